@@ -1,0 +1,30 @@
+# A room is a folder: its public headers in include/abbe/NAME, its sources in src, one static library abbe_NAME.
+# The library exposes nothing but its own include folder, so an arrow the architecture forbids does not compile.
+
+add_library(abbe_warnings INTERFACE)
+add_library(abbe::warnings ALIAS abbe_warnings)
+target_compile_options(abbe_warnings INTERFACE
+  -Wall -Wextra -Wpedantic -Wshadow -Wconversion -Wno-sign-conversion -Wnon-virtual-dtor -Wold-style-cast -Werror
+  $<$<CXX_COMPILER_ID:Clang>:-Wthread-safety>)
+
+if(ABBE_SANITIZE)
+  add_compile_options(-fsanitize=${ABBE_SANITIZE} -fno-omit-frame-pointer)
+  add_link_options(-fsanitize=${ABBE_SANITIZE})
+  if(ABBE_SANITIZE MATCHES "undefined")
+    add_compile_options(-fno-sanitize-recover=undefined)
+  endif()
+endif()
+
+function(abbe_room name)
+  file(GLOB_RECURSE sources CONFIGURE_DEPENDS ${CMAKE_CURRENT_SOURCE_DIR}/src/*.cpp)
+  file(GLOB_RECURSE headers CONFIGURE_DEPENDS ${CMAKE_CURRENT_SOURCE_DIR}/include/*.hpp)
+  add_library(abbe_${name} STATIC ${sources})
+  add_library(abbe::${name} ALIAS abbe_${name})
+  set_target_properties(abbe_${name} PROPERTIES EXPORT_NAME ${name} VERIFY_INTERFACE_HEADER_SETS ON
+                        POSITION_INDEPENDENT_CODE ON)
+  target_sources(abbe_${name} PUBLIC FILE_SET HEADERS BASE_DIRS ${CMAKE_CURRENT_SOURCE_DIR}/include
+                                     FILES ${headers})
+  target_include_directories(abbe_${name} PRIVATE ${CMAKE_CURRENT_SOURCE_DIR}/src)
+  target_compile_features(abbe_${name} PUBLIC cxx_std_20)
+  target_link_libraries(abbe_${name} PRIVATE $<BUILD_INTERFACE:abbe::warnings>)
+endfunction()

@@ -1,0 +1,3 @@
+namespace abbe::daemon {
+// Replaced by the room's first real source.
+}

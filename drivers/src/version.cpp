@@ -1,0 +1,3 @@
+namespace abbe::drivers {
+// Replaced by the room's first real source.
+}

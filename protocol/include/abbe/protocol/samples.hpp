@@ -1,0 +1,122 @@
+#pragma once
+/// The plain vocabulary: what devices say, once decoded. SI (m, rad, s, K, Pa); trivially copyable, fixed size, so
+/// that a sample can live in a ring. `time` is the host time of the instant the sample describes, never of its arrival.
+/// Pure data; safe to copy between threads.
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <type_traits>
+
+#include "abbe/protocol/time.hpp"
+
+namespace abbe::protocol {
+
+inline constexpr std::size_t kMaxAxes = 8;
+
+/// Quality of one sample; a bit set, so that several can be true at once.
+enum class SampleFlag : std::uint32_t {
+  None = 0,
+  GapBefore = 1u << 0,        ///< samples were lost before this one: see `lost_before`
+  TimeWidened = 1u << 1,      ///< the kernel stamp was unusable, u_time was widened
+  ClockUnsettled = 1u << 2,   ///< the device clock model has not converged yet
+  AxisMissing = 1u << 3,      ///< at least one axis did not answer in this cycle: see `missing_mask`
+  BusError = 1u << 4,         ///< the bus reported errors since the previous sample
+  BusOff = 1u << 5,           ///< the CAN controller is bus-off: positions are the last known ones
+  DeviceError = 1u << 6,      ///< the device itself reports an error (EMCY, alarm, bad status)
+  SpeedWarning = 1u << 7,     ///< tracker: target nearly too fast
+  SpeedExceeded = 1u << 8,    ///< tracker: target too fast, the point is not to be used
+  PointInvalid = 1u << 9,     ///< tracker: prism error or trigger violation, the point is not to be used
+  BeamReturned = 1u << 10,    ///< first point after the beam was lost
+  Restarted = 1u << 11,       ///< first sample after a reconnection or a restart of the device
+};
+using SampleFlags = std::uint32_t;
+
+constexpr SampleFlags operator|(SampleFlag a, SampleFlag b) noexcept {
+  return static_cast<SampleFlags>(a) | static_cast<SampleFlags>(b);
+}
+constexpr SampleFlags operator|(SampleFlags a, SampleFlag b) noexcept { return a | static_cast<SampleFlags>(b); }
+constexpr SampleFlags& operator|=(SampleFlags& a, SampleFlag b) noexcept { return a = a | b; }
+[[nodiscard]] constexpr bool has(SampleFlags flags, SampleFlag f) noexcept {
+  return (flags & static_cast<SampleFlags>(f)) != 0;
+}
+
+/// What every sample in a ring begins with. `u_time` is a standard uncertainty (k = 1) of `time`.
+struct SampleHead {
+  HostTime time{};
+  std::chrono::nanoseconds u_time{};
+  SampleFlags flags = 0;
+  std::uint32_t lost_before = 0;  ///< samples dropped between the previous one in the ring and this one
+};
+
+/// One point of a laser tracker, in the tracker's own frame (right-handed, z up).
+struct TrackerPoint {
+  SampleHead head;
+  DeviceTime device_time{};
+  std::array<double, 3> p_tracker_m{};  ///< position of the reflector centre
+  std::int32_t device_status = 0;       ///< the point status as the device sent it
+};
+
+/// All axes of one encoder bus at one SYNC (or one scan).
+struct AxisSample {
+  SampleHead head;
+  std::uint32_t cycle = 0;         ///< SYNC or scan number since start, wraps
+  std::uint8_t axis_count = 0;
+  std::uint8_t missing_mask = 0;   ///< bit i: axis i did not answer, its values are the previous ones
+  std::array<std::int64_t, kMaxAxes> count{};    ///< raw device counts
+  std::array<double, kMaxAxes> position{};       ///< scale reading, m (linear) or rad (rotary)
+};
+
+/// One confirmed edge of a touch probe.
+struct ProbeTrigger {
+  SampleHead head;
+  std::uint32_t touch = 0;  ///< number of the touch since start
+};
+
+/// What the air is like where the measurement happens. NaN where the device does not measure a quantity.
+struct EnvironmentSample {
+  SampleHead head;
+  double air_temperature_K = 0.0;
+  double air_pressure_Pa = 0.0;
+  double relative_humidity = 0.0;  ///< 0 to 1
+};
+
+/// The machine at one instant: axes interpolated to `head.time`, and what was measured there.
+struct Snapshot {
+  SampleHead head;
+  std::uint8_t axis_count = 0;
+  std::uint8_t missing_mask = 0;
+  bool axes_compensated = false;  ///< false: raw scale readings; true: already corrected by the control
+  bool has_tracker_point = false;
+  bool has_trigger = false;
+  bool has_environment = false;
+  std::array<double, kMaxAxes> position{};      ///< m or rad
+  std::array<double, kMaxAxes> velocity{};      ///< m/s or rad/s
+  std::array<double, kMaxAxes> u_position{};    ///< standard uncertainty of the interpolation to head.time, m or rad
+  TrackerPoint tracker_point;
+  ProbeTrigger trigger;
+  EnvironmentSample environment;
+};
+
+/// Bytes exactly as they crossed the boundary of a device, cut into blocks of fixed size. A message longer than one
+/// block goes on in the next ones, each but the last with `continued` set.
+struct RawBlock {
+  static constexpr std::size_t kCapacity = 2048;
+  enum class Direction : std::uint8_t { FromDevice = 0, ToDevice = 1 };
+
+  HostTime time{};                 ///< arrival (FromDevice) or departure (ToDevice)
+  std::uint32_t lost_before = 0;   ///< blocks dropped between the previous one in the ring and this one
+  std::uint16_t length = 0;
+  bool continued = false;          ///< the next block belongs to the same read
+  Direction direction = Direction::FromDevice;
+  std::array<std::byte, kCapacity> bytes;  // NOLINT: left uninitialised on purpose, `length` says what counts
+};
+
+static_assert(std::is_trivially_copyable_v<TrackerPoint>);
+static_assert(std::is_trivially_copyable_v<AxisSample>);
+static_assert(std::is_trivially_copyable_v<ProbeTrigger>);
+static_assert(std::is_trivially_copyable_v<EnvironmentSample>);
+static_assert(std::is_trivially_copyable_v<Snapshot>);
+static_assert(std::is_trivially_copyable_v<RawBlock>);
+
+}  // namespace abbe::protocol

@@ -1,0 +1,44 @@
+#pragma once
+/// The clocks of the house, as types: subtracting instants of two clocks does not compile, only a ClockModel converts.
+/// None has a now(): reading a clock is for drivers and daemon; everything here is handed its time.
+
+#include <chrono>
+#include <cstdint>
+
+namespace abbe::protocol {
+
+/// Host time: CLOCK_MONOTONIC, or speed x CLOCK_MONOTONIC with simulated devices. Never the wall clock.
+struct HostClock {
+  using duration = std::chrono::nanoseconds;
+  using rep = duration::rep;
+  using period = duration::period;
+  using time_point = std::chrono::time_point<HostClock>;
+  static constexpr bool is_steady = true;
+};
+using HostTime = HostClock::time_point;
+
+/// A device's own free-running clock of arbitrary epoch (tracker seconds and microseconds, encoder ticks).
+struct DeviceClock {
+  using duration = std::chrono::nanoseconds;
+  using rep = duration::rep;
+  using period = duration::period;
+  using time_point = std::chrono::time_point<DeviceClock>;
+  static constexpr bool is_steady = true;
+};
+using DeviceTime = DeviceClock::time_point;
+
+/// Wall-clock time; appears only in the one constant that maps HostTime to UTC for people and file dates.
+using UtcTime = std::chrono::sys_time<std::chrono::nanoseconds>;
+
+/// UTC = host + offset. Taken once at start, recorded and published, never baked into samples.
+struct UtcOffset {
+  std::chrono::nanoseconds value{};
+  [[nodiscard]] constexpr UtcTime to_utc(HostTime t) const noexcept {
+    return UtcTime{t.time_since_epoch() + value};
+  }
+  [[nodiscard]] constexpr HostTime to_host(UtcTime t) const noexcept {
+    return HostTime{t.time_since_epoch() - value};
+  }
+};
+
+}  // namespace abbe::protocol

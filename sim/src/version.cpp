@@ -1,0 +1,3 @@
+namespace abbe::sim {
+// Replaced by the room's first real source.
+}

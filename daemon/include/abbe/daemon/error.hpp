@@ -1,5 +1,6 @@
 #pragma once
-/// The daemon's errors: a code a program can act on and a sentence a person can, "what was tried: what was seen".
+/// The daemon's errors: a code a program can act on and a sentence a person can, "what was tried: what was
+/// seen".
 
 #include <string>
 #include <tl/expected.hpp>

@@ -1,3 +1,0 @@
-namespace abbe::daemon {
-// Replaced by the room's first real source.
-}

@@ -1,0 +1,212 @@
+#include "abbe/daemon/cdr.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <map>
+#include <random>
+#include <regex>
+#include <string>
+
+namespace abbe::daemon {
+namespace {
+
+using testing::HasSubstr;
+
+v1::Snapshot some_snapshot() {
+  v1::Snapshot s;
+  s.machine("vmc-3");
+  s.sequence_number(42);
+  s.host_time_ns(-7);
+  s.position({0.1, 0.2, 0.3});
+  s.velocity({1.0, 2.0, 3.0});
+  s.u_position({1e-6, 2e-6, 3e-6});
+  s.has_tracker_point(true);
+  s.p_tracker_m({1.5, -2.5, 0.25});
+  s.relative_humidity(0.5);
+  return s;
+}
+
+v1::ErrorModel some_model() {
+  v1::ErrorModel m;
+  m.machine("vmc-3");
+  m.model_id("otf-1");
+  m.chain("[w X' b Y Z (C1) t]");
+  v1::Parameter p;
+  p.name("EXX");
+  p.value(1e-6);
+  m.parameters({p, p, p});
+  v1::AxisRange r;
+  r.axis("X");
+  r.max_m(0.5);
+  m.validity({r});
+  return m;
+}
+
+template <class T>
+std::vector<std::byte> encoded(const T& value) {
+  std::vector<std::byte> payload;
+  EXPECT_TRUE(encode(value, payload).has_value());
+  return payload;
+}
+
+TEST(Cdr, PayloadBeginsWithLittleEndianCdrHeader) {
+  const auto payload = encoded(some_snapshot());
+  const std::vector<std::byte> header(payload.begin(), payload.begin() + 4);
+  EXPECT_EQ(header, (std::vector{std::byte{0}, std::byte{1}, std::byte{0}, std::byte{0}}));
+}
+
+TEST(Cdr, FirstMemberIsLaidOutAsXcdr1String) {
+  const auto payload = encoded(some_snapshot());
+  EXPECT_EQ(payload[4], std::byte{6});  // length of "vmc-3" with its NUL, little endian
+  EXPECT_EQ(std::string(reinterpret_cast<const char*>(payload.data()) + 8, 6), std::string("vmc-3\0", 6));
+}
+
+TEST(Cdr, SnapshotSurvivesTheRoundTripFieldByField) {
+  const auto s = some_snapshot();
+  const auto back = decode<v1::Snapshot>(encoded(s));
+  ASSERT_TRUE(back.has_value());
+  EXPECT_EQ(*back, s);
+}
+
+TEST(Cdr, ModelSurvivesTheRoundTripFieldByField) {
+  const auto m = some_model();
+  const auto back = decode<v1::ErrorModel>(encoded(m));
+  ASSERT_TRUE(back.has_value());
+  EXPECT_EQ(*back, m);
+}
+
+TEST(Cdr, EncodeRefusesTextBeyondItsBound) {
+  auto s = some_snapshot();
+  s.machine(std::string(65, 'm'));
+  std::vector<std::byte> payload;
+  const auto result = encode(s, payload);
+  ASSERT_FALSE(result.has_value());
+  EXPECT_THAT(result.error().text, HasSubstr("machine: 65 bytes, bound 64"));
+  EXPECT_TRUE(payload.empty());
+}
+
+TEST(Cdr, EncodeRefusesSequenceBeyondItsBound) {
+  auto s = some_snapshot();
+  s.velocity(std::vector<double>(9));
+  std::vector<std::byte> payload;
+  EXPECT_FALSE(encode(s, payload).has_value());
+}
+
+TEST(Cdr, EncodeTakesSequenceAtItsBound) {
+  v1::ErrorGrid grid;
+  grid.nodes(std::vector<v1::GridNode>(480));
+  EXPECT_LE(encoded(grid).size(), 48'000u);
+}
+
+TEST(Cdr, EncodeRefusesBoundsBrokenInsideASequence) {
+  auto m = some_model();
+  m.parameters()[2].name(std::string(17, 'E'));
+  std::vector<std::byte> payload;
+  EXPECT_FALSE(encode(m, payload).has_value());
+}
+
+TEST(Cdr, EncodeRefusesTextWithNulInside) {
+  auto s = some_snapshot();
+  s.machine(std::string("a\0b", 3));
+  std::vector<std::byte> payload;
+  EXPECT_FALSE(encode(s, payload).has_value());
+}
+
+TEST(Cdr, DecodeRefusesAnEnumeratorThatDoesNotExist) {
+  v1::ModelState state;
+  state.machine("m");
+  auto payload = encoded(state);
+  // header 4, machine 4 + 2 (padded to 8), sequence number 8, host time 8, then the enumeration.
+  payload.at(4 + 8 + 8 + 8) = std::byte{17};
+  EXPECT_FALSE(decode<v1::ModelState>(payload).has_value());
+}
+
+TEST(Cdr, DecodeRefusesWhatEncodeWouldRefuse) {
+  auto payload = encoded(some_snapshot());
+  payload.at(4) = std::byte{200};  // a longer machine name, reaching into what follows
+  EXPECT_FALSE(decode<v1::Snapshot>(payload).has_value());
+}
+
+TEST(Cdr, DecodeRefusesEveryTruncation) {
+  const auto payload = encoded(some_model());
+  for (std::size_t n = 0; n < payload.size(); ++n) {
+    EXPECT_FALSE(decode<v1::ErrorModel>(std::span(payload).first(n)).has_value()) << n << " bytes";
+  }
+}
+
+TEST(Cdr, DecodeTakesPaddingToAMultipleOfFourButNoMore) {
+  auto payload = encoded(some_snapshot());
+  payload.resize(payload.size() + 3);
+  EXPECT_TRUE(decode<v1::Snapshot>(payload).has_value());
+  payload.resize(payload.size() + 1);
+  EXPECT_FALSE(decode<v1::Snapshot>(payload).has_value());
+}
+
+TEST(Cdr, DecodeIsTotalOnDamagedBytes) {
+  std::mt19937 random(4711);
+  const auto good = encoded(some_model());
+  std::size_t refused = 0;
+  for (int i = 0; i < 5000; ++i) {
+    auto bad = good;
+    for (int k = 0; k < 4; ++k) bad[4 + random() % (bad.size() - 4)] = static_cast<std::byte>(random());
+    const auto value = decode<v1::ErrorModel>(bad);
+    if (!value) {
+      ++refused;
+      EXPECT_FALSE(value.error().text.empty());
+    }
+  }
+  EXPECT_GT(refused, 0u);
+}
+
+TEST(Cdr, NamesAreThoseOfDdsAndMcap) {
+  EXPECT_EQ(type_name<v1::ErrorGrid>(), "abbe::v1::ErrorGrid");
+  EXPECT_EQ(topic_name<v1::ErrorGrid>(), "abbe/v1/ErrorGrid");
+}
+
+/// Bounded members of one struct as the IDL text says.
+std::map<std::string, std::size_t> bounds_in_idl(const std::string& type) {
+  std::string text(idl_text());
+  const auto begin = text.find("struct " + type + " {");
+  EXPECT_NE(begin, std::string::npos) << type;
+  text = text.substr(begin, text.find("};", begin) - begin);
+  const std::regex member(R"((?:string<|sequence<[^,]*,\s*)(\d+)>\s*(\w+);)");
+  std::map<std::string, std::size_t> bounds;
+  for (std::sregex_iterator it(text.begin(), text.end(), member), end; it != end; ++it) {
+    bounds[(*it)[2]] = std::stoul((*it)[1]);
+  }
+  return bounds;
+}
+
+template <class T>
+void expect_bounds_of_idl(const std::string& type) {
+  std::map<std::string, std::size_t> checked;
+  for (const MemberBound& b : member_bounds<T>()) checked[std::string(b.member)] = b.bound;
+  EXPECT_EQ(checked, bounds_in_idl(type)) << type;
+  EXPECT_FALSE(checked.empty());
+}
+
+TEST(Cdr, BoundsCheckedAreThoseOfTheIdl) {
+  expect_bounds_of_idl<v1::TrackerPoint>("TrackerPoint");
+  expect_bounds_of_idl<v1::AxisSample>("AxisSample");
+  expect_bounds_of_idl<v1::EnvironmentSample>("EnvironmentSample");
+  expect_bounds_of_idl<v1::RawBytes>("RawBytes");
+  expect_bounds_of_idl<v1::CalibrationEvent>("CalibrationEvent");
+  expect_bounds_of_idl<v1::Snapshot>("Snapshot");
+  expect_bounds_of_idl<v1::Compensation>("Compensation");
+  expect_bounds_of_idl<v1::Parameter>("Parameter");
+  expect_bounds_of_idl<v1::AxisRange>("AxisRange");
+  expect_bounds_of_idl<v1::ErrorModel>("ErrorModel");
+  expect_bounds_of_idl<v1::ErrorGrid>("ErrorGrid");
+  expect_bounds_of_idl<v1::ModelState>("ModelState");
+  expect_bounds_of_idl<v1::Health>("Health");
+}
+
+TEST(Cdr, IdlTextCarriesNoPathOfTheBuildMachine) {
+  EXPECT_THAT(std::string(idl_text()), HasSubstr("struct Snapshot {"));
+  EXPECT_EQ(idl_text().find("/home"), std::string_view::npos);
+  EXPECT_EQ(idl_text().find("#line"), std::string_view::npos);
+}
+
+}  // namespace
+}  // namespace abbe::daemon

@@ -1,0 +1,101 @@
+#pragma once
+/// CANopen communication objects that are one frame each: NMT, SYNC, heartbeat, EMCY [CiA 301].
+/// Every decoder is total: a frame that is not exactly such an object gives nullopt. Pure, no allocation.
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+
+#include "abbe/protocol/can/frame.hpp"
+#include "abbe/protocol/rt.hpp"
+
+namespace abbe::protocol::can {
+
+using NodeId = std::uint8_t;  ///< 1..127; 0 addresses all nodes in NMT commands only
+inline constexpr NodeId kMaxNodeId = 127;
+inline constexpr NodeId kAllNodes = 0;
+[[nodiscard]] constexpr bool is_node_id(unsigned node) noexcept {
+  return node >= 1 && node <= kMaxNodeId;
+}
+
+/// Identifiers of the predefined connection set [CiA 301].
+namespace cob {
+inline constexpr std::uint32_t kNmt = 0x000;
+inline constexpr std::uint32_t kSync = 0x080;
+inline constexpr std::uint32_t kEmergency = 0x080;    ///< + node
+inline constexpr std::uint32_t kTpdo1 = 0x180;        ///< + node; TPDO n: + 100h (n - 1)
+inline constexpr std::uint32_t kSdoResponse = 0x580;  ///< + node, server -> client
+inline constexpr std::uint32_t kSdoRequest = 0x600;   ///< + node, client -> server
+inline constexpr std::uint32_t kHeartbeat = 0x700;    ///< + node
+[[nodiscard]] constexpr std::uint32_t tpdo(unsigned number, NodeId node) noexcept {
+  return kTpdo1 + 0x100 * (number - 1) + node;
+}
+}  // namespace cob
+
+enum class NmtCommand : std::uint8_t {
+  Start = 1,
+  Stop = 2,
+  PreOperational = 128,
+  ResetNode = 129,
+  ResetCommunication = 130
+};
+struct NmtMessage {
+  NmtCommand command{};
+  NodeId node = kAllNodes;
+};
+[[nodiscard]] CanFrame encode_nmt(NmtCommand command, NodeId node) ABBE_RT;
+[[nodiscard]] std::optional<NmtMessage> decode_nmt(const CanFrame& frame) ABBE_RT;
+
+/// SYNC: no data, or a counter that runs 1..overflow value (1019h).
+struct Sync {
+  std::optional<std::uint8_t> counter;
+};
+[[nodiscard]] CanFrame encode_sync(std::optional<std::uint8_t> counter = std::nullopt) ABBE_RT;
+[[nodiscard]] std::optional<Sync> decode_sync(const CanFrame& frame) ABBE_RT;
+
+/// NMT state as the heartbeat carries it; 0 is the boot-up message, sent once after a reset.
+enum class NodeState : std::uint8_t { BootUp = 0, Stopped = 4, Operational = 5, PreOperational = 127 };
+struct Heartbeat {
+  NodeId node = 0;
+  NodeState state{};
+};
+[[nodiscard]] CanFrame encode_heartbeat(NodeId node, NodeState state) ABBE_RT;
+[[nodiscard]] std::optional<Heartbeat> decode_heartbeat(const CanFrame& frame) ABBE_RT;
+
+/// Emergency error codes [CiA 301]; a device may send others of the same hundreds.
+enum class EmergencyCode : std::uint16_t {
+  Reset = 0x0000,
+  Generic = 0x1000,
+  Current = 0x2000,
+  Voltage = 0x3000,
+  Temperature = 0x4000,
+  Hardware = 0x5000,
+  Software = 0x6000,
+  CanOverrun = 0x8110,
+  ErrorPassive = 0x8120,
+  HeartbeatLost = 0x8130,
+  RecoveredFromBusOff = 0x8140,
+  IdCollision = 0x8150,
+  PdoLength = 0x8210,
+};
+/// Bits of the error register 1001h [CiA 301].
+enum class ErrorRegister : std::uint8_t {
+  Generic = 1u << 0,
+  Current = 1u << 1,
+  Voltage = 1u << 2,
+  Temperature = 1u << 3,
+  Communication = 1u << 4,
+  Profile = 1u << 5,
+  Manufacturer = 1u << 7,
+};
+struct Emergency {
+  NodeId node = 0;
+  std::uint16_t code = 0;  ///< 0: all errors gone
+  std::uint8_t error_register = 0;
+  std::array<std::byte, 5> manufacturer{};
+};
+[[nodiscard]] CanFrame encode_emergency(const Emergency& emergency) ABBE_RT;
+[[nodiscard]] std::optional<Emergency> decode_emergency(const CanFrame& frame) ABBE_RT;
+
+}  // namespace abbe::protocol::can

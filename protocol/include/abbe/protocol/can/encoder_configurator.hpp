@@ -1,0 +1,125 @@
+#pragma once
+/// Brings one encoder from any state to "sends its position at every SYNC" [CiA 301: PDO configuration
+/// order]. Sans-I/O like the SdoClient it drives: frames and a time in, frames out. No allocation. Not
+/// thread-safe.
+///
+/// Order: NMT pre-operational; read 1000h and 1018h and check them; read the step (6005h:01, else 6501h;
+/// rotary: 6001h); disable the TPDO; clear its mapping; map the position; set the count; transmission type,
+/// inhibit time, event timer; enable it; heartbeat; disable the other default TPDO; NMT start.
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+
+#include "abbe/protocol/can/canopen.hpp"
+#include "abbe/protocol/can/pdo.hpp"
+#include "abbe/protocol/can/sdo.hpp"
+#include "abbe/protocol/can/sdo_client.hpp"
+#include "abbe/protocol/time.hpp"
+
+namespace abbe::protocol::can {
+
+/// What the encoder shall do, and what it must be.
+struct EncoderPlan {
+  NodeId node = 1;
+  PositionType position = PositionType::Signed32;
+  std::uint8_t tpdo = 1;        ///< 1 or 2
+  std::uint8_t sync_every = 1;  ///< 1..240: transmission type
+  std::uint16_t heartbeat_ms = 100;
+  std::optional<std::uint32_t> vendor;  ///< checked against 1018h when given
+  std::optional<std::uint32_t> product;
+  std::optional<std::uint32_t> serial;
+};
+
+/// One SDO write of the procedure.
+struct SdoWrite {
+  ObjectId object;
+  std::uint32_t value = 0;
+  std::uint8_t size = 0;
+  bool optional = false;  ///< a node without this object is as good
+};
+/// Steps 2 to 8 as a list.
+using PdoConfiguration = std::array<SdoWrite, 10>;
+[[nodiscard]] PdoConfiguration pdo_configuration(const EncoderPlan& plan) noexcept;
+
+/// What the encoder said about itself.
+struct EncoderDescription {
+  std::uint32_t device_type = 0;
+  std::uint32_t vendor = 0;
+  std::uint32_t product = 0;
+  std::uint32_t revision = 0;
+  std::uint32_t serial = 0;
+  std::optional<std::uint32_t> step_nm;               ///< linear, as read: 0 is for the caller to refuse
+  std::optional<std::uint32_t> units_per_revolution;  ///< rotary
+};
+
+enum class ConfigurationFault : std::uint8_t {
+  None,
+  Silent,        ///< no answer, all retries used
+  Refused,       ///< SDO abort by the node: `abort_code`
+  NotAnEncoder,  ///< 1000h does not say profile 406: `seen`
+  WrongVendor,   ///< `seen`
+  WrongProduct,  ///< `seen`
+  WrongSerial,   ///< `seen`
+  BadAnswer,     ///< an answer that is no number, or a protocol error
+};
+struct ConfigurationError {
+  ConfigurationFault fault = ConfigurationFault::None;
+  ObjectId object;
+  AbortCode abort_code = AbortCode::None;
+  std::uint32_t seen = 0;
+};
+/// "does not answer", "refused", ... Static storage.
+[[nodiscard]] const char* to_text(ConfigurationFault fault) noexcept;
+
+class EncoderConfigurator {
+ public:
+  enum class State : std::uint8_t { Idle, Working, Ready, Failed };
+
+  explicit EncoderConfigurator(const EncoderPlan& plan, SdoClientOptions options = {}) noexcept;
+
+  void start(HostTime now) noexcept;
+  void on_frame(const CanFrame& frame, HostTime now) noexcept;
+  void on_time(HostTime now) noexcept;
+  /// The next frame to send, until nullopt.
+  [[nodiscard]] std::optional<CanFrame> take_frame() noexcept;
+
+  [[nodiscard]] State state() const noexcept { return state_; }
+  [[nodiscard]] HostTime deadline() const noexcept { return sdo_.deadline(); }
+  [[nodiscard]] const EncoderPlan& plan() const noexcept { return plan_; }
+  [[nodiscard]] const EncoderDescription& description() const noexcept { return description_; }
+  [[nodiscard]] const ConfigurationError& error() const noexcept { return error_; }
+
+ private:
+  enum class Step : std::uint8_t {
+    DeviceType,
+    Vendor,
+    Product,
+    Revision,
+    Serial,
+    Scale,
+    ScaleFallback,
+    Write
+  };
+
+  void advance(HostTime now) noexcept;
+  void begin_step(HostTime now) noexcept;
+  void next_step(HostTime now) noexcept;
+  void write_number(const SdoWrite& write, HostTime now) noexcept;
+  [[nodiscard]] bool take_number(std::uint32_t value) noexcept;
+  [[nodiscard]] bool tolerated() const noexcept;
+  void fail(ConfigurationFault fault, std::uint32_t seen) noexcept;
+
+  EncoderPlan plan_;
+  SdoClient sdo_;
+  PdoConfiguration writes_;
+  EncoderDescription description_;
+  ConfigurationError error_;
+  State state_ = State::Idle;
+  Step step_ = Step::DeviceType;
+  std::size_t write_index_ = 0;
+  std::optional<CanFrame> nmt_;  ///< goes out before anything of the SDO client
+};
+
+}  // namespace abbe::protocol::can

@@ -5,6 +5,7 @@
 #include <string>
 #include <tl/expected.hpp>
 #include <utility>
+#include <vector>
 
 namespace abbe::daemon {
 
@@ -19,6 +20,8 @@ enum class ErrorCode {
 struct Error {
   ErrorCode code = ErrorCode::BadInput;
   std::string text;
+  std::vector<std::string> details =
+      {};  ///< one line each, when one sentence is not enough: every fault of a file
 };
 
 template <class T>
@@ -26,6 +29,23 @@ using Result = tl::expected<T, Error>;
 
 [[nodiscard]] inline tl::unexpected<Error> fail(ErrorCode code, std::string text) {
   return tl::make_unexpected(Error{code, std::move(text)});
+}
+
+/// Exit code of a program that ends with this error; 0 is success. Listed in every --help.
+[[nodiscard]] constexpr int exit_code(ErrorCode code) noexcept {
+  switch (code) {
+    case ErrorCode::DataInsufficient:
+      return 1;
+    case ErrorCode::Usage:
+      return 2;
+    case ErrorCode::BadInput:
+      return 3;
+    case ErrorCode::Io:
+      return 4;
+    case ErrorCode::Refused:
+      return 5;
+  }
+  return 4;
 }
 
 }  // namespace abbe::daemon

@@ -1,0 +1,185 @@
+#pragma once
+/// The one configuration file, read once into plain structs. In the file lengths are mm, small errors um and
+/// urad, times ms or us, and the unit stands in the key; here everything is SI or std::chrono. A relative
+/// path is meant from the folder of the file. `machine.toml` (only [machine], [axes], [target], [model] and
+/// the noise figures of [tracker]) and `abbed.toml` (everything) are the same format: each reader takes from
+/// either file what it needs. Pure data; safe to copy between threads.
+
+#include <array>
+#include <chrono>
+#include <cstdint>
+#include <filesystem>
+#include <map>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "abbe/daemon/error.hpp"
+
+namespace abbe::daemon {
+
+enum class AxisKind { Linear, Rotary };
+
+/// [axes.NAME]. `reference` is where positioning and angle tables are zero: 0 if inside the range, else the
+/// minimum.
+struct AxisConfig {
+  std::string name;
+  AxisKind kind = AxisKind::Linear;
+  double min = 0.0;        ///< m or rad
+  double max = 0.0;        ///< m or rad
+  double reference = 0.0;  ///< m or rad
+  friend bool operator==(const AxisConfig&, const AxisConfig&) = default;
+};
+
+enum class BasisConfig { Linear, Cubic };
+
+/// [machine], [axes.*], [target], [model], and the noise figures of [tracker]: what identification needs to
+/// know.
+struct MachineConfig {
+  std::string name;
+  std::string chain;             ///< ISO 10791-6 style, "[w X' b Y Z (C1) t]"
+  std::vector<AxisConfig> axes;  ///< linear axes in the order X, Y, Z, then rotary ones by name
+  std::array<double, 3>
+      target_offset_m{};  ///< reflector centre relative to the tool reference point, machine axes
+  BasisConfig basis = BasisConfig::Linear;
+  std::map<std::string, std::vector<double>>
+      nodes_m;                    ///< of every linear axis, ascending, both ends of travel included
+  double sigma_range_m = 2e-6;    ///< standard deviation of one tracker range
+  double sigma_angle_rad = 3e-6;  ///< standard deviation of one tracker direction, perpendicular to the beam
+  [[nodiscard]] const AxisConfig* find_axis(std::string_view name) const noexcept;
+  friend bool operator==(const MachineConfig&, const MachineConfig&) = default;
+};
+
+enum class WeatherConfig {
+  None,
+  Read,
+  Compute
+};  ///< none: environment is not read; compute: the controller corrects n
+
+/// [tracker]: the instrument on the wire.
+struct TrackerConfig {
+  std::string name = "tracker";
+  std::string host;
+  std::uint16_t port = 700;
+  double point_rate_hz = 500.0;
+  WeatherConfig weather = WeatherConfig::Compute;
+  std::chrono::nanoseconds max_constant_delay{
+      std::chrono::milliseconds{2}};  ///< bound of the unobservable part of the delay
+  std::chrono::nanoseconds connect_timeout{std::chrono::seconds{3}};
+  std::chrono::nanoseconds command_timeout{std::chrono::seconds{3}};
+  std::chrono::nanoseconds initialize_timeout{std::chrono::seconds{120}};
+  std::chrono::nanoseconds silence_timeout{
+      std::chrono::milliseconds{1500}};  ///< no data while streaming: a fault
+};
+
+enum class EncoderTransport { Udp, SocketCan };
+
+/// One element of [encoder] nodes. reading = offset + count * step, the step negative when `invert = true`.
+struct EncoderNodeConfig {
+  std::string axis;
+  std::uint8_t node = 0;  ///< CANopen node id, 1 to 127
+  double step = 1e-9;     ///< m or rad per count, signed
+  double offset = 0.0;    ///< m or rad: the reading at count 0
+  AxisKind kind = AxisKind::Linear;
+};
+
+/// [encoder]: CANopen encoders on one bus.
+struct EncoderConfig {
+  std::string name = "encoder";
+  EncoderTransport transport = EncoderTransport::SocketCan;
+  std::string interface;         ///< SocketCAN only, "can0"
+  std::uint16_t local_port = 0;  ///< UDP only; 0: the kernel chooses
+  std::string peer_host;         ///< UDP only
+  std::uint16_t peer_port = 0;   ///< UDP only
+  std::chrono::nanoseconds sync_period{std::chrono::milliseconds{1}};
+  std::chrono::nanoseconds sampling_delay{};    ///< from SYNC on the wire to the instant the node latches
+  std::chrono::nanoseconds u_sampling_delay{};  ///< its standard uncertainty
+  bool axes_compensated = false;                ///< true: the control already corrects these readings
+  std::vector<EncoderNodeConfig> nodes;
+};
+
+enum class RealTimeMode { Enforce, Ignore };
+
+/// [daemon]
+struct DaemonConfig {
+  std::filesystem::path data_dir = "/var/lib/abbe";
+  std::filesystem::path runtime_dir = "/run/abbe";
+  std::chrono::nanoseconds hub_period{std::chrono::microseconds{250}};
+  std::chrono::nanoseconds watermark{
+      std::chrono::milliseconds{600}};  ///< how long the hub waits for a late stream
+  bool simulated = false;               ///< the devices are simulated: only then may `speed` differ from 1
+  double speed = 1.0;                   ///< host time = speed x CLOCK_MONOTONIC
+  RealTimeMode realtime = RealTimeMode::Ignore;
+  int tracker_priority = 40;  ///< SCHED_FIFO, 1 to 99
+  int encoder_priority = 50;
+  int hub_priority = 30;
+  std::optional<int> tracker_cpu;  ///< the core the thread is bound to
+  std::optional<int> encoder_cpu;
+  std::optional<int> hub_cpu;
+};
+
+/// [recording]
+struct RecordingConfig {
+  std::filesystem::path dir;  ///< default: data_dir/recordings
+  std::uint32_t chunk_bytes = 256 * 1024;
+  std::chrono::nanoseconds chunk_period{
+      std::chrono::seconds{1}};                         ///< a chunk is closed at the latest after this
+  bool raw = true;                                      ///< also record the device bytes
+  std::uint64_t min_free_bytes = 256ull * 1024 * 1024;  ///< recording stops, acquisition goes on, below this
+};
+
+enum class Supervise { Child, Systemd, Off };
+
+/// [dds]
+struct DdsConfig {
+  std::uint32_t domain = 0;
+  double snapshot_hz = 50.0;
+  double compensation_hz = 100.0;
+  std::chrono::nanoseconds model_repeat{std::chrono::seconds{10}};
+  std::chrono::nanoseconds validity{
+      std::chrono::milliseconds{500}};  ///< a subscriber must not apply older vectors
+  Supervise supervise = Supervise::Child;
+  std::filesystem::path profile;  ///< XML profiles; empty: the built-in ones
+  std::filesystem::path socket;   ///< default: runtime_dir/dds.sock
+};
+
+/// [gate]: what a model must satisfy before it may become active.
+struct GateConfig {
+  double max_error_m = 1e-3;      ///< largest |V| inside the validity volume
+  double max_gradient = 1e-3;     ///< largest |dV/dq|, m per m
+  double holdout_fraction = 0.2;  ///< share of the blocks the fit does not see
+  std::vector<std::string>
+      accept;  ///< by name: what the data of a method cannot show and the site takes upon itself
+};
+
+/// [control]
+struct ControlConfig {
+  std::filesystem::path socket;  ///< default: runtime_dir/control.sock
+};
+
+/// The whole file. `[tracker]` without host and a missing `[encoder]` mean "not connected".
+struct Config {
+  MachineConfig machine;
+  std::optional<TrackerConfig> tracker;
+  std::optional<EncoderConfig> encoder;
+  DaemonConfig daemon;
+  RecordingConfig recording;
+  DdsConfig dds;
+  GateConfig gate;
+  ControlConfig control;
+};
+
+/// Reads and checks a whole file. Io if it cannot be read; else BadInput with one line per fault in
+/// Error::details, at most 20, each "file:line:column: key: what is wrong". Nothing is used of a file that
+/// has a fault.
+[[nodiscard]] Result<Config> load_config(const std::filesystem::path& file);
+
+/// The same for the text of a file; `file` names it in the errors and anchors relative paths.
+[[nodiscard]] Result<Config> parse_config(std::string_view text, const std::filesystem::path& file);
+
+/// SHA-256 in hex over what a model depends on (machine identity, chain, axes, target, basis and nodes): a
+/// stored model is only taken up again after a restart if this agrees. Noise figures do not enter.
+[[nodiscard]] std::string machine_hash(const MachineConfig& machine);
+
+}  // namespace abbe::daemon

@@ -1,0 +1,56 @@
+#pragma once
+/// Names of geometric errors, as in ISO 230-1: `E`, the direction of the deviation (X Y Z translation, A B C
+/// rotation about x y z), the moving axis: EXX positioning of X, EYX and EZX its straightness, EAX roll, EBX
+/// and ECX pitch and yaw. Squareness: EA0Z and EB0Z tilt the direction in which Z travels, EC0Y the direction
+/// of Y; X is the primary direction, XY the secondary plane. V = actual - nominal, tool relative to
+/// workpiece.
+
+#include <array>
+#include <cstddef>
+#include <optional>
+#include <string>
+#include <string_view>
+
+#include "abbe/calib/kinematic_chain.hpp"
+
+namespace abbe::calib {
+
+/// What a table describes: translation along x y z [m] or rotation about x y z [rad].
+enum class Motion : std::size_t { X = 0, Y = 1, Z = 2, A = 3, B = 4, C = 5 };
+inline constexpr std::array<Motion, 6> kAllMotions{Motion::X, Motion::Y, Motion::Z,
+                                                   Motion::A, Motion::B, Motion::C};
+[[nodiscard]] constexpr bool is_rotation(Motion m) {
+  return static_cast<std::size_t>(m) >= 3;
+}
+/// 0, 1, 2 for x, y, z: the direction of the translation or of the rotation vector.
+[[nodiscard]] constexpr std::size_t direction(Motion m) {
+  return static_cast<std::size_t>(m) % 3;
+}
+
+/// One error motion of one axis, a function of that axis' position.
+struct ErrorMotion {
+  Motion motion = Motion::X;
+  Axis axis = Axis::X;
+  friend bool operator==(const ErrorMotion&, const ErrorMotion&) = default;
+};
+[[nodiscard]] std::string name(ErrorMotion e);
+[[nodiscard]] std::optional<ErrorMotion> error_motion(std::string_view iso_name);
+/// EXX, EYY, EZZ.
+[[nodiscard]] bool is_positioning(ErrorMotion e);
+/// The other six translations.
+[[nodiscard]] bool is_straightness(ErrorMotion e);
+
+/// Squareness in the order in which it stands in every parameter vector.
+inline constexpr std::array<std::string_view, 3> kSquarenessNames{"EA0Z", "EB0Z", "EC0Y"};
+
+/// One identified number with its name, as it is stored and reported. Rotations and squareness in rad, others
+/// in m.
+struct Parameter {
+  std::string name;                  ///< "EXX" or "EC0Y"
+  std::optional<double> position_m;  ///< node on its axis; none for squareness
+  double value = 0.0;
+  double u = 0.0;  ///< standard uncertainty (k = 1) in the stated gauge, unit of `value`
+  [[nodiscard]] bool is_angle() const;
+};
+
+}  // namespace abbe::calib

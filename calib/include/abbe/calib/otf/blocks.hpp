@@ -1,0 +1,40 @@
+#pragma once
+/// Means of consecutive tracker samples. A mean is the mean of the machine's path over the block, not the
+/// path at the mean: whatever a block is compared with has to be averaged over the same sub-points.
+
+#include <span>
+#include <vector>
+
+#include "abbe/calib/otf/run.hpp"
+
+namespace abbe::calib::otf {
+
+struct Block {
+  Vector3 mean_tracker_m = Vector3::Zero();
+  std::size_t samples = 0;  ///< valid samples in the mean; 0: the beam was lost, the block only keeps time
+  bool complete = false;    ///< all samples there: fit for the adjustment
+  std::size_t first_sub_point = 0;  ///< into BlockSeries::sub_points_tracker_m, Options::row_points of them
+};
+
+/// Blocks in the order of time, equally long.
+struct BlockSeries {
+  std::vector<Block> blocks;
+  std::vector<Vector3> sub_points_tracker_m;  ///< equidistant samples of every complete block
+  std::size_t sub_points = 0;                 ///< per block
+  std::size_t block_samples = 0;              ///< n of sigma / sqrt(n)
+  Vector3 start_tracker_m = Vector3::Zero();  ///< mean of the standstill at the first vertex
+  Vector3 end_tracker_m = Vector3::Zero();
+  std::size_t samples = 0;
+  std::size_t lost_samples = 0;  ///< invalid or missing in time
+};
+
+/// NotFinite for NaN in a valid sample (says which), BadInput for time that does not ascend,
+/// TooFewObservations below four blocks or without standstill samples.
+[[nodiscard]] Result<BlockSeries> make_blocks(std::span<const TrackerObservation>, const Options&);
+
+/// From means alone (a reduced recording): sub-points are spread along the direction of travel.
+[[nodiscard]] Result<BlockSeries> blocks_from_means(std::span<const Vector3> means_tracker_m,
+                                                    const Vector3& start_tracker_m,
+                                                    const Vector3& end_tracker_m, const Options&);
+
+}  // namespace abbe::calib::otf

@@ -1,0 +1,24 @@
+#pragma once
+/// Stage three: how well the method predicts observations it was not fitted to, against no compensation and
+/// against the active model. Legs are dealt into folds (leg i into fold i mod k: neighbours in time part,
+/// every fold spreads over the volume); the model for a fold is fitted to the other folds. The alignment took
+/// a rigid motion out of y that depends on the machine's errors, and no model contains it. Every contender
+/// therefore gets its own best-fit rigid motion on each held-out fold, the same six numbers of freedom from
+/// the same rows, and is compared by what remains. That makes the comparison independent of gauges, too.
+
+#include "abbe/calib/gate.hpp"
+#include "abbe/calib/otf/solve.hpp"
+
+namespace abbe::calib::otf {
+
+/// `active` may be null; it is left out of the comparison if it does not hold for this run's target offset.
+/// RankDeficient if the legs outside a fold do not determine the model, TooFewObservations with fewer legs
+/// than folds.
+[[nodiscard]] Result<HeldOutFigures> held_out(const Observations&, const VolumetricModel* active,
+                                              const Options& = {});
+
+/// held_out() and the limits of the gate.
+[[nodiscard]] Result<Verdict> judge(const Observations&, const Solution&, const VolumetricModel* active,
+                                    const GateLimits& = {}, const Options& = {});
+
+}  // namespace abbe::calib::otf

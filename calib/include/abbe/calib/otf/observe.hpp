@@ -1,0 +1,76 @@
+#pragma once
+/// Stage one: tracker points and path in, weighted linear observations of the machine's errors out.
+/// Each used block gives two rows, along a2 and a3 of its path frame; the direction of travel carries no
+/// information without synchronised clocks (weight 0 in [Sanders 2023] eq. (4)).
+
+#include <Eigen/Core>
+#include <cstddef>
+#include <span>
+#include <vector>
+
+#include "abbe/calib/otf/alignment.hpp"
+#include "abbe/calib/otf/path_frame.hpp"
+#include "abbe/calib/parameter_layout.hpp"
+
+namespace abbe::calib::otf {
+
+/// Rows of a sparse design matrix, columns ascending within a row.
+class SparseRows {
+ public:
+  struct Entry {
+    std::size_t column;
+    double value;
+  };
+  void append(std::span<const Entry> row);
+  [[nodiscard]] std::size_t rows() const { return begin_.size() - 1; }
+  [[nodiscard]] std::span<const Entry> row(std::size_t i) const;
+
+ private:
+  std::vector<Entry> entries_;
+  std::vector<std::size_t> begin_{0};
+};
+
+/// One row: y = A U + noise.
+struct Observation {
+  double y_m = 0.0;      ///< measured minus nominal position along `direction`
+  double sigma_m = 1.0;  ///< standard uncertainty of y
+  double weight = 1.0;   ///< 1/m^2; 1/sigma^2 unless somebody weights otherwise
+  std::size_t leg = 0;
+  std::size_t block = 0;
+  Vector3 direction = Vector3::UnitX();       ///< a2 or a3, machine coordinates
+  Vector3 axis_position_m = Vector3::Zero();  ///< closest nominal axis position
+};
+
+struct Observations {
+  ParameterLayout layout;
+  Vector3 target_offset_m = Vector3::Zero();
+  SparseRows A;  ///< fit_size() columns, rigid unknowns last
+  std::vector<Observation> rows;
+  Alignment alignment;
+  std::vector<Vector3> covered_m;  ///< axis positions whose hull the used blocks cover
+  std::size_t samples = 0;
+  std::size_t lost_samples = 0;
+  std::size_t blocks = 0;
+  std::size_t blocks_used = 0;
+};
+
+/// Rows of one measured point (or block mean) along a2 and a3: W P M B and W P V of [Sanders 2023] eq. (6),
+/// before weighting. `sub_points_m` are the nominal axis positions over which the design is averaged. Appends
+/// two rows.
+struct PointOnPath {
+  std::size_t leg = 0;
+  std::size_t block = 0;
+  Vector3 deviation_m;      ///< measured minus closest nominal point
+  Vector3 axis_position_m;  ///< closest nominal
+  PathFrame frame;
+  double samples = 1.0;  ///< in the mean
+};
+void append_rows(Observations&, const PointOnPath&, std::span<const Vector3> sub_points_m);
+
+[[nodiscard]] Result<Observations> observe(std::span<const TrackerObservation>, const Machine&, const Path&,
+                                           const Noise&, const Options& = {});
+/// The same from blocks that were averaged elsewhere.
+[[nodiscard]] Result<Observations> observe_blocks(const BlockSeries&, const Machine&, const Path&,
+                                                  const Noise&, const Options& = {});
+
+}  // namespace abbe::calib::otf

@@ -1,0 +1,33 @@
+#pragma once
+/// The control API: one JSON object a line, request then answer, over a Unix stream socket that only the
+/// daemon's user and group may open. A request is {"do": NAME, ...}; an answer {"ok": true, ...} or {"ok":
+/// false, "error": TEXT}. Ordinary world.
+
+#include <chrono>
+#include <filesystem>
+#include <functional>
+#include <memory>
+#include <nlohmann/json.hpp>
+
+#include "abbe/daemon/error.hpp"
+
+namespace abbe::daemon {
+
+/// Serves the socket on a thread of its own. The handler runs on that thread; it must not block for long.
+class ControlServer {
+ public:
+  using Handler = std::function<nlohmann::json(const nlohmann::json& request)>;
+
+  /// Refuses when a live server already answers at `socket_path`; a file left behind by a dead one is
+  /// replaced.
+  [[nodiscard]] static Result<std::unique_ptr<ControlServer>> open(const std::filesystem::path& socket_path,
+                                                                   Handler handler);
+  virtual ~ControlServer() = default;
+};
+
+/// One request and its answer. An answer with "ok": false becomes an Error with its text.
+[[nodiscard]] Result<nlohmann::json> ask_daemon(const std::filesystem::path& socket_path,
+                                                const nlohmann::json& request,
+                                                std::chrono::milliseconds time_out = std::chrono::seconds{5});
+
+}  // namespace abbe::daemon

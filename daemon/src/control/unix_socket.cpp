@@ -1,0 +1,63 @@
+#include "control/unix_socket.hpp"
+
+#include <fmt/format.h>
+#include <sys/socket.h>
+#include <sys/stat.h>
+#include <sys/un.h>
+
+#include <cerrno>
+#include <cstring>
+
+namespace abbe::daemon {
+namespace {
+
+constexpr int kBacklog = 16;
+constexpr mode_t kOwnerAndGroup = 0660;
+
+Result<sockaddr_un> address_of(const std::filesystem::path& path) {
+  sockaddr_un address{};
+  address.sun_family = AF_UNIX;
+  if (path.native().size() >= sizeof address.sun_path) {
+    return tl::unexpected(
+        Error{ErrorCode::Usage, fmt::format("socket {}: the path is longer than {} characters", path.string(),
+                                            sizeof address.sun_path - 1)});
+  }
+  std::memcpy(address.sun_path, path.c_str(), path.native().size() + 1);
+  return address;
+}
+
+Error failed(const char* what, const std::filesystem::path& path) {
+  return {ErrorCode::Io, fmt::format("{} {}: {}", what, path.string(), std::strerror(errno))};
+}
+
+}  // namespace
+
+Result<FileDescriptor> connect_unix(const std::filesystem::path& path) {
+  auto address = address_of(path);
+  if (!address) return tl::unexpected(address.error());
+  FileDescriptor fd{::socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0)};
+  const auto* generic = reinterpret_cast<const sockaddr*>(&*address);  // the socket API's own idiom
+  if (!fd || ::connect(fd.get(), generic, sizeof *address) != 0)
+    return tl::unexpected(failed("connect", path));
+  return fd;
+}
+
+Result<FileDescriptor> listen_unix(const std::filesystem::path& path) {
+  auto address = address_of(path);
+  if (!address) return tl::unexpected(address.error());
+  if (connect_unix(path)) {
+    return tl::unexpected(
+        Error{ErrorCode::Io, fmt::format("listen {}: another daemon already answers there", path.string())});
+  }
+  std::error_code ignored;
+  std::filesystem::remove(path, ignored);
+  FileDescriptor fd{::socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0)};
+  const auto* generic = reinterpret_cast<const sockaddr*>(&*address);
+  if (!fd || ::bind(fd.get(), generic, sizeof *address) != 0) return tl::unexpected(failed("bind", path));
+  if (::chmod(path.c_str(), kOwnerAndGroup) != 0 || ::listen(fd.get(), kBacklog) != 0) {
+    return tl::unexpected(failed("listen", path));
+  }
+  return fd;
+}
+
+}  // namespace abbe::daemon

@@ -1,0 +1,154 @@
+#include "abbe/daemon/calibration_session.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+namespace abbe::daemon {
+namespace {
+
+using namespace std::chrono_literals;
+using protocol::HostTime;
+using protocol::SampleFlag;
+using protocol::Snapshot;
+
+constexpr auto kPeriod = 2ms;       // 500 points per second
+constexpr double kStep_m = 100e-6;  // 50 mm/s
+
+/// Drives a machine point by point and shows every snapshot to a session.
+class Drive {
+ public:
+  explicit Drive(CalibrationSession& session) : session_(session) {}
+
+  void stand(AxisPosition q, std::chrono::nanoseconds how_long) {
+    q_ = q;
+    for (auto t = 0ns; t < how_long; t += kPeriod) show();
+  }
+  void move(AxisPosition to) {
+    const AxisPosition from = q_;
+    const double way = std::hypot(to[0] - from[0], to[1] - from[1], to[2] - from[2]);
+    const int steps = static_cast<int>(std::ceil(way / kStep_m));
+    for (int i = 1; i <= steps; ++i) {
+      for (std::size_t a = 0; a < 3; ++a) q_[a] = from[a] + (to[a] - from[a]) * i / steps;
+      show();
+    }
+  }
+  void pause(std::chrono::nanoseconds how_long) { now_ += how_long; }
+  [[nodiscard]] HostTime now() const { return now_; }
+
+ private:
+  void show() {
+    Snapshot s;
+    s.head.time = now_;
+    s.axis_count = 3;
+    for (std::size_t a = 0; a < 3; ++a) s.position[a] = q_[a];
+    s.has_tracker_point = true;
+    s.tracker_point.p_tracker_m = q_;
+    session_.take(s);
+    now_ += kPeriod;
+  }
+
+  CalibrationSession& session_;
+  AxisPosition q_{};
+  HostTime now_{10s};
+};
+
+const std::vector<AxisPosition> kPath{{0, 0, 0}, {0.1, 0, 0}, {0.1, 0.1, 0}, {0.1, 0.1, 0.1}};
+
+TEST(CalibrationSession, GoesThroughItsStatesAlongThePath) {
+  CalibrationSession session;
+  ASSERT_TRUE(session.start(kPath, HostTime{10s}));
+  Drive drive{session};
+  drive.stand(kPath[0], 1s);
+  EXPECT_EQ(session.status().state, SessionState::Warming);
+  for (std::size_t i = 1; i < kPath.size(); ++i) drive.move(kPath[i]);
+  EXPECT_EQ(session.status().state, SessionState::Acquiring);
+  drive.stand(kPath.back(), 2s);
+  EXPECT_EQ(session.status().state, SessionState::Identifying);
+}
+
+TEST(CalibrationSession, TheRunBeginsAndEndsInStandstill) {
+  CalibrationSession session;
+  ASSERT_TRUE(session.start(kPath, HostTime{10s}));
+  Drive drive{session};
+  drive.stand(kPath[0], 5s);
+  for (std::size_t i = 1; i < kPath.size(); ++i) drive.move(kPath[i]);
+  drive.stand(kPath.back(), 2s);
+  const auto run = session.take_run();
+  ASSERT_TRUE(run);
+  ASSERT_GT(run->size(), 1000u);
+  EXPECT_EQ((*run)[19].p_tracker_m, kPath[0]);
+  EXPECT_EQ((*run)[run->size() - 20].p_tracker_m, kPath.back());
+  EXPECT_LT(run->size(),
+            3000u + 2u * 200u + 10u);  // 300 mm at 0.1 mm each, and 0.4 s of standstill at either end
+}
+
+TEST(CalibrationSession, RefusesWhenAnotherPathIsDriven) {
+  CalibrationSession session;
+  ASSERT_TRUE(session.start(kPath, HostTime{10s}));
+  Drive drive{session};
+  drive.stand(kPath[0], 1s);
+  drive.move({0, 0.1, 0});
+  EXPECT_EQ(session.status().state, SessionState::Refused);
+  EXPECT_NE(session.status().reason.find("another path"), std::string::npos) << session.status().reason;
+}
+
+TEST(CalibrationSession, RefusesWhenTheBeamStaysAway) {
+  CalibrationSession session;
+  ASSERT_TRUE(session.start(kPath, HostTime{10s}));
+  Drive drive{session};
+  drive.stand(kPath[0], 1s);
+  drive.move(kPath[1]);
+  drive.pause(40s);
+  drive.move(kPath[2]);
+  EXPECT_EQ(session.status().state, SessionState::Refused);
+  EXPECT_NE(session.status().reason.find("no tracker point for 40.0 s"), std::string::npos)
+      << session.status().reason;
+}
+
+TEST(CalibrationSession, LooksAtNothingFromBeforeItsStart) {
+  CalibrationSession session;
+  ASSERT_TRUE(session.start(kPath, HostTime{60s}));
+  Drive drive{session};
+  drive.stand(kPath[0], 1s);
+  drive.move(kPath[1]);
+  EXPECT_EQ(session.status().state, SessionState::Warming);
+}
+
+TEST(CalibrationSession, ASecondStartWhileRunningIsRefused) {
+  CalibrationSession session;
+  ASSERT_TRUE(session.start(kPath, HostTime{10s}));
+  const auto second = session.start(kPath, HostTime{11s});
+  ASSERT_FALSE(second);
+  EXPECT_EQ(second.error().code, ErrorCode::Refused);
+}
+
+TEST(CalibrationSession, TheVerdictEndsItActiveOrRefusedAndLeavesItsTrack) {
+  for (const bool passed : {true, false}) {
+    CalibrationSession session;
+    ASSERT_TRUE(session.start(kPath, HostTime{10s}));
+    Drive drive{session};
+    drive.stand(kPath[0], 1s);
+    for (std::size_t i = 1; i < kPath.size(); ++i) drive.move(kPath[i]);
+    drive.stand(kPath.back(), 2s);
+    ASSERT_TRUE(session.take_run());
+    session.judged("model", passed, "verdict", drive.now());
+    std::vector<SessionState> track;
+    for (const auto& event : session.take_events()) track.push_back(event.status.state);
+    EXPECT_EQ(track,
+              (std::vector{SessionState::Warming, SessionState::Acquiring, SessionState::Identifying,
+                           SessionState::Judged, passed ? SessionState::Active : SessionState::Refused}));
+  }
+}
+
+TEST(CalibrationSession, CancelEndsARunningSessionOnly) {
+  CalibrationSession session;
+  EXPECT_FALSE(session.cancel("operator", HostTime{1s}));
+  ASSERT_TRUE(session.start(kPath, HostTime{10s}));
+  ASSERT_TRUE(session.cancel("operator", HostTime{11s}));
+  EXPECT_EQ(session.status().state, SessionState::Refused);
+  EXPECT_TRUE(session.start(kPath, HostTime{12s}));
+}
+
+}  // namespace
+}  // namespace abbe::daemon

@@ -1,0 +1,34 @@
+#pragma once
+/// One true error motion as a function of the position of its axis: values on nodes, joined by straight lines
+/// or by a natural cubic spline. Outside the nodes the formula of the last cell goes on. Pure; safe to share
+/// between threads.
+
+#include <span>
+#include <vector>
+
+namespace abbe::sim {
+
+enum class Shape { Linear, Cubic };
+
+class ErrorFunction {
+ public:
+  /// The function that is 0 everywhere.
+  ErrorFunction() = default;
+  /// `nodes_m` ascending, at least two, one value each (m for translations, rad for rotations); asserted.
+  ErrorFunction(std::vector<double> nodes_m, std::vector<double> values, Shape shape = Shape::Linear);
+
+  [[nodiscard]] double at(double position_m) const;
+
+  [[nodiscard]] std::span<const double> nodes_m() const { return nodes_m_; }
+  [[nodiscard]] std::span<const double> values() const { return values_; }
+  [[nodiscard]] Shape shape() const { return shape_; }
+  [[nodiscard]] ErrorFunction with_values(std::vector<double> values) const;
+
+ private:
+  std::vector<double> nodes_m_;
+  std::vector<double> values_;
+  std::vector<double> curvature_;  ///< second derivatives at the nodes; empty when linear
+  Shape shape_ = Shape::Linear;
+};
+
+}  // namespace abbe::sim

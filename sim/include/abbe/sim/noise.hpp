@@ -1,0 +1,35 @@
+#pragma once
+/// Random numbers by index, not by turn: the same (seed, stream, index) gives the same number whoever asks
+/// first, so that the wall clock, thread order or a lost connection never change what the simulated
+/// instruments measure. Pure.
+
+#include <cstdint>
+
+namespace abbe::sim {
+
+/// What a number is drawn for; each its own sequence.
+enum class NoiseStream : std::uint64_t {
+  Range = 1,
+  Azimuth,
+  Elevation,
+  Burst,
+  Command,
+  Truth,
+  Squareness,
+  Backlash,
+  Encoder = 1000,
+};
+
+/// Uniform in (0, 1).
+[[nodiscard]] double uniform(std::uint64_t seed, std::uint64_t stream, std::uint64_t index);
+/// Standard normal.
+[[nodiscard]] double gaussian(std::uint64_t seed, std::uint64_t stream, std::uint64_t index);
+
+[[nodiscard]] inline double uniform(std::uint64_t seed, NoiseStream stream, std::uint64_t index) {
+  return uniform(seed, static_cast<std::uint64_t>(stream), index);
+}
+[[nodiscard]] inline double gaussian(std::uint64_t seed, NoiseStream stream, std::uint64_t index) {
+  return gaussian(seed, static_cast<std::uint64_t>(stream), index);
+}
+
+}  // namespace abbe::sim

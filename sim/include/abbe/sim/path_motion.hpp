@@ -1,0 +1,65 @@
+#pragma once
+/// What the control does with the axes: a polyline of axis positions, trapezoidal speed along each leg, an
+/// exact stop at every vertex and a dwell before every leg. Position at any time is a pure function; before
+/// the start the machine stands at the first vertex, after the end at the last. Times in s from the start of
+/// the motion, lengths in m.
+
+#include <Eigen/Core>
+#include <array>
+#include <string_view>
+#include <vector>
+
+#include "abbe/sim/error.hpp"
+
+namespace abbe::sim {
+
+struct PathVertex {
+  Eigen::Vector3d q_m = Eigen::Vector3d::Zero();
+  double feed_m_per_s = 0.0;  ///< of the leg that ends here; 0 = the plan's feed
+};
+
+struct PathPlan {
+  std::vector<PathVertex> vertices;
+  double feed_m_per_s = 2.5 / 60.0;
+  double acceleration_m_per_s2 = 1.0;
+  double dwell_s = 0.05;
+};
+
+struct AxisMotion {
+  Eigen::Vector3d q_m = Eigen::Vector3d::Zero();
+  Eigen::Vector3d velocity_m_per_s = Eigen::Vector3d::Zero();
+  std::array<int, 3> direction{};  ///< per axis: sign of its last motion, 0 before its first
+};
+
+class PathMotion {
+ public:
+  /// Needs a vertex, and positive feed and acceleration; legs without length are left out.
+  [[nodiscard]] static Result<PathMotion> plan(const PathPlan& plan);
+
+  [[nodiscard]] AxisMotion at(double time_s) const;
+  [[nodiscard]] double duration_s() const { return end_s_; }
+  [[nodiscard]] std::size_t legs() const { return legs_.size(); }
+  /// When leg i leaves its first vertex and when it stands at its last.
+  [[nodiscard]] double leg_begin_s(std::size_t i) const { return legs_[i].begin_s; }
+  [[nodiscard]] double leg_end_s(std::size_t i) const;
+
+ private:
+  struct Leg {
+    Eigen::Vector3d from_m, unit;
+    double length_m, speed_m_per_s, begin_s, ramp_s, cruise_s;
+    std::array<int, 3> direction_before, direction;
+  };
+  [[nodiscard]] AxisMotion on_leg(const Leg& leg, double time_s) const;
+
+  Eigen::Vector3d first_m_ = Eigen::Vector3d::Zero();
+  Eigen::Vector3d last_m_ = Eigen::Vector3d::Zero();
+  double acceleration_m_per_s2_ = 1.0;
+  double end_s_ = 0.0;
+  std::vector<Leg> legs_;
+};
+
+/// The text of path.csv: header `x_mm,y_mm,z_mm[,feed_mm_per_min]`, `#` comments. `name` stands in the error,
+/// which lists every bad line (at most 20). Blank feed cells mean the plan's feed.
+[[nodiscard]] Result<std::vector<PathVertex>> parse_path_csv(std::string_view text, std::string_view name);
+
+}  // namespace abbe::sim

@@ -1,0 +1,92 @@
+#pragma once
+/// The truth: a machine of three linear axes with 21 known geometric errors, by exact homogeneous transforms.
+///
+///   p(q) = T_1 T_2 T_3 t,   T_a(q) = Trans(q_a e'_a) Trans(EXa, EYa, EZa) Rz(ECa) Ry(EBa) Rx(EAa)
+///
+/// axes ordered from workpiece to tool; t = target offset from the tool reference point; e'_a = direction of
+/// travel, tilted by the squareness errors alone and normalised: e'_Y ~ (-C0Y, 1, 0), e'_Z ~ (B0Z, -A0Z, 1),
+/// e'_X = (1, 0, 0). V = actual - nominal = p(q) - (q + t). Everything is the motion of the tool relative to
+/// the workpiece, in machine coordinates, for primed and unprimed axes alike. SI units. Names: ISO 230-1.
+/// Written without a look at `calib`, on purpose. Pure functions; safe to call from any thread.
+
+#include <Eigen/Core>
+#include <array>
+#include <cstddef>
+#include <string>
+#include <string_view>
+
+#include "abbe/sim/error.hpp"
+#include "abbe/sim/error_function.hpp"
+
+namespace abbe::sim {
+
+enum class Axis : std::size_t { X = 0, Y = 1, Z = 2 };
+inline constexpr std::array<Axis, 3> kAxes{Axis::X, Axis::Y, Axis::Z};
+inline constexpr std::string_view kAxisLetters = "XYZ";
+
+/// The six error motions of one axis: translations along x, y, z, then rotations about x, y, z.
+enum class Motion : std::size_t { EX = 0, EY = 1, EZ = 2, EA = 3, EB = 4, EC = 5 };
+inline constexpr std::size_t kMotions = 6;
+inline constexpr std::string_view kMotionLetters = "XYZABC";
+[[nodiscard]] inline std::string motion_name(std::size_t motion, Axis axis) {
+  return {'E', kMotionLetters[motion], kAxisLetters[static_cast<std::size_t>(axis)]};
+}
+
+struct AxisRange {
+  double min_m = 0.0;
+  double max_m = 0.0;
+  double reference_m = 0.0;
+};
+
+struct AxisTruth {
+  AxisRange range;
+  std::array<ErrorFunction, kMotions> error;
+  /// Backlash b: the error is f + s b / 2, s = direction of the last motion (+1, -1; 0 before the first). m
+  /// or rad.
+  std::array<double, kMotions> backlash{};
+};
+
+struct Squareness {
+  double A0Z_rad = 0.0;
+  double B0Z_rad = 0.0;
+  double C0Y_rad = 0.0;
+};
+
+/// Slow growth of the machine: at heat 1 axis a is longer by growth_per_m[a] and its zero is moved by
+/// shift_m.
+struct ThermalDrift {
+  Eigen::Vector3d growth_per_m = Eigen::Vector3d::Zero();
+  Eigen::Vector3d shift_m = Eigen::Vector3d::Zero();
+  double time_constant_s = 3600.0;
+  [[nodiscard]] double heat_after(double elapsed_s) const;  ///< 1 - exp(-t / tau), 0 before t = 0
+};
+
+struct TruthMachine {
+  std::array<Axis, 3> order{Axis::X, Axis::Y, Axis::Z};  ///< from workpiece to tool
+  std::array<AxisTruth, 3> axes;                         ///< by Axis, not by order
+  Squareness squareness;
+  ThermalDrift thermal;
+  Eigen::Vector3d target_offset_m = Eigen::Vector3d::Zero();
+
+  [[nodiscard]] AxisTruth& axis(Axis a) { return axes[static_cast<std::size_t>(a)]; }
+  [[nodiscard]] const AxisTruth& axis(Axis a) const { return axes[static_cast<std::size_t>(a)]; }
+};
+
+/// What besides the position decides the error.
+struct MachineCondition {
+  std::array<int, 3> direction{};  ///< per axis: sign of its last motion
+  double heat = 0.0;               ///< 0 cold to 1 warm
+};
+
+/// Where the target really is, in machine coordinates, when the scales read q.
+[[nodiscard]] Eigen::Vector3d position_m(const TruthMachine& truth, const Eigen::Vector3d& q_m,
+                                         const MachineCondition& condition = {});
+
+/// V at scale reading q.
+[[nodiscard]] Eigen::Vector3d error_m(const TruthMachine& truth, const Eigen::Vector3d& q_m,
+                                      const MachineCondition& condition = {});
+
+/// Order of X, Y, Z from a chain as "[w X' b Y Z (C1) t]", read from w to t. Other tokens do not matter to V.
+[[nodiscard]] Result<std::array<Axis, 3>> parse_chain(std::string_view chain);
+
+}  // namespace abbe::sim

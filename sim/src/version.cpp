@@ -1,3 +1,0 @@
-namespace abbe::sim {
-// Replaced by the room's first real source.
-}

@@ -5,7 +5,7 @@
 
 #include <map>
 #include <random>
-#include <regex>
+#include <sstream>
 #include <string>
 
 namespace abbe::daemon {
@@ -170,10 +170,13 @@ std::map<std::string, std::size_t> bounds_in_idl(const std::string& type) {
   const auto begin = text.find("struct " + type + " {");
   EXPECT_NE(begin, std::string::npos) << type;
   text = text.substr(begin, text.find("};", begin) - begin);
-  const std::regex member(R"((?:string<|sequence<[^,]*,\s*)(\d+)>\s*(\w+);)");
   std::map<std::string, std::size_t> bounds;
-  for (std::sregex_iterator it(text.begin(), text.end(), member), end; it != end; ++it) {
-    bounds[(*it)[2]] = std::stoul((*it)[1]);
+  std::istringstream lines(text);
+  for (std::string line; std::getline(lines, line);) {
+    // Lines such as `  @key string<64> machine;` and `  sequence<double, 8> position;  // m or rad`.
+    const auto close = line.find("> "), open = line.find_last_of("<,", close), end = line.find(';');
+    if (close == std::string::npos || end == std::string::npos || close > end) continue;
+    bounds[line.substr(close + 2, end - close - 2)] = std::stoul(line.substr(open + 1));
   }
   return bounds;
 }

@@ -1,0 +1,62 @@
+#pragma once
+/// abbed's end of the local socket to abbe-dds. abbed listens, abbe-dds connects, so abbe-dds may die and
+/// come back. Nothing here ever blocks: what the socket does not take at once is dropped and counted (live
+/// topics) or kept, newest per key, until it does (durable topics; all of them are sent again to every new
+/// abbe-dds). Used by one thread, the one that assembles snapshots, so that a hung abbed stops beating. The
+/// real-time threads never come here: it makes system calls and allocates.
+
+#include <chrono>
+#include <cstddef>
+#include <cstdint>
+#include <filesystem>
+#include <memory>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "abbe/daemon/cdr.hpp"
+#include "abbe/daemon/error.hpp"
+#include "abbe/daemon/topics.hpp"
+
+namespace abbe::daemon {
+
+struct DdsLinkCounters {
+  std::uint64_t sent = 0;          ///< frames handed to the kernel completely, beats included
+  std::uint64_t dropped_live = 0;  ///< live samples dropped: nobody connected, or the socket was full
+  std::uint64_t refused = 0;       ///< payloads that are no CDR payload of their topic or too long
+  std::uint64_t connections = 0;   ///< how often an abbe-dds came
+};
+
+class DdsLink {
+ public:
+  /// Wall time even with simulated devices: abbe-dds measures the beats with its own CLOCK_MONOTONIC.
+  using WallTime = std::chrono::steady_clock::time_point;
+  static constexpr std::chrono::milliseconds kBeatPeriod{100};
+
+  /// Creates the socket file (mode 0600) and listens. A file left by a dead abbed is replaced; Error (Io) if
+  /// a living one answers there, the path is too long for a socket (107 bytes), or the directory is missing.
+  [[nodiscard]] static Result<DdsLink> listen(const std::filesystem::path& socket);
+  ~DdsLink();  ///< closes the connection (abbe-dds publishes INVALID) and removes the socket file
+  DdsLink(DdsLink&&) noexcept;
+  DdsLink& operator=(DdsLink&&) noexcept;
+
+  /// Hands over one payload as encode() made it. The key is read from the payload.
+  void publish(Topic topic, std::span<const std::byte> payload);
+
+  /// Says "I am alive". Call it every turn of the loop; it sends at most every kBeatPeriod.
+  void beat(WallTime now);
+
+  /// Accepts an abbe-dds (a newer one replaces the older one), notices that it left, sends what waits. Call
+  /// every turn.
+  void poll();
+
+  [[nodiscard]] bool connected() const noexcept;
+  [[nodiscard]] const DdsLinkCounters& counters() const noexcept;
+
+ private:
+  struct State;
+  explicit DdsLink(std::unique_ptr<State> state);
+  std::unique_ptr<State> state_;
+};
+
+}  // namespace abbe::daemon

@@ -1,0 +1,59 @@
+#pragma once
+/// Starts abbe-dds as a child of abbed and starts it again when it dies: at once if it had been up for a
+/// while, with a growing delay if it dies at start (bad profile, port in use). Knows its child by pid only.
+/// Used by one thread that is not real-time; never blocks but in the destructor.
+
+#include <sys/types.h>
+
+#include <chrono>
+#include <cstdint>
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "abbe/daemon/error.hpp"
+
+namespace abbe::daemon {
+
+class DdsSupervisor {
+ public:
+  using WallTime = std::chrono::steady_clock::time_point;
+
+  struct Options {
+    std::filesystem::path program;                 ///< abbe-dds
+    std::vector<std::string> arguments;            ///< without argv[0]
+    std::chrono::milliseconds steady_after{2000};  ///< alive this long: the next death is answered at once
+    std::chrono::milliseconds first_delay{100};    ///< after a death at start; doubles
+    std::chrono::milliseconds longest_delay{5000};
+    std::chrono::milliseconds stop_patience{3000};  ///< destructor: SIGTERM, then this long, then SIGKILL
+  };
+
+  /// Error (Io) if the program cannot be started at all (missing, not executable).
+  [[nodiscard]] static Result<DdsSupervisor> start(Options options, WallTime now);
+  ~DdsSupervisor();
+  DdsSupervisor(DdsSupervisor&&) noexcept;
+  DdsSupervisor& operator=(DdsSupervisor&&) noexcept;
+
+  /// Notices a death and starts again when it is time. Call every turn, at least every 50 ms.
+  void poll(WallTime now);
+
+  [[nodiscard]] pid_t pid() const noexcept { return pid_; }  ///< 0 while there is none
+  [[nodiscard]] std::uint64_t restarts() const noexcept { return restarts_; }
+  /// How the last child ended, for the log and Health: "exit code 3", "signal 9"; empty if none has.
+  [[nodiscard]] const std::string& last_end() const noexcept { return last_end_; }
+
+ private:
+  explicit DdsSupervisor(Options options) : options_(std::move(options)) {}
+  Result<void> spawn(WallTime now);
+  void stop() noexcept;
+
+  Options options_;
+  pid_t pid_ = 0;
+  WallTime started_{};
+  WallTime next_start_{};
+  std::chrono::milliseconds delay_{0};
+  std::uint64_t restarts_ = 0;
+  std::string last_end_;
+};
+
+}  // namespace abbe::daemon

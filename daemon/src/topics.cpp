@@ -1,0 +1,83 @@
+#include "abbe/daemon/topics.hpp"
+
+#include <cstring>
+
+namespace abbe::daemon {
+namespace {
+
+using namespace std::chrono_literals;
+using Kind = TopicTraits::Kind;
+using Key = TopicTraits::Key;
+
+constexpr std::array<TopicTraits, kTopicCount> kTopics{{
+    {Topic::Snapshot, "abbe/v1/Snapshot", "abbe::v1::Snapshot", Kind::Live, Key::Machine, 0ms},
+    {Topic::Compensation, "abbe/v1/Compensation", "abbe::v1::Compensation", Kind::Live, Key::Machine, 0ms},
+    {Topic::ErrorModel, "abbe/v1/ErrorModel", "abbe::v1::ErrorModel", Kind::Durable, Key::Machine, 10s},
+    {Topic::ErrorGrid, "abbe/v1/ErrorGrid", "abbe::v1::ErrorGrid", Kind::Durable, Key::MachineAndNumber, 10s},
+    {Topic::ModelState, "abbe/v1/ModelState", "abbe::v1::ModelState", Kind::Durable, Key::Machine, 1s},
+    {Topic::Health, "abbe/v1/Health", "abbe::v1::Health", Kind::Durable, Key::MachineAndText, 10s},
+    {Topic::CalibrationEvent, "abbe/v1/CalibrationEvent", "abbe::v1::CalibrationEvent", Kind::Durable,
+     Key::Machine, 10s},
+}};
+
+/// Reads CDR_LE from the end of the encapsulation header on, where alignment counts from.
+class KeyReader {
+ public:
+  explicit KeyReader(std::span<const std::byte> body) : body_(body) {}
+
+  std::optional<std::uint32_t> number() {
+    const std::size_t at = (offset_ + 3) / 4 * 4;
+    if (at + 4 > body_.size()) return std::nullopt;
+    std::uint32_t value = 0;
+    for (std::size_t i = 0; i < 4; ++i) value |= std::to_integer<std::uint32_t>(body_[at + i]) << (8 * i);
+    offset_ = at + 4;
+    return value;
+  }
+
+  std::optional<std::string_view> text() {
+    const auto length = number();  // counts the NUL
+    if (!length || *length == 0 || *length > body_.size() - offset_) return std::nullopt;
+    const auto* begin = reinterpret_cast<const char*>(body_.data() + offset_);
+    if (std::memchr(begin, 0, *length) != begin + *length - 1) return std::nullopt;
+    offset_ += *length;
+    return std::string_view(begin, *length - 1);
+  }
+
+  [[nodiscard]] std::span<const std::byte> read_so_far() const { return body_.first(offset_); }
+
+ private:
+  std::span<const std::byte> body_;
+  std::size_t offset_ = 0;
+};
+
+}  // namespace
+
+const TopicTraits& traits(Topic topic) noexcept {
+  return kTopics[static_cast<std::size_t>(topic)];
+}
+
+std::span<const TopicTraits> all_topics() noexcept {
+  return kTopics;
+}
+
+std::optional<Topic> topic_from(std::uint8_t value) noexcept {
+  if (value >= kTopicCount) return std::nullopt;
+  return static_cast<Topic>(value);
+}
+
+std::optional<PayloadKey> payload_key(Topic topic, std::span<const std::byte> payload) noexcept {
+  constexpr std::size_t kHeaderBytes = 4;
+  if (payload.size() < kHeaderBytes || payload[0] != std::byte{0} || payload[1] != std::byte{1})
+    return std::nullopt;
+  KeyReader reader(payload.subspan(kHeaderBytes));
+  PayloadKey key;
+  const auto machine = reader.text();
+  if (!machine) return std::nullopt;
+  key.machine = *machine;
+  if (traits(topic).key == Key::MachineAndNumber && !(key.number = reader.number())) return std::nullopt;
+  if (traits(topic).key == Key::MachineAndText && !(key.text = reader.text())) return std::nullopt;
+  key.bytes = reader.read_so_far();
+  return key;
+}
+
+}  // namespace abbe::daemon

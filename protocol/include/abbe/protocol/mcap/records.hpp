@@ -1,0 +1,284 @@
+#pragma once
+/// The records of an MCAP file [MCAP specification, mcap.dev/spec], one struct each, and their bytes.
+///
+/// Decoding: structs are views into the bytes they were decoded from; total (any bytes give a record or a
+/// DecodeError), no allocation, trailing fields a newer writer may have added are skipped. Encoding:
+/// append(buffer, record) adds opcode, length and content to a buffer the caller owns, without allocation
+/// while its capacity lasts; all integers little-endian. A string of 4 GiB or more cannot be written (lengths
+/// are u32) and must not be asked for. Times are nanoseconds since the Unix epoch, UTC. Pure; thread-safe.
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <cstring>
+#include <optional>
+#include <span>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include <tl/expected.hpp>
+
+namespace abbe::protocol::mcap {
+
+using Bytes = std::span<const std::byte>;
+using Buffer = std::vector<std::byte>;
+
+/// First and last eight bytes of a file.
+inline constexpr std::array<std::byte, 8> kMagic{std::byte{0x89}, std::byte{'M'}, std::byte{'C'},
+                                                 std::byte{'A'},  std::byte{'P'}, std::byte{'0'},
+                                                 std::byte{0x0D}, std::byte{0x0A}};
+
+/// Opcode and content length before every record's content.
+inline constexpr std::size_t kRecordHeadSize = 1 + 8;
+/// Opcode to last field of a Footer.
+inline constexpr std::size_t kFooterRecordSize = kRecordHeadSize + 8 + 8 + 4;
+
+enum class Opcode : std::uint8_t {
+  Header = 0x01,
+  Footer = 0x02,
+  Schema = 0x03,
+  Channel = 0x04,
+  Message = 0x05,
+  Chunk = 0x06,
+  MessageIndex = 0x07,
+  ChunkIndex = 0x08,
+  Attachment = 0x09,
+  AttachmentIndex = 0x0A,
+  Statistics = 0x0B,
+  Metadata = 0x0C,
+  MetadataIndex = 0x0D,
+  SummaryOffset = 0x0E,
+  DataEnd = 0x0F,
+};
+
+enum class DecodeError : std::uint8_t {
+  Truncated,  ///< a field passes the end of the content
+  BadMap,     ///< a map or array whose byte length is not a whole number of entries
+  BadCrc,     ///< an attachment that does not match its checksum
+};
+
+template <class T>
+using Decoded = tl::expected<T, DecodeError>;
+
+/// The packed entries of an array or map of two integers, as they lie in the file (so the bytes need no
+/// alignment).
+template <class First, class Second>
+class PackedPairs {
+ public:
+  static constexpr std::size_t kEntrySize = sizeof(First) + sizeof(Second);
+
+  PackedPairs() = default;
+  /// Views whole entries; a remainder of less than one entry is not seen.
+  explicit PackedPairs(Bytes bytes) noexcept : bytes_(bytes.first(bytes.size() / kEntrySize * kEntrySize)) {}
+
+  [[nodiscard]] Bytes bytes() const noexcept { return bytes_; }
+  [[nodiscard]] std::size_t size() const noexcept { return bytes_.size() / kEntrySize; }
+  [[nodiscard]] bool empty() const noexcept { return bytes_.empty(); }
+  [[nodiscard]] std::pair<First, Second> operator[](std::size_t i) const noexcept {
+    std::pair<First, Second> entry;
+    std::memcpy(&entry.first, &bytes_[i * kEntrySize], sizeof(First));
+    std::memcpy(&entry.second, &bytes_[i * kEntrySize + sizeof(First)], sizeof(Second));
+    return entry;
+  }
+
+ private:
+  Bytes bytes_;
+};
+
+/// A map<string, string> as it lies in the file.
+class StringMap {
+ public:
+  using Entry = std::pair<std::string_view, std::string_view>;
+
+  StringMap() = default;
+  /// Views packed entries (without the length of the whole map), as pack() writes them.
+  explicit StringMap(Bytes packed) noexcept : bytes_(packed) {}
+  [[nodiscard]] Bytes bytes() const noexcept { return bytes_; }
+  /// Takes the first entry off the front; none left or a torn entry: nothing.
+  [[nodiscard]] std::optional<Entry> take() noexcept;
+  [[nodiscard]] std::optional<std::string_view> find(std::string_view key) const noexcept;
+  /// Appends the packed entry to `buffer`, over which a StringMap can then be laid.
+  static void pack(Buffer& buffer, std::string_view key, std::string_view value);
+
+ private:
+  Bytes bytes_;
+};
+
+struct Header {
+  std::string_view profile;
+  std::string_view library;
+};
+
+struct Footer {
+  std::uint64_t summary_start = 0;         ///< 0: no summary
+  std::uint64_t summary_offset_start = 0;  ///< 0: no summary offsets
+  std::uint32_t summary_crc = 0;  ///< from summary_start to summary_offset_start's last byte; 0: none
+};
+
+struct Schema {
+  std::uint16_t id = 0;  ///< never 0 in a file
+  std::string_view name;
+  std::string_view encoding;
+  Bytes data;
+};
+
+struct Channel {
+  std::uint16_t id = 0;
+  std::uint16_t schema_id = 0;
+  std::string_view topic;
+  std::string_view message_encoding;
+  StringMap metadata;
+};
+
+struct Message {
+  std::uint16_t channel_id = 0;
+  std::uint32_t sequence = 0;
+  std::uint64_t log_time_ns = 0;
+  std::uint64_t publish_time_ns = 0;
+  Bytes data;
+};
+
+/// Everything of a Chunk record before its records.
+struct ChunkHead {
+  std::uint64_t first_time_ns = 0;
+  std::uint64_t last_time_ns = 0;
+  std::uint64_t uncompressed_size = 0;
+  std::uint32_t uncompressed_crc = 0;  ///< 0: none
+  std::string_view compression;        ///< empty: none, the only one this room reads or writes
+  std::uint64_t records_size =
+      0;  ///< bytes of records that follow, as the record says (a cut file has fewer)
+};
+
+struct Chunk {
+  ChunkHead head;
+  Bytes records;
+};
+
+struct MessageIndex {
+  std::uint16_t channel_id = 0;
+  PackedPairs<std::uint64_t, std::uint64_t> entries;  ///< log time, offset in the uncompressed records
+};
+
+struct ChunkIndex {
+  std::uint64_t first_time_ns = 0;
+  std::uint64_t last_time_ns = 0;
+  std::uint64_t chunk_start = 0;   ///< offset of the Chunk's opcode in the file
+  std::uint64_t chunk_length = 0;  ///< of the whole Chunk record
+  PackedPairs<std::uint16_t, std::uint64_t>
+      index_offsets;               ///< channel, offset of its MessageIndex in the file
+  std::uint64_t index_length = 0;  ///< of all the MessageIndex records together
+  std::string_view compression;
+  std::uint64_t compressed_size = 0;
+  std::uint64_t uncompressed_size = 0;
+};
+
+struct Attachment {
+  std::uint64_t log_time_ns = 0;
+  std::uint64_t create_time_ns = 0;
+  std::string_view name;
+  std::string_view media_type;
+  Bytes data;
+};
+
+struct AttachmentIndex {
+  std::uint64_t offset = 0;
+  std::uint64_t length = 0;  ///< of the whole Attachment record
+  std::uint64_t log_time_ns = 0;
+  std::uint64_t create_time_ns = 0;
+  std::uint64_t data_size = 0;
+  std::string_view name;
+  std::string_view media_type;
+};
+
+struct Statistics {
+  std::uint64_t message_count = 0;
+  std::uint16_t schema_count = 0;
+  std::uint32_t channel_count = 0;
+  std::uint32_t attachment_count = 0;
+  std::uint32_t metadata_count = 0;
+  std::uint32_t chunk_count = 0;
+  std::uint64_t first_time_ns = 0;
+  std::uint64_t last_time_ns = 0;
+  PackedPairs<std::uint16_t, std::uint64_t> channel_message_counts;
+};
+
+struct Metadata {
+  std::string_view name;
+  StringMap entries;
+};
+
+struct MetadataIndex {
+  std::uint64_t offset = 0;
+  std::uint64_t length = 0;  ///< of the whole Metadata record
+  std::string_view name;
+};
+
+struct SummaryOffset {
+  Opcode group = Opcode::Header;
+  std::uint64_t start = 0;
+  std::uint64_t length = 0;
+};
+
+struct DataEnd {
+  std::uint32_t data_section_crc = 0;  ///< 0: none
+};
+
+/// The content of a record (without opcode and length) as a T; defined for every struct above but ChunkHead.
+/// decode<Chunk> wants all of the chunk's records to be there and does not check their checksum.
+template <class T>
+[[nodiscard]] Decoded<T> decode(Bytes content) noexcept = delete;
+
+template <>
+[[nodiscard]] Decoded<Header> decode<Header>(Bytes content) noexcept;
+template <>
+[[nodiscard]] Decoded<Footer> decode<Footer>(Bytes content) noexcept;
+template <>
+[[nodiscard]] Decoded<Schema> decode<Schema>(Bytes content) noexcept;
+template <>
+[[nodiscard]] Decoded<Channel> decode<Channel>(Bytes content) noexcept;
+template <>
+[[nodiscard]] Decoded<Message> decode<Message>(Bytes content) noexcept;
+template <>
+[[nodiscard]] Decoded<Chunk> decode<Chunk>(Bytes content) noexcept;
+template <>
+[[nodiscard]] Decoded<MessageIndex> decode<MessageIndex>(Bytes content) noexcept;
+template <>
+[[nodiscard]] Decoded<ChunkIndex> decode<ChunkIndex>(Bytes content) noexcept;
+template <>
+[[nodiscard]] Decoded<Attachment> decode<Attachment>(Bytes content) noexcept;
+template <>
+[[nodiscard]] Decoded<AttachmentIndex> decode<AttachmentIndex>(Bytes content) noexcept;
+template <>
+[[nodiscard]] Decoded<Statistics> decode<Statistics>(Bytes content) noexcept;
+template <>
+[[nodiscard]] Decoded<Metadata> decode<Metadata>(Bytes content) noexcept;
+template <>
+[[nodiscard]] Decoded<MetadataIndex> decode<MetadataIndex>(Bytes content) noexcept;
+template <>
+[[nodiscard]] Decoded<SummaryOffset> decode<SummaryOffset>(Bytes content) noexcept;
+template <>
+[[nodiscard]] Decoded<DataEnd> decode<DataEnd>(Bytes content) noexcept;
+
+/// A chunk whose records may be cut short: `records` holds those bytes that are there.
+[[nodiscard]] Decoded<Chunk> decode_cut_chunk(Bytes content) noexcept;
+
+void append_magic(Buffer& buffer);
+void append(Buffer& buffer, const Header& record);
+void append(Buffer& buffer, const Footer& record);
+void append(Buffer& buffer, const Schema& record);
+void append(Buffer& buffer, const Channel& record);
+void append(Buffer& buffer, const Message& record);
+/// Size and number of records are taken from `records`; the checksum from the head.
+void append(Buffer& buffer, const Chunk& record);
+void append(Buffer& buffer, const MessageIndex& record);
+void append(Buffer& buffer, const ChunkIndex& record);
+void append(Buffer& buffer, const Attachment& record);
+void append(Buffer& buffer, const AttachmentIndex& record);
+void append(Buffer& buffer, const Statistics& record);
+void append(Buffer& buffer, const Metadata& record);
+void append(Buffer& buffer, const MetadataIndex& record);
+void append(Buffer& buffer, const SummaryOffset& record);
+void append(Buffer& buffer, const DataEnd& record);
+
+}  // namespace abbe::protocol::mcap

@@ -1,0 +1,134 @@
+#pragma once
+/// What an emScon controller answers (packet type 0, controller to client): one answer per request, with the
+/// number of its command, but for GetReflectors, which gets one per reflector. Units as in requests.hpp.
+/// Pure, allocation-free, total.
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <tl/expected.hpp>
+#include <variant>
+
+#include "abbe/protocol/emscon/requests.hpp"
+#include "abbe/protocol/emscon/types.hpp"
+
+namespace abbe::protocol::emscon {
+
+using Name = std::array<char16_t, 32>;  ///< UTF-16, ends at the first zero
+
+/// The answer to every command that has nothing to tell but its outcome, and to any command that was refused.
+struct Acknowledge {
+  Command command{};
+  Status status = Status::Ok;
+};
+
+struct SystemStatusAnswer {
+  static constexpr Command kCommand = Command::GetSystemStatus;
+  Status status = Status::Ok;
+  Status last_result = Status::Ok;
+  TrackerProcessorStatus tracker_processor = TrackerProcessorStatus::Initialised;
+  LaserStatus laser = LaserStatus::Ready;
+  AdmStatus adm = AdmStatus::Ready;
+  std::int32_t version_major = 0;
+  std::int32_t version_minor = 0;
+  std::int32_t version_build = 0;
+  WeatherMonitor weather_monitor = WeatherMonitor::None;
+  std::int32_t flags = 0;
+  std::int32_t serial_number = 0;
+};
+struct TrackerStatusAnswer {
+  static constexpr Command kCommand = Command::GetTrackerStatus;
+  Status status = Status::Ok;
+  TrackerStatus tracker = TrackerStatus::NotReady;
+};
+struct UnitsAnswer {
+  static constexpr Command kCommand = Command::GetUnits;
+  Status status = Status::Ok;
+  Units units;
+};
+struct EnvironmentAnswer {
+  static constexpr Command kCommand = Command::GetEnvironmentParams;
+  Status status = Status::Ok;
+  Environment environment;
+};
+struct RefractionAnswer {
+  static constexpr Command kCommand = Command::GetRefractionParams;
+  Status status = Status::Ok;
+  Refraction refraction;
+};
+struct ReflectorAnswer {
+  static constexpr Command kCommand = Command::GetReflector;
+  Status status = Status::Ok;
+  std::int32_t internal_id = 0;
+};
+struct ReflectorsAnswer {
+  static constexpr Command kCommand = Command::GetReflectors;
+  Status status = Status::Ok;
+  std::int32_t total = 0;  ///< how many such answers there are in all
+  std::int32_t internal_id = 0;
+  TargetType target_type = TargetType::CornerCube;
+  double surface_offset = 0.0;
+  Name name{};
+};
+struct SystemSettingsAnswer {
+  static constexpr Command kCommand = Command::GetSystemSettings;
+  Status status = Status::Ok;
+  SystemSettings settings;
+};
+struct LongSystemParameterAnswer {
+  static constexpr Command kCommand = Command::GetLongSystemParameter;
+  Status status = Status::Ok;
+  LongParameter parameter{};
+  std::int32_t value = 0;
+};
+struct MeasurementStatusInfoAnswer {
+  static constexpr Command kCommand = Command::GetMeasurementStatusInfo;
+  Status status = Status::Ok;
+  Status last_result = Status::Ok;
+  std::int32_t bits = 0;  ///< MeasurementStatusBit
+};
+struct ObjectTemperatureAnswer {
+  static constexpr Command kCommand = Command::GetObjectTemperature;
+  Status status = Status::Ok;
+  double temperature = 20.0;
+};
+struct TriggerBoardInfoAnswer {
+  static constexpr Command kCommand = Command::GetTriggerBoardInfo;
+  Status status = Status::Ok;
+  std::int32_t card_type = 0;
+  std::int32_t fpga_version = 0;
+  std::int32_t max_trigger_frequency_hz = 0;
+  std::int32_t error = 0;
+};
+/// 164 bytes, of which only these fields are used; the others keep their raw bytes.
+struct TrackerInfoAnswer {
+  static constexpr Command kCommand = Command::GetTrackerInfo;
+  Status status = Status::Ok;
+  std::int32_t sensor_type = 0;
+  Name name{};
+  std::int32_t serial_number = 0;
+  std::array<std::byte, 40> other{};
+  std::int32_t max_data_rate_hz = 1000;  ///< points per second
+  std::array<std::byte, 32> more{};
+};
+
+using Answer = std::variant<Acknowledge, SystemStatusAnswer, TrackerStatusAnswer, UnitsAnswer,
+                            EnvironmentAnswer, RefractionAnswer, ReflectorAnswer, ReflectorsAnswer,
+                            SystemSettingsAnswer, LongSystemParameterAnswer, MeasurementStatusInfoAnswer,
+                            ObjectTemperatureAnswer, TriggerBoardInfoAnswer, TrackerInfoAnswer>;
+
+inline constexpr std::size_t kMaxAnswerSize = 164;
+
+[[nodiscard]] Command command_of(const Answer&) ABBE_RT;
+[[nodiscard]] Status status_of(const Answer&) ABBE_RT;
+
+/// Bytes written to `out`, 0 if it is too small; kMaxAnswerSize always suffices.
+[[nodiscard]] std::size_t encode(const Answer&, std::span<std::byte> out) ABBE_RT;
+
+/// `packet` is one whole packet. 16 bytes are an Acknowledge whatever the command (that is how a query is
+/// refused); a longer packet of a command with an answer of its own is that answer, and may have more bytes
+/// at its end than known here (later firmware appends), which are ignored.
+[[nodiscard]] tl::expected<Answer, DecodeError> decode_answer(std::span<const std::byte> packet) ABBE_RT;
+
+}  // namespace abbe::protocol::emscon

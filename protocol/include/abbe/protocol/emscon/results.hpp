@@ -1,0 +1,124 @@
+#pragma once
+/// What an emScon controller sends unasked: measurements, errors, changes of state; and `decode`, for
+/// whatever it sends. Values are in the units of SetUnits and the coordinates of SetCoordinateSystemType.
+/// Pure, allocation-free, total.
+
+#include <array>
+#include <cassert>
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <tl/expected.hpp>
+#include <variant>
+
+#include "abbe/protocol/emscon/answers.hpp"
+#include "abbe/protocol/emscon/types.hpp"
+
+namespace abbe::protocol::emscon {
+
+/// Type 1. The status of a broken beam is not known to any public source.
+struct ErrorResponse {
+  Command command{};
+  Status status = Status::Unknown;
+};
+
+/// Type 8.
+struct StatusChange {
+  Event event{};
+};
+
+/// Type 2: the mean of a stationary measurement. It carries no time of its own.
+struct SingleResult {
+  Status status = Status::Ok;
+  MeasurementMode mode = MeasurementMode::Stationary;
+  bool try_mode = false;
+  std::array<double, 3> value{};
+  std::array<double, 3> std_dev{};
+  double std_total = 0.0;
+  std::array<double, 3> pointing_error{};
+  std::array<double, 3> apriori_std{};
+  double apriori_total = 0.0;
+  Environment environment;
+};
+
+/// Type 7: where the reflector is, at most 10 times a second while the beam is locked.
+struct ReflectorPosition {
+  Status status = Status::Ok;
+  std::array<double, 3> value{};
+};
+
+struct MultiHead {
+  Status status = Status::Ok;
+  MeasurementMode mode = MeasurementMode::ContinuousTime;
+  bool try_mode = false;
+  Environment environment;
+};
+struct MultiPoint {
+  PointStatus status = PointStatus::Ok;
+  TrackerClockReading time;
+  std::array<double, 3> value{};
+};
+/// What a point of type 10 has beside.
+struct MultiPointStatistics {
+  std::array<double, 3> apriori_std{};
+  double apriori_total = 0.0;
+  std::array<double, 3> covariance{};  ///< 12, 13, 23
+};
+struct ExtendedMultiPoint {
+  MultiPoint point;
+  MultiPointStatistics statistics;
+};
+
+inline constexpr std::size_t kMultiHeadSize = 48;
+inline constexpr std::size_t kMultiPointSize = 36;
+inline constexpr std::size_t kExtendedMultiPointSize = 92;
+inline constexpr std::size_t kMaxMultiPoints = (kMaxPacketSize - kMultiHeadSize) / kMultiPointSize;
+inline constexpr std::size_t kMaxExtendedMultiPoints =
+    (kMaxPacketSize - kMultiHeadSize) / kExtendedMultiPointSize;
+
+/// Types 3 and 10: a burst of points of a continuous measurement. A view of the packet's bytes, which must
+/// outlive it; points are read where they lie.
+class MultiResult {
+ public:
+  /// Total: `packet` of any bytes gives a result or an error.
+  [[nodiscard]] static tl::expected<MultiResult, DecodeError> from(std::span<const std::byte> packet) ABBE_RT;
+
+  [[nodiscard]] const MultiHead& head() const ABBE_RT { return head_; }
+  [[nodiscard]] bool extended() const ABBE_RT { return point_size_ == kExtendedMultiPointSize; }
+  [[nodiscard]] std::size_t size() const ABBE_RT { return points_.size() / point_size_; }
+  [[nodiscard]] MultiPoint point(std::size_t k) const ABBE_RT;                 ///< k < size()
+  [[nodiscard]] MultiPointStatistics statistics(std::size_t k) const ABBE_RT;  ///< k < size(), extended()
+
+ private:
+  MultiResult(const MultiHead& head, std::span<const std::byte> points, std::size_t point_size) ABBE_RT
+      : head_(head),
+        points_(points),
+        point_size_(point_size) {}
+
+  MultiHead head_;
+  std::span<const std::byte> points_;
+  std::size_t point_size_;
+};
+
+/// A packet of a known type whose layout is not needed here (six-degree-of-freedom probes, Nivel, type 9).
+struct OtherPacket {
+  PacketType type{};
+};
+
+using ControllerPacket = std::variant<Answer, ErrorResponse, StatusChange, SingleResult, ReflectorPosition,
+                                      MultiResult, OtherPacket>;
+
+/// Whatever a controller sends. `packet` is one whole packet, as the framer gives it.
+[[nodiscard]] tl::expected<ControllerPacket, DecodeError> decode(std::span<const std::byte> packet) ABBE_RT;
+
+/// Bytes written to `out`, 0 if it is too small (or the points are more than one packet holds).
+[[nodiscard]] std::size_t encode(const ErrorResponse&, std::span<std::byte> out) ABBE_RT;
+[[nodiscard]] std::size_t encode(const StatusChange&, std::span<std::byte> out) ABBE_RT;
+[[nodiscard]] std::size_t encode(const SingleResult&, std::span<std::byte> out) ABBE_RT;
+[[nodiscard]] std::size_t encode(const ReflectorPosition&, std::span<std::byte> out) ABBE_RT;
+[[nodiscard]] std::size_t encode(const MultiHead&, std::span<const MultiPoint>,
+                                 std::span<std::byte> out) ABBE_RT;
+[[nodiscard]] std::size_t encode(const MultiHead&, std::span<const ExtendedMultiPoint>,
+                                 std::span<std::byte> out) ABBE_RT;
+
+}  // namespace abbe::protocol::emscon

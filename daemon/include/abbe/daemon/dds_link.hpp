@@ -33,7 +33,7 @@ class DdsLink {
   using WallTime = std::chrono::steady_clock::time_point;
   static constexpr std::chrono::milliseconds kBeatPeriod{100};
 
-  /// Creates the socket file (mode 0600) and listens. A file left by a dead abbed is replaced; Error (Io) if
+  /// Creates the socket file (mode 0660) and listens. A file left by a dead abbed is replaced; Error (Io) if
   /// a living one answers there, the path is too long for a socket (107 bytes), or the directory is missing.
   [[nodiscard]] static Result<DdsLink> listen(const std::filesystem::path& socket);
   ~DdsLink();  ///< closes the connection (abbe-dds publishes INVALID) and removes the socket file

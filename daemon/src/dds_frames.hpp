@@ -1,0 +1,89 @@
+#pragma once
+/// The frames on the local socket between abbed and abbe-dds, one direction only: 8 bytes of header, then a
+/// payload.
+///   bytes 0..3  length of the payload, little endian
+///   byte  4     kind
+///   byte  5     topic (kind Publish, else 0)
+///   bytes 6..7  version of this format
+/// Sans-I/O; single-threaded.
+
+#include <algorithm>
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <cstring>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "abbe/daemon/topics.hpp"
+
+namespace abbe::daemon {
+
+inline constexpr std::size_t kFrameHeaderBytes = 8;
+inline constexpr std::uint8_t kFrameVersion = 1;
+/// No topic comes near it: the largest, ErrorModel with 1024 parameters, is below 52 kB.
+inline constexpr std::size_t kMaxPayloadBytes = 64 * 1024;
+
+enum class FrameKind : std::uint8_t { Beat = 0, Publish = 1 };
+
+struct Frame {
+  FrameKind kind = FrameKind::Beat;
+  Topic topic = Topic::Snapshot;
+  std::span<const std::byte> payload;
+};
+
+inline void append_frame(std::vector<std::byte>& out, const Frame& frame) {
+  const auto n = static_cast<std::uint32_t>(frame.payload.size());
+  const auto byte = [](std::uint32_t v) { return static_cast<std::byte>(v & 0xffu); };
+  const std::array<std::byte, kFrameHeaderBytes> header{byte(n),
+                                                        byte(n >> 8),
+                                                        byte(n >> 16),
+                                                        byte(n >> 24),
+                                                        byte(static_cast<std::uint32_t>(frame.kind)),
+                                                        byte(static_cast<std::uint32_t>(frame.topic)),
+                                                        byte(kFrameVersion),
+                                                        byte(0)};
+  out.insert(out.end(), header.begin(), header.end());
+  out.insert(out.end(), frame.payload.begin(), frame.payload.end());
+}
+
+/// Bytes in, frames out. After `broken()` the stream is lost and the connection is to be closed.
+class FrameReader {
+ public:
+  /// Where to read the next bytes to; then tell how many came with filled().
+  [[nodiscard]] std::span<std::byte> room() {
+    if (end_ == buffer_.size() || begin_ == end_) {
+      std::memmove(buffer_.data(), buffer_.data() + begin_, end_ - begin_);
+      end_ -= begin_;
+      begin_ = 0;
+    }
+    return std::span(buffer_).subspan(end_);
+  }
+  void filled(std::size_t bytes) { end_ += bytes; }
+
+  /// The next whole frame; its payload is valid until the next call of room().
+  [[nodiscard]] std::optional<Frame> next() {
+    const auto waiting = std::span<const std::byte>(buffer_).subspan(begin_, end_ - begin_);
+    if (broken_ || waiting.size() < kFrameHeaderBytes) return std::nullopt;
+    std::size_t length = 0;
+    for (std::size_t i = 0; i < 4; ++i) length |= std::to_integer<std::size_t>(waiting[i]) << (8 * i);
+    const auto kind = std::to_integer<std::uint8_t>(waiting[4]);
+    const auto topic = topic_from(std::to_integer<std::uint8_t>(waiting[5]));
+    const auto version = std::to_integer<std::uint8_t>(waiting[6]);
+    broken_ = length > kMaxPayloadBytes || kind > 1 || !topic || version != kFrameVersion;
+    if (broken_ || waiting.size() < kFrameHeaderBytes + length) return std::nullopt;
+    begin_ += kFrameHeaderBytes + length;
+    return Frame{static_cast<FrameKind>(kind), *topic, waiting.subspan(kFrameHeaderBytes, length)};
+  }
+
+  [[nodiscard]] bool broken() const noexcept { return broken_; }
+
+ private:
+  std::vector<std::byte> buffer_ = std::vector<std::byte>(2 * (kFrameHeaderBytes + kMaxPayloadBytes));
+  std::size_t begin_ = 0;
+  std::size_t end_ = 0;
+  bool broken_ = false;
+};
+
+}  // namespace abbe::daemon

@@ -1,0 +1,134 @@
+#include "abbe/daemon/dds_supervisor.hpp"
+
+#include <sched.h>
+#include <signal.h>
+#include <spawn.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <cstring>
+#include <thread>
+#include <utility>
+
+extern char** environ;
+
+namespace abbe::daemon {
+namespace {
+
+std::string describe_end(int status) {
+  if (WIFSIGNALED(status)) return "signal " + std::to_string(WTERMSIG(status));
+  return "exit code " + std::to_string(WEXITSTATUS(status));
+}
+
+/// The child starts as an ordinary process whatever thread of abbed starts it: no signal blocked or ignored,
+/// not real-time.
+class SpawnAttributes {
+ public:
+  SpawnAttributes() {
+    ::posix_spawnattr_init(&attributes_);
+    sigset_t none, all;
+    ::sigemptyset(&none);
+    ::sigfillset(&all);
+    ::posix_spawnattr_setsigmask(&attributes_, &none);
+    ::posix_spawnattr_setsigdefault(&attributes_, &all);
+    const sched_param ordinary{};
+    ::posix_spawnattr_setschedpolicy(&attributes_, SCHED_OTHER);
+    ::posix_spawnattr_setschedparam(&attributes_, &ordinary);
+    ::posix_spawnattr_setflags(&attributes_,
+                               POSIX_SPAWN_SETSIGMASK | POSIX_SPAWN_SETSIGDEF | POSIX_SPAWN_SETSCHEDULER);
+  }
+  ~SpawnAttributes() { ::posix_spawnattr_destroy(&attributes_); }
+  SpawnAttributes(const SpawnAttributes&) = delete;
+  SpawnAttributes& operator=(const SpawnAttributes&) = delete;
+  [[nodiscard]] const posix_spawnattr_t* get() const { return &attributes_; }
+
+ private:
+  posix_spawnattr_t attributes_{};
+};
+
+}  // namespace
+
+Result<DdsSupervisor> DdsSupervisor::start(Options options, WallTime now) {
+  // abbe-dds leaves by itself once this process is gone, after having said so to its subscribers.
+  options.arguments.insert(options.arguments.end(), {"--parent", std::to_string(::getpid())});
+  DdsSupervisor supervisor(std::move(options));
+  if (auto spawned = supervisor.spawn(now); !spawned) return tl::make_unexpected(spawned.error());
+  return supervisor;
+}
+
+DdsSupervisor::DdsSupervisor(DdsSupervisor&& other) noexcept
+    : options_(std::move(other.options_)),
+      pid_(std::exchange(other.pid_, 0)),
+      started_(other.started_),
+      next_start_(other.next_start_),
+      delay_(other.delay_),
+      restarts_(other.restarts_),
+      last_end_(std::move(other.last_end_)) {}
+
+DdsSupervisor& DdsSupervisor::operator=(DdsSupervisor&& other) noexcept {
+  if (this == &other) return *this;
+  stop();
+  options_ = std::move(other.options_);
+  pid_ = std::exchange(other.pid_, 0);
+  started_ = other.started_;
+  next_start_ = other.next_start_;
+  delay_ = other.delay_;
+  restarts_ = other.restarts_;
+  last_end_ = std::move(other.last_end_);
+  return *this;
+}
+
+DdsSupervisor::~DdsSupervisor() {
+  stop();
+}
+
+Result<void> DdsSupervisor::spawn(WallTime now) {
+  std::string program = options_.program.string();
+  std::vector<char*> argv{program.data()};
+  for (std::string& argument : options_.arguments) argv.push_back(argument.data());
+  argv.push_back(nullptr);
+  const SpawnAttributes attributes;
+  pid_t child = 0;
+  if (const int error =
+          ::posix_spawn(&child, program.c_str(), nullptr, attributes.get(), argv.data(), environ)) {
+    return fail(ErrorCode::Io, "start " + program + ": " + std::strerror(error));
+  }
+  pid_ = child;
+  started_ = now;
+  return {};
+}
+
+void DdsSupervisor::poll(WallTime now) {
+  if (pid_ != 0) {
+    int status = 0;
+    if (::waitpid(pid_, &status, WNOHANG) != pid_) return;
+    pid_ = 0;
+    last_end_ = describe_end(status);
+    const bool died_at_start = now - started_ < options_.steady_after;
+    delay_ = !died_at_start ? std::chrono::milliseconds{0}
+                            : std::clamp(2 * delay_, options_.first_delay, options_.longest_delay);
+    next_start_ = now + delay_;
+  }
+  if (now < next_start_) return;
+  ++restarts_;
+  if (!spawn(now)) {
+    last_end_ = "could not be started";
+    delay_ = options_.longest_delay;
+    next_start_ = now + delay_;
+  }
+}
+
+void DdsSupervisor::stop() noexcept {
+  if (pid_ == 0) return;
+  ::kill(pid_, SIGTERM);
+  const auto deadline = std::chrono::steady_clock::now() + options_.stop_patience;
+  while (::waitpid(pid_, nullptr, WNOHANG) == 0) {
+    if (std::chrono::steady_clock::now() > deadline) ::kill(pid_, SIGKILL);
+    std::this_thread::sleep_for(std::chrono::milliseconds{2});
+  }
+  pid_ = 0;
+}
+
+}  // namespace abbe::daemon

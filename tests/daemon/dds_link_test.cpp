@@ -1,0 +1,200 @@
+#include "abbe/daemon/dds_link.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <poll.h>
+#include <sys/socket.h>
+#include <sys/stat.h>
+#include <sys/un.h>
+#include <unistd.h>
+
+#include <cstdlib>
+#include <filesystem>
+#include <optional>
+#include <string>
+
+namespace abbe::daemon {
+namespace {
+
+using namespace std::chrono_literals;
+
+std::vector<std::byte> state_payload(const std::string& machine, std::uint64_t sequence) {
+  v1::ModelState state;
+  state.machine(machine);
+  state.sequence_number(sequence);
+  std::vector<std::byte> payload;
+  EXPECT_TRUE(encode(state, payload).has_value());
+  return payload;
+}
+
+std::vector<std::byte> snapshot_payload(std::uint64_t sequence) {
+  v1::Snapshot snapshot;
+  snapshot.machine("m");
+  snapshot.sequence_number(sequence);
+  snapshot.position({1.0, 2.0, 3.0});
+  std::vector<std::byte> payload;
+  EXPECT_TRUE(encode(snapshot, payload).has_value());
+  return payload;
+}
+
+class DdsLinkTest : public testing::Test {
+ protected:
+  DdsLinkTest() {
+    std::string name = testing::TempDir() + "abbe-link-XXXXXX";
+    directory_ = ::mkdtemp(name.data());
+    path_ = directory_ / "dds.sock";
+    auto link = DdsLink::listen(path_);
+    EXPECT_TRUE(link.has_value());
+    link_.emplace(std::move(*link));
+  }
+  ~DdsLinkTest() override { std::filesystem::remove_all(directory_); }
+
+  std::filesystem::path directory_;
+  std::filesystem::path path_;
+  std::optional<DdsLink> link_;
+};
+
+/// The far end: what abbe-dds would see, frame by frame.
+struct FarEnd {
+  struct Seen {
+    int kind = -1;
+    int topic = -1;
+    std::vector<std::byte> payload;
+  };
+
+  explicit FarEnd(const std::filesystem::path& path) {
+    sockaddr_un address{};
+    address.sun_family = AF_UNIX;
+    path.string().copy(address.sun_path, sizeof(address.sun_path) - 1);
+    EXPECT_EQ(::connect(fd, reinterpret_cast<const sockaddr*>(&address), sizeof(address)), 0);
+  }
+  ~FarEnd() { ::close(fd); }
+  FarEnd(const FarEnd&) = delete;
+  FarEnd& operator=(const FarEnd&) = delete;
+
+  /// Every whole frame that has arrived by now.
+  std::vector<Seen> take() {
+    std::byte chunk[4096];
+    for (ssize_t n = 0; (n = ::recv(fd, chunk, sizeof(chunk), MSG_DONTWAIT)) > 0;) {
+      bytes.insert(bytes.end(), chunk, chunk + n);
+    }
+    std::vector<Seen> seen;
+    for (;;) {
+      if (bytes.size() < 8) return seen;
+      const std::size_t length = std::to_integer<std::size_t>(bytes[0]) |
+                                 std::to_integer<std::size_t>(bytes[1]) << 8 |
+                                 std::to_integer<std::size_t>(bytes[2]) << 16;
+      if (bytes.size() < 8 + length) return seen;
+      seen.push_back({std::to_integer<int>(bytes[4]), std::to_integer<int>(bytes[5]), {}});
+      seen.back().payload.assign(bytes.begin() + 8, bytes.begin() + 8 + static_cast<std::ptrdiff_t>(length));
+      bytes.erase(bytes.begin(), bytes.begin() + 8 + static_cast<std::ptrdiff_t>(length));
+    }
+  }
+
+  int fd = ::socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0);
+  std::vector<std::byte> bytes;
+};
+
+TEST_F(DdsLinkTest, HandsOverThePayloadUnchanged) {
+  FarEnd far(path_);
+  link_->poll();
+  const auto payload = snapshot_payload(5);
+  link_->publish(Topic::Snapshot, payload);
+  const auto seen = far.take();
+  ASSERT_EQ(seen.size(), 1u);
+  EXPECT_EQ(seen[0].topic, static_cast<int>(Topic::Snapshot));
+  EXPECT_EQ(seen[0].payload, payload);
+}
+
+TEST_F(DdsLinkTest, LateComerGetsTheNewestOfEveryDurableKey) {
+  link_->publish(Topic::ModelState, state_payload("a", 1));
+  link_->publish(Topic::ModelState, state_payload("b", 2));
+  link_->publish(Topic::ModelState, state_payload("a", 3));
+  FarEnd far(path_);
+  link_->poll();
+  const auto seen = far.take();
+  ASSERT_EQ(seen.size(), 2u);
+  EXPECT_EQ(seen[0].payload, state_payload("b", 2));
+  EXPECT_EQ(seen[1].payload, state_payload("a", 3));
+}
+
+TEST_F(DdsLinkTest, DurableTopicsAreSentAgainAfterAReconnection) {
+  link_->publish(Topic::ModelState, state_payload("a", 1));
+  for (int i = 0; i < 2; ++i) {
+    FarEnd far(path_);
+    link_->poll();
+    EXPECT_EQ(far.take().size(), 1u) << "connection " << i;
+  }
+  EXPECT_EQ(link_->counters().connections, 2u);
+}
+
+TEST_F(DdsLinkTest, LiveSamplesWithoutListenerAreDroppedAndCounted) {
+  link_->publish(Topic::Snapshot, snapshot_payload(1));
+  EXPECT_EQ(link_->counters().dropped_live, 1u);
+  FarEnd far(path_);
+  link_->poll();
+  EXPECT_TRUE(far.take().empty());
+}
+
+TEST_F(DdsLinkTest, NeverBlocksOnAPeerThatDoesNotReadAndKeepsWhatIsDurable) {
+  FarEnd far(path_);
+  link_->poll();
+  std::uint64_t n = 0;
+  while (link_->counters().dropped_live == 0) link_->publish(Topic::Snapshot, snapshot_payload(++n));
+  link_->publish(Topic::ModelState, state_payload("a", 7));
+  bool state_came = false;
+  for (int turn = 0; turn < 3; ++turn) {
+    for (const auto& frame : far.take()) state_came |= frame.payload == state_payload("a", 7);
+    link_->poll();
+  }
+  EXPECT_TRUE(state_came);
+}
+
+TEST_F(DdsLinkTest, BeatsEvery100MillisecondsHoweverOftenItIsCalled) {
+  FarEnd far(path_);
+  link_->poll();
+  const DdsLink::WallTime start{100s};
+  for (auto t = 0ms; t < 1000ms; t += 1ms) link_->beat(start + t);
+  EXPECT_EQ(far.take().size(), 10u);
+}
+
+TEST_F(DdsLinkTest, NoticesThatThePeerLeft) {
+  {
+    FarEnd far(path_);
+    link_->poll();
+    EXPECT_TRUE(link_->connected());
+  }
+  link_->poll();
+  EXPECT_FALSE(link_->connected());
+}
+
+TEST_F(DdsLinkTest, RefusesBytesThatAreNoPayload) {
+  link_->publish(Topic::ModelState, std::vector<std::byte>(64));
+  EXPECT_EQ(link_->counters().refused, 1u);
+}
+
+TEST_F(DdsLinkTest, SocketFileIsClosedToStrangers) {
+  struct stat file {};
+  ASSERT_EQ(::stat(path_.c_str(), &file), 0);
+  EXPECT_EQ(file.st_mode & 0777, 0660u);
+}
+
+TEST_F(DdsLinkTest, RefusesAPathThatALivingProcessServes) {
+  const auto second = DdsLink::listen(path_);
+  ASSERT_FALSE(second.has_value());
+  EXPECT_THAT(second.error().text, testing::HasSubstr("already answers there"));
+}
+
+TEST_F(DdsLinkTest, ReplacesTheSocketFileOfADeadProcess) {
+  const auto stale = directory_ / "stale.sock";
+  sockaddr_un address{};
+  address.sun_family = AF_UNIX;
+  stale.string().copy(address.sun_path, sizeof(address.sun_path) - 1);
+  const int fd = ::socket(AF_UNIX, SOCK_STREAM, 0);
+  ASSERT_EQ(::bind(fd, reinterpret_cast<const sockaddr*>(&address), sizeof(address)), 0);
+  ::close(fd);
+  EXPECT_TRUE(DdsLink::listen(stale).has_value());
+}
+
+}  // namespace
+}  // namespace abbe::daemon

@@ -1,0 +1,25 @@
+#pragma once
+/// The daemon's configuration and recorded points as the input types of the on-the-fly method: the copy that
+/// is all the daemon knows of them. Pure; allocates.
+
+#include <span>
+#include <vector>
+
+#include "abbe/calib/otf/run.hpp"
+#include "abbe/daemon/config.hpp"
+#include "abbe/daemon/error.hpp"
+#include "abbe/daemon/otf_acquisition.hpp"
+
+namespace abbe::daemon {
+
+/// BadInput if the chain or the nodes are not those of a machine of three linear axes.
+[[nodiscard]] Result<calib::otf::Machine> otf_machine(const MachineConfig& machine);
+[[nodiscard]] calib::otf::Noise otf_noise(const MachineConfig& machine);
+[[nodiscard]] calib::otf::Path otf_path(std::span<const AxisPosition> path_m);
+/// Time is the tracker's own clock from the first point on.
+[[nodiscard]] std::vector<calib::otf::TrackerObservation> otf_observations(std::span<const RunPoint> points);
+
+/// An error of the mathematics in the daemon's words and exit codes.
+[[nodiscard]] Error error_of(const calib::Error& error);
+
+}  // namespace abbe::daemon

@@ -1,0 +1,57 @@
+#include "abbe/daemon/otf_inputs.hpp"
+
+#include <fmt/format.h>
+
+#include <chrono>
+#include <string>
+
+namespace abbe::daemon {
+
+Result<calib::otf::Machine> otf_machine(const MachineConfig& machine) {
+  auto chain = calib::KinematicChain::parse(machine.chain);
+  if (!chain) return tl::unexpected(error_of(chain.error()));
+  calib::otf::Machine out;
+  out.chain = *chain;
+  for (const calib::Axis a : calib::kAllAxes) {
+    const std::string axis_name(1, calib::letter(a));
+    const AxisConfig* axis = machine.find_axis(axis_name);
+    const auto nodes = machine.nodes_m.find(axis_name);
+    if (axis == nullptr || nodes == machine.nodes_m.end()) {
+      return fail(ErrorCode::BadInput,
+                  fmt::format("machine {}: axis {} has no range", machine.name, axis_name));
+    }
+    out.nodes[calib::index(a)] = {.nodes_m = nodes->second, .reference_m = axis->reference};
+  }
+  out.target_offset_m = {machine.target_offset_m[0], machine.target_offset_m[1], machine.target_offset_m[2]};
+  return out;
+}
+
+calib::otf::Noise otf_noise(const MachineConfig& machine) {
+  return {.sigma_range_m = machine.sigma_range_m, .sigma_angle_rad = machine.sigma_angle_rad};
+}
+
+calib::otf::Path otf_path(std::span<const AxisPosition> path_m) {
+  calib::otf::Path path;
+  path.vertices_m.reserve(path_m.size());
+  for (const AxisPosition& q : path_m) path.vertices_m.emplace_back(q[0], q[1], q[2]);
+  return path;
+}
+
+std::vector<calib::otf::TrackerObservation> otf_observations(std::span<const RunPoint> points) {
+  std::vector<calib::otf::TrackerObservation> out;
+  out.reserve(points.size());
+  for (const RunPoint& p : points) {
+    out.push_back(
+        {.time_s = std::chrono::duration<double>(p.device_time - points.front().device_time).count(),
+         .p_tracker_m = {p.p_tracker_m[0], p.p_tracker_m[1], p.p_tracker_m[2]},
+         .valid = p.usable});
+  }
+  return out;
+}
+
+Error error_of(const calib::Error& error) {
+  const bool input = error.code == calib::ErrorCode::BadInput || error.code == calib::ErrorCode::NotFinite;
+  return {input ? ErrorCode::BadInput : ErrorCode::DataInsufficient, error.text};
+}
+
+}  // namespace abbe::daemon

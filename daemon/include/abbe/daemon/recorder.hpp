@@ -1,0 +1,109 @@
+#pragma once
+/// Writes what was acquired into an MCAP file, so that a power cut, a kill or a full disk costs at most the
+/// chunk that was open. NAME.mcap.part while it grows, NAME.mcap once closed cleanly; both are readable.
+///
+/// Samples are XCDR1 messages of the IDL types (topics abbe/v1/TrackerPoint ..., schema encoding omgidl),
+/// dated in UTC = host time + UtcOffset; raw device bytes lie beside them. A chunk is closed at chunk_bytes
+/// or after chunk_period, written with its indexes by one pwrite and made durable (fdatasync) every
+/// sync_period.
+///
+/// A full or failing disk never stops the caller: record() and tick() cannot fail. The file is cut back to
+/// its last whole chunk and closed if there is room for that, messages are counted as lost, status() says
+/// why, and when there is room again recording goes on in NAME-2.mcap, NAME-3.mcap ...
+///
+/// One thread uses it, in the ordinary world: it allocates and makes blocking system calls.
+
+#include <chrono>
+#include <cstdint>
+#include <filesystem>
+#include <memory>
+#include <string>
+#include <string_view>
+
+#include "abbe/daemon/cdr.hpp"
+#include "abbe/daemon/error.hpp"
+#include "abbe/daemon/recording_info.hpp"
+#include "abbe/protocol/samples.hpp"
+
+namespace abbe::daemon {
+
+struct RecorderOptions {
+  std::filesystem::path directory;
+  std::string name;  ///< without extension; neither NAME.mcap nor NAME.mcap.part may exist
+  std::size_t chunk_bytes = 1024 * 1024;  ///< at most this much is lost with a chunk, and
+  std::chrono::nanoseconds chunk_period = std::chrono::milliseconds{500};  ///< at most this long
+  std::chrono::nanoseconds sync_period = std::chrono::seconds{1};
+  std::chrono::nanoseconds retry_period = std::chrono::seconds{5};  ///< after the disk was full or failed
+  std::uint64_t min_free_bytes = 0;  ///< the disk counts as full when less than this is free
+};
+
+struct RecorderStatus {
+  enum class State : std::uint8_t {
+    Recording,
+    DiskFull,  ///< messages are lost; tried again every retry_period
+    Failed,    ///< another I/O error; tried again likewise
+    Closed,
+  };
+  State state = State::Closed;
+  std::string fault;           ///< empty while Recording: "write rec.mcap.part: No space left on device"
+  std::filesystem::path file;  ///< the present (or last) file
+  std::uint32_t files = 0;     ///< how many were begun
+  std::uint64_t bytes = 0;     ///< written to the present file in whole chunks
+  std::uint64_t chunks = 0;    ///< written to all files
+  std::uint64_t messages = 0;  ///< in those chunks
+  std::uint64_t lost = 0;      ///< messages that were to be recorded and are in no file
+  std::uint64_t refused = 0;   ///< messages outside the bounds of the IDL (a device name > 32 characters)
+};
+[[nodiscard]] std::string_view name(RecorderStatus::State state) noexcept;  ///< "recording", "disk full" ...
+
+/// The first `bytes` bytes of `file` have this hash: `head -c BYTES FILE | sha256sum`.
+struct RecordingDigest {
+  std::string sha256;  ///< hex
+  std::uint64_t bytes = 0;
+  std::filesystem::path file;
+};
+
+class Recorder {
+ public:
+  /// Wall time even with simulated devices: what a power cut costs does not run at simulated speed.
+  using WallTime = std::chrono::steady_clock::time_point;
+
+  /// Creates the file. Error (Io): the directory cannot be written or a file of that name exists. A full disk
+  /// is not an error: recording begins when there is room.
+  [[nodiscard]] static Result<Recorder> open(RecorderOptions options, RecordingInfo info, WallTime now);
+  ~Recorder();  ///< closes cleanly if close() was not called
+  Recorder(Recorder&&) noexcept;
+  Recorder& operator=(Recorder&&) noexcept;
+
+  void record(const protocol::TrackerPoint& point, std::string_view device);
+  void record(const protocol::AxisSample& sample, std::string_view device);
+  void record(const protocol::EnvironmentSample& sample, std::string_view device);
+  void record(const protocol::RawBlock& block, std::string_view device);
+  void record(const v1::CalibrationEvent& event);
+
+  /// Written at once, and again into every later file of this recorder.
+  void attach(RecordingAttachment attachment, protocol::HostTime time);
+
+  /// Call every turn, at least every 100 ms: closes the chunk, syncs and retries when it is time to.
+  void tick(WallTime now);
+
+  /// Ends the open chunk now, so that everything recorded so far is in the file and in digest().
+  void flush();
+
+  /// The hash of everything written to the present file until now.
+  [[nodiscard]] RecordingDigest digest() const;
+
+  /// Ends the file: chunk, indexes, footer, fsync, rename, fsync of the directory. The digest is that of the
+  /// finished file. Error (Io): it could not be finished and stays NAME.mcap.part, readable up to its last
+  /// whole chunk.
+  Result<RecordingDigest> close();
+
+  [[nodiscard]] const RecorderStatus& status() const noexcept;
+
+ private:
+  struct State;
+  explicit Recorder(std::unique_ptr<State> state);
+  std::unique_ptr<State> state_;
+};
+
+}  // namespace abbe::daemon

@@ -1,0 +1,97 @@
+#pragma once
+/// From a device's own clock to host time, learned from arrivals. An arrival is never early: it comes after
+/// the instant it reports by a delay >= 0, so arrival - device time lies above a straight line (offset and
+/// skew) and touches it when the delay is smallest. The model is the highest line below all arrivals of the
+/// last minute: the lower convex hull's edge over the mean device time, with the skew held within a bound.
+/// The smallest delay itself cannot be seen; it is somewhere in [0, max_constant_delay]. The estimate is
+/// centred in that interval, which enters the uncertainty as a rectangular distribution ([GUM] 4.3.7).
+/// Deterministic, fixed memory, no allocation. One thread.
+
+#include <array>
+#include <chrono>
+#include <cstddef>
+#include <cstdint>
+
+#include "abbe/drivers/device.hpp"
+#include "abbe/protocol/rt.hpp"
+#include "abbe/protocol/time.hpp"
+
+namespace abbe::drivers {
+
+struct ClockModelOptions {
+  std::chrono::nanoseconds window =
+      std::chrono::seconds{60};  ///< long enough for a skew of 1 ppm, short enough to follow temperature
+  double max_skew = 200e-6;      ///< quartz in a cabinet; beyond it a slope is an artefact of late arrivals
+  std::chrono::nanoseconds max_constant_delay =
+      std::chrono::milliseconds{2};  ///< bound of the smallest delay (device + wire + kernel)
+  std::chrono::nanoseconds jump =
+      std::chrono::milliseconds{50};  ///< a disagreement no delay explains: the device clock jumped
+  std::size_t settled_after = 30;     ///< observations; with packets every 332 ms this is 10 s
+};
+
+/// An instant of the device in host time. `u_time` is a standard uncertainty (k = 1).
+struct HostInstant {
+  protocol::HostTime time{};
+  std::chrono::nanoseconds u_time{};
+  bool settled = false;
+};
+
+class ClockModel {
+ public:
+  enum class Observed {
+    Followed,   ///< the model took it in
+    Restarted,  ///< the device clock went back or jumped: the model began anew with this observation
+  };
+
+  explicit ClockModel(const ClockModelOptions& options = {}) noexcept : options_(options) {}
+
+  /// The last instant a packet reports, and when the packet arrived. Call once per packet, before mapping its
+  /// points.
+  Observed observe(protocol::DeviceTime last_point, protocol::HostTime arrival) ABBE_RT;
+
+  /// Host time of any instant of the device; meant for the window and shortly around it. Before the first
+  /// observation the answer is the epoch with an uncertainty of an hour.
+  [[nodiscard]] HostInstant to_host(protocol::DeviceTime t) const ABBE_RT;
+
+  /// Forget everything: reconnected to what may be another device.
+  void reset() ABBE_RT;
+
+  [[nodiscard]] ClockStatus status() const ABBE_RT;
+
+ private:
+  struct Point {
+    double device_s = 0.0;  ///< device time since origin_device_
+    double offset_s = 0.0;  ///< (arrival - origin_host_) - device_s
+  };
+  static constexpr std::size_t kPoints = 256;  ///< one per window / 255: the lowest arrival of its slice
+
+  void begin_with(protocol::DeviceTime last_point, protocol::HostTime arrival) ABBE_RT;
+  [[nodiscard]] bool jumped(const Point& p, protocol::HostTime arrival) ABBE_RT;
+  void keep(const Point& p) ABBE_RT;
+  void forget_before(double device_s) ABBE_RT;
+  void fit() ABBE_RT;
+  void fit_slope() ABBE_RT;
+  void judge_lateness() ABBE_RT;
+  [[nodiscard]] double line_at(double device_s) const ABBE_RT;
+  [[nodiscard]] bool settled() const ABBE_RT;
+
+  ClockModelOptions options_;
+  protocol::DeviceTime origin_device_{};
+  protocol::HostTime origin_host_{};
+  std::array<Point, kPoints> points_{};
+  std::size_t count_ = 0;
+  std::uint64_t restarts_ = 0;
+  double last_device_s_ = 0.0;
+  double offset_s_ = 0.0;  ///< of the line at device_s = pivot_s_
+  double pivot_s_ = 0.0;
+  double slope_ = 0.0;          ///< d offset / d device time
+  double touch_begin_s_ = 0.0;  ///< the hull edge the line lies on
+  double touch_end_s_ = 0.0;
+  double mean_lateness_s_ = 0.0;
+  double u_touch_s_ = 0.0;  ///< standard uncertainty of the line where it touches
+  double u_slope_ = 0.0;
+  bool late_ = false;  ///< arrivals are later than any delay explains, since late_since_
+  protocol::HostTime late_since_{};
+};
+
+}  // namespace abbe::drivers

@@ -1,0 +1,61 @@
+#pragma once
+/// The real-time loop, once for all drivers: wait() in the ordinary world, receive() in real time, until told
+/// to stop. Memory is locked and the stack touched, scheduling and affinity are set before the first turn.
+
+#include <chrono>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "abbe/drivers/device.hpp"
+#include "abbe/drivers/error.hpp"
+#include "abbe/drivers/latency_histogram.hpp"
+
+namespace abbe::drivers {
+
+enum class RealTimeMode {
+  Enforce,  ///< what the system refuses (memory lock, priority, affinity) is an error: do not start
+  Ignore,   ///< what the system refuses is a warning: tests, laptops
+};
+
+struct DeviceThreadOptions {
+  std::string name = "device";  ///< shown by top; the kernel keeps 15 characters
+  RealTimeMode mode = RealTimeMode::Ignore;
+  bool lock_memory = false;  ///< mlockall, present and future; a matter of the whole process
+  int priority = 0;          ///< SCHED_FIFO 1..99; 0 stays with the ordinary scheduler
+  std::optional<int> cpu;    ///< the one processor to run on; none: anywhere
+  std::chrono::nanoseconds wait_at_most =
+      std::chrono::milliseconds{50};  ///< host time; also how soon stop() is heard
+};
+
+/// Owns the thread, not the device: the device must outlive it. Functions may be called from any one other
+/// thread, latency() and failure() from any.
+class DeviceThread {
+ public:
+  /// Starts the loop, or says what the system refused. The device is not touched when it fails.
+  [[nodiscard]] static Result<std::unique_ptr<DeviceThread>> start(Device& device,
+                                                                   DeviceThreadOptions options);
+
+  DeviceThread(const DeviceThread&) = delete;
+  DeviceThread& operator=(const DeviceThread&) = delete;
+  /// Stops.
+  ~DeviceThread();
+
+  /// Asks the loop to end and waits for it: at most one wait() and one receive(). Safe to call again.
+  void stop();
+
+  /// What the system refused in mode Ignore, one sentence each; empty in mode Enforce.
+  [[nodiscard]] const std::vector<std::string>& warnings() const noexcept;
+  /// From wait() having returned to receive() having returned.
+  [[nodiscard]] const LatencyHistogram& latency() const noexcept;
+  /// The exception that ended the loop, in words; none while it runs or if it was stopped.
+  [[nodiscard]] std::optional<std::string> failure() const;
+
+ private:
+  struct State;
+  explicit DeviceThread(std::unique_ptr<State> state);
+  std::unique_ptr<State> state_;
+};
+
+}  // namespace abbe::drivers

@@ -1,0 +1,8 @@
+#include "abbe/drivers/raw_ring.hpp"
+
+namespace abbe::drivers {
+
+RawRing::RawRing(std::size_t capacity_blocks)
+    : indices_(capacity_blocks), blocks_(std::make_unique<protocol::RawBlock[]>(indices_.capacity())) {}
+
+}  // namespace abbe::drivers

@@ -1,0 +1,178 @@
+#include "abbe/drivers/clock_model.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+namespace abbe::drivers {
+namespace {
+
+constexpr std::chrono::hours kNothingKnown{1};
+constexpr double kPriorLateness_s =
+    0.020;  ///< what an arrival may be late by before anything was seen; weighs one arrival
+constexpr std::chrono::seconds kLateForTooLong{
+    5};  ///< a stalled network drains in milliseconds, a jumped clock stays
+
+double seconds(std::chrono::nanoseconds d) noexcept {
+  return 1e-9 * static_cast<double>(d.count());
+}
+std::chrono::nanoseconds nanoseconds(double s) noexcept {
+  return std::chrono::nanoseconds{std::llround(1e9 * s)};
+}
+
+}  // namespace
+
+ClockModel::Observed ClockModel::observe(protocol::DeviceTime last_point,
+                                         protocol::HostTime arrival) ABBE_RT {
+  if (count_ == 0) {
+    begin_with(last_point, arrival);
+    return Observed::Followed;
+  }
+  const double device_s = seconds(last_point - origin_device_);
+  const Point p{device_s, seconds(arrival - origin_host_) - device_s};
+  if (device_s == last_device_s_) return Observed::Followed;  // the same instant again says nothing new
+  if (device_s < last_device_s_ || jumped(p, arrival)) {
+    reset();
+    ++restarts_;
+    begin_with(last_point, arrival);
+    return Observed::Restarted;
+  }
+  last_device_s_ = device_s;
+  keep(p);
+  fit();
+  return Observed::Followed;
+}
+
+void ClockModel::begin_with(protocol::DeviceTime last_point, protocol::HostTime arrival) ABBE_RT {
+  origin_device_ = last_point;
+  origin_host_ = arrival;
+  last_device_s_ = 0.0;
+  keep({0.0, 0.0});
+  fit();
+}
+
+bool ClockModel::jumped(const Point& p, protocol::HostTime arrival) ABBE_RT {
+  const double lateness_s = p.offset_s - line_at(p.device_s);
+  const double jump_s = seconds(options_.jump);
+  if (lateness_s < -jump_s) return true;  // the device clock went ahead: no delay is negative
+  if (lateness_s < jump_s) {
+    late_ = false;
+    return false;
+  }
+  if (!late_) late_since_ = arrival;
+  late_ = true;
+  return arrival - late_since_ > kLateForTooLong;
+}
+
+void ClockModel::reset() ABBE_RT {
+  count_ = 0;
+  slope_ = 0.0;
+  late_ = false;
+}
+
+/// One point per slice of the window, the lowest: the line can touch no other.
+void ClockModel::keep(const Point& p) ABBE_RT {
+  forget_before(p.device_s - seconds(options_.window));
+  const double slice_s = seconds(options_.window) / static_cast<double>(kPoints - 1);
+  if (count_ != 0 && std::floor(points_[count_ - 1].device_s / slice_s) == std::floor(p.device_s / slice_s)) {
+    Point& last = points_[count_ - 1];
+    if (p.offset_s - slope_ * (p.device_s - last.device_s) < last.offset_s) last = p;
+    return;
+  }
+  points_[count_++] = p;
+}
+
+void ClockModel::forget_before(double device_s) ABBE_RT {
+  const auto begin = points_.begin();
+  const auto end = begin + static_cast<std::ptrdiff_t>(count_);
+  auto first = std::find_if(begin, end, [&](const Point& p) { return p.device_s >= device_s; });
+  if (first == begin && count_ == kPoints) ++first;
+  count_ = static_cast<std::size_t>(std::move(first, end, begin) - begin);
+}
+
+void ClockModel::fit() ABBE_RT {
+  if (count_ > 1) fit_slope();
+  const auto begin = points_.begin();
+  const auto end = begin + static_cast<std::ptrdiff_t>(count_);
+  const auto height = [this](const Point& p) { return p.offset_s - slope_ * p.device_s; };
+  const auto lowest = std::min_element(begin, end, [&](auto& a, auto& b) { return height(a) < height(b); });
+  pivot_s_ = lowest->device_s;
+  offset_s_ = lowest->offset_s;
+  if (count_ == 1) touch_begin_s_ = touch_end_s_ = pivot_s_;
+  judge_lateness();
+}
+
+/// The highest line below all points at their mean time: the edge of the lower convex hull above that time
+/// (monotone chain, [Andrew 1979]).
+void ClockModel::fit_slope() ABBE_RT {
+  std::array<std::uint16_t, kPoints> hull;  // NOLINT: filled below, `size` says how far
+  std::size_t size = 0;
+  const auto turns_down = [this](const Point& a, const Point& b, const Point& c) {
+    return (b.device_s - a.device_s) * (c.offset_s - a.offset_s) <=
+           (b.offset_s - a.offset_s) * (c.device_s - a.device_s);
+  };
+  double mean_s = 0.0;
+  for (std::size_t i = 0; i < count_; ++i) {
+    while (size >= 2 && turns_down(points_[hull[size - 2]], points_[hull[size - 1]], points_[i])) --size;
+    hull[size++] = static_cast<std::uint16_t>(i);
+    mean_s += points_[i].device_s / static_cast<double>(count_);
+  }
+  std::size_t edge = 0;
+  while (edge + 2 < size && points_[hull[edge + 1]].device_s < mean_s) ++edge;
+  const Point& a = points_[hull[edge]];
+  const Point& b = points_[hull[edge + 1]];
+  const double free_slope = (b.offset_s - a.offset_s) / (b.device_s - a.device_s);
+  slope_ = std::clamp(free_slope, -options_.max_skew, options_.max_skew);
+  touch_begin_s_ = a.device_s;
+  touch_end_s_ = b.device_s;
+}
+
+/// Mean delay above the line from the median (one stalled packet must not shake it): an exponential
+/// distribution has median = mean ln 2. The lowest of n such delays lies mean / n above zero, on average and
+/// in standard deviation.
+void ClockModel::judge_lateness() ABBE_RT {
+  std::array<double, kPoints> lateness;  // NOLINT: filled below
+  for (std::size_t i = 0; i < count_; ++i) lateness[i] = points_[i].offset_s - line_at(points_[i].device_s);
+  const auto middle = lateness.begin() + static_cast<std::ptrdiff_t>(count_ / 2);
+  std::nth_element(lateness.begin(), middle, lateness.begin() + static_cast<std::ptrdiff_t>(count_));
+  const double n = static_cast<double>(count_);
+  constexpr double kLn2 = 0.693147180559945309;
+  mean_lateness_s_ = *middle / kLn2;
+  u_touch_s_ =
+      2.0 * (kPriorLateness_s + n * mean_lateness_s_) / (1.0 + n) / n;  // 2: each end rests on half of them
+  const double span_s = points_[count_ - 1].device_s - points_[0].device_s;
+  const double lever_s = std::max(touch_end_s_ - touch_begin_s_, span_s / 4.0);
+  const double u_limit = options_.max_skew / std::sqrt(3.0);  // rectangular within the bound
+  u_slope_ = lever_s > 0.0 ? std::min(u_limit, std::sqrt(2.0) * u_touch_s_ / lever_s) : u_limit;
+}
+
+double ClockModel::line_at(double device_s) const ABBE_RT {
+  return offset_s_ + slope_ * (device_s - pivot_s_);
+}
+
+HostInstant ClockModel::to_host(protocol::DeviceTime t) const ABBE_RT {
+  if (count_ == 0) return {protocol::HostTime{}, kNothingKnown, false};
+  const double device_s = seconds(t - origin_device_);
+  const double bound_s = seconds(options_.max_constant_delay);
+  const double outside_s = std::max({0.0, touch_begin_s_ - device_s, device_s - touch_end_s_});
+  const double u_constant_s =
+      bound_s / std::sqrt(12.0);  // rectangular over [0, bound], estimate in its middle
+  const double u_s = std::hypot(u_constant_s, u_touch_s_, u_slope_ * outside_s);
+  return {origin_host_ + (t - origin_device_) + nanoseconds(line_at(device_s) - bound_s / 2.0),
+          nanoseconds(u_s), settled()};
+}
+
+bool ClockModel::settled() const ABBE_RT {
+  return count_ >= options_.settled_after && !late_;
+}
+
+ClockStatus ClockModel::status() const ABBE_RT {
+  if (count_ == 0) return {.restarts = restarts_};
+  return {.settled = settled(),
+          .skew = -slope_,  // offset falls where the device clock runs fast
+          .residual = nanoseconds(mean_lateness_s_),
+          .u_time = to_host(origin_device_ + nanoseconds(last_device_s_)).u_time,
+          .restarts = restarts_};
+}
+
+}  // namespace abbe::drivers

@@ -1,0 +1,33 @@
+#include "abbe/drivers/status_board.hpp"
+
+#include <algorithm>
+#include <cstring>
+
+namespace abbe::drivers {
+
+void FaultText::set(protocol::HostTime at, std::string_view text) ABBE_RT {
+  std::array<char, kCapacity> bytes{};
+  const std::size_t length = std::min(text.size(), kCapacity);
+  std::copy_n(text.data(), length, bytes.data());
+  std::array<std::uint64_t, kWords> words{};
+  std::memcpy(words.data(), bytes.data(), kCapacity);
+
+  const std::uint64_t sequence = sequence_.load(std::memory_order_relaxed);  // own counter
+  sequence_.store(sequence + 1, std::memory_order_relaxed);  // made visible by the releases that follow
+  // release: pairs with the acquires in read(); carries the odd sequence along
+  length_.store(length, std::memory_order_release);
+  at_ns_.store(at.time_since_epoch().count(), std::memory_order_release);
+  for (std::size_t i = 0; i < kWords; ++i) words_[i].store(words[i], std::memory_order_release);
+  sequence_.store(sequence + 2,
+                  std::memory_order_release);  // release: pairs with the first acquire in read()
+}
+
+void StatusBoard::set_clock(const ClockStatus& clock) ABBE_RT {
+  clock_settled_.store(clock.settled, std::memory_order_relaxed);
+  clock_skew_.store(clock.skew, std::memory_order_relaxed);
+  clock_residual_ns_.store(clock.residual.count(), std::memory_order_relaxed);
+  clock_u_time_ns_.store(clock.u_time.count(), std::memory_order_relaxed);
+  clock_restarts_.store(clock.restarts, std::memory_order_relaxed);
+}
+
+}  // namespace abbe::drivers

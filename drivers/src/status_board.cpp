@@ -1,0 +1,52 @@
+#include "abbe/drivers/status_board.hpp"
+
+#include <algorithm>
+#include <cstring>
+#include <utility>
+
+namespace abbe::drivers {
+
+FaultText::Read FaultText::read() const {
+  std::array<std::uint64_t, kWords> words{};
+  std::uint64_t length = 0;
+  std::int64_t at_ns = 0;
+  for (;;) {
+    const std::uint64_t before =
+        sequence_.load(std::memory_order_acquire);  // pairs with the last release in set()
+    // acquire: pairs with the releases in set(); whoever sees a new word also sees the odd sequence before it
+    length = length_.load(std::memory_order_acquire);
+    at_ns = at_ns_.load(std::memory_order_acquire);
+    std::transform(words_.begin(), words_.end(), words.begin(),
+                   [](const auto& w) { return w.load(std::memory_order_acquire); });
+    if (before % 2 == 0 && sequence_.load(std::memory_order_relaxed) == before) break;
+  }
+  std::array<char, kCapacity> bytes{};
+  std::memcpy(bytes.data(), words.data(), kCapacity);
+  return {std::string(bytes.data(), length), protocol::HostTime{std::chrono::nanoseconds{at_ns}}};
+}
+
+DeviceStatus StatusBoard::read(std::string name, std::uint64_t dropped, std::uint64_t raw_dropped) const {
+  DeviceStatus s;
+  s.name = std::move(name);
+  s.state = state_.load(std::memory_order_acquire);  // acquire: pairs with the release in set_state()
+  s.connected = connected_.load(std::memory_order_relaxed);
+  s.samples = samples.value();
+  s.dropped = dropped;
+  s.raw_dropped = raw_dropped;
+  s.gaps = gaps.value();
+  s.faults = faults.value();
+  s.time_widened = time_widened.value();
+  s.clock = {.settled = clock_settled_.load(std::memory_order_relaxed),
+             .skew = clock_skew_.load(std::memory_order_relaxed),
+             .residual = std::chrono::nanoseconds{clock_residual_ns_.load(std::memory_order_relaxed)},
+             .u_time = std::chrono::nanoseconds{clock_u_time_ns_.load(std::memory_order_relaxed)},
+             .restarts = clock_restarts_.load(std::memory_order_relaxed)};
+  s.last_sample =
+      protocol::HostTime{std::chrono::nanoseconds{last_sample_ns_.load(std::memory_order_relaxed)}};
+  auto [text, at] = fault_text_.read();
+  s.last_fault = std::move(text);
+  s.last_fault_at = at;
+  return s;
+}
+
+}  // namespace abbe::drivers

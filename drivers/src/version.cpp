@@ -1,3 +1,0 @@
-namespace abbe::drivers {
-// Replaced by the room's first real source.
-}

@@ -32,7 +32,7 @@ struct AxisConfig {
   friend bool operator==(const AxisConfig&, const AxisConfig&) = default;
 };
 
-enum class BasisConfig { Linear, Cubic };
+enum class BasisConfig { Linear };
 
 /// [machine], [axes.*], [target], [model], and the noise figures of [tracker]: what identification needs to
 /// know.

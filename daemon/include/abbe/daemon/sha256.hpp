@@ -1,0 +1,35 @@
+#pragma once
+/// SHA-256 [FIPS 180-4] by OpenSSL, as the hexadecimal text that stands in models and records.
+
+#include <cstddef>
+#include <filesystem>
+#include <memory>
+#include <span>
+#include <string>
+#include <string_view>
+
+#include "abbe/daemon/error.hpp"
+
+namespace abbe::daemon {
+
+/// Running hash; not copyable, not thread-safe.
+class Sha256 {
+ public:
+  Sha256();
+  Sha256(const Sha256&) = delete;
+  Sha256& operator=(const Sha256&) = delete;
+  ~Sha256();
+
+  void update(std::span<const std::byte> bytes);
+  void update(std::string_view text);
+  [[nodiscard]] std::string hex();  ///< 64 lower-case digits; the hash is finished afterwards
+
+ private:
+  struct State;
+  std::unique_ptr<State> state_;
+};
+
+[[nodiscard]] std::string sha256_hex(std::string_view text);
+[[nodiscard]] Result<std::string> sha256_hex_of_file(const std::filesystem::path& file);
+
+}  // namespace abbe::daemon

@@ -1,0 +1,70 @@
+#include <fmt/format.h>
+
+#include <cerrno>
+#include <cstring>
+#include <fstream>
+#include <sstream>
+
+#include "abbe/daemon/sha256.hpp"
+#include "config/readers.hpp"
+
+namespace abbe::daemon {
+
+namespace {
+
+Config read_all(Section& root, const std::filesystem::path& base) {
+  Config config;
+  read_machine(root, config.machine);
+  read_tracker(root, config);
+  read_encoder(root, config);
+  read_daemon(root, base, config);
+  read_recording(root, base, config);
+  read_dds(root, base, config);
+  read_gate(root, config);
+  read_control(root, base, config);
+  root.close();
+  return config;
+}
+
+}  // namespace
+
+Result<Config> parse_config(std::string_view text, const std::filesystem::path& file) {
+  Faults faults(file.string());
+  toml::table table;
+  try {
+    table = toml::parse(text, file.string());
+  } catch (const toml::parse_error& error) {
+    // A parser that lost its way guesses from there on: the first fault of syntax is the only one worth
+    // showing.
+    faults.add(error.source().begin.line, error.source().begin.column, "", error.description());
+    return tl::make_unexpected(faults.to_error());
+  }
+  Section root(&table, "", {1, 1}, faults);
+  auto config = read_all(root, file.parent_path());
+  if (faults.any()) return tl::make_unexpected(faults.to_error());
+  return config;
+}
+
+Result<Config> load_config(const std::filesystem::path& file) {
+  std::ifstream in(file, std::ios::binary);
+  std::ostringstream text;
+  if (in && in.peek() != std::ifstream::traits_type::eof()) text << in.rdbuf();
+  if (in.bad() || !in.is_open())
+    return fail(ErrorCode::Io, fmt::format("read {}: {}", file.string(), std::strerror(errno)));
+  return parse_config(text.str(), file);
+}
+
+std::string machine_hash(const MachineConfig& machine) {
+  std::string text = fmt::format("{}|{}|{}", machine.name, machine.chain, static_cast<int>(machine.basis));
+  for (const auto& axis : machine.axes)
+    text += fmt::format("|{} {} {:.17g} {:.17g} {:.17g}", axis.name, static_cast<int>(axis.kind), axis.min,
+                        axis.max, axis.reference);
+  for (const double t : machine.target_offset_m) text += fmt::format("|{:.17g}", t);
+  for (const auto& [axis, nodes_m] : machine.nodes_m) {
+    text += "|" + axis;
+    for (const double node_m : nodes_m) text += fmt::format(" {:.17g}", node_m);
+  }
+  return sha256_hex(text);
+}
+
+}  // namespace abbe::daemon

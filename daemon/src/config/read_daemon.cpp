@@ -1,0 +1,91 @@
+#include <fmt/format.h>
+
+#include "config/readers.hpp"
+
+namespace abbe::daemon {
+
+namespace {
+
+void read_cpu(Section& section, std::string_view key, std::optional<int>& out) {
+  int cpu = 0;
+  if (section.get_integer(key, cpu, 0, 1023)) out = cpu;
+}
+
+void read_scheduling(Section& section, DaemonConfig& out) {
+  section.get_word<RealTimeMode>("realtime", out.realtime,
+                                 {{"enforce", RealTimeMode::Enforce}, {"ignore", RealTimeMode::Ignore}});
+  section.get_integer("tracker_priority", out.tracker_priority, 1, 99);
+  section.get_integer("encoder_priority", out.encoder_priority, 1, 99);
+  section.get_integer("hub_priority", out.hub_priority, 1, 99);
+  read_cpu(section, "tracker_cpu", out.tracker_cpu);
+  read_cpu(section, "encoder_cpu", out.encoder_cpu);
+  read_cpu(section, "hub_cpu", out.hub_cpu);
+}
+
+}  // namespace
+
+void read_daemon(Section& root, const std::filesystem::path& base, Config& out) {
+  Section section = root.child("daemon");
+  auto& daemon = out.daemon;
+  section.get("data_dir", daemon.data_dir, base);
+  section.get("runtime_dir", daemon.runtime_dir, base);
+  section.get("hub_period_us", daemon.hub_period, kMicro, {50.0, 1e6});
+  section.get("watermark_ms", daemon.watermark, kMilli, {1.0, 60e3});
+  section.get("simulated", daemon.simulated);
+  section.get("speed", daemon.speed, kPlain, {1e-3, 1e4});
+  if (daemon.speed != 1.0 && !daemon.simulated)
+    section.fault("speed", "may differ from 1 only with simulated = true: real devices keep real time");
+  read_scheduling(section, daemon);
+  section.close();
+}
+
+void read_recording(Section& root, const std::filesystem::path& base, Config& out) {
+  Section section = root.child("recording");
+  auto& recording = out.recording;
+  recording.dir = out.daemon.data_dir / "recordings";
+  section.get("dir", recording.dir, base);
+  std::uint32_t chunk_kB = 256;
+  if (section.get_integer("chunk_kB", chunk_kB, 4, 65536)) recording.chunk_bytes = chunk_kB * 1024;
+  section.get("chunk_period_ms", recording.chunk_period, kMilli, {10.0, 60e3});
+  section.get("raw", recording.raw);
+  std::uint64_t min_free_MB = 256;
+  if (section.get_integer("min_free_MB", min_free_MB, 0, 1'000'000'000))
+    recording.min_free_bytes = min_free_MB << 20;
+  section.close();
+}
+
+void read_dds(Section& root, const std::filesystem::path& base, Config& out) {
+  Section section = root.child("dds");
+  auto& dds = out.dds;
+  dds.socket = out.daemon.runtime_dir / "dds.sock";
+  section.get_integer("domain", dds.domain, 0, 232);  // RTPS 2.2, 9.6.1.1: port numbers end at domain 232
+  section.get("snapshot_hz", dds.snapshot_hz, kPlain, {0.1, 1000.0});
+  section.get("compensation_hz", dds.compensation_hz, kPlain, {0.1, 1000.0});
+  section.get("model_repeat_s", dds.model_repeat, kPlain, {1.0, 3600.0});
+  section.get("validity_s", dds.validity, kPlain, {0.01, 3600.0});
+  section.get_word<Supervise>(
+      "supervise", dds.supervise,
+      {{"child", Supervise::Child}, {"systemd", Supervise::Systemd}, {"off", Supervise::Off}});
+  section.get("profile", dds.profile, base);
+  section.get("socket", dds.socket, base);
+  section.close();
+}
+
+void read_gate(Section& root, Config& out) {
+  Section section = root.child("gate");
+  auto& gate = out.gate;
+  section.get("max_error_mm", gate.max_error_m, kMilli, kPositive);
+  section.get("max_gradient", gate.max_gradient, kPlain, kPositive);
+  section.get("holdout_fraction", gate.holdout_fraction, kPlain, {0.05, 0.5});
+  section.get("accept", gate.accept);
+  section.close();
+}
+
+void read_control(Section& root, const std::filesystem::path& base, Config& out) {
+  Section section = root.child("control");
+  out.control.socket = out.daemon.runtime_dir / "control.sock";
+  section.get("socket", out.control.socket, base);
+  section.close();
+}
+
+}  // namespace abbe::daemon

@@ -1,0 +1,117 @@
+#include <fmt/format.h>
+
+#include <set>
+
+#include "config/readers.hpp"
+
+namespace abbe::daemon {
+
+namespace {
+
+void read_noise(Section& tracker, MachineConfig& machine) {
+  tracker.get("sigma_range_um", machine.sigma_range_m, kMicro, kPositive);
+  tracker.get("sigma_angle_urad", machine.sigma_angle_rad, kMicro, kPositive);
+}
+
+void read_tracker_timeouts(Section& tracker, TrackerConfig& out) {
+  tracker.get("max_constant_delay_us", out.max_constant_delay, kMicro, kNotNegative);
+  tracker.get("connect_timeout_s", out.connect_timeout, kPlain, kPositive);
+  tracker.get("command_timeout_s", out.command_timeout, kPlain, kPositive);
+  tracker.get("initialize_timeout_s", out.initialize_timeout, kPlain, kPositive);
+  tracker.get("silence_timeout_s", out.silence_timeout, kPlain, kPositive);
+}
+
+/// Keys that only make sense on the other transport are refused: they would be silently ignored.
+void refuse(Section& encoder, std::initializer_list<std::string_view> keys, std::string_view transport) {
+  for (const auto key : keys)
+    if (encoder.has(key))
+      encoder.fault(key, fmt::format("has no meaning with transport = \"{}\"", transport));
+}
+
+void read_transport(Section& encoder, EncoderConfig& out) {
+  const bool known = encoder.get_word<EncoderTransport>(
+      "transport", out.transport,
+      {{"udp", EncoderTransport::Udp}, {"socketcan", EncoderTransport::SocketCan}}, Need::Required);
+  if (!known) {
+    for (const auto key : {"interface", "local_port", "peer_host", "peer_port"})
+      static_cast<void>(encoder.has(key));
+  } else if (out.transport == EncoderTransport::SocketCan) {
+    encoder.get("interface", out.interface, Need::Required);
+    refuse(encoder, {"local_port", "peer_host", "peer_port"}, "socketcan");
+  } else {
+    encoder.get_integer("local_port", out.local_port, 0, 65535);
+    encoder.get("peer_host", out.peer_host, Need::Required);
+    encoder.get_integer("peer_port", out.peer_port, 1, 65535, Need::Required);
+    refuse(encoder, {"interface"}, "udp");
+  }
+}
+
+EncoderNodeConfig read_node(Section& section, const MachineConfig& machine) {
+  EncoderNodeConfig node;
+  const bool named = section.get("axis", node.axis, Need::Required);
+  const AxisConfig* axis = machine.find_axis(node.axis);
+  if (named && axis == nullptr && !machine.axes.empty()) section.fault("axis", "no such axis in [axes]");
+  if (axis != nullptr) node.kind = axis->kind;
+  section.get_integer("node", node.node, 1, 127, Need::Required);
+  const bool linear = node.kind == AxisKind::Linear;
+  section.get(linear ? "step_nm" : "step_nrad", node.step, kNano, kPositive);
+  section.get(linear ? "offset_mm" : "offset_rad", node.offset, linear ? kMilli : kPlain, kAny);
+  bool invert = false;
+  if (section.get("invert", invert) && invert) node.step = -node.step;
+  section.close();
+  return node;
+}
+
+void read_nodes(Section& encoder, const MachineConfig& machine, EncoderConfig& out) {
+  constexpr std::size_t kMostNodes = 8;  // as many axes as a sample carries
+  std::set<std::string> axes;
+  std::set<int> ids;
+  for (auto& section : encoder.children("nodes")) {
+    auto node = read_node(section, machine);
+    if (!node.axis.empty() && !axes.insert(node.axis).second)
+      section.fault("axis", fmt::format("axis {} has two nodes", node.axis));
+    if (node.node != 0 && !ids.insert(node.node).second)
+      section.fault("node", fmt::format("node id {} is used twice", node.node));
+    out.nodes.push_back(std::move(node));
+  }
+  if (out.nodes.empty() || out.nodes.size() > kMostNodes)
+    encoder.fault("nodes", fmt::format("needs 1 to {} nodes", kMostNodes));
+}
+
+}  // namespace
+
+void read_tracker(Section& root, Config& out) {
+  Section tracker = root.child("tracker");
+  read_noise(tracker, out.machine);
+  TrackerConfig config;
+  const bool has_host = tracker.get("host", config.host);
+  tracker.get("name", config.name);
+  tracker.get_integer("port", config.port, 1, 65535);
+  tracker.get("point_rate_hz", config.point_rate_hz, kPlain,
+              {1.0, 1000.0});  // emScon: whole ms between points
+  tracker.get_word<WeatherConfig>(
+      "weather", config.weather,
+      {{"none", WeatherConfig::None}, {"read", WeatherConfig::Read}, {"compute", WeatherConfig::Compute}});
+  read_tracker_timeouts(tracker, config);
+  if (!has_host && tracker.has("port") && !tracker.has("host"))
+    tracker.fault("host", "missing, but a port is given");
+  tracker.close();
+  if (has_host) out.tracker = std::move(config);
+}
+
+void read_encoder(Section& root, Config& out) {
+  Section encoder = root.child("encoder");
+  if (!encoder.present()) return;
+  EncoderConfig config;
+  encoder.get("name", config.name);
+  read_transport(encoder, config);
+  encoder.get("sync_period_us", config.sync_period, kMicro, {100.0, 1e6});
+  encoder.get("sampling_delay_us", config.sampling_delay, kMicro, kNotNegative);
+  encoder.get("u_sampling_delay_us", config.u_sampling_delay, kMicro, kNotNegative);
+  encoder.get("axes_compensated", config.axes_compensated);
+  read_nodes(encoder, out.machine, config);
+  encoder.close();
+  out.encoder = std::move(config);
+}
+
+}  // namespace abbe::daemon

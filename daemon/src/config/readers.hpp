@@ -1,0 +1,19 @@
+#pragma once
+/// One reader per group of tables. Each fills what it can, adds a fault for what it cannot, and closes its
+/// sections.
+
+#include "abbe/daemon/config.hpp"
+#include "config/section.hpp"
+
+namespace abbe::daemon {
+
+void read_machine(Section& root, MachineConfig& out);
+void read_tracker(Section& root, Config& out);
+void read_encoder(Section& root, Config& out);
+void read_daemon(Section& root, const std::filesystem::path& base, Config& out);
+void read_recording(Section& root, const std::filesystem::path& base, Config& out);
+void read_dds(Section& root, const std::filesystem::path& base, Config& out);
+void read_gate(Section& root, Config& out);
+void read_control(Section& root, const std::filesystem::path& base, Config& out);
+
+}  // namespace abbe::daemon

@@ -27,9 +27,9 @@ struct EncoderPlan {
   std::uint8_t tpdo = 1;        ///< 1 or 2
   std::uint8_t sync_every = 1;  ///< 1..240: transmission type
   std::uint16_t heartbeat_ms = 100;
-  std::optional<std::uint32_t> vendor;  ///< checked against 1018h when given
-  std::optional<std::uint32_t> product;
-  std::optional<std::uint32_t> serial;
+  std::optional<std::uint32_t> vendor{};  ///< checked against 1018h when given
+  std::optional<std::uint32_t> product{};
+  std::optional<std::uint32_t> serial{};
 };
 
 /// One SDO write of the procedure.

@@ -106,8 +106,9 @@ class ObjectDictionary {
   [[nodiscard]] AbortCode check_mapping(ObjectId object, std::uint64_t value) const noexcept;
   void after_write(ObjectId object, std::uint64_t value) noexcept;
 
-  EncoderIdentity identity_;
-  std::array<char, kMaxSdoBytes> name_{};  ///< identity_.name points here: the caller's text may go away
+  EncoderIdentity identity_;  ///< its name is kept in `name_`: the caller's text may go away
+  std::array<std::byte, kMaxSdoBytes> name_{};
+  std::size_t name_size_ = 0;
   std::array<Entry, kCapacity> entries_{};
   std::size_t count_ = 0;
   std::int64_t raw_position_ = 0;

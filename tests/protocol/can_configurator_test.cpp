@@ -1,0 +1,140 @@
+#include <gtest/gtest.h>
+
+#include <vector>
+
+#include "abbe/protocol/can/cia406.hpp"
+#include "abbe/protocol/can/encoder_configurator.hpp"
+#include "abbe/protocol/can/sdo_server.hpp"
+
+namespace abbe::protocol::can {
+namespace {
+
+using namespace std::chrono_literals;
+
+/// Runs the configurator against a dictionary; `sent` keeps what went over the wire.
+struct Bench {
+  explicit Bench(EncoderIdentity identity, EncoderPlan plan)
+      : objects(identity), server(identity.node, objects), configurator(plan) {}
+
+  void run() {
+    configurator.start(HostTime{});
+    while (const auto frame = configurator.take_frame()) {
+      sent.push_back(*frame);
+      if (const auto answer = server.on_frame(*frame, HostTime{})) configurator.on_frame(*answer, HostTime{});
+    }
+  }
+  ObjectDictionary objects;
+  SdoServer server;
+  EncoderConfigurator configurator;
+  std::vector<CanFrame> sent;
+};
+
+TEST(PdoConfiguration, FollowsTheOrderOfTheStandard) {
+  const auto writes = pdo_configuration({.node = 5, .heartbeat_ms = 200});
+  const std::vector<std::pair<ObjectId, std::uint32_t>> order{
+      {{0x1800, 1}, 0xC0000185}, {{0x1A00, 0}, 0},          {{0x1A00, 1}, 0x60040020},
+      {{0x1A00, 0}, 1},          {{0x1800, 2}, 1},          {{0x1800, 3}, 0},
+      {{0x1800, 5}, 0},          {{0x1800, 1}, 0x40000185}, {{0x1017, 0}, 200}};
+  for (std::size_t i = 0; i < order.size(); ++i) {
+    EXPECT_EQ(writes[i].object, order[i].first) << i;
+    EXPECT_EQ(writes[i].value, order[i].second) << i;
+  }
+}
+
+TEST(EncoderConfigurator, StopsTheNodeFirstAndStartsItLast) {
+  Bench bench{{.node = 5}, {.node = 5}};
+  bench.run();
+  ASSERT_EQ(bench.configurator.state(), EncoderConfigurator::State::Ready);
+  EXPECT_EQ(bench.sent.front(), encode_nmt(NmtCommand::PreOperational, 5));
+  EXPECT_EQ(bench.sent.back(), encode_nmt(NmtCommand::Start, 5));
+}
+
+TEST(EncoderConfigurator, LeavesOneSynchronousPositionPdo) {
+  Bench bench{{.node = 5},
+              {.node = 5, .position = PositionType::Signed64, .sync_every = 2, .heartbeat_ms = 50}};
+  bench.run();
+  const auto pdo = bench.objects.tpdo(1);
+  EXPECT_TRUE(pdo.enabled);
+  EXPECT_EQ(pdo.transmission_type, 2);
+  EXPECT_EQ(pdo.event_timer_ms, 0);
+  ASSERT_EQ(pdo.mapped, 1);
+  EXPECT_EQ(pdo.mapping[0], mapped_position(PositionType::Signed64));
+  EXPECT_FALSE(bench.objects.tpdo(2).enabled);
+  EXPECT_EQ(bench.objects.number(object::kHeartbeatTime), 50u);
+}
+
+TEST(EncoderConfigurator, CanUseTheSecondTpdo) {
+  Bench bench{{.node = 5}, {.node = 5, .tpdo = 2}};
+  bench.run();
+  EXPECT_TRUE(bench.objects.tpdo(2).enabled);
+  EXPECT_FALSE(bench.objects.tpdo(1).enabled);
+}
+
+TEST(EncoderConfigurator, ReadsIdentityAndStep) {
+  Bench bench{{.node = 5, .vendor = 7, .product = 8, .revision = 9, .serial = 10, .step_nm = 25},
+              {.node = 5}};
+  bench.run();
+  const auto& description = bench.configurator.description();
+  EXPECT_EQ(description.vendor, 7u);
+  EXPECT_EQ(description.serial, 10u);
+  EXPECT_EQ(description.step_nm, 25u);
+  EXPECT_FALSE(description.units_per_revolution);
+}
+
+TEST(EncoderConfigurator, ReadsUnitsPerRevolutionOfARotaryEncoder) {
+  Bench bench{{.node = 5, .kind = object::EncoderKind::SingleTurn, .units_per_revolution = 36000},
+              {.node = 5}};
+  bench.run();
+  EXPECT_EQ(bench.configurator.description().units_per_revolution, 36000u);
+  EXPECT_FALSE(bench.configurator.description().step_nm);
+}
+
+TEST(EncoderConfigurator, TellsAnotherDeviceFromAnEncoder) {
+  Bench bench{{.node = 5}, {.node = 5}};
+  bench.objects.set_number(object::kDeviceType, 0x00020192);  // a drive: profile 402
+  bench.run();
+  EXPECT_EQ(bench.configurator.state(), EncoderConfigurator::State::Failed);
+  EXPECT_EQ(bench.configurator.error().fault, ConfigurationFault::NotAnEncoder);
+  EXPECT_EQ(bench.configurator.error().seen, 0x00020192u);
+}
+
+TEST(EncoderConfigurator, RefusesAnExchangedScale) {
+  Bench bench{{.node = 5, .serial = 11}, {.node = 5, .serial = 12}};
+  bench.run();
+  EXPECT_EQ(bench.configurator.error().fault, ConfigurationFault::WrongSerial);
+  EXPECT_EQ(bench.configurator.error().seen, 11u);
+}
+
+TEST(EncoderConfigurator, NamesTheObjectAndTheReasonOfARefusal) {
+  Bench bench{{.node = 5, .has_position64 = false}, {.node = 5, .position = PositionType::Signed64}};
+  bench.run();
+  EXPECT_EQ(bench.configurator.error().fault, ConfigurationFault::Refused);
+  EXPECT_EQ(bench.configurator.error().object, (ObjectId{0x1A00, 1}));
+  EXPECT_EQ(bench.configurator.error().abort_code, AbortCode::NotMappable);
+}
+
+TEST(EncoderConfigurator, GivesUpOnAMuteNodeAfterAllRetries) {
+  EncoderConfigurator configurator{{.node = 5}};
+  HostTime now{};
+  configurator.start(now);
+  for (int i = 0; i < 3; ++i) {
+    EXPECT_EQ(configurator.state(), EncoderConfigurator::State::Working);
+    now = configurator.deadline();
+    configurator.on_time(now);
+  }
+  EXPECT_EQ(configurator.state(), EncoderConfigurator::State::Failed);
+  EXPECT_EQ(configurator.error().fault, ConfigurationFault::Silent);
+  EXPECT_EQ(now, HostTime{} + 1500ms);
+}
+
+TEST(EncoderConfigurator, BeginsAnewWhenStartedAgain) {
+  Bench bench{{.node = 5}, {.node = 5}};
+  bench.run();
+  bench.objects.reset();
+  bench.run();
+  EXPECT_EQ(bench.configurator.state(), EncoderConfigurator::State::Ready);
+  EXPECT_EQ(bench.objects.tpdo(1).transmission_type, 1);
+}
+
+}  // namespace
+}  // namespace abbe::protocol::can

@@ -1,0 +1,68 @@
+#pragma once
+/// The CSV files people hand to abbe, read into SI. Every reader gives all faults of a file at once (at most
+/// 20, each "file:line:column: column name: what is wrong") and nothing of a file that has one: NaN and
+/// infinity, a missing or unknown column, a row too short or too long, time that does not ascend, a last line
+/// that does not end. Comma, one header row, lines that begin with # are comments, decimal point. Functions,
+/// safe from any thread.
+
+#include <cstddef>
+#include <filesystem>
+#include <functional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "abbe/calib/otf/run.hpp"
+#include "abbe/daemon/error.hpp"
+#include "abbe/daemon/otf_acquisition.hpp"
+
+namespace abbe::daemon {
+
+/// A file as it was read: its name without folder, and the SHA-256 of exactly the bytes that were parsed.
+struct InputFile {
+  std::string name;
+  std::string sha256;
+  friend bool operator==(const InputFile&, const InputFile&) = default;
+};
+
+/// Called with 0 <= fraction <= 1, ascending; may be empty.
+using ReadProgress = std::function<void(double fraction)>;
+
+/// path.csv: `x_mm,y_mm,z_mm[,feed_mm_per_min]`, at least two vertices, no two neighbours equal.
+struct PathFile {
+  InputFile source;
+  std::vector<AxisPosition> vertices_m;
+  std::vector<double> feed_m_per_s;  ///< as long as vertices_m, or empty if the file has no such column
+};
+[[nodiscard]] Result<PathFile> read_path_csv(const std::filesystem::path& file);
+
+/// tracker.csv: `time_s,range_mm,azimuth_rad,elevation_rad[,status]` or `time_s,x_mm,y_mm,z_mm[,status]`.
+/// Status is the device's: 0 good, 1 speed warning (still good), others mark a point that holds its place but
+/// is not used.
+struct TrackerFile {
+  InputFile source;
+  std::vector<calib::otf::TrackerObservation> points;
+};
+[[nodiscard]] Result<TrackerFile> read_tracker_csv(const std::filesystem::path& file,
+                                                   const ReadProgress& progress = {});
+
+/// encoder.csv: `time_s,x_mm,y_mm,z_mm`, machine clock.
+struct EncoderRow {
+  double time_s = 0.0;
+  AxisPosition reading_m{};
+};
+struct EncoderFile {
+  InputFile source;
+  std::vector<EncoderRow> rows;
+};
+[[nodiscard]] Result<EncoderFile> read_encoder_csv(const std::filesystem::path& file,
+                                                   const ReadProgress& progress = {});
+
+/// points.csv: `x_mm,y_mm,z_mm`, scale readings, at least one.
+struct PointsFile {
+  InputFile source;
+  std::vector<AxisPosition> points_m;
+};
+[[nodiscard]] Result<PointsFile> read_points_csv(const std::filesystem::path& file);
+
+}  // namespace abbe::daemon

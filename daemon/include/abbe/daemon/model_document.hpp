@@ -1,0 +1,74 @@
+#pragma once
+/// A model as it is written, kept and exchanged: model.json. Lengths in the file are mm, errors um and urad,
+/// covariance in products of those; here everything is SI. What is written reads back to the same bits.
+
+#include <cstddef>
+#include <filesystem>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "abbe/calib/otf/solve.hpp"
+#include "abbe/calib/volumetric_model.hpp"
+#include "abbe/daemon/config.hpp"
+#include "abbe/daemon/input_files.hpp"
+#include "abbe/protocol/time.hpp"
+
+namespace abbe::daemon {
+
+struct ResidualFigures {
+  double mean_abs_m = 0.0;
+  double rms_m = 0.0;
+  double max_abs_m = 0.0;
+  friend bool operator==(const ResidualFigures&, const ResidualFigures&) = default;
+};
+
+/// How the model came about, in the terms every method shares.
+struct ModelStatistics {
+  std::size_t samples = 0, lost_samples = 0;
+  std::size_t observations = 0, unknowns = 0, rank = 0;
+  double condition = 0.0;
+  double sigma0 = 0.0;
+  double chi2_per_dof = 0.0;
+  ResidualFigures before, after;
+  int iterations = 0;
+  std::string stop_reason;
+  friend bool operator==(const ModelStatistics&, const ModelStatistics&) = default;
+};
+[[nodiscard]] ModelStatistics model_statistics(const calib::otf::Statistics& statistics);
+
+/// A model and where it came from.
+struct ModelDocument {
+  calib::VolumetricModel model;
+  std::string method = "otf";
+  std::string estimator = "two-step";
+  std::string machine;       ///< name in the configuration
+  std::string machine_hash;  ///< machine_hash() of the configuration
+  protocol::UtcTime created{};
+  ModelStatistics statistics;
+  std::vector<InputFile> inputs;
+};
+
+/// The document of an OTF solution.
+[[nodiscard]] ModelDocument otf_document(const calib::otf::Solution& solution, const MachineConfig& machine,
+                                         std::vector<InputFile> inputs, protocol::UtcTime created);
+
+/// SHA-256 in hex over what the model *says* (method, chain, basis, nodes, gauge, tools, parameters,
+/// covariance, validity), not over dates, inputs or statistics: the live model's hash equals the replay's.
+[[nodiscard]] std::string model_hash(const calib::VolumetricModel& model, std::string_view method);
+
+/// The first 16 digits of the hash: how people and the store call a model.
+[[nodiscard]] std::string model_id(const calib::VolumetricModel& model, std::string_view method);
+
+/// The text of model.json; the same document gives the same bytes.
+[[nodiscard]] std::string to_json(const ModelDocument& document);
+
+/// BadInput with every fault in Error::details. `file` only names the text in errors. A text whose recorded
+/// hash is not the hash of its content is refused.
+[[nodiscard]] Result<ModelDocument> parse_model(std::string_view text, const std::string& file);
+[[nodiscard]] Result<ModelDocument> read_model(const std::filesystem::path& file);
+
+/// `name,position_mm,value,u,unit`
+[[nodiscard]] std::string to_tables_csv(const calib::VolumetricModel& model);
+
+}  // namespace abbe::daemon

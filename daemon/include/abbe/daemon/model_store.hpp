@@ -1,0 +1,79 @@
+#pragma once
+/// All models the machine ever had, accepted or refused, and which of them is active. A folder:
+///     models/ID.json   one model.json each, never changed once written
+///     state.json       every event in order (added, activated, rolled back), replaced as a whole
+/// Each write goes to a new file, to the disk, then over the old name: after a power cut the old or the new
+/// state is there, never half of one. Several processes may use a store (a lock file orders them); one object
+/// belongs to one thread. A model file that cannot be read is listed with its fault and stands in nobody's
+/// way.
+
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "abbe/daemon/model_document.hpp"
+
+namespace abbe::daemon {
+
+/// Who asked for a change, why, and when: kept for ever.
+struct StoreActor {
+  std::string who;
+  std::string why;
+  protocol::UtcTime when{};
+};
+
+enum class StoreAction { Added, Activated, Forced, RolledBack };
+
+struct StoreEvent {
+  StoreAction action = StoreAction::Added;
+  std::string id;  ///< the model added, or the one that is active from now on
+  StoreActor actor;
+  bool accepted = false;             ///< Added: what the gate said
+  std::vector<std::string> reasons;  ///< Added: why it was refused
+};
+
+struct StoreEntry {
+  std::string id;
+  bool active = false;
+  bool accepted = false;  ///< by the gate, when it was added
+  std::vector<std::string> reasons;
+  protocol::UtcTime added{};
+  std::string method, machine;  ///< empty if the file cannot be read
+  std::string fault;            ///< why the file cannot be read; empty if it can
+};
+
+class ModelStore {
+ public:
+  /// Creates the folder if needed. Io if that fails, BadInput if state.json is damaged (the models are left
+  /// alone).
+  [[nodiscard]] static Result<ModelStore> open(const std::filesystem::path& folder);
+
+  /// Keeps a model with the gate's verdict; returns its id. A model that is there already (same hash) is not
+  /// written again, but the event is.
+  [[nodiscard]] Result<std::string> add(const ModelDocument& document, bool accepted,
+                                        std::vector<std::string> reasons, const StoreActor& actor);
+
+  /// Makes a model active. Refused if the gate refused it, unless forced; BadInput if it is not there or
+  /// damaged.
+  [[nodiscard]] Result<void> activate(const std::string& id, const StoreActor& actor, bool force = false);
+
+  /// Back to the model that was active before; returns its id. Refused if there was none.
+  [[nodiscard]] Result<std::string> rollback(const StoreActor& actor);
+
+  [[nodiscard]] Result<std::vector<StoreEntry>> list() const;     ///< newest first
+  [[nodiscard]] Result<std::vector<StoreEvent>> history() const;  ///< oldest first
+  [[nodiscard]] Result<std::optional<std::string>> active_id()
+      const;  ///< read anew each time: others may change it
+  [[nodiscard]] Result<ModelDocument> load(const std::string& id) const;
+
+  /// The id that begins with `prefix` (4 digits at least), or "active". Usage if none or several do.
+  [[nodiscard]] Result<std::string> find(const std::string& prefix) const;
+  [[nodiscard]] std::filesystem::path model_path(const std::string& id) const;
+
+ private:
+  explicit ModelStore(std::filesystem::path folder) : folder_(std::move(folder)) {}
+  std::filesystem::path folder_;
+};
+
+}  // namespace abbe::daemon

@@ -1,0 +1,53 @@
+#pragma once
+/// The one DDS participant of a process, made from an XML profile that the site may replace.
+/// Thread-safe as far as Fast DDS is; create and destroy it from one thread.
+
+#include <cstdint>
+#include <filesystem>
+#include <memory>
+
+#include "abbe/daemon/error.hpp"
+#include "abbe/daemon/topics.hpp"
+
+namespace eprosima::fastdds::dds {
+class DomainParticipant;
+class Topic;
+}  // namespace eprosima::fastdds::dds
+
+namespace abbe::dds {
+
+using daemon::Error;
+using daemon::ErrorCode;
+using daemon::Result;
+
+/// Highest domain whose ports, by the default rule 7400 + 250 x domain, are UDP ports
+/// [DDSI-RTPS 2.5, 9.6.2.3].
+inline constexpr std::uint32_t kHighestDomain = 232;
+
+struct ParticipantOptions {
+  std::uint32_t domain = 0;
+  std::filesystem::path
+      profiles;  ///< XML file with a participant profile "abbe"; empty: the built-in abbe-dds.xml
+};
+
+class Participant {
+ public:
+  /// Error: Usage for a domain above kHighestDomain, BadInput for a profile that cannot be read or has no
+  /// participant "abbe", Io if no participant can be created (no port, no interface).
+  [[nodiscard]] static Result<Participant> create(const ParticipantOptions& options);
+
+  /// The topic with its payload type, registered without TypeObject and TypeInformation. Error Io: Fast DDS
+  /// refuses.
+  [[nodiscard]] Result<eprosima::fastdds::dds::Topic*> topic(daemon::Topic topic);
+
+  [[nodiscard]] eprosima::fastdds::dds::DomainParticipant& get() const noexcept { return *participant_; }
+
+ private:
+  struct Deleter {
+    void operator()(eprosima::fastdds::dds::DomainParticipant* participant) const noexcept;
+  };
+  explicit Participant(eprosima::fastdds::dds::DomainParticipant* participant) : participant_(participant) {}
+  std::unique_ptr<eprosima::fastdds::dds::DomainParticipant, Deleter> participant_;
+};
+
+}  // namespace abbe::dds

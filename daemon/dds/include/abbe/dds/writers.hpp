@@ -1,0 +1,40 @@
+#pragma once
+/// One writer per topic of the table, in one participant. Used by one thread.
+
+#include <array>
+#include <chrono>
+#include <cstddef>
+#include <span>
+
+#include "abbe/daemon/dds_bridge.hpp"
+#include "abbe/dds/participant.hpp"
+#include "abbe/dds/payload_type.hpp"
+
+namespace eprosima::fastdds::dds {
+class DataWriter;
+}
+
+namespace abbe::dds {
+
+class Writers final : public daemon::DdsOutlet {
+ public:
+  /// `participant` must outlive the writers. Error Io: Fast DDS refuses one (security permissions,
+  /// resources).
+  [[nodiscard]] static Result<Writers> create(Participant& participant);
+
+  /// False if Fast DDS did not take it. A payload is written as it is.
+  bool write(daemon::Topic topic, std::span<const std::byte> payload) override;
+
+  /// Says to the readers of ModelState: somebody answers for it.
+  void assert_liveliness() override;
+
+  /// Waits until every reader has acknowledged ModelState, or the time is over.
+  void wait_for_state_acknowledged(std::chrono::milliseconds at_most);
+
+ private:
+  Writers() = default;
+  std::array<eprosima::fastdds::dds::DataWriter*, daemon::kTopicCount> writers_{};
+  Payload buffer_;
+};
+
+}  // namespace abbe::dds

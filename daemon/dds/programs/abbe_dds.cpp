@@ -1,0 +1,110 @@
+// abbe-dds: the DDS participant of abbe, a process of its own so that nothing a stranger sends can stop
+// abbed.
+#include <signal.h>
+#include <unistd.h>
+
+#include <CLI/CLI.hpp>
+#include <cstdio>
+#include <exception>
+#include <string>
+
+#include "abbe/daemon/dds_bridge.hpp"
+#include "abbe/dds/participant.hpp"
+#include "abbe/dds/writers.hpp"
+
+namespace {
+
+using abbe::daemon::DdsBridge;
+using abbe::daemon::DdsFeed;
+using abbe::daemon::Error;
+using abbe::daemon::ErrorCode;
+
+enum ExitCode { kDone = 0, kUsage = 2, kBadProfile = 3, kIo = 4, kInternal = 70 };
+
+constexpr const char* kExitCodes =
+    "Exit codes: 0 stopped by SIGTERM or SIGINT or because the parent is gone, 2 usage, 3 the profile cannot "
+    "be used,\n"
+    "4 no participant or writer can be created, 70 an exception nobody expected.";
+
+volatile sig_atomic_t stop_requested = 0;
+
+struct Options {
+  std::string socket;
+  abbe::dds::ParticipantOptions participant;
+  pid_t parent = 0;  ///< 0: nobody's child
+};
+
+void stop_on_signals() {
+  struct sigaction action {};
+  action.sa_handler = [](int) { stop_requested = 1; };
+  for (const int signal : {SIGTERM, SIGINT}) ::sigaction(signal, &action, nullptr);
+}
+
+int refuse(const Error& error) {
+  std::fprintf(stderr, "abbe-dds: %s\n", error.text.c_str());
+  switch (error.code) {
+    case ErrorCode::Usage:
+      return kUsage;
+    case ErrorCode::BadInput:
+      return kBadProfile;
+    default:
+      return kIo;
+  }
+}
+
+bool parent_is_gone(const Options& options) {
+  return options.parent != 0 && ::getppid() != options.parent;
+}
+
+void say_when_it_changes(const DdsBridge& bridge, bool& alive) {
+  if (bridge.source_alive() == alive) return;
+  alive = bridge.source_alive();
+  std::fprintf(stderr, alive ? "abbe-dds: abbed is alive\n" : "abbe-dds: abbed is lost, published INVALID\n");
+}
+
+int run(const Options& options) {
+  auto participant = abbe::dds::Participant::create(options.participant);
+  if (!participant) return refuse(participant.error());
+  auto writers = abbe::dds::Writers::create(*participant);
+  if (!writers) return refuse(writers.error());
+  stop_on_signals();
+
+  DdsBridge bridge(*writers);
+  DdsFeed feed(options.socket, bridge);
+  bool alive = false;
+  while (stop_requested == 0 && !parent_is_gone(options)) {
+    feed.turn();
+    say_when_it_changes(bridge, alive);
+  }
+  bridge.lost();
+  writers->wait_for_state_acknowledged(std::chrono::seconds{1});
+  return kDone;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  CLI::App app{
+      "Publishes over DDS what abbed hands over its local socket, and tells the subscribers when abbed is "
+      "lost."};
+  app.footer(kExitCodes);
+  Options options;
+  app.add_option("--socket", options.socket, "Unix socket of abbed; waits for it if it is not there")
+      ->required();
+  app.add_option("--domain", options.participant.domain, "DDS domain, 0 to 232")->capture_default_str();
+  app.add_option("--profile", options.participant.profiles,
+                 "XML file with a participant profile \"abbe\" (default: built in, UDP on every interface)");
+  app.add_option("--parent", options.parent,
+                 "leave when this process is no longer the parent (given by abbed)");
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& e) {
+    return app.exit(e) == 0 ? kDone : kUsage;
+  }
+  try {
+    return run(options);
+  } catch (const std::exception& e) {
+    std::fprintf(stderr, "abbe-dds: %s\n", e.what());
+    return kInternal;
+  }
+}

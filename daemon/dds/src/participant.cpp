@@ -1,0 +1,88 @@
+#include "abbe/dds/participant.hpp"
+
+#include <fastdds/dds/domain/DomainParticipant.hpp>
+#include <fastdds/dds/domain/DomainParticipantFactory.hpp>
+#include <fastdds/dds/log/Log.hpp>
+#include <fastdds/dds/log/StdoutErrConsumer.hpp>
+#include <fastdds/dds/topic/TypeSupport.hpp>
+
+#include <cstdlib>
+#include <fstream>
+#include <string>
+
+#include "abbe/dds/payload_type.hpp"
+#include "builtin_profile.hpp"
+
+namespace abbe::dds {
+namespace {
+
+namespace fast = eprosima::fastdds::dds;
+constexpr const char* kProfileName = "abbe";
+const auto kOk = eprosima::fastrtps::types::ReturnCode_t::RETCODE_OK;
+
+/// Standard output belongs to what a program prints; Fast DDS writes its errors there unless told otherwise.
+void log_to_stderr() {
+  auto consumer = std::make_unique<fast::StdoutErrConsumer>();
+  consumer->stderr_threshold(fast::Log::Kind::Info);
+  fast::Log::ClearConsumers();
+  fast::Log::RegisterConsumer(std::move(consumer));
+}
+
+Result<fast::DomainParticipantQos> read_profile(const std::filesystem::path& file) {
+  // Else a DEFAULT_FASTRTPS_PROFILES.xml that happens to lie in the working directory would change what we
+  // are.
+  ::setenv("SKIP_DEFAULT_XML", "1", 1);
+  auto* factory = fast::DomainParticipantFactory::get_instance();
+  const std::string name = file.empty() ? std::string("built-in profile") : file.string();
+  if (!file.empty() && !std::ifstream(file)) return fail(ErrorCode::BadInput, name + ": cannot be read");
+  const auto loaded = file.empty()
+                          ? factory->load_XML_profiles_string(kBuiltinProfile, sizeof(kBuiltinProfile) - 1)
+                          : factory->load_XML_profiles_file(name);
+  if (loaded != kOk) return fail(ErrorCode::BadInput, name + ": is not a Fast DDS XML profile file");
+  fast::DomainParticipantQos qos;
+  if (factory->get_participant_qos_from_profile(kProfileName, qos) != kOk) {
+    return fail(ErrorCode::BadInput, name + ": has no participant profile \"" + kProfileName + "\"");
+  }
+  return qos;
+}
+
+}  // namespace
+
+void Participant::Deleter::operator()(fast::DomainParticipant* participant) const noexcept {
+  participant->delete_contained_entities();
+  fast::DomainParticipantFactory::get_instance()->delete_participant(participant);
+}
+
+Result<Participant> Participant::create(const ParticipantOptions& options) {
+  log_to_stderr();
+  if (options.domain > kHighestDomain) {
+    return fail(ErrorCode::Usage, "domain " + std::to_string(options.domain) + ": the highest is " +
+                                      std::to_string(kHighestDomain));
+  }
+  const auto qos = read_profile(options.profiles);
+  if (!qos) return tl::make_unexpected(qos.error());
+  auto* participant =
+      fast::DomainParticipantFactory::get_instance()->create_participant(options.domain, *qos);
+  if (participant == nullptr) {
+    return fail(ErrorCode::Io, "domain " + std::to_string(options.domain) +
+                                   ": no participant can be created (ports or interfaces of the profile)");
+  }
+  return Participant(participant);
+}
+
+Result<fast::Topic*> Participant::topic(daemon::Topic topic) {
+  const auto& traits = daemon::traits(topic);
+  fast::TypeSupport type(new PayloadType(topic));
+  // An announced TypeInformation keeps Cyclone DDS 0.10 from matching, an announced TypeObject crashes Fast
+  // DDS 2.9 participants that do not know the type.
+  type->auto_fill_type_information(false);
+  type->auto_fill_type_object(false);
+  const std::string name(traits.name);
+  auto* created = type.register_type(participant_.get()) == kOk
+                      ? participant_->create_topic(name, type.get_type_name(), fast::TOPIC_QOS_DEFAULT)
+                      : nullptr;
+  if (created == nullptr) return fail(ErrorCode::Io, "topic " + name + ": Fast DDS refuses it");
+  return created;
+}
+
+}  // namespace abbe::dds

@@ -1,0 +1,122 @@
+#include "abbe/daemon/dds_bridge.hpp"
+
+#include <vector>
+
+#include "abbe/daemon/cdr.hpp"
+#include "retained_payloads.hpp"
+
+namespace abbe::daemon {
+namespace {
+
+struct Written {
+  bool ever = false;
+  DdsBridge::WallTime at{};
+};
+
+constexpr const char* kSourceLost = "SOURCE_LOST";
+
+bool is_durable(Topic topic) {
+  return traits(topic).kind == TopicTraits::Kind::Durable;
+}
+
+/// The state `payload` as of a source that no longer talks; nothing if it already says so or is no
+/// ModelState.
+std::vector<std::byte> invalidated(std::span<const std::byte> payload) {
+  auto state = decode<v1::ModelState>(payload);
+  if (!state || state->reason() == kSourceLost) return {};
+  state->state(v1::MODEL_INVALID);
+  state->reason(kSourceLost);
+  state->sequence_number(state->sequence_number() + 1);
+  std::vector<std::byte> invalid;
+  if (!encode(*state, invalid)) invalid.clear();
+  return invalid;
+}
+
+}  // namespace
+
+struct DdsBridge::State {
+  explicit State(DdsOutlet& o) : outlet(o) {}
+
+  DdsOutlet& outlet;
+  bool alive = false;
+  WallTime last_beat{};
+  WallTime last_assert{};
+  RetainedPayloads<Written> durable;
+  std::uint64_t written = 0;
+  std::uint64_t refused = 0;
+
+  void write(Topic topic, std::span<const std::byte> payload) {
+    ++(outlet.write(topic, payload) ? written : refused);
+  }
+
+  void write_what_is_due(WallTime now) {
+    for (auto& entry : durable.entries()) {
+      if (entry.extra.ever && now - entry.extra.at < traits(entry.topic).repeat) continue;
+      write(entry.topic, entry.payload);
+      entry.extra = {true, now};
+    }
+  }
+
+  /// Afterwards the states are forgotten, everything else waits to be written again.
+  void tell_that_source_is_lost() {
+    alive = false;
+    for (const auto& entry : durable.entries()) {
+      if (entry.topic != Topic::ModelState) continue;
+      if (const auto invalid = invalidated(entry.payload); !invalid.empty())
+        write(Topic::ModelState, invalid);
+    }
+    std::erase_if(durable.entries(), [](const auto& entry) { return entry.topic == Topic::ModelState; });
+    for (auto& entry : durable.entries()) entry.extra.ever = false;
+  }
+};
+
+DdsBridge::DdsBridge(DdsOutlet& outlet) : state_(std::make_unique<State>(outlet)) {}
+DdsBridge::~DdsBridge() = default;
+
+void DdsBridge::connected() {
+  lost();
+  state_->durable.entries().clear();
+}
+
+void DdsBridge::beat(WallTime now) {
+  state_->alive = true;
+  state_->last_beat = now;
+}
+
+void DdsBridge::publish(Topic topic, std::span<const std::byte> payload, WallTime now) {
+  const auto key = payload_key(topic, payload);
+  if (!key) {
+    ++state_->refused;
+  } else if (is_durable(topic)) {
+    state_->durable.keep(topic, key->bytes, payload);
+    if (state_->alive) state_->write_what_is_due(now);
+  } else if (state_->alive) {
+    state_->write(topic, payload);
+  }
+}
+
+void DdsBridge::lost() {
+  if (state_->alive) state_->tell_that_source_is_lost();
+}
+
+void DdsBridge::turn(WallTime now) {
+  State& s = *state_;
+  if (s.alive && now - s.last_beat > kSilence) s.tell_that_source_is_lost();
+  if (!s.alive) return;
+  s.write_what_is_due(now);
+  if (now - s.last_assert < kAssertPeriod) return;
+  s.outlet.assert_liveliness();
+  s.last_assert = now;
+}
+
+bool DdsBridge::source_alive() const noexcept {
+  return state_->alive;
+}
+std::uint64_t DdsBridge::written() const noexcept {
+  return state_->written;
+}
+std::uint64_t DdsBridge::refused() const noexcept {
+  return state_->refused;
+}
+
+}  // namespace abbe::daemon

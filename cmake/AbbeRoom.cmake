@@ -4,7 +4,9 @@
 add_library(abbe_warnings INTERFACE)
 add_library(abbe::warnings ALIAS abbe_warnings)
 target_compile_options(abbe_warnings INTERFACE
-  -Wall -Wextra -Wpedantic -Wshadow -Wconversion -Wno-sign-conversion -Wnon-virtual-dtor -Wold-style-cast -Werror
+  -Wall -Wextra -Wpedantic -Wshadow -Wconversion -Wnon-virtual-dtor -Wold-style-cast -Werror
+  -Wno-sign-conversion              # indices: Eigen counts signed, std unsigned
+  -Wno-missing-field-initializers   # designated initialisers leave the other members at their defaults on purpose
   $<$<CXX_COMPILER_ID:Clang>:-Wthread-safety>)
 
 if(ABBE_SANITIZE)

@@ -1,0 +1,52 @@
+#pragma once
+/// Merges the streams of all devices by host time into snapshots, one per tracker point, with the axes
+/// interpolated to the point's instant.
+///
+/// Tracker points arrive in bursts, up to a third of a second late; axis samples arrive at once. A point is
+/// assembled as soon as two axis samples at or after its instant are there (the interpolation uses two on
+/// either side). If they do not come, it is assembled from what there is, flagged AxisMissing if that is not
+/// enough, once any stream has advanced `watermark` beyond it. Both rules look at the times in the samples
+/// only, so neither the order of arrival (within the watermark) nor the speed of a replay changes a result.
+/// Ordinary world; not thread-safe.
+
+#include <chrono>
+#include <deque>
+#include <vector>
+
+#include "abbe/daemon/batch.hpp"
+#include "abbe/drivers/interpolation.hpp"
+#include "abbe/protocol/samples.hpp"
+
+namespace abbe::daemon {
+
+struct AssemblerOptions {
+  std::chrono::nanoseconds watermark =
+      std::chrono::milliseconds{600};  ///< how far a stream may lag behind the others
+  drivers::InterpolationOptions interpolation;
+  bool axes_compensated = false;  ///< the readings are already corrected by the control
+};
+
+class Assembler {
+ public:
+  explicit Assembler(AssemblerOptions options);
+
+  void take(const Batch& batch);
+  /// Snapshots that are complete, oldest first; appended to `out`.
+  void emit(std::vector<protocol::Snapshot>& out);
+  /// Everything still held, at the end of a recording.
+  void finish(std::vector<protocol::Snapshot>& out);
+
+ private:
+  [[nodiscard]] bool ready(protocol::HostTime t) const;
+  [[nodiscard]] protocol::Snapshot assemble(const protocol::TrackerPoint& point);
+  void emit_first(std::vector<protocol::Snapshot>& out);
+  void forget_axes();
+
+  AssemblerOptions options_;
+  std::deque<protocol::TrackerPoint> points_;
+  std::deque<protocol::AxisSample> axes_;
+  std::deque<protocol::EnvironmentSample> environment_;  // front: in force for the next point
+  protocol::HostTime newest_{};
+};
+
+}  // namespace abbe::daemon

@@ -1,0 +1,31 @@
+#pragma once
+/// The newest of everything, for those who want to see now rather than exactly: the axes as of the latest
+/// SYNC, the latest tracker point (up to a third of a second older) and the latest environment.
+/// Identification never uses it. Ordinary world; not thread-safe.
+
+#include <optional>
+
+#include "abbe/daemon/batch.hpp"
+#include "abbe/protocol/samples.hpp"
+
+namespace abbe::daemon {
+
+class LiveView {
+ public:
+  explicit LiveView(bool axes_compensated) noexcept { view_.axes_compensated = axes_compensated; }
+
+  /// True if anything new came.
+  bool take(const Batch& batch);
+  [[nodiscard]] const protocol::Snapshot& view() const noexcept { return view_; }
+  /// Instant of the latest axis sample with all of X, Y, Z; none yet: nothing.
+  [[nodiscard]] std::optional<protocol::HostTime> axes_known_at() const noexcept { return axes_known_at_; }
+
+ private:
+  void take(const protocol::AxisSample& sample);
+
+  protocol::Snapshot view_{};
+  std::optional<protocol::AxisSample> previous_;
+  std::optional<protocol::HostTime> axes_known_at_;
+};
+
+}  // namespace abbe::daemon

@@ -1,0 +1,37 @@
+#pragma once
+/// An acquired run becomes a judged model: observe, solve, judge in a row, the same for a live session and
+/// its replay. Pure and deterministic: equal points give equal bits. About a second; runs on a thread of its
+/// own in the daemon.
+
+#include <functional>
+#include <span>
+#include <vector>
+
+#include "abbe/calib/gate.hpp"
+#include "abbe/calib/otf/solve.hpp"
+#include "abbe/daemon/config.hpp"
+#include "abbe/daemon/error.hpp"
+#include "abbe/daemon/otf_acquisition.hpp"
+
+namespace abbe::daemon {
+
+struct OtfRun {
+  std::vector<AxisPosition> path_m;
+  std::vector<RunPoint> points;
+};
+
+struct OtfCandidate {
+  calib::otf::Solution solution;
+  calib::Verdict verdict;
+};
+
+/// `active` may be null. `progress` is called with 0 to 1 in the calling thread, and may be empty.
+/// DataInsufficient when the run does not determine the model, with what is missing.
+[[nodiscard]] Result<OtfCandidate> identify_run(const OtfRun& run, const MachineConfig& machine,
+                                                const GateConfig& gate, const calib::VolumetricModel* active,
+                                                const std::function<void(double)>& progress = {});
+
+/// SHA-256 in hex over the points as they entered the identification: times, positions and whether usable.
+[[nodiscard]] std::string points_sha256(std::span<const RunPoint> points);
+
+}  // namespace abbe::daemon

@@ -1,0 +1,80 @@
+#pragma once
+/// Hands what the daemon knows to abbe-dds, each topic in its own rhythm: live vectors at their rates, model
+/// and grid when they change, state when it changes and every second (its age moves), health every second and
+/// when it changes. abbe-dds repeats durable topics for late joiners by itself. Rhythms run in wall time,
+/// also with simulated devices. Used by the hub's thread only.
+
+#include <array>
+#include <chrono>
+#include <cstdint>
+#include <map>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "abbe/daemon/dds_link.hpp"
+#include "abbe/daemon/idl_messages.hpp"
+
+namespace abbe::daemon {
+
+struct PublisherOptions {
+  std::string machine;
+  std::array<double, 3> tool_offset_m{};
+  double snapshot_hz = 50.0;                                           ///< 0: whenever something new came
+  double compensation_hz = 100.0;                                      ///< 0: whenever something new came
+  std::chrono::nanoseconds validity = std::chrono::milliseconds{500};  ///< of a live vector, host time
+};
+
+/// What may be said of the model in force at this moment.
+struct ModelStanding {
+  v1::ModelStatus status = v1::ModelStatus::MODEL_NONE;
+  std::string reason;
+  const ModelInForce* model = nullptr;
+  std::uint64_t revision = 0;  ///< changes whenever another model comes into force
+};
+
+/// Health of one stream, device or not.
+struct StreamHealth {
+  drivers::DeviceStatus status;
+  double rate_hz = 0.0;
+  double latency_p50_s = 0.0;
+  double latency_p99_s = 0.0;
+};
+
+class Publisher {
+ public:
+  using WallTime = DdsLink::WallTime;
+
+  Publisher(DdsLink link, PublisherOptions options, protocol::UtcOffset utc);
+
+  /// Every turn, first thing: says the daemon is alive and lets the link breathe.
+  void beat(WallTime wall);
+  /// Every turn in which something new came.
+  void live(const protocol::Snapshot& view, const ModelStanding& standing, protocol::HostTime now,
+            WallTime wall);
+  /// Every turn.
+  void model(const ModelStanding& standing, protocol::HostTime now, WallTime wall);
+  void health(std::span<const StreamHealth> streams, protocol::HostTime now);
+  void event(const SessionEvent& event);
+
+  [[nodiscard]] const DdsLink& link() const noexcept { return link_; }
+
+ private:
+  template <class T>
+  void send(Topic topic, const T& message);
+  [[nodiscard]] Stamp stamp(protocol::HostTime now) { return {options_.machine, ++sequence_number_, now}; }
+
+  DdsLink link_;
+  PublisherOptions options_;
+  protocol::UtcOffset utc_;
+  std::vector<std::byte> payload_;  // reused
+  std::uint64_t sequence_number_ = 0;
+  WallTime next_snapshot_{};
+  WallTime next_compensation_{};
+  WallTime next_state_{};
+  v1::ModelStatus sent_status_ = v1::ModelStatus::MODEL_NONE;
+  std::string sent_reason_;
+  std::uint64_t sent_revision_ = 0;
+};
+
+}  // namespace abbe::daemon

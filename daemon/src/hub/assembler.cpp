@@ -1,0 +1,103 @@
+#include "abbe/daemon/assembler.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cstddef>
+#include <iterator>
+#include <span>
+
+namespace abbe::daemon {
+namespace {
+
+using protocol::AxisSample;
+using protocol::HostTime;
+using protocol::SampleFlag;
+using protocol::Snapshot;
+
+// Axis samples older than this are forgotten. A tracker that stalls delivers its backlog later; ten seconds
+// of 1 kHz are 2 MB.
+constexpr auto kAxisMemory = std::chrono::seconds{10};
+
+bool earlier(const AxisSample& sample, HostTime t) {
+  return sample.head.time < t;
+}
+
+void set_axes(Snapshot& s, const drivers::AxesAt& axes) {
+  s.axis_count = axes.axis_count;
+  s.missing_mask = axes.missing_mask;
+  s.head.flags = s.head.flags | axes.flags;
+  s.position = axes.position;
+  s.velocity = axes.velocity;
+  s.u_position = axes.u_position;
+}
+
+}  // namespace
+
+Assembler::Assembler(AssemblerOptions options) : options_(options) {}
+
+void Assembler::take(const Batch& batch) {
+  points_.insert(points_.end(), batch.points.begin(), batch.points.end());
+  for (const AxisSample& sample : batch.axes) {
+    // A sample that is not later than its predecessor (a restarted bus) would break the order interpolation
+    // needs.
+    if (axes_.empty() || axes_.back().head.time < sample.head.time) axes_.push_back(sample);
+  }
+  environment_.insert(environment_.end(), batch.environment.begin(), batch.environment.end());
+  if (!batch.points.empty()) newest_ = std::max(newest_, batch.points.back().head.time);
+  if (!batch.axes.empty()) newest_ = std::max(newest_, batch.axes.back().head.time);
+}
+
+bool Assembler::ready(HostTime t) const {
+  if (newest_ - t > options_.watermark) return true;
+  return axes_.size() >= 2 && t <= axes_[axes_.size() - 2].head.time;
+}
+
+void Assembler::emit(std::vector<Snapshot>& out) {
+  while (!points_.empty() && ready(points_.front().head.time)) emit_first(out);
+  forget_axes();
+}
+
+void Assembler::finish(std::vector<Snapshot>& out) {
+  while (!points_.empty()) emit_first(out);
+}
+
+void Assembler::emit_first(std::vector<Snapshot>& out) {
+  out.push_back(assemble(points_.front()));
+  points_.pop_front();
+}
+
+Snapshot Assembler::assemble(const protocol::TrackerPoint& point) {
+  Snapshot s;
+  s.head = point.head;
+  s.axes_compensated = options_.axes_compensated;
+  s.has_tracker_point = true;
+  s.tracker_point = point;
+  while (environment_.size() > 1 && environment_[1].head.time <= point.head.time) environment_.pop_front();
+  if (!environment_.empty() && environment_.front().head.time <= point.head.time) {
+    s.has_environment = true;
+    s.environment = environment_.front();
+  }
+
+  // Two samples on either side are all that the interpolation looks at; handing over exactly these keeps a
+  // result independent of what else has arrived.
+  const auto after = std::lower_bound(axes_.begin(), axes_.end(), point.head.time, earlier);
+  const auto begin = after - std::min<std::ptrdiff_t>(2, after - axes_.begin());
+  const auto end = after + std::min<std::ptrdiff_t>(2, axes_.end() - after);
+  std::array<AxisSample, 4> around;
+  std::copy(begin, end, around.begin());
+  const auto axes = drivers::interpolate_axes(std::span{around}.first(static_cast<std::size_t>(end - begin)),
+                                              point.head.time, point.head.u_time, options_.interpolation);
+  if (axes) {
+    set_axes(s, *axes);
+  } else {
+    s.head.flags |= SampleFlag::AxisMissing;
+  }
+  return s;
+}
+
+void Assembler::forget_axes() {
+  const HostTime oldest = newest_ - kAxisMemory;
+  while (axes_.size() > 4 && axes_.front().head.time < oldest) axes_.pop_front();
+}
+
+}  // namespace abbe::daemon

@@ -1,0 +1,76 @@
+#include "abbe/daemon/publisher.hpp"
+
+#include <utility>
+
+namespace abbe::daemon {
+namespace {
+
+using namespace std::chrono_literals;
+
+constexpr auto kStatePeriod = 1s;  // the IDL promises the state at least this often
+
+std::chrono::nanoseconds period(double rate_hz) {
+  return rate_hz > 0.0 ? std::chrono::nanoseconds{static_cast<std::int64_t>(1e9 / rate_hz)} : 0ns;
+}
+
+/// True when it is time; the next time is a period after this one, not after the one that was due.
+bool due(Publisher::WallTime& next, Publisher::WallTime now, std::chrono::nanoseconds period) {
+  if (now < next) return false;
+  next = now + period;
+  return true;
+}
+
+}  // namespace
+
+Publisher::Publisher(DdsLink link, PublisherOptions options, protocol::UtcOffset utc)
+    : link_(std::move(link)), options_(std::move(options)), utc_(utc) {}
+
+template <class T>
+void Publisher::send(Topic topic, const T& message) {
+  // A message outside the IDL's bounds is a defect of ours: the link counts it as refused (an empty payload).
+  (void)encode(message, payload_);
+  link_.publish(topic, payload_);
+}
+
+void Publisher::beat(WallTime wall) {
+  link_.poll();
+  link_.beat(wall);
+}
+
+void Publisher::live(const protocol::Snapshot& view, const ModelStanding& standing, protocol::HostTime now,
+                     WallTime wall) {
+  if (due(next_snapshot_, wall, period(options_.snapshot_hz))) {
+    send(Topic::Snapshot, snapshot_message(view, utc_, stamp(now)));
+  }
+  if (view.axis_count < 3 || !due(next_compensation_, wall, period(options_.compensation_hz))) return;
+  send(Topic::Compensation, compensation_message(standing.status, standing.model, view,
+                                                 options_.tool_offset_m, options_.validity, stamp(now)));
+}
+
+void Publisher::model(const ModelStanding& standing, protocol::HostTime now, WallTime wall) {
+  if (standing.model != nullptr && standing.revision != sent_revision_) {
+    send(Topic::ErrorModel, model_message(*standing.model, stamp(now)));
+    for (const auto& slice : grid_messages(*standing.model, stamp(now))) send(Topic::ErrorGrid, slice);
+    sent_revision_ = standing.revision;
+    next_state_ = wall;
+  }
+  const bool changed = standing.status != sent_status_ || standing.reason != sent_reason_;
+  if (!changed && wall < next_state_) return;
+  send(Topic::ModelState,
+       state_message(standing.status, standing.reason, standing.model, options_.validity, stamp(now)));
+  sent_status_ = standing.status;
+  sent_reason_ = standing.reason;
+  next_state_ = wall + kStatePeriod;
+}
+
+void Publisher::health(std::span<const StreamHealth> streams, protocol::HostTime now) {
+  for (const StreamHealth& s : streams) {
+    send(Topic::Health, health_message(s.status, s.rate_hz, s.latency_p50_s, s.latency_p99_s, stamp(now)));
+  }
+}
+
+void Publisher::event(const SessionEvent& event) {
+  send(Topic::CalibrationEvent, event_message(event, options_.machine));
+}
+
+}  // namespace abbe::daemon

@@ -1,0 +1,126 @@
+#include "abbe/daemon/assembler.hpp"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <random>
+
+namespace abbe::daemon {
+namespace {
+
+using namespace std::chrono_literals;
+using protocol::AxisSample;
+using protocol::HostTime;
+using protocol::SampleFlag;
+using protocol::Snapshot;
+using protocol::TrackerPoint;
+
+constexpr HostTime kStart{100s};
+
+// The machine of these tests: X moves with constant acceleration, Y and Z stand.
+double x_at(HostTime t) {
+  const double s = std::chrono::duration<double>(t - kStart).count();
+  return 0.01 * s + 0.5 * s * s;
+}
+
+AxisSample axes_at(HostTime t) {
+  AxisSample a;
+  a.head.time = t;
+  a.axis_count = 3;
+  a.position = {x_at(t), 0.2, -0.3};
+  return a;
+}
+
+TrackerPoint point_at(HostTime t) {
+  TrackerPoint p;
+  p.head.time = t;
+  p.p_tracker_m = {x_at(t), 0.0, 0.0};
+  return p;
+}
+
+Batch axes_batch(HostTime from, HostTime to) {
+  Batch b;
+  for (HostTime t = from; t < to; t += 1ms) b.axes.push_back(axes_at(t));
+  return b;
+}
+
+Batch burst(HostTime from, int points) {
+  Batch b;
+  for (int i = 0; i < points; ++i) b.points.push_back(point_at(from + i * 2ms + 300us));
+  return b;
+}
+
+TEST(Assembler, PutsTheAxesWhereTheTrackerPointIs) {
+  Assembler assembler{{}};
+  assembler.take(axes_batch(kStart, kStart + 400ms));
+  assembler.take(burst(kStart + 10ms, 166));
+  std::vector<Snapshot> out;
+  assembler.emit(out);
+  ASSERT_EQ(out.size(), 166u);
+  for (const Snapshot& s : out) {
+    // A cubic through samples of a parabola is that parabola; what is left is rounding.
+    EXPECT_NEAR(s.position[0], x_at(s.head.time), 1e-12);
+    EXPECT_TRUE(s.has_tracker_point);
+  }
+}
+
+TEST(Assembler, TheOrderOfArrivalChangesNothing) {
+  std::vector<Snapshot> early_axes;
+  std::vector<Snapshot> late_axes;
+  Assembler first{{}};
+  first.take(axes_batch(kStart, kStart + 1s));
+  for (int b = 0; b < 2; ++b) first.take(burst(kStart + 20ms + b * 332ms, 166));
+  first.emit(early_axes);
+
+  Assembler second{{}};
+  for (int b = 0; b < 2; ++b) {
+    second.take(burst(kStart + 20ms + b * 332ms, 166));
+    second.emit(late_axes);
+    second.take(axes_batch(kStart + b * 500ms, kStart + (b + 1) * 500ms));
+    second.emit(late_axes);
+  }
+  ASSERT_EQ(early_axes.size(), 332u);
+  ASSERT_EQ(late_axes.size(), early_axes.size());
+  for (std::size_t i = 0; i < early_axes.size(); ++i) {
+    EXPECT_EQ(late_axes[i].head.time, early_axes[i].head.time);
+    EXPECT_EQ(late_axes[i].position, early_axes[i].position);
+    EXPECT_EQ(late_axes[i].u_position, early_axes[i].u_position);
+  }
+}
+
+TEST(Assembler, WaitsForAxesUntilTheWatermark) {
+  Assembler assembler{{.watermark = 600ms}};
+  std::vector<Snapshot> out;
+  assembler.take(burst(kStart, 166));
+  assembler.emit(out);
+  EXPECT_TRUE(out.empty());
+  assembler.take(burst(kStart + 700ms, 166));
+  assembler.emit(out);
+  ASSERT_FALSE(out.empty());
+  EXPECT_TRUE(has(out.front().head.flags, SampleFlag::AxisMissing));
+  EXPECT_EQ(out.front().axis_count, 0);
+}
+
+TEST(Assembler, DoesNotInterpolateAcrossAGap) {
+  Assembler assembler{{}};
+  assembler.take(axes_batch(kStart, kStart + 50ms));
+  assembler.take(axes_batch(kStart + 90ms, kStart + 200ms));
+  assembler.take(burst(kStart + 60ms, 1));
+  std::vector<Snapshot> out;
+  assembler.emit(out);
+  ASSERT_EQ(out.size(), 1u);
+  EXPECT_TRUE(has(out.front().head.flags, SampleFlag::AxisMissing));
+}
+
+TEST(Assembler, GivesOutTheRestAtTheEnd) {
+  Assembler assembler{{}};
+  assembler.take(axes_batch(kStart, kStart + 100ms));
+  assembler.take(burst(kStart + 90ms, 20));
+  std::vector<Snapshot> out;
+  assembler.finish(out);
+  EXPECT_EQ(out.size(), 20u);
+}
+
+}  // namespace
+}  // namespace abbe::daemon

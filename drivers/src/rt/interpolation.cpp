@@ -64,7 +64,7 @@ PositionVelocity on_cubic(const Around& s, std::size_t axis) noexcept {
 
 double u_of_curve(const Around& s, bool cubic, double max_acceleration) noexcept {
   const double bound = 0.5 * max_acceleration * s.theta * (1.0 - s.theta) * s.span_s * s.span_s;
-  return (cubic ? 9.0 / 8.0 : 1.0) * bound / std::sqrt(3.0);
+  return (cubic ? 6.0 / 5.0 : 1.0) * bound / std::sqrt(3.0);
 }
 
 tl::expected<Around, InterpolationError> find_around(std::span<const AxisSample> samples,
@@ -80,12 +80,11 @@ tl::expected<Around, InterpolationError> find_around(std::span<const AxisSample>
   if (span > max_span) return tl::unexpected(InterpolationError::Gap);
   Around s{.before = &*before, .after = &*after, .span_s = seconds(span)};
   s.theta = seconds(time - before->head.time) / s.span_s;
-  if (before != samples.begin() && before->head.time - (before - 1)->head.time <= max_span) {
-    s.neighbour_before = &*(before - 1);
-  }
-  if (after + 1 != samples.end() && (after + 1)->head.time - after->head.time <= max_span) {
-    s.neighbour_after = &*(after + 1);
-  }
+  const auto useful = [span](const AxisSample& left, const AxisSample& right) {
+    return 5 * (right.head.time - left.head.time) <= 6 * span;  // the bound of u_of_curve() holds up to 1.2
+  };
+  if (before != samples.begin() && useful(*(before - 1), *before)) s.neighbour_before = &*(before - 1);
+  if (after + 1 != samples.end() && useful(*after, *(after + 1))) s.neighbour_after = &*(after + 1);
   return s;
 }
 

@@ -1,0 +1,69 @@
+#pragma once
+/// What every real-time path must stand, as two checks for any receiver, ring or device:
+///   expect_no_allocation(10'000, [&](std::size_t i) { receiver.receive(bytes_of(i), arrival, sink); });
+///   expect_no_system_call([&] { receiver.receive(bytes, arrival, sink); });
+/// Prepare everything outside the callable; it holds the real-time path and nothing else.
+
+#include <gtest/gtest.h>
+#include <linux/filter.h>
+#include <linux/seccomp.h>
+#include <sys/prctl.h>
+#include <sys/syscall.h>
+#include <unistd.h>
+
+#include <array>
+#include <cstddef>
+
+#include "allocation_count.hpp"
+
+namespace abbe::tests {
+
+/// Calls `path(i)` for i = 0 .. times - 1; the calling thread must not take memory in any of them.
+template <class Path>
+void expect_no_allocation(std::size_t times, Path&& path) {
+  const AllocationCount allocations;
+  for (std::size_t i = 0; i < times; ++i) path(i);
+  EXPECT_EQ(allocations.value(), 0u) << "allocations in " << times << " turns of a real-time path";
+}
+
+/// From here on the kernel ends this process at any system call but exit_group.
+inline void allow_only_exit() {
+  std::array<sock_filter, 4> filter{{
+      BPF_STMT(BPF_LD | BPF_W | BPF_ABS, offsetof(seccomp_data, nr)),
+      BPF_JUMP(BPF_JMP | BPF_JEQ | BPF_K, SYS_exit_group, 0, 1),
+      BPF_STMT(BPF_RET | BPF_K, SECCOMP_RET_ALLOW),
+      BPF_STMT(BPF_RET | BPF_K, SECCOMP_RET_KILL_PROCESS),
+  }};
+  sock_fprog program{static_cast<unsigned short>(filter.size()), filter.data()};
+  if (prctl(PR_SET_NO_NEW_PRIVS, 1, 0, 0, 0) != 0 ||
+      prctl(PR_SET_SECCOMP, SECCOMP_MODE_FILTER, &program) != 0) {
+    _exit(3);
+  }
+}
+
+#if defined(__SANITIZE_THREAD__)
+inline constexpr bool kSystemCallsAreOurs =
+    false;  // ThreadSanitizer maps its shadow on demand and takes futexes
+#else
+inline constexpr bool kSystemCallsAreOurs = true;
+#endif
+
+/// Runs `path` in a child where any system call is deadly. Skips (does not fail) under ThreadSanitizer, whose
+/// own system calls cannot be told from ours.
+template <class Path>
+void expect_no_system_call(Path&& path) {
+  if constexpr (kSystemCallsAreOurs) {
+    EXPECT_EXIT(
+        {
+          allow_only_exit();
+          path();
+          syscall(SYS_exit_group, 0);  // not exit(): destructors and leak checks make system calls
+        },
+        testing::ExitedWithCode(0), "")
+        << "a system call was made in a real-time path";
+  } else {
+    GTEST_SKIP() << "ThreadSanitizer makes system calls of its own";
+  }
+}
+
+}  // namespace abbe::tests

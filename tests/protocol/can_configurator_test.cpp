@@ -105,6 +105,30 @@ TEST(EncoderConfigurator, RefusesAnExchangedScale) {
   EXPECT_EQ(bench.configurator.error().seen, 11u);
 }
 
+TEST(EncoderConfigurator, RefusesARotaryEncoderWhereALinearOneIsConfigured) {
+  Bench bench{{.node = 5, .kind = object::EncoderKind::MultiTurn}, {.node = 5, .linear = true}};
+  bench.run();
+  EXPECT_EQ(bench.configurator.error().fault, ConfigurationFault::WrongKind);
+}
+
+TEST(EncoderConfigurator, RefusesAStepOfZeroOnlyWhenTheStepIsNeeded) {
+  for (const bool needed : {true, false}) {
+    Bench bench{{.node = 5}, {.node = 5, .needs_scale = needed}};
+    bench.objects.set_number(object::kPositionStep, 0);
+    bench.objects.set_number(object::kMeasuringStep, 0);
+    bench.run();
+    EXPECT_EQ(bench.configurator.error().fault,
+              needed ? ConfigurationFault::NoScale : ConfigurationFault::None);
+  }
+}
+
+TEST(EncoderConfigurator, TakesTheMeasuringStepWhereThePositionStepIsZero) {
+  Bench bench{{.node = 5, .step_nm = 20}, {.node = 5, .needs_scale = true}};
+  bench.objects.set_number(object::kPositionStep, 0);
+  bench.run();
+  EXPECT_EQ(bench.configurator.description().step_nm, 20u);
+}
+
 TEST(EncoderConfigurator, NamesTheObjectAndTheReasonOfARefusal) {
   Bench bench{{.node = 5, .has_position64 = false}, {.node = 5, .position = PositionType::Signed64}};
   bench.run();

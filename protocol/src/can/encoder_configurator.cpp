@@ -46,6 +46,10 @@ const char* to_text(ConfigurationFault fault) noexcept {
       return "is another product";
     case ConfigurationFault::WrongSerial:
       return "has another serial number";
+    case ConfigurationFault::WrongKind:
+      return "is not of the kind (linear, rotary) configured";
+    case ConfigurationFault::NoScale:
+      return "has no measuring step";
     case ConfigurationFault::BadAnswer:
       return "answers nonsense";
   }
@@ -109,6 +113,8 @@ void EncoderConfigurator::begin_step(HostTime now) noexcept {
     }
     case Step::ScaleFallback:
       return sdo_.start_upload(object::kMeasuringStep, now);
+    case Step::Range:
+      return sdo_.start_upload(object::kTotalRange, now);
     case Step::Write:
       return write_number(writes_[write_index_], now);
   }
@@ -153,6 +159,7 @@ bool EncoderConfigurator::tolerated() const noexcept {
       return !plan_.serial;
     case Step::Scale:
     case Step::ScaleFallback:
+    case Step::Range:
       return true;  // the caller may know the scale; if not it refuses
     case Step::DeviceType:
       return false;
@@ -167,8 +174,7 @@ bool EncoderConfigurator::take_number(std::uint32_t value) noexcept {
   };
   switch (step_) {
     case Step::DeviceType:
-      description_.device_type = value;
-      if (!object::is_encoder(value)) fail(ConfigurationFault::NotAnEncoder, value);
+      check_device_type(value);
       return state_ == State::Working;
     case Step::Vendor:
       description_.vendor = value;
@@ -187,22 +193,38 @@ bool EncoderConfigurator::take_number(std::uint32_t value) noexcept {
       (object::is_linear(description_.device_type) ? description_.step_nm
                                                    : description_.units_per_revolution) = value;
       return true;
+    case Step::Range:
+      description_.total_range = value;
+      return true;
     case Step::Write:
       return true;
   }
   return true;
 }
 
+void EncoderConfigurator::check_device_type(std::uint32_t value) noexcept {
+  description_.device_type = value;
+  if (!object::is_encoder(value)) return fail(ConfigurationFault::NotAnEncoder, value);
+  if (plan_.linear && *plan_.linear != object::is_linear(value)) fail(ConfigurationFault::WrongKind, value);
+}
+
+bool EncoderConfigurator::scale_known() const noexcept {
+  return description_.step_nm.value_or(0) != 0 || description_.units_per_revolution.value_or(0) != 0;
+}
+
 void EncoderConfigurator::next_step(HostTime now) noexcept {
-  const bool scale_known = description_.step_nm || description_.units_per_revolution;
+  const bool linear = object::is_linear(description_.device_type);
   if (step_ == Step::Write) {
     if (++write_index_ == writes_.size()) {
       state_ = State::Ready;
       nmt_ = encode_nmt(NmtCommand::Start, plan_.node);
       return;
     }
-  } else if (step_ == Step::Scale && scale_known) {
-    step_ = Step::Write;
+  } else if (step_ == Step::Scale && !scale_known()) {
+    step_ = Step::ScaleFallback;
+  } else if (step_ == Step::Scale || step_ == Step::ScaleFallback) {
+    if (plan_.needs_scale && !scale_known()) return fail(ConfigurationFault::NoScale, 0);
+    step_ = linear ? Step::Write : Step::Range;
   } else {
     step_ = static_cast<Step>(static_cast<std::uint8_t>(step_) + 1);
   }

@@ -30,6 +30,8 @@ struct EncoderPlan {
   std::optional<std::uint32_t> vendor{};  ///< checked against 1018h when given
   std::optional<std::uint32_t> product{};
   std::optional<std::uint32_t> serial{};
+  std::optional<bool> linear{};  ///< checked against 1000h when given
+  bool needs_scale = false;      ///< a node that does not know its step, or says 0, is refused
 };
 
 /// One SDO write of the procedure.
@@ -52,6 +54,7 @@ struct EncoderDescription {
   std::uint32_t serial = 0;
   std::optional<std::uint32_t> step_nm;               ///< linear, as read: 0 is for the caller to refuse
   std::optional<std::uint32_t> units_per_revolution;  ///< rotary
+  std::optional<std::uint32_t> total_range;           ///< rotary: counts after which the position wraps
 };
 
 enum class ConfigurationFault : std::uint8_t {
@@ -62,6 +65,8 @@ enum class ConfigurationFault : std::uint8_t {
   WrongVendor,   ///< `seen`
   WrongProduct,  ///< `seen`
   WrongSerial,   ///< `seen`
+  WrongKind,     ///< linear instead of rotary or the other way round: `seen`
+  NoScale,       ///< the step is 0 or unknown, and needed
   BadAnswer,     ///< an answer that is no number, or a protocol error
 };
 struct ConfigurationError {
@@ -100,12 +105,15 @@ class EncoderConfigurator {
     Serial,
     Scale,
     ScaleFallback,
+    Range,
     Write
   };
 
   void advance(HostTime now) noexcept;
   void begin_step(HostTime now) noexcept;
   void next_step(HostTime now) noexcept;
+  [[nodiscard]] bool scale_known() const noexcept;
+  void check_device_type(std::uint32_t value) noexcept;
   void write_number(const SdoWrite& write, HostTime now) noexcept;
   [[nodiscard]] bool take_number(std::uint32_t value) noexcept;
   [[nodiscard]] bool tolerated() const noexcept;

@@ -2,6 +2,8 @@
 /// Vectors, rigid motions and the best-fit rotation between two point sets. Lengths in m, angles in rad.
 
 #include <Eigen/Core>
+#include <Eigen/Geometry>
+#include <Eigen/LU>
 #include <span>
 
 #include "abbe/calib/error.hpp"

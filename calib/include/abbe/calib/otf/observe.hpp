@@ -46,11 +46,11 @@ struct Observation {
 struct Observations {
   ParameterLayout layout;
   Vector3 target_offset_m = Vector3::Zero();
-  SparseRows A;  ///< fit_size() columns, rigid unknowns last
-  std::vector<Observation> rows;
-  std::vector<Vector3> sub_points_m;  ///< nominal axis positions a row is averaged over
-  Alignment alignment;
-  std::vector<Vector3> covered_m;  ///< axis positions whose hull the used blocks cover
+  SparseRows A{};  ///< fit_size() columns, rigid unknowns last
+  std::vector<Observation> rows{};
+  std::vector<Vector3> sub_points_m{};  ///< nominal axis positions a row is averaged over
+  Alignment alignment{};
+  std::vector<Vector3> covered_m{};  ///< axis positions whose hull the used blocks cover
   std::size_t samples = 0;
   std::size_t lost_samples = 0;
   std::size_t blocks = 0;

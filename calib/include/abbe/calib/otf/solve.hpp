@@ -32,7 +32,7 @@ enum class StopReason { Direct };  ///< Direct: linear problem, solved at once
 /// the same input gives the same bits.
 struct NormalEquations {
   Eigen::MatrixXd H;        ///< lower triangle, the rest is zero
-  Eigen::MatrixXd H_noise;  ///< A^T W^2 C W^2 A; the same, equals H where weights are 1/sigma^2
+  Eigen::MatrixXd H_noise;  ///< A^T W^2 C W^2 A, lower triangle; equals H where weights are 1/sigma^2
   Eigen::VectorXd g;
   std::size_t rows = 0;
 
@@ -77,7 +77,7 @@ struct Statistics {
   ResidualStatistics before;  ///< deviations after the alignment, no model
   ResidualStatistics after;
   int iterations = 0;
-  int alignment_updates = 0;
+  int alignment_iterations = 0;
   double alignment_rms_m = 0.0;
   StopReason stop = StopReason::Direct;
 };

@@ -19,6 +19,19 @@ struct Sha256::State {
   ~State() { EVP_MD_CTX_free(context); }
 };
 
+namespace {
+
+std::string finish(EVP_MD_CTX* context) {
+  std::array<unsigned char, EVP_MAX_MD_SIZE> digest{};
+  unsigned int size = 0;
+  EVP_DigestFinal_ex(context, digest.data(), &size);
+  std::string text;
+  for (unsigned int i = 0; i < size; ++i) fmt::format_to(std::back_inserter(text), "{:02x}", digest[i]);
+  return text;
+}
+
+}  // namespace
+
 Sha256::Sha256() : state_(std::make_unique<State>()) {
   // Both fail only when memory is gone: SHA-256 is part of the default provider.
   if (state_->context == nullptr || EVP_DigestInit_ex(state_->context, EVP_sha256(), nullptr) != 1)
@@ -36,12 +49,13 @@ void Sha256::update(std::string_view text) {
 }
 
 std::string Sha256::hex() {
-  std::array<unsigned char, EVP_MAX_MD_SIZE> digest{};
-  unsigned int size = 0;
-  EVP_DigestFinal_ex(state_->context, digest.data(), &size);
-  std::string text;
-  for (unsigned int i = 0; i < size; ++i) fmt::format_to(std::back_inserter(text), "{:02x}", digest[i]);
-  return text;
+  return finish(state_->context);
+}
+
+std::string Sha256::hex_so_far() const {
+  State copy;
+  EVP_MD_CTX_copy_ex(copy.context, state_->context);
+  return finish(copy.context);
 }
 
 std::string sha256_hex(std::string_view text) {

@@ -22,7 +22,8 @@ class Sha256 {
 
   void update(std::span<const std::byte> bytes);
   void update(std::string_view text);
-  [[nodiscard]] std::string hex();  ///< 64 lower-case digits; the hash is finished afterwards
+  [[nodiscard]] std::string hex();               ///< 64 lower-case digits; the hash is finished afterwards
+  [[nodiscard]] std::string hex_so_far() const;  ///< of what was added until now; more may be added
 
  private:
   struct State;

@@ -1,5 +1,5 @@
 #pragma once
-/// observe and solve in a row; judge asks for the active model and the limits and follows by itself.
+/// observe, solve and judge in a row.
 
 #include "abbe/calib/otf/judge.hpp"
 

@@ -1,0 +1,3 @@
+namespace abbe::calib {
+// Replaced by the room's first real source.
+}

@@ -1,0 +1,369 @@
+#include "abbe/daemon/recorder.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cerrno>
+#include <optional>
+#include <utility>
+
+#include "abbe/protocol/mcap/writer.hpp"
+#include "abbe/protocol/raw_bytes_cdr.hpp"
+#include "recording/file_front.hpp"
+#include "recording/recording_file.hpp"
+#include "recording/sample_messages.hpp"
+#include "recording/streams.hpp"
+
+namespace abbe::daemon {
+
+namespace mcap = protocol::mcap;
+using recording::IoFault;
+using recording::RecordingFile;
+using recording::Stream;
+using IoResult = tl::expected<void, IoFault>;
+
+namespace {
+
+/// Room that must have come back beyond min_free_bytes before a new file is begun: else a disk that hovers at
+/// the limit would fill a directory with stumps.
+constexpr std::uint64_t kResumeMarginChunks = 16;
+
+struct TimedAttachment {
+  RecordingAttachment attachment;
+  std::uint64_t time_ns = 0;
+};
+
+}  // namespace
+
+struct Recorder::State {
+  State(RecorderOptions o, RecordingInfo i)
+      : options(std::move(o)), info(std::move(i)), chunk(options.chunk_bytes) {}
+
+  [[nodiscard]] std::uint64_t utc_ns(protocol::HostTime time) const {
+    return static_cast<std::uint64_t>(
+        std::max<std::int64_t>(0, info.utc_offset.to_utc(time).time_since_epoch().count()));
+  }
+  [[nodiscard]] std::filesystem::path path(std::uint32_t part, std::string_view extension) const;
+  [[nodiscard]] IoResult begin_file();
+  [[nodiscard]] IoResult write_front(RecordingFile& fresh, mcap::SummaryBuilder& fresh_summary) const;
+  [[nodiscard]] IoResult end_file();
+  void add(Stream stream, protocol::HostTime time, std::span<const std::byte> payload);
+  template <class Message>
+  void add_encoded(Stream stream, protocol::HostTime time, const Message& message);
+  void write_chunk();
+  void sync_if_due();
+  void enter_fault(const IoFault& fault);
+  void retry();
+  [[nodiscard]] bool has_room_again() const;
+
+  RecorderOptions options;
+  RecordingInfo info;
+  std::vector<TimedAttachment> attachments;
+  std::optional<RecordingFile> file;
+  std::uint32_t part = 0;  ///< of the present file
+  std::uint64_t messages_in_file = 0;
+  bool end_written = false;
+  std::string previous_file;
+  mcap::ChunkBuilder chunk;
+  mcap::SummaryBuilder summary;
+  std::array<std::uint32_t, recording::kStreamCount> sequences{};
+  RecorderStatus status;
+
+  WallTime now{};
+  WallTime chunk_since{};  ///< no message of the open chunk was recorded before this
+  WallTime synced{};
+  bool unsynced = false;
+  WallTime retry_at{};
+
+  // Reused, so that recording a sample allocates nothing once they have grown.
+  std::vector<std::byte> payload;
+  std::array<std::byte, protocol::kMaxRawBytesCdrSize> raw_payload{};
+  v1::TrackerPoint tracker_point;
+  v1::AxisSample axis_sample;
+  v1::EnvironmentSample environment;
+};
+
+std::string_view name(RecorderStatus::State state) noexcept {
+  switch (state) {
+    case RecorderStatus::State::Recording:
+      return "recording";
+    case RecorderStatus::State::DiskFull:
+      return "disk full";
+    case RecorderStatus::State::Failed:
+      return "failed";
+    case RecorderStatus::State::Closed:
+      return "closed";
+  }
+  return "?";
+}
+
+// --- files
+// ---------------------------------------------------------------------------------------------------------
+
+std::filesystem::path Recorder::State::path(std::uint32_t number, std::string_view extension) const {
+  const std::string suffix = number == 1 ? "" : fmt::format("-{}", number);
+  return options.directory / fmt::format("{}{}{}", options.name, suffix, extension);
+}
+
+IoResult Recorder::State::write_front(RecordingFile& fresh, mcap::SummaryBuilder& fresh_summary) const {
+  mcap::Buffer front;
+  recording::append_front(info, {part + 1, previous_file}, fresh_summary, front);
+  for (const TimedAttachment& kept : attachments) {
+    fresh_summary.add(recording::append_attachment(kept.attachment, kept.time_ns, front.size(), front));
+  }
+  if (auto written = fresh.append(front); !written) return written;
+  return fresh.sync();
+}
+
+IoResult Recorder::State::begin_file() {
+  if (recording::free_bytes_of(options.directory) < options.min_free_bytes) {
+    return tl::unexpected(recording::io_fault("begin", path(part + 1, ".mcap.part"), ENOSPC));
+  }
+  const auto finished = path(part + 1, ".mcap");
+  if (std::filesystem::exists(finished))
+    return tl::unexpected(recording::io_fault("create", finished, EEXIST));
+  auto fresh = RecordingFile::create(path(part + 1, ".mcap.part"));
+  if (!fresh) return tl::unexpected(fresh.error());
+  mcap::SummaryBuilder fresh_summary;
+  if (auto written = write_front(*fresh, fresh_summary); !written) {
+    fresh->discard();
+    return written;
+  }
+  file = std::move(*fresh);
+  summary = std::move(fresh_summary);
+  sequences = {};
+  messages_in_file = 0;
+  end_written = false;
+  ++part;
+  synced = now;
+  unsynced = false;
+  status.state = RecorderStatus::State::Recording;
+  status.fault.clear();
+  status.file = file->path();
+  status.bytes = file->size();
+  ++status.files;
+  return {};
+}
+
+IoResult Recorder::State::end_file() {
+  if (!end_written) {
+    mcap::Buffer end;
+    summary.finish(file->size(), end);
+    if (auto written = file->append(end); !written) return written;
+    end_written = true;
+  }
+  auto finished = file->finish(path(part, ".mcap"));
+  status.file = file->path();
+  status.bytes = file->size();
+  return finished;
+}
+
+// --- messages
+// ------------------------------------------------------------------------------------------------------
+
+void Recorder::State::add(Stream stream, protocol::HostTime time, std::span<const std::byte> data) {
+  if (status.state != RecorderStatus::State::Recording) {
+    ++status.lost;
+    return;
+  }
+  constexpr std::size_t kMessageHead = mcap::kRecordHeadSize + 2 + 4 + 8 + 8;
+  if (!chunk.empty() && chunk.records_size() + kMessageHead + data.size() > options.chunk_bytes) {
+    write_chunk();
+    if (status.state != RecorderStatus::State::Recording) {
+      ++status.lost;
+      return;
+    }
+  }
+  if (chunk.empty()) chunk_since = now;
+  const std::uint64_t log_time_ns = utc_ns(time);
+  chunk.add(mcap::Message{recording::channel_id(stream), sequences[recording::index(stream)]++, log_time_ns,
+                          log_time_ns, data});
+}
+
+template <class Message>
+void Recorder::State::add_encoded(Stream stream, protocol::HostTime time, const Message& message) {
+  if (!encode(message, payload)) {
+    ++status.refused;
+    return;
+  }
+  add(stream, time, payload);
+}
+
+void Recorder::State::write_chunk() {
+  if (chunk.empty()) return;
+  const std::uint64_t messages = chunk.message_count();
+  const mcap::ClosedChunk closed = chunk.close();
+  const std::uint64_t offset = file->size();
+  const auto written = file->append(closed.bytes);
+  if (written) summary.add(closed, offset);
+  chunk.clear();
+  if (!written) {
+    status.lost += messages;
+    enter_fault(written.error());
+    return;
+  }
+  unsynced = true;
+  messages_in_file += messages;
+  status.messages += messages;
+  ++status.chunks;
+  status.bytes = file->size();
+  if (file->free_bytes() < options.min_free_bytes) {
+    enter_fault({ENOSPC, fmt::format("write {}: less than {} bytes would stay free", file->path().string(),
+                                     options.min_free_bytes)});
+  }
+}
+
+// --- time and trouble
+// ----------------------------------------------------------------------------------------------
+
+void Recorder::State::sync_if_due() {
+  if (!unsynced || now - synced < options.sync_period) return;
+  synced = now;
+  unsynced = false;
+  if (const auto done = file->sync(); !done) enter_fault(done.error());
+}
+
+void Recorder::State::enter_fault(const IoFault& fault) {
+  status.lost += chunk.message_count();
+  chunk.clear();
+  status.state =
+      recording::is_disk_full(fault.error) ? RecorderStatus::State::DiskFull : RecorderStatus::State::Failed;
+  status.fault = fault.what;
+  retry_at = now + options.retry_period;
+  if (messages_in_file == 0 && part > 1) {
+    file->discard();  // a stump: the next attempt takes its name
+    --part;
+    --status.files;
+    file.reset();
+    return;
+  }
+  // The end is small and may still fit. If not, the whole chunks are readable without it, and retry() tries
+  // again.
+  const bool ended = end_file().has_value();
+  previous_file = file->path().filename().string();
+  if (ended) file.reset();
+}
+
+bool Recorder::State::has_room_again() const {
+  return recording::free_bytes_of(options.directory) >=
+         options.min_free_bytes + kResumeMarginChunks * options.chunk_bytes;
+}
+
+void Recorder::State::retry() {
+  if (now < retry_at) return;
+  retry_at = now + options.retry_period;
+  if (status.state == RecorderStatus::State::DiskFull && !has_room_again()) return;
+  if (file && end_file()) file.reset();
+  if (const auto begun = begin_file(); !begun) status.fault = begun.error().what;
+}
+
+// --- the public face
+// -----------------------------------------------------------------------------------------------
+
+Result<Recorder> Recorder::open(RecorderOptions options, RecordingInfo info, WallTime now) {
+  auto state = std::make_unique<State>(std::move(options), std::move(info));
+  state->now = now;
+  if (const auto begun = state->begin_file(); !begun) {
+    if (!recording::is_disk_full(begun.error().error)) return fail(ErrorCode::Io, begun.error().what);
+    state->status.state = RecorderStatus::State::DiskFull;
+    state->status.fault = begun.error().what;
+    state->retry_at = now + state->options.retry_period;
+  }
+  return Recorder{std::move(state)};
+}
+
+Recorder::Recorder(std::unique_ptr<State> state) : state_(std::move(state)) {}
+Recorder::Recorder(Recorder&&) noexcept = default;
+Recorder& Recorder::operator=(Recorder&& other) noexcept {
+  std::swap(state_, other.state_);  // what was here is closed with `other`
+  return *this;
+}
+Recorder::~Recorder() {
+  if (state_) (void)close();
+}
+
+void Recorder::record(const protocol::TrackerPoint& point, std::string_view device) {
+  recording::fill(state_->tracker_point, point, device);
+  state_->add_encoded(Stream::TrackerPoint, point.head.time, state_->tracker_point);
+}
+
+void Recorder::record(const protocol::AxisSample& sample, std::string_view device) {
+  recording::fill(state_->axis_sample, sample, device);
+  state_->add_encoded(Stream::AxisSample, sample.head.time, state_->axis_sample);
+}
+
+void Recorder::record(const protocol::EnvironmentSample& sample, std::string_view device) {
+  recording::fill(state_->environment, sample, device);
+  state_->add_encoded(Stream::Environment, sample.head.time, state_->environment);
+}
+
+void Recorder::record(const protocol::RawBlock& block, std::string_view device) {
+  const auto size = encode_cdr(protocol::to_raw_bytes(block, device), state_->raw_payload);
+  if (!size) {
+    ++state_->status.refused;
+    return;
+  }
+  state_->add(Stream::RawBytes, block.time, std::span{state_->raw_payload}.first(*size));
+}
+
+void Recorder::record(const v1::CalibrationEvent& event) {
+  const protocol::HostTime time{std::chrono::nanoseconds{event.host_time_ns()}};
+  state_->add_encoded(Stream::CalibrationEvent, time, event);
+}
+
+void Recorder::attach(RecordingAttachment attachment, protocol::HostTime time) {
+  State& s = *state_;
+  s.attachments.push_back({std::move(attachment), s.utc_ns(time)});
+  if (s.status.state != RecorderStatus::State::Recording) return;  // the next file begins with it
+  s.write_chunk();
+  if (s.status.state != RecorderStatus::State::Recording) return;
+  mcap::Buffer bytes;
+  const TimedAttachment& kept = s.attachments.back();
+  const auto index = recording::append_attachment(kept.attachment, kept.time_ns, s.file->size(), bytes);
+  if (const auto written = s.file->append(bytes); !written) return s.enter_fault(written.error());
+  s.summary.add(index);
+  s.unsynced = true;
+  s.status.bytes = s.file->size();
+}
+
+void Recorder::tick(WallTime now) {
+  State& s = *state_;
+  s.now = now;
+  if (s.status.state == RecorderStatus::State::Closed) return;
+  if (s.status.state != RecorderStatus::State::Recording) return s.retry();
+  if (!s.chunk.empty() && now - s.chunk_since >= s.options.chunk_period) s.write_chunk();
+  if (s.status.state == RecorderStatus::State::Recording) s.sync_if_due();
+}
+
+void Recorder::flush() {
+  if (state_->status.state == RecorderStatus::State::Recording) state_->write_chunk();
+}
+
+RecordingDigest Recorder::digest() const {
+  if (!state_->file) return {{}, 0, state_->status.file};
+  return {state_->file->sha256(), state_->file->size(), state_->file->path()};
+}
+
+Result<RecordingDigest> Recorder::close() {
+  State& s = *state_;
+  if (s.status.state == RecorderStatus::State::Closed)
+    return fail(ErrorCode::Usage, "close recording: it is closed");
+  flush();
+  const bool was_recording = s.status.state == RecorderStatus::State::Recording;
+  const std::string fault = s.status.fault;
+  s.status.state = RecorderStatus::State::Closed;
+  if (!s.file) return fail(ErrorCode::Io, fault);
+  const auto ended = s.end_file();
+  const RecordingDigest finished = digest();
+  s.file.reset();
+  if (!ended) return fail(ErrorCode::Io, ended.error().what);
+  if (!was_recording) return fail(ErrorCode::Io, fault);
+  return finished;
+}
+
+const RecorderStatus& Recorder::status() const noexcept {
+  return state_->status;
+}
+
+}  // namespace abbe::daemon

@@ -1,0 +1,156 @@
+#pragma once
+/// A folder of its own for every test, samples whose content says which number they have, and recordings of
+/// them.
+
+#include <gtest/gtest.h>
+#include <stdlib.h>
+
+#include <cstdint>
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+#include <string>
+#include <vector>
+
+#include "abbe/daemon/recorder.hpp"
+#include "abbe/daemon/recording_reader.hpp"
+
+namespace abbe::daemon {
+
+/// Made in the system's place for temporary files, removed with all it holds.
+class TemporaryFolder {
+ public:
+  TemporaryFolder() {
+    std::string pattern = (std::filesystem::temp_directory_path() / "abbe-recording-XXXXXX").string();
+    if (::mkdtemp(pattern.data()) == nullptr) ADD_FAILURE() << "no temporary folder: " << pattern;
+    path_ = pattern;
+  }
+  TemporaryFolder(const TemporaryFolder&) = delete;
+  TemporaryFolder& operator=(const TemporaryFolder&) = delete;
+  ~TemporaryFolder() {
+    std::error_code ignored;
+    std::filesystem::remove_all(path_, ignored);
+  }
+  [[nodiscard]] const std::filesystem::path& path() const { return path_; }
+
+ private:
+  std::filesystem::path path_;
+};
+
+using FileBytes = std::vector<char>;
+
+inline FileBytes bytes_of_file(const std::filesystem::path& file) {
+  std::ifstream in(file, std::ios::binary);
+  return {std::istreambuf_iterator<char>(in), std::istreambuf_iterator<char>()};
+}
+
+inline void write_file(const std::filesystem::path& file, const FileBytes& bytes, std::size_t size) {
+  std::ofstream out(file, std::ios::binary | std::ios::trunc);
+  out.write(bytes.data(), static_cast<std::streamsize>(size));
+}
+
+// 2026-03-01 12:00:00 UTC at host time 1000 s.
+inline constexpr protocol::UtcOffset kOffset{std::chrono::seconds{1772366400 - 1000}};
+
+inline RecordingInfo example_info() {
+  return {"M1", kOffset, 20.0, "[machine]\nname = \"M1\"\n", {{"abbe", "0.1.0"}, {"tracker", "emScon 3.6"}}};
+}
+
+inline RecorderOptions example_options(const std::filesystem::path& directory) {
+  RecorderOptions options;
+  options.directory = directory;
+  options.name = "run";
+  return options;
+}
+
+inline protocol::HostTime example_time(std::uint32_t i) {
+  return protocol::HostTime{std::chrono::seconds{1000} + i * std::chrono::milliseconds{1}};
+}
+
+inline protocol::TrackerPoint example_point(std::uint32_t i) {
+  protocol::TrackerPoint point;
+  point.head = {example_time(i), std::chrono::microseconds{700 + i},
+                protocol::SampleFlags{0} | protocol::SampleFlag::GapBefore, i};
+  point.device_time = protocol::DeviceTime{std::chrono::microseconds{123456 + i}};
+  point.p_tracker_m = {0.1 * i, -0.2 * i, 1.0 / (1 + i)};
+  point.device_status = static_cast<std::int32_t>(i) - 3;
+  return point;
+}
+
+inline protocol::AxisSample example_axes(std::uint32_t i) {
+  protocol::AxisSample sample;
+  sample.head = {example_time(i), std::chrono::nanoseconds{50}, 0, 0};
+  sample.cycle = 10 * i;
+  sample.axis_count = 3;
+  sample.missing_mask = 4;
+  sample.count = {static_cast<std::int64_t>(i) * 1000000007, -5, 1};
+  sample.position = {1e-9 * i, 0.25, -1.5};
+  return sample;
+}
+
+inline protocol::EnvironmentSample example_environment(std::uint32_t i) {
+  protocol::EnvironmentSample sample;
+  sample.head.time = example_time(i);
+  sample.air_temperature_K = 293.15 + i;
+  sample.air_pressure_Pa = 101325.0;
+  sample.relative_humidity = 0.5;
+  return sample;
+}
+
+inline protocol::RawBlock example_block(std::uint32_t i) {
+  protocol::RawBlock block;
+  block.time = example_time(i);
+  block.lost_before = i;
+  block.length = static_cast<std::uint16_t>(10 + i % 100);
+  block.continued = i % 2 == 1;
+  block.direction =
+      i % 3 == 0 ? protocol::RawBlock::Direction::ToDevice : protocol::RawBlock::Direction::FromDevice;
+  for (std::size_t b = 0; b < block.length; ++b) block.bytes[b] = static_cast<std::byte>(i + b);
+  return block;
+}
+
+inline v1::CalibrationEvent example_event(std::uint32_t i) {
+  v1::CalibrationEvent event;
+  event.machine("M1");
+  event.host_time_ns(example_time(i).time_since_epoch().count());
+  event.method("otf");
+  event.state("acquiring");
+  event.reason("leg " + std::to_string(i));
+  event.progress(0.5);
+  return event;
+}
+
+/// Sample `i`, of a kind that changes with i.
+inline void record_example(Recorder& recorder, std::uint32_t i) {
+  switch (i % 5) {
+    case 0:
+      return recorder.record(example_point(i), "tracker");
+    case 1:
+      return recorder.record(example_axes(i), "encoder");
+    case 2:
+      return recorder.record(example_block(i), "tracker");
+    case 3:
+      return recorder.record(example_environment(i), "weather");
+    default:
+      return recorder.record(example_event(i));
+  }
+}
+
+/// Each chunk holds `per_chunk` examples; closed cleanly.
+inline std::filesystem::path example_recording(const std::filesystem::path& directory, std::uint32_t chunks,
+                                               std::uint32_t per_chunk) {
+  auto recorder = Recorder::open(example_options(directory), example_info(), {});
+  if (!recorder) {
+    ADD_FAILURE() << recorder.error().text;
+    return {};
+  }
+  for (std::uint32_t i = 0; i < chunks * per_chunk; ++i) {
+    record_example(*recorder, i);
+    if ((i + 1) % per_chunk == 0) recorder->flush();
+  }
+  const auto closed = recorder->close();
+  EXPECT_TRUE(closed) << (closed ? "" : closed.error().text);
+  return closed ? closed->file : std::filesystem::path{};
+}
+
+}  // namespace abbe::daemon

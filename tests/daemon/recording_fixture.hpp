@@ -14,6 +14,7 @@
 
 #include "abbe/daemon/recorder.hpp"
 #include "abbe/daemon/recording_reader.hpp"
+#include "abbe/protocol/mcap/reader.hpp"
 
 namespace abbe::daemon {
 

@@ -1,0 +1,47 @@
+// The real-time half of the tracker: what wait() read becomes samples.
+#include "abbe/drivers/tracker/device.hpp"
+
+#include <utility>
+
+namespace abbe::drivers {
+
+using Direction = protocol::RawBlock::Direction;
+
+void TrackerDevice::receive() ABBE_RT {
+  if (std::exchange(began_, false)) {
+    raw_.push_bytes(arrival_, Direction::FromDevice, {});
+    receiver_.push({}, arrival_);
+  }
+  const auto bytes = std::span<const std::byte>{buffer_}.first(std::exchange(filled_, 0));
+  if (bytes.empty()) return;
+  raw_.push_bytes(arrival_, Direction::FromDevice, bytes);
+  receiver_.push(bytes, arrival_);
+  while (const auto message = receiver_.next()) {
+    std::visit([this](const auto& m) ABBE_RT { take(m); }, *message);
+  }
+  const TrackerCounters& counters = receiver_.counters();
+  const std::uint64_t gaps = counters.gaps + counters.beam_losses;
+  board_.gaps.add(gaps - std::exchange(gaps_seen_, gaps));
+}
+
+void TrackerDevice::take(const TrackerBurst& burst) ABBE_RT {
+  points_.push(burst.points);
+  board_.samples.add(burst.points.size());
+  board_.set_last_sample(burst.points.back().head.time);
+  board_.set_clock(receiver_.clock());
+  post(TrackerPointsArrived{burst.points.size()});
+}
+
+void TrackerDevice::post(const Message& message) ABBE_RT {
+  const auto* more = std::get_if<TrackerPointsArrived>(&message);
+  auto* last = inbox_count_ == 0 ? nullptr : std::get_if<TrackerPointsArrived>(&inbox_[inbox_count_ - 1]);
+  if (more != nullptr && last != nullptr) {
+    last->count += more->count;
+  } else if (inbox_count_ < kInbox) {
+    inbox_[inbox_count_++] = message;
+  } else {
+    ++inbox_lost_;
+  }
+}
+
+}  // namespace abbe::drivers

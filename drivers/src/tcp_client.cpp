@@ -1,0 +1,145 @@
+#include "abbe/drivers/tcp_client.hpp"
+
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <netdb.h>
+#include <netinet/in.h>
+#include <netinet/tcp.h>
+#include <poll.h>
+#include <sys/socket.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <array>
+#include <cerrno>
+#include <ctime>
+#include <memory>
+#include <system_error>
+#include <utility>
+
+namespace abbe::drivers {
+namespace {
+
+/// Longest wait given to the kernel at once; the caller comes back anyway.
+constexpr std::chrono::seconds kLongestPoll{1};
+
+std::string words_for(int error) {
+  return std::system_category().message(error);
+}
+
+auto failed(ErrorCode code, std::string text) {
+  return tl::unexpected{Error{code, std::move(text)}};
+}
+
+using Addresses = std::unique_ptr<addrinfo, decltype(&::freeaddrinfo)>;
+
+Result<Addresses> resolve(const std::string& host, std::uint16_t port) {
+  addrinfo hints{};
+  hints.ai_socktype = SOCK_STREAM;
+  hints.ai_flags = AI_NUMERICSERV;
+  addrinfo* found = nullptr;
+  const int error = ::getaddrinfo(host.c_str(), std::to_string(port).c_str(), &hints, &found);
+  if (error != 0) return failed(ErrorCode::Unreachable, fmt::format("no address: {}", ::gai_strerror(error)));
+  return Addresses{found, &::freeaddrinfo};
+}
+
+const addrinfo& nth(const Addresses& addresses, unsigned n) {
+  unsigned count = 0;
+  for (const addrinfo* a = addresses.get(); a != nullptr; a = a->ai_next) ++count;
+  const addrinfo* chosen = addresses.get();
+  for (unsigned i = 0; i < n % count; ++i) chosen = chosen->ai_next;
+  return *chosen;
+}
+
+bool later(int error) {
+  return error == EAGAIN || error == EWOULDBLOCK || error == EINTR;
+}
+
+}  // namespace
+
+Result<void> TcpClient::open(const std::string& host, std::uint16_t port) {
+  close();
+  const auto addresses = resolve(host, port);
+  if (!addresses) return tl::unexpected{addresses.error()};
+  const addrinfo& address = nth(*addresses, tries_++);
+  fd_ = ::socket(address.ai_family, SOCK_STREAM | SOCK_NONBLOCK | SOCK_CLOEXEC, 0);
+  if (fd_ < 0) return failed(ErrorCode::SystemRefused, fmt::format("no socket: {}", words_for(errno)));
+  const int yes = 1;
+  ::setsockopt(fd_, IPPROTO_TCP, TCP_NODELAY, &yes, sizeof yes);
+  if (::connect(fd_, address.ai_addr, address.ai_addrlen) != 0 && errno != EINPROGRESS) {
+    const int error = errno;
+    close();
+    return failed(ErrorCode::Unreachable, fmt::format("no connection: {}", words_for(error)));
+  }
+  opening_ = true;  // also when it is there already: wait() tells
+  return {};
+}
+
+void TcpClient::close() noexcept {
+  if (fd_ >= 0) ::close(std::exchange(fd_, -1));
+  opening_ = false;
+  unsent_.clear();
+}
+
+void TcpClient::finish() noexcept {
+  if (!established()) return;
+  ::shutdown(fd_, SHUT_WR);
+  // Closing a socket with unread bytes resets the connection and may overtake what was just written.
+  std::array<std::byte, 4096> thrown_away;  // NOLINT(cppcoreguidelines-pro-type-member-init)
+  for (int i = 0; i < 1000 && ::recv(fd_, thrown_away.data(), thrown_away.size(), MSG_DONTWAIT) > 0; ++i) {
+  }
+}
+
+Result<TcpClient::Ready> TcpClient::wait(std::chrono::nanoseconds wall) {
+  using std::chrono::nanoseconds;
+  const bool writing = opening_ || !unsent_.empty();
+  pollfd descriptor{fd_, static_cast<short>(writing ? POLLIN | POLLOUT : POLLIN), 0};
+  const nanoseconds bounded = std::clamp<nanoseconds>(wall, nanoseconds{0}, kLongestPoll);
+  const auto whole = std::chrono::floor<std::chrono::seconds>(bounded);
+  const timespec timeout{whole.count(), (bounded - whole).count()};
+  const int ready = ::ppoll(&descriptor, closed() ? 0 : 1, &timeout, nullptr);
+  if (ready <= 0) return Ready::Nothing;
+  if (opening_) return end_of_opening();
+  if ((descriptor.revents & POLLOUT) != 0) {
+    if (const auto sent = flush(); !sent) return tl::unexpected{sent.error()};
+  }
+  const bool something = (descriptor.revents & (POLLIN | POLLERR | POLLHUP)) != 0;
+  return something ? Ready::Readable : Ready::Nothing;
+}
+
+Result<TcpClient::Ready> TcpClient::end_of_opening() {
+  int error = 0;
+  socklen_t size = sizeof error;
+  ::getsockopt(fd_, SOL_SOCKET, SO_ERROR, &error, &size);
+  if (error != 0) {
+    close();
+    return failed(ErrorCode::Unreachable, fmt::format("no connection: {}", words_for(error)));
+  }
+  opening_ = false;
+  return Ready::Established;
+}
+
+Result<std::size_t> TcpClient::read(std::span<std::byte> into) {
+  const ssize_t n = ::recv(fd_, into.data(), into.size(), MSG_DONTWAIT);
+  if (n > 0) return static_cast<std::size_t>(n);
+  if (n == 0) return failed(ErrorCode::Unreachable, "connection closed by the peer");
+  if (later(errno)) return std::size_t{0};
+  return failed(ErrorCode::Unreachable, fmt::format("connection lost: {}", words_for(errno)));
+}
+
+Result<void> TcpClient::write(std::span<const std::byte> bytes) {
+  unsent_.insert(unsent_.end(), bytes.begin(), bytes.end());
+  return flush();
+}
+
+Result<void> TcpClient::flush() {
+  while (!unsent_.empty()) {
+    const ssize_t n = ::send(fd_, unsent_.data(), unsent_.size(), MSG_NOSIGNAL | MSG_DONTWAIT);
+    if (n < 0 && later(errno)) return {};
+    if (n < 0) return failed(ErrorCode::Unreachable, fmt::format("connection lost: {}", words_for(errno)));
+    unsent_.erase(unsent_.begin(), unsent_.begin() + n);
+  }
+  return {};
+}
+
+}  // namespace abbe::drivers

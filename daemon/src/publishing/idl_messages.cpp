@@ -106,7 +106,7 @@ v1::ErrorModel model_message(const ModelInForce& in_force, const Stamp& stamp) {
     range.max_m(nodes_m.back());
     m.validity().push_back(range);
   }
-  m.recording_sha256(in_force.observations_sha256);
+  m.recording_sha256(in_force.recording_sha256);
   m.created_utc_ns(in_force.created.time_since_epoch().count());
   return m;
 }

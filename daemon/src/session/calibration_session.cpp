@@ -69,10 +69,6 @@ std::optional<std::vector<RunPoint>> CalibrationSession::take_run() {
   return run;
 }
 
-void CalibrationSession::report_identification_progress(double fraction) {
-  if (status_.state == SessionState::Identifying) status_.progress = fraction;
-}
-
 void CalibrationSession::judged(std::string model_id, bool passed, std::string reason, HostTime now) {
   if (status_.state != SessionState::Identifying) return;  // cancelled meanwhile
   status_.model_id = std::move(model_id);

@@ -17,17 +17,17 @@ namespace abbe::calib {
 struct HeldOutFigures {
   double no_compensation = 0.0;
   double candidate = 0.0;
-  std::optional<double> active;  ///< none: no active model, or it does not hold for this tool
+  std::optional<double> active{};  ///< none: no active model, or it does not hold for this tool
   std::size_t observations = 0;
   /// the same, unweighted, in m: for people
   double no_compensation_rms_m = 0.0;
   double candidate_rms_m = 0.0;
-  std::optional<double> active_rms_m;
+  std::optional<double> active_rms_m{};
 };
 
 struct GateLimits {
   double max_error_m = 1e-3;     ///< |V| anywhere; 1 mm: larger is a machine to be repaired, or a wrong path
-  double max_gradient = 2e-3;    ///< |dV/dq|, m/m; 2 mm/m: 100 um between nodes 50 mm apart
+  double max_gradient = 5e-3;    ///< |dV/dq|, m/m; 5 mm/m: 250 um between nodes 50 mm apart
   double min_improvement = 0.0;  ///< required relative drop of the held-out figure; 0: merely better
 };
 

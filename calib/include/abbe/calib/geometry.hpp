@@ -2,6 +2,8 @@
 /// Vectors, rigid motions and the best-fit rotation between two point sets. Lengths in m, angles in rad.
 
 #include <Eigen/Core>
+#include <Eigen/Geometry>
+#include <Eigen/LU>
 #include <span>
 
 #include "abbe/calib/error.hpp"
@@ -22,9 +24,10 @@ struct RigidTransform {
 /// Point from the spherical coordinates of a tracker: azimuth = atan2(y, x), elevation from the xy plane.
 [[nodiscard]] Vector3 from_spherical(double range_m, double azimuth_rad, double elevation_rad);
 
-/// The rotation R (det +1) that minimises sum |to_i - R from_i|^2 for cross = sum to_i from_i^T. [Kabsch
-/// 1976] with the sign rule of [Umeyama 1991] eq. (43), so that a reflection is never returned.
-/// DegenerateGeometry when the points span less than a plane: then the rotation is not determined.
+/// The rotation R (det +1) that minimises sum |to_i - R from_i|^2 for cross = sum to_i from_i^T ([Kabsch
+/// 1976], the method [Sanders 2023] section 1.2.3 names). Of the two signs the determinant allows, never the
+/// reflection. DegenerateGeometry when the points span less than a plane: then the rotation is not
+/// determined.
 [[nodiscard]] Result<Matrix3> rotation_from_cross_covariance(const Matrix3& cross);
 
 /// R and t that minimise sum |to_i - (R from_i + t)|^2. Both spans have the same length >= 3.

@@ -51,7 +51,6 @@ class CalibrationSession {
 
   /// The acquired run, once, when the state has become Identifying.
   [[nodiscard]] std::optional<std::vector<RunPoint>> take_run();
-  void report_identification_progress(double fraction);
 
   /// The identification is done: a model was judged, or the data did not allow one.
   void judged(std::string model_id, bool passed, std::string reason, protocol::HostTime now);

@@ -20,7 +20,7 @@ struct ModelInForce {
   std::string id;
   std::string method;
   std::string estimator;
-  std::string observations_sha256;  ///< of the recorded points it was identified from
+  std::string recording_sha256;  ///< of what was recorded when it was identified; empty: not recorded
   protocol::UtcTime created{};
   protocol::HostTime active_since{};
   calib::VolumetricModel model;

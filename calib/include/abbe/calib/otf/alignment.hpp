@@ -15,9 +15,9 @@ struct Alignment {
   RigidTransform T_machine_tracker;        ///< tracker frame to machine coordinates
   RigidTransform rough_T_machine_tracker;  ///< from start, end and centroid only
   std::vector<std::size_t> leg;            ///< of every block
-  std::vector<bool> used;                  ///< complete and outside the corners
-  int updates = 0;
-  double first_rms_m = 0.0;  ///< distance of the used blocks to the path before and after the updates
+  std::vector<bool> used;                  ///< usable and outside the corners
+  int iterations = 0;
+  double first_rms_m = 0.0;  ///< distance of the used blocks to the path, first and last iteration
   double last_rms_m = 0.0;
   double measured_length_m = 0.0;
   double path_length_m = 0.0;

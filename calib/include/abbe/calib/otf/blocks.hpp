@@ -12,16 +12,15 @@ namespace abbe::calib::otf {
 struct Block {
   Vector3 mean_tracker_m = Vector3::Zero();
   std::size_t samples = 0;  ///< valid samples in the mean; 0: the beam was lost, the block only keeps time
-  bool complete = false;    ///< all samples there: fit for the adjustment
+  bool usable = false;      ///< at least half of the samples are there: fit for the adjustment
   std::size_t first_sub_point = 0;  ///< into BlockSeries::sub_points_tracker_m, Options::row_points of them
 };
 
 /// Blocks in the order of time, equally long.
 struct BlockSeries {
   std::vector<Block> blocks;
-  std::vector<Vector3> sub_points_tracker_m;  ///< equidistant samples of every complete block
+  std::vector<Vector3> sub_points_tracker_m;  ///< evenly spread valid samples of every usable block
   std::size_t sub_points = 0;                 ///< per block
-  std::size_t block_samples = 0;              ///< n of sigma / sqrt(n)
   Vector3 start_tracker_m = Vector3::Zero();  ///< mean of the standstill at the first vertex
   Vector3 end_tracker_m = Vector3::Zero();
   std::size_t samples = 0;

@@ -1,5 +1,5 @@
 #pragma once
-/// observe, solve and judge in a row.
+/// observe and solve in a row; judge asks for the active model and the limits and follows by itself.
 
 #include "abbe/calib/otf/judge.hpp"
 

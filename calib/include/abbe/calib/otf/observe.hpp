@@ -39,15 +39,18 @@ struct Observation {
   std::size_t block = 0;
   Vector3 direction = Vector3::UnitX();       ///< a2 or a3, machine coordinates
   Vector3 axis_position_m = Vector3::Zero();  ///< closest nominal axis position
+  std::size_t first_sub_point = 0;            ///< into Observations::sub_points_m
+  std::size_t sub_points = 0;
 };
 
 struct Observations {
   ParameterLayout layout;
   Vector3 target_offset_m = Vector3::Zero();
-  SparseRows A;  ///< fit_size() columns, rigid unknowns last
-  std::vector<Observation> rows;
-  Alignment alignment;
-  std::vector<Vector3> covered_m;  ///< axis positions whose hull the used blocks cover
+  SparseRows A{};  ///< fit_size() columns, rigid unknowns last
+  std::vector<Observation> rows{};
+  std::vector<Vector3> sub_points_m{};  ///< nominal axis positions a row is averaged over
+  Alignment alignment{};
+  std::vector<Vector3> covered_m{};  ///< axis positions whose hull the used blocks cover
   std::size_t samples = 0;
   std::size_t lost_samples = 0;
   std::size_t blocks = 0;
@@ -60,8 +63,8 @@ struct Observations {
 struct PointOnPath {
   std::size_t leg = 0;
   std::size_t block = 0;
-  Vector3 deviation_m;      ///< measured minus closest nominal point
-  Vector3 axis_position_m;  ///< closest nominal
+  Vector3 deviation_m = Vector3::Zero();      ///< measured minus closest nominal point
+  Vector3 axis_position_m = Vector3::Zero();  ///< closest nominal
   PathFrame frame;
   double samples = 1.0;  ///< in the mean
 };

@@ -69,9 +69,11 @@ struct Options {
   /// Weight of the direction of travel in the leg assignment, in m: (0.02 m)^2 (1 - cos) beside the squared
   /// distance.
   double leg_direction_m = 0.02;
-  /// Alignment is refused if the rms distance to the path stays above this: 1 mm is the largest error a
-  /// machine passes the gate with; the path of another run misses by centimetres.
+  /// Alignment is refused if the rms distance to the path stays above the first, or one block or one end of
+  /// the path above the second: 1 mm is the largest error a machine passes the gate with, and its rms is
+  /// lower; the path of another run misses by centimetres, and so do the last blocks of a truncated one.
   double max_alignment_rms_m = 1e-3;
+  double max_alignment_distance_m = 3e-3;
   /// Alignment is refused if measured and nominal length of the path differ by more than this fraction.
   double max_length_mismatch = 0.05;
   /// Gauge weight relative to trace(H)/trace(K^T K). Any positive value gives the same solution (minimal

@@ -31,15 +31,14 @@ enum class StopReason { Direct };  ///< Direct: linear problem, solved at once
 /// H = A^T W^2 A, g = A^T W^2 y over fit_size() unknowns; additive over observations. Summation in row order:
 /// the same input gives the same bits.
 struct NormalEquations {
-  Eigen::MatrixXd H;        ///< full symmetric
-  Eigen::MatrixXd H_noise;  ///< A^T W^2 C W^2 A; equals H where weights are 1/sigma^2
+  Eigen::MatrixXd H;        ///< lower triangle, the rest is zero
+  Eigen::MatrixXd H_noise;  ///< A^T W^2 C W^2 A, lower triangle; equals H where weights are 1/sigma^2
   Eigen::VectorXd g;
   std::size_t rows = 0;
 
   explicit NormalEquations(std::size_t unknowns);
   void add(std::span<const SparseRows::Entry> row, const Observation&);
   NormalEquations& operator+=(const NormalEquations&);
-  NormalEquations& operator-=(const NormalEquations&);
 };
 /// Of the rows for which `take` is true; of all if it is empty.
 [[nodiscard]] NormalEquations normal_equations(const Observations&,
@@ -78,7 +77,7 @@ struct Statistics {
   ResidualStatistics before;  ///< deviations after the alignment, no model
   ResidualStatistics after;
   int iterations = 0;
-  int alignment_updates = 0;
+  int alignment_iterations = 0;
   double alignment_rms_m = 0.0;
   StopReason stop = StopReason::Direct;
 };

@@ -1,0 +1,80 @@
+#include "abbe/calib/gauge.hpp"
+
+#include <Eigen/Dense>
+#include <array>
+#include <vector>
+
+#include "abbe/calib/model_comparison.hpp"
+#include "abbe/calib/rigid_body_model.hpp"
+
+namespace abbe::calib {
+namespace {
+
+using Condition = Eigen::RowVectorXd;
+
+Condition zero_at(const ParameterLayout& layout, const Table& table, double position_m) {
+  Condition k = Condition::Zero(static_cast<Eigen::Index>(layout.fit_size()));
+  const BasisRow b = basis_row(layout.nodes()[index(table.motion.axis)].nodes_m, position_m);
+  const auto first = static_cast<Eigen::Index>(table.offset + b.first);
+  k(first) = b.weight[0];
+  k(first + 1) = b.weight[1];
+  return k;
+}
+
+}  // namespace
+
+Eigen::MatrixXd gauge_conditions(Gauge, const ParameterLayout& layout) {
+  std::vector<Condition> conditions;
+  for (const Table& table : layout.tables()) {
+    const AxisNodes& axis = layout.nodes()[index(table.motion.axis)];
+    if (is_straightness(table.motion)) {
+      conditions.push_back(zero_at(layout, table, axis.nodes_m.front()));
+      conditions.push_back(zero_at(layout, table, axis.nodes_m.back()));
+    } else {
+      conditions.push_back(zero_at(layout, table, axis.reference_m));
+    }
+  }
+  Eigen::MatrixXd K(static_cast<Eigen::Index>(conditions.size()),
+                    static_cast<Eigen::Index>(layout.fit_size()));
+  for (std::size_t i = 0; i < conditions.size(); ++i) {
+    K.row(static_cast<Eigen::Index>(i)) = conditions[i];
+  }
+  return K;
+}
+
+Eigen::MatrixXd unobservable_combinations(const ParameterLayout& layout, std::span<const Vector3> targets_m) {
+  const auto n = static_cast<Eigen::Index>(layout.fit_size());
+  Eigen::MatrixXd H = Eigen::MatrixXd::Zero(n, n);
+  for (const Vector3& t : targets_m) {
+    for (const Vector3& q : tensor_grid(layout.nodes())) {
+      const DesignColumns columns = design_columns_with_rigid(layout, q, t);
+      for (const Column& i : columns.span()) {
+        for (const Column& j : columns.span()) {
+          H(static_cast<Eigen::Index>(i.parameter), static_cast<Eigen::Index>(j.parameter)) +=
+              i.dV_dU.dot(j.dV_dU);
+        }
+      }
+    }
+  }
+  const Eigen::VectorXd scale =
+      H.diagonal().unaryExpr([](double d) { return d > 0 ? 1 / std::sqrt(d) : 1.0; });
+  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(scale.asDiagonal() * H * scale.asDiagonal());
+  // Scaled eigenvalues of complete data fall into two groups, above 1e-5 and at rounding level (1e-15),
+  // whatever the order of the axes; anything between separates them.
+  constexpr double kZero = 1e-11;
+  Eigen::Index nullity = 0;
+  while (nullity < n && eigen.eigenvalues()(nullity) < kZero * eigen.eigenvalues()(n - 1)) {
+    ++nullity;
+  }
+  return scale.asDiagonal() * eigen.eigenvectors().leftCols(nullity);
+}
+
+Eigen::VectorXd to_gauge(Gauge gauge, const ParameterLayout& layout, const Vector3& target_offset_m,
+                         const Eigen::VectorXd& U) {
+  const Eigen::MatrixXd N = unobservable_combinations(layout, std::array{target_offset_m});
+  const Eigen::MatrixXd K = gauge_conditions(gauge, layout);
+  const Eigen::VectorXd z = (K * N).colPivHouseholderQr().solve(-(K * U));
+  return U + N * z;
+}
+
+}  // namespace abbe::calib

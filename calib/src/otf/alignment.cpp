@@ -1,0 +1,252 @@
+#include "abbe/calib/otf/alignment.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "message.hpp"
+
+namespace abbe::calib::otf {
+namespace {
+
+struct Centroid {
+  Vector3 centre_m = Vector3::Zero();
+  double length_m = 0.0;
+};
+
+/// Of a polyline, by length: a mean over time would be drawn to where the machine dwells and to slow corners.
+Centroid centroid(std::span<const Vector3> points) {
+  Centroid c;
+  for (std::size_t i = 0; i + 1 < points.size(); ++i) {
+    const double length = (points[i + 1] - points[i]).norm();
+    c.centre_m += 0.5 * length * (points[i] + points[i + 1]);
+    c.length_m += length;
+  }
+  c.centre_m /= c.length_m;
+  return c;
+}
+
+/// Start, means of the blocks that have samples, end.
+std::vector<Vector3> seen(const BlockSeries& series) {
+  std::vector<Vector3> points{series.start_tracker_m};
+  for (const Block& b : series.blocks) {
+    if (b.samples > 0) {
+      points.push_back(b.mean_tracker_m);
+    }
+  }
+  points.push_back(series.end_tracker_m);
+  return points;
+}
+
+Result<void> check(const BlockSeries& series, const Path& path) {
+  for (const Vector3& v : path.vertices_m) {
+    if (!v.allFinite()) {
+      return failure(ErrorCode::NotFinite, "path: a vertex is not a number");
+    }
+  }
+  if (path.vertices_m.size() < 3) {
+    return failure(ErrorCode::BadInput,
+                   message("path: ", path.vertices_m.size(), " vertices, needs at least 3"));
+  }
+  for (std::size_t i = 0; i + 1 < path.vertices_m.size(); ++i) {
+    if (path.vertices_m[i] == path.vertices_m[i + 1]) {
+      return failure(ErrorCode::BadInput, message("path: vertices ", i, " and ", i + 1, " coincide"));
+    }
+  }
+  if (std::count_if(series.blocks.begin(), series.blocks.end(), [](const Block& b) { return b.usable; }) <
+      4) {
+    return failure(ErrorCode::TooFewObservations, "alignment: fewer than 4 usable blocks");
+  }
+  return {};
+}
+
+/// [Sanders 2023] section 1.2.3: start on start, then the rotation that brings end and centroid closest.
+Result<RigidTransform> rough(const BlockSeries& series, const Centroid& measured, const Path& path,
+                             const Centroid& nominal, const Vector3& t) {
+  const Vector3& start = path.vertices_m.front();
+  const Vector3 to_centre = nominal.centre_m - start, to_end = path.vertices_m.back() - start;
+  // An angle below 1 degree at the start lets the roll about the line depend on the errors of the machine.
+  constexpr double kCollinear = 0.017;
+  if (to_centre.cross(to_end).norm() <= kCollinear * to_centre.norm() * to_end.norm()) {
+    return failure(
+        ErrorCode::DegenerateGeometry,
+        message("rough alignment: start (", start.transpose(), "), end (", path.vertices_m.back().transpose(),
+                ") and centroid (", nominal.centre_m.transpose(), ") m of the path lie on a line"));
+  }
+  const Vector3 m_centre = measured.centre_m - series.start_tracker_m;
+  const Vector3 m_end = series.end_tracker_m - series.start_tracker_m;
+  const Matrix3 cross = to_centre * m_centre.transpose() + to_end * m_end.transpose();
+  return rotation_from_cross_covariance(cross).map([&](const Matrix3& R) {
+    return RigidTransform{R, start + t - R * series.start_tracker_m};
+  });
+}
+
+/// Axis positions of all blocks under a transform; NaN where the beam was lost.
+std::vector<Vector3> axis_positions(const BlockSeries& series, const RigidTransform& T, const Vector3& t) {
+  std::vector<Vector3> points;
+  points.reserve(series.blocks.size());
+  for (const Block& b : series.blocks) {
+    points.push_back(b.samples > 0 ? Vector3(T * b.mean_tracker_m - t)
+                                   : Vector3(Vector3::Constant(std::numeric_limits<double>::quiet_NaN())));
+  }
+  return points;
+}
+
+/// Pairs of measured and closest nominal points, outside the corners.
+struct Pairs {
+  std::vector<Vector3> measured_m, nominal_m;
+  std::vector<bool> used;
+  double rms_m = 0.0;
+  double farthest_m = 0.0;
+  std::size_t farthest_block = 0;
+};
+
+Pairs pair_up(const BlockSeries& series, std::span<const Vector3> points, std::span<const std::size_t> leg,
+              const Path& path, const Vector3& t, double corner_m) {
+  Pairs pairs;
+  pairs.used.assign(points.size(), false);
+  double squares = 0.0;
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    if (!series.blocks[i].usable) {
+      continue;
+    }
+    const Vector3 &from = path.vertices_m[leg[i]], &to = path.vertices_m[leg[i] + 1];
+    const LegPoint closest = closest_on_leg(from, to, points[i]);
+    if (closest.along_m < corner_m || (to - from).norm() - closest.along_m < corner_m) {
+      continue;
+    }
+    pairs.used[i] = true;
+    pairs.measured_m.push_back(series.blocks[i].mean_tracker_m);
+    pairs.nominal_m.push_back(closest.closest_m + t);
+    const double distance = (points[i] - closest.closest_m).norm();
+    squares += distance * distance;
+    if (distance > pairs.farthest_m) {
+      pairs.farthest_m = distance;
+      pairs.farthest_block = i;
+    }
+  }
+  pairs.rms_m = std::sqrt(squares / static_cast<double>(std::max<std::size_t>(1, pairs.measured_m.size())));
+  return pairs;
+}
+
+Result<void> check_length(double measured_m, double nominal_m, double allowed) {
+  if (std::abs(measured_m / nominal_m - 1.0) > allowed) {
+    return failure(ErrorCode::AlignmentFailed,
+                   message("alignment: the tracker saw ", measured_m, " m of travel, the path is ", nominal_m,
+                           " m long: not the same run, or not all of it"));
+  }
+  return {};
+}
+
+tl::unexpected<Error> does_not_fit(const std::string& what, double is_m, double limit_m) {
+  return failure(ErrorCode::AlignmentFailed,
+                 message("alignment: ", what, " is ", 1e3 * is_m, " mm, allowed are ", 1e3 * limit_m,
+                         " mm: the points do not fit this path"));
+}
+
+Result<void> check_fit(const Alignment& a, const Pairs& pairs, const BlockSeries& series, const Path& path,
+                       const Vector3& t, const Options& options) {
+  if (!(pairs.rms_m <= options.max_alignment_rms_m)) {
+    return does_not_fit("rms distance to the path", pairs.rms_m, options.max_alignment_rms_m);
+  }
+  const double limit_m = options.max_alignment_distance_m;
+  if (pairs.farthest_m > limit_m) {
+    return does_not_fit(
+        message("distance of block ", pairs.farthest_block, " to leg ", a.leg[pairs.farthest_block]),
+        pairs.farthest_m, limit_m);
+  }
+  const double start_m = (a.T_machine_tracker * series.start_tracker_m - t - path.vertices_m.front()).norm();
+  const double end_m = (a.T_machine_tracker * series.end_tracker_m - t - path.vertices_m.back()).norm();
+  if (start_m > limit_m) {
+    return does_not_fit("distance of the first points to the first vertex", start_m, limit_m);
+  }
+  if (end_m > limit_m) {
+    return does_not_fit("distance of the last points to the last vertex", end_m, limit_m);
+  }
+  return {};
+}
+
+void report(const Options& options, int update) {
+  if (options.progress) {
+    // Usually done after about ten updates.
+    options.progress(Stage::Align, std::min(1.0, update / 10.0));
+  }
+}
+
+/// Iterated closest points: [Sanders 2023] section 1.2.3. Leaves the last pairs in `pairs`.
+Result<void> refine(Alignment& a, Pairs& pairs, const BlockSeries& series, const Path& path, const Vector3& t,
+                    const Options& options) {
+  double previous_rms_m = 0.0;
+  for (int update = 0;; ++update) {
+    const std::vector<Vector3> points = axis_positions(series, a.T_machine_tracker, t);
+    if (update < options.leg_assignment_updates) {
+      Result<std::vector<std::size_t>> leg = assign_legs(points, path, options.leg_direction_m);
+      if (!leg) {
+        return tl::unexpected(leg.error());
+      }
+      a.leg = *std::move(leg);
+    }
+    pairs = pair_up(series, points, a.leg, path, t, options.corner_m);
+    a.iterations = update + 1;
+    a.last_rms_m = pairs.rms_m;
+    report(options, update);
+    if (update == 0) {
+      a.first_rms_m = pairs.rms_m;
+    }
+    const double drop = (previous_rms_m - pairs.rms_m) / previous_rms_m;
+    if (update >= options.min_alignment_updates && drop < options.alignment_tolerance) {
+      return {};
+    }
+    if (update == options.max_alignment_updates) {
+      return failure(ErrorCode::NotConverged, message("alignment: still moving after ", update,
+                                                      " updates, rms ", 1e6 * pairs.rms_m, " um"));
+    }
+    previous_rms_m = pairs.rms_m;
+    const Result<RigidTransform> next = fit_rigid(pairs.measured_m, pairs.nominal_m);
+    if (!next) {
+      return failure(next.error().code, message("fine alignment: ", next.error().text));
+    }
+    a.T_machine_tracker = *next;
+  }
+}
+
+}  // namespace
+
+LegPoint closest_on_leg(const Vector3& from_m, const Vector3& to_m, const Vector3& p_m) {
+  const Vector3 direction = (to_m - from_m).normalized();
+  const double along_m = direction.dot(p_m - from_m);
+  return {from_m + along_m * direction, along_m};
+}
+
+Result<Alignment> align(const BlockSeries& series, const Machine& machine, const Path& path,
+                        const Options& options) {
+  if (Result<void> fine = check(series, path); !fine) {
+    return tl::unexpected(fine.error());
+  }
+  const Vector3& t = machine.target_offset_m;
+  const Centroid measured = centroid(seen(series)), nominal = centroid(path.vertices_m);
+  const Result<RigidTransform> first = rough(series, measured, path, nominal, t);
+  if (!first) {
+    return tl::unexpected(first.error());
+  }
+  if (Result<void> fine = check_length(measured.length_m, nominal.length_m, options.max_length_mismatch);
+      !fine) {
+    return tl::unexpected(fine.error());
+  }
+  Alignment a;
+  a.rough_T_machine_tracker = a.T_machine_tracker = *first;
+  a.measured_length_m = measured.length_m;
+  a.path_length_m = nominal.length_m;
+  Pairs pairs;
+  Result<void> fine = refine(a, pairs, series, path, t, options);
+  if (fine) {
+    fine = check_fit(a, pairs, series, path, t, options);
+  }
+  if (!fine) {
+    return tl::unexpected(fine.error());
+  }
+  a.used = std::move(pairs.used);
+  return a;
+}
+
+}  // namespace abbe::calib::otf

@@ -1,0 +1,161 @@
+#include "abbe/calib/otf/judge.hpp"
+
+#include <Eigen/Dense>
+#include <cmath>
+
+#include "message.hpp"
+
+namespace abbe::calib::otf {
+namespace {
+
+/// Sums over everything held out, of what one contender leaves unexplained.
+struct Remainder {
+  double whitened_squares = 0.0;
+  double squares_m2 = 0.0;
+};
+
+/// The last six entries of a row are the rigid ones.
+Vector6 rigid_row(std::span<const SparseRows::Entry> row) {
+  Vector6 r;
+  for (std::size_t k = 0; k < 6; ++k) {
+    r(static_cast<Eigen::Index>(k)) = row[row.size() - 6 + k].value;
+  }
+  return r;
+}
+
+/// Takes the best-fit rigid motion out of the residuals of the held-out rows and adds up what remains.
+void add_without_rigid(Remainder& total, const Observations& o, std::span<const std::size_t> rows,
+                       std::span<const double> residual_m) {
+  Eigen::Matrix<double, 6, 6> H = Eigen::Matrix<double, 6, 6>::Zero();
+  Vector6 g = Vector6::Zero();
+  for (std::size_t i = 0; i < rows.size(); ++i) {
+    const Vector6 a = rigid_row(o.A.row(rows[i]));
+    const double sigma_m = o.rows[rows[i]].sigma_m, weight = 1.0 / (sigma_m * sigma_m);
+    H.noalias() += weight * a * a.transpose();
+    g += weight * residual_m[i] * a;
+  }
+  // A complete orthogonal decomposition: a fold of few legs may leave part of the rigid motion free, which
+  // then is not used.
+  const Vector6 rigid = H.completeOrthogonalDecomposition().solve(g);
+  for (std::size_t i = 0; i < rows.size(); ++i) {
+    const double rest_m = residual_m[i] - rigid_row(o.A.row(rows[i])).dot(rigid);
+    const double whitened = rest_m / o.rows[rows[i]].sigma_m;
+    total.whitened_squares += whitened * whitened;
+    total.squares_m2 += rest_m * rest_m;
+  }
+}
+
+double predicted_by_fit(const Observations& o, std::size_t row, const Eigen::VectorXd& U) {
+  double sum = 0.0;
+  for (const SparseRows::Entry& e : o.A.row(row)) {
+    sum += e.value * U(static_cast<Eigen::Index>(e.column));
+  }
+  return sum;
+}
+
+/// Averaged over the same sub-points as the row: fair to a model whose nodes are elsewhere.
+double predicted_by_model(const Observations& o, std::size_t row, const VolumetricModel& model) {
+  const Observation& r = o.rows[row];
+  Vector3 sum = Vector3::Zero();
+  for (std::size_t k = 0; k < r.sub_points; ++k) {
+    sum += model.V_at(o.sub_points_m[r.first_sub_point + k], o.target_offset_m);
+  }
+  return r.direction.dot(sum) / static_cast<double>(r.sub_points);
+}
+
+/// Residuals of some rows under one contender's prediction.
+template <class Prediction>
+std::vector<double> residuals(const Observations& o, std::span<const std::size_t> rows,
+                              Prediction predicted_m) {
+  std::vector<double> r;
+  r.reserve(rows.size());
+  for (const std::size_t row : rows) {
+    r.push_back(o.rows[row].y_m - predicted_m(row));
+  }
+  return r;
+}
+
+std::vector<NormalEquations> equations_by_fold(const Observations& o, std::size_t folds) {
+  std::vector<NormalEquations> parts;
+  for (std::size_t f = 0; f < folds; ++f) {
+    parts.push_back(normal_equations(o, [&](const Observation& r) { return r.leg % folds == f; }));
+  }
+  return parts;
+}
+
+Result<Adjustment> fit_without(const std::vector<NormalEquations>& parts, std::size_t fold,
+                               const Observations& o, const Options& options) {
+  NormalEquations training(o.layout.fit_size());
+  for (std::size_t f = 0; f < parts.size(); ++f) {
+    if (f != fold) {
+      training += parts[f];
+    }
+  }
+  Result<Adjustment> a = adjust(training, o.layout, options.gauge_weight);
+  if (!a) {
+    return failure(a.error().code,
+                   message("held-out test without fold ", fold, " of ", parts.size(), ": ", a.error().text));
+  }
+  return a;
+}
+
+double root_mean(double squares, std::size_t n) {
+  return std::sqrt(squares / static_cast<double>(n));
+}
+
+}  // namespace
+
+Result<HeldOutFigures> held_out(const Observations& o, const VolumetricModel* active,
+                                const Options& options) {
+  const std::size_t folds = options.held_out_folds;
+  const std::size_t legs = o.rows.empty() ? 0 : o.rows.back().leg + 1;
+  if (folds < 2 || legs < folds) {
+    return failure(ErrorCode::TooFewObservations, message("held-out test: ", legs, " legs in ", folds,
+                                                          " folds, needs 2 folds and a leg in each"));
+  }
+  const bool with_active = active != nullptr && active->holds_for_tool(o.target_offset_m);
+  const std::vector<NormalEquations> parts = equations_by_fold(o, folds);
+  Remainder none, candidate, other;
+  for (std::size_t f = 0; f < folds; ++f) {
+    const Result<Adjustment> fit = fit_without(parts, f, o, options);
+    if (!fit) {
+      return tl::unexpected(fit.error());
+    }
+    std::vector<std::size_t> rows;
+    for (std::size_t i = 0; i < o.rows.size(); ++i) {
+      if (o.rows[i].leg % folds == f) {
+        rows.push_back(i);
+      }
+    }
+    add_without_rigid(none, o, rows, residuals(o, rows, [](std::size_t) { return 0.0; }));
+    add_without_rigid(candidate, o, rows,
+                      residuals(o, rows, [&](std::size_t i) { return predicted_by_fit(o, i, fit->U); }));
+    if (with_active) {
+      add_without_rigid(other, o, rows,
+                        residuals(o, rows, [&](std::size_t i) { return predicted_by_model(o, i, *active); }));
+    }
+    if (options.progress) {
+      options.progress(Stage::Judge, static_cast<double>(f + 1) / static_cast<double>(folds));
+    }
+  }
+  const std::size_t n = o.rows.size();
+  HeldOutFigures figures{.no_compensation = root_mean(none.whitened_squares, n),
+                         .candidate = root_mean(candidate.whitened_squares, n),
+                         .observations = n,
+                         .no_compensation_rms_m = root_mean(none.squares_m2, n),
+                         .candidate_rms_m = root_mean(candidate.squares_m2, n)};
+  if (with_active) {
+    figures.active = root_mean(other.whitened_squares, n);
+    figures.active_rms_m = root_mean(other.squares_m2, n);
+  }
+  return figures;
+}
+
+Result<Verdict> judge(const Observations& o, const Solution& solution, const VolumetricModel* active,
+                      const GateLimits& limits, const Options& options) {
+  return held_out(o, active, options).map([&](const HeldOutFigures& figures) {
+    return decide(solution.model, figures, limits);
+  });
+}
+
+}  // namespace abbe::calib::otf

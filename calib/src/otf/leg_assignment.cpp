@@ -1,0 +1,84 @@
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "abbe/calib/otf/alignment.hpp"
+#include "message.hpp"
+
+namespace abbe::calib::otf {
+namespace {
+
+struct Leg {
+  Vector3 from_m, direction;
+  double length_m = 0.0;
+};
+
+std::vector<Leg> legs_of(const Path& path) {
+  std::vector<Leg> legs;
+  for (std::size_t i = 0; i + 1 < path.vertices_m.size(); ++i) {
+    const Vector3 d = path.vertices_m[i + 1] - path.vertices_m[i];
+    legs.push_back({path.vertices_m[i], d.normalized(), d.norm()});
+  }
+  return legs;
+}
+
+/// Direction of travel from the neighbours; zero where a neighbour is lost or the machine stands.
+Vector3 chord(std::span<const Vector3> points, std::size_t i) {
+  const Vector3 c = points[std::min(i + 1, points.size() - 1)] - points[i == 0 ? 0 : i - 1];
+  const double length = c.norm();
+  return length > 0 ? Vector3(c / length) : Vector3(Vector3::Zero());
+}
+
+double squared_distance(const Leg& leg, const Vector3& p) {
+  const Vector3 r = p - leg.from_m;
+  const double along = std::clamp(leg.direction.dot(r), 0.0, leg.length_m);
+  return (r - along * leg.direction).squaredNorm();
+}
+
+/// A lost block costs nothing anywhere, a standing one only its distance.
+double cost(const Leg& leg, const Vector3& p, const Vector3& travel, double direction_m) {
+  if (!p.allFinite()) {
+    return 0.0;
+  }
+  const bool moves = travel.squaredNorm() > 0;  // false for NaN, too
+  return squared_distance(leg, p) +
+         (moves ? direction_m * direction_m * (1.0 - travel.dot(leg.direction)) : 0.0);
+}
+
+}  // namespace
+
+Result<std::vector<std::size_t>> assign_legs(std::span<const Vector3> points_m, const Path& path,
+                                             double direction_m) {
+  const std::vector<Leg> legs = legs_of(path);
+  const std::size_t n = points_m.size(), m = legs.size();
+  if (m == 0 || n < m) {
+    return failure(ErrorCode::TooFewObservations,
+                   message("leg assignment: ", n, " blocks for ", m, " legs, needs one block a leg"));
+  }
+  // Viterbi: best[j] = least cost of blocks 0..i with block i on leg j; it came from leg j or j - 1.
+  std::vector<double> best(m, std::numeric_limits<double>::infinity());
+  std::vector<unsigned char> advanced(n * m, 0);
+  best[0] = cost(legs[0], points_m[0], chord(points_m, 0), direction_m);
+  for (std::size_t i = 1; i < n; ++i) {
+    const Vector3 travel = chord(points_m, i);
+    // Legs that cannot be reached yet, or from which the last one cannot be reached any more, stay out.
+    const std::size_t highest = std::min(m - 1, i), left = n - 1 - i;
+    const std::size_t lowest = m - 1 > left ? m - 1 - left : 0;
+    for (std::size_t j = highest + 1; j-- > 0;) {
+      const bool from_before = j > 0 && best[j - 1] < best[j];
+      advanced[i * m + j] = from_before ? 1 : 0;
+      const double arrival = from_before ? best[j - 1] : best[j];
+      best[j] = j < lowest ? std::numeric_limits<double>::infinity()
+                           : arrival + cost(legs[j], points_m[i], travel, direction_m);
+    }
+  }
+  std::vector<std::size_t> leg(n);
+  std::size_t j = m - 1;
+  for (std::size_t i = n; i-- > 0;) {
+    leg[i] = j;
+    j -= advanced[i * m + j];
+  }
+  return leg;
+}
+
+}  // namespace abbe::calib::otf

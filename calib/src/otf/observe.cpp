@@ -1,0 +1,192 @@
+#include "abbe/calib/otf/observe.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "abbe/calib/rigid_body_model.hpp"
+#include "message.hpp"
+
+namespace abbe::calib::otf {
+namespace {
+
+/// Columns of M B averaged over positions, ascending by parameter.
+class MeanColumns {
+ public:
+  void add(std::span<const Column> columns) {
+    auto at = sum_.begin();
+    for (const Column& c : columns) {
+      at = std::lower_bound(at, sum_.end(), c.parameter,
+                            [](const Column& s, std::size_t parameter) { return s.parameter < parameter; });
+      if (at == sum_.end() || at->parameter != c.parameter) {
+        at = sum_.insert(at, Column{c.parameter, Vector3::Zero()});
+      }
+      at->dV_dU += c.dV_dU;
+    }
+    ++count_;
+  }
+
+  [[nodiscard]] std::vector<SparseRows::Entry> along(const Vector3& direction) const {
+    std::vector<SparseRows::Entry> row;
+    row.reserve(sum_.size());
+    for (const Column& c : sum_) {
+      row.push_back({c.parameter, direction.dot(c.dV_dU) / static_cast<double>(count_)});
+    }
+    return row;
+  }
+
+ private:
+  std::vector<Column> sum_;
+  std::size_t count_ = 0;
+};
+
+Result<void> check(const Noise& noise) {
+  if (!(noise.sigma_range_m > 0) || !(noise.sigma_angle_rad > 0) || !std::isfinite(noise.sigma_range_m) ||
+      !std::isfinite(noise.sigma_angle_rad)) {
+    return failure(ErrorCode::BadInput,
+                   message("tracker noise: sigma_range ", noise.sigma_range_m, " m, sigma_angle ",
+                           noise.sigma_angle_rad, " rad: both must be positive"));
+  }
+  return {};
+}
+
+/// A block that travels farther than twice the corner exclusion can straddle a corner and still be used.
+Result<void> check_travel(const BlockSeries& series, const Options& options) {
+  std::vector<double> travel_m;
+  for (std::size_t i = 0; i + 1 < series.blocks.size(); ++i) {
+    if (series.blocks[i].usable && series.blocks[i + 1].usable) {
+      travel_m.push_back((series.blocks[i + 1].mean_tracker_m - series.blocks[i].mean_tracker_m).norm());
+    }
+  }
+  if (travel_m.empty()) {
+    return {};
+  }
+  const auto middle = travel_m.begin() + std::ssize(travel_m) / 2;
+  std::nth_element(travel_m.begin(), middle, travel_m.end());
+  if (0.5 * *middle <= options.corner_m) {
+    return {};
+  }
+  const double most = 2.0 * options.corner_m / *middle * static_cast<double>(options.block_samples);
+  return failure(ErrorCode::BadInput,
+                 message("tracker blocks: ", options.block_samples, " samples travel ", 1e3 * *middle,
+                         " mm, more than twice the corner exclusion of ", 1e3 * options.corner_m,
+                         " mm: use at most ", std::floor(most), " samples a block, or exclude more"));
+}
+
+PointOnPath point_on_path(const Block& block, std::size_t i, const Alignment& a, const Path& path,
+                          const Vector3& t, const Noise& noise) {
+  const Vector3 &from = path.vertices_m[a.leg[i]], &to = path.vertices_m[a.leg[i] + 1];
+  const Vector3 q = a.T_machine_tracker * block.mean_tracker_m - t;
+  const Vector3 closest = closest_on_leg(from, to, q).closest_m;
+  // The tracker stands at T.t_m in the machine, so the beam is R m.
+  const Vector3 beam_m = a.T_machine_tracker.R * block.mean_tracker_m;
+  return {a.leg[i],
+          i,
+          q - closest,
+          closest,
+          path_frame(to - from, beam_m, noise),
+          static_cast<double>(block.samples)};
+}
+
+std::vector<Vector3> sub_points(const BlockSeries& series, std::size_t i, const Alignment& a,
+                                const Path& path, const Vector3& t) {
+  const Vector3 &from = path.vertices_m[a.leg[i]], &to = path.vertices_m[a.leg[i] + 1];
+  std::vector<Vector3> points;
+  points.reserve(series.sub_points);
+  for (std::size_t k = 0; k < series.sub_points; ++k) {
+    const Vector3& p = series.sub_points_tracker_m[series.blocks[i].first_sub_point + k];
+    points.push_back(closest_on_leg(from, to, a.T_machine_tracker * p - t).closest_m);
+  }
+  return points;
+}
+
+/// Ends of what was seen of every leg. Where data begin within three corner exclusions of a vertex, the
+/// vertex itself counts as covered: the model goes on there by less than the distance of two nodes.
+std::vector<Vector3> covered(const Observations& o, const Path& path, double corner_m) {
+  std::vector<Vector3> points;
+  for (std::size_t i = 0; i < o.rows.size();) {
+    std::size_t last = i;
+    while (last + 1 < o.rows.size() && o.rows[last + 1].leg == o.rows[i].leg) {
+      ++last;
+    }
+    const Vector3 &from = path.vertices_m[o.rows[i].leg], &to = path.vertices_m[o.rows[i].leg + 1];
+    const Vector3 &first_seen = o.rows[i].axis_position_m, &last_seen = o.rows[last].axis_position_m;
+    points.push_back((first_seen - from).norm() <= 3 * corner_m ? from : first_seen);
+    points.push_back((last_seen - to).norm() <= 3 * corner_m ? to : last_seen);
+    i = last + 1;
+  }
+  return points;
+}
+
+}  // namespace
+
+void SparseRows::append(std::span<const Entry> row) {
+  entries_.insert(entries_.end(), row.begin(), row.end());
+  begin_.push_back(entries_.size());
+}
+
+std::span<const SparseRows::Entry> SparseRows::row(std::size_t i) const {
+  return std::span(entries_).subspan(begin_[i], begin_[i + 1] - begin_[i]);
+}
+
+void append_rows(Observations& o, const PointOnPath& point, std::span<const Vector3> sub_points_m) {
+  MeanColumns columns;
+  for (const Vector3& q : sub_points_m) {
+    columns.add(design_columns_with_rigid(o.layout, q, o.target_offset_m).span());
+  }
+  const std::size_t first = o.sub_points_m.size();
+  o.sub_points_m.insert(o.sub_points_m.end(), sub_points_m.begin(), sub_points_m.end());
+  const auto append = [&](const Vector3& a, double sigma_m) {
+    const double mean_sigma_m = sigma_m / std::sqrt(point.samples);
+    o.A.append(columns.along(a));
+    o.rows.push_back({a.dot(point.deviation_m), mean_sigma_m, 1.0 / (mean_sigma_m * mean_sigma_m), point.leg,
+                      point.block, a, point.axis_position_m, first, sub_points_m.size()});
+  };
+  append(point.frame.a2, point.frame.sigma2_m);
+  append(point.frame.a3, point.frame.sigma3_m);
+}
+
+Result<Observations> observe(std::span<const TrackerObservation> samples, const Machine& machine,
+                             const Path& path, const Noise& noise, const Options& options) {
+  const Result<BlockSeries> series = make_blocks(samples, options);
+  if (!series) {
+    return tl::unexpected(series.error());
+  }
+  return observe_blocks(*series, machine, path, noise, options);
+}
+
+Result<Observations> observe_blocks(const BlockSeries& series, const Machine& machine, const Path& path,
+                                    const Noise& noise, const Options& options) {
+  Result<void> fine = check(noise);
+  if (fine) {
+    fine = check_travel(series, options);
+  }
+  Result<ParameterLayout> layout = ParameterLayout::observable_with_one_target(machine.chain, machine.nodes);
+  if (!fine || !layout) {
+    return tl::unexpected(fine ? layout.error() : fine.error());
+  }
+  Result<Alignment> alignment = align(series, machine, path, options);
+  if (!alignment) {
+    return tl::unexpected(alignment.error());
+  }
+  Observations o{.layout = *std::move(layout),
+                 .target_offset_m = machine.target_offset_m,
+                 .alignment = *std::move(alignment)};
+  o.samples = series.samples;
+  o.lost_samples = series.lost_samples;
+  o.blocks = series.blocks.size();
+  for (std::size_t i = 0; i < series.blocks.size(); ++i) {
+    if (o.alignment.used[i]) {
+      append_rows(o, point_on_path(series.blocks[i], i, o.alignment, path, o.target_offset_m, noise),
+                  sub_points(series, i, o.alignment, path, o.target_offset_m));
+      ++o.blocks_used;
+    }
+    if (options.progress && (i + 1) % 1000 == 0) {
+      options.progress(Stage::Observe,
+                       static_cast<double>(i + 1) / static_cast<double>(series.blocks.size()));
+    }
+  }
+  o.covered_m = covered(o, path, options.corner_m);
+  return o;
+}
+
+}  // namespace abbe::calib::otf

@@ -1,0 +1,114 @@
+#include "abbe/calib/otf/solve.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include "message.hpp"
+
+namespace abbe::calib::otf {
+namespace {
+
+/// y - A U of every row; y itself for an empty U.
+std::vector<double> residuals_m(const Observations& o, const Eigen::VectorXd& U) {
+  std::vector<double> r(o.rows.size());
+  for (std::size_t i = 0; i < r.size(); ++i) {
+    r[i] = o.rows[i].y_m;
+    if (U.size() > 0) {
+      for (const SparseRows::Entry& e : o.A.row(i)) {
+        r[i] -= e.value * U(static_cast<Eigen::Index>(e.column));
+      }
+    }
+  }
+  return r;
+}
+
+double chi2(const Observations& o, std::span<const double> r) {
+  double sum = 0.0;
+  for (std::size_t i = 0; i < r.size(); ++i) {
+    const double whitened = r[i] / o.rows[i].sigma_m;
+    sum += whitened * whitened;
+  }
+  return sum;
+}
+
+ResidualStatistics residual_statistics(const Observations& o, std::span<const double> r) {
+  ResidualStatistics s;
+  for (const double v : r) {
+    s.mean_abs_m += std::abs(v);
+    s.rms_m += v * v;
+    s.max_abs_m = std::max(s.max_abs_m, std::abs(v));
+  }
+  const double n = static_cast<double>(std::max<std::size_t>(1, r.size()));
+  s.mean_abs_m /= n;
+  s.rms_m = std::sqrt(s.rms_m / n);
+  s.weighted_rms = std::sqrt(chi2(o, r) / n);
+  return s;
+}
+
+Statistics statistics(const Observations& o, const Adjustment& a) {
+  const std::vector<double> before = residuals_m(o, {}), after = residuals_m(o, a.U);
+  Statistics s;
+  s.samples = o.samples;
+  s.lost_samples = o.lost_samples;
+  s.blocks = o.blocks;
+  s.blocks_used = o.blocks_used;
+  s.observations = o.rows.size();
+  s.unknowns = o.layout.fit_size();
+  s.rank = a.rank;
+  s.gauge_conditions = a.null_combinations;
+  s.degrees_of_freedom = s.observations - s.rank;
+  s.condition = a.condition;
+  s.chi2 = chi2(o, after);
+  s.chi2_per_dof = s.chi2 / static_cast<double>(s.degrees_of_freedom);
+  s.sigma0 = std::sqrt(s.chi2_per_dof);
+  s.before = residual_statistics(o, before);
+  s.after = residual_statistics(o, after);
+  s.iterations = 1;
+  s.alignment_iterations = o.alignment.iterations;
+  s.alignment_rms_m = o.alignment.last_rms_m;
+  return s;
+}
+
+void report(const Options& options, double fraction) {
+  if (options.progress) {
+    options.progress(Stage::Solve, fraction);
+  }
+}
+
+}  // namespace
+
+Result<Solution> solve(const Observations& o, const Options& options) {
+  const std::size_t needed = o.layout.fit_size();
+  if (o.rows.size() <= needed) {
+    return failure(ErrorCode::TooFewObservations,
+                   message("adjustment: ", o.rows.size(), " observations for ", needed, " unknowns"));
+  }
+  report(options, 0.0);
+  const NormalEquations N = normal_equations(o);
+  report(options, 0.5);
+  Result<Adjustment> a = adjust(N, o.layout, options.gauge_weight);
+  if (!a) {
+    return tl::unexpected(a.error());
+  }
+  Result<ValidityVolume> validity = ValidityVolume::hull_of(o.covered_m);
+  if (!validity) {
+    return tl::unexpected(validity.error());
+  }
+  const auto n = static_cast<Eigen::Index>(o.layout.model_size());
+  Result<VolumetricModel> model =
+      VolumetricModel::from_vector(o.layout, Gauge::G1, std::array{o.target_offset_m}, a->U.head(n),
+                                   a->covariance.topLeftCorner(n, n), *std::move(validity));
+  if (!model) {
+    return tl::unexpected(model.error());
+  }
+  report(options, 1.0);
+  return Solution{.model = *std::move(model),
+                  .estimator = Estimator::TwoStep,
+                  .rigid = a->U.tail<6>(),
+                  .covariance_with_rigid = a->covariance,
+                  .T_machine_tracker = o.alignment.T_machine_tracker,
+                  .statistics = statistics(o, *a)};
+}
+
+}  // namespace abbe::calib::otf

@@ -1,0 +1,141 @@
+#include "abbe/calib/validity_volume.hpp"
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
+
+#include "message.hpp"
+
+namespace abbe::calib {
+namespace {
+
+/// Points closer than this to a plane lie in it: far below the micrometre a position means, far above
+/// rounding.
+constexpr double kFlat_m = 1e-9;
+
+struct Plane {
+  Vector3 outward;
+  double offset_m;
+};
+
+bool by_coordinates(const Vector3& a, const Vector3& b) {
+  return std::lexicographical_compare(a.data(), a.data() + 3, b.data(), b.data() + 3);
+}
+
+std::vector<Vector3> distinct(std::span<const Vector3> points) {
+  std::vector<Vector3> sorted(points.begin(), points.end());
+  std::sort(sorted.begin(), sorted.end(), by_coordinates);
+  const auto same = [](const Vector3& a, const Vector3& b) { return (a - b).norm() < kFlat_m; };
+  sorted.erase(std::unique(sorted.begin(), sorted.end(), same), sorted.end());
+  return sorted;
+}
+
+bool all_below(std::span<const Vector3> points, const Plane& plane) {
+  return std::all_of(points.begin(), points.end(),
+                     [&](const Vector3& p) { return plane.outward.dot(p) <= plane.offset_m + kFlat_m; });
+}
+
+bool is_known(const std::vector<Plane>& planes, const Plane& plane) {
+  constexpr double kSameDirection = 1e-9;
+  return std::any_of(planes.begin(), planes.end(), [&](const Plane& p) {
+    return (p.outward - plane.outward).norm() < kSameDirection &&
+           std::abs(p.offset_m - plane.offset_m) < kFlat_m;
+  });
+}
+
+/// Every plane through three points that has all others on one side. Brute force, because it does not mind
+/// the many coplanar points of a lattice.
+std::vector<Plane> supporting_planes(std::span<const Vector3> points) {
+  std::vector<Plane> planes;
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    for (std::size_t j = i + 1; j < points.size(); ++j) {
+      for (std::size_t k = j + 1; k < points.size(); ++k) {
+        const Vector3 e1 = points[j] - points[i], e2 = points[k] - points[i];
+        const Vector3 normal = e1.cross(e2);
+        if (normal.norm() < kFlat_m * std::max(e1.norm(), e2.norm())) {
+          continue;
+        }
+        const Vector3 unit = normal.normalized();
+        for (const Vector3& outward : {unit, Vector3(-unit)}) {
+          const Plane plane{outward, outward.dot(points[i])};
+          if (all_below(points, plane) && !is_known(planes, plane)) {
+            planes.push_back(plane);
+          }
+        }
+      }
+    }
+  }
+  return planes;
+}
+
+/// Points in the extreme along 26 directions: a first hull of few points that swallows most of the others.
+std::vector<Vector3> extremes(std::span<const Vector3> points) {
+  std::vector<Vector3> found;
+  for (int x = -1; x <= 1; ++x) {
+    for (int y = -1; y <= 1; ++y) {
+      for (int z = -1; z <= 1; ++z) {
+        const Vector3 d(x, y, z);
+        found.push_back(
+            *std::max_element(points.begin(), points.end(),
+                              [&](const Vector3& a, const Vector3& b) { return d.dot(a) < d.dot(b); }));
+      }
+    }
+  }
+  return distinct(found);
+}
+
+bool is_inside(std::span<const Plane> planes, const Vector3& p) {
+  return std::all_of(planes.begin(), planes.end(),
+                     [&](const Plane& f) { return f.outward.dot(p) < f.offset_m - kFlat_m; });
+}
+
+/// A vertex lies in three faces or more with independent directions.
+bool is_vertex(std::span<const Plane> planes, const Vector3& p) {
+  Matrix3 directions = Matrix3::Zero();
+  for (const Plane& f : planes) {
+    if (std::abs(f.outward.dot(p) - f.offset_m) < 2 * kFlat_m) {
+      directions += f.outward * f.outward.transpose();
+    }
+  }
+  constexpr double kIndependent = 1e-12;
+  return directions.determinant() > kIndependent;
+}
+
+}  // namespace
+
+Result<ValidityVolume> ValidityVolume::hull_of(std::span<const Vector3> axis_positions_m) {
+  for (const Vector3& p : axis_positions_m) {
+    if (!p.allFinite()) {
+      return failure(ErrorCode::NotFinite, "validity volume: a point is not a number");
+    }
+  }
+  std::vector<Vector3> points = distinct(axis_positions_m);
+  if (points.size() >= 4) {
+    const std::vector<Plane> first = supporting_planes(extremes(points));
+    if (first.size() >= 4) {
+      std::erase_if(points, [&](const Vector3& p) { return is_inside(first, p); });
+    }
+  }
+  ValidityVolume volume;
+  const std::vector<Plane> planes = supporting_planes(points);
+  for (const Plane& plane : planes) {
+    volume.faces_.push_back({plane.outward, plane.offset_m});
+  }
+  std::copy_if(points.begin(), points.end(), std::back_inserter(volume.vertices_m_),
+               [&](const Vector3& p) { return is_vertex(planes, p); });
+  if (volume.faces_.size() < 4 || volume.vertices_m_.size() < 4) {
+    return failure(ErrorCode::DegenerateGeometry,
+                   message("validity volume: ", points.size(), " different points do not enclose a volume"));
+  }
+  return volume;
+}
+
+bool ValidityVolume::contains(const Vector3& p) const {
+  if (faces_.empty()) {
+    return false;
+  }
+  return std::all_of(faces_.begin(), faces_.end(),
+                     [&](const HalfSpace& f) { return f.outward.dot(p) <= f.offset_m + kTolerance_m; });
+}
+
+}  // namespace abbe::calib

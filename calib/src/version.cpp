@@ -1,3 +1,0 @@
-namespace abbe::calib {
-// Replaced by the room's first real source.
-}

@@ -1,0 +1,247 @@
+#include "abbe/calib/volumetric_model.hpp"
+
+#include <cmath>
+#include <limits>
+
+#include "abbe/calib/rigid_body_model.hpp"
+#include "message.hpp"
+
+namespace abbe::calib {
+namespace {
+
+constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
+
+/// sum_ij v_i C_ij v_j^T over the few columns that are not zero.
+Matrix3 propagate(const DesignColumns& columns, const Eigen::MatrixXd& covariance) {
+  const double* data = covariance.data();
+  const auto stride = static_cast<std::size_t>(covariance.rows());
+  Matrix3 half = Matrix3::Zero();  // half + half^T is the result
+  for (std::size_t j = 0; j < columns.count; ++j) {
+    const Column& cj = columns.column[j];
+    const double* row = data + cj.parameter * stride;
+    Vector3 sum = 0.5 * row[cj.parameter] * cj.dV_dU;
+    for (std::size_t i = 0; i < j; ++i) {
+      sum += row[columns.column[i].parameter] * columns.column[i].dV_dU;
+    }
+    half.noalias() += sum * cj.dV_dU.transpose();
+  }
+  return half + half.transpose();
+}
+
+Result<void> check_covariance(const Eigen::MatrixXd& C, std::size_t parameters) {
+  const auto n = static_cast<Eigen::Index>(parameters);
+  if (C.rows() != n || C.cols() != n) {
+    return failure(ErrorCode::BadInput, message("model: covariance is ", C.rows(), " x ", C.cols(),
+                                                ", parameters are ", parameters));
+  }
+  if (!C.allFinite()) {
+    return failure(ErrorCode::NotFinite, "model: covariance contains a value that is not a number");
+  }
+  if (!C.isApprox(C.transpose(), 1e-12)) {
+    return failure(ErrorCode::BadInput, "model: covariance is not symmetric");
+  }
+  if (n > 0 && C.diagonal().minCoeff() < 0) {
+    return failure(ErrorCode::BadInput, "model: covariance has a negative variance");
+  }
+  return {};
+}
+
+/// The tables a list of stored parameters speaks of, in order of first appearance.
+std::vector<ErrorMotion> tables_named(std::span<const Parameter> parameters) {
+  std::vector<ErrorMotion> found;
+  for (const Parameter& p : parameters) {
+    const std::optional<ErrorMotion> e = error_motion(p.name);
+    if (e && (found.empty() || !(found.back() == *e))) {
+      found.push_back(*e);
+    }
+  }
+  return found;
+}
+
+/// Stored nodes may have been through a decimal in mm.
+constexpr double kSameNode_m = 1e-9;
+
+Result<void> check_parameters(const std::vector<Parameter>& stored, const std::vector<Parameter>& expected) {
+  if (stored.size() != expected.size()) {
+    return failure(ErrorCode::BadInput, message("model: ", stored.size(),
+                                                " parameters, its tables and nodes need ", expected.size()));
+  }
+  for (std::size_t i = 0; i < stored.size(); ++i) {
+    const Parameter &is = stored[i], &should = expected[i];
+    const bool same_node = is.position_m.has_value() == should.position_m.has_value() &&
+                           (!is.position_m || std::abs(*is.position_m - *should.position_m) < kSameNode_m);
+    if (is.name != should.name || !same_node) {
+      return failure(ErrorCode::BadInput,
+                     message("model: parameter ", i, " is ", is.name, " at ", is.position_m.value_or(kNaN),
+                             " m, should be ", should.name, " at ", should.position_m.value_or(kNaN), " m"));
+    }
+    if (!std::isfinite(is.value)) {
+      return failure(ErrorCode::NotFinite,
+                     message("model: parameter ", i, " (", is.name, ") is not a number"));
+    }
+  }
+  return {};
+}
+
+std::vector<Parameter> named(const ParameterLayout& layout, const Eigen::VectorXd& U,
+                             const Eigen::MatrixXd& C) {
+  std::vector<Parameter> parameters;
+  const auto add = [&](std::string parameter_name, std::optional<double> position_m) {
+    const auto i = static_cast<Eigen::Index>(parameters.size());
+    parameters.push_back({std::move(parameter_name), position_m, U(i), std::sqrt(C(i, i))});
+  };
+  for (const Table& table : layout.tables()) {
+    for (const double node_m : layout.nodes()[index(table.motion.axis)].nodes_m) {
+      add(name(table.motion), node_m);
+    }
+  }
+  for (const std::string_view squareness : kSquarenessNames) {
+    add(std::string(squareness), std::nullopt);
+  }
+  return parameters;
+}
+
+}  // namespace
+
+Result<VolumetricModel> VolumetricModel::from_vector(const ParameterLayout& layout, Gauge gauge,
+                                                     std::span<const Vector3> tool_offsets_m,
+                                                     const Eigen::VectorXd& U,
+                                                     const Eigen::MatrixXd& covariance,
+                                                     ValidityVolume validity) {
+  if (U.size() != static_cast<Eigen::Index>(layout.model_size())) {
+    return failure(ErrorCode::BadInput,
+                   message("model: ", U.size(), " values for ", layout.model_size(), " parameters"));
+  }
+  if (!U.allFinite()) {
+    return failure(ErrorCode::NotFinite, "model: a parameter is not a number");
+  }
+  if (Result<void> fine = check_covariance(covariance, layout.model_size()); !fine) {
+    return tl::unexpected(fine.error());
+  }
+  if (tool_offsets_m.empty()) {
+    return failure(ErrorCode::BadInput, "model: no tool offset given");
+  }
+  if (tool_offsets_m.size() > 1 && layout.tables().size() != kAllAxes.size() * kAllMotions.size()) {
+    return failure(ErrorCode::BadInput, message("model: several tool offsets, but only ",
+                                                layout.tables().size(), " of 18 tables"));
+  }
+  for (const Vector3& t : tool_offsets_m) {
+    if (!t.allFinite()) {
+      return failure(ErrorCode::NotFinite, "model: a tool offset is not a number");
+    }
+  }
+  VolumetricModel model(layout);
+  model.gauge_ = gauge;
+  model.tool_offsets_m_.assign(tool_offsets_m.begin(), tool_offsets_m.end());
+  model.U_ = U;
+  model.covariance_ = covariance;
+  model.validity_ = std::move(validity);
+  return model;
+}
+
+Result<VolumetricModel> VolumetricModel::from_description(ModelDescription d) {
+  Result<ParameterLayout> layout = ParameterLayout::with_tables(d.chain, d.nodes, tables_named(d.parameters));
+  if (!layout) {
+    return failure(layout.error().code, message("model: ", layout.error().text));
+  }
+  const auto n = static_cast<Eigen::Index>(layout->model_size());
+  const Eigen::VectorXd zeros = Eigen::VectorXd::Zero(n);
+  const std::vector<Parameter> expected = named(*layout, zeros, Eigen::MatrixXd::Zero(n, n));
+  if (Result<void> fine = check_parameters(d.parameters, expected); !fine) {
+    return tl::unexpected(fine.error());
+  }
+  Eigen::VectorXd U(n);
+  for (std::size_t i = 0; i < d.parameters.size(); ++i) {
+    U(static_cast<Eigen::Index>(i)) = d.parameters[i].value;
+  }
+  Result<ValidityVolume> validity = ValidityVolume::hull_of(d.validity_hull_m);
+  if (!validity) {
+    return tl::unexpected(validity.error());
+  }
+  return from_vector(*layout, d.gauge, d.tool_offsets_m, U, d.covariance, *std::move(validity));
+}
+
+bool VolumetricModel::holds_for_tool(const Vector3& tool_offset_m) const {
+  if (!tool_offset_m.allFinite()) {
+    return false;
+  }
+  return holds_for_any_tool() || (tool_offset_m - tool_offsets_m_.front()).norm() <= kToolTolerance_m;
+}
+
+const Vector3& VolumetricModel::lever_offset_m(const Vector3& asked_m) const {
+  // The tables of one tool contain its lever; using a slightly different one here would count the change for
+  // some of the rotations only.
+  return holds_for_any_tool() ? asked_m : tool_offsets_m_.front();
+}
+
+VolumetricError VolumetricModel::error_at(const Vector3& axis_position_m,
+                                          const Vector3& tool_offset_m) const {
+  VolumetricError e;
+  e.inside = validity_.contains(axis_position_m);
+  e.tool_ok = holds_for_tool(tool_offset_m);
+  if (!e.tool_ok) {
+    e.V_m.setConstant(kNaN);
+    e.cov_V_m2.setConstant(kNaN);
+    return e;
+  }
+  const DesignColumns columns = design_columns(layout_, axis_position_m, lever_offset_m(tool_offset_m));
+  for (const Column& c : columns.span()) {
+    e.V_m += c.dV_dU * U_(static_cast<Eigen::Index>(c.parameter));
+  }
+  e.cov_V_m2 = propagate(columns, covariance_);
+  return e;
+}
+
+Vector3 VolumetricModel::V_at(const Vector3& axis_position_m, const Vector3& tool_offset_m) const {
+  if (!holds_for_tool(tool_offset_m)) {
+    return Vector3::Constant(kNaN);
+  }
+  return volumetric_error(layout_, {U_.data(), layout_.model_size()}, axis_position_m,
+                          lever_offset_m(tool_offset_m));
+}
+
+Result<Correction> VolumetricModel::command_correction(const Vector3& nominal_m,
+                                                       const Vector3& tool_offset_m) const {
+  if (!holds_for_tool(tool_offset_m)) {
+    return failure(ErrorCode::NotApplicable,
+                   message("correction for tool offset (", tool_offset_m.transpose(),
+                           ") m: the model holds for (", tool_offsets_m_.front().transpose(), ") m"));
+  }
+  if (!nominal_m.allFinite()) {
+    return failure(ErrorCode::NotFinite, "correction: the position is not a number");
+  }
+  constexpr double kSettled_m = 1e-9;
+  constexpr int kMostEvaluations = 50;
+  Correction correction;
+  correction.inside = validity_.contains(nominal_m);
+  while (correction.evaluations < kMostEvaluations) {
+    const Vector3 next = -V_at(nominal_m + correction.c_m, tool_offset_m);
+    const double step_m = (next - correction.c_m).norm();
+    correction.c_m = next;
+    ++correction.evaluations;
+    if (step_m < kSettled_m) {
+      return correction;
+    }
+  }
+  return failure(ErrorCode::NotConverged,
+                 message("correction at (", nominal_m.transpose(), ") m: still moving after ",
+                         kMostEvaluations, " evaluations"));
+}
+
+std::vector<Parameter> VolumetricModel::parameters() const {
+  return named(layout_, U_, covariance_);
+}
+
+ModelDescription VolumetricModel::description() const {
+  ModelDescription d;
+  d.chain = layout_.chain();
+  d.nodes = layout_.nodes();
+  d.gauge = gauge_;
+  d.tool_offsets_m = tool_offsets_m_;
+  d.parameters = parameters();
+  d.covariance = covariance_;
+  d.validity_hull_m.assign(validity_.vertices_m().begin(), validity_.vertices_m().end());
+  return d;
+}
+
+}  // namespace abbe::calib

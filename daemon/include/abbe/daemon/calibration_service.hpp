@@ -1,0 +1,61 @@
+#pragma once
+/// Runs calibrations in the daemon: feeds the session, identifies on a thread of its own, keeps the judged
+/// model in the store and puts it in force if the gate accepted it. Used by the hub's thread only.
+
+#include <atomic>
+#include <future>
+#include <memory>
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "abbe/daemon/calibration_request.hpp"
+#include "abbe/daemon/calibration_session.hpp"
+#include "abbe/daemon/model_authority.hpp"
+#include "abbe/daemon/otf_identification.hpp"
+#include "abbe/daemon/recorder_thread.hpp"
+
+namespace abbe::daemon {
+
+class CalibrationService {
+ public:
+  /// `recorder` may be null: nothing is recorded then, and models name no recording.
+  CalibrationService(const Config& config, ModelAuthority& authority, RecorderThread* recorder,
+                     protocol::UtcOffset utc);
+  ~CalibrationService();  ///< waits for a running identification
+  CalibrationService(const CalibrationService&) = delete;
+  CalibrationService& operator=(const CalibrationService&) = delete;
+
+  [[nodiscard]] Result<void> start_otf(std::vector<AxisPosition> path_m, const std::string& who,
+                                       protocol::HostTime now);
+  [[nodiscard]] Result<void> cancel(const std::string& who, protocol::HostTime now);
+
+  /// Every turn: new snapshots, and the outcome of an identification that has ended. Returns changes of
+  /// state, in order.
+  std::vector<SessionEvent> turn(std::span<const protocol::Snapshot> snapshots, protocol::HostTime now);
+
+  [[nodiscard]] SessionStatus status() const;
+  /// The verdict of the last identification, for people; none yet: nothing.
+  [[nodiscard]] const std::optional<calib::HeldOutFigures>& held_out() const noexcept { return held_out_; }
+
+ private:
+  struct Outcome {
+    Result<OtfCandidate> candidate;
+    std::vector<InputFile> inputs;
+  };
+  void begin_identification(std::vector<RunPoint> points);
+  void conclude(Outcome outcome, protocol::HostTime now);
+
+  const Config& config_;
+  ModelAuthority& authority_;
+  RecorderThread* recorder_;
+  protocol::UtcOffset utc_;
+  CalibrationSession session_;
+  std::string who_;
+  std::future<Outcome> identification_;
+  std::atomic<double> identified_share_{0.0};
+  std::optional<calib::HeldOutFigures> held_out_;
+};
+
+}  // namespace abbe::daemon

@@ -1,0 +1,22 @@
+#pragma once
+/// What a person or program may ask a running daemon, request by request:
+///     {"do": "status"}
+///     {"do": "calibrate", "method": "otf", "path_m": [[x, y, z], ...], "who": NAME}
+///     {"do": "cancel", "who": NAME}
+///     {"do": "activate", "id": ID, "who": NAME, "why": TEXT, "force": BOOL}
+///     {"do": "rollback", "who": NAME, "why": TEXT}
+/// Lengths m. Runs on the hub's thread, through Hub::call().
+
+#include <chrono>
+#include <nlohmann/json.hpp>
+
+#include "abbe/daemon/hub.hpp"
+
+namespace abbe::daemon {
+
+/// The answer to one request, from any thread but the hub's; a hub that does not answer in `time_out` is said
+/// so.
+[[nodiscard]] nlohmann::json answer_request(Hub& hub, const nlohmann::json& request,
+                                            std::chrono::milliseconds time_out = std::chrono::seconds{3});
+
+}  // namespace abbe::daemon

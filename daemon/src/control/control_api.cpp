@@ -1,0 +1,158 @@
+#include "abbe/daemon/control_api.hpp"
+
+#include <fmt/format.h>
+
+#include <map>
+#include <string>
+#include <utility>
+
+namespace abbe::daemon {
+namespace {
+
+using nlohmann::json;
+
+json refusal(std::string text) {
+  return {{"ok", false}, {"error", std::move(text)}};
+}
+
+std::string_view status_name(v1::ModelStatus status) {
+  switch (status) {
+    case v1::ModelStatus::MODEL_NONE:
+      return "NONE";
+    case v1::ModelStatus::MODEL_ACTIVE:
+      return "ACTIVE";
+    case v1::ModelStatus::MODEL_STALE:
+      return "STALE";
+    case v1::ModelStatus::MODEL_DRIFT:
+      return "DRIFT";
+    case v1::ModelStatus::MODEL_INVALID:
+      return "INVALID";
+  }
+  return "INVALID";
+}
+
+double seconds(std::chrono::nanoseconds t) {
+  return std::chrono::duration<double>(t).count();
+}
+
+json device_json(const StreamHealth& h) {
+  const auto& d = h.status;
+  return {{"name", d.name},
+          {"state", d.state},
+          {"connected", d.connected},
+          {"rate_hz", h.rate_hz},
+          {"samples", d.samples},
+          {"dropped", d.dropped + d.raw_dropped},
+          {"gaps", d.gaps},
+          {"faults", d.faults},
+          {"last_fault", d.last_fault},
+          {"clock",
+           {{"settled", d.clock.settled},
+            {"skew_ppm", d.clock.skew * 1e6},
+            {"residual_s", seconds(d.clock.residual)},
+            {"u_time_s", seconds(d.clock.u_time)}}},
+          {"latency_p50_s", h.latency_p50_s},
+          {"latency_p99_s", h.latency_p99_s}};
+}
+
+json session_json(const SessionStatus& s, const std::optional<calib::HeldOutFigures>& held_out) {
+  json out{{"state", name(s.state)},
+           {"reason", s.reason},
+           {"progress", s.progress},
+           {"points", s.points},
+           {"model_id", s.model_id}};
+  if (held_out) {
+    out["held_out_rms_um"] = {{"candidate", held_out->candidate_rms_m * 1e6},
+                              {"no_compensation", held_out->no_compensation_rms_m * 1e6}};
+  }
+  return out;
+}
+
+json model_json(const ModelStanding& standing) {
+  json out{{"state", status_name(standing.status)}, {"reason", standing.reason}};
+  if (standing.model != nullptr) {
+    out["id"] = standing.model->id;
+    out["method"] = standing.model->method;
+    out["recording_sha256"] = standing.model->recording_sha256;
+  }
+  return out;
+}
+
+json status(const Hub& hub) {
+  json devices = json::array();
+  for (const auto& h : hub.health()) devices.push_back(device_json(h));
+  json out{{"ok", true},
+           {"machine", hub.parts().config.machine.name},
+           {"model", model_json(hub.standing())},
+           {"session", session_json(hub.parts().calibration.status(), hub.parts().calibration.held_out())},
+           {"streams", std::move(devices)}};
+  const auto& live = hub.live().view();
+  out["position_m"] = std::vector<double>(live.position.begin(), live.position.begin() + live.axis_count);
+  if (hub.parts().recorder != nullptr) out["recording"] = hub.parts().recorder->status().file.string();
+  if (hub.parts().publisher != nullptr) {
+    const auto& link = hub.parts().publisher->link();
+    out["dds"] = {{"connected", link.connected()},
+                  {"sent", link.counters().sent},
+                  {"dropped_live", link.counters().dropped_live},
+                  {"connections", link.counters().connections}};
+  }
+  return out;
+}
+
+json calibrate(const Hub& hub, const json& request) {
+  if (request.at("method") != "otf") {
+    return refusal(fmt::format("calibrate: unknown method {}, known: \"otf\"", request.at("method").dump()));
+  }
+  auto started =
+      hub.parts().calibration.start_otf(request.at("path_m").get<std::vector<AxisPosition>>(),
+                                        request.at("who").get<std::string>(), hub.parts().time.now());
+  return started ? json{{"ok", true}} : refusal(started.error().text);
+}
+
+json cancel(const Hub& hub, const json& request) {
+  auto done = hub.parts().calibration.cancel(request.at("who").get<std::string>(), hub.parts().time.now());
+  return done ? json{{"ok", true}} : refusal(done.error().text);
+}
+
+StoreActor actor(const json& request) {
+  return {.who = request.at("who").get<std::string>(),
+          .why = request.at("why").get<std::string>(),
+          .when = std::chrono::system_clock::now()};
+}
+
+json id_or_refusal(const Result<std::string>& id) {
+  return id ? json{{"ok", true}, {"id", *id}} : refusal(id.error().text);
+}
+
+json activate(const Hub& hub, const json& request) {
+  return id_or_refusal(hub.parts().authority.activate(request.at("id").get<std::string>(), actor(request),
+                                                      request.value("force", false), hub.parts().time.now()));
+}
+
+json rollback(const Hub& hub, const json& request) {
+  return id_or_refusal(hub.parts().authority.rollback(actor(request), hub.parts().time.now()));
+}
+
+}  // namespace
+
+json answer_request(Hub& hub, const json& request, std::chrono::milliseconds time_out) {
+  using Task = json (*)(const Hub&, const json&);
+  static const std::map<std::string, Task> kTasks{
+      {"status", [](const Hub& h, const json&) { return status(h); }},
+      {"calibrate", calibrate},
+      {"cancel", cancel},
+      {"activate", activate},
+      {"rollback", rollback},
+  };
+  const auto what = request.at("do").get<std::string>();
+  const auto task = kTasks.find(what);
+  if (task == kTasks.end()) {
+    return refusal(
+        fmt::format("unknown request \"{}\": known are status, calibrate, cancel, activate, rollback", what));
+  }
+  auto answer = hub.call([&hub, run = task->second, request] { return run(hub, request); }, time_out);
+  return answer ? std::move(*answer)
+                : refusal(fmt::format("the hub did not answer in {} ms", time_out.count()));
+}
+
+}  // namespace abbe::daemon

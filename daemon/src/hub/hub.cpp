@@ -1,0 +1,143 @@
+#include "abbe/daemon/hub.hpp"
+
+#include <ctime>
+#include <future>
+#include <utility>
+
+namespace abbe::daemon {
+namespace {
+
+using namespace std::chrono_literals;
+using protocol::HostTime;
+
+constexpr auto kHealthPeriod = 1s;
+// Two and a half SYNC periods: one cycle may be lost and the axes are still known.
+constexpr double kMostLostCycles = 2.5;
+// Without axis positions for this long (host time) the model in force is STALE.
+constexpr auto kAxesPatience = 500ms;
+
+AssemblerOptions assembler_options(const Config& config) {
+  AssemblerOptions options;
+  options.watermark = config.daemon.watermark;
+  if (config.encoder) {
+    options.axes_compensated = config.encoder->axes_compensated;
+    const std::chrono::duration<double, std::nano> span = kMostLostCycles * config.encoder->sync_period;
+    options.interpolation.max_span = std::chrono::duration_cast<std::chrono::nanoseconds>(span);
+  }
+  return options;
+}
+
+void sleep_until(std::chrono::steady_clock::time_point t) {
+  const auto ns = t.time_since_epoch().count();  // steady_clock is CLOCK_MONOTONIC
+  const timespec at{.tv_sec = ns / 1'000'000'000, .tv_nsec = ns % 1'000'000'000};
+  (void)clock_nanosleep(CLOCK_MONOTONIC, TIMER_ABSTIME, &at, nullptr);
+}
+
+}  // namespace
+
+struct Hub::Call {
+  std::function<nlohmann::json()> task;
+  std::promise<nlohmann::json> result;
+};
+
+Hub::Hub(HubParts parts)
+    : parts_(parts),
+      assembler_(assembler_options(parts.config)),
+      live_(parts.config.encoder && parts.config.encoder->axes_compensated) {}
+
+Hub::WallTime Hub::last_turn() const noexcept {
+  return WallTime{std::chrono::nanoseconds{last_turn_ns_.load(std::memory_order_relaxed)}};
+}
+
+ModelStanding Hub::standing() const {
+  return parts_.authority.standing(parts_.time.now(), live_.axes_known_at(), kAxesPatience);
+}
+
+void Hub::turn(WallTime wall) {
+  last_turn_ns_.store(wall.time_since_epoch().count(), std::memory_order_relaxed);
+  if (parts_.publisher != nullptr) parts_.publisher->beat(wall);
+
+  batch_.clear();
+  parts_.devices.drain(batch_);
+  const bool fresh = live_.take(batch_);
+  const HostTime now = parts_.time.now();
+  // Live first: subscribers wait for it; the recorder and the assembler have time.
+  publish(fresh, now, wall);
+
+  if (parts_.recorder != nullptr && !batch_.empty()) parts_.recorder->hand_over(batch_);
+  assembler_.take(batch_);
+  snapshots_.clear();
+  assembler_.emit(snapshots_);
+  for (const auto& event : parts_.calibration.turn(snapshots_, now)) {
+    if (parts_.publisher != nullptr) parts_.publisher->event(event);
+  }
+  run_calls();
+}
+
+void Hub::publish(bool fresh, HostTime now, WallTime wall) {
+  const ModelStanding standing = this->standing();
+  if (wall >= next_health_) {
+    next_health_ = wall + kHealthPeriod;
+    collect_health(now);
+    if (parts_.publisher != nullptr) parts_.publisher->health(health_, now);
+  }
+  if (parts_.publisher == nullptr) return;
+  if (fresh) parts_.publisher->live(live_.view(), standing, now, wall);
+  parts_.publisher->model(standing, now, wall);
+}
+
+void Hub::collect_health(HostTime now) {
+  health_ = parts_.devices.health(now);
+  if (parts_.recorder == nullptr) return;
+  const RecorderStatus r = parts_.recorder->status();
+  StreamHealth recorder;
+  recorder.status.name = "recorder";
+  recorder.status.state = name(r.state);
+  recorder.status.connected = r.state == RecorderStatus::State::Recording;
+  recorder.status.samples = r.messages;
+  recorder.status.dropped = r.lost + parts_.recorder->dropped();
+  recorder.status.last_fault = r.fault;
+  health_.push_back(std::move(recorder));
+}
+
+void Hub::run() {
+  const auto period = parts_.config.daemon.hub_period;
+  auto next = std::chrono::steady_clock::now();
+  while (!stopping_.load(std::memory_order_relaxed)) {
+    turn(std::chrono::steady_clock::now());
+    next += period;
+    if (const auto now = std::chrono::steady_clock::now(); next < now)
+      next = now;  // late: do not catch up in a rush
+    sleep_until(next);
+  }
+}
+
+std::optional<nlohmann::json> Hub::call(std::function<nlohmann::json()> task,
+                                        std::chrono::milliseconds time_out) {
+  auto call = std::make_shared<Call>();
+  call->task = std::move(task);
+  auto result = call->result.get_future();
+  {
+    const std::lock_guard lock{calls_mutex_};
+    calls_.push_back(std::move(call));
+  }
+  if (result.wait_for(time_out) != std::future_status::ready) return std::nullopt;
+  return result.get();
+}
+
+void Hub::run_calls() {
+  std::vector<std::shared_ptr<Call>> calls;
+  {
+    const std::lock_guard lock{calls_mutex_};
+    calls.swap(calls_);
+  }
+  for (const auto& call : calls) {
+    try {
+      call->result.set_value(call->task());
+    } catch (...) {  // a member of the wrong type in the request: the caller gets it
+      call->result.set_exception(std::current_exception());
+    }
+  }
+}
+
+}  // namespace abbe::daemon

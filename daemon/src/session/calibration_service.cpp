@@ -1,0 +1,113 @@
+#include "abbe/daemon/calibration_service.hpp"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <chrono>
+#include <utility>
+
+namespace abbe::daemon {
+namespace {
+
+using protocol::HostTime;
+
+std::string verdict_text(const calib::Verdict& verdict) {
+  const auto& h = verdict.held_out;
+  const std::string figures =
+      fmt::format("held-out residual rms {:.3f} um, without compensation {:.3f} um{}",
+                  h.candidate_rms_m * 1e6, h.no_compensation_rms_m * 1e6,
+                  h.active_rms_m ? fmt::format(", active model {:.3f} um", *h.active_rms_m * 1e6) : "");
+  if (verdict.accepted) return "accepted: " + figures;
+  return fmt::format("refused: {} ({})", fmt::join(verdict.reasons, "; "), figures);
+}
+
+}  // namespace
+
+CalibrationService::CalibrationService(const Config& config, ModelAuthority& authority,
+                                       RecorderThread* recorder, protocol::UtcOffset utc)
+    : config_(config), authority_(authority), recorder_(recorder), utc_(utc) {}
+
+CalibrationService::~CalibrationService() {
+  if (identification_.valid()) identification_.wait();
+}
+
+Result<void> CalibrationService::start_otf(std::vector<AxisPosition> path_m, const std::string& who,
+                                           HostTime now) {
+  if (identification_.valid()) {
+    return fail(ErrorCode::Refused, "calibrate otf: the identification of a cancelled run is still ending");
+  }
+  const CalibrationRequest request{.path_m = path_m, .from = now};
+  if (auto started = session_.start(std::move(path_m), now); !started) return started;
+  who_ = who;
+  if (recorder_ != nullptr) recorder_->attach(to_attachment(request), now);
+  return {};
+}
+
+Result<void> CalibrationService::cancel(const std::string& who, HostTime now) {
+  return session_.cancel(who, now);
+}
+
+std::vector<SessionEvent> CalibrationService::turn(std::span<const protocol::Snapshot> snapshots,
+                                                   HostTime now) {
+  for (const auto& snapshot : snapshots) session_.take(snapshot);
+  if (auto run = session_.take_run()) begin_identification(std::move(*run));
+  if (identification_.valid() &&
+      identification_.wait_for(std::chrono::seconds{0}) == std::future_status::ready) {
+    conclude(identification_.get(), now);
+  }
+  auto events = session_.take_events();
+  if (recorder_ != nullptr) {
+    for (const auto& event : events) recorder_->hand_over(event_message(event, config_.machine.name));
+  }
+  return events;
+}
+
+void CalibrationService::begin_identification(std::vector<RunPoint> points) {
+  OtfRun run{.path_m = session_.path_m(), .points = std::move(points)};
+  std::optional<calib::VolumetricModel> active;
+  if (const auto* in_force = authority_.in_force()) active = in_force->model;
+  std::future<RecordingDigest> digest;
+  if (recorder_ != nullptr) digest = recorder_->digest();
+  identified_share_ = 0.0;
+  identification_ = std::async(std::launch::async, [this, run = std::move(run), active = std::move(active),
+                                                    digest = std::move(digest)]() mutable {
+    std::vector<InputFile> inputs;
+    if (digest.valid()) {
+      const RecordingDigest d = digest.get();
+      // The hash is that of the first `bytes` bytes: the recording goes on.
+      inputs.push_back({fmt::format("{} ({} bytes)", d.file.filename().string(), d.bytes), d.sha256});
+    }
+    inputs.push_back({"points", points_sha256(run.points)});
+    auto candidate = identify_run(run, config_.machine, config_.gate, active ? &*active : nullptr,
+                                  [this](double share) { identified_share_ = share; });
+    return Outcome{std::move(candidate), std::move(inputs)};
+  });
+}
+
+void CalibrationService::conclude(Outcome outcome, HostTime now) {
+  if (session_.status().state != SessionState::Identifying) return;  // cancelled meanwhile
+  if (!outcome.candidate) {
+    session_.not_identified(outcome.candidate.error().text, now);
+    return;
+  }
+  const auto& verdict = outcome.candidate->verdict;
+  held_out_ = verdict.held_out;
+  const auto created = utc_.to_utc(now);
+  const auto document =
+      otf_document(outcome.candidate->solution, config_.machine, std::move(outcome.inputs), created);
+  const auto id =
+      authority_.add(document, verdict, {.who = who_, .why = "calibrate otf", .when = created}, now);
+  if (!id) {
+    session_.not_identified(fmt::format("identified, but not kept: {}", id.error().text), now);
+    return;
+  }
+  session_.judged(*id, verdict.accepted, verdict_text(verdict), now);
+}
+
+SessionStatus CalibrationService::status() const {
+  SessionStatus s = session_.status();
+  if (s.state == SessionState::Identifying) s.progress = identified_share_;
+  return s;
+}
+
+}  // namespace abbe::daemon

@@ -1,0 +1,49 @@
+#pragma once
+/// Misbehaviour on a timetable: what goes wrong, when (simulated seconds after the machine begins to move),
+/// how long.
+
+#include <cstdint>
+#include <optional>
+#include <string_view>
+
+namespace abbe::sim {
+
+enum class FaultKind {
+  // tracker
+  BeamBreak,       ///< error packet and event NotReady, no points; after `duration_s` event Ready
+  SpeedExceeded,   ///< points say so, whatever the speed
+  PrismError,      ///< points say so
+  Stall,           ///< the socket is silent, then everything comes at once
+  Mute,            ///< tracker: commands and points are swallowed; encoder: the node says nothing
+  Reboot,          ///< server closing, connection lost, warm again after `duration_s`
+  Disconnect,      ///< the connection breaks and can be made again at once
+  Busy,            ///< commands are answered with ServerBusy
+  Weather,         ///< the air becomes `value` K warmer at once, with its events
+  TrackerGarbage,  ///< bytes that are no packet
+  // encoder
+  Late,        ///< frames leave `value` s late
+  Restart,     ///< the node boots anew
+  Emergency,   ///< EMCY with code `value`; after `duration_s` the all-clear
+  BusGarbage,  ///< datagrams that are no CAN frames
+  BusOff,      ///< error frame bus-off, silence, then the error frame restarted
+};
+
+struct Fault {
+  FaultKind kind = FaultKind::BeamBreak;
+  double at_s = 0.0;
+  double duration_s = 1.0;
+  double value = 0.0;
+  std::uint8_t node = 0;  ///< encoder faults: CANopen node, 0 = all
+};
+
+enum class FaultTarget { Tracker, Encoder };
+
+struct ScheduledFault {
+  FaultTarget target = FaultTarget::Tracker;
+  Fault fault;
+};
+
+/// The kind by its name in a configuration ("beam_break", "late", ...), for this device only.
+[[nodiscard]] std::optional<FaultKind> fault_kind(FaultTarget target, std::string_view name);
+
+}  // namespace abbe::sim

@@ -1,0 +1,59 @@
+#pragma once
+/// The whole stage: machine, tracker, encoder bus and the timetable of faults, stepped together. poll(now)
+/// does what is due, never blocks and reads no clock; a program turns it with real time, a test with whatever
+/// it likes. Not thread-safe.
+
+#include <poll.h>
+
+#include <memory>
+#include <optional>
+#include <vector>
+
+#include "abbe/sim/encoder_bus.hpp"
+#include "abbe/sim/tracker_server.hpp"
+
+namespace abbe::sim {
+
+struct SimulationSetup {
+  TruthMachine truth;
+  PathPlan path;
+  bool start_when_streaming = true;  ///< else the machine starts by itself
+  std::chrono::nanoseconds standstill =
+      std::chrono::seconds{2};  ///< before the motion, from the first point or from the start
+  std::optional<TrackerOptions> tracker;
+  std::uint16_t tracker_port = 0;
+  std::optional<EncoderBusOptions> bus;
+  std::vector<EncoderNodeOptions> nodes;
+  std::vector<ScheduledFault> faults;
+};
+
+class Simulation {
+ public:
+  /// Opens the sockets. BadInput for an impossible path, Io for a port that is taken.
+  [[nodiscard]] static Result<std::unique_ptr<Simulation>> open(const SimulationSetup& setup, HostTime now);
+
+  void poll(HostTime now);
+  [[nodiscard]] HostTime next_due() const;
+  /// What to wait for besides the time.
+  void add_poll_fds(std::vector<pollfd>& fds) const;
+
+  [[nodiscard]] VirtualMachine& machine() { return machine_; }
+  [[nodiscard]] const VirtualMachine& machine() const { return machine_; }
+  [[nodiscard]] std::optional<TrackerServer>& tracker() { return tracker_; }
+  [[nodiscard]] std::optional<EncoderBus>& bus() { return bus_; }
+
+ private:
+  Simulation(TruthMachine truth, PathMotion path, const SimulationSetup& setup);
+  void start_machine();
+  void inject_faults(HostTime now);
+
+  VirtualMachine machine_;
+  bool start_when_streaming_;
+  std::chrono::nanoseconds standstill_;
+  std::optional<TrackerServer> tracker_;
+  std::optional<EncoderBus> bus_;
+  std::vector<ScheduledFault> faults_;  ///< by time
+  std::size_t next_fault_ = 0;
+};
+
+}  // namespace abbe::sim

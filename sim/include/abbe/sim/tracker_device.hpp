@@ -1,0 +1,168 @@
+#pragma once
+/// A laser tracker controller that speaks emScon TPI, without its socket: bytes and a time in, bytes out. It
+/// needs what a real one needs (warm-up, Initialize, a reflector, a measurement mode) and refuses with the
+/// status a real one would give. Not thread-safe.
+///
+/// Chosen here, because no public source says: a broken beam is an error packet with status Unknown for
+/// StartMeasurement, then event NotReady; when the beam is back comes event Ready, and points go on by
+/// themselves if keepLastPosition is set.
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "abbe/protocol/emscon/framer.hpp"
+#include "abbe/protocol/emscon/requests.hpp"
+#include "abbe/protocol/emscon/results.hpp"
+#include "abbe/sim/fault.hpp"
+#include "abbe/sim/tracker_model.hpp"
+
+namespace abbe::sim {
+
+namespace emscon = protocol::emscon;
+
+struct TrackerOptions {
+  TrackerModel model;
+  std::chrono::nanoseconds delay =
+      std::chrono::milliseconds{1};    ///< from a point to the earliest burst that holds it
+  std::chrono::nanoseconds warm_up{};  ///< from power-on until the laser is stable
+  std::chrono::nanoseconds command_latency = std::chrono::milliseconds{10};
+  std::chrono::nanoseconds initialize_time = std::chrono::seconds{2};
+  double air_temperature_C = 20.0;
+  double air_pressure_mbar = 1013.25;
+  double air_humidity_percent = 50.0;
+  double air_drift_K_per_hour = 0.5;
+};
+
+class TrackerDevice {
+ public:
+  /// Switched on at `now`. `machine` must outlive it.
+  TrackerDevice(const TrackerOptions& options, const VirtualMachine& machine, HostTime now);
+
+  void connected(HostTime now);
+  void disconnected();
+  void receive(std::span<const std::byte> bytes, HostTime now);
+  /// Does what is due until `now`, in the order it is due.
+  void advance(HostTime now);
+  [[nodiscard]] HostTime next_due() const;
+
+  /// Bytes for the client, made since the last call.
+  [[nodiscard]] std::vector<std::byte> take_output();
+  /// The controller wants the connection closed, once its output is out.
+  [[nodiscard]] bool wants_close() const { return wants_close_; }
+  /// False while it restarts: nobody is let in.
+  [[nodiscard]] bool accepts() const { return !booting_until_; }
+
+  void inject(const Fault& fault, HostTime now);
+
+  /// When the first point of the first continuous measurement was taken.
+  [[nodiscard]] std::optional<HostTime> first_stream() const { return first_stream_; }
+  [[nodiscard]] bool streaming() const { return stream_.has_value(); }
+  [[nodiscard]] std::uint64_t points_sent() const { return points_sent_; }
+
+ private:
+  struct Command {
+    emscon::Request request;
+    HostTime due;
+  };
+  struct Stream {
+    DeviceTime next_point;
+    std::chrono::nanoseconds separation;
+    HostTime next_burst;
+    std::uint64_t points_left;
+  };
+
+  /// Of the time points are measured in, not of when they are sent.
+  struct Window {
+    HostTime from = HostTime::max();
+    HostTime until = HostTime::max();
+    [[nodiscard]] bool holds(HostTime t) const { return t >= from && t < until; }
+  };
+
+  // Commands.
+  void on_packet(std::span<const std::byte> packet, HostTime now);
+  void carry_out(const emscon::Request& request, HostTime at);
+  [[nodiscard]] emscon::Status outcome(const emscon::Request& request, HostTime at);
+  [[nodiscard]] emscon::Status start_measurement(HostTime at);
+  [[nodiscard]] emscon::Status set_mode(emscon::MeasurementMode mode);
+  bool answer_query(const emscon::Request& request, HostTime at);
+  [[nodiscard]] std::chrono::nanoseconds latency(const emscon::Request& request) const;
+
+  // What happens by itself.
+  void step(HostTime at);
+  void emit_burst(HostTime at);
+  void emit_points(std::span<const emscon::MultiPoint> points);
+  void emit_single(HostTime at);
+  void check_weather(HostTime at);
+  void finish_boot(HostTime at);
+  void return_beam();
+  [[nodiscard]] emscon::MultiPoint point_at(DeviceTime t);
+  [[nodiscard]] emscon::PointStatus status_of(BeamSpeed speed, HostTime at) const;
+  [[nodiscard]] emscon::Environment environment(HostTime at) const;
+  [[nodiscard]] double air_temperature_C(HostTime at) const;
+
+  template <class... Packet>
+  void send(const Packet&... packet) {
+    if (!connected_) return;
+    const std::size_t size = emscon::encode(packet..., std::span(packet_));
+    out_.insert(out_.end(), packet_.begin(), packet_.begin() + static_cast<std::ptrdiff_t>(size));
+  }
+  void send_event(emscon::Event event);
+  void reset_session();
+
+  TrackerOptions options_;
+  const VirtualMachine& machine_;
+  emscon::PacketFramer framer_;
+  std::vector<std::byte> packet_ =
+      std::vector<std::byte>(emscon::kMaxPacketSize);  ///< the packet being written
+  std::vector<std::byte> out_;
+  bool connected_ = false;
+  bool wants_close_ = false;
+  bool announce_start_ = false;
+
+  HostTime power_on_;
+  HostTime warm_at_;
+  bool warm_announced_ = true;
+  std::optional<HostTime> booting_until_;
+  bool initialised_ = false;
+
+  std::optional<Command> pending_;
+  std::uint64_t commands_ = 0;
+  emscon::Units units_;
+  emscon::SystemSettings settings_;
+  emscon::Environment set_environment_;
+  emscon::Refraction refraction_;
+  emscon::SetContinuousTimeModeParams continuous_;
+  emscon::SetStationaryModeParams stationary_;
+  emscon::StatisticMode continuous_statistics_ = emscon::StatisticMode::Standard;
+  emscon::MeasurementMode mode_ = emscon::MeasurementMode::Stationary;
+  std::int32_t reflector_ = 0;
+
+  std::optional<Stream> stream_;
+  std::optional<HostTime> single_due_;
+  std::optional<HostTime> first_stream_;
+  struct Grid {
+    DeviceTime first;
+    std::chrono::nanoseconds separation;
+  };
+  std::optional<Grid> grid_;  ///< where points lie since power-on, so that a second start does not shift them
+  std::uint64_t bursts_ = 0;
+  std::uint64_t noise_base_ = 0;
+  std::uint64_t noise_next_ = 0;
+  std::uint64_t points_sent_ = 0;
+
+  double announced_temperature_C_;
+  double weather_step_K_ = 0.0;
+  std::optional<HostTime> beam_back_;
+  Window beam_broken_;
+  Window speed_fault_;
+  Window prism_fault_;
+  HostTime mute_until_ = HostTime::min();
+  HostTime busy_until_ = HostTime::min();
+  std::optional<HostTime> stall_until_;
+};
+
+}  // namespace abbe::sim

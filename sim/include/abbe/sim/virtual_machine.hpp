@@ -1,0 +1,48 @@
+#pragma once
+/// A truth machine driven along its path: what scales and a tracker can observe of it at any host time. It
+/// stands at the first vertex until start() says when the motion begins. Not thread-safe.
+
+#include <optional>
+#include <utility>
+
+#include "abbe/sim/path_motion.hpp"
+#include "abbe/sim/sim_clock.hpp"
+#include "abbe/sim/truth_machine.hpp"
+
+namespace abbe::sim {
+
+class VirtualMachine {
+ public:
+  VirtualMachine(TruthMachine truth, PathMotion path) : truth_(std::move(truth)), path_(std::move(path)) {}
+
+  /// The motion begins at `at`; only the first call counts.
+  void start(HostTime at) {
+    if (!start_) start_ = at;
+  }
+  [[nodiscard]] std::optional<HostTime> started() const { return start_; }
+  /// When the path has been driven; nullopt before start().
+  [[nodiscard]] std::optional<HostTime> finished() const {
+    if (!start_) return std::nullopt;
+    return *start_ + seconds_to_ns(path_.duration_s());
+  }
+
+  /// Scale readings q, m.
+  [[nodiscard]] AxisMotion motion(HostTime at) const { return path_.at(elapsed_s(at)); }
+  /// Where the target really is, machine coordinates, m.
+  [[nodiscard]] Eigen::Vector3d target_m(HostTime at) const {
+    const AxisMotion m = motion(at);
+    return position_m(truth_, m.q_m, {m.direction, truth_.thermal.heat_after(elapsed_s(at))});
+  }
+
+  [[nodiscard]] const TruthMachine& truth() const { return truth_; }
+  [[nodiscard]] const PathMotion& path() const { return path_; }
+
+ private:
+  [[nodiscard]] double elapsed_s(HostTime at) const { return start_ ? ns_to_seconds(at - *start_) : -1.0; }
+
+  TruthMachine truth_;
+  PathMotion path_;
+  std::optional<HostTime> start_;
+};
+
+}  // namespace abbe::sim

@@ -1,0 +1,76 @@
+#include "abbe/sim/simulation.hpp"
+
+#include <algorithm>
+#include <utility>
+
+namespace abbe::sim {
+
+Simulation::Simulation(TruthMachine truth, PathMotion path, const SimulationSetup& setup)
+    : machine_(std::move(truth), std::move(path)),
+      start_when_streaming_(setup.start_when_streaming),
+      standstill_(setup.standstill),
+      faults_(setup.faults) {
+  std::stable_sort(faults_.begin(), faults_.end(),
+                   [](const auto& a, const auto& b) { return a.fault.at_s < b.fault.at_s; });
+}
+
+Result<std::unique_ptr<Simulation>> Simulation::open(const SimulationSetup& setup, HostTime now) {
+  auto path = PathMotion::plan(setup.path);
+  if (!path) return tl::unexpected(path.error());
+  std::unique_ptr<Simulation> simulation(new Simulation(setup.truth, std::move(*path), setup));
+  if (setup.tracker) {
+    auto tracker = TrackerServer::open(setup.tracker_port, *setup.tracker, simulation->machine_, now);
+    if (!tracker) return tl::unexpected(tracker.error());
+    simulation->tracker_.emplace(std::move(*tracker));
+  }
+  if (setup.bus) {
+    auto bus = EncoderBus::open(*setup.bus, setup.nodes, simulation->machine_, now);
+    if (!bus) return tl::unexpected(bus.error());
+    simulation->bus_.emplace(std::move(*bus));
+  }
+  if (!setup.start_when_streaming) simulation->machine_.start(now + setup.standstill);
+  return simulation;
+}
+
+void Simulation::poll(HostTime now) {
+  if (tracker_) tracker_->poll(now);
+  start_machine();
+  inject_faults(now);
+  if (bus_) bus_->poll(now);
+}
+
+void Simulation::start_machine() {
+  if (machine_.started() || !start_when_streaming_ || !tracker_) return;
+  if (const auto streaming = tracker_->device().first_stream()) machine_.start(*streaming + standstill_);
+}
+
+void Simulation::inject_faults(HostTime now) {
+  if (!machine_.started()) return;
+  for (; next_fault_ < faults_.size(); ++next_fault_) {
+    const ScheduledFault& next = faults_[next_fault_];
+    if (*machine_.started() + seconds_to_ns(next.fault.at_s) > now) return;
+    if (next.target == FaultTarget::Tracker && tracker_) tracker_->inject(next.fault, now);
+    if (next.target == FaultTarget::Encoder && bus_) bus_->inject(next.fault, now);
+  }
+}
+
+HostTime Simulation::next_due() const {
+  HostTime due = HostTime::max();
+  if (tracker_) due = std::min(due, tracker_->next_due());
+  if (bus_) due = std::min(due, bus_->next_due());
+  if (machine_.started() && next_fault_ < faults_.size()) {
+    due = std::min(due, *machine_.started() + seconds_to_ns(faults_[next_fault_].fault.at_s));
+  }
+  return due;
+}
+
+void Simulation::add_poll_fds(std::vector<pollfd>& fds) const {
+  if (tracker_) {
+    fds.push_back({tracker_->listener_fd(), POLLIN, 0});
+    const short events = static_cast<short>(tracker_->wants_write() ? POLLIN | POLLOUT : POLLIN);
+    if (tracker_->client_fd() >= 0) fds.push_back({tracker_->client_fd(), events, 0});
+  }
+  if (bus_) fds.push_back({bus_->fd(), POLLIN, 0});
+}
+
+}  // namespace abbe::sim

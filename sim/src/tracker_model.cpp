@@ -1,0 +1,73 @@
+#include "abbe/sim/tracker_model.hpp"
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
+
+#include "abbe/sim/noise.hpp"
+
+namespace abbe::sim {
+namespace {
+
+constexpr double kWarningShare = 0.8;
+
+BeamSpeed judged(const TrackerModel& model, const Eigen::Vector3d& p, const Eigen::Vector3d& velocity) {
+  const Eigen::Vector3d beam = p.normalized();
+  const double radial = std::abs(velocity.dot(beam));
+  const double lateral = (velocity - velocity.dot(beam) * beam).norm();
+  const double share =
+      std::max(radial / model.max_radial_speed_m_per_s, lateral / model.max_lateral_speed_m_per_s);
+  if (share > 1.0) return BeamSpeed::Exceeded;
+  return share > kWarningShare ? BeamSpeed::Warning : BeamSpeed::Fine;
+}
+
+Eigen::Vector3d with_noise(const TrackerModel& model, const Eigen::Vector3d& p, std::uint64_t index) {
+  const double across = std::hypot(p.x(), p.y());
+  const double elevation0 = std::atan2(p.z(), across);
+  const double range = p.norm() + model.sigma_range_m * gaussian(model.seed, NoiseStream::Range, index);
+  const double elevation =
+      elevation0 + model.sigma_angle_rad * gaussian(model.seed, NoiseStream::Elevation, index);
+  const double azimuth = std::atan2(p.y(), p.x()) + model.sigma_angle_rad / std::cos(elevation0) *
+                                                        gaussian(model.seed, NoiseStream::Azimuth, index);
+  return range * Eigen::Vector3d(std::cos(elevation) * std::cos(azimuth),
+                                 std::cos(elevation) * std::sin(azimuth), std::sin(elevation));
+}
+
+}  // namespace
+
+Eigen::Matrix3d R_machine_tracker(const TrackerModel& model) {
+  return (Eigen::AngleAxisd(model.rotation_rad.z(), Eigen::Vector3d::UnitZ()) *
+          Eigen::AngleAxisd(model.rotation_rad.y(), Eigen::Vector3d::UnitY()) *
+          Eigen::AngleAxisd(model.rotation_rad.x(), Eigen::Vector3d::UnitX()))
+      .toRotationMatrix();
+}
+
+TrackerView observe(const TrackerModel& model, const VirtualMachine& machine, HostTime at,
+                    std::uint64_t index) {
+  const Eigen::Matrix3d R_tracker_machine = R_machine_tracker(model).transpose();
+  const Eigen::Vector3d p = R_tracker_machine * (machine.target_m(at) - model.position_m);
+  const Eigen::Vector3d velocity = R_tracker_machine * machine.motion(at).velocity_m_per_s;
+  return {with_noise(model, p, index), judged(model, p, velocity)};
+}
+
+DeviceTime device_time(const TrackerModel& model, HostTime power_on, HostTime at) {
+  // The drift alone goes through a double: whole nanoseconds stay whole.
+  const std::chrono::nanoseconds since = at - power_on;
+  const auto drift = seconds_to_ns(ns_to_seconds(since) * model.clock_drift_ppm * 1e-6);
+  return DeviceTime{seconds_to_ns(model.clock_offset_s) + since + drift};
+}
+
+HostTime host_time(const TrackerModel& model, HostTime power_on, DeviceTime at) {
+  const std::chrono::nanoseconds on_its_clock = at.time_since_epoch() - seconds_to_ns(model.clock_offset_s);
+  const double ppm = model.clock_drift_ppm * 1e-6;
+  return power_on + on_its_clock - seconds_to_ns(ns_to_seconds(on_its_clock) * ppm / (1.0 + ppm));
+}
+
+std::chrono::nanoseconds burst_interval(std::uint64_t seed, std::uint64_t burst) {
+  // Two half normal distributions about the median; 1.645 standard deviations hold 90 %.
+  const double z = gaussian(seed, NoiseStream::Burst, burst);
+  const double ms = 332.0 + z * (z < 0.0 ? 8.0 : 12.0) / 1.645;
+  return seconds_to_ns(std::clamp(ms, 300.0, 400.0) * 1e-3);
+}
+
+}  // namespace abbe::sim

@@ -1,0 +1,102 @@
+#include "abbe/sim/tracker_server.hpp"
+
+#include <netinet/in.h>
+#include <netinet/tcp.h>
+
+#include <array>
+#include <cerrno>
+#include <utility>
+
+namespace abbe::sim {
+namespace {
+
+constexpr std::size_t kMostUnsent = 32u << 20;  // a client this far behind does not read any more
+
+}  // namespace
+
+Result<TrackerServer> TrackerServer::open(std::uint16_t port, const TrackerOptions& options,
+                                          const VirtualMachine& machine, HostTime now) {
+  auto listener = listen_tcp(port);
+  if (!listener) return tl::unexpected(listener.error());
+  return TrackerServer(std::move(*listener), std::make_unique<TrackerDevice>(options, machine, now));
+}
+
+TrackerServer::TrackerServer(Socket listener, std::unique_ptr<TrackerDevice> device)
+    : listener_(std::move(listener)), port_(port_of(listener_)), device_(std::move(device)) {}
+
+void TrackerServer::poll(HostTime now) {
+  accept_clients(now);
+  read(now);
+  device_->advance(now);
+  write();
+  if (client_ && device_->wants_close() && unsent_.empty()) drop_client();
+}
+
+void TrackerServer::inject(const Fault& fault, HostTime now) {
+  device_->inject(fault, now);
+  write();
+  if (client_ && device_->wants_close() && unsent_.empty()) drop_client();
+}
+
+void TrackerServer::accept_clients(HostTime now) {
+  for (;;) {
+    Socket stranger(::accept4(listener_.get(), nullptr, nullptr, SOCK_NONBLOCK | SOCK_CLOEXEC));
+    if (!stranger) return;
+    device_->advance(now);
+    if (!device_->accepts()) continue;  // restarting: the connection is closed at once
+    if (client_) read(now);             // it may just have gone
+    if (client_) {
+      turn_away(stranger);
+      continue;
+    }
+    const int on = 1;
+    setsockopt(stranger.get(), IPPROTO_TCP, TCP_NODELAY, &on, sizeof on);
+    client_ = std::move(stranger);
+    device_->connected(now);
+  }
+}
+
+void TrackerServer::turn_away(const Socket& stranger) const {
+  std::array<std::byte, 64> packet{};
+  const std::size_t size =
+      emscon::encode(emscon::ErrorResponse{emscon::Command{}, emscon::Status::MultipleConnectionsNotAllowed},
+                     std::span(packet));
+  ::send(stranger.get(), packet.data(), size, MSG_DONTWAIT | MSG_NOSIGNAL);
+}
+
+void TrackerServer::read(HostTime now) {
+  std::array<std::byte, 4096> buffer;  // NOLINT: filled by recv
+  while (client_) {
+    const ssize_t size = ::recv(client_.get(), buffer.data(), buffer.size(), MSG_DONTWAIT);
+    if (size > 0) {
+      device_->receive(std::span(buffer).first(static_cast<std::size_t>(size)), now);
+    } else if (size < 0 && (errno == EAGAIN || errno == EWOULDBLOCK || errno == EINTR)) {
+      return;
+    } else {
+      drop_client();
+    }
+  }
+}
+
+void TrackerServer::write() {
+  const std::vector<std::byte> more = device_->take_output();
+  if (!client_) return;
+  unsent_.insert(unsent_.end(), more.begin(), more.end());
+  std::size_t done = 0;
+  while (done < unsent_.size()) {
+    const ssize_t size =
+        ::send(client_.get(), unsent_.data() + done, unsent_.size() - done, MSG_DONTWAIT | MSG_NOSIGNAL);
+    if (size <= 0) break;
+    done += static_cast<std::size_t>(size);
+  }
+  unsent_.erase(unsent_.begin(), unsent_.begin() + static_cast<std::ptrdiff_t>(done));
+  if (unsent_.size() > kMostUnsent) drop_client();
+}
+
+void TrackerServer::drop_client() {
+  client_.close();
+  unsent_.clear();
+  device_->disconnected();
+}
+
+}  // namespace abbe::sim

@@ -1,0 +1,326 @@
+#pragma once
+/// What every driver must stand, written once: mute, late, torn, garbage, unplugged, back again, flooding,
+/// restarted peer; and in all of it nothing is allocated in receive(), nothing invalid looks valid, every
+/// loss is counted.
+///
+/// A driver's test supplies a FaultyPeer: the driver, a peer that talks to it over a real socket in the same
+/// thread, and a SteppedTime they share. Nothing sleeps: one turn is peer, wait(), receive(), then time goes
+/// on by kTurn.
+///
+///   struct MyPeer { ... };  // models FaultyPeer
+///   INSTANTIATE_TYPED_TEST_SUITE_P(My, DriverConformance, MyPeer);
+///
+/// A TCP peer that unplugs keeps its port by holding a second socket bound to it (SO_REUSEPORT, not
+/// listening).
+
+#include <gtest/gtest.h>
+
+#include <chrono>
+#include <concepts>
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "abbe/drivers/device.hpp"
+#include "abbe/drivers/time_source.hpp"
+#include "abbe/protocol/samples.hpp"
+#include "allocation_count.hpp"
+
+namespace abbe::tests {
+
+/// What a driver's test implements. All calls come from one thread and return at once. Default constructed,
+/// the peer is there and well, the device is made and has had no turn yet.
+template <class P>
+concept FaultyPeer = requires(P p, std::vector<protocol::SampleHead>& heads) {
+  { p.device() } -> std::same_as<drivers::Device&>;
+  { p.time() } -> std::same_as<drivers::SteppedTime&>;
+  /// Takes what the device's sample ring holds (all rings, if it has several that carry the measurement).
+  p.take_samples(heads);
+  /// Accepts connections, answers commands; called once a turn while the peer is up.
+  p.serve();
+  /// One packet (burst, cycle) of valid samples that end about now. Called once a turn while the peer speaks;
+  /// may say nothing in some turns, if the device is not streaming yet or the packet is not due.
+  p.say_valid();
+  /// The same, later than usual but within what is tolerated: one packet, held back and then sent.
+  p.hold_back();  ///< from now on say_valid() is kept in the peer ...
+  p.send_held();  ///< ... until now
+  /// The first half of a valid packet; then the rest, where the transport can deliver it
+  /// (kTornCanBeFinished).
+  p.send_torn();
+  p.finish_torn();
+  /// Bytes that are no packet of the protocol.
+  p.send_garbage();
+  /// The cable is out: connections are lost and refused. And is in again.
+  p.unplug();
+  p.plug_in();
+  /// At once, more valid samples than the sample ring holds.
+  p.flood();
+  /// Power off and on: connections are lost, the device's clock and counters begin anew.
+  p.restart();
+
+  { P::kTurn } -> std::convertible_to<std::chrono::nanoseconds>;          ///< host time of one turn
+  { P::kSilenceLimit } -> std::convertible_to<std::chrono::nanoseconds>;  ///< silence is a fault after this
+  {
+    P::kRecoveryLimit
+    } -> std::convertible_to<std::chrono::nanoseconds>;  ///< from well again to streaming again
+  {
+    P::kTornCanBeFinished
+    } -> std::convertible_to<bool>;  ///< true: a byte stream; false: datagrams or frames
+};
+
+/// Flags that keep a sample from being taken for a valid one.
+inline constexpr protocol::SampleFlags kNotToBeUsed =
+    protocol::SampleFlag::AxisMissing | protocol::SampleFlag::BusOff | protocol::SampleFlag::DeviceError |
+    protocol::SampleFlag::SpeedExceeded | protocol::SampleFlag::PointInvalid;
+/// Flags of which the first sample after an interruption carries at least one.
+inline constexpr protocol::SampleFlags kInterrupted =
+    protocol::SampleFlag::GapBefore | protocol::SampleFlag::Restarted | protocol::SampleFlag::BeamReturned;
+
+template <FaultyPeer Peer>
+class DriverConformance : public testing::Test {
+ protected:
+  using Heads = std::vector<protocol::SampleHead>;
+
+  drivers::DeviceStatus status() { return peer_.device().status(); }
+
+  /// One turn; returns the heads of the samples it brought.
+  Heads turn() {
+    if (up_) peer_.serve();
+    if (up_ && speaking_) peer_.say_valid();
+    peer_.device().wait(Peer::kTurn);
+    const AllocationCount allocations;
+    peer_.device().receive();
+    allocated_in_receive_ += allocations.value();
+    peer_.time().advance(Peer::kTurn);
+    Heads heads;
+    peer_.take_samples(heads);
+    taken_ += heads.size();
+    return heads;
+  }
+
+  Heads turns_for(std::chrono::nanoseconds duration) {
+    Heads all;
+    for (const auto end = peer_.time().now() + duration; peer_.time().now() < end;) append(turn(), all);
+    return all;
+  }
+
+  /// Turns until `done()`; false if `limit` of host time passed before. Samples on the way go to `seen_`.
+  template <class Done>
+  bool turns_until(std::chrono::nanoseconds limit, Done done) {
+    seen_.clear();
+    for (const auto end = peer_.time().now() + limit; !done();) {
+      if (peer_.time().now() >= end) return false;
+      append(turn(), seen_);
+    }
+    return true;
+  }
+
+  static bool usable(const protocol::SampleHead& head) { return (head.flags & kNotToBeUsed) == 0; }
+  static std::size_t usable_in(const Heads& heads) {
+    std::size_t n = 0;
+    for (const auto& head : heads) n += usable(head) ? 1 : 0;
+    return n;
+  }
+
+  bool usable_samples_come(std::chrono::nanoseconds limit) {
+    return turns_until(limit, [this] { return usable_in(seen_) != 0; });
+  }
+  /// From nothing to streaming; the precondition of every test.
+  void begin_streaming() {
+    ASSERT_TRUE(usable_samples_come(Peer::kRecoveryLimit))
+        << "never streamed; last fault: " << status().last_fault;
+    turns_for(10 * Peer::kTurn);
+    before_ = status();
+  }
+
+  void TearDown() override {
+    EXPECT_EQ(allocated_in_receive_, 0u) << "receive() took memory";
+    const auto s = status();
+    EXPECT_EQ(s.samples, taken_ + s.dropped) << "every decoded sample is taken or counted as dropped";
+  }
+
+  Peer peer_;
+  bool up_ = true;  ///< the peer is served: its process runs
+  bool speaking_ = true;
+  Heads seen_;
+  drivers::DeviceStatus before_;  ///< when begin_streaming() was through
+
+ private:
+  static void append(const Heads& from, Heads& to) { to.insert(to.end(), from.begin(), from.end()); }
+  std::uint64_t allocated_in_receive_ = 0;
+  std::uint64_t taken_ = 0;
+};
+
+TYPED_TEST_SUITE_P(DriverConformance);
+
+TYPED_TEST_P(DriverConformance, StreamsWhatThePeerSays) {
+  this->begin_streaming();
+  const auto heads = this->turns_for(20 * TypeParam::kTurn);
+  EXPECT_GT(this->usable_in(heads), 0u);
+  EXPECT_TRUE(this->status().connected);
+  EXPECT_EQ(this->status().faults, this->before_.faults);
+}
+
+TYPED_TEST_P(DriverConformance, StampsNoSampleWithTheFuture) {
+  this->begin_streaming();
+  for (int i = 0; i < 20; ++i) {
+    const auto before_turn = this->peer_.time().now();
+    for (const auto& head : this->turn()) EXPECT_LE(head.time, before_turn + 3 * head.u_time);
+  }
+}
+
+TYPED_TEST_P(DriverConformance, NoticesAMutePeer) {
+  this->begin_streaming();
+  this->speaking_ = false;
+  const auto noticed = [this] { return this->status().faults > this->before_.faults; };
+  EXPECT_TRUE(this->turns_until(2 * TypeParam::kSilenceLimit, noticed));
+  EXPECT_NE(this->status().last_fault, "");
+}
+
+TYPED_TEST_P(DriverConformance, InventsNothingWhileThePeerIsMute) {
+  this->begin_streaming();
+  this->speaking_ = false;
+  this->turns_for(2 * TypeParam::kTurn);  // what was under way
+  EXPECT_EQ(this->usable_in(this->turns_for(2 * TypeParam::kSilenceLimit)), 0u);
+}
+
+TYPED_TEST_P(DriverConformance, StreamsAgainWhenAMutePeerSpeaks) {
+  this->begin_streaming();
+  this->speaking_ = false;
+  this->turns_for(2 * TypeParam::kSilenceLimit);
+  this->speaking_ = true;
+  EXPECT_TRUE(this->usable_samples_come(TypeParam::kRecoveryLimit)) << this->status().last_fault;
+}
+
+TYPED_TEST_P(DriverConformance, ToleratesALatePacket) {
+  this->begin_streaming();
+  this->peer_.hold_back();
+  this->turns_for(TypeParam::kSilenceLimit / 2);
+  this->peer_.send_held();
+  EXPECT_TRUE(this->usable_samples_come(TypeParam::kSilenceLimit));
+  EXPECT_TRUE(this->status().connected);
+}
+
+TYPED_TEST_P(DriverConformance, WaitsForTheRestOfATornPacket) {
+  if (!TypeParam::kTornCanBeFinished) GTEST_SKIP() << "a datagram is never finished";
+  this->begin_streaming();
+  this->speaking_ = false;
+  this->turns_for(2 * TypeParam::kTurn);
+  this->peer_.send_torn();
+  EXPECT_EQ(this->turns_for(3 * TypeParam::kTurn).size(), 0u);
+  this->peer_.finish_torn();
+  EXPECT_TRUE(this->usable_samples_come(3 * TypeParam::kTurn));
+  EXPECT_EQ(this->status().faults, this->before_.faults);
+}
+
+TYPED_TEST_P(DriverConformance, CountsATornDatagramAndGoesOn) {
+  if (TypeParam::kTornCanBeFinished) GTEST_SKIP() << "a byte stream may deliver the rest";
+  this->begin_streaming();
+  this->peer_.send_torn();
+  const auto counted = [this] { return this->status().faults > this->before_.faults; };
+  EXPECT_TRUE(this->turns_until(TypeParam::kSilenceLimit, counted));
+  EXPECT_TRUE(this->usable_samples_come(TypeParam::kRecoveryLimit));
+}
+
+TYPED_TEST_P(DriverConformance, CountsGarbageAndMakesNoSampleOfIt) {
+  this->begin_streaming();
+  this->speaking_ = false;
+  this->turns_for(2 * TypeParam::kTurn);
+  this->peer_.send_garbage();
+  EXPECT_EQ(this->usable_in(this->turns_for(5 * TypeParam::kTurn)), 0u);
+  EXPECT_GT(this->status().faults, this->before_.faults);
+  EXPECT_NE(this->status().last_fault, "");
+}
+
+TYPED_TEST_P(DriverConformance, StreamsAgainAfterGarbage) {
+  this->begin_streaming();
+  this->peer_.send_garbage();
+  this->turns_for(5 * TypeParam::kTurn);
+  EXPECT_TRUE(this->usable_samples_come(TypeParam::kRecoveryLimit)) << this->status().last_fault;
+}
+
+TYPED_TEST_P(DriverConformance, NoticesThatItIsUnplugged) {
+  this->begin_streaming();
+  this->peer_.unplug();
+  this->up_ = false;
+  EXPECT_TRUE(this->turns_until(2 * TypeParam::kSilenceLimit, [this] { return !this->status().connected; }));
+  EXPECT_GT(this->status().faults, this->before_.faults);
+  EXPECT_EQ(this->usable_in(this->turns_for(TypeParam::kSilenceLimit)), 0u);
+}
+
+TYPED_TEST_P(DriverConformance, StreamsWhenPluggedInAgainAndMarksIt) {
+  this->begin_streaming();
+  this->peer_.unplug();
+  this->up_ = false;
+  this->turns_for(2 * TypeParam::kSilenceLimit);
+  this->peer_.plug_in();
+  this->up_ = true;
+  ASSERT_TRUE(this->usable_samples_come(TypeParam::kRecoveryLimit)) << this->status().last_fault;
+  EXPECT_TRUE(this->status().connected);
+  protocol::SampleFlags flags = 0;  // of everything up to the first usable sample
+  for (const auto& head : this->seen_) {
+    flags |= head.flags;
+    if (this->usable(head)) break;
+  }
+  EXPECT_NE(flags & kInterrupted, 0u);
+}
+
+TYPED_TEST_P(DriverConformance, StartsWhenThePeerComesLater) {
+  this->peer_.unplug();
+  this->up_ = false;
+  this->turns_for(2 * TypeParam::kSilenceLimit);
+  EXPECT_FALSE(this->status().connected);
+  this->peer_.plug_in();
+  this->up_ = true;
+  EXPECT_TRUE(this->usable_samples_come(TypeParam::kRecoveryLimit)) << this->status().last_fault;
+}
+
+TYPED_TEST_P(DriverConformance, DropsCountsAndMarksWhenFlooded) {
+  this->begin_streaming();
+  this->peer_.flood();
+  const auto dropped = [this] { return this->status().dropped > this->before_.dropped; };
+  ASSERT_TRUE(this->turns_until(TypeParam::kRecoveryLimit, dropped));
+  const auto marked = [this] {
+    for (const auto& head : this->seen_) {
+      if (has(head.flags, protocol::SampleFlag::GapBefore) && head.lost_before != 0) return true;
+    }
+    return false;
+  };
+  EXPECT_TRUE(this->turns_until(TypeParam::kRecoveryLimit, marked));
+}
+
+TYPED_TEST_P(DriverConformance, StreamsAgainAfterThePeerRestartedAndMarksIt) {
+  this->begin_streaming();
+  this->peer_.restart();
+  const auto marked = [this] {
+    for (const auto& head : this->seen_) {
+      if ((head.flags & kInterrupted) != 0) return true;
+    }
+    return false;
+  };
+  EXPECT_TRUE(this->turns_until(TypeParam::kRecoveryLimit, marked)) << this->status().last_fault;
+  EXPECT_TRUE(this->usable_samples_come(TypeParam::kRecoveryLimit)) << this->status().last_fault;
+}
+
+TYPED_TEST_P(DriverConformance, KeepsSampleTimesNearTheHostClockThroughARestart) {
+  this->begin_streaming();
+  this->peer_.restart();
+  this->turns_for(TypeParam::kRecoveryLimit / 2);
+  ASSERT_TRUE(this->usable_samples_come(TypeParam::kRecoveryLimit)) << this->status().last_fault;
+  for (const auto& head : this->seen_) {
+    EXPECT_GE(head.time, this->peer_.time().now() - TypeParam::kRecoveryLimit);
+    EXPECT_LE(head.time, this->peer_.time().now() + 3 * head.u_time);
+  }
+}
+
+REGISTER_TYPED_TEST_SUITE_P(DriverConformance, StreamsWhatThePeerSays, StampsNoSampleWithTheFuture,
+                            NoticesAMutePeer, InventsNothingWhileThePeerIsMute,
+                            StreamsAgainWhenAMutePeerSpeaks, ToleratesALatePacket,
+                            WaitsForTheRestOfATornPacket, CountsATornDatagramAndGoesOn,
+                            CountsGarbageAndMakesNoSampleOfIt, StreamsAgainAfterGarbage,
+                            NoticesThatItIsUnplugged, StreamsWhenPluggedInAgainAndMarksIt,
+                            StartsWhenThePeerComesLater, DropsCountsAndMarksWhenFlooded,
+                            StreamsAgainAfterThePeerRestartedAndMarksIt,
+                            KeepsSampleTimesNearTheHostClockThroughARestart);
+
+}  // namespace abbe::tests

@@ -1,0 +1,163 @@
+#include "abbe/daemon/input_files.hpp"
+
+#include <fmt/format.h>
+
+#include <cmath>
+#include <numbers>
+
+#include "abbe/calib/geometry.hpp"
+#include "abbe/daemon/sha256.hpp"
+#include "files/text_file.hpp"
+#include "input/number_table.hpp"
+
+namespace abbe::daemon {
+
+namespace {
+
+constexpr double kMmPerM = 1e3;
+constexpr double kSecondsPerMinute = 60.0;
+
+struct Parsed {
+  InputFile source;
+  NumberTable table;
+  Faults faults;
+};
+
+/// Reads, hashes and parses; semantic checks of the caller go to `faults`, settle() gives the verdict.
+Result<Parsed> parse(const std::filesystem::path& file, const std::vector<TableForm>& forms,
+                     const ReadProgress& progress = {}) {
+  const auto text = read_text(file);
+  if (!text) return tl::make_unexpected(text.error());
+  Faults faults(file.string());
+  auto table = parse_numbers(*text, forms, faults, progress);
+  if (!table) return tl::make_unexpected(faults.to_error());
+  return Parsed{{file.filename().string(), sha256_hex(*text)}, std::move(*table), std::move(faults)};
+}
+
+AxisPosition position_m(const NumberTable& table, std::size_t row, std::size_t first) {
+  return {table.at(row, first) / kMmPerM, table.at(row, first + 1) / kMmPerM,
+          table.at(row, first + 2) / kMmPerM};
+}
+
+void check_rows(Parsed& parsed, std::size_t least, std::string_view what) {
+  const auto& table = parsed.table;
+  if (table.rows() >= least) return;
+  const auto line = table.rows() == 0 ? 1 : table.line(table.rows() - 1);
+  parsed.faults.add(line, 1, "", fmt::format("needs at least {} {}, has {}", least, what, table.rows()));
+}
+
+// Rows with a fault are left out of the checks below: they would only repeat it.
+
+void check_time_ascends(Parsed& parsed) {
+  const auto& table = parsed.table;
+  std::optional<double> before_s;
+  for (std::size_t row = 0; row < table.rows(); ++row) {
+    if (!table.sound(row)) continue;
+    const double time_s = table.at(row, 0);
+    if (before_s && time_s <= *before_s)
+      parsed.faults.add(table.line(row), 1, "time_s",
+                        fmt::format("{} after {}: time must ascend", time_s, *before_s));
+    before_s = time_s;
+  }
+}
+
+void check_path(Parsed& parsed) {
+  const auto& table = parsed.table;
+  for (std::size_t row = 0; row < table.rows(); ++row) {
+    if (!table.sound(row)) continue;
+    if (row > 0 && table.sound(row - 1) && position_m(table, row, 0) == position_m(table, row - 1, 0))
+      parsed.faults.add(table.line(row), 1, "", "the same vertex as before");
+    if (table.has(3) && table.at(row, 3) <= 0.0)
+      parsed.faults.add(table.line(row), 1, "feed_mm_per_min", "must be positive");
+  }
+}
+
+constexpr std::size_t kSpherical = 0;  // index of the form
+
+void check_spherical(Parsed& parsed) {
+  const auto& table = parsed.table;
+  if (table.form() != kSpherical) return;
+  for (std::size_t row = 0; row < table.rows(); ++row) {
+    if (!table.sound(row)) continue;
+    if (table.at(row, 1) <= 0.0) parsed.faults.add(table.line(row), 1, "range_mm", "must be positive");
+    if (std::abs(table.at(row, 2)) > 2.0 * std::numbers::pi)
+      parsed.faults.add(table.line(row), 1, "azimuth_rad", "beyond a full turn (degrees?)");
+    if (std::abs(table.at(row, 3)) > std::numbers::pi / 2.0)
+      parsed.faults.add(table.line(row), 1, "elevation_rad", "beyond the vertical (degrees?)");
+  }
+}
+
+calib::otf::TrackerObservation observation(const NumberTable& table, std::size_t row) {
+  constexpr double kSpeedWarning =
+      1.0;  // the highest status that still is a good point: emScon, point status
+  calib::otf::TrackerObservation point;
+  point.time_s = table.at(row, 0);
+  point.valid = table.at(row, 4) >= 0.0 && table.at(row, 4) <= kSpeedWarning;
+  if (table.form() == kSpherical) {
+    point.p_tracker_m = calib::from_spherical(table.at(row, 1) / kMmPerM, table.at(row, 2), table.at(row, 3));
+  } else {
+    const auto p_m = position_m(table, row, 1);
+    point.p_tracker_m = calib::Vector3(p_m[0], p_m[1], p_m[2]);
+  }
+  return point;
+}
+
+}  // namespace
+
+Result<PathFile> read_path_csv(const std::filesystem::path& file) {
+  auto parsed = parse(file, {{{"x_mm"}, {"y_mm"}, {"z_mm"}, {"feed_mm_per_min", false}}});
+  if (!parsed) return tl::make_unexpected(parsed.error());
+  check_rows(*parsed, 2, "vertices");
+  check_path(*parsed);
+  if (parsed->faults.any()) return tl::make_unexpected(parsed->faults.to_error());
+  const auto& table = parsed->table;
+  PathFile path{parsed->source, {}, {}};
+  for (std::size_t row = 0; row < table.rows(); ++row) {
+    path.vertices_m.push_back(position_m(table, row, 0));
+    if (table.has(3)) path.feed_m_per_s.push_back(table.at(row, 3) / kMmPerM / kSecondsPerMinute);
+  }
+  return path;
+}
+
+Result<TrackerFile> read_tracker_csv(const std::filesystem::path& file, const ReadProgress& progress) {
+  auto parsed = parse(file,
+                      {{{"time_s"}, {"range_mm"}, {"azimuth_rad"}, {"elevation_rad"}, {"status", false}},
+                       {{"time_s"}, {"x_mm"}, {"y_mm"}, {"z_mm"}, {"status", false}}},
+                      progress);
+  if (!parsed) return tl::make_unexpected(parsed.error());
+  check_rows(*parsed, 1, "points");
+  check_time_ascends(*parsed);
+  check_spherical(*parsed);
+  if (parsed->faults.any()) return tl::make_unexpected(parsed->faults.to_error());
+  TrackerFile tracker{parsed->source, {}};
+  tracker.points.reserve(parsed->table.rows());
+  for (std::size_t row = 0; row < parsed->table.rows(); ++row)
+    tracker.points.push_back(observation(parsed->table, row));
+  return tracker;
+}
+
+Result<EncoderFile> read_encoder_csv(const std::filesystem::path& file, const ReadProgress& progress) {
+  auto parsed = parse(file, {{{"time_s"}, {"x_mm"}, {"y_mm"}, {"z_mm"}}}, progress);
+  if (!parsed) return tl::make_unexpected(parsed.error());
+  check_rows(*parsed, 1, "readings");
+  check_time_ascends(*parsed);
+  if (parsed->faults.any()) return tl::make_unexpected(parsed->faults.to_error());
+  EncoderFile encoder{parsed->source, {}};
+  encoder.rows.reserve(parsed->table.rows());
+  for (std::size_t row = 0; row < parsed->table.rows(); ++row)
+    encoder.rows.push_back({parsed->table.at(row, 0), position_m(parsed->table, row, 1)});
+  return encoder;
+}
+
+Result<PointsFile> read_points_csv(const std::filesystem::path& file) {
+  auto parsed = parse(file, {{{"x_mm"}, {"y_mm"}, {"z_mm"}}});
+  if (!parsed) return tl::make_unexpected(parsed.error());
+  check_rows(*parsed, 1, "points");
+  if (parsed->faults.any()) return tl::make_unexpected(parsed->faults.to_error());
+  PointsFile points{parsed->source, {}};
+  for (std::size_t row = 0; row < parsed->table.rows(); ++row)
+    points.points_m.push_back(position_m(parsed->table, row, 0));
+  return points;
+}
+
+}  // namespace abbe::daemon

@@ -1,0 +1,83 @@
+#include <fmt/format.h>
+
+#include <array>
+#include <bit>
+#include <cstdint>
+
+#include "abbe/daemon/model_document.hpp"
+#include "abbe/daemon/sha256.hpp"
+
+namespace abbe::daemon {
+
+namespace {
+
+/// Feeds labelled numbers to the hash as the little-endian bytes of IEEE 754 doubles, each list with its
+/// length in front, so that no two models share a stream. Minus zero counts as zero.
+class Canonical {
+ public:
+  void text(std::string_view value) {
+    count(value.size());
+    hash_.update(value);
+  }
+  void count(std::size_t value) { word(static_cast<std::uint64_t>(value)); }
+  void number(double value) { word(std::bit_cast<std::uint64_t>(value + 0.0)); }
+  void vector(const calib::Vector3& v) {
+    for (int i = 0; i < 3; ++i) number(v[i]);
+  }
+  void vectors(std::span<const calib::Vector3> list) {
+    count(list.size());
+    for (const auto& v : list) vector(v);
+  }
+  [[nodiscard]] std::string hex() { return hash_.hex(); }
+
+ private:
+  void word(std::uint64_t value) {
+    std::array<std::byte, 8> bytes{};
+    for (std::size_t i = 0; i < bytes.size(); ++i) bytes[i] = static_cast<std::byte>(value >> (8 * i));
+    hash_.update(bytes);
+  }
+  Sha256 hash_;
+};
+
+void add_frame(Canonical& out, const calib::VolumetricModel& model) {
+  const auto& layout = model.layout();
+  out.text(layout.chain().text());
+  for (const auto& axis : layout.nodes()) {
+    out.count(axis.nodes_m.size());
+    for (const double node_m : axis.nodes_m) out.number(node_m);
+    out.number(axis.reference_m);
+  }
+  out.text(name(calib::Basis::Linear));
+  out.text(name(model.gauge()));
+  out.vectors(model.tool_offsets_m());
+}
+
+void add_values(Canonical& out, const calib::VolumetricModel& model) {
+  out.count(model.layout().tables().size());
+  for (const auto& table : model.layout().tables()) out.text(name(table.motion));
+  const auto& U = model.U();
+  const auto& covariance = model.covariance();
+  out.count(static_cast<std::size_t>(U.size()));
+  for (Eigen::Index i = 0; i < U.size(); ++i) out.number(U[i]);
+  for (Eigen::Index i = 0; i < covariance.rows(); ++i)
+    for (Eigen::Index j = i; j < covariance.cols(); ++j) out.number(covariance(i, j));
+}
+
+}  // namespace
+
+std::string model_hash(const calib::VolumetricModel& model, std::string_view method) {
+  Canonical out;
+  out.text("abbe/model/1");
+  out.text(method);
+  add_frame(out, model);
+  add_values(out, model);
+  out.vectors(model.validity().vertices_m());
+  return out.hex();
+}
+
+std::string model_id(const calib::VolumetricModel& model, std::string_view method) {
+  constexpr std::size_t kDigits = 16;
+  return model_hash(model, method).substr(0, kDigits);
+}
+
+}  // namespace abbe::daemon

@@ -1,0 +1,34 @@
+#include "abbe/daemon/model_document.hpp"
+
+namespace abbe::daemon {
+
+namespace {
+
+ResidualFigures figures(const calib::otf::ResidualStatistics& s) {
+  return {s.mean_abs_m, s.rms_m, s.max_abs_m};
+}
+
+}  // namespace
+
+ModelStatistics model_statistics(const calib::otf::Statistics& s) {
+  return {.samples = s.samples,
+          .lost_samples = s.lost_samples,
+          .observations = s.observations,
+          .unknowns = s.unknowns,
+          .rank = s.rank,
+          .condition = s.condition,
+          .sigma0 = s.sigma0,
+          .chi2_per_dof = s.chi2_per_dof,
+          .before = figures(s.before),
+          .after = figures(s.after),
+          .iterations = s.iterations,
+          .stop_reason = std::string{name(s.stop)}};
+}
+
+ModelDocument otf_document(const calib::otf::Solution& solution, const MachineConfig& machine,
+                           std::vector<InputFile> inputs, protocol::UtcTime created) {
+  return {solution.model,        "otf",   std::string{name(solution.estimator)}, machine.name,
+          machine_hash(machine), created, model_statistics(solution.statistics), std::move(inputs)};
+}
+
+}  // namespace abbe::daemon

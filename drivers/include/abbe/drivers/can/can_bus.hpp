@@ -1,0 +1,54 @@
+#pragma once
+/// The seam for CAN transports: frames in with the time they arrived, frames out. Ordinary world (system
+/// calls); one thread. SocketCanBus is the real bus, UdpCanBus the tunnel and the simulator.
+
+#include <chrono>
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <string>
+
+#include "abbe/drivers/error.hpp"
+#include "abbe/protocol/can/frame.hpp"
+#include "abbe/protocol/time.hpp"
+
+namespace abbe::drivers {
+
+namespace can = protocol::can;
+
+struct ReceivedFrame {
+  can::CanFrame frame;
+  protocol::HostTime time{};  ///< arrival
+};
+
+/// What a transport lost or refused since it was made; never goes back.
+struct CanBusCounters {
+  std::uint64_t lost = 0;          ///< the kernel's queue was full, or datagrams missing in the sequence
+  std::uint64_t refused = 0;       ///< datagrams that are no CAN frames
+  std::uint64_t time_widened = 0;  ///< arrivals whose kernel stamp could not be used
+};
+
+class CanBus {
+ public:
+  CanBus() = default;
+  CanBus(const CanBus&) = delete;
+  CanBus& operator=(const CanBus&) = delete;
+  virtual ~CanBus() = default;
+
+  /// Opens, or closes and opens again, for these 11-bit identifiers and all error frames; others are not
+  /// delivered.
+  [[nodiscard]] virtual Result<void> open(std::span<const std::uint32_t> ids) = 0;
+  virtual void close() noexcept = 0;
+  /// Waits at most `wall` (the operating system's time, 0 = look only) and reads what is there, at most
+  /// out.size(). Error code Unreachable: nobody there now, the bus stays open; any other code: close and open
+  /// again.
+  [[nodiscard]] virtual Result<std::size_t> read(std::span<ReceivedFrame> out,
+                                                 std::chrono::nanoseconds wall) = 0;
+  /// Errors as for read().
+  [[nodiscard]] virtual Result<void> send(std::span<const can::CanFrame> frames) = 0;
+  [[nodiscard]] virtual CanBusCounters counters() const noexcept = 0;
+  /// For people: "can0", "udp 127.0.0.1:20000".
+  [[nodiscard]] virtual std::string name() const = 0;
+};
+
+}  // namespace abbe::drivers

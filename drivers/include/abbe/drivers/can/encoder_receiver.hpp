@@ -1,0 +1,180 @@
+#pragma once
+/// Frames of an encoder bus to AxisSamples. Sans-I/O and deterministic: the same events in the same order
+/// give the same samples, so replay from raw bytes uses it unchanged. Real time: no allocation after
+/// construction. One thread.
+///
+/// A cycle begins when our SYNC goes out (on_sent). The sample leaves when the last axis has answered, or at
+/// the deadline, the next SYNC or bus-off with the axes that did not answer marked in missing_mask: these
+/// keep their previous value. All axes carry one time: SYNC + sampling delay. An axis that never answered has
+/// position NaN. An answer that comes after its cycle is closed is counted and not used; one stamped before
+/// the SYNC cannot be its answer; a second one in a cycle replaces the first, which was late. A bus that is
+/// always late by a whole cycle cannot be told from one that is in time: the period must be longer than the
+/// slowest answer.
+///
+/// The scale is configured or read along from the SDO answers on the bus (6005h:01, else 6501h; rotary:
+/// 6001h), so that a recording carries it. 0 is refused: the axis stays missing.
+///
+/// Raw blocks of a CAN bus: each is one whole datagram of protocol/can/udp_framing.hpp with all its frames at
+/// one host time. FromDevice: as received. ToDevice: as sent, the SYNC among them. FromDevice without frames
+/// (no bytes or count 0): nothing came until that time, which is what closes a cycle at its deadline. The
+/// sequence number counts blocks.
+
+#include <algorithm>
+#include <array>
+#include <chrono>
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "abbe/drivers/error.hpp"
+#include "abbe/protocol/can/canopen.hpp"
+#include "abbe/protocol/can/frame.hpp"
+#include "abbe/protocol/can/pdo.hpp"
+#include "abbe/protocol/can/sdo.hpp"
+#include "abbe/protocol/can/udp_framing.hpp"
+#include "abbe/protocol/rt.hpp"
+#include "abbe/protocol/samples.hpp"
+
+namespace abbe::drivers {
+
+namespace can = protocol::can;
+
+enum class AxisKind : std::uint8_t { Linear, Rotary };
+
+struct EncoderAxis {
+  std::string name;  ///< "X"; for messages
+  can::NodeId node = 1;
+  AxisKind kind = AxisKind::Linear;
+  can::PositionType position = can::PositionType::Signed32;
+  std::uint8_t tpdo = 1;          ///< 1 or 2
+  std::optional<double> scale{};  ///< m or rad per count, negative reverses; none: ask the encoder
+  std::uint64_t wrap_counts =
+      0;  ///< counts after which it begins anew; 0: what the encoder says, else 2^32 (2^64)
+  std::optional<std::uint32_t> serial{};  ///< checked when given
+};
+
+struct EncoderReceiverOptions {
+  std::vector<EncoderAxis> axes;  ///< 1 to protocol::kMaxAxes, in the order of the sample
+  std::chrono::nanoseconds sync_period = std::chrono::milliseconds{1};
+  std::chrono::nanoseconds answer_within{};  ///< after the SYNC; 0: 0.8 of the period
+  std::chrono::nanoseconds
+      sampling_delay{};  ///< SYNC leaving us to position taken; device specific, to be calibrated
+  std::chrono::nanoseconds u_sampling_delay = std::chrono::microseconds{50};  ///< its standard uncertainty
+  std::chrono::nanoseconds heartbeat_timeout = std::chrono::milliseconds{350};
+};
+/// BadConfiguration names the axis and what is wrong with it.
+[[nodiscard]] Result<void> check(const EncoderReceiverOptions& options);
+
+/// Since construction.
+struct EncoderCounters {
+  std::uint64_t samples = 0;
+  std::uint64_t missing_answers = 0;  ///< axes x cycles
+  std::uint64_t late_frames = 0;
+  std::uint64_t duplicate_frames = 0;
+  std::uint64_t short_frames = 0;  ///< TPDOs too short for a position
+  std::uint64_t missed_syncs = 0;  ///< periods in which no SYNC was sent
+  std::uint64_t emergencies = 0;
+  std::uint64_t heartbeat_losses = 0;
+  std::uint64_t bus_reports = 0;  ///< error frames
+  std::uint64_t scale_refusals = 0;
+  std::uint64_t bad_blocks = 0;  ///< raw blocks that are no datagram
+};
+
+class EncoderReceiver {
+ public:
+  /// `options` have passed check(). Allocates.
+  explicit EncoderReceiver(const EncoderReceiverOptions& options);
+
+  // Events in the order in which they happened. The samples they complete (at most two) are valid until the
+  // next event.
+  [[nodiscard]] std::span<const protocol::AxisSample> on_sent(const can::CanFrame& frame,
+                                                              protocol::HostTime time) ABBE_RT;
+  [[nodiscard]] std::span<const protocol::AxisSample> on_frame(const can::CanFrame& frame,
+                                                               protocol::HostTime time) ABBE_RT;
+  /// Nothing more came until `now`.
+  [[nodiscard]] std::span<const protocol::AxisSample> on_time(protocol::HostTime now) ABBE_RT;
+  /// When on_time() has something to do: the deadline of the open cycle, else HostTime::max().
+  [[nodiscard]] protocol::HostTime deadline() const ABBE_RT;
+
+  /// Replay: all events of one raw block, every sample to sink(const AxisSample&). Total.
+  template <class Sink>
+  void on_raw(const protocol::RawBlock& block, Sink&& sink) {
+    const auto give = [&](std::span<const protocol::AxisSample> samples) {
+      for (const auto& sample : samples) sink(sample);
+    };
+    const auto bytes = std::span{block.bytes}.first(std::min<std::size_t>(block.length, block.bytes.size()));
+    const bool sent = block.direction == protocol::RawBlock::Direction::ToDevice;
+    if (bytes.empty()) return give(on_time(block.time));
+    auto view = can::DatagramView::parse(bytes);
+    if (!view) return count_bad_block();
+    if (view->count() == 0 && !sent) return give(on_time(block.time));
+    can::CanFrame frame;
+    while (view->next(frame)) give(sent ? on_sent(frame, block.time) : on_frame(frame, block.time));
+  }
+
+  [[nodiscard]] const EncoderCounters& counters() const ABBE_RT { return counters_; }
+  [[nodiscard]] bool bus_off() const ABBE_RT { return bus_off_; }
+  /// m or rad per count; nullopt while unknown.
+  [[nodiscard]] std::optional<double> scale(std::size_t axis) const ABBE_RT;
+
+ private:
+  struct Axis {
+    can::NodeId node = 0;
+    AxisKind kind{};
+    can::PositionType type{};
+    std::uint32_t tpdo_id = 0;
+    bool scale_configured = false;
+    bool wrap_configured = false;
+    double scale = 0.0;         ///< 0: unknown
+    std::uint64_t modulus = 0;  ///< 0: 2^64
+    bool seen = false;
+    std::uint64_t raw = 0;        ///< the latest count as sent, modulo `modulus`
+    std::uint16_t emergency = 0;  ///< the latest code; 0: none
+    bool heartbeat_lost = false;
+    std::optional<protocol::HostTime> last_heartbeat;
+  };
+  using Samples = std::span<const protocol::AxisSample>;
+
+  void begin_cycle(protocol::HostTime time) ABBE_RT;
+  void close_cycle() ABBE_RT;
+  void emit(protocol::HostTime time) ABBE_RT;
+  [[nodiscard]] protocol::SampleFlags take_flags(std::uint8_t missing) ABBE_RT;
+  [[nodiscard]] Samples done() const ABBE_RT { return {out_.data(), out_count_}; }
+  void on_position(std::size_t i, const can::CanFrame& frame, protocol::HostTime time) ABBE_RT;
+  void hear() ABBE_RT;
+  void take_position(std::size_t i, std::int64_t count) ABBE_RT;
+  void on_node_frame(Axis& axis, const can::CanFrame& frame, protocol::HostTime time) ABBE_RT;
+  void on_heartbeat(Axis& axis, can::NodeState state, protocol::HostTime time) ABBE_RT;
+  void on_bus_report(const can::CanFrame& frame, protocol::HostTime time) ABBE_RT;
+  void on_sdo_answer(Axis& axis, const can::CanFrame& frame) ABBE_RT;
+  void learn(Axis& axis, can::ObjectId object, std::uint32_t value) ABBE_RT;
+  void check_heartbeats(protocol::HostTime time) ABBE_RT;
+  void count_bad_block() ABBE_RT { ++counters_.bad_blocks; }
+
+  std::array<Axis, protocol::kMaxAxes> axes_{};
+  std::size_t axis_count_ = 0;
+  std::uint8_t all_mask_ = 0;
+  std::chrono::nanoseconds period_;
+  std::chrono::nanoseconds answer_within_;
+  std::chrono::nanoseconds sampling_delay_;
+  std::chrono::nanoseconds u_sampling_delay_;
+  std::chrono::nanoseconds heartbeat_timeout_;
+
+  bool open_ = false;                            ///< a cycle waits for answers
+  std::optional<protocol::HostTime> sync_time_;  ///< of the latest SYNC
+  std::uint32_t cycle_ = 0;
+  std::uint8_t received_mask_ = 0;
+  bool bus_off_ = false;
+  bool bus_error_pending_ = false;  ///< since the previous sample
+  bool restarted_pending_ = false;
+  std::uint32_t lost_pending_ = 0;  ///< SYNCs that were not sent
+  protocol::AxisSample current_;    ///< counts and positions stay from cycle to cycle
+  std::array<protocol::AxisSample, 4> out_{};
+  std::size_t out_count_ = 0;
+  EncoderCounters counters_;
+};
+
+}  // namespace abbe::drivers

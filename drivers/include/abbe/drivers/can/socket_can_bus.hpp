@@ -1,0 +1,49 @@
+#pragma once
+/// The real bus: a Linux SocketCAN RAW socket, filtered to the identifiers in use, with error frames, kernel
+/// receive stamps and the kernel's own loss counter. Bit rate and restart-ms belong to the interface (ip
+/// link), not to us.
+
+#include <cstdint>
+#include <memory>
+#include <string>
+
+#include "abbe/drivers/can/can_bus.hpp"
+#include "abbe/drivers/kernel_stamp.hpp"
+#include "abbe/drivers/time_source.hpp"
+
+namespace abbe::drivers {
+
+struct SocketCanOptions {
+  std::string interface = "can0";
+  int receive_buffer_bytes = 1 << 20;
+};
+
+class SocketCanBus final : public CanBus {
+ public:
+  /// `time` must outlive the bus.
+  SocketCanBus(SocketCanOptions options, const TimeSource& time);
+  ~SocketCanBus() override;
+
+  [[nodiscard]] Result<void> open(std::span<const std::uint32_t> ids) override;
+  void close() noexcept override;
+  [[nodiscard]] Result<std::size_t> read(std::span<ReceivedFrame> out,
+                                         std::chrono::nanoseconds wall) override;
+  [[nodiscard]] Result<void> send(std::span<const can::CanFrame> frames) override;
+  [[nodiscard]] CanBusCounters counters() const noexcept override;
+  [[nodiscard]] std::string name() const override { return options_.interface; }
+
+ private:
+  struct Batch;  ///< the buffers of recvmmsg
+  [[nodiscard]] Result<void> configure(std::span<const std::uint32_t> ids);
+  [[nodiscard]] Result<void> bind_to_interface();
+
+  SocketCanOptions options_;
+  const TimeSource& time_;
+  int fd_ = -1;
+  KernelStampMap stamps_;
+  std::unique_ptr<Batch> batch_;
+  std::uint64_t lost_ = 0;
+  std::uint32_t last_overflow_ = 0;  ///< SO_RXQ_OVFL counts per socket
+};
+
+}  // namespace abbe::drivers

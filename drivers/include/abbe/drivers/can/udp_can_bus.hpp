@@ -1,0 +1,64 @@
+#pragma once
+/// CAN over UDP with the framing of protocol/can/udp_framing.hpp: peers are the cannelloni tunnel, gateways
+/// and abbe-sim. All frames of a datagram get the arrival time of the datagram; a tunnel that buffers makes
+/// it a late one, which costs nothing here: positions are dated by the SYNC.
+
+#include <array>
+#include <bitset>
+#include <cstdint>
+#include <optional>
+#include <string>
+
+#include "abbe/drivers/can/can_bus.hpp"
+#include "abbe/drivers/kernel_stamp.hpp"
+#include "abbe/drivers/time_source.hpp"
+#include "abbe/protocol/can/udp_framing.hpp"
+
+namespace abbe::drivers {
+
+struct UdpCanOptions {
+  std::string local_address = "127.0.0.1";
+  std::uint16_t local_port = 0;  ///< 0: the kernel chooses, see local_port()
+  std::string peer_address = "127.0.0.1";
+  std::uint16_t peer_port = 20000;
+  double speed =
+      1.0;  ///< host time per monotonic time, as given to the TimeSource; 0: stepped, stamps are not used
+};
+
+class UdpCanBus final : public CanBus {
+ public:
+  /// `time` must outlive the bus.
+  UdpCanBus(UdpCanOptions options, const TimeSource& time);
+  ~UdpCanBus() override;
+
+  [[nodiscard]] Result<void> open(std::span<const std::uint32_t> ids) override;
+  void close() noexcept override;
+  [[nodiscard]] Result<std::size_t> read(std::span<ReceivedFrame> out,
+                                         std::chrono::nanoseconds wall) override;
+  [[nodiscard]] Result<void> send(std::span<const can::CanFrame> frames) override;
+  [[nodiscard]] CanBusCounters counters() const noexcept override;
+  [[nodiscard]] std::string name() const override;
+
+  /// The port bound to; 0 while closed.
+  [[nodiscard]] std::uint16_t local_port() const noexcept { return bound_port_; }
+
+ private:
+  [[nodiscard]] Result<bool> receive_datagram();
+  std::size_t take_frames(std::span<ReceivedFrame> out);
+  [[nodiscard]] Result<void> send_datagram(std::span<const std::byte> datagram);
+
+  UdpCanOptions options_;
+  const TimeSource& time_;
+  int fd_ = -1;
+  std::uint16_t bound_port_ = 0;
+  std::bitset<can::CanFrame::kStandardMask + 1> wanted_;
+  KernelStampMap stamps_;
+  can::SequenceGaps gaps_;
+  std::uint64_t refused_ = 0;
+  std::uint8_t sequence_ = 0;
+  std::optional<can::DatagramView> rest_;  ///< of the datagram in `buffer_`, not yet taken
+  protocol::HostTime rest_time_{};
+  std::array<std::byte, 65536> buffer_{};
+};
+
+}  // namespace abbe::drivers

@@ -1,0 +1,184 @@
+#include "abbe/drivers/can/encoder_device.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <thread>
+
+namespace abbe::drivers {
+
+using protocol::HostTime;
+using protocol::RawBlock;
+
+namespace {
+/// No node heard for so long: not "configuring" any more but "silent".
+constexpr std::chrono::seconds kSilentAfter{1};
+}  // namespace
+
+Result<std::unique_ptr<EncoderDevice>> EncoderDevice::create(const EncoderDeviceOptions& options,
+                                                             std::unique_ptr<CanBus> bus,
+                                                             const TimeSource& time) {
+  if (auto ok = check(options.receiver); !ok) return tl::unexpected(ok.error());
+  return std::unique_ptr<EncoderDevice>(new EncoderDevice(options, std::move(bus), time));
+}
+
+EncoderDevice::EncoderDevice(const EncoderDeviceOptions& options, std::unique_ptr<CanBus> bus,
+                             const TimeSource& time)
+    : options_(options),
+      bus_(std::move(bus)),
+      time_(time),
+      samples_(options.sample_capacity),
+      raw_(options.raw_capacity_blocks),
+      receiver_(options.receiver),
+      supervisor_(options.receiver.axes, options.supervisor) {
+  board_.set_state("closed");
+}
+
+DeviceStatus EncoderDevice::status() const {
+  return board_.read(options_.name, samples_.dropped(), raw_.dropped());
+}
+
+void EncoderDevice::wait(std::chrono::nanoseconds at_most) {
+  batch_count_ = 0;
+  turn_end_ = time_.now();
+  if (!ensure_open(at_most)) return;
+  follow_bus_off(turn_end_);
+  send_sync();
+  if (!receiver_.bus_off()) {
+    supervisor_.on_time(time_.now());
+    send_configuration();
+  }
+  if (open_) read_batch(time_.now(), at_most);
+  account(turn_end_);
+  show_state(turn_end_);
+}
+
+bool EncoderDevice::ensure_open(std::chrono::nanoseconds at_most) {
+  if (open_) return true;
+  const auto now = time_.now();
+  if (now < reopen_at_) {
+    std::this_thread::sleep_for(time_.wall(std::min(at_most, std::chrono::nanoseconds{reopen_at_ - now})));
+    return false;
+  }
+  if (const auto opened = bus_->open(supervisor_.ids()); !opened) {
+    close_bus(opened.error());
+    return false;
+  }
+  open_ = true;
+  supervisor_.start(now);
+  return true;
+}
+
+void EncoderDevice::close_bus(const Error& error) {
+  const auto now = time_.now();
+  board_.fault(now, error.text);
+  bus_->close();
+  open_ = false;
+  next_sync_.reset();
+  reopen_at_ = now + options_.reopen_after;
+  board_.set_connected(false);
+  board_.set_state("closed");
+}
+
+void EncoderDevice::follow_bus_off(HostTime now) {
+  if (receiver_.bus_off() == bus_was_off_) return;
+  bus_was_off_ = receiver_.bus_off();
+  next_sync_.reset();
+  if (bus_was_off_) {
+    board_.fault(now, fmt::format("CAN {}: bus off", bus_->name()));
+  } else {
+    supervisor_.bus_recovered(now);
+  }
+}
+
+bool EncoderDevice::syncing() const {
+  return !receiver_.bus_off() && supervisor_.ready() > 0;
+}
+
+void EncoderDevice::send_sync() {
+  if (!syncing()) {
+    next_sync_.reset();
+    return;
+  }
+  const auto now = time_.now();
+  if (!next_sync_) next_sync_ = now;
+  if (now < *next_sync_) return;
+  const auto period = options_.receiver.sync_period;
+  *next_sync_ +=
+      period * ((now - *next_sync_) / period + 1);  // on the grid; the receiver counts what was left out
+  (void)send(can::encode_sync());
+}
+
+void EncoderDevice::send_configuration() {
+  while (open_) {
+    const auto frame = supervisor_.take_frame();
+    if (!frame || !send(*frame)) return;
+  }
+}
+
+bool EncoderDevice::send(const can::CanFrame& frame) {
+  const auto at = time_.now();  // before: no answer can be older than its question
+  if (const auto sent = bus_->send({&frame, 1}); !sent) {
+    if (sent.error().code != ErrorCode::Unreachable) {
+      close_bus(sent.error());
+    } else if (!unreachable_) {
+      unreachable_ = true;
+      board_.fault(at, sent.error().text);
+    }
+    return false;
+  }
+  record(at, RawBlock::Direction::ToDevice, {&frame, 1});
+  push(receiver_.on_sent(frame, at));
+  return true;
+}
+
+void EncoderDevice::read_batch(HostTime now, std::chrono::nanoseconds at_most) {
+  auto until = std::min(now + at_most, receiver_.deadline());
+  until = std::min(until, next_sync_.value_or(until));
+  if (!receiver_.bus_off()) until = std::min(until, supervisor_.deadline());
+  const auto budget = std::max(until - now, std::chrono::nanoseconds{0});
+  const auto read = bus_->read(batch_, time_.wall(budget));
+  turn_end_ = time_.now();
+  if (!read) {
+    if (read.error().code != ErrorCode::Unreachable) return close_bus(read.error());
+    if (!unreachable_) board_.fault(turn_end_, read.error().text);
+    unreachable_ = true;
+    return;
+  }
+  batch_count_ = *read;
+  for (const auto& received : std::span{batch_}.first(batch_count_)) {
+    if (received.frame.is(can::FrameFlag::Error)) continue;
+    unreachable_ = false;
+    last_heard_ = turn_end_;
+    supervisor_.on_frame(received.frame, turn_end_);
+  }
+}
+
+void EncoderDevice::account(HostTime now) {
+  while (const auto text = supervisor_.take_fault()) board_.fault(now, *text);
+  const auto bus = bus_->counters();
+  const auto missed = receiver_.counters().missed_syncs;
+  board_.gaps.add(bus.lost - bus_seen_.lost + missed - missed_seen_);
+  board_.time_widened.add(bus.time_widened - bus_seen_.time_widened);
+  if (bus.refused != bus_seen_.refused) {
+    board_.faults.add(bus.refused - bus_seen_.refused - 1);
+    board_.fault(now, fmt::format("CAN {}: read: {} datagrams that are no CAN frames", bus_->name(),
+                                  bus.refused - bus_seen_.refused));
+  }
+  bus_seen_ = bus;
+  missed_seen_ = missed;
+}
+
+void EncoderDevice::show_state(HostTime now) {
+  if (!open_) return;
+  const auto ready = supervisor_.ready();
+  const bool heard = last_heard_ != HostTime{} && now - last_heard_ < kSilentAfter;
+  board_.set_connected(heard && !receiver_.bus_off());
+  board_.set_state(receiver_.bus_off()                  ? "bus off"
+                   : ready == supervisor_.nodes()       ? "streaming"
+                   : ready > 0                          ? "degraded"
+                   : heard || last_heard_ == HostTime{} ? "configuring"
+                                                        : "silent");
+}
+
+}  // namespace abbe::drivers

@@ -1,0 +1,188 @@
+#include "abbe/drivers/can/encoder_supervisor.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+
+namespace abbe::drivers {
+
+using can::ConfigurationFault;
+using protocol::HostTime;
+
+namespace {
+
+/// A node that boots twice within this is not configured twice: it would answer a storm with a storm.
+constexpr std::chrono::milliseconds kBetweenStarts{50};
+/// A heartbeat from before the NMT start may still be on its way: believe the second one.
+constexpr unsigned kIdleBeats = 2;
+
+can::EncoderPlan plan_of(const EncoderAxis& axis, std::uint16_t heartbeat_ms) {
+  can::EncoderPlan plan;
+  plan.node = axis.node;
+  plan.position = axis.position;
+  plan.tpdo = axis.tpdo;
+  plan.heartbeat_ms = heartbeat_ms;
+  plan.serial = axis.serial;
+  plan.linear = axis.kind == AxisKind::Linear;
+  plan.needs_scale = !axis.scale.has_value();
+  return plan;
+}
+
+std::string describe(const EncoderAxis& axis, const can::ConfigurationError& error) {
+  auto text = fmt::format("encoder {} (node {}): configure {:04X}h:{:02X}: {}", axis.name, axis.node,
+                          error.object.index, error.object.sub, to_text(error.fault));
+  if (error.fault == ConfigurationFault::Refused) {
+    text += fmt::format(": {} ({:08X}h)", to_text(error.abort_code),
+                        static_cast<std::uint32_t>(error.abort_code));
+  } else if (error.seen != 0) {
+    text += fmt::format(": {:08X}h", error.seen);
+  }
+  return text;
+}
+
+}  // namespace
+
+EncoderSupervisor::EncoderSupervisor(std::span<const EncoderAxis> axes, const SupervisorOptions& options)
+    : options_(options) {
+  for (const auto& axis : axes) {
+    nodes_.push_back({axis, can::EncoderConfigurator{plan_of(axis, options.heartbeat_ms), options.sdo}});
+  }
+}
+
+std::vector<std::uint32_t> EncoderSupervisor::ids() const {
+  std::vector<std::uint32_t> ids;
+  for (const auto& node : nodes_) {
+    ids.push_back(can::cob::kEmergency + node.axis.node);
+    ids.push_back(can::cob::tpdo(node.axis.tpdo, node.axis.node));
+    ids.push_back(can::cob::kSdoResponse + node.axis.node);
+    ids.push_back(can::cob::kHeartbeat + node.axis.node);
+  }
+  return ids;
+}
+
+bool EncoderSupervisor::is_from(const Node& node, const can::CanFrame& frame) {
+  const auto id = node.axis.node;
+  return frame.is_standard_data() &&
+         (frame.id == can::cob::tpdo(node.axis.tpdo, id) || frame.id == can::cob::kHeartbeat + id ||
+          frame.id == can::cob::kSdoResponse + id || frame.id == can::cob::kEmergency + id);
+}
+
+void EncoderSupervisor::start(HostTime now) {
+  for (auto& node : nodes_) configure(node, now);
+}
+
+void EncoderSupervisor::bus_recovered(HostTime now) {
+  broadcasts_.push_back(can::encode_nmt(can::NmtCommand::ResetCommunication, can::kAllNodes));
+  for (auto& node : nodes_) {
+    node.state = State::Waiting;  // the boot-up message starts it, or this time-out
+    node.retry_at = now + options_.sdo.timeout;
+  }
+}
+
+void EncoderSupervisor::configure(Node& node, HostTime now) {
+  node.state = State::Configuring;
+  node.started = now;
+  node.idle_beats = 0;
+  node.configurator.start(now);
+}
+
+void EncoderSupervisor::on_frame(const can::CanFrame& frame, HostTime now) {
+  for (auto& node : nodes_) {
+    if (!is_from(node, frame)) continue;
+    node.heard = now;
+    if (const auto heartbeat = can::decode_heartbeat(frame)) {
+      on_heartbeat(node, heartbeat->state, now);
+    } else if (node.state == State::Waiting && node.told == ConfigurationFault::Silent) {
+      configure(node, now);  // it is back
+    }
+    if (node.state != State::Configuring) continue;
+    node.configurator.on_frame(frame, now);
+    follow(node, now);
+  }
+}
+
+void EncoderSupervisor::on_heartbeat(Node& node, can::NodeState state, HostTime now) {
+  if (state == can::NodeState::BootUp) {
+    if (node.state != State::Configuring || now - node.started >= kBetweenStarts) configure(node, now);
+    return;
+  }
+  if (node.state == State::Waiting && node.told == ConfigurationFault::Silent) return configure(node, now);
+  node.idle_beats = state == can::NodeState::Operational ? 0 : node.idle_beats + 1;
+  if (node.state == State::Ready && node.idle_beats >= kIdleBeats) configure(node, now);
+}
+
+void EncoderSupervisor::on_time(HostTime now) {
+  for (auto& node : nodes_) {
+    switch (node.state) {
+      case State::Waiting:
+        if (now >= node.retry_at) configure(node, now);
+        break;
+      case State::Configuring:
+        node.configurator.on_time(now);
+        follow(node, now);
+        break;
+      case State::Ready:
+        if (now - node.heard < options_.silence) break;
+        tell(node, ConfigurationFault::Silent,
+             fmt::format("encoder {} (node {}): listen: silent for {} ms", node.axis.name, node.axis.node,
+                         std::chrono::duration_cast<std::chrono::milliseconds>(options_.silence).count()));
+        configure(node, now);
+        break;
+    }
+  }
+}
+
+void EncoderSupervisor::follow(Node& node, HostTime now) {
+  if (node.configurator.state() == can::EncoderConfigurator::State::Ready) {
+    node.state = State::Ready;
+    node.heard = now;
+    node.told = ConfigurationFault::None;
+  } else if (node.configurator.state() == can::EncoderConfigurator::State::Failed) {
+    node.state = State::Waiting;
+    node.retry_at = now + options_.retry_after;
+    const auto& error = node.configurator.error();
+    tell(node, error.fault, describe(node.axis, error));
+  }
+}
+
+void EncoderSupervisor::tell(Node& node, ConfigurationFault fault, std::string text) {
+  if (node.told != fault) faults_.push_back(std::move(text));
+  node.told = fault;
+}
+
+std::optional<can::CanFrame> EncoderSupervisor::take_frame() {
+  if (!broadcasts_.empty()) {
+    const auto frame = broadcasts_.front();
+    broadcasts_.erase(broadcasts_.begin());
+    return frame;
+  }
+  for (auto& node : nodes_) {
+    if (const auto frame = node.configurator.take_frame()) return frame;
+  }
+  return std::nullopt;
+}
+
+std::optional<std::string> EncoderSupervisor::take_fault() {
+  if (faults_.empty()) return std::nullopt;
+  auto text = std::move(faults_.front());
+  faults_.erase(faults_.begin());
+  return text;
+}
+
+HostTime EncoderSupervisor::deadline() const {
+  auto earliest = HostTime::max();
+  for (const auto& node : nodes_) {
+    const auto due = node.state == State::Waiting       ? node.retry_at
+                     : node.state == State::Configuring ? node.configurator.deadline()
+                                                        : node.heard + options_.silence;
+    earliest = std::min(earliest, due);
+  }
+  return earliest;
+}
+
+std::size_t EncoderSupervisor::ready() const {
+  const auto is_ready = [](const Node& node) { return node.state == State::Ready; };
+  return static_cast<std::size_t>(std::count_if(nodes_.begin(), nodes_.end(), is_ready));
+}
+
+}  // namespace abbe::drivers

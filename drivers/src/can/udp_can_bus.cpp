@@ -1,0 +1,160 @@
+#include "abbe/drivers/can/udp_can_bus.hpp"
+
+#include <arpa/inet.h>
+#include <netinet/in.h>
+#include <unistd.h>
+
+#include "can/socket_io.hpp"
+
+namespace abbe::drivers {
+
+namespace {
+
+/// Room in an Ethernet frame: a larger datagram would be cut into IP fragments, each of which can be lost.
+constexpr std::size_t kDatagramBytes = 1472;
+
+std::optional<sockaddr_in> address_of(const std::string& text, std::uint16_t port) {
+  sockaddr_in address{};
+  address.sin_family = AF_INET;
+  address.sin_port = htons(port);
+  if (inet_pton(AF_INET, text.c_str(), &address.sin_addr) != 1) return std::nullopt;
+  return address;
+}
+
+}  // namespace
+
+UdpCanBus::UdpCanBus(UdpCanOptions options, const TimeSource& time)
+    : options_(std::move(options)), time_(time), stamps_(options_.speed) {}
+
+UdpCanBus::~UdpCanBus() {
+  close();
+}
+
+std::string UdpCanBus::name() const {
+  return fmt::format("udp {}:{}", options_.peer_address, options_.peer_port);
+}
+
+CanBusCounters UdpCanBus::counters() const noexcept {
+  return {gaps_.lost(), refused_, stamps_.widened()};
+}
+
+void UdpCanBus::close() noexcept {
+  if (fd_ >= 0) ::close(fd_);
+  fd_ = -1;
+  bound_port_ = 0;
+  rest_.reset();
+}
+
+Result<void> UdpCanBus::open(std::span<const std::uint32_t> ids) {
+  close();
+  gaps_.restart();
+  wanted_.reset();
+  for (const auto id : ids) wanted_.set(id & can::CanFrame::kStandardMask);
+  const auto local = address_of(options_.local_address, options_.local_port);
+  const auto peer = address_of(options_.peer_address, options_.peer_port);
+  if (!local || !peer || options_.peer_port == 0) {
+    return tl::unexpected(Error{ErrorCode::BadConfiguration,
+                                fmt::format("CAN {}: not two IPv4 addresses with a peer port", name())});
+  }
+  fd_ = socket(AF_INET, SOCK_DGRAM | SOCK_NONBLOCK | SOCK_CLOEXEC, 0);
+  if (fd_ < 0) return socket_error(ErrorCode::SystemRefused, name(), "socket", errno);
+  enable_stamps(fd_);
+  const auto* local_any = reinterpret_cast<const sockaddr*>(&*local);  // NOLINT: the sockets interface
+  if (bind(fd_, local_any, sizeof *local) != 0) {
+    const auto error = errno;
+    close();
+    const auto what = fmt::format("bind {}:{}", options_.local_address, options_.local_port);
+    return socket_error(ErrorCode::SystemRefused, name(), what, error);
+  }
+  // Connected: only the peer's datagrams come in, and nobody listening there shows as an error.
+  const auto* peer_any = reinterpret_cast<const sockaddr*>(&*peer);  // NOLINT: the sockets interface
+  if (connect(fd_, peer_any, sizeof *peer) != 0) {
+    const auto error = errno;
+    close();
+    return socket_error(ErrorCode::SystemRefused, name(), "connect", error);
+  }
+  sockaddr_in bound{};
+  socklen_t length = sizeof bound;
+  getsockname(fd_, reinterpret_cast<sockaddr*>(&bound), &length);  // NOLINT: the sockets interface
+  bound_port_ = ntohs(bound.sin_port);
+  return {};
+}
+
+Result<std::size_t> UdpCanBus::read(std::span<ReceivedFrame> out, std::chrono::nanoseconds wall) {
+  auto count = take_frames(out);
+  if (count == 0) wait_readable(fd_, wall);
+  while (count < out.size()) {
+    const auto received = receive_datagram();
+    if (!received && count == 0) return tl::unexpected(received.error());
+    if (!received || !*received) break;
+    count += take_frames(out.subspan(count));
+  }
+  return count;
+}
+
+/// The next datagram into the buffer; false when there is none. One that is no CAN datagram is counted and
+/// skipped.
+Result<bool> UdpCanBus::receive_datagram() {
+  for (unsigned skipped = 0; skipped < 64; ++skipped) {  // a flood of garbage must not keep us here
+    iovec io{buffer_.data(), buffer_.size()};
+    alignas(cmsghdr) std::array<char, 256> control{};
+    msghdr message{};
+    message.msg_iov = &io;
+    message.msg_iovlen = 1;
+    message.msg_control = control.data();
+    message.msg_controllen = control.size();
+    const auto size = recvmsg(fd_, &message, MSG_DONTWAIT);
+    if (size < 0) {
+      if (errno == EAGAIN || errno == EWOULDBLOCK || errno == EINTR) return false;
+      const auto code = errno == ECONNREFUSED ? ErrorCode::Unreachable : ErrorCode::SystemRefused;
+      return socket_error(code, name(), "receive", errno);
+    }
+    const auto now = time_.now();
+    rest_time_ = options_.speed > 0.0 ? stamps_.arrival(stamp_of(message), read_clock_pair(), now).time : now;
+    auto view = can::DatagramView::parse(std::span{buffer_}.first(static_cast<std::size_t>(size)));
+    if (view) {
+      gaps_.on_sequence(view->sequence());
+      rest_ = *view;
+      return true;
+    }
+    ++refused_;
+  }
+  return false;
+}
+
+std::size_t UdpCanBus::take_frames(std::span<ReceivedFrame> out) {
+  std::size_t count = 0;
+  if (!rest_) return 0;
+  while (count < out.size()) {
+    auto& slot = out[count];
+    if (!rest_->next(slot.frame)) {
+      rest_.reset();
+      break;
+    }
+    slot.time = rest_time_;
+    const bool wanted = slot.frame.is_standard_data() && wanted_.test(slot.frame.id);
+    if (wanted || slot.frame.is(can::FrameFlag::Error)) ++count;
+  }
+  return count;
+}
+
+Result<void> UdpCanBus::send(std::span<const can::CanFrame> frames) {
+  std::array<std::byte, kDatagramBytes> buffer;  // NOLINT: filled by the writer
+  while (!frames.empty()) {
+    can::DatagramWriter writer{buffer, sequence_++};
+    std::size_t n = 0;
+    while (n < frames.size() && writer.add(frames[n])) ++n;
+    if (auto sent = send_datagram(writer.finish()); !sent) return sent;
+    frames = frames.subspan(n);
+  }
+  return {};
+}
+
+Result<void> UdpCanBus::send_datagram(std::span<const std::byte> datagram) {
+  if (::send(fd_, datagram.data(), datagram.size(), MSG_DONTWAIT | MSG_NOSIGNAL) >= 0) return {};
+  const bool passing = errno == ECONNREFUSED || errno == EAGAIN || errno == ENOBUFS || errno == ENETUNREACH ||
+                       errno == EHOSTUNREACH;
+  return socket_error(passing ? ErrorCode::Unreachable : ErrorCode::SystemRefused, name(), "send", errno);
+}
+
+}  // namespace abbe::drivers

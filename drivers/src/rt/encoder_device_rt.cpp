@@ -1,0 +1,49 @@
+// The real-time half of the encoder device: what wait() read becomes samples. The other half is
+// can/encoder_device.cpp.
+
+#include "abbe/drivers/can/encoder_device.hpp"
+
+namespace abbe::drivers {
+
+using protocol::HostTime;
+using protocol::RawBlock;
+
+void EncoderDevice::receive() ABBE_RT {
+  const auto frames = std::span<const ReceivedFrame>{batch_}.first(batch_count_);
+  record_frames(frames);
+  for (const auto& received : frames) push(receiver_.on_frame(received.frame, received.time));
+  // A full batch may have more behind it: only a read that found the end says that nothing else came.
+  const bool all_read = batch_count_ < batch_.size();
+  batch_count_ = 0;
+  if (!all_read || turn_end_ < receiver_.deadline()) return;
+  (void)raw_.push_bytes(turn_end_, RawBlock::Direction::FromDevice, {});
+  push(receiver_.on_time(turn_end_));
+}
+
+/// One block for each run of frames with one time.
+void EncoderDevice::record_frames(std::span<const ReceivedFrame> frames) ABBE_RT {
+  std::size_t i = 0;
+  while (i < frames.size()) {
+    can::DatagramWriter writer{datagram_, raw_sequence_++};
+    const auto time = frames[i].time;
+    while (i < frames.size() && frames[i].time == time && writer.add(frames[i].frame)) ++i;
+    (void)raw_.push_bytes(time, RawBlock::Direction::FromDevice, writer.finish());
+  }
+}
+
+void EncoderDevice::record(HostTime time, RawBlock::Direction direction,
+                           std::span<const can::CanFrame> frames) ABBE_RT {
+  can::DatagramWriter writer{datagram_, raw_sequence_++};
+  for (const auto& frame : frames) (void)writer.add(frame);
+  (void)raw_.push_bytes(time, direction, writer.finish());
+}
+
+void EncoderDevice::push(std::span<const protocol::AxisSample> samples) ABBE_RT {
+  for (const auto& sample : samples) {
+    (void)samples_.try_push(sample);
+    board_.samples.add();
+    board_.set_last_sample(sample.head.time);
+  }
+}
+
+}  // namespace abbe::drivers

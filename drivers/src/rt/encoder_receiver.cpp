@@ -1,0 +1,291 @@
+#include "abbe/drivers/can/encoder_receiver.hpp"
+
+#include <cmath>
+#include <limits>
+#include <numbers>
+
+#include "abbe/protocol/can/cia406.hpp"
+#include "abbe/protocol/can/error_frame.hpp"
+
+namespace abbe::drivers {
+
+using protocol::AxisSample;
+using protocol::HostTime;
+using protocol::SampleFlag;
+
+namespace {
+
+constexpr std::uint64_t kModulus32 = std::uint64_t{1} << 32;
+constexpr double kMetresPerNanometre = 1e-9;
+/// What two readings of two clocks may disagree by, as a part of the period: a stamp this little before the
+/// SYNC is not before it.
+constexpr int kStampSlackParts = 50;
+
+/// `count` on a circle of `modulus` counts; 0 stands for 2^64.
+std::uint64_t on_circle(std::int64_t count, std::uint64_t modulus) ABBE_RT {
+  if (modulus == 0) return static_cast<std::uint64_t>(count);
+  const auto m = static_cast<std::int64_t>(modulus);  // check() keeps it below 2^63
+  return static_cast<std::uint64_t>((count % m + m) % m);
+}
+
+/// The smallest step from `from` to `to`, both on the circle.
+std::int64_t wrapped_step(std::uint64_t from, std::uint64_t to, std::uint64_t modulus) ABBE_RT {
+  if (modulus == 0) return static_cast<std::int64_t>(to - from);
+  const std::uint64_t ahead = to >= from ? to - from : to + modulus - from;
+  if (ahead < modulus - ahead) return static_cast<std::int64_t>(ahead);
+  return -static_cast<std::int64_t>(modulus - ahead);
+}
+
+}  // namespace
+
+EncoderReceiver::EncoderReceiver(const EncoderReceiverOptions& options)
+    : axis_count_(std::min(options.axes.size(), axes_.size())),
+      all_mask_(static_cast<std::uint8_t>((1u << axis_count_) - 1u)),
+      period_(options.sync_period),
+      answer_within_(options.answer_within.count() > 0 ? options.answer_within : options.sync_period * 4 / 5),
+      sampling_delay_(options.sampling_delay),
+      u_sampling_delay_(options.u_sampling_delay),
+      heartbeat_timeout_(options.heartbeat_timeout) {
+  for (std::size_t i = 0; i < axis_count_; ++i) {
+    const auto& from = options.axes[i];
+    auto& axis = axes_[i];
+    axis.node = from.node;
+    axis.kind = from.kind;
+    axis.type = from.position;
+    axis.tpdo_id = can::cob::tpdo(from.tpdo, from.node);
+    axis.scale_configured = from.scale.has_value();
+    axis.scale = from.scale.value_or(0.0);
+    axis.wrap_configured = from.wrap_counts != 0;
+    axis.modulus = from.wrap_counts;
+    if (!axis.wrap_configured && from.position != can::PositionType::Signed64) axis.modulus = kModulus32;
+  }
+  current_.axis_count = static_cast<std::uint8_t>(axis_count_);
+  current_.position.fill(std::numeric_limits<double>::quiet_NaN());
+  for (std::size_t i = axis_count_; i < current_.position.size(); ++i) current_.position[i] = 0.0;
+}
+
+std::optional<double> EncoderReceiver::scale(std::size_t axis) const ABBE_RT {
+  if (axis >= axis_count_ || axes_[axis].scale == 0.0) return std::nullopt;
+  return axes_[axis].scale;
+}
+
+HostTime EncoderReceiver::deadline() const ABBE_RT {
+  return open_ ? *sync_time_ + answer_within_ : HostTime::max();
+}
+
+EncoderReceiver::Samples EncoderReceiver::on_sent(const can::CanFrame& frame, HostTime time) ABBE_RT {
+  out_count_ = 0;
+  if (can::decode_sync(frame)) begin_cycle(time);
+  return done();
+}
+
+EncoderReceiver::Samples EncoderReceiver::on_time(HostTime now) ABBE_RT {
+  out_count_ = 0;
+  if (now >= deadline()) close_cycle();
+  return done();
+}
+
+EncoderReceiver::Samples EncoderReceiver::on_frame(const can::CanFrame& frame, HostTime time) ABBE_RT {
+  out_count_ = 0;
+  if (time >= deadline()) close_cycle();
+  if (frame.is(can::FrameFlag::Error)) {
+    on_bus_report(frame, time);
+  } else if (frame.is_standard_data()) {
+    for (std::size_t i = 0; i < axis_count_; ++i) {
+      if (frame.id == axes_[i].tpdo_id) {
+        on_position(i, frame, time);
+      } else {
+        on_node_frame(axes_[i], frame, time);
+      }
+    }
+  }
+  return done();
+}
+
+void EncoderReceiver::begin_cycle(HostTime time) ABBE_RT {
+  close_cycle();
+  if (sync_time_ && period_.count() > 0) {
+    const auto periods = (time - *sync_time_ + period_ / 2) / period_;
+    if (periods > 1) {
+      lost_pending_ += static_cast<std::uint32_t>(std::min<std::int64_t>(periods - 1, 0xFFFF));
+      counters_.missed_syncs += static_cast<std::uint64_t>(periods - 1);
+    }
+    ++cycle_;
+  }
+  sync_time_ = time;
+  received_mask_ = 0;
+  open_ = true;
+  check_heartbeats(time);
+}
+
+void EncoderReceiver::close_cycle() ABBE_RT {
+  if (open_) emit(*sync_time_ + sampling_delay_);
+}
+
+void EncoderReceiver::emit(HostTime time) ABBE_RT {
+  open_ = false;
+  auto known = std::uint8_t{0};
+  for (std::size_t i = 0; i < axis_count_; ++i) {
+    if (axes_[i].scale != 0.0) known = static_cast<std::uint8_t>(known | (1u << i));
+  }
+  const bool invalid = bus_off_;
+  const auto usable = invalid ? 0u : static_cast<unsigned>(received_mask_ & known);
+  const auto missing = static_cast<std::uint8_t>(all_mask_ & ~usable);
+  for (std::size_t i = 0; i < axis_count_; ++i) counters_.missing_answers += (missing >> i) & 1u;
+  current_.head.time = time;
+  current_.head.u_time = u_sampling_delay_;
+  current_.head.lost_before = lost_pending_;
+  current_.head.flags = take_flags(missing);
+  current_.cycle = cycle_;
+  current_.missing_mask = missing;
+  ++counters_.samples;
+  if (out_count_ < out_.size()) out_[out_count_++] = current_;
+}
+
+protocol::SampleFlags EncoderReceiver::take_flags(std::uint8_t missing) ABBE_RT {
+  protocol::SampleFlags flags = 0;
+  if (missing != 0) flags |= SampleFlag::AxisMissing;
+  if (lost_pending_ != 0) flags |= SampleFlag::GapBefore;
+  if (bus_error_pending_) flags |= SampleFlag::BusError;
+  if (bus_off_) flags |= SampleFlag::BusOff;
+  if (restarted_pending_ && missing != all_mask_) {
+    flags |= SampleFlag::Restarted;
+    restarted_pending_ = false;
+  }
+  for (std::size_t i = 0; i < axis_count_; ++i) {
+    if (axes_[i].emergency != 0 || axes_[i].heartbeat_lost) flags |= SampleFlag::DeviceError;
+  }
+  lost_pending_ = 0;
+  bus_error_pending_ = false;
+  return flags;
+}
+
+void EncoderReceiver::on_position(std::size_t i, const can::CanFrame& frame, HostTime time) ABBE_RT {
+  const auto count = can::decode_position(frame.payload(), axes_[i].type);
+  if (!count) {
+    ++counters_.short_frames;
+    return;
+  }
+  hear();
+  const auto bit = static_cast<std::uint8_t>(1u << i);
+  if (!open_) {
+    // After the last answer: its cycle had an older one. After the deadline: too late. Both leave the sample
+    // as it went.
+    ++((received_mask_ & bit) != 0 ? counters_.duplicate_frames : counters_.late_frames);
+    return;
+  }
+  if (time + period_ / kStampSlackParts < *sync_time_) {
+    ++counters_.late_frames;
+    return;
+  }
+  if ((received_mask_ & bit) != 0) ++counters_.duplicate_frames;
+  take_position(i, *count);
+  received_mask_ = static_cast<std::uint8_t>(received_mask_ | bit);
+  if (received_mask_ == all_mask_) close_cycle();
+}
+
+/// A node was heard: who receives is on the bus.
+void EncoderReceiver::hear() ABBE_RT {
+  if (!bus_off_) return;
+  bus_off_ = false;
+  restarted_pending_ = true;
+}
+
+void EncoderReceiver::take_position(std::size_t i, std::int64_t count) ABBE_RT {
+  auto& axis = axes_[i];
+  const auto raw = on_circle(count, axis.modulus);
+  // The first count is taken as the encoder means it (an absolute scale may be negative), later ones as steps
+  // from it.
+  if (axis.seen) {
+    const auto step = static_cast<std::uint64_t>(wrapped_step(axis.raw, raw, axis.modulus));
+    current_.count[i] = static_cast<std::int64_t>(static_cast<std::uint64_t>(current_.count[i]) + step);
+  } else {
+    current_.count[i] = count;
+  }
+  axis.raw = raw;
+  axis.seen = true;
+  if (axis.scale != 0.0) current_.position[i] = static_cast<double>(current_.count[i]) * axis.scale;
+}
+
+void EncoderReceiver::on_node_frame(Axis& axis, const can::CanFrame& frame, HostTime time) ABBE_RT {
+  if (frame.id == can::cob::kHeartbeat + axis.node) {
+    hear();
+    if (const auto heartbeat = can::decode_heartbeat(frame)) on_heartbeat(axis, heartbeat->state, time);
+  } else if (frame.id == can::cob::kEmergency + axis.node) {
+    if (const auto emergency = can::decode_emergency(frame)) {
+      axis.emergency = emergency->code;
+      if (emergency->code != 0) ++counters_.emergencies;
+    }
+  } else if (frame.id == can::cob::kSdoResponse + axis.node) {
+    on_sdo_answer(axis, frame);
+  }
+}
+
+void EncoderReceiver::on_heartbeat(Axis& axis, can::NodeState state, HostTime time) ABBE_RT {
+  axis.last_heartbeat = time;
+  axis.heartbeat_lost = false;
+  if (state != can::NodeState::BootUp) return;
+  axis.emergency = 0;
+  axis.last_heartbeat.reset();  // it beats again only once it is configured
+  if (axis.seen) restarted_pending_ = true;
+}
+
+void EncoderReceiver::check_heartbeats(HostTime time) ABBE_RT {
+  for (std::size_t i = 0; i < axis_count_; ++i) {
+    auto& axis = axes_[i];
+    if (!axis.last_heartbeat || axis.heartbeat_lost || time - *axis.last_heartbeat <= heartbeat_timeout_)
+      continue;
+    axis.heartbeat_lost = true;
+    ++counters_.heartbeat_losses;
+  }
+}
+
+void EncoderReceiver::on_bus_report(const can::CanFrame& frame, HostTime time) ABBE_RT {
+  const auto report = can::decode_error_frame(frame);
+  if (!report) return;
+  ++counters_.bus_reports;
+  using can::BusCondition;
+  if (report->conditions != static_cast<can::BusConditions>(BusCondition::Active)) bus_error_pending_ = true;
+  const bool back =
+      has(report->conditions, BusCondition::Restarted) || has(report->conditions, BusCondition::Active);
+  if (has(report->conditions, BusCondition::BusOff) && !bus_off_) {
+    bus_off_ = true;
+    const auto last = open_ ? *sync_time_ + sampling_delay_ : time;
+    emit(last);  // at once: nobody should go on trusting the previous one until a deadline
+  } else if (back && bus_off_) {
+    bus_off_ = false;
+    restarted_pending_ = true;
+  }
+}
+
+void EncoderReceiver::on_sdo_answer(Axis& axis, const can::CanFrame& frame) ABBE_RT {
+  // Expedited upload answer with its size: 4Fh, 4Bh, 47h, 43h for 1 to 4 bytes [CiA 301].
+  const auto command = frame.byte(0);
+  if (frame.length != 8 || (command & 0xF3) != 0x43) return;
+  const std::size_t bytes = 4u - ((command >> 2) & 3u);
+  std::uint32_t value = 0;
+  for (std::size_t i = 0; i < bytes; ++i) value |= std::uint32_t{frame.byte(4 + i)} << (8 * i);
+  const auto index = static_cast<std::uint16_t>(frame.byte(1) | (frame.byte(2) << 8));
+  learn(axis, {index, frame.byte(3)}, value);
+}
+
+void EncoderReceiver::learn(Axis& axis, can::ObjectId object, std::uint32_t value) ABBE_RT {
+  namespace obj = can::object;
+  const bool linear = axis.kind == AxisKind::Linear;
+  const bool step = linear && (object == obj::kPositionStep || object == obj::kMeasuringStep);
+  const bool turn = !linear && (object == obj::kUnitsPerRevolution || object == obj::kMeasuringStep);
+  if (step || turn) {
+    if (axis.scale_configured) return;
+    if (value == 0) {
+      ++counters_.scale_refusals;
+      axis.scale = 0.0;
+      return;
+    }
+    axis.scale = step ? kMetresPerNanometre * value : 2.0 * std::numbers::pi / value;
+  } else if (!linear && object == obj::kTotalRange && !axis.wrap_configured && value > 1) {
+    axis.modulus = value;
+    axis.raw %= value;
+  }
+}
+
+}  // namespace abbe::drivers

@@ -1,0 +1,259 @@
+#include "abbe/drivers/tracker/receiver.hpp"
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <numbers>
+
+namespace abbe::drivers {
+namespace {
+
+using protocol::SampleFlag;
+using protocol::TrackerPoint;
+
+constexpr double kMetresPerMillimetre = 1e-3;
+constexpr double kZeroCelsius_K = 273.15;
+constexpr double kPascalsPerMillibar = 100.0;
+constexpr double kPerPercent = 0.01;
+
+/// Points measured before a break may arrive after its report: the beam is back at the first point after a
+/// hole at least this long, or of three separations.
+constexpr std::chrono::milliseconds kShortestBreak{20};
+
+SampleFlag flag_of(emscon::PointStatus status) ABBE_RT {
+  switch (status) {
+    case emscon::PointStatus::Ok:
+      return SampleFlag::None;
+    case emscon::PointStatus::SpeedWarning:
+      return SampleFlag::SpeedWarning;
+    case emscon::PointStatus::SpeedExceeded:
+      return SampleFlag::SpeedExceeded;
+    case emscon::PointStatus::PrismError:
+    case emscon::PointStatus::TriggerTimeViolation:
+      break;
+  }
+  return SampleFlag::PointInvalid;  // and what is not known here is not to be trusted
+}
+
+bool finite(const std::array<double, 3>& v) ABBE_RT {
+  return std::isfinite(v[0]) && std::isfinite(v[1]) && std::isfinite(v[2]);
+}
+
+std::array<double, 3> metres(const std::array<double, 3>& mm) ABBE_RT {
+  return {kMetresPerMillimetre * mm[0], kMetresPerMillimetre * mm[1], kMetresPerMillimetre * mm[2]};
+}
+
+/// Bit for bit, so that a NaN from the device is not news every time.
+bool same(const emscon::Environment& a, const emscon::Environment& b) ABBE_RT {
+  const auto bits = [](double v) { return std::bit_cast<std::uint64_t>(v); };
+  return bits(a.temperature) == bits(b.temperature) && bits(a.pressure) == bits(b.pressure) &&
+         bits(a.humidity) == bits(b.humidity);
+}
+
+}  // namespace
+
+TrackerReceiver::TrackerReceiver(const TrackerReceiverOptions& options) noexcept
+    : options_(options), clock_(options.clock) {
+  framer_.resync();
+}
+
+void TrackerReceiver::push(std::span<const std::byte> bytes, protocol::HostTime arrival) ABBE_RT {
+  arrival_ = arrival;
+  if (bytes.empty()) {
+    connection_began();
+  } else if (!silenced_) {
+    framer_.push(bytes);
+  }
+}
+
+void TrackerReceiver::connection_began() ABBE_RT {
+  framer_.reset();
+  clock_.reset();
+  accepting_ = silenced_ = beam_lost_ = environment_known_ = false;
+  last_ = {};
+  weather_due_.reset();
+  pending_flags_ = static_cast<protocol::SampleFlags>(SampleFlag::Restarted);
+}
+
+void TrackerReceiver::bytes_lost() ABBE_RT {
+  framer_.reset();
+  framer_.resync();
+  silenced_ = false;
+  pending_flags_ |= SampleFlag::GapBefore;
+}
+
+std::optional<TrackerMessage> TrackerReceiver::next() ABBE_RT {
+  if (weather_due_) {
+    const TrackerMessage message = *weather_due_;
+    weather_due_.reset();
+    return message;
+  }
+  while (!silenced_) {
+    const auto packet = framer_.next();
+    if (!packet && framer_.broken()) return nonsense(std::nullopt, framer_.refused());
+    if (!packet) return std::nullopt;
+    if (const auto message = understand(*packet)) return message;
+  }
+  return std::nullopt;
+}
+
+std::optional<TrackerMessage> TrackerReceiver::understand(std::span<const std::byte> packet) ABBE_RT {
+  const auto decoded = emscon::decode(packet);
+  if (!decoded) return nonsense(decoded.error(), packet);
+  ++counters_.packets;
+  return std::visit([this](const auto& p) { return take(p); }, *decoded);
+}
+
+TrackerMessage TrackerReceiver::nonsense(std::optional<emscon::DecodeError> error,
+                                         std::span<const std::byte> bytes) ABBE_RT {
+  silenced_ = true;
+  ++counters_.nonsense;
+  TrackerNonsense n;
+  n.error = error;
+  n.length = std::min(bytes.size(), n.first_bytes.size());
+  std::copy_n(bytes.begin(), n.length, n.first_bytes.begin());
+  return n;
+}
+
+std::optional<TrackerMessage> TrackerReceiver::take(const emscon::Answer& answer) ABBE_RT {
+  if (emscon::command_of(answer) == emscon::Command::StartMeasurement &&
+      emscon::accepted(emscon::status_of(answer))) {
+    accepting_ = true;
+  }
+  return answer;
+}
+
+std::optional<TrackerMessage> TrackerReceiver::take(const emscon::ErrorResponse& error) ABBE_RT {
+  beam_lost();
+  return error;
+}
+
+std::optional<TrackerMessage> TrackerReceiver::take(const emscon::StatusChange& change) ABBE_RT {
+  if (change.event == emscon::Event::MeasurementNotReady) beam_lost();
+  return change;
+}
+
+/// The number of a broken beam is not public, so any unsolicited error while points come counts as one.
+void TrackerReceiver::beam_lost() ABBE_RT {
+  if (!last_.known || beam_lost_) return;
+  beam_lost_ = true;
+  ++counters_.beam_losses;
+}
+
+TrackerMessage TrackerReceiver::burst(std::size_t count) ABBE_RT {
+  counters_.points += count;
+  return TrackerBurst{std::span{points_}.first(count)};
+}
+
+/// A mean over [arrival - delay - T, arrival - delay]: the middle of it, rectangular ([GUM] 4.3.7) in both.
+std::optional<TrackerMessage> TrackerReceiver::take(const emscon::SingleResult& result) ABBE_RT {
+  if (!accepting_) {
+    ++counters_.points_refused;
+    return std::nullopt;
+  }
+  const auto delay = options_.clock.max_constant_delay;
+  const double u_ns =
+      std::hypot(static_cast<double>(options_.stationary_time.count()), static_cast<double>(delay.count())) /
+      (2.0 * std::numbers::sqrt3);
+  TrackerPoint& point = points_[0];
+  point = {};
+  point.head.time = arrival_ - (options_.stationary_time + delay) / 2;
+  point.head.u_time = std::chrono::nanoseconds{std::llround(u_ns)};
+  point.p_tracker_m = metres(result.value);
+  point.device_status = static_cast<std::int32_t>(result.status);
+  if (!emscon::accepted(result.status))
+    point.head.flags |= SampleFlag::DeviceError | SampleFlag::PointInvalid;
+  if (!finite(result.value)) point.head.flags |= SampleFlag::PointInvalid;
+  if (beam_lost_) point.head.flags |= SampleFlag::BeamReturned;
+  beam_lost_ = false;
+  mark_pending(point.head);
+  last_.known = true;
+  weather(result.environment, point.head);
+  return burst(1);
+}
+
+std::optional<TrackerMessage> TrackerReceiver::take(const emscon::MultiResult& result) ABBE_RT {
+  if (result.size() == 0) return std::nullopt;
+  if (!accepting_) {
+    counters_.points_refused += result.size();
+    return std::nullopt;
+  }
+  const auto newest = result.point(result.size() - 1).time.to_device_time();
+  if (clock_.observe(newest, arrival_) == ClockModel::Observed::Restarted) {
+    last_.known = false;
+    pending_flags_ |= SampleFlag::Restarted;
+  }
+  for (std::size_t k = 0; k < result.size(); ++k) convert(result.point(k), result.head().status, points_[k]);
+  weather(result.head().environment, points_[0].head);
+  return burst(result.size());
+}
+
+void TrackerReceiver::convert(const emscon::MultiPoint& from, emscon::Status status,
+                              TrackerPoint& to) ABBE_RT {
+  to = {};
+  to.device_time = from.time.to_device_time();
+  to.p_tracker_m = metres(from.value);
+  to.device_status = static_cast<std::int32_t>(from.status);
+  const HostInstant instant = clock_.to_host(to.device_time);
+  to.head.time = instant.time;
+  to.head.u_time = instant.u_time;
+  to.head.flags |= flag_of(from.status);
+  if (!instant.settled) to.head.flags |= SampleFlag::ClockUnsettled;
+  if (!finite(from.value)) to.head.flags |= SampleFlag::PointInvalid;
+  if (!emscon::accepted(status)) to.head.flags |= SampleFlag::DeviceError | SampleFlag::PointInvalid;
+  follow(to);
+  mark_pending(to.head);
+}
+
+/// Compares with the point before: the device's clock must go on, and holes in it are lost points or a lost
+/// beam.
+void TrackerReceiver::follow(TrackerPoint& point) ABBE_RT {
+  if (!last_.known) {
+    last_ = {point.device_time, true};
+    return;
+  }
+  const auto since_last = point.device_time - last_.device_time;
+  if (since_last <= std::chrono::nanoseconds{0}) {
+    ++counters_.time_disorder;
+    point.head.flags |= SampleFlag::PointInvalid;
+    return;
+  }
+  mark_hole(since_last, point);
+  last_.device_time = point.device_time;
+}
+
+void TrackerReceiver::mark_hole(std::chrono::nanoseconds since_last, TrackerPoint& point) ABBE_RT {
+  const auto separation = options_.time_separation;
+  if (beam_lost_ && since_last >= std::max<std::chrono::nanoseconds>(kShortestBreak, 3 * separation)) {
+    beam_lost_ = false;
+    point.head.flags |= SampleFlag::BeamReturned;
+    return;
+  }
+  if (separation.count() == 0 || 2 * since_last <= 3 * separation) return;
+  ++counters_.gaps;
+  point.head.flags |= SampleFlag::GapBefore;
+  point.head.lost_before = static_cast<std::uint32_t>(
+      std::min<std::int64_t>((since_last + separation / 2) / separation - 1, INT32_MAX));
+}
+
+void TrackerReceiver::mark_pending(protocol::SampleHead& head) ABBE_RT {
+  head.flags |= pending_flags_;
+  pending_flags_ = 0;
+}
+
+void TrackerReceiver::weather(const emscon::Environment& environment,
+                              const protocol::SampleHead& head) ABBE_RT {
+  if (environment_known_ && same(environment, environment_)) return;
+  environment_ = environment;
+  environment_known_ = true;
+  protocol::EnvironmentSample sample;
+  sample.head.time = head.time;
+  sample.head.u_time = head.u_time;
+  sample.head.flags = head.flags & static_cast<protocol::SampleFlags>(SampleFlag::ClockUnsettled);
+  sample.air_temperature_K = environment.temperature + kZeroCelsius_K;
+  sample.air_pressure_Pa = environment.pressure * kPascalsPerMillibar;
+  sample.relative_humidity = environment.humidity * kPerPercent;
+  weather_due_ = sample;
+}
+
+}  // namespace abbe::drivers

@@ -1,0 +1,365 @@
+#include <gtest/gtest.h>
+
+#include <array>
+#include <cmath>
+#include <numbers>
+#include <vector>
+
+#include "abbe/drivers/can/encoder_receiver.hpp"
+#include "abbe/protocol/can/error_frame.hpp"
+
+namespace abbe::drivers {
+namespace {
+
+using namespace std::chrono_literals;
+using can::BusCondition;
+using protocol::AxisSample;
+using protocol::HostTime;
+using protocol::SampleFlag;
+
+constexpr HostTime kStart{1h};
+constexpr std::array<can::NodeId, 3> kNodes{1, 2, 3};
+
+EncoderReceiverOptions three_axes(std::optional<double> scale = 1e-8) {
+  EncoderReceiverOptions options;
+  for (const can::NodeId node : kNodes) {
+    options.axes.push_back({.name = "XYZ" + std::to_string(node), .node = node, .scale = scale});
+  }
+  return options;
+}
+can::CanFrame position(can::NodeId node, std::int64_t count) {
+  return can::encode_position(can::cob::tpdo(1, node), can::PositionType::Signed32, count);
+}
+can::CanFrame bus_report(BusCondition condition) {
+  return can::encode_error_frame({.conditions = static_cast<can::BusConditions>(condition)});
+}
+
+/// A receiver with a script of events; all samples are kept.
+struct Line {
+  explicit Line(const EncoderReceiverOptions& options = three_axes()) : receiver(options) {}
+
+  void keep(std::span<const AxisSample> s) { samples.insert(samples.end(), s.begin(), s.end()); }
+  void sync(HostTime t) { keep(receiver.on_sent(can::encode_sync(), t)); }
+  void frame(const can::CanFrame& f, HostTime t) { keep(receiver.on_frame(f, t)); }
+  void time(HostTime t) { keep(receiver.on_time(t)); }
+  /// A whole cycle in which the axes answer `count`, + 1, + 2.
+  void cycle(HostTime t, std::int64_t count) {
+    sync(t);
+    for (const can::NodeId node : kNodes) frame(position(node, count + node - 1), t + 100us * node);
+  }
+
+  EncoderReceiver receiver;
+  std::vector<AxisSample> samples;
+};
+
+TEST(EncoderReceiver, DatesAllAxesByTheSync) {
+  auto options = three_axes();
+  options.sampling_delay = 7us;
+  Line line{options};
+  line.cycle(kStart, 1000);
+  ASSERT_EQ(line.samples.size(), 1u);
+  EXPECT_EQ(line.samples[0].head.time, kStart + 7us);
+  EXPECT_EQ(line.samples[0].head.u_time, options.u_sampling_delay);
+  EXPECT_EQ(line.samples[0].head.flags, 0u);
+  EXPECT_EQ(line.samples[0].axis_count, 3);
+  EXPECT_EQ(line.samples[0].missing_mask, 0);
+}
+
+TEST(EncoderReceiver, ConvertsCountsByTheScaleOfEachAxis) {
+  auto options = three_axes();
+  options.axes[1].scale = -2e-9;
+  Line line{options};
+  line.cycle(kStart, 1000);
+  EXPECT_DOUBLE_EQ(line.samples.at(0).position[0], 1000 * 1e-8);
+  EXPECT_DOUBLE_EQ(line.samples.at(0).position[1], 1001 * -2e-9);
+  EXPECT_EQ(line.samples.at(0).count[2], 1002);
+}
+
+TEST(EncoderReceiver, GivesTheSampleWithTheLastAnswerAndNotBefore) {
+  Line line;
+  line.sync(kStart);
+  line.frame(position(3, 3), kStart + 100us);
+  line.frame(position(1, 1), kStart + 200us);
+  EXPECT_TRUE(line.samples.empty());
+  line.frame(position(2, 2), kStart + 300us);
+  EXPECT_EQ(line.samples.size(), 1u);
+  EXPECT_EQ(line.receiver.deadline(), HostTime::max());
+}
+
+TEST(EncoderReceiver, FlagsAMissingAxisAtTheDeadlineAndKeepsItsValue) {
+  Line line;
+  line.cycle(kStart, 1000);
+  line.sync(kStart + 1ms);
+  line.frame(position(1, 2000), kStart + 1100us);
+  line.frame(position(3, 2002), kStart + 1200us);
+  line.time(kStart + 1799us);
+  EXPECT_EQ(line.samples.size(), 1u);
+  line.time(kStart + 1800us);
+  ASSERT_EQ(line.samples.size(), 2u);
+  EXPECT_EQ(line.samples[1].missing_mask, 0b010);
+  EXPECT_TRUE(has(line.samples[1].head.flags, SampleFlag::AxisMissing));
+  EXPECT_EQ(line.samples[1].count[1], 1001);
+  EXPECT_EQ(line.samples[1].count[2], 2002);
+  EXPECT_EQ(line.receiver.counters().missing_answers, 1u);
+}
+
+TEST(EncoderReceiver, ClosesAnOpenCycleWithTheNextSync) {
+  Line line;
+  line.sync(kStart);
+  line.sync(kStart + 1ms);
+  ASSERT_EQ(line.samples.size(), 1u);
+  EXPECT_EQ(line.samples[0].head.time, kStart);
+  EXPECT_EQ(line.samples[0].missing_mask, 0b111);
+}
+
+TEST(EncoderReceiver, AFrameAfterTheDeadlineClosesTheCycleAndIsNotUsed) {
+  Line line;
+  line.cycle(kStart, 1000);
+  line.sync(kStart + 1ms);
+  line.frame(position(1, 5000), kStart + 1ms + 800us);
+  ASSERT_EQ(line.samples.size(), 2u);
+  EXPECT_EQ(line.samples[1].missing_mask, 0b111);
+  EXPECT_EQ(line.samples[1].count[0], 1000);
+  EXPECT_EQ(line.receiver.counters().late_frames, 1u);
+}
+
+TEST(EncoderReceiver, AnAxisNeverHeardHasNoPosition) {
+  Line line;
+  line.sync(kStart);
+  line.frame(position(1, 7), kStart + 100us);
+  line.time(kStart + 900us);
+  ASSERT_EQ(line.samples.size(), 1u);
+  EXPECT_FALSE(std::isnan(line.samples[0].position[0]));
+  EXPECT_TRUE(std::isnan(line.samples[0].position[1]));
+}
+
+TEST(EncoderReceiver, AnAnswerStampedBeforeTheSyncIsNotItsAnswer) {
+  Line line;
+  line.sync(kStart);
+  line.frame(position(1, 7), kStart - 100us);
+  line.time(kStart + 900us);
+  EXPECT_EQ(line.samples.at(0).missing_mask, 0b111);
+  EXPECT_EQ(line.receiver.counters().late_frames, 1u);
+}
+
+TEST(EncoderReceiver, TheSecondAnswerOfACycleReplacesTheFirst) {
+  Line line;
+  line.sync(kStart);
+  line.frame(position(1, 10), kStart + 10us);
+  line.frame(position(1, 20), kStart + 200us);
+  line.frame(position(2, 30), kStart + 300us);
+  line.frame(position(3, 40), kStart + 400us);
+  EXPECT_EQ(line.samples.at(0).count[0], 20);
+  EXPECT_EQ(line.receiver.counters().duplicate_frames, 1u);
+}
+
+TEST(EncoderReceiver, UnwrapsThirtyTwoBitsInBothDirections) {
+  Line line;
+  line.cycle(kStart, 2147483640);
+  line.cycle(kStart + 1ms, -2147483640);
+  line.cycle(kStart + 2ms, 2147483640);
+  EXPECT_EQ(line.samples.at(1).count[0], 2147483656);
+  EXPECT_EQ(line.samples.at(2).count[0], 2147483640);
+}
+
+TEST(EncoderReceiver, TakesTheFirstCountOfAnAbsoluteScaleAsItIs) {
+  Line line;
+  line.cycle(kStart, -5000);
+  EXPECT_EQ(line.samples.at(0).count[0], -5000);
+  EXPECT_DOUBLE_EQ(line.samples.at(0).position[0], -5e-5);
+}
+
+TEST(EncoderReceiver, UnwrapsARotaryEncoderAtItsOwnRange) {
+  EncoderReceiverOptions options;
+  options.axes = {{.name = "C",
+                   .node = 1,
+                   .kind = AxisKind::Rotary,
+                   .position = can::PositionType::Unsigned32,
+                   .scale = 2 * std::numbers::pi / 36000,
+                   .wrap_counts = 36000}};
+  Line line{options};
+  std::int64_t ms = 0;
+  for (const std::int64_t count : {35990, 10, 17990, 35970, 5}) {
+    line.sync(kStart + 1ms * ms);
+    line.frame(can::encode_position(0x181, can::PositionType::Unsigned32, count), kStart + 1ms * ms + 10us);
+    ++ms;
+  }
+  ASSERT_EQ(line.samples.size(), 5u);
+  EXPECT_EQ(line.samples[1].count[0], 36010);
+  EXPECT_EQ(line.samples[4].count[0], 72005);
+  EXPECT_NEAR(line.samples[4].position[0], 2 * std::numbers::pi * 72005 / 36000, 1e-12);
+}
+
+TEST(EncoderReceiver, ReadsSixtyFourBitPositions) {
+  auto options = three_axes();
+  for (auto& axis : options.axes) axis.position = can::PositionType::Signed64;
+  Line line{options};
+  line.sync(kStart);
+  for (const can::NodeId node : kNodes) {
+    line.frame(can::encode_position(0x180u + node, can::PositionType::Signed64, -10'000'000'000),
+               kStart + 10us);
+  }
+  EXPECT_EQ(line.samples.at(0).count[2], -10'000'000'000);
+}
+
+TEST(EncoderReceiver, ReadsTheStepAlongFromTheBus) {
+  Line line{three_axes(std::nullopt)};
+  for (const can::NodeId node : kNodes) {
+    EXPECT_FALSE(line.receiver.scale(node - 1u));
+    line.frame(can::standard_frame(0x580u + node, {0x43, 0x05, 0x60, 0x01, 25, 0, 0, 0}), kStart);
+  }
+  line.cycle(kStart, 1000);
+  EXPECT_DOUBLE_EQ(*line.receiver.scale(0), 25e-9);
+  EXPECT_DOUBLE_EQ(line.samples.at(0).position[0], 25e-6);
+}
+
+TEST(EncoderReceiver, RefusesAStepOfZeroAndKeepsTheAxisMissing) {
+  Line line{three_axes(std::nullopt)};
+  for (const can::NodeId node : kNodes) {
+    line.frame(can::standard_frame(0x580u + node, {0x43, 0x05, 0x60, 0x01, 0, 0, 0, 0}), kStart);
+  }
+  line.cycle(kStart, 1000);
+  EXPECT_EQ(line.samples.at(0).missing_mask, 0b111);
+  EXPECT_TRUE(std::isnan(line.samples.at(0).position[0]));
+  EXPECT_EQ(line.receiver.counters().scale_refusals, 3u);
+}
+
+TEST(EncoderReceiver, TheConfiguredScaleWinsOverTheEncoders) {
+  Line line;
+  line.frame(can::standard_frame(0x581, {0x43, 0x05, 0x60, 0x01, 25, 0, 0, 0}), kStart);
+  EXPECT_DOUBLE_EQ(*line.receiver.scale(0), 1e-8);
+}
+
+TEST(EncoderReceiver, AnEmergencyStaysUntilTheNodeTakesItBack) {
+  Line line;
+  line.frame(can::encode_emergency({.node = 2, .code = 0x5000, .error_register = 1}), kStart);
+  line.cycle(kStart, 1);
+  line.cycle(kStart + 1ms, 2);
+  EXPECT_TRUE(has(line.samples.at(0).head.flags, SampleFlag::DeviceError));
+  EXPECT_TRUE(has(line.samples.at(1).head.flags, SampleFlag::DeviceError));
+  line.frame(can::encode_emergency({.node = 2}), kStart + 1500us);
+  line.cycle(kStart + 2ms, 3);
+  EXPECT_EQ(line.samples.at(2).head.flags, 0u);
+  EXPECT_EQ(line.receiver.counters().emergencies, 1u);
+}
+
+TEST(EncoderReceiver, MissesAHeartbeatThatStopped) {
+  Line line;
+  line.frame(can::encode_heartbeat(1, can::NodeState::Operational), kStart);
+  line.cycle(kStart + 350ms, 1);
+  EXPECT_EQ(line.samples.at(0).head.flags & static_cast<protocol::SampleFlags>(SampleFlag::DeviceError), 0u);
+  line.cycle(kStart + 351ms, 2);
+  EXPECT_TRUE(has(line.samples.at(1).head.flags, SampleFlag::DeviceError));
+  EXPECT_EQ(line.receiver.counters().heartbeat_losses, 1u);
+  line.frame(can::encode_heartbeat(1, can::NodeState::Operational), kStart + 351500us);
+  line.cycle(kStart + 352ms, 3);
+  EXPECT_FALSE(has(line.samples.at(2).head.flags, SampleFlag::DeviceError));
+}
+
+TEST(EncoderReceiver, MarksTheSampleAfterABusErrorOnly) {
+  Line line;
+  line.frame(bus_report(BusCondition::NoAcknowledge), kStart);
+  line.cycle(kStart, 1);
+  line.cycle(kStart + 1ms, 2);
+  EXPECT_TRUE(has(line.samples.at(0).head.flags, SampleFlag::BusError));
+  EXPECT_FALSE(has(line.samples.at(1).head.flags, SampleFlag::BusError));
+}
+
+TEST(EncoderReceiver, BusOffMakesAllAxesInvalidAtOnce) {
+  Line line;
+  line.cycle(kStart, 1000);
+  line.sync(kStart + 1ms);
+  line.frame(position(1, 2000), kStart + 1100us);
+  line.frame(bus_report(BusCondition::BusOff), kStart + 1200us);
+  ASSERT_EQ(line.samples.size(), 2u);
+  EXPECT_EQ(line.samples[1].missing_mask, 0b111);
+  EXPECT_TRUE(has(line.samples[1].head.flags, SampleFlag::BusOff));
+  EXPECT_TRUE(line.receiver.bus_off());
+}
+
+TEST(EncoderReceiver, ComesBackFromBusOffWithARestartedSample) {
+  for (const bool told : {true, false}) {
+    Line line;
+    line.cycle(kStart, 1000);
+    line.frame(bus_report(BusCondition::BusOff), kStart + 900us);
+    if (told) line.frame(bus_report(BusCondition::Restarted), kStart + 100ms);
+    line.cycle(kStart + 101ms, 3000);
+    const auto& sample = line.samples.back();
+    EXPECT_EQ(sample.missing_mask, 0);
+    EXPECT_FALSE(has(sample.head.flags, SampleFlag::BusOff));
+    EXPECT_TRUE(has(sample.head.flags, SampleFlag::Restarted));
+    EXPECT_TRUE(has(sample.head.flags, SampleFlag::GapBefore));
+  }
+}
+
+TEST(EncoderReceiver, ABootUpMarksTheNextSampleRestarted) {
+  Line line;
+  line.cycle(kStart, 1);
+  line.frame(can::encode_heartbeat(2, can::NodeState::BootUp), kStart + 900us);
+  line.cycle(kStart + 1ms, 2);
+  line.cycle(kStart + 2ms, 3);
+  EXPECT_TRUE(has(line.samples.at(1).head.flags, SampleFlag::Restarted));
+  EXPECT_FALSE(has(line.samples.at(2).head.flags, SampleFlag::Restarted));
+}
+
+TEST(EncoderReceiver, CountsPeriodsWithoutASync) {
+  Line line;
+  line.cycle(kStart, 1);
+  line.cycle(kStart + 4ms + 30us, 2);
+  EXPECT_TRUE(has(line.samples.at(1).head.flags, SampleFlag::GapBefore));
+  EXPECT_EQ(line.samples.at(1).head.lost_before, 3u);
+  EXPECT_EQ(line.receiver.counters().missed_syncs, 3u);
+}
+
+TEST(EncoderReceiver, CountsTpdosTooShortForAPosition) {
+  Line line;
+  line.sync(kStart);
+  line.frame(can::standard_frame(0x181, {1, 2}), kStart + 10us);
+  line.time(kStart + 900us);
+  EXPECT_EQ(line.receiver.counters().short_frames, 1u);
+  EXPECT_EQ(line.samples.at(0).missing_mask, 0b111);
+}
+
+TEST(EncoderReceiver, IgnoresStrangersOnTheBus) {
+  Line line;
+  line.sync(kStart);
+  for (const std::uint32_t id : {0x000u, 0x080u, 0x184u, 0x281u, 0x601u, 0x7FFu}) {
+    line.frame(can::standard_frame(id, {1, 2, 3, 4, 5, 6, 7, 8}), kStart + 10us);
+  }
+  auto extended = position(1, 5);
+  extended.set(can::FrameFlag::Extended);
+  line.frame(extended, kStart + 10us);
+  line.time(kStart + 900us);
+  EXPECT_EQ(line.samples.at(0).missing_mask, 0b111);
+}
+
+TEST(EncoderReceiver, TakesPositionsFromCanFdFramesToo) {
+  Line line;
+  line.sync(kStart);
+  for (const can::NodeId node : kNodes) {
+    auto frame = position(node, 9);
+    frame.set(can::FrameFlag::Fd);
+    line.frame(frame, kStart + 10us);
+  }
+  EXPECT_EQ(line.samples.at(0).missing_mask, 0);
+}
+
+TEST(EncoderOptions, AreRefusedWithTheNameOfTheAxis) {
+  const auto refused = [](auto&& change) {
+    auto options = three_axes();
+    change(options);
+    const auto result = check(options);
+    return result ? std::string{} : result.error().text;
+  };
+  EXPECT_TRUE(check(three_axes()));
+  EXPECT_THAT(refused([](auto& o) { o.axes[1].scale = 0.0; }), testing::HasSubstr("XYZ2"));
+  EXPECT_THAT(refused([](auto& o) { o.axes[2].node = 1; }), testing::HasSubstr("both are node 1"));
+  EXPECT_THAT(refused([](auto& o) { o.axes[0].node = 128; }), testing::HasSubstr("1 to 127"));
+  EXPECT_THAT(refused([](auto& o) { o.axes.resize(9); }), testing::HasSubstr("9 axes"));
+  EXPECT_THAT(refused([](auto& o) { o.axes.clear(); }), testing::HasSubstr("0 axes"));
+  EXPECT_THAT(refused([](auto& o) { o.sync_period = 0ns; }), testing::HasSubstr("period"));
+  EXPECT_THAT(refused([](auto& o) { o.answer_within = 2ms; }), testing::HasSubstr("answers"));
+}
+
+}  // namespace
+}  // namespace abbe::drivers

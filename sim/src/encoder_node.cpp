@@ -116,7 +116,8 @@ void EncoderNode::sample(HostTime at) {
   const auto axis = static_cast<Eigen::Index>(options_.axis);
   const auto stream = static_cast<std::uint64_t>(NoiseStream::Encoder) + options_.node;
   const double noise_m = options_.noise_m * gaussian(options_.seed, stream, readings_++);
-  const double counts = (machine_.motion(at).q_m[axis] + noise_m) / (1e-9 * options_.step_nm);
+  const double step_m = (options_.invert ? -1e-9 : 1e-9) * options_.step_nm;
+  const double counts = (machine_.motion(at).q_m[axis] + noise_m - options_.offset_m) / step_m;
   objects_.set_raw_position(std::llround(counts));
 }
 

@@ -42,7 +42,7 @@ Result<std::vector<PathVertex>> parse_path_csv(std::string_view text, std::strin
     read_feed(table, row, vertex, errors);
     vertices.push_back(vertex);
   }
-  if (vertices.size() < 2) errors.add(1, "a path needs at least two vertices");
+  if (vertices.empty()) errors.add(1, "no points");
   if (errors.any()) return tl::unexpected(errors.error());
   return vertices;
 }

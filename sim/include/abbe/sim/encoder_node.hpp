@@ -20,6 +20,8 @@ struct EncoderNodeOptions {
   can::NodeId node = 1;
   Axis axis = Axis::X;
   std::uint32_t step_nm = 10;
+  double offset_m = 0.0;  ///< the reading at count 0
+  bool invert = false;    ///< counts fall as the reading rises
   double noise_m = 5e-9;  ///< standard deviation of one reading before it is rounded to counts
   std::uint64_t seed = 1;
   std::chrono::nanoseconds boot_time = std::chrono::milliseconds{200};  ///< from reset to boot-up message

@@ -9,6 +9,7 @@ namespace abbe::sim {
 enum class ErrorCode {
   BadInput,  ///< a file or a value that makes no machine, path or configuration
   Io,        ///< a file or a socket that the system refuses
+  Usage,     ///< a command line that leaves out what cannot be guessed
 };
 
 struct Error {
@@ -24,6 +25,9 @@ using Result = tl::expected<T, Error>;
 }
 [[nodiscard]] inline tl::unexpected<Error> io_error(std::string text) {
   return tl::unexpected(Error{ErrorCode::Io, std::move(text)});
+}
+[[nodiscard]] inline tl::unexpected<Error> usage_error(std::string text) {
+  return tl::unexpected(Error{ErrorCode::Usage, std::move(text)});
 }
 
 }  // namespace abbe::sim

@@ -1,0 +1,172 @@
+/// abbe-sim run: the stage with real time and real sockets, until it is told to stop.
+
+#include <fmt/format.h>
+#include <poll.h>
+#include <sys/prctl.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <csignal>
+#include <memory>
+
+#include "abbe/sim/simulation.hpp"
+#include "abbe/sim/truth_table.hpp"
+#include "commands.hpp"
+#include "files.hpp"
+#include "setup_file.hpp"
+
+namespace abbe::sim {
+namespace {
+
+volatile std::sig_atomic_t stop_requested = 0;
+void request_stop(int) {
+  stop_requested = 1;
+}
+
+struct RunOptions {
+  SetupChoices choices;
+  std::string ports_file;
+  std::string truth_out;
+};
+
+/// Signals are let through only while waiting, so that none falls between the question and the wait.
+sigset_t hold_signals() {
+  struct sigaction action {};
+  action.sa_handler = request_stop;
+  sigaction(SIGINT, &action, nullptr);
+  sigaction(SIGTERM, &action, nullptr);
+  sigset_t held, before;
+  sigemptyset(&held);
+  sigaddset(&held, SIGINT);
+  sigaddset(&held, SIGTERM);
+  sigprocmask(SIG_BLOCK, &held, &before);
+  return before;
+}
+
+/// Says on stderr what a person in front of the machine would see; a bar only where somebody watches.
+class Narrator {
+ public:
+  explicit Narrator(double speed) : speed_(speed) {}
+
+  void look(Simulation& simulation, HostTime now) {
+    const bool client = simulation.tracker() && simulation.tracker()->client_fd() >= 0;
+    if (client != client_)
+      fmt::print(stderr, "{}tracker: client {}\n", bar_end(), client ? "connected" : "gone");
+    client_ = client;
+    const VirtualMachine& machine = simulation.machine();
+    if (machine.started() && !announced_start_) {
+      announced_start_ = true;
+      fmt::print(stderr, "{}machine: {} legs, {:.0f} s ({:.0f} s on the wall)\n", bar_end(),
+                 machine.path().legs(), machine.path().duration_s(), machine.path().duration_s() / speed_);
+    }
+    if (machine.finished() && now >= *machine.finished() && !announced_end_) {
+      announced_end_ = true;
+      fmt::print(stderr, "{}machine: path driven, standing\n", bar_end());
+    }
+    if (announced_start_ && !announced_end_) draw(machine, now);
+  }
+
+ private:
+  void draw(const VirtualMachine& machine, HostTime now) {
+    const double share =
+        std::clamp(ns_to_seconds(now - *machine.started()) / machine.path().duration_s(), 0.0, 1.0);
+    const int percent = static_cast<int>(100.0 * share);
+    if (!terminal_ || percent == drawn_) return;
+    drawn_ = percent;
+    fmt::print(stderr, "\rmachine: {:3d} % [{:<40}]", percent,
+               std::string(static_cast<std::size_t>(percent) * 40 / 100, '#'));
+  }
+  const char* bar_end() {
+    const bool open = drawn_ >= 0;
+    drawn_ = -1;
+    return open ? "\n" : "";
+  }
+
+  double speed_;
+  bool terminal_ = isatty(STDERR_FILENO) == 1;
+  bool client_ = false;
+  bool announced_start_ = false;
+  bool announced_end_ = false;
+  int drawn_ = -1;
+};
+
+void wait(const Simulation& simulation, const SimClock& clock, const sigset_t& signals) {
+  std::vector<pollfd> fds;
+  simulation.add_poll_fds(fds);
+  constexpr std::chrono::nanoseconds kLongest =
+      std::chrono::milliseconds{200};  // of the wall: keeps the narrator awake
+  std::chrono::nanoseconds wall = kLongest;
+  if (const HostTime due = simulation.next_due(); due != HostTime::max()) {
+    wall = std::clamp(clock.wall(due - clock.now()), std::chrono::nanoseconds{0}, kLongest);
+  }
+  const timespec timeout{wall.count() / 1'000'000'000, wall.count() % 1'000'000'000};
+  ppoll(fds.data(), fds.size(), &timeout, &signals);
+}
+
+Result<void> announce(Simulation& simulation, const RunOptions& options) {
+  const std::uint16_t tracker = simulation.tracker()->port();
+  const std::uint16_t can = simulation.bus()->port();
+  if (!options.ports_file.empty()) {
+    // Readable by a shell and by a TOML reader alike.
+    const auto written =
+        write_file(options.ports_file, fmt::format("tracker_port={}\ncan_port={}\n", tracker, can));
+    if (!written) return written;
+  }
+  fmt::print("tracker: emScon on 127.0.0.1:{}\nencoders: CAN over UDP on 127.0.0.1:{}\n", tracker, can);
+  std::fflush(stdout);
+  return {};
+}
+
+int run(const RunOptions& options) {
+  const auto setup = load_setup(options.choices);
+  if (!setup) return report(setup.error());
+  if (!options.truth_out.empty()) {
+    const auto written = write_file(options.truth_out, format_truth_csv(setup->simulation.truth));
+    if (!written) return report(written.error());
+  }
+  const SimClock clock(setup->speed);
+  const sigset_t signals = hold_signals();
+  prctl(PR_SET_TIMERSLACK, 1);  // at 20 times real time the usual 50 us would be a millisecond
+  auto simulation = Simulation::open(setup->simulation, clock.now());
+  if (!simulation) return report(simulation.error());
+  if (const auto announced = announce(**simulation, options); !announced) return report(announced.error());
+  Narrator narrator(setup->speed);
+  while (stop_requested == 0) {
+    wait(**simulation, clock, signals);
+    const HostTime now = clock.now();
+    (*simulation)->poll(now);
+    narrator.look(**simulation, now);
+  }
+  return kDone;
+}
+
+}  // namespace
+
+Subcommand add_run(CLI::App& app) {
+  auto options = std::make_shared<RunOptions>();  // lives as long as the command line's callbacks
+  SetupChoices& choices = options->choices;
+  CLI::App* sub =
+      app.add_subcommand("run", "machine, tracker and encoders on 127.0.0.1 until SIGINT or SIGTERM");
+  add_machine_options(*sub, choices);
+  sub->add_option("--path", choices.path_file, "CSV x_mm,y_mm,z_mm[,feed_mm_per_min]")->type_name("FILE");
+  sub->add_option("--feed", choices.feed_mm_per_min, "mm/min (default 2500)")->check(CLI::PositiveNumber);
+  sub->add_option("--speed", choices.speed, "simulated seconds per second; the daemon must be given the same")
+      ->check(CLI::Range(1e-3, 1e4));
+  sub->add_option("--tracker-port", choices.tracker_port, "TCP; 0 = any free one");
+  sub->add_option("--can-port", choices.can_port, "UDP; 0 = any free one");
+  sub->add_option("--can-peer-port", choices.can_peer_port,
+                  "UDP port of the daemon; 0 = whoever speaks first");
+  sub->add_option("--ports-file", options->ports_file,
+                  "written when all ports listen: lines tracker_port=N and can_port=N")
+      ->type_name("FILE");
+  sub->add_option("--truth-out", options->truth_out, "write the errors of this machine as CSV")
+      ->type_name("FILE");
+  CLI::Option* streaming =
+      sub->add_flag("--start-when-streaming", choices.start_when_streaming,
+                    "move when the tracker has streamed through the standstill (default)");
+  sub->add_flag("--start-at-once", choices.start_at_once, "move after the standstill, watched or not")
+      ->excludes(streaming);
+  return {sub, [options] { return run(*options); }};
+}
+
+}  // namespace abbe::sim

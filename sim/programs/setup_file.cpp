@@ -1,0 +1,340 @@
+#include "setup_file.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <filesystem>
+
+#include "abbe/sim/random_truth.hpp"
+#include "abbe/sim/truth_table.hpp"
+#include "files.hpp"
+#include "toml_section.hpp"
+
+namespace abbe::sim {
+namespace {
+
+constexpr double kMilli = 1e-3;
+constexpr double kMicro = 1e-6;
+constexpr double kFeed = 1e-3 / 60.0;  // mm/min in m/s
+constexpr std::int64_t kLastPort = 65535;
+constexpr std::int64_t kLastNode = 127;
+
+/// Everything the files say, before the truth is made of it.
+struct Draft {
+  LoadedSetup setup;
+  RandomTruthOptions random;
+  std::string truth_file;
+  std::string path_file;
+  std::string machine_file;
+  std::int64_t seed = 1;
+  double encoder_noise_m = 5e-9;
+};
+
+std::string beside(const std::string& file, const std::string& path) {
+  return (std::filesystem::path(file).parent_path() / path).string();
+}
+
+void read_duration(TomlSection& section, std::string_view key, std::chrono::nanoseconds& value,
+                   double scale) {
+  double seconds = 0.0;
+  if (section.number(key, seconds, scale, kNotNegativeNumber)) value = seconds_to_ns(seconds);
+}
+
+void read_port(TomlSection& section, std::string_view key, std::uint16_t& port) {
+  std::int64_t value = 0;
+  if (section.integer(key, value, 0, kLastPort)) port = static_cast<std::uint16_t>(value);
+}
+
+void read_axes(TomlSection root, TruthMachine& truth) {
+  TomlSection axes = root.child("axes");
+  if (!axes.present()) return root.fault("axes", "missing");
+  for (const Axis axis : kAxes) {
+    const std::string_view name = kAxisLetters.substr(static_cast<std::size_t>(axis), 1);
+    TomlSection section = axes.child(name);
+    AxisRange& range = truth.axis(axis).range;
+    const bool has_min = section.number("min_mm", range.min_m, kMilli);
+    const bool has_max = section.number("max_mm", range.max_m, kMilli);
+    if (!has_min || !has_max) {
+      section.fault("", "needs min_mm and max_mm");
+    } else if (range.min_m >= range.max_m) {
+      section.fault("max_mm", "must exceed min_mm");
+    }
+    range.reference_m = range.min_m <= 0.0 && range.max_m >= 0.0 ? 0.0 : range.min_m;
+    section.number("reference_mm", range.reference_m, kMilli);
+  }
+}
+
+void read_encoder_nodes(TomlSection& encoder, std::vector<EncoderNodeOptions>& nodes) {
+  std::vector<EncoderNodeOptions> seen;
+  for (TomlSection& section : encoder.children("nodes")) {
+    EncoderNodeOptions node;
+    std::string name;
+    std::int64_t id = 0;
+    double step_nm = 10.0;
+    section.text("axis", name);
+    const std::size_t axis = name.size() == 1 ? kAxisLetters.find(name[0]) : std::string_view::npos;
+    if (axis == std::string_view::npos) {
+      section.fault("axis", "must be X, Y or Z");
+      continue;
+    }
+    if (!section.integer("node", id, 1, kLastNode)) section.fault("node", "missing");
+    section.number("step_nm", step_nm, 1.0, {1.0, 1e9});
+    section.number("offset_mm", node.offset_m, kMilli);
+    section.flag("invert", node.invert);
+    node.axis = kAxes[axis];
+    node.node = static_cast<can::NodeId>(id);
+    node.step_nm = static_cast<std::uint32_t>(step_nm);
+    seen.push_back(node);
+  }
+  if (!seen.empty()) nodes = seen;
+}
+
+/// The tables the daemon reads too. Keys that only it knows are none of ours.
+void read_machine_tables(TomlSection root, Draft& draft) {
+  SimulationSetup& simulation = draft.setup.simulation;
+  TomlSection machine = root.child("machine");
+  std::string chain = "[w X b Y Z t]";
+  if (!machine.text("chain", chain)) root.fault("machine.chain", "missing");
+  if (const auto order = parse_chain(chain)) {
+    simulation.truth.order = *order;
+  } else {
+    machine.fault("chain", order.error().text);
+  }
+  read_axes(root, simulation.truth);
+  root.child("target").vector("offset_mm", simulation.truth.target_offset_m, kMilli);
+  TomlSection tracker = root.child("tracker");
+  tracker.number("sigma_range_um", simulation.tracker->model.sigma_range_m, kMicro, kNotNegativeNumber);
+  tracker.number("sigma_angle_urad", simulation.tracker->model.sigma_angle_rad, kMicro, kNotNegativeNumber);
+  read_port(tracker, "port", simulation.tracker_port);
+  TomlSection encoder = root.child("encoder");
+  read_port(encoder, "peer_port", simulation.bus->port);
+  read_port(encoder, "local_port", simulation.bus->peer_port);
+  read_encoder_nodes(encoder, simulation.nodes);
+  root.child("daemon").number("speed", draft.setup.speed, 1.0, {1e-3, 1e4});
+}
+
+void read_truth(TomlSection section, const std::string& file, Draft& draft) {
+  std::string shape = "linear";
+  section.number("mean_error_um", draft.random.mean_error_m, kMicro, kPositiveNumber);
+  section.number("node_spacing_mm", draft.random.node_spacing_m, kMilli, {0.1, 1e6});
+  section.number("backlash_um", draft.random.backlash_m, kMicro, kNotNegativeNumber);
+  section.text("shape", shape);
+  if (shape != "linear" && shape != "cubic") section.fault("shape", "must be \"linear\" or \"cubic\"");
+  draft.random.shape = shape == "cubic" ? Shape::Cubic : Shape::Linear;
+  std::string path;
+  if (section.text("file", path)) draft.truth_file = beside(file, path);
+  section.refuse_unknown_keys();
+}
+
+void read_thermal(TomlSection section, ThermalDrift& thermal) {
+  section.vector("growth_um_per_m", thermal.growth_per_m, kMicro);
+  section.vector("shift_um", thermal.shift_m, kMicro);
+  section.number("time_constant_s", thermal.time_constant_s, 1.0, kPositiveNumber);
+  section.refuse_unknown_keys();
+}
+
+void read_path(TomlSection section, const std::string& file, Draft& draft) {
+  SimulationSetup& simulation = draft.setup.simulation;
+  std::string path;
+  if (section.text("file", path)) draft.path_file = beside(file, path);
+  section.number("feed_mm_per_min", simulation.path.feed_m_per_s, kFeed, kPositiveNumber);
+  section.number("acceleration_mm_per_s2", simulation.path.acceleration_m_per_s2, kMilli, kPositiveNumber);
+  section.number("dwell_s", simulation.path.dwell_s, 1.0, kNotNegativeNumber);
+  read_duration(section, "standstill_s", simulation.standstill, 1.0);
+  section.flag("start_when_streaming", simulation.start_when_streaming);
+  section.refuse_unknown_keys();
+}
+
+void read_tracker(TomlSection section, SimulationSetup& simulation) {
+  TrackerOptions& tracker = *simulation.tracker;
+  TrackerModel& model = tracker.model;
+  read_port(section, "port", simulation.tracker_port);
+  section.vector("position_mm", model.position_m, kMilli);
+  section.vector("rotation_rad", model.rotation_rad);
+  section.number("sigma_range_um", model.sigma_range_m, kMicro, kNotNegativeNumber);
+  section.number("sigma_angle_urad", model.sigma_angle_rad, kMicro, kNotNegativeNumber);
+  section.number("max_radial_speed_mm_per_s", model.max_radial_speed_m_per_s, kMilli, kPositiveNumber);
+  section.number("max_lateral_speed_mm_per_s", model.max_lateral_speed_m_per_s, kMilli, kPositiveNumber);
+  section.number("clock_offset_s", model.clock_offset_s, 1.0, {0.0, 2e9});
+  section.number("clock_drift_ppm", model.clock_drift_ppm, 1.0, {-1000.0, 1000.0});
+  read_duration(section, "delay_ms", tracker.delay, kMilli);
+  read_duration(section, "warm_up_s", tracker.warm_up, 1.0);
+  read_duration(section, "command_latency_ms", tracker.command_latency, kMilli);
+  read_duration(section, "initialize_s", tracker.initialize_time, 1.0);
+  section.number("air_temperature_C", tracker.air_temperature_C);
+  section.number("air_pressure_mbar", tracker.air_pressure_mbar);
+  section.number("air_humidity_percent", tracker.air_humidity_percent);
+  section.number("air_drift_K_per_hour", tracker.air_drift_K_per_hour);
+  section.refuse_unknown_keys();
+}
+
+void read_faults(TomlSection& sim, std::vector<ScheduledFault>& faults) {
+  for (TomlSection& section : sim.children("fault")) {
+    ScheduledFault scheduled;
+    std::string device, kind;
+    std::int64_t node = 0;
+    section.text("device", device);
+    section.text("kind", kind);
+    if (device != "tracker" && device != "encoder")
+      section.fault("device", "must be \"tracker\" or \"encoder\"");
+    scheduled.target = device == "encoder" ? FaultTarget::Encoder : FaultTarget::Tracker;
+    const auto known = fault_kind(scheduled.target, kind);
+    if (!known) section.fault("kind", fmt::format("\"{}\" is no fault of this device", kind));
+    scheduled.fault.kind = known.value_or(FaultKind::Mute);
+    if (!section.number("at_s", scheduled.fault.at_s, 1.0, kNotNegativeNumber))
+      section.fault("at_s", "missing");
+    section.number("duration_s", scheduled.fault.duration_s, 1.0, kNotNegativeNumber);
+    section.number("value", scheduled.fault.value);
+    if (section.integer("node", node, 0, kLastNode)) scheduled.fault.node = static_cast<std::uint8_t>(node);
+    section.refuse_unknown_keys();
+    faults.push_back(scheduled);
+  }
+}
+
+void read_sim(TomlSection sim, const std::string& file, Draft& draft) {
+  SimulationSetup& simulation = draft.setup.simulation;
+  std::string machine;
+  if (sim.text("machine", machine)) draft.machine_file = beside(file, machine);
+  sim.integer("seed", draft.seed, 0, INT64_MAX);
+  sim.number("speed", draft.setup.speed, 1.0, {1e-3, 1e4});
+  read_truth(sim.child("truth"), file, draft);
+  read_thermal(sim.child("thermal"), simulation.truth.thermal);
+  read_path(sim.child("path"), file, draft);
+  read_tracker(sim.child("tracker"), simulation);
+  TomlSection encoder = sim.child("encoder");
+  read_port(encoder, "port", simulation.bus->port);
+  read_port(encoder, "peer_port", simulation.bus->peer_port);
+  encoder.number("noise_nm", draft.encoder_noise_m, 1e-9, kNotNegativeNumber);
+  encoder.refuse_unknown_keys();
+  read_faults(sim, simulation.faults);
+  sim.refuse_unknown_keys();
+}
+
+Result<toml::table> parse(const std::string& file) {
+  const auto text = read_file(file);
+  if (!text) return tl::unexpected(text.error());
+  try {
+    return toml::parse(*text, file);
+  } catch (const toml::parse_error& e) {
+    return bad_input(fmt::format("{}:{}: {}", file, e.source().begin.line, e.description()));
+  }
+}
+
+/// Reads the parts of one file that `reader` knows.
+template <class Reader>
+Result<void> with_file(const std::string& file, Reader reader) {
+  const auto table = parse(file);
+  if (!table) return tl::unexpected(table.error());
+  TomlFaults faults(file);
+  reader(TomlSection(&*table, "", faults));
+  if (faults.any()) return tl::unexpected(faults.error());
+  return {};
+}
+
+Result<void> read_files(const SetupChoices& choices, Draft& draft) {
+  // The machine file comes first although [sim] may name it: what [sim] says about a port or a speed wins.
+  if (!choices.config_file.empty()) {
+    const auto named = with_file(choices.config_file, [&](TomlSection root) {
+      std::string machine;
+      if (root.child("sim").text("machine", machine))
+        draft.machine_file = beside(choices.config_file, machine);
+    });
+    if (!named) return named;
+  }
+  if (!choices.machine_file.empty()) draft.machine_file = choices.machine_file;
+  if (draft.machine_file.empty()) draft.machine_file = choices.config_file;
+  if (draft.machine_file.empty()) return usage_error("no machine: give --machine FILE or --config FILE");
+  const std::string machine_file = draft.machine_file;
+  const auto machine = with_file(machine_file, [&](TomlSection root) { read_machine_tables(root, draft); });
+  if (!machine) return machine;
+  if (choices.config_file.empty()) return {};
+  return with_file(choices.config_file, [&](TomlSection root) {
+    TomlSection sim = root.child("sim");
+    if (!sim.present()) return root.fault("sim", "missing");
+    read_sim(sim, choices.config_file, draft);
+  });
+}
+
+void apply_choices(const SetupChoices& choices, Draft& draft) {
+  SimulationSetup& simulation = draft.setup.simulation;
+  if (!choices.path_file.empty()) draft.path_file = choices.path_file;
+  if (!choices.truth_file.empty()) draft.truth_file = choices.truth_file;
+  if (choices.seed) draft.seed = static_cast<std::int64_t>(*choices.seed);
+  if (choices.speed) draft.setup.speed = *choices.speed;
+  if (choices.feed_mm_per_min) simulation.path.feed_m_per_s = *choices.feed_mm_per_min * kFeed;
+  if (choices.tracker_port) simulation.tracker_port = *choices.tracker_port;
+  if (choices.can_port) simulation.bus->port = *choices.can_port;
+  if (choices.can_peer_port) simulation.bus->peer_port = *choices.can_peer_port;
+  if (choices.start_when_streaming) simulation.start_when_streaming = true;
+  if (choices.start_at_once) simulation.start_when_streaming = false;
+}
+
+Result<void> make_truth(Draft& draft) {
+  TruthMachine& truth = draft.setup.simulation.truth;
+  if (draft.truth_file.empty()) {
+    draft.random.seed = static_cast<std::uint64_t>(draft.seed);
+    truth = random_truth(truth, draft.random);
+    return {};
+  }
+  const auto text = read_file(draft.truth_file);
+  if (!text) return tl::unexpected(text.error());
+  auto read = parse_truth_csv(*text, draft.truth_file, truth, draft.random.shape);
+  if (!read) return tl::unexpected(read.error());
+  truth = *read;
+  return {};
+}
+
+Result<void> make_path(const Draft& draft, PathPlan& path) {
+  if (draft.path_file.empty()) return usage_error("no path: give --path FILE or [sim.path] file");
+  const auto text = read_file(draft.path_file);
+  if (!text) return tl::unexpected(text.error());
+  auto vertices = parse_path_csv(*text, draft.path_file);
+  if (!vertices) return tl::unexpected(vertices.error());
+  if (vertices->size() < 2) return bad_input(draft.path_file + ": a path needs at least two vertices");
+  path.vertices = *vertices;
+  return {};
+}
+
+void share_seed_and_speed(Draft& draft) {
+  SimulationSetup& simulation = draft.setup.simulation;
+  simulation.tracker->model.seed = static_cast<std::uint64_t>(draft.seed);
+  simulation.bus->speed = draft.setup.speed;
+  for (EncoderNodeOptions& node : simulation.nodes) {
+    node.seed = static_cast<std::uint64_t>(draft.seed);
+    node.noise_m = draft.encoder_noise_m;
+  }
+}
+
+}  // namespace
+
+void add_machine_options(CLI::App& app, SetupChoices& choices) {
+  app.add_option("--config", choices.config_file, "TOML file with a [sim] table")->type_name("FILE");
+  app.add_option("--machine", choices.machine_file, "machine description: machine.toml or abbed.toml")
+      ->type_name("FILE");
+  app.add_option("--seed", choices.seed, "of the errors and of all noise (default 1)");
+  app.add_option("--truth", choices.truth_file, "the errors as CSV instead of random ones")
+      ->type_name("FILE");
+}
+
+Result<LoadedSetup> load_setup(const SetupChoices& choices) {
+  Draft draft;
+  SimulationSetup& simulation = draft.setup.simulation;
+  simulation.tracker.emplace();
+  simulation.bus.emplace();
+  for (const Axis axis : kAxes) {
+    EncoderNodeOptions node;
+    node.node = static_cast<can::NodeId>(static_cast<std::size_t>(axis) + 1);
+    node.axis = axis;
+    simulation.nodes.push_back(node);
+  }
+  if (const auto read = read_files(choices, draft); !read) return tl::unexpected(read.error());
+  apply_choices(choices, draft);
+  if (const auto made = make_truth(draft); !made) return tl::unexpected(made.error());
+  if (choices.needs_path) {
+    if (const auto made = make_path(draft, simulation.path); !made) return tl::unexpected(made.error());
+  }
+  share_seed_and_speed(draft);
+  return draft.setup;
+}
+
+}  // namespace abbe::sim

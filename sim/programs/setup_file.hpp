@@ -1,0 +1,43 @@
+#pragma once
+/// What to simulate, from files: the machine description the daemon uses too, and the simulator's own [sim]
+/// table, in the same file or in one of its own. In files lengths are mm, small errors um and urad; here
+/// everything is SI.
+
+#include <CLI/CLI.hpp>
+#include <cstdint>
+#include <optional>
+#include <string>
+
+#include "abbe/sim/simulation.hpp"
+
+namespace abbe::sim {
+
+/// What the command line says; it wins over the files.
+struct SetupChoices {
+  std::string config_file;   ///< with a [sim] table; may name the machine file
+  std::string machine_file;  ///< with [machine], [axes.*], [target]
+  std::string path_file;
+  std::string truth_file;
+  std::optional<std::uint64_t> seed;
+  std::optional<double> speed;
+  std::optional<double> feed_mm_per_min;
+  std::optional<std::uint16_t> tracker_port;
+  std::optional<std::uint16_t> can_port;
+  std::optional<std::uint16_t> can_peer_port;
+  bool start_when_streaming = false;
+  bool start_at_once = false;
+  bool needs_path = true;
+};
+
+struct LoadedSetup {
+  SimulationSetup simulation;
+  double speed = 1.0;
+};
+
+/// --config, --machine, --seed, --truth.
+void add_machine_options(CLI::App& app, SetupChoices& choices);
+
+/// BadInput with every fault of a file at once, Io for a file that cannot be read.
+[[nodiscard]] Result<LoadedSetup> load_setup(const SetupChoices& choices);
+
+}  // namespace abbe::sim

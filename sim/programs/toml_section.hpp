@@ -1,0 +1,70 @@
+#pragma once
+/// One table of a TOML file, read key by key. Every fault goes into one list ("file:line: table.key: what is
+/// wrong", at most 20), and keys that nobody asked for are faults of a strict table.
+
+#include <toml++/toml.h>
+#include <Eigen/Core>
+#include <cstdint>
+#include <optional>
+#include <set>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "abbe/sim/error.hpp"
+
+namespace abbe::sim {
+
+class TomlFaults {
+ public:
+  explicit TomlFaults(std::string file) : file_(std::move(file)) {}
+  void add(const toml::node* where, std::string_view key, std::string_view what);
+  [[nodiscard]] bool any() const { return count_ > 0; }
+  [[nodiscard]] Error error() const { return {ErrorCode::BadInput, text_}; }
+
+ private:
+  std::string file_;
+  std::string text_;
+  std::size_t count_ = 0;
+};
+
+struct NumberRange {
+  double least;
+  double most;
+};
+inline constexpr NumberRange kAnyNumber{-1e12, 1e12};
+inline constexpr NumberRange kPositiveNumber{1e-12, 1e12};
+inline constexpr NumberRange kNotNegativeNumber{0.0, 1e12};
+
+class TomlSection {
+ public:
+  /// `table` may be null: then every get() leaves its value alone.
+  TomlSection(const toml::table* table, std::string name, TomlFaults& faults)
+      : table_(table), name_(std::move(name)), faults_(faults) {}
+
+  [[nodiscard]] bool present() const { return table_ != nullptr; }
+  [[nodiscard]] TomlSection child(std::string_view key);
+  [[nodiscard]] std::vector<TomlSection> children(std::string_view key);  ///< of an array of tables
+
+  /// Each sets `value` and says true if the key is there and good. `scale` turns the file's unit into SI.
+  bool number(std::string_view key, double& value, double scale = 1.0, NumberRange range = kAnyNumber);
+  bool integer(std::string_view key, std::int64_t& value, std::int64_t least, std::int64_t most);
+  bool text(std::string_view key, std::string& value);
+  bool flag(std::string_view key, bool& value);
+  bool vector(std::string_view key, Eigen::Vector3d& value, double scale = 1.0);
+
+  void fault(std::string_view key, std::string_view what);
+  /// Keys that nobody asked for are faults from here on.
+  void refuse_unknown_keys();
+
+ private:
+  const toml::node* find(std::string_view key);
+  [[nodiscard]] std::string path_of(std::string_view key) const;
+
+  const toml::table* table_;
+  std::string name_;
+  TomlFaults& faults_;
+  std::set<std::string, std::less<>> known_;
+};
+
+}  // namespace abbe::sim

@@ -10,11 +10,6 @@ namespace abbe::drivers {
 using protocol::HostTime;
 using protocol::RawBlock;
 
-namespace {
-/// No node heard for so long: not "configuring" any more but "silent".
-constexpr std::chrono::seconds kSilentAfter{1};
-}  // namespace
-
 Result<std::unique_ptr<EncoderDevice>> EncoderDevice::create(const EncoderDeviceOptions& options,
                                                              std::unique_ptr<CanBus> bus,
                                                              const TimeSource& time) {
@@ -172,7 +167,7 @@ void EncoderDevice::account(HostTime now) {
 void EncoderDevice::show_state(HostTime now) {
   if (!open_) return;
   const auto ready = supervisor_.ready();
-  const bool heard = last_heard_ != HostTime{} && now - last_heard_ < kSilentAfter;
+  const bool heard = last_heard_ != HostTime{} && now - last_heard_ < options_.supervisor.silence;
   board_.set_connected(heard && !receiver_.bus_off());
   board_.set_state(receiver_.bus_off()                  ? "bus off"
                    : ready == supervisor_.nodes()       ? "streaming"

@@ -89,11 +89,10 @@ void EncoderSupervisor::configure(Node& node, HostTime now) {
 void EncoderSupervisor::on_frame(const can::CanFrame& frame, HostTime now) {
   for (auto& node : nodes_) {
     if (!is_from(node, frame)) continue;
-    node.heard = now;
-    if (const auto heartbeat = can::decode_heartbeat(frame)) {
+    if (frame.id == can::cob::tpdo(node.axis.tpdo, node.axis.node)) {
+      on_position(node, now);
+    } else if (const auto heartbeat = can::decode_heartbeat(frame)) {
       on_heartbeat(node, heartbeat->state, now);
-    } else if (node.state == State::Waiting && node.told == ConfigurationFault::Silent) {
-      configure(node, now);  // it is back
     }
     if (node.state != State::Configuring) continue;
     node.configurator.on_frame(frame, now);
@@ -101,12 +100,19 @@ void EncoderSupervisor::on_frame(const can::CanFrame& frame, HostTime now) {
   }
 }
 
+void EncoderSupervisor::on_position(Node& node, HostTime now) {
+  node.positions_at = now;
+  if (node.state == State::Ready) node.told = ConfigurationFault::None;
+}
+
 void EncoderSupervisor::on_heartbeat(Node& node, can::NodeState state, HostTime now) {
   if (state == can::NodeState::BootUp) {
     if (node.state != State::Configuring || now - node.started >= kBetweenStarts) configure(node, now);
     return;
   }
-  if (node.state == State::Waiting && node.told == ConfigurationFault::Silent) return configure(node, now);
+  if (node.state == State::Waiting && node.told == ConfigurationFault::Silent) {
+    return configure(node, now);  // it is back
+  }
   node.idle_beats = state == can::NodeState::Operational ? 0 : node.idle_beats + 1;
   if (node.state == State::Ready && node.idle_beats >= kIdleBeats) configure(node, now);
 }
@@ -122,10 +128,11 @@ void EncoderSupervisor::on_time(HostTime now) {
         follow(node, now);
         break;
       case State::Ready:
-        if (now - node.heard < options_.silence) break;
-        tell(node, ConfigurationFault::Silent,
-             fmt::format("encoder {} (node {}): listen: silent for {} ms", node.axis.name, node.axis.node,
-                         std::chrono::duration_cast<std::chrono::milliseconds>(options_.silence).count()));
+        if (now - node.positions_at < options_.silence) break;
+        tell(
+            node, ConfigurationFault::Silent,
+            fmt::format("encoder {} (node {}): listen: no position for {} ms", node.axis.name, node.axis.node,
+                        std::chrono::duration_cast<std::chrono::milliseconds>(options_.silence).count()));
         configure(node, now);
         break;
     }
@@ -135,8 +142,7 @@ void EncoderSupervisor::on_time(HostTime now) {
 void EncoderSupervisor::follow(Node& node, HostTime now) {
   if (node.configurator.state() == can::EncoderConfigurator::State::Ready) {
     node.state = State::Ready;
-    node.heard = now;
-    node.told = ConfigurationFault::None;
+    node.positions_at = now;
   } else if (node.configurator.state() == can::EncoderConfigurator::State::Failed) {
     node.state = State::Waiting;
     node.retry_at = now + options_.retry_after;
@@ -174,7 +180,7 @@ HostTime EncoderSupervisor::deadline() const {
   for (const auto& node : nodes_) {
     const auto due = node.state == State::Waiting       ? node.retry_at
                      : node.state == State::Configuring ? node.configurator.deadline()
-                                                        : node.heard + options_.silence;
+                                                        : node.positions_at + options_.silence;
     earliest = std::min(earliest, due);
   }
   return earliest;

@@ -19,7 +19,7 @@ namespace abbe::drivers {
 struct SupervisorOptions {
   std::uint16_t heartbeat_ms = 100;
   std::chrono::nanoseconds silence =
-      std::chrono::milliseconds{350};  ///< a configured node unheard for so long is lost
+      std::chrono::milliseconds{350};  ///< a ready node without positions for so long is lost
   std::chrono::nanoseconds retry_after = std::chrono::seconds{1};  ///< after a configuration that failed
   can::SdoClientOptions sdo{};
 };
@@ -39,7 +39,8 @@ class EncoderSupervisor {
 
   [[nodiscard]] std::size_t nodes() const { return nodes_.size(); }
   [[nodiscard]] std::size_t ready() const;
-  /// A fault not reported yet, in words; each node reports the same fault once until it was ready again.
+  /// A fault not reported yet, in words; each node reports the same fault once until its positions came
+  /// again.
   [[nodiscard]] std::optional<std::string> take_fault();
   /// Identifiers that nodes send with: what the bus must deliver.
   [[nodiscard]] std::vector<std::uint32_t> ids() const;
@@ -52,13 +53,14 @@ class EncoderSupervisor {
     State state = State::Waiting;
     protocol::HostTime started{};
     protocol::HostTime retry_at{};
-    protocol::HostTime heard{};
-    unsigned idle_beats = 0;  ///< heartbeats in a row that were not "operational"
+    protocol::HostTime positions_at{};  ///< when the latest came, or when it became ready
+    unsigned idle_beats = 0;            ///< heartbeats in a row that were not "operational"
     can::ConfigurationFault told = can::ConfigurationFault::None;
   };
 
   void configure(Node& node, protocol::HostTime now);
   void follow(Node& node, protocol::HostTime now);
+  void on_position(Node& node, protocol::HostTime now);
   void on_heartbeat(Node& node, can::NodeState state, protocol::HostTime now);
   void tell(Node& node, can::ConfigurationFault fault, std::string text);
   [[nodiscard]] static bool is_from(const Node& node, const can::CanFrame& frame);

@@ -1,0 +1,197 @@
+#include <gtest/gtest.h>
+#include <linux/can.h>
+
+#include <cstring>
+
+#include "abbe/drivers/can/linux_frame.hpp"
+#include "abbe/drivers/can/socket_can_bus.hpp"
+#include "abbe/drivers/can/udp_can_bus.hpp"
+#include "encoder_peer.hpp"
+
+namespace abbe::drivers {
+namespace {
+
+using namespace std::chrono_literals;
+using can::FrameFlag;
+using tests::EncoderPeer;
+
+constexpr std::array<std::uint32_t, 2> kIds{0x181, 0x701};
+
+/// A bus and a peer that know each other.
+struct UdpLine {
+  UdpLine() {
+    EXPECT_TRUE(bus.open(kIds).has_value());
+    const std::array hello{can::encode_sync()};
+    EXPECT_TRUE(bus.send(hello).has_value());
+    peer.serve({});
+  }
+  MonotonicTime time;
+  EncoderPeer peer{std::span<const can::EncoderIdentity>{}};
+  UdpCanBus bus{{.peer_port = peer.port()}, time};
+  std::array<ReceivedFrame, 64> frames{};
+};
+
+TEST(UdpCanBus, BindsToAPortTheKernelChose) {
+  UdpLine line;
+  EXPECT_NE(line.bus.local_port(), 0);
+  EXPECT_EQ(line.peer.syncs(), 1u);
+  line.bus.close();
+  EXPECT_EQ(line.bus.local_port(), 0);
+}
+
+TEST(UdpCanBus, DeliversOnlyTheIdentifiersAskedForAndErrorFrames) {
+  UdpLine line;
+  can::CanFrame error;
+  error.set(FrameFlag::Error);
+  error.id = 0x40;
+  auto extended = can::standard_frame(0x181, {1});
+  extended.set(FrameFlag::Extended);
+  const std::array sent{can::standard_frame(0x180, {1}), can::standard_frame(0x181, {2}), extended, error,
+                        can::standard_frame(0x701, {5})};
+  line.peer.send(sent);
+  const auto n = line.bus.read(line.frames, 1s);
+  ASSERT_TRUE(n.has_value());
+  ASSERT_EQ(*n, 3u);
+  EXPECT_EQ(line.frames[0].frame, sent[1]);
+  EXPECT_EQ(line.frames[1].frame, error);
+  EXPECT_EQ(line.frames[2].frame, sent[4]);
+}
+
+TEST(UdpCanBus, DatesFramesBetweenSendingAndReading) {
+  UdpLine line;
+  const auto before = line.time.now();
+  line.peer.send(std::array{can::standard_frame(0x181, {1})});
+  ASSERT_EQ(line.bus.read(line.frames, 1s).value_or(0), 1u);
+  EXPECT_LE(line.frames[0].time, line.time.now());
+  EXPECT_GE(line.frames[0].time, before - 200us);  // two clocks are read one after the other
+}
+
+TEST(UdpCanBus, HandsOutALargeDatagramInPieces) {
+  UdpLine line;
+  const std::vector<can::CanFrame> many(150, can::standard_frame(0x181, {1, 2, 3}));
+  line.peer.send(many);
+  std::size_t total = 0;
+  while (total < many.size()) {
+    const auto n = line.bus.read(line.frames, 1s);
+    ASSERT_TRUE(n.has_value());
+    ASSERT_GT(*n, 0u);
+    total += *n;
+  }
+  EXPECT_EQ(total, many.size());
+}
+
+TEST(UdpCanBus, CountsGarbageAndLostDatagrams) {
+  UdpLine line;
+  line.peer.send(std::array{can::standard_frame(0x181, {1})});
+  line.peer.skip_sequence(3);
+  line.peer.send_bytes(std::as_bytes(std::span{"no CAN at all"}));
+  line.peer.send(std::array{can::standard_frame(0x181, {2})});
+  std::size_t total = 0;
+  while (total < 2) {
+    const auto n = line.bus.read(line.frames, 1s);
+    ASSERT_TRUE(n.has_value());
+    ASSERT_GT(*n, 0u);
+    total += *n;
+  }
+  EXPECT_EQ(line.bus.counters().refused, 1u);
+  EXPECT_EQ(line.bus.counters().lost, 3u);
+}
+
+TEST(UdpCanBus, RefusesAddressesThatAreNone) {
+  MonotonicTime time;
+  UdpCanBus bad_address{{.peer_address = "machine", .peer_port = 1}, time};
+  const auto refused = bad_address.open(kIds);
+  ASSERT_FALSE(refused);
+  EXPECT_EQ(refused.error().code, ErrorCode::BadConfiguration);
+  UdpCanBus no_port{{.peer_port = 0}, time};
+  EXPECT_FALSE(no_port.open(kIds));
+}
+
+TEST(UdpCanBus, SaysWhichPortIsTaken) {
+  MonotonicTime time;
+  EncoderPeer holder{std::span<const can::EncoderIdentity>{}};
+  UdpCanBus bus{{.local_port = holder.port(), .peer_port = 9}, time};
+  const auto refused = bus.open(kIds);
+  ASSERT_FALSE(refused);
+  EXPECT_EQ(refused.error().code, ErrorCode::SystemRefused);
+  EXPECT_THAT(refused.error().text, testing::HasSubstr(std::to_string(holder.port())));
+}
+
+TEST(LinuxFrame, RoundTripsEveryKindOfFrame) {
+  auto fd = can::standard_frame(0x181, {1, 2, 3});
+  fd.set(FrameFlag::Fd);
+  fd.fd_flags = CANFD_BRS;
+  fd.length = 64;
+  auto extended = can::standard_frame(0, {9});
+  extended.set(FrameFlag::Extended);
+  extended.id = 0x1ABCDEF0;
+  auto remote = can::standard_frame(0x123, {0, 0, 0});
+  remote.set(FrameFlag::Remote);
+  can::CanFrame error;
+  error.set(FrameFlag::Error);
+  error.id = 0x1FF;
+  error.length = 8;
+  for (const auto& frame :
+       {can::standard_frame(0x605, {0x40, 4, 0x60, 0, 0, 0, 0, 0}), fd, extended, remote, error}) {
+    const auto out = to_linux(frame);
+    EXPECT_EQ(from_linux(out.frame, out.size), frame);
+  }
+}
+
+TEST(LinuxFrame, ReadsNothingFromShortReadsAndCutsWildLengths) {
+  canfd_frame wild{};
+  wild.len = 255;
+  EXPECT_FALSE(from_linux(wild, 7));
+  EXPECT_EQ(from_linux(wild, CAN_MTU)->length, 8);
+  EXPECT_EQ(from_linux(wild, CANFD_MTU)->length, 64);
+}
+
+TEST(LinuxFrame, FiltersMatchExactlyTheDataFramesAskedFor) {
+  const auto filters = filters_for(kIds);
+  ASSERT_EQ(filters.size(), kIds.size());
+  const auto passes = [&](canid_t id) {
+    return (id & filters[0].can_mask) == (filters[0].can_id & filters[0].can_mask);
+  };
+  EXPECT_TRUE(passes(0x181));
+  EXPECT_FALSE(passes(0x182));
+  EXPECT_FALSE(passes(0x181 | CAN_RTR_FLAG));
+  EXPECT_FALSE(passes(0x181 | CAN_EFF_FLAG));
+}
+
+TEST(SocketCanBus, SaysWhatTheSystemRefused) {
+  MonotonicTime time;
+  SocketCanBus bus{{.interface = "nocan99"}, time};
+  const auto opened = bus.open(kIds);
+  ASSERT_FALSE(opened);
+  EXPECT_EQ(opened.error().code, ErrorCode::SystemRefused);
+  EXPECT_THAT(opened.error().text, testing::HasSubstr("nocan99"));
+}
+
+/// On a machine with a virtual CAN interface: ip link add dev vcan0 type vcan; ip link set vcan0 up.
+TEST(SocketCanBus, CarriesFramesOverVcan) {
+  MonotonicTime time;
+  SocketCanBus receiver{{.interface = "vcan0"}, time};
+  SocketCanBus sender{{.interface = "vcan0"}, time};
+  if (const auto opened = receiver.open(kIds); !opened)
+    GTEST_SKIP() << "no CAN here: " << opened.error().text;
+  ASSERT_TRUE(sender.open({}).has_value());
+  auto fd = can::standard_frame(0x701, {1});
+  fd.set(FrameFlag::Fd);
+  const std::array sent{can::standard_frame(0x181, {1, 2}), can::standard_frame(0x182, {3}), fd};
+  const auto before = time.now();
+  ASSERT_TRUE(sender.send(sent).has_value());
+  std::array<ReceivedFrame, 8> frames{};
+  std::size_t total = 0;
+  while (total < 2) {
+    const auto n = receiver.read(std::span{frames}.subspan(total), 1s);
+    ASSERT_TRUE(n.has_value());
+    ASSERT_GT(*n, 0u);
+    total += *n;
+  }
+  EXPECT_EQ(frames[0].frame, sent[0]);
+  EXPECT_EQ(frames[1].frame, fd);
+  EXPECT_GE(frames[0].time, before - 200us);
+}
+
+}  // namespace
+}  // namespace abbe::drivers

@@ -1,0 +1,271 @@
+#include <gtest/gtest.h>
+
+#include <cstring>
+
+#include "abbe/drivers/can/encoder_device.hpp"
+#include "abbe/drivers/can/udp_can_bus.hpp"
+#include "abbe/protocol/can/error_frame.hpp"
+#include "encoder_peer.hpp"
+
+namespace abbe::drivers {
+namespace {
+
+using namespace std::chrono_literals;
+using can::EncoderIdentity;
+using protocol::AxisSample;
+using protocol::RawBlock;
+using protocol::SampleFlag;
+using tests::EncoderPeer;
+
+/// Two nodes and the device on one stepped clock. A turn is 1 ms, a SYNC period 4 ms.
+class EncoderDeviceOnUdp : public testing::Test {
+ protected:
+  static constexpr auto kTurn = 1ms;
+
+  explicit EncoderDeviceOnUdp(std::vector<EncoderIdentity> identities = {{.node = 1}, {.node = 2}})
+      : peer(identities) {
+    EncoderDeviceOptions options;
+    options.receiver.axes = {{.name = "X", .node = 1}, {.name = "Y", .node = 2}};
+    options.receiver.sync_period = 4ms;
+    auto made = EncoderDevice::create(
+        options, std::make_unique<UdpCanBus>(UdpCanOptions{.peer_port = peer.port(), .speed = 0.0}, time),
+        time);
+    EXPECT_TRUE(made.has_value());
+    device = std::move(*made);
+  }
+
+  void turn() {
+    peer.serve(time.now());
+    peer.answer_sync();
+    device->wait(kTurn);
+    device->receive();
+    time.advance(kTurn);
+    std::array<AxisSample, 64> out{};
+    const auto n = device->samples().pop(out);
+    samples.insert(samples.end(), out.begin(), out.begin() + static_cast<std::ptrdiff_t>(n));
+    std::array<RawBlock, 256> blocks;  // NOLINT: filled by pop
+    const auto raw_count = device->raw().pop(blocks);
+    raw.insert(raw.end(), blocks.begin(), blocks.begin() + static_cast<std::ptrdiff_t>(raw_count));
+  }
+  void turns(int n) {
+    for (int i = 0; i < n; ++i) turn();
+  }
+  template <class Done>
+  bool turns_until(Done done, int limit = 5000) {
+    for (int i = 0; i < limit && !done(); ++i) turn();
+    return done();
+  }
+  bool state_becomes(std::string_view state) {
+    return turns_until([&] { return device->status().state == state; });
+  }
+  void begin_streaming() {
+    ASSERT_TRUE(state_becomes("streaming")) << device->status().last_fault;
+    ASSERT_TRUE(turns_until([&] { return !samples.empty() && samples.back().missing_mask == 0; }));
+    samples.clear();
+  }
+
+  SteppedTime time;
+  EncoderPeer peer;
+  std::unique_ptr<EncoderDevice> device;
+  std::vector<AxisSample> samples;
+  std::vector<RawBlock> raw;
+};
+
+TEST_F(EncoderDeviceOnUdp, ConfiguresAllNodesAndStreams) {
+  begin_streaming();
+  EXPECT_TRUE(device->status().connected);
+  EXPECT_EQ(device->status().faults, 0u);
+  for (const std::size_t i : {0u, 1u}) {
+    EXPECT_EQ(peer.node(i).objects.tpdo(1).transmission_type, 1);
+    EXPECT_FALSE(peer.node(i).objects.tpdo(2).enabled);
+    EXPECT_EQ(peer.node(i).state, can::NodeState::Operational);
+  }
+}
+
+TEST_F(EncoderDeviceOnUdp, GivesPositionsInMetresByTheStepOfTheEncoder) {
+  begin_streaming();
+  peer.move_to(123456);
+  turns(8);
+  EXPECT_EQ(samples.back().count[1], 123456);
+  EXPECT_DOUBLE_EQ(samples.back().position[1], 123456 * 10e-9);
+}
+
+TEST_F(EncoderDeviceOnUdp, SendsTheSyncOnItsGridWithoutDrift) {
+  begin_streaming();
+  turns(100);
+  ASSERT_GT(samples.size(), 20u);
+  for (std::size_t i = 1; i < samples.size(); ++i)
+    EXPECT_EQ(samples[i].head.time - samples[i - 1].head.time, 4ms);
+}
+
+TEST_F(EncoderDeviceOnUdp, LeavesOutSyncsItCannotServeAndStaysOnTheGrid) {
+  begin_streaming();
+  turns(8);
+  const auto before = samples.back().head.time;
+  time.advance(13ms);  // the thread was not scheduled
+  turns(12);
+  const auto gap = std::find_if(samples.begin(), samples.end(),
+                                [](const auto& s) { return has(s.head.flags, SampleFlag::GapBefore); });
+  ASSERT_NE(gap, samples.end());
+  EXPECT_GT(gap->head.lost_before, 0u);
+  EXPECT_GT(device->status().gaps, 0u);
+  EXPECT_EQ((samples.back().head.time - before) % 4ms, 0ns);
+}
+
+TEST_F(EncoderDeviceOnUdp, GoesOnWithTheOtherAxisWhenOneIsMute) {
+  begin_streaming();
+  peer.node(1).mute = true;
+  ASSERT_TRUE(state_becomes("degraded"));
+  EXPECT_THAT(device->status().last_fault, testing::HasSubstr("encoder Y (node 2)"));
+  samples.clear();
+  turns(20);
+  ASSERT_FALSE(samples.empty());
+  EXPECT_EQ(samples.back().missing_mask, 0b10);
+  peer.node(1).mute = false;
+  ASSERT_TRUE(state_becomes("streaming"));
+  turns(10);
+  EXPECT_EQ(samples.back().missing_mask, 0);
+}
+
+TEST_F(EncoderDeviceOnUdp, ReconfiguresANodeThatBootedAnew) {
+  begin_streaming();
+  peer.restart();
+  EXPECT_NE(peer.node(0).objects.tpdo(1).transmission_type, 1);
+  ASSERT_TRUE(turns_until([&] {
+    return std::any_of(samples.begin(), samples.end(),
+                       [](const auto& s) { return has(s.head.flags, SampleFlag::Restarted); });
+  }));
+  ASSERT_TRUE(state_becomes("streaming"));
+  EXPECT_EQ(peer.node(0).objects.tpdo(1).transmission_type, 1);
+}
+
+TEST_F(EncoderDeviceOnUdp, ReconfiguresANodeThatStandsIdle) {
+  begin_streaming();
+  peer.node(0).state = can::NodeState::PreOperational;
+  ASSERT_TRUE(turns_until([&] { return peer.node(0).state == can::NodeState::Operational; }));
+  ASSERT_TRUE(state_becomes("streaming"));
+}
+
+TEST_F(EncoderDeviceOnUdp, RefusesADeviceOfAnotherTypeByName) {
+  peer.node(1).objects.set_number(can::object::kDeviceType, 0x00020192);
+  ASSERT_TRUE(state_becomes("degraded"));
+  EXPECT_THAT(device->status().last_fault,
+              testing::AllOf(testing::HasSubstr("encoder Y (node 2)"), testing::HasSubstr("no encoder"),
+                             testing::HasSubstr("00020192")));
+}
+
+TEST_F(EncoderDeviceOnUdp, RefusesAnEncoderWhoseStepIsZero) {
+  peer.node(0).objects.set_number(can::object::kPositionStep, 0);
+  peer.node(0).objects.set_number(can::object::kMeasuringStep, 0);
+  ASSERT_TRUE(state_becomes("degraded"));
+  EXPECT_THAT(device->status().last_fault, testing::HasSubstr("encoder X (node 1)"));
+  EXPECT_THAT(device->status().last_fault, testing::HasSubstr("no measuring step"));
+}
+
+TEST_F(EncoderDeviceOnUdp, ReportsAMuteNodeOnceNotEveryRetry) {
+  peer.node(1).mute = true;
+  ASSERT_TRUE(state_becomes("degraded"));
+  turns(8000);
+  EXPECT_EQ(device->status().faults, 1u);
+}
+
+TEST_F(EncoderDeviceOnUdp, SaysBusOffAndStopsTheSync) {
+  begin_streaming();
+  const std::array off{
+      can::encode_error_frame({.conditions = static_cast<can::BusConditions>(can::BusCondition::BusOff)})};
+  peer.send(off);
+  ASSERT_TRUE(state_becomes("bus off"));
+  EXPECT_FALSE(device->status().connected);
+  EXPECT_TRUE(has(samples.back().head.flags, SampleFlag::BusOff));
+  EXPECT_EQ(samples.back().missing_mask, 0b11);
+}
+
+TEST_F(EncoderDeviceOnUdp, ResetsAndReconfiguresTheNodesAfterBusOff) {
+  begin_streaming();
+  for (auto condition : {can::BusCondition::BusOff, can::BusCondition::Restarted}) {
+    const std::array frame{
+        can::encode_error_frame({.conditions = static_cast<can::BusConditions>(condition)})};
+    peer.send(frame);
+    device->wait(kTurn);
+    device->receive();
+  }
+  turns(3);
+  EXPECT_TRUE(std::any_of(peer.nmt().begin(), peer.nmt().end(), [](const auto& m) {
+    return m.command == can::NmtCommand::ResetCommunication && m.node == can::kAllNodes;
+  }));
+  samples.clear();
+  ASSERT_TRUE(state_becomes("streaming"));
+  ASSERT_TRUE(turns_until([&] { return !samples.empty() && samples.back().missing_mask == 0; }));
+}
+
+TEST_F(EncoderDeviceOnUdp, CountsDatagramsThatAreMissing) {
+  begin_streaming();
+  const auto before = device->status().gaps;
+  peer.skip_sequence(5);
+  turns(10);
+  EXPECT_EQ(device->status().gaps, before + 5);
+}
+
+TEST_F(EncoderDeviceOnUdp, SurvivesAFloodOfPositions) {
+  begin_streaming();
+  const std::vector<can::CanFrame> flood(4000, can::encode_position(0x181, can::PositionType::Signed32, 5));
+  peer.send(flood);
+  turns(40);
+  EXPECT_EQ(samples.back().missing_mask, 0);
+  EXPECT_EQ(device->status().state, "streaming");
+}
+
+TEST_F(EncoderDeviceOnUdp, ReplaysItsRawBytesToTheSameSamples) {
+  begin_streaming();
+  peer.node(1).mute = true;
+  turns(50);
+  peer.node(1).mute = false;
+  peer.move_to(-77);
+  turns(2000);
+  const auto options = [] {
+    EncoderReceiverOptions o;
+    o.axes = {{.name = "X", .node = 1}, {.name = "Y", .node = 2}};
+    o.sync_period = 4ms;
+    return o;
+  }();
+  EncoderReceiver replay{options};
+  std::vector<AxisSample> replayed;
+  for (const auto& block : raw) replay.on_raw(block, [&](const AxisSample& s) { replayed.push_back(s); });
+  ASSERT_GT(replayed.size(), samples.size());  // begin_streaming() forgot the first ones
+  const auto* tail = &replayed[replayed.size() - samples.size()];
+  for (std::size_t i = 0; i < samples.size(); ++i) {
+    EXPECT_EQ(tail[i].head.time, samples[i].head.time);
+    EXPECT_EQ(tail[i].head.flags, samples[i].head.flags);
+    EXPECT_EQ(tail[i].missing_mask, samples[i].missing_mask);
+    EXPECT_EQ(tail[i].count, samples[i].count);
+    EXPECT_EQ(std::memcmp(&tail[i].position, &samples[i].position, sizeof samples[i].position), 0);
+  }
+}
+
+TEST(EncoderDevice, RefusesABadConfiguration) {
+  SteppedTime time;
+  EXPECT_FALSE(EncoderDevice::create({}, std::make_unique<UdpCanBus>(UdpCanOptions{}, time), time));
+}
+
+TEST(EncoderDevice, SaysThatNobodyListensAndGoesOnTrying) {
+  SteppedTime time;
+  std::uint16_t port = 0;
+  { port = EncoderPeer{std::span<const EncoderIdentity>{}}.port(); }  // closed again: nobody is there
+  EncoderDeviceOptions options;
+  options.receiver.axes = {{.name = "X", .node = 1}};
+  auto device = EncoderDevice::create(
+      options, std::make_unique<UdpCanBus>(UdpCanOptions{.peer_port = port, .speed = 0.0}, time), time);
+  ASSERT_TRUE(device.has_value());
+  for (int i = 0; i < 3000; ++i) {
+    (*device)->wait(1ms);
+    (*device)->receive();
+    time.advance(1ms);
+  }
+  const auto status = (*device)->status();
+  EXPECT_FALSE(status.connected);
+  EXPECT_EQ(status.samples, 0u);
+  EXPECT_GE(status.faults, 1u);
+}
+
+}  // namespace
+}  // namespace abbe::drivers

@@ -98,50 +98,67 @@ void ClockModel::fit() ABBE_RT {
   const auto lowest = std::min_element(begin, end, [&](auto& a, auto& b) { return height(a) < height(b); });
   pivot_s_ = lowest->device_s;
   offset_s_ = lowest->offset_s;
-  if (count_ == 1) touch_begin_s_ = touch_end_s_ = pivot_s_;
+  if (count_ == 1) quarter_s_ = three_quarters_s_ = pivot_s_;
   judge_lateness();
 }
 
-/// The highest line below all points at their mean time: the edge of the lower convex hull above that time
-/// (monotone chain, [Andrew 1979]).
+/// Lower convex hull by monotone chain ([Andrew 1979]); the slope is that of the chord between the hull's
+/// heights at a quarter and at three quarters of the observed time. The one edge over the middle is the
+/// better line for exponential delays only if it is long; the chord scatters less for every kind of delay
+/// that was tried (by 10 to 20 %).
 void ClockModel::fit_slope() ABBE_RT {
-  std::array<std::uint16_t, kPoints> hull;  // NOLINT: filled below, `size` says how far
-  std::size_t size = 0;
+  const std::size_t size = find_hull();
+  const double begin_s = points_[0].device_s;
+  const double span_s = points_[count_ - 1].device_s - begin_s;
+  quarter_s_ = begin_s + 0.25 * span_s;
+  three_quarters_s_ = begin_s + 0.75 * span_s;
+  const double free_slope = (hull_height(size, three_quarters_s_) - hull_height(size, quarter_s_)) /
+                            (three_quarters_s_ - quarter_s_);
+  slope_ = std::clamp(free_slope, -options_.max_skew, options_.max_skew);
+}
+
+std::size_t ClockModel::find_hull() ABBE_RT {
   const auto turns_down = [this](const Point& a, const Point& b, const Point& c) {
     return (b.device_s - a.device_s) * (c.offset_s - a.offset_s) <=
            (b.offset_s - a.offset_s) * (c.device_s - a.device_s);
   };
-  double mean_s = 0.0;
+  std::size_t size = 0;
   for (std::size_t i = 0; i < count_; ++i) {
-    while (size >= 2 && turns_down(points_[hull[size - 2]], points_[hull[size - 1]], points_[i])) --size;
-    hull[size++] = static_cast<std::uint16_t>(i);
-    mean_s += points_[i].device_s / static_cast<double>(count_);
+    while (size >= 2 && turns_down(points_[hull_[size - 2]], points_[hull_[size - 1]], points_[i])) --size;
+    hull_[size++] = static_cast<std::uint16_t>(i);
   }
-  std::size_t edge = 0;
-  while (edge + 2 < size && points_[hull[edge + 1]].device_s < mean_s) ++edge;
-  const Point& a = points_[hull[edge]];
-  const Point& b = points_[hull[edge + 1]];
-  const double free_slope = (b.offset_s - a.offset_s) / (b.device_s - a.device_s);
-  slope_ = std::clamp(free_slope, -options_.max_skew, options_.max_skew);
-  touch_begin_s_ = a.device_s;
-  touch_end_s_ = b.device_s;
+  return size;
 }
 
-/// Mean delay above the line from the median (one stalled packet must not shake it): an exponential
-/// distribution has median = mean ln 2. The lowest of n such delays lies mean / n above zero, on average and
-/// in standard deviation.
+double ClockModel::hull_height(std::size_t hull_size, double device_s) const ABBE_RT {
+  std::size_t edge = 0;
+  while (edge + 2 < hull_size && points_[hull_[edge + 1]].device_s < device_s) ++edge;
+  const Point& a = points_[hull_[edge]];
+  const Point& b = points_[hull_[edge + 1]];
+  return a.offset_s + (device_s - a.device_s) * (b.offset_s - a.offset_s) / (b.device_s - a.device_s);
+}
+
+/// How far the line lies above the true envelope, from how densely arrivals crowd above it: q, the lateness
+/// of the tenth. If delays crowd towards their smallest (exponential), the lowest of many is late by 0.1 q;
+/// if they thin out towards it (a point's age in its packet plus an exponential), by 0.3 q; the freedom of
+/// the slope adds to both.
+/// Lowered by q / 2 with u = q / 2, the error over its uncertainty has root mean square 0.8 to 1.1 for either
+/// kind and mean jitters of 0.5 to 8 ms (400 runs each). An order statistic, so that stalled packets shake
+/// nothing.
 void ClockModel::judge_lateness() ABBE_RT {
-  std::array<double, kPoints> lateness;  // NOLINT: filled below
+  std::array<double, kPoints> lateness{};
   for (std::size_t i = 0; i < count_; ++i) lateness[i] = points_[i].offset_s - line_at(points_[i].device_s);
-  const auto middle = lateness.begin() + static_cast<std::ptrdiff_t>(count_ / 2);
-  std::nth_element(lateness.begin(), middle, lateness.begin() + static_cast<std::ptrdiff_t>(count_));
+  const auto begin = lateness.begin();
+  const auto end = begin + static_cast<std::ptrdiff_t>(count_);
+  const auto middle = begin + static_cast<std::ptrdiff_t>(count_ / 2);
+  std::nth_element(begin, middle, end);
+  median_lateness_s_ = *middle;
+  const auto tenth = begin + static_cast<std::ptrdiff_t>(std::min<std::size_t>(count_ - 1, 10));
+  std::nth_element(begin, tenth, end);
   const double n = static_cast<double>(count_);
-  constexpr double kLn2 = 0.693147180559945309;
-  mean_lateness_s_ = *middle / kLn2;
-  u_touch_s_ =
-      2.0 * (kPriorLateness_s + n * mean_lateness_s_) / (1.0 + n) / n;  // 2: each end rests on half of them
-  const double span_s = points_[count_ - 1].device_s - points_[0].device_s;
-  const double lever_s = std::max(touch_end_s_ - touch_begin_s_, span_s / 4.0);
+  lowered_s_ = 0.5 * *tenth;
+  u_touch_s_ = std::hypot(0.5 * *tenth, kPriorLateness_s / (n * n));
+  const double lever_s = three_quarters_s_ - quarter_s_;
   const double u_limit = options_.max_skew / std::sqrt(3.0);  // rectangular within the bound
   u_slope_ = lever_s > 0.0 ? std::min(u_limit, std::sqrt(2.0) * u_touch_s_ / lever_s) : u_limit;
 }
@@ -154,11 +171,11 @@ HostInstant ClockModel::to_host(protocol::DeviceTime t) const ABBE_RT {
   if (count_ == 0) return {protocol::HostTime{}, kNothingKnown, false};
   const double device_s = seconds(t - origin_device_);
   const double bound_s = seconds(options_.max_constant_delay);
-  const double outside_s = std::max({0.0, touch_begin_s_ - device_s, device_s - touch_end_s_});
+  const double outside_s = std::max({0.0, quarter_s_ - device_s, device_s - three_quarters_s_});
   const double u_constant_s =
       bound_s / std::sqrt(12.0);  // rectangular over [0, bound], estimate in its middle
   const double u_s = std::hypot(u_constant_s, u_touch_s_, u_slope_ * outside_s);
-  return {origin_host_ + (t - origin_device_) + nanoseconds(line_at(device_s) - bound_s / 2.0),
+  return {origin_host_ + (t - origin_device_) + nanoseconds(line_at(device_s) - lowered_s_ - bound_s / 2.0),
           nanoseconds(u_s), settled()};
 }
 
@@ -170,7 +187,7 @@ ClockStatus ClockModel::status() const ABBE_RT {
   if (count_ == 0) return {.restarts = restarts_};
   return {.settled = settled(),
           .skew = -slope_,  // offset falls where the device clock runs fast
-          .residual = nanoseconds(mean_lateness_s_),
+          .residual = nanoseconds(median_lateness_s_),
           .u_time = to_host(origin_device_ + nanoseconds(last_device_s_)).u_time,
           .restarts = restarts_};
 }

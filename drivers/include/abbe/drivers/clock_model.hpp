@@ -1,11 +1,11 @@
 #pragma once
 /// From a device's own clock to host time, learned from arrivals. An arrival is never early: it comes after
-/// the instant it reports by a delay >= 0, so arrival - device time lies above a straight line (offset and
-/// skew) and touches it when the delay is smallest. The model is the highest line below all arrivals of the
-/// last minute: the lower convex hull's edge over the mean device time, with the skew held within a bound.
-/// The smallest delay itself cannot be seen; it is somewhere in [0, max_constant_delay]. The estimate is
-/// centred in that interval, which enters the uncertainty as a rectangular distribution ([GUM] 4.3.7).
-/// Deterministic, fixed memory, no allocation. One thread.
+/// the instant it reports by a delay >= 0, so (arrival - device time) lies above a straight line (offset and
+/// skew) and comes near it when the delay is smallest. The model is a line below all arrivals of the last
+/// minute that touches the lowest; its slope is that of their lower convex hull, held within a bound. The
+/// smallest delay itself cannot be seen; it is somewhere in [0, max_constant_delay]. The estimate is centred
+/// in that interval, which enters the uncertainty as a rectangular distribution ([GUM] 4.3.7). Deterministic,
+/// fixed memory, no allocation. One thread.
 
 #include <array>
 #include <chrono>
@@ -71,6 +71,9 @@ class ClockModel {
   void forget_before(double device_s) ABBE_RT;
   void fit() ABBE_RT;
   void fit_slope() ABBE_RT;
+  /// Indices of the hull's points go to hull_; returns how many.
+  std::size_t find_hull() ABBE_RT;
+  [[nodiscard]] double hull_height(std::size_t hull_size, double device_s) const ABBE_RT;
   void judge_lateness() ABBE_RT;
   [[nodiscard]] double line_at(double device_s) const ABBE_RT;
   [[nodiscard]] bool settled() const ABBE_RT;
@@ -79,15 +82,17 @@ class ClockModel {
   protocol::DeviceTime origin_device_{};
   protocol::HostTime origin_host_{};
   std::array<Point, kPoints> points_{};
+  std::array<std::uint16_t, kPoints> hull_{};  ///< scratch of fit_slope()
   std::size_t count_ = 0;
   std::uint64_t restarts_ = 0;
   double last_device_s_ = 0.0;
   double offset_s_ = 0.0;  ///< of the line at device_s = pivot_s_
   double pivot_s_ = 0.0;
-  double slope_ = 0.0;          ///< d offset / d device time
-  double touch_begin_s_ = 0.0;  ///< the hull edge the line lies on
-  double touch_end_s_ = 0.0;
-  double mean_lateness_s_ = 0.0;
+  double slope_ = 0.0;             ///< d offset / d device time
+  double quarter_s_ = 0.0;         ///< of the observed device time: the slope is that between here ...
+  double three_quarters_s_ = 0.0;  ///< ... and here
+  double median_lateness_s_ = 0.0;
+  double lowered_s_ = 0.0;  ///< what the line is taken to lie above the true envelope
   double u_touch_s_ = 0.0;  ///< standard uncertainty of the line where it touches
   double u_slope_ = 0.0;
   bool late_ = false;  ///< arrivals are later than any delay explains, since late_since_

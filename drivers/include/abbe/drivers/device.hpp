@@ -17,7 +17,7 @@ namespace abbe::drivers {
 struct ClockStatus {
   bool settled = false;
   double skew = 0.0;                    ///< device clock rate - 1, relative to the host
-  std::chrono::nanoseconds residual{};  ///< mean lateness of arrivals over the lower envelope
+  std::chrono::nanoseconds residual{};  ///< median lateness of arrivals over the lower envelope
   std::chrono::nanoseconds u_time{};    ///< standard uncertainty of the latest mapping
   std::uint64_t restarts = 0;           ///< times the device clock jumped or began anew
 };

@@ -1,0 +1,145 @@
+#include "abbe/calib/gauge.hpp"
+
+#include <gtest/gtest.h>
+
+#include <Eigen/Dense>
+#include <functional>
+
+#include "abbe/calib/model_comparison.hpp"
+#include "abbe/calib/rigid_body_model.hpp"
+#include "otf_run.hpp"
+
+namespace {
+using namespace abbe::calib;
+using namespace abbe::tests::otf;
+
+const Vector3 kTarget(0.02, -0.015, -0.12);
+const std::vector<Vector3> kThreeTargets{kTarget, {0.1, 0.03, -0.05}, {-0.04, 0.09, -0.2}};
+
+/// Nullity of complete 3D data, by singular values: `extra_runs` adds three unknown offset corrections for
+/// every target but the first; `keep` chooses columns.
+std::size_t nullity(const ParameterLayout& layout, std::span<const Vector3> targets, bool unknown_offsets,
+                    const std::function<bool(std::size_t)>& keep) {
+  const std::vector<Vector3> grid = tensor_grid(layout.nodes());
+  const std::size_t columns = layout.fit_size() + (unknown_offsets ? 3 * (targets.size() - 1) : 0);
+  const auto n = static_cast<Eigen::Index>(columns);
+  Eigen::MatrixXd A = Eigen::MatrixXd::Zero(static_cast<Eigen::Index>(3 * grid.size() * targets.size()), n);
+  Eigen::Index row = 0;
+  for (std::size_t run = 0; run < targets.size(); ++run) {
+    for (const Vector3& q : grid) {
+      const DesignColumns design = design_columns_with_rigid(layout, q, targets[run]);
+      for (const Column& c : design.span()) {
+        A.block<3, 1>(row, static_cast<Eigen::Index>(c.parameter)) = c.dV_dU;
+      }
+      if (unknown_offsets && run > 0) {
+        A.block<3, 3>(row, static_cast<Eigen::Index>(layout.fit_size() + 3 * (run - 1))).setIdentity();
+      }
+      row += 3;
+    }
+  }
+  std::vector<Eigen::Index> kept;
+  for (std::size_t i = 0; i < columns; ++i) {
+    if (keep(i)) {
+      kept.push_back(static_cast<Eigen::Index>(i));
+    }
+  }
+  const Eigen::MatrixXd chosen = A(Eigen::all, kept);
+  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(chosen.transpose() * chosen,
+                                                             Eigen::EigenvaluesOnly);
+  return static_cast<std::size_t>(
+      (eigen.eigenvalues().array() < 1e-11 * eigen.eigenvalues().maxCoeff()).count());
+}
+
+const auto everything = [](std::size_t) { return true; };
+
+class Nullity : public testing::TestWithParam<const char*> {
+ protected:
+  otf::Machine machine_ = coarse_machine(GetParam());
+  ParameterLayout one_target_ = layout_of(machine_);
+  ParameterLayout all_ = *ParameterLayout::all_tables(machine_.chain, machine_.nodes);
+};
+INSTANTIATE_TEST_SUITE_P(Chains, Nullity,
+                         testing::Values("[w b X Y Z t]", "[w b X Z Y t]", "[w b Y X Z t]", "[w b Y Z X t]",
+                                         "[w b Z X Y t]", "[w b Z Y X t]"));
+
+TEST_P(Nullity, Of14TablesSquarenessAndRigidIs20) {
+  EXPECT_EQ(nullity(one_target_, std::array{kTarget}, false, everything), 20u);
+}
+
+TEST_P(Nullity, Of14TablesAndSquarenessIs14) {
+  EXPECT_EQ(nullity(one_target_, std::array{kTarget}, false,
+                    [&](std::size_t i) { return i < one_target_.rigid_offset(); }),
+            14u);
+}
+
+TEST_P(Nullity, Of14TablesAloneIs11) {
+  EXPECT_EQ(nullity(one_target_, std::array{kTarget}, false,
+                    [&](std::size_t i) { return i < one_target_.squareness_offset(); }),
+            11u);
+}
+
+TEST_P(Nullity, Of18TablesAndOneTargetGrowsWithTheNodesOfTheLastAxes) {
+  const std::array<Axis, 3>& order = machine_.chain.order_w_to_t();
+  EXPECT_EQ(nullity(all_, std::array{kTarget}, false, everything),
+            20 + all_.node_count(order[1]) + 3 * all_.node_count(order[2]));
+}
+
+TEST_P(Nullity, Of18TablesAndThreeKnownTargetsIs21) {
+  EXPECT_EQ(nullity(all_, kThreeTargets, false, everything), 21u);
+}
+
+TEST_P(Nullity, Of18TablesAndThreeTargetsOfUnknownOffsetIs24) {
+  EXPECT_EQ(nullity(all_, kThreeTargets, true, everything), 24u);
+}
+
+TEST_P(Nullity, IsSpannedByTheUnobservableCombinations) {
+  const Eigen::MatrixXd N = unobservable_combinations(one_target_, std::array{kTarget});
+  ASSERT_EQ(N.cols(), 20);
+  const DesignColumns design = design_columns_with_rigid(one_target_, Vector3(0.11, -0.13, -0.17), kTarget);
+  Eigen::MatrixXd seen = Eigen::MatrixXd::Zero(3, 20);
+  for (const Column& c : design.span()) {
+    seen += c.dV_dU * N.row(static_cast<Eigen::Index>(c.parameter));
+  }
+  EXPECT_LT(seen.norm(), 1e-11 * N.norm());
+}
+
+TEST_P(Nullity, IsRemovedExactlyByGaugeG1) {
+  const Eigen::MatrixXd K = gauge_conditions(Gauge::G1, one_target_);
+  EXPECT_EQ(K.rows(), 20);
+  const Eigen::MatrixXd KN =
+      K * unobservable_combinations(one_target_, std::array{kTarget}).colwise().normalized();
+  Eigen::ColPivHouseholderQR<Eigen::MatrixXd> factor(KN);
+  EXPECT_EQ(factor.setThreshold(1e-9).rank(), 20);
+}
+
+TEST(GaugeG1, Has24ConditionsFor18Tables) {
+  const otf::Machine machine = case_a_machine();
+  EXPECT_EQ(gauge_conditions(Gauge::G1, *ParameterLayout::all_tables(machine.chain, machine.nodes)).rows(),
+            24);
+}
+
+TEST(GaugeG1, ConversionMeetsTheConditionsAndChangesNoMeasurement) {
+  const otf::Machine machine = coarse_machine("[w X' b Y Z t]");
+  const ParameterLayout layout = layout_of(machine);
+  std::mt19937_64 random(5);
+  Eigen::VectorXd U = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(layout.fit_size()));
+  U.head(static_cast<Eigen::Index>(layout.model_size())) = random_tables(layout, 1e-4, random);
+  const Eigen::VectorXd G1 = to_gauge(Gauge::G1, layout, kTarget, U);
+  EXPECT_LT((gauge_conditions(Gauge::G1, layout) * G1).norm(), 1e-15);
+  const DesignColumns design = design_columns_with_rigid(layout, Vector3(0.2, 0.1, -0.05), kTarget);
+  Vector3 change = Vector3::Zero();
+  for (const Column& c : design.span()) {
+    change += c.dV_dU * (G1 - U)(static_cast<Eigen::Index>(c.parameter));
+  }
+  EXPECT_LT(change.norm(), 1e-15);
+}
+
+TEST(GaugeG1, LeavesTheReferenceTablesAsTheyAre) {
+  const otf::Machine machine = case_a_machine();
+  const ParameterLayout layout = layout_of(machine);
+  Eigen::VectorXd U = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(layout.fit_size()));
+  U.head(163) = case_a_tables(TableColumn::Truth);
+  EXPECT_LT((gauge_conditions(Gauge::G1, layout) * U).cwiseAbs().maxCoeff(), 1e-15);
+}
+
+}  // namespace

@@ -4,6 +4,7 @@
 
 #include "abbe/drivers/can/encoder_device.hpp"
 #include "abbe/drivers/can/udp_can_bus.hpp"
+#include "abbe/drivers/device_thread.hpp"
 #include "abbe/protocol/can/error_frame.hpp"
 #include "encoder_peer.hpp"
 
@@ -240,6 +241,36 @@ TEST_F(EncoderDeviceOnUdp, ReplaysItsRawBytesToTheSameSamples) {
     EXPECT_EQ(tail[i].count, samples[i].count);
     EXPECT_EQ(std::memcmp(&tail[i].position, &samples[i].position, sizeof samples[i].position), 0);
   }
+}
+
+TEST(EncoderDevice, StreamsInItsOwnThreadOnTheRealClock) {
+  const std::array identities{EncoderIdentity{.node = 1}, EncoderIdentity{.node = 2}};
+  EncoderPeer peer{identities};
+  MonotonicTime time;
+  EncoderDeviceOptions options;
+  options.receiver.axes = {{.name = "X", .node = 1}, {.name = "Y", .node = 2}};
+  auto device = EncoderDevice::create(
+      options, std::make_unique<UdpCanBus>(UdpCanOptions{.peer_port = peer.port()}, time), time);
+  ASSERT_TRUE(device.has_value());
+  auto thread = DeviceThread::start(**device, {.name = "encoders"});
+  ASSERT_TRUE(thread.has_value());
+  std::vector<AxisSample> complete;
+  const auto give_up = time.now() + 60s;
+  while (complete.size() < 50 && time.now() < give_up) {
+    peer.wait(1);
+    peer.serve(time.now());
+    peer.answer_sync();
+    std::array<AxisSample, 16> out{};
+    const auto n = (*device)->samples().pop(out);
+    std::copy_if(out.begin(), out.begin() + static_cast<std::ptrdiff_t>(n), std::back_inserter(complete),
+                 [](const AxisSample& s) { return s.missing_mask == 0; });
+    EXPECT_EQ((*device)->status().name, "encoders");
+  }
+  (*thread)->stop();
+  EXPECT_FALSE((*thread)->failure());
+  ASSERT_GE(complete.size(), 50u) << (*device)->status().last_fault;
+  for (std::size_t i = 1; i < complete.size(); ++i)
+    EXPECT_LT(complete[i - 1].head.time, complete[i].head.time);
 }
 
 TEST(EncoderDevice, RefusesABadConfiguration) {

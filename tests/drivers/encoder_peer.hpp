@@ -6,6 +6,7 @@
 #include <arpa/inet.h>
 #include <gtest/gtest.h>
 #include <netinet/in.h>
+#include <poll.h>
 #include <sys/socket.h>
 #include <unistd.h>
 
@@ -73,6 +74,11 @@ class EncoderPeer {
       while (view->next(frame)) on_frame(frame, now);
     }
     beat(now);
+  }
+  /// Lets the operating system wait until something comes, at most `ms`.
+  void wait(int ms) const {
+    pollfd p{fd_, POLLIN, 0};
+    ::poll(&p, 1, ms);
   }
   /// Forgets everything that came: the cable was out.
   void drain() {

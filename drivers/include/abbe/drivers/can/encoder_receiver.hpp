@@ -107,7 +107,7 @@ class EncoderReceiver {
     };
     const auto bytes = std::span{block.bytes}.first(std::min<std::size_t>(block.length, block.bytes.size()));
     const bool sent = block.direction == protocol::RawBlock::Direction::ToDevice;
-    if (bytes.empty()) return give(on_time(block.time));
+    if (bytes.empty() && !sent) return give(on_time(block.time));
     auto view = can::DatagramView::parse(bytes);
     if (!view) return count_bad_block();
     if (view->count() == 0 && !sent) return give(on_time(block.time));

@@ -30,7 +30,7 @@ struct InterpolationOptions {
 
 enum class InterpolationError {
   TooEarly,  ///< the first sample is later than the instant
-  TooLate,   ///< the last sample is earlier than the instant: ask again when more have come
+  TooLate,   ///< no sample is later than the instant: ask again when more have come
   Gap,       ///< the enclosing samples are further apart than max_span
 };
 

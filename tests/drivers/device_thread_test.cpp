@@ -1,0 +1,120 @@
+#include "abbe/drivers/device_thread.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <sched.h>
+
+#include <atomic>
+#include <stdexcept>
+#include <thread>
+
+namespace abbe::tests {
+namespace {
+
+using namespace std::chrono_literals;
+using drivers::DeviceThread;
+using drivers::DeviceThreadOptions;
+using drivers::RealTimeMode;
+
+/// Counts its turns and, if told to, throws in one of them.
+class TurnCounter final : public drivers::Device {
+ public:
+  explicit TurnCounter(int throw_in_turn = -1) : throw_in_turn_(throw_in_turn) {}
+  void wait(std::chrono::nanoseconds at_most) override {
+    waited_at_most = at_most;
+    if (turns == throw_in_turn_) throw std::runtime_error("no such register");
+    std::this_thread::yield();
+  }
+  void receive() ABBE_RT override { ++turns; }
+  [[nodiscard]] drivers::DeviceStatus status() const override { return {}; }
+
+  std::atomic<int> turns{0};
+  std::atomic<std::chrono::nanoseconds> waited_at_most{};
+
+ private:
+  int throw_in_turn_;
+};
+
+void wait_for(const std::function<bool()>& done) {
+  while (!done()) std::this_thread::yield();  // bounded by the test's own time-out
+}
+
+TEST(DeviceThread, TurnsUntilStopped) {
+  TurnCounter device;
+  auto thread = DeviceThread::start(device, {.wait_at_most = 7ms});
+  ASSERT_TRUE(thread);
+  wait_for([&] { return device.turns > 10; });
+  (*thread)->stop();
+  const int turns = device.turns;
+  EXPECT_EQ(device.waited_at_most.load(), 7ms);
+  EXPECT_FALSE((*thread)->failure());
+  std::this_thread::yield();
+  EXPECT_EQ(device.turns, turns);
+}
+
+TEST(DeviceThread, FillsALatencyHistogramWithEveryTurn) {
+  TurnCounter device;
+  auto thread = DeviceThread::start(device, {});
+  ASSERT_TRUE(thread);
+  wait_for([&] { return device.turns > 10; });
+  (*thread)->stop();
+  EXPECT_EQ((*thread)->latency().read().total, static_cast<std::uint64_t>(device.turns));
+}
+
+TEST(DeviceThread, HandsOverTheExceptionThatEndedIt) {
+  TurnCounter device(3);
+  auto thread = DeviceThread::start(device, {});
+  ASSERT_TRUE(thread);
+  wait_for([&] { return (*thread)->failure().has_value(); });
+  EXPECT_EQ(*(*thread)->failure(), "no such register");
+  EXPECT_EQ(device.turns, 3);
+}
+
+// No machine has processor 1023 in its set: a refusal that does not depend on who runs the test.
+constexpr int kNoSuchProcessor = 1023;
+
+TEST(DeviceThread, RefusesToStartInEnforceMode) {
+  TurnCounter device;
+  const auto thread = DeviceThread::start(
+      device, {.name = "tracker", .mode = RealTimeMode::Enforce, .cpu = kNoSuchProcessor});
+  ASSERT_FALSE(thread);
+  EXPECT_EQ(thread.error().code, drivers::ErrorCode::SystemRefused);
+  EXPECT_THAT(thread.error().text, testing::HasSubstr("thread tracker: affinity to processor 1023"));
+  EXPECT_EQ(device.turns, 0);
+}
+
+TEST(DeviceThread, WarnsAndRunsInIgnoreMode) {
+  TurnCounter device;
+  const auto thread = DeviceThread::start(device, {.mode = RealTimeMode::Ignore, .cpu = kNoSuchProcessor});
+  ASSERT_TRUE(thread);
+  ASSERT_EQ((*thread)->warnings().size(), 1u);
+  EXPECT_THAT((*thread)->warnings()[0], testing::HasSubstr("affinity"));
+  wait_for([&] { return device.turns > 0; });
+}
+
+TEST(DeviceThread, SaysEverythingTheSystemRefusedAtOnce) {
+  TurnCounter device;
+  const auto thread =
+      DeviceThread::start(device, {.mode = RealTimeMode::Enforce, .priority = 1000, .cpu = kNoSuchProcessor});
+  ASSERT_FALSE(thread);
+  EXPECT_THAT(thread.error().text,
+              testing::AllOf(testing::HasSubstr("affinity"), testing::HasSubstr("SCHED_FIFO priority 1000")));
+}
+
+TEST(DeviceThread, RunsWhereItIsPut) {
+  class Where final : public drivers::Device {
+   public:
+    void wait(std::chrono::nanoseconds) override { cpu = sched_getcpu(); }
+    void receive() ABBE_RT override {}
+    [[nodiscard]] drivers::DeviceStatus status() const override { return {}; }
+    std::atomic<int> cpu{-1};
+  } device;
+  const int here = sched_getcpu();
+  const auto thread = DeviceThread::start(device, {.mode = RealTimeMode::Enforce, .cpu = here});
+  ASSERT_TRUE(thread) << thread.error().text;
+  wait_for([&] { return device.cpu >= 0; });
+  EXPECT_EQ(device.cpu, here);
+}
+
+}  // namespace
+}  // namespace abbe::tests

@@ -4,6 +4,8 @@
 /// topics) or kept, newest per key, until it does (durable topics; all of them are sent again to every new
 /// abbe-dds). Used by one thread, the one that assembles snapshots, so that a hung abbed stops beating. The
 /// real-time threads never come here: it makes system calls and allocates.
+/// ModelState is to be published at least once a second: its age changes, and abbe-dds forgets it when abbed was
+/// silent, so that no old ACTIVE comes to life.
 
 #include <chrono>
 #include <cstddef>

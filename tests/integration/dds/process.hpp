@@ -1,0 +1,54 @@
+#pragma once
+/// A program under test: started, its standard output read line by line with the time each line came, killed
+/// at the end.
+
+#include <sys/types.h>
+#include <chrono>
+#include <condition_variable>
+#include <functional>
+#include <mutex>
+#include <optional>
+#include <string>
+#include <thread>
+#include <vector>
+
+namespace abbe::test {
+
+using Clock = std::chrono::steady_clock;
+
+struct Line {
+  std::string text;
+  Clock::time_point came;
+};
+
+class Process {
+ public:
+  explicit Process(std::vector<std::string> command);
+  ~Process();
+  Process(const Process&) = delete;
+  Process& operator=(const Process&) = delete;
+
+  [[nodiscard]] pid_t pid() const { return pid_; }
+  void signal(int number) const;
+  /// The exit code, -1 if it ended by a signal or not within `at_most` (then it is killed).
+  int wait_for_end(std::chrono::seconds at_most = std::chrono::seconds{20});
+
+  /// The first line not before `from` that begins with `prefix`; nothing if none came within `at_most`.
+  std::optional<Line> wait_for(const std::string& prefix, Clock::time_point from = {},
+                               std::chrono::seconds at_most = std::chrono::seconds{20});
+  std::vector<Line> lines();
+  /// All lines, for the message of a failed expectation.
+  std::string transcript();
+
+ private:
+  void read(int fd);
+
+  pid_t pid_ = 0;
+  std::mutex mutex_;
+  std::condition_variable changed_;
+  std::vector<Line> lines_;
+  bool ended_ = false;
+  std::thread reader_;
+};
+
+}  // namespace abbe::test

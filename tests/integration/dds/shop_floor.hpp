@@ -1,0 +1,91 @@
+#pragma once
+/// abbed's stand-in with its abbe-dds, and subscribers, on a DDS domain nobody else uses at the moment.
+
+#include <fcntl.h>
+#include <gtest/gtest.h>
+#include <sys/file.h>
+#include <unistd.h>
+
+#include <cstdlib>
+#include <filesystem>
+#include <memory>
+#include <string>
+
+#include "process.hpp"
+
+namespace abbe::test {
+
+/// Domains 1 to 100, whose ports are below those the kernel gives away; claimed by a lock that ends with this
+/// process.
+class DomainClaim {
+ public:
+  DomainClaim() {
+    for (int i = 0; i < 100 && fd_ < 0; ++i) {
+      number_ = 1 + (static_cast<int>(::getpid()) + i) % 100;
+      const auto file =
+          std::filesystem::temp_directory_path() / ("abbe-test-domain-" + std::to_string(number_));
+      fd_ = ::open(file.c_str(), O_CREAT | O_RDWR | O_CLOEXEC, 0666);
+      if (fd_ >= 0 && ::flock(fd_, LOCK_EX | LOCK_NB) != 0) {
+        ::close(fd_);
+        fd_ = -1;
+      }
+    }
+  }
+  ~DomainClaim() { ::close(fd_); }
+  DomainClaim(const DomainClaim&) = delete;
+  DomainClaim& operator=(const DomainClaim&) = delete;
+  [[nodiscard]] std::string text() const { return std::to_string(number_); }
+
+ private:
+  int fd_ = -1;
+  int number_ = 0;
+};
+
+class ShopFloor : public testing::Test {
+ protected:
+  ShopFloor() {
+    ::setenv("CYCLONEDDS_URI", "file://" ABBE_CYCLONE_CONFIG, 1);
+    std::string name = testing::TempDir() + "abbe-dds-XXXXXX";
+    directory_ = ::mkdtemp(name.data());
+  }
+  ~ShopFloor() override {
+    feeder_.reset();
+    std::filesystem::remove_all(directory_);
+  }
+
+  void start_feeder() {
+    const std::string socket = directory_ / "dds.sock";
+    feeder_ = std::make_unique<Process>(
+        std::vector<std::string>{ABBE_FEEDER_PROGRAM, socket, ABBE_DDS_PROGRAM, "--socket", socket,
+                                 "--domain", domain_.text(), "--profile", ABBE_LOOPBACK_PROFILE});
+  }
+
+  [[nodiscard]] std::vector<std::string> watch(std::vector<std::string> options) const {
+    std::vector<std::string> command{ABBE_WATCH_PROGRAM, "--domain", domain_.text(), "--profile",
+                                     ABBE_LOOPBACK_PROFILE};
+    command.insert(command.end(), options.begin(), options.end());
+    return command;
+  }
+  [[nodiscard]] std::vector<std::string> fast_subscriber() const {
+    return {ABBE_FAST_SUBSCRIBER, domain_.text(), ABBE_LOOPBACK_PROFILE};
+  }
+  [[nodiscard]] std::vector<std::string> cyclone_subscriber() const {
+    return {ABBE_CYCLONE_SUBSCRIBER, domain_.text()};
+  }
+
+  /// abbe-dds as the supervisor last announced it.
+  pid_t abbe_dds_pid() {
+    EXPECT_TRUE(feeder_->wait_for("child"));
+    pid_t pid = 0;
+    for (const Line& line : feeder_->lines()) {
+      if (line.text.starts_with("child ")) pid = std::stoi(line.text.substr(6));
+    }
+    return pid;
+  }
+
+  DomainClaim domain_;
+  std::filesystem::path directory_;
+  std::unique_ptr<Process> feeder_;
+};
+
+}  // namespace abbe::test

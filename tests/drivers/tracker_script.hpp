@@ -9,7 +9,7 @@
 #include "abbe/protocol/emscon/results.hpp"
 #include "abbe/protocol/time.hpp"
 
-namespace abbe::tests {
+namespace abbe::tests::tracker {
 
 namespace emscon = protocol::emscon;
 using Bytes = std::vector<std::byte>;
@@ -42,4 +42,4 @@ inline Bytes ok(emscon::Command command) {
   return packet(emscon::Answer{emscon::Acknowledge{command, {}}});
 }
 
-}  // namespace abbe::tests
+}  // namespace abbe::tests::tracker

@@ -9,6 +9,7 @@ namespace abbe::tests {
 namespace {
 
 using namespace std::chrono_literals;
+using namespace tracker;
 
 class TrackerRealTimePath : public testing::Test {
  protected:

@@ -1,0 +1,180 @@
+#pragma once
+/// The simulated tracker controller on a listening socket of 127.0.0.1, in the test's own thread, with its
+/// point packets in the test's hands: they are gathered, and sent, held back or torn as the test says;
+/// answers and events go out at once. Nothing happens but in the functions a test calls.
+
+#include <arpa/inet.h>
+#include <gtest/gtest.h>
+#include <netinet/in.h>
+#include <netinet/tcp.h>
+#include <sys/socket.h>
+
+#include <array>
+#include <deque>
+#include <memory>
+#include <span>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include "abbe/protocol/emscon/framer.hpp"
+#include "abbe/sim/socket.hpp"
+#include "abbe/sim/tracker_device.hpp"
+#include "tracker_script.hpp"
+
+namespace abbe::tests::tracker {
+
+using protocol::HostTime;
+
+inline sim::VirtualMachine standing_machine() {
+  sim::PathPlan plan;
+  plan.vertices = {{{0.1, 0.2, -0.3}}};
+  return {sim::TruthMachine{}, sim::PathMotion::plan(plan).value()};
+}
+
+class TrackerPeer {
+ public:
+  explicit TrackerPeer(HostTime now, const sim::TrackerOptions& options = {})
+      : options_(options),
+        machine_(standing_machine()),
+        port_holder_(bound_socket(0)),
+        port_(sim::port_of(port_holder_)) {
+    power_on(now);
+    listen();
+  }
+
+  [[nodiscard]] std::uint16_t port() const { return port_; }
+  [[nodiscard]] bool connected() const { return static_cast<bool>(client_); }
+  [[nodiscard]] sim::TrackerDevice& controller() { return *controller_; }
+  [[nodiscard]] std::size_t packets_ready() const { return points_.size(); }
+
+  /// Lets a client in, hears it, does what is due, answers. Points are gathered.
+  void serve(HostTime now) {
+    accept_client(now);
+    hear(now);
+    controller_->advance(now);
+    gather();
+  }
+
+  /// Sends all points gathered so far.
+  void say_points() {
+    for (; !points_.empty(); points_.pop_front()) say(points_.front());
+  }
+  void forget_all_but_the_latest() {
+    while (points_.size() > 1) points_.pop_front();
+  }
+  /// The first half of the latest packet; finish_torn() sends the rest.
+  void send_torn() {
+    forget_all_but_the_latest();
+    ASSERT_FALSE(points_.empty());
+    torn_ = std::move(points_.front());
+    points_.clear();
+    send(std::span{torn_}.first(torn_.size() / 2));
+  }
+  void finish_torn() {
+    send(std::span{torn_}.subspan(torn_.size() / 2));
+    remember(torn_);
+  }
+  void send(std::span<const std::byte> bytes) {
+    if (client_) ::send(client_.get(), bytes.data(), bytes.size(), MSG_NOSIGNAL);
+  }
+  void send(std::string_view text) { send(std::as_bytes(std::span{text})); }
+
+  /// `count` points at once, a microsecond apart, right after the last ones said.
+  void flood(std::size_t count) {
+    std::vector<emscon::MultiPoint> points;
+    for (std::size_t k = 0; k < count; ++k)
+      points.push_back(point(last_said_ += std::chrono::microseconds{1}));
+    send(burst(points));
+  }
+
+  void hang_up() {
+    client_.close();
+    points_.clear();
+    controller_->disconnected();
+  }
+  void unplug() {
+    hang_up();
+    listener_.close();
+  }
+  void listen() {
+    listener_ = bound_socket(port_);
+    ASSERT_EQ(::listen(listener_.get(), 4), 0);
+  }
+  /// Off and on again: the connection is lost, the controller's clock begins anew.
+  void restart(HostTime now) {
+    hang_up();
+    power_on(now);
+  }
+
+ private:
+  /// Held by a second socket, so that the port stays ours while unplugged.
+  static sim::Socket bound_socket(std::uint16_t port) {
+    sim::Socket s(::socket(AF_INET, SOCK_STREAM | SOCK_NONBLOCK | SOCK_CLOEXEC, 0));
+    const int yes = 1;
+    ::setsockopt(s.get(), SOL_SOCKET, SO_REUSEADDR, &yes, sizeof yes);
+    ::setsockopt(s.get(), SOL_SOCKET, SO_REUSEPORT, &yes, sizeof yes);
+    sockaddr_in a{};
+    a.sin_family = AF_INET;
+    a.sin_port = htons(port);
+    a.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
+    EXPECT_EQ(::bind(s.get(), reinterpret_cast<const sockaddr*>(&a), sizeof a), 0);
+    return s;
+  }
+
+  void power_on(HostTime now) { controller_ = std::make_unique<sim::TrackerDevice>(options_, machine_, now); }
+
+  void accept_client(HostTime now) {
+    sim::Socket accepted(::accept4(listener_.get(), nullptr, nullptr, SOCK_NONBLOCK | SOCK_CLOEXEC));
+    if (!accepted) return;
+    if (client_) hang_up();
+    client_ = std::move(accepted);
+    const int yes =
+        1;  // else an event after an answer waits for a delayed ACK, in a time the test does not have
+    ::setsockopt(client_.get(), IPPROTO_TCP, TCP_NODELAY, &yes, sizeof yes);
+    controller_->connected(now);
+  }
+
+  void hear(HostTime now) {
+    if (!client_) return;
+    std::array<std::byte, 4096> bytes{};
+    const ssize_t n = ::recv(client_.get(), bytes.data(), bytes.size(), MSG_DONTWAIT);
+    if (n > 0) controller_->receive(std::span{bytes}.first(static_cast<std::size_t>(n)), now);
+    if (n == 0) hang_up();
+  }
+
+  void gather() {
+    const auto bytes = controller_->take_output();
+    framer_->push(bytes);
+    while (const auto packet = framer_->next()) {
+      if (emscon::MultiResult::from(*packet)) {
+        points_.emplace_back(packet->begin(), packet->end());
+      } else {
+        send(*packet);
+      }
+    }
+  }
+
+  void say(const Bytes& packet) {
+    send(packet);
+    remember(packet);
+  }
+  void remember(const Bytes& packet) {
+    const auto result = emscon::MultiResult::from(packet);
+    last_said_ = result->point(result->size() - 1).time.to_device_time();
+  }
+
+  sim::TrackerOptions options_;
+  sim::VirtualMachine machine_;
+  sim::Socket port_holder_;
+  std::uint16_t port_;
+  sim::Socket listener_;
+  sim::Socket client_;
+  std::unique_ptr<sim::TrackerDevice> controller_;
+  std::unique_ptr<emscon::PacketFramer> framer_ = std::make_unique<emscon::PacketFramer>();
+  std::deque<Bytes> points_;  ///< one burst each, not yet said
+  Bytes torn_;
+  protocol::DeviceTime last_said_{};
+};
+
+}  // namespace abbe::tests::tracker

@@ -1,0 +1,139 @@
+#include "abbe/calib/otf/alignment.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "otf_run.hpp"
+
+namespace {
+using namespace abbe::calib;
+using namespace abbe::calib::otf;
+using namespace abbe::tests::otf;
+using testing::ElementsAre;
+using testing::HasSubstr;
+
+TEST(LegAssignment, FindsTheTurningPointOfLegsOnOneLine) {
+  // Out 30 mm, back 20 mm, on the same line: distances alone cannot tell.
+  const Path path{{{0, 0, 0}, {0.03, 0, 0}, {0.01, 0, 0}}};
+  std::vector<Vector3> points;
+  for (const double x : {0.002, 0.010, 0.018, 0.026, 0.028, 0.020, 0.012}) {
+    points.emplace_back(x, 0, 0);
+  }
+  const auto leg = assign_legs(points, path, 0.02);
+  ASSERT_TRUE(leg);
+  EXPECT_THAT(*leg, ElementsAre(0, 0, 0, 0, 1, 1, 1));
+}
+
+TEST(LegAssignment, IsNotConfusedByLegsThatCross) {
+  // The third leg crosses the first one in its middle.
+  const Path path{{{0, 0, 0}, {1, 0, 0}, {0.5, 0.5, 0}, {0.5, -0.5, 0}}};
+  std::vector<Vector3> points;
+  std::vector<std::size_t> truth;
+  for (std::size_t l = 0; l < 3; ++l) {
+    for (int k = 0; k < 20; ++k) {
+      points.emplace_back(path.vertices_m[l] +
+                          (k + 0.5) / 20 * (path.vertices_m[l + 1] - path.vertices_m[l]));
+      truth.push_back(l);
+    }
+  }
+  EXPECT_EQ(assign_legs(points, path, 0.02).value(), truth);
+}
+
+TEST(LegAssignment, GoesOnThroughLostBlocks) {
+  const Path path{{{0, 0, 0}, {1, 0, 0}, {1, 1, 0}}};
+  const double nan = std::nan("");
+  std::vector<Vector3> points{{0.1, 0, 0},     {0.5, 0, 0}, {nan, nan, nan},
+                              {nan, nan, nan}, {1, 0.5, 0}, {1, 0.9, 0}};
+  const auto leg = assign_legs(points, path, 0.02);
+  ASSERT_TRUE(leg);
+  EXPECT_EQ(leg->at(1), 0u);
+  EXPECT_EQ(leg->at(4), 1u);
+}
+
+TEST(LegAssignment, NeedsABlockForEveryLeg) {
+  const Path path{{{0, 0, 0}, {1, 0, 0}, {1, 1, 0}}};
+  EXPECT_FALSE(assign_legs(std::vector<Vector3>{{0, 0, 0}}, path, 0.02));
+}
+
+/// Case A from its published block means; where the machine stood at the ends follows from the rough
+/// transform.
+BlockSeries case_a_series(const ReferenceBlocks& blocks) {
+  const RigidTransform rough = case_a_rough_alignment_noisy(), fine = case_a_alignment(true);
+  const Path path = case_a_path();
+  const Vector3 t = case_a_machine().target_offset_m;
+  const Vector3 start = rough.R.transpose() * (path.vertices_m.front() + t - rough.t_m);
+  const Vector3 end = fine.R.transpose() * (path.vertices_m.back() + t - fine.t_m);
+  return *blocks_from_means(blocks.means_tracker_m, start, end, {});
+}
+
+TEST(Alignment, OfTheReferenceBlocksIsThePrototypes) {
+  const ReferenceBlocks blocks = case_a_blocks();
+  const Result<Alignment> a = align(case_a_series(blocks), case_a_machine(), case_a_path(), {});
+  ASSERT_TRUE(a) << a.error().text;
+  const RigidTransform reference = case_a_alignment(true);
+  // The means are printed to 1e-9 m and the end is not the measured one; from samples it is 1e-8, see
+  // CaseAStream.
+  EXPECT_LT((a->T_machine_tracker.R - reference.R).cwiseAbs().maxCoeff(), 3e-8);
+  EXPECT_LT((a->T_machine_tracker.t_m - reference.t_m).cwiseAbs().maxCoeff(), 3e-8);
+  EXPECT_EQ(a->leg, blocks.leg);
+  EXPECT_EQ(a->used, blocks.used);
+  EXPECT_EQ(std::count(a->used.begin(), a->used.end(), true), 4663);
+  EXPECT_NEAR(a->last_rms_m, 63.4036e-6, 0.001e-6);
+}
+
+struct Refusal {
+  ErrorCode code{};
+  std::string text;
+};
+Refusal refusal(const MadeRun& run, const Path& path) {
+  const auto a = align(*make_blocks(run.samples, run.options), run.machine, path, run.options);
+  return a ? Refusal{{}, "accepted"} : Refusal{a.error().code, a.error().text};
+}
+
+TEST(Alignment, RefusesAPathOnALine) {
+  const MadeRun run = make_run({});
+  const Refusal r = refusal(run, Path{{{0, 0, 0}, {0.1, 0, 0}, {0.3, 0, 0}}});
+  EXPECT_EQ(r.code, ErrorCode::DegenerateGeometry);
+  EXPECT_THAT(r.text, HasSubstr("line"));
+}
+
+TEST(Alignment, RefusesThePathOfAnotherRunByLength) {
+  const MadeRun run = make_run({});
+  Path other = run.path;
+  other.vertices_m.resize(61);
+  const Refusal r = refusal(run, other);
+  EXPECT_EQ(r.code, ErrorCode::AlignmentFailed);
+  EXPECT_THAT(r.text, HasSubstr("m of travel"));
+}
+
+TEST(Alignment, RefusesAPathOfTheRightLengthButAnotherShape) {
+  const MadeRun run = make_run({});
+  Path other = run.path;
+  for (Vector3& v : other.vertices_m) {
+    v.y() = -v.y();  // the mirror image: no rotation brings it there
+  }
+  const Refusal r = refusal(run, other);
+  EXPECT_EQ(r.code, ErrorCode::AlignmentFailed);
+  EXPECT_THAT(r.text, HasSubstr("mm"));
+}
+
+TEST(Alignment, RefusesARunThatEndsEarly) {
+  MadeRun run = make_run({});
+  run.samples.resize(run.samples.size() - 400);  // 0.8 s: less than the length check sees
+  EXPECT_EQ(refusal(run, run.path).code, ErrorCode::AlignmentFailed);
+}
+
+TEST(Alignment, RefusesVerticesThatAreNaNOrCoincide) {
+  const MadeRun run = make_run({});
+  Path broken = run.path;
+  broken.vertices_m[5].x() = std::nan("");
+  EXPECT_EQ(refusal(run, broken).code, ErrorCode::NotFinite);
+  broken = run.path;
+  broken.vertices_m[5] = broken.vertices_m[4];
+  EXPECT_EQ(refusal(run, broken).code, ErrorCode::BadInput);
+}
+
+}  // namespace

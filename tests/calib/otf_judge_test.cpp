@@ -1,0 +1,93 @@
+#include "abbe/calib/otf/judge.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "abbe/calib/otf/identify.hpp"
+#include "otf_run.hpp"
+
+namespace {
+using namespace abbe::calib;
+using namespace abbe::calib::otf;
+using namespace abbe::tests::otf;
+using testing::Contains;
+using testing::HasSubstr;
+
+Identification identified(const MadeRun& run) {
+  return *identify(run.samples, run.machine, run.path, run.noise, run.options);
+}
+
+TEST(Judge, AcceptsAModelOfTheMachineItWasMeasuredOn) {
+  const MadeRun run = make_run({});
+  const Identification id = identified(run);
+  const auto verdict = judge(id.observations, id.solution, nullptr, {}, run.options);
+  ASSERT_TRUE(verdict) << verdict.error().text;
+  EXPECT_TRUE(verdict->accepted) << verdict->reasons.front();
+  EXPECT_NEAR(verdict->held_out.candidate, 1.0, 0.05);
+  EXPECT_GT(verdict->held_out.no_compensation, 10.0);
+  EXPECT_FALSE(verdict->held_out.active);
+}
+
+TEST(Judge, RefusesAModelOfNoiseOnAPerfectMachine) {
+  const MadeRun run = make_run({.error_scale_m = 0.0});
+  const Identification id = identified(run);
+  const auto verdict = judge(id.observations, id.solution, nullptr, {}, run.options);
+  ASSERT_TRUE(verdict);
+  EXPECT_FALSE(verdict->accepted);
+  EXPECT_THAT(verdict->reasons, Contains(HasSubstr("without compensation")));
+}
+
+TEST(Judge, FindsTheActiveModelOfTheSameMachineAsGood) {
+  const MadeRun first = make_run({.seed = 1});
+  const Identification before = identified(first);
+  MadeRun second = make_run({.seed = 1});
+  const auto held = held_out(identified(second).observations, &before.solution.model, second.options);
+  ASSERT_TRUE(held);
+  ASSERT_TRUE(held->active);
+  EXPECT_NEAR(*held->active, 1.0, 0.05);
+}
+
+TEST(Judge, PrefersANewModelToThatOfAnotherMachine) {
+  const MadeRun run = make_run({.seed = 1}), other = make_run({.seed = 2});
+  const Identification id = identified(run);
+  const VolumetricModel active = identified(other).solution.model;
+  const auto verdict = judge(id.observations, id.solution, &active, {}, run.options);
+  ASSERT_TRUE(verdict);
+  EXPECT_TRUE(verdict->accepted);
+  EXPECT_GT(verdict->held_out.active.value(), 10.0);
+}
+
+TEST(Judge, DoesNotDependOnTheGaugeOfTheActiveModel) {
+  const MadeRun run = make_run({.seed = 1});
+  const Identification id = identified(run);
+  const VolumetricModel& model = id.solution.model;
+  // The same machine, written down in another gauge: any combination nothing can see is added.
+  const Eigen::MatrixXd N =
+      unobservable_combinations(model.layout(), std::array{run.machine.target_offset_m});
+  const auto n = static_cast<Eigen::Index>(model.layout().model_size());
+  const Eigen::VectorXd shift = N.rowwise().sum() / N.cwiseAbs().maxCoeff() * 1e-4;
+  const VolumetricModel shifted =
+      *VolumetricModel::from_vector(model.layout(), Gauge::G1, model.tool_offsets_m(),
+                                    model.U() + shift.head(n), model.covariance(), model.validity());
+  const double as_stated = held_out(id.observations, &model, run.options)->active.value();
+  const double in_other_gauge = held_out(id.observations, &shifted, run.options)->active.value();
+  EXPECT_NEAR(in_other_gauge, as_stated, 1e-6);
+}
+
+TEST(Judge, LeavesOutAnActiveModelOfAnotherTool) {
+  const MadeRun run = make_run({});
+  const Identification id = identified(run);
+  const VolumetricModel& m = id.solution.model;
+  const VolumetricModel other = *VolumetricModel::from_vector(
+      m.layout(), Gauge::G1, std::array{Vector3(0, 0, -0.5)}, m.U(), m.covariance(), m.validity());
+  EXPECT_FALSE(held_out(id.observations, &other, run.options)->active);
+}
+
+TEST(Judge, NeedsLegsForEveryFold) {
+  MadeRun run = make_run({});
+  const Identification id = identified(run);
+  run.options.held_out_folds = 500;
+  EXPECT_EQ(held_out(id.observations, nullptr, run.options).error().code, ErrorCode::TooFewObservations);
+}
+
+}  // namespace

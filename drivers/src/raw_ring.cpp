@@ -2,7 +2,6 @@
 
 namespace abbe::drivers {
 
-RawRing::RawRing(std::size_t capacity_blocks)
-    : indices_(capacity_blocks), blocks_(std::make_unique<protocol::RawBlock[]>(indices_.capacity())) {}
+RawRing::RawRing(std::size_t capacity_blocks) : indices_(capacity_blocks), blocks_(indices_.capacity()) {}
 
 }  // namespace abbe::drivers

@@ -1,13 +1,13 @@
 #pragma once
 /// Where the axes were at an instant, from the samples around it. Pure functions; no allocation; any thread.
-/// Position: cubic through the two enclosing samples, with slopes from their neighbours (cubic Hermite, central
-/// differences). Exact for constant acceleration, where a straight line lags by a T^2 / 8 = 0.6 um (5 m/s^2, 1 kHz)
-/// through the whole of every ramp. Straight line where a neighbour is missing or more than 1.2 times as far as the
-/// two enclosing samples are apart. Velocity is the derivative.
-/// Uncertainty: |acceleration| <= a_max is all that is assumed. The error of the line is at most
-/// (a_max / 2) theta (1 - theta) T^2, in the middle (a_max / 2) (T / 2)^2; of the cubic at most 6/5 of that (the
-/// integral of the modulus of its Peano kernel). Taken as rectangular ([GUM] 4.3.7). Added in quadrature: speed times
-/// the time uncertainty of the samples and of the instant asked for.
+/// Position: cubic through the two enclosing samples, with slopes from their neighbours (cubic Hermite,
+/// central differences). Exact for constant acceleration, where a straight line lags by a T^2 / 8 = 0.6 um (5
+/// m/s^2, 1 kHz) through the whole of every ramp. Straight line where a neighbour is missing or more than 1.2
+/// times as far as the two enclosing samples are apart. Velocity is the derivative. Uncertainty:
+/// |acceleration| <= a_max is all that is assumed. The error of the line is at most (a_max / 2) theta (1 -
+/// theta) T^2, in the middle (a_max / 2) (T / 2)^2; of the cubic at most 6/5 of that (the integral of the
+/// modulus of its Peano kernel). Taken as rectangular ([GUM] 4.3.7). Added in quadrature: speed times the
+/// time uncertainty of the samples and of the instant asked for.
 
 #include <array>
 #include <chrono>

@@ -7,10 +7,10 @@
 #include <atomic>
 #include <cstddef>
 #include <cstdint>
-#include <memory>
 #include <span>
 
 #include "abbe/drivers/ring_indices.hpp"
+#include "abbe/drivers/ring_slots.hpp"
 #include "abbe/protocol/samples.hpp"
 
 namespace abbe::drivers {
@@ -38,8 +38,9 @@ class RawRing {
 
  private:
   RingIndices indices_;
-  std::unique_ptr<protocol::RawBlock[]> blocks_;
-  std::uint64_t lost_ = 0;  ///< writer only: blocks dropped since the last read that fitted
+  RingSlots<protocol::RawBlock> blocks_;
+  /// Writer only: blocks dropped since the last read that fitted. Apart from blocks_, which the reader reads.
+  alignas(kNoSharing) std::uint64_t lost_ = 0;
   std::atomic<std::uint64_t> dropped_{0};
 };
 

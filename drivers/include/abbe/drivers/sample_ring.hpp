@@ -8,11 +8,11 @@
 #include <cstddef>
 #include <cstdint>
 #include <limits>
-#include <memory>
 #include <span>
 #include <type_traits>
 
 #include "abbe/drivers/ring_indices.hpp"
+#include "abbe/drivers/ring_slots.hpp"
 #include "abbe/protocol/samples.hpp"
 
 namespace abbe::drivers {
@@ -23,8 +23,7 @@ class SampleRing {
 
  public:
   /// Capacity is rounded up to a power of two. Allocates.
-  explicit SampleRing(std::size_t capacity)
-      : indices_(capacity), slots_(std::make_unique<T[]>(indices_.capacity())) {}
+  explicit SampleRing(std::size_t capacity) : indices_(capacity), slots_(indices_.capacity()) {}
 
   /// Writer thread. False: full, the sample is dropped and counted.
   bool try_push(const T& sample) ABBE_RT {
@@ -90,8 +89,9 @@ class SampleRing {
   }
 
   RingIndices indices_;
-  std::unique_ptr<T[]> slots_;
-  std::uint64_t lost_ = 0;  ///< writer only: dropped since the last sample that fitted
+  RingSlots<T> slots_;
+  /// Writer only: dropped since the last sample that fitted. Apart from slots_, which the reader reads.
+  alignas(kNoSharing) std::uint64_t lost_ = 0;
   std::atomic<std::uint64_t> dropped_{0};
 };
 

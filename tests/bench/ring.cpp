@@ -1,0 +1,202 @@
+// Question: does the sample ring carry as many samples a second from thread to thread as the better of
+// boost::lockfree::spsc_queue and moodycamel::ReaderWriterQueue? Asked: median ratio >= 0.95 over >= 21
+// rounds. Each round runs all three, in an order that turns round by round, and gives one ratio ours / better
+// peer; of five short runs of each the fastest counts, because a run in which a thread lost its processor
+// says nothing about a ring. Writer: one push per sample, as receive() does, trying again when full (nobody
+// drops, so all carry the same samples). Reader: in batches of 64 where the queue has them (ours, boost), one
+// by one where not (moodycamel). The other lines give each its best: ours and boost also push in batches
+// of 16.
+//
+//   bench_ring [rounds = 41] [samples per run = 200000]
+
+#include <readerwriterqueue/readerwriterqueue.h>
+
+#include <algorithm>
+#include <array>
+#include <atomic>
+#include <boost/lockfree/spsc_queue.hpp>
+#include <chrono>
+#include <cstdio>
+#include <cstdlib>
+#include <functional>
+#include <memory>
+#include <span>
+#include <thread>
+#include <vector>
+
+#include "abbe/drivers/sample_ring.hpp"
+#include "abbe/protocol/samples.hpp"
+
+namespace {
+
+using abbe::protocol::AxisSample;
+using abbe::protocol::TrackerPoint;
+
+constexpr std::size_t kCapacity = 1024;
+constexpr std::size_t kReadBatch = 64;
+constexpr std::uint32_t kWriteBatch = 16;
+constexpr int kRunsPerRound = 5;
+
+void number(TrackerPoint& p, std::int32_t i) {
+  p.device_status = i;
+}
+void number(AxisSample& s, std::int32_t i) {
+  s.cycle = static_cast<std::uint32_t>(i);
+}
+std::uint32_t number_of(const TrackerPoint& p) {
+  return static_cast<std::uint32_t>(p.device_status);
+}
+std::uint32_t number_of(const AxisSample& s) {
+  return s.cycle;
+}
+
+/// Each queue behind the same four verbs. push()es answer how many were taken.
+template <class T>
+struct Ours {
+  abbe::drivers::SampleRing<T> ring{kCapacity};
+  std::size_t push(const T& t) { return ring.try_push(t) ? 1 : 0; }
+  std::size_t push(std::span<const T> batch) { return ring.push(batch); }
+  std::size_t pop(std::span<T> out) { return ring.pop(out); }
+};
+template <class T>
+struct Boost {
+  boost::lockfree::spsc_queue<T, boost::lockfree::capacity<kCapacity>> queue;
+  std::size_t push(const T& t) { return queue.push(t) ? 1 : 0; }
+  std::size_t push(std::span<const T> batch) { return queue.push(batch.data(), batch.size()); }
+  std::size_t pop(std::span<T> out) { return queue.pop(out.data(), out.size()); }
+};
+template <class T>
+struct Moodycamel {
+  moodycamel::ReaderWriterQueue<T> queue{kCapacity};
+  std::size_t push(const T& t) { return queue.try_enqueue(t) ? 1 : 0; }
+  std::size_t push(std::span<const T> batch) {
+    std::size_t n = 0;
+    while (n < batch.size() && queue.try_enqueue(batch[n])) ++n;
+    return n;
+  }
+  std::size_t pop(std::span<T> out) {
+    std::size_t n = 0;
+    while (n < out.size() && queue.try_dequeue(out[n])) ++n;
+    return n;
+  }
+};
+
+/// Waits for the other side: spins first, for it is usually there at once; then lets others run.
+class Patience {
+ public:
+  void wait() {
+    if (++turns_ % 2000 == 0) {
+      std::this_thread::yield();
+    } else {
+#if defined(__x86_64__)
+      __builtin_ia32_pause();
+#endif
+    }
+  }
+
+ private:
+  unsigned turns_ = 0;
+};
+
+template <class T, class Queue>
+void write_one_by_one(Queue& queue, std::uint32_t samples) {
+  T sample{};
+  Patience patience;
+  for (std::uint32_t i = 0; i < samples; ++i) {
+    number(sample, static_cast<std::int32_t>(i));
+    while (queue.push(sample) == 0) patience.wait();
+  }
+}
+
+template <class T, class Queue>
+void write_batches(Queue& queue, std::uint32_t samples) {
+  std::array<T, kWriteBatch> batch{};
+  Patience patience;
+  for (std::uint32_t i = 0; i < samples; i += kWriteBatch) {
+    for (std::uint32_t k = 0; k < kWriteBatch; ++k) number(batch[k], static_cast<std::int32_t>(i + k));
+    std::span<const T> rest = batch;
+    while (!rest.empty()) {
+      const std::size_t n = queue.push(rest);
+      rest = rest.subspan(n);
+      if (n == 0) patience.wait();
+    }
+  }
+}
+
+/// Million samples a second, from the first push to the last pop. Ends the program if one is missing or out
+/// of order.
+template <class T, class Queue>
+double run(bool batches, std::uint32_t samples) {
+  auto queue = std::make_unique<Queue>();
+  std::atomic<bool> ready{false};
+  std::atomic<bool> go{false};
+  std::thread writer([&] {
+    ready = true;
+    while (!go) std::this_thread::yield();
+    batches ? write_batches<T>(*queue, samples) : write_one_by_one<T>(*queue, samples);
+  });
+  while (!ready) std::this_thread::yield();
+  Patience patience;
+  const auto begin = std::chrono::steady_clock::now();
+  go = true;
+  std::array<T, kReadBatch> out{};
+  std::uint32_t expected = 0;
+  while (expected < samples) {
+    const std::size_t n = queue->pop(out);
+    if (n == 0) patience.wait();
+    for (std::size_t i = 0; i < n; ++i) {
+      if (number_of(out[i]) != expected++) {
+        std::fprintf(stderr, "sample %u is missing or out of order\n", expected - 1);
+        std::exit(1);
+      }
+    }
+  }
+  const std::chrono::duration<double> took = std::chrono::steady_clock::now() - begin;
+  writer.join();
+  return 1e-6 * samples / took.count();
+}
+
+double median(std::vector<double> v) {
+  std::nth_element(v.begin(), v.begin() + static_cast<std::ptrdiff_t>(v.size() / 2), v.end());
+  return v[v.size() / 2];
+}
+
+template <class T>
+double compare(const char* what, bool batches, int rounds, std::uint32_t samples) {
+  const std::array<std::function<double()>, 3> runs{
+      [&] { return run<T, Ours<T>>(batches, samples); },
+      [&] { return run<T, Boost<T>>(batches, samples); },
+      [&] { return run<T, Moodycamel<T>>(batches, samples); },
+  };
+  std::array<std::vector<double>, 3> rates;
+  std::vector<double> ratios;
+  for (int round = 0; round < rounds; ++round) {
+    std::array<double, 3> rate{};
+    for (std::size_t k = 0; k < 3; ++k) {
+      const std::size_t which = (k + static_cast<std::size_t>(round)) % 3;
+      for (int i = 0; i < kRunsPerRound; ++i) rate[which] = std::max(rate[which], runs[which]());
+      rates[which].push_back(rate[which]);
+    }
+    ratios.push_back(rate[0] / std::max(rate[1], rate[2]));
+  }
+  std::printf(
+      "%-32s %4zu B  ours %7.1f  boost %7.1f  moodycamel %7.1f  M/s  median ratio to the better %.2f\n", what,
+      sizeof(T), median(rates[0]), median(rates[1]), median(rates[2]), median(ratios));
+  return median(ratios);
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  const int rounds = argc > 1 ? std::atoi(argv[1]) : 41;
+  const std::uint32_t wanted = argc > 2 ? static_cast<std::uint32_t>(std::atoi(argv[2])) : 200'000;
+  const std::uint32_t samples = wanted - wanted % kWriteBatch;
+  std::printf("%d rounds of %u samples, capacity %zu, medians\n", rounds, samples, kCapacity);
+  const double point = compare<TrackerPoint>("TrackerPoint, pushed one by one", false, rounds, samples);
+  const double axes = compare<AxisSample>("AxisSample, pushed one by one", false, rounds, samples);
+  compare<TrackerPoint>("TrackerPoint, pushed by 16", true, rounds, samples);
+  compare<AxisSample>("AxisSample, pushed by 16", true, rounds, samples);
+  const bool good = std::min(point, axes) >= 0.95;
+  std::printf("asked >= 0.95 pushed one by one: %s\n", good ? "yes" : "no");
+  return good ? 0 : 1;
+}

@@ -1,47 +1,27 @@
 /// abbe-sim run: the stage with real time and real sockets, until it is told to stop.
 
 #include <fmt/format.h>
-#include <poll.h>
-#include <sys/prctl.h>
 #include <unistd.h>
 
 #include <algorithm>
-#include <csignal>
 #include <memory>
 
 #include "abbe/sim/simulation.hpp"
 #include "abbe/sim/truth_table.hpp"
 #include "commands.hpp"
+#include "event_loop.hpp"
 #include "files.hpp"
+#include "ports_file.hpp"
 #include "setup_file.hpp"
 
 namespace abbe::sim {
 namespace {
-
-volatile std::sig_atomic_t stop_requested = 0;
-void request_stop(int) {
-  stop_requested = 1;
-}
 
 struct RunOptions {
   SetupChoices choices;
   std::string ports_file;
   std::string truth_out;
 };
-
-/// Signals are let through only while waiting, so that none falls between the question and the wait.
-sigset_t hold_signals() {
-  struct sigaction action {};
-  action.sa_handler = request_stop;
-  sigaction(SIGINT, &action, nullptr);
-  sigaction(SIGTERM, &action, nullptr);
-  sigset_t held, before;
-  sigemptyset(&held);
-  sigaddset(&held, SIGINT);
-  sigaddset(&held, SIGTERM);
-  sigprocmask(SIG_BLOCK, &held, &before);
-  return before;
-}
 
 /// Says on stderr what a person in front of the machine would see; a bar only where somebody watches.
 class Narrator {
@@ -90,33 +70,6 @@ class Narrator {
   int drawn_ = -1;
 };
 
-void wait(const Simulation& simulation, const SimClock& clock, const sigset_t& signals) {
-  std::vector<pollfd> fds;
-  simulation.add_poll_fds(fds);
-  constexpr std::chrono::nanoseconds kLongest =
-      std::chrono::milliseconds{200};  // of the wall: keeps the narrator awake
-  std::chrono::nanoseconds wall = kLongest;
-  if (const HostTime due = simulation.next_due(); due != HostTime::max()) {
-    wall = std::clamp(clock.wall(due - clock.now()), std::chrono::nanoseconds{0}, kLongest);
-  }
-  const timespec timeout{wall.count() / 1'000'000'000, wall.count() % 1'000'000'000};
-  ppoll(fds.data(), fds.size(), &timeout, &signals);
-}
-
-Result<void> announce(Simulation& simulation, const RunOptions& options) {
-  const std::uint16_t tracker = simulation.tracker()->port();
-  const std::uint16_t can = simulation.bus()->port();
-  if (!options.ports_file.empty()) {
-    // Readable by a shell and by a TOML reader alike.
-    const auto written =
-        write_file(options.ports_file, fmt::format("tracker_port={}\ncan_port={}\n", tracker, can));
-    if (!written) return written;
-  }
-  fmt::print("tracker: emScon on 127.0.0.1:{}\nencoders: CAN over UDP on 127.0.0.1:{}\n", tracker, can);
-  std::fflush(stdout);
-  return {};
-}
-
 int run(const RunOptions& options) {
   const auto setup = load_setup(options.choices);
   if (!setup) return report(setup.error());
@@ -124,16 +77,19 @@ int run(const RunOptions& options) {
     const auto written = write_file(options.truth_out, format_truth_csv(setup->simulation.truth));
     if (!written) return report(written.error());
   }
-  const SimClock clock(setup->speed);
-  const sigset_t signals = hold_signals();
-  prctl(PR_SET_TIMERSLACK, 1);  // at 20 times real time the usual 50 us would be a millisecond
-  auto simulation = Simulation::open(setup->simulation, clock.now());
+  const EventLoop loop(setup->speed);
+  auto simulation = Simulation::open(setup->simulation, loop.clock().now());
   if (!simulation) return report(simulation.error());
-  if (const auto announced = announce(**simulation, options); !announced) return report(announced.error());
+  if (const auto announced = announce_ports({(*simulation)->tracker()->port(), (*simulation)->bus()->port()},
+                                            options.ports_file);
+      !announced)
+    return report(announced.error());
   Narrator narrator(setup->speed);
-  while (stop_requested == 0) {
-    wait(**simulation, clock, signals);
-    const HostTime now = clock.now();
+  while (!loop.stopped()) {
+    std::vector<pollfd> fds;
+    (*simulation)->add_poll_fds(fds);
+    loop.wait(fds, (*simulation)->next_due());
+    const HostTime now = loop.clock().now();
     (*simulation)->poll(now);
     narrator.look(**simulation, now);
   }

@@ -56,11 +56,7 @@ Result<EncoderBus> EncoderBus::open(const EncoderBusOptions& options,
 EncoderBus::EncoderBus(Socket socket, const EncoderBusOptions& options)
     : socket_(std::move(socket)), port_(port_of(socket_)), speed_(options.speed) {
   if (options.peer_port == 0) return;
-  sockaddr_in peer{};
-  peer.sin_family = AF_INET;
-  peer.sin_port = htons(options.peer_port);
-  peer.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
-  std::memcpy(&peer_, &peer, sizeof peer);
+  peer_ = loopback_address(options.peer_port);
   has_peer_ = true;
 }
 

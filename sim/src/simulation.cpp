@@ -19,7 +19,8 @@ Result<std::unique_ptr<Simulation>> Simulation::open(const SimulationSetup& setu
   if (!path) return tl::unexpected(path.error());
   std::unique_ptr<Simulation> simulation(new Simulation(setup.truth, std::move(*path), setup));
   if (setup.tracker) {
-    auto tracker = TrackerServer::open(setup.tracker_port, *setup.tracker, simulation->machine_, now);
+    auto tracker = TrackerServer::open(
+        setup.tracker_port, std::make_unique<TrackerDevice>(*setup.tracker, simulation->machine_, now));
     if (!tracker) return tl::unexpected(tracker.error());
     simulation->tracker_.emplace(std::move(*tracker));
   }
@@ -49,7 +50,11 @@ void Simulation::inject_faults(HostTime now) {
   for (; next_fault_ < faults_.size(); ++next_fault_) {
     const ScheduledFault& next = faults_[next_fault_];
     if (*machine_.started() + seconds_to_ns(next.fault.at_s) > now) return;
-    if (next.target == FaultTarget::Tracker && tracker_) tracker_->inject(next.fault, now);
+    if (next.target == FaultTarget::Tracker && tracker_) {
+      tracker_->device().inject(next.fault, now);
+      tracker_->poll(now);
+    }
+
     if (next.target == FaultTarget::Encoder && bus_) bus_->inject(next.fault, now);
   }
 }

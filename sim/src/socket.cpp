@@ -62,4 +62,11 @@ std::uint16_t port_of(const Socket& socket) {
   return ntohs(address.sin_port);
 }
 
+sockaddr_storage loopback_address(std::uint16_t port) {
+  const sockaddr_in address = loopback(port);
+  sockaddr_storage storage{};
+  std::memcpy(&storage, &address, sizeof address);
+  return storage;
+}
+
 }  // namespace abbe::sim

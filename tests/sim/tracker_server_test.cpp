@@ -13,7 +13,7 @@ using namespace std::chrono_literals;
 class TrackerServerTest : public testing::Test {
  protected:
   static TrackerServer open(const VirtualMachine& machine, HostTime now) {
-    return TrackerServer::open(0, {}, machine, now).value();
+    return TrackerServer::open(0, std::make_unique<TrackerDevice>(TrackerOptions{}, machine, now)).value();
   }
 
   Socket connect() {
@@ -80,7 +80,8 @@ TEST_F(TrackerServerTest, TakesTheNextClientWhenTheFirstHasGone) {
 
 TEST_F(TrackerServerTest, RebootClosesTheConnectionAndLetsNobodyInUntilItIsOver) {
   const Socket client = connect();
-  server_.inject({FaultKind::Reboot, 0.0, 5.0, 0.0, 0}, now_);
+  server_.device().inject({FaultKind::Reboot, 0.0, 5.0, 0.0, 0}, now_);
+  server_.poll(now_);
   const auto closing = emscon::decode(test::receive_bytes(client));
   EXPECT_EQ(std::get<emscon::StatusChange>(*closing).event, emscon::Event::ServerClosing);
   EXPECT_TRUE(test::receive_bytes(client).empty());
@@ -93,7 +94,8 @@ TEST_F(TrackerServerTest, RebootClosesTheConnectionAndLetsNobodyInUntilItIsOver)
 }
 
 TEST_F(TrackerServerTest, PortInUseIsAClearError) {
-  const auto second = TrackerServer::open(server_.port(), {}, machine_, now_);
+  const auto second =
+      TrackerServer::open(server_.port(), std::make_unique<TrackerDevice>(TrackerOptions{}, machine_, now_));
   ASSERT_FALSE(second);
   EXPECT_EQ(second.error().code, ErrorCode::Io);
   EXPECT_THAT(second.error().text, testing::HasSubstr(std::to_string(server_.port())));

@@ -2,6 +2,8 @@
 /// A file descriptor with an owner, and the two kinds of loopback endpoint the simulator needs. All
 /// non-blocking.
 
+#include <sys/socket.h>
+
 #include <cstdint>
 #include <utility>
 
@@ -34,5 +36,7 @@ class Socket {
 [[nodiscard]] Result<Socket> listen_tcp(std::uint16_t port);
 [[nodiscard]] Result<Socket> bind_udp(std::uint16_t port);
 [[nodiscard]] std::uint16_t port_of(const Socket& socket);
+/// 127.0.0.1 with this port, as sendto() wants it.
+[[nodiscard]] sockaddr_storage loopback_address(std::uint16_t port);
 
 }  // namespace abbe::sim

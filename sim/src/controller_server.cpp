@@ -1,30 +1,33 @@
-#include "abbe/sim/tracker_server.hpp"
+#include "abbe/sim/controller_server.hpp"
 
 #include <netinet/in.h>
 #include <netinet/tcp.h>
+#include <sys/socket.h>
 
 #include <array>
 #include <cerrno>
 #include <utility>
+
+#include "abbe/sim/recorded_tracker.hpp"
+#include "abbe/sim/tracker_device.hpp"
 
 namespace abbe::sim {
 namespace {
 
 constexpr std::size_t kMostUnsent = 32u << 20;  // a client this far behind does not read any more
 
-}  // namespace
-
-Result<TrackerServer> TrackerServer::open(std::uint16_t port, const TrackerOptions& options,
-                                          const VirtualMachine& machine, HostTime now) {
-  auto listener = listen_tcp(port);
-  if (!listener) return tl::unexpected(listener.error());
-  return TrackerServer(std::move(*listener), std::make_unique<TrackerDevice>(options, machine, now));
+void turn_away(const Socket& stranger) {
+  std::array<std::byte, 64> packet{};
+  const std::size_t size =
+      emscon::encode(emscon::ErrorResponse{emscon::Command{}, emscon::Status::MultipleConnectionsNotAllowed},
+                     std::span(packet));
+  ::send(stranger.get(), packet.data(), size, MSG_DONTWAIT | MSG_NOSIGNAL);
 }
 
-TrackerServer::TrackerServer(Socket listener, std::unique_ptr<TrackerDevice> device)
-    : listener_(std::move(listener)), port_(port_of(listener_)), device_(std::move(device)) {}
+}  // namespace
 
-void TrackerServer::poll(HostTime now) {
+template <class Controller>
+void ControllerServer<Controller>::poll(HostTime now) {
   accept_clients(now);
   read(now);
   device_->advance(now);
@@ -32,13 +35,8 @@ void TrackerServer::poll(HostTime now) {
   if (client_ && device_->wants_close() && unsent_.empty()) drop_client();
 }
 
-void TrackerServer::inject(const Fault& fault, HostTime now) {
-  device_->inject(fault, now);
-  write();
-  if (client_ && device_->wants_close() && unsent_.empty()) drop_client();
-}
-
-void TrackerServer::accept_clients(HostTime now) {
+template <class Controller>
+void ControllerServer<Controller>::accept_clients(HostTime now) {
   for (;;) {
     Socket stranger(::accept4(listener_.get(), nullptr, nullptr, SOCK_NONBLOCK | SOCK_CLOEXEC));
     if (!stranger) return;
@@ -56,15 +54,8 @@ void TrackerServer::accept_clients(HostTime now) {
   }
 }
 
-void TrackerServer::turn_away(const Socket& stranger) const {
-  std::array<std::byte, 64> packet{};
-  const std::size_t size =
-      emscon::encode(emscon::ErrorResponse{emscon::Command{}, emscon::Status::MultipleConnectionsNotAllowed},
-                     std::span(packet));
-  ::send(stranger.get(), packet.data(), size, MSG_DONTWAIT | MSG_NOSIGNAL);
-}
-
-void TrackerServer::read(HostTime now) {
+template <class Controller>
+void ControllerServer<Controller>::read(HostTime now) {
   std::array<std::byte, 4096> buffer;  // NOLINT: filled by recv
   while (client_) {
     const ssize_t size = ::recv(client_.get(), buffer.data(), buffer.size(), MSG_DONTWAIT);
@@ -78,7 +69,8 @@ void TrackerServer::read(HostTime now) {
   }
 }
 
-void TrackerServer::write() {
+template <class Controller>
+void ControllerServer<Controller>::write() {
   const std::vector<std::byte> more = device_->take_output();
   if (!client_) return;
   unsent_.insert(unsent_.end(), more.begin(), more.end());
@@ -93,10 +85,14 @@ void TrackerServer::write() {
   if (unsent_.size() > kMostUnsent) drop_client();
 }
 
-void TrackerServer::drop_client() {
+template <class Controller>
+void ControllerServer<Controller>::drop_client() {
   client_.close();
   unsent_.clear();
   device_->disconnected();
 }
+
+template class ControllerServer<TrackerDevice>;
+template class ControllerServer<RecordedTracker>;
 
 }  // namespace abbe::sim

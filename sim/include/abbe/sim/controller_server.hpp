@@ -1,0 +1,52 @@
+#pragma once
+/// A tracker controller behind a TCP port: one client at a time, another one is told so and turned away.
+/// Steppable: poll(now) never blocks and reads no clock. Not thread-safe. Controllers: TrackerDevice
+/// (simulated), RecordedTracker (replayed).
+
+#include <memory>
+#include <utility>
+#include <vector>
+
+#include "abbe/sim/error.hpp"
+#include "abbe/sim/sim_clock.hpp"
+#include "abbe/sim/socket.hpp"
+
+namespace abbe::sim {
+
+template <class Controller>
+class ControllerServer {
+ public:
+  /// On 127.0.0.1; port 0: the kernel chooses.
+  [[nodiscard]] static Result<ControllerServer> open(std::uint16_t port,
+                                                     std::unique_ptr<Controller> controller) {
+    auto listener = listen_tcp(port);
+    if (!listener) return tl::unexpected(listener.error());
+    return ControllerServer(std::move(*listener), std::move(controller));
+  }
+
+  void poll(HostTime now);
+  [[nodiscard]] HostTime next_due() const { return device_->next_due(); }
+  [[nodiscard]] std::uint16_t port() const { return port_; }
+  [[nodiscard]] int listener_fd() const { return listener_.get(); }
+  [[nodiscard]] int client_fd() const { return client_.get(); }  ///< -1 without a client
+  [[nodiscard]] bool wants_write() const { return !unsent_.empty(); }
+  [[nodiscard]] Controller& device() { return *device_; }
+  [[nodiscard]] const Controller& device() const { return *device_; }
+
+ private:
+  ControllerServer(Socket listener, std::unique_ptr<Controller> device)
+      : listener_(std::move(listener)), port_(port_of(listener_)), device_(std::move(device)) {}
+
+  void accept_clients(HostTime now);
+  void read(HostTime now);
+  void write();
+  void drop_client();
+
+  Socket listener_;
+  Socket client_;
+  std::uint16_t port_ = 0;
+  std::unique_ptr<Controller> device_;
+  std::vector<std::byte> unsent_;
+};
+
+}  // namespace abbe::sim

@@ -1,0 +1,77 @@
+#pragma once
+/// The encoders of a recording on their UDP port again. The n-th SYNC from the start is answered with the
+/// frames that answered the n-th SYNC then, SDO requests with the recorded responses to the same request,
+/// everything else (heartbeats, EMCY, error frames) comes with its original timing. Until the recording
+/// starts nodes are kept alive with heartbeats and the first positions. Without a tracker in the recording it
+/// starts with the first SYNC. Steppable, not thread-safe.
+
+#include <sys/socket.h>
+
+#include <map>
+#include <set>
+#include <vector>
+
+#include "abbe/protocol/can/canopen.hpp"
+#include "abbe/protocol/can/frame.hpp"
+#include "abbe/sim/encoder_bus.hpp"
+#include "abbe/sim/recorded_traffic.hpp"
+
+namespace abbe::sim {
+
+class RecordedBus {
+ public:
+  /// `timeline` must outlive it. `leads`: it starts the timeline, because no tracker does.
+  [[nodiscard]] static Result<RecordedBus> open(const EncoderBusOptions& options,
+                                                const RecordedDevice& device, ReplayTimeline& timeline,
+                                                bool leads);
+
+  void poll(HostTime now);
+  [[nodiscard]] HostTime next_due() const;
+  [[nodiscard]] int fd() const { return socket_.get(); }
+  [[nodiscard]] std::uint16_t port() const { return port_of(socket_); }
+  [[nodiscard]] bool finished() const { return timeline_.running() && next_spoken_ >= spoken_.size(); }
+  [[nodiscard]] std::size_t syncs() const { return cycles_.size(); }
+
+ private:
+  struct Cycle {
+    HostTime sync;
+    std::vector<can::CanFrame> answers;
+  };
+  struct Spoken {
+    HostTime time;
+    can::CanFrame frame;
+  };
+  using SdoRequest = std::pair<std::uint32_t, std::array<std::byte, 8>>;
+  struct SdoResponses {
+    std::vector<can::CanFrame> frames;
+    std::size_t next = 0;
+  };
+
+  RecordedBus(Socket socket, const EncoderBusOptions& options, const RecordedDevice& device,
+              ReplayTimeline& timeline, bool leads);
+  void take(const can::CanFrame& frame, bool to_device, HostTime time);
+  void on_frame(const can::CanFrame& frame, HostTime now);
+  void on_sync(HostTime now);
+  void on_sdo(const can::CanFrame& frame);
+  void send(std::span<const can::CanFrame> frames);
+  void keep_alive(HostTime now);
+  [[nodiscard]] std::size_t cycle_at(HostTime recorded) const;
+
+  Socket socket_;
+  ReplayTimeline& timeline_;
+  bool leads_;
+  bool has_peer_ = false;
+  sockaddr_storage peer_{};
+  std::uint8_t sequence_ = 0;
+  std::set<can::NodeId> nodes_;
+  std::vector<Cycle> cycles_;
+  std::vector<Spoken> spoken_;
+  std::map<SdoRequest, SdoResponses> sdo_;
+  std::map<can::NodeId, SdoRequest> asked_;  ///< while the recording is read: requests without a response yet
+  std::optional<std::size_t> next_cycle_;
+  std::size_t next_spoken_ = 0;
+  HostTime next_beat_ = HostTime::min();
+  can::NodeState state_ = can::NodeState::PreOperational;
+};
+
+}  // namespace abbe::sim

@@ -1,0 +1,24 @@
+#include "ports_file.hpp"
+
+#include <fmt/format.h>
+
+#include <cstdio>
+
+#include "files.hpp"
+
+namespace abbe::sim {
+
+Result<void> announce_ports(const Ports& ports, const std::string& path) {
+  std::string lines;
+  if (ports.tracker) lines += fmt::format("tracker_port={}\n", *ports.tracker);
+  if (ports.can) lines += fmt::format("can_port={}\n", *ports.can);
+  if (!path.empty()) {
+    if (const auto written = write_file(path, lines); !written) return written;
+  }
+  if (ports.tracker) fmt::print("tracker: emScon on 127.0.0.1:{}\n", *ports.tracker);
+  if (ports.can) fmt::print("encoders: CAN over UDP on 127.0.0.1:{}\n", *ports.can);
+  std::fflush(stdout);
+  return {};
+}
+
+}  // namespace abbe::sim

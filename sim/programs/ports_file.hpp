@@ -1,0 +1,22 @@
+#pragma once
+/// Where the devices listen, for people (standard output) and for scripts (a file written when everything
+/// listens, whose lines `tracker_port=N` and `can_port=N` a shell and a TOML reader both understand; a device
+/// that is not there has no line).
+
+#include <cstdint>
+#include <optional>
+#include <string>
+
+#include "abbe/sim/error.hpp"
+
+namespace abbe::sim {
+
+struct Ports {
+  std::optional<std::uint16_t> tracker;
+  std::optional<std::uint16_t> can;
+};
+
+/// The file is there before anything is printed. Empty path: no file.
+[[nodiscard]] Result<void> announce_ports(const Ports& ports, const std::string& path);
+
+}  // namespace abbe::sim

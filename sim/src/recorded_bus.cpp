@@ -1,0 +1,184 @@
+#include "abbe/sim/recorded_bus.hpp"
+
+#include <netinet/in.h>
+
+#include <algorithm>
+#include <cstring>
+#include <utility>
+
+#include "abbe/protocol/can/udp_framing.hpp"
+
+namespace abbe::sim {
+namespace {
+
+using namespace std::chrono_literals;
+
+constexpr auto kBeat = 100ms;      // between heartbeats while nothing is replayed
+constexpr auto kOutOfStep = 50ms;  // a master that paused is led back to where the recording is
+constexpr std::uint32_t kFirstTpdo = 0x180;
+constexpr std::uint32_t kLastTpdo = 0x4FF;
+constexpr std::uint32_t kFunction = 0x780;
+constexpr std::uint32_t kNode = 0x07F;
+
+bool is_tpdo(const can::CanFrame& frame) {
+  return frame.is_standard_data() && frame.id >= kFirstTpdo && frame.id <= kLastTpdo &&
+         (frame.id & 0x80) != 0;
+}
+bool is_function(const can::CanFrame& frame, std::uint32_t function) {
+  return frame.is_standard_data() && (frame.id & kFunction) == function && (frame.id & kNode) != 0;
+}
+std::array<std::byte, 8> first_eight(const can::CanFrame& frame) {
+  std::array<std::byte, 8> bytes{};
+  std::copy_n(frame.data.begin(), bytes.size(), bytes.begin());
+  return bytes;
+}
+
+}  // namespace
+
+Result<RecordedBus> RecordedBus::open(const EncoderBusOptions& options, const RecordedDevice& device,
+                                      ReplayTimeline& timeline, bool leads) {
+  auto socket = bind_udp(options.port);
+  if (!socket) return tl::unexpected(socket.error());
+  return RecordedBus(std::move(*socket), options, device, timeline, leads);
+}
+
+RecordedBus::RecordedBus(Socket socket, const EncoderBusOptions& options, const RecordedDevice& device,
+                         ReplayTimeline& timeline, bool leads)
+    : socket_(std::move(socket)), timeline_(timeline), leads_(leads) {
+  for (const RecordedBlock& block : device.blocks) {
+    auto view = can::DatagramView::parse(block.bytes);
+    if (!view) continue;
+    for (can::CanFrame frame; view->next(frame);) take(frame, block.to_device, block.time);
+  }
+  if (options.peer_port == 0) return;
+  peer_ = loopback_address(options.peer_port);
+  has_peer_ = true;
+}
+
+void RecordedBus::take(const can::CanFrame& frame, bool to_device, HostTime time) {
+  if (to_device) {
+    if (can::decode_sync(frame)) cycles_.push_back({time, {}});
+    if (is_function(frame, can::cob::kSdoRequest)) {
+      asked_[static_cast<can::NodeId>(frame.id & kNode)] = {frame.id, first_eight(frame)};
+    }
+    return;
+  }
+  if (is_tpdo(frame)) {
+    if (!cycles_.empty()) cycles_.back().answers.push_back(frame);
+  } else if (is_function(frame, can::cob::kSdoResponse)) {
+    const auto asked = asked_.find(static_cast<can::NodeId>(frame.id & kNode));
+    if (asked == asked_.end()) return;
+    sdo_[asked->second].frames.push_back(frame);
+    asked_.erase(asked);
+  } else {
+    if (const auto beat = can::decode_heartbeat(frame)) nodes_.insert(beat->node);
+    spoken_.push_back({time, frame});
+  }
+}
+
+void RecordedBus::poll(HostTime now) {
+  std::array<std::byte, 2048> buffer;  // NOLINT: filled by recvfrom
+  for (int i = 0; i < 256; ++i) {
+    sockaddr_storage from{};
+    socklen_t from_size = sizeof from;
+    const ssize_t size = ::recvfrom(socket_.get(), buffer.data(), buffer.size(), MSG_DONTWAIT,
+                                    reinterpret_cast<sockaddr*>(&from), &from_size);
+    if (size < 0) break;
+    peer_ = from;
+    has_peer_ = true;
+    auto view = can::DatagramView::parse(std::span(buffer).first(static_cast<std::size_t>(size)));
+    if (!view) continue;
+    for (can::CanFrame frame; view->next(frame);) on_frame(frame, now);
+  }
+  keep_alive(now);
+  if (!timeline_.running()) next_spoken_ = 0;
+  for (; next_spoken_ < spoken_.size() && timeline_.due(spoken_[next_spoken_].time) <= now; ++next_spoken_) {
+    // What was said before the start has been said by keep_alive.
+    if (now - timeline_.due(spoken_[next_spoken_].time) < kOutOfStep)
+      send(std::span(&spoken_[next_spoken_].frame, 1));
+  }
+}
+
+HostTime RecordedBus::next_due() const {
+  if (!timeline_.running()) return has_peer_ ? next_beat_ : HostTime::max();
+  return next_spoken_ < spoken_.size() ? timeline_.due(spoken_[next_spoken_].time) : next_beat_;
+}
+
+void RecordedBus::keep_alive(HostTime now) {
+  const bool over = next_spoken_ >= spoken_.size();
+  if ((timeline_.running() && !over) || !has_peer_ || now < next_beat_) return;
+  next_beat_ = now + kBeat;
+  std::vector<can::CanFrame> beats;
+  for (const can::NodeId node : nodes_) beats.push_back(can::encode_heartbeat(node, state_));
+  send(beats);
+}
+
+void RecordedBus::on_frame(const can::CanFrame& frame, HostTime now) {
+  if (can::decode_sync(frame)) return on_sync(now);
+  if (is_function(frame, can::cob::kSdoRequest)) return on_sdo(frame);
+  const auto nmt = can::decode_nmt(frame);
+  if (!nmt) return;
+  if (nmt->command == can::NmtCommand::Start) state_ = can::NodeState::Operational;
+  if (nmt->command == can::NmtCommand::Stop) state_ = can::NodeState::Stopped;
+  if (nmt->command == can::NmtCommand::PreOperational) state_ = can::NodeState::PreOperational;
+  if (nmt->command != can::NmtCommand::ResetNode && nmt->command != can::NmtCommand::ResetCommunication)
+    return;
+  state_ = can::NodeState::PreOperational;
+  for (const can::NodeId node : nodes_) {
+    if (nmt->node != can::kAllNodes && nmt->node != node) continue;
+    const can::CanFrame boot = can::encode_heartbeat(node, can::NodeState::BootUp);
+    send(std::span(&boot, 1));
+  }
+}
+
+std::size_t RecordedBus::cycle_at(HostTime recorded) const {
+  const auto after = std::lower_bound(cycles_.begin(), cycles_.end(), recorded,
+                                      [](const Cycle& cycle, HostTime t) { return cycle.sync < t; });
+  if (after == cycles_.begin()) return 0;
+  if (after == cycles_.end()) return cycles_.size() - 1;
+  const auto before = after - 1;
+  return static_cast<std::size_t>((recorded - before->sync < after->sync - recorded ? before : after) -
+                                  cycles_.begin());
+}
+
+void RecordedBus::on_sync(HostTime now) {
+  if (cycles_.empty()) return;
+  if (leads_) timeline_.start(cycles_.front().sync, now);
+  if (!timeline_.running()) {
+    next_cycle_.reset();
+    return send(cycles_.front().answers);
+  }
+  const HostTime recorded = timeline_.recorded(now);
+  std::size_t cycle = next_cycle_.value_or(cycle_at(recorded));
+  const auto apart = cycles_[cycle].sync - recorded;
+  if (apart > kOutOfStep || apart < -kOutOfStep) cycle = cycle_at(recorded);
+  next_cycle_ = std::min(cycle + 1, cycles_.size() - 1);
+  send(cycles_[cycle].answers);
+}
+
+void RecordedBus::on_sdo(const can::CanFrame& frame) {
+  const auto known = sdo_.find({frame.id, first_eight(frame)});
+  if (known == sdo_.end()) {
+    // Nobody asked this when the recording was made: general error, for the same object.
+    const std::uint32_t id = can::cob::kSdoResponse + (frame.id & kNode);
+    const can::CanFrame abort =
+        can::standard_frame(id, {0x80, frame.byte(1), frame.byte(2), frame.byte(3), 0x00, 0x00, 0x00, 0x08});
+    return send(std::span(&abort, 1));
+  }
+  SdoResponses& responses = known->second;
+  send(std::span(&responses.frames[responses.next], 1));
+  if (responses.next + 1 < responses.frames.size()) ++responses.next;
+}
+
+void RecordedBus::send(std::span<const can::CanFrame> frames) {
+  std::array<std::byte, 1400> buffer{};
+  while (has_peer_ && !frames.empty()) {
+    can::DatagramWriter writer(buffer, sequence_++);
+    while (!frames.empty() && writer.add(frames.front())) frames = frames.subspan(1);
+    const auto bytes = writer.finish();
+    ::sendto(socket_.get(), bytes.data(), bytes.size(), MSG_DONTWAIT | MSG_NOSIGNAL,
+             reinterpret_cast<const sockaddr*>(&peer_), sizeof(sockaddr_in));
+  }
+}
+
+}  // namespace abbe::sim

@@ -1,0 +1,258 @@
+/// A recording back on the wire: what was answered then is answered now, and what came then comes with its
+/// timing.
+
+#include <gmock/gmock.h>
+
+#include "abbe/protocol/can/canopen.hpp"
+#include "abbe/protocol/can/udp_framing.hpp"
+#include "abbe/protocol/mcap/writer.hpp"
+#include "abbe/protocol/raw_bytes_cdr.hpp"
+#include "abbe/sim/controller_server.hpp"
+#include "abbe/sim/recorded_bus.hpp"
+#include "abbe/sim/recorded_tracker.hpp"
+#include "loopback_client.hpp"
+#include "tracker_script.hpp"
+
+namespace abbe::sim {
+namespace {
+
+using namespace std::chrono_literals;
+namespace mcap = protocol::mcap;
+
+constexpr HostTime kThen{5000s};  // when the recording was made
+constexpr HostTime kNow{90s};     // when it is replayed
+
+template <class Packet>
+std::vector<std::byte> packed(const Packet& packet) {
+  std::vector<std::byte> bytes(emscon::kMaxPacketSize);
+  bytes.resize(emscon::encode(packet, std::span(bytes)));
+  return bytes;
+}
+
+std::vector<std::byte> datagram(std::span<const can::CanFrame> frames) {
+  std::vector<std::byte> bytes(1400);
+  can::DatagramWriter writer(bytes, 0);
+  for (const can::CanFrame& frame : frames) EXPECT_TRUE(writer.add(frame));
+  bytes.resize(writer.finish().size());
+  return bytes;
+}
+
+RecordedDevice recorded_tracker() {
+  const auto ok = [](emscon::Command c) {
+    return packed(emscon::Answer{emscon::Acknowledge{c, emscon::Status::Ok}});
+  };
+  RecordedDevice device{"tracker", RecordedKind::Tracker, {}};
+  emscon::SystemStatusAnswer status;
+  status.serial_number = 4711;
+  device.blocks = {{kThen, false, packed(emscon::Answer{status})},
+                   {kThen + 10ms, false, ok(emscon::Command::Initialize)},
+                   {kThen + 1s, true, packed(emscon::Request{emscon::StartMeasurement{}})},
+                   {kThen + 2s, false, ok(emscon::Command::StartMeasurement)},
+                   {kThen + 3s, false, packed(emscon::StatusChange{emscon::Event::MeasurementNotReady})},
+                   {kThen + 4s, false, packed(emscon::StatusChange{emscon::Event::MeasurementReady})}};
+  return device;
+}
+
+RecordedDevice recorded_encoders() {
+  RecordedDevice device{"encoders", RecordedKind::Encoders, {}};
+  const can::CanFrame beat = can::encode_heartbeat(1, can::NodeState::Operational);
+  const can::CanFrame sync = can::encode_sync();
+  const can::CanFrame ask = can::standard_frame(0x601, {0x40, 0, 0x10, 0, 0, 0, 0, 0});
+  const can::CanFrame told = can::standard_frame(0x581, {0x43, 0, 0x10, 0, 0x96, 0x01, 8, 0});
+  const auto add = [&](HostTime t, bool to_device, const can::CanFrame& frame) {
+    device.blocks.push_back({t, to_device, datagram(std::span(&frame, 1))});
+  };
+  add(kThen, true, ask);
+  add(kThen + 1ms, false, told);
+  add(kThen + 2ms, false, beat);
+  for (int n = 0; n < 100; ++n) {
+    add(kThen + 2s + n * 1ms, true, sync);
+    add(kThen + 2s + n * 1ms + 100us, false,
+        can::encode_position(0x181, can::PositionType::Signed32, 1000 + n));
+  }
+  add(kThen + 2s + 50ms, false, can::encode_emergency({1, 0x5000, 1, {}}));
+  return device;
+}
+
+std::vector<std::byte> mcap_file(const std::vector<RecordedDevice>& devices) {
+  mcap::ChunkBuilder chunk(1 << 20);
+  chunk.add(mcap::Channel{7, 0, "abbe/v1/RawBytes", "cdr", {}});
+  std::uint32_t sequence = 0;
+  std::vector<std::byte> payload(protocol::kMaxRawBytesCdrSize);
+  for (const RecordedDevice& device : devices) {
+    for (const RecordedBlock& block : device.blocks) {
+      protocol::RawBytes raw;
+      raw.device = device.name;
+      raw.time = block.time;
+      raw.direction = block.to_device ? protocol::RawBlock::Direction::ToDevice
+                                      : protocol::RawBlock::Direction::FromDevice;
+      raw.bytes = block.bytes;
+      const std::size_t size = protocol::encode_cdr(raw, payload).value();
+      chunk.add(mcap::Message{7, sequence++, 0, 0, std::span(payload).first(size)});
+    }
+  }
+  mcap::Buffer file;
+  mcap::append_magic(file);
+  mcap::append(file, mcap::Header{});
+  const auto bytes = chunk.close().bytes;
+  file.insert(file.end(), bytes.begin(), bytes.end());
+  return file;
+}
+
+TEST(RecordedTraffic, FindsTheDevicesOfARecording) {
+  const auto devices = read_traffic(mcap_file({recorded_tracker(), recorded_encoders()}), "r.mcap");
+  ASSERT_TRUE(devices) << devices.error().text;
+  ASSERT_EQ(devices->size(), 2u);
+  EXPECT_EQ((*devices)[0].name, "encoders");
+  EXPECT_EQ((*devices)[0].kind, RecordedKind::Encoders);
+  EXPECT_EQ((*devices)[1].kind, RecordedKind::Tracker);
+  EXPECT_EQ((*devices)[1].blocks.size(), recorded_tracker().blocks.size());
+  EXPECT_EQ((*devices)[1].blocks[2].time, kThen + 1s);
+  EXPECT_TRUE((*devices)[1].blocks[2].to_device);
+}
+
+TEST(RecordedTraffic, RefusesAFileThatIsNoRecording) {
+  EXPECT_FALSE(read_traffic(std::as_bytes(std::span("PK zip")), "r.mcap"));
+  EXPECT_FALSE(read_traffic(mcap_file({}), "r.mcap"));
+}
+
+TEST(RecordedTraffic, ReadsWhatIsThereOfAFileCutAnywhere) {
+  const auto file = mcap_file({recorded_tracker()});
+  for (std::size_t size = 0; size < file.size(); size += 7) {
+    const auto devices = read_traffic(std::span(file).first(size), "r.mcap");
+    if (!devices) continue;
+    EXPECT_LE((*devices)[0].blocks.size(), recorded_tracker().blocks.size());
+  }
+}
+
+std::vector<std::byte> reply(RecordedTracker& tracker, const emscon::Request& request, HostTime now) {
+  tracker.receive(packed(request), now);
+  return tracker.take_output();
+}
+
+TEST(RecordedTracker, GivesTheRecordedAnswers) {
+  ReplayTimeline timeline;
+  RecordedTracker tracker(recorded_tracker(), timeline);
+  tracker.connected(kNow);
+  for (int i = 0; i < 2; ++i) {  // also more often than then
+    const auto answer = emscon::decode_answer(reply(tracker, emscon::GetSystemStatus{}, kNow));
+    EXPECT_EQ(std::get<emscon::SystemStatusAnswer>(answer.value()).serial_number, 4711);
+  }
+}
+
+TEST(RecordedTracker, DoesNotInventAnswers) {
+  ReplayTimeline timeline;
+  RecordedTracker tracker(recorded_tracker(), timeline);
+  tracker.connected(kNow);
+  const auto answer = emscon::decode_answer(reply(tracker, emscon::GetUnits{}, kNow));
+  EXPECT_EQ(status_of(answer.value()), emscon::Status::NotImplemented);
+}
+
+TEST(RecordedTracker, SpeaksWithTheTimingOfThenFromTheStartOfMeasuring) {
+  ReplayTimeline timeline;
+  RecordedTracker tracker(recorded_tracker(), timeline);
+  tracker.connected(kNow);
+  EXPECT_EQ(tracker.next_due(), HostTime::max());
+  reply(tracker, emscon::StartMeasurement{}, kNow);
+  EXPECT_EQ(tracker.next_due(), kNow + 1s);
+  tracker.advance(kNow + 999ms);
+  EXPECT_TRUE(tracker.take_output().empty());
+  tracker.advance(kNow + 1s);
+  EXPECT_EQ(tracker.take_output(), packed(emscon::StatusChange{emscon::Event::MeasurementNotReady}));
+  EXPECT_FALSE(tracker.finished());
+  tracker.advance(kNow + 2s);
+  EXPECT_TRUE(tracker.finished());
+}
+
+TEST(RecordedTracker, BeginsAnewForTheNextClient) {
+  ReplayTimeline timeline;
+  RecordedTracker tracker(recorded_tracker(), timeline);
+  tracker.connected(kNow);
+  reply(tracker, emscon::StartMeasurement{}, kNow);
+  tracker.advance(kNow + 10s);
+  tracker.disconnected();
+  tracker.connected(kNow + 20s);
+  reply(tracker, emscon::StartMeasurement{}, kNow + 30s);
+  EXPECT_EQ(tracker.next_due(), kNow + 31s);
+}
+
+class RecordedBusTest : public testing::Test {
+ protected:
+  std::vector<can::CanFrame> tell(const can::CanFrame& frame, HostTime now) {
+    test::send_bytes(peer_, datagram(std::span(&frame, 1)));
+    test::readable(bus_.fd());
+    bus_.poll(now);
+    std::vector<can::CanFrame> frames;
+    while (test::readable(peer_.get(), 0)) {
+      const auto bytes = test::receive_bytes(peer_);
+      auto view = can::DatagramView::parse(bytes);
+      for (can::CanFrame f; view && view->next(f);) frames.push_back(f);
+    }
+    return frames;
+  }
+
+  std::optional<std::int64_t> position(HostTime now) {
+    for (const can::CanFrame& frame : tell(can::encode_sync(), now)) {
+      if (frame.id == 0x181) return can::decode_position(frame.payload(), can::PositionType::Signed32);
+    }
+    return std::nullopt;
+  }
+
+  ReplayTimeline timeline_;
+  RecordedBus bus_ = RecordedBus::open({}, recorded_encoders(), timeline_, false).value();
+  Socket peer_ = test::connected(SOCK_DGRAM, bus_.port());
+};
+
+TEST_F(RecordedBusTest, AnswersSdoRequestsAsThen) {
+  const auto frames = tell(can::standard_frame(0x601, {0x40, 0, 0x10, 0, 0, 0, 0, 0}), kNow);
+  ASSERT_FALSE(frames.empty());
+  EXPECT_EQ(frames[0], can::standard_frame(0x581, {0x43, 0, 0x10, 0, 0x96, 0x01, 8, 0}));
+  const auto unknown = tell(can::standard_frame(0x601, {0x40, 1, 0x20, 0, 0, 0, 0, 0}), kNow + 1ms);
+  ASSERT_FALSE(unknown.empty());
+  EXPECT_EQ(unknown[0].byte(0), 0x80);
+}
+
+TEST_F(RecordedBusTest, StandsAtTheFirstPositionUntilTheRecordingStarts) {
+  EXPECT_EQ(position(kNow), 1000);
+  EXPECT_EQ(position(kNow + 1ms), 1000);
+}
+
+TEST_F(RecordedBusTest, GivesEverySyncTheNextCycleWhateverTheJitter) {
+  timeline_.start(kThen + 2s, kNow);
+  EXPECT_EQ(position(kNow + 10ms + 200us), 1010);
+  EXPECT_EQ(position(kNow + 10ms + 900us), 1011);
+  EXPECT_EQ(position(kNow + 12ms + 300us), 1012);
+}
+
+TEST_F(RecordedBusTest, FollowsTheRecordingAfterALongPause) {
+  timeline_.start(kThen + 2s, kNow);
+  EXPECT_EQ(position(kNow), 1000);
+  EXPECT_EQ(position(kNow + 80ms), 1080);
+  EXPECT_EQ(position(kNow + 10s), 1099);
+}
+
+TEST_F(RecordedBusTest, EmergencyComesAtItsTime) {
+  timeline_.start(kThen + 2s, kNow);
+  const auto before = tell(can::encode_sync(), kNow + 49ms);
+  const auto after = tell(can::encode_sync(), kNow + 50ms);
+  const auto emergencies = [](const std::vector<can::CanFrame>& frames) {
+    return std::count_if(frames.begin(), frames.end(),
+                         [](const can::CanFrame& f) { return can::decode_emergency(f).has_value(); });
+  };
+  EXPECT_EQ(emergencies(before), 0);
+  EXPECT_EQ(emergencies(after), 1);
+}
+
+TEST_F(RecordedBusTest, WithoutATrackerTheFirstSyncStartsTheRecording) {
+  ReplayTimeline timeline;
+  RecordedBus alone = RecordedBus::open({}, recorded_encoders(), timeline, true).value();
+  const Socket peer = test::connected(SOCK_DGRAM, alone.port());
+  const can::CanFrame sync = can::encode_sync();
+  test::send_bytes(peer, datagram(std::span(&sync, 1)));
+  test::readable(alone.fd());
+  alone.poll(kNow);
+  EXPECT_EQ(timeline.due(kThen + 2s), kNow);
+}
+
+}  // namespace
+}  // namespace abbe::sim

@@ -1,0 +1,211 @@
+#include "abbe/daemon/model_store.hpp"
+
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <sys/file.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <cstring>
+
+#include "files/text_file.hpp"
+#include "store/store_state.hpp"
+
+namespace abbe::daemon {
+
+namespace {
+
+namespace fs = std::filesystem;
+
+/// Orders the changes of several processes; released when it goes out of scope or the process dies.
+class StoreLock {
+ public:
+  explicit StoreLock(const fs::path& folder)
+      : fd_(::open((folder / "lock").c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0644)) {
+    while (fd_ >= 0 && ::flock(fd_, LOCK_EX) != 0)
+      if (errno != EINTR) break;
+  }
+  StoreLock(const StoreLock&) = delete;
+  StoreLock& operator=(const StoreLock&) = delete;
+  ~StoreLock() {
+    if (fd_ >= 0) ::close(fd_);
+  }
+  [[nodiscard]] bool held() const noexcept { return fd_ >= 0; }
+
+ private:
+  int fd_;
+};
+
+tl::unexpected<Error> lock_failure(const fs::path& folder) {
+  return fail(ErrorCode::Io,
+              fmt::format("lock the model store {}: {}", folder.string(), std::strerror(errno)));
+}
+
+fs::path state_path(const fs::path& folder) {
+  return folder / "state.json";
+}
+
+/// A store nobody wrote to yet has no events.
+Result<StoreState> read_state(const fs::path& folder) {
+  const auto file = state_path(folder);
+  std::error_code ignored;
+  if (!fs::exists(file, ignored)) return StoreState{};
+  const auto text = read_text(file);
+  if (!text) return tl::make_unexpected(text.error());
+  return store_state_from_text(*text, file.string());
+}
+
+Result<void> append(const fs::path& folder, StoreState state, StoreEvent event) {
+  state.events.push_back(std::move(event));
+  return replace_file(state_path(folder), to_text(state));
+}
+
+bool is_id(const std::string& text) {
+  return text.size() == 16 && text.find_first_not_of("0123456789abcdef") == std::string::npos;
+}
+
+/// The ids of the files in models/, in order of name.
+std::vector<std::string> ids_on_disk(const fs::path& folder) {
+  std::vector<std::string> ids;
+  std::error_code ignored;
+  for (const auto& entry : fs::directory_iterator(folder / "models", ignored))
+    if (entry.path().extension() == ".json" && is_id(entry.path().stem().string()))
+      ids.push_back(entry.path().stem().string());
+  std::sort(ids.begin(), ids.end());
+  return ids;
+}
+
+}  // namespace
+
+Result<ModelStore> ModelStore::open(const fs::path& folder) {
+  std::error_code failed;
+  fs::create_directories(folder / "models", failed);
+  if (failed)
+    return fail(ErrorCode::Io,
+                fmt::format("create the model store {}: {}", folder.string(), failed.message()));
+  if (const auto state = read_state(folder); !state) return tl::make_unexpected(state.error());
+  return ModelStore(folder);
+}
+
+fs::path ModelStore::model_path(const std::string& id) const {
+  return folder_ / "models" / (id + ".json");
+}
+
+Result<std::string> ModelStore::add(const ModelDocument& document, bool accepted,
+                                    std::vector<std::string> reasons, const StoreActor& actor) {
+  const StoreLock lock(folder_);
+  if (!lock.held()) return lock_failure(folder_);
+  auto state = read_state(folder_);
+  if (!state) return tl::make_unexpected(state.error());
+  const auto id = model_id(document.model, document.method);
+  // A damaged file of the same id is written again: what it should have held is in our hands.
+  if (!load(id))
+    if (const auto written = replace_file(model_path(id), to_json(document)); !written)
+      return tl::make_unexpected(written.error());
+  StoreEvent event{StoreAction::Added, id, actor, accepted, std::move(reasons)};
+  if (const auto done = append(folder_, std::move(*state), std::move(event)); !done)
+    return tl::make_unexpected(done.error());
+  return id;
+}
+
+Result<void> ModelStore::activate(const std::string& id, const StoreActor& actor, bool force) {
+  const StoreLock lock(folder_);
+  if (!lock.held()) return lock_failure(folder_);
+  auto state = read_state(folder_);
+  if (!state) return tl::make_unexpected(state.error());
+  if (const auto document = load(id); !document) return tl::make_unexpected(document.error());
+  const StoreEvent* added = state->last_added(id);
+  const bool accepted = added != nullptr && added->accepted;
+  if (!accepted && !force)
+    return fail(
+        ErrorCode::Refused,
+        added == nullptr
+            ? fmt::format("activate {}: the gate never judged it (force it to take it anyway)", id)
+            : fmt::format("activate {}: the gate refused it: {}", id, fmt::join(added->reasons, "; ")));
+  const auto action = accepted ? StoreAction::Activated : StoreAction::Forced;
+  return append(folder_, std::move(*state), StoreEvent{action, id, actor, accepted, {}});
+}
+
+Result<std::string> ModelStore::rollback(const StoreActor& actor) {
+  const StoreLock lock(folder_);
+  if (!lock.held()) return lock_failure(folder_);
+  auto state = read_state(folder_);
+  if (!state) return tl::make_unexpected(state.error());
+  const auto stack = state->activations();
+  if (stack.size() < 2)
+    return fail(ErrorCode::Refused, "roll back: no model was active before the present one");
+  const auto& id = stack[stack.size() - 2];
+  if (const auto document = load(id); !document) return tl::make_unexpected(document.error());
+  if (const auto done =
+          append(folder_, std::move(*state), StoreEvent{StoreAction::RolledBack, id, actor, false, {}});
+      !done)
+    return tl::make_unexpected(done.error());
+  return id;
+}
+
+Result<std::vector<StoreEntry>> ModelStore::list() const {
+  const auto state = read_state(folder_);
+  if (!state) return tl::make_unexpected(state.error());
+  const auto active = state->active();
+  std::vector<StoreEntry> entries;
+  for (const auto& id : ids_on_disk(folder_)) {
+    StoreEntry entry;
+    entry.id = id;
+    entry.active = active == id;
+    if (const StoreEvent* added = state->last_added(id); added != nullptr) {
+      entry.accepted = added->accepted;
+      entry.reasons = added->reasons;
+      entry.added = added->actor.when;
+    }
+    if (const auto document = load(id)) {
+      entry.method = document->method;
+      entry.machine = document->machine;
+    } else {
+      entry.fault = document.error().text;
+    }
+    entries.push_back(std::move(entry));
+  }
+  std::stable_sort(entries.begin(), entries.end(),
+                   [](const auto& a, const auto& b) { return a.added > b.added; });
+  return entries;
+}
+
+Result<std::vector<StoreEvent>> ModelStore::history() const {
+  auto state = read_state(folder_);
+  if (!state) return tl::make_unexpected(state.error());
+  return std::move(state->events);
+}
+
+Result<std::optional<std::string>> ModelStore::active_id() const {
+  const auto state = read_state(folder_);
+  if (!state) return tl::make_unexpected(state.error());
+  return state->active();
+}
+
+Result<ModelDocument> ModelStore::load(const std::string& id) const {
+  auto document = read_model(model_path(id));
+  if (document && model_id(document->model, document->method) != id)
+    return fail(ErrorCode::BadInput,
+                fmt::format("{}: holds another model than its name says", model_path(id).string()));
+  return document;
+}
+
+Result<std::string> ModelStore::find(const std::string& prefix) const {
+  if (prefix == "active") {
+    const auto active = active_id();
+    if (!active) return tl::make_unexpected(active.error());
+    return *active ? Result<std::string>{**active} : fail(ErrorCode::Usage, "no model is active");
+  }
+  constexpr std::size_t kShortest = 4;
+  std::vector<std::string> found;
+  if (prefix.size() >= kShortest)
+    for (const auto& id : ids_on_disk(folder_))
+      if (id.starts_with(prefix)) found.push_back(id);
+  if (found.size() == 1) return found.front();
+  return fail(ErrorCode::Usage,
+              fmt::format("model \"{}\": {} in {} begin with that", prefix,
+                          found.empty() ? "none" : std::to_string(found.size()), folder_.string()));
+}
+
+}  // namespace abbe::daemon

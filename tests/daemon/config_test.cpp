@@ -1,0 +1,183 @@
+#include "abbe/daemon/config.hpp"
+
+#include <gmock/gmock.h>
+
+#include <string>
+
+namespace abbe::daemon {
+namespace {
+
+using std::chrono::microseconds;
+
+using ::testing::AllOf;
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+using ::testing::SizeIs;
+using ::testing::StartsWith;
+
+const std::string kMachine = R"([machine]
+name = "mill"
+chain = "[w X' b Y Z (C1) t]"
+[axes.X]
+min_mm = -300
+max_mm = 300
+[axes.Y]
+min_mm = -250
+max_mm = 250
+reference_mm = 10
+[axes.Z]
+min_mm = -400
+max_mm = -100
+[target]
+offset_mm = [20, -15, -120]
+[model]
+node_spacing_mm = 50
+)";
+
+std::vector<std::string> faults_of(const std::string& text) {
+  const auto config = parse_config(text, "abbed.toml");
+  return config ? std::vector<std::string>{} : config.error().details;
+}
+
+TEST(Config, ReadsAMachineInSI) {
+  const auto config = parse_config(kMachine, "machine.toml");
+  ASSERT_TRUE(config) << config.error().details.front();
+  const auto& machine = config->machine;
+  EXPECT_EQ(machine.find_axis("X")->min, -0.3);
+  EXPECT_EQ(machine.target_offset_m, (std::array<double, 3>{0.02, -0.015, -0.12}));
+  EXPECT_THAT(machine.nodes_m.at("X"), SizeIs(13));
+  EXPECT_EQ(machine.nodes_m.at("X").back(), 0.3);
+}
+
+TEST(Config, PutsTheReferenceAtZeroIfInsideElseAtTheMinimum) {
+  const auto config = parse_config(kMachine, "machine.toml");
+  ASSERT_TRUE(config);
+  EXPECT_EQ(config->machine.find_axis("X")->reference, 0.0);
+  EXPECT_EQ(config->machine.find_axis("Y")->reference, 0.01);
+  EXPECT_EQ(config->machine.find_axis("Z")->reference, -0.4);
+}
+
+TEST(Config, OfAMachineAloneHasNoDevices) {
+  const auto config = parse_config(kMachine + "[tracker]\nsigma_range_um = 1.5\n", "machine.toml");
+  ASSERT_TRUE(config);
+  EXPECT_DOUBLE_EQ(config->machine.sigma_range_m, 1.5e-6);
+  EXPECT_FALSE(config->tracker);
+  EXPECT_FALSE(config->encoder);
+}
+
+TEST(Config, ReadsDevicesOfTheDaemon) {
+  const auto config = parse_config(kMachine + R"(
+[tracker]
+host = "10.0.0.7"
+max_constant_delay_us = 1500
+weather = "read"
+[encoder]
+transport = "udp"
+peer_host = "10.0.0.8"
+peer_port = 20000
+sync_period_us = 500
+nodes = [{axis = "X", node = 1, step_nm = 10, invert = true}, {axis = "Y", node = 2}]
+)",
+                                   "abbed.toml");
+  ASSERT_TRUE(config) << config.error().details.front();
+  EXPECT_EQ(config->tracker->max_constant_delay, microseconds{1500});
+  EXPECT_EQ(config->tracker->weather, WeatherConfig::Read);
+  EXPECT_EQ(config->encoder->sync_period, microseconds{500});
+  EXPECT_DOUBLE_EQ(config->encoder->nodes[0].step, -1e-8);
+  EXPECT_DOUBLE_EQ(config->encoder->nodes[1].step, 1e-9);
+}
+
+TEST(Config, AnchorsRelativePathsAtTheFile) {
+  const auto config =
+      parse_config(kMachine + "[daemon]\ndata_dir = \"data\"\nruntime_dir = \"/run/x\"\n", "/etc/a/b.toml");
+  ASSERT_TRUE(config);
+  EXPECT_EQ(config->recording.dir, "/etc/a/data/recordings");
+  EXPECT_EQ(config->control.socket, "/run/x/control.sock");
+}
+
+TEST(Config, ReportsThreeFaultsWithTheirLines) {
+  const auto faults = faults_of(
+      kMachine + "[daemon]\nhub_period_us = \"fast\"\n[dds]\ndomian = 3\n[gate]\nmax_error_mm = -1\n");
+  EXPECT_THAT(
+      faults,
+      ElementsAre(AllOf(StartsWith("abbed.toml:19:17: daemon.hub_period_us:"), HasSubstr("a number")),
+                  AllOf(StartsWith("abbed.toml:21:1: dds.domian:"), HasSubstr("did you mean \"domain\"")),
+                  AllOf(StartsWith("abbed.toml:23:16: gate.max_error_mm:"), HasSubstr("positive"))));
+}
+
+TEST(Config, SuggestsTheKeyWithItsUnit) {
+  auto text = kMachine;
+  text.replace(text.find("min_mm"), 6, "min");
+  EXPECT_THAT(faults_of(text),
+              ElementsAre(HasSubstr("axes.X.min_mm: missing"),
+                          AllOf(HasSubstr("axes.X.min: unknown key"), HasSubstr("\"min_mm\""))));
+}
+
+TEST(Config, ShowsAtMostTwentyFaults) {
+  std::string text = kMachine + "[daemon]\n";
+  for (int i = 0; i < 30; ++i) text += "nonsense_" + std::to_string(i) + " = 1\n";
+  const auto faults = faults_of(text);
+  EXPECT_THAT(faults, SizeIs(21));
+  EXPECT_THAT(faults.front(), HasSubstr("nonsense_0"));
+  EXPECT_THAT(faults.back(), HasSubstr("and 10 more"));
+}
+
+TEST(Config, NamesThePlaceOfASyntaxFault) {
+  EXPECT_THAT(faults_of(kMachine + "[daemon\n"), ElementsAre(StartsWith("abbed.toml:18:8:")));
+}
+
+TEST(Config, RefusesAnotherSpeedForRealDevices) {
+  EXPECT_THAT(faults_of(kMachine + "[daemon]\nspeed = 10\n"), ElementsAre(HasSubstr("simulated = true")));
+  EXPECT_THAT(faults_of(kMachine + "[daemon]\nspeed = 10\nsimulated = true\n"), SizeIs(0));
+}
+
+TEST(Config, RefusesAChainThatIsNotOne) {
+  auto text = kMachine;
+  text.replace(text.find("Y Z (C1)"), 8, "Y Y (C1)");
+  EXPECT_THAT(faults_of(text), ElementsAre(HasSubstr("machine.chain:")));
+}
+
+TEST(Config, RefusesTwoNodesOnOneId) {
+  EXPECT_THAT(faults_of(kMachine + "[encoder]\ntransport = \"socketcan\"\ninterface = \"can0\"\n"
+                                   "nodes = [{axis = \"X\", node = 5}, {axis = \"Y\", node = 5}]\n"),
+              ElementsAre(HasSubstr("encoder.nodes[1].node: node id 5 is used twice")));
+}
+
+TEST(Config, RefusesKeysOfTheOtherTransport) {
+  EXPECT_THAT(
+      faults_of(kMachine + "[encoder]\ntransport = \"socketcan\"\ninterface = \"can0\"\npeer_port = 9\n"
+                           "nodes = [{axis = \"X\", node = 5}]\n"),
+      ElementsAre(HasSubstr("encoder.peer_port: has no meaning")));
+}
+
+TEST(Config, RefusesNodesThatDoNotSpanTheTravel) {
+  auto text = kMachine + "nodes_mm = { X = [-300, 0, 299] }\n";
+  EXPECT_THAT(faults_of(text), ElementsAre(HasSubstr("model.nodes_mm.X: first and last node")));
+}
+
+TEST(Config, RefusesInfinity) {
+  auto text = kMachine;
+  text.replace(text.find("-300"), 4, "-inf");
+  EXPECT_THAT(faults_of(text), ElementsAre(HasSubstr("axes.X.min_mm: must be finite")));
+}
+
+TEST(Config, SaysWhichFileCannotBeRead) {
+  const auto config = load_config("/nonexistent/abbed.toml");
+  ASSERT_FALSE(config);
+  EXPECT_EQ(config.error().code, ErrorCode::Io);
+  EXPECT_THAT(config.error().text, AllOf(HasSubstr("/nonexistent/abbed.toml"), HasSubstr("No such file")));
+}
+
+TEST(Config, MachineHashFollowsGeometryNotNoise) {
+  const auto plain = parse_config(kMachine, "a.toml");
+  const auto noisier = parse_config(kMachine + "[tracker]\nsigma_range_um = 9\n", "b.toml");
+  auto text = kMachine;
+  text.replace(text.find("offset_mm = [20"), 15, "offset_mm = [21");
+  const auto longer = parse_config(text, "c.toml");
+  ASSERT_TRUE(plain && noisier && longer);
+  EXPECT_EQ(machine_hash(plain->machine), machine_hash(noisier->machine));
+  EXPECT_NE(machine_hash(plain->machine), machine_hash(longer->machine));
+}
+
+}  // namespace
+}  // namespace abbe::daemon

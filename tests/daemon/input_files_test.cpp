@@ -1,0 +1,154 @@
+#include "abbe/daemon/input_files.hpp"
+
+#include <gmock/gmock.h>
+
+#include <fstream>
+#include <string>
+
+#include "abbe/daemon/sha256.hpp"
+
+namespace abbe::daemon {
+namespace {
+
+using ::testing::AllOf;
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+using ::testing::IsEmpty;
+using ::testing::SizeIs;
+
+class InputFiles : public ::testing::Test {
+ protected:
+  std::filesystem::path write(const std::string& name, const std::string& text) {
+    const auto file =
+        std::filesystem::path(::testing::TempDir()) /
+        (std::string(::testing::UnitTest::GetInstance()->current_test_info()->name()) + "_" + name);
+    std::ofstream(file, std::ios::binary) << text;
+    return file;
+  }
+  std::vector<std::string> tracker_faults(const std::string& text) {
+    const auto tracker = read_tracker_csv(write("tracker.csv", text));
+    return tracker ? std::vector<std::string>{} : tracker.error().details;
+  }
+};
+
+TEST_F(InputFiles, ReadTheCartesianTrackerForm) {
+  const auto tracker =
+      read_tracker_csv(write("t.csv", "time_s,x_mm,y_mm,z_mm\n0,1,2,3\n0.002,-1000,0.5,1e1\n"));
+  ASSERT_TRUE(tracker);
+  ASSERT_THAT(tracker->points, SizeIs(2));
+  EXPECT_EQ(tracker->points[1].time_s, 0.002);
+  EXPECT_EQ(tracker->points[1].p_tracker_m, calib::Vector3(-1.0, 0.0005, 0.01));
+}
+
+TEST_F(InputFiles, ReadTheSphericalTrackerForm) {
+  const auto tracker = read_tracker_csv(
+      write("t.csv", "time_s,range_mm,azimuth_rad,elevation_rad,status\n0,2000,1.5707963267948966,0,0\n"));
+  ASSERT_TRUE(tracker) << tracker.error().details.front();
+  // 2 m along y; the rounding of pi/2 leaves 1e-16 of it on x.
+  EXPECT_LT((tracker->points[0].p_tracker_m - calib::Vector3(0, 2, 0)).norm(), 1e-15);
+}
+
+TEST_F(InputFiles, KeepUnusablePointsInTheirPlace) {
+  const auto tracker = read_tracker_csv(
+      write("t.csv", "time_s,x_mm,y_mm,z_mm,status\n0,1,2,3,0\n1,1,2,3,1\n2,1,2,3,2\n3,1,2,3,0\n"));
+  ASSERT_TRUE(tracker);
+  std::vector<bool> valid;
+  for (const auto& point : tracker->points) valid.push_back(point.valid);
+  EXPECT_THAT(valid, ElementsAre(true, true, false, true));
+}
+
+TEST_F(InputFiles, MayHaveCommentsBlankLinesAndColumnsInAnyOrder) {
+  const auto points =
+      read_points_csv(write("p.csv", "# by hand\r\nz_mm, x_mm ,y_mm\r\n\r\n# more\r\n3,1,+2\r\n"));
+  ASSERT_TRUE(points) << points.error().details.front();
+  EXPECT_THAT(points->points_m, ElementsAre(AxisPosition{0.001, 0.002, 0.003}));
+}
+
+TEST_F(InputFiles, ReportEveryBadCellWithLineColumnAndName) {
+  EXPECT_THAT(tracker_faults("time_s,x_mm,y_mm,z_mm\n0,1,2,3\n# note\n1,nan,2,3\n2,1,two,3\n3,1,2,\n"),
+              ElementsAre(AllOf(HasSubstr("tracker.csv:4:3: x_mm:"), HasSubstr("finite")),
+                          AllOf(HasSubstr("tracker.csv:5:5: y_mm:"), HasSubstr("\"two\": not a number")),
+                          AllOf(HasSubstr("tracker.csv:6:7: z_mm:"), HasSubstr("empty"))));
+}
+
+TEST_F(InputFiles, RefuseTimeThatDoesNotAscendBesideOtherFaults) {
+  EXPECT_THAT(tracker_faults("time_s,x_mm,y_mm,z_mm\n1,1,2,3\n1,1,2,3\n2,1,2,3x\n3,1,2,3\n2.5,1,2,3\n"),
+              ElementsAre(AllOf(HasSubstr(":3:1: time_s: 1 after 1")), HasSubstr(":4:7: z_mm:"),
+                          HasSubstr(":6:1: time_s: 2.5 after 3")));
+}
+
+TEST_F(InputFiles, RefuseAMissingAndAnUnknownColumn) {
+  EXPECT_THAT(tracker_faults("time_s,x_mm,y_mm,zmm\n0,1,2,3\n"),
+              ElementsAre(AllOf(HasSubstr(":1:18: zmm: unknown column"), HasSubstr("did you mean \"z_mm\"")),
+                          HasSubstr(":1:1: z_mm: missing column")));
+}
+
+TEST_F(InputFiles, RefuseALineThatWasCutOff) {
+  EXPECT_THAT(tracker_faults("time_s,x_mm,y_mm,z_mm\n0,1,2,3\n1,1,2,3"),
+              ElementsAre(HasSubstr(":3:8: the last line")));
+  EXPECT_THAT(tracker_faults("time_s,x_mm,y_mm,z_mm\n0,1,2,3\n1,1\n"),
+              ElementsAre(HasSubstr("2 values where 4 belong")));
+}
+
+TEST_F(InputFiles, RefuseAnEmptyFileAndAHeaderAlone) {
+  EXPECT_THAT(tracker_faults(""), ElementsAre(HasSubstr("empty")));
+  EXPECT_THAT(tracker_faults("time_s,x_mm,y_mm,z_mm\n"), ElementsAre(HasSubstr("at least 1 points")));
+}
+
+TEST_F(InputFiles, ShowAtMostTwentyFaults) {
+  std::string text = "time_s,x_mm,y_mm,z_mm\n";
+  for (int i = 0; i < 50; ++i) text += std::to_string(i) + ",1,2,oops\n";
+  const auto faults = tracker_faults(text);
+  EXPECT_THAT(faults, SizeIs(21));
+  EXPECT_THAT(faults.back(), HasSubstr("and 30 more"));
+}
+
+TEST_F(InputFiles, SuspectDegrees) {
+  EXPECT_THAT(tracker_faults("time_s,range_mm,azimuth_rad,elevation_rad\n0,2000,90,45\n"),
+              ElementsAre(HasSubstr("azimuth_rad: beyond a full turn"),
+                          HasSubstr("elevation_rad: beyond the vertical")));
+}
+
+TEST_F(InputFiles, ReadAPathWithItsFeed) {
+  const auto path =
+      read_path_csv(write("path.csv", "x_mm,y_mm,z_mm,feed_mm_per_min\n0,0,0,600\n100,0,0,1200\n"));
+  ASSERT_TRUE(path);
+  EXPECT_THAT(path->vertices_m, ElementsAre(AxisPosition{0, 0, 0}, AxisPosition{0.1, 0, 0}));
+  EXPECT_DOUBLE_EQ(path->feed_m_per_s[1], 0.02);
+}
+
+TEST_F(InputFiles, RefuseAPathThatDoesNotMove) {
+  const auto path = read_path_csv(write("path.csv", "x_mm,y_mm,z_mm\n0,0,0\n0,0,0\n"));
+  ASSERT_FALSE(path);
+  EXPECT_THAT(path.error().details, ElementsAre(HasSubstr(":3:1: the same vertex")));
+}
+
+TEST_F(InputFiles, ReadAnEncoderLog) {
+  const auto encoder = read_encoder_csv(write("e.csv", "time_s,x_mm,y_mm,z_mm\n0,1,2,3\n0.004,4,5,6\n"));
+  ASSERT_TRUE(encoder);
+  EXPECT_EQ(encoder->rows[1].time_s, 0.004);
+  EXPECT_EQ(encoder->rows[1].reading_m, (AxisPosition{0.004, 0.005, 0.006}));
+}
+
+TEST_F(InputFiles, CarryTheHashOfTheirBytes) {
+  const std::string text = "x_mm,y_mm,z_mm\n1,2,3\n";
+  const auto points = read_points_csv(write("p.csv", text));
+  ASSERT_TRUE(points);
+  EXPECT_EQ(points->source.sha256, sha256_hex(text));
+}
+
+TEST_F(InputFiles, SayWhichFileIsNotThere) {
+  const auto points = read_points_csv("/nonexistent/points.csv");
+  ASSERT_FALSE(points);
+  EXPECT_EQ(points.error().code, ErrorCode::Io);
+  EXPECT_THAT(points.error().text, HasSubstr("/nonexistent/points.csv"));
+  EXPECT_THAT(points.error().details, IsEmpty());
+}
+
+TEST(Sha256, AgreesWithThePublishedExample) {
+  // FIPS 180-4 example: the one-block message "abc".
+  EXPECT_EQ(sha256_hex("abc"), "ba7816bf8f01cfea414140de5dae2223b00361a396177a9cb410ff61f20015ad");
+}
+
+}  // namespace
+}  // namespace abbe::daemon

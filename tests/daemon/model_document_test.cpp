@@ -1,0 +1,127 @@
+#include "abbe/daemon/model_document.hpp"
+
+#include <gmock/gmock.h>
+
+#include <bit>
+#include <cstdint>
+
+#include "synthetic_model.hpp"
+
+namespace abbe::daemon {
+namespace {
+
+using test::synthetic_document;
+using test::synthetic_model;
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+using ::testing::Not;
+using ::testing::SizeIs;
+
+bool same_bits(double a, double b) {
+  return std::bit_cast<std::uint64_t>(a) == std::bit_cast<std::uint64_t>(b);
+}
+
+std::string replaced(std::string text, const std::string& what, const std::string& with) {
+  const auto at = text.find(what);
+  EXPECT_NE(at, std::string::npos) << what;
+  return text.replace(at, what.size(), with);
+}
+
+TEST(ModelDocument, ReadsBackToTheSameBits) {
+  const auto written = synthetic_document(1);
+  const auto read = parse_model(to_json(written), "model.json");
+  ASSERT_TRUE(read) << read.error().text << read.error().details.front();
+  ASSERT_EQ(read->model.U().size(), written.model.U().size());
+  for (Eigen::Index i = 0; i < written.model.U().size(); ++i)
+    EXPECT_TRUE(same_bits(read->model.U()[i], written.model.U()[i])) << i;
+  const auto& a = written.model.covariance();
+  const auto& b = read->model.covariance();
+  for (Eigen::Index i = 0; i < a.rows(); ++i)
+    for (Eigen::Index j = 0; j < a.cols(); ++j) EXPECT_TRUE(same_bits(a(i, j), b(i, j))) << i << "," << j;
+}
+
+TEST(ModelDocument, ReadsBackWithItsOrigin) {
+  const auto written = synthetic_document(2);
+  const auto read = parse_model(to_json(written), "model.json");
+  ASSERT_TRUE(read);
+  EXPECT_EQ(read->machine, written.machine);
+  EXPECT_EQ(read->created, written.created);
+  EXPECT_EQ(read->inputs, written.inputs);
+  EXPECT_EQ(read->statistics, written.statistics);
+}
+
+TEST(ModelDocument, WritesTheSameBytesAgain) {
+  const auto text = to_json(synthetic_document(3));
+  const auto read = parse_model(text, "model.json");
+  ASSERT_TRUE(read);
+  EXPECT_EQ(to_json(*read), text);
+}
+
+TEST(ModelDocument, HashLeavesOutDatesAndInputs) {
+  auto document = synthetic_document(4);
+  const auto hash = model_hash(document.model, document.method);
+  document.created += std::chrono::hours{1};
+  document.inputs.clear();
+  const auto read = parse_model(to_json(document), "model.json");
+  ASSERT_TRUE(read);
+  EXPECT_EQ(model_hash(read->model, read->method), hash);
+  EXPECT_THAT(hash, SizeIs(64));
+}
+
+TEST(ModelDocument, HashFollowsOneBitOfOneParameter) {
+  const auto model = synthetic_model(5);
+  auto description = model.description();
+  description.parameters[7].value = std::nextafter(description.parameters[7].value, 1.0);
+  const auto other = calib::VolumetricModel::from_description(description);
+  ASSERT_TRUE(other);
+  EXPECT_NE(model_hash(model, "otf"), model_hash(*other, "otf"));
+}
+
+TEST(ModelDocument, WritesLengthsInMmAndErrorsInMicrometres) {
+  const auto text = to_json(synthetic_document(6));
+  EXPECT_THAT(text, HasSubstr("\"tool_offsets_mm\": [[20, -15, -120]]"));
+  EXPECT_THAT(text, HasSubstr("\"nodes_mm\": [-300, -150, 0, "));
+  EXPECT_THAT(text, HasSubstr("\"unit\": \"urad\""));
+}
+
+TEST(ModelDocument, IsRefusedWhenANumberWasChanged) {
+  const auto text = to_json(synthetic_document(7));
+  const auto at = text.find("\"value\": ") + 9;
+  auto changed = text;
+  changed[at + 3] = changed[at + 3] == '1' ? '2' : '1';
+  const auto read = parse_model(changed, "model.json");
+  ASSERT_FALSE(read);
+  EXPECT_EQ(read.error().code, ErrorCode::BadInput);
+  EXPECT_THAT(read.error().details, ElementsAre(HasSubstr("hash: is not the hash of the content")));
+}
+
+TEST(ModelDocument, ReportsEveryFaultAtOnce) {
+  auto text = to_json(synthetic_document(8));
+  text = replaced(text, "\"gauge\": \"G1\"", "\"gauge\": \"G7\"");
+  text = replaced(text, "\"squareness\": \"travel\"", "\"squareness\": 1");
+  text = replaced(text, "\"sigma0\"", "\"sigma1\"");
+  const auto read = parse_model(text, "model.json");
+  ASSERT_FALSE(read);
+  EXPECT_THAT(read.error().details, ::testing::IsSupersetOf({HasSubstr("model.json: gauge: must be \"G1\""),
+                                                             HasSubstr("squareness: must be a string"),
+                                                             HasSubstr("statistics.sigma0: missing")}));
+}
+
+TEST(ModelDocument, IsRefusedWhenCutAnywhere) {
+  const auto text = to_json(synthetic_document(9));
+  for (std::size_t length = 0; length + 2 < text.size(); length += 997) {
+    const auto read = parse_model(std::string_view{text}.substr(0, length), "model.json");
+    ASSERT_FALSE(read) << length;
+    EXPECT_EQ(read.error().code, ErrorCode::BadInput);
+  }
+}
+
+TEST(ModelDocument, GivesTablesToSpreadsheets) {
+  const auto csv = to_tables_csv(synthetic_model(10));
+  EXPECT_THAT(csv, ::testing::StartsWith("name,position_mm,value,u,unit\nEXX,-300,"));
+  EXPECT_THAT(csv, HasSubstr("\nEC0Y,,"));
+  EXPECT_THAT(csv, Not(HasSubstr("nan")));
+}
+
+}  // namespace
+}  // namespace abbe::daemon

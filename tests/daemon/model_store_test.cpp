@@ -1,0 +1,160 @@
+#include "abbe/daemon/model_store.hpp"
+
+#include <gmock/gmock.h>
+#include <signal.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <fstream>
+
+#include "synthetic_model.hpp"
+
+namespace abbe::daemon {
+namespace {
+
+namespace fs = std::filesystem;
+using test::synthetic_document;
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+using ::testing::IsEmpty;
+using ::testing::SizeIs;
+
+class ModelStoreTest : public ::testing::Test {
+ protected:
+  ModelStoreTest() { fs::remove_all(folder_); }
+  ~ModelStoreTest() override { fs::remove_all(folder_); }
+  ModelStore open() { return ModelStore::open(folder_).value(); }
+  std::string add(unsigned seed, bool accepted = true, std::vector<std::string> reasons = {}) {
+    return open().add(synthetic_document(seed), accepted, std::move(reasons), actor("daemon")).value();
+  }
+  StoreActor actor(std::string why) {
+    now_ += std::chrono::seconds{1};
+    return {"tester", std::move(why), now_};
+  }
+
+  fs::path folder_ =
+      fs::path(::testing::TempDir()) /
+      (std::string("store_") + ::testing::UnitTest::GetInstance()->current_test_info()->name());
+  protocol::UtcTime now_{std::chrono::hours{24 * 365}};
+};
+
+TEST_F(ModelStoreTest, IsEmptyWhenNew) {
+  EXPECT_THAT(open().list().value(), IsEmpty());
+  EXPECT_EQ(open().active_id().value(), std::nullopt);
+}
+
+TEST_F(ModelStoreTest, KeepsWhatIsAddedAndGivesItBack) {
+  const auto id = add(1);
+  const auto document = open().load(id);
+  ASSERT_TRUE(document);
+  EXPECT_EQ(model_hash(document->model, "otf").substr(0, 16), id);
+  EXPECT_EQ(open().find(id.substr(0, 6)).value(), id);
+}
+
+TEST_F(ModelStoreTest, ActivatesAndRollsBackThroughSeveralModels) {
+  const auto a = add(1), b = add(2), c = add(3);
+  auto store = open();
+  for (const auto& id : {a, b, c}) ASSERT_TRUE(store.activate(id, actor("better")));
+  EXPECT_EQ(store.active_id().value(), c);
+  EXPECT_EQ(store.rollback(actor("drifts")).value(), b);
+  EXPECT_EQ(store.rollback(actor("worse")).value(), a);
+  EXPECT_EQ(open().active_id().value(), a);
+  const auto none = store.rollback(actor("worse still"));
+  ASSERT_FALSE(none);
+  EXPECT_EQ(none.error().code, ErrorCode::Refused);
+}
+
+TEST_F(ModelStoreTest, RefusesARefusedModelUnlessForced) {
+  const auto id = add(1, false, {"largest error 3 mm"});
+  auto store = open();
+  const auto refused = store.activate(id, actor("hope"));
+  ASSERT_FALSE(refused);
+  EXPECT_EQ(refused.error().code, ErrorCode::Refused);
+  EXPECT_THAT(refused.error().text, HasSubstr("largest error 3 mm"));
+  ASSERT_TRUE(store.activate(id, actor("measured by hand"), true));
+  const auto last = store.history().value().back();
+  EXPECT_EQ(last.action, StoreAction::Forced);
+  EXPECT_EQ(last.actor.who, "tester");
+  EXPECT_EQ(last.actor.why, "measured by hand");
+}
+
+TEST_F(ModelStoreTest, ListsNewestFirstWithVerdicts) {
+  const auto a = add(1);
+  const auto b = add(2, false, {"no better"});
+  const auto entries = open().list().value();
+  ASSERT_THAT(entries, SizeIs(2));
+  EXPECT_EQ(entries[0].id, b);
+  EXPECT_THAT(entries[0].reasons, ElementsAre("no better"));
+  EXPECT_TRUE(entries[1].accepted);
+}
+
+TEST_F(ModelStoreTest, ListsADamagedModelWithItsFault) {
+  const auto a = add(1), b = add(2);
+  fs::resize_file(open().model_path(a), 1000);
+  const auto entries = open().list().value();
+  ASSERT_THAT(entries, SizeIs(2));
+  EXPECT_EQ(entries[0].fault, "");
+  EXPECT_THAT(entries[1].fault, HasSubstr(a));
+  EXPECT_FALSE(open().activate(a, actor("try")));
+  EXPECT_TRUE(open().activate(b, actor("whole")));
+}
+
+TEST_F(ModelStoreTest, RefusesAModelUnderAnotherName) {
+  const auto a = add(1), b = add(2);
+  fs::copy_file(open().model_path(a), open().model_path(b), fs::copy_options::overwrite_existing);
+  const auto document = open().load(b);
+  ASSERT_FALSE(document);
+  EXPECT_THAT(document.error().text, HasSubstr("another model"));
+}
+
+TEST_F(ModelStoreTest, IsNotDisturbedByAHalfWrittenFile) {
+  const auto a = add(1);
+  ASSERT_TRUE(open().activate(a, actor("good")));
+  std::ofstream(folder_ / "state.json.77.new") << "{\"schema\": \"abbe/st";
+  std::ofstream(folder_ / "models" / "0123456789abcdef.json.77.new") << "{";
+  EXPECT_EQ(open().active_id().value(), a);
+  EXPECT_THAT(open().list().value(), SizeIs(1));
+}
+
+TEST_F(ModelStoreTest, SaysThatTheStateIsDamaged) {
+  add(1);
+  fs::resize_file(folder_ / "state.json", 20);
+  const auto store = ModelStore::open(folder_);
+  ASSERT_FALSE(store);
+  EXPECT_EQ(store.error().code, ErrorCode::BadInput);
+  EXPECT_THAT(store.error().text, HasSubstr("state.json"));
+}
+
+// A process that does nothing but activate is killed at ever later moments; whatever it was doing, the store
+// opens and one of the two models is active.
+TEST_F(ModelStoreTest, SurvivesAKillAtAnyMoment) {
+  const auto a = add(1), b = add(2);
+  ASSERT_TRUE(open().activate(a, actor("start")));
+  for (int round = 0; round < 12; ++round) {
+    const pid_t child = ::fork();
+    ASSERT_GE(child, 0);
+    if (child == 0) {
+      auto store = open();
+      for (int i = 0;; ++i) static_cast<void>(store.activate(i % 2 == 0 ? b : a, actor("again")));
+    }
+    ::usleep(static_cast<useconds_t>(1000 + 1700 * round));
+    ::kill(child, SIGKILL);
+    int status = 0;
+    ASSERT_EQ(::waitpid(child, &status, 0), child);
+    const auto store = ModelStore::open(folder_);
+    ASSERT_TRUE(store) << store.error().text;
+    const auto active = store->active_id().value();
+    EXPECT_TRUE(active == a || active == b);
+  }
+}
+
+TEST_F(ModelStoreTest, FindsByPrefixOrSaysHowManyThereAre) {
+  const auto id = add(1);
+  EXPECT_EQ(open().find("active").error().code, ErrorCode::Usage);
+  EXPECT_EQ(open().find("zzzz").error().code, ErrorCode::Usage);
+  ASSERT_TRUE(open().activate(id, actor("good")));
+  EXPECT_EQ(open().find("active").value(), id);
+}
+
+}  // namespace
+}  // namespace abbe::daemon

@@ -1,0 +1,5 @@
+#include "abbe/daemon/cli.hpp"
+
+int main(int argc, char** argv) {
+  return abbe::daemon::run_cli(argc, argv);
+}

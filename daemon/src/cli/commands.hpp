@@ -1,0 +1,18 @@
+#pragma once
+/// One function per subcommand: it adds itself to `parent`; when it was called, its callback leaves the exit
+/// code in `exit`. Options that hold a value live as long as the callback does.
+
+#include <CLI/App.hpp>
+#include <CLI/Config.hpp>
+#include <CLI/Formatter.hpp>
+
+namespace abbe::daemon {
+
+void add_identify_otf(CLI::App& parent, int& exit);
+void add_model_eval(CLI::App& parent, int& exit);
+void add_model_list(CLI::App& parent, int& exit);
+void add_model_show(CLI::App& parent, int& exit);
+void add_model_activate(CLI::App& parent, int& exit);
+void add_model_rollback(CLI::App& parent, int& exit);
+
+}  // namespace abbe::daemon

@@ -1,0 +1,127 @@
+#include <fmt/format.h>
+
+#include <charconv>
+#include <cmath>
+#include <cstdio>
+#include <memory>
+#include <optional>
+
+#include "abbe/daemon/input_files.hpp"
+#include "abbe/daemon/model_document.hpp"
+#include "abbe/daemon/otf_inputs.hpp"
+#include "cli/commands.hpp"
+#include "cli/terminal.hpp"
+
+namespace abbe::daemon {
+
+namespace {
+
+constexpr double kMmPerM = 1e3;
+constexpr double kUmPerM = 1e6;
+
+struct Arguments {
+  std::string model, points, tool;
+  bool correction = false;
+};
+
+/// "x,y,z" in mm.
+std::optional<calib::Vector3> parse_tool(const std::string& text) {
+  calib::Vector3 tool_m = calib::Vector3::Zero();
+  const char* at = text.data();
+  const char* const end = at + text.size();
+  for (int i = 0; i < 3; ++i) {
+    double value_mm = 0.0;
+    const auto [next, fault] = std::from_chars(at, end, value_mm);
+    if (fault != std::errc{} || !std::isfinite(value_mm)) return std::nullopt;
+    tool_m[i] = value_mm / kMmPerM;
+    at = next;
+    if (i < 2 && (at == end || *at++ != ',')) return std::nullopt;
+  }
+  return at == end ? std::optional{tool_m} : std::nullopt;
+}
+
+Result<calib::Vector3> tool_of(const Arguments& arguments, const calib::VolumetricModel& model) {
+  calib::Vector3 tool_m = model.tool_offsets_m().front();
+  if (!arguments.tool.empty()) {
+    const auto given = parse_tool(arguments.tool);
+    if (!given)
+      return fail(ErrorCode::Usage, fmt::format("--tool \"{}\": must be x,y,z in mm", arguments.tool));
+    tool_m = *given;
+  }
+  if (!model.holds_for_tool(tool_m))
+    return fail(
+        ErrorCode::DataInsufficient,
+        fmt::format(
+            "tool offset {}, {}, {} mm: the model was identified with another and does not hold for it",
+            tool_m[0] * kMmPerM, tool_m[1] * kMmPerM, tool_m[2] * kMmPerM));
+  return tool_m;
+}
+
+/// One row: position, vector, standard uncertainty, inside. The correction moves with V, and so has its
+/// uncertainty.
+Result<std::string> row(const calib::VolumetricModel& model, const AxisPosition& q,
+                        const calib::Vector3& tool_m, bool correction) {
+  const calib::Vector3 position_m(q[0], q[1], q[2]);
+  const auto error = model.error_at(position_m, tool_m);
+  calib::Vector3 vector_m = error.V_m;
+  bool inside = error.inside;
+  if (correction) {
+    const auto found = model.command_correction(position_m, tool_m);
+    if (!found) return tl::make_unexpected(error_of(found.error()));
+    vector_m = found->c_m;
+    inside = found->inside;
+  }
+  std::string text;
+  for (int i = 0; i < 3; ++i) text += fmt::format("{:.17g},", position_m[i] * kMmPerM);
+  for (int i = 0; i < 3; ++i) text += fmt::format("{:.17g},", vector_m[i] * kUmPerM);
+  for (int i = 0; i < 3; ++i) text += fmt::format("{:.17g},", std::sqrt(error.cov_V_m2(i, i)) * kUmPerM);
+  return text + (inside ? "1\n" : "0\n");
+}
+
+Result<std::string> evaluate(const Arguments& arguments) {
+  const auto document = read_model(arguments.model);
+  if (!document) return tl::make_unexpected(document.error());
+  const auto points = read_points_csv(arguments.points);
+  if (!points) return tl::make_unexpected(points.error());
+  const auto tool_m = tool_of(arguments, document->model);
+  if (!tool_m) return tl::make_unexpected(tool_m.error());
+  std::string text = arguments.correction
+                         ? "# quantity = command_correction\nx_mm,y_mm,z_mm,cx_um,cy_um,cz_um"
+                         : "# quantity = error\nx_mm,y_mm,z_mm,ex_um,ey_um,ez_um";
+  text += ",ux_um,uy_um,uz_um,inside\n";
+  for (const auto& q : points->points_m) {
+    const auto line = row(document->model, q, *tool_m, arguments.correction);
+    if (!line) return tl::make_unexpected(line.error());
+    text += *line;
+  }
+  return text;
+}
+
+int run(const Arguments& arguments) {
+  const auto text = evaluate(arguments);
+  if (!text) return report(text.error());
+  if (std::fwrite(text->data(), 1, text->size(), stdout) != text->size() || std::fflush(stdout) != 0)
+    return report({ErrorCode::Io, "write the result to stdout: it is closed or full"});
+  return 0;
+}
+
+}  // namespace
+
+void add_model_eval(CLI::App& parent, int& exit) {
+  auto arguments = std::make_shared<Arguments>();
+  auto* command = parent.add_subcommand(
+      "eval",
+      "The volumetric error at given axis positions, as CSV on stdout.\n"
+      "e = actual - nominal at the scale reading; u its standard uncertainty (k = 1) in the model's gauge;\n"
+      "inside: 1 where the model's data reach.");
+  command->add_option("MODEL", arguments->model, "model.json")->required();
+  command->add_option("--points", arguments->points, "points.csv: x_mm,y_mm,z_mm, scale readings")
+      ->required();
+  command->add_option("--tool", arguments->tool,
+                      "x,y,z: tool offset in mm; default: the one of the calibration");
+  command->add_flag("--correction", arguments->correction,
+                    "what to add to a command instead: c = -e(p + c), solved to 1 nm");
+  command->callback([arguments, &exit] { exit = run(*arguments); });
+}
+
+}  // namespace abbe::daemon

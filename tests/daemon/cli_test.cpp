@@ -1,0 +1,238 @@
+/// `abbe` as people use it: the built program as a process, its files, output and exit codes.
+
+#include <gmock/gmock.h>
+#include <sys/wait.h>
+
+#include <cstdlib>
+#include <fstream>
+#include <nlohmann/json.hpp>
+#include <sstream>
+
+#include "abbe/calib/model_comparison.hpp"
+#include "abbe/daemon/model_store.hpp"
+#include "synthetic_model.hpp"
+#include "synthetic_otf_run.hpp"
+
+namespace abbe::daemon {
+namespace {
+
+namespace fs = std::filesystem;
+using ::testing::AllOf;
+using ::testing::HasSubstr;
+using ::testing::IsEmpty;
+using ::testing::Not;
+using ::testing::StartsWith;
+
+std::string text_of(const fs::path& file) {
+  std::ostringstream text;
+  text << std::ifstream(file, std::ios::binary).rdbuf();
+  return text.str();
+}
+
+struct Ran {
+  int exit = -1;
+  std::string out, err;
+};
+
+/// One folder for the whole suite: making the run is the slow part.
+class Cli : public ::testing::Test {
+ protected:
+  static void SetUpTestSuite() {
+    folder_ = fs::path(::testing::TempDir()) / fmt::format("cli_{}", ::getpid());
+    files_ = test::write_synthetic_run(folder_);
+    identified_ = identify(files_.path, files_.tracker, folder_ / "out");
+  }
+  static void TearDownTestSuite() { fs::remove_all(folder_); }
+
+  /// Arguments hold no quotes: every path comes from the test itself.
+  static Ran abbe(const std::string& arguments) {
+    const auto out = folder_ / "stdout", err = folder_ / "stderr";
+    const auto command =
+        fmt::format("'{}' {} >'{}' 2>'{}'", ABBE_PROGRAM, arguments, out.string(), err.string());
+    const int status = std::system(command.c_str());
+    return {WIFEXITED(status) ? WEXITSTATUS(status) : -1, text_of(out), text_of(err)};
+  }
+  static Ran identify(const fs::path& path, const fs::path& tracker, const fs::path& out,
+                      const std::string& more = "") {
+    return abbe(fmt::format("identify otf --machine '{}' --path '{}' --tracker '{}' -o '{}' {}",
+                            files_.machine.string(), path.string(), tracker.string(), out.string(), more));
+  }
+  static fs::path write(const std::string& name, const std::string& text) {
+    test::write_text(folder_ / name, text);
+    return folder_ / name;
+  }
+
+  static inline fs::path folder_;
+  static inline test::OtfFiles files_;
+  static inline Ran identified_;
+};
+
+/// Columns of the rows of `model eval`, without comment and header.
+std::vector<std::vector<double>> rows_of(const std::string& csv) {
+  std::vector<std::vector<double>> rows;
+  std::istringstream lines(csv);
+  for (std::string line; std::getline(lines, line);) {
+    if (line.empty() || line[0] == '#' || line[0] == 'x') continue;
+    std::vector<double> row;
+    std::istringstream cells(line);
+    for (std::string cell; std::getline(cells, cell, ',');) row.push_back(std::stod(cell));
+    rows.push_back(row);
+  }
+  return rows;
+}
+
+TEST_F(Cli, IdentifiesTheTruthOfASimulatedMachine) {
+  ASSERT_EQ(identified_.exit, 0) << identified_.err;
+  std::string points = "x_mm,y_mm,z_mm\n";
+  std::vector<calib::Vector3> grid_m, difference_m;
+  for (const double x : {-30.0, -20.0, 10.0, 30.0})
+    for (const double y : {-30.0, 5.0, 30.0})
+      for (const double z : {-30.0, 0.0, 30.0}) points += fmt::format("{},{},{}\n", x, y, z);
+  const auto ran = abbe(fmt::format("model eval '{}' --points '{}'", (folder_ / "out/model.json").string(),
+                                    write("points.csv", points).string()));
+  ASSERT_EQ(ran.exit, 0) << ran.err;
+  const auto truth = test::synthetic_truth();
+  for (const auto& row : rows_of(ran.out)) {
+    ASSERT_EQ(row.size(), 10u);
+    const calib::Vector3 q_m(row[0] / 1e3, row[1] / 1e3, row[2] / 1e3);
+    grid_m.push_back(q_m + truth.target_offset_m);
+    difference_m.push_back(calib::Vector3(row[3], row[4], row[5]) / 1e6 - sim::error_m(truth, q_m));
+    EXPECT_EQ(row[9], 1.0);
+  }
+  const auto difference = calib::rigid_free(grid_m, difference_m);
+  ASSERT_TRUE(difference);
+  // Errors of 10 to 30 um; the two-step estimator leaves second-order terms of some 10 nm without noise.
+  EXPECT_LT(difference->rigid_free.max_m, 0.1e-6);
+}
+
+TEST_F(Cli, WritesTablesBesideTheModel) {
+  EXPECT_THAT(text_of(folder_ / "out/tables.csv"), StartsWith("name,position_mm,value,u,unit\nEXX,-60,"));
+  const auto document = read_model(folder_ / "out/model.json");
+  ASSERT_TRUE(document);
+  EXPECT_EQ(document->machine, "small mill");
+  ASSERT_EQ(document->inputs.size(), 3u);
+  EXPECT_EQ(document->inputs[2].name, "tracker.csv");
+}
+
+TEST_F(Cli, SaysNothingOnStderrWhenItIsNotATerminal) {
+  EXPECT_THAT(identified_.err, IsEmpty());
+  EXPECT_THAT(identified_.out, Not(HasSubstr("\x1b")));
+}
+
+TEST_F(Cli, GivesTheSummaryAsJson) {
+  const auto ran = identify(files_.path, files_.tracker, folder_ / "again", "--json");
+  ASSERT_EQ(ran.exit, 0) << ran.err;
+  const auto summary = nlohmann::json::parse(ran.out);
+  const auto first = read_model(folder_ / "out/model.json");
+  ASSERT_TRUE(first);
+  EXPECT_EQ(summary.at("hash"), model_hash(first->model, "otf"));  // the same input gives the same bits
+  EXPECT_LT(summary.at("held_out_rms_after_um").get<double>(),
+            summary.at("held_out_rms_before_um").get<double>());
+}
+
+TEST_F(Cli, CorrectsCommandsByTheErrorAtTheCorrectedPlace) {
+  const auto points = write("one.csv", "x_mm,y_mm,z_mm\n10,20,-30\n");
+  const auto model = (folder_ / "out/model.json").string();
+  const auto c = abbe(fmt::format("model eval '{}' --points '{}' --correction", model, points.string()));
+  ASSERT_EQ(c.exit, 0) << c.err;
+  EXPECT_THAT(c.out, StartsWith("# quantity = command_correction\nx_mm,y_mm,z_mm,cx_um,"));
+  const auto correction = rows_of(c.out).at(0);
+  const auto corrected = write(
+      "corrected.csv", fmt::format("x_mm,y_mm,z_mm\n{:.17g},{:.17g},{:.17g}\n", 10 + correction[3] / 1e3,
+                                   20 + correction[4] / 1e3, -30 + correction[5] / 1e3));
+  const auto error =
+      rows_of(abbe(fmt::format("model eval '{}' --points '{}'", model, corrected.string())).out).at(0);
+  for (std::size_t i = 3; i < 6; ++i) EXPECT_NEAR(correction[i], -error[i], 1e-3);  // um: solved to 1 nm
+}
+
+TEST_F(Cli, RefusesAToolTheModelDoesNotHoldFor) {
+  const auto points = write("one.csv", "x_mm,y_mm,z_mm\n10,20,-30\n");
+  const auto ran = abbe(fmt::format("model eval '{}' --points '{}' --tool -20,0,-200",
+                                    (folder_ / "out/model.json").string(), points.string()));
+  EXPECT_EQ(ran.exit, 1);
+  EXPECT_THAT(ran.out, IsEmpty());
+  EXPECT_THAT(ran.err, HasSubstr("does not hold for it"));
+}
+
+TEST_F(Cli, ExitsWith1WhenThePathIsAnother) {
+  auto path = test::synthetic_path_csv();
+  path.resize(path.rfind('\n', path.size() / 2) + 1);  // half the legs are missing
+  const auto ran = identify(write("half.csv", path), files_.tracker, folder_ / "half");
+  EXPECT_EQ(ran.exit, 1) << ran.err;
+  EXPECT_FALSE(fs::exists(folder_ / "half/model.json"));
+}
+
+TEST_F(Cli, ExitsWith2OnUsage) {
+  EXPECT_EQ(abbe("").exit, 2);
+  EXPECT_EQ(abbe("identify otf").exit, 2);
+  EXPECT_EQ(abbe("frobnicate").exit, 2);
+  const auto ran = identify(files_.path, files_.tracker, folder_ / "x", "--estimator joint");
+  EXPECT_EQ(ran.exit, 2);
+  EXPECT_THAT(ran.err, HasSubstr("joint"));
+}
+
+TEST_F(Cli, ExitsWith3OnABadFileAndListsItsFaults) {
+  auto text = test::synthetic_tracker_csv();
+  text.resize(text.size() - 5);
+  const auto ran = identify(files_.path, write("cut.csv", text), folder_ / "cut");
+  EXPECT_EQ(ran.exit, 3);
+  EXPECT_THAT(ran.err, AllOf(HasSubstr("cut.csv"), HasSubstr("the last line does not end")));
+  EXPECT_FALSE(fs::exists(folder_ / "cut"));
+}
+
+TEST_F(Cli, ExitsWith4WhenAFileIsNotThereOrNotWritable) {
+  EXPECT_EQ(identify(files_.path, folder_ / "missing.csv", folder_ / "x").exit, 4);
+  const auto ran = identify(files_.path, files_.tracker, files_.machine / "below-a-file");
+  EXPECT_EQ(ran.exit, 4) << ran.err;
+}
+
+TEST_F(Cli, HelpNamesTheExitCodesAndEnds0) {
+  const auto ran = abbe("identify otf --help");
+  EXPECT_EQ(ran.exit, 0);
+  EXPECT_THAT(ran.out, AllOf(HasSubstr("--tracker"), HasSubstr("Exit codes"), HasSubstr("range_mm")));
+}
+
+TEST_F(Cli, LooksAfterAStore) {
+  const auto folder = folder_ / "store";
+  auto store = ModelStore::open(folder).value();
+  const auto a = store.add(test::synthetic_document(1), true, {}, {"test", "", {}}).value();
+  const auto b = store.add(test::synthetic_document(2), false, {"no better"}, {"test", "", {}}).value();
+  const auto at = fmt::format(" --store '{}'", folder.string());
+  EXPECT_EQ(abbe("model activate " + a + at).exit, 0);
+  EXPECT_EQ(abbe("model activate " + b + at).exit, 5);
+  EXPECT_EQ(abbe("model activate " + b + at + " --force").exit, 2);
+  EXPECT_EQ(abbe("model activate " + b + at + " --force --why checked-by-hand").exit, 0);
+  EXPECT_EQ(nlohmann::json::parse(abbe("model list --json" + at).out).size(), 2u);
+  EXPECT_THAT(abbe("model show active" + at).out,
+              AllOf(HasSubstr(b), HasSubstr("forced"), HasSubstr("EXX,-300,")));
+  EXPECT_EQ(abbe("model rollback" + at).exit, 0);
+  EXPECT_EQ(ModelStore::open(folder).value().active_id().value(), a);
+  EXPECT_EQ(abbe("model rollback" + at).exit, 5);
+}
+
+TEST_F(Cli, SaysWhenAProgramOfItsOwnIsNotThere) {
+  // An empty folder beside a copy of abbe: no abbe-sim next to it, none in this PATH.
+  const auto copy = folder_ / "alone" / "abbe";
+  fs::create_directories(copy.parent_path());
+  fs::copy_file(ABBE_PROGRAM, copy, fs::copy_options::overwrite_existing);
+  const auto err = folder_ / "alone" / "err";
+  const int status =
+      std::system(fmt::format("PATH=/nonexistent '{}' sim 2>'{}'", copy.string(), err.string()).c_str());
+  EXPECT_EQ(WEXITSTATUS(status), 4);
+  EXPECT_THAT(text_of(err), HasSubstr("abbe-sim"));
+}
+
+TEST_F(Cli, RunsAProgramBesideItself) {
+  const auto copy = folder_ / "beside" / "abbe";
+  fs::create_directories(copy.parent_path());
+  fs::copy_file(ABBE_PROGRAM, copy, fs::copy_options::overwrite_existing);
+  const auto out = folder_ / "beside" / "out";
+  test::write_text(copy.parent_path() / "abbe-sim", "#!/bin/sh\necho \"sim got $*\"\nexit 7\n");
+  fs::permissions(copy.parent_path() / "abbe-sim", fs::perms::owner_all);
+  const int status = std::system(fmt::format("'{}' sim --seed 3 >'{}'", copy.string(), out.string()).c_str());
+  EXPECT_EQ(WEXITSTATUS(status), 7);
+  EXPECT_EQ(text_of(out), "sim got --seed 3\n");
+}
+
+}  // namespace
+}  // namespace abbe::daemon

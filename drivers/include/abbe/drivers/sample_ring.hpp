@@ -27,13 +27,14 @@ class SampleRing {
 
   /// Writer thread. False: full, the sample is dropped and counted.
   bool try_push(const T& sample) ABBE_RT {
-    if (indices_.free_slots(1) == 0) {
+    if (indices_.free_slots(1) == 0) [[unlikely]] {
       drop(1);
       return false;
     }
     T& slot = slots_[indices_.slot(indices_.write_counter())];
     slot = sample;
-    if (lost_ != 0) mark_gap(slot);
+    if (lost_ != 0) [[unlikely]]
+      mark_gap(slot);
     indices_.publish(1);
     return true;
   }
@@ -75,12 +76,12 @@ class SampleRing {
   }
 
  private:
-  void drop(std::size_t n) ABBE_RT {
+  [[gnu::cold, gnu::noinline]] void drop(std::size_t n) ABBE_RT {
     lost_ += n;
     // relaxed, and no read-modify-write: the writer is the only one who stores
     dropped_.store(dropped_.load(std::memory_order_relaxed) + n, std::memory_order_relaxed);
   }
-  void mark_gap(T& sample) ABBE_RT {
+  [[gnu::cold, gnu::noinline]] void mark_gap(T& sample) ABBE_RT {
     const std::uint64_t lost = lost_ + sample.head.lost_before;
     sample.head.lost_before =
         static_cast<std::uint32_t>(std::min<std::uint64_t>(lost, std::numeric_limits<std::uint32_t>::max()));

@@ -59,7 +59,7 @@ Eigen::MatrixXd unobservable_combinations(const ParameterLayout& layout, std::sp
   const Eigen::VectorXd scale =
       H.diagonal().unaryExpr([](double d) { return d > 0 ? 1 / std::sqrt(d) : 1.0; });
   const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(scale.asDiagonal() * H * scale.asDiagonal());
-  // Scaled eigenvalues of complete data fall into two groups, above 1e-5 and at rounding level (1e-15),
+  // Scaled eigenvalues of complete data fall into two groups, above 5e-3 and at rounding level (1e-15),
   // whatever the order of the axes; anything between separates them.
   constexpr double kZero = 1e-11;
   Eigen::Index nullity = 0;

@@ -1,7 +1,11 @@
 #include <gtest/gtest.h>
+#include <sys/socket.h>
+#include <sys/un.h>
 #include <unistd.h>
 
+#include <cstring>
 #include <filesystem>
+#include <fstream>
 
 #include "abbe/daemon/control_protocol.hpp"
 
@@ -83,11 +87,23 @@ TEST_F(Control, TwoDaemonsOnOneSocketAreRefused) {
 }
 
 TEST_F(Control, ASocketLeftBehindIsReplaced) {
-  { const auto dead = ControlServer::open(socket(), echo); }
   // What a killed daemon leaves: the file without anybody listening.
-  std::filesystem::create_directories(socket().parent_path());
-  ASSERT_EQ(::symlink("/nonexistent", socket().c_str()), 0);
+  const int dead = ::socket(AF_UNIX, SOCK_STREAM, 0);
+  sockaddr_un address{};
+  address.sun_family = AF_UNIX;
+  ASSERT_LT(socket().native().size(), sizeof address.sun_path);
+  std::strcpy(address.sun_path, socket().c_str());
+  ASSERT_EQ(::bind(dead, reinterpret_cast<const sockaddr*>(&address), sizeof address), 0);
+  ::close(dead);
   EXPECT_TRUE(ControlServer::open(socket(), echo));
+}
+
+TEST_F(Control, AFileThatIsNoSocketIsLeftAlone) {
+  std::ofstream{socket()} << "precious";
+  const auto server = ControlServer::open(socket(), echo);
+  ASSERT_FALSE(server);
+  EXPECT_NE(server.error().text.find("not a socket"), std::string::npos) << server.error().text;
+  EXPECT_TRUE(std::filesystem::is_regular_file(socket()));
 }
 
 }  // namespace

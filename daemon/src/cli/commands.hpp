@@ -9,6 +9,9 @@
 namespace abbe::daemon {
 
 void add_identify_otf(CLI::App& parent, int& exit);
+void add_calibrate_otf(CLI::App& parent, int& exit);
+void add_replay(CLI::App& parent, int& exit);
+void add_status(CLI::App& parent, int& exit);
 void add_model_eval(CLI::App& parent, int& exit);
 void add_model_list(CLI::App& parent, int& exit);
 void add_model_show(CLI::App& parent, int& exit);

@@ -50,6 +50,11 @@ Error exec_program(std::string_view name, int argc, const char* const* argv) {
 }
 
 void add_commands(CLI::App& app, int& exit) {
+  add_status(app, exit);
+  auto* calibrate = app.add_subcommand("calibrate", "Calibrate the machine that the running daemon watches");
+  calibrate->require_subcommand(1);
+  add_calibrate_otf(*calibrate, exit);
+  add_replay(app, exit);
   auto* identify =
       app.add_subcommand("identify", "Identify a machine's geometric errors from recorded files");
   identify->require_subcommand(1);

@@ -114,25 +114,6 @@ json cancel(const Hub& hub, const json& request) {
   return done ? json{{"ok", true}} : refusal(done.error().text);
 }
 
-StoreActor actor(const json& request) {
-  return {.who = request.at("who").get<std::string>(),
-          .why = request.at("why").get<std::string>(),
-          .when = std::chrono::system_clock::now()};
-}
-
-json id_or_refusal(const Result<std::string>& id) {
-  return id ? json{{"ok", true}, {"id", *id}} : refusal(id.error().text);
-}
-
-json activate(const Hub& hub, const json& request) {
-  return id_or_refusal(hub.parts().authority.activate(request.at("id").get<std::string>(), actor(request),
-                                                      request.value("force", false), hub.parts().time.now()));
-}
-
-json rollback(const Hub& hub, const json& request) {
-  return id_or_refusal(hub.parts().authority.rollback(actor(request), hub.parts().time.now()));
-}
-
 }  // namespace
 
 json answer_request(Hub& hub, const json& request, std::chrono::milliseconds time_out) {
@@ -141,14 +122,11 @@ json answer_request(Hub& hub, const json& request, std::chrono::milliseconds tim
       {"status", [](const Hub& h, const json&) { return status(h); }},
       {"calibrate", calibrate},
       {"cancel", cancel},
-      {"activate", activate},
-      {"rollback", rollback},
   };
   const auto what = request.at("do").get<std::string>();
   const auto task = kTasks.find(what);
   if (task == kTasks.end()) {
-    return refusal(
-        fmt::format("unknown request \"{}\": known are status, calibrate, cancel, activate, rollback", what));
+    return refusal(fmt::format("unknown request \"{}\": known are status, calibrate, cancel", what));
   }
   auto answer = hub.call([&hub, run = task->second, request] { return run(hub, request); }, time_out);
   return answer ? std::move(*answer)

@@ -49,8 +49,14 @@ Result<FileDescriptor> listen_unix(const std::filesystem::path& path) {
     return tl::unexpected(
         Error{ErrorCode::Io, fmt::format("listen {}: another daemon already answers there", path.string())});
   }
-  std::error_code ignored;
-  std::filesystem::remove(path, ignored);
+  std::error_code error;
+  const auto type = std::filesystem::symlink_status(path, error).type();
+  if (type == std::filesystem::file_type::socket) {
+    std::filesystem::remove(path, error);
+  } else if (type != std::filesystem::file_type::not_found) {
+    return fail(ErrorCode::Io,
+                fmt::format("listen {}: there is something that is not a socket", path.string()));
+  }
   FileDescriptor fd{::socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0)};
   const auto* generic = reinterpret_cast<const sockaddr*>(&*address);
   if (!fd || ::bind(fd.get(), generic, sizeof *address) != 0) return tl::unexpected(failed("bind", path));

@@ -4,6 +4,8 @@
 #include <future>
 #include <utility>
 
+#include "abbe/daemon/device_options.hpp"
+
 namespace abbe::daemon {
 namespace {
 
@@ -11,26 +13,36 @@ using namespace std::chrono_literals;
 using protocol::HostTime;
 
 constexpr auto kHealthPeriod = 1s;
-// Two and a half SYNC periods: one cycle may be lost and the axes are still known.
-constexpr double kMostLostCycles = 2.5;
-// Without axis positions for this long (host time) the model in force is STALE.
+// Without axis positions for this long (wall time, also with simulated devices) the model in force is STALE.
 constexpr auto kAxesPatience = 500ms;
-
-AssemblerOptions assembler_options(const Config& config) {
-  AssemblerOptions options;
-  options.watermark = config.daemon.watermark;
-  if (config.encoder) {
-    options.axes_compensated = config.encoder->axes_compensated;
-    const std::chrono::duration<double, std::nano> span = kMostLostCycles * config.encoder->sync_period;
-    options.interpolation.max_span = std::chrono::duration_cast<std::chrono::nanoseconds>(span);
-  }
-  return options;
-}
 
 void sleep_until(std::chrono::steady_clock::time_point t) {
   const auto ns = t.time_since_epoch().count();  // steady_clock is CLOCK_MONOTONIC
   const timespec at{.tv_sec = ns / 1'000'000'000, .tv_nsec = ns % 1'000'000'000};
   (void)clock_nanosleep(CLOCK_MONOTONIC, TIMER_ABSTIME, &at, nullptr);
+}
+
+StreamHealth health_of(const RecorderThread& recorder) {
+  const RecorderStatus r = recorder.status();
+  StreamHealth h;
+  h.status.name = "recorder";
+  h.status.state = name(r.state);
+  h.status.connected = r.state == RecorderStatus::State::Recording;
+  h.status.samples = r.messages;
+  h.status.dropped = r.lost + recorder.dropped();
+  h.status.last_fault = r.fault;
+  return h;
+}
+
+StreamHealth health_of(const DdsLink& link) {
+  StreamHealth h;
+  h.status.name = "dds";
+  h.status.state = link.connected() ? "connected" : "waiting";
+  h.status.connected = link.connected();
+  h.status.samples = link.counters().sent;
+  h.status.dropped = link.counters().dropped_live;
+  h.status.faults = link.counters().refused;
+  return h;
 }
 
 }  // namespace
@@ -50,7 +62,7 @@ Hub::WallTime Hub::last_turn() const noexcept {
 }
 
 ModelStanding Hub::standing() const {
-  return parts_.authority.standing(parts_.time.now(), live_.axes_known_at(), kAxesPatience);
+  return parts_.authority.standing(parts_.time.now(), live_.axes_known_at(), parts_.time.host(kAxesPatience));
 }
 
 void Hub::turn(WallTime wall) {
@@ -78,6 +90,7 @@ void Hub::publish(bool fresh, HostTime now, WallTime wall) {
   const ModelStanding standing = this->standing();
   if (wall >= next_health_) {
     next_health_ = wall + kHealthPeriod;
+    parts_.authority.follow_store(now);
     collect_health(now);
     if (parts_.publisher != nullptr) parts_.publisher->health(health_, now);
   }
@@ -88,16 +101,8 @@ void Hub::publish(bool fresh, HostTime now, WallTime wall) {
 
 void Hub::collect_health(HostTime now) {
   health_ = parts_.devices.health(now);
-  if (parts_.recorder == nullptr) return;
-  const RecorderStatus r = parts_.recorder->status();
-  StreamHealth recorder;
-  recorder.status.name = "recorder";
-  recorder.status.state = name(r.state);
-  recorder.status.connected = r.state == RecorderStatus::State::Recording;
-  recorder.status.samples = r.messages;
-  recorder.status.dropped = r.lost + parts_.recorder->dropped();
-  recorder.status.last_fault = r.fault;
-  health_.push_back(std::move(recorder));
+  if (parts_.recorder != nullptr) health_.push_back(health_of(*parts_.recorder));
+  if (parts_.publisher != nullptr) health_.push_back(health_of(parts_.publisher->link()));
 }
 
 void Hub::run() {

@@ -50,26 +50,21 @@ Result<std::string> ModelAuthority::add(const ModelDocument& document, const cal
                                         const StoreActor& actor, HostTime now) {
   auto id = store_.add(document, verdict.accepted, verdict.reasons, actor);
   if (!id || !verdict.accepted) return id;
-  if (auto activated = activate(*id, actor, /*force=*/false, now); !activated) {
-    return tl::unexpected(activated.error());
+  if (auto done = store_.activate(*id, actor); !done) return tl::unexpected(done.error());
+  if (auto taken = take_up_active(now); !taken) return tl::unexpected(taken.error());
+  return id;
+}
+
+bool ModelAuthority::follow_store(HostTime now) {
+  const auto id = store_.active_id();
+  if (!id) return false;  // being replaced, or damaged: what is in force stays
+  const bool same = id->has_value() ? in_force_ && in_force_->id == **id : !in_force_;
+  if (same || (!in_force_ && !fault_.empty() && fault_id_ == *id)) return false;
+  if (auto taken = take_up_active(now); !taken) {
+    fault_ = taken.error().text;
+    fault_id_ = *id;
   }
-  return id;
-}
-
-Result<std::string> ModelAuthority::activate(const std::string& prefix, const StoreActor& actor, bool force,
-                                             HostTime now) {
-  auto id = store_.find(prefix);
-  if (!id) return id;
-  if (auto done = store_.activate(*id, actor, force); !done) return tl::unexpected(done.error());
-  if (auto taken = take_up_active(now); !taken) return tl::unexpected(taken.error());
-  return id;
-}
-
-Result<std::string> ModelAuthority::rollback(const StoreActor& actor, HostTime now) {
-  auto id = store_.rollback(actor);
-  if (!id) return id;
-  if (auto taken = take_up_active(now); !taken) return tl::unexpected(taken.error());
-  return id;
+  return true;
 }
 
 ModelStanding ModelAuthority::standing(HostTime now, std::optional<HostTime> axes_known_at,

@@ -1,47 +1,17 @@
 #include "abbe/daemon/otf_identification.hpp"
 
-#include <algorithm>
-#include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <utility>
 
 #include "abbe/calib/otf/judge.hpp"
 #include "abbe/calib/otf/observe.hpp"
+#include "abbe/daemon/otf_blocks.hpp"
 #include "abbe/daemon/otf_inputs.hpp"
 #include "abbe/daemon/sha256.hpp"
 
 namespace abbe::daemon {
 namespace {
-
-// A block is averaged over about this much travel: fine against nodes 50 mm apart, and the length at which
-// the reference evaluation of the method was made (100 points at 500 Hz and 2500 mm/min).
-constexpr double kBlockTravel_m = 8.3e-3;
-constexpr std::size_t kSmallestBlock = 10;  // the design rows of a block are averaged over ten of its points
-constexpr std::size_t kLargestBlock = 1000;
-
-/// Typical way between two points while the machine moves: the upper quartile, which standstill and ramps do
-/// not reach.
-double typical_step_m(std::span<const RunPoint> points) {
-  std::vector<double> steps;
-  steps.reserve(points.size());
-  for (std::size_t i = 1; i < points.size(); ++i) {
-    const auto& a = points[i - 1].p_tracker_m;
-    const auto& b = points[i].p_tracker_m;
-    steps.push_back(std::hypot(b[0] - a[0], b[1] - a[1], b[2] - a[2]));
-  }
-  if (steps.empty()) return 0.0;
-  const auto quartile = steps.begin() + static_cast<std::ptrdiff_t>(3 * steps.size() / 4);
-  std::nth_element(steps.begin(), quartile, steps.end());
-  return *quartile;
-}
-
-std::size_t block_samples(std::span<const RunPoint> points) {
-  const double step_m = typical_step_m(points);
-  if (!(step_m > 0.0)) return kLargestBlock;
-  return std::clamp(static_cast<std::size_t>(std::lround(kBlockTravel_m / step_m)), kSmallestBlock,
-                    kLargestBlock);
-}
 
 /// The stages share one bar: the alignment takes most of the time.
 double overall(calib::otf::Stage stage, double fraction) {
@@ -70,15 +40,16 @@ Result<OtfCandidate> identify_run(const OtfRun& run, const MachineConfig& machin
                                   const std::function<void(double)>& progress) {
   const auto machine = otf_machine(machine_config);
   if (!machine) return tl::unexpected(machine.error());
+  const auto points = otf_observations(run.points);
   calib::otf::Options options;
-  options.block_samples = block_samples(run.points);
+  options.block_samples = otf_block_samples(points);
   if (progress) {
     options.progress = [&progress](calib::otf::Stage stage, double fraction) {
       progress(overall(stage, fraction));
     };
   }
-  auto observations = calib::otf::observe(otf_observations(run.points), *machine, otf_path(run.path_m),
-                                          otf_noise(machine_config), options);
+  auto observations =
+      calib::otf::observe(points, *machine, otf_path(run.path_m), otf_noise(machine_config), options);
   if (!observations) return tl::unexpected(error_of(observations.error()));
   auto solution = calib::otf::solve(*observations, options);
   if (!solution) return tl::unexpected(error_of(solution.error()));

@@ -147,7 +147,7 @@ struct DdsConfig {
 /// [gate]: what a model must satisfy before it may become active.
 struct GateConfig {
   double max_error_m = 1e-3;      ///< largest |V| inside the validity volume
-  double max_gradient = 1e-3;     ///< largest |dV/dq|, m per m
+  double max_gradient = 5e-3;     ///< largest |dV/dq|, m per m; 250 um between nodes 50 mm apart
   double holdout_fraction = 0.2;  ///< share of the blocks the fit does not see
   std::vector<std::string>
       accept;  ///< by name: what the data of a method cannot show and the site takes upon itself

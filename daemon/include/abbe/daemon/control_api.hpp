@@ -3,9 +3,7 @@
 ///     {"do": "status"}
 ///     {"do": "calibrate", "method": "otf", "path_m": [[x, y, z], ...], "who": NAME}
 ///     {"do": "cancel", "who": NAME}
-///     {"do": "activate", "id": ID, "who": NAME, "why": TEXT, "force": BOOL}
-///     {"do": "rollback", "who": NAME, "why": TEXT}
-/// Lengths m. Runs on the hub's thread, through Hub::call().
+/// Lengths m. Models are activated and rolled back in the store; the daemon follows it. Runs on the hub's thread, through Hub::call().
 
 #include <chrono>
 #include <nlohmann/json.hpp>

@@ -27,9 +27,9 @@ class ModelAuthority {
   /// Keeps a judged model and activates it if the gate accepted it. Returns its id.
   [[nodiscard]] Result<std::string> add(const ModelDocument& document, const calib::Verdict& verdict,
                                         const StoreActor& actor, protocol::HostTime now);
-  [[nodiscard]] Result<std::string> activate(const std::string& prefix, const StoreActor& actor, bool force,
-                                             protocol::HostTime now);
-  [[nodiscard]] Result<std::string> rollback(const StoreActor& actor, protocol::HostTime now);
+  /// Takes up another model if somebody has activated or rolled back one in the store (`abbe model ...` does). True if
+  /// it changed.
+  bool follow_store(protocol::HostTime now);
 
   /// `axes_known_at`: the latest instant all axes were known; `patience`: how long that may be ago.
   [[nodiscard]] ModelStanding standing(protocol::HostTime now,
@@ -47,7 +47,8 @@ class ModelAuthority {
   std::string machine_hash_;
   std::optional<ModelInForce> in_force_;
   bool made_for_this_machine_ = false;
-  std::string fault_;  // why the store's active model is not in force
+  std::string fault_;                    // why the store's active model is not in force
+  std::optional<std::string> fault_id_;  // and which one that is
   std::uint64_t revision_ = 0;
 };
 

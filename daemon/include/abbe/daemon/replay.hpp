@@ -1,0 +1,51 @@
+#pragma once
+/// A recording goes once more through the same receivers, assembler, session and identification as it did live. From the
+/// decoded samples or from the raw device bytes, at recorded speed or as fast as possible; the model's hash comes out the
+/// same. Reads no clock but to pace itself.
+
+#include <chrono>
+#include <cstdint>
+#include <functional>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "abbe/daemon/calibration_session.hpp"
+#include "abbe/daemon/config.hpp"
+#include "abbe/daemon/otf_identification.hpp"
+#include "abbe/daemon/recording_reader.hpp"
+
+namespace abbe::daemon {
+
+enum class ReplaySource { Samples, RawBytes };
+
+struct ReplayOptions {
+  ReplaySource source = ReplaySource::Samples;
+  double speed = 0.0;  ///< recorded seconds per second; 0: as fast as possible
+  std::function<void(double share)> progress;
+  std::function<void(const protocol::Snapshot&)> on_snapshot;
+};
+
+/// One calibration of the recording, done again.
+struct ReplayedCalibration {
+  SessionStatus ended;                       ///< state Identifying: the run was complete; else why it was not
+  std::optional<Result<OtfCandidate>> outcome;  ///< of a complete run
+  std::string model_hash;                    ///< empty without a model
+  std::string model_id;
+  std::string points_sha256;
+};
+
+struct ReplayReport {
+  std::vector<ReplayedCalibration> calibrations;
+  std::vector<std::string> live_model_ids;  ///< as the recording's own events name them
+  std::uint64_t snapshots = 0;
+  std::uint64_t undecodable = 0;
+  std::chrono::nanoseconds recorded{};  ///< from the first to the last message
+};
+
+/// `config` is the one the recording was made with (RecordingInfo::configuration). BadInput for a recording whose
+/// calibration request cannot be read.
+[[nodiscard]] Result<ReplayReport> replay(const RecordingReader& recording, const Config& config,
+                                          const ReplayOptions& options);
+
+}  // namespace abbe::daemon

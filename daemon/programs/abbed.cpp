@@ -1,0 +1,118 @@
+// abbed: the daemon. Runs in the foreground, logs to stderr, tells systemd when it is ready and that it is
+// alive.
+#include <fmt/format.h>
+#include <signal.h>
+
+#include <CLI/CLI.hpp>
+#include <chrono>
+#include <cstdio>
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+#include <string>
+
+#include "abbe/daemon/abbed.hpp"
+#include "abbe/daemon/config.hpp"
+#include "abbe/daemon/service_manager.hpp"
+
+namespace {
+
+using namespace abbe::daemon;  // NOLINT(google-build-using-namespace): a program, not a header
+using namespace std::chrono_literals;
+
+enum ExitCode { kDone = 0, kUsage = 2, kBadInput = 3, kIo = 4, kHubHangs = 70 };
+
+constexpr const char* kExitCodes =
+    "Exit codes: 0 stopped by SIGTERM or SIGINT (or the configuration is good), 2 usage, 3 the configuration "
+    "is bad,\n"
+    "4 the system refused something (socket, directory, port, priority), 70 the hub hangs: systemd starts "
+    "abbed anew.";
+
+constexpr auto kTurn = 20ms;  // how often abbe-dds is looked after
+
+int refuse(const Error& error) {
+  fmt::print(stderr, "abbed: {}\n", error.text);
+  for (const auto& detail : error.details) fmt::print(stderr, "  {}\n", detail);
+  return error.code == ErrorCode::Io ? kIo : kBadInput;
+}
+
+std::string text_of(const std::filesystem::path& file) {
+  std::ifstream in{file, std::ios::binary};
+  return {std::istreambuf_iterator<char>{in}, {}};
+}
+
+/// abbe-dds stands beside abbed; else the PATH is asked.
+std::string dds_program() {
+  std::error_code error;
+  const auto beside = std::filesystem::read_symlink("/proc/self/exe", error).parent_path() / "abbe-dds";
+  return !error && std::filesystem::exists(beside, error) ? beside.string() : "abbe-dds";
+}
+
+/// Blocked before any thread is started, so that only the main thread ever takes them.
+sigset_t block_stop_signals() {
+  sigset_t stop;
+  sigemptyset(&stop);
+  sigaddset(&stop, SIGTERM);
+  sigaddset(&stop, SIGINT);
+  pthread_sigmask(SIG_BLOCK, &stop, nullptr);
+  return stop;
+}
+
+int run(Abbed& abbed, const sigset_t& stop) {
+  const auto feed_period = watchdog_period();
+  auto next_feed = std::chrono::steady_clock::now();
+  const timespec turn{.tv_sec = 0, .tv_nsec = std::chrono::nanoseconds{kTurn}.count()};
+  for (;;) {
+    if (sigtimedwait(&stop, nullptr, &turn) > 0) return kDone;
+    abbed.turn();
+    if (!abbed.alive()) {
+      fmt::print(stderr, "abbed: the hub has not turned for a second\n");
+      if (!feed_period) continue;  // nobody to start us anew: keep what still works
+      return kHubHangs;
+    }
+    if (const auto now = std::chrono::steady_clock::now(); feed_period && now >= next_feed) {
+      tell_alive();
+      next_feed = now + *feed_period;
+    }
+  }
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  CLI::App app{
+      "Watches a machine tool or measuring machine, identifies its geometric errors and publishes their "
+      "compensation."};
+  app.footer(kExitCodes);
+  app.set_version_flag("--version", ABBE_VERSION);
+  std::string file = "/etc/abbe/abbed.toml";
+  bool check_only = false;
+  app.add_option("-c,--config", file, "the configuration")->capture_default_str();
+  app.add_flag("--check-config", check_only,
+               "only check the configuration, say everything that is wrong with it");
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& e) {
+    return app.exit(e) == 0 ? kDone : kUsage;
+  }
+
+  auto config = load_config(file);
+  if (!config) return refuse(config.error());
+  if (check_only) {
+    fmt::print("{}: good\n", file);
+    return kDone;
+  }
+  const sigset_t stop = block_stop_signals();
+  auto abbed = Abbed::start(
+      std::move(*config),
+      {.configuration_text = text_of(file), .configuration_file = file, .dds_program = dds_program()});
+  if (!abbed) return refuse(abbed.error());
+  for (const auto& warning : (*abbed)->warnings()) fmt::print(stderr, "abbed: warning: {}\n", warning);
+  fmt::print(stderr, "abbed: running, configuration {}\n", file);
+  tell_ready("running");
+  const int code = run(**abbed, stop);
+  tell_stopping();
+  abbed->reset();
+  fmt::print(stderr, "abbed: stopped\n");
+  return code;
+}

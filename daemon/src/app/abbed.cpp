@@ -1,0 +1,221 @@
+#include "abbe/daemon/abbed.hpp"
+
+#include <fmt/format.h>
+#include <pthread.h>
+#include <sched.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <chrono>
+#include <cstring>
+#include <ctime>
+#include <optional>
+#include <thread>
+#include <utility>
+
+#include "abbe/daemon/control_api.hpp"
+#include "abbe/daemon/control_protocol.hpp"
+#include "abbe/daemon/dds_supervisor.hpp"
+#include "abbe/daemon/hub.hpp"
+
+namespace abbe::daemon {
+namespace {
+
+using namespace std::chrono_literals;
+using WallTime = std::chrono::steady_clock::time_point;
+
+constexpr auto kHubPatience = 1s;  // thousands of turns; a hub silent for this long hangs
+
+/// UTC less host time, both read now; the one constant that ever mentions the wall clock.
+protocol::UtcOffset utc_offset(const drivers::TimeSource& time) {
+  const auto utc = std::chrono::system_clock::now().time_since_epoch();
+  return {std::chrono::duration_cast<std::chrono::nanoseconds>(utc) - time.now().time_since_epoch()};
+}
+
+Result<void> make_directory(const std::filesystem::path& directory) {
+  std::error_code error;
+  std::filesystem::create_directories(directory, error);
+  if (error) return fail(ErrorCode::Io, fmt::format("create {}: {}", directory.string(), error.message()));
+  return {};
+}
+
+/// "abbe-2026-11-21T03-40-12Z-4711": readable, sorts by time, and two daemons never meet.
+std::string recording_name() {
+  const std::time_t now = std::chrono::system_clock::to_time_t(std::chrono::system_clock::now());
+  std::tm utc{};
+  ::gmtime_r(&now, &utc);
+  return fmt::format("abbe-{:04}-{:02}-{:02}T{:02}-{:02}-{:02}Z-{}", utc.tm_year + 1900, utc.tm_mon + 1,
+                     utc.tm_mday, utc.tm_hour, utc.tm_min, utc.tm_sec, ::getpid());
+}
+
+RecorderThreadOptions recorder_options(const Config& config) {
+  RecorderThreadOptions options;
+  options.recorder.directory = config.recording.dir;
+  options.recorder.name = recording_name();
+  options.recorder.chunk_bytes = config.recording.chunk_bytes;
+  options.recorder.chunk_period = config.recording.chunk_period;
+  options.recorder.min_free_bytes = config.recording.min_free_bytes;
+  options.raw = config.recording.raw;
+  if (config.tracker) options.tracker = config.tracker->name;
+  if (config.encoder) options.encoder = config.encoder->name;
+  return options;
+}
+
+PublisherOptions publisher_options(const Config& config) {
+  return {.machine = config.machine.name,
+          .tool_offset_m = config.machine.target_offset_m,
+          .snapshot_hz = config.dds.snapshot_hz,
+          .compensation_hz = config.dds.compensation_hz,
+          .validity = config.dds.validity};
+}
+
+/// The hub is soft real time: above the ordinary programs, below the devices. A refusal is a warning in mode
+/// `ignore`.
+Result<void> set_priority(std::thread& thread, const DaemonConfig& config) {
+  sched_param parameters{};
+  parameters.sched_priority = config.hub_priority;
+  int error = ::pthread_setschedparam(thread.native_handle(), SCHED_FIFO, &parameters);
+  if (error == 0 && config.hub_cpu) {
+    cpu_set_t cpus;
+    CPU_ZERO(&cpus);
+    CPU_SET(*config.hub_cpu, &cpus);
+    error = ::pthread_setaffinity_np(thread.native_handle(), sizeof cpus, &cpus);
+  }
+  if (error == 0) return {};
+  return fail(ErrorCode::Io,
+              fmt::format("hub thread: SCHED_FIFO {}: {}", config.hub_priority, std::strerror(error)));
+}
+
+}  // namespace
+
+// In the order of starting; destroyed in reverse.
+struct Abbed::State {
+  Config config;
+  AbbedOptions options;
+  drivers::MonotonicTime time;
+  protocol::UtcOffset utc;
+  std::vector<std::string> warnings;
+  std::unique_ptr<RecorderThread> recorder;
+  std::optional<ModelAuthority> authority;
+  std::optional<CalibrationService> calibration;
+  std::optional<Publisher> publisher;
+  std::optional<DdsSupervisor> supervisor;
+  std::optional<DeviceSet> devices;
+  std::optional<Hub> hub;
+  std::thread hub_thread;
+  std::unique_ptr<ControlServer> control;
+
+  State(Config c, AbbedOptions o)
+      : config(std::move(c)), options(std::move(o)), time(config.daemon.speed), utc(utc_offset(time)) {}
+  State(const State&) = delete;
+  State& operator=(const State&) = delete;
+  ~State() {
+    control.reset();
+    if (hub) hub->stop();
+    if (hub_thread.joinable()) hub_thread.join();
+  }
+
+  Result<void> open_recorder() {
+    RecordingInfo info{.machine = config.machine.name,
+                       .utc_offset = utc,
+                       .speed = config.daemon.speed,
+                       .configuration = options.configuration_text,
+                       .versions = {{"abbe", ABBE_VERSION}}};
+    auto opened = RecorderThread::start(recorder_options(config), std::move(info));
+    if (!opened) return tl::unexpected(opened.error());
+    recorder = std::move(*opened);
+    return {};
+  }
+
+  Result<void> open_models() {
+    auto opened = ModelAuthority::open(config.daemon.data_dir / "models", config.machine, time.now());
+    if (!opened) return tl::unexpected(opened.error());
+    authority.emplace(std::move(*opened));
+    calibration.emplace(config, *authority, recorder.get(), utc);
+    return {};
+  }
+
+  Result<void> open_dds() {
+    if (config.dds.supervise == Supervise::Off) return {};
+    auto link = DdsLink::listen(config.dds.socket);
+    if (!link) return tl::unexpected(link.error());
+    publisher.emplace(std::move(*link), publisher_options(config), utc);
+    if (config.dds.supervise != Supervise::Child) return {};
+    DdsSupervisor::Options child{
+        .program = options.dds_program,
+        .arguments = {"--socket", config.dds.socket.string(), "--domain", std::to_string(config.dds.domain)}};
+    if (!config.dds.profile.empty()) {
+      child.arguments.insert(child.arguments.end(), {"--profile", config.dds.profile.string()});
+    }
+    auto started = DdsSupervisor::start(std::move(child), WallTime::clock::now());
+    if (!started) return tl::unexpected(started.error());
+    supervisor.emplace(std::move(*started));
+    return {};
+  }
+
+  Result<void> start_devices() {
+    auto started = DeviceSet::start(config, time);
+    if (!started) return tl::unexpected(started.error());
+    devices.emplace(std::move(*started));
+    const auto refused = devices->warnings();
+    warnings.insert(warnings.end(), refused.begin(), refused.end());
+    return {};
+  }
+
+  Result<void> start_hub() {
+    hub.emplace(HubParts{.config = config,
+                         .time = time,
+                         .devices = *devices,
+                         .authority = *authority,
+                         .calibration = *calibration,
+                         .publisher = publisher ? &*publisher : nullptr,
+                         .recorder = recorder.get()});
+    hub_thread = std::thread([this] { hub->run(); });
+    if (auto set = set_priority(hub_thread, config.daemon); !set) {
+      if (config.daemon.realtime == RealTimeMode::Enforce) return set;
+      warnings.push_back(set.error().text);
+    }
+    return {};
+  }
+
+  Result<void> open_control() {
+    auto opened = ControlServer::open(config.control.socket, [this](const nlohmann::json& request) {
+      return answer_request(*hub, request);
+    });
+    if (!opened) return tl::unexpected(opened.error());
+    control = std::move(*opened);
+    return {};
+  }
+};
+
+Result<std::unique_ptr<Abbed>> Abbed::start(Config config, AbbedOptions options) {
+  auto state = std::make_unique<State>(std::move(config), std::move(options));
+  for (const auto& directory :
+       {state->config.daemon.data_dir, state->config.daemon.runtime_dir, state->config.recording.dir,
+        state->config.control.socket.parent_path(), state->config.dds.socket.parent_path()}) {
+    if (auto made = make_directory(directory); !made) return tl::unexpected(made.error());
+  }
+  using Step = Result<void> (State::*)();
+  for (const Step step : {&State::open_recorder, &State::open_models, &State::open_dds, &State::start_devices,
+                          &State::start_hub, &State::open_control}) {
+    if (auto done = ((*state).*step)(); !done) return tl::unexpected(done.error());
+  }
+  return std::unique_ptr<Abbed>{new Abbed{std::move(state)}};
+}
+
+Abbed::Abbed(std::unique_ptr<State> state) : state_(std::move(state)) {}
+Abbed::~Abbed() = default;
+
+void Abbed::turn() {
+  if (state_->supervisor) state_->supervisor->poll(WallTime::clock::now());
+}
+
+bool Abbed::alive() const {
+  return WallTime::clock::now() - state_->hub->last_turn() < kHubPatience;
+}
+
+std::vector<std::string> Abbed::warnings() const {
+  return state_->warnings;
+}
+
+}  // namespace abbe::daemon

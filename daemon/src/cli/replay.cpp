@@ -1,0 +1,135 @@
+/// `abbe replay FILE`: a recording once more through receivers, assembler, session and identification.
+
+#include <fmt/format.h>
+
+#include <CLI/App.hpp>
+#include <CLI/Config.hpp>
+#include <CLI/Formatter.hpp>
+#include <algorithm>
+#include <chrono>
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <string>
+
+#include "abbe/daemon/replay.hpp"
+#include "cli/commands.hpp"
+#include "cli/terminal.hpp"
+
+namespace abbe::daemon {
+namespace {
+
+using nlohmann::json;
+
+struct Arguments {
+  std::string file;
+  std::string config;
+  bool raw = false;
+  double speed = 0.0;
+  bool json = false;
+};
+
+Result<Config> config_of(const Arguments& arguments, const RecordingReader& recording) {
+  if (!arguments.config.empty()) return load_config(arguments.config);
+  return parse_config(recording.info().configuration, arguments.file + " (recorded configuration)");
+}
+
+json calibration_json(const ReplayedCalibration& c) {
+  json out{{"state", name(c.ended.state)}, {"reason", c.ended.reason}};
+  if (!c.outcome) return out;
+  if (!*c.outcome) {
+    out["error"] = c.outcome->error().text;
+    return out;
+  }
+  const auto& verdict = (*c.outcome)->verdict;
+  out["model_hash"] = c.model_hash;
+  out["model_id"] = c.model_id;
+  out["accepted"] = verdict.accepted;
+  out["reasons"] = verdict.reasons;
+  out["points_sha256"] = c.points_sha256;
+  return out;
+}
+
+bool same_as_live(const ReplayReport& report) {
+  std::vector<std::string> ids;
+  for (const auto& c : report.calibrations) {
+    if (!c.model_id.empty()) ids.push_back(c.model_id);
+  }
+  return ids == report.live_model_ids;
+}
+
+void print_report(const ReplayReport& r, double wall_s) {
+  const double recorded_s = std::chrono::duration<double>(r.recorded).count();
+  fmt::print("{} snapshots, {:.1f} s recorded, replayed in {:.2f} s: {:.0f} x real time\n", r.snapshots,
+             recorded_s, wall_s, recorded_s / wall_s);
+  for (const auto& c : r.calibrations) {
+    if (!c.outcome) {
+      fmt::print("calibration  {}: {}\n", name(c.ended.state), c.ended.reason);
+    } else if (!*c.outcome) {
+      fmt::print("calibration  not identified: {}\n", c.outcome->error().text);
+    } else {
+      fmt::print("calibration  {} model {}\n             hash {}\n",
+                 (*c.outcome)->verdict.accepted ? "accepted" : "refused", c.model_id, c.model_hash);
+    }
+  }
+  for (const auto& id : r.live_model_ids) fmt::print("live         model {}\n", id);
+  if (!r.live_model_ids.empty())
+    fmt::print("{}\n", same_as_live(r) ? "the same as live" : "NOT the same as live");
+}
+
+void print_json(const RecordingReader& recording, const ReplayReport& r, double wall_s) {
+  json out{{"snapshots", r.snapshots},
+           {"undecodable", r.undecodable},
+           {"recorded_s", std::chrono::duration<double>(r.recorded).count()},
+           {"wall_s", wall_s},
+           {"live_model_ids", r.live_model_ids},
+           {"same_as_live", same_as_live(r)},
+           {"losses", json::array()},
+           {"calibrations", json::array()}};
+  for (const auto& loss : recording.losses()) out["losses"].push_back(loss.what);
+  for (const auto& c : r.calibrations) out["calibrations"].push_back(calibration_json(c));
+  fmt::print("{}\n", out.dump(1));
+}
+
+int run(const Arguments& arguments) {
+  const auto start = std::chrono::steady_clock::now();
+  const auto recording = RecordingReader::open(arguments.file);
+  if (!recording) return report(recording.error());
+  for (const auto& loss : recording->losses()) fmt::print(stderr, "{}: {}\n", arguments.file, loss.what);
+  const auto config = config_of(arguments, *recording);
+  if (!config) return report(config.error());
+  ProgressBar bar;
+  ReplayOptions options{.source = arguments.raw ? ReplaySource::RawBytes : ReplaySource::Samples,
+                        .speed = arguments.speed,
+                        .progress = [&bar](double share) { bar.show("replaying", share); }};
+  const auto result = replay(*recording, *config, options);
+  bar.clear();
+  if (!result) return report(result.error());
+  const double wall_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  if (arguments.json) {
+    print_json(*recording, *result, wall_s);
+  } else {
+    print_report(*result, wall_s);
+  }
+  const bool all_identified = std::all_of(result->calibrations.begin(), result->calibrations.end(),
+                                          [](const auto& c) { return c.outcome && *c.outcome; });
+  return all_identified ? 0 : 1;
+}
+
+}  // namespace
+
+void add_replay(CLI::App& parent, int& exit) {
+  auto arguments = std::make_shared<Arguments>();
+  auto* command =
+      parent.add_subcommand("replay", "A recording once more: the same snapshots, the same model");
+  command->add_option("FILE", arguments->file, "recording (.mcap, also an unfinished .mcap.part)")
+      ->required();
+  command->add_flag("--raw", arguments->raw, "from the raw device bytes instead of the decoded samples");
+  command->add_option("--speed", arguments->speed, "recorded seconds per second; 0: as fast as possible")
+      ->capture_default_str()
+      ->check(CLI::NonNegativeNumber);
+  command->add_option("-c,--config", arguments->config, "another configuration than the recorded one");
+  command->add_flag("--json", arguments->json, "as one JSON object");
+  command->callback([arguments, &exit] { exit = run(*arguments); });
+}
+
+}  // namespace abbe::daemon

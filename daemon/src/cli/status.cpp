@@ -1,0 +1,86 @@
+/// `abbe status`: what the running daemon sees, does and publishes.
+
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include <CLI/App.hpp>
+#include <CLI/Config.hpp>
+#include <CLI/Formatter.hpp>
+#include <memory>
+#include <string>
+
+#include "abbe/daemon/control_protocol.hpp"
+#include "cli/commands.hpp"
+#include "cli/daemon_socket.hpp"
+#include "cli/terminal.hpp"
+
+namespace abbe::daemon {
+namespace {
+
+using nlohmann::json;
+
+constexpr int kRed = 1;
+constexpr int kGreen = 2;
+constexpr int kYellow = 3;
+
+int colour_of_model(const std::string& state) {
+  if (state == "ACTIVE") return kGreen;
+  return state == "INVALID" ? kRed : kYellow;
+}
+
+void print_stream(const json& s) {
+  const bool connected = s["connected"];
+  fmt::print("{:<10} {:<14} {:>8.1f}/s {:>10} {:>7} {:>5} {:>7}  {}\n", s["name"].get<std::string>(),
+             coloured(fmt::format("{:<14}", s["state"].get<std::string>()), connected ? kGreen : kYellow,
+                      STDOUT_FILENO),
+             s["rate_hz"].get<double>(), s["samples"].get<std::uint64_t>(), s["dropped"].get<std::uint64_t>(),
+             s["gaps"].get<std::uint64_t>(), s.contains("faults") ? s["faults"].get<std::uint64_t>() : 0,
+             s["last_fault"].get<std::string>());
+}
+
+void print_status(const json& status) {
+  const json& model = status["model"];
+  const std::string state = model["state"];
+  fmt::print("machine    {}\n", status["machine"].get<std::string>());
+  fmt::print("model      {} {} ({})\n", coloured(state, colour_of_model(state), STDOUT_FILENO),
+             model.value("id", "-"), model["reason"].get<std::string>());
+  const json& session = status["session"];
+  fmt::print("session    {}, {:.0f} %, {} points: {}\n", session["state"].get<std::string>(),
+             100.0 * session["progress"].get<double>(), session["points"].get<std::uint64_t>(),
+             session["reason"].get<std::string>());
+  if (status.contains("recording")) fmt::print("recording  {}\n", status["recording"].get<std::string>());
+  if (status.contains("dds")) {
+    fmt::print("dds        {}, {} messages\n",
+               status["dds"]["connected"].get<bool>() ? "connected" : "not connected",
+               status["dds"]["sent"].get<std::uint64_t>());
+  }
+  fmt::print("\n{:<10} {:<14} {:>10} {:>10} {:>7} {:>5} {:>7}  {}\n", "stream", "state", "rate", "samples",
+             "dropped", "gaps", "faults", "last fault");
+  for (const json& stream : status["streams"]) print_stream(stream);
+}
+
+int status(const DaemonSocket& where, bool as_json) {
+  const auto socket = socket_path(where);
+  if (!socket) return report(socket.error());
+  const auto answer = ask_daemon(*socket, {{"do", "status"}});
+  if (!answer) return report(answer.error());
+  if (as_json) {
+    fmt::print("{}\n", answer->dump(1));
+  } else {
+    print_status(*answer);
+  }
+  return 0;
+}
+
+}  // namespace
+
+void add_status(CLI::App& parent, int& exit) {
+  auto where = std::make_shared<DaemonSocket>();
+  auto as_json = std::make_shared<bool>(false);
+  auto* command = parent.add_subcommand("status", "What the running daemon sees, does and publishes");
+  add_socket_options(*command, *where);
+  command->add_flag("--json", *as_json, "as one JSON object");
+  command->callback([where, as_json, &exit] { exit = status(*where, *as_json); });
+}
+
+}  // namespace abbe::daemon

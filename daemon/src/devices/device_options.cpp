@@ -1,0 +1,81 @@
+#include "abbe/daemon/device_options.hpp"
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+
+namespace abbe::daemon {
+namespace {
+
+using protocol::emscon::WeatherMonitor;
+
+// Two and a half SYNC periods: one cycle may be lost and the axes are still known.
+constexpr double kMostLostCycles = 2.5;
+
+WeatherMonitor weather_monitor(WeatherConfig weather) {
+  switch (weather) {
+    case WeatherConfig::None:
+      return WeatherMonitor::None;
+    case WeatherConfig::Read:
+      return WeatherMonitor::Read;
+    case WeatherConfig::Compute:
+      return WeatherMonitor::ReadAndCompute;
+  }
+  return WeatherMonitor::None;
+}
+
+std::chrono::nanoseconds stretched(std::chrono::nanoseconds time_out, double speed) {
+  const std::chrono::duration<double, std::nano> longer = time_out * std::max(speed, 1.0);
+  return std::chrono::duration_cast<std::chrono::nanoseconds>(longer);
+}
+
+}  // namespace
+
+drivers::TrackerDeviceOptions device_options(const TrackerConfig& config, double speed) {
+  drivers::TrackerDeviceOptions options;
+  options.name = config.name;
+  options.host = config.host;
+  options.port = config.port;
+  options.session.time_separation_ms = static_cast<std::int32_t>(std::lround(1000.0 / config.point_rate_hz));
+  options.session.weather = weather_monitor(config.weather);
+  options.session.connect_timeout = stretched(config.connect_timeout, speed);
+  options.session.command_timeout = stretched(config.command_timeout, speed);
+  options.session.initialize_timeout = stretched(config.initialize_timeout, speed);
+  options.session.silence_timeout = stretched(config.silence_timeout, speed);
+  options.clock.max_constant_delay = config.max_constant_delay;
+  return options;
+}
+
+drivers::EncoderDeviceOptions device_options(const EncoderConfig& config, double speed) {
+  drivers::EncoderDeviceOptions options;
+  options.name = config.name;
+  options.receiver.sync_period = config.sync_period;
+  options.receiver.sampling_delay = config.sampling_delay;
+  options.receiver.u_sampling_delay = config.u_sampling_delay;
+  options.receiver.heartbeat_timeout = stretched(options.receiver.heartbeat_timeout, speed);
+  options.supervisor.silence = stretched(options.supervisor.silence, speed);
+  options.supervisor.sdo.timeout = stretched(options.supervisor.sdo.timeout, speed);
+  options.reopen_after = stretched(options.reopen_after, speed);
+  for (const EncoderNodeConfig& node : config.nodes) {
+    drivers::EncoderAxis axis;
+    axis.name = node.axis;
+    axis.node = node.node;
+    axis.kind = node.kind == AxisKind::Rotary ? drivers::AxisKind::Rotary : drivers::AxisKind::Linear;
+    axis.scale = node.step;
+    options.receiver.axes.push_back(axis);
+  }
+  return options;
+}
+
+AssemblerOptions assembler_options(const Config& config) {
+  AssemblerOptions options;
+  options.watermark = config.daemon.watermark;
+  if (config.encoder) {
+    options.axes_compensated = config.encoder->axes_compensated;
+    const std::chrono::duration<double, std::nano> span = kMostLostCycles * config.encoder->sync_period;
+    options.interpolation.max_span = std::chrono::duration_cast<std::chrono::nanoseconds>(span);
+  }
+  return options;
+}
+
+}  // namespace abbe::daemon

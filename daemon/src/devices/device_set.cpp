@@ -1,0 +1,164 @@
+#include "abbe/daemon/device_set.hpp"
+
+#include <array>
+#include <map>
+#include <utility>
+
+#include "abbe/daemon/device_options.hpp"
+#include "abbe/drivers/can/socket_can_bus.hpp"
+#include "abbe/drivers/can/udp_can_bus.hpp"
+#include "abbe/drivers/device_thread.hpp"
+
+namespace abbe::daemon {
+namespace {
+
+using drivers::DeviceThread;
+using protocol::HostTime;
+
+// How much one call takes out of a ring: several bursts.
+constexpr std::size_t kMostSamples = 1024;
+constexpr std::size_t kMostBlocks = 128;
+
+Error error_of(const drivers::Error& error) {
+  return {error.code == drivers::ErrorCode::BadConfiguration ? ErrorCode::BadInput : ErrorCode::Io,
+          error.text};
+}
+
+template <class Ring, class T, std::size_t N>
+void drain_ring(Ring& ring, std::array<T, N>& room, std::vector<T>& out) {
+  for (std::size_t n = room.size(); n == room.size();) {
+    n = ring.pop(room);
+    out.insert(out.end(), room.begin(), room.begin() + static_cast<std::ptrdiff_t>(n));
+  }
+}
+
+std::unique_ptr<drivers::CanBus> make_bus(const EncoderConfig& config, double speed,
+                                          const drivers::TimeSource& time) {
+  if (config.transport == EncoderTransport::SocketCan) {
+    return std::make_unique<drivers::SocketCanBus>(drivers::SocketCanOptions{.interface = config.interface},
+                                                   time);
+  }
+  return std::make_unique<drivers::UdpCanBus>(drivers::UdpCanOptions{.local_port = config.local_port,
+                                                                     .peer_address = config.peer_host,
+                                                                     .peer_port = config.peer_port,
+                                                                     .speed = speed},
+                                              time);
+}
+
+drivers::DeviceThreadOptions thread_options(const DaemonConfig& config, std::string name, int priority,
+                                            std::optional<int> cpu) {
+  const bool enforce = config.realtime == RealTimeMode::Enforce;
+  return {.name = std::move(name),
+          .mode = enforce ? drivers::RealTimeMode::Enforce : drivers::RealTimeMode::Ignore,
+          .lock_memory = enforce,
+          .priority = priority,
+          .cpu = cpu};
+}
+
+/// A device with its thread, and what is needed to say its rate. Destroyed: the thread ends first.
+template <class D>
+struct Running {
+  std::unique_ptr<D> device;
+  std::unique_ptr<DeviceThread> thread;
+};
+
+template <class D>
+Result<Running<D>> run(drivers::Result<std::unique_ptr<D>> device, drivers::DeviceThreadOptions options) {
+  if (!device) return tl::unexpected(error_of(device.error()));
+  auto thread = DeviceThread::start(**device, std::move(options));
+  if (!thread) return tl::unexpected(error_of(thread.error()));
+  return Running<D>{std::move(*device), std::move(*thread)};
+}
+
+}  // namespace
+
+struct DeviceSet::State {
+  std::optional<Running<drivers::TrackerDevice>> tracker;
+  std::optional<Running<drivers::EncoderDevice>> encoder;
+  std::array<protocol::TrackerPoint, kMostSamples> points;
+  std::array<protocol::AxisSample, kMostSamples> axes;
+  std::array<protocol::EnvironmentSample, 16> environment;
+  std::array<protocol::RawBlock, kMostBlocks> blocks;
+  std::map<std::string, std::pair<HostTime, std::uint64_t>> counted;  // at the previous health()
+
+  StreamHealth health_of(const drivers::Device& device, const DeviceThread& thread, HostTime now) {
+    StreamHealth h{.status = device.status()};
+    if (const auto failure = thread.failure()) {
+      h.status.state = "ended by a defect";
+      h.status.last_fault = *failure;
+    }
+    const auto latency = thread.latency().read();
+    h.latency_p50_s = std::chrono::duration<double>(latency.quantile(0.50)).count();
+    h.latency_p99_s = std::chrono::duration<double>(latency.quantile(0.99)).count();
+    auto& [at, samples] = counted[h.status.name];
+    const std::chrono::duration<double> passed = now - at;
+    if (at != HostTime{} && passed.count() > 0.0) {
+      h.rate_hz = static_cast<double>(h.status.samples - samples) / passed.count();
+    }
+    at = now;
+    samples = h.status.samples;
+    return h;
+  }
+};
+
+Result<DeviceSet> DeviceSet::start(const Config& config, const drivers::TimeSource& time) {
+  auto state = std::make_unique<State>();
+  if (config.encoder) {
+    auto running =
+        run(drivers::EncoderDevice::create(device_options(*config.encoder, config.daemon.speed),
+                                           make_bus(*config.encoder, config.daemon.speed, time), time),
+            thread_options(config.daemon, "abbe-encoder", config.daemon.encoder_priority,
+                           config.daemon.encoder_cpu));
+    if (!running) return tl::unexpected(running.error());
+    state->encoder.emplace(std::move(*running));
+  }
+  if (config.tracker) {
+    auto running =
+        run(drivers::TrackerDevice::create(device_options(*config.tracker, config.daemon.speed), time),
+            thread_options(config.daemon, "abbe-tracker", config.daemon.tracker_priority,
+                           config.daemon.tracker_cpu));
+    if (!running) return tl::unexpected(running.error());
+    state->tracker.emplace(std::move(*running));
+  }
+  return DeviceSet{std::move(state)};
+}
+
+DeviceSet::DeviceSet(std::unique_ptr<State> state) : state_(std::move(state)) {}
+DeviceSet::~DeviceSet() = default;
+DeviceSet::DeviceSet(DeviceSet&&) noexcept = default;
+DeviceSet& DeviceSet::operator=(DeviceSet&&) noexcept = default;
+
+void DeviceSet::drain(Batch& batch) {
+  State& s = *state_;
+  if (s.encoder) {
+    drain_ring(s.encoder->device->samples(), s.axes, batch.axes);
+    drain_ring(s.encoder->device->raw(), s.blocks, batch.encoder_raw);
+  }
+  if (s.tracker) {
+    drain_ring(s.tracker->device->points(), s.points, batch.points);
+    drain_ring(s.tracker->device->environment(), s.environment, batch.environment);
+    drain_ring(s.tracker->device->raw(), s.blocks, batch.tracker_raw);
+  }
+}
+
+std::vector<StreamHealth> DeviceSet::health(HostTime now) {
+  std::vector<StreamHealth> out;
+  if (state_->tracker)
+    out.push_back(state_->health_of(*state_->tracker->device, *state_->tracker->thread, now));
+  if (state_->encoder)
+    out.push_back(state_->health_of(*state_->encoder->device, *state_->encoder->thread, now));
+  return out;
+}
+
+std::vector<std::string> DeviceSet::warnings() const {
+  std::vector<std::string> out;
+  const auto add = [&out](const auto& running) {
+    if (running)
+      out.insert(out.end(), running->thread->warnings().begin(), running->thread->warnings().end());
+  };
+  add(state_->tracker);
+  add(state_->encoder);
+  return out;
+}
+
+}  // namespace abbe::daemon

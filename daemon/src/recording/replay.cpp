@@ -1,0 +1,249 @@
+#include "abbe/daemon/replay.hpp"
+
+#include <chrono>
+#include <map>
+#include <thread>
+#include <utility>
+#include <variant>
+
+#include "abbe/daemon/assembler.hpp"
+#include "abbe/daemon/calibration_request.hpp"
+#include "abbe/daemon/calibration_session.hpp"
+#include "abbe/daemon/device_options.hpp"
+#include "abbe/daemon/model_document.hpp"
+#include "abbe/drivers/can/encoder_receiver.hpp"
+#include "abbe/drivers/tracker/receiver.hpp"
+
+namespace abbe::daemon {
+namespace {
+
+using protocol::HostTime;
+
+// Messages between two turns of the assembler: enough to make the turn cheap, few enough to stay in the
+// cache.
+constexpr std::size_t kMessagesPerTurn = 256;
+
+/// Gives the points of a tracker in the order in which it measured them. A recording is read in the order of
+/// host time, and that is a mapping: while the clock model is still learning, a burst may begin before the
+/// end of the one before.
+class DeviceOrder {
+ public:
+  void take(std::uint32_t sequence, const protocol::TrackerPoint& point,
+            std::vector<protocol::TrackerPoint>& out) {
+    waiting_.emplace(sequence, point);
+    // Nothing is farther out of order than a few bursts: a number still missing then was lost with a damaged
+    // chunk.
+    while (!waiting_.empty() && (waiting_.begin()->first == next_ || waiting_.size() > kMostWaiting))
+      give_first(out);
+  }
+  void finish(std::vector<protocol::TrackerPoint>& out) {
+    while (!waiting_.empty()) give_first(out);
+  }
+
+ private:
+  static constexpr std::size_t kMostWaiting = 4096;
+  void give_first(std::vector<protocol::TrackerPoint>& out) {
+    out.push_back(waiting_.begin()->second);
+    next_ = waiting_.begin()->first + 1;
+    waiting_.erase(waiting_.begin());
+  }
+
+  std::map<std::uint32_t, protocol::TrackerPoint> waiting_;
+  std::uint32_t next_ = 0;
+};
+
+/// Raw device bytes into the samples they were decoded to.
+class RawDecoder {
+ public:
+  explicit RawDecoder(const Config& config) {
+    if (config.tracker) {
+      tracker_name_ = config.tracker->name;
+      tracker_ = std::make_unique<drivers::TrackerReceiver>(
+          drivers::receiver_options(device_options(*config.tracker, config.daemon.speed)));
+    }
+    if (config.encoder) {
+      encoder_name_ = config.encoder->name;
+      encoder_.emplace(device_options(*config.encoder, config.daemon.speed).receiver);
+    }
+  }
+
+  void take(const protocol::RawBlock& block, std::string_view device, Batch& batch) {
+    if (tracker_ && device == tracker_name_) take_tracker(block, batch);
+    if (encoder_ && device == encoder_name_) {
+      encoder_->on_raw(block, [&](const protocol::AxisSample& s) { batch.axes.push_back(s); });
+    }
+  }
+
+ private:
+  void take_tracker(const protocol::RawBlock& block, Batch& batch) {
+    if (block.direction != protocol::RawBlock::Direction::FromDevice) return;
+    if (block.lost_before > 0) tracker_->bytes_lost();
+    tracker_->push(std::span{block.bytes}.first(block.length), block.time);
+    while (const auto message = tracker_->next()) {
+      if (const auto* burst = std::get_if<drivers::TrackerBurst>(&*message)) {
+        batch.points.insert(batch.points.end(), burst->points.begin(), burst->points.end());
+      } else if (const auto* weather = std::get_if<protocol::EnvironmentSample>(&*message)) {
+        batch.environment.push_back(*weather);
+      }
+    }
+  }
+
+  std::string tracker_name_;
+  std::string encoder_name_;
+  std::unique_ptr<drivers::TrackerReceiver> tracker_;
+  std::optional<drivers::EncoderReceiver> encoder_;
+};
+
+/// The calibrations the recording asks for, one after the other.
+class Calibrations {
+ public:
+  Calibrations(std::vector<CalibrationRequest> requests, const Config& config)
+      : requests_(std::move(requests)), config_(config) {
+    begin_next();
+  }
+
+  void take(const protocol::Snapshot& snapshot) {
+    // A request that came later ends the one before, as it did live (by a cancellation).
+    if (next_ < requests_.size() && snapshot.head.time >= requests_[next_].from) {
+      end();
+      begin_next();
+    }
+    session_.take(snapshot);
+    if (auto run = session_.take_run()) identify(std::move(*run));
+  }
+
+  [[nodiscard]] std::vector<ReplayedCalibration> finish() {
+    end();
+    return std::move(done_);
+  }
+
+ private:
+  void begin_next() {
+    if (next_ == requests_.size()) return;
+    session_ = {};
+    (void)session_.start(requests_[next_].path_m, requests_[next_].from);
+    identified_ = false;
+    ++next_;
+  }
+  void end() {
+    if (next_ > 0 && !identified_) done_.push_back({.ended = session_.status()});
+    identified_ = true;
+  }
+  void identify(std::vector<RunPoint> points) {
+    ReplayedCalibration c{.ended = session_.status(), .points_sha256 = points_sha256(points)};
+    c.outcome = identify_run({.path_m = session_.path_m(), .points = std::move(points)}, config_.machine,
+                             config_.gate, nullptr);
+    if (*c.outcome) {
+      c.model_hash = model_hash((*c.outcome)->solution.model, "otf");
+      c.model_id = model_id((*c.outcome)->solution.model, "otf");
+    }
+    done_.push_back(std::move(c));
+    identified_ = true;
+  }
+
+  std::vector<CalibrationRequest> requests_;
+  const Config& config_;
+  CalibrationSession session_;
+  std::size_t next_ = 0;
+  bool identified_ = true;
+  std::vector<ReplayedCalibration> done_;
+};
+
+Result<std::vector<CalibrationRequest>> requests_of(const RecordingReader& recording) {
+  std::vector<CalibrationRequest> requests;
+  for (const auto& attachment : recording.attachments()) {
+    if (attachment.name != kCalibrationRequestName) continue;
+    auto request = from_attachment(attachment);
+    if (!request) return tl::unexpected(request.error());
+    requests.push_back(std::move(*request));
+  }
+  return requests;
+}
+
+/// Holds the replay back to `speed` times the recorded time, which began at `first`.
+class Pace {
+ public:
+  Pace(double speed, HostTime first) : speed_(speed), first_(first) {}
+  void wait_for(HostTime recorded) const {
+    if (!(speed_ > 0.0)) return;
+    const std::chrono::duration<double> wall = std::chrono::duration<double>(recorded - first_) / speed_;
+    std::this_thread::sleep_until(start_ + std::chrono::duration_cast<std::chrono::nanoseconds>(wall));
+  }
+
+ private:
+  double speed_;
+  HostTime first_;
+  std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
+};
+
+}  // namespace
+
+Result<ReplayReport> replay(const RecordingReader& recording, const Config& config,
+                            const ReplayOptions& options) {
+  auto requests = requests_of(recording);
+  if (!requests) return tl::unexpected(requests.error());
+  Calibrations calibrations{std::move(*requests), config};
+  Assembler assembler{assembler_options(config)};
+  RawDecoder raw{config};
+  ReplayReport report;
+  Batch batch;
+  std::vector<protocol::Snapshot> snapshots;
+
+  DeviceOrder device_order;
+  std::uint32_t sequence = 0;  // of the message being delivered
+  RecordingSink sink;
+  if (options.source == ReplaySource::Samples) {
+    sink.tracker_point = [&](const protocol::TrackerPoint& p, std::string_view) {
+      device_order.take(sequence, p, batch.points);
+    };
+    sink.axis_sample = [&](const protocol::AxisSample& s, std::string_view) { batch.axes.push_back(s); };
+    sink.environment = [&](const protocol::EnvironmentSample& e, std::string_view) {
+      batch.environment.push_back(e);
+    };
+  } else {
+    sink.raw_block = [&](const protocol::RawBlock& b, std::string_view device) {
+      raw.take(b, device, batch);
+    };
+  }
+  sink.calibration_event = [&](const v1::CalibrationEvent& e) {
+    if (!e.model_id().empty() &&
+        (report.live_model_ids.empty() || report.live_model_ids.back() != e.model_id())) {
+      report.live_model_ids.push_back(e.model_id());
+    }
+  };
+
+  const auto hand_on = [&] {
+    for (const auto& s : snapshots) {
+      calibrations.take(s);
+      if (options.on_snapshot) options.on_snapshot(s);
+    }
+    report.snapshots += snapshots.size();
+    snapshots.clear();
+  };
+
+  const auto range = recording.time_range();
+  if (!range) return report;
+  report.recorded = range->second - range->first;
+  const Pace pace{options.speed, range->first};
+  auto cursor = recording.messages();
+  std::size_t taken = 0;
+  while (const auto message = cursor.next()) {
+    pace.wait_for(message->time);
+    sequence = message->sequence;
+    if (!deliver(*message, sink)) ++report.undecodable;
+    if (++taken % kMessagesPerTurn != 0) continue;
+    assembler.take(batch);
+    batch.clear();
+    assembler.emit(snapshots);
+    hand_on();
+    if (options.progress) options.progress(cursor.progress());
+  }
+  device_order.finish(batch.points);
+  assembler.take(batch);
+  assembler.finish(snapshots);
+  hand_on();
+  report.calibrations = calibrations.finish();
+  return report;
+}
+
+}  // namespace abbe::daemon

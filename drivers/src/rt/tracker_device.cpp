@@ -3,6 +3,8 @@
 
 #include <utility>
 
+#include "abbe/protocol/visit.hpp"
+
 namespace abbe::drivers {
 
 using Direction = protocol::RawBlock::Direction;
@@ -17,7 +19,7 @@ void TrackerDevice::receive() ABBE_RT {
   raw_.push_bytes(arrival_, Direction::FromDevice, bytes);
   receiver_.push(bytes, arrival_);
   while (const auto message = receiver_.next()) {
-    std::visit([this](const auto& m) ABBE_RT { take(m); }, *message);
+    protocol::visit_trivial([this](const auto& m) ABBE_RT { take(m); }, *message);
   }
   const TrackerCounters& counters = receiver_.counters();
   const std::uint64_t gaps = counters.gaps + counters.beam_losses;

@@ -5,6 +5,8 @@
 #include <cmath>
 #include <numbers>
 
+#include "abbe/protocol/visit.hpp"
+
 namespace abbe::drivers {
 namespace {
 
@@ -101,7 +103,7 @@ std::optional<TrackerMessage> TrackerReceiver::understand(std::span<const std::b
   const auto decoded = emscon::decode(packet);
   if (!decoded) return nonsense(decoded.error(), packet);
   ++counters_.packets;
-  return std::visit([this](const auto& p) { return take(p); }, *decoded);
+  return protocol::visit_trivial([this](const auto& p) { return take(p); }, *decoded);
 }
 
 TrackerMessage TrackerReceiver::nonsense(std::optional<emscon::DecodeError> error,

@@ -40,8 +40,12 @@ TrackerDevice::TrackerDevice(const TrackerDeviceOptions& options, const TimeSour
 }
 
 TrackerDevice::~TrackerDevice() {
-  tell(TrackerStopRequested{});
-  tcp_.finish();
+  try {
+    tell(TrackerStopRequested{});
+    tcp_.finish();
+  } catch (
+      ...) {  // NOLINT(bugprone-empty-catch): out of memory; the closed connection stops the controller too
+  }
 }
 
 void TrackerDevice::wait(std::chrono::nanoseconds at_most) {

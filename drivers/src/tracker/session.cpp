@@ -262,10 +262,10 @@ TrackerAction TrackerSession::next_step() {
   return send(step, true);
 }
 
-TrackerAction TrackerSession::send(Step step, bool scripted) {
+TrackerAction TrackerSession::send(const Step& step, bool scripted) {
   const emscon::Request request = step.request;
   const auto due = now_ + time_for(emscon::command_of(request));
-  pending_ = Pending{std::move(step), scripted, false, due, now_ + options_.busy_patience};
+  pending_ = Pending{step, scripted, false, due, now_ + options_.busy_patience};
   return TrackerSend{request};
 }
 

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <utility>
 
+#include "abbe/protocol/visit.hpp"
 #include "emscon/fields.hpp"
 
 namespace abbe::protocol::emscon {
@@ -56,15 +57,15 @@ struct CommandOf {
 }  // namespace
 
 Command command_of(const Answer& answer) ABBE_RT {
-  return std::visit(CommandOf{}, answer);
+  return visit_trivial(CommandOf{}, answer);
 }
 
 Status status_of(const Answer& answer) ABBE_RT {
-  return std::visit([](const auto& p) { return p.status; }, answer);
+  return visit_trivial([](const auto& p) { return p.status; }, answer);
 }
 
 std::size_t encode(const Answer& answer, std::span<std::byte> out) ABBE_RT {
-  return std::visit(
+  return visit_trivial(
       [out]<class P>(const P& p) -> std::size_t {
         constexpr std::size_t kSize = kAnswerHeadSize + wire::size_of<P>();
         if (out.size() < kSize) return 0;

@@ -18,6 +18,7 @@ namespace abbe::protocol::emscon::wire {
 template <class T, class Packet>
 inline constexpr bool kIs = std::is_same_v<std::remove_const_t<T>, Packet>;
 
+// NOLINTBEGIN(bugprone-branch-clone): packets of equal layout are listed each, as the documents do.
 /// Calls io(field, ...) with the fields of `p` after the head that all packets of its kind share.
 template <class P, class Io>
 constexpr void fields(P& p, Io&& io) ABBE_RT {
@@ -120,6 +121,7 @@ constexpr void fields(P& p, Io&& io) ABBE_RT {
   }
   // Acknowledge and the bare requests have no fields of their own.
 }
+// NOLINTEND(bugprone-branch-clone)
 
 template <class T>
 inline constexpr bool kIsArray = false;

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <utility>
 
+#include "abbe/protocol/visit.hpp"
 #include "emscon/fields.hpp"
 
 namespace abbe::protocol::emscon {
@@ -43,11 +44,11 @@ Decoded decode_body(Command command, ByteReader& in, std::index_sequence<I...>) 
 }  // namespace
 
 Command command_of(const Request& request) ABBE_RT {
-  return std::visit([]<class P>(const P&) { return P::kCommand; }, request);
+  return visit_trivial([]<class P>(const P&) { return P::kCommand; }, request);
 }
 
 std::size_t encode(const Request& request, std::span<std::byte> out) ABBE_RT {
-  return std::visit(
+  return visit_trivial(
       [out]<class P>(const P& p) -> std::size_t {
         constexpr std::size_t kSize = kRequestHeadSize + wire::size_of<P>();
         if (out.size() < kSize) return 0;

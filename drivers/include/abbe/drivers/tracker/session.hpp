@@ -144,7 +144,7 @@ class TrackerSession {
   void write_script();
   TrackerAction begin_script();
   TrackerAction next_step();
-  TrackerAction send(Step step, bool scripted);
+  TrackerAction send(const Step& step, bool scripted);
   TrackerAction send_again();
   TrackerAction refused(emscon::Status status);
   TrackerAction start_refused();

@@ -24,14 +24,16 @@ std::string move_point(const std::string& scientific, int shift) {
   const auto count = static_cast<int>(digits.size());
   std::string text = negative ? "-" : "";
   if (exponent < -5 || exponent > 16) {
-    text += digits.substr(0, 1) + (count > 1 ? "." + digits.substr(1) : "") + fmt::format("e{}", exponent);
+    text += digits.front();
+    if (count > 1) text.append(1, '.').append(digits, 1);
+    text += fmt::format("e{}", exponent);
   } else if (exponent < 0) {
-    text += "0." + std::string(static_cast<std::size_t>(-exponent - 1), '0') + digits;
+    text.append("0.").append(static_cast<std::size_t>(-exponent - 1), '0').append(digits);
   } else if (count <= exponent + 1) {
-    text += digits + std::string(static_cast<std::size_t>(exponent + 1 - count), '0');
+    text.append(digits).append(static_cast<std::size_t>(exponent + 1 - count), '0');
   } else {
-    text += digits.substr(0, static_cast<std::size_t>(exponent + 1)) + "." +
-            digits.substr(static_cast<std::size_t>(exponent + 1));
+    const auto whole = static_cast<std::size_t>(exponent + 1);
+    text.append(digits, 0, whole).append(1, '.').append(digits, whole);
   }
   return text;
 }

@@ -1,3 +1,5 @@
+#include <cmath>
+
 #include "abbe/daemon/model_document.hpp"
 
 namespace abbe::daemon {
@@ -8,6 +10,11 @@ ResidualFigures figures(const calib::otf::ResidualStatistics& s) {
   return {s.mean_abs_m, s.rms_m, s.max_abs_m};
 }
 
+/// Without a degree of freedom the ratio does not exist; a file of numbers says 0.
+double or_zero(double value) {
+  return std::isfinite(value) ? value : 0.0;
+}
+
 }  // namespace
 
 ModelStatistics model_statistics(const calib::otf::Statistics& s) {
@@ -16,9 +23,9 @@ ModelStatistics model_statistics(const calib::otf::Statistics& s) {
           .observations = s.observations,
           .unknowns = s.unknowns,
           .rank = s.rank,
-          .condition = s.condition,
-          .sigma0 = s.sigma0,
-          .chi2_per_dof = s.chi2_per_dof,
+          .condition = or_zero(s.condition),
+          .sigma0 = or_zero(s.sigma0),
+          .chi2_per_dof = or_zero(s.chi2_per_dof),
           .before = figures(s.before),
           .after = figures(s.after),
           .iterations = s.iterations,

@@ -39,13 +39,13 @@ std::string vector_mm(const calib::Vector3& v) {
 
 std::string vectors_mm(std::span<const calib::Vector3> list) {
   std::string text = "[";
-  for (const auto& v : list) text += (text.size() > 1 ? ", " : "") + vector_mm(v);
+  for (const auto& v : list) text.append(text.size() > 1 ? ", " : "").append(vector_mm(v));
   return text + "]";
 }
 
 std::string numbers(std::span<const double> list, int shift) {
   std::string text = "[";
-  for (const double v : list) text += (text.size() > 1 ? ", " : "") + to_decimal(v, shift);
+  for (const double v : list) text.append(text.size() > 1 ? ", " : "").append(to_decimal(v, shift));
   return text + "]";
 }
 
@@ -80,8 +80,10 @@ void write_covariance(JsonText& out, const Eigen::MatrixXd& covariance) {
   out.raw("[");
   for (Eigen::Index i = 0; i < covariance.rows(); ++i) {
     out.raw(i > 0 ? ",\n    " : "\n    ");
-    for (Eigen::Index j = i; j < covariance.cols(); ++j)
-      out.raw((j > i ? "," : "") + to_decimal(covariance(i, j), kMicroUnitSquared));
+    for (Eigen::Index j = i; j < covariance.cols(); ++j) {
+      if (j > i) out.raw(",");
+      out.raw(to_decimal(covariance(i, j), kMicroUnitSquared));
+    }
   }
   out.raw("\n  ]");
 }

@@ -179,9 +179,9 @@ TEST(ClockModel, SaysTheSameForTheSameArrivals) {
 
 TEST(ClockModel, FollowsManyPacketsASecondAsWellAsFew) {
   ClockModel model({.max_constant_delay = 0ns});
-  for (int i = 0; i < 100'000; ++i)
+  for (int i = 0; i < 30'000; ++i)
     model.observe(DeviceTime{i * 1ms}, HostTime{100s + i * 1ms + (i % 10) * 100us});
-  EXPECT_LT(std::chrono::abs(model.to_host(DeviceTime{100s}).time - HostTime{200s}), 20us);
+  EXPECT_LT(std::chrono::abs(model.to_host(DeviceTime{30s}).time - HostTime{130s}), 20us);
 }
 
 }  // namespace

@@ -94,10 +94,10 @@ TEST(Observe, DividesTheNoiseByTheSamplesOfABlock) {
 
 TEST(Observe, RefusesBlocksThatStraddleCorners) {
   MadeRun run = make_run({});
-  run.options.block_samples = 100;  // 80 mm at 0.2 m/s
+  run.options.block_samples = 100;  // 160 mm at 0.4 m/s
   const auto o = observe(run.samples, run.machine, run.path, run.noise, run.options);
   ASSERT_FALSE(o);
-  EXPECT_THAT(o.error().text, HasSubstr("use at most 2"));
+  EXPECT_THAT(o.error().text, HasSubstr("use at most 12"));
 }
 
 TEST(Observe, RefusesNoiseThatIsNotPositive) {

@@ -174,7 +174,7 @@ TEST(WholeRun, SurvivesALostBeam) {
   for (std::size_t i = 10000; i < 11500; ++i) {
     run.samples[i].valid = false;
   }
-  run.samples.erase(run.samples.begin() + 25000, run.samples.begin() + 25250);
+  run.samples.erase(run.samples.begin() + 20000, run.samples.begin() + 20250);
   const auto id = identify(run.samples, run.machine, run.path, run.noise, run.options);
   ASSERT_TRUE(id) << id.error().text;
   EXPECT_EQ(id->solution.statistics.lost_samples, 1750u);

@@ -27,7 +27,7 @@ struct MadeRunOptions {
   unsigned seed = 1;
   double noise_factor = 1.0;  ///< of the default noise model; 0: exact
   double error_scale_m = 30e-6;
-  double speed_m_s = 0.2;
+  double speed_m_s = 0.4;
   double rate_hz = 250.0;
   std::string chain = "[w X' b Y Z (C1) t]";
 };
@@ -87,7 +87,7 @@ inline MadeRun make_run(const MadeRunOptions& wanted) {
   MadeRun run;
   run.machine = coarse_machine(wanted.chain);
   run.path = case_a_path();
-  run.options.block_samples = 10;  // 8 mm
+  run.options.block_samples = 10;  // 16 mm
   const calib::ParameterLayout layout = layout_of(run.machine);
   run.truth = random_tables(layout, wanted.error_scale_m, random);
   run.T_machine_tracker = case_a_alignment(true);

@@ -13,6 +13,10 @@ namespace {
 class MeanColumns {
  public:
   void add(std::span<const Column> columns) {
+    if (++count_ == 1) {
+      sum_.assign(columns.begin(), columns.end());
+      return;
+    }
     auto at = sum_.begin();
     for (const Column& c : columns) {
       at = std::lower_bound(at, sum_.end(), c.parameter,
@@ -22,7 +26,6 @@ class MeanColumns {
       }
       at->dV_dU += c.dV_dU;
     }
-    ++count_;
   }
 
   [[nodiscard]] std::vector<SparseRows::Entry> along(const Vector3& direction) const {

@@ -7,8 +7,12 @@
 // by one where not (moodycamel). The other lines give each its best: ours and boost also push in batches
 // of 16.
 //
-// Seen on two virtual processors: AxisSample one by one is level with boost (1.0), but 0.82 to 0.9 in the runs, about
-// one in four, in which everything is five times slower because the host moved the processors apart.
+// Seen on two busy virtual processors with this program, SCHED_FIFO, -O2: TrackerPoint one by one and both
+// payloads by 16 above 1 nearly always. AxisSample one by one is about level with boost and not reliably
+// above 0.95: 10 of 15 short calls (7 or 11 rounds) reached it, the others gave 0.82 to 0.91; of two calls of
+// 21 rounds one gave 0.97, one (-O3) 0.82. Low ratios are commoner when every queue is slow, but not only
+// then; the cause is not established. Without SCHED_FIFO on that machine neither payload reached 0.95 one by
+// one (0.92 and 0.94, 0.74 and 0.75).
 //
 //   bench_ring [rounds = 41] [samples per run = 200000]
 

@@ -39,14 +39,15 @@ void run(BurstProfile& profile, ClockModel& model, double until_s) {
 }
 
 constexpr std::uint64_t kSeeds = 50;
+constexpr std::uint64_t kFirstSeed = 900'000;  // the model's coefficients were chosen on seeds 0 to 399
 
 /// The measured profile with 15 ppm and a constant delay nobody knows, of 0 to 2 ms.
 BurstProfile measured(std::uint64_t seed) {
-  return {seed, {.skew = 15e-6, .constant_delay_s = 0.002 * BurstProfile(1000 + seed, {}).uniform()}};
+  return {seed, {.skew = 15e-6, .constant_delay_s = 0.002 * BurstProfile(5'000'000 + seed, {}).uniform()}};
 }
 
 TEST(ClockModel, ErrsByLessThan2msAfterAMinute) {
-  for (std::uint64_t seed = 0; seed < kSeeds; ++seed) {
+  for (std::uint64_t seed = kFirstSeed; seed < kFirstSeed + kSeeds; ++seed) {
     BurstProfile profile = measured(seed);
     ClockModel model;
     for (run(profile, model, 60.0); profile.last_point_s() < 120.0;) {
@@ -59,7 +60,7 @@ TEST(ClockModel, ErrsByLessThan2msAfterAMinute) {
 
 TEST(ClockModel, StatesAnUncertaintyThatCoversTheTruth) {
   std::uint64_t covered = 0;
-  for (std::uint64_t seed = 0; seed < kSeeds; ++seed) {
+  for (std::uint64_t seed = kFirstSeed; seed < kFirstSeed + kSeeds; ++seed) {
     BurstProfile profile = measured(seed);
     ClockModel model;
     run(profile, model, 60.0);
@@ -74,7 +75,7 @@ TEST(ClockModel, StatesAnUncertaintyThatCoversTheTruth) {
 TEST(ClockModel, KnowsHowWellTheEnvelopeIsFollowed) {
   std::uint64_t covered = 0;
   double sum_of_u_s = 0.0;
-  for (std::uint64_t seed = 0; seed < kSeeds; ++seed) {
+  for (std::uint64_t seed = kFirstSeed; seed < kFirstSeed + kSeeds; ++seed) {
     BurstProfile profile(seed, {});
     ClockModel model({.max_constant_delay = 0ns});
     run(profile, model, 60.0);

@@ -17,6 +17,7 @@
 #include "abbe/daemon/control_protocol.hpp"
 #include "abbe/daemon/dds_supervisor.hpp"
 #include "abbe/daemon/hub.hpp"
+#include "control/unix_socket.hpp"
 
 namespace abbe::daemon {
 namespace {
@@ -115,6 +116,14 @@ struct Abbed::State {
     if (hub_thread.joinable()) hub_thread.join();
   }
 
+  /// Asked before anything is opened: a second abbed that got as far as the socket for abbe-dds would, merely
+  /// by trying it, cut the first one off from its abbe-dds.
+  Result<void> refuse_second_daemon() {
+    if (!connect_unix(config.control.socket)) return {};
+    return fail(ErrorCode::Io, fmt::format("listen {}: another daemon already answers there",
+                                           config.control.socket.string()));
+  }
+
   Result<void> open_recorder() {
     RecordingInfo info{.machine = config.machine.name,
                        .utc_offset = utc,
@@ -196,8 +205,8 @@ Result<std::unique_ptr<Abbed>> Abbed::start(Config config, AbbedOptions options)
     if (auto made = make_directory(directory); !made) return tl::unexpected(made.error());
   }
   using Step = Result<void> (State::*)();
-  for (const Step step : {&State::open_recorder, &State::open_models, &State::open_dds, &State::start_devices,
-                          &State::start_hub, &State::open_control}) {
+  for (const Step step : {&State::refuse_second_daemon, &State::open_recorder, &State::open_models,
+                          &State::open_dds, &State::start_devices, &State::start_hub, &State::open_control}) {
     if (auto done = ((*state).*step)(); !done) return tl::unexpected(done.error());
   }
   return std::unique_ptr<Abbed>{new Abbed{std::move(state)}};

@@ -103,6 +103,9 @@ int main(int argc, char** argv) {
     return kDone;
   }
   const sigset_t stop = block_stop_signals();
+  // A file that may not grow (RLIMIT_FSIZE, LimitFSIZE=) is for the recorder to report like a full disk, by
+  // the EFBIG of its write; the signal's default would end acquisition with it.
+  ::signal(SIGXFSZ, SIG_IGN);
   auto abbed = Abbed::start(
       std::move(*config),
       {.configuration_text = text_of(file), .configuration_file = file, .dds_program = dds_program()});

@@ -1,0 +1,47 @@
+/// abbe-dds dies: abbed starts another and acquires on.
+
+#include <gmock/gmock.h>
+#include <signal.h>
+
+#include <fstream>
+
+#include "spine.hpp"
+
+namespace abbe::test {
+namespace {
+
+struct KilledDds : Spine {
+  /// The one child abbed has; 0 while there is none.
+  [[nodiscard]] pid_t abbe_dds() const {
+    const std::string task = "/proc/" + std::to_string(abbed_->pid()) + "/task";
+    for (const auto& thread : std::filesystem::directory_iterator(task)) {
+      pid_t child = 0;
+      if (std::ifstream{thread.path() / "children"} >> child) return child;
+    }
+    return 0;
+  }
+  [[nodiscard]] std::uint64_t connections() const {
+    const auto now = status();
+    return now.is_object() && now["dds"]["connected"] ? now["dds"]["connections"].get<std::uint64_t>() : 0;
+  }
+};
+
+TEST_F(KilledDds, IsReplacedWhileAcquisitionGoesOn) {
+  write_path("path.csv", path());
+  ASSERT_NO_FATAL_FAILURE(start_simulator());
+  write_configuration("child");
+  ASSERT_NO_FATAL_FAILURE(start_abbed());
+  ASSERT_TRUE(eventually([this] { return connections() == 1; }));
+  const pid_t killed = abbe_dds();
+  ASSERT_NE(killed, 0);
+  ASSERT_EQ(::kill(killed, SIGKILL), 0);
+  EXPECT_TRUE(goes_on("encoder"));
+  EXPECT_TRUE(eventually([this] { return connections() == 2; }));
+  EXPECT_NE(abbe_dds(), killed);
+  EXPECT_TRUE(goes_on("encoder"));
+  const auto encoder = stream("encoder");
+  EXPECT_EQ(encoder["dropped"], 0);
+}
+
+}  // namespace
+}  // namespace abbe::test

@@ -1,0 +1,73 @@
+/// What abbed says, and with which exit code, when it cannot start.
+
+#include <gmock/gmock.h>
+
+#include "spine.hpp"
+
+namespace abbe::test {
+namespace {
+
+using testing::HasSubstr;
+
+struct Refusals : Spine {
+  /// No device answers at these ports; abbed has to cope with that anyway.
+  Refusals() {
+    tracker_port_ = 1;
+    can_port_ = 1;
+    write_configuration();
+  }
+  [[nodiscard]] std::string line_of(const std::string& word) const {
+    const std::string text = text_of(file("abbed.toml"));
+    const auto at = text.find(word);
+    EXPECT_NE(at, std::string::npos);
+    return std::to_string(1 + std::count(text.begin(), text.begin() + static_cast<std::ptrdiff_t>(at), '\n'));
+  }
+  void replace(const std::string& what, const std::string& by) {
+    std::string text = text_of(file("abbed.toml"));
+    ASSERT_NE(text.find(what), std::string::npos);
+    write("abbed.toml", text.replace(text.find(what), what.size(), by));
+  }
+  [[nodiscard]] Outcome run_abbed(const std::string& option = "") const {
+    std::vector<std::string> command{ABBED_PROGRAM, "--config", file("abbed.toml")};
+    if (!option.empty()) command.push_back(option);
+    return run(command);
+  }
+};
+
+TEST_F(Refusals, GoodConfigurationIsSaidToBeGood) {
+  EXPECT_EQ(run_abbed("--check-config").code, 0);
+}
+
+TEST_F(Refusals, UnknownOptionIsUsage) {
+  const auto outcome = run_abbed("--no-such-option");
+  EXPECT_EQ(outcome.code, 2);
+  EXPECT_THAT(outcome.err, HasSubstr("--no-such-option"));
+}
+
+TEST_F(Refusals, ThreeErrorsOfAConfigurationAreSaidAtOnceWithTheirLines) {
+  replace("max_mm = 100", "max_mm = -200");
+  replace("point_rate_hz = 500", "point_rate_Hz = 500");
+  replace("chunk_kB = 16", "chunk_kB = \"much\"");
+  const auto outcome = run_abbed();
+  EXPECT_EQ(outcome.code, 3);
+  const auto fault = [this](const std::string& key) { return "abbed.toml:" + line_of(key) + ":"; };
+  EXPECT_THAT(outcome.err, HasSubstr(fault("max_mm = -200")));
+  EXPECT_THAT(outcome.err, HasSubstr(fault("point_rate_Hz")));
+  EXPECT_THAT(outcome.err, HasSubstr(fault("chunk_kB")));
+}
+
+TEST_F(Refusals, MissingConfigurationIsNamed) {
+  const auto outcome = run({ABBED_PROGRAM, "--config", file("none.toml")});
+  EXPECT_EQ(outcome.code, 4);
+  EXPECT_THAT(outcome.err, HasSubstr("none.toml"));
+}
+
+TEST_F(Refusals, FileInPlaceOfTheDataDirectoryIsNamed) {
+  write("data", "");
+  const auto outcome = run_abbed();
+  EXPECT_EQ(outcome.code, 4);
+  EXPECT_THAT(outcome.err, HasSubstr(file("data")));
+}
+
+}  // namespace
+}  // namespace abbe::test

@@ -1,0 +1,119 @@
+/// From the wire to the model and back: a calibration, what it is worth, and the same once more from its
+/// recording.
+
+#include <gmock/gmock.h>
+
+#include <sstream>
+
+#include "spine.hpp"
+
+namespace abbe::test {
+namespace {
+
+using nlohmann::json;
+using testing::HasSubstr;
+
+struct ShortRun : Spine {
+  void start_everything() {
+    write_path("path.csv", path());
+    start_simulator();
+    const auto truth = run({ABBE_SIM_PROGRAM, "truth", "--config", file("sim.toml"), "--grid", "5", "5", "5",
+                            "-o", file("truth.csv")});
+    ASSERT_EQ(truth.code, 0) << truth.err;
+    hold_simulator();
+#ifdef ABBE_WITH_DDS
+    write_configuration("child");
+    start_abbed();
+    watch_ = start({ABBE_WATCH_PROGRAM, "--domain", domain_.text(), "--profile", ABBE_LOOPBACK_PROFILE,
+                    "--json", "--compare", file("truth.csv"), "--timeout", "100"},
+                   "watch");
+#else
+    write_configuration("off");
+    start_abbed();
+#endif
+  }
+
+  /// The line of abbe-watch that says what the received model is worth; null without one.
+  json comparison() const {
+    std::istringstream lines{watch_->out()};
+    for (std::string line; std::getline(lines, line);) {
+      const json said = json::parse(line, nullptr, false);
+      if (said.is_object() && said.contains("comparison")) return said["comparison"];
+    }
+    return {};
+  }
+
+  void expect_subscriber_sees_a_smaller_error() {
+#ifdef ABBE_WITH_DDS
+    EXPECT_EQ(watch_->wait_for_end(), 0) << watch_->err();
+    const json compared = comparison();
+    ASSERT_TRUE(compared.is_object());
+    // The tracker's noise on the blocks of this run, amplified by the fit, stays below a micrometre; the
+    // error is 60.
+    EXPECT_GT(compared["before_mean_um"], 30.0);
+    EXPECT_LT(compared["after_mean_um"], 0.05 * compared["before_mean_um"].get<double>());
+#endif
+  }
+
+  void expect_the_same_again(const std::vector<std::string>& options) {
+    std::vector<std::string> command{ABBE_PROGRAM, "replay", "--json", recordings().front()};
+    command.insert(command.end(), options.begin(), options.end());
+    const auto replayed = run(command);
+    EXPECT_EQ(replayed.code, 0) << replayed.err;
+    const json said = json::parse(replayed.out, nullptr, false);
+    ASSERT_TRUE(said.is_object()) << replayed.out;
+    EXPECT_EQ(said["live_model_ids"].size(), 1u);
+    EXPECT_TRUE(said["same_as_live"]) << said.dump(1);
+    EXPECT_EQ(said["losses"], json::array());
+  }
+
+  std::unique_ptr<Program> watch_;
+};
+
+TEST_F(ShortRun, IsCalibratedPublishedRecordedAndReplayedTheSame) {
+  ASSERT_NO_FATAL_FAILURE(start_everything());
+  const auto calibrated = calibrate("path.csv");
+  ASSERT_EQ(calibrated.code, 0) << calibrated.out << calibrated.err;
+  EXPECT_EQ(status()["model"]["state"], "ACTIVE");
+  ASSERT_NO_FATAL_FAILURE(expect_subscriber_sees_a_smaller_error());
+  EXPECT_EQ(abbed_->stop(), 0) << abbed_->err();
+  ASSERT_EQ(recordings().size(), 1u);
+  EXPECT_EQ(recordings().front().extension(), ".mcap");  // closed: else .part
+  expect_the_same_again({});
+  expect_the_same_again({"--raw"});
+}
+
+struct WrongPath : Spine {
+  /// Begins where the machine does, then goes elsewhere.
+  static Vertices other_path() {
+    Vertices other = path();
+    other.resize(3);
+    other[1] = {other[0][0], other[0][1] + 150.0, other[0][2]};
+    other[2] = {other[0][0], other[0][1] + 150.0, other[0][2] + 50.0};
+    return other;
+  }
+};
+
+TEST_F(WrongPath, IsRefusedAndTheDaemonGoesOn) {
+  write_path("path.csv", path());
+  write_path("other.csv", other_path());
+  ASSERT_NO_FATAL_FAILURE(start_simulator());
+  hold_simulator();
+  write_configuration();
+  ASSERT_NO_FATAL_FAILURE(start_abbed());
+  const auto refused = calibrate("other.csv");
+  EXPECT_EQ(refused.code, 1) << refused.err;
+  EXPECT_THAT(refused.out, HasSubstr("refused"));
+  EXPECT_THAT(refused.out, HasSubstr("another path is being driven"));
+  EXPECT_TRUE(goes_on("encoder"));
+  EXPECT_EQ(abbed_->stop(), 0);
+  // 1: the recording holds no run that could be identified; that much it must tell.
+  const auto replayed = run({ABBE_PROGRAM, "replay", "--json", recordings().front()});
+  EXPECT_EQ(replayed.code, 1) << replayed.err;
+  const json said = json::parse(replayed.out, nullptr, false);
+  ASSERT_TRUE(said.is_object()) << replayed.out << replayed.err;
+  EXPECT_THAT(said["calibrations"].at(0)["reason"], HasSubstr("another path is being driven"));
+}
+
+}  // namespace
+}  // namespace abbe::test

@@ -1,0 +1,49 @@
+/// The units as systemd itself judges them, with the built programs in place of the installed ones.
+
+#include <gmock/gmock.h>
+
+#include "spine.hpp"
+
+namespace abbe::test {
+namespace {
+
+constexpr const char* kAnalyze = "/usr/bin/systemd-analyze";
+constexpr double kExposedAtMost = 3.0;  // of 10; systemd calls it OK
+
+struct Systemd : Spine {
+  void SetUp() override {
+    if (!std::filesystem::exists(kAnalyze)) GTEST_SKIP() << kAnalyze << " is missing";
+    for (const std::string unit : {"abbed.service", "abbe-dds.service"}) {
+      std::string text = text_of(std::filesystem::path{ABBE_UNIT_DIR} / unit);
+      const std::string installed = "ExecStart=/usr/bin/";
+      const auto at = text.find(installed);
+      ASSERT_NE(at, std::string::npos) << unit;
+      write(unit, text.replace(at, installed.size(), "ExecStart=" ABBE_BIN_DIR "/"));
+    }
+  }
+  [[nodiscard]] double exposure(const std::string& unit) const {
+    const auto judged = run({kAnalyze, "security", "--offline=true", "--no-pager", file(unit)});
+    const std::string level = "Overall exposure level for " + unit + ": ";
+    const auto at = judged.out.find(level);
+    EXPECT_NE(at, std::string::npos) << judged.out << judged.err;
+    return at == std::string::npos ? 10.0 : std::stod(judged.out.substr(at + level.size()));
+  }
+};
+
+TEST_F(Systemd, FindsNothingWrongWithTheUnits) {
+  std::vector<std::string> command{kAnalyze, "verify", "--man=no", file("abbed.service")};
+#ifdef ABBE_WITH_DDS
+  command.push_back(file("abbe-dds.service"));
+#endif
+  const auto verified = run(command);
+  EXPECT_EQ(verified.code, 0);
+  EXPECT_THAT(verified.err, testing::Not(testing::HasSubstr(".service:"))) << verified.err;
+}
+
+TEST_F(Systemd, UnitsAreHardened) {
+  EXPECT_LE(exposure("abbed.service"), kExposedAtMost);
+  EXPECT_LE(exposure("abbe-dds.service"), kExposedAtMost);
+}
+
+}  // namespace
+}  // namespace abbe::test

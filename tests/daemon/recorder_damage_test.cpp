@@ -145,7 +145,7 @@ TEST(RecordingReader, RefusesWhatIsNoRecording) {
 /// Records samples 0, 1, 2, ... for ever and says through `pipe` how many are in finished chunks.
 [[noreturn]] void record_until_killed(const std::filesystem::path& directory, int pipe) {
   auto options = example_options(directory);
-  options.chunk_bytes = 16 * 1024;
+  options.chunk_bytes = 8 * 1024;
   auto recorder = Recorder::open(options, example_info(), {});
   if (!recorder) ::_exit(1);
   std::uint64_t said = 0;
@@ -191,7 +191,7 @@ class KilledRecorders : public ::testing::Test {
   };
   KilledRecorders() {
     std::mt19937 random{50};
-    std::uniform_int_distribution<unsigned> moment{1, 40};
+    std::uniform_int_distribution<unsigned> moment{1, 12};
     for (int round = 0; round < kRounds; ++round) {
       const auto folder = folder_.path() / std::to_string(round);
       std::filesystem::create_directory(folder);

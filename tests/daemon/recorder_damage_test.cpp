@@ -17,6 +17,13 @@ namespace {
 constexpr std::uint32_t kChunks = 3;
 constexpr std::uint32_t kPerChunk = 10;
 
+#ifdef __SANITIZE_THREAD__
+constexpr std::size_t kSummaryStep =
+    16;  // one thread and 40 kB of schema texts: nothing to find there, and slow
+#else
+constexpr std::size_t kSummaryStep = 1;
+#endif
+
 std::vector<std::string> texts(std::span<const RecordingLoss> losses) {
   std::vector<std::string> all;
   for (const RecordingLoss& loss : losses) all.push_back(loss.what);
@@ -53,7 +60,8 @@ TEST_F(DamagedRecording, CutAtAnyByteKeepsEveryFinishedChunk) {
   ASSERT_EQ(chunk_ends_.size(), kChunks);
   const auto file = folder_.path() / "cut.mcap";
   write_file(file, whole_, whole_.size());
-  for (std::size_t cut = whole_.size(); cut >= chunk_starts_[0]; --cut) {
+  const std::size_t data_end = chunk_ends_.back() + 1024;  // indexes and DataEnd lie behind the last chunk
+  for (std::size_t cut = whole_.size(); cut >= chunk_starts_[0]; cut -= cut > data_end ? kSummaryStep : 1) {
     std::filesystem::resize_file(file, cut);
     const auto finished = static_cast<std::uint32_t>(
         std::ranges::count_if(chunk_ends_, [cut](std::size_t end) { return end <= cut; }));

@@ -87,6 +87,17 @@ nodes = [{axis = "X", node = 1, step_nm = 10, invert = true}, {axis = "Y", node 
   EXPECT_DOUBLE_EQ(config->encoder->nodes[1].step, 1e-9);
 }
 
+TEST(Config, TakesARateOfZeroForWheneverSomethingNewCame) {
+  const auto config = parse_config(kMachine + "[dds]\nsnapshot_hz = 0\ncompensation_hz = 0\n", "abbed.toml");
+  ASSERT_TRUE(config) << config.error().details.front();
+  EXPECT_EQ(config->dds.snapshot_hz, 0.0);
+  EXPECT_EQ(config->dds.compensation_hz, 0.0);
+}
+
+TEST(Config, RefusesANegativeRate) {
+  EXPECT_THAT(faults_of(kMachine + "[dds]\nsnapshot_hz = -1\n"), ElementsAre(HasSubstr("snapshot_hz")));
+}
+
 TEST(Config, AnchorsRelativePathsAtTheFile) {
   const auto config =
       parse_config(kMachine + "[daemon]\ndata_dir = \"data\"\nruntime_dir = \"/run/x\"\n", "/etc/a/b.toml");

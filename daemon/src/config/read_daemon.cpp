@@ -59,8 +59,10 @@ void read_dds(Section& root, const std::filesystem::path& base, Config& out) {
   auto& dds = out.dds;
   dds.socket = out.daemon.runtime_dir / "dds.sock";
   section.get_integer("domain", dds.domain, 0, 232);  // RTPS 2.2, 9.6.1.1: port numbers end at domain 232
-  section.get("snapshot_hz", dds.snapshot_hz, kPlain, {0.1, 1000.0});
-  section.get("compensation_hz", dds.compensation_hz, kPlain, {0.1, 1000.0});
+  // 0: every turn of the hub in which something new came. Its period and the devices' rates are the bound
+  // then.
+  section.get("snapshot_hz", dds.snapshot_hz, kPlain, {0.0, 1000.0});
+  section.get("compensation_hz", dds.compensation_hz, kPlain, {0.0, 1000.0});
   section.get("model_repeat_s", dds.model_repeat, kPlain, {1.0, 3600.0});
   section.get("validity_s", dds.validity, kPlain, {0.01, 3600.0});
   section.get_word<Supervise>(

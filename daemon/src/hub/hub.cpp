@@ -1,5 +1,7 @@
 #include "abbe/daemon/hub.hpp"
 
+#include <sys/prctl.h>
+
 #include <ctime>
 #include <future>
 #include <utility>
@@ -87,16 +89,14 @@ void Hub::turn(WallTime wall) {
 }
 
 void Hub::publish(bool fresh, HostTime now, WallTime wall) {
-  const ModelStanding standing = this->standing();
+  if (fresh && parts_.publisher != nullptr) parts_.publisher->live(live_.view(), standing(), now, wall);
   if (wall >= next_health_) {
     next_health_ = wall + kHealthPeriod;
     parts_.authority.follow_store(now);
     collect_health(now);
     if (parts_.publisher != nullptr) parts_.publisher->health(health_, now);
   }
-  if (parts_.publisher == nullptr) return;
-  if (fresh) parts_.publisher->live(live_.view(), standing, now, wall);
-  parts_.publisher->model(standing, now, wall);
+  if (parts_.publisher != nullptr) parts_.publisher->model(standing(), now, wall);
 }
 
 void Hub::collect_health(HostTime now) {
@@ -106,6 +106,9 @@ void Hub::collect_health(HostTime now) {
 }
 
 void Hub::run() {
+  // Without SCHED_FIFO the kernel may wake a thread 50 us late to spare a processor a wake-up: a fifth of the
+  // usual period, in every turn.
+  ::prctl(PR_SET_TIMERSLACK, 1UL);
   const auto period = parts_.config.daemon.hub_period;
   auto next = std::chrono::steady_clock::now();
   while (!stopping_.load(std::memory_order_relaxed)) {

@@ -134,8 +134,8 @@ enum class Supervise { Child, Systemd, Off };
 /// [dds]
 struct DdsConfig {
   std::uint32_t domain = 0;
-  double snapshot_hz = 50.0;
-  double compensation_hz = 100.0;
+  double snapshot_hz = 50.0;       ///< at most; 0: whenever something new came
+  double compensation_hz = 100.0;  ///< at most; 0: whenever something new came
   std::chrono::nanoseconds model_repeat{std::chrono::seconds{10}};
   std::chrono::nanoseconds validity{
       std::chrono::milliseconds{500}};  ///< a subscriber must not apply older vectors

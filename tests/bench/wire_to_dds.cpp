@@ -1,0 +1,380 @@
+// From the wire to DDS: how long after the last TPDO of a cycle, or the last byte of a burst, left the
+// simulated device a subscriber in another process has the sample, through abbed and abbe-dds as they are
+// installed, against a bare Fast DDS hop in the same rhythm, before and after in the same run (the better one
+// counts). The hub looks every P, so a sample waits P/2 in the mean and P at most before anything can happen
+// to it.
+//   bench_wire_to_dds [--short]
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <signal.h>
+#include <spawn.h>
+#include <stdlib.h>
+#include <sys/prctl.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <array>
+#include <chrono>
+#include <filesystem>
+#include <fstream>
+#include <functional>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "dds_hop.hpp"
+#include "forked_task.hpp"
+#include "snapshot_log.hpp"
+#include "stamped_stage.hpp"
+
+extern char** environ;
+
+namespace {
+
+using namespace abbe::bench;  // NOLINT(google-build-using-namespace): a program, not a header
+using namespace std::chrono_literals;
+namespace fs = std::filesystem;
+
+constexpr auto kHubPeriod = 250us;
+constexpr auto kSyncPeriod = 10ms;  // 100 Hz: the processors stay idle between two cycles
+constexpr double kHops = 3.0;       // the limits: P/2 + 3 hops in the middle, P + 3 hops in 99 of 100
+constexpr std::int64_t kLongest_ns = 200'000'000;
+
+struct Plan {
+  std::size_t cycles = 2500;
+  std::size_t bursts = 75;
+  std::size_t hops = 700;  ///< before, and as many after
+};
+
+double us(std::int64_t ns) {
+  return 1e-3 * static_cast<double>(ns);
+}
+
+struct Quantiles {
+  std::size_t n = 0;
+  double p50 = 0.0, p99 = 0.0;
+};
+
+Quantiles quantiles(std::vector<double> values) {
+  if (values.empty()) return {};
+  std::ranges::sort(values);
+  const std::size_t n = values.size();
+  return {n, values[n / 2], values[std::min(n - 1, n * 99 / 100)]};
+}
+
+/// What befell the samples of one device, us.
+struct Path {
+  std::vector<double> sending, to_hub, hub_to_subscriber, whole;
+  std::size_t lost = 0;  ///< departures without an arrival
+};
+
+// ----------------------------------------------------------------------------------------------------
+// matching departures and arrivals
+
+/// The publishing turn of the hub that an arrival belongs to: the last one before it.
+const HubTurn* turn_of(const SnapshotLog& log, std::int64_t arrived_ns, std::int64_t left_ns) {
+  const HubTurn* found = nullptr;
+  for (std::size_t i = 0; i < log.turns.size(); ++i) {
+    const HubTurn& turn = log.turns[i];
+    if (turn.hub_ns <= arrived_ns && turn.hub_ns >= left_ns &&
+        (found == nullptr || turn.hub_ns > found->hub_ns))
+      found = &turn;
+  }
+  return found;
+}
+
+void note(Path& path, const SnapshotLog& log, const Departure& departure, std::int64_t arrived_ns) {
+  path.sending.push_back(us(departure.after_ns - departure.before_ns));
+  path.whole.push_back(us(arrived_ns - departure.before_ns));
+  if (const HubTurn* turn = turn_of(log, arrived_ns, departure.before_ns)) {
+    path.to_hub.push_back(us(turn->hub_ns - departure.before_ns));
+    path.hub_to_subscriber.push_back(us(arrived_ns - turn->hub_ns));
+  }
+}
+
+/// A cycle's sample carries the time of the SYNC that asked for it, just before its TPDOs left.
+Path encoder_path(const SnapshotLog& log, const std::vector<Departure>& cycles) {
+  Path path;
+  constexpr std::int64_t kHalfPeriod_ns = std::chrono::nanoseconds{kSyncPeriod}.count() / 2;
+  std::size_t i = 0;
+  for (const Departure& cycle : cycles) {
+    while (i < log.arrivals.size() && log.arrivals[i].host_time_ns < cycle.before_ns - kHalfPeriod_ns) ++i;
+    if (i == log.arrivals.size() || log.arrivals[i].host_time_ns > cycle.after_ns) {
+      ++path.lost;
+    } else {
+      note(path, log, cycle, log.arrivals[i].arrived_ns);
+    }
+  }
+  return path;
+}
+
+/// A burst has arrived with the first snapshot that shows its last point: the newest seen before the next
+/// burst left.
+Path tracker_path(const SnapshotLog& log, const std::vector<Departure>& bursts) {
+  Path path;
+  std::size_t i = 0;
+  for (const Departure& burst : bursts) {
+    const Arrival* last = nullptr;
+    std::int64_t before = 0;
+    for (; i < log.arrivals.size() && log.arrivals[i].arrived_ns < burst.before_ns; ++i)
+      before = log.arrivals[i].tracker_device_time_ns;
+    for (std::size_t k = i;
+         k < log.arrivals.size() && log.arrivals[k].arrived_ns < burst.before_ns + kLongest_ns; ++k) {
+      const Arrival& arrival = log.arrivals[k];
+      if (arrival.tracker_device_time_ns > (last != nullptr ? last->tracker_device_time_ns : before))
+        last = &arrival;
+    }
+    if (last == nullptr) {
+      ++path.lost;
+    } else {
+      note(path, log, burst, last->arrived_ns);
+    }
+  }
+  return path;
+}
+
+// ----------------------------------------------------------------------------------------------------
+// abbed, as it is installed
+
+/// The folder of one run, removed at the end unless something failed.
+class RunFolder {
+ public:
+  RunFolder() {
+    std::string name = (fs::temp_directory_path() / "abbe-bench.XXXXXX").string();
+    if (::mkdtemp(name.data()) == nullptr) std::abort();
+    path_ = name;
+  }
+  ~RunFolder() {
+    std::error_code ignored;
+    if (!keep_) fs::remove_all(path_, ignored);
+  }
+  RunFolder(const RunFolder&) = delete;
+  RunFolder& operator=(const RunFolder&) = delete;
+  void keep() { keep_ = true; }
+  [[nodiscard]] const fs::path& path() const { return path_; }
+
+ private:
+  fs::path path_;
+  bool keep_ = false;
+};
+
+std::string configuration(const StampedStage& stage, std::uint32_t domain) {
+  return fmt::format(R"([machine]
+name = "bench"
+chain = "[w X' b Y Z (C1) t]"
+[axes.X]
+min_mm = -300
+max_mm = 300
+[axes.Y]
+min_mm = -250
+max_mm = 250
+[axes.Z]
+min_mm = -400
+max_mm = 0
+[target]
+offset_mm = [20, -15, -120]
+[model]
+node_spacing_mm = 50
+[tracker]
+host = "127.0.0.1"
+port = {}
+point_rate_hz = 500
+[encoder]
+transport = "udp"
+peer_host = "127.0.0.1"
+peer_port = {}
+sync_period_us = {}
+nodes = [{{ axis = "X", node = 1, step_nm = 10 }}, {{ axis = "Y", node = 2, step_nm = 10 }}, {{ axis = "Z", node = 3, step_nm = 10 }}]
+[daemon]
+data_dir = "data"
+runtime_dir = "run"
+hub_period_us = {}
+simulated = true
+[recording]
+min_free_MB = 16
+[dds]
+domain = {}
+profile = "{}"
+snapshot_hz = 0
+compensation_hz = 0
+)",
+                     stage.tracker_port(), stage.can_port(), std::chrono::microseconds{kSyncPeriod}.count(),
+                     std::chrono::microseconds{kHubPeriod}.count(), domain, ABBE_LOOPBACK_PROFILE);
+}
+
+/// Stopped with SIGTERM, as systemd would.
+class Daemon {
+ public:
+  explicit Daemon(const fs::path& folder) {
+    std::string program = ABBE_ABBED, flag = "--config", config = (folder / "abbed.toml").string();
+    std::array<char*, 4> argv{program.data(), flag.data(), config.data(), nullptr};
+    posix_spawn_file_actions_t actions;
+    ::posix_spawn_file_actions_init(&actions);
+    ::posix_spawn_file_actions_addopen(&actions, STDERR_FILENO, (folder / "abbed.log").c_str(),
+                                       O_WRONLY | O_CREAT, 0600);
+    if (::posix_spawn(&pid_, program.c_str(), &actions, nullptr, argv.data(), environ) != 0) pid_ = 0;
+    ::posix_spawn_file_actions_destroy(&actions);
+  }
+  ~Daemon() { stop(); }
+  Daemon(const Daemon&) = delete;
+  Daemon& operator=(const Daemon&) = delete;
+  void stop() {
+    if (pid_ <= 0) return;
+    ::kill(pid_, SIGTERM);
+    ::waitpid(pid_, nullptr, 0);
+    pid_ = 0;
+  }
+
+ private:
+  pid_t pid_ = 0;
+};
+
+// ----------------------------------------------------------------------------------------------------
+// the run
+
+bool turn_until(StampedStage& stage, std::chrono::seconds patience, const std::function<bool()>& done) {
+  const auto deadline = std::chrono::steady_clock::now() + patience;
+  while (!done()) {
+    if (std::chrono::steady_clock::now() > deadline) return false;
+    stage.turn();
+  }
+  return true;
+}
+
+bool both_flow(const SnapshotLog& log) {
+  const std::size_t n = log.arrivals.size();
+  return n > 0 && log.turns.size() > 0 && log.arrivals[n - 1].tracker_device_time_ns != 0;
+}
+
+/// The whole chain, from the first SYNC to the last arrival. False: said on stderr.
+bool run_chain(StampedStage& stage, SnapshotLog& log, ForkedTask& subscriber, std::uint32_t domain,
+               const Plan& plan) {
+  RunFolder folder;
+  std::ofstream(folder.path() / "abbed.toml") << configuration(stage, domain);
+  subscriber.begin();
+  Daemon daemon(folder.path());
+  if (!turn_until(stage, 60s, [&] { return log.failed || both_flow(log); }) || log.failed) {
+    fmt::print(stderr, "bench_wire_to_dds: no samples from both devices; see {}\n", folder.path().string());
+    folder.keep();
+    return false;
+  }
+  const auto settled = std::chrono::steady_clock::now() + 3s;  // the clock model, caches, discovery
+  turn_until(stage, 10s, [&] { return std::chrono::steady_clock::now() > settled; });
+  stage.forget();
+  const auto enough = [&] {
+    return stage.cycles().size() >= plan.cycles && stage.bursts().size() >= plan.bursts;
+  };
+  const bool complete = turn_until(stage, 120s, enough);
+  const Departure last = stage.cycles().empty() ? Departure{} : stage.cycles().back();
+  const auto cycles = stage.cycles().size(), bursts = stage.bursts().size();
+  turn_until(stage, 2s, [&] { return monotonic_ns() > last.after_ns + kLongest_ns; });
+  if (!complete) fmt::print(stderr, "bench_wire_to_dds: only {} cycles and {} bursts\n", cycles, bursts);
+  daemon.stop();
+  log.stop = true;
+  subscriber.wait();
+  return complete;
+}
+
+std::string load_average() {
+  std::array<double, 1> load{};
+  return ::getloadavg(load.data(), 1) == 1 ? fmt::format("{:.2f}", load[0]) : "unknown";
+}
+
+/// The better of the two in each figure: a disturbed hop must not excuse abbe.
+HopResult better(const HopResult& a, const HopResult& b) {
+  return {a.received + b.received, std::min(a.p50_us, b.p50_us), std::min(a.p99_us, b.p99_us)};
+}
+
+void print_verdict(std::string_view what, const Path& path, const HopResult& hop) {
+  const double P = us(std::chrono::nanoseconds{kHubPeriod}.count());
+  const Quantiles q = quantiles(path.whole);
+  const double asked50 = P / 2 + kHops * hop.p50_us;
+  const double asked99 = P + kHops * hop.p99_us;
+  const double strict99 = P + kHops * hop.p50_us;
+  const auto row = [&](std::string_view name, double asked, double measured) {
+    fmt::print("  {:<8} {:<30} {:>8.1f} {:>9.1f}   {:>5.2f}  {}\n", what, name, asked, measured,
+               measured / asked, measured <= asked ? "held" : "MISSED");
+  };
+  row("p50 <= P/2 + 3 hop p50", asked50, q.p50);
+  row("p99 <= P + 3 hop p99", asked99, q.p99);
+  row("p99 <= P + 3 hop p50 (stricter)", strict99, q.p99);
+  if (path.lost > 0) fmt::print("  {:<8} {} of {} without an arrival\n", what, path.lost, path.lost + q.n);
+}
+
+void print_shares(std::string_view what, const Path& path, const DeviceLatency& device,
+                  const HopResult& hop) {
+  const double P = us(std::chrono::nanoseconds{kHubPeriod}.count());
+  const Quantiles sending = quantiles(path.sending), to_hub = quantiles(path.to_hub),
+                  out = quantiles(path.hub_to_subscriber);
+  const auto row = [&](std::string_view share, std::string p50, std::string p99, std::string_view how) {
+    fmt::print("  {:<8} {:<36} {:>7} {:>8}   {}\n", what, share, p50, p99, how);
+  };
+  const auto number = [](double v) { return fmt::format("{:.1f}", v); };
+  row("leaving the simulator to the hub", number(to_hub.p50), number(to_hub.p99), "measured");
+  row("  the simulator's sending", number(sending.p50), number(sending.p99), "measured");
+  row("  bytes to ring, real-time part", number(1e6 * device.p50_s), number(1e6 * device.p99_s),
+      "the daemon's own");
+  row("  ring: waiting for the hub", number(P / 2), number(P * 0.99), "uniform over P, assumed");
+  row("  wire and waking the device thread", number(to_hub.p50 - P / 2 - sending.p50 - 1e6 * device.p50_s),
+      "-", "the difference");
+  row("hub to subscriber", number(out.p50), number(out.p99), "measured");
+  row("  DDS: the bare hop", number(hop.p50_us), number(hop.p99_us), "measured beside");
+  row("  hub's encoding, socket, abbe-dds", number(out.p50 - hop.p50_us), "-", "the difference");
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  Plan plan;
+  if (argc > 1 && std::string_view(argv[1]) == "--short") plan = {300, 8, 200};
+  const auto domain = static_cast<std::uint32_t>(::getpid() % 200 + 1);
+  HopOptions hop_options{.samples = plan.hops, .warm_up = 100, .period = kSyncPeriod, .domain = domain + 1};
+  hop_options.profile = ABBE_LOOPBACK_PROFILE;
+
+  // Every process is forked here, before anything starts a thread.
+  auto& before = shared_memory<HopResult>();
+  auto& after = shared_memory<HopResult>();
+  auto& log = shared_memory<SnapshotLog>();
+  ForkedTask hop_before([&] { before = measure_dds_hop(hop_options); });
+  ForkedTask hop_after([&] { after = measure_dds_hop(hop_options); });
+  ForkedTask subscriber([&] { subscribe(log, {domain, ABBE_LOOPBACK_PROFILE}); });
+
+  ::prctl(PR_SET_TIMERSLACK, 1UL);
+  const std::string load_before = load_average();
+  hop_before.begin();
+  hop_before.wait();
+  auto stage = StampedStage::open();
+  if (!stage) {
+    fmt::print(stderr, "bench_wire_to_dds: {}\n", stage.error().text);
+    return 1;
+  }
+  if (!run_chain(**stage, log, subscriber, domain, plan)) return 1;
+  hop_after.begin();
+  hop_after.wait();
+  if (before.received == 0 || after.received == 0) {
+    fmt::print(stderr, "bench_wire_to_dds: the bare hop found no subscriber\n");
+    return 1;
+  }
+
+  const HopResult hop = better(before, after);
+  const Path encoder = encoder_path(log, (*stage)->cycles());
+  const Path tracker = tracker_path(log, (*stage)->bursts());
+  fmt::print(
+      "wire to DDS: hub period P {} us, SYNC every {} us, {} cycles, {} bursts of 166 points; load {} "
+      "before, {} after\n",
+      kHubPeriod.count(), std::chrono::microseconds{kSyncPeriod}.count(), encoder.whole.size(),
+      tracker.whole.size(), load_before, load_average());
+  fmt::print(
+      "bare Fast DDS hop, {} B every {} us, us: p50 {:.1f} p99 {:.1f} before, p50 {:.1f} p99 {:.1f} "
+      "after\n\n",
+      hop::kMessageBytes, hop_options.period.count(), before.p50_us, before.p99_us, after.p50_us,
+      after.p99_us);
+  fmt::print("  {:<8} {:<30} {:>8} {:>9}   {:>5}\n", "device", "limit, us", "asked", "measured", "ratio");
+  print_verdict("encoder", encoder, hop);
+  print_verdict("tracker", tracker, hop);
+  fmt::print("\n  {:<8} {:<36} {:>7} {:>8}\n", "device", "share, us", "p50", "p99");
+  print_shares("encoder", encoder, log.encoder, hop);
+  print_shares("tracker", tracker, log.tracker, hop);
+}

@@ -65,7 +65,7 @@ class VolumetricModel {
 
   /// About 1 us with covariance. No allocation.
   [[nodiscard]] VolumetricError error_at(const Vector3& axis_position_m, const Vector3& tool_offset_m) const;
-  /// V alone, about ten times faster. NaN for a tool the model does not hold for.
+  /// V alone, about four times faster. NaN for a tool the model does not hold for.
   [[nodiscard]] Vector3 V_at(const Vector3& axis_position_m, const Vector3& tool_offset_m) const;
   /// c = -V(p + c), iterated until it moves by less than 1e-9 m. NotApplicable for another tool; NotConverged
   /// after 50 evaluations (needs |dV/dq| close to 1: nonsense tables).

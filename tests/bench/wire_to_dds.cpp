@@ -299,6 +299,33 @@ std::string load_average() {
   return ::getloadavg(load.data(), 1) == 1 ? fmt::format("{:.2f}", load[0]) : "unknown";
 }
 
+/// How much of the machine nobody uses, from one call to the next. With nothing left, the p99 is the slice
+/// some other program was given by the scheduler (about 3 ms), not abbe's.
+class IdleShare {
+ public:
+  IdleShare() { read(); }
+  double percent() {
+    const double idle = idle_, all = all_;
+    read();
+    return all_ > all ? 100.0 * (idle_ - idle) / (all_ - all) : 0.0;
+  }
+
+ private:
+  void read() {
+    std::ifstream in("/proc/stat");
+    std::string cpu;
+    in >> cpu;
+    all_ = 0.0;
+    double ticks = 0.0;
+    for (int column = 0; column < 8 && in >> ticks;
+         ++column) {  // user nice system idle iowait irq softirq steal
+      all_ += ticks;
+      if (column == 3) idle_ = ticks;
+    }
+  }
+  double idle_ = 0.0, all_ = 0.0;
+};
+
 /// The better of the two in each figure: a disturbed hop must not excuse abbe.
 HopResult better(const HopResult& a, const HopResult& b) {
   return {a.received + b.received, std::min(a.p50_us, b.p50_us), std::min(a.p99_us, b.p99_us)};
@@ -367,7 +394,9 @@ int main(int argc, char** argv) {
     fmt::print(stderr, "bench_wire_to_dds: {}\n", stage.error().text);
     return 1;
   }
+  IdleShare idle;
   if (!run_chain(**stage, log, subscriber, domain, plan)) return 1;
+  const double idle_percent = idle.percent();
   hop_after.begin();
   hop_after.wait();
   if (before.received == 0 || after.received == 0) {
@@ -382,9 +411,9 @@ int main(int argc, char** argv) {
   const Path tracker = tracker_path(log, (*stage)->bursts());
   fmt::print(
       "wire to DDS: hub period P {} us, SYNC every {} us, {} cycles, {} bursts of 166 points; load {} "
-      "before, {} after\n",
+      "before, {} after, processors {:.0f} % idle meanwhile\n",
       kHubPeriod.count(), std::chrono::microseconds{kSyncPeriod}.count(), encoder.whole.size(),
-      tracker.whole.size(), load_before, load_average());
+      tracker.whole.size(), load_before, load_average(), idle_percent);
   fmt::print(
       "bare Fast DDS hop, {} B every {} us, us: p50 {:.1f} p99 {:.1f} before, p50 {:.1f} p99 {:.1f} "
       "after\n\n",

@@ -34,6 +34,7 @@ class Drive {
     }
   }
   void pause(std::chrono::nanoseconds how_long) { now_ += how_long; }
+  void jump(AxisPosition to) { q_ = to; }  ///< without a snapshot on the way
   [[nodiscard]] HostTime now() const { return now_; }
 
  private:
@@ -91,6 +92,40 @@ TEST(CalibrationSession, RefusesWhenAnotherPathIsDriven) {
   drive.move({0, 0.1, 0});
   EXPECT_EQ(session.status().state, SessionState::Refused);
   EXPECT_NE(session.status().reason.find("another path"), std::string::npos) << session.status().reason;
+}
+
+TEST(CalibrationSession, ABeamLostAroundACornerDoesNotLoseThePath) {
+  CalibrationSession session;
+  ASSERT_TRUE(session.start(kPath, HostTime{10s}));
+  Drive drive{session};
+  drive.stand(kPath[0], 1s);
+  drive.move({0.08, 0, 0});
+  drive.pause(3s);
+  drive.jump({0.1, 0.02, 0});
+  drive.move(kPath[2]);
+  drive.move(kPath[3]);
+  drive.stand(kPath.back(), 2s);
+  EXPECT_EQ(session.status().state, SessionState::Identifying) << session.status().reason;
+}
+
+TEST(CalibrationSession, AClockMappingThatJumpsBackDoesNotAddWay) {
+  CalibrationSession session;
+  ASSERT_TRUE(session.start(kPath, HostTime{10s}));
+  Drive drive{session};
+  drive.stand(kPath[0], 1s);
+  for (std::size_t i = 1; i < kPath.size(); ++i) {
+    drive.move(kPath[i]);
+    const AxisPosition corner = kPath[i];
+    const AxisPosition back{corner[0] - 0.1 * (corner[0] - kPath[i - 1][0]),
+                            corner[1] - 0.1 * (corner[1] - kPath[i - 1][1]),
+                            corner[2] - 0.1 * (corner[2] - kPath[i - 1][2])};
+    for (int k = 0; k < 5; ++k) {
+      drive.jump(back);
+      drive.move(corner);
+    }
+  }
+  drive.stand(kPath.back(), 2s);
+  EXPECT_EQ(session.status().state, SessionState::Identifying) << session.status().reason;
 }
 
 TEST(CalibrationSession, RefusesWhenTheBeamStaysAway) {

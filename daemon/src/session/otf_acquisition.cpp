@@ -14,17 +14,20 @@ using protocol::HostTime;
 using protocol::SampleFlag;
 using protocol::Snapshot;
 
-// Moves shorter than this are encoder noise and do not count as driven way: ten 10 nm counts, far below any
-// real step.
-constexpr double kNoiseStep_m = 1e-7;
-// The driven way may miss this share of the path length: rounding of corners between two snapshots.
-constexpr double kMissingShare = 0.02;
+// Off its leg for longer than this, the machine is on a later one: the beam was away while it turned a
+// corner. Shorter than that, only the mapping of the tracker's clock moved.
+constexpr auto kCornerMissed = std::chrono::milliseconds{500};
 
 double distance(const AxisPosition& a, const AxisPosition& b) {
   return std::hypot(a[0] - b[0], a[1] - b[1], a[2] - b[2]);
 }
 
-double distance_to_leg(const AxisPosition& q, const AxisPosition& a, const AxisPosition& b) {
+/// Nearest point of the leg from `a` to `b`.
+struct OnLeg {
+  double off_m = 0.0;
+  double along_m = 0.0;
+};
+OnLeg nearest_on_leg(const AxisPosition& q, const AxisPosition& a, const AxisPosition& b) {
   double along = 0.0;
   double length2 = 0.0;
   for (std::size_t i = 0; i < 3; ++i) {
@@ -32,13 +35,14 @@ double distance_to_leg(const AxisPosition& q, const AxisPosition& a, const AxisP
     length2 += (b[i] - a[i]) * (b[i] - a[i]);
   }
   const double s = length2 > 0.0 ? std::clamp(along / length2, 0.0, 1.0) : 0.0;
-  return distance(q, {a[0] + s * (b[0] - a[0]), a[1] + s * (b[1] - a[1]), a[2] + s * (b[2] - a[2])});
+  const AxisPosition nearest{a[0] + s * (b[0] - a[0]), a[1] + s * (b[1] - a[1]), a[2] + s * (b[2] - a[2])};
+  return {distance(q, nearest), s * std::sqrt(length2)};
 }
 
 double distance_to_path(const AxisPosition& q, const std::vector<AxisPosition>& path) {
   double nearest = std::numeric_limits<double>::infinity();
   for (std::size_t i = 1; i < path.size(); ++i) {
-    nearest = std::min(nearest, distance_to_leg(q, path[i - 1], path[i]));
+    nearest = std::min(nearest, nearest_on_leg(q, path[i - 1], path[i]).off_m);
   }
   return nearest;
 }
@@ -119,8 +123,7 @@ void OtfAcquisition::wait_at_start(const RunPoint& point, const AxisPosition& q)
     before_.clear();
     phase_ = Phase::Running;
     reason_ = "driving the path";
-    last_q_ = q;
-    driven_m_ = distance(path_.front(), q);
+    on_leg_at_ = point.time;
     points_.push_back(point);
     return;
   }
@@ -132,31 +135,38 @@ void OtfAcquisition::wait_at_start(const RunPoint& point, const AxisPosition& q)
 
 void OtfAcquisition::run(const RunPoint& point, const AxisPosition& q) {
   points_.push_back(point);
-  if (const double step_m = distance(q, last_q_); step_m > kNoiseStep_m) {
-    driven_m_ += step_m;
-    last_q_ = q;
-  }
   if (const double off_m = distance_to_path(q, path_); off_m > options_.path_tolerance_m) {
     fail(fmt::format(
         "machine at {} is {:.1f} mm away from every leg of the path: another path is being driven", text(q),
         off_m * 1e3));
     return;
   }
-  if (complete(point.time, q)) {
-    trim_end();
-    phase_ = Phase::Complete;
-    reason_ = fmt::format("path driven, {} tracker points", points_.size());
-    return;
+  follow_path(point, q);
+  if (!complete(point.time, q)) return;
+  trim_end();
+  phase_ = Phase::Complete;
+  reason_ = fmt::format("path driven, {} tracker points", points_.size());
+}
+
+void OtfAcquisition::follow_path(const RunPoint& point, const AxisPosition& q) {
+  const std::size_t last = path_.size() - 2;
+  while (leg_ < last && distance(q, path_[leg_ + 1]) <= options_.vertex_tolerance_m) ++leg_;
+  OnLeg here = nearest_on_leg(q, path_[leg_], path_[leg_ + 1]);
+  for (std::size_t later = leg_ + 1; here.off_m > options_.path_tolerance_m && later <= last; ++later) {
+    if (point.time - on_leg_at_ < kCornerMissed) return;
+    const OnLeg there = nearest_on_leg(q, path_[later], path_[later + 1]);
+    if (there.off_m > options_.path_tolerance_m) continue;
+    leg_ = later;
+    here = there;
   }
-  if (driven_m_ > (1.0 + 2.0 * kMissingShare) * path_length_m_) {
-    fail(fmt::format("driven {:.3f} m of a path of {:.3f} m without standing at its last vertex {}",
-                     driven_m_, path_length_m_, text(path_.back())));
-  }
+  if (here.off_m > options_.path_tolerance_m) return;
+  on_leg_at_ = point.time;
+  const auto behind = static_cast<std::ptrdiff_t>(leg_ + 1);
+  driven_m_ = length({path_.begin(), path_.begin() + behind}) + here.along_m;
 }
 
 bool OtfAcquisition::complete(HostTime now, const AxisPosition& q) const {
-  return driven_m_ >= (1.0 - kMissingShare) * path_length_m_ &&
-         distance(q, path_.back()) <= options_.vertex_tolerance_m &&
+  return leg_ + 2 == path_.size() && distance(q, path_.back()) <= options_.vertex_tolerance_m &&
          now - stand_since_ >= options_.stand_after;
 }
 

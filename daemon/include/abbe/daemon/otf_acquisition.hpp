@@ -62,6 +62,7 @@ class OtfAcquisition {
   void wait_at_start(const RunPoint& point, const AxisPosition& q);
   void run(const RunPoint& point, const AxisPosition& q);
   void track_standstill(const RunPoint& point, const AxisPosition& q);
+  void follow_path(const RunPoint& point, const AxisPosition& q);
   [[nodiscard]] bool complete(protocol::HostTime now, const AxisPosition& q) const;
   void trim_end();
   void fail(std::string reason);
@@ -77,8 +78,9 @@ class OtfAcquisition {
   AxisPosition stand_at_{};  // where the current standstill began
   protocol::HostTime stand_since_{};
   bool stand_known_ = false;
-  AxisPosition last_q_{};
-  double driven_m_ = 0.0;
+  std::size_t leg_ = 0;             // the machine is on, or just before, this leg
+  protocol::HostTime on_leg_at_{};  // when it was last seen there
+  double driven_m_ = 0.0;           // along the path, up to the machine
   protocol::HostTime last_time_{};
 };
 

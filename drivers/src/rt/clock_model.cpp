@@ -118,7 +118,7 @@ void ClockModel::fit_slope() ABBE_RT {
 }
 
 std::size_t ClockModel::find_hull() ABBE_RT {
-  const auto turns_down = [this](const Point& a, const Point& b, const Point& c) {
+  const auto turns_down = [](const Point& a, const Point& b, const Point& c) {
     return (b.device_s - a.device_s) * (c.offset_s - a.offset_s) <=
            (b.offset_s - a.offset_s) * (c.device_s - a.device_s);
   };

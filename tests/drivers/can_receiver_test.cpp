@@ -75,6 +75,15 @@ TEST(EncoderReceiver, ConvertsCountsByTheScaleOfEachAxis) {
   EXPECT_EQ(line.samples.at(0).count[2], 1002);
 }
 
+TEST(EncoderReceiver, AddsTheReadingAtCountZero) {
+  auto options = three_axes();
+  options.axes[0].offset = -0.25;
+  Line line{options};
+  line.cycle(kStart, 1000);
+  EXPECT_DOUBLE_EQ(line.samples.at(0).position[0], -0.25 + 1000 * 1e-8);
+  EXPECT_DOUBLE_EQ(line.samples.at(0).position[1], 1001 * 1e-8);
+}
+
 TEST(EncoderReceiver, GivesTheSampleWithTheLastAnswerAndNotBefore) {
   Line line;
   line.sync(kStart);

@@ -63,7 +63,6 @@ void read_dds(Section& root, const std::filesystem::path& base, Config& out) {
   // then.
   section.get("snapshot_hz", dds.snapshot_hz, kPlain, {0.0, 1000.0});
   section.get("compensation_hz", dds.compensation_hz, kPlain, {0.0, 1000.0});
-  section.get("model_repeat_s", dds.model_repeat, kPlain, {1.0, 3600.0});
   section.get("validity_s", dds.validity, kPlain, {0.01, 3600.0});
   section.get_word<Supervise>(
       "supervise", dds.supervise,

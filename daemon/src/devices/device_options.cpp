@@ -62,6 +62,7 @@ drivers::EncoderDeviceOptions device_options(const EncoderConfig& config, double
     axis.node = node.node;
     axis.kind = node.kind == AxisKind::Rotary ? drivers::AxisKind::Rotary : drivers::AxisKind::Linear;
     axis.scale = node.step;
+    axis.offset = node.offset;
     options.receiver.axes.push_back(axis);
   }
   return options;

@@ -1,5 +1,6 @@
 #include "abbe/daemon/otf_identification.hpp"
 
+#include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <utility>
@@ -43,6 +44,7 @@ Result<OtfCandidate> identify_run(const OtfRun& run, const MachineConfig& machin
   const auto points = otf_observations(run.points);
   calib::otf::Options options;
   options.block_samples = otf_block_samples(points);
+  options.held_out_folds = static_cast<std::size_t>(std::lround(1.0 / gate.holdout_fraction));
   if (progress) {
     options.progress = [&progress](calib::otf::Stage stage, double fraction) {
       progress(overall(stage, fraction));

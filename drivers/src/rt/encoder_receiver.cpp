@@ -55,6 +55,7 @@ EncoderReceiver::EncoderReceiver(const EncoderReceiverOptions& options)
     axis.tpdo_id = can::cob::tpdo(from.tpdo, from.node);
     axis.scale_configured = from.scale.has_value();
     axis.scale = from.scale.value_or(0.0);
+    axis.offset = from.offset;
     axis.wrap_configured = from.wrap_counts != 0;
     axis.modulus = from.wrap_counts;
     if (!axis.wrap_configured && from.position != can::PositionType::Signed64) axis.modulus = kModulus32;
@@ -204,7 +205,7 @@ void EncoderReceiver::take_position(std::size_t i, std::int64_t count) ABBE_RT {
   }
   axis.raw = raw;
   axis.seen = true;
-  if (axis.scale != 0.0) current_.position[i] = static_cast<double>(current_.count[i]) * axis.scale;
+  if (axis.scale != 0.0) current_.position[i] = axis.offset + static_cast<double>(current_.count[i]) * axis.scale;
 }
 
 void EncoderReceiver::on_node_frame(Axis& axis, const can::CanFrame& frame, HostTime time) ABBE_RT {

@@ -136,7 +136,6 @@ struct DdsConfig {
   std::uint32_t domain = 0;
   double snapshot_hz = 50.0;       ///< at most; 0: whenever something new came
   double compensation_hz = 100.0;  ///< at most; 0: whenever something new came
-  std::chrono::nanoseconds model_repeat{std::chrono::seconds{10}};
   std::chrono::nanoseconds validity{
       std::chrono::milliseconds{500}};  ///< a subscriber must not apply older vectors
   Supervise supervise = Supervise::Child;
@@ -148,7 +147,7 @@ struct DdsConfig {
 struct GateConfig {
   double max_error_m = 1e-3;      ///< largest |V| inside the validity volume
   double max_gradient = 5e-3;     ///< largest |dV/dq|, m per m; 250 um between nodes 50 mm apart
-  double holdout_fraction = 0.2;  ///< share of the blocks the fit does not see
+  double holdout_fraction = 0.2;  ///< share of the legs a fit does not see while it is judged by them
   std::vector<std::string>
       accept;  ///< by name: what the data of a method cannot show and the site takes upon itself
 };

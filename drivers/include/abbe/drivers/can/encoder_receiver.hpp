@@ -51,6 +51,7 @@ struct EncoderAxis {
   can::PositionType position = can::PositionType::Signed32;
   std::uint8_t tpdo = 1;          ///< 1 or 2
   std::optional<double> scale{};  ///< m or rad per count, negative reverses; none: ask the encoder
+  double offset = 0.0;            ///< m or rad: the reading at count 0
   std::uint64_t wrap_counts =
       0;  ///< counts after which it begins anew; 0: what the encoder says, else 2^32 (2^64)
   std::optional<std::uint32_t> serial{};  ///< checked when given
@@ -129,6 +130,7 @@ class EncoderReceiver {
     bool scale_configured = false;
     bool wrap_configured = false;
     double scale = 0.0;         ///< 0: unknown
+    double offset = 0.0;        ///< reading at count 0
     std::uint64_t modulus = 0;  ///< 0: 2^64
     bool seen = false;
     std::uint64_t raw = 0;        ///< the latest count as sent, modulo `modulus`

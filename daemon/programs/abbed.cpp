@@ -108,7 +108,7 @@ int main(int argc, char** argv) {
   ::signal(SIGXFSZ, SIG_IGN);
   auto abbed = Abbed::start(
       std::move(*config),
-      {.configuration_text = text_of(file), .configuration_file = file, .dds_program = dds_program()});
+      {.configuration_text = text_of(file), .dds_program = dds_program()});
   if (!abbed) return refuse(abbed.error());
   for (const auto& warning : (*abbed)->warnings()) fmt::print(stderr, "abbed: warning: {}\n", warning);
   fmt::print(stderr, "abbed: running, configuration {}\n", file);

@@ -213,10 +213,7 @@ Result<ReplayReport> replay(const RecordingReader& recording, const Config& conf
   };
 
   const auto hand_on = [&] {
-    for (const auto& s : snapshots) {
-      calibrations.take(s);
-      if (options.on_snapshot) options.on_snapshot(s);
-    }
+    for (const auto& s : snapshots) calibrations.take(s);
     report.snapshots += snapshots.size();
     snapshots.clear();
   };

@@ -15,7 +15,6 @@ namespace abbe::daemon {
 /// How abbed was started.
 struct AbbedOptions {
   std::string configuration_text;   ///< the file as it was read; goes into the recording
-  std::string configuration_file;   ///< its name, for people
   std::string dds_program;          ///< abbe-dds, started as a child if the configuration says so
 };
 

@@ -23,7 +23,6 @@ struct ReplayOptions {
   ReplaySource source = ReplaySource::Samples;
   double speed = 0.0;  ///< recorded seconds per second; 0: as fast as possible
   std::function<void(double share)> progress;
-  std::function<void(const protocol::Snapshot&)> on_snapshot;
 };
 
 /// One calibration of the recording, done again.

@@ -94,6 +94,9 @@ TEST_F(RecorderTest, RawBytesWeatherAndEventsComeBackAsTheyWere) {
   sink.environment = [&](const protocol::EnvironmentSample& sample, std::string_view) {
     EXPECT_EQ(sample.head.time, example_time(4));
     EXPECT_EQ(sample.air_temperature_K, example_environment(4).air_temperature_K);
+    EXPECT_EQ(sample.measured, example_environment(4).measured);
+    EXPECT_EQ(sample.temperature_K[1], example_environment(4).temperature_K[1]);
+    EXPECT_TRUE(std::isnan(sample.temperature_K[0]));
     ++given;
   };
   sink.calibration_event = [&](const v1::CalibrationEvent& event) {

@@ -95,6 +95,8 @@ inline protocol::EnvironmentSample example_environment(std::uint32_t i) {
   sample.air_temperature_K = 293.15 + i;
   sample.air_pressure_Pa = 101325.0;
   sample.relative_humidity = 0.5;
+  sample.measured |= protocol::temperature_bit(1);
+  sample.temperature_K[1] = 294.0;
   return sample;
 }
 

@@ -48,6 +48,8 @@ void fill(v1::EnvironmentSample& message, const protocol::EnvironmentSample& sam
   message.air_temperature_K(sample.air_temperature_K);
   message.air_pressure_Pa(sample.air_pressure_Pa);
   message.relative_humidity(sample.relative_humidity);
+  message.measured(sample.measured);
+  message.temperature_K(sample.temperature_K);
 }
 
 protocol::TrackerPoint sample_of(const v1::TrackerPoint& message) {
@@ -80,6 +82,8 @@ protocol::EnvironmentSample sample_of(const v1::EnvironmentSample& message) {
   sample.air_temperature_K = message.air_temperature_K();
   sample.air_pressure_Pa = message.air_pressure_Pa();
   sample.relative_humidity = message.relative_humidity();
+  sample.measured = message.measured();
+  sample.temperature_K = message.temperature_K();
   return sample;
 }
 

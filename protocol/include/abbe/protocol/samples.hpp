@@ -1,11 +1,12 @@
 #pragma once
-/// The plain vocabulary: what devices say, once decoded. SI (m, rad, s, K, Pa); trivially copyable, fixed size, so
-/// that a sample can live in a ring. `time` is the host time of the instant the sample describes, never of its arrival.
-/// Pure data; safe to copy between threads.
+/// The plain vocabulary: what devices say, once decoded. SI (m, rad, s, K, Pa); trivially copyable, fixed
+/// size, so that a sample can live in a ring. `time` is the host time of the instant the sample describes,
+/// never of its arrival. Pure data; safe to copy between threads.
 
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <limits>
 #include <type_traits>
 
 #include "abbe/protocol/time.hpp"
@@ -13,30 +14,35 @@
 namespace abbe::protocol {
 
 inline constexpr std::size_t kMaxAxes = 8;
+inline constexpr std::size_t kMaxTemperatures = 8;
 
 /// Quality of one sample; a bit set, so that several can be true at once.
 enum class SampleFlag : std::uint32_t {
   None = 0,
-  GapBefore = 1u << 0,        ///< samples were lost before this one: see `lost_before`
-  TimeWidened = 1u << 1,      ///< the kernel stamp was unusable, u_time was widened
-  ClockUnsettled = 1u << 2,   ///< the device clock model has not converged yet
-  AxisMissing = 1u << 3,      ///< at least one axis did not answer in this cycle: see `missing_mask`
-  BusError = 1u << 4,         ///< the bus reported errors since the previous sample
-  BusOff = 1u << 5,           ///< the CAN controller is bus-off: positions are the last known ones
-  DeviceError = 1u << 6,      ///< the device itself reports an error (EMCY, alarm, bad status)
-  SpeedWarning = 1u << 7,     ///< tracker: target nearly too fast
-  SpeedExceeded = 1u << 8,    ///< tracker: target too fast, the point is not to be used
-  PointInvalid = 1u << 9,     ///< tracker: prism error or trigger violation, the point is not to be used
-  BeamReturned = 1u << 10,    ///< first point after the beam was lost
-  Restarted = 1u << 11,       ///< first sample after a reconnection or a restart of the device
+  GapBefore = 1u << 0,       ///< samples were lost before this one: see `lost_before`
+  TimeWidened = 1u << 1,     ///< the kernel stamp was unusable, u_time was widened
+  ClockUnsettled = 1u << 2,  ///< the device clock model has not converged yet
+  AxisMissing = 1u << 3,     ///< at least one axis did not answer in this cycle: see `missing_mask`
+  BusError = 1u << 4,        ///< the bus reported errors since the previous sample
+  BusOff = 1u << 5,          ///< the CAN controller is bus-off: positions are the last known ones
+  DeviceError = 1u << 6,     ///< the device itself reports an error (EMCY, alarm, bad status)
+  SpeedWarning = 1u << 7,    ///< tracker: target nearly too fast
+  SpeedExceeded = 1u << 8,   ///< tracker: target too fast, the point is not to be used
+  PointInvalid = 1u << 9,    ///< tracker: prism error or trigger violation, the point is not to be used
+  BeamReturned = 1u << 10,   ///< first point after the beam was lost
+  Restarted = 1u << 11,      ///< first sample after a reconnection or a restart of the device
 };
 using SampleFlags = std::uint32_t;
 
 constexpr SampleFlags operator|(SampleFlag a, SampleFlag b) noexcept {
   return static_cast<SampleFlags>(a) | static_cast<SampleFlags>(b);
 }
-constexpr SampleFlags operator|(SampleFlags a, SampleFlag b) noexcept { return a | static_cast<SampleFlags>(b); }
-constexpr SampleFlags& operator|=(SampleFlags& a, SampleFlag b) noexcept { return a = a | b; }
+constexpr SampleFlags operator|(SampleFlags a, SampleFlag b) noexcept {
+  return a | static_cast<SampleFlags>(b);
+}
+constexpr SampleFlags& operator|=(SampleFlags& a, SampleFlag b) noexcept {
+  return a = a | b;
+}
 [[nodiscard]] constexpr bool has(SampleFlags flags, SampleFlag f) noexcept {
   return (flags & static_cast<SampleFlags>(f)) != 0;
 }
@@ -60,11 +66,11 @@ struct TrackerPoint {
 /// All axes of one encoder bus at one SYNC (or one scan).
 struct AxisSample {
   SampleHead head;
-  std::uint32_t cycle = 0;         ///< SYNC or scan number since start, wraps
+  std::uint32_t cycle = 0;  ///< SYNC or scan number since start, wraps
   std::uint8_t axis_count = 0;
-  std::uint8_t missing_mask = 0;   ///< bit i: axis i did not answer, its values are the previous ones
-  std::array<std::int64_t, kMaxAxes> count{};    ///< raw device counts
-  std::array<double, kMaxAxes> position{};       ///< scale reading, m (linear) or rad (rotary)
+  std::uint8_t missing_mask = 0;  ///< bit i: axis i did not answer, its values are the previous ones
+  std::array<std::int64_t, kMaxAxes> count{};  ///< raw device counts
+  std::array<double, kMaxAxes> position{};     ///< scale reading, m (linear) or rad (rotary)
 };
 
 /// One confirmed edge of a touch probe.
@@ -73,12 +79,32 @@ struct ProbeTrigger {
   std::uint32_t touch = 0;  ///< number of the touch since start
 };
 
-/// What the air is like where the measurement happens. NaN where the device does not measure a quantity.
+/// What an EnvironmentSample speaks of: a bit set. A NaN whose bit is set is measured here but not available
+/// now.
+using EnvironmentMask = std::uint16_t;
+inline constexpr EnvironmentMask kAirTemperature = 1u << 0;
+inline constexpr EnvironmentMask kAirPressure = 1u << 1;
+inline constexpr EnvironmentMask kRelativeHumidity = 1u << 2;
+inline constexpr EnvironmentMask kAllOfTheAir = kAirTemperature | kAirPressure | kRelativeHumidity;
+[[nodiscard]] constexpr EnvironmentMask temperature_bit(std::size_t channel) noexcept {
+  return static_cast<EnvironmentMask>(1u << (8 + channel));
+}
+
+inline constexpr auto kNoTemperatures = [] {
+  std::array<double, kMaxTemperatures> none{};
+  none.fill(std::numeric_limits<double>::quiet_NaN());
+  return none;
+}();
+
+/// What it is like where the measurement happens: the air, and named temperatures (scales, parts) by channel;
+/// the configuration says which channel is what. NaN where the device does not measure a quantity.
 struct EnvironmentSample {
   SampleHead head;
   double air_temperature_K = 0.0;
   double air_pressure_Pa = 0.0;
   double relative_humidity = 0.0;  ///< 0 to 1
+  EnvironmentMask measured = kAllOfTheAir;
+  std::array<double, kMaxTemperatures> temperature_K = kNoTemperatures;
 };
 
 /// The machine at one instant: axes interpolated to `head.time`, and what was measured there.
@@ -90,24 +116,25 @@ struct Snapshot {
   bool has_tracker_point = false;
   bool has_trigger = false;
   bool has_environment = false;
-  std::array<double, kMaxAxes> position{};      ///< m or rad
-  std::array<double, kMaxAxes> velocity{};      ///< m/s or rad/s
-  std::array<double, kMaxAxes> u_position{};    ///< standard uncertainty of the interpolation to head.time, m or rad
+  std::array<double, kMaxAxes> position{};  ///< m or rad
+  std::array<double, kMaxAxes> velocity{};  ///< m/s or rad/s
+  std::array<double, kMaxAxes>
+      u_position{};  ///< standard uncertainty of the interpolation to head.time, m or rad
   TrackerPoint tracker_point;
   ProbeTrigger trigger;
   EnvironmentSample environment;
 };
 
-/// Bytes exactly as they crossed the boundary of a device, cut into blocks of fixed size. A message longer than one
-/// block goes on in the next ones, each but the last with `continued` set.
+/// Bytes exactly as they crossed the boundary of a device, cut into blocks of fixed size. A message longer
+/// than one block goes on in the next ones, each but the last with `continued` set.
 struct RawBlock {
   static constexpr std::size_t kCapacity = 2048;
   enum class Direction : std::uint8_t { FromDevice = 0, ToDevice = 1 };
 
-  HostTime time{};                 ///< arrival (FromDevice) or departure (ToDevice)
-  std::uint32_t lost_before = 0;   ///< blocks dropped between the previous one in the ring and this one
+  HostTime time{};                ///< arrival (FromDevice) or departure (ToDevice)
+  std::uint32_t lost_before = 0;  ///< blocks dropped between the previous one in the ring and this one
   std::uint16_t length = 0;
-  bool continued = false;          ///< the next block belongs to the same read
+  bool continued = false;  ///< the next block belongs to the same read
   Direction direction = Direction::FromDevice;
   std::array<std::byte, kCapacity> bytes;  // NOLINT: left uninitialised on purpose, `length` says what counts
 };

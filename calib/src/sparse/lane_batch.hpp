@@ -1,0 +1,13 @@
+#pragma once
+/// Many paths of one Gram problem, eight at a time: a lane that has finished takes the next path.
+
+#include <span>
+#include <vector>
+
+#include "sparse/path_lane.hpp"
+
+namespace abbe::calib::sparse {
+
+[[nodiscard]] std::vector<SolvedPath> solve_paths(const GramProblem&, std::span<const PathTask>);
+
+}  // namespace abbe::calib::sparse

@@ -1,0 +1,66 @@
+#pragma once
+/// One path on its way: everything but the sweeps. Tells which columns the next sweeps move, at which lambda,
+/// and takes over when they have converged or the budget is used up.
+
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "sparse/gram.hpp"
+#include "sparse/shrinkage.hpp"
+
+namespace abbe::calib::sparse {
+
+struct PathTask {
+  Penalty penalty;
+  std::span<const double> lambda;
+  bool first_is_empty = false;  ///< lambda[0] is lambda_max: its solution is known
+  double tolerance = 0.0;       ///< of a coefficient, absolute
+  long max_sweeps = 0;
+  Eigen::Index max_nonzero = 0;
+};
+
+/// In standardised units, columns of the Gram problem.
+struct SolvedPath {
+  std::vector<long> sweeps;  ///< of each lambda reached
+  Eigen::MatrixXd b;         ///< columns x reached
+  bool budget_exhausted = false;
+};
+
+class PathLane {
+ public:
+  PathLane(const GramProblem& problem, const PathTask& task);
+
+  [[nodiscard]] bool finished() const { return finished_; }
+  [[nodiscard]] long sweeps_left() const { return task_.max_sweeps - total_; }
+  [[nodiscard]] double tolerance() const { return task_.tolerance; }
+  [[nodiscard]] const Shrinkage& shrinkage_now() const { return shrink_; }
+  [[nodiscard]] const std::vector<Eigen::Index>& active() const { return active_; }  ///< in order of entry
+  [[nodiscard]] double& coefficient(Eigen::Index j) { return b_(j); }
+
+  /// After `count` sweeps over active(), the last of which moved less than the tolerance if `converged`, with
+  /// coefficient() brought up to date if it did or if the budget is used up.
+  void swept(long count, bool converged);
+  [[nodiscard]] SolvedPath take() &&;
+
+ private:
+  [[nodiscard]] bool admit(bool strong);
+  void finish_lambda();
+  void begin_lambda();
+  [[nodiscard]] double cutoff() const;
+  [[nodiscard]] double correlation(Eigen::Index j) const;
+
+  const GramProblem* problem_;
+  PathTask task_;
+  std::size_t at_ = 0;  ///< index of lambda
+  long total_ = 0;
+  bool finished_ = false;
+  Shrinkage shrink_;
+  Eigen::VectorXd b_;
+  Eigen::VectorXd z_;  ///< as last computed: of columns left out, not of the active ones
+  std::vector<char> is_active_, is_strong_;
+  std::vector<Eigen::Index> active_;
+  SolvedPath solved_;
+};
+
+}  // namespace abbe::calib::sparse

@@ -1,0 +1,25 @@
+#pragma once
+/// From what the caller asks to tasks of the solver, and from its solutions to paths in the caller's units.
+
+#include <vector>
+
+#include "abbe/calib/sparse/path.hpp"
+#include "sparse/path_lane.hpp"
+
+namespace abbe::calib::sparse {
+
+[[nodiscard]] Result<void> check(const PathOptions&);
+
+struct LambdaList {
+  std::vector<double> values;
+  bool first_is_empty = false;
+};
+[[nodiscard]] LambdaList lambda_list(const GramProblem&, const PathOptions&);
+[[nodiscard]] std::vector<double> default_lambda(const GramProblem&, int count, double ratio);
+
+/// `lambda` is viewed, not copied.
+[[nodiscard]] PathTask path_task(const GramProblem&, const Penalty&, const LambdaList& lambda,
+                                 const PathOptions&);
+[[nodiscard]] Path to_path(const GramProblem&, const PathTask&, SolvedPath);
+
+}  // namespace abbe::calib::sparse

@@ -1,0 +1,55 @@
+#pragma once
+/// The inner loop: sweeps of coordinate descent over the active columns of one Gram matrix for eight paths at
+/// once, one path in each lane of the vector registers. The paths differ in penalty, lambda and active
+/// columns; a lane does the same arithmetic in the same order whatever the other lanes hold and however wide
+/// the registers are, so its result is the same bits alone or in company, on a processor with AVX-512, AVX2
+/// or neither (multiply and add are never fused).
+
+#include <cstddef>
+#include <cstdint>
+
+namespace abbe::calib::sparse {
+
+inline constexpr std::size_t kLanes = 8;
+/// Columns are swept in blocks of this many; unused ones at the end have a zero Gram row and a zero mask.
+inline constexpr std::size_t kBlock = 4;
+
+struct alignas(64) Lanes {
+  double of[kLanes]{};
+};
+struct alignas(64) LaneMask {
+  std::int64_t of[kLanes]{};  ///< all bits set: the column is active in this lane; else 0
+};
+
+/// Shrinkage (see shrinkage.hpp) of every lane, and when the lane is done.
+struct LaneParameters {
+  Lanes lambda, inner_end, outer_end, offset, factor;
+  Lanes tolerance;  ///< a sweep whose largest change is smaller ends the lane; -1: an idle lane never ends
+};
+
+struct SweepProblem {
+  std::size_t columns = 0;       ///< multiple of kBlock
+  const double* gram = nullptr;  ///< columns x columns; row j holds all that z_j needs
+  const double* xty = nullptr;
+  const LaneMask* mask = nullptr;
+  Lanes* b = nullptr;
+};
+
+struct SweepOutcome {
+  long sweeps = 0;         ///< done
+  unsigned converged = 0;  ///< bit of every lane whose last sweep was within its tolerance
+};
+
+/// Sweeps until some lane has converged, at most `max_sweeps` (>= 1) times.
+using SweepFunction = SweepOutcome (*)(const SweepProblem&, const LaneParameters&, long max_sweeps);
+
+SweepOutcome sweep_baseline(const SweepProblem&, const LaneParameters&, long max_sweeps);
+#if defined(__x86_64__)
+SweepOutcome sweep_avx2(const SweepProblem&, const LaneParameters&, long max_sweeps);
+SweepOutcome sweep_avx512(const SweepProblem&, const LaneParameters&, long max_sweeps);
+#endif
+
+/// For the processor at hand.
+[[nodiscard]] SweepFunction fastest_sweep();
+
+}  // namespace abbe::calib::sparse

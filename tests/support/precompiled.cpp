@@ -1,0 +1,1 @@
+// Nothing of its own: the target that carries the precompiled headers of all test programs needs one source.

@@ -28,13 +28,32 @@ constexpr std::array kEncoderFaults{
     Name{"restart", FaultKind::Restart},    Name{"emergency", FaultKind::Emergency},
     Name{"garbage", FaultKind::BusGarbage}, Name{"bus_off", FaultKind::BusOff},
 };
+constexpr std::array kEnvironmentFaults{
+    Name{"mute", FaultKind::Mute},
+    Name{"late", FaultKind::Late},
+    Name{"disconnect", FaultKind::Disconnect},
+    Name{"exception", FaultKind::ModbusException},
+    Name{"garbage", FaultKind::ModbusGarbage},
+    Name{"wrong_map", FaultKind::WrongMap},
+    Name{"sensors_gone", FaultKind::SensorsGone},
+};
+
+std::span<const Name> names_for(FaultTarget target) {
+  switch (target) {
+    case FaultTarget::Tracker:
+      return kTrackerFaults;
+    case FaultTarget::Encoder:
+      return kEncoderFaults;
+    case FaultTarget::Environment:
+      return kEnvironmentFaults;
+  }
+  return {};
+}
 
 }  // namespace
 
 std::optional<FaultKind> fault_kind(FaultTarget target, std::string_view name) {
-  const std::span<const Name> names = target == FaultTarget::Tracker ? std::span<const Name>(kTrackerFaults)
-                                                                     : std::span<const Name>(kEncoderFaults);
-  for (const Name& candidate : names) {
+  for (const Name& candidate : names_for(target)) {
     if (candidate.name == name) return candidate.kind;
   }
   return std::nullopt;

@@ -26,6 +26,11 @@ enum class FaultKind {
   Emergency,   ///< EMCY with code `value`; after `duration_s` the all-clear
   BusGarbage,  ///< datagrams that are no CAN frames
   BusOff,      ///< error frame bus-off, silence, then the error frame restarted
+  // environment (and Mute, Late, Disconnect: port or terminal gone for `duration_s`)
+  ModbusException,  ///< every request is answered with exception `value` (0: 6, busy)
+  ModbusGarbage,    ///< bytes instead of answers
+  WrongMap,         ///< every register lies one address higher
+  SensorsGone,      ///< the probe is unplugged, the wires are broken
 };
 
 struct Fault {
@@ -33,10 +38,10 @@ struct Fault {
   double at_s = 0.0;
   double duration_s = 1.0;
   double value = 0.0;
-  std::uint8_t node = 0;  ///< encoder faults: CANopen node, 0 = all
+  std::uint8_t node = 0;  ///< encoder faults: CANopen node; environment faults: number of the device; 0 = all
 };
 
-enum class FaultTarget { Tracker, Encoder };
+enum class FaultTarget { Tracker, Encoder, Environment };
 
 struct ScheduledFault {
   FaultTarget target = FaultTarget::Tracker;

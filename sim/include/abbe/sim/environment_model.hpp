@@ -1,0 +1,31 @@
+#pragma once
+/// How warm, heavy and damp a shop floor is, and how warm its scales and parts are: each quantity a mean, a
+/// drift and a swing. Pure; values are looked up by time, nothing is stepped.
+
+#include <array>
+#include <cstddef>
+
+#include "abbe/sim/sim_clock.hpp"
+
+namespace abbe::sim {
+
+inline constexpr std::size_t kSimulatedInputs = 8;
+
+/// mean + drift * t + swing * sin(2 pi t / period), in the unit of the quantity.
+struct Course {
+  double mean = 0.0;
+  double drift_per_hour = 0.0;
+  double swing = 0.0;
+  double swing_period_s = 600.0;
+  [[nodiscard]] double at(std::chrono::nanoseconds since_start) const;
+};
+
+struct EnvironmentModel {
+  Course air_temperature_C{20.0};
+  Course air_pressure_hPa{1013.25};
+  Course relative_humidity_percent{45.0};
+  std::array<Course, kSimulatedInputs> temperature_C{Course{20.0}, Course{20.0}, Course{20.0}, Course{20.0},
+                                                     Course{20.0}, Course{20.0}, Course{20.0}, Course{20.0}};
+};
+
+}  // namespace abbe::sim

@@ -1,0 +1,43 @@
+#pragma once
+/// What the registers of the simulated Modbus devices hold. Written from the manufacturers' descriptions and
+/// not from the driver's maps, so that a wrong map is found. Pure.
+
+#include <cstdint>
+#include <optional>
+#include <string_view>
+#include <vector>
+
+#include "abbe/sim/environment_model.hpp"
+
+namespace abbe::sim {
+
+enum class ModbusModel {
+  Indigo520Hmp,  ///< units 240 (transmitter with barometer) and 241 (HMP probe)
+  CometT7510,    ///< any unit; read-only
+  Zt2005C8,      ///< eight inputs, engineering units
+};
+/// "indigo520_hmp", "comet_t7510", "zt2005_c8".
+[[nodiscard]] std::optional<ModbusModel> modbus_model(std::string_view name);
+
+enum class RegisterSpace { Holding, Input };
+
+struct SimulatedRegister {
+  std::uint8_t unit = 1;  ///< 0: every unit
+  RegisterSpace space = RegisterSpace::Holding;
+  std::uint16_t address = 0;  ///< on the wire
+  std::uint16_t value = 0;
+};
+
+struct ModbusIdentity {
+  ModbusModel model = ModbusModel::CometT7510;
+  std::uint32_t serial_number = 20969999;
+  std::uint8_t unit = 1;  ///< of CometT7510 and Zt2005C8 on a serial line
+};
+
+/// `sensors_gone`: the probe is unplugged, the wires are broken.
+[[nodiscard]] std::vector<SimulatedRegister> registers_of(const ModbusIdentity& identity,
+                                                          const EnvironmentModel& environment,
+                                                          std::chrono::nanoseconds since_start,
+                                                          bool sensors_gone);
+
+}  // namespace abbe::sim

@@ -1,0 +1,60 @@
+#pragma once
+/// A simulated Modbus device behind a TCP port or a pseudo terminal, on libmodbus' server functions; up to
+/// two TCP clients, as the Comet has it. Steppable: poll(now) does what is due and blocks for a torn request
+/// only (20 ms at most). Not thread-safe.
+
+#include <poll.h>
+
+#include <memory>
+#include <optional>
+#include <string>
+#include <variant>
+#include <vector>
+
+#include "abbe/sim/error.hpp"
+#include "abbe/sim/fault.hpp"
+#include "abbe/sim/modbus_registers.hpp"
+
+namespace abbe::sim {
+
+struct ModbusTcpEndpoint {
+  std::uint16_t port = 0;  ///< on 127.0.0.1; 0: the kernel chooses
+};
+/// The client's end of a pseudo terminal appears under this path, a symbolic link that is replaced if it is
+/// there already.
+struct ModbusPtyEndpoint {
+  std::string link;
+};
+
+struct ModbusServerOptions {
+  std::string name = "environment";
+  ModbusIdentity identity;
+  EnvironmentModel environment;
+  std::variant<ModbusTcpEndpoint, ModbusPtyEndpoint> endpoint;
+};
+
+class ModbusServer {
+ public:
+  /// Io: port taken, no pseudo terminal, link not to be made.
+  [[nodiscard]] static Result<ModbusServer> open(const ModbusServerOptions& options, HostTime now);
+  ModbusServer(ModbusServer&&) noexcept;
+  ModbusServer& operator=(ModbusServer&&) noexcept;
+  ~ModbusServer();  ///< removes the link
+
+  void poll(HostTime now);
+  [[nodiscard]] HostTime next_due() const;
+  void add_poll_fds(std::vector<pollfd>& fds) const;
+  void inject(const Fault& fault, HostTime now);
+
+  [[nodiscard]] const std::string& name() const;
+  [[nodiscard]] std::uint16_t port() const;  ///< 0 on a pseudo terminal
+  /// "Modbus TCP on 127.0.0.1:40001", "Modbus RTU on /tmp/rtd"
+  [[nodiscard]] std::string where() const;
+
+ private:
+  struct State;
+  explicit ModbusServer(std::unique_ptr<State> state);
+  std::unique_ptr<State> state_;
+};
+
+}  // namespace abbe::sim

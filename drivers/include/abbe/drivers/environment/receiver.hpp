@@ -1,0 +1,121 @@
+#pragma once
+/// What is to be asked of a Modbus device and what its answers mean. Sans-I/O and deterministic: the same
+/// bytes with the same times give the same samples, live or replayed. A connection begins with the proving
+/// registers; then round after round of reads, each of which makes one sample. Real time: allocation-free, no
+/// system call. One thread.
+///
+/// A sample describes the middle between the first question of its round and the last answer, rectangular in
+/// between ([GUM] 4.3.7); how old a value is inside the device is not known.
+///
+/// Raw blocks: ToDevice, one whole request; FromDevice, bytes as read; an empty one is a new connection.
+
+#include <array>
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "abbe/drivers/environment/register_map.hpp"
+#include "abbe/protocol/rt.hpp"
+#include "abbe/protocol/samples.hpp"
+
+namespace abbe::drivers {
+
+/// Why the device is not believed; text_of() says it with the names of the map.
+struct EnvironmentFailure {
+  enum class Kind : std::uint8_t {
+    None,
+    Unasked,      ///< bytes although nothing was asked
+    Malformed,    ///< no answer to what was asked: `error`
+    Exception,    ///< the device declined: `exception`
+    Unproven,     ///< proving register `index` holds `value`: wrong device or wrong map
+    Implausible,  ///< measured register `index` reads `value` on the first round: wrong map
+  };
+  Kind kind = Kind::None;
+  modbus::DecodeError error{};
+  std::uint8_t exception = 0;
+  std::size_t index = 0;
+  double value = 0.0;  ///< Unproven: the register; Implausible: SI
+  modbus::ReadRequest request{};
+};
+/// True if asking again cannot help: the device or the map must be changed.
+[[nodiscard]] bool is_refusal(const EnvironmentFailure& failure) noexcept;
+[[nodiscard]] std::string text_of(const EnvironmentFailure& failure, const RegisterMap& map);
+
+struct EnvironmentCounters {
+  std::uint64_t samples = 0;
+  std::uint64_t unavailable = 0;  ///< values that the device did not have
+  std::uint64_t implausible = 0;  ///< values beyond plausible_range(), given as not available
+};
+
+class EnvironmentReceiver {
+ public:
+  enum class Progress : std::uint8_t {
+    Waiting,   ///< for more bytes, or for nothing
+    Answered,  ///< the next request may go out
+    Sample,    ///< sample() is new; the next round may begin when it is due
+    Failed,    ///< failure(); nothing more until begin()
+  };
+
+  /// The map must satisfy check(). Allocates.
+  EnvironmentReceiver(RegisterMap map, modbus::Transport transport);
+
+  /// A new connection (or a line on which everything is to begin anew).
+  void begin() ABBE_RT;
+  /// What to ask now; nothing while an answer is under way or after a failure.
+  [[nodiscard]] std::optional<modbus::ReadRequest> next_request() const ABBE_RT;
+  /// The next request begins a new round of measuring.
+  [[nodiscard]] bool between_rounds() const ABBE_RT { return proven_ && read_ == 0 && !pending_; }
+  [[nodiscard]] bool proven() const ABBE_RT { return proven_; }
+  [[nodiscard]] bool awaiting() const ABBE_RT { return pending_.has_value(); }
+  void sent(const modbus::ReadRequest& request, protocol::HostTime at) ABBE_RT;
+  Progress push(std::span<const std::byte> bytes, protocol::HostTime at) ABBE_RT;
+
+  [[nodiscard]] const protocol::EnvironmentSample& sample() const ABBE_RT { return sample_; }
+  [[nodiscard]] const EnvironmentFailure& failure() const ABBE_RT { return failure_; }
+  [[nodiscard]] const EnvironmentCounters& counters() const ABBE_RT { return counters_; }
+  [[nodiscard]] const RegisterMap& map() const noexcept { return map_; }
+
+  /// Replay: one recorded block. True if sample() is new.
+  bool on_raw(const protocol::RawBlock& block) ABBE_RT;
+
+ private:
+  /// Where a register lies in the answers: which read, which byte of it.
+  struct Spot {
+    std::size_t read = 0;
+    std::size_t byte = 0;
+  };
+  [[nodiscard]] static std::vector<Spot> spots_in(const std::vector<modbus::ReadRequest>& reads,
+                                                  const std::vector<RegisterPlace>& places, int base_offset);
+
+  Progress fail(const EnvironmentFailure& failure) ABBE_RT;
+  Progress accept(std::span<const std::byte> registers) ABBE_RT;
+  Progress prove(std::span<const std::byte> registers) ABBE_RT;
+  Progress measure(std::span<const std::byte> registers) ABBE_RT;
+  [[nodiscard]] bool take_value(std::size_t index, double value) ABBE_RT;
+  void finish_round() ABBE_RT;
+  void join() ABBE_RT;
+
+  RegisterMap map_;
+  modbus::Transport transport_;
+  std::vector<modbus::ReadRequest> proving_reads_;
+  std::vector<modbus::ReadRequest> reads_;
+  std::vector<Spot> spots_;  ///< of map_.measured
+
+  bool begun_ = false;
+  bool proven_ = false;
+  bool first_round_ = true;
+  std::size_t read_ = 0;  ///< the next of proving_reads_ or reads_
+  std::optional<modbus::ReadRequest> pending_;
+  std::array<std::byte, 2 * modbus::kMaxAduSize> bytes_{};
+  std::size_t filled_ = 0;
+  protocol::HostTime asked_{};     ///< the first question of the round
+  protocol::HostTime answered_{};  ///< the latest answer
+  protocol::EnvironmentSample building_;
+  protocol::EnvironmentSample sample_;
+  EnvironmentFailure failure_;
+  EnvironmentCounters counters_;
+};
+
+}  // namespace abbe::drivers

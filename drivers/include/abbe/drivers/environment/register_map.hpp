@@ -1,0 +1,74 @@
+#pragma once
+/// Which registers of a Modbus device hold what: data, not code. A map has registers that are measured, and
+/// registers that prove that the right device answers with the right map (serial number, status word): they
+/// are read first on every connection. Pure data.
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "abbe/drivers/error.hpp"
+#include "abbe/protocol/modbus/read.hpp"
+#include "abbe/protocol/modbus/registers.hpp"
+#include "abbe/protocol/samples.hpp"
+
+namespace abbe::drivers {
+
+namespace modbus = protocol::modbus;
+
+struct RegisterPlace {
+  std::uint8_t unit = 1;
+  modbus::Function function = modbus::Function::ReadHoldingRegisters;
+  std::uint16_t address = 0;  ///< as on the wire, from 0, before `base_offset` of the map
+  modbus::RegisterType type = modbus::RegisterType::Int16;
+  modbus::WordOrder order = modbus::WordOrder::HighFirst;
+};
+
+enum class Quantity : std::uint8_t { AirTemperature, AirPressure, RelativeHumidity, Temperature };
+
+/// What no shop floor has: a value outside is no measurement, and on the first round no right map. SI.
+struct PlausibleRange {
+  double min;
+  double max;
+};
+/// Air -40 to 85 C, 500 to 1200 hPa, 0 to 105 %; scales and parts -50 to 200 C.
+[[nodiscard]] PlausibleRange plausible_range(Quantity quantity) noexcept;
+
+/// value [SI] = register * scale + offset.
+struct MeasuredRegister {
+  std::string name;  ///< "air temperature", "scale X"
+  Quantity quantity = Quantity::Temperature;
+  std::uint8_t channel = 0;  ///< Temperature only: index into EnvironmentSample::temperature_K
+  RegisterPlace place;
+  double scale = 1.0;
+  double offset = 0.0;
+  std::vector<double> unavailable;  ///< register values that mean "not available" (broken sensor, no probe)
+};
+[[nodiscard]] protocol::EnvironmentMask mask_of(const MeasuredRegister& measured) noexcept;
+
+struct ProvingRegister {
+  std::string name;  ///< "serial number"
+  RegisterPlace place;
+  double expected = 0.0;  ///< before any scaling
+};
+
+struct RegisterMap {
+  std::string name;     ///< "comet-t7510"
+  int base_offset = 0;  ///< added to every address: -1 where the documentation counts from 1
+  std::vector<MeasuredRegister> measured;
+  std::vector<ProvingRegister> proving;
+};
+
+/// BadConfiguration: nothing is measured, a quantity twice, a channel beyond kMaxTemperatures, a scale of 0,
+/// an address outside 0 to FFFFh, more reads than kMaxReads.
+[[nodiscard]] Result<void> check(const RegisterMap& map);
+
+/// The fewest reads that cover all of `places`: registers of one unit and function that touch share one.
+[[nodiscard]] std::vector<modbus::ReadRequest> reads_for(const std::vector<RegisterPlace>& places,
+                                                         int base_offset);
+
+inline constexpr std::size_t kMaxReads = 32;
+
+}  // namespace abbe::drivers

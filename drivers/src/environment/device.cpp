@@ -1,0 +1,134 @@
+#include "abbe/drivers/environment/device.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <thread>
+#include <utility>
+
+namespace abbe::drivers {
+
+using protocol::HostTime;
+using protocol::RawBlock;
+using std::chrono::nanoseconds;
+
+namespace {
+
+bool has_address(const ModbusAddress& address) {
+  const auto* tcp = std::get_if<ModbusTcp>(&address);
+  return tcp != nullptr ? !tcp->host.empty() && tcp->port != 0
+                        : !std::get<ModbusSerial>(address).path.empty();
+}
+
+auto in_ms(nanoseconds t) {
+  return std::chrono::duration_cast<std::chrono::milliseconds>(t).count();
+}
+
+}  // namespace
+
+Result<std::unique_ptr<EnvironmentDevice>> EnvironmentDevice::create(const EnvironmentDeviceOptions& options,
+                                                                     const TimeSource& time) {
+  if (const auto fine = check(options.map); !fine) return tl::unexpected(fine.error());
+  if (!has_address(options.address))
+    return tl::unexpected(
+        Error{ErrorCode::BadConfiguration, options.name + ": host, port or path is missing"});
+  if (options.period <= nanoseconds{0})
+    return tl::unexpected(Error{ErrorCode::BadConfiguration, options.name + ": period must be above 0"});
+  return std::unique_ptr<EnvironmentDevice>{new EnvironmentDevice{options, time}};
+}
+
+EnvironmentDevice::EnvironmentDevice(const EnvironmentDeviceOptions& options, const TimeSource& time)
+    : options_(options),
+      time_(time),
+      samples_(options.sample_capacity),
+      raw_(options.raw_capacity_blocks),
+      receiver_(options.map, transport_of(options.address)) {
+  board_.set_state("closed");
+}
+
+DeviceStatus EnvironmentDevice::status() const {
+  return board_.read(options_.name, samples_.dropped(), raw_.dropped());
+}
+
+void EnvironmentDevice::wait(nanoseconds at_most) {
+  heed_progress(time_.now());
+  if (!ensure_open(at_most)) return;
+  ask();
+  if (line_.is_open()) listen(at_most);
+}
+
+void EnvironmentDevice::heed_progress(HostTime now) {
+  const auto progress = std::exchange(progress_, Progress::Waiting);
+  if (progress == Progress::Failed) {
+    const bool refused = is_refusal(receiver_.failure());
+    return fail(text_of(receiver_.failure(), receiver_.map()),
+                refused ? options_.refused_retry : options_.retry, refused ? "refused" : "closed");
+  }
+  if (progress == Progress::Waiting) return;
+  board_.set_connected(true);
+  board_.set_state(receiver_.proven() ? "reading" : "proving");
+  if (progress == Progress::Sample) plan_next_round(now);
+  const auto implausible = receiver_.counters().implausible;
+  if (std::exchange(implausible_seen_, implausible) != implausible)
+    board_.fault(now, fmt::format("{} {}: a value beyond all sense, given as not available", options_.name,
+                                  text_of(options_.address)));
+}
+
+/// On the grid; rounds that were slept through are left out.
+void EnvironmentDevice::plan_next_round(HostTime now) {
+  const auto late = std::max(now - next_round_, nanoseconds{0});
+  next_round_ += options_.period * (late / options_.period + 1);
+}
+
+bool EnvironmentDevice::ensure_open(nanoseconds at_most) {
+  if (line_.is_open()) return true;
+  const auto now = time_.now();
+  if (now < open_at_) {
+    std::this_thread::sleep_for(time_.wall(std::min(at_most, nanoseconds{open_at_ - now})));
+    return false;
+  }
+  if (const auto opened = line_.open(options_.address, options_.connect_timeout); !opened) {
+    fail(opened.error().text, options_.retry);
+    return false;
+  }
+  receiver_.begin();
+  raw_.push_bytes(now, RawBlock::Direction::FromDevice, {});
+  next_round_ = now;
+  board_.set_state("proving");
+  return true;
+}
+
+void EnvironmentDevice::ask() {
+  const auto request = receiver_.next_request();
+  const auto at = time_.now();  // before: no answer can be older than its question
+  if (!request || (receiver_.between_rounds() && at < next_round_)) return;
+  if (const auto sent = line_.send(*request); !sent) return fail(sent.error().text, options_.retry);
+  receiver_.sent(*request, at);
+  answer_due_ = at + options_.answer_timeout;
+  std::array<std::byte, modbus::kMaxAduSize> frame{};
+  const auto length = modbus::encode(*request, transport_of(options_.address), frame);
+  raw_.push_bytes(at, RawBlock::Direction::ToDevice, std::span{frame}.first(length));
+}
+
+void EnvironmentDevice::listen(nanoseconds at_most) {
+  const auto due = receiver_.awaiting() ? answer_due_ : next_round_;
+  const auto budget = std::clamp(nanoseconds{due - time_.now()}, nanoseconds{0}, at_most);
+  const auto read = line_.read(buffer_, time_.wall(budget));
+  arrival_ = time_.now();
+  if (!read) return fail(read.error().text, options_.retry);
+  filled_ = *read;
+  if (filled_ == 0 && receiver_.awaiting() && arrival_ >= answer_due_)
+    fail(fmt::format("no answer in {} ms", in_ms(options_.answer_timeout)), options_.retry);
+}
+
+void EnvironmentDevice::fail(std::string_view what, nanoseconds retry, const char* state) {
+  const auto now = time_.now();
+  board_.fault(now, fmt::format("{} {}: {}", options_.name, text_of(options_.address), what));
+  line_.close();
+  board_.set_connected(false);
+  board_.set_state(state);
+  open_at_ = now + retry;
+  filled_ = 0;
+}
+
+}  // namespace abbe::drivers

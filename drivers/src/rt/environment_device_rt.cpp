@@ -1,0 +1,19 @@
+// The real-time half of the environment device: what wait() read becomes samples.
+#include <utility>
+
+#include "abbe/drivers/environment/device.hpp"
+
+namespace abbe::drivers {
+
+void EnvironmentDevice::receive() ABBE_RT {
+  const auto bytes = std::span<const std::byte>{buffer_}.first(std::exchange(filled_, 0));
+  if (bytes.empty()) return;
+  raw_.push_bytes(arrival_, protocol::RawBlock::Direction::FromDevice, bytes);
+  progress_ = receiver_.push(bytes, arrival_);
+  if (progress_ != Progress::Sample) return;
+  samples_.try_push(receiver_.sample());
+  board_.samples.add();
+  board_.set_last_sample(receiver_.sample().head.time);
+}
+
+}  // namespace abbe::drivers

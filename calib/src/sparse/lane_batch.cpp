@@ -6,7 +6,7 @@
 #include <optional>
 #include <utility>
 
-#include "sparse/sweep.hpp"
+#include "abbe/calib/sparse/sweep.hpp"
 
 namespace abbe::calib::sparse {
 namespace {
@@ -171,7 +171,7 @@ class LaneBatch {
   std::vector<SolvedPath> solved_;
   std::array<Lane, kLanes> lanes_;
   std::size_t next_ = 0;
-  SweepFunction sweep_ = fastest_sweep();
+  SweepFunction sweep_ = sweep_variants().front().sweep;
   LaneParameters parameters_;
   std::vector<char> in_use_;        ///< of the problem's columns
   std::vector<Index> columns_;      ///< problem column at each place; -1: padding

@@ -7,6 +7,8 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <string_view>
+#include <vector>
 
 namespace abbe::calib::sparse {
 
@@ -21,7 +23,9 @@ struct alignas(64) LaneMask {
   std::int64_t of[kLanes]{};  ///< all bits set: the column is active in this lane; else 0
 };
 
-/// Shrinkage (see shrinkage.hpp) of every lane, and when the lane is done.
+/// How every lane shrinks z to b, and when it is done: |z| <= lambda: 0; <= inner_end: |z| - lambda; <=
+/// outer_end:
+/// (|z| - offset) * factor; else |z|; times sgn(z).
 struct LaneParameters {
   Lanes lambda, inner_end, outer_end, offset, factor;
   Lanes tolerance;  ///< a sweep whose largest change is smaller ends the lane; -1: an idle lane never ends
@@ -43,13 +47,11 @@ struct SweepOutcome {
 /// Sweeps until some lane has converged, at most `max_sweeps` (>= 1) times.
 using SweepFunction = SweepOutcome (*)(const SweepProblem&, const LaneParameters&, long max_sweeps);
 
-SweepOutcome sweep_baseline(const SweepProblem&, const LaneParameters&, long max_sweeps);
-#if defined(__x86_64__)
-SweepOutcome sweep_avx2(const SweepProblem&, const LaneParameters&, long max_sweeps);
-SweepOutcome sweep_avx512(const SweepProblem&, const LaneParameters&, long max_sweeps);
-#endif
-
-/// For the processor at hand.
-[[nodiscard]] SweepFunction fastest_sweep();
+struct SweepVariant {
+  std::string_view instructions;  ///< "AVX-512", "AVX2", "baseline"
+  SweepFunction sweep = nullptr;
+};
+/// Those the processor at hand can run, fastest first; the last one runs everywhere.
+[[nodiscard]] std::vector<SweepVariant> sweep_variants();
 
 }  // namespace abbe::calib::sparse

@@ -1,0 +1,13 @@
+#pragma once
+/// One sweep function for each width of the vector registers; which of them may run is for sweep_variants()
+/// to say.
+
+#include "abbe/calib/sparse/sweep.hpp"
+
+namespace abbe::calib::sparse {
+
+SweepOutcome sweep_baseline(const SweepProblem&, const LaneParameters&, long max_sweeps);
+SweepOutcome sweep_avx2(const SweepProblem&, const LaneParameters&, long max_sweeps);
+SweepOutcome sweep_avx512(const SweepProblem&, const LaneParameters&, long max_sweeps);
+
+}  // namespace abbe::calib::sparse

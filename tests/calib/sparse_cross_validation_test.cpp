@@ -1,0 +1,164 @@
+#include "abbe/calib/sparse/cross_validation.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <array>
+#include <cmath>
+#include <limits>
+#include <thread>
+
+#include "sparse_problem.hpp"
+
+namespace {
+using namespace abbe::calib;
+using namespace abbe::calib::sparse;
+using namespace abbe::tests::sparse;
+using testing::HasSubstr;
+
+/// NaN equals NaN.
+bool same_bits(const Eigen::MatrixXd& a, const Eigen::MatrixXd& b) {
+  return a.rows() == b.rows() && a.cols() == b.cols() &&
+         ((a.array() == b.array()) || (a.array().isNaN() && b.array().isNaN())).all();
+}
+
+Folds five_folds(const Problem& problem) {
+  return random_folds(static_cast<std::size_t>(problem.y.size()), 5, 42).value();
+}
+
+/// Mean squared error of rows held out, from fits made one by one.
+double error_by_hand(const Problem& problem, const Folds& folds, const Penalty& penalty,
+                     const PathOptions& options, Eigen::Index k) {
+  double sum = 0.0;
+  for (int fold = 0; fold < folds.count; ++fold) {
+    std::vector<Eigen::Index> in, out;
+    for (std::size_t i = 0; i < folds.of_row.size(); ++i) {
+      (folds.of_row[i] == fold ? out : in).push_back(static_cast<Eigen::Index>(i));
+    }
+    const auto path = fit_path(problem.X(in, Eigen::all), problem.y(in), penalty, options).value();
+    sum += (predict(path, problem.X(out, Eigen::all), k) - problem.y(out)).squaredNorm();
+  }
+  return sum / static_cast<double>(problem.y.size());
+}
+
+TEST(SparseCrossValidation, IsTheErrorOfFitsThatDidNotSeeTheRow) {
+  const Problem problem = random_problem(50, 10, 21);
+  const Penalty penalty{PenaltyKind::Scad, 3.7};
+  const PathOptions options{.lambda = log_spaced(1.0, 0.01, 20)};
+  const auto cv = cross_validate(problem.X, problem.y, penalty, five_folds(problem), options);
+  ASSERT_TRUE(cv) << cv.error().text;
+  for (const Eigen::Index k : {0, 10, 19}) {
+    // standardised twice instead of once: rounding of 1e4-sized columns
+    EXPECT_NEAR(cv->error(k), error_by_hand(problem, five_folds(problem), penalty, options, k), 1e-10) << k;
+  }
+}
+
+TEST(SparseCrossValidation, ChoosesTheSmallestErrorAndBeatsTheEmptyModel) {
+  const Problem problem = random_problem(50, 10, 22);
+  const auto cv = cross_validate(problem.X, problem.y, {}, five_folds(problem));
+  ASSERT_TRUE(cv) << cv.error().text;
+  EXPECT_EQ(cv->error(cv->best), cv->error.minCoeff());
+  EXPECT_LT(cv->error(cv->best), 0.2 * cv->null_error);  // 0.09 of noise in a variance of 1 and more
+  EXPECT_GT(cv->standard_error(cv->best), 0.0);
+}
+
+TEST(SparseCrossValidation, OfAnEmptyModelIsTheSpreadOfTheRows) {
+  const Problem problem = random_problem(50, 10, 23);
+  const auto cv = cross_validate(problem.X, problem.y, {}, five_folds(problem), {.lambda = {1e6}});
+  ASSERT_TRUE(cv) << cv.error().text;
+  double sum = 0.0;
+  for (int fold = 0; fold < 5; ++fold) {
+    std::vector<Eigen::Index> in, out;
+    for (Eigen::Index i = 0; i < 50; ++i) {
+      (five_folds(problem).of_row[static_cast<std::size_t>(i)] == fold ? out : in).push_back(i);
+    }
+    sum += (problem.y(out).array() - problem.y(in).mean()).square().sum();
+  }
+  EXPECT_NEAR(cv->error(0), sum / 50, 1e-12);
+}
+
+TEST(SparseGridSearch, EveryColumnIsItsOwnCrossValidationBitForBit) {
+  const Problem problem = random_problem(60, 20, 24);
+  const auto gamma = equally_spaced(2.001, 30.0, 11);  // more than one register full
+  const auto grid = grid_search(problem.X, problem.y, PenaltyKind::Scad, gamma, five_folds(problem));
+  ASSERT_TRUE(grid) << grid.error().text;
+  for (std::size_t g = 0; g < gamma.size(); ++g) {
+    const auto cv =
+        cross_validate(problem.X, problem.y, {PenaltyKind::Scad, gamma[g]}, five_folds(problem)).value();
+    EXPECT_TRUE(same_bits(grid->error.col(static_cast<Eigen::Index>(g)), cv.error)) << gamma[g];
+    EXPECT_TRUE(same_bits(grid->paths[g].coefficients, cv.path.coefficients)) << gamma[g];
+    EXPECT_EQ(grid->paths[g].sweeps, cv.path.sweeps);
+  }
+}
+
+/// Both halves of the tasks on a thread of their own.
+void on_two_threads(std::size_t count, const std::function<void(std::size_t)>& task) {
+  const auto every_other = [&](std::size_t first) {
+    for (std::size_t i = first; i < count; i += 2) {
+      task(i);
+    }
+  };
+  std::thread other(every_other, 1);
+  every_other(0);
+  other.join();
+}
+
+TEST(SparseGridSearch, GivesTheSameBitsOnTwoThreads) {
+  const Problem problem = random_problem(60, 20, 25);
+  const auto gamma = equally_spaced(1.5, 10.0, 4);
+  const auto one = grid_search(problem.X, problem.y, PenaltyKind::Mcp, gamma, five_folds(problem));
+  const auto two =
+      grid_search(problem.X, problem.y, PenaltyKind::Mcp, gamma, five_folds(problem), {}, on_two_threads);
+  ASSERT_TRUE(one && two);
+  EXPECT_TRUE(same_bits(one->error, two->error));
+  EXPECT_TRUE(same_bits(one->best_coefficients(), two->best_coefficients()));
+}
+
+TEST(SparseGridSearch, CellsBeyondSomeFoldsBudgetAreMissing) {
+  const Problem problem = random_problem(60, 20, 26);
+  const PathOptions options{.lambda = log_spaced(1.0, 1e-6, 40), .max_sweeps = 150};
+  const auto grid =
+      grid_search(problem.X, problem.y, PenaltyKind::Scad, {2.5, 20.0}, five_folds(problem), options);
+  ASSERT_TRUE(grid) << grid.error().text;
+  EXPECT_FALSE(std::isnan(grid->error(0, 0)));
+  EXPECT_TRUE(std::isnan(grid->error(39, 0)));
+  EXPECT_FALSE(std::isnan(grid->error(grid->best.lambda, grid->best.gamma)));
+}
+
+TEST(SparseGridSearch, TakesTheFirstOfEqualCells) {
+  const Problem problem = random_problem(60, 20, 27);
+  const auto grid = grid_search(problem.X, problem.y, PenaltyKind::Lasso, {1.0, 2.0}, five_folds(problem));
+  ASSERT_TRUE(grid);
+  EXPECT_EQ(grid->best.gamma, 0);
+}
+
+TEST(SparseGridSearch, RefusesFoldsThatDoNotFit) {
+  const Problem problem = random_problem(20, 4, 28);
+  const auto with = [&](const Folds& folds) {
+    return cross_validate(problem.X, problem.y, {}, folds).error();
+  };
+  EXPECT_EQ(with(random_folds(19, 5, 1).value()).code, ErrorCode::BadInput);
+  EXPECT_EQ(with({.of_row = std::vector<int>(20, 0), .count = 2}).code, ErrorCode::BadInput);
+  EXPECT_EQ(with({.of_row = std::vector<int>(20, 3), .count = 2}).code, ErrorCode::BadInput);
+}
+
+TEST(SparseGridSearch, NamesTheFoldThatLeavesTooFewRows) {
+  const Problem problem = random_problem(20, 4, 29);
+  Folds folds{.of_row = std::vector<int>(20, 1), .count = 2};
+  folds.of_row[0] = 0;  // without fold 1 a single row is left
+  const auto cv = cross_validate(problem.X, problem.y, {}, folds);
+  ASSERT_FALSE(cv);
+  EXPECT_EQ(cv.error().code, ErrorCode::TooFewObservations);
+  EXPECT_THAT(cv.error().text, HasSubstr("without fold 1"));
+}
+
+TEST(SparseGridSearch, RefusesAnEmptyOrBadListOfGammas) {
+  const Problem problem = random_problem(20, 4, 30);
+  const Folds folds = random_folds(20, 4, 1).value();
+  EXPECT_EQ(grid_search(problem.X, problem.y, PenaltyKind::Scad, {}, folds).error().code,
+            ErrorCode::BadInput);
+  EXPECT_EQ(grid_search(problem.X, problem.y, PenaltyKind::Scad, {3.0, 2.0}, folds).error().code,
+            ErrorCode::BadInput);
+}
+
+}  // namespace

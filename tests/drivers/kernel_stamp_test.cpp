@@ -23,10 +23,10 @@ ClockPair at(nanoseconds monotonic, nanoseconds step = 0ns) {
   return {monotonic, kWall + monotonic + step};
 }
 
-/// A map that has seen one receive at 10 s.
+/// A map of a queue that was empty at 10 s.
 KernelStampMap begun(double speed = 1.0) {
   KernelStampMap map(speed);
-  map.arrival(kWall + 10s, at(10s), HostTime{10s});
+  map.nothing_older_than(at(10s));
   return map;
 }
 
@@ -51,9 +51,25 @@ TEST(KernelStampMap, FallsBackToUserSpaceTimeWithoutAStamp) {
   EXPECT_EQ(a.u_time, 1ms);
 }
 
-TEST(KernelStampMap, BelievesNoStampOfTheFirstReceive) {
+TEST(KernelStampMap, BelievesNoStampBeforeTheQueueWasKnownToBeEmpty) {
   KernelStampMap map;
   EXPECT_TRUE(map.arrival(kWall + 10s, at(10s), HostTime{10s}).widened);
+}
+
+TEST(KernelStampMap, BelievesEveryStampOfABatch) {
+  KernelStampMap map = begun();
+  for (const auto came : {10301ms, 10302ms, 10303ms}) {  // one reading of the clocks for all three
+    const Arrival a = map.arrival(kWall + came, at(10305ms), HostTime{10305ms});
+    EXPECT_FALSE(a.widened);
+    EXPECT_EQ(a.time, HostTime{came});
+  }
+  EXPECT_EQ(map.widened(), 0u);
+}
+
+TEST(KernelStampMap, BelievesWhatWasLeftBehindByAReadThatWasTooSmall) {
+  KernelStampMap map = begun();
+  EXPECT_FALSE(map.arrival(kWall + 10301ms, at(10305ms), HostTime{10305ms}).widened);
+  EXPECT_EQ(map.arrival(kWall + 10302ms, at(10309ms), HostTime{10309ms}).time, HostTime{10302ms});
 }
 
 TEST(KernelStampMap, BelievesNoStampFromTheFuture) {
@@ -63,7 +79,7 @@ TEST(KernelStampMap, BelievesNoStampFromTheFuture) {
   EXPECT_EQ(a.time, HostTime{10300ms});
 }
 
-TEST(KernelStampMap, BelievesNoStampOlderThanTheLastReceive) {
+TEST(KernelStampMap, BelievesNoStampOlderThanTheEmptyQueue) {
   KernelStampMap map = begun();
   EXPECT_TRUE(map.arrival(kWall + 9999ms, at(10300ms), HostTime{10300ms}).widened);
 }
@@ -87,6 +103,7 @@ TEST(KernelStampMap, NoticesAStepTooSmallForTheAgeToShow) {
 TEST(KernelStampMap, BelievesStampsAgainAfterAStep) {
   KernelStampMap map = begun();
   map.arrival(kWall + 10299ms, at(10300ms, 3600s), HostTime{10300ms});
+  map.nothing_older_than(at(10300ms, 3600s));
   const Arrival a = map.arrival(kWall + 3600s + 10599ms, at(10600ms, 3600s), HostTime{10600ms});
   EXPECT_FALSE(a.widened);
   EXPECT_EQ(a.time, HostTime{10599ms});
@@ -104,6 +121,7 @@ HostTime mapped_with_step(nanoseconds step) {
     const nanoseconds wall_step = profile.last_point_s() < 60.0 ? 0ns : step;
     const ClockPair now = at(read_at, wall_step);
     model.observe(p.last_point, map.arrival(now.realtime - 200us, now, HostTime{read_at}).time);
+    map.nothing_older_than(now);
   }
   return model.to_host(profile.device_at(120.0)).time;
 }

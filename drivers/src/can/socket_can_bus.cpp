@@ -55,6 +55,7 @@ void SocketCanBus::close() noexcept {
 
 Result<void> SocketCanBus::open(std::span<const std::uint32_t> ids) {
   close();
+  stamps_.nothing_older_than(read_clock_pair());
   fd_ = socket(PF_CAN, SOCK_RAW | SOCK_NONBLOCK | SOCK_CLOEXEC, CAN_RAW);
   if (fd_ < 0) return socket_error(ErrorCode::SystemRefused, name(), "socket", errno);
   auto ok = configure(ids);
@@ -99,12 +100,14 @@ Result<void> SocketCanBus::bind_to_interface() {
 Result<std::size_t> SocketCanBus::read(std::span<ReceivedFrame> out, std::chrono::nanoseconds wall) {
   wait_readable(fd_, wall);
   batch_->prepare();
+  const auto begun = read_clock_pair();
   const auto slots = static_cast<unsigned>(std::min<std::size_t>(kSlots, out.size()));
   const int got = recvmmsg(fd_, batch_->messages.data(), slots, MSG_DONTWAIT, nullptr);
   if (got < 0) {
-    if (errno == EAGAIN || errno == EWOULDBLOCK || errno == EINTR) return 0;
-    return socket_error(ErrorCode::SystemRefused, name(), "receive",
-                        errno);  // ENETDOWN: the interface went down
+    if (errno != EAGAIN && errno != EWOULDBLOCK && errno != EINTR)
+      return socket_error(ErrorCode::SystemRefused, name(), "receive", errno);  // ENETDOWN: it went down
+    stamps_.nothing_older_than(begun);
+    return 0;
   }
   const auto clocks = read_clock_pair();
   const auto now = time_.now();
@@ -121,6 +124,7 @@ Result<std::size_t> SocketCanBus::read(std::span<ReceivedFrame> out, std::chrono
     }
     if (const auto frame = from_linux(batch_->frames[i], message.msg_len)) out[count++].frame = *frame;
   }
+  if (static_cast<unsigned>(got) < slots) stamps_.nothing_older_than(begun);
   return count;
 }
 

@@ -56,6 +56,7 @@ Result<void> UdpCanBus::open(std::span<const std::uint32_t> ids) {
     return tl::unexpected(Error{ErrorCode::BadConfiguration,
                                 fmt::format("CAN {}: not two IPv4 addresses with a peer port", name())});
   }
+  stamps_.nothing_older_than(read_clock_pair());
   fd_ = socket(AF_INET, SOCK_DGRAM | SOCK_NONBLOCK | SOCK_CLOEXEC, 0);
   if (fd_ < 0) return socket_error(ErrorCode::SystemRefused, name(), "socket", errno);
   enable_stamps(fd_);
@@ -83,10 +84,15 @@ Result<void> UdpCanBus::open(std::span<const std::uint32_t> ids) {
 Result<std::size_t> UdpCanBus::read(std::span<ReceivedFrame> out, std::chrono::nanoseconds wall) {
   auto count = take_frames(out);
   if (count == 0) wait_readable(fd_, wall);
+  const auto begun = read_clock_pair();
   while (count < out.size()) {
     const auto received = receive_datagram();
     if (!received && count == 0) return tl::unexpected(received.error());
-    if (!received || !*received) break;
+    if (!received) break;
+    if (!*received) {
+      stamps_.nothing_older_than(begun);
+      break;
+    }
     count += take_frames(out.subspan(count));
   }
   return count;

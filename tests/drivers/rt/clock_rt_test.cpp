@@ -42,6 +42,7 @@ TEST(KernelStampMapRt, TakesNoMemoryAndMakesNoSystemCall) {
   const auto read = [&](std::size_t i) {
     const auto now = std::chrono::milliseconds(i);
     map.arrival(1000s + now - 5us, {now, 1000s + now}, HostTime{now});
+    map.nothing_older_than({now, 1000s + now});
   };
   expect_no_allocation(10'000, read);
   expect_no_system_call([&] { read(10'001); });

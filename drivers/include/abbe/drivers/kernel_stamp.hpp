@@ -2,9 +2,10 @@
 /// From the kernel's receive stamp to host time. SO_TIMESTAMPING stamps are wall-clock time, which people and
 /// NTP may step, so a stamp serves only as an age, taken against the wall clock of the same moment:
 ///   age = realtime now - stamp,  arrival = host now - age.
-/// Accepted when 0 <= age <= time since the last receive, and when the wall clock went on since the last
-/// receive as the monotonic clock did (else one of them was stepped, and the age may be wrong by that step).
-/// A stamp that is not accepted leaves the user-space time, widened, and is counted. A wall-clock step
+/// Accepted when 0 <= age <= time since the queue was last known to be empty, and when the wall clock went on
+/// since then as the monotonic clock did (else one of them was stepped, and the age may be wrong by that
+/// step). The bound moves only with nothing_older_than(), so every stamp of one batch is held against the
+/// same. A stamp that is not accepted leaves the user-space time, widened, and is counted. A wall-clock step
 /// therefore changes no arrival. Pure: every time is handed in. One thread.
 
 #include <chrono>
@@ -37,8 +38,8 @@ struct KernelStampOptions {
       std::chrono::microseconds{10};  ///< interrupt to stamp on an idle shop-floor PC
   /// Waking up the device thread: what an arrival may be late by when only user space saw it.
   std::chrono::nanoseconds u_user_space = std::chrono::milliseconds{1};
-  /// Two readings of two clocks, with a preemption between them; below it a step is not seen and does no
-  /// harm.
+  /// Two readings of two clocks with a preemption between them, or a stamp on its way into the queue; below
+  /// it a step is not seen and does no harm.
   std::chrono::nanoseconds step = std::chrono::microseconds{200};
 };
 
@@ -53,6 +54,10 @@ class KernelStampMap {
   Arrival arrival(std::optional<std::chrono::nanoseconds> stamp, const ClockPair& now,
                   protocol::HostTime host_now) ABBE_RT;
 
+  /// Both clocks just before a read that left nothing in the queue, or before the socket began to listen:
+  /// what is read from now on has not come earlier. Until the first call no stamp is believed.
+  void nothing_older_than(const ClockPair& begun) ABBE_RT { empty_at_ = begun; }
+
   /// Arrivals whose stamp was missing or not believed; the caller's own thread.
   [[nodiscard]] std::uint64_t widened() const ABBE_RT { return widened_; }
 
@@ -61,7 +66,7 @@ class KernelStampMap {
 
   double speed_;
   KernelStampOptions options_;
-  std::optional<ClockPair> last_;
+  std::optional<ClockPair> empty_at_;
   std::uint64_t widened_ = 0;
 };
 

@@ -114,14 +114,59 @@ TEST(UdpCanBus, CountsGarbageAndLostDatagrams) {
   EXPECT_EQ(line.bus.counters().lost, 3u);
 }
 
-TEST(UdpCanBus, RefusesAddressesThatAreNone) {
+TEST(UdpCanBus, SaysThatANameHasNoAddress) {
   MonotonicTime time;
-  UdpCanBus bad_address{{.peer_address = "machine", .peer_port = 1}, time};
-  const auto refused = bad_address.open(kIds);
+  const std::string no_name(300, 'x');  // longer than any name may be: nobody is asked
+  UdpCanBus bus{{.peer_address = no_name, .peer_port = 1}, time};
+  const auto refused = bus.open(kIds);
   ASSERT_FALSE(refused);
-  EXPECT_EQ(refused.error().code, ErrorCode::BadConfiguration);
-  UdpCanBus no_port{{.peer_port = 0}, time};
-  EXPECT_FALSE(no_port.open(kIds));
+  EXPECT_EQ(refused.error().code, ErrorCode::Unreachable);
+  EXPECT_THAT(refused.error().text, testing::HasSubstr("no address"));
+}
+
+TEST(UdpCanBus, RefusesAPeerWithoutHostOrPort) {
+  MonotonicTime time;
+  for (const UdpCanOptions& options :
+       {UdpCanOptions{.peer_port = 0}, UdpCanOptions{.peer_address = "", .peer_port = 1}}) {
+    const auto refused = UdpCanBus{options, time}.open(kIds);
+    ASSERT_FALSE(refused);
+    EXPECT_EQ(refused.error().code, ErrorCode::BadConfiguration);
+  }
+}
+
+TEST(UdpCanBus, LooksUpTheNameOfItsPeer) {
+  MonotonicTime time;
+  EncoderPeer peer{std::span<const can::EncoderIdentity>{}};
+  UdpCanBus bus{{.peer_address = "localhost", .peer_port = peer.port()}, time};
+  const auto opened = bus.open(kIds);
+  ASSERT_TRUE(opened.has_value()) << opened.error().text;
+  const std::array hello{can::encode_sync()};
+  EXPECT_TRUE(bus.send(hello).has_value());
+  peer.serve({});
+  EXPECT_EQ(peer.syncs(), 1u);
+}
+
+TEST(UdpCanBus, ReachesAPeerOnAnotherComputer) {
+  MonotonicTime time;
+  UdpCanBus bus{{.peer_address = "192.0.2.1", .peer_port = 20000}, time};  // reserved for examples [RFC 5737]
+  const auto opened = bus.open(kIds);
+  if (!opened && opened.error().text.find(std::strerror(ENETUNREACH)) != std::string::npos)
+    GTEST_SKIP() << "no network here";
+  EXPECT_TRUE(opened.has_value()) << opened.error().text;
+}
+
+TEST(UdpCanBus, HearsNobodyButItsPeer) {
+  UdpLine line;
+  const int stranger = ::socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC, 0);
+  sockaddr_in to{};
+  to.sin_family = AF_INET;
+  to.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
+  to.sin_port = htons(line.bus.local_port());
+  EXPECT_GT(::sendto(stranger, "no", 2, 0, reinterpret_cast<const sockaddr*>(&to), sizeof to), 0);
+  ::close(stranger);
+  line.peer.send(std::array{can::standard_frame(0x181, {1})});
+  EXPECT_EQ(line.bus.read(line.frames, 1s).value_or(0), 1u);
+  EXPECT_EQ(line.bus.counters().refused, 0u);
 }
 
 TEST(UdpCanBus, SaysWhichPortIsTaken) {

@@ -1,8 +1,11 @@
 #include "abbe/drivers/can/udp_can_bus.hpp"
 
 #include <arpa/inet.h>
+#include <netdb.h>
 #include <netinet/in.h>
 #include <unistd.h>
+
+#include <memory>
 
 #include "can/socket_io.hpp"
 
@@ -13,11 +16,21 @@ namespace {
 /// Room in an Ethernet frame: a larger datagram would be cut into IP fragments, each of which can be lost.
 constexpr std::size_t kDatagramBytes = 1472;
 
-std::optional<sockaddr_in> address_of(const std::string& text, std::uint16_t port) {
+/// A literal is taken as it is; a name is asked for, which may take its time.
+Result<sockaddr_in> resolve(const std::string& host, std::uint16_t port) {
+  addrinfo hints{};
+  hints.ai_family = AF_INET;
+  hints.ai_socktype = SOCK_DGRAM;
+  addrinfo* found = nullptr;
+  const int error = ::getaddrinfo(host.c_str(), nullptr, &hints, &found);
+  if (error != 0) {
+    return tl::unexpected(Error{ErrorCode::Unreachable,
+                                fmt::format("CAN udp {}: no address: {}", host, ::gai_strerror(error))});
+  }
+  const std::unique_ptr<addrinfo, decltype(&::freeaddrinfo)> owner{found, &::freeaddrinfo};
   sockaddr_in address{};
-  address.sin_family = AF_INET;
+  std::memcpy(&address, found->ai_addr, sizeof address);
   address.sin_port = htons(port);
-  if (inet_pton(AF_INET, text.c_str(), &address.sin_addr) != 1) return std::nullopt;
   return address;
 }
 
@@ -50,12 +63,14 @@ Result<void> UdpCanBus::open(std::span<const std::uint32_t> ids) {
   gaps_.restart();
   wanted_.reset();
   for (const auto id : ids) wanted_.set(id & can::CanFrame::kStandardMask);
-  const auto local = address_of(options_.local_address, options_.local_port);
-  const auto peer = address_of(options_.peer_address, options_.peer_port);
-  if (!local || !peer || options_.peer_port == 0) {
-    return tl::unexpected(Error{ErrorCode::BadConfiguration,
-                                fmt::format("CAN {}: not two IPv4 addresses with a peer port", name())});
+  if (options_.peer_address.empty() || options_.peer_port == 0) {
+    return tl::unexpected(
+        Error{ErrorCode::BadConfiguration, fmt::format("CAN {}: host or port is missing", name())});
   }
+  const auto local = resolve(options_.local_address, options_.local_port);
+  if (!local) return tl::unexpected(local.error());
+  const auto peer = resolve(options_.peer_address, options_.peer_port);
+  if (!peer) return tl::unexpected(peer.error());
   stamps_.nothing_older_than(read_clock_pair());
   fd_ = socket(AF_INET, SOCK_DGRAM | SOCK_NONBLOCK | SOCK_CLOEXEC, 0);
   if (fd_ < 0) return socket_error(ErrorCode::SystemRefused, name(), "socket", errno);

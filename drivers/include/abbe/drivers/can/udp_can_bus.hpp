@@ -17,9 +17,10 @@
 namespace abbe::drivers {
 
 struct UdpCanOptions {
-  std::string local_address = "127.0.0.1";
-  std::uint16_t local_port = 0;  ///< 0: the kernel chooses, see local_port()
-  std::string peer_address = "127.0.0.1";
+  /// The peer may be on any network of this computer; connected, only its datagrams come in.
+  std::string local_address = "0.0.0.0";
+  std::uint16_t local_port = 0;            ///< 0: the kernel chooses, see local_port()
+  std::string peer_address = "127.0.0.1";  ///< IPv4, or a name that open() looks up
   std::uint16_t peer_port = 20000;
   double speed =
       1.0;  ///< host time per monotonic time, as given to the TimeSource; 0: stepped, stamps are not used

@@ -1,10 +1,28 @@
 #include "abbe/daemon/live_view.hpp"
 
+#include <algorithm>
 #include <chrono>
 #include <cmath>
 #include <cstddef>
 
 namespace abbe::daemon {
+
+namespace {
+
+using protocol::SampleFlag;
+
+constexpr std::size_t kLinearAxes = 3;
+constexpr unsigned kXyz = 0b111;
+
+}  // namespace
+
+bool axes_known(const protocol::Snapshot& view) noexcept {
+  const auto flags = view.head.flags;
+  return view.axis_count >= kLinearAxes && (view.missing_mask & kXyz) == 0 &&
+         !has(flags, SampleFlag::BusOff) && !has(flags, SampleFlag::DeviceError) &&
+         std::all_of(view.position.begin(), view.position.begin() + kLinearAxes,
+                     [](double q) { return std::isfinite(q); });
+}
 
 bool LiveView::take(const Batch& batch) {
   for (const auto& sample : batch.axes) take(sample);
@@ -34,8 +52,7 @@ void LiveView::take(const protocol::AxisSample& sample) {
   }
   view_.position = sample.position;
   previous_ = sample;
-  constexpr unsigned kXyz = 0b111;
-  if (sample.axis_count >= 3 && (sample.missing_mask & kXyz) == 0) axes_known_at_ = sample.head.time;
+  if (axes_known(view_)) axes_known_at_ = sample.head.time;
 }
 
 }  // namespace abbe::daemon

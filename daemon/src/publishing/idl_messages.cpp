@@ -4,6 +4,8 @@
 #include <array>
 #include <cstddef>
 
+#include "abbe/daemon/live_view.hpp"
+
 namespace abbe::daemon {
 namespace {
 
@@ -163,16 +165,18 @@ v1::Compensation compensation_message(v1::ModelStatus status, const ModelInForce
   m.sequence_number(stamp.sequence_number);
   m.host_time_ns(ns(s.head.time));
   m.kind(v1::Quantity::QUANTITY_ERROR);
-  m.state(status);
+  const bool known = axes_known(s);
+  m.state(status == v1::ModelStatus::MODEL_ACTIVE && !known ? v1::ModelStatus::MODEL_STALE : status);
   m.position_m({s.position[0], s.position[1], s.position[2]});
   m.tool_offset_m(tool_offset_m);
   // Age of the position the vector belongs to: what a subscriber compares with validity_ns.
   m.age_ns((stamp.now - s.head.time).count());
   m.validity_ns(validity.count());
   if (in_force == nullptr) return m;
+  m.model_id(in_force->id);
+  if (!known) return m;  // a vector of where the machine stood once looks as valid as any
   const auto e = in_force->model.error_at({s.position[0], s.position[1], s.position[2]},
                                           {tool_offset_m[0], tool_offset_m[1], tool_offset_m[2]});
-  m.model_id(in_force->id);
   m.tool_ok(e.tool_ok);
   if (!e.tool_ok) return m;  // never a number that looks valid
   m.inside(e.inside);

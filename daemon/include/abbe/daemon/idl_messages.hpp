@@ -39,7 +39,9 @@ struct Stamp {
 [[nodiscard]] std::vector<v1::ErrorGrid> grid_messages(const ModelInForce&, const Stamp&);
 [[nodiscard]] v1::ModelState state_message(v1::ModelStatus, std::string_view reason, const ModelInForce*,
                                            std::chrono::nanoseconds validity, const Stamp&);
-/// V at the axis position of `snapshot` for the model's own tool; all zero and not inside without a model.
+/// V at the axis position of the live view, for the given tool; all zero and not inside without a model, for
+/// a tool it does not hold for, and where the axes are not known: ACTIVE becomes STALE then, in this very
+/// message.
 [[nodiscard]] v1::Compensation compensation_message(v1::ModelStatus, const ModelInForce*,
                                                     const protocol::Snapshot&,
                                                     const std::array<double, 3>& tool_offset_m,

@@ -10,6 +10,10 @@
 
 namespace abbe::daemon {
 
+/// X, Y and Z stand where a live view says, at its instant: all answered, from a bus and nodes without a
+/// fault. Else the positions are the last known ones, however fresh the instant looks.
+[[nodiscard]] bool axes_known(const protocol::Snapshot& view) noexcept;
+
 class LiveView {
  public:
   explicit LiveView(bool axes_compensated) noexcept { view_.axes_compensated = axes_compensated; }
@@ -17,7 +21,7 @@ class LiveView {
   /// True if anything new came.
   bool take(const Batch& batch);
   [[nodiscard]] const protocol::Snapshot& view() const noexcept { return view_; }
-  /// Instant of the latest axis sample with all of X, Y, Z; none yet: nothing.
+  /// The latest instant at which axes_known() held; none yet: nothing.
   [[nodiscard]] std::optional<protocol::HostTime> axes_known_at() const noexcept { return axes_known_at_; }
 
  private:

@@ -1,0 +1,92 @@
+#include "abbe/daemon/live_view.hpp"
+
+#include <gtest/gtest.h>
+
+#include <limits>
+
+namespace abbe::daemon {
+namespace {
+
+using namespace std::chrono_literals;
+using protocol::AxisSample;
+using protocol::HostTime;
+using protocol::SampleFlag;
+using protocol::Snapshot;
+
+constexpr HostTime kStart{100s};
+
+AxisSample axes_at(HostTime t, double x_m) {
+  AxisSample a;
+  a.head.time = t;
+  a.axis_count = 4;
+  a.position = {x_m, 0.2, -0.3, 1.5};
+  return a;
+}
+
+Batch of(const AxisSample& sample) {
+  Batch b;
+  b.axes.push_back(sample);
+  return b;
+}
+
+Batch of(const protocol::TrackerPoint& point) {
+  Batch b;
+  b.points.push_back(point);
+  return b;
+}
+
+TEST(LiveView, ShowsTheLatestAxesAndHowFastTheyMove) {
+  LiveView live{false};
+  EXPECT_TRUE(live.take(of(axes_at(kStart, 0.1))));
+  EXPECT_TRUE(live.take(of(axes_at(kStart + 1ms, 0.1001))));
+  EXPECT_EQ(live.view().head.time, kStart + 1ms);
+  EXPECT_EQ(live.view().position[0], 0.1001);
+  EXPECT_NEAR(live.view().velocity[0], 0.1, 1e-9);  // 0.1 mm in 1 ms
+  EXPECT_EQ(live.view().velocity[1], 0.0);
+}
+
+TEST(LiveView, SaysThatNothingCame) {
+  LiveView live{false};
+  EXPECT_FALSE(live.take(Batch{}));
+  EXPECT_FALSE(live.axes_known_at());
+}
+
+TEST(LiveView, ATrackerPointDoesNotMakeTheAxesYounger) {
+  LiveView live{false};
+  live.take(of(axes_at(kStart, 0.1)));
+  protocol::TrackerPoint point;
+  point.head.time = kStart + 1s;
+  EXPECT_TRUE(live.take(of(point)));
+  EXPECT_EQ(live.view().head.time, kStart);
+  EXPECT_TRUE(live.view().has_tracker_point);
+}
+
+TEST(LiveView, KnowsTheAxesOnlyWhileEachOfXyzAnswersWithoutAFault) {
+  const auto missing = [](AxisSample& a) { a.missing_mask = 0b100; };
+  const auto bus_off = [](AxisSample& a) { a.head.flags |= SampleFlag::BusOff; };
+  const auto alarm = [](AxisSample& a) { a.head.flags |= SampleFlag::DeviceError; };
+  const auto nonsense = [](AxisSample& a) { a.position[1] = std::numeric_limits<double>::quiet_NaN(); };
+  const auto too_few = [](AxisSample& a) { a.axis_count = 2; };
+  for (void (*break_it)(AxisSample&) : {+missing, +bus_off, +alarm, +nonsense, +too_few}) {
+    LiveView live{false};
+    live.take(of(axes_at(kStart, 0.1)));
+    EXPECT_TRUE(axes_known(live.view()));
+    auto broken = axes_at(kStart + 1ms, 0.1);
+    break_it(broken);
+    live.take(of(broken));
+    EXPECT_FALSE(axes_known(live.view()));
+    EXPECT_EQ(live.axes_known_at(), kStart);
+  }
+}
+
+TEST(LiveView, AMissingRotaryAxisDoesNotHideXyz) {
+  LiveView live{false};
+  auto sample = axes_at(kStart, 0.1);
+  sample.missing_mask = 0b1000;
+  sample.head.flags |= SampleFlag::AxisMissing;
+  live.take(of(sample));
+  EXPECT_EQ(live.axes_known_at(), kStart);
+}
+
+}  // namespace
+}  // namespace abbe::daemon

@@ -34,6 +34,10 @@ offset_mm = [20, -15, -120]
 node_spacing_mm = 50
 )";
 
+const std::string kCanBus = "[encoder]\ntransport = \"socketcan\"\ninterface = \"can0\"\n";
+const std::string kNodes = R"(nodes = [{axis = "X", node = 1}, {axis = "Y", node = 2}, {axis = "Z", node = 3}]
+)";
+
 std::vector<std::string> faults_of(const std::string& text) {
   const auto config = parse_config(text, "abbed.toml");
   return config ? std::vector<std::string>{} : config.error().details;
@@ -76,7 +80,7 @@ transport = "udp"
 peer_host = "10.0.0.8"
 peer_port = 20000
 sync_period_us = 500
-nodes = [{axis = "X", node = 1, step_nm = 10, invert = true}, {axis = "Y", node = 2}]
+nodes = [{axis = "X", node = 1, step_nm = 10, invert = true}, {axis = "Y", node = 2}, {axis = "Z", node = 3}]
 )",
                                    "abbed.toml");
   ASSERT_TRUE(config) << config.error().details.front();
@@ -148,17 +152,39 @@ TEST(Config, RefusesAChainThatIsNotOne) {
   EXPECT_THAT(faults_of(text), ElementsAre(HasSubstr("machine.chain:")));
 }
 
+TEST(Config, PutsTheNodesInTheOrderOfTheMachinesAxes) {
+  const auto config = parse_config(kMachine + kCanBus + R"(nodes = [
+  {axis = "B", node = 9}, {axis = "Z", node = 3}, {axis = "W", node = 4}, {axis = "X", node = 1}, {axis = "Y", node = 2}]
+[axes.B]
+kind = "rotary"
+min_rad = -1
+max_rad = 1
+[axes.W]
+min_mm = 0
+max_mm = 100
+)",
+                                   "abbed.toml");
+  ASSERT_TRUE(config) << config.error().details.front();
+  std::string order;
+  for (const auto& node : config->encoder->nodes) order += node.axis + std::to_string(node.node);
+  EXPECT_EQ(order, "X1Y2Z3W4B9");
+}
+
+TEST(Config, RefusesAnEncoderWithoutXyz) {
+  EXPECT_THAT(faults_of(kMachine + kCanBus + R"(nodes = [{axis = "X", node = 5}, {axis = "Z", node = 6}])"),
+              ElementsAre(HasSubstr("encoder.nodes: axis Y has no node")));
+}
+
 TEST(Config, RefusesTwoNodesOnOneId) {
-  EXPECT_THAT(faults_of(kMachine + "[encoder]\ntransport = \"socketcan\"\ninterface = \"can0\"\n"
-                                   "nodes = [{axis = \"X\", node = 5}, {axis = \"Y\", node = 5}]\n"),
+  EXPECT_THAT(faults_of(kMachine + kCanBus +
+                        R"(nodes = [{axis = "X", node = 5}, {axis = "Y", node = 5}, {axis = "Z", node = 6}]
+)"),
               ElementsAre(HasSubstr("encoder.nodes[1].node: node id 5 is used twice")));
 }
 
 TEST(Config, RefusesKeysOfTheOtherTransport) {
-  EXPECT_THAT(
-      faults_of(kMachine + "[encoder]\ntransport = \"socketcan\"\ninterface = \"can0\"\npeer_port = 9\n"
-                           "nodes = [{axis = \"X\", node = 5}]\n"),
-      ElementsAre(HasSubstr("encoder.peer_port: has no meaning")));
+  EXPECT_THAT(faults_of(kMachine + kCanBus + "peer_port = 9\n" + kNodes),
+              ElementsAre(HasSubstr("encoder.peer_port: has no meaning")));
 }
 
 TEST(Config, RefusesNodesThatDoNotSpanTheTravel) {

@@ -4,6 +4,7 @@
 #include <abbe/calib/kinematic_chain.hpp>
 #include <algorithm>
 #include <cmath>
+#include <tuple>
 
 #include "config/readers.hpp"
 
@@ -36,8 +37,9 @@ void read_axis(Section axis, const std::string& name, std::vector<AxisConfig>& o
 }
 
 void sort_axes(std::vector<AxisConfig>& axes) {
-  std::stable_sort(axes.begin(), axes.end(), [](const AxisConfig& a, const AxisConfig& b) {
-    return std::pair{a.kind, a.name} < std::pair{b.kind, b.name};
+  const auto further = [](const AxisConfig& a) { return a.name != "X" && a.name != "Y" && a.name != "Z"; };
+  std::stable_sort(axes.begin(), axes.end(), [&further](const AxisConfig& a, const AxisConfig& b) {
+    return std::tuple{further(a), a.kind, a.name} < std::tuple{further(b), b.kind, b.name};
   });
 }
 

@@ -39,7 +39,7 @@ enum class BasisConfig { Linear };
 struct MachineConfig {
   std::string name;
   std::string chain;             ///< ISO 10791-6 style, "[w X' b Y Z (C1) t]"
-  std::vector<AxisConfig> axes;  ///< linear axes in the order X, Y, Z, then rotary ones by name
+  std::vector<AxisConfig> axes;  ///< X, Y, Z, then further linear ones, then rotary ones by name
   std::array<double, 3>
       target_offset_m{};  ///< reflector centre relative to the tool reference point, machine axes
   BasisConfig basis = BasisConfig::Linear;
@@ -96,7 +96,7 @@ struct EncoderConfig {
   std::chrono::nanoseconds sampling_delay{};    ///< from SYNC on the wire to the instant the node latches
   std::chrono::nanoseconds u_sampling_delay{};  ///< its standard uncertainty
   bool axes_compensated = false;                ///< true: the control already corrects these readings
-  std::vector<EncoderNodeConfig> nodes;
+  std::vector<EncoderNodeConfig> nodes;         ///< in the order of MachineConfig::axes; X, Y and Z are there
 };
 
 enum class RealTimeMode { Enforce, Ignore };

@@ -15,33 +15,53 @@ std::string provenance(const ModelDocument& document) {
   return document.inputs.empty() ? std::string{} : document.inputs.front().sha256;
 }
 
+/// Why the model may be used: a person who forced it answers for it by name.
+std::string reason_of(const StoreEvent& activation) {
+  const auto said_by = [&activation](std::string_view what) {
+    const auto& [who, why, when] = activation.actor;
+    return fmt::format("{} by {}{}{}", what, who, why.empty() ? "" : ": ", why);
+  };
+  switch (activation.action) {
+    case StoreAction::Forced:
+      return said_by("forced");
+    case StoreAction::RolledBack:
+      return said_by(activation.accepted ? "rolled back" : "rolled back to a model the gate did not accept,");
+    case StoreAction::Added:
+    case StoreAction::Activated:
+      break;
+  }
+  return "accepted by the gate";
+}
+
 }  // namespace
 
 Result<ModelAuthority> ModelAuthority::open(const std::filesystem::path& store_folder,
-                                            const MachineConfig& machine, HostTime now) {
+                                            const MachineConfig& machine, protocol::UtcOffset utc,
+                                            HostTime now) {
   auto store = ModelStore::open(store_folder);
   if (!store) return tl::unexpected(store.error());
-  ModelAuthority authority{std::move(*store), machine_hash(machine)};
+  ModelAuthority authority{std::move(*store), machine_hash(machine), utc};
   if (auto taken = authority.take_up_active(now); !taken) authority.fault_ = taken.error().text;
   return authority;
 }
 
 Result<void> ModelAuthority::take_up_active(HostTime now) {
-  const auto id = store_.active_id();
-  if (!id) return tl::unexpected(id.error());
+  const auto activation = store_.activation();
+  if (!activation) return tl::unexpected(activation.error());
   in_force_.reset();
   fault_.clear();
   ++revision_;
-  if (!*id) return {};
-  auto document = store_.load(**id);
+  activation_ = activation->value_or(StoreEvent{});
+  if (!*activation) return {};
+  auto document = store_.load(activation_.id);
   if (!document) return tl::unexpected(document.error());
   made_for_this_machine_ = document->machine_hash == machine_hash_;
-  in_force_.emplace(ModelInForce{.id = **id,
+  in_force_.emplace(ModelInForce{.id = activation_.id,
                                  .method = document->method,
                                  .estimator = document->estimator,
                                  .recording_sha256 = provenance(*document),
                                  .created = document->created,
-                                 .active_since = now,
+                                 .active_since = std::min(now, utc_.to_host(activation_.actor.when)),
                                  .model = std::move(document->model)});
   return {};
 }
@@ -56,14 +76,13 @@ Result<std::string> ModelAuthority::add(const ModelDocument& document, const cal
 }
 
 bool ModelAuthority::follow_store(HostTime now) {
-  const auto id = store_.active_id();
-  if (!id) return false;  // being replaced, or damaged: what is in force stays
-  const bool same = id->has_value() ? in_force_ && in_force_->id == **id : !in_force_;
-  if (same || (!in_force_ && !fault_.empty() && fault_id_ == *id)) return false;
-  if (auto taken = take_up_active(now); !taken) {
-    fault_ = taken.error().text;
-    fault_id_ = *id;
-  }
+  const auto activation = store_.activation();
+  if (!activation) return false;  // being replaced, or damaged: what is in force stays
+  const bool same = activation->has_value() ? (*activation)->id == activation_.id &&
+                                                  (*activation)->actor.when == activation_.actor.when
+                                            : !in_force_ && fault_.empty();
+  if (same) return false;
+  if (auto taken = take_up_active(now); !taken) fault_ = taken.error().text;
   return true;
 }
 
@@ -84,7 +103,7 @@ ModelStanding ModelAuthority::standing(HostTime now, std::optional<HostTime> axe
     s.reason = "no recent axis positions";
   } else {
     s.status = v1::ModelStatus::MODEL_ACTIVE;
-    s.reason = "accepted by the gate";
+    s.reason = reason_of(activation_);
   }
   return s;
 }

@@ -183,6 +183,12 @@ Result<std::optional<std::string>> ModelStore::active_id() const {
   return state->active();
 }
 
+Result<std::optional<StoreEvent>> ModelStore::activation() const {
+  const auto state = read_state(folder_);
+  if (!state) return tl::make_unexpected(state.error());
+  return state->activation();
+}
+
 Result<ModelDocument> ModelStore::load(const std::string& id) const {
   auto document = read_model(model_path(id));
   if (document && model_id(document->model, document->method) != id)

@@ -64,6 +64,17 @@ std::optional<std::string> StoreState::active() const {
   return stack.empty() ? std::nullopt : std::optional{stack.back()};
 }
 
+std::optional<StoreEvent> StoreState::activation() const {
+  const auto id = active();
+  if (!id) return std::nullopt;
+  const auto last = std::find_if(events.rbegin(), events.rend(),
+                                 [](const StoreEvent& event) { return event.action != StoreAction::Added; });
+  StoreEvent event = *last;
+  const StoreEvent* added = last_added(*id);
+  event.accepted = added != nullptr && added->accepted;
+  return event;
+}
+
 const StoreEvent* StoreState::last_added(std::string_view id) const {
   const auto found = std::find_if(events.rbegin(), events.rend(), [&](const StoreEvent& event) {
     return event.action == StoreAction::Added && event.id == id;

@@ -16,6 +16,8 @@ struct StoreState {
   /// Every activation that a rollback has not taken back, oldest first; the last one is active.
   [[nodiscard]] std::vector<std::string> activations() const;
   [[nodiscard]] std::optional<std::string> active() const;
+  /// The event that made it so, `accepted` as the gate said of the model when it was added.
+  [[nodiscard]] std::optional<StoreEvent> activation() const;
   [[nodiscard]] const StoreEvent* last_added(std::string_view id) const;  ///< null if the gate never saw it
 };
 

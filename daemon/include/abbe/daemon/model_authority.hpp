@@ -1,8 +1,9 @@
 #pragma once
 /// Which model is in force, and what may be said of it. The store is the memory; this is its one writer in a
-/// running daemon. After a restart the active model is STALE until the machine's configuration hash agrees
-/// with the one the model was made for and all axes have been seen; without recent axis positions it is STALE
-/// again. Ordinary world; used by the hub's thread only.
+/// running daemon; when and by whom a model was activated is the store's to say, so that a restart changes
+/// neither its age nor its reason. After a restart the active model is STALE until the machine's
+/// configuration hash agrees with the one the model was made for and all axes have been seen; without recent
+/// axis positions it is STALE again. Ordinary world; used by the hub's thread only.
 
 #include <chrono>
 #include <cstdint>
@@ -22,13 +23,14 @@ class ModelAuthority {
   /// Takes up the active model of the store, if there is one. A damaged one is said in standing() and not
   /// used.
   [[nodiscard]] static Result<ModelAuthority> open(const std::filesystem::path& store_folder,
-                                                   const MachineConfig& machine, protocol::HostTime now);
+                                                   const MachineConfig& machine, protocol::UtcOffset utc,
+                                                   protocol::HostTime now);
 
   /// Keeps a judged model and activates it if the gate accepted it. Returns its id.
   [[nodiscard]] Result<std::string> add(const ModelDocument& document, const calib::Verdict& verdict,
                                         const StoreActor& actor, protocol::HostTime now);
-  /// Takes up another model if somebody has activated or rolled back one in the store (`abbe model ...` does). True if
-  /// it changed.
+  /// Takes up another model if somebody has activated or rolled back one in the store (`abbe model ...`
+  /// does). True if it changed.
   bool follow_store(protocol::HostTime now);
 
   /// `axes_known_at`: the latest instant all axes were known; `patience`: how long that may be ago.
@@ -39,16 +41,17 @@ class ModelAuthority {
   [[nodiscard]] const ModelStore& store() const noexcept { return store_; }
 
  private:
-  ModelAuthority(ModelStore store, std::string machine_hash)
-      : store_(std::move(store)), machine_hash_(std::move(machine_hash)) {}
+  ModelAuthority(ModelStore store, std::string machine_hash, protocol::UtcOffset utc)
+      : store_(std::move(store)), machine_hash_(std::move(machine_hash)), utc_(utc) {}
   [[nodiscard]] Result<void> take_up_active(protocol::HostTime now);
 
   ModelStore store_;
   std::string machine_hash_;
+  protocol::UtcOffset utc_;
+  StoreEvent activation_;  // of the store's active model, in force or not
   std::optional<ModelInForce> in_force_;
   bool made_for_this_machine_ = false;
-  std::string fault_;                    // why the store's active model is not in force
-  std::optional<std::string> fault_id_;  // and which one that is
+  std::string fault_;  // why the store's active model is not in force
   std::uint64_t revision_ = 0;
 };
 

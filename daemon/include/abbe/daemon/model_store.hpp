@@ -65,6 +65,9 @@ class ModelStore {
   [[nodiscard]] Result<std::vector<StoreEvent>> history() const;  ///< oldest first
   [[nodiscard]] Result<std::optional<std::string>> active_id()
       const;  ///< read anew each time: others may change it
+  /// What put the active model in force, read anew each time; `accepted`: what the gate said of the model.
+  /// None: no model is active.
+  [[nodiscard]] Result<std::optional<StoreEvent>> activation() const;
   [[nodiscard]] Result<ModelDocument> load(const std::string& id) const;
 
   /// The id that begins with `prefix` (4 digits at least), or "active". Usage if none or several do.

@@ -1,0 +1,153 @@
+#include "abbe/daemon/model_authority.hpp"
+
+#include <gmock/gmock.h>
+
+#include "synthetic_model.hpp"
+
+namespace abbe::daemon {
+namespace {
+
+namespace fs = std::filesystem;
+using namespace std::chrono_literals;
+using protocol::HostTime;
+using test::synthetic_document;
+using ::testing::HasSubstr;
+using v1::ModelStatus;
+
+constexpr protocol::UtcOffset kUtc{1'700'000'000s};
+constexpr HostTime kNow{1000s};
+constexpr auto kPatience = 500ms;
+
+class ModelAuthorityTest : public ::testing::Test {
+ protected:
+  ModelAuthorityTest() {
+    fs::remove_all(folder_);
+    machine_.name = "mill";
+  }
+  ~ModelAuthorityTest() override { fs::remove_all(folder_); }
+
+  ModelAuthority open() { return ModelAuthority::open(folder_, machine_, kUtc, kNow).value(); }
+  /// Somebody's command, in a process of its own as it were.
+  ModelStore store() { return ModelStore::open(folder_).value(); }
+  [[nodiscard]] ModelDocument document(unsigned seed) const {
+    auto d = synthetic_document(seed);
+    d.machine_hash = machine_hash(machine_);
+    return d;
+  }
+  static StoreActor actor(std::string why, HostTime when = kNow) {
+    return {"anna", std::move(why), kUtc.to_utc(when)};
+  }
+  static ModelStanding fresh_standing(const ModelAuthority& a) { return a.standing(kNow, kNow, kPatience); }
+
+  MachineConfig machine_;
+  fs::path folder_ =
+      fs::path(::testing::TempDir()) /
+      (std::string("authority_") + ::testing::UnitTest::GetInstance()->current_test_info()->name());
+};
+
+TEST_F(ModelAuthorityTest, WithoutAModelTheStateIsNone) {
+  const auto standing = fresh_standing(open());
+  EXPECT_EQ(standing.status, ModelStatus::MODEL_NONE);
+  EXPECT_EQ(standing.model, nullptr);
+}
+
+TEST_F(ModelAuthorityTest, AnAcceptedModelIsActiveAtOnce) {
+  auto authority = open();
+  const auto id = authority.add(document(1), {.accepted = true}, actor("calibrate otf"), kNow);
+  ASSERT_TRUE(id) << id.error().text;
+  const auto standing = fresh_standing(authority);
+  EXPECT_EQ(standing.status, ModelStatus::MODEL_ACTIVE);
+  EXPECT_EQ(standing.reason, "accepted by the gate");
+  EXPECT_EQ(standing.model->id, *id);
+}
+
+TEST_F(ModelAuthorityTest, ARefusedModelIsKeptAndChangesNothing) {
+  auto authority = open();
+  const auto first = authority.add(document(1), {.accepted = true}, actor("calibrate otf"), kNow).value();
+  const auto revision = fresh_standing(authority).revision;
+  const auto second =
+      authority.add(document(2), {.reasons = {"worse"}}, actor("calibrate otf"), kNow).value();
+  EXPECT_TRUE(store().load(second));
+  EXPECT_EQ(fresh_standing(authority).model->id, first);
+  EXPECT_EQ(fresh_standing(authority).revision, revision);
+}
+
+TEST_F(ModelAuthorityTest, WithoutAxesOrWithOldOnesItIsStale) {
+  auto authority = open();
+  ASSERT_TRUE(authority.add(document(1), {.accepted = true}, actor("calibrate otf"), kNow));
+  EXPECT_EQ(authority.standing(kNow, std::nullopt, kPatience).status, ModelStatus::MODEL_STALE);
+  EXPECT_EQ(authority.standing(kNow + 500ms, kNow, kPatience).status, ModelStatus::MODEL_ACTIVE);
+  EXPECT_EQ(authority.standing(kNow + 501ms, kNow, kPatience).status, ModelStatus::MODEL_STALE);
+}
+
+TEST_F(ModelAuthorityTest, OfAnotherMachineConfigurationItIsStale) {
+  auto other = document(1);
+  other.machine_hash = "of another machine";
+  auto authority = open();
+  ASSERT_TRUE(authority.add(other, {.accepted = true}, actor("calibrate otf"), kNow));
+  const auto standing = fresh_standing(authority);
+  EXPECT_EQ(standing.status, ModelStatus::MODEL_STALE);
+  EXPECT_THAT(standing.reason, HasSubstr("another machine configuration"));
+}
+
+TEST_F(ModelAuthorityTest, AForcedModelNamesWhoForcedItAndWhyAlsoAfterARestart) {
+  auto authority = open();
+  const auto id = authority.add(document(1), {.reasons = {"3 mm"}}, actor("calibrate otf"), kNow).value();
+  ASSERT_TRUE(store().activate(id, actor("crane test"), true));
+  ASSERT_TRUE(authority.follow_store(kNow));
+  EXPECT_EQ(fresh_standing(authority).reason, "forced by anna: crane test");
+  EXPECT_EQ(fresh_standing(open()).reason, "forced by anna: crane test");
+}
+
+TEST_F(ModelAuthorityTest, ARollbackIsSaidAndWhetherTheGateEverAcceptedTheModel) {
+  auto authority = open();
+  const auto forced = authority.add(document(1), {.reasons = {"3 mm"}}, actor("calibrate otf"), kNow).value();
+  ASSERT_TRUE(store().activate(forced, actor("crane test"), true));
+  ASSERT_TRUE(authority.add(document(2), {.accepted = true}, actor("calibrate otf"), kNow));
+  ASSERT_TRUE(authority.add(document(3), {.accepted = true}, actor("calibrate otf"), kNow));
+  ASSERT_TRUE(store().rollback(actor("drifts")));
+  ASSERT_TRUE(authority.follow_store(kNow));
+  EXPECT_EQ(fresh_standing(authority).reason, "rolled back by anna: drifts");
+  ASSERT_TRUE(store().rollback(actor("drifts too", kNow + 1s)));
+  ASSERT_TRUE(authority.follow_store(kNow));
+  EXPECT_EQ(fresh_standing(authority).model->id, forced);
+  EXPECT_THAT(fresh_standing(authority).reason,
+              HasSubstr("a model the gate did not accept, by anna: drifts too"));
+}
+
+TEST_F(ModelAuthorityTest, FollowsTheStoreOnceForEachChange) {
+  auto authority = open();
+  const auto a = authority.add(document(1), {.accepted = true}, actor("first"), kNow).value();
+  ASSERT_TRUE(authority.add(document(2), {.accepted = true}, actor("second"), kNow));
+  EXPECT_FALSE(authority.follow_store(kNow));
+  const auto revision = fresh_standing(authority).revision;
+  ASSERT_TRUE(store().activate(a, actor("by hand")));
+  EXPECT_TRUE(authority.follow_store(kNow));
+  EXPECT_EQ(fresh_standing(authority).model->id, a);
+  EXPECT_GT(fresh_standing(authority).revision, revision);
+  EXPECT_FALSE(authority.follow_store(kNow));
+}
+
+TEST_F(ModelAuthorityTest, ADamagedActiveModelIsInvalidAndNotUsed) {
+  const auto id = open().add(document(1), {.accepted = true}, actor("calibrate otf"), kNow).value();
+  fs::resize_file(store().model_path(id), 1000);
+  auto authority = open();
+  const auto standing = fresh_standing(authority);
+  EXPECT_EQ(standing.status, ModelStatus::MODEL_INVALID);
+  EXPECT_THAT(standing.reason, HasSubstr(id));
+  EXPECT_EQ(standing.model, nullptr);
+  EXPECT_FALSE(authority.follow_store(kNow));
+}
+
+TEST_F(ModelAuthorityTest, ARestartDoesNotMakeTheModelYounger) {
+  ASSERT_TRUE(open().add(document(1), {.accepted = true}, actor("calibrate otf", kNow - 24h), kNow));
+  EXPECT_EQ(fresh_standing(open()).model->active_since, kNow - 24h);
+}
+
+TEST_F(ModelAuthorityTest, AWallClockThatWasSetBackDoesNotMakeAnAgeNegative) {
+  ASSERT_TRUE(open().add(document(1), {.accepted = true}, actor("calibrate otf", kNow + 1h), kNow));
+  EXPECT_EQ(fresh_standing(open()).model->active_since, kNow);
+}
+
+}  // namespace
+}  // namespace abbe::daemon

@@ -22,16 +22,16 @@ class ModelAuthorityTest : public ::testing::Test {
  protected:
   ModelAuthorityTest() {
     fs::remove_all(folder_);
-    machine_.name = "mill";
+    config_.machine.name = "mill";
   }
   ~ModelAuthorityTest() override { fs::remove_all(folder_); }
 
-  ModelAuthority open() { return ModelAuthority::open(folder_, machine_, kUtc, kNow).value(); }
+  ModelAuthority open() { return ModelAuthority::open(folder_, config_, kUtc, kNow).value(); }
   /// Somebody's command, in a process of its own as it were.
   ModelStore store() { return ModelStore::open(folder_).value(); }
   [[nodiscard]] ModelDocument document(unsigned seed) const {
     auto d = synthetic_document(seed);
-    d.machine_hash = machine_hash(machine_);
+    d.machine_hash = machine_hash(config_);
     return d;
   }
   static StoreActor actor(std::string why, HostTime when = kNow) {
@@ -39,7 +39,7 @@ class ModelAuthorityTest : public ::testing::Test {
   }
   static ModelStanding fresh_standing(const ModelAuthority& a) { return a.standing(kNow, kNow, kPatience); }
 
-  MachineConfig machine_;
+  Config config_;
   fs::path folder_ =
       fs::path(::testing::TempDir()) /
       (std::string("authority_") + ::testing::UnitTest::GetInstance()->current_test_info()->name());

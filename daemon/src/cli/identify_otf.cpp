@@ -30,8 +30,7 @@ struct Arguments {
 };
 
 struct Inputs {
-  MachineConfig machine;
-  GateConfig gate;
+  Config config;
   PathFile path;
   TrackerFile tracker;
   std::vector<InputFile> sources;
@@ -56,8 +55,7 @@ Result<Inputs> read_inputs(const Arguments& arguments, ProgressBar& bar) {
   if (!tracker) return tl::make_unexpected(tracker.error());
   std::vector<InputFile> sources{
       {std::filesystem::path(arguments.machine).filename().string(), *hash}, path->source, tracker->source};
-  return Inputs{std::move(config->machine), std::move(config->gate), std::move(*path), std::move(*tracker),
-                std::move(sources)};
+  return Inputs{std::move(*config), std::move(*path), std::move(*tracker), std::move(sources)};
 }
 
 std::string_view words(otf::Stage stage) {
@@ -75,21 +73,21 @@ std::string_view words(otf::Stage stage) {
 }
 
 Result<Outcome> identify(const Inputs& inputs, const Arguments& arguments, ProgressBar& bar) {
-  const auto machine = otf_machine(inputs.machine);
+  const auto machine = otf_machine(inputs.config.machine);
   if (!machine) return tl::make_unexpected(machine.error());
   otf::Options options;
   options.block_samples =
       arguments.block_samples > 0 ? arguments.block_samples : otf_block_samples(inputs.tracker.points);
   options.progress = [&](otf::Stage stage, double fraction) { bar.show(words(stage), fraction); };
   const auto found = otf::identify(inputs.tracker.points, *machine, otf_path(inputs.path.vertices_m),
-                                   otf_noise(inputs.machine), options);
+                                   otf_noise(inputs.config.machine), options);
   if (!found) return tl::make_unexpected(error_of(found.error()));
-  const calib::GateLimits limits{.max_error_m = inputs.gate.max_error_m,
-                                 .max_gradient = inputs.gate.max_gradient};
+  const calib::GateLimits limits{.max_error_m = inputs.config.gate.max_error_m,
+                                 .max_gradient = inputs.config.gate.max_gradient};
   auto verdict = otf::judge(found->observations, found->solution, nullptr, limits, options);
   if (!verdict) return tl::make_unexpected(error_of(verdict.error()));
   const auto now = std::chrono::time_point_cast<std::chrono::nanoseconds>(std::chrono::system_clock::now());
-  return Outcome{otf_document(found->solution, inputs.machine, inputs.sources, now), std::move(*verdict),
+  return Outcome{otf_document(found->solution, inputs.config, inputs.sources, now), std::move(*verdict),
                  found->observations.blocks_used, options.block_samples};
 }
 

@@ -26,6 +26,13 @@ Config read_all(Section& root, const std::filesystem::path& base) {
   return config;
 }
 
+std::string reading_text(const EncoderConfig& encoder) {
+  std::string text = encoder.axes_compensated ? "|compensated" : "|raw";
+  for (const auto& node : encoder.nodes)
+    text += fmt::format("|{} {} {:.17g} {:.17g}", node.axis, node.node, node.step, node.offset);
+  return text;
+}
+
 }  // namespace
 
 Result<Config> parse_config(std::string_view text, const std::filesystem::path& file) {
@@ -54,7 +61,8 @@ Result<Config> load_config(const std::filesystem::path& file) {
   return parse_config(text.str(), file);
 }
 
-std::string machine_hash(const MachineConfig& machine) {
+std::string machine_hash(const Config& config) {
+  const MachineConfig& machine = config.machine;
   std::string text = fmt::format("{}|{}|{}", machine.name, machine.chain, static_cast<int>(machine.basis));
   for (const auto& axis : machine.axes)
     text += fmt::format("|{} {} {:.17g} {:.17g} {:.17g}", axis.name, static_cast<int>(axis.kind), axis.min,
@@ -64,6 +72,7 @@ std::string machine_hash(const MachineConfig& machine) {
     text += "|" + axis;
     for (const double node_m : nodes_m) text += fmt::format(" {:.17g}", node_m);
   }
+  if (config.encoder) text += reading_text(*config.encoder);
   return sha256_hex(text);
 }
 

@@ -32,10 +32,10 @@ ModelStatistics model_statistics(const calib::otf::Statistics& s) {
           .stop_reason = std::string{name(s.stop)}};
 }
 
-ModelDocument otf_document(const calib::otf::Solution& solution, const MachineConfig& machine,
+ModelDocument otf_document(const calib::otf::Solution& solution, const Config& config,
                            std::vector<InputFile> inputs, protocol::UtcTime created) {
-  return {solution.model,        "otf",   std::string{name(solution.estimator)}, machine.name,
-          machine_hash(machine), created, model_statistics(solution.statistics), std::move(inputs)};
+  return {solution.model,       "otf",   std::string{name(solution.estimator)}, config.machine.name,
+          machine_hash(config), created, model_statistics(solution.statistics), std::move(inputs)};
 }
 
 }  // namespace abbe::daemon

@@ -94,7 +94,7 @@ void CalibrationService::conclude(Outcome outcome, HostTime now) {
   held_out_ = verdict.held_out;
   const auto created = utc_.to_utc(now);
   const auto document =
-      otf_document(outcome.candidate->solution, config_.machine, std::move(outcome.inputs), created);
+      otf_document(outcome.candidate->solution, config_, std::move(outcome.inputs), created);
   const auto id =
       authority_.add(document, verdict, {.who = who_, .why = "calibrate otf", .when = created}, now);
   if (!id) {

@@ -35,12 +35,11 @@ std::string reason_of(const StoreEvent& activation) {
 
 }  // namespace
 
-Result<ModelAuthority> ModelAuthority::open(const std::filesystem::path& store_folder,
-                                            const MachineConfig& machine, protocol::UtcOffset utc,
-                                            HostTime now) {
+Result<ModelAuthority> ModelAuthority::open(const std::filesystem::path& store_folder, const Config& config,
+                                            protocol::UtcOffset utc, HostTime now) {
   auto store = ModelStore::open(store_folder);
   if (!store) return tl::unexpected(store.error());
-  ModelAuthority authority{std::move(*store), machine_hash(machine), utc};
+  ModelAuthority authority{std::move(*store), machine_hash(config), utc};
   if (auto taken = authority.take_up_active(now); !taken) authority.fault_ = taken.error().text;
   return authority;
 }

@@ -177,8 +177,10 @@ struct Config {
 /// The same for the text of a file; `file` names it in the errors and anchors relative paths.
 [[nodiscard]] Result<Config> parse_config(std::string_view text, const std::filesystem::path& file);
 
-/// SHA-256 in hex over what a model depends on (machine identity, chain, axes, target, basis and nodes): a
-/// stored model is only taken up again after a restart if this agrees. Noise figures do not enter.
-[[nodiscard]] std::string machine_hash(const MachineConfig& machine);
+/// SHA-256 in hex over what a model depends on: the machine (identity, chain, axes, target, basis, nodes) and
+/// what a scale reading is (which node is which axis, its step and offset, whether the control corrects it
+/// already). A stored model is ACTIVE only where this agrees. Noise figures, and how the bytes travel, do not
+/// enter.
+[[nodiscard]] std::string machine_hash(const Config& config);
 
 }  // namespace abbe::daemon

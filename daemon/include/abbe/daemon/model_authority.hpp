@@ -23,7 +23,7 @@ class ModelAuthority {
   /// Takes up the active model of the store, if there is one. A damaged one is said in standing() and not
   /// used.
   [[nodiscard]] static Result<ModelAuthority> open(const std::filesystem::path& store_folder,
-                                                   const MachineConfig& machine, protocol::UtcOffset utc,
+                                                   const Config& config, protocol::UtcOffset utc,
                                                    protocol::HostTime now);
 
   /// Keeps a judged model and activates it if the gate accepted it. Returns its id.

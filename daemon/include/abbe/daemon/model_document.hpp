@@ -50,7 +50,7 @@ struct ModelDocument {
 };
 
 /// The document of an OTF solution.
-[[nodiscard]] ModelDocument otf_document(const calib::otf::Solution& solution, const MachineConfig& machine,
+[[nodiscard]] ModelDocument otf_document(const calib::otf::Solution& solution, const Config& config,
                                          std::vector<InputFile> inputs, protocol::UtcTime created);
 
 /// SHA-256 in hex over what the model *says* (method, chain, basis, nodes, gauge, tools, parameters,

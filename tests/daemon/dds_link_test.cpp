@@ -13,8 +13,12 @@
 #include <optional>
 #include <string>
 
+#include "dds_far_end.hpp"
+
 namespace abbe::daemon {
 namespace {
+
+using test::FarEnd;
 
 using namespace std::chrono_literals;
 
@@ -52,47 +56,6 @@ class DdsLinkTest : public testing::Test {
   std::filesystem::path directory_;
   std::filesystem::path path_;
   std::optional<DdsLink> link_;
-};
-
-/// The far end: what abbe-dds would see, frame by frame.
-struct FarEnd {
-  struct Seen {
-    int kind = -1;
-    int topic = -1;
-    std::vector<std::byte> payload;
-  };
-
-  explicit FarEnd(const std::filesystem::path& path) {
-    sockaddr_un address{};
-    address.sun_family = AF_UNIX;
-    path.string().copy(address.sun_path, sizeof(address.sun_path) - 1);
-    EXPECT_EQ(::connect(fd, reinterpret_cast<const sockaddr*>(&address), sizeof(address)), 0);
-  }
-  ~FarEnd() { ::close(fd); }
-  FarEnd(const FarEnd&) = delete;
-  FarEnd& operator=(const FarEnd&) = delete;
-
-  /// Every whole frame that has arrived by now.
-  std::vector<Seen> take() {
-    std::byte chunk[4096];
-    for (ssize_t n = 0; (n = ::recv(fd, chunk, sizeof(chunk), MSG_DONTWAIT)) > 0;) {
-      bytes.insert(bytes.end(), chunk, chunk + n);
-    }
-    std::vector<Seen> seen;
-    for (;;) {
-      if (bytes.size() < 8) return seen;
-      const std::size_t length = std::to_integer<std::size_t>(bytes[0]) |
-                                 std::to_integer<std::size_t>(bytes[1]) << 8 |
-                                 std::to_integer<std::size_t>(bytes[2]) << 16;
-      if (bytes.size() < 8 + length) return seen;
-      seen.push_back({std::to_integer<int>(bytes[4]), std::to_integer<int>(bytes[5]), {}});
-      seen.back().payload.assign(bytes.begin() + 8, bytes.begin() + 8 + static_cast<std::ptrdiff_t>(length));
-      bytes.erase(bytes.begin(), bytes.begin() + 8 + static_cast<std::ptrdiff_t>(length));
-    }
-  }
-
-  int fd = ::socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0);
-  std::vector<std::byte> bytes;
 };
 
 TEST_F(DdsLinkTest, HandsOverThePayloadUnchanged) {

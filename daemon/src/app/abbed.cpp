@@ -16,6 +16,7 @@
 #include "abbe/daemon/control_api.hpp"
 #include "abbe/daemon/control_protocol.hpp"
 #include "abbe/daemon/dds_supervisor.hpp"
+#include "abbe/daemon/device_set.hpp"
 #include "abbe/daemon/hub.hpp"
 #include "control/unix_socket.hpp"
 

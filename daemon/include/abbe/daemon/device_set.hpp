@@ -7,27 +7,24 @@
 #include <string>
 #include <vector>
 
-#include "abbe/daemon/batch.hpp"
 #include "abbe/daemon/config.hpp"
 #include "abbe/daemon/error.hpp"
-#include "abbe/daemon/publisher.hpp"
+#include "abbe/daemon/sample_source.hpp"
 #include "abbe/drivers/time_source.hpp"
 
 namespace abbe::daemon {
 
-class DeviceSet {
+class DeviceSet final : public SampleSource {
  public:
   /// Creates the devices and starts their threads. Io when the system refuses what real-time mode `enforce`
   /// asks for, BadInput for a device that cannot be opened as configured. `time` must outlive the set.
   [[nodiscard]] static Result<DeviceSet> start(const Config& config, const drivers::TimeSource& time);
-  ~DeviceSet();  ///< stops all threads
+  ~DeviceSet() override;  ///< stops all threads
   DeviceSet(DeviceSet&&) noexcept;
   DeviceSet& operator=(DeviceSet&&) noexcept;
 
-  /// Appends everything the rings hold to `batch`.
-  void drain(Batch& batch);
-  /// Rates are those since the previous call.
-  [[nodiscard]] std::vector<StreamHealth> health(protocol::HostTime now);
+  void drain(Batch& batch) override;
+  [[nodiscard]] std::vector<StreamHealth> health(protocol::HostTime now) override;
   /// What the system refused in real-time mode `ignore`, one sentence each.
   [[nodiscard]] std::vector<std::string> warnings() const;
 

@@ -15,11 +15,12 @@
 
 #include "abbe/daemon/assembler.hpp"
 #include "abbe/daemon/calibration_service.hpp"
-#include "abbe/daemon/device_set.hpp"
 #include "abbe/daemon/live_view.hpp"
 #include "abbe/daemon/model_authority.hpp"
 #include "abbe/daemon/publisher.hpp"
 #include "abbe/daemon/recorder_thread.hpp"
+#include "abbe/daemon/sample_source.hpp"
+#include "abbe/drivers/time_source.hpp"
 
 namespace abbe::daemon {
 
@@ -27,7 +28,7 @@ namespace abbe::daemon {
 struct HubParts {
   const Config& config;
   const drivers::TimeSource& time;
-  DeviceSet& devices;
+  SampleSource& devices;
   ModelAuthority& authority;
   CalibrationService& calibration;
   Publisher* publisher = nullptr;

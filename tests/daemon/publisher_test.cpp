@@ -1,0 +1,163 @@
+#include "abbe/daemon/publisher.hpp"
+
+#include <gmock/gmock.h>
+#include <stdlib.h>
+
+#include <optional>
+
+#include "dds_far_end.hpp"
+#include "synthetic_model.hpp"
+
+namespace abbe::daemon {
+namespace {
+
+using namespace std::chrono_literals;
+using protocol::HostTime;
+using test::FarEnd;
+using test::messages;
+using ::testing::SizeIs;
+using v1::ModelStatus;
+using WallTime = Publisher::WallTime;
+
+constexpr HostTime kNow{100s};
+constexpr WallTime kWall{50s};
+
+const ModelInForce kModel{.id = "m", .method = "otf", .model = test::synthetic_model(1)};
+
+protocol::Snapshot view() {
+  protocol::Snapshot v;
+  v.head.time = kNow;
+  v.axis_count = 3;
+  v.position = {0.01, -0.02, -0.25};
+  return v;
+}
+
+ModelStanding active(std::uint64_t revision = 1) {
+  return {.status = ModelStatus::MODEL_ACTIVE, .reason = "accepted", .model = &kModel, .revision = revision};
+}
+
+class PublisherTest : public ::testing::Test {
+ protected:
+  PublisherTest() {
+    std::string name = testing::TempDir() + "abbe-publisher-XXXXXX";
+    directory_ = ::mkdtemp(name.data());
+    open({.machine = "mill", .tool_offset_m = {0.02, -0.015, -0.12}});
+  }
+  ~PublisherTest() override { std::filesystem::remove_all(directory_); }
+
+  void open(PublisherOptions options) {
+    far_.reset();
+    publisher_.reset();
+    publisher_.emplace(DdsLink::listen(directory_ / "dds.sock").value(), std::move(options),
+                       protocol::UtcOffset{});
+    far_.emplace(directory_ / "dds.sock");
+    publisher_->beat(kWall);
+  }
+  template <class T>
+  std::vector<T> taken(Topic topic) {
+    return messages<T>(far_->take(), topic);
+  }
+
+  std::filesystem::path directory_;
+  std::optional<Publisher> publisher_;
+  std::optional<FarEnd> far_;
+};
+
+TEST_F(PublisherTest, LiveVectorsKeepToTheirRates) {
+  std::size_t snapshots = 0, compensations = 0;
+  for (auto t = 0ms; t < 1s; t += 1ms) {
+    publisher_->live(view(), active(), kNow + t, kWall + t);
+    const auto seen = far_->take();
+    snapshots += messages<v1::Snapshot>(seen, Topic::Snapshot).size();
+    compensations += messages<v1::Compensation>(seen, Topic::Compensation).size();
+  }
+  EXPECT_EQ(snapshots, 50u);
+  EXPECT_EQ(compensations, 100u);
+}
+
+TEST_F(PublisherTest, ARateOfZeroIsEveryTime) {
+  open({.machine = "mill", .snapshot_hz = 0.0, .compensation_hz = 0.0});
+  for (int i = 0; i < 5; ++i) publisher_->live(view(), active(), kNow, kWall);
+  const auto seen = far_->take();
+  EXPECT_THAT(messages<v1::Snapshot>(seen, Topic::Snapshot), SizeIs(5));
+  EXPECT_THAT(messages<v1::Compensation>(seen, Topic::Compensation), SizeIs(5));
+}
+
+TEST_F(PublisherTest, ACompensationCarriesTheStateOfTheModel) {
+  auto standing = active();
+  standing.status = ModelStatus::MODEL_STALE;
+  publisher_->live(view(), standing, kNow + 2ms, kWall);
+  const auto sent = taken<v1::Compensation>(Topic::Compensation);
+  ASSERT_THAT(sent, SizeIs(1));
+  EXPECT_EQ(sent[0].state(), ModelStatus::MODEL_STALE);
+  EXPECT_EQ(sent[0].age_ns(), 2'000'000);
+}
+
+TEST_F(PublisherTest, WithAnAxisMissingNoCompensationIsActive) {
+  auto broken = view();
+  broken.missing_mask = 0b010;
+  publisher_->live(broken, active(), kNow, kWall);
+  const auto sent = taken<v1::Compensation>(Topic::Compensation);
+  ASSERT_THAT(sent, SizeIs(1));
+  EXPECT_EQ(sent[0].state(), ModelStatus::MODEL_STALE);
+}
+
+TEST_F(PublisherTest, WithoutAxesThereIsASnapshotAndNoCompensation) {
+  publisher_->live({}, active(), kNow, kWall);
+  const auto seen = far_->take();
+  EXPECT_THAT(messages<v1::Snapshot>(seen, Topic::Snapshot), SizeIs(1));
+  EXPECT_THAT(messages<v1::Compensation>(seen, Topic::Compensation), SizeIs(0));
+}
+
+TEST_F(PublisherTest, ModelAndGridGoOutOncePerRevision) {
+  for (int turn = 0; turn < 3; ++turn) publisher_->model(active(1), kNow, kWall);
+  auto seen = far_->take();
+  EXPECT_THAT(messages<v1::ErrorModel>(seen, Topic::ErrorModel), SizeIs(1));
+  EXPECT_FALSE(messages<v1::ErrorGrid>(seen, Topic::ErrorGrid).empty());
+  publisher_->model(active(2), kNow, kWall);
+  seen = far_->take();
+  EXPECT_THAT(messages<v1::ErrorModel>(seen, Topic::ErrorModel), SizeIs(1));
+  EXPECT_THAT(messages<v1::ModelState>(seen, Topic::ModelState), SizeIs(1));
+}
+
+TEST_F(PublisherTest, TheStateGoesOutEverySecondAndAtOnceWhenItChanges) {
+  std::size_t sent = 0;
+  for (auto t = 0ms; t <= 2500ms; t += 10ms) {
+    publisher_->model({}, kNow + t, kWall + t);
+    sent += taken<v1::ModelState>(Topic::ModelState).size();
+  }
+  EXPECT_EQ(sent, 3u);
+  auto standing = active();
+  standing.reason = "forced by anna: crane test";
+  publisher_->model(standing, kNow + 2510ms, kWall + 2510ms);
+  const auto changed = taken<v1::ModelState>(Topic::ModelState);
+  ASSERT_THAT(changed, SizeIs(1));
+  EXPECT_EQ(changed[0].state(), ModelStatus::MODEL_ACTIVE);
+  EXPECT_EQ(changed[0].reason(), "forced by anna: crane test");
+}
+
+TEST_F(PublisherTest, TheAgeOfAModelCountsFromItsActivation) {
+  auto model = kModel;
+  model.active_since = kNow - 1h;
+  auto standing = active();
+  standing.model = &model;
+  publisher_->model(standing, kNow, kWall);
+  const auto sent = taken<v1::ModelState>(Topic::ModelState);
+  ASSERT_THAT(sent, SizeIs(1));
+  EXPECT_EQ(sent[0].age_ns(), std::chrono::nanoseconds{1h}.count());
+}
+
+TEST_F(PublisherTest, EveryStreamHasItsHealth) {
+  std::vector<StreamHealth> streams(2);
+  streams[0].status.name = "tracker";
+  streams[1].status.name = "encoder";
+  streams[1].status.last_fault = "no answer";
+  publisher_->health(streams, kNow);
+  const auto sent = taken<v1::Health>(Topic::Health);
+  ASSERT_THAT(sent, SizeIs(2));
+  EXPECT_EQ(sent[1].stream(), "encoder");
+  EXPECT_EQ(sent[1].fault(), "no answer");
+}
+
+}  // namespace
+}  // namespace abbe::daemon

@@ -154,6 +154,15 @@ TEST(Config, RefusesAChainThatIsNotOne) {
   EXPECT_THAT(faults_of(text), ElementsAre(HasSubstr("machine.chain:")));
 }
 
+TEST(Config, TheSamplingInstantOfARealNodeIsNeverPerfectlyKnown) {
+  const auto silent = parse_config(kMachine + kCanBus + kNodes, "abbed.toml");
+  ASSERT_TRUE(silent);
+  EXPECT_GT(silent->encoder->u_sampling_delay.count(), 0);
+  const std::string zero = kMachine + kCanBus + "u_sampling_delay_us = 0\n" + kNodes;
+  EXPECT_THAT(faults_of(zero), ElementsAre(HasSubstr("encoder.u_sampling_delay_us: must be positive")));
+  EXPECT_THAT(faults_of(zero + "[daemon]\nsimulated = true\n"), SizeIs(0));
+}
+
 TEST(Config, PutsTheNodesInTheOrderOfTheMachinesAxes) {
   const auto config = parse_config(kMachine + kCanBus + R"(nodes = [
   {axis = "B", node = 9}, {axis = "Z", node = 3}, {axis = "W", node = 4}, {axis = "X", node = 1}, {axis = "Y", node = 2}]

@@ -15,9 +15,10 @@ namespace {
 Config read_all(Section& root, const std::filesystem::path& base) {
   Config config;
   read_machine(root, config.machine);
+  read_daemon(root, base,
+              config);  // before the devices: what may be said of them depends on [daemon] simulated
   read_tracker(root, config);
   read_encoder(root, config);
-  read_daemon(root, base, config);
   read_recording(root, base, config);
   read_dds(root, base, config);
   read_gate(root, config);

@@ -124,6 +124,9 @@ void read_encoder(Section& root, Config& out) {
   encoder.get("sync_period_us", config.sync_period, kMicro, {100.0, 1e6});
   encoder.get("sampling_delay_us", config.sampling_delay, kMicro, kNotNegative);
   encoder.get("u_sampling_delay_us", config.u_sampling_delay, kMicro, kNotNegative);
+  if (config.u_sampling_delay.count() == 0 && !out.daemon.simulated)
+    encoder.fault("u_sampling_delay_us",
+                  "must be positive: no real node latches at a perfectly known instant");
   encoder.get("axes_compensated", config.axes_compensated);
   read_nodes(encoder, out.machine, config);
   encoder.close();

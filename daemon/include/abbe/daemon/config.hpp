@@ -93,10 +93,11 @@ struct EncoderConfig {
   std::string peer_host;         ///< UDP only
   std::uint16_t peer_port = 0;   ///< UDP only
   std::chrono::nanoseconds sync_period{std::chrono::milliseconds{1}};
-  std::chrono::nanoseconds sampling_delay{};    ///< from SYNC on the wire to the instant the node latches
-  std::chrono::nanoseconds u_sampling_delay{};  ///< its standard uncertainty
-  bool axes_compensated = false;                ///< true: the control already corrects these readings
-  std::vector<EncoderNodeConfig> nodes;         ///< in the order of MachineConfig::axes; X, Y and Z are there
+  std::chrono::nanoseconds sampling_delay{};  ///< from SYNC on the wire to the instant the node latches
+  std::chrono::nanoseconds u_sampling_delay =
+      std::chrono::microseconds{50};     ///< its standard uncertainty; 0 only with simulated devices
+  bool axes_compensated = false;         ///< true: the control already corrects these readings
+  std::vector<EncoderNodeConfig> nodes;  ///< in the order of MachineConfig::axes; X, Y and Z are there
 };
 
 enum class RealTimeMode { Enforce, Ignore };

@@ -160,6 +160,14 @@ TEST_F(HubTest, SaysHowTheStreamsAreOnceASecond) {
   EXPECT_EQ(sent[1].stream(), "dds");
 }
 
+TEST_F(HubTest, RefusesToCalibrateAxesTheControlCorrectsAlready) {
+  config_.encoder.emplace().axes_compensated = true;
+  const auto started = calibration_->start_otf({{0, 0, 0}, {1, 0, 0}, {1, 1, 0}}, "anna", time_.now());
+  ASSERT_FALSE(started);
+  EXPECT_EQ(started.error().code, ErrorCode::Refused);
+  EXPECT_THAT(started.error().text, testing::HasSubstr("axes_compensated"));
+}
+
 TEST_F(HubTest, RunsATaskOfAnotherThreadAtItsNextTurn) {
   auto answer = std::async(std::launch::async, [this] {
     return hub_->call([] { return json{{"n", 3}}; }, 60s);

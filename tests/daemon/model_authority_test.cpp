@@ -90,6 +90,15 @@ TEST_F(ModelAuthorityTest, OfAnotherMachineConfigurationItIsStale) {
   EXPECT_THAT(standing.reason, HasSubstr("another machine configuration"));
 }
 
+TEST_F(ModelAuthorityTest, WhereTheControlCorrectsAlreadyNoModelIsActive) {
+  config_.encoder.emplace().axes_compensated = true;
+  auto authority = open();
+  ASSERT_TRUE(authority.add(document(1), {.accepted = true}, actor("by hand"), kNow));
+  const auto standing = fresh_standing(authority);
+  EXPECT_EQ(standing.status, ModelStatus::MODEL_INVALID);
+  EXPECT_THAT(standing.reason, HasSubstr("axes_compensated"));
+}
+
 TEST_F(ModelAuthorityTest, AForcedModelNamesWhoForcedItAndWhyAlsoAfterARestart) {
   auto authority = open();
   const auto id = authority.add(document(1), {.reasons = {"3 mm"}}, actor("calibrate otf"), kNow).value();

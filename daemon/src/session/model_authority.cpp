@@ -35,11 +35,17 @@ std::string reason_of(const StoreEvent& activation) {
 
 }  // namespace
 
+ModelAuthority::ModelAuthority(ModelStore store, const Config& config, protocol::UtcOffset utc)
+    : store_(std::move(store)),
+      machine_hash_(machine_hash(config)),
+      axes_compensated_(config.encoder && config.encoder->axes_compensated),
+      utc_(utc) {}
+
 Result<ModelAuthority> ModelAuthority::open(const std::filesystem::path& store_folder, const Config& config,
                                             protocol::UtcOffset utc, HostTime now) {
   auto store = ModelStore::open(store_folder);
   if (!store) return tl::unexpected(store.error());
-  ModelAuthority authority{std::move(*store), machine_hash(config), utc};
+  ModelAuthority authority{std::move(*store), config, utc};
   if (auto taken = authority.take_up_active(now); !taken) authority.fault_ = taken.error().text;
   return authority;
 }
@@ -94,7 +100,10 @@ ModelStanding ModelAuthority::standing(HostTime now, std::optional<HostTime> axe
     return s;
   }
   s.status = v1::ModelStatus::MODEL_STALE;
-  if (!made_for_this_machine_) {
+  if (axes_compensated_) {
+    s.status = v1::ModelStatus::MODEL_INVALID;
+    s.reason = "the control already corrects these axes: [encoder] axes_compensated = true";
+  } else if (!made_for_this_machine_) {
     s.reason = "the model was made for another machine configuration";
   } else if (!axes_known_at) {
     s.reason = "no axis positions yet";

@@ -95,8 +95,10 @@ struct EncoderConfig {
   std::chrono::nanoseconds sync_period{std::chrono::milliseconds{1}};
   std::chrono::nanoseconds sampling_delay{};  ///< from SYNC on the wire to the instant the node latches
   std::chrono::nanoseconds u_sampling_delay =
-      std::chrono::microseconds{50};     ///< its standard uncertainty; 0 only with simulated devices
-  bool axes_compensated = false;         ///< true: the control already corrects these readings
+      std::chrono::microseconds{50};  ///< its standard uncertainty; 0 only with simulated devices
+  /// True: the control already corrects these readings. No model is ACTIVE then, and none can be identified:
+  /// it would be applied, or measured, on top of the control's own.
+  bool axes_compensated = false;
   std::vector<EncoderNodeConfig> nodes;  ///< in the order of MachineConfig::axes; X, Y and Z are there
 };
 

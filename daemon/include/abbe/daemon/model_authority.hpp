@@ -3,7 +3,8 @@
 /// running daemon; when and by whom a model was activated is the store's to say, so that a restart changes
 /// neither its age nor its reason. After a restart the active model is STALE until the machine's
 /// configuration hash agrees with the one the model was made for and all axes have been seen; without recent
-/// axis positions it is STALE again. Ordinary world; used by the hub's thread only.
+/// axis positions it is STALE again. Where the control corrects the axis readings itself it is INVALID:
+/// applied, it would correct twice. Ordinary world; used by the hub's thread only.
 
 #include <chrono>
 #include <cstdint>
@@ -41,12 +42,12 @@ class ModelAuthority {
   [[nodiscard]] const ModelStore& store() const noexcept { return store_; }
 
  private:
-  ModelAuthority(ModelStore store, std::string machine_hash, protocol::UtcOffset utc)
-      : store_(std::move(store)), machine_hash_(std::move(machine_hash)), utc_(utc) {}
+  ModelAuthority(ModelStore store, const Config& config, protocol::UtcOffset utc);
   [[nodiscard]] Result<void> take_up_active(protocol::HostTime now);
 
   ModelStore store_;
   std::string machine_hash_;
+  bool axes_compensated_;
   protocol::UtcOffset utc_;
   StoreEvent activation_;  // of the store's active model, in force or not
   std::optional<ModelInForce> in_force_;

@@ -163,6 +163,29 @@ TEST(Config, TheSamplingInstantOfARealNodeIsNeverPerfectlyKnown) {
   EXPECT_THAT(faults_of(zero + "[daemon]\nsimulated = true\n"), SizeIs(0));
 }
 
+TEST(Config, RefusesNamesThatNoMessageCanCarry) {
+  const auto with = [](std::string text, const std::string& what, std::size_t length) {
+    return text.replace(text.find(what), what.size(), std::string(length, 'm'));
+  };
+  EXPECT_THAT(faults_of(with(kMachine, "mill", 64)), SizeIs(0));
+  EXPECT_THAT(faults_of(with(kMachine, "mill", 65)),
+              ElementsAre(HasSubstr("machine.name: must be at most 64")));
+  const std::string devices =
+      kMachine + "[tracker]\nhost = \"h\"\nname = \"TTT\"\n" + kCanBus + "name = \"EEE\"\n" + kNodes;
+  EXPECT_THAT(faults_of(with(devices, "TTT", 32)), SizeIs(0));
+  EXPECT_THAT(faults_of(with(devices, "TTT", 33)),
+              ElementsAre(HasSubstr("tracker.name: must be at most 32")));
+  EXPECT_THAT(faults_of(with(devices, "EEE", 33)),
+              ElementsAre(HasSubstr("encoder.name: must be at most 32")));
+}
+
+TEST(Config, RefusesAModelOfMoreParametersThanCanBePublished) {
+  auto text = kMachine;
+  text.replace(text.find("node_spacing_mm = 50"), 20, "node_spacing_mm = 5");
+  EXPECT_THAT(faults_of(text),
+              ElementsAre(AllOf(HasSubstr("model.node_spacing_mm"), HasSubstr("can be published"))));
+}
+
 TEST(Config, PutsTheNodesInTheOrderOfTheMachinesAxes) {
   const auto config = parse_config(kMachine + kCanBus + R"(nodes = [
   {axis = "B", node = 9}, {axis = "Z", node = 3}, {axis = "W", node = 4}, {axis = "X", node = 1}, {axis = "Y", node = 2}]

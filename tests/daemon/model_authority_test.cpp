@@ -148,6 +148,16 @@ TEST_F(ModelAuthorityTest, ADamagedActiveModelIsInvalidAndNotUsed) {
   EXPECT_FALSE(authority.follow_store(kNow));
 }
 
+TEST_F(ModelAuthorityTest, AModelThatCannotBePublishedIsNotTakenUp) {
+  auto unpublishable = document(1);
+  unpublishable.estimator = std::string(33, 'e');
+  const auto id = store().add(unpublishable, true, {}, actor("by hand")).value();
+  ASSERT_TRUE(store().activate(id, actor("by hand")));
+  const auto standing = fresh_standing(open());
+  EXPECT_EQ(standing.status, ModelStatus::MODEL_INVALID);
+  EXPECT_THAT(standing.reason, testing::AllOf(HasSubstr("cannot be published"), HasSubstr("estimator")));
+}
+
 TEST_F(ModelAuthorityTest, ARestartDoesNotMakeTheModelYounger) {
   ASSERT_TRUE(open().add(document(1), {.accepted = true}, actor("calibrate otf", kNow - 24h), kNow));
   EXPECT_EQ(fresh_standing(open()).model->active_since, kNow - 24h);

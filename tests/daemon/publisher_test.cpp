@@ -147,6 +147,13 @@ TEST_F(PublisherTest, TheAgeOfAModelCountsFromItsActivation) {
   EXPECT_EQ(sent[0].age_ns(), std::chrono::nanoseconds{1h}.count());
 }
 
+TEST_F(PublisherTest, AMessageOutsideItsBoundsIsCountedAndNamed) {
+  open({.machine = std::string(65, 'm')});
+  publisher_->live(view(), active(), kNow, kWall);
+  EXPECT_EQ(publisher_->link().counters().refused, 2u);
+  EXPECT_THAT(publisher_->refusal(), testing::HasSubstr("machine"));
+}
+
 TEST_F(PublisherTest, EveryStreamHasItsHealth) {
   std::vector<StreamHealth> streams(2);
   streams[0].status.name = "tracker";

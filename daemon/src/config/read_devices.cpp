@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <set>
 
+#include "config/message_bounds.hpp"
 #include "config/readers.hpp"
 
 namespace abbe::daemon {
@@ -101,7 +102,7 @@ void read_tracker(Section& root, Config& out) {
   read_noise(tracker, out.machine);
   TrackerConfig config;
   const bool has_host = tracker.get("host", config.host);
-  tracker.get("name", config.name);
+  get_bounded(tracker, "name", config.name, bound_of<v1::TrackerPoint>("device"));
   tracker.get_integer("port", config.port, 1, 65535);
   tracker.get("point_rate_hz", config.point_rate_hz, kPlain,
               {1.0, 1000.0});  // emScon: whole ms between points
@@ -119,7 +120,7 @@ void read_encoder(Section& root, Config& out) {
   Section encoder = root.child("encoder");
   if (!encoder.present()) return;
   EncoderConfig config;
-  encoder.get("name", config.name);
+  get_bounded(encoder, "name", config.name, bound_of<v1::AxisSample>("device"));
   read_transport(encoder, config);
   encoder.get("sync_period_us", config.sync_period, kMicro, {100.0, 1e6});
   encoder.get("sampling_delay_us", config.sampling_delay, kMicro, kNotNegative);

@@ -2,10 +2,13 @@
 
 #include <abbe/calib/axis_table.hpp>
 #include <abbe/calib/kinematic_chain.hpp>
+#include <abbe/calib/parameter_layout.hpp>
 #include <algorithm>
 #include <cmath>
 #include <tuple>
 
+#include "abbe/daemon/otf_inputs.hpp"
+#include "config/message_bounds.hpp"
 #include "config/readers.hpp"
 
 namespace abbe::daemon {
@@ -101,6 +104,17 @@ void read_model(Section model, const toml::node* spacing_node, MachineConfig& ou
   model.close();
 }
 
+/// A machine that is faulty anyway has no model to count.
+void check_model_size(Section& model, const MachineConfig& config) {
+  const auto machine = otf_machine(config);
+  if (!machine) return;
+  const auto layout = calib::ParameterLayout::observable_with_one_target(machine->chain, machine->nodes);
+  const std::size_t most = bound_of<v1::ErrorModel>("parameters");
+  if (layout && layout->model_size() > most)
+    model.fault("node_spacing_mm", fmt::format("makes a model of {} parameters; at most {} can be published",
+                                               layout->model_size(), most));
+}
+
 }  // namespace
 
 const AxisConfig* MachineConfig::find_axis(std::string_view axis_name) const noexcept {
@@ -112,8 +126,8 @@ const AxisConfig* MachineConfig::find_axis(std::string_view axis_name) const noe
 void read_machine(Section& root, MachineConfig& out) {
   Section machine = root.child("machine", Need::Required);
   if (machine.present()) {
-    machine.get("name", out.name, Need::Required);
-    if (machine.get("chain", out.chain, Need::Required))
+    get_bounded(machine, "name", out.name, bound_of<v1::Snapshot>("machine"), Need::Required);
+    if (get_bounded(machine, "chain", out.chain, bound_of<v1::ErrorModel>("chain"), Need::Required))
       if (const auto chain = calib::KinematicChain::parse(out.chain); !chain)
         machine.fault("chain", chain.error().text);
     machine.close();
@@ -132,6 +146,7 @@ void read_machine(Section& root, MachineConfig& out) {
 
   Section model = root.child("model");
   read_model(model, model.node("node_spacing_mm"), out);
+  check_model_size(model, out);
 }
 
 }  // namespace abbe::daemon

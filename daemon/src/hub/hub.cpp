@@ -36,7 +36,8 @@ StreamHealth health_of(const RecorderThread& recorder) {
   return h;
 }
 
-StreamHealth health_of(const DdsLink& link) {
+StreamHealth health_of(const Publisher& publisher) {
+  const DdsLink& link = publisher.link();
   StreamHealth h;
   h.status.name = "dds";
   h.status.state = link.connected() ? "connected" : "waiting";
@@ -44,6 +45,7 @@ StreamHealth health_of(const DdsLink& link) {
   h.status.samples = link.counters().sent;
   h.status.dropped = link.counters().dropped_live;
   h.status.faults = link.counters().refused;
+  h.status.last_fault = publisher.refusal();
   return h;
 }
 
@@ -102,7 +104,7 @@ void Hub::publish(bool fresh, HostTime now, WallTime wall) {
 void Hub::collect_health(HostTime now) {
   health_ = parts_.devices.health(now);
   if (parts_.recorder != nullptr) health_.push_back(health_of(*parts_.recorder));
-  if (parts_.publisher != nullptr) health_.push_back(health_of(parts_.publisher->link()));
+  if (parts_.publisher != nullptr) health_.push_back(health_of(*parts_.publisher));
 }
 
 void Hub::run() {

@@ -1,5 +1,7 @@
 #include "abbe/daemon/publisher.hpp"
 
+#include <fmt/format.h>
+
 #include <utility>
 
 namespace abbe::daemon {
@@ -27,8 +29,11 @@ Publisher::Publisher(DdsLink link, PublisherOptions options, protocol::UtcOffset
 
 template <class T>
 void Publisher::send(Topic topic, const T& message) {
-  // A message outside the IDL's bounds is a defect of ours: the link counts it as refused (an empty payload).
-  (void)encode(message, payload_);
+  // Outside the IDL's bounds: the configuration should have refused what led here. The link counts the empty
+  // payload.
+  if (auto encoded = encode(message, payload_); !encoded) {
+    refusal_ = fmt::format("{} not sent: {}", traits(topic).name, encoded.error().text);
+  }
   link_.publish(topic, payload_);
 }
 

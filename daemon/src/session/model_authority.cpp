@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <utility>
 
+#include "abbe/daemon/cdr.hpp"
+
 namespace abbe::daemon {
 namespace {
 
@@ -68,6 +70,12 @@ Result<void> ModelAuthority::take_up_active(HostTime now) {
                                  .created = document->created,
                                  .active_since = std::min(now, utc_.to_host(activation_.actor.when)),
                                  .model = std::move(document->model)});
+  std::vector<std::byte> unused;
+  if (auto encoded = encode(model_message(*in_force_, {.now = now}), unused); !encoded) {
+    in_force_.reset();
+    return fail(ErrorCode::Refused,
+                fmt::format("model {} cannot be published: {}", activation_.id, encoded.error().text));
+  }
   return {};
 }
 

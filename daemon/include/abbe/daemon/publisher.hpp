@@ -57,6 +57,8 @@ class Publisher {
   void health(std::span<const StreamHealth> streams, protocol::HostTime now);
   void event(const SessionEvent& event);
 
+  /// Why the last message that could not be encoded was not sent; empty: all could.
+  [[nodiscard]] const std::string& refusal() const noexcept { return refusal_; }
   [[nodiscard]] const DdsLink& link() const noexcept { return link_; }
 
  private:
@@ -68,6 +70,7 @@ class Publisher {
   PublisherOptions options_;
   protocol::UtcOffset utc_;
   std::vector<std::byte> payload_;  // reused
+  std::string refusal_;
   std::uint64_t sequence_number_ = 0;
   WallTime next_snapshot_{};
   WallTime next_compensation_{};

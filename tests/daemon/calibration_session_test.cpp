@@ -4,6 +4,8 @@
 
 #include <cmath>
 
+#include "abbe/daemon/device_options.hpp"
+
 namespace abbe::daemon {
 namespace {
 
@@ -82,6 +84,17 @@ TEST(CalibrationSession, TheRunBeginsAndEndsInStandstill) {
   EXPECT_EQ((*run)[run->size() - 20].p_tracker_m, kPath.back());
   EXPECT_LT(run->size(),
             3000u + 2u * 200u + 10u);  // 300 mm at 0.1 mm each, and 0.4 s of standstill at either end
+}
+
+TEST(CalibrationSession, ASlowTrackerStandsLongEnoughForTwentyPoints) {
+  Config config;
+  config.tracker.emplace().point_rate_hz = 10.0;
+  const auto options = acquisition_options(config);
+  EXPECT_GE(options.stand_before / 100ms, 20);
+  EXPECT_GE(options.keep_before, options.stand_before);
+  EXPECT_GE(options.stand_after, options.keep_after);
+  config.tracker->point_rate_hz = 500.0;
+  EXPECT_EQ(acquisition_options(config).stand_before, AcquisitionOptions{}.stand_before);
 }
 
 TEST(CalibrationSession, RefusesWhenAnotherPathIsDriven) {

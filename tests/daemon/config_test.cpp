@@ -186,6 +186,26 @@ TEST(Config, RefusesAModelOfMoreParametersThanCanBePublished) {
               ElementsAre(AllOf(HasSubstr("model.node_spacing_mm"), HasSubstr("can be published"))));
 }
 
+TEST(Config, TakesThePointRatesATrackerHas) {
+  const auto rate = [](const std::string& hz) {
+    const auto config =
+        parse_config(kMachine + "[tracker]\nhost = \"h\"\npoint_rate_hz = " + hz + "\n", "abbed.toml");
+    return config ? config->tracker->point_rate_hz : 0.0;
+  };
+  EXPECT_EQ(rate("1000"), 1000.0);
+  EXPECT_EQ(rate("500"), 500.0);
+  EXPECT_DOUBLE_EQ(rate("333"), 1e3 / 3.0);
+  EXPECT_THAT(faults_of(kMachine + "[tracker]\nhost = \"h\"\npoint_rate_hz = 300\n"),
+              ElementsAre(AllOf(HasSubstr("tracker.point_rate_hz"), HasSubstr("250 and 333.3"))));
+}
+
+TEST(Config, RefusesPeriodsTheLivenessRulesForbid) {
+  EXPECT_THAT(faults_of(kMachine + "[daemon]\nhub_period_us = 60000\n"),
+              ElementsAre(HasSubstr("hub_period_us")));
+  EXPECT_THAT(faults_of(kMachine + kCanBus + "sync_period_us = 200000\n" + kNodes),
+              ElementsAre(HasSubstr("sync_period_us")));
+}
+
 TEST(Config, PutsTheNodesInTheOrderOfTheMachinesAxes) {
   const auto config = parse_config(kMachine + kCanBus + R"(nodes = [
   {axis = "B", node = 9}, {axis = "Z", node = 3}, {axis = "W", node = 4}, {axis = "X", node = 1}, {axis = "Y", node = 2}]

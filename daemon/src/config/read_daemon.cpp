@@ -29,8 +29,9 @@ void read_daemon(Section& root, const std::filesystem::path& base, Config& out) 
   auto& daemon = out.daemon;
   section.get("data_dir", daemon.data_dir, base);
   section.get("runtime_dir", daemon.runtime_dir, base);
-  section.get("hub_period_us", daemon.hub_period, kMicro, {50.0, 1e6});
-  section.get("watermark_ms", daemon.watermark, kMilli, {1.0, 60e3});
+  // The hub says "alive" to abbe-dds every 100 ms, and is held for hung after a second without a turn.
+  section.get("hub_period_us", daemon.hub_period, kMicro, {50.0, 50e3});
+  section.get("watermark_ms", daemon.watermark, kMilli, {1.0, 5e3});  // half of what the assembler remembers
   section.get("simulated", daemon.simulated);
   section.get("speed", daemon.speed, kPlain, {1e-3, 1e4});
   if (daemon.speed != 1.0 && !daemon.simulated)

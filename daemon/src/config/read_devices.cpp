@@ -1,6 +1,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 #include <set>
 
 #include "config/message_bounds.hpp"
@@ -13,6 +14,19 @@ namespace {
 void read_noise(Section& tracker, MachineConfig& machine) {
   tracker.get("sigma_range_um", machine.sigma_range_m, kMicro, kPositive);
   tracker.get("sigma_angle_urad", machine.sigma_angle_rad, kMicro, kPositive);
+}
+
+/// emScon measures every whole number of milliseconds: a rate in between would silently become another.
+void read_point_rate(Section& tracker, TrackerConfig& out) {
+  constexpr double kRounded = 5e-3;  // 333 stands for 333.3
+  if (!tracker.get("point_rate_hz", out.point_rate_hz, kPlain, {1.0, 1000.0})) return;
+  const double period_ms = std::round(1e3 / out.point_rate_hz);
+  if (std::abs(out.point_rate_hz * period_ms / 1e3 - 1.0) > kRounded)
+    tracker.fault(
+        "point_rate_hz",
+        fmt::format("the tracker measures every whole ms: possible nearby are {:.4g} and {:.4g}",
+                    1e3 / std::ceil(1e3 / out.point_rate_hz), 1e3 / std::floor(1e3 / out.point_rate_hz)));
+  out.point_rate_hz = 1e3 / period_ms;
 }
 
 void read_tracker_timeouts(Section& tracker, TrackerConfig& out) {
@@ -104,8 +118,7 @@ void read_tracker(Section& root, Config& out) {
   const bool has_host = tracker.get("host", config.host);
   get_bounded(tracker, "name", config.name, bound_of<v1::TrackerPoint>("device"));
   tracker.get_integer("port", config.port, 1, 65535);
-  tracker.get("point_rate_hz", config.point_rate_hz, kPlain,
-              {1.0, 1000.0});  // emScon: whole ms between points
+  read_point_rate(tracker, config);
   tracker.get_word<WeatherConfig>(
       "weather", config.weather,
       {{"none", WeatherConfig::None}, {"read", WeatherConfig::Read}, {"compute", WeatherConfig::Compute}});
@@ -122,7 +135,8 @@ void read_encoder(Section& root, Config& out) {
   EncoderConfig config;
   get_bounded(encoder, "name", config.name, bound_of<v1::AxisSample>("device"));
   read_transport(encoder, config);
-  encoder.get("sync_period_us", config.sync_period, kMicro, {100.0, 1e6});
+  // Nodes count as silent after 350 ms, and the axes as unknown after 500 ms.
+  encoder.get("sync_period_us", config.sync_period, kMicro, {100.0, 100e3});
   encoder.get("sampling_delay_us", config.sampling_delay, kMicro, kNotNegative);
   encoder.get("u_sampling_delay_us", config.u_sampling_delay, kMicro, kNotNegative);
   if (config.u_sampling_delay.count() == 0 && !out.daemon.simulated)

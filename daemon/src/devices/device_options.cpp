@@ -12,6 +12,10 @@ using protocol::emscon::WeatherMonitor;
 // Two and a half SYNC periods: one cycle may be lost and the axes are still known.
 constexpr double kMostLostCycles = 2.5;
 
+// The alignment wants 20 points of standstill at either end of a run
+// (calib::otf::Options::standstill_samples).
+constexpr double kStandstillPoints = 20.0;
+
 WeatherMonitor weather_monitor(WeatherConfig weather) {
   switch (weather) {
     case WeatherConfig::None:
@@ -76,6 +80,20 @@ AssemblerOptions assembler_options(const Config& config) {
     const std::chrono::duration<double, std::nano> span = kMostLostCycles * config.encoder->sync_period;
     options.interpolation.max_span = std::chrono::duration_cast<std::chrono::nanoseconds>(span);
   }
+  return options;
+}
+
+AcquisitionOptions acquisition_options(const Config& config) {
+  AcquisitionOptions options;
+  if (!config.tracker) return options;
+  const std::chrono::duration<double> period{1.0 / config.tracker->point_rate_hz};
+  const auto holding = [&period](double points) {
+    return std::chrono::duration_cast<std::chrono::nanoseconds>(points * period);
+  };
+  options.stand_before = std::max(options.stand_before, holding(kStandstillPoints));
+  options.keep_before = std::max(options.keep_before, holding(2.0 * kStandstillPoints));
+  options.keep_after = std::max(options.keep_after, holding(2.0 * kStandstillPoints));
+  options.stand_after = std::max(options.stand_after, options.keep_after + holding(kStandstillPoints));
   return options;
 }
 

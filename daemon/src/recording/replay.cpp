@@ -120,7 +120,7 @@ class Calibrations {
  private:
   void begin_next() {
     if (next_ == requests_.size()) return;
-    session_ = {};
+    session_ = CalibrationSession{acquisition_options(config_)};
     (void)session_.start(requests_[next_].path_m, requests_[next_].from);
     identified_ = false;
     ++next_;

@@ -6,6 +6,8 @@
 #include <chrono>
 #include <utility>
 
+#include "abbe/daemon/device_options.hpp"
+
 namespace abbe::daemon {
 namespace {
 
@@ -25,7 +27,11 @@ std::string verdict_text(const calib::Verdict& verdict) {
 
 CalibrationService::CalibrationService(const Config& config, ModelAuthority& authority,
                                        RecorderThread* recorder, protocol::UtcOffset utc)
-    : config_(config), authority_(authority), recorder_(recorder), utc_(utc) {}
+    : config_(config),
+      authority_(authority),
+      recorder_(recorder),
+      utc_(utc),
+      session_(acquisition_options(config)) {}
 
 CalibrationService::~CalibrationService() {
   if (identification_.valid()) identification_.wait();

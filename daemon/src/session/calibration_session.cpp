@@ -28,7 +28,7 @@ Result<void> CalibrationSession::start(std::vector<AxisPosition> path_m, HostTim
   if (path_m.size() < 2)
     return fail(ErrorCode::BadInput, "calibrate otf: a path needs at least two vertices");
   path_m_ = std::move(path_m);
-  acquisition_.emplace(path_m_, from);
+  acquisition_.emplace(path_m_, from, acquisition_options_);
   status_ = {};
   enter(SessionState::Warming, acquisition_->reason(), from);
   return {};

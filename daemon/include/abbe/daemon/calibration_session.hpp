@@ -41,6 +41,8 @@ struct SessionEvent {
 
 class CalibrationSession {
  public:
+  explicit CalibrationSession(AcquisitionOptions acquisition = {}) : acquisition_options_(acquisition) {}
+
   /// Begins an on-the-fly run along `path_m`. `from`: snapshots before this instant do not belong to it.
   /// Error::Refused while a session is running.
   [[nodiscard]] Result<void> start(std::vector<AxisPosition> path_m, protocol::HostTime from);
@@ -65,6 +67,7 @@ class CalibrationSession {
  private:
   void enter(SessionState state, std::string reason, protocol::HostTime now);
 
+  AcquisitionOptions acquisition_options_;
   std::vector<AxisPosition> path_m_;
   std::optional<OtfAcquisition> acquisition_;
   SessionStatus status_;

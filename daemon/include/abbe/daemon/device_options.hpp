@@ -1,10 +1,11 @@
 #pragma once
-/// The configuration as the drivers' options: one place, so that a live device and its replay decode alike. Pure.
-/// Time-outs are host time in the drivers; with simulated devices at `speed` > 1 they are stretched by it, because the
-/// peer's answer still takes the operating system's time.
+/// The configuration as the drivers' options: one place, so that a live device and its replay decode alike.
+/// Pure. Time-outs are host time in the drivers; with simulated devices at `speed` > 1 they are stretched by
+/// it, because the peer's answer still takes the operating system's time.
 
 #include "abbe/daemon/assembler.hpp"
 #include "abbe/daemon/config.hpp"
+#include "abbe/daemon/otf_acquisition.hpp"
 #include "abbe/drivers/can/encoder_device.hpp"
 #include "abbe/drivers/tracker/device.hpp"
 
@@ -13,5 +14,7 @@ namespace abbe::daemon {
 [[nodiscard]] drivers::TrackerDeviceOptions device_options(const TrackerConfig& config, double speed);
 [[nodiscard]] drivers::EncoderDeviceOptions device_options(const EncoderConfig& config, double speed);
 [[nodiscard]] AssemblerOptions assembler_options(const Config& config);
+/// Standstill is judged over enough points at the tracker's rate.
+[[nodiscard]] AcquisitionOptions acquisition_options(const Config& config);
 
 }  // namespace abbe::daemon

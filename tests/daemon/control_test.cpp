@@ -48,15 +48,26 @@ TEST_F(Control, ARequestLargerThanAnyBufferArrivesWhole) {
   EXPECT_EQ((*answer)["heard"]["text"], big);
 }
 
-TEST_F(Control, ARefusalBecomesAnErrorWithItsText) {
-  const auto server = ControlServer::open(socket(), [](const json&) {
-    return json{{"ok", false}, {"error", "a session is running"}};
-  });
+TEST_F(Control, ARefusalArrivesAsTheErrorItWas) {
+  for (const auto code : {ErrorCode::DataInsufficient, ErrorCode::Usage, ErrorCode::BadInput, ErrorCode::Io,
+                          ErrorCode::Refused}) {
+    const auto server = ControlServer::open(socket(), [code](const json&) {
+      return refusal({code, "a session is running"});
+    });
+    ASSERT_TRUE(server);
+    const auto answer = ask_daemon(socket(), {{"do", "calibrate"}});
+    ASSERT_FALSE(answer);
+    EXPECT_EQ(answer.error().code, code);
+    EXPECT_EQ(answer.error().text, "a session is running");
+  }
+}
+
+TEST_F(Control, AnAnswerThatSaysNothingIsARefusal) {
+  const auto server = ControlServer::open(socket(), [](const json&) { return json{{"ok", "perhaps"}}; });
   ASSERT_TRUE(server);
-  const auto answer = ask_daemon(socket(), {{"do", "calibrate"}});
+  const auto answer = ask_daemon(socket(), {{"do", "status"}});
   ASSERT_FALSE(answer);
   EXPECT_EQ(answer.error().code, ErrorCode::Refused);
-  EXPECT_EQ(answer.error().text, "a session is running");
 }
 
 TEST_F(Control, AMemberOfTheWrongTypeIsAnAnswerNotACrash) {
@@ -66,6 +77,7 @@ TEST_F(Control, AMemberOfTheWrongTypeIsAnAnswerNotACrash) {
   ASSERT_TRUE(server);
   const auto answer = ask_daemon(socket(), {{"do", "count"}, {"n", "three"}});
   ASSERT_FALSE(answer);
+  EXPECT_EQ(answer.error().code, ErrorCode::Usage);
   EXPECT_NE(answer.error().text.find("count"), std::string::npos) << answer.error().text;
   EXPECT_TRUE(ask_daemon(socket(), {{"do", "count"}, {"n", 3}}));
 }

@@ -176,6 +176,19 @@ TEST_F(HubTest, RunsATaskOfAnotherThreadAtItsNextTurn) {
   EXPECT_EQ(answer.get(), (json{{"n", 3}}));
 }
 
+TEST_F(HubTest, ATaskNobodyWaitsForAnyMoreDoesNotRun) {
+  bool ran = false;
+  const auto answer = hub_->call(
+      [&ran] {
+        ran = true;
+        return json{};
+      },
+      1ms);
+  EXPECT_FALSE(answer);
+  turn();
+  EXPECT_FALSE(ran);
+}
+
 TEST_F(HubTest, ATaskThatThrowsThrowsInTheThreadThatAsked) {
   auto answer = std::async(std::launch::async, [this] {
     return hub_->call([]() -> json { throw std::runtime_error{"no"}; }, 60s);

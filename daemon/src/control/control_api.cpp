@@ -6,14 +6,12 @@
 #include <string>
 #include <utility>
 
+#include "abbe/daemon/control_protocol.hpp"
+
 namespace abbe::daemon {
 namespace {
 
 using nlohmann::json;
-
-json refusal(std::string text) {
-  return {{"ok", false}, {"error", std::move(text)}};
-}
 
 std::string_view status_name(v1::ModelStatus status) {
   switch (status) {
@@ -101,17 +99,18 @@ json status(const Hub& hub) {
 
 json calibrate(const Hub& hub, const json& request) {
   if (request.at("method") != "otf") {
-    return refusal(fmt::format("calibrate: unknown method {}, known: \"otf\"", request.at("method").dump()));
+    return refusal({ErrorCode::Usage, fmt::format("calibrate: unknown method {}, known: \"otf\"",
+                                                  request.at("method").dump())});
   }
   auto started =
       hub.parts().calibration.start_otf(request.at("path_m").get<std::vector<AxisPosition>>(),
                                         request.at("who").get<std::string>(), hub.parts().time.now());
-  return started ? json{{"ok", true}} : refusal(started.error().text);
+  return started ? json{{"ok", true}} : refusal(started.error());
 }
 
 json cancel(const Hub& hub, const json& request) {
   auto done = hub.parts().calibration.cancel(request.at("who").get<std::string>(), hub.parts().time.now());
-  return done ? json{{"ok", true}} : refusal(done.error().text);
+  return done ? json{{"ok", true}} : refusal(done.error());
 }
 
 }  // namespace
@@ -126,11 +125,12 @@ json answer_request(Hub& hub, const json& request, std::chrono::milliseconds tim
   const auto what = request.at("do").get<std::string>();
   const auto task = kTasks.find(what);
   if (task == kTasks.end()) {
-    return refusal(fmt::format("unknown request \"{}\": known are status, calibrate, cancel", what));
+    return refusal(
+        {ErrorCode::Usage, fmt::format("unknown request \"{}\": known are status, calibrate, cancel", what)});
   }
   auto answer = hub.call([&hub, run = task->second, request] { return run(hub, request); }, time_out);
   return answer ? std::move(*answer)
-                : refusal(fmt::format("the hub did not answer in {} ms", time_out.count()));
+                : refusal({ErrorCode::Io, fmt::format("the hub did not answer in {} ms", time_out.count())});
 }
 
 }  // namespace abbe::daemon

@@ -8,6 +8,7 @@
 #include <string>
 
 #include "abbe/daemon/control_protocol.hpp"
+#include "control/refusal.hpp"
 #include "control/unix_socket.hpp"
 
 namespace abbe::daemon {
@@ -59,9 +60,8 @@ Result<json> ask_daemon(const std::filesystem::path& socket_path, const json& re
   json answer = json::parse(*line, nullptr, /*allow_exceptions=*/false);
   if (!answer.is_object())
     return tl::unexpected(no_answer(socket_path, "answered something that is not a JSON object"));
-  if (!answer.value("ok", false)) {
-    return tl::unexpected(Error{ErrorCode::Refused, answer.value("error", "refused without a reason")});
-  }
+  const auto ok = answer.find("ok");
+  if (ok == answer.end() || *ok != true) return tl::unexpected(error_of_refusal(answer));
   return answer;
 }
 

@@ -32,10 +32,6 @@ struct Client {
   std::string outbox;
 };
 
-json refusal(std::string text) {
-  return {{"ok", false}, {"error", std::move(text)}};
-}
-
 class Server final : public ControlServer {
  public:
   Server(FileDescriptor listener, FileDescriptor wake, std::filesystem::path path, Handler handler)
@@ -111,12 +107,13 @@ class Server final : public ControlServer {
   json answer(const std::string& line) {
     const json request = json::parse(line, nullptr, /*allow_exceptions=*/false);
     if (!request.is_object() || !request.contains("do") || !request["do"].is_string()) {
-      return refusal(R"(expected one JSON object a line with a string member "do")");
+      return refusal({ErrorCode::Usage, R"(expected one JSON object a line with a string member "do")"});
     }
     try {
       return handler_(request);
     } catch (const std::exception& e) {  // a member of the wrong type, as nlohmann::json says it
-      return refusal(fmt::format("request \"{}\": {}", request["do"].get<std::string>(), e.what()));
+      return refusal(
+          {ErrorCode::Usage, fmt::format("request \"{}\": {}", request["do"].get<std::string>(), e.what())});
     }
   }
 

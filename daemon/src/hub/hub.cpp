@@ -53,6 +53,7 @@ StreamHealth health_of(const Publisher& publisher) {
 
 struct Hub::Call {
   std::function<nlohmann::json()> task;
+  std::atomic<bool> claimed{false};  // by the hub, which runs it then, or by the caller, who has given up
   std::promise<nlohmann::json> result;
 };
 
@@ -129,9 +130,11 @@ std::optional<nlohmann::json> Hub::call(std::function<nlohmann::json()> task,
   auto result = call->result.get_future();
   {
     const std::lock_guard lock{calls_mutex_};
-    calls_.push_back(std::move(call));
+    calls_.push_back(call);
   }
-  if (result.wait_for(time_out) != std::future_status::ready) return std::nullopt;
+  // A task that has begun is as good as done: its result is waited for.
+  if (result.wait_for(time_out) != std::future_status::ready && !call->claimed.exchange(true))
+    return std::nullopt;
   return result.get();
 }
 
@@ -142,6 +145,7 @@ void Hub::run_calls() {
     calls.swap(calls_);
   }
   for (const auto& call : calls) {
+    if (call->claimed.exchange(true)) continue;
     try {
       call->result.set_value(call->task());
     } catch (...) {  // a member of the wrong type in the request: the caller gets it

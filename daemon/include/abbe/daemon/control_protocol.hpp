@@ -1,7 +1,8 @@
 #pragma once
 /// The control API: one JSON object a line, request then answer, over a Unix stream socket that only the
 /// daemon's user and group may open. A request is {"do": NAME, ...}; an answer {"ok": true, ...} or {"ok":
-/// false, "error": TEXT}. Ordinary world.
+/// false, "code": WORD, "error": TEXT}, WORD one of data_insufficient, usage, bad_input, io, refused: the
+/// exit code of whoever asked follows it. Ordinary world.
 
 #include <chrono>
 #include <filesystem>
@@ -25,7 +26,10 @@ class ControlServer {
   virtual ~ControlServer() = default;
 };
 
-/// One request and its answer. An answer with "ok": false becomes an Error with its text.
+/// The answer that an Error becomes on the socket.
+[[nodiscard]] nlohmann::json refusal(const Error& error);
+
+/// One request and its answer. An answer with "ok": false becomes the Error it was made of.
 [[nodiscard]] Result<nlohmann::json> ask_daemon(const std::filesystem::path& socket_path,
                                                 const nlohmann::json& request,
                                                 std::chrono::milliseconds time_out = std::chrono::seconds{5});

@@ -50,7 +50,7 @@ class Hub {
   [[nodiscard]] WallTime last_turn() const noexcept;
 
   /// Runs `task` on the hub's thread at its next turn and gives back its result; from any other thread.
-  /// Nothing if the hub does not get round to it in `time_out`.
+  /// Nothing if the hub does not get round to it in `time_out`; it never runs then.
   [[nodiscard]] std::optional<nlohmann::json> call(std::function<nlohmann::json()> task,
                                                    std::chrono::milliseconds time_out);
 

@@ -1,0 +1,11 @@
+#pragma once
+/// An Error as the answer on the control socket, and back.
+
+#include "abbe/daemon/control_protocol.hpp"
+
+namespace abbe::daemon {
+
+/// `answer`: with "ok": false. A code nobody knows, of a newer daemon, is Refused.
+[[nodiscard]] Error error_of_refusal(const nlohmann::json& answer);
+
+}  // namespace abbe::daemon

@@ -1,5 +1,6 @@
 #include "abbe/daemon/hub.hpp"
 
+#include <fmt/format.h>
 #include <sys/prctl.h>
 
 #include <ctime>
@@ -31,8 +32,12 @@ StreamHealth health_of(const RecorderThread& recorder) {
   h.status.state = name(r.state);
   h.status.connected = r.state == RecorderStatus::State::Recording;
   h.status.samples = r.messages;
-  h.status.dropped = r.lost + recorder.dropped();
+  h.status.dropped = r.lost + r.refused + recorder.dropped();
   h.status.last_fault = r.fault;
+  if (r.fault.empty() && r.refused > 0) {
+    h.status.last_fault =
+        fmt::format("{} messages outside the bounds of the IDL are not recorded", r.refused);
+  }
   return h;
 }
 

@@ -10,6 +10,7 @@
 
 #include "abbe/calib/model_comparison.hpp"
 #include "abbe/daemon/model_store.hpp"
+#include "abbe/daemon/recorder.hpp"
 #include "synthetic_model.hpp"
 #include "synthetic_otf_run.hpp"
 
@@ -232,6 +233,33 @@ TEST_F(Cli, RunsAProgramBesideItself) {
   const int status = std::system(fmt::format("'{}' sim --seed 3 >'{}'", copy.string(), out.string()).c_str());
   EXPECT_EQ(WEXITSTATUS(status), 7);
   EXPECT_EQ(text_of(out), "sim got --seed 3\n");
+}
+
+/// A recording in which the daemon said it had identified a model, and which holds no run that gives one.
+fs::path recording_of_a_lost_model(const fs::path& directory) {
+  fs::create_directories(directory);
+  RecorderOptions options;
+  options.directory = directory;
+  options.name = "run";
+  auto recorder =
+      Recorder::open(options, {.machine = "mill", .configuration = test::synthetic_machine_toml()}, {});
+  EXPECT_TRUE(recorder);
+  v1::CalibrationEvent event;
+  event.machine("mill");
+  event.method("otf");
+  event.state("active");
+  event.model_id("0123456789abcdef");
+  recorder->record(event);
+  return recorder->close().value().file;
+}
+
+TEST_F(Cli, AReplayThatDoesNotGiveTheLiveModelFails) {
+  const auto recording = recording_of_a_lost_model(folder_ / "recordings");
+  const auto ran = abbe(fmt::format("replay '{}'", recording.string()));
+  EXPECT_EQ(ran.exit, 1) << ran.err;
+  EXPECT_THAT(ran.out, HasSubstr("NOT the same as live"));
+  const auto other = abbe(fmt::format("replay '{}' -c '{}'", recording.string(), files_.machine.string()));
+  EXPECT_EQ(other.exit, 0) << other.err;
 }
 
 }  // namespace

@@ -90,6 +90,15 @@ void print_json(const RecordingReader& recording, const ReplayReport& r, double 
   fmt::print("{}\n", out.dump(1));
 }
 
+/// With another configuration another model is what was asked for.
+int exit_code_of(const ReplayReport& report, const Arguments& arguments) {
+  constexpr int kDone = 0, kNoAnswer = 1;
+  const bool all_identified = std::all_of(report.calibrations.begin(), report.calibrations.end(),
+                                          [](const auto& c) { return c.outcome && *c.outcome; });
+  const bool must_agree = !report.live_model_ids.empty() && arguments.config.empty();
+  return all_identified && (!must_agree || same_as_live(report)) ? kDone : kNoAnswer;
+}
+
 int run(const Arguments& arguments) {
   const auto start = std::chrono::steady_clock::now();
   const auto recording = RecordingReader::open(arguments.file);
@@ -110,17 +119,17 @@ int run(const Arguments& arguments) {
   } else {
     print_report(*result, wall_s);
   }
-  const bool all_identified = std::all_of(result->calibrations.begin(), result->calibrations.end(),
-                                          [](const auto& c) { return c.outcome && *c.outcome; });
-  return all_identified ? 0 : 1;
+  return exit_code_of(*result, arguments);
 }
 
 }  // namespace
 
 void add_replay(CLI::App& parent, int& exit) {
   auto arguments = std::make_shared<Arguments>();
-  auto* command =
-      parent.add_subcommand("replay", "A recording once more: the same snapshots, the same model");
+  auto* command = parent.add_subcommand(
+      "replay",
+      "A recording once more: the same snapshots, the same model.\n"
+      "Exit code 1 if a calibration gives no model, or (unless -c is given) another than live.");
   command->add_option("FILE", arguments->file, "recording (.mcap, also an unfinished .mcap.part)")
       ->required();
   command->add_flag("--raw", arguments->raw, "from the raw device bytes instead of the decoded samples");

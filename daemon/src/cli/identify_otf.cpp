@@ -9,7 +9,6 @@
 #include "abbe/calib/otf/identify.hpp"
 #include "abbe/daemon/input_files.hpp"
 #include "abbe/daemon/model_document.hpp"
-#include "abbe/daemon/otf_blocks.hpp"
 #include "abbe/daemon/otf_inputs.hpp"
 #include "abbe/daemon/sha256.hpp"
 #include "cli/commands.hpp"
@@ -75,16 +74,14 @@ std::string_view words(otf::Stage stage) {
 Result<Outcome> identify(const Inputs& inputs, const Arguments& arguments, ProgressBar& bar) {
   const auto machine = otf_machine(inputs.config.machine);
   if (!machine) return tl::make_unexpected(machine.error());
-  otf::Options options;
-  options.block_samples =
-      arguments.block_samples > 0 ? arguments.block_samples : otf_block_samples(inputs.tracker.points);
+  otf::Options options = otf_options(inputs.tracker.points, inputs.config.gate);
+  if (arguments.block_samples > 0) options.block_samples = arguments.block_samples;
   options.progress = [&](otf::Stage stage, double fraction) { bar.show(words(stage), fraction); };
   const auto found = otf::identify(inputs.tracker.points, *machine, otf_path(inputs.path.vertices_m),
                                    otf_noise(inputs.config.machine), options);
   if (!found) return tl::make_unexpected(error_of(found.error()));
-  const calib::GateLimits limits{.max_error_m = inputs.config.gate.max_error_m,
-                                 .max_gradient = inputs.config.gate.max_gradient};
-  auto verdict = otf::judge(found->observations, found->solution, nullptr, limits, options);
+  auto verdict =
+      otf::judge(found->observations, found->solution, nullptr, gate_limits(inputs.config.gate), options);
   if (!verdict) return tl::make_unexpected(error_of(verdict.error()));
   const auto now = std::chrono::time_point_cast<std::chrono::nanoseconds>(std::chrono::system_clock::now());
   return Outcome{otf_document(found->solution, inputs.config, inputs.sources, now), std::move(*verdict),

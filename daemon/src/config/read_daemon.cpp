@@ -79,7 +79,6 @@ void read_gate(Section& root, Config& out) {
   section.get("max_error_mm", gate.max_error_m, kMilli, kPositive);
   section.get("max_gradient", gate.max_gradient, kPlain, kPositive);
   section.get("holdout_fraction", gate.holdout_fraction, kPlain, {0.05, 0.5});
-  section.get("accept", gate.accept);
   section.close();
 }
 

@@ -1,13 +1,11 @@
 #include "abbe/daemon/otf_identification.hpp"
 
-#include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <utility>
 
 #include "abbe/calib/otf/judge.hpp"
 #include "abbe/calib/otf/observe.hpp"
-#include "abbe/daemon/otf_blocks.hpp"
 #include "abbe/daemon/otf_inputs.hpp"
 #include "abbe/daemon/sha256.hpp"
 
@@ -42,9 +40,7 @@ Result<OtfCandidate> identify_run(const OtfRun& run, const MachineConfig& machin
   const auto machine = otf_machine(machine_config);
   if (!machine) return tl::unexpected(machine.error());
   const auto points = otf_observations(run.points);
-  calib::otf::Options options;
-  options.block_samples = otf_block_samples(points);
-  options.held_out_folds = static_cast<std::size_t>(std::lround(1.0 / gate.holdout_fraction));
+  calib::otf::Options options = otf_options(points, gate);
   if (progress) {
     options.progress = [&progress](calib::otf::Stage stage, double fraction) {
       progress(overall(stage, fraction));
@@ -55,8 +51,7 @@ Result<OtfCandidate> identify_run(const OtfRun& run, const MachineConfig& machin
   if (!observations) return tl::unexpected(error_of(observations.error()));
   auto solution = calib::otf::solve(*observations, options);
   if (!solution) return tl::unexpected(error_of(solution.error()));
-  const calib::GateLimits limits{.max_error_m = gate.max_error_m, .max_gradient = gate.max_gradient};
-  auto verdict = calib::otf::judge(*observations, *solution, active, limits, options);
+  auto verdict = calib::otf::judge(*observations, *solution, active, gate_limits(gate), options);
   if (!verdict) return tl::unexpected(error_of(verdict.error()));
   return OtfCandidate{std::move(*solution), std::move(*verdict)};
 }

@@ -3,7 +3,10 @@
 #include <fmt/format.h>
 
 #include <chrono>
+#include <cmath>
 #include <string>
+
+#include "abbe/daemon/otf_blocks.hpp"
 
 namespace abbe::daemon {
 
@@ -47,6 +50,18 @@ std::vector<calib::otf::TrackerObservation> otf_observations(std::span<const Run
          .valid = p.usable});
   }
   return out;
+}
+
+calib::otf::Options otf_options(std::span<const calib::otf::TrackerObservation> points,
+                                const GateConfig& gate) {
+  calib::otf::Options options;
+  options.block_samples = otf_block_samples(points);
+  options.held_out_folds = static_cast<std::size_t>(std::lround(1.0 / gate.holdout_fraction));
+  return options;
+}
+
+calib::GateLimits gate_limits(const GateConfig& gate) {
+  return {.max_error_m = gate.max_error_m, .max_gradient = gate.max_gradient};
 }
 
 Error error_of(const calib::Error& error) {

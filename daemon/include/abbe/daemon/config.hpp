@@ -151,8 +151,6 @@ struct GateConfig {
   double max_error_m = 1e-3;      ///< largest |V| inside the validity volume
   double max_gradient = 5e-3;     ///< largest |dV/dq|, m per m; 250 um between nodes 50 mm apart
   double holdout_fraction = 0.2;  ///< share of the legs a fit does not see while it is judged by them
-  std::vector<std::string>
-      accept;  ///< by name: what the data of a method cannot show and the site takes upon itself
 };
 
 /// [control]

@@ -5,6 +5,7 @@
 #include <span>
 #include <vector>
 
+#include "abbe/calib/gate.hpp"
 #include "abbe/calib/otf/run.hpp"
 #include "abbe/daemon/config.hpp"
 #include "abbe/daemon/error.hpp"
@@ -18,6 +19,10 @@ namespace abbe::daemon {
 [[nodiscard]] calib::otf::Path otf_path(std::span<const AxisPosition> path_m);
 /// Time is the tracker's own clock from the first point on.
 [[nodiscard]] std::vector<calib::otf::TrackerObservation> otf_observations(std::span<const RunPoint> points);
+/// How these points are fitted and judged under [gate]: the same for the daemon, a replay and files.
+[[nodiscard]] calib::otf::Options otf_options(std::span<const calib::otf::TrackerObservation> points,
+                                              const GateConfig& gate);
+[[nodiscard]] calib::GateLimits gate_limits(const GateConfig& gate);
 
 /// An error of the mathematics in the daemon's words and exit codes.
 [[nodiscard]] Error error_of(const calib::Error& error);

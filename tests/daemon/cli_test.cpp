@@ -262,5 +262,35 @@ TEST_F(Cli, AReplayThatDoesNotGiveTheLiveModelFails) {
   EXPECT_EQ(other.exit, 0) << other.err;
 }
 
+TEST_F(Cli, TheConfigurationNamesTheStore) {
+  const auto config =
+      write("daemon.toml", test::synthetic_machine_toml() + "[daemon]\ndata_dir = \"data\"\n");
+  auto store = ModelStore::open(folder_ / "data" / "models").value();
+  const StoreActor actor{"tester", "test", {}};
+  const auto id = store.add(test::synthetic_document(1), true, {}, actor).value();
+  const auto activated = abbe(fmt::format("model activate {} -c '{}'", id, config.string()));
+  EXPECT_EQ(activated.exit, 0) << activated.err;
+  EXPECT_EQ(store.active_id().value(), id);
+  EXPECT_THAT(abbe(fmt::format("model list -c '{}'", config.string())).out, HasSubstr(id));
+}
+
+TEST_F(Cli, EvaluatesAModelOfTheStoreByItsNameThere) {
+  const auto folder = folder_ / "evaluated";
+  auto store = ModelStore::open(folder).value();
+  const StoreActor actor{"tester", "test", {}};
+  const auto id = store.add(test::synthetic_document(2), true, {}, actor).value();
+  ASSERT_TRUE(store.activate(id, actor));
+  const auto points = write("one_point.csv", "x_mm,y_mm,z_mm\n10,-20,-250\n");
+  const auto eval = [&](const std::string& model) {
+    return abbe(
+        fmt::format("model eval '{}' --points '{}' --store '{}'", model, points.string(), folder.string()));
+  };
+  const auto by_file = eval(store.model_path(id).string());
+  ASSERT_EQ(by_file.exit, 0) << by_file.err;
+  EXPECT_EQ(eval("active").out, by_file.out);
+  EXPECT_EQ(eval(id.substr(0, 8)).out, by_file.out);
+  EXPECT_EQ(eval("ffff").exit, 2);
+}
+
 }  // namespace
 }  // namespace abbe::daemon

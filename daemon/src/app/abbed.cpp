@@ -138,7 +138,7 @@ struct Abbed::State {
   }
 
   Result<void> open_models() {
-    auto opened = ModelAuthority::open(config.daemon.data_dir / "models", config, utc, time.now());
+    auto opened = ModelAuthority::open(config.daemon.models_dir(), config, utc, time.now());
     if (!opened) return tl::unexpected(opened.error());
     authority.emplace(std::move(*opened));
     calibration.emplace(config, *authority, recorder.get(), utc);

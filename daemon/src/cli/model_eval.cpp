@@ -10,6 +10,7 @@
 #include "abbe/daemon/model_document.hpp"
 #include "abbe/daemon/otf_inputs.hpp"
 #include "cli/commands.hpp"
+#include "cli/store_option.hpp"
 #include "cli/terminal.hpp"
 
 namespace abbe::daemon {
@@ -21,6 +22,7 @@ constexpr double kUmPerM = 1e6;
 
 struct Arguments {
   std::string model, points, tool;
+  StoreOption store;
   bool correction = false;
 };
 
@@ -78,8 +80,21 @@ Result<std::string> row(const calib::VolumetricModel& model, const AxisPosition&
   return text + (inside ? "1\n" : "0\n");
 }
 
+/// A file, or else a model of the store. What looks like a path is never looked up there.
+Result<ModelDocument> model_of(const Arguments& arguments) {
+  std::error_code ignored;
+  const std::filesystem::path file = arguments.model;
+  if (file.has_parent_path() || file.has_extension() || std::filesystem::exists(file, ignored))
+    return read_model(file);
+  const auto store = open_store(arguments.store);
+  if (!store) return tl::make_unexpected(store.error());
+  const auto id = store->find(arguments.model);
+  if (!id) return tl::make_unexpected(id.error());
+  return store->load(*id);
+}
+
 Result<std::string> evaluate(const Arguments& arguments) {
-  const auto document = read_model(arguments.model);
+  const auto document = model_of(arguments);
   if (!document) return tl::make_unexpected(document.error());
   const auto points = read_points_csv(arguments.points);
   if (!points) return tl::make_unexpected(points.error());
@@ -114,7 +129,11 @@ void add_model_eval(CLI::App& parent, int& exit) {
       "The volumetric error at given axis positions, as CSV on stdout.\n"
       "e = actual - nominal at the scale reading; u its standard uncertainty (k = 1) in the model's gauge;\n"
       "inside: 1 where the model's data reach.");
-  command->add_option("MODEL", arguments->model, "model.json")->required();
+  command
+      ->add_option("MODEL", arguments->model,
+                   "model.json; or, of the store, an id, the beginning of one, \"active\"")
+      ->required();
+  add_store_options(*command, arguments->store);
   command->add_option("--points", arguments->points, "points.csv: x_mm,y_mm,z_mm, scale readings")
       ->required();
   command->add_option("--tool", arguments->tool,

@@ -1,15 +1,14 @@
 /// `abbe model list|show|activate|rollback`: a machine's store of models.
 
 #include <fmt/format.h>
-#include <pwd.h>
-#include <unistd.h>
 
 #include <chrono>
 #include <memory>
 #include <nlohmann/json.hpp>
 
-#include "abbe/daemon/model_store.hpp"
 #include "cli/commands.hpp"
+#include "cli/daemon_socket.hpp"
+#include "cli/store_option.hpp"
 #include "cli/terminal.hpp"
 #include "model/utc_text.hpp"
 
@@ -18,18 +17,13 @@ namespace abbe::daemon {
 namespace {
 
 struct Arguments {
-  std::string store = "/var/lib/abbe/models";
+  StoreOption store;
   std::string id, why;
   bool json = false, force = false;
 };
 
-void add_store_option(CLI::App& command, Arguments& arguments) {
-  command.add_option("--store", arguments.store, "folder of the store")->capture_default_str();
-}
-
 StoreActor actor(const Arguments& arguments) {
-  const passwd* const user = ::getpwuid(::getuid());
-  return {user != nullptr ? user->pw_name : fmt::format("uid {}", ::getuid()), arguments.why,
+  return {user_name(), arguments.why,
           std::chrono::time_point_cast<std::chrono::nanoseconds>(std::chrono::system_clock::now())};
 }
 
@@ -62,7 +56,7 @@ void print_table(const std::vector<StoreEntry>& entries) {
 }
 
 int list(const Arguments& arguments) {
-  const auto store = ModelStore::open(arguments.store);
+  const auto store = open_store(arguments.store);
   if (!store) return report(store.error());
   const auto entries = store->list();
   if (!entries) return report(entries.error());
@@ -103,7 +97,7 @@ Result<StoreEntry> entry_of(const ModelStore& store, const std::string& id) {
 }
 
 int show(const Arguments& arguments) {
-  const auto store = ModelStore::open(arguments.store);
+  const auto store = open_store(arguments.store);
   if (!store) return report(store.error());
   const auto id = store->find(arguments.id);
   if (!id) return report(id.error());
@@ -120,7 +114,7 @@ int show(const Arguments& arguments) {
 }
 
 int activate(const Arguments& arguments) {
-  auto store = ModelStore::open(arguments.store);
+  auto store = open_store(arguments.store);
   if (!store) return report(store.error());
   const auto id = store->find(arguments.id);
   if (!id) return report(id.error());
@@ -131,7 +125,7 @@ int activate(const Arguments& arguments) {
 }
 
 int rollback(const Arguments& arguments) {
-  auto store = ModelStore::open(arguments.store);
+  auto store = open_store(arguments.store);
   if (!store) return report(store.error());
   const auto id = store->rollback(actor(arguments));
   if (!id) return report(id.error());
@@ -144,7 +138,7 @@ int rollback(const Arguments& arguments) {
 void add_model_list(CLI::App& parent, int& exit) {
   auto arguments = std::make_shared<Arguments>();
   auto* command = parent.add_subcommand("list", "All models of the store, newest first");
-  add_store_option(*command, *arguments);
+  add_store_options(*command, arguments->store);
   command->add_flag("--json", arguments->json, "as a JSON array");
   command->callback([arguments, &exit] { exit = list(*arguments); });
 }
@@ -153,7 +147,7 @@ void add_model_show(CLI::App& parent, int& exit) {
   auto arguments = std::make_shared<Arguments>();
   auto* command = parent.add_subcommand("show", "One model: where it came from, how good it is, its tables");
   command->add_option("ID", arguments->id, "id, the beginning of one, or \"active\"")->required();
-  add_store_option(*command, *arguments);
+  add_store_options(*command, arguments->store);
   command->add_flag("--json", arguments->json, "the whole model.json");
   command->callback([arguments, &exit] { exit = show(*arguments); });
 }
@@ -163,7 +157,7 @@ void add_model_activate(CLI::App& parent, int& exit) {
   auto* command =
       parent.add_subcommand("activate", "Make a model the active one; who did it and why is kept");
   command->add_option("ID", arguments->id, "id, or the beginning of one")->required();
-  add_store_option(*command, *arguments);
+  add_store_options(*command, arguments->store);
   command->add_option("--why", arguments->why, "the reason, for the record; needed with --force");
   command->add_flag("--force", arguments->force, "also a model the gate refused");
   command->callback([arguments, &exit] {
@@ -177,7 +171,7 @@ void add_model_activate(CLI::App& parent, int& exit) {
 void add_model_rollback(CLI::App& parent, int& exit) {
   auto arguments = std::make_shared<Arguments>();
   auto* command = parent.add_subcommand("rollback", "Go back to the model that was active before");
-  add_store_option(*command, *arguments);
+  add_store_options(*command, arguments->store);
   command->add_option("--why", arguments->why, "the reason, for the record");
   command->callback([arguments, &exit] { exit = rollback(*arguments); });
 }

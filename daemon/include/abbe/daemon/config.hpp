@@ -107,6 +107,7 @@ enum class RealTimeMode { Enforce, Ignore };
 /// [daemon]
 struct DaemonConfig {
   std::filesystem::path data_dir = "/var/lib/abbe";
+  [[nodiscard]] std::filesystem::path models_dir() const { return data_dir / "models"; }
   std::filesystem::path runtime_dir = "/run/abbe";
   std::chrono::nanoseconds hub_period{std::chrono::microseconds{250}};
   std::chrono::nanoseconds watermark{

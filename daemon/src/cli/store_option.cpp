@@ -1,0 +1,22 @@
+#include "cli/store_option.hpp"
+
+#include <CLI/Config.hpp>
+#include <CLI/Formatter.hpp>
+
+#include "abbe/daemon/config.hpp"
+
+namespace abbe::daemon {
+
+void add_store_options(CLI::App& command, StoreOption& where) {
+  auto* store = command.add_option("--store", where.folder, "folder of the store")->capture_default_str();
+  command.add_option("-c,--config", where.config, "the store of this abbed.toml")->excludes(store);
+}
+
+Result<ModelStore> open_store(const StoreOption& where) {
+  if (where.config.empty()) return ModelStore::open(where.folder);
+  const auto config = load_config(where.config);
+  if (!config) return tl::unexpected(config.error());
+  return ModelStore::open(config->daemon.models_dir());
+}
+
+}  // namespace abbe::daemon

@@ -1,0 +1,19 @@
+#pragma once
+/// How a command finds the store of models: --store, or the configuration of the daemon it belongs to.
+
+#include <CLI/App.hpp>
+#include <string>
+
+#include "abbe/daemon/model_store.hpp"
+
+namespace abbe::daemon {
+
+struct StoreOption {
+  std::string folder = "/var/lib/abbe/models";
+  std::string config;
+};
+
+void add_store_options(CLI::App& command, StoreOption& where);
+[[nodiscard]] Result<ModelStore> open_store(const StoreOption& where);
+
+}  // namespace abbe::daemon

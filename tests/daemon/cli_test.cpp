@@ -1,14 +1,17 @@
 /// `abbe` as people use it: the built program as a process, its files, output and exit codes.
 
 #include <gmock/gmock.h>
+#include <signal.h>
 #include <sys/wait.h>
 
 #include <cstdlib>
 #include <fstream>
+#include <functional>
 #include <nlohmann/json.hpp>
 #include <sstream>
 
 #include "abbe/calib/model_comparison.hpp"
+#include "abbe/daemon/control_protocol.hpp"
 #include "abbe/daemon/model_store.hpp"
 #include "abbe/daemon/recorder.hpp"
 #include "synthetic_model.hpp"
@@ -290,6 +293,57 @@ TEST_F(Cli, EvaluatesAModelOfTheStoreByItsNameThere) {
   EXPECT_EQ(eval("active").out, by_file.out);
   EXPECT_EQ(eval(id.substr(0, 8)).out, by_file.out);
   EXPECT_EQ(eval("ffff").exit, 2);
+}
+
+/// A daemon that goes through the given states, one a question; `at_question` is told how many there were.
+struct ScriptedDaemon {
+  std::vector<nlohmann::json> sessions;
+  std::function<void(std::size_t)> at_question = [](std::size_t) {};
+  std::size_t asked = 0;
+
+  nlohmann::json operator()(const nlohmann::json& request) {
+    if (request["do"] != "status") return {{"ok", true}};
+    at_question(asked);
+    const auto& session = sessions[std::min(asked++, sessions.size() - 1)];
+    return {{"ok", true}, {"session", session}};
+  }
+};
+
+nlohmann::json session(const std::string& state, const std::string& reason) {
+  return {
+      {"state", state}, {"reason", reason}, {"progress", 0.5}, {"model_id", state == "active" ? "abcd" : ""}};
+}
+
+TEST_F(Cli, CalibrateSaysWhatIsWaitedForAtEveryStep) {
+  const auto socket = folder_ / "told.sock";
+  const auto daemon = ControlServer::open(
+      socket,
+      ScriptedDaemon{{session("warming", "waiting for the machine to stand at (1.000, 2.000, 3.000) mm"),
+                      session("acquiring", "driving the path"), session("active", "accepted")}});
+  ASSERT_TRUE(daemon);
+  const auto ran =
+      abbe(fmt::format("calibrate otf --path '{}' --socket '{}'", files_.path.string(), socket.string()));
+  EXPECT_EQ(ran.exit, 0) << ran.err;
+  EXPECT_THAT(ran.err, AllOf(HasSubstr("warming: waiting for the machine to stand at (1.000"),
+                             HasSubstr("acquiring: driving the path")));
+  EXPECT_THAT(ran.out, StartsWith("active abcd"));
+}
+
+TEST_F(Cli, CalibrateInterruptedSaysHowToCancel) {
+  const auto socket = folder_ / "left.sock", pid_file = folder_ / "left.pid";
+  ScriptedDaemon script{{session("acquiring", "driving the path")}};
+  script.at_question = [&pid_file](std::size_t n) {
+    if (n == 1) ::kill(std::stoi(text_of(pid_file)), SIGINT);
+  };
+  const auto daemon = ControlServer::open(socket, script);
+  ASSERT_TRUE(daemon);
+  const auto command =
+      fmt::format("sh -c 'echo $$ >{}; exec {} calibrate otf --path {} --socket {}' 2>{}", pid_file.string(),
+                  ABBE_PROGRAM, files_.path.string(), socket.string(), (folder_ / "left.err").string());
+  const int status = std::system(command.c_str());
+  ASSERT_TRUE(WIFEXITED(status));
+  EXPECT_EQ(WEXITSTATUS(status), 130);
+  EXPECT_THAT(text_of(folder_ / "left.err"), HasSubstr("--cancel --socket " + socket.string()));
 }
 
 }  // namespace

@@ -1,11 +1,13 @@
 /// `abbe calibrate otf`: asks the running daemon for a calibration and follows it to its verdict.
 
 #include <fmt/format.h>
+#include <signal.h>
 
 #include <CLI/App.hpp>
 #include <CLI/Config.hpp>
 #include <CLI/Formatter.hpp>
 #include <chrono>
+#include <csignal>
 #include <memory>
 #include <string>
 #include <thread>
@@ -46,10 +48,47 @@ int print_verdict(const json& session, bool as_json) {
   return session["model_id"].get<std::string>().empty() ? 1 : 5;
 }
 
+volatile std::sig_atomic_t interrupted = 0;  // written by the signal handler
+
+/// Ctrl-C ends the looking on, not the calibration: that takes a word to the daemon.
+void leave_on_interrupt() {
+  struct sigaction leave {};
+  leave.sa_handler = [](int) { interrupted = 1; };
+  ::sigaction(SIGINT, &leave, nullptr);
+}
+
+int say_how_to_cancel(const std::filesystem::path& socket) {
+  constexpr int kInterrupted = 128 + SIGINT;  // what a shell reports
+  fmt::print(stderr, "abbe: the calibration goes on; end it with: abbe calibrate otf --cancel --socket {}\n",
+             socket.string());
+  return kInterrupted;
+}
+
+/// One line whenever the daemon is about something else: "warming: waiting for the machine to stand at ...".
+class Narrator {
+ public:
+  void tell(ProgressBar& bar, const std::string& state, const std::string& reason) {
+    std::string line = fmt::format("{}: {}", state, reason);
+    if (line == told_) return;
+    bar.clear();
+    fmt::print(stderr, "{}\n", line);
+    told_ = std::move(line);
+  }
+
+ private:
+  std::string told_;
+};
+
 int follow(const std::filesystem::path& socket, bool as_json) {
+  leave_on_interrupt();
   ProgressBar bar;
+  Narrator narrator;
   auto answered = std::chrono::steady_clock::now();
   for (;; std::this_thread::sleep_for(kLook)) {
+    if (interrupted != 0) {
+      bar.clear();
+      return say_how_to_cancel(socket);
+    }
     const auto status = ask_daemon(socket, {{"do", "status"}});
     const auto now = std::chrono::steady_clock::now();
     if (!status) {
@@ -64,6 +103,7 @@ int follow(const std::filesystem::path& socket, bool as_json) {
       bar.clear();
       return print_verdict(session, as_json);
     }
+    narrator.tell(bar, state, session["reason"]);
     bar.show(state, session["progress"].get<double>());
   }
 }
@@ -89,9 +129,11 @@ int calibrate(const Arguments& arguments) {
 
 void add_calibrate_otf(CLI::App& parent, int& exit) {
   auto arguments = std::make_shared<Arguments>();
-  auto* command = parent.add_subcommand("otf",
-                                        "On the fly with a laser tracker: waits until the machine stands at "
-                                        "the first vertex, then drive the path");
+  auto* command =
+      parent.add_subcommand("otf",
+                            "On the fly with a laser tracker: waits until the machine stands at "
+                            "the first vertex, then drive the path.\n"
+                            "Ctrl-C ends the looking on (exit code 130), --cancel the calibration.");
   auto* path =
       command->add_option("--path", arguments->path_file, "the path the machine will drive: x_mm,y_mm,z_mm");
   add_socket_options(*command, arguments->where);

@@ -23,10 +23,11 @@ namespace {
 constexpr std::string_view kFooter =
     "Programs of their own: `abbe sim ...` runs abbe-sim, `abbe watch ...` runs abbe-watch.\n"
     "Exit codes: 0 done; 1 the data do not allow an answer (rank, alignment, too few points), or a replay "
-    "gave another "
-    "model;\n"
+    "gave "
+    "another model;\n"
     "2 usage; 3 bad input file; 4 input or output failed; 5 refused, by the gate or by what the daemon is "
-    "doing.\n"
+    "doing;\n"
+    "130 interrupted while following a calibration, which goes on.\n"
     "Lengths are mm, small errors um, angles rad or urad, times s: the unit stands in every column and key.";
 
 /// Subcommands that are programs, as git has them.

@@ -3,6 +3,7 @@
 #include <sched.h>
 #include <signal.h>
 #include <spawn.h>
+#include <sys/prctl.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
@@ -48,6 +49,13 @@ class SpawnAttributes {
   posix_spawnattr_t attributes_{};
 };
 
+/// What abbed may do for real time (CAP_SYS_NICE, CAP_IPC_LOCK as ambient capabilities of its unit) is not
+/// for the process that strangers can talk to. Only what a program started from here inherits is cleared;
+/// this one keeps its own.
+void keep_capabilities_from_children() {
+  ::prctl(PR_CAP_AMBIENT, PR_CAP_AMBIENT_CLEAR_ALL, 0UL, 0UL, 0UL);
+}
+
 }  // namespace
 
 Result<DdsSupervisor> DdsSupervisor::start(Options options, WallTime now) {
@@ -90,6 +98,7 @@ Result<void> DdsSupervisor::spawn(WallTime now) {
   for (std::string& argument : options_.arguments) argv.push_back(argument.data());
   argv.push_back(nullptr);
   const SpawnAttributes attributes;
+  keep_capabilities_from_children();
   pid_t child = 0;
   if (const int error =
           ::posix_spawn(&child, program.c_str(), nullptr, attributes.get(), argv.data(), environ)) {

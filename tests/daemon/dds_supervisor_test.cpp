@@ -1,11 +1,18 @@
 #include "abbe/daemon/dds_supervisor.hpp"
 
 #include <gtest/gtest.h>
+#include <linux/capability.h>
 #include <poll.h>
 #include <signal.h>
+#include <sys/prctl.h>
 #include <sys/syscall.h>
 #include <sys/wait.h>
 #include <unistd.h>
+
+#include <array>
+#include <optional>
+#include <string>
+#include <thread>
 
 namespace abbe::daemon {
 namespace {
@@ -73,6 +80,35 @@ TEST(DdsSupervisor, TellsTheChildWhoItsParentIs) {
   wait_for_end(supervisor->pid());
   supervisor->poll(WallTime{1ms});
   EXPECT_EQ(supervisor->last_end(), "exit code 7");
+}
+
+/// CAP_IPC_LOCK in the calling thread's ambient set, as systemd gives it to abbed. False where the system
+/// does not allow it.
+bool take_an_ambient_capability() {
+  __user_cap_header_struct header{_LINUX_CAPABILITY_VERSION_3, 0};
+  std::array<__user_cap_data_struct, 2> sets{};
+  if (::syscall(SYS_capget, &header, sets.data()) != 0) return false;
+  sets[0].inheritable |= 1u << CAP_IPC_LOCK;
+  return ::syscall(SYS_capset, &header, sets.data()) == 0 &&
+         ::prctl(PR_CAP_AMBIENT, PR_CAP_AMBIENT_RAISE, CAP_IPC_LOCK, 0UL, 0UL) == 0;
+}
+
+TEST(DdsSupervisor, TheChildInheritsNoCapability) {
+  std::optional<std::string> ended;
+  std::thread([&ended] {  // a thread of its own: capabilities are a thread's
+    if (!take_an_ambient_capability()) return;
+    auto supervisor = DdsSupervisor::start(shell("while read name set; do [ \"$name\" = CapAmb: ] && [ "
+                                                 "\"$set\" = 0000000000000000 ] && exit 7; done "
+                                                 "</proc/self/status; exit 8"),
+                                           WallTime{});
+    ASSERT_TRUE(supervisor.has_value());
+    wait_for_end(supervisor->pid());
+    supervisor->poll(WallTime{1ms});
+    ended = supervisor->last_end();
+  })
+      .join();
+  if (!ended) GTEST_SKIP() << "this user may not raise an ambient capability";
+  EXPECT_EQ(*ended, "exit code 7");
 }
 
 TEST(DdsSupervisor, StopsItsChildWhenItGoes) {

@@ -1,6 +1,7 @@
 #pragma once
 /// Starts abbe-dds as a child of abbed and starts it again when it dies: at once if it had been up for a
-/// while, with a growing delay if it dies at start (bad profile, port in use). Knows its child by pid only.
+/// while, with a growing delay if it dies at start (bad profile, port in use). Knows its child by pid only;
+/// the child inherits none of abbed's capabilities.
 /// Used by one thread that is not real-time; never blocks but in the destructor.
 
 #include <sys/types.h>

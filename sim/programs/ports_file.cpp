@@ -12,11 +12,16 @@ Result<void> announce_ports(const Ports& ports, const std::string& path) {
   std::string lines;
   if (ports.tracker) lines += fmt::format("tracker_port={}\n", *ports.tracker);
   if (ports.can) lines += fmt::format("can_port={}\n", *ports.can);
+  for (const NamedPlace& place : ports.environment) {
+    lines += place.port != 0 ? fmt::format("{}_port={}\n", place.name, place.port)
+                             : fmt::format("{}_path=\"{}\"\n", place.name, place.path);
+  }
   if (!path.empty()) {
     if (const auto written = write_file(path, lines); !written) return written;
   }
   if (ports.tracker) fmt::print("tracker: emScon on 127.0.0.1:{}\n", *ports.tracker);
   if (ports.can) fmt::print("encoders: CAN over UDP on 127.0.0.1:{}\n", *ports.can);
+  for (const NamedPlace& place : ports.environment) fmt::print("{}: {}\n", place.name, place.where);
   std::fflush(stdout);
   return {};
 }

@@ -6,14 +6,24 @@
 #include <cstdint>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "abbe/sim/error.hpp"
 
 namespace abbe::sim {
 
+/// A device of [[sim.environment]]: `NAME_port=N`, or `NAME_path="PATH"` on a pseudo terminal.
+struct NamedPlace {
+  std::string name;
+  std::string where;       ///< for people
+  std::uint16_t port = 0;  ///< 0: on a pseudo terminal
+  std::string path;
+};
+
 struct Ports {
   std::optional<std::uint16_t> tracker;
   std::optional<std::uint16_t> can;
+  std::vector<NamedPlace> environment;
 };
 
 /// The file is there before anything is printed. Empty path: no file.

@@ -80,9 +80,10 @@ int run(const RunOptions& options) {
   const EventLoop loop(setup->speed);
   auto simulation = Simulation::open(setup->simulation, loop.clock().now());
   if (!simulation) return report(simulation.error());
-  if (const auto announced = announce_ports({(*simulation)->tracker()->port(), (*simulation)->bus()->port()},
-                                            options.ports_file);
-      !announced)
+  Ports ports{(*simulation)->tracker()->port(), (*simulation)->bus()->port(), {}};
+  for (const ModbusServer& server : (*simulation)->environment())
+    ports.environment.push_back({server.name(), server.where(), server.port(), server.path()});
+  if (const auto announced = announce_ports(ports, options.ports_file); !announced)
     return report(announced.error());
   Narrator narrator(setup->speed);
   while (!loop.stopped()) {

@@ -7,6 +7,7 @@
 
 #include "abbe/sim/random_truth.hpp"
 #include "abbe/sim/truth_table.hpp"
+#include "environment_setup.hpp"
 #include "files.hpp"
 #include "toml_section.hpp"
 
@@ -175,9 +176,11 @@ void read_faults(TomlSection& sim, std::vector<ScheduledFault>& faults) {
     std::int64_t node = 0;
     section.text("device", device);
     section.text("kind", kind);
-    if (device != "tracker" && device != "encoder")
-      section.fault("device", "must be \"tracker\" or \"encoder\"");
-    scheduled.target = device == "encoder" ? FaultTarget::Encoder : FaultTarget::Tracker;
+    if (device != "tracker" && device != "encoder" && device != "environment")
+      section.fault("device", "must be \"tracker\", \"encoder\" or \"environment\"");
+    scheduled.target = device == "encoder"       ? FaultTarget::Encoder
+                       : device == "environment" ? FaultTarget::Environment
+                                                 : FaultTarget::Tracker;
     const auto known = fault_kind(scheduled.target, kind);
     if (!known) section.fault("kind", fmt::format("\"{}\" is no fault of this device", kind));
     scheduled.fault.kind = known.value_or(FaultKind::Mute);
@@ -206,6 +209,7 @@ void read_sim(TomlSection sim, const std::string& file, Draft& draft) {
   read_port(encoder, "peer_port", simulation.bus->peer_port);
   encoder.number("noise_nm", draft.encoder_noise_m, 1e-9, kNotNegativeNumber);
   encoder.refuse_unknown_keys();
+  read_environment(sim, simulation.environment);
   read_faults(sim, simulation.faults);
   sim.refuse_unknown_keys();
 }

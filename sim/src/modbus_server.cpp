@@ -267,6 +267,9 @@ const std::string& ModbusServer::name() const {
 std::uint16_t ModbusServer::port() const {
   return state_->port_number;
 }
+std::string ModbusServer::path() const {
+  return state_->serial() ? state_->link() : std::string{};
+}
 std::string ModbusServer::where() const {
   return state_->serial() ? fmt::format("Modbus RTU on {}", state_->link())
                           : fmt::format("Modbus TCP on 127.0.0.1:{}", state_->port_number);

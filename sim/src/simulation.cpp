@@ -29,6 +29,11 @@ Result<std::unique_ptr<Simulation>> Simulation::open(const SimulationSetup& setu
     if (!bus) return tl::unexpected(bus.error());
     simulation->bus_.emplace(std::move(*bus));
   }
+  for (const ModbusServerOptions& options : setup.environment) {
+    auto server = ModbusServer::open(options, now);
+    if (!server) return tl::unexpected(server.error());
+    simulation->environment_.push_back(std::move(*server));
+  }
   if (!setup.start_when_streaming) simulation->machine_.start(now + setup.standstill);
   return simulation;
 }
@@ -38,6 +43,7 @@ void Simulation::poll(HostTime now) {
   start_machine();
   inject_faults(now);
   if (bus_) bus_->poll(now);
+  for (ModbusServer& server : environment_) server.poll(now);
 }
 
 void Simulation::start_machine() {
@@ -56,6 +62,13 @@ void Simulation::inject_faults(HostTime now) {
     }
 
     if (next.target == FaultTarget::Encoder && bus_) bus_->inject(next.fault, now);
+    if (next.target == FaultTarget::Environment) inject_environment(next.fault, now);
+  }
+}
+
+void Simulation::inject_environment(const Fault& fault, HostTime now) {
+  for (std::size_t i = 0; i < environment_.size(); ++i) {
+    if (fault.node == 0 || fault.node == i + 1) environment_[i].inject(fault, now);
   }
 }
 
@@ -63,6 +76,7 @@ HostTime Simulation::next_due() const {
   HostTime due = HostTime::max();
   if (tracker_) due = std::min(due, tracker_->next_due());
   if (bus_) due = std::min(due, bus_->next_due());
+  for (const ModbusServer& server : environment_) due = std::min(due, server.next_due());
   if (machine_.started() && next_fault_ < faults_.size()) {
     due = std::min(due, *machine_.started() + seconds_to_ns(faults_[next_fault_].fault.at_s));
   }
@@ -76,6 +90,7 @@ void Simulation::add_poll_fds(std::vector<pollfd>& fds) const {
     if (tracker_->client_fd() >= 0) fds.push_back({tracker_->client_fd(), events, 0});
   }
   if (bus_) fds.push_back({bus_->fd(), POLLIN, 0});
+  for (const ModbusServer& server : environment_) server.add_poll_fds(fds);
 }
 
 }  // namespace abbe::sim

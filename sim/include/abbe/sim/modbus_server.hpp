@@ -48,6 +48,7 @@ class ModbusServer {
 
   [[nodiscard]] const std::string& name() const;
   [[nodiscard]] std::uint16_t port() const;  ///< 0 on a pseudo terminal
+  [[nodiscard]] std::string path() const;    ///< of the pseudo terminal's link, empty with TCP
   /// "Modbus TCP on 127.0.0.1:40001", "Modbus RTU on /tmp/rtd"
   [[nodiscard]] std::string where() const;
 

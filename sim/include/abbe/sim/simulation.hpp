@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "abbe/sim/encoder_bus.hpp"
+#include "abbe/sim/modbus_server.hpp"
 #include "abbe/sim/tracker_server.hpp"
 
 namespace abbe::sim {
@@ -24,6 +25,7 @@ struct SimulationSetup {
   std::uint16_t tracker_port = 0;
   std::optional<EncoderBusOptions> bus;
   std::vector<EncoderNodeOptions> nodes;
+  std::vector<ModbusServerOptions> environment;
   std::vector<ScheduledFault> faults;
 };
 
@@ -41,17 +43,20 @@ class Simulation {
   [[nodiscard]] const VirtualMachine& machine() const { return machine_; }
   [[nodiscard]] std::optional<TrackerServer>& tracker() { return tracker_; }
   [[nodiscard]] std::optional<EncoderBus>& bus() { return bus_; }
+  [[nodiscard]] const std::vector<ModbusServer>& environment() const { return environment_; }
 
  private:
   Simulation(TruthMachine truth, PathMotion path, const SimulationSetup& setup);
   void start_machine();
   void inject_faults(HostTime now);
+  void inject_environment(const Fault& fault, HostTime now);
 
   VirtualMachine machine_;
   bool start_when_streaming_;
   std::chrono::nanoseconds standstill_;
   std::optional<TrackerServer> tracker_;
   std::optional<EncoderBus> bus_;
+  std::vector<ModbusServer> environment_;
   std::vector<ScheduledFault> faults_;  ///< by time
   std::size_t next_fault_ = 0;
 };

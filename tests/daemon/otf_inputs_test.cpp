@@ -1,9 +1,33 @@
 #include "abbe/daemon/otf_inputs.hpp"
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
+
+#include "synthetic_otf_run.hpp"
 
 namespace abbe::daemon {
 namespace {
+
+using testing::HasSubstr;
+
+MachineConfig machine() {
+  return parse_config(test::synthetic_machine_toml(), "machine.toml")->machine;
+}
+
+TEST(OtfPath, IsRefusedBeforeTheMachineDrivesIt) {
+  const std::vector<AxisPosition> outside{{0, 0, 0}, {0.05, 0, 0}, {0.05, 0.07, 0}};  // travel: 60 mm
+  const std::vector<AxisPosition> on_a_line{{0, 0, 0}, {0.01, 0, 0}, {0.05, 0, 0}};
+  for (const auto& [path, what] : {std::pair{outside, "axis travels"}, std::pair{on_a_line, "on a line"}}) {
+    const auto refused = check_otf_path(path, machine());
+    ASSERT_FALSE(refused);
+    EXPECT_EQ(refused.error().code, ErrorCode::BadInput);
+    EXPECT_THAT(refused.error().text, HasSubstr(what));
+  }
+}
+
+TEST(OtfPath, ThatCanBeIdentifiedIsTaken) {
+  EXPECT_TRUE(check_otf_path(std::vector<AxisPosition>{{0, 0, 0}, {0.05, 0, 0}, {0.05, 0.06, 0}}, machine()));
+}
 
 TEST(OtfInputs, TheGateOfTheConfigurationDecidesHowARunIsJudged) {
   const GateConfig gate{.max_error_m = 2e-3, .max_gradient = 1e-2, .holdout_fraction = 0.1};

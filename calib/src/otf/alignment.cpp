@@ -9,23 +9,6 @@
 namespace abbe::calib::otf {
 namespace {
 
-struct Centroid {
-  Vector3 centre_m = Vector3::Zero();
-  double length_m = 0.0;
-};
-
-/// Of a polyline, by length: a mean over time would be drawn to where the machine dwells and to slow corners.
-Centroid centroid(std::span<const Vector3> points) {
-  Centroid c;
-  for (std::size_t i = 0; i + 1 < points.size(); ++i) {
-    const double length = (points[i + 1] - points[i]).norm();
-    c.centre_m += 0.5 * length * (points[i] + points[i + 1]);
-    c.length_m += length;
-  }
-  c.centre_m /= c.length_m;
-  return c;
-}
-
 /// Start, means of the blocks that have samples, end.
 std::vector<Vector3> seen(const BlockSeries& series) {
   std::vector<Vector3> points{series.start_tracker_m};
@@ -39,19 +22,8 @@ std::vector<Vector3> seen(const BlockSeries& series) {
 }
 
 Result<void> check(const BlockSeries& series, const Path& path) {
-  for (const Vector3& v : path.vertices_m) {
-    if (!v.allFinite()) {
-      return failure(ErrorCode::NotFinite, "path: a vertex is not a number");
-    }
-  }
-  if (path.vertices_m.size() < 3) {
-    return failure(ErrorCode::BadInput,
-                   message("path: ", path.vertices_m.size(), " vertices, needs at least 3"));
-  }
-  for (std::size_t i = 0; i + 1 < path.vertices_m.size(); ++i) {
-    if (path.vertices_m[i] == path.vertices_m[i + 1]) {
-      return failure(ErrorCode::BadInput, message("path: vertices ", i, " and ", i + 1, " coincide"));
-    }
+  if (Result<void> fine = check(path); !fine) {
+    return fine;
   }
   if (std::count_if(series.blocks.begin(), series.blocks.end(), [](const Block& b) { return b.usable; }) <
       4) {
@@ -65,14 +37,6 @@ Result<RigidTransform> rough(const BlockSeries& series, const Centroid& measured
                              const Centroid& nominal, const Vector3& t) {
   const Vector3& start = path.vertices_m.front();
   const Vector3 to_centre = nominal.centre_m - start, to_end = path.vertices_m.back() - start;
-  // An angle below 1 degree at the start lets the roll about the line depend on the errors of the machine.
-  constexpr double kCollinear = 0.017;
-  if (to_centre.cross(to_end).norm() <= kCollinear * to_centre.norm() * to_end.norm()) {
-    return failure(
-        ErrorCode::DegenerateGeometry,
-        message("rough alignment: start (", start.transpose(), "), end (", path.vertices_m.back().transpose(),
-                ") and centroid (", nominal.centre_m.transpose(), ") m of the path lie on a line"));
-  }
   const Vector3 m_centre = measured.centre_m - series.start_tracker_m;
   const Vector3 m_end = series.end_tracker_m - series.start_tracker_m;
   const Matrix3 cross = to_centre * m_centre.transpose() + to_end * m_end.transpose();
@@ -211,12 +175,6 @@ Result<void> refine(Alignment& a, Pairs& pairs, const BlockSeries& series, const
 }
 
 }  // namespace
-
-LegPoint closest_on_leg(const Vector3& from_m, const Vector3& to_m, const Vector3& p_m) {
-  const Vector3 direction = (to_m - from_m).normalized();
-  const double along_m = direction.dot(p_m - from_m);
-  return {from_m + along_m * direction, along_m};
-}
 
 Result<Alignment> align(const BlockSeries& series, const Machine& machine, const Path& path,
                         const Options& options) {

@@ -17,6 +17,8 @@ namespace abbe::daemon {
 [[nodiscard]] Result<calib::otf::Machine> otf_machine(const MachineConfig& machine);
 [[nodiscard]] calib::otf::Noise otf_noise(const MachineConfig& machine);
 [[nodiscard]] calib::otf::Path otf_path(std::span<const AxisPosition> path_m);
+/// BadInput when no run along the path could be identified: too few vertices, on a line, outside the travel.
+[[nodiscard]] Result<void> check_otf_path(std::span<const AxisPosition> path_m, const MachineConfig& machine);
 /// Time is the tracker's own clock from the first point on.
 [[nodiscard]] std::vector<calib::otf::TrackerObservation> otf_observations(std::span<const RunPoint> points);
 /// How these points are fitted and judged under [gate]: the same for the daemon, a replay and files.

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "abbe/calib/otf/blocks.hpp"
+#include "abbe/calib/otf/polyline.hpp"
 
 namespace abbe::calib::otf {
 
@@ -23,20 +24,13 @@ struct Alignment {
   double path_length_m = 0.0;
 };
 
-/// Closest point to `p_m` on the leg from `from_m` to `to_m`, not clamped to its ends.
-struct LegPoint {
-  Vector3 closest_m = Vector3::Zero();
-  double along_m = 0.0;  ///< from the beginning of the leg
-};
-[[nodiscard]] LegPoint closest_on_leg(const Vector3& from_m, const Vector3& to_m, const Vector3& p_m);
-
 /// Monotone assignment: leg 0 first, last leg last, stay or +1 from block to block, of least cost
 /// distance^2 + direction_m^2 (1 - chord . d). The globally closest leg confuses legs that cross or coincide.
 /// `points_m` are axis positions (target offset taken off); NaN stands for a lost block.
 [[nodiscard]] Result<std::vector<std::size_t>> assign_legs(std::span<const Vector3> points_m, const Path&,
                                                            double direction_m);
 
-/// DegenerateGeometry: start, end and centroid on a line. AlignmentFailed: the points do not fit this path
+/// Errors of check(Path). AlignmentFailed: the points do not fit this path
 /// (length, rms). NotConverged: max_alignment_updates used up.
 [[nodiscard]] Result<Alignment> align(const BlockSeries&, const Machine&, const Path&, const Options&);
 

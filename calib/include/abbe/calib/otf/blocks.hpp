@@ -27,6 +27,12 @@ struct BlockSeries {
   std::size_t lost_samples = 0;  ///< invalid or missing in time
 };
 
+/// Samples to a block so that the target travels 8.3 mm in it: fine against nodes 50 mm apart, and the length
+/// at which [Sanders 2023] was re-evaluated (100 samples at 500 Hz and 2500 mm/min). 10 to 1000. The travel
+/// is taken over chords of 50 samples, so that noise does not count as way, and from their upper quartile,
+/// which standstill and ramps do not reach.
+[[nodiscard]] std::size_t suitable_block_samples(std::span<const TrackerObservation>);
+
 /// NotFinite for NaN in a valid sample (says which), BadInput for time that does not ascend,
 /// TooFewObservations below four blocks or without standstill samples.
 [[nodiscard]] Result<BlockSeries> make_blocks(std::span<const TrackerObservation>, const Options&);

@@ -37,15 +37,19 @@ class Drive {
   }
   void pause(std::chrono::nanoseconds how_long) { now_ += how_long; }
   void jump(AxisPosition to) { q_ = to; }  ///< without a snapshot on the way
+  /// What the tracker's clock says besides host time; 500 s at first.
+  void set_device_clock(std::chrono::nanoseconds ahead) { device_ahead_ = ahead; }
+  void lose_axes() { axes_known_ = false; }
   [[nodiscard]] HostTime now() const { return now_; }
 
  private:
   void show() {
     Snapshot s;
     s.head.time = now_;
-    s.axis_count = 3;
+    s.axis_count = axes_known_ ? 3 : 0;
     for (std::size_t a = 0; a < 3; ++a) s.position[a] = q_[a];
     s.has_tracker_point = true;
+    s.tracker_point.device_time = protocol::DeviceTime{now_.time_since_epoch() + device_ahead_};
     s.tracker_point.p_tracker_m = q_;
     session_.take(s);
     now_ += kPeriod;
@@ -54,6 +58,8 @@ class Drive {
   CalibrationSession& session_;
   AxisPosition q_{};
   HostTime now_{10s};
+  std::chrono::nanoseconds device_ahead_ = 500s;
+  bool axes_known_ = true;
 };
 
 const std::vector<AxisPosition> kPath{{0, 0, 0}, {0.1, 0, 0}, {0.1, 0.1, 0}, {0.1, 0.1, 0.1}};
@@ -152,6 +158,109 @@ TEST(CalibrationSession, RefusesWhenTheBeamStaysAway) {
   EXPECT_EQ(session.status().state, SessionState::Refused);
   EXPECT_NE(session.status().reason.find("no tracker point for 40.0 s"), std::string::npos)
       << session.status().reason;
+}
+
+TEST(CalibrationSession, WaitsInWallTimeForASimulatorThatIsFasterThanTime) {
+  Config config;
+  config.daemon.speed = 20.0;
+  EXPECT_EQ(acquisition_options(config).arrival_patience, 20 * AcquisitionOptions{}.arrival_patience);
+}
+
+TEST(CalibrationSession, LeavesOutPointsThatCameOutOfOrder) {
+  CalibrationSession session;
+  ASSERT_TRUE(session.start(kPath, HostTime{10s}));
+  Drive drive{session};
+  drive.stand(kPath[0], 1s);
+  drive.move(kPath[1]);
+  drive.set_device_clock(499900ms);  // one packet, 100 ms old by the tracker's own clock
+  drive.stand(kPath[1], 50ms);
+  drive.set_device_clock(500s);
+  for (std::size_t i = 2; i < kPath.size(); ++i) drive.move(kPath[i]);
+  drive.stand(kPath.back(), 2s);
+  EXPECT_NE(session.status().reason.find("25 left out"), std::string::npos) << session.status().reason;
+  const auto run = session.take_run();
+  ASSERT_TRUE(run);
+  for (std::size_t i = 1; i < run->size(); ++i) ASSERT_GT((*run)[i].device_time, (*run)[i - 1].device_time);
+}
+
+TEST(CalibrationSession, RefusesWhenTheTrackersClockBeginsAnew) {
+  CalibrationSession session;
+  ASSERT_TRUE(session.start(kPath, HostTime{10s}));
+  Drive drive{session};
+  drive.stand(kPath[0], 1s);
+  drive.move(kPath[1]);
+  drive.set_device_clock(0s);
+  drive.move(kPath[2]);
+  EXPECT_EQ(session.status().state, SessionState::Refused);
+  EXPECT_NE(session.status().reason.find("clock began anew"), std::string::npos) << session.status().reason;
+}
+
+TEST(CalibrationSession, WaitsOnWhenTheTrackersClockBeginsAnewBeforeTheRun) {
+  CalibrationSession session;
+  ASSERT_TRUE(session.start(kPath, HostTime{10s}));
+  Drive drive{session};
+  drive.stand(kPath[0], 1s);
+  drive.set_device_clock(0s);
+  drive.stand(kPath[0], 1s);
+  drive.move(kPath[1]);
+  EXPECT_EQ(session.status().state, SessionState::Acquiring) << session.status().reason;
+}
+
+TEST(CalibrationSession, EndsWhenNoPointArrivesAnyMore) {
+  CalibrationSession session;
+  ASSERT_TRUE(session.start(kPath, HostTime{10s}));
+  Drive drive{session};
+  drive.stand(kPath[0], 1s);
+  drive.move(kPath[1]);
+  session.tick(drive.now() + 30s);  // a backlog may still come
+  EXPECT_EQ(session.status().state, SessionState::Acquiring);
+  session.tick(drive.now() + 41s);
+  EXPECT_EQ(session.status().state, SessionState::Refused);
+  EXPECT_NE(session.status().reason.find("no tracker point"), std::string::npos) << session.status().reason;
+}
+
+TEST(CalibrationSession, DoesNotWaitForEverForTheMachineToStandAtTheStart) {
+  CalibrationSession silent, elsewhere;
+  ASSERT_TRUE(silent.start(kPath, HostTime{10s}));
+  silent.tick(HostTime{10s} + 59min);
+  EXPECT_EQ(silent.status().state, SessionState::Warming);
+  silent.tick(HostTime{10s} + 61min);
+  EXPECT_EQ(silent.status().state, SessionState::Refused);
+
+  ASSERT_TRUE(elsewhere.start(kPath, HostTime{10s}));
+  Drive drive{elsewhere};
+  drive.stand(kPath[1], 1s);
+  drive.pause(1h);
+  drive.stand(kPath[1], 1s);
+  EXPECT_EQ(elsewhere.status().state, SessionState::Refused);
+  EXPECT_NE(elsewhere.status().reason.find("did not stand at"), std::string::npos)
+      << elsewhere.status().reason;
+}
+
+TEST(CalibrationSession, RefusesWhenTheMachineStopsForGood) {
+  CalibrationSession session;
+  ASSERT_TRUE(session.start(kPath, HostTime{10s}));
+  Drive drive{session};
+  drive.stand(kPath[0], 1s);
+  drive.move({0.05, 0, 0});
+  for (int i = 0; i < 60; ++i) {  // a point now and then: the tracker goes on
+    drive.pause(20s);
+    drive.stand({0.05, 0, 0}, kPeriod);
+  }
+  EXPECT_EQ(session.status().state, SessionState::Refused);
+  EXPECT_NE(session.status().reason.find("stood still"), std::string::npos) << session.status().reason;
+}
+
+TEST(CalibrationSession, RefusesWhenTheAxesStayAway) {
+  CalibrationSession session;
+  ASSERT_TRUE(session.start(kPath, HostTime{10s}));
+  Drive drive{session};
+  drive.stand(kPath[0], 1s);
+  drive.move(kPath[1]);
+  drive.lose_axes();
+  drive.stand(kPath[1], 31s);
+  EXPECT_EQ(session.status().state, SessionState::Refused);
+  EXPECT_NE(session.status().reason.find("no axis positions"), std::string::npos) << session.status().reason;
 }
 
 TEST(CalibrationSession, LooksAtNothingFromBeforeItsStart) {

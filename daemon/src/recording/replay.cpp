@@ -98,7 +98,7 @@ class RawDecoder {
 class Calibrations {
  public:
   Calibrations(std::vector<CalibrationRequest> requests, const Config& config)
-      : requests_(std::move(requests)), config_(config) {
+      : requests_(std::move(requests)), config_(config), session_(acquisition_options(config)) {
     begin_next();
   }
 

@@ -43,9 +43,18 @@ Result<void> CalibrationSession::cancel(std::string who, HostTime now) {
 void CalibrationSession::take(const protocol::Snapshot& snapshot) {
   if (status_.state != SessionState::Warming && status_.state != SessionState::Acquiring) return;
   acquisition_->take(snapshot);
+  follow_acquisition(snapshot.head.time);
+}
+
+void CalibrationSession::tick(HostTime now) {
+  if (status_.state != SessionState::Warming && status_.state != SessionState::Acquiring) return;
+  acquisition_->tick(now);
+  follow_acquisition(now);
+}
+
+void CalibrationSession::follow_acquisition(HostTime now) {
   status_.progress = acquisition_->progress();
   status_.points = acquisition_->points().size();
-  const HostTime now = snapshot.head.time;
   switch (acquisition_->phase()) {
     case OtfAcquisition::Phase::WaitingAtStart:
       break;

@@ -3,13 +3,15 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <cmath>
-#include <limits>
 #include <utility>
+
+#include "abbe/calib/otf/polyline.hpp"
+#include "abbe/daemon/otf_inputs.hpp"
 
 namespace abbe::daemon {
 namespace {
 
+using calib::Vector3;
 using protocol::HostTime;
 using protocol::SampleFlag;
 using protocol::Snapshot;
@@ -18,42 +20,7 @@ using protocol::Snapshot;
 // corner. Shorter than that, only the mapping of the tracker's clock moved.
 constexpr auto kCornerMissed = std::chrono::milliseconds{500};
 
-double distance(const AxisPosition& a, const AxisPosition& b) {
-  return std::hypot(a[0] - b[0], a[1] - b[1], a[2] - b[2]);
-}
-
-/// Nearest point of the leg from `a` to `b`.
-struct OnLeg {
-  double off_m = 0.0;
-  double along_m = 0.0;
-};
-OnLeg nearest_on_leg(const AxisPosition& q, const AxisPosition& a, const AxisPosition& b) {
-  double along = 0.0;
-  double length2 = 0.0;
-  for (std::size_t i = 0; i < 3; ++i) {
-    along += (q[i] - a[i]) * (b[i] - a[i]);
-    length2 += (b[i] - a[i]) * (b[i] - a[i]);
-  }
-  const double s = length2 > 0.0 ? std::clamp(along / length2, 0.0, 1.0) : 0.0;
-  const AxisPosition nearest{a[0] + s * (b[0] - a[0]), a[1] + s * (b[1] - a[1]), a[2] + s * (b[2] - a[2])};
-  return {distance(q, nearest), s * std::sqrt(length2)};
-}
-
-double distance_to_path(const AxisPosition& q, const std::vector<AxisPosition>& path) {
-  double nearest = std::numeric_limits<double>::infinity();
-  for (std::size_t i = 1; i < path.size(); ++i) {
-    nearest = std::min(nearest, nearest_on_leg(q, path[i - 1], path[i]).off_m);
-  }
-  return nearest;
-}
-
-double length(const std::vector<AxisPosition>& path) {
-  double sum = 0.0;
-  for (std::size_t i = 1; i < path.size(); ++i) sum += distance(path[i - 1], path[i]);
-  return sum;
-}
-
-std::string text(const AxisPosition& q) {
+std::string text(const Vector3& q) {
   return fmt::format("({:.3f}, {:.3f}, {:.3f}) mm", q[0] * 1e3, q[1] * 1e3, q[2] * 1e3);
 }
 
@@ -75,31 +42,38 @@ double seconds(std::chrono::nanoseconds t) {
 
 }  // namespace
 
-OtfAcquisition::OtfAcquisition(std::vector<AxisPosition> path, HostTime from, AcquisitionOptions options)
-    : path_(std::move(path)), from_(from), options_(options), path_length_m_(length(path_)) {
-  reason_ =
-      fmt::format("waiting for the machine to stand at {} with the tracker streaming", text(path_.front()));
+OtfAcquisition::OtfAcquisition(const std::vector<AxisPosition>& path, HostTime from,
+                               AcquisitionOptions options)
+    : path_(otf_path(path)),
+      driven_at_m_(calib::otf::lengths_to_vertices_m(path_)),
+      from_(from),
+      options_(options) {
+  reason_ = fmt::format("waiting for the machine to stand at {} with the tracker streaming",
+                        text(path_.vertices_m.front()));
 }
 
 double OtfAcquisition::progress() const noexcept {
   if (phase_ == Phase::Complete) return 1.0;
-  return path_length_m_ > 0.0 ? std::min(driven_m_ / path_length_m_, 1.0) : 0.0;
+  return driven_at_m_.back() > 0.0 ? std::min(driven_m_ / driven_at_m_.back(), 1.0) : 0.0;
 }
 
 void OtfAcquisition::take(const Snapshot& snapshot) {
   if (!snapshot.has_tracker_point || snapshot.head.time < from_) return;
   const RunPoint point = run_point(snapshot);
+  if (!in_order(point)) return;
   if (phase_ == Phase::Running && point.time - last_time_ > options_.silence) {
     fail(fmt::format("no tracker point for {:.1f} s in the middle of the run",
                      seconds(point.time - last_time_)));
   }
   last_time_ = point.time;
+  if (axes_known(snapshot)) axes_known_at_ = point.time;
+  give_up_if_stuck(point.time);
   // Without axis positions the point keeps its place in the sequence, but decides nothing.
   if (!axes_known(snapshot)) {
     if (phase_ == Phase::Running) points_.push_back(point);
     return;
   }
-  const AxisPosition q{snapshot.position[0], snapshot.position[1], snapshot.position[2]};
+  const Vector3 q{snapshot.position[0], snapshot.position[1], snapshot.position[2]};
   track_standstill(point, q);
   if (phase_ == Phase::WaitingAtStart)
     wait_at_start(point, q);
@@ -107,14 +81,49 @@ void OtfAcquisition::take(const Snapshot& snapshot) {
     run(point, q);
 }
 
-void OtfAcquisition::track_standstill(const RunPoint& point, const AxisPosition& q) {
-  if (stand_known_ && distance(q, stand_at_) <= options_.stand_tolerance_m) return;
+void OtfAcquisition::tick(HostTime now) {
+  if (phase_ == Phase::Running && now - last_time_ > options_.arrival_patience) {
+    fail(fmt::format("no tracker point for {:.0f} s in the middle of the run", seconds(now - last_time_)));
+  } else if (phase_ == Phase::WaitingAtStart) {
+    give_up_if_stuck(now - options_.arrival_patience);
+  }
+}
+
+/// The identification needs time that ascends.
+bool OtfAcquisition::in_order(const RunPoint& point) {
+  const auto last = std::exchange(last_device_time_, point.device_time);
+  if (!last || point.device_time > *last) return true;
+  if (*last - point.device_time > options_.clock_began_anew) {
+    before_.clear();
+    if (phase_ == Phase::Running) fail("the tracker's clock began anew in the middle of the run");
+    return true;
+  }
+  last_device_time_ = last;
+  ++disordered_;
+  return false;
+}
+
+void OtfAcquisition::give_up_if_stuck(HostTime point_time) {
+  if (phase_ == Phase::WaitingAtStart && point_time - from_ > options_.wait_for_start) {
+    fail(fmt::format("the machine did not stand at {} and drive off within {:.0f} min",
+                     text(path_.vertices_m.front()), seconds(options_.wait_for_start) / 60.0));
+  } else if (phase_ == Phase::Running && point_time - axes_known_at_ > options_.silence) {
+    fail(fmt::format("no axis positions for {:.1f} s in the middle of the run",
+                     seconds(point_time - axes_known_at_)));
+  } else if (phase_ == Phase::Running && point_time - stand_since_ > options_.longest_stop) {
+    fail(fmt::format("the machine has stood still on its path for {:.0f} min",
+                     seconds(options_.longest_stop) / 60.0));
+  }
+}
+
+void OtfAcquisition::track_standstill(const RunPoint& point, const Vector3& q) {
+  if (stand_known_ && (q - stand_at_).norm() <= options_.stand_tolerance_m) return;
   stand_known_ = true;
   stand_at_ = q;
   stand_since_ = point.time;
 }
 
-void OtfAcquisition::wait_at_start(const RunPoint& point, const AxisPosition& q) {
+void OtfAcquisition::wait_at_start(const RunPoint& point, const Vector3& q) {
   const bool left_standstill = stand_since_ == point.time;
   const bool stood_long_enough =
       !before_.empty() && before_.back().time - before_.front().time >= options_.stand_before;
@@ -128,14 +137,14 @@ void OtfAcquisition::wait_at_start(const RunPoint& point, const AxisPosition& q)
     return;
   }
   if (left_standstill) before_.clear();
-  if (distance(q, path_.front()) > options_.vertex_tolerance_m || !point.usable) return;
+  if ((q - path_.vertices_m.front()).norm() > options_.vertex_tolerance_m || !point.usable) return;
   before_.push_back(point);
   while (before_.back().time - before_.front().time > options_.keep_before) before_.pop_front();
 }
 
-void OtfAcquisition::run(const RunPoint& point, const AxisPosition& q) {
+void OtfAcquisition::run(const RunPoint& point, const Vector3& q) {
   points_.push_back(point);
-  if (const double off_m = distance_to_path(q, path_); off_m > options_.path_tolerance_m) {
+  if (const double off_m = distance_to_path_m(path_, q); off_m > options_.path_tolerance_m) {
     fail(fmt::format(
         "machine at {} is {:.1f} mm away from every leg of the path: another path is being driven", text(q),
         off_m * 1e3));
@@ -146,27 +155,31 @@ void OtfAcquisition::run(const RunPoint& point, const AxisPosition& q) {
   trim_end();
   phase_ = Phase::Complete;
   reason_ = fmt::format("path driven, {} tracker points", points_.size());
+  if (disordered_ > 0) reason_ += fmt::format(", {} left out that came out of order", disordered_);
 }
 
-void OtfAcquisition::follow_path(const RunPoint& point, const AxisPosition& q) {
-  const std::size_t last = path_.size() - 2;
-  while (leg_ < last && distance(q, path_[leg_ + 1]) <= options_.vertex_tolerance_m) ++leg_;
-  OnLeg here = nearest_on_leg(q, path_[leg_], path_[leg_ + 1]);
+void OtfAcquisition::follow_path(const RunPoint& point, const Vector3& q) {
+  const std::size_t last = path_.vertices_m.size() - 2;
+  while (leg_ < last && (q - path_.vertices_m[leg_ + 1]).norm() <= options_.vertex_tolerance_m) ++leg_;
+  const auto on_leg = [&](std::size_t leg) {
+    return calib::otf::nearest_on_leg(path_.vertices_m[leg], path_.vertices_m[leg + 1], q);
+  };
+  calib::otf::OnLeg here = on_leg(leg_);
   for (std::size_t later = leg_ + 1; here.off_m > options_.path_tolerance_m && later <= last; ++later) {
     if (point.time - on_leg_at_ < kCornerMissed) return;
-    const OnLeg there = nearest_on_leg(q, path_[later], path_[later + 1]);
+    const calib::otf::OnLeg there = on_leg(later);
     if (there.off_m > options_.path_tolerance_m) continue;
     leg_ = later;
     here = there;
   }
   if (here.off_m > options_.path_tolerance_m) return;
   on_leg_at_ = point.time;
-  const auto behind = static_cast<std::ptrdiff_t>(leg_ + 1);
-  driven_m_ = length({path_.begin(), path_.begin() + behind}) + here.along_m;
+  driven_m_ = driven_at_m_[leg_] + here.along_m;
 }
 
-bool OtfAcquisition::complete(HostTime now, const AxisPosition& q) const {
-  return leg_ + 2 == path_.size() && distance(q, path_.back()) <= options_.vertex_tolerance_m &&
+bool OtfAcquisition::complete(HostTime now, const Vector3& q) const {
+  return leg_ + 2 == path_.vertices_m.size() &&
+         (q - path_.vertices_m.back()).norm() <= options_.vertex_tolerance_m &&
          now - stand_since_ >= options_.stand_after;
 }
 

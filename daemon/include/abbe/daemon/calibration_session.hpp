@@ -50,6 +50,9 @@ class CalibrationSession {
   [[nodiscard]] Result<void> cancel(std::string who, protocol::HostTime now);
 
   void take(const protocol::Snapshot& snapshot);
+  /// Ends an acquisition that nothing arrives for any more; `now` is host time. Live only: see
+  /// OtfAcquisition::tick().
+  void tick(protocol::HostTime now);
 
   /// The acquired run, once, when the state has become Identifying.
   [[nodiscard]] std::optional<std::vector<RunPoint>> take_run();
@@ -65,6 +68,7 @@ class CalibrationSession {
   [[nodiscard]] std::vector<SessionEvent> take_events();
 
  private:
+  void follow_acquisition(protocol::HostTime now);
   void enter(SessionState state, std::string reason, protocol::HostTime now);
 
   AcquisitionOptions acquisition_options_;

@@ -8,10 +8,12 @@
 #include <chrono>
 #include <cstdint>
 #include <deque>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
 
+#include "abbe/calib/otf/run.hpp"
 #include "abbe/protocol/samples.hpp"
 
 namespace abbe::daemon {
@@ -38,7 +40,16 @@ struct AcquisitionOptions {
   std::chrono::nanoseconds stand_after =
       std::chrono::milliseconds{1000};  ///< longer than any dwell at a vertex
   std::chrono::nanoseconds keep_after = std::chrono::milliseconds{400};  ///< standstill kept behind the run
-  std::chrono::nanoseconds silence = std::chrono::seconds{30};  ///< a beam gone for longer ends the run
+  /// Inside the run: between two tracker points, or without axis positions, for longer ends it.
+  std::chrono::nanoseconds silence = std::chrono::seconds{30};
+  /// Host time for which no point need have arrived: `silence` and the backlog a stalled tracker delivers.
+  std::chrono::nanoseconds arrival_patience = std::chrono::seconds{40};
+  std::chrono::nanoseconds wait_for_start =
+      std::chrono::hours{1};  ///< for the machine to stand at P0 and leave
+  std::chrono::nanoseconds longest_stop =
+      std::chrono::minutes{15};  ///< on the path: a longer one ends the run
+  /// A packet out of order goes back by a burst (a third of a second); a clock that began anew by more.
+  std::chrono::nanoseconds clock_began_anew = std::chrono::seconds{1};
 };
 
 class OtfAcquisition {
@@ -46,9 +57,14 @@ class OtfAcquisition {
   enum class Phase : std::uint8_t { WaitingAtStart, Running, Complete, Failed };
 
   /// `path`: vertices of the polyline, at least two. `from`: snapshots before this instant are not looked at.
-  OtfAcquisition(std::vector<AxisPosition> path, protocol::HostTime from, AcquisitionOptions options = {});
+  OtfAcquisition(const std::vector<AxisPosition>& path, protocol::HostTime from,
+                 AcquisitionOptions options = {});
 
+  /// Points whose device time does not ascend are left out and counted.
   void take(const protocol::Snapshot& snapshot);
+  /// Fails what nothing arrives for any more; `now` is host time. Never needed for a replay: what it fails
+  /// has no points that could complete it.
+  void tick(protocol::HostTime now);
 
   [[nodiscard]] Phase phase() const noexcept { return phase_; }
   [[nodiscard]] const std::string& reason() const noexcept {
@@ -59,29 +75,34 @@ class OtfAcquisition {
   [[nodiscard]] std::vector<RunPoint> release() noexcept { return std::move(points_); }
 
  private:
-  void wait_at_start(const RunPoint& point, const AxisPosition& q);
-  void run(const RunPoint& point, const AxisPosition& q);
-  void track_standstill(const RunPoint& point, const AxisPosition& q);
-  void follow_path(const RunPoint& point, const AxisPosition& q);
-  [[nodiscard]] bool complete(protocol::HostTime now, const AxisPosition& q) const;
+  [[nodiscard]] bool in_order(const RunPoint& point);
+  void give_up_if_stuck(protocol::HostTime point_time);
+  void wait_at_start(const RunPoint& point, const calib::Vector3& q);
+  void run(const RunPoint& point, const calib::Vector3& q);
+  void track_standstill(const RunPoint& point, const calib::Vector3& q);
+  void follow_path(const RunPoint& point, const calib::Vector3& q);
+  [[nodiscard]] bool complete(protocol::HostTime now, const calib::Vector3& q) const;
   void trim_end();
   void fail(std::string reason);
 
-  std::vector<AxisPosition> path_;
+  calib::otf::Path path_;
+  std::vector<double> driven_at_m_;  // every vertex
   protocol::HostTime from_;
   AcquisitionOptions options_;
-  double path_length_m_ = 0.0;
   Phase phase_ = Phase::WaitingAtStart;
   std::string reason_;
   std::deque<RunPoint> before_;  // standstill at the first vertex, the last keep_before of it
   std::vector<RunPoint> points_;
-  AxisPosition stand_at_{};  // where the current standstill began
+  calib::Vector3 stand_at_ = calib::Vector3::Zero();  // where the current standstill began
   protocol::HostTime stand_since_{};
   bool stand_known_ = false;
   std::size_t leg_ = 0;             // the machine is on, or just before, this leg
   protocol::HostTime on_leg_at_{};  // when it was last seen there
   double driven_m_ = 0.0;           // along the path, up to the machine
+  protocol::HostTime axes_known_at_{};
   protocol::HostTime last_time_{};
+  std::optional<protocol::DeviceTime> last_device_time_;
+  std::size_t disordered_ = 0;
 };
 
 }  // namespace abbe::daemon

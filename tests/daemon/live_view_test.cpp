@@ -36,7 +36,7 @@ Batch of(const protocol::TrackerPoint& point) {
 }
 
 TEST(LiveView, ShowsTheLatestAxesAndHowFastTheyMove) {
-  LiveView live{false};
+  LiveView live{AssemblerOptions{}};
   EXPECT_TRUE(live.take(of(axes_at(kStart, 0.1))));
   EXPECT_TRUE(live.take(of(axes_at(kStart + 1ms, 0.1001))));
   EXPECT_EQ(live.view().head.time, kStart + 1ms);
@@ -46,13 +46,13 @@ TEST(LiveView, ShowsTheLatestAxesAndHowFastTheyMove) {
 }
 
 TEST(LiveView, SaysThatNothingCame) {
-  LiveView live{false};
+  LiveView live{AssemblerOptions{}};
   EXPECT_FALSE(live.take(Batch{}));
   EXPECT_FALSE(live.axes_known_at());
 }
 
 TEST(LiveView, ATrackerPointDoesNotMakeTheAxesYounger) {
-  LiveView live{false};
+  LiveView live{AssemblerOptions{}};
   live.take(of(axes_at(kStart, 0.1)));
   protocol::TrackerPoint point;
   point.head.time = kStart + 1s;
@@ -68,7 +68,7 @@ TEST(LiveView, KnowsTheAxesOnlyWhileEachOfXyzAnswersWithoutAFault) {
   const auto nonsense = [](AxisSample& a) { a.position[1] = std::numeric_limits<double>::quiet_NaN(); };
   const auto too_few = [](AxisSample& a) { a.axis_count = 2; };
   for (void (*break_it)(AxisSample&) : {+missing, +bus_off, +alarm, +nonsense, +too_few}) {
-    LiveView live{false};
+    LiveView live{AssemblerOptions{}};
     live.take(of(axes_at(kStart, 0.1)));
     EXPECT_TRUE(axes_known(live.view()));
     auto broken = axes_at(kStart + 1ms, 0.1);
@@ -80,7 +80,7 @@ TEST(LiveView, KnowsTheAxesOnlyWhileEachOfXyzAnswersWithoutAFault) {
 }
 
 TEST(LiveView, AMissingRotaryAxisDoesNotHideXyz) {
-  LiveView live{false};
+  LiveView live{AssemblerOptions{}};
   auto sample = axes_at(kStart, 0.1);
   sample.missing_mask = 0b1000;
   sample.head.flags |= SampleFlag::AxisMissing;

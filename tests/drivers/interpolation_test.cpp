@@ -151,5 +151,27 @@ TEST(InterpolateAxes, UsesNoNeighbourThatDidNotAnswer) {
   EXPECT_NEAR(at->position[0], 0.5 * 0.0015, 1e-15);
 }
 
+TEST(LatestAxes, AreThoseOfTheSampleWithTheSlopeToTheOneBefore) {
+  auto samples = sampled({5, 6}, [](double t) { return 1.0 + 0.5 * t; });
+  samples[1].head.u_time = 50us;
+  const auto at = drivers::latest_axes(&samples[0], samples[1]);
+  EXPECT_EQ(at.time, HostTime{6ms});
+  EXPECT_EQ(at.position[0], samples[1].position[0]);
+  EXPECT_NEAR(at.velocity[0], 0.5, 1e-10);
+  EXPECT_NEAR(at.u_position[0], 0.5 * 50e-6, 1e-14);
+}
+
+TEST(LatestAxes, HaveNoSpeedWithoutAnAnswerBeforeAndNow) {
+  auto samples = sampled({5, 6, 60}, [](double t) { return 1.0 + 0.5 * t; });
+  EXPECT_EQ(drivers::latest_axes(nullptr, samples[1]).velocity[0], 0.0);
+  EXPECT_EQ(drivers::latest_axes(&samples[1], samples[0]).velocity[0], 0.0) << "later";
+  EXPECT_EQ(drivers::latest_axes(&samples[1], samples[2]).velocity[0], 0.0) << "long ago";
+  samples[1].missing_mask = 1;
+  samples[1].position[0] = 99.0;
+  const auto at = drivers::latest_axes(&samples[0], samples[1]);
+  EXPECT_EQ(at.velocity[0], 0.0);
+  EXPECT_EQ(at.missing_mask, 1);
+}
+
 }  // namespace
 }  // namespace abbe::tests

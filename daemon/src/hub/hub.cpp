@@ -63,9 +63,7 @@ struct Hub::Call {
 };
 
 Hub::Hub(HubParts parts)
-    : parts_(parts),
-      assembler_(assembler_options(parts.config)),
-      live_(parts.config.encoder && parts.config.encoder->axes_compensated) {}
+    : parts_(parts), assembler_(assembler_options(parts.config)), live_(assembler_options(parts.config)) {}
 
 Hub::WallTime Hub::last_turn() const noexcept {
   return WallTime{std::chrono::nanoseconds{last_turn_ns_.load(std::memory_order_relaxed)}};

@@ -1,7 +1,6 @@
 #include "abbe/daemon/live_view.hpp"
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <cstddef>
 
@@ -40,17 +39,12 @@ bool LiveView::take(const Batch& batch) {
 
 void LiveView::take(const protocol::AxisSample& sample) {
   view_.head = sample.head;
-  view_.axis_count = sample.axis_count;
-  view_.missing_mask = sample.missing_mask;
-  if (previous_) {
-    const std::chrono::duration<double> step = sample.head.time - previous_->head.time;
-    for (std::size_t a = 0; a < sample.axis_count && step.count() > 0.0; ++a) {
-      view_.velocity[a] = (sample.position[a] - previous_->position[a]) / step.count();
-      view_.u_position[a] =
-          std::abs(view_.velocity[a]) * std::chrono::duration<double>(sample.head.u_time).count();
-    }
-  }
-  view_.position = sample.position;
+  const auto axes = drivers::latest_axes(previous_ ? &*previous_ : nullptr, sample, interpolation_);
+  view_.axis_count = axes.axis_count;
+  view_.missing_mask = axes.missing_mask;
+  view_.position = axes.position;
+  view_.velocity = axes.velocity;
+  view_.u_position = axes.u_position;
   previous_ = sample;
   if (axes_known(view_)) axes_known_at_ = sample.head.time;
 }

@@ -114,4 +114,23 @@ tl::expected<AxesAt, InterpolationError> interpolate_axes(std::span<const AxisSa
   return at;
 }
 
+AxesAt latest_axes(const AxisSample* previous, const AxisSample& latest,
+                   const InterpolationOptions& options) noexcept {
+  AxesAt at;
+  at.time = latest.head.time;
+  at.axis_count = latest.axis_count;
+  at.missing_mask = latest.missing_mask;
+  at.flags = latest.head.flags;
+  const auto step =
+      previous != nullptr ? latest.head.time - previous->head.time : std::chrono::nanoseconds{0};
+  const bool usable = step.count() > 0 && step <= options.max_span;
+  for (std::size_t axis = 0; axis < at.axis_count; ++axis) {
+    at.position[axis] = latest.position[axis];
+    if (!usable || !answered(previous, axis) || !answered(&latest, axis)) continue;
+    at.velocity[axis] = slope(*previous, latest, axis);
+    at.u_position[axis] = std::abs(at.velocity[axis]) * seconds(latest.head.u_time);
+  }
+  return at;
+}
+
 }  // namespace abbe::drivers

@@ -5,6 +5,7 @@
 
 #include <optional>
 
+#include "abbe/daemon/assembler.hpp"
 #include "abbe/daemon/batch.hpp"
 #include "abbe/protocol/samples.hpp"
 
@@ -16,7 +17,9 @@ namespace abbe::daemon {
 
 class LiveView {
  public:
-  explicit LiveView(bool axes_compensated) noexcept { view_.axes_compensated = axes_compensated; }
+  explicit LiveView(const AssemblerOptions& options) noexcept : interpolation_(options.interpolation) {
+    view_.axes_compensated = options.axes_compensated;
+  }
 
   /// True if anything new came.
   bool take(const Batch& batch);
@@ -27,6 +30,7 @@ class LiveView {
  private:
   void take(const protocol::AxisSample& sample);
 
+  drivers::InterpolationOptions interpolation_;
   protocol::Snapshot view_{};
   std::optional<protocol::AxisSample> previous_;
   std::optional<protocol::HostTime> axes_known_at_;

@@ -51,4 +51,10 @@ struct AxesAt {
     std::span<const protocol::AxisSample> samples, protocol::HostTime time, std::chrono::nanoseconds u_time,
     const InterpolationOptions& options = {}) noexcept;
 
+/// The axes at the instant of `latest`: its positions, and the slope of the line from `previous` as velocity.
+/// An axis that did not answer in both, or without a `previous` that is earlier and at most max_span away:
+/// velocity 0.
+[[nodiscard]] AxesAt latest_axes(const protocol::AxisSample* previous, const protocol::AxisSample& latest,
+                                 const InterpolationOptions& options = {}) noexcept;
+
 }  // namespace abbe::drivers

@@ -89,6 +89,30 @@ TEST(Assembler, TheOrderOfArrivalChangesNothing) {
   }
 }
 
+TEST(Assembler, AnAxisSampleThatComesLateChangesNothing) {
+  Batch in_order = axes_batch(kStart, kStart + 50ms);
+  in_order.axes[20].head.time += 300us;  // the bus said out of turn that it is off
+  in_order.axes[20].missing_mask = 0b111;
+  in_order.axes[30].head.time = in_order.axes[31].head.time;  // and once twice for one instant
+  in_order.axes[30].missing_mask = 0b001;
+  Batch out_of_order = in_order;
+  std::swap(out_of_order.axes[20], out_of_order.axes[21]);
+  std::swap(out_of_order.axes[30], out_of_order.axes[31]);
+  std::vector<std::vector<Snapshot>> results;
+  for (const Batch& axes : {in_order, out_of_order}) {
+    Assembler assembler{{}};
+    assembler.take(axes);
+    assembler.take(burst(kStart + 4ms, 20));
+    assembler.emit(results.emplace_back());
+  }
+  ASSERT_EQ(results[0].size(), 20u);
+  ASSERT_EQ(results[1].size(), 20u);
+  for (std::size_t i = 0; i < 20; ++i) {
+    EXPECT_EQ(results[0][i].position, results[1][i].position) << i;
+    EXPECT_EQ(results[0][i].missing_mask, results[1][i].missing_mask) << i;
+  }
+}
+
 TEST(Assembler, WaitsForAxesUntilTheWatermark) {
   Assembler assembler{{.watermark = 600ms}};
   std::vector<Snapshot> out;

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <cstddef>
 #include <iterator>
 #include <span>
@@ -22,6 +23,12 @@ bool earlier(const AxisSample& sample, HostTime t) {
   return sample.head.time < t;
 }
 
+template <class T>
+void insert_by_time(std::deque<T>& in_order, const T& sample) {
+  const auto later = [](HostTime t, const T& other) { return t < other.head.time; };
+  in_order.insert(std::upper_bound(in_order.begin(), in_order.end(), sample.head.time, later), sample);
+}
+
 void set_axes(Snapshot& s, const drivers::AxesAt& axes) {
   s.axis_count = axes.axis_count;
   s.missing_mask = axes.missing_mask;
@@ -37,14 +44,23 @@ Assembler::Assembler(AssemblerOptions options) : options_(options) {}
 
 void Assembler::take(const Batch& batch) {
   points_.insert(points_.end(), batch.points.begin(), batch.points.end());
+  for (const auto& point : batch.points) newest_ = std::max(newest_, point.head.time);
   for (const AxisSample& sample : batch.axes) {
-    // A sample that is not later than its predecessor (a restarted bus) would break the order interpolation
-    // needs.
-    if (axes_.empty() || axes_.back().head.time < sample.head.time) axes_.push_back(sample);
+    newest_ = std::max(newest_, sample.head.time);
+    take(sample);
   }
-  environment_.insert(environment_.end(), batch.environment.begin(), batch.environment.end());
-  if (!batch.points.empty()) newest_ = std::max(newest_, batch.points.back().head.time);
-  if (!batch.axes.empty()) newest_ = std::max(newest_, batch.axes.back().head.time);
+  for (const auto& sample : batch.environment) insert_by_time(environment_, sample);
+}
+
+/// A bus that went off or began anew may report an instant before that of the last sample. Interpolation
+/// needs one sample an instant: the one that knows less stays, whichever came first.
+void Assembler::take(const AxisSample& sample) {
+  const auto same = std::lower_bound(axes_.begin(), axes_.end(), sample.head.time, earlier);
+  if (same == axes_.end() || same->head.time != sample.head.time) {
+    axes_.insert(same, sample);
+  } else if (std::popcount(sample.missing_mask) > std::popcount(same->missing_mask)) {
+    *same = sample;
+  }
 }
 
 bool Assembler::ready(HostTime t) const {

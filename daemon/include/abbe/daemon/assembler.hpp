@@ -6,7 +6,9 @@
 /// assembled as soon as two axis samples at or after its instant are there (the interpolation uses two on
 /// either side). If they do not come, it is assembled from what there is, flagged AxisMissing if that is not
 /// enough, once any stream has advanced `watermark` beyond it. Both rules look at the times in the samples
-/// only, so neither the order of arrival (within the watermark) nor the speed of a replay changes a result.
+/// only, and an axis or environment sample that comes after a later one is put in its place, so neither the
+/// order of arrival (within the watermark) nor the speed of a replay changes a result. Tracker points are
+/// given back in the order they were taken in.
 /// Ordinary world; not thread-safe.
 
 #include <chrono>
@@ -37,6 +39,7 @@ class Assembler {
   void finish(std::vector<protocol::Snapshot>& out);
 
  private:
+  void take(const protocol::AxisSample& sample);
   [[nodiscard]] bool ready(protocol::HostTime t) const;
   [[nodiscard]] protocol::Snapshot assemble(const protocol::TrackerPoint& point);
   void emit_first(std::vector<protocol::Snapshot>& out);

@@ -15,6 +15,7 @@ using namespace std::chrono_literals;
 using can::BusCondition;
 using protocol::AxisSample;
 using protocol::HostTime;
+using protocol::RawBlock;
 using protocol::SampleFlag;
 
 constexpr HostTime kStart{1h};
@@ -309,6 +310,44 @@ TEST(EncoderReceiver, ABootUpMarksTheNextSampleRestarted) {
   line.cycle(kStart + 2ms, 3);
   EXPECT_TRUE(has(line.samples.at(1).head.flags, SampleFlag::Restarted));
   EXPECT_FALSE(has(line.samples.at(2).head.flags, SampleFlag::Restarted));
+}
+
+TEST(EncoderReceiver, ALossEndsTheOpenCycleAndTheNextSampleSaysSo) {
+  Line line;
+  line.cycle(kStart, 1000);
+  line.sync(kStart + 1ms);
+  line.frame(position(kNodes[0], 2000), kStart + 1100us);
+  // Lost here: the other answers, a SYNC, and the first answer to it.
+  line.keep(line.receiver.on_loss());
+  ASSERT_EQ(line.samples.size(), 2u);
+  EXPECT_EQ(line.samples.back().missing_mask, 0b110);
+  line.frame(position(kNodes[1], 3000), kStart + 2200us);
+  EXPECT_EQ(line.samples.size(), 2u) << "an answer to a SYNC nobody knows";
+  line.cycle(kStart + 3ms, 4000);
+  ASSERT_EQ(line.samples.size(), 3u);
+  EXPECT_EQ(line.samples.back().missing_mask, 0);
+  EXPECT_TRUE(has(line.samples.back().head.flags, SampleFlag::GapBefore));
+}
+
+TEST(EncoderReceiver, TakesTheLossARawBlockTellsOf) {
+  EncoderReceiver receiver{three_axes()};
+  std::vector<AxisSample> samples;
+  const auto keep = [&](const AxisSample& s) { samples.push_back(s); };
+  RawBlock block;
+  block.time = kStart;
+  block.direction = RawBlock::Direction::ToDevice;
+  can::DatagramWriter sync{block.bytes, 0};
+  ASSERT_TRUE(sync.add(can::encode_sync()));
+  block.length = static_cast<std::uint16_t>(sync.finish().size());
+  receiver.on_raw(block, keep);
+  EXPECT_TRUE(samples.empty());
+  RawBlock later;
+  later.time = kStart + 100us;
+  later.length = 0;
+  later.lost_before = 1;
+  receiver.on_raw(later, keep);
+  ASSERT_EQ(samples.size(), 1u);
+  EXPECT_EQ(samples[0].missing_mask, 0b111);
 }
 
 TEST(EncoderReceiver, CountsPeriodsWithoutASync) {

@@ -86,6 +86,13 @@ EncoderReceiver::Samples EncoderReceiver::on_time(HostTime now) ABBE_RT {
   return done();
 }
 
+EncoderReceiver::Samples EncoderReceiver::on_loss() ABBE_RT {
+  out_count_ = 0;
+  close_cycle();
+  gap_pending_ = true;
+  return done();
+}
+
 EncoderReceiver::Samples EncoderReceiver::on_frame(const can::CanFrame& frame, HostTime time) ABBE_RT {
   out_count_ = 0;
   if (time >= deadline()) close_cycle();
@@ -146,7 +153,7 @@ void EncoderReceiver::emit(HostTime time) ABBE_RT {
 protocol::SampleFlags EncoderReceiver::take_flags(std::uint8_t missing) ABBE_RT {
   protocol::SampleFlags flags = 0;
   if (missing != 0) flags |= SampleFlag::AxisMissing;
-  if (lost_pending_ != 0) flags |= SampleFlag::GapBefore;
+  if (lost_pending_ != 0 || gap_pending_) flags |= SampleFlag::GapBefore;
   if (bus_error_pending_) flags |= SampleFlag::BusError;
   if (bus_off_) flags |= SampleFlag::BusOff;
   if (restarted_pending_ && missing != all_mask_) {
@@ -157,6 +164,7 @@ protocol::SampleFlags EncoderReceiver::take_flags(std::uint8_t missing) ABBE_RT 
     if (axes_[i].emergency != 0 || axes_[i].heartbeat_lost) flags |= SampleFlag::DeviceError;
   }
   lost_pending_ = 0;
+  gap_pending_ = false;
   bus_error_pending_ = false;
   return flags;
 }
@@ -205,7 +213,8 @@ void EncoderReceiver::take_position(std::size_t i, std::int64_t count) ABBE_RT {
   }
   axis.raw = raw;
   axis.seen = true;
-  if (axis.scale != 0.0) current_.position[i] = axis.offset + static_cast<double>(current_.count[i]) * axis.scale;
+  if (axis.scale != 0.0)
+    current_.position[i] = axis.offset + static_cast<double>(current_.count[i]) * axis.scale;
 }
 
 void EncoderReceiver::on_node_frame(Axis& axis, const can::CanFrame& frame, HostTime time) ABBE_RT {

@@ -97,6 +97,9 @@ class EncoderReceiver {
                                                                protocol::HostTime time) ABBE_RT;
   /// Nothing more came until `now`.
   [[nodiscard]] std::span<const protocol::AxisSample> on_time(protocol::HostTime now) ABBE_RT;
+  /// Frames are missing here: the open cycle ends, as an answer that comes now may be one to a SYNC that is
+  /// missing; the next sample says so.
+  [[nodiscard]] std::span<const protocol::AxisSample> on_loss() ABBE_RT;
   /// When on_time() has something to do: the deadline of the open cycle, else HostTime::max().
   [[nodiscard]] protocol::HostTime deadline() const ABBE_RT;
 
@@ -107,6 +110,7 @@ class EncoderReceiver {
       for (const auto& sample : samples) sink(sample);
     };
     const auto bytes = std::span{block.bytes}.first(std::min<std::size_t>(block.length, block.bytes.size()));
+    if (block.lost_before > 0) give(on_loss());
     const bool sent = block.direction == protocol::RawBlock::Direction::ToDevice;
     if (bytes.empty() && !sent) return give(on_time(block.time));
     auto view = can::DatagramView::parse(bytes);
@@ -172,6 +176,7 @@ class EncoderReceiver {
   bool bus_off_ = false;
   bool bus_error_pending_ = false;  ///< since the previous sample
   bool restarted_pending_ = false;
+  bool gap_pending_ = false;
   std::uint32_t lost_pending_ = 0;  ///< SYNCs that were not sent
   protocol::AxisSample current_;    ///< counts and positions stay from cycle to cycle
   std::array<protocol::AxisSample, 4> out_{};

@@ -1,36 +1,12 @@
 #pragma once
-/// Unix stream sockets and the ownership of a file descriptor. Ordinary world.
-
-#include <unistd.h>
+/// Unix stream sockets. Ordinary world.
 
 #include <filesystem>
-#include <utility>
 
 #include "abbe/daemon/error.hpp"
+#include "files/file_descriptor.hpp"
 
 namespace abbe::daemon {
-
-/// Owns a file descriptor; closes it once.
-class FileDescriptor {
- public:
-  FileDescriptor() noexcept = default;
-  explicit FileDescriptor(int fd) noexcept : fd_(fd) {}
-  FileDescriptor(FileDescriptor&& other) noexcept : fd_(std::exchange(other.fd_, -1)) {}
-  FileDescriptor& operator=(FileDescriptor&& other) noexcept {
-    std::swap(fd_, other.fd_);
-    return *this;
-  }
-  FileDescriptor(const FileDescriptor&) = delete;
-  FileDescriptor& operator=(const FileDescriptor&) = delete;
-  ~FileDescriptor() {
-    if (fd_ >= 0) ::close(fd_);
-  }
-  [[nodiscard]] int get() const noexcept { return fd_; }
-  explicit operator bool() const noexcept { return fd_ >= 0; }
-
- private:
-  int fd_ = -1;
-};
 
 /// A listening socket at `path`, mode 0660. A socket file nobody answers at is replaced; one in use is an
 /// Error.

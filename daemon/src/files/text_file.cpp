@@ -8,24 +8,11 @@
 #include <cerrno>
 #include <cstring>
 
+#include "files/file_descriptor.hpp"
+
 namespace abbe::daemon {
 
 namespace {
-
-/// A file descriptor that closes itself.
-class Descriptor {
- public:
-  explicit Descriptor(int fd) : fd_(fd) {}
-  Descriptor(const Descriptor&) = delete;
-  Descriptor& operator=(const Descriptor&) = delete;
-  ~Descriptor() {
-    if (fd_ >= 0) ::close(fd_);
-  }
-  [[nodiscard]] int get() const noexcept { return fd_; }
-
- private:
-  int fd_;
-};
 
 tl::unexpected<Error> io_failure(std::string_view verb, const std::filesystem::path& file) {
   return fail(ErrorCode::Io, fmt::format("{} {}: {}", verb, file.string(), std::strerror(errno)));
@@ -43,14 +30,14 @@ bool write_all(int fd, std::string_view text) {
 
 /// The name in the folder is on the disk only after the folder itself is.
 bool sync_folder(const std::filesystem::path& folder) {
-  const Descriptor fd(::open(folder.empty() ? "." : folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC));
+  const FileDescriptor fd(::open(folder.empty() ? "." : folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC));
   return fd.get() >= 0 && ::fsync(fd.get()) == 0;
 }
 
 }  // namespace
 
 Result<std::string> read_text(const std::filesystem::path& file) {
-  const Descriptor fd(::open(file.c_str(), O_RDONLY | O_CLOEXEC));
+  const FileDescriptor fd(::open(file.c_str(), O_RDONLY | O_CLOEXEC));
   struct stat status {};
   if (fd.get() < 0 || ::fstat(fd.get(), &status) != 0) return io_failure("read", file);
   std::string text(static_cast<std::size_t>(status.st_size), '\0');
@@ -70,7 +57,7 @@ Result<std::string> read_text(const std::filesystem::path& file) {
 Result<void> replace_file(const std::filesystem::path& file, std::string_view text) {
   const std::filesystem::path fresh = fmt::format("{}.{}.new", file.string(), ::getpid());
   {
-    const Descriptor fd(::open(fresh.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0644));
+    const FileDescriptor fd(::open(fresh.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0644));
     if (fd.get() < 0) return io_failure("write", fresh);
     if (!write_all(fd.get(), text) || ::fsync(fd.get()) != 0) {
       const auto failure = io_failure("write", fresh);

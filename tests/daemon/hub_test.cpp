@@ -73,7 +73,9 @@ class HubTest : public ::testing::Test {
   void activate_a_model() {
     auto document = test::synthetic_document(1);
     document.machine_hash = machine_hash(config_);
-    ASSERT_TRUE(authority_->add(document, {.accepted = true}, {"anna", "test", {}}, time_.now()));
+    auto kept = authority_->keeper().keep(document, {.accepted = true}, {"anna", "test", {}}, time_.now());
+    ASSERT_TRUE(kept) << kept.error().text;
+    authority_->take_up(std::move(kept->active).value());
   }
   void turn(std::chrono::nanoseconds later = 1ms) {
     time_.passed += later;

@@ -37,6 +37,25 @@ class ModelAuthorityTest : public ::testing::Test {
   static StoreActor actor(std::string why, HostTime when = kNow) {
     return {"anna", std::move(why), kUtc.to_utc(when)};
   }
+  /// As the daemon does it on two threads.
+  static Result<std::string> add(ModelAuthority&& authority, const ModelDocument& d,
+                                 const calib::Verdict& verdict, const StoreActor& who, HostTime now) {
+    return add(authority, d, verdict, who, now);
+  }
+  static Result<std::string> add(ModelAuthority& authority, const ModelDocument& d,
+                                 const calib::Verdict& verdict, const StoreActor& who, HostTime now) {
+    auto kept = authority.keeper().keep(d, verdict, who, now);
+    if (!kept) return tl::unexpected(kept.error());
+    if (kept->active) authority.take_up(std::move(*kept->active));
+    return kept->id;
+  }
+  /// Until it is known whether there is something new; true if there was.
+  static bool follow(ModelAuthority& authority) {
+    using Following = ModelAuthority::Following;
+    auto following = Following::Reading;
+    while (following == Following::Reading) following = authority.follow_store(kNow);
+    return following == Following::TakenUp;
+  }
   static ModelStanding fresh_standing(const ModelAuthority& a) { return a.standing(kNow, kNow, kPatience); }
 
   Config config_;
@@ -53,7 +72,7 @@ TEST_F(ModelAuthorityTest, WithoutAModelTheStateIsNone) {
 
 TEST_F(ModelAuthorityTest, AnAcceptedModelIsActiveAtOnce) {
   auto authority = open();
-  const auto id = authority.add(document(1), {.accepted = true}, actor("calibrate otf"), kNow);
+  const auto id = add(authority, document(1), {.accepted = true}, actor("calibrate otf"), kNow);
   ASSERT_TRUE(id) << id.error().text;
   const auto standing = fresh_standing(authority);
   EXPECT_EQ(standing.status, ModelStatus::MODEL_ACTIVE);
@@ -63,10 +82,10 @@ TEST_F(ModelAuthorityTest, AnAcceptedModelIsActiveAtOnce) {
 
 TEST_F(ModelAuthorityTest, ARefusedModelIsKeptAndChangesNothing) {
   auto authority = open();
-  const auto first = authority.add(document(1), {.accepted = true}, actor("calibrate otf"), kNow).value();
+  const auto first = add(authority, document(1), {.accepted = true}, actor("calibrate otf"), kNow).value();
   const auto revision = fresh_standing(authority).revision;
   const auto second =
-      authority.add(document(2), {.reasons = {"worse"}}, actor("calibrate otf"), kNow).value();
+      add(authority, document(2), {.reasons = {"worse"}}, actor("calibrate otf"), kNow).value();
   EXPECT_TRUE(store().load(second));
   EXPECT_EQ(fresh_standing(authority).model->id, first);
   EXPECT_EQ(fresh_standing(authority).revision, revision);
@@ -74,7 +93,7 @@ TEST_F(ModelAuthorityTest, ARefusedModelIsKeptAndChangesNothing) {
 
 TEST_F(ModelAuthorityTest, WithoutAxesOrWithOldOnesItIsStale) {
   auto authority = open();
-  ASSERT_TRUE(authority.add(document(1), {.accepted = true}, actor("calibrate otf"), kNow));
+  ASSERT_TRUE(add(authority, document(1), {.accepted = true}, actor("calibrate otf"), kNow));
   EXPECT_EQ(authority.standing(kNow, std::nullopt, kPatience).status, ModelStatus::MODEL_STALE);
   EXPECT_EQ(authority.standing(kNow + 500ms, kNow, kPatience).status, ModelStatus::MODEL_ACTIVE);
   EXPECT_EQ(authority.standing(kNow + 501ms, kNow, kPatience).status, ModelStatus::MODEL_STALE);
@@ -84,7 +103,7 @@ TEST_F(ModelAuthorityTest, OfAnotherMachineConfigurationItIsStale) {
   auto other = document(1);
   other.machine_hash = "of another machine";
   auto authority = open();
-  ASSERT_TRUE(authority.add(other, {.accepted = true}, actor("calibrate otf"), kNow));
+  ASSERT_TRUE(add(authority, other, {.accepted = true}, actor("calibrate otf"), kNow));
   const auto standing = fresh_standing(authority);
   EXPECT_EQ(standing.status, ModelStatus::MODEL_STALE);
   EXPECT_THAT(standing.reason, HasSubstr("another machine configuration"));
@@ -93,7 +112,7 @@ TEST_F(ModelAuthorityTest, OfAnotherMachineConfigurationItIsStale) {
 TEST_F(ModelAuthorityTest, WhereTheControlCorrectsAlreadyNoModelIsActive) {
   config_.encoder.emplace().axes_compensated = true;
   auto authority = open();
-  ASSERT_TRUE(authority.add(document(1), {.accepted = true}, actor("by hand"), kNow));
+  ASSERT_TRUE(add(authority, document(1), {.accepted = true}, actor("by hand"), kNow));
   const auto standing = fresh_standing(authority);
   EXPECT_EQ(standing.status, ModelStatus::MODEL_INVALID);
   EXPECT_THAT(standing.reason, HasSubstr("axes_compensated"));
@@ -101,24 +120,25 @@ TEST_F(ModelAuthorityTest, WhereTheControlCorrectsAlreadyNoModelIsActive) {
 
 TEST_F(ModelAuthorityTest, AForcedModelNamesWhoForcedItAndWhyAlsoAfterARestart) {
   auto authority = open();
-  const auto id = authority.add(document(1), {.reasons = {"3 mm"}}, actor("calibrate otf"), kNow).value();
+  const auto id = add(authority, document(1), {.reasons = {"3 mm"}}, actor("calibrate otf"), kNow).value();
   ASSERT_TRUE(store().activate(id, actor("crane test"), true));
-  ASSERT_TRUE(authority.follow_store(kNow));
+  ASSERT_TRUE(follow(authority));
   EXPECT_EQ(fresh_standing(authority).reason, "forced by anna: crane test");
   EXPECT_EQ(fresh_standing(open()).reason, "forced by anna: crane test");
 }
 
 TEST_F(ModelAuthorityTest, ARollbackIsSaidAndWhetherTheGateEverAcceptedTheModel) {
   auto authority = open();
-  const auto forced = authority.add(document(1), {.reasons = {"3 mm"}}, actor("calibrate otf"), kNow).value();
+  const auto forced =
+      add(authority, document(1), {.reasons = {"3 mm"}}, actor("calibrate otf"), kNow).value();
   ASSERT_TRUE(store().activate(forced, actor("crane test"), true));
-  ASSERT_TRUE(authority.add(document(2), {.accepted = true}, actor("calibrate otf"), kNow));
-  ASSERT_TRUE(authority.add(document(3), {.accepted = true}, actor("calibrate otf"), kNow));
+  ASSERT_TRUE(add(authority, document(2), {.accepted = true}, actor("calibrate otf"), kNow));
+  ASSERT_TRUE(add(authority, document(3), {.accepted = true}, actor("calibrate otf"), kNow));
   ASSERT_TRUE(store().rollback(actor("drifts")));
-  ASSERT_TRUE(authority.follow_store(kNow));
+  ASSERT_TRUE(follow(authority));
   EXPECT_EQ(fresh_standing(authority).reason, "rolled back by anna: drifts");
   ASSERT_TRUE(store().rollback(actor("drifts too", kNow + 1s)));
-  ASSERT_TRUE(authority.follow_store(kNow));
+  ASSERT_TRUE(follow(authority));
   EXPECT_EQ(fresh_standing(authority).model->id, forced);
   EXPECT_THAT(fresh_standing(authority).reason,
               HasSubstr("a model the gate did not accept, by anna: drifts too"));
@@ -126,26 +146,34 @@ TEST_F(ModelAuthorityTest, ARollbackIsSaidAndWhetherTheGateEverAcceptedTheModel)
 
 TEST_F(ModelAuthorityTest, FollowsTheStoreOnceForEachChange) {
   auto authority = open();
-  const auto a = authority.add(document(1), {.accepted = true}, actor("first"), kNow).value();
-  ASSERT_TRUE(authority.add(document(2), {.accepted = true}, actor("second"), kNow));
-  EXPECT_FALSE(authority.follow_store(kNow));
+  const auto a = add(authority, document(1), {.accepted = true}, actor("first"), kNow).value();
+  ASSERT_TRUE(add(authority, document(2), {.accepted = true}, actor("second"), kNow));
+  EXPECT_FALSE(follow(authority));
   const auto revision = fresh_standing(authority).revision;
   ASSERT_TRUE(store().activate(a, actor("by hand")));
-  EXPECT_TRUE(authority.follow_store(kNow));
+  EXPECT_TRUE(follow(authority));
   EXPECT_EQ(fresh_standing(authority).model->id, a);
   EXPECT_GT(fresh_standing(authority).revision, revision);
-  EXPECT_FALSE(authority.follow_store(kNow));
+  EXPECT_FALSE(follow(authority));
+}
+
+TEST_F(ModelAuthorityTest, AStoreThatIsBeingDamagedChangesNothing) {
+  auto authority = open();
+  const auto id = add(authority, document(1), {.accepted = true}, actor("calibrate otf"), kNow).value();
+  fs::resize_file(folder_ / "state.json", 10);
+  EXPECT_FALSE(follow(authority));
+  EXPECT_EQ(fresh_standing(authority).model->id, id);
 }
 
 TEST_F(ModelAuthorityTest, ADamagedActiveModelIsInvalidAndNotUsed) {
-  const auto id = open().add(document(1), {.accepted = true}, actor("calibrate otf"), kNow).value();
+  const auto id = add(open(), document(1), {.accepted = true}, actor("calibrate otf"), kNow).value();
   fs::resize_file(store().model_path(id), 1000);
   auto authority = open();
   const auto standing = fresh_standing(authority);
   EXPECT_EQ(standing.status, ModelStatus::MODEL_INVALID);
   EXPECT_THAT(standing.reason, HasSubstr(id));
   EXPECT_EQ(standing.model, nullptr);
-  EXPECT_FALSE(authority.follow_store(kNow));
+  EXPECT_FALSE(follow(authority));
 }
 
 TEST_F(ModelAuthorityTest, AModelThatCannotBePublishedIsNotTakenUp) {
@@ -159,12 +187,12 @@ TEST_F(ModelAuthorityTest, AModelThatCannotBePublishedIsNotTakenUp) {
 }
 
 TEST_F(ModelAuthorityTest, ARestartDoesNotMakeTheModelYounger) {
-  ASSERT_TRUE(open().add(document(1), {.accepted = true}, actor("calibrate otf", kNow - 24h), kNow));
+  ASSERT_TRUE(add(open(), document(1), {.accepted = true}, actor("calibrate otf", kNow - 24h), kNow));
   EXPECT_EQ(fresh_standing(open()).model->active_since, kNow - 24h);
 }
 
 TEST_F(ModelAuthorityTest, AWallClockThatWasSetBackDoesNotMakeAnAgeNegative) {
-  ASSERT_TRUE(open().add(document(1), {.accepted = true}, actor("calibrate otf", kNow + 1h), kNow));
+  ASSERT_TRUE(add(open(), document(1), {.accepted = true}, actor("calibrate otf", kNow + 1h), kNow));
   EXPECT_EQ(fresh_standing(open()).model->active_since, kNow);
 }
 

@@ -98,7 +98,7 @@ void Hub::publish(bool fresh, HostTime now, WallTime wall) {
   if (fresh && parts_.publisher != nullptr) parts_.publisher->live(live_.view(), standing(), now, wall);
   if (wall >= next_health_) {
     next_health_ = wall + kHealthPeriod;
-    parts_.authority.follow_store(now);
+    (void)parts_.authority.follow_store(now);
     collect_health(now);
     if (parts_.publisher != nullptr) parts_.publisher->health(health_, now);
   }

@@ -7,6 +7,8 @@
 #include <utility>
 
 #include "abbe/daemon/device_options.hpp"
+#include "abbe/daemon/otf_inputs.hpp"
+#include "session/outcome.hpp"
 
 namespace abbe::daemon {
 namespace {
@@ -23,6 +25,11 @@ std::string verdict_text(const calib::Verdict& verdict) {
   return fmt::format("refused: {} ({})", fmt::join(verdict.reasons, "; "), figures);
 }
 
+template <class T>
+bool ready(const std::future<T>& work) {
+  return work.valid() && work.wait_for(std::chrono::seconds{0}) == std::future_status::ready;
+}
+
 }  // namespace
 
 CalibrationService::CalibrationService(const Config& config, ModelAuthority& authority,
@@ -35,6 +42,7 @@ CalibrationService::CalibrationService(const Config& config, ModelAuthority& aut
 
 CalibrationService::~CalibrationService() {
   if (identification_.valid()) identification_.wait();
+  if (keeping_.valid()) keeping_.wait();
 }
 
 Result<void> CalibrationService::start_otf(std::vector<AxisPosition> path_m, const std::string& who,
@@ -48,6 +56,7 @@ Result<void> CalibrationService::start_otf(std::vector<AxisPosition> path_m, con
   if (identification_.valid()) {
     return fail(ErrorCode::Refused, "calibrate otf: the identification of a cancelled run is still ending");
   }
+  if (auto fine = check_otf_path(path_m, config_.machine); !fine) return fine;
   const CalibrationRequest request{.path_m = path_m, .from = now};
   if (auto started = session_.start(std::move(path_m), now); !started) return started;
   who_ = who;
@@ -56,17 +65,18 @@ Result<void> CalibrationService::start_otf(std::vector<AxisPosition> path_m, con
 }
 
 Result<void> CalibrationService::cancel(const std::string& who, HostTime now) {
+  if (keeping_.valid())
+    return fail(ErrorCode::Refused, "cancel: the model is being put into the store already");
   return session_.cancel(who, now);
 }
 
 std::vector<SessionEvent> CalibrationService::turn(std::span<const protocol::Snapshot> snapshots,
                                                    HostTime now) {
   for (const auto& snapshot : snapshots) session_.take(snapshot);
+  session_.tick(now);
   if (auto run = session_.take_run()) begin_identification(std::move(*run));
-  if (identification_.valid() &&
-      identification_.wait_for(std::chrono::seconds{0}) == std::future_status::ready) {
-    conclude(identification_.get(), now);
-  }
+  if (ready(identification_)) keep(outcome_of(identification_), now);
+  if (ready(keeping_)) conclude(outcome_of(keeping_), now);
   auto events = session_.take_events();
   if (recorder_ != nullptr) {
     for (const auto& event : events) recorder_->hand_over(event_message(event, config_.machine.name));
@@ -81,39 +91,48 @@ void CalibrationService::begin_identification(std::vector<RunPoint> points) {
   std::future<RecordingDigest> digest;
   if (recorder_ != nullptr) digest = recorder_->digest();
   identified_share_ = 0.0;
-  identification_ = std::async(std::launch::async, [this, run = std::move(run), active = std::move(active),
-                                                    digest = std::move(digest)]() mutable {
-    std::vector<InputFile> inputs;
-    if (digest.valid()) {
-      const RecordingDigest d = digest.get();
-      // The hash is that of the first `bytes` bytes: the recording goes on.
-      inputs.push_back({fmt::format("{} ({} bytes)", d.file.filename().string(), d.bytes), d.sha256});
-    }
-    inputs.push_back({"points", points_sha256(run.points)});
-    auto candidate = identify_run(run, config_.machine, config_.gate, active ? &*active : nullptr,
-                                  [this](double share) { identified_share_ = share; });
-    return Outcome{std::move(candidate), std::move(inputs)};
-  });
+  identification_ = std::async(
+      std::launch::async,
+      [this, run = std::move(run), active = std::move(active),
+       digest = std::move(digest)]() mutable -> Result<Identified> {
+        std::vector<InputFile> inputs;
+        if (digest.valid()) {
+          const RecordingDigest d = digest.get();
+          // The hash is that of the first `bytes` bytes: the recording goes on.
+          inputs.push_back({fmt::format("{} ({} bytes)", d.file.filename().string(), d.bytes), d.sha256});
+        }
+        inputs.push_back({"points", points_sha256(run.points)});
+        auto candidate = identify_run(run, config_.machine, config_.gate, active ? &*active : nullptr,
+                                      [this](double share) { identified_share_ = share; });
+        if (!candidate) return tl::unexpected(candidate.error());
+        return Identified{std::move(*candidate), std::move(inputs)};
+      });
 }
 
-void CalibrationService::conclude(Outcome outcome, HostTime now) {
+void CalibrationService::keep(Result<Identified> identified, HostTime now) {
   if (session_.status().state != SessionState::Identifying) return;  // cancelled meanwhile
-  if (!outcome.candidate) {
-    session_.not_identified(outcome.candidate.error().text, now);
+  if (!identified) {
+    session_.not_identified(identified.error().text, now);
     return;
   }
-  const auto& verdict = outcome.candidate->verdict;
-  held_out_ = verdict.held_out;
+  verdict_ = identified->candidate.verdict;
+  held_out_ = verdict_.held_out;
   const auto created = utc_.to_utc(now);
-  const auto document =
-      otf_document(outcome.candidate->solution, config_, std::move(outcome.inputs), created);
-  const auto id =
-      authority_.add(document, verdict, {.who = who_, .why = "calibrate otf", .when = created}, now);
-  if (!id) {
-    session_.not_identified(fmt::format("identified, but not kept: {}", id.error().text), now);
+  keeping_ = std::async(
+      std::launch::async,
+      [keeper = authority_.keeper(), verdict = verdict_, now,
+       actor = StoreActor{.who = who_, .why = "calibrate otf", .when = created},
+       document = otf_document(identified->candidate.solution, config_, std::move(identified->inputs),
+                               created)]() mutable { return keeper.keep(document, verdict, actor, now); });
+}
+
+void CalibrationService::conclude(Result<KeptModel> kept, HostTime now) {
+  if (!kept) {
+    session_.not_identified(fmt::format("identified, but not kept: {}", kept.error().text), now);
     return;
   }
-  session_.judged(*id, verdict.accepted, verdict_text(verdict), now);
+  if (kept->active) authority_.take_up(std::move(*kept->active));
+  session_.judged(kept->id, verdict_.accepted, verdict_text(verdict_), now);
 }
 
 SessionStatus CalibrationService::status() const {

@@ -2,20 +2,14 @@
 
 #include <fmt/format.h>
 
-#include <algorithm>
 #include <utility>
 
-#include "abbe/daemon/cdr.hpp"
+#include "session/outcome.hpp"
 
 namespace abbe::daemon {
 namespace {
 
 using protocol::HostTime;
-
-/// The hash of what the model was identified from, as its document names it; empty if it names nothing.
-std::string provenance(const ModelDocument& document) {
-  return document.inputs.empty() ? std::string{} : document.inputs.front().sha256;
-}
 
 /// Why the model may be used: a person who forced it answers for it by name.
 std::string reason_of(const StoreEvent& activation) {
@@ -35,83 +29,59 @@ std::string reason_of(const StoreEvent& activation) {
   return "accepted by the gate";
 }
 
+bool same(const StoreEvent& a, const StoreEvent& b) {
+  return a.id == b.id && a.actor.when == b.actor.when && a.action == b.action;
+}
+
 }  // namespace
 
-ModelAuthority::ModelAuthority(ModelStore store, const Config& config, protocol::UtcOffset utc)
-    : store_(std::move(store)),
-      machine_hash_(machine_hash(config)),
-      axes_compensated_(config.encoder && config.encoder->axes_compensated),
-      utc_(utc) {}
+ModelAuthority::ModelAuthority(ModelKeeper keeper, bool axes_compensated)
+    : keeper_(std::move(keeper)), axes_compensated_(axes_compensated), seen_(keeper_.stamp()) {}
 
 Result<ModelAuthority> ModelAuthority::open(const std::filesystem::path& store_folder, const Config& config,
                                             protocol::UtcOffset utc, HostTime now) {
-  auto store = ModelStore::open(store_folder);
-  if (!store) return tl::unexpected(store.error());
-  ModelAuthority authority{std::move(*store), config, utc};
-  if (auto taken = authority.take_up_active(now); !taken) authority.fault_ = taken.error().text;
+  auto keeper = ModelKeeper::open(store_folder, config, utc);
+  if (!keeper) return tl::unexpected(keeper.error());
+  ModelAuthority authority{std::move(*keeper), config.encoder && config.encoder->axes_compensated};
+  auto active = authority.keeper_.read_active(now);
+  if (!active) return tl::unexpected(active.error());
+  authority.take_up(std::move(*active));
   return authority;
 }
 
-Result<void> ModelAuthority::take_up_active(HostTime now) {
-  const auto activation = store_.activation();
-  if (!activation) return tl::unexpected(activation.error());
-  in_force_.reset();
-  fault_.clear();
+void ModelAuthority::take_up(ActiveModel active) {
+  active_ = std::move(active);
   ++revision_;
-  activation_ = activation->value_or(StoreEvent{});
-  if (!*activation) return {};
-  auto document = store_.load(activation_.id);
-  if (!document) return tl::unexpected(document.error());
-  made_for_this_machine_ = document->machine_hash == machine_hash_;
-  in_force_.emplace(ModelInForce{.id = activation_.id,
-                                 .method = document->method,
-                                 .estimator = document->estimator,
-                                 .recording_sha256 = provenance(*document),
-                                 .created = document->created,
-                                 .active_since = std::min(now, utc_.to_host(activation_.actor.when)),
-                                 .model = std::move(document->model)});
-  std::vector<std::byte> unused;
-  if (auto encoded = encode(model_message(*in_force_, {.now = now}), unused); !encoded) {
-    in_force_.reset();
-    return fail(ErrorCode::Refused,
-                fmt::format("model {} cannot be published: {}", activation_.id, encoded.error().text));
+}
+
+ModelAuthority::Following ModelAuthority::follow_store(HostTime now) {
+  if (!reading_.valid()) {
+    const StoreStamp stamp = keeper_.stamp();
+    if (stamp == seen_) return Following::Unchanged;
+    seen_ = stamp;
+    reading_ = std::async(std::launch::async, [keeper = keeper_, now] { return keeper.read_active(now); });
   }
-  return {};
-}
-
-Result<std::string> ModelAuthority::add(const ModelDocument& document, const calib::Verdict& verdict,
-                                        const StoreActor& actor, HostTime now) {
-  auto id = store_.add(document, verdict.accepted, verdict.reasons, actor);
-  if (!id || !verdict.accepted) return id;
-  if (auto done = store_.activate(*id, actor); !done) return tl::unexpected(done.error());
-  if (auto taken = take_up_active(now); !taken) return tl::unexpected(taken.error());
-  return id;
-}
-
-bool ModelAuthority::follow_store(HostTime now) {
-  const auto activation = store_.activation();
-  if (!activation) return false;  // being replaced, or damaged: what is in force stays
-  const bool same = activation->has_value() ? (*activation)->id == activation_.id &&
-                                                  (*activation)->actor.when == activation_.actor.when
-                                            : !in_force_ && fault_.empty();
-  if (same) return false;
-  if (auto taken = take_up_active(now); !taken) fault_ = taken.error().text;
-  return true;
+  if (reading_.wait_for(std::chrono::seconds{0}) != std::future_status::ready) return Following::Reading;
+  auto active = outcome_of(reading_);
+  // Being replaced, or damaged: what is in force stays.
+  if (!active || same(active->activation, active_.activation)) return Following::Unchanged;
+  take_up(std::move(*active));
+  return Following::TakenUp;
 }
 
 ModelStanding ModelAuthority::standing(HostTime now, std::optional<HostTime> axes_known_at,
                                        std::chrono::nanoseconds patience) const {
   ModelStanding s{.model = in_force(), .revision = revision_};
-  if (!in_force_) {
-    s.status = fault_.empty() ? v1::ModelStatus::MODEL_NONE : v1::ModelStatus::MODEL_INVALID;
-    s.reason = fault_.empty() ? "no model has been activated" : fault_;
+  if (!active_.model) {
+    s.status = active_.fault.empty() ? v1::ModelStatus::MODEL_NONE : v1::ModelStatus::MODEL_INVALID;
+    s.reason = active_.fault.empty() ? "no model has been activated" : active_.fault;
     return s;
   }
   s.status = v1::ModelStatus::MODEL_STALE;
   if (axes_compensated_) {
     s.status = v1::ModelStatus::MODEL_INVALID;
     s.reason = "the control already corrects these axes: [encoder] axes_compensated = true";
-  } else if (!made_for_this_machine_) {
+  } else if (!active_.made_for_this_machine) {
     s.reason = "the model was made for another machine configuration";
   } else if (!axes_known_at) {
     s.reason = "no axis positions yet";
@@ -119,7 +89,7 @@ ModelStanding ModelAuthority::standing(HostTime now, std::optional<HostTime> axe
     s.reason = "no recent axis positions";
   } else {
     s.status = v1::ModelStatus::MODEL_ACTIVE;
-    s.reason = reason_of(activation_);
+    s.reason = reason_of(active_.activation);
   }
   return s;
 }

@@ -2,11 +2,13 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <chrono>
 #include <cmath>
 #include <string>
 
-#include "abbe/daemon/otf_blocks.hpp"
+#include "abbe/calib/otf/blocks.hpp"
+#include "abbe/calib/otf/polyline.hpp"
 
 namespace abbe::daemon {
 
@@ -40,6 +42,14 @@ calib::otf::Path otf_path(std::span<const AxisPosition> path_m) {
   return path;
 }
 
+Result<void> check_otf_path(std::span<const AxisPosition> path_m, const MachineConfig& machine) {
+  const auto known = otf_machine(machine);
+  if (!known) return tl::unexpected(known.error());
+  const auto fine = calib::otf::check(otf_path(path_m), known->nodes);
+  if (!fine) return fail(ErrorCode::BadInput, "calibrate otf: " + fine.error().text);
+  return {};
+}
+
 std::vector<calib::otf::TrackerObservation> otf_observations(std::span<const RunPoint> points) {
   std::vector<calib::otf::TrackerObservation> out;
   out.reserve(points.size());
@@ -55,7 +65,7 @@ std::vector<calib::otf::TrackerObservation> otf_observations(std::span<const Run
 calib::otf::Options otf_options(std::span<const calib::otf::TrackerObservation> points,
                                 const GateConfig& gate) {
   calib::otf::Options options;
-  options.block_samples = otf_block_samples(points);
+  options.block_samples = calib::otf::suitable_block_samples(points);
   options.held_out_folds = static_cast<std::size_t>(std::lround(1.0 / gate.holdout_fraction));
   return options;
 }

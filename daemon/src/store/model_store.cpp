@@ -3,12 +3,15 @@
 #include <fcntl.h>
 #include <fmt/format.h>
 #include <sys/file.h>
-#include <unistd.h>
+#include <sys/stat.h>
 
 #include <algorithm>
 #include <cerrno>
+#include <chrono>
 #include <cstring>
+#include <thread>
 
+#include "files/file_descriptor.hpp"
 #include "files/text_file.hpp"
 #include "store/store_state.hpp"
 
@@ -18,28 +21,24 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// Orders the changes of several processes; released when it goes out of scope or the process dies.
-class StoreLock {
- public:
-  explicit StoreLock(const fs::path& folder)
-      : fd_(::open((folder / "lock").c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0644)) {
-    while (fd_ >= 0 && ::flock(fd_, LOCK_EX) != 0)
-      if (errno != EINTR) break;
-  }
-  StoreLock(const StoreLock&) = delete;
-  StoreLock& operator=(const StoreLock&) = delete;
-  ~StoreLock() {
-    if (fd_ >= 0) ::close(fd_);
-  }
-  [[nodiscard]] bool held() const noexcept { return fd_ >= 0; }
+constexpr auto kLockPatience =
+    std::chrono::seconds{5};  // a change takes milliseconds; the next is queued behind it
+constexpr auto kLockLook = std::chrono::milliseconds{10};
 
- private:
-  int fd_;
-};
-
-tl::unexpected<Error> lock_failure(const fs::path& folder) {
-  return fail(ErrorCode::Io,
-              fmt::format("lock the model store {}: {}", folder.string(), std::strerror(errno)));
+/// Orders the changes of several processes: unlocked when the descriptor is closed or the process dies.
+Result<FileDescriptor> lock_store(const fs::path& folder) {
+  const auto failure = [&folder](std::string_view seen) {
+    return fail(ErrorCode::Io, fmt::format("lock the model store {}: {}", folder.string(), seen));
+  };
+  FileDescriptor lock{::open((folder / "lock").c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0644)};
+  if (!lock) return failure(std::strerror(errno));
+  const auto until = std::chrono::steady_clock::now() + kLockPatience;
+  while (::flock(lock.get(), LOCK_EX | LOCK_NB) != 0) {
+    if (errno != EWOULDBLOCK && errno != EINTR) return failure(std::strerror(errno));
+    if (std::chrono::steady_clock::now() > until) return failure("another process has held it for 5 s");
+    std::this_thread::sleep_for(kLockLook);
+  }
+  return lock;
 }
 
 fs::path state_path(const fs::path& folder) {
@@ -69,9 +68,9 @@ bool is_id(const std::string& text) {
 std::vector<std::string> ids_on_disk(const fs::path& folder) {
   std::vector<std::string> ids;
   std::error_code ignored;
-  for (const auto& entry : fs::directory_iterator(folder / "models", ignored))
-    if (entry.path().extension() == ".json" && is_id(entry.path().stem().string()))
-      ids.push_back(entry.path().stem().string());
+  for (fs::directory_iterator entry(folder / "models", ignored), end; entry != end; entry.increment(ignored))
+    if (entry->path().extension() == ".json" && is_id(entry->path().stem().string()))
+      ids.push_back(entry->path().stem().string());
   std::sort(ids.begin(), ids.end());
   return ids;
 }
@@ -88,14 +87,16 @@ Result<ModelStore> ModelStore::open(const fs::path& folder) {
   return ModelStore(folder);
 }
 
+ModelStore::ModelStore(fs::path folder) : folder_(std::move(folder)), state_file_(state_path(folder_)) {}
+
 fs::path ModelStore::model_path(const std::string& id) const {
   return folder_ / "models" / (id + ".json");
 }
 
 Result<std::string> ModelStore::add(const ModelDocument& document, bool accepted,
                                     std::vector<std::string> reasons, const StoreActor& actor) {
-  const StoreLock lock(folder_);
-  if (!lock.held()) return lock_failure(folder_);
+  const auto lock = lock_store(folder_);
+  if (!lock) return tl::make_unexpected(lock.error());
   auto state = read_state(folder_);
   if (!state) return tl::make_unexpected(state.error());
   const auto id = model_id(document.model, document.method);
@@ -110,8 +111,8 @@ Result<std::string> ModelStore::add(const ModelDocument& document, bool accepted
 }
 
 Result<void> ModelStore::activate(const std::string& id, const StoreActor& actor, bool force) {
-  const StoreLock lock(folder_);
-  if (!lock.held()) return lock_failure(folder_);
+  const auto lock = lock_store(folder_);
+  if (!lock) return tl::make_unexpected(lock.error());
   auto state = read_state(folder_);
   if (!state) return tl::make_unexpected(state.error());
   if (const auto document = load(id); !document) return tl::make_unexpected(document.error());
@@ -128,8 +129,8 @@ Result<void> ModelStore::activate(const std::string& id, const StoreActor& actor
 }
 
 Result<std::string> ModelStore::rollback(const StoreActor& actor) {
-  const StoreLock lock(folder_);
-  if (!lock.held()) return lock_failure(folder_);
+  const auto lock = lock_store(folder_);
+  if (!lock) return tl::make_unexpected(lock.error());
   auto state = read_state(folder_);
   if (!state) return tl::make_unexpected(state.error());
   const auto stack = state->activations();
@@ -187,6 +188,13 @@ Result<std::optional<StoreEvent>> ModelStore::activation() const {
   const auto state = read_state(folder_);
   if (!state) return tl::make_unexpected(state.error());
   return state->activation();
+}
+
+StoreStamp ModelStore::stamp() const noexcept {
+  struct stat status {};
+  if (::stat(state_file_.c_str(), &status) != 0) return {};
+  constexpr std::int64_t kSecond_ns = 1'000'000'000;
+  return {status.st_ino, status.st_mtim.tv_sec * kSecond_ns + status.st_mtim.tv_nsec, status.st_size};
 }
 
 Result<ModelDocument> ModelStore::load(const std::string& id) const {

@@ -1,6 +1,7 @@
 #pragma once
-/// Runs calibrations in the daemon: feeds the session, identifies on a thread of its own, keeps the judged
-/// model in the store and puts it in force if the gate accepted it. Used by the hub's thread only.
+/// Runs calibrations in the daemon: feeds the session, identifies and keeps the judged model in the store on
+/// a thread of its own, and puts it in force if the gate accepted it. Used by the hub's thread only; no call
+/// waits for anything.
 
 #include <atomic>
 #include <future>
@@ -23,15 +24,16 @@ class CalibrationService {
   /// `recorder` may be null: nothing is recorded then, and models name no recording.
   CalibrationService(const Config& config, ModelAuthority& authority, RecorderThread* recorder,
                      protocol::UtcOffset utc);
-  ~CalibrationService();  ///< waits for a running identification
+  ~CalibrationService();  ///< waits for a running identification or store
   CalibrationService(const CalibrationService&) = delete;
   CalibrationService& operator=(const CalibrationService&) = delete;
 
   [[nodiscard]] Result<void> start_otf(std::vector<AxisPosition> path_m, const std::string& who,
                                        protocol::HostTime now);
+  /// Refused without a session, and while the model is being put into the store.
   [[nodiscard]] Result<void> cancel(const std::string& who, protocol::HostTime now);
 
-  /// Every turn: new snapshots, and the outcome of an identification that has ended. Returns changes of
+  /// Every turn: new snapshots, and the outcome of what has ended on the other thread. Returns changes of
   /// state, in order.
   std::vector<SessionEvent> turn(std::span<const protocol::Snapshot> snapshots, protocol::HostTime now);
 
@@ -40,12 +42,13 @@ class CalibrationService {
   [[nodiscard]] const std::optional<calib::HeldOutFigures>& held_out() const noexcept { return held_out_; }
 
  private:
-  struct Outcome {
-    Result<OtfCandidate> candidate;
+  struct Identified {
+    OtfCandidate candidate;
     std::vector<InputFile> inputs;
   };
   void begin_identification(std::vector<RunPoint> points);
-  void conclude(Outcome outcome, protocol::HostTime now);
+  void keep(Result<Identified> identified, protocol::HostTime now);
+  void conclude(Result<KeptModel> kept, protocol::HostTime now);
 
   const Config& config_;
   ModelAuthority& authority_;
@@ -53,7 +56,9 @@ class CalibrationService {
   protocol::UtcOffset utc_;
   CalibrationSession session_;
   std::string who_;
-  std::future<Outcome> identification_;
+  std::future<Result<Identified>> identification_;
+  std::future<Result<KeptModel>> keeping_;
+  calib::Verdict verdict_;  // of the model being kept
   std::atomic<double> identified_share_{0.0};
   std::optional<calib::HeldOutFigures> held_out_;
 };

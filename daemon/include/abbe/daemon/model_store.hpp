@@ -3,10 +3,11 @@
 ///     models/ID.json   one model.json each, never changed once written
 ///     state.json       every event in order (added, activated, rolled back), replaced as a whole
 /// Each write goes to a new file, to the disk, then over the old name: after a power cut the old or the new
-/// state is there, never half of one. Several processes may use a store (a lock file orders them); one object
-/// belongs to one thread. A model file that cannot be read is listed with its fault and stands in nobody's
-/// way.
+/// state is there, never half of one. Several processes may use a store (a lock file orders them; a change
+/// that gets no lock for five seconds fails); one object belongs to one thread. A model file that cannot be
+/// read is listed with its fault and stands in nobody's way.
 
+#include <cstdint>
 #include <filesystem>
 #include <optional>
 #include <string>
@@ -43,6 +44,14 @@ struct StoreEntry {
   std::string fault;            ///< why the file cannot be read; empty if it can
 };
 
+/// Which state.json this is: it is replaced, never written to. All zero: there is none.
+struct StoreStamp {
+  std::uint64_t inode = 0;
+  std::int64_t modified_ns = 0;
+  std::int64_t bytes = 0;
+  bool operator==(const StoreStamp&) const = default;
+};
+
 class ModelStore {
  public:
   /// Creates the folder if needed. Io if that fails, BadInput if state.json is damaged (the models are left
@@ -70,13 +79,17 @@ class ModelStore {
   [[nodiscard]] Result<std::optional<StoreEvent>> activation() const;
   [[nodiscard]] Result<ModelDocument> load(const std::string& id) const;
 
+  /// The same as before: nothing was added or activated since.
+  [[nodiscard]] StoreStamp stamp() const noexcept;
+
   /// The id that begins with `prefix` (4 digits at least), or "active". Usage if none or several do.
   [[nodiscard]] Result<std::string> find(const std::string& prefix) const;
   [[nodiscard]] std::filesystem::path model_path(const std::string& id) const;
 
  private:
-  explicit ModelStore(std::filesystem::path folder) : folder_(std::move(folder)) {}
+  explicit ModelStore(std::filesystem::path folder);
   std::filesystem::path folder_;
+  std::filesystem::path state_file_;
 };
 
 }  // namespace abbe::daemon

@@ -20,13 +20,13 @@ namespace {
 using namespace abbe::daemon;  // NOLINT(google-build-using-namespace): a program, not a header
 using namespace std::chrono_literals;
 
-enum ExitCode { kDone = 0, kUsage = 2, kBadInput = 3, kIo = 4, kHubHangs = 70 };
+enum ExitCode { kDone = 0, kUsage = 2, kBadInput = 3, kIo = 4, kDefect = 70 };
 
 constexpr const char* kExitCodes =
     "Exit codes: 0 stopped by SIGTERM or SIGINT (or the configuration is good), 2 usage, 3 the configuration "
     "is bad,\n"
-    "4 the system refused something (socket, directory, port, priority), 70 the hub hangs: systemd starts "
-    "abbed anew.";
+    "4 the system refused something (socket, directory, port, priority), 70 the hub hangs or a defect "
+    "ended abbed: systemd starts it anew.";
 
 constexpr auto kTurn = 20ms;  // how often abbe-dds is looked after
 
@@ -68,7 +68,7 @@ int run(Abbed& abbed, const sigset_t& stop) {
     if (!abbed.alive()) {
       fmt::print(stderr, "abbed: the hub has not turned for a second\n");
       if (!feed_period) continue;  // nobody to start us anew: keep what still works
-      return kHubHangs;
+      return kDefect;
     }
     if (const auto now = std::chrono::steady_clock::now(); feed_period && now >= next_feed) {
       tell_alive();
@@ -77,9 +77,7 @@ int run(Abbed& abbed, const sigset_t& stop) {
   }
 }
 
-}  // namespace
-
-int main(int argc, char** argv) {
+int abbed_main(int argc, char** argv) {
   CLI::App app{
       "Watches a machine tool or measuring machine, identifies its geometric errors and publishes their "
       "compensation."};
@@ -106,9 +104,8 @@ int main(int argc, char** argv) {
   // A file that may not grow (RLIMIT_FSIZE, LimitFSIZE=) is for the recorder to report like a full disk, by
   // the EFBIG of its write; the signal's default would end acquisition with it.
   ::signal(SIGXFSZ, SIG_IGN);
-  auto abbed = Abbed::start(
-      std::move(*config),
-      {.configuration_text = text_of(file), .dds_program = dds_program()});
+  auto abbed =
+      Abbed::start(std::move(*config), {.configuration_text = text_of(file), .dds_program = dds_program()});
   if (!abbed) return refuse(abbed.error());
   for (const auto& warning : (*abbed)->warnings()) fmt::print(stderr, "abbed: warning: {}\n", warning);
   fmt::print(stderr, "abbed: running, configuration {}\n", file);
@@ -118,4 +115,15 @@ int main(int argc, char** argv) {
   abbed->reset();
   fmt::print(stderr, "abbed: stopped\n");
   return code;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  try {
+    return abbed_main(argc, argv);
+  } catch (const std::exception& defect) {
+    fmt::print(stderr, "abbed: ended by a defect: {}\n", defect.what());
+    return kDefect;
+  }
 }

@@ -7,8 +7,10 @@
 #include <unistd.h>
 
 #include <chrono>
+#include <cstdio>
 #include <cstring>
 #include <ctime>
+#include <exception>
 #include <optional>
 #include <thread>
 #include <utility>
@@ -180,12 +182,20 @@ struct Abbed::State {
                          .calibration = *calibration,
                          .publisher = publisher ? &*publisher : nullptr,
                          .recorder = recorder.get()});
-    hub_thread = std::thread([this] { hub->run(); });
+    hub_thread = std::thread([this] { run_hub(); });
     if (auto set = set_priority(hub_thread, config.daemon); !set) {
       if (config.daemon.realtime == RealTimeMode::Enforce) return set;
       warnings.push_back(set.error().text);
     }
     return {};
+  }
+
+  void run_hub() noexcept {
+    try {
+      hub->run();
+    } catch (const std::exception& defect) {  // it turns no more, which alive() sees
+      fmt::print(stderr, "abbed: the hub ended by a defect: {}\n", defect.what());
+    }
   }
 
   Result<void> open_control() {

@@ -8,7 +8,9 @@
 
 #include <atomic>
 #include <cerrno>
+#include <cstdio>
 #include <cstring>
+#include <exception>
 #include <list>
 #include <string>
 #include <thread>
@@ -39,7 +41,13 @@ class Server final : public ControlServer {
         wake_(std::move(wake)),
         path_(std::move(path)),
         handler_(std::move(handler)) {
-    thread_ = std::thread([this] { serve(); });
+    thread_ = std::thread([this] {
+      try {
+        serve();
+      } catch (const std::exception& defect) {  // nobody is answered any more; everything else goes on
+        fmt::print(stderr, "abbed: the control socket ended by a defect: {}\n", defect.what());
+      }
+    });
   }
   Server(const Server&) = delete;
   Server& operator=(const Server&) = delete;

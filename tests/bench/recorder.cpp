@@ -1,6 +1,6 @@
 // What recording costs per sample, against plain write() of the same bytes, and how many times faster than
-// real time a recording is read back. Ten minutes of a calibration: 2000 axis samples and 500 tracker points a
-// second, raw bytes beside them.
+// real time a recording is read back. Ten minutes of a calibration: 2000 axis samples and 500 tracker points
+// a second, raw bytes beside them.
 
 #include <fcntl.h>
 #include <fmt/format.h>
@@ -86,7 +86,7 @@ void record_second(daemon::Recorder& recorder, std::uint32_t second, bool raw) {
   block.bytes = {};
   for (std::uint32_t i = 0; i < 12; ++i) {  // a second of 500 points of 36 bytes, and of TPDOs
     block.time = time_at(second * 12 + i, 12);
-    recorder.record(block, "tracker");
+    recorder.record(protocol::to_raw_bytes(block, "tracker"));
   }
 }
 

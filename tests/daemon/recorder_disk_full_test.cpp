@@ -133,6 +133,28 @@ TEST_F(DiskFull, RecordingGoesOnInANewFileWhenThereIsRoomAgain) {
   EXPECT_EQ(second->attachments().size(), 1u) << "every file explains itself";
 }
 
+TEST_F(DiskFull, TheNextFileSaysHowManyMessagesAreMissing) {
+  FileSizeLimit limit{kFewChunks};
+  Recorder recorder = open(WallTime{100s});
+  constexpr std::uint32_t kHandedOver = 2000;
+  for (std::uint32_t i = 0; i < kHandedOver; ++i) recorder.record(example_axes(i), "encoder");
+  ASSERT_EQ(recorder.status().state, State::DiskFull);
+  const auto before = recorder.status();
+  EXPECT_EQ(before.messages + before.lost, kHandedOver);
+  limit.set(RLIM_INFINITY);
+  recorder.tick(WallTime{105s});
+  recorder.record(example_axes(kHandedOver), "encoder");
+  recorder.record(example_axes(kHandedOver + 1), "encoder");
+  ASSERT_TRUE(recorder.close());
+  std::vector<std::uint32_t> lost_before;
+  RecordingSink sink;
+  sink.axis_sample = [&](const protocol::AxisSample& a, std::string_view) {
+    lost_before.push_back(a.head.lost_before);
+  };
+  EXPECT_EQ(RecordingReader::open(folder_.path() / "run-2.mcap")->read(sink), 0u);
+  EXPECT_EQ(lost_before, (std::vector<std::uint32_t>{static_cast<std::uint32_t>(before.lost), 0}));
+}
+
 TEST_F(DiskFull, WhileItStaysFullNoStumpsPileUp) {
   FileSizeLimit limit{kFewChunks};
   Recorder recorder = open(WallTime{100s});

@@ -75,7 +75,7 @@ TEST_F(RecorderTest, AnAxisSampleComesBackAsItWas) {
 
 TEST_F(RecorderTest, RawBytesWeatherAndEventsComeBackAsTheyWere) {
   Recorder recorder = open();
-  recorder.record(example_block(3), "tracker");
+  recorder.record(protocol::to_raw_bytes(example_block(3), "tracker"));
   recorder.record(example_environment(4), "weather");
   recorder.record(example_event(5));
   ASSERT_TRUE(recorder.close());
@@ -172,7 +172,7 @@ TEST_F(RecorderTest, WhatWasFlushedIsReadableWhileRecordingGoesOn) {
 TEST_F(RecorderTest, ADeviceNameBeyondTheIdlIsCountedNotWritten) {
   Recorder recorder = open();
   recorder.record(example_point(1), std::string(33, 'x'));
-  recorder.record(example_block(1), std::string(33, 'x'));
+  recorder.record(protocol::to_raw_bytes(example_block(1), std::string(33, 'x')));
   EXPECT_EQ(recorder.status().refused, 2u);
   ASSERT_TRUE(recorder.close());
   EXPECT_EQ(read("run.mcap").message_count(), 0u);

@@ -131,7 +131,7 @@ inline void record_example(Recorder& recorder, std::uint32_t i) {
     case 1:
       return recorder.record(example_axes(i), "encoder");
     case 2:
-      return recorder.record(example_block(i), "tracker");
+      return recorder.record(protocol::to_raw_bytes(example_block(i), "tracker"));
     case 3:
       return recorder.record(example_environment(i), "weather");
     default:

@@ -11,6 +11,7 @@
 #include "abbe/protocol/mcap/writer.hpp"
 #include "abbe/protocol/raw_bytes_cdr.hpp"
 #include "recording/file_front.hpp"
+#include "recording/loss_ledger.hpp"
 #include "recording/recording_file.hpp"
 #include "recording/sample_messages.hpp"
 #include "recording/streams.hpp"
@@ -48,10 +49,13 @@ struct Recorder::State {
   [[nodiscard]] IoResult begin_file();
   [[nodiscard]] IoResult write_front(RecordingFile& fresh, mcap::SummaryBuilder& fresh_summary) const;
   [[nodiscard]] IoResult end_file();
-  void add(Stream stream, protocol::HostTime time, std::span<const std::byte> payload);
+  [[nodiscard]] bool add(Stream stream, protocol::HostTime time, std::span<const std::byte> payload);
+  /// Marks `message` with what is missing before it, and adds it.
   template <class Message>
-  void add_encoded(Stream stream, protocol::HostTime time, const Message& message);
+  void add_marked(Stream stream, protocol::HostTime time, std::string_view device, Message& message);
+  void account(Stream stream, std::string_view device, std::uint32_t lost_before, bool added);
   void write_chunk();
+  void lose_chunk();
   void sync_if_due();
   void enter_fault(const IoFault& fault);
   void retry();
@@ -69,6 +73,9 @@ struct Recorder::State {
   mcap::SummaryBuilder summary;
   std::array<std::uint32_t, recording::kStreamCount> sequences{};
   RecorderStatus status;
+  recording::LossLedger lost;  ///< not yet said by a later message
+  recording::LossLedger
+      in_chunk;  ///< with what they say was lost before them: gone if the chunk cannot be written
 
   WallTime now{};
   WallTime chunk_since{};  ///< no message of the open chunk was recorded before this
@@ -121,8 +128,10 @@ IoResult Recorder::State::begin_file() {
     return tl::unexpected(recording::io_fault("begin", path(part + 1, ".mcap.part"), ENOSPC));
   }
   const auto finished = path(part + 1, ".mcap");
-  if (std::filesystem::exists(finished))
+  std::error_code error;
+  if (std::filesystem::exists(finished, error))
     return tl::unexpected(recording::io_fault("create", finished, EEXIST));
+  if (error) return tl::unexpected(recording::io_fault("look for", finished, error.value()));
   auto fresh = RecordingFile::create(path(part + 1, ".mcap.part"));
   if (!fresh) return tl::unexpected(fresh.error());
   mcap::SummaryBuilder fresh_summary;
@@ -162,32 +171,45 @@ IoResult Recorder::State::end_file() {
 // --- messages
 // ------------------------------------------------------------------------------------------------------
 
-void Recorder::State::add(Stream stream, protocol::HostTime time, std::span<const std::byte> data) {
+bool Recorder::State::add(Stream stream, protocol::HostTime time, std::span<const std::byte> data) {
   if (status.state != RecorderStatus::State::Recording) {
     ++status.lost;
-    return;
+    return false;
   }
   constexpr std::size_t kMessageHead = mcap::kRecordHeadSize + 2 + 4 + 8 + 8;
   if (!chunk.empty() && chunk.records_size() + kMessageHead + data.size() > options.chunk_bytes) {
     write_chunk();
     if (status.state != RecorderStatus::State::Recording) {
       ++status.lost;
-      return;
+      return false;
     }
   }
   if (chunk.empty()) chunk_since = now;
   const std::uint64_t log_time_ns = utc_ns(time);
   chunk.add(mcap::Message{recording::channel_id(stream), sequences[recording::index(stream)]++, log_time_ns,
                           log_time_ns, data});
+  return true;
 }
 
 template <class Message>
-void Recorder::State::add_encoded(Stream stream, protocol::HostTime time, const Message& message) {
-  if (!encode(message, payload)) {
-    ++status.refused;
-    return;
-  }
-  add(stream, time, payload);
+void Recorder::State::add_marked(Stream stream, protocol::HostTime time, std::string_view device,
+                                 Message& message) {
+  const std::uint32_t missing = lost.take(stream, device);
+  if (missing > 0) recording::mark_gap(message, missing);
+  const bool encoded = encode(message, payload).has_value();
+  if (!encoded) ++status.refused;
+  account(stream, device, missing, encoded && add(stream, time, payload));
+}
+
+void Recorder::State::account(Stream stream, std::string_view device, std::uint32_t lost_before, bool added) {
+  (added ? in_chunk : lost).add(stream, device, lost_before + 1);
+}
+
+void Recorder::State::lose_chunk() {
+  status.lost += chunk.message_count();
+  chunk.clear();
+  lost.add(in_chunk);
+  in_chunk.clear();
 }
 
 void Recorder::State::write_chunk() {
@@ -196,13 +218,10 @@ void Recorder::State::write_chunk() {
   const mcap::ClosedChunk closed = chunk.close();
   const std::uint64_t offset = file->size();
   const auto written = file->append(closed.bytes);
-  if (written) summary.add(closed, offset);
+  if (!written) return enter_fault(written.error());
+  summary.add(closed, offset);
   chunk.clear();
-  if (!written) {
-    status.lost += messages;
-    enter_fault(written.error());
-    return;
-  }
+  in_chunk.clear();
   unsynced = true;
   messages_in_file += messages;
   status.messages += messages;
@@ -225,8 +244,7 @@ void Recorder::State::sync_if_due() {
 }
 
 void Recorder::State::enter_fault(const IoFault& fault) {
-  status.lost += chunk.message_count();
-  chunk.clear();
+  lose_chunk();
   status.state =
       recording::is_disk_full(fault.error) ? RecorderStatus::State::DiskFull : RecorderStatus::State::Failed;
   status.fault = fault.what;
@@ -285,31 +303,36 @@ Recorder::~Recorder() {
 
 void Recorder::record(const protocol::TrackerPoint& point, std::string_view device) {
   recording::fill(state_->tracker_point, point, device);
-  state_->add_encoded(Stream::TrackerPoint, point.head.time, state_->tracker_point);
+  state_->add_marked(Stream::TrackerPoint, point.head.time, device, state_->tracker_point);
 }
 
 void Recorder::record(const protocol::AxisSample& sample, std::string_view device) {
   recording::fill(state_->axis_sample, sample, device);
-  state_->add_encoded(Stream::AxisSample, sample.head.time, state_->axis_sample);
+  state_->add_marked(Stream::AxisSample, sample.head.time, device, state_->axis_sample);
 }
 
 void Recorder::record(const protocol::EnvironmentSample& sample, std::string_view device) {
   recording::fill(state_->environment, sample, device);
-  state_->add_encoded(Stream::Environment, sample.head.time, state_->environment);
+  state_->add_marked(Stream::Environment, sample.head.time, device, state_->environment);
 }
 
-void Recorder::record(const protocol::RawBlock& block, std::string_view device) {
-  const auto size = encode_cdr(protocol::to_raw_bytes(block, device), state_->raw_payload);
-  if (!size) {
-    ++state_->status.refused;
-    return;
-  }
-  state_->add(Stream::RawBytes, block.time, std::span{state_->raw_payload}.first(*size));
+void Recorder::record(protocol::RawBytes bytes) {
+  const std::uint32_t missing = state_->lost.take(Stream::RawBytes, bytes.device);
+  bytes.lost_before += missing;
+  const auto size = encode_cdr(bytes, state_->raw_payload);
+  if (!size) ++state_->status.refused;
+  const bool added =
+      size && state_->add(Stream::RawBytes, bytes.time, std::span{state_->raw_payload}.first(*size));
+  state_->account(Stream::RawBytes, bytes.device, missing, added);
 }
 
 void Recorder::record(const v1::CalibrationEvent& event) {
   const protocol::HostTime time{std::chrono::nanoseconds{event.host_time_ns()}};
-  state_->add_encoded(Stream::CalibrationEvent, time, event);
+  if (!encode(event, state_->payload)) {
+    ++state_->status.refused;
+    return;
+  }
+  (void)state_->add(Stream::CalibrationEvent, time, state_->payload);
 }
 
 void Recorder::attach(RecordingAttachment attachment, protocol::HostTime time) {

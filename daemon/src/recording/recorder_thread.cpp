@@ -1,18 +1,33 @@
 #include "abbe/daemon/recorder_thread.hpp"
 
+#include <fmt/format.h>
+
 #include <chrono>
 #include <condition_variable>
 #include <mutex>
-#include <optional>
 #include <thread>
 #include <utility>
 #include <vector>
+
+#include "recording/waiting_blocks.hpp"
 
 namespace abbe::daemon {
 namespace {
 
 // How long a sample may wait in memory before it is encoded; a tenth of the shortest chunk.
 constexpr std::chrono::milliseconds kTurn{20};
+
+template <class T>
+std::size_t size_of(const std::vector<T>& samples) noexcept {
+  return samples.size() * sizeof(T);
+}
+
+std::size_t bytes_of(const Batch& batch) noexcept {
+  std::size_t bytes = size_of(batch.points) + size_of(batch.axes) + size_of(batch.environment);
+  for (const auto* blocks : {&batch.tracker_raw, &batch.encoder_raw})
+    bytes += WaitingBlocks::bytes_of(*blocks);
+  return bytes;
+}
 
 struct Attachment {
   RecordingAttachment what;
@@ -21,26 +36,50 @@ struct Attachment {
 
 /// What waits for the recorder.
 struct Waiting {
-  Batch batch;
+  std::vector<protocol::TrackerPoint> points;
+  std::vector<protocol::AxisSample> axes;
+  std::vector<protocol::EnvironmentSample> environment;
+  WaitingBlocks tracker_raw;
+  WaitingBlocks encoder_raw;
   std::vector<v1::CalibrationEvent> events;
   std::vector<Attachment> attachments;
   std::vector<std::promise<RecordingDigest>> digests;
+  bool full = false;  ///< what comes until the recorder has taken this is dropped: one hole, not many
 
-  [[nodiscard]] std::size_t size() const noexcept {
-    return batch.points.size() + batch.axes.size() + batch.environment.size() + batch.tracker_raw.size() +
-           batch.encoder_raw.size();
+  [[nodiscard]] std::size_t bytes() const noexcept {
+    return size_of(points) + size_of(axes) + size_of(environment) + tracker_raw.bytes() + encoder_raw.bytes();
   }
-  void clear() noexcept {
-    batch.clear();
+  /// Keeps the room for an ordinary turn, gives that of a stalled disk back.
+  void clear() {
+    constexpr std::size_t kOrdinary = 1 << 20;
+    if (bytes() > kOrdinary) {
+      *this = {};
+      return;
+    }
+    points.clear();
+    axes.clear();
+    environment.clear();
+    tracker_raw.clear();
+    encoder_raw.clear();
     events.clear();
     attachments.clear();
     digests.clear();
+    full = false;
   }
 };
 
+/// Messages of each stream that were dropped since the last one that was not.
+struct Dropped {
+  std::uint32_t points = 0, axes = 0, environment = 0, tracker_raw = 0, encoder_raw = 0;
+};
+
 template <class T>
-void append(std::vector<T>& to, const std::vector<T>& from) {
-  to.insert(to.end(), from.begin(), from.end());
+void append(std::vector<T>& to, const std::vector<T>& from, std::uint32_t& dropped) {
+  if (from.empty()) return;
+  const auto first = to.insert(to.end(), from.begin(), from.end());
+  if (dropped == 0) return;
+  first->head.lost_before += std::exchange(dropped, 0);
+  first->head.flags |= protocol::SampleFlag::GapBefore;
 }
 
 }  // namespace
@@ -52,6 +91,7 @@ struct RecorderThread::State {
   std::condition_variable stop_asked;
   Waiting waiting;            // under mutex
   RecorderStatus status;      // under mutex, a copy of the recorder's own
+  Dropped unsaid;             // under mutex
   std::uint64_t dropped = 0;  // under mutex
   bool stopping = false;      // under mutex
   std::thread thread;
@@ -67,20 +107,46 @@ struct RecorderThread::State {
         last = stopping;
         std::swap(turn, waiting);
       }
-      write(turn);
-      turn.clear();
+      const std::string defect = write_all(turn);
+      turn.clear();  // whoever waits for a digest that was not made learns of it
       const std::lock_guard lock{mutex};
       status = recorder.status();
+      if (defect.empty()) continue;
+      status.state = RecorderStatus::State::Failed;
+      status.fault = defect;
     }
+  }
+
+  /// What went wrong, if something did that only a defect or a lack of memory explains.
+  std::string write_all(Waiting& turn) {
+    try {
+      write(turn);
+      return {};
+    } catch (const std::exception& defect) {
+      return fmt::format("recorder: {}", defect.what());
+    }
+  }
+
+  void drop(const Batch& batch) {
+    const auto lose = [this](std::uint32_t& unsaid_of, std::size_t messages) {
+      unsaid_of += static_cast<std::uint32_t>(messages);
+      dropped += messages;
+    };
+    lose(unsaid.points, batch.points.size());
+    lose(unsaid.axes, batch.axes.size());
+    lose(unsaid.environment, batch.environment.size());
+    if (!options.raw) return;
+    lose(unsaid.tracker_raw, batch.tracker_raw.size());
+    lose(unsaid.encoder_raw, batch.encoder_raw.size());
   }
 
   void write(Waiting& turn) {
     for (auto& a : turn.attachments) recorder.attach(std::move(a.what), a.time);
-    for (const auto& s : turn.batch.axes) recorder.record(s, options.encoder);
-    for (const auto& s : turn.batch.points) recorder.record(s, options.tracker);
-    for (const auto& s : turn.batch.environment) recorder.record(s, options.tracker);
-    for (const auto& b : turn.batch.tracker_raw) recorder.record(b, options.tracker);
-    for (const auto& b : turn.batch.encoder_raw) recorder.record(b, options.encoder);
+    for (const auto& s : turn.axes) recorder.record(s, options.encoder);
+    for (const auto& s : turn.points) recorder.record(s, options.tracker);
+    for (const auto& s : turn.environment) recorder.record(s, options.tracker);
+    turn.tracker_raw.for_each(options.tracker, [this](const auto& bytes) { recorder.record(bytes); });
+    turn.encoder_raw.for_each(options.encoder, [this](const auto& bytes) { recorder.record(bytes); });
     for (const auto& e : turn.events) recorder.record(e);
     if (!turn.digests.empty()) recorder.flush();
     for (auto& d : turn.digests) d.set_value(recorder.digest());
@@ -108,23 +174,25 @@ RecorderThread::~RecorderThread() {
   }
   state_->stop_asked.notify_one();
   state_->thread.join();
-  (void)state_->recorder.close();  // what could not be finished stays readable as .part
+  try {
+    (void)state_->recorder.close();  // what could not be finished stays readable as .part
+  } catch (
+      const std::exception&) {  // NOLINT(bugprone-empty-catch): so does what a lack of memory left behind
+  }
 }
 
 void RecorderThread::hand_over(const Batch& batch) {
   const std::lock_guard lock{state_->mutex};
-  auto& waiting = state_->waiting.batch;
-  const std::size_t coming = batch.points.size() + batch.axes.size() + batch.environment.size();
-  if (state_->waiting.size() + coming > state_->options.most_waiting) {
-    state_->dropped += coming;
-    return;
-  }
-  append(waiting.points, batch.points);
-  append(waiting.axes, batch.axes);
-  append(waiting.environment, batch.environment);
+  Waiting& waiting = state_->waiting;
+  Dropped& unsaid = state_->unsaid;
+  waiting.full = waiting.full || waiting.bytes() + bytes_of(batch) > state_->options.most_waiting_bytes;
+  if (waiting.full) return state_->drop(batch);
+  append(waiting.points, batch.points, unsaid.points);
+  append(waiting.axes, batch.axes, unsaid.axes);
+  append(waiting.environment, batch.environment, unsaid.environment);
   if (!state_->options.raw) return;
-  append(waiting.tracker_raw, batch.tracker_raw);
-  append(waiting.encoder_raw, batch.encoder_raw);
+  waiting.tracker_raw.append(batch.tracker_raw, unsaid.tracker_raw);
+  waiting.encoder_raw.append(batch.encoder_raw, unsaid.encoder_raw);
 }
 
 void RecorderThread::hand_over(v1::CalibrationEvent event) {

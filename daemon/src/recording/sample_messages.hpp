@@ -17,4 +17,11 @@ void fill(v1::EnvironmentSample& message, const protocol::EnvironmentSample& sam
 [[nodiscard]] protocol::AxisSample sample_of(const v1::AxisSample& message);
 [[nodiscard]] protocol::EnvironmentSample sample_of(const v1::EnvironmentSample& message);
 
+/// Says in a message that `lost` of its stream are missing before it.
+template <class Message>
+void mark_gap(Message& message, std::uint32_t lost) {
+  message.flags(message.flags() | protocol::SampleFlag::GapBefore);
+  if constexpr (requires { message.lost_before(); }) message.lost_before(message.lost_before() + lost);
+}
+
 }  // namespace abbe::daemon::recording

@@ -9,7 +9,8 @@
 ///
 /// A full or failing disk never stops the caller: record() and tick() cannot fail. The file is cut back to
 /// its last whole chunk and closed if there is room for that, messages are counted as lost, status() says
-/// why, and when there is room again recording goes on in NAME-2.mcap, NAME-3.mcap ...
+/// why, and when there is room again recording goes on in NAME-2.mcap, NAME-3.mcap ... There the first
+/// message of every stream and device says in lost_before how many are missing.
 ///
 /// One thread uses it, in the ordinary world: it allocates and makes blocking system calls.
 
@@ -23,6 +24,7 @@
 #include "abbe/daemon/cdr.hpp"
 #include "abbe/daemon/error.hpp"
 #include "abbe/daemon/recording_info.hpp"
+#include "abbe/protocol/raw_bytes_cdr.hpp"
 #include "abbe/protocol/samples.hpp"
 
 namespace abbe::daemon {
@@ -78,7 +80,7 @@ class Recorder {
   void record(const protocol::TrackerPoint& point, std::string_view device);
   void record(const protocol::AxisSample& sample, std::string_view device);
   void record(const protocol::EnvironmentSample& sample, std::string_view device);
-  void record(const protocol::RawBlock& block, std::string_view device);
+  void record(protocol::RawBytes bytes);
   void record(const v1::CalibrationEvent& event);
 
   /// Written at once, and again into every later file of this recorder.

@@ -1,7 +1,8 @@
 #pragma once
 /// The recorder on a thread of its own, so that a slow disk never holds up the hub. What the hub hands over
-/// waits in memory; when more than `most_waiting` samples wait, further ones are dropped, counted, and said
-/// in status(). Functions may be called from any thread.
+/// waits in memory; when more than `most_waiting_bytes` would wait, further batches are dropped and counted
+/// until the recorder has taken what waits, and the next message of every stream says in lost_before how many
+/// it were. Functions may be called from any thread.
 
 #include <cstdint>
 #include <future>
@@ -17,8 +18,9 @@ struct RecorderThreadOptions {
   RecorderOptions recorder;
   std::string tracker = "tracker";  ///< device names in the recording
   std::string encoder = "encoder";
-  bool raw = true;                       ///< record the device bytes, too
-  std::size_t most_waiting = 1'000'000;  ///< samples; minutes of a stalled disk at 1.5 kHz
+  bool raw = true;  ///< record the device bytes, too
+  /// Two minutes of a stalled disk with axes at 1 kHz and a tracker at 500 Hz. The memory may be locked.
+  std::size_t most_waiting_bytes = 64 << 20;
 };
 
 class RecorderThread {
@@ -33,10 +35,11 @@ class RecorderThread {
   void hand_over(v1::CalibrationEvent event);
   void attach(RecordingAttachment attachment, protocol::HostTime time);
 
-  /// Everything handed over before this call is on its way to the disk when the future is ready.
+  /// Everything handed over before this call is on its way to the disk when the future is ready. A broken
+  /// promise if the recorder failed at it.
   [[nodiscard]] std::future<RecordingDigest> digest();
   [[nodiscard]] RecorderStatus status() const;
-  [[nodiscard]] std::uint64_t dropped() const noexcept;  ///< handed over, but not waited for
+  [[nodiscard]] std::uint64_t dropped() const noexcept;  ///< messages handed over for which there was no room
 
  private:
   struct State;

@@ -1,0 +1,103 @@
+#include "abbe/daemon/recorder_thread.hpp"
+
+#include <gtest/gtest.h>
+
+#include "recording_fixture.hpp"
+
+namespace abbe::daemon {
+namespace {
+
+using protocol::SampleFlag;
+
+class RecorderThreadTest : public ::testing::Test {
+ protected:
+  void start(std::size_t most_waiting_bytes) {
+    RecorderThreadOptions options;
+    options.recorder = example_options(folder_.path());
+    options.most_waiting_bytes = most_waiting_bytes;
+    auto started = RecorderThread::start(std::move(options), example_info());
+    if (!started) throw std::runtime_error(started.error().text);
+    thread_ = std::move(*started);
+  }
+  /// One message of every stream in each of `count` places from `first` on.
+  static Batch batch(std::uint32_t first, std::uint32_t count) {
+    Batch b;
+    for (std::uint32_t i = first; i < first + count; ++i) {
+      b.points.push_back(example_point(i));
+      b.points.back().head.lost_before = 0;
+      b.axes.push_back(example_axes(i));
+      b.environment.push_back(example_environment(i));
+      b.tracker_raw.push_back(example_block(i));
+      b.encoder_raw.push_back(example_block(i));
+      b.tracker_raw.back().lost_before = b.encoder_raw.back().lost_before = 0;
+    }
+    return b;
+  }
+  /// The recorder has taken everything that waited.
+  void wait_until_written() { (void)thread_->digest().get(); }
+  [[nodiscard]] RecordingReader finish() {
+    thread_.reset();
+    auto reader = RecordingReader::open(folder_.path() / "run.mcap");
+    if (!reader) throw std::runtime_error(reader.error().text);
+    return std::move(*reader);
+  }
+
+  TemporaryFolder folder_;
+  std::unique_ptr<RecorderThread> thread_;
+};
+
+TEST_F(RecorderThreadTest, RecordsWhatItIsHanded) {
+  start(1 << 20);
+  thread_->hand_over(batch(0, 10));
+  EXPECT_EQ(finish().message_count(), 50u);
+}
+
+TEST_F(RecorderThreadTest, WhatThereIsNoRoomForIsCountedWithItsRawBlocks) {
+  start(1000);
+  thread_->hand_over(batch(0, 100));
+  EXPECT_EQ(thread_->dropped(), 500u);
+  EXPECT_EQ(finish().message_count(), 0u);
+}
+
+TEST_F(RecorderThreadTest, ABlockTakesTheRoomOfItsBytesOnly) {
+  start(20'000);  // ten RawBlocks
+  Batch b;
+  for (std::uint32_t i = 0; i < 100; ++i) b.encoder_raw.push_back(example_block(i));
+  thread_->hand_over(b);
+  EXPECT_EQ(thread_->dropped(), 0u);
+  EXPECT_EQ(finish().message_count(), 100u);
+}
+
+TEST_F(RecorderThreadTest, TheNextMessageOfEveryStreamSaysHowManyAreMissing) {
+  start(10'000);
+  thread_->hand_over(batch(0, 2));
+  thread_->hand_over(batch(2, 100));  // too much at once
+  wait_until_written();
+  thread_->hand_over(batch(102, 2));
+  std::vector<std::uint32_t> points, axes, tracker_raw, encoder_raw;
+  std::vector<bool> environment;
+  RecordingSink sink;
+  sink.tracker_point = [&](const protocol::TrackerPoint& p, std::string_view) {
+    points.push_back(p.head.lost_before);
+  };
+  sink.axis_sample = [&](const protocol::AxisSample& a, std::string_view) {
+    axes.push_back(a.head.lost_before);
+    EXPECT_EQ(has(a.head.flags, SampleFlag::GapBefore), a.head.lost_before > 0);
+  };
+  sink.environment = [&](const protocol::EnvironmentSample& e, std::string_view) {
+    environment.push_back(has(e.head.flags, SampleFlag::GapBefore));
+  };
+  sink.raw_block = [&](const protocol::RawBlock& b, std::string_view device) {
+    (device == "tracker" ? tracker_raw : encoder_raw).push_back(b.lost_before);
+  };
+  EXPECT_EQ(finish().read(sink), 0u);
+  const std::vector<std::uint32_t> expected{0, 0, 100, 0};
+  EXPECT_EQ(points, expected);
+  EXPECT_EQ(axes, expected);
+  EXPECT_EQ(tracker_raw, expected);
+  EXPECT_EQ(encoder_raw, expected);
+  EXPECT_EQ(environment, (std::vector<bool>{false, false, true, false}));
+}
+
+}  // namespace
+}  // namespace abbe::daemon

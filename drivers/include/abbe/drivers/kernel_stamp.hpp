@@ -30,7 +30,7 @@ struct ClockPair {
   std::chrono::nanoseconds realtime{};   ///< CLOCK_REALTIME
 };
 
-/// Reads both clocks; two system calls at most (vDSO), ordinary world.
+/// Reads both clocks at one instant, again if the thread was interrupted in between; ordinary world (vDSO).
 [[nodiscard]] ClockPair read_clock_pair() noexcept;
 
 struct KernelStampOptions {

@@ -164,6 +164,8 @@ struct BadCase {
   PathOptions options;
   ErrorCode code;
   const char* text;
+
+  friend void PrintTo(const BadCase& bad, std::ostream* out) { *out << bad.name; }
 };
 
 std::vector<BadCase> bad_cases() {
@@ -175,9 +177,14 @@ std::vector<BadCase> bad_cases() {
   one_row = {good.X.topRows(1), good.y.head(1)};
   flat_y.y.setConstant(0.1);
   flat_X.X.setConstant(7.0);
+  Problem huge_X = good, huge_y = good;
+  huge_X.X(0, 0) = 1e200;
+  huge_y.y(0) = 1e200;
   using enum ErrorCode;
   return {{"NanInDesign", nan_in_X, {}, {}, NotFinite, "design"},
           {"InfinityInY", nan_in_y, {}, {}, NotFinite, "in y"},
+          {"HugeDesign", huge_X, {}, {}, NotFinite, "too large"},
+          {"HugeY", huge_y, {}, {}, NotFinite, "too large"},
           {"ShapesDiffer", short_y, {}, {}, BadInput, "20 rows in the design, 19 in y"},
           {"OneRow", one_row, {}, {}, TooFewObservations, "1 row"},
           {"ConstantY", flat_y, {}, {}, TooFewObservations, "does not vary"},

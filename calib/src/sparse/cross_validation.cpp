@@ -47,6 +47,7 @@ Result<std::vector<Penalty>> penalties(PenaltyKind kind, const std::vector<doubl
 std::vector<Path> full_paths(const GramProblem& problem, const std::vector<Penalty>& penalties,
                              const LambdaList& lambda, const PathOptions& options) {
   std::vector<PathTask> tasks;
+  tasks.reserve(penalties.size());
   for (const Penalty& penalty : penalties) {
     tasks.push_back(path_task(problem, penalty, lambda, options));
   }

@@ -36,6 +36,9 @@ Result<GramProblem> gram_problem(const Eigen::MatrixXd& X, const Eigen::VectorXd
   problem.y = y.array() - problem.y_mean;
   const auto n = static_cast<double>(y.size());
   problem.y_rms = std::sqrt(problem.y.squaredNorm() / n);
+  if (!std::isfinite(problem.y_rms)) {
+    return failure(ErrorCode::NotFinite, "sparse regression: squares of y are too large for a double");
+  }
   if (problem.y_rms <= kConstantY * y.cwiseAbs().maxCoeff()) {
     return failure(ErrorCode::TooFewObservations,
                    message("sparse regression: y does not vary over ", y.size(), " rows"));

@@ -51,6 +51,7 @@ Result<HeldOut> hold_out(const GramProblem& all, const Folds& folds, int fold,
     return failure(problem.error().code, message("without fold ", fold, ": ", problem.error().text));
   }
   std::vector<PathTask> tasks;
+  tasks.reserve(penalties.size());
   for (const Penalty& penalty : penalties) {
     tasks.push_back(path_task(*problem, penalty, lambda, options));
   }

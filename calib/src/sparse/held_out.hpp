@@ -9,8 +9,7 @@
 
 namespace abbe::calib::sparse {
 
-/// Count, mean and sum of squared deviations from the mean: adds up over folds without cancellation [Chan
-/// 1983].
+/// Count, mean and sum of squared deviations from the mean: adds up over folds without cancellation.
 struct Moments {
   double count = 0.0;
   double mean = 0.0;

@@ -21,7 +21,8 @@ PathLane::PathLane(const GramProblem& problem, const PathTask& task)
   }
 }
 
-/// [Tibshirani 2012] eq. (9); for MCP and SCAD scaled by the steepest slope of the shrinkage [Breheny 2011].
+/// The strong rule of [Tibshirani 2012]; for MCP and SCAD scaled by the steepest slope of the shrinkage
+/// [Breheny 2011].
 double PathLane::cutoff() const {
   const double now = task_.lambda[at_];
   const double before = at_ == 0 ? z_.cwiseAbs().maxCoeff() : task_.lambda[at_ - 1];

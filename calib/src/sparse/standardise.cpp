@@ -20,6 +20,10 @@ Result<Standardised> standardise(const Eigen::MatrixXd& X) {
   const Eigen::VectorXd mean = X.colwise().mean();
   const Eigen::MatrixXd centred = X.rowwise() - mean.transpose();
   const Eigen::VectorXd scale = root_mean_square(centred);
+  if (!scale.allFinite()) {
+    return failure(ErrorCode::NotFinite,
+                   "standardise columns: squares of the design are too large for a double");
+  }
   Standardised out;
   out.original_columns = X.cols();
   for (Eigen::Index j = 0; j < X.cols(); ++j) {

@@ -20,7 +20,7 @@ namespace abbe::calib::sparse {
 [[nodiscard]] Result<double> objective(const Eigen::MatrixXd& X, const Eigen::VectorXd& y, const Penalty&,
                                        double lambda, const Eigen::VectorXd& b);
 
-/// The convexity diagnostic of [Breheny 2011] section 4.2: smallest eigenvalue of X_U' X_U / n - concavity *
+/// The convexity diagnostic of [Breheny 2011]: smallest eigenvalue of X_U' X_U / n - concavity *
 /// I over the union U of the supports of neighbouring solutions k and k + 1 (the last one: its own).
 /// Negative: the objective is not convex there and other minima may be near. Infinite where U is empty.
 struct Convexity {

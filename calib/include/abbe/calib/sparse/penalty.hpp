@@ -2,7 +2,7 @@
 /// Penalties of sparse regression, one coefficient at a time, for columns of unit mean square and the
 /// objective
 ///   1/(2n) |y - X b|^2 + sum_j p(|b_j|).
-/// Lasso [Tibshirani 1996], MCP [Zhang 2010], SCAD [Fan 2001] eq. (2.8). Unit-free: lambda has the unit of b,
+/// Lasso [Tibshirani 1996], MCP [Zhang 2010], SCAD [Fan 2001]. Unit-free: lambda has the unit of b,
 /// which is that of y.
 
 #include <string_view>

@@ -19,7 +19,7 @@ struct Standardised {
   Eigen::Index original_columns = 0;
 };
 
-/// BadInput: no row, or no column that varies. NotFinite: NaN or infinity.
+/// BadInput: no row, or no column that varies. NotFinite: NaN, infinity, or squares that overflow.
 [[nodiscard]] Result<Standardised> standardise(const Eigen::MatrixXd& X);
 
 /// Coefficients in the units of the original design: row 0 the intercept, row 1 + j column j; one column for

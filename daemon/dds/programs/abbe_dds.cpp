@@ -8,6 +8,7 @@
 #include <exception>
 #include <string>
 
+#include "abbe/daemon/config.hpp"
 #include "abbe/daemon/dds_bridge.hpp"
 #include "abbe/dds/participant.hpp"
 #include "abbe/dds/writers.hpp"
@@ -19,16 +20,18 @@ using abbe::daemon::DdsFeed;
 using abbe::daemon::Error;
 using abbe::daemon::ErrorCode;
 
-enum ExitCode { kDone = 0, kUsage = 2, kBadProfile = 3, kIo = 4, kInternal = 70 };
+enum ExitCode { kDone = 0, kUsage = 2, kBadInput = 3, kIo = 4, kInternal = 70 };
 
 constexpr const char* kExitCodes =
-    "Exit codes: 0 stopped by SIGTERM or SIGINT or because the parent is gone, 2 usage, 3 the profile cannot "
-    "be used,\n"
+    "Exit codes: 0 stopped by SIGTERM or SIGINT or because the parent is gone, 2 usage, 3 the configuration "
+    "or "
+    "the profile cannot be used,\n"
     "4 no participant or writer can be created, 70 an exception nobody expected.";
 
 volatile sig_atomic_t stop_requested = 0;
 
 struct Options {
+  std::string config;
   std::string socket;
   abbe::dds::ParticipantOptions participant;
   pid_t parent = 0;  ///< 0: nobody's child
@@ -42,11 +45,12 @@ void stop_on_signals() {
 
 int refuse(const Error& error) {
   std::fprintf(stderr, "abbe-dds: %s\n", error.text.c_str());
+  for (const auto& detail : error.details) std::fprintf(stderr, "  %s\n", detail.c_str());
   switch (error.code) {
     case ErrorCode::Usage:
       return kUsage;
     case ErrorCode::BadInput:
-      return kBadProfile;
+      return kBadInput;
     default:
       return kIo;
   }
@@ -60,6 +64,22 @@ void say_when_it_changes(const DdsBridge& bridge, bool& alive) {
   if (bridge.source_alive() == alive) return;
   alive = bridge.source_alive();
   std::fprintf(stderr, alive ? "abbe-dds: abbed is alive\n" : "abbe-dds: abbed is lost, published INVALID\n");
+}
+
+/// As a service of its own it must do what abbed.toml says, and must not run beside a child of abbed's.
+abbe::daemon::Result<void> take_from_config(Options& options) {
+  auto config = abbe::daemon::load_config(options.config);
+  if (!config) return tl::make_unexpected(config.error());
+  if (config->dds.supervise != abbe::daemon::Supervise::Systemd) {
+    return abbe::daemon::fail(ErrorCode::BadInput,
+                              options.config +
+                                  ": [dds] supervise is not \"systemd\": abbed starts abbe-dds "
+                                  "itself, or nobody is to");
+  }
+  options.socket = config->dds.socket;
+  options.participant.domain = config->dds.domain;
+  options.participant.profiles = config->dds.profile;
+  return {};
 }
 
 int run(const Options& options) {
@@ -89,11 +109,18 @@ int main(int argc, char** argv) {
       "lost."};
   app.footer(kExitCodes);
   Options options;
-  app.add_option("--socket", options.socket, "Unix socket of abbed; waits for it if it is not there")
-      ->required();
-  app.add_option("--domain", options.participant.domain, "DDS domain, 0 to 232")->capture_default_str();
-  app.add_option("--profile", options.participant.profiles,
-                 "XML file with a participant profile \"abbe\" (default: built in, UDP on every interface)");
+  auto* const socket =
+      app.add_option("--socket", options.socket, "Unix socket of abbed; waits for it if it is not there");
+  auto* const domain =
+      app.add_option("--domain", options.participant.domain, "DDS domain, 0 to 232")->capture_default_str();
+  auto* const profile = app.add_option(
+      "--profile", options.participant.profiles,
+      "XML file with a participant profile \"abbe\" (default: built in, UDP on every interface)");
+  app.add_option("-c,--config", options.config,
+                 "socket, domain and profile from this abbed.toml, which says supervise = \"systemd\"")
+      ->excludes(socket)
+      ->excludes(domain)
+      ->excludes(profile);
   app.add_option("--parent", options.parent,
                  "leave when this process is no longer the parent (given by abbed)");
   try {
@@ -101,7 +128,13 @@ int main(int argc, char** argv) {
   } catch (const CLI::ParseError& e) {
     return app.exit(e) == 0 ? kDone : kUsage;
   }
+  if (options.config.empty() && options.socket.empty()) {
+    return refuse({ErrorCode::Usage, "--socket or --config is needed"});
+  }
   try {
+    if (!options.config.empty()) {
+      if (auto taken = take_from_config(options); !taken) return refuse(taken.error());
+    }
     return run(options);
   } catch (const std::exception& e) {
     std::fprintf(stderr, "abbe-dds: %s\n", e.what());

@@ -1,7 +1,10 @@
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include <fstream>
+#include <thread>
 
+#include "abbe/daemon/dds_link.hpp"
 #include "shop_floor.hpp"
 
 namespace abbe::test {
@@ -12,7 +15,17 @@ struct AbbeDds : ShopFloor {
     arguments.insert(arguments.begin(), ABBE_DDS_PROGRAM);
     return Process(std::move(arguments)).wait_for_end();
   }
+  /// An abbed.toml whose sockets are in the folder of the test.
+  void write_config(const std::string& supervise) {
+    std::string text = "[machine]\nname = \"mill\"\nchain = \"[w b X Y Z t]\"\n";
+    for (const char axis : {'X', 'Y', 'Z'})
+      text += fmt::format("[axes.{}]\nmin_mm = 0\nmax_mm = 100\n", axis);
+    text += fmt::format("[dds]\nsupervise = \"{}\"\ndomain = {}\nprofile = \"{}\"\nsocket = \"dds.sock\"\n",
+                        supervise, domain_.text(), ABBE_LOOPBACK_PROFILE);
+    std::ofstream(config) << text;
+  }
   std::string socket = directory_ / "dds.sock";
+  std::string config = directory_ / "abbed.toml";
 };
 
 TEST_F(AbbeDds, MissingProfileEndsWithThree) {
@@ -26,6 +39,28 @@ TEST_F(AbbeDds, ProfileThatIsNoProfileEndsWithThree) {
 
 TEST_F(AbbeDds, DomainWithoutPortsEndsWithTwo) {
   EXPECT_EQ(exit_code({"--socket", socket, "--domain", "233"}), 2);
+}
+
+TEST_F(AbbeDds, AsAServiceItRefusesAConfigurationThatMakesItAChild) {
+  write_config("child");
+  EXPECT_EQ(exit_code({"--config", config}), 3);
+}
+
+TEST_F(AbbeDds, AsAServiceItFindsSocketDomainAndProfileInTheConfiguration) {
+  write_config("systemd");
+  auto link = daemon::DdsLink::listen(socket);
+  ASSERT_TRUE(link) << link.error().text;
+  const Process service({ABBE_DDS_PROGRAM, "--config", config});
+  const auto deadline = Clock::now() + std::chrono::seconds{20};
+  while (!link->connected() && Clock::now() < deadline) {
+    link->poll();
+    std::this_thread::sleep_for(std::chrono::milliseconds{5});
+  }
+  EXPECT_TRUE(link->connected());
+}
+
+TEST_F(AbbeDds, WithoutSocketAndConfigurationItIsUsage) {
+  EXPECT_EQ(exit_code({}), 2);
 }
 
 TEST_F(AbbeDds, LeavesWhenItsParentIsSomebodyElse) {

@@ -77,6 +77,7 @@ TEST(UdpCanBus, BelievesTheStampOfEveryDatagramThatWaited) {
     total += *n;
   }
   EXPECT_EQ(line.bus.counters().time_widened, 0u);
+  for (std::size_t i = 0; i < 3; ++i) EXPECT_FALSE(line.frames[i].time_widened);
 }
 
 TEST(UdpCanBus, HandsOutALargeDatagramInPieces) {

@@ -350,6 +350,21 @@ TEST(EncoderReceiver, TakesTheLossARawBlockTellsOf) {
   EXPECT_EQ(samples[0].missing_mask, 0b111);
 }
 
+TEST(EncoderReceiver, FlagsAndWidensACycleWithAnAnswerNobodyKnowsTheTimeOf) {
+  Line line;
+  line.sync(kStart);
+  line.frame(position(kNodes[0], 1), kStart + 100us);
+  line.keep(line.receiver.on_frame(position(kNodes[1], 2), kStart + 200us, true));
+  line.frame(position(kNodes[2], 3), kStart + 300us);
+  line.cycle(kStart + 1ms, 10);
+  ASSERT_EQ(line.samples.size(), 2u);
+  EXPECT_TRUE(has(line.samples[0].head.flags, SampleFlag::TimeWidened));
+  EXPECT_NEAR(static_cast<double>(line.samples[0].head.u_time.count()),
+              std::hypot(static_cast<double>(line.samples[1].head.u_time.count()), 1e6 / std::numbers::sqrt3),
+              1.0);
+  EXPECT_FALSE(has(line.samples[1].head.flags, SampleFlag::TimeWidened));
+}
+
 TEST(EncoderReceiver, CountsPeriodsWithoutASync) {
   Line line;
   line.cycle(kStart, 1);

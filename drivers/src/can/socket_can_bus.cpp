@@ -114,7 +114,9 @@ Result<std::size_t> SocketCanBus::read(std::span<ReceivedFrame> out, std::chrono
   std::size_t count = 0;
   for (unsigned i = 0; i < static_cast<unsigned>(got); ++i) {
     auto& message = batch_->messages[i];
-    out[count].time = stamps_.arrival(stamp_of(message.msg_hdr), clocks, now).time;
+    const auto arrival = stamps_.arrival(stamp_of(message.msg_hdr), clocks, now);
+    out[count].time = arrival.time;
+    out[count].time_widened = arrival.widened;
     for (auto* c = CMSG_FIRSTHDR(&message.msg_hdr); c != nullptr; c = CMSG_NXTHDR(&message.msg_hdr, c)) {
       if (c->cmsg_level != SOL_SOCKET || c->cmsg_type != SO_RXQ_OVFL) continue;
       std::uint32_t overflow = 0;  // cumulative for this socket

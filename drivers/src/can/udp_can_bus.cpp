@@ -131,7 +131,8 @@ Result<bool> UdpCanBus::receive_datagram() {
       return socket_error(code, name(), "receive", errno);
     }
     const auto now = time_.now();
-    rest_time_ = options_.speed > 0.0 ? stamps_.arrival(stamp_of(message), read_clock_pair(), now).time : now;
+    rest_arrival_ = {.time = now};
+    if (options_.speed > 0.0) rest_arrival_ = stamps_.arrival(stamp_of(message), read_clock_pair(), now);
     auto view = can::DatagramView::parse(std::span{buffer_}.first(static_cast<std::size_t>(size)));
     if (view) {
       gaps_.on_sequence(view->sequence());
@@ -152,7 +153,8 @@ std::size_t UdpCanBus::take_frames(std::span<ReceivedFrame> out) {
       rest_.reset();
       break;
     }
-    slot.time = rest_time_;
+    slot.time = rest_arrival_.time;
+    slot.time_widened = rest_arrival_.widened;
     const bool wanted = slot.frame.is_standard_data() && wanted_.test(slot.frame.id);
     if (wanted || slot.frame.is(can::FrameFlag::Error)) ++count;
   }

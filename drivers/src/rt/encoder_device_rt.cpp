@@ -11,7 +11,8 @@ using protocol::RawBlock;
 void EncoderDevice::receive() ABBE_RT {
   const auto frames = std::span<const ReceivedFrame>{batch_}.first(batch_count_);
   record_frames(frames);
-  for (const auto& received : frames) push(receiver_.on_frame(received.frame, received.time));
+  for (const auto& received : frames)
+    push(receiver_.on_frame(received.frame, received.time, received.time_widened));
   // A full batch may have more behind it: only a read that found the end says that nothing else came.
   const bool all_read = batch_count_ < batch_.size();
   batch_count_ = 0;

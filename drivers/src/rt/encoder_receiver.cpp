@@ -21,6 +21,13 @@ constexpr double kMetresPerNanometre = 1e-9;
 /// SYNC is not before it.
 constexpr int kStampSlackParts = 50;
 
+/// [GUM] 4.3.7: the instant may be off by a period to either side.
+std::chrono::nanoseconds widened(std::chrono::nanoseconds u, std::chrono::nanoseconds period) ABBE_RT {
+  const double u_ns =
+      std::hypot(static_cast<double>(u.count()), static_cast<double>(period.count()) / std::numbers::sqrt3);
+  return std::chrono::nanoseconds{std::llround(u_ns)};
+}
+
 /// `count` on a circle of `modulus` counts; 0 stands for 2^64.
 std::uint64_t on_circle(std::int64_t count, std::uint64_t modulus) ABBE_RT {
   if (modulus == 0) return static_cast<std::uint64_t>(count);
@@ -45,6 +52,7 @@ EncoderReceiver::EncoderReceiver(const EncoderReceiverOptions& options)
       answer_within_(options.answer_within.count() > 0 ? options.answer_within : options.sync_period * 4 / 5),
       sampling_delay_(options.sampling_delay),
       u_sampling_delay_(options.u_sampling_delay),
+      u_widened_(widened(options.u_sampling_delay, options.sync_period)),
       heartbeat_timeout_(options.heartbeat_timeout) {
   for (std::size_t i = 0; i < axis_count_; ++i) {
     const auto& from = options.axes[i];
@@ -93,7 +101,8 @@ EncoderReceiver::Samples EncoderReceiver::on_loss() ABBE_RT {
   return done();
 }
 
-EncoderReceiver::Samples EncoderReceiver::on_frame(const can::CanFrame& frame, HostTime time) ABBE_RT {
+EncoderReceiver::Samples EncoderReceiver::on_frame(const can::CanFrame& frame, HostTime time,
+                                                   bool time_widened) ABBE_RT {
   out_count_ = 0;
   if (time >= deadline()) close_cycle();
   if (frame.is(can::FrameFlag::Error)) {
@@ -101,7 +110,7 @@ EncoderReceiver::Samples EncoderReceiver::on_frame(const can::CanFrame& frame, H
   } else if (frame.is_standard_data()) {
     for (std::size_t i = 0; i < axis_count_; ++i) {
       if (frame.id == axes_[i].tpdo_id) {
-        on_position(i, frame, time);
+        on_position(i, frame, time, time_widened);
       } else {
         on_node_frame(axes_[i], frame, time);
       }
@@ -141,7 +150,7 @@ void EncoderReceiver::emit(HostTime time) ABBE_RT {
   const auto missing = static_cast<std::uint8_t>(all_mask_ & ~usable);
   for (std::size_t i = 0; i < axis_count_; ++i) counters_.missing_answers += (missing >> i) & 1u;
   current_.head.time = time;
-  current_.head.u_time = u_sampling_delay_;
+  current_.head.u_time = time_widened_ ? u_widened_ : u_sampling_delay_;
   current_.head.lost_before = lost_pending_;
   current_.head.flags = take_flags(missing);
   current_.cycle = cycle_;
@@ -154,6 +163,7 @@ protocol::SampleFlags EncoderReceiver::take_flags(std::uint8_t missing) ABBE_RT 
   protocol::SampleFlags flags = 0;
   if (missing != 0) flags |= SampleFlag::AxisMissing;
   if (lost_pending_ != 0 || gap_pending_) flags |= SampleFlag::GapBefore;
+  if (time_widened_) flags |= SampleFlag::TimeWidened;
   if (bus_error_pending_) flags |= SampleFlag::BusError;
   if (bus_off_) flags |= SampleFlag::BusOff;
   if (restarted_pending_ && missing != all_mask_) {
@@ -165,11 +175,13 @@ protocol::SampleFlags EncoderReceiver::take_flags(std::uint8_t missing) ABBE_RT 
   }
   lost_pending_ = 0;
   gap_pending_ = false;
+  time_widened_ = false;
   bus_error_pending_ = false;
   return flags;
 }
 
-void EncoderReceiver::on_position(std::size_t i, const can::CanFrame& frame, HostTime time) ABBE_RT {
+void EncoderReceiver::on_position(std::size_t i, const can::CanFrame& frame, HostTime time,
+                                  bool time_widened) ABBE_RT {
   const auto count = can::decode_position(frame.payload(), axes_[i].type);
   if (!count) {
     ++counters_.short_frames;
@@ -189,6 +201,7 @@ void EncoderReceiver::on_position(std::size_t i, const can::CanFrame& frame, Hos
   }
   if ((received_mask_ & bit) != 0) ++counters_.duplicate_frames;
   take_position(i, *count);
+  time_widened_ = time_widened_ || time_widened;
   received_mask_ = static_cast<std::uint8_t>(received_mask_ | bit);
   if (received_mask_ == all_mask_) close_cycle();
 }

@@ -20,7 +20,7 @@ inline constexpr std::size_t kMaxTemperatures = 8;
 enum class SampleFlag : std::uint32_t {
   None = 0,
   GapBefore = 1u << 0,       ///< samples were lost before this one: see `lost_before`
-  TimeWidened = 1u << 1,     ///< the kernel stamp was unusable, u_time was widened
+  TimeWidened = 1u << 1,     ///< a kernel stamp it depends on was unusable, u_time was widened
   ClockUnsettled = 1u << 2,  ///< the device clock model has not converged yet
   AxisMissing = 1u << 3,     ///< at least one axis did not answer in this cycle: see `missing_mask`
   BusError = 1u << 4,        ///< the bus reported errors since the previous sample

@@ -19,6 +19,7 @@ namespace can = protocol::can;
 struct ReceivedFrame {
   can::CanFrame frame;
   protocol::HostTime time{};  ///< arrival
+  bool time_widened = false;  ///< the kernel stamp was not believed: `time` is when user space saw it
 };
 
 /// What a transport lost or refused since it was made; never goes back.

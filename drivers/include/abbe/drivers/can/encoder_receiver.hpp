@@ -93,8 +93,12 @@ class EncoderReceiver {
   // next event.
   [[nodiscard]] std::span<const protocol::AxisSample> on_sent(const can::CanFrame& frame,
                                                               protocol::HostTime time) ABBE_RT;
+  /// `time_widened`: the kernel stamp was not believed. A position that came so may be the answer to the SYNC
+  /// before: the sample is flagged TimeWidened and its u_time widened by a period, rectangular. Raw blocks do
+  /// not tell: a replay from raw bytes has the same positions without this flag.
   [[nodiscard]] std::span<const protocol::AxisSample> on_frame(const can::CanFrame& frame,
-                                                               protocol::HostTime time) ABBE_RT;
+                                                               protocol::HostTime time,
+                                                               bool time_widened = false) ABBE_RT;
   /// Nothing more came until `now`.
   [[nodiscard]] std::span<const protocol::AxisSample> on_time(protocol::HostTime now) ABBE_RT;
   /// Frames are missing here: the open cycle ends, as an answer that comes now may be one to a SYNC that is
@@ -149,7 +153,8 @@ class EncoderReceiver {
   void emit(protocol::HostTime time) ABBE_RT;
   [[nodiscard]] protocol::SampleFlags take_flags(std::uint8_t missing) ABBE_RT;
   [[nodiscard]] Samples done() const ABBE_RT { return {out_.data(), out_count_}; }
-  void on_position(std::size_t i, const can::CanFrame& frame, protocol::HostTime time) ABBE_RT;
+  void on_position(std::size_t i, const can::CanFrame& frame, protocol::HostTime time,
+                   bool time_widened) ABBE_RT;
   void hear() ABBE_RT;
   void take_position(std::size_t i, std::int64_t count) ABBE_RT;
   void on_node_frame(Axis& axis, const can::CanFrame& frame, protocol::HostTime time) ABBE_RT;
@@ -167,6 +172,7 @@ class EncoderReceiver {
   std::chrono::nanoseconds answer_within_;
   std::chrono::nanoseconds sampling_delay_;
   std::chrono::nanoseconds u_sampling_delay_;
+  std::chrono::nanoseconds u_widened_;
   std::chrono::nanoseconds heartbeat_timeout_;
 
   bool open_ = false;                            ///< a cycle waits for answers
@@ -177,6 +183,7 @@ class EncoderReceiver {
   bool bus_error_pending_ = false;  ///< since the previous sample
   bool restarted_pending_ = false;
   bool gap_pending_ = false;
+  bool time_widened_ = false;       ///< of an answer to the open cycle
   std::uint32_t lost_pending_ = 0;  ///< SYNCs that were not sent
   protocol::AxisSample current_;    ///< counts and positions stay from cycle to cycle
   std::array<protocol::AxisSample, 4> out_{};

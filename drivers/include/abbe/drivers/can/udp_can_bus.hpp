@@ -58,7 +58,7 @@ class UdpCanBus final : public CanBus {
   std::uint64_t refused_ = 0;
   std::uint8_t sequence_ = 0;
   std::optional<can::DatagramView> rest_;  ///< of the datagram in `buffer_`, not yet taken
-  protocol::HostTime rest_time_{};
+  Arrival rest_arrival_;
   std::array<std::byte, 65536> buffer_{};
 };
 

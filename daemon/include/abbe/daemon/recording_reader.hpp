@@ -1,6 +1,6 @@
 #pragma once
 /// Opens a recording, complete or broken, and gives its messages in the order of their times: what `abbe
-/// replay` and `abbe identify --recording` stand on. Whatever is damaged is passed over and said in losses();
+/// replay` stands on. Whatever is damaged is passed over and said in losses();
 /// whole chunks are always given, of a chunk cut off by the end of the file every whole message.
 ///
 /// The file is mapped: views stay valid as long as the reader, and the file must not be shortened meanwhile

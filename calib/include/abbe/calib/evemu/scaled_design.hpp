@@ -1,0 +1,79 @@
+#pragma once
+/// The design everything numerical uses: the span of the equivalent model's columns in Legendre polynomials
+/// of u = (q - centre) / half width, arms in units of the largest half width. Every function is at most about
+/// 1 in the volume, so every coefficient is a length: the size of its contribution. Penalties and priors
+/// speak of these coefficients. A stylus offset does not change the span, so there is none here.
+
+#include <Eigen/Core>
+#include <array>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "abbe/calib/evemu/equivalent_model.hpp"
+
+namespace abbe::calib::evemu {
+
+/// The box of scale readings a design is scaled to.
+struct ReadingBox {
+  Vector3 centre_m = Vector3::Zero();
+  Vector3 half_width_m = Vector3::Ones();
+};
+/// Bounding box of the points.
+[[nodiscard]] ReadingBox bounding_box(std::span<const Vector3> readings_m);
+
+enum class FunctionKind { Constant, Translation, Rotation };
+
+/// sum over parts of sign * P_order(u_axis) [* arm of another axis] in one component.
+struct DesignFunction {
+  struct Part {
+    std::size_t component = 0;
+    double sign = 1.0;
+    std::size_t arm = 3;  ///< axis; 3: none
+  };
+  FunctionKind kind = FunctionKind::Constant;
+  std::size_t axis = 0;
+  int order = 0;
+  std::array<Part, 2> part{};
+  std::size_t parts = 1;
+};
+
+/// Immutable value.
+class ScaledDesign {
+ public:
+  /// Values of all Legendre polynomials and arms at one reading. No allocation.
+  struct Factors {
+    std::array<std::array<double, kMostOrder + 1>, 3> P;
+    std::array<double, 4> arm;  ///< the last is 1: no arm
+  };
+
+  /// DegenerateGeometry if the box has no extent in an axis, BadInput for an order out of range.
+  [[nodiscard]] static Result<ScaledDesign> of(const KinematicChain&, int order, const ReadingBox&);
+
+  [[nodiscard]] const EquivalentModel& equivalent() const { return equivalent_; }
+  [[nodiscard]] const ReadingBox& box() const { return box_; }
+  /// The arms' unit: the largest half width.
+  [[nodiscard]] double arm_unit_m() const { return box_.half_width_m.maxCoeff(); }
+  [[nodiscard]] std::size_t size() const { return functions_.size(); }
+  /// In the order of equivalent().names(): function j spans name j and, through lower orders, others.
+  [[nodiscard]] std::span<const DesignFunction> functions() const { return functions_; }
+
+  [[nodiscard]] Factors factors(const Vector3& reading_m) const;
+  [[nodiscard]] static double value(const DesignFunction& f, const DesignFunction::Part& part,
+                                    const Factors& at) {
+    return part.sign * at.P[f.axis][static_cast<std::size_t>(f.order)] * at.arm[part.arm];
+  }
+  /// 3 x size(): E_m = B c_m.
+  [[nodiscard]] Eigen::Matrix3Xd B(const Vector3& reading_m) const;
+  /// beta = M (1000 c_m): the named coefficients in mm^(1-k), rad mm^-k.
+  [[nodiscard]] Eigen::MatrixXd named_from_scaled() const;
+  /// size() x 3: what c a small rotation omega x (q - about) has.
+  [[nodiscard]] Eigen::MatrixX3d rotation_about(const Vector3& about_m) const;
+
+ private:
+  EquivalentModel equivalent_;
+  ReadingBox box_;
+  std::vector<DesignFunction> functions_;
+};
+
+}  // namespace abbe::calib::evemu

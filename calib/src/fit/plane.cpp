@@ -1,0 +1,44 @@
+#include "abbe/calib/fit/plane.hpp"
+
+#include <cmath>
+
+#include "abbe/calib/fit/point_set.hpp"
+#include "message.hpp"
+
+namespace abbe::calib::fit {
+
+Result<Plane> fit_plane(std::span<const Vector3> points, const Vector3& towards,
+                        std::optional<double> known_sigma) {
+  constexpr std::size_t kUnknowns = 3;
+  const Result<PointSet> set = point_set(points, kUnknowns, "plane");
+  if (!set) {
+    return tl::unexpected(set.error());
+  }
+  if (set->on_a_line()) {
+    return failure(ErrorCode::DegenerateGeometry,
+                   message("plane: the ", points.size(), " points lie on a line (extents ",
+                           set->singular_values.transpose(), ")"));
+  }
+  Plane plane;
+  plane.point = set->centroid;
+  plane.normal = set->directions.col(2);
+  const double side = plane.normal.dot(towards);
+  if (!(std::abs(side) > PointSet::kDegenerate * towards.norm())) {
+    return failure(ErrorCode::DegenerateGeometry,
+                   "plane: the given outward direction lies in the plane and does not tell its sides apart");
+  }
+  if (side < 0) {
+    plane.normal = -plane.normal;
+  }
+  plane.residuals = residual_statistics(set->centred.transpose() * plane.normal, kUnknowns);
+  const double sigma = known_sigma.value_or(plane.residuals.sigma0);
+  for (Eigen::Index i = 0; i < 2; ++i) {
+    const double u_tilt = sigma / set->singular_values(i);
+    plane.cov_normal.noalias() +=
+        u_tilt * u_tilt * set->directions.col(i) * set->directions.col(i).transpose();
+  }
+  plane.u_offset = sigma / std::sqrt(static_cast<double>(points.size()));
+  return plane;
+}
+
+}  // namespace abbe::calib::fit

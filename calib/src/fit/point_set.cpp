@@ -1,0 +1,57 @@
+#include "abbe/calib/fit/point_set.hpp"
+
+#include <Eigen/SVD>
+#include <algorithm>
+#include <vector>
+
+#include "message.hpp"
+
+namespace abbe::calib::fit {
+namespace {
+
+std::size_t distinct_points(const Eigen::Matrix3Xd& centred, double size) {
+  std::vector<Vector3> different;
+  for (Eigen::Index i = 0; i < centred.cols(); ++i) {
+    const bool known = std::any_of(different.begin(), different.end(), [&](const Vector3& p) {
+      return (p - centred.col(i)).norm() <= PointSet::kDegenerate * size;
+    });
+    if (!known) {
+      different.emplace_back(centred.col(i));
+    }
+  }
+  return different.size();
+}
+
+}  // namespace
+
+Result<PointSet> point_set(std::span<const Vector3> points, std::size_t needed, const char* what) {
+  PointSet set;
+  set.centred.resize(3, static_cast<Eigen::Index>(points.size()));
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    if (!points[i].allFinite()) {
+      return failure(ErrorCode::NotFinite, message(what, ": point ", i, " is not a number"));
+    }
+    set.centred.col(static_cast<Eigen::Index>(i)) = points[i];
+  }
+  if (points.size() >= needed && !points.empty()) {
+    // Relative to the first point before summing: the mean of large coordinates would lose digits.
+    set.centred.colwise() -= points.front();
+    const Vector3 mean = set.centred.rowwise().mean();
+    set.centred.colwise() -= mean;
+    set.centroid = points.front() + mean;
+    set.size = set.centred.colwise().norm().maxCoeff();
+    set.distinct = distinct_points(set.centred, set.size);
+  } else {
+    set.distinct = points.size();
+  }
+  if (set.distinct < needed) {
+    return failure(ErrorCode::TooFewObservations,
+                   message(what, ": ", set.distinct, " different points, needs ", needed));
+  }
+  const Eigen::JacobiSVD<Eigen::Matrix3Xd> svd(set.centred, Eigen::ComputeFullU);
+  set.directions = svd.matrixU();
+  set.singular_values.head(svd.singularValues().size()) = svd.singularValues();
+  return set;
+}
+
+}  // namespace abbe::calib::fit

@@ -73,10 +73,65 @@ struct AxisSample {
   std::array<double, kMaxAxes> position{};     ///< scale reading, m (linear) or rad (rotary)
 };
 
-/// One confirmed edge of a touch probe.
+/// How the instant of a touch was learned.
+enum class TouchLatch : std::uint8_t {
+  Clock = 0,     ///< a counter of the card was latched by the edge
+  Scan = 1,      ///< only known to lie between two scans
+  Reported = 2,  ///< the measuring machine latched and reports the position
+};
+
+/// What is to be known about one touch; a bit set. None: a touch as it should be.
+enum class TouchFlag : std::uint32_t {
+  None = 0,
+  Chattered = 1u << 0,      ///< more edges followed within the chatter limit; the first one counts
+  SpeedTooLow = 1u << 1,    ///< approach slower than the probe was qualified for
+  SpeedTooHigh = 1u << 2,   ///< approach faster than that
+  SpeedUnsteady = 1u << 3,  ///< the approach was speeding up or slowing down: pre-travel is not as qualified
+  LatchRefused = 1u << 4,   ///< the latched clock contradicts the scans; the scans were used
+  NoPosition = 1u << 5,     ///< scans around the touch were lost: there is no position
+  Refused = 1u << 6,        ///< the measuring machine reported a warning with it
+};
+using TouchFlags = std::uint32_t;
+
+constexpr TouchFlags operator|(TouchFlag a, TouchFlag b) noexcept {
+  return static_cast<TouchFlags>(a) | static_cast<TouchFlags>(b);
+}
+constexpr TouchFlags operator|(TouchFlags a, TouchFlag b) noexcept { return a | static_cast<TouchFlags>(b); }
+constexpr TouchFlags& operator|=(TouchFlags& a, TouchFlag b) noexcept { return a = a | b; }
+[[nodiscard]] constexpr bool has(TouchFlags flags, TouchFlag f) noexcept {
+  return (flags & static_cast<TouchFlags>(f)) != 0;
+}
+
+/// One touch of a probe. `head.time` is the instant of contact: that of the first edge less the probe's delay.
+/// The position is that of the scales, not of the stylus tip; with `axis_count` 0 whoever has axis samples
+/// finds it at `head.time`.
 struct ProbeTrigger {
   SampleHead head;
   std::uint32_t touch = 0;  ///< number of the touch since start
+  std::uint32_t probe = 0;  ///< which probe: its delay and qualification go by this
+  TouchLatch latch = TouchLatch::Clock;
+  TouchFlags touch_flags = 0;
+  std::int64_t edge_clock_count = 0;  ///< the card's time base at the first edge; Reported: 0
+  std::uint8_t axis_count = 0;
+  std::uint8_t missing_mask = 0;  ///< bit i: axis i is not known
+  double speed_m_s = 0.0;         ///< of the approach, over the linear axes
+  std::array<double, kMaxAxes> position{};      ///< at contact, m or rad
+  std::array<double, kMaxAxes> velocity{};      ///< of the approach, m/s or rad/s
+  std::array<double, kMaxAxes> u_position{};    ///< standard uncertainty
+  std::array<double, kMaxAxes> U95_position{};  ///< half-width of the 95 % interval; not 2 u for Scan
+};
+
+/// One scan out of the window around a touch, at the full rate of the card.
+struct TouchScan {
+  SampleHead head;
+  std::uint32_t touch = 0;  ///< ProbeTrigger::touch
+  std::uint8_t axis_count = 0;
+  std::uint8_t missing_mask = 0;
+  std::int64_t clock_count = 0;  ///< the card's time base
+  std::int64_t latch_count = 0;  ///< the time base at the latest edge
+  std::int64_t edge_count = 0;
+  std::array<std::int64_t, kMaxAxes> count{};
+  std::array<double, kMaxAxes> position{};  ///< m or rad
 };
 
 /// What an EnvironmentSample speaks of: a bit set. A NaN whose bit is set is measured here but not available
@@ -142,6 +197,7 @@ struct RawBlock {
 static_assert(std::is_trivially_copyable_v<TrackerPoint>);
 static_assert(std::is_trivially_copyable_v<AxisSample>);
 static_assert(std::is_trivially_copyable_v<ProbeTrigger>);
+static_assert(std::is_trivially_copyable_v<TouchScan>);
 static_assert(std::is_trivially_copyable_v<EnvironmentSample>);
 static_assert(std::is_trivially_copyable_v<Snapshot>);
 static_assert(std::is_trivially_copyable_v<RawBlock>);

@@ -21,5 +21,8 @@ template std::size_t SampleRing<protocol::EnvironmentSample>::push(
     std::span<const protocol::EnvironmentSample>) ABBE_RT;
 template std::size_t SampleRing<protocol::EnvironmentSample>::pop(
     std::span<protocol::EnvironmentSample>) ABBE_RT;
+template bool SampleRing<protocol::TouchScan>::try_push(const protocol::TouchScan&) ABBE_RT;
+template std::size_t SampleRing<protocol::TouchScan>::push(std::span<const protocol::TouchScan>) ABBE_RT;
+template std::size_t SampleRing<protocol::TouchScan>::pop(std::span<protocol::TouchScan>) ABBE_RT;
 
 }  // namespace abbe::drivers

@@ -1,0 +1,111 @@
+#include "abbe/drivers/sampling/distance_code.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdlib>
+#include <string>
+
+namespace abbe::drivers {
+namespace {
+
+// Marks of one scale lie on whole periods; more than this away from one is not noise any more.
+constexpr double kMostFraction = 0.25;
+
+tl::unexpected<Error> bad(std::string what) {
+  return tl::unexpected(Error{ErrorCode::BadConfiguration, "distance-coded marks: " + std::move(what)});
+}
+
+int sign(std::int64_t x) noexcept {
+  return (x > 0) - (x < 0);
+}
+
+std::int64_t on_circle(const DistanceCode& code, std::int64_t position) noexcept {
+  if (!code.rotary) return position;
+  const std::int64_t rest = position % code.length;
+  return rest < 0 ? rest + code.length : rest;
+}
+
+/// k of the pair's fixed mark, that is which of the coded marks.
+std::int64_t coded_marks(const DistanceCode& code) noexcept {
+  const std::int64_t k = code.length / code.increment;
+  return code.rotary ? k : k + 1;
+}
+
+bool on_scale(const DistanceCode& code, std::int64_t position) noexcept {
+  return code.rotary || (position >= 0 && position <= code.length);
+}
+
+}  // namespace
+
+Result<void> check(const DistanceCode& code) {
+  if (code.increment < 8 || code.increment % 2 != 0)
+    return bad("the increment is not an even number above 7");
+  if (code.length < 2 * code.increment) return bad("a scale shorter than two increments has not four marks");
+  if (code.rotary && code.length % code.increment != 0)
+    return bad("a revolution is not a whole number of increments");
+  // From here on the distance of a coded mark to its neighbours is no longer between 0 and the increment.
+  if (coded_marks(code) >= code.increment / 2) return bad("the scale is longer than the code");
+  return {};
+}
+
+std::string_view name(MarkFault fault) noexcept {
+  switch (fault) {
+    case MarkFault::NotWhole:
+      return "the distance of two marks is no whole number of periods";
+    case MarkFault::NotOfCode:
+      return "two marks are at a distance that the scale does not have";
+    case MarkFault::Disagree:
+      return "neighbouring marks contradict each other";
+    case MarkFault::Reversed:
+      return "the direction changed between marks";
+    case MarkFault::WrongScale:
+      return "mark after mark was refused: not the scale that is configured";
+  }
+  return "?";
+}
+
+std::optional<std::int64_t> first_mark(const DistanceCode& code, std::int64_t distance,
+                                       int direction) noexcept {
+  const std::int64_t N = code.increment;
+  const std::int64_t M = distance;
+  const std::int64_t B = 2 * M - N;
+  if (M <= 0 || B == 0 || std::abs(B) / 2 > coded_marks(code)) return std::nullopt;
+  const std::int64_t P1 = (std::abs(B) - sign(B) - 1) * N / 2 + (sign(B) - direction) * M / 2;
+  if (!on_scale(code, P1) || !on_scale(code, P1 + direction * M)) return std::nullopt;
+  return on_circle(code, P1);
+}
+
+tl::expected<MarkDatum, MarkFault> datum_of(const DistanceCode& code,
+                                            std::span<const double, kMarksForDatum> marks) noexcept {
+  MarkDatum datum;
+  datum.direction = marks[1] > marks[0] ? 1 : -1;
+  std::array<std::int64_t, kMarksForDatum> position{};
+  std::optional<std::int64_t> expected;
+  for (std::size_t i = 0; i + 1 < kMarksForDatum; ++i) {
+    const double apart = (marks[i + 1] - marks[i]) * datum.direction;
+    if (apart <= 0.0) return tl::unexpected(MarkFault::Reversed);
+    const double whole = std::round(apart);
+    if (std::abs(apart - whole) > kMostFraction) return tl::unexpected(MarkFault::NotWhole);
+    const auto M = static_cast<std::int64_t>(whole);
+    const auto P = first_mark(code, M, datum.direction);
+    if (!P) return tl::unexpected(MarkFault::NotOfCode);
+    if (expected && on_circle(code, *expected) != *P) return tl::unexpected(MarkFault::Disagree);
+    // Not reduced to the circle: an offset must not jump between the four.
+    position[i] = expected ? *expected : *P;
+    expected = position[i] + datum.direction * M;
+  }
+  position.back() = *expected;
+  datum.first_mark = position[0];
+  double low = 0.0;
+  double high = 0.0;
+  for (std::size_t i = 0; i < kMarksForDatum; ++i) {
+    const double offset = static_cast<double>(position[i]) - marks[i];
+    low = i == 0 ? offset : std::min(low, offset);
+    high = i == 0 ? offset : std::max(high, offset);
+    datum.offset_periods += offset / static_cast<double>(kMarksForDatum);
+  }
+  datum.spread_periods = high - low;
+  return datum;
+}
+
+}  // namespace abbe::drivers

@@ -1,0 +1,77 @@
+#include "abbe/drivers/sampling/mark_traverse.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace abbe::drivers {
+
+void MarkTraverse::reset() noexcept {
+  count_ = 0;
+  refusals_ = 0;
+  moving_ = false;
+  direction_ = 0;
+  reversed_ = false;
+}
+
+void MarkTraverse::on_position(std::int64_t count) noexcept {
+  follow(static_cast<double>(count) / options_.counts_per_period);
+}
+
+/// Direction by the way since the farthest point: noise does not turn it round.
+void MarkTraverse::follow(double position) noexcept {
+  if (!moving_) {
+    moving_ = true;
+    farthest_ = position;
+    return;
+  }
+  const double way = position - farthest_;
+  if (direction_ == 0) {
+    if (std::abs(way) < options_.reversal_periods) return;
+    direction_ = way > 0.0 ? 1 : -1;
+    farthest_ = position;
+  } else if (way * direction_ >= 0.0) {
+    farthest_ = position;
+  } else if (std::abs(way) >= options_.reversal_periods) {
+    direction_ = -direction_;
+    farthest_ = position;
+    reversed_ = true;
+  }
+}
+
+void MarkTraverse::keep(double position) noexcept {
+  if (count_ == kMarksForDatum) {
+    std::copy(marks_.begin() + 1, marks_.end(), marks_.begin());
+    --count_;
+  }
+  marks_[count_++] = position;
+}
+
+tl::unexpected<MarkFault> MarkTraverse::refuse(MarkFault fault) noexcept {
+  return tl::unexpected(++refusals_ >= options_.most_refusals ? MarkFault::WrongScale : fault);
+}
+
+std::optional<tl::expected<MarkDatum, MarkFault>> MarkTraverse::on_mark(std::int64_t count) noexcept {
+  const double position = static_cast<double>(count) / options_.counts_per_period;
+  follow(position);
+  if (reversed_) {
+    reversed_ = false;
+    const bool lost = count_ > 0;
+    count_ = 0;
+    keep(position);
+    if (!lost) return std::nullopt;
+    return tl::expected<MarkDatum, MarkFault>{tl::unexpected(MarkFault::Reversed)};
+  }
+  keep(position);
+  if (count_ < kMarksForDatum) return std::nullopt;
+  auto datum = datum_of(options_.code, marks_);
+  if (!datum) {
+    // One of the four is wrong, nobody knows which: none of them is used again but the latest, as a first.
+    count_ = 0;
+    keep(position);
+    return tl::expected<MarkDatum, MarkFault>{refuse(datum.error())};
+  }
+  refusals_ = 0;
+  return datum;
+}
+
+}  // namespace abbe::drivers

@@ -6,8 +6,10 @@
 
 #include <array>
 #include <cerrno>
+#include <type_traits>
 #include <utility>
 
+#include "abbe/sim/ippdme_device.hpp"
 #include "abbe/sim/recorded_tracker.hpp"
 #include "abbe/sim/tracker_device.hpp"
 
@@ -16,7 +18,10 @@ namespace {
 
 constexpr std::size_t kMostUnsent = 32u << 20;  // a client this far behind does not read any more
 
+/// A tracker controller tells it why; I++ DME has no word for it.
+template <class Controller>
 void turn_away(const Socket& stranger) {
+  if constexpr (std::is_same_v<Controller, IppDmeDevice>) return;
   std::array<std::byte, 64> packet{};
   const std::size_t size =
       emscon::encode(emscon::ErrorResponse{emscon::Command{}, emscon::Status::MultipleConnectionsNotAllowed},
@@ -44,7 +49,7 @@ void ControllerServer<Controller>::accept_clients(HostTime now) {
     if (!device_->accepts()) continue;  // restarting: the connection is closed at once
     if (client_) read(now);             // it may just have gone
     if (client_) {
-      turn_away(stranger);
+      turn_away<Controller>(stranger);
       continue;
     }
     const int on = 1;
@@ -94,5 +99,6 @@ void ControllerServer<Controller>::drop_client() {
 
 template class ControllerServer<TrackerDevice>;
 template class ControllerServer<RecordedTracker>;
+template class ControllerServer<IppDmeDevice>;
 
 }  // namespace abbe::sim

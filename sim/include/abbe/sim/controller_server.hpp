@@ -1,7 +1,7 @@
 #pragma once
 /// A tracker controller behind a TCP port: one client at a time, another one is told so and turned away.
 /// Steppable: poll(now) never blocks and reads no clock. Not thread-safe. Controllers: TrackerDevice
-/// (simulated), RecordedTracker (replayed).
+/// (simulated), RecordedTracker (replayed), IppDmeDevice (a measuring machine).
 
 #include <memory>
 #include <utility>

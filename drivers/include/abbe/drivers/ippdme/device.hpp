@@ -1,0 +1,107 @@
+#pragma once
+/// A measuring machine behind an I++ DME server, as a Device: IppReceiver and IppSession around one TCP
+/// connection. A second source of touches behind the same vocabulary as the counter card's: each measured
+/// point is a ProbeTrigger, a failed one a ProbeTrigger without position. States: those of IppState.
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <mutex>
+#include <string>
+#include <variant>
+#include <vector>
+
+#include "abbe/drivers/device.hpp"
+#include "abbe/drivers/ippdme/receiver.hpp"
+#include "abbe/drivers/ippdme/session.hpp"
+#include "abbe/drivers/raw_ring.hpp"
+#include "abbe/drivers/sample_ring.hpp"
+#include "abbe/drivers/status_board.hpp"
+#include "abbe/drivers/tcp_client.hpp"
+#include "abbe/drivers/time_source.hpp"
+
+namespace abbe::drivers {
+
+struct IppDeviceOptions {
+  std::string name = "cmm";
+  std::string host = "127.0.0.1";
+  std::uint16_t port = ippdme::kPort;
+  IppSessionOptions session;  ///< `peer` is made from name, host and port
+  IppReceiverOptions receiver;
+  std::size_t touch_capacity = 256;
+  std::size_t position_capacity = 256;  ///< 25 s at 10 a second
+  std::size_t raw_capacity_blocks = 256;
+};
+
+class IppDevice final : public Device {
+ public:
+  /// `time` must outlive the device. BadConfiguration as check(). The connection is opened by the first
+  /// wait().
+  [[nodiscard]] static Result<std::unique_ptr<IppDevice>> create(const IppDeviceOptions& options,
+                                                                 const TimeSource& time);
+  /// Stops a motion that is under way and ends the session, without waiting for the answer.
+  ~IppDevice() override;
+
+  void wait(std::chrono::nanoseconds at_most) override;
+  void receive() ABBE_RT override;
+  [[nodiscard]] DeviceStatus status() const override;
+
+  /// Any thread: moves the machine and touches, in the order of the calls; one ProbeTrigger each, numbered
+  /// from 1 in that order. Points not yet begun are forgotten when the connection is lost.
+  void measure(const ProbePoint& point);
+
+  /// One reader each.
+  [[nodiscard]] SampleRing<protocol::ProbeTrigger>& touches() noexcept { return touches_; }
+  [[nodiscard]] SampleRing<protocol::AxisSample>& positions() noexcept { return positions_; }
+  [[nodiscard]] RawRing& raw() noexcept { return raw_; }
+
+ private:
+  using Message = std::variant<IppAck, IppComplete, IppData, IppError, IppNonsense>;
+  static constexpr std::size_t kInbox = 256;
+  static constexpr std::size_t kMostRead = 4096;
+
+  IppDevice(const IppDeviceOptions& options, const TimeSource& time);
+
+  void tell(const IppInput& input);
+  [[nodiscard]] bool act(const IppAction& action, IppInput& next);
+  [[nodiscard]] bool open(IppInput& next);
+  [[nodiscard]] bool send(const std::string& line, IppInput& next);
+  void close();
+  void read_mail();
+  void read_requests();
+  void poll(std::chrono::nanoseconds at_most);
+  void read();
+  void show();
+
+  void take(const protocol::AxisSample& sample) ABBE_RT;
+  void take(const protocol::ProbeTrigger& touch) ABBE_RT;
+  template <class M>
+  void take(const M& message) ABBE_RT {
+    post(message);
+  }
+  void post(const Message& message) ABBE_RT;
+
+  IppDeviceOptions options_;
+  const TimeSource& time_;
+  SampleRing<protocol::ProbeTrigger> touches_;
+  SampleRing<protocol::AxisSample> positions_;
+  RawRing raw_;
+  StatusBoard board_;
+  IppReceiver receiver_;
+  IppSession session_;
+  TcpClient tcp_;
+
+  std::mutex requests_mutex_;
+  std::vector<ProbePoint> requests_;  // under requests_mutex_
+
+  std::uint64_t faults_seen_ = 0;
+  protocol::HostTime arrival_{};
+  std::size_t filled_ = 0;
+  std::array<std::byte, kMostRead> buffer_{};
+  std::array<Message, kInbox> inbox_{};  ///< from receive() to the next wait(), same thread
+  std::size_t inbox_count_ = 0;
+  std::uint64_t inbox_lost_ = 0;
+};
+
+}  // namespace abbe::drivers

@@ -1,0 +1,206 @@
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <utility>
+
+#include "abbe/drivers/ippdme/receiver.hpp"
+
+namespace abbe::drivers {
+namespace {
+
+using protocol::AxisSample;
+using protocol::HostTime;
+using protocol::ProbeTrigger;
+using protocol::SampleFlag;
+using protocol::SampleHead;
+using protocol::TouchFlag;
+using std::chrono::nanoseconds;
+
+constexpr double kMetresPerMillimetre = 1e-3;
+constexpr double kCountsPerMillimetre = 1e6;  // the machine has counts, but does not show them: nanometres
+constexpr int kRepairable = 2;                // severity from which on the command has failed
+
+IppText text_of(std::string_view text) noexcept {
+  IppText t;
+  t.length = static_cast<std::uint8_t>(std::min(text.size(), t.characters.size()));
+  std::copy_n(text.begin(), t.length, t.characters.begin());
+  return t;
+}
+
+std::string_view chars(std::span<const std::byte> bytes) noexcept {
+  return {reinterpret_cast<const char*>(bytes.data()), bytes.size()};
+}
+
+/// A touch that somebody made by hand comes as PtMeas(X(..),Y(..),Z(..)).
+std::string_view picked(std::string_view data) noexcept {
+  constexpr std::string_view kFront = "PtMeas(";
+  if (!data.starts_with(kFront) || !data.ends_with(')')) return {};
+  data.remove_prefix(kFront.size());
+  data.remove_suffix(1);
+  return data;
+}
+
+}  // namespace
+
+void IppReceiver::sent(std::span<const std::byte> bytes, HostTime time) ABBE_RT {
+  std::string_view line = chars(bytes);
+  if (line.ends_with("\r\n")) line.remove_suffix(2);
+  const auto command = ippdme::parse_command(line);
+  if (!command) return;
+  Asked asked{.tag = command->tag, .time = time, .known = true};
+  if (command->method == "Get") asked.purpose = Purpose::Position;
+  if (command->method == "OnMoveReportE") asked.purpose = Purpose::MoveReport;
+  if (command->method == "PtMeas") {
+    asked.purpose = Purpose::Touch;
+    asked.touch = ++touches_;
+  }
+  // The report goes on for as long as the connection: its place is the first.
+  if (asked.purpose == Purpose::MoveReport) {
+    asked_[0] = asked;
+    return;
+  }
+  next_asked_ = next_asked_ % (kMostAsked - 1) + 1;
+  asked_[next_asked_] = asked;
+}
+
+IppReceiver::Asked* IppReceiver::find(ippdme::Tag tag) ABBE_RT {
+  for (Asked& asked : asked_)
+    if (asked.known && asked.tag == tag) return &asked;
+  return nullptr;
+}
+
+void IppReceiver::push(std::span<const std::byte> bytes, HostTime arrival) ABBE_RT {
+  arrival_ = arrival;
+  if (bytes.empty()) {
+    framer_.reset();
+    silenced_ = false;
+    position_restarted_ = touch_restarted_ = true;
+    error_due_.reset();
+    for (Asked& asked : asked_) asked.known = false;
+    return;
+  }
+  if (!silenced_) framer_.push(bytes);
+}
+
+std::optional<IppMessage> IppReceiver::next() ABBE_RT {
+  if (error_due_) {
+    const IppMessage due = *error_due_;
+    error_due_.reset();
+    return due;
+  }
+  while (!silenced_) {
+    const auto line = framer_.next();
+    if (!line) return std::nullopt;
+    if (!*line) return nonsense(line->error(), {});
+    if (auto message = understand(**line)) return message;
+  }
+  return std::nullopt;
+}
+
+IppMessage IppReceiver::nonsense(ippdme::LineError error, std::string_view line) ABBE_RT {
+  silenced_ = true;
+  return IppNonsense{error, text_of(line)};
+}
+
+std::optional<IppMessage> IppReceiver::understand(std::string_view line) ABBE_RT {
+  const auto response = ippdme::parse_response(line);
+  if (!response) return nonsense(response.error(), line);
+  switch (response->kind) {
+    case ippdme::Response::Kind::Ack:
+      return IppMessage{IppAck{response->tag}};
+    case ippdme::Response::Kind::Complete:
+      return IppMessage{IppComplete{response->tag}};
+    case ippdme::Response::Kind::Error:
+      return error(*response);
+    case ippdme::Response::Kind::Data:
+      break;
+  }
+  return data(*response, line);
+}
+
+/// Somewhere between `from` and the arrival.
+SampleHead IppReceiver::between(HostTime from) ABBE_RT {
+  const nanoseconds half = std::max(nanoseconds{0}, arrival_ - from) / 2;
+  SampleHead head;
+  head.time = arrival_ - half;
+  head.u_time = nanoseconds{std::llround(static_cast<double>(half.count()) / std::sqrt(3.0))};
+  return head;
+}
+
+std::optional<IppMessage> IppReceiver::data(const ippdme::Response& response, std::string_view line) ABBE_RT {
+  const Asked* asked = find(response.tag);
+  const bool unsolicited = response.tag == ippdme::kUnsolicited;
+  const std::string_view by_hand = unsolicited ? picked(response.data) : std::string_view{};
+  if (by_hand.empty() && (asked == nullptr || asked->purpose == Purpose::Other)) {
+    if (unsolicited) return std::nullopt;  // a key, a changed property: nobody here wants it
+    return IppMessage{IppData{response.tag, text_of(response.data)}};
+  }
+  const auto point = ippdme::parse_point(unsolicited ? by_hand : response.data);
+  if (!point) return nonsense(point.error(), line);
+  if (unsolicited) return touch(*point, between(arrival_ - options_.max_report_delay), ++touches_, false);
+  switch (asked->purpose) {
+    case Purpose::Position:
+      return position(*point, between(asked->time));
+    case Purpose::MoveReport:
+      return position(*point, between(arrival_ - options_.max_report_delay));
+    case Purpose::Touch:
+      return touch(*point, between(asked->time), asked->touch, asked->warned);
+    case Purpose::Other:
+      break;
+  }
+  return std::nullopt;
+}
+
+AxisSample IppReceiver::position(const ippdme::PointReport& at, const SampleHead& head) ABBE_RT {
+  AxisSample sample;
+  sample.head = head;
+  if (std::exchange(position_restarted_, false)) sample.head.flags |= SampleFlag::Restarted;
+  sample.cycle = ++cycle_;
+  sample.axis_count = 3;
+  sample.missing_mask = static_cast<std::uint8_t>(0b111 & ~at.known);
+  if (sample.missing_mask != 0) sample.head.flags |= SampleFlag::AxisMissing;
+  for (std::size_t i = 0; i < 3; ++i) {
+    const bool known = ((at.known >> i) & 1u) != 0 && std::abs(at.p_mm[i]) < 1e9;
+    sample.position[i] = known ? kMetresPerMillimetre * at.p_mm[i] : std::numeric_limits<double>::quiet_NaN();
+    sample.count[i] = known ? std::llround(kCountsPerMillimetre * at.p_mm[i]) : 0;
+  }
+  return sample;
+}
+
+ProbeTrigger IppReceiver::touch(const ippdme::PointReport& at, const SampleHead& head, std::uint32_t number,
+                                bool warned) ABBE_RT {
+  ProbeTrigger t;
+  t.head = head;
+  if (std::exchange(touch_restarted_, false)) t.head.flags |= SampleFlag::Restarted;
+  t.touch = number;
+  t.probe = options_.probe;
+  t.latch = protocol::TouchLatch::Reported;
+  if (warned) t.touch_flags |= TouchFlag::Refused;
+  t.axis_count = 3;
+  t.missing_mask = static_cast<std::uint8_t>(0b111 & ~at.known);
+  if (t.missing_mask != 0) {
+    t.head.flags |= SampleFlag::AxisMissing;
+    t.touch_flags |= TouchFlag::NoPosition;
+  }
+  for (std::size_t i = 0; i < 3; ++i) {
+    const bool known = ((at.known >> i) & 1u) != 0;
+    t.position[i] = known ? kMetresPerMillimetre * at.p_mm[i] : std::numeric_limits<double>::quiet_NaN();
+    t.u_position[i] = options_.u_position_m;
+    t.U95_position[i] = 1.96 * options_.u_position_m;
+  }
+  return t;
+}
+
+/// A touch that failed is one too: who asked for it must hear that there is no position.
+IppMessage IppReceiver::error(const ippdme::Response& response) ABBE_RT {
+  const IppError report{response.tag, response.error.severity, response.error.code,
+                        text_of(response.error.text)};
+  Asked* asked = find(response.tag);
+  if (asked == nullptr || asked->purpose != Purpose::Touch) return report;
+  asked->warned = true;
+  if (response.error.severity < kRepairable) return report;
+  error_due_ = report;
+  return touch({}, between(asked->time), asked->touch, true);
+}
+
+}  // namespace abbe::drivers

@@ -1,0 +1,126 @@
+#pragma once
+/// An I++ DME server in front of a simulated measuring machine, without its socket: bytes and a time in,
+/// bytes out. It wants what a real one wants (a session, a homed machine, a tool that exists) and answers
+/// with the error numbers of the specification. Commands are carried out one after the other, events at once.
+/// Not thread-safe. [I++ DME 1.4.3]
+///
+/// Chosen here, because the specification leaves it open: a touch reports the centre of the tip, and its data
+/// line comes when the machine has retracted.
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <deque>
+#include <memory>
+#include <optional>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "abbe/protocol/ippdme/lines.hpp"
+#include "abbe/sim/measuring_machine.hpp"
+#include "abbe/sim/sim_clock.hpp"
+
+namespace abbe::sim {
+
+namespace ippdme = protocol::ippdme;
+
+struct IppDmeOptions {
+  MeasuringMachine machine;
+  bool homed = true;
+  std::vector<std::string> tools = {"ruby 4"};
+  double travel_speed_m_s = 0.2;
+  double probing_speed_m_s = 5e-3;
+  std::chrono::nanoseconds home_time = std::chrono::seconds{2};
+  bool speaks_move_reports = true;
+};
+
+class IppDmeDevice {
+ public:
+  /// Switched on at `now`.
+  IppDmeDevice(const IppDmeOptions& options, HostTime now);
+
+  void connected(HostTime now);
+  void disconnected();
+  void receive(std::span<const std::byte> bytes, HostTime now);
+  /// Does what is due until `now`, in the order it is due.
+  void advance(HostTime now);
+  [[nodiscard]] HostTime next_due() const;
+
+  /// Bytes for the client, made since the last call.
+  [[nodiscard]] std::vector<std::byte> take_output();
+  [[nodiscard]] bool wants_close() const { return false; }
+  [[nodiscard]] bool accepts() const { return true; }
+
+  /// The emergency stop is pressed: an unsolicited error, motion ends.
+  void press_emergency_stop();
+  /// Somebody touches by hand.
+  void touch_by_hand(const Eigen::Vector3d& reading_m);
+
+  [[nodiscard]] bool in_session() const { return session_; }
+  [[nodiscard]] std::uint64_t touches() const { return touches_; }
+  /// Scale readings.
+  [[nodiscard]] Eigen::Vector3d reading_m(HostTime now) const;
+
+ private:
+  struct Command {
+    ippdme::Tag tag;
+    std::string method;
+    std::string arguments;
+  };
+  /// From one place to another; what is said at its end.
+  struct Motion {
+    Command command;
+    Eigen::Vector3d from_m;
+    Eigen::Vector3d to_m;
+    HostTime begin;
+    HostTime end;
+    std::optional<Probing> probing;
+    bool homing = false;
+  };
+  struct MoveReport {
+    ippdme::Tag tag;
+    std::vector<std::string> names;
+    std::chrono::nanoseconds period;
+    HostTime next;
+  };
+
+  void on_line(std::string_view line, HostTime now);
+  void on_event(const Command& command, HostTime now);
+  void begin_next(HostTime now);
+  void carry_out(const Command& command, HostTime now);
+  [[nodiscard]] bool carry_out_session(const Command& command);
+  [[nodiscard]] bool carry_out_tools(const Command& command);
+  [[nodiscard]] bool carry_out_motion(const Command& command, HostTime now);
+  [[nodiscard]] bool carry_out_reports(const Command& command, HostTime now);
+  void begin_motion(const Command& command, const Eigen::Vector3d& to_m, double extra_s, HostTime now);
+  void begin_touch(const Command& command, HostTime now);
+  void end_motion();
+  void abort(HostTime now);
+
+  void say(std::string_view line);
+  void acknowledge(ippdme::Tag tag) { say(ippdme::to_string(tag) + " &"); }
+  void complete(ippdme::Tag tag) { say(ippdme::to_string(tag) + " %"); }
+  void data(ippdme::Tag tag, std::string_view text) {
+    say(ippdme::to_string(tag) + " # " + std::string(text));
+  }
+  void fault(const Command& command, int severity, int code, std::string_view text);
+  [[nodiscard]] std::string place(const std::vector<std::string>& names, const Eigen::Vector3d& p_m) const;
+
+  IppDmeOptions options_;
+  std::unique_ptr<ippdme::LineFramer> framer_ = std::make_unique<ippdme::LineFramer>();
+  std::vector<std::byte> out_;
+  bool session_ = false;
+  bool homed_;
+  bool failed_ = false;  ///< an error of severity 2 or more, until ClearAllErrors
+  std::string tool_;
+  std::deque<Command> queue_;
+  std::optional<Motion> motion_;
+  std::optional<MoveReport> move_report_;
+  std::vector<std::string> touch_report_ = {"X", "Y", "Z"};
+  Eigen::Vector3d position_m_ = Eigen::Vector3d::Zero();
+  std::uint64_t touches_ = 0;
+};
+
+}  // namespace abbe::sim

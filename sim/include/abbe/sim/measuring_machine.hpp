@@ -1,0 +1,41 @@
+#pragma once
+/// A measuring machine with known geometric errors and spheres on its table: what it reads when it probes.
+/// The tip meets the true surface; the machine reports what its scales say there. SI, machine coordinates.
+/// Pure functions over plain options; safe to call from any thread.
+
+#include <Eigen/Core>
+#include <cstdint>
+#include <optional>
+#include <vector>
+
+#include "abbe/sim/truth_machine.hpp"
+
+namespace abbe::sim {
+
+struct Sphere {
+  Eigen::Vector3d centre_m = Eigen::Vector3d::Zero();
+  double radius_m = 12.5e-3;
+};
+
+struct MeasuringMachine {
+  TruthMachine truth;
+  std::vector<Sphere> spheres;
+  double tip_radius_m = 2e-3;
+  double approach_m = 2e-3;  ///< probing begins this far before the nominal place ...
+  double search_m = 5e-3;    ///< ... and ends this far behind it
+  double noise_m = 0.0;      ///< of a reading along the approach
+  std::uint64_t seed = 1;
+};
+
+enum class ProbingFault { AlreadyTouching, NothingThere };
+struct Probing {
+  std::optional<ProbingFault> fault;
+  Eigen::Vector3d reading_m =
+      Eigen::Vector3d::Zero();  ///< scales at contact: the centre of the tip, not of the surface
+};
+
+/// Moves from place + approach x normal against the (unit) normal. `number` draws the noise.
+[[nodiscard]] Probing probe(const MeasuringMachine& machine, const Eigen::Vector3d& place_m,
+                            const Eigen::Vector3d& normal, std::uint64_t number);
+
+}  // namespace abbe::sim

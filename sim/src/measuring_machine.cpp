@@ -1,0 +1,47 @@
+#include "abbe/sim/measuring_machine.hpp"
+
+#include <algorithm>
+#include <limits>
+
+#include "abbe/sim/noise.hpp"
+
+namespace abbe::sim {
+namespace {
+
+constexpr double kStep_m = 50e-6;  // far below any sphere: the first contact is not stepped over
+constexpr int kHalvings = 45;      // 50 um / 2^45 is below a femtometre
+
+/// Distance of the tip's surface to the nearest sphere when the scales read q.
+double clearance_m(const MeasuringMachine& machine, const Eigen::Vector3d& q_m) {
+  const Eigen::Vector3d tip_m = position_m(machine.truth, q_m);
+  double nearest = std::numeric_limits<double>::infinity();
+  for (const Sphere& s : machine.spheres)
+    nearest = std::min(nearest, (tip_m - s.centre_m).norm() - s.radius_m - machine.tip_radius_m);
+  return nearest;
+}
+
+}  // namespace
+
+Probing probe(const MeasuringMachine& machine, const Eigen::Vector3d& place_m, const Eigen::Vector3d& normal,
+              std::uint64_t number) {
+  const auto at = [&](double way_m) -> Eigen::Vector3d {
+    return place_m + (machine.approach_m - way_m) * normal;
+  };
+  if (clearance_m(machine, at(0.0)) <= 0.0) return {ProbingFault::AlreadyTouching, at(0.0)};
+  const double most_m = machine.approach_m + machine.search_m;
+  double free_m = 0.0;
+  double touching_m = kStep_m;
+  while (clearance_m(machine, at(touching_m)) > 0.0) {
+    free_m = touching_m;
+    touching_m += kStep_m;
+    if (touching_m > most_m) return {ProbingFault::NothingThere, at(most_m)};
+  }
+  for (int i = 0; i < kHalvings; ++i) {
+    const double middle_m = 0.5 * (free_m + touching_m);
+    (clearance_m(machine, at(middle_m)) > 0.0 ? free_m : touching_m) = middle_m;
+  }
+  const double noise_m = machine.noise_m * gaussian(machine.seed, NoiseStream::Range, number);
+  return {std::nullopt, at(touching_m) + noise_m * normal};
+}
+
+}  // namespace abbe::sim

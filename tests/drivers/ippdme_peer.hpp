@@ -1,0 +1,107 @@
+#pragma once
+/// The simulated measuring machine's server on a listening socket of 127.0.0.1, in the test's own thread,
+/// with what it says in the test's hands: lines are gathered, and sent when the test says so.
+
+#include <arpa/inet.h>
+#include <gtest/gtest.h>
+#include <netinet/in.h>
+#include <netinet/tcp.h>
+#include <sys/socket.h>
+
+#include <array>
+#include <memory>
+#include <span>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include "abbe/sim/ippdme_device.hpp"
+#include "abbe/sim/socket.hpp"
+
+namespace abbe::tests {
+
+class IppDmePeer {
+ public:
+  explicit IppDmePeer(protocol::HostTime now, sim::IppDmeOptions options = {})
+      : options_(std::move(options)), port_holder_(bound_socket(0)), port_(sim::port_of(port_holder_)) {
+    power_on(now);
+    listen();
+  }
+
+  [[nodiscard]] std::uint16_t port() const { return port_; }
+  [[nodiscard]] sim::IppDmeDevice& machine() { return *machine_; }
+
+  /// Lets a client in, hears it, does what is due. What the machine says is gathered.
+  void serve(protocol::HostTime now) {
+    accept_client(now);
+    hear(now);
+    machine_->advance(now);
+    const auto bytes = machine_->take_output();
+    gathered_.append(reinterpret_cast<const char*>(bytes.data()), bytes.size());
+  }
+  void say_gathered() { send(std::exchange(gathered_, {})); }
+  void send(std::string_view text) {
+    if (client_ && !text.empty()) ::send(client_.get(), text.data(), text.size(), MSG_NOSIGNAL);
+  }
+
+  void hang_up() {
+    client_.close();
+    gathered_.clear();
+    machine_->disconnected();
+  }
+  void unplug() {
+    hang_up();
+    listener_.close();
+  }
+  void listen() {
+    listener_ = bound_socket(port_);
+    ASSERT_EQ(::listen(listener_.get(), 4), 0);
+  }
+  void restart(protocol::HostTime now) {
+    hang_up();
+    power_on(now);
+  }
+
+ private:
+  /// Held by a second socket, so that the port stays ours while unplugged.
+  static sim::Socket bound_socket(std::uint16_t port) {
+    sim::Socket s(::socket(AF_INET, SOCK_STREAM | SOCK_NONBLOCK | SOCK_CLOEXEC, 0));
+    const int yes = 1;
+    ::setsockopt(s.get(), SOL_SOCKET, SO_REUSEADDR, &yes, sizeof yes);
+    ::setsockopt(s.get(), SOL_SOCKET, SO_REUSEPORT, &yes, sizeof yes);
+    sockaddr_in a{};
+    a.sin_family = AF_INET;
+    a.sin_port = htons(port);
+    a.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
+    EXPECT_EQ(::bind(s.get(), reinterpret_cast<const sockaddr*>(&a), sizeof a), 0);
+    return s;
+  }
+  void power_on(protocol::HostTime now) { machine_ = std::make_unique<sim::IppDmeDevice>(options_, now); }
+  void accept_client(protocol::HostTime now) {
+    sim::Socket accepted(::accept4(listener_.get(), nullptr, nullptr, SOCK_NONBLOCK | SOCK_CLOEXEC));
+    if (!accepted) return;
+    if (client_) hang_up();
+    client_ = std::move(accepted);
+    const int yes = 1;
+    ::setsockopt(client_.get(), IPPROTO_TCP, TCP_NODELAY, &yes, sizeof yes);
+    machine_->connected(now);
+  }
+  void hear(protocol::HostTime now) {
+    if (!client_) return;
+    std::array<std::byte, 4096> bytes{};
+    const ssize_t n = ::recv(client_.get(), bytes.data(), bytes.size(), MSG_DONTWAIT);
+    if (n > 0) machine_->receive(std::span{bytes}.first(static_cast<std::size_t>(n)), now);
+    if (n == 0) hang_up();
+  }
+
+  sim::IppDmeOptions options_;
+  sim::Socket port_holder_;
+  std::uint16_t port_;
+  sim::Socket listener_;
+  sim::Socket client_;
+  std::unique_ptr<sim::IppDmeDevice> machine_;
+  std::string gathered_;
+};
+
+}  // namespace abbe::tests

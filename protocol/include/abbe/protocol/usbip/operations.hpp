@@ -1,0 +1,155 @@
+#pragma once
+/// USB/IP before the transfers: which devices a server exports, and importing one of them. Big-endian, TCP
+/// port 3240, version 1.1.1 [Linux Documentation/usb/usbip_protocol.rst]. An import that is granted turns the
+/// connection into a stream of transfers (urb.hpp). Decoders are total and need the whole message;
+/// message_size() says how much that is. Pure, no allocation.
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <string_view>
+#include <tl/expected.hpp>
+
+#include "abbe/protocol/rt.hpp"
+
+namespace abbe::protocol::usbip {
+
+inline constexpr std::uint16_t kPort = 3240;
+inline constexpr std::uint16_t kVersion = 0x0111;
+
+enum class OpCode : std::uint16_t {
+  DeviceListRequest = 0x8005,
+  DeviceListReply = 0x0005,
+  ImportRequest = 0x8003,
+  ImportReply = 0x0003,
+};
+enum class OpStatus : std::uint32_t {
+  Ok = 0,
+  Refused = 1,
+  Busy = 2,
+  DeviceError = 3,
+  NoDevice = 4,
+  Unexpected = 5
+};
+
+enum class OpError : std::uint8_t {
+  Truncated,    ///< fewer bytes than the message needs
+  BadVersion,   ///< no USB/IP 1.1.1
+  UnknownCode,  ///< not the message that was asked for
+};
+[[nodiscard]] const char* to_text(OpError error) noexcept;
+
+enum class Speed : std::uint32_t { Unknown = 0, Low = 1, Full = 2, High = 3, Wireless = 4, Super = 5 };
+
+/// Text of fixed width on the wire, padded with zeros; longer text is cut.
+template <std::size_t N>
+struct FixedText {
+  std::array<char, N> characters{};
+  constexpr FixedText() = default;
+  constexpr explicit FixedText(std::string_view text) noexcept {
+    for (std::size_t i = 0; i < text.size() && i + 1 < N; ++i) characters[i] = text[i];
+  }
+  [[nodiscard]] constexpr std::string_view view() const noexcept {
+    const std::string_view all{characters.data(), N};
+    return all.substr(0, all.find('\0'));
+  }
+  friend bool operator==(const FixedText&, const FixedText&) = default;
+};
+using BusId = FixedText<32>;
+
+struct ExportedDevice {
+  FixedText<256> path;
+  BusId bus_id;  ///< "1-1"
+  std::uint32_t bus = 0;
+  std::uint32_t number = 0;
+  Speed speed = Speed::High;
+  std::uint16_t vendor = 0;
+  std::uint16_t product = 0;
+  std::uint16_t version = 0;
+  std::uint8_t device_class = 0;
+  std::uint8_t device_subclass = 0;
+  std::uint8_t device_protocol = 0;
+  std::uint8_t configuration = 0;  ///< the active one, 0: none
+  std::uint8_t configurations = 1;
+  std::uint8_t interfaces = 1;
+  friend bool operator==(const ExportedDevice&, const ExportedDevice&) = default;
+};
+
+/// "devid" of the transfers.
+[[nodiscard]] constexpr std::uint32_t device_id(const ExportedDevice& device) noexcept {
+  return device.bus << 16 | (device.number & 0xFFFFu);
+}
+
+struct ExportedInterface {
+  std::uint8_t interface_class = 0;
+  std::uint8_t interface_subclass = 0;
+  std::uint8_t interface_protocol = 0;
+  friend bool operator==(const ExportedInterface&, const ExportedInterface&) = default;
+};
+
+struct OpHead {
+  std::uint16_t version = kVersion;
+  OpCode code = OpCode::ImportRequest;
+  OpStatus status = OpStatus::Ok;
+  friend bool operator==(const OpHead&, const OpHead&) = default;
+};
+
+inline constexpr std::size_t kOpHeadSize = 8;
+inline constexpr std::size_t kExportedDeviceSize = 312;
+inline constexpr std::size_t kExportedInterfaceSize = 4;
+inline constexpr std::size_t kImportRequestSize = kOpHeadSize + 32;
+inline constexpr std::size_t kImportReplySize = kOpHeadSize + kExportedDeviceSize;
+
+/// The head of any operation; UnknownCode for a code that is none of ours.
+[[nodiscard]] tl::expected<OpHead, OpError> decode_op_head(std::span<const std::byte> bytes) ABBE_RT;
+
+// Each writer returns the bytes written, 0 if `out` is too small.
+std::size_t encode_device_list_request(std::span<std::byte> out) ABBE_RT;
+std::size_t encode_import_request(const BusId& bus_id, std::span<std::byte> out) ABBE_RT;
+/// A refusal (`device` empty) is the head alone.
+std::size_t encode_import_reply(OpStatus status, const ExportedDevice* device,
+                                std::span<std::byte> out) ABBE_RT;
+[[nodiscard]] tl::expected<BusId, OpError> decode_import_request(std::span<const std::byte> bytes) ABBE_RT;
+
+struct ImportReply {
+  OpStatus status = OpStatus::Ok;
+  ExportedDevice device;  ///< only with status Ok
+  friend bool operator==(const ImportReply&, const ImportReply&) = default;
+};
+[[nodiscard]] tl::expected<ImportReply, OpError> decode_import_reply(
+    std::span<const std::byte> bytes) ABBE_RT;
+
+/// Writes a device list: the head, then device by device with as many interfaces as it says.
+class DeviceListWriter {
+ public:
+  DeviceListWriter(std::span<std::byte> out, std::uint32_t devices) ABBE_RT;
+  /// False when it does not fit.
+  bool add(const ExportedDevice& device, std::span<const ExportedInterface> interfaces) ABBE_RT;
+  [[nodiscard]] std::span<const std::byte> written() const ABBE_RT { return out_.first(size_); }
+
+ private:
+  std::span<std::byte> out_;
+  std::size_t size_ = 0;
+};
+
+/// Walks a device list that has come as a whole. The bytes must outlive the view.
+class DeviceListView {
+ public:
+  /// Truncated as long as the announced devices have not all come.
+  [[nodiscard]] static tl::expected<DeviceListView, OpError> parse(std::span<const std::byte> bytes) ABBE_RT;
+  [[nodiscard]] std::uint32_t count() const ABBE_RT { return count_; }
+  /// The next device; nothing after the last. Its interfaces are left out: nobody here needs them.
+  [[nodiscard]] std::optional<ExportedDevice> next() ABBE_RT;
+
+ private:
+  DeviceListView(std::span<const std::byte> devices, std::uint32_t count) ABBE_RT : rest_(devices),
+                                                                                    count_(count),
+                                                                                    left_(count) {}
+  std::span<const std::byte> rest_;
+  std::uint32_t count_;
+  std::uint32_t left_;
+};
+
+}  // namespace abbe::protocol::usbip

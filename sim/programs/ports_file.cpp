@@ -16,12 +16,16 @@ Result<void> announce_ports(const Ports& ports, const std::string& path) {
     lines += place.port != 0 ? fmt::format("{}_port={}\n", place.name, place.port)
                              : fmt::format("{}_path=\"{}\"\n", place.name, place.path);
   }
+  // The first card has the bare name, further ones are numbered: usbip_port_2.
+  for (std::size_t i = 0; i < ports.usbip.size(); ++i)
+    lines += fmt::format("usbip_port{}={}\n", i == 0 ? "" : fmt::format("_{}", i + 1), ports.usbip[i]);
   if (!path.empty()) {
     if (const auto written = write_file(path, lines); !written) return written;
   }
   if (ports.tracker) fmt::print("tracker: emScon on 127.0.0.1:{}\n", *ports.tracker);
   if (ports.can) fmt::print("encoders: CAN over UDP on 127.0.0.1:{}\n", *ports.can);
   for (const NamedPlace& place : ports.environment) fmt::print("{}: {}\n", place.name, place.where);
+  for (const auto port : ports.usbip) fmt::print("counter card: USB/IP on 127.0.0.1:{}, bus id 1-1\n", port);
   std::fflush(stdout);
   return {};
 }

@@ -70,6 +70,16 @@ class Narrator {
   int drawn_ = -1;
 };
 
+Ports ports_of(Simulation& simulation) {
+  Ports ports;
+  if (simulation.tracker()) ports.tracker = simulation.tracker()->port();
+  if (simulation.bus()) ports.can = simulation.bus()->port();
+  for (const ModbusServer& server : simulation.environment())
+    ports.environment.push_back({server.name(), server.where(), server.port(), server.path()});
+  for (const UsbipServer& card : simulation.counter_cards()) ports.usbip.push_back(card.port());
+  return ports;
+}
+
 int run(const RunOptions& options) {
   const auto setup = load_setup(options.choices);
   if (!setup) return report(setup.error());
@@ -80,10 +90,7 @@ int run(const RunOptions& options) {
   const EventLoop loop(setup->speed);
   auto simulation = Simulation::open(setup->simulation, loop.clock().now());
   if (!simulation) return report(simulation.error());
-  Ports ports{(*simulation)->tracker()->port(), (*simulation)->bus()->port(), {}};
-  for (const ModbusServer& server : (*simulation)->environment())
-    ports.environment.push_back({server.name(), server.where(), server.port(), server.path()});
-  if (const auto announced = announce_ports(ports, options.ports_file); !announced)
+  if (const auto announced = announce_ports(ports_of(**simulation), options.ports_file); !announced)
     return report(announced.error());
   Narrator narrator(setup->speed);
   while (!loop.stopped()) {
@@ -102,8 +109,8 @@ int run(const RunOptions& options) {
 Subcommand add_run(CLI::App& app) {
   auto options = std::make_shared<RunOptions>();  // lives as long as the command line's callbacks
   SetupChoices& choices = options->choices;
-  CLI::App* sub =
-      app.add_subcommand("run", "machine, tracker and encoders on 127.0.0.1 until SIGINT or SIGTERM");
+  CLI::App* sub = app.add_subcommand(
+      "run", "machine, tracker, encoders and counter card on 127.0.0.1 until SIGINT or SIGTERM");
   add_machine_options(*sub, choices);
   sub->add_option("--path", choices.path_file, "CSV x_mm,y_mm,z_mm[,feed_mm_per_min]")->type_name("FILE");
   sub->add_option("--feed", choices.feed_mm_per_min, "mm/min (default 2500)")->check(CLI::PositiveNumber);
@@ -113,8 +120,9 @@ Subcommand add_run(CLI::App& app) {
   sub->add_option("--can-port", choices.can_port, "UDP; 0 = any free one");
   sub->add_option("--can-peer-port", choices.can_peer_port,
                   "UDP port of the daemon; 0 = whoever speaks first");
+  sub->add_option("--usbip-port", choices.usbip_port, "TCP, of the counter card; 0 = any free one");
   sub->add_option("--ports-file", options->ports_file,
-                  "written when all ports listen: lines tracker_port=N and can_port=N")
+                  "written when all ports listen: lines tracker_port=N, can_port=N, usbip_port=N")
       ->type_name("FILE");
   sub->add_option("--truth-out", options->truth_out, "write the errors of this machine as CSV")
       ->type_name("FILE");

@@ -90,6 +90,60 @@ void read_encoder_nodes(TomlSection& encoder, std::vector<EncoderNodeOptions>& n
   if (!seen.empty()) nodes = seen;
 }
 
+std::optional<std::uint8_t> read_channel(TomlSection& section, std::string_view key) {
+  std::int64_t channel = 0;
+  if (!section.integer(key, channel, 0, static_cast<std::int64_t>(quad08::kChannels) - 1))
+    return std::nullopt;
+  return static_cast<std::uint8_t>(channel);
+}
+
+CardAxis read_card_axis(TomlSection& section) {
+  CardAxis axis;
+  section.text("axis", axis.name);
+  axis.channel = read_channel(section, "channel").value_or(0);
+  section.number("step_nm", axis.step, 1e-9, kPositiveNumber);
+  section.number("step_nrad", axis.step, 1e-9, kPositiveNumber);
+  bool invert = false;
+  section.flag("invert", invert);
+  if (invert) axis.step = -axis.step;
+  return axis;
+}
+
+/// The daemon's [counter_card]: its wiring is the card's.
+void read_counter_card(TomlSection section, SimulationSetup& simulation) {
+  if (!section.present()) return;
+  CounterCardSetup card;
+  read_port(section, "port", card.port);
+  section.text("serial_number", card.serial);
+  std::string source = "external";
+  section.text("clock_source", source);
+  card.own_timer = source == "timer0";
+  section.number("clock_MHz", card.clock_hz, 1e6, kPositiveNumber);
+  card.clock_channel = read_channel(section, "clock_channel").value_or(card.clock_channel);
+  card.latch_channel = read_channel(section, "latch_channel");
+  card.edge_channel = read_channel(section, "edge_channel");
+  for (TomlSection& axis : section.children("axes")) card.axes.push_back(read_card_axis(axis));
+  simulation.counter_cards.push_back(card);
+}
+
+/// [sim.counter_card]: what the daemon cannot know of it.
+void read_sim_counter_card(TomlSection section, SimulationSetup& simulation) {
+  if (!section.present()) return;
+  if (simulation.counter_cards.empty())
+    return section.fault("", "there is no [counter_card] in the machine file");
+  CounterCardSetup& card = simulation.counter_cards.front();
+  double noise_m = 0.0;
+  double fifo_bytes = static_cast<double>(card.fifo_bytes);
+  read_port(section, "port", card.port);
+  section.text("serial_number", card.serial);
+  section.number("noise_nm", noise_m, 1e-9, kNotNegativeNumber);
+  section.number("clock_deviation_ppm", card.clock_deviation_ppm, 1.0, {-1000.0, 1000.0});
+  section.number("fifo_kB", fifo_bytes, 1e3, {1.0, 1e6});
+  card.fifo_bytes = static_cast<std::size_t>(fifo_bytes);
+  for (CardAxis& axis : card.axes) axis.noise = noise_m;
+  section.refuse_unknown_keys();
+}
+
 /// The tables the daemon reads too. Keys that only it knows are none of ours.
 void read_machine_tables(TomlSection root, Draft& draft) {
   SimulationSetup& simulation = draft.setup.simulation;
@@ -111,6 +165,7 @@ void read_machine_tables(TomlSection root, Draft& draft) {
   read_port(encoder, "peer_port", simulation.bus->port);
   read_port(encoder, "local_port", simulation.bus->peer_port);
   read_encoder_nodes(encoder, simulation.nodes);
+  read_counter_card(root.child("counter_card"), simulation);
   root.child("daemon").number("speed", draft.setup.speed, 1.0, {1e-3, 1e4});
 }
 
@@ -176,11 +231,17 @@ void read_faults(TomlSection& sim, std::vector<ScheduledFault>& faults) {
     std::int64_t node = 0;
     section.text("device", device);
     section.text("kind", kind);
-    if (device != "tracker" && device != "encoder" && device != "environment")
-      section.fault("device", "must be \"tracker\", \"encoder\" or \"environment\"");
-    scheduled.target = device == "encoder"       ? FaultTarget::Encoder
-                       : device == "environment" ? FaultTarget::Environment
-                                                 : FaultTarget::Tracker;
+    if (device == "tracker") {
+      scheduled.target = FaultTarget::Tracker;
+    } else if (device == "encoder") {
+      scheduled.target = FaultTarget::Encoder;
+    } else if (device == "environment") {
+      scheduled.target = FaultTarget::Environment;
+    } else if (device == "counter_card") {
+      scheduled.target = FaultTarget::CounterCard;
+    } else {
+      section.fault("device", "must be \"tracker\", \"encoder\", \"environment\" or \"counter_card\"");
+    }
     const auto known = fault_kind(scheduled.target, kind);
     if (!known) section.fault("kind", fmt::format("\"{}\" is no fault of this device", kind));
     scheduled.fault.kind = known.value_or(FaultKind::Mute);
@@ -210,6 +271,7 @@ void read_sim(TomlSection sim, const std::string& file, Draft& draft) {
   encoder.number("noise_nm", draft.encoder_noise_m, 1e-9, kNotNegativeNumber);
   encoder.refuse_unknown_keys();
   read_environment(sim, simulation.environment);
+  read_sim_counter_card(sim.child("counter_card"), simulation);
   read_faults(sim, simulation.faults);
   sim.refuse_unknown_keys();
 }
@@ -269,6 +331,8 @@ void apply_choices(const SetupChoices& choices, Draft& draft) {
   if (choices.tracker_port) simulation.tracker_port = *choices.tracker_port;
   if (choices.can_port) simulation.bus->port = *choices.can_port;
   if (choices.can_peer_port) simulation.bus->peer_port = *choices.can_peer_port;
+  if (choices.usbip_port && !simulation.counter_cards.empty())
+    simulation.counter_cards.front().port = *choices.usbip_port;
   if (choices.start_when_streaming) simulation.start_when_streaming = true;
   if (choices.start_at_once) simulation.start_when_streaming = false;
 }
@@ -307,6 +371,7 @@ void share_seed_and_speed(Draft& draft) {
     node.seed = static_cast<std::uint64_t>(draft.seed);
     node.noise_m = draft.encoder_noise_m;
   }
+  for (CounterCardSetup& card : simulation.counter_cards) card.seed = static_cast<std::uint64_t>(draft.seed);
 }
 
 }  // namespace

@@ -38,6 +38,17 @@ constexpr std::array kEnvironmentFaults{
     Name{"sensors_gone", FaultKind::SensorsGone},
 };
 
+constexpr std::array kCounterCardFaults{
+    Name{"mute", FaultKind::Mute},
+    Name{"stall", FaultKind::Stall},
+    Name{"unplug", FaultKind::Unplug},
+    Name{"restart", FaultKind::CardRestart},
+    Name{"overrun", FaultKind::Overrun},
+    Name{"lost_scans", FaultKind::LostScans},
+    Name{"clock_jump", FaultKind::ClockJump},
+    Name{"garbage", FaultKind::UsbGarbage},
+};
+
 std::span<const Name> names_for(FaultTarget target) {
   switch (target) {
     case FaultTarget::Tracker:
@@ -46,6 +57,8 @@ std::span<const Name> names_for(FaultTarget target) {
       return kEncoderFaults;
     case FaultTarget::Environment:
       return kEnvironmentFaults;
+    case FaultTarget::CounterCard:
+      return kCounterCardFaults;
   }
   return {};
 }

@@ -34,6 +34,11 @@ Result<std::unique_ptr<Simulation>> Simulation::open(const SimulationSetup& setu
     if (!server) return tl::unexpected(server.error());
     simulation->environment_.push_back(std::move(*server));
   }
+  for (const CounterCardSetup& card : setup.counter_cards) {
+    auto server = UsbipServer::open(card.port, wire(card, simulation->machine_));
+    if (!server) return tl::unexpected(server.error());
+    simulation->counter_cards_.push_back(std::move(*server));
+  }
   if (!setup.start_when_streaming) simulation->machine_.start(now + setup.standstill);
   return simulation;
 }
@@ -44,6 +49,7 @@ void Simulation::poll(HostTime now) {
   inject_faults(now);
   if (bus_) bus_->poll(now);
   for (ModbusServer& server : environment_) server.poll(now);
+  for (UsbipServer& card : counter_cards_) card.poll(now);
 }
 
 void Simulation::start_machine() {
@@ -56,14 +62,19 @@ void Simulation::inject_faults(HostTime now) {
   for (; next_fault_ < faults_.size(); ++next_fault_) {
     const ScheduledFault& next = faults_[next_fault_];
     if (*machine_.started() + seconds_to_ns(next.fault.at_s) > now) return;
-    if (next.target == FaultTarget::Tracker && tracker_) {
-      tracker_->device().inject(next.fault, now);
-      tracker_->poll(now);
-    }
-
-    if (next.target == FaultTarget::Encoder && bus_) bus_->inject(next.fault, now);
-    if (next.target == FaultTarget::Environment) inject_environment(next.fault, now);
+    inject(next, now);
   }
+}
+
+void Simulation::inject(const ScheduledFault& next, HostTime now) {
+  if (next.target == FaultTarget::Tracker && tracker_) {
+    tracker_->device().inject(next.fault, now);
+    tracker_->poll(now);
+  }
+  if (next.target == FaultTarget::Encoder && bus_) bus_->inject(next.fault, now);
+  if (next.target == FaultTarget::Environment) inject_environment(next.fault, now);
+  if (next.target != FaultTarget::CounterCard) return;
+  for (UsbipServer& card : counter_cards_) card.inject(next.fault, now);
 }
 
 void Simulation::inject_environment(const Fault& fault, HostTime now) {
@@ -77,6 +88,7 @@ HostTime Simulation::next_due() const {
   if (tracker_) due = std::min(due, tracker_->next_due());
   if (bus_) due = std::min(due, bus_->next_due());
   for (const ModbusServer& server : environment_) due = std::min(due, server.next_due());
+  for (const UsbipServer& card : counter_cards_) due = std::min(due, card.next_due());
   if (machine_.started() && next_fault_ < faults_.size()) {
     due = std::min(due, *machine_.started() + seconds_to_ns(faults_[next_fault_].fault.at_s));
   }
@@ -91,6 +103,11 @@ void Simulation::add_poll_fds(std::vector<pollfd>& fds) const {
   }
   if (bus_) fds.push_back({bus_->fd(), POLLIN, 0});
   for (const ModbusServer& server : environment_) server.add_poll_fds(fds);
+  for (const UsbipServer& card : counter_cards_) {
+    fds.push_back({card.listener_fd(), POLLIN, 0});
+    const short events = static_cast<short>(card.wants_write() ? POLLIN | POLLOUT : POLLIN);
+    if (card.client_fd() >= 0) fds.push_back({card.client_fd(), events, 0});
+  }
 }
 
 }  // namespace abbe::sim

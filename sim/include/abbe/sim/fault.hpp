@@ -31,6 +31,13 @@ enum class FaultKind {
   ModbusGarbage,    ///< bytes instead of answers
   WrongMap,         ///< every register lies one address higher
   SensorsGone,      ///< the probe is unplugged, the wires are broken
+  // counter card; it also stalls and is mute
+  Unplug,       ///< gone from the bus, there again after `duration_s` with all counters at zero
+  CardRestart,  ///< power off and on
+  Overrun,      ///< the FIFO was full: no more scans until it is reset
+  LostScans,    ///< the next `value` scans are never seen
+  ClockJump,    ///< the counted clock jumps by `value` counts
+  UsbGarbage,   ///< bytes that are no USB/IP
 };
 
 struct Fault {
@@ -41,7 +48,7 @@ struct Fault {
   std::uint8_t node = 0;  ///< encoder faults: CANopen node; environment faults: number of the device; 0 = all
 };
 
-enum class FaultTarget { Tracker, Encoder, Environment };
+enum class FaultTarget { Tracker, Encoder, Environment, CounterCard };
 
 struct ScheduledFault {
   FaultTarget target = FaultTarget::Tracker;

@@ -18,6 +18,7 @@ enum class NoiseStream : std::uint64_t {
   Squareness,
   Backlash,
   Encoder = 1000,
+  CounterCard = 2000,
 };
 
 /// Uniform in (0, 1).

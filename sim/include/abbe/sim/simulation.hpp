@@ -1,17 +1,20 @@
 #pragma once
-/// The whole stage: machine, tracker, encoder bus and the timetable of faults, stepped together. poll(now)
-/// does what is due, never blocks and reads no clock; a program turns it with real time, a test with whatever
-/// it likes. Not thread-safe.
+/// The whole stage: machine, tracker, encoder bus, counter cards and the timetable of faults, stepped
+/// together. poll(now) does what is due, never blocks and reads no clock; a program turns it with real time,
+/// a test with whatever it likes. Not thread-safe.
 
 #include <poll.h>
 
+#include <deque>
 #include <memory>
 #include <optional>
 #include <vector>
 
+#include "abbe/sim/counter_card_setup.hpp"
 #include "abbe/sim/encoder_bus.hpp"
 #include "abbe/sim/modbus_server.hpp"
 #include "abbe/sim/tracker_server.hpp"
+#include "abbe/sim/usbip_server.hpp"
 
 namespace abbe::sim {
 
@@ -26,6 +29,7 @@ struct SimulationSetup {
   std::optional<EncoderBusOptions> bus;
   std::vector<EncoderNodeOptions> nodes;
   std::vector<ModbusServerOptions> environment;
+  std::vector<CounterCardSetup> counter_cards;
   std::vector<ScheduledFault> faults;
 };
 
@@ -44,12 +48,14 @@ class Simulation {
   [[nodiscard]] std::optional<TrackerServer>& tracker() { return tracker_; }
   [[nodiscard]] std::optional<EncoderBus>& bus() { return bus_; }
   [[nodiscard]] const std::vector<ModbusServer>& environment() const { return environment_; }
+  [[nodiscard]] std::deque<UsbipServer>& counter_cards() { return counter_cards_; }
 
  private:
   Simulation(TruthMachine truth, PathMotion path, const SimulationSetup& setup);
   void start_machine();
   void inject_faults(HostTime now);
   void inject_environment(const Fault& fault, HostTime now);
+  void inject(const ScheduledFault& next, HostTime now);
 
   VirtualMachine machine_;
   bool start_when_streaming_;
@@ -57,6 +63,7 @@ class Simulation {
   std::optional<TrackerServer> tracker_;
   std::optional<EncoderBus> bus_;
   std::vector<ModbusServer> environment_;
+  std::deque<UsbipServer> counter_cards_;
   std::vector<ScheduledFault> faults_;  ///< by time
   std::size_t next_fault_ = 0;
 };

@@ -1,0 +1,148 @@
+#pragma once
+/// A USB-QUAD08 counter card: the registers behind endpoint 0 and the stream of scans behind endpoint 82h,
+/// its counters following scales, a clock and a probe. Sans-I/O and without a clock: requests and a time in,
+/// answers out. Scans are made when somebody asks, for the instants at which the pacer ticked. Not
+/// thread-safe.
+///
+/// Takes for granted what nobody has seen on hardware yet: a counter with latch-on-index gives, in a scan,
+/// its count at the latest index edge since it was set up, and 0 before; the FIFO's depth (`fifo_bytes`);
+/// that a FIFO that is full ends the scan with status bit 4.
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <deque>
+#include <functional>
+#include <optional>
+#include <span>
+#include <string>
+#include <variant>
+#include <vector>
+
+#include "abbe/protocol/quad08/channel.hpp"
+#include "abbe/protocol/quad08/scan_list.hpp"
+#include "abbe/protocol/usb/setup.hpp"
+#include "abbe/sim/sim_clock.hpp"
+
+namespace abbe::sim {
+
+namespace quad08 = protocol::quad08;
+namespace usb = protocol::usb;
+
+/// What hangs on phases A and B of a counter.
+struct ScaleSignal {
+  std::function<double(HostTime)> reading;  ///< m or rad
+  double step = 10e-9;        ///< m or rad per count, four counts a signal period; may be negative
+  double noise = 0.0;         ///< standard deviation of a reading, m or rad
+  std::vector<double> marks;  ///< scale readings of the index pulses, ascending
+};
+struct ClockSignal {
+  double hz = 10e6;
+  double deviation_ppm = 0.0;  ///< against the host's clock
+};
+/// The card's own timer output 0: runs when the card was told to.
+struct TimerSignal {};
+/// Each trigger of the probe is one edge.
+struct ProbeSignal {};
+using PhaseSignal = std::variant<std::monostate, ScaleSignal, ClockSignal, TimerSignal, ProbeSignal>;
+
+struct CardChannel {
+  PhaseSignal phases;
+  bool probe_on_index = false;  ///< else a scale's own index pulses
+};
+
+struct CounterCardOptions {
+  std::string serial = "01ABBE08";
+  std::uint16_t vendor = quad08::kVendor;
+  std::uint16_t product = quad08::kProduct;
+  std::uint16_t firmware = 0x0104;
+  std::array<CardChannel, quad08::kChannels> channels;
+  std::size_t fifo_bytes = 256 * 1024;
+  double pacer_deviation_ppm = 0.0;
+  std::uint64_t seed = 1;
+};
+
+class CounterCard {
+ public:
+  explicit CounterCard(const CounterCardOptions& options);
+
+  /// A control transfer; nothing: the card stalls it.
+  [[nodiscard]] std::optional<std::vector<std::byte>> control(const usb::Setup& setup, HostTime now);
+  /// Makes the scans due until `now`. More than the FIFO and `wanted` bytes on their way to the host hold:
+  /// overrun.
+  void advance(HostTime now, std::size_t wanted);
+  /// Bytes for the host, oldest first; at most `most`.
+  [[nodiscard]] std::vector<std::byte> take(std::size_t most);
+  [[nodiscard]] std::size_t available() const { return fifo_.size(); }
+  /// When there will be so many bytes; never if the scan does not run.
+  [[nodiscard]] HostTime available_at(std::size_t bytes) const;
+  [[nodiscard]] bool scanning() const { return pacing_ && !overrun_; }
+
+  /// The probe touched at `at`, not before any that came earlier nor before the scans already made.
+  void add_probe_edge(HostTime at);
+  /// Power off and on: registers, counters and FIFO as new.
+  void restart();
+
+  // Misbehaviour.
+  void overrun() { overrun_ = true; }
+  void lose_scans(std::size_t count);          ///< the next ones are never seen
+  void jump_clock(std::int64_t counts);        ///< all clock counters, at once
+  void corrupt_register(std::uint16_t value);  ///< the self-test register reads this from now on
+
+  [[nodiscard]] const CounterCardOptions& options() const { return options_; }
+  [[nodiscard]] std::uint64_t scans_made() const { return scans_made_; }
+
+ private:
+  struct Counter {
+    quad08::CounterSetup setup{.register_reading = true};
+    std::int64_t zero = 0;  ///< count of the signal when it was set up
+    HostTime set_up_at{};
+    std::optional<double> last_reading;  ///< of a scale, at the previous scan
+    std::uint64_t latched = 0;
+  };
+
+  void write_register(std::uint16_t where, std::uint16_t value, HostTime now);
+  [[nodiscard]] std::uint16_t read_register(std::uint16_t where, HostTime now);
+  [[nodiscard]] std::optional<std::vector<std::byte>> standard(const usb::Setup& setup);
+  [[nodiscard]] std::optional<std::vector<std::byte>> descriptor(const usb::Setup& setup) const;
+  void control_acquisition(std::uint16_t value, HostTime now);
+  void set_up_counter(std::uint16_t value, HostTime now);
+  void control_timer(std::uint16_t value, HostTime now);
+  [[nodiscard]] std::uint16_t status() const;
+
+  [[nodiscard]] HostTime scan_time(std::uint64_t scan) const;
+  void make_scan(HostTime at);
+  [[nodiscard]] std::uint64_t value_of(std::size_t channel, HostTime at);
+  [[nodiscard]] std::uint64_t latched_value(std::size_t channel, HostTime at);
+  [[nodiscard]] std::int64_t signal_count(std::size_t channel, HostTime at);
+  [[nodiscard]] std::int64_t scale_count(const ScaleSignal& scale, double reading) const;
+  [[nodiscard]] double scale_reading(std::size_t channel, const ScaleSignal& scale, HostTime at);
+  [[nodiscard]] std::int64_t timer_count(HostTime at) const;
+  [[nodiscard]] std::int64_t probe_count(HostTime at) const;
+  [[nodiscard]] std::optional<HostTime> latest_edge(HostTime at) const;
+
+  CounterCardOptions options_;
+  std::array<Counter, quad08::kChannels> counters_{};
+  std::uint16_t bank_ = 0;
+  std::uint16_t mark_ = 0;
+  std::optional<std::uint16_t> corrupted_mark_;
+  std::vector<std::uint16_t> scan_words_;
+  quad08::ScanLayout layout_;
+  std::uint64_t divisor_ = 0;
+  bool dma_ = false;
+  bool list_started_ = false;
+  bool pacing_ = false;
+  bool overrun_ = false;
+  HostTime pacer_began_{};
+  std::uint64_t next_scan_ = 0;
+  std::uint64_t scans_made_ = 0;
+  std::vector<std::uint16_t> timer_words_;
+  std::optional<HostTime> timer_began_;
+  std::int64_t clock_jump_ = 0;
+  std::uint64_t readings_ = 0;
+  std::deque<HostTime> edges_;
+  std::int64_t edges_forgotten_ = 0;
+  std::deque<std::byte> fifo_;
+};
+
+}  // namespace abbe::sim

@@ -1,7 +1,7 @@
 #pragma once
 /// What every driver must stand, written once: mute, late, torn, garbage, unplugged, back again, flooding,
-/// restarted peer; and in all of it nothing is allocated in receive(), nothing invalid looks valid, every
-/// loss is counted.
+/// slow consumer, restarted peer, clock jump; and in all of it nothing is allocated in receive(), nothing
+/// invalid looks valid, every loss is counted.
 ///
 /// A driver's test supplies a FaultyPeer: the driver, a peer that talks to it over a real socket in the same
 /// thread, and a SteppedTime they share. Nothing sleeps: one turn is peer, wait(), receive(), then time goes
@@ -9,6 +9,9 @@
 ///
 ///   struct MyPeer { ... };  // models FaultyPeer
 ///   INSTANTIATE_TYPED_TEST_SUITE_P(My, DriverConformance, MyPeer);
+///
+/// A peer whose device has a clock of its own also has jump_clock(): the clock is suddenly a second or more
+/// ahead.
 ///
 /// A TCP peer that unplugs keeps its port by holding a second socket bound to it (SO_REUSEPORT, not
 /// listening).
@@ -93,7 +96,7 @@ class DriverConformance : public testing::Test {
     allocated_in_receive_ += allocations.value();
     peer_.time().advance(Peer::kTurn);
     Heads heads;
-    peer_.take_samples(heads);
+    if (reading_) peer_.take_samples(heads);
     taken_ += heads.size();
     return heads;
   }
@@ -142,6 +145,7 @@ class DriverConformance : public testing::Test {
   Peer peer_;
   bool up_ = true;  ///< the peer is served: its process runs
   bool speaking_ = true;
+  bool reading_ = true;  ///< somebody takes the samples
   Heads seen_;
   drivers::DeviceStatus before_;  ///< when begin_streaming() was through
 
@@ -289,6 +293,45 @@ TYPED_TEST_P(DriverConformance, DropsCountsAndMarksWhenFlooded) {
   EXPECT_TRUE(this->turns_until(TypeParam::kRecoveryLimit, marked));
 }
 
+TYPED_TEST_P(DriverConformance, MarksWhatASlowConsumerMissed) {
+  this->begin_streaming();
+  this->reading_ = false;
+  const auto dropped = [this] { return this->status().dropped > this->before_.dropped; };
+  if (!this->turns_until(4 * TypeParam::kRecoveryLimit, dropped)) {
+    GTEST_SKIP() << "too slow a device to fill its ring in the time of a test";
+  }
+  this->reading_ = true;
+  const auto marked = [this] {
+    for (const auto& head : this->seen_) {
+      if (has(head.flags, protocol::SampleFlag::GapBefore) && head.lost_before != 0) return true;
+    }
+    return false;
+  };
+  EXPECT_TRUE(this->turns_until(TypeParam::kRecoveryLimit, marked));
+  EXPECT_TRUE(this->status().connected) << "who reads late disturbs nothing";
+}
+
+TYPED_TEST_P(DriverConformance, KeepsSampleTimesNearTheHostClockThroughAClockJump) {
+  if constexpr (requires(TypeParam p) { p.jump_clock(); }) {
+    this->begin_streaming();
+    this->peer_.jump_clock();
+    const auto marked = [this] {
+      for (const auto& head : this->seen_) {
+        if ((head.flags & kInterrupted) != 0) return true;
+      }
+      return false;
+    };
+    ASSERT_TRUE(this->turns_until(TypeParam::kRecoveryLimit, marked)) << this->status().last_fault;
+    ASSERT_TRUE(this->usable_samples_come(TypeParam::kRecoveryLimit)) << this->status().last_fault;
+    for (const auto& head : this->seen_) {
+      EXPECT_GE(head.time, this->peer_.time().now() - TypeParam::kRecoveryLimit);
+      EXPECT_LE(head.time, this->peer_.time().now() + 3 * head.u_time);
+    }
+  } else {
+    GTEST_SKIP() << "the device has no clock of its own, or the peer cannot make it jump";
+  }
+}
+
 TYPED_TEST_P(DriverConformance, StreamsAgainAfterThePeerRestartedAndMarksIt) {
   this->begin_streaming();
   this->peer_.restart();
@@ -320,6 +363,7 @@ REGISTER_TYPED_TEST_SUITE_P(DriverConformance, StreamsWhatThePeerSays, StampsNoS
                             CountsGarbageAndMakesNoSampleOfIt, StreamsAgainAfterGarbage,
                             NoticesThatItIsUnplugged, StreamsWhenPluggedInAgainAndMarksIt,
                             StartsWhenThePeerComesLater, DropsCountsAndMarksWhenFlooded,
+                            MarksWhatASlowConsumerMissed, KeepsSampleTimesNearTheHostClockThroughAClockJump,
                             StreamsAgainAfterThePeerRestartedAndMarksIt,
                             KeepsSampleTimesNearTheHostClockThroughARestart);
 

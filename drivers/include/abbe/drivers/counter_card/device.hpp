@@ -1,0 +1,113 @@
+#pragma once
+/// A USB-QUAD08 counter card as a Device: CounterCardReceiver and CounterCardSession around one USB link.
+/// wait(): sends what the session asks for, collects what the card sent. receive(): bytes to scans, raw
+/// blocks. States: those of CardState. After the card was unplugged or restarted its counters begin at zero
+/// where the axes then stand (SampleFlag::Restarted): positions are true again once a datum was taken.
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "abbe/drivers/counter_card/receiver.hpp"
+#include "abbe/drivers/counter_card/session.hpp"
+#include "abbe/drivers/counter_card/thinning.hpp"
+#include "abbe/drivers/device.hpp"
+#include "abbe/drivers/raw_ring.hpp"
+#include "abbe/drivers/sample_ring.hpp"
+#include "abbe/drivers/status_board.hpp"
+#include "abbe/drivers/time_source.hpp"
+#include "abbe/drivers/usb/usb_link.hpp"
+#include "abbe/protocol/usbip/urb.hpp"
+
+namespace abbe::drivers {
+
+struct CounterCardOptions {
+  std::string name = "counter card";
+  std::string serial;  ///< empty: the only card there is
+  CounterCardReceiverOptions receiver;
+  CounterCardSessionOptions session;  ///< `peer`, `wiring` and `stream` are made from the rest
+  /// How much time one transfer holds: the resolution of arrival times, and what is lost when it is lost.
+  std::chrono::nanoseconds transfer_time = std::chrono::microseconds{1500};
+  std::size_t transfers_in_flight = 32;
+  std::size_t sample_every = 1;         ///< one sample in the ring for so many scans; the sink sees them all
+  std::size_t sample_capacity = 65536;  ///< 2 s at 33 kHz
+  std::size_t raw_capacity_blocks = 4096;
+};
+
+/// Which device a link must lead to.
+[[nodiscard]] UsbIdentity identity_of(const CounterCardOptions& options);
+/// Bytes of one transfer: whole packets, at most 16 KiB.
+[[nodiscard]] std::size_t transfer_bytes(const CounterCardOptions& options);
+
+class CounterCardDevice final : public Device {
+ public:
+  /// `time` and `sink` (may be null) must outlive the device. BadConfiguration as check(). The link is opened
+  /// by the first wait().
+  [[nodiscard]] static Result<std::unique_ptr<CounterCardDevice>> create(const CounterCardOptions& options,
+                                                                         std::unique_ptr<UsbLink> link,
+                                                                         const TimeSource& time,
+                                                                         CounterScanSink* sink = nullptr);
+
+  /// Stops a running scan, for as long as the card answers at once.
+  ~CounterCardDevice() override;
+
+  void wait(std::chrono::nanoseconds at_most) override;
+  void receive() ABBE_RT override;
+  [[nodiscard]] DeviceStatus status() const override;
+
+  /// One reader each. No samples come from a card all of whose axes are latched on their index.
+  [[nodiscard]] SampleRing<protocol::AxisSample>& samples() noexcept { return samples_; }
+  [[nodiscard]] RawRing& raw() noexcept { return raw_; }
+  /// The device thread's own view.
+  [[nodiscard]] const CounterCardReceiver& receiver() const noexcept { return receiver_; }
+  /// What the configuration takes for granted, in a sentence; empty if nothing.
+  [[nodiscard]] std::string assumption() const;
+
+ private:
+  CounterCardDevice(const CounterCardOptions& options, std::unique_ptr<UsbLink> link, const TimeSource& time,
+                    CounterScanSink* sink);
+
+  void tell(const CardInput& input);
+  [[nodiscard]] bool act(const CardAction& action);
+  void send(const usb::Setup& setup);
+  void stop_scan();
+  [[nodiscard]] bool answered();
+  void hand_over_events();
+  void hand_over_scans();
+  void account();
+  void show();
+
+  void take(const UsbControlDone& done) ABBE_RT;
+  void take(const UsbBulkIn& bulk) ABBE_RT;
+  void push(const CounterScan& scan) ABBE_RT;
+  void record(const protocol::usbip::SubmitReply& reply, std::span<const std::byte> data,
+              protocol::HostTime time) ABBE_RT;
+
+  CounterCardOptions options_;
+  std::unique_ptr<UsbLink> link_;
+  const TimeSource& time_;
+  CounterScanSink* sink_;
+  bool live_axes_ = true;
+  ScanThinning thinning_;
+  SampleRing<protocol::AxisSample> samples_;
+  RawRing raw_;
+  StatusBoard board_;
+  CounterCardReceiver receiver_;
+  CounterCardSession session_;
+
+  std::span<const UsbEvent> events_;  ///< of the latest wait(); the session hears of them in the next
+  protocol::HostTime turn_end_{};
+  std::size_t scans_ = 0;  ///< of the latest receive()
+  bool out_of_step_told_ = false;
+  std::uint64_t faults_seen_ = 0;
+  std::uint64_t gaps_seen_ = 0;
+  std::uint64_t disagreements_seen_ = 0;
+  std::uint32_t raw_sequence_ = 0;
+
+  std::array<std::byte, CounterCardReceiver::kLongestMessage> message_{};
+};
+
+}  // namespace abbe::drivers

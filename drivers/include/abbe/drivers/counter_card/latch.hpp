@@ -1,0 +1,57 @@
+#pragma once
+/// From the count of a latch channel to the count of the clock channel at the same instant. Both count the
+/// same clock, but were zeroed at different moments: latch = clock + offset. With the card's own timer the
+/// offset is 0; else each edge narrows it: an edge came between two scans, so the offset lies in an interval
+/// as long as the scan, and in that of every other edge. Pure state machine, real time, one thread.
+
+#include <cstdint>
+#include <optional>
+
+#include "abbe/protocol/quad08/stream.hpp"
+#include "abbe/protocol/rt.hpp"
+
+namespace abbe::drivers {
+
+class LatchTracker {
+ public:
+  /// `in_step`: both counters begin with the clock (the card's own timer).
+  LatchTracker(protocol::quad08::CountWidth width, bool in_step) ABBE_RT : width_(width), in_step_(in_step) {
+    reset();
+  }
+
+  /// The counters were zeroed.
+  void reset() ABBE_RT;
+  /// Begun in the middle of a stream: what the latch reads now is no news.
+  void begin_at(std::uint64_t latch_raw) ABBE_RT { last_raw_ = latch_raw; }
+
+  struct Latch {
+    std::int64_t clock_count = 0;  ///< unwrapped, of the clock channel
+    std::int64_t half_width = 0;   ///< the truth is within
+  };
+  /// Every scan in order: what both channels read, and the unwrapped clock of this and of the previous scan.
+  /// True: the latch has changed since the previous scan.
+  bool on_scan(std::uint64_t latch_raw, std::uint64_t clock_raw, std::int64_t clock_count,
+               std::int64_t previous_clock_count) ABBE_RT;
+  /// The latest latch; nothing before the first edge.
+  [[nodiscard]] std::optional<Latch> latest() const ABBE_RT { return latest_; }
+  /// Times a latch lay outside the scan in which it came: another clock, or an input latched otherwise than
+  /// assumed.
+  [[nodiscard]] std::uint64_t disagreements() const ABBE_RT { return disagreements_; }
+
+ private:
+  /// Bounds of latch - clock at one instant, counts.
+  struct Offset {
+    std::int64_t low = 0;
+    std::int64_t high = 0;
+  };
+  void narrow(const Offset& seen) ABBE_RT;
+
+  protocol::quad08::CountWidth width_;
+  bool in_step_;
+  std::uint64_t last_raw_ = 0;
+  std::optional<Offset> offset_;
+  std::optional<Latch> latest_;
+  std::uint64_t disagreements_ = 0;
+};
+
+}  // namespace abbe::drivers

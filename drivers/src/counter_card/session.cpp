@@ -1,0 +1,298 @@
+#include "abbe/drivers/counter_card/session.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <utility>
+
+namespace abbe::drivers {
+namespace {
+
+using protocol::HostTime;
+
+constexpr unsigned kMostStatusTries = 100;  // as the maker's library
+
+std::string in_milliseconds(std::chrono::nanoseconds d) {
+  return fmt::format("{} ms", std::chrono::duration_cast<std::chrono::milliseconds>(d).count());
+}
+
+quad08::CounterSetup setup_of(const CounterAxis& axis) {
+  return {.mode = quad08::CounterMode::Encoder,
+          .quadrature = quad08::Quadrature::X4,
+          .latch_on_index = axis.latch_on_index};
+}
+
+}  // namespace
+
+const char* name_of(CardState state) noexcept {
+  switch (state) {
+    case CardState::Closed:
+      return "closed";
+    case CardState::Opening:
+      return "opening";
+    case CardState::Testing:
+      return "testing";
+    case CardState::SettingUp:
+      return "setting up";
+    case CardState::Loading:
+      return "loading";
+    case CardState::Arming:
+      return "arming";
+    case CardState::Streaming:
+      return "streaming";
+    case CardState::Halting:
+      return "restarting";
+  }
+  return "?";
+}
+
+CounterCardSession::CounterCardSession(const CounterCardSessionOptions& options) : options_(options) {}
+
+CardAction CounterCardSession::on(const CardInput& input, HostTime now) {
+  return std::visit([&](const auto& i) { return take(i, now); }, input);
+}
+
+HostTime CounterCardSession::deadline() const {
+  if (state_ == CardState::Closed) return open_at_;
+  if (state_ == CardState::Opening) return asked_at_ + options_.open_timeout;
+  if (asked_ || stopping_bulk_) return asked_at_ + options_.control_timeout;
+  if (state_ == CardState::Streaming && !halt_) {
+    const auto silent = troubled_ ? retry_at_ : last_scans_ + options_.silence;
+    return std::min(silent, next_status_);
+  }
+  return asked_at_;
+}
+
+CardAction CounterCardSession::take(const CardTick&, HostTime now) {
+  switch (state_) {
+    case CardState::Closed:
+      if (now < open_at_) return CardNothing{};
+      enter(CardState::Opening);
+      asked_at_ = now;
+      return CardOpen{};
+    case CardState::Opening:
+      if (now - asked_at_ < options_.open_timeout) return CardNothing{};
+      return fail(now, fmt::format("open: no answer in {}", in_milliseconds(options_.open_timeout)));
+    case CardState::Testing:
+    case CardState::SettingUp:
+    case CardState::Loading:
+    case CardState::Arming:
+    case CardState::Streaming:
+    case CardState::Halting:
+      break;
+  }
+  if (asked_ || stopping_bulk_) {
+    if (now - asked_at_ < options_.control_timeout) return CardNothing{};
+    return fail(now, fmt::format("request: no answer in {}", in_milliseconds(options_.control_timeout)));
+  }
+  return state_ == CardState::Streaming ? watch(now) : next_step(now);
+}
+
+/// Streaming, and nothing under way.
+CardAction CounterCardSession::watch(HostTime now) {
+  if (halt_) {
+    halt_ = false;
+    enter(CardState::Halting);
+    load(quad08::stop_sequence());
+    return next_step(now);
+  }
+  if (troubled_ && now >= retry_at_) return trouble(now, {});
+  if (!troubled_ && now - last_scans_ >= options_.silence) {
+    return trouble(now, fmt::format("no scans for {}", in_milliseconds(options_.silence)));
+  }
+  if (now < next_status_) return CardNothing{};
+  next_status_ = now + options_.status_period;
+  return send(quad08::read(quad08::Register::Acquisition), now);
+}
+
+CardAction CounterCardSession::take(const UsbOpened&, HostTime now) {
+  if (state_ != CardState::Opening) return CardNothing{};
+  enter(CardState::Testing);
+  load(quad08::open_sequence());
+  return next_step(now);
+}
+
+void CounterCardSession::enter(CardState state) {
+  state_ = state;
+  step_ = 0;
+  steps_.clear();
+  status_tries_ = 0;
+}
+
+void CounterCardSession::load(const quad08::Sequence& sequence) {
+  const auto steps = sequence.steps();
+  steps_.insert(steps_.end(), steps.begin(), steps.end());
+}
+
+CardAction CounterCardSession::next_step(HostTime now) {
+  if (step_ < steps_.size()) return send(steps_[step_].setup, now);
+  return stage_done(now);
+}
+
+CardAction CounterCardSession::send(const usb::Setup& setup, HostTime now) {
+  asked_ = true;
+  asked_at_ = now;
+  return CardControl{setup};
+}
+
+CardAction CounterCardSession::stage_done(HostTime now) {
+  switch (state_) {
+    case CardState::Testing:
+      enter_setting_up();
+      return next_step(now);
+    case CardState::SettingUp:
+      enter(CardState::Loading);
+      load(quad08::load_sequence(layout_of(options_.wiring), divisor_of(options_.wiring)));
+      return next_step(now);
+    case CardState::Loading:
+      enter(CardState::Arming);
+      load(quad08::arm_sequence());
+      asked_at_ = now;
+      return CardStartBulk{};
+    case CardState::Arming:
+      return send(quad08::read(quad08::Register::Acquisition), now);
+    case CardState::Halting:
+      stopping_bulk_ = true;
+      asked_at_ = now;
+      return CardStopBulk{};
+    case CardState::Closed:
+    case CardState::Opening:
+    case CardState::Streaming:
+      break;
+  }
+  return CardNothing{};
+}
+
+/// With its own timer as the clock the counters are set up while it stands: they begin with it, in step.
+void CounterCardSession::enter_setting_up() {
+  enter(CardState::SettingUp);
+  const auto& wiring = options_.wiring;
+  const auto timer =
+      wiring.clock_source == ClockSource::Timer1 ? quad08::Timer::Timer1 : quad08::Timer::Timer0;
+  const bool own_clock = wiring.clock_source != ClockSource::External;
+  const auto set_up = [this](std::uint8_t channel, const quad08::CounterSetup& setup,
+                             const quad08::Debounce& phases, const quad08::Debounce& index) {
+    for (const auto& write : quad08::channel_writes(channel, setup, phases, index))
+      steps_.push_back({write, quad08::Expect::Nothing, 0});
+  };
+  if (own_clock) load(quad08::timer_stop(timer));
+  for (const auto& axis : wiring.axes) set_up(axis.channel, setup_of(axis), axis.debounce, axis.debounce);
+  if (wiring.edge_channel) set_up(*wiring.edge_channel, {}, wiring.edge_debounce, {});
+  if (wiring.latch_channel) {
+    set_up(*wiring.latch_channel, {.latch_on_index = true}, {}, wiring.latch_debounce);
+  }
+  set_up(wiring.clock_channel, {}, {}, {});
+  if (own_clock) load(quad08::timer_start(timer, timer_divisor(wiring)));
+}
+
+CardAction CounterCardSession::take(const UsbControlDone& done, HostTime now) {
+  if (!asked_) return CardNothing{};
+  asked_ = false;
+  if (step_ < steps_.size()) {
+    const auto& step = steps_[step_];
+    const auto word = quad08::decode_word(done.bytes());
+    const bool answered =
+        done.outcome == UsbOutcome::Done && (step.expect == quad08::Expect::Nothing || word);
+    if (!answered || !fulfilled(step, word.value_or(0))) return refused_step(step, done, now);
+    ++step_;
+    return next_step(now);
+  }
+  if (state_ == CardState::Arming && done.setup == quad08::start_pacer()) {
+    enter(CardState::Streaming);
+    last_scans_ = now;
+    next_status_ = now + options_.status_period;
+    if (troubled_) retry_at_ = now + options_.retry_after;
+    return CardNothing{};
+  }
+  const auto word = quad08::decode_word(done.bytes());
+  if (done.outcome != UsbOutcome::Done || !word) return fail(now, "status: it cannot be read");
+  return on_status(quad08::Status{*word}, now);
+}
+
+CardAction CounterCardSession::refused_step(const quad08::Step& step, const UsbControlDone& done,
+                                            HostTime now) {
+  const auto word = quad08::decode_word(done.bytes());
+  const auto what = step.setup == quad08::read_firmware_version()
+                        ? std::string{"firmware version"}
+                        : fmt::format("register {:02X}h", step.setup.index);
+  if (done.outcome != UsbOutcome::Done) return fail(now, what + ": refused by the device");
+  if (!word) return fail(now, fmt::format("{}: {} bytes instead of 2", what, done.length));
+  return fail(now, fmt::format("self-test: {} reads {:04X}h, {:04X}h expected", what, *word, step.value));
+}
+
+CardAction CounterCardSession::on_status(quad08::Status status, HostTime now) {
+  if (state_ == CardState::Streaming) {
+    if (status.overrun()) return trouble(now, fmt::format("overrun (status {:03X}h)", status.bits));
+    if (status.hardware_error())
+      return trouble(now, fmt::format("hardware error (status {:03X}h)", status.bits));
+    return CardNothing{};
+  }
+  if (state_ != CardState::Arming) return CardNothing{};
+  if (status.hardware_error())
+    return fail(now, fmt::format("scan start: hardware error (status {:03X}h)", status.bits));
+  if (status.ready()) return send(quad08::start_pacer(), now);
+  if (++status_tries_ >= kMostStatusTries)
+    return fail(now, fmt::format("scan start: not ready (status {:03X}h)", status.bits));
+  return send(quad08::read(quad08::Register::Acquisition), now);
+}
+
+CardAction CounterCardSession::take(const UsbBulkStopped&, HostTime now) {
+  if (state_ != CardState::Halting) return CardNothing{};
+  stopping_bulk_ = false;
+  enter(CardState::Loading);
+  load(quad08::load_sequence(layout_of(options_.wiring), divisor_of(options_.wiring)));
+  return next_step(now);
+}
+
+CardAction CounterCardSession::take(const UsbLost& lost, HostTime now) {
+  if (state_ == CardState::Closed) return CardNothing{};
+  report(lost.error.text);
+  fail(now, {});
+  return CardNothing{};
+}
+
+CardAction CounterCardSession::take(const CardScans& scans, HostTime now) {
+  if (scans.count == 0) return CardNothing{};
+  last_scans_ = now;
+  troubled_ = false;
+  scans_since_fault_ = true;
+  return CardNothing{};
+}
+
+CardAction CounterCardSession::take(const CardOutOfStep& out, HostTime now) {
+  return state_ == CardState::Streaming && !halt_ ? trouble(now, out.seen) : CardNothing{};
+}
+
+CardAction CounterCardSession::take(const CardBulkFailed& failed, HostTime now) {
+  if (state_ != CardState::Streaming || halt_) return CardNothing{};
+  return trouble(now, failed.outcome == UsbOutcome::Stalled ? "scan endpoint: stalled"
+                                                            : "scan endpoint: transfer failed");
+}
+
+/// The scan is started anew; the counters go on. What follows before scans come again is the same trouble.
+CardAction CounterCardSession::trouble(HostTime now, std::string text) {
+  if (troubled_ && now < retry_at_) return CardNothing{};
+  if (!troubled_) report(fmt::format("{}: {}", options_.peer, text));
+  troubled_ = true;
+  retry_at_ = now + options_.retry_after;
+  ++restarts_;
+  halt_ = true;
+  return asked_ ? CardAction{CardNothing{}} : watch(now);
+}
+
+CardAction CounterCardSession::fail(HostTime now, std::string text) {
+  if (!text.empty()) report(fmt::format("{}: {}", options_.peer, text));
+  enter(CardState::Closed);
+  asked_ = stopping_bulk_ = halt_ = troubled_ = false;
+  open_at_ = now + options_.reopen_after;
+  return CardClose{};
+}
+
+/// The same again before any scan came is the same fault: nobody is there each time we ask.
+void CounterCardSession::report(std::string text) {
+  if (!std::exchange(scans_since_fault_, false) && text == fault_.text) return;
+  ++fault_.count;
+  fault_.text = std::move(text);
+}
+
+}  // namespace abbe::drivers

@@ -1,0 +1,123 @@
+#include "abbe/drivers/counter_card/wiring.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <set>
+
+#include "abbe/protocol/samples.hpp"
+
+namespace abbe::drivers {
+namespace {
+
+/// A lost scan must show in the clock's count beyond its rounding and its deviation from the pacer.
+constexpr double kFewestCountsPerScan = 8.0;
+/// An upward step must be told from a wrap.
+constexpr double kMostCountsPerScan = 1e9;
+constexpr double kFastestClock_hz = 24e6;  // half of the card's own 48 MHz
+
+Result<void> refuse(std::string text) {
+  return tl::unexpected(Error{ErrorCode::BadConfiguration, "counter card: " + std::move(text)});
+}
+
+Result<void> check_axis(const CounterAxis& axis) {
+  const auto name = fmt::format("axis {} (channel {})", axis.name, axis.channel);
+  if (axis.scale == 0.0 || !std::isfinite(axis.scale))
+    return refuse(fmt::format("{}: scale {} per count", name, axis.scale));
+  if (!std::isfinite(axis.offset)) return refuse(fmt::format("{}: offset {}", name, axis.offset));
+  return {};
+}
+
+Result<void> check_axes(const CounterCardWiring& wiring) {
+  if (wiring.axes.empty() || wiring.axes.size() > protocol::kMaxAxes) {
+    return refuse(fmt::format("{} axes, 1 to {} are possible", wiring.axes.size(), protocol::kMaxAxes));
+  }
+  std::set<std::string> names;
+  for (const auto& axis : wiring.axes) {
+    if (auto ok = check_axis(axis); !ok) return ok;
+    if (!names.insert(axis.name).second) return refuse(fmt::format("two channels claim axis {}", axis.name));
+  }
+  return {};
+}
+
+Result<void> check_channels(const CounterCardWiring& wiring) {
+  std::array<std::string, quad08::kChannels> used;
+  const auto claim = [&used](std::uint8_t channel, const std::string& what) -> Result<void> {
+    if (channel >= used.size())
+      return refuse(fmt::format("{}: channel {}, 0 to {} exist", what, channel, used.size() - 1));
+    if (!used[channel].empty())
+      return refuse(fmt::format("channel {} is claimed by {} and {}", channel, used[channel], what));
+    used[channel] = what;
+    return {};
+  };
+  for (const auto& axis : wiring.axes)
+    if (auto ok = claim(axis.channel, "axis " + axis.name); !ok) return ok;
+  if (auto ok = claim(wiring.clock_channel, "the clock"); !ok) return ok;
+  if (wiring.latch_channel)
+    if (auto ok = claim(*wiring.latch_channel, "the probe latch"); !ok) return ok;
+  if (wiring.edge_channel)
+    if (auto ok = claim(*wiring.edge_channel, "the probe edges"); !ok) return ok;
+  return {};
+}
+
+Result<void> check_clock(const CounterCardWiring& wiring) {
+  if (!quad08::pacer_divisor(wiring.scan_rate_hz))
+    return refuse(fmt::format("the card cannot scan at {} Hz", wiring.scan_rate_hz));
+  if (!(wiring.clock_hz > 0.0 && wiring.clock_hz <= kFastestClock_hz))
+    return refuse(fmt::format("a clock of {} Hz cannot be counted", wiring.clock_hz));
+  const double counts = clock_counts_per_scan(wiring);
+  if (counts < kFewestCountsPerScan || counts > kMostCountsPerScan) {
+    return refuse(fmt::format("{} clock periods per scan: {} to {} are needed to see lost scans", counts,
+                              kFewestCountsPerScan, kMostCountsPerScan));
+  }
+  if (wiring.clock_source == ClockSource::External) return {};
+  const double divisor = quad08::kPacerClock_hz / wiring.clock_hz;
+  if (std::abs(divisor - std::round(divisor)) > 1e-9 * divisor || divisor < 2.0) {
+    return refuse(fmt::format("the card's timer cannot make {} Hz: 48 MHz / n is possible", wiring.clock_hz));
+  }
+  return {};
+}
+
+}  // namespace
+
+Result<void> check(const CounterCardWiring& wiring) {
+  if (auto ok = check_axes(wiring); !ok) return ok;
+  if (auto ok = check_channels(wiring); !ok) return ok;
+  return check_clock(wiring);
+}
+
+quad08::ScanLayout layout_of(const CounterCardWiring& wiring) {
+  std::set<std::uint8_t> channels{wiring.clock_channel};
+  for (const auto& axis : wiring.axes) channels.insert(axis.channel);
+  if (wiring.latch_channel) channels.insert(*wiring.latch_channel);
+  if (wiring.edge_channel) channels.insert(*wiring.edge_channel);
+  quad08::ScanLayout layout{.width = wiring.width};
+  for (const auto channel : channels) layout.channels[layout.count++] = channel;
+  return layout;
+}
+
+std::uint64_t divisor_of(const CounterCardWiring& wiring) {
+  return quad08::pacer_divisor(wiring.scan_rate_hz).value_or(0);
+}
+
+double scan_rate_hz(const CounterCardWiring& wiring) {
+  return quad08::pacer_rate_hz(divisor_of(wiring));
+}
+
+double clock_counts_per_scan(const CounterCardWiring& wiring) {
+  return wiring.clock_hz / scan_rate_hz(wiring);
+}
+
+std::uint32_t timer_divisor(const CounterCardWiring& wiring) {
+  return static_cast<std::uint32_t>(std::lround(quad08::kPacerClock_hz / wiring.clock_hz));
+}
+
+bool rests_on_assumption(const CounterCardWiring& wiring) {
+  const bool latched =
+      wiring.latch_channel.has_value() || std::ranges::any_of(wiring.axes, &CounterAxis::latch_on_index);
+  return latched && !wiring.latch_verified;
+}
+
+}  // namespace abbe::drivers

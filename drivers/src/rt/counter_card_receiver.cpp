@@ -1,0 +1,242 @@
+#include "abbe/drivers/counter_card/receiver.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <utility>
+
+namespace abbe::drivers {
+namespace {
+
+using protocol::SampleFlag;
+
+std::uint32_t saturated(std::uint64_t n) ABBE_RT {
+  return static_cast<std::uint32_t>(std::min<std::uint64_t>(n, std::numeric_limits<std::uint32_t>::max()));
+}
+
+}  // namespace
+
+bool CounterCardReceiver::beats(const quad08::RawScan& from, const quad08::RawScan& to) const ABBE_RT {
+  return metronome_.beats(from[metronome_.place], to[metronome_.place], width_);
+}
+
+protocol::DeviceTime CounterCardReceiver::device_time(std::int64_t clock_count) const ABBE_RT {
+  // Whole seconds apart from the rest: a double alone would lose nanoseconds after weeks.
+  const double whole = std::floor(static_cast<double>(clock_count) / clock_hz_);
+  const double rest = static_cast<double>(clock_count) - whole * clock_hz_;
+  return protocol::DeviceTime{std::chrono::seconds{static_cast<std::int64_t>(whole)} +
+                              std::chrono::nanoseconds{std::llround(rest / clock_hz_ * 1e9)}};
+}
+
+void CounterCardReceiver::on_control(const protocol::usb::Setup& setup) ABBE_RT {
+  if (quad08::is_write(setup, quad08::Register::CounterSetup)) counters_zeroed();
+  const bool transfer = quad08::is_write(setup, quad08::Register::DmaControl);
+  if (transfer && setup.value == quad08::dma::kChannel1On) stream_began();
+}
+
+void CounterCardReceiver::counters_zeroed() ABBE_RT {
+  last_.reset();
+  candidate_.reset();
+  clock_.reset();
+  latch_.reset();
+  zeroed_ = true;
+  current_.clock_count = current_.latch_count = current_.latch_half_width = current_.edge_count = 0;
+  current_.latched = false;
+  pending_flags_ = static_cast<protocol::SampleFlags>(SampleFlag::Restarted);
+}
+
+void CounterCardReceiver::stream_began() ABBE_RT {
+  decoder_.reset();
+  pending_ = {};
+  seeking_ = out_of_step_ = false;
+  window_filled_ = 0;
+  candidate_.reset();
+  refused_run_ = 0;
+  stream_restarted_ = last_.has_value();
+}
+
+void CounterCardReceiver::bytes_lost() ABBE_RT {
+  stream_began();
+  seeking_ = true;
+  raw_filled_ = 0;
+}
+
+void CounterCardReceiver::push(std::span<const std::byte> bytes, protocol::HostTime arrival) ABBE_RT {
+  arrival_ = arrival;
+  if (!out_of_step_) pending_ = bytes;
+}
+
+std::span<const CounterScan> CounterCardReceiver::next() ABBE_RT {
+  scan_count_ = 0;
+  // One raw scan gives at most two: the one held back and itself.
+  while (scan_count_ + 2 <= scans_.size() && !out_of_step_) {
+    const auto raw = next_raw();
+    if (!raw) break;
+    take(*raw);
+  }
+  stamp();
+  return std::span{scans_}.first(scan_count_);
+}
+
+std::optional<quad08::RawScan> CounterCardReceiver::next_raw() ABBE_RT {
+  if (auto scan = decoder_.next()) return scan;
+  if (seeking_) {
+    seek();
+    if (auto scan = decoder_.next()) return scan;  // out of the window; the rest comes after
+  }
+  if (seeking_ || pending_.empty()) return std::nullopt;
+  decoder_.push(std::exchange(pending_, {}));
+  return decoder_.next();
+}
+
+/// Ends with all bytes taken into the window, or with the decoder at the beginning of a scan.
+void CounterCardReceiver::seek() ABBE_RT {
+  const std::size_t needed = quad08::seek_window(decoder_.layout());
+  while (!pending_.empty()) {
+    const std::size_t more = std::min(needed - window_filled_, pending_.size());
+    std::copy_n(pending_.begin(), more, window_.begin() + static_cast<std::ptrdiff_t>(window_filled_));
+    pending_ = pending_.subspan(more);
+    window_filled_ += more;
+    if (window_filled_ < needed) return;
+    const auto window = std::span{window_}.first(window_filled_);
+    if (const auto begin = quad08::seek_scan(window, decoder_.layout(), metronome_)) {
+      decoder_.reset();
+      decoder_.push(window.subspan(*begin));
+      window_filled_ = 0;
+      seeking_ = false;
+      return;
+    }
+    // None of these offsets: go on behind the last one that was tried.
+    const std::size_t tried = decoder_.layout().scan_bytes();
+    std::copy(window.begin() + static_cast<std::ptrdiff_t>(tried), window.end(), window_.begin());
+    window_filled_ -= tried;
+  }
+}
+
+void CounterCardReceiver::take(const quad08::RawScan& raw) ABBE_RT {
+  if (candidate_ && beats(*candidate_, raw)) {
+    accept(*candidate_);
+    accept(raw);
+    candidate_.reset();
+    refused_run_ = 0;
+  } else if (candidate_) {
+    refuse(*candidate_, raw);
+  } else if (last_ && !stream_restarted_ && beats(*last_, raw)) {
+    accept(raw);
+  } else {
+    candidate_ = raw;
+  }
+}
+
+void CounterCardReceiver::refuse(const quad08::RawScan& from, const quad08::RawScan& to) ABBE_RT {
+  ++counters_.refused_scans;
+  refused_step_ = quad08::upward_step(from[metronome_.place], to[metronome_.place], width_);
+  candidate_ = to;
+  out_of_step_ = ++refused_run_ >= kMostRefused;
+}
+
+void CounterCardReceiver::accept(const quad08::RawScan& raw) ABBE_RT {
+  CounterScan& scan = scans_[scan_count_++];
+  current_.axes.head.flags = std::exchange(pending_flags_, 0);
+  current_.axes.head.lost_before = 0;
+  if (current_.axes.missing_mask != 0) current_.axes.head.flags |= SampleFlag::AxisMissing;
+  if (last_) {
+    const auto& from = (*last_)[metronome_.place];
+    count_lost(quad08::upward_step(from, raw[metronome_.place], width_), current_);
+  }
+  unwrap(raw, current_);
+  last_ = raw;
+  ++counters_.scans;
+  scan = current_;
+}
+
+void CounterCardReceiver::count_lost(std::uint64_t clock_step, CounterScan& scan) ABBE_RT {
+  const auto periods = static_cast<std::uint64_t>(
+      std::max(1.0, std::round(static_cast<double>(clock_step) / metronome_.step)));
+  scan.axes.cycle += saturated(periods);
+  const bool restarted = std::exchange(stream_restarted_, false);
+  if (periods == 1 && !restarted) return;
+  const std::uint64_t lost = std::max<std::uint64_t>(periods - 1, 1);
+  ++counters_.gaps;
+  counters_.lost_scans += lost;
+  scan.axes.head.lost_before = saturated(lost);
+  scan.axes.head.flags |= SampleFlag::GapBefore;
+}
+
+void CounterCardReceiver::unwrap(const quad08::RawScan& raw, CounterScan& scan) ABBE_RT {
+  const quad08::RawScan zeros{};
+  const auto& from = last_ ? *last_ : zeros;
+  const std::int64_t previous_clock = scan.clock_count;
+  const std::size_t clock = metronome_.place;
+  scan.clock_count += static_cast<std::int64_t>(quad08::upward_step(from[clock], raw[clock], width_));
+  for (std::size_t i = 0; i < scan.axes.axis_count; ++i) {
+    const Axis& axis = axes_[i];
+    const std::int64_t before = last_ ? scan.axes.count[i] : 0;
+    scan.axes.count[i] = before + quad08::signed_step(from[axis.place], raw[axis.place], width_);
+    scan.axes.position[i] = axis.offset + static_cast<double>(scan.axes.count[i]) * axis.scale;
+  }
+  if (edge_place_) {
+    scan.edge_count +=
+        static_cast<std::int64_t>(quad08::upward_step(from[*edge_place_], raw[*edge_place_], width_));
+  }
+  if (latch_place_) follow_latch(raw, previous_clock, scan);
+}
+
+void CounterCardReceiver::follow_latch(const quad08::RawScan& raw, std::int64_t previous_clock,
+                                       CounterScan& scan) ABBE_RT {
+  const auto reading = raw[*latch_place_];
+  if (!last_ && !zeroed_) return latch_.begin_at(reading);
+  if (!latch_.on_scan(reading, raw[metronome_.place], scan.clock_count, previous_clock)) return;
+  ++counters_.edges;
+  counters_.latch_disagreements = latch_.disagreements();
+  scan.latched = true;
+  scan.latch_count = latch_.latest()->clock_count;
+  scan.latch_half_width = latch_.latest()->half_width;
+}
+
+/// The last scan of a batch is the youngest: its age on arrival is the smallest.
+void CounterCardReceiver::stamp() ABBE_RT {
+  if (scan_count_ == 0) return;
+  const auto youngest = device_time(scans_[scan_count_ - 1].clock_count);
+  if (clock_.observe(youngest, arrival_) == ClockModel::Observed::Restarted) {
+    ++counters_.clock_jumps;
+    scans_[0].axes.head.flags |= SampleFlag::Restarted;
+  }
+  for (auto& scan : std::span{scans_}.first(scan_count_)) {
+    const auto at = clock_.to_host(device_time(scan.clock_count));
+    scan.axes.head.time = at.time;
+    scan.axes.head.u_time = at.u_time;
+    if (!at.settled) scan.axes.head.flags |= SampleFlag::ClockUnsettled;
+  }
+}
+
+bool CounterCardReceiver::join(const protocol::RawBlock& block) ABBE_RT {
+  if (block.lost_before != 0) bytes_lost();
+  const auto part = std::span{block.bytes}.first(std::min<std::size_t>(block.length, block.bytes.size()));
+  if (part.size() > raw_.size() - raw_filled_) {
+    bytes_lost();
+    return false;
+  }
+  std::copy(part.begin(), part.end(), raw_.begin() + static_cast<std::ptrdiff_t>(raw_filled_));
+  raw_filled_ += part.size();
+  return !block.continued && on_raw_message(block.direction, block.time);
+}
+
+bool CounterCardReceiver::on_raw_message(protocol::RawBlock::Direction direction,
+                                         protocol::HostTime time) ABBE_RT {
+  const auto message = std::span<const std::byte>{raw_}.first(std::exchange(raw_filled_, 0));
+  if (message.size() < protocol::usbip::kUrbHeaderSize) return false;
+  const auto urb = protocol::usbip::decode_urb(message.first<protocol::usbip::kUrbHeaderSize>());
+  if (!urb) return false;
+  const auto* request = std::get_if<protocol::usbip::Submit>(&*urb);
+  const auto* answer = std::get_if<protocol::usbip::SubmitReply>(&*urb);
+  const bool sent = direction == protocol::RawBlock::Direction::ToDevice;
+  if (sent && request != nullptr && request->head.endpoint == 0) {
+    on_control(protocol::usb::decode_setup(request->setup));
+  }
+  if (sent || answer == nullptr || answer->head.endpoint == 0) return false;
+  push(message.subspan(protocol::usbip::kUrbHeaderSize), time);
+  return true;
+}
+
+}  // namespace abbe::drivers

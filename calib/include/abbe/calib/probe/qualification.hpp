@@ -1,0 +1,76 @@
+#pragma once
+/// A touch probe qualified on a sphere of known radius R: its effective tip radius, and how that changes with
+/// the direction of the approach (lobing, the pre-travel's variation). The centre of the tip at a touch from
+/// the outward direction n, as the scales say, lies at
+///     |p_i - c| = R + r + sum_j a_j Y_j(n_i)
+/// Y_j: the harmonic polynomials of degree 2 and 3 in n (degree 0 is r, degree 1 would be c; the three lobes
+/// of a kinematic seat are of degree 3). Gauss-Newton; residuals along n, independent, of one deviation.
+/// Valid for the stylus and the measuring speed it was made with. Pure; allocates. SI.
+
+#include <Eigen/Core>
+#include <span>
+
+#include "abbe/calib/error.hpp"
+#include "abbe/calib/geometry.hpp"
+
+namespace abbe::calib::probe {
+
+struct QualifyingTouch {
+  Vector3 p_m = Vector3::Zero();      ///< centre of the tip by the scales, with the delay compensated
+  Vector3 normal = Vector3::UnitZ();  ///< outward at the sphere, against the approach; about 0.1 is enough
+};
+
+struct QualificationOptions {
+  double sphere_radius_m = 12.5e-3;  ///< certified
+  double u_sphere_radius_m = 0.0;
+  /// Of the Jacobian with columns of unit length; above it the touches cover too little of the sphere to tell
+  /// lobing from the centre. Evenly touched down to the equator: 74; 0.3 rad below it: 18; 0.3 rad above:
+  /// 369.
+  double max_condition = 300.0;
+};
+
+/// Radius to subtract along n, m, and its standard uncertainty.
+struct EffectiveRadius {
+  double radius_m = 0.0;
+  double u_m = 0.0;
+};
+
+class LobingMap {
+ public:
+  static constexpr int kTerms = 13;  ///< r, five of degree 2, seven of degree 3
+  using Terms = Eigen::Matrix<double, kTerms, 1>;
+  using Covariance = Eigen::Matrix<double, kTerms, kTerms>;
+
+  LobingMap() = default;
+  LobingMap(const Terms& terms_m, const Covariance& covariance_m2)
+      : terms_m_(terms_m), covariance_m2_(covariance_m2) {}
+
+  /// `normal` is brought to unit length.
+  [[nodiscard]] EffectiveRadius at(const Vector3& normal) const;
+  [[nodiscard]] const Terms& terms_m() const { return terms_m_; }
+  [[nodiscard]] const Covariance& covariance_m2() const { return covariance_m2_; }
+  /// Y_0 ... Y_12 at a unit vector; Y_0 = 1.
+  [[nodiscard]] static Terms basis(const Vector3& unit);
+
+ private:
+  Terms terms_m_ = Terms::Zero();
+  Covariance covariance_m2_ = Covariance::Zero();
+};
+
+struct Qualification {
+  Vector3 centre_m = Vector3::Zero();
+  Matrix3 cov_centre_m2 = Matrix3::Zero();
+  LobingMap map;
+  double lobing_m = 0.0;  ///< largest less smallest effective radius over the touched directions
+  double residual_rms_m = 0.0;
+  double sigma_m = 0.0;  ///< deviation of one touch
+  double condition = 0.0;
+  int freedom = 0;
+};
+
+/// NotFinite; BadInput for a normal of no length; TooFewObservations below 24 touches; DegenerateGeometry if
+/// they cover too little; NotConverged.
+[[nodiscard]] Result<Qualification> qualify(std::span<const QualifyingTouch> touches,
+                                            const QualificationOptions& options = {});
+
+}  // namespace abbe::calib::probe

@@ -1,0 +1,101 @@
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <random>
+#include <vector>
+
+#include "abbe/calib/probe/delay.hpp"
+
+namespace abbe::calib::probe {
+namespace {
+
+struct Truth {
+  double delay_s = 2e-3;
+  double jitter_s = 20e-6;
+  double scatter_m = 0.2e-6;
+};
+
+std::vector<FeedTouch> touches(const Truth& truth, const std::vector<double>& feeds_m_s, int each,
+                               std::mt19937& random) {
+  std::normal_distribution<double> normal;
+  std::vector<FeedTouch> out;
+  for (const double feed : feeds_m_s) {
+    for (int i = 0; i < each; ++i) {
+      const double v = feed * (1.0 + 0.002 * normal(random));  // no control holds a feed exactly
+      const double delay = truth.delay_s + truth.jitter_s * normal(random);
+      out.push_back({v, 0.7 + v * delay + truth.scatter_m * normal(random)});
+    }
+  }
+  return out;
+}
+
+const std::vector<double> kThreeFeeds = {1e-3, 4e-3, 8e-3};
+
+TEST(ProbeDelay, IsExactWithoutNoise) {
+  std::mt19937 random(1);
+  const auto fit = fit_delay(touches({.jitter_s = 0.0, .scatter_m = 0.0}, kThreeFeeds, 3, random));
+  ASSERT_TRUE(fit) << fit.error().text;
+  EXPECT_NEAR(fit->delay_s, 2e-3, 1e-9);
+  EXPECT_NEAR(fit->origin_m, 0.7, 1e-11);
+  EXPECT_EQ(fit->feeds, 3u);
+}
+
+TEST(ProbeDelay, FindsAFallingPlaceAsANegativeDelay) {
+  std::mt19937 random(2);
+  const auto fit = fit_delay(touches({.delay_s = -1e-3}, kThreeFeeds, 20, random));
+  ASSERT_TRUE(fit);
+  EXPECT_NEAR(fit->delay_s, -1e-3, 6 * fit->u_delay_s);
+}
+
+/// 2000 calibrations of a probe: how often the truth lies within 1.96 u, and within what the scatter is
+/// found.
+TEST(ProbeDelay, StatesItsUncertainty) {
+  std::mt19937 random(3);
+  const Truth truth{.jitter_s = 50e-6};
+  int held = 0;
+  double jitter_s2 = 0.0;
+  constexpr int kRuns = 2000;
+  for (int run = 0; run < kRuns; ++run) {
+    const auto fit = fit_delay(touches(truth, kThreeFeeds, 25, random));
+    ASSERT_TRUE(fit);
+    held += std::abs(fit->delay_s - truth.delay_s) <= 1.96 * fit->u_delay_s ? 1 : 0;
+    jitter_s2 += fit->u_jitter_s * fit->u_jitter_s / kRuns;
+  }
+  const double covered = static_cast<double>(held) / kRuns;
+  RecordProperty("covered", std::to_string(covered));
+  EXPECT_GE(covered, 0.92);
+  EXPECT_LE(covered, 0.975);
+  EXPECT_NEAR(std::sqrt(jitter_s2), truth.jitter_s, 0.15 * truth.jitter_s);
+}
+
+TEST(ProbeDelay, ShowsPlacesThatLieOnNoLine) {
+  std::mt19937 random(4);
+  auto bent = touches({.jitter_s = 0.0}, {1e-3, 3e-3, 5e-3, 8e-3}, 20, random);
+  const auto straight = fit_delay(bent);
+  for (FeedTouch& t : bent) t.along_m += 0.05 * t.speed_m_s * t.speed_m_s;  // 3 um at 8 mm/s
+  const auto fit = fit_delay(bent);
+  ASSERT_TRUE(straight && fit);
+  EXPECT_LT(straight->misfit, 5.0);
+  EXPECT_GT(fit->misfit, 20.0);
+}
+
+TEST(ProbeDelay, WantsThreeFeedsFarEnoughApart) {
+  std::mt19937 random(5);
+  EXPECT_EQ(fit_delay(touches({}, {1e-3, 8e-3}, 10, random)).error().code, ErrorCode::TooFewObservations);
+  EXPECT_EQ(fit_delay(touches({}, kThreeFeeds, 2, random)).error().code, ErrorCode::TooFewObservations);
+  EXPECT_EQ(fit_delay(touches({}, {3e-3, 4e-3, 5e-3}, 10, random)).error().code,
+            ErrorCode::DegenerateGeometry);
+  EXPECT_EQ(fit_delay({}).error().code, ErrorCode::TooFewObservations);
+}
+
+TEST(ProbeDelay, RefusesWhatIsNoTouch) {
+  std::mt19937 random(6);
+  auto some = touches({}, kThreeFeeds, 5, random);
+  some[3].along_m = std::nan("");
+  EXPECT_EQ(fit_delay(some).error().code, ErrorCode::NotFinite);
+  some[3] = {0.0, 0.0};
+  EXPECT_EQ(fit_delay(some).error().code, ErrorCode::BadInput);
+}
+
+}  // namespace
+}  // namespace abbe::calib::probe

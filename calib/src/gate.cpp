@@ -61,8 +61,10 @@ Verdict decide(const VolumetricModel& candidate, const HeldOutFigures& held_out,
   require_better(verdict, held_out.candidate, held_out.no_compensation, limits.min_improvement,
                  "without compensation");
   if (held_out.active) {
+    // The candidate's figure comes from fits to a part of the run, the active model from all of its own: on
+    // an unchanged machine the active model stays.
     require_better(verdict, held_out.candidate, *held_out.active, limits.min_improvement,
-                   "of the active model");
+                   "of the active model, so the active model still holds");
   }
   if (!(verdict.max_error_m <= limits.max_error_m)) {
     verdict.reasons.push_back(message("largest error ", 1e6 * verdict.max_error_m, " um exceeds ",

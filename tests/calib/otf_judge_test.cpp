@@ -11,6 +11,7 @@ using namespace abbe::calib;
 using namespace abbe::calib::otf;
 using namespace abbe::tests::otf;
 using testing::Contains;
+using testing::ElementsAre;
 using testing::HasSubstr;
 
 Identification identified(const MadeRun& run) {
@@ -40,11 +41,21 @@ TEST(Judge, RefusesAModelOfNoiseOnAPerfectMachine) {
 TEST(Judge, FindsTheActiveModelOfTheSameMachineAsGood) {
   const MadeRun first = make_run({.seed = 1});
   const Identification before = identified(first);
-  MadeRun second = make_run({.seed = 1});
+  const MadeRun second = make_run({.seed = 1, .noise_seed = 2});
   const auto held = held_out(identified(second).observations, &before.solution.model, second.options);
   ASSERT_TRUE(held);
   ASSERT_TRUE(held->active);
   EXPECT_NEAR(*held->active, 1.0, 0.05);
+}
+
+TEST(Judge, KeepsTheActiveModelOfAnUnchangedMachine) {
+  const MadeRun first = make_run({.seed = 1}), second = make_run({.seed = 1, .noise_seed = 2});
+  const VolumetricModel active = identified(first).solution.model;
+  const Identification again = identified(second);
+  const auto verdict = judge(again.observations, again.solution, &active, {}, second.options);
+  ASSERT_TRUE(verdict);
+  EXPECT_FALSE(verdict->accepted);
+  EXPECT_THAT(verdict->reasons, ElementsAre(HasSubstr("the active model still holds")));
 }
 
 TEST(Judge, PrefersANewModelToThatOfAnotherMachine) {

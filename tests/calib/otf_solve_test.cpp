@@ -160,6 +160,22 @@ TEST_P(WholeRun, WithNoiseLeavesNoMoreThanTheNoise) {
   EXPECT_EQ(s.degrees_of_freedom, s.observations - s.rank);
 }
 
+TEST(WholeRun, BelievesTheStatedUncertaintyWhileTheResidualsAgree) {
+  const MadeRun run = make_run({.seed = 4});
+  const auto id = identify(run.samples, run.machine, run.path, run.noise, run.options);
+  ASSERT_TRUE(id) << id.error().text;
+  EXPECT_EQ(id->solution.statistics.covariance_factor, 1.0);
+}
+
+TEST(WholeRun, WidensTheUncertaintyWhenTheTrackerIsWorseThanStated) {
+  const MadeRun stated = make_run({.seed = 4}), worse = make_run({.seed = 4, .noise_factor = 3.0});
+  const auto a = identify(stated.samples, stated.machine, stated.path, stated.noise, stated.options);
+  const auto b = identify(worse.samples, worse.machine, worse.path, worse.noise, worse.options);
+  ASSERT_TRUE(a && b);
+  EXPECT_NEAR(b->solution.statistics.covariance_factor, 9.0, 0.5);
+  EXPECT_NEAR(b->solution.model.covariance().trace() / a->solution.model.covariance().trace(), 9.0, 0.5);
+}
+
 TEST(WholeRun, GivesTheSameBitsForTheSameInput) {
   const MadeRun run = make_run({.seed = 5});
   const auto first = identify(run.samples, run.machine, run.path, run.noise, run.options);

@@ -24,7 +24,8 @@ struct MadeRun {
 };
 
 struct MadeRunOptions {
-  unsigned seed = 1;
+  unsigned seed = 1;          ///< of the machine
+  unsigned noise_seed = 1;    ///< of what the tracker adds: same machine, another run
   double noise_factor = 1.0;  ///< of the default noise model; 0: exact
   double error_scale_m = 30e-6;
   double speed_m_s = 0.4;
@@ -83,7 +84,7 @@ inline Vector3 with_noise(const Vector3& p, const calib::otf::Noise& noise, doub
 }
 
 inline MadeRun make_run(const MadeRunOptions& wanted) {
-  std::mt19937_64 random(wanted.seed);
+  std::mt19937_64 random(wanted.seed), noise(wanted.noise_seed);
   MadeRun run;
   run.machine = coarse_machine(wanted.chain);
   run.path = case_a_path();
@@ -96,7 +97,7 @@ inline MadeRun make_run(const MadeRunOptions& wanted) {
     const Vector3 V = calib::volumetric_error(layout, {run.truth.data(), layout.model_size()}, q, t);
     const Vector3 p = run.T_machine_tracker.R.transpose() * (q + t + V - run.T_machine_tracker.t_m);
     run.samples.push_back({static_cast<double>(run.samples.size()) / wanted.rate_hz,
-                           with_noise(p, run.noise, wanted.noise_factor, random), true});
+                           with_noise(p, run.noise, wanted.noise_factor, noise), true});
   }
   return run;
 }

@@ -10,12 +10,12 @@
 
 namespace abbe::daemon::test {
 
-/// Same seed, same bits.
-inline calib::VolumetricModel synthetic_model(unsigned seed) {
+/// Same seed, same bits. Nodes 150 mm apart in X and Y, 100 mm in Z, divided by `finer`.
+inline calib::VolumetricModel synthetic_model(unsigned seed, double finer = 1.0) {
   std::mt19937 random(seed);
   std::normal_distribution<double> normal;
-  const auto x = calib::equidistant_nodes(-0.3, 0.3, 0.15).value();
-  const auto z = calib::equidistant_nodes(-0.4, -0.1, 0.1).value();
+  const auto x = calib::equidistant_nodes(-0.3, 0.3, 0.15 / finer).value();
+  const auto z = calib::equidistant_nodes(-0.4, -0.1, 0.1 / finer).value();
   const auto chain = calib::KinematicChain::parse("[w X' b Y Z (C1) t]").value();
   const auto layout = calib::ParameterLayout::observable_with_one_target(chain, {x, x, z}).value();
   const auto n = static_cast<Eigen::Index>(layout.model_size());
@@ -45,6 +45,7 @@ inline ModelDocument synthetic_document(unsigned seed) {
                              .condition = 1.0 / 3.0,
                              .sigma0 = 0.1,
                              .chi2_per_dof = 0.01,
+                             .covariance_factor = 4.0 / 3.0,
                              .before = {1e-5 / 3, 2e-5 / 3, 3e-5},
                              .after = {1e-7 / 3, 2e-7 / 3, 3e-7},
                              .iterations = 1,

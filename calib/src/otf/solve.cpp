@@ -46,8 +46,15 @@ ResidualStatistics residual_statistics(const Observations& o, std::span<const do
   return s;
 }
 
-Statistics statistics(const Observations& o, const Adjustment& a) {
-  const std::vector<double> before = residuals_m(o, {}), after = residuals_m(o, a.U);
+/// Turbulence, vibration or a tracker worse than its data sheet show here first; they must not leave as a
+/// small uncertainty. Smaller residuals than stated prove nothing and change nothing.
+double covariance_factor(double chi2_per_dof, std::size_t dof) {
+  constexpr double kNormal999 = 3.090;  // 99.9 % quantile; chi2/dof has standard deviation sqrt(2/dof)
+  const double unsuspicious = 1.0 + kNormal999 * std::sqrt(2.0 / static_cast<double>(dof));
+  return chi2_per_dof > unsuspicious ? chi2_per_dof : 1.0;
+}
+
+Statistics statistics(const Observations& o, const Adjustment& a, const Residuals& residuals) {
   Statistics s;
   s.samples = o.samples;
   s.lost_samples = o.lost_samples;
@@ -59,11 +66,12 @@ Statistics statistics(const Observations& o, const Adjustment& a) {
   s.gauge_conditions = a.null_combinations;
   s.degrees_of_freedom = s.observations - s.rank;
   s.condition = a.condition;
-  s.chi2 = chi2(o, after);
+  s.chi2 = chi2(o, residuals.after_m);
   s.chi2_per_dof = s.chi2 / static_cast<double>(s.degrees_of_freedom);
   s.sigma0 = std::sqrt(s.chi2_per_dof);
-  s.before = residual_statistics(o, before);
-  s.after = residual_statistics(o, after);
+  s.covariance_factor = covariance_factor(s.chi2_per_dof, s.degrees_of_freedom);
+  s.before = residual_statistics(o, residuals.before_m);
+  s.after = residual_statistics(o, residuals.after_m);
   s.iterations = 1;
   s.alignment_iterations = o.alignment.iterations;
   s.alignment_rms_m = o.alignment.last_rms_m;
@@ -95,6 +103,9 @@ Result<Solution> solve(const Observations& o, const Options& options) {
   if (!validity) {
     return tl::unexpected(validity.error());
   }
+  Residuals residuals{residuals_m(o, {}), residuals_m(o, a->U)};
+  const Statistics figures = statistics(o, *a, residuals);
+  a->covariance *= figures.covariance_factor;
   const auto n = static_cast<Eigen::Index>(o.layout.model_size());
   Result<VolumetricModel> model =
       VolumetricModel::from_vector(o.layout, Gauge::G1, std::array{o.target_offset_m}, a->U.head(n),
@@ -108,7 +119,8 @@ Result<Solution> solve(const Observations& o, const Options& options) {
                   .rigid = a->U.tail<6>(),
                   .covariance_with_rigid = a->covariance,
                   .T_machine_tracker = o.alignment.T_machine_tracker,
-                  .statistics = statistics(o, *a)};
+                  .statistics = figures,
+                  .residuals = std::move(residuals)};
 }
 
 }  // namespace abbe::calib::otf

@@ -113,6 +113,7 @@ void print_json(const Outcome& outcome, const std::filesystem::path& folder) {
       {"rank", s.rank},
       {"condition", s.condition},
       {"sigma0", s.sigma0},
+      {"covariance_factor", s.covariance_factor},
       {"residual_rms_before_um", s.before.rms_m * kMicro},
       {"residual_rms_after_um", s.after.rms_m * kMicro},
       {"held_out_rms_before_um", outcome.verdict.held_out.no_compensation_rms_m * kMicro},

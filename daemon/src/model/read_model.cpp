@@ -183,6 +183,7 @@ ModelStatistics read_statistics(Reader& in) {
   s.condition = in.number_of(*statistics, path, "condition", 0);
   s.sigma0 = in.number_of(*statistics, path, "sigma0", 0);
   s.chi2_per_dof = in.number_of(*statistics, path, "chi2_per_dof", 0);
+  s.covariance_factor = in.number_of(*statistics, path, "covariance_factor", 0);
   s.before = read_residuals(in, *statistics, "before");
   s.after = read_residuals(in, *statistics, "after");
   s.iterations = static_cast<int>(in.count_of(*statistics, path, "iterations"));

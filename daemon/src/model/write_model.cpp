@@ -98,11 +98,11 @@ void write_statistics(JsonText& out, const ModelStatistics& s) {
   out.key("statistics");
   out.raw(fmt::format(
       "{{\"samples\": {}, \"lost_samples\": {}, \"observations\": {}, \"unknowns\": {}, \"rank\": {},\n"
-      "    \"condition\": {}, \"sigma0\": {}, \"chi2_per_dof\": {},\n"
+      "    \"condition\": {}, \"sigma0\": {}, \"chi2_per_dof\": {}, \"covariance_factor\": {},\n"
       "    \"before\": {},\n    \"after\": {},\n    \"iterations\": {}, \"stop_reason\": {}}}",
       s.samples, s.lost_samples, s.observations, s.unknowns, s.rank, to_decimal(s.condition, 0),
-      to_decimal(s.sigma0, 0), to_decimal(s.chi2_per_dof, 0), residuals(s.before), residuals(s.after),
-      s.iterations, JsonText::quoted(s.stop_reason)));
+      to_decimal(s.sigma0, 0), to_decimal(s.chi2_per_dof, 0), to_decimal(s.covariance_factor, 0),
+      residuals(s.before), residuals(s.after), s.iterations, JsonText::quoted(s.stop_reason)));
 }
 
 void write_inputs(JsonText& out, const std::vector<InputFile>& inputs) {

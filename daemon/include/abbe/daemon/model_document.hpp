@@ -30,6 +30,7 @@ struct ModelStatistics {
   double condition = 0.0;
   double sigma0 = 0.0;
   double chi2_per_dof = 0.0;
+  double covariance_factor = 1.0;  ///< see calib::otf::Statistics
   ResidualFigures before, after;
   int iterations = 0;
   std::string stop_reason;

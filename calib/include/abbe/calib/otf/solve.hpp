@@ -63,6 +63,12 @@ struct ResidualStatistics {
   double weighted_rms = 0.0;  ///< of residual / sigma
 };
 
+/// Of every row, in row order.
+struct Residuals {
+  std::vector<double> before_m;  ///< deviation after the alignment, no model
+  std::vector<double> after_m;
+};
+
 struct Statistics {
   std::size_t samples = 0, lost_samples = 0, blocks = 0, blocks_used = 0;
   std::size_t observations = 0;  ///< rows
@@ -73,7 +79,10 @@ struct Statistics {
   double condition = 0.0;
   double chi2 = 0.0;
   double chi2_per_dof = 0.0;
-  double sigma0 = 0.0;        ///< sqrt(chi2_per_dof); the covariance is not scaled by it
+  double sigma0 = 0.0;  ///< sqrt(chi2_per_dof)
+  /// What the covariance was multiplied with: chi2_per_dof where the residuals are larger than the stated
+  /// uncertainties explain (beyond the 99.9 % quantile of chi2/dof), else 1 [Birge 1932].
+  double covariance_factor = 1.0;
   ResidualStatistics before;  ///< deviations after the alignment, no model
   ResidualStatistics after;
   int iterations = 0;
@@ -89,6 +98,7 @@ struct Solution {
   Eigen::MatrixXd covariance_with_rigid;
   RigidTransform T_machine_tracker;
   Statistics statistics;
+  Residuals residuals;
 };
 
 [[nodiscard]] Result<Solution> solve(const Observations&, const Options& = {});

@@ -74,8 +74,11 @@ void visit(const v1::ErrorModel& m, V&& v) {
   v("squareness", m.squareness(), 16);
   v("parameters", m.parameters(), 1024);
   v("validity", m.validity(), 3);
+  v("validity_hull", m.validity_hull(), 512);
   v("recording_sha256", m.recording_sha256(), 64);
 }
+template <class V>
+void visit(const v1::HullVertex&, V&&) {}
 template <class V>
 void visit(const v1::GridNode&, V&&) {}
 template <class V>
@@ -101,8 +104,8 @@ void visit(const v1::Health& m, V&& v) {
 
 /// A struct of ours inside a sequence, whose own members are bounded too.
 template <class E>
-inline constexpr bool kIsNested =
-    std::is_same_v<E, v1::Parameter> || std::is_same_v<E, v1::AxisRange> || std::is_same_v<E, v1::GridNode>;
+inline constexpr bool kIsNested = std::is_same_v<E, v1::Parameter> || std::is_same_v<E, v1::AxisRange> ||
+                                  std::is_same_v<E, v1::HullVertex> || std::is_same_v<E, v1::GridNode>;
 
 /// Visits one value; afterwards `broken` says what is wrong, empty if nothing.
 class Checker {

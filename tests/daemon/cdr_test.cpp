@@ -199,6 +199,7 @@ TEST(Cdr, BoundsCheckedAreThoseOfTheIdl) {
   expect_bounds_of_idl<v1::Compensation>("Compensation");
   expect_bounds_of_idl<v1::Parameter>("Parameter");
   expect_bounds_of_idl<v1::AxisRange>("AxisRange");
+  expect_bounds_of_idl<v1::HullVertex>("HullVertex");
   expect_bounds_of_idl<v1::ErrorModel>("ErrorModel");
   expect_bounds_of_idl<v1::ErrorGrid>("ErrorGrid");
   expect_bounds_of_idl<v1::ModelState>("ModelState");

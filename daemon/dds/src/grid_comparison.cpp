@@ -116,6 +116,7 @@ Result<GridInterpolation> GridInterpolation::create(std::span<const v1::GridNode
                                                          nodes.size(), x.size(), y.size(), z.size()));
   }
   grid.error_m_.resize(nodes.size(), Vector3::Constant(std::nan("")));
+  grid.inside_.resize(nodes.size());
   for (const v1::GridNode& node : nodes) {
     std::size_t index = 0;
     for (std::size_t axis = 0; axis < 3; ++axis) {
@@ -124,6 +125,7 @@ Result<GridInterpolation> GridInterpolation::create(std::span<const v1::GridNode
       index = index * values.size() + static_cast<std::size_t>(at - values.begin());
     }
     grid.error_m_[index] = vector_of(node.error_m());
+    grid.inside_[index] = node.inside();
   }
   if (std::any_of(grid.error_m_.begin(), grid.error_m_.end(),
                   [](const Vector3& e) { return !e.allFinite(); })) {
@@ -138,7 +140,7 @@ bool GridInterpolation::at(const Vector3& position_m, Vector3& error_m) const {
   for (std::size_t axis = 0; axis < 3; ++axis) {
     if (!locate(nodes_m_[axis], position_m[static_cast<int>(axis)], cell[axis], fraction[axis])) return false;
   }
-  error_m.setZero();
+  Vector3 sum = Vector3::Zero();
   for (std::size_t corner = 0; corner < 8; ++corner) {
     double weight = 1.0;
     std::size_t index = 0;
@@ -147,8 +149,10 @@ bool GridInterpolation::at(const Vector3& position_m, Vector3& error_m) const {
       weight *= far == 1 ? fraction[axis] : 1.0 - fraction[axis];
       index = index * nodes_m_[axis].size() + cell[axis] + far;
     }
-    error_m += weight * error_m_[index];
+    if (!inside_[index]) return false;
+    sum += weight * error_m_[index];
   }
+  error_m = sum;
   return true;
 }
 

@@ -50,8 +50,12 @@ Json fields(const v1::Parameter& m) {
 Json fields(const v1::AxisRange& m) {
   return {FIELD(axis), FIELD(min_m), FIELD(max_m)};
 }
+Json fields(const v1::HullVertex& m) {
+  return {FIELD(position_m)};
+}
+
 Json fields(const v1::GridNode& m) {
-  return {FIELD(position_m), FIELD(error_m), FIELD(cov_m2)};
+  return {FIELD(position_m), FIELD(error_m), FIELD(cov_m2), FIELD(inside)};
 }
 
 template <class T>
@@ -74,18 +78,14 @@ Json fields(const v1::ErrorModel& m) {
           FIELD(tool_offset_m),
           {"parameters", list(m.parameters())},
           {"validity", list(m.validity())},
+          {"validity_hull", list(m.validity_hull())},
           FIELD(recording_sha256),
           FIELD(created_utc_ns)};
 }
 
 Json fields(const v1::ErrorGrid& m) {
-  return {FIELD(machine),
-          FIELD(slice),
-          FIELD(slices),
-          FIELD(sequence_number),
-          FIELD(model_id),
-          FIELD(tool_offset_m),
-          {"nodes", list(m.nodes())}};
+  return {FIELD(machine),  FIELD(slice),         FIELD(slices),     FIELD(sequence_number),
+          FIELD(model_id), FIELD(tool_offset_m), FIELD(every_node), {"nodes", list(m.nodes())}};
 }
 
 Json fields(const v1::ModelState& m) {

@@ -11,9 +11,10 @@ namespace {
 
 using std::chrono::nanoseconds;
 
-constexpr std::size_t kNodesPerSlice = 480;    // ErrorGrid::nodes in the IDL
-constexpr std::size_t kGridNodesPerAxis = 16;  // 16^3 = 4096 nodes, the most a grid may have
-constexpr std::size_t kReasonBound = 256;      // ModelState::reason, Health::fault
+constexpr std::size_t kNodesPerSlice = 480;   // ErrorGrid::nodes in the IDL
+constexpr std::size_t kMostGridNodes = 4096;  // 9 slices: what a late joiner is sent at once
+constexpr std::size_t kHullBound = 512;       // ErrorModel::validity_hull
+constexpr std::size_t kReasonBound = 256;     // ModelState::reason, Health::fault
 constexpr std::size_t kEventReasonBound = 512;
 
 std::int64_t ns(protocol::HostTime t) {
@@ -32,14 +33,34 @@ std::array<double, 6> upper_triangle(const calib::Matrix3& c) {
   return {c(0, 0), c(0, 1), c(0, 2), c(1, 1), c(1, 2), c(2, 2)};
 }
 
-/// At most kGridNodesPerAxis of them, the ends always.
-std::vector<double> thinned(const std::vector<double>& nodes_m) {
-  if (nodes_m.size() <= kGridNodesPerAxis) return nodes_m;
+/// `count` >= 2 of them, evenly by number, the ends always.
+std::vector<double> thinned(const std::vector<double>& nodes_m, std::size_t count) {
   std::vector<double> out;
-  for (std::size_t i = 0; i < kGridNodesPerAxis; ++i) {
-    out.push_back(nodes_m[i * (nodes_m.size() - 1) / (kGridNodesPerAxis - 1)]);
-  }
+  for (std::size_t i = 0; i < count; ++i) out.push_back(nodes_m[i * (nodes_m.size() - 1) / (count - 1)]);
   return out;
+}
+
+using GridAxes = std::array<std::vector<double>, 3>;
+
+/// All nodes if they are no more than a grid may have, else the axis with most nodes gives some up, again and
+/// again.
+GridAxes grid_axes(const calib::MachineNodes& nodes) {
+  std::array<std::size_t, 3> count{};
+  for (std::size_t a = 0; a < 3; ++a) count[a] = nodes[a].nodes_m.size();
+  while (count[0] * count[1] * count[2] > kMostGridNodes) --*std::max_element(count.begin(), count.end());
+  GridAxes axes;
+  for (std::size_t a = 0; a < 3; ++a) axes[a] = thinned(nodes[a].nodes_m, count[a]);
+  return axes;
+}
+
+/// Where there are more than fit, some: a hull of fewer vertices lies inside the true one.
+std::vector<v1::HullVertex> hull_of(const calib::ValidityVolume& validity) {
+  std::vector<v1::HullVertex> hull;
+  for (const calib::Vector3& p :
+       validity.vertices_m().first(std::min(kHullBound, validity.vertices_m().size()))) {
+    hull.emplace_back().position_m(array(p));
+  }
+  return hull;
 }
 
 v1::GridNode grid_node(const ModelInForce& m, const calib::Vector3& q_m, const calib::Vector3& tool_m) {
@@ -48,6 +69,7 @@ v1::GridNode grid_node(const ModelInForce& m, const calib::Vector3& q_m, const c
   node.position_m(array(q_m));
   node.error_m(array(e.V_m));
   node.cov_m2(upper_triangle(e.cov_V_m2));
+  node.inside(e.inside);
   return node;
 }
 
@@ -108,20 +130,24 @@ v1::ErrorModel model_message(const ModelInForce& in_force, const Stamp& stamp) {
     range.max_m(nodes_m.back());
     m.validity().push_back(range);
   }
+  m.validity_hull(hull_of(in_force.model.validity()));
   m.recording_sha256(in_force.recording_sha256);
   m.created_utc_ns(in_force.created.time_since_epoch().count());
   return m;
 }
 
 std::vector<v1::ErrorGrid> grid_messages(const ModelInForce& in_force, const Stamp& stamp) {
-  const auto& nodes = in_force.model.layout().nodes();
+  const GridAxes axes = grid_axes(in_force.model.layout().nodes());
   const calib::Vector3 tool_m = in_force.model.tool_offsets_m().front();
   std::vector<v1::GridNode> all;
-  for (const double x : thinned(nodes[0].nodes_m)) {
-    for (const double y : thinned(nodes[1].nodes_m)) {
-      for (const double z : thinned(nodes[2].nodes_m)) all.push_back(grid_node(in_force, {x, y, z}, tool_m));
+  for (const double x : axes[0]) {
+    for (const double y : axes[1]) {
+      for (const double z : axes[2]) all.push_back(grid_node(in_force, {x, y, z}, tool_m));
     }
   }
+  const auto& nodes = in_force.model.layout().nodes();
+  const bool every_node =
+      all.size() == nodes[0].nodes_m.size() * nodes[1].nodes_m.size() * nodes[2].nodes_m.size();
   const std::size_t slices = (all.size() + kNodesPerSlice - 1) / kNodesPerSlice;
   std::vector<v1::ErrorGrid> messages;
   for (std::size_t slice = 0; slice < slices; ++slice) {
@@ -134,6 +160,7 @@ std::vector<v1::ErrorGrid> grid_messages(const ModelInForce& in_force, const Sta
     m.sequence_number(stamp.sequence_number);
     m.model_id(in_force.id);
     m.tool_offset_m(array(tool_m));
+    m.every_node(every_node);
     m.nodes(std::vector<v1::GridNode>(begin,
                                       begin + static_cast<std::ptrdiff_t>(std::min(left, kNodesPerSlice))));
     messages.push_back(std::move(m));

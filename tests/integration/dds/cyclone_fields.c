@@ -32,14 +32,19 @@ static void print_model(const abbe_v1_ErrorModel* m) {
     const abbe_v1_AxisRange* r = &m->validity._buffer[i];
     printf("validity %s %.17g %.17g\n", r->axis, r->min_m, r->max_m);
   }
+  for (uint32_t i = 0; i < m->validity_hull._length; ++i) {
+    const double* p = m->validity_hull._buffer[i].position_m;
+    printf("hull %.17g %.17g %.17g\n", p[0], p[1], p[2]);
+  }
 }
 
 static void print_slice(const abbe_v1_ErrorGrid* g) {
-  printf("grid %s %u %u %" PRIu64 " %s\n", g->machine, g->slice, g->slices, g->sequence_number, g->model_id);
+  printf("grid %s %u %u %" PRIu64 " %s %d\n", g->machine, g->slice, g->slices, g->sequence_number, g->model_id,
+         g->every_node);
   for (uint32_t i = 0; i < g->nodes._length; ++i) {
     const abbe_v1_GridNode* n = &g->nodes._buffer[i];
-    printf("node %.17g %.17g %.17g %.17g %.17g %.17g %.17g\n", n->position_m[0], n->position_m[1],
-           n->position_m[2], n->error_m[0], n->error_m[1], n->error_m[2], n->cov_m2[5]);
+    printf("node %.17g %.17g %.17g %.17g %.17g %.17g %.17g %d\n", n->position_m[0], n->position_m[1],
+           n->position_m[2], n->error_m[0], n->error_m[1], n->error_m[2], n->cov_m2[5], n->inside);
   }
 }
 

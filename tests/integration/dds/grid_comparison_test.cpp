@@ -54,6 +54,16 @@ TEST(GridInterpolation, OutsideHasNoAnswer) {
   EXPECT_FALSE(grid->at({0.1, -1e-6, 0.1}, error));
 }
 
+TEST(GridInterpolation, HasNoAnswerInACellWithACornerTheDataDidNotCover) {
+  auto nodes = sample_nodes();
+  for (auto& node : nodes) node.inside(node.position_m()[2] < 0.75);
+  const auto grid = GridInterpolation::create(nodes);
+  ASSERT_TRUE(grid.has_value());
+  Vector3 error;
+  EXPECT_TRUE(grid->at({0.1, 0.2, 0.65}, error));
+  EXPECT_FALSE(grid->at({0.1, 0.2, 0.75}, error));
+}
+
 TEST(GridInterpolation, RefusesAGridWithAHole) {
   auto nodes = sample_nodes();
   nodes.erase(nodes.begin() + 100);

@@ -28,18 +28,22 @@ std::vector<std::string> model_lines() {
   for (const auto& r : m.validity()) {
     lines.push_back(fmt::format("validity {} {} {}", r.axis(), g17(r.min_m()), g17(r.max_m())));
   }
+  for (const auto& v : m.validity_hull()) {
+    const auto& p = v.position_m();
+    lines.push_back(fmt::format("hull {} {} {}", g17(p[0]), g17(p[1]), g17(p[2])));
+  }
   return lines;
 }
 
 std::vector<std::string> slice_lines() {
   const auto g = grid_slices()[1];
-  std::vector<std::string> lines{fmt::format("grid {} {} {} {} {}", g.machine(), g.slice(), g.slices(),
-                                             g.sequence_number(), g.model_id())};
+  std::vector<std::string> lines{fmt::format("grid {} {} {} {} {} {:d}", g.machine(), g.slice(), g.slices(),
+                                             g.sequence_number(), g.model_id(), g.every_node())};
   for (const auto& n : g.nodes()) {
     const auto& p = n.position_m();
     const auto& e = n.error_m();
-    lines.push_back(fmt::format("node {} {} {} {} {} {} {}", g17(p[0]), g17(p[1]), g17(p[2]), g17(e[0]),
-                                g17(e[1]), g17(e[2]), g17(n.cov_m2()[5])));
+    lines.push_back(fmt::format("node {} {} {} {} {} {} {} {:d}", g17(p[0]), g17(p[1]), g17(p[2]), g17(e[0]),
+                                g17(e[1]), g17(e[2]), g17(n.cov_m2()[5]), n.inside()));
   }
   return lines;
 }

@@ -50,6 +50,11 @@ inline v1::ErrorModel error_model() {
   x.min_m(-0.25);
   x.max_m(0.5);
   m.validity({x});
+  for (const double z : {0.0, 0.25, 0.5}) {
+    v1::HullVertex vertex;
+    vertex.position_m({-0.25, 0.125, z});
+    m.validity_hull().push_back(vertex);
+  }
   m.recording_sha256(std::string(64, 'a'));
   m.created_utc_ns(1'717'200'000'000'000'000LL);
   return m;
@@ -72,6 +77,7 @@ inline std::vector<v1::ErrorGrid> grid_slices() {
                      0.1 * static_cast<double>(i % kNodesPerAxis)});
     node.error_m(error_at(node.position_m()));
     node.cov_m2({1e-12, 0.0, 0.0, 4e-12, 0.0, 9e-12});
+    node.inside(i != 500);  // one in slice 1
     slices[i / 480].nodes().push_back(node);
   }
   for (std::uint32_t s = 0; s < 2; ++s) {
@@ -80,6 +86,7 @@ inline std::vector<v1::ErrorGrid> grid_slices() {
     slices[s].slices(2);
     slices[s].sequence_number(4);
     slices[s].model_id(kModelId);
+    slices[s].every_node(true);
   }
   return slices;
 }

@@ -27,17 +27,19 @@ struct KnownError {
 [[nodiscard]] daemon::Result<void> write_grid_csv(const std::filesystem::path& file,
                                                   std::span<const v1::GridNode> nodes);
 
-/// V between the nodes of a full tensor grid (any order of nodes), linear in x, y and z.
+/// V between the nodes of a full tensor grid (any order of nodes), linear in x, y and z; only in cells of
+/// which every corner lies within the volume the data covered.
 class GridInterpolation {
  public:
   /// Error BadInput if the nodes are not all combinations of the coordinates that occur.
   [[nodiscard]] static daemon::Result<GridInterpolation> create(std::span<const v1::GridNode> nodes);
-  /// False: outside of the grid, `error_m` untouched.
+  /// False: outside of the grid or of what the data covered, `error_m` untouched.
   [[nodiscard]] bool at(const calib::Vector3& position_m, calib::Vector3& error_m) const;
 
  private:
   std::array<std::vector<double>, 3> nodes_m_;
   std::vector<calib::Vector3> error_m_;  ///< x slowest
+  std::vector<bool> inside_;             ///< in the same order
 };
 
 struct GridComparison {

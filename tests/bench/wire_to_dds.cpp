@@ -331,7 +331,8 @@ HopResult better(const HopResult& a, const HopResult& b) {
   return {a.received + b.received, std::min(a.p50_us, b.p50_us), std::min(a.p99_us, b.p99_us)};
 }
 
-void print_verdict(std::string_view what, const Path& path, const HopResult& hop) {
+/// True: both limits were held.
+bool print_verdict(std::string_view what, const Path& path, const HopResult& hop) {
   const double P = us(std::chrono::nanoseconds{kHubPeriod}.count());
   const Quantiles q = quantiles(path.whole);
   const double asked50 = P / 2 + kHops * hop.p50_us;
@@ -345,6 +346,7 @@ void print_verdict(std::string_view what, const Path& path, const HopResult& hop
   row("p99 <= P + 3 hop p99", asked99, q.p99);
   row("p99 <= P + 3 hop p50 (stricter)", strict99, q.p99);
   if (path.lost > 0) fmt::print("  {:<8} {} of {} without an arrival\n", what, path.lost, path.lost + q.n);
+  return q.n > 0 && q.p50 <= asked50 && q.p99 <= asked99;
 }
 
 void print_shares(std::string_view what, const Path& path, const DeviceLatency& device,
@@ -420,9 +422,10 @@ int main(int argc, char** argv) {
       hop::kMessageBytes, hop_options.period.count(), before.p50_us, before.p99_us, after.p50_us,
       after.p99_us);
   fmt::print("  {:<8} {:<30} {:>8} {:>9}   {:>5}\n", "device", "limit, us", "asked", "measured", "ratio");
-  print_verdict("encoder", encoder, hop);
-  print_verdict("tracker", tracker, hop);
+  const bool encoder_held = print_verdict("encoder", encoder, hop);
+  const bool tracker_held = print_verdict("tracker", tracker, hop);
   fmt::print("\n  {:<8} {:<36} {:>7} {:>8}\n", "device", "share, us", "p50", "p99");
   print_shares("encoder", encoder, log.encoder, hop);
   print_shares("tracker", tracker, log.tracker, hop);
+  return encoder_held && tracker_held ? 0 : 1;
 }

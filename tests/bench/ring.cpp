@@ -7,12 +7,9 @@
 // by one where not (moodycamel). The other lines give each its best: ours and boost also push in batches
 // of 16.
 //
-// Seen on two busy virtual processors with this program, SCHED_FIFO, -O2: TrackerPoint one by one and both
-// payloads by 16 above 1 nearly always. AxisSample one by one is about level with boost and not reliably
-// above 0.95: 10 of 15 short calls (7 or 11 rounds) reached it, the others gave 0.82 to 0.91; of two calls of
-// 21 rounds one gave 0.97, one (-O3) 0.82. Low ratios are commoner when every queue is slow, but not only
-// then; the cause is not established. Without SCHED_FIFO on that machine neither payload reached 0.95 one by
-// one (0.92 and 0.94, 0.74 and 0.75).
+// The sample ring is boost's queue behind the rule of the house (drop, count, mark), so against boost the
+// question is what the rule costs: one count for each push, a marked copy after each full queue, which this
+// writer meets often.
 //
 //   bench_ring [rounds = 41] [samples per run = 200000]
 
@@ -60,9 +57,10 @@ std::uint32_t number_of(const AxisSample& s) {
   return s.cycle;
 }
 
-/// Which prepared sample is the i-th sent: blocks of kWriteBatch in a scattered order. In steps with the slots of a queue
-/// a source would lie at the same place modulo 4096 as its slot for a whole run, or never, as the heap happened to be; a
-/// load that seems to hit an earlier store waits for it, and the placement, not the queue, would decide the rate by two.
+/// Which prepared sample is the i-th sent: blocks of kWriteBatch in a scattered order. In steps with the
+/// slots of a queue a source would lie at the same place modulo 4096 as its slot for a whole run, or never,
+/// as the heap happened to be; a load that seems to hit an earlier store waits for it, and the placement, not
+/// the queue, would decide the rate by two.
 std::uint32_t source_of(std::uint32_t i) {
   constexpr std::uint32_t kScatter = 13;  // has no factor in common with the number of blocks
   return (i / kWriteBatch * kScatter * kWriteBatch + i % kWriteBatch) % kPrepared;

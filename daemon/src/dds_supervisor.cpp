@@ -23,20 +23,21 @@ std::string describe_end(int status) {
   return "exit code " + std::to_string(WEXITSTATUS(status));
 }
 
-/// The child starts as an ordinary process whatever thread of abbed starts it: no signal blocked or ignored,
-/// not real-time.
+/// The child starts the same whatever thread of abbed starts it: no signal blocked or ignored, real-time only
+/// as asked. Its threads inherit that.
 class SpawnAttributes {
  public:
-  SpawnAttributes() {
+  explicit SpawnAttributes(int priority) {
     ::posix_spawnattr_init(&attributes_);
     sigset_t none, all;
     ::sigemptyset(&none);
     ::sigfillset(&all);
     ::posix_spawnattr_setsigmask(&attributes_, &none);
     ::posix_spawnattr_setsigdefault(&attributes_, &all);
-    const sched_param ordinary{};
-    ::posix_spawnattr_setschedpolicy(&attributes_, SCHED_OTHER);
-    ::posix_spawnattr_setschedparam(&attributes_, &ordinary);
+    sched_param scheduling{};
+    scheduling.sched_priority = priority;
+    ::posix_spawnattr_setschedpolicy(&attributes_, priority > 0 ? SCHED_FIFO : SCHED_OTHER);
+    ::posix_spawnattr_setschedparam(&attributes_, &scheduling);
     ::posix_spawnattr_setflags(&attributes_,
                                POSIX_SPAWN_SETSIGMASK | POSIX_SPAWN_SETSIGDEF | POSIX_SPAWN_SETSCHEDULER);
   }
@@ -97,13 +98,15 @@ Result<void> DdsSupervisor::spawn(WallTime now) {
   std::vector<char*> argv{program.data()};
   for (std::string& argument : options_.arguments) argv.push_back(argument.data());
   argv.push_back(nullptr);
-  const SpawnAttributes attributes;
   keep_capabilities_from_children();
   pid_t child = 0;
-  if (const int error =
-          ::posix_spawn(&child, program.c_str(), nullptr, attributes.get(), argv.data(), environ)) {
-    return fail(ErrorCode::Io, "start " + program + ": " + std::strerror(error));
-  }
+  const auto start = [&](int priority) {
+    const SpawnAttributes attributes(priority);
+    return ::posix_spawn(&child, program.c_str(), nullptr, attributes.get(), argv.data(), environ);
+  };
+  int error = start(options_.priority);
+  if (error == EPERM && options_.priority > 0) error = start(0);
+  if (error != 0) return fail(ErrorCode::Io, "start " + program + ": " + std::strerror(error));
   pid_ = child;
   started_ = now;
   return {};

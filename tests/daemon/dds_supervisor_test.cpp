@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 #include <linux/capability.h>
 #include <poll.h>
+#include <sched.h>
 #include <signal.h>
 #include <sys/prctl.h>
 #include <sys/syscall.h>
@@ -109,6 +110,19 @@ TEST(DdsSupervisor, TheChildInheritsNoCapability) {
       .join();
   if (!ended) GTEST_SKIP() << "this user may not raise an ambient capability";
   EXPECT_EQ(*ended, "exit code 7");
+}
+
+TEST(DdsSupervisor, GivesTheChildItsPriorityWherePermitted) {
+  sched_param mine{};
+  mine.sched_priority = 1;
+  const bool permitted = ::sched_setscheduler(0, SCHED_FIFO, &mine) == 0;
+  mine.sched_priority = 0;
+  ASSERT_EQ(::sched_setscheduler(0, SCHED_OTHER, &mine), 0);
+  auto options = shell("exec sleep 60");
+  options.priority = 20;
+  auto supervisor = DdsSupervisor::start(options, WallTime{});
+  ASSERT_TRUE(supervisor.has_value()) << supervisor.error().text;
+  EXPECT_EQ(::sched_getscheduler(supervisor->pid()), permitted ? SCHED_FIFO : SCHED_OTHER);
 }
 
 TEST(DdsSupervisor, StopsItsChildWhenItGoes) {

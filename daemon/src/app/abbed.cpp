@@ -155,7 +155,8 @@ struct Abbed::State {
     if (config.dds.supervise != Supervise::Child) return {};
     DdsSupervisor::Options child{
         .program = options.dds_program,
-        .arguments = {"--socket", config.dds.socket.string(), "--domain", std::to_string(config.dds.domain)}};
+        .arguments = {"--socket", config.dds.socket.string(), "--domain", std::to_string(config.dds.domain)},
+        .priority = config.dds.priority};
     if (!config.dds.profile.empty()) {
       child.arguments.insert(child.arguments.end(), {"--profile", config.dds.profile.string()});
     }

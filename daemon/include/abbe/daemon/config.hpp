@@ -143,6 +143,7 @@ struct DdsConfig {
   std::chrono::nanoseconds validity{
       std::chrono::milliseconds{500}};  ///< a subscriber must not apply older vectors
   Supervise supervise = Supervise::Child;
+  int priority = 20;              ///< SCHED_FIFO of abbe-dds, below hub and devices; 0: an ordinary process
   std::filesystem::path profile;  ///< XML profiles; empty: the built-in ones
   std::filesystem::path socket;   ///< default: runtime_dir/dds.sock
 };

@@ -23,6 +23,7 @@ class DdsSupervisor {
   struct Options {
     std::filesystem::path program;                 ///< abbe-dds
     std::vector<std::string> arguments;            ///< without argv[0]
+    int priority = 0;                              ///< SCHED_FIFO; 0, or not permitted: an ordinary process
     std::chrono::milliseconds steady_after{2000};  ///< alive this long: the next death is answered at once
     std::chrono::milliseconds first_delay{100};    ///< after a death at start; doubles
     std::chrono::milliseconds longest_delay{5000};

@@ -118,6 +118,42 @@ TEST_F(Cli, WritesTablesBesideTheModel) {
   EXPECT_EQ(document->inputs[2].name, "tracker.csv");
 }
 
+TEST_F(Cli, WritesAReportThatNeedsNoNetwork) {
+  const std::string page = text_of(folder_ / "out/report.html");
+  EXPECT_THAT(page, StartsWith("<!doctype html>"));
+  const auto document = read_model(folder_ / "out/model.json");
+  ASSERT_TRUE(document);
+  for (const std::string& shown : {document->machine, model_id(document->model, "otf"), std::string("EXX"),
+                                   std::string("squareness"), std::string("Chart.js")}) {
+    EXPECT_THAT(page, HasSubstr(shown == "squareness" ? "Squareness" : shown));
+  }
+  EXPECT_THAT(page, Not(HasSubstr("src=")));
+  EXPECT_THAT(page, Not(HasSubstr("<link")));
+}
+
+TEST_F(Cli, KeepsAModelWithTheVerdictAgainstTheActiveOne) {
+  const auto store = folder_ / "kept";
+  const auto keep = fmt::format("--keep '{}'", store.string());
+  ASSERT_EQ(identify(files_.path, files_.tracker, folder_ / "k1", keep).exit, 0);
+  const auto id = model_id(read_model(folder_ / "k1/model.json")->model, "otf");
+  ASSERT_EQ(abbe(fmt::format("model activate {} --store '{}'", id, store.string())).exit, 0);
+  const auto again = identify(files_.path, files_.tracker, folder_ / "k2", keep + " --json");
+  ASSERT_EQ(again.exit, 0) << again.err;
+  const auto gate = nlohmann::json::parse(again.out).at("gate");
+  EXPECT_FALSE(gate.at("accepted"));
+  EXPECT_THAT(gate.at("reasons").at(0).get<std::string>(), HasSubstr("the active model still holds"));
+}
+
+TEST_F(Cli, ComparesTwoModels) {
+  const auto model = (folder_ / "out/model.json").string();
+  const auto same = abbe(fmt::format("model compare '{0}' '{0}' --json", model));
+  ASSERT_EQ(same.exit, 0) << same.err;
+  const auto figures = nlohmann::json::parse(same.out);
+  EXPECT_GT(figures.at("points").get<int>(), 8);
+  EXPECT_EQ(figures.at("as_stated").at("max_um"), 0.0);
+  EXPECT_EQ(abbe(fmt::format("model compare '{}' '{}'", model, (folder_ / "none.json").string())).exit, 4);
+}
+
 TEST_F(Cli, SaysNothingOnStderrWhenItIsNotATerminal) {
   EXPECT_THAT(identified_.err, IsEmpty());
   EXPECT_THAT(identified_.out, Not(HasSubstr("\x1b")));

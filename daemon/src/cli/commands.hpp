@@ -12,6 +12,7 @@ void add_identify_otf(CLI::App& parent, int& exit);
 void add_calibrate_otf(CLI::App& parent, int& exit);
 void add_replay(CLI::App& parent, int& exit);
 void add_status(CLI::App& parent, int& exit);
+void add_model_compare(CLI::App& parent, int& exit);
 void add_model_eval(CLI::App& parent, int& exit);
 void add_model_list(CLI::App& parent, int& exit);
 void add_model_show(CLI::App& parent, int& exit);

@@ -4,14 +4,20 @@
 #include <filesystem>
 #include <memory>
 #include <nlohmann/json.hpp>
+#include <optional>
 #include <system_error>
 
 #include "abbe/calib/otf/identify.hpp"
 #include "abbe/daemon/input_files.hpp"
 #include "abbe/daemon/model_document.hpp"
+#include "abbe/daemon/model_store.hpp"
+#include "abbe/daemon/otf_identification.hpp"
 #include "abbe/daemon/otf_inputs.hpp"
+#include "abbe/daemon/otf_report.hpp"
+#include "abbe/daemon/replay.hpp"
 #include "abbe/daemon/sha256.hpp"
 #include "cli/commands.hpp"
+#include "cli/daemon_socket.hpp"
 #include "cli/terminal.hpp"
 #include "files/text_file.hpp"
 
@@ -22,13 +28,13 @@ namespace {
 namespace otf = calib::otf;
 
 struct Arguments {
-  std::string machine, path, tracker, out;
+  std::string machine, path, tracker, recording, keep, out;
   std::string estimator = "two-step";
   std::size_t block_samples = 0;  // 0: by travel
   bool json = false;
 };
 
-struct Inputs {
+struct Files {
   Config config;
   PathFile path;
   TrackerFile tracker;
@@ -37,12 +43,12 @@ struct Inputs {
 
 struct Outcome {
   ModelDocument document;
+  otf::Residuals residuals;
   calib::Verdict verdict;
-  std::size_t blocks_used = 0;
-  std::size_t block_samples = 0;
+  std::size_t blocks = 0, blocks_used = 0;
 };
 
-Result<Inputs> read_inputs(const Arguments& arguments, ProgressBar& bar) {
+Result<Files> read_files(const Arguments& arguments, ProgressBar& bar) {
   auto config = load_config(arguments.machine);
   if (!config) return tl::make_unexpected(config.error());
   const auto hash = sha256_hex_of_file(arguments.machine);
@@ -54,7 +60,7 @@ Result<Inputs> read_inputs(const Arguments& arguments, ProgressBar& bar) {
   if (!tracker) return tl::make_unexpected(tracker.error());
   std::vector<InputFile> sources{
       {std::filesystem::path(arguments.machine).filename().string(), *hash}, path->source, tracker->source};
-  return Inputs{std::move(*config), std::move(*path), std::move(*tracker), std::move(sources)};
+  return Files{std::move(*config), std::move(*path), std::move(*tracker), std::move(sources)};
 }
 
 std::string_view words(otf::Stage stage) {
@@ -71,29 +77,100 @@ std::string_view words(otf::Stage stage) {
   return "";
 }
 
-Result<Outcome> identify(const Inputs& inputs, const Arguments& arguments, ProgressBar& bar) {
-  const auto machine = otf_machine(inputs.config.machine);
-  if (!machine) return tl::make_unexpected(machine.error());
-  otf::Options options = otf_options(inputs.tracker.points, inputs.config.gate);
-  if (arguments.block_samples > 0) options.block_samples = arguments.block_samples;
-  options.progress = [&](otf::Stage stage, double fraction) { bar.show(words(stage), fraction); };
-  const auto found = otf::identify(inputs.tracker.points, *machine, otf_path(inputs.path.vertices_m),
-                                   otf_noise(inputs.config.machine), options);
-  if (!found) return tl::make_unexpected(error_of(found.error()));
-  auto verdict =
-      otf::judge(found->observations, found->solution, nullptr, gate_limits(inputs.config.gate), options);
-  if (!verdict) return tl::make_unexpected(error_of(verdict.error()));
-  const auto now = std::chrono::time_point_cast<std::chrono::nanoseconds>(std::chrono::system_clock::now());
-  return Outcome{otf_document(found->solution, inputs.config, inputs.sources, now), std::move(*verdict),
-                 found->observations.blocks_used, options.block_samples};
+protocol::UtcTime now() {
+  return std::chrono::time_point_cast<std::chrono::nanoseconds>(std::chrono::system_clock::now());
 }
 
-Result<void> write_outputs(const std::filesystem::path& folder, const ModelDocument& document) {
+Outcome outcome_of(OtfCandidate candidate, const Config& config, std::vector<InputFile> sources) {
+  auto document = otf_document(candidate.solution, config, std::move(sources), now());
+  const auto& s = candidate.solution.statistics;
+  return {std::move(document), std::move(candidate.solution.residuals), std::move(candidate.verdict),
+          s.blocks, s.blocks_used};
+}
+
+Result<Outcome> from_files(const Arguments& arguments, const calib::VolumetricModel* active,
+                           ProgressBar& bar) {
+  auto files = read_files(arguments, bar);
+  if (!files) return tl::make_unexpected(files.error());
+  const auto machine = otf_machine(files->config.machine);
+  if (!machine) return tl::make_unexpected(machine.error());
+  otf::Options options = otf_options(files->tracker.points, files->config.gate);
+  if (arguments.block_samples > 0) options.block_samples = arguments.block_samples;
+  options.progress = [&](otf::Stage stage, double fraction) { bar.show(words(stage), fraction); };
+  auto found = otf::identify(files->tracker.points, *machine, otf_path(files->path.vertices_m),
+                             otf_noise(files->config.machine), options);
+  if (!found) return tl::make_unexpected(error_of(found.error()));
+  auto verdict =
+      otf::judge(found->observations, found->solution, active, gate_limits(files->config.gate), options);
+  if (!verdict) return tl::make_unexpected(error_of(verdict.error()));
+  return outcome_of({std::move(found->solution), std::move(*verdict)}, files->config,
+                    std::move(files->sources));
+}
+
+/// The last run of the recording that was driven to its end.
+Result<OtfCandidate> last_complete_run(ReplayReport replayed, const std::string& file) {
+  std::string why = replayed.calibrations.empty() ? "no calibration was asked for" : "";
+  for (auto c = replayed.calibrations.rbegin(); c != replayed.calibrations.rend(); ++c) {
+    if (c->outcome && *c->outcome) return std::move(**c->outcome);
+    if (why.empty()) why = c->outcome ? c->outcome->error().text : c->ended.reason;
+  }
+  return fail(ErrorCode::DataInsufficient, fmt::format("{}: holds no complete calibration: {}", file, why));
+}
+
+Result<Outcome> from_recording(const Arguments& arguments, const calib::VolumetricModel* active,
+                               ProgressBar& bar) {
+  const auto recording = RecordingReader::open(arguments.recording);
+  if (!recording) return tl::make_unexpected(recording.error());
+  const auto config =
+      arguments.machine.empty()
+          ? parse_config(recording->info().configuration, arguments.recording + " (recorded configuration)")
+          : load_config(arguments.machine);
+  if (!config) return tl::make_unexpected(config.error());
+  const auto hash = sha256_hex_of_file(arguments.recording);
+  if (!hash) return tl::make_unexpected(hash.error());
+  auto replayed =
+      replay(*recording, *config,
+             {.active = active, .progress = [&bar](double share) { bar.show("replaying", share); }});
+  if (!replayed) return tl::make_unexpected(replayed.error());
+  auto candidate = last_complete_run(std::move(*replayed), arguments.recording);
+  if (!candidate) return tl::make_unexpected(candidate.error());
+  return outcome_of(std::move(*candidate), *config,
+                    {{std::filesystem::path(arguments.recording).filename().string(), *hash}});
+}
+
+Result<void> write_outputs(const std::filesystem::path& folder, const Outcome& outcome) {
   std::error_code failed;
   std::filesystem::create_directories(folder, failed);
   if (failed) return fail(ErrorCode::Io, fmt::format("create {}: {}", folder.string(), failed.message()));
+  const ModelDocument& document = outcome.document;
   if (auto done = replace_file(folder / "model.json", to_json(document)); !done) return done;
-  return replace_file(folder / "tables.csv", to_tables_csv(document.model));
+  if (auto done = replace_file(folder / "tables.csv", to_tables_csv(document.model)); !done) return done;
+  return replace_file(folder / "report.html", otf_report(document, outcome.residuals, outcome.verdict));
+}
+
+/// The active model of the store the result will be kept in; none without --keep.
+Result<std::optional<ModelDocument>> active_model(const Arguments& arguments) {
+  std::optional<ModelDocument> active;
+  if (arguments.keep.empty()) return active;
+  const auto store = ModelStore::open(arguments.keep);
+  if (!store) return tl::make_unexpected(store.error());
+  const auto id = store->active_id();
+  if (!id) return tl::make_unexpected(id.error());
+  if (!*id) return active;
+  auto document = store->load(**id);
+  if (!document) return tl::make_unexpected(document.error());
+  active = std::move(*document);
+  return active;
+}
+
+Result<void> keep(const Arguments& arguments, const Outcome& outcome) {
+  if (arguments.keep.empty()) return {};
+  auto store = ModelStore::open(arguments.keep);
+  if (!store) return tl::make_unexpected(store.error());
+  const auto id = store->add(outcome.document, outcome.verdict.accepted, outcome.verdict.reasons,
+                             {user_name(), "abbe identify otf", now()});
+  if (!id) return tl::make_unexpected(id.error());
+  return {};
 }
 
 constexpr double kMicro = 1e6;
@@ -106,7 +183,7 @@ void print_json(const Outcome& outcome, const std::filesystem::path& folder) {
       {"hash", model_hash(outcome.document.model, outcome.document.method)},
       {"samples", s.samples},
       {"lost_samples", s.lost_samples},
-      {"block_samples", outcome.block_samples},
+      {"blocks", outcome.blocks},
       {"blocks_used", outcome.blocks_used},
       {"observations", s.observations},
       {"unknowns", s.unknowns},
@@ -129,8 +206,8 @@ void print_summary(const Outcome& outcome, const std::filesystem::path& folder) 
   fmt::print("model       {}  ({} tables, tool and machine \"{}\")\n",
              model_id(outcome.document.model, outcome.document.method),
              outcome.document.model.layout().tables().size(), outcome.document.machine);
-  fmt::print("samples     {}, {} lost; {} blocks of {} used\n", s.samples, s.lost_samples,
-             outcome.blocks_used, outcome.block_samples);
+  fmt::print("samples     {}, {} lost; {} of {} blocks used\n", s.samples, s.lost_samples,
+             outcome.blocks_used, outcome.blocks);
   fmt::print("solution    {} observations, {} unknowns, rank {}, condition {:.3g}, sigma0 {:.3f}\n",
              s.observations, s.unknowns, s.rank, s.condition, s.sigma0);
   fmt::print("residuals   {:.3f} um rms before, {:.3f} um after\n", s.before.rms_m * kMicro,
@@ -140,18 +217,24 @@ void print_summary(const Outcome& outcome, const std::filesystem::path& folder) 
   fmt::print("gate        {}\n", outcome.verdict.accepted ? coloured("would accept", kGreen, kStdout)
                                                           : coloured("would refuse", kYellow, kStdout));
   for (const auto& reason : outcome.verdict.reasons) fmt::print("            {}\n", reason);
-  fmt::print("written     {}, tables.csv\n", (folder / "model.json").string());
+  fmt::print("written     {}, tables.csv, report.html\n", (folder / "model.json").string());
+}
+
+Result<Outcome> identify(const Arguments& arguments, ProgressBar& bar) {
+  const auto active = active_model(arguments);
+  if (!active) return tl::make_unexpected(active.error());
+  const calib::VolumetricModel* const compared = *active ? &(*active)->model : nullptr;
+  return arguments.recording.empty() ? from_files(arguments, compared, bar)
+                                     : from_recording(arguments, compared, bar);
 }
 
 int run(const Arguments& arguments) {
   ProgressBar bar;
-  const auto inputs = read_inputs(arguments, bar);
-  if (!inputs) return bar.clear(), report(inputs.error());
-  const auto outcome = identify(*inputs, arguments, bar);
+  const auto outcome = identify(arguments, bar);
   bar.clear();
   if (!outcome) return report(outcome.error());
-  if (const auto written = write_outputs(arguments.out, outcome->document); !written)
-    return report(written.error());
+  if (const auto written = write_outputs(arguments.out, *outcome); !written) return report(written.error());
+  if (const auto kept = keep(arguments, *outcome); !kept) return report(kept.error());
   arguments.json ? print_json(*outcome, arguments.out) : print_summary(*outcome, arguments.out);
   return 0;
 }
@@ -160,19 +243,29 @@ int run(const Arguments& arguments) {
 
 void add_identify_otf(CLI::App& parent, int& exit) {
   auto arguments = std::make_shared<Arguments>();
-  auto* command = parent.add_subcommand("otf",
-                                        "From laser tracker points taken on the fly along a path.\n"
-                                        "Writes model.json and tables.csv to OUT and says how well the model "
-                                        "predicts legs it was not fitted to.");
-  command->add_option("--machine", arguments->machine, "machine.toml, or the daemon's abbed.toml")
-      ->required();
-  command->add_option("--path", arguments->path, "path.csv: x_mm,y_mm,z_mm, the vertices that were driven")
-      ->required();
-  command
-      ->add_option("--tracker", arguments->tracker,
-                   "tracker.csv: time_s,range_mm,azimuth_rad,elevation_rad[,status]\nor "
-                   "time_s,x_mm,y_mm,z_mm[,status]")
-      ->required();
+  auto* command = parent.add_subcommand(
+      "otf",
+      "From laser tracker points taken on the fly along a path.\n"
+      "Writes model.json, tables.csv and report.html to OUT and says how well the model "
+      "predicts legs it was not fitted to.");
+  auto* machine =
+      command->add_option("--machine", arguments->machine, "machine.toml, or the daemon's abbed.toml");
+  auto* path = command->add_option("--path", arguments->path,
+                                   "path.csv: x_mm,y_mm,z_mm, the vertices that were driven");
+  auto* tracker = command->add_option("--tracker", arguments->tracker,
+                                      "tracker.csv: time_s,range_mm,azimuth_rad,elevation_rad[,status]\n"
+                                      "or time_s,x_mm,y_mm,z_mm[,status]");
+  auto* recording = command->add_option(
+      "--recording", arguments->recording,
+      "what the daemon recorded (.mcap) instead of path and tracker: its last complete run, with\n"
+      "the recorded configuration unless --machine is given");
+  path->needs(machine, tracker);
+  tracker->needs(path);
+  recording->excludes(path)->excludes(tracker);
+  command->add_option(
+      "--keep", arguments->keep,
+      "also keep the model in this store, judged against the model active there; activate it with\n"
+      "abbe model activate");
   command->add_option("--estimator", arguments->estimator, "two-step: align, then adjust")
       ->check(CLI::IsMember({"two-step"}))
       ->capture_default_str();
@@ -182,7 +275,12 @@ void add_identify_otf(CLI::App& parent, int& exit) {
       ->check(CLI::Range(10, 1000));
   command->add_flag("--json", arguments->json, "the summary as one JSON object");
   command->add_option("-o,--out", arguments->out, "folder for the results; created if needed")->required();
-  command->callback([arguments, &exit] { exit = run(*arguments); });
+  command->callback([arguments, &exit] {
+    exit =
+        arguments->tracker.empty() && arguments->recording.empty()
+            ? report({ErrorCode::Usage, "identify otf needs --machine, --path and --tracker, or --recording"})
+            : run(*arguments);
+  });
 }
 
 }  // namespace abbe::daemon

@@ -80,21 +80,8 @@ Result<std::string> row(const calib::VolumetricModel& model, const AxisPosition&
   return text + (inside ? "1\n" : "0\n");
 }
 
-/// A file, or else a model of the store. What looks like a path is never looked up there.
-Result<ModelDocument> model_of(const Arguments& arguments) {
-  std::error_code ignored;
-  const std::filesystem::path file = arguments.model;
-  if (file.has_parent_path() || file.has_extension() || std::filesystem::exists(file, ignored))
-    return read_model(file);
-  const auto store = open_store(arguments.store);
-  if (!store) return tl::make_unexpected(store.error());
-  const auto id = store->find(arguments.model);
-  if (!id) return tl::make_unexpected(id.error());
-  return store->load(*id);
-}
-
 Result<std::string> evaluate(const Arguments& arguments) {
-  const auto document = model_of(arguments);
+  const auto document = model_named(arguments.model, arguments.store);
   if (!document) return tl::make_unexpected(document.error());
   const auto points = read_points_csv(arguments.points);
   if (!points) return tl::make_unexpected(points.error());

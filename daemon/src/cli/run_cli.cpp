@@ -67,6 +67,7 @@ void add_commands(CLI::App& app, int& exit) {
       app.add_subcommand("model", "Evaluate models, and look after the store of a machine's models");
   model->require_subcommand(1);
   add_model_eval(*model, exit);
+  add_model_compare(*model, exit);
   add_model_list(*model, exit);
   add_model_show(*model, exit);
   add_model_activate(*model, exit);

@@ -19,4 +19,16 @@ Result<ModelStore> open_store(const StoreOption& where) {
   return ModelStore::open(config->daemon.models_dir());
 }
 
+Result<ModelDocument> model_named(const std::string& name, const StoreOption& where) {
+  std::error_code ignored;
+  const std::filesystem::path file = name;
+  if (file.has_parent_path() || file.has_extension() || std::filesystem::exists(file, ignored))
+    return read_model(file);
+  const auto store = open_store(where);
+  if (!store) return tl::make_unexpected(store.error());
+  const auto id = store->find(name);
+  if (!id) return tl::make_unexpected(id.error());
+  return store->load(*id);
+}
+
 }  // namespace abbe::daemon

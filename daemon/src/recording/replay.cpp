@@ -97,8 +97,9 @@ class RawDecoder {
 /// The calibrations the recording asks for, one after the other.
 class Calibrations {
  public:
-  Calibrations(std::vector<CalibrationRequest> requests, const Config& config)
-      : requests_(std::move(requests)), config_(config), session_(acquisition_options(config)) {
+  Calibrations(std::vector<CalibrationRequest> requests, const Config& config,
+               const calib::VolumetricModel* active)
+      : requests_(std::move(requests)), config_(config), active_(active), session_(acquisition_options(config)) {
     begin_next();
   }
 
@@ -132,7 +133,7 @@ class Calibrations {
   void identify(std::vector<RunPoint> points) {
     ReplayedCalibration c{.ended = session_.status(), .points_sha256 = points_sha256(points)};
     c.outcome = identify_run({.path_m = session_.path_m(), .points = std::move(points)}, config_.machine,
-                             config_.gate, nullptr);
+                             config_.gate, active_);
     if (*c.outcome) {
       c.model_hash = model_hash((*c.outcome)->solution.model, "otf");
       c.model_id = model_id((*c.outcome)->solution.model, "otf");
@@ -143,6 +144,7 @@ class Calibrations {
 
   std::vector<CalibrationRequest> requests_;
   const Config& config_;
+  const calib::VolumetricModel* active_;
   CalibrationSession session_;
   std::size_t next_ = 0;
   bool identified_ = true;
@@ -182,7 +184,7 @@ Result<ReplayReport> replay(const RecordingReader& recording, const Config& conf
                             const ReplayOptions& options) {
   auto requests = requests_of(recording);
   if (!requests) return tl::unexpected(requests.error());
-  Calibrations calibrations{std::move(*requests), config};
+  Calibrations calibrations{std::move(*requests), config, options.active};
   Assembler assembler{assembler_options(config)};
   RawDecoder raw{config};
   ReplayReport report;

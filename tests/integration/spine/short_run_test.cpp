@@ -67,6 +67,16 @@ struct ShortRun : Spine {
     EXPECT_EQ(said["losses"], json::array());
   }
 
+  void expect_the_recording_gives_the_model(const std::string& id) {
+    const auto identified = run({ABBE_PROGRAM, "identify", "otf", "--recording", recordings().front(), "-o",
+                                 file("again"), "--json"});
+    EXPECT_EQ(identified.code, 0) << identified.err;
+    const json said = json::parse(identified.out, nullptr, false);
+    ASSERT_TRUE(said.is_object()) << identified.out;
+    EXPECT_EQ(said["id"], id);
+    EXPECT_TRUE(std::filesystem::exists(file("again/report.html")));
+  }
+
   std::unique_ptr<Program> watch_;
 };
 
@@ -74,13 +84,15 @@ TEST_F(ShortRun, IsCalibratedPublishedRecordedAndReplayedTheSame) {
   ASSERT_NO_FATAL_FAILURE(start_everything());
   const auto calibrated = calibrate("path.csv");
   ASSERT_EQ(calibrated.code, 0) << calibrated.out << calibrated.err;
-  EXPECT_EQ(status()["model"]["state"], "ACTIVE");
+  const json model = status()["model"];
+  EXPECT_EQ(model["state"], "ACTIVE");
   ASSERT_NO_FATAL_FAILURE(expect_subscriber_sees_a_smaller_error());
   EXPECT_EQ(abbed_->stop(), 0) << abbed_->err();
   ASSERT_EQ(recordings().size(), 1u);
   EXPECT_EQ(recordings().front().extension(), ".mcap");  // closed: else .part
   expect_the_same_again({});
   expect_the_same_again({"--raw"});
+  expect_the_recording_gives_the_model(model["id"]);
 }
 
 struct WrongPath : Spine {

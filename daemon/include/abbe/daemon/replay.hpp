@@ -1,7 +1,7 @@
 #pragma once
-/// A recording goes once more through the same receivers, assembler, session and identification as it did live. From the
-/// decoded samples or from the raw device bytes, at recorded speed or as fast as possible; the model's hash comes out the
-/// same. Reads no clock but to pace itself.
+/// A recording goes once more through the same receivers, assembler, session and identification as it did
+/// live. From the decoded samples or from the raw device bytes, at recorded speed or as fast as possible; the
+/// model's hash comes out the same. Reads no clock but to pace itself.
 
 #include <chrono>
 #include <cstdint>
@@ -22,14 +22,16 @@ enum class ReplaySource { Samples, RawBytes };
 struct ReplayOptions {
   ReplaySource source = ReplaySource::Samples;
   double speed = 0.0;  ///< recorded seconds per second; 0: as fast as possible
+  const calib::VolumetricModel* active =
+      nullptr;  ///< what the gate compares with; null: no compensation alone
   std::function<void(double share)> progress;
 };
 
 /// One calibration of the recording, done again.
 struct ReplayedCalibration {
-  SessionStatus ended;                       ///< state Identifying: the run was complete; else why it was not
+  SessionStatus ended;  ///< state Identifying: the run was complete; else why it was not
   std::optional<Result<OtfCandidate>> outcome;  ///< of a complete run
-  std::string model_hash;                    ///< empty without a model
+  std::string model_hash;                       ///< empty without a model
   std::string model_id;
   std::string points_sha256;
 };
@@ -42,8 +44,8 @@ struct ReplayReport {
   std::chrono::nanoseconds recorded{};  ///< from the first to the last message
 };
 
-/// `config` is the one the recording was made with (RecordingInfo::configuration). BadInput for a recording whose
-/// calibration request cannot be read.
+/// `config` is the one the recording was made with (RecordingInfo::configuration). BadInput for a recording
+/// whose calibration request cannot be read.
 [[nodiscard]] Result<ReplayReport> replay(const RecordingReader& recording, const Config& config,
                                           const ReplayOptions& options);
 

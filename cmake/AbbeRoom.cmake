@@ -19,6 +19,13 @@ if(ABBE_SANITIZE)
   endif()
 endif()
 
+# For code that computes little: in sanitizer builds the optimizer would take longer than it saves.
+function(abbe_compile_fast target)
+  if(ABBE_SANITIZE)
+    target_compile_options(${target} PRIVATE -O0)
+  endif()
+endfunction()
+
 function(abbe_room name)
   file(GLOB_RECURSE sources CONFIGURE_DEPENDS ${CMAKE_CURRENT_SOURCE_DIR}/src/*.cpp)
   file(GLOB_RECURSE headers CONFIGURE_DEPENDS ${CMAKE_CURRENT_SOURCE_DIR}/include/*.hpp)

@@ -104,7 +104,6 @@ std::span<const MemberBound> member_bounds() noexcept {
 
 template std::span<const MemberBound> member_bounds<v1::Parameter>() noexcept;
 template std::span<const MemberBound> member_bounds<v1::AxisRange>() noexcept;
-template std::span<const MemberBound> member_bounds<v1::HullVertex>() noexcept;
 
 #define ABBE_TOPIC_TYPE(TYPE)                                             \
   namespace {                                                             \

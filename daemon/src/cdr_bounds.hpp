@@ -85,7 +85,7 @@ template <class V>
 void visit(const v1::ErrorGrid& m, V&& v) {
   v("machine", m.machine(), 64);
   v("model_id", m.model_id(), 64);
-  v("nodes", m.nodes(), 480);
+  v("nodes", m.nodes(), 456);
 }
 template <class V>
 void visit(const v1::ModelState& m, V&& v) {

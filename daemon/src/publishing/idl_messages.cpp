@@ -11,7 +11,7 @@ namespace {
 
 using std::chrono::nanoseconds;
 
-constexpr std::size_t kNodesPerSlice = 480;   // ErrorGrid::nodes in the IDL
+constexpr std::size_t kNodesPerSlice = 456;   // ErrorGrid::nodes in the IDL
 constexpr std::size_t kMostGridNodes = 4096;  // 9 slices: what a late joiner is sent at once
 constexpr std::size_t kHullBound = 512;       // ErrorModel::validity_hull
 constexpr std::size_t kReasonBound = 256;     // ModelState::reason, Health::fault

@@ -78,7 +78,7 @@ inline std::vector<v1::ErrorGrid> grid_slices() {
     node.error_m(error_at(node.position_m()));
     node.cov_m2({1e-12, 0.0, 0.0, 4e-12, 0.0, 9e-12});
     node.inside(i != 500);  // one in slice 1
-    slices[i / 480].nodes().push_back(node);
+    slices[i / 456].nodes().push_back(node);
   }
   for (std::uint32_t s = 0; s < 2; ++s) {
     slices[s].machine(kMachine);

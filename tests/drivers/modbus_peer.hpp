@@ -26,6 +26,7 @@
 #include "abbe/drivers/environment/device.hpp"
 #include "abbe/sim/socket.hpp"
 #include "modbus_script.hpp"
+#include "peer_socket.hpp"
 
 namespace abbe::tests {
 
@@ -137,19 +138,6 @@ class ModbusPeer {
 
  private:
   [[nodiscard]] std::string link() const { return folder_ + "/line"; }
-  static sim::Socket bound_socket(std::uint16_t port) {
-    sim::Socket s(::socket(AF_INET, SOCK_STREAM | SOCK_NONBLOCK | SOCK_CLOEXEC, 0));
-    const int yes = 1;
-    ::setsockopt(s.get(), SOL_SOCKET, SO_REUSEADDR, &yes, sizeof yes);
-    ::setsockopt(s.get(), SOL_SOCKET, SO_REUSEPORT, &yes, sizeof yes);
-    sockaddr_in a{};
-    a.sin_family = AF_INET;
-    a.sin_port = htons(port);
-    a.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
-    EXPECT_EQ(::bind(s.get(), reinterpret_cast<const sockaddr*>(&a), sizeof a), 0);
-    return s;
-  }
-
   modbus::Transport transport_;
   std::string folder_;
   std::uint16_t port_ = 0;

@@ -20,6 +20,7 @@
 #include "abbe/protocol/emscon/framer.hpp"
 #include "abbe/sim/socket.hpp"
 #include "abbe/sim/tracker_device.hpp"
+#include "peer_socket.hpp"
 #include "tracker_script.hpp"
 
 namespace abbe::tests::tracker {
@@ -108,20 +109,6 @@ class TrackerPeer {
   }
 
  private:
-  /// Held by a second socket, so that the port stays ours while unplugged.
-  static sim::Socket bound_socket(std::uint16_t port) {
-    sim::Socket s(::socket(AF_INET, SOCK_STREAM | SOCK_NONBLOCK | SOCK_CLOEXEC, 0));
-    const int yes = 1;
-    ::setsockopt(s.get(), SOL_SOCKET, SO_REUSEADDR, &yes, sizeof yes);
-    ::setsockopt(s.get(), SOL_SOCKET, SO_REUSEPORT, &yes, sizeof yes);
-    sockaddr_in a{};
-    a.sin_family = AF_INET;
-    a.sin_port = htons(port);
-    a.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
-    EXPECT_EQ(::bind(s.get(), reinterpret_cast<const sockaddr*>(&a), sizeof a), 0);
-    return s;
-  }
-
   void power_on(HostTime now) { controller_ = std::make_unique<sim::TrackerDevice>(options_, machine_, now); }
 
   void accept_client(HostTime now) {

@@ -236,6 +236,15 @@ TEST(Config, RefusesTwoNodesOnOneId) {
               ElementsAre(HasSubstr("encoder.nodes[1].node: node id 5 is used twice")));
 }
 
+TEST(Config, LetsTheKernelSendTheSyncOnSocketCanOnly) {
+  const std::string by_kernel = "sync = \"kernel\"\n" + kNodes;
+  const auto config = parse_config(kMachine + kCanBus + by_kernel, "abbed.toml");
+  ASSERT_TRUE(config) << config.error().details.front();
+  EXPECT_EQ(config->encoder->sync, SyncConfig::Kernel);
+  const std::string udp = "[encoder]\ntransport = \"udp\"\npeer_host = \"10.0.0.8\"\npeer_port = 20000\n";
+  EXPECT_THAT(faults_of(kMachine + udp + by_kernel), ElementsAre(HasSubstr("encoder.sync: has no meaning")));
+}
+
 TEST(Config, RefusesKeysOfTheOtherTransport) {
   EXPECT_THAT(faults_of(kMachine + kCanBus + "peer_port = 9\n" + kNodes),
               ElementsAre(HasSubstr("encoder.peer_port: has no meaning")));

@@ -207,6 +207,27 @@ TEST_F(EncoderDeviceOnUdp, CountsDatagramsThatAreMissing) {
   EXPECT_EQ(device->status().gaps, before + 5);
 }
 
+TEST_F(EncoderDeviceOnUdp, CountsPositionsThatAreTooShortAsFaults) {
+  begin_streaming();
+  const auto before = device->status().faults;
+  const std::vector<can::CanFrame> shorts(3, can::standard_frame(0x181, {1, 2}));
+  peer.send(shorts);
+  turns(10);
+  EXPECT_EQ(device->status().faults, before + 3);
+  EXPECT_THAT(device->status().last_fault, testing::HasSubstr("too short"));
+}
+
+TEST_F(EncoderDeviceOnUdp, RefusesASyncThatOnlyTheKernelCouldSend) {
+  EncoderDeviceOptions options;
+  options.receiver.axes = {{.name = "X", .node = 1}};
+  options.sync = SyncSource::Kernel;
+  const auto refused = EncoderDevice::create(
+      options, std::make_unique<UdpCanBus>(UdpCanOptions{.peer_port = peer.port()}, time), time);
+  ASSERT_FALSE(refused);
+  EXPECT_EQ(refused.error().code, ErrorCode::BadConfiguration);
+  EXPECT_THAT(refused.error().text, testing::HasSubstr("SocketCAN"));
+}
+
 TEST_F(EncoderDeviceOnUdp, SurvivesAFloodOfPositions) {
   begin_streaming();
   const std::vector<can::CanFrame> flood(4000, can::encode_position(0x181, can::PositionType::Signed32, 5));

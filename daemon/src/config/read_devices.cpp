@@ -49,16 +49,18 @@ void read_transport(Section& encoder, EncoderConfig& out) {
       "transport", out.transport,
       {{"udp", EncoderTransport::Udp}, {"socketcan", EncoderTransport::SocketCan}}, Need::Required);
   if (!known) {
-    for (const auto key : {"interface", "local_port", "peer_host", "peer_port"})
+    for (const auto key : {"interface", "sync", "local_port", "peer_host", "peer_port"})
       static_cast<void>(encoder.has(key));
   } else if (out.transport == EncoderTransport::SocketCan) {
     encoder.get("interface", out.interface, Need::Required);
+    encoder.get_word<SyncConfig>("sync", out.sync,
+                                 {{"daemon", SyncConfig::Daemon}, {"kernel", SyncConfig::Kernel}});
     refuse(encoder, {"local_port", "peer_host", "peer_port"}, "socketcan");
   } else {
     encoder.get_integer("local_port", out.local_port, 0, 65535);
     encoder.get("peer_host", out.peer_host, Need::Required);
     encoder.get_integer("peer_port", out.peer_port, 1, 65535, Need::Required);
-    refuse(encoder, {"interface"}, "udp");
+    refuse(encoder, {"interface", "sync"}, "udp");
   }
 }
 

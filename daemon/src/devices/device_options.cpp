@@ -53,6 +53,8 @@ drivers::TrackerDeviceOptions device_options(const TrackerConfig& config, double
 drivers::EncoderDeviceOptions device_options(const EncoderConfig& config, double speed) {
   drivers::EncoderDeviceOptions options;
   options.name = config.name;
+  options.sync =
+      config.sync == SyncConfig::Kernel ? drivers::SyncSource::Kernel : drivers::SyncSource::Thread;
   options.receiver.sync_period = config.sync_period;
   options.receiver.sampling_delay = config.sampling_delay;
   options.receiver.u_sampling_delay = config.u_sampling_delay;

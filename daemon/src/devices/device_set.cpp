@@ -35,8 +35,8 @@ void drain_ring(Ring& ring, std::array<T, N>& room, std::vector<T>& out) {
 std::unique_ptr<drivers::CanBus> make_bus(const EncoderConfig& config, double speed,
                                           const drivers::TimeSource& time) {
   if (config.transport == EncoderTransport::SocketCan) {
-    return std::make_unique<drivers::SocketCanBus>(drivers::SocketCanOptions{.interface = config.interface},
-                                                   time);
+    return std::make_unique<drivers::SocketCanBus>(
+        drivers::SocketCanOptions{.interface = config.interface, .speed = speed}, time);
   }
   return std::make_unique<drivers::UdpCanBus>(drivers::UdpCanOptions{.local_port = config.local_port,
                                                                      .peer_address = config.peer_host,

@@ -14,6 +14,11 @@ Result<std::unique_ptr<EncoderDevice>> EncoderDevice::create(const EncoderDevice
                                                              std::unique_ptr<CanBus> bus,
                                                              const TimeSource& time) {
   if (auto ok = check(options.receiver); !ok) return tl::unexpected(ok.error());
+  if (options.sync == SyncSource::Kernel && !bus->has_sync()) {
+    return tl::unexpected(
+        Error{ErrorCode::BadConfiguration,
+              fmt::format("CAN {}: the kernel sends a SYNC only on SocketCAN", bus->name())});
+  }
   return std::unique_ptr<EncoderDevice>(new EncoderDevice(options, std::move(bus), time));
 }
 
@@ -55,10 +60,16 @@ bool EncoderDevice::ensure_open(std::chrono::nanoseconds at_most) {
     std::this_thread::sleep_for(time_.wall(std::min(at_most, std::chrono::nanoseconds{reopen_at_ - now})));
     return false;
   }
-  if (const auto opened = bus_->open(supervisor_.ids()); !opened) {
-    close_bus(opened.error());
+  auto ids = supervisor_.ids();
+  if (options_.sync == SyncSource::Kernel) ids.push_back(can::cob::kSync);
+  if (const auto opened = bus_->open(ids); !opened) {
+    // The same refusal four times a second is one fault.
+    if (opened.error().text != refusal_) board_.fault(now, opened.error().text);
+    refusal_ = opened.error().text;
+    reopen_at_ = now + options_.reopen_after;
     return false;
   }
+  refusal_.clear();
   open_ = true;
   supervisor_.start(now);
   return true;
@@ -69,6 +80,7 @@ void EncoderDevice::close_bus(const Error& error) {
   board_.fault(now, error.text);
   bus_->close();
   open_ = false;
+  kernel_sync_ = false;
   next_sync_.reset();
   reopen_at_ = now + options_.reopen_after;
   board_.set_connected(false);
@@ -90,7 +102,18 @@ bool EncoderDevice::syncing() const {
   return !receiver_.bus_off() && supervisor_.ready() > 0;
 }
 
+void EncoderDevice::follow_kernel_sync() {
+  if (syncing() == kernel_sync_) return;
+  if (kernel_sync_) {
+    bus_->stop_sync();
+  } else if (const auto started = bus_->start_sync(options_.receiver.sync_period); !started) {
+    return close_bus(started.error());
+  }
+  kernel_sync_ = !kernel_sync_;
+}
+
 void EncoderDevice::send_sync() {
+  if (options_.sync == SyncSource::Kernel) return follow_kernel_sync();
   if (!syncing()) {
     next_sync_.reset();
     return;
@@ -142,7 +165,12 @@ void EncoderDevice::read_batch(HostTime now, std::chrono::nanoseconds at_most) {
   }
   batch_count_ = *read;
   for (const auto& received : std::span{batch_}.first(batch_count_)) {
-    if (received.frame.is(can::FrameFlag::Error)) continue;
+    if (received.frame.is(can::FrameFlag::Error) || received.echo) continue;
+    if (can::decode_sync(received.frame) && !rival_told_) {
+      rival_told_ = true;
+      board_.fault(turn_end_,
+                   fmt::format("CAN {}: somebody else sends SYNCs on this bus, too", bus_->name()));
+    }
     unreachable_ = false;
     last_heard_ = turn_end_;
     supervisor_.on_frame(received.frame, turn_end_);
@@ -162,6 +190,16 @@ void EncoderDevice::account(HostTime now) {
   }
   bus_seen_ = bus;
   missed_seen_ = missed;
+  count_short_frames(now);
+}
+
+void EncoderDevice::count_short_frames(HostTime now) {
+  const auto shorts = receiver_.counters().short_frames;
+  if (shorts == short_seen_) return;
+  board_.faults.add(shorts - short_seen_ - 1);
+  board_.fault(now, fmt::format("CAN {}: read: {} frames too short for a position", bus_->name(),
+                                shorts - short_seen_));
+  short_seen_ = shorts;
 }
 
 void EncoderDevice::show_state(HostTime now) {

@@ -1,14 +1,17 @@
 #include "abbe/drivers/can/socket_can_bus.hpp"
 
 #include <linux/can.h>
+#include <linux/can/bcm.h>
 #include <linux/can/error.h>
 #include <linux/can/raw.h>
 #include <net/if.h>
+#include <sys/ioctl.h>
 #include <unistd.h>
 
 #include <array>
 
 #include "abbe/drivers/can/linux_frame.hpp"
+#include "abbe/protocol/can/canopen.hpp"
 #include "can/socket_io.hpp"
 
 namespace abbe::drivers {
@@ -37,7 +40,7 @@ struct SocketCanBus::Batch {
 };
 
 SocketCanBus::SocketCanBus(SocketCanOptions options, const TimeSource& time)
-    : options_(std::move(options)), time_(time), batch_(std::make_unique<Batch>()) {}
+    : options_(std::move(options)), time_(time), stamps_(options_.speed), batch_(std::make_unique<Batch>()) {}
 
 SocketCanBus::~SocketCanBus() {
   close();
@@ -48,6 +51,7 @@ CanBusCounters SocketCanBus::counters() const noexcept {
 }
 
 void SocketCanBus::close() noexcept {
+  stop_sync();
   if (fd_ >= 0) ::close(fd_);
   fd_ = -1;
   last_overflow_ = 0;
@@ -59,7 +63,7 @@ Result<void> SocketCanBus::open(std::span<const std::uint32_t> ids) {
   fd_ = socket(PF_CAN, SOCK_RAW | SOCK_NONBLOCK | SOCK_CLOEXEC, CAN_RAW);
   if (fd_ < 0) return socket_error(ErrorCode::SystemRefused, name(), "socket", errno);
   auto ok = configure(ids);
-  if (ok) ok = bind_to_interface();
+  if (ok) ok = find_interface().and_then([this](int index) { return bind_to_interface(index); });
   if (!ok) close();
   return ok;
 }
@@ -75,22 +79,42 @@ Result<void> SocketCanBus::configure(std::span<const std::uint32_t> ids) {
     return socket_error(ErrorCode::SystemRefused, name(), "ask for error frames", errno);
   }
   const int on = 1;
-  // Not every interface does CAN FD and not everybody may enlarge the buffer: both are welcome, neither is
-  // needed.
-  setsockopt(fd_, SOL_CAN_RAW, CAN_RAW_FD_FRAMES, &on, sizeof on);
-  setsockopt(fd_, SOL_SOCKET, SO_RCVBUF, &options_.receive_buffer_bytes,
-             sizeof options_.receive_buffer_bytes);
+  setsockopt(fd_, SOL_CAN_RAW, CAN_RAW_FD_FRAMES, &on,
+             sizeof on);  // find_interface() asks whether it matters
+  const int bytes_wanted = options_.receive_buffer_bytes;
+  if (setsockopt(fd_, SOL_SOCKET, SO_RCVBUFFORCE, &bytes_wanted, sizeof bytes_wanted) != 0) {
+    setsockopt(fd_, SOL_SOCKET, SO_RCVBUF, &bytes_wanted, sizeof bytes_wanted);
+  }
   setsockopt(fd_, SOL_SOCKET, SO_RXQ_OVFL, &on, sizeof on);
   enable_stamps(fd_);
   return {};
 }
 
-Result<void> SocketCanBus::bind_to_interface() {
+/// The index of an interface that is there, is up, and carries what is wanted.
+Result<int> SocketCanBus::find_interface() const {
+  ifreq request{};
+  options_.interface.copy(request.ifr_name, IFNAMSIZ - 1);
+  const auto ask = [&](unsigned long what) { return ioctl(fd_, what, &request) == 0; };
+  const auto no = [&](std::string_view what, int error) {
+    return socket_error(ErrorCode::SystemRefused, name(), what, error);
+  };
+  if (!ask(SIOCGIFINDEX)) return no("find the interface", errno);
+  const int index = request.ifr_ifindex;
+  if (!ask(SIOCGIFFLAGS)) return no("look at the interface", errno);
+  if ((request.ifr_flags & IFF_UP) == 0) return no("open (ip link set up)", ENETDOWN);
+  if (!ask(SIOCGIFMTU)) return no("look at the interface", errno);
+  if (options_.require_fd && request.ifr_mtu < static_cast<int>(CANFD_MTU)) {
+    return tl::unexpected(
+        Error{ErrorCode::BadConfiguration,
+              fmt::format("CAN {}: CAN FD is asked for: the interface is classic", name())});
+  }
+  return index;
+}
+
+Result<void> SocketCanBus::bind_to_interface(int index) {
   sockaddr_can address{};
   address.can_family = AF_CAN;
-  address.can_ifindex = static_cast<int>(if_nametoindex(options_.interface.c_str()));
-  if (address.can_ifindex == 0)
-    return socket_error(ErrorCode::SystemRefused, name(), "find the interface", errno);
+  address.can_ifindex = index;
   const auto* any = reinterpret_cast<const sockaddr*>(&address);  // NOLINT: the sockets interface
   if (bind(fd_, any, sizeof address) != 0)
     return socket_error(ErrorCode::SystemRefused, name(), "bind", errno);
@@ -114,7 +138,8 @@ Result<std::size_t> SocketCanBus::read(std::span<ReceivedFrame> out, std::chrono
   std::size_t count = 0;
   for (unsigned i = 0; i < static_cast<unsigned>(got); ++i) {
     auto& message = batch_->messages[i];
-    const auto arrival = stamps_.arrival(stamp_of(message.msg_hdr), clocks, now);
+    const auto arrival = options_.speed > 0.0 ? stamps_.arrival(stamp_of(message.msg_hdr), clocks, now)
+                                              : Arrival{.time = now};
     out[count].time = arrival.time;
     out[count].time_widened = arrival.widened;
     for (auto* c = CMSG_FIRSTHDR(&message.msg_hdr); c != nullptr; c = CMSG_NXTHDR(&message.msg_hdr, c)) {
@@ -124,7 +149,12 @@ Result<std::size_t> SocketCanBus::read(std::span<ReceivedFrame> out, std::chrono
       lost_ += overflow - last_overflow_;
       last_overflow_ = overflow;
     }
-    if (const auto frame = from_linux(batch_->frames[i], message.msg_len)) out[count++].frame = *frame;
+    const auto frame = from_linux(batch_->frames[i], message.msg_len);
+    if (!frame) continue;
+    // MSG_DONTROUTE: made on this computer [linux/can/raw.h].
+    const bool ours = (message.msg_hdr.msg_flags & MSG_DONTROUTE) != 0;
+    out[count].echo = ours && sync_fd_ >= 0 && can::decode_sync(*frame).has_value();
+    out[count++].frame = *frame;
   }
   if (static_cast<unsigned>(got) < slots) stamps_.nothing_older_than(begun);
   return count;
@@ -139,6 +169,45 @@ Result<void> SocketCanBus::send(std::span<const can::CanFrame> frames) {
     return socket_error(passing ? ErrorCode::Unreachable : ErrorCode::SystemRefused, name(), "send", errno);
   }
   return {};
+}
+
+Result<void> SocketCanBus::start_sync(std::chrono::nanoseconds period) {
+  stop_sync();
+  const auto no = [this](std::string_view what) {
+    const auto error = socket_error(ErrorCode::SystemRefused, name(), what, errno);
+    stop_sync();
+    return error;
+  };
+  const auto index = find_interface();
+  if (!index) return tl::unexpected(index.error());
+  sync_fd_ = socket(PF_CAN, SOCK_DGRAM | SOCK_CLOEXEC, CAN_BCM);
+  if (sync_fd_ < 0) return no("socket of the broadcast manager");
+  sockaddr_can address{};
+  address.can_family = AF_CAN;
+  address.can_ifindex = *index;
+  const auto* any = reinterpret_cast<const sockaddr*>(&address);  // NOLINT: the sockets interface
+  if (connect(sync_fd_, any, sizeof address) != 0) return no("connect the broadcast manager");
+
+  const auto sync = to_linux(can::encode_sync());
+  bcm_msg_head head{};
+  head.opcode = TX_SETUP;
+  head.flags = SETTIMER | STARTTIMER;
+  const auto us = std::chrono::duration_cast<std::chrono::microseconds>(time_.wall(period)).count();
+  head.ival2 = {us / 1'000'000, us % 1'000'000};
+  head.can_id = sync.frame.can_id;
+  head.nframes = 1;
+  // The broadcast manager reads the frames right behind the head; a classic frame is the first CAN_MTU bytes.
+  std::array<std::byte, sizeof head + CAN_MTU> job{};
+  std::memcpy(job.data(), &head, sizeof head);
+  std::memcpy(job.data() + sizeof head, &sync.frame, CAN_MTU);
+  if (write(sync_fd_, job.data(), job.size()) != static_cast<ssize_t>(job.size()))
+    return no("start the SYNC");
+  return {};
+}
+
+void SocketCanBus::stop_sync() noexcept {
+  if (sync_fd_ >= 0) ::close(sync_fd_);
+  sync_fd_ = -1;
 }
 
 }  // namespace abbe::drivers

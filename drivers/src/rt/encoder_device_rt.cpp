@@ -11,8 +11,10 @@ using protocol::RawBlock;
 void EncoderDevice::receive() ABBE_RT {
   const auto frames = std::span<const ReceivedFrame>{batch_}.first(batch_count_);
   record_frames(frames);
-  for (const auto& received : frames)
-    push(receiver_.on_frame(received.frame, received.time, received.time_widened));
+  for (const auto& received : frames) {
+    push(received.echo ? receiver_.on_sent(received.frame, received.time)
+                       : receiver_.on_frame(received.frame, received.time, received.time_widened));
+  }
   // A full batch may have more behind it: only a read that found the end says that nothing else came.
   const bool all_read = batch_count_ < batch_.size();
   batch_count_ = 0;
@@ -21,14 +23,17 @@ void EncoderDevice::receive() ABBE_RT {
   push(receiver_.on_time(turn_end_));
 }
 
-/// One block for each run of frames with one time.
+/// One block for each run of frames with one time and direction.
 void EncoderDevice::record_frames(std::span<const ReceivedFrame> frames) ABBE_RT {
   std::size_t i = 0;
   while (i < frames.size()) {
     can::DatagramWriter writer{datagram_, raw_sequence_++};
-    const auto time = frames[i].time;
-    while (i < frames.size() && frames[i].time == time && writer.add(frames[i].frame)) ++i;
-    (void)raw_.push_bytes(time, RawBlock::Direction::FromDevice, writer.finish());
+    const auto& first = frames[i];
+    const auto belongs = [&](const ReceivedFrame& f) { return f.time == first.time && f.echo == first.echo; };
+    while (i < frames.size() && belongs(frames[i]) && writer.add(frames[i].frame)) ++i;
+    (void)raw_.push_bytes(first.time,
+                          first.echo ? RawBlock::Direction::ToDevice : RawBlock::Direction::FromDevice,
+                          writer.finish());
   }
 }
 

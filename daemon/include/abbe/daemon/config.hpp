@@ -74,6 +74,7 @@ struct TrackerConfig {
 };
 
 enum class EncoderTransport { Udp, SocketCan };
+enum class SyncConfig { Daemon, Kernel };  ///< who sends the SYNC: the device thread, or CAN_BCM on its timer
 
 /// One element of [encoder] nodes. reading = offset + count * step, the step negative when `invert = true`.
 struct EncoderNodeConfig {
@@ -92,6 +93,7 @@ struct EncoderConfig {
   std::uint16_t local_port = 0;  ///< UDP only; 0: the kernel chooses
   std::string peer_host;         ///< UDP only
   std::uint16_t peer_port = 0;   ///< UDP only
+  SyncConfig sync = SyncConfig::Daemon;
   std::chrono::nanoseconds sync_period{std::chrono::milliseconds{1}};
   std::chrono::nanoseconds sampling_delay{};  ///< from SYNC on the wire to the instant the node latches
   std::chrono::nanoseconds u_sampling_delay =

@@ -18,8 +18,9 @@ namespace can = protocol::can;
 
 struct ReceivedFrame {
   can::CanFrame frame;
-  protocol::HostTime time{};  ///< arrival
+  protocol::HostTime time{};  ///< arrival; of an echo: when it left
   bool time_widened = false;  ///< the kernel stamp was not believed: `time` is when user space saw it
+  bool echo = false;          ///< our own cyclic SYNC (start_sync), heard back as it left
 };
 
 /// What a transport lost or refused since it was made; never goes back.
@@ -47,6 +48,12 @@ class CanBus {
                                                  std::chrono::nanoseconds wall) = 0;
   /// Errors as for read().
   [[nodiscard]] virtual Result<void> send(std::span<const can::CanFrame> frames) = 0;
+  /// Lets the operating system send the SYNC every `period` from now on, whatever this thread does, until
+  /// stop_sync() or close(). read() gives each as an echo, if its identifier was among those of open().
+  /// BadConfiguration if this transport cannot.
+  [[nodiscard]] virtual Result<void> start_sync(std::chrono::nanoseconds period);
+  virtual void stop_sync() noexcept {}
+  [[nodiscard]] virtual bool has_sync() const noexcept { return false; }
   [[nodiscard]] virtual CanBusCounters counters() const noexcept = 0;
   /// For people: "can0", "udp 127.0.0.1:20000".
   [[nodiscard]] virtual std::string name() const = 0;

@@ -4,8 +4,9 @@
 ///
 /// The SYNC runs on the host clock at start + n x period: no drift; a period that could not be served is left
 /// out, counted, and marked as a gap on the next sample. It runs while at least one node is configured and
-/// the bus is not off. States: "closed", "configuring", "silent", "degraded" (some nodes), "streaming" (all
-/// nodes), "bus off".
+/// the bus is not off. With SyncSource::Kernel the SYNC comes from the kernel's timer instead and its echo is
+/// the time: on a real controller when the frame was on the wire. States: "closed", "configuring", "silent",
+/// "degraded" (some nodes), "streaming" (all nodes), "bus off".
 
 #include <array>
 #include <cstdint>
@@ -24,18 +25,25 @@
 
 namespace abbe::drivers {
 
+enum class SyncSource {
+  Thread,  ///< the device thread sends it, on any transport; its time is read just before
+  Kernel,  ///< CAN_BCM sends it, whatever the thread does; SocketCAN only; its time is the stamp of its echo
+};
+
 struct EncoderDeviceOptions {
   std::string name = "encoders";
   EncoderReceiverOptions receiver;
   SupervisorOptions supervisor;
-  std::chrono::nanoseconds reopen_after = std::chrono::seconds{1};  ///< after the transport failed
-  std::size_t sample_capacity = 8192;                               ///< 8 s at 1 kHz
+  SyncSource sync = SyncSource::Thread;
+  std::chrono::nanoseconds reopen_after = std::chrono::milliseconds{250};  ///< after the transport failed
+  std::size_t sample_capacity = 8192;                                      ///< 8 s at 1 kHz
   std::size_t raw_capacity_blocks = 8192;
 };
 
 class EncoderDevice final : public Device {
  public:
-  /// `time` must outlive the device. BadConfiguration as check(). The bus is opened by the first wait().
+  /// `time` must outlive the device. BadConfiguration as check(), and for a SYNC that `bus` cannot send. The
+  /// bus is opened by the first wait().
   [[nodiscard]] static Result<std::unique_ptr<EncoderDevice>> create(const EncoderDeviceOptions& options,
                                                                      std::unique_ptr<CanBus> bus,
                                                                      const TimeSource& time);
@@ -59,6 +67,8 @@ class EncoderDevice final : public Device {
   void close_bus(const Error& error);
   void follow_bus_off(protocol::HostTime now);
   void send_sync();
+  void follow_kernel_sync();
+  void count_short_frames(protocol::HostTime now);
   void send_configuration();
   [[nodiscard]] bool send(const can::CanFrame& frame);
   void read_batch(protocol::HostTime now, std::chrono::nanoseconds at_most);
@@ -84,11 +94,15 @@ class EncoderDevice final : public Device {
   bool started_ = false;  ///< the supervisor was started once
   bool bus_was_off_ = false;
   bool unreachable_ = false;  ///< told already
+  std::string refusal_;       ///< why it could not be opened, as told already
+  bool kernel_sync_ = false;  ///< runs
+  bool rival_told_ = false;   ///< that somebody else sends SYNCs, too
   protocol::HostTime reopen_at_{};
   std::optional<protocol::HostTime> next_sync_;
   protocol::HostTime last_heard_{};
   CanBusCounters bus_seen_;
   std::uint64_t missed_seen_ = 0;
+  std::uint64_t short_seen_ = 0;
 
   std::array<ReceivedFrame, kBatch> batch_{};
   std::size_t batch_count_ = 0;

@@ -1,7 +1,7 @@
 #pragma once
 /// The real bus: a Linux SocketCAN RAW socket, filtered to the identifiers in use, with error frames, kernel
-/// receive stamps and the kernel's own loss counter. Bit rate and restart-ms belong to the interface (ip
-/// link), not to us.
+/// receive stamps and the kernel's own loss counter; a BCM socket beside it sends the cyclic SYNC from the
+/// kernel's timer. Bit rate and restart-ms belong to the interface (ip link), not to us.
 
 #include <cstdint>
 #include <memory>
@@ -15,7 +15,12 @@ namespace abbe::drivers {
 
 struct SocketCanOptions {
   std::string interface = "can0";
+  /// Asked for; without CAP_NET_ADMIN the kernel gives net.core.rmem_max at most (by default some 500
+  /// frames).
   int receive_buffer_bytes = 1 << 20;
+  bool require_fd =
+      false;  ///< refuse an interface that carries no CAN FD; where it does, FD frames are read anyway
+  double speed = 1.0;  ///< as UdpCanOptions::speed
 };
 
 class SocketCanBus final : public CanBus {
@@ -29,17 +34,22 @@ class SocketCanBus final : public CanBus {
   [[nodiscard]] Result<std::size_t> read(std::span<ReceivedFrame> out,
                                          std::chrono::nanoseconds wall) override;
   [[nodiscard]] Result<void> send(std::span<const can::CanFrame> frames) override;
+  [[nodiscard]] Result<void> start_sync(std::chrono::nanoseconds period) override;
+  void stop_sync() noexcept override;
+  [[nodiscard]] bool has_sync() const noexcept override { return true; }
   [[nodiscard]] CanBusCounters counters() const noexcept override;
   [[nodiscard]] std::string name() const override { return options_.interface; }
 
  private:
   struct Batch;  ///< the buffers of recvmmsg
   [[nodiscard]] Result<void> configure(std::span<const std::uint32_t> ids);
-  [[nodiscard]] Result<void> bind_to_interface();
+  [[nodiscard]] Result<int> find_interface() const;
+  [[nodiscard]] Result<void> bind_to_interface(int index);
 
   SocketCanOptions options_;
   const TimeSource& time_;
   int fd_ = -1;
+  int sync_fd_ = -1;  ///< CAN_BCM; closing it ends the SYNC
   KernelStampMap stamps_;
   std::unique_ptr<Batch> batch_;
   std::uint64_t lost_ = 0;

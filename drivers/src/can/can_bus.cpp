@@ -1,0 +1,10 @@
+#include "abbe/drivers/can/can_bus.hpp"
+
+namespace abbe::drivers {
+
+Result<void> CanBus::start_sync(std::chrono::nanoseconds) {
+  return tl::unexpected(
+      Error{ErrorCode::BadConfiguration, "CAN " + name() + ": only SocketCAN sends the SYNC by itself"});
+}
+
+}  // namespace abbe::drivers

@@ -11,6 +11,7 @@ namespace abbe::sim {
 Result<void> announce_ports(const Ports& ports, const std::string& path) {
   std::string lines;
   if (ports.tracker) lines += fmt::format("tracker_port={}\n", *ports.tracker);
+  if (!ports.can_interface.empty()) lines += fmt::format("can_interface={}\n", ports.can_interface);
   if (ports.can) lines += fmt::format("can_port={}\n", *ports.can);
   for (const NamedPlace& place : ports.environment) {
     lines += place.port != 0 ? fmt::format("{}_port={}\n", place.name, place.port)
@@ -24,6 +25,7 @@ Result<void> announce_ports(const Ports& ports, const std::string& path) {
   }
   if (ports.tracker) fmt::print("tracker: emScon on 127.0.0.1:{}\n", *ports.tracker);
   if (ports.can) fmt::print("encoders: CAN over UDP on 127.0.0.1:{}\n", *ports.can);
+  if (!ports.can_interface.empty()) fmt::print("encoders: CAN on {}\n", ports.can_interface);
   for (const NamedPlace& place : ports.environment) fmt::print("{}: {}\n", place.name, place.where);
   for (const auto port : ports.usbip) fmt::print("counter card: USB/IP on 127.0.0.1:{}, bus id 1-1\n", port);
   std::fflush(stdout);

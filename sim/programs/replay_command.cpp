@@ -92,7 +92,8 @@ int replay(const ReplayOptions& options) {
   Replay& replay = **opened;
   Ports ports;
   if (replay.tracker) ports.tracker = replay.tracker->port();
-  if (replay.bus) ports.can = replay.bus->port();
+  ports.can_interface = replay.bus ? options.bus.interface : "";
+  if (replay.bus && ports.can_interface.empty()) ports.can = replay.bus->port();
   if (const auto announced = announce_ports(ports, options.ports_file); !announced)
     return report(announced.error());
   bool was_finished = false;
@@ -120,6 +121,7 @@ Subcommand add_replay(CLI::App& app) {
   sub->add_option("--can-port", options->bus.port, "UDP; 0 = any free one");
   sub->add_option("--can-peer-port", options->bus.peer_port,
                   "UDP port of the daemon; 0 = whoever speaks first");
+  sub->add_option("--can-interface", options->bus.interface, "SocketCAN interface instead of UDP");
   sub->add_option("--ports-file", options->ports_file, "as of run")->type_name("FILE");
   sub->add_flag("--exit-at-end", options->exit_at_end, "leave when everything has been served");
   return {sub, [options] { return replay(*options); }};

@@ -70,10 +70,11 @@ class Narrator {
   int drawn_ = -1;
 };
 
-Ports ports_of(Simulation& simulation) {
+Ports ports_of(Simulation& simulation, const std::string& can_interface) {
   Ports ports;
   if (simulation.tracker()) ports.tracker = simulation.tracker()->port();
-  if (simulation.bus()) ports.can = simulation.bus()->port();
+  ports.can_interface = can_interface;
+  if (simulation.bus() && can_interface.empty()) ports.can = simulation.bus()->port();
   for (const ModbusServer& server : simulation.environment())
     ports.environment.push_back({server.name(), server.where(), server.port(), server.path()});
   for (const UsbipServer& card : simulation.counter_cards()) ports.usbip.push_back(card.port());
@@ -90,7 +91,8 @@ int run(const RunOptions& options) {
   const EventLoop loop(setup->speed);
   auto simulation = Simulation::open(setup->simulation, loop.clock().now());
   if (!simulation) return report(simulation.error());
-  if (const auto announced = announce_ports(ports_of(**simulation), options.ports_file); !announced)
+  const Ports ports = ports_of(**simulation, setup->simulation.bus->interface);
+  if (const auto announced = announce_ports(ports, options.ports_file); !announced)
     return report(announced.error());
   Narrator narrator(setup->speed);
   while (!loop.stopped()) {
@@ -120,6 +122,7 @@ Subcommand add_run(CLI::App& app) {
   sub->add_option("--can-port", choices.can_port, "UDP; 0 = any free one");
   sub->add_option("--can-peer-port", choices.can_peer_port,
                   "UDP port of the daemon; 0 = whoever speaks first");
+  sub->add_option("--can-interface", choices.can_interface, "SocketCAN interface instead of UDP: vcan0");
   sub->add_option("--usbip-port", choices.usbip_port, "TCP, of the counter card; 0 = any free one");
   sub->add_option("--ports-file", options->ports_file,
                   "written when all ports listen: lines tracker_port=N, can_port=N, usbip_port=N")

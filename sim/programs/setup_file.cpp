@@ -164,6 +164,7 @@ void read_machine_tables(TomlSection root, Draft& draft) {
   TomlSection encoder = root.child("encoder");
   read_port(encoder, "peer_port", simulation.bus->port);
   read_port(encoder, "local_port", simulation.bus->peer_port);
+  encoder.text("interface", simulation.bus->interface);
   read_encoder_nodes(encoder, simulation.nodes);
   read_counter_card(root.child("counter_card"), simulation);
   root.child("daemon").number("speed", draft.setup.speed, 1.0, {1e-3, 1e4});
@@ -268,6 +269,7 @@ void read_sim(TomlSection sim, const std::string& file, Draft& draft) {
   TomlSection encoder = sim.child("encoder");
   read_port(encoder, "port", simulation.bus->port);
   read_port(encoder, "peer_port", simulation.bus->peer_port);
+  encoder.text("interface", simulation.bus->interface);
   encoder.number("noise_nm", draft.encoder_noise_m, 1e-9, kNotNegativeNumber);
   encoder.refuse_unknown_keys();
   read_environment(sim, simulation.environment);
@@ -330,6 +332,7 @@ void apply_choices(const SetupChoices& choices, Draft& draft) {
   if (choices.feed_mm_per_min) simulation.path.feed_m_per_s = *choices.feed_mm_per_min * kFeed;
   if (choices.tracker_port) simulation.tracker_port = *choices.tracker_port;
   if (choices.can_port) simulation.bus->port = *choices.can_port;
+  if (!choices.can_interface.empty()) simulation.bus->interface = choices.can_interface;
   if (choices.can_peer_port) simulation.bus->peer_port = *choices.can_peer_port;
   if (choices.usbip_port && !simulation.counter_cards.empty())
     simulation.counter_cards.front().port = *choices.usbip_port;

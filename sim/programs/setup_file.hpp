@@ -24,6 +24,7 @@ struct SetupChoices {
   std::optional<std::uint16_t> tracker_port;
   std::optional<std::uint16_t> can_port;
   std::optional<std::uint16_t> can_peer_port;
+  std::string can_interface;
   std::optional<std::uint16_t> usbip_port;
   bool start_when_streaming = false;
   bool start_at_once = false;

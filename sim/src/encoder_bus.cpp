@@ -1,39 +1,12 @@
 #include "abbe/sim/encoder_bus.hpp"
 
-#include <arpa/inet.h>
-#include <netinet/in.h>
-
 #include <algorithm>
-#include <array>
-#include <cmath>
-#include <cstring>
-#include <ctime>
 #include <utility>
-
-#include "abbe/protocol/can/udp_framing.hpp"
 
 namespace abbe::sim {
 namespace {
 
-constexpr std::size_t kLargestDatagram = 65536;
-constexpr std::size_t kOutgoingDatagram = 1400;  // below every Ethernet MTU, as the tunnel does by default
 constexpr std::uint16_t kGenericEmergency = 0x1000;
-
-/// How long ago the kernel took a datagram in; zero when it did not say or its clock was stepped meanwhile.
-std::chrono::nanoseconds age_of(const msghdr& message) {
-  for (cmsghdr* c = CMSG_FIRSTHDR(&message); c != nullptr;
-       c = CMSG_NXTHDR(const_cast<msghdr*>(&message), c)) {
-    if (c->cmsg_level != SOL_SOCKET || c->cmsg_type != SCM_TIMESTAMPNS) continue;
-    timespec stamp{};
-    timespec now{};
-    std::memcpy(&stamp, CMSG_DATA(c), sizeof stamp);
-    clock_gettime(CLOCK_REALTIME, &now);
-    const std::chrono::nanoseconds age{(now.tv_sec - stamp.tv_sec) * 1'000'000'000 + now.tv_nsec -
-                                       stamp.tv_nsec};
-    if (age.count() >= 0 && age < std::chrono::seconds{1}) return age;
-  }
-  return {};
-}
 
 bool concerns(const Fault& fault, const EncoderNode& node) {
   return fault.node == 0 || fault.node == node.node();
@@ -44,20 +17,11 @@ bool concerns(const Fault& fault, const EncoderNode& node) {
 Result<EncoderBus> EncoderBus::open(const EncoderBusOptions& options,
                                     std::span<const EncoderNodeOptions> nodes, const VirtualMachine& machine,
                                     HostTime now) {
-  auto socket = bind_udp(options.port);
-  if (!socket) return tl::unexpected(socket.error());
-  const int on = 1;
-  if (options.speed > 0.0) setsockopt(socket->get(), SOL_SOCKET, SO_TIMESTAMPNS, &on, sizeof on);
-  EncoderBus bus(std::move(*socket), options);
+  auto port = CanPort::open(options);
+  if (!port) return tl::unexpected(port.error());
+  EncoderBus bus(std::move(*port));
   for (const EncoderNodeOptions& node : nodes) bus.nodes_.emplace_back(node, machine, now);
   return bus;
-}
-
-EncoderBus::EncoderBus(Socket socket, const EncoderBusOptions& options)
-    : socket_(std::move(socket)), port_(port_of(socket_)), speed_(options.speed) {
-  if (options.peer_port == 0) return;
-  peer_ = loopback_address(options.peer_port);
-  has_peer_ = true;
 }
 
 void EncoderBus::poll(HostTime now) {
@@ -84,36 +48,11 @@ HostTime EncoderBus::next_due() const {
 }
 
 void EncoderBus::receive(HostTime now) {
-  std::array<std::byte, kLargestDatagram> buffer;  // NOLINT: filled by recvmsg
-  // A bound, so that a flood cannot keep the other devices from their turn.
-  for (int i = 0; i < 256; ++i) {
-    sockaddr_storage from{};
-    iovec part{buffer.data(), buffer.size()};
-    alignas(cmsghdr) std::array<char, 64> control{};
-    msghdr message{};
-    message.msg_name = &from;
-    message.msg_namelen = sizeof from;
-    message.msg_iov = &part;
-    message.msg_iovlen = 1;
-    message.msg_control = control.data();
-    message.msg_controllen = control.size();
-    const ssize_t size = ::recvmsg(socket_.get(), &message, MSG_DONTWAIT);
-    if (size < 0) return;
-    peer_ = from;
-    has_peer_ = true;
-    const auto age = seconds_to_ns(speed_ * ns_to_seconds(age_of(message)));
-    on_datagram(std::span(buffer).first(static_cast<std::size_t>(size)), now - age);
+  for (const ArrivedFrame& arrived : port_->receive()) {
+    if (bus_off_until_) continue;
+    for (EncoderNode& node : nodes_) node.on_frame(arrived.frame, now - arrived.age);
+    collect();
   }
-}
-
-void EncoderBus::on_datagram(std::span<const std::byte> bytes, HostTime at) {
-  if (bus_off_until_) return;
-  auto view = can::DatagramView::parse(bytes);
-  if (!view) return;  // what is not ours does not reach the bus
-  for (can::CanFrame frame; view->next(frame);) {
-    for (EncoderNode& node : nodes_) node.on_frame(frame, at);
-  }
-  collect();
 }
 
 void EncoderBus::collect() {
@@ -129,29 +68,19 @@ void EncoderBus::collect() {
 void EncoderBus::send_due(HostTime now) {
   const auto end = std::find_if(waiting_.begin(), waiting_.end(),
                                 [now](const TimedFrame& timed) { return timed.due > now; });
-  if (has_peer_ && !bus_off_until_) {
-    std::array<std::byte, kOutgoingDatagram> buffer{};
-    for (auto it = waiting_.begin(); it != end;) {
-      can::DatagramWriter writer(buffer, sequence_++);
-      while (it != end && writer.add(it->frame)) ++it;
-      send_datagram(writer.finish());
-    }
+  if (!bus_off_until_) {
+    std::vector<can::CanFrame> frames;
+    for (auto it = waiting_.begin(); it != end; ++it) frames.push_back(it->frame);
+    port_->send(frames);
   }
-  waiting_.erase(waiting_.begin(), end);  // without a listener they are gone, as on a real bus
-}
-
-void EncoderBus::send_datagram(std::span<const std::byte> bytes) {
-  if (!has_peer_) return;
-  ::sendto(socket_.get(), bytes.data(), bytes.size(), MSG_DONTWAIT | MSG_NOSIGNAL,
-           reinterpret_cast<const sockaddr*>(&peer_), sizeof(sockaddr_in));
+  waiting_.erase(waiting_.begin(), end);
 }
 
 void EncoderBus::send_error_frame(can::BusCondition condition) {
-  std::array<std::byte, kOutgoingDatagram> buffer{};
-  can::DatagramWriter writer(buffer, sequence_++);
   can::BusReport report;
   report.conditions = static_cast<can::BusConditions>(condition);
-  if (writer.add(can::encode_error_frame(report))) send_datagram(writer.finish());
+  const can::CanFrame frame = can::encode_error_frame(report);
+  port_->send(std::span(&frame, 1));
 }
 
 void EncoderBus::end_bus_off(HostTime now) {
@@ -167,12 +96,7 @@ void EncoderBus::inject(const Fault& fault, HostTime now) {
     bus_off_until_ = until;
     return;
   }
-  if (fault.kind == FaultKind::BusGarbage) {
-    constexpr std::array<std::byte, 7> kNoDatagram{std::byte{0xff}, std::byte{0xff}, std::byte{0x00},
-                                                   std::byte{0x13}, std::byte{0x37}, std::byte{0x02},
-                                                   std::byte{0x00}};
-    return send_datagram(kNoDatagram);
-  }
+  if (fault.kind == FaultKind::BusGarbage) return port_->send_garbage();
   for (EncoderNode& node : nodes_) {
     if (!concerns(fault, node)) continue;
     switch (fault.kind) {

@@ -1,9 +1,6 @@
 #include "abbe/sim/recorded_bus.hpp"
 
-#include <netinet/in.h>
-
 #include <algorithm>
-#include <cstring>
 #include <utility>
 
 #include "abbe/protocol/can/udp_framing.hpp"
@@ -37,22 +34,19 @@ std::array<std::byte, 8> first_eight(const can::CanFrame& frame) {
 
 Result<RecordedBus> RecordedBus::open(const EncoderBusOptions& options, const RecordedDevice& device,
                                       ReplayTimeline& timeline, bool leads) {
-  auto socket = bind_udp(options.port);
-  if (!socket) return tl::unexpected(socket.error());
-  return RecordedBus(std::move(*socket), options, device, timeline, leads);
+  auto port = CanPort::open(options);
+  if (!port) return tl::unexpected(port.error());
+  return RecordedBus(std::move(*port), device, timeline, leads);
 }
 
-RecordedBus::RecordedBus(Socket socket, const EncoderBusOptions& options, const RecordedDevice& device,
+RecordedBus::RecordedBus(std::unique_ptr<CanPort> port, const RecordedDevice& device,
                          ReplayTimeline& timeline, bool leads)
-    : socket_(std::move(socket)), timeline_(timeline), leads_(leads) {
+    : port_(std::move(port)), timeline_(timeline), leads_(leads) {
   for (const RecordedBlock& block : device.blocks) {
     auto view = can::DatagramView::parse(block.bytes);
     if (!view) continue;
     for (can::CanFrame frame; view->next(frame);) take(frame, block.to_device, block.time);
   }
-  if (options.peer_port == 0) return;
-  peer_ = loopback_address(options.peer_port);
-  has_peer_ = true;
 }
 
 void RecordedBus::take(const can::CanFrame& frame, bool to_device, HostTime time) {
@@ -77,40 +71,28 @@ void RecordedBus::take(const can::CanFrame& frame, bool to_device, HostTime time
 }
 
 void RecordedBus::poll(HostTime now) {
-  std::array<std::byte, 2048> buffer;  // NOLINT: filled by recvfrom
-  for (int i = 0; i < 256; ++i) {
-    sockaddr_storage from{};
-    socklen_t from_size = sizeof from;
-    const ssize_t size = ::recvfrom(socket_.get(), buffer.data(), buffer.size(), MSG_DONTWAIT,
-                                    reinterpret_cast<sockaddr*>(&from), &from_size);
-    if (size < 0) break;
-    peer_ = from;
-    has_peer_ = true;
-    auto view = can::DatagramView::parse(std::span(buffer).first(static_cast<std::size_t>(size)));
-    if (!view) continue;
-    for (can::CanFrame frame; view->next(frame);) on_frame(frame, now);
-  }
+  for (const ArrivedFrame& arrived : port_->receive()) on_frame(arrived.frame, now);
   keep_alive(now);
   if (!timeline_.running()) next_spoken_ = 0;
   for (; next_spoken_ < spoken_.size() && timeline_.due(spoken_[next_spoken_].time) <= now; ++next_spoken_) {
     // What was said before the start has been said by keep_alive.
     if (now - timeline_.due(spoken_[next_spoken_].time) < kOutOfStep)
-      send(std::span(&spoken_[next_spoken_].frame, 1));
+      port_->send(std::span(&spoken_[next_spoken_].frame, 1));
   }
 }
 
 HostTime RecordedBus::next_due() const {
-  if (!timeline_.running()) return has_peer_ ? next_beat_ : HostTime::max();
+  if (!timeline_.running()) return port_->has_listener() ? next_beat_ : HostTime::max();
   return next_spoken_ < spoken_.size() ? timeline_.due(spoken_[next_spoken_].time) : next_beat_;
 }
 
 void RecordedBus::keep_alive(HostTime now) {
   const bool over = next_spoken_ >= spoken_.size();
-  if ((timeline_.running() && !over) || !has_peer_ || now < next_beat_) return;
+  if ((timeline_.running() && !over) || !port_->has_listener() || now < next_beat_) return;
   next_beat_ = now + kBeat;
   std::vector<can::CanFrame> beats;
   for (const can::NodeId node : nodes_) beats.push_back(can::encode_heartbeat(node, state_));
-  send(beats);
+  port_->send(beats);
 }
 
 void RecordedBus::on_frame(const can::CanFrame& frame, HostTime now) {
@@ -127,7 +109,7 @@ void RecordedBus::on_frame(const can::CanFrame& frame, HostTime now) {
   for (const can::NodeId node : nodes_) {
     if (nmt->node != can::kAllNodes && nmt->node != node) continue;
     const can::CanFrame boot = can::encode_heartbeat(node, can::NodeState::BootUp);
-    send(std::span(&boot, 1));
+    port_->send(std::span(&boot, 1));
   }
 }
 
@@ -146,14 +128,14 @@ void RecordedBus::on_sync(HostTime now) {
   if (leads_) timeline_.start(cycles_.front().sync, now);
   if (!timeline_.running()) {
     next_cycle_.reset();
-    return send(cycles_.front().answers);
+    return port_->send(cycles_.front().answers);
   }
   const HostTime recorded = timeline_.recorded(now);
   std::size_t cycle = next_cycle_.value_or(cycle_at(recorded));
   const auto apart = cycles_[cycle].sync - recorded;
   if (apart > kOutOfStep || apart < -kOutOfStep) cycle = cycle_at(recorded);
   next_cycle_ = std::min(cycle + 1, cycles_.size() - 1);
-  send(cycles_[cycle].answers);
+  port_->send(cycles_[cycle].answers);
 }
 
 void RecordedBus::on_sdo(const can::CanFrame& frame) {
@@ -163,22 +145,11 @@ void RecordedBus::on_sdo(const can::CanFrame& frame) {
     const std::uint32_t id = can::cob::kSdoResponse + (frame.id & kNode);
     const can::CanFrame abort =
         can::standard_frame(id, {0x80, frame.byte(1), frame.byte(2), frame.byte(3), 0x00, 0x00, 0x00, 0x08});
-    return send(std::span(&abort, 1));
+    return port_->send(std::span(&abort, 1));
   }
   SdoResponses& responses = known->second;
-  send(std::span(&responses.frames[responses.next], 1));
+  port_->send(std::span(&responses.frames[responses.next], 1));
   if (responses.next + 1 < responses.frames.size()) ++responses.next;
-}
-
-void RecordedBus::send(std::span<const can::CanFrame> frames) {
-  std::array<std::byte, 1400> buffer{};
-  while (has_peer_ && !frames.empty()) {
-    can::DatagramWriter writer(buffer, sequence_++);
-    while (!frames.empty() && writer.add(frames.front())) frames = frames.subspan(1);
-    const auto bytes = writer.finish();
-    ::sendto(socket_.get(), bytes.data(), bytes.size(), MSG_DONTWAIT | MSG_NOSIGNAL,
-             reinterpret_cast<const sockaddr*>(&peer_), sizeof(sockaddr_in));
-  }
 }
 
 }  // namespace abbe::sim

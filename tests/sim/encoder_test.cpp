@@ -236,6 +236,15 @@ TEST_F(EncoderBusTest, SurvivesDatagramsThatAreNoFrames) {
   EXPECT_EQ(receive().size(), 3u);
 }
 
+TEST_F(EncoderBusTest, MissingInterfaceIsAClearError) {
+  EncoderBusOptions options;
+  options.interface = "nocan99";
+  const auto refused = EncoderBus::open(options, {}, machine_, now_);
+  ASSERT_FALSE(refused);
+  EXPECT_EQ(refused.error().code, ErrorCode::Io);
+  EXPECT_THAT(refused.error().text, testing::HasSubstr("nocan99"));
+}
+
 TEST_F(EncoderBusTest, PortInUseIsAClearError) {
   const auto second = EncoderBus::open({.port = bus_.port()}, {}, machine_, now_);
   ASSERT_FALSE(second);

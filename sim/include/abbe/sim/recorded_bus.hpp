@@ -1,13 +1,12 @@
 #pragma once
-/// The encoders of a recording on their UDP port again. The n-th SYNC from the start is answered with the
+/// The encoders of a recording on their port again. The n-th SYNC from the start is answered with the
 /// frames that answered the n-th SYNC then, SDO requests with the recorded responses to the same request,
 /// everything else (heartbeats, EMCY, error frames) comes with its original timing. Until the recording
 /// starts nodes are kept alive with heartbeats and the first positions. Without a tracker in the recording it
 /// starts with the first SYNC. Steppable, not thread-safe.
 
-#include <sys/socket.h>
-
 #include <map>
+#include <memory>
 #include <set>
 #include <vector>
 
@@ -27,8 +26,8 @@ class RecordedBus {
 
   void poll(HostTime now);
   [[nodiscard]] HostTime next_due() const;
-  [[nodiscard]] int fd() const { return socket_.get(); }
-  [[nodiscard]] std::uint16_t port() const { return port_of(socket_); }
+  [[nodiscard]] int fd() const { return port_->fd(); }
+  [[nodiscard]] std::uint16_t port() const { return port_->port(); }
   [[nodiscard]] bool finished() const { return timeline_.running() && next_spoken_ >= spoken_.size(); }
   [[nodiscard]] std::size_t syncs() const { return cycles_.size(); }
 
@@ -47,22 +46,18 @@ class RecordedBus {
     std::size_t next = 0;
   };
 
-  RecordedBus(Socket socket, const EncoderBusOptions& options, const RecordedDevice& device,
-              ReplayTimeline& timeline, bool leads);
+  RecordedBus(std::unique_ptr<CanPort> port, const RecordedDevice& device, ReplayTimeline& timeline,
+              bool leads);
   void take(const can::CanFrame& frame, bool to_device, HostTime time);
   void on_frame(const can::CanFrame& frame, HostTime now);
   void on_sync(HostTime now);
   void on_sdo(const can::CanFrame& frame);
-  void send(std::span<const can::CanFrame> frames);
   void keep_alive(HostTime now);
   [[nodiscard]] std::size_t cycle_at(HostTime recorded) const;
 
-  Socket socket_;
+  std::unique_ptr<CanPort> port_;
   ReplayTimeline& timeline_;
   bool leads_;
-  bool has_peer_ = false;
-  sockaddr_storage peer_{};
-  std::uint8_t sequence_ = 0;
   std::set<can::NodeId> nodes_;
   std::vector<Cycle> cycles_;
   std::vector<Spoken> spoken_;

@@ -365,6 +365,17 @@ TEST(EncoderReceiver, FlagsAndWidensACycleWithAnAnswerNobodyKnowsTheTimeOf) {
   EXPECT_FALSE(has(line.samples[1].head.flags, SampleFlag::TimeWidened));
 }
 
+TEST(EncoderReceiver, FlagsAndWidensACycleWhoseSyncWasHeardAtATimeNobodyKnows) {
+  Line line;
+  line.keep(line.receiver.on_sent(can::encode_sync(), kStart, true));
+  for (const can::NodeId node : kNodes) line.frame(position(node, 1), kStart + 100us);
+  line.cycle(kStart + 1ms, 10);
+  ASSERT_EQ(line.samples.size(), 2u);
+  EXPECT_TRUE(has(line.samples[0].head.flags, SampleFlag::TimeWidened));
+  EXPECT_GT(line.samples[0].head.u_time, line.samples[1].head.u_time);
+  EXPECT_FALSE(has(line.samples[1].head.flags, SampleFlag::TimeWidened));
+}
+
 TEST(EncoderReceiver, CountsPeriodsWithoutASync) {
   Line line;
   line.cycle(kStart, 1);

@@ -12,7 +12,7 @@ void EncoderDevice::receive() ABBE_RT {
   const auto frames = std::span<const ReceivedFrame>{batch_}.first(batch_count_);
   record_frames(frames);
   for (const auto& received : frames) {
-    push(received.echo ? receiver_.on_sent(received.frame, received.time)
+    push(received.echo ? receiver_.on_sent(received.frame, received.time, received.time_widened)
                        : receiver_.on_frame(received.frame, received.time, received.time_widened));
   }
   // A full batch may have more behind it: only a read that found the end says that nothing else came.

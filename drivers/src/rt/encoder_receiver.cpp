@@ -82,9 +82,10 @@ HostTime EncoderReceiver::deadline() const ABBE_RT {
   return open_ ? *sync_time_ + answer_within_ : HostTime::max();
 }
 
-EncoderReceiver::Samples EncoderReceiver::on_sent(const can::CanFrame& frame, HostTime time) ABBE_RT {
+EncoderReceiver::Samples EncoderReceiver::on_sent(const can::CanFrame& frame, HostTime time,
+                                                  bool time_widened) ABBE_RT {
   out_count_ = 0;
-  if (can::decode_sync(frame)) begin_cycle(time);
+  if (can::decode_sync(frame)) begin_cycle(time, time_widened);
   return done();
 }
 
@@ -119,7 +120,7 @@ EncoderReceiver::Samples EncoderReceiver::on_frame(const can::CanFrame& frame, H
   return done();
 }
 
-void EncoderReceiver::begin_cycle(HostTime time) ABBE_RT {
+void EncoderReceiver::begin_cycle(HostTime time, bool time_widened) ABBE_RT {
   close_cycle();
   if (sync_time_ && period_.count() > 0) {
     const auto periods = (time - *sync_time_ + period_ / 2) / period_;
@@ -130,6 +131,7 @@ void EncoderReceiver::begin_cycle(HostTime time) ABBE_RT {
     ++cycle_;
   }
   sync_time_ = time;
+  time_widened_ = time_widened;
   received_mask_ = 0;
   open_ = true;
   check_heartbeats(time);

@@ -91,11 +91,14 @@ class EncoderReceiver {
 
   // Events in the order in which they happened. The samples they complete (at most two) are valid until the
   // next event.
+  //
+  // `time_widened`: the kernel stamp was not believed. A position that came so may be the answer to the SYNC
+  // before, and a SYNC heard so left earlier: the sample is flagged TimeWidened and its u_time widened by a
+  // period, rectangular. Raw blocks do not tell: a replay from raw bytes has the same positions without this
+  // flag.
   [[nodiscard]] std::span<const protocol::AxisSample> on_sent(const can::CanFrame& frame,
-                                                              protocol::HostTime time) ABBE_RT;
-  /// `time_widened`: the kernel stamp was not believed. A position that came so may be the answer to the SYNC
-  /// before: the sample is flagged TimeWidened and its u_time widened by a period, rectangular. Raw blocks do
-  /// not tell: a replay from raw bytes has the same positions without this flag.
+                                                              protocol::HostTime time,
+                                                              bool time_widened = false) ABBE_RT;
   [[nodiscard]] std::span<const protocol::AxisSample> on_frame(const can::CanFrame& frame,
                                                                protocol::HostTime time,
                                                                bool time_widened = false) ABBE_RT;
@@ -148,7 +151,7 @@ class EncoderReceiver {
   };
   using Samples = std::span<const protocol::AxisSample>;
 
-  void begin_cycle(protocol::HostTime time) ABBE_RT;
+  void begin_cycle(protocol::HostTime time, bool time_widened) ABBE_RT;
   void close_cycle() ABBE_RT;
   void emit(protocol::HostTime time) ABBE_RT;
   [[nodiscard]] protocol::SampleFlags take_flags(std::uint8_t missing) ABBE_RT;
@@ -183,7 +186,7 @@ class EncoderReceiver {
   bool bus_error_pending_ = false;  ///< since the previous sample
   bool restarted_pending_ = false;
   bool gap_pending_ = false;
-  bool time_widened_ = false;       ///< of an answer to the open cycle
+  bool time_widened_ = false;       ///< of the open cycle: its SYNC, or an answer
   std::uint32_t lost_pending_ = 0;  ///< SYNCs that were not sent
   protocol::AxisSample current_;    ///< counts and positions stay from cycle to cycle
   std::array<protocol::AxisSample, 4> out_{};

@@ -62,6 +62,7 @@ RecorderThreadOptions recorder_options(const Config& config) {
   options.raw = config.recording.raw;
   if (config.tracker) options.tracker = config.tracker->name;
   if (config.encoder) options.encoder = config.encoder->name;
+  if (config.counter_card) options.encoder = config.counter_card->name;
   return options;
 }
 

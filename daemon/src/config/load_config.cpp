@@ -19,6 +19,7 @@ Config read_all(Section& root, const std::filesystem::path& base) {
               config);  // before the devices: what may be said of them depends on [daemon] simulated
   read_tracker(root, config);
   read_encoder(root, config);
+  read_counter_card(root, config);
   read_recording(root, base, config);
   read_dds(root, base, config);
   read_gate(root, config);
@@ -31,6 +32,13 @@ std::string reading_text(const EncoderConfig& encoder) {
   std::string text = encoder.axes_compensated ? "|compensated" : "|raw";
   for (const auto& node : encoder.nodes)
     text += fmt::format("|{} {} {:.17g} {:.17g}", node.axis, node.node, node.step, node.offset);
+  return text;
+}
+
+std::string reading_text(const CounterCardConfig& card) {
+  std::string text = card.axes_compensated ? "|compensated" : "|raw";
+  for (const auto& axis : card.wiring.axes)
+    text += fmt::format("|{} {} {:.17g} {:.17g}", axis.name, axis.channel, axis.scale, axis.offset);
   return text;
 }
 
@@ -74,6 +82,7 @@ std::string machine_hash(const Config& config) {
     for (const double node_m : nodes_m) text += fmt::format(" {:.17g}", node_m);
   }
   if (config.encoder) text += reading_text(*config.encoder);
+  if (config.counter_card) text += reading_text(*config.counter_card);
   return sha256_hex(text);
 }
 

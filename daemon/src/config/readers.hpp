@@ -10,6 +10,7 @@ namespace abbe::daemon {
 void read_machine(Section& root, MachineConfig& out);
 void read_tracker(Section& root, Config& out);
 void read_encoder(Section& root, Config& out);
+void read_counter_card(Section& root, Config& out);
 void read_daemon(Section& root, const std::filesystem::path& base, Config& out);
 void read_recording(Section& root, const std::filesystem::path& base, Config& out);
 void read_dds(Section& root, const std::filesystem::path& base, Config& out);

@@ -74,12 +74,35 @@ drivers::EncoderDeviceOptions device_options(const EncoderConfig& config, double
   return options;
 }
 
+drivers::CounterCardOptions device_options(const CounterCardConfig& config, double speed) {
+  drivers::CounterCardOptions options;
+  options.name = config.name;
+  options.serial = config.serial_number;
+  options.receiver.wiring = config.wiring;
+  options.receiver.clock.max_constant_delay = config.max_constant_delay;
+  options.sample_every = config.sample_every;
+  options.transfer_time = stretched(options.transfer_time, speed);
+  auto& session = options.session;
+  for (auto* time_out : {&session.open_timeout, &session.control_timeout, &session.silence,
+                         &session.status_period, &session.reopen_after, &session.retry_after}) {
+    *time_out = stretched(*time_out, speed);
+  }
+  return options;
+}
+
 AssemblerOptions assembler_options(const Config& config) {
   AssemblerOptions options;
   options.watermark = config.daemon.watermark;
   if (config.encoder) {
     options.axes_compensated = config.encoder->axes_compensated;
     const std::chrono::duration<double, std::nano> span = kMostLostCycles * config.encoder->sync_period;
+    options.interpolation.max_span = std::chrono::duration_cast<std::chrono::nanoseconds>(span);
+  }
+  if (config.counter_card) {
+    options.axes_compensated = config.counter_card->axes_compensated;
+    const double sample_rate_hz =
+        drivers::scan_rate_hz(config.counter_card->wiring) / config.counter_card->sample_every;
+    const std::chrono::duration<double> span{kMostLostCycles / sample_rate_hz};
     options.interpolation.max_span = std::chrono::duration_cast<std::chrono::nanoseconds>(span);
   }
   return options;

@@ -8,6 +8,8 @@
 #include "abbe/drivers/can/socket_can_bus.hpp"
 #include "abbe/drivers/can/udp_can_bus.hpp"
 #include "abbe/drivers/device_thread.hpp"
+#include "abbe/drivers/usb/libusb_link.hpp"
+#include "abbe/drivers/usb/usbip_link.hpp"
 
 namespace abbe::daemon {
 namespace {
@@ -45,6 +47,16 @@ std::unique_ptr<drivers::CanBus> make_bus(const EncoderConfig& config, double sp
                                               time);
 }
 
+std::unique_ptr<drivers::UsbLink> make_link(const CounterCardConfig& config,
+                                            const drivers::UsbIdentity& identity,
+                                            const drivers::TimeSource& time) {
+  if (config.transport == CardTransport::Usb) return std::make_unique<drivers::LibusbLink>(identity, time);
+  return std::make_unique<drivers::UsbipLink>(
+      drivers::UsbipOptions{
+          .host = config.host, .port = config.port, .bus_id = config.bus_id, .identity = identity},
+      time);
+}
+
 drivers::DeviceThreadOptions thread_options(const DaemonConfig& config, std::string name, int priority,
                                             std::optional<int> cpu) {
   const bool enforce = config.realtime == RealTimeMode::Enforce;
@@ -75,6 +87,7 @@ Result<Running<D>> run(drivers::Result<std::unique_ptr<D>> device, drivers::Devi
 struct DeviceSet::State {
   std::optional<Running<drivers::TrackerDevice>> tracker;
   std::optional<Running<drivers::EncoderDevice>> encoder;
+  std::optional<Running<drivers::CounterCardDevice>> counter_card;
   std::array<protocol::TrackerPoint, kMostSamples> points;
   std::array<protocol::AxisSample, kMostSamples> axes;
   std::array<protocol::EnvironmentSample, 16> environment;
@@ -112,6 +125,15 @@ Result<DeviceSet> DeviceSet::start(const Config& config, const drivers::TimeSour
     if (!running) return tl::unexpected(running.error());
     state->encoder.emplace(std::move(*running));
   }
+  if (config.counter_card) {
+    const auto options = device_options(*config.counter_card, config.daemon.speed);
+    auto link = make_link(*config.counter_card, drivers::identity_of(options), time);
+    auto running = run(drivers::CounterCardDevice::create(options, std::move(link), time),
+                       thread_options(config.daemon, "abbe-counters", config.daemon.encoder_priority,
+                                      config.daemon.encoder_cpu));
+    if (!running) return tl::unexpected(running.error());
+    state->counter_card.emplace(std::move(*running));
+  }
   if (config.tracker) {
     auto running =
         run(drivers::TrackerDevice::create(device_options(*config.tracker, config.daemon.speed), time),
@@ -134,6 +156,10 @@ void DeviceSet::drain(Batch& batch) {
     drain_ring(s.encoder->device->samples(), s.axes, batch.axes);
     drain_ring(s.encoder->device->raw(), s.blocks, batch.encoder_raw);
   }
+  if (s.counter_card) {  // the configuration allows one source of axes
+    drain_ring(s.counter_card->device->samples(), s.axes, batch.axes);
+    drain_ring(s.counter_card->device->raw(), s.blocks, batch.encoder_raw);
+  }
   if (s.tracker) {
     drain_ring(s.tracker->device->points(), s.points, batch.points);
     drain_ring(s.tracker->device->environment(), s.environment, batch.environment);
@@ -147,6 +173,8 @@ std::vector<StreamHealth> DeviceSet::health(HostTime now) {
     out.push_back(state_->health_of(*state_->tracker->device, *state_->tracker->thread, now));
   if (state_->encoder)
     out.push_back(state_->health_of(*state_->encoder->device, *state_->encoder->thread, now));
+  if (state_->counter_card)
+    out.push_back(state_->health_of(*state_->counter_card->device, *state_->counter_card->thread, now));
   return out;
 }
 
@@ -158,6 +186,11 @@ std::vector<std::string> DeviceSet::warnings() const {
   };
   add(state_->tracker);
   add(state_->encoder);
+  add(state_->counter_card);
+  if (state_->counter_card) {
+    if (auto assumed = state_->counter_card->device->assumption(); !assumed.empty())
+      out.push_back(std::move(assumed));
+  }
   return out;
 }
 

@@ -12,6 +12,8 @@
 #include "abbe/daemon/device_options.hpp"
 #include "abbe/daemon/model_document.hpp"
 #include "abbe/drivers/can/encoder_receiver.hpp"
+#include "abbe/drivers/counter_card/receiver.hpp"
+#include "abbe/drivers/counter_card/thinning.hpp"
 #include "abbe/drivers/tracker/receiver.hpp"
 
 namespace abbe::daemon {
@@ -65,12 +67,23 @@ class RawDecoder {
       encoder_name_ = config.encoder->name;
       encoder_.emplace(device_options(*config.encoder, config.daemon.speed).receiver);
     }
+    if (config.counter_card) {
+      card_name_ = config.counter_card->name;
+      thinning_ = drivers::ScanThinning{config.counter_card->sample_every};
+      card_ = std::make_unique<drivers::CounterCardReceiver>(
+          device_options(*config.counter_card, config.daemon.speed).receiver);
+    }
   }
 
   void take(const protocol::RawBlock& block, std::string_view device, Batch& batch) {
     if (tracker_ && device == tracker_name_) take_tracker(block, batch);
     if (encoder_ && device == encoder_name_) {
       encoder_->on_raw(block, [&](const protocol::AxisSample& s) { batch.axes.push_back(s); });
+    }
+    if (card_ && device == card_name_) {
+      card_->on_raw(block, [&](const drivers::CounterScan& s) {
+        if (const auto sample = thinning_.take(s.axes)) batch.axes.push_back(*sample);
+      });
     }
   }
 
@@ -92,6 +105,9 @@ class RawDecoder {
   std::string encoder_name_;
   std::unique_ptr<drivers::TrackerReceiver> tracker_;
   std::optional<drivers::EncoderReceiver> encoder_;
+  std::string card_name_;
+  std::unique_ptr<drivers::CounterCardReceiver> card_;
+  drivers::ScanThinning thinning_{1};
 };
 
 /// The calibrations the recording asks for, one after the other.

@@ -47,7 +47,7 @@ CalibrationService::~CalibrationService() {
 
 Result<void> CalibrationService::start_otf(std::vector<AxisPosition> path_m, const std::string& who,
                                            HostTime now) {
-  if (config_.encoder && config_.encoder->axes_compensated) {
+  if (config_.axes_compensated()) {
     return fail(ErrorCode::Refused,
                 "calibrate otf: the control already corrects these axes ([encoder] axes_compensated = true): "
                 "switch its "

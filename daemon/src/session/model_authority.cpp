@@ -42,7 +42,7 @@ Result<ModelAuthority> ModelAuthority::open(const std::filesystem::path& store_f
                                             protocol::UtcOffset utc, HostTime now) {
   auto keeper = ModelKeeper::open(store_folder, config, utc);
   if (!keeper) return tl::unexpected(keeper.error());
-  ModelAuthority authority{std::move(*keeper), config.encoder && config.encoder->axes_compensated};
+  ModelAuthority authority{std::move(*keeper), config.axes_compensated()};
   auto active = authority.keeper_.read_active(now);
   if (!active) return tl::unexpected(active.error());
   authority.take_up(std::move(*active));

@@ -16,6 +16,7 @@
 #include <vector>
 
 #include "abbe/daemon/error.hpp"
+#include "abbe/drivers/counter_card/wiring.hpp"
 
 namespace abbe::daemon {
 
@@ -104,6 +105,25 @@ struct EncoderConfig {
   std::vector<EncoderNodeConfig> nodes;  ///< in the order of MachineConfig::axes; X, Y and Z are there
 };
 
+enum class CardTransport { Usb, Usbip };
+
+/// [counter_card]: a USB-QUAD08 whose counters are the axes, instead of [encoder]. reading = offset + count *
+/// step, count 0 being where the axis stood when the card was set up. `step_nm` is that of one count, four
+/// counts a signal period.
+struct CounterCardConfig {
+  std::string name = "counter_card";
+  CardTransport transport = CardTransport::Usb;
+  std::string host = "127.0.0.1";  ///< USB/IP only
+  std::uint16_t port = 3240;       ///< USB/IP only
+  std::string bus_id = "1-1";      ///< USB/IP only
+  std::string serial_number;       ///< empty: the only card there is
+  drivers::CounterCardWiring wiring;
+  std::uint32_t sample_every = 1;  ///< one axis sample for so many scans
+  std::chrono::nanoseconds max_constant_delay{
+      std::chrono::milliseconds{1}};  ///< bound of the unobservable part of the delay
+  bool axes_compensated = false;      ///< true: the control already corrects these readings
+};
+
 enum class RealTimeMode { Enforce, Ignore };
 
 /// [daemon]
@@ -162,16 +182,23 @@ struct ControlConfig {
   std::filesystem::path socket;  ///< default: runtime_dir/control.sock
 };
 
-/// The whole file. `[tracker]` without host and a missing `[encoder]` mean "not connected".
+/// The whole file. `[tracker]` without host, a missing `[encoder]`, a missing `[counter_card]` mean "not
+/// connected". The axes come from one device: [encoder] or [counter_card].
 struct Config {
   MachineConfig machine;
   std::optional<TrackerConfig> tracker;
   std::optional<EncoderConfig> encoder;
+  std::optional<CounterCardConfig> counter_card;
   DaemonConfig daemon;
   RecordingConfig recording;
   DdsConfig dds;
   GateConfig gate;
   ControlConfig control;
+
+  /// The control already corrects what the axes read, whichever device reads them.
+  [[nodiscard]] bool axes_compensated() const noexcept {
+    return (encoder && encoder->axes_compensated) || (counter_card && counter_card->axes_compensated);
+  }
 };
 
 /// Reads and checks a whole file. Io if it cannot be read; else BadInput with one line per fault in

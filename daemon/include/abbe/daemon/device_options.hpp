@@ -7,12 +7,14 @@
 #include "abbe/daemon/config.hpp"
 #include "abbe/daemon/otf_acquisition.hpp"
 #include "abbe/drivers/can/encoder_device.hpp"
+#include "abbe/drivers/counter_card/device.hpp"
 #include "abbe/drivers/tracker/device.hpp"
 
 namespace abbe::daemon {
 
 [[nodiscard]] drivers::TrackerDeviceOptions device_options(const TrackerConfig& config, double speed);
 [[nodiscard]] drivers::EncoderDeviceOptions device_options(const EncoderConfig& config, double speed);
+[[nodiscard]] drivers::CounterCardOptions device_options(const CounterCardConfig& config, double speed);
 [[nodiscard]] AssemblerOptions assembler_options(const Config& config);
 /// Standstill is judged over enough points at the tracker's rate.
 [[nodiscard]] AcquisitionOptions acquisition_options(const Config& config);

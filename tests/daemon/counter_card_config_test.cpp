@@ -1,0 +1,105 @@
+#include <gmock/gmock.h>
+
+#include <string>
+
+#include "abbe/daemon/config.hpp"
+#include "abbe/daemon/device_options.hpp"
+
+namespace abbe::daemon {
+namespace {
+
+using ::testing::Contains;
+using ::testing::HasSubstr;
+
+const std::string kMachine = R"([machine]
+name = "mill"
+chain = "[w X' b Y Z (C1) t]"
+[axes.X]
+min_mm = -300
+max_mm = 300
+[axes.Y]
+min_mm = -250
+max_mm = 250
+[axes.Z]
+min_mm = -400
+max_mm = -100
+[target]
+offset_mm = [20, -15, -120]
+[model]
+node_spacing_mm = 50
+)";
+
+std::string card(const std::string& axes, const std::string& more = {}) {
+  return kMachine +
+         "[counter_card]\ntransport = \"usbip\"\nhost = \"127.0.0.1\"\nport = 3241\nclock_MHz = 10\n" + more +
+         "axes = [" + axes + "]\n";
+}
+
+std::vector<std::string> faults_of(const std::string& text) {
+  const auto config = parse_config(text, "abbed.toml");
+  return config ? std::vector<std::string>{} : config.error().details;
+}
+
+TEST(CounterCardConfig, ReadsItsWiringInSi) {
+  const auto config = parse_config(
+      card(R"({axis = "X", channel = 0, step_nm = 10, offset_mm = -300},
+              {axis = "Z", channel = 2, step_nm = 20, invert = true})",
+           "serial_number = \"01ABBE08\"\nlatch_channel = 6\nclock_source = \"timer0\"\nwidth_bits = 48\n"),
+      "abbed.toml");
+  ASSERT_TRUE(config) << config.error().details.front();
+  const auto& found = *config->counter_card;
+  EXPECT_EQ(found.port, 3241);
+  EXPECT_EQ(found.serial_number, "01ABBE08");
+  EXPECT_DOUBLE_EQ(found.wiring.axes.at(0).scale, 10e-9);
+  EXPECT_DOUBLE_EQ(found.wiring.axes.at(0).offset, -0.3);
+  EXPECT_DOUBLE_EQ(found.wiring.axes.at(1).scale, -20e-9);
+  EXPECT_DOUBLE_EQ(found.wiring.clock_hz, 10e6);
+  EXPECT_EQ(found.wiring.clock_source, drivers::ClockSource::Timer0);
+  EXPECT_EQ(found.wiring.latch_channel, 6);
+  EXPECT_EQ(found.wiring.width, drivers::quad08::CountWidth::Bits48);
+}
+
+TEST(CounterCardConfig, StretchesTimeOutsWithTheSpeedOfTheSimulation) {
+  const auto config = parse_config(card(R"({axis = "X", channel = 0, step_nm = 10})"), "abbed.toml");
+  ASSERT_TRUE(config);
+  EXPECT_EQ(device_options(*config->counter_card, 10.0).session.silence, std::chrono::seconds{1});
+  EXPECT_EQ(device_options(*config->counter_card, 1.0).session.silence, std::chrono::milliseconds{100});
+}
+
+TEST(CounterCardConfig, RefusesAnAxisScaleOfZero) {
+  EXPECT_THAT(faults_of(card(R"({axis = "X", channel = 0, step_nm = 0})")),
+              Contains(HasSubstr("axis X (channel 0): scale 0 per count")));
+}
+
+TEST(CounterCardConfig, RefusesTwoChannelsForOneAxis) {
+  EXPECT_THAT(
+      faults_of(card(R"({axis = "X", channel = 0, step_nm = 10}, {axis = "X", channel = 1, step_nm = 10})")),
+      Contains(HasSubstr("two channels claim axis X")));
+}
+
+TEST(CounterCardConfig, RefusesTwoUsesOfOneChannel) {
+  EXPECT_THAT(faults_of(card(R"({axis = "X", channel = 5, step_nm = 10})")),
+              Contains(HasSubstr("channel 5 is claimed by axis X and the clock")));
+}
+
+TEST(CounterCardConfig, RefusesAnAxisTheMachineDoesNotHave) {
+  EXPECT_THAT(faults_of(card(R"({axis = "B", channel = 0, step_nm = 10})")),
+              Contains(HasSubstr("no such axis in [axes]")));
+}
+
+TEST(CounterCardConfig, RefusesAxesFromTwoDevices) {
+  const auto text =
+      card(R"({axis = "X", channel = 0, step_nm = 10})") +
+      "[encoder]\ntransport = \"socketcan\"\ninterface = \"can0\"\nnodes = [{axis = \"X\", node = 1}]\n";
+  EXPECT_THAT(faults_of(text), Contains(HasSubstr("the axes come from [encoder] already")));
+}
+
+TEST(CounterCardConfig, RefusesKeysOfTheOtherTransport) {
+  const auto text = kMachine +
+                    "[counter_card]\ntransport = \"usb\"\nport = 3240\naxes = [{axis = \"X\", channel = 0, "
+                    "step_nm = 10}]\n";
+  EXPECT_THAT(faults_of(text), Contains(HasSubstr("has no meaning with transport = \"usb\"")));
+}
+
+}  // namespace
+}  // namespace abbe::daemon

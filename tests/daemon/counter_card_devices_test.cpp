@@ -1,0 +1,115 @@
+// A counter card in the daemon's set of devices, over the wire: configured as a person would, played by the
+// simulator in a thread of its own, in real time.
+
+#include <gmock/gmock.h>
+#include <poll.h>
+
+#include <atomic>
+#include <string>
+#include <thread>
+
+#include "abbe/daemon/config.hpp"
+#include "abbe/daemon/device_set.hpp"
+#include "abbe/sim/usbip_server.hpp"
+
+namespace abbe::daemon {
+namespace {
+
+using namespace std::chrono_literals;
+using testing::Contains;
+using testing::HasSubstr;
+
+class CardInAThread {
+ public:
+  CardInAThread() : server_(std::move(*sim::UsbipServer::open(0, card()))), thread_([this] { run(); }) {}
+  CardInAThread(const CardInAThread&) = delete;
+  CardInAThread& operator=(const CardInAThread&) = delete;
+  ~CardInAThread() {
+    stop_ = true;
+    thread_.join();
+  }
+  [[nodiscard]] std::uint16_t port() const { return server_.port(); }
+
+ private:
+  static sim::CounterCardOptions card() {
+    sim::CounterCardOptions card;
+    card.channels[0].phases = sim::ScaleSignal{
+        .reading = [](sim::HostTime t) { return 0.01 * sim::ns_to_seconds(t.time_since_epoch()); },
+        .step = 1e-8,
+        .noise = 0.0,
+        .marks = {}};
+    card.channels[1].phases = sim::ScaleSignal{.step = 1e-6};
+    card.channels[5].phases = sim::ClockSignal{.hz = 1e6};
+    return card;
+  }
+  void run() {
+    const sim::SimClock clock{1.0};
+    while (!stop_) {
+      pollfd fds[2] = {{server_.listener_fd(), POLLIN, 0}, {server_.client_fd(), POLLIN, 0}};
+      ::poll(fds, 2, 1);
+      server_.poll(clock.now());
+    }
+  }
+
+  sim::UsbipServer server_;
+  std::atomic<bool> stop_{false};
+  std::thread thread_;
+};
+
+Config configuration(std::uint16_t port) {
+  const std::string text = R"([machine]
+name = "mill"
+chain = "[w X' b Y Z (C1) t]"
+[axes.X]
+min_mm = -300
+max_mm = 300
+[axes.Y]
+min_mm = -250
+max_mm = 250
+[axes.Z]
+min_mm = -400
+max_mm = -100
+[target]
+offset_mm = [20, -15, -120]
+[model]
+node_spacing_mm = 50
+[counter_card]
+transport = "usbip"
+port = )" + std::to_string(port) +
+                           R"(
+clock_MHz = 1
+latch_channel = 6
+scan_rate_hz = 2000
+axes = [{axis = "X", channel = 0, step_nm = 10, offset_mm = -120}, {axis = "Y", channel = 1, step_nm = 1000, offset_mm = 3}]
+)";
+  auto config = parse_config(text, "abbed.toml");
+  EXPECT_TRUE(config) << config.error().details.front();
+  return *config;
+}
+
+TEST(CounterCardDevices, GiveTheAxesOfTheConfiguration) {
+  CardInAThread card;
+  const auto config = configuration(card.port());
+  const drivers::MonotonicTime time;
+  auto devices = DeviceSet::start(config, time);
+  ASSERT_TRUE(devices) << devices.error().text;
+  Batch batch;
+  const auto patience = time.now() + 20s;
+  while (batch.axes.size() < 500 && time.now() < patience) {
+    devices->drain(batch);
+    std::this_thread::sleep_for(1ms);
+  }
+  ASSERT_GE(batch.axes.size(), 500u) << devices->health(time.now()).front().status.last_fault;
+  const auto& first = batch.axes.front();
+  const auto& last = batch.axes.back();
+  EXPECT_NEAR(first.position[0], -0.12, 5e-3) << "count 0 is where it stood when it was set up";
+  EXPECT_DOUBLE_EQ(last.position[1], 0.003);
+  const double seconds = std::chrono::duration<double>(last.head.time - first.head.time).count();
+  EXPECT_NEAR(last.position[0] - first.position[0], 0.01 * seconds, 1e-6);
+  EXPECT_FALSE(batch.encoder_raw.empty());
+  EXPECT_EQ(devices->health(time.now()).front().status.name, "counter_card");
+  EXPECT_THAT(devices->warnings(), Contains(HasSubstr("not yet seen on hardware")));
+}
+
+}  // namespace
+}  // namespace abbe::daemon

@@ -9,6 +9,7 @@ namespace abbe::daemon {
 namespace {
 
 using ::testing::Contains;
+using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 
 const std::string kMachine = R"([machine]
@@ -31,7 +32,7 @@ node_spacing_mm = 50
 
 std::string card(const std::string& axes, const std::string& more = {}) {
   return kMachine +
-         "[counter_card]\ntransport = \"usbip\"\nhost = \"127.0.0.1\"\nport = 3241\nclock_MHz = 10\n" + more +
+         "[counter_card]\ntransport = \"usbip\"\nhost = \"127.0.0.1\"\nport = 3241\nclock_MHz = 12\n" + more +
          "axes = [" + axes + "]\n";
 }
 
@@ -40,10 +41,13 @@ std::vector<std::string> faults_of(const std::string& text) {
   return config ? std::vector<std::string>{} : config.error().details;
 }
 
+const std::string kAxes = R"({axis = "X", channel = 0, step_nm = 10}, {axis = "Y", channel = 1, step_nm = 10},
+                             {axis = "Z", channel = 2, step_nm = 10})";
+
 TEST(CounterCardConfig, ReadsItsWiringInSi) {
   const auto config = parse_config(
-      card(R"({axis = "X", channel = 0, step_nm = 10, offset_mm = -300},
-              {axis = "Z", channel = 2, step_nm = 20, invert = true})",
+      card(R"({axis = "Z", channel = 2, step_nm = 20, invert = true}, {axis = "Y", channel = 1, step_nm = 10},
+              {axis = "X", channel = 0, step_nm = 10, offset_mm = -300})",
            "serial_number = \"01ABBE08\"\nlatch_channel = 6\nclock_source = \"timer0\"\nwidth_bits = 48\n"),
       "abbed.toml");
   ASSERT_TRUE(config) << config.error().details.front();
@@ -52,15 +56,16 @@ TEST(CounterCardConfig, ReadsItsWiringInSi) {
   EXPECT_EQ(found.serial_number, "01ABBE08");
   EXPECT_DOUBLE_EQ(found.wiring.axes.at(0).scale, 10e-9);
   EXPECT_DOUBLE_EQ(found.wiring.axes.at(0).offset, -0.3);
-  EXPECT_DOUBLE_EQ(found.wiring.axes.at(1).scale, -20e-9);
-  EXPECT_DOUBLE_EQ(found.wiring.clock_hz, 10e6);
+  EXPECT_DOUBLE_EQ(found.wiring.axes.at(2).scale, -20e-9);
+  EXPECT_THAT(config->connected_axes(), ElementsAre("X", "Y", "Z")) << "whatever their order in the file";
+  EXPECT_DOUBLE_EQ(found.wiring.clock_hz, 12e6);
   EXPECT_EQ(found.wiring.clock_source, drivers::ClockSource::Timer0);
   EXPECT_EQ(found.wiring.latch_channel, 6);
   EXPECT_EQ(found.wiring.width, drivers::quad08::CountWidth::Bits48);
 }
 
 TEST(CounterCardConfig, StretchesTimeOutsWithTheSpeedOfTheSimulation) {
-  const auto config = parse_config(card(R"({axis = "X", channel = 0, step_nm = 10})"), "abbed.toml");
+  const auto config = parse_config(card(kAxes), "abbed.toml");
   ASSERT_TRUE(config);
   EXPECT_EQ(device_options(*config->counter_card, 10.0).session.silence, std::chrono::seconds{1});
   EXPECT_EQ(device_options(*config->counter_card, 1.0).session.silence, std::chrono::milliseconds{100});
@@ -77,6 +82,28 @@ TEST(CounterCardConfig, RefusesTwoChannelsForOneAxis) {
       Contains(HasSubstr("two channels claim axis X")));
 }
 
+TEST(CounterCardConfig, NeedsEveryLinearAxis) {
+  EXPECT_THAT(
+      faults_of(card(R"({axis = "X", channel = 0, step_nm = 10}, {axis = "Z", channel = 2, step_nm = 10})")),
+      Contains(HasSubstr("axis Y has no channel")));
+}
+
+TEST(CounterCardConfig, WiringIsPartOfWhatAReadingIs) {
+  const auto hash = [](const std::string& x) {
+    const auto config =
+        parse_config(card("{axis = \"X\", " + x + R"(}, {axis = "Y", channel = 1, step_nm = 10},
+                                     {axis = "Z", channel = 2, step_nm = 10})"),
+                     "abbed.toml");
+    EXPECT_TRUE(config) << config.error().details.front();
+    return config ? machine_hash(*config) : "";
+  };
+  const auto plain = hash("channel = 0, step_nm = 10");
+  EXPECT_EQ(plain, hash("channel = 0, step_nm = 10, debounce_code = 3"));
+  EXPECT_NE(plain, hash("channel = 3, step_nm = 10"));
+  EXPECT_NE(plain, hash("channel = 0, step_nm = 20"));
+  EXPECT_NE(plain, hash("channel = 0, step_nm = 10, offset_mm = 1"));
+}
+
 TEST(CounterCardConfig, RefusesTwoUsesOfOneChannel) {
   EXPECT_THAT(faults_of(card(R"({axis = "X", channel = 5, step_nm = 10})")),
               Contains(HasSubstr("channel 5 is claimed by axis X and the clock")));
@@ -89,9 +116,9 @@ TEST(CounterCardConfig, RefusesAnAxisTheMachineDoesNotHave) {
 
 TEST(CounterCardConfig, RefusesAxesFromTwoDevices) {
   const auto text =
-      card(R"({axis = "X", channel = 0, step_nm = 10})") +
+      card(kAxes) +
       "[encoder]\ntransport = \"socketcan\"\ninterface = \"can0\"\nnodes = [{axis = \"X\", node = 1}]\n";
-  EXPECT_THAT(faults_of(text), Contains(HasSubstr("the axes come from [encoder] already")));
+  EXPECT_THAT(faults_of(text), Contains(HasSubstr("axis X is claimed by [encoder] and [counter_card]")));
 }
 
 TEST(CounterCardConfig, RefusesKeysOfTheOtherTransport) {

@@ -56,7 +56,7 @@ class CardInAThread {
   std::thread thread_;
 };
 
-Config configuration(std::uint16_t port) {
+Config configuration(std::uint16_t port, const std::string& serial_number = "01ABBE08") {
   const std::string text = R"([machine]
 name = "mill"
 chain = "[w X' b Y Z (C1) t]"
@@ -76,11 +76,12 @@ node_spacing_mm = 50
 [counter_card]
 transport = "usbip"
 port = )" + std::to_string(port) +
-                           R"(
+                           "\nserial_number = \"" + serial_number + R"("
 clock_MHz = 1
 latch_channel = 6
 scan_rate_hz = 2000
-axes = [{axis = "X", channel = 0, step_nm = 10, offset_mm = -120}, {axis = "Y", channel = 1, step_nm = 1000, offset_mm = 3}]
+axes = [{axis = "X", channel = 0, step_nm = 10, offset_mm = -120}, {axis = "Y", channel = 1, step_nm = 1000, offset_mm = 3},
+        {axis = "Z", channel = 2, step_nm = 1000}]
 )";
   auto config = parse_config(text, "abbed.toml");
   EXPECT_TRUE(config) << config.error().details.front();
@@ -104,11 +105,28 @@ TEST(CounterCardDevices, GiveTheAxesOfTheConfiguration) {
   const auto& last = batch.axes.back();
   EXPECT_NEAR(first.position[0], -0.12, 5e-3) << "count 0 is where it stood when it was set up";
   EXPECT_DOUBLE_EQ(last.position[1], 0.003);
-  const double seconds = std::chrono::duration<double>(last.head.time - first.head.time).count();
-  EXPECT_NEAR(last.position[0] - first.position[0], 0.01 * seconds, 1e-6);
+  const double seconds = (last.cycle - first.cycle) / 2000.0;  // by the card's own pacer
+  EXPECT_NEAR(last.position[0] - first.position[0], 0.01 * seconds, 2e-8) << "rounded to a count of 10 nm";
   EXPECT_FALSE(batch.encoder_raw.empty());
   EXPECT_EQ(devices->health(time.now()).front().status.name, "counter_card");
   EXPECT_THAT(devices->warnings(), Contains(HasSubstr("not yet seen on hardware")));
+}
+
+TEST(CounterCardDevices, NameTheCardThatIsNotTheConfiguredOne) {
+  CardInAThread card;
+  const drivers::MonotonicTime time;
+  auto devices = DeviceSet::start(configuration(card.port(), "01C0FFEE"), time);
+  ASSERT_TRUE(devices) << devices.error().text;
+  std::string fault;
+  const auto patience = time.now() + 20s;
+  while (fault.empty() && time.now() < patience) {
+    fault = devices->health(time.now()).front().status.last_fault;
+    std::this_thread::sleep_for(1ms);
+  }
+  EXPECT_THAT(fault, HasSubstr("its serial number is \"01ABBE08\", configured is \"01C0FFEE\""));
+  Batch batch;
+  devices->drain(batch);
+  EXPECT_TRUE(batch.axes.empty());
 }
 
 }  // namespace

@@ -5,6 +5,7 @@
 #include <fstream>
 #include <iterator>
 #include <regex>
+#include <sstream>
 
 #include "abbe/daemon/config.hpp"
 
@@ -30,6 +31,18 @@ std::string uncommented() {
   return std::regex_replace(example(), std::regex{"\n#([a-z_A-Z]+ = )"}, "\n$1");
 }
 
+/// With the tables that are there by example only: blocks that begin with "# [[".
+std::string with_example_tables() {
+  std::istringstream lines{example()};
+  std::string out;
+  bool in_table = false;
+  for (std::string line; std::getline(lines, line);) {
+    in_table = line.rfind("# [[", 0) == 0 || (in_table && line.rfind("# ", 0) == 0);
+    out += (in_table ? line.substr(2) : line) + "\n";
+  }
+  return out;
+}
+
 TEST(ExampleConfig, IsGood) {
   ASSERT_FALSE(example().empty());
   EXPECT_EQ(faults(example()), "");
@@ -40,6 +53,13 @@ TEST(ExampleConfig, ItsCommentedKeysAreGoodToo) {
   EXPECT_EQ(faults(uncommented()), "");
 }
 
+TEST(ExampleConfig, ItsExampleTablesAreGoodToo) {
+  EXPECT_EQ(faults(with_example_tables()), "");
+  const auto config = parse_config(with_example_tables(), "/etc/abbe/abbed.toml").value();
+  EXPECT_EQ(config.environment.size(), 3u);
+  EXPECT_EQ(config.thermal.size(), 1u);
+}
+
 TEST(ExampleConfig, ItsCommentedKeysAreTheDefaults) {
   const auto plain = parse_config(example(), "/etc/abbe/abbed.toml").value();
   const auto full = parse_config(uncommented(), "/etc/abbe/abbed.toml").value();
@@ -48,6 +68,10 @@ TEST(ExampleConfig, ItsCommentedKeysAreTheDefaults) {
   EXPECT_EQ(full.tracker->silence_timeout, plain.tracker->silence_timeout);
   EXPECT_EQ(full.tracker->weather, plain.tracker->weather);
   EXPECT_EQ(full.encoder->u_sampling_delay, plain.encoder->u_sampling_delay);
+  EXPECT_EQ(full.air.wavelength_m, plain.air.wavelength_m);
+  EXPECT_EQ(full.air.co2_ppm, plain.air.co2_ppm);
+  EXPECT_EQ(full.air.u_relative_humidity, plain.air.u_relative_humidity);
+  EXPECT_EQ(full.air.max_age, plain.air.max_age);
   EXPECT_EQ(full.daemon.watermark, plain.daemon.watermark);
   EXPECT_EQ(full.daemon.data_dir, plain.daemon.data_dir);
   EXPECT_EQ(full.recording.dir, plain.recording.dir);

@@ -1,6 +1,8 @@
 #include "abbe/daemon/recorder_thread.hpp"
 
-#include <gtest/gtest.h>
+#include <gmock/gmock.h>
+
+#include <map>
 
 #include "recording_fixture.hpp"
 
@@ -8,12 +10,15 @@ namespace abbe::daemon {
 namespace {
 
 using protocol::SampleFlag;
+using ::testing::Pair;
+using ::testing::UnorderedElementsAre;
 
 class RecorderThreadTest : public ::testing::Test {
  protected:
   void start(std::size_t most_waiting_bytes) {
     RecorderThreadOptions options;
     options.recorder = example_options(folder_.path());
+    options.environment = {"air", "scales"};
     options.most_waiting_bytes = most_waiting_bytes;
     auto started = RecorderThread::start(std::move(options), example_info());
     if (!started) throw std::runtime_error(started.error().text);
@@ -66,6 +71,54 @@ TEST_F(RecorderThreadTest, ABlockTakesTheRoomOfItsBytesOnly) {
   thread_->hand_over(b);
   EXPECT_EQ(thread_->dropped(), 0u);
   EXPECT_EQ(finish().message_count(), 100u);
+}
+
+/// `count` samples and their bytes of one device of [[environment]].
+Batch measured(std::size_t device, std::uint32_t first, std::uint32_t count) {
+  Batch b;
+  for (std::uint32_t i = first; i < first + count; ++i) {
+    b.measured_environment.push_back({device, example_environment(i)});
+    b.environment_raw.push_back({device, example_block(i)});
+    b.environment_raw.back().block.lost_before = 0;
+  }
+  return b;
+}
+
+TEST_F(RecorderThreadTest, RecordsEnvironmentDevicesUnderTheirNames) {
+  start(1 << 20);
+  thread_->hand_over(measured(1, 0, 2));
+  thread_->hand_over(measured(0, 2, 1));
+  std::map<std::string, int, std::less<>> samples, blocks;
+  RecordingSink sink;
+  sink.environment = [&](const protocol::EnvironmentSample&, std::string_view d) {
+    ++samples[std::string{d}];
+  };
+  sink.raw_block = [&](const protocol::RawBlock&, std::string_view d) { ++blocks[std::string{d}]; };
+  EXPECT_EQ(finish().read(sink), 0u);
+  const std::map<std::string, int, std::less<>> expected{{"air", 1}, {"scales", 2}};
+  EXPECT_EQ(samples, expected);
+  EXPECT_EQ(blocks, expected);
+}
+
+TEST_F(RecorderThreadTest, EveryEnvironmentDeviceSaysItsOwnLosses) {
+  start(2'000);
+  thread_->hand_over(measured(1, 0, 100));  // too much at once
+  EXPECT_EQ(thread_->dropped(), 200u);
+  wait_until_written();
+  thread_->hand_over(measured(0, 100, 1));
+  thread_->hand_over(measured(1, 100, 2));
+  std::vector<std::pair<std::string, bool>> samples;
+  std::vector<std::pair<std::string, std::uint32_t>> blocks;
+  RecordingSink sink;
+  sink.environment = [&](const protocol::EnvironmentSample& e, std::string_view d) {
+    samples.emplace_back(d, has(e.head.flags, SampleFlag::GapBefore));
+  };
+  sink.raw_block = [&](const protocol::RawBlock& b, std::string_view d) {
+    blocks.emplace_back(d, b.lost_before);
+  };
+  EXPECT_EQ(finish().read(sink), 0u);
+  EXPECT_THAT(samples, UnorderedElementsAre(Pair("air", false), Pair("scales", true), Pair("scales", false)));
+  EXPECT_THAT(blocks, UnorderedElementsAre(Pair("air", 0u), Pair("scales", 100u), Pair("scales", 0u)));
 }
 
 TEST_F(RecorderThreadTest, TheNextMessageOfEveryStreamSaysHowManyAreMissing) {

@@ -63,6 +63,7 @@ RecorderThreadOptions recorder_options(const Config& config) {
   if (config.tracker) options.tracker = config.tracker->name;
   if (config.encoder) options.encoder = config.encoder->name;
   if (config.counter_card) options.encoder = config.counter_card->name;
+  for (const auto& device : config.environment) options.environment.push_back(device.name);
   return options;
 }
 

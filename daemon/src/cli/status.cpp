@@ -38,6 +38,23 @@ void print_stream(const json& s) {
              s["last_fault"].get<std::string>());
 }
 
+std::string value_text(const json& value, int digits, std::string_view unit) {
+  return value.is_number() ? fmt::format("{:.{}f} {}", value.get<double>(), digits, unit)
+                           : fmt::format("- {}", unit);
+}
+
+void print_environment(const json& e) {
+  fmt::print("air        {}, {}, {}", value_text(e["air_temperature_C"], 2, "C"),
+             value_text(e["air_pressure_hPa"], 2, "hPa"), value_text(e["relative_humidity_percent"], 1, "%"));
+  if (e.contains("refractive_index")) {
+    const json& index = e["refractive_index"];
+    fmt::print(", n = {:.9f} (u = {:.1e})", index["n"].get<double>(), index["u_n"].get<double>());
+  }
+  fmt::print("\n");
+  for (const auto& [name, value] : e["temperatures_C"].items())
+    fmt::print("           {} {}\n", name, value_text(value, 2, "C"));
+}
+
 void print_status(const json& status) {
   const json& model = status["model"];
   const std::string state = model["state"];
@@ -48,6 +65,7 @@ void print_status(const json& status) {
   fmt::print("session    {}, {:.0f} %, {} points: {}\n", session["state"].get<std::string>(),
              100.0 * session["progress"].get<double>(), session["points"].get<std::uint64_t>(),
              session["reason"].get<std::string>());
+  if (status.contains("environment")) print_environment(status["environment"]);
   if (status.contains("recording")) fmt::print("recording  {}\n", status["recording"].get<std::string>());
   if (status.contains("dds")) {
     fmt::print("dds        {}, {} messages\n",

@@ -20,6 +20,9 @@ Config read_all(Section& root, const std::filesystem::path& base) {
   read_tracker(root, config);
   read_encoder(root, config);
   read_counter_card(root, config);
+  read_environment(root, config);
+  read_thermal(root, config);
+  read_air(root, config);
   read_recording(root, base, config);
   read_dds(root, base, config);
   read_gate(root, config);
@@ -70,6 +73,15 @@ Result<Config> load_config(const std::filesystem::path& file) {
   return parse_config(text.str(), file);
 }
 
+std::vector<std::string> Config::connected_axes() const {
+  std::vector<std::string> names;
+  if (encoder)
+    for (const auto& node : encoder->nodes) names.push_back(node.axis);
+  if (counter_card)
+    for (const auto& axis : counter_card->wiring.axes) names.push_back(axis.name);
+  return names;
+}
+
 std::string machine_hash(const Config& config) {
   const MachineConfig& machine = config.machine;
   std::string text = fmt::format("{}|{}|{}", machine.name, machine.chain, static_cast<int>(machine.basis));
@@ -83,6 +95,9 @@ std::string machine_hash(const Config& config) {
   }
   if (config.encoder) text += reading_text(*config.encoder);
   if (config.counter_card) text += reading_text(*config.counter_card);
+  for (const auto& thermal : config.thermal)
+    text += fmt::format("|thermal {} {:.17g} {:.17g} {}", thermal.axis, thermal.alpha_per_K, thermal.fixed_m,
+                        config.temperatures[thermal.temperature]);
   return sha256_hex(text);
 }
 

@@ -1,5 +1,6 @@
 #include <fmt/format.h>
 
+#include "config/machine_order.hpp"
 #include "config/message_bounds.hpp"
 #include "config/readers.hpp"
 
@@ -92,9 +93,13 @@ void read_counter_card(Section& root, Config& out) {
   read_probe(card, config.wiring);
   read_scan(card, config);
   for (auto& section : card.children("axes")) config.wiring.axes.push_back(read_axis(section, out.machine));
+  put_in_order_of_the_machine(out.machine, &drivers::CounterAxis::name, card, "axes", "channel",
+                              config.wiring.axes);
   // The driver knows what a wiring must be; its sentence names axis and channel.
   if (const auto possible = drivers::check(config.wiring); !possible) card.fault("", possible.error().text);
-  if (out.encoder) card.fault("", "the axes come from [encoder] already: one of them must go");
+  for (const auto& axis : config.wiring.axes)
+    if (const auto claimed = out.connected_axes(); std::ranges::find(claimed, axis.name) != claimed.end())
+      card.fault("axes", fmt::format("axis {} is claimed by [encoder] and [counter_card]", axis.name));
   card.close();
   out.counter_card = std::move(config);
 }

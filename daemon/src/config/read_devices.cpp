@@ -1,9 +1,9 @@
 #include <fmt/format.h>
 
-#include <algorithm>
 #include <cmath>
 #include <set>
 
+#include "config/machine_order.hpp"
 #include "config/message_bounds.hpp"
 #include "config/readers.hpp"
 
@@ -80,15 +80,6 @@ EncoderNodeConfig read_node(Section& section, const MachineConfig& machine) {
   return node;
 }
 
-/// Everybody behind the encoder takes an axis by its place in a sample: the file's order must not matter.
-void put_in_order_of_the_machine(const MachineConfig& machine, std::vector<EncoderNodeConfig>& nodes) {
-  const auto place = [&machine](const EncoderNodeConfig& node) {
-    return machine.find_axis(node.axis) - machine.axes.data();
-  };
-  std::stable_sort(nodes.begin(), nodes.end(),
-                   [&place](const auto& a, const auto& b) { return place(a) < place(b); });
-}
-
 void read_nodes(Section& encoder, const MachineConfig& machine, EncoderConfig& out) {
   constexpr std::size_t kMostNodes = 8;  // as many axes as a sample carries
   std::set<std::string> axes;
@@ -103,12 +94,7 @@ void read_nodes(Section& encoder, const MachineConfig& machine, EncoderConfig& o
   }
   if (out.nodes.empty() || out.nodes.size() > kMostNodes)
     encoder.fault("nodes", fmt::format("needs 1 to {} nodes", kMostNodes));
-  for (const std::string needed : {"X", "Y", "Z"})
-    if (!axes.contains(needed)) encoder.fault("nodes", fmt::format("axis {} has no node", needed));
-  const bool all_known = std::all_of(out.nodes.begin(), out.nodes.end(), [&machine](const auto& node) {
-    return machine.find_axis(node.axis) != nullptr;
-  });
-  if (all_known) put_in_order_of_the_machine(machine, out.nodes);
+  put_in_order_of_the_machine(machine, &EncoderNodeConfig::axis, encoder, "nodes", "node", out.nodes);
 }
 
 }  // namespace

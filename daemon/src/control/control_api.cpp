@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <cmath>
 #include <map>
 #include <string>
 #include <utility>
@@ -76,6 +77,25 @@ json model_json(const ModelStanding& standing) {
   return out;
 }
 
+/// NaN has no place in JSON: null.
+json number(double value) {
+  return std::isnan(value) ? json{} : json(value);
+}
+
+json environment_json(const protocol::Snapshot& live, const Config& config) {
+  const auto& e = live.environment;
+  json out{{"air_temperature_C", number(e.air_temperature_K - 273.15)},
+           {"air_pressure_hPa", number(e.air_pressure_Pa * 1e-2)},
+           {"relative_humidity_percent", number(e.relative_humidity * 1e2)}};
+  json temperatures = json::object();
+  for (std::size_t i = 0; i < config.temperatures.size(); ++i)
+    temperatures[config.temperatures[i]] = number(e.temperature_K[i] - 273.15);
+  out["temperatures_C"] = std::move(temperatures);
+  if (const auto index = index_of_air(e, config.air))
+    out["refractive_index"] = {{"n", index->n}, {"u_n", index->u_n}};
+  return out;
+}
+
 json status(const Hub& hub) {
   json devices = json::array();
   for (const auto& h : hub.health()) devices.push_back(device_json(h));
@@ -86,6 +106,7 @@ json status(const Hub& hub) {
            {"streams", std::move(devices)}};
   const auto& live = hub.live().view();
   out["position_m"] = std::vector<double>(live.position.begin(), live.position.begin() + live.axis_count);
+  if (live.has_environment) out["environment"] = environment_json(live, hub.parts().config);
   if (hub.parts().recorder != nullptr) out["recording"] = hub.parts().recorder->status().file.string();
   if (hub.parts().publisher != nullptr) {
     const auto& link = hub.parts().publisher->link();

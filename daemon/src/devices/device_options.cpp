@@ -90,9 +90,37 @@ drivers::CounterCardOptions device_options(const CounterCardConfig& config, doub
   return options;
 }
 
+drivers::EnvironmentDeviceOptions device_options(const EnvironmentConfig& config, double speed) {
+  drivers::EnvironmentDeviceOptions options;
+  options.name = config.name;
+  options.address = config.address;
+  options.map = config.map;
+  options.period = config.period;
+  options.answer_timeout = stretched(config.answer_timeout, speed);
+  options.retry = stretched(options.retry, speed);
+  options.refused_retry = stretched(options.refused_retry, speed);
+  return options;
+}
+
+EnvironmentUseOptions environment_use(const Config& config) {
+  EnvironmentUseOptions use;
+  use.max_age = config.air.max_age;
+  for (const auto& device : config.environment) {
+    for (const auto& measured : device.map.measured) use.measured |= drivers::mask_of(measured);
+  }
+  use.air = config.air;
+  const auto axes = config.connected_axes();
+  for (const ThermalConfig& thermal : config.thermal) {
+    const auto axis = std::find(axes.begin(), axes.end(), thermal.axis);
+    if (axis != axes.end()) use.thermal.push_back({static_cast<std::size_t>(axis - axes.begin()), thermal});
+  }
+  return use;
+}
+
 AssemblerOptions assembler_options(const Config& config) {
   AssemblerOptions options;
   options.watermark = config.daemon.watermark;
+  options.environment = environment_use(config);
   if (config.encoder) {
     options.axes_compensated = config.encoder->axes_compensated;
     const std::chrono::duration<double, std::nano> span = kMostLostCycles * config.encoder->sync_period;

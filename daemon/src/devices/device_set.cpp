@@ -88,11 +88,21 @@ struct DeviceSet::State {
   std::optional<Running<drivers::TrackerDevice>> tracker;
   std::optional<Running<drivers::EncoderDevice>> encoder;
   std::optional<Running<drivers::CounterCardDevice>> counter_card;
+  std::vector<Running<drivers::EnvironmentDevice>> environments;
   std::array<protocol::TrackerPoint, kMostSamples> points;
   std::array<protocol::AxisSample, kMostSamples> axes;
   std::array<protocol::EnvironmentSample, 16> environment;
   std::array<protocol::RawBlock, kMostBlocks> blocks;
   std::map<std::string, std::pair<HostTime, std::uint64_t>> counted;  // at the previous health()
+
+  void drain_environment(std::size_t i, Batch& batch) {
+    auto& device = *environments[i].device;
+    for (protocol::EnvironmentSample sample; device.samples().pop({&sample, 1}) != 0;)
+      batch.measured_environment.push_back({i, sample});
+    while (const std::size_t n = device.raw().pop(blocks)) {
+      for (std::size_t b = 0; b < n; ++b) batch.environment_raw.push_back({i, blocks[b]});
+    }
+  }
 
   StreamHealth health_of(const drivers::Device& device, const DeviceThread& thread, HostTime now) {
     StreamHealth h{.status = device.status()};
@@ -142,6 +152,13 @@ Result<DeviceSet> DeviceSet::start(const Config& config, const drivers::TimeSour
     if (!running) return tl::unexpected(running.error());
     state->tracker.emplace(std::move(*running));
   }
+  for (const EnvironmentConfig& device : config.environment) {
+    // Once a second and never in a hurry: an ordinary thread.
+    auto running = run(drivers::EnvironmentDevice::create(device_options(device, config.daemon.speed), time),
+                       thread_options(config.daemon, "abbe-environ", 0, std::nullopt));
+    if (!running) return tl::unexpected(running.error());
+    state->environments.push_back(std::move(*running));
+  }
   return DeviceSet{std::move(state)};
 }
 
@@ -165,6 +182,7 @@ void DeviceSet::drain(Batch& batch) {
     drain_ring(s.tracker->device->environment(), s.environment, batch.environment);
     drain_ring(s.tracker->device->raw(), s.blocks, batch.tracker_raw);
   }
+  for (std::size_t i = 0; i < s.environments.size(); ++i) s.drain_environment(i, batch);
 }
 
 std::vector<StreamHealth> DeviceSet::health(HostTime now) {
@@ -175,22 +193,24 @@ std::vector<StreamHealth> DeviceSet::health(HostTime now) {
     out.push_back(state_->health_of(*state_->encoder->device, *state_->encoder->thread, now));
   if (state_->counter_card)
     out.push_back(state_->health_of(*state_->counter_card->device, *state_->counter_card->thread, now));
+  for (const auto& running : state_->environments)
+    out.push_back(state_->health_of(*running.device, *running.thread, now));
   return out;
 }
 
 std::vector<std::string> DeviceSet::warnings() const {
   std::vector<std::string> out;
   const auto add = [&out](const auto& running) {
-    if (running)
-      out.insert(out.end(), running->thread->warnings().begin(), running->thread->warnings().end());
+    out.insert(out.end(), running.thread->warnings().begin(), running.thread->warnings().end());
   };
-  add(state_->tracker);
-  add(state_->encoder);
-  add(state_->counter_card);
+  if (state_->tracker) add(*state_->tracker);
+  if (state_->encoder) add(*state_->encoder);
   if (state_->counter_card) {
+    add(*state_->counter_card);
     if (auto assumed = state_->counter_card->device->assumption(); !assumed.empty())
       out.push_back(std::move(assumed));
   }
+  for (const auto& running : state_->environments) add(running);
   return out;
 }
 

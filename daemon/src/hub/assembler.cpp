@@ -6,6 +6,7 @@
 #include <cstddef>
 #include <iterator>
 #include <span>
+#include <utility>
 
 namespace abbe::daemon {
 namespace {
@@ -23,12 +24,6 @@ bool earlier(const AxisSample& sample, HostTime t) {
   return sample.head.time < t;
 }
 
-template <class T>
-void insert_by_time(std::deque<T>& in_order, const T& sample) {
-  const auto later = [](HostTime t, const T& other) { return t < other.head.time; };
-  in_order.insert(std::upper_bound(in_order.begin(), in_order.end(), sample.head.time, later), sample);
-}
-
 void set_axes(Snapshot& s, const drivers::AxesAt& axes) {
   s.axis_count = axes.axis_count;
   s.missing_mask = axes.missing_mask;
@@ -40,7 +35,8 @@ void set_axes(Snapshot& s, const drivers::AxesAt& axes) {
 
 }  // namespace
 
-Assembler::Assembler(AssemblerOptions options) : options_(options) {}
+Assembler::Assembler(AssemblerOptions options)
+    : options_(std::move(options)), environment_(options_.environment, options_.watermark) {}
 
 void Assembler::take(const Batch& batch) {
   points_.insert(points_.end(), batch.points.begin(), batch.points.end());
@@ -49,7 +45,7 @@ void Assembler::take(const Batch& batch) {
     newest_ = std::max(newest_, sample.head.time);
     take(sample);
   }
-  for (const auto& sample : batch.environment) insert_by_time(environment_, sample);
+  environment_.take(batch);
 }
 
 /// A bus that went off or began anew may report an instant before that of the last sample. Interpolation
@@ -88,10 +84,9 @@ Snapshot Assembler::assemble(const protocol::TrackerPoint& point) {
   s.axes_compensated = options_.axes_compensated;
   s.has_tracker_point = true;
   s.tracker_point = point;
-  while (environment_.size() > 1 && environment_[1].head.time <= point.head.time) environment_.pop_front();
-  if (!environment_.empty() && environment_.front().head.time <= point.head.time) {
+  if (const auto environment = environment_.at(point.head.time)) {
     s.has_environment = true;
-    s.environment = environment_.front();
+    s.environment = *environment;
   }
 
   // Two samples on either side are all that the interpolation looks at; handing over exactly these keeps a
@@ -108,6 +103,8 @@ Snapshot Assembler::assemble(const protocol::TrackerPoint& point) {
   } else {
     s.head.flags |= SampleFlag::AxisMissing;
   }
+  correct_for_temperature(s, options_.environment);
+  correct_for_air(s, options_.environment);
   return s;
 }
 

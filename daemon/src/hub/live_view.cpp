@@ -24,17 +24,20 @@ bool axes_known(const protocol::Snapshot& view) noexcept {
 }
 
 bool LiveView::take(const Batch& batch) {
+  environment_.take(batch);
+  if (const auto environment = environment_.latest()) {
+    view_.has_environment = true;
+    view_.environment = *environment;
+  }
   for (const auto& sample : batch.axes) take(sample);
   if (!batch.points.empty()) {
     view_.has_tracker_point = true;
     view_.tracker_point = batch.points.back();
+    correct_for_air(view_, use_);
     if (!axes_known_at_) view_.head.time = batch.points.back().head.time;
   }
-  if (!batch.environment.empty()) {
-    view_.has_environment = true;
-    view_.environment = batch.environment.back();
-  }
-  return !batch.axes.empty() || !batch.points.empty() || !batch.environment.empty();
+  return !batch.axes.empty() || !batch.points.empty() || !batch.environment.empty() ||
+         !batch.measured_environment.empty();
 }
 
 void LiveView::take(const protocol::AxisSample& sample) {
@@ -45,6 +48,7 @@ void LiveView::take(const protocol::AxisSample& sample) {
   view_.position = axes.position;
   view_.velocity = axes.velocity;
   view_.u_position = axes.u_position;
+  correct_for_temperature(view_, use_);
   previous_ = sample;
   if (axes_known(view_)) axes_known_at_ = sample.head.time;
 }

@@ -23,15 +23,23 @@ std::size_t size_of(const std::vector<T>& samples) noexcept {
 }
 
 std::size_t bytes_of(const Batch& batch) noexcept {
-  std::size_t bytes = size_of(batch.points) + size_of(batch.axes) + size_of(batch.environment);
+  std::size_t bytes = size_of(batch.points) + size_of(batch.axes) + size_of(batch.environment) +
+                      batch.measured_environment.size() * sizeof(protocol::EnvironmentSample);
   for (const auto* blocks : {&batch.tracker_raw, &batch.encoder_raw})
     bytes += WaitingBlocks::bytes_of(*blocks);
+  for (const auto& [device, block] : batch.environment_raw) bytes += WaitingBlocks::bytes_of(block);
   return bytes;
 }
 
 struct Attachment {
   RecordingAttachment what;
   protocol::HostTime time{};
+};
+
+/// What waits of one device of [[environment]].
+struct WaitingMeasured {
+  std::vector<protocol::EnvironmentSample> samples;
+  WaitingBlocks raw;
 };
 
 /// What waits for the recorder.
@@ -41,13 +49,17 @@ struct Waiting {
   std::vector<protocol::EnvironmentSample> environment;
   WaitingBlocks tracker_raw;
   WaitingBlocks encoder_raw;
+  std::vector<WaitingMeasured> measured;  ///< in the order of RecorderThreadOptions::environment
   std::vector<v1::CalibrationEvent> events;
   std::vector<Attachment> attachments;
   std::vector<std::promise<RecordingDigest>> digests;
   bool full = false;  ///< what comes until the recorder has taken this is dropped: one hole, not many
 
   [[nodiscard]] std::size_t bytes() const noexcept {
-    return size_of(points) + size_of(axes) + size_of(environment) + tracker_raw.bytes() + encoder_raw.bytes();
+    std::size_t bytes =
+        size_of(points) + size_of(axes) + size_of(environment) + tracker_raw.bytes() + encoder_raw.bytes();
+    for (const auto& device : measured) bytes += size_of(device.samples) + device.raw.bytes();
+    return bytes;
   }
   /// Keeps the room for an ordinary turn, gives that of a stalled disk back.
   void clear() {
@@ -61,6 +73,10 @@ struct Waiting {
     environment.clear();
     tracker_raw.clear();
     encoder_raw.clear();
+    for (auto& device : measured) {
+      device.samples.clear();
+      device.raw.clear();
+    }
     events.clear();
     attachments.clear();
     digests.clear();
@@ -70,16 +86,34 @@ struct Waiting {
 
 /// Messages of each stream that were dropped since the last one that was not.
 struct Dropped {
+  struct OfDevice {
+    std::uint32_t samples = 0, raw = 0;
+  };
   std::uint32_t points = 0, axes = 0, environment = 0, tracker_raw = 0, encoder_raw = 0;
+  std::vector<OfDevice> measured;
 };
+
+template <class T>
+T& place(std::vector<T>& of_devices, std::size_t device) {
+  if (device >= of_devices.size()) of_devices.resize(device + 1);
+  return of_devices[device];
+}
+
+void say_dropped(protocol::SampleHead& head, std::uint32_t& dropped) {
+  if (dropped == 0) return;
+  head.lost_before += std::exchange(dropped, 0);
+  head.flags |= protocol::SampleFlag::GapBefore;
+}
 
 template <class T>
 void append(std::vector<T>& to, const std::vector<T>& from, std::uint32_t& dropped) {
   if (from.empty()) return;
-  const auto first = to.insert(to.end(), from.begin(), from.end());
-  if (dropped == 0) return;
-  first->head.lost_before += std::exchange(dropped, 0);
-  first->head.flags |= protocol::SampleFlag::GapBefore;
+  say_dropped(to.insert(to.end(), from.begin(), from.end())->head, dropped);
+}
+template <class T>
+void append(std::vector<T>& to, const T& sample, std::uint32_t& dropped) {
+  to.push_back(sample);
+  say_dropped(to.back().head, dropped);
 }
 
 }  // namespace
@@ -135,9 +169,12 @@ struct RecorderThread::State {
     lose(unsaid.points, batch.points.size());
     lose(unsaid.axes, batch.axes.size());
     lose(unsaid.environment, batch.environment.size());
+    for (const auto& sample : batch.measured_environment)
+      lose(place(unsaid.measured, sample.device).samples, 1);
     if (!options.raw) return;
     lose(unsaid.tracker_raw, batch.tracker_raw.size());
     lose(unsaid.encoder_raw, batch.encoder_raw.size());
+    for (const auto& raw : batch.environment_raw) lose(place(unsaid.measured, raw.device).raw, 1);
   }
 
   void write(Waiting& turn) {
@@ -147,6 +184,11 @@ struct RecorderThread::State {
     for (const auto& s : turn.environment) recorder.record(s, options.tracker);
     turn.tracker_raw.for_each(options.tracker, [this](const auto& bytes) { recorder.record(bytes); });
     turn.encoder_raw.for_each(options.encoder, [this](const auto& bytes) { recorder.record(bytes); });
+    for (std::size_t i = 0; i < turn.measured.size(); ++i) {
+      const std::string& device = options.environment.at(i);
+      for (const auto& s : turn.measured[i].samples) recorder.record(s, device);
+      turn.measured[i].raw.for_each(device, [this](const auto& bytes) { recorder.record(bytes); });
+    }
     for (const auto& e : turn.events) recorder.record(e);
     if (!turn.digests.empty()) recorder.flush();
     for (auto& d : turn.digests) d.set_value(recorder.digest());
@@ -190,9 +232,13 @@ void RecorderThread::hand_over(const Batch& batch) {
   append(waiting.points, batch.points, unsaid.points);
   append(waiting.axes, batch.axes, unsaid.axes);
   append(waiting.environment, batch.environment, unsaid.environment);
+  for (const auto& [device, sample] : batch.measured_environment)
+    append(place(waiting.measured, device).samples, sample, place(unsaid.measured, device).samples);
   if (!state_->options.raw) return;
   waiting.tracker_raw.append(batch.tracker_raw, unsaid.tracker_raw);
   waiting.encoder_raw.append(batch.encoder_raw, unsaid.encoder_raw);
+  for (const auto& [device, block] : batch.environment_raw)
+    place(waiting.measured, device).raw.append(block, place(unsaid.measured, device).raw);
 }
 
 void RecorderThread::hand_over(v1::CalibrationEvent event) {

@@ -14,6 +14,7 @@
 #include "abbe/drivers/can/encoder_receiver.hpp"
 #include "abbe/drivers/counter_card/receiver.hpp"
 #include "abbe/drivers/counter_card/thinning.hpp"
+#include "abbe/drivers/environment/receiver.hpp"
 #include "abbe/drivers/tracker/receiver.hpp"
 
 namespace abbe::daemon {
@@ -63,6 +64,10 @@ class RawDecoder {
       tracker_ = std::make_unique<drivers::TrackerReceiver>(
           drivers::receiver_options(device_options(*config.tracker, config.daemon.speed)));
     }
+    for (const EnvironmentConfig& device : config.environment) {
+      environment_names_.push_back(device.name);
+      environment_.emplace_back(device.map, drivers::transport_of(device.address));
+    }
     if (config.encoder) {
       encoder_name_ = config.encoder->name;
       encoder_.emplace(device_options(*config.encoder, config.daemon.speed).receiver);
@@ -84,6 +89,10 @@ class RawDecoder {
       card_->on_raw(block, [&](const drivers::CounterScan& s) {
         if (const auto sample = thinning_.take(s.axes)) batch.axes.push_back(*sample);
       });
+    }
+    for (std::size_t i = 0; i < environment_.size(); ++i) {
+      if (device == environment_names_[i] && environment_[i].on_raw(block))
+        batch.measured_environment.push_back({i, environment_[i].sample()});
     }
   }
 
@@ -108,6 +117,8 @@ class RawDecoder {
   std::string card_name_;
   std::unique_ptr<drivers::CounterCardReceiver> card_;
   drivers::ScanThinning thinning_{1};
+  std::vector<std::string> environment_names_;
+  std::vector<drivers::EnvironmentReceiver> environment_;
 };
 
 /// The calibrations the recording asks for, one after the other.
@@ -115,7 +126,10 @@ class Calibrations {
  public:
   Calibrations(std::vector<CalibrationRequest> requests, const Config& config,
                const calib::VolumetricModel* active)
-      : requests_(std::move(requests)), config_(config), active_(active), session_(acquisition_options(config)) {
+      : requests_(std::move(requests)),
+        config_(config),
+        active_(active),
+        session_(acquisition_options(config)) {
     begin_next();
   }
 
@@ -167,6 +181,14 @@ class Calibrations {
   std::vector<ReplayedCalibration> done_;
 };
 
+/// Which of Config::environment it is; none: the tracker's weather.
+std::optional<std::size_t> environment_place(const Config& config, std::string_view device) {
+  for (std::size_t i = 0; i < config.environment.size(); ++i) {
+    if (config.environment[i].name == device) return i;
+  }
+  return std::nullopt;
+}
+
 Result<std::vector<CalibrationRequest>> requests_of(const RecordingReader& recording) {
   std::vector<CalibrationRequest> requests;
   for (const auto& attachment : recording.attachments()) {
@@ -215,8 +237,13 @@ Result<ReplayReport> replay(const RecordingReader& recording, const Config& conf
       device_order.take(sequence, p, batch.points);
     };
     sink.axis_sample = [&](const protocol::AxisSample& s, std::string_view) { batch.axes.push_back(s); };
-    sink.environment = [&](const protocol::EnvironmentSample& e, std::string_view) {
-      batch.environment.push_back(e);
+    sink.environment = [&](const protocol::EnvironmentSample& e, std::string_view device) {
+      const auto measuring = environment_place(config, device);
+      if (measuring) {
+        batch.measured_environment.push_back({*measuring, e});
+      } else {
+        batch.environment.push_back(e);
+      }
     };
   } else {
     sink.raw_block = [&](const protocol::RawBlock& b, std::string_view device) {

@@ -15,18 +15,22 @@ class WaitingBlocks {
  public:
   /// What append() will need for these.
   [[nodiscard]] static std::size_t bytes_of(const std::vector<protocol::RawBlock>& blocks) noexcept {
-    std::size_t bytes = blocks.size() * sizeof(Head);
-    for (const auto& block : blocks) bytes += block.length;
+    std::size_t bytes = 0;
+    for (const auto& block : blocks) bytes += bytes_of(block);
     return bytes;
+  }
+  [[nodiscard]] static std::size_t bytes_of(const protocol::RawBlock& block) noexcept {
+    return sizeof(Head) + block.length;
   }
   /// `dropped` blocks before these never came this far: the first one says so.
   void append(const std::vector<protocol::RawBlock>& blocks, std::uint32_t& dropped) {
-    for (const auto& block : blocks) {
-      const auto from = protocol::to_raw_bytes(block, {}).bytes;
-      heads_.push_back({block.time, block.lost_before + std::exchange(dropped, 0), block.direction,
-                        block.continued, from.size()});
-      bytes_.insert(bytes_.end(), from.begin(), from.end());
-    }
+    for (const auto& block : blocks) append(block, dropped);
+  }
+  void append(const protocol::RawBlock& block, std::uint32_t& dropped) {
+    const auto from = protocol::to_raw_bytes(block, {}).bytes;
+    heads_.push_back({block.time, block.lost_before + std::exchange(dropped, 0), block.direction,
+                      block.continued, from.size()});
+    bytes_.insert(bytes_.end(), from.begin(), from.end());
   }
   [[nodiscard]] std::size_t bytes() const noexcept { return heads_.size() * sizeof(Head) + bytes_.size(); }
 

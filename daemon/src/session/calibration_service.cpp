@@ -48,10 +48,10 @@ CalibrationService::~CalibrationService() {
 Result<void> CalibrationService::start_otf(std::vector<AxisPosition> path_m, const std::string& who,
                                            HostTime now) {
   if (config_.axes_compensated()) {
-    return fail(ErrorCode::Refused,
-                "calibrate otf: the control already corrects these axes ([encoder] axes_compensated = true): "
-                "switch its "
-                "compensation off first, and say so there");
+    return fail(
+        ErrorCode::Refused,
+        "calibrate otf: the control already corrects these axes (axes_compensated = true): switch its "
+        "compensation off first, and say so in the configuration");
   }
   if (identification_.valid()) {
     return fail(ErrorCode::Refused, "calibrate otf: the identification of a cancelled run is still ending");

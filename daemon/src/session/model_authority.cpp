@@ -80,7 +80,7 @@ ModelStanding ModelAuthority::standing(HostTime now, std::optional<HostTime> axe
   s.status = v1::ModelStatus::MODEL_STALE;
   if (axes_compensated_) {
     s.status = v1::ModelStatus::MODEL_INVALID;
-    s.reason = "the control already corrects these axes: [encoder] axes_compensated = true";
+    s.reason = "the control already corrects these axes: axes_compensated = true";
   } else if (!active_.made_for_this_machine) {
     s.reason = "the model was made for another machine configuration";
   } else if (!axes_known_at) {

@@ -16,6 +16,7 @@
 #include <vector>
 
 #include "abbe/daemon/batch.hpp"
+#include "abbe/daemon/environment_use.hpp"
 #include "abbe/drivers/interpolation.hpp"
 #include "abbe/protocol/samples.hpp"
 
@@ -26,6 +27,7 @@ struct AssemblerOptions {
       std::chrono::milliseconds{600};  ///< how far a stream may lag behind the others
   drivers::InterpolationOptions interpolation;
   bool axes_compensated = false;  ///< the readings are already corrected by the control
+  EnvironmentUseOptions environment;
 };
 
 class Assembler {
@@ -48,7 +50,7 @@ class Assembler {
   AssemblerOptions options_;
   std::deque<protocol::TrackerPoint> points_;
   std::deque<protocol::AxisSample> axes_;
-  std::deque<protocol::EnvironmentSample> environment_;  // front: in force for the next point
+  EnvironmentMerge environment_;
   protocol::HostTime newest_{};
 };
 

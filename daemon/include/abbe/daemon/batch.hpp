@@ -2,29 +2,44 @@
 /// What the hub took out of the rings in one turn, or a replay out of a recording: every stream in its own
 /// order. Reused from turn to turn, so that it stops allocating once it has grown. Pure data.
 
+#include <cstddef>
 #include <vector>
 
 #include "abbe/protocol/samples.hpp"
 
 namespace abbe::daemon {
 
+/// From the device of that place in Config::environment.
+struct FromEnvironment {
+  std::size_t device = 0;
+  protocol::EnvironmentSample sample;
+};
+struct RawFromEnvironment {
+  std::size_t device = 0;
+  protocol::RawBlock block;
+};
+
 struct Batch {
   std::vector<protocol::TrackerPoint> points;
   std::vector<protocol::AxisSample> axes;
-  std::vector<protocol::EnvironmentSample> environment;
+  std::vector<protocol::EnvironmentSample> environment;  ///< the weather of the tracker
+  std::vector<FromEnvironment> measured_environment;
   std::vector<protocol::RawBlock> tracker_raw;
   std::vector<protocol::RawBlock> encoder_raw;
+  std::vector<RawFromEnvironment> environment_raw;
 
   void clear() noexcept {
     points.clear();
     axes.clear();
     environment.clear();
+    measured_environment.clear();
     tracker_raw.clear();
     encoder_raw.clear();
+    environment_raw.clear();
   }
   [[nodiscard]] bool empty() const noexcept {
     return points.empty() && axes.empty() && environment.empty() && tracker_raw.empty() &&
-           encoder_raw.empty();
+           encoder_raw.empty() && measured_environment.empty() && environment_raw.empty();
   }
 };
 

@@ -15,8 +15,11 @@
 #include <string_view>
 #include <vector>
 
+#include "abbe/calib/environment/refractive_index.hpp"
 #include "abbe/daemon/error.hpp"
 #include "abbe/drivers/counter_card/wiring.hpp"
+#include "abbe/drivers/environment/modbus_line.hpp"
+#include "abbe/drivers/environment/register_map.hpp"
 
 namespace abbe::daemon {
 
@@ -124,6 +127,39 @@ struct CounterCardConfig {
   bool axes_compensated = false;      ///< true: the control already corrects these readings
 };
 
+/// One [[environment]]: a Modbus device that measures air, scales or parts.
+struct EnvironmentConfig {
+  std::string name;
+  drivers::ModbusAddress address;
+  drivers::RegisterMap map;
+  std::chrono::nanoseconds period{std::chrono::seconds{1}};
+  std::chrono::nanoseconds answer_timeout{std::chrono::milliseconds{500}};
+};
+
+/// One [[thermal]]: the readings of an axis are corrected to what the machine really does, by the temperature
+/// of its scale.
+struct ThermalConfig {
+  std::string axis;
+  std::uint8_t temperature = 0;  ///< index into Config::temperatures
+  double alpha_per_K = 0.0;      ///< of the scale
+  double u_alpha_per_K = 0.0;
+  double u_temperature_K = 0.0;
+  double fixed_m = 0.0;  ///< the reading where the scale is fixed to the machine
+};
+
+/// [air]: the refractive index of the air that is measured.
+struct AirConfig {
+  calib::IndexEquation equation = calib::IndexEquation::Ciddor;
+  double wavelength_m = calib::kHeliumNeon_m;
+  double co2_ppm = 450.0;
+  double u_temperature_K = 0.2;
+  double u_pressure_Pa = 30.0;
+  double u_relative_humidity = 0.03;
+  std::chrono::nanoseconds max_age{std::chrono::seconds{60}};  ///< an older value is not available any more
+  /// The tracker's distances are raw: computed with this index. Then they are corrected to the air measured.
+  std::optional<double> assumed_index;
+};
+
 enum class RealTimeMode { Enforce, Ignore };
 
 /// [daemon]
@@ -189,11 +225,19 @@ struct Config {
   std::optional<TrackerConfig> tracker;
   std::optional<EncoderConfig> encoder;
   std::optional<CounterCardConfig> counter_card;
+  std::vector<EnvironmentConfig> environment;
+  std::vector<std::string>
+      temperatures;  ///< names of EnvironmentSample::temperature_K, as they are configured
+  std::vector<ThermalConfig> thermal;
+  AirConfig air;
   DaemonConfig daemon;
   RecordingConfig recording;
   DdsConfig dds;
   GateConfig gate;
   ControlConfig control;
+
+  /// What a sample of the axes holds, in its order; empty: no axis is connected.
+  [[nodiscard]] std::vector<std::string> connected_axes() const;
 
   /// The control already corrects what the axes read, whichever device reads them.
   [[nodiscard]] bool axes_compensated() const noexcept {

@@ -8,6 +8,7 @@
 #include "abbe/daemon/otf_acquisition.hpp"
 #include "abbe/drivers/can/encoder_device.hpp"
 #include "abbe/drivers/counter_card/device.hpp"
+#include "abbe/drivers/environment/device.hpp"
 #include "abbe/drivers/tracker/device.hpp"
 
 namespace abbe::daemon {
@@ -15,6 +16,8 @@ namespace abbe::daemon {
 [[nodiscard]] drivers::TrackerDeviceOptions device_options(const TrackerConfig& config, double speed);
 [[nodiscard]] drivers::EncoderDeviceOptions device_options(const EncoderConfig& config, double speed);
 [[nodiscard]] drivers::CounterCardOptions device_options(const CounterCardConfig& config, double speed);
+[[nodiscard]] drivers::EnvironmentDeviceOptions device_options(const EnvironmentConfig& config, double speed);
+[[nodiscard]] EnvironmentUseOptions environment_use(const Config& config);
 [[nodiscard]] AssemblerOptions assembler_options(const Config& config);
 /// Standstill is judged over enough points at the tracker's rate.
 [[nodiscard]] AcquisitionOptions acquisition_options(const Config& config);

@@ -7,6 +7,7 @@
 
 #include "abbe/daemon/assembler.hpp"
 #include "abbe/daemon/batch.hpp"
+#include "abbe/daemon/environment_use.hpp"
 #include "abbe/protocol/samples.hpp"
 
 namespace abbe::daemon {
@@ -17,7 +18,8 @@ namespace abbe::daemon {
 
 class LiveView {
  public:
-  explicit LiveView(const AssemblerOptions& options) noexcept : interpolation_(options.interpolation) {
+  explicit LiveView(const AssemblerOptions& options)
+      : interpolation_(options.interpolation), use_(options.environment), environment_(use_, {}) {
     view_.axes_compensated = options.axes_compensated;
   }
 
@@ -31,6 +33,8 @@ class LiveView {
   void take(const protocol::AxisSample& sample);
 
   drivers::InterpolationOptions interpolation_;
+  EnvironmentUseOptions use_;
+  EnvironmentMerge environment_;
   protocol::Snapshot view_{};
   std::optional<protocol::AxisSample> previous_;
   std::optional<protocol::HostTime> axes_known_at_;

@@ -8,6 +8,7 @@
 #include <future>
 #include <memory>
 #include <string>
+#include <vector>
 
 #include "abbe/daemon/batch.hpp"
 #include "abbe/daemon/recorder.hpp"
@@ -18,7 +19,8 @@ struct RecorderThreadOptions {
   RecorderOptions recorder;
   std::string tracker = "tracker";  ///< device names in the recording
   std::string encoder = "encoder";
-  bool raw = true;  ///< record the device bytes, too
+  std::vector<std::string> environment;  ///< in the order of Config::environment
+  bool raw = true;                       ///< record the device bytes, too
   /// Two minutes of a stalled disk with axes at 1 kHz and a tracker at 500 Hz. The memory may be locked.
   std::size_t most_waiting_bytes = 64 << 20;
 };

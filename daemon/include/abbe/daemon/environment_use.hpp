@@ -1,0 +1,70 @@
+#pragma once
+/// What the environment does to measurements: many devices' samples merged into what is in force at an
+/// instant, scale readings corrected for the temperature of the scale, raw tracker distances for the index of
+/// the air. Composition only: the formulas are calib's. Deterministic, so that a replay is the live run
+/// again. Ordinary world; not thread-safe.
+
+#include <chrono>
+#include <deque>
+#include <optional>
+#include <vector>
+
+#include "abbe/daemon/batch.hpp"
+#include "abbe/daemon/config.hpp"
+#include "abbe/protocol/samples.hpp"
+
+namespace abbe::daemon {
+
+/// A [[thermal]] with the place of its axis in AxisSample.
+struct ThermalAxis {
+  std::size_t axis = 0;
+  ThermalConfig config;
+};
+
+struct EnvironmentUseOptions {
+  protocol::EnvironmentMask measured =
+      0;  ///< by the devices of [[environment]]: not taken from the tracker then
+  std::chrono::nanoseconds max_age{std::chrono::seconds{60}};
+  std::vector<ThermalAxis> thermal;
+  AirConfig air;
+};
+
+/// Every quantity from the device that measures it: at most one of [[environment]], else the tracker. A value
+/// of a device that has been silent for longer than max_age is NaN.
+class EnvironmentMerge {
+ public:
+  /// A sample of [[environment]] is in force from `lag` after its instant: by then it has come, whatever the
+  /// order of arrival, and an environment that is half a second old is as good.
+  EnvironmentMerge(const EnvironmentUseOptions& options, std::chrono::nanoseconds lag);
+
+  void take(const Batch& batch);
+  /// What is in force at `t`; nothing yet: none. Ask with rising times: what is older is forgotten.
+  [[nodiscard]] std::optional<protocol::EnvironmentSample> at(protocol::HostTime t);
+  /// The newest of everything.
+  [[nodiscard]] std::optional<protocol::EnvironmentSample> latest() { return at(newest_); }
+
+ private:
+  using Samples = std::deque<protocol::EnvironmentSample>;  // front: in force
+
+  protocol::EnvironmentMask measured_;
+  std::chrono::nanoseconds max_age_;
+  std::chrono::nanoseconds lag_;
+  Samples weather_;
+  std::vector<Samples> devices_;
+  protocol::HostTime newest_{};
+};
+
+/// Readings become true positions (and velocities), their uncertainty is added in quadrature. An axis whose
+/// scale temperature is not known has no known position: it is set in missing_mask, and AxisMissing is
+/// flagged.
+void correct_for_temperature(protocol::Snapshot& snapshot, const EnvironmentUseOptions& options);
+
+/// The index of the air of the sample, or why there is none (a quantity not available).
+[[nodiscard]] Result<calib::RefractiveIndex> index_of_air(const protocol::EnvironmentSample& environment,
+                                                          const AirConfig& config);
+
+/// With [air] assumed_index: the tracker point's distance is corrected; without a known index the point is
+/// flagged PointInvalid. Else nothing.
+void correct_for_air(protocol::Snapshot& snapshot, const EnvironmentUseOptions& options);
+
+}  // namespace abbe::daemon

@@ -1,0 +1,191 @@
+#include <gmock/gmock.h>
+
+#include <string>
+
+#include "abbe/daemon/config.hpp"
+#include "abbe/daemon/device_options.hpp"
+
+namespace abbe::daemon {
+namespace {
+
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+using ::testing::IsEmpty;
+
+const std::string kMachine = R"([machine]
+name = "mill"
+chain = "[w X' b Y Z (C1) t]"
+[axes.X]
+min_mm = -300
+max_mm = 300
+[axes.Y]
+min_mm = -250
+max_mm = 250
+[axes.Z]
+min_mm = -400
+max_mm = -100
+[target]
+offset_mm = [20, -15, -120]
+[encoder]
+transport = "udp"
+peer_host = "10.0.0.8"
+peer_port = 20000
+nodes = [{axis = "Y", node = 2}, {axis = "X", node = 1}, {axis = "Z", node = 3}]
+)";
+const std::string kAir = R"([[environment]]
+name = "air"
+map = "comet-t7510"
+host = "10.0.0.9"
+serial_number = 20961234
+)";
+const std::string kScales = R"([[environment]]
+name = "rtd"
+map = "icpdas-zt2005-c8"
+serial = "/dev/serial/by-id/rs485"
+baud = 9600
+parity = "none"
+stop_bits = 2
+unit = 3
+inputs = ["scale_x", "", "part"]
+)";
+
+Config config_of(const std::string& text) {
+  auto config = parse_config(kMachine + text, "abbed.toml");
+  EXPECT_TRUE(config) << config.error().details.front();
+  return config ? *config : Config{};
+}
+std::string faults_of(const std::string& text) {
+  const auto config = parse_config(kMachine + text, "abbed.toml");
+  std::string all;
+  if (!config)
+    for (const auto& fault : config.error().details) all += fault + "\n";
+  return all;
+}
+
+TEST(EnvironmentConfiguration, KnowsDevicesByTheNameOfTheirMap) {
+  const auto config = config_of(kAir + kScales);
+  ASSERT_EQ(config.environment.size(), 2u);
+  EXPECT_EQ(std::get<drivers::ModbusTcp>(config.environment[0].address).host, "10.0.0.9");
+  EXPECT_EQ(config.environment[0].map.proving.front().expected, 20961234.0);
+  const auto& line = std::get<drivers::ModbusSerial>(config.environment[1].address);
+  EXPECT_EQ(drivers::text_of(line), "/dev/serial/by-id/rs485 9600 8N2");
+  EXPECT_THAT(config.temperatures, ElementsAre("scale_x", "part"));
+  EXPECT_EQ(config.environment[1].map.measured[1].place.address, 2);
+}
+
+TEST(EnvironmentConfiguration, TakesARegisterMapOfItsOwn) {
+  const auto config = config_of(R"([[environment]]
+name = "chiller"
+map = "custom"
+host = "10.0.0.9"
+base_offset = -1
+[[environment.measured]]
+quantity = "temperature"
+name = "coolant"
+registers = "input"
+address = 12
+type = "float32"
+word_order = "low_first"
+quantity_unit = "C"
+[[environment.measured]]
+quantity = "air_pressure"
+address = 20
+type = "uint16"
+scale = 0.1
+quantity_unit = "hPa"
+[[environment.proving]]
+name = "device type"
+address = 1
+type = "uint16"
+expected = 4711
+)");
+  ASSERT_EQ(config.environment.size(), 1u);
+  const auto& map = config.environment[0].map;
+  EXPECT_EQ(map.base_offset, -1);
+  EXPECT_EQ(map.measured[0].offset, 273.15);
+  EXPECT_DOUBLE_EQ(map.measured[1].scale, 10.0);
+  EXPECT_EQ(map.proving[0].expected, 4711.0);
+}
+
+TEST(EnvironmentConfiguration, RefusesMapsThatCannotBeMeant) {
+  const std::string custom = "[[environment]]\nname = \"a\"\nmap = \"custom\"\nhost = \"h\"\n";
+  EXPECT_THAT(faults_of(custom), HasSubstr("no register is measured"));
+  EXPECT_THAT(faults_of(custom + "[[environment.measured]]\nquantity = \"air_pressure\"\naddress = 1\n"
+                                 "type = \"int16\"\nquantity_unit = \"C\"\n"),
+              HasSubstr("is not a unit of the quantity"));
+  EXPECT_THAT(faults_of(custom + "[[environment.measured]]\nquantity = \"air_pressure\"\naddress = 1\n"
+                                 "type = \"int16\"\nquantity_unit = \"Pa\"\nscale = 0\n"),
+              HasSubstr("must not be 0"));
+}
+
+TEST(EnvironmentConfiguration, RefusesAMapNobodyKnows) {
+  EXPECT_THAT(faults_of("[[environment]]\nname = \"a\"\nmap = \"comet-t751\"\nhost = \"h\"\n"),
+              HasSubstr("did you mean \"comet-t7510\"?"));
+}
+
+TEST(EnvironmentConfiguration, NeedsTheSerialNumberOfAComet) {
+  EXPECT_THAT(faults_of("[[environment]]\nname = \"a\"\nmap = \"comet-t7510\"\nhost = \"h\"\n"),
+              HasSubstr("needs the serial number"));
+}
+
+TEST(EnvironmentConfiguration, RefusesTwoDevicesThatMeasureTheSame) {
+  EXPECT_THAT(
+      faults_of(kAir + "[[environment]]\nname = \"b\"\nmap = \"vaisala-indigo520-hmp\"\nhost = \"h\"\n"),
+      HasSubstr("air temperature is measured by two devices"));
+}
+
+TEST(EnvironmentConfiguration, RefusesADeviceWithoutAnAddressOrWithTwo) {
+  EXPECT_THAT(faults_of("[[environment]]\nname = \"a\"\nmap = \"vaisala-indigo520-hmp\"\n"),
+              HasSubstr("needs one of host"));
+  EXPECT_THAT(
+      faults_of("[[environment]]\nname = \"a\"\nmap = \"vaisala-indigo520-hmp\"\nhost = \"h\"\nserial = "
+                "\"/dev/ttyS0\"\n"),
+      HasSubstr("needs one of host"));
+}
+
+TEST(ThermalConfiguration, FindsTheAxisAmongTheEncodersAndTheTemperatureByName) {
+  const auto config = config_of(kScales + R"([[thermal]]
+axis = "Y"
+temperature = "part"
+alpha_um_per_m_K = 8
+u_alpha_um_per_m_K = 0.5
+u_temperature_K = 0.2
+fixed_mm = -200
+)");
+  const auto use = environment_use(config);
+  ASSERT_EQ(use.thermal.size(), 1u);
+  EXPECT_EQ(use.thermal[0].axis, 1u);
+  EXPECT_EQ(use.thermal[0].config.temperature, 1);
+  EXPECT_DOUBLE_EQ(use.thermal[0].config.alpha_per_K, 8e-6);
+  EXPECT_DOUBLE_EQ(use.thermal[0].config.fixed_m, -0.2);
+}
+
+TEST(ThermalConfiguration, IsPartOfWhatAReadingIs) {
+  const auto hash = [](const std::string& temperature, const std::string& alpha, const std::string& u) {
+    return machine_hash(config_of(kScales + "[[thermal]]\naxis = \"X\"\ntemperature = \"" + temperature +
+                                  "\"\nalpha_um_per_m_K = " + alpha + "\nu_alpha_um_per_m_K = " + u +
+                                  "\nu_temperature_K = 0.2\nfixed_mm = 0\n"));
+  };
+  const auto plain = hash("scale_x", "8", "0.5");
+  EXPECT_NE(plain, machine_hash(config_of(kScales)));
+  EXPECT_NE(plain, hash("part", "8", "0.5"));
+  EXPECT_NE(plain, hash("scale_x", "9", "0.5"));
+  EXPECT_EQ(plain, hash("scale_x", "8", "1"));  // how well it is known changes no reading
+}
+
+TEST(ThermalConfiguration, RefusesATemperatureNobodyMeasures) {
+  EXPECT_THAT(
+      faults_of(kScales + "[[thermal]]\naxis = \"X\"\ntemperature = \"scale_y\"\nalpha_um_per_m_K = 8\n"
+                          "u_alpha_um_per_m_K = 1\nu_temperature_K = 1\nfixed_mm = 0\n"),
+      HasSubstr("no [[environment]] measures it"));
+}
+
+TEST(AirConfiguration, RefusesToCorrectDistancesTwice) {
+  EXPECT_THAT(faults_of("[tracker]\nhost = \"t\"\n[air]\nassumed_index = 1.00027\n"),
+              HasSubstr("the controller computes the index already"));
+  EXPECT_THAT(faults_of("[tracker]\nhost = \"t\"\nweather = \"read\"\n[air]\nassumed_index = 1.00027\n"),
+              IsEmpty());
+}
+
+}  // namespace
+}  // namespace abbe::daemon

@@ -121,6 +121,8 @@ template std::span<const MemberBound> member_bounds<v1::AxisRange>() noexcept;
 
 ABBE_TOPIC_TYPE(TrackerPoint)
 ABBE_TOPIC_TYPE(AxisSample)
+ABBE_TOPIC_TYPE(ProbeTrigger)
+ABBE_TOPIC_TYPE(TouchScan)
 ABBE_TOPIC_TYPE(EnvironmentSample)
 ABBE_TOPIC_TYPE(RawBytes)
 ABBE_TOPIC_TYPE(CalibrationEvent)

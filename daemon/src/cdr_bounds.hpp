@@ -24,6 +24,20 @@ void visit(const v1::AxisSample& m, V&& v) {
   v("position", m.position(), 8);
 }
 template <class V>
+void visit(const v1::ProbeTrigger& m, V&& v) {
+  v("device", m.device(), 32);
+  v("position", m.position(), 8);
+  v("velocity", m.velocity(), 8);
+  v("u_position", m.u_position(), 8);
+  v("U95_position", m.U95_position(), 8);
+}
+template <class V>
+void visit(const v1::TouchScan& m, V&& v) {
+  v("device", m.device(), 32);
+  v("counts", m.counts(), 8);
+  v("position", m.position(), 8);
+}
+template <class V>
 void visit(const v1::EnvironmentSample& m, V&& v) {
   v("device", m.device(), 32);
 }

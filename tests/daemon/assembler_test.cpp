@@ -146,5 +146,63 @@ TEST(Assembler, GivesOutTheRestAtTheEnd) {
   EXPECT_EQ(out.size(), 20u);
 }
 
+protocol::ProbeTrigger touch_at(HostTime t) {
+  protocol::ProbeTrigger touch;
+  touch.head.time = t;
+  touch.touch = 1;
+  return touch;
+}
+
+TEST(Assembler, ATouchThatKnowsTheAxesKeepsThem) {
+  Assembler assembler{{}};
+  assembler.take(axes_batch(kStart, kStart + 100ms));
+  Batch batch;
+  batch.touches.push_back(touch_at(kStart + 50ms));
+  batch.touches[0].axis_count = 3;
+  batch.touches[0].position = {1.0, 2.0, 3.0};
+  batch.touches[0].u_position = {1e-9, 1e-9, 1e-9};
+  assembler.take(batch);
+  std::vector<Snapshot> out;
+  assembler.emit(out);
+  ASSERT_EQ(out.size(), 1u);
+  EXPECT_TRUE(out[0].has_trigger);
+  EXPECT_FALSE(out[0].has_tracker_point);
+  EXPECT_EQ(out[0].trigger.touch, 1u);
+  EXPECT_EQ(out[0].position, batch.touches[0].position);
+  EXPECT_EQ(out[0].u_position[2], 1e-9);
+}
+
+TEST(Assembler, ATouchWithoutAxesGetsThoseOfItsInstant) {
+  Assembler assembler{{}};
+  assembler.take(axes_batch(kStart, kStart + 100ms));
+  Batch batch;
+  batch.touches.push_back(touch_at(kStart + 50ms + 300us));
+  assembler.take(batch);
+  std::vector<Snapshot> out;
+  assembler.emit(out);
+  ASSERT_EQ(out.size(), 1u);
+  EXPECT_NEAR(out[0].position[0], x_at(out[0].head.time), 1e-12);
+}
+
+TEST(Assembler, ATouchBeforeAPointDoesNotTakeItsEnvironmentAway) {
+  Assembler assembler{{}};
+  Batch batch = axes_batch(kStart, kStart + 1s);
+  for (const auto at : {0ms, 500ms}) {
+    protocol::EnvironmentSample e;
+    e.head.time = kStart + at;
+    e.air_temperature_K = 290.0 + std::chrono::duration<double>(at).count();
+    batch.environment.push_back(e);
+  }
+  batch.touches.push_back(touch_at(kStart + 800ms));
+  assembler.take(batch);
+  std::vector<Snapshot> out;
+  assembler.emit(out);
+  assembler.take(burst(kStart + 100ms, 1));
+  assembler.emit(out);
+  ASSERT_EQ(out.size(), 2u);
+  EXPECT_EQ(out[0].environment.air_temperature_K, 290.5);
+  EXPECT_EQ(out[1].environment.air_temperature_K, 290.0);
+}
+
 }  // namespace
 }  // namespace abbe::daemon

@@ -192,6 +192,8 @@ void expect_bounds_of_idl(const std::string& type) {
 TEST(Cdr, BoundsCheckedAreThoseOfTheIdl) {
   expect_bounds_of_idl<v1::TrackerPoint>("TrackerPoint");
   expect_bounds_of_idl<v1::AxisSample>("AxisSample");
+  expect_bounds_of_idl<v1::ProbeTrigger>("ProbeTrigger");
+  expect_bounds_of_idl<v1::TouchScan>("TouchScan");
   expect_bounds_of_idl<v1::EnvironmentSample>("EnvironmentSample");
   expect_bounds_of_idl<v1::RawBytes>("RawBytes");
   expect_bounds_of_idl<v1::CalibrationEvent>("CalibrationEvent");

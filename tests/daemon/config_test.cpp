@@ -309,5 +309,19 @@ TEST(Config, MachineHashDoesNotDependOnTheWayTheBytesTake) {
   EXPECT_EQ(machine_hash(*can), machine_hash(*udp));
 }
 
+TEST(ConfigCmm, IsReadInSi) {
+  const auto config = parse_config(
+      kMachine + "[cmm]\nhost = \"10.0.0.9\"\ntool = \"ruby 4\"\nu_position_um = 0.9\n", "abbed.toml");
+  ASSERT_TRUE(config && config->cmm);
+  EXPECT_EQ(config->cmm->host, "10.0.0.9");
+  EXPECT_EQ(config->cmm->port, 1294);
+  EXPECT_DOUBLE_EQ(config->cmm->u_position_m, 0.9e-6);
+  EXPECT_FALSE(config->cmm->home);
+}
+
+TEST(ConfigCmm, NeedsAHost) {
+  EXPECT_THAT(faults_of(kMachine + "[cmm]\nport = 1294\n"), ElementsAre(HasSubstr("cmm.host")));
+}
+
 }  // namespace
 }  // namespace abbe::daemon

@@ -68,8 +68,8 @@ class DiskFull : public ::testing::Test {
   std::uint32_t next_ = 0;
 };
 
-// About 42 kB of schemas stand at the front of a file, so at 70 kB it has a few chunks.
-constexpr rlim_t kFewChunks = 70'000;
+// About 67 kB of schemas stand at the front of a file, so at 95 kB it has a few chunks.
+constexpr rlim_t kFewChunks = 95'000;
 
 TEST_F(DiskFull, AcquisitionGoesOnAndTheFaultIsSaid) {
   FileSizeLimit limit{kFewChunks};
@@ -92,7 +92,7 @@ TEST_F(DiskFull, WhatWasFinishedIsWholeAndNothingIsCorrupt) {
 }
 
 TEST_F(DiskFull, EveryLimitWithinAChunkLeavesASoundFile) {
-  for (rlim_t bytes = 60'000; bytes < 60'000 + 9'000; bytes += 331) {
+  for (rlim_t bytes = 85'000; bytes < 85'000 + 9'000; bytes += 331) {
     const TemporaryFolder folder;
     auto options = example_options(folder.path());
     options.chunk_bytes = 8 * 1024;

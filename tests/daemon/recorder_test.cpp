@@ -73,6 +73,46 @@ TEST_F(RecorderTest, AnAxisSampleComesBackAsItWas) {
   EXPECT_EQ(samples[0].position, wanted.position);
 }
 
+TEST_F(RecorderTest, TouchesAndTheScansAroundThemComeBackAsTheyWere) {
+  Recorder recorder = open();
+  recorder.record(example_touch(9), "probe");
+  recorder.record(example_touch_scan(10), "probe");
+  ASSERT_TRUE(recorder.close());
+  std::size_t given = 0;
+  RecordingSink sink;
+  sink.probe_trigger = [&](const protocol::ProbeTrigger& touch, std::string_view device) {
+    const auto wanted = example_touch(9);
+    EXPECT_EQ(device, "probe");
+    EXPECT_EQ(touch.head.time, wanted.head.time);
+    EXPECT_EQ(touch.head.lost_before, wanted.head.lost_before);
+    EXPECT_EQ(touch.touch, wanted.touch);
+    EXPECT_EQ(touch.probe, wanted.probe);
+    EXPECT_EQ(touch.latch, wanted.latch);
+    EXPECT_EQ(touch.touch_flags, wanted.touch_flags);
+    EXPECT_EQ(touch.edge_clock_count, wanted.edge_clock_count);
+    EXPECT_EQ(touch.missing_mask, wanted.missing_mask);
+    EXPECT_EQ(touch.axis_count, wanted.axis_count);
+    EXPECT_EQ(touch.speed_m_s, wanted.speed_m_s);
+    EXPECT_EQ(touch.position, wanted.position);
+    EXPECT_EQ(touch.velocity, wanted.velocity);
+    EXPECT_EQ(touch.u_position, wanted.u_position);
+    EXPECT_EQ(touch.U95_position, wanted.U95_position);
+    ++given;
+  };
+  sink.touch_scan = [&](const protocol::TouchScan& scan, std::string_view) {
+    const auto wanted = example_touch_scan(10);
+    EXPECT_EQ(scan.touch, wanted.touch);
+    EXPECT_EQ(scan.clock_count, wanted.clock_count);
+    EXPECT_EQ(scan.latch_count, wanted.latch_count);
+    EXPECT_EQ(scan.edge_count, wanted.edge_count);
+    EXPECT_EQ(scan.count, wanted.count);
+    EXPECT_EQ(scan.position, wanted.position);
+    ++given;
+  };
+  EXPECT_EQ(read("run.mcap").read(sink), 0u);
+  EXPECT_EQ(given, 2u);
+}
+
 TEST_F(RecorderTest, RawBytesWeatherAndEventsComeBackAsTheyWere) {
   Recorder recorder = open();
   recorder.record(protocol::to_raw_bytes(example_block(3), "tracker"));

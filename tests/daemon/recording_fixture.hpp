@@ -100,6 +100,37 @@ inline protocol::EnvironmentSample example_environment(std::uint32_t i) {
   return sample;
 }
 
+inline protocol::ProbeTrigger example_touch(std::uint32_t i) {
+  protocol::ProbeTrigger touch;
+  touch.head = {example_time(i), std::chrono::microseconds{3}, 0, i};
+  touch.touch = i;
+  touch.probe = 7;
+  touch.latch = protocol::TouchLatch::Scan;
+  touch.touch_flags = protocol::TouchFlag::Chattered | protocol::TouchFlag::SpeedTooHigh;
+  touch.edge_clock_count = 1'000'000'007LL * i;
+  touch.axis_count = 3;
+  touch.missing_mask = 2;
+  touch.speed_m_s = 0.004;
+  touch.position = {0.1 * i, -0.2, 0.3};
+  touch.velocity = {0.0, 0.0, -0.004};
+  touch.u_position = {1e-9, 2e-9, 3e-9};
+  touch.U95_position = {2e-9, 4e-9, 6e-9};
+  return touch;
+}
+
+inline protocol::TouchScan example_touch_scan(std::uint32_t i) {
+  protocol::TouchScan scan;
+  scan.head = {example_time(i), std::chrono::nanoseconds{100}, 0, 0};
+  scan.touch = 3;
+  scan.axis_count = 2;
+  scan.clock_count = 300'000'000'000LL + i;
+  scan.latch_count = scan.clock_count - 5;
+  scan.edge_count = 4;
+  scan.count = {1, -2};
+  scan.position = {1e-8, -2e-8};
+  return scan;
+}
+
 inline protocol::RawBlock example_block(std::uint32_t i) {
   protocol::RawBlock block;
   block.time = example_time(i);

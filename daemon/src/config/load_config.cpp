@@ -20,7 +20,8 @@ Config read_all(Section& root, const std::filesystem::path& base) {
   read_tracker(root, config);
   read_encoder(root, config);
   read_counter_card(root, config);
-  read_environment(root, config);
+  read_cmm(root, config);
+  read_environment(root, config);  // after the devices whose names must differ
   read_thermal(root, config);
   read_air(root, config);
   read_recording(root, base, config);
@@ -36,6 +37,10 @@ std::string reading_text(const EncoderConfig& encoder) {
   for (const auto& node : encoder.nodes)
     text += fmt::format("|{} {} {:.17g} {:.17g}", node.axis, node.node, node.step, node.offset);
   return text;
+}
+
+std::string reading_text(const CmmConfig& cmm) {
+  return cmm.axes_compensated ? "|cmm|compensated" : "|cmm|raw";
 }
 
 std::string reading_text(const CounterCardConfig& card) {
@@ -95,6 +100,7 @@ std::string machine_hash(const Config& config) {
   }
   if (config.encoder) text += reading_text(*config.encoder);
   if (config.counter_card) text += reading_text(*config.counter_card);
+  if (config.cmm_reads_axes()) text += reading_text(*config.cmm);
   for (const auto& thermal : config.thermal)
     text += fmt::format("|thermal {} {:.17g} {:.17g} {}", thermal.axis, thermal.alpha_per_K, thermal.fixed_m,
                         config.temperatures[thermal.temperature]);

@@ -117,17 +117,32 @@ EnvironmentUseOptions environment_use(const Config& config) {
   return use;
 }
 
+drivers::IppDeviceOptions device_options(const CmmConfig& config, double speed) {
+  drivers::IppDeviceOptions options;
+  options.name = config.name;
+  options.host = config.host;
+  options.port = config.port;
+  options.session.tool = config.tool;
+  options.session.home = config.home;
+  options.session.poll_period = stretched(options.session.poll_period, speed);
+  options.session.connect_timeout = stretched(options.session.connect_timeout, speed);
+  options.session.command_timeout = stretched(config.command_timeout, speed);
+  options.session.motion_timeout = stretched(config.motion_timeout, speed);
+  options.receiver.probe = config.probe;
+  options.receiver.u_position_m = config.u_position_m;
+  return options;
+}
+
 AssemblerOptions assembler_options(const Config& config) {
   AssemblerOptions options;
   options.watermark = config.daemon.watermark;
   options.environment = environment_use(config);
+  options.axes_compensated = config.axes_compensated();
   if (config.encoder) {
-    options.axes_compensated = config.encoder->axes_compensated;
     const std::chrono::duration<double, std::nano> span = kMostLostCycles * config.encoder->sync_period;
     options.interpolation.max_span = std::chrono::duration_cast<std::chrono::nanoseconds>(span);
   }
   if (config.counter_card) {
-    options.axes_compensated = config.counter_card->axes_compensated;
     const double sample_rate_hz =
         drivers::scan_rate_hz(config.counter_card->wiring) / config.counter_card->sample_every;
     const std::chrono::duration<double> span{kMostLostCycles / sample_rate_hz};

@@ -89,9 +89,12 @@ struct DeviceSet::State {
   std::optional<Running<drivers::EncoderDevice>> encoder;
   std::optional<Running<drivers::CounterCardDevice>> counter_card;
   std::vector<Running<drivers::EnvironmentDevice>> environments;
+  std::optional<Running<drivers::IppDevice>> cmm;
+  bool cmm_is_the_axes = false;
   std::array<protocol::TrackerPoint, kMostSamples> points;
   std::array<protocol::AxisSample, kMostSamples> axes;
   std::array<protocol::EnvironmentSample, 16> environment;
+  std::array<protocol::ProbeTrigger, 16> touches;
   std::array<protocol::RawBlock, kMostBlocks> blocks;
   std::map<std::string, std::pair<HostTime, std::uint64_t>> counted;  // at the previous health()
 
@@ -159,6 +162,13 @@ Result<DeviceSet> DeviceSet::start(const Config& config, const drivers::TimeSour
     if (!running) return tl::unexpected(running.error());
     state->environments.push_back(std::move(*running));
   }
+  if (config.cmm) {
+    auto running = run(drivers::IppDevice::create(device_options(*config.cmm, config.daemon.speed), time),
+                       thread_options(config.daemon, "abbe-cmm", 0, std::nullopt));
+    if (!running) return tl::unexpected(running.error());
+    state->cmm.emplace(std::move(*running));
+    state->cmm_is_the_axes = config.cmm_reads_axes();
+  }
   return DeviceSet{std::move(state)};
 }
 
@@ -183,6 +193,25 @@ void DeviceSet::drain(Batch& batch) {
     drain_ring(s.tracker->device->raw(), s.blocks, batch.tracker_raw);
   }
   for (std::size_t i = 0; i < s.environments.size(); ++i) s.drain_environment(i, batch);
+  if (s.cmm) drain_cmm(batch);
+}
+
+void DeviceSet::drain_cmm(Batch& batch) {
+  State& s = *state_;
+  auto& device = *s.cmm->device;
+  drain_ring(device.touches(), s.touches, batch.touches);
+  drain_ring(device.raw(), s.blocks, batch.probe_raw);
+  if (s.cmm_is_the_axes) {
+    drain_ring(device.positions(), s.axes, batch.axes);
+  } else {
+    while (device.positions().pop(s.axes) == s.axes.size()) {
+    }
+  }
+}
+
+void DeviceSet::measure(std::span<const drivers::ProbePoint> points) {
+  if (!state_->cmm) return;
+  for (const auto& point : points) state_->cmm->device->measure(point);
 }
 
 std::vector<StreamHealth> DeviceSet::health(HostTime now) {
@@ -195,6 +224,7 @@ std::vector<StreamHealth> DeviceSet::health(HostTime now) {
     out.push_back(state_->health_of(*state_->counter_card->device, *state_->counter_card->thread, now));
   for (const auto& running : state_->environments)
     out.push_back(state_->health_of(*running.device, *running.thread, now));
+  if (state_->cmm) out.push_back(state_->health_of(*state_->cmm->device, *state_->cmm->thread, now));
   return out;
 }
 
@@ -211,6 +241,7 @@ std::vector<std::string> DeviceSet::warnings() const {
       out.push_back(std::move(assumed));
   }
   for (const auto& running : state_->environments) add(running);
+  if (state_->cmm) add(*state_->cmm);
   return out;
 }
 

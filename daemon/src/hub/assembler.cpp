@@ -46,6 +46,8 @@ void Assembler::take(const Batch& batch) {
     take(sample);
   }
   environment_.take(batch);
+  touches_.insert(touches_.end(), batch.touches.begin(), batch.touches.end());
+  for (const auto& touch : batch.touches) newest_ = std::max(newest_, touch.head.time);
 }
 
 /// A bus that went off or began anew may report an instant before that of the last sample. Interpolation
@@ -65,52 +67,87 @@ bool Assembler::ready(HostTime t) const {
 }
 
 void Assembler::emit(std::vector<Snapshot>& out) {
-  while (!points_.empty() && ready(points_.front().head.time)) emit_first(out);
-  forget_axes();
+  while (!points_.empty() && ready(points_.front().head.time)) emit_first_point(out);
+  while (!touches_.empty() && ready(touches_.front().head.time)) emit_first_touch(out);
+  forget();
 }
 
 void Assembler::finish(std::vector<Snapshot>& out) {
-  while (!points_.empty()) emit_first(out);
+  while (!points_.empty()) emit_first_point(out);
+  while (!touches_.empty()) emit_first_touch(out);
 }
 
-void Assembler::emit_first(std::vector<Snapshot>& out) {
+void Assembler::emit_first_point(std::vector<Snapshot>& out) {
   out.push_back(assemble(points_.front()));
   points_.pop_front();
 }
 
-Snapshot Assembler::assemble(const protocol::TrackerPoint& point) {
-  Snapshot s;
-  s.head = point.head;
-  s.axes_compensated = options_.axes_compensated;
+void Assembler::emit_first_touch(std::vector<Snapshot>& out) {
+  out.push_back(assemble(touches_.front()));
+  touches_.pop_front();
+}
+
+Snapshot Assembler::assemble(const protocol::TrackerPoint& point) const {
+  Snapshot s = begin(point.head);
   s.has_tracker_point = true;
   s.tracker_point = point;
-  if (const auto environment = environment_.at(point.head.time)) {
-    s.has_environment = true;
-    s.environment = *environment;
-  }
-
-  // Two samples on either side are all that the interpolation looks at; handing over exactly these keeps a
-  // result independent of what else has arrived.
-  const auto after = std::lower_bound(axes_.begin(), axes_.end(), point.head.time, earlier);
-  const auto begin = after - std::min<std::ptrdiff_t>(2, after - axes_.begin());
-  const auto end = after + std::min<std::ptrdiff_t>(2, axes_.end() - after);
-  std::array<AxisSample, 4> around;
-  std::copy(begin, end, around.begin());
-  const auto axes = drivers::interpolate_axes(std::span{around}.first(static_cast<std::size_t>(end - begin)),
-                                              point.head.time, point.head.u_time, options_.interpolation);
-  if (axes) {
-    set_axes(s, *axes);
-  } else {
-    s.head.flags |= SampleFlag::AxisMissing;
-  }
+  interpolate(s);
   correct_for_temperature(s, options_.environment);
   correct_for_air(s, options_.environment);
   return s;
 }
 
-void Assembler::forget_axes() {
+Snapshot Assembler::assemble(const protocol::ProbeTrigger& touch) const {
+  Snapshot s = begin(touch.head);
+  s.has_trigger = true;
+  s.trigger = touch;
+  if (touch.axis_count == 0) {
+    interpolate(s);
+  } else {
+    s.axis_count = touch.axis_count;
+    s.missing_mask = touch.missing_mask;
+    s.position = touch.position;
+    s.velocity = touch.velocity;
+    s.u_position = touch.u_position;
+  }
+  // What a measuring machine reports is its own affair: no scale of ours was read.
+  if (touch.latch != protocol::TouchLatch::Reported) correct_for_temperature(s, options_.environment);
+  return s;
+}
+
+/// With the environment in force at that time.
+Snapshot Assembler::begin(const protocol::SampleHead& head) const {
+  Snapshot s;
+  s.head = head;
+  s.axes_compensated = options_.axes_compensated;
+  if (const auto environment = environment_.at(head.time)) {
+    s.has_environment = true;
+    s.environment = *environment;
+  }
+  return s;
+}
+
+void Assembler::interpolate(Snapshot& s) const {
+  // Two samples on either side are all that the interpolation looks at; handing over exactly these keeps a
+  // result independent of what else has arrived.
+  const auto after = std::lower_bound(axes_.begin(), axes_.end(), s.head.time, earlier);
+  const auto first = after - std::min<std::ptrdiff_t>(2, after - axes_.begin());
+  const auto end = after + std::min<std::ptrdiff_t>(2, axes_.end() - after);
+  std::array<AxisSample, 4> around;
+  std::copy(first, end, around.begin());
+  const auto axes = drivers::interpolate_axes(std::span{around}.first(static_cast<std::size_t>(end - first)),
+                                              s.head.time, s.head.u_time, options_.interpolation);
+  if (axes) {
+    set_axes(s, *axes);
+  } else {
+    s.head.flags |= SampleFlag::AxisMissing;
+  }
+}
+
+void Assembler::forget() {
   const HostTime oldest = newest_ - kAxisMemory;
   while (axes_.size() > 4 && axes_.front().head.time < oldest) axes_.pop_front();
+  environment_.forget(oldest);
 }
 
 }  // namespace abbe::daemon

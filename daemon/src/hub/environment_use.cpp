@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <limits>
 
 #include "abbe/calib/environment/thermal_expansion.hpp"
@@ -39,10 +40,15 @@ void insert_by_time(std::deque<EnvironmentSample>& in_order, const EnvironmentSa
   in_order.insert(std::upper_bound(in_order.begin(), in_order.end(), sample.head.time, later), sample);
 }
 
-/// Forgets what is followed by another sample in force at `t`; the front, if it is in force.
-const EnvironmentSample* in_force(std::deque<EnvironmentSample>& samples, HostTime t) {
+/// The last one not after `t`.
+const EnvironmentSample* in_force(const std::deque<EnvironmentSample>& samples, HostTime t) {
+  const auto later = [](HostTime at, const EnvironmentSample& sample) { return at < sample.head.time; };
+  const auto after = std::upper_bound(samples.begin(), samples.end(), t, later);
+  return after == samples.begin() ? nullptr : &*std::prev(after);
+}
+
+void forget_before(std::deque<EnvironmentSample>& samples, HostTime t) {
   while (samples.size() > 1 && samples[1].head.time <= t) samples.pop_front();
-  return !samples.empty() && samples.front().head.time <= t ? &samples.front() : nullptr;
 }
 
 }  // namespace
@@ -63,7 +69,7 @@ void EnvironmentMerge::take(const Batch& batch) {
   for (const auto& sample : batch.axes) newest_ = std::max(newest_, sample.head.time);
 }
 
-std::optional<EnvironmentSample> EnvironmentMerge::at(HostTime t) {
+std::optional<EnvironmentSample> EnvironmentMerge::at(HostTime t) const {
   EnvironmentSample merged;
   merged.measured = 0;
   merged.air_temperature_K = merged.air_pressure_Pa = merged.relative_humidity = kNotAvailable;
@@ -73,7 +79,7 @@ std::optional<EnvironmentSample> EnvironmentMerge::at(HostTime t) {
     merge(*weather, static_cast<EnvironmentMask>(weather->measured & ~measured_), false, merged);
     any = true;
   }
-  for (auto& samples : devices_) {
+  for (const auto& samples : devices_) {
     const auto* sample = in_force(samples, t - lag_);
     if (sample == nullptr) continue;
     merge(*sample, sample->measured, t - sample->head.time > max_age_ + lag_, merged);
@@ -81,6 +87,11 @@ std::optional<EnvironmentSample> EnvironmentMerge::at(HostTime t) {
   }
   if (!any) return std::nullopt;
   return merged;
+}
+
+void EnvironmentMerge::forget(HostTime oldest) {
+  forget_before(weather_, oldest);
+  for (auto& samples : devices_) forget_before(samples, oldest - lag_);
 }
 
 void correct_for_temperature(protocol::Snapshot& s, const EnvironmentUseOptions& options) {

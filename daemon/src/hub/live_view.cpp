@@ -25,7 +25,8 @@ bool axes_known(const protocol::Snapshot& view) noexcept {
 
 bool LiveView::take(const Batch& batch) {
   environment_.take(batch);
-  if (const auto environment = environment_.latest()) {
+  environment_.forget(environment_.newest());
+  if (const auto environment = environment_.at(environment_.newest())) {
     view_.has_environment = true;
     view_.environment = *environment;
   }
@@ -36,8 +37,12 @@ bool LiveView::take(const Batch& batch) {
     correct_for_air(view_, use_);
     if (!axes_known_at_) view_.head.time = batch.points.back().head.time;
   }
-  return !batch.axes.empty() || !batch.points.empty() || !batch.environment.empty() ||
-         !batch.measured_environment.empty();
+  if (!batch.touches.empty()) {
+    view_.has_trigger = true;
+    view_.trigger = batch.touches.back();
+  }
+  return !batch.axes.empty() || !batch.points.empty() || !batch.touches.empty() ||
+         !batch.environment.empty() || !batch.measured_environment.empty();
 }
 
 void LiveView::take(const protocol::AxisSample& sample) {

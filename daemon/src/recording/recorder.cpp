@@ -89,6 +89,8 @@ struct Recorder::State {
   v1::TrackerPoint tracker_point;
   v1::AxisSample axis_sample;
   v1::EnvironmentSample environment;
+  v1::ProbeTrigger touch;
+  v1::TouchScan touch_scan;
 };
 
 std::string_view name(RecorderStatus::State state) noexcept {
@@ -309,6 +311,16 @@ void Recorder::record(const protocol::TrackerPoint& point, std::string_view devi
 void Recorder::record(const protocol::AxisSample& sample, std::string_view device) {
   recording::fill(state_->axis_sample, sample, device);
   state_->add_marked(Stream::AxisSample, sample.head.time, device, state_->axis_sample);
+}
+
+void Recorder::record(const protocol::ProbeTrigger& touch, std::string_view device) {
+  recording::fill(state_->touch, touch, device);
+  state_->add_marked(Stream::ProbeTrigger, touch.head.time, device, state_->touch);
+}
+
+void Recorder::record(const protocol::TouchScan& scan, std::string_view device) {
+  recording::fill(state_->touch_scan, scan, device);
+  state_->add_marked(Stream::TouchScan, scan.head.time, device, state_->touch_scan);
 }
 
 void Recorder::record(const protocol::EnvironmentSample& sample, std::string_view device) {

@@ -25,7 +25,8 @@ std::size_t size_of(const std::vector<T>& samples) noexcept {
 std::size_t bytes_of(const Batch& batch) noexcept {
   std::size_t bytes = size_of(batch.points) + size_of(batch.axes) + size_of(batch.environment) +
                       batch.measured_environment.size() * sizeof(protocol::EnvironmentSample);
-  for (const auto* blocks : {&batch.tracker_raw, &batch.encoder_raw})
+  bytes += size_of(batch.touches) + size_of(batch.touch_scans);
+  for (const auto* blocks : {&batch.tracker_raw, &batch.encoder_raw, &batch.probe_raw})
     bytes += WaitingBlocks::bytes_of(*blocks);
   for (const auto& [device, block] : batch.environment_raw) bytes += WaitingBlocks::bytes_of(block);
   return bytes;
@@ -47,8 +48,11 @@ struct Waiting {
   std::vector<protocol::TrackerPoint> points;
   std::vector<protocol::AxisSample> axes;
   std::vector<protocol::EnvironmentSample> environment;
+  std::vector<protocol::ProbeTrigger> touches;
+  std::vector<protocol::TouchScan> touch_scans;
   WaitingBlocks tracker_raw;
   WaitingBlocks encoder_raw;
+  WaitingBlocks probe_raw;
   std::vector<WaitingMeasured> measured;  ///< in the order of RecorderThreadOptions::environment
   std::vector<v1::CalibrationEvent> events;
   std::vector<Attachment> attachments;
@@ -56,8 +60,8 @@ struct Waiting {
   bool full = false;  ///< what comes until the recorder has taken this is dropped: one hole, not many
 
   [[nodiscard]] std::size_t bytes() const noexcept {
-    std::size_t bytes =
-        size_of(points) + size_of(axes) + size_of(environment) + tracker_raw.bytes() + encoder_raw.bytes();
+    std::size_t bytes = size_of(points) + size_of(axes) + size_of(environment) + size_of(touches) +
+                        size_of(touch_scans) + tracker_raw.bytes() + encoder_raw.bytes() + probe_raw.bytes();
     for (const auto& device : measured) bytes += size_of(device.samples) + device.raw.bytes();
     return bytes;
   }
@@ -71,8 +75,11 @@ struct Waiting {
     points.clear();
     axes.clear();
     environment.clear();
+    touches.clear();
+    touch_scans.clear();
     tracker_raw.clear();
     encoder_raw.clear();
+    probe_raw.clear();
     for (auto& device : measured) {
       device.samples.clear();
       device.raw.clear();
@@ -89,7 +96,8 @@ struct Dropped {
   struct OfDevice {
     std::uint32_t samples = 0, raw = 0;
   };
-  std::uint32_t points = 0, axes = 0, environment = 0, tracker_raw = 0, encoder_raw = 0;
+  std::uint32_t points = 0, axes = 0, environment = 0, touches = 0, touch_scans = 0;
+  std::uint32_t tracker_raw = 0, encoder_raw = 0, probe_raw = 0;
   std::vector<OfDevice> measured;
 };
 
@@ -171,9 +179,12 @@ struct RecorderThread::State {
     lose(unsaid.environment, batch.environment.size());
     for (const auto& sample : batch.measured_environment)
       lose(place(unsaid.measured, sample.device).samples, 1);
+    lose(unsaid.touches, batch.touches.size());
+    lose(unsaid.touch_scans, batch.touch_scans.size());
     if (!options.raw) return;
     lose(unsaid.tracker_raw, batch.tracker_raw.size());
     lose(unsaid.encoder_raw, batch.encoder_raw.size());
+    lose(unsaid.probe_raw, batch.probe_raw.size());
     for (const auto& raw : batch.environment_raw) lose(place(unsaid.measured, raw.device).raw, 1);
   }
 
@@ -182,8 +193,11 @@ struct RecorderThread::State {
     for (const auto& s : turn.axes) recorder.record(s, options.encoder);
     for (const auto& s : turn.points) recorder.record(s, options.tracker);
     for (const auto& s : turn.environment) recorder.record(s, options.tracker);
+    for (const auto& t : turn.touches) recorder.record(t, options.probe);
+    for (const auto& s : turn.touch_scans) recorder.record(s, options.probe);
     turn.tracker_raw.for_each(options.tracker, [this](const auto& bytes) { recorder.record(bytes); });
     turn.encoder_raw.for_each(options.encoder, [this](const auto& bytes) { recorder.record(bytes); });
+    turn.probe_raw.for_each(options.probe, [this](const auto& bytes) { recorder.record(bytes); });
     for (std::size_t i = 0; i < turn.measured.size(); ++i) {
       const std::string& device = options.environment.at(i);
       for (const auto& s : turn.measured[i].samples) recorder.record(s, device);
@@ -234,9 +248,12 @@ void RecorderThread::hand_over(const Batch& batch) {
   append(waiting.environment, batch.environment, unsaid.environment);
   for (const auto& [device, sample] : batch.measured_environment)
     append(place(waiting.measured, device).samples, sample, place(unsaid.measured, device).samples);
+  append(waiting.touches, batch.touches, unsaid.touches);
+  append(waiting.touch_scans, batch.touch_scans, unsaid.touch_scans);
   if (!state_->options.raw) return;
   waiting.tracker_raw.append(batch.tracker_raw, unsaid.tracker_raw);
   waiting.encoder_raw.append(batch.encoder_raw, unsaid.encoder_raw);
+  waiting.probe_raw.append(batch.probe_raw, unsaid.probe_raw);
   for (const auto& [device, block] : batch.environment_raw)
     place(waiting.measured, device).raw.append(block, place(unsaid.measured, device).raw);
 }

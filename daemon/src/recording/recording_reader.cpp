@@ -92,6 +92,9 @@ bool deliver(const RecordedMessage& message, const RecordingSink& sink) {
   if (topic == topic_name<v1::EnvironmentSample>()) {
     return deliver_as<v1::EnvironmentSample>(message, sink.environment);
   }
+  if (topic == topic_name<v1::ProbeTrigger>())
+    return deliver_as<v1::ProbeTrigger>(message, sink.probe_trigger);
+  if (topic == topic_name<v1::TouchScan>()) return deliver_as<v1::TouchScan>(message, sink.touch_scan);
   if (topic == topic_name<v1::CalibrationEvent>()) return deliver_event(message, sink);
   return true;
 }

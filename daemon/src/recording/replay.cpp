@@ -15,6 +15,7 @@
 #include "abbe/drivers/counter_card/receiver.hpp"
 #include "abbe/drivers/counter_card/thinning.hpp"
 #include "abbe/drivers/environment/receiver.hpp"
+#include "abbe/drivers/ippdme/receiver.hpp"
 #include "abbe/drivers/tracker/receiver.hpp"
 
 namespace abbe::daemon {
@@ -78,6 +79,12 @@ class RawDecoder {
       card_ = std::make_unique<drivers::CounterCardReceiver>(
           device_options(*config.counter_card, config.daemon.speed).receiver);
     }
+    if (config.cmm) {
+      cmm_name_ = config.cmm->name;
+      cmm_is_the_axes_ = config.cmm_reads_axes();
+      cmm_ =
+          std::make_unique<drivers::IppReceiver>(device_options(*config.cmm, config.daemon.speed).receiver);
+    }
   }
 
   void take(const protocol::RawBlock& block, std::string_view device, Batch& batch) {
@@ -94,6 +101,7 @@ class RawDecoder {
       if (device == environment_names_[i] && environment_[i].on_raw(block))
         batch.measured_environment.push_back({i, environment_[i].sample()});
     }
+    if (cmm_ && device == cmm_name_) take_cmm(block, batch);
   }
 
  private:
@@ -110,8 +118,27 @@ class RawDecoder {
     }
   }
 
+  void take_cmm(const protocol::RawBlock& block, Batch& batch) {
+    const auto bytes = std::span{block.bytes}.first(block.length);
+    if (block.direction == protocol::RawBlock::Direction::ToDevice) return cmm_->sent(bytes, block.time);
+    // A hole cuts a line in two: what comes is taken from the next connection on.
+    if (block.lost_before > 0) cmm_->push({}, block.time);
+    cmm_->push(bytes, block.time);
+    while (const auto message = cmm_->next()) {
+      if (const auto* touch = std::get_if<protocol::ProbeTrigger>(&*message)) {
+        batch.touches.push_back(*touch);
+      } else if (const auto* sample = std::get_if<protocol::AxisSample>(&*message);
+                 sample && cmm_is_the_axes_) {
+        batch.axes.push_back(*sample);
+      }
+    }
+  }
+
   std::string tracker_name_;
   std::string encoder_name_;
+  std::string cmm_name_;
+  bool cmm_is_the_axes_ = false;
+  std::unique_ptr<drivers::IppReceiver> cmm_;
   std::unique_ptr<drivers::TrackerReceiver> tracker_;
   std::optional<drivers::EncoderReceiver> encoder_;
   std::string card_name_;
@@ -244,6 +271,9 @@ Result<ReplayReport> replay(const RecordingReader& recording, const Config& conf
       } else {
         batch.environment.push_back(e);
       }
+    };
+    sink.probe_trigger = [&](const protocol::ProbeTrigger& t, std::string_view) {
+      batch.touches.push_back(t);
     };
   } else {
     sink.raw_block = [&](const protocol::RawBlock& b, std::string_view device) {

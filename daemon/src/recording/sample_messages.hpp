@@ -11,10 +11,14 @@ namespace abbe::daemon::recording {
 /// Fill an existing message, so that its strings and sequences keep their memory.
 void fill(v1::TrackerPoint& message, const protocol::TrackerPoint& point, std::string_view device);
 void fill(v1::AxisSample& message, const protocol::AxisSample& sample, std::string_view device);
+void fill(v1::ProbeTrigger& message, const protocol::ProbeTrigger& touch, std::string_view device);
+void fill(v1::TouchScan& message, const protocol::TouchScan& scan, std::string_view device);
 void fill(v1::EnvironmentSample& message, const protocol::EnvironmentSample& sample, std::string_view device);
 
 [[nodiscard]] protocol::TrackerPoint sample_of(const v1::TrackerPoint& message);
 [[nodiscard]] protocol::AxisSample sample_of(const v1::AxisSample& message);
+[[nodiscard]] protocol::ProbeTrigger sample_of(const v1::ProbeTrigger& message);
+[[nodiscard]] protocol::TouchScan sample_of(const v1::TouchScan& message);
 [[nodiscard]] protocol::EnvironmentSample sample_of(const v1::EnvironmentSample& message);
 
 /// Says in a message that `lost` of its stream are missing before it.

@@ -9,8 +9,16 @@
 
 namespace abbe::daemon::recording {
 
-enum class Stream : std::uint8_t { TrackerPoint, AxisSample, Environment, RawBytes, CalibrationEvent };
-inline constexpr std::size_t kStreamCount = 5;
+enum class Stream : std::uint8_t {
+  TrackerPoint,
+  AxisSample,
+  Environment,
+  RawBytes,
+  CalibrationEvent,
+  ProbeTrigger,
+  TouchScan
+};
+inline constexpr std::size_t kStreamCount = 7;
 
 struct StreamNames {
   std::string_view topic;
@@ -22,7 +30,9 @@ struct StreamNames {
            {topic_name<v1::AxisSample>(), type_name<v1::AxisSample>()},
            {topic_name<v1::EnvironmentSample>(), type_name<v1::EnvironmentSample>()},
            {topic_name<v1::RawBytes>(), type_name<v1::RawBytes>()},
-           {topic_name<v1::CalibrationEvent>(), type_name<v1::CalibrationEvent>()}}};
+           {topic_name<v1::CalibrationEvent>(), type_name<v1::CalibrationEvent>()},
+           {topic_name<v1::ProbeTrigger>(), type_name<v1::ProbeTrigger>()},
+           {topic_name<v1::TouchScan>(), type_name<v1::TouchScan>()}}};
 }
 
 [[nodiscard]] constexpr std::size_t index(Stream stream) noexcept {

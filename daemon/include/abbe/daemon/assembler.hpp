@@ -1,6 +1,7 @@
 #pragma once
-/// Merges the streams of all devices by host time into snapshots, one per tracker point, with the axes
-/// interpolated to the point's instant.
+/// Merges the streams of all devices by host time into snapshots, one per tracker point and one per touch,
+/// with the axes interpolated to its instant. A touch that knows the axes itself (latched by the counter
+/// card, reported by a measuring machine) keeps them. Points come in their order, touches in theirs.
 ///
 /// Tracker points arrive in bursts, up to a third of a second late; axis samples arrive at once. A point is
 /// assembled as soon as two axis samples at or after its instant are there (the interpolation uses two on
@@ -43,12 +44,17 @@ class Assembler {
  private:
   void take(const protocol::AxisSample& sample);
   [[nodiscard]] bool ready(protocol::HostTime t) const;
-  [[nodiscard]] protocol::Snapshot assemble(const protocol::TrackerPoint& point);
-  void emit_first(std::vector<protocol::Snapshot>& out);
-  void forget_axes();
+  [[nodiscard]] protocol::Snapshot assemble(const protocol::TrackerPoint& point) const;
+  [[nodiscard]] protocol::Snapshot assemble(const protocol::ProbeTrigger& touch) const;
+  [[nodiscard]] protocol::Snapshot begin(const protocol::SampleHead& head) const;
+  void interpolate(protocol::Snapshot& snapshot) const;
+  void emit_first_point(std::vector<protocol::Snapshot>& out);
+  void emit_first_touch(std::vector<protocol::Snapshot>& out);
+  void forget();
 
   AssemblerOptions options_;
   std::deque<protocol::TrackerPoint> points_;
+  std::deque<protocol::ProbeTrigger> touches_;
   std::deque<protocol::AxisSample> axes_;
   EnvironmentMerge environment_;
   protocol::HostTime newest_{};

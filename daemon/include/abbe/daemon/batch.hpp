@@ -24,8 +24,11 @@ struct Batch {
   std::vector<protocol::AxisSample> axes;
   std::vector<protocol::EnvironmentSample> environment;  ///< the weather of the tracker
   std::vector<FromEnvironment> measured_environment;
+  std::vector<protocol::ProbeTrigger> touches;
+  std::vector<protocol::TouchScan> touch_scans;
   std::vector<protocol::RawBlock> tracker_raw;
   std::vector<protocol::RawBlock> encoder_raw;
+  std::vector<protocol::RawBlock> probe_raw;  ///< of a measuring machine
   std::vector<RawFromEnvironment> environment_raw;
 
   void clear() noexcept {
@@ -33,13 +36,17 @@ struct Batch {
     axes.clear();
     environment.clear();
     measured_environment.clear();
+    touches.clear();
+    touch_scans.clear();
     tracker_raw.clear();
     encoder_raw.clear();
+    probe_raw.clear();
     environment_raw.clear();
   }
   [[nodiscard]] bool empty() const noexcept {
-    return points.empty() && axes.empty() && environment.empty() && tracker_raw.empty() &&
-           encoder_raw.empty() && measured_environment.empty() && environment_raw.empty();
+    return points.empty() && axes.empty() && environment.empty() && measured_environment.empty() &&
+           touches.empty() && touch_scans.empty() && tracker_raw.empty() && encoder_raw.empty() &&
+           probe_raw.empty() && environment_raw.empty();
   }
 };
 

@@ -160,6 +160,22 @@ struct AirConfig {
   std::optional<double> assumed_index;
 };
 
+/// [cmm]: a measuring machine behind an I++ DME server. Its touches are the daemon's; its positions are the
+/// axes where no other device gives them.
+struct CmmConfig {
+  std::string name = "cmm";
+  std::string host;
+  std::uint16_t port = 1294;
+  std::string tool;            ///< set before measuring; empty: the one that is set
+  bool home = false;           ///< may send the machine home if it is not
+  std::uint32_t probe = 1;     ///< number of its probe in the touches
+  double u_position_m = 1e-6;  ///< of a reported position
+  /// A measuring machine reports positions it has corrected itself, unless told otherwise.
+  bool axes_compensated = true;
+  std::chrono::nanoseconds command_timeout{std::chrono::seconds{3}};
+  std::chrono::nanoseconds motion_timeout{std::chrono::seconds{120}};
+};
+
 enum class RealTimeMode { Enforce, Ignore };
 
 /// [daemon]
@@ -230,19 +246,23 @@ struct Config {
       temperatures;  ///< names of EnvironmentSample::temperature_K, as they are configured
   std::vector<ThermalConfig> thermal;
   AirConfig air;
+  std::optional<CmmConfig> cmm;
   DaemonConfig daemon;
   RecordingConfig recording;
   DdsConfig dds;
   GateConfig gate;
   ControlConfig control;
 
-  /// What a sample of the axes holds, in its order; empty: no axis is connected.
+  /// What a sample of [encoder] or [counter_card] holds, in its order; empty: there is none.
   [[nodiscard]] std::vector<std::string> connected_axes() const;
 
   /// The control already corrects what the axes read, whichever device reads them.
   [[nodiscard]] bool axes_compensated() const noexcept {
-    return (encoder && encoder->axes_compensated) || (counter_card && counter_card->axes_compensated);
+    return (encoder && encoder->axes_compensated) || (counter_card && counter_card->axes_compensated) ||
+           (cmm_reads_axes() && cmm->axes_compensated);
   }
+  /// No other device reads the axes: they are what the measuring machine reports.
+  [[nodiscard]] bool cmm_reads_axes() const noexcept { return cmm && !encoder && !counter_card; }
 };
 
 /// Reads and checks a whole file. Io if it cannot be read; else BadInput with one line per fault in

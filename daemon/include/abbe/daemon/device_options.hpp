@@ -9,6 +9,7 @@
 #include "abbe/drivers/can/encoder_device.hpp"
 #include "abbe/drivers/counter_card/device.hpp"
 #include "abbe/drivers/environment/device.hpp"
+#include "abbe/drivers/ippdme/device.hpp"
 #include "abbe/drivers/tracker/device.hpp"
 
 namespace abbe::daemon {
@@ -18,6 +19,7 @@ namespace abbe::daemon {
 [[nodiscard]] drivers::CounterCardOptions device_options(const CounterCardConfig& config, double speed);
 [[nodiscard]] drivers::EnvironmentDeviceOptions device_options(const EnvironmentConfig& config, double speed);
 [[nodiscard]] EnvironmentUseOptions environment_use(const Config& config);
+[[nodiscard]] drivers::IppDeviceOptions device_options(const CmmConfig& config, double speed);
 [[nodiscard]] AssemblerOptions assembler_options(const Config& config);
 /// Standstill is judged over enough points at the tracker's rate.
 [[nodiscard]] AcquisitionOptions acquisition_options(const Config& config);

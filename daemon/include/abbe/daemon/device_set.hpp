@@ -4,12 +4,14 @@
 
 #include <chrono>
 #include <memory>
+#include <span>
 #include <string>
 #include <vector>
 
 #include "abbe/daemon/config.hpp"
 #include "abbe/daemon/error.hpp"
 #include "abbe/daemon/sample_source.hpp"
+#include "abbe/drivers/ippdme/session.hpp"
 #include "abbe/drivers/time_source.hpp"
 
 namespace abbe::daemon {
@@ -27,8 +29,11 @@ class DeviceSet final : public SampleSource {
   [[nodiscard]] std::vector<StreamHealth> health(protocol::HostTime now) override;
   /// What the system refused in real-time mode `ignore`, one sentence each.
   [[nodiscard]] std::vector<std::string> warnings() const;
+  /// Moves the measuring machine and touches; the touches come with drain(). Without one: nothing.
+  void measure(std::span<const drivers::ProbePoint> points);
 
  private:
+  void drain_cmm(Batch& batch);
   struct State;
   explicit DeviceSet(std::unique_ptr<State> state);
   std::unique_ptr<State> state_;

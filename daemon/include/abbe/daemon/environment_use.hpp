@@ -38,13 +38,14 @@ class EnvironmentMerge {
   EnvironmentMerge(const EnvironmentUseOptions& options, std::chrono::nanoseconds lag);
 
   void take(const Batch& batch);
-  /// What is in force at `t`; nothing yet: none. Ask with rising times: what is older is forgotten.
-  [[nodiscard]] std::optional<protocol::EnvironmentSample> at(protocol::HostTime t);
-  /// The newest of everything.
-  [[nodiscard]] std::optional<protocol::EnvironmentSample> latest() { return at(newest_); }
+  /// What is in force at `t`; nothing yet: none.
+  [[nodiscard]] std::optional<protocol::EnvironmentSample> at(protocol::HostTime t) const;
+  /// Nobody will ask for an instant before this one.
+  void forget(protocol::HostTime oldest);
+  [[nodiscard]] protocol::HostTime newest() const noexcept { return newest_; }
 
  private:
-  using Samples = std::deque<protocol::EnvironmentSample>;  // front: in force
+  using Samples = std::deque<protocol::EnvironmentSample>;  // by time
 
   protocol::EnvironmentMask measured_;
   std::chrono::nanoseconds max_age_;

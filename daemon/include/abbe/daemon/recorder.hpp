@@ -79,6 +79,8 @@ class Recorder {
 
   void record(const protocol::TrackerPoint& point, std::string_view device);
   void record(const protocol::AxisSample& sample, std::string_view device);
+  void record(const protocol::ProbeTrigger& touch, std::string_view device);
+  void record(const protocol::TouchScan& scan, std::string_view device);
   void record(const protocol::EnvironmentSample& sample, std::string_view device);
   void record(protocol::RawBytes bytes);
   void record(const v1::CalibrationEvent& event);

@@ -19,6 +19,7 @@ struct RecorderThreadOptions {
   RecorderOptions recorder;
   std::string tracker = "tracker";  ///< device names in the recording
   std::string encoder = "encoder";
+  std::string probe = "probe";           ///< the touch probe, or the measuring machine
   std::vector<std::string> environment;  ///< in the order of Config::environment
   bool raw = true;                       ///< record the device bytes, too
   /// Two minutes of a stalled disk with axes at 1 kHz and a tracker at 500 Hz. The memory may be locked.

@@ -46,6 +46,8 @@ struct RecordingSink {
   std::function<void(const protocol::TrackerPoint&, std::string_view device)> tracker_point;
   std::function<void(const protocol::AxisSample&, std::string_view device)> axis_sample;
   std::function<void(const protocol::EnvironmentSample&, std::string_view device)> environment;
+  std::function<void(const protocol::ProbeTrigger&, std::string_view device)> probe_trigger;
+  std::function<void(const protocol::TouchScan&, std::string_view device)> touch_scan;
   std::function<void(const protocol::RawBlock&, std::string_view device)> raw_block;
   std::function<void(const v1::CalibrationEvent&)> calibration_event;
 };

@@ -1,0 +1,90 @@
+#include <gtest/gtest.h>
+
+#include <string>
+
+#include "abbe/sim/ippdme_server.hpp"
+
+namespace abbe::sim {
+namespace {
+
+using namespace std::chrono_literals;
+
+constexpr HostTime kStart{100s};
+
+IppDmeOptions with_a_sphere() {
+  IppDmeOptions o;
+  o.machine.spheres = {{.centre_m = {0.1, 0.2, -0.1}, .radius_m = 12.5e-3}};
+  return o;
+}
+
+/// Says one line at `at` and gives what is answered until `until`, lines joined by a blank.
+std::string ask(IppDmeDevice& machine, const std::string& line, HostTime at = kStart,
+                HostTime until = kStart) {
+  const std::string bytes = line + "\r\n";
+  machine.receive(std::as_bytes(std::span{bytes}), at);
+  machine.advance(std::max(at, until));
+  const auto out = machine.take_output();
+  std::string text(reinterpret_cast<const char*>(out.data()), out.size());
+  for (auto at_end = text.find("\r\n"); at_end != std::string::npos; at_end = text.find("\r\n"))
+    text.replace(at_end, 2, "|");
+  return text;
+}
+
+TEST(IppDmeDevice, AnswersNothingOutsideOfASession) {
+  IppDmeDevice machine{with_a_sphere(), kStart};
+  machine.connected(kStart);
+  EXPECT_EQ(ask(machine, "00001 IsHomed()"),
+            "00001 &|00001 ! Error(3,0008,IsHomed,\"Protocol error\")|00001 %|");
+  EXPECT_EQ(ask(machine, "00002 StartSession()"), "00002 &|00002 %|");
+  EXPECT_EQ(ask(machine, "00003 IsHomed()"), "00003 &|00003 # IsHomed(1)|00003 %|");
+}
+
+TEST(IppDmeDevice, RefusesASecondSession) {
+  IppDmeDevice machine{with_a_sphere(), kStart};
+  (void)ask(machine, "00001 StartSession()");
+  EXPECT_NE(ask(machine, "00002 StartSession()").find("Error(3,0008"), std::string::npos);
+}
+
+TEST(IppDmeDevice, WantsItsErrorsClearedAfterAnAbort) {
+  IppDmeDevice machine{with_a_sphere(), kStart};
+  (void)ask(machine, "00001 StartSession()");
+  EXPECT_EQ(ask(machine, "00002 GoTo(X(100))"), "00002 &|");
+  EXPECT_EQ(ask(machine, "E0001 AbortE()", kStart + 100ms, kStart + 100ms),
+            "E0001 &|00002 ! Error(2,0006,GoTo,\"Transaction aborted\")|00002 %|E0001 %|");
+  EXPECT_NEAR(machine.reading_m(kStart + 1s)[0], 0.02, 1e-9);  // 0.1 s of 200 mm/s
+  EXPECT_NE(ask(machine, "00003 IsHomed()").find("Error(2,0514"), std::string::npos);
+  EXPECT_EQ(ask(machine, "00004 ClearAllErrors()"), "00004 &|00004 %|");
+  EXPECT_EQ(ask(machine, "00005 GoTo(X(20))"), "00005 &|00005 %|");
+}
+
+TEST(IppDmeDevice, ReportsWhileMovingTenTimesASecondAtMost) {
+  IppDmeDevice machine{with_a_sphere(), kStart};
+  (void)ask(machine, "00001 StartSession()");
+  EXPECT_EQ(ask(machine, "E0001 OnMoveReportE(Time(0.01),Dis(1),X())"), "E0001 &|");
+  const std::string said = ask(machine, "00002 GoTo(X(200))", kStart, kStart + 2s);  // 1 s
+  EXPECT_EQ(said,
+            "00002 &|E0001 # X(0)|E0001 # X(20)|E0001 # X(40)|E0001 # X(60)|E0001 # X(80)|E0001 # X(100)|"
+            "E0001 # X(120)|E0001 # X(140)|E0001 # X(160)|E0001 # X(180)|00002 %|");
+}
+
+TEST(IppDmeDevice, SaysWhereTheSurfaceIsNot) {
+  IppDmeDevice machine{with_a_sphere(), kStart};
+  (void)ask(machine, "00001 StartSession()");
+  const std::string missed = ask(machine, "00002 PtMeas(X(0),Y(0),Z(0),IJK(0,0,1))", kStart, kStart + 60s);
+  EXPECT_NE(missed.find("Error(2,1006"), std::string::npos) << missed;
+  (void)ask(machine, "00003 ClearAllErrors()");
+  const std::string inside =
+      ask(machine, "00004 PtMeas(X(100),Y(200),Z(-100),IJK(0,0,1))", kStart, kStart + 60s);
+  EXPECT_NE(inside.find("Error(2,1001"), std::string::npos) << inside;
+}
+
+TEST(MeasuringMachine, TouchesASphereWhereItIs) {
+  const MeasuringMachine machine{.spheres = {{.centre_m = {0.0, 0.0, 0.0}, .radius_m = 10e-3}}};
+  const Eigen::Vector3d normal = Eigen::Vector3d{1.0, 2.0, 2.0} / 3.0;
+  const Probing probing = probe(machine, 12.3e-3 * normal, normal, 0);
+  ASSERT_FALSE(probing.fault);
+  EXPECT_NEAR(probing.reading_m.norm(), 12e-3, 1e-15);
+}
+
+}  // namespace
+}  // namespace abbe::sim

@@ -309,6 +309,36 @@ TEST(Config, MachineHashDoesNotDependOnTheWayTheBytesTake) {
   EXPECT_EQ(machine_hash(*can), machine_hash(*udp));
 }
 
+const std::string kCardWithProbe = R"([counter_card]
+transport = "usbip"
+latch_channel = 6
+edge_channel = 7
+axes = [{axis = "X", channel = 0, step_nm = 10}, {axis = "Y", channel = 1, step_nm = 10},
+        {axis = "Z", channel = 2, step_nm = 10}]
+)";
+
+TEST(ConfigProbe, IsReadInSi) {
+  const auto config =
+      parse_config(kMachine + kCardWithProbe + "[probe]\nid = 4\ndelay_us = 2000\njitter_us = 20\n" +
+                       "max_speed_mm_s = 8\nconfirm_ms = 4\n",
+                   "abbed.toml");
+  ASSERT_TRUE(config) << config.error().details.front();
+  ASSERT_TRUE(config->probe);
+  EXPECT_EQ(config->probe->delay.id, 4u);
+  EXPECT_EQ(config->probe->delay.delay, std::chrono::milliseconds{2});
+  EXPECT_EQ(config->probe->approach.max_speed_m_s, 0.008);
+  EXPECT_EQ(config->probe->switching.confirm, std::chrono::milliseconds{4});
+}
+
+TEST(ConfigProbe, NeedsChannelsOfACounterCard) {
+  EXPECT_THAT(faults_of(kMachine + "[probe]\nid = 4\n"), ElementsAre(HasSubstr("needs [counter_card]")));
+}
+
+TEST(ConfigProbe, RefusesWhatNoProbeCanDo) {
+  EXPECT_THAT(faults_of(kMachine + kCardWithProbe + "[probe]\nconfirm_ms = 1\nchatter_ms = 2\n"),
+              ElementsAre(HasSubstr("chatter limit not below the confirmation")));
+}
+
 TEST(ConfigCmm, IsReadInSi) {
   const auto config = parse_config(
       kMachine + "[cmm]\nhost = \"10.0.0.9\"\ntool = \"ruby 4\"\nu_position_um = 0.9\n", "abbed.toml");

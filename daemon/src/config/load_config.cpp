@@ -20,6 +20,7 @@ Config read_all(Section& root, const std::filesystem::path& base) {
   read_tracker(root, config);
   read_encoder(root, config);
   read_counter_card(root, config);
+  read_probe(root, config);
   read_cmm(root, config);
   read_environment(root, config);  // after the devices whose names must differ
   read_thermal(root, config);

@@ -28,6 +28,10 @@ WeatherMonitor weather_monitor(WeatherConfig weather) {
   return WeatherMonitor::None;
 }
 
+std::chrono::nanoseconds nanoseconds_of(double seconds) {
+  return std::chrono::nanoseconds{std::llround(1e9 * seconds)};
+}
+
 std::chrono::nanoseconds stretched(std::chrono::nanoseconds time_out, double speed) {
   const std::chrono::duration<double, std::nano> longer = time_out * std::max(speed, 1.0);
   return std::chrono::duration_cast<std::chrono::nanoseconds>(longer);
@@ -115,6 +119,33 @@ EnvironmentUseOptions environment_use(const Config& config) {
     if (axis != axes.end()) use.thermal.push_back({static_cast<std::size_t>(axis - axes.begin()), thermal});
   }
   return use;
+}
+
+drivers::TouchOptions touch_options(const ProbeConfig& probe, const CounterCardConfig& card,
+                                    const MachineConfig& machine) {
+  drivers::TouchOptions options;
+  options.delay = probe.delay;
+  options.approach = probe.approach;
+  options.switching = probe.switching;
+  options.window_before = probe.window_before;
+  options.window_after = probe.window_after;
+  drivers::ProbeWiring& wiring = options.wiring;
+  wiring.clock_hz = card.wiring.clock_hz;
+  wiring.use_latch = card.wiring.latch_channel.has_value();
+  wiring.scan_period = nanoseconds_of(1.0 / drivers::scan_rate_hz(card.wiring));
+  // A debounce of microseconds filters noise; one longer than chatter is the confirmation itself.
+  const auto& debounce = card.wiring.edge_debounce;
+  const auto stands = nanoseconds_of(drivers::quad08::kDebounce_s[debounce.time_code]);
+  const bool confirms = card.wiring.edge_channel && debounce.enabled && !debounce.trigger_before_stable;
+  if (confirms && stands > probe.switching.chatter) wiring.counter_debounce = stands;
+  wiring.linear_axes = 0;
+  for (std::size_t i = 0; i < card.wiring.axes.size(); ++i) {
+    const AxisConfig* axis = machine.find_axis(card.wiring.axes[i].name);
+    const bool linear = axis == nullptr || axis->kind == AxisKind::Linear;
+    if (linear) wiring.linear_axes = static_cast<std::uint8_t>(wiring.linear_axes | (1u << i));
+    wiring.resolution[i] = std::abs(card.wiring.axes[i].scale);
+  }
+  return options;
 }
 
 drivers::IppDeviceOptions device_options(const CmmConfig& config, double speed) {

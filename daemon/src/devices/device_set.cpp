@@ -8,6 +8,7 @@
 #include "abbe/drivers/can/socket_can_bus.hpp"
 #include "abbe/drivers/can/udp_can_bus.hpp"
 #include "abbe/drivers/device_thread.hpp"
+#include "abbe/drivers/sampling/touch_detector.hpp"
 #include "abbe/drivers/usb/libusb_link.hpp"
 #include "abbe/drivers/usb/usbip_link.hpp"
 
@@ -85,6 +86,8 @@ Result<Running<D>> run(drivers::Result<std::unique_ptr<D>> device, drivers::Devi
 }  // namespace
 
 struct DeviceSet::State {
+  std::unique_ptr<drivers::TouchDetector>
+      touch_detector;  // before the card that feeds it: destroyed after it
   std::optional<Running<drivers::TrackerDevice>> tracker;
   std::optional<Running<drivers::EncoderDevice>> encoder;
   std::optional<Running<drivers::CounterCardDevice>> counter_card;
@@ -95,6 +98,7 @@ struct DeviceSet::State {
   std::array<protocol::AxisSample, kMostSamples> axes;
   std::array<protocol::EnvironmentSample, 16> environment;
   std::array<protocol::ProbeTrigger, 16> touches;
+  std::array<protocol::TouchScan, 256> touch_scans;
   std::array<protocol::RawBlock, kMostBlocks> blocks;
   std::map<std::string, std::pair<HostTime, std::uint64_t>> counted;  // at the previous health()
 
@@ -141,9 +145,14 @@ Result<DeviceSet> DeviceSet::start(const Config& config, const drivers::TimeSour
   if (config.counter_card) {
     const auto options = device_options(*config.counter_card, config.daemon.speed);
     auto link = make_link(*config.counter_card, drivers::identity_of(options), time);
-    auto running = run(drivers::CounterCardDevice::create(options, std::move(link), time),
-                       thread_options(config.daemon, "abbe-counters", config.daemon.encoder_priority,
-                                      config.daemon.encoder_cpu));
+    if (config.probe) {
+      state->touch_detector = std::make_unique<drivers::TouchDetector>(
+          touch_options(*config.probe, *config.counter_card, config.machine));
+    }
+    auto running =
+        run(drivers::CounterCardDevice::create(options, std::move(link), time, state->touch_detector.get()),
+            thread_options(config.daemon, "abbe-counters", config.daemon.encoder_priority,
+                           config.daemon.encoder_cpu));
     if (!running) return tl::unexpected(running.error());
     state->counter_card.emplace(std::move(*running));
   }
@@ -186,6 +195,10 @@ void DeviceSet::drain(Batch& batch) {
   if (s.counter_card) {  // the configuration allows one source of axes
     drain_ring(s.counter_card->device->samples(), s.axes, batch.axes);
     drain_ring(s.counter_card->device->raw(), s.blocks, batch.encoder_raw);
+  }
+  if (s.touch_detector) {
+    drain_ring(s.touch_detector->touches(), s.touches, batch.touches);
+    drain_ring(s.touch_detector->windows(), s.touch_scans, batch.touch_scans);
   }
   if (s.tracker) {
     drain_ring(s.tracker->device->points(), s.points, batch.points);

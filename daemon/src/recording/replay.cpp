@@ -16,6 +16,7 @@
 #include "abbe/drivers/counter_card/thinning.hpp"
 #include "abbe/drivers/environment/receiver.hpp"
 #include "abbe/drivers/ippdme/receiver.hpp"
+#include "abbe/drivers/sampling/touch_detector.hpp"
 #include "abbe/drivers/tracker/receiver.hpp"
 
 namespace abbe::daemon {
@@ -79,6 +80,10 @@ class RawDecoder {
       card_ = std::make_unique<drivers::CounterCardReceiver>(
           device_options(*config.counter_card, config.daemon.speed).receiver);
     }
+    if (config.counter_card && config.probe) {
+      touch_detector_ = std::make_unique<drivers::TouchDetector>(
+          touch_options(*config.probe, *config.counter_card, config.machine));
+    }
     if (config.cmm) {
       cmm_name_ = config.cmm->name;
       cmm_is_the_axes_ = config.cmm_reads_axes();
@@ -95,6 +100,7 @@ class RawDecoder {
     if (card_ && device == card_name_) {
       card_->on_raw(block, [&](const drivers::CounterScan& s) {
         if (const auto sample = thinning_.take(s.axes)) batch.axes.push_back(*sample);
+        if (touch_detector_) detect(s, batch);
       });
     }
     for (std::size_t i = 0; i < environment_.size(); ++i) {
@@ -118,6 +124,12 @@ class RawDecoder {
     }
   }
 
+  void detect(const drivers::CounterScan& scan, Batch& batch) {
+    touch_detector_->on_scan(scan);
+    std::array<protocol::ProbeTrigger, 1> touch;
+    while (touch_detector_->touches().pop(touch) == 1) batch.touches.push_back(touch[0]);
+  }
+
   void take_cmm(const protocol::RawBlock& block, Batch& batch) {
     const auto bytes = std::span{block.bytes}.first(block.length);
     if (block.direction == protocol::RawBlock::Direction::ToDevice) return cmm_->sent(bytes, block.time);
@@ -136,6 +148,7 @@ class RawDecoder {
 
   std::string tracker_name_;
   std::string encoder_name_;
+  std::unique_ptr<drivers::TouchDetector> touch_detector_;
   std::string cmm_name_;
   bool cmm_is_the_axes_ = false;
   std::unique_ptr<drivers::IppReceiver> cmm_;

@@ -20,6 +20,7 @@
 #include "abbe/drivers/counter_card/wiring.hpp"
 #include "abbe/drivers/environment/modbus_line.hpp"
 #include "abbe/drivers/environment/register_map.hpp"
+#include "abbe/drivers/sampling/probe_options.hpp"
 
 namespace abbe::daemon {
 
@@ -160,6 +161,17 @@ struct AirConfig {
   std::optional<double> assumed_index;
 };
 
+/// [probe]: the touch probe on the latch and edge channels of [counter_card]. Delay and jitter are those that
+/// `abbe calibrate probe` finds for this probe; the wiring comes from the card.
+struct ProbeConfig {
+  std::string name = "probe";
+  drivers::ProbeDelay delay;
+  drivers::ProbeApproach approach;
+  drivers::ProbeSwitching switching;
+  std::chrono::nanoseconds window_before{std::chrono::milliseconds{10}};
+  std::chrono::nanoseconds window_after{std::chrono::milliseconds{10}};
+};
+
 /// [cmm]: a measuring machine behind an I++ DME server. Its touches are the daemon's; its positions are the
 /// axes where no other device gives them.
 struct CmmConfig {
@@ -246,6 +258,7 @@ struct Config {
       temperatures;  ///< names of EnvironmentSample::temperature_K, as they are configured
   std::vector<ThermalConfig> thermal;
   AirConfig air;
+  std::optional<ProbeConfig> probe;
   std::optional<CmmConfig> cmm;
   DaemonConfig daemon;
   RecordingConfig recording;

@@ -19,6 +19,9 @@ namespace abbe::daemon {
 [[nodiscard]] drivers::CounterCardOptions device_options(const CounterCardConfig& config, double speed);
 [[nodiscard]] drivers::EnvironmentDeviceOptions device_options(const EnvironmentConfig& config, double speed);
 [[nodiscard]] EnvironmentUseOptions environment_use(const Config& config);
+/// The probe on the card's channels; `machine` says which axes are linear.
+[[nodiscard]] drivers::TouchOptions touch_options(const ProbeConfig& probe, const CounterCardConfig& card,
+                                                  const MachineConfig& machine);
 [[nodiscard]] drivers::IppDeviceOptions device_options(const CmmConfig& config, double speed);
 [[nodiscard]] AssemblerOptions assembler_options(const Config& config);
 /// Standstill is judged over enough points at the tracker's rate.

@@ -6,6 +6,8 @@
 #include <iterator>
 #include <regex>
 #include <sstream>
+#include <string>
+#include <vector>
 
 #include "abbe/daemon/config.hpp"
 
@@ -31,16 +33,30 @@ std::string uncommented() {
   return std::regex_replace(example(), std::regex{"\n#([a-z_A-Z]+ = )"}, "\n$1");
 }
 
-/// With the tables that are there by example only: blocks that begin with "# [[".
-std::string with_example_tables() {
-  std::istringstream lines{example()};
-  std::string out;
-  bool in_table = false;
-  for (std::string line; std::getline(lines, line);) {
-    in_table = line.rfind("# [[", 0) == 0 || (in_table && line.rfind("# ", 0) == 0);
-    out += (in_table ? line.substr(2) : line) + "\n";
+/// With the tables of these names that are there by example only: blocks that begin with "# [NAME]".
+std::string with_tables(std::string text, const std::vector<std::string>& names) {
+  for (const auto& name : names) {
+    std::istringstream lines{text};
+    text.clear();
+    bool in_table = false;
+    for (std::string line; std::getline(lines, line);) {
+      in_table = line.rfind("# " + name, 0) == 0 || (in_table && line.rfind("# ", 0) == 0);
+      text += (in_table ? line.substr(2) : line) + "\n";
+    }
   }
-  return out;
+  return text;
+}
+
+std::string with_modbus_and_cmm() {
+  return with_tables(example(), {"[[environment]]", "[[thermal]]", "[cmm]"});
+}
+
+/// The axes come from one device.
+std::string with_counter_card_and_probe() {
+  const std::string text = example();
+  const auto encoder = text.find("\n[encoder]");
+  return with_tables(text.substr(0, encoder) + text.substr(text.find("\n\n", encoder)),
+                     {"[counter_card]", "[probe]"});
 }
 
 TEST(ExampleConfig, IsGood) {
@@ -54,10 +70,48 @@ TEST(ExampleConfig, ItsCommentedKeysAreGoodToo) {
 }
 
 TEST(ExampleConfig, ItsExampleTablesAreGoodToo) {
-  EXPECT_EQ(faults(with_example_tables()), "");
-  const auto config = parse_config(with_example_tables(), "/etc/abbe/abbed.toml").value();
+  ASSERT_EQ(faults(with_modbus_and_cmm()), "");
+  const auto config = parse_config(with_modbus_and_cmm(), "/etc/abbe/abbed.toml").value();
   EXPECT_EQ(config.environment.size(), 3u);
   EXPECT_EQ(config.thermal.size(), 1u);
+  EXPECT_TRUE(config.cmm);
+}
+
+TEST(ExampleConfig, ItsCounterCardShowsTheDefaults) {
+  ASSERT_EQ(faults(with_counter_card_and_probe()), "");
+  const auto config = parse_config(with_counter_card_and_probe(), "/etc/abbe/abbed.toml").value();
+  ASSERT_TRUE(config.counter_card && config.probe);
+  const CounterCardConfig plain;
+  const auto& card = *config.counter_card;
+  EXPECT_EQ(card.name, plain.name);
+  EXPECT_EQ(card.wiring.clock_channel, plain.wiring.clock_channel);
+  EXPECT_EQ(card.wiring.clock_source, plain.wiring.clock_source);
+  EXPECT_EQ(card.wiring.clock_hz, plain.wiring.clock_hz);
+  EXPECT_EQ(drivers::divisor_of(card.wiring), drivers::divisor_of(plain.wiring));
+  EXPECT_EQ(card.wiring.width, plain.wiring.width);
+  EXPECT_EQ(card.sample_every, plain.sample_every);
+  EXPECT_EQ(card.max_constant_delay, plain.max_constant_delay);
+  EXPECT_EQ(card.axes_compensated, plain.axes_compensated);
+}
+
+TEST(ExampleConfig, ItsProbeShowsTheDefaults) {
+  ASSERT_EQ(faults(with_counter_card_and_probe()), "");
+  const auto probe = *parse_config(with_counter_card_and_probe(), "/etc/abbe/abbed.toml").value().probe;
+  const ProbeConfig plain;
+  EXPECT_EQ(probe.name, plain.name);
+  EXPECT_EQ(probe.delay.id, plain.delay.id);
+  EXPECT_EQ(probe.delay.delay, plain.delay.delay);
+  EXPECT_EQ(probe.delay.u_jitter, plain.delay.u_jitter);
+  EXPECT_EQ(probe.delay.u_delay, plain.delay.u_delay);
+  EXPECT_EQ(probe.approach.max_speed_m_s, plain.approach.max_speed_m_s);
+  EXPECT_EQ(probe.approach.max_speed_change, plain.approach.max_speed_change);
+  EXPECT_EQ(probe.approach.speed_window, plain.approach.speed_window);
+  EXPECT_EQ(probe.switching.confirm, plain.switching.confirm);
+  EXPECT_EQ(probe.switching.chatter, plain.switching.chatter);
+  EXPECT_EQ(probe.switching.rearm_quiet, plain.switching.rearm_quiet);
+  EXPECT_EQ(probe.switching.rearm_retract_m, plain.switching.rearm_retract_m);
+  EXPECT_EQ(probe.window_before, plain.window_before);
+  EXPECT_EQ(probe.window_after, plain.window_after);
 }
 
 TEST(ExampleConfig, ItsCommentedKeysAreTheDefaults) {

@@ -30,6 +30,9 @@ bool is_straightness(ErrorMotion e) {
 }
 
 bool Parameter::is_angle() const {
+  if (name.rfind("k_", 0) == 0) {
+    return false;
+  }
   const std::optional<ErrorMotion> motion = error_motion(name);
   return motion ? is_rotation(motion->motion) : true;
 }

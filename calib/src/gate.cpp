@@ -8,16 +8,23 @@
 namespace abbe::calib {
 namespace {
 
+/// Tables are defined on their whole grid; polynomials are judged where their data were.
+bool counts(const VolumetricModel& model, const Vector3& q) {
+  return model.polynomials() == nullptr || model.validity().contains(q);
+}
+
 double max_error_m(const VolumetricModel& model, const Vector3& t) {
   double most = 0.0;
   for (const Vector3& q : tensor_grid(model.layout().nodes())) {
-    most = std::max(most, model.V_at(q, t).norm());
+    if (counts(model, q)) {
+      most = std::max(most, model.V_at(q, t).norm());
+    }
   }
   return most;
 }
 
-/// Along an axis V is linear between nodes and multilinear in the other two: its derivative is largest on the
-/// grid lines.
+/// Along an axis V of tables is linear between nodes and multilinear in the other two: its derivative is
+/// largest on the grid lines. For polynomials this is the mean slope over an eighth of the volume.
 double max_gradient(const VolumetricModel& model, const Vector3& t) {
   double most = 0.0;
   const MachineNodes& nodes = model.layout().nodes();
@@ -31,6 +38,9 @@ double max_gradient(const VolumetricModel& model, const Vector3& t) {
       }
       Vector3 beside = q;
       beside(k) = *next;
+      if (!counts(model, q) || !counts(model, beside)) {
+        continue;
+      }
       most = std::max(most, (model.V_at(beside, t) - model.V_at(q, t)).norm() / (*next - q(k)));
     }
   }

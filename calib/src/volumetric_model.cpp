@@ -83,6 +83,46 @@ Result<void> check_parameters(const std::vector<Parameter>& stored, const std::v
   return {};
 }
 
+std::vector<Parameter> named(const evemu::EvemuModel& model) {
+  std::vector<Parameter> parameters;
+  for (std::size_t j = 0; j < model.design().size(); ++j) {
+    const auto i = static_cast<Eigen::Index>(j);
+    parameters.push_back({model.design().equivalent().names()[j], std::nullopt, model.c_m()(i),
+                          std::sqrt(model.covariance_m2()(i, i))});
+  }
+  return parameters;
+}
+
+Result<void> check_names(const std::vector<Parameter>& stored, std::span<const std::string> expected) {
+  if (stored.size() != expected.size()) {
+    return failure(ErrorCode::BadInput,
+                   message("model: ", stored.size(), " coefficients, its order needs ", expected.size()));
+  }
+  for (std::size_t i = 0; i < stored.size(); ++i) {
+    if (stored[i].name != expected[i]) {
+      return failure(ErrorCode::BadInput,
+                     message("model: coefficient ", i, " is ", stored[i].name, ", should be ", expected[i]));
+    }
+  }
+  return {};
+}
+
+/// Grid over the box of the hull: polynomials up to order 5 turn less than once in a quarter of it.
+MachineNodes grid_over(const ValidityVolume& validity) {
+  constexpr int kCells = 8;
+  const evemu::ReadingBox box = evemu::bounding_box(validity.vertices_m());
+  MachineNodes nodes;
+  for (Eigen::Index a = 0; a < 3; ++a) {
+    AxisNodes& axis = nodes[static_cast<std::size_t>(a)];
+    for (int k = 0; k <= kCells; ++k) {
+      const double u = 2.0 * k / kCells - 1.0;
+      axis.nodes_m.push_back(box.centre_m(a) + u * box.half_width_m(a));
+    }
+    axis.reference_m = axis.nodes_m.front();
+  }
+  return nodes;
+}
+
 std::vector<Parameter> named(const ParameterLayout& layout, const Eigen::VectorXd& U,
                              const Eigen::MatrixXd& C) {
   std::vector<Parameter> parameters;
@@ -139,7 +179,66 @@ Result<VolumetricModel> VolumetricModel::from_vector(const ParameterLayout& layo
   return model;
 }
 
+Result<VolumetricModel> VolumetricModel::from_polynomials(evemu::EvemuModel model, Gauge gauge,
+                                                          const Vector3& tool_offset_m,
+                                                          ValidityVolume validity) {
+  if (!tool_offset_m.allFinite()) {
+    return failure(ErrorCode::NotFinite, "model: the tool offset is not a number");
+  }
+  if (gauge == Gauge::G1) {
+    return failure(ErrorCode::BadInput, "model: gauge G1 is for tables, polynomials have Ball1");
+  }
+  Result<ParameterLayout> layout =
+      ParameterLayout::with_tables(model.design().equivalent().chain(), grid_over(validity), {});
+  if (!layout) {
+    return failure(layout.error().code, message("model: ", layout.error().text));
+  }
+  VolumetricModel result(*std::move(layout));
+  result.gauge_ = gauge;
+  result.tool_offsets_m_ = {tool_offset_m};
+  result.U_ = model.c_m();
+  result.covariance_ = model.covariance_m2();
+  result.validity_ = std::move(validity);
+  result.polynomials_ = std::move(model);
+  return result;
+}
+
+namespace {
+
+Result<VolumetricModel> polynomials_from(const ModelDescription& d) {
+  Result<evemu::ScaledDesign> design =
+      evemu::ScaledDesign::of(d.chain, d.polynomials->order, d.polynomials->box);
+  if (!design) {
+    return failure(design.error().code, message("model: ", design.error().text));
+  }
+  if (Result<void> fine = check_names(d.parameters, design->equivalent().names()); !fine) {
+    return tl::unexpected(fine.error());
+  }
+  if (d.tool_offsets_m.size() != 1) {
+    return failure(ErrorCode::BadInput,
+                   message("model: ", d.tool_offsets_m.size(), " tool offsets, polynomials hold for one"));
+  }
+  Eigen::VectorXd c_m(static_cast<Eigen::Index>(d.parameters.size()));
+  for (std::size_t i = 0; i < d.parameters.size(); ++i) {
+    c_m(static_cast<Eigen::Index>(i)) = d.parameters[i].value;
+  }
+  Result<ValidityVolume> validity = ValidityVolume::hull_of(d.validity_hull_m);
+  if (!validity) {
+    return tl::unexpected(validity.error());
+  }
+  return evemu::EvemuModel::of(*std::move(design), d.polynomials->ball1_m, std::move(c_m), d.covariance)
+      .and_then([&](evemu::EvemuModel model) {
+        return VolumetricModel::from_polynomials(std::move(model), d.gauge, d.tool_offsets_m.front(),
+                                                 *std::move(validity));
+      });
+}
+
+}  // namespace
+
 Result<VolumetricModel> VolumetricModel::from_description(ModelDescription d) {
+  if (d.polynomials) {
+    return polynomials_from(d);
+  }
   Result<ParameterLayout> layout = ParameterLayout::with_tables(d.chain, d.nodes, tables_named(d.parameters));
   if (!layout) {
     return failure(layout.error().code, message("model: ", layout.error().text));
@@ -184,6 +283,10 @@ VolumetricError VolumetricModel::error_at(const Vector3& axis_position_m,
     e.cov_V_m2.setConstant(kNaN);
     return e;
   }
+  if (polynomials_) {
+    polynomials_->V_and_cov_at(axis_position_m, e.V_m, e.cov_V_m2);
+    return e;
+  }
   const DesignColumns columns = design_columns(layout_, axis_position_m, lever_offset_m(tool_offset_m));
   for (const Column& c : columns.span()) {
     e.V_m += c.dV_dU * U_(static_cast<Eigen::Index>(c.parameter));
@@ -195,6 +298,9 @@ VolumetricError VolumetricModel::error_at(const Vector3& axis_position_m,
 Vector3 VolumetricModel::V_at(const Vector3& axis_position_m, const Vector3& tool_offset_m) const {
   if (!holds_for_tool(tool_offset_m)) {
     return Vector3::Constant(kNaN);
+  }
+  if (polynomials_) {
+    return polynomials_->V_at(axis_position_m);
   }
   return volumetric_error(layout_, {U_.data(), layout_.model_size()}, axis_position_m,
                           lever_offset_m(tool_offset_m));
@@ -229,7 +335,7 @@ Result<Correction> VolumetricModel::command_correction(const Vector3& nominal_m,
 }
 
 std::vector<Parameter> VolumetricModel::parameters() const {
-  return named(layout_, U_, covariance_);
+  return polynomials_ ? named(*polynomials_) : named(layout_, U_, covariance_);
 }
 
 ModelDescription VolumetricModel::description() const {
@@ -241,6 +347,10 @@ ModelDescription VolumetricModel::description() const {
   d.parameters = parameters();
   d.covariance = covariance_;
   d.validity_hull_m.assign(validity_.vertices_m().begin(), validity_.vertices_m().end());
+  if (polynomials_) {
+    d.polynomials = PolynomialForm{polynomials_->design().equivalent().order(), polynomials_->design().box(),
+                                   polynomials_->ball1_m()};
+  }
   return d;
 }
 

@@ -46,8 +46,9 @@ inline constexpr std::array<std::string_view, 3> kSquarenessNames{"EA0Z", "EB0Z"
 /// One identified number with its name, as it is stored and reported. Rotations and squareness in rad, others
 /// in m.
 struct Parameter {
-  std::string name;                  ///< "EXX" or "EC0Y"
-  std::optional<double> position_m;  ///< node on its axis; none for squareness
+  /// "EXX", "EC0Y", or "k_exz2": a function of the scaled design of [Li OMM], always a length
+  std::string name;
+  std::optional<double> position_m;  ///< node on its axis; none for squareness and k_
   double value = 0.0;
   double u = 0.0;  ///< standard uncertainty (k = 1) in the stated gauge, unit of `value`
   [[nodiscard]] bool is_angle() const;

@@ -8,6 +8,9 @@
 /// - straightness: 0 at the first and at the last node,
 /// - rotations: 0 at the reference position;
 /// squareness and the rigid unknowns stay free.
+/// A model from a ball array ([Li OMM]) states V relative to Ball1: V = 0 there. Its rotation about Ball1 is
+/// that of the blocks of the artefact as the machine measured them (Ball1Blocks), or known from elsewhere
+/// (Ball1). Neither has conditions on tables.
 
 #include <Eigen/Core>
 #include <span>
@@ -18,12 +21,20 @@
 
 namespace abbe::calib {
 
-enum class Gauge { G1 };
-[[nodiscard]] constexpr std::string_view name(Gauge) {
+enum class Gauge { G1, Ball1Blocks, Ball1 };
+[[nodiscard]] constexpr std::string_view name(Gauge gauge) {
+  switch (gauge) {
+    case Gauge::G1:
+      break;
+    case Gauge::Ball1Blocks:
+      return "Ball1-blocks";
+    case Gauge::Ball1:
+      return "Ball1";
+  }
   return "G1";
 }
 
-/// K: one row per condition, fit_size() columns (the six rigid ones last, zero in G1).
+/// For G1. K: one row per condition, fit_size() columns (the six rigid ones last, zero in G1).
 [[nodiscard]] Eigen::MatrixXd gauge_conditions(Gauge, const ParameterLayout&);
 
 /// Basis of the combinations (columns, fit_size() rows) that no measurement of `targets_m` anywhere in the

@@ -4,8 +4,9 @@
 /// reading q, for the tool offset t (tool reference point to functional point). Measuring: corrected =
 /// reading + V(reading). Positioning: command p + c with c = -V(p + c). Not estimable, and so not in a model:
 /// a rigid motion of the whole volume (where the machine stands), and anything that happened outside the
-/// validity volume. Values and uncertainties hold in the stated gauge; compare two models with
-/// rigid_free_difference().
+/// validity volume. Two forms: tables between nodes (rigid-body model), or polynomials (equivalent model of a
+/// ball array), which have no tables. Values and uncertainties hold in the stated gauge; compare two models
+/// with rigid_free_difference().
 
 #include <Eigen/Core>
 #include <optional>
@@ -13,6 +14,7 @@
 #include <string>
 #include <vector>
 
+#include "abbe/calib/evemu/model.hpp"
 #include "abbe/calib/gauge.hpp"
 #include "abbe/calib/geometry.hpp"
 #include "abbe/calib/parameter_layout.hpp"
@@ -33,6 +35,13 @@ struct Correction {
   bool inside = false;
 };
 
+/// What a model in polynomials has beside its coefficients.
+struct PolynomialForm {
+  int order = 3;
+  evemu::ReadingBox box;
+  Vector3 ball1_m = Vector3::Zero();
+};
+
 /// A model as it is stored: everything from_description() needs to build it again, bit for bit.
 struct ModelDescription {
   KinematicChain chain;
@@ -45,6 +54,8 @@ struct ModelDescription {
   std::vector<Parameter> parameters;  ///< in the order of ParameterLayout, without the rigid ones
   Eigen::MatrixXd covariance;         ///< parameters x parameters, full, symmetric, m^2, m rad, rad^2
   std::vector<Vector3> validity_hull_m;
+  /// Set: `parameters` are the coefficients of the scaled design [m], nodes and basis do not count.
+  std::optional<PolynomialForm> polynomials{};
 };
 
 /// Immutable value; all members are const and may be called from any thread.
@@ -63,6 +74,10 @@ class VolumetricModel {
                                                            const Eigen::VectorXd& U,
                                                            const Eigen::MatrixXd& covariance, ValidityVolume);
 
+  /// In polynomials. Holds for one tool. Gauge Ball1 or Ball1Blocks.
+  [[nodiscard]] static Result<VolumetricModel> from_polynomials(evemu::EvemuModel, Gauge,
+                                                                const Vector3& tool_offset_m, ValidityVolume);
+
   /// About 1 us with covariance. No allocation.
   [[nodiscard]] VolumetricError error_at(const Vector3& axis_position_m, const Vector3& tool_offset_m) const;
   /// V alone, about four times faster. NaN for a tool the model does not hold for.
@@ -73,7 +88,13 @@ class VolumetricModel {
                                                       const Vector3& tool_offset_m) const;
 
   [[nodiscard]] bool holds_for_tool(const Vector3& tool_offset_m) const;
+  /// Of polynomials: no tables; the nodes are a grid over the validity volume, fine enough to judge the model
+  /// and to publish it.
   [[nodiscard]] const ParameterLayout& layout() const { return layout_; }
+  /// Null for a model of tables.
+  [[nodiscard]] const evemu::EvemuModel* polynomials() const {
+    return polynomials_ ? &*polynomials_ : nullptr;
+  }
   [[nodiscard]] Gauge gauge() const { return gauge_; }
   [[nodiscard]] std::span<const Vector3> tool_offsets_m() const { return tool_offsets_m_; }
   [[nodiscard]] const ValidityVolume& validity() const { return validity_; }
@@ -88,6 +109,7 @@ class VolumetricModel {
   [[nodiscard]] const Vector3& lever_offset_m(const Vector3& asked_m) const;
 
   ParameterLayout layout_;
+  std::optional<evemu::EvemuModel> polynomials_;
   Gauge gauge_ = Gauge::G1;
   std::vector<Vector3> tool_offsets_m_;
   Eigen::VectorXd U_;

@@ -1,0 +1,72 @@
+#pragma once
+/// The ball array: balls in an L on a plate with two blocks whose faces give it a direction. [Li OMM] eqs.
+/// (11), (12): the uniform coordinate system has its origin in Ball1, z along the normal of block 1, x along
+/// (normal of block 2) x z. Carried from the calibration of the artefact to a position on the machine, it
+/// says where the balls should be; what the machine reads instead is the error. Lengths in m.
+
+#include <Eigen/Core>
+#include <array>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "abbe/calib/fit/plane.hpp"
+#include "abbe/calib/fit/sphere.hpp"
+#include "abbe/calib/geometry.hpp"
+
+namespace abbe::calib::evemu {
+
+struct Calibrator {
+  struct Ball {
+    int number = 0;
+    Vector3 centre_m = Vector3::Zero();  ///< in the frame of the artefact's own calibration
+    double radius_m = 0.0;
+    double u_m = 0.0;  ///< standard uncertainty of the centre, per coordinate
+  };
+  struct Block {
+    int number = 0;
+    Vector3 normal = Vector3::UnitZ();  ///< outward
+    double u_rad = 0.0;
+  };
+  std::string name;
+  double tip_radius_m = 0.0;
+  std::vector<Ball> balls;    ///< 1, 2, 3 ... in this order
+  std::vector<Block> blocks;  ///< 1 and 2
+};
+
+/// BadInput / NotFinite / DegenerateGeometry: numbers that are not 1, 2, 3 .., fewer than 4 balls, balls on a
+/// line, two balls in one place, other than two blocks, normals parallel.
+[[nodiscard]] Result<void> check(const Calibrator&);
+
+enum class Feature { Ball, Block };
+
+/// One probed point: the centre of the tip, machine coordinates.
+struct Touch {
+  int position = 0;
+  Feature feature = Feature::Ball;
+  int number = 0;
+  Vector3 p_m = Vector3::Zero();
+};
+
+/// z along n1, x along n2 x z: columns of the rotation; origin Ball1. Maps uniform to measuring coordinates.
+/// DegenerateGeometry for parallel normals.
+[[nodiscard]] Result<RigidTransform> uniform_frame(const Vector3& ball1_m, const Vector3& n1,
+                                                   const Vector3& n2);
+
+/// The artefact as the machine saw it at one position.
+struct SeenArtefact {
+  int position = 0;
+  std::vector<fit::Sphere> balls;
+  std::vector<std::vector<Vector3>> ball_points_m;
+  std::array<fit::Plane, 2> blocks{};
+  std::array<std::vector<Vector3>, 2> block_points_m;
+  RigidTransform T_self_uni;
+  std::vector<Vector3> ideal_m;  ///< [Li OMM] eq. (12): where the balls should be
+};
+
+/// A calibrator from touches of its own calibration (one position, on a good machine). `outward`: roughly
+/// where the faces of the blocks look. Radii are those of the fits without the tip's.
+[[nodiscard]] Result<Calibrator> precalibrated(std::string name, std::span<const Touch>, double tip_radius_m,
+                                               const std::array<Vector3, 2>& outward);
+
+}  // namespace abbe::calib::evemu

@@ -1,0 +1,66 @@
+#pragma once
+/// The volumetric error as an equivalent model: V(q) = B(q) c in scaled Legendre polynomials, for one tool
+/// offset, zero at Ball1. Uncertainty from the full covariance of c. Extrapolates outside the balls' hull
+/// without limit: whoever asks must ask the validity volume, too.
+
+#include <Eigen/Core>
+#include <array>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "abbe/calib/evemu/scaled_design.hpp"
+
+namespace abbe::calib::evemu {
+
+/// Coefficient of [Li OMM] Table 3: mm^(1-order) for translations, rad mm^-order for rotations.
+struct NamedCoefficient {
+  std::string name;
+  double value = 0.0;
+  double u = 0.0;
+  std::string unit;  ///< "mm", "1", "mm^-1", "rad/mm" ...
+};
+
+/// Immutable value; all members may be called from any thread.
+class EvemuModel {
+ public:
+  /// BadInput / NotFinite unless c and its covariance fit the design and the covariance is symmetric with no
+  /// negative variance. Neither is changed: whoever wants V(Ball1) = 0 calls zero_at() first.
+  [[nodiscard]] static Result<EvemuModel> of(ScaledDesign, const Vector3& ball1_m, Eigen::VectorXd c_m,
+                                             const Eigen::MatrixXd& covariance_m2);
+
+  [[nodiscard]] const ScaledDesign& design() const { return design_; }
+  [[nodiscard]] const Vector3& ball1_m() const { return ball1_m_; }
+  [[nodiscard]] const Eigen::VectorXd& c_m() const { return c_m_; }
+  [[nodiscard]] const Eigen::MatrixXd& covariance_m2() const { return covariance_m2_; }
+
+  /// No allocation.
+  [[nodiscard]] Vector3 V_at(const Vector3& reading_m) const;
+  /// V and its covariance; well below a microsecond with optimisation. No allocation.
+  void V_and_cov_at(const Vector3& reading_m, Vector3& V_m, Matrix3& cov_m2) const;
+
+  /// In the order of the equivalent model's names.
+  [[nodiscard]] std::vector<NamedCoefficient> named_coefficients() const;
+
+ private:
+  explicit EvemuModel(ScaledDesign design) : design_(std::move(design)) {}
+
+  /// One product of polynomials in one component, in the order of the components.
+  struct Entry {
+    DesignFunction::Part part;
+    std::size_t axis = 0, order = 0;
+    double c_m = 0.0;
+  };
+  ScaledDesign design_;
+  Vector3 ball1_m_ = Vector3::Zero();
+  Eigen::VectorXd c_m_;
+  Eigen::MatrixXd covariance_m2_;
+  std::vector<Entry> entries_;
+  std::array<std::size_t, 4> first_{};  ///< where a component's entries begin
+  Eigen::MatrixXd entry_covariance_;    ///< between entries: blocks by component are contiguous
+};
+
+/// c -> c - B(place) c on the constants: V is zero there. As a matrix on c.
+[[nodiscard]] Eigen::MatrixXd zero_at(const ScaledDesign&, const Vector3& place_m);
+
+}  // namespace abbe::calib::evemu

@@ -1,0 +1,99 @@
+#pragma once
+/// Stage two: errors of ball centres in, a model with uncertainty out.
+///   ols        least squares, plain; covariance for the noise balls share, s from the residuals.
+///   ridge      shrinks everything but the constants, amount by marginal likelihood.
+///   bayes-pose the default: priors by order, shared noise of Ball1 and random pose rotations, their sizes by
+///              marginal likelihood (prior.hpp); what the machine's errors do to spheres and blocks is in the
+///              design when their touches are there.
+///   lasso, mcp, scad  as in [Li OMM] with ncvreg's semantics; covariance by bootstrap (see CovarianceKind).
+/// Not estimable from touches: a rotation of V about Ball1 common to all positions (observe.hpp). It is set
+/// to what the blocks say (gauge Ball1-blocks), and its uncertainty is in the covariance. Also not in the
+/// covariance: that hyper-parameters are estimates, that a machine is no polynomial, and errors of the
+/// calibrator that all positions share.
+
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <string_view>
+
+#include "abbe/calib/evemu/noise.hpp"
+#include "abbe/calib/evemu/prior.hpp"
+#include "abbe/calib/volumetric_model.hpp"
+
+namespace abbe::calib::evemu {
+
+enum class Estimator { Ols, Ridge, BayesPose, Lasso, Mcp, Scad };
+[[nodiscard]] std::string_view name(Estimator);
+[[nodiscard]] std::optional<Estimator> estimator(std::string_view name);
+
+/// Bootstrap: seeded, parametric, by position: noise is drawn anew with the estimated s and w around the
+/// fitted model, lambda and gamma stay; no bias is in it, and penalised estimates have one.
+enum class CovarianceKind { Analytic, Bootstrap };
+[[nodiscard]] std::string_view name(CovarianceKind);
+
+struct SolveOptions {
+  Estimator estimator = Estimator::BayesPose;
+  /// Ridge and bayes-pose, when there are touches: rows through the touched points. Off: through the centres
+  /// alone, as in [Li OMM] and as for all other estimators.
+  bool use_touches = true;
+};
+
+struct ResidualFigures {
+  double mean_abs_m = 0.0;  ///< of the components
+  double rms_m = 0.0;
+  double max_abs_m = 0.0;
+};
+
+struct Statistics {
+  std::size_t positions = 0, balls = 0;  ///< balls: readings over all positions
+  std::size_t observations = 0;          ///< components, without those of Ball1, which are 0 by definition
+  std::size_t unknowns = 0;
+  std::size_t rank = 0;               ///< of the design with columns of unit length
+  double condition = 0.0;             ///< the same, within its rank
+  double effective_parameters = 0.0;  ///< degrees of freedom the coefficients spend; rank for ols
+  double degrees_of_freedom = 0.0;    ///< observations - those of coefficients and pose rotations
+  double s_m = 0.0;                   ///< noise of a ball centre per coordinate
+  double w_rad = 0.0;                 ///< random pose rotation per axis; 0 where not estimated
+  double chi2_per_dof = 0.0;          ///< of whitened residuals over s
+  ResidualFigures before, after;
+  int iterations = 0;
+};
+
+/// The rotation about Ball1 that no touch can see.
+struct MeanRotation {
+  /// What the estimate had before it was set to the blocks' direction: with block touches, the prior's
+  /// choice; with errors only, the mean of the pose rotations found.
+  Vector3 removed_rad = Vector3::Zero();
+  Matrix3 cov_rad2 = Matrix3::Zero();  ///< is in the model's covariance
+  bool referenced = false;             ///< known from elsewhere: the model is more than a shape
+};
+
+struct Solution {
+  VolumetricModel model;
+  Eigen::VectorXd raw_c_m;  ///< coefficients before V(Ball1) = 0 and the rotation were set
+  Estimator estimator = Estimator::BayesPose;
+  CovarianceKind covariance = CovarianceKind::Analytic;
+  std::optional<HyperParameters> hyper;
+  std::vector<Vector3> pose_rotations_rad;  ///< estimated, by position; empty where not modelled
+  MeanRotation rotation;
+  Statistics statistics;
+};
+
+/// The scaled design over the readings.
+[[nodiscard]] Result<ScaledDesign> design_of(const Observations&);
+
+/// RankDeficient for ols when the positions do not determine every combination, TooFewObservations,
+/// DegenerateGeometry when the balls enclose no volume.
+[[nodiscard]] Result<Solution> solve(const Observations&, const SolveOptions& = {});
+
+/// V known independently at some readings, relative to each other in the machine's directions.
+struct RotationReference {
+  std::span<const BallError> points;  ///< position and ball do not count; >= 3 not on a line
+  double sigma_m = 1e-6;              ///< standard uncertainty of V, per component, independent
+};
+/// The same solution turned (and moved) onto the reference; the rotation's uncertainty becomes that of the
+/// reference.
+[[nodiscard]] Result<Solution> with_rotation_reference(Solution, const RotationReference&);
+
+}  // namespace abbe::calib::evemu

@@ -1,0 +1,122 @@
+#include "abbe/calib/evemu/artefact.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+
+#include "abbe/calib/fit/point_set.hpp"
+#include "message.hpp"
+
+namespace abbe::calib::evemu {
+namespace {
+
+tl::unexpected<Error> broken(const Calibrator& c, ErrorCode code, const std::string& what) {
+  return failure(code, message("calibrator \"", c.name, "\": ", what));
+}
+
+Result<void> check_balls(const Calibrator& c) {
+  constexpr std::size_t kLeastBalls = 4;
+  if (c.balls.size() < kLeastBalls) {
+    return broken(c, ErrorCode::BadInput, message(c.balls.size(), " balls, needs ", kLeastBalls));
+  }
+  for (std::size_t i = 0; i < c.balls.size(); ++i) {
+    const Calibrator::Ball& ball = c.balls[i];
+    if (ball.number != static_cast<int>(i) + 1) {
+      return broken(c, ErrorCode::BadInput,
+                    message("ball number ", ball.number, " where ", i + 1, " belongs"));
+    }
+    if (!ball.centre_m.allFinite() || !std::isfinite(ball.u_m)) {
+      return broken(c, ErrorCode::NotFinite, message("ball ", ball.number, " is not a number"));
+    }
+    if (!(ball.radius_m > 0.0) || ball.u_m < 0.0) {
+      return broken(c, ErrorCode::BadInput,
+                    message("ball ", ball.number, " has radius ", ball.radius_m, " m"));
+    }
+    for (std::size_t j = 0; j < i; ++j) {
+      if ((ball.centre_m - c.balls[j].centre_m).norm() < ball.radius_m + c.balls[j].radius_m) {
+        return broken(c, ErrorCode::BadInput, message("balls ", j + 1, " and ", i + 1, " overlap"));
+      }
+    }
+  }
+  return {};
+}
+
+Result<void> check_blocks(const Calibrator& c) {
+  if (c.blocks.size() != 2 || c.blocks[0].number != 1 || c.blocks[1].number != 2) {
+    return broken(c, ErrorCode::BadInput, message("needs blocks 1 and 2, has ", c.blocks.size()));
+  }
+  for (const Calibrator::Block& block : c.blocks) {
+    if (!block.normal.allFinite() || !(block.normal.norm() > 0.0)) {
+      return broken(c, ErrorCode::NotFinite, message("block ", block.number, " has no direction"));
+    }
+  }
+  return uniform_frame(Vector3::Zero(), c.blocks[0].normal, c.blocks[1].normal)
+      .map([](const RigidTransform&) {});
+}
+
+}  // namespace
+
+Result<RigidTransform> uniform_frame(const Vector3& ball1_m, const Vector3& n1, const Vector3& n2) {
+  const Vector3 z = n1.normalized(), across = n2.normalized().cross(z);
+  // Faces meet near a right angle; below this the plate's direction about z is a matter of rounding.
+  constexpr double kParallel = 1e-3;
+  if (!(across.norm() > kParallel)) {
+    return failure(ErrorCode::DegenerateGeometry,
+                   "uniform coordinate system: the normals of the two blocks are parallel");
+  }
+  const Vector3 x = across.normalized();
+  RigidTransform T;
+  T.R << x, z.cross(x), z;
+  T.t_m = ball1_m;
+  return T;
+}
+
+Result<void> check(const Calibrator& c) {
+  if (!std::isfinite(c.tip_radius_m) || c.tip_radius_m < 0.0) {
+    return broken(c, ErrorCode::BadInput, message("tip radius ", c.tip_radius_m, " m"));
+  }
+  if (Result<void> balls = check_balls(c); !balls) {
+    return balls;
+  }
+  std::vector<Vector3> centres;
+  for (const Calibrator::Ball& ball : c.balls) {
+    centres.push_back(ball.centre_m);
+  }
+  const Result<fit::PointSet> set = fit::point_set(centres, 3, "calibrator");
+  if (!set || set->on_a_line()) {
+    return broken(c, ErrorCode::DegenerateGeometry, "its balls lie on a line");
+  }
+  return check_blocks(c);
+}
+
+Result<Calibrator> precalibrated(std::string name, std::span<const Touch> touches, double tip_radius_m,
+                                 const std::array<Vector3, 2>& outward) {
+  std::map<int, std::vector<Vector3>> balls, blocks;
+  for (const Touch& t : touches) {
+    (t.feature == Feature::Ball ? balls : blocks)[t.number].push_back(t.p_m);
+  }
+  Calibrator c;
+  c.name = std::move(name);
+  c.tip_radius_m = tip_radius_m;
+  for (const auto& [number, points] : balls) {
+    const Result<fit::Sphere> sphere = fit::fit_sphere(points);
+    if (!sphere) {
+      return broken(c, sphere.error().code, message("ball ", number, ": ", sphere.error().text));
+    }
+    const double u_m = std::sqrt(sphere->covariance.topLeftCorner<3, 3>().trace() / 3.0);
+    c.balls.push_back({number, sphere->centre, sphere->radius - tip_radius_m, u_m});
+  }
+  for (const auto& [number, points] : blocks) {
+    if (number != 1 && number != 2) {
+      return broken(c, ErrorCode::BadInput, message("there is no block ", number));
+    }
+    const Result<fit::Plane> plane = fit::fit_plane(points, outward[static_cast<std::size_t>(number) - 1]);
+    if (!plane) {
+      return broken(c, plane.error().code, message("block ", number, ": ", plane.error().text));
+    }
+    c.blocks.push_back({number, plane->normal, std::sqrt(plane->cov_normal.trace() / 2.0)});
+  }
+  return check(c).map([&] { return c; });
+}
+
+}  // namespace abbe::calib::evemu

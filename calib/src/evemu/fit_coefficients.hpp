@@ -1,0 +1,39 @@
+#pragma once
+/// What every estimator of coefficients takes and gives: plain numbers on the scaled design.
+
+#include <Eigen/Core>
+#include <optional>
+#include <vector>
+
+#include "abbe/calib/evemu/solve.hpp"
+
+namespace abbe::calib::evemu {
+
+struct FitProblem {
+  const Observations& observations;
+  const ScaledDesign& design;
+  Eigen::MatrixXd X;  ///< rows before whitening
+  Eigen::VectorXd y;
+  bool from_touches = false;
+};
+
+struct Fit {
+  Eigen::VectorXd c_m;
+  Eigen::MatrixXd covariance_m2;
+  CovarianceKind kind = CovarianceKind::Analytic;
+  std::optional<HyperParameters> hyper;
+  std::vector<Vector3> pose_rotations_rad;
+  Matrix3 cov_mean_pose_rotation_rad2 = Matrix3::Zero();
+  double s_m = 0.0, w_rad = 0.0;
+  double effective_parameters = 0.0, pose_parameters = 0.0;
+  int iterations = 0;
+};
+
+/// The rows of `observations` on a design that may be that of more positions.
+[[nodiscard]] FitProblem problem_of(const Observations&, const ScaledDesign&, const SolveOptions&);
+[[nodiscard]] Result<Fit> fit_with(const FitProblem&, const SolveOptions&);
+
+[[nodiscard]] Result<Fit> fit_ols(const FitProblem&);
+[[nodiscard]] Result<Fit> fit_prior(PriorKind, const FitProblem&);
+
+}  // namespace abbe::calib::evemu

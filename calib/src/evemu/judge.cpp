@@ -1,0 +1,112 @@
+#include "abbe/calib/evemu/judge.hpp"
+
+#include <Eigen/Dense>
+#include <cmath>
+#include <functional>
+
+#include "abbe/calib/evemu/design_rows.hpp"
+#include "evemu/fit_coefficients.hpp"
+#include "message.hpp"
+
+namespace abbe::calib::evemu {
+namespace {
+
+/// The observations of one position, or of all others.
+Observations part_of(const Observations& o, int position, bool others) {
+  Observations part = o;
+  std::erase_if(part.rows, [&](const BallError& r) { return (r.position == position) == others; });
+  std::erase_if(part.seen, [&](const SeenArtefact& s) { return (s.position == position) == others; });
+  return part;
+}
+
+/// V of a contender at the balls of a position, relative to its Ball1.
+Eigen::VectorXd relative_to_ball1(const Observations& position,
+                                  const std::function<Vector3(const Vector3&)>& V_at) {
+  const Vector3 V1 = V_at(position.rows[position_rows(position).front().ball1].reading_m);
+  Eigen::VectorXd V(static_cast<Eigen::Index>(3 * position.rows.size()));
+  for (std::size_t i = 0; i < position.rows.size(); ++i) {
+    V.segment<3>(static_cast<Eigen::Index>(3 * i)) = V_at(position.rows[i].reading_m) - V1;
+  }
+  return V;
+}
+
+struct Remainder {
+  double whitened_squares = 0.0;
+  double squares_m2 = 0.0;
+
+  void add(const Observations& position, const Eigen::VectorXd& r) {
+    const Eigen::MatrixXd S = pose_rotation_rows(position);
+    const Eigen::MatrixXd S_white = whitened(position, S);
+    const Eigen::VectorXd r_white = whitened(position, r);
+    const Eigen::Vector3d omega = S_white.colPivHouseholderQr().solve(r_white);
+    whitened_squares += (r_white - S_white * omega).squaredNorm();
+    squares_m2 += (r - S * omega).squaredNorm();
+  }
+};
+
+}  // namespace
+
+Result<HeldOutFigures> held_out(const Observations& o, double s_m, const VolumetricModel* active,
+                                const SolveOptions& options) {
+  const std::vector<PositionRows> positions = position_rows(o);
+  constexpr std::size_t kLeastPositions = 3;
+  if (positions.size() < kLeastPositions) {
+    return failure(ErrorCode::TooFewObservations,
+                   message("held-out test: ", positions.size(), " positions, needs ", kLeastPositions));
+  }
+  const Result<ScaledDesign> design = design_of(o);
+  if (!design) {
+    return tl::unexpected(design.error());
+  }
+  const bool with_active = active != nullptr && active->holds_for_tool(o.machine.tool_offset_m);
+  Remainder none, candidate, other;
+  for (const PositionRows& p : positions) {
+    const Observations rest = part_of(o, p.position, true), left_out = part_of(o, p.position, false);
+    const Result<Fit> fit = fit_with(problem_of(rest, *design, options), options);
+    if (!fit) {
+      return failure(fit.error().code,
+                     message("held-out test without position ", p.position, ": ", fit.error().text));
+    }
+    const Eigen::VectorXd y = observed_m(left_out);
+    none.add(left_out, y);
+    candidate.add(left_out, y - relative_to_ball1(left_out, [&](const Vector3& q) -> Vector3 {
+                              return design->B(q) * fit->c_m;
+                            }));
+    if (with_active) {
+      other.add(left_out, y - relative_to_ball1(left_out, [&](const Vector3& q) {
+                            return active->V_at(q, o.machine.tool_offset_m);
+                          }));
+    }
+  }
+  const std::size_t n = 3 * (o.rows.size() - positions.size());
+  const auto root_mean = [&](double squares) { return std::sqrt(squares / static_cast<double>(n)); };
+  HeldOutFigures figures{.no_compensation = root_mean(none.whitened_squares) / s_m,
+                         .candidate = root_mean(candidate.whitened_squares) / s_m,
+                         .observations = n,
+                         .no_compensation_rms_m = root_mean(none.squares_m2),
+                         .candidate_rms_m = root_mean(candidate.squares_m2)};
+  if (with_active) {
+    figures.active = root_mean(other.whitened_squares) / s_m;
+    figures.active_rms_m = root_mean(other.squares_m2);
+  }
+  return figures;
+}
+
+Result<Verdict> judge(const Observations& o, const Solution& solution, const VolumetricModel* active,
+                      const JudgeOptions& options) {
+  SolveOptions solve = options.solve;
+  solve.estimator = solution.estimator;
+  return held_out(o, solution.statistics.s_m, active, solve).map([&](const HeldOutFigures& figures) {
+    Verdict verdict = decide(solution.model, figures, options.limits);
+    if (!solution.rotation.referenced && !options.accept_shape_only) {
+      const double u_rad = std::sqrt(solution.rotation.cov_rad2.trace() / 3.0);
+      verdict.reasons.push_back(
+          message("shape only: the machine measured the blocks itself, so a rotation of about ", 1e6 * u_rad,
+                  " urad about Ball1 is unknown; give a rotation reference or accept ", kShapeOnly));
+    }
+    verdict.accepted = verdict.reasons.empty();
+    return verdict;
+  });
+}
+
+}  // namespace abbe::calib::evemu

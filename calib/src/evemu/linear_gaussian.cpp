@@ -1,0 +1,68 @@
+#include "abbe/calib/evemu/linear_gaussian.hpp"
+
+#include <Eigen/Cholesky>
+#include <Eigen/QR>
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+namespace abbe::calib::evemu {
+
+LinearGaussian::LinearGaussian(const Eigen::MatrixXd& X, const Eigen::MatrixXd& S, const Eigen::VectorXd& y)
+    : unknowns_(X.cols()), rows_(X.rows()) {
+  Eigen::MatrixXd Z(X.rows(), X.cols() + S.cols());
+  Z << X, S;
+  const Eigen::HouseholderQR<Eigen::MatrixXd> qr(Z);
+  const Eigen::Index m = std::min(Z.rows(), Z.cols());
+  R_ = qr.matrixQR().topRows(m).triangularView<Eigen::Upper>();
+  const Eigen::VectorXd turned = qr.householderQ().adjoint() * y;
+  z_ = turned.head(m);
+  rest_ = turned.tail(Z.rows() - m).squaredNorm();
+}
+
+LinearGaussian::Evidence LinearGaussian::evidence(const Eigen::VectorXd& prior, double noise) const {
+  const Eigen::Index m = R_.rows(), out_of_reach = rows_ - m;
+  // K = R diag(prior) R^T + s^2 I is the covariance of z; the rest of y is pure noise.
+  const Eigen::MatrixXd scaled = R_ * prior.cwiseSqrt().asDiagonal();
+  Eigen::MatrixXd K = Eigen::MatrixXd::Zero(m, m);
+  K.selfadjointView<Eigen::Lower>().rankUpdate(scaled);
+  K.diagonal().array() += noise;
+  const Eigen::LLT<Eigen::MatrixXd> llt(K);
+  Evidence e;
+  const Eigen::MatrixXd L_inv_scaled = llt.matrixL().solve(scaled);
+  const Eigen::VectorXd L_inv_z = llt.matrixL().solve(z_);
+  const Eigen::VectorXd projected = L_inv_scaled.transpose() * L_inv_z;
+  const double log_det = 2.0 * llt.matrixLLT().diagonal().array().log().sum();
+  e.log_likelihood =
+      -0.5 * (log_det + L_inv_z.squaredNorm() + static_cast<double>(out_of_reach) * std::log(noise) +
+              rest_ / noise + static_cast<double>(rows_) * std::log(2.0 * std::numbers::pi));
+  const Eigen::VectorXd used = L_inv_scaled.colwise().squaredNorm();
+  e.by_log_prior = 0.5 * (projected.cwiseAbs2() - used);
+  // trace(K^-1) s^2 = m - trace(K^-1 R D R^T); z^T K^-2 z from one more solve.
+  const Eigen::VectorXd K_inv_z = llt.matrixU().solve(L_inv_z);
+  e.by_log_noise = 0.5 * (noise * K_inv_z.squaredNorm() - (static_cast<double>(m) - used.sum()) +
+                          rest_ / noise - static_cast<double>(out_of_reach));
+  return e;
+}
+
+LinearGaussian::Posterior LinearGaussian::posterior(const Eigen::VectorXd& prior, double noise) const {
+  // Information form, scaled by the prior: no difference of large and small variances.
+  const Eigen::VectorXd root = prior.cwiseSqrt();
+  const Eigen::MatrixXd scaled = R_ * root.asDiagonal() / std::sqrt(noise);
+  const Eigen::Index n = R_.cols();
+  Eigen::MatrixXd information = Eigen::MatrixXd::Identity(n, n);
+  information.selfadjointView<Eigen::Lower>().rankUpdate(scaled.transpose());
+  const Eigen::LLT<Eigen::MatrixXd> llt(information);
+  Posterior p;
+  const Eigen::MatrixXd inverse = llt.solve(Eigen::MatrixXd::Identity(n, n));
+  p.covariance = root.asDiagonal() * inverse * root.asDiagonal();
+  p.covariance = 0.5 * (p.covariance + p.covariance.transpose()).eval();
+  p.mean = root.cwiseProduct(llt.solve(scaled.transpose() * (z_ / std::sqrt(noise))));
+  // Column j spends (inverse * scaled^T scaled)_jj = 1 - inverse_jj.
+  const Eigen::VectorXd spent = Eigen::VectorXd::Ones(n) - inverse.diagonal();
+  p.effective_parameters = spent.head(unknowns_).sum();
+  p.effective_pose_parameters = spent.tail(n - unknowns_).sum();
+  return p;
+}
+
+}  // namespace abbe::calib::evemu

@@ -1,0 +1,82 @@
+#include "abbe/calib/evemu/noise.hpp"
+
+#include <Eigen/Cholesky>
+
+namespace abbe::calib::evemu {
+namespace {
+
+constexpr double kBall1Variance = 1e-4;
+
+/// Applies `act` to the balls of every position, component by component.
+template <class Act>
+Eigen::MatrixXd by_position(const Observations& o, const Eigen::MatrixXd& rows, const Act& act) {
+  Eigen::MatrixXd result(rows.rows(), rows.cols());
+  for (const PositionRows& p : position_rows(o)) {
+    const Eigen::LLT<Eigen::MatrixXd> llt(ball_covariance(p));
+    const auto count = static_cast<Eigen::Index>(p.count);
+    for (Eigen::Index c = 0; c < 3; ++c) {
+      const auto at = Eigen::seqN(3 * static_cast<Eigen::Index>(p.first) + c, count, 3);
+      result(at, Eigen::all) = act(llt, Eigen::MatrixXd(rows(at, Eigen::all)));
+    }
+  }
+  return result;
+}
+
+}  // namespace
+
+std::vector<PositionRows> position_rows(const Observations& o) {
+  std::vector<PositionRows> found;
+  for (std::size_t i = 0; i < o.rows.size(); ++i) {
+    if (found.empty() || found.back().position != o.rows[i].position) {
+      found.push_back({o.rows[i].position, i, 0, i});
+    }
+    ++found.back().count;
+    if (o.rows[i].ball == 1) {
+      found.back().ball1 = i;
+    }
+  }
+  return found;
+}
+
+Eigen::MatrixXd ball_covariance(const PositionRows& p) {
+  const auto n = static_cast<Eigen::Index>(p.count), first = static_cast<Eigen::Index>(p.ball1 - p.first);
+  Eigen::MatrixXd C = Eigen::MatrixXd::Ones(n, n) + Eigen::MatrixXd::Identity(n, n);
+  C.row(first).setZero();
+  C.col(first).setZero();
+  C(first, first) = kBall1Variance;
+  return C;
+}
+
+Eigen::MatrixXd whitened(const Observations& o, const Eigen::MatrixXd& rows) {
+  return by_position(o, rows, [](const Eigen::LLT<Eigen::MatrixXd>& llt, const Eigen::MatrixXd& m) {
+    return Eigen::MatrixXd(llt.matrixL().solve(m));
+  });
+}
+
+Eigen::MatrixXd times_ball_covariance(const Observations& o, const Eigen::MatrixXd& rows) {
+  return by_position(o, rows, [](const Eigen::LLT<Eigen::MatrixXd>& llt, const Eigen::MatrixXd& m) {
+    return Eigen::MatrixXd(llt.reconstructedMatrix() * m);
+  });
+}
+
+Eigen::MatrixXd coloured(const Observations& o, const Eigen::MatrixXd& rows) {
+  return by_position(o, rows, [](const Eigen::LLT<Eigen::MatrixXd>& llt, const Eigen::MatrixXd& m) {
+    return Eigen::MatrixXd(llt.matrixL() * m);
+  });
+}
+
+Eigen::MatrixXd pose_rotation_rows(const Observations& o) {
+  const std::vector<PositionRows> positions = position_rows(o);
+  Eigen::MatrixXd S = Eigen::MatrixXd::Zero(static_cast<Eigen::Index>(3 * o.rows.size()),
+                                            static_cast<Eigen::Index>(3 * positions.size()));
+  for (std::size_t p = 0; p < positions.size(); ++p) {
+    const Vector3& ball1_m = o.rows[positions[p].ball1].reading_m;
+    for (std::size_t i = positions[p].first; i < positions[p].first + positions[p].count; ++i) {
+      S.block<3, 3>(static_cast<Eigen::Index>(3 * i), static_cast<Eigen::Index>(3 * p)) =
+          -rotation_effect(o.rows[i].reading_m - ball1_m);
+    }
+  }
+  return S;
+}
+
+}  // namespace abbe::calib::evemu

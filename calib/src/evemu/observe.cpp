@@ -1,0 +1,383 @@
+#include "abbe/calib/evemu/observe.hpp"
+
+#include <Eigen/Dense>
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <map>
+#include <numbers>
+
+#include "abbe/calib/fit/point_set.hpp"
+#include "message.hpp"
+
+namespace abbe::calib::evemu {
+namespace {
+
+constexpr double kMmPerM = 1e3;
+constexpr double kUmPerM = 1e6;
+
+/// Touched points of one position by feature and number.
+using Touched = std::map<std::pair<Feature, int>, std::vector<Vector3>>;
+
+const char* name_of(Feature feature) {
+  return feature == Feature::Ball ? "ball" : "block";
+}
+
+tl::unexpected<Error> at_position(int position, ErrorCode code, const std::string& what) {
+  return failure(code, message("position ", position, ": ", what));
+}
+
+Result<std::map<int, Touched>> by_position(std::span<const Touch> touches, const ObserveOptions& options) {
+  std::map<int, Touched> found;
+  for (std::size_t i = 0; i < touches.size(); ++i) {
+    if (!touches[i].p_m.allFinite()) {
+      return at_position(touches[i].position, ErrorCode::NotFinite, message("touch ", i, " is not a number"));
+    }
+    found[touches[i].position][{touches[i].feature, touches[i].number}].push_back(touches[i].p_m);
+  }
+  for (int p = 1; p <= options.positions; ++p) {
+    if (!found.contains(p)) {
+      return at_position(
+          p, ErrorCode::TooFewObservations,
+          message("left out: nothing was touched there, of ", options.positions, " positions"));
+    }
+  }
+  for (const auto& [position, touched] : found) {
+    if (position < 1 || position > options.positions) {
+      return at_position(position, ErrorCode::BadInput,
+                         message("positions are numbered 1 to ", options.positions));
+    }
+  }
+  return found;
+}
+
+Result<void> check_complete(int position, const Touched& touched, const Calibrator& c,
+                            const ObserveOptions& options) {
+  for (const auto& [feature, points] : touched) {
+    const int most = feature.first == Feature::Ball ? static_cast<int>(c.balls.size()) : 2;
+    if (feature.second < 1 || feature.second > most) {
+      return at_position(position, ErrorCode::BadInput,
+                         message("the calibrator has no ", name_of(feature.first), " ", feature.second));
+    }
+  }
+  const auto require = [&](Feature feature, int number, std::size_t least) -> Result<void> {
+    const auto at = touched.find({feature, number});
+    const std::size_t points = at == touched.end() ? 0 : at->second.size();
+    if (points == 0) {
+      return at_position(position, ErrorCode::TooFewObservations,
+                         message(name_of(feature), " ", number, " was left out"));
+    }
+    if (points < least) {
+      return at_position(
+          position, ErrorCode::TooFewObservations,
+          message(name_of(feature), " ", number, " has too few points: ", points, ", needs ", least));
+    }
+    return {};
+  };
+  for (const Calibrator::Ball& ball : c.balls) {
+    if (Result<void> enough = require(Feature::Ball, ball.number, options.least_points_per_ball); !enough) {
+      return enough;
+    }
+  }
+  for (const Calibrator::Block& block : c.blocks) {
+    if (Result<void> enough = require(Feature::Block, block.number, options.least_points_per_block);
+        !enough) {
+      return enough;
+    }
+  }
+  return {};
+}
+
+Result<std::vector<fit::Sphere>> fit_balls(int position, const Touched& touched, const Calibrator& c) {
+  std::vector<fit::Sphere> spheres;
+  for (const Calibrator::Ball& ball : c.balls) {
+    Result<fit::Sphere> sphere = fit::fit_sphere(touched.at({Feature::Ball, ball.number}));
+    if (!sphere) {
+      return at_position(position, sphere.error().code,
+                         message("ball ", ball.number, ": ", sphere.error().text));
+    }
+    spheres.push_back(*sphere);
+  }
+  return spheres;
+}
+
+Result<void> check_twice(int position, std::span<const fit::Sphere> balls) {
+  for (std::size_t i = 0; i < balls.size(); ++i) {
+    for (std::size_t j = 0; j < i; ++j) {
+      const double apart_m = (balls[i].centre - balls[j].centre).norm();
+      if (apart_m < 0.5 * (balls[i].radius + balls[j].radius)) {
+        return at_position(position, ErrorCode::BadInput,
+                           message("one ball was touched twice, as ball ", j + 1, " and as ball ", i + 1,
+                                   " (centres ", apart_m * kMmPerM, " mm apart)"));
+      }
+    }
+  }
+  return {};
+}
+
+Result<void> check_radii(int position, std::span<const fit::Sphere> balls, const Calibrator& c,
+                         const ObserveOptions& options) {
+  for (std::size_t i = 0; i < balls.size(); ++i) {
+    const double expected_m = c.balls[i].radius_m + c.tip_radius_m;
+    if (!(std::abs(balls[i].radius - expected_m) <= options.max_radius_mismatch_m)) {
+      return at_position(position, ErrorCode::BadInput,
+                         message("ball ", i + 1, " has radius ", balls[i].radius * kMmPerM,
+                                 " mm, calibrator \"", c.name, "\" and tip make ", expected_m * kMmPerM,
+                                 " mm: calibrator file of another artefact, or another tip"));
+    }
+  }
+  return {};
+}
+
+/// Machine from calibration coordinates, by the balls alone.
+Result<RigidTransform> rough_pose(int position, std::span<const fit::Sphere> balls, const Calibrator& c,
+                                  const ObserveOptions& options) {
+  std::vector<Vector3> from, to;
+  for (std::size_t i = 0; i < balls.size(); ++i) {
+    from.push_back(c.balls[i].centre_m);
+    to.push_back(balls[i].centre);
+  }
+  const Result<RigidTransform> T = fit_rigid(from, to);
+  if (!T) {
+    return at_position(position, T.error().code, T.error().text);
+  }
+  double worst_m = 0.0;
+  std::size_t worst = 0;
+  for (std::size_t i = 0; i < balls.size(); ++i) {
+    const double off_m = (*T * from[i] - to[i]).norm();
+    if (off_m > worst_m) {
+      worst_m = off_m;
+      worst = i;
+    }
+  }
+  if (worst_m > options.max_shape_mismatch_m) {
+    return at_position(
+        position, ErrorCode::BadInput,
+        message("the balls do not have the shape of calibrator \"", c.name, "\": ball ", worst + 1, " is ",
+                worst_m * kMmPerM,
+                " mm off: calibrator file of another artefact, or balls numbered differently"));
+  }
+  return *T;
+}
+
+double angle_rad(const Vector3& a, const Vector3& b) {
+  return std::atan2(a.cross(b).norm(), a.dot(b));
+}
+
+/// A face may be met from either side; what counts here is its line.
+double line_angle_rad(const Vector3& a, const Vector3& b) {
+  const double angle = angle_rad(a, b);
+  return std::min(angle, std::numbers::pi - angle);
+}
+
+Result<void> fit_blocks(SeenArtefact& seen, const Touched& touched, const Calibrator& c,
+                        const RigidTransform& T_machine_pre, const ObserveOptions& options) {
+  std::array<Vector3, 2> nominal;
+  for (std::size_t b = 0; b < 2; ++b) {
+    nominal[b] = T_machine_pre.R * c.blocks[b].normal.normalized();
+    seen.block_points_m[b] = touched.at({Feature::Block, static_cast<int>(b) + 1});
+    Result<fit::Plane> plane = fit::fit_plane(seen.block_points_m[b], nominal[b]);
+    if (!plane) {
+      return at_position(seen.position, plane.error().code,
+                         message("block ", b + 1, ": ", plane.error().text));
+    }
+    seen.blocks[b] = *plane;
+  }
+  const auto fits = [&](std::size_t plane, std::size_t block) {
+    return line_angle_rad(seen.blocks[plane].normal, nominal[block]) <= options.max_block_tilt_rad;
+  };
+  if (!(fits(0, 0) && fits(1, 1))) {
+    if (fits(0, 1) && fits(1, 0)) {
+      return at_position(seen.position, ErrorCode::BadInput, "blocks 1 and 2 are swapped");
+    }
+    const std::size_t wrong = fits(0, 0) ? 1 : 0;
+    return at_position(
+        seen.position, ErrorCode::BadInput,
+        message("block ", wrong + 1, " is tilted by ",
+                line_angle_rad(seen.blocks[wrong].normal, nominal[wrong]) * kMmPerM,
+                " mrad against calibrator \"", c.name, "\": another face, or another artefact"));
+  }
+  return {};
+}
+
+Result<SeenArtefact> see(int position, const Touched& touched, const Calibrator& c,
+                         const RigidTransform& T_uni_pre, const ObserveOptions& options) {
+  if (Result<void> complete = check_complete(position, touched, c, options); !complete) {
+    return tl::unexpected(complete.error());
+  }
+  SeenArtefact seen;
+  seen.position = position;
+  Result<std::vector<fit::Sphere>> balls = fit_balls(position, touched, c);
+  if (!balls) {
+    return tl::unexpected(balls.error());
+  }
+  seen.balls = *std::move(balls);
+  for (const Calibrator::Ball& ball : c.balls) {
+    seen.ball_points_m.push_back(touched.at({Feature::Ball, ball.number}));
+  }
+  if (Result<void> twice = check_twice(position, seen.balls); !twice) {
+    return tl::unexpected(twice.error());
+  }
+  if (Result<void> radii = check_radii(position, seen.balls, c, options); !radii) {
+    return tl::unexpected(radii.error());
+  }
+  const Result<RigidTransform> pose = rough_pose(position, seen.balls, c, options);
+  if (!pose) {
+    return tl::unexpected(pose.error());
+  }
+  if (Result<void> blocks = fit_blocks(seen, touched, c, *pose, options); !blocks) {
+    return tl::unexpected(blocks.error());
+  }
+  Result<RigidTransform> frame =
+      uniform_frame(seen.balls.front().centre, seen.blocks[0].normal, seen.blocks[1].normal);
+  if (!frame) {
+    return at_position(position, frame.error().code, frame.error().text);
+  }
+  seen.T_self_uni = *frame;
+  for (const Calibrator::Ball& ball : c.balls) {
+    seen.ideal_m.push_back(seen.T_self_uni * (T_uni_pre * ball.centre_m));
+  }
+  return seen;
+}
+
+RigidTransform inverse(const RigidTransform& T) {
+  return {T.R.transpose(), -(T.R.transpose() * T.t_m)};
+}
+
+Result<void> check_volume(const Observations& o, const ObserveOptions& options) {
+  std::vector<Vector3> readings;
+  for (const BallError& row : o.rows) {
+    readings.push_back(row.reading_m);
+  }
+  const Result<fit::PointSet> set = fit::point_set(readings, 4, "ball array");
+  if (!set) {
+    return tl::unexpected(set.error());
+  }
+  const double thickness = set->singular_values(2) / set->singular_values(0);
+  if (!(thickness >= options.least_thickness)) {
+    return failure(
+        ErrorCode::DegenerateGeometry,
+        message("ball array: the positions are coplanar, all balls lie in one plane (thickness ", thickness,
+                " of the extent, needs ", options.least_thickness, "): tilt and roll the artefact more"));
+  }
+  return {};
+}
+
+/// Ball1 of every position, which must be there, be zero, and stand still.
+Result<void> place_ball1(Observations& o, const ObserveOptions& options) {
+  std::vector<const BallError*> first;
+  for (const BallError& row : o.rows) {
+    if (row.ball == 1) {
+      first.push_back(&row);
+      o.ball1_m += row.reading_m;
+    }
+  }
+  o.ball1_m /= static_cast<double>(std::max<std::size_t>(1, first.size()));
+  for (const BallError* row : first) {
+    const double shift_m = (row->reading_m - o.ball1_m).norm();
+    if (shift_m > options.max_ball1_shift_m) {
+      return at_position(
+          row->position, ErrorCode::BadInput,
+          message("Ball1 was read ", shift_m * kMmPerM,
+                  " mm from its mean place: it must stand still, the artefact turns about it"));
+    }
+    if (row->V_m.norm() * kUmPerM > 1e-3) {
+      return at_position(row->position, ErrorCode::BadInput,
+                         message("the error of Ball1 is ", row->V_m.norm() * kUmPerM,
+                                 " um: errors are relative to Ball1, it must be 0"));
+    }
+  }
+  return {};
+}
+
+Result<Observations> finish(Observations o, const ObserveOptions& options) {
+  if (Result<void> placed = place_ball1(o, options); !placed) {
+    return tl::unexpected(placed.error());
+  }
+  if (Result<void> volume = check_volume(o, options); !volume) {
+    return tl::unexpected(volume.error());
+  }
+  return o;
+}
+
+}  // namespace
+
+std::size_t Observations::positions() const {
+  std::size_t count = 0;
+  for (std::size_t i = 0; i < rows.size(); ++i) {
+    count += i == 0 || rows[i].position != rows[i - 1].position ? 1 : 0;
+  }
+  return count;
+}
+
+Result<Observations> observe(std::span<const Touch> touches, const Calibrator& c, const Machine& machine,
+                             const ObserveOptions& options) {
+  if (Result<void> sound = check(c); !sound) {
+    return tl::unexpected(sound.error());
+  }
+  const Result<std::map<int, Touched>> positions = by_position(touches, options);
+  if (!positions) {
+    return tl::unexpected(positions.error());
+  }
+  const RigidTransform T_uni_pre =
+      inverse(*uniform_frame(c.balls.front().centre_m, c.blocks[0].normal, c.blocks[1].normal));
+  Observations o;
+  o.machine = machine;
+  o.order = options.order;
+  for (const auto& [position, touched] : *positions) {
+    Result<SeenArtefact> seen = see(position, touched, c, T_uni_pre, options);
+    if (!seen) {
+      return tl::unexpected(seen.error());
+    }
+    for (std::size_t i = 0; i < c.balls.size(); ++i) {
+      const Vector3& reading_m = seen->balls[i].centre;
+      // Ball1 is the origin of both frames: exactly zero, not rounding.
+      const Vector3 V_m = i == 0 ? Vector3(Vector3::Zero()) : Vector3(seen->ideal_m[i] - reading_m);
+      o.rows.push_back({position, c.balls[i].number, reading_m, V_m});
+    }
+    o.seen.push_back(*std::move(seen));
+  }
+  return finish(std::move(o), options);
+}
+
+Result<Observations> observe_errors(std::span<const BallError> errors, const Machine& machine,
+                                    RotationOrigin rotation, const ObserveOptions& options) {
+  Observations o;
+  o.machine = machine;
+  o.order = options.order;
+  o.rotation = rotation;
+  o.rows.assign(errors.begin(), errors.end());
+  std::sort(o.rows.begin(), o.rows.end(), [](const BallError& a, const BallError& b) {
+    return std::pair(a.position, a.ball) < std::pair(b.position, b.ball);
+  });
+  std::map<int, bool> has_ball1;
+  for (std::size_t i = 0; i < o.rows.size(); ++i) {
+    const BallError& row = o.rows[i];
+    if (!row.reading_m.allFinite() || !row.V_m.allFinite()) {
+      return at_position(row.position, ErrorCode::NotFinite, message("ball ", row.ball, " is not a number"));
+    }
+    if (i > 0 && row.position == o.rows[i - 1].position && row.ball == o.rows[i - 1].ball) {
+      return at_position(row.position, ErrorCode::BadInput,
+                         message("ball ", row.ball, " stands there twice"));
+    }
+    has_ball1[row.position] = has_ball1[row.position] || row.ball == 1;
+  }
+  for (int p = 1; p <= options.positions; ++p) {
+    if (!has_ball1.contains(p)) {
+      return at_position(p, ErrorCode::TooFewObservations,
+                         message("left out, of ", options.positions, " positions"));
+    }
+  }
+  for (const auto& [position, has] : has_ball1) {
+    if (!has) {
+      return at_position(position, ErrorCode::TooFewObservations, "Ball1 was left out");
+    }
+    if (position < 1 || position > options.positions) {
+      return at_position(position, ErrorCode::BadInput,
+                         message("positions are numbered 1 to ", options.positions));
+    }
+  }
+  return finish(std::move(o), options);
+}
+
+}  // namespace abbe::calib::evemu

@@ -1,0 +1,196 @@
+#include "abbe/calib/evemu/prior.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+
+namespace abbe::calib::evemu {
+namespace {
+
+/// Logarithms of s_d, rho, s_a, s, w.
+using Theta = Eigen::Matrix<double, 5, 1>;
+using Theta5x5 = Eigen::Matrix<double, 5, 5>;
+enum : Eigen::Index { kSd = 0, kRho = 1, kSa = 2, kS = 3, kW = 4 };
+
+HyperParameters parameters(const Theta& theta) {
+  return {.s_d_m = std::exp(theta(kSd)),
+          .rho = std::exp(theta(kRho)),
+          .s_a_m = std::exp(theta(kSa)),
+          .s_m = std::exp(theta(kS)),
+          .w_rad = std::exp(theta(kW))};
+}
+
+Theta logarithms(const HyperParameters& h) {
+  Theta theta;
+  theta << std::log(h.s_d_m), std::log(h.rho), std::log(h.s_a_m), std::log(h.s_m), std::log(h.w_rad);
+  return theta;
+}
+
+struct Bounds {
+  Theta low, high;
+};
+const Bounds& bounds() {
+  static const Bounds b{logarithms({1e-7, 1e-3, 1e-7, 1e-9, 1e-8}), logarithms({1.0, 3.0, 1.0, 1e-3, 1e-2})};
+  return b;
+}
+
+/// d log(variance) / d theta of one column.
+Theta sensitivity(PriorKind kind, const DesignFunction* f, double s_d_m) {
+  Theta d = Theta::Zero();
+  if (f == nullptr) {
+    d(kW) = kind == PriorKind::BayesPose ? 2.0 : 0.0;
+  } else if (f->kind == FunctionKind::Constant) {
+    return d;
+  } else if (kind == PriorKind::Ridge) {
+    d(kSd) = 2.0;
+  } else if (f->kind == FunctionKind::Rotation) {
+    d(kSa) = 2.0;
+    d(kRho) = 2.0 * (f->order - 1);
+  } else if (f->order > 1 || s_d_m > kLinearPrior_m) {
+    d(kSd) = 2.0;
+    d(kRho) = 2.0 * (f->order - 1);
+  }
+  return d;
+}
+
+/// Minus log likelihood, with gradient.
+struct Objective {
+  PriorKind kind;
+  const ScaledDesign& design;
+  std::size_t positions;
+  const LinearGaussian& problem;
+  int evaluations = 0;
+
+  double operator()(const Theta& theta, Theta& gradient) {
+    ++evaluations;
+    const HyperParameters h = parameters(theta);
+    const LinearGaussian::Evidence e =
+        problem.evidence(prior_variances(kind, design, positions, h), h.s_m * h.s_m);
+    gradient.setZero();
+    for (Eigen::Index j = 0; j < e.by_log_prior.size(); ++j) {
+      const auto column = static_cast<std::size_t>(j);
+      const DesignFunction* f = column < design.size() ? &design.functions()[column] : nullptr;
+      gradient -= e.by_log_prior(j) * sensitivity(kind, f, h.s_d_m);
+    }
+    gradient(kS) -= 2.0 * e.by_log_noise;
+    return -e.log_likelihood;
+  }
+};
+
+/// Directions that would leave the bounds are taken out.
+void keep_inside(const Theta& theta, const Theta& gradient, Theta& direction) {
+  for (Eigen::Index i = 0; i < theta.size(); ++i) {
+    const bool at_low = theta(i) <= bounds().low(i) && gradient(i) > 0;
+    const bool at_high = theta(i) >= bounds().high(i) && gradient(i) < 0;
+    if (at_low || at_high) {
+      direction(i) = 0.0;
+    }
+  }
+}
+
+struct Minimum {
+  Theta theta;
+  double value = std::numeric_limits<double>::infinity();
+};
+
+/// BFGS with backtracking, steps of at most a factor e^2 in any parameter.
+Minimum descend(Objective& f, const Theta& start) {
+  constexpr int kMostIterations = 60;
+  constexpr double kFlat = 1e-4;  // of the log likelihood per unit of log theta: far below what it can tell
+  Minimum at{start};
+  Theta gradient;
+  at.value = f(at.theta, gradient);
+  Theta5x5 inverse_hessian = 0.05 * Theta5x5::Identity();
+  for (int iteration = 0; iteration < kMostIterations; ++iteration) {
+    Theta free = gradient;
+    keep_inside(at.theta, gradient, free);
+    if (free.cwiseAbs().maxCoeff() < kFlat) {
+      break;
+    }
+    Theta direction = -inverse_hessian * free;
+    keep_inside(at.theta, gradient, direction);
+    if (!(direction.dot(free) < 0.0)) {
+      inverse_hessian = 0.05 * Theta5x5::Identity();
+      direction = -0.05 * free;
+    }
+    constexpr double kLongest = 2.0;
+    direction *= std::min(1.0, kLongest / direction.cwiseAbs().maxCoeff());
+    double step = 1.0;
+    Theta next, next_gradient;
+    double value = 0.0;
+    bool lower = false;
+    for (int halving = 0; halving < 12 && !lower; ++halving, step *= 0.4) {
+      next = (at.theta + step * direction).cwiseMax(bounds().low).cwiseMin(bounds().high);
+      value = f(next, next_gradient);
+      lower = value < at.value + 1e-4 * free.dot(next - at.theta);
+    }
+    if (!lower) {
+      break;
+    }
+    const Theta s = next - at.theta, y = next_gradient - gradient;
+    const double gain = at.value - value, sy = s.dot(y);
+    if (sy > 1e-10 * s.norm() * y.norm()) {
+      const Theta5x5 left = Theta5x5::Identity() - s * y.transpose() / sy;
+      inverse_hessian = left * inverse_hessian * left.transpose() + s * s.transpose() / sy;
+    }
+    at = {next, value};
+    gradient = next_gradient;
+    constexpr double kSettled = 1e-7;
+    if (gain < kSettled) {
+      break;
+    }
+  }
+  return at;
+}
+
+}  // namespace
+
+Eigen::VectorXd prior_variances(PriorKind kind, const ScaledDesign& design, std::size_t positions,
+                                const HyperParameters& h) {
+  const auto n = static_cast<Eigen::Index>(design.size());
+  Eigen::VectorXd v(n + static_cast<Eigen::Index>(3 * positions));
+  for (std::size_t j = 0; j < design.size(); ++j) {
+    const DesignFunction& f = design.functions()[j];
+    double sd_m = h.s_d_m;
+    if (f.kind == FunctionKind::Constant) {
+      sd_m = kConstantPrior_m;
+    } else if (kind == PriorKind::BayesPose) {
+      sd_m = (f.kind == FunctionKind::Rotation ? h.s_a_m : h.s_d_m) * std::pow(h.rho, f.order - 1);
+      if (f.kind == FunctionKind::Translation && f.order == 1) {
+        sd_m = std::max(sd_m, kLinearPrior_m);
+      }
+    }
+    v(static_cast<Eigen::Index>(j)) = sd_m * sd_m;
+  }
+  v.tail(v.size() - n).setConstant(kind == PriorKind::BayesPose ? h.w_rad * h.w_rad : 0.0);
+  return v;
+}
+
+HyperParameters most_likely(PriorKind kind, const ScaledDesign& design, std::size_t positions,
+                            const LinearGaussian& problem) {
+  Objective f{kind, design, positions, problem};
+  // The likelihood can have one maximum that calls the scatter noise and one that calls it pose rotation.
+  const std::array<HyperParameters, 2> starts{
+      HyperParameters{.s_d_m = 5e-4, .rho = 0.6, .s_a_m = 5e-4, .s_m = 1e-5, .w_rad = 1e-4},
+      HyperParameters{.s_d_m = 5e-4, .rho = 0.6, .s_a_m = 5e-4, .s_m = 5e-6, .w_rad = 2e-6}};
+  Minimum best{logarithms(starts.front())};
+  const std::size_t used = kind == PriorKind::Ridge ? 1 : starts.size();
+  for (std::size_t i = 0; i < used; ++i) {
+    const Minimum found = descend(f, logarithms(starts[i]));
+    if (found.value < best.value) {
+      best = found;
+    }
+  }
+  HyperParameters h = parameters(best.theta);
+  if (kind == PriorKind::Ridge) {
+    h.rho = 1.0;
+    h.s_a_m = h.s_d_m;
+    h.w_rad = 0.0;
+  }
+  h.log_likelihood = -best.value;
+  h.evaluations = f.evaluations;
+  return h;
+}
+
+}  // namespace abbe::calib::evemu

@@ -1,0 +1,247 @@
+#include "abbe/calib/evemu/solve.hpp"
+
+#include <Eigen/Dense>
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <utility>
+
+#include "abbe/calib/evemu/design_rows.hpp"
+#include "evemu/fit_coefficients.hpp"
+#include "message.hpp"
+
+namespace abbe::calib::evemu {
+namespace {
+
+constexpr std::array<std::pair<Estimator, std::string_view>, 6> kEstimatorNames{
+    {{Estimator::Ols, "ols"},
+     {Estimator::Ridge, "ridge"},
+     {Estimator::BayesPose, "bayes-pose"},
+     {Estimator::Lasso, "lasso"},
+     {Estimator::Mcp, "mcp"},
+     {Estimator::Scad, "scad"}}};
+
+std::vector<Vector3> readings_m(const Observations& o) {
+  std::vector<Vector3> readings;
+  for (const BallError& row : o.rows) {
+    readings.push_back(row.reading_m);
+  }
+  return readings;
+}
+
+/// Theta averaged over the positions, 3 x size().
+Eigen::Matrix3Xd mean_block_rotation(const Observations& o, const ScaledDesign& design) {
+  Eigen::Matrix3Xd mean = Eigen::Matrix3Xd::Zero(3, static_cast<Eigen::Index>(design.size()));
+  for (const SeenArtefact& seen : o.seen) {
+    mean += block_rotation(seen, design) / static_cast<double>(o.seen.size());
+  }
+  return mean;
+}
+
+/// What squareness and slopes of a machine let the blocks be turned by, when nothing else is known: the prior
+/// of a linear translation across the volume, as an angle.
+Matrix3 prior_rotation_rad2(const ScaledDesign& design) {
+  const double u_rad = kLinearPrior_m / design.arm_unit_m();
+  return u_rad * u_rad * Matrix3::Identity();
+}
+
+/// Sets V(Ball1) = 0 and the rotation to that of the blocks; puts the rotation's uncertainty into the
+/// covariance.
+MeanRotation set_gauge(const FitProblem& problem, Fit& fit) {
+  const Observations& o = problem.observations;
+  const Eigen::MatrixX3d G = problem.design.rotation_about(o.ball1_m);
+  const Eigen::MatrixXd Z = zero_at(problem.design, o.ball1_m);
+  MeanRotation rotation;
+  rotation.referenced = o.rotation == RotationOrigin::Independent;
+  Eigen::MatrixXd T = Z;
+  if (problem.from_touches) {
+    const Eigen::Matrix3Xd mean = mean_block_rotation(o, problem.design);
+    rotation.removed_rad = mean * fit.c_m;
+    rotation.cov_rad2 = mean * fit.covariance_m2 * mean.transpose();
+    T = Z * (Eigen::MatrixXd::Identity(Z.rows(), Z.cols()) - G * mean);
+  } else {
+    for (const Vector3& theta : fit.pose_rotations_rad) {
+      rotation.removed_rad += theta / static_cast<double>(fit.pose_rotations_rad.size());
+    }
+    rotation.cov_rad2 =
+        rotation.referenced ? fit.cov_mean_pose_rotation_rad2 : prior_rotation_rad2(problem.design);
+  }
+  fit.c_m = T * fit.c_m;
+  fit.covariance_m2 = T * fit.covariance_m2 * T.transpose();
+  if (!rotation.referenced) {
+    fit.covariance_m2 += G * rotation.cov_rad2 * G.transpose();
+  }
+  fit.covariance_m2 = 0.5 * (fit.covariance_m2 + fit.covariance_m2.transpose()).eval();
+  return rotation;
+}
+
+ResidualFigures residual_figures(const Observations& o, const Eigen::VectorXd& r) {
+  ResidualFigures f;
+  double squares = 0.0, sum = 0.0;
+  std::size_t count = 0;
+  for (std::size_t i = 0; i < o.rows.size(); ++i) {
+    if (o.rows[i].ball == 1) {
+      continue;
+    }
+    const Vector3 at = r.segment<3>(static_cast<Eigen::Index>(3 * i));
+    squares += at.squaredNorm();
+    sum += at.lpNorm<1>();
+    f.max_abs_m = std::max(f.max_abs_m, at.lpNorm<Eigen::Infinity>());
+    count += 3;
+  }
+  f.mean_abs_m = sum / static_cast<double>(std::max<std::size_t>(1, count));
+  f.rms_m = std::sqrt(squares / static_cast<double>(std::max<std::size_t>(1, count)));
+  return f;
+}
+
+Statistics statistics_of(const FitProblem& problem, const Fit& fit) {
+  const Observations& o = problem.observations;
+  Statistics s;
+  s.positions = o.positions();
+  s.balls = o.rows.size();
+  s.observations = 3 * (o.rows.size() - s.positions);
+  s.unknowns = problem.design.size();
+  const Eigen::VectorXd scale = problem.X.colwise().norm().cwiseMax(1e-300).cwiseInverse();
+  const Eigen::BDCSVD<Eigen::MatrixXd> svd(problem.X * scale.asDiagonal());
+  const Eigen::VectorXd& sv = svd.singularValues();
+  // Unobservable rotations leave 1e-7 (Ball1 does not come back to the same nanometre), data 1e-4 and more.
+  constexpr double kZero = 1e-6;
+  s.rank = static_cast<std::size_t>((sv.array() > kZero * sv(0)).count());
+  s.condition = sv(0) / sv(static_cast<Eigen::Index>(s.rank) - 1);
+  s.effective_parameters = fit.effective_parameters;
+  s.degrees_of_freedom = static_cast<double>(s.observations) - fit.effective_parameters - fit.pose_parameters;
+  s.s_m = fit.s_m;
+  s.w_rad = fit.w_rad;
+  Eigen::VectorXd r = problem.y - problem.X * fit.c_m;
+  s.before = residual_figures(o, problem.y);
+  s.after = residual_figures(o, r);
+  if (!fit.pose_rotations_rad.empty()) {
+    Eigen::VectorXd omega(static_cast<Eigen::Index>(3 * fit.pose_rotations_rad.size()));
+    for (std::size_t p = 0; p < fit.pose_rotations_rad.size(); ++p) {
+      omega.segment<3>(static_cast<Eigen::Index>(3 * p)) = fit.pose_rotations_rad[p];
+    }
+    r -= pose_rotation_rows(o) * omega;
+  }
+  for (const PositionRows& p : position_rows(o)) {
+    r.segment<3>(static_cast<Eigen::Index>(3 * p.ball1)).setZero();  // no observation
+  }
+  s.chi2_per_dof = whitened(o, r).squaredNorm() / (fit.s_m * fit.s_m) / std::max(1.0, s.degrees_of_freedom);
+  s.iterations = fit.iterations;
+  return s;
+}
+
+}  // namespace
+
+std::string_view name(Estimator e) {
+  return kEstimatorNames[static_cast<std::size_t>(e)].second;
+}
+
+std::optional<Estimator> estimator(std::string_view text) {
+  for (const auto& [value, known] : kEstimatorNames) {
+    if (known == text) {
+      return value;
+    }
+  }
+  return std::nullopt;
+}
+
+std::string_view name(CovarianceKind kind) {
+  return kind == CovarianceKind::Analytic ? "analytic" : "bootstrap by position";
+}
+
+Result<ScaledDesign> design_of(const Observations& o) {
+  return ScaledDesign::of(o.machine.chain, o.order, bounding_box(readings_m(o)));
+}
+
+Result<Solution> solve(const Observations& o, const SolveOptions& options) {
+  constexpr std::size_t kLeastPositions = 2;
+  if (o.positions() < kLeastPositions) {
+    return failure(ErrorCode::TooFewObservations,
+                   message("ball array: ", o.positions(), " positions, needs ", kLeastPositions));
+  }
+  Result<ScaledDesign> design = design_of(o);
+  if (!design) {
+    return tl::unexpected(design.error());
+  }
+  const FitProblem problem = problem_of(o, *design, options);
+  Result<Fit> fit = fit_with(problem, options);
+  if (!fit) {
+    return tl::unexpected(fit.error());
+  }
+  const Statistics statistics = statistics_of(problem, *fit);
+  const Eigen::VectorXd raw_c_m = fit->c_m;
+  const MeanRotation rotation = set_gauge(problem, *fit);
+  Result<ValidityVolume> validity = ValidityVolume::hull_of(readings_m(o));
+  if (!validity) {
+    return tl::unexpected(validity.error());
+  }
+  Result<EvemuModel> evemu = EvemuModel::of(*design, o.ball1_m, fit->c_m, fit->covariance_m2);
+  if (!evemu) {
+    return tl::unexpected(evemu.error());
+  }
+  return VolumetricModel::from_polynomials(*std::move(evemu),
+                                           rotation.referenced ? Gauge::Ball1 : Gauge::Ball1Blocks,
+                                           o.machine.tool_offset_m, *std::move(validity))
+      .map([&](VolumetricModel model) {
+        return Solution{.model = std::move(model),
+                        .raw_c_m = raw_c_m,
+                        .estimator = options.estimator,
+                        .covariance = fit->kind,
+                        .hyper = fit->hyper,
+                        .pose_rotations_rad = fit->pose_rotations_rad,
+                        .rotation = rotation,
+                        .statistics = statistics};
+      });
+}
+
+Result<Solution> with_rotation_reference(Solution solution, const RotationReference& reference) {
+  if (reference.points.size() < 3) {
+    return failure(ErrorCode::TooFewObservations,
+                   message("rotation reference: ", reference.points.size(), " points, needs 3"));
+  }
+  const EvemuModel& evemu = *solution.model.polynomials();
+  const auto rows = static_cast<Eigen::Index>(3 * reference.points.size());
+  // Unknown: a translation (a reference has its own origin) and the rotation.
+  Eigen::MatrixXd J(rows, 6);
+  Eigen::VectorXd r(rows);
+  for (std::size_t i = 0; i < reference.points.size(); ++i) {
+    const BallError& p = reference.points[i];
+    const auto at = static_cast<Eigen::Index>(3 * i);
+    J.block<3, 3>(at, 0) = Matrix3::Identity();
+    J.block<3, 3>(at, 3) = rotation_effect(p.reading_m - evemu.ball1_m());
+    r.segment<3>(at) = p.V_m - evemu.V_at(p.reading_m);
+  }
+  const Eigen::VectorXd scale = J.colwise().norm().cwiseMax(1e-300).cwiseInverse();
+  Eigen::ColPivHouseholderQR<Eigen::MatrixXd> qr(J * scale.asDiagonal());
+  constexpr double kLine = 1e-6;
+  qr.setThreshold(kLine);
+  if (qr.rank() < 6) {
+    return failure(ErrorCode::DegenerateGeometry, "rotation reference: its points lie on a line");
+  }
+  const Vector3 omega = (scale.asDiagonal() * qr.solve(r)).tail<3>();
+  const Eigen::MatrixXd JtJ_inv = (J.transpose() * J).ldlt().solve(Eigen::MatrixXd::Identity(6, 6));
+  const Matrix3 cov = reference.sigma_m * reference.sigma_m * JtJ_inv.bottomRightCorner<3, 3>();
+  const Eigen::MatrixX3d G = evemu.design().rotation_about(evemu.ball1_m());
+  Eigen::MatrixXd C = evemu.covariance_m2();
+  if (!solution.rotation.referenced) {
+    C -= G * solution.rotation.cov_rad2 * G.transpose();
+  }
+  C += G * cov * G.transpose();
+  C = 0.5 * (C + C.transpose()).eval();
+  C.diagonal() = C.diagonal().cwiseMax(0.0);  // what was added came off again, but for rounding
+  Result<EvemuModel> turned = EvemuModel::of(evemu.design(), evemu.ball1_m(), evemu.c_m() + G * omega, C);
+  if (!turned) {
+    return tl::unexpected(turned.error());
+  }
+  return VolumetricModel::from_polynomials(*std::move(turned), Gauge::Ball1,
+                                           solution.model.tool_offsets_m().front(), solution.model.validity())
+      .map([&](VolumetricModel model) {
+        solution.model = std::move(model);
+        solution.rotation.removed_rad -= omega;
+        solution.rotation.cov_rad2 = cov;
+        solution.rotation.referenced = true;
+        return solution;
+      });
+}
+
+}  // namespace abbe::calib::evemu

@@ -1,0 +1,307 @@
+#include "abbe/calib/evemu/solve.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <Eigen/Dense>
+#include <numbers>
+
+#include "abbe/calib/evemu/judge.hpp"
+#include "evemu_study.hpp"
+
+namespace {
+using namespace abbe::calib;
+using namespace abbe::calib::evemu;
+using namespace abbe::tests::evemu;
+using testing::Contains;
+using testing::HasSubstr;
+
+Observations reference_observations() {
+  return *observe_errors(reference_errors(), reference_machine(), RotationOrigin::Independent);
+}
+
+TEST(EvemuLeastSquares, AgreesWithTheReferenceInStandardisedUnits) {
+  const Observations o = reference_observations();
+  const auto solution = solve(o, {.estimator = Estimator::Ols});
+  ASSERT_TRUE(solution) << solution.error().text;
+  const ScaledDesign& design = solution->model.polynomials()->design();
+  const Eigen::VectorXd beta = 1000 * design.named_from_scaled() * solution->raw_c_m;
+  const auto reference = reference_cells("lm_noint_beta.csv");
+  Eigen::MatrixXd X(216, 45);
+  for (std::size_t i = 0; i < o.rows.size(); ++i) {
+    X.middleRows<3>(static_cast<Eigen::Index>(3 * i)) = design.equivalent().X(1000 * o.rows[i].reading_m);
+  }
+  const Eigen::RowVectorXd mean = X.colwise().mean();
+  const Eigen::VectorXd scale = ((X.rowwise() - mean).colwise().squaredNorm() / 216).cwiseSqrt();
+  Eigen::VectorXd off(45), size(45);
+  for (Eigen::Index j = 0; j < 45; ++j) {
+    const auto& row = reference[static_cast<std::size_t>(j)];
+    ASSERT_EQ(row[0], design.equivalent().names()[static_cast<std::size_t>(j)]);
+    off(j) = (beta(j) - std::stod(row[1])) * scale(j);
+    size(j) = std::stod(row[1]) * scale(j);
+  }
+  EXPECT_LT(off.norm(), 1e-8 * size.norm());
+}
+
+TEST(EvemuLeastSquares, FindsTheNoiseBallsShare) {
+  // points72 has 5 um per ball; 216 residuals know it to 7 %.
+  EXPECT_NEAR(solve(reference_observations(), {.estimator = Estimator::Ols})->statistics.s_m, 5e-6, 0.7e-6);
+}
+
+TEST(EvemuLeastSquares, SaysWhenPositionsDoNotSuffice) {
+  auto errors = reference_errors();
+  std::erase_if(errors, [](const BallError& e) { return e.position > 2; });
+  ObserveOptions options;
+  options.positions = 2;
+  const Observations o = *observe_errors(errors, reference_machine(), RotationOrigin::Independent, options);
+  EXPECT_EQ(solve(o, {.estimator = Estimator::Ols}).error().code, ErrorCode::RankDeficient);
+  EXPECT_TRUE(
+      solve(o, {.estimator = Estimator::BayesPose}));  // the prior fills in, and says how uncertain it is
+}
+
+struct SmallProblem {
+  Eigen::MatrixXd X, S;
+  Eigen::VectorXd y, prior;
+};
+SmallProblem small_problem() {
+  std::srand(4);
+  SmallProblem p{
+      Eigen::MatrixXd::Random(20, 4), Eigen::MatrixXd::Random(20, 3), Eigen::VectorXd::Random(20), {}};
+  p.prior = Eigen::VectorXd::Random(7).cwiseAbs() * 3;
+  return p;
+}
+
+TEST(LinearGaussian, HasTheEvidenceOfTheFullCovariance) {
+  const SmallProblem p = small_problem();
+  const double noise = 0.3;
+  Eigen::MatrixXd Z(20, 7);
+  Z << p.X, p.S;
+  const Eigen::MatrixXd K =
+      Z * p.prior.asDiagonal() * Z.transpose() + noise * Eigen::MatrixXd::Identity(20, 20);
+  const double expected =
+      -0.5 * (std::log(K.determinant()) + p.y.dot(K.ldlt().solve(p.y)) + 20 * std::log(2 * std::numbers::pi));
+  EXPECT_NEAR(LinearGaussian(p.X, p.S, p.y).evidence(p.prior, noise).log_likelihood, expected, 1e-10);
+}
+
+TEST(LinearGaussian, HasTheGradientOfItsEvidence) {
+  const SmallProblem p = small_problem();
+  const LinearGaussian problem(p.X, p.S, p.y);
+  const double noise = 0.3, h = 1e-5;
+  const auto e = problem.evidence(p.prior, noise);
+  for (Eigen::Index j = 0; j < 7; ++j) {
+    Eigen::VectorXd up = p.prior, down = p.prior;
+    up(j) *= std::exp(h);
+    down(j) *= std::exp(-h);
+    const double numeric =
+        (problem.evidence(up, noise).log_likelihood - problem.evidence(down, noise).log_likelihood) / (2 * h);
+    EXPECT_NEAR(e.by_log_prior(j), numeric, 1e-7) << j;
+  }
+  const double numeric = (problem.evidence(p.prior, noise * std::exp(h)).log_likelihood -
+                          problem.evidence(p.prior, noise * std::exp(-h)).log_likelihood) /
+                         (2 * h);
+  EXPECT_NEAR(e.by_log_noise, numeric, 1e-7);
+}
+
+TEST(LinearGaussian, HasThePosteriorOfTheFullCovariance) {
+  const SmallProblem p = small_problem();
+  const double noise = 0.3;
+  Eigen::MatrixXd Z(20, 7);
+  Z << p.X, p.S;
+  const Eigen::MatrixXd V = p.prior.asDiagonal();
+  const Eigen::MatrixXd K = Z * V * Z.transpose() + noise * Eigen::MatrixXd::Identity(20, 20);
+  const auto posterior = LinearGaussian(p.X, p.S, p.y).posterior(p.prior, noise);
+  EXPECT_LT((posterior.mean - V * Z.transpose() * K.ldlt().solve(p.y)).norm(), 1e-12);
+  EXPECT_LT((posterior.covariance - (V - V * Z.transpose() * K.ldlt().solve(Z * V))).norm(), 1e-12);
+  const double hat = (p.X * V.topLeftCorner(4, 4) * p.X.transpose() * K.inverse()).trace();
+  EXPECT_NEAR(posterior.effective_parameters, hat, 1e-10);
+}
+
+/// Mean R_resmag of bayes-pose over that of ols, same seeds.
+struct Ratio {
+  double of_means = 0.0;
+  double worst_R = 0.0;
+};
+Ratio ratio_to_ols(const Layout& layout, const Noise& noise, unsigned seeds) {
+  const Field V = table3_machine();
+  double ols_mean = 0, bayes_mean = 0;
+  Ratio ratio;
+  for (unsigned seed = 1; seed <= seeds; ++seed) {
+    const Observations o = simulated(layout, V, noise, seed);
+    const Solution ols = *solve(o, {.estimator = Estimator::Ols}), bayes = *solve(o);
+    const auto grid = evaluation_grid(ols.model.validity(), layout);
+    const Remaining left = remaining(V, field_of(bayes), grid);
+    ols_mean += remaining(V, raw_field_of(ols), grid).mean_R;
+    bayes_mean += left.mean_R;
+    ratio.worst_R = std::max(ratio.worst_R, left.max_R);
+  }
+  ratio.of_means = bayes_mean / ols_mean;
+  return ratio;
+}
+
+TEST(EvemuBayes, LeavesHalfOfWhatLeastSquaresLeavesWhenPositionsTurn) {
+  EXPECT_LE(ratio_to_ols(reference_layout(), {8e-6, 0.15e-3}, 12).of_means, 0.52);
+}
+
+TEST(EvemuBayes, LeavesNoPointWorseThanBeforeInANearlyPlaneLayout) {
+  EXPECT_LT(ratio_to_ols(reference_layout(0.1), {8e-6, 0.32e-3}, 6).worst_R, 1.0);
+}
+
+TEST(EvemuBayes, FindsNoiseAndPoseRotations) {
+  const Solution s = *solve(simulated(reference_layout(), table3_machine(), {8e-6, 0.3e-3}, 3));
+  EXPECT_NEAR(s.statistics.s_m, 8e-6, 1.5e-6);
+  EXPECT_NEAR(s.statistics.w_rad, 0.3e-3, 0.15e-3);  // 24 numbers know it to 15 %
+  EXPECT_NEAR(s.statistics.chi2_per_dof, 1.0, 0.2);
+}
+
+TEST(EvemuBayes, SeesTheShapeOfAMachineThatMeasuredItsOwnBlocks) {
+  const Observations o =
+      *observe(reference_touches("touched_sig3um.csv"), reference_calibrator(), reference_machine());
+  const Field V = table3_machine();
+  const Solution s = *solve(o);
+  const auto grid = evaluation_grid(s.model.validity());
+  const Remaining as_it_is = remaining(V, field_of(s), grid);
+  EXPECT_GT(as_it_is.mean_R, 0.5);  // the blocks' rotation is not V's: nothing in the touches tells
+  EXPECT_LE(remaining(V, turned_to(V, field_of(s), grid), grid).rms_m, 0.07e-3);
+  // ... and the stated uncertainty knows.
+  std::size_t in = 0;
+  for (const Vector3& p : grid) {
+    const VolumetricError e = s.model.error_at(p, Vector3::Zero());
+    const Vector3 off = V(p) - e.V_m;
+    in += off.cwiseAbs2().cwiseQuotient(e.cov_V_m2.diagonal()).maxCoeff() < 9.0;
+  }
+  EXPECT_GT(static_cast<double>(in), 0.95 * static_cast<double>(grid.size()));
+}
+
+TEST(EvemuSolution, IsZeroAtBall1) {
+  for (const Estimator e : {Estimator::Ols, Estimator::Ridge, Estimator::BayesPose}) {
+    const Observations o = reference_observations();
+    const Solution s = *solve(o, {.estimator = e});
+    const VolumetricError at = s.model.error_at(o.ball1_m, Vector3::Zero());
+    EXPECT_LT(at.V_m.norm(), 1e-15);
+    EXPECT_LT(at.cov_V_m2.norm(), 1e-20);
+    EXPECT_TRUE(at.inside);
+  }
+}
+
+TEST(EvemuSolution, HoldsForItsToolOnly) {
+  const Solution s = *solve(reference_observations());
+  EXPECT_FALSE(s.model.error_at({0.2, 0.2, 0.04}, {0, 0, 0.05}).tool_ok);
+  EXPECT_FALSE(s.model.error_at({0.2, 0.2, 0.5}, Vector3::Zero()).inside);
+}
+
+TEST(EvemuSolution, PropagatesItsFullCovariance) {
+  const Solution s = *solve(reference_observations());
+  const EvemuModel& m = *s.model.polynomials();
+  for (const Vector3& q : {Vector3(0.1, 0.2, 0.04), Vector3(0.5, 0.0, 0.07), Vector3(0.3, 0.15, 0.01)}) {
+    const Eigen::Matrix3Xd B = m.design().B(q);
+    const VolumetricError e = s.model.error_at(q, Vector3::Zero());
+    EXPECT_LT((e.V_m - B * m.c_m()).norm(), 1e-15);
+    EXPECT_LT((e.V_m - s.model.V_at(q, Vector3::Zero())).norm(), 1e-15);
+    EXPECT_LT((e.cov_V_m2 - B * m.covariance_m2() * B.transpose()).norm(), 1e-12 * e.cov_V_m2.norm());
+  }
+}
+
+TEST(EvemuSolution, ComesBackFromItsDescriptionBitForBit) {
+  const Solution s = *solve(reference_observations());
+  const auto again = VolumetricModel::from_description(s.model.description());
+  ASSERT_TRUE(again) << again.error().text;
+  const Vector3 q(0.31, 0.17, 0.05);
+  EXPECT_EQ(again->V_at(q, Vector3::Zero()), s.model.V_at(q, Vector3::Zero()));
+  EXPECT_EQ(again->error_at(q, Vector3::Zero()).cov_V_m2, s.model.error_at(q, Vector3::Zero()).cov_V_m2);
+  EXPECT_EQ(again->gauge(), Gauge::Ball1);
+}
+
+TEST(EvemuSolution, CorrectsACommand) {
+  const Solution s = *solve(reference_observations());
+  const Vector3 p(0.4, 0.1, 0.05);
+  const auto c = s.model.command_correction(p, Vector3::Zero());
+  ASSERT_TRUE(c);
+  EXPECT_LT((c->c_m + s.model.V_at(p + c->c_m, Vector3::Zero())).norm(), 1e-9);
+}
+
+TEST(RotationReference, TurnsAShapeOntoWhatIsKnown) {
+  const Field V = table3_machine();
+  const Observations o =
+      *observe(reference_touches("touched_sig3um.csv"), reference_calibrator(), reference_machine());
+  std::vector<BallError> known;
+  for (const Vector3& q : {Vector3(0.1, 0.15, 0.04), Vector3(0.5, 0.25, 0.05), Vector3(0.45, 0.1, 0.04),
+                           Vector3(0.3, 0.2, 0.06), Vector3(0.55, 0.15, 0.05)}) {
+    known.push_back({1, 1, q, V(q)});
+  }
+  const auto turned = with_rotation_reference(*solve(o), {known, 5e-6});
+  ASSERT_TRUE(turned) << turned.error().text;
+  EXPECT_TRUE(turned->rotation.referenced);
+  EXPECT_EQ(turned->model.gauge(), Gauge::Ball1);
+  const auto grid = evaluation_grid(turned->model.validity());
+  EXPECT_LT(remaining(V, field_of(*turned), grid).rms_m, 0.15e-3);  // 2.3 mm before
+  EXPECT_LT(turned->model.error_at({0.5, 0.2, 0.05}, Vector3::Zero()).cov_V_m2.trace(), 1e-2 * 1e-6);
+}
+
+TEST(RotationReference, NeedsPointsOffALine) {
+  const Solution s = *solve(reference_observations());
+  const std::vector<BallError> line{
+      {1, 1, {0.1, 0, 0}, {}}, {1, 2, {0.2, 0, 0}, {}}, {1, 3, {0.3, 0, 0}, {}}};
+  EXPECT_EQ(with_rotation_reference(s, {line, 1e-6}).error().code, ErrorCode::DegenerateGeometry);
+}
+
+JudgeOptions generous() {
+  JudgeOptions options;
+  options.limits.max_error_m = 10e-3;  // the machine has 3.3 mm
+  options.limits.max_gradient = 0.1;
+  return options;
+}
+
+TEST(EvemuJudge, AcceptsAModelOfTheMachineItWasMeasuredOn) {
+  const Observations o = reference_observations();
+  const auto verdict = judge(o, *solve(o), nullptr, generous());
+  ASSERT_TRUE(verdict) << verdict.error().text;
+  EXPECT_TRUE(verdict->accepted) << verdict->reasons.front();
+  EXPECT_GT(verdict->held_out.no_compensation, 20 * verdict->held_out.candidate);
+  EXPECT_LT(verdict->held_out.candidate, 3.0);
+}
+
+TEST(EvemuJudge, RefusesWhatDoesNotBeatNoCompensation) {
+  const Field perfect = [](const Vector3&) { return Vector3(Vector3::Zero()); };
+  for (const Estimator e : {Estimator::Ols, Estimator::BayesPose}) {
+    const Observations o = simulated(reference_layout(), perfect, {8e-6, 0.1e-3}, 2);
+    const auto verdict = judge(o, *solve(o, {.estimator = e}), nullptr, generous());
+    ASSERT_TRUE(verdict);
+    if (e == Estimator::Ols) {
+      EXPECT_FALSE(verdict->accepted);
+      EXPECT_THAT(verdict->reasons, Contains(HasSubstr("without compensation")));
+    } else {
+      // Priors find next to nothing, and what they find is next to nothing better or worse.
+      EXPECT_NEAR(verdict->held_out.candidate / verdict->held_out.no_compensation, 1.0, 0.1);
+    }
+  }
+}
+
+TEST(EvemuJudge, CallsAShapeAShapeUnlessToldOtherwise) {
+  const Observations o =
+      *observe(reference_touches("touched_sig3um.csv"), reference_calibrator(), reference_machine());
+  const Solution s = *solve(o);
+  const auto verdict = judge(o, s, nullptr, generous());
+  ASSERT_TRUE(verdict);
+  EXPECT_FALSE(verdict->accepted);
+  EXPECT_THAT(verdict->reasons, testing::ElementsAre(HasSubstr("shape only")));
+  JudgeOptions told = generous();
+  told.accept_shape_only = true;
+  EXPECT_TRUE(judge(o, s, nullptr, told)->accepted);
+}
+
+TEST(EvemuJudge, ComparesWithTheActiveModelWhateverItsRotation) {
+  const Observations o = reference_observations();
+  const Solution s = *solve(o);
+  const EvemuModel& m = *s.model.polynomials();
+  const Eigen::VectorXd turned =
+      m.c_m() + m.design().rotation_about(m.ball1_m()) * Vector3(1e-3, 2e-3, -1e-3);
+  const VolumetricModel other =
+      *VolumetricModel::from_polynomials(*EvemuModel::of(m.design(), m.ball1_m(), turned, m.covariance_m2()),
+                                         Gauge::Ball1, Vector3::Zero(), s.model.validity());
+  const auto as_it_is = held_out(o, s.statistics.s_m, &s.model),
+             as_turned = held_out(o, s.statistics.s_m, &other);
+  ASSERT_TRUE(as_it_is && as_turned);
+  EXPECT_NEAR(as_it_is->active.value(), as_turned->active.value(), 1e-6);
+}
+
+}  // namespace

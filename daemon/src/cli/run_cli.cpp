@@ -64,6 +64,7 @@ void add_commands(CLI::App& app, int& exit) {
       app.add_subcommand("identify", "Identify a machine's geometric errors from recorded files");
   identify->require_subcommand(1);
   add_identify_otf(*identify, exit);
+  add_identify_evemu(*identify, exit);
   auto* model =
       app.add_subcommand("model", "Evaluate models, and look after the store of a machine's models");
   model->require_subcommand(1);

@@ -163,7 +163,17 @@ class RowReader {
   }
 
  private:
+  void read_word(const Cell& cell, std::size_t number, std::size_t column, double* row) {
+    const auto& words = form_[column].words;
+    const auto found = std::find(words.begin(), words.end(), cell.text);
+    row[column] = static_cast<double>(found - words.begin());
+    if (found == words.end())
+      faults_.add(number, cell.column, form_[column].name,
+                  fmt::format("\"{}\": must be {}", cell.text, fmt::join(words, " or ")));
+  }
+
   void read_cell(const Cell& cell, std::size_t number, std::size_t column, double* row) {
+    if (!form_[column].words.empty()) return read_word(cell, number, column, row);
     const auto fault = parse_cell(cell.text, row[column]);
     if (!fault.empty())
       faults_.add(number, cell.column, form_[column].name, fmt::format("\"{}\": {}", cell.text, fault));

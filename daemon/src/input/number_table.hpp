@@ -19,6 +19,7 @@ namespace abbe::daemon {
 struct ColumnRule {
   std::string_view name;
   bool required = true;
+  std::vector<std::string_view> words = {};  ///< not a number but one of these; the value is its index
 };
 
 /// The columns of one form of a file. A file may have several forms; the header decides.

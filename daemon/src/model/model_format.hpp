@@ -9,6 +9,7 @@ namespace abbe::daemon {
 
 inline constexpr std::string_view kModelSchema = "abbe/model/1";
 inline constexpr std::string_view kVersion = ABBE_VERSION;
+inline constexpr std::string_view kLegendre = "legendre";  ///< basis of a model in polynomials
 
 // How far the decimal point moves between SI and the file.
 inline constexpr int kMm = 3;

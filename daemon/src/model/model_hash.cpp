@@ -6,6 +6,7 @@
 
 #include "abbe/daemon/model_document.hpp"
 #include "abbe/daemon/sha256.hpp"
+#include "model/model_format.hpp"
 
 namespace abbe::daemon {
 
@@ -47,7 +48,15 @@ void add_frame(Canonical& out, const calib::VolumetricModel& model) {
     for (const double node_m : axis.nodes_m) out.number(node_m);
     out.number(axis.reference_m);
   }
-  out.text(name(calib::Basis::Linear));
+  if (const auto* polynomials = model.polynomials()) {
+    out.text(kLegendre);
+    out.count(static_cast<std::size_t>(polynomials->design().equivalent().order()));
+    out.vector(polynomials->design().box().centre_m);
+    out.vector(polynomials->design().box().half_width_m);
+    out.vector(polynomials->ball1_m());
+  } else {
+    out.text(name(calib::Basis::Linear));
+  }
   out.text(name(model.gauge()));
   out.vectors(model.tool_offsets_m());
 }

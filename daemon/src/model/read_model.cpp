@@ -1,5 +1,6 @@
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 #include <nlohmann/json.hpp>
 
@@ -90,11 +91,31 @@ class Reader {
   std::vector<std::string> faults_;
 };
 
-void read_axes(Reader& in, calib::ModelDescription& out) {
+calib::Vector3 read_vector(Reader& in, const Json& entry, const std::string& path, const std::string& key) {
+  const Json* value = in.find(entry, path, key);
+  if (value == nullptr) return calib::Vector3::Zero();
+  const auto v = in.numbers(*value, path + "." + key, kMm);
+  if (v.size() == 3) return {v[0], v[1], v[2]};
+  in.fault(path + "." + key, "must be [x, y, z]");
+  return calib::Vector3::Zero();
+}
+
+void read_polynomials(Reader& in, const Json& basis, calib::ModelDescription& out) {
+  calib::PolynomialForm form;
+  form.order = static_cast<int>(std::min<std::size_t>(in.count_of(basis, "basis", "order"), 1000));
+  form.box.centre_m = read_vector(in, basis, "basis", "centre_mm");
+  form.box.half_width_m = read_vector(in, basis, "basis", "half_width_mm");
+  form.ball1_m = read_vector(in, basis, "basis", "zero_mm");
+  out.polynomials = form;
+}
+
+void read_basis(Reader& in, calib::ModelDescription& out) {
   const Json* basis = in.find(in.root(), "", "basis");
   if (basis == nullptr) return;
   const Json* kind = in.find(*basis, "basis", "kind");
-  if (kind != nullptr && *kind != name(calib::Basis::Linear)) in.fault("basis.kind", "must be \"linear\"");
+  if (kind != nullptr && *kind == kLegendre) return read_polynomials(in, *basis, out);
+  if (kind != nullptr && *kind != name(calib::Basis::Linear))
+    in.fault("basis.kind", fmt::format("must be \"linear\" or \"{}\"", kLegendre));
   const Json* axes = in.find(*basis, "basis", "axes");
   if (axes == nullptr) return;
   for (const auto axis : calib::kAllAxes) {
@@ -143,6 +164,16 @@ void read_covariance(Reader& in, calib::ModelDescription& out) {
     for (Eigen::Index j = i; j < n; ++j) out.covariance(i, j) = out.covariance(j, i) = values[k++];
 }
 
+void read_gauge(Reader& in, calib::ModelDescription& out) {
+  const auto text = in.text("gauge");
+  for (const auto gauge : {calib::Gauge::G1, calib::Gauge::Ball1Blocks, calib::Gauge::Ball1})
+    if (text == name(gauge)) {
+      out.gauge = gauge;
+      return;
+    }
+  in.fault("gauge", "must be \"G1\", \"Ball1-blocks\" or \"Ball1\"");
+}
+
 calib::ModelDescription read_description(Reader& in) {
   calib::ModelDescription out;
   const auto chain = calib::KinematicChain::parse(in.text("chain"));
@@ -150,10 +181,10 @@ calib::ModelDescription read_description(Reader& in) {
     out.chain = *chain;
   else
     in.fault("chain", chain.error().text);
-  if (in.text("gauge") != name(calib::Gauge::G1)) in.fault("gauge", "must be \"G1\"");
+  read_gauge(in, out);
   if (in.text("squareness") != "travel") in.fault("squareness", "must be \"travel\"");
   out.tool_offsets_m = in.vectors(in.find(in.root(), "", "tool_offsets_mm"), "tool_offsets_mm");
-  read_axes(in, out);
+  read_basis(in, out);
   if (const Json* validity = in.find(in.root(), "", "validity"))
     out.validity_hull_m = in.vectors(in.find(*validity, "validity", "hull_mm"), "validity.hull_mm");
   read_parameters(in, out);

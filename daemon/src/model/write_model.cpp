@@ -49,6 +49,15 @@ std::string numbers(std::span<const double> list, int shift) {
   return text + "]";
 }
 
+void write_polynomials(JsonText& out, const calib::evemu::EvemuModel& model) {
+  const auto& design = model.design();
+  out.key("basis");
+  out.raw(fmt::format(
+      "{{\"kind\": \"{}\", \"order\": {},\n    \"centre_mm\": {}, \"half_width_mm\": {}, \"zero_mm\": {}}}",
+      kLegendre, design.equivalent().order(), vector_mm(design.box().centre_m),
+      vector_mm(design.box().half_width_m), vector_mm(model.ball1_m())));
+}
+
 void write_axes(JsonText& out, const calib::ParameterLayout& layout) {
   out.key("basis");
   out.raw(fmt::format("{{\"kind\": \"{}\", \"axes\": {{", name(calib::Basis::Linear)));
@@ -132,7 +141,10 @@ std::string to_json(const ModelDocument& document) {
   out.member("squareness", "travel");
   out.key("tool_offsets_mm");
   out.raw(vectors_mm(model.tool_offsets_m()));
-  write_axes(out, model.layout());
+  if (const auto* polynomials = model.polynomials())
+    write_polynomials(out, *polynomials);
+  else
+    write_axes(out, model.layout());
   write_statistics(out, document.statistics);
   write_inputs(out, document.inputs);
   out.key("validity");
@@ -140,6 +152,13 @@ std::string to_json(const ModelDocument& document) {
   write_parameters(out, model);
   write_covariance(out, model.covariance());
   return out.finish();
+}
+
+std::string to_coefficients_csv(const calib::evemu::EvemuModel& model) {
+  std::string text = "name,value,u,unit\n";
+  for (const auto& c : model.named_coefficients())
+    text += fmt::format("{},{:.17g},{:.17g},{}\n", c.name, c.value, c.u, c.unit);
+  return text;
 }
 
 std::string to_tables_csv(const calib::VolumetricModel& model) {

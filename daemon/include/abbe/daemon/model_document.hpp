@@ -8,6 +8,7 @@
 #include <string_view>
 #include <vector>
 
+#include "abbe/calib/evemu/solve.hpp"
 #include "abbe/calib/otf/solve.hpp"
 #include "abbe/calib/volumetric_model.hpp"
 #include "abbe/daemon/config.hpp"
@@ -54,6 +55,10 @@ struct ModelDocument {
 [[nodiscard]] ModelDocument otf_document(const calib::otf::Solution& solution, const Config& config,
                                          std::vector<InputFile> inputs, protocol::UtcTime created);
 
+/// The document of a ball array's solution.
+[[nodiscard]] ModelDocument evemu_document(const calib::evemu::Solution& solution, const Config& config,
+                                           std::vector<InputFile> inputs, protocol::UtcTime created);
+
 /// SHA-256 in hex over what the model *says* (method, chain, basis, nodes, gauge, tools, parameters,
 /// covariance, validity), not over dates, inputs or statistics: the live model's hash equals the replay's.
 [[nodiscard]] std::string model_hash(const calib::VolumetricModel& model, std::string_view method);
@@ -68,6 +73,9 @@ struct ModelDocument {
 /// hash is not the hash of its content is refused.
 [[nodiscard]] Result<ModelDocument> parse_model(std::string_view text, const std::string& file);
 [[nodiscard]] Result<ModelDocument> read_model(const std::filesystem::path& file);
+
+/// `name,value,u,unit`: the coefficients of [Li OMM] Table 3 in mm and rad, of a model in polynomials.
+[[nodiscard]] std::string to_coefficients_csv(const calib::evemu::EvemuModel& model);
 
 /// `name,position_mm,value,u,unit`
 [[nodiscard]] std::string to_tables_csv(const calib::VolumetricModel& model);

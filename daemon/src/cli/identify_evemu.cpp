@@ -1,0 +1,245 @@
+#include <fmt/format.h>
+
+#include <chrono>
+#include <cmath>
+#include <filesystem>
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <system_error>
+
+#include "abbe/calib/evemu/judge.hpp"
+#include "abbe/daemon/evemu_files.hpp"
+#include "abbe/daemon/model_document.hpp"
+#include "abbe/daemon/otf_inputs.hpp"
+#include "abbe/daemon/sha256.hpp"
+#include "cli/commands.hpp"
+#include "cli/terminal.hpp"
+#include "files/text_file.hpp"
+
+namespace abbe::daemon {
+
+namespace {
+
+namespace evemu = calib::evemu;
+constexpr double kMicro_per_1 = 1e6;
+
+struct Arguments {
+  std::string machine, touches, calibrator, errors, reference, out;
+  std::string estimator = "bayes-pose";
+  double u_reference_um = 1.0;
+  int order = 3;
+  int positions = 8;
+  bool rotation_known = false, accept_shape_only = false, json = false;
+};
+
+struct Outcome {
+  Config config;
+  std::vector<InputFile> sources;
+  evemu::Observations observations;
+  std::optional<evemu::Solution> solution;
+  calib::Verdict verdict;
+};
+
+Result<evemu::Observations> from_touches(const Arguments& arguments, const evemu::Machine& machine,
+                                         const evemu::ObserveOptions& options,
+                                         std::vector<InputFile>& sources) {
+  const auto calibrator = read_calibrator_toml(arguments.calibrator);
+  if (!calibrator) return tl::make_unexpected(calibrator.error());
+  const auto touches = read_touches_csv(arguments.touches);
+  if (!touches) return tl::make_unexpected(touches.error());
+  sources.insert(sources.end(), {touches->source, calibrator->source});
+  auto observed = evemu::observe(touches->touches, calibrator->calibrator, machine, options);
+  if (!observed) return tl::make_unexpected(error_of(observed.error()));
+  return std::move(*observed);
+}
+
+Result<evemu::Observations> from_errors(const Arguments& arguments, const evemu::Machine& machine,
+                                        const evemu::ObserveOptions& options,
+                                        std::vector<InputFile>& sources) {
+  const auto errors = read_errors_csv(arguments.errors);
+  if (!errors) return tl::make_unexpected(errors.error());
+  sources.push_back(errors->source);
+  const auto rotation =
+      arguments.rotation_known ? evemu::RotationOrigin::Independent : evemu::RotationOrigin::Blocks;
+  auto observed = evemu::observe_errors(errors->errors, machine, rotation, options);
+  if (!observed) return tl::make_unexpected(error_of(observed.error()));
+  return std::move(*observed);
+}
+
+Result<evemu::Solution> turned(evemu::Solution solution, const Arguments& arguments,
+                               std::vector<InputFile>& sources) {
+  if (arguments.reference.empty()) return solution;
+  const auto points = read_errors_csv(arguments.reference);
+  if (!points) return tl::make_unexpected(points.error());
+  sources.push_back(points->source);
+  auto result = evemu::with_rotation_reference(std::move(solution),
+                                               {points->errors, arguments.u_reference_um / kMicro_per_1});
+  if (!result) return tl::make_unexpected(error_of(result.error()));
+  return std::move(*result);
+}
+
+Result<Outcome> identify(const Arguments& arguments) {
+  auto config = load_config(arguments.machine);
+  if (!config) return tl::make_unexpected(config.error());
+  const auto hash = sha256_hex_of_file(arguments.machine);
+  if (!hash) return tl::make_unexpected(hash.error());
+  Outcome outcome;
+  outcome.sources.push_back({std::filesystem::path(arguments.machine).filename().string(), *hash});
+  const auto machine = evemu_machine(config->machine);
+  if (!machine) return tl::make_unexpected(machine.error());
+  evemu::ObserveOptions options;
+  options.order = arguments.order;
+  options.positions = arguments.positions;
+  auto observed = arguments.touches.empty() ? from_errors(arguments, *machine, options, outcome.sources)
+                                            : from_touches(arguments, *machine, options, outcome.sources);
+  if (!observed) return tl::make_unexpected(observed.error());
+  outcome.observations = std::move(*observed);
+  evemu::JudgeOptions judging;
+  judging.solve.estimator = *evemu::estimator(arguments.estimator);
+  judging.limits = gate_limits(config->gate);
+  judging.accept_shape_only = arguments.accept_shape_only;
+  auto solution = evemu::solve(outcome.observations, judging.solve);
+  if (!solution) return tl::make_unexpected(error_of(solution.error()));
+  auto referenced = turned(std::move(*solution), arguments, outcome.sources);
+  if (!referenced) return tl::make_unexpected(referenced.error());
+  auto verdict = evemu::judge(outcome.observations, *referenced, nullptr, judging);
+  if (!verdict) return tl::make_unexpected(error_of(verdict.error()));
+  outcome.config = std::move(*config);
+  outcome.solution = std::move(*referenced);
+  outcome.verdict = std::move(*verdict);
+  return outcome;
+}
+
+Result<void> write_outputs(const std::filesystem::path& folder, const ModelDocument& document) {
+  std::error_code failed;
+  std::filesystem::create_directories(folder, failed);
+  if (failed) return fail(ErrorCode::Io, fmt::format("create {}: {}", folder.string(), failed.message()));
+  if (auto done = replace_file(folder / "model.json", to_json(document)); !done) return done;
+  return replace_file(folder / "coefficients.csv", to_coefficients_csv(*document.model.polynomials()));
+}
+
+double u_rotation_urad(const evemu::Solution& solution) {
+  return kMicro_per_1 * std::sqrt(solution.rotation.cov_rad2.trace() / 3.0);
+}
+
+void print_json(const Outcome& outcome, const ModelDocument& document, const std::filesystem::path& folder) {
+  const auto& s = outcome.solution->statistics;
+  const auto& held_out = outcome.verdict.held_out;
+  const nlohmann::json object{
+      {"model", (folder / "model.json").string()},
+      {"id", model_id(document.model, document.method)},
+      {"hash", model_hash(document.model, document.method)},
+      {"estimator", document.estimator},
+      {"covariance", evemu::name(outcome.solution->covariance)},
+      {"positions", s.positions},
+      {"balls", s.balls},
+      {"observations", s.observations},
+      {"unknowns", s.unknowns},
+      {"rank", s.rank},
+      {"condition", s.condition},
+      {"effective_parameters", s.effective_parameters},
+      {"noise_um", s.s_m * kMicro_per_1},
+      {"pose_rotation_urad", s.w_rad * kMicro_per_1},
+      {"u_mean_rotation_urad", u_rotation_urad(*outcome.solution)},
+      {"shape_only", !outcome.solution->rotation.referenced},
+      {"residual_rms_before_um", s.before.rms_m * kMicro_per_1},
+      {"residual_rms_after_um", s.after.rms_m * kMicro_per_1},
+      {"held_out_rms_before_um", held_out.no_compensation_rms_m * kMicro_per_1},
+      {"held_out_rms_after_um", held_out.candidate_rms_m * kMicro_per_1},
+      {"gate", {{"accepted", outcome.verdict.accepted}, {"reasons", outcome.verdict.reasons}}}};
+  fmt::print("{}\n", object.dump(1));
+}
+
+void print_summary(const Outcome& outcome, const ModelDocument& document,
+                   const std::filesystem::path& folder) {
+  constexpr int kGreen = 2, kYellow = 3, kStdout = 1;
+  const auto& s = outcome.solution->statistics;
+  const auto& held_out = outcome.verdict.held_out;
+  fmt::print("model       {}  ({} coefficients, tool and machine \"{}\")\n",
+             model_id(document.model, document.method), s.unknowns, document.machine);
+  fmt::print("artefact    {} positions, {} ball centres\n", s.positions, s.balls);
+  fmt::print(
+      "solution    {}: {} observations, rank {} of {}, condition {:.3g}, {:.1f} effective parameters\n",
+      document.estimator, s.observations, s.rank, s.unknowns, s.condition, s.effective_parameters);
+  fmt::print("noise       {:.2f} um per ball coordinate, {:.1f} urad per position\n", s.s_m * kMicro_per_1,
+             s.w_rad * kMicro_per_1);
+  fmt::print("residuals   {:.3f} um rms before, {:.3f} um after\n", s.before.rms_m * kMicro_per_1,
+             s.after.rms_m * kMicro_per_1);
+  fmt::print("held out    {:.3f} um rms without compensation, {:.3f} um with the model\n",
+             held_out.no_compensation_rms_m * kMicro_per_1, held_out.candidate_rms_m * kMicro_per_1);
+  fmt::print("rotation    {}, u = {:.1f} urad about Ball1\n",
+             outcome.solution->rotation.referenced ? "referenced" : "that of the blocks: shape only",
+             u_rotation_urad(*outcome.solution));
+  fmt::print("gate        {}\n", outcome.verdict.accepted ? coloured("would accept", kGreen, kStdout)
+                                                          : coloured("would refuse", kYellow, kStdout));
+  for (const auto& reason : outcome.verdict.reasons) fmt::print("            {}\n", reason);
+  fmt::print("written     {}, coefficients.csv\n", (folder / "model.json").string());
+}
+
+int run(const Arguments& arguments) {
+  const auto outcome = identify(arguments);
+  if (!outcome) return report(outcome.error());
+  const auto now = std::chrono::time_point_cast<std::chrono::nanoseconds>(std::chrono::system_clock::now());
+  const auto document = evemu_document(*outcome->solution, outcome->config, outcome->sources, now);
+  if (const auto written = write_outputs(arguments.out, document); !written) return report(written.error());
+  arguments.json ? print_json(*outcome, document, arguments.out)
+                 : print_summary(*outcome, document, arguments.out);
+  return 0;
+}
+
+void add_options(CLI::App& command, Arguments& arguments) {
+  command.add_option("--machine", arguments.machine, "machine.toml, or the daemon's abbed.toml")->required();
+  auto* touches = command.add_option("--touches", arguments.touches,
+                                     "touches.csv: position,kind,index,x_mm,y_mm,z_mm; kind ball or block");
+  auto* calibrator = command.add_option("--calibrator", arguments.calibrator, "calibrator.toml");
+  auto* errors = command.add_option("--errors", arguments.errors,
+                                    "errors.csv instead: position,ball,x_mm,y_mm,z_mm,ex_um,ey_um,ez_um");
+  touches->needs(calibrator);
+  calibrator->needs(touches);
+  errors->excludes(touches);
+  command
+      .add_option("--estimator", arguments.estimator,
+                  "bayes-pose: priors by order, shared noise of Ball1, random pose rotations;\n"
+                  "ols: least squares; ridge: one prior for all")
+      ->check(CLI::IsMember({"bayes-pose", "ols", "ridge"}))
+      ->capture_default_str();
+  command.add_option("--order", arguments.order, "of the polynomials")
+      ->check(CLI::Range(evemu::kLeastOrder, evemu::kMostOrder))
+      ->capture_default_str();
+  command.add_option("--positions", arguments.positions, "positions of the artefact that must be there")
+      ->check(CLI::Range(2, 1000))
+      ->capture_default_str();
+  command
+      .add_flag("--rotation-known", arguments.rotation_known,
+                "the errors' directions do not come from the artefact's blocks")
+      ->needs(errors);
+  command.add_option("--rotation-reference", arguments.reference,
+                     "errors.csv of points where V is known independently: turns the model onto them");
+  command
+      .add_option("--u-reference-um", arguments.u_reference_um, "standard uncertainty of the reference's V")
+      ->check(CLI::PositiveNumber)
+      ->capture_default_str();
+  command.add_flag("--accept-shape-only", arguments.accept_shape_only,
+                   "judge the model although its rotation about Ball1 is unknown");
+  command.add_flag("--json", arguments.json, "the summary as one JSON object");
+  command.add_option("-o,--out", arguments.out, "folder for the results; created if needed")->required();
+}
+
+}  // namespace
+
+void add_identify_evemu(CLI::App& parent, int& exit) {
+  auto arguments = std::make_shared<Arguments>();
+  auto* command = parent.add_subcommand(
+      "evemu",
+      "From a ball array touched at several positions.\n"
+      "Writes model.json and coefficients.csv to OUT and says how well the model predicts positions it was "
+      "not fitted to.");
+  add_options(*command, *arguments);
+  command->callback([arguments, &exit] {
+    exit = arguments->touches.empty() && arguments->errors.empty()
+               ? report({ErrorCode::Usage, "identify evemu: give --touches and --calibrator, or --errors"})
+               : run(*arguments);
+  });
+}
+
+}  // namespace abbe::daemon

@@ -1,0 +1,158 @@
+#include "abbe/daemon/evemu_files.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "abbe/daemon/otf_inputs.hpp"
+#include "abbe/daemon/sha256.hpp"
+#include "config/section.hpp"
+#include "files/text_file.hpp"
+#include "input/number_table.hpp"
+
+namespace abbe::daemon {
+
+namespace {
+
+constexpr double kMmPerM = 1e3;
+constexpr double kUmPerM = 1e6;
+constexpr int kMostNumber = 1000;  // of positions and features: far above any procedure, far below overflow
+
+/// A whole number from 1; a fault otherwise.
+int number_at(const NumberTable& table, std::size_t row, std::size_t column, std::string_view name,
+              Faults& faults) {
+  const double value = table.at(row, column);
+  const bool fine = value >= 1.0 && value <= kMostNumber && value == std::floor(value);
+  if (!fine && table.sound(row))
+    faults.add(table.line(row), 1, name, fmt::format("{}: must be a whole number from 1", value));
+  return fine ? static_cast<int>(value) : 1;
+}
+
+calib::Vector3 vector_at(const NumberTable& table, std::size_t row, std::size_t first, double per_m) {
+  return {table.at(row, first) / per_m, table.at(row, first + 1) / per_m, table.at(row, first + 2) / per_m};
+}
+
+struct Parsed {
+  InputFile source;
+  NumberTable table;
+  Faults faults;
+};
+
+Result<Parsed> parse(const std::filesystem::path& file, const TableForm& form) {
+  const auto text = read_text(file);
+  if (!text) return tl::make_unexpected(text.error());
+  Faults faults(file.string());
+  auto table = parse_numbers(*text, {form}, faults);
+  if (table && table->rows() == 0) faults.add(1, 1, "", "has no rows");
+  if (!table) return tl::make_unexpected(faults.to_error());
+  return Parsed{{file.filename().string(), sha256_hex(*text)}, std::move(*table), std::move(faults)};
+}
+
+void read_balls(Section& root, calib::evemu::Calibrator& out) {
+  for (Section& ball : root.children("ball")) {
+    calib::evemu::Calibrator::Ball b;
+    ball.get_integer("number", b.number, 1, kMostNumber, Need::Required);
+    ball.get("x_mm", b.centre_m.x(), kMilli, kAny, Need::Required);
+    ball.get("y_mm", b.centre_m.y(), kMilli, kAny, Need::Required);
+    ball.get("z_mm", b.centre_m.z(), kMilli, kAny, Need::Required);
+    ball.get("radius_mm", b.radius_m, kMilli, kPositive, Need::Required);
+    ball.get("u_um", b.u_m, kMicro, kNotNegative);
+    ball.close();
+    out.balls.push_back(b);
+  }
+  std::sort(out.balls.begin(), out.balls.end(),
+            [](const auto& a, const auto& b) { return a.number < b.number; });
+}
+
+void read_blocks(Section& root, calib::evemu::Calibrator& out) {
+  for (Section& block : root.children("block")) {
+    calib::evemu::Calibrator::Block b;
+    std::vector<double> normal;
+    block.get_integer("number", b.number, 1, 2, Need::Required);
+    if (block.get("normal", normal, kPlain, Need::Required)) {
+      if (normal.size() == 3)
+        b.normal = {normal[0], normal[1], normal[2]};
+      else
+        block.fault("normal", "must be three numbers, x, y, z");
+    }
+    block.get("u_urad", b.u_rad, kMicro, kNotNegative);
+    block.close();
+    out.blocks.push_back(b);
+  }
+  std::sort(out.blocks.begin(), out.blocks.end(),
+            [](const auto& a, const auto& b) { return a.number < b.number; });
+}
+
+calib::evemu::Calibrator read_calibrator(Section& root) {
+  calib::evemu::Calibrator out;
+  Section head = root.child("calibrator", Need::Required);
+  head.get("name", out.name, Need::Required);
+  head.get("tip_radius_mm", out.tip_radius_m, kMilli, kNotNegative, Need::Required);
+  head.close();
+  read_balls(root, out);
+  read_blocks(root, out);
+  root.close();
+  return out;
+}
+
+}  // namespace
+
+Result<TouchesFile> read_touches_csv(const std::filesystem::path& file) {
+  auto parsed =
+      parse(file, {{"position"}, {"kind", true, {"ball", "block"}}, {"index"}, {"x_mm"}, {"y_mm"}, {"z_mm"}});
+  if (!parsed) return tl::make_unexpected(parsed.error());
+  auto& [source, table, faults] = *parsed;
+  TouchesFile out{source, {}};
+  for (std::size_t row = 0; row < table.rows(); ++row)
+    out.touches.push_back(
+        {.position = number_at(table, row, 0, "position", faults),
+         .feature = table.at(row, 1) < 0.5 ? calib::evemu::Feature::Ball : calib::evemu::Feature::Block,
+         .number = number_at(table, row, 2, "index", faults),
+         .p_m = vector_at(table, row, 3, kMmPerM)});
+  if (faults.any()) return tl::make_unexpected(faults.to_error());
+  return out;
+}
+
+Result<BallErrorsFile> read_errors_csv(const std::filesystem::path& file) {
+  auto parsed =
+      parse(file, {{"position"}, {"ball"}, {"x_mm"}, {"y_mm"}, {"z_mm"}, {"ex_um"}, {"ey_um"}, {"ez_um"}});
+  if (!parsed) return tl::make_unexpected(parsed.error());
+  auto& [source, table, faults] = *parsed;
+  BallErrorsFile out{source, {}};
+  for (std::size_t row = 0; row < table.rows(); ++row)
+    out.errors.push_back({.position = number_at(table, row, 0, "position", faults),
+                          .ball = number_at(table, row, 1, "ball", faults),
+                          .reading_m = vector_at(table, row, 2, kMmPerM),
+                          .V_m = vector_at(table, row, 5, kUmPerM)});
+  if (faults.any()) return tl::make_unexpected(faults.to_error());
+  return out;
+}
+
+Result<CalibratorFile> read_calibrator_toml(const std::filesystem::path& file) {
+  const auto text = read_text(file);
+  if (!text) return tl::make_unexpected(text.error());
+  Faults faults(file.string());
+  toml::table table;
+  try {
+    table = toml::parse(*text, file.string());
+  } catch (const toml::parse_error& error) {
+    faults.add(error.source().begin.line, error.source().begin.column, "", error.description());
+    return tl::make_unexpected(faults.to_error());
+  }
+  Section root(&table, "", {1, 1}, faults);
+  auto calibrator = read_calibrator(root);
+  if (faults.any()) return tl::make_unexpected(faults.to_error());
+  if (const auto sound = calib::evemu::check(calibrator); !sound)
+    return fail(ErrorCode::BadInput, fmt::format("{}: {}", file.string(), sound.error().text));
+  return CalibratorFile{{file.filename().string(), sha256_hex(*text)}, std::move(calibrator)};
+}
+
+Result<calib::evemu::Machine> evemu_machine(const MachineConfig& machine) {
+  const auto chain = calib::KinematicChain::parse(machine.chain);
+  if (!chain) return tl::make_unexpected(error_of(chain.error()));
+  const auto& t = machine.target_offset_m;
+  return calib::evemu::Machine{*chain, {t[0], t[1], t[2]}};
+}
+
+}  // namespace abbe::daemon

@@ -1,0 +1,193 @@
+/// `abbe identify evemu` and `abbe model eval` on its model: the built program, its files and exit codes.
+
+#include <fmt/format.h>
+#include <gmock/gmock.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <nlohmann/json.hpp>
+#include <sstream>
+
+#include "abbe/daemon/evemu_files.hpp"
+#include "abbe/daemon/model_document.hpp"
+#include "evemu_run.hpp"
+
+namespace abbe::daemon {
+namespace {
+
+namespace fs = std::filesystem;
+using ::testing::AllOf;
+using ::testing::HasSubstr;
+using ::testing::StartsWith;
+
+constexpr std::string_view kMachine = R"([machine]
+name = "weak portal"
+chain = "[w b Z X Y t]"
+[axes.X]
+min_mm = -100
+max_mm = 650
+[axes.Y]
+min_mm = -100
+max_mm = 400
+[axes.Z]
+min_mm = 0
+max_mm = 100
+)";
+
+std::string text_of(const fs::path& file) {
+  std::ostringstream text;
+  text << std::ifstream(file, std::ios::binary).rdbuf();
+  return text.str();
+}
+
+std::string calibrator_toml() {
+  const auto c = tests::evemu::reference_calibrator();
+  std::string text = "[calibrator]\nname = \"L array\"\ntip_radius_mm = 0\n";
+  for (const auto& b : c.balls)
+    text +=
+        fmt::format("[[ball]]\nnumber = {}\nx_mm = {}\ny_mm = {}\nz_mm = {}\nradius_mm = 12.7\nu_um = 0.5\n",
+                    b.number, 1e3 * b.centre_m.x(), 1e3 * b.centre_m.y(), 1e3 * b.centre_m.z());
+  for (const auto& b : c.blocks)
+    text += fmt::format("[[block]]\nnumber = {}\nnormal = [{}, {}, {}]\nu_urad = 5\n", b.number, b.normal.x(),
+                        b.normal.y(), b.normal.z());
+  return text;
+}
+
+std::string touches_csv() {
+  std::string text = "position,kind,index,x_mm,y_mm,z_mm\n";
+  for (const auto& row : tests::evemu::reference_cells("touched_sig3um.csv"))
+    text += fmt::format("{},{},{},{},{},{}\n", row[0], row[1], row[2], row[3], row[4], row[5]);
+  return text;
+}
+
+std::string errors_csv() {
+  std::string text = "position,ball,x_mm,y_mm,z_mm,ex_um,ey_um,ez_um\n";
+  for (const auto& e : tests::evemu::reference_errors())
+    text += fmt::format("{},{},{:.17g},{:.17g},{:.17g},{:.17g},{:.17g},{:.17g}\n", e.position, e.ball,
+                        1e3 * e.reading_m.x(), 1e3 * e.reading_m.y(), 1e3 * e.reading_m.z(), 1e6 * e.V_m.x(),
+                        1e6 * e.V_m.y(), 1e6 * e.V_m.z());
+  return text;
+}
+
+struct Ran {
+  int exit = -1;
+  std::string out, err;
+};
+
+class EvemuCli : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    fs::create_directories(folder_);
+    write("machine.toml", std::string{kMachine});
+    write("calibrator.toml", calibrator_toml());
+    write("touches.csv", touches_csv());
+    write("errors.csv", errors_csv());
+  }
+  void TearDown() override { fs::remove_all(folder_); }
+
+  fs::path write(const std::string& name, const std::string& text) const {
+    std::ofstream(folder_ / name, std::ios::binary) << text;
+    return folder_ / name;
+  }
+  Ran abbe(const std::string& arguments) const {
+    const auto out = folder_ / "stdout", err = folder_ / "stderr";
+    const auto command = fmt::format("cd '{}' && '{}' {} >'{}' 2>'{}'", folder_.string(), ABBE_PROGRAM,
+                                     arguments, out.string(), err.string());
+    const int status = std::system(command.c_str());
+    return {WIFEXITED(status) ? WEXITSTATUS(status) : -1, text_of(out), text_of(err)};
+  }
+
+  fs::path folder_ = fs::path(::testing::TempDir()) / fmt::format("evemu_cli_{}", ::getpid());
+};
+
+TEST_F(EvemuCli, IdentifiesFromTouchesAndCallsItAShape) {
+  const auto ran = abbe(
+      "identify evemu --machine machine.toml --touches touches.csv --calibrator calibrator.toml --json -o "
+      "out");
+  ASSERT_EQ(ran.exit, 0) << ran.err;
+  const auto summary = nlohmann::json::parse(ran.out);
+  EXPECT_EQ(summary["balls"], 72);
+  EXPECT_EQ(summary["shape_only"], true);
+  EXPECT_EQ(summary["gate"]["accepted"], false);
+  EXPECT_LT(summary["held_out_rms_after_um"].get<double>(),
+            0.1 * summary["held_out_rms_before_um"].get<double>());
+  EXPECT_THAT(
+      text_of(folder_ / "out/coefficients.csv"),
+      AllOf(StartsWith("name,value,u,unit\nk_dxx1,"), HasSubstr("\nk_ezz3,"), HasSubstr(",rad/mm^3\n")));
+}
+
+TEST_F(EvemuCli, EvaluatesWhatItIdentified) {
+  const auto identified =
+      abbe("identify evemu --machine machine.toml --errors errors.csv --rotation-known -o out");
+  ASSERT_EQ(identified.exit, 0) << identified.err;
+  EXPECT_THAT(identified.out, HasSubstr("referenced"));
+  write("points.csv", "x_mm,y_mm,z_mm\n500,200,50\n500,200,500\n");
+  const auto ran = abbe("model eval out/model.json --points points.csv");
+  ASSERT_EQ(ran.exit, 0) << ran.err;
+  const auto document = read_model(folder_ / "out/model.json");
+  ASSERT_TRUE(document);
+  EXPECT_EQ(document->method, "evemu");
+  const auto e = document->model.error_at({0.5, 0.2, 0.05}, calib::Vector3::Zero());
+  std::istringstream lines(ran.out);
+  std::string line;
+  std::getline(lines, line);
+  std::getline(lines, line);
+  std::getline(lines, line);
+  EXPECT_EQ(line, fmt::format("500,200,50,{:.17g},{:.17g},{:.17g},{:.17g},{:.17g},{:.17g},1", 1e6 * e.V_m.x(),
+                              1e6 * e.V_m.y(), 1e6 * e.V_m.z(), 1e6 * std::sqrt(e.cov_V_m2(0, 0)),
+                              1e6 * std::sqrt(e.cov_V_m2(1, 1)), 1e6 * std::sqrt(e.cov_V_m2(2, 2))));
+  std::getline(lines, line);
+  EXPECT_THAT(line, ::testing::EndsWith(",0"));
+}
+
+TEST_F(EvemuCli, WritesModelsThatReadBackToTheSameBits) {
+  ASSERT_EQ(abbe("identify evemu --machine machine.toml --errors errors.csv -o out").exit, 0);
+  const auto text = text_of(folder_ / "out/model.json");
+  const auto document = parse_model(text, "model.json");
+  ASSERT_TRUE(document) << document.error().details.front();
+  EXPECT_EQ(to_json(*document), text);
+}
+
+TEST_F(EvemuCli, NamesWhatIsWrongWithTouches) {
+  auto touches = touches_csv();
+  write("touches.csv", touches.replace(touches.find("1,ball"), 6, "1,bell"));
+  const auto ran =
+      abbe("identify evemu --machine machine.toml --touches touches.csv --calibrator calibrator.toml -o out");
+  EXPECT_EQ(ran.exit, 3);
+  EXPECT_THAT(ran.err, HasSubstr("touches.csv:2:3: kind: \"bell\": must be ball or block"));
+  EXPECT_FALSE(fs::exists(folder_ / "out/model.json"));
+}
+
+TEST_F(EvemuCli, NamesAPositionThatIsMissing) {
+  std::string text = "position,ball,x_mm,y_mm,z_mm,ex_um,ey_um,ez_um\n";
+  std::istringstream lines(errors_csv());
+  std::string line;
+  std::getline(lines, line);
+  while (std::getline(lines, line))
+    if (!line.starts_with("4,")) text += line + "\n";
+  write("errors.csv", text);
+  const auto ran = abbe("identify evemu --machine machine.toml --errors errors.csv -o out");
+  EXPECT_EQ(ran.exit, 1);
+  EXPECT_THAT(ran.err, HasSubstr("position 4: left out"));
+}
+
+TEST_F(EvemuCli, NeedsTouchesOrErrors) {
+  EXPECT_EQ(abbe("identify evemu --machine machine.toml -o out").exit, 2);
+  EXPECT_EQ(abbe("identify evemu --machine machine.toml --touches touches.csv -o out").exit, 2);
+}
+
+TEST_F(EvemuCli, RefusesACalibratorWithEveryFaultNamed) {
+  write("calibrator.toml",
+        "[calibrator]\nname = \"x\"\n[[ball]]\nnumber = 1\nx_mm = 0\ny_mm = 0\nz_mm = 0\nr = 3\n");
+  const auto calibrator = read_calibrator_toml(folder_ / "calibrator.toml");
+  ASSERT_FALSE(calibrator);
+  std::string all;
+  for (const auto& fault : calibrator.error().details) all += fault + "\n";
+  EXPECT_THAT(all, AllOf(HasSubstr("tip_radius_mm"), HasSubstr("radius_mm"), HasSubstr(": ball[0].r")));
+}
+
+}  // namespace
+}  // namespace abbe::daemon

@@ -44,8 +44,8 @@ TEST_F(Systemd, TheInstallationHoldsAllOfIt) {
   const auto installed =
       run({ABBE_CMAKE, "-DCMAKE_INSTALL_PREFIX=" + file("usr"), "-P", ABBE_SYSTEMD_INSTALL});
   ASSERT_EQ(installed.code, 0) << installed.err;
-  for (const char* name :
-       {"lib/systemd/system/abbed.service", "lib/sysusers.d/abbe.conf", "lib/tmpfiles.d/abbe.conf"})
+  for (const char* name : {"lib/systemd/system/abbed.service", "lib/sysusers.d/abbe.conf",
+                           "lib/tmpfiles.d/abbe.conf", "lib/udev/rules.d/60-abbe.rules"})
     EXPECT_FALSE(text_of(file("usr") + "/" + name).empty()) << name;
   const auto unit = text_of(file("usr/lib/systemd/system/abbed.service"));
   EXPECT_THAT(unit, testing::HasSubstr("ExecStart=" ABBE_INSTALLED_BIN "/abbed --config"));

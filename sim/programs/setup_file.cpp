@@ -109,9 +109,8 @@ CardAxis read_card_axis(TomlSection& section) {
   return axis;
 }
 
-/// The daemon's [counter_card]: its wiring is the card's.
-void read_counter_card(TomlSection section, SimulationSetup& simulation) {
-  if (!section.present()) return;
+/// What hangs on any card: its address and its clock.
+CounterCardSetup read_card(TomlSection& section) {
   CounterCardSetup card;
   read_port(section, "port", card.port);
   section.text("serial_number", card.serial);
@@ -122,7 +121,48 @@ void read_counter_card(TomlSection section, SimulationSetup& simulation) {
   card.clock_channel = read_channel(section, "clock_channel").value_or(card.clock_channel);
   card.latch_channel = read_channel(section, "latch_channel");
   card.edge_channel = read_channel(section, "edge_channel");
+  return card;
+}
+
+/// The daemon's [counter_card]: its wiring is the card's.
+void read_counter_card(TomlSection section, SimulationSetup& simulation) {
+  if (!section.present()) return;
+  CounterCardSetup card = read_card(section);
   for (TomlSection& axis : section.children("axes")) card.axes.push_back(read_card_axis(axis));
+  simulation.counter_cards.push_back(card);
+}
+
+/// A scale of [counter_card] once more, with its marks.
+CardAxis read_marked_axis(TomlSection& section, const CounterCardSetup& live) {
+  CardAxis axis;
+  std::string name;
+  section.text("axis", name);
+  const auto counted = std::ranges::find(live.axes, name, &CardAxis::name);
+  if (counted == live.axes.end()) {
+    section.fault("axis", "is not counted by [counter_card]");
+    return axis;
+  }
+  axis = *counted;
+  axis.channel = read_channel(section, "channel").value_or(0);
+  std::int64_t increment = axis.nominal_increment;
+  double length = 0.0;
+  section.number("signal_period_um", axis.signal_period, kMicro, kPositiveNumber);
+  section.number("length_mm", length, kMilli, kPositiveNumber);
+  section.number("zero_mark_mm", axis.marks_zero, kMilli);
+  section.integer("increment", increment, 2, 1'000'000);
+  axis.nominal_increment = static_cast<int>(increment);
+  if (axis.signal_period > 0.0)
+    axis.mark_pairs = static_cast<int>(length / (axis.signal_period * static_cast<double>(increment)));
+  return axis;
+}
+
+/// The daemon's [reference]: a second card on the same scales, with their marks.
+void read_reference(TomlSection section, SimulationSetup& simulation) {
+  if (!section.present()) return;
+  if (simulation.counter_cards.empty()) return section.fault("", "there is no [counter_card]");
+  CounterCardSetup card = read_card(section);
+  const CounterCardSetup& live = simulation.counter_cards.front();
+  for (TomlSection& axis : section.children("axes")) card.axes.push_back(read_marked_axis(axis, live));
   simulation.counter_cards.push_back(card);
 }
 
@@ -142,6 +182,21 @@ void read_sim_counter_card(TomlSection section, SimulationSetup& simulation) {
   card.fifo_bytes = static_cast<std::size_t>(fifo_bytes);
   for (CardAxis& axis : card.axes) axis.noise = noise_m;
   section.refuse_unknown_keys();
+}
+
+void read_probe(TomlSection section, SimulationSetup& simulation) {
+  if (!section.present()) return;
+  TouchedSurface surface;
+  std::string axis = "Z";
+  section.text("axis", axis);
+  const auto place = axis.size() == 1 ? kAxisLetters.find(axis[0]) : std::string_view::npos;
+  if (place == std::string_view::npos) section.fault("axis", "must be X, Y or Z");
+  surface.axis = static_cast<int>(place == std::string_view::npos ? 2 : place);
+  if (!section.number("surface_mm", surface.surface_m, kMilli)) section.fault("surface_mm", "missing");
+  section.number("delay_us", surface.delay_s, kMicro, kNotNegativeNumber);
+  section.number("jitter_us", surface.jitter_s, kMicro, kNotNegativeNumber);
+  section.refuse_unknown_keys();
+  simulation.surface = surface;
 }
 
 /// The tables the daemon reads too. Keys that only it knows are none of ours.
@@ -167,6 +222,7 @@ void read_machine_tables(TomlSection root, Draft& draft) {
   encoder.text("interface", simulation.bus->interface);
   read_encoder_nodes(encoder, simulation.nodes);
   read_counter_card(root.child("counter_card"), simulation);
+  read_reference(root.child("reference"), simulation);
   root.child("daemon").number("speed", draft.setup.speed, 1.0, {1e-3, 1e4});
 }
 
@@ -274,6 +330,7 @@ void read_sim(TomlSection sim, const std::string& file, Draft& draft) {
   encoder.refuse_unknown_keys();
   read_environment(sim, simulation.environment);
   read_sim_counter_card(sim.child("counter_card"), simulation);
+  read_probe(sim.child("probe"), simulation);
   read_faults(sim, simulation.faults);
   sim.refuse_unknown_keys();
 }
@@ -374,6 +431,7 @@ void share_seed_and_speed(Draft& draft) {
     node.seed = static_cast<std::uint64_t>(draft.seed);
     node.noise_m = draft.encoder_noise_m;
   }
+  if (simulation.surface) simulation.surface->seed = static_cast<std::uint64_t>(draft.seed);
   for (CounterCardSetup& card : simulation.counter_cards) card.seed = static_cast<std::uint64_t>(draft.seed);
 }
 

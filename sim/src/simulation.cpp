@@ -39,6 +39,10 @@ Result<std::unique_ptr<Simulation>> Simulation::open(const SimulationSetup& setu
     if (!server) return tl::unexpected(server.error());
     simulation->counter_cards_.push_back(std::move(*server));
   }
+  if (setup.surface) {
+    const auto edges = edge_times_s(*setup.surface, simulation->machine_.path());
+    simulation->edges_s_.assign(edges.begin(), edges.end());
+  }
   if (!setup.start_when_streaming) simulation->machine_.start(now + setup.standstill);
   return simulation;
 }
@@ -46,6 +50,7 @@ Result<std::unique_ptr<Simulation>> Simulation::open(const SimulationSetup& setu
 void Simulation::poll(HostTime now) {
   if (tracker_) tracker_->poll(now);
   start_machine();
+  touch(now);
   inject_faults(now);
   if (bus_) bus_->poll(now);
   for (ModbusServer& server : environment_) server.poll(now);
@@ -55,6 +60,17 @@ void Simulation::poll(HostTime now) {
 void Simulation::start_machine() {
   if (machine_.started() || !start_when_streaming_ || !tracker_) return;
   if (const auto streaming = tracker_->device().first_stream()) machine_.start(*streaming + standstill_);
+}
+
+/// The card must know of an edge before it makes the scan that shows it.
+void Simulation::touch(HostTime now) {
+  constexpr auto kAhead = std::chrono::seconds{1};
+  if (!machine_.started() || counter_cards_.empty()) return;
+  for (; !edges_s_.empty(); edges_s_.pop_front()) {
+    const HostTime at = *machine_.started() + seconds_to_ns(edges_s_.front());
+    if (at > now + kAhead) return;
+    counter_cards_.front().card().add_probe_edge(at);
+  }
 }
 
 void Simulation::inject_faults(HostTime now) {

@@ -17,6 +17,7 @@ enum class NoiseStream : std::uint64_t {
   Truth,
   Squareness,
   Backlash,
+  Probe,
   Encoder = 1000,
   CounterCard = 2000,
 };

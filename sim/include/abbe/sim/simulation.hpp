@@ -13,6 +13,7 @@
 #include "abbe/sim/counter_card_setup.hpp"
 #include "abbe/sim/encoder_bus.hpp"
 #include "abbe/sim/modbus_server.hpp"
+#include "abbe/sim/touched_surface.hpp"
 #include "abbe/sim/tracker_server.hpp"
 #include "abbe/sim/usbip_server.hpp"
 
@@ -30,6 +31,7 @@ struct SimulationSetup {
   std::vector<EncoderNodeOptions> nodes;
   std::vector<ModbusServerOptions> environment;
   std::vector<CounterCardSetup> counter_cards;
+  std::optional<TouchedSurface> surface;  ///< touched by the probe on the first card
   std::vector<ScheduledFault> faults;
 };
 
@@ -53,6 +55,7 @@ class Simulation {
  private:
   Simulation(TruthMachine truth, PathMotion path, const SimulationSetup& setup);
   void start_machine();
+  void touch(HostTime now);
   void inject_faults(HostTime now);
   void inject_environment(const Fault& fault, HostTime now);
   void inject(const ScheduledFault& next, HostTime now);
@@ -64,6 +67,7 @@ class Simulation {
   std::optional<EncoderBus> bus_;
   std::vector<ModbusServer> environment_;
   std::deque<UsbipServer> counter_cards_;
+  std::deque<double> edges_s_;          ///< that the probe's card does not know of yet
   std::vector<ScheduledFault> faults_;  ///< by time
   std::size_t next_fault_ = 0;
 };

@@ -1,0 +1,25 @@
+#pragma once
+/// A surface in the machine's way, touched whenever one axis falls through it, and the probe that says so
+/// some time later. The machine drives on: pre-travel and bending are not simulated. Pure; made from the path
+/// alone.
+
+#include <cstdint>
+#include <vector>
+
+#include "abbe/sim/path_motion.hpp"
+#include "abbe/sim/sim_clock.hpp"
+
+namespace abbe::sim {
+
+struct TouchedSurface {
+  int axis = 2;            ///< 0 to 2: X, Y, Z
+  double surface_m = 0.0;  ///< scale reading at contact
+  double delay_s = 5e-6;   ///< from contact to the edge
+  double jitter_s = 1e-6;  ///< its standard deviation from touch to touch
+  std::uint64_t seed = 1;
+};
+
+/// When the probe's edges come, s from the start of the motion, ascending.
+[[nodiscard]] std::vector<double> edge_times_s(const TouchedSurface& surface, const PathMotion& path);
+
+}  // namespace abbe::sim

@@ -78,6 +78,15 @@ TEST_F(CliCalibrateProbe, SaysWhatIsMissing) {
   EXPECT_THAT(out, HasSubstr("2 feeds, at least 3 are needed"));
 }
 
+TEST_F(CliCalibrateProbe, RefusesPlacesThatLieOnNoLine) {
+  auto touches = touches_at({1e-3, 4e-3, 8e-3});
+  for (std::size_t i = 0; i < 4; ++i) touches[i].position[2] += 20e-6;  // the part was moved
+  record(touches);
+  const auto [exit, out] = calibrate("");
+  EXPECT_EQ(exit, 1);
+  EXPECT_THAT(out, HasSubstr("do not lie on a line"));
+}
+
 TEST_F(CliCalibrateProbe, LooksAtOneProbeIfAsked) {
   record(touches_at({1e-3, 4e-3, 8e-3}));  // of probe 7
   EXPECT_EQ(calibrate("--probe 7").first, 0);

@@ -11,6 +11,7 @@
 #include <cmath>
 #include <memory>
 #include <nlohmann/json.hpp>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -40,7 +41,8 @@ struct Arguments {
 bool usable(const ProbeTrigger& touch) {
   constexpr protocol::TouchFlags kNotUsable =
       TouchFlag::SpeedUnsteady | TouchFlag::NoPosition | TouchFlag::Refused;
-  return (touch.touch_flags & kNotUsable) == 0 && touch.axis_count >= kLinearAxes;
+  const bool known = (touch.missing_mask & ((1u << kLinearAxes) - 1)) == 0;
+  return (touch.touch_flags & kNotUsable) == 0 && touch.axis_count >= kLinearAxes && known;
 }
 
 Result<std::vector<calib::probe::RecordedTouch>> touches_of(const Arguments& arguments) {
@@ -55,6 +57,21 @@ Result<std::vector<calib::probe::RecordedTouch>> touches_of(const Arguments& arg
   };
   (void)recording->read(sink);
   return touches;
+}
+
+/// Chance alone exceeds this misfit once in a thousand times with three feeds; residuals smaller than any
+/// probe repeats are no reason to refuse.
+std::optional<Error> not_on_a_line(const calib::probe::ProbeDelayFit& fit) {
+  constexpr double kMostMisfit = 10.8;
+  constexpr double kRepeats_m = 0.1e-6;
+  if (fit.misfit <= kMostMisfit || fit.residual_rms_m <= kRepeats_m) return std::nullopt;
+  return Error{
+      ErrorCode::DataInsufficient,
+      fmt::format(
+          "probe delay: the places do not lie on a line over the feed (misfit {:.1f}, residuals "
+          "{:.3f} um): more than one place, something moved, or a latch not yet in step with its clock",
+          fit.misfit, 1e6 * fit.residual_rms_m),
+      {}};
 }
 
 Error error_of(const calib::Error& error) {
@@ -112,7 +129,9 @@ int calibrate(const Arguments& arguments) {
     return q ? print_qualification(*q, arguments.json) : report(error_of(q.error()));
   }
   const auto fit = calib::probe::fit_delay(calib::probe::same_place(*touches));
-  return fit ? print_delay(*fit, arguments.json) : report(error_of(fit.error()));
+  if (!fit) return report(error_of(fit.error()));
+  if (const auto refused = not_on_a_line(*fit)) return report(*refused);
+  return print_delay(*fit, arguments.json);
 }
 
 }  // namespace

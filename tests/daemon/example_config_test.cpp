@@ -56,7 +56,7 @@ std::string with_counter_card_and_probe() {
   const std::string text = example();
   const auto encoder = text.find("\n[encoder]");
   return with_tables(text.substr(0, encoder) + text.substr(text.find("\n\n", encoder)),
-                     {"[counter_card]", "[probe]"});
+                     {"[counter_card]", "[reference]", "[probe]"});
 }
 
 TEST(ExampleConfig, IsGood) {
@@ -80,7 +80,10 @@ TEST(ExampleConfig, ItsExampleTablesAreGoodToo) {
 TEST(ExampleConfig, ItsCounterCardShowsTheDefaults) {
   ASSERT_EQ(faults(with_counter_card_and_probe()), "");
   const auto config = parse_config(with_counter_card_and_probe(), "/etc/abbe/abbed.toml").value();
-  ASSERT_TRUE(config.counter_card && config.probe);
+  ASSERT_TRUE(config.counter_card && config.probe && config.reference);
+  EXPECT_EQ(config.reference->axes.size(), 3u);
+  EXPECT_EQ(config.reference->u_alignment, ReferenceConfig{}.u_alignment);
+  EXPECT_EQ(config.reference->tolerance_m, ReferenceConfig{}.tolerance_m);
   const CounterCardConfig plain;
   const auto& card = *config.counter_card;
   EXPECT_EQ(card.name, plain.name);

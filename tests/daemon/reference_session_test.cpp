@@ -62,7 +62,7 @@ ReferenceOptions options() {
   ReferenceOptions o;
   o.axes = {
       {.name = "X", .marks = {.code = kCode, .counts_per_period = kCountsPerPeriod}, .period = kPeriod_m}};
-  o.max_half_width_counts = 10.0;  // 2.5 um
+  o.axes[0].max_half_width_counts = 10.0;  // 2.5 um
   return o;
 }
 
@@ -80,7 +80,7 @@ TEST(ReferenceSession, FindsWhereTheLiveCounterBegan) {
 
 TEST(ReferenceSession, DrivenSlowlyAlignsTheCardsToACount) {
   ReferenceOptions o = options();
-  o.max_half_width_counts = 0.75;
+  o.axes[0].max_half_width_counts = 0.75;
   o.u_alignment = 400us;
   ReferenceSession session{o};
   TwoCards cards;
@@ -93,7 +93,7 @@ TEST(ReferenceSession, DrivenSlowlyAlignsTheCardsToACount) {
 
 TEST(ReferenceSession, SaysThatTheCardsMustBeAlignedBetter) {
   ReferenceOptions o = options();
-  o.max_half_width_counts = 0.1;
+  o.axes[0].max_half_width_counts = 0.1;
   ReferenceSession session{o};
   TwoCards cards;
   cards.drive(

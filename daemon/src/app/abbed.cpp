@@ -107,6 +107,7 @@ struct Abbed::State {
   std::unique_ptr<RecorderThread> recorder;
   std::optional<ModelAuthority> authority;
   std::optional<CalibrationService> calibration;
+  std::optional<ReferenceService> reference;
   std::optional<Publisher> publisher;
   std::optional<DdsSupervisor> supervisor;
   std::optional<DeviceSet> devices;
@@ -149,6 +150,7 @@ struct Abbed::State {
     if (!opened) return tl::unexpected(opened.error());
     authority.emplace(std::move(*opened));
     calibration.emplace(config, *authority, recorder.get(), utc);
+    reference.emplace(config, recorder.get());
     return {};
   }
 
@@ -187,7 +189,8 @@ struct Abbed::State {
                          .authority = *authority,
                          .calibration = *calibration,
                          .publisher = publisher ? &*publisher : nullptr,
-                         .recorder = recorder.get()});
+                         .recorder = recorder.get(),
+                         .reference = &*reference});
     hub_thread = std::thread([this] { run_hub(); });
     if (auto set = set_priority(hub_thread, config.daemon); !set) {
       if (config.daemon.realtime == RealTimeMode::Enforce) return set;

@@ -59,6 +59,7 @@ void add_commands(CLI::App& app, int& exit) {
   calibrate->require_subcommand(1);
   add_calibrate_otf(*calibrate, exit);
   add_calibrate_probe(*calibrate, exit);
+  add_reference(app, exit);
   add_replay(app, exit);
   auto* identify =
       app.add_subcommand("identify", "Identify a machine's geometric errors from recorded files");

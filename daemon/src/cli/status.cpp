@@ -55,6 +55,13 @@ void print_environment(const json& e) {
     fmt::print("           {} {}\n", name, value_text(value, 2, "C"));
 }
 
+void print_reference(const json& reference) {
+  fmt::print("reference  {}", reference["running"].get<bool>() ? "looking for marks" : "");
+  for (const json& axis : reference["axes"])
+    fmt::print("{} {}", axis["axis"].get<std::string>(), axis["known"].get<bool>() ? "known " : "not known ");
+  fmt::print("\n");
+}
+
 void print_status(const json& status) {
   const json& model = status["model"];
   const std::string state = model["state"];
@@ -65,6 +72,7 @@ void print_status(const json& status) {
   fmt::print("session    {}, {:.0f} %, {} points: {}\n", session["state"].get<std::string>(),
              100.0 * session["progress"].get<double>(), session["points"].get<std::uint64_t>(),
              session["reason"].get<std::string>());
+  if (status.contains("reference")) print_reference(status["reference"]);
   if (status.contains("environment")) print_environment(status["environment"]);
   if (status.contains("recording")) fmt::print("recording  {}\n", status["recording"].get<std::string>());
   if (status.contains("dds")) {

@@ -20,6 +20,7 @@ Config read_all(Section& root, const std::filesystem::path& base) {
   read_tracker(root, config);
   read_encoder(root, config);
   read_counter_card(root, config);
+  read_reference(root, config);
   read_probe(root, config);
   read_cmm(root, config);
   read_environment(root, config);  // after the devices whose names must differ
@@ -48,6 +49,14 @@ std::string reading_text(const CounterCardConfig& card) {
   std::string text = card.axes_compensated ? "|compensated" : "|raw";
   for (const auto& axis : card.wiring.axes)
     text += fmt::format("|{} {} {:.17g} {:.17g}", axis.name, axis.channel, axis.scale, axis.offset);
+  return text;
+}
+
+std::string reading_text(const ReferenceConfig& reference) {
+  std::string text;
+  for (const auto& axis : reference.axes)
+    text += fmt::format("|marks {} {:.17g} {:.17g} {} {}", axis.axis, axis.zero_mark, axis.signal_period,
+                        axis.code.increment, axis.reversed ? "reversed" : "along");
   return text;
 }
 
@@ -101,6 +110,7 @@ std::string machine_hash(const Config& config) {
   }
   if (config.encoder) text += reading_text(*config.encoder);
   if (config.counter_card) text += reading_text(*config.counter_card);
+  if (config.reference) text += reading_text(*config.reference);
   if (config.cmm_reads_axes()) text += reading_text(*config.cmm);
   for (const auto& thermal : config.thermal)
     text += fmt::format("|thermal {} {:.17g} {:.17g} {}", thermal.axis, thermal.alpha_per_K, thermal.fixed_m,

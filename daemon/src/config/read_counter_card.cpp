@@ -1,5 +1,8 @@
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <cmath>
+
 #include "config/machine_order.hpp"
 #include "config/message_bounds.hpp"
 #include "config/readers.hpp"
@@ -80,7 +83,94 @@ drivers::CounterAxis read_axis(Section& section, const MachineConfig& machine) {
   return axis;
 }
 
+drivers::CounterAxis read_latched_axis(Section& section, const CounterCardConfig& live,
+                                       ReferenceAxisConfig& marks) {
+  drivers::CounterAxis axis{.latch_on_index = true};
+  const bool named = section.get("axis", axis.name, Need::Required);
+  const auto counted = std::ranges::find(live.wiring.axes, axis.name, &drivers::CounterAxis::name);
+  if (named && counted == live.wiring.axes.end()) section.fault("axis", "is not counted by [counter_card]");
+  if (counted != live.wiring.axes.end()) {
+    axis.scale = counted->scale;
+    if (counted->offset != 0.0)
+      section.fault("axis", fmt::format("has an offset in [counter_card], which the marks of {} are to give",
+                                        axis.name));
+  }
+  section.get_integer("channel", axis.channel, 0, kLastChannel, Need::Required);
+  read_debounce(section, "debounce_code", axis.debounce);
+  marks.axis = axis.name;
+  return axis;
+}
+
+void read_marks(Section& section, bool linear, double step, ReferenceAxisConfig& out) {
+  double length = 0.0;
+  section.get(linear ? "signal_period_um" : "signal_period_urad", out.signal_period, kMicro, kPositive,
+              Need::Required);
+  section.get(linear ? "length_mm" : "length_rad", length, linear ? kMilli : kPlain, kPositive,
+              Need::Required);
+  section.get_integer("increment", out.code.increment, 2, 1'000'000);
+  section.get(linear ? "zero_mark_mm" : "zero_mark_rad", out.zero_mark, linear ? kMilli : kPlain, kAny);
+  section.get("reversed", out.reversed);
+  out.code.rotary = !linear;
+  out.code.length = std::llround(length / out.signal_period);
+  const double counts = out.signal_period / std::abs(step);
+  if (std::isfinite(counts) && std::abs(counts - std::round(counts)) > 1e-6 * counts)
+    section.fault(
+        "", fmt::format("a signal period holds {:.6g} counts of [counter_card]: it must be a whole number",
+                        counts));
+  if (const auto possible = drivers::check(out.code); !possible) section.fault("", possible.error().text);
+}
+
+void read_latched_axes(Section& section, const Config& config, ReferenceConfig& out) {
+  for (auto& axis : section.children("axes")) {
+    ReferenceAxisConfig marks;
+    out.card.wiring.axes.push_back(read_latched_axis(axis, *config.counter_card, marks));
+    const AxisConfig* known = config.machine.find_axis(marks.axis);
+    const bool linear = known == nullptr || known->kind == AxisKind::Linear;
+    read_marks(axis, linear, out.card.wiring.axes.back().scale, marks);
+    axis.close();
+    out.axes.push_back(std::move(marks));
+  }
+}
+
+/// The same card cannot count live and latch.
+bool same_card(const CounterCardConfig& a, const CounterCardConfig& b) {
+  if (a.transport != b.transport) return false;
+  if (a.transport == CardTransport::Usb) return a.serial_number.empty() || a.serial_number == b.serial_number;
+  return a.host == b.host && a.port == b.port && a.bus_id == b.bus_id;
+}
+
 }  // namespace
+
+void read_reference(Section& root, Config& out) {
+  Section section = root.child("reference");
+  if (!section.present()) return;
+  ReferenceConfig config;
+  CounterCardConfig& card = config.card;
+  card.name = "reference_card";
+  card.wiring.scan_rate_hz = 2000.0;
+  get_bounded(section, "name", card.name, bound_of<v1::AxisSample>("device"));
+  section.get("serial_number", card.serial_number);
+  read_transport(section, card);
+  read_clock(section, card.wiring);
+  section.get("scan_rate_hz", card.wiring.scan_rate_hz, kPlain, kPositive);
+  section.get("max_constant_delay_us", card.max_constant_delay, kMicro, kNotNegative);
+  section.get("latch_verified", card.wiring.latch_verified);
+  section.get("u_alignment_us", config.u_alignment, kMicro, kPositive);
+  section.get("tolerance_um", config.tolerance_m, kMicro, kPositive);
+  if (!out.counter_card) {
+    section.fault("", "needs [counter_card]: the axes must be counted live, too");
+    static_cast<void>(section.has("axes"));
+  } else {
+    if (same_card(*out.counter_card, card))
+      section.fault(
+          "", "is the card of [counter_card]: marks need a second one, told apart by its serial number");
+    read_latched_axes(section, out, config);
+    if (const auto possible = drivers::check(card.wiring); !possible)
+      section.fault("", possible.error().text);
+  }
+  section.close();
+  out.reference = std::move(config);
+}
 
 void read_counter_card(Section& root, Config& out) {
   Section card = root.child("counter_card");

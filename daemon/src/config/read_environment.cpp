@@ -215,6 +215,7 @@ void read_environment(Section& root, Config& out) {
   if (out.tracker) names.insert(out.tracker->name);
   if (out.encoder) names.insert(out.encoder->name);
   if (out.counter_card) names.insert(out.counter_card->name);
+  if (out.reference) names.insert(out.reference->card.name);
   if (out.probe) names.insert(out.probe->name);
   if (out.cmm) names.insert(out.cmm->name);
   protocol::EnvironmentMask seen = 0;

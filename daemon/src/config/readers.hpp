@@ -14,6 +14,7 @@ void read_counter_card(Section& root, Config& out);
 void read_environment(Section& root, Config& out);
 void read_thermal(Section& root, Config& out);
 void read_air(Section& root, Config& out);
+void read_reference(Section& root, Config& out);
 void read_probe(Section& root, Config& out);
 void read_cmm(Section& root, Config& out);
 void read_daemon(Section& root, const std::filesystem::path& base, Config& out);

@@ -96,6 +96,33 @@ json environment_json(const protocol::Snapshot& live, const Config& config) {
   return out;
 }
 
+std::string_view name(AxisReference::State state) {
+  switch (state) {
+    case AxisReference::State::Searching:
+      return "searching";
+    case AxisReference::State::Found:
+      return "found";
+    case AxisReference::State::Failed:
+      return "failed";
+  }
+  return "failed";
+}
+
+json reference_json(const ReferenceService& reference) {
+  json axes = json::array();
+  for (const auto& axis : reference.status()) {
+    json& out = axes.emplace_back(json{{"axis", axis.name},
+                                       {"known", axis.known},
+                                       {"state", name(axis.found.state)},
+                                       {"marks", axis.found.marks},
+                                       {"reason", axis.found.reason}});
+    if (axis.found.state != AxisReference::State::Found) continue;
+    out["reading_at_zero"] = axis.reading_at_zero;
+    out["u"] = axis.found.u_offset;
+  }
+  return {{"running", reference.running()}, {"axes", std::move(axes)}};
+}
+
 json status(const Hub& hub) {
   json devices = json::array();
   for (const auto& h : hub.health()) devices.push_back(device_json(h));
@@ -107,6 +134,8 @@ json status(const Hub& hub) {
   const auto& live = hub.live().view();
   out["position_m"] = std::vector<double>(live.position.begin(), live.position.begin() + live.axis_count);
   if (live.has_environment) out["environment"] = environment_json(live, hub.parts().config);
+  if (const auto* reference = hub.parts().reference; reference != nullptr && reference->configured())
+    out["reference"] = reference_json(*reference);
   if (hub.parts().recorder != nullptr) out["recording"] = hub.parts().recorder->status().file.string();
   if (hub.parts().publisher != nullptr) {
     const auto& link = hub.parts().publisher->link();
@@ -134,6 +163,13 @@ json cancel(const Hub& hub, const json& request) {
   return done ? json{{"ok", true}} : refusal(done.error());
 }
 
+json reference(const Hub& hub, const json& request) {
+  if (hub.parts().reference == nullptr) return refusal({ErrorCode::Refused, "reference: not in this daemon"});
+  ReferenceService& service = *hub.parts().reference;
+  auto done = request.value("cancel", false) ? service.cancel() : service.start();
+  return done ? json{{"ok", true}} : refusal(done.error());
+}
+
 }  // namespace
 
 json answer_request(Hub& hub, const json& request, std::chrono::milliseconds time_out) {
@@ -142,12 +178,14 @@ json answer_request(Hub& hub, const json& request, std::chrono::milliseconds tim
       {"status", [](const Hub& h, const json&) { return status(h); }},
       {"calibrate", calibrate},
       {"cancel", cancel},
+      {"reference", reference},
   };
   const auto what = request.at("do").get<std::string>();
   const auto task = kTasks.find(what);
   if (task == kTasks.end()) {
     return refusal(
-        {ErrorCode::Usage, fmt::format("unknown request \"{}\": known are status, calibrate, cancel", what)});
+        {ErrorCode::Usage,
+         fmt::format("unknown request \"{}\": known are status, calibrate, cancel, reference", what)});
   }
   auto answer = hub.call([&hub, run = task->second, request] { return run(hub, request); }, time_out);
   return answer ? std::move(*answer)

@@ -8,6 +8,7 @@
 #include "abbe/drivers/can/socket_can_bus.hpp"
 #include "abbe/drivers/can/udp_can_bus.hpp"
 #include "abbe/drivers/device_thread.hpp"
+#include "abbe/drivers/sampling/mark_watcher.hpp"
 #include "abbe/drivers/sampling/touch_detector.hpp"
 #include "abbe/drivers/usb/libusb_link.hpp"
 #include "abbe/drivers/usb/usbip_link.hpp"
@@ -86,11 +87,13 @@ Result<Running<D>> run(drivers::Result<std::unique_ptr<D>> device, drivers::Devi
 }  // namespace
 
 struct DeviceSet::State {
-  std::unique_ptr<drivers::TouchDetector>
-      touch_detector;  // before the card that feeds it: destroyed after it
+  // Before the cards that feed them: destroyed after them.
+  std::unique_ptr<drivers::TouchDetector> touch_detector;
+  drivers::MarkWatcher mark_watcher;
   std::optional<Running<drivers::TrackerDevice>> tracker;
   std::optional<Running<drivers::EncoderDevice>> encoder;
   std::optional<Running<drivers::CounterCardDevice>> counter_card;
+  std::optional<Running<drivers::CounterCardDevice>> reference_card;
   std::vector<Running<drivers::EnvironmentDevice>> environments;
   std::optional<Running<drivers::IppDevice>> cmm;
   bool cmm_is_the_axes = false;
@@ -99,6 +102,7 @@ struct DeviceSet::State {
   std::array<protocol::EnvironmentSample, 16> environment;
   std::array<protocol::ProbeTrigger, 16> touches;
   std::array<protocol::TouchScan, 256> touch_scans;
+  std::array<drivers::MarkCrossing, 64> marks;
   std::array<protocol::RawBlock, kMostBlocks> blocks;
   std::map<std::string, std::pair<HostTime, std::uint64_t>> counted;  // at the previous health()
 
@@ -156,6 +160,17 @@ Result<DeviceSet> DeviceSet::start(const Config& config, const drivers::TimeSour
     if (!running) return tl::unexpected(running.error());
     state->counter_card.emplace(std::move(*running));
   }
+  if (config.reference) {
+    const CounterCardConfig& card = config.reference->card;
+    const auto options = device_options(card, config.daemon.speed);
+    auto running =
+        run(drivers::CounterCardDevice::create(options, make_link(card, drivers::identity_of(options), time),
+                                               time, &state->mark_watcher),
+            thread_options(config.daemon, "abbe-marks", config.daemon.encoder_priority,
+                           config.daemon.encoder_cpu));
+    if (!running) return tl::unexpected(running.error());
+    state->reference_card.emplace(std::move(*running));
+  }
   if (config.tracker) {
     auto running =
         run(drivers::TrackerDevice::create(device_options(*config.tracker, config.daemon.speed), time),
@@ -196,6 +211,13 @@ void DeviceSet::drain(Batch& batch) {
     drain_ring(s.counter_card->device->samples(), s.axes, batch.axes);
     drain_ring(s.counter_card->device->raw(), s.blocks, batch.encoder_raw);
   }
+  if (s.reference_card) {
+    while (const std::size_t n = s.mark_watcher.crossings().pop(s.marks))
+      batch.marks.insert(batch.marks.end(), s.marks.begin(),
+                         s.marks.begin() + static_cast<std::ptrdiff_t>(n));
+    while (s.reference_card->device->raw().pop(s.blocks) != 0) {
+    }
+  }
   if (s.touch_detector) {
     drain_ring(s.touch_detector->touches(), s.touches, batch.touches);
     drain_ring(s.touch_detector->windows(), s.touch_scans, batch.touch_scans);
@@ -235,6 +257,8 @@ std::vector<StreamHealth> DeviceSet::health(HostTime now) {
     out.push_back(state_->health_of(*state_->encoder->device, *state_->encoder->thread, now));
   if (state_->counter_card)
     out.push_back(state_->health_of(*state_->counter_card->device, *state_->counter_card->thread, now));
+  if (state_->reference_card)
+    out.push_back(state_->health_of(*state_->reference_card->device, *state_->reference_card->thread, now));
   for (const auto& running : state_->environments)
     out.push_back(state_->health_of(*running.device, *running.thread, now));
   if (state_->cmm) out.push_back(state_->health_of(*state_->cmm->device, *state_->cmm->thread, now));
@@ -248,10 +272,10 @@ std::vector<std::string> DeviceSet::warnings() const {
   };
   if (state_->tracker) add(*state_->tracker);
   if (state_->encoder) add(*state_->encoder);
-  if (state_->counter_card) {
-    add(*state_->counter_card);
-    if (auto assumed = state_->counter_card->device->assumption(); !assumed.empty())
-      out.push_back(std::move(assumed));
+  for (const auto* card : {&state_->counter_card, &state_->reference_card}) {
+    if (!*card) continue;
+    add(**card);
+    if (auto assumed = (*card)->device->assumption(); !assumed.empty()) out.push_back(std::move(assumed));
   }
   for (const auto& running : state_->environments) add(running);
   if (state_->cmm) add(*state_->cmm);

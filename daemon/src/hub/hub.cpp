@@ -79,6 +79,7 @@ void Hub::turn(WallTime wall) {
 
   batch_.clear();
   parts_.devices.drain(batch_);
+  if (parts_.reference != nullptr) parts_.reference->turn(batch_);
   const bool fresh = live_.take(batch_);
   const HostTime now = parts_.time.now();
   // Live first: subscribers wait for it; the recorder and the assembler have time.

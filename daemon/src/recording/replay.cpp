@@ -9,6 +9,7 @@
 #include "abbe/daemon/assembler.hpp"
 #include "abbe/daemon/calibration_request.hpp"
 #include "abbe/daemon/calibration_session.hpp"
+#include "abbe/daemon/datum.hpp"
 #include "abbe/daemon/device_options.hpp"
 #include "abbe/daemon/model_document.hpp"
 #include "abbe/drivers/can/encoder_receiver.hpp"
@@ -229,6 +230,18 @@ std::optional<std::size_t> environment_place(const Config& config, std::string_v
   return std::nullopt;
 }
 
+/// What the marks gave in the live run: the bytes of the second card are not recorded.
+Result<Datum> datum_of(const RecordingReader& recording, const Config& config) {
+  Datum datum{config};
+  for (const auto& attachment : recording.attachments()) {
+    if (attachment.name != kDatumName) continue;
+    const auto found = datum_from_attachment(attachment);
+    if (!found) return tl::unexpected(found.error());
+    datum.found(*found);
+  }
+  return datum;
+}
+
 Result<std::vector<CalibrationRequest>> requests_of(const RecordingReader& recording) {
   std::vector<CalibrationRequest> requests;
   for (const auto& attachment : recording.attachments()) {
@@ -262,6 +275,9 @@ Result<ReplayReport> replay(const RecordingReader& recording, const Config& conf
                             const ReplayOptions& options) {
   auto requests = requests_of(recording);
   if (!requests) return tl::unexpected(requests.error());
+  auto datum = datum_of(recording, config);
+  if (!datum) return tl::unexpected(datum.error());
+  const bool from_raw = options.source != ReplaySource::Samples;  // recorded samples have their datum
   Calibrations calibrations{std::move(*requests), config, options.active};
   Assembler assembler{assembler_options(config)};
   RawDecoder raw{config};
@@ -317,6 +333,7 @@ Result<ReplayReport> replay(const RecordingReader& recording, const Config& conf
     sequence = message->sequence;
     if (!deliver(*message, sink)) ++report.undecodable;
     if (++taken % kMessagesPerTurn != 0) continue;
+    if (from_raw) datum->apply(batch);
     assembler.take(batch);
     batch.clear();
     assembler.emit(snapshots);
@@ -324,6 +341,7 @@ Result<ReplayReport> replay(const RecordingReader& recording, const Config& conf
     if (options.progress) options.progress(cursor.progress());
   }
   device_order.finish(batch.points);
+  if (from_raw) datum->apply(batch);
   assembler.take(batch);
   assembler.finish(snapshots);
   hand_on();

@@ -118,7 +118,7 @@ void ReferenceSession::cross(Axis& axis, const drivers::MarkCrossing& crossing) 
 
 void ReferenceSession::conclude(Axis& axis) {
   if (axis.result.state != AxisReference::State::Searching || !axis.datum) return;
-  if (axis.alignment.half_width() > options_.max_half_width_counts) {
+  if (axis.alignment.half_width() > axis.options.max_half_width_counts) {
     axis.result.reason =
         axis.options.name + ": the marks agree; drive on, slowly, until the cards are aligned";
     return;

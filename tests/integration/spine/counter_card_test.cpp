@@ -1,11 +1,8 @@
-/// The axes come from a counter card instead of CAN encoders: abbe-sim plays it over USB/IP, abbed reads it.
-
 #include <gmock/gmock.h>
 
 #include <string>
 
-#include "program.hpp"
-#include "spine.hpp"
+#include "counter_card_run.hpp"
 
 namespace abbe::test {
 namespace {
@@ -13,37 +10,8 @@ namespace {
 using nlohmann::json;
 using testing::HasSubstr;
 
-struct CounterCardRun : Spine {
-  static std::string wiring(const std::string& more) {
-    return "[counter_card]\ntransport = \"usbip\"\nserial_number = \"01ABBE08\"\nclock_MHz = 1\n"
-           "scan_rate_hz = 1000\nlatch_channel = 6\n" +
-           more +
-           "axes = [\n"
-           "  { axis = \"X\", channel = 0, step_nm = 10 },\n"
-           "  { axis = \"Y\", channel = 1, step_nm = 10 },\n"
-           "  { axis = \"Z\", channel = 2, step_nm = 10 },\n]\n";
-  }
-  /// The simulator reads the same wiring as the daemon.
-  void start_both() {
-    write_path("path.csv", path());
-    write("machine.toml", text_of(file("machine.toml")) + wiring(""));
-    ASSERT_NO_FATAL_FAILURE(start_simulator());
-    const std::string ports = text_of(file("ports"));
-    const auto at = ports.find("usbip_port=");
-    ASSERT_NE(at, std::string::npos) << ports;
-    write_card_configuration(wiring("port = " + std::to_string(std::stoi(ports.substr(at + 11))) + "\n"));
-    ASSERT_NO_FATAL_FAILURE(start_abbed());
-  }
-  void write_card_configuration(const std::string& card) {
-    write_configuration();
-    std::string text = text_of(file("abbed.toml"));
-    const auto encoder = text.find("[encoder]");
-    text.replace(encoder, text.find("[daemon]") - encoder, card);
-    write("abbed.toml", text);
-  }
-};
-
 TEST_F(CounterCardRun, StreamsRecordsAndSaysWhatItTakesForGranted) {
+  write_path("path.csv", path());
   ASSERT_NO_FATAL_FAILURE(start_both());
   ASSERT_TRUE(eventually([&] { return samples("counter_card") > 1000; })) << status().dump(1);
   EXPECT_EQ(stream("counter_card")["state"], "streaming");

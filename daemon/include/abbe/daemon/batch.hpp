@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <vector>
 
+#include "abbe/drivers/sampling/mark_watcher.hpp"
 #include "abbe/protocol/samples.hpp"
 
 namespace abbe::daemon {
@@ -26,6 +27,7 @@ struct Batch {
   std::vector<FromEnvironment> measured_environment;
   std::vector<protocol::ProbeTrigger> touches;
   std::vector<protocol::TouchScan> touch_scans;
+  std::vector<drivers::MarkCrossing> marks;  ///< of the second card: not recorded, what they give is
   std::vector<protocol::RawBlock> tracker_raw;
   std::vector<protocol::RawBlock> encoder_raw;
   std::vector<protocol::RawBlock> probe_raw;  ///< of a measuring machine
@@ -38,6 +40,7 @@ struct Batch {
     measured_environment.clear();
     touches.clear();
     touch_scans.clear();
+    marks.clear();
     tracker_raw.clear();
     encoder_raw.clear();
     probe_raw.clear();
@@ -45,8 +48,8 @@ struct Batch {
   }
   [[nodiscard]] bool empty() const noexcept {
     return points.empty() && axes.empty() && environment.empty() && measured_environment.empty() &&
-           touches.empty() && touch_scans.empty() && tracker_raw.empty() && encoder_raw.empty() &&
-           probe_raw.empty() && environment_raw.empty();
+           touches.empty() && touch_scans.empty() && marks.empty() && tracker_raw.empty() &&
+           encoder_raw.empty() && probe_raw.empty() && environment_raw.empty();
   }
 };
 

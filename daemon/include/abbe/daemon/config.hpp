@@ -20,6 +20,7 @@
 #include "abbe/drivers/counter_card/wiring.hpp"
 #include "abbe/drivers/environment/modbus_line.hpp"
 #include "abbe/drivers/environment/register_map.hpp"
+#include "abbe/drivers/sampling/distance_code.hpp"
 #include "abbe/drivers/sampling/probe_options.hpp"
 
 namespace abbe::daemon {
@@ -126,6 +127,26 @@ struct CounterCardConfig {
   std::chrono::nanoseconds max_constant_delay{
       std::chrono::milliseconds{1}};  ///< bound of the unobservable part of the delay
   bool axes_compensated = false;      ///< true: the control already corrects these readings
+};
+
+/// One element of [reference] axes: the distance-coded marks of the scale. Reading at a mark = zero_mark +
+/// (reversed: -) its place on the scale.
+struct ReferenceAxisConfig {
+  std::string axis;
+  drivers::DistanceCode code;
+  double signal_period = 20e-6;  ///< of the scale, m or rad
+  double zero_mark = 0.0;        ///< m or rad: the reading at the scale's zero mark
+  bool reversed = false;         ///< the scale's places rise as the reading falls
+};
+
+/// [reference]: a second card that latches axes of [counter_card] on their marks. These axes are not known
+/// until `abbe reference` has found where their counters began.
+struct ReferenceConfig {
+  CounterCardConfig card;                 ///< its axes are in the order of `axes`
+  std::vector<ReferenceAxisConfig> axes;  ///< each is an axis of [counter_card]
+  std::chrono::nanoseconds u_alignment{
+      std::chrono::milliseconds{1}};  ///< how well the two cards' scans lie beside each other in time
+  double tolerance_m = 1e-6;          ///< how well the two cards' counts must be brought together, m or rad
 };
 
 /// One [[environment]]: a Modbus device that measures air, scales or parts.
@@ -258,6 +279,7 @@ struct Config {
       temperatures;  ///< names of EnvironmentSample::temperature_K, as they are configured
   std::vector<ThermalConfig> thermal;
   AirConfig air;
+  std::optional<ReferenceConfig> reference;
   std::optional<ProbeConfig> probe;
   std::optional<CmmConfig> cmm;
   DaemonConfig daemon;

@@ -19,12 +19,13 @@
 #include "abbe/daemon/model_authority.hpp"
 #include "abbe/daemon/publisher.hpp"
 #include "abbe/daemon/recorder_thread.hpp"
+#include "abbe/daemon/reference_service.hpp"
 #include "abbe/daemon/sample_source.hpp"
 #include "abbe/drivers/time_source.hpp"
 
 namespace abbe::daemon {
 
-/// Everything the hub's turn works on. Owned by abbed; `publisher` and `recorder` may be null.
+/// Everything the hub's turn works on. Owned by abbed; `publisher`, `recorder` and `reference` may be null.
 struct HubParts {
   const Config& config;
   const drivers::TimeSource& time;
@@ -33,6 +34,7 @@ struct HubParts {
   CalibrationService& calibration;
   Publisher* publisher = nullptr;
   RecorderThread* recorder = nullptr;
+  ReferenceService* reference = nullptr;
 };
 
 class Hub {

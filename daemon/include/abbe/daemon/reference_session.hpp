@@ -23,17 +23,17 @@
 namespace abbe::daemon {
 
 struct ReferenceAxis {
-  std::string name;                    ///< "X"
-  std::uint8_t live_axis = 0;          ///< place in the live card's samples
-  std::uint8_t latched_axis = 0;       ///< place in the latching card's
-  drivers::MarkTraverseOptions marks;  ///< `counts_per_period` with the sign of the live card's step
-  double period = 20e-6;               ///< of the scale's signal, m or rad
+  std::string name;                     ///< "X"
+  std::uint8_t live_axis = 0;           ///< place in the live card's samples
+  std::uint8_t latched_axis = 0;        ///< place in the latching card's
+  drivers::MarkTraverseOptions marks;   ///< `counts_per_period` with the sign of the live card's step
+  double period = 20e-6;                ///< of the scale's signal, m or rad
+  double max_half_width_counts = 0.75;  ///< how well the difference of the zeros must be known
 };
 
 struct ReferenceOptions {
   std::vector<ReferenceAxis> axes;
   std::chrono::nanoseconds u_alignment = std::chrono::milliseconds{1};
-  double max_half_width_counts = 0.75;  ///< the difference of the zeros must be known to one count
 };
 
 struct AxisReference {
@@ -55,6 +55,7 @@ class ReferenceSession {
 
   [[nodiscard]] const AxisReference& axis(std::size_t i) const { return axes_[i].result; }
   [[nodiscard]] bool finished() const;
+  [[nodiscard]] const ReferenceOptions& options() const noexcept { return options_; }
 
  private:
   struct Axis {

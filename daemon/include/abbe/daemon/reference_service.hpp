@@ -1,0 +1,56 @@
+#pragma once
+/// `abbe reference` in the daemon: runs a ReferenceSession over the live samples and the marks of the second
+/// card, and gives every reading its datum. The hub's thread only; no call waits for anything.
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "abbe/daemon/config.hpp"
+#include "abbe/daemon/datum.hpp"
+#include "abbe/daemon/recorder_thread.hpp"
+#include "abbe/daemon/reference_session.hpp"
+
+namespace abbe::daemon {
+
+/// What a session looks for, from the two cards' wiring.
+[[nodiscard]] ReferenceOptions reference_options(const ReferenceConfig& config,
+                                                 const CounterCardConfig& live);
+
+class ReferenceService {
+ public:
+  struct AxisStatus {
+    std::string name;
+    AxisReference found;           ///< of the running session, or of the latest
+    double reading_at_zero = 0.0;  ///< with state Found: m or rad, what the datum says of count 0
+    bool known = false;            ///< readings have a datum now
+  };
+
+  /// `recorder` may be null.
+  ReferenceService(const Config& config, RecorderThread* recorder);
+
+  /// Refused without [reference] and while one runs. Axes that are known already stay so until the new datum.
+  [[nodiscard]] Result<void> start();
+  [[nodiscard]] Result<void> cancel();
+  /// Every turn, before anybody else sees the batch.
+  void turn(Batch& batch);
+
+  [[nodiscard]] bool configured() const noexcept { return config_.reference.has_value(); }
+  [[nodiscard]] bool running() const noexcept { return running_; }
+  [[nodiscard]] std::vector<AxisStatus> status() const;
+
+ private:
+  void look_for_marks(const Batch& batch);
+  void take_up(std::size_t axis);
+  [[nodiscard]] double reading_at_zero(std::size_t axis) const;
+
+  const Config& config_;
+  RecorderThread* recorder_;
+  Datum datum_;
+  std::optional<ReferenceSession> session_;  ///< the latest
+  std::vector<bool> taken_up_;
+  bool running_ = false;
+  protocol::HostTime newest_{};  ///< of the live samples
+};
+
+}  // namespace abbe::daemon

@@ -1,0 +1,107 @@
+/// `abbe reference`: the running daemon finds where the axes' counters began, from their distance-coded
+/// marks.
+
+#include <fmt/format.h>
+
+#include <CLI/App.hpp>
+#include <CLI/Config.hpp>
+#include <CLI/Formatter.hpp>
+#include <chrono>
+#include <map>
+#include <memory>
+#include <string>
+#include <thread>
+
+#include "abbe/daemon/control_protocol.hpp"
+#include "cli/commands.hpp"
+#include "cli/daemon_socket.hpp"
+#include "cli/terminal.hpp"
+
+namespace abbe::daemon {
+namespace {
+
+using namespace std::chrono_literals;
+using nlohmann::json;
+
+constexpr auto kLook = 200ms;
+
+struct Arguments {
+  DaemonSocket where;
+  bool cancel = false;
+  bool json = false;
+};
+
+std::string line_of(const json& axis) {
+  const std::string state = axis["state"];
+  if (state == "found") {
+    return fmt::format("{:<4} found after {} marks: count 0 is at {:.6f} mm, u = {:.3f} um",
+                       axis["axis"].get<std::string>(), axis["marks"].get<std::size_t>(),
+                       1e3 * axis["reading_at_zero"].get<double>(), 1e6 * axis["u"].get<double>());
+  }
+  return fmt::format("{:<4} {}, {} marks{}{}", axis["axis"].get<std::string>(), state,
+                     axis["marks"].get<std::size_t>(), axis["reason"].get<std::string>().empty() ? "" : ": ",
+                     axis["reason"].get<std::string>());
+}
+
+/// One line on stderr whenever there is news of an axis.
+class Narrator {
+ public:
+  void tell(const json& reference) {
+    for (const json& axis : reference["axes"]) {
+      std::string line = line_of(axis);
+      if (told_[axis["axis"]] == line) continue;
+      fmt::print(stderr, "{}\n", line);
+      told_[axis["axis"]] = std::move(line);
+    }
+  }
+
+ private:
+  std::map<std::string, std::string> told_;
+};
+
+int print_result(const json& reference, bool as_json) {
+  bool all = true;
+  for (const json& axis : reference["axes"]) {
+    all = all && axis["state"] == "found";
+    if (!as_json) fmt::print("{}\n", line_of(axis));
+  }
+  if (as_json) fmt::print("{}\n", reference.dump(1));
+  return all ? 0 : 1;
+}
+
+int follow(const std::filesystem::path& socket, bool as_json) {
+  Narrator narrator;
+  for (;; std::this_thread::sleep_for(kLook)) {
+    const auto status = ask_daemon(socket, {{"do", "status"}});
+    if (!status) return report(status.error());
+    const json& reference = (*status)["reference"];
+    if (!reference["running"].get<bool>()) return print_result(reference, as_json);
+    narrator.tell(reference);
+  }
+}
+
+int reference(const Arguments& arguments) {
+  const auto socket = socket_path(arguments.where);
+  if (!socket) return report(socket.error());
+  const auto answer = ask_daemon(*socket, {{"do", "reference"}, {"cancel", arguments.cancel}});
+  if (!answer) return report(answer.error());
+  return arguments.cancel ? 0 : follow(*socket, arguments.json);
+}
+
+}  // namespace
+
+void add_reference(CLI::App& parent, int& exit) {
+  auto arguments = std::make_shared<Arguments>();
+  auto* command = parent.add_subcommand(
+      "reference",
+      "Find where the axes' counters began, from distance-coded marks: then drive each axis slowly over at\n"
+      "least four marks in one direction. Ends when every axis of [reference] has its datum. Ctrl-C ends "
+      "the\n"
+      "looking on, --cancel the search.");
+  add_socket_options(*command, arguments->where);
+  command->add_flag("--cancel", arguments->cancel, "end the search that is running");
+  command->add_flag("--json", arguments->json, "the result as JSON");
+  command->callback([arguments, &exit] { exit = reference(*arguments); });
+}
+
+}  // namespace abbe::daemon

@@ -1,0 +1,113 @@
+#include "abbe/daemon/datum.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <nlohmann/json.hpp>
+
+namespace abbe::daemon {
+namespace {
+
+using nlohmann::json;
+using protocol::SampleFlag;
+
+template <class Sample>
+void set_missing(Sample& sample, std::size_t axis) {
+  sample.missing_mask = static_cast<std::uint8_t>(sample.missing_mask | 1u << axis);
+  sample.head.flags |= SampleFlag::AxisMissing;
+}
+
+}  // namespace
+
+Datum::Datum(const Config& config) {
+  if (!config.reference || !config.counter_card) return;
+  const auto& live = config.counter_card->wiring.axes;
+  for (const auto& marks : config.reference->axes) {
+    const auto axis = std::ranges::find(live, marks.axis, &drivers::CounterAxis::name);
+    if (axis != live.end())
+      axes_.push_back({.place = static_cast<std::size_t>(axis - live.begin()), .step = axis->scale});
+  }
+}
+
+void Datum::found(const FoundDatum& datum) {
+  for (Axis& axis : axes_)
+    if (axis.place == datum.axis) axis.coming.push_back(datum);
+}
+
+bool Datum::known(std::size_t place) const {
+  const auto axis = std::ranges::find(axes_, place, &Axis::place);
+  return axis == axes_.end() || axis->in_force || !axis->coming.empty();
+}
+
+void Datum::move_on(const protocol::SampleHead& head) {
+  for (Axis& axis : axes_) {
+    while (!axis.coming.empty() && axis.coming.front().from < head.time) {
+      axis.in_force = axis.coming.front();
+      axis.coming.pop_front();
+    }
+    if (has(head.flags, SampleFlag::Restarted)) axis.in_force.reset();
+  }
+}
+
+void Datum::apply(protocol::AxisSample& sample) {
+  move_on(sample.head);
+  for (const Axis& axis : axes_) {
+    if (axis.in_force) {
+      sample.position[axis.place] =
+          axis.in_force->reading_at_zero + axis.step * static_cast<double>(sample.count[axis.place]);
+    } else {
+      set_missing(sample, axis.place);
+    }
+  }
+}
+
+void Datum::apply(protocol::ProbeTrigger& touch) const {
+  for (const Axis& axis : axes_) {
+    if (axis.in_force) {
+      touch.position[axis.place] += axis.in_force->reading_at_zero;  // the driver's own offset is 0
+    } else {
+      set_missing(touch, axis.place);
+    }
+  }
+}
+
+void Datum::apply(protocol::TouchScan& scan) const {
+  for (const Axis& axis : axes_) {
+    if (axis.in_force) {
+      scan.position[axis.place] =
+          axis.in_force->reading_at_zero + axis.step * static_cast<double>(scan.count[axis.place]);
+    } else {
+      set_missing(scan, axis.place);
+    }
+  }
+}
+
+void Datum::apply(Batch& batch) {
+  if (axes_.empty()) return;
+  for (auto& sample : batch.axes) apply(sample);
+  for (auto& touch : batch.touches) apply(touch);
+  for (auto& scan : batch.touch_scans) apply(scan);
+}
+
+RecordingAttachment to_attachment(const FoundDatum& datum) {
+  const json content{{"axis", datum.axis},
+                     {"reading_at_zero", datum.reading_at_zero},
+                     {"u", datum.u},
+                     {"from_ns", datum.from.time_since_epoch().count()}};
+  return {.name = std::string{kDatumName}, .media_type = "application/json", .content = content.dump()};
+}
+
+Result<FoundDatum> datum_from_attachment(const RecordingAttachment& attachment) {
+  try {
+    const json content = json::parse(attachment.content);
+    return FoundDatum{
+        .axis = content.at("axis").get<std::size_t>(),
+        .reading_at_zero = content.at("reading_at_zero").get<double>(),
+        .u = content.at("u").get<double>(),
+        .from = protocol::HostTime{std::chrono::nanoseconds{content.at("from_ns").get<std::int64_t>()}}};
+  } catch (const json::exception& e) {
+    return fail(ErrorCode::BadInput, fmt::format("attachment {}: {}", attachment.name, e.what()));
+  }
+}
+
+}  // namespace abbe::daemon

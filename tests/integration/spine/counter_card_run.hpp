@@ -1,0 +1,59 @@
+#pragma once
+/// The axes come from a counter card instead of CAN encoders: abbe-sim plays it over USB/IP, abbed reads it.
+
+#include <regex>
+#include <string>
+
+#include "program.hpp"
+#include "spine.hpp"
+
+namespace abbe::test {
+
+struct CounterCardRun : Spine {
+  static std::string wiring(const std::string& more) {
+    return "[counter_card]\ntransport = \"usbip\"\nserial_number = \"01ABBE08\"\nclock_MHz = 1\n"
+           "scan_rate_hz = 1000\nlatch_channel = 6\n" +
+           more +
+           "axes = [\n"
+           "  { axis = \"X\", channel = 0, step_nm = 10 },\n"
+           "  { axis = \"Y\", channel = 1, step_nm = 10 },\n"
+           "  { axis = \"Z\", channel = 2, step_nm = 10 },\n]\n";
+  }
+  /// The simulator's port of that name; 0: it has none.
+  [[nodiscard]] int port(const std::string& name) const {
+    const std::string ports = text_of(file("ports"));
+    const auto at = ports.find(name + "=");
+    return at == std::string::npos ? 0 : std::stoi(ports.substr(at + name.size() + 1));
+  }
+  [[nodiscard]] std::string card_at_its_port() const {
+    return wiring(wiring_ + "port = " + std::to_string(port("usbip_port")) + "\n");
+  }
+  /// The simulator reads the same wiring as the daemon. `more`: further tables of both; PORT_2 stands for the
+  /// second card's port.
+  void start_both(std::string more = {}) {
+    const std::string anywhere = std::regex_replace(more, std::regex{"PORT_2"}, "0");
+    write("machine.toml", text_of(file("machine.toml")) + wiring(wiring_) + anywhere);
+    ASSERT_NO_FATAL_FAILURE(start_simulator());
+    ASSERT_NE(port("usbip_port"), 0) << text_of(file("ports"));
+    more = std::regex_replace(more, std::regex{"PORT_2"}, std::to_string(port("usbip_port_2")));
+    write_card_configuration(card_at_its_port() + more);
+    ASSERT_NO_FATAL_FAILURE(start_abbed());
+  }
+  [[nodiscard]] std::string at_speed(const std::string& text) const {
+    return std::regex_replace(text, std::regex{"\nspeed = [0-9]+"}, "\nspeed = " + speed_);
+  }
+
+  std::string wiring_;  ///< further keys of [counter_card], of both
+  std::string speed_;   ///< of both; empty: the usual one
+
+  void write_card_configuration(const std::string& card) {
+    write_configuration();
+    std::string text = text_of(file("abbed.toml"));
+    const auto encoder = text.find("[encoder]");
+    text.replace(encoder, text.find("[daemon]") - encoder, card);
+    if (!speed_.empty()) text = at_speed(text);
+    write("abbed.toml", text);
+  }
+};
+
+}  // namespace abbe::test

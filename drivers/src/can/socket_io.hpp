@@ -35,7 +35,9 @@ inline void wait_readable(int fd, std::chrono::nanoseconds wall) {
 }
 
 /// Asks for receive stamps of the kernel and, where there are any, of the hardware. The hardware's clock is
-/// another one and is not used yet. A refusal is no error: the user-space time, widened, remains.
+/// another one and is not used yet. The kernel begins to stamp a little later, when a worker of its own has
+/// switched it on; frames that come before have no stamp. A refusal is no error: the user-space time,
+/// widened, remains.
 inline void enable_stamps(int fd) {
   const int flags = SOF_TIMESTAMPING_RX_SOFTWARE | SOF_TIMESTAMPING_SOFTWARE;
   setsockopt(fd, SOL_SOCKET, SO_TIMESTAMPING, &flags, sizeof flags);

@@ -1,0 +1,87 @@
+// The encoder driver in the conformance suite of all drivers, on a virtual CAN bus of the kernel.
+
+#include "abbe/drivers/can/encoder_device.hpp"
+#include "abbe/drivers/can/socket_can_bus.hpp"
+#include "driver_conformance.hpp"
+#include "vcan_nodes.hpp"
+
+namespace abbe::tests {
+namespace {
+
+using namespace std::chrono_literals;
+
+class VcanConformancePeer {
+ public:
+  static constexpr std::chrono::nanoseconds kTurn = 1ms;
+  static constexpr std::chrono::nanoseconds kSilenceLimit = 400ms;
+  static constexpr std::chrono::nanoseconds kRecoveryLimit = 4s;  // SDO retries 1.5 s, then a pause of 1 s
+  static constexpr bool kTornCanBeFinished = false;
+
+  VcanConformancePeer() {
+    drivers::EncoderDeviceOptions options;
+    options.receiver.axes = {{.name = "X", .node = 1}, {.name = "Y", .node = 2}};
+    options.receiver.sync_period = 4ms;
+    options.sample_capacity = 16;  // the bus hands over 64 frames a turn
+    options.raw_capacity_blocks = 64;  // nobody reads them here: full all the time
+    auto bus = std::make_unique<drivers::SocketCanBus>(
+        drivers::SocketCanOptions{.interface = vcan_.name(), .speed = 0.0}, time_);
+    device_ = std::move(*drivers::EncoderDevice::create(options, std::move(bus), time_));
+  }
+
+  drivers::Device& device() { return *device_; }
+  drivers::SteppedTime& time() { return time_; }
+  void take_samples(std::vector<protocol::SampleHead>& heads) {
+    std::array<protocol::AxisSample, 64> out{};
+    const auto n = device_->samples().pop(out);
+    for (std::size_t i = 0; i < n; ++i) heads.push_back(out[i].head);
+  }
+  void serve() { nodes_.serve(time_.now()); }
+  void say_valid() {
+    const auto frames = nodes_.take_answer();
+    if (frames.empty()) return;
+    if (!holding_) return nodes_.send(frames);
+    if (held_.empty()) held_ = frames;
+  }
+  void hold_back() { holding_ = true; }
+  void send_held() {
+    holding_ = false;
+    if (!held_.empty()) nodes_.send(held_);
+    held_.clear();
+  }
+  /// A frame is never torn on a bus; what a confused node sends is a position without its last bytes.
+  void send_torn() { (void)nodes_.socket().send(can::standard_frame(0x181, {1, 2})); }
+  void finish_torn() {}
+  void send_garbage() {
+    auto extended = can::standard_frame(0x181, {1, 2, 3, 4});
+    extended.set(can::FrameFlag::Extended);
+    const std::array frames{extended, can::standard_frame(0x7FF, {9}), can::standard_frame(0x182, {})};
+    (void)nodes_.socket().send(frames);
+  }
+  void unplug() { vcan_.down(); }
+  void plug_in() {
+    vcan_.up();
+    nodes_.drain();
+  }
+  /// A cycle makes one sample whatever the nodes say; only the bus can make many at once, by going off and
+  /// on.
+  void flood() {
+    for (int i = 0; i < 100; ++i) {
+      (void)nodes_.socket().send_condition(can::BusCondition::BusOff);
+      (void)nodes_.socket().send_condition(can::BusCondition::Active);
+    }
+  }
+  void restart() { nodes_.restart(); }
+
+ private:
+  VirtualCan vcan_;
+  drivers::SteppedTime time_;
+  VcanNodes nodes_{vcan_, std::array{can::EncoderIdentity{.node = 1}, can::EncoderIdentity{.node = 2}}};
+  std::unique_ptr<drivers::EncoderDevice> device_;
+  bool holding_ = false;
+  std::vector<can::CanFrame> held_;
+};
+
+INSTANTIATE_TYPED_TEST_SUITE_P(EncoderOnVcan, DriverConformance, VcanConformancePeer);
+
+}  // namespace
+}  // namespace abbe::tests

@@ -1,0 +1,65 @@
+// Five axes and their SYNC at 1 kHz over UDP, for as long as wanted, on this computer and in its own time:
+// the one test of this folder that needs no guest. scripts/soak runs it; a computer that is busy with other
+// things may fail it.
+//
+// ABBE_HIL_SECONDS: default 5.
+
+#include <fmt/format.h>
+
+#include <cstdlib>
+
+#include "abbe/drivers/can/udp_can_bus.hpp"
+#include "abbe/drivers/device_thread.hpp"
+#include "simulated_encoders.hpp"
+
+namespace abbe::tests {
+namespace {
+
+using namespace std::chrono_literals;
+
+constexpr std::size_t kAxes = 5;
+
+std::chrono::seconds run_time() {
+  const char* seconds = std::getenv("ABBE_HIL_SECONDS");
+  return std::chrono::seconds{seconds != nullptr ? std::atoi(seconds) : 5};
+}
+
+TEST(FiveAxesOverUdp, AreNeverMissing) {
+  drivers::MonotonicTime time;
+  const SimulatedEncoders encoders{sim::CanPortOptions{.speed = 1.0}, kAxes, ::geteuid() == 0 ? 90 : 0};
+  drivers::EncoderDeviceOptions options;
+  options.receiver.axes = SimulatedEncoders::axes(kAxes);
+  auto device = std::move(*drivers::EncoderDevice::create(
+      options,
+      std::make_unique<drivers::UdpCanBus>(drivers::UdpCanOptions{.peer_port = encoders.port()}, time),
+      time));
+  const auto thread = std::move(*drivers::DeviceThread::start(*device, {.name = "encoders", .priority = 50}));
+
+  std::array<protocol::AxisSample, 4096> some{};
+  std::array<protocol::RawBlock, 4096> blocks;  // NOLINT: filled by pop
+  std::size_t samples = 0;
+  std::size_t incomplete = 0;
+  std::uint64_t lost = 0;
+  const auto take = [&](bool count) {
+    const auto n = device->samples().pop(some);
+    device->raw().pop(blocks);
+    for (std::size_t i = 0; count && i < n; ++i) {
+      ++samples;
+      incomplete += some[i].missing_mask != 0 ? 1 : 0;
+      lost += some[i].head.lost_before;
+    }
+  };
+  for (int i = 0; i < 500 && device->status().state != "streaming"; ++i, ::usleep(10'000)) take(false);
+  ASSERT_EQ(device->status().state, "streaming") << device->status().last_fault;
+  ::usleep(100'000);
+  take(false);
+  for (const auto end = time.now() + run_time(); time.now() < end; ::usleep(20'000)) take(true);
+  fmt::print("udp: {} samples of {} axes, {} incomplete, {} lost\n", samples, kAxes, incomplete, lost);
+  EXPECT_GE(samples + 50, static_cast<std::size_t>(run_time() / 1ms));
+  EXPECT_EQ(incomplete, 0u);
+  EXPECT_EQ(lost, 0u);
+  EXPECT_EQ(device->status().dropped, 0u);
+}
+
+}  // namespace
+}  // namespace abbe::tests

@@ -3,6 +3,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <sched.h>
+#include <sys/mman.h>
+#include <sys/prctl.h>
 
 #include <atomic>
 #include <stdexcept>
@@ -114,6 +116,14 @@ TEST(DeviceThread, RunsWhereItIsPut) {
   ASSERT_TRUE(thread) << thread.error().text;
   wait_for([&] { return device.cpu >= 0; });
   EXPECT_EQ(device.cpu, here);
+}
+
+TEST(DeviceThread, LocksMemoryWithoutHugePages) {
+  TurnCounter device;
+  const auto thread = DeviceThread::start(device, {.lock_memory = true});
+  ASSERT_TRUE(thread) << thread.error().text;
+  EXPECT_EQ(::prctl(PR_GET_THP_DISABLE, 0, 0, 0, 0), 1);
+  ::munlockall();
 }
 
 }  // namespace

@@ -21,7 +21,7 @@ class VcanConformancePeer {
     drivers::EncoderDeviceOptions options;
     options.receiver.axes = {{.name = "X", .node = 1}, {.name = "Y", .node = 2}};
     options.receiver.sync_period = 4ms;
-    options.sample_capacity = 16;  // the bus hands over 64 frames a turn
+    options.sample_capacity = 16;      // the bus hands over 64 frames a turn
     options.raw_capacity_blocks = 64;  // nobody reads them here: full all the time
     auto bus = std::make_unique<drivers::SocketCanBus>(
         drivers::SocketCanOptions{.interface = vcan_.name(), .speed = 0.0}, time_);

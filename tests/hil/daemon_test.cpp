@@ -8,13 +8,14 @@
 #include <signal.h>
 #include <unistd.h>
 
-#include <cstdlib>
 #include <filesystem>
 #include <fstream>
 #include <nlohmann/json.hpp>
 
 #include "can_interface.hpp"
+#include "figure.hpp"
 #include "program.hpp"
+#include "run_time.hpp"
 
 namespace abbe::tests {
 namespace {
@@ -92,8 +93,7 @@ supervise = "off"
 )";
 
 int run_seconds() {
-  const char* seconds = std::getenv("ABBE_HIL_SECONDS");
-  return seconds != nullptr ? std::atoi(seconds) : 20;
+  return static_cast<int>(run_time(20s).count());
 }
 
 struct Use {
@@ -176,8 +176,10 @@ class WholeDaemon : public testing::Test {
     EXPECT_GE(more, (run_seconds() - slack_s) * rate_hz) << after.dump(1);
     for (const char* counter : {"dropped", "gaps", "faults"})
       EXPECT_EQ(after[counter], before[counter]) << after.dump(1);
-    fmt::print("daemon: {}: {} samples, latency p99 {:.0f} us\n", after["name"].get<std::string>(), more,
-               1e6 * after["latency_p99_s"].get<double>());
+    print_figure("whole daemon, " + after["name"].get<std::string>(), "0 lost",
+                 "{} samples, {} gaps, {} dropped, latency p99 {:.0f} us", more,
+                 after["gaps"].get<int>() - before["gaps"].get<int>(), after["dropped"].get<int>(),
+                 1e6 * after["latency_p99_s"].get<double>());
   }
 
   std::filesystem::path directory_;
@@ -198,8 +200,9 @@ TEST_F(WholeDaemon, AcquiresFromAllDevicesWithoutLossAndComesBackAfterTheBusWasD
   expect_nothing_lost(encoder, stream("encoder"), kEncoder_hz, 0.01);
   expect_nothing_lost(tracker, stream("tracker"), kTracker_hz, kLongestBurst_s);
   const Use used = use_of(abbed_->pid());
-  fmt::print("daemon: {:.1f} % of the guest's processor, resident {} kB, at first {} kB\n",
-             100.0 * (used.processor_s - use.processor_s) / run_seconds(), used.resident_kB, use.resident_kB);
+  print_figure(
+      "whole daemon, use", "memory flat", "{:.1f} % of the guest's processor, resident {} kB, at first {} kB",
+      100.0 * (used.processor_s - use.processor_s) / run_seconds(), used.resident_kB, use.resident_kB);
   // Memory is locked, so what it holds is resident: a leak of one sample a second would show in the soak.
   EXPECT_LT(used.resident_kB, use.resident_kB + 2048);
 

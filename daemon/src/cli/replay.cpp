@@ -13,6 +13,7 @@
 
 #include "abbe/daemon/replay.hpp"
 #include "cli/commands.hpp"
+#include "cli/sample_lines.hpp"
 #include "cli/terminal.hpp"
 
 namespace abbe::daemon {
@@ -26,6 +27,7 @@ struct Arguments {
   bool raw = false;
   double speed = 0.0;
   bool json = false;
+  bool samples = false;
 };
 
 Result<Config> config_of(const Arguments& arguments, const RecordingReader& recording) {
@@ -110,10 +112,15 @@ int run(const Arguments& arguments) {
   ReplayOptions options{.source = arguments.raw ? ReplaySource::RawBytes : ReplaySource::Samples,
                         .speed = arguments.speed,
                         .progress = [&bar](double share) { bar.show("replaying", share); }};
+  if (arguments.samples)
+    options.samples = [](const Batch& batch, protocol::HostTime begin) {
+      print_samples(stdout, batch, begin);
+    };
   const auto result = replay(*recording, *config, options);
   bar.clear();
   if (!result) return report(result.error());
   const double wall_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  if (arguments.samples) return exit_code_of(*result, arguments);
   if (arguments.json) {
     print_json(*recording, *result, wall_s);
   } else {
@@ -137,7 +144,9 @@ void add_replay(CLI::App& parent, int& exit) {
       ->capture_default_str()
       ->check(CLI::NonNegativeNumber);
   command->add_option("-c,--config", arguments->config, "another configuration than the recorded one");
-  command->add_flag("--json", arguments->json, "as one JSON object");
+  auto* as_json = command->add_flag("--json", arguments->json, "as one JSON object");
+  command->add_flag("--samples", arguments->samples, "print every sample as a line instead of the report")
+      ->excludes(as_json);
   command->callback([arguments, &exit] { exit = run(*arguments); });
 }
 

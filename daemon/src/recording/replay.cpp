@@ -334,6 +334,7 @@ Result<ReplayReport> replay(const RecordingReader& recording, const Config& conf
     if (!deliver(*message, sink)) ++report.undecodable;
     if (++taken % kMessagesPerTurn != 0) continue;
     if (from_raw) datum->apply(batch);
+    if (options.samples) options.samples(batch, range->first);
     assembler.take(batch);
     batch.clear();
     assembler.emit(snapshots);
@@ -342,6 +343,7 @@ Result<ReplayReport> replay(const RecordingReader& recording, const Config& conf
   }
   device_order.finish(batch.points);
   if (from_raw) datum->apply(batch);
+  if (options.samples) options.samples(batch, range->first);
   assembler.take(batch);
   assembler.finish(snapshots);
   hand_on();

@@ -10,6 +10,7 @@
 #include <string>
 #include <vector>
 
+#include "abbe/daemon/batch.hpp"
 #include "abbe/daemon/calibration_session.hpp"
 #include "abbe/daemon/config.hpp"
 #include "abbe/daemon/otf_identification.hpp"
@@ -25,6 +26,8 @@ struct ReplayOptions {
   const calib::VolumetricModel* active =
       nullptr;  ///< what the gate compares with; null: no compensation alone
   std::function<void(double share)> progress;
+  /// Sees every sample as the assembler gets it, with the time of the recording's first message.
+  std::function<void(const Batch& batch, protocol::HostTime begin)> samples;
 };
 
 /// One calibration of the recording, done again.

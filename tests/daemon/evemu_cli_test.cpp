@@ -56,10 +56,19 @@ std::string calibrator_toml() {
   return text;
 }
 
-std::string touches_csv() {
+using Touches = std::vector<calib::evemu::Touch>;
+using calib::evemu::Feature;
+
+Touches touches() {
+  return tests::evemu::reference_touches("touched_sig3um.csv");
+}
+
+std::string touches_csv(const Touches& all = touches()) {
   std::string text = "position,kind,index,x_mm,y_mm,z_mm\n";
-  for (const auto& row : tests::evemu::reference_cells("touched_sig3um.csv"))
-    text += fmt::format("{},{},{},{},{},{}\n", row[0], row[1], row[2], row[3], row[4], row[5]);
+  for (const auto& t : all)
+    text += fmt::format("{},{},{},{:.17g},{:.17g},{:.17g}\n", t.position,
+                        t.feature == Feature::Ball ? "ball" : "block", t.number, 1e3 * t.p_m.x(),
+                        1e3 * t.p_m.y(), 1e3 * t.p_m.z());
   return text;
 }
 
@@ -98,6 +107,18 @@ class EvemuCli : public ::testing::Test {
                                      arguments, out.string(), err.string());
     const int status = std::system(command.c_str());
     return {WIFEXITED(status) ? WEXITSTATUS(status) : -1, text_of(out), text_of(err)};
+  }
+
+  Ran identify(const Touches& all) const {
+    write("touches.csv", touches_csv(all));
+    return abbe(
+        "identify evemu --machine machine.toml --touches touches.csv --calibrator calibrator.toml -o out");
+  }
+  /// Nothing is written when the input is refused.
+  void expect_refused(const Ran& ran, int exit, const std::string& why) const {
+    EXPECT_EQ(ran.exit, exit);
+    EXPECT_THAT(ran.err, HasSubstr(why));
+    EXPECT_FALSE(fs::exists(folder_ / "out"));
   }
 
   fs::path folder_ = fs::path(::testing::TempDir()) / fmt::format("evemu_cli_{}", ::getpid());
@@ -159,6 +180,99 @@ TEST_F(EvemuCli, NamesWhatIsWrongWithTouches) {
   EXPECT_EQ(ran.exit, 3);
   EXPECT_THAT(ran.err, HasSubstr("touches.csv:2:3: kind: \"bell\": must be ball or block"));
   EXPECT_FALSE(fs::exists(folder_ / "out/model.json"));
+}
+
+TEST_F(EvemuCli, NamesABallWithTooFewPoints) {
+  auto all = touches();
+  int kept = 0;
+  std::erase_if(all, [&](const auto& t) {
+    return t.position == 3 && t.feature == Feature::Ball && t.number == 4 && ++kept > 3;
+  });
+  expect_refused(identify(all), 1, "position 3: ball 4 has too few points: 3");
+}
+
+TEST_F(EvemuCli, NamesABallTouchedUnderTwoNumbers) {
+  auto all = touches();
+  std::erase_if(all,
+                [](const auto& t) { return t.position == 2 && t.feature == Feature::Ball && t.number == 5; });
+  for (const auto& t : touches())
+    if (t.position == 2 && t.feature == Feature::Ball && t.number == 4) {
+      all.push_back(t);
+      all.back().number = 5;
+    }
+  expect_refused(identify(all), 3, "position 2: one ball was touched twice, as ball 4 and as ball 5");
+}
+
+TEST_F(EvemuCli, NamesSwappedBlocks) {
+  auto all = touches();
+  for (auto& t : all)
+    if (t.position == 6 && t.feature == Feature::Block) t.number = 3 - t.number;
+  expect_refused(identify(all), 3, "position 6: blocks 1 and 2 are swapped");
+}
+
+TEST_F(EvemuCli, NamesAPositionNobodyTouched) {
+  auto all = touches();
+  std::erase_if(all, [](const auto& t) { return t.position == 5; });
+  expect_refused(identify(all), 1, "position 5: left out");
+}
+
+TEST_F(EvemuCli, NamesTheCalibratorOfAnotherArtefact) {
+  std::string text = calibrator_toml();
+  const auto at = text.find("radius_mm = 12.7", text.find("number = 3"));
+  write("calibrator.toml", text.replace(at, 16, "radius_mm = 15.0"));
+  expect_refused(identify(touches()), 3, "calibrator file of another artefact");
+}
+
+TEST_F(EvemuCli, NamesCoplanarPositions) {
+  std::string text = "position,ball,x_mm,y_mm,z_mm,ex_um,ey_um,ez_um\n";
+  for (const auto& e : tests::evemu::reference_errors())
+    text += fmt::format("{},{},{},{},30,{},{},{}\n", e.position, e.ball, 1e3 * e.reading_m.x(),
+                        1e3 * e.reading_m.y(), 1e6 * e.V_m.x(), 1e6 * e.V_m.y(), 1e6 * e.V_m.z());
+  write("errors.csv", text);
+  expect_refused(abbe("identify evemu --machine machine.toml --errors errors.csv -o out"), 1,
+                 "the positions are coplanar");
+}
+
+TEST_F(EvemuCli, ChoosesSparseModelsByFolds) {
+  const auto ran = abbe(
+      "identify evemu --machine machine.toml --errors errors.csv --estimator lasso --folds ball --json -o "
+      "out");
+  ASSERT_EQ(ran.exit, 0) << ran.err;
+  const auto summary = nlohmann::json::parse(ran.out);
+  EXPECT_EQ(summary["covariance"], "bootstrap by position");
+  EXPECT_GT(summary["chosen"]["lambda"].get<double>(), 0.0);
+  EXPECT_THAT(text_of(folder_ / "out/cross_validation.csv"), StartsWith("gamma,lambda,error_um2\n"));
+  EXPECT_THAT(text_of(folder_ / "out/report.html"), HasSubstr("Choice of lambda and gamma"));
+  write("folds.txt", "1\n2\n");
+  const auto refused = abbe(
+      "identify evemu --machine machine.toml --errors errors.csv --estimator lasso --folds folds.txt -o no");
+  EXPECT_EQ(refused.exit, 3);
+}
+
+TEST_F(EvemuCli, AcceptsAShapeWhenTheConfigurationSaysSoByName) {
+  const std::string limits = "[gate]\nmax_error_mm = 10\nmax_gradient = 0.1\n";
+  const auto accepted = [&](const std::string& gate) {
+    write("machine.toml", std::string{kMachine} + gate);
+    const auto ran = abbe(
+        "identify evemu --machine machine.toml --touches touches.csv --calibrator calibrator.toml --json -o "
+        "out");
+    EXPECT_EQ(ran.exit, 0) << ran.err;
+    return nlohmann::json::parse(ran.out)["gate"];
+  };
+  const auto refused = accepted(limits);
+  EXPECT_EQ(refused["accepted"], false);
+  EXPECT_THAT(refused["reasons"][0].get<std::string>(), StartsWith("shape only"));
+  EXPECT_EQ(accepted(limits + "accept = [\"evemu-shape-only\"]\n")["accepted"], true);
+  write("machine.toml", std::string{kMachine} + "[gate]\naccept = [\"everything\"]\n");
+  EXPECT_EQ(abbe("identify evemu --machine machine.toml --errors errors.csv -o out").exit, 3);
+}
+
+TEST_F(EvemuCli, ExplainsInItsReportWhatItCannotSee) {
+  ASSERT_EQ(identify(touches()).exit, 0);
+  const auto page = text_of(folder_ / "out/report.html");
+  EXPECT_THAT(page, AllOf(HasSubstr("The rotation nobody sees"), HasSubstr("shape only"),
+                          HasSubstr("Rotations of the positions"), HasSubstr("k_ezz3")));
+  EXPECT_THAT(page, ::testing::Not(HasSubstr("http://")));
 }
 
 TEST_F(EvemuCli, NamesAPositionThatIsMissing) {

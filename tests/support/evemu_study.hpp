@@ -111,6 +111,15 @@ inline std::vector<Vector3> evaluation_grid(const calib::ValidityVolume& hull,
   return grid;
 }
 
+/// The same over the volume of the reference layout, whatever layout was measured.
+inline std::vector<Vector3> reference_grid() {
+  std::vector<Vector3> balls;
+  for (const auto& position : reference_layout().true_m) {
+    balls.insert(balls.end(), position.begin(), position.end());
+  }
+  return evaluation_grid(*calib::ValidityVolume::hull_of(balls));
+}
+
 struct Remaining {
   double mean_R = 0.0, max_R = 0.0;  ///< R_resmag = |V - V_model| / |V|
   double rms_m = 0.0;                ///< of |V - V_model|

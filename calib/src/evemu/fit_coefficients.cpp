@@ -119,7 +119,7 @@ Result<Fit> fit_with(const FitProblem& problem, const SolveOptions& options) {
     case Estimator::Lasso:
     case Estimator::Mcp:
     case Estimator::Scad:
-      break;
+      return fit_sparse(problem, options);
   }
   return failure(ErrorCode::BadInput, message("estimator ", name(options.estimator), " is not known here"));
 }

@@ -22,6 +22,7 @@ struct Fit {
   Eigen::MatrixXd covariance_m2;
   CovarianceKind kind = CovarianceKind::Analytic;
   std::optional<HyperParameters> hyper;
+  std::optional<SparseChoice> sparse;
   std::vector<Vector3> pose_rotations_rad;
   Matrix3 cov_mean_pose_rotation_rad2 = Matrix3::Zero();
   double s_m = 0.0, w_rad = 0.0;
@@ -34,6 +35,7 @@ struct Fit {
 [[nodiscard]] Result<Fit> fit_with(const FitProblem&, const SolveOptions&);
 
 [[nodiscard]] Result<Fit> fit_ols(const FitProblem&);
+[[nodiscard]] Result<Fit> fit_sparse(const FitProblem&, const SolveOptions&);
 [[nodiscard]] Result<Fit> fit_prior(PriorKind, const FitProblem&);
 
 }  // namespace abbe::calib::evemu

@@ -96,6 +96,8 @@ Result<Verdict> judge(const Observations& o, const Solution& solution, const Vol
                       const JudgeOptions& options) {
   SolveOptions solve = options.solve;
   solve.estimator = solution.estimator;
+  solve.sparse.chosen = solution.sparse;
+  solve.sparse.bootstrap_runs = 0;
   return held_out(o, solution.statistics.s_m, active, solve).map([&](const HeldOutFigures& figures) {
     Verdict verdict = decide(solution.model, figures, options.limits);
     if (!solution.rotation.referenced && !options.accept_shape_only) {

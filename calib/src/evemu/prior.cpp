@@ -171,9 +171,10 @@ HyperParameters most_likely(PriorKind kind, const ScaledDesign& design, std::siz
                             const LinearGaussian& problem) {
   Objective f{kind, design, positions, problem};
   // The likelihood can have one maximum that calls the scatter noise and one that calls it pose rotation.
-  const std::array<HyperParameters, 2> starts{
+  const std::array<HyperParameters, 3> starts{
       HyperParameters{.s_d_m = 5e-4, .rho = 0.6, .s_a_m = 5e-4, .s_m = 1e-5, .w_rad = 1e-4},
-      HyperParameters{.s_d_m = 5e-4, .rho = 0.6, .s_a_m = 5e-4, .s_m = 5e-6, .w_rad = 2e-6}};
+      HyperParameters{.s_d_m = 5e-4, .rho = 0.6, .s_a_m = 5e-4, .s_m = 5e-6, .w_rad = 2e-6},
+      HyperParameters{.s_d_m = 3e-4, .rho = 0.45, .s_a_m = 2e-4, .s_m = 8e-6, .w_rad = 3e-4}};
   Minimum best{logarithms(starts.front())};
   const std::size_t used = kind == PriorKind::Ridge ? 1 : starts.size();
   for (std::size_t i = 0; i < used; ++i) {

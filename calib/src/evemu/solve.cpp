@@ -94,7 +94,24 @@ ResidualFigures residual_figures(const Observations& o, const Eigen::VectorXd& r
   return f;
 }
 
-Statistics statistics_of(const FitProblem& problem, const Fit& fit) {
+/// Observed minus fitted; what pose rotations explain is taken out. Ball1 is no observation.
+Eigen::VectorXd residuals_of(const FitProblem& problem, const Fit& fit) {
+  const Observations& o = problem.observations;
+  Eigen::VectorXd r = problem.y - problem.X * fit.c_m;
+  if (!fit.pose_rotations_rad.empty()) {
+    Eigen::VectorXd omega(static_cast<Eigen::Index>(3 * fit.pose_rotations_rad.size()));
+    for (std::size_t p = 0; p < fit.pose_rotations_rad.size(); ++p) {
+      omega.segment<3>(static_cast<Eigen::Index>(3 * p)) = fit.pose_rotations_rad[p];
+    }
+    r -= pose_rotation_rows(o) * omega;
+  }
+  for (const PositionRows& p : position_rows(o)) {
+    r.segment<3>(static_cast<Eigen::Index>(3 * p.ball1)).setZero();
+  }
+  return r;
+}
+
+Statistics statistics_of(const FitProblem& problem, const Fit& fit, const Eigen::VectorXd& r) {
   const Observations& o = problem.observations;
   Statistics s;
   s.positions = o.positions();
@@ -112,22 +129,21 @@ Statistics statistics_of(const FitProblem& problem, const Fit& fit) {
   s.degrees_of_freedom = static_cast<double>(s.observations) - fit.effective_parameters - fit.pose_parameters;
   s.s_m = fit.s_m;
   s.w_rad = fit.w_rad;
-  Eigen::VectorXd r = problem.y - problem.X * fit.c_m;
   s.before = residual_figures(o, problem.y);
   s.after = residual_figures(o, r);
-  if (!fit.pose_rotations_rad.empty()) {
-    Eigen::VectorXd omega(static_cast<Eigen::Index>(3 * fit.pose_rotations_rad.size()));
-    for (std::size_t p = 0; p < fit.pose_rotations_rad.size(); ++p) {
-      omega.segment<3>(static_cast<Eigen::Index>(3 * p)) = fit.pose_rotations_rad[p];
-    }
-    r -= pose_rotation_rows(o) * omega;
+  if (fit.s_m > 0.0) {
+    s.chi2_per_dof = whitened(o, r).squaredNorm() / (fit.s_m * fit.s_m) / std::max(1.0, s.degrees_of_freedom);
   }
-  for (const PositionRows& p : position_rows(o)) {
-    r.segment<3>(static_cast<Eigen::Index>(3 * p.ball1)).setZero();  // no observation
-  }
-  s.chi2_per_dof = whitened(o, r).squaredNorm() / (fit.s_m * fit.s_m) / std::max(1.0, s.degrees_of_freedom);
   s.iterations = fit.iterations;
   return s;
+}
+
+std::vector<Vector3> by_ball(const Eigen::VectorXd& r) {
+  std::vector<Vector3> balls;
+  for (Eigen::Index i = 0; i + 2 < r.size(); i += 3) {
+    balls.emplace_back(r.segment<3>(i));
+  }
+  return balls;
 }
 
 }  // namespace
@@ -140,6 +156,19 @@ std::optional<Estimator> estimator(std::string_view text) {
   for (const auto& [value, known] : kEstimatorNames) {
     if (known == text) {
       return value;
+    }
+  }
+  return std::nullopt;
+}
+
+std::string_view name(FoldsBy folds) {
+  return folds == FoldsBy::Position ? "position" : (folds == FoldsBy::Ball ? "ball" : "row");
+}
+
+std::optional<FoldsBy> folds_by(std::string_view text) {
+  for (const FoldsBy folds : {FoldsBy::Position, FoldsBy::Ball, FoldsBy::Row}) {
+    if (name(folds) == text) {
+      return folds;
     }
   }
   return std::nullopt;
@@ -168,7 +197,8 @@ Result<Solution> solve(const Observations& o, const SolveOptions& options) {
   if (!fit) {
     return tl::unexpected(fit.error());
   }
-  const Statistics statistics = statistics_of(problem, *fit);
+  const Eigen::VectorXd residuals = residuals_of(problem, *fit);
+  const Statistics statistics = statistics_of(problem, *fit, residuals);
   const Eigen::VectorXd raw_c_m = fit->c_m;
   const MeanRotation rotation = set_gauge(problem, *fit);
   Result<ValidityVolume> validity = ValidityVolume::hull_of(readings_m(o));
@@ -188,6 +218,8 @@ Result<Solution> solve(const Observations& o, const SolveOptions& options) {
                         .estimator = options.estimator,
                         .covariance = fit->kind,
                         .hyper = fit->hyper,
+                        .sparse = fit->sparse,
+                        .residuals_m = by_ball(residuals),
                         .pose_rotations_rad = fit->pose_rotations_rad,
                         .rotation = rotation,
                         .statistics = statistics};

@@ -9,10 +9,13 @@
 
 #include "abbe/calib/evemu/judge.hpp"
 #include "abbe/daemon/evemu_files.hpp"
+#include "abbe/daemon/evemu_report.hpp"
 #include "abbe/daemon/model_document.hpp"
+#include "abbe/daemon/model_store.hpp"
 #include "abbe/daemon/otf_inputs.hpp"
 #include "abbe/daemon/sha256.hpp"
 #include "cli/commands.hpp"
+#include "cli/daemon_socket.hpp"
 #include "cli/terminal.hpp"
 #include "files/text_file.hpp"
 
@@ -24,8 +27,8 @@ namespace evemu = calib::evemu;
 constexpr double kMicro_per_1 = 1e6;
 
 struct Arguments {
-  std::string machine, touches, calibrator, errors, reference, out;
-  std::string estimator = "bayes-pose";
+  std::string machine, touches, calibrator, errors, reference, keep, out;
+  std::string estimator = "bayes-pose", folds = "position";
   double u_reference_um = 1.0;
   int order = 3;
   int positions = 8;
@@ -78,7 +81,39 @@ Result<evemu::Solution> turned(evemu::Solution solution, const Arguments& argume
   return std::move(*result);
 }
 
+/// A word, or a file with one fold number for each of the 3 rows of every ball, by position and ball.
+Result<evemu::SparseOptions> sparse_options(const Arguments& arguments, std::vector<InputFile>& sources) {
+  evemu::SparseOptions options;
+  if (const auto by = evemu::folds_by(arguments.folds)) {
+    options.folds = *by;
+    return options;
+  }
+  const auto text = read_text(arguments.folds);
+  if (!text) return tl::make_unexpected(text.error());
+  auto folds = calib::sparse::parse_folds(*text);
+  if (!folds) return fail(ErrorCode::BadInput, fmt::format("{}: {}", arguments.folds, folds.error().text));
+  sources.push_back({std::filesystem::path(arguments.folds).filename().string(), sha256_hex(*text)});
+  options.given_folds = std::move(*folds);
+  return options;
+}
+
+Result<std::optional<ModelDocument>> active_model(const Arguments& arguments) {
+  std::optional<ModelDocument> active;
+  if (arguments.keep.empty()) return active;
+  const auto store = ModelStore::open(arguments.keep);
+  if (!store) return tl::make_unexpected(store.error());
+  const auto id = store->active_id();
+  if (!id) return tl::make_unexpected(id.error());
+  if (!*id) return active;
+  auto document = store->load(**id);
+  if (!document) return tl::make_unexpected(document.error());
+  active = std::move(*document);
+  return active;
+}
+
 Result<Outcome> identify(const Arguments& arguments) {
+  const auto active = active_model(arguments);
+  if (!active) return tl::make_unexpected(active.error());
   auto config = load_config(arguments.machine);
   if (!config) return tl::make_unexpected(config.error());
   const auto hash = sha256_hex_of_file(arguments.machine);
@@ -97,12 +132,16 @@ Result<Outcome> identify(const Arguments& arguments) {
   evemu::JudgeOptions judging;
   judging.solve.estimator = *evemu::estimator(arguments.estimator);
   judging.limits = gate_limits(config->gate);
-  judging.accept_shape_only = arguments.accept_shape_only;
+  judging.accept_shape_only = arguments.accept_shape_only || config->gate.accepts(evemu::kShapeOnly);
+  auto sparse = sparse_options(arguments, outcome.sources);
+  if (!sparse) return tl::make_unexpected(sparse.error());
+  judging.solve.sparse = std::move(*sparse);
   auto solution = evemu::solve(outcome.observations, judging.solve);
   if (!solution) return tl::make_unexpected(error_of(solution.error()));
   auto referenced = turned(std::move(*solution), arguments, outcome.sources);
   if (!referenced) return tl::make_unexpected(referenced.error());
-  auto verdict = evemu::judge(outcome.observations, *referenced, nullptr, judging);
+  auto verdict =
+      evemu::judge(outcome.observations, *referenced, *active ? &(*active)->model : nullptr, judging);
   if (!verdict) return tl::make_unexpected(error_of(verdict.error()));
   outcome.config = std::move(*config);
   outcome.solution = std::move(*referenced);
@@ -110,12 +149,45 @@ Result<Outcome> identify(const Arguments& arguments) {
   return outcome;
 }
 
-Result<void> write_outputs(const std::filesystem::path& folder, const ModelDocument& document) {
+/// The surface lambda and gamma were chosen from; cells no path reached are left out.
+std::string to_surface_csv(const evemu::SparseChoice& choice) {
+  std::string text = "gamma,lambda,error_um2\n";
+  constexpr double kUm2PerMm2 = 1e6;
+  for (std::size_t g = 0; g < choice.all_gamma.size(); ++g)
+    for (std::size_t l = 0; l < choice.all_lambda.size(); ++l) {
+      const double error =
+          choice.error_mm2(static_cast<Eigen::Index>(l), static_cast<Eigen::Index>(g)) * kUm2PerMm2;
+      if (std::isfinite(error))
+        text += fmt::format("{:.17g},{:.17g},{:.17g}\n", choice.all_gamma[g], choice.all_lambda[l], error);
+    }
+  return text;
+}
+
+Result<void> write_outputs(const std::filesystem::path& folder, const ModelDocument& document,
+                           const Outcome& outcome) {
   std::error_code failed;
   std::filesystem::create_directories(folder, failed);
   if (failed) return fail(ErrorCode::Io, fmt::format("create {}: {}", folder.string(), failed.message()));
   if (auto done = replace_file(folder / "model.json", to_json(document)); !done) return done;
-  return replace_file(folder / "coefficients.csv", to_coefficients_csv(*document.model.polynomials()));
+  if (auto done =
+          replace_file(folder / "coefficients.csv", to_coefficients_csv(*document.model.polynomials()));
+      !done)
+    return done;
+  if (const auto& choice = outcome.solution->sparse)
+    if (auto done = replace_file(folder / "cross_validation.csv", to_surface_csv(*choice)); !done)
+      return done;
+  return replace_file(folder / "report.html",
+                      evemu_report(document, outcome.observations, *outcome.solution, outcome.verdict));
+}
+
+Result<void> keep(const Arguments& arguments, const ModelDocument& document, const calib::Verdict& verdict) {
+  if (arguments.keep.empty()) return {};
+  auto store = ModelStore::open(arguments.keep);
+  if (!store) return tl::make_unexpected(store.error());
+  const auto id = store->add(document, verdict.accepted, verdict.reasons,
+                             {user_name(), "abbe identify evemu", document.created});
+  if (!id) return tl::make_unexpected(id.error());
+  return {};
 }
 
 double u_rotation_urad(const evemu::Solution& solution) {
@@ -125,7 +197,7 @@ double u_rotation_urad(const evemu::Solution& solution) {
 void print_json(const Outcome& outcome, const ModelDocument& document, const std::filesystem::path& folder) {
   const auto& s = outcome.solution->statistics;
   const auto& held_out = outcome.verdict.held_out;
-  const nlohmann::json object{
+  nlohmann::json object{
       {"model", (folder / "model.json").string()},
       {"id", model_id(document.model, document.method)},
       {"hash", model_hash(document.model, document.method)},
@@ -147,6 +219,8 @@ void print_json(const Outcome& outcome, const ModelDocument& document, const std
       {"held_out_rms_before_um", held_out.no_compensation_rms_m * kMicro_per_1},
       {"held_out_rms_after_um", held_out.candidate_rms_m * kMicro_per_1},
       {"gate", {{"accepted", outcome.verdict.accepted}, {"reasons", outcome.verdict.reasons}}}};
+  if (const auto& choice = outcome.solution->sparse)
+    object["chosen"] = {{"lambda", choice->lambda.back()}, {"gamma", choice->gamma}};
   fmt::print("{}\n", object.dump(1));
 }
 
@@ -163,6 +237,9 @@ void print_summary(const Outcome& outcome, const ModelDocument& document,
       document.estimator, s.observations, s.rank, s.unknowns, s.condition, s.effective_parameters);
   fmt::print("noise       {:.2f} um per ball coordinate, {:.1f} urad per position\n", s.s_m * kMicro_per_1,
              s.w_rad * kMicro_per_1);
+  if (const auto& choice = outcome.solution->sparse)
+    fmt::print("chosen      lambda {:.3g}, gamma {:.3g}{}\n", choice->lambda.back(), choice->gamma,
+               choice->curvature < 0.0 ? "; not convex there: other solutions may be near" : "");
   fmt::print("residuals   {:.3f} um rms before, {:.3f} um after\n", s.before.rms_m * kMicro_per_1,
              s.after.rms_m * kMicro_per_1);
   fmt::print("held out    {:.3f} um rms without compensation, {:.3f} um with the model\n",
@@ -173,7 +250,7 @@ void print_summary(const Outcome& outcome, const ModelDocument& document,
   fmt::print("gate        {}\n", outcome.verdict.accepted ? coloured("would accept", kGreen, kStdout)
                                                           : coloured("would refuse", kYellow, kStdout));
   for (const auto& reason : outcome.verdict.reasons) fmt::print("            {}\n", reason);
-  fmt::print("written     {}, coefficients.csv\n", (folder / "model.json").string());
+  fmt::print("written     {}, coefficients.csv, report.html\n", (folder / "model.json").string());
 }
 
 int run(const Arguments& arguments) {
@@ -181,7 +258,9 @@ int run(const Arguments& arguments) {
   if (!outcome) return report(outcome.error());
   const auto now = std::chrono::time_point_cast<std::chrono::nanoseconds>(std::chrono::system_clock::now());
   const auto document = evemu_document(*outcome->solution, outcome->config, outcome->sources, now);
-  if (const auto written = write_outputs(arguments.out, document); !written) return report(written.error());
+  if (const auto written = write_outputs(arguments.out, document, *outcome); !written)
+    return report(written.error());
+  if (const auto kept = keep(arguments, document, outcome->verdict); !kept) return report(kept.error());
   arguments.json ? print_json(*outcome, document, arguments.out)
                  : print_summary(*outcome, document, arguments.out);
   return 0;
@@ -200,8 +279,14 @@ void add_options(CLI::App& command, Arguments& arguments) {
   command
       .add_option("--estimator", arguments.estimator,
                   "bayes-pose: priors by order, shared noise of Ball1, random pose rotations;\n"
-                  "ols: least squares; ridge: one prior for all")
-      ->check(CLI::IsMember({"bayes-pose", "ols", "ridge"}))
+                  "ols: least squares; ridge: one prior for all;\n"
+                  "lasso, mcp, scad: penalised, chosen by cross-validation over 50 x 100 values")
+      ->check(CLI::IsMember({"bayes-pose", "ols", "ridge", "lasso", "mcp", "scad"}))
+      ->capture_default_str();
+  command
+      .add_option("--folds", arguments.folds,
+                  "what lasso, mcp and scad hold out together: position, ball, row (as published: leaks the\n"
+                  "noise rows share), or a file of one fold number a row")
       ->capture_default_str();
   command.add_option("--order", arguments.order, "of the polynomials")
       ->check(CLI::Range(evemu::kLeastOrder, evemu::kMostOrder))
@@ -220,7 +305,10 @@ void add_options(CLI::App& command, Arguments& arguments) {
       ->check(CLI::PositiveNumber)
       ->capture_default_str();
   command.add_flag("--accept-shape-only", arguments.accept_shape_only,
-                   "judge the model although its rotation about Ball1 is unknown");
+                   "judge the model although its rotation about Ball1 is unknown; as [gate] accept =\n"
+                   "[\"evemu-shape-only\"]");
+  command.add_option("--keep", arguments.keep,
+                     "also keep the model in this store, judged against the model active there");
   command.add_flag("--json", arguments.json, "the summary as one JSON object");
   command.add_option("-o,--out", arguments.out, "folder for the results; created if needed")->required();
 }
@@ -229,11 +317,11 @@ void add_options(CLI::App& command, Arguments& arguments) {
 
 void add_identify_evemu(CLI::App& parent, int& exit) {
   auto arguments = std::make_shared<Arguments>();
-  auto* command = parent.add_subcommand(
-      "evemu",
-      "From a ball array touched at several positions.\n"
-      "Writes model.json and coefficients.csv to OUT and says how well the model predicts positions it was "
-      "not fitted to.");
+  auto* command = parent.add_subcommand("evemu",
+                                        "From a ball array touched at several positions.\n"
+                                        "Writes model.json, coefficients.csv and report.html to OUT and says "
+                                        "how well the model predicts positions it was "
+                                        "not fitted to.");
   add_options(*command, *arguments);
   command->callback([arguments, &exit] {
     exit = arguments->touches.empty() && arguments->errors.empty()

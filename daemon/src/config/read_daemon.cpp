@@ -1,5 +1,8 @@
 #include <fmt/format.h>
 
+#include <algorithm>
+
+#include "abbe/calib/evemu/judge.hpp"
 #include "config/readers.hpp"
 
 namespace abbe::daemon {
@@ -80,6 +83,11 @@ void read_gate(Section& root, Config& out) {
   section.get("max_error_mm", gate.max_error_m, kMilli, kPositive);
   section.get("max_gradient", gate.max_gradient, kPlain, kPositive);
   section.get("holdout_fraction", gate.holdout_fraction, kPlain, {0.05, 0.5});
+  if (section.get("accept", gate.accept)) {
+    for (const auto& name : gate.accept)
+      if (name != calib::evemu::kShapeOnly)
+        section.fault("accept", fmt::format("\"{}\": must be \"{}\"", name, calib::evemu::kShapeOnly));
+  }
   section.close();
 }
 
@@ -88,6 +96,10 @@ void read_control(Section& root, const std::filesystem::path& base, Config& out)
   out.control.socket = out.daemon.runtime_dir / "control.sock";
   section.get("socket", out.control.socket, base);
   section.close();
+}
+
+bool GateConfig::accepts(std::string_view name) const {
+  return std::find(accept.begin(), accept.end(), name) != accept.end();
 }
 
 }  // namespace abbe::daemon

@@ -5,7 +5,8 @@
 ///   bayes-pose the default: priors by order, shared noise of Ball1 and random pose rotations, their sizes by
 ///              marginal likelihood (prior.hpp); what the machine's errors do to spheres and blocks is in the
 ///              design when their touches are there.
-///   lasso, mcp, scad  as in [Li OMM] with ncvreg's semantics; covariance by bootstrap (see CovarianceKind).
+///   lasso, mcp, scad  as in [Li OMM]: plain monomials in mm, ncvreg's semantics, lambda and gamma by
+///              cross-validation; covariance by bootstrap (see CovarianceKind).
 /// Not estimable from touches: a rotation of V about Ball1 common to all positions (observe.hpp). It is set
 /// to what the blocks say (gauge Ball1-blocks), and its uncertainty is in the covariance. Also not in the
 /// covariance: that hyper-parameters are estimates, that a machine is no polynomial, and errors of the
@@ -19,6 +20,7 @@
 
 #include "abbe/calib/evemu/noise.hpp"
 #include "abbe/calib/evemu/prior.hpp"
+#include "abbe/calib/sparse/folds.hpp"
 #include "abbe/calib/volumetric_model.hpp"
 
 namespace abbe::calib::evemu {
@@ -32,11 +34,39 @@ enum class Estimator { Ols, Ridge, BayesPose, Lasso, Mcp, Scad };
 enum class CovarianceKind { Analytic, Bootstrap };
 [[nodiscard]] std::string_view name(CovarianceKind);
 
+/// How rows are held out to choose lambda and gamma. Folds over single rows, as in [Li OMM], let a fit see
+/// the noise it is judged by: the components of a ball share their touches, the balls of a position share
+/// Ball1.
+enum class FoldsBy { Position, Ball, Row };
+[[nodiscard]] std::string_view name(FoldsBy);
+[[nodiscard]] std::optional<FoldsBy> folds_by(std::string_view name);
+
+/// lambda and gamma, with the surface they were chosen from.
+struct SparseChoice {
+  std::vector<double> lambda;  ///< the path down to the chosen one, which is last [mm]
+  double gamma = 3.7;
+  std::vector<double> all_lambda, all_gamma;
+  Eigen::MatrixXd error_mm2;  ///< mean squared held-out error, all_lambda x all_gamma; NaN: not reached
+  double curvature = 0.0;     ///< smallest eigenvalue of sparse::convexity at the choice; < 0: other minima
+                              ///< may be near
+};
+
+struct SparseOptions {
+  FoldsBy folds = FoldsBy::Position;
+  std::optional<sparse::Folds> given_folds{};  ///< set: these, for 3 rows of every observation in their order
+  /// Grid to choose from; empty: the one of [Li OMM], 100 lambdas 1e-1 .. 1e-10 mm, 50 gammas up to 100.
+  std::vector<double> lambda{}, gamma{};
+  std::uint64_t seed = 1;                ///< of the bootstrap, and of folds over rows
+  int bootstrap_runs = 100;              ///< a standard deviation to 7 %; 0: no covariance
+  std::optional<SparseChoice> chosen{};  ///< set: no search
+};
+
 struct SolveOptions {
   Estimator estimator = Estimator::BayesPose;
   /// Ridge and bayes-pose, when there are touches: rows through the touched points. Off: through the centres
   /// alone, as in [Li OMM] and as for all other estimators.
   bool use_touches = true;
+  SparseOptions sparse{};
 };
 
 struct ResidualFigures {
@@ -55,7 +85,7 @@ struct Statistics {
   double degrees_of_freedom = 0.0;    ///< observations - those of coefficients and pose rotations
   double s_m = 0.0;                   ///< noise of a ball centre per coordinate
   double w_rad = 0.0;                 ///< random pose rotation per axis; 0 where not estimated
-  double chi2_per_dof = 0.0;          ///< of whitened residuals over s
+  double chi2_per_dof = 0.0;          ///< of whitened residuals over s; 0 without s
   ResidualFigures before, after;
   int iterations = 0;
 };
@@ -75,6 +105,9 @@ struct Solution {
   Estimator estimator = Estimator::BayesPose;
   CovarianceKind covariance = CovarianceKind::Analytic;
   std::optional<HyperParameters> hyper;
+  std::optional<SparseChoice> sparse;
+  /// Observed minus fitted, pose rotations taken out, in the order of the observations; Ball1: zero.
+  std::vector<Vector3> residuals_m;
   std::vector<Vector3> pose_rotations_rad;  ///< estimated, by position; empty where not modelled
   MeanRotation rotation;
   Statistics statistics;
@@ -83,8 +116,9 @@ struct Solution {
 /// The scaled design over the readings.
 [[nodiscard]] Result<ScaledDesign> design_of(const Observations&);
 
-/// RankDeficient for ols when the positions do not determine every combination, TooFewObservations,
-/// DegenerateGeometry when the balls enclose no volume.
+/// Errors of sparse::grid_search for lasso, mcp and scad (folds that are not for these rows), RankDeficient
+/// for ols when the positions do not determine every combination, TooFewObservations, DegenerateGeometry when
+/// the balls enclose no volume.
 [[nodiscard]] Result<Solution> solve(const Observations&, const SolveOptions& = {});
 
 /// V known independently at some readings, relative to each other in the machine's directions.

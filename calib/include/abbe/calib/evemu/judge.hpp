@@ -1,10 +1,11 @@
 #pragma once
 /// Stage three: how well the model predicts positions it was not fitted to. Every position is left out once
-/// and the model fitted to the others, hyper-parameters included. A position's direction is known only
-/// through its blocks, so every contender gets its own best-fit rotation about Ball1 there, the same three
-/// numbers of freedom from the same rows, and is compared by what remains over the noise balls share. What
-/// this test cannot see is a rotation common to all positions (observe.hpp). A model with an unreferenced
-/// rotation is a shape: it is refused unless somebody accepts that by name.
+/// and the model fitted to the others, hyper-parameters included (not lambda and gamma of the sparse
+/// estimators: those stay as chosen). A position's direction is known only through its blocks, so every
+/// contender gets its own best-fit rotation about Ball1 there, the same three numbers of freedom from the
+/// same rows, and is compared by what remains over the noise balls share. What this test cannot see is a
+/// rotation common to all positions (observe.hpp). A model with an unreferenced rotation is a shape: it is
+/// refused unless somebody accepts that by name.
 
 #include "abbe/calib/evemu/solve.hpp"
 #include "abbe/calib/gate.hpp"

@@ -9,8 +9,9 @@
 ///              cross-validation; covariance by bootstrap (see CovarianceKind).
 /// Not estimable from touches: a rotation of V about Ball1 common to all positions (observe.hpp). It is set
 /// to what the blocks say (gauge Ball1-blocks), and its uncertainty is in the covariance. Also not in the
-/// covariance: that hyper-parameters are estimates, that a machine is no polynomial, and errors of the
-/// calibrator that all positions share.
+/// covariance: that hyper-parameters are estimates (of nearly coplanar positions, a twentieth of the tilt of
+/// [Li OMM], the likelihood can take slopes of V for pose rotations), that a machine is no polynomial, and
+/// errors of the calibrator that all positions share.
 
 #include <cstddef>
 #include <cstdint>

@@ -84,9 +84,19 @@ std::vector<Vector3> extremes(std::span<const Vector3> points) {
   return distinct(found);
 }
 
-bool is_inside(std::span<const Plane> planes, const Vector3& p) {
-  return std::all_of(planes.begin(), planes.end(),
-                     [&](const Plane& f) { return f.outward.dot(p) < f.offset_m - kFlat_m; });
+/// Of `points`, the farthest outside of each face; the faces of a few points meet most of the others at once.
+std::vector<Vector3> farthest_outside(std::span<const Plane> planes, std::span<const Vector3> points) {
+  std::vector<Vector3> found;
+  for (const Plane& face : planes) {
+    const auto height = [&](const Vector3& p) { return face.outward.dot(p) - face.offset_m; };
+    const auto farthest =
+        std::max_element(points.begin(), points.end(),
+                         [&](const Vector3& a, const Vector3& b) { return height(a) < height(b); });
+    if (height(*farthest) > kFlat_m) {
+      found.push_back(*farthest);
+    }
+  }
+  return distinct(found);
 }
 
 /// A vertex lies in three faces or more with independent directions.
@@ -101,6 +111,30 @@ bool is_vertex(std::span<const Plane> planes, const Vector3& p) {
   return directions.determinant() > kIndependent;
 }
 
+struct Hull {
+  std::vector<Plane> planes;
+  std::vector<Vector3> on_surface;
+};
+
+bool is_inside(std::span<const Plane> planes, const Vector3& p) {
+  return std::all_of(planes.begin(), planes.end(),
+                     [&](const Plane& f) { return f.outward.dot(p) < f.offset_m - kFlat_m; });
+}
+
+/// The hull of the extremes grows by what lies outside until nothing does, so that the brute force sees the
+/// corners (8 for a box of any number of points) and not the path between them.
+Hull hull_of_distinct(std::span<const Vector3> points) {
+  Hull hull{{}, extremes(points)};
+  std::vector<Vector3> beyond;
+  do {
+    hull.on_surface.insert(hull.on_surface.end(), beyond.begin(), beyond.end());
+    hull.planes = supporting_planes(hull.on_surface);
+    std::erase_if(hull.on_surface, [&](const Vector3& p) { return is_inside(hull.planes, p); });
+    beyond = farthest_outside(hull.planes, points);
+  } while (!beyond.empty());
+  return hull;
+}
+
 }  // namespace
 
 Result<ValidityVolume> ValidityVolume::hull_of(std::span<const Vector3> axis_positions_m) {
@@ -109,20 +143,14 @@ Result<ValidityVolume> ValidityVolume::hull_of(std::span<const Vector3> axis_pos
       return failure(ErrorCode::NotFinite, "validity volume: a point is not a number");
     }
   }
-  std::vector<Vector3> points = distinct(axis_positions_m);
-  if (points.size() >= 4) {
-    const std::vector<Plane> first = supporting_planes(extremes(points));
-    if (first.size() >= 4) {
-      std::erase_if(points, [&](const Vector3& p) { return is_inside(first, p); });
-    }
-  }
+  const std::vector<Vector3> points = distinct(axis_positions_m);
+  const Hull hull = points.size() < 4 ? Hull{} : hull_of_distinct(points);
   ValidityVolume volume;
-  const std::vector<Plane> planes = supporting_planes(points);
-  for (const Plane& plane : planes) {
+  for (const Plane& plane : hull.planes) {
     volume.faces_.push_back({plane.outward, plane.offset_m});
   }
   std::copy_if(points.begin(), points.end(), std::back_inserter(volume.vertices_m_),
-               [&](const Vector3& p) { return is_vertex(planes, p); });
+               [&](const Vector3& p) { return is_vertex(hull.planes, p); });
   if (volume.faces_.size() < 4 || volume.vertices_m_.size() < 4) {
     return failure(ErrorCode::DegenerateGeometry,
                    message("validity volume: ", points.size(), " different points do not enclose a volume"));

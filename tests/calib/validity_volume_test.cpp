@@ -58,6 +58,36 @@ TEST(ValidityVolume, CanBeMadeAgainFromItsVertices) {
   EXPECT_FALSE(again.contains({0.2999, 0.2502, -0.0001}));
 }
 
+TEST(ValidityVolume, SeesTheBumpOnATiltedPlate) {
+  std::vector<Vector3> points;
+  for (int i = 0; i <= 10; ++i) {
+    for (int j = 0; j <= 10; ++j) {
+      const double x = 0.1 * i, y = 0.1 * j;
+      const bool bump = i == 5 && j == 5;
+      points.emplace_back(x, y, 0.3 * x + 0.7 * y + (bump ? 1e-4 : 0.0));
+    }
+  }
+  const Result<ValidityVolume> volume = ValidityVolume::hull_of(points);
+  ASSERT_TRUE(volume) << volume.error().text;
+  EXPECT_TRUE(volume->contains({0.5, 0.5, 0.50005}));
+  EXPECT_FALSE(volume->contains({0.5, 0.5, 0.5002}));
+}
+
+TEST(ValidityVolume, OfALongPathAroundABoxIsThatBox) {
+  std::vector<Vector3> points;
+  const std::vector<Vector3> corners{{0, 0, 0}, {1, 0, 0}, {1, 1, 0}, {0, 1, 0},
+                                     {0, 1, 1}, {1, 1, 1}, {1, 0, 1}, {0, 0, 1}};
+  for (std::size_t leg = 0; leg + 1 < corners.size(); ++leg) {
+    for (int i = 0; i < 1000; ++i) {
+      points.push_back(corners[leg] + 1e-3 * i * (corners[leg + 1] - corners[leg]));
+    }
+  }
+  points.push_back(corners.back());
+  const Result<ValidityVolume> volume = ValidityVolume::hull_of(points);
+  ASSERT_TRUE(volume) << volume.error().text;
+  EXPECT_EQ(volume->vertices_m().size(), 8u);
+}
+
 TEST(ValidityVolume, RefusesAFlatOne) {
   const std::vector<Vector3> flat{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {1, 1, 0}, {0.5, 0.2, 0}};
   const Result<ValidityVolume> volume = ValidityVolume::hull_of(flat);

@@ -13,7 +13,8 @@
 #include <string>
 
 #include "abbe/daemon/cdr.hpp"
-#include "abbe/dds/grid_comparison.hpp"
+#include "abbe/daemon/input_files.hpp"
+#include "abbe/dds/grid_nodes.hpp"
 #include "abbe/dds/json_lines.hpp"
 #include "abbe/dds/participant.hpp"
 #include "abbe/dds/readers.hpp"
@@ -195,7 +196,7 @@ class Watch {
   WallClock::time_point last_live_{};
 };
 
-void print_comparison(const Options& options, const dds::GridComparison& c, const std::string& model_id) {
+void print_comparison(const Options& options, const calib::FieldComparison& c, const std::string& model_id) {
   if (options.json) {
     fmt::print(
         "{{\"comparison\":{{\"model_id\":\"{}\",\"points\":{},\"outside\":{},\"before_mean_um\":{:.6g},"
@@ -216,21 +217,23 @@ void print_comparison(const Options& options, const dds::GridComparison& c, cons
 }
 
 Result<void> use_model(const Options& options, const dds::ReceivedModel& model,
-                       const std::vector<dds::KnownError>& known) {
+                       const std::optional<daemon::ErrorsFile>& known) {
   const auto nodes = model.grid();
   if (!options.grid_csv.empty()) {
     if (auto written = dds::write_grid_csv(options.grid_csv, *nodes); !written) return written;
   }
-  if (known.empty()) return {};
-  const auto grid = dds::GridInterpolation::create(*nodes);
-  if (!grid) return tl::make_unexpected(grid.error());
-  const auto comparison = dds::compare(known, *grid);
-  if (!comparison) return tl::make_unexpected(comparison.error());
+  if (!known) return {};
+  const auto lattice = dds::lattice_of(*nodes);
+  if (!lattice) return tl::make_unexpected(lattice.error());
+  std::vector<calib::Vector3> positions_m;
+  for (const auto& q : known->points_m) positions_m.emplace_back(q[0], q[1], q[2]);
+  const auto comparison = calib::compare(positions_m, known->errors_m, *lattice);
+  if (!comparison) return daemon::fail(ErrorCode::DataInsufficient, comparison.error().text);
   print_comparison(options, *comparison, model.state()->model_id());
   return {};
 }
 
-int watch(const Options& options, dds::Readers& readers, const std::vector<dds::KnownError>& known) {
+int watch(const Options& options, dds::Readers& readers, const std::optional<daemon::ErrorsFile>& known) {
   Watch watch(options);
   const auto start = WallClock::now();
   bool answered_for = false;
@@ -259,9 +262,9 @@ int watch(const Options& options, dds::Readers& readers, const std::vector<dds::
 }
 
 int run(const Options& options) {
-  std::vector<dds::KnownError> known;
+  std::optional<daemon::ErrorsFile> known;
   if (!options.known_errors.empty()) {
-    auto read = dds::read_known_errors(options.known_errors);
+    auto read = daemon::read_errors_csv(options.known_errors);
     if (!read) return exit_code_of(read.error());
     known = std::move(*read);
   }

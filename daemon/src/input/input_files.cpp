@@ -15,6 +15,7 @@ namespace abbe::daemon {
 namespace {
 
 constexpr double kMmPerM = 1e3;
+constexpr double kUmPerM = 1e6;
 constexpr double kSecondsPerMinute = 60.0;
 
 struct Parsed {
@@ -158,6 +159,30 @@ Result<PointsFile> read_points_csv(const std::filesystem::path& file) {
   for (std::size_t row = 0; row < parsed->table.rows(); ++row)
     points.points_m.push_back(position_m(parsed->table, row, 0));
   return points;
+}
+
+Result<ErrorsFile> read_errors_csv(const std::filesystem::path& file) {
+  auto parsed = parse(file, {{{"x_mm"},
+                              {"y_mm"},
+                              {"z_mm"},
+                              {"ex_um"},
+                              {"ey_um"},
+                              {"ez_um"},
+                              {"ux_um", false},
+                              {"uy_um", false},
+                              {"uz_um", false},
+                              {"inside", false}}});
+  if (!parsed) return tl::make_unexpected(parsed.error());
+  check_rows(*parsed, 1, "points");
+  if (parsed->faults.any()) return tl::make_unexpected(parsed->faults.to_error());
+  ErrorsFile errors{parsed->source, {}, {}};
+  const auto& table = parsed->table;
+  for (std::size_t row = 0; row < table.rows(); ++row) {
+    errors.points_m.push_back(position_m(table, row, 0));
+    errors.errors_m.emplace_back(table.at(row, 3) / kUmPerM, table.at(row, 4) / kUmPerM,
+                                 table.at(row, 5) / kUmPerM);
+  }
+  return errors;
 }
 
 }  // namespace abbe::daemon

@@ -65,4 +65,13 @@ struct PointsFile {
 };
 [[nodiscard]] Result<PointsFile> read_points_csv(const std::filesystem::path& file);
 
+/// errors.csv: `x_mm,y_mm,z_mm,ex_um,ey_um,ez_um[,ux_um,uy_um,uz_um][,inside]` as `abbe model eval` writes
+/// it, V = true - reading at scale readings, at least one; u and inside are not used.
+struct ErrorsFile {
+  InputFile source;
+  std::vector<AxisPosition> points_m;
+  std::vector<calib::Vector3> errors_m;  ///< as long as points_m
+};
+[[nodiscard]] Result<ErrorsFile> read_errors_csv(const std::filesystem::path& file);
+
 }  // namespace abbe::daemon

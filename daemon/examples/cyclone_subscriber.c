@@ -9,6 +9,9 @@
 #include "abbe_v1.h"
 #include "dds/dds.h"
 
+/* How often we look, so how long a vector may have waited for us. */
+static const dds_duration_t poll_period = DDS_MSECS(5);
+
 /* The rule of abbe_v1.idl. answered_for: a writer of ModelState keeps its lease. */
 static const char* why_not(const abbe_v1_Compensation* c, const abbe_v1_ModelState* state,
                            bool answered_for) {
@@ -18,7 +21,7 @@ static const char* why_not(const abbe_v1_Compensation* c, const abbe_v1_ModelSta
   if (strcmp(c->model_id, state->model_id) != 0) return "the vector is of another model";
   if (!c->inside) return "outside the volume the data covered";
   if (!c->tool_ok) return "the model does not hold for this tool";
-  if (c->age_ns > c->validity_ns) return "too old";
+  if (c->age_ns + poll_period > c->validity_ns) return "too old";
   return NULL;
 }
 
@@ -76,6 +79,6 @@ int main(int argc, char** argv) {
     while (dds_take(vectors, (void**)&vector, &info, 1, 1) > 0) {
       if (info.valid_data) decide(vector, state, answered_for);
     }
-    dds_sleepfor(DDS_MSECS(5));
+    dds_sleepfor(poll_period);
   }
 }

@@ -4,6 +4,7 @@
 // own.
 #include <unistd.h>
 
+#include <cstdint>
 #include <cstdio>
 #include <cstdlib>
 #include <fastdds/dds/domain/DomainParticipant.hpp>
@@ -23,15 +24,23 @@ using abbe::v1::ModelState;
 
 namespace {
 
-/// The rule of abbe_v1.idl. `answered_for`: a writer of ModelState keeps its lease.
-const char* why_not(const Compensation& c, const ModelState& state, bool answered_for) {
+/// How long a vector has waited for us: the listener's lock, and whatever else kept this thread.
+std::int64_t waited_ns(const SampleInfo& info) {
+  eprosima::fastrtps::Time_t now;
+  eprosima::fastrtps::Time_t::now(now);
+  return now.to_ns() - info.reception_timestamp.to_ns();
+}
+
+/// The rule of abbe_v1.idl. `answered_for`: a writer of ModelState keeps its lease; `age_ns`: with our own
+/// waiting.
+const char* why_not(const Compensation& c, std::int64_t age_ns, const ModelState& state, bool answered_for) {
   if (!answered_for) return "nobody answers for the model";
   if (state.state() != abbe::v1::MODEL_ACTIVE || c.state() != abbe::v1::MODEL_ACTIVE)
     return "the model is not ACTIVE";
   if (c.model_id() != state.model_id()) return "the vector is of another model";
   if (!c.inside()) return "outside the volume the data covered";
   if (!c.tool_ok()) return "the model does not hold for this tool";
-  if (c.age_ns() > c.validity_ns()) return "too old";
+  if (age_ns > c.validity_ns()) return "too old";
   return nullptr;
 }
 
@@ -53,12 +62,12 @@ class Listener : public DataReaderListener {
         std::printf("state %u %s\n", static_cast<unsigned>(state_.state()), state_.reason().c_str());
     }
     while (!is_state && reader->take_next_sample(&c, &info) == ok) {
-      if (info.valid_data) decide(c);
+      if (info.valid_data) decide(c, c.age_ns() + waited_ns(info));
     }
   }
 
-  void decide(const Compensation& c) {
-    if (const char* reason = why_not(c, state_, answered_for_)) {
+  void decide(const Compensation& c, std::int64_t age_ns) {
+    if (const char* reason = why_not(c, age_ns, state_, answered_for_)) {
       std::printf("do not apply: %s\n", reason);
     } else {
       std::printf("apply V = %.3f %.3f %.3f um\n", c.vector_m()[0] * 1e6, c.vector_m()[1] * 1e6,

@@ -1,5 +1,6 @@
 /// abbe-sim: a machine with known errors and the instruments around it, on real sockets.
 
+#include <CLI/CLI.hpp>
 #include <cstdio>
 #include <exception>
 #include <vector>

@@ -2,11 +2,14 @@
 /// The subcommands of abbe-sim. Each adds itself to the command line and returns what runs it; the result is
 /// an exit code.
 
-#include <CLI/CLI.hpp>
 #include <functional>
 #include <string_view>
 
 #include "abbe/sim/error.hpp"
+
+namespace CLI {
+class App;
+}
 
 namespace abbe::sim {
 

@@ -3,12 +3,15 @@
 /// table, in the same file or in one of its own. In files lengths are mm, small errors um and urad; here
 /// everything is SI.
 
-#include <CLI/CLI.hpp>
 #include <cstdint>
 #include <optional>
 #include <string>
 
 #include "abbe/sim/simulation.hpp"
+
+namespace CLI {
+class App;
+}
 
 namespace abbe::sim {
 

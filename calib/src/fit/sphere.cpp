@@ -76,8 +76,10 @@ Result<Sphere> fit_sphere(std::span<const Vector3> points, std::optional<double>
                    message("sphere: ", points.size(), " points do not determine one (last step ", step,
                            " of the set's size after ", sphere.iterations, " iterations)"));
   }
-  const Eigen::MatrixX4d J = jacobian(p, s, r);
-  const Eigen::JacobiSVD<Eigen::MatrixX4d> svd(J, Eigen::ComputeFullV);
+  const Eigen::HouseholderQR<Eigen::MatrixX4d> qr(jacobian(p, s, r));
+  Eigen::Matrix4d R = qr.matrixQR().topRows<4>();
+  R.triangularView<Eigen::StrictlyLower>().setZero();
+  const Eigen::JacobiSVD<Eigen::Matrix4d, Eigen::NoQRPreconditioner> svd(R, Eigen::ComputeFullV);
   sphere.condition = svd.singularValues()(0) / svd.singularValues()(3);
   sphere.centre = set->centroid + set->size * s.centre;
   sphere.radius = set->size * s.radius;

@@ -68,6 +68,11 @@ void read_dds(Section& root, const std::filesystem::path& base, Config& out) {
   section.get("snapshot_hz", dds.snapshot_hz, kPlain, {0.0, 1000.0});
   section.get("compensation_hz", dds.compensation_hz, kPlain, {0.0, 1000.0});
   section.get_integer("priority", dds.priority, 0, 99);
+  if (dds.priority >= out.daemon.hub_priority)
+    section.fault("priority",
+                  fmt::format("must be below [daemon] hub_priority {}: a busy participant must not "
+                              "keep the hub from its beat",
+                              out.daemon.hub_priority));
   section.get("validity_s", dds.validity, kPlain, {0.01, 3600.0});
   section.get_word<Supervise>(
       "supervise", dds.supervise,

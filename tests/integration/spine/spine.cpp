@@ -47,7 +47,7 @@ file = "path.csv"
 feed_mm_per_min = 10000
 acceleration_mm_per_s2 = 1000
 dwell_s = 0.05
-standstill_s = 2
+standstill_s = 8
 [sim.tracker]
 position_mm = [-350, -320, -150]
 rotation_rad = [0.0013, -0.0342, 1.1003]

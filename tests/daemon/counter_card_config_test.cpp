@@ -4,6 +4,7 @@
 
 #include "abbe/daemon/config.hpp"
 #include "abbe/daemon/device_options.hpp"
+#include "mill.hpp"
 
 namespace abbe::daemon {
 namespace {
@@ -12,23 +13,7 @@ using ::testing::Contains;
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 
-const std::string kMachine = R"([machine]
-name = "mill"
-chain = "[w X' b Y Z (C1) t]"
-[axes.X]
-min_mm = -300
-max_mm = 300
-[axes.Y]
-min_mm = -250
-max_mm = 250
-[axes.Z]
-min_mm = -400
-max_mm = -100
-[target]
-offset_mm = [20, -15, -120]
-[model]
-node_spacing_mm = 50
-)";
+const std::string kMachine = test::kMill;
 
 std::string card(const std::string& axes, const std::string& more = {}) {
   return kMachine +

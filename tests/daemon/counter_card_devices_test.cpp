@@ -11,6 +11,7 @@
 #include "abbe/daemon/config.hpp"
 #include "abbe/daemon/device_set.hpp"
 #include "abbe/sim/usbip_server.hpp"
+#include "mill.hpp"
 
 namespace abbe::daemon {
 namespace {
@@ -57,25 +58,9 @@ class CardInAThread {
 };
 
 Config configuration(std::uint16_t port, const std::string& serial_number = "01ABBE08") {
-  const std::string text = R"([machine]
-name = "mill"
-chain = "[w X' b Y Z (C1) t]"
-[axes.X]
-min_mm = -300
-max_mm = 300
-[axes.Y]
-min_mm = -250
-max_mm = 250
-[axes.Z]
-min_mm = -400
-max_mm = -100
-[target]
-offset_mm = [20, -15, -120]
-[model]
-node_spacing_mm = 50
-[counter_card]
+  const std::string text = test::kMill + std::string(R"([counter_card]
 transport = "usbip"
-port = )" + std::to_string(port) +
+port = )") + std::to_string(port) +
                            "\nserial_number = \"" + serial_number + R"("
 clock_MHz = 1
 latch_channel = 6

@@ -4,6 +4,7 @@
 
 #include "abbe/daemon/config.hpp"
 #include "abbe/daemon/device_options.hpp"
+#include "mill.hpp"
 
 namespace abbe::daemon {
 namespace {
@@ -12,26 +13,12 @@ using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
 
-const std::string kMachine = R"([machine]
-name = "mill"
-chain = "[w X' b Y Z (C1) t]"
-[axes.X]
-min_mm = -300
-max_mm = 300
-[axes.Y]
-min_mm = -250
-max_mm = 250
-[axes.Z]
-min_mm = -400
-max_mm = -100
-[target]
-offset_mm = [20, -15, -120]
-[encoder]
+const std::string kMachine = test::kMill + std::string(R"([encoder]
 transport = "udp"
 peer_host = "10.0.0.8"
 peer_port = 20000
 nodes = [{axis = "Y", node = 2}, {axis = "X", node = 1}, {axis = "Z", node = 3}]
-)";
+)");
 const std::string kAir = R"([[environment]]
 name = "air"
 map = "comet-t7510"

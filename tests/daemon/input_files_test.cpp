@@ -151,8 +151,8 @@ TEST(Sha256, AgreesWithThePublishedExample) {
 }
 
 TEST_F(InputFiles, ReadKnownErrorsInMicrometres) {
-  const auto errors =
-      read_errors_csv(write("e.csv", "# truth\nez_um,ey_um,ex_um,z_mm,y_mm,x_mm,inside\n3,2,1,30,20,10,1\n"));
+  const auto errors = read_known_errors_csv(
+      write("e.csv", "# truth\nez_um,ey_um,ex_um,z_mm,y_mm,x_mm,inside\n3,2,1,30,20,10,1\n"));
   ASSERT_TRUE(errors) << errors.error().details.front();
   ASSERT_THAT(errors->errors_m, SizeIs(1));
   EXPECT_EQ(errors->points_m[0], (AxisPosition{0.01, 0.02, 0.03}));
@@ -160,10 +160,10 @@ TEST_F(InputFiles, ReadKnownErrorsInMicrometres) {
 }
 
 TEST_F(InputFiles, RefuseKnownErrorsWithoutAComponentOrARow) {
-  const auto without = read_errors_csv(write("a.csv", "x_mm,y_mm,z_mm,ex_um,ey_um\n1,2,3,4,5\n"));
+  const auto without = read_known_errors_csv(write("a.csv", "x_mm,y_mm,z_mm,ex_um,ey_um\n1,2,3,4,5\n"));
   ASSERT_FALSE(without);
   EXPECT_THAT(without.error().details, ElementsAre(HasSubstr(":1:1: ez_um: missing column")));
-  const auto empty = read_errors_csv(write("b.csv", "x_mm,y_mm,z_mm,ex_um,ey_um,ez_um\n"));
+  const auto empty = read_known_errors_csv(write("b.csv", "x_mm,y_mm,z_mm,ex_um,ey_um,ez_um\n"));
   ASSERT_FALSE(empty);
   EXPECT_THAT(empty.error().details, ElementsAre(HasSubstr("needs at least 1 points, has 0")));
 }

@@ -217,7 +217,7 @@ void print_comparison(const Options& options, const calib::FieldComparison& c, c
 }
 
 Result<void> use_model(const Options& options, const dds::ReceivedModel& model,
-                       const std::optional<daemon::ErrorsFile>& known) {
+                       const std::optional<daemon::KnownErrorsFile>& known) {
   const auto nodes = model.grid();
   if (!options.grid_csv.empty()) {
     if (auto written = dds::write_grid_csv(options.grid_csv, *nodes); !written) return written;
@@ -233,7 +233,8 @@ Result<void> use_model(const Options& options, const dds::ReceivedModel& model,
   return {};
 }
 
-int watch(const Options& options, dds::Readers& readers, const std::optional<daemon::ErrorsFile>& known) {
+int watch(const Options& options, dds::Readers& readers,
+          const std::optional<daemon::KnownErrorsFile>& known) {
   Watch watch(options);
   const auto start = WallClock::now();
   bool answered_for = false;
@@ -262,9 +263,9 @@ int watch(const Options& options, dds::Readers& readers, const std::optional<dae
 }
 
 int run(const Options& options) {
-  std::optional<daemon::ErrorsFile> known;
+  std::optional<daemon::KnownErrorsFile> known;
   if (!options.known_errors.empty()) {
-    auto read = daemon::read_errors_csv(options.known_errors);
+    auto read = daemon::read_known_errors_csv(options.known_errors);
     if (!read) return exit_code_of(read.error());
     known = std::move(*read);
   }

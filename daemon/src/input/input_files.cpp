@@ -161,7 +161,7 @@ Result<PointsFile> read_points_csv(const std::filesystem::path& file) {
   return points;
 }
 
-Result<ErrorsFile> read_errors_csv(const std::filesystem::path& file) {
+Result<KnownErrorsFile> read_known_errors_csv(const std::filesystem::path& file) {
   auto parsed = parse(file, {{{"x_mm"},
                               {"y_mm"},
                               {"z_mm"},
@@ -175,7 +175,7 @@ Result<ErrorsFile> read_errors_csv(const std::filesystem::path& file) {
   if (!parsed) return tl::make_unexpected(parsed.error());
   check_rows(*parsed, 1, "points");
   if (parsed->faults.any()) return tl::make_unexpected(parsed->faults.to_error());
-  ErrorsFile errors{parsed->source, {}, {}};
+  KnownErrorsFile errors{parsed->source, {}, {}};
   const auto& table = parsed->table;
   for (std::size_t row = 0; row < table.rows(); ++row) {
     errors.points_m.push_back(position_m(table, row, 0));

@@ -67,11 +67,11 @@ struct PointsFile {
 
 /// errors.csv: `x_mm,y_mm,z_mm,ex_um,ey_um,ez_um[,ux_um,uy_um,uz_um][,inside]` as `abbe model eval` writes
 /// it, V = true - reading at scale readings, at least one; u and inside are not used.
-struct ErrorsFile {
+struct KnownErrorsFile {
   InputFile source;
   std::vector<AxisPosition> points_m;
   std::vector<calib::Vector3> errors_m;  ///< as long as points_m
 };
-[[nodiscard]] Result<ErrorsFile> read_errors_csv(const std::filesystem::path& file);
+[[nodiscard]] Result<KnownErrorsFile> read_known_errors_csv(const std::filesystem::path& file);
 
 }  // namespace abbe::daemon

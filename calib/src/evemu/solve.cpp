@@ -9,6 +9,7 @@
 #include "abbe/calib/evemu/design_rows.hpp"
 #include "evemu/fit_coefficients.hpp"
 #include "message.hpp"
+#include "singular_values.hpp"
 
 namespace abbe::calib::evemu {
 namespace {
@@ -119,8 +120,7 @@ Statistics statistics_of(const FitProblem& problem, const Fit& fit, const Eigen:
   s.observations = 3 * (o.rows.size() - s.positions);
   s.unknowns = problem.design.size();
   const Eigen::VectorXd scale = problem.X.colwise().norm().cwiseMax(1e-300).cwiseInverse();
-  const Eigen::BDCSVD<Eigen::MatrixXd> svd(problem.X * scale.asDiagonal());
-  const Eigen::VectorXd& sv = svd.singularValues();
+  const Eigen::VectorXd sv = singular_values(problem.X * scale.asDiagonal());
   // Unobservable rotations leave 1e-7 (Ball1 does not come back to the same nanometre), data 1e-4 and more.
   constexpr double kZero = 1e-6;
   s.rank = static_cast<std::size_t>((sv.array() > kZero * sv(0)).count());

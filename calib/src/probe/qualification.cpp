@@ -1,11 +1,11 @@
 #include "abbe/calib/probe/qualification.hpp"
 
 #include <Eigen/QR>
-#include <Eigen/SVD>
 #include <algorithm>
 #include <cmath>
 
 #include "message.hpp"
+#include "singular_values.hpp"
 
 namespace abbe::calib::probe {
 namespace {
@@ -56,7 +56,7 @@ System system_at(std::span<const QualifyingTouch> touches, const Unknowns& x, do
 double condition_of(const Eigen::MatrixXd& J) {
   const Eigen::RowVectorXd norms = J.colwise().norm().cwiseMax(1e-300);
   const Eigen::MatrixXd scaled = J * norms.cwiseInverse().asDiagonal();
-  const Eigen::VectorXd values = Eigen::JacobiSVD<Eigen::MatrixXd>(scaled).singularValues();
+  const Eigen::VectorXd values = singular_values(scaled);
   return values[0] / std::max(values[values.size() - 1], 1e-300);
 }
 

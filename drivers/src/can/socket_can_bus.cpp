@@ -9,6 +9,7 @@
 #include <unistd.h>
 
 #include <array>
+#include <cstring>
 
 #include "abbe/drivers/can/linux_frame.hpp"
 #include "abbe/protocol/can/canopen.hpp"
@@ -138,8 +139,8 @@ Result<std::size_t> SocketCanBus::read(std::span<ReceivedFrame> out, std::chrono
   std::size_t count = 0;
   for (unsigned i = 0; i < static_cast<unsigned>(got); ++i) {
     auto& message = batch_->messages[i];
-    const auto arrival = options_.speed > 0.0 ? stamps_.arrival(stamp_of(message.msg_hdr), clocks, now)
-                                              : Arrival{.time = now};
+    const auto arrival =
+        options_.speed > 0.0 ? stamps_.arrival(stamp_of(message.msg_hdr), clocks, now) : Arrival{.time = now};
     out[count].time = arrival.time;
     out[count].time_widened = arrival.widened;
     for (auto* c = CMSG_FIRSTHDR(&message.msg_hdr); c != nullptr; c = CMSG_NXTHDR(&message.msg_hdr, c)) {
@@ -189,7 +190,8 @@ Result<void> SocketCanBus::start_sync(std::chrono::nanoseconds period) {
   if (connect(sync_fd_, any, sizeof address) != 0) return no("connect the broadcast manager");
 
   const auto sync = to_linux(can::encode_sync());
-  bcm_msg_head head{};
+  bcm_msg_head head;  // ends in an array of no length, which clang does not let us initialise
+  std::memset(&head, 0, sizeof head);
   head.opcode = TX_SETUP;
   head.flags = SETTIMER | STARTTIMER;
   const auto us = std::chrono::duration_cast<std::chrono::microseconds>(time_.wall(period)).count();

@@ -1,13 +1,11 @@
 // The real-time half of the measuring machine: what wait() read becomes samples.
-#include <utility>
-
 #include "abbe/drivers/ippdme/device.hpp"
 #include "abbe/protocol/visit.hpp"
 
 namespace abbe::drivers {
 
 void IppDevice::receive() ABBE_RT {
-  const auto bytes = std::span<const std::byte>{buffer_}.first(std::exchange(filled_, 0));
+  const auto bytes = received();
   if (bytes.empty()) return;
   raw_.push_bytes(arrival_, protocol::RawBlock::Direction::FromDevice, bytes);
   receiver_.push(bytes, arrival_);
@@ -26,14 +24,6 @@ void IppDevice::take(const protocol::ProbeTrigger& touch) ABBE_RT {
   touches_.try_push(touch);
   board_.samples.add();
   board_.set_last_sample(touch.head.time);
-}
-
-void IppDevice::post(const Message& message) ABBE_RT {
-  if (inbox_count_ < kInbox) {
-    inbox_[inbox_count_++] = message;
-  } else {
-    ++inbox_lost_;
-  }
 }
 
 }  // namespace abbe::drivers

@@ -14,7 +14,7 @@ void TrackerDevice::receive() ABBE_RT {
     raw_.push_bytes(arrival_, Direction::FromDevice, {});
     receiver_.push({}, arrival_);
   }
-  const auto bytes = std::span<const std::byte>{buffer_}.first(std::exchange(filled_, 0));
+  const auto bytes = received();
   if (bytes.empty()) return;
   raw_.push_bytes(arrival_, Direction::FromDevice, bytes);
   receiver_.push(bytes, arrival_);
@@ -31,18 +31,16 @@ void TrackerDevice::take(const TrackerBurst& burst) ABBE_RT {
   board_.samples.add(burst.points.size());
   board_.set_last_sample(burst.points.back().head.time);
   board_.set_clock(receiver_.clock());
-  post(TrackerPointsArrived{burst.points.size()});
+  take(TrackerPointsArrived{burst.points.size()});
 }
 
-void TrackerDevice::post(const Message& message) ABBE_RT {
-  const auto* more = std::get_if<TrackerPointsArrived>(&message);
-  auto* last = inbox_count_ == 0 ? nullptr : std::get_if<TrackerPointsArrived>(&inbox_[inbox_count_ - 1]);
-  if (more != nullptr && last != nullptr) {
-    last->count += more->count;
-  } else if (inbox_count_ < kInbox) {
-    inbox_[inbox_count_++] = message;
+/// One message for all bursts of a turn.
+void TrackerDevice::take(const TrackerPointsArrived& arrived) ABBE_RT {
+  auto* last = last_posted();
+  if (auto* points = last == nullptr ? nullptr : std::get_if<TrackerPointsArrived>(last)) {
+    points->count += arrived.count;
   } else {
-    ++inbox_lost_;
+    post(arrived);
   }
 }
 

@@ -1,8 +1,5 @@
 #include "abbe/drivers/tracker/device.hpp"
 
-#include <fmt/format.h>
-
-#include <algorithm>
 #include <utility>
 
 namespace abbe::drivers {
@@ -18,31 +15,27 @@ TrackerReceiverOptions receiver_options(const TrackerDeviceOptions& options) {
 
 Result<std::unique_ptr<TrackerDevice>> TrackerDevice::create(const TrackerDeviceOptions& options,
                                                              const TimeSource& time) {
+  const TcpPeer peer = tcp_peer(options.name, options.host, options.port);
   TrackerDeviceOptions named = options;
-  named.session.peer = fmt::format("{} {}:{}", options.name, options.host, options.port);
+  named.session.peer = peer.name;
   if (const auto fine = check(named.session); !fine) return tl::unexpected{fine.error()};
-  if (options.host.empty() || options.port == 0) {
-    return tl::unexpected{
-        Error{ErrorCode::BadConfiguration, named.session.peer + ": host or port is missing"}};
-  }
-  return std::unique_ptr<TrackerDevice>{new TrackerDevice{named, time}};
+  if (const auto fine = check(peer); !fine) return tl::unexpected{fine.error()};
+  return std::unique_ptr<TrackerDevice>{new TrackerDevice{named, peer, time}};
 }
 
-TrackerDevice::TrackerDevice(const TrackerDeviceOptions& options, const TimeSource& time)
-    : options_(options),
-      time_(time),
+TrackerDevice::TrackerDevice(const TrackerDeviceOptions& options, TcpPeer peer, const TimeSource& time)
+    : SessionOverTcp(std::move(peer), time, TrackerSession{options.session}),
+      options_(options),
       points_(options.point_capacity),
       environment_(options.environment_capacity),
       raw_(options.raw_capacity_blocks),
-      receiver_(receiver_options(options)),
-      session_(options.session) {
+      receiver_(receiver_options(options)) {
   show();
 }
 
 TrackerDevice::~TrackerDevice() {
   try {
-    tell(TrackerStopRequested{});
-    tcp_.finish();
+    leave(TrackerStopRequested{});
   } catch (
       ...) {  // NOLINT(bugprone-empty-catch): out of memory; the closed connection stops the controller too
   }
@@ -59,88 +52,10 @@ DeviceStatus TrackerDevice::status() const {
   return board_.read(options_.name, points_.dropped(), raw_.dropped());
 }
 
-/// What receive() understood, in order; the rest of it is void once the connection is closed.
-void TrackerDevice::read_mail() {
-  for (std::size_t i = 0; i < inbox_count_; ++i) {
-    board_.set_connected(tcp_.established());
-    std::visit([this](const auto& m) { tell(m); }, inbox_[i]);
-  }
-  inbox_count_ = 0;
-  if (std::exchange(inbox_lost_, 0) != 0) {
-    board_.fault(time_.now(), options_.session.peer + ": more messages in one read than there is room for");
-  }
-}
-
-/// An action may fail at once, which is the next input.
-void TrackerDevice::tell(const TrackerInput& input) {
-  TrackerInput next = input;
-  while (act(session_.on(next, time_.now()), next)) {
-  }
-}
-
-bool TrackerDevice::act(const TrackerAction& action, TrackerInput& next) {
-  if (std::holds_alternative<TrackerOpen>(action)) return open(next);
-  if (const auto* command = std::get_if<TrackerSend>(&action)) return send(command->request, next);
-  if (std::holds_alternative<TrackerClose>(action)) close();
-  return false;
-}
-
-bool TrackerDevice::open(TrackerInput& next) {
-  const auto opened = tcp_.open(options_.host, options_.port);
-  if (!opened) next = TrackerConnectionLost{opened.error().text};
-  return !opened;
-}
-
-bool TrackerDevice::send(const emscon::Request& request, TrackerInput& next) {
-  std::array<std::byte, emscon::kMaxRequestSize> bytes{};
-  const auto packet = std::span<const std::byte>{bytes}.first(emscon::encode(request, bytes));
+std::span<const std::byte> TrackerDevice::encode(const TrackerSend& command) {
+  const auto packet = std::span<const std::byte>{command_}.first(emscon::encode(command.request, command_));
   raw_.push_bytes(time_.now(), protocol::RawBlock::Direction::ToDevice, packet);
-  const auto sent = tcp_.write(packet);
-  if (sent) return false;
-  close();
-  next = TrackerConnectionLost{sent.error().text};
-  return true;
-}
-
-void TrackerDevice::close() {
-  tcp_.close();
-  inbox_count_ = 0;
-  filled_ = 0;
-  began_ = false;
-  board_.set_connected(false);
-}
-
-void TrackerDevice::poll(std::chrono::nanoseconds at_most) {
-  const auto until_due = session_.deadline() - time_.now();
-  const auto ready = tcp_.wait(time_.wall(std::clamp(until_due, std::chrono::nanoseconds{0}, at_most)));
-  if (!ready) {
-    close();
-    tell(TrackerConnectionLost{ready.error().text});
-  } else if (*ready == TcpClient::Ready::Established) {
-    began_ = true;
-    arrival_ = time_.now();
-    tell(TrackerConnected{});
-  } else if (*ready == TcpClient::Ready::Readable) {
-    read();
-  }
-}
-
-void TrackerDevice::read() {
-  const auto count = tcp_.read(buffer_);
-  arrival_ = time_.now();
-  if (count) {
-    filled_ = *count;
-    return;
-  }
-  close();
-  tell(TrackerConnectionLost{count.error().text});
-}
-
-void TrackerDevice::show() {
-  board_.set_state(name_of(session_.state()));
-  if (faults_seen_ == session_.fault().count) return;
-  faults_seen_ = session_.fault().count;
-  board_.fault(time_.now(), session_.fault().text);
+  return packet;
 }
 
 }  // namespace abbe::drivers

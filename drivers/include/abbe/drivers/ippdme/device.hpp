@@ -17,9 +17,7 @@
 #include "abbe/drivers/ippdme/session.hpp"
 #include "abbe/drivers/raw_ring.hpp"
 #include "abbe/drivers/sample_ring.hpp"
-#include "abbe/drivers/status_board.hpp"
-#include "abbe/drivers/tcp_client.hpp"
-#include "abbe/drivers/time_source.hpp"
+#include "abbe/drivers/session_over_tcp.hpp"
 
 namespace abbe::drivers {
 
@@ -34,7 +32,22 @@ struct IppDeviceOptions {
   std::size_t raw_capacity_blocks = 256;
 };
 
-class IppDevice final : public Device {
+/// For SessionOverTcp.
+struct IppWords {
+  using Session = IppSession;
+  using Input = IppInput;
+  using Action = IppAction;
+  using Open = IppOpen;
+  using Send = IppSend;
+  using Close = IppClose;
+  using Connected = IppConnected;
+  using ConnectionLost = IppConnectionLost;
+  using Message = std::variant<IppAck, IppComplete, IppData, IppError, IppNonsense>;
+  static constexpr std::size_t kInbox = 256;
+  static constexpr std::size_t kMostRead = 4096;
+};
+
+class IppDevice final : public Device, private SessionOverTcp<IppDevice, IppWords> {
  public:
   /// `time` must outlive the device. BadConfiguration as check(). The connection is opened by the first
   /// wait().
@@ -57,22 +70,14 @@ class IppDevice final : public Device {
   [[nodiscard]] RawRing& raw() noexcept { return raw_; }
 
  private:
-  using Message = std::variant<IppAck, IppComplete, IppData, IppError, IppNonsense>;
-  static constexpr std::size_t kInbox = 256;
-  static constexpr std::size_t kMostRead = 4096;
+  friend class SessionOverTcp<IppDevice, IppWords>;
 
-  IppDevice(const IppDeviceOptions& options, const TimeSource& time);
+  IppDevice(const IppDeviceOptions& options, TcpPeer peer, const TimeSource& time);
 
-  void tell(const IppInput& input);
-  [[nodiscard]] bool act(const IppAction& action, IppInput& next);
-  [[nodiscard]] bool open(IppInput& next);
-  [[nodiscard]] bool send(const std::string& line, IppInput& next);
-  void close();
-  void read_mail();
+  [[nodiscard]] std::span<const std::byte> encode(const IppSend& command);
+  void connected();
+  void disconnected() {}
   void read_requests();
-  void poll(std::chrono::nanoseconds at_most);
-  void read();
-  void show();
 
   void take(const protocol::AxisSample& sample) ABBE_RT;
   void take(const protocol::ProbeTrigger& touch) ABBE_RT;
@@ -80,28 +85,15 @@ class IppDevice final : public Device {
   void take(const M& message) ABBE_RT {
     post(message);
   }
-  void post(const Message& message) ABBE_RT;
 
   IppDeviceOptions options_;
-  const TimeSource& time_;
   SampleRing<protocol::ProbeTrigger> touches_;
   SampleRing<protocol::AxisSample> positions_;
   RawRing raw_;
-  StatusBoard board_;
   IppReceiver receiver_;
-  IppSession session_;
-  TcpClient tcp_;
 
   std::mutex requests_mutex_;
   std::vector<ProbePoint> requests_;  // under requests_mutex_
-
-  std::uint64_t faults_seen_ = 0;
-  protocol::HostTime arrival_{};
-  std::size_t filled_ = 0;
-  std::array<std::byte, kMostRead> buffer_{};
-  std::array<Message, kInbox> inbox_{};  ///< from receive() to the next wait(), same thread
-  std::size_t inbox_count_ = 0;
-  std::uint64_t inbox_lost_ = 0;
 };
 
 }  // namespace abbe::drivers

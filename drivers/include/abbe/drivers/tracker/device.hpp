@@ -14,9 +14,7 @@
 #include "abbe/drivers/device.hpp"
 #include "abbe/drivers/raw_ring.hpp"
 #include "abbe/drivers/sample_ring.hpp"
-#include "abbe/drivers/status_board.hpp"
-#include "abbe/drivers/tcp_client.hpp"
-#include "abbe/drivers/time_source.hpp"
+#include "abbe/drivers/session_over_tcp.hpp"
 #include "abbe/drivers/tracker/receiver.hpp"
 #include "abbe/drivers/tracker/session.hpp"
 
@@ -36,7 +34,23 @@ struct TrackerDeviceOptions {
 /// What the receiver of this device is made with; replay needs the same.
 [[nodiscard]] TrackerReceiverOptions receiver_options(const TrackerDeviceOptions& options);
 
-class TrackerDevice final : public Device {
+/// For SessionOverTcp.
+struct TrackerWords {
+  using Session = TrackerSession;
+  using Input = TrackerInput;
+  using Action = TrackerAction;
+  using Open = TrackerOpen;
+  using Send = TrackerSend;
+  using Close = TrackerClose;
+  using Connected = TrackerConnected;
+  using ConnectionLost = TrackerConnectionLost;
+  using Message = std::variant<TrackerPointsArrived, emscon::Answer, emscon::ErrorResponse,
+                               emscon::StatusChange, TrackerNonsense>;
+  static constexpr std::size_t kInbox = 128;
+  static constexpr std::size_t kMostRead = emscon::kMaxPacketSize;
+};
+
+class TrackerDevice final : public Device, private SessionOverTcp<TrackerDevice, TrackerWords> {
  public:
   /// `time` must outlive the device. BadConfiguration as check(). The connection is opened by the first
   /// wait().
@@ -55,21 +69,13 @@ class TrackerDevice final : public Device {
   [[nodiscard]] RawRing& raw() noexcept { return raw_; }
 
  private:
-  using Message = std::variant<TrackerPointsArrived, emscon::Answer, emscon::ErrorResponse,
-                               emscon::StatusChange, TrackerNonsense>;
-  static constexpr std::size_t kInbox = 128;
+  friend class SessionOverTcp<TrackerDevice, TrackerWords>;
 
-  TrackerDevice(const TrackerDeviceOptions& options, const TimeSource& time);
+  TrackerDevice(const TrackerDeviceOptions& options, TcpPeer peer, const TimeSource& time);
 
-  void tell(const TrackerInput& input);
-  [[nodiscard]] bool act(const TrackerAction& action, TrackerInput& next);
-  [[nodiscard]] bool open(TrackerInput& next);
-  [[nodiscard]] bool send(const emscon::Request& request, TrackerInput& next);
-  void close();
-  void read_mail();
-  void poll(std::chrono::nanoseconds at_most);
-  void read();
-  void show();
+  [[nodiscard]] std::span<const std::byte> encode(const TrackerSend& command);
+  void connected() { began_ = true; }
+  void disconnected() { began_ = false; }
 
   void take(const TrackerBurst& burst) ABBE_RT;
   void take(const protocol::EnvironmentSample& sample) ABBE_RT { environment_.try_push(sample); }
@@ -77,27 +83,17 @@ class TrackerDevice final : public Device {
   void take(const M& message) ABBE_RT {
     post(message);
   }
-  void post(const Message& message) ABBE_RT;
+  void take(const TrackerPointsArrived& arrived) ABBE_RT;
 
   TrackerDeviceOptions options_;
-  const TimeSource& time_;
   SampleRing<protocol::TrackerPoint> points_;
   SampleRing<protocol::EnvironmentSample> environment_;
   RawRing raw_;
-  StatusBoard board_;
   TrackerReceiver receiver_;
-  TrackerSession session_;
-  TcpClient tcp_;
 
-  std::uint64_t faults_seen_ = 0;
   std::uint64_t gaps_seen_ = 0;
   bool began_ = false;  ///< a new connection, not yet told to the receiver
-  protocol::HostTime arrival_{};
-  std::size_t filled_ = 0;
-  std::array<std::byte, emscon::kMaxPacketSize> buffer_{};
-  std::array<Message, kInbox> inbox_{};  ///< from receive() to the next wait(), same thread
-  std::size_t inbox_count_ = 0;
-  std::uint64_t inbox_lost_ = 0;
+  std::array<std::byte, emscon::kMaxRequestSize> command_{};
 };
 
 }  // namespace abbe::drivers

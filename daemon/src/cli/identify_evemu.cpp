@@ -3,19 +3,18 @@
 #include <chrono>
 #include <cmath>
 #include <filesystem>
+#include <map>
 #include <memory>
 #include <nlohmann/json.hpp>
-#include <system_error>
 
 #include "abbe/calib/evemu/judge.hpp"
 #include "abbe/daemon/evemu_files.hpp"
 #include "abbe/daemon/evemu_report.hpp"
 #include "abbe/daemon/model_document.hpp"
-#include "abbe/daemon/model_store.hpp"
 #include "abbe/daemon/otf_inputs.hpp"
 #include "abbe/daemon/sha256.hpp"
 #include "cli/commands.hpp"
-#include "cli/daemon_socket.hpp"
+#include "cli/identified_model.hpp"
 #include "cli/terminal.hpp"
 #include "files/text_file.hpp"
 
@@ -97,22 +96,8 @@ Result<evemu::SparseOptions> sparse_options(const Arguments& arguments, std::vec
   return options;
 }
 
-Result<std::optional<ModelDocument>> active_model(const Arguments& arguments) {
-  std::optional<ModelDocument> active;
-  if (arguments.keep.empty()) return active;
-  const auto store = ModelStore::open(arguments.keep);
-  if (!store) return tl::make_unexpected(store.error());
-  const auto id = store->active_id();
-  if (!id) return tl::make_unexpected(id.error());
-  if (!*id) return active;
-  auto document = store->load(**id);
-  if (!document) return tl::make_unexpected(document.error());
-  active = std::move(*document);
-  return active;
-}
-
 Result<Outcome> identify(const Arguments& arguments) {
-  const auto active = active_model(arguments);
+  const auto active = active_model(arguments.keep);
   if (!active) return tl::make_unexpected(active.error());
   auto config = load_config(arguments.machine);
   if (!config) return tl::make_unexpected(config.error());
@@ -165,29 +150,11 @@ std::string to_surface_csv(const evemu::SparseChoice& choice) {
 
 Result<void> write_outputs(const std::filesystem::path& folder, const ModelDocument& document,
                            const Outcome& outcome) {
-  std::error_code failed;
-  std::filesystem::create_directories(folder, failed);
-  if (failed) return fail(ErrorCode::Io, fmt::format("create {}: {}", folder.string(), failed.message()));
-  if (auto done = replace_file(folder / "model.json", to_json(document)); !done) return done;
-  if (auto done =
-          replace_file(folder / "coefficients.csv", to_coefficients_csv(*document.model.polynomials()));
-      !done)
-    return done;
-  if (const auto& choice = outcome.solution->sparse)
-    if (auto done = replace_file(folder / "cross_validation.csv", to_surface_csv(*choice)); !done)
-      return done;
-  return replace_file(folder / "report.html",
-                      evemu_report(document, outcome.observations, *outcome.solution, outcome.verdict));
-}
-
-Result<void> keep(const Arguments& arguments, const ModelDocument& document, const calib::Verdict& verdict) {
-  if (arguments.keep.empty()) return {};
-  auto store = ModelStore::open(arguments.keep);
-  if (!store) return tl::make_unexpected(store.error());
-  const auto id = store->add(document, verdict.accepted, verdict.reasons,
-                             {user_name(), "abbe identify evemu", document.created});
-  if (!id) return tl::make_unexpected(id.error());
-  return {};
+  std::map<std::string, std::string> files{
+      {"coefficients.csv", to_coefficients_csv(*document.model.polynomials())},
+      {"report.html", evemu_report(document, outcome.observations, *outcome.solution, outcome.verdict)}};
+  if (const auto& choice = outcome.solution->sparse) files["cross_validation.csv"] = to_surface_csv(*choice);
+  return write_results(folder, document, files);
 }
 
 double u_rotation_urad(const evemu::Solution& solution) {
@@ -226,9 +193,7 @@ void print_json(const Outcome& outcome, const ModelDocument& document, const std
 
 void print_summary(const Outcome& outcome, const ModelDocument& document,
                    const std::filesystem::path& folder) {
-  constexpr int kGreen = 2, kYellow = 3, kStdout = 1;
   const auto& s = outcome.solution->statistics;
-  const auto& held_out = outcome.verdict.held_out;
   fmt::print("model       {}  ({} coefficients, tool and machine \"{}\")\n",
              model_id(document.model, document.method), s.unknowns, document.machine);
   fmt::print("artefact    {} positions, {} ball centres\n", s.positions, s.balls);
@@ -242,14 +207,10 @@ void print_summary(const Outcome& outcome, const ModelDocument& document,
                choice->curvature < 0.0 ? "; not convex there: other solutions may be near" : "");
   fmt::print("residuals   {:.3f} um rms before, {:.3f} um after\n", s.before.rms_m * kMicro_per_1,
              s.after.rms_m * kMicro_per_1);
-  fmt::print("held out    {:.3f} um rms without compensation, {:.3f} um with the model\n",
-             held_out.no_compensation_rms_m * kMicro_per_1, held_out.candidate_rms_m * kMicro_per_1);
   fmt::print("rotation    {}, u = {:.1f} urad about Ball1\n",
              outcome.solution->rotation.referenced ? "referenced" : "that of the blocks: shape only",
              u_rotation_urad(*outcome.solution));
-  fmt::print("gate        {}\n", outcome.verdict.accepted ? coloured("would accept", kGreen, kStdout)
-                                                          : coloured("would refuse", kYellow, kStdout));
-  for (const auto& reason : outcome.verdict.reasons) fmt::print("            {}\n", reason);
+  print_verdict(outcome.verdict);
   fmt::print("written     {}, coefficients.csv, report.html\n", (folder / "model.json").string());
 }
 
@@ -260,7 +221,8 @@ int run(const Arguments& arguments) {
   const auto document = evemu_document(*outcome->solution, outcome->config, outcome->sources, now);
   if (const auto written = write_outputs(arguments.out, document, *outcome); !written)
     return report(written.error());
-  if (const auto kept = keep(arguments, document, outcome->verdict); !kept) return report(kept.error());
+  if (const auto kept = keep(arguments.keep, document, outcome->verdict, "abbe identify evemu"); !kept)
+    return report(kept.error());
   arguments.json ? print_json(*outcome, document, arguments.out)
                  : print_summary(*outcome, document, arguments.out);
   return 0;

@@ -5,19 +5,17 @@
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <optional>
-#include <system_error>
 
 #include "abbe/calib/otf/identify.hpp"
 #include "abbe/daemon/input_files.hpp"
 #include "abbe/daemon/model_document.hpp"
-#include "abbe/daemon/model_store.hpp"
 #include "abbe/daemon/otf_identification.hpp"
 #include "abbe/daemon/otf_inputs.hpp"
 #include "abbe/daemon/otf_report.hpp"
 #include "abbe/daemon/replay.hpp"
 #include "abbe/daemon/sha256.hpp"
 #include "cli/commands.hpp"
-#include "cli/daemon_socket.hpp"
+#include "cli/identified_model.hpp"
 #include "cli/terminal.hpp"
 #include "files/text_file.hpp"
 
@@ -139,38 +137,10 @@ Result<Outcome> from_recording(const Arguments& arguments, const calib::Volumetr
 }
 
 Result<void> write_outputs(const std::filesystem::path& folder, const Outcome& outcome) {
-  std::error_code failed;
-  std::filesystem::create_directories(folder, failed);
-  if (failed) return fail(ErrorCode::Io, fmt::format("create {}: {}", folder.string(), failed.message()));
   const ModelDocument& document = outcome.document;
-  if (auto done = replace_file(folder / "model.json", to_json(document)); !done) return done;
-  if (auto done = replace_file(folder / "tables.csv", to_tables_csv(document.model)); !done) return done;
-  return replace_file(folder / "report.html", otf_report(document, outcome.residuals, outcome.verdict));
-}
-
-/// The active model of the store the result will be kept in; none without --keep.
-Result<std::optional<ModelDocument>> active_model(const Arguments& arguments) {
-  std::optional<ModelDocument> active;
-  if (arguments.keep.empty()) return active;
-  const auto store = ModelStore::open(arguments.keep);
-  if (!store) return tl::make_unexpected(store.error());
-  const auto id = store->active_id();
-  if (!id) return tl::make_unexpected(id.error());
-  if (!*id) return active;
-  auto document = store->load(**id);
-  if (!document) return tl::make_unexpected(document.error());
-  active = std::move(*document);
-  return active;
-}
-
-Result<void> keep(const Arguments& arguments, const Outcome& outcome) {
-  if (arguments.keep.empty()) return {};
-  auto store = ModelStore::open(arguments.keep);
-  if (!store) return tl::make_unexpected(store.error());
-  const auto id = store->add(outcome.document, outcome.verdict.accepted, outcome.verdict.reasons,
-                             {user_name(), "abbe identify otf", now()});
-  if (!id) return tl::make_unexpected(id.error());
-  return {};
+  return write_results(folder, document,
+                       {{"tables.csv", to_tables_csv(document.model)},
+                        {"report.html", otf_report(document, outcome.residuals, outcome.verdict)}});
 }
 
 constexpr double kMicro = 1e6;
@@ -200,9 +170,7 @@ void print_json(const Outcome& outcome, const std::filesystem::path& folder) {
 }
 
 void print_summary(const Outcome& outcome, const std::filesystem::path& folder) {
-  constexpr int kGreen = 2, kYellow = 3, kStdout = 1;
   const auto& s = outcome.document.statistics;
-  const auto& held_out = outcome.verdict.held_out;
   fmt::print("model       {}  ({} tables, tool and machine \"{}\")\n",
              model_id(outcome.document.model, outcome.document.method),
              outcome.document.model.layout().tables().size(), outcome.document.machine);
@@ -212,16 +180,12 @@ void print_summary(const Outcome& outcome, const std::filesystem::path& folder) 
              s.observations, s.unknowns, s.rank, s.condition, s.sigma0);
   fmt::print("residuals   {:.3f} um rms before, {:.3f} um after\n", s.before.rms_m * kMicro,
              s.after.rms_m * kMicro);
-  fmt::print("held out    {:.3f} um rms without compensation, {:.3f} um with the model\n",
-             held_out.no_compensation_rms_m * kMicro, held_out.candidate_rms_m * kMicro);
-  fmt::print("gate        {}\n", outcome.verdict.accepted ? coloured("would accept", kGreen, kStdout)
-                                                          : coloured("would refuse", kYellow, kStdout));
-  for (const auto& reason : outcome.verdict.reasons) fmt::print("            {}\n", reason);
+  print_verdict(outcome.verdict);
   fmt::print("written     {}, tables.csv, report.html\n", (folder / "model.json").string());
 }
 
 Result<Outcome> identify(const Arguments& arguments, ProgressBar& bar) {
-  const auto active = active_model(arguments);
+  const auto active = active_model(arguments.keep);
   if (!active) return tl::make_unexpected(active.error());
   const calib::VolumetricModel* const compared = *active ? &(*active)->model : nullptr;
   return arguments.recording.empty() ? from_files(arguments, compared, bar)
@@ -234,7 +198,8 @@ int run(const Arguments& arguments) {
   bar.clear();
   if (!outcome) return report(outcome.error());
   if (const auto written = write_outputs(arguments.out, *outcome); !written) return report(written.error());
-  if (const auto kept = keep(arguments, *outcome); !kept) return report(kept.error());
+  if (const auto kept = keep(arguments.keep, outcome->document, outcome->verdict, "abbe identify otf"); !kept)
+    return report(kept.error());
   arguments.json ? print_json(*outcome, arguments.out) : print_summary(*outcome, arguments.out);
   return 0;
 }

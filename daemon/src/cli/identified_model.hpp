@@ -1,0 +1,29 @@
+#pragma once
+/// What every "abbe identify" does with its model, whatever method made it.
+
+#include <filesystem>
+#include <map>
+#include <optional>
+#include <string>
+
+#include "abbe/calib/gate.hpp"
+#include "abbe/daemon/error.hpp"
+#include "abbe/daemon/model_document.hpp"
+
+namespace abbe::daemon {
+
+/// The active model of the store the result will be kept in; none if `store` is empty.
+[[nodiscard]] Result<std::optional<ModelDocument>> active_model(const std::string& store);
+
+/// Adds the model to the store, by whom and by `command`; nothing if `store` is empty.
+[[nodiscard]] Result<void> keep(const std::string& store, const ModelDocument& document,
+                                const calib::Verdict& verdict, const std::string& command);
+
+/// model.json and `more` (file name to text) into the folder, which is created if needed. Error Io.
+[[nodiscard]] Result<void> write_results(const std::filesystem::path& folder, const ModelDocument& document,
+                                         const std::map<std::string, std::string>& more);
+
+/// The held-out residuals and what the gate would do, on stdout.
+void print_verdict(const calib::Verdict& verdict);
+
+}  // namespace abbe::daemon

@@ -26,8 +26,10 @@ using test::eventually;
 using test::Program;
 using testing::HasSubstr;
 
-constexpr double kEncoder_hz = 980.0;  // CAN_BCM makes each period a few us too long
+constexpr double kEncoder_hz = 980.0;       // CAN_BCM makes each period a few us too long
+constexpr double kCounterCard_hz = 1010.0;  // every 33rd scan
 constexpr double kTracker_hz = 500.0;
+constexpr double kAir_hz = 1.0;
 constexpr double kLongestBurst_s = 0.4;
 
 constexpr const char* kMachine = R"(
@@ -63,6 +65,36 @@ rotation_rad = [0.0013, -0.0342, 1.1003]
 initialize_s = 0.2
 [sim.encoder]
 interface = "vcan7"
+[[sim.environment]]
+name = "air"
+model = "comet_t7510"
+serial_number = 20961234
+)";
+
+/// The axes come from one of these.
+constexpr const char* kEncoder = R"(
+[encoder]
+transport = "socketcan"
+interface = "vcan7"
+sync = "kernel"
+sync_period_us = 1000
+nodes = [
+  { axis = "X", node = 1, step_nm = 10 },
+  { axis = "Y", node = 2, step_nm = 10 },
+  { axis = "Z", node = 3, step_nm = 10 },
+]
+)";
+constexpr const char* kCounterCard = R"(
+axes = [
+  { axis = "X", channel = 0, step_nm = 10 },
+  { axis = "Y", channel = 1, step_nm = 10 },
+  { axis = "Z", channel = 2, step_nm = 10 },
+]
+transport = "usbip"
+clock_MHz = 1
+latch_channel = 6
+edge_channel = 7
+sample_every = 33
 )";
 
 constexpr const char* kDaemon = R"(
@@ -71,16 +103,12 @@ host = "127.0.0.1"
 port = {port}
 point_rate_hz = 500
 weather = "none"
-[encoder]
-transport = "socketcan"
-interface = "vcan7"
-sync = "kernel"
-sync_period_us = 1000
-nodes = [
-  {{ axis = "X", node = 1, step_nm = 10 }},
-  {{ axis = "Y", node = 2, step_nm = 10 }},
-  {{ axis = "Z", node = 3, step_nm = 10 }},
-]
+[[environment]]
+name = "air"
+map = "comet-t7510"
+host = "127.0.0.1"
+port = {air_port}
+serial_number = 20961234
 [daemon]
 data_dir = "data"
 runtime_dir = "run"
@@ -123,27 +151,38 @@ class WholeDaemon : public testing::Test {
   WholeDaemon() {
     std::string name = testing::TempDir() + "abbe-hil-XXXXXX";
     directory_ = ::mkdtemp(name.data());
-    write("machine.toml", kMachine);
-    write("sim.toml", kSimulator);
-    write("path.csv", "x_mm,y_mm,z_mm\n-300,-250,-400\n300,250,0\n-300,250,-400\n300,-250,0\n");
-    // Above everything of abbed: what it stands for takes no processor time at all.
-    simulator_ = start({"/usr/bin/chrt", "-f", "90", ABBE_SIM_PROGRAM, "run", "--config", file("sim.toml"),
-                        "--ports-file", file("ports")},
-                       "sim");
-    EXPECT_TRUE(
-        eventually([this] { return std::filesystem::exists(file("ports")) || !simulator_->running(); }));
-    const std::string ports = test::text_of(file("ports"));
-    EXPECT_THAT(ports, HasSubstr("can_interface=vcan7")) << simulator_->err();
-    const auto at = ports.find("tracker_port=");
-    if (at == std::string::npos) return;
-    write("abbed.toml", kMachine + fmt::format(kDaemon, fmt::arg("port", std::stoi(ports.substr(at + 13)))));
-    abbed_ = start({ABBED_PROGRAM, "--config", file("abbed.toml")}, "abbed");
   }
   ~WholeDaemon() override {
     if (!HasFailure()) return;
     for (const char* log : {"abbed.err", "sim.err"})
       fmt::print("--- {}\n{}\n", log, test::text_of(file(log)));
     fmt::print("--- status\n{}\n", status().dump(1));
+  }
+
+  /// `axes` is the table of both that the axes come from, `card` that of a counter card without its port.
+  void start_all(const std::string& axes, const std::string& card = "") {
+    const std::string any_port = card.empty() ? "" : "[counter_card]\n" + card;
+    write("machine.toml", kMachine + axes + any_port);
+    write("sim.toml", kSimulator);
+    write("path.csv", "x_mm,y_mm,z_mm\n-300,-250,-400\n300,250,0\n-300,250,-400\n300,-250,0\n");
+    // Above everything of abbed: what it stands for takes no processor time at all.
+    simulator_ = start({"/usr/bin/chrt", "-f", "90", ABBE_SIM_PROGRAM, "run", "--config", file("sim.toml"),
+                        "--ports-file", file("ports")},
+                       "sim");
+    ASSERT_TRUE(
+        eventually([this] { return std::filesystem::exists(file("ports")) || !simulator_->running(); }));
+    const std::string at_its_port =
+        card.empty() ? "" : fmt::format("[counter_card]\nport = {}\n", port("usbip_port")) + card;
+    write("abbed.toml", kMachine + axes + at_its_port +
+                            fmt::format(kDaemon, fmt::arg("port", port("tracker_port")),
+                                        fmt::arg("air_port", port("air_port"))));
+    abbed_ = start({ABBED_PROGRAM, "--config", file("abbed.toml")}, "abbed");
+  }
+  [[nodiscard]] int port(const std::string& name) const {
+    const std::string ports = test::text_of(file("ports"));
+    const auto at = ports.find(name + "=");
+    EXPECT_NE(at, std::string::npos) << name << ": " << ports << simulator_->err();
+    return at == std::string::npos ? 1 : std::stoi(ports.substr(at + name.size() + 1));
   }
 
   void write(const std::string& name, const std::string& text) const {
@@ -182,6 +221,29 @@ class WholeDaemon : public testing::Test {
                  1e6 * after["latency_p99_s"].get<double>());
   }
 
+  /// All devices at once, with the axes from `axes`.
+  void expect_nothing_lost_with(const std::string& axes, double axes_hz) {
+    ASSERT_TRUE(streams(axes)) << stream(axes).dump(1);
+    ASSERT_TRUE(streams("tracker"));
+    ASSERT_TRUE(eventually([&] { return stream("air").value("samples", 0) > 0; })) << stream("air").dump(1);
+    ::sleep(1);
+    const json axes_before = stream(axes);
+    const json tracker = stream("tracker");
+    const json air = stream("air");
+    const Use use = use_of(abbed_->pid());
+    ::sleep(static_cast<unsigned>(run_seconds()));
+    expect_nothing_lost(axes_before, stream(axes), axes_hz, 0.01);
+    expect_nothing_lost(tracker, stream("tracker"), kTracker_hz, kLongestBurst_s);
+    expect_nothing_lost(air, stream("air"), kAir_hz, 1.0);
+    const Use used = use_of(abbed_->pid());
+    print_figure("whole daemon, use with " + axes, "memory flat",
+                 "{:.1f} % of the guest's processor, resident {} kB, at first {} kB",
+                 100.0 * (used.processor_s - use.processor_s) / run_seconds(), used.resident_kB,
+                 use.resident_kB);
+    // Memory is locked, so what it holds is resident: a leak of one sample a second would show in the soak.
+    EXPECT_LT(used.resident_kB, use.resident_kB + 2048);
+  }
+
   std::filesystem::path directory_;
   VirtualCan vcan_;
   std::unique_ptr<Program> simulator_;
@@ -189,23 +251,8 @@ class WholeDaemon : public testing::Test {
 };
 
 TEST_F(WholeDaemon, AcquiresFromAllDevicesWithoutLossAndComesBackAfterTheBusWasDown) {
-  ASSERT_NE(abbed_, nullptr);
-  ASSERT_TRUE(streams("encoder"));
-  ASSERT_TRUE(streams("tracker"));
-  ::sleep(1);
-  const json encoder = stream("encoder");
-  const json tracker = stream("tracker");
-  const Use use = use_of(abbed_->pid());
-  ::sleep(static_cast<unsigned>(run_seconds()));
-  expect_nothing_lost(encoder, stream("encoder"), kEncoder_hz, 0.01);
-  expect_nothing_lost(tracker, stream("tracker"), kTracker_hz, kLongestBurst_s);
-  const Use used = use_of(abbed_->pid());
-  print_figure(
-      "whole daemon, use", "memory flat", "{:.1f} % of the guest's processor, resident {} kB, at first {} kB",
-      100.0 * (used.processor_s - use.processor_s) / run_seconds(), used.resident_kB, use.resident_kB);
-  // Memory is locked, so what it holds is resident: a leak of one sample a second would show in the soak.
-  EXPECT_LT(used.resident_kB, use.resident_kB + 2048);
-
+  ASSERT_NO_FATAL_FAILURE(start_all(kEncoder));
+  ASSERT_NO_FATAL_FAILURE(expect_nothing_lost_with("encoder", kEncoder_hz));
   vcan_.down();
   ASSERT_TRUE(eventually([&] { return stream("encoder").value("state", "") == "closed"; }));
   EXPECT_THAT(stream("encoder").value("last_fault", ""), HasSubstr("vcan7"));
@@ -214,8 +261,14 @@ TEST_F(WholeDaemon, AcquiresFromAllDevicesWithoutLossAndComesBackAfterTheBusWasD
   EXPECT_EQ(abbed_->stop(), 0) << abbed_->err();
 }
 
+TEST_F(WholeDaemon, AcquiresFromACounterCardWithoutLoss) {
+  ASSERT_NO_FATAL_FAILURE(start_all("", kCounterCard));
+  ASSERT_NO_FATAL_FAILURE(expect_nothing_lost_with("counter_card", kCounterCard_hz));
+  EXPECT_EQ(abbed_->stop(), 0) << abbed_->err();
+}
+
 TEST_F(WholeDaemon, RecordsWithoutLoss) {
-  ASSERT_NE(abbed_, nullptr);
+  ASSERT_NO_FATAL_FAILURE(start_all(kEncoder));
   ASSERT_TRUE(streams("encoder"));
   ASSERT_TRUE(streams("tracker"));
   ::sleep(2);

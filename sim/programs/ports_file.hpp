@@ -1,7 +1,7 @@
 #pragma once
 /// Where the devices listen, for people (standard output) and for scripts (a file written when everything
-/// listens, whose lines `tracker_port=N`, `can_port=N` or `can_interface=NAME`, and `usbip_port=N` a shell
-/// and a TOML reader both understand; a device that is not there has no line).
+/// listens, whose lines `tracker_port=N`, `can_port=N` or `can_interface=NAME`, `usbip_port=N` and
+/// `cmm_port=N` a shell and a TOML reader both understand; a device that is not there has no line).
 
 #include <cstdint>
 #include <optional>
@@ -25,7 +25,8 @@ struct Ports {
   std::optional<std::uint16_t> can;
   std::vector<NamedPlace> environment;
   std::vector<std::uint16_t> usbip;  ///< one a counter card
-  std::string can_interface;         ///< SocketCAN; no port then
+  std::optional<std::uint16_t> cmm;
+  std::string can_interface;  ///< SocketCAN; no port then
 };
 
 /// The file is there before anything is printed. Empty path: no file.

@@ -3,11 +3,12 @@
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>
+#include <charconv>
 #include <memory>
 
-#include "abbe/sim/controller_server.hpp"
-#include "abbe/sim/recorded_bus.hpp"
-#include "abbe/sim/recorded_tracker.hpp"
+#include <toml++/toml.h>
+
+#include "abbe/sim/replay.hpp"
 #include "commands.hpp"
 #include "event_loop.hpp"
 #include "files.hpp"
@@ -20,86 +21,98 @@ struct ReplayOptions {
   std::string file;
   std::string ports_file;
   double speed = 1.0;
-  std::uint16_t tracker_port = 0;
-  EncoderBusOptions bus;
+  ReplaySetup setup;
+  std::vector<std::string> places;  ///< NAME=PORT or NAME=PATH
   bool exit_at_end = false;
 };
 
-using RecordedTrackerServer = ControllerServer<RecordedTracker>;
-
-struct Replay {
-  ReplayTimeline timeline;
-  std::optional<RecordedTrackerServer> tracker;
-  std::optional<RecordedBus> bus;
-
-  void poll(HostTime now) {
-    if (tracker) tracker->poll(now);
-    if (bus) bus->poll(now);
-  }
-  [[nodiscard]] HostTime next_due() const {
-    return std::min(tracker ? tracker->next_due() : HostTime::max(), bus ? bus->next_due() : HostTime::max());
-  }
-  [[nodiscard]] std::vector<pollfd> fds() const {
-    std::vector<pollfd> all;
-    if (tracker) {
-      all.push_back({tracker->listener_fd(), POLLIN, 0});
-      const short events = static_cast<short>(tracker->wants_write() ? POLLIN | POLLOUT : POLLIN);
-      if (tracker->client_fd() >= 0) all.push_back({tracker->client_fd(), events, 0});
+/// "air=1502", "parts=/tmp/parts".
+Result<void> read_places(const ReplayOptions& options, ReplaySetup& setup) {
+  for (const std::string& place : options.places) {
+    const auto equals = place.find('=');
+    const std::string name = place.substr(0, equals);
+    const std::string where = equals == std::string::npos ? "" : place.substr(equals + 1);
+    if (name.empty() || where.empty())
+      return usage_error(fmt::format("--at {}: must be NAME=PORT or NAME=PATH", place));
+    std::uint16_t port = 0;
+    const auto [end, wrong] = std::from_chars(where.data(), where.data() + where.size(), port);
+    if (wrong == std::errc{} && end == where.data() + where.size()) {
+      setup.ports[name] = port;
+    } else {
+      setup.links[name] = where;
     }
-    if (bus) all.push_back({bus->fd(), POLLIN, 0});
-    return all;
   }
-  [[nodiscard]] bool finished() const {
-    const bool tracker_done = !tracker || (tracker->device().finished() && !tracker->wants_write());
-    return tracker_done && (!bus || bus->finished());
-  }
-};
-
-const RecordedDevice* first_of(const std::vector<RecordedDevice>& devices, RecordedKind kind) {
-  for (const RecordedDevice& device : devices) {
-    if (device.kind == kind) return &device;
-  }
-  return nullptr;
+  return {};
 }
 
-Result<std::unique_ptr<Replay>> open(const ReplayOptions& options) {
+/// The serial numbers that the daemon expected of its cards when it recorded them.
+void read_serials(const std::string& configuration, std::map<std::string, std::string>& serials) {
+  try {
+    const toml::table root = toml::parse(configuration);
+    for (const auto* card : {"counter_card", "reference"}) {
+      const auto serial = root[card]["serial_number"].value<std::string>();
+      const auto name = root[card]["name"].value<std::string>();
+      if (serial) serials[name.value_or(card)] = *serial;
+    }
+  } catch (const toml::parse_error&) {
+    return;  // of a daemon of another age: the bytes are served all the same
+  }
+}
+
+Ports ports_of(const std::vector<ReplayedPlace>& places) {
+  Ports ports;
+  for (const ReplayedPlace& place : places) {
+    fmt::print(stderr, "replay: {}: {}\n", place.name, place.what);
+    switch (place.kind) {
+      case RecordedKind::Tracker:
+        ports.tracker = place.port;
+        break;
+      case RecordedKind::Encoders:
+        ports.can_interface = place.path;
+        if (place.path.empty()) ports.can = place.port;
+        break;
+      case RecordedKind::CounterCard:
+        ports.usbip.push_back(place.port);
+        break;
+      case RecordedKind::ModbusTcp:
+        ports.environment.push_back(
+            {place.name, fmt::format("Modbus TCP on 127.0.0.1:{}", place.port), place.port, {}});
+        break;
+      case RecordedKind::ModbusRtu:
+        ports.environment.push_back({place.name, "Modbus RTU on " + place.path, 0, place.path});
+        break;
+      case RecordedKind::MeasuringMachine:
+        ports.cmm = place.port;
+        break;
+    }
+  }
+  return ports;
+}
+
+Result<std::unique_ptr<Replay>> open(const ReplayOptions& options, HostTime now) {
   const auto text = read_file(options.file);
   if (!text) return tl::unexpected(text.error());
-  const auto devices = read_traffic(std::as_bytes(std::span(*text)), options.file);
+  const auto bytes = std::as_bytes(std::span(*text));
+  const auto devices = read_traffic(bytes, options.file);
   if (!devices) return tl::unexpected(devices.error());
-  auto replay = std::make_unique<Replay>();
-  const RecordedDevice* tracker = first_of(*devices, RecordedKind::Tracker);
-  if (tracker != nullptr) {
-    auto server = RecordedTrackerServer::open(options.tracker_port,
-                                              std::make_unique<RecordedTracker>(*tracker, replay->timeline));
-    if (!server) return tl::unexpected(server.error());
-    fmt::print(stderr, "replay: {}: {} packets after the start of measuring\n", tracker->name,
-               server->device().packets());
-    replay->tracker.emplace(std::move(*server));
-  }
-  if (const RecordedDevice* encoders = first_of(*devices, RecordedKind::Encoders)) {
-    auto bus = RecordedBus::open(options.bus, *encoders, replay->timeline, tracker == nullptr);
-    if (!bus) return tl::unexpected(bus.error());
-    fmt::print(stderr, "replay: {}: {} cycles\n", encoders->name, bus->syncs());
-    replay->bus.emplace(std::move(*bus));
-  }
-  return replay;
+  ReplaySetup setup = options.setup;
+  setup.bus.speed = options.speed;
+  if (const auto read = read_places(options, setup); !read) return tl::unexpected(read.error());
+  read_serials(recorded_configuration(bytes), setup.serials);
+  return Replay::open(*devices, setup, now);
 }
 
 int replay(const ReplayOptions& options) {
   const EventLoop loop(options.speed);
-  const auto opened = open(options);
+  const auto opened = open(options, loop.clock().now());
   if (!opened) return report(opened.error());
   Replay& replay = **opened;
-  Ports ports;
-  if (replay.tracker) ports.tracker = replay.tracker->port();
-  ports.can_interface = replay.bus ? options.bus.interface : "";
-  if (replay.bus && ports.can_interface.empty()) ports.can = replay.bus->port();
-  if (const auto announced = announce_ports(ports, options.ports_file); !announced)
+  if (const auto announced = announce_ports(ports_of(replay.places()), options.ports_file); !announced)
     return report(announced.error());
   bool was_finished = false;
   while (!loop.stopped() && !(options.exit_at_end && was_finished)) {
-    std::vector<pollfd> fds = replay.fds();
+    std::vector<pollfd> fds;
+    replay.add_poll_fds(fds);
     loop.wait(fds, replay.next_due());
     replay.poll(loop.clock().now());
     if (replay.finished() && !was_finished) fmt::print(stderr, "replay: everything served\n");
@@ -118,11 +131,15 @@ Subcommand add_replay(CLI::App& app) {
   sub->add_option("--speed", options->speed,
                   "simulated seconds per second; the daemon must be given the same")
       ->check(CLI::Range(1e-3, 1e4));
-  sub->add_option("--tracker-port", options->tracker_port, "TCP; 0 = any free one");
-  sub->add_option("--can-port", options->bus.port, "UDP; 0 = any free one");
-  sub->add_option("--can-peer-port", options->bus.peer_port,
+  sub->add_option("--tracker-port", options->setup.tracker_port, "TCP; 0 = any free one");
+  sub->add_option("--can-port", options->setup.bus.port, "UDP; 0 = any free one");
+  sub->add_option("--can-peer-port", options->setup.bus.peer_port,
                   "UDP port of the daemon; 0 = whoever speaks first");
-  sub->add_option("--can-interface", options->bus.interface, "SocketCAN interface instead of UDP");
+  sub->add_option("--can-interface", options->setup.bus.interface, "SocketCAN interface instead of UDP");
+  sub->add_option("--at", options->places,
+                  "NAME=PORT or, for a serial line, NAME=PATH: where the device of that name is served "
+                  "(default: any free port; repeatable)")
+      ->type_name("PLACE");
   sub->add_option("--ports-file", options->ports_file, "as of run")->type_name("FILE");
   sub->add_flag("--exit-at-end", options->exit_at_end, "leave when everything has been served");
   return {sub, [options] { return replay(*options); }};

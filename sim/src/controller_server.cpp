@@ -10,6 +10,7 @@
 #include <utility>
 
 #include "abbe/sim/ippdme_device.hpp"
+#include "abbe/sim/recorded_dialogue.hpp"
 #include "abbe/sim/recorded_tracker.hpp"
 #include "abbe/sim/tracker_device.hpp"
 
@@ -18,10 +19,11 @@ namespace {
 
 constexpr std::size_t kMostUnsent = 32u << 20;  // a client this far behind does not read any more
 
-/// A tracker controller tells it why; I++ DME has no word for it.
+/// A tracker controller tells it why; I++ DME and Modbus have no word for it.
 template <class Controller>
 void turn_away(const Socket& stranger) {
-  if constexpr (std::is_same_v<Controller, IppDmeDevice>) return;
+  if constexpr (std::is_same_v<Controller, IppDmeDevice> || std::is_same_v<Controller, RecordedDialogue>)
+    return;
   std::array<std::byte, 64> packet{};
   const std::size_t size =
       emscon::encode(emscon::ErrorResponse{emscon::Command{}, emscon::Status::MultipleConnectionsNotAllowed},
@@ -100,5 +102,6 @@ void ControllerServer<Controller>::drop_client() {
 template class ControllerServer<TrackerDevice>;
 template class ControllerServer<RecordedTracker>;
 template class ControllerServer<IppDmeDevice>;
+template class ControllerServer<RecordedDialogue>;
 
 }  // namespace abbe::sim

@@ -1,5 +1,6 @@
 // What the card answers on endpoint 0.
 #include <algorithm>
+#include <utility>
 
 #include "abbe/protocol/bytes.hpp"
 #include "abbe/protocol/quad08/stream.hpp"
@@ -65,6 +66,12 @@ Answer CounterCard::control(const usb::Setup& setup, HostTime now) {
   }
   if (answer && answer->size() > setup.length) answer->resize(setup.length);
   return answer;
+}
+
+ControlAnswer CounterCard::answer(const usb::Setup& setup, HostTime now) {
+  auto data = control(setup, now);
+  if (!data) return {ControlAnswer::Outcome::Stalled, {}};
+  return {ControlAnswer::Outcome::Done, std::move(*data)};
 }
 
 Answer CounterCard::standard(const usb::Setup& setup) {

@@ -1,20 +1,16 @@
 #include "abbe/sim/modbus_server.hpp"
 
-#include <fcntl.h>
 #include <fmt/format.h>
 #include <modbus/modbus.h>
-#include <stdlib.h>
 #include <sys/socket.h>
-#include <termios.h>
 #include <unistd.h>
 
 #include <algorithm>
 #include <array>
 #include <cerrno>
-#include <cstring>
-#include <filesystem>
 #include <utility>
 
+#include "abbe/sim/pseudo_terminal.hpp"
 #include "abbe/sim/socket.hpp"
 
 namespace abbe::sim {
@@ -37,31 +33,6 @@ struct FreeMapping {
 };
 using Mapping = std::unique_ptr<modbus_mapping_t, FreeMapping>;
 
-/// Both ends: with the client's end held open the terminal stays usable while no client is there.
-struct Terminal {
-  Socket server;
-  Socket client;
-};
-
-Result<Terminal> open_terminal(const std::string& link) {
-  Terminal t{Socket{posix_openpt(O_RDWR | O_NOCTTY | O_CLOEXEC)}, {}};
-  std::array<char, 64> path{};
-  if (!t.server || grantpt(t.server.get()) != 0 || unlockpt(t.server.get()) != 0 ||
-      ptsname_r(t.server.get(), path.data(), path.size()) != 0)
-    return io_error(fmt::format("{}: no pseudo terminal: {}", link, std::strerror(errno)));
-  t.client = Socket{::open(path.data(), O_RDWR | O_NOCTTY | O_CLOEXEC)};
-  termios raw{};
-  if (!t.client || tcgetattr(t.client.get(), &raw) != 0)
-    return io_error(fmt::format("{}: {}", path.data(), std::strerror(errno)));
-  cfmakeraw(&raw);
-  tcsetattr(t.client.get(), TCSANOW, &raw);
-  std::error_code failed;
-  if (std::filesystem::is_symlink(link)) std::filesystem::remove(link, failed);
-  std::filesystem::create_symlink(path.data(), link, failed);
-  if (failed) return io_error(fmt::format("{}: {}", link, failed.message()));
-  return t;
-}
-
 bool readable(int fd) {
   pollfd poll{fd, POLLIN, 0};
   return ::poll(&poll, 1, 0) > 0;
@@ -81,7 +52,7 @@ struct ModbusServer::State {
   std::uint16_t port_number = 0;
   Socket listener;
   std::vector<Socket> clients;
-  Terminal terminal;
+  PseudoTerminal terminal;
   Context context;
   std::vector<Query> waiting;
   std::vector<std::pair<Fault, HostTime>> faults;  ///< with their ends
@@ -108,7 +79,7 @@ struct ModbusServer::State {
 
 Result<void> ModbusServer::State::plug_in() {
   if (serial()) {
-    auto opened = open_terminal(link());
+    auto opened = PseudoTerminal::open(link());
     if (!opened) return tl::unexpected(opened.error());
     terminal = std::move(*opened);
     return {};
@@ -123,10 +94,8 @@ Result<void> ModbusServer::State::plug_in() {
 void ModbusServer::State::unplug() {
   listener.close();
   clients.clear();
-  terminal = {};
+  terminal.close();
   waiting.clear();
-  std::error_code ignored;
-  if (serial()) std::filesystem::remove(link(), ignored);
 }
 
 void ModbusServer::State::end_faults(HostTime now) {
@@ -153,7 +122,7 @@ void ModbusServer::State::receive(HostTime now) {
     std::erase_if(waiting, [fd](const Query& q) { return q.fd == fd; });
     return true;
   });
-  if (terminal.server && readable(terminal.server.get())) (void)receive_from(terminal.server.get(), now);
+  if (terminal.fd() >= 0 && readable(terminal.fd())) (void)receive_from(terminal.fd(), now);
 }
 
 /// False: the client is gone, or speaks something else.
@@ -252,7 +221,7 @@ HostTime ModbusServer::next_due() const {
 
 void ModbusServer::add_poll_fds(std::vector<pollfd>& fds) const {
   if (state_->listener) fds.push_back({state_->listener.get(), POLLIN, 0});
-  if (state_->terminal.server) fds.push_back({state_->terminal.server.get(), POLLIN, 0});
+  if (state_->terminal.fd() >= 0) fds.push_back({state_->terminal.fd(), POLLIN, 0});
   for (const auto& client : state_->clients) fds.push_back({client.get(), POLLIN, 0});
 }
 

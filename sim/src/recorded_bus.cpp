@@ -53,12 +53,15 @@ void RecordedBus::take(const can::CanFrame& frame, bool to_device, HostTime time
   if (to_device) {
     if (can::decode_sync(frame)) cycles_.push_back({time, {}});
     if (is_function(frame, can::cob::kSdoRequest)) {
-      asked_[static_cast<can::NodeId>(frame.id & kNode)] = {frame.id, first_eight(frame)};
+      const auto node = static_cast<can::NodeId>(frame.id & kNode);
+      if (const auto unanswered = asked_.find(node); unanswered != asked_.end())
+        sdo_[unanswered->second].frames.push_back(std::nullopt);
+      asked_[node] = {frame.id, first_eight(frame)};
     }
     return;
   }
   if (is_tpdo(frame)) {
-    if (!cycles_.empty()) cycles_.back().answers.push_back(frame);
+    if (!cycles_.empty()) cycles_.back().answers.push_back({time - cycles_.back().sync, frame});
   } else if (is_function(frame, can::cob::kSdoResponse)) {
     const auto asked = asked_.find(static_cast<can::NodeId>(frame.id & kNode));
     if (asked == asked_.end()) return;
@@ -72,6 +75,7 @@ void RecordedBus::take(const can::CanFrame& frame, bool to_device, HostTime time
 
 void RecordedBus::poll(HostTime now) {
   for (const ArrivedFrame& arrived : port_->receive()) on_frame(arrived.frame, now);
+  send_late(now);
   keep_alive(now);
   if (!timeline_.running()) next_spoken_ = 0;
   for (; next_spoken_ < spoken_.size() && timeline_.due(spoken_[next_spoken_].time) <= now; ++next_spoken_) {
@@ -82,8 +86,10 @@ void RecordedBus::poll(HostTime now) {
 }
 
 HostTime RecordedBus::next_due() const {
-  if (!timeline_.running()) return port_->has_listener() ? next_beat_ : HostTime::max();
-  return next_spoken_ < spoken_.size() ? timeline_.due(spoken_[next_spoken_].time) : next_beat_;
+  const HostTime late = late_.empty() ? HostTime::max() : late_.front().time;
+  if (!timeline_.running()) return std::min(late, port_->has_listener() ? next_beat_ : HostTime::max());
+  return std::min(late,
+                  next_spoken_ < spoken_.size() ? timeline_.due(spoken_[next_spoken_].time) : next_beat_);
 }
 
 void RecordedBus::keep_alive(HostTime now) {
@@ -106,6 +112,7 @@ void RecordedBus::on_frame(const can::CanFrame& frame, HostTime now) {
   if (nmt->command != can::NmtCommand::ResetNode && nmt->command != can::NmtCommand::ResetCommunication)
     return;
   state_ = can::NodeState::PreOperational;
+  if (timeline_.running() && next_spoken_ < spoken_.size()) return;  // they boot when they did, if they did
   for (const can::NodeId node : nodes_) {
     if (nmt->node != can::kAllNodes && nmt->node != node) continue;
     const can::CanFrame boot = can::encode_heartbeat(node, can::NodeState::BootUp);
@@ -128,14 +135,35 @@ void RecordedBus::on_sync(HostTime now) {
   if (leads_) timeline_.start(cycles_.front().sync, now);
   if (!timeline_.running()) {
     next_cycle_.reset();
-    return port_->send(cycles_.front().answers);
+    return answer(cycles_.front(), now);
   }
   const HostTime recorded = timeline_.recorded(now);
   std::size_t cycle = next_cycle_.value_or(cycle_at(recorded));
   const auto apart = cycles_[cycle].sync - recorded;
   if (apart > kOutOfStep || apart < -kOutOfStep) cycle = cycle_at(recorded);
   next_cycle_ = std::min(cycle + 1, cycles_.size() - 1);
-  port_->send(cycles_[cycle].answers);
+  answer(cycles_[cycle], now);
+}
+
+/// At once what came within two milliseconds: how long a node takes is no fault.
+void RecordedBus::answer(const Cycle& cycle, HostTime now) {
+  constexpr auto kAtOnce = 2ms;
+  std::vector<can::CanFrame> at_once;
+  for (const Answer& answer : cycle.answers) {
+    if (answer.delay < kAtOnce) {
+      at_once.push_back(answer.frame);
+    } else {
+      late_.push_back({now + answer.delay, answer.frame});
+    }
+  }
+  std::ranges::stable_sort(late_, {}, &Spoken::time);
+  port_->send(at_once);
+}
+
+void RecordedBus::send_late(HostTime now) {
+  const auto due = std::ranges::find_if(late_, [now](const Spoken& s) { return s.time > now; });
+  for (auto it = late_.begin(); it != due; ++it) port_->send(std::span(&it->frame, 1));
+  late_.erase(late_.begin(), due);
 }
 
 void RecordedBus::on_sdo(const can::CanFrame& frame) {
@@ -148,7 +176,8 @@ void RecordedBus::on_sdo(const can::CanFrame& frame) {
     return port_->send(std::span(&abort, 1));
   }
   SdoResponses& responses = known->second;
-  port_->send(std::span(&responses.frames[responses.next], 1));
+  const auto& response = responses.frames[responses.next];
+  if (response) port_->send(std::span(&*response, 1));
   if (responses.next + 1 < responses.frames.size()) ++responses.next;
 }
 

@@ -41,38 +41,83 @@ bool accepted(std::span<const std::byte> packet) {
 RecordedTracker::RecordedTracker(const RecordedDevice& device, ReplayTimeline& timeline)
     : timeline_(timeline) {
   for (const RecordedBlock& block : device.blocks) {
-    if (block.to_device) continue;
-    for (auto rest = std::span<const std::byte>(block.bytes); !rest.empty();) {
-      rest = rest.subspan(framer_.push(rest));
-      while (const auto packet = framer_.next()) take(*packet, block.time);
-      if (framer_.broken()) framer_.resync();  // lost blocks, or a connection that broke inside a packet
+    if (block.connects() || connections_.empty()) {
+      framer_.reset();
+      connections_.emplace_back().began = block.time;
     }
+    read(block);
   }
+  if (connections_.empty()) connections_.emplace_back();
   framer_.reset();
+}
+
+void RecordedTracker::read(const RecordedBlock& block) {
+  Connection& connection = connections_.back();
+  if (block.lost()) {
+    connection.spoken.push_back({block.time, {}, true});
+    return;
+  }
+  if (block.to_device) {
+    connection.exchanges[head_of(block.bytes).command].push_back({.asked = block.time});
+    return;
+  }
+  if (block.hole_before) framer_.resync();
+  if (connection.garbled) {
+    connection.spoken.push_back({block.time, block.bytes});
+    return;
+  }
+  for (auto rest = std::span<const std::byte>(block.bytes); !rest.empty() && !framer_.broken();) {
+    rest = rest.subspan(framer_.push(rest));
+    while (const auto packet = framer_.next()) take(*packet, block.time);
+  }
+  if (!framer_.broken()) return;
+  const auto refused = framer_.refused();
+  connection.spoken.push_back({block.time, {refused.begin(), refused.end()}});
+  connection.garbled = true;
 }
 
 void RecordedTracker::take(std::span<const std::byte> packet, HostTime time) {
   const Head head = head_of(packet);
-  if (head.type != kCommandType) {
-    if (started_) spoken_.push_back({time, {packet.begin(), packet.end()}});
-    return;
-  }
-  if (head.command == kStart && !started_ && accepted(packet)) started_ = time;
-  answers_[head.command].packets.emplace_back(packet.begin(), packet.end());
+  if (head.type == kCommandType) return take_answer(head.command, packet, time);
+  connections_.back().spoken.push_back({time, {packet.begin(), packet.end()}});
 }
 
-void RecordedTracker::connected(HostTime) {
-  disconnected();
+void RecordedTracker::take_answer(std::int32_t command, std::span<const std::byte> packet, HostTime time) {
+  Connection& connection = connections_.back();
+  auto& exchanges = connection.exchanges[command];
+  auto exchange =
+      std::ranges::find_if(exchanges, [](const Exchange& e) { return e.answers.size() < e.wanted; });
+  // A recording that began in the middle has answers without questions.
+  if (exchange == exchanges.end()) exchange = exchanges.insert(exchange, {.asked = time});
+  if (command == kReflectors) {  // the one command with an answer per reflector
+    const auto first = emscon::decode_answer(packet);
+    const auto* reflectors = first ? std::get_if<emscon::ReflectorsAnswer>(&*first) : nullptr;
+    if (reflectors != nullptr) exchange->wanted = static_cast<std::size_t>(std::max(reflectors->total, 1));
+  }
+  exchange->answered = time;
+  exchange->answers.emplace_back(packet.begin(), packet.end());
+  if (command == kStart && !connection.first_start && accepted(packet)) connection.first_start = time;
+}
+
+std::size_t RecordedTracker::packets() const {
+  std::size_t sum = 0;
+  for (const Connection& connection : connections_) sum += connection.spoken.size();
+  return sum;
+}
+
+void RecordedTracker::connected(HostTime now) {
+  if (std::exchange(played_, true)) connection_ = (connection_ + 1) % connections_.size();
+  connected_at_ = now;
 }
 
 void RecordedTracker::disconnected() {
   framer_.reset();
   out_.clear();
-  for (auto& [command, answers] : answers_) answers.next = 0;
-  playing_ = false;
-  wants_close_ = false;
+  answered_.clear();
+  due_.clear();
   next_ = 0;
-  timeline_.rewind();
+  anchored_ = stopped_ = wants_close_ = false;
+  if (connection_ + 1 == connections_.size()) timeline_.rewind();
 }
 
 void RecordedTracker::receive(std::span<const std::byte> bytes, HostTime now) {
@@ -81,39 +126,61 @@ void RecordedTracker::receive(std::span<const std::byte> bytes, HostTime now) {
     while (const auto packet = framer_.next()) answer(*packet, now);
   }
   wants_close_ = wants_close_ || framer_.broken();
+  advance(now);
 }
 
 void RecordedTracker::answer(std::span<const std::byte> request, HostTime now) {
   const std::int32_t command = head_of(request).command;
-  const auto known = answers_.find(command);
-  if (known == answers_.end()) {
+  const auto known = connection().exchanges.find(command);
+  if (known == connection().exchanges.end()) {
     std::array<std::byte, emscon::kMaxAnswerSize> refusal{};
     const emscon::Acknowledge no{static_cast<emscon::Command>(command), emscon::Status::NotImplemented};
     return say(std::span(refusal).first(emscon::encode(emscon::Answer{no}, refusal)));
   }
-  Answers& answers = known->second;
-  std::size_t count = 1;
-  if (command == kReflectors) {  // the one command with an answer per reflector
-    const auto first = emscon::decode_answer(answers.packets[answers.next]);
-    const auto* reflectors = first ? std::get_if<emscon::ReflectorsAnswer>(&*first) : nullptr;
-    if (reflectors != nullptr) count = static_cast<std::size_t>(std::max(reflectors->total, 1));
-  }
-  const std::size_t from = answers.next;
-  for (std::size_t i = from; i < std::min(from + count, answers.packets.size()); ++i) say(answers.packets[i]);
-  if (from + count < answers.packets.size()) answers.next = from + count;
-  if (command == kStop) playing_ = false;
-  if (command == kStart && started_ && accepted(answers.packets[from])) {
-    playing_ = true;
-    timeline_.start(*started_, now);
-  }
+  const std::size_t turn = answered_[command]++;
+  const Exchange& exchange = known->second[std::min(turn, known->second.size() - 1)];
+  if (exchange.answers.empty()) return;
+  Due due{now + (exchange.answered - exchange.asked), exchange.answers};
+  if (command == kStart && accepted(exchange.answers.front())) due.starts = exchange.answered;
+  due.stops = command == kStop;
+  due_.push_back(std::move(due));
+}
+
+void RecordedTracker::carry_out(const Due& due) {
+  for (const Packet& packet : due.packets) say(packet);
+  if (due.stops) stopped_ = true;
+  if (!due.starts) return;
+  anchored_ = true;
+  stopped_ = false;
+  timeline_.restart(*due.starts, due.time);
+}
+
+HostTime RecordedTracker::spoken_due() const {
+  if (!played_ || next_ >= connection().spoken.size() || stopped_) return HostTime::max();
+  const HostTime time = connection().spoken[next_].time;
+  if (anchored_) return timeline_.due(time);
+  const bool waits = connection().first_start && time >= *connection().first_start;
+  return waits ? HostTime::max() : connected_at_ + (time - connection().began);
 }
 
 HostTime RecordedTracker::next_due() const {
-  return playing_ && next_ < spoken_.size() ? timeline_.due(spoken_[next_].time) : HostTime::max();
+  return due_.empty() ? spoken_due() : std::min(due_.front().time, spoken_due());
 }
 
 void RecordedTracker::advance(HostTime now) {
-  for (; next_due() <= now; ++next_) say(spoken_[next_].packet);
+  while (next_due() <= now) {
+    if (!due_.empty() && due_.front().time <= spoken_due()) {
+      carry_out(due_.front());
+      due_.pop_front();
+    } else {
+      const Spoken& spoken = connection().spoken[next_++];
+      say(spoken.packet);
+      wants_close_ = wants_close_ || spoken.breaks;
+    }
+  }
+  const bool last = connection_ + 1 == connections_.size();
+  const bool begun = anchored_ || (played_ && !connection().first_start);
+  finished_ = finished_ || (last && begun && next_ >= connection().spoken.size());
 }
 
 std::vector<std::byte> RecordedTracker::take_output() {

@@ -3,11 +3,15 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cstring>
 #include <map>
 
 #include "abbe/protocol/can/udp_framing.hpp"
+#include "abbe/protocol/ippdme/lines.hpp"
 #include "abbe/protocol/mcap/reader.hpp"
+#include "abbe/protocol/modbus/read.hpp"
 #include "abbe/protocol/raw_bytes_cdr.hpp"
+#include "abbe/protocol/usbip/urb.hpp"
 
 namespace abbe::sim {
 namespace {
@@ -30,7 +34,7 @@ class TrafficReader {
   std::vector<RecordedDevice> finish() {
     std::vector<RecordedDevice> devices;
     for (auto& [name, device] : devices_) devices.push_back(std::move(device));
-    for (RecordedDevice& device : devices) device.kind = kind_of(device);
+    for (RecordedDevice& device : devices) device.kind = kind_of(device.blocks);
     return devices;
   }
 
@@ -44,18 +48,11 @@ class TrafficReader {
     device.name = raw->device;
     const bool to_device = raw->direction == protocol::RawBlock::Direction::ToDevice;
     bool& open = open_[device.name];
-    if (!open || device.blocks.empty()) device.blocks.push_back({raw->time, to_device, {}});
+    if (!open || device.blocks.empty())
+      device.blocks.push_back({raw->time, to_device, raw->lost_before != 0, {}});
     auto& bytes = device.blocks.back().bytes;
     bytes.insert(bytes.end(), raw->bytes.begin(), raw->bytes.end());
     open = raw->continued;
-  }
-
-  static RecordedKind kind_of(const RecordedDevice& device) {
-    for (const RecordedBlock& block : device.blocks) {
-      if (block.bytes.empty()) continue;
-      return protocol::can::DatagramView::parse(block.bytes) ? RecordedKind::Encoders : RecordedKind::Tracker;
-    }
-    return RecordedKind::Tracker;
   }
 
   std::vector<std::uint16_t> raw_channels_;
@@ -63,23 +60,80 @@ class TrafficReader {
   std::map<std::string, bool> open_;
 };
 
-}  // namespace
-
-Result<std::vector<RecordedDevice>> read_traffic(std::span<const std::byte> file, std::string_view name) {
-  if (!mcap::starts_with_magic(file)) return bad_input(fmt::format("{}: not an MCAP file", name));
-  TrafficReader reader;
+/// Every record of the file, also those in chunks, to `take(opcode, content)`.
+void for_each_record(std::span<const std::byte> file, const auto& take) {
   mcap::LinearScan scan(file);
   while (const auto item = scan.next()) {
     if (!item->chunk) {
-      reader.on_record(item->record.opcode, item->record.content);
+      take(item->record.opcode, item->record.content);
       continue;
     }
     if (item->chunk->state != mcap::ScannedChunk::State::Whole &&
         item->chunk->state != mcap::ScannedChunk::State::Cut)
       continue;
     mcap::RecordReader records(item->chunk->chunk.records);
-    while (const auto record = records.next()) reader.on_record(record->opcode, record->content);
+    while (const auto record = records.next()) take(record->opcode, record->content);
   }
+}
+
+bool is_usbip(std::span<const std::byte> bytes) {
+  if (bytes.size() < protocol::usbip::kUrbHeaderSize) return false;
+  return protocol::usbip::decode_urb(bytes.first<protocol::usbip::kUrbHeaderSize>()).has_value();
+}
+
+bool is_line(std::span<const std::byte> bytes) {
+  std::string_view text{reinterpret_cast<const char*>(bytes.data()), bytes.size()};
+  text = text.substr(0, text.find("\r\n"));
+  return protocol::ippdme::parse_command(text) || protocol::ippdme::parse_response(text);
+}
+
+bool is_emscon(std::span<const std::byte> bytes) {
+  constexpr std::size_t kHead = 8;
+  if (bytes.size() < kHead) return false;
+  std::int32_t size = 0;
+  std::memcpy(&size, bytes.data(), sizeof size);
+  return static_cast<std::size_t>(size) == bytes.size();
+}
+
+std::optional<RecordedKind> kind_of_bytes(std::span<const std::byte> bytes) {
+  if (is_emscon(bytes)) return RecordedKind::Tracker;
+  if (is_usbip(bytes)) return RecordedKind::CounterCard;
+  if (protocol::can::DatagramView::parse(bytes)) return RecordedKind::Encoders;
+  if (protocol::modbus::decode_request(bytes, protocol::modbus::Transport::Tcp))
+    return RecordedKind::ModbusTcp;
+  if (protocol::modbus::decode_request(bytes, protocol::modbus::Transport::Rtu))
+    return RecordedKind::ModbusRtu;
+  if (is_line(bytes)) return RecordedKind::MeasuringMachine;
+  return std::nullopt;
+}
+
+}  // namespace
+
+RecordedKind kind_of(std::span<const RecordedBlock> blocks) {
+  for (const bool to_device : {true, false}) {
+    for (const RecordedBlock& block : blocks) {
+      if (block.to_device != to_device || block.bytes.empty()) continue;
+      if (const auto kind = kind_of_bytes(block.bytes)) return *kind;
+    }
+  }
+  return RecordedKind::Tracker;
+}
+
+std::string recorded_configuration(std::span<const std::byte> file) {
+  constexpr std::string_view kRecord = "abbe.configuration";
+  std::string text;
+  for_each_record(file, [&](mcap::Opcode opcode, mcap::Bytes content) {
+    if (opcode != mcap::Opcode::Metadata) return;
+    const auto metadata = mcap::decode<mcap::Metadata>(content);
+    if (metadata && metadata->name == kRecord) text = metadata->entries.find("text").value_or("");
+  });
+  return text;
+}
+
+Result<std::vector<RecordedDevice>> read_traffic(std::span<const std::byte> file, std::string_view name) {
+  if (!mcap::starts_with_magic(file)) return bad_input(fmt::format("{}: not an MCAP file", name));
+  TrafficReader reader;
+  for_each_record(file, [&](mcap::Opcode opcode, mcap::Bytes content) { reader.on_record(opcode, content); });
   auto devices = reader.finish();
   if (devices.empty())
     return bad_input(fmt::format("{}: holds no raw bytes of a device ([recording] raw = true)", name));

@@ -112,18 +112,10 @@ HostTime Simulation::next_due() const {
 }
 
 void Simulation::add_poll_fds(std::vector<pollfd>& fds) const {
-  if (tracker_) {
-    fds.push_back({tracker_->listener_fd(), POLLIN, 0});
-    const short events = static_cast<short>(tracker_->wants_write() ? POLLIN | POLLOUT : POLLIN);
-    if (tracker_->client_fd() >= 0) fds.push_back({tracker_->client_fd(), events, 0});
-  }
+  if (tracker_) tracker_->add_poll_fds(fds);
   if (bus_) fds.push_back({bus_->fd(), POLLIN, 0});
   for (const ModbusServer& server : environment_) server.add_poll_fds(fds);
-  for (const UsbipServer& card : counter_cards_) {
-    fds.push_back({card.listener_fd(), POLLIN, 0});
-    const short events = static_cast<short>(card.wants_write() ? POLLIN | POLLOUT : POLLIN);
-    if (card.client_fd() >= 0) fds.push_back({card.client_fd(), events, 0});
-  }
+  for (const UsbipServer& card : counter_cards_) card.add_poll_fds(fds);
 }
 
 }  // namespace abbe::sim

@@ -28,11 +28,21 @@ std::size_t wanted_bytes(const auto& requests) {
 Result<UsbipServer> UsbipServer::open(std::uint16_t port, const CounterCardOptions& card) {
   auto listener = listen_tcp(port);
   if (!listener) return tl::unexpected(listener.error());
-  return UsbipServer(std::move(*listener), card);
+  auto simulated = std::make_unique<CounterCard>(card);
+  CounterCard* const simulated_card = simulated.get();
+  UsbipServer server(std::move(*listener), std::move(simulated));
+  server.simulated_ = simulated_card;
+  return server;
 }
 
-UsbipServer::UsbipServer(Socket listener, const CounterCardOptions& card)
-    : listener_(std::move(listener)), port_(port_of(listener_)), card_(card) {}
+Result<UsbipServer> UsbipServer::open(std::uint16_t port, std::unique_ptr<ExportedCard> card) {
+  auto listener = listen_tcp(port);
+  if (!listener) return tl::unexpected(listener.error());
+  return UsbipServer(std::move(*listener), std::move(card));
+}
+
+UsbipServer::UsbipServer(Socket listener, std::unique_ptr<ExportedCard> card)
+    : listener_(std::move(listener)), port_(port_of(listener_)), card_(std::move(card)) {}
 
 void UsbipServer::poll(HostTime now) {
   end_faults(now);
@@ -41,12 +51,13 @@ void UsbipServer::poll(HostTime now) {
   fill_requests(now);
   write();
   if (closing_ && unsent_.empty()) disconnect();
+  if (client_ && card_->breaks_at() <= now) disconnect();
 }
 
 HostTime UsbipServer::next_due() const {
-  HostTime due = fault_ends_.value_or(HostTime::max());
+  HostTime due = std::min(fault_ends_.value_or(HostTime::max()), card_->breaks_at());
   if (!mute_ && !deaf_ && !requests_.empty())
-    due = std::min(due, card_.available_at(requests_.front().length));
+    due = std::min(due, card_->available_at(requests_.front().length));
   return due;
 }
 
@@ -90,8 +101,8 @@ usbip::ExportedDevice UsbipServer::exported() const {
   device.bus_id = usbip::BusId{kBusId};
   device.bus = kBus;
   device.number = kDevice;
-  device.vendor = card_.options().vendor;
-  device.product = card_.options().product;
+  device.vendor = card_->ids().vendor;
+  device.product = card_->ids().product;
   device.version = 0x0100;
   device.device_class = 0xFF;
   return device;
@@ -151,9 +162,12 @@ void UsbipServer::on_submit(const usbip::Submit& submit, HostTime now) {
   }
   if (submit.head.endpoint != 0) return reply(submit.head.sequence, usbip::UrbStatus::Stalled, 0, {});
   fill_requests(now);  // what was measured before the request is gone before its answer
-  const auto answer = card_.control(usb::decode_setup(submit.setup), now);
-  if (!answer) return reply(submit.head.sequence, usbip::UrbStatus::Stalled, 0, {});
-  reply(submit.head.sequence, usbip::UrbStatus::Ok, static_cast<std::uint32_t>(answer->size()), *answer);
+  const auto answer = card_->answer(usb::decode_setup(submit.setup), now);
+  if (answer.outcome == ControlAnswer::Outcome::Silent) return;
+  if (answer.outcome == ControlAnswer::Outcome::Stalled)
+    return reply(submit.head.sequence, usbip::UrbStatus::Stalled, 0, {});
+  const auto& data = answer.data;
+  reply(submit.head.sequence, usbip::UrbStatus::Ok, static_cast<std::uint32_t>(data.size()), data);
 }
 
 void UsbipServer::on_unlink(const usbip::Unlink& unlink) {
@@ -167,13 +181,13 @@ void UsbipServer::on_unlink(const usbip::Unlink& unlink) {
 /// Whole requests only, but for the rest of a scan that has ended.
 void UsbipServer::fill_requests(HostTime now) {
   if (deaf_) return;
-  card_.advance(now, wanted_bytes(requests_));
+  card_->advance(now, wanted_bytes(requests_));
   if (mute_) return;
-  while (!requests_.empty() && card_.available() != 0) {
+  while (!requests_.empty() && card_->available() != 0) {
     const Request request = requests_.front();
-    if (card_.available() < request.length && card_.scanning()) return;
+    if (card_->available() < request.length && card_->scanning()) return;
     requests_.pop_front();
-    const auto bytes = card_.take(request.length);
+    const auto bytes = card_->take(request.length);
     reply(request.sequence, usbip::UrbStatus::Ok, static_cast<std::uint32_t>(bytes.size()), bytes);
   }
 }
@@ -213,12 +227,13 @@ void UsbipServer::disconnect() {
   incoming_.clear();
   unsent_.clear();
   requests_.clear();
+  card_->host_gone();
 }
 
 void UsbipServer::plug_out() {
   plugged_ = false;
   disconnect();
-  card_.restart();  // it lives on the power of the bus
+  simulated_->restart();  // it lives on the power of the bus
 }
 
 void UsbipServer::end_faults(HostTime now) {
@@ -230,6 +245,7 @@ void UsbipServer::end_faults(HostTime now) {
 }
 
 void UsbipServer::inject(const Fault& fault, HostTime now) {
+  if (simulated_ == nullptr) return;
   const HostTime until = now + seconds_to_ns(fault.duration_s);
   switch (fault.kind) {
     case FaultKind::Mute:
@@ -246,16 +262,16 @@ void UsbipServer::inject(const Fault& fault, HostTime now) {
       break;
     case FaultKind::CardRestart:
       disconnect();
-      card_.restart();
+      simulated_->restart();
       break;
     case FaultKind::Overrun:
-      card_.overrun();
+      simulated_->overrun();
       break;
     case FaultKind::LostScans:
-      card_.lose_scans(static_cast<std::size_t>(std::max(1.0, fault.value)));
+      simulated_->lose_scans(static_cast<std::size_t>(std::max(1.0, fault.value)));
       break;
     case FaultKind::ClockJump:
-      card_.jump_clock(static_cast<std::int64_t>(fault.value));
+      simulated_->jump_clock(static_cast<std::int64_t>(fault.value));
       break;
     case FaultKind::UsbGarbage: {
       const std::vector<std::byte> nonsense(usbip::kUrbHeaderSize, std::byte{0xA5});

@@ -44,12 +44,13 @@ RecordedDevice recorded_tracker() {
   RecordedDevice device{"tracker", RecordedKind::Tracker, {}};
   emscon::SystemStatusAnswer status;
   status.serial_number = 4711;
-  device.blocks = {{kThen, false, packed(emscon::Answer{status})},
-                   {kThen + 10ms, false, ok(emscon::Command::Initialize)},
-                   {kThen + 1s, true, packed(emscon::Request{emscon::StartMeasurement{}})},
-                   {kThen + 2s, false, ok(emscon::Command::StartMeasurement)},
-                   {kThen + 3s, false, packed(emscon::StatusChange{emscon::Event::MeasurementNotReady})},
-                   {kThen + 4s, false, packed(emscon::StatusChange{emscon::Event::MeasurementReady})}};
+  device.blocks = {
+      {kThen, false, false, packed(emscon::Answer{status})},
+      {kThen + 10ms, false, false, ok(emscon::Command::Initialize)},
+      {kThen + 2s, true, false, packed(emscon::Request{emscon::StartMeasurement{}})},
+      {kThen + 2s, false, false, ok(emscon::Command::StartMeasurement)},
+      {kThen + 3s, false, false, packed(emscon::StatusChange{emscon::Event::MeasurementNotReady})},
+      {kThen + 4s, false, false, packed(emscon::StatusChange{emscon::Event::MeasurementReady})}};
   return device;
 }
 
@@ -60,7 +61,7 @@ RecordedDevice recorded_encoders() {
   const can::CanFrame ask = can::standard_frame(0x601, {0x40, 0, 0x10, 0, 0, 0, 0, 0});
   const can::CanFrame told = can::standard_frame(0x581, {0x43, 0, 0x10, 0, 0x96, 0x01, 8, 0});
   const auto add = [&](HostTime t, bool to_device, const can::CanFrame& frame) {
-    device.blocks.push_back({t, to_device, datagram(std::span(&frame, 1))});
+    device.blocks.push_back({t, to_device, false, datagram(std::span(&frame, 1))});
   };
   add(kThen, true, ask);
   add(kThen + 1ms, false, told);
@@ -107,7 +108,7 @@ TEST(RecordedTraffic, FindsTheDevicesOfARecording) {
   EXPECT_EQ((*devices)[0].kind, RecordedKind::Encoders);
   EXPECT_EQ((*devices)[1].kind, RecordedKind::Tracker);
   EXPECT_EQ((*devices)[1].blocks.size(), recorded_tracker().blocks.size());
-  EXPECT_EQ((*devices)[1].blocks[2].time, kThen + 1s);
+  EXPECT_EQ((*devices)[1].blocks[2].time, kThen + 2s);
   EXPECT_TRUE((*devices)[1].blocks[2].to_device);
 }
 
@@ -176,6 +177,61 @@ TEST(RecordedTracker, BeginsAnewForTheNextClient) {
   EXPECT_EQ(tracker.next_due(), kNow + 31s);
 }
 
+TEST(RecordedTracker, AnswersAfterTheTimeItTookThen) {
+  ReplayTimeline timeline;
+  RecordedDevice device = recorded_tracker();
+  device.blocks[2].time -= 500ms;
+  RecordedTracker tracker(device, timeline);
+  tracker.connected(kNow);
+  EXPECT_TRUE(reply(tracker, emscon::StartMeasurement{}, kNow).empty());
+  EXPECT_EQ(tracker.next_due(), kNow + 500ms);
+  tracker.advance(kNow + 500ms);
+  EXPECT_FALSE(tracker.take_output().empty());
+  EXPECT_EQ(tracker.next_due(), kNow + 1500ms);
+}
+
+TEST(RecordedTracker, SaysNothingWhereItSaidNothing) {
+  ReplayTimeline timeline;
+  RecordedDevice device = recorded_tracker();
+  device.blocks.erase(device.blocks.begin() + 3);
+  RecordedTracker tracker(device, timeline);
+  tracker.connected(kNow);
+  EXPECT_TRUE(reply(tracker, emscon::StartMeasurement{}, kNow).empty());
+}
+
+TEST(RecordedTracker, BreaksTheConnectionThatBrokeAndGoesOnOnTheNext) {
+  ReplayTimeline timeline;
+  RecordedDevice device = recorded_tracker();
+  device.blocks[5] = {kThen + 4s, true, false, {}};
+  device.blocks.push_back({kThen + 6s, false, false, {}});
+  emscon::SystemStatusAnswer status;
+  status.serial_number = 4712;
+  device.blocks.push_back({kThen + 6s, false, false, packed(emscon::Answer{status})});
+  RecordedTracker tracker(device, timeline);
+  tracker.connected(kNow);
+  reply(tracker, emscon::StartMeasurement{}, kNow);
+  tracker.advance(kNow + 1900ms);
+  EXPECT_FALSE(tracker.wants_close());
+  tracker.advance(kNow + 2s);
+  EXPECT_TRUE(tracker.wants_close());
+  tracker.disconnected();
+  tracker.connected(kNow + 3s);
+  const auto answer = emscon::decode_answer(reply(tracker, emscon::GetSystemStatus{}, kNow + 3s));
+  EXPECT_EQ(std::get<emscon::SystemStatusAnswer>(answer.value()).serial_number, 4712);
+}
+
+TEST(RecordedTracker, SaysWhatIsNoPacketAsItCame) {
+  ReplayTimeline timeline;
+  RecordedDevice device = recorded_tracker();
+  const std::vector<std::byte> nonsense(16, std::byte{0xFF});
+  device.blocks[4].bytes = nonsense;
+  RecordedTracker tracker(device, timeline);
+  tracker.connected(kNow);
+  reply(tracker, emscon::StartMeasurement{}, kNow);
+  tracker.advance(kNow + 1s);
+  EXPECT_EQ(tracker.take_output(), nonsense);
+}
+
 class RecordedBusTest : public testing::Test {
  protected:
   std::vector<can::CanFrame> tell(const can::CanFrame& frame, HostTime now) {
@@ -241,6 +297,49 @@ TEST_F(RecordedBusTest, EmergencyComesAtItsTime) {
   };
   EXPECT_EQ(emergencies(before), 0);
   EXPECT_EQ(emergencies(after), 1);
+}
+
+TEST_F(RecordedBusTest, AnswersAsLateAsThen) {
+  RecordedDevice device = recorded_encoders();
+  for (auto& block : device.blocks)
+    if (block.time > kThen + 2s + 50ms && !block.to_device) block.time += 20ms;
+  ReplayTimeline timeline;
+  RecordedBus late = RecordedBus::open({}, device, timeline, true).value();
+  const Socket peer = test::connected(SOCK_DGRAM, late.port());
+  const auto sync_at = [&](HostTime now) {
+    const can::CanFrame sync = can::encode_sync();
+    test::send_bytes(peer, datagram(std::span(&sync, 1)));
+    test::readable(late.fd());
+    late.poll(now);
+  };
+  sync_at(kNow);
+  sync_at(kNow + 60ms);
+  late.poll(kNow + 60ms);  // heartbeats are due, too
+  EXPECT_EQ(late.next_due(), kNow + 60ms + 20ms + 100us);
+}
+
+TEST_F(RecordedBusTest, IsSilentWhereTheNodeWas) {
+  RecordedDevice device = recorded_encoders();
+  const can::CanFrame ask = can::standard_frame(0x601, {0x40, 0, 0x10, 0, 0, 0, 0, 0});
+  device.blocks.push_back({kThen + 3s, true, false, datagram(std::span(&ask, 1))});
+  device.blocks.push_back({kThen + 4s, true, false, datagram(std::span(&ask, 1))});
+  ReplayTimeline timeline;
+  RecordedBus bus = RecordedBus::open({}, device, timeline, true).value();
+  const Socket peer = test::connected(SOCK_DGRAM, bus.port());
+  std::vector<bool> answered;
+  for (int i = 0; i < 2; ++i) {
+    test::send_bytes(peer, datagram(std::span(&ask, 1)));
+    test::readable(bus.fd());
+    bus.poll(kNow);
+    bool told = false;
+    while (test::readable(peer.get(), 0)) {
+      const auto bytes = test::receive_bytes(peer);
+      auto view = can::DatagramView::parse(bytes);
+      for (can::CanFrame f; view && view->next(f);) told = told || f.id == 0x581;
+    }
+    answered.push_back(told);
+  }
+  EXPECT_EQ(answered, (std::vector<bool>{true, false}));
 }
 
 TEST_F(RecordedBusTest, WithoutATrackerTheFirstSyncStartsTheRecording) {

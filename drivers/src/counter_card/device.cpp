@@ -146,8 +146,10 @@ void CounterCardDevice::hand_over_events() {
     } else if (const auto* done = std::get_if<UsbControlDone>(&event)) {
       tell(*done);
     } else if (const auto* lost = std::get_if<UsbLost>(&event)) {
+      if (session_.connected()) raw_.push_bytes(turn_end_, RawBlock::Direction::ToDevice, {});
       tell(*lost);
     } else if (std::holds_alternative<UsbOpened>(event)) {
+      raw_.push_bytes(turn_end_, RawBlock::Direction::FromDevice, {});
       tell(UsbOpened{});
     } else {
       tell(UsbBulkStopped{});

@@ -102,7 +102,7 @@ void EnvironmentDevice::ask() {
   const auto request = receiver_.next_request();
   const auto at = time_.now();  // before: no answer can be older than its question
   if (!request || (receiver_.between_rounds() && at < next_round_)) return;
-  if (const auto sent = line_.send(*request); !sent) return fail(sent.error().text, options_.retry);
+  if (const auto sent = line_.send(*request); !sent) return lose(sent.error().text);
   receiver_.sent(*request, at);
   answer_due_ = at + options_.answer_timeout;
   std::array<std::byte, modbus::kMaxAduSize> frame{};
@@ -115,10 +115,16 @@ void EnvironmentDevice::listen(nanoseconds at_most) {
   const auto budget = std::clamp(nanoseconds{due - time_.now()}, nanoseconds{0}, at_most);
   const auto read = line_.read(buffer_, time_.wall(budget));
   arrival_ = time_.now();
-  if (!read) return fail(read.error().text, options_.retry);
+  if (!read) return lose(read.error().text);
   filled_ = *read;
   if (filled_ == 0 && receiver_.awaiting() && arrival_ >= answer_due_)
     fail(fmt::format("no answer in {} ms", in_ms(options_.answer_timeout)), options_.retry);
+}
+
+/// The line has gone, and not by us: nothing sent, into a line that was open.
+void EnvironmentDevice::lose(std::string_view what) {
+  raw_.push_bytes(time_.now(), RawBlock::Direction::ToDevice, {});
+  fail(what, options_.retry);
 }
 
 void EnvironmentDevice::fail(std::string_view what, nanoseconds retry, const char* state) {

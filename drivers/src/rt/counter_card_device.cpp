@@ -22,6 +22,7 @@ void CounterCardDevice::take(const UsbBulkIn& bulk) ABBE_RT {
   SubmitReply reply;
   reply.head.direction = protocol::usbip::Direction::In;
   reply.head.endpoint = quad08::kScanEndpoint & 0x0Fu;
+  if (bulk.outcome != UsbOutcome::Done) reply.status = protocol::usbip::UrbStatus::Stalled;
   record(reply, bulk.bytes, bulk.arrival);
   receiver_.push(bulk.bytes, bulk.arrival);
   for (auto scans = receiver_.next(); !scans.empty(); scans = receiver_.next()) {

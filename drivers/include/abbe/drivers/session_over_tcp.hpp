@@ -7,7 +7,7 @@
 /// ConnectionLost; Message, the variant that receive() posts; kInbox messages and kMostRead bytes of
 /// room for one turn. `Driver` derives from this and gives: std::span<const std::byte> encode(const Send&),
 /// valid until its next call and already recorded; void connected(), before the session hears of it; void
-/// disconnected().
+/// disconnected(); RawRing& raw().
 
 #include <algorithm>
 #include <array>
@@ -18,6 +18,7 @@
 #include <utility>
 #include <variant>
 
+#include "abbe/drivers/raw_ring.hpp"
 #include "abbe/drivers/status_board.hpp"
 #include "abbe/drivers/tcp_client.hpp"
 #include "abbe/drivers/time_source.hpp"
@@ -124,6 +125,7 @@ class SessionOverTcp {
     if (const auto* command = std::get_if<typename Words::Send>(&action)) {
       const auto sent = tcp_.write(driver().encode(*command));
       if (sent) return false;
+      record_loss();
       close();
       next = typename Words::ConnectionLost{sent.error().text};
       return true;
@@ -139,7 +141,14 @@ class SessionOverTcp {
     filled_ = *count;
   }
 
+  /// Not by us: nothing sent, into a connection that was there.
+  void record_loss() {
+    if (tcp_.established())
+      driver().raw().push_bytes(time_.now(), protocol::RawBlock::Direction::ToDevice, {});
+  }
+
   void lose(const std::string& why) {
+    record_loss();
     close();
     tell(typename Words::ConnectionLost{why});
   }

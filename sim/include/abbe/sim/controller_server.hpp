@@ -1,7 +1,9 @@
 #pragma once
 /// A tracker controller behind a TCP port: one client at a time, another one is told so and turned away.
 /// Steppable: poll(now) never blocks and reads no clock. Not thread-safe. Controllers: TrackerDevice
-/// (simulated), RecordedTracker (replayed), IppDmeDevice (a measuring machine).
+/// (simulated), RecordedTracker and RecordedDialogue (replayed), IppDmeDevice (a measuring machine).
+
+#include <poll.h>
 
 #include <memory>
 #include <utility>
@@ -30,6 +32,12 @@ class ControllerServer {
   [[nodiscard]] int listener_fd() const { return listener_.get(); }
   [[nodiscard]] int client_fd() const { return client_.get(); }  ///< -1 without a client
   [[nodiscard]] bool wants_write() const { return !unsent_.empty(); }
+  /// What to wait for besides the time.
+  void add_poll_fds(std::vector<pollfd>& fds) const {
+    fds.push_back({listener_fd(), POLLIN, 0});
+    const short events = static_cast<short>(wants_write() ? POLLIN | POLLOUT : POLLIN);
+    if (client_fd() >= 0) fds.push_back({client_fd(), events, 0});
+  }
   [[nodiscard]] Controller& device() { return *device_; }
   [[nodiscard]] const Controller& device() const { return *device_; }
 

@@ -22,6 +22,7 @@
 #include "abbe/protocol/quad08/channel.hpp"
 #include "abbe/protocol/quad08/scan_list.hpp"
 #include "abbe/protocol/usb/setup.hpp"
+#include "abbe/sim/exported_card.hpp"
 #include "abbe/sim/sim_clock.hpp"
 
 namespace abbe::sim {
@@ -62,21 +63,21 @@ struct CounterCardOptions {
   std::uint64_t seed = 1;
 };
 
-class CounterCard {
+class CounterCard final : public ExportedCard {
  public:
   explicit CounterCard(const CounterCardOptions& options);
 
   /// A control transfer; nothing: the card stalls it.
   [[nodiscard]] std::optional<std::vector<std::byte>> control(const usb::Setup& setup, HostTime now);
+  [[nodiscard]] ControlAnswer answer(const usb::Setup& setup, HostTime now) override;
+  [[nodiscard]] UsbIds ids() const override { return {options_.vendor, options_.product}; }
   /// Makes the scans due until `now`. More than the FIFO and `wanted` bytes on their way to the host hold:
   /// overrun.
-  void advance(HostTime now, std::size_t wanted);
-  /// Bytes for the host, oldest first; at most `most`.
-  [[nodiscard]] std::vector<std::byte> take(std::size_t most);
-  [[nodiscard]] std::size_t available() const { return fifo_.size(); }
-  /// When there will be so many bytes; never if the scan does not run.
-  [[nodiscard]] HostTime available_at(std::size_t bytes) const;
-  [[nodiscard]] bool scanning() const { return pacing_ && !overrun_; }
+  void advance(HostTime now, std::size_t wanted) override;
+  [[nodiscard]] std::vector<std::byte> take(std::size_t most) override;
+  [[nodiscard]] std::size_t available() const override { return fifo_.size(); }
+  [[nodiscard]] HostTime available_at(std::size_t bytes) const override;
+  [[nodiscard]] bool scanning() const override { return pacing_ && !overrun_; }
 
   /// The probe touched at `at`, not before any that came earlier nor before the scans already made.
   void add_probe_edge(HostTime at);

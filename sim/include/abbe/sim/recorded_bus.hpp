@@ -1,12 +1,14 @@
 #pragma once
 /// The encoders of a recording on their port again. The n-th SYNC from the start is answered with the
-/// frames that answered the n-th SYNC then, SDO requests with the recorded responses to the same request,
-/// everything else (heartbeats, EMCY, error frames) comes with its original timing. Until the recording
+/// frames that answered the n-th SYNC then, as late as then, SDO requests with the recorded responses to the
+/// same request or with silence where that was the answer, everything else (heartbeats, EMCY, error frames)
+/// comes with its original timing. Until the recording
 /// starts nodes are kept alive with heartbeats and the first positions. Without a tracker in the recording it
 /// starts with the first SYNC. Steppable, not thread-safe.
 
 #include <map>
 #include <memory>
+#include <optional>
 #include <set>
 #include <vector>
 
@@ -32,9 +34,13 @@ class RecordedBus {
   [[nodiscard]] std::size_t syncs() const { return cycles_.size(); }
 
  private:
+  struct Answer {
+    std::chrono::nanoseconds delay{};  ///< after the SYNC
+    can::CanFrame frame;
+  };
   struct Cycle {
     HostTime sync;
-    std::vector<can::CanFrame> answers;
+    std::vector<Answer> answers;
   };
   struct Spoken {
     HostTime time;
@@ -42,7 +48,7 @@ class RecordedBus {
   };
   using SdoRequest = std::pair<std::uint32_t, std::array<std::byte, 8>>;
   struct SdoResponses {
-    std::vector<can::CanFrame> frames;
+    std::vector<std::optional<can::CanFrame>> frames;  ///< nothing: the node did not answer
     std::size_t next = 0;
   };
 
@@ -51,6 +57,8 @@ class RecordedBus {
   void take(const can::CanFrame& frame, bool to_device, HostTime time);
   void on_frame(const can::CanFrame& frame, HostTime now);
   void on_sync(HostTime now);
+  void answer(const Cycle& cycle, HostTime now);
+  void send_late(HostTime now);
   void on_sdo(const can::CanFrame& frame);
   void keep_alive(HostTime now);
   [[nodiscard]] std::size_t cycle_at(HostTime recorded) const;
@@ -61,6 +69,7 @@ class RecordedBus {
   std::set<can::NodeId> nodes_;
   std::vector<Cycle> cycles_;
   std::vector<Spoken> spoken_;
+  std::vector<Spoken> late_;  ///< of cycles already asked for, by the time they leave
   std::map<SdoRequest, SdoResponses> sdo_;
   std::map<can::NodeId, SdoRequest> asked_;  ///< while the recording is read: requests without a response yet
   std::optional<std::size_t> next_cycle_;

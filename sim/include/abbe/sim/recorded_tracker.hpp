@@ -1,10 +1,14 @@
 #pragma once
-/// A tracker controller that says again what it said in a recording. Commands are answered with the
-/// recording's own answers to the same command, in their order, the last one for ever; a command nobody sent
-/// then is answered NotImplemented. What was not an answer (bursts, errors, events) comes with its original
-/// timing from the moment measuring starts. Interface as TrackerDevice.
+/// A tracker controller that says again what it said in a recording. The n-th of equal commands on a
+/// connection is answered as the n-th was then, after the same time or not at all, when there were no more as
+/// the last one; a command nobody sent then is answered NotImplemented. What was not an answer (bursts,
+/// errors, events, bytes that are no packet) comes with its original timing from the moment measuring starts.
+/// A connection that broke then breaks again, and the next one goes on where the next one did; after the last
+/// one all begins anew. Interface as TrackerDevice.
 
+#include <deque>
 #include <map>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -19,7 +23,6 @@ class RecordedTracker {
   RecordedTracker(const RecordedDevice& device, ReplayTimeline& timeline);
 
   void connected(HostTime now);
-  /// Also rewinds: the next client sees the recording from its start.
   void disconnected();
   void receive(std::span<const std::byte> bytes, HostTime now);
   void advance(HostTime now);
@@ -29,31 +32,57 @@ class RecordedTracker {
   [[nodiscard]] bool accepts() const { return true; }
 
   /// Everything has been served.
-  [[nodiscard]] bool finished() const { return playing_ && next_ >= spoken_.size(); }
-  [[nodiscard]] std::size_t packets() const { return spoken_.size(); }
+  [[nodiscard]] bool finished() const { return finished_; }
+  [[nodiscard]] std::size_t packets() const;
 
  private:
   using Packet = std::vector<std::byte>;
   struct Spoken {
     HostTime time;
     Packet packet;
+    bool breaks = false;  ///< the connection, instead of saying something
   };
-  struct Answers {
+  struct Exchange {
+    HostTime asked{};
+    HostTime answered{};
+    std::vector<Packet> answers;  ///< none: the controller said nothing
+    std::size_t wanted = 1;
+  };
+  struct Connection {
+    HostTime began{};
+    std::map<std::int32_t, std::vector<Exchange>> exchanges;  ///< by command
+    std::vector<Spoken> spoken;
+    std::optional<HostTime> first_start;
+    bool garbled = false;  ///< while it is read: bytes that are no packets
+  };
+  struct Due {
+    HostTime time;
     std::vector<Packet> packets;
-    std::size_t next = 0;
+    std::optional<HostTime> starts;  ///< measuring, at this recorded time
+    bool stops = false;
   };
 
+  void read(const RecordedBlock& block);
   void take(std::span<const std::byte> packet, HostTime time);
+  void take_answer(std::int32_t command, std::span<const std::byte> packet, HostTime time);
   void answer(std::span<const std::byte> request, HostTime now);
+  void carry_out(const Due& due);
+  [[nodiscard]] HostTime spoken_due() const;
+  [[nodiscard]] const Connection& connection() const { return connections_[connection_]; }
   void say(std::span<const std::byte> packet) { out_.insert(out_.end(), packet.begin(), packet.end()); }
 
   ReplayTimeline& timeline_;
   protocol::emscon::PacketFramer framer_;
-  std::map<std::int32_t, Answers> answers_;  ///< by command
-  std::vector<Spoken> spoken_;               ///< not answers; from the first start of a measurement on
-  std::optional<HostTime> started_;          ///< in recorded time
-  bool playing_ = false;
-  std::size_t next_ = 0;
+  std::vector<Connection> connections_;
+  std::size_t connection_ = 0;
+  bool played_ = false;  ///< the present connection has been begun
+  HostTime connected_at_{};
+  std::map<std::int32_t, std::size_t> answered_;  ///< on the present connection
+  std::deque<Due> due_;
+  std::size_t next_ = 0;   ///< of what is spoken
+  bool anchored_ = false;  ///< measuring was started on the present connection
+  bool stopped_ = false;
+  bool finished_ = false;
   bool wants_close_ = false;
   std::vector<std::byte> out_;
 };

@@ -17,16 +17,36 @@ namespace abbe::sim {
 struct RecordedBlock {
   HostTime time{};
   bool to_device = false;
+  bool hole_before = false;      ///< the recording lost blocks before this one
   std::vector<std::byte> bytes;  ///< of one read or one write: continued blocks are joined
+
+  /// Nothing from a device: a connection begins (with encoders: time has passed).
+  [[nodiscard]] bool connects() const { return !to_device && bytes.empty(); }
+  /// Nothing to a device: the connection was lost, and not by us.
+  [[nodiscard]] bool lost() const { return to_device && bytes.empty(); }
 };
 
-enum class RecordedKind { Tracker, Encoders };
+enum class RecordedKind {
+  Tracker,      ///< emScon packets
+  Encoders,     ///< CAN frames in datagrams, whatever the bus was
+  CounterCard,  ///< USB/IP messages, whatever the transport was
+  ModbusTcp,
+  ModbusRtu,
+  MeasuringMachine,  ///< lines of I++ DME
+};
 
 struct RecordedDevice {
   std::string name;
-  RecordedKind kind{};  ///< encoders: the bytes are CAN frames in datagrams
+  RecordedKind kind{};
   std::vector<RecordedBlock> blocks;
 };
+
+/// By what was said to the device, or, where nothing was, by what it said; a tracker, if that is no protocol
+/// known here.
+[[nodiscard]] RecordedKind kind_of(std::span<const RecordedBlock> blocks);
+
+/// The text of the configuration a recording was made with; empty if it does not hold one.
+[[nodiscard]] std::string recorded_configuration(std::span<const std::byte> file);
 
 /// `name` stands in the errors. BadInput: no MCAP file, or one without raw bytes.
 [[nodiscard]] Result<std::vector<RecordedDevice>> read_traffic(std::span<const std::byte> file,
@@ -40,6 +60,8 @@ class ReplayTimeline {
     if (!shift_) shift_ = now - recorded;
   }
   void rewind() { shift_.reset(); }
+  /// Once more, also while it runs: a device that came back begins where it did then.
+  void restart(HostTime recorded, HostTime now) { shift_ = now - recorded; }
   [[nodiscard]] bool running() const { return shift_.has_value(); }
   [[nodiscard]] HostTime due(HostTime recorded) const {
     return shift_ ? recorded + *shift_ : HostTime::max();

@@ -1,11 +1,14 @@
 #pragma once
-/// A simulated counter card as a USB device that a USB/IP server exports (bus id "1-1"): for `usbip attach`
-/// from any Linux and for USB/IP clients. One client at a time. Requests for scans wait until they can be
-/// filled, as on a real bus; a short one comes only when the scan was stopped. Steppable: poll(now) never
-/// blocks and reads no clock. Not thread-safe.
+/// A counter card, simulated or recorded, as a USB device that a USB/IP server exports (bus id "1-1"): for
+/// `usbip attach` from any Linux and for USB/IP clients. One client at a time. Requests for scans wait until
+/// they can be filled, as on a real bus; a short one comes only when the scan was stopped. Steppable:
+/// poll(now) never blocks and reads no clock. Not thread-safe.
+
+#include <poll.h>
 
 #include <cstdint>
 #include <deque>
+#include <memory>
 #include <span>
 #include <vector>
 
@@ -24,6 +27,7 @@ class UsbipServer {
  public:
   /// On 127.0.0.1; port 0: the kernel chooses.
   [[nodiscard]] static Result<UsbipServer> open(std::uint16_t port, const CounterCardOptions& card);
+  [[nodiscard]] static Result<UsbipServer> open(std::uint16_t port, std::unique_ptr<ExportedCard> card);
 
   void poll(HostTime now);
   [[nodiscard]] HostTime next_due() const;
@@ -31,9 +35,17 @@ class UsbipServer {
   [[nodiscard]] int listener_fd() const { return listener_.get(); }  ///< -1 while unplugged
   [[nodiscard]] int client_fd() const { return client_.get(); }      ///< -1 without a client
   [[nodiscard]] bool wants_write() const { return !unsent_.empty(); }
-  [[nodiscard]] CounterCard& card() { return card_; }
+  /// What to wait for besides the time.
+  void add_poll_fds(std::vector<pollfd>& fds) const {
+    fds.push_back({listener_fd(), POLLIN, 0});
+    const short events = static_cast<short>(wants_write() ? POLLIN | POLLOUT : POLLIN);
+    if (client_fd() >= 0) fds.push_back({client_fd(), events, 0});
+  }
+  /// The simulated one; must not be asked for with another.
+  [[nodiscard]] CounterCard& card() { return *simulated_; }
   [[nodiscard]] std::size_t waiting_requests() const { return requests_.size(); }
 
+  /// With a simulated card only.
   void inject(const Fault& fault, HostTime now);
 
   // Misbehaviour, for tests that step it.
@@ -52,7 +64,7 @@ class UsbipServer {
     std::uint32_t length;
   };
 
-  UsbipServer(Socket listener, const CounterCardOptions& card);
+  UsbipServer(Socket listener, std::unique_ptr<ExportedCard> card);
 
   void accept_clients();
   void read(HostTime now);
@@ -71,7 +83,8 @@ class UsbipServer {
   Socket listener_;
   Socket client_;
   std::uint16_t port_ = 0;
-  CounterCard card_;
+  std::unique_ptr<ExportedCard> card_;
+  CounterCard* simulated_ = nullptr;  ///< card_, where it is one
   bool imported_ = false;
   bool closing_ = false;
   bool plugged_ = true;

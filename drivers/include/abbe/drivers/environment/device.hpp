@@ -59,6 +59,7 @@ class EnvironmentDevice final : public Device {
   void ask();
   void listen(std::chrono::nanoseconds at_most);
   void plan_next_round(protocol::HostTime now);
+  void lose(std::string_view what);
   void fail(std::string_view what, std::chrono::nanoseconds retry, const char* state = "closed");
 
   EnvironmentDeviceOptions options_;

@@ -7,7 +7,8 @@
 /// A sample describes the middle between the first question of its round and the last answer, rectangular in
 /// between ([GUM] 4.3.7); how old a value is inside the device is not known.
 ///
-/// Raw blocks: ToDevice, one whole request; FromDevice, bytes as read; an empty one is a new connection.
+/// Raw blocks: ToDevice, one whole request, an empty one is a connection that was lost; FromDevice, bytes as
+/// read, an empty one is a new connection.
 
 #include <array>
 #include <cstdint>

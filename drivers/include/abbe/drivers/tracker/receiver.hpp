@@ -4,8 +4,9 @@
 /// the units the session asks for: mm, rad, Celsius, mbar, percent, right-handed Cartesian coordinates. Real
 /// time: allocation-free, no system call. One thread. About 300 kB: keep it on the heap.
 ///
-/// Raw blocks of a tracker: FromDevice, as received; an empty one is a new connection. ToDevice, as sent (for
-/// people and for serving a recording back; not needed to decode it).
+/// Raw blocks of a tracker: FromDevice, as received; an empty one is a new connection. ToDevice, as sent, an
+/// empty one is a connection that was lost (for people and for serving a recording back; not needed to decode
+/// it).
 ///
 /// A recording may begin anywhere: until the first new connection the receiver seeks a packet head and takes
 /// points at once. On a new connection it takes none before the controller has accepted StartMeasurement:

@@ -1,0 +1,101 @@
+#pragma once
+/// A counter card that says again what it said in a recording. While a card is opened and set up, the n-th
+/// request is answered as the same request was then; scans come with their original timing from the moment
+/// the pacer is started; the status is what it was at that time. Where the card said nothing it says nothing;
+/// a connection that broke then breaks again, and the next one goes on where the next one did; after the last
+/// one all begins anew. A host that restarts the scan although nobody did then gets what is left of it.
+/// Not thread-safe.
+///
+/// A recording does not hold the card's descriptors: they are those of the simulated card, with the serial
+/// number that is given.
+
+#include <deque>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "abbe/protocol/usbip/urb.hpp"
+#include "abbe/sim/counter_card.hpp"
+#include "abbe/sim/exported_card.hpp"
+#include "abbe/sim/recorded_traffic.hpp"
+
+namespace abbe::sim {
+
+class RecordedCard final : public ExportedCard {
+ public:
+  /// `timeline` must outlive it. `leads`: it starts the timeline, because no tracker does.
+  RecordedCard(const RecordedDevice& device, const std::string& serial, ReplayTimeline& timeline, bool leads);
+
+  [[nodiscard]] UsbIds ids() const override;
+  [[nodiscard]] ControlAnswer answer(const protocol::usb::Setup& setup, HostTime now) override;
+  void advance(HostTime now, std::size_t wanted) override;
+  [[nodiscard]] std::vector<std::byte> take(std::size_t most) override;
+  [[nodiscard]] std::size_t available() const override { return fifo_.size(); }
+  [[nodiscard]] HostTime available_at(std::size_t bytes) const override;
+  [[nodiscard]] bool scanning() const override;
+  void host_gone() override;
+  [[nodiscard]] HostTime breaks_at() const override;
+
+  /// Every scan has been served.
+  [[nodiscard]] bool finished() const { return finished_; }
+  [[nodiscard]] std::size_t transfers() const;
+
+ private:
+  struct Exchange {
+    protocol::usb::Setup setup;
+    HostTime asked{};
+    std::optional<ControlAnswer> answer;  ///< nothing: the card was silent
+  };
+  struct Transfer {
+    HostTime time{};
+    std::vector<std::byte> bytes;
+  };
+  /// From one start of the pacer to the next.
+  struct Scan {
+    std::size_t begins = 0;  ///< the exchange that started it
+    std::size_t halts = 0;   ///< the first exchange after it that is no question for the status
+    std::vector<Transfer> transfers;
+  };
+  struct Connection {
+    std::size_t begins = 0;  ///< its first exchange
+    std::optional<HostTime> lost;
+  };
+
+  void read(const RecordedBlock& block);
+  void read_message(std::span<const std::byte> message, HostTime time, bool to_device);
+  void read_request(const protocol::usb::Setup& setup, HostTime time);
+  void find_halts();
+  [[nodiscard]] std::size_t end_of_connection() const;
+  [[nodiscard]] ControlAnswer status_at(HostTime recorded) const;
+  [[nodiscard]] ControlAnswer next_answer(const protocol::usb::Setup& setup, HostTime now);
+  [[nodiscard]] ControlAnswer unrecorded(const protocol::usb::Setup& setup, HostTime now);
+  [[nodiscard]] std::optional<std::size_t> find(const protocol::usb::Setup& setup) const;
+  void open();
+  void start(std::size_t scan, HostTime now);
+  [[nodiscard]] bool has_rest() const;
+  [[nodiscard]] bool halts_before_its_time(HostTime now) const;
+  [[nodiscard]] HostTime due(HostTime recorded) const;
+  [[nodiscard]] HostTime recorded(HostTime now) const;
+
+  ReplayTimeline& timeline_;
+  bool leads_;
+  CounterCard descriptors_;
+  std::vector<Exchange> exchanges_;
+  std::vector<Scan> scans_;
+  std::vector<Connection> connections_;
+  unsigned versions_ = 0;  ///< while it is read: questions for the firmware on this connection
+
+  bool opened_ = false;   ///< by this host
+  std::size_t next_ = 0;  ///< exchange
+  std::optional<std::size_t> connection_;
+  std::optional<std::size_t> scan_;
+  std::size_t next_transfer_ = 0;
+  bool running_ = false;   ///< the pacer, for this host
+  bool flushing_ = false;  ///< it is being halted: what came until then comes at once
+  bool resuming_ = false;  ///< the host restarts a scan that went on then
+  std::chrono::nanoseconds shift_{};
+  std::deque<std::byte> fifo_;
+  bool finished_ = false;
+};
+
+}  // namespace abbe::sim

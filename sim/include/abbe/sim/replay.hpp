@@ -1,0 +1,64 @@
+#pragma once
+/// All devices of a recording, each on its wire again: emScon, CAN over UDP or SocketCAN, USB/IP, Modbus TCP
+/// and RTU, I++ DME. Steppable: poll(now) never blocks and reads no clock. Not thread-safe.
+
+#include <poll.h>
+
+#include <map>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "abbe/sim/can_port.hpp"
+#include "abbe/sim/recorded_traffic.hpp"
+
+namespace abbe::sim {
+
+struct ReplaySetup {
+  std::uint16_t tracker_port = 0;  ///< on 127.0.0.1; 0: the kernel chooses
+  CanPortOptions bus;
+  std::map<std::string, std::uint16_t> ports;  ///< TCP, by the name of the device
+  std::map<std::string, std::string> links;    ///< where a pseudo terminal appears, by the name of the device
+  std::map<std::string, std::string> serials;  ///< of counter cards, by the name of the device
+};
+
+/// Where a device is served.
+struct ReplayedPlace {
+  std::string name;
+  RecordedKind kind{};
+  std::string what;        ///< for people: "12 packets after the start of measuring"
+  std::uint16_t port = 0;  ///< 0: on `path`
+  std::string path;        ///< of a pseudo terminal, or the name of a CAN interface
+};
+
+/// One device of a replay.
+class ReplayedDevice {
+ public:
+  virtual ~ReplayedDevice() = default;
+  virtual void poll(HostTime now) = 0;
+  [[nodiscard]] virtual HostTime next_due() const = 0;
+  virtual void add_poll_fds(std::vector<pollfd>& fds) const = 0;
+  /// Everything has been served.
+  [[nodiscard]] virtual bool finished() const = 0;
+  [[nodiscard]] virtual ReplayedPlace place() const = 0;
+};
+
+class Replay {
+ public:
+  /// Io for a port that is taken.
+  [[nodiscard]] static Result<std::unique_ptr<Replay>> open(const std::vector<RecordedDevice>& devices,
+                                                            const ReplaySetup& setup, HostTime now);
+
+  void poll(HostTime now);
+  [[nodiscard]] HostTime next_due() const;
+  void add_poll_fds(std::vector<pollfd>& fds) const;
+  [[nodiscard]] bool finished() const;
+  [[nodiscard]] std::vector<ReplayedPlace> places() const;
+
+ private:
+  Replay() = default;
+  ReplayTimeline timeline_;
+  std::vector<std::unique_ptr<ReplayedDevice>> devices_;
+};
+
+}  // namespace abbe::sim

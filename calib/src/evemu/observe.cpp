@@ -244,6 +244,11 @@ RigidTransform inverse(const RigidTransform& T) {
   return {T.R.transpose(), -(T.R.transpose() * T.t_m)};
 }
 
+/// Of a calibrator that has passed check().
+RigidTransform pre_to_uniform(const Calibrator& c) {
+  return inverse(*uniform_frame(c.balls.front().centre_m, c.blocks[0].normal, c.blocks[1].normal));
+}
+
 Result<void> check_volume(const Observations& o, const ObserveOptions& options) {
   std::vector<Vector3> readings;
   for (const BallError& row : o.rows) {
@@ -310,6 +315,18 @@ std::size_t Observations::positions() const {
   return count;
 }
 
+Result<SeenArtefact> see_artefact(int position, std::span<const Touch> touches, const Calibrator& c,
+                                  const ObserveOptions& options) {
+  if (Result<void> sound = check(c); !sound) {
+    return tl::unexpected(sound.error());
+  }
+  Touched touched;
+  for (const Touch& touch : touches) {
+    touched[{touch.feature, touch.number}].push_back(touch.p_m);
+  }
+  return see(position, touched, c, pre_to_uniform(c), options);
+}
+
 Result<Observations> observe(std::span<const Touch> touches, const Calibrator& c, const Machine& machine,
                              const ObserveOptions& options) {
   if (Result<void> sound = check(c); !sound) {
@@ -319,13 +336,11 @@ Result<Observations> observe(std::span<const Touch> touches, const Calibrator& c
   if (!positions) {
     return tl::unexpected(positions.error());
   }
-  const RigidTransform T_uni_pre =
-      inverse(*uniform_frame(c.balls.front().centre_m, c.blocks[0].normal, c.blocks[1].normal));
   Observations o;
   o.machine = machine;
   o.order = options.order;
   for (const auto& [position, touched] : *positions) {
-    Result<SeenArtefact> seen = see(position, touched, c, T_uni_pre, options);
+    Result<SeenArtefact> seen = see(position, touched, c, pre_to_uniform(c), options);
     if (!seen) {
       return tl::unexpected(seen.error());
     }

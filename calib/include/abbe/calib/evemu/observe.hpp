@@ -74,7 +74,10 @@ struct Observations {
 /// (all balls in one plane).
 [[nodiscard]] Result<Observations> observe(std::span<const Touch>, const Calibrator&, const Machine&,
                                            const ObserveOptions& = {});
-/// The same from errors that were computed elsewhere; block rotations are then unknown.
+/// One position alone, by the same rules.
+[[nodiscard]] Result<SeenArtefact> see_artefact(int position, std::span<const Touch> touches_of_it,
+                                                const Calibrator&, const ObserveOptions& = {});
+/// observe() from errors that were computed elsewhere; block rotations are then unknown.
 [[nodiscard]] Result<Observations> observe_errors(std::span<const BallError>, const Machine&,
                                                   RotationOrigin rotation = RotationOrigin::Blocks,
                                                   const ObserveOptions& = {});

@@ -1,0 +1,307 @@
+#include "abbe/calib/evemu/touch_guide.hpp"
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+#include <utility>
+
+#include "evemu/touch_site.hpp"
+#include "message.hpp"
+
+namespace abbe::calib::evemu {
+namespace {
+
+constexpr double kMmPerM = 1e3;
+constexpr std::size_t kBall1 = 0, kBlock1 = 1, kBlock2 = 2;
+// The same feature or position in vain twice: whoever touches does not follow.
+constexpr std::size_t kMostSetAside = 2;
+
+Result<void> check_plan(const TouchPlan& plan, const ObserveOptions& observe) {
+  std::vector<int> sorted = plan.positions, expected(plan.positions.size());
+  std::ranges::sort(sorted);
+  std::iota(expected.begin(), expected.end(), 1);
+  if (sorted.empty() || sorted != expected) {
+    return failure(ErrorCode::BadInput,
+                   message("touch plan: positions must be 1 to ", sorted.size(), ", each once"));
+  }
+  if (plan.points_per_ball < observe.least_points_per_ball ||
+      plan.points_per_block < observe.least_points_per_block) {
+    return failure(ErrorCode::BadInput,
+                   message("touch plan: needs at least ", observe.least_points_per_ball,
+                           " points a ball and ", observe.least_points_per_block, " a block"));
+  }
+  return {};
+}
+
+std::string place_text(const Vector3& p_m) {
+  const Vector3 mm = kMmPerM * p_m;
+  return message("(", mm.x(), ", ", mm.y(), ", ", mm.z(), ") mm");
+}
+
+}  // namespace
+
+std::string name(const TouchedFeature& f) {
+  return message(f.feature == Feature::Ball ? "ball " : "block ", f.number);
+}
+
+struct TouchGuide::Setup {
+  Calibrator calibrator;
+  TouchPlan plan;
+  GuideOptions options;
+};
+
+TouchGuide::TouchGuide(std::unique_ptr<const Setup> setup) : setup_(std::move(setup)) {
+  begin_position();
+}
+TouchGuide::TouchGuide(TouchGuide&&) noexcept = default;
+TouchGuide& TouchGuide::operator=(TouchGuide&&) noexcept = default;
+TouchGuide::~TouchGuide() = default;
+
+Result<TouchGuide> TouchGuide::create(Calibrator calibrator, TouchPlan plan, GuideOptions options) {
+  if (Result<void> sound = check(calibrator); !sound) return tl::unexpected(sound.error());
+  if (Result<void> sound = check_plan(plan, options.observe); !sound) return tl::unexpected(sound.error());
+  return TouchGuide(
+      std::make_unique<const Setup>(Setup{std::move(calibrator), std::move(plan), std::move(options)}));
+}
+
+const TouchPlan& TouchGuide::plan() const {
+  return setup_->plan;
+}
+
+std::size_t TouchGuide::points_of(std::size_t feature) const {
+  const bool ball = feature_at(feature).feature == Feature::Ball;
+  return ball ? plan().points_per_ball : plan().points_per_block;
+}
+
+std::size_t TouchGuide::least_of(std::size_t feature) const {
+  const ObserveOptions& observe = setup_->options.observe;
+  const bool ball = feature_at(feature).feature == Feature::Ball;
+  return ball ? observe.least_points_per_ball : observe.least_points_per_block;
+}
+
+bool TouchGuide::has_enough(std::size_t feature) const {
+  return site_->points(feature).size() >= least_of(feature);
+}
+
+bool TouchGuide::all_have_enough() const {
+  for (std::size_t f = 0; f < passed_.size(); ++f) {
+    if (!has_enough(f)) return false;
+  }
+  return true;
+}
+
+std::string TouchGuide::where() const {
+  return message("position ", plan().positions[place_], ": ");
+}
+
+/// "ball 3 has 24 of 25 points"
+std::string TouchGuide::tally(std::size_t feature) const {
+  return message(name(feature_at(feature)), " has ", site_->points(feature).size(), " of ",
+                 points_of(feature), " points");
+}
+
+NextTouch TouchGuide::next() const {
+  return {plan().positions[place_], place_, feature_at(feature_), site_->points(feature_).size(),
+          points_of(feature_)};
+}
+
+std::size_t TouchGuide::planned() const {
+  const std::size_t balls = setup_->calibrator.balls.size();
+  return plan().positions.size() * (balls * plan().points_per_ball + 2 * plan().points_per_block);
+}
+
+std::size_t TouchGuide::taken() const {
+  std::size_t count = finished_.size();
+  for (std::size_t f = 0; f < passed_.size(); ++f) count += site_->points(f).size();
+  return count;
+}
+
+std::vector<Touch> TouchGuide::touches() const {
+  std::vector<Touch> all = finished_;
+  if (complete()) return all;
+  const std::vector<Touch> here = site_->touches(plan().positions[place_]);
+  all.insert(all.end(), here.begin(), here.end());
+  return all;
+}
+
+void TouchGuide::begin_position() {
+  const std::optional<Vector3> ball1_m = site_ ? site_->ball1_m() : std::nullopt;
+  site_ = std::make_unique<Site>(setup_->calibrator, setup_->options, ball1_m);
+  passed_.assign(setup_->calibrator.balls.size() + 2, false);
+  feature_ = kBall1;
+}
+
+GuidedTouch TouchGuide::take(const Vector3& p_m) {
+  GuidedTouch out;
+  if (complete() || failure_) {
+    out.fate = TouchFate::Astray;
+    return out;
+  }
+  const auto feature = site_->feature_of(p_m, feature_);
+  if (!feature) {
+    astray(p_m, out);
+    return out;
+  }
+  astray_in_a_row_ = 0;
+  if (site_->has_point_near(*feature, p_m)) {
+    out.fate = TouchFate::SamePlace;
+    out.notes.push_back(where() + message("the same place on ", name(feature_at(*feature)),
+                                          " was touched twice; it counts once"));
+  } else if (site_->points(*feature).size() >= points_of(*feature)) {
+    on_complete_feature(*feature, p_m, out);
+  } else {
+    put(*feature, p_m, out);
+  }
+  return out;
+}
+
+void TouchGuide::astray(const Vector3& p_m, GuidedTouch& out) {
+  out.fate = TouchFate::Astray;
+  std::string text = where() + message("the touch at ", place_text(p_m), " is on no ball or block");
+  std::size_t ball = 0;
+  if (const double off_m = site_->nearest_ball_m(p_m, ball); std::isfinite(off_m))
+    text += message("; nearest is ball ", ball + 1, ", ", kMmPerM * off_m, " mm away");
+  else if (site_->points(kBall1).size() == 1) {
+    // Nothing says which of the two was wrong; the next one will.
+    site_->clear(kBall1);
+    text = where() + message("the touch at ", place_text(p_m),
+                             " and the one before are not on one ball: both are set aside");
+  }
+  out.notes.push_back(text + "; expected: " + name(feature_at(feature_)));
+  if (++astray_in_a_row_ < setup_->options.most_astray) return;
+  fail(
+      ErrorCode::BadInput,
+      message(astray_in_a_row_, " touches one after the other are on no ball or block of calibrator \"",
+              setup_->calibrator.name,
+              "\": calibrator file of another artefact, or another order; the last one: ", out.notes.back()));
+}
+
+/// All points of it are there already. Ball1 again, with nothing missing elsewhere: the next position began.
+void TouchGuide::on_complete_feature(std::size_t feature, const Vector3& p_m, GuidedTouch& out) {
+  if (feature == kBall1 && feature_ != kBall1 && all_have_enough()) {
+    pass_over_until(passed_.size(), out);
+    if (all_have_enough()) {
+      end_position(out);
+      if (!complete() && !failure_) return put(kBall1, p_m, out);
+    }
+    out.fate = TouchFate::Doubled;
+    return;
+  }
+  out.fate = TouchFate::Doubled;
+  out.notes.push_back(where() +
+                      message(name(feature_at(feature)), " has all its ", points_of(feature),
+                              " points: this one is not needed; expected: ", name(feature_at(feature_))));
+}
+
+void TouchGuide::put(std::size_t feature, const Vector3& p_m, GuidedTouch& out) {
+  if (feature > feature_) pass_over_until(feature, out);
+  feature_ = feature;
+  site_->add(feature, p_m);
+  if (site_->points(feature).size() == points_of(feature) && accept_feature(feature, out))
+    go_on_from(feature, out);
+}
+
+/// Somebody went on: what is missing is said now, and asked for again at the end if it is too much.
+void TouchGuide::pass_over_until(std::size_t feature, GuidedTouch& out) {
+  for (std::size_t f = feature_; f < feature; ++f) {
+    const std::size_t points = site_->points(f).size();
+    if (points >= points_of(f) || passed_[f]) continue;
+    passed_[f] = true;
+    if (points == 0) {
+      out.notes.push_back(where() + name(feature_at(f)) + " was left out; it is asked for again");
+    } else {
+      out.notes.push_back(where() + tally(f) +
+                          (has_enough(f) ? ", the rest was missed" : ": too few, it is asked for again"));
+    }
+    if (has_enough(f)) (void)accept_feature(f, out);
+  }
+}
+
+bool TouchGuide::accept_feature(std::size_t feature, GuidedTouch& out) {
+  const FeatureCheck seen = site_->check(feature);
+  const std::string which = name(feature_at(feature));
+  if (seen.outlier) {
+    const Vector3 p_m = site_->points(feature)[*seen.outlier];
+    site_->drop(feature, *seen.outlier);
+    out.notes.push_back(where() + message("the touch at ", place_text(p_m), " is ", kMmPerM * seen.off_m,
+                                          " mm off the others of ", which, ": set aside, touch another"));
+    return false;
+  }
+  if (seen.other_radius_m && feature == kBall1 && place_ == 0) {
+    const Calibrator& c = setup_->calibrator;
+    fail(ErrorCode::BadInput,
+         message("ball 1 has radius ", kMmPerM * *seen.other_radius_m, " mm, calibrator \"", c.name,
+                 "\" and tip make ", kMmPerM * (c.balls.front().radius_m + c.tip_radius_m),
+                 " mm: calibrator file of another artefact, or another tip"));
+    return false;
+  }
+  if (!seen.fine) {
+    set_feature_aside(feature, which + " is not what its points lie on", out);
+    return false;
+  }
+  const bool both_faces = has_enough(kBlock1) && has_enough(kBlock2);
+  if ((feature == kBlock1 || feature == kBlock2) && both_faces &&
+      site_->faces_off_rad() > setup_->options.observe.max_block_tilt_rad) {
+    const double off_mrad = kMmPerM * site_->faces_off_rad();
+    site_->clear(kBlock1);
+    set_feature_aside(kBlock2, message("the two faces stand ", off_mrad, " mrad off the calibrator's angle"),
+                      out);
+    feature_ = kBlock1;
+    return false;
+  }
+  return true;
+}
+
+void TouchGuide::go_on_from(std::size_t feature, GuidedTouch& out) {
+  for (std::size_t f = feature + 1; f < passed_.size(); ++f) {
+    if (site_->points(f).size() >= points_of(f) || passed_[f]) continue;
+    feature_ = f;
+    return;
+  }
+  for (std::size_t f = 0; f < passed_.size(); ++f) {
+    if (has_enough(f)) continue;
+    feature_ = f;
+    return;
+  }
+  end_position(out);
+}
+
+void TouchGuide::end_position(GuidedTouch& out) {
+  const int position = plan().positions[place_];
+  const std::vector<Touch> touches = site_->touches(position);
+  const auto seen = see_artefact(position, touches, setup_->calibrator, setup_->options.observe);
+  if (!seen) return set_position_aside(seen.error().text, out);
+  for (std::size_t before = 0; before < seen_.size(); ++before) {
+    const double turn_rad = Eigen::AngleAxisd(seen_[before].transpose() * seen->T_self_uni.R).angle();
+    if (turn_rad >= setup_->options.least_turn_rad) continue;
+    return set_position_aside(
+        where() + message("the artefact stands as at position ", plan().positions[before], ": turn it"), out);
+  }
+  finished_.insert(finished_.end(), touches.begin(), touches.end());
+  seen_.push_back(seen->T_self_uni.R);
+  set_aside_in_a_row_ = 0;
+  ++place_;
+  begin_position();
+}
+
+void TouchGuide::set_feature_aside(std::size_t feature, const std::string& why, GuidedTouch& out) {
+  const std::string text = where() + why;
+  site_->clear(feature);
+  passed_[feature] = false;
+  feature_ = feature;
+  out.notes.push_back(text + ": its touches are set aside, touch it again");
+  if (++set_aside_in_a_row_ >= kMostSetAside) fail(ErrorCode::BadInput, text + ", again");
+}
+
+void TouchGuide::set_position_aside(const std::string& why, GuidedTouch& out) {
+  begin_position();
+  out.notes.push_back(why + ": this position's touches are set aside, touch it again from ball 1");
+  if (++set_aside_in_a_row_ >= kMostSetAside) fail(ErrorCode::BadInput, why + ", again");
+}
+
+void TouchGuide::fail(ErrorCode code, std::string text) {
+  failure_ = Error{code, std::move(text)};
+}
+
+}  // namespace abbe::calib::evemu

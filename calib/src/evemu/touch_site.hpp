@@ -1,0 +1,65 @@
+#pragma once
+/// One position of the ball array while it is being touched: the points of every feature, and where the
+/// features are as far as these tell. Features by measuring order: 0 Ball1, 1 and 2 the blocks, 3 Ball2, ...
+
+#include <cstddef>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "abbe/calib/evemu/touch_guide.hpp"
+
+namespace abbe::calib::evemu {
+
+[[nodiscard]] TouchedFeature feature_at(std::size_t order);
+
+/// What the points of a feature say of themselves.
+struct FeatureCheck {
+  bool fine = false;
+  std::optional<std::size_t> outlier{};    ///< without this one it would be
+  double off_m = 0.0;                      ///< of the outlier, from the surface of the others
+  std::optional<double> other_radius_m{};  ///< they lie on one sphere, but not on this ball's
+};
+
+class Site {
+ public:
+  /// `ball1_m`: where it stood at the positions before. References must outlive the site.
+  Site(const Calibrator&, const GuideOptions&, std::optional<Vector3> ball1_m);
+
+  /// The feature that p lies on; nothing: none known. `expected` decides where the features themselves
+  /// cannot.
+  [[nodiscard]] std::optional<std::size_t> feature_of(const Vector3& p_m, std::size_t expected);
+  /// Distance to the surface of the nearest ball known, which it is in `ball`; infinity before any is.
+  [[nodiscard]] double nearest_ball_m(const Vector3& p_m, std::size_t& ball) const;
+
+  [[nodiscard]] const std::vector<Vector3>& points(std::size_t feature) const { return points_[feature]; }
+  [[nodiscard]] bool has_point_near(std::size_t feature, const Vector3& p_m) const;
+  void add(std::size_t feature, const Vector3& p_m);
+  void drop(std::size_t feature, std::size_t point);
+  void clear(std::size_t feature);
+  [[nodiscard]] FeatureCheck check(std::size_t feature) const;
+  /// Both faces are there: the angle between them less the calibrator's.
+  [[nodiscard]] double faces_off_rad() const;
+  [[nodiscard]] const std::optional<Vector3>& ball1_m() const { return ball1_m_; }
+  [[nodiscard]] std::vector<Touch> touches(int position) const;
+
+ private:
+  [[nodiscard]] double radius_m(std::size_t feature) const;
+  [[nodiscard]] double extent_m() const;
+  [[nodiscard]] bool near_first_ball(const Vector3& p_m) const;
+  [[nodiscard]] bool on_face(std::size_t block, const Vector3& p_m) const;
+  [[nodiscard]] std::optional<std::size_t> face_of(const Vector3& p_m, std::size_t expected) const;
+  [[nodiscard]] std::optional<std::size_t> ball_of(const Vector3& p_m);
+  [[nodiscard]] FeatureCheck check_ball(std::size_t feature) const;
+  [[nodiscard]] FeatureCheck check_face(std::size_t feature) const;
+  void place_balls();
+
+  const Calibrator& calibrator_;
+  const GuideOptions& options_;
+  std::optional<Vector3> ball1_m_;
+  std::vector<std::vector<Vector3>> points_;
+  /// Places of all balls, for each side the two faces may look to; those no touch has contradicted.
+  std::vector<std::vector<Vector3>> candidates_;
+};
+
+}  // namespace abbe::calib::evemu

@@ -66,7 +66,7 @@ const std::vector<AxisPosition> kPath{{0, 0, 0}, {0.1, 0, 0}, {0.1, 0.1, 0}, {0.
 
 TEST(CalibrationSession, GoesThroughItsStatesAlongThePath) {
   CalibrationSession session;
-  ASSERT_TRUE(session.start(kPath, HostTime{10s}));
+  ASSERT_TRUE(session.start({OtfRequest{kPath}, HostTime{10s}}));
   Drive drive{session};
   drive.stand(kPath[0], 1s);
   EXPECT_EQ(session.status().state, SessionState::Warming);
@@ -78,13 +78,14 @@ TEST(CalibrationSession, GoesThroughItsStatesAlongThePath) {
 
 TEST(CalibrationSession, TheRunBeginsAndEndsInStandstill) {
   CalibrationSession session;
-  ASSERT_TRUE(session.start(kPath, HostTime{10s}));
+  ASSERT_TRUE(session.start({OtfRequest{kPath}, HostTime{10s}}));
   Drive drive{session};
   drive.stand(kPath[0], 5s);
   for (std::size_t i = 1; i < kPath.size(); ++i) drive.move(kPath[i]);
   drive.stand(kPath.back(), 2s);
-  const auto run = session.take_run();
-  ASSERT_TRUE(run);
+  const auto taken = session.take_run();
+  ASSERT_TRUE(taken);
+  const std::vector<RunPoint>* run = &std::get<OtfRun>(*taken).points;
   ASSERT_GT(run->size(), 1000u);
   EXPECT_EQ((*run)[19].p_tracker_m, kPath[0]);
   EXPECT_EQ((*run)[run->size() - 20].p_tracker_m, kPath.back());
@@ -105,7 +106,7 @@ TEST(CalibrationSession, ASlowTrackerStandsLongEnoughForTwentyPoints) {
 
 TEST(CalibrationSession, RefusesWhenAnotherPathIsDriven) {
   CalibrationSession session;
-  ASSERT_TRUE(session.start(kPath, HostTime{10s}));
+  ASSERT_TRUE(session.start({OtfRequest{kPath}, HostTime{10s}}));
   Drive drive{session};
   drive.stand(kPath[0], 1s);
   drive.move({0, 0.1, 0});
@@ -115,7 +116,7 @@ TEST(CalibrationSession, RefusesWhenAnotherPathIsDriven) {
 
 TEST(CalibrationSession, ABeamLostAroundACornerDoesNotLoseThePath) {
   CalibrationSession session;
-  ASSERT_TRUE(session.start(kPath, HostTime{10s}));
+  ASSERT_TRUE(session.start({OtfRequest{kPath}, HostTime{10s}}));
   Drive drive{session};
   drive.stand(kPath[0], 1s);
   drive.move({0.08, 0, 0});
@@ -129,7 +130,7 @@ TEST(CalibrationSession, ABeamLostAroundACornerDoesNotLoseThePath) {
 
 TEST(CalibrationSession, AClockMappingThatJumpsBackDoesNotAddWay) {
   CalibrationSession session;
-  ASSERT_TRUE(session.start(kPath, HostTime{10s}));
+  ASSERT_TRUE(session.start({OtfRequest{kPath}, HostTime{10s}}));
   Drive drive{session};
   drive.stand(kPath[0], 1s);
   for (std::size_t i = 1; i < kPath.size(); ++i) {
@@ -149,7 +150,7 @@ TEST(CalibrationSession, AClockMappingThatJumpsBackDoesNotAddWay) {
 
 TEST(CalibrationSession, RefusesWhenTheBeamStaysAway) {
   CalibrationSession session;
-  ASSERT_TRUE(session.start(kPath, HostTime{10s}));
+  ASSERT_TRUE(session.start({OtfRequest{kPath}, HostTime{10s}}));
   Drive drive{session};
   drive.stand(kPath[0], 1s);
   drive.move(kPath[1]);
@@ -168,7 +169,7 @@ TEST(CalibrationSession, WaitsInWallTimeForASimulatorThatIsFasterThanTime) {
 
 TEST(CalibrationSession, LeavesOutPointsThatCameOutOfOrder) {
   CalibrationSession session;
-  ASSERT_TRUE(session.start(kPath, HostTime{10s}));
+  ASSERT_TRUE(session.start({OtfRequest{kPath}, HostTime{10s}}));
   Drive drive{session};
   drive.stand(kPath[0], 1s);
   drive.move(kPath[1]);
@@ -178,14 +179,15 @@ TEST(CalibrationSession, LeavesOutPointsThatCameOutOfOrder) {
   for (std::size_t i = 2; i < kPath.size(); ++i) drive.move(kPath[i]);
   drive.stand(kPath.back(), 2s);
   EXPECT_NE(session.status().reason.find("25 left out"), std::string::npos) << session.status().reason;
-  const auto run = session.take_run();
-  ASSERT_TRUE(run);
+  const auto taken = session.take_run();
+  ASSERT_TRUE(taken);
+  const std::vector<RunPoint>* run = &std::get<OtfRun>(*taken).points;
   for (std::size_t i = 1; i < run->size(); ++i) ASSERT_GT((*run)[i].device_time, (*run)[i - 1].device_time);
 }
 
 TEST(CalibrationSession, RefusesWhenTheTrackersClockBeginsAnew) {
   CalibrationSession session;
-  ASSERT_TRUE(session.start(kPath, HostTime{10s}));
+  ASSERT_TRUE(session.start({OtfRequest{kPath}, HostTime{10s}}));
   Drive drive{session};
   drive.stand(kPath[0], 1s);
   drive.move(kPath[1]);
@@ -197,7 +199,7 @@ TEST(CalibrationSession, RefusesWhenTheTrackersClockBeginsAnew) {
 
 TEST(CalibrationSession, WaitsOnWhenTheTrackersClockBeginsAnewBeforeTheRun) {
   CalibrationSession session;
-  ASSERT_TRUE(session.start(kPath, HostTime{10s}));
+  ASSERT_TRUE(session.start({OtfRequest{kPath}, HostTime{10s}}));
   Drive drive{session};
   drive.stand(kPath[0], 1s);
   drive.set_device_clock(0s);
@@ -208,7 +210,7 @@ TEST(CalibrationSession, WaitsOnWhenTheTrackersClockBeginsAnewBeforeTheRun) {
 
 TEST(CalibrationSession, EndsWhenNoPointArrivesAnyMore) {
   CalibrationSession session;
-  ASSERT_TRUE(session.start(kPath, HostTime{10s}));
+  ASSERT_TRUE(session.start({OtfRequest{kPath}, HostTime{10s}}));
   Drive drive{session};
   drive.stand(kPath[0], 1s);
   drive.move(kPath[1]);
@@ -221,13 +223,13 @@ TEST(CalibrationSession, EndsWhenNoPointArrivesAnyMore) {
 
 TEST(CalibrationSession, DoesNotWaitForEverForTheMachineToStandAtTheStart) {
   CalibrationSession silent, elsewhere;
-  ASSERT_TRUE(silent.start(kPath, HostTime{10s}));
+  ASSERT_TRUE(silent.start({OtfRequest{kPath}, HostTime{10s}}));
   silent.tick(HostTime{10s} + 59min);
   EXPECT_EQ(silent.status().state, SessionState::Warming);
   silent.tick(HostTime{10s} + 61min);
   EXPECT_EQ(silent.status().state, SessionState::Refused);
 
-  ASSERT_TRUE(elsewhere.start(kPath, HostTime{10s}));
+  ASSERT_TRUE(elsewhere.start({OtfRequest{kPath}, HostTime{10s}}));
   Drive drive{elsewhere};
   drive.stand(kPath[1], 1s);
   drive.pause(1h);
@@ -239,7 +241,7 @@ TEST(CalibrationSession, DoesNotWaitForEverForTheMachineToStandAtTheStart) {
 
 TEST(CalibrationSession, RefusesWhenTheMachineStopsForGood) {
   CalibrationSession session;
-  ASSERT_TRUE(session.start(kPath, HostTime{10s}));
+  ASSERT_TRUE(session.start({OtfRequest{kPath}, HostTime{10s}}));
   Drive drive{session};
   drive.stand(kPath[0], 1s);
   drive.move({0.05, 0, 0});
@@ -253,7 +255,7 @@ TEST(CalibrationSession, RefusesWhenTheMachineStopsForGood) {
 
 TEST(CalibrationSession, RefusesWhenTheAxesStayAway) {
   CalibrationSession session;
-  ASSERT_TRUE(session.start(kPath, HostTime{10s}));
+  ASSERT_TRUE(session.start({OtfRequest{kPath}, HostTime{10s}}));
   Drive drive{session};
   drive.stand(kPath[0], 1s);
   drive.move(kPath[1]);
@@ -265,7 +267,7 @@ TEST(CalibrationSession, RefusesWhenTheAxesStayAway) {
 
 TEST(CalibrationSession, LooksAtNothingFromBeforeItsStart) {
   CalibrationSession session;
-  ASSERT_TRUE(session.start(kPath, HostTime{60s}));
+  ASSERT_TRUE(session.start({OtfRequest{kPath}, HostTime{60s}}));
   Drive drive{session};
   drive.stand(kPath[0], 1s);
   drive.move(kPath[1]);
@@ -274,8 +276,8 @@ TEST(CalibrationSession, LooksAtNothingFromBeforeItsStart) {
 
 TEST(CalibrationSession, ASecondStartWhileRunningIsRefused) {
   CalibrationSession session;
-  ASSERT_TRUE(session.start(kPath, HostTime{10s}));
-  const auto second = session.start(kPath, HostTime{11s});
+  ASSERT_TRUE(session.start({OtfRequest{kPath}, HostTime{10s}}));
+  const auto second = session.start({OtfRequest{kPath}, HostTime{11s}});
   ASSERT_FALSE(second);
   EXPECT_EQ(second.error().code, ErrorCode::Refused);
 }
@@ -283,7 +285,7 @@ TEST(CalibrationSession, ASecondStartWhileRunningIsRefused) {
 TEST(CalibrationSession, TheVerdictEndsItActiveOrRefusedAndLeavesItsTrack) {
   for (const bool passed : {true, false}) {
     CalibrationSession session;
-    ASSERT_TRUE(session.start(kPath, HostTime{10s}));
+    ASSERT_TRUE(session.start({OtfRequest{kPath}, HostTime{10s}}));
     Drive drive{session};
     drive.stand(kPath[0], 1s);
     for (std::size_t i = 1; i < kPath.size(); ++i) drive.move(kPath[i]);
@@ -301,10 +303,10 @@ TEST(CalibrationSession, TheVerdictEndsItActiveOrRefusedAndLeavesItsTrack) {
 TEST(CalibrationSession, CancelEndsARunningSessionOnly) {
   CalibrationSession session;
   EXPECT_FALSE(session.cancel("operator", HostTime{1s}));
-  ASSERT_TRUE(session.start(kPath, HostTime{10s}));
+  ASSERT_TRUE(session.start({OtfRequest{kPath}, HostTime{10s}}));
   ASSERT_TRUE(session.cancel("operator", HostTime{11s}));
   EXPECT_EQ(session.status().state, SessionState::Refused);
-  EXPECT_TRUE(session.start(kPath, HostTime{12s}));
+  EXPECT_TRUE(session.start({OtfRequest{kPath}, HostTime{12s}}));
 }
 
 }  // namespace

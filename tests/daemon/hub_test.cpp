@@ -164,7 +164,8 @@ TEST_F(HubTest, SaysHowTheStreamsAreOnceASecond) {
 
 TEST_F(HubTest, RefusesToCalibrateAxesTheControlCorrectsAlready) {
   config_.encoder.emplace().axes_compensated = true;
-  const auto started = calibration_->start_otf({{0, 0, 0}, {1, 0, 0}, {1, 1, 0}}, "anna", time_.now());
+  const auto started =
+      calibration_->start(OtfRequest{{{0, 0, 0}, {1, 0, 0}, {1, 1, 0}}}, "anna", time_.now());
   ASSERT_FALSE(started);
   EXPECT_EQ(started.error().code, ErrorCode::Refused);
   EXPECT_THAT(started.error().text, testing::HasSubstr("axes_compensated"));

@@ -109,7 +109,10 @@ Result<Outcome> from_files(const Arguments& arguments, const calib::VolumetricMo
 Result<OtfCandidate> last_complete_run(ReplayReport replayed, const std::string& file) {
   std::string why = replayed.calibrations.empty() ? "no calibration was asked for" : "";
   for (auto c = replayed.calibrations.rbegin(); c != replayed.calibrations.rend(); ++c) {
-    if (c->outcome && *c->outcome) return std::move(**c->outcome);
+    if (c->outcome && *c->outcome) {
+      if (auto* otf = std::get_if<OtfCandidate>(&**c->outcome)) return std::move(*otf);
+      continue;
+    }
     if (why.empty()) why = c->outcome ? c->outcome->error().text : c->ended.reason;
   }
   return fail(ErrorCode::DataInsufficient, fmt::format("{}: holds no complete calibration: {}", file, why));

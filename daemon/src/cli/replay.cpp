@@ -42,7 +42,7 @@ json calibration_json(const ReplayedCalibration& c) {
     out["error"] = c.outcome->error().text;
     return out;
   }
-  const auto& verdict = (*c.outcome)->verdict;
+  const auto& verdict = verdict_of(**c.outcome);
   out["model_hash"] = c.model_hash;
   out["model_id"] = c.model_id;
   out["accepted"] = verdict.accepted;
@@ -70,7 +70,7 @@ void print_report(const ReplayReport& r, double wall_s) {
       fmt::print("calibration  not identified: {}\n", c.outcome->error().text);
     } else {
       fmt::print("calibration  {} model {}\n             hash {}\n",
-                 (*c.outcome)->verdict.accepted ? "accepted" : "refused", c.model_id, c.model_hash);
+                 verdict_of(**c.outcome).accepted ? "accepted" : "refused", c.model_id, c.model_hash);
     }
   }
   for (const auto& id : r.live_model_ids) fmt::print("live         model {}\n", id);

@@ -58,6 +58,7 @@ void add_commands(CLI::App& app, int& exit) {
   auto* calibrate = app.add_subcommand("calibrate", "Calibrate the machine that the running daemon watches");
   calibrate->require_subcommand(1);
   add_calibrate_otf(*calibrate, exit);
+  add_calibrate_evemu(*calibrate, exit);
   add_calibrate_probe(*calibrate, exit);
   add_reference(app, exit);
   add_replay(app, exit);

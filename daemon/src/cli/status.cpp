@@ -62,6 +62,12 @@ void print_reference(const json& reference) {
   fmt::print("\n");
 }
 
+void print_next(const json& next) {
+  fmt::print("next       {} of position {}, {} of {} points touched\n", next["on"].get<std::string>(),
+             next["position"].get<int>(), next["touched"].get<std::size_t>(),
+             next["points"].get<std::size_t>());
+}
+
 void print_status(const json& status) {
   const json& model = status["model"];
   const std::string state = model["state"];
@@ -72,6 +78,8 @@ void print_status(const json& status) {
   fmt::print("session    {}, {:.0f} %, {} points: {}\n", session["state"].get<std::string>(),
              100.0 * session["progress"].get<double>(), session["points"].get<std::uint64_t>(),
              session["reason"].get<std::string>());
+  if (session.contains("next")) print_next(session["next"]);
+  for (const json& note : session["notes"]) fmt::print("           {}\n", note.get<std::string>());
   if (status.contains("reference")) print_reference(status["reference"]);
   if (status.contains("environment")) print_environment(status["environment"]);
   if (status.contains("recording")) fmt::print("recording  {}\n", status["recording"].get<std::string>());

@@ -54,12 +54,18 @@ json device_json(const StreamHealth& h) {
           {"latency_p99_s", h.latency_p99_s}};
 }
 
+json next_json(const calib::evemu::NextTouch& next) {
+  return {{"position", next.position},
+          {"place", next.place + 1},
+          {"on", calib::evemu::name(next.on)},
+          {"touched", next.touched},
+          {"points", next.points}};
+}
+
 json session_json(const SessionStatus& s, const std::optional<calib::HeldOutFigures>& held_out) {
-  json out{{"state", name(s.state)},
-           {"reason", s.reason},
-           {"progress", s.progress},
-           {"points", s.points},
-           {"model_id", s.model_id}};
+  json out{{"state", name(s.state)}, {"method", s.method},     {"reason", s.reason}, {"progress", s.progress},
+           {"points", s.points},     {"model_id", s.model_id}, {"notes", s.notes},   {"noted", s.noted}};
+  if (s.next) out["next"] = next_json(*s.next);
   if (held_out) {
     out["held_out_rms_um"] = {{"candidate", held_out->candidate_rms_m * 1e6},
                               {"no_compensation", held_out->no_compensation_rms_m * 1e6}};
@@ -148,13 +154,11 @@ json status(const Hub& hub) {
 }
 
 json calibrate(const Hub& hub, const json& request) {
-  if (request.at("method") != "otf") {
-    return refusal({ErrorCode::Usage, fmt::format("calibrate: unknown method {}, known: \"otf\"",
-                                                  request.at("method").dump())});
-  }
+  const HubParts& parts = hub.parts();
+  auto task = task_from_json(request, touch_plan(parts.config.evemu));
+  if (!task) return refusal(task.error());
   auto started =
-      hub.parts().calibration.start_otf(request.at("path_m").get<std::vector<AxisPosition>>(),
-                                        request.at("who").get<std::string>(), hub.parts().time.now());
+      parts.calibration.start(std::move(*task), request.at("who").get<std::string>(), parts.time.now());
   return started ? json{{"ok", true}} : refusal(started.error());
 }
 

@@ -111,7 +111,7 @@ v1::ErrorModel model_message(const ModelInForce& in_force, const Stamp& stamp) {
   m.estimator(in_force.estimator);
   m.gauge(std::string{calib::name(in_force.model.gauge())});
   m.chain(layout.chain().text());
-  m.basis("linear");
+  m.basis(in_force.model.polynomials() == nullptr ? "linear" : "legendre");
   m.squareness("travel");
   m.tool_offset_m(array(in_force.model.tool_offsets_m().front()));
   for (const auto& p : in_force.model.parameters()) {
@@ -146,7 +146,9 @@ std::vector<v1::ErrorGrid> grid_messages(const ModelInForce& in_force, const Sta
     }
   }
   const auto& nodes = in_force.model.layout().nodes();
+  // Said of tables that are all there: only they are linear in between.
   const bool every_node =
+      in_force.model.polynomials() == nullptr &&
       all.size() == nodes[0].nodes_m.size() * nodes[1].nodes_m.size() * nodes[2].nodes_m.size();
   const std::size_t slices = (all.size() + kNodesPerSlice - 1) / kNodesPerSlice;
   std::vector<v1::ErrorGrid> messages;
@@ -235,7 +237,7 @@ v1::CalibrationEvent event_message(const SessionEvent& event, std::string_view m
   v1::CalibrationEvent m;
   m.machine(std::string{machine});
   m.host_time_ns(ns(event.time));
-  m.method("otf");
+  m.method(event.status.method);
   m.state(std::string{name(event.status.state)});
   m.reason(cut(event.status.reason, kEventReasonBound));
   m.progress(event.status.progress);

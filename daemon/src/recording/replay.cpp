@@ -170,7 +170,7 @@ class Calibrations {
       : requests_(std::move(requests)),
         config_(config),
         active_(active),
-        session_(acquisition_options(config)) {
+        session_(acquisition_options(config), evemu_acquisition_options(config)) {
     begin_next();
   }
 
@@ -181,7 +181,7 @@ class Calibrations {
       begin_next();
     }
     session_.take(snapshot);
-    if (auto run = session_.take_run()) identify(std::move(*run));
+    if (const auto run = session_.take_run()) identify_again(*run);
   }
 
   [[nodiscard]] std::vector<ReplayedCalibration> finish() {
@@ -192,8 +192,8 @@ class Calibrations {
  private:
   void begin_next() {
     if (next_ == requests_.size()) return;
-    session_ = CalibrationSession{acquisition_options(config_)};
-    (void)session_.start(requests_[next_].path_m, requests_[next_].from);
+    session_ = CalibrationSession{acquisition_options(config_), evemu_acquisition_options(config_)};
+    (void)session_.start(requests_[next_]);
     identified_ = false;
     ++next_;
   }
@@ -201,13 +201,12 @@ class Calibrations {
     if (next_ > 0 && !identified_) done_.push_back({.ended = session_.status()});
     identified_ = true;
   }
-  void identify(std::vector<RunPoint> points) {
-    ReplayedCalibration c{.ended = session_.status(), .points_sha256 = points_sha256(points)};
-    c.outcome = identify_run({.path_m = session_.path_m(), .points = std::move(points)}, config_.machine,
-                             config_.gate, active_);
+  void identify_again(const CalibrationRun& run) {
+    ReplayedCalibration c{.ended = session_.status(), .points_sha256 = inputs_of(run).back().sha256};
+    c.outcome = identify(run, config_, active_);
     if (*c.outcome) {
-      c.model_hash = model_hash((*c.outcome)->solution.model, "otf");
-      c.model_id = model_id((*c.outcome)->solution.model, "otf");
+      c.model_hash = model_hash(model_of(**c.outcome), method_of(**c.outcome));
+      c.model_id = model_id(model_of(**c.outcome), method_of(**c.outcome));
     }
     done_.push_back(std::move(c));
     identified_ = true;
@@ -245,7 +244,7 @@ Result<Datum> datum_of(const RecordingReader& recording, const Config& config) {
 Result<std::vector<CalibrationRequest>> requests_of(const RecordingReader& recording) {
   std::vector<CalibrationRequest> requests;
   for (const auto& attachment : recording.attachments()) {
-    if (attachment.name != kCalibrationRequestName) continue;
+    if (!is_calibration_request(attachment.name)) continue;
     auto request = from_attachment(attachment);
     if (!request) return tl::unexpected(request.error());
     requests.push_back(std::move(*request));

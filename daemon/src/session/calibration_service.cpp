@@ -6,6 +6,7 @@
 #include <chrono>
 #include <utility>
 
+#include "abbe/daemon/calibration_run.hpp"
 #include "abbe/daemon/device_options.hpp"
 #include "abbe/daemon/otf_inputs.hpp"
 #include "session/outcome.hpp"
@@ -38,29 +39,37 @@ CalibrationService::CalibrationService(const Config& config, ModelAuthority& aut
       authority_(authority),
       recorder_(recorder),
       utc_(utc),
-      session_(acquisition_options(config)) {}
+      session_(acquisition_options(config), evemu_acquisition_options(config)) {}
 
 CalibrationService::~CalibrationService() {
   if (identification_.valid()) identification_.wait();
   if (keeping_.valid()) keeping_.wait();
 }
 
-Result<void> CalibrationService::start_otf(std::vector<AxisPosition> path_m, const std::string& who,
-                                           HostTime now) {
+Result<void> CalibrationService::check(const CalibrationTask& task) const {
   if (config_.axes_compensated()) {
     return fail(
         ErrorCode::Refused,
-        "calibrate otf: the control already corrects these axes (axes_compensated = true): switch its "
-        "compensation off first, and say so in the configuration");
+        fmt::format("calibrate {}: the control already corrects these axes (axes_compensated = true): "
+                    "switch its compensation off first, and say so in the configuration",
+                    method_of(task)));
   }
   if (identification_.valid()) {
-    return fail(ErrorCode::Refused, "calibrate otf: the identification of a cancelled run is still ending");
+    return fail(
+        ErrorCode::Refused,
+        fmt::format("calibrate {}: the identification of a cancelled run is still ending", method_of(task)));
   }
-  if (auto fine = check_otf_path(path_m, config_.machine); !fine) return fine;
-  const CalibrationRequest request{.path_m = path_m, .from = now};
-  if (auto started = session_.start(std::move(path_m), now); !started) return started;
+  if (const auto* otf = std::get_if<OtfRequest>(&task)) return check_otf_path(otf->path_m, config_.machine);
+  return check_evemu(std::get<EvemuRequest>(task), config_);
+}
+
+Result<void> CalibrationService::start(CalibrationTask task, const std::string& who, HostTime now) {
+  if (auto fine = check(task); !fine) return fine;
+  CalibrationRequest request{.task = std::move(task), .from = now};
+  const RecordingAttachment attachment = to_attachment(request);
+  if (auto started = session_.start(std::move(request)); !started) return started;
   who_ = who;
-  if (recorder_ != nullptr) recorder_->attach(to_attachment(request), now);
+  if (recorder_ != nullptr) recorder_->attach(attachment, now);
   return {};
 }
 
@@ -84,8 +93,7 @@ std::vector<SessionEvent> CalibrationService::turn(std::span<const protocol::Sna
   return events;
 }
 
-void CalibrationService::begin_identification(std::vector<RunPoint> points) {
-  OtfRun run{.path_m = session_.path_m(), .points = std::move(points)};
+void CalibrationService::begin_identification(CalibrationRun run) {
   std::optional<calib::VolumetricModel> active;
   if (const auto* in_force = authority_.in_force()) active = in_force->model;
   std::future<RecordingDigest> digest;
@@ -101,9 +109,10 @@ void CalibrationService::begin_identification(std::vector<RunPoint> points) {
           // The hash is that of the first `bytes` bytes: the recording goes on.
           inputs.push_back({fmt::format("{} ({} bytes)", d.file.filename().string(), d.bytes), d.sha256});
         }
-        inputs.push_back({"points", points_sha256(run.points)});
-        auto candidate = identify_run(run, config_.machine, config_.gate, active ? &*active : nullptr,
-                                      [this](double share) { identified_share_ = share; });
+        const auto entered = inputs_of(run);
+        inputs.insert(inputs.end(), entered.begin(), entered.end());
+        auto candidate = identify(run, config_, active ? &*active : nullptr,
+                                  [this](double share) { identified_share_ = share; });
         if (!candidate) return tl::unexpected(candidate.error());
         return Identified{std::move(*candidate), std::move(inputs)};
       });
@@ -115,15 +124,17 @@ void CalibrationService::keep(Result<Identified> identified, HostTime now) {
     session_.not_identified(identified.error().text, now);
     return;
   }
-  verdict_ = identified->candidate.verdict;
+  verdict_ = verdict_of(identified->candidate);
   held_out_ = verdict_.held_out;
   const auto created = utc_.to_utc(now);
   keeping_ = std::async(
       std::launch::async,
       [keeper = authority_.keeper(), verdict = verdict_, now,
-       actor = StoreActor{.who = who_, .why = "calibrate otf", .when = created},
-       document = otf_document(identified->candidate.solution, config_, std::move(identified->inputs),
-                               created)]() mutable { return keeper.keep(document, verdict, actor, now); });
+       actor = StoreActor{.who = who_,
+                          .why = fmt::format("calibrate {}", method_of(identified->candidate)),
+                          .when = created},
+       document = document_of(identified->candidate, config_, std::move(identified->inputs),
+                              created)]() mutable { return keeper.keep(document, verdict, actor, now); });
 }
 
 void CalibrationService::conclude(Result<KeptModel> kept, HostTime now) {

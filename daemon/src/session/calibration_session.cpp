@@ -4,6 +4,7 @@
 
 #include <array>
 #include <utility>
+#include <variant>
 
 namespace abbe::daemon {
 
@@ -20,17 +21,37 @@ bool CalibrationSession::running() const noexcept {
          status_.state == SessionState::Identifying || status_.state == SessionState::Judged;
 }
 
-Result<void> CalibrationSession::start(std::vector<AxisPosition> path_m, HostTime from) {
-  if (running()) {
-    return fail(ErrorCode::Refused,
-                fmt::format("calibrate otf: a session is {} already", name(status_.state)));
+bool CalibrationSession::acquiring() const noexcept {
+  return status_.state == SessionState::Warming || status_.state == SessionState::Acquiring;
+}
+
+Result<CalibrationSession::Acquisition> CalibrationSession::acquisition(
+    const CalibrationRequest& request) const {
+  if (const auto* touching = std::get_if<EvemuRequest>(&request.task)) {
+    auto made = EvemuAcquisition::create(*touching, request.from, evemu_options_);
+    if (!made) return tl::unexpected(made.error());
+    return std::move(*made);
   }
+  const auto& path_m = std::get<OtfRequest>(request.task).path_m;
   if (path_m.size() < 2)
     return fail(ErrorCode::BadInput, "calibrate otf: a path needs at least two vertices");
-  path_m_ = std::move(path_m);
-  acquisition_.emplace(path_m_, from, acquisition_options_);
+  return OtfAcquisition{path_m, request.from, otf_options_};
+}
+
+Result<void> CalibrationSession::start(CalibrationRequest request) {
+  if (running()) {
+    return fail(ErrorCode::Refused, fmt::format("calibrate {}: a session is {} already",
+                                                method_of(request.task), name(status_.state)));
+  }
+  auto made = acquisition(request);
+  if (!made) return tl::unexpected(made.error());
+  acquisition_.emplace(std::move(*made));
   status_ = {};
-  enter(SessionState::Warming, acquisition_->reason(), from);
+  status_.method = method_of(request.task);
+  if (auto* otf = std::get_if<OtfRequest>(&request.task)) path_m_ = std::move(otf->path_m);
+  if (const auto* touching = std::get_if<EvemuAcquisition>(&*acquisition_)) status_.next = touching->next();
+  enter(SessionState::Warming, std::visit([](const auto& a) { return a.reason(); }, *acquisition_),
+        request.from);
   return {};
 }
 
@@ -41,38 +62,79 @@ Result<void> CalibrationSession::cancel(std::string who, HostTime now) {
 }
 
 void CalibrationSession::take(const protocol::Snapshot& snapshot) {
-  if (status_.state != SessionState::Warming && status_.state != SessionState::Acquiring) return;
-  acquisition_->take(snapshot);
+  if (!acquiring()) return;
+  std::visit([&](auto& a) { a.take(snapshot); }, *acquisition_);
   follow_acquisition(snapshot.head.time);
 }
 
 void CalibrationSession::tick(HostTime now) {
-  if (status_.state != SessionState::Warming && status_.state != SessionState::Acquiring) return;
-  acquisition_->tick(now);
+  if (!acquiring()) return;
+  std::visit([&](auto& a) { a.tick(now); }, *acquisition_);
   follow_acquisition(now);
 }
 
+namespace {
+
+std::size_t points_of(const OtfAcquisition& a) {
+  return a.points().size();
+}
+std::size_t points_of(const EvemuAcquisition& a) {
+  return a.points();
+}
+
+}  // namespace
+
 void CalibrationSession::follow_acquisition(HostTime now) {
-  status_.progress = acquisition_->progress();
-  status_.points = acquisition_->points().size();
-  switch (acquisition_->phase()) {
-    case OtfAcquisition::Phase::WaitingAtStart:
+  const auto [phase, reason] = std::visit(
+      [this](const auto& a) {
+        status_.progress = a.progress();
+        status_.points = points_of(a);
+        return std::pair{a.phase(), a.reason()};
+      },
+      *acquisition_);
+  if (auto* touching = std::get_if<EvemuAcquisition>(&*acquisition_)) follow_guidance(*touching, now);
+  switch (phase) {
+    case AcquisitionPhase::WaitingAtStart:
       break;
-    case OtfAcquisition::Phase::Running:
-      if (status_.state == SessionState::Warming) enter(SessionState::Acquiring, acquisition_->reason(), now);
+    case AcquisitionPhase::Running:
+      if (status_.state == SessionState::Warming) enter(SessionState::Acquiring, reason, now);
       break;
-    case OtfAcquisition::Phase::Complete:
-      enter(SessionState::Identifying, acquisition_->reason(), now);
+    case AcquisitionPhase::Complete:
+      enter(SessionState::Identifying, reason, now);
       break;
-    case OtfAcquisition::Phase::Failed:
-      enter(SessionState::Refused, acquisition_->reason(), now);
+    case AcquisitionPhase::Failed:
+      enter(SessionState::Refused, reason, now);
       break;
   }
 }
 
-std::optional<std::vector<RunPoint>> CalibrationSession::take_run() {
+/// A note is said, then what to do; both are events, so that whoever listens hears them in this order.
+void CalibrationSession::follow_guidance(EvemuAcquisition& touching, HostTime now) {
+  const auto notes = touching.take_notes();
+  for (const std::string& note : notes) {
+    status_.notes.push_back(note);
+    ++status_.noted;
+    enter(status_.state, note, now);
+  }
+  if (status_.notes.size() > SessionStatus::kMostNotes) {
+    const auto surplus = status_.notes.size() - SessionStatus::kMostNotes;
+    status_.notes.erase(status_.notes.begin(), status_.notes.begin() + static_cast<std::ptrdiff_t>(surplus));
+  }
+  status_.next = touching.next();
+  const bool same_state =
+      touching.phase() ==
+      (status_.state == SessionState::Warming ? AcquisitionPhase::WaitingAtStart : AcquisitionPhase::Running);
+  if (same_state && touching.reason() != status_.reason) enter(status_.state, touching.reason(), now);
+}
+
+std::optional<CalibrationRun> CalibrationSession::take_run() {
   if (status_.state != SessionState::Identifying || !acquisition_) return std::nullopt;
-  auto run = acquisition_->release();
+  CalibrationRun run;
+  if (auto* otf = std::get_if<OtfAcquisition>(&*acquisition_)) {
+    run = OtfRun{.path_m = path_m_, .points = otf->release()};
+  } else {
+    run = std::get<EvemuAcquisition>(*acquisition_).release();
+  }
   acquisition_.reset();
   status_.progress = 0.0;
   return run;
@@ -98,6 +160,7 @@ void CalibrationSession::enter(SessionState state, std::string reason, HostTime 
   status_.reason = std::move(reason);
   if (state == SessionState::Active || state == SessionState::Refused) {
     status_.progress = 1.0;
+    status_.next.reset();
     acquisition_.reset();
   }
   events_.push_back({now, status_});

@@ -1,24 +1,42 @@
 #pragma once
-/// What a calibration was asked for, as it lies in the recording beside the samples, so that a replay is
-/// asked the same.
+/// What a calibration was asked for, as it comes over the control socket and lies in the recording beside the
+/// samples, so that a replay is asked the same.
 
+#include <nlohmann/json_fwd.hpp>
 #include <string>
+#include <string_view>
+#include <variant>
 #include <vector>
 
 #include "abbe/daemon/error.hpp"
+#include "abbe/daemon/evemu_acquisition.hpp"
 #include "abbe/daemon/otf_acquisition.hpp"
 #include "abbe/daemon/recording_info.hpp"
 
 namespace abbe::daemon {
 
-struct CalibrationRequest {
+struct OtfRequest {
   std::vector<AxisPosition> path_m;
+};
+
+/// One for every method.
+using CalibrationTask = std::variant<OtfRequest, EvemuRequest>;
+[[nodiscard]] std::string_view method_of(const CalibrationTask& task) noexcept;  ///< "otf", "evemu"
+
+struct CalibrationRequest {
+  CalibrationTask task;
   protocol::HostTime from{};  ///< snapshots before this instant do not belong to it
 };
 
-/// Name of the attachment; its content is JSON and keeps every bit of the numbers.
-inline constexpr std::string_view kCalibrationRequestName = "calibration-otf.json";
+/// {"method": ..., what it needs}; keeps every bit of the numbers.
+[[nodiscard]] nlohmann::json to_json(const CalibrationTask& task);
+/// BadInput naming what is missing or of the wrong type; Usage for a method nobody knows. `plan`: for what of
+/// it an evemu task does not say.
+[[nodiscard]] Result<CalibrationTask> task_from_json(const nlohmann::json& object,
+                                                     const calib::evemu::TouchPlan& plan = {});
 
+/// As an attachment of the recording: "calibration-otf.json", "calibration-evemu.json".
+[[nodiscard]] bool is_calibration_request(std::string_view attachment_name) noexcept;
 [[nodiscard]] RecordingAttachment to_attachment(const CalibrationRequest& request);
 [[nodiscard]] Result<CalibrationRequest> from_attachment(const RecordingAttachment& attachment);
 

@@ -14,7 +14,6 @@
 #include "abbe/daemon/calibration_request.hpp"
 #include "abbe/daemon/calibration_session.hpp"
 #include "abbe/daemon/model_authority.hpp"
-#include "abbe/daemon/otf_identification.hpp"
 #include "abbe/daemon/recorder_thread.hpp"
 
 namespace abbe::daemon {
@@ -28,8 +27,8 @@ class CalibrationService {
   CalibrationService(const CalibrationService&) = delete;
   CalibrationService& operator=(const CalibrationService&) = delete;
 
-  [[nodiscard]] Result<void> start_otf(std::vector<AxisPosition> path_m, const std::string& who,
-                                       protocol::HostTime now);
+  /// Refused or BadInput for a task of which no calibration could come with this configuration.
+  [[nodiscard]] Result<void> start(CalibrationTask task, const std::string& who, protocol::HostTime now);
   /// Refused without a session, and while the model is being put into the store.
   [[nodiscard]] Result<void> cancel(const std::string& who, protocol::HostTime now);
 
@@ -43,10 +42,11 @@ class CalibrationService {
 
  private:
   struct Identified {
-    OtfCandidate candidate;
+    Candidate candidate;
     std::vector<InputFile> inputs;
   };
-  void begin_identification(std::vector<RunPoint> points);
+  [[nodiscard]] Result<void> check(const CalibrationTask& task) const;
+  void begin_identification(CalibrationRun run);
   void keep(Result<Identified> identified, protocol::HostTime now);
   void conclude(Result<KeptModel> kept, protocol::HostTime now);
 

@@ -3,21 +3,25 @@
 /// and by the outcome of the identification that somebody else runs; it reads no clock and starts no thread,
 /// so live and replay go through the same states at the same recorded instants.
 ///
-///     idle ──start──▶ warming ──the run begins──▶ acquiring ──path driven──▶ identifying ──▶ judged
+///     idle ──start──▶ warming ──the run begins──▶ acquiring ──run complete──▶ identifying ──▶ judged
 ///     ──gate──▶ active
 ///                        │                            │                          │             │
 ///                        └────────────cancel, lost────┴──────data do not allow───┴───gate──────┴──▶ refused
 ///
-/// Ordinary world; not thread-safe.
+/// The same for every method; what differs is the acquisition (OtfAcquisition, EvemuAcquisition). Where
+/// people are guided from touch to touch, every new instruction is an event, too. Ordinary world; not
+/// thread-safe.
 
 #include <cstdint>
 #include <optional>
 #include <string>
 #include <string_view>
+#include <variant>
 #include <vector>
 
+#include "abbe/daemon/calibration_request.hpp"
+#include "abbe/daemon/calibration_run.hpp"
 #include "abbe/daemon/error.hpp"
-#include "abbe/daemon/otf_acquisition.hpp"
 #include "abbe/protocol/samples.hpp"
 
 namespace abbe::daemon {
@@ -27,10 +31,16 @@ enum class SessionState : std::uint8_t { Idle, Warming, Acquiring, Identifying, 
 
 struct SessionStatus {
   SessionState state = SessionState::Idle;
-  std::string reason;
+  std::string method = "otf";
+  std::string reason;     ///< why it is in this state, or what to do now
   double progress = 0.0;  ///< 0 to 1 of what the state is busy with
   std::size_t points = 0;
-  std::string model_id;  ///< of the model this session ended in, active or refused
+  std::string model_id;                         ///< of the model this session ended in, active or refused
+  std::optional<calib::evemu::NextTouch> next;  ///< of a guided acquisition
+  std::vector<std::string> notes;               ///< what was noticed, the latest kMostNotes
+  std::size_t noted = 0;                        ///< how many there were
+
+  static constexpr std::size_t kMostNotes = 50;
 };
 
 /// A change of state, to be recorded and published.
@@ -41,21 +51,21 @@ struct SessionEvent {
 
 class CalibrationSession {
  public:
-  explicit CalibrationSession(AcquisitionOptions acquisition = {}) : acquisition_options_(acquisition) {}
+  explicit CalibrationSession(AcquisitionOptions otf = {}, EvemuAcquisitionOptions evemu = {})
+      : otf_options_(otf), evemu_options_(std::move(evemu)) {}
 
-  /// Begins an on-the-fly run along `path_m`. `from`: snapshots before this instant do not belong to it.
-  /// Error::Refused while a session is running.
-  [[nodiscard]] Result<void> start(std::vector<AxisPosition> path_m, protocol::HostTime from);
+  /// Refused while a session is running; BadInput for a task that is none.
+  [[nodiscard]] Result<void> start(CalibrationRequest request);
   /// Ends a running session as refused; what was acquired stays in the recording.
   [[nodiscard]] Result<void> cancel(std::string who, protocol::HostTime now);
 
   void take(const protocol::Snapshot& snapshot);
   /// Ends an acquisition that nothing arrives for any more; `now` is host time. Live only: see
-  /// OtfAcquisition::tick().
+  /// tick() of the acquisitions.
   void tick(protocol::HostTime now);
 
   /// The acquired run, once, when the state has become Identifying.
-  [[nodiscard]] std::optional<std::vector<RunPoint>> take_run();
+  [[nodiscard]] std::optional<CalibrationRun> take_run();
 
   /// The identification is done: a model was judged, or the data did not allow one.
   void judged(std::string model_id, bool passed, std::string reason, protocol::HostTime now);
@@ -63,17 +73,22 @@ class CalibrationSession {
 
   [[nodiscard]] const SessionStatus& status() const noexcept { return status_; }
   [[nodiscard]] bool running() const noexcept;
-  [[nodiscard]] const std::vector<AxisPosition>& path_m() const noexcept { return path_m_; }
   /// Changes since the last call, in order.
   [[nodiscard]] std::vector<SessionEvent> take_events();
 
  private:
+  using Acquisition = std::variant<OtfAcquisition, EvemuAcquisition>;
+
+  [[nodiscard]] Result<Acquisition> acquisition(const CalibrationRequest& request) const;
+  [[nodiscard]] bool acquiring() const noexcept;
   void follow_acquisition(protocol::HostTime now);
+  void follow_guidance(EvemuAcquisition& touching, protocol::HostTime now);
   void enter(SessionState state, std::string reason, protocol::HostTime now);
 
-  AcquisitionOptions acquisition_options_;
-  std::vector<AxisPosition> path_m_;
-  std::optional<OtfAcquisition> acquisition_;
+  AcquisitionOptions otf_options_;
+  EvemuAcquisitionOptions evemu_options_;
+  std::vector<AxisPosition> path_m_;  ///< of an on-the-fly run
+  std::optional<Acquisition> acquisition_;
   SessionStatus status_;
   std::vector<SessionEvent> events_;
 };

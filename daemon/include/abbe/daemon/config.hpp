@@ -267,6 +267,17 @@ struct GateConfig {
   [[nodiscard]] bool accepts(std::string_view name) const;
 };
 
+/// [evemu]: calibration with a ball array.
+struct EvemuConfig {
+  std::string estimator = "bayes-pose";  ///< one of calib::evemu::estimator()
+  std::string folds = "position";        ///< one of calib::evemu::folds_by(): for lasso, mcp, scad
+  int order = 3;                         ///< of the polynomials
+  std::vector<int> positions{4, 8, 3, 7, 2, 6, 1, 5};  ///< of the array, in the order they are touched
+  std::size_t points_per_ball = 25;
+  std::size_t points_per_block = 25;
+  std::chrono::nanoseconds longest_pause{std::chrono::hours{1}};  ///< without a touch: the session ends
+};
+
 /// [control]
 struct ControlConfig {
   std::filesystem::path socket;  ///< default: runtime_dir/control.sock
@@ -291,6 +302,7 @@ struct Config {
   RecordingConfig recording;
   DdsConfig dds;
   GateConfig gate;
+  EvemuConfig evemu;
   ControlConfig control;
 
   /// What a sample of [encoder] or [counter_card] holds, in its order; empty: there is none.

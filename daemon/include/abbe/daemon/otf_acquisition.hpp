@@ -14,6 +14,7 @@
 #include <vector>
 
 #include "abbe/calib/otf/run.hpp"
+#include "abbe/daemon/acquisition_phase.hpp"
 #include "abbe/protocol/samples.hpp"
 
 namespace abbe::daemon {
@@ -54,7 +55,7 @@ struct AcquisitionOptions {
 
 class OtfAcquisition {
  public:
-  enum class Phase : std::uint8_t { WaitingAtStart, Running, Complete, Failed };
+  using Phase = AcquisitionPhase;
 
   /// `path`: vertices of the polyline, at least two. `from`: snapshots before this instant are not looked at.
   OtfAcquisition(const std::vector<AxisPosition>& path, protocol::HostTime from,

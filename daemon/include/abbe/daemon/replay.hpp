@@ -11,9 +11,9 @@
 #include <vector>
 
 #include "abbe/daemon/batch.hpp"
+#include "abbe/daemon/calibration_run.hpp"
 #include "abbe/daemon/calibration_session.hpp"
 #include "abbe/daemon/config.hpp"
-#include "abbe/daemon/otf_identification.hpp"
 #include "abbe/daemon/recording_reader.hpp"
 
 namespace abbe::daemon {
@@ -32,11 +32,11 @@ struct ReplayOptions {
 
 /// One calibration of the recording, done again.
 struct ReplayedCalibration {
-  SessionStatus ended;  ///< state Identifying: the run was complete; else why it was not
-  std::optional<Result<OtfCandidate>> outcome;  ///< of a complete run
-  std::string model_hash;                       ///< empty without a model
+  SessionStatus ended;                       ///< state Identifying: the run was complete; else why it was not
+  std::optional<Result<Candidate>> outcome;  ///< of a complete run
+  std::string model_hash;                    ///< empty without a model
   std::string model_id;
-  std::string points_sha256;
+  std::string points_sha256;  ///< of the points or touches that entered the identification
 };
 
 struct ReplayReport {

@@ -1,21 +1,17 @@
-/// `abbe calibrate otf`: asks the running daemon for a calibration and follows it to its verdict.
+#include "cli/follow_calibration.hpp"
 
 #include <fmt/format.h>
 #include <signal.h>
 
-#include <CLI/App.hpp>
 #include <CLI/Config.hpp>
 #include <CLI/Formatter.hpp>
+#include <algorithm>
 #include <chrono>
 #include <csignal>
-#include <memory>
-#include <string>
 #include <thread>
+#include <utility>
 
 #include "abbe/daemon/control_protocol.hpp"
-#include "abbe/daemon/input_files.hpp"
-#include "cli/commands.hpp"
-#include "cli/daemon_socket.hpp"
 #include "cli/terminal.hpp"
 
 namespace abbe::daemon {
@@ -26,14 +22,6 @@ using nlohmann::json;
 
 constexpr auto kLook = 200ms;  // how often a person's progress bar moves
 constexpr auto kPatienceWithoutDaemon = 5s;
-
-struct Arguments {
-  DaemonSocket where;
-  std::string path_file;
-  bool detach = false;
-  bool cancel = false;
-  bool json = false;
-};
 
 int print_verdict(const json& session, bool as_json) {
   const std::string state = session["state"];
@@ -57,16 +45,27 @@ void leave_on_interrupt() {
   ::sigaction(SIGINT, &leave, nullptr);
 }
 
-int say_how_to_cancel(const std::filesystem::path& socket) {
+int say_how_to_cancel(const std::filesystem::path& socket, const std::string& method) {
   constexpr int kInterrupted = 128 + SIGINT;  // what a shell reports
-  fmt::print(stderr, "abbe: the calibration goes on; end it with: abbe calibrate otf --cancel --socket {}\n",
-             socket.string());
+  fmt::print(stderr, "abbe: the calibration goes on; end it with: abbe calibrate {} --cancel --socket {}\n",
+             method, socket.string());
   return kInterrupted;
 }
 
-/// One line whenever the daemon is about something else: "warming: waiting for the machine to stand at ...".
+/// One line whenever the daemon is about something else: "warming: waiting for the machine to stand at ...",
+/// and one for everything it noticed meanwhile.
 class Narrator {
  public:
+  void tell_notes(ProgressBar& bar, const json& session) {
+    const auto noted = session.value("noted", std::size_t{0});
+    const json notes = session.value("notes", json::array());
+    if (noted < noted_) noted_ = 0;  // another session
+    const std::size_t fresh = std::min(noted - noted_, notes.size());
+    if (fresh > 0) bar.clear();
+    for (std::size_t i = notes.size() - fresh; i < notes.size(); ++i)
+      fmt::print(stderr, "  {}\n", notes[i].get<std::string>());
+    noted_ = noted;
+  }
   void tell(ProgressBar& bar, const std::string& state, const std::string& reason) {
     std::string line = fmt::format("{}: {}", state, reason);
     if (line == told_) return;
@@ -77,9 +76,10 @@ class Narrator {
 
  private:
   std::string told_;
+  std::size_t noted_ = 0;
 };
 
-int follow(const std::filesystem::path& socket, bool as_json) {
+int follow(const std::filesystem::path& socket, const std::string& method, bool as_json) {
   leave_on_interrupt();
   ProgressBar bar;
   Narrator narrator;
@@ -87,7 +87,7 @@ int follow(const std::filesystem::path& socket, bool as_json) {
   for (;; std::this_thread::sleep_for(kLook)) {
     if (interrupted != 0) {
       bar.clear();
-      return say_how_to_cancel(socket);
+      return say_how_to_cancel(socket, method);
     }
     const auto status = ask_daemon(socket, {{"do", "status"}});
     const auto now = std::chrono::steady_clock::now();
@@ -99,6 +99,7 @@ int follow(const std::filesystem::path& socket, bool as_json) {
     answered = now;
     const json& session = (*status)["session"];
     const std::string state = session["state"];
+    narrator.tell_notes(bar, session);
     if (state == "active" || state == "refused" || state == "idle") {
       bar.clear();
       return print_verdict(session, as_json);
@@ -108,43 +109,31 @@ int follow(const std::filesystem::path& socket, bool as_json) {
   }
 }
 
-int cancel(const std::filesystem::path& socket) {
-  const auto answer = ask_daemon(socket, {{"do", "cancel"}, {"who", user_name()}});
+}  // namespace
+
+void add_follow_options(CLI::App& command, FollowOptions& options, CLI::Option* excluded) {
+  add_socket_options(command, options.where);
+  command.add_flag("--detach", options.detach, "return as soon as the daemon waits for the machine");
+  command.add_flag("--cancel", options.cancel, "end the calibration that is running")->excludes(excluded);
+  command.add_flag("--json", options.json, "the verdict as JSON");
+}
+
+int cancel_calibration(const FollowOptions& options) {
+  const auto socket = socket_path(options.where);
+  if (!socket) return report(socket.error());
+  const auto answer = ask_daemon(*socket, {{"do", "cancel"}, {"who", user_name()}});
   return answer ? 0 : report(answer.error());
 }
 
-int calibrate(const Arguments& arguments) {
-  const auto socket = socket_path(arguments.where);
+int run_calibration(const FollowOptions& options, json task) {
+  const auto socket = socket_path(options.where);
   if (!socket) return report(socket.error());
-  if (arguments.cancel) return cancel(*socket);
-  const auto path = read_path_csv(arguments.path_file);
-  if (!path) return report(path.error());
-  const auto started = ask_daemon(
-      *socket, {{"do", "calibrate"}, {"method", "otf"}, {"path_m", path->vertices_m}, {"who", user_name()}});
+  const auto method = task.at("method").get<std::string>();
+  task["do"] = "calibrate";
+  task["who"] = user_name();
+  const auto started = ask_daemon(*socket, task);
   if (!started) return report(started.error());
-  return arguments.detach ? 0 : follow(*socket, arguments.json);
-}
-
-}  // namespace
-
-void add_calibrate_otf(CLI::App& parent, int& exit) {
-  auto arguments = std::make_shared<Arguments>();
-  auto* command =
-      parent.add_subcommand("otf",
-                            "On the fly with a laser tracker: waits until the machine stands at "
-                            "the first vertex, then drive the path.\n"
-                            "Ctrl-C ends the looking on (exit code 130), --cancel the calibration.");
-  auto* path =
-      command->add_option("--path", arguments->path_file, "the path the machine will drive: x_mm,y_mm,z_mm");
-  add_socket_options(*command, arguments->where);
-  command->add_flag("--detach", arguments->detach, "return as soon as the daemon waits for the machine");
-  command->add_flag("--cancel", arguments->cancel, "end the calibration that is running")->excludes(path);
-  command->add_flag("--json", arguments->json, "the verdict as JSON");
-  command->callback([arguments, &exit] {
-    exit = arguments->path_file.empty() && !arguments->cancel
-               ? report({ErrorCode::Usage, "calibrate otf: --path is needed", {}})
-               : calibrate(*arguments);
-  });
+  return options.detach ? 0 : follow(*socket, method, options.json);
 }
 
 }  // namespace abbe::daemon

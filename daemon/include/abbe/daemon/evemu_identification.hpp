@@ -1,0 +1,29 @@
+#pragma once
+/// Touches of a ball array become a judged model: observe, solve, judge in a row, with the estimator of
+/// [evemu], the same for a live session and its replay. Pure and deterministic. A tenth of a second with the
+/// default estimator, seconds with lasso, mcp, scad; runs on a thread of its own in the daemon.
+
+#include "abbe/calib/evemu/judge.hpp"
+#include "abbe/daemon/config.hpp"
+#include "abbe/daemon/error.hpp"
+#include "abbe/daemon/evemu_acquisition.hpp"
+
+namespace abbe::daemon {
+
+struct EvemuCandidate {
+  calib::evemu::Observations observations;
+  calib::evemu::Solution solution;
+  calib::Verdict verdict;
+};
+
+/// `active` may be null. DataInsufficient or BadInput, with what is wrong with the touches, by position and
+/// number. A run without rotation reference is judged "shape only" unless [gate] accepts that by name.
+[[nodiscard]] Result<EvemuCandidate> identify_touches(const EvemuRun& run, const Config& config,
+                                                      const calib::VolumetricModel* active);
+
+[[nodiscard]] calib::evemu::TouchPlan touch_plan(const EvemuConfig& config);
+/// Refused or BadInput if no touches would come of it: no probe, or a machine that has corrected them.
+[[nodiscard]] Result<void> check_evemu(const EvemuRequest& request, const Config& config);
+[[nodiscard]] EvemuAcquisitionOptions evemu_acquisition_options(const Config& config);
+
+}  // namespace abbe::daemon

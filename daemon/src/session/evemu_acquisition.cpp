@@ -1,0 +1,126 @@
+#include "abbe/daemon/evemu_acquisition.hpp"
+
+#include <fmt/format.h>
+
+#include <array>
+#include <utility>
+
+#include "abbe/daemon/otf_inputs.hpp"
+
+namespace abbe::daemon {
+namespace {
+
+namespace evemu = calib::evemu;
+using protocol::HostTime;
+using protocol::TouchFlag;
+
+constexpr unsigned kXyz = 0b111;
+
+/// Why a touch is not used; empty: it is.
+std::string_view fault_of(const protocol::Snapshot& touch) {
+  const auto flags = touch.trigger.touch_flags;
+  static constexpr std::array<std::pair<TouchFlag, std::string_view>, 6> kFaults{
+      {{TouchFlag::NoPosition, "scans around it were lost, it has no position"},
+       {TouchFlag::Refused, "the measuring machine warned about it"},
+       {TouchFlag::SpeedTooLow, "the approach was slower than the probe is qualified for"},
+       {TouchFlag::SpeedTooHigh, "the approach was faster than the probe is qualified for"},
+       {TouchFlag::SpeedUnsteady, "the speed of the approach changed"},
+       {TouchFlag::LatchRefused, "the latched clock contradicts the scans"}}};
+  for (const auto& [flag, text] : kFaults) {
+    if (has(flags, flag)) return text;
+  }
+  if (touch.axis_count < 3 || (touch.missing_mask & kXyz) != 0) return "an axis was not known";
+  return {};
+}
+
+}  // namespace
+
+Result<EvemuAcquisition> EvemuAcquisition::create(EvemuRequest request, HostTime from,
+                                                  EvemuAcquisitionOptions options) {
+  auto guide = evemu::TouchGuide::create(request.calibrator, request.plan);
+  if (!guide) return tl::unexpected(error_of(guide.error()));
+  return EvemuAcquisition{std::move(request), std::move(*guide), from, std::move(options)};
+}
+
+EvemuAcquisition::EvemuAcquisition(EvemuRequest request, evemu::TouchGuide guide, HostTime from,
+                                   EvemuAcquisitionOptions options)
+    : request_(std::move(request)),
+      guide_(std::move(guide)),
+      from_(from),
+      options_(std::move(options)),
+      last_touch_(from) {
+  say_what_comes_next();
+}
+
+double EvemuAcquisition::progress() const noexcept {
+  return phase_ == Phase::Complete
+             ? 1.0
+             : static_cast<double>(guide_.taken()) / static_cast<double>(guide_.planned());
+}
+
+std::optional<evemu::NextTouch> EvemuAcquisition::next() const {
+  if (phase_ == Phase::Complete || phase_ == Phase::Failed) return std::nullopt;
+  return guide_.next();
+}
+
+void EvemuAcquisition::take(const protocol::Snapshot& snapshot) {
+  if (!snapshot.has_trigger || snapshot.head.time < from_) return;
+  if (phase_ == Phase::Complete || phase_ == Phase::Failed) return;
+  last_touch_ = snapshot.head.time;
+  if (phase_ == Phase::Running && options_.zero_is_lost_by_restart &&
+      has(snapshot.head.flags, protocol::SampleFlag::Restarted)) {
+    phase_ = Phase::Failed;
+    reason_ = fmt::format("{} touch {}: its device began anew, positions have another zero since",
+                          options_.device, snapshot.trigger.touch);
+    return;
+  }
+  if (!usable(snapshot)) return;
+  const calib::Vector3 reading_m{snapshot.position[0], snapshot.position[1], snapshot.position[2]};
+  for (const std::string& text : guide_.take(reading_m).notes) note(snapshot, text);
+  if (guide_.taken() > 0 && phase_ == Phase::WaitingAtStart) phase_ = Phase::Running;
+  if (const auto& failure = guide_.failure()) {
+    phase_ = Phase::Failed;
+    reason_ = failure->text;
+  } else if (guide_.complete()) {
+    phase_ = Phase::Complete;
+    reason_ = fmt::format("{} touches at {} positions", guide_.taken(), request_.plan.positions.size());
+  } else {
+    say_what_comes_next();
+  }
+}
+
+bool EvemuAcquisition::usable(const protocol::Snapshot& touch) {
+  const auto fault = fault_of(touch);
+  if (fault.empty()) return true;
+  const auto next = guide_.next();
+  note(touch, fmt::format("not used: {}; expected: {}", fault, evemu::name(next.on)));
+  return false;
+}
+
+void EvemuAcquisition::note(const protocol::Snapshot& touch, const std::string& what) {
+  notes_.push_back(fmt::format("{} touch {}: {}", options_.device, touch.trigger.touch, what));
+}
+
+void EvemuAcquisition::say_what_comes_next() {
+  const auto next = guide_.next();
+  reason_ = fmt::format("position {} ({} of {}): touch {}, {} points", next.position, next.place + 1,
+                        request_.plan.positions.size(), evemu::name(next.on), next.points);
+}
+
+void EvemuAcquisition::tick(HostTime now) {
+  if (phase_ == Phase::Complete || phase_ == Phase::Failed || now - last_touch_ <= options_.longest_pause)
+    return;
+  phase_ = Phase::Failed;
+  reason_ = fmt::format("no touch for {:.0f} s; {}", std::chrono::duration<double>(now - last_touch_).count(),
+                        reason_);
+}
+
+std::vector<std::string> EvemuAcquisition::take_notes() {
+  return std::exchange(notes_, {});
+}
+
+EvemuRun EvemuAcquisition::release() {
+  return {std::move(request_), guide_.touches()};
+}
+
+}  // namespace abbe::daemon

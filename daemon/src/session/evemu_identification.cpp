@@ -1,0 +1,74 @@
+#include "abbe/daemon/evemu_identification.hpp"
+
+#include <utility>
+
+#include "abbe/daemon/evemu_files.hpp"
+#include "abbe/daemon/otf_inputs.hpp"
+
+namespace abbe::daemon {
+namespace {
+
+namespace evemu = calib::evemu;
+
+evemu::JudgeOptions judge_options(const Config& config) {
+  evemu::JudgeOptions options;
+  options.limits = gate_limits(config.gate);
+  options.accept_shape_only = config.gate.accepts(evemu::kShapeOnly);
+  // Both words were checked when the configuration was read.
+  options.solve.estimator = evemu::estimator(config.evemu.estimator).value_or(evemu::Estimator::BayesPose);
+  options.solve.sparse.folds = evemu::folds_by(config.evemu.folds).value_or(evemu::FoldsBy::Position);
+  return options;
+}
+
+}  // namespace
+
+evemu::TouchPlan touch_plan(const EvemuConfig& config) {
+  return {config.positions, config.points_per_ball, config.points_per_block};
+}
+
+EvemuAcquisitionOptions evemu_acquisition_options(const Config& config) {
+  EvemuAcquisitionOptions options{.longest_pause = config.evemu.longest_pause};
+  if (config.probe) options.device = config.probe->name;
+  if (config.cmm) options.device = config.cmm->name;
+  options.zero_is_lost_by_restart = config.probe && !config.reference;
+  return options;
+}
+
+Result<void> check_evemu(const EvemuRequest& request, const Config& config) {
+  if (!config.probe && !config.cmm) {
+    return fail(ErrorCode::Refused,
+                "calibrate evemu: neither [probe] nor [cmm] is in the configuration: no touches would come");
+  }
+  if (config.cmm && config.cmm->axes_compensated) {
+    return fail(ErrorCode::Refused,
+                "calibrate evemu: the measuring machine corrects what it reports ([cmm] axes_compensated = "
+                "true): switch that off first, and say so in the configuration");
+  }
+  if (const auto machine = evemu_machine(config.machine); !machine) return tl::unexpected(machine.error());
+  const auto guide = evemu::TouchGuide::create(request.calibrator, request.plan);
+  if (!guide) return fail(ErrorCode::BadInput, "calibrate evemu: " + guide.error().text);
+  return {};
+}
+
+Result<EvemuCandidate> identify_touches(const EvemuRun& run, const Config& config,
+                                        const calib::VolumetricModel* active) {
+  const auto machine = evemu_machine(config.machine);
+  if (!machine) return tl::unexpected(machine.error());
+  evemu::ObserveOptions observing;
+  observing.order = config.evemu.order;
+  observing.positions = static_cast<int>(run.asked.plan.positions.size());
+  auto observations = evemu::observe(run.touches, run.asked.calibrator, *machine, observing);
+  if (!observations) return tl::unexpected(error_of(observations.error()));
+  const evemu::JudgeOptions judging = judge_options(config);
+  auto solution = evemu::solve(*observations, judging.solve);
+  if (solution && run.asked.reference) {
+    const auto& [points, sigma_m] = *run.asked.reference;
+    solution = evemu::with_rotation_reference(std::move(*solution), {points, sigma_m});
+  }
+  if (!solution) return tl::unexpected(error_of(solution.error()));
+  auto verdict = evemu::judge(*observations, *solution, active, judging);
+  if (!verdict) return tl::unexpected(error_of(verdict.error()));
+  return EvemuCandidate{std::move(*observations), std::move(*solution), std::move(*verdict)};
+}
+
+}  // namespace abbe::daemon

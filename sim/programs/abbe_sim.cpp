@@ -35,7 +35,8 @@ int run(int argc, char** argv) {
   CLI::App app{"Simulated machine tool, laser tracker and encoders with errors that are known", "abbe-sim"};
   app.require_subcommand(1);
   app.footer(kFooter);
-  const std::vector<Subcommand> commands{add_run(app), add_truth(app), add_machine(app), add_replay(app)};
+  const std::vector<Subcommand> commands{add_run(app), add_truth(app), add_machine(app), add_replay(app),
+                                         add_evemu(app)};
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& e) {

@@ -27,6 +27,7 @@ struct Subcommand {
 [[nodiscard]] Subcommand add_truth(CLI::App& app);
 [[nodiscard]] Subcommand add_machine(CLI::App& app);
 [[nodiscard]] Subcommand add_replay(CLI::App& app);
+[[nodiscard]] Subcommand add_evemu(CLI::App& app);
 
 /// "abbe-sim: " and the text on stderr; the exit code for it.
 int report(const Error& error);

@@ -199,6 +199,28 @@ void read_probe(TomlSection section, SimulationSetup& simulation) {
   simulation.surface = surface;
 }
 
+void read_count(TomlSection& section, std::string_view key, std::size_t& value) {
+  constexpr std::int64_t kMost = 1000;
+  std::int64_t count = 0;
+  if (section.integer(key, count, 1, kMost)) value = static_cast<std::size_t>(count);
+}
+
+/// What abbe-sim evemu plays.
+void read_sim_evemu(TomlSection section, LoadedSetup& setup) {
+  TouchingOptions& touching = setup.touching;
+  read_count(section, "points_per_ball", touching.points_per_ball);
+  read_count(section, "points_per_block", touching.points_per_block);
+  section.number("probing_mm_per_s", touching.probing_m_per_s, kMilli, kPositiveNumber);
+  section.number("travel_mm_per_s", touching.travel_m_per_s, kMilli, kPositiveNumber);
+  section.number("noise_um", touching.noise_m, kMicro, kNotNegativeNumber);
+  section.number("delay_us", touching.delay_s, kMicro, kNotNegativeNumber);
+  section.number("jitter_us", touching.jitter_s, kMicro, kNotNegativeNumber);
+  section.number("sag_um", setup.weak_stiffness.sag_m, kMicro);
+  section.number("periodic_um", setup.weak_stiffness.periodic_m, kMicro);
+  section.number("period_mm", setup.weak_stiffness.period_m, kMilli, kPositiveNumber);
+  section.refuse_unknown_keys();
+}
+
 /// The tables the daemon reads too. Keys that only it knows are none of ours.
 void read_machine_tables(TomlSection root, Draft& draft) {
   SimulationSetup& simulation = draft.setup.simulation;
@@ -330,6 +352,7 @@ void read_sim(TomlSection sim, const std::string& file, Draft& draft) {
   encoder.refuse_unknown_keys();
   read_environment(sim, simulation.environment);
   read_sim_counter_card(sim.child("counter_card"), simulation);
+  read_sim_evemu(sim.child("evemu"), draft.setup);
   read_probe(sim.child("probe"), simulation);
   read_faults(sim, simulation.faults);
   sim.refuse_unknown_keys();

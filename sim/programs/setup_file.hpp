@@ -8,6 +8,8 @@
 #include <string>
 
 #include "abbe/sim/simulation.hpp"
+#include "abbe/sim/touching.hpp"
+#include "abbe/sim/weak_stiffness.hpp"
 
 namespace CLI {
 class App;
@@ -36,6 +38,8 @@ struct SetupChoices {
 
 struct LoadedSetup {
   SimulationSetup simulation;
+  TouchingOptions touching;             ///< [sim.evemu]
+  WeakStiffnessOptions weak_stiffness;  ///< [sim.evemu]
   double speed = 1.0;
 };
 

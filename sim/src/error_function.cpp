@@ -2,7 +2,9 @@
 
 #include <algorithm>
 #include <cassert>
+#include <cmath>
 #include <cstddef>
+#include <numbers>
 #include <utility>
 
 namespace abbe::sim {
@@ -35,8 +37,32 @@ ErrorFunction::ErrorFunction(std::vector<double> nodes_m, std::vector<double> va
   if (shape_ == Shape::Cubic) curvature_ = natural_curvature(nodes_m_, values_);
 }
 
+ErrorFunction ErrorFunction::polynomial(std::vector<double> coefficients) {
+  ErrorFunction f;
+  f.coefficients_ = std::move(coefficients);
+  return f;
+}
+
+ErrorFunction ErrorFunction::with_wave(double amplitude, double period_m) const {
+  ErrorFunction f = *this;
+  f.wave_amplitude_ = amplitude;
+  f.wave_period_m_ = period_m;
+  return f;
+}
+
 double ErrorFunction::at(double position_m) const {
-  if (nodes_m_.empty()) return 0.0;
+  double value = nodes_m_.empty() ? 0.0 : between_nodes(position_m);
+  double power = 1.0;
+  for (const double c : coefficients_) {
+    value += c * power;
+    power *= position_m;
+  }
+  if (wave_amplitude_ != 0.0)
+    value += wave_amplitude_ * std::sin(2.0 * std::numbers::pi * position_m / wave_period_m_);
+  return value;
+}
+
+double ErrorFunction::between_nodes(double position_m) const {
   const auto above = std::upper_bound(nodes_m_.begin() + 1, nodes_m_.end() - 1, position_m);
   const auto k = static_cast<std::size_t>(above - nodes_m_.begin()) - 1;
   const double h = nodes_m_[k + 1] - nodes_m_[k];

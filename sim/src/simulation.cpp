@@ -8,6 +8,7 @@ namespace abbe::sim {
 Simulation::Simulation(TruthMachine truth, PathMotion path, const SimulationSetup& setup)
     : machine_(std::move(truth), std::move(path)),
       start_when_streaming_(setup.start_when_streaming),
+      held_(setup.held),
       standstill_(setup.standstill),
       faults_(setup.faults) {
   std::stable_sort(faults_.begin(), faults_.end(),
@@ -43,13 +44,14 @@ Result<std::unique_ptr<Simulation>> Simulation::open(const SimulationSetup& setu
     const auto edges = edge_times_s(*setup.surface, simulation->machine_.path());
     simulation->edges_s_.assign(edges.begin(), edges.end());
   }
-  if (!setup.start_when_streaming) simulation->machine_.start(now + setup.standstill);
+  simulation->edges_s_.insert(simulation->edges_s_.end(), setup.edges_s.begin(), setup.edges_s.end());
+  if (!setup.start_when_streaming && !setup.held) simulation->machine_.start(now + setup.standstill);
   return simulation;
 }
 
 void Simulation::poll(HostTime now) {
   if (tracker_) tracker_->poll(now);
-  start_machine();
+  start_machine(now);
   touch(now);
   inject_faults(now);
   if (bus_) bus_->poll(now);
@@ -57,9 +59,18 @@ void Simulation::poll(HostTime now) {
   for (UsbipServer& card : counter_cards_) card.poll(now);
 }
 
-void Simulation::start_machine() {
-  if (machine_.started() || !start_when_streaming_ || !tracker_) return;
-  if (const auto streaming = tracker_->device().first_stream()) machine_.start(*streaming + standstill_);
+void Simulation::start_machine(HostTime now) {
+  if (machine_.started() || !start_when_streaming_ || held_) return;
+  if (tracker_) {
+    if (const auto streaming = tracker_->device().first_stream()) machine_.start(*streaming + standstill_);
+  } else if (!counter_cards_.empty() && counter_cards_.front().card().scanning()) {
+    machine_.start(now + standstill_);
+  }
+}
+
+void Simulation::let_go(HostTime now) {
+  held_ = false;
+  machine_.start(now + standstill_);
 }
 
 /// The card must know of an edge before it makes the scan that shows it.

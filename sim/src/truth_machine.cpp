@@ -39,6 +39,12 @@ Eigen::Isometry3d carriage(const TruthMachine& truth, Axis axis, double q_m,
   return T;
 }
 
+double sag_at_m(double sag_m, const Eigen::Vector3d& q_m) {
+  constexpr double kMiddle_m = 0.25, kWidth_m = 0.15, kRoot = 0.5;
+  const double u = (q_m.x() - kMiddle_m) / kWidth_m;
+  return sag_m * std::exp(-u * u) * (kRoot + q_m.y());
+}
+
 }  // namespace
 
 double ThermalDrift::heat_after(double elapsed_s) const {
@@ -51,6 +57,7 @@ Eigen::Vector3d position_m(const TruthMachine& truth, const Eigen::Vector3d& q_m
   for (auto it = truth.order.rbegin(); it != truth.order.rend(); ++it) {
     p = carriage(truth, *it, q_m[static_cast<Eigen::Index>(*it)], condition) * p;
   }
+  if (truth.sag_m != 0.0) p.z() -= sag_at_m(truth.sag_m, q_m);
   return p;
 }
 

@@ -1,7 +1,7 @@
 #pragma once
 /// One true error motion as a function of the position of its axis: values on nodes, joined by straight lines
-/// or by a natural cubic spline. Outside the nodes the formula of the last cell goes on. Pure; safe to share
-/// between threads.
+/// or by a natural cubic spline; or a polynomial; and a wave on top of either. Outside the nodes the formula
+/// of the last cell goes on. Pure; safe to share between threads.
 
 #include <span>
 #include <vector>
@@ -17,6 +17,11 @@ class ErrorFunction {
   /// `nodes_m` ascending, at least two, one value each (m for translations, rad for rotations); asserted.
   ErrorFunction(std::vector<double> nodes_m, std::vector<double> values, Shape shape = Shape::Linear);
 
+  /// sum of coefficient[k] position^k, SI. Has no nodes.
+  [[nodiscard]] static ErrorFunction polynomial(std::vector<double> coefficients);
+  /// The same and amplitude sin(2 pi position / period).
+  [[nodiscard]] ErrorFunction with_wave(double amplitude, double period_m) const;
+
   [[nodiscard]] double at(double position_m) const;
 
   [[nodiscard]] std::span<const double> nodes_m() const { return nodes_m_; }
@@ -25,10 +30,15 @@ class ErrorFunction {
   [[nodiscard]] ErrorFunction with_values(std::vector<double> values) const;
 
  private:
+  [[nodiscard]] double between_nodes(double position_m) const;
+
   std::vector<double> nodes_m_;
   std::vector<double> values_;
   std::vector<double> curvature_;  ///< second derivatives at the nodes; empty when linear
   Shape shape_ = Shape::Linear;
+  std::vector<double> coefficients_;
+  double wave_amplitude_ = 0.0;
+  double wave_period_m_ = 1.0;
 };
 
 }  // namespace abbe::sim

@@ -22,7 +22,8 @@ namespace abbe::sim {
 struct SimulationSetup {
   TruthMachine truth;
   PathPlan path;
-  bool start_when_streaming = true;  ///< else the machine starts by itself
+  bool start_when_streaming = true;  ///< tracker, or without one the first counter card; else by itself
+  bool held = false;                 ///< not before let_go()
   std::chrono::nanoseconds standstill =
       std::chrono::seconds{2};  ///< before the motion, from the first point or from the start
   std::optional<TrackerOptions> tracker;
@@ -32,6 +33,7 @@ struct SimulationSetup {
   std::vector<ModbusServerOptions> environment;
   std::vector<CounterCardSetup> counter_cards;
   std::optional<TouchedSurface> surface;  ///< touched by the probe on the first card
+  std::vector<double> edges_s;  ///< further edges of that probe, s from the start of the motion, ascending
   std::vector<ScheduledFault> faults;
 };
 
@@ -41,6 +43,8 @@ class Simulation {
   [[nodiscard]] static Result<std::unique_ptr<Simulation>> open(const SimulationSetup& setup, HostTime now);
 
   void poll(HostTime now);
+  /// Whoever held the machine waits no longer.
+  void let_go(HostTime now);
   [[nodiscard]] HostTime next_due() const;
   /// What to wait for besides the time.
   void add_poll_fds(std::vector<pollfd>& fds) const;
@@ -54,7 +58,7 @@ class Simulation {
 
  private:
   Simulation(TruthMachine truth, PathMotion path, const SimulationSetup& setup);
-  void start_machine();
+  void start_machine(HostTime now);
   void touch(HostTime now);
   void inject_faults(HostTime now);
   void inject_environment(const Fault& fault, HostTime now);
@@ -62,6 +66,7 @@ class Simulation {
 
   VirtualMachine machine_;
   bool start_when_streaming_;
+  bool held_;
   std::chrono::nanoseconds standstill_;
   std::optional<TrackerServer> tracker_;
   std::optional<EncoderBus> bus_;

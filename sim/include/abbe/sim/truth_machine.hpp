@@ -66,6 +66,9 @@ struct TruthMachine {
   std::array<AxisTruth, 3> axes;                         ///< by Axis, not by order
   Squareness squareness;
   ThermalDrift thermal;
+  /// Sag under a travelling weight, which no motion of one axis is: the target sinks by sag exp(-((x - 250
+  /// mm) / 150 mm)^2) (0.5 + y), x and y in m.
+  double sag_m = 0.0;
   Eigen::Vector3d target_offset_m = Eigen::Vector3d::Zero();
 
   [[nodiscard]] AxisTruth& axis(Axis a) { return axes[static_cast<std::size_t>(a)]; }

@@ -1,0 +1,66 @@
+#pragma once
+/// A ball array touched on a machine with errors: the path the machine drives, and when its probe makes
+/// contact. The tip meets the true surfaces; the scales read what they read there. The program of the machine
+/// knows where the array stands: every approach is along the true normal of the surface. The machine drives
+/// on through the surface; pre-travel and bending are not simulated, nor is what stands in the way between
+/// two touches. Pure; deterministic from the seed.
+
+#include <cstdint>
+#include <set>
+#include <vector>
+
+#include "abbe/sim/ball_array.hpp"
+#include "abbe/sim/path_motion.hpp"
+#include "abbe/sim/truth_machine.hpp"
+
+namespace abbe::sim {
+
+struct TouchingOptions {
+  std::vector<int> positions{4, 8, 3, 7, 2, 6, 1, 5};  ///< in the order they are touched
+  std::size_t points_per_ball = 25;
+  std::size_t points_per_block = 25;
+  double approach_m = 1e-3;  ///< at probing speed before the surface ...
+  double beyond_m = 0.3e-3;  ///< ... and behind it
+  double probing_m_per_s = 5e-3;
+  double retract_m_per_s = 20e-3;
+  double travel_m_per_s = 0.2;
+  double acceleration_m_per_s2 = 1.0;
+  double noise_m = 3e-6;   ///< of machine and probe along the approach, from touch to touch
+  double delay_s = 5e-6;   ///< from contact to the edge
+  double jitter_s = 1e-6;  ///< its standard deviation from touch to touch
+  std::uint64_t seed = 1;
+  // Misbehaviour, by number of the touch in the program, from 0.
+  std::set<std::size_t> missed;   ///< the probe is silent
+  std::set<std::size_t> doubled;  ///< made twice in the same place
+  std::set<std::size_t> stray;    ///< before it, one in the air 40 mm away
+};
+
+/// One probing movement: a leg of the path with the surface it goes for.
+struct ProbingMove {
+  std::size_t leg = 0;                                 ///< of the path
+  Eigen::Vector3d place_m = Eigen::Vector3d::Zero();   ///< on the surface, true
+  Eigen::Vector3d normal = Eigen::Vector3d::UnitZ();   ///< there, outward
+  Eigen::Vector3d centre_m = Eigen::Vector3d::Zero();  ///< of the ball
+  double radius_m = 0.0;                               ///< of the ball; 0: a face
+  enum class Kind : std::uint8_t { Contact, Silent, InTheAir } kind = Kind::Contact;
+};
+
+struct TouchingProgram {
+  PathPlan path;
+  std::vector<ProbingMove> moves;
+};
+
+/// The whole procedure, from reading 0 of every axis: at every position ball 1, block 1, block 2, then ball 2
+/// to the last.
+[[nodiscard]] TouchingProgram plan_touching(const TruthMachine& truth, const BallArray& array,
+                                            const TouchingOptions& options);
+
+/// When the probe's edges come, s from the start of the motion, ascending. `path` is that of the program.
+[[nodiscard]] std::vector<double> edge_times_s(const TouchingProgram& program, const TruthMachine& truth,
+                                               const PathMotion& path, double tip_radius_m,
+                                               const TouchingOptions& options);
+
+/// The scale reading at which the tip's centre truly is at `place_m` (of a machine without target offset).
+[[nodiscard]] Eigen::Vector3d reading_at_m(const TruthMachine& truth, const Eigen::Vector3d& place_m);
+
+}  // namespace abbe::sim

@@ -1,0 +1,119 @@
+#include "touching_run.hpp"
+
+#include <fmt/format.h>
+
+namespace abbe::test {
+namespace {
+
+using nlohmann::json;
+
+constexpr const char* kMachine = R"([machine]
+name = "weak"
+chain = "[w b Z X Y t]"
+[axes.X]
+min_mm = -150
+max_mm = 650
+[axes.Y]
+min_mm = -150
+max_mm = 400
+[axes.Z]
+min_mm = -50
+max_mm = 150
+[target]
+offset_mm = [0, 0, 0]
+[model]
+node_spacing_mm = 50
+[counter_card]
+transport = "usbip"
+serial_number = "01ABBE08"
+clock_MHz = 1
+scan_rate_hz = 500
+latch_channel = 6
+)";
+
+constexpr const char* kAxes = R"(axes = [
+  { axis = "X", channel = 0, step_nm = 10 },
+  { axis = "Y", channel = 1, step_nm = 10 },
+  { axis = "Z", channel = 2, step_nm = 10 },
+]
+)";
+
+constexpr const char* kSimulator = R"([sim]
+machine = "machine.toml"
+seed = 3
+speed = {speed}
+[sim.evemu]
+points_per_ball = 6
+points_per_block = 5
+)";
+
+constexpr const char* kDaemon = R"([evemu]
+points_per_ball = 6
+points_per_block = 5
+[daemon]
+data_dir = "data"
+runtime_dir = "run"
+simulated = true
+speed = {speed}
+realtime = "ignore"
+[recording]
+min_free_MB = 1
+chunk_kB = 16
+[dds]
+supervise = "{dds}"
+domain = {domain}
+profile = "{profile}"
+)";
+
+}  // namespace
+
+TouchingRun::TouchingRun() {
+  write("machine.toml", fmt::format("{}{}", kMachine, kAxes));
+  write("sim.toml", fmt::format(kSimulator, fmt::arg("speed", ABBE_SPINE_SPEED)));
+}
+
+void TouchingRun::start_touching_simulator(const std::vector<std::string>& more) {
+  std::vector<std::string> command{
+      ABBE_SIM_PROGRAM,        "evemu",        "--config",        file("sim.toml"),
+      "--start-on-signal",     "--ports-file", file("ports"),     "--calibrator-out",
+      file("calibrator.toml"), "--truth-out",  file("truth.csv"), "--reference-out",
+      file("reference.csv")};
+  command.insert(command.end(), more.begin(), more.end());
+  simulator_ = start(std::move(command), "sim");
+  ASSERT_TRUE(
+      eventually([this] { return std::filesystem::exists(file("ports")) || !simulator_->running(); }));
+  const std::string ports = text_of(file("ports")), key = "usbip_port=";
+  const auto at = ports.find(key);
+  ASSERT_NE(at, std::string::npos) << simulator_->err();
+  usbip_port_ = std::stoi(ports.substr(at + key.size()));
+}
+
+void TouchingRun::write_touching_configuration(const std::string& gate, const std::string& dds,
+                                               const std::string& probe) const {
+  write("abbed.toml",
+        kMachine + fmt::format("port = {}\n", usbip_port_) + kAxes + probe + "[gate]\n" + gate +
+            fmt::format(kDaemon, fmt::arg("speed", ABBE_SPINE_SPEED), fmt::arg("dds", dds),
+                        fmt::arg("domain", domain_.text()), fmt::arg("profile", ABBE_LOOPBACK_PROFILE)));
+}
+
+std::vector<std::string> TouchingRun::calibrate_command(const std::string& calibrator) const {
+  return {ABBE_PROGRAM, "calibrate", "evemu", "-c", file("abbed.toml"), "--calibrator", file(calibrator)};
+}
+
+Outcome TouchingRun::calibrate_touching(const std::string& calibrator) const {
+  Program calibration(calibrate_command(calibrator), directory_ / "calibrate");
+  EXPECT_TRUE(eventually([&] {
+    const json now = session();
+    return !calibration.running() || (now.is_object() && now["state"] == "warming");
+  }));
+  let_machine_go();
+  const int code = calibration.wait_for_end();
+  return {code, calibration.out(), calibration.err()};
+}
+
+json TouchingRun::session() const {
+  const json now = status();
+  return now.is_object() ? now["session"] : json();
+}
+
+}  // namespace abbe::test

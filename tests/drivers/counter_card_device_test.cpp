@@ -111,6 +111,20 @@ TEST(CounterCardDevice, RecoversFromAnOverrunKeepsPositionsAndMarksTheGap) {
   EXPECT_EQ(bench.device->status().faults, 1u);
 }
 
+TEST(CounterCardDevice, NoticesADeafCardWithinItsSilenceAlsoWhileItsStatusIsAwaited) {
+  CardBench bench;
+  ASSERT_TRUE(bench.streams());
+  for (const auto phase : {0ms, 30ms, 60ms, 90ms}) {  // of the status question
+    bench.turns_for(500ms + phase);
+    const auto before = bench.device->status().faults;
+    bench.server.inject({.kind = sim::FaultKind::Mute, .duration_s = 0.2}, bench.time.now());
+    EXPECT_TRUE(bench.until([&] { return bench.device->status().faults > before; },
+                            drivers::CounterCardSessionOptions{}.silence + 4 * CardBench::kTurn));
+    EXPECT_THAT(bench.device->status().last_fault, HasSubstr("no scans for 90 ms"));
+    ASSERT_TRUE(bench.until([&] { return bench.device->status().state == "streaming"; }));
+  }
+}
+
 TEST(CounterCardDevice, MarksScansThatTheCardLost) {
   CardBench bench;
   ASSERT_TRUE(bench.streams());

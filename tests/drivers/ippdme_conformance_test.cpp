@@ -11,7 +11,7 @@ class FaultyMeasuringMachine {
  public:
   static constexpr std::chrono::nanoseconds kTurn = 100ms;  // no server reports more often
   static constexpr std::chrono::nanoseconds kSilenceLimit = 3s;
-  static constexpr std::chrono::nanoseconds kRecoveryLimit = 30s;  // longest pause 10 s, two turns a command
+  static constexpr std::chrono::nanoseconds kRecoveryLimit = 30s;  // two turns a command
   static constexpr bool kTornCanBeFinished = true;
 
   drivers::Device& device() { return *device_; }

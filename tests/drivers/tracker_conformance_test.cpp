@@ -12,7 +12,7 @@ class FaultyTracker {
   static constexpr std::chrono::nanoseconds kTurn = 200ms;  // bursts come every 324 to 344 ms
   static constexpr std::chrono::nanoseconds kSilenceLimit = 1500ms;
   static constexpr std::chrono::nanoseconds kRecoveryLimit =
-      40s;  // longest pause 10 s, set-up 6 s, Initialize 2 s
+      40s;  // a pause, set-up 6 s, Initialize 2 s
   static constexpr bool kTornCanBeFinished = true;
 
   drivers::Device& device() { return *device_; }

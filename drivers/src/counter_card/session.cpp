@@ -55,7 +55,10 @@ CardAction CounterCardSession::on(const CardInput& input, HostTime now) {
 HostTime CounterCardSession::deadline() const {
   if (state_ == CardState::Closed) return open_at_;
   if (state_ == CardState::Opening) return asked_at_ + options_.open_timeout;
-  if (asked_ || stopping_bulk_) return asked_at_ + options_.control_timeout;
+  if (asked_ || stopping_bulk_) {
+    const auto overdue = asked_at_ + options_.control_timeout;
+    return expects_scans() ? std::min(overdue, last_scans_ + options_.silence) : overdue;
+  }
   if (state_ == CardState::Streaming && !halt_) {
     const auto silent = troubled_ ? retry_at_ : last_scans_ + options_.silence;
     return std::min(silent, next_status_);
@@ -82,10 +85,24 @@ CardAction CounterCardSession::take(const CardTick&, HostTime now) {
       break;
   }
   if (asked_ || stopping_bulk_) {
-    if (now - asked_at_ < options_.control_timeout) return CardNothing{};
+    if (now - asked_at_ < options_.control_timeout)
+      return silent(now) ? trouble_of_silence(now) : CardAction{CardNothing{}};
     return fail(now, fmt::format("request: no answer in {}", in_milliseconds(options_.control_timeout)));
   }
   return state_ == CardState::Streaming ? watch(now) : next_step(now);
+}
+
+bool CounterCardSession::expects_scans() const {
+  return state_ == CardState::Streaming && !halt_ && !troubled_;
+}
+
+bool CounterCardSession::silent(HostTime now) const {
+  return expects_scans() && now - last_scans_ >= options_.silence;
+}
+
+/// Also while the status is asked for: a card that is deaf answers neither.
+CardAction CounterCardSession::trouble_of_silence(HostTime now) {
+  return trouble(now, fmt::format("no scans for {}", in_milliseconds(options_.silence)));
 }
 
 /// Streaming, and nothing under way.
@@ -97,9 +114,7 @@ CardAction CounterCardSession::watch(HostTime now) {
     return next_step(now);
   }
   if (troubled_ && now >= retry_at_) return trouble(now, {});
-  if (!troubled_ && now - last_scans_ >= options_.silence) {
-    return trouble(now, fmt::format("no scans for {}", in_milliseconds(options_.silence)));
-  }
+  if (silent(now)) return trouble_of_silence(now);
   if (now < next_status_) return CardNothing{};
   next_status_ = now + options_.status_period;
   return send(quad08::read(quad08::Register::Acquisition), now);

@@ -264,18 +264,28 @@ TrackerAction TrackerSession::next_step() {
 
 TrackerAction TrackerSession::send(const Step& step, bool scripted) {
   const emscon::Request request = step.request;
-  const auto due = now_ + time_for(emscon::command_of(request));
-  pending_ = Pending{step, scripted, false, due, now_ + options_.busy_patience};
+  pending_ = Pending{.step = step, .scripted = scripted, .patience = now_ + options_.busy_patience};
+  await_answer();
   return TrackerSend{request};
+}
+
+void TrackerSession::await_answer() {
+  pending_->overdue = now_ + time_for(emscon::command_of(pending_->step.request));
+  const bool first = state_ == TrackerState::Querying;
+  pending_->due = first ? std::min(now_ + options_.ask_again, pending_->overdue) : pending_->overdue;
 }
 
 TrackerAction TrackerSession::send_again() {
   pending_->waiting_to_resend = false;
-  pending_->due = now_ + time_for(emscon::command_of(pending_->step.request));
+  await_answer();
   return TrackerSend{pending_->step.request};
 }
 
 TrackerAction TrackerSession::overdue() {
+  if (now_ < pending_->overdue) {
+    pending_->due = std::min(now_ + options_.ask_again, pending_->overdue);
+    return TrackerSend{pending_->step.request};
+  }
   const Command command = emscon::command_of(pending_->step.request);
   if (state_ == TrackerState::Stopping) {
     pending_.reset();

@@ -23,9 +23,10 @@ struct CounterCardSessionOptions {
   UsbBulkStream stream;
   std::chrono::nanoseconds open_timeout = std::chrono::seconds{2};
   std::chrono::nanoseconds control_timeout = std::chrono::milliseconds{500};
-  std::chrono::nanoseconds silence = std::chrono::milliseconds{100};  ///< no scans for so long is a fault
+  std::chrono::nanoseconds silence =
+      std::chrono::milliseconds{90};  ///< no scans for so long is a fault, seen before 100 ms are over
   std::chrono::nanoseconds status_period = std::chrono::milliseconds{100};
-  std::chrono::nanoseconds reopen_after = std::chrono::milliseconds{500};
+  std::chrono::nanoseconds reopen_after = std::chrono::milliseconds{250};
   std::chrono::nanoseconds retry_after =
       std::chrono::milliseconds{500};  ///< after a restart that brought no scans
 };
@@ -110,6 +111,9 @@ class CounterCardSession {
   CardAction send(const usb::Setup& setup, Now now);
   CardAction refused_step(const quad08::Step& step, const UsbControlDone& done, Now now);
   CardAction on_status(quad08::Status status, Now now);
+  [[nodiscard]] bool expects_scans() const;
+  [[nodiscard]] bool silent(Now now) const;
+  CardAction trouble_of_silence(Now now);
   CardAction watch(Now now);
   CardAction trouble(Now now, std::string text);
   CardAction fail(Now now, std::string text);

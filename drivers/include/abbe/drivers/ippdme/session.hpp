@@ -57,8 +57,8 @@ struct IppSessionOptions {
   std::chrono::nanoseconds command_timeout = std::chrono::seconds{3};
   std::chrono::nanoseconds motion_timeout = std::chrono::seconds{120};  ///< Home and PtMeas
   std::chrono::nanoseconds first_pause =
-      std::chrono::milliseconds{500};                                 ///< before connecting again, doubled
-  std::chrono::nanoseconds longest_pause = std::chrono::seconds{10};  ///< ... up to this
+      std::chrono::milliseconds{250};  ///< before connecting again, doubled
+  std::chrono::nanoseconds longest_pause = std::chrono::milliseconds{500};  ///< ... up to this
 };
 /// BadConfiguration says which option is out of its range.
 [[nodiscard]] Result<void> check(const IppSessionOptions& options);

@@ -62,6 +62,8 @@ struct TrackerSessionOptions {
 
   std::chrono::nanoseconds connect_timeout = std::chrono::seconds{3};
   std::chrono::nanoseconds command_timeout = std::chrono::seconds{3};
+  /// The first question of a connection is repeated: who was away hears it as soon as he is back.
+  std::chrono::nanoseconds ask_again = std::chrono::milliseconds{250};
   std::chrono::nanoseconds initialize_timeout = std::chrono::seconds{120};     ///< Initialize and GoBirdBath
   std::chrono::nanoseconds silence_timeout = std::chrono::milliseconds{1500};  ///< no packet while streaming
   std::chrono::nanoseconds busy_retry = std::chrono::milliseconds{250};  ///< after "busy" or "not ready"
@@ -71,8 +73,9 @@ struct TrackerSessionOptions {
       std::chrono::seconds{1};                                    ///< beam back: then StartMeasurement again
   std::chrono::nanoseconds keep_alive = std::chrono::seconds{5};  ///< how often a quiet controller is asked
   std::chrono::nanoseconds first_pause =
-      std::chrono::milliseconds{500};  ///< before connecting again, doubled ...
-  std::chrono::nanoseconds longest_pause = std::chrono::seconds{10};  ///< ... up to this
+      std::chrono::milliseconds{250};  ///< before connecting again, doubled ...
+  std::chrono::nanoseconds longest_pause =
+      std::chrono::milliseconds{500};  ///< ... up to this: whoever is back streams within a second
 };
 /// BadConfiguration says which option is out of its range.
 [[nodiscard]] Result<void> check(const TrackerSessionOptions& options);
@@ -128,6 +131,7 @@ class TrackerSession {
     bool scripted = false;
     bool waiting_to_resend = false;
     protocol::HostTime due{};       ///< of the answer, or of sending it again
+    protocol::HostTime overdue{};   ///< no answer until here is a fault
     protocol::HostTime patience{};  ///< "busy" until here is borne
   };
 
@@ -151,6 +155,7 @@ class TrackerSession {
   TrackerAction done(const emscon::Answer& answer);
   TrackerAction done_without_beam(const emscon::Answer& answer);
   TrackerAction judge(const emscon::SystemStatusAnswer& status);
+  void await_answer();
   TrackerAction overdue();
   TrackerAction tick_streaming();
   TrackerAction start_again();

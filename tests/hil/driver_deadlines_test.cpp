@@ -5,19 +5,11 @@
 
 #include <gtest/gtest.h>
 
-#include "abbe/drivers/counter_card/device.hpp"
-#include "abbe/drivers/environment/device.hpp"
-#include "abbe/drivers/environment/known_maps.hpp"
-#include "abbe/drivers/ippdme/device.hpp"
-#include "abbe/drivers/tracker/device.hpp"
-#include "abbe/drivers/usb/usbip_link.hpp"
-#include "abbe/sim/ippdme_server.hpp"
-#include "abbe/sim/simulation.hpp"
 #include "busy_world.hpp"
 #include "figure.hpp"
 #include "locked_memory.hpp"
 #include "run_time.hpp"
-#include "served_devices.hpp"
+#include "simulated_devices.hpp"
 
 namespace abbe::tests {
 namespace {
@@ -28,140 +20,6 @@ using std::chrono::nanoseconds;
 
 constexpr int kDevicePriority = 50;
 constexpr int kPeerPriority = 90;  // hardware would take no processor time at all
-
-const drivers::MonotonicTime& monotonic() {
-  static const drivers::MonotonicTime time;
-  return time;
-}
-
-std::unique_ptr<sim::Simulation> open_simulation(sim::SimulationSetup setup) {
-  setup.path.vertices = {{{0, 0, 0}}, {{0.2, 0.1, 0}}, {{0, 0, 0}}};
-  setup.start_when_streaming = false;
-  return sim::Simulation::open(setup, monotonic().now()).value();
-}
-ServedDevices::Peer peer_of(sim::Simulation& simulation) {
-  return {[&](auto& fds) { simulation.add_poll_fds(fds); }, [&] { return simulation.next_due(); },
-          [&](HostTime now) { simulation.poll(now); }};
-}
-
-struct Tracker {
-  static constexpr const char* kName = "tracker, 500 points/s";
-  static constexpr nanoseconds kPeriod = 2ms;
-  static constexpr std::size_t kFirst = 200;
-
-  Tracker() {
-    sim::SimulationSetup setup;
-    setup.tracker.emplace();
-    setup.tracker->initialize_time = 100ms;
-    simulation = open_simulation(setup);
-    drivers::TrackerDeviceOptions options;
-    options.host = "127.0.0.1";
-    options.port = simulation->tracker()->port();
-    device = drivers::TrackerDevice::create(options, monotonic()).value();
-  }
-  std::size_t pop() {
-    std::array<protocol::TrackerPoint, 256> some{};
-    return device->points().pop(some);
-  }
-  [[nodiscard]] ServedDevices::Peer peer() const { return peer_of(*simulation); }
-
-  std::unique_ptr<sim::Simulation> simulation;
-  std::unique_ptr<drivers::TrackerDevice> device;
-};
-
-struct CounterCard {
-  static constexpr const char* kName = "counter card, USB/IP in the process, a transfer each 1.5 ms";
-  static constexpr nanoseconds kPeriod = 1500us;
-  static constexpr std::size_t kFirst = 2000;
-
-  CounterCard() {
-    sim::SimulationSetup setup;
-    auto& card = setup.counter_cards.emplace_back();
-    drivers::CounterCardOptions options;
-    auto& wiring = options.receiver.wiring;
-    for (std::uint8_t i = 0; i < 5; ++i) {
-      const std::string name(1, "XYZAC"[i]);
-      card.axes.push_back({.name = name, .channel = i});
-      wiring.axes.push_back({.name = name, .channel = i, .scale = 1e-8});
-    }
-    wiring.clock_channel = card.clock_channel;
-    wiring.clock_hz = card.clock_hz;
-    wiring.latch_channel = card.latch_channel;
-    wiring.edge_channel = card.edge_channel;
-    simulation = open_simulation(setup);
-    auto link = std::make_unique<drivers::UsbipLink>(
-        drivers::UsbipOptions{.port = simulation->counter_cards().front().port(),
-                              .identity = drivers::identity_of(options)},
-        monotonic());
-    device = drivers::CounterCardDevice::create(options, std::move(link), monotonic()).value();
-  }
-  std::size_t pop() {
-    std::array<protocol::AxisSample, 256> some;  // NOLINT: filled by pop
-    std::size_t all = 0;
-    for (std::size_t n = some.size(); n == some.size(); all += n) n = device->samples().pop(some);
-    return all;
-  }
-  [[nodiscard]] ServedDevices::Peer peer() const { return peer_of(*simulation); }
-
-  std::unique_ptr<sim::Simulation> simulation;
-  std::unique_ptr<drivers::CounterCardDevice> device;
-};
-
-struct Environment {
-  static constexpr const char* kName = "environment, Modbus TCP each 100 ms";
-  static constexpr nanoseconds kPeriod = 100ms;
-  static constexpr std::size_t kFirst = 2;
-
-  Environment() {
-    sim::SimulationSetup setup;
-    setup.environment.emplace_back();
-    simulation = open_simulation(setup);
-    drivers::EnvironmentDeviceOptions options;
-    options.address = drivers::ModbusTcp{"127.0.0.1", simulation->environment().front().port()};
-    options.map =
-        drivers::known_map("comet-t7510", {.serial_number = sim::ModbusIdentity{}.serial_number}).value();
-    options.period = kPeriod;
-    device = drivers::EnvironmentDevice::create(options, monotonic()).value();
-  }
-  std::size_t pop() {
-    std::array<protocol::EnvironmentSample, 64> some{};
-    return device->samples().pop(some);
-  }
-  [[nodiscard]] ServedDevices::Peer peer() const { return peer_of(*simulation); }
-
-  std::unique_ptr<sim::Simulation> simulation;
-  std::unique_ptr<drivers::EnvironmentDevice> device;
-};
-
-struct MeasuringMachine {
-  static constexpr const char* kName = "measuring machine, I++ DME, 10 positions/s";
-  static constexpr nanoseconds kPeriod = 100ms;
-  static constexpr std::size_t kFirst = 2;
-
-  MeasuringMachine() {
-    server = std::make_unique<sim::IppDmeServer>(
-        sim::IppDmeServer::open(0,
-                                std::make_unique<sim::IppDmeDevice>(sim::IppDmeOptions{}, monotonic().now()))
-            .value());
-    drivers::IppDeviceOptions options;
-    options.port = server->port();
-    device = drivers::IppDevice::create(options, monotonic()).value();
-  }
-  std::size_t pop() {
-    std::array<protocol::AxisSample, 64> some{};
-    return device->positions().pop(some);
-  }
-  [[nodiscard]] ServedDevices::Peer peer() const {
-    return {[this](auto& fds) {
-              fds.push_back({server->listener_fd(), POLLIN, 0});
-              if (server->client_fd() >= 0) fds.push_back({server->client_fd(), POLLIN, 0});
-            },
-            [this] { return server->next_due(); }, [this](HostTime now) { server->poll(now); }};
-  }
-
-  std::unique_ptr<sim::IppDmeServer> server;
-  std::unique_ptr<drivers::IppDevice> device;
-};
 
 /// The device thread's loop with a look at the clock after each turn.
 template <class Driver>

@@ -16,7 +16,9 @@
 #include <thread>
 #include <vector>
 
+#include "abbe/sim/ippdme_server.hpp"
 #include "abbe/sim/sim_clock.hpp"
+#include "abbe/sim/simulation.hpp"
 
 namespace abbe::tests {
 
@@ -82,5 +84,20 @@ class ServedDevices {
   std::atomic<bool> stop_{false};
   std::thread thread_;
 };
+
+inline ServedDevices::Peer peer_of(sim::Simulation& simulation) {
+  return {[&](auto& fds) { simulation.add_poll_fds(fds); }, [&] { return simulation.next_due(); },
+          [&](protocol::HostTime now) { simulation.poll(now); }};
+}
+inline ServedDevices::Peer peer_of(sim::IppDmeServer& server) {
+  return {[&](auto& fds) {
+            fds.push_back({server.listener_fd(), POLLIN, 0});
+            if (server.client_fd() >= 0) fds.push_back({server.client_fd(), POLLIN, 0});
+          },
+          [&] { return server.next_due(); }, [&](protocol::HostTime now) { server.poll(now); }};
+}
+inline sim::IppDmeServer open_measuring_machine(protocol::HostTime now) {
+  return sim::IppDmeServer::open(0, std::make_unique<sim::IppDmeDevice>(sim::IppDmeOptions{}, now)).value();
+}
 
 }  // namespace abbe::tests

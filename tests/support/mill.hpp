@@ -1,5 +1,5 @@
 #pragma once
-/// The machine of the configuration tests, as a file would describe it.
+/// The machine of most tests, as a file would describe it.
 
 namespace abbe::daemon::test {
 

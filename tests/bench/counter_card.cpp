@@ -22,6 +22,7 @@
 #include "abbe/drivers/usb/libusb_link.hpp"
 #include "abbe/drivers/usb/usbip_link.hpp"
 #include "abbe/sim/usbip_server.hpp"
+#include "figure.hpp"
 #include "forked_task.hpp"
 
 namespace {
@@ -204,11 +205,14 @@ int judge(std::uint16_t port, std::chrono::duration<double> duration, std::chron
     if (!r.clean()) break;
     highest = factor;
   }
-  fmt::print(
-      "lost {} (asked 0), gaps {} (asked 0), driver and ring {:.1f} % of one processor (asked <= {:.0f} %)\n",
-      usual.lost, usual.gaps, 100.0 * usual.share, 100.0 * kAskedShare);
-  fmt::print("highest rate without loss {:.0f} scans/s: {:.0f} x 33,333 (asked >= {:.0f})\n",
-             highest * kRate_hz, highest, kAskedFactor);
+  using tests::print_figure;
+  print_figure("encoder path on this computer", "0 lost, 0 unflagged",
+               "{} scans, {} lost, {} gaps, {} unflagged", usual.scans, usual.lost, usual.gaps,
+               usual.unflagged);
+  print_figure("encoder path, driver and ring", fmt::format("<= {:.0f} %", 100.0 * kAskedShare),
+               "{:.1f} % of one processor", 100.0 * usual.share);
+  print_figure("encoder path, highest rate without loss", fmt::format(">= {:.0f} x 33,333", kAskedFactor),
+               "{:.0f} scans/s, {:.0f} x 33,333", highest * kRate_hz, highest);
   return usual.clean() && usual.share <= kAskedShare && highest >= kAskedFactor ? 0 : 1;
 }
 

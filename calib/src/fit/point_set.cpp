@@ -56,6 +56,9 @@ Result<PointSet> point_set(std::span<const Vector3> points, std::size_t needed, 
   R.topRows(rank) = qr.matrixQR().topRows(rank);
   R.triangularView<Eigen::StrictlyLower>().setZero();
   const Eigen::JacobiSVD<Matrix3, Eigen::NoQRPreconditioner> svd(R, Eigen::ComputeFullV);
+  if (svd.info() != Eigen::Success) {  // coordinates whose squares overflow
+    return failure(ErrorCode::NotFinite, message(what, ": points too far apart"));
+  }
   set.directions = svd.matrixV();
   set.singular_values = svd.singularValues();
   return set;

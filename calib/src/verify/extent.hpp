@@ -1,0 +1,23 @@
+#pragma once
+/// Where points lie, and coordinates in which that is the box from -1 to 1.
+
+#include <span>
+
+#include "abbe/calib/geometry.hpp"
+
+namespace abbe::calib::verify {
+
+struct Extent {
+  Vector3 centre_m = Vector3::Zero();
+  Vector3 half_width_m = Vector3::Ones();
+  [[nodiscard]] Vector3 scaled(const Vector3& p_m) const {
+    return (p_m - centre_m).cwiseQuotient(half_width_m);
+  }
+  [[nodiscard]] double diagonal_m() const { return 2.0 * half_width_m.norm(); }
+};
+
+/// DegenerateGeometry unless the points span a volume: their thinnest direction, in scaled coordinates, must
+/// be more than a thousandth of the widest.
+[[nodiscard]] Result<Extent> extent_of(std::span<const Vector3> points_m);
+
+}  // namespace abbe::calib::verify

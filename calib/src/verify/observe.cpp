@@ -1,0 +1,72 @@
+#include "abbe/calib/verify/observe.hpp"
+
+#include "abbe/calib/model_comparison.hpp"
+#include "message.hpp"
+#include "verify/extent.hpp"
+
+namespace abbe::calib::verify {
+namespace {
+
+Result<void> check_finite(std::span<const MeasuredPoint> points) {
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    if (!points[i].reading_m.allFinite() || !points[i].measured_m.allFinite()) {
+      return failure(ErrorCode::NotFinite, message("verification: point ", i + 1, " is not finite"));
+    }
+  }
+  return {};
+}
+
+Result<void> check_misfit(const Observations& o, const Extent& extent) {
+  Vector3 mean = Vector3::Zero();
+  for (const Vector3& v : o.V_m) {
+    mean += v / static_cast<double>(o.V_m.size());
+  }
+  std::vector<Vector3> left;
+  for (const Vector3& v : o.V_m) {
+    left.push_back(v - mean);
+  }
+  const double rms_m = vector_statistics(left).rms_m;
+  if (rms_m > kMostMisfit * extent.diagonal_m()) {
+    return failure(
+        ErrorCode::AlignmentFailed,
+        message("verification: readings and measured points of ", extent.diagonal_m(), " m extent leave ",
+                rms_m, " m rms",
+                o.frame == Frame::BestFit ? " after the best rigid motion" : " in the machine's axes",
+                ": rows mixed up, another unit, or a left-handed frame"));
+  }
+  return {};
+}
+
+}  // namespace
+
+Result<Observations> observe(std::span<const MeasuredPoint> points, Frame frame) {
+  if (auto finite = check_finite(points); !finite) {
+    return tl::make_unexpected(finite.error());
+  }
+  Observations o;
+  o.frame = frame;
+  for (const MeasuredPoint& p : points) {
+    o.readings_m.push_back(p.reading_m);
+    o.measured_m.push_back(p.measured_m);
+  }
+  const auto extent = extent_of(o.readings_m);
+  if (!extent) {
+    return tl::make_unexpected(extent.error());
+  }
+  if (frame == Frame::BestFit) {
+    const auto T = fit_rigid(o.measured_m, o.readings_m);
+    if (!T) {
+      return tl::make_unexpected(T.error());
+    }
+    o.T_machine_tracker = *T;
+  }
+  for (const MeasuredPoint& p : points) {
+    o.V_m.emplace_back(o.T_machine_tracker * p.measured_m - p.reading_m);
+  }
+  if (auto fits = check_misfit(o, *extent); !fits) {
+    return tl::make_unexpected(fits.error());
+  }
+  return o;
+}
+
+}  // namespace abbe::calib::verify

@@ -1,0 +1,210 @@
+/// Verification against an independent instrument: the reference solutions of the ball array on their own
+/// grid, and tracker points of a machine whose errors are known.
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <random>
+
+#include "abbe/calib/verify/compare.hpp"
+#include "evemu_study.hpp"
+
+namespace abbe::calib::verify {
+namespace {
+
+using tests::evemu::Field;
+
+RigidTransform tracker_station() {
+  return {Eigen::AngleAxisd(2.1, Vector3(0.1, -0.2, 1.0).normalized()).toRotationMatrix(),
+          Vector3(2.5, -1.4, 0.6)};
+}
+
+/// What the tracker sees: the true place, in its own frame.
+std::vector<MeasuredPoint> measured(const Field& V, const std::vector<Vector3>& readings,
+                                    const RigidTransform& T_tracker_machine = tracker_station()) {
+  std::vector<MeasuredPoint> points;
+  for (const Vector3& q : readings) points.push_back({q, T_tracker_machine * (q + V(q))});
+  return points;
+}
+
+std::vector<Vector3> box_of(const Vector3& low, const Vector3& high, const std::array<int, 3>& count) {
+  std::vector<Vector3> points;
+  for (int i = 0; i < count[0]; ++i)
+    for (int j = 0; j < count[1]; ++j)
+      for (int k = 0; k < count[2]; ++k)
+        points.emplace_back(low + (high - low)
+                                      .cwiseProduct(Vector3(i / (count[0] - 1.0), j / (count[1] - 1.0),
+                                                            k / (count[2] - 1.0))));
+  return points;
+}
+
+std::vector<Vector3> measured_box() {
+  return box_of({-0.1, -0.1, -0.04}, {0.8, 0.4, 0.12}, {10, 6, 9});
+}
+
+/// The grid of the reference and Ball1: asked for on the same grid, nothing is interpolated.
+std::vector<Vector3> measured_grid() {
+  auto readings = tests::evemu::reference_grid();
+  readings.emplace_back(-0.09, 0.14, 0.03);
+  return readings;
+}
+
+/// A model out of coefficients of the reference; holds inside the balls of the reference layout.
+VolumetricModel reference_model(const std::string& solution) {
+  std::vector<Vector3> balls;
+  for (const auto& position : tests::evemu::reference_layout().true_m)
+    balls.insert(balls.end(), position.begin(), position.end());
+  const auto design =
+      *evemu::ScaledDesign::of(tests::evemu::reference_machine().chain, 3, evemu::bounding_box(balls));
+  const Eigen::VectorXd named = tests::evemu::reference_coefficients(solution);
+  const Eigen::VectorXd c = (1000.0 * design.named_from_scaled()).fullPivLu().solve(named);
+  const auto n = static_cast<Eigen::Index>(design.size());
+  return *VolumetricModel::from_polynomials(
+      *evemu::EvemuModel::of(design, balls[0], c, Eigen::MatrixXd::Zero(n, n)), Gauge::Ball1, Vector3::Zero(),
+      *ValidityVolume::hull_of(balls));
+}
+
+Field field_of(const VolumetricModel& model) {
+  return [model](const Vector3& q) { return model.V_at(q, Vector3::Zero()); };
+}
+
+Options paper_grid() {
+  return {.step_m = Vector3(0.1 / 3, 0.05 / 3, 0.01 / 3), .least_distance_m = 0.17};
+}
+
+Comparison verified(const Field& truth, const VolumetricModel& model, const std::vector<Vector3>& readings,
+                    Frame frame, const Options& options = {}) {
+  const RigidTransform T = frame == Frame::Machine ? RigidTransform{} : tracker_station();
+  return *compare(*observe(measured(truth, readings, T), frame), model, Vector3::Zero(), options);
+}
+
+TEST(Verification, GivesTheStatisticsOfTheReferenceOnItsGrid) {
+  const auto all = tests::evemu::reference_json("solutions.json");
+  for (const std::string solution : {"ols", "ncvreg_maxit1e6"}) {
+    const auto c = verified(tests::evemu::table3_machine(), reference_model(solution), measured_grid(),
+                            Frame::Machine, paper_grid());
+    const auto& R = all["solutions"][solution]["R_resmag"];
+    EXPECT_EQ(c.R_stated.count, all["n_grid"].get<std::size_t>());
+    constexpr double kShiftOfConstants = 2e-3;  // the reference keeps the estimate's own V at Ball1
+    EXPECT_NEAR(c.R_stated.mean, R["mean"].get<double>(), kShiftOfConstants) << solution;
+    EXPECT_NEAR(c.R_stated.median, R["p50"].get<double>(), kShiftOfConstants) << solution;
+    EXPECT_EQ(c.R_stated.above_1, 0u);
+  }
+}
+
+TEST(Verification, OfThePerfectModelLeavesNothing) {
+  const auto model = reference_model("true");
+  const auto c = verified(field_of(model), model, measured_grid(), Frame::BestFit, paper_grid());
+  EXPECT_GT(c.before.rms_m, 100e-6);
+  EXPECT_LT(c.after.max_m, 1e-9);
+  EXPECT_LT(c.interpolation_rms_m, 1e-9);
+  EXPECT_LT(c.R_turned.max, 0.02);  // V in axes turned by some mrad
+  EXPECT_EQ(c.R_turned.count, c.grid.size());
+}
+
+TEST(Verification, SaysWhatInterpolationCosts) {
+  const auto model = reference_model("true");
+  const auto c = verified(field_of(model), model, measured_box(), Frame::Machine, paper_grid());
+  double squares = 0.0;
+  for (const auto& g : c.grid)
+    squares += (g.V_las_m - g.stated_m).squaredNorm() / static_cast<double>(c.grid.size());
+  EXPECT_NEAR(c.interpolation_rms_m, std::sqrt(squares), 1e-9);
+  EXPECT_GT(c.interpolation_rms_m, 1e-6);
+}
+
+TEST(Verification, SeesTheRotationOnlyInTheMachinesAxes) {
+  const auto model = reference_model("true");
+  const Vector3 omega(2e-4, -3e-4, 5e-4), ball1(-0.09, 0.14, 0.03);
+  const Field V = field_of(model);
+  const Field turned = [&](const Vector3& q) -> Vector3 { return V(q) + omega.cross(q - ball1); };
+  const auto seen = verified(turned, model, measured_grid(), Frame::Machine, paper_grid());
+  EXPECT_LT((seen.turned.tail<3>() - omega).norm(), 1e-9);
+  EXPECT_LT(seen.R_turned.max, 1e-6);
+  EXPECT_GT(seen.R_stated.median, 0.05);
+  const auto fitted = verified(turned, model, measured_grid(), Frame::BestFit, paper_grid()),
+             plain = verified(V, model, measured_grid(), Frame::BestFit, paper_grid());
+  EXPECT_LT((fitted.turned - plain.turned).norm(), 2e-6);  // to first order
+}
+
+TEST(Verification, DoesNotMindWhereTheTrackerStands) {
+  const auto model = reference_model("ols");
+  const Field V = tests::evemu::table3_machine();
+  const auto a = *compare(*observe(measured(V, measured_box())), model, Vector3::Zero());
+  const auto b = *compare(*observe(measured(V, measured_box(), RigidTransform{})), model, Vector3::Zero());
+  EXPECT_NEAR(a.before.rms_m, b.before.rms_m, 1e-12);
+  EXPECT_NEAR(a.R_turned.mean, b.R_turned.mean, 1e-9);
+}
+
+TEST(Verification, SetsVToZeroAtBall1) {
+  const auto model = reference_model("ols");
+  const Field V = tests::evemu::table3_machine();
+  const Field shifted = [&](const Vector3& q) -> Vector3 { return V(q) + Vector3(1e-3, -2e-3, 5e-4); };
+  const auto a = verified(V, model, measured_grid(), Frame::Machine, paper_grid()),
+             b = verified(shifted, model, measured_grid(), Frame::Machine, paper_grid());
+  EXPECT_LT((*a.origin_m - Vector3(-0.09, 0.14, 0.03)).norm(), 1e-12);
+  for (std::size_t i = 0; i < a.grid.size(); ++i)
+    ASSERT_LT((a.grid[i].V_las_m - b.grid[i].V_las_m).norm(), 1e-12);
+}
+
+TEST(Verification, TakesModelsOfTables) {
+  const auto side = *equidistant_nodes(0.0, 0.3, 0.1), height = *equidistant_nodes(0.0, 0.1, 0.05);
+  const auto layout = *ParameterLayout::observable_with_one_target(*KinematicChain::parse("[w b Z X Y t]"),
+                                                                   {side, side, height});
+  Eigen::VectorXd U = Eigen::VectorXd::LinSpaced(static_cast<Eigen::Index>(layout.model_size()), -1e-4, 1e-4);
+  const auto n = U.size();
+  const auto hull = box_of({0, 0, 0}, {0.3, 0.3, 0.1}, {2, 2, 2});
+  const std::vector<Vector3> tools{Vector3::Zero()};
+  const auto model = *VolumetricModel::from_vector(layout, Gauge::G1, tools, U, Eigen::MatrixXd::Zero(n, n),
+                                                   *ValidityVolume::hull_of(hull));
+  const auto c =
+      verified(field_of(model), model, box_of({0, 0, 0}, {0.3, 0.3, 0.1}, {7, 7, 5}), Frame::BestFit);
+  EXPECT_FALSE(c.origin_m);
+  EXPECT_LT(c.after.rms_m, 1e-3 * c.before.rms_m);
+  EXPECT_LT(c.R_turned.median, 0.02);
+}
+
+TEST(Verification, SaysWhatTheDataDoNotAllow) {
+  const auto model = reference_model("ols");
+  const Field large = tests::evemu::table3_machine();
+  const Field V = [&](const Vector3& q) -> Vector3 { return 0.1 * large(q); };
+  const auto code = [&](const std::vector<Vector3>& readings, const Options& options = {}) {
+    const auto o = observe(measured(V, readings));
+    if (!o) return o.error().code;
+    return compare(*o, model, Vector3::Zero(), options).error().code;
+  };
+  EXPECT_EQ(code(box_of({0, 0, 0}, {0.8, 0.4, 0.0}, {5, 5, 2})), ErrorCode::DegenerateGeometry);
+  EXPECT_EQ(code(box_of({0.1, 0, 0}, {0.5, 0.3, 0.1}, {9, 7, 5})),
+            ErrorCode::DegenerateGeometry);  // no Ball1
+  EXPECT_EQ(code(box_of({-0.1, -0.1, -0.05}, {0.8, 0.4, 0.15}, {2, 2, 2})), ErrorCode::TooFewObservations);
+  EXPECT_EQ(code(measured_box(), {.step_m = Vector3::Constant(1e-6)}), ErrorCode::BadInput);
+  EXPECT_EQ(compare(*observe(measured(V, measured_box())), model, Vector3(0, 0, 0.1)).error().code,
+            ErrorCode::NotApplicable);
+}
+
+TEST(Verification, RefusesMixedUpRowsAndMirroredFrames) {
+  auto points = measured(tests::evemu::table3_machine(), measured_box());
+  auto mirrored = points;
+  for (auto& p : mirrored) p.measured_m.y() = -p.measured_m.y();
+  EXPECT_EQ(observe(mirrored).error().code, ErrorCode::AlignmentFailed);
+  std::mt19937 random(1);
+  for (std::size_t i = 1; i < points.size(); ++i)
+    std::swap(points[i].measured_m, points[random() % i].measured_m);
+  EXPECT_EQ(observe(points).error().code, ErrorCode::AlignmentFailed);
+  points[3].reading_m.x() = std::numeric_limits<double>::quiet_NaN();
+  EXPECT_EQ(observe(points).error().code, ErrorCode::NotFinite);
+}
+
+TEST(RatioStatistics, AreThoseOfTheSample) {
+  const auto s = ratio_statistics({0.4, 0.1, 1.5, 0.2, 0.3});
+  EXPECT_EQ(s.count, 5u);
+  EXPECT_DOUBLE_EQ(s.mean, 0.5);
+  EXPECT_DOUBLE_EQ(s.median, 0.3);
+  EXPECT_DOUBLE_EQ(s.p25, 0.2);
+  EXPECT_DOUBLE_EQ(s.p75, 0.4);
+  EXPECT_DOUBLE_EQ(s.max, 1.5);
+  EXPECT_EQ(s.above_1, 1u);
+  EXPECT_NEAR(s.standard_deviation, 0.570087712549569, 1e-12);
+}
+
+}  // namespace
+}  // namespace abbe::calib::verify

@@ -111,13 +111,18 @@ inline std::vector<Vector3> evaluation_grid(const calib::ValidityVolume& hull,
   return grid;
 }
 
-/// The same over the volume of the reference layout, whatever layout was measured.
-inline std::vector<Vector3> reference_grid() {
+/// The same inside the balls of a layout.
+inline std::vector<Vector3> hull_grid(const Layout& layout) {
   std::vector<Vector3> balls;
-  for (const auto& position : reference_layout().true_m) {
+  for (const auto& position : layout.true_m) {
     balls.insert(balls.end(), position.begin(), position.end());
   }
-  return evaluation_grid(*calib::ValidityVolume::hull_of(balls));
+  return evaluation_grid(*calib::ValidityVolume::hull_of(balls), layout);
+}
+
+/// The volume of the reference layout, whatever layout was measured.
+inline std::vector<Vector3> reference_grid() {
+  return hull_grid(reference_layout());
 }
 
 struct Remaining {

@@ -199,6 +199,20 @@ TEST(Config, TakesThePointRatesATrackerHas) {
               ElementsAre(AllOf(HasSubstr("tracker.point_rate_hz"), HasSubstr("250 and 333.3"))));
 }
 
+TEST(Config, KnowsTheTwoModesOfATracker) {
+  const std::string tracker = kMachine + "[tracker]\nhost = \"h\"\n";
+  EXPECT_EQ(parse_config(tracker, "abbed.toml")->tracker->mode, TrackerModeConfig::Continuous);
+  const auto config =
+      parse_config(tracker + "mode = \"stationary\"\nstationary_time_ms = 800\n", "abbed.toml");
+  ASSERT_TRUE(config);
+  EXPECT_EQ(config->tracker->mode, TrackerModeConfig::Stationary);
+  EXPECT_EQ(config->tracker->stationary_time, std::chrono::milliseconds{800});
+  EXPECT_THAT(faults_of(tracker + "mode = \"stationary\"\npoint_rate_hz = 500\n"),
+              ElementsAre(HasSubstr("tracker.point_rate_hz")));
+  EXPECT_THAT(faults_of(tracker + "stationary_time_ms = 500\n"),
+              ElementsAre(HasSubstr("tracker.stationary_time_ms")));
+}
+
 TEST(Config, RefusesPeriodsTheLivenessRulesForbid) {
   EXPECT_THAT(faults_of(kMachine + "[daemon]\nhub_period_us = 60000\n"),
               ElementsAre(HasSubstr("hub_period_us")));

@@ -5,6 +5,7 @@
 
 #include <future>
 
+#include "abbe/daemon/control_api.hpp"
 #include "dds_far_end.hpp"
 #include "synthetic_model.hpp"
 
@@ -171,6 +172,15 @@ TEST_F(HubTest, RefusesToCalibrateAxesTheControlCorrectsAlready) {
   EXPECT_THAT(started.error().text, testing::HasSubstr("axes_compensated"));
 }
 
+TEST_F(HubTest, RefusesToCalibrateOnTheFlyWithAStationaryTracker) {
+  config_.tracker.emplace().mode = TrackerModeConfig::Stationary;
+  const auto started =
+      calibration_->start(OtfRequest{{{0, 0, 0}, {1, 0, 0}, {1, 1, 0}}}, "anna", time_.now());
+  ASSERT_FALSE(started);
+  EXPECT_EQ(started.error().code, ErrorCode::Refused);
+  EXPECT_THAT(started.error().text, testing::HasSubstr("stationary"));
+}
+
 TEST_F(HubTest, RunsATaskOfAnotherThreadAtItsNextTurn) {
   auto answer = std::async(std::launch::async, [this] {
     return hub_->call([] { return json{{"n", 3}}; }, 60s);
@@ -199,6 +209,51 @@ TEST_F(HubTest, ATaskThatThrowsThrowsInTheThreadThatAsked) {
   while (answer.wait_for(0s) != std::future_status::ready) hub_->turn(time_.wall_now());
   EXPECT_THROW((void)answer.get(), std::runtime_error);
   turn();
+}
+
+TEST_F(HubTest, CollectsStandstillsForWhoeverAsksOverTheSocket) {
+  config_.tracker.emplace().host = "127.0.0.1";
+  VerificationService verification{config_};
+  Hub hub{HubParts{.config = config_,
+                   .time = time_,
+                   .devices = devices_,
+                   .authority = *authority_,
+                   .calibration = *calibration_,
+                   .verification = &verification}};
+  const auto ask = [&](const json& request) {
+    auto answer = std::async(std::launch::async, [&] { return answer_request(hub, request, 60s); });
+    while (answer.wait_for(0s) != std::future_status::ready) hub.turn(time_.wall_now());
+    return answer.get();
+  };
+  const auto stand = [&](double x) {
+    for (int i = 0; i < 1500; ++i) {
+      protocol::AxisSample axes;
+      axes.head.time = time_.now() + 2ms;
+      axes.axis_count = 3;
+      axes.position = {x, 0.0, 0.0};
+      devices_.next.axes.push_back(axes);
+      if (i % 10 == 5) {
+        auto& point = devices_.next.points.emplace_back();
+        point.head.time = time_.now() + 1ms;
+        point.p_tracker_m = {1.0, x, 0.0};
+      }
+      time_.passed += 2ms;
+      hub.turn(time_.wall_now());
+    }
+  };
+  const auto begun = ask({{"do", "verification"}, {"step", "begin"}});
+  ASSERT_EQ(begun["ok"], true) << begun.dump();
+  stand(0.1);
+  stand(0.2);
+  const auto look = ask({{"do", "verification"}, {"step", "look"}, {"number", begun["number"]}, {"from", 0}});
+  ASSERT_EQ(look["points"].size(), 1u) << look.dump();
+  EXPECT_EQ(look["points"][0]["reading_m"], (json{0.1, 0.0, 0.0}));
+  EXPECT_EQ(look["points"][0]["tracker_m"], (json{1.0, 0.1, 0.0}));
+  EXPECT_GT(look["standing"].get<int>(), 50);
+  const auto end = ask({{"do", "verification"}, {"step", "end"}, {"number", begun["number"]}, {"from", 1}});
+  ASSERT_EQ(end["points"].size(), 1u) << end.dump();
+  EXPECT_EQ(end["points"][0]["reading_m"], (json{0.2, 0.0, 0.0}));
+  EXPECT_EQ(ask({{"do", "verification"}, {"step", "look"}, {"number", 99}})["code"], "refused");
 }
 
 }  // namespace

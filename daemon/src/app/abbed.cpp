@@ -108,6 +108,7 @@ struct Abbed::State {
   std::optional<ModelAuthority> authority;
   std::optional<CalibrationService> calibration;
   std::optional<ReferenceService> reference;
+  std::optional<VerificationService> verification;
   std::optional<Publisher> publisher;
   std::optional<DdsSupervisor> supervisor;
   std::optional<DeviceSet> devices;
@@ -151,6 +152,7 @@ struct Abbed::State {
     authority.emplace(std::move(*opened));
     calibration.emplace(config, *authority, recorder.get(), utc);
     reference.emplace(config, recorder.get());
+    verification.emplace(config);
     return {};
   }
 
@@ -190,7 +192,8 @@ struct Abbed::State {
                          .calibration = *calibration,
                          .publisher = publisher ? &*publisher : nullptr,
                          .recorder = recorder.get(),
-                         .reference = &*reference});
+                         .reference = &*reference,
+                         .verification = &*verification});
     hub_thread = std::thread([this] { run_hub(); });
     if (auto set = set_priority(hub_thread, config.daemon); !set) {
       if (config.daemon.realtime == RealTimeMode::Enforce) return set;

@@ -1,10 +1,8 @@
 #include <fmt/format.h>
 
-#include <charconv>
 #include <cmath>
 #include <cstdio>
 #include <memory>
-#include <optional>
 
 #include "abbe/daemon/input_files.hpp"
 #include "abbe/daemon/model_document.hpp"
@@ -12,6 +10,7 @@
 #include "cli/commands.hpp"
 #include "cli/store_option.hpp"
 #include "cli/terminal.hpp"
+#include "cli/vector_option.hpp"
 
 namespace abbe::daemon {
 
@@ -25,39 +24,6 @@ struct Arguments {
   StoreOption store;
   bool correction = false;
 };
-
-/// "x,y,z" in mm.
-std::optional<calib::Vector3> parse_tool(const std::string& text) {
-  calib::Vector3 tool_m = calib::Vector3::Zero();
-  const char* at = text.data();
-  const char* const end = at + text.size();
-  for (int i = 0; i < 3; ++i) {
-    double value_mm = 0.0;
-    const auto [next, fault] = std::from_chars(at, end, value_mm);
-    if (fault != std::errc{} || !std::isfinite(value_mm)) return std::nullopt;
-    tool_m[i] = value_mm / kMmPerM;
-    at = next;
-    if (i < 2 && (at == end || *at++ != ',')) return std::nullopt;
-  }
-  return at == end ? std::optional{tool_m} : std::nullopt;
-}
-
-Result<calib::Vector3> tool_of(const Arguments& arguments, const calib::VolumetricModel& model) {
-  calib::Vector3 tool_m = model.tool_offsets_m().front();
-  if (!arguments.tool.empty()) {
-    const auto given = parse_tool(arguments.tool);
-    if (!given)
-      return fail(ErrorCode::Usage, fmt::format("--tool \"{}\": must be x,y,z in mm", arguments.tool));
-    tool_m = *given;
-  }
-  if (!model.holds_for_tool(tool_m))
-    return fail(
-        ErrorCode::DataInsufficient,
-        fmt::format(
-            "tool offset {}, {}, {} mm: the model was identified with another and does not hold for it",
-            tool_m[0] * kMmPerM, tool_m[1] * kMmPerM, tool_m[2] * kMmPerM));
-  return tool_m;
-}
 
 /// One row: position, vector, standard uncertainty, inside. The correction moves with V, and so has its
 /// uncertainty.
@@ -85,7 +51,7 @@ Result<std::string> evaluate(const Arguments& arguments) {
   if (!document) return tl::make_unexpected(document.error());
   const auto points = read_points_csv(arguments.points);
   if (!points) return tl::make_unexpected(points.error());
-  const auto tool_m = tool_of(arguments, document->model);
+  const auto tool_m = tool_of(arguments.tool, document->model);
   if (!tool_m) return tl::make_unexpected(tool_m.error());
   std::string text = arguments.correction
                          ? "# quantity = command_correction\nx_mm,y_mm,z_mm,cx_um,cy_um,cz_um"

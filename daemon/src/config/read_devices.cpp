@@ -29,6 +29,25 @@ void read_point_rate(Section& tracker, TrackerConfig& out) {
   out.point_rate_hz = 1e3 / period_ms;
 }
 
+/// What only the other mode knows is refused: it would be silently ignored.
+void read_mode(Section& tracker, TrackerConfig& out) {
+  constexpr int kLongest_ms = 60'000;  // emScon
+  tracker.get_word<TrackerModeConfig>(
+      "mode", out.mode,
+      {{"continuous", TrackerModeConfig::Continuous}, {"stationary", TrackerModeConfig::Stationary}});
+  if (out.mode == TrackerModeConfig::Stationary) {
+    int time_ms = static_cast<int>(out.stationary_time / std::chrono::milliseconds{1});
+    tracker.get_integer("stationary_time_ms", time_ms, 1, kLongest_ms);
+    out.stationary_time = std::chrono::milliseconds{time_ms};
+    if (tracker.has("point_rate_hz"))
+      tracker.fault("point_rate_hz", "has no meaning with mode = \"stationary\"");
+  } else {
+    read_point_rate(tracker, out);
+    if (tracker.has("stationary_time_ms"))
+      tracker.fault("stationary_time_ms", "has no meaning with mode = \"continuous\"");
+  }
+}
+
 void read_tracker_timeouts(Section& tracker, TrackerConfig& out) {
   tracker.get("max_constant_delay_us", out.max_constant_delay, kMicro, kNotNegative);
   tracker.get("connect_timeout_s", out.connect_timeout, kPlain, kPositive);
@@ -106,7 +125,7 @@ void read_tracker(Section& root, Config& out) {
   const bool has_host = tracker.get("host", config.host);
   get_bounded(tracker, "name", config.name, bound_of<v1::TrackerPoint>("device"));
   tracker.get_integer("port", config.port, 1, 65535);
-  read_point_rate(tracker, config);
+  read_mode(tracker, config);
   tracker.get_word<WeatherConfig>(
       "weather", config.weather,
       {{"none", WeatherConfig::None}, {"read", WeatherConfig::Read}, {"compute", WeatherConfig::Compute}});

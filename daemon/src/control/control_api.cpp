@@ -174,6 +174,39 @@ json reference(const Hub& hub, const json& request) {
   return done ? json{{"ok", true}} : refusal(done.error());
 }
 
+json point_json(const StandstillPoint& p) {
+  const auto list = [](const calib::Vector3& v) { return json{v.x(), v.y(), v.z()}; };
+  return {{"reading_m", list(p.mean.reading_m)},
+          {"tracker_m", list(p.mean.measured_m)},
+          {"tracker_points", p.tracker_points},
+          {"scatter_m", p.scatter_m}};
+}
+
+/// {"step": "begin"} gives a number; {"step": "look" | "end", "number": .., "from": k} the points from the
+/// k-th on, "end" after the standstill that goes on was closed.
+json verification(const Hub& hub, const json& request) {
+  if (hub.parts().verification == nullptr) return refusal({ErrorCode::Refused, "verify: not in this daemon"});
+  VerificationService& service = *hub.parts().verification;
+  const auto step = request.at("step").get<std::string>();
+  if (step == "begin") {
+    const auto number = service.begin();
+    return number ? json{{"ok", true}, {"number", *number}} : refusal(number.error());
+  }
+  const auto number = request.at("number").get<std::uint64_t>();
+  if (step == "end") {
+    if (const auto ended = service.end(number); !ended) return refusal(ended.error());
+  } else if (step != "look") {
+    return refusal({ErrorCode::Usage, fmt::format("verification: unknown step {}", step)});
+  }
+  const auto found = service.points(number);
+  if (!found) return refusal(found.error());
+  const auto& points = (*found)->points();
+  json list = json::array();
+  for (std::size_t i = request.value("from", std::size_t{0}); i < points.size(); ++i)
+    list.push_back(point_json(points[i]));
+  return {{"ok", true}, {"standing", (*found)->standing()}, {"points", std::move(list)}};
+}
+
 }  // namespace
 
 json answer_request(Hub& hub, const json& request, std::chrono::milliseconds time_out) {
@@ -183,13 +216,15 @@ json answer_request(Hub& hub, const json& request, std::chrono::milliseconds tim
       {"calibrate", calibrate},
       {"cancel", cancel},
       {"reference", reference},
+      {"verification", verification},
   };
   const auto what = request.at("do").get<std::string>();
   const auto task = kTasks.find(what);
   if (task == kTasks.end()) {
     return refusal(
         {ErrorCode::Usage,
-         fmt::format("unknown request \"{}\": known are status, calibrate, cancel, reference", what)});
+         fmt::format("unknown request \"{}\": known are status, calibrate, cancel, reference, verification",
+                     what)});
   }
   auto answer = hub.call([&hub, run = task->second, request] { return run(hub, request); }, time_out);
   return answer ? std::move(*answer)

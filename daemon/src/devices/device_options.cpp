@@ -45,6 +45,9 @@ drivers::TrackerDeviceOptions device_options(const TrackerConfig& config, double
   options.host = config.host;
   options.port = config.port;
   options.session.time_separation_ms = static_cast<std::int32_t>(std::lround(1000.0 / config.point_rate_hz));
+  if (config.mode == TrackerModeConfig::Stationary) options.session.mode = drivers::TrackerMode::Stationary;
+  options.session.stationary_time_ms =
+      static_cast<std::int32_t>(config.stationary_time / std::chrono::milliseconds{1});
   options.session.weather = weather_monitor(config.weather);
   options.session.connect_timeout = stretched(config.connect_timeout, speed);
   options.session.command_timeout = stretched(config.command_timeout, speed);

@@ -92,6 +92,7 @@ void Hub::turn(WallTime wall) {
   for (const auto& event : parts_.calibration.turn(snapshots_, now)) {
     if (parts_.publisher != nullptr) parts_.publisher->event(event);
   }
+  if (parts_.verification != nullptr) parts_.verification->turn(snapshots_);
   run_calls();
 }
 

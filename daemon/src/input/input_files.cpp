@@ -185,4 +185,33 @@ Result<KnownErrorsFile> read_known_errors_csv(const std::filesystem::path& file)
   return errors;
 }
 
+Result<VerificationFile> read_verification_csv(const std::filesystem::path& file) {
+  auto parsed =
+      parse(file, {{{"x_mm"}, {"y_mm"}, {"z_mm"}, {"tracker_x_mm"}, {"tracker_y_mm"}, {"tracker_z_mm"}}});
+  if (!parsed) return tl::make_unexpected(parsed.error());
+  check_rows(*parsed, 1, "points");
+  if (parsed->faults.any()) return tl::make_unexpected(parsed->faults.to_error());
+  const auto& table = parsed->table;
+  VerificationFile out{parsed->source, {}, {}};
+  const auto vector_m = [&](std::size_t row, std::size_t first) {
+    const auto p = position_m(table, row, first);
+    return calib::Vector3(p[0], p[1], p[2]);
+  };
+  for (std::size_t row = 0; row < table.rows(); ++row) {
+    out.points.push_back({vector_m(row, 0), vector_m(row, 3)});
+    out.lines.push_back(table.line(row));
+  }
+  return out;
+}
+
+std::string to_verification_csv(std::span<const calib::verify::MeasuredPoint> points) {
+  std::string text = "x_mm,y_mm,z_mm,tracker_x_mm,tracker_y_mm,tracker_z_mm\n";
+  for (const auto& p : points) {
+    const calib::Vector3 reading_mm = kMmPerM * p.reading_m, measured_mm = kMmPerM * p.measured_m;
+    text += fmt::format("{:.17g},{:.17g},{:.17g},{:.17g},{:.17g},{:.17g}\n", reading_mm.x(), reading_mm.y(),
+                        reading_mm.z(), measured_mm.x(), measured_mm.y(), measured_mm.z());
+  }
+  return text;
+}
+
 }  // namespace abbe::daemon

@@ -316,7 +316,10 @@ Result<ReplayReport> replay(const RecordingReader& recording, const Config& conf
   };
 
   const auto hand_on = [&] {
-    for (const auto& s : snapshots) calibrations.take(s);
+    for (const auto& s : snapshots) {
+      calibrations.take(s);
+      if (options.snapshots) options.snapshots(s);
+    }
     report.snapshots += snapshots.size();
     snapshots.clear();
   };

@@ -9,6 +9,7 @@
 
 #include "abbe/daemon/html_report.hpp"
 #include "model/utc_text.hpp"
+#include "report/sections.hpp"
 
 namespace abbe::daemon {
 namespace {
@@ -17,29 +18,11 @@ namespace evemu = calib::evemu;
 constexpr double kMicro = 1e6;
 constexpr double kMilli = 1e3;
 
-std::string um(double m) {
-  return fmt::format("{:.2f} um", m * kMicro);
-}
-
 void add_verdict(HtmlReport& page, const calib::Verdict& verdict) {
-  page.heading("Verdict");
-  page.paragraph(verdict.accepted ? "The gate accepts the model." : "The gate refuses the model:");
-  for (const auto& reason : verdict.reasons) page.paragraph(reason);
-  const auto& held_out = verdict.held_out;
-  std::vector<std::pair<std::string, std::string>> facts{
-      {"left at positions the fit did not see, without compensation",
-       um(held_out.no_compensation_rms_m) + " rms"},
-      {"with the model", um(held_out.candidate_rms_m) + " rms"},
-      {"the same in standard deviations of the measurement (1: noise alone)",
-       fmt::format("{:.2f} without, {:.2f} with the model", held_out.no_compensation, held_out.candidate)}};
-  if (held_out.active_rms_m)
-    facts.emplace_back("with the model active until now", um(*held_out.active_rms_m) + " rms");
-  facts.emplace_back("largest error in the volume", um(verdict.max_error_m));
-  page.facts(facts);
+  add_verdict(page, verdict, "positions");
   page.paragraph(
       "Every position was left out once. Each contender had its own best-fit rotation about Ball1 there, "
-      "because "
-      "the direction of a position is known through its blocks alone.");
+      "because the direction of a position is known through its blocks alone.");
 }
 
 void add_rotation(HtmlReport& page, const evemu::Solution& solution) {
@@ -78,7 +61,7 @@ std::vector<double> components_um(const evemu::Observations& o, const evemu::Sol
 void add_residuals(HtmlReport& page, const evemu::Observations& o, const evemu::Solution& solution) {
   page.heading("What remains at the balls");
   const auto row = [](const char* what, const evemu::ResidualFigures& f) {
-    return std::vector<std::string>{what, um(f.mean_abs_m), um(f.rms_m), um(f.max_abs_m)};
+    return std::vector<std::string>{what, um_text(f.mean_abs_m), um_text(f.rms_m), um_text(f.max_abs_m)};
   };
   page.table({"", "mean", "rms", "largest"},
              {row("errors", solution.statistics.before), row("residuals", solution.statistics.after)});
@@ -195,12 +178,10 @@ void add_origin(HtmlReport& page, const ModelDocument& document, const evemu::So
        {"observations", fmt::format("{} for {} coefficients, rank {}, condition {:.3g}, {:.1f} effective "
                                     "parameters",
                                     s.observations, s.unknowns, s.rank, s.condition, s.effective_parameters)},
-       {"noise of a ball centre, per coordinate", um(s.s_m)},
+       {"noise of a ball centre, per coordinate", um_text(s.s_m)},
        {"chi^2 per degree of freedom", fmt::format("{:.3f}", s.chi2_per_dof)},
        {"valid", "inside the hull of the ball centres, for one tool"}});
-  std::vector<std::vector<std::string>> rows;
-  for (const auto& input : document.inputs) rows.push_back({input.name, input.sha256});
-  if (!rows.empty()) page.table({"input", "SHA-256"}, rows);
+  add_inputs(page, document.inputs);
 }
 
 }  // namespace

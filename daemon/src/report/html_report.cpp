@@ -186,6 +186,25 @@ void HtmlReport::chart(const Histogram& histogram) {
                            axis("count"))}}));
 }
 
+void HtmlReport::chart(const VectorChart& chart) {
+  // One line with a gap behind every arrow; only beginnings have a dot.
+  const json gap{{"x", nullptr}, {"y", nullptr}};
+  json line = json::array(), dots = json::array();
+  for (const auto& a : chart.arrows) {
+    line.push_back({{"x", a.x}, {"y", a.y}});
+    line.push_back({{"x", a.x + chart.magnification * a.dx}, {"y", a.y + chart.magnification * a.dy}});
+    line.push_back(gap);
+    for (const double radius : {2.0, 0.0, 0.0}) dots.push_back(radius);
+  }
+  const json dataset{{"label", chart.name},      {"data", line},
+                     {"showLine", true},         {"spanGaps", false},
+                     {"borderWidth", 1.5},       {"pointRadius", dots},
+                     {"borderColor", colour(0)}, {"backgroundColor", colour(0)}};
+  canvas(for_script({{"type", "scatter"},
+                     {"data", {{"datasets", json::array({dataset})}}},
+                     {"options", options(chart.title, axis(chart.x_label), axis(chart.y_label))}}));
+}
+
 void HtmlReport::canvas(std::string_view configuration) {
   // Neighbouring charts share a row.
   constexpr std::string_view kEnd = "</div>\n<!-- charts -->\n";

@@ -7,6 +7,7 @@
 
 #include "abbe/daemon/html_report.hpp"
 #include "model/utc_text.hpp"
+#include "report/sections.hpp"
 
 namespace abbe::daemon {
 namespace {
@@ -14,30 +15,10 @@ namespace {
 constexpr double kMicro = 1e6;
 constexpr double kMilli = 1e3;
 
+constexpr int kDecimals = 3;
+
 std::string um(double m) {
-  return fmt::format("{:.3f} um", m * kMicro);
-}
-
-std::vector<double> in_um(const std::vector<double>& m) {
-  std::vector<double> out;
-  for (const double v : m) out.push_back(v * kMicro);
-  return out;
-}
-
-void add_verdict(HtmlReport& page, const calib::Verdict& verdict) {
-  page.heading("Verdict");
-  page.paragraph(verdict.accepted ? "The gate accepts the model." : "The gate refuses the model:");
-  for (const auto& reason : verdict.reasons) page.paragraph(reason);
-  const auto& held_out = verdict.held_out;
-  std::vector<std::pair<std::string, std::string>> facts{
-      {"left on legs the fit did not see, without compensation", um(held_out.no_compensation_rms_m) + " rms"},
-      {"with the model", um(held_out.candidate_rms_m) + " rms"},
-      {"the same in standard deviations of the measurement (1: noise alone)",
-       fmt::format("{:.2f} without, {:.2f} with the model", held_out.no_compensation, held_out.candidate)}};
-  if (held_out.active_rms_m)
-    facts.emplace_back("with the model active until now", um(*held_out.active_rms_m) + " rms");
-  facts.emplace_back("largest error in the volume", um(verdict.max_error_m));
-  page.facts(facts);
+  return um_text(m, kDecimals);
 }
 
 void add_origin(HtmlReport& page, const ModelDocument& document) {
@@ -55,10 +36,7 @@ void add_origin(HtmlReport& page, const ModelDocument& document) {
               {"sigma0",
                fmt::format("{:.3f} (1: residuals as large as the stated uncertainties explain)", s.sigma0)},
               {"covariance multiplied with", fmt::format("{:.3f}", s.covariance_factor)}});
-  if (document.inputs.empty()) return;
-  std::vector<std::vector<std::string>> rows;
-  for (const auto& input : document.inputs) rows.push_back({input.name, input.sha256});
-  page.table({"input", "SHA-256"}, rows);
+  add_inputs(page, document.inputs);
 }
 
 void add_residuals(HtmlReport& page, const ModelStatistics& s, const calib::otf::Residuals& residuals) {
@@ -117,7 +95,7 @@ void add_tables(HtmlReport& page, const calib::VolumetricModel& model) {
 std::string otf_report(const ModelDocument& document, const calib::otf::Residuals& residuals,
                        const calib::Verdict& verdict) {
   HtmlReport page(fmt::format("{}: on-the-fly calibration", document.machine));
-  add_verdict(page, verdict);
+  add_verdict(page, verdict, "legs", kDecimals);
   add_residuals(page, document.statistics, residuals);
   add_tables(page, document.model);
   add_origin(page, document);

@@ -59,7 +59,12 @@ Result<void> CalibrationService::check(const CalibrationTask& task) const {
         ErrorCode::Refused,
         fmt::format("calibrate {}: the identification of a cancelled run is still ending", method_of(task)));
   }
-  if (const auto* otf = std::get_if<OtfRequest>(&task)) return check_otf_path(otf->path_m, config_.machine);
+  if (const auto* otf = std::get_if<OtfRequest>(&task)) {
+    if (config_.tracker && config_.tracker->mode == TrackerModeConfig::Stationary)
+      return fail(ErrorCode::Refused,
+                  "calibrate otf: [tracker] mode = \"stationary\" gives no points on the fly");
+    return check_otf_path(otf->path_m, config_.machine);
+  }
   return check_evemu(std::get<EvemuRequest>(task), config_);
 }
 

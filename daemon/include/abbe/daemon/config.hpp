@@ -63,12 +63,18 @@ enum class WeatherConfig {
   Compute
 };  ///< none: environment is not read; compute: the controller corrects n
 
+/// Continuous: for runs on the fly. Stationary: one mean after the other, for verification at standstills;
+/// no run on the fly is possible then.
+enum class TrackerModeConfig { Continuous, Stationary };
+
 /// [tracker]: the instrument on the wire.
 struct TrackerConfig {
   std::string name = "tracker";
   std::string host;
   std::uint16_t port = 700;
-  double point_rate_hz = 500.0;
+  TrackerModeConfig mode = TrackerModeConfig::Continuous;
+  double point_rate_hz = 500.0;                                              ///< continuous
+  std::chrono::nanoseconds stationary_time{std::chrono::milliseconds{500}};  ///< a mean's; whole ms
   WeatherConfig weather = WeatherConfig::Compute;
   std::chrono::nanoseconds max_constant_delay{
       std::chrono::milliseconds{2}};  ///< bound of the unobservable part of the delay

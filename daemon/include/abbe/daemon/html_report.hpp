@@ -32,6 +32,17 @@ struct Histogram {
   std::size_t bins = 40;
 };
 
+/// Arrows in a plane: each begins at its dot and is drawn `magnification` times as long as it is.
+struct VectorChart {
+  struct Arrow {
+    double x = 0.0, y = 0.0;    ///< where it begins, in the units of the axes
+    double dx = 0.0, dy = 0.0;  ///< the same units
+  };
+  std::string title, x_label, y_label, name;
+  std::vector<Arrow> arrows;
+  double magnification = 1.0;
+};
+
 class HtmlReport {
  public:
   explicit HtmlReport(std::string_view title);
@@ -43,6 +54,7 @@ class HtmlReport {
   void table(const std::vector<std::string>& columns, const std::vector<std::vector<std::string>>& rows);
   void chart(const LineChart&);
   void chart(const Histogram&);
+  void chart(const VectorChart&);
 
   /// The whole page.
   [[nodiscard]] std::string text() const;

@@ -21,11 +21,13 @@
 #include "abbe/daemon/recorder_thread.hpp"
 #include "abbe/daemon/reference_service.hpp"
 #include "abbe/daemon/sample_source.hpp"
+#include "abbe/daemon/verification_service.hpp"
 #include "abbe/drivers/time_source.hpp"
 
 namespace abbe::daemon {
 
-/// Everything the hub's turn works on. Owned by abbed; `publisher`, `recorder` and `reference` may be null.
+/// Everything the hub's turn works on. Owned by abbed; `publisher`, `recorder` and the services behind them
+/// may be null.
 struct HubParts {
   const Config& config;
   const drivers::TimeSource& time;
@@ -35,6 +37,7 @@ struct HubParts {
   Publisher* publisher = nullptr;
   RecorderThread* recorder = nullptr;
   ReferenceService* reference = nullptr;
+  VerificationService* verification = nullptr;
 };
 
 class Hub {

@@ -8,11 +8,13 @@
 #include <cstddef>
 #include <filesystem>
 #include <functional>
+#include <span>
 #include <string>
 #include <string_view>
 #include <vector>
 
 #include "abbe/calib/otf/run.hpp"
+#include "abbe/calib/verify/observe.hpp"
 #include "abbe/daemon/error.hpp"
 #include "abbe/daemon/otf_acquisition.hpp"
 
@@ -73,5 +75,15 @@ struct KnownErrorsFile {
   std::vector<calib::Vector3> errors_m;  ///< as long as points_m
 };
 [[nodiscard]] Result<KnownErrorsFile> read_known_errors_csv(const std::filesystem::path& file);
+
+/// verification.csv: `x_mm,y_mm,z_mm,tracker_x_mm,tracker_y_mm,tracker_z_mm`: scale reading and independent
+/// measurement there, each in its own frame; at least one.
+struct VerificationFile {
+  InputFile source;
+  std::vector<calib::verify::MeasuredPoint> points;
+  std::vector<std::size_t> lines;  ///< where each stands in the file; empty for points out of none
+};
+[[nodiscard]] Result<VerificationFile> read_verification_csv(const std::filesystem::path& file);
+[[nodiscard]] std::string to_verification_csv(std::span<const calib::verify::MeasuredPoint> points);
 
 }  // namespace abbe::daemon

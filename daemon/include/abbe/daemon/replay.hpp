@@ -28,6 +28,8 @@ struct ReplayOptions {
   std::function<void(double share)> progress;
   /// Sees every sample as the assembler gets it, with the time of the recording's first message.
   std::function<void(const Batch& batch, protocol::HostTime begin)> samples;
+  /// Sees every snapshot, in order.
+  std::function<void(const protocol::Snapshot&)> snapshots;
 };
 
 /// One calibration of the recording, done again.

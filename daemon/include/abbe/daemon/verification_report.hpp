@@ -1,0 +1,29 @@
+#pragma once
+/// What a metrologist looks at after an independent measurement of the compensated volume: what is left, how
+/// it compares with what was there (R_resmag of [Li OMM] section 5.4), and the vectors in three planes. Pure.
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "abbe/calib/verify/compare.hpp"
+#include "abbe/daemon/model_document.hpp"
+
+namespace abbe::daemon {
+
+struct Verification {
+  calib::verify::Observations observations;
+  calib::verify::Comparison comparison;
+  std::vector<InputFile> inputs;
+  std::vector<std::size_t> lines;  ///< of the points in their file; may be empty
+  /// Where the planes of vectors lie, one coordinate for each axis; default: the middle of the grid.
+  std::optional<calib::Vector3> planes_m;
+};
+
+/// report.html, self-contained.
+[[nodiscard]] std::string verification_report(const ModelDocument&, const Verification&);
+
+/// grid.csv: `x_mm,y_mm,z_mm,las_x_um,las_y_um,las_z_um,model_x_um,...,turned_x_um,...,R_stated,R_turned`.
+[[nodiscard]] std::string to_grid_csv(const calib::verify::Comparison&);
+
+}  // namespace abbe::daemon

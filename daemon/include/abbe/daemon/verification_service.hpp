@@ -1,0 +1,42 @@
+#pragma once
+/// Collects the points of a verification in the running daemon, for `abbe verify --live`: begun and ended
+/// over the control socket, one at a time. Whoever begins later takes over, so that nobody who went away
+/// blocks it. Used by the hub's thread only.
+
+#include <cstdint>
+#include <optional>
+#include <span>
+
+#include "abbe/daemon/config.hpp"
+#include "abbe/daemon/error.hpp"
+#include "abbe/daemon/standstill_points.hpp"
+
+namespace abbe::daemon {
+
+/// Of this tracker.
+[[nodiscard]] StandstillOptions standstill_options(const Config& config);
+/// Refused where readings at standstills say nothing of a model: no tracker, or axes that the control already
+/// corrects.
+[[nodiscard]] Result<void> check_verification(const Config& config);
+
+class VerificationService {
+ public:
+  explicit VerificationService(const Config& config) : config_(config) {}
+
+  /// The number by which whoever began it asks for it.
+  [[nodiscard]] Result<std::uint64_t> begin();
+  /// The standstill that goes on is its last point.
+  [[nodiscard]] Result<void> end(std::uint64_t number);
+  /// Refused once somebody else has begun another.
+  [[nodiscard]] Result<const StandstillPoints*> points(std::uint64_t number) const;
+
+  void turn(std::span<const protocol::Snapshot> snapshots);
+
+ private:
+  const Config& config_;
+  std::uint64_t number_ = 0;
+  bool running_ = false;
+  StandstillPoints points_;
+};
+
+}  // namespace abbe::daemon

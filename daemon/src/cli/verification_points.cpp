@@ -1,0 +1,104 @@
+#include "cli/verification_points.hpp"
+
+#include <fmt/format.h>
+#include <signal.h>
+
+#include <chrono>
+#include <csignal>
+#include <nlohmann/json.hpp>
+#include <thread>
+
+#include "abbe/daemon/control_protocol.hpp"
+#include "abbe/daemon/replay.hpp"
+#include "abbe/daemon/sha256.hpp"
+#include "abbe/daemon/verification_service.hpp"
+#include "cli/terminal.hpp"
+
+namespace abbe::daemon {
+namespace {
+
+using namespace std::chrono_literals;
+using nlohmann::json;
+
+constexpr auto kLook = 200ms;
+
+volatile std::sig_atomic_t interrupted = 0;  // written by the signal handler
+
+void end_on_interrupt() {
+  struct sigaction end {};
+  end.sa_handler = [](int) { interrupted = 1; };
+  ::sigaction(SIGINT, &end, nullptr);
+}
+
+calib::Vector3 vector_of(const json& list) {
+  return {list.at(0).get<double>(), list.at(1).get<double>(), list.at(2).get<double>()};
+}
+
+void tell(std::size_t number, const json& point) {
+  const calib::Vector3 q_mm = 1e3 * vector_of(point.at("reading_m"));
+  fmt::print(stderr, "{:>4}: {:.3f}, {:.3f}, {:.3f} mm, {} tracker points, scatter {:.1f} um\n", number,
+             q_mm.x(), q_mm.y(), q_mm.z(), point.at("tracker_points").get<std::size_t>(),
+             1e6 * point.at("scatter_m").get<double>());
+}
+
+/// One look at the daemon: new points are told and kept.
+Result<void> look(const std::filesystem::path& socket, const json& number, const char* step,
+                  VerificationFile& out) {
+  const auto answer = ask_daemon(
+      socket, {{"do", "verification"}, {"step", step}, {"number", number}, {"from", out.points.size()}});
+  if (!answer) return tl::make_unexpected(answer.error());
+  for (const json& point : answer->at("points")) {
+    out.points.push_back({vector_of(point.at("reading_m")), vector_of(point.at("tracker_m"))});
+    tell(out.points.size(), point);
+  }
+  return {};
+}
+
+/// A daemon that went away takes no points with it.
+Result<VerificationFile> what_there_is(VerificationFile& points, const Error& error) {
+  if (points.points.empty()) return tl::make_unexpected(error);
+  (void)report(error);
+  return std::move(points);
+}
+
+}  // namespace
+
+Result<VerificationFile> points_of_recording(const std::string& file) {
+  const auto recording = RecordingReader::open(file);
+  if (!recording) return tl::make_unexpected(recording.error());
+  const auto config = parse_config(recording->info().configuration, file + " (recorded configuration)");
+  if (!config) return tl::make_unexpected(config.error());
+  if (const auto possible = check_verification(*config); !possible)
+    return fail(ErrorCode::DataInsufficient, fmt::format("{}: {}", file, possible.error().text));
+  const auto hash = sha256_hex_of_file(file);
+  if (!hash) return tl::make_unexpected(hash.error());
+  StandstillPoints standstills{standstill_options(*config)};
+  ProgressBar bar;
+  const auto replayed =
+      replay(*recording, *config,
+             {.progress = [&bar](double share) { bar.show("replaying", share); },
+              .snapshots = [&standstills](const protocol::Snapshot& s) { standstills.take(s); }});
+  if (!replayed) return tl::make_unexpected(replayed.error());
+  standstills.finish();
+  VerificationFile out{{std::filesystem::path(file).filename().string(), *hash}, {}, {}};
+  for (const auto& p : standstills.points()) out.points.push_back(p.mean);
+  return out;
+}
+
+Result<VerificationFile> points_of_daemon(const std::filesystem::path& socket, std::size_t count) {
+  const auto begun = ask_daemon(socket, {{"do", "verification"}, {"step", "begin"}});
+  if (!begun) return tl::make_unexpected(begun.error());
+  const json number = begun->at("number");
+  end_on_interrupt();
+  fmt::print(stderr, "abbe: stand still for some seconds at every point; Ctrl-C after the last one\n");
+  VerificationFile out;
+  const auto all = [&] { return interrupted != 0 || (count != 0 && out.points.size() >= count); };
+  for (; !all(); std::this_thread::sleep_for(kLook)) {
+    if (const auto looked = look(socket, number, "look", out); !looked)
+      return what_there_is(out, looked.error());
+  }
+  if (const auto ended = look(socket, number, "end", out); !ended) return what_there_is(out, ended.error());
+  return out;
+}
+
+}  // namespace abbe::daemon

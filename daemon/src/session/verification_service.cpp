@@ -1,0 +1,50 @@
+#include "abbe/daemon/verification_service.hpp"
+
+#include <algorithm>
+
+namespace abbe::daemon {
+
+StandstillOptions standstill_options(const Config& config) {
+  StandstillOptions options;
+  if (config.tracker && config.tracker->mode == TrackerModeConfig::Stationary)
+    options.settle = std::max(options.settle, config.tracker->stationary_time);
+  return options;
+}
+
+Result<void> check_verification(const Config& config) {
+  if (!config.tracker)
+    return fail(ErrorCode::Refused, "verify: there is no [tracker] with a host to measure with");
+  if (config.axes_compensated())
+    return fail(
+        ErrorCode::Refused,
+        "verify: the control already corrects these axes (axes_compensated = true): a model speaks of "
+        "readings without its correction");
+  return {};
+}
+
+Result<std::uint64_t> VerificationService::begin() {
+  if (auto possible = check_verification(config_); !possible) return tl::make_unexpected(possible.error());
+  points_ = StandstillPoints{standstill_options(config_)};
+  running_ = true;
+  return ++number_;
+}
+
+Result<void> VerificationService::end(std::uint64_t number) {
+  if (const auto own = points(number); !own) return tl::make_unexpected(own.error());
+  if (running_) points_.finish();
+  running_ = false;
+  return {};
+}
+
+Result<const StandstillPoints*> VerificationService::points(std::uint64_t number) const {
+  if (number == 0 || number != number_)
+    return fail(ErrorCode::Refused, "verify: somebody else has begun another verification");
+  return &points_;
+}
+
+void VerificationService::turn(std::span<const protocol::Snapshot> snapshots) {
+  if (!running_) return;
+  for (const auto& snapshot : snapshots) points_.take(snapshot);
+}
+
+}  // namespace abbe::daemon

@@ -1,0 +1,71 @@
+#include "abbe/daemon/verification_service.hpp"
+
+#include <gmock/gmock.h>
+
+namespace abbe::daemon {
+namespace {
+
+using namespace std::chrono_literals;
+using protocol::Snapshot;
+
+Config watched() {
+  Config config;
+  config.tracker.emplace().host = "127.0.0.1";
+  return config;
+}
+
+std::vector<Snapshot> standstill(std::chrono::nanoseconds from, double x) {
+  std::vector<Snapshot> all;
+  for (auto t = from; t < from + 3s; t += 100ms) {
+    Snapshot& s = all.emplace_back();
+    s.head.time = protocol::HostTime{t};
+    s.axis_count = 3;
+    s.position[0] = x;
+    s.has_tracker_point = true;
+    s.tracker_point.p_tracker_m = {1.0, x, 0.0};
+  }
+  return all;
+}
+
+TEST(VerificationService, CollectsBetweenBeginAndEnd) {
+  const Config config = watched();
+  VerificationService service(config);
+  service.turn(standstill(0s, 0.5));
+  const auto number = service.begin();
+  ASSERT_TRUE(number);
+  service.turn(standstill(10s, 0.1));
+  service.turn(standstill(20s, 0.2));
+  EXPECT_EQ((*service.points(*number))->points().size(), 1u);
+  ASSERT_TRUE(service.end(*number));
+  service.turn(standstill(30s, 0.3));
+  ASSERT_EQ((*service.points(*number))->points().size(), 2u);
+  EXPECT_DOUBLE_EQ((*service.points(*number))->points()[1].mean.reading_m.x(), 0.2);
+}
+
+TEST(VerificationService, BelongsToWhoeverBeganLast) {
+  const Config config = watched();
+  VerificationService service(config);
+  EXPECT_EQ(service.points(0).error().code, ErrorCode::Refused);
+  const auto first = *service.begin(), second = *service.begin();
+  EXPECT_EQ(service.points(first).error().code, ErrorCode::Refused);
+  EXPECT_EQ(service.end(first).error().code, ErrorCode::Refused);
+  EXPECT_TRUE(service.points(second));
+}
+
+TEST(VerificationService, RefusesReadingsThatSayNothing) {
+  const Config without;
+  EXPECT_EQ(VerificationService(without).begin().error().code, ErrorCode::Refused);
+  Config compensated = watched();
+  compensated.encoder.emplace().axes_compensated = true;
+  EXPECT_THAT(VerificationService(compensated).begin().error().text, testing::HasSubstr("axes_compensated"));
+}
+
+TEST(VerificationService, WaitsForTheMeansOfASlowTracker) {
+  Config config = watched();
+  config.tracker->mode = TrackerModeConfig::Stationary;
+  config.tracker->stationary_time = 2s;
+  EXPECT_EQ(standstill_options(config).settle, 2s);
+}
+
+}  // namespace
+}  // namespace abbe::daemon

@@ -1,0 +1,259 @@
+/// `abbe verify`: the built program on models of two methods, its files and exit codes.
+
+#include <fmt/format.h>
+#include <gmock/gmock.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <nlohmann/json.hpp>
+#include <sstream>
+
+#include "abbe/calib/evemu/solve.hpp"
+#include "abbe/daemon/control_protocol.hpp"
+#include "abbe/daemon/input_files.hpp"
+#include "abbe/daemon/model_document.hpp"
+#include "evemu_study.hpp"
+#include "recording_fixture.hpp"
+#include "synthetic_model.hpp"
+
+namespace abbe::daemon {
+namespace {
+
+namespace fs = std::filesystem;
+namespace study = tests::evemu;
+using ::testing::AllOf;
+using ::testing::HasSubstr;
+using ::testing::Not;
+using ::testing::StartsWith;
+
+std::string text_of(const fs::path& file) {
+  std::ostringstream text;
+  text << std::ifstream(file, std::ios::binary).rdbuf();
+  return text.str();
+}
+
+ModelDocument ball_array_document() {
+  const auto solution = *calib::evemu::solve(
+      study::simulated(study::reference_layout(), study::table3_machine(), {8e-6, 0.0}, 1));
+  Config config;
+  config.machine.name = "weak portal";
+  return evemu_document(solution, config, {}, {});
+}
+
+/// Every 100, 100 and 20 mm, as in [Li OMM] section 5.4, seen from the tracker.
+std::vector<calib::verify::MeasuredPoint> tracker_points(const study::Field& V) {
+  const calib::RigidTransform T_tracker_machine{
+      Eigen::AngleAxisd(1.1, calib::Vector3(0.2, 0.1, 1.0).normalized()).toRotationMatrix(),
+      calib::Vector3(3.0, -1.0, 0.4)};
+  std::vector<calib::verify::MeasuredPoint> points;
+  for (int x = -100; x <= 600; x += 100)
+    for (int y = -100; y <= 400; y += 100)
+      for (int z = 0; z <= 100; z += 20) {
+        const calib::Vector3 q(1e-3 * x, 1e-3 * y, 1e-3 * z);
+        points.push_back({q, T_tracker_machine * (q + V(q))});
+      }
+  return points;
+}
+
+struct Ran {
+  int exit = -1;
+  std::string out, err;
+};
+
+class VerifyCli : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    fs::create_directories(folder_);
+    write("model.json", to_json(ball_array_document()));
+    write("verification.csv", to_verification_csv(tracker_points(study::table3_machine())));
+  }
+  void TearDown() override { fs::remove_all(folder_); }
+
+  void write(const std::string& name, const std::string& text) const {
+    std::ofstream(folder_ / name, std::ios::binary) << text;
+  }
+  Ran abbe(const std::string& arguments) const {
+    const auto out = folder_ / "stdout", err = folder_ / "stderr";
+    const auto command = fmt::format("cd '{}' && '{}' {} >'{}' 2>'{}'", folder_.string(), ABBE_PROGRAM,
+                                     arguments, out.string(), err.string());
+    const int status = std::system(command.c_str());
+    return {WIFEXITED(status) ? WEXITSTATUS(status) : -1, text_of(out), text_of(err)};
+  }
+
+  fs::path folder_ = fs::path(::testing::TempDir()) / fmt::format("verify_cli_{}", ::getpid());
+};
+
+TEST_F(VerifyCli, SaysHowMuchAModelLeaves) {
+  const auto ran = abbe("verify model.json --points verification.csv --json");
+  ASSERT_EQ(ran.exit, 0) << ran.err;
+  const auto summary = nlohmann::json::parse(ran.out);
+  EXPECT_EQ(summary["points"], 8 * 6 * 6);
+  EXPECT_LT(summary["after"]["rms_um"].get<double>(), 0.1 * summary["before"]["rms_um"].get<double>());
+  EXPECT_LT(summary["R_turned"]["median"].get<double>(), 0.3);
+  EXPECT_GT(summary["R_turned"]["count"].get<int>(), 1000);
+}
+
+TEST_F(VerifyCli, WritesAReportThatNeedsNoNetwork) {
+  const auto ran = abbe("verify model.json --points verification.csv --planes-mm 366.667,50,33.333 -o out");
+  ASSERT_EQ(ran.exit, 0) << ran.err;
+  EXPECT_THAT(ran.out, AllOf(HasSubstr("R_resmag"), HasSubstr("without compensation"), HasSubstr("above 1")));
+  const auto page = text_of(folder_ / "out/report.html");
+  EXPECT_THAT(page, AllOf(HasSubstr("Vectors in three planes"), HasSubstr("rigid motion"),
+                          HasSubstr("weak portal"), Not(HasSubstr("src=\"http"))));
+  EXPECT_THAT(text_of(folder_ / "out/grid.csv"), StartsWith("x_mm,y_mm,z_mm,las_x_um,"));
+}
+
+TEST_F(VerifyCli, TakesAModelOfTables) {
+  const auto document = test::synthetic_document(3);
+  write("tables.json", to_json(document));
+  std::vector<calib::verify::MeasuredPoint> points;
+  const auto tool = document.model.tool_offsets_m().front();
+  for (int i = 0; i < 343; ++i) {
+    const calib::Vector3 q(-0.3 + 0.1 * (i % 7), -0.3 + 0.1 * (i / 7 % 7), -0.4 + 0.05 * (i / 49));
+    points.push_back({q, q + tool + document.model.V_at(q, tool)});
+  }
+  write("points.csv", to_verification_csv(points));
+  const auto ran = abbe("verify tables.json --points points.csv --json");
+  ASSERT_EQ(ran.exit, 0) << ran.err;
+  const auto summary = nlohmann::json::parse(ran.out);
+  EXPECT_LT(summary["after"]["max_um"].get<double>(), 1e-3);
+  EXPECT_GT(summary["before"]["max_um"].get<double>(), 1.0);
+}
+
+constexpr std::string_view kWatched = R"([machine]
+name = "weak portal"
+chain = "[w b Z X Y t]"
+[axes.X]
+min_mm = -100
+max_mm = 650
+[axes.Y]
+min_mm = -100
+max_mm = 400
+[axes.Z]
+min_mm = 0
+max_mm = 100
+[target]
+offset_mm = [0, 0, 0]
+[tracker]
+host = "127.0.0.1"
+mode = "stationary"
+[encoder]
+transport = "udp"
+peer_host = "127.0.0.1"
+peer_port = 1
+sync_period_us = 100000
+nodes = [{ axis = "X", node = 1, step_nm = 1 }, { axis = "Y", node = 2, step_nm = 1 }, { axis = "Z", node = 3, step_nm = 1 }]
+)";
+
+/// Three seconds at every point, the next one reached at once.
+void record_standstills(const fs::path& folder, const std::vector<calib::verify::MeasuredPoint>& points) {
+  using namespace std::chrono_literals;
+  RecordingInfo info = example_info();
+  info.configuration = kWatched;
+  auto recorder = Recorder::open(example_options(folder), info, Recorder::WallTime{});
+  ASSERT_TRUE(recorder) << recorder.error().text;
+  constexpr int kSteps = 30;  // of 100 ms
+  for (std::size_t i = 0; i < kSteps * points.size(); ++i) {
+    const auto& p = points[i / kSteps];
+    protocol::AxisSample axes;
+    axes.head.time = protocol::HostTime{1000s + static_cast<std::int64_t>(i) * 100ms};
+    axes.axis_count = 3;
+    std::copy_n(p.reading_m.data(), 3, axes.position.begin());
+    recorder->record(axes, "encoder");
+    if (i % 5 != 2) continue;
+    protocol::TrackerPoint seen;
+    seen.head.time = axes.head.time + 20ms;
+    seen.device_time = protocol::DeviceTime{seen.head.time.time_since_epoch()};
+    std::copy_n(p.measured_m.data(), 3, seen.p_tracker_m.begin());
+    recorder->record(seen, "tracker");
+  }
+  ASSERT_TRUE(recorder->close());
+}
+
+TEST_F(VerifyCli, TakesTheStandstillsOfARecording) {
+  const auto points = tracker_points(study::table3_machine());
+  record_standstills(folder_, points);
+  const auto ran = abbe("verify model.json --recording run.mcap --json -o out");
+  ASSERT_EQ(ran.exit, 0) << ran.err;
+  EXPECT_EQ(nlohmann::json::parse(ran.out)["points"], points.size());
+  const auto mean_of = [&](const Ran& r) {
+    return nlohmann::json::parse(r.out)["R_turned"]["mean"].get<double>();
+  };
+  constexpr double kRounding = 1e-9;  // m to mm and back, through a rotation of metres
+  for (const auto* file : {"verification.csv", "out/verification.csv"}) {
+    const auto again = abbe(fmt::format("verify model.json --points {} --json", file));
+    ASSERT_EQ(again.exit, 0) << again.err;
+    EXPECT_NEAR(mean_of(again), mean_of(ran), kRounding) << file;
+  }
+}
+
+/// A daemon that has found `points`.
+std::unique_ptr<ControlServer> daemon_with(const fs::path& socket,
+                                           const std::vector<calib::verify::MeasuredPoint>& points) {
+  return std::move(*ControlServer::open(socket, [points](const nlohmann::json& request) {
+    const auto list = [](const calib::Vector3& v) { return nlohmann::json{v.x(), v.y(), v.z()}; };
+    if (request.at("step") == "begin") return nlohmann::json{{"ok", true}, {"number", 7}};
+    EXPECT_EQ(request.at("number"), 7);
+    const auto from = request.at("from").get<std::size_t>();
+    nlohmann::json found = nlohmann::json::array();
+    for (std::size_t i = from; i < points.size(); ++i)
+      found.push_back({{"reading_m", list(points[i].reading_m)},
+                       {"tracker_m", list(points[i].measured_m)},
+                       {"tracker_points", 4},
+                       {"scatter_m", 1e-6}});
+    return nlohmann::json{{"ok", true}, {"standing", 0}, {"points", found}};
+  }));
+}
+
+TEST_F(VerifyCli, CollectsThePointsOfTheRunningDaemon) {
+  const auto points = tracker_points(study::table3_machine());
+  const auto server = daemon_with(folder_ / "control.sock", points);
+  const auto ran = abbe(
+      fmt::format("verify model.json --live --socket control.sock --count {} --json -o out", points.size()));
+  ASSERT_EQ(ran.exit, 0) << ran.err;
+  EXPECT_THAT(ran.err, HasSubstr(fmt::format("{}: ", points.size())));
+  EXPECT_EQ(nlohmann::json::parse(ran.out)["points"], points.size());
+  EXPECT_EQ(text_of(folder_ / "out/verification.csv"), text_of(folder_ / "verification.csv"));
+}
+
+TEST_F(VerifyCli, KeepsCollectedPointsThatAllowNoAnswer) {
+  auto points = tracker_points(study::table3_machine());
+  points.resize(3);
+  const auto server = daemon_with(folder_ / "control.sock", points);
+  EXPECT_EQ(abbe("verify model.json --live --socket control.sock --count 3 -o out").exit, 1);
+  EXPECT_TRUE(fs::exists(folder_ / "out/verification.csv"));
+  EXPECT_EQ(abbe("verify model.json --live --socket control.sock").exit, 2);  // nowhere to keep them
+}
+
+TEST_F(VerifyCli, NamesFileAndLineOfBadPoints) {
+  write("verification.csv", "x_mm,y_mm,z_mm,tracker_x_mm,tracker_y_mm,tracker_z_mm\n0,0,0,1,2,nan\n1,2,3\n");
+  const auto ran = abbe("verify model.json --points verification.csv");
+  EXPECT_EQ(ran.exit, 3);
+  EXPECT_THAT(ran.err, AllOf(HasSubstr("verification.csv:2:"), HasSubstr("tracker_z_mm"),
+                             HasSubstr("verification.csv:3:")));
+}
+
+TEST_F(VerifyCli, SaysWhenTheDataAllowNoAnswer) {
+  auto points = tracker_points(study::table3_machine());
+  points.resize(3);
+  write("verification.csv", to_verification_csv(points));
+  EXPECT_EQ(abbe("verify model.json --points verification.csv").exit, 1);
+  auto mirrored = tracker_points(study::table3_machine());
+  for (auto& p : mirrored) p.measured_m.x() = -p.measured_m.x();
+  write("verification.csv", to_verification_csv(mirrored));
+  const auto ran = abbe("verify model.json --points verification.csv");
+  EXPECT_EQ(ran.exit, 1);
+  EXPECT_THAT(ran.err, HasSubstr("left-handed"));
+}
+
+TEST_F(VerifyCli, RefusesNonsenseOnTheCommandLine) {
+  EXPECT_EQ(abbe("verify model.json").exit, 2);
+  EXPECT_EQ(abbe("verify model.json --points verification.csv --grid-mm 1,2").exit, 2);
+  EXPECT_EQ(abbe("verify model.json --points verification.csv --frame best").exit, 2);
+}
+
+}  // namespace
+}  // namespace abbe::daemon

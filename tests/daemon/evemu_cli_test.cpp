@@ -172,6 +172,29 @@ TEST_F(EvemuCli, WritesModelsThatReadBackToTheSameBits) {
   EXPECT_EQ(to_json(*document), text);
 }
 
+/// The first position's touches stand for those of a good machine.
+TEST_F(EvemuCli, MakesTheCalibratorFileOfAnArtefact) {
+  Touches one = touches();
+  std::erase_if(one, [](const auto& t) { return t.position != 1; });
+  write("pre.csv", touches_csv(one));
+  const auto ran = abbe(
+      "identify artefact --touches pre.csv --name 'L \"array\"' --tip-radius-mm 2 "
+      "--machine-tip-radius-mm 1.5 -o pre.toml");
+  ASSERT_EQ(ran.exit, 0) << ran.err;
+  const auto read = read_calibrator_toml(folder_ / "pre.toml");
+  ASSERT_TRUE(read) << read.error().text;
+  const auto expected = *calib::evemu::precalibrated("L \"array\"", one, 2e-3,
+                                                     {calib::Vector3::UnitZ(), calib::Vector3::UnitY()});
+  EXPECT_EQ(read->calibrator.name, "L \"array\"");
+  EXPECT_DOUBLE_EQ(read->calibrator.tip_radius_m, 1.5e-3);
+  ASSERT_EQ(read->calibrator.balls.size(), expected.balls.size());
+  for (std::size_t i = 0; i < expected.balls.size(); ++i) {
+    EXPECT_LT((read->calibrator.balls[i].centre_m - expected.balls[i].centre_m).norm(), 1e-14);
+    EXPECT_NEAR(read->calibrator.balls[i].radius_m, expected.balls[i].radius_m, 1e-15);
+  }
+  EXPECT_EQ(abbe("identify artefact --touches touches.csv --name L --tip-radius-mm 2 -o pre.toml").exit, 3);
+}
+
 TEST_F(EvemuCli, NamesWhatIsWrongWithTouches) {
   auto touches = touches_csv();
   write("touches.csv", touches.replace(touches.find("1,ball"), 6, "1,bell"));

@@ -63,10 +63,11 @@ void add_commands(CLI::App& app, int& exit) {
   add_reference(app, exit);
   add_replay(app, exit);
   auto* identify = app.add_subcommand(
-      "identify", "Identify a machine's geometric errors from recorded files");
+      "identify", "Identify a machine's geometric errors, or an artefact, from recorded files");
   identify->require_subcommand(1);
   add_identify_otf(*identify, exit);
   add_identify_evemu(*identify, exit);
+  add_identify_artefact(*identify, exit);
   add_verify(app, exit);
   auto* model =
       app.add_subcommand("model", "Evaluate models, and look after the store of a machine's models");

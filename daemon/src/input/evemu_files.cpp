@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <nlohmann/json.hpp>
 
 #include "abbe/daemon/otf_inputs.hpp"
 #include "abbe/daemon/sha256.hpp"
@@ -65,7 +66,19 @@ void read_balls(Section& root, calib::evemu::Calibrator& out) {
             [](const auto& a, const auto& b) { return a.number < b.number; });
 }
 
-void read_blocks(Section& root, calib::evemu::Calibrator& out) {
+void read_face(Section& block, std::optional<BlockFace>& out) {
+  BlockFace face;
+  unsigned known = 0;
+  known += block.get("x_mm", face.centre_m.x(), kMilli, kAny) ? 1 : 0;
+  known += block.get("y_mm", face.centre_m.y(), kMilli, kAny) ? 1 : 0;
+  known += block.get("z_mm", face.centre_m.z(), kMilli, kAny) ? 1 : 0;
+  block.get("half_size_mm", face.half_size_m, kMilli, kPositive);
+  if (known == 3) out = face;
+  if (known == 1 || known == 2) block.fault("x_mm", "needs y_mm and z_mm, too");
+}
+
+void read_blocks(Section& root, calib::evemu::Calibrator& out,
+                 std::array<std::optional<BlockFace>, 2>& faces) {
   for (Section& block : root.children("block")) {
     calib::evemu::Calibrator::Block b;
     std::vector<double> normal;
@@ -77,6 +90,7 @@ void read_blocks(Section& root, calib::evemu::Calibrator& out) {
         block.fault("normal", "must be three numbers, x, y, z");
     }
     block.get("u_urad", b.u_rad, kMicro, kNotNegative);
+    read_face(block, faces[b.number == 2 ? 1 : 0]);
     block.close();
     out.blocks.push_back(b);
   }
@@ -84,14 +98,14 @@ void read_blocks(Section& root, calib::evemu::Calibrator& out) {
             [](const auto& a, const auto& b) { return a.number < b.number; });
 }
 
-calib::evemu::Calibrator read_calibrator(Section& root) {
+calib::evemu::Calibrator read_calibrator(Section& root, std::array<std::optional<BlockFace>, 2>& faces) {
   calib::evemu::Calibrator out;
   Section head = root.child("calibrator", Need::Required);
   head.get("name", out.name, Need::Required);
   head.get("tip_radius_mm", out.tip_radius_m, kMilli, kNotNegative, Need::Required);
   head.close();
   read_balls(root, out);
-  read_blocks(root, out);
+  read_blocks(root, out, faces);
   root.close();
   return out;
 }
@@ -141,11 +155,35 @@ Result<CalibratorFile> read_calibrator_toml(const std::filesystem::path& file) {
     return tl::make_unexpected(faults.to_error());
   }
   Section root(&table, "", {1, 1}, faults);
-  auto calibrator = read_calibrator(root);
+  std::array<std::optional<BlockFace>, 2> faces;
+  auto calibrator = read_calibrator(root, faces);
   if (faults.any()) return tl::make_unexpected(faults.to_error());
   if (const auto sound = calib::evemu::check(calibrator); !sound)
     return fail(ErrorCode::BadInput, fmt::format("{}: {}", file.string(), sound.error().text));
-  return CalibratorFile{{file.filename().string(), sha256_hex(*text)}, std::move(calibrator)};
+  return CalibratorFile{{file.filename().string(), sha256_hex(*text)}, std::move(calibrator), faces};
+}
+
+std::string calibrator_toml(const calib::evemu::Calibrator& calibrator,
+                            const std::array<std::optional<BlockFace>, 2>& faces, std::string_view comment) {
+  const auto place = [](const calib::Vector3& p_m) {
+    return fmt::format("x_mm = {:.17g}\ny_mm = {:.17g}\nz_mm = {:.17g}\n", kMmPerM * p_m.x(),
+                       kMmPerM * p_m.y(), kMmPerM * p_m.z());
+  };
+  std::string out{comment};
+  out += fmt::format("[calibrator]\nname = {}\ntip_radius_mm = {:.17g}\n",
+                     nlohmann::json(calibrator.name).dump(), kMmPerM * calibrator.tip_radius_m);
+  for (const auto& ball : calibrator.balls) {
+    out += fmt::format("\n[[ball]]\nnumber = {}\n{}radius_mm = {:.17g}\nu_um = {:.3g}\n", ball.number,
+                       place(ball.centre_m), kMmPerM * ball.radius_m, kUmPerM * ball.u_m);
+  }
+  for (const auto& block : calibrator.blocks) {
+    const auto& n = block.normal;
+    out += fmt::format("\n[[block]]\nnumber = {}\nnormal = [{:.17g}, {:.17g}, {:.17g}]\nu_urad = {:.3g}\n",
+                       block.number, n.x(), n.y(), n.z(), 1e6 * block.u_rad);
+    if (const auto& face = faces[block.number == 2 ? 1 : 0])
+      out += fmt::format("{}half_size_mm = {:.17g}\n", place(face->centre_m), kMmPerM * face->half_size_m);
+  }
+  return out;
 }
 
 Result<calib::evemu::Machine> evemu_machine(const MachineConfig& machine) {

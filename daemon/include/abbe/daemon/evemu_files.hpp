@@ -3,7 +3,11 @@
 /// calibrator. Faults as in input_files.hpp: all at once, with file, line and column, and nothing of a file
 /// that has one. Functions, safe from any thread.
 
+#include <array>
 #include <filesystem>
+#include <optional>
+#include <string>
+#include <string_view>
 #include <vector>
 
 #include "abbe/calib/evemu/observe.hpp"
@@ -27,13 +31,24 @@ struct BallErrorsFile {
 };
 [[nodiscard]] Result<BallErrorsFile> read_errors_csv(const std::filesystem::path& file);
 
+/// Where the face of a block is that is to be touched: a square around its centre.
+struct BlockFace {
+  calib::Vector3 centre_m = calib::Vector3::Zero();
+  double half_size_m = 5e-3;
+};
+
 /// calibrator.toml: `[calibrator] name, tip_radius_mm`; `[[ball]] number, x_mm, y_mm, z_mm, radius_mm, u_um`;
-/// `[[block]] number, normal, u_urad`.
+/// `[[block]] number, normal, u_urad`, and where somebody is to touch it x_mm, y_mm, z_mm, half_size_mm.
 struct CalibratorFile {
   InputFile source;
   calib::evemu::Calibrator calibrator;
+  std::array<std::optional<BlockFace>, 2> faces;  ///< of blocks 1 and 2
 };
 [[nodiscard]] Result<CalibratorFile> read_calibrator_toml(const std::filesystem::path& file);
+/// The same file again; `comment` lines stand at its head, each with its #.
+[[nodiscard]] std::string calibrator_toml(const calib::evemu::Calibrator& calibrator,
+                                          const std::array<std::optional<BlockFace>, 2>& faces,
+                                          std::string_view comment);
 
 /// The chain and target offset (here: the tip) of a configuration.
 [[nodiscard]] Result<calib::evemu::Machine> evemu_machine(const MachineConfig& machine);

@@ -7,6 +7,7 @@
 #include "abbe/drivers/can/udp_can_bus.hpp"
 #include "abbe/drivers/device_thread.hpp"
 #include "figure.hpp"
+#include "locked_memory.hpp"
 #include "run_time.hpp"
 #include "simulated_encoders.hpp"
 
@@ -18,6 +19,7 @@ using namespace std::chrono_literals;
 constexpr std::size_t kAxes = 5;
 
 TEST(FiveAxesOverUdp, AreNeverMissing) {
+  EXPECT_TRUE(::geteuid() != 0 || lock_memory());
   drivers::MonotonicTime time;
   const SimulatedEncoders encoders{sim::CanPortOptions{.speed = 1.0}, kAxes, ::geteuid() == 0 ? 90 : 0};
   drivers::EncoderDeviceOptions options;
@@ -28,8 +30,8 @@ TEST(FiveAxesOverUdp, AreNeverMissing) {
       time));
   const auto thread = std::move(*drivers::DeviceThread::start(*device, {.name = "encoders", .priority = 50}));
 
-  std::array<protocol::AxisSample, 4096> some{};
-  std::array<protocol::RawBlock, 4096> blocks;  // NOLINT: filled by pop
+  std::vector<protocol::AxisSample> some(4096);
+  std::vector<protocol::RawBlock> blocks(4096);  // too much for a stack
   std::size_t samples = 0;
   std::size_t incomplete = 0;
   std::uint64_t lost = 0;

@@ -9,6 +9,7 @@
 #include "abbe/sim/truth_table.hpp"
 #include "environment_setup.hpp"
 #include "files.hpp"
+#include "measuring_machine_setup.hpp"
 #include "toml_section.hpp"
 
 namespace abbe::sim {
@@ -27,6 +28,7 @@ struct Draft {
   std::string truth_file;
   std::string path_file;
   std::string machine_file;
+  std::string artefact_file;
   std::int64_t seed = 1;
   double encoder_noise_m = 5e-9;
 };
@@ -245,6 +247,7 @@ void read_machine_tables(TomlSection root, Draft& draft) {
   read_encoder_nodes(encoder, simulation.nodes);
   read_counter_card(root.child("counter_card"), simulation);
   read_reference(root.child("reference"), simulation);
+  read_cmm(root.child("cmm"), simulation);
   root.child("daemon").number("speed", draft.setup.speed, 1.0, {1e-3, 1e4});
 }
 
@@ -318,8 +321,11 @@ void read_faults(TomlSection& sim, std::vector<ScheduledFault>& faults) {
       scheduled.target = FaultTarget::Environment;
     } else if (device == "counter_card") {
       scheduled.target = FaultTarget::CounterCard;
+    } else if (device == "cmm") {
+      scheduled.target = FaultTarget::MeasuringMachine;
     } else {
-      section.fault("device", "must be \"tracker\", \"encoder\", \"environment\" or \"counter_card\"");
+      section.fault("device",
+                    "must be \"tracker\", \"encoder\", \"environment\", \"counter_card\" or \"cmm\"");
     }
     const auto known = fault_kind(scheduled.target, kind);
     if (!known) section.fault("kind", fmt::format("\"{}\" is no fault of this device", kind));
@@ -354,6 +360,9 @@ void read_sim(TomlSection sim, const std::string& file, Draft& draft) {
   read_sim_counter_card(sim.child("counter_card"), simulation);
   read_sim_evemu(sim.child("evemu"), draft.setup);
   read_probe(sim.child("probe"), simulation);
+  std::string artefact;
+  read_sim_cmm(sim.child("cmm"), simulation, artefact);
+  if (!artefact.empty()) draft.artefact_file = beside(file, artefact);
   read_faults(sim, simulation.faults);
   sim.refuse_unknown_keys();
 }
@@ -454,6 +463,8 @@ void share_seed_and_speed(Draft& draft) {
     node.seed = static_cast<std::uint64_t>(draft.seed);
     node.noise_m = draft.encoder_noise_m;
   }
+  if (simulation.measuring_machine)
+    simulation.measuring_machine->machine.seed = static_cast<std::uint64_t>(draft.seed);
   if (simulation.surface) simulation.surface->seed = static_cast<std::uint64_t>(draft.seed);
   for (CounterCardSetup& card : simulation.counter_cards) card.seed = static_cast<std::uint64_t>(draft.seed);
 }
@@ -476,6 +487,10 @@ Result<LoadedSetup> load_setup(const SetupChoices& choices) {
   if (const auto made = make_truth(draft); !made) return tl::unexpected(made.error());
   if (choices.needs_path) {
     if (const auto made = make_path(draft, simulation.path); !made) return tl::unexpected(made.error());
+  }
+  if (!draft.artefact_file.empty()) {
+    const auto read = read_artefact(draft.artefact_file, simulation.measuring_machine->machine);
+    if (!read) return tl::unexpected(read.error());
   }
   share_seed_and_speed(draft);
   return draft.setup;

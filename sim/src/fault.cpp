@@ -49,6 +49,15 @@ constexpr std::array kCounterCardFaults{
     Name{"garbage", FaultKind::UsbGarbage},
 };
 
+constexpr std::array kMeasuringMachineFaults{
+    Name{"mute", FaultKind::Mute},
+    Name{"disconnect", FaultKind::Disconnect},
+    Name{"emergency_stop", FaultKind::EmergencyStop},
+    Name{"refuse_touch", FaultKind::RefuseTouch},
+    Name{"refuse_way", FaultKind::RefuseWay},
+    Name{"garbage", FaultKind::LineGarbage},
+};
+
 std::span<const Name> names_for(FaultTarget target) {
   switch (target) {
     case FaultTarget::Tracker:
@@ -59,6 +68,8 @@ std::span<const Name> names_for(FaultTarget target) {
       return kEnvironmentFaults;
     case FaultTarget::CounterCard:
       return kCounterCardFaults;
+    case FaultTarget::MeasuringMachine:
+      return kMeasuringMachineFaults;
   }
   return {};
 }

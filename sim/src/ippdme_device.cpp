@@ -59,7 +59,7 @@ void IppDmeDevice::connected(HostTime) {
 }
 
 void IppDmeDevice::disconnected() {
-  session_ = false;
+  session_ = wants_close_ = false;
   queue_.clear();
   motion_.reset();
   move_report_.reset();
@@ -104,10 +104,27 @@ Eigen::Vector3d IppDmeDevice::reading_m(HostTime now) const {
   return motion_->from_m + share * (motion_->to_m - motion_->from_m);
 }
 
+void IppDmeDevice::inject(const Fault& fault, HostTime now) {
+  constexpr int kSurfaceNotFound = 1006;
+  constexpr int kOutOfLimits = 2500;
+  if (fault.kind == FaultKind::Mute) {
+    disconnected();  // it forgets what it was about
+    mute_until_ = now + seconds_to_ns(fault.duration_s);
+  }
+  if (fault.kind == FaultKind::Disconnect) wants_close_ = true;
+  if (fault.kind == FaultKind::EmergencyStop) press_emergency_stop();
+  if (fault.kind == FaultKind::RefuseTouch)
+    refuse_touch_ = fault.value > 0.0 ? static_cast<int>(fault.value) : kSurfaceNotFound;
+  if (fault.kind == FaultKind::RefuseWay)
+    refuse_way_ = fault.value > 0.0 ? static_cast<int>(fault.value) : kOutOfLimits;
+  if (fault.kind == FaultKind::LineGarbage) say("\x01 this is no line of I++ DME");
+}
+
 // --- what comes in
 
 void IppDmeDevice::receive(std::span<const std::byte> bytes, HostTime now) {
   advance(now);
+  if (now < mute_until_) return;
   while (!bytes.empty()) {
     const std::size_t taken = framer_->push(bytes);
     bytes = bytes.subspan(taken);
@@ -350,7 +367,11 @@ void IppDmeDevice::end_motion() {
   const Motion motion = *std::exchange(motion_, std::nullopt);
   position_m_ = motion.to_m;
   homed_ = homed_ || motion.homing;
-  if (motion.probing && motion.probing->fault == ProbingFault::AlreadyTouching) {
+  if (motion.probing && refuse_touch_ != 0) {
+    fault(motion.command, 2, std::exchange(refuse_touch_, 0), "Refused by the simulation");
+  } else if (motion.command.method == "GoTo" && refuse_way_ != 0) {
+    fault(motion.command, 2, std::exchange(refuse_way_, 0), "Refused by the simulation");
+  } else if (motion.probing && motion.probing->fault == ProbingFault::AlreadyTouching) {
     fault(motion.command, 2, 1001, "Illegal touch");
   } else if (motion.probing && motion.probing->fault == ProbingFault::NothingThere) {
     fault(motion.command, 2, 1006, "Surface not found");

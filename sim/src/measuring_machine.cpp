@@ -1,6 +1,8 @@
 #include "abbe/sim/measuring_machine.hpp"
 
+#include <Eigen/Geometry>
 #include <algorithm>
+#include <cmath>
 #include <limits>
 
 #include "abbe/sim/noise.hpp"
@@ -8,15 +10,27 @@
 namespace abbe::sim {
 namespace {
 
-constexpr double kStep_m = 50e-6;  // far below any sphere: the first contact is not stepped over
+constexpr double kStep_m = 50e-6;  // far below any sphere and tip: the first contact is not stepped over
 constexpr int kHalvings = 45;      // 50 um / 2^45 is below a femtometre
 
-/// Distance of the tip's surface to the nearest sphere when the scales read q.
+/// To the nearest point of the square; a direction in its plane is chosen, as no file says how it lies.
+double distance_m(const Face& face, const Eigen::Vector3d& p_m) {
+  const Eigen::Vector3d z = face.normal.normalized();
+  const Eigen::Vector3d x = z.unitOrthogonal();
+  const Eigen::Vector3d y = z.cross(x);
+  const Eigen::Vector3d from = p_m - face.centre_m;
+  const auto beyond = [&](double along) { return std::max(0.0, std::abs(along) - face.half_size_m); };
+  return Eigen::Vector3d(beyond(from.dot(x)), beyond(from.dot(y)), from.dot(z)).norm();
+}
+
+/// Distance of the tip's surface to the nearest surface when the scales read q.
 double clearance_m(const MeasuringMachine& machine, const Eigen::Vector3d& q_m) {
   const Eigen::Vector3d tip_m = position_m(machine.truth, q_m);
   double nearest = std::numeric_limits<double>::infinity();
   for (const Sphere& s : machine.spheres)
     nearest = std::min(nearest, (tip_m - s.centre_m).norm() - s.radius_m - machine.tip_radius_m);
+  for (const Face& f : machine.faces)
+    nearest = std::min(nearest, distance_m(f, tip_m) - machine.tip_radius_m);
   return nearest;
 }
 

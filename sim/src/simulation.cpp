@@ -40,6 +40,12 @@ Result<std::unique_ptr<Simulation>> Simulation::open(const SimulationSetup& setu
     if (!server) return tl::unexpected(server.error());
     simulation->counter_cards_.push_back(std::move(*server));
   }
+  if (setup.measuring_machine) {
+    auto server = IppDmeServer::open(setup.measuring_machine_port,
+                                     std::make_unique<IppDmeDevice>(*setup.measuring_machine, now));
+    if (!server) return tl::unexpected(server.error());
+    simulation->measuring_machine_.emplace(std::move(*server));
+  }
   if (setup.surface) {
     const auto edges = edge_times_s(*setup.surface, simulation->machine_.path());
     simulation->edges_s_.assign(edges.begin(), edges.end());
@@ -57,6 +63,7 @@ void Simulation::poll(HostTime now) {
   if (bus_) bus_->poll(now);
   for (ModbusServer& server : environment_) server.poll(now);
   for (UsbipServer& card : counter_cards_) card.poll(now);
+  if (measuring_machine_) measuring_machine_->poll(now);
 }
 
 void Simulation::start_machine(HostTime now) {
@@ -99,6 +106,8 @@ void Simulation::inject(const ScheduledFault& next, HostTime now) {
     tracker_->poll(now);
   }
   if (next.target == FaultTarget::Encoder && bus_) bus_->inject(next.fault, now);
+  if (next.target == FaultTarget::MeasuringMachine && measuring_machine_)
+    measuring_machine_->device().inject(next.fault, now);
   if (next.target == FaultTarget::Environment) inject_environment(next.fault, now);
   if (next.target != FaultTarget::CounterCard) return;
   for (UsbipServer& card : counter_cards_) card.inject(next.fault, now);
@@ -116,6 +125,7 @@ HostTime Simulation::next_due() const {
   if (bus_) due = std::min(due, bus_->next_due());
   for (const ModbusServer& server : environment_) due = std::min(due, server.next_due());
   for (const UsbipServer& card : counter_cards_) due = std::min(due, card.next_due());
+  if (measuring_machine_) due = std::min(due, measuring_machine_->next_due());
   if (machine_.started() && next_fault_ < faults_.size()) {
     due = std::min(due, *machine_.started() + seconds_to_ns(faults_[next_fault_].fault.at_s));
   }
@@ -127,6 +137,7 @@ void Simulation::add_poll_fds(std::vector<pollfd>& fds) const {
   if (bus_) fds.push_back({bus_->fd(), POLLIN, 0});
   for (const ModbusServer& server : environment_) server.add_poll_fds(fds);
   for (const UsbipServer& card : counter_cards_) card.add_poll_fds(fds);
+  if (measuring_machine_) measuring_machine_->add_poll_fds(fds);
 }
 
 }  // namespace abbe::sim

@@ -86,5 +86,34 @@ TEST(MeasuringMachine, TouchesASphereWhereItIs) {
   EXPECT_NEAR(probing.reading_m.norm(), 12e-3, 1e-15);
 }
 
+TEST(IppDmeDevice, MeetsTheFaceOfABlockWithinItsSquareOnly) {
+  MeasuringMachine machine;
+  machine.tip_radius_m = 2e-3;
+  machine.faces = {{.centre_m = {0.1, 0.1, 0.0}, .normal = {0, 0, 1}, .half_size_m = 10e-3}};
+  const auto on = probe(machine, {0.105, 0.1, 2e-3}, Eigen::Vector3d::UnitZ(), 0);
+  ASSERT_FALSE(on.fault);
+  EXPECT_NEAR(on.reading_m.z(), 2e-3, 1e-12);
+  EXPECT_EQ(probe(machine, {0.13, 0.1, 2e-3}, Eigen::Vector3d::UnitZ(), 1).fault, ProbingFault::NothingThere);
+}
+
+TEST(IppDmeDevice, IsMuteForAWhileAndForgetsItsSession) {
+  IppDmeDevice machine{with_a_sphere(), kStart};
+  machine.connected(kStart);
+  (void)ask(machine, "00001 StartSession()");
+  machine.inject({.kind = FaultKind::Mute, .duration_s = 1.0}, kStart);
+  EXPECT_EQ(ask(machine, "00002 IsHomed()", kStart + 500ms, kStart + 500ms), "");
+  EXPECT_NE(ask(machine, "00003 IsHomed()", kStart + 1s, kStart + 1s).find("Protocol error"),
+            std::string::npos);
+}
+
+TEST(IppDmeDevice, RefusesTheNextTouchWithTheErrorThatIsWanted) {
+  IppDmeDevice machine{with_a_sphere(), kStart};
+  machine.connected(kStart);
+  (void)ask(machine, "00001 StartSession()");
+  machine.inject({.kind = FaultKind::RefuseTouch, .value = 1009}, kStart);
+  const auto said = ask(machine, "00002 PtMeas(X(100),Y(200),Z(-85.5),IJK(0,0,1))", kStart, kStart + 60s);
+  EXPECT_NE(said.find("00002 ! Error(2,1009,PtMeas"), std::string::npos) << said;
+}
+
 }  // namespace
 }  // namespace abbe::sim

@@ -38,6 +38,11 @@ enum class FaultKind {
   LostScans,    ///< the next `value` scans are never seen
   ClockJump,    ///< the counted clock jumps by `value` counts
   UsbGarbage,   ///< bytes that are no USB/IP
+  // measuring machine; it also is mute and disconnects
+  EmergencyStop,  ///< somebody pressed it
+  RefuseTouch,    ///< the next touch ends with error `value` (0: 1006, surface not found)
+  RefuseWay,      ///< the next GoTo does (0: 2500, out of limits)
+  LineGarbage,    ///< bytes that are no lines
 };
 
 struct Fault {
@@ -48,7 +53,7 @@ struct Fault {
   std::uint8_t node = 0;  ///< encoder faults: CANopen node; environment faults: number of the device; 0 = all
 };
 
-enum class FaultTarget { Tracker, Encoder, Environment, CounterCard };
+enum class FaultTarget { Tracker, Encoder, Environment, CounterCard, MeasuringMachine };
 
 struct ScheduledFault {
   FaultTarget target = FaultTarget::Tracker;

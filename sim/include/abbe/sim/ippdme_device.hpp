@@ -19,6 +19,7 @@
 #include <vector>
 
 #include "abbe/protocol/ippdme/lines.hpp"
+#include "abbe/sim/fault.hpp"
 #include "abbe/sim/measuring_machine.hpp"
 #include "abbe/sim/sim_clock.hpp"
 
@@ -50,8 +51,10 @@ class IppDmeDevice {
 
   /// Bytes for the client, made since the last call.
   [[nodiscard]] std::vector<std::byte> take_output();
-  [[nodiscard]] bool wants_close() const { return false; }
+  [[nodiscard]] bool wants_close() const { return wants_close_; }
   [[nodiscard]] bool accepts() const { return true; }
+
+  void inject(const Fault& fault, HostTime now);
 
   /// The emergency stop is pressed: an unsolicited error, motion ends.
   void press_emergency_stop();
@@ -121,6 +124,10 @@ class IppDmeDevice {
   std::vector<std::string> touch_report_ = {"X", "Y", "Z"};
   Eigen::Vector3d position_m_ = Eigen::Vector3d::Zero();
   std::uint64_t touches_ = 0;
+  HostTime mute_until_ = HostTime::min();
+  int refuse_touch_ = 0;  ///< the next one, with this error; 0: not
+  int refuse_way_ = 0;    ///< likewise
+  bool wants_close_ = false;
 };
 
 }  // namespace abbe::sim

@@ -1,7 +1,7 @@
 #pragma once
-/// A measuring machine with known geometric errors and spheres on its table: what it reads when it probes.
-/// The tip meets the true surface; the machine reports what its scales say there. SI, machine coordinates.
-/// Pure functions over plain options; safe to call from any thread.
+/// A measuring machine with known geometric errors, spheres and faces of blocks on its table: what it reads
+/// when it probes. The tip meets the true surface; the machine reports what its scales say there. SI, machine
+/// coordinates. Pure functions over plain options; safe to call from any thread.
 
 #include <Eigen/Core>
 #include <cstdint>
@@ -17,9 +17,17 @@ struct Sphere {
   double radius_m = 12.5e-3;
 };
 
+/// A square, seen from both sides.
+struct Face {
+  Eigen::Vector3d centre_m = Eigen::Vector3d::Zero();
+  Eigen::Vector3d normal = Eigen::Vector3d::UnitZ();
+  double half_size_m = 10e-3;
+};
+
 struct MeasuringMachine {
   TruthMachine truth;
   std::vector<Sphere> spheres;
+  std::vector<Face> faces;
   double tip_radius_m = 2e-3;
   double approach_m = 2e-3;  ///< probing begins this far before the nominal place ...
   double search_m = 5e-3;    ///< ... and ends this far behind it

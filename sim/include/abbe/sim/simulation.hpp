@@ -1,7 +1,7 @@
 #pragma once
-/// The whole stage: machine, tracker, encoder bus, counter cards and the timetable of faults, stepped
-/// together. poll(now) does what is due, never blocks and reads no clock; a program turns it with real time,
-/// a test with whatever it likes. Not thread-safe.
+/// The whole stage: machine, tracker, encoder bus, counter cards, a measuring machine and the timetable of
+/// faults, stepped together. poll(now) does what is due, never blocks and reads no clock; a program turns it
+/// with real time, a test with whatever it likes. Not thread-safe.
 
 #include <poll.h>
 
@@ -12,6 +12,7 @@
 
 #include "abbe/sim/counter_card_setup.hpp"
 #include "abbe/sim/encoder_bus.hpp"
+#include "abbe/sim/ippdme_server.hpp"
 #include "abbe/sim/modbus_server.hpp"
 #include "abbe/sim/touched_surface.hpp"
 #include "abbe/sim/tracker_server.hpp"
@@ -32,6 +33,8 @@ struct SimulationSetup {
   std::vector<EncoderNodeOptions> nodes;
   std::vector<ModbusServerOptions> environment;
   std::vector<CounterCardSetup> counter_cards;
+  std::optional<IppDmeOptions> measuring_machine;
+  std::uint16_t measuring_machine_port = 0;
   std::optional<TouchedSurface> surface;  ///< touched by the probe on the first card
   std::vector<double> edges_s;  ///< further edges of that probe, s from the start of the motion, ascending
   std::vector<ScheduledFault> faults;
@@ -55,6 +58,7 @@ class Simulation {
   [[nodiscard]] std::optional<EncoderBus>& bus() { return bus_; }
   [[nodiscard]] const std::vector<ModbusServer>& environment() const { return environment_; }
   [[nodiscard]] std::deque<UsbipServer>& counter_cards() { return counter_cards_; }
+  [[nodiscard]] const std::optional<IppDmeServer>& measuring_machine() const { return measuring_machine_; }
 
  private:
   Simulation(TruthMachine truth, PathMotion path, const SimulationSetup& setup);
@@ -72,6 +76,7 @@ class Simulation {
   std::optional<EncoderBus> bus_;
   std::vector<ModbusServer> environment_;
   std::deque<UsbipServer> counter_cards_;
+  std::optional<IppDmeServer> measuring_machine_;
   std::deque<double> edges_s_;          ///< that the probe's card does not know of yet
   std::vector<ScheduledFault> faults_;  ///< by time
   std::size_t next_fault_ = 0;

@@ -97,6 +97,44 @@ TEST(IppDevice, ReadsAtTheTouchWhatAMachineWithErrorsReads) {
   }
 }
 
+TEST(IppDevice, GoesTheWayToATouchWithoutTouching) {
+  Stage stage;
+  ASSERT_TRUE(stage.state_becomes("ready")) << stage.device->status().last_fault;
+  stage.device->measure({.position_m = {0.1, 0.2, 0.0}, .touch = false});
+  stage.device->measure(on_top());
+  EXPECT_EQ(stage.device->points_left(), 2u);
+  ASSERT_TRUE(stage.turns_until(30s, [&] { return stage.device->points_left() == 0; }));
+  ASSERT_EQ(stage.touches.size(), 1u);
+  EXPECT_EQ(stage.touches[0].touch, 1u);
+  EXPECT_EQ(stage.touches[0].touch_flags, 0u);
+  EXPECT_EQ(stage.device->status().faults, 0u);
+}
+
+TEST(IppDevice, ForgetsWhatIsBehindAWayThatWasRefused) {
+  Stage stage;
+  ASSERT_TRUE(stage.state_becomes("ready")) << stage.device->status().last_fault;
+  stage.peer.machine().inject({.kind = sim::FaultKind::RefuseWay}, stage.time.now());
+  stage.device->measure({.position_m = {0.1, 0.2, 0.1}, .touch = false});
+  stage.device->measure(on_top());
+  ASSERT_TRUE(stage.turns_until(30s, [&] { return stage.device->points_left() == 0; }));
+  EXPECT_TRUE(stage.touches.empty());
+  EXPECT_NE(stage.device->status().last_fault.find("GoTo was refused: 2500"), std::string::npos)
+      << stage.device->status().last_fault;
+}
+
+TEST(IppDevice, ForgetsTheTouchWhenTheConnectionIsLostOnTheWay) {
+  Stage stage;
+  ASSERT_TRUE(stage.state_becomes("ready")) << stage.device->status().last_fault;
+  stage.peer.reset_connection();
+  const std::array way{ProbePoint{.position_m = {0.1, 0.2, 0.1}, .touch = false}, on_top()};
+  stage.device->measure(way);
+  stage.device->wait(0ns);
+  EXPECT_EQ(stage.device->points_left(), 0u);
+  ASSERT_TRUE(stage.state_becomes("ready"));
+  for (int i = 0; i < 100; ++i) stage.turn();
+  EXPECT_TRUE(stage.touches.empty());
+}
+
 TEST(IppDevice, SaysThatATouchFailedAndGoesOn) {
   Stage stage;
   stage.device->measure({.position_m = {0.3, 0.3, 0.0}});

@@ -31,9 +31,10 @@ IppDevice::~IppDevice() {
   }
 }
 
-void IppDevice::measure(const ProbePoint& point) {
+void IppDevice::measure(std::span<const ProbePoint> points) {
   const std::lock_guard lock{requests_mutex_};
-  requests_.push_back(point);
+  requests_.insert(requests_.end(), points.begin(), points.end());
+  points_left_.fetch_add(points.size(), std::memory_order_release);  // pairs with points_left()
 }
 
 void IppDevice::wait(std::chrono::nanoseconds at_most) {
@@ -42,6 +43,7 @@ void IppDevice::wait(std::chrono::nanoseconds at_most) {
   tell(IppTick{});
   poll(at_most);
   show();
+  count_points();
 }
 
 DeviceStatus IppDevice::status() const {
@@ -54,7 +56,14 @@ void IppDevice::read_requests() {
     const std::lock_guard lock{requests_mutex_};
     requests.swap(requests_);
   }
-  for (const ProbePoint& point : requests) tell(point);
+  const auto lost = session().fault().count;  // while they are told: what is behind is void
+  for (const ProbePoint& point : requests)
+    if (session().fault().count == lost) tell(point);
+}
+
+void IppDevice::count_points() {
+  const std::lock_guard lock{requests_mutex_};
+  points_left_.store(requests_.size() + session().points_left(), std::memory_order_release);
 }
 
 std::span<const std::byte> IppDevice::encode(const IppSend& command) {

@@ -36,8 +36,16 @@ std::string_view method_name(std::string_view method) {
   return method.substr(0, method.find('('));
 }
 
+std::string mm(double m) {
+  return ippdme::number_text(kMillimetresPerMetre * m);
+}
+
+std::string go_to(const ProbePoint& p) {
+  return fmt::format("GoTo(X({}),Y({}),Z({}))", mm(p.position_m[0]), mm(p.position_m[1]),
+                     mm(p.position_m[2]));
+}
+
 std::string pt_meas(const ProbePoint& p) {
-  const auto mm = [](double m) { return ippdme::number_text(kMillimetresPerMetre * m); };
   const auto number = [](double v) { return ippdme::number_text(v); };
   return fmt::format("PtMeas(X({}),Y({}),Z({}),IJK({},{},{}))", mm(p.position_m[0]), mm(p.position_m[1]),
                      mm(p.position_m[2]), number(p.normal[0]), number(p.normal[1]), number(p.normal[2]));
@@ -236,8 +244,10 @@ IppAction IppSession::ready() {
   if (points_.empty()) return IppNothing{};
   const ProbePoint point = points_.front();
   points_.pop_front();
-  return send(
-      {.state = IppState::Measuring, .method = pt_meas(point), .purpose = Purpose::Touch, .moves = true});
+  return send({.state = IppState::Measuring,
+               .method = point.touch ? pt_meas(point) : go_to(point),
+               .purpose = point.touch ? Purpose::Touch : Purpose::Move,
+               .moves = true});
 }
 
 /// Of a command that is not the pending one, and no event.
@@ -308,6 +318,7 @@ IppAction IppSession::done() {
     case Purpose::Get:
       due_ = was.due - options_.command_timeout + options_.poll_period;  // from when it was sent
       return ready();
+    case Purpose::Move:
     case Purpose::Touch:
     case Purpose::Clear:
       due_ = now_;
@@ -327,9 +338,11 @@ IppAction IppSession::judge_home(const std::string& data) {
 
 IppAction IppSession::failed(const Pending& was) {
   const std::string what = fmt::format("{} was refused: {}", method_name(was.step.method), said(*was.error));
-  const bool measuring = was.step.purpose == Purpose::Touch || was.step.purpose == Purpose::Get;
+  const bool moving = was.step.purpose == Purpose::Move;
+  const bool measuring = moving || was.step.purpose == Purpose::Touch || was.step.purpose == Purpose::Get;
   if (!measuring || was.error->severity >= kUserNeeded) return give_up(IppState::Faulted, what);
   note(what);
+  if (moving) points_.clear();  // the way to what comes next was not made
   return send({.state = IppState::Clearing, .method = "ClearAllErrors()", .purpose = Purpose::Clear});
 }
 

@@ -78,6 +78,8 @@ class SessionOverTcp {
     }
   }
 
+  [[nodiscard]] const typename Words::Session& session() const { return session_; }
+
   void show() {
     board_.set_state(name_of(session_.state()));
     if (faults_seen_ == session_.fault().count) return;

@@ -4,10 +4,12 @@
 /// point is a ProbeTrigger, a failed one a ProbeTrigger without position. States: those of IppState.
 
 #include <array>
+#include <atomic>
 #include <cstddef>
 #include <cstdint>
 #include <memory>
 #include <mutex>
+#include <span>
 #include <string>
 #include <variant>
 #include <vector>
@@ -62,7 +64,15 @@ class IppDevice final : public Device, private SessionOverTcp<IppDevice, IppWord
 
   /// Any thread: moves the machine and touches, in the order of the calls; one ProbeTrigger each, numbered
   /// from 1 in that order. Points not yet begun are forgotten when the connection is lost.
-  void measure(const ProbePoint& point);
+  void measure(const ProbePoint& point) { measure(std::span{&point, 1}); }
+  /// All of them or, when the connection is lost in between, nothing of the rest: half a way to a touch leads
+  /// through whatever stands there.
+  void measure(std::span<const ProbePoint> points);
+  /// Any thread: how many of them are neither done nor given up. 0: the touches of all that were begun are in
+  /// the ring.
+  [[nodiscard]] std::size_t points_left() const noexcept {
+    return points_left_.load(std::memory_order_acquire);  // pairs with the releases in measure() and wait()
+  }
 
   /// One reader each.
   [[nodiscard]] SampleRing<protocol::ProbeTrigger>& touches() noexcept { return touches_; }
@@ -78,6 +88,7 @@ class IppDevice final : public Device, private SessionOverTcp<IppDevice, IppWord
   void connected();
   void disconnected() {}
   void read_requests();
+  void count_points();
 
   void take(const protocol::AxisSample& sample) ABBE_RT;
   void take(const protocol::ProbeTrigger& touch) ABBE_RT;
@@ -94,6 +105,7 @@ class IppDevice final : public Device, private SessionOverTcp<IppDevice, IppWord
 
   std::mutex requests_mutex_;
   std::vector<ProbePoint> requests_;  // under requests_mutex_
+  std::atomic<std::size_t> points_left_{0};
 };
 
 }  // namespace abbe::drivers

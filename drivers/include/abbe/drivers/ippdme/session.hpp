@@ -40,11 +40,13 @@ enum class IppState {
 /// A literal: "ready", "measuring", ...
 [[nodiscard]] const char* name_of(IppState) noexcept;
 
-/// One touch: the nominal place and the outward normal there. The machine moves to the place plus its
-/// approach distance along the normal and probes against it.
+/// One touch: the nominal place and the outward normal there, of the centre of the tip. The machine moves to
+/// the place plus its approach distance along the normal and probes against it. Or a place on the way there:
+/// it only moves, straight, and when that is refused nothing that was asked after it is begun.
 struct ProbePoint {
   std::array<double, 3> position_m{};
   std::array<double, 3> normal = {0.0, 0.0, 1.0};
+  bool touch = true;
 };
 
 struct IppSessionOptions {
@@ -90,7 +92,10 @@ class IppSession {
   [[nodiscard]] protocol::HostTime deadline() const noexcept;
 
   [[nodiscard]] IppState state() const noexcept { return state_; }
-  [[nodiscard]] std::size_t points_waiting() const noexcept { return points_.size(); }
+  /// Asked for and neither done nor given up.
+  [[nodiscard]] std::size_t points_left() const noexcept {
+    return points_.size() + (state_ == IppState::Measuring ? 1 : 0);
+  }
   struct Fault {
     std::uint64_t count = 0;
     std::string text;
@@ -98,7 +103,7 @@ class IppSession {
   [[nodiscard]] const Fault& fault() const noexcept { return fault_; }
 
  private:
-  enum class Purpose { Other, Version, IsHomed, Get, Touch, Clear, End };
+  enum class Purpose { Other, Version, IsHomed, Get, Move, Touch, Clear, End };
   struct Step {
     IppState state;
     std::string method;  ///< with its arguments

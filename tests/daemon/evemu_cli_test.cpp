@@ -5,15 +5,19 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <algorithm>
+#include <chrono>
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
 #include <nlohmann/json.hpp>
 #include <sstream>
 
+#include "abbe/daemon/calibration_request.hpp"
 #include "abbe/daemon/evemu_files.hpp"
 #include "abbe/daemon/model_document.hpp"
 #include "evemu_run.hpp"
+#include "recording_fixture.hpp"
 
 namespace abbe::daemon {
 namespace {
@@ -170,6 +174,79 @@ TEST_F(EvemuCli, WritesModelsThatReadBackToTheSameBits) {
   const auto document = parse_model(text, "model.json");
   ASSERT_TRUE(document) << document.error().details.front();
   EXPECT_EQ(to_json(*document), text);
+}
+
+/// [evemu] asks for less than the options' defaults do.
+constexpr std::string_view kWatched = R"([encoder]
+transport = "udp"
+peer_host = "127.0.0.1"
+peer_port = 1
+sync_period_us = 100000
+nodes = [{ axis = "X", node = 1, step_nm = 1 }, { axis = "Y", node = 2, step_nm = 1 }, { axis = "Z", node = 3, step_nm = 1 }]
+[evemu]
+order = 2
+)";
+
+/// What the daemon records of a calibration: what was asked for, and one touch a second in the plan's order.
+void record_touches(const fs::path& folder, const Touches& all) {
+  using namespace std::chrono_literals;
+  RecordingInfo info = example_info();
+  info.configuration = std::string{kMachine} + std::string{kWatched};
+  auto recorder = Recorder::open(example_options(folder), info, Recorder::WallTime{});
+  ASSERT_TRUE(recorder) << recorder.error().text;
+  constexpr protocol::HostTime kFrom{1000s};
+  EvemuRequest request{.calibrator = tests::evemu::reference_calibrator()};
+  request.sources = {{"calibrator.toml", "abc"}};
+  recorder->attach(to_attachment({request, kFrom}), kFrom);
+  std::uint32_t number = 0;
+  const auto record = [&](int position, Feature feature, int which) {
+    for (const auto& t : all) {
+      if (t.position != position || t.feature != feature || t.number != which) continue;
+      protocol::ProbeTrigger touch;
+      touch.head.time = kFrom + ++number * 1s;
+      touch.touch = number;
+      touch.axis_count = 3;
+      std::copy_n(t.p_m.data(), 3, touch.position.begin());
+      recorder->record(touch, "probe");
+    }
+  };
+  for (const int position : request.plan.positions) {
+    record(position, Feature::Ball, 1);
+    record(position, Feature::Block, 1);
+    record(position, Feature::Block, 2);
+    for (int ball = 2; ball <= 9; ++ball) record(position, Feature::Ball, ball);
+  }
+  ASSERT_TRUE(recorder->close());
+}
+
+TEST_F(EvemuCli, IdentifiesFromARecordingAsFromTheTouchesInIt) {
+  record_touches(folder_, touches());
+  const auto ran = abbe("identify evemu --recording run.mcap --json -o out");
+  ASSERT_EQ(ran.exit, 0) << ran.err;
+  const auto again = abbe(
+      "identify evemu --machine machine.toml --touches touches.csv --calibrator calibrator.toml --order 2 "
+      "--json -o again");
+  ASSERT_EQ(again.exit, 0) << again.err;
+  const auto recorded = nlohmann::json::parse(ran.out), read = nlohmann::json::parse(again.out);
+  EXPECT_EQ(recorded["unknowns"], 31);
+  EXPECT_EQ(recorded["observations"], read["observations"]);
+  // The calibrator file states uncertainties, the reference calibrator none; the fit knows neither.
+  EXPECT_NEAR(recorded["residual_rms_after_um"].get<double>(), read["residual_rms_after_um"].get<double>(),
+              1e-3);
+  const auto inputs = nlohmann::json::parse(text_of(folder_ / "out/model.json"))["inputs"].dump();
+  EXPECT_THAT(inputs, AllOf(HasSubstr("run.mcap"), HasSubstr("calibrator.toml"), HasSubstr("touches")));
+  const auto other = abbe("identify evemu --recording run.mcap --order 3 --estimator ols --json -o other");
+  ASSERT_EQ(other.exit, 0) << other.err;
+  EXPECT_EQ(nlohmann::json::parse(other.out)["unknowns"], 45);
+}
+
+TEST_F(EvemuCli, SaysWhatARecordingWithoutACompleteRunLacks) {
+  Touches few = touches();
+  few.resize(10);
+  record_touches(folder_, few);
+  expect_refused(abbe("identify evemu --recording run.mcap -o out"), 1,
+                 "no complete calibration with a ball array");
+  EXPECT_EQ(abbe("identify evemu --recording run.mcap --touches touches.csv -o out").exit, 2);
 }
 
 /// The first position's touches stand for those of a good machine.

@@ -6,15 +6,18 @@
 #include <map>
 #include <memory>
 #include <nlohmann/json.hpp>
+#include <optional>
 
 #include "abbe/calib/evemu/judge.hpp"
 #include "abbe/daemon/evemu_files.hpp"
 #include "abbe/daemon/evemu_report.hpp"
 #include "abbe/daemon/model_document.hpp"
 #include "abbe/daemon/otf_inputs.hpp"
+#include "abbe/daemon/replay.hpp"
 #include "abbe/daemon/sha256.hpp"
 #include "cli/commands.hpp"
 #include "cli/identified_model.hpp"
+#include "cli/opened_recording.hpp"
 #include "cli/terminal.hpp"
 #include "files/text_file.hpp"
 
@@ -25,13 +28,20 @@ namespace {
 namespace evemu = calib::evemu;
 constexpr double kMicro_per_1 = 1e6;
 
-struct Arguments {
-  std::string machine, touches, calibrator, errors, reference, keep, out;
-  std::string estimator = "bayes-pose", folds = "position";
+struct IdentifyEvemuArguments {
+  std::string machine, touches, calibrator, errors, recording, reference, keep, out;
+  std::optional<std::string> estimator, folds;  // these four: else what [evemu] says
+  std::optional<int> order, positions;
   double u_reference_um = 1.0;
-  int order = 3;
-  int positions = 8;
   bool rotation_known = false, accept_shape_only = false, json = false;
+};
+
+/// What was measured, whatever it comes from.
+struct Input {
+  Config config;
+  std::vector<InputFile> sources;
+  evemu::Observations observations;
+  std::optional<RotationPoints> reference;
 };
 
 struct Outcome {
@@ -42,96 +52,150 @@ struct Outcome {
   calib::Verdict verdict;
 };
 
-Result<evemu::Observations> from_touches(const Arguments& arguments, const evemu::Machine& machine,
-                                         const evemu::ObserveOptions& options,
-                                         std::vector<InputFile>& sources) {
+Result<void> observe_touches(const IdentifyEvemuArguments& arguments, const evemu::Machine& machine,
+                             const evemu::ObserveOptions& options, Input& input) {
   const auto calibrator = read_calibrator_toml(arguments.calibrator);
   if (!calibrator) return tl::make_unexpected(calibrator.error());
   const auto touches = read_touches_csv(arguments.touches);
   if (!touches) return tl::make_unexpected(touches.error());
-  sources.insert(sources.end(), {touches->source, calibrator->source});
+  input.sources.insert(input.sources.end(), {touches->source, calibrator->source});
   auto observed = evemu::observe(touches->touches, calibrator->calibrator, machine, options);
   if (!observed) return tl::make_unexpected(error_of(observed.error()));
-  return std::move(*observed);
+  input.observations = std::move(*observed);
+  return {};
 }
 
-Result<evemu::Observations> from_errors(const Arguments& arguments, const evemu::Machine& machine,
-                                        const evemu::ObserveOptions& options,
-                                        std::vector<InputFile>& sources) {
+Result<void> observe_errors(const IdentifyEvemuArguments& arguments, const evemu::Machine& machine,
+                            const evemu::ObserveOptions& options, Input& input) {
   const auto errors = read_errors_csv(arguments.errors);
   if (!errors) return tl::make_unexpected(errors.error());
-  sources.push_back(errors->source);
+  input.sources.push_back(errors->source);
   const auto rotation =
       arguments.rotation_known ? evemu::RotationOrigin::Independent : evemu::RotationOrigin::Blocks;
   auto observed = evemu::observe_errors(errors->errors, machine, rotation, options);
   if (!observed) return tl::make_unexpected(error_of(observed.error()));
-  return std::move(*observed);
+  input.observations = std::move(*observed);
+  return {};
 }
 
-Result<evemu::Solution> turned(evemu::Solution solution, const Arguments& arguments,
-                               std::vector<InputFile>& sources) {
-  if (arguments.reference.empty()) return solution;
-  const auto points = read_errors_csv(arguments.reference);
-  if (!points) return tl::make_unexpected(points.error());
-  sources.push_back(points->source);
-  auto result = evemu::with_rotation_reference(std::move(solution),
-                                               {points->errors, arguments.u_reference_um / kMicro_per_1});
-  if (!result) return tl::make_unexpected(error_of(result.error()));
-  return std::move(*result);
-}
-
-/// A word, or a file with one fold number for each of the 3 rows of every ball, by position and ball.
-Result<evemu::SparseOptions> sparse_options(const Arguments& arguments, std::vector<InputFile>& sources) {
-  evemu::SparseOptions options;
-  if (const auto by = evemu::folds_by(arguments.folds)) {
-    options.folds = *by;
-    return options;
-  }
-  const auto text = read_text(arguments.folds);
-  if (!text) return tl::make_unexpected(text.error());
-  auto folds = calib::sparse::parse_folds(*text);
-  if (!folds) return fail(ErrorCode::BadInput, fmt::format("{}: {}", arguments.folds, folds.error().text));
-  sources.push_back({std::filesystem::path(arguments.folds).filename().string(), sha256_hex(*text)});
-  options.given_folds = std::move(*folds);
+evemu::ObserveOptions observe_options(const IdentifyEvemuArguments& arguments, const EvemuConfig& config,
+                                      std::size_t positions) {
+  evemu::ObserveOptions options;
+  options.order = arguments.order.value_or(config.order);
+  options.positions = arguments.positions.value_or(static_cast<int>(positions));
   return options;
 }
 
-Result<Outcome> identify(const Arguments& arguments) {
-  const auto active = active_model(arguments.keep);
-  if (!active) return tl::make_unexpected(active.error());
+Result<Input> from_files(const IdentifyEvemuArguments& arguments) {
   auto config = load_config(arguments.machine);
   if (!config) return tl::make_unexpected(config.error());
   const auto hash = sha256_hex_of_file(arguments.machine);
   if (!hash) return tl::make_unexpected(hash.error());
-  Outcome outcome;
-  outcome.sources.push_back({std::filesystem::path(arguments.machine).filename().string(), *hash});
+  Input input;
+  input.sources.push_back({std::filesystem::path(arguments.machine).filename().string(), *hash});
   const auto machine = evemu_machine(config->machine);
   if (!machine) return tl::make_unexpected(machine.error());
-  evemu::ObserveOptions options;
-  options.order = arguments.order;
-  options.positions = arguments.positions;
-  auto observed = arguments.touches.empty() ? from_errors(arguments, *machine, options, outcome.sources)
-                                            : from_touches(arguments, *machine, options, outcome.sources);
-  if (!observed) return tl::make_unexpected(observed.error());
-  outcome.observations = std::move(*observed);
-  evemu::JudgeOptions judging;
-  judging.solve.estimator = *evemu::estimator(arguments.estimator);
-  judging.limits = gate_limits(config->gate);
-  judging.accept_shape_only = arguments.accept_shape_only || config->gate.accepts(evemu::kShapeOnly);
-  auto sparse = sparse_options(arguments, outcome.sources);
+  const auto options = observe_options(arguments, config->evemu, config->evemu.positions.size());
+  const auto observe = arguments.touches.empty() ? observe_errors : observe_touches;
+  if (const auto observed = observe(arguments, *machine, options, input); !observed)
+    return tl::make_unexpected(observed.error());
+  input.config = std::move(*config);
+  return input;
+}
+
+/// The last run of the recording that was touched to its end.
+Result<EvemuRun> last_complete_run(const OpenedRecording& recording) {
+  std::optional<EvemuRun> last;
+  ProgressBar bar;
+  const auto replayed = replay(recording.reader, recording.config,
+                               {.progress = [&bar](double share) { bar.show("replaying", share); },
+                                .runs =
+                                    [&last](CalibrationRun run) {
+                                      if (auto* touched = std::get_if<EvemuRun>(&run))
+                                        last = std::move(*touched);
+                                    }});
+  if (!replayed) return tl::make_unexpected(replayed.error());
+  if (last) return std::move(*last);
+  std::string why = "none was asked for";
+  for (const auto& c : replayed->calibrations)
+    if (c.ended.method == "evemu") why = c.ended.reason;
+  return fail(
+      ErrorCode::DataInsufficient,
+      fmt::format("{}: holds no complete calibration with a ball array: {}", recording.source.name, why));
+}
+
+Result<Input> from_recording(const IdentifyEvemuArguments& arguments) {
+  auto recording = open_recording(arguments.recording, arguments.machine);
+  if (!recording) return tl::make_unexpected(recording.error());
+  const auto machine = evemu_machine(recording->config.machine);
+  if (!machine) return tl::make_unexpected(machine.error());
+  const auto run = last_complete_run(*recording);
+  if (!run) return tl::make_unexpected(run.error());
+  auto observed =
+      evemu::observe(run->touches, run->asked.calibrator, *machine,
+                     observe_options(arguments, recording->config.evemu, run->asked.plan.positions.size()));
+  if (!observed) return tl::make_unexpected(error_of(observed.error()));
+  Input input{std::move(recording->config), {recording->source}, std::move(*observed), run->asked.reference};
+  const auto entered = inputs_of(*run);
+  input.sources.insert(input.sources.end(), entered.begin(), entered.end());
+  return input;
+}
+
+Result<void> read_reference(const IdentifyEvemuArguments& arguments, Input& input) {
+  if (arguments.reference.empty()) return {};
+  const auto points = read_errors_csv(arguments.reference);
+  if (!points) return tl::make_unexpected(points.error());
+  input.sources.push_back(points->source);
+  input.reference = RotationPoints{points->errors, arguments.u_reference_um / kMicro_per_1};
+  return {};
+}
+
+/// A word, or a file with one fold number for each of the 3 rows of every ball, by position and ball.
+Result<evemu::SparseOptions> sparse_options(const std::string& given, std::vector<InputFile>& sources) {
+  evemu::SparseOptions options;
+  if (const auto by = evemu::folds_by(given)) {
+    options.folds = *by;
+    return options;
+  }
+  const auto text = read_text(given);
+  if (!text) return tl::make_unexpected(text.error());
+  auto folds = calib::sparse::parse_folds(*text);
+  if (!folds) return fail(ErrorCode::BadInput, fmt::format("{}: {}", given, folds.error().text));
+  sources.push_back({std::filesystem::path(given).filename().string(), sha256_hex(*text)});
+  options.given_folds = std::move(*folds);
+  return options;
+}
+
+Result<evemu::JudgeOptions> judge_options(const IdentifyEvemuArguments& arguments, Input& input) {
+  const Config& config = input.config;
+  evemu::JudgeOptions options;
+  options.solve.estimator = *evemu::estimator(arguments.estimator.value_or(config.evemu.estimator));
+  options.limits = gate_limits(config.gate);
+  options.accept_shape_only = arguments.accept_shape_only || config.gate.accepts(evemu::kShapeOnly);
+  auto sparse = sparse_options(arguments.folds.value_or(config.evemu.folds), input.sources);
   if (!sparse) return tl::make_unexpected(sparse.error());
-  judging.solve.sparse = std::move(*sparse);
-  auto solution = evemu::solve(outcome.observations, judging.solve);
+  options.solve.sparse = std::move(*sparse);
+  return options;
+}
+
+Result<Outcome> identify(const IdentifyEvemuArguments& arguments) {
+  const auto active = active_model(arguments.keep);
+  if (!active) return tl::make_unexpected(active.error());
+  auto input = arguments.recording.empty() ? from_files(arguments) : from_recording(arguments);
+  if (!input) return tl::make_unexpected(input.error());
+  const auto judging = judge_options(arguments, *input);
+  if (!judging) return tl::make_unexpected(judging.error());
+  if (const auto read = read_reference(arguments, *input); !read) return tl::make_unexpected(read.error());
+  auto solution = evemu::solve(input->observations, judging->solve);
+  if (solution && input->reference)
+    solution = evemu::with_rotation_reference(std::move(*solution),
+                                              {input->reference->points, input->reference->sigma_m});
   if (!solution) return tl::make_unexpected(error_of(solution.error()));
-  auto referenced = turned(std::move(*solution), arguments, outcome.sources);
-  if (!referenced) return tl::make_unexpected(referenced.error());
   auto verdict =
-      evemu::judge(outcome.observations, *referenced, *active ? &(*active)->model : nullptr, judging);
+      evemu::judge(input->observations, *solution, *active ? &(*active)->model : nullptr, *judging);
   if (!verdict) return tl::make_unexpected(error_of(verdict.error()));
-  outcome.config = std::move(*config);
-  outcome.solution = std::move(*referenced);
-  outcome.verdict = std::move(*verdict);
-  return outcome;
+  return Outcome{std::move(input->config), std::move(input->sources), std::move(input->observations),
+                 std::move(*solution), std::move(*verdict)};
 }
 
 /// The surface lambda and gamma were chosen from; cells no path reached are left out.
@@ -214,7 +278,7 @@ void print_summary(const Outcome& outcome, const ModelDocument& document,
   fmt::print("written     {}, coefficients.csv, report.html\n", (folder / "model.json").string());
 }
 
-int run(const Arguments& arguments) {
+int run(const IdentifyEvemuArguments& arguments) {
   const auto outcome = identify(arguments);
   if (!outcome) return report(outcome.error());
   const auto now = std::chrono::time_point_cast<std::chrono::nanoseconds>(std::chrono::system_clock::now());
@@ -228,34 +292,39 @@ int run(const Arguments& arguments) {
   return 0;
 }
 
-void add_options(CLI::App& command, Arguments& arguments) {
-  command.add_option("--machine", arguments.machine, "machine.toml, or the daemon's abbed.toml")->required();
+void add_options(CLI::App& command, IdentifyEvemuArguments& arguments) {
+  auto* machine =
+      command.add_option("--machine", arguments.machine, "machine.toml, or the daemon's abbed.toml");
   auto* touches = command.add_option("--touches", arguments.touches,
                                      "touches.csv: position,kind,index,x_mm,y_mm,z_mm; kind ball or block");
   auto* calibrator = command.add_option("--calibrator", arguments.calibrator, "calibrator.toml");
   auto* errors = command.add_option("--errors", arguments.errors,
                                     "errors.csv instead: position,ball,x_mm,y_mm,z_mm,ex_um,ey_um,ez_um");
-  touches->needs(calibrator);
+  auto* recording = command.add_option(
+      "--recording", arguments.recording,
+      "what the daemon recorded (.mcap) instead: its last complete run with a ball array, with the\n"
+      "recorded configuration unless --machine is given");
+  touches->needs(machine, calibrator);
   calibrator->needs(touches);
-  errors->excludes(touches);
+  errors->needs(machine)->excludes(touches);
+  recording->excludes(touches)->excludes(errors);
   command
       .add_option("--estimator", arguments.estimator,
                   "bayes-pose: priors by order, shared noise of Ball1, random pose rotations;\n"
                   "ols: least squares; ridge: one prior for all;\n"
-                  "lasso, mcp, scad: penalised, chosen by cross-validation over 50 x 100 values")
-      ->check(CLI::IsMember({"bayes-pose", "ols", "ridge", "lasso", "mcp", "scad"}))
-      ->capture_default_str();
+                  "lasso, mcp, scad: penalised, chosen by cross-validation over 50 x 100 values;\n"
+                  "default: that of [evemu], which is bayes-pose")
+      ->check(CLI::IsMember({"bayes-pose", "ols", "ridge", "lasso", "mcp", "scad"}));
+  command.add_option(
+      "--folds", arguments.folds,
+      "what lasso, mcp and scad hold out together: position, ball, row (as published: leaks the\n"
+      "noise rows share), or a file of one fold number a row; default: that of [evemu]: position");
+  command.add_option("--order", arguments.order, "of the polynomials; default: that of [evemu]: 3")
+      ->check(CLI::Range(evemu::kLeastOrder, evemu::kMostOrder));
   command
-      .add_option("--folds", arguments.folds,
-                  "what lasso, mcp and scad hold out together: position, ball, row (as published: leaks the\n"
-                  "noise rows share), or a file of one fold number a row")
-      ->capture_default_str();
-  command.add_option("--order", arguments.order, "of the polynomials")
-      ->check(CLI::Range(evemu::kLeastOrder, evemu::kMostOrder))
-      ->capture_default_str();
-  command.add_option("--positions", arguments.positions, "positions of the artefact that must be there")
-      ->check(CLI::Range(2, 1000))
-      ->capture_default_str();
+      .add_option("--positions", arguments.positions,
+                  "positions of the artefact that must be there; default: those that were asked for: 8")
+      ->check(CLI::Range(2, 1000));
   command
       .add_flag("--rotation-known", arguments.rotation_known,
                 "the errors' directions do not come from the artefact's blocks")
@@ -278,7 +347,7 @@ void add_options(CLI::App& command, Arguments& arguments) {
 }  // namespace
 
 void add_identify_evemu(CLI::App& parent, int& exit) {
-  auto arguments = std::make_shared<Arguments>();
+  auto arguments = std::make_shared<IdentifyEvemuArguments>();
   auto* command = parent.add_subcommand("evemu",
                                         "From a ball array touched at several positions.\n"
                                         "Writes model.json, coefficients.csv and report.html to OUT and says "
@@ -286,8 +355,10 @@ void add_identify_evemu(CLI::App& parent, int& exit) {
                                         "not fitted to.");
   add_options(*command, *arguments);
   command->callback([arguments, &exit] {
-    exit = arguments->touches.empty() && arguments->errors.empty()
-               ? report({ErrorCode::Usage, "identify evemu: give --touches and --calibrator, or --errors"})
+    exit = arguments->touches.empty() && arguments->errors.empty() && arguments->recording.empty()
+               ? report({ErrorCode::Usage,
+                         "identify evemu needs --machine with --touches and --calibrator or "
+                         "with --errors, or --recording"})
                : run(*arguments);
   });
 }

@@ -16,6 +16,7 @@
 #include "abbe/daemon/sha256.hpp"
 #include "cli/commands.hpp"
 #include "cli/identified_model.hpp"
+#include "cli/opened_recording.hpp"
 #include "cli/terminal.hpp"
 #include "files/text_file.hpp"
 
@@ -120,23 +121,15 @@ Result<OtfCandidate> last_complete_run(ReplayReport replayed, const std::string&
 
 Result<Outcome> from_recording(const Arguments& arguments, const calib::VolumetricModel* active,
                                ProgressBar& bar) {
-  const auto recording = RecordingReader::open(arguments.recording);
+  const auto recording = open_recording(arguments.recording, arguments.machine);
   if (!recording) return tl::make_unexpected(recording.error());
-  const auto config =
-      arguments.machine.empty()
-          ? parse_config(recording->info().configuration, arguments.recording + " (recorded configuration)")
-          : load_config(arguments.machine);
-  if (!config) return tl::make_unexpected(config.error());
-  const auto hash = sha256_hex_of_file(arguments.recording);
-  if (!hash) return tl::make_unexpected(hash.error());
   auto replayed =
-      replay(*recording, *config,
+      replay(recording->reader, recording->config,
              {.active = active, .progress = [&bar](double share) { bar.show("replaying", share); }});
   if (!replayed) return tl::make_unexpected(replayed.error());
   auto candidate = last_complete_run(std::move(*replayed), arguments.recording);
   if (!candidate) return tl::make_unexpected(candidate.error());
-  return outcome_of(std::move(*candidate), *config,
-                    {{std::filesystem::path(arguments.recording).filename().string(), *hash}});
+  return outcome_of(std::move(*candidate), recording->config, {recording->source});
 }
 
 Result<void> write_outputs(const std::filesystem::path& folder, const Outcome& outcome) {

@@ -10,8 +10,8 @@
 
 #include "abbe/daemon/control_protocol.hpp"
 #include "abbe/daemon/replay.hpp"
-#include "abbe/daemon/sha256.hpp"
 #include "abbe/daemon/verification_service.hpp"
+#include "cli/opened_recording.hpp"
 #include "cli/terminal.hpp"
 
 namespace abbe::daemon {
@@ -64,23 +64,20 @@ Result<VerificationFile> what_there_is(VerificationFile& points, const Error& er
 }  // namespace
 
 Result<VerificationFile> points_of_recording(const std::string& file) {
-  const auto recording = RecordingReader::open(file);
+  const auto recording = open_recording(file);
   if (!recording) return tl::make_unexpected(recording.error());
-  const auto config = parse_config(recording->info().configuration, file + " (recorded configuration)");
-  if (!config) return tl::make_unexpected(config.error());
-  if (const auto possible = check_verification(*config); !possible)
+  const Config& config = recording->config;
+  if (const auto possible = check_verification(config); !possible)
     return fail(ErrorCode::DataInsufficient, fmt::format("{}: {}", file, possible.error().text));
-  const auto hash = sha256_hex_of_file(file);
-  if (!hash) return tl::make_unexpected(hash.error());
-  StandstillPoints standstills{standstill_options(*config)};
+  StandstillPoints standstills{standstill_options(config)};
   ProgressBar bar;
   const auto replayed =
-      replay(*recording, *config,
+      replay(recording->reader, config,
              {.progress = [&bar](double share) { bar.show("replaying", share); },
               .snapshots = [&standstills](const protocol::Snapshot& s) { standstills.take(s); }});
   if (!replayed) return tl::make_unexpected(replayed.error());
   standstills.finish();
-  VerificationFile out{{std::filesystem::path(file).filename().string(), *hash}, {}, {}};
+  VerificationFile out{recording->source, {}, {}};
   for (const auto& p : standstills.points()) out.points.push_back(p.mean);
   return out;
 }

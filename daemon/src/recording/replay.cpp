@@ -165,11 +165,10 @@ class RawDecoder {
 /// The calibrations the recording asks for, one after the other.
 class Calibrations {
  public:
-  Calibrations(std::vector<CalibrationRequest> requests, const Config& config,
-               const calib::VolumetricModel* active)
+  Calibrations(std::vector<CalibrationRequest> requests, const Config& config, const ReplayOptions& options)
       : requests_(std::move(requests)),
         config_(config),
-        active_(active),
+        options_(options),
         session_(acquisition_options(config), evemu_acquisition_options(config)) {
     begin_next();
   }
@@ -181,7 +180,7 @@ class Calibrations {
       begin_next();
     }
     session_.take(snapshot);
-    if (const auto run = session_.take_run()) identify_again(*run);
+    if (auto run = session_.take_run()) options_.runs ? hand_over(std::move(*run)) : identify_again(*run);
   }
 
   [[nodiscard]] std::vector<ReplayedCalibration> finish() {
@@ -201,9 +200,14 @@ class Calibrations {
     if (next_ > 0 && !identified_) done_.push_back({.ended = session_.status()});
     identified_ = true;
   }
+  void hand_over(CalibrationRun run) {
+    done_.push_back({.ended = session_.status(), .points_sha256 = inputs_of(run).back().sha256});
+    identified_ = true;
+    options_.runs(std::move(run));
+  }
   void identify_again(const CalibrationRun& run) {
     ReplayedCalibration c{.ended = session_.status(), .points_sha256 = inputs_of(run).back().sha256};
-    c.outcome = identify(run, config_, active_);
+    c.outcome = identify(run, config_, options_.active);
     if (*c.outcome) {
       c.model_hash = model_hash(model_of(**c.outcome), method_of(**c.outcome));
       c.model_id = model_id(model_of(**c.outcome), method_of(**c.outcome));
@@ -214,7 +218,7 @@ class Calibrations {
 
   std::vector<CalibrationRequest> requests_;
   const Config& config_;
-  const calib::VolumetricModel* active_;
+  const ReplayOptions& options_;
   CalibrationSession session_;
   std::size_t next_ = 0;
   bool identified_ = true;
@@ -277,7 +281,7 @@ Result<ReplayReport> replay(const RecordingReader& recording, const Config& conf
   auto datum = datum_of(recording, config);
   if (!datum) return tl::unexpected(datum.error());
   const bool from_raw = options.source != ReplaySource::Samples;  // recorded samples have their datum
-  Calibrations calibrations{std::move(*requests), config, options.active};
+  Calibrations calibrations{std::move(*requests), config, options};
   Assembler assembler{assembler_options(config)};
   RawDecoder raw{config};
   ReplayReport report;

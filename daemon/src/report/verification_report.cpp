@@ -80,8 +80,7 @@ void add_frame(HtmlReport& page, const Verification& v) {
       o.frame == verify::Frame::BestFit
           ? "Nobody knows where the instrument stood but through these points: its frame was fitted onto the "
             "readings. That takes out of V_las the rigid motion that fits it best (six numbers): nothing can "
-            "be "
-            "said here of where the volume lies or how it is turned, only of its shape."
+            "be said here of where the volume lies or how it is turned, only of its shape."
           : "The instrument's axes were given as those of the machine: V_las keeps its rotation.");
   page.paragraph(
       "\"As stated\" compares with V as the model has it. \"Turned\" gives the model the small rigid motion "
@@ -119,8 +118,8 @@ void add_ratio(HtmlReport& page, const verify::Comparison& c) {
   page.heading("R_resmag: what is left of every vector");
   page.paragraph(
       "|V_las - V_model| / |V_las| on a grid inside the model's volume; below 1 the model helps, above it "
-      "harms "
-      "[Li OMM, eqs. 20, 21].");
+      "harms [Li OMM, eqs. 20, 21]. What \"turned\" and \"as stated\" mean, and why the second one may be "
+      "near 1 for a good model, is said under \"Frames\".");
   page.table({"", "points", "mean", "std", "min", "25 %", "median", "75 %", "max", "above 1"},
              {ratio_row("turned", c.R_turned), ratio_row("as stated", c.R_stated)});
   std::vector<double> stated, turned;

@@ -67,6 +67,16 @@ struct WholeArray : TouchingRun {
     EXPECT_TRUE(said["same_as_live"]) << said.dump(1);
   }
 
+  void expect_the_live_model_from(const std::string& recording, const std::string& live_id) const {
+    const auto identified = run(
+        {ABBE_PROGRAM, "identify", "evemu", "--recording", recording, "--json", "-o", file("identified")});
+    EXPECT_EQ(identified.code, 0) << identified.err;
+    const json said = json::parse(identified.out, nullptr, false);
+    ASSERT_TRUE(said.is_object()) << identified.out;
+    EXPECT_EQ(said["id"], live_id);
+    EXPECT_TRUE(said["gate"]["accepted"]) << said.dump(1);
+  }
+
   void expect_shape_only_without_acceptance() const {
     write_touching_configuration("max_error_mm = 10\nmax_gradient = 0.5\n");
     const auto judged =
@@ -93,6 +103,7 @@ TEST_F(WholeArray, IsGuidedIdentifiedPublishedAndReplayedTheSame) {
   EXPECT_EQ(abbed_->stop(), 0) << abbed_->err();
   expect_the_same_again({});
   expect_the_same_again({"--raw"});
+  expect_the_live_model_from(recordings().front(), model["id"]);
   expect_shape_only_without_acceptance();
 }
 

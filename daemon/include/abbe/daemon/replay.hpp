@@ -30,12 +30,14 @@ struct ReplayOptions {
   std::function<void(const Batch& batch, protocol::HostTime begin)> samples;
   /// Sees every snapshot, in order.
   std::function<void(const protocol::Snapshot&)> snapshots;
+  /// Gets every complete run instead of its being identified again.
+  std::function<void(CalibrationRun)> runs;
 };
 
 /// One calibration of the recording, done again.
 struct ReplayedCalibration {
   SessionStatus ended;                       ///< state Identifying: the run was complete; else why it was not
-  std::optional<Result<Candidate>> outcome;  ///< of a complete run
+  std::optional<Result<Candidate>> outcome;  ///< of a complete run; none if ReplayOptions::runs got it
   std::string model_hash;                    ///< empty without a model
   std::string model_id;
   std::string points_sha256;  ///< of the points or touches that entered the identification

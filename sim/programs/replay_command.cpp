@@ -49,10 +49,11 @@ Result<void> read_places(const ReplayOptions& options, ReplaySetup& setup) {
 void read_serials(const std::string& configuration, std::map<std::string, std::string>& serials) {
   try {
     const toml::table root = toml::parse(configuration);
-    for (const auto* card : {"counter_card", "reference"}) {
-      const auto serial = root[card]["serial_number"].value<std::string>();
-      const auto name = root[card]["name"].value<std::string>();
-      if (serial) serials[name.value_or(card)] = *serial;
+    for (const auto& [table, usual] :
+         {std::pair{"counter_card", "counter_card"}, std::pair{"reference", "reference_card"}}) {
+      const auto serial = root[table]["serial_number"].value<std::string>();
+      const auto name = root[table]["name"].value<std::string>();
+      if (serial) serials[name.value_or(usual)] = *serial;
     }
   } catch (const toml::parse_error&) {
     return;  // of a daemon of another age: the bytes are served all the same

@@ -63,6 +63,7 @@ RecorderThreadOptions recorder_options(const Config& config) {
   if (config.tracker) options.tracker = config.tracker->name;
   if (config.encoder) options.encoder = config.encoder->name;
   if (config.counter_card) options.encoder = config.counter_card->name;
+  if (config.reference) options.reference = config.reference->card.name;
   for (const auto& device : config.environment) options.environment.push_back(device.name);
   if (config.probe) options.probe = config.probe->name;
   if (config.cmm) options.probe = config.cmm->name;

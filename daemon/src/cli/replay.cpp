@@ -73,6 +73,10 @@ void print_report(const ReplayReport& r, double wall_s) {
                  verdict_of(**c.outcome).accepted ? "accepted" : "refused", c.model_id, c.model_hash);
     }
   }
+  for (const auto& d : r.datums) {
+    fmt::print("reference    {}: count 0 is at {:.6f} mm live, {} from the marks in the bytes\n", d.axis,
+               1e3 * d.live, d.again ? fmt::format("{:.6f} mm", 1e3 * *d.again) : "not found");
+  }
   for (const auto& id : r.live_model_ids) fmt::print("live         model {}\n", id);
   if (!r.live_model_ids.empty())
     fmt::print("{}\n", same_as_live(r) ? "the same as live" : "NOT the same as live");
@@ -85,9 +89,13 @@ void print_json(const RecordingReader& recording, const ReplayReport& r, double 
            {"wall_s", wall_s},
            {"live_model_ids", r.live_model_ids},
            {"same_as_live", same_as_live(r)},
+           {"reference", json::array()},
            {"losses", json::array()},
            {"calibrations", json::array()}};
   for (const auto& loss : recording.losses()) out["losses"].push_back(loss.what);
+  for (const auto& d : r.datums)
+    out["reference"].push_back(
+        {{"axis", d.axis}, {"live", d.live}, {"again", d.again ? json(*d.again) : json{}}});
   for (const auto& c : r.calibrations) out["calibrations"].push_back(calibration_json(c));
   fmt::print("{}\n", out.dump(1));
 }

@@ -215,8 +215,7 @@ void DeviceSet::drain(Batch& batch) {
     while (const std::size_t n = s.mark_watcher.crossings().pop(s.marks))
       batch.marks.insert(batch.marks.end(), s.marks.begin(),
                          s.marks.begin() + static_cast<std::ptrdiff_t>(n));
-    while (s.reference_card->device->raw().pop(s.blocks) != 0) {
-    }
+    drain_ring(s.reference_card->device->raw(), s.blocks, batch.reference_raw);
   }
   if (s.touch_detector) {
     drain_ring(s.touch_detector->touches(), s.touches, batch.touches);

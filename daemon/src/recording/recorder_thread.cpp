@@ -26,7 +26,7 @@ std::size_t bytes_of(const Batch& batch) noexcept {
   std::size_t bytes = size_of(batch.points) + size_of(batch.axes) + size_of(batch.environment) +
                       batch.measured_environment.size() * sizeof(protocol::EnvironmentSample);
   bytes += size_of(batch.touches) + size_of(batch.touch_scans);
-  for (const auto* blocks : {&batch.tracker_raw, &batch.encoder_raw, &batch.probe_raw})
+  for (const auto* blocks : {&batch.tracker_raw, &batch.encoder_raw, &batch.probe_raw, &batch.reference_raw})
     bytes += WaitingBlocks::bytes_of(*blocks);
   for (const auto& [device, block] : batch.environment_raw) bytes += WaitingBlocks::bytes_of(block);
   return bytes;
@@ -53,6 +53,7 @@ struct Waiting {
   WaitingBlocks tracker_raw;
   WaitingBlocks encoder_raw;
   WaitingBlocks probe_raw;
+  WaitingBlocks reference_raw;
   std::vector<WaitingMeasured> measured;  ///< in the order of RecorderThreadOptions::environment
   std::vector<v1::CalibrationEvent> events;
   std::vector<Attachment> attachments;
@@ -61,7 +62,8 @@ struct Waiting {
 
   [[nodiscard]] std::size_t bytes() const noexcept {
     std::size_t bytes = size_of(points) + size_of(axes) + size_of(environment) + size_of(touches) +
-                        size_of(touch_scans) + tracker_raw.bytes() + encoder_raw.bytes() + probe_raw.bytes();
+                        size_of(touch_scans) + tracker_raw.bytes() + encoder_raw.bytes() + probe_raw.bytes() +
+                        reference_raw.bytes();
     for (const auto& device : measured) bytes += size_of(device.samples) + device.raw.bytes();
     return bytes;
   }
@@ -80,6 +82,7 @@ struct Waiting {
     tracker_raw.clear();
     encoder_raw.clear();
     probe_raw.clear();
+    reference_raw.clear();
     for (auto& device : measured) {
       device.samples.clear();
       device.raw.clear();
@@ -97,7 +100,7 @@ struct Dropped {
     std::uint32_t samples = 0, raw = 0;
   };
   std::uint32_t points = 0, axes = 0, environment = 0, touches = 0, touch_scans = 0;
-  std::uint32_t tracker_raw = 0, encoder_raw = 0, probe_raw = 0;
+  std::uint32_t tracker_raw = 0, encoder_raw = 0, probe_raw = 0, reference_raw = 0;
   std::vector<OfDevice> measured;
 };
 
@@ -185,6 +188,7 @@ struct RecorderThread::State {
     lose(unsaid.tracker_raw, batch.tracker_raw.size());
     lose(unsaid.encoder_raw, batch.encoder_raw.size());
     lose(unsaid.probe_raw, batch.probe_raw.size());
+    lose(unsaid.reference_raw, batch.reference_raw.size());
     for (const auto& raw : batch.environment_raw) lose(place(unsaid.measured, raw.device).raw, 1);
   }
 
@@ -198,6 +202,7 @@ struct RecorderThread::State {
     turn.tracker_raw.for_each(options.tracker, [this](const auto& bytes) { recorder.record(bytes); });
     turn.encoder_raw.for_each(options.encoder, [this](const auto& bytes) { recorder.record(bytes); });
     turn.probe_raw.for_each(options.probe, [this](const auto& bytes) { recorder.record(bytes); });
+    turn.reference_raw.for_each(options.reference, [this](const auto& bytes) { recorder.record(bytes); });
     for (std::size_t i = 0; i < turn.measured.size(); ++i) {
       const std::string& device = options.environment.at(i);
       for (const auto& s : turn.measured[i].samples) recorder.record(s, device);
@@ -254,6 +259,7 @@ void RecorderThread::hand_over(const Batch& batch) {
   waiting.tracker_raw.append(batch.tracker_raw, unsaid.tracker_raw);
   waiting.encoder_raw.append(batch.encoder_raw, unsaid.encoder_raw);
   waiting.probe_raw.append(batch.probe_raw, unsaid.probe_raw);
+  waiting.reference_raw.append(batch.reference_raw, unsaid.reference_raw);
   for (const auto& [device, block] : batch.environment_raw)
     place(waiting.measured, device).raw.append(block, place(unsaid.measured, device).raw);
 }

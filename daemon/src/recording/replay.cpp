@@ -17,8 +17,10 @@
 #include "abbe/drivers/counter_card/thinning.hpp"
 #include "abbe/drivers/environment/receiver.hpp"
 #include "abbe/drivers/ippdme/receiver.hpp"
+#include "abbe/drivers/sampling/mark_watcher.hpp"
 #include "abbe/drivers/sampling/touch_detector.hpp"
 #include "abbe/drivers/tracker/receiver.hpp"
+#include "recording/mark_search.hpp"
 
 namespace abbe::daemon {
 namespace {
@@ -81,6 +83,11 @@ class RawDecoder {
       card_ = std::make_unique<drivers::CounterCardReceiver>(
           device_options(*config.counter_card, config.daemon.speed).receiver);
     }
+    if (config.reference) {
+      reference_name_ = config.reference->card.name;
+      reference_card_ = std::make_unique<drivers::CounterCardReceiver>(
+          device_options(config.reference->card, config.daemon.speed).receiver);
+    }
     if (config.counter_card && config.probe) {
       touch_detector_ = std::make_unique<drivers::TouchDetector>(
           touch_options(*config.probe, *config.counter_card, config.machine));
@@ -103,6 +110,9 @@ class RawDecoder {
         if (const auto sample = thinning_.take(s.axes)) batch.axes.push_back(*sample);
         if (touch_detector_) detect(s, batch);
       });
+    }
+    if (reference_card_ && device == reference_name_) {
+      reference_card_->on_raw(block, [&](const drivers::CounterScan& s) { watch(s, batch); });
     }
     for (std::size_t i = 0; i < environment_.size(); ++i) {
       if (device == environment_names_[i] && environment_[i].on_raw(block))
@@ -129,6 +139,12 @@ class RawDecoder {
     touch_detector_->on_scan(scan);
     std::array<protocol::ProbeTrigger, 1> touch;
     while (touch_detector_->touches().pop(touch) == 1) batch.touches.push_back(touch[0]);
+  }
+
+  void watch(const drivers::CounterScan& scan, Batch& batch) {
+    mark_watcher_.on_scan(scan);
+    for (drivers::MarkCrossing crossing; mark_watcher_.crossings().pop({&crossing, 1}) == 1;)
+      batch.marks.push_back(crossing);
   }
 
   void take_cmm(const protocol::RawBlock& block, Batch& batch) {
@@ -158,6 +174,9 @@ class RawDecoder {
   std::string card_name_;
   std::unique_ptr<drivers::CounterCardReceiver> card_;
   drivers::ScanThinning thinning_{1};
+  std::string reference_name_;
+  std::unique_ptr<drivers::CounterCardReceiver> reference_card_;
+  drivers::MarkWatcher mark_watcher_;
   std::vector<std::string> environment_names_;
   std::vector<drivers::EnvironmentReceiver> environment_;
 };
@@ -233,7 +252,7 @@ std::optional<std::size_t> environment_place(const Config& config, std::string_v
   return std::nullopt;
 }
 
-/// What the marks gave in the live run: the bytes of the second card are not recorded.
+/// What the marks gave in the live run: since when a datum was known is not in the bytes.
 Result<Datum> datum_of(const RecordingReader& recording, const Config& config) {
   Datum datum{config};
   for (const auto& attachment : recording.attachments()) {
@@ -280,6 +299,8 @@ Result<ReplayReport> replay(const RecordingReader& recording, const Config& conf
   if (!requests) return tl::unexpected(requests.error());
   auto datum = datum_of(recording, config);
   if (!datum) return tl::unexpected(datum.error());
+  auto marks = MarkSearch::of(recording, config);
+  if (!marks) return tl::unexpected(marks.error());
   const bool from_raw = options.source != ReplaySource::Samples;  // recorded samples have their datum
   Calibrations calibrations{std::move(*requests), config, options};
   Assembler assembler{assembler_options(config)};
@@ -339,6 +360,7 @@ Result<ReplayReport> replay(const RecordingReader& recording, const Config& conf
     sequence = message->sequence;
     if (!deliver(*message, sink)) ++report.undecodable;
     if (++taken % kMessagesPerTurn != 0) continue;
+    marks->take(batch);
     if (from_raw) datum->apply(batch);
     if (options.samples) options.samples(batch, range->first);
     assembler.take(batch);
@@ -348,12 +370,14 @@ Result<ReplayReport> replay(const RecordingReader& recording, const Config& conf
     if (options.progress) options.progress(cursor.progress());
   }
   device_order.finish(batch.points);
+  marks->take(batch);
   if (from_raw) datum->apply(batch);
   if (options.samples) options.samples(batch, range->first);
   assembler.take(batch);
   assembler.finish(snapshots);
   hand_on();
   report.calibrations = calibrations.finish();
+  if (from_raw) report.datums = marks->compared(recording);
   return report;
 }
 

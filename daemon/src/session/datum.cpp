@@ -97,6 +97,21 @@ RecordingAttachment to_attachment(const FoundDatum& datum) {
   return {.name = std::string{kDatumName}, .media_type = "application/json", .content = content.dump()};
 }
 
+RecordingAttachment reference_request(protocol::HostTime from) {
+  return {.name = std::string{kReferenceRequestName},
+          .media_type = "application/json",
+          .content = json{{"from_ns", from.time_since_epoch().count()}}.dump()};
+}
+
+Result<protocol::HostTime> reference_request_from(const RecordingAttachment& attachment) {
+  try {
+    const auto ns = json::parse(attachment.content).at("from_ns").get<std::int64_t>();
+    return protocol::HostTime{std::chrono::nanoseconds{ns}};
+  } catch (const json::exception& e) {
+    return fail(ErrorCode::BadInput, fmt::format("attachment {}: {}", attachment.name, e.what()));
+  }
+}
+
 Result<FoundDatum> datum_from_attachment(const RecordingAttachment& attachment) {
   try {
     const json content = json::parse(attachment.content);

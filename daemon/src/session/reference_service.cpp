@@ -22,6 +22,10 @@ ReferenceOptions reference_options(const ReferenceConfig& config, const CounterC
   return options;
 }
 
+double reading_at_zero(const ReferenceAxisConfig& marks, const AxisReference& found) {
+  return marks.zero_mark + (marks.reversed ? -found.offset : found.offset);
+}
+
 ReferenceService::ReferenceService(const Config& config, RecorderThread* recorder)
     : config_(config), recorder_(recorder), datum_(config) {}
 
@@ -32,6 +36,8 @@ Result<void> ReferenceService::start() {
   session_.emplace(reference_options(*config_.reference, *config_.counter_card));
   taken_up_.assign(config_.reference->axes.size(), false);
   running_ = true;
+  from_ = newest_;
+  if (recorder_ != nullptr) recorder_->attach(reference_request(newest_), newest_);
   return {};
 }
 
@@ -42,16 +48,15 @@ Result<void> ReferenceService::cancel() {
 }
 
 void ReferenceService::turn(Batch& batch) {
+  for (const auto& sample : batch.axes) newest_ = std::max(newest_, sample.head.time);
   if (running_) look_for_marks(batch);
   datum_.apply(batch);
 }
 
 void ReferenceService::look_for_marks(const Batch& batch) {
-  for (const auto& crossing : batch.marks) session_->take(crossing);
-  for (const auto& sample : batch.axes) {
-    session_->take(sample);
-    newest_ = std::max(newest_, sample.head.time);
-  }
+  for (const auto& crossing : batch.marks)
+    if (crossing.head.time > from_) session_->take(crossing);
+  for (const auto& sample : batch.axes) session_->take(sample);
   for (std::size_t i = 0; i < taken_up_.size(); ++i) {
     const bool found = session_->axis(i).state == AxisReference::State::Found;
     if (found && !taken_up_[i]) take_up(i);
@@ -70,9 +75,7 @@ void ReferenceService::take_up(std::size_t axis) {
 }
 
 double ReferenceService::reading_at_zero(std::size_t axis) const {
-  const ReferenceAxisConfig& marks = config_.reference->axes[axis];
-  const double place = session_->axis(axis).offset;
-  return marks.zero_mark + (marks.reversed ? -place : place);
+  return daemon::reading_at_zero(config_.reference->axes[axis], session_->axis(axis));
 }
 
 std::vector<ReferenceService::AxisStatus> ReferenceService::status() const {

@@ -27,10 +27,11 @@ struct Batch {
   std::vector<FromEnvironment> measured_environment;
   std::vector<protocol::ProbeTrigger> touches;
   std::vector<protocol::TouchScan> touch_scans;
-  std::vector<drivers::MarkCrossing> marks;  ///< of the second card: not recorded, what they give is
+  std::vector<drivers::MarkCrossing> marks;  ///< of the second card: its bytes are recorded, not these
   std::vector<protocol::RawBlock> tracker_raw;
   std::vector<protocol::RawBlock> encoder_raw;
-  std::vector<protocol::RawBlock> probe_raw;  ///< of a measuring machine
+  std::vector<protocol::RawBlock> probe_raw;      ///< of a measuring machine
+  std::vector<protocol::RawBlock> reference_raw;  ///< of the second counter card
   std::vector<RawFromEnvironment> environment_raw;
 
   void clear() noexcept {
@@ -44,12 +45,13 @@ struct Batch {
     tracker_raw.clear();
     encoder_raw.clear();
     probe_raw.clear();
+    reference_raw.clear();
     environment_raw.clear();
   }
   [[nodiscard]] bool empty() const noexcept {
     return points.empty() && axes.empty() && environment.empty() && measured_environment.empty() &&
            touches.empty() && touch_scans.empty() && marks.empty() && tracker_raw.empty() &&
-           encoder_raw.empty() && probe_raw.empty() && environment_raw.empty();
+           encoder_raw.empty() && probe_raw.empty() && reference_raw.empty() && environment_raw.empty();
   }
 };
 

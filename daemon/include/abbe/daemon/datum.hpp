@@ -52,6 +52,10 @@ class Datum {
 
 /// As it lies in the recording, for a replay from raw bytes.
 inline constexpr std::string_view kDatumName = "datum.json";
+/// Since when the marks were searched for: crossings and samples later than this.
+inline constexpr std::string_view kReferenceRequestName = "reference.json";
+[[nodiscard]] RecordingAttachment reference_request(protocol::HostTime from);
+[[nodiscard]] Result<protocol::HostTime> reference_request_from(const RecordingAttachment& attachment);
 [[nodiscard]] RecordingAttachment to_attachment(const FoundDatum& datum);
 [[nodiscard]] Result<FoundDatum> datum_from_attachment(const RecordingAttachment& attachment);
 

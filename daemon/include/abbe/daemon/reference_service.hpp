@@ -17,6 +17,9 @@ namespace abbe::daemon {
 [[nodiscard]] ReferenceOptions reference_options(const ReferenceConfig& config,
                                                  const CounterCardConfig& live);
 
+/// What a found axis says of count 0. m or rad.
+[[nodiscard]] double reading_at_zero(const ReferenceAxisConfig& marks, const AxisReference& found);
+
 class ReferenceService {
  public:
   struct AxisStatus {
@@ -51,6 +54,7 @@ class ReferenceService {
   std::vector<bool> taken_up_;
   bool running_ = false;
   protocol::HostTime newest_{};  ///< of the live samples
+  protocol::HostTime from_{};    ///< what came later belongs to the search
 };
 
 }  // namespace abbe::daemon

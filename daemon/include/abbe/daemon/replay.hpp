@@ -43,8 +43,16 @@ struct ReplayedCalibration {
   std::string points_sha256;  ///< of the points or touches that entered the identification
 };
 
+/// The datum of one axis, found once more from the marks in the raw bytes of both cards.
+struct ReplayedDatum {
+  std::string axis;
+  double live = 0.0;            ///< m or rad: the reading at count 0, as the recording's own attachment says
+  std::optional<double> again;  ///< nothing: the marks in the recording do not give it
+};
+
 struct ReplayReport {
   std::vector<ReplayedCalibration> calibrations;
+  std::vector<ReplayedDatum> datums;        ///< from raw bytes only
   std::vector<std::string> live_model_ids;  ///< as the recording's own events name them
   std::uint64_t snapshots = 0;
   std::uint64_t undecodable = 0;

@@ -113,6 +113,7 @@ struct Abbed::State {
   std::optional<Publisher> publisher;
   std::optional<DdsSupervisor> supervisor;
   std::optional<DeviceSet> devices;
+  std::optional<TouchService> touching;
   std::optional<Hub> hub;
   std::thread hub_thread;
   std::unique_ptr<ControlServer> control;
@@ -186,6 +187,7 @@ struct Abbed::State {
   }
 
   Result<void> start_hub() {
+    touching.emplace(*devices, config.cmm.has_value());
     hub.emplace(HubParts{.config = config,
                          .time = time,
                          .devices = *devices,
@@ -194,6 +196,7 @@ struct Abbed::State {
                          .publisher = publisher ? &*publisher : nullptr,
                          .recorder = recorder.get(),
                          .reference = &*reference,
+                         .touching = &*touching,
                          .verification = &*verification});
     hub_thread = std::thread([this] { run_hub(); });
     if (auto set = set_priority(hub_thread, config.daemon); !set) {

@@ -15,6 +15,7 @@ void add_calibrate_otf(CLI::App& parent, int& exit);
 void add_calibrate_evemu(CLI::App& parent, int& exit);
 void add_reference(CLI::App& parent, int& exit);
 void add_calibrate_probe(CLI::App& parent, int& exit);
+void add_calibrate_artefact(CLI::App& parent, int& exit);
 void add_replay(CLI::App& parent, int& exit);
 void add_verify(CLI::App& parent, int& exit);
 void add_status(CLI::App& parent, int& exit);

@@ -60,6 +60,7 @@ void add_commands(CLI::App& app, int& exit) {
   add_calibrate_otf(*calibrate, exit);
   add_calibrate_evemu(*calibrate, exit);
   add_calibrate_probe(*calibrate, exit);
+  add_calibrate_artefact(*calibrate, exit);
   add_reference(app, exit);
   add_replay(app, exit);
   auto* identify = app.add_subcommand(

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <array>
 #include <cmath>
 #include <map>
 #include <string>
@@ -207,6 +208,41 @@ json verification(const Hub& hub, const json& request) {
   return {{"ok", true}, {"standing", (*found)->standing()}, {"points", std::move(list)}};
 }
 
+drivers::ProbePoint place_from(const json& place, bool touch) {
+  return {.position_m = place.get<std::array<double, 3>>(), .touch = touch};
+}
+
+json touch(const Hub& hub, const json& request) {
+  if (hub.parts().touching == nullptr) return refusal({ErrorCode::Refused, "touch: not in this daemon"});
+  TouchService& service = *hub.parts().touching;
+  if (request.value("cancel", false)) {
+    auto done = service.cancel();
+    return done ? json{{"ok", true}} : refusal(done.error());
+  }
+  std::vector<TouchRequest> wanted;
+  for (const json& point : request.at("points")) {
+    TouchRequest& one = wanted.emplace_back();
+    for (const json& place : point.at("way")) one.way.push_back(place_from(place, false));
+    one.point = place_from(point.at("at_m"), true);
+    one.point.normal = point.at("normal").get<std::array<double, 3>>();
+  }
+  auto started = service.start(std::move(wanted));
+  return started ? json{{"ok", true}} : refusal(started.error());
+}
+
+json touches(const Hub& hub, const json&) {
+  if (hub.parts().touching == nullptr) return refusal({ErrorCode::Refused, "touch: not in this daemon"});
+  const TouchService::Status& status = hub.parts().touching->status();
+  json made = json::array();
+  for (const auto& t : status.touches)
+    made.push_back({{"at_m", {t.position[0], t.position[1], t.position[2]}}, {"u_m", t.u_position[0]}});
+  return {{"ok", true},
+          {"running", status.running},
+          {"asked", status.asked},
+          {"reason", status.reason},
+          {"touches", std::move(made)}};
+}
+
 }  // namespace
 
 json answer_request(Hub& hub, const json& request, std::chrono::milliseconds time_out) {
@@ -217,13 +253,16 @@ json answer_request(Hub& hub, const json& request, std::chrono::milliseconds tim
       {"cancel", cancel},
       {"reference", reference},
       {"verification", verification},
+      {"touch", touch},
+      {"touches", touches},
   };
   const auto what = request.at("do").get<std::string>();
   const auto task = kTasks.find(what);
   if (task == kTasks.end()) {
     return refusal(
         {ErrorCode::Usage,
-         fmt::format("unknown request \"{}\": known are status, calibrate, cancel, reference, verification",
+         fmt::format("unknown request \"{}\": known are status, calibrate, cancel, reference, verification, "
+                     "touch, touches",
                      what)});
   }
   auto answer = hub.call([&hub, run = task->second, request] { return run(hub, request); }, time_out);

@@ -245,7 +245,11 @@ void DeviceSet::drain_cmm(Batch& batch) {
 
 void DeviceSet::measure(std::span<const drivers::ProbePoint> points) {
   if (!state_->cmm) return;
-  for (const auto& point : points) state_->cmm->device->measure(point);
+  state_->cmm->device->measure(points);
+}
+
+std::size_t DeviceSet::points_left() const {
+  return state_->cmm ? state_->cmm->device->points_left() : 0;
 }
 
 std::vector<StreamHealth> DeviceSet::health(HostTime now) {

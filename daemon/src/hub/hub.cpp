@@ -78,7 +78,9 @@ void Hub::turn(WallTime wall) {
   if (parts_.publisher != nullptr) parts_.publisher->beat(wall);
 
   batch_.clear();
+  const std::size_t points_left = parts_.devices.points_left();
   parts_.devices.drain(batch_);
+  touch(points_left);
   if (parts_.reference != nullptr) parts_.reference->turn(batch_);
   const bool fresh = live_.take(batch_);
   const HostTime now = parts_.time.now();
@@ -94,6 +96,18 @@ void Hub::turn(WallTime wall) {
   }
   if (parts_.verification != nullptr) parts_.verification->turn(snapshots_);
   run_calls();
+}
+
+/// What the machine said last is asked for only when that matters: its health is not for every turn.
+void Hub::touch(std::size_t points_left) {
+  if (parts_.touching == nullptr || !parts_.touching->status().running) return;
+  std::string seen;
+  if (points_left == 0 && batch_.touches.empty()) {
+    collect_health(parts_.time.now());
+    for (const auto& h : health_)
+      if (parts_.config.cmm && h.status.name == parts_.config.cmm->name) seen = h.status.last_fault;
+  }
+  parts_.touching->turn(batch_, points_left, seen);
 }
 
 void Hub::publish(bool fresh, HostTime now, WallTime wall) {

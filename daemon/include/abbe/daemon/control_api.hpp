@@ -3,7 +3,11 @@
 ///     {"do": "status"}
 ///     {"do": "calibrate", "method": "otf", "path_m": [[x, y, z], ...], "who": NAME}
 ///     {"do": "cancel", "who": NAME}
-/// Lengths m. Models are activated and rolled back in the store; the daemon follows it. Runs on the hub's thread, through Hub::call().
+///     {"do": "touch", "points": [{"way": [[x, y, z], ...], "at_m": [x, y, z], "normal": [i, j, k]}, ...]}
+///     {"do": "touch", "cancel": true}
+///     {"do": "touches"}
+/// Lengths m. Models are activated and rolled back in the store; the daemon follows it. Runs on the hub's
+/// thread, through Hub::call().
 
 #include <chrono>
 #include <nlohmann/json.hpp>

@@ -29,8 +29,8 @@ class DeviceSet final : public SampleSource {
   [[nodiscard]] std::vector<StreamHealth> health(protocol::HostTime now) override;
   /// What the system refused in real-time mode `ignore`, one sentence each.
   [[nodiscard]] std::vector<std::string> warnings() const;
-  /// Moves the measuring machine and touches; the touches come with drain(). Without one: nothing.
-  void measure(std::span<const drivers::ProbePoint> points);
+  void measure(std::span<const drivers::ProbePoint> points) override;
+  [[nodiscard]] std::size_t points_left() const override;
 
  private:
   void drain_cmm(Batch& batch);

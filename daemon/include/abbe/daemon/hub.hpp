@@ -21,6 +21,7 @@
 #include "abbe/daemon/recorder_thread.hpp"
 #include "abbe/daemon/reference_service.hpp"
 #include "abbe/daemon/sample_source.hpp"
+#include "abbe/daemon/touch_service.hpp"
 #include "abbe/daemon/verification_service.hpp"
 #include "abbe/drivers/time_source.hpp"
 
@@ -37,6 +38,7 @@ struct HubParts {
   Publisher* publisher = nullptr;
   RecorderThread* recorder = nullptr;
   ReferenceService* reference = nullptr;
+  TouchService* touching = nullptr;
   VerificationService* verification = nullptr;
 };
 
@@ -70,6 +72,7 @@ class Hub {
   void run_calls();
   void publish(bool fresh, protocol::HostTime now, WallTime wall);
   void collect_health(protocol::HostTime now);
+  void touch(std::size_t points_left);
 
   HubParts parts_;
   Assembler assembler_;

@@ -1,0 +1,165 @@
+/// `abbe calibrate artefact`: the command, the daemon and a simulated measuring machine over I++ DME.
+
+#include <gmock/gmock.h>
+
+#include <cmath>
+#include <csignal>
+#include <fstream>
+#include <random>
+#include <regex>
+
+#include "abbe/daemon/evemu_files.hpp"
+#include "counter_card_run.hpp"
+
+namespace abbe::test {
+namespace {
+
+using nlohmann::json;
+using testing::HasSubstr;
+
+struct ArtefactRun : CounterCardRun {
+  static constexpr double kNoise_um = 0.3;
+  static constexpr double kMachine_um = 0.4;
+  static constexpr int kBalls = 9;
+
+  /// Nine balls in an L and two faces; `off_mm`: how far each coordinate is from nominal.
+  static std::string artefact(double off_mm, double u_block_rad) {
+    std::mt19937_64 random(11);
+    std::normal_distribution<double> off(0.0, off_mm);
+    std::string text = "[calibrator]\nname = \"L\"\ntip_radius_mm = 1.5\n";
+    for (int i = 1; i <= kBalls; ++i) {
+      const double along = 60.0 * (i <= 5 ? i - 1 : i - 5);
+      const double x = i <= 5 ? along : 0.0, y = i <= 5 ? 0.0 : along;
+      text += "[[ball]]\nnumber = " + std::to_string(i) + "\nx_mm = " + std::to_string(x + off(random)) +
+              "\ny_mm = " + std::to_string(y + off(random)) + "\nz_mm = " + std::to_string(60 + off(random)) +
+              "\nradius_mm = " + std::to_string(12.7 + off(random)) + "\n";
+    }
+    const double c = std::cos(u_block_rad), s = std::sin(u_block_rad);
+    text += "[[block]]\nnumber = 1\nnormal = [" + std::to_string(s) + ", 0, " + std::to_string(c) +
+            "]\nx_mm = 60\ny_mm = 60\nz_mm = 40\nhalf_size_mm = 10\n";
+    text += "[[block]]\nnumber = 2\nnormal = [0, " + std::to_string(-c) + ", " + std::to_string(s) +
+            "]\nx_mm = 90\ny_mm = 80\nz_mm = 45\nhalf_size_mm = 10\n";
+    return text;
+  }
+  static std::string machine_table(int port) {
+    return "[cmm]\nhost = \"127.0.0.1\"\nport = " + std::to_string(port) +
+           "\nu_position_um = " + std::to_string(kMachine_um) + "\n";
+  }
+  /// The daemon with nothing but a measuring machine. `more`: faults of the simulation.
+  void start(const std::string& more = {}) {
+    write_path("path.csv", {{0, 0, -50}, {1, 0, -50}});
+    write("nominal.toml", artefact(0.0, 0.0));
+    write("true.toml", artefact(0.05, 2e-3));
+    write("machine.toml", text_of(file("machine.toml")) + machine_table(0));
+    write("sim.toml", std::regex_replace(text_of(file("sim.toml")), std::regex{"standstill_s = 8"},
+                                         "standstill_s = 1\nstart_when_streaming = false") +
+                          "[sim.cmm]\nartefact = \"true.toml\"\nnoise_um = " + std::to_string(kNoise_um) +
+                          "\n" + more);
+    ASSERT_NO_FATAL_FAILURE(start_simulator());
+    write_configuration();
+    const std::string whole = text_of(file("abbed.toml"));
+    write("abbed.toml", whole.substr(0, whole.find("[tracker]")) + machine_table(port("cmm_port")) +
+                            whole.substr(whole.find("[daemon]")));
+    ASSERT_NO_FATAL_FAILURE(start_abbed());
+    ASSERT_TRUE(eventually([&] { return samples("cmm") > 2; })) << status().dump(1);
+  }
+  [[nodiscard]] Outcome calibrate(std::vector<std::string> more = {}) const {
+    std::vector<std::string> command{ABBE_PROGRAM,           "calibrate", "artefact",         "--calibrator",
+                                     file("nominal.toml"),   "-c",        file("abbed.toml"), "-o",
+                                     file("calibrator.toml")};
+    command.insert(command.end(), more.begin(), more.end());
+    return run(command);
+  }
+  [[nodiscard]] std::size_t kept_touches() const {
+    const std::string text = text_of(file("calibrator.touches.csv"));
+    return text.empty() ? 0 : static_cast<std::size_t>(std::count(text.begin(), text.end(), '\n')) - 1;
+  }
+};
+
+TEST_F(ArtefactRun, FindsTheBallsWithinTheStatedUncertainty) {
+  ASSERT_NO_FATAL_FAILURE(start());
+  const auto done = calibrate({"--points", "9", "--block-points", "5"});
+  ASSERT_EQ(done.code, 0) << done.out << done.err;
+  EXPECT_EQ(kept_touches(), kBalls * 9u + 2u * 5u);
+  const auto found = daemon::read_calibrator_toml(file("calibrator.toml"));
+  const auto truth = daemon::read_calibrator_toml(file("true.toml"));
+  ASSERT_TRUE(found) << found.error().text;
+  ASSERT_TRUE(truth) << truth.error().text;
+  for (std::size_t i = 0; i < kBalls; ++i) {
+    const auto& ball = found->calibrator.balls[i];
+    const auto& is = truth->calibrator.balls[i];
+    // Four standard uncertainties per coordinate: once in 16,000.
+    EXPECT_LT((ball.centre_m - is.centre_m).cwiseAbs().maxCoeff(), 4.0 * ball.u_m) << "ball " << i + 1;
+    EXPECT_GE(ball.u_m, 1e-6 * kMachine_um);
+    EXPECT_LT(ball.u_m, 3e-6);  // not so large that anything would agree
+    EXPECT_NEAR(ball.radius_m, is.radius_m, 4.0 * ball.u_m);
+  }
+  for (std::size_t i = 0; i < 2; ++i) {
+    const auto& block = found->calibrator.blocks[i];
+    EXPECT_LT((block.normal - truth->calibrator.blocks[i].normal.normalized()).norm(), 4.0 * block.u_rad);
+  }
+}
+
+TEST_F(ArtefactRun, SaysWhyTheMachineRefusedATouchAndKeepsTheOthers) {
+  ASSERT_NO_FATAL_FAILURE(start());
+  write("nominal.toml", std::regex_replace(artefact(0.0, 0.0), std::regex{"number = 3\nx_mm = 120"},
+                                           "number = 3\nx_mm = 150"));
+  const auto refused = calibrate({"--points", "5"});
+  EXPECT_EQ(refused.code, 1) << refused.out;
+  EXPECT_THAT(refused.err, HasSubstr("touch 11 of"));
+  EXPECT_THAT(refused.err, HasSubstr("1006 Surface not found"));
+  EXPECT_EQ(kept_touches(), 10u);
+  EXPECT_FALSE(std::filesystem::exists(file("calibrator.toml")));
+}
+
+TEST_F(ArtefactRun, SaysThatTheMachineWentAway) {
+  ASSERT_NO_FATAL_FAILURE(start());
+  Program running({ABBE_PROGRAM, "calibrate", "artefact", "--calibrator", file("nominal.toml"), "-c",
+                   file("abbed.toml"), "-o", file("calibrator.toml")},
+                  file("artefact"));
+  const auto touched = [&] { return text_of(recordings().front()).size(); };
+  const auto before = touched();
+  ASSERT_TRUE(eventually([&] { return touched() > before + 4096; }));
+  simulator_->stop();
+  EXPECT_EQ(running.wait_for_end(), 1);
+  EXPECT_THAT(running.err(), HasSubstr("was not made"));
+  EXPECT_THAT(running.err(), HasSubstr("touches until then"));
+}
+
+TEST_F(ArtefactRun, EndsTheTouchingWhenInterrupted) {
+  ASSERT_NO_FATAL_FAILURE(start());
+  Program running({ABBE_PROGRAM, "calibrate", "artefact", "--calibrator", file("nominal.toml"), "-c",
+                   file("abbed.toml"), "-o", file("calibrator.toml")},
+                  file("artefact"));
+  const auto recorded = [&] { return text_of(recordings().front()).size(); };
+  const auto before = recorded();
+  ASSERT_TRUE(eventually([&] { return recorded() > before + 4096; }));
+  running.signal(SIGINT);
+  EXPECT_EQ(running.wait_for_end(), 1);
+  EXPECT_THAT(running.err(), HasSubstr("cancelled"));
+  EXPECT_LT(kept_touches(), kBalls * 13u);
+  EXPECT_GT(kept_touches(), 0u);
+}
+
+TEST_F(ArtefactRun, NeedsAMeasuringMachineAndKnownFaces) {
+  write_path("path.csv", {{0, 0, -50}, {1, 0, -50}});
+  write("nominal.toml", artefact(0.0, 0.0));
+  ASSERT_NO_FATAL_FAILURE(start_simulator());
+  write_configuration();
+  ASSERT_NO_FATAL_FAILURE(start_abbed());
+  const auto none = calibrate();
+  EXPECT_EQ(none.code, 5);
+  EXPECT_THAT(none.err, HasSubstr("[cmm]"));
+  write("nominal.toml",
+        std::regex_replace(artefact(0.0, 0.0), std::regex{"x_mm = 90\ny_mm = 80\nz_mm = 45\n"}, ""));
+  const auto faceless = calibrate();
+  EXPECT_EQ(faceless.code, 3);
+  EXPECT_THAT(faceless.err, HasSubstr("block 2"));
+  write("nominal.toml", std::regex_replace(artefact(0.0, 0.0), std::regex{"number = 4"}, "number = 40"));
+  const auto unknown = calibrate();
+  EXPECT_EQ(unknown.code, 3);
+  EXPECT_THAT(unknown.err, HasSubstr("ball number"));
+}
+
+}  // namespace
+}  // namespace abbe::test

@@ -18,6 +18,22 @@ class EncoderConformancePeer {
   static constexpr std::chrono::nanoseconds kRecoveryLimit = 4s;  // SDO retries 1.5 s, then a pause of 1 s
   static constexpr bool kTornCanBeFinished = false;
 
+  static std::set<std::string_view> shown(Fault fault) {
+    switch (fault) {
+      case Fault::None:
+        return {"streaming"};
+      case Fault::Mute:
+        return {"degraded", "silent", "configuring"};
+      case Fault::Garbage:
+        return {"streaming"};
+      case Fault::Unplugged:
+        return {"silent"};
+      case Fault::Restart:
+        return {"degraded", "configuring"};
+    }
+    return {};
+  }
+
   EncoderConformancePeer() {
     drivers::EncoderDeviceOptions options;
     options.receiver.axes = {{.name = "X", .node = 1}, {.name = "Y", .node = 2}};

@@ -78,6 +78,7 @@ class RecordDevice final : public drivers::Device {
     if (n > 0) {
       last_heard_ = time_.now();
       board_.set_connected(true);
+      board_.set_state("streaming");
       raw_.push_bytes(last_heard_, protocol::RawBlock::Direction::FromDevice,
                       std::as_bytes(std::span(buffer_)).subspan(filled_, static_cast<std::size_t>(n)));
       filled_ += static_cast<std::size_t>(n);
@@ -117,6 +118,7 @@ class RecordDevice final : public drivers::Device {
   void lose(const char* cause) {
     board_.fault(time_.now(), cause);
     board_.set_connected(false);
+    board_.set_state("closed");
     socket_.reset();
     filled_ = 0;
     nonsense_ = false;
@@ -150,6 +152,11 @@ class RecordPeer {
   static constexpr std::chrono::nanoseconds kSilenceLimit = RecordDevice::kSilence;
   static constexpr std::chrono::nanoseconds kRecoveryLimit = 1s;
   static constexpr bool kTornCanBeFinished = true;
+
+  static std::set<std::string_view> shown(Fault fault) {
+    if (fault == Fault::None) return {"streaming"};
+    return {"closed"};
+  }
 
   RecordPeer() : port_holder_(bound_socket(0)), port_(port_of(port_holder_.get())), device_(time_, port_) {
     plug_in();

@@ -13,6 +13,22 @@ class FaultyCard {
   static constexpr std::chrono::nanoseconds kRecoveryLimit = 3s;  // 300 requests, one in two turns; pauses
   static constexpr bool kTornCanBeFinished = true;
 
+  static std::set<std::string_view> shown(Fault fault) {
+    switch (fault) {
+      case Fault::None:
+        return {"streaming"};
+      case Fault::Mute:
+        return {"restarting", "loading", "arming"};
+      case Fault::Garbage:
+        return {"closed"};
+      case Fault::Unplugged:
+        return {"closed"};
+      case Fault::Restart:
+        return {"closed"};
+    }
+    return {};
+  }
+
   drivers::Device& device() { return *bench_.device; }
   drivers::SteppedTime& time() { return bench_.time; }
   void take_samples(std::vector<protocol::SampleHead>& heads) {

@@ -17,6 +17,22 @@ class FaultyModbus {
   static constexpr std::chrono::nanoseconds kRecoveryLimit = 1s;    // asked of it
   static constexpr bool kTornCanBeFinished = true;
 
+  static std::set<std::string_view> shown(Fault fault) {
+    switch (fault) {
+      case Fault::None:
+        return {"reading"};
+      case Fault::Mute:
+        return {"closed"};
+      case Fault::Garbage:
+        return {"closed"};
+      case Fault::Unplugged:
+        return {"closed"};
+      case Fault::Restart:
+        return {"closed"};
+    }
+    return {};
+  }
+
   drivers::Device& device() { return *device_; }
   drivers::SteppedTime& time() { return time_; }
   void take_samples(std::vector<protocol::SampleHead>& heads) {

@@ -14,6 +14,22 @@ class FaultyMeasuringMachine {
   static constexpr std::chrono::nanoseconds kRecoveryLimit = 30s;  // two turns a command
   static constexpr bool kTornCanBeFinished = true;
 
+  static std::set<std::string_view> shown(Fault fault) {
+    switch (fault) {
+      case Fault::None:
+        return {"ready"};
+      case Fault::Mute:
+        return {"faulted"};
+      case Fault::Garbage:
+        return {"faulted"};
+      case Fault::Unplugged:
+        return {"disconnected"};
+      case Fault::Restart:
+        return {"disconnected"};
+    }
+    return {};
+  }
+
   drivers::Device& device() { return *device_; }
   drivers::SteppedTime& time() { return time_; }
   void take_samples(std::vector<protocol::SampleHead>& heads) {

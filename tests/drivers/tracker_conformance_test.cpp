@@ -15,6 +15,22 @@ class FaultyTracker {
       40s;  // a pause, set-up 6 s, Initialize 2 s
   static constexpr bool kTornCanBeFinished = true;
 
+  static std::set<std::string_view> shown(Fault fault) {
+    switch (fault) {
+      case Fault::None:
+        return {"streaming"};
+      case Fault::Mute:
+        return {"faulted"};
+      case Fault::Garbage:
+        return {"faulted"};
+      case Fault::Unplugged:
+        return {"disconnected"};
+      case Fault::Restart:
+        return {"disconnected"};
+    }
+    return {};
+  }
+
   drivers::Device& device() { return *device_; }
   drivers::SteppedTime& time() { return time_; }
   void take_samples(std::vector<protocol::SampleHead>& heads) {
@@ -40,6 +56,7 @@ class FaultyTracker {
   void plug_in() { peer_.listen(); }
   void flood() { peer_.flood(1800); }
   void restart() { peer_.restart(time_.now()); }
+  void jump_clock() { peer_.jump_clock(std::chrono::seconds{30}); }
 
  private:
   drivers::TrackerDeviceOptions options() const {

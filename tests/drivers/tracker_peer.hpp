@@ -10,6 +10,7 @@
 #include <sys/socket.h>
 
 #include <array>
+#include <cstring>
 #include <deque>
 #include <memory>
 #include <span>
@@ -89,6 +90,9 @@ class TrackerPeer {
     send(burst(points));
   }
 
+  /// From now on the controller's clock shows so much more.
+  void jump_clock(std::chrono::seconds by) { clock_ahead_ += static_cast<std::int32_t>(by.count()); }
+
   void hang_up() {
     client_.close();
     points_.clear();
@@ -142,9 +146,19 @@ class TrackerPeer {
     }
   }
 
-  void say(const Bytes& packet) {
+  void say(Bytes packet) {
+    set_clock_ahead(packet);
     send(packet);
     remember(packet);
+  }
+  /// [emScon TPI 3.6] MultiMeasResultT: points of 36 bytes from byte 48 on, seconds in their bytes 4 to 7.
+  void set_clock_ahead(Bytes& packet) const {
+    for (std::size_t at = 48 + 4; clock_ahead_ != 0 && at + 4 <= packet.size(); at += 36) {
+      std::int32_t seconds = 0;
+      std::memcpy(&seconds, packet.data() + at, sizeof seconds);
+      seconds += clock_ahead_;
+      std::memcpy(packet.data() + at, &seconds, sizeof seconds);
+    }
   }
   void remember(const Bytes& packet) {
     const auto result = emscon::MultiResult::from(packet);
@@ -162,6 +176,7 @@ class TrackerPeer {
   std::deque<Bytes> points_;  ///< one burst each, not yet said
   Bytes torn_;
   protocol::DeviceTime last_said_{};
+  std::int32_t clock_ahead_ = 0;  ///< s
 };
 
 }  // namespace abbe::tests::tracker

@@ -10,6 +10,10 @@
 ///   struct MyPeer { ... };  // models FaultyPeer
 ///   INSTANTIATE_TYPED_TEST_SUITE_P(My, DriverConformance, MyPeer);
 ///
+/// What the device must show of each fault: `static std::set<std::string_view> shown(Fault)` are the states
+/// of which it must show one while the fault lasts (a fault that passes unseen by the state: the usual ones).
+/// The counters are the same for every driver: see the tests' names.
+///
 /// A peer whose device has a clock of its own also has jump_clock(): the clock is suddenly a second or more
 /// ahead.
 ///
@@ -21,7 +25,9 @@
 #include <chrono>
 #include <concepts>
 #include <cstdint>
+#include <set>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "abbe/drivers/device.hpp"
@@ -30,6 +36,8 @@
 #include "allocation_count.hpp"
 
 namespace abbe::tests {
+
+enum class Fault { None, Mute, Garbage, Unplugged, Restart };
 
 /// What a driver's test implements. All calls come from one thread and return at once. Default constructed,
 /// the peer is there and well, the device is made and has had no turn yet.
@@ -142,6 +150,16 @@ class DriverConformance : public testing::Test {
     EXPECT_EQ(s.samples, taken_ + s.dropped) << "every decoded sample is taken or counted as dropped";
   }
 
+  /// The state that a fault must show, at the latest when the peer's silence would.
+  bool shows(Fault fault) {
+    if constexpr (requires { Peer::shown(fault); }) {
+      const auto states = Peer::shown(fault);
+      return turns_until(2 * Peer::kSilenceLimit, [&] { return states.count(status().state) != 0; });
+    } else {
+      return true;  // the guest's peers: what a state must be is shown here, once
+    }
+  }
+
   Peer peer_;
   bool up_ = true;  ///< the peer is served: its process runs
   bool speaking_ = true;
@@ -247,8 +265,9 @@ TYPED_TEST_P(DriverConformance, NoticesThatItIsUnplugged) {
   this->begin_streaming();
   this->peer_.unplug();
   this->up_ = false;
-  EXPECT_TRUE(this->turns_until(2 * TypeParam::kSilenceLimit, [this] { return !this->status().connected; }));
-  EXPECT_GT(this->status().faults, this->before_.faults);
+  EXPECT_TRUE(this->turns_until(2 * TypeParam::kSilenceLimit, [this] {
+    return !this->status().connected && this->status().faults > this->before_.faults;
+  }));
   EXPECT_EQ(this->usable_in(this->turns_for(TypeParam::kSilenceLimit)), 0u);
 }
 
@@ -356,10 +375,71 @@ TYPED_TEST_P(DriverConformance, KeepsSampleTimesNearTheHostClockThroughARestart)
   }
 }
 
-REGISTER_TYPED_TEST_SUITE_P(DriverConformance, StreamsWhatThePeerSays, StampsNoSampleWithTheFuture,
-                            NoticesAMutePeer, InventsNothingWhileThePeerIsMute,
-                            StreamsAgainWhenAMutePeerSpeaks, ToleratesALatePacket,
-                            WaitsForTheRestOfATornPacket, CountsATornDatagramAndGoesOn,
+TYPED_TEST_P(DriverConformance, ShowsThatItStreams) {
+  this->begin_streaming();
+  EXPECT_TRUE(this->shows(Fault::None)) << this->status().state;
+  EXPECT_TRUE(this->status().connected);
+}
+
+TYPED_TEST_P(DriverConformance, ShowsAMutePeerAndCountsAFault) {
+  this->begin_streaming();
+  this->speaking_ = false;
+  EXPECT_TRUE(this->shows(Fault::Mute)) << this->status().state;
+  EXPECT_TRUE(this->turns_until(2 * TypeParam::kSilenceLimit,
+                                [this] { return this->status().faults > this->before_.faults; }));
+  EXPECT_GE(this->status().last_fault_at, this->before_.last_sample);
+}
+
+TYPED_TEST_P(DriverConformance, ShowsGarbageAndCountsAFault) {
+  this->begin_streaming();
+  this->peer_.send_garbage();
+  EXPECT_TRUE(this->shows(Fault::Garbage)) << this->status().state;
+  EXPECT_TRUE(this->turns_until(2 * TypeParam::kSilenceLimit,
+                                [this] { return this->status().faults > this->before_.faults; }));
+}
+
+TYPED_TEST_P(DriverConformance, ShowsThatItIsUnpluggedAndCountsAFault) {
+  this->begin_streaming();
+  this->peer_.unplug();
+  this->up_ = false;
+  EXPECT_TRUE(this->shows(Fault::Unplugged)) << this->status().state;
+  EXPECT_TRUE(this->turns_until(2 * TypeParam::kSilenceLimit, [this] { return !this->status().connected; }));
+  EXPECT_GT(this->status().faults, this->before_.faults);
+}
+
+TYPED_TEST_P(DriverConformance, ShowsARestartedPeerAndCountsIt) {
+  this->begin_streaming();
+  this->peer_.restart();
+  EXPECT_TRUE(this->shows(Fault::Restart)) << this->status().state;
+  const auto counted = [this] {
+    const auto s = this->status();
+    return s.faults > this->before_.faults || s.gaps > this->before_.gaps;
+  };
+  EXPECT_TRUE(this->turns_until(TypeParam::kRecoveryLimit, counted));
+  EXPECT_TRUE(this->usable_samples_come(TypeParam::kRecoveryLimit)) << this->status().last_fault;
+}
+
+TYPED_TEST_P(DriverConformance, ShowsAClockJumpAndCountsIt) {
+  if constexpr (requires(TypeParam p) { p.jump_clock(); }) {
+    this->begin_streaming();
+    this->peer_.jump_clock();
+    const auto counted = [this] {
+      const auto s = this->status();
+      return s.clock.restarts > this->before_.clock.restarts || s.gaps > this->before_.gaps;
+    };
+    EXPECT_TRUE(this->turns_until(TypeParam::kRecoveryLimit, counted));
+    EXPECT_TRUE(this->status().connected);
+  } else {
+    GTEST_SKIP() << "the device has no clock of its own, or the peer cannot make it jump";
+  }
+}
+
+REGISTER_TYPED_TEST_SUITE_P(DriverConformance, ShowsThatItStreams, ShowsAMutePeerAndCountsAFault,
+                            ShowsGarbageAndCountsAFault, ShowsThatItIsUnpluggedAndCountsAFault,
+                            ShowsARestartedPeerAndCountsIt, ShowsAClockJumpAndCountsIt,
+                            StreamsWhatThePeerSays, StampsNoSampleWithTheFuture, NoticesAMutePeer,
+                            InventsNothingWhileThePeerIsMute, StreamsAgainWhenAMutePeerSpeaks,
+                            ToleratesALatePacket, WaitsForTheRestOfATornPacket, CountsATornDatagramAndGoesOn,
                             CountsGarbageAndMakesNoSampleOfIt, StreamsAgainAfterGarbage,
                             NoticesThatItIsUnplugged, StreamsWhenPluggedInAgainAndMarksIt,
                             StartsWhenThePeerComesLater, DropsCountsAndMarksWhenFlooded,

@@ -68,8 +68,9 @@ void IppDevice::count_points() {
 
 std::span<const std::byte> IppDevice::encode(const IppSend& command) {
   const auto bytes = std::as_bytes(std::span{command.line});
-  raw_.push_bytes(time_.now(), protocol::RawBlock::Direction::ToDevice, bytes);
-  receiver_.sent(bytes, time_.now());
+  const protocol::HostTime now = time_.now();  // once: a replay knows only the recorded one
+  raw_.push_bytes(now, protocol::RawBlock::Direction::ToDevice, bytes);
+  receiver_.sent(bytes, now);
   return bytes;
 }
 

@@ -158,9 +158,10 @@ TEST_F(HubTest, SaysHowTheStreamsAreOnceASecond) {
     const auto more = messages<v1::Health>(far_->take(), Topic::Health);
     sent.insert(sent.end(), more.begin(), more.end());
   }
-  ASSERT_THAT(sent, SizeIs(2 * 3));  // encoder and dds, at the first turn and twice a second later
+  ASSERT_THAT(sent, SizeIs(3 * 3));  // at the first turn and twice a second later
   EXPECT_EQ(sent[0].stream(), "encoder");
-  EXPECT_EQ(sent[1].stream(), "dds");
+  EXPECT_EQ(sent[1].stream(), "models");
+  EXPECT_EQ(sent[2].stream(), "dds");
 }
 
 TEST_F(HubTest, RefusesToCalibrateAxesTheControlCorrectsAlready) {

@@ -1,6 +1,12 @@
 #include "abbe/daemon/model_authority.hpp"
 
 #include <gmock/gmock.h>
+#include <sched.h>
+#include <sys/stat.h>
+
+#include <fstream>
+#include <set>
+#include <thread>
 
 #include "synthetic_model.hpp"
 
@@ -17,6 +23,11 @@ using v1::ModelStatus;
 constexpr protocol::UtcOffset kUtc{1'700'000'000s};
 constexpr HostTime kNow{1000s};
 constexpr auto kPatience = 500ms;
+
+std::string text_of(const fs::path& file) {
+  std::ifstream in{file};
+  return {std::istreambuf_iterator<char>{in}, {}};
+}
 
 class ModelAuthorityTest : public ::testing::Test {
  protected:
@@ -163,6 +174,127 @@ TEST_F(ModelAuthorityTest, AStoreThatIsBeingDamagedChangesNothing) {
   fs::resize_file(folder_ / "state.json", 10);
   EXPECT_FALSE(follow(authority));
   EXPECT_EQ(fresh_standing(authority).model->id, id);
+}
+
+// As when its owner and mode are put right: nothing of it that could be watched changes by that.
+TEST_F(ModelAuthorityTest, AStoreThatCannotBeReadIsSaidAndReadAgainUntilItCan) {
+  auto authority = open();
+  const auto first = add(authority, document(1), {.accepted = true}, actor("first"), kNow).value();
+  ASSERT_TRUE(add(authority, document(2), {.accepted = true}, actor("second"), kNow));
+  ASSERT_TRUE(store().rollback(actor("drifts")));
+  const fs::path state = folder_ / "state.json";
+  const auto time = fs::last_write_time(state);
+  std::string text = text_of(state);
+  text.front() = '[';
+  std::ofstream{state} << text;
+  fs::last_write_time(state, time);
+  EXPECT_FALSE(follow(authority));
+  EXPECT_THAT(authority.fault(), HasSubstr("state.json"));
+  EXPECT_THAT(fresh_standing(authority).reason, HasSubstr("state.json"));
+  text.front() = '{';
+  std::ofstream{state} << text;
+  fs::last_write_time(state, time);
+  EXPECT_TRUE(follow(authority));
+  EXPECT_EQ(authority.fault(), "");
+  EXPECT_EQ(fresh_standing(authority).model->id, first);
+  EXPECT_EQ(fresh_standing(authority).reason, "rolled back by anna: drifts");
+}
+
+TEST_F(ModelAuthorityTest, AModelFileThatWasRepairedComesIntoForce) {
+  const auto id = add(open(), document(1), {.accepted = true}, actor("calibrate otf"), kNow).value();
+  const fs::path file = store().model_path(id);
+  fs::rename(file, folder_ / "elsewhere");
+  auto authority = open();
+  ASSERT_EQ(fresh_standing(authority).status, ModelStatus::MODEL_INVALID);
+  fs::rename(folder_ / "elsewhere", file);
+  EXPECT_TRUE(follow(authority));
+  EXPECT_EQ(fresh_standing(authority).status, ModelStatus::MODEL_ACTIVE);
+}
+
+/// The store with a pipe in the place of state.json: whoever reads it waits until the test writes into it.
+class SlowStore {
+ public:
+  explicit SlowStore(fs::path state) : state_(std::move(state)), saved_(state_.string() + ".saved") {
+    fs::rename(state_, saved_);
+    if (::mkfifo(state_.c_str(), 0600) != 0) throw std::runtime_error{"mkfifo"};
+  }
+  /// Waits until it is being read, puts the file back and gives the reader `text`.
+  void answer(const std::string& text) {
+    std::ofstream pipe{state_};
+    fs::rename(saved_, state_);
+    pipe << text;
+  }
+
+ private:
+  fs::path state_, saved_;
+};
+
+TEST_F(ModelAuthorityTest, WhatWasReadBeforeAnotherModelWasTakenUpIsNotTakenUp) {
+  auto authority = open();
+  ASSERT_TRUE(add(authority, document(1), {.accepted = true}, actor("first"), kNow));
+  ASSERT_TRUE(store().activate(store().add(document(3), true, {}, actor("third")).value(), actor("by hand")));
+  const std::string before = text_of(folder_ / "state.json");
+  auto kept = authority.keeper().keep(document(2), {.accepted = true}, actor("second", kNow + 1s), kNow);
+  ASSERT_TRUE(kept);
+  SlowStore slow{folder_ / "state.json"};
+  ASSERT_EQ(authority.follow_store(kNow), ModelAuthority::Following::Reading);
+  authority.take_up(std::move(*kept->active));
+  slow.answer(before);
+  EXPECT_FALSE(follow(authority));
+  EXPECT_EQ(fresh_standing(authority).model->id, kept->id);
+  EXPECT_FALSE(follow(authority));
+  EXPECT_EQ(fresh_standing(authority).model->id, kept->id);
+}
+
+TEST_F(ModelAuthorityTest, WhatWasKeptBeforeARollbackIsNotTakenUpAfterIt) {
+  auto authority = open();
+  const auto first = add(authority, document(1), {.accepted = true}, actor("first"), kNow).value();
+  const auto since = authority.revision();
+  auto kept = authority.keeper().keep(document(2), {.accepted = true}, actor("second"), kNow);
+  ASSERT_TRUE(kept);
+  ASSERT_TRUE(store().rollback(actor("drifts", kNow + 1s)));
+  ASSERT_TRUE(follow(authority));
+  authority.take_up(std::move(*kept->active), since);
+  EXPECT_EQ(fresh_standing(authority).model->id, first);
+  EXPECT_FALSE(follow(authority));
+  EXPECT_EQ(fresh_standing(authority).model->id, first);
+}
+
+std::set<std::string> threads() {
+  std::set<std::string> ids;
+  for (const auto& entry : fs::directory_iterator{"/proc/self/task"}) ids.insert(entry.path().filename());
+  return ids;
+}
+
+// The hub is pinned and has a real-time priority; here a batch thread on one processor stands for it.
+TEST_F(ModelAuthorityTest, TheStoreIsReadOnAnOrdinaryThreadHoweverTheHubRuns) {
+  auto authority = open();
+  ASSERT_TRUE(add(authority, document(1), {.accepted = true}, actor("first"), kNow));
+  const std::string state = text_of(folder_ / "state.json");
+  SlowStore slow{folder_ / "state.json"};
+  std::set<std::string> before;
+  std::thread hub{[&] {
+    const sched_param none{};
+    ASSERT_EQ(::sched_setscheduler(0, SCHED_BATCH, &none), 0);
+    cpu_set_t one;
+    CPU_ZERO(&one);
+    CPU_SET(::sched_getcpu(), &one);
+    ASSERT_EQ(::sched_setaffinity(0, sizeof one, &one), 0);
+    before = threads();
+    EXPECT_EQ(authority.follow_store(kNow), ModelAuthority::Following::Reading);
+  }};
+  hub.join();
+  const std::ofstream pipe{folder_ / "state.json"};  // returns when the worker has opened its end
+  std::set<std::string> now = threads();
+  for (const auto& id : before) now.erase(id);
+  ASSERT_EQ(now.size(), 1u);
+  const pid_t worker = std::stoi(*now.begin());
+  EXPECT_EQ(::sched_getscheduler(worker), SCHED_OTHER);
+  cpu_set_t of_worker, of_process;
+  ASSERT_EQ(::sched_getaffinity(worker, sizeof of_worker, &of_worker), 0);
+  ASSERT_EQ(::sched_getaffinity(::getpid(), sizeof of_process, &of_process), 0);
+  EXPECT_TRUE(CPU_EQUAL(&of_worker, &of_process));
+  slow.answer(state);
 }
 
 TEST_F(ModelAuthorityTest, ADamagedActiveModelIsInvalidAndNotUsed) {

@@ -41,6 +41,16 @@ StreamHealth health_of(const RecorderThread& recorder) {
   return h;
 }
 
+/// The model store, as far as it can be followed.
+StreamHealth health_of(const ModelAuthority& authority) {
+  StreamHealth h;
+  h.status.name = "models";
+  h.status.connected = authority.fault().empty();
+  h.status.state = h.status.connected ? "followed" : "unreadable";
+  h.status.last_fault = authority.fault();
+  return h;
+}
+
 StreamHealth health_of(const Publisher& publisher) {
   const DdsLink& link = publisher.link();
   StreamHealth h;
@@ -123,6 +133,7 @@ void Hub::publish(bool fresh, HostTime now, WallTime wall) {
 
 void Hub::collect_health(HostTime now) {
   health_ = parts_.devices.health(now);
+  health_.push_back(health_of(parts_.authority));
   if (parts_.recorder != nullptr) health_.push_back(health_of(*parts_.recorder));
   if (parts_.publisher != nullptr) health_.push_back(health_of(*parts_.publisher));
 }

@@ -9,6 +9,7 @@
 #include "abbe/daemon/calibration_run.hpp"
 #include "abbe/daemon/device_options.hpp"
 #include "abbe/daemon/otf_inputs.hpp"
+#include "abbe/daemon/work_aside.hpp"
 #include "session/outcome.hpp"
 
 namespace abbe::daemon {
@@ -104,23 +105,21 @@ void CalibrationService::begin_identification(CalibrationRun run) {
   std::future<RecordingDigest> digest;
   if (recorder_ != nullptr) digest = recorder_->digest();
   identified_share_ = 0.0;
-  identification_ = std::async(
-      std::launch::async,
-      [this, run = std::move(run), active = std::move(active),
-       digest = std::move(digest)]() mutable -> Result<Identified> {
-        std::vector<InputFile> inputs;
-        if (digest.valid()) {
-          const RecordingDigest d = digest.get();
-          // The hash is that of the first `bytes` bytes: the recording goes on.
-          inputs.push_back({fmt::format("{} ({} bytes)", d.file.filename().string(), d.bytes), d.sha256});
-        }
-        const auto entered = inputs_of(run);
-        inputs.insert(inputs.end(), entered.begin(), entered.end());
-        auto candidate = identify(run, config_, active ? &*active : nullptr,
-                                  [this](double share) { identified_share_ = share; });
-        if (!candidate) return tl::unexpected(candidate.error());
-        return Identified{std::move(*candidate), std::move(inputs)};
-      });
+  identification_ = start_aside([this, run = std::move(run), active = std::move(active),
+                                 digest = std::move(digest)]() mutable -> Result<Identified> {
+    std::vector<InputFile> inputs;
+    if (digest.valid()) {
+      const RecordingDigest d = digest.get();
+      // The hash is that of the first `bytes` bytes: the recording goes on.
+      inputs.push_back({fmt::format("{} ({} bytes)", d.file.filename().string(), d.bytes), d.sha256});
+    }
+    const auto entered = inputs_of(run);
+    inputs.insert(inputs.end(), entered.begin(), entered.end());
+    auto candidate = identify(run, config_, active ? &*active : nullptr,
+                              [this](double share) { identified_share_ = share; });
+    if (!candidate) return tl::unexpected(candidate.error());
+    return Identified{std::move(*candidate), std::move(inputs)};
+  });
 }
 
 void CalibrationService::keep(Result<Identified> identified, HostTime now) {
@@ -132,8 +131,8 @@ void CalibrationService::keep(Result<Identified> identified, HostTime now) {
   verdict_ = verdict_of(identified->candidate);
   held_out_ = verdict_.held_out;
   const auto created = utc_.to_utc(now);
-  keeping_ = std::async(
-      std::launch::async,
+  keeping_since_ = authority_.revision();
+  keeping_ = start_aside(
       [keeper = authority_.keeper(), verdict = verdict_, now,
        actor = StoreActor{.who = who_,
                           .why = fmt::format("calibrate {}", method_of(identified->candidate)),
@@ -147,7 +146,7 @@ void CalibrationService::conclude(Result<KeptModel> kept, HostTime now) {
     session_.not_identified(fmt::format("identified, but not kept: {}", kept.error().text), now);
     return;
   }
-  if (kept->active) authority_.take_up(std::move(*kept->active));
+  if (kept->active) authority_.take_up(std::move(*kept->active), keeping_since_);
   session_.judged(kept->id, verdict_.accepted, verdict_text(verdict_), now);
 }
 

@@ -4,12 +4,17 @@
 
 #include <utility>
 
+#include "abbe/daemon/work_aside.hpp"
 #include "session/outcome.hpp"
 
 namespace abbe::daemon {
 namespace {
 
 using protocol::HostTime;
+
+// A model file that cannot be used may be made readable or put back from a backup; the store does not change
+// by that.
+constexpr auto kRepairPeriod = std::chrono::seconds{10};
 
 /// Why the model may be used: a person who forced it answers for it by name.
 std::string reason_of(const StoreEvent& activation) {
@@ -54,23 +59,49 @@ void ModelAuthority::take_up(ActiveModel active) {
   ++revision_;
 }
 
+void ModelAuthority::take_up(ActiveModel active, std::uint64_t since) {
+  if (since == revision_) {
+    take_up(std::move(active));
+  } else {
+    seen_.reset();
+  }
+}
+
 ModelAuthority::Following ModelAuthority::follow_store(HostTime now) {
   if (!reading_.valid()) {
     const StoreStamp stamp = keeper_.stamp();
-    if (stamp == seen_) return Following::Unchanged;
+    const bool to_repair = !active_.fault.empty() && now >= next_repair_;
+    if (stamp == seen_ && !to_repair) return Following::Unchanged;
     seen_ = stamp;
-    reading_ = std::async(std::launch::async, [keeper = keeper_, now] { return keeper.read_active(now); });
+    next_repair_ = now + kRepairPeriod;
+    reading_since_ = revision_;
+    reading_ = start_aside([keeper = keeper_, now] { return keeper.read_active(now); });
   }
   if (reading_.wait_for(std::chrono::seconds{0}) != std::future_status::ready) return Following::Reading;
   auto active = outcome_of(reading_);
-  // Being replaced, or damaged: what is in force stays.
-  if (!active || same(active->activation, active_.activation)) return Following::Unchanged;
-  take_up(std::move(*active));
-  return Following::TakenUp;
+  if (!active) {
+    // What is in force stays; said in standing() and in health(), and tried again at the next call.
+    fault_ = active.error().text;
+    seen_.reset();
+    return Following::Unchanged;
+  }
+  fault_.clear();
+  if (same(active->activation, active_.activation) && active->fault == active_.fault)
+    return Following::Unchanged;
+  const auto before = revision_;
+  take_up(std::move(*active), reading_since_);
+  return revision_ == before ? Following::Unchanged : Following::TakenUp;
 }
 
 ModelStanding ModelAuthority::standing(HostTime now, std::optional<HostTime> axes_known_at,
                                        std::chrono::nanoseconds patience) const {
+  ModelStanding s = standing_by_store(now, axes_known_at, patience);
+  if (!fault_.empty()) s.reason += fmt::format("; not known what was activated since: {}", fault_);
+  return s;
+}
+
+ModelStanding ModelAuthority::standing_by_store(HostTime now, std::optional<HostTime> axes_known_at,
+                                                std::chrono::nanoseconds patience) const {
   ModelStanding s{.model = in_force(), .revision = revision_};
   if (!active_.model) {
     s.status = active_.fault.empty() ? v1::ModelStatus::MODEL_NONE : v1::ModelStatus::MODEL_INVALID;

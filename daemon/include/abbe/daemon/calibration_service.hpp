@@ -58,7 +58,8 @@ class CalibrationService {
   std::string who_;
   std::future<Result<Identified>> identification_;
   std::future<Result<KeptModel>> keeping_;
-  calib::Verdict verdict_;  // of the model being kept
+  std::uint64_t keeping_since_ = 0;  // revision of the authority when the keeping began
+  calib::Verdict verdict_;           // of the model being kept
   std::atomic<double> identified_share_{0.0};
   std::optional<calib::HeldOutFigures> held_out_;
 };

@@ -30,12 +30,18 @@ class ModelAuthority {
   /// For putting a model into the store on another thread; what it says is active then goes to take_up().
   [[nodiscard]] ModelKeeper keeper() const { return keeper_; }
   void take_up(ActiveModel active);
+  /// The same for what began to be read when revision() was `since`: if another model was taken up meanwhile,
+  /// this one may be the older and the next follow_store() reads the store again instead.
+  void take_up(ActiveModel active, std::uint64_t since);
+  [[nodiscard]] std::uint64_t revision() const noexcept { return revision_; }
 
   enum class Following : std::uint8_t { Unchanged, Reading, TakenUp };
   /// Takes up another model if somebody has activated or rolled back one in the store (`abbe model ...`
   /// does). Never waits: the store is read on a thread of its own when its file has changed, and asked for
-  /// again.
+  /// again. A store that cannot be read is said in standing() and fault(), and read again at every call.
   Following follow_store(protocol::HostTime now);
+  /// Why the store could not be read the last time; empty: it could.
+  [[nodiscard]] const std::string& fault() const noexcept { return fault_; }
 
   /// `axes_known_at`: the latest instant all axes were known; `patience`: how long that may be ago.
   [[nodiscard]] ModelStanding standing(protocol::HostTime now,
@@ -47,12 +53,19 @@ class ModelAuthority {
 
  private:
   ModelAuthority(ModelKeeper keeper, bool axes_compensated);
+  [[nodiscard]] ModelStanding standing_by_store(protocol::HostTime now,
+                                                std::optional<protocol::HostTime> axes_known_at,
+                                                std::chrono::nanoseconds patience) const;
 
   ModelKeeper keeper_;
   bool axes_compensated_;
-  StoreStamp seen_;  // of the store as `active_` was read from it, or as it is being read
+  // Of the store as `active_` was read from it, or as it is being read; none: it is to be read again.
+  std::optional<StoreStamp> seen_;
   ActiveModel active_;
+  std::string fault_;
+  protocol::HostTime next_repair_{};
   std::uint64_t revision_ = 0;
+  std::uint64_t reading_since_ = 0;  // revision_ when the reading began
   std::future<Result<ActiveModel>> reading_;
 };
 

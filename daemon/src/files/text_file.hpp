@@ -13,7 +13,16 @@ namespace abbe::daemon {
 [[nodiscard]] Result<std::string> read_text(const std::filesystem::path& file);
 
 /// Writes a new file beside the old one, forces it to the disk and renames it: after a power cut either the
-/// old or the new content is there.
+/// old or the new content is there. Owner and mode stay those of the file; a new file gets those of its
+/// folder (never writable by others), whoever writes it: what root writes for the daemon, the daemon can
+/// read.
 [[nodiscard]] Result<void> replace_file(const std::filesystem::path& file, std::string_view text);
+
+/// With all folders above; each new one gets owner and mode of the one it is in.
+[[nodiscard]] Result<void> create_folder(const std::filesystem::path& folder);
+
+/// Owner and mode of an open file that was created just now, from the folder it is in. Best effort: only root
+/// may give files away.
+void take_after_folder(int fd, const std::filesystem::path& folder) noexcept;
 
 }  // namespace abbe::daemon

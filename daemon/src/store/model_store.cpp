@@ -25,12 +25,25 @@ constexpr auto kLockPatience =
     std::chrono::seconds{5};  // a change takes milliseconds; the next is queued behind it
 constexpr auto kLockLook = std::chrono::milliseconds{10};
 
+/// Created as the folder is, so that whoever uses the store after root can lock it, too. flock() asks for no
+/// more than reading.
+FileDescriptor open_lock(const fs::path& file) {
+  FileDescriptor lock{::open(file.c_str(), O_RDONLY | O_CLOEXEC | O_NOFOLLOW)};
+  if (lock || errno != ENOENT) return lock;
+  lock = FileDescriptor{::open(file.c_str(), O_RDONLY | O_CREAT | O_EXCL | O_CLOEXEC | O_NOFOLLOW, 0600)};
+  if (lock) take_after_folder(lock.get(), file.parent_path());
+  // Lost against another process: it is there now.
+  else if (errno == EEXIST)
+    lock = FileDescriptor{::open(file.c_str(), O_RDONLY | O_CLOEXEC | O_NOFOLLOW)};
+  return lock;
+}
+
 /// Orders the changes of several processes: unlocked when the descriptor is closed or the process dies.
 Result<FileDescriptor> lock_store(const fs::path& folder) {
   const auto failure = [&folder](std::string_view seen) {
     return fail(ErrorCode::Io, fmt::format("lock the model store {}: {}", folder.string(), seen));
   };
-  FileDescriptor lock{::open((folder / "lock").c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0644)};
+  FileDescriptor lock = open_lock(folder / "lock");
   if (!lock) return failure(std::strerror(errno));
   const auto until = std::chrono::steady_clock::now() + kLockPatience;
   while (::flock(lock.get(), LOCK_EX | LOCK_NB) != 0) {
@@ -48,8 +61,8 @@ fs::path state_path(const fs::path& folder) {
 /// A store nobody wrote to yet has no events.
 Result<StoreState> read_state(const fs::path& folder) {
   const auto file = state_path(folder);
-  std::error_code ignored;
-  if (!fs::exists(file, ignored)) return StoreState{};
+  std::error_code seen;
+  if (fs::status(file, seen).type() == fs::file_type::not_found) return StoreState{};
   const auto text = read_text(file);
   if (!text) return tl::make_unexpected(text.error());
   return store_state_from_text(*text, file.string());
@@ -78,11 +91,7 @@ std::vector<std::string> ids_on_disk(const fs::path& folder) {
 }  // namespace
 
 Result<ModelStore> ModelStore::open(const fs::path& folder) {
-  std::error_code failed;
-  fs::create_directories(folder / "models", failed);
-  if (failed)
-    return fail(ErrorCode::Io,
-                fmt::format("create the model store {}: {}", folder.string(), failed.message()));
+  if (const auto made = create_folder(folder / "models"); !made) return tl::make_unexpected(made.error());
   if (const auto state = read_state(folder); !state) return tl::make_unexpected(state.error());
   return ModelStore(folder);
 }

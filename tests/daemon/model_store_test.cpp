@@ -2,6 +2,7 @@
 
 #include <gmock/gmock.h>
 #include <signal.h>
+#include <sys/stat.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
@@ -18,6 +19,21 @@ using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
 using ::testing::SizeIs;
+
+std::string text_of(const fs::path& file) {
+  std::ifstream in{file};
+  return {std::istreambuf_iterator<char>{in}, {}};
+}
+
+mode_t mode_of(const fs::path& file) {
+  struct stat status {};
+  return ::stat(file.c_str(), &status) == 0 ? status.st_mode & 0777U : 0;
+}
+
+uid_t owner_of(const fs::path& file) {
+  struct stat status {};
+  return ::stat(file.c_str(), &status) == 0 ? status.st_uid : static_cast<uid_t>(-1);
+}
 
 class ModelStoreTest : public ::testing::Test {
  protected:
@@ -62,6 +78,51 @@ TEST_F(ModelStoreTest, ActivatesAndRollsBackThroughSeveralModels) {
   const auto none = store.rollback(actor("worse still"));
   ASSERT_FALSE(none);
   EXPECT_EQ(none.error().code, ErrorCode::Refused);
+}
+
+TEST_F(ModelStoreTest, AModelActivatedTwiceIsRolledBackAtOnce) {
+  const auto a = add(1), b = add(2);
+  auto store = open();
+  for (const auto& id : {a, b, b}) ASSERT_TRUE(store.activate(id, actor("better")));
+  EXPECT_EQ(store.rollback(actor("drifts")).value(), a);
+  EXPECT_EQ(open().active_id().value(), a);
+  EXPECT_FALSE(store.rollback(actor("again")));
+}
+
+// As versions before wrote it: a rollback to the model that was active already.
+TEST_F(ModelStoreTest, ARollbackLeavesActiveWhatItSays) {
+  const auto a = add(1), b = add(2);
+  auto store = open();
+  for (const auto& id : {a, b, b}) ASSERT_TRUE(store.activate(id, actor("better")));
+  ASSERT_TRUE(store.rollback(actor("drifts")));
+  std::string text = text_of(folder_ / "state.json");
+  // The keys of an event are in order: the id follows its action.
+  text.replace(text.find(a, text.rfind("rolled-back")), a.size(), b);
+  std::ofstream(folder_ / "state.json") << text;
+  EXPECT_EQ(open().active_id().value(), b);
+}
+
+TEST_F(ModelStoreTest, WhatIsWrittenKeepsTheModeAndNewFilesTakeThatOfTheirFolder) {
+  const auto id = add(1);
+  fs::permissions(folder_ / "state.json", fs::perms{0640});
+  const mode_t before = ::umask(077);
+  const auto second = add(2);
+  ::umask(before);
+  EXPECT_EQ(mode_of(folder_ / "state.json"), 0640u);
+  EXPECT_EQ(mode_of(open().model_path(second)), mode_of(folder_ / "models") & 0664u);
+}
+
+TEST_F(ModelStoreTest, AFreshStoreOfRootBelongsToTheFolderItIsIn) {
+  if (::geteuid() != 0) GTEST_SKIP() << "only root can give files away";
+  constexpr uid_t kDaemon = 4711;
+  ASSERT_EQ(::chown((fs::create_directory(folder_), folder_.c_str()), kDaemon, kDaemon), 0);
+  const mode_t before = ::umask(077);
+  const auto id = ModelStore::open(folder_ / "store")->add(synthetic_document(1), true, {}, actor("root"));
+  ::umask(before);
+  for (const char* file : {"store", "store/models", "store/lock", "store/state.json"})
+    EXPECT_EQ(owner_of(folder_ / file), kDaemon) << file;
+  EXPECT_EQ(owner_of(ModelStore::open(folder_ / "store")->model_path(id.value())), kDaemon);
+  EXPECT_EQ(mode_of(folder_ / "store/state.json"), mode_of(folder_) & 0664u);
 }
 
 TEST_F(ModelStoreTest, RefusesARefusedModelUnlessForced) {

@@ -51,10 +51,11 @@ std::optional<StoreEvent> event_from(const json& object) {
 std::vector<std::string> StoreState::activations() const {
   std::vector<std::string> stack;
   for (const auto& event : events) {
-    if (event.action == StoreAction::Activated || event.action == StoreAction::Forced)
-      stack.push_back(event.id);
-    else if (event.action == StoreAction::RolledBack && !stack.empty())
-      stack.pop_back();
+    if (event.action == StoreAction::Added) continue;
+    if (event.action == StoreAction::RolledBack)
+      while (!stack.empty() && stack.back() != event.id) stack.pop_back();
+    // A model activated twice was active once: before it came the one before.
+    if (stack.empty() || stack.back() != event.id) stack.push_back(event.id);
   }
   return stack;
 }

@@ -58,4 +58,8 @@ void print_verdict(const calib::Verdict& verdict) {
   for (const auto& reason : verdict.reasons) fmt::print("            {}\n", reason);
 }
 
+int exit_code(const calib::Verdict& verdict) {
+  return verdict.accepted ? 0 : exit_code(ErrorCode::Refused);
+}
+
 }  // namespace abbe::daemon

@@ -26,4 +26,7 @@ namespace abbe::daemon {
 /// The held-out residuals and what the gate would do, on stdout.
 void print_verdict(const calib::Verdict& verdict);
 
+/// 0, or that of a refusal: the results are written either way.
+[[nodiscard]] int exit_code(const calib::Verdict& verdict);
+
 }  // namespace abbe::daemon

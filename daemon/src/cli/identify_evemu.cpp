@@ -289,7 +289,7 @@ int run(const IdentifyEvemuArguments& arguments) {
     return report(kept.error());
   arguments.json ? print_json(*outcome, document, arguments.out)
                  : print_summary(*outcome, document, arguments.out);
-  return 0;
+  return exit_code(outcome->verdict);
 }
 
 void add_options(CLI::App& command, IdentifyEvemuArguments& arguments) {
@@ -352,7 +352,9 @@ void add_identify_evemu(CLI::App& parent, int& exit) {
                                         "From a ball array touched at several positions.\n"
                                         "Writes model.json, coefficients.csv and report.html to OUT and says "
                                         "how well the model predicts positions it was "
-                                        "not fitted to.");
+                                        "not fitted to.\n"
+                                        "Exit code 5 if the gate would refuse it; everything is written all "
+                                        "the same.");
   add_options(*command, *arguments);
   command->callback([arguments, &exit] {
     exit = arguments->touches.empty() && arguments->errors.empty() && arguments->recording.empty()

@@ -197,7 +197,7 @@ int run(const Arguments& arguments) {
   if (const auto kept = keep(arguments.keep, outcome->document, outcome->verdict, "abbe identify otf"); !kept)
     return report(kept.error());
   arguments.json ? print_json(*outcome, arguments.out) : print_summary(*outcome, arguments.out);
-  return 0;
+  return exit_code(outcome->verdict);
 }
 
 }  // namespace
@@ -208,7 +208,8 @@ void add_identify_otf(CLI::App& parent, int& exit) {
       "otf",
       "From laser tracker points taken on the fly along a path.\n"
       "Writes model.json, tables.csv and report.html to OUT and says how well the model "
-      "predicts legs it was not fitted to.");
+      "predicts legs it was not fitted to.\n"
+      "Exit code 5 if the gate would refuse it; everything is written all the same.");
   auto* machine =
       command->add_option("--machine", arguments->machine, "machine.toml, or the daemon's abbed.toml");
   auto* path = command->add_option("--path", arguments->path,

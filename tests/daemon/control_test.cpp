@@ -1,8 +1,15 @@
 #include <gtest/gtest.h>
+#include <poll.h>
+#include <pwd.h>
+#include <sys/resource.h>
 #include <sys/socket.h>
 #include <sys/un.h>
 #include <unistd.h>
 
+#include <algorithm>
+#include <array>
+#include <atomic>
+#include <chrono>
 #include <cstring>
 #include <filesystem>
 #include <fstream>
@@ -12,6 +19,7 @@
 namespace abbe::daemon {
 namespace {
 
+using namespace std::chrono_literals;
 using nlohmann::json;
 
 class Control : public testing::Test {
@@ -80,6 +88,122 @@ TEST_F(Control, AMemberOfTheWrongTypeIsAnAnswerNotACrash) {
   EXPECT_EQ(answer.error().code, ErrorCode::Usage);
   EXPECT_NE(answer.error().text.find("count"), std::string::npos) << answer.error().text;
   EXPECT_TRUE(ask_daemon(socket(), {{"do", "count"}, {"n", 3}}));
+}
+
+TEST_F(Control, BytesThatAreNoTextAreReplacedAndTheSocketLivesOn) {
+  const auto server = ControlServer::open(socket(), [](const json&) {
+    return json{{"ok", true}, {"fault", "tracker says \xff\xc3"}};
+  });
+  ASSERT_TRUE(server);
+  for (int i = 0; i < 2; ++i) {
+    const auto answer = ask_daemon(socket(), {{"do", "status"}, {"file", "\xfe.csv"}});
+    ASSERT_TRUE(answer) << answer.error().text;
+    EXPECT_EQ((*answer)["fault"].get<std::string>().find("tracker says "), 0u);
+  }
+}
+
+TEST_F(Control, WhoAsksIsWhatTheKernelSays) {
+  const auto server = ControlServer::open(socket(), echo);
+  ASSERT_TRUE(server);
+  const auto answer = ask_daemon(socket(), {{"do", "cancel"}, {"user", "mallory"}, {"who", "anna"}});
+  ASSERT_TRUE(answer);
+  const passwd* me = ::getpwuid(::getuid());
+  EXPECT_EQ((*answer)["heard"]["user"], me != nullptr ? me->pw_name : "uid " + std::to_string(::getuid()));
+  EXPECT_EQ((*answer)["heard"]["who"], "anna");
+}
+
+/// A client of its own, for what ask_daemon() would never do.
+class RawClient {
+ public:
+  RawClient() = default;
+  ~RawClient() { ::close(fd_); }
+  RawClient(const RawClient&) = delete;
+  RawClient& operator=(const RawClient&) = delete;
+  void connect(const std::filesystem::path& path) const {
+    sockaddr_un address{};
+    address.sun_family = AF_UNIX;
+    std::strncpy(address.sun_path, path.c_str(), sizeof address.sun_path - 1);
+    ASSERT_EQ(::connect(fd_, reinterpret_cast<const sockaddr*>(&address), sizeof address), 0);
+  }
+  [[nodiscard]] bool send(const std::string& text) const {
+    return ::send(fd_, text.data(), text.size(), MSG_NOSIGNAL) == static_cast<ssize_t>(text.size());
+  }
+  [[nodiscard]] bool readable(std::chrono::milliseconds time_out) const {
+    pollfd wait{fd_, POLLIN, 0};
+    return ::poll(&wait, 1, static_cast<int>(time_out.count())) == 1;
+  }
+  /// How many answers come until `lines` have.
+  [[nodiscard]] int read_lines(int lines) const {
+    std::array<char, 65536> buffer{};
+    int read = 0;
+    while (read < lines) {
+      const ssize_t n = ::read(fd_, buffer.data(), buffer.size());
+      if (n <= 0) break;
+      read += static_cast<int>(std::count(buffer.data(), buffer.data() + n, '\n'));
+    }
+    return read;
+  }
+
+ private:
+  int fd_ = ::socket(AF_UNIX, SOCK_STREAM, 0);
+};
+
+TEST_F(Control, AClientThatNeverReadsGetsNoMoreAnswersThanFitAndKeepsNobodyWaiting) {
+  constexpr int kAsked = 200;
+  std::atomic<int> answered = 0;
+  const auto server = ControlServer::open(socket(), [&](const json& request) {
+    if (request["do"] == "much") ++answered;
+    return json{{"ok", true}, {"text", std::string(request["do"] == "much" ? 1u << 19 : 1u, 'x')}};
+  });
+  ASSERT_TRUE(server);
+  const RawClient greedy;
+  greedy.connect(socket());
+  std::string requests;
+  for (int i = 0; i < kAsked; ++i) requests += "{\"do\": \"much\"}\n";
+  ASSERT_TRUE(greedy.send(requests));
+  ASSERT_TRUE(greedy.readable(60s));
+  for (int i = 0; i < 20; ++i) ASSERT_TRUE(ask_daemon(socket(), {{"do", "little"}}));
+  EXPECT_LT(answered, 20);
+  EXPECT_EQ(greedy.read_lines(kAsked), kAsked);
+}
+
+/// Nobody can open anything while it lives.
+class NoDescriptors {
+ public:
+  NoDescriptors() {
+    ::getrlimit(RLIMIT_NOFILE, &before_);
+    const int next = ::dup(STDIN_FILENO);  // the lowest that is free
+    ::close(next);
+    const rlimit none{static_cast<rlim_t>(next), before_.rlim_max};
+    ::setrlimit(RLIMIT_NOFILE, &none);
+  }
+  ~NoDescriptors() { ::setrlimit(RLIMIT_NOFILE, &before_); }
+  NoDescriptors(const NoDescriptors&) = delete;
+  NoDescriptors& operator=(const NoDescriptors&) = delete;
+
+ private:
+  rlimit before_{};
+};
+
+std::chrono::nanoseconds processor_time() {
+  timespec t{};
+  ::clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &t);
+  return std::chrono::seconds{t.tv_sec} + std::chrono::nanoseconds{t.tv_nsec};
+}
+
+TEST_F(Control, WithoutDescriptorsForANewcomerTheServerRestsAndTakesItLater) {
+  const auto server = ControlServer::open(socket(), echo);
+  ASSERT_TRUE(server);
+  RawClient client;
+  {
+    const NoDescriptors none;
+    client.connect(socket());
+    ASSERT_TRUE(client.send("{\"do\": \"status\"}\n"));
+    const auto before = processor_time();
+    EXPECT_FALSE(client.readable(300ms));
+    EXPECT_LT(processor_time() - before, 150ms);  // a server that does not rest uses all of them
+  }
+  EXPECT_TRUE(client.readable(60s));
 }
 
 TEST_F(Control, WithoutADaemonTheErrorNamesTheSocket) {

@@ -51,6 +51,14 @@ TEST(FaultText, CutsWhatIsTooLong) {
   EXPECT_EQ(text.read().text, std::string(FaultText::kCapacity, 'x'));
 }
 
+TEST(FaultText, CutsBetweenCharactersNotWithinOne) {
+  FaultText text;
+  text.set(HostTime{}, std::string(FaultText::kCapacity - 1, 'x') + "\u00b5m");
+  EXPECT_EQ(text.read().text, std::string(FaultText::kCapacity - 1, 'x'));
+  text.set(HostTime{}, std::string(FaultText::kCapacity - 2, 'x') + "\u00b5");
+  EXPECT_EQ(text.read().text, std::string(FaultText::kCapacity - 2, 'x') + "\u00b5");
+}
+
 TEST(FaultText, NeverShowsPartsOfTwo) {
   FaultText text;
   std::atomic<bool> stop{false};

@@ -8,6 +8,7 @@
 #include <string>
 
 #include "abbe/daemon/control_protocol.hpp"
+#include "control/json_line.hpp"
 #include "control/refusal.hpp"
 #include "control/unix_socket.hpp"
 
@@ -53,7 +54,7 @@ Result<json> ask_daemon(const std::filesystem::path& socket_path, const json& re
                         std::chrono::milliseconds time_out) {
   auto fd = connect_unix(socket_path);
   if (!fd) return tl::unexpected(Error{fd.error().code, fd.error().text + " (is abbed running?)"});
-  if (auto sent = send_line(fd->get(), request.dump() + '\n', socket_path); !sent)
+  if (auto sent = send_line(fd->get(), line_of(request), socket_path); !sent)
     return tl::unexpected(sent.error());
   const auto line = receive_line(fd->get(), time_out, socket_path);
   if (!line) return tl::unexpected(line.error());

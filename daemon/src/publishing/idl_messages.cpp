@@ -21,7 +21,12 @@ std::int64_t ns(protocol::HostTime t) {
   return t.time_since_epoch().count();
 }
 
+/// Between two characters of UTF-8.
 std::string cut(std::string_view text, std::size_t bound) {
+  constexpr unsigned kContinuationMask = 0xC0, kContinuation = 0x80;
+  if (text.size() > bound)
+    while (bound > 0 && (static_cast<unsigned char>(text[bound]) & kContinuationMask) == kContinuation)
+      --bound;
   return std::string{text.substr(0, bound)};
 }
 

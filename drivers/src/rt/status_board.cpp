@@ -2,12 +2,26 @@
 
 #include <algorithm>
 #include <cstring>
+#include <string_view>
 
 namespace abbe::drivers {
 
+namespace {
+
+/// How many bytes of a text longer than kCapacity are kept: it is cut between two characters of UTF-8.
+std::size_t whole_code_points(std::string_view text) ABBE_RT {
+  constexpr unsigned kContinuationMask = 0xC0, kContinuation = 0x80;
+  std::size_t length = FaultText::kCapacity;
+  while (length > 0 && (static_cast<unsigned char>(text[length]) & kContinuationMask) == kContinuation)
+    --length;
+  return length;
+}
+
+}  // namespace
+
 void FaultText::set(protocol::HostTime at, std::string_view text) ABBE_RT {
   std::array<char, kCapacity> bytes{};
-  const std::size_t length = std::min(text.size(), kCapacity);
+  const std::size_t length = text.size() <= kCapacity ? text.size() : whole_code_points(text);
   std::copy_n(text.data(), length, bytes.data());
   std::array<std::uint64_t, kWords> words{};
   std::memcpy(words.data(), bytes.data(), kCapacity);

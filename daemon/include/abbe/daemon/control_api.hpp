@@ -1,11 +1,12 @@
 #pragma once
 /// What a person or program may ask a running daemon, request by request:
 ///     {"do": "status"}
-///     {"do": "calibrate", "method": "otf", "path_m": [[x, y, z], ...], "who": NAME}
-///     {"do": "cancel", "who": NAME}
+///     {"do": "calibrate", "method": "otf", "path_m": [[x, y, z], ...], "who": REMARK}
+///     {"do": "cancel", "who": REMARK}
 ///     {"do": "touch", "points": [{"way": [[x, y, z], ...], "at_m": [x, y, z], "normal": [i, j, k]}, ...]}
 ///     {"do": "touch", "cancel": true}
 ///     {"do": "touches"}
+/// Who asked is "user", which the server sets; "who", if it says something else, is kept beside it.
 /// Lengths m. Models are activated and rolled back in the store; the daemon follows it. Runs on the hub's
 /// thread, through Hub::call().
 

@@ -2,7 +2,8 @@
 /// The control API: one JSON object a line, request then answer, over a Unix stream socket that only the
 /// daemon's user and group may open. A request is {"do": NAME, ...}; an answer {"ok": true, ...} or {"ok":
 /// false, "code": WORD, "error": TEXT}, WORD one of data_insufficient, usage, bad_input, io, refused: the
-/// exit code of whoever asked follows it. Ordinary world.
+/// exit code of whoever asked follows it. The server puts the user the kernel knows the client to be
+/// (SO_PEERCRED) into every request as "user". Ordinary world.
 
 #include <chrono>
 #include <filesystem>

@@ -151,6 +151,7 @@ TEST_F(RecorderTest, TheFileIsPartUntilClosed) {
   Recorder recorder = open();
   EXPECT_TRUE(exists("run.mcap.part"));
   EXPECT_FALSE(exists("run.mcap"));
+  recorder.record(example_point(1), "tracker");
   ASSERT_TRUE(recorder.close());
   EXPECT_FALSE(exists("run.mcap.part"));
   EXPECT_TRUE(exists("run.mcap"));
@@ -163,7 +164,7 @@ TEST_F(RecorderTest, DroppedWithoutCloseItClosesCleanly) {
 }
 
 TEST_F(RecorderTest, AnExistingRecordingIsNeverOverwritten) {
-  ASSERT_TRUE(open().close());
+  { open().record(example_point(1), "tracker"); }
   const auto second = Recorder::open(example_options(folder_.path()), example_info(), WallTime{});
   ASSERT_FALSE(second);
   EXPECT_EQ(second.error().code, ErrorCode::Io);
@@ -198,6 +199,15 @@ TEST_F(RecorderTest, AChunkIsClosedBeforeItOutgrowsItsSize) {
   EXPECT_EQ(read("run.mcap").message_count(), 500u);
 }
 
+TEST_F(RecorderTest, AFileThatHoldsNothingIsRemoved) {
+  Recorder recorder = open();
+  const auto closed = recorder.close();
+  ASSERT_TRUE(closed) << closed.error().text;
+  EXPECT_EQ(closed->bytes, 0u);
+  EXPECT_FALSE(exists("run.mcap.part"));
+  EXPECT_FALSE(exists("run.mcap"));
+}
+
 TEST_F(RecorderTest, WhatWasFlushedIsReadableWhileRecordingGoesOn) {
   Recorder recorder = open();
   recorder.record(example_point(1), "tracker");
@@ -214,8 +224,9 @@ TEST_F(RecorderTest, ADeviceNameBeyondTheIdlIsCountedNotWritten) {
   recorder.record(example_point(1), std::string(33, 'x'));
   recorder.record(protocol::to_raw_bytes(example_block(1), std::string(33, 'x')));
   EXPECT_EQ(recorder.status().refused, 2u);
+  recorder.record(example_point(1), "tracker");
   ASSERT_TRUE(recorder.close());
-  EXPECT_EQ(read("run.mcap").message_count(), 0u);
+  EXPECT_EQ(read("run.mcap").message_count(), 1u);
 }
 
 TEST_F(RecorderTest, TheFileExplainsItself) {

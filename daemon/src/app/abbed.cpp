@@ -6,11 +6,13 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <chrono>
 #include <cstdio>
 #include <cstring>
 #include <ctime>
 #include <exception>
+#include <future>
 #include <optional>
 #include <thread>
 #include <utility>
@@ -20,6 +22,7 @@
 #include "abbe/daemon/dds_supervisor.hpp"
 #include "abbe/daemon/device_set.hpp"
 #include "abbe/daemon/hub.hpp"
+#include "control/control_server.hpp"
 #include "control/unix_socket.hpp"
 
 namespace abbe::daemon {
@@ -105,8 +108,8 @@ struct Abbed::State {
   drivers::MonotonicTime time;
   protocol::UtcOffset utc;
   std::vector<std::string> warnings;
-  std::unique_ptr<RecorderThread> recorder;
   std::optional<ModelAuthority> authority;
+  std::unique_ptr<RecorderThread> recorder;
   std::optional<CalibrationService> calibration;
   std::optional<ReferenceService> reference;
   std::optional<VerificationService> verification;
@@ -115,7 +118,10 @@ struct Abbed::State {
   std::optional<DeviceSet> devices;
   std::optional<TouchService> touching;
   std::optional<Hub> hub;
+  WallTime running_since;
+  std::promise<void> hub_may_run;  // or it is broken: abbed was refused
   std::thread hub_thread;
+  FileDescriptor control_listener;
   std::unique_ptr<ControlServer> control;
 
   State(Config c, AbbedOptions o)
@@ -124,7 +130,9 @@ struct Abbed::State {
   State& operator=(const State&) = delete;
   ~State() {
     control.reset();
+    if (control_listener) ::unlink(config.control.socket.c_str());
     if (hub) hub->stop();
+    hub_may_run = {};
     if (hub_thread.joinable()) hub_thread.join();
   }
 
@@ -152,9 +160,6 @@ struct Abbed::State {
     auto opened = ModelAuthority::open(config.daemon.models_dir(), config, utc, time.now());
     if (!opened) return tl::unexpected(opened.error());
     authority.emplace(std::move(*opened));
-    calibration.emplace(config, *authority, recorder.get(), utc);
-    reference.emplace(config, recorder.get());
-    verification.emplace(config);
     return {};
   }
 
@@ -186,7 +191,27 @@ struct Abbed::State {
     return {};
   }
 
-  Result<void> start_hub() {
+  /// The thread waits until there is a hub to run; whether it may have its priority is known before.
+  Result<void> start_hub_thread() {
+    hub_thread = std::thread([this, may_run = hub_may_run.get_future()]() mutable { run_hub(may_run); });
+    if (auto set = set_priority(hub_thread, config.daemon); !set) {
+      if (config.daemon.realtime == RealTimeMode::Enforce) return set;
+      warnings.push_back(set.error().text);
+    }
+    return {};
+  }
+
+  Result<void> listen_control() {
+    auto listener = listen_unix(config.control.socket);
+    if (!listener) return tl::unexpected(listener.error());
+    control_listener = std::move(*listener);
+    return {};
+  }
+
+  Result<void> run() {
+    calibration.emplace(config, *authority, recorder.get(), utc);
+    reference.emplace(config, recorder.get());
+    verification.emplace(config);
     touching.emplace(*devices, config.cmm.has_value());
     hub.emplace(HubParts{.config = config,
                          .time = time,
@@ -198,29 +223,24 @@ struct Abbed::State {
                          .reference = &*reference,
                          .touching = &*touching,
                          .verification = &*verification});
-    hub_thread = std::thread([this] { run_hub(); });
-    if (auto set = set_priority(hub_thread, config.daemon); !set) {
-      if (config.daemon.realtime == RealTimeMode::Enforce) return set;
-      warnings.push_back(set.error().text);
-    }
+    running_since = WallTime::clock::now();
+    hub_may_run.set_value();
+    control = serve_control(std::move(control_listener), config.control.socket,
+                            [this](const nlohmann::json& request) { return answer_request(*hub, request); });
     return {};
   }
 
-  void run_hub() noexcept {
+  void run_hub(std::future<void>& may_run) noexcept {
+    try {
+      may_run.get();
+    } catch (const std::future_error&) {
+      return;
+    }
     try {
       hub->run();
     } catch (const std::exception& defect) {  // it turns no more, which alive() sees
       fmt::print(stderr, "abbed: the hub ended by a defect: {}\n", defect.what());
     }
-  }
-
-  Result<void> open_control() {
-    auto opened = ControlServer::open(config.control.socket, [this](const nlohmann::json& request) {
-      return answer_request(*hub, request);
-    });
-    if (!opened) return tl::unexpected(opened.error());
-    control = std::move(*opened);
-    return {};
   }
 };
 
@@ -232,8 +252,10 @@ Result<std::unique_ptr<Abbed>> Abbed::start(Config config, AbbedOptions options)
     if (auto made = make_directory(directory); !made) return tl::unexpected(made.error());
   }
   using Step = Result<void> (State::*)();
-  for (const Step step : {&State::refuse_second_daemon, &State::open_recorder, &State::open_models,
-                          &State::open_dds, &State::start_devices, &State::start_hub, &State::open_control}) {
+  // The recorder last of all that may refuse: a start that fails again and again leaves no files behind.
+  for (const Step step :
+       {&State::refuse_second_daemon, &State::open_models, &State::open_dds, &State::start_devices,
+        &State::start_hub_thread, &State::listen_control, &State::open_recorder, &State::run}) {
     if (auto done = ((*state).*step)(); !done) return tl::unexpected(done.error());
   }
   return std::unique_ptr<Abbed>{new Abbed{std::move(state)}};
@@ -247,7 +269,7 @@ void Abbed::turn() {
 }
 
 bool Abbed::alive() const {
-  return WallTime::clock::now() - state_->hub->last_turn() < kHubPatience;
+  return WallTime::clock::now() - std::max(state_->hub->last_turn(), state_->running_since) < kHubPatience;
 }
 
 std::vector<std::string> Abbed::warnings() const {

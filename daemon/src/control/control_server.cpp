@@ -21,6 +21,7 @@
 #include <vector>
 
 #include "abbe/daemon/control_protocol.hpp"
+#include "control/control_server.hpp"
 #include "control/json_line.hpp"
 #include "control/unix_socket.hpp"
 
@@ -169,12 +170,17 @@ class Server final : public ControlServer {
 
 }  // namespace
 
+std::unique_ptr<ControlServer> serve_control(FileDescriptor listener, const std::filesystem::path& path,
+                                             ControlServer::Handler handler) {
+  FileDescriptor wake{::eventfd(0, EFD_CLOEXEC)};
+  return std::make_unique<Server>(std::move(listener), std::move(wake), path, std::move(handler));
+}
+
 Result<std::unique_ptr<ControlServer>> ControlServer::open(const std::filesystem::path& socket_path,
                                                            Handler handler) {
   auto listener = listen_unix(socket_path);
   if (!listener) return tl::unexpected(listener.error());
-  FileDescriptor wake{::eventfd(0, EFD_CLOEXEC)};
-  return std::make_unique<Server>(std::move(*listener), std::move(wake), socket_path, std::move(handler));
+  return serve_control(std::move(*listener), socket_path, std::move(handler));
 }
 
 }  // namespace abbe::daemon

@@ -389,6 +389,11 @@ Result<RecordingDigest> Recorder::close() {
   const std::string fault = s.status.fault;
   s.status.state = RecorderStatus::State::Closed;
   if (!s.file) return fail(ErrorCode::Io, fault);
+  if (s.messages_in_file == 0 && s.attachments.empty()) {
+    s.file->discard();
+    s.file.reset();
+    return RecordingDigest{};
+  }
   const auto ended = s.end_file();
   const RecordingDigest finished = digest();
   s.file.reset();

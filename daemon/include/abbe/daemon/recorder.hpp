@@ -99,7 +99,7 @@ class Recorder {
 
   /// Ends the file: chunk, indexes, footer, fsync, rename, fsync of the directory. The digest is that of the
   /// finished file. Error (Io): it could not be finished and stays NAME.mcap.part, readable up to its last
-  /// whole chunk.
+  /// whole chunk. A file that holds nothing is removed; its digest is empty.
   Result<RecordingDigest> close();
 
   [[nodiscard]] const RecorderStatus& status() const noexcept;

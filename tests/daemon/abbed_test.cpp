@@ -1,0 +1,66 @@
+#include "abbe/daemon/abbed.hpp"
+
+#include <gmock/gmock.h>
+#include <stdlib.h>
+
+#include <filesystem>
+#include <fstream>
+
+namespace abbe::daemon {
+namespace {
+
+namespace fs = std::filesystem;
+using ::testing::HasSubstr;
+using ::testing::IsEmpty;
+
+class AbbedTest : public ::testing::Test {
+ protected:
+  AbbedTest() {
+    std::string name = testing::TempDir() + "abbed-XXXXXX";
+    directory_ = ::mkdtemp(name.data());
+    config_.machine.name = "mill";
+    config_.daemon.data_dir = directory_;
+    config_.daemon.runtime_dir = directory_;
+    config_.recording.dir = directory_ / "recordings";
+    config_.recording.min_free_bytes = 0;
+    config_.control.socket = directory_ / "control.sock";
+    config_.dds.socket = directory_ / "dds.sock";
+    config_.dds.supervise = Supervise::Off;
+  }
+  ~AbbedTest() override { fs::remove_all(directory_); }
+
+  [[nodiscard]] std::vector<fs::path> recordings() const {
+    const fs::directory_iterator files{config_.recording.dir}, end;
+    return {files, end};
+  }
+
+  fs::path directory_;
+  Config config_;
+};
+
+TEST_F(AbbedTest, AStartThatIsRefusedLeavesNoRecordingBehind) {
+  std::ofstream{config_.control.socket} << "not a socket";
+  const auto abbed = Abbed::start(config_, {});
+  ASSERT_FALSE(abbed);
+  EXPECT_THAT(abbed.error().text, HasSubstr("control.sock"));
+  EXPECT_THAT(recordings(), IsEmpty());
+}
+
+TEST_F(AbbedTest, RecordsWhileItRunsAndKeepsNoFileThatHoldsNothing) {
+  auto abbed = Abbed::start(config_, {});
+  ASSERT_TRUE(abbed) << abbed.error().text;
+  EXPECT_EQ(recordings().size(), 1u);
+  abbed->reset();
+  EXPECT_THAT(recordings(), IsEmpty());
+  EXPECT_FALSE(fs::exists(config_.control.socket));
+}
+
+TEST_F(AbbedTest, ASecondOneIsRefusedAndTheFirstGoesOn) {
+  const auto first = Abbed::start(config_, {});
+  ASSERT_TRUE(first) << first.error().text;
+  EXPECT_FALSE(Abbed::start(config_, {}));
+  EXPECT_TRUE(fs::exists(config_.control.socket));
+}
+
+}  // namespace
+}  // namespace abbe::daemon

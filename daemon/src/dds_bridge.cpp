@@ -1,5 +1,7 @@
 #include "abbe/daemon/dds_bridge.hpp"
 
+#include <map>
+#include <string>
 #include <vector>
 
 #include "abbe/daemon/cdr.hpp"
@@ -13,6 +15,7 @@ struct Written {
   DdsBridge::WallTime at{};
 };
 
+constexpr std::size_t kHeaderBytes = 4;  // of a CDR payload
 constexpr const char* kSourceLost = "SOURCE_LOST";
 
 bool is_durable(Topic topic) {
@@ -42,11 +45,28 @@ struct DdsBridge::State {
   WallTime last_beat{};
   WallTime last_assert{};
   RetainedPayloads<Written> durable;
+  /// Of each machine, by number: the head of their payloads, as far as the key.
+  std::map<std::string, std::map<std::uint32_t, std::vector<std::byte>>> slices_written;
   std::uint64_t written = 0;
   std::uint64_t refused = 0;
 
   void write(Topic topic, std::span<const std::byte> payload) {
     ++(outlet.write(topic, payload) ? written : refused);
+    if (topic == Topic::ErrorGrid) follow_slices(payload);
+  }
+
+  /// What was written stays with DDS for late joiners, also what another abbed said: beyond the slices of
+  /// this grid it is of another model.
+  void follow_slices(std::span<const std::byte> payload) {
+    const auto key = payload_key(Topic::ErrorGrid, payload);
+    const auto slices = grid_slices(payload);
+    if (!key || !slices) return;
+    auto& known = slices_written[std::string{key->machine}];
+    for (auto beyond = known.lower_bound(*slices); beyond != known.end(); beyond = known.erase(beyond))
+      outlet.dispose(Topic::ErrorGrid, beyond->second);
+    // The key is all that disposing takes.
+    const std::size_t head = kHeaderBytes + key->bytes.size();
+    known[*key->number].assign(payload.begin(), payload.begin() + static_cast<std::ptrdiff_t>(head));
   }
 
   void write_what_is_due(WallTime now) {

@@ -36,12 +36,25 @@ class RetainedPayloads {
     Entry& entry = entries_.back();
     entry.payload.assign(payload.begin(), payload.end());
     entry.extra = {};
-    return entry;
+    if (topic == Topic::ErrorGrid) drop_surplus_slices(payload);
+    return entries_.back();
   }
 
   [[nodiscard]] std::vector<Entry>& entries() noexcept { return entries_; }
 
  private:
+  /// A grid of fewer slices than the one before: what lies beyond belongs to the model before.
+  void drop_surplus_slices(std::span<const std::byte> newest) {
+    const auto machine = payload_key(Topic::ErrorGrid, newest);
+    const auto slices = grid_slices(newest);
+    if (!machine || !slices) return;
+    std::erase_if(entries_, [&](const Entry& e) {
+      if (e.topic != Topic::ErrorGrid) return false;
+      const auto key = payload_key(e.topic, e.payload);
+      return key && key->machine == machine->machine && key->number >= slices;
+    });
+  }
+
   std::vector<Entry> entries_;
 };
 

@@ -20,6 +20,8 @@ constexpr std::array<TopicTraits, kTopicCount> kTopics{{
      Key::Machine, 10s},
 }};
 
+constexpr std::size_t kHeaderBytes = 4;
+
 /// Reads CDR_LE from the end of the encapsulation header on, where alignment counts from.
 class KeyReader {
  public:
@@ -66,7 +68,6 @@ std::optional<Topic> topic_from(std::uint8_t value) noexcept {
 }
 
 std::optional<PayloadKey> payload_key(Topic topic, std::span<const std::byte> payload) noexcept {
-  constexpr std::size_t kHeaderBytes = 4;
   if (payload.size() < kHeaderBytes || payload[0] != std::byte{0} || payload[1] != std::byte{1})
     return std::nullopt;
   KeyReader reader(payload.subspan(kHeaderBytes));
@@ -78,6 +79,14 @@ std::optional<PayloadKey> payload_key(Topic topic, std::span<const std::byte> pa
   if (traits(topic).key == Key::MachineAndText && !(key.text = reader.text())) return std::nullopt;
   key.bytes = reader.read_so_far();
   return key;
+}
+
+std::optional<std::uint32_t> grid_slices(std::span<const std::byte> payload) noexcept {
+  if (!payload_key(Topic::ErrorGrid, payload)) return std::nullopt;
+  KeyReader reader(payload.subspan(kHeaderBytes));
+  static_cast<void>(reader.text());    // machine
+  static_cast<void>(reader.number());  // slice
+  return reader.number();
 }
 
 }  // namespace abbe::daemon

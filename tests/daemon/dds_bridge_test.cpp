@@ -45,6 +45,14 @@ std::vector<std::byte> model() {
   return payload_of(model);
 }
 
+std::vector<std::byte> slice(std::uint32_t number, std::uint32_t slices) {
+  v1::ErrorGrid grid;
+  grid.machine("m");
+  grid.slice(number);
+  grid.slices(slices);
+  return payload_of(grid);
+}
+
 struct Recorded final : DdsOutlet {
   struct Write {
     Topic topic;
@@ -57,7 +65,12 @@ struct Recorded final : DdsOutlet {
     writes.push_back({topic, {payload.begin(), payload.end()}});
     return true;
   }
+  void dispose(Topic topic, std::span<const std::byte> payload) override {
+    EXPECT_EQ(topic, Topic::ErrorGrid);
+    disposed.push_back(payload_key(topic, payload)->number.value());
+  }
   void assert_liveliness() override { ++assertions; }
+  std::vector<std::uint32_t> disposed;
 
   [[nodiscard]] int count(Topic topic) const {
     int n = 0;
@@ -94,6 +107,27 @@ TEST_F(DdsBridgeTest, WritesPayloadsUnchanged) {
   bridge.publish(Topic::Snapshot, snapshot(), t);
   ASSERT_EQ(outlet.writes.size(), 1u);
   EXPECT_EQ(outlet.writes[0].payload, snapshot());
+}
+
+TEST_F(DdsBridgeTest, SlicesBeyondASmallerGridAreDisposedAndNotRepeated) {
+  bridge.beat(t);
+  for (std::uint32_t i = 0; i < 3; ++i) bridge.publish(Topic::ErrorGrid, slice(i, 3), t);
+  bridge.publish(Topic::ErrorGrid, slice(0, 1), t);
+  EXPECT_EQ(outlet.disposed, (std::vector<std::uint32_t>{1, 2}));
+  const int written = outlet.count(Topic::ErrorGrid);
+  live(10s + 50ms);
+  EXPECT_EQ(outlet.count(Topic::ErrorGrid), written + 1);
+}
+
+TEST_F(DdsBridgeTest, SlicesOfAnAbbedBeforeAreDisposedToo) {
+  bridge.beat(t);
+  for (std::uint32_t i = 0; i < 3; ++i) bridge.publish(Topic::ErrorGrid, slice(i, 3), t);
+  bridge.connected();
+  bridge.publish(Topic::ErrorGrid, slice(0, 2), t);
+  EXPECT_TRUE(outlet.disposed.empty());
+  bridge.beat(t);
+  bridge.turn(t);
+  EXPECT_EQ(outlet.disposed, (std::vector<std::uint32_t>{2}));
 }
 
 TEST_F(DdsBridgeTest, WritesNothingBeforeTheFirstBeat) {

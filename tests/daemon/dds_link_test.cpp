@@ -41,6 +41,16 @@ std::vector<std::byte> snapshot_payload(std::uint64_t sequence) {
   return payload;
 }
 
+std::vector<std::byte> slice_payload(const std::string& machine, std::uint32_t number, std::uint32_t slices) {
+  v1::ErrorGrid grid;
+  grid.machine(machine);
+  grid.slice(number);
+  grid.slices(slices);
+  std::vector<std::byte> bytes;
+  EXPECT_TRUE(encode(grid, bytes));
+  return bytes;
+}
+
 class DdsLinkTest : public testing::Test {
  protected:
   DdsLinkTest() {
@@ -79,6 +89,18 @@ TEST_F(DdsLinkTest, LateComerGetsTheNewestOfEveryDurableKey) {
   ASSERT_EQ(seen.size(), 2u);
   EXPECT_EQ(seen[0].payload, state_payload("b", 2));
   EXPECT_EQ(seen[1].payload, state_payload("a", 3));
+}
+
+TEST_F(DdsLinkTest, LateComerGetsNoSlicesOfALargerGridBefore) {
+  for (std::uint32_t i = 0; i < 3; ++i) link_->publish(Topic::ErrorGrid, slice_payload("a", i, 3));
+  link_->publish(Topic::ErrorGrid, slice_payload("b", 2, 3));
+  link_->publish(Topic::ErrorGrid, slice_payload("a", 0, 1));
+  FarEnd far(path_);
+  link_->poll();
+  const auto seen = far.take();
+  ASSERT_EQ(seen.size(), 2u);
+  EXPECT_EQ(seen[0].payload, slice_payload("b", 2, 3));
+  EXPECT_EQ(seen[1].payload, slice_payload("a", 0, 1));
 }
 
 TEST_F(DdsLinkTest, DurableTopicsAreSentAgainAfterAReconnection) {

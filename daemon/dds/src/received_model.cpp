@@ -27,18 +27,28 @@ const char* name_of(v1::ModelStatus status) noexcept {
   return status < names.size() ? names[status] : "unknown";
 }
 
+void ReceivedModel::state(v1::ModelState state) {
+  const bool another = !state_ || state_->model_id() != state.model_id();
+  state_ = std::move(state);
+  if (another) std::erase_if(slices_, [this](const auto& of) { return of.first != state_->model_id(); });
+}
+
 void ReceivedModel::slice(v1::ErrorGrid slice) {
-  std::erase_if(slices_, [&](const auto& s) {
-    return s.second.model_id() != slice.model_id() || s.second.slices() != slice.slices();
-  });
-  slices_[slice.slice()] = std::move(slice);
+  constexpr std::size_t kMostModels = 4;  // the state's, the next one, and what is left of others
+  if (slices_.size() >= kMostModels && !slices_.contains(slice.model_id()))
+    std::erase_if(slices_, [this](const auto& of) { return !state_ || of.first != state_->model_id(); });
+  Slices& of_model = slices_[slice.model_id()];
+  std::erase_if(of_model, [&](const auto& s) { return s.second.slices() != slice.slices(); });
+  of_model[slice.slice()] = std::move(slice);
 }
 
 std::optional<std::vector<v1::GridNode>> ReceivedModel::grid() const {
-  if (slices_.empty() || slices_.size() != slices_.begin()->second.slices()) return std::nullopt;
-  if (!state_ || slices_.begin()->second.model_id() != state_->model_id()) return std::nullopt;
+  if (!state_) return std::nullopt;
+  const auto of_model = slices_.find(state_->model_id());
+  if (of_model == slices_.end() || of_model->second.size() != of_model->second.begin()->second.slices())
+    return std::nullopt;
   std::vector<v1::GridNode> nodes;
-  for (const auto& [number, slice] : slices_)
+  for (const auto& [number, slice] : of_model->second)
     nodes.insert(nodes.end(), slice.nodes().begin(), slice.nodes().end());
   return nodes;
 }

@@ -40,6 +40,13 @@ bool Writers::write(daemon::Topic topic, std::span<const std::byte> payload) {
   return writers_[index_of(topic)]->write(&buffer_);
 }
 
+void Writers::dispose(daemon::Topic topic, std::span<const std::byte> payload) {
+  buffer_.bytes.assign(payload.begin(), payload.end());
+  // An instance that was never written is refused: then there is nothing to take back.
+  static_cast<void>(
+      writers_[index_of(topic)]->dispose(&buffer_, eprosima::fastrtps::rtps::c_InstanceHandle_Unknown));
+}
+
 void Writers::assert_liveliness() {
   writers_[index_of(daemon::Topic::ModelState)]->assert_liveliness();
 }

@@ -44,8 +44,31 @@ TEST(ReceivedModel, SlicesOfTwoModelsAreNeverMixed) {
   auto model = complete();
   auto other = test::grid_slices()[0];
   other.model_id("otf-2");
+  const auto whole = model.grid()->size();
   model.slice(other);
+  EXPECT_EQ(model.grid()->size(), whole);
+  auto state = test::active_state(2);
+  state.model_id("otf-2");
+  model.state(state);
   EXPECT_FALSE(model.grid().has_value());
+}
+
+// What a late joiner may meet: the end of a larger grid that was there before, in any order.
+TEST(ReceivedModel, SlicesLeftOfAnotherModelAreIgnored) {
+  auto left = test::grid_slices().back();
+  left.model_id("otf-before");
+  left.slice(left.slices() + 1);
+  left.slices(left.slices() + 2);
+  for (const bool before : {true, false}) {
+    ReceivedModel model;
+    if (before) model.slice(left);
+    for (auto& slice : test::grid_slices()) model.slice(std::move(slice));
+    if (!before) model.slice(left);
+    model.state(test::active_state(1));
+    EXPECT_TRUE(model.grid().has_value()) << before;
+    model.slice(left);
+    EXPECT_TRUE(model.grid().has_value()) << before;
+  }
 }
 
 TEST(ReceivedModel, GridOfAnotherModelThanTheStateIsARefusal) {

@@ -7,7 +7,8 @@
 ///   nothing, so that the lease of ModelState's writer ends too.
 /// - back: durable topics go out again. The state only once abbed says it anew, so that no old ACTIVE comes
 /// to life.
-/// - durable topics are repeated as their traits say. Used by one thread; time is handed in.
+/// - durable topics are repeated as their traits say.
+/// - slices of ErrorGrid beyond those of the newest grid are disposed. Used by one thread; time is handed in.
 
 #include <chrono>
 #include <cstddef>
@@ -26,6 +27,8 @@ class DdsOutlet {
  public:
   virtual ~DdsOutlet() = default;
   virtual bool write(Topic topic, std::span<const std::byte> payload) = 0;  ///< false: refused
+  /// The instance this payload was written to is gone: nobody who comes late is to see it.
+  virtual void dispose(Topic topic, std::span<const std::byte> payload) = 0;
   virtual void assert_liveliness() = 0;
 };
 

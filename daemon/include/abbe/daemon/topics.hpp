@@ -56,4 +56,7 @@ struct PayloadKey {
 };
 [[nodiscard]] std::optional<PayloadKey> payload_key(Topic topic, std::span<const std::byte> payload) noexcept;
 
+/// How many slices the grid has that this payload of ErrorGrid is a part of. Nothing if it is none.
+[[nodiscard]] std::optional<std::uint32_t> grid_slices(std::span<const std::byte> payload) noexcept;
+
 }  // namespace abbe::daemon

@@ -22,15 +22,16 @@ struct Decision {
 
 class ReceivedModel {
  public:
-  void state(v1::ModelState state) { state_ = std::move(state); }
+  void state(v1::ModelState state);
   void model(v1::ErrorModel model) { model_ = std::move(model); }
-  /// Slices of another model than the newest slice's are forgotten.
+  /// Slices are kept by model: those of the next one come before its state, and a late joiner may meet old
+  /// ones among them.
   void slice(v1::ErrorGrid slice);
 
   [[nodiscard]] const std::optional<v1::ModelState>& state() const noexcept { return state_; }
   [[nodiscard]] const std::optional<v1::ErrorModel>& model() const noexcept { return model_; }
 
-  /// All nodes in the order of the slices; nothing while a slice is missing or the model is not the state's.
+  /// All nodes of the state's model in the order of the slices; nothing while a slice is missing.
   [[nodiscard]] std::optional<std::vector<v1::GridNode>> grid() const;
 
   /// May the grid be applied? `answered_for`: a writer of ModelState keeps its lease.
@@ -39,7 +40,8 @@ class ReceivedModel {
  private:
   std::optional<v1::ModelState> state_;
   std::optional<v1::ErrorModel> model_;
-  std::map<std::uint32_t, v1::ErrorGrid> slices_;
+  using Slices = std::map<std::uint32_t, v1::ErrorGrid>;
+  std::map<std::string, Slices> slices_;  // by model
 };
 
 /// May this vector be applied, as it arrived just now?

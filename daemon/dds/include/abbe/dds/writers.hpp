@@ -25,6 +25,8 @@ class Writers final : public daemon::DdsOutlet {
   /// False if Fast DDS did not take it. A payload is written as it is.
   bool write(daemon::Topic topic, std::span<const std::byte> payload) override;
 
+  void dispose(daemon::Topic topic, std::span<const std::byte> payload) override;
+
   /// Says to the readers of ModelState: somebody answers for it.
   void assert_liveliness() override;
 

@@ -373,5 +373,24 @@ TEST(Config, KeepsTheParticipantBehindTheHub) {
   EXPECT_THAT(faults_of(kMachine + "[daemon]\nhub_priority = 15\n[dds]\npriority = 14\n"), SizeIs(0));
 }
 
+TEST(Config, NoTwoDevicesShareANameAndNoneTakesThatOfAPartOfTheDaemon) {
+  const auto with = [](const std::string& tracker) {
+    return faults_of(kMachine + "[tracker]\nhost = \"10.0.0.7\"\nname = \"" + tracker + "\"\n" + kCanBus +
+                     kNodes);
+  };
+  EXPECT_THAT(with("laser"), SizeIs(0));
+  EXPECT_THAT(with("encoder"), ElementsAre(HasSubstr("encoder.name: two devices are called \"encoder\"")));
+  for (const char* own : {"recorder", "models", "dds"})
+    EXPECT_THAT(with(own), ElementsAre(AllOf(HasSubstr("tracker.name"), HasSubstr("the daemon calls"))));
+}
+
+TEST(Config, TheHubStaysBelowTheDevices) {
+  EXPECT_THAT(faults_of(kMachine + "[daemon]\nhub_priority = 40\n"),
+              ElementsAre(AllOf(HasSubstr("daemon.hub_priority"), HasSubstr("below tracker_priority 40"))));
+  EXPECT_THAT(faults_of(kMachine + "[daemon]\nencoder_priority = 30\n"),
+              ElementsAre(HasSubstr("encoder_priority 30")));
+  EXPECT_THAT(faults_of(kMachine + "[daemon]\nhub_priority = 39\n"), SizeIs(0));
+}
+
 }  // namespace
 }  // namespace abbe::daemon

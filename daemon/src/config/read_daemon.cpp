@@ -20,6 +20,11 @@ void read_scheduling(Section& section, DaemonConfig& out) {
   section.get_integer("tracker_priority", out.tracker_priority, 1, 99);
   section.get_integer("encoder_priority", out.encoder_priority, 1, 99);
   section.get_integer("hub_priority", out.hub_priority, 1, 99);
+  if (out.hub_priority >= std::min(out.tracker_priority, out.encoder_priority))
+    section.fault("hub_priority",
+                  fmt::format("{} must be below tracker_priority {} and encoder_priority {}: a busy hub must "
+                              "not keep the devices from their bytes",
+                              out.hub_priority, out.tracker_priority, out.encoder_priority));
   read_cpu(section, "tracker_cpu", out.tracker_cpu);
   read_cpu(section, "encoder_cpu", out.encoder_cpu);
   read_cpu(section, "hub_cpu", out.hub_cpu);

@@ -208,21 +208,36 @@ EnvironmentConfig read_device(Section& device, Config& out) {
   return config;
 }
 
+/// The names of Health's streams must differ: those of the devices, and the daemon's own.
+void take_name(const std::string& name, std::set<std::string>& names, Section& section) {
+  static const std::set<std::string> kOwn{"recorder", "models", "dds"};
+  if (name.empty()) return;
+  if (kOwn.contains(name))
+    section.fault("name", fmt::format("\"{}\" is what the daemon calls a part of its own", name));
+  else if (!names.insert(name).second)
+    section.fault("name", fmt::format("two devices are called \"{}\"", name));
+}
+
 }  // namespace
 
 void read_environment(Section& root, Config& out) {
   std::set<std::string> names;
-  if (out.tracker) names.insert(out.tracker->name);
-  if (out.encoder) names.insert(out.encoder->name);
-  if (out.counter_card) names.insert(out.counter_card->name);
-  if (out.reference) names.insert(out.reference->card.name);
-  if (out.probe) names.insert(out.probe->name);
-  if (out.cmm) names.insert(out.cmm->name);
+  const auto take = [&](const char* table, const auto& device, const auto& name) {
+    if (!device) return;
+    Section section = root.child(table);
+    take_name(name(*device), names, section);
+  };
+  const auto own_name = [](const auto& device) { return device.name; };
+  take("tracker", out.tracker, own_name);
+  take("encoder", out.encoder, own_name);
+  take("counter_card", out.counter_card, own_name);
+  take("reference", out.reference, [](const auto& reference) { return reference.card.name; });
+  take("probe", out.probe, own_name);
+  take("cmm", out.cmm, own_name);
   protocol::EnvironmentMask seen = 0;
   for (auto& section : root.children("environment")) {
     auto config = read_device(section, out);
-    if (!config.name.empty() && !names.insert(config.name).second)
-      section.fault("name", fmt::format("two devices are called \"{}\"", config.name));
+    take_name(config.name, names, section);
     for (const auto& measured : config.map.measured) {
       const auto bit = drivers::mask_of(measured);
       if ((seen & bit) != 0 && measured.quantity != Quantity::Temperature)

@@ -61,12 +61,17 @@ sigset_t block_stop_signals() {
 int run(Abbed& abbed, const sigset_t& stop) {
   const auto feed_period = watchdog_period();
   auto next_feed = std::chrono::steady_clock::now();
+  bool hangs = false;
   const timespec turn{.tv_sec = 0, .tv_nsec = std::chrono::nanoseconds{kTurn}.count()};
   for (;;) {
     if (sigtimedwait(&stop, nullptr, &turn) > 0) return kDone;
     abbed.turn();
-    if (!abbed.alive()) {
-      fmt::print(stderr, "abbed: the hub has not turned for a second\n");
+    if (const bool hung = !abbed.alive(); hung != hangs) {
+      hangs = hung;
+      fmt::print(stderr, "abbed: {}\n",
+                 hangs ? "the hub has not turned for a second" : "the hub turns again");
+    }
+    if (hangs) {
       if (!feed_period) continue;  // nobody to start us anew: keep what still works
       return kDefect;
     }

@@ -4,6 +4,7 @@
 #include <signal.h>
 #include <sys/wait.h>
 
+#include <atomic>
 #include <cstdlib>
 #include <fstream>
 #include <functional>
@@ -138,7 +139,8 @@ TEST_F(Cli, KeepsAModelWithTheVerdictAgainstTheActiveOne) {
   const auto id = model_id(read_model(folder_ / "k1/model.json")->model, "otf");
   ASSERT_EQ(abbe(fmt::format("model activate {} --store '{}'", id, store.string())).exit, 0);
   const auto again = identify(files_.path, files_.tracker, folder_ / "k2", keep + " --json");
-  ASSERT_EQ(again.exit, 0) << again.err;
+  ASSERT_EQ(again.exit, 5) << again.err;
+  EXPECT_TRUE(fs::exists(folder_ / "k2/report.html"));
   const auto gate = nlohmann::json::parse(again.out).at("gate");
   EXPECT_FALSE(gate.at("accepted"));
   EXPECT_THAT(gate.at("reasons").at(0).get<std::string>(), HasSubstr("the active model still holds"));
@@ -363,6 +365,68 @@ TEST_F(Cli, CalibrateSaysWhatIsWaitedForAtEveryStep) {
   EXPECT_THAT(ran.err, AllOf(HasSubstr("warming: waiting for the machine to stand at (1.000"),
                              HasSubstr("acquiring: driving the path")));
   EXPECT_THAT(ran.out, StartsWith("active abcd"));
+}
+
+nlohmann::json refused_as(const std::string& code) {
+  auto refused = session("refused", "because");
+  refused["code"] = code;
+  return refused;
+}
+
+TEST_F(Cli, CalibrateExitsAsTheSessionWasRefused) {
+  const std::vector<std::pair<std::string, int>> codes{
+      {"data_insufficient", 1}, {"bad_input", 3}, {"io", 4}, {"refused", 5}};
+  for (const auto& [code, exit] : codes) {
+    const auto socket = folder_ / "code.sock";
+    const auto daemon = ControlServer::open(socket, ScriptedDaemon{{refused_as(code)}});
+    ASSERT_TRUE(daemon);
+    const auto ran =
+        abbe(fmt::format("calibrate otf --path '{}' --socket '{}'", files_.path.string(), socket.string()));
+    EXPECT_EQ(ran.exit, exit) << code;
+    EXPECT_THAT(ran.out, HasSubstr("because"));
+  }
+}
+
+TEST_F(Cli, ADaemonStartedAnewMeanwhileHasLostTheSession) {
+  const auto socket = folder_ / "lost.sock";
+  const auto daemon =
+      ControlServer::open(socket, ScriptedDaemon{{session("acquiring", "driving"), session("idle", "")}});
+  ASSERT_TRUE(daemon);
+  const auto ran =
+      abbe(fmt::format("calibrate otf --path '{}' --socket '{}'", files_.path.string(), socket.string()));
+  EXPECT_EQ(ran.exit, 4);
+  EXPECT_THAT(ran.err, HasSubstr("lost"));
+}
+
+TEST_F(Cli, ReferencePrintsEachAxisInItsUnits) {
+  const auto socket = folder_ / "reference.sock";
+  const auto axis = [](const char* name, const char* kind) {
+    return nlohmann::json{{"axis", name},  {"kind", kind}, {"state", "found"},          {"marks", 4},
+                          {"known", true}, {"u", 2e-6},    {"reading_at_zero", 0.0125}, {"reason", ""}};
+  };
+  const auto daemon = ControlServer::open(socket, [&](const nlohmann::json&) -> nlohmann::json {
+    return {{"ok", true},
+            {"reference", {{"running", false}, {"axes", {axis("X", "linear"), axis("C", "rotary")}}}}};
+  });
+  ASSERT_TRUE(daemon);
+  const auto ran = abbe(fmt::format("reference --socket '{}'", socket.string()));
+  EXPECT_EQ(ran.exit, 0) << ran.err;
+  EXPECT_THAT(ran.out, AllOf(HasSubstr("at 12.500000 mm, u = 2.000 um"),
+                             HasSubstr("at 0.012500000 rad, u = 2.000 urad")));
+}
+
+TEST_F(Cli, ASearchOfADaemonStartedAnewIsLost) {
+  const auto socket = folder_ / "search.sock";
+  std::atomic<int> asked = 0;
+  const auto daemon = ControlServer::open(socket, [&](const nlohmann::json&) -> nlohmann::json {
+    return {{"ok", true},
+            {"process", asked++ < 2 ? 1 : 2},
+            {"reference", {{"running", true}, {"axes", nlohmann::json::array()}}}};
+  });
+  ASSERT_TRUE(daemon);
+  const auto ran = abbe(fmt::format("reference --socket '{}'", socket.string()));
+  EXPECT_EQ(ran.exit, 4);
+  EXPECT_THAT(ran.err, HasSubstr("search for the marks is lost"));
 }
 
 TEST_F(Cli, CalibrateInterruptedSaysHowToCancel) {

@@ -1,55 +1,35 @@
 #include "cli/follow_calibration.hpp"
 
 #include <fmt/format.h>
-#include <signal.h>
 
 #include <CLI/Config.hpp>
 #include <CLI/Formatter.hpp>
 #include <algorithm>
-#include <chrono>
-#include <csignal>
-#include <thread>
+#include <optional>
 #include <utility>
 
 #include "abbe/daemon/control_protocol.hpp"
+#include "cli/follow.hpp"
 #include "cli/terminal.hpp"
+#include "control/refusal.hpp"
 
 namespace abbe::daemon {
 namespace {
 
-using namespace std::chrono_literals;
 using nlohmann::json;
-
-constexpr auto kLook = 200ms;  // how often a person's progress bar moves
-constexpr auto kPatienceWithoutDaemon = 5s;
 
 int print_verdict(const json& session, bool as_json) {
   const std::string state = session["state"];
+  // A session ends in a verdict; a daemon without one is not the one that was asked.
+  if (state == "idle")
+    return report({ErrorCode::Io, "the calibration is lost: the daemon was started anew", {}});
   if (as_json) {
     fmt::print("{}\n", session.dump(1));
   } else {
     fmt::print("{} {}\n{}\n", state, session["model_id"].get<std::string>(),
                session["reason"].get<std::string>());
   }
-  if (state == "active") return 0;
-  // Refused with a model: the gate. Without: the data did not allow one, or the run was not completed.
-  return session["model_id"].get<std::string>().empty() ? 1 : 5;
-}
-
-volatile std::sig_atomic_t interrupted = 0;  // written by the signal handler
-
-/// Ctrl-C ends the looking on, not the calibration: that takes a word to the daemon.
-void leave_on_interrupt() {
-  struct sigaction leave {};
-  leave.sa_handler = [](int) { interrupted = 1; };
-  ::sigaction(SIGINT, &leave, nullptr);
-}
-
-int say_how_to_cancel(const std::filesystem::path& socket, const std::string& method) {
-  constexpr int kInterrupted = 128 + SIGINT;  // what a shell reports
-  fmt::print(stderr, "abbe: the calibration goes on; end it with: abbe calibrate {} --cancel --socket {}\n",
-             method, socket.string());
-  return kInterrupted;
+  return state == "active" ? 0 : exit_code(error_of_refusal(session).code);
 }
 
 /// One line whenever the daemon is about something else: "warming: waiting for the machine to stand at ...",
@@ -79,25 +59,11 @@ class Narrator {
   std::size_t noted_ = 0;
 };
 
-int follow(const std::filesystem::path& socket, const std::string& method, bool as_json) {
-  leave_on_interrupt();
+int follow_session(const std::filesystem::path& socket, const std::string& method, bool as_json) {
   ProgressBar bar;
   Narrator narrator;
-  auto answered = std::chrono::steady_clock::now();
-  for (;; std::this_thread::sleep_for(kLook)) {
-    if (interrupted != 0) {
-      bar.clear();
-      return say_how_to_cancel(socket, method);
-    }
-    const auto status = ask_daemon(socket, {{"do", "status"}});
-    const auto now = std::chrono::steady_clock::now();
-    if (!status) {
-      if (now - answered < kPatienceWithoutDaemon) continue;
-      bar.clear();
-      return report(status.error());
-    }
-    answered = now;
-    const json& session = (*status)["session"];
+  const auto look = [&](const json& status) -> std::optional<int> {
+    const json& session = status["session"];
     const std::string state = session["state"];
     narrator.tell_notes(bar, session);
     if (state == "active" || state == "refused" || state == "idle") {
@@ -106,7 +72,13 @@ int follow(const std::filesystem::path& socket, const std::string& method, bool 
     }
     narrator.tell(bar, state, session["reason"]);
     bar.show(state, session["progress"].get<double>());
-  }
+    return std::nullopt;
+  };
+  return follow({.socket = socket,
+                 .what = "the calibration",
+                 .cancel = fmt::format("abbe calibrate {} --cancel", method),
+                 .look = look},
+                bar);
 }
 
 }  // namespace
@@ -133,7 +105,7 @@ int run_calibration(const FollowOptions& options, json task) {
   task["who"] = user_name();
   const auto started = ask_daemon(*socket, task);
   if (!started) return report(started.error());
-  return options.detach ? 0 : follow(*socket, method, options.json);
+  return options.detach ? 0 : follow_session(*socket, method, options.json);
 }
 
 }  // namespace abbe::daemon

@@ -6,24 +6,21 @@
 #include <CLI/App.hpp>
 #include <CLI/Config.hpp>
 #include <CLI/Formatter.hpp>
-#include <chrono>
 #include <map>
 #include <memory>
+#include <optional>
 #include <string>
-#include <thread>
 
 #include "abbe/daemon/control_protocol.hpp"
 #include "cli/commands.hpp"
 #include "cli/daemon_socket.hpp"
+#include "cli/follow.hpp"
 #include "cli/terminal.hpp"
 
 namespace abbe::daemon {
 namespace {
 
-using namespace std::chrono_literals;
 using nlohmann::json;
-
-constexpr auto kLook = 200ms;
 
 struct Arguments {
   DaemonSocket where;
@@ -34,9 +31,11 @@ struct Arguments {
 std::string line_of(const json& axis) {
   const std::string state = axis["state"];
   if (state == "found") {
-    return fmt::format("{:<4} found after {} marks: count 0 is at {:.6f} mm, u = {:.3f} um",
+    const bool rotary = axis.value("kind", "linear") == "rotary";
+    return fmt::format("{:<4} found after {} marks: count 0 is at {:.{}f} {}, u = {:.3f} {}",
                        axis["axis"].get<std::string>(), axis["marks"].get<std::size_t>(),
-                       1e3 * axis["reading_at_zero"].get<double>(), 1e6 * axis["u"].get<double>());
+                       (rotary ? 1.0 : 1e3) * axis["reading_at_zero"].get<double>(), rotary ? 9 : 6,
+                       rotary ? "rad" : "mm", 1e6 * axis["u"].get<double>(), rotary ? "urad" : "um");
   }
   return fmt::format("{:<4} {}, {} marks{}{}", axis["axis"].get<std::string>(), state,
                      axis["marks"].get<std::size_t>(), axis["reason"].get<std::string>().empty() ? "" : ": ",
@@ -69,15 +68,20 @@ int print_result(const json& reference, bool as_json) {
   return all ? 0 : 1;
 }
 
-int follow(const std::filesystem::path& socket, bool as_json) {
+int follow_search(const std::filesystem::path& socket, bool as_json) {
+  ProgressBar no_bar{false};
   Narrator narrator;
-  for (;; std::this_thread::sleep_for(kLook)) {
-    const auto status = ask_daemon(socket, {{"do", "status"}});
-    if (!status) return report(status.error());
-    const json& reference = (*status)["reference"];
-    if (!reference["running"].get<bool>()) return print_result(reference, as_json);
-    narrator.tell(reference);
-  }
+  const auto look = [&](const json& status) -> std::optional<int> {
+    const json& found = status["reference"];
+    if (!found["running"].get<bool>()) return print_result(found, as_json);
+    narrator.tell(found);
+    return std::nullopt;
+  };
+  return follow({.socket = socket,
+                 .what = "the search for the marks",
+                 .cancel = "abbe reference --cancel",
+                 .look = look},
+                no_bar);
 }
 
 int reference(const Arguments& arguments) {
@@ -85,7 +89,7 @@ int reference(const Arguments& arguments) {
   if (!socket) return report(socket.error());
   const auto answer = ask_daemon(*socket, {{"do", "reference"}, {"cancel", arguments.cancel}});
   if (!answer) return report(answer.error());
-  return arguments.cancel ? 0 : follow(*socket, arguments.json);
+  return arguments.cancel ? 0 : follow_search(*socket, arguments.json);
 }
 
 }  // namespace
@@ -97,7 +101,7 @@ void add_reference(CLI::App& parent, int& exit) {
       "Find where the axes' counters began, from distance-coded marks: then drive each axis slowly over at\n"
       "least four marks in one direction. Ends when every axis of [reference] has its datum. Ctrl-C ends "
       "the\n"
-      "looking on, --cancel the search.");
+      "looking on (exit code 130), --cancel the search.");
   add_socket_options(*command, arguments->where);
   command->add_flag("--cancel", arguments->cancel, "end the search that is running");
   command->add_flag("--json", arguments->json, "the result as JSON");

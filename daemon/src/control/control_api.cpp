@@ -1,6 +1,7 @@
 #include "abbe/daemon/control_api.hpp"
 
 #include <fmt/format.h>
+#include <unistd.h>
 
 #include <array>
 #include <cmath>
@@ -9,6 +10,7 @@
 #include <utility>
 
 #include "abbe/daemon/control_protocol.hpp"
+#include "control/refusal.hpp"
 
 namespace abbe::daemon {
 namespace {
@@ -66,6 +68,7 @@ json next_json(const calib::evemu::NextTouch& next) {
 json session_json(const SessionStatus& s, const std::optional<calib::HeldOutFigures>& held_out) {
   json out{{"state", name(s.state)}, {"method", s.method},     {"reason", s.reason}, {"progress", s.progress},
            {"points", s.points},     {"model_id", s.model_id}, {"notes", s.notes},   {"noted", s.noted}};
+  if (s.state == SessionState::Refused) out["code"] = word_of(s.refused_as);
   if (s.next) out["next"] = next_json(*s.next);
   if (held_out) {
     out["held_out_rms_um"] = {{"candidate", held_out->candidate_rms_m * 1e6},
@@ -115,10 +118,13 @@ std::string_view name(AxisReference::State state) {
   return "failed";
 }
 
-json reference_json(const ReferenceService& reference) {
+json reference_json(const ReferenceService& reference, const MachineConfig& machine) {
   json axes = json::array();
   for (const auto& axis : reference.status()) {
+    const AxisConfig* known = machine.find_axis(axis.name);
+    const bool rotary = known != nullptr && known->kind == AxisKind::Rotary;
     json& out = axes.emplace_back(json{{"axis", axis.name},
+                                       {"kind", rotary ? "rotary" : "linear"},
                                        {"known", axis.known},
                                        {"state", name(axis.found.state)},
                                        {"marks", axis.found.marks},
@@ -134,6 +140,7 @@ json status(const Hub& hub) {
   json devices = json::array();
   for (const auto& h : hub.health()) devices.push_back(device_json(h));
   json out{{"ok", true},
+           {"process", ::getpid()},
            {"machine", hub.parts().config.machine.name},
            {"model", model_json(hub.standing())},
            {"session", session_json(hub.parts().calibration.status(), hub.parts().calibration.held_out())},
@@ -142,7 +149,7 @@ json status(const Hub& hub) {
   out["position_m"] = std::vector<double>(live.position.begin(), live.position.begin() + live.axis_count);
   if (live.has_environment) out["environment"] = environment_json(live, hub.parts().config);
   if (const auto* reference = hub.parts().reference; reference != nullptr && reference->configured())
-    out["reference"] = reference_json(*reference);
+    out["reference"] = reference_json(*reference, hub.parts().config.machine);
   if (hub.parts().recorder != nullptr) out["recording"] = hub.parts().recorder->status().file.string();
   if (hub.parts().publisher != nullptr) {
     const auto& link = hub.parts().publisher->link();

@@ -8,4 +8,7 @@ namespace abbe::daemon {
 /// `answer`: with "ok": false. A code nobody knows, of a newer daemon, is Refused.
 [[nodiscard]] Error error_of_refusal(const nlohmann::json& answer);
 
+/// "data_insufficient", "io" ...: what a program acts on.
+[[nodiscard]] std::string_view word_of(ErrorCode code) noexcept;
+
 }  // namespace abbe::daemon

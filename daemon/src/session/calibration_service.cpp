@@ -125,7 +125,7 @@ void CalibrationService::begin_identification(CalibrationRun run) {
 void CalibrationService::keep(Result<Identified> identified, HostTime now) {
   if (session_.status().state != SessionState::Identifying) return;  // cancelled meanwhile
   if (!identified) {
-    session_.not_identified(identified.error().text, now);
+    session_.not_identified(identified.error(), now);
     return;
   }
   verdict_ = verdict_of(identified->candidate);
@@ -143,7 +143,8 @@ void CalibrationService::keep(Result<Identified> identified, HostTime now) {
 
 void CalibrationService::conclude(Result<KeptModel> kept, HostTime now) {
   if (!kept) {
-    session_.not_identified(fmt::format("identified, but not kept: {}", kept.error().text), now);
+    session_.not_identified(
+        {kept.error().code, fmt::format("identified, but not kept: {}", kept.error().text), {}}, now);
     return;
   }
   if (kept->active) authority_.take_up(std::move(*kept->active), keeping_since_);

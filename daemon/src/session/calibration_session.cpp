@@ -144,11 +144,14 @@ void CalibrationSession::judged(std::string model_id, bool passed, std::string r
   if (status_.state != SessionState::Identifying) return;  // cancelled meanwhile
   status_.model_id = std::move(model_id);
   enter(SessionState::Judged, reason, now);
+  status_.refused_as = ErrorCode::Refused;
   enter(passed ? SessionState::Active : SessionState::Refused, std::move(reason), now);
 }
 
-void CalibrationSession::not_identified(std::string reason, HostTime now) {
-  if (status_.state == SessionState::Identifying) enter(SessionState::Refused, std::move(reason), now);
+void CalibrationSession::not_identified(const Error& why, HostTime now) {
+  if (status_.state != SessionState::Identifying) return;
+  status_.refused_as = why.code;
+  enter(SessionState::Refused, why.text, now);
 }
 
 std::vector<SessionEvent> CalibrationSession::take_events() {

@@ -32,8 +32,9 @@ enum class SessionState : std::uint8_t { Idle, Warming, Acquiring, Identifying, 
 struct SessionStatus {
   SessionState state = SessionState::Idle;
   std::string method = "otf";
-  std::string reason;     ///< why it is in this state, or what to do now
-  double progress = 0.0;  ///< 0 to 1 of what the state is busy with
+  std::string reason;                                  ///< why it is in this state, or what to do now
+  ErrorCode refused_as = ErrorCode::DataInsufficient;  ///< Refused: by what, for the exit code of who asked
+  double progress = 0.0;                               ///< 0 to 1 of what the state is busy with
   std::size_t points = 0;
   std::string model_id;                         ///< of the model this session ended in, active or refused
   std::optional<calib::evemu::NextTouch> next;  ///< of a guided acquisition
@@ -69,7 +70,7 @@ class CalibrationSession {
 
   /// The identification is done: a model was judged, or the data did not allow one.
   void judged(std::string model_id, bool passed, std::string reason, protocol::HostTime now);
-  void not_identified(std::string reason, protocol::HostTime now);
+  void not_identified(const Error& why, protocol::HostTime now);
 
   [[nodiscard]] const SessionStatus& status() const noexcept { return status_; }
   [[nodiscard]] bool running() const noexcept;

@@ -265,9 +265,7 @@ struct DdsConfig {
 struct GateConfig {
   double max_error_m = 1e-3;      ///< largest |V| inside the validity volume
   double max_gradient = 5e-3;     ///< largest |dV/dq|, m per m; 250 um between nodes 50 mm apart
-  /// Share of the legs of an on-the-fly run that a fit does not see while it is judged by them. Models of a
-  /// ball array are judged by positions held out, one after the other.
-  double holdout_fraction = 0.2;
+  double holdout_fraction = 0.2;  ///< share of the legs a fit does not see while it is judged by them
   /// What no data of a method can show and this shop takes as it is, by name: "evemu-shape-only", a ball
   /// array's model whose rotation about Ball1 nobody has referenced.
   std::vector<std::string> accept;

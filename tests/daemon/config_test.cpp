@@ -384,6 +384,17 @@ TEST(Config, NoTwoDevicesShareANameAndNoneTakesThatOfAPartOfTheDaemon) {
     EXPECT_THAT(with(own), ElementsAre(AllOf(HasSubstr("tracker.name"), HasSubstr("the daemon calls"))));
 }
 
+TEST(Config, RecordingsAreCutAndKeptForEverUnlessToldOtherwise) {
+  const auto silent = parse_config(kMachine, "abbed.toml");
+  ASSERT_TRUE(silent);
+  EXPECT_EQ(silent->recording.max_file_bytes, 4096ull << 20);
+  EXPECT_EQ(silent->recording.keep.count(), 0);
+  const auto told = parse_config(kMachine + "[recording]\nmax_file_MB = 10\nkeep_days = 30\n", "abbed.toml");
+  ASSERT_TRUE(told) << told.error().details.front();
+  EXPECT_EQ(told->recording.max_file_bytes, 10ull << 20);
+  EXPECT_EQ(told->recording.keep, std::chrono::days{30});
+}
+
 TEST(Config, TheHubStaysBelowTheDevices) {
   EXPECT_THAT(faults_of(kMachine + "[daemon]\nhub_priority = 40\n"),
               ElementsAre(AllOf(HasSubstr("daemon.hub_priority"), HasSubstr("below tracker_priority 40"))));

@@ -314,5 +314,61 @@ TEST(RawBytesCdr, ByHandIsTheSameAsFastCdr) {
   }
 }
 
+v1::CalibrationEvent event_of(const char* state) {
+  v1::CalibrationEvent event;
+  event.machine("M1");
+  event.method("otf");
+  event.state(state);
+  return event;
+}
+
+/// Small enough that every chunk is a full file.
+RecorderOptions small_files(const std::filesystem::path& folder) {
+  auto options = example_options(folder);
+  options.max_file_bytes = 1;
+  return options;
+}
+
+TEST_F(RecorderTest, AFullFileIsClosedAndTheNextGoesOnWithoutAHole) {
+  Recorder recorder = open(small_files(folder_.path()));
+  auto point = example_point(1);
+  point.head.lost_before = 0;
+  for (int i = 0; i < 3; ++i) {
+    recorder.record(point, "tracker");
+    recorder.flush();
+  }
+  ASSERT_TRUE(recorder.close());
+  for (const char* file : {"run.mcap", "run-2.mcap", "run-3.mcap"}) {
+    int points = 0;
+    RecordingSink sink;
+    sink.tracker_point = [&](const protocol::TrackerPoint& p, std::string_view) {
+      ++points;
+      EXPECT_EQ(p.head.lost_before, 0u);
+    };
+    EXPECT_EQ(read(file).read(sink), 0u);
+    EXPECT_EQ(points, 1) << file;
+  }
+  EXPECT_FALSE(exists("run-4.mcap"));
+  EXPECT_FALSE(exists("run-4.mcap.part"));
+  EXPECT_EQ(recorder.status().lost, 0u);
+}
+
+TEST_F(RecorderTest, TheRunOfACalibrationLiesInOneFile) {
+  Recorder recorder = open(small_files(folder_.path()));
+  recorder.attach({"calibration-otf.json", "application/json", "{}"}, example_time(1));
+  recorder.record(event_of("warming"));
+  for (std::uint32_t i = 0; i < 3; ++i) {
+    recorder.record(example_point(i), "tracker");
+    recorder.flush();
+    EXPECT_FALSE(exists("run-2.mcap.part")) << i;
+  }
+  recorder.record(event_of("active"));
+  recorder.flush();
+  recorder.record(example_point(4), "tracker");
+  ASSERT_TRUE(recorder.close());
+  EXPECT_EQ(read("run.mcap").attachments().size(), 1u);
+  EXPECT_EQ(read("run-2.mcap").attachments().size(), 0u) << "asked for again where its points are not";
+}
+
 }  // namespace
 }  // namespace abbe::daemon

@@ -22,8 +22,11 @@
 #include "abbe/daemon/dds_supervisor.hpp"
 #include "abbe/daemon/device_set.hpp"
 #include "abbe/daemon/hub.hpp"
+#include "abbe/daemon/old_recordings.hpp"
+#include "abbe/daemon/work_aside.hpp"
 #include "control/control_server.hpp"
 #include "control/unix_socket.hpp"
+#include "session/outcome.hpp"
 
 namespace abbe::daemon {
 namespace {
@@ -31,6 +34,7 @@ namespace {
 using namespace std::chrono_literals;
 using WallTime = std::chrono::steady_clock::time_point;
 
+constexpr auto kTidyPeriod = 1h;   // old recordings are looked for this often
 constexpr auto kHubPatience = 1s;  // thousands of turns; a hub silent for this long hangs
 
 /// UTC less host time, both read now; the one constant that ever mentions the wall clock.
@@ -62,6 +66,7 @@ RecorderThreadOptions recorder_options(const Config& config) {
   options.recorder.chunk_bytes = config.recording.chunk_bytes;
   options.recorder.chunk_period = config.recording.chunk_period;
   options.recorder.min_free_bytes = config.recording.min_free_bytes;
+  options.recorder.max_file_bytes = config.recording.max_file_bytes;
   options.raw = config.recording.raw;
   if (config.tracker) options.tracker = config.tracker->name;
   if (config.encoder) options.encoder = config.encoder->name;
@@ -123,6 +128,8 @@ struct Abbed::State {
   std::thread hub_thread;
   FileDescriptor control_listener;
   std::unique_ptr<ControlServer> control;
+  std::future<Result<std::vector<std::filesystem::path>>> tidying;
+  WallTime next_tidying{};
 
   State(Config c, AbbedOptions o)
       : config(std::move(c)), options(std::move(o)), time(config.daemon.speed), utc(utc_offset(time)) {}
@@ -230,6 +237,23 @@ struct Abbed::State {
     return {};
   }
 
+  void tidy_recordings(WallTime now) {
+    if (config.recording.keep <= 0h) return;
+    if (tidying.valid() && tidying.wait_for(0s) == std::future_status::ready) {
+      const auto removed = outcome_of(tidying);
+      if (!removed) fmt::print(stderr, "abbed: {}\n", removed.error().text);
+      if (removed && !removed->empty())
+        fmt::print(stderr, "abbed: removed {} recordings older than {} h\n", removed->size(),
+                   config.recording.keep.count());
+    }
+    if (tidying.valid() || now < next_tidying) return;
+    next_tidying = now + kTidyPeriod;
+    tidying = start_aside([dir = config.recording.dir, models = config.daemon.models_dir(),
+                           until = std::filesystem::file_time_type::clock::now() - config.recording.keep] {
+      return remove_old_recordings(dir, models, until);
+    });
+  }
+
   void run_hub(std::future<void>& may_run) noexcept {
     try {
       may_run.get();
@@ -265,7 +289,9 @@ Abbed::Abbed(std::unique_ptr<State> state) : state_(std::move(state)) {}
 Abbed::~Abbed() = default;
 
 void Abbed::turn() {
-  if (state_->supervisor) state_->supervisor->poll(WallTime::clock::now());
+  const auto now = WallTime::clock::now();
+  if (state_->supervisor) state_->supervisor->poll(now);
+  state_->tidy_recordings(now);
 }
 
 bool Abbed::alive() const {

@@ -60,6 +60,11 @@ void read_recording(Section& root, const std::filesystem::path& base, Config& ou
   std::uint64_t min_free_MB = 256;
   if (section.get_integer("min_free_MB", min_free_MB, 0, 1'000'000'000))
     recording.min_free_bytes = min_free_MB << 20;
+  std::uint64_t max_file_MB = 0;
+  if (section.get_integer("max_file_MB", max_file_MB, 0, 1'000'000'000))
+    recording.max_file_bytes = max_file_MB << 20;
+  int keep_days = 0;
+  if (section.get_integer("keep_days", keep_days, 0, 36'500)) recording.keep = std::chrono::days{keep_days};
   section.close();
 }
 

@@ -8,6 +8,8 @@
 #include <optional>
 #include <utility>
 
+#include "abbe/daemon/calibration_request.hpp"
+#include "abbe/daemon/calibration_session.hpp"
 #include "abbe/protocol/mcap/writer.hpp"
 #include "abbe/protocol/raw_bytes_cdr.hpp"
 #include "recording/file_front.hpp"
@@ -58,6 +60,8 @@ struct Recorder::State {
   void lose_chunk();
   void sync_if_due();
   void enter_fault(const IoFault& fault);
+  void say_fault(const IoFault& fault);
+  void go_on_in_next_file();
   void retry();
   [[nodiscard]] bool has_room_again() const;
 
@@ -69,6 +73,7 @@ struct Recorder::State {
   std::uint64_t messages_in_file = 0;
   bool end_written = false;
   std::string previous_file;
+  bool calibrating = false;  ///< the run that was asked for belongs into one file
   mcap::ChunkBuilder chunk;
   mcap::SummaryBuilder summary;
   std::array<std::uint32_t, recording::kStreamCount> sequences{};
@@ -232,7 +237,17 @@ void Recorder::State::write_chunk() {
   if (file->free_bytes() < options.min_free_bytes) {
     enter_fault({ENOSPC, fmt::format("write {}: less than {} bytes would stay free", file->path().string(),
                                      options.min_free_bytes)});
+  } else if (options.max_file_bytes > 0 && file->size() >= options.max_file_bytes && !calibrating) {
+    go_on_in_next_file();
   }
+}
+
+void Recorder::State::go_on_in_next_file() {
+  if (const auto ended = end_file(); !ended) return enter_fault(ended.error());
+  previous_file = file->path().filename().string();
+  file.reset();
+  std::erase_if(attachments, [](const auto& kept) { return is_calibration_request(kept.attachment.name); });
+  if (const auto begun = begin_file(); !begun) say_fault(begun.error());
 }
 
 // --- time and trouble
@@ -245,12 +260,16 @@ void Recorder::State::sync_if_due() {
   if (const auto done = file->sync(); !done) enter_fault(done.error());
 }
 
-void Recorder::State::enter_fault(const IoFault& fault) {
-  lose_chunk();
+void Recorder::State::say_fault(const IoFault& fault) {
   status.state =
       recording::is_disk_full(fault.error) ? RecorderStatus::State::DiskFull : RecorderStatus::State::Failed;
   status.fault = fault.what;
   retry_at = now + options.retry_period;
+}
+
+void Recorder::State::enter_fault(const IoFault& fault) {
+  lose_chunk();
+  say_fault(fault);
   if (messages_in_file == 0 && part > 1) {
     file->discard();  // a stump: the next attempt takes its name
     --part;
@@ -345,10 +364,14 @@ void Recorder::record(const v1::CalibrationEvent& event) {
     return;
   }
   (void)state_->add(Stream::CalibrationEvent, time, state_->payload);
+  state_->calibrating = event.state() != name(SessionState::Active) &&
+                        event.state() != name(SessionState::Refused) &&
+                        event.state() != name(SessionState::Idle);
 }
 
 void Recorder::attach(RecordingAttachment attachment, protocol::HostTime time) {
   State& s = *state_;
+  s.calibrating = s.calibrating || is_calibration_request(attachment.name);
   s.attachments.push_back({std::move(attachment), s.utc_ns(time)});
   if (s.status.state != RecorderStatus::State::Recording) return;  // the next file begins with it
   s.write_chunk();
@@ -389,7 +412,7 @@ Result<RecordingDigest> Recorder::close() {
   const std::string fault = s.status.fault;
   s.status.state = RecorderStatus::State::Closed;
   if (!s.file) return fail(ErrorCode::Io, fault);
-  if (s.messages_in_file == 0 && s.attachments.empty()) {
+  if (s.messages_in_file == 0 && (s.part > 1 || s.attachments.empty())) {
     s.file->discard();
     s.file.reset();
     return RecordingDigest{};

@@ -241,9 +241,11 @@ struct RecordingConfig {
   std::filesystem::path dir;  ///< default: data_dir/recordings
   std::uint32_t chunk_bytes = 256 * 1024;
   std::chrono::nanoseconds chunk_period{
-      std::chrono::seconds{1}};                         ///< a chunk is closed at the latest after this
-  bool raw = true;                                      ///< also record the device bytes
-  std::uint64_t min_free_bytes = 256ull * 1024 * 1024;  ///< recording stops, acquisition goes on, below this
+      std::chrono::seconds{1}};                          ///< a chunk is closed at the latest after this
+  bool raw = true;                                       ///< also record the device bytes
+  std::uint64_t min_free_bytes = 256ull * 1024 * 1024;   ///< recording stops, acquisition goes on, below this
+  std::uint64_t max_file_bytes = 4096ull * 1024 * 1024;  ///< then the next part begins; 0: never
+  std::chrono::hours keep{0};  ///< recordings no model names are removed after this; 0: never
 };
 
 enum class Supervise { Child, Systemd, Off };
@@ -263,9 +265,11 @@ struct DdsConfig {
 
 /// [gate]: what a model must satisfy before it may become active.
 struct GateConfig {
-  double max_error_m = 1e-3;      ///< largest |V| inside the validity volume
-  double max_gradient = 5e-3;     ///< largest |dV/dq|, m per m; 250 um between nodes 50 mm apart
-  double holdout_fraction = 0.2;  ///< share of the legs a fit does not see while it is judged by them
+  double max_error_m = 1e-3;   ///< largest |V| inside the validity volume
+  double max_gradient = 5e-3;  ///< largest |dV/dq|, m per m; 250 um between nodes 50 mm apart
+  /// Share of the legs of an on-the-fly run that a fit does not see while it is judged by them. Models of a
+  /// ball array are judged by positions held out, one after the other.
+  double holdout_fraction = 0.2;
   /// What no data of a method can show and this shop takes as it is, by name: "evemu-shape-only", a ball
   /// array's model whose rotation about Ball1 nobody has referenced.
   std::vector<std::string> accept;

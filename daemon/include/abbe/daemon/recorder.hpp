@@ -12,6 +12,10 @@
 /// why, and when there is room again recording goes on in NAME-2.mcap, NAME-3.mcap ... There the first
 /// message of every stream and device says in lost_before how many are missing.
 ///
+/// A file that has reached max_file_bytes is closed and recording goes on in the next, too, but never while a
+/// calibration is running: its run lies in one file. Nothing is missing in between; calibrations that are
+/// over are not asked for again in the next file.
+///
 /// One thread uses it, in the ordinary world: it allocates and makes blocking system calls.
 
 #include <chrono>
@@ -37,6 +41,7 @@ struct RecorderOptions {
   std::chrono::nanoseconds sync_period = std::chrono::seconds{1};
   std::chrono::nanoseconds retry_period = std::chrono::seconds{5};  ///< after the disk was full or failed
   std::uint64_t min_free_bytes = 0;  ///< the disk counts as full when less than this is free
+  std::uint64_t max_file_bytes = 0;  ///< about; 0: one file, however large
 };
 
 struct RecorderStatus {

@@ -156,7 +156,7 @@ struct Abbed::State {
                        .utc_offset = utc,
                        .speed = config.daemon.speed,
                        .configuration = options.configuration_text,
-                       .versions = {{"abbe", ABBE_VERSION}}};
+                       .versions = {{"abbe", ABBE_VERSION}, {kDatumRule, "2"}}};
     auto opened = RecorderThread::start(recorder_options(config), std::move(info));
     if (!opened) return tl::unexpected(opened.error());
     recorder = std::move(*opened);

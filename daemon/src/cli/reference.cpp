@@ -10,6 +10,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "abbe/daemon/control_protocol.hpp"
 #include "cli/commands.hpp"
@@ -25,6 +26,8 @@ using nlohmann::json;
 struct Arguments {
   DaemonSocket where;
   bool cancel = false;
+  bool here = false;
+  std::vector<std::string> axes;
   bool json = false;
 };
 
@@ -87,9 +90,12 @@ int follow_search(const std::filesystem::path& socket, bool as_json) {
 int reference(const Arguments& arguments) {
   const auto socket = socket_path(arguments.where);
   if (!socket) return report(socket.error());
-  const auto answer = ask_daemon(*socket, {{"do", "reference"}, {"cancel", arguments.cancel}});
+  const auto answer = ask_daemon(*socket, {{"do", "reference"},
+                                           {"cancel", arguments.cancel},
+                                           {"here", arguments.here},
+                                           {"axes", arguments.axes}});
   if (!answer) return report(answer.error());
-  return arguments.cancel ? 0 : follow_search(*socket, arguments.json);
+  return arguments.cancel || arguments.here ? 0 : follow_search(*socket, arguments.json);
 }
 
 }  // namespace
@@ -103,7 +109,11 @@ void add_reference(CLI::App& parent, int& exit) {
       "the\n"
       "looking on (exit code 130), --cancel the search.");
   add_socket_options(*command, arguments->where);
-  command->add_flag("--cancel", arguments->cancel, "end the search that is running");
+  auto* cancel = command->add_flag("--cancel", arguments->cancel, "end the search that is running");
+  auto* here = command->add_flag("--here", arguments->here,
+                                 "no search: axes without marks stand where they read their offset, now");
+  here->excludes(cancel);
+  command->add_option("--axis", arguments->axes, "with --here: only these")->needs(here);
   command->add_flag("--json", arguments->json, "the result as JSON");
   command->callback([arguments, &exit] { exit = reference(*arguments); });
 }

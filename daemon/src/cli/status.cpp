@@ -81,6 +81,11 @@ void print_status(const json& status) {
   if (session.contains("next")) print_next(session["next"]);
   for (const json& note : session["notes"]) fmt::print("           {}\n", note.get<std::string>());
   if (status.contains("reference")) print_reference(status["reference"]);
+  if (const json axes = status.value("axes_without_zero", json::array()); !axes.empty()) {
+    fmt::print("zero       of");
+    for (const json& axis : axes) fmt::print(" {}", axis.get<std::string>());
+    fmt::print(" not known: `abbe reference --here` where they read their offset\n");
+  }
   if (status.contains("environment")) print_environment(status["environment"]);
   if (status.contains("recording")) fmt::print("recording  {}\n", status["recording"].get<std::string>());
   if (status.contains("dds")) {

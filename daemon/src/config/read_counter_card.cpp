@@ -182,6 +182,7 @@ void read_counter_card(Section& root, Config& out) {
   read_clock(card, config.wiring);
   read_probe(card, config.wiring);
   read_scan(card, config);
+  card.get_word<bool>("zero", config.zero_is_here, {{"unknown", false}, {"here", true}});
   for (auto& section : card.children("axes")) config.wiring.axes.push_back(read_axis(section, out.machine));
   put_in_order_of_the_machine(out.machine, &drivers::CounterAxis::name, card, "axes", "channel",
                               config.wiring.axes);

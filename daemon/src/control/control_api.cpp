@@ -150,6 +150,7 @@ json status(const Hub& hub) {
   if (live.has_environment) out["environment"] = environment_json(live, hub.parts().config);
   if (const auto* reference = hub.parts().reference; reference != nullptr && reference->configured())
     out["reference"] = reference_json(*reference, hub.parts().config.machine);
+  if (hub.parts().reference != nullptr) out["axes_without_zero"] = hub.parts().reference->without_zero();
   if (hub.parts().recorder != nullptr) out["recording"] = hub.parts().recorder->status().file.string();
   if (hub.parts().publisher != nullptr) {
     const auto& link = hub.parts().publisher->link();
@@ -184,7 +185,10 @@ json cancel(const Hub& hub, const json& request) {
 json reference(const Hub& hub, const json& request) {
   if (hub.parts().reference == nullptr) return refusal({ErrorCode::Refused, "reference: not in this daemon"});
   ReferenceService& service = *hub.parts().reference;
-  auto done = request.value("cancel", false) ? service.cancel() : service.start();
+  auto done = request.value("here", false)
+                  ? service.stand_at_offset(request.value("axes", std::vector<std::string>{}))
+              : request.value("cancel", false) ? service.cancel()
+                                               : service.start();
   return done ? json{{"ok", true}} : refusal(done.error());
 }
 

@@ -254,7 +254,9 @@ std::optional<std::size_t> environment_place(const Config& config, std::string_v
 
 /// What the marks gave in the live run: since when a datum was known is not in the bytes.
 Result<Datum> datum_of(const RecordingReader& recording, const Config& config) {
-  Datum datum{config};
+  const auto versions = recording.metadata().find("abbe.versions");
+  const bool asked = versions != recording.metadata().end() && versions->second.contains(kDatumRule);
+  Datum datum{config, asked ? Datum::WithoutMarks::NeedAZero : Datum::WithoutMarks::Untouched};
   for (const auto& attachment : recording.attachments()) {
     if (attachment.name != kDatumName) continue;
     const auto found = datum_from_attachment(attachment);

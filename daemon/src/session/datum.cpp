@@ -19,13 +19,23 @@ void set_missing(Sample& sample, std::size_t axis) {
 
 }  // namespace
 
-Datum::Datum(const Config& config) {
-  if (!config.reference || !config.counter_card) return;
+bool has_marks(const Config& config, const std::string& axis) {
+  return config.reference && std::ranges::any_of(config.reference->axes,
+                                                 [&axis](const auto& marks) { return marks.axis == axis; });
+}
+
+Datum::Datum(const Config& config, WithoutMarks without_marks) {
+  if (!config.counter_card) return;
   const auto& live = config.counter_card->wiring.axes;
-  for (const auto& marks : config.reference->axes) {
-    const auto axis = std::ranges::find(live, marks.axis, &drivers::CounterAxis::name);
-    if (axis != live.end())
-      axes_.push_back({.place = static_cast<std::size_t>(axis - live.begin()), .step = axis->scale});
+  for (std::size_t i = 0; i < live.size(); ++i) {
+    const bool marks = has_marks(config, live[i].name);
+    if (!marks && without_marks == WithoutMarks::Untouched) continue;
+    Axis& axis = axes_.emplace_back();
+    axis.place = i;
+    axis.step = live[i].scale;
+    axis.offset = live[i].offset;
+    axis.zero_is_here = !marks && config.counter_card->zero_is_here;
+    if (axis.zero_is_here) axis.in_force = FoundDatum{.axis = i, .reading_at_zero = axis.offset};
   }
 }
 
@@ -45,8 +55,10 @@ void Datum::move_on(const protocol::SampleHead& head) {
       axis.in_force = axis.coming.front();
       axis.coming.pop_front();
     }
-    if (has(head.flags, SampleFlag::Restarted)) axis.in_force.reset();
+    const bool first_set_up = !begun_ && axis.zero_is_here;
+    if (has(head.flags, SampleFlag::Restarted) && !first_set_up) axis.in_force.reset();
   }
+  begun_ = true;
 }
 
 void Datum::apply(protocol::AxisSample& sample) {
@@ -64,7 +76,7 @@ void Datum::apply(protocol::AxisSample& sample) {
 void Datum::apply(protocol::ProbeTrigger& touch) const {
   for (const Axis& axis : axes_) {
     if (axis.in_force) {
-      touch.position[axis.place] += axis.in_force->reading_at_zero;  // the driver's own offset is 0
+      touch.position[axis.place] += axis.in_force->reading_at_zero - axis.offset;
     } else {
       set_missing(touch, axis.place);
     }

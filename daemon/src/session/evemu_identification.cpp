@@ -1,7 +1,9 @@
 #include "abbe/daemon/evemu_identification.hpp"
 
+#include <algorithm>
 #include <utility>
 
+#include "abbe/daemon/datum.hpp"
 #include "abbe/daemon/evemu_files.hpp"
 #include "abbe/daemon/otf_inputs.hpp"
 
@@ -30,7 +32,11 @@ EvemuAcquisitionOptions evemu_acquisition_options(const Config& config) {
   EvemuAcquisitionOptions options{.longest_pause = config.evemu.longest_pause};
   if (config.probe) options.device = config.probe->name;
   if (config.cmm) options.device = config.cmm->name;
-  options.zero_is_lost_by_restart = config.probe && !config.reference;
+  // Marks find the same zero again, people only about.
+  options.zero_is_lost_by_restart =
+      config.probe && config.counter_card &&
+      std::ranges::any_of(config.counter_card->wiring.axes,
+                          [&config](const auto& axis) { return !has_marks(config, axis.name); });
   return options;
 }
 

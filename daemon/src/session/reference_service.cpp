@@ -1,5 +1,7 @@
 #include "abbe/daemon/reference_service.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 
@@ -49,6 +51,7 @@ Result<void> ReferenceService::cancel() {
 
 void ReferenceService::turn(Batch& batch) {
   for (const auto& sample : batch.axes) newest_ = std::max(newest_, sample.head.time);
+  if (!batch.axes.empty()) latest_ = batch.axes.back();
   if (running_) look_for_marks(batch);
   datum_.apply(batch);
 }
@@ -70,8 +73,49 @@ void ReferenceService::take_up(std::size_t axis) {
                          .reading_at_zero = reading_at_zero(axis),
                          .u = session_->axis(axis).u_offset,
                          .from = newest_};
+  take_up(datum);
+}
+
+void ReferenceService::take_up(const FoundDatum& datum) {
   datum_.found(datum);
   if (recorder_ != nullptr) recorder_->attach(to_attachment(datum), newest_);
+}
+
+std::vector<std::string> ReferenceService::without_marks() const {
+  std::vector<std::string> names;
+  if (!config_.counter_card) return names;
+  for (const auto& axis : config_.counter_card->wiring.axes)
+    if (!has_marks(config_, axis.name)) names.push_back(axis.name);
+  return names;
+}
+
+std::vector<std::string> ReferenceService::without_zero() const {
+  auto names = without_marks();
+  std::erase_if(names, [this](const std::string& name) {
+    const auto& axes = config_.counter_card->wiring.axes;
+    const auto axis = std::ranges::find(axes, name, &drivers::CounterAxis::name);
+    return datum_.known(static_cast<std::size_t>(axis - axes.begin()));
+  });
+  return names;
+}
+
+Result<void> ReferenceService::stand_at_offset(const std::vector<std::string>& axes) {
+  const auto possible = without_marks();
+  for (const auto& name : axes)
+    if (std::ranges::find(possible, name) == possible.end())
+      return fail(ErrorCode::Usage,
+                  fmt::format("reference: {} has marks, or is not counted by a card", name));
+  if (possible.empty())
+    return fail(ErrorCode::Usage, "reference: there is no axis whose zero somebody could know");
+  if (!latest_) return fail(ErrorCode::Refused, "reference: the counter card has not said anything yet");
+  const auto& live = config_.counter_card->wiring.axes;
+  for (const auto& name : axes.empty() ? possible : axes) {
+    const auto place =
+        static_cast<std::size_t>(std::ranges::find(live, name, &drivers::CounterAxis::name) - live.begin());
+    const double counted = live[place].scale * static_cast<double>(latest_->count[place]);
+    take_up(FoundDatum{.axis = place, .reading_at_zero = live[place].offset - counted, .from = newest_});
+  }
+  return {};
 }
 
 double ReferenceService::reading_at_zero(std::size_t axis) const {

@@ -11,7 +11,8 @@ namespace abbe::test {
 
 struct CounterCardRun : Spine {
   static std::string wiring(const std::string& more) {
-    return "[counter_card]\ntransport = \"usbip\"\nserial_number = \"01ABBE08\"\nclock_MHz = 1\n"
+    return "[counter_card]\ntransport = \"usbip\"\nzero = \"here\"\nserial_number = \"01ABBE08\"\nclock_MHz "
+           "= 1\n"
            "scan_rate_hz = 1000\nlatch_channel = 6\n" +
            more +
            "axes = [\n"

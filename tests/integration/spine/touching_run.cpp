@@ -25,6 +25,7 @@ offset_mm = [0, 0, 0]
 node_spacing_mm = 50
 [counter_card]
 transport = "usbip"
+zero = "here"
 serial_number = "01ABBE08"
 clock_MHz = 1
 scan_rate_hz = 500

@@ -133,6 +133,9 @@ struct CounterCardConfig {
   std::chrono::nanoseconds max_constant_delay{
       std::chrono::milliseconds{1}};  ///< bound of the unobservable part of the delay
   bool axes_compensated = false;      ///< true: the control already corrects these readings
+  /// Axes without marks read their offset where they stand when the card is set up for the first time. Else,
+  /// and always when it began anew in the middle, they are not known until `abbe reference --here`.
+  bool zero_is_here = false;
 };
 
 /// One element of [reference] axes: the distance-coded marks of the scale. Reading at a mark = zero_mark +

@@ -1,12 +1,15 @@
 #pragma once
-/// Readings of the axes whose zero is found from reference marks ([reference]). Until it is found, and again
-/// after the card's counters began anew, such an axis is missing in every sample: where a counter happened to
-/// stand is no reading. Its uncertainty is the same error in all readings and is not added to theirs.
+/// Readings of the axes of a counter card. Its counters begin at 0 wherever the axes stand when it is set up:
+/// until the zero of an axis is found from reference marks ([reference]), or somebody says that the axis
+/// stands at its offset (`abbe reference --here`), and again after the counters began anew, the axis is
+/// missing in every sample. [counter_card] zero = "here" says it of the first set-up only. Decided for each
+/// axis. The uncertainty of a datum is the same error in all readings and is not added to theirs.
 /// Deterministic: decided by the samples' own times, so that a replay from raw bytes is the live run again.
 /// Ordinary world; not thread-safe.
 
 #include <deque>
 #include <optional>
+#include <string>
 #include <vector>
 
 #include "abbe/daemon/batch.hpp"
@@ -23,10 +26,15 @@ struct FoundDatum {
   protocol::HostTime from{};
 };
 
+/// Whether [reference] finds the zero of this axis.
+[[nodiscard]] bool has_marks(const Config& config, const std::string& axis);
+
 class Datum {
  public:
-  /// Without [reference] nothing is ever changed.
-  explicit Datum(const Config& config);
+  /// What is to be done with axes that have no marks. Untouched: recordings from before it was asked.
+  enum class WithoutMarks { NeedAZero, Untouched };
+  /// Without [counter_card] nothing is ever changed.
+  explicit Datum(const Config& config, WithoutMarks without_marks = WithoutMarks::NeedAZero);
 
   /// In the order of time.
   void found(const FoundDatum& datum);
@@ -39,6 +47,8 @@ class Datum {
   struct Axis {
     std::size_t place = 0;
     double step = 0.0;
+    double offset = 0.0;        // the driver's own
+    bool zero_is_here = false;  // at the first set-up
     std::deque<FoundDatum> coming;
     std::optional<FoundDatum> in_force;
   };
@@ -48,10 +58,13 @@ class Datum {
   void apply(protocol::TouchScan& scan) const;
 
   std::vector<Axis> axes_;
+  bool begun_ = false;  // a sample was seen: what begins anew now is not the first set-up
 };
 
 /// As it lies in the recording, for a replay from raw bytes.
 inline constexpr std::string_view kDatumName = "datum.json";
+/// Among the versions of a recording: axes without marks needed a zero, too.
+inline constexpr const char* kDatumRule = "datum";
 /// Since when the marks were searched for: crossings and samples later than this.
 inline constexpr std::string_view kReferenceRequestName = "reference.json";
 [[nodiscard]] RecordingAttachment reference_request(protocol::HostTime from);

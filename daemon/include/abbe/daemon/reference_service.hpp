@@ -35,16 +35,23 @@ class ReferenceService {
   /// Refused without [reference] and while one runs. Axes that are known already stay so until the new datum.
   [[nodiscard]] Result<void> start();
   [[nodiscard]] Result<void> cancel();
+  /// Somebody says that these axes stand where they read their offset; none: all that have no marks. Usage
+  /// for an axis that has marks or is not counted, Refused before anything came.
+  [[nodiscard]] Result<void> stand_at_offset(const std::vector<std::string>& axes);
   /// Every turn, before anybody else sees the batch.
   void turn(Batch& batch);
 
   [[nodiscard]] bool configured() const noexcept { return config_.reference.has_value(); }
   [[nodiscard]] bool running() const noexcept { return running_; }
   [[nodiscard]] std::vector<AxisStatus> status() const;
+  /// Axes without marks that are not known now.
+  [[nodiscard]] std::vector<std::string> without_zero() const;
 
  private:
   void look_for_marks(const Batch& batch);
   void take_up(std::size_t axis);
+  void take_up(const FoundDatum& datum);
+  [[nodiscard]] std::vector<std::string> without_marks() const;
   [[nodiscard]] double reading_at_zero(std::size_t axis) const;
 
   const Config& config_;
@@ -54,7 +61,8 @@ class ReferenceService {
   std::vector<bool> taken_up_;
   bool running_ = false;
   protocol::HostTime newest_{};  ///< of the live samples
-  protocol::HostTime from_{};    ///< what came later belongs to the search
+  std::optional<protocol::AxisSample> latest_;
+  protocol::HostTime from_{};  ///< what came later belongs to the search
 };
 
 }  // namespace abbe::daemon

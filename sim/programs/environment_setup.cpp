@@ -8,8 +8,6 @@
 namespace abbe::sim {
 namespace {
 
-constexpr std::int64_t kLastPort = 65535;
-
 /// NAME_C and so on: its mean; NAME_drift_per_hour, NAME_swing, NAME_swing_period_s.
 void read_course(TomlSection& section, std::string_view name, std::string_view unit, Course& course) {
   section.number(fmt::format("{}_{}", name, unit), course.mean);

@@ -7,10 +7,6 @@
 namespace abbe::sim {
 namespace {
 
-constexpr double kMilli = 1e-3;
-constexpr double kMicro = 1e-6;
-constexpr std::int64_t kLastPort = 65535;
-
 void read_place(TomlSection& section, Eigen::Vector3d& place_m) {
   section.number("x_mm", place_m.x(), kMilli);
   section.number("y_mm", place_m.y(), kMilli);

@@ -15,10 +15,7 @@
 namespace abbe::sim {
 namespace {
 
-constexpr double kMilli = 1e-3;
-constexpr double kMicro = 1e-6;
 constexpr double kFeed = 1e-3 / 60.0;  // mm/min in m/s
-constexpr std::int64_t kLastPort = 65535;
 constexpr std::int64_t kLastNode = 127;
 
 /// Everything the files say, before the truth is made of it.

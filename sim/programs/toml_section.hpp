@@ -35,6 +35,9 @@ struct NumberRange {
 inline constexpr NumberRange kAnyNumber{-1e12, 1e12};
 inline constexpr NumberRange kPositiveNumber{1e-12, 1e12};
 inline constexpr NumberRange kNotNegativeNumber{0.0, 1e12};
+inline constexpr std::int64_t kLastPort = 65535;
+inline constexpr double kMilli = 1e-3;
+inline constexpr double kMicro = 1e-6;
 
 class TomlSection {
  public:

@@ -5,12 +5,12 @@
 #include <iterator>
 #include <numbers>
 
+#include "units.hpp"
+
 namespace abbe::sim {
 namespace {
 
 using Eigen::Vector3d;
-
-constexpr double kMmPerM = 1e3;
 
 }  // namespace
 

@@ -29,13 +29,13 @@ std::vector<std::byte> word(std::uint16_t value) {
 }
 
 template <class... B>
-std::vector<std::byte> bytes_of(B... b) {
+std::vector<std::byte> data_of(B... b) {
   return {static_cast<std::byte>(b)...};
 }
 
 std::vector<std::byte> configuration() {
   constexpr unsigned kLength = 25;
-  return bytes_of(9, 2, kLength, 0, 1, quad08::kConfiguration, 0, 0x80, 250,  // bus powered, 500 mA
+  return data_of(9, 2, kLength, 0, 1, quad08::kConfiguration, 0, 0x80, 250,  // bus powered, 500 mA
                   9, 4, 0, 0, 1, 0xFF, 0, 0, 0,                               // one vendor interface
                   7, 5, quad08::kScanEndpoint, 2, quad08::kPacketSize & 0xFFu, quad08::kPacketSize >> 8, 0);
 }
@@ -81,9 +81,9 @@ Answer CounterCard::standard(const usb::Setup& setup) {
     case usb::StandardRequest::GetStatus:
       return word(0);
     case usb::StandardRequest::GetConfiguration:
-      return bytes_of(quad08::kConfiguration);
+      return data_of(quad08::kConfiguration);
     case usb::StandardRequest::GetInterface:
-      return bytes_of(0);
+      return data_of(0);
     case usb::StandardRequest::ClearFeature:
     case usb::StandardRequest::SetFeature:
     case usb::StandardRequest::SetAddress:
@@ -109,7 +109,7 @@ Answer CounterCard::descriptor(const usb::Setup& setup) const {
     case usb::DescriptorType::String:
       switch (setup.value & 0xFFu) {
         case 0:
-          return bytes_of(4, 3, usb::kEnglish & 0xFFu, usb::kEnglish >> 8);
+          return data_of(4, 3, usb::kEnglish & 0xFFu, usb::kEnglish >> 8);
         case kManufacturerString:
           return string("abbe-sim");
         case kProductString:

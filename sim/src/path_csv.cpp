@@ -2,17 +2,17 @@
 
 #include "abbe/sim/path_motion.hpp"
 #include "csv.hpp"
+#include "units.hpp"
 
 namespace abbe::sim {
 namespace {
 
-constexpr double kMetresPerMillimetre = 1e-3;
 constexpr double kMetresPerSecondPerFeed = 1e-3 / 60.0;  // mm/min
-constexpr std::array<std::string_view, 4> kColumns{"x_mm", "y_mm", "z_mm", "feed_mm_per_min"};
+constexpr std::array<std::string_view, 4> kPathColumns{"x_mm", "y_mm", "z_mm", "feed_mm_per_min"};
 
 bool header_is_right(const CsvTable& table) {
   const std::size_t n = table.header.size();
-  return (n == 3 || n == 4) && std::equal(table.header.begin(), table.header.end(), kColumns.begin());
+  return (n == 3 || n == 4) && std::equal(table.header.begin(), table.header.end(), kPathColumns.begin());
 }
 
 void read_feed(const CsvTable& table, const CsvRow& row, PathVertex& vertex, CsvErrors& errors) {
@@ -37,7 +37,7 @@ Result<std::vector<PathVertex>> parse_path_csv(std::string_view text, std::strin
     PathVertex vertex;
     for (std::size_t k = 0; k < 3; ++k) {
       const auto value = csv_number(table, row, k, errors);
-      if (value) vertex.q_m[static_cast<Eigen::Index>(k)] = *value * kMetresPerMillimetre;
+      if (value) vertex.q_m[static_cast<Eigen::Index>(k)] = *value * kMPerMm;
     }
     read_feed(table, row, vertex, errors);
     vertices.push_back(vertex);

@@ -11,7 +11,6 @@ namespace {
 using namespace std::chrono_literals;
 
 constexpr auto kBeat = 100ms;      // between heartbeats while nothing is replayed
-constexpr auto kOutOfStep = 50ms;  // a master that paused is led back to where the recording is
 constexpr std::uint32_t kFirstTpdo = 0x180;
 constexpr std::uint32_t kLastTpdo = 0x4FF;
 constexpr std::uint32_t kFunction = 0x780;

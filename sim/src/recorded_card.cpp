@@ -12,7 +12,6 @@ using namespace std::chrono_literals;
 using Outcome = ControlAnswer::Outcome;
 
 // A host that halts the scan so long before it did then has reasons of its own.
-constexpr auto kOutOfStep = 50ms;
 
 constexpr auto kStatus = quad08::read(quad08::Register::Acquisition);
 

@@ -5,6 +5,7 @@
 #include <numbers>
 
 #include "abbe/sim/noise.hpp"
+#include "crossing.hpp"
 
 namespace abbe::sim {
 namespace {
@@ -122,16 +123,12 @@ double clearance_m(const ProbingMove& move, const Vector3d& tip_m, double tip_ra
 
 double contact_s(const ProbingMove& move, const TruthMachine& truth, const PathMotion& path,
                  double tip_radius_m) {
-  constexpr int kHalvings = 60;  // of one leg: to the last bit of a double
-  double before = path.leg_begin_s(move.leg);
-  double after = path.leg_end_s(move.leg);
+  const double before = path.leg_begin_s(move.leg);
+  const double after = path.leg_end_s(move.leg);
   if (move.kind == ProbingMove::Kind::InTheAir) return 0.5 * (before + after);
-  for (int i = 0; i < kHalvings; ++i) {
-    const double middle = 0.5 * (before + after);
-    const Vector3d tip_m = position_m(truth, path.at(middle).q_m);
-    (clearance_m(move, tip_m, tip_radius_m) > 0.0 ? before : after) = middle;
-  }
-  return after;
+  return crossing(before, after, [&](double t) {
+    return clearance_m(move, position_m(truth, path.at(t).q_m), tip_radius_m) <= 0.0;
+  });
 }
 
 }  // namespace

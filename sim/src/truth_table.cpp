@@ -6,13 +6,13 @@
 #include <iterator>
 
 #include "csv.hpp"
+#include "units.hpp"
 
 namespace abbe::sim {
 namespace {
 
 constexpr double kMicro = 1e-6;  // um in m, urad in rad
-constexpr double kMetresPerMillimetre = 1e-3;
-constexpr std::array<std::string_view, 4> kColumns{"name", "position_mm", "value", "unit"};
+constexpr std::array<std::string_view, 4> kTruthColumns{"name", "position_mm", "value", "unit"};
 constexpr std::string_view kBacklash = ".backlash";
 
 struct Place {
@@ -69,7 +69,7 @@ class TruthReader {
       return;
     }
     const auto position = csv_number(table_, row, 1, errors_);
-    if (position && value) add_node(row, *place, *position * kMetresPerMillimetre, *value * kMicro);
+    if (position && value) add_node(row, *place, *position * kMPerMm, *value * kMicro);
   }
 
   TruthMachine finish(Shape shape) {
@@ -120,7 +120,7 @@ Result<TruthMachine> parse_truth_csv(std::string_view text, std::string_view nam
                                      Shape shape) {
   CsvErrors errors(name);
   const CsvTable table = split_csv(text, errors);
-  if (!std::equal(table.header.begin(), table.header.end(), kColumns.begin(), kColumns.end())) {
+  if (!std::equal(table.header.begin(), table.header.end(), kTruthColumns.begin(), kTruthColumns.end())) {
     errors.add(1, "the header must be name,position_mm,value,unit");
     return tl::unexpected(errors.error());
   }
@@ -134,8 +134,8 @@ Result<TruthMachine> parse_truth_csv(std::string_view text, std::string_view nam
 std::string format_truth_csv(const TruthMachine& truth) {
   std::string out = "name,position_mm,value,unit\n";
   const auto row = [&](std::string_view name, double at_m, double value, std::string_view unit) {
-    fmt::format_to(std::back_inserter(out), "{},{:.17g},{:.17g},{}\n", name, at_m / kMetresPerMillimetre,
-                   value / kMicro, unit);
+    fmt::format_to(std::back_inserter(out), "{},{:.17g},{:.17g},{}\n", name, at_m / kMPerMm, value / kMicro,
+                   unit);
   };
   for (const Axis axis : kAxes) {
     for (std::size_t m = 0; m < kMotions; ++m) {

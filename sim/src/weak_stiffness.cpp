@@ -2,10 +2,11 @@
 
 #include <cmath>
 
+#include "units.hpp"
+
 namespace abbe::sim {
 namespace {
 
-constexpr double kMmPerM = 1e3;
 constexpr double kBall1_mm[3] = {-90.0, 140.0, 30.0};
 
 /// c0 + c1 p + c2 p^2 + c3 p^3, coefficients for p and value in mm (translations) or p in mm (rotations).

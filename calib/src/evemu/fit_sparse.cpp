@@ -5,11 +5,10 @@
 #include "abbe/calib/sparse/cross_validation.hpp"
 #include "abbe/calib/sparse/optimality.hpp"
 #include "evemu/fit_coefficients.hpp"
+#include "units.hpp"
 
 namespace abbe::calib::evemu {
 namespace {
-
-constexpr double kMmPerM = 1e3;
 
 /// The regression of [Li OMM]: plain monomials in mm, because a penalty speaks of the columns it is given.
 struct Regression {

@@ -3,6 +3,7 @@
 #include <cmath>
 
 #include "message.hpp"
+#include "units.hpp"
 
 namespace abbe::calib::evemu {
 namespace {
@@ -107,7 +108,6 @@ void EvemuModel::V_and_cov_at(const Vector3& reading_m, Vector3& V_m, Matrix3& c
 }
 
 std::vector<NamedCoefficient> EvemuModel::named_coefficients() const {
-  constexpr double kMmPerM = 1e3;
   const Eigen::MatrixXd M = kMmPerM * design_.named_from_scaled();
   const Eigen::VectorXd value = M * c_m_;
   std::vector<NamedCoefficient> named;

@@ -5,16 +5,14 @@
 #include <array>
 #include <cmath>
 #include <map>
-#include <numbers>
 
 #include "abbe/calib/fit/point_set.hpp"
+#include "evemu/angle.hpp"
 #include "message.hpp"
+#include "units.hpp"
 
 namespace abbe::calib::evemu {
 namespace {
-
-constexpr double kMmPerM = 1e3;
-constexpr double kUmPerM = 1e6;
 
 /// Touched points of one position by feature and number.
 using Touched = std::map<std::pair<Feature, int>, std::vector<Vector3>>;
@@ -158,16 +156,6 @@ Result<RigidTransform> rough_pose(int position, std::span<const fit::Sphere> bal
                 " mm off: calibrator file of another artefact, or balls numbered differently"));
   }
   return *T;
-}
-
-double angle_rad(const Vector3& a, const Vector3& b) {
-  return std::atan2(a.cross(b).norm(), a.dot(b));
-}
-
-/// A face may be met from either side; what counts here is its line.
-double line_angle_rad(const Vector3& a, const Vector3& b) {
-  const double angle = angle_rad(a, b);
-  return std::min(angle, std::numbers::pi - angle);
 }
 
 Result<void> fit_blocks(SeenArtefact& seen, const Touched& touched, const Calibrator& c,

@@ -4,11 +4,11 @@
 #include <map>
 
 #include "message.hpp"
+#include "units.hpp"
 
 namespace abbe::calib::evemu {
 namespace {
 
-constexpr double kMmPerM = 1e3;
 using Coefficients = std::array<double, kMostOrder + 1>;  ///< of 1, q, q^2 ...
 
 std::size_t axis_of(const EquivalentModel& model, std::size_t row) {

@@ -8,12 +8,11 @@
 
 #include "evemu/touch_site.hpp"
 #include "message.hpp"
+#include "units.hpp"
 
 namespace abbe::calib::evemu {
 namespace {
 
-constexpr double kMmPerM = 1e3;
-constexpr std::size_t kBall1 = 0, kBlock1 = 1, kBlock2 = 2;
 // The same feature or position in vain twice: whoever touches does not follow.
 constexpr std::size_t kMostSetAside = 2;
 

@@ -3,16 +3,15 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <numbers>
 
 #include "abbe/calib/fit/plane.hpp"
 #include "abbe/calib/fit/point_set.hpp"
 #include "abbe/calib/fit/sphere.hpp"
+#include "evemu/angle.hpp"
 
 namespace abbe::calib::evemu {
 namespace {
 
-constexpr std::size_t kBall1 = 0, kBlock1 = 1, kBlock2 = 2;
 // A face spans this share of its length across, or it is a line and no face yet.
 constexpr double kLeastWidth = 0.05;
 
@@ -53,11 +52,6 @@ double spread_m(const std::vector<Vector3>& points, const Vector3& about_m) {
   double most = 0.0;
   for (const Vector3& p : points) most = std::max(most, (p - about_m).norm());
   return most;
-}
-
-double line_angle_rad(const Vector3& a, const Vector3& b) {
-  const double angle = std::atan2(a.cross(b).norm(), a.dot(b));
-  return std::min(angle, std::numbers::pi - angle);
 }
 
 }  // namespace

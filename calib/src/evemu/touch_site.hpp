@@ -11,6 +11,8 @@
 
 namespace abbe::calib::evemu {
 
+inline constexpr std::size_t kBall1 = 0, kBlock1 = 1, kBlock2 = 2;  ///< in this order
+
 [[nodiscard]] TouchedFeature feature_at(std::size_t order);
 
 /// What the points of a feature say of themselves.

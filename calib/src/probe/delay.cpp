@@ -12,7 +12,7 @@ namespace abbe::calib::probe {
 namespace {
 
 constexpr std::size_t kLeastFeeds = 3;
-constexpr std::size_t kLeastTouches = 3;  // of each: a variance from two is no estimate
+constexpr std::size_t kLeastTouchesPerFeed = 3;  // of each: a variance from two is no estimate
 
 /// All touches of one feed.
 struct Feed {
@@ -52,10 +52,10 @@ Result<std::vector<Feed>> group(std::span<const FeedTouch> touches, const DelayO
   for (std::size_t begin = 0, end = 0; begin < sorted.size(); begin = end) {
     const double most = sorted[begin].speed_m_s / (1.0 - options.same_feed);
     while (end < sorted.size() && sorted[end].speed_m_s <= most) ++end;
-    if (end - begin < kLeastTouches) {
+    if (end - begin < kLeastTouchesPerFeed) {
       return failure(ErrorCode::TooFewObservations,
                      message("probe delay: ", end - begin, " touches at ", sorted[begin].speed_m_s * 1e3,
-                             " mm/s, at least ", kLeastTouches, " are needed at each feed"));
+                             " mm/s, at least ", kLeastTouchesPerFeed, " are needed at each feed"));
     }
     feeds.push_back(feed_of(std::span{sorted}.subspan(begin, end - begin)));
   }

@@ -7,6 +7,7 @@
 #include "abbe/calib/evemu/scaled_design.hpp"
 #include "abbe/calib/verify/interpolation.hpp"
 #include "message.hpp"
+#include "units.hpp"
 
 namespace abbe::calib::verify {
 namespace {
@@ -70,7 +71,7 @@ Result<void> check_step(const evemu::ReadingBox& box, const Comparison& c) {
   const double places = (2.0 * box.half_width_m).cwiseQuotient(c.step_m).array().max(1.0).prod();
   if (!(places <= kMostPlaces)) {
     return failure(ErrorCode::BadInput,
-                   message("verification: steps of (", 1e3 * c.step_m.transpose(), ") mm make ", places,
+                   message("verification: steps of (", kMmPerM * c.step_m.transpose(), ") mm make ", places,
                            " grid points, most are ", kMostPlaces));
   }
   return {};
@@ -118,7 +119,7 @@ Result<WeightedPlaces> weighted_places(const Observations& o, const VolumetricMo
   }
   if (c.origin_m && !weights->back()) {
     return failure(ErrorCode::DegenerateGeometry,
-                   message("verification: the origin (", 1e3 * c.origin_m->transpose(),
+                   message("verification: the origin (", kMmPerM * c.origin_m->transpose(),
                            ") mm, where V is set to zero, lies outside the measured points"));
   }
   WeightedPlaces places;
@@ -292,7 +293,7 @@ Result<Comparison> compare(const Observations& o, const VolumetricModel& model, 
                            const Options& options) {
   if (!model.holds_for_tool(tool_offset_m)) {
     return failure(ErrorCode::NotApplicable,
-                   message("verification for tool offset (", 1e3 * tool_offset_m.transpose(),
+                   message("verification for tool offset (", kMmPerM * tool_offset_m.transpose(),
                            ") mm: the model does not hold for it"));
   }
   Comparison c = settled(model, options);

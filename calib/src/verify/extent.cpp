@@ -3,6 +3,7 @@
 #include <Eigen/Eigenvalues>
 
 #include "message.hpp"
+#include "units.hpp"
 
 namespace abbe::calib::verify {
 
@@ -22,7 +23,7 @@ Result<Extent> extent_of(std::span<const Vector3> points_m) {
   const auto flat = [&] {
     return failure(ErrorCode::DegenerateGeometry,
                    message("volume of ", points_m.size(), " points: they lie in a plane (extents ",
-                           1e3 * (high - low).transpose(), " mm)"));
+                           kMmPerM * (high - low).transpose(), " mm)"));
   };
   if (!(extent.half_width_m.minCoeff() > 0.0)) {
     return flat();

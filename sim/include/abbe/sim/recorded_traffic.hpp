@@ -2,6 +2,7 @@
 /// The raw bytes of a recording, device by device, as they crossed the wire: what a replay serves. Reads the
 /// MCAP file whole or broken; only messages on abbe/v1/RawBytes are looked at. Pure but for memory.
 
+#include <chrono>
 #include <cstddef>
 #include <optional>
 #include <span>
@@ -51,6 +52,9 @@ struct RecordedDevice {
 /// `name` stands in the errors. BadInput: no MCAP file, or one without raw bytes.
 [[nodiscard]] Result<std::vector<RecordedDevice>> read_traffic(std::span<const std::byte> file,
                                                                std::string_view name);
+
+/// A master that paused for longer is led back to where the recording is.
+inline constexpr std::chrono::milliseconds kOutOfStep{50};
 
 /// Recorded time -> time of the replay, shared by all devices of a recording so that they stay in step. Set
 /// by the first that starts.

@@ -1,0 +1,17 @@
+#pragma once
+
+namespace abbe::sim {
+
+/// Where between `before` and `after` `crossed` becomes true, by bisection to the last bit of a double.
+/// Precondition: it is false at `before` and true at `after`.
+template <class Crossed>
+[[nodiscard]] double crossing(double before, double after, const Crossed& crossed) {
+  constexpr int kHalvings = 60;
+  for (int i = 0; i < kHalvings; ++i) {
+    const double middle = 0.5 * (before + after);
+    (crossed(middle) ? after : before) = middle;
+  }
+  return after;
+}
+
+}  // namespace abbe::sim

@@ -103,6 +103,17 @@ Scatter scatter_of(const std::vector<Feed>& feeds) {
   return scatter;
 }
 
+/// Student's t for 95 % over that of the normal distribution; Cornish and Fisher's series, to 0.1 % from 6
+/// degrees of freedom on.
+double student_over_normal(double dof) {
+  constexpr double z = 1.959964;
+  constexpr double z2 = z * z;
+  const double first = (z2 + 1) / (4 * dof);
+  const double second = (5 * z2 * z2 + 16 * z2 + 3) / (96 * dof * dof);
+  const double third = (3 * z2 * z2 * z2 + 19 * z2 * z2 + 17 * z2 - 15) / (384 * dof * dof * dof);
+  return 1 + first + second + third;
+}
+
 }  // namespace
 
 Result<ProbeDelayFit> fit_delay(std::span<const FeedTouch> touches, const DelayOptions& options) {
@@ -153,6 +164,8 @@ Result<ProbeDelayFit> fit_delay(std::span<const FeedTouch> touches, const DelayO
     const double residual = f.along_m - fit.origin_m - fit.delay_s * f.speed_m_s;
     fit.misfit += weight(f) * residual * residual / static_cast<double>(feeds->size() - 2);
   }
+  fit.dof = static_cast<double>(fit.touches - fit.feeds);
+  fit.u_delay_s *= std::sqrt(std::max(1.0, fit.misfit)) * student_over_normal(fit.dof);
   double squares = 0.0;
   for (const FeedTouch& t : touches) {
     const double residual = t.along_m - fit.origin_m - fit.delay_s * t.speed_m_s;

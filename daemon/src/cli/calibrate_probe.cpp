@@ -85,13 +85,16 @@ int print_delay(const calib::probe::ProbeDelayFit& fit, bool as_json) {
                             {"jitter_us", 1e6 * fit.u_jitter_s},
                             {"scatter_um", 1e6 * fit.u_scatter_m},
                             {"misfit", fit.misfit},
+                            {"dof", fit.dof},
                             {"feeds", fit.feeds},
                             {"touches", fit.touches}}
                            .dump(1));
     return 0;
   }
-  fmt::print("# {} touches at {} feeds; misfit {:.2f} (about 1: the places lie on a line)\n", fit.touches,
-             fit.feeds, fit.misfit);
+  fmt::print(
+      "# {} touches at {} feeds; misfit {:.2f} (about 1: the places lie on a line), in u_delay_us with the "
+      "{:.0f} degrees of freedom\n",
+      fit.touches, fit.feeds, fit.misfit, fit.dof);
   fmt::print("# to be added to the delay_us they were made with; scatter {:.3f} um\n", 1e6 * fit.u_scatter_m);
   fmt::print("delay_us = {:.3f}\nu_delay_us = {:.3f}\njitter_us = {:.3f}\n", 1e6 * fit.delay_s,
              1e6 * fit.u_delay_s, 1e6 * fit.u_jitter_s);

@@ -1,6 +1,8 @@
 #include "abbe/calib/gate.hpp"
 
 #include <algorithm>
+#include <span>
+#include <vector>
 
 #include "abbe/calib/model_comparison.hpp"
 #include "message.hpp"
@@ -8,24 +10,47 @@
 namespace abbe::calib {
 namespace {
 
-/// Tables are defined on their whole grid; polynomials are judged where their data were.
-bool counts(const VolumetricModel& model, const Vector3& q) {
-  return model.polynomials() == nullptr || model.validity().contains(q);
+/// Tables are defined on their whole grid; polynomials are judged where their data were. The nodes alone will
+/// not do: a thin or tilted hull passes between them.
+std::vector<Vector3> places(const VolumetricModel& model) {
+  std::vector<Vector3> found = tensor_grid(model.layout().nodes());
+  if (model.polynomials() == nullptr) {
+    return found;
+  }
+  std::erase_if(found, [&](const Vector3& q) { return !model.validity().contains(q); });
+  const std::span<const Vector3> vertices = model.validity().vertices_m();
+  for (std::size_t i = 0; i < vertices.size(); ++i) {
+    for (std::size_t j = 0; j <= i; ++j) {
+      found.push_back(0.5 * (vertices[i] + vertices[j]));
+    }
+  }
+  return found;
 }
 
-double max_error_m(const VolumetricModel& model, const Vector3& t) {
+double max_error_m(const VolumetricModel& model, const std::vector<Vector3>& at, const Vector3& t) {
   double most = 0.0;
-  for (const Vector3& q : tensor_grid(model.layout().nodes())) {
-    if (counts(model, q)) {
-      most = std::max(most, model.V_at(q, t).norm());
+  for (const Vector3& q : at) {
+    most = std::max(most, model.V_at(q, t).norm());
+  }
+  return most;
+}
+
+/// Central differences; of the lowest orders exact, of the fifth wrong by (step / volume)^2.
+double max_slope(const VolumetricModel& model, const std::vector<Vector3>& at, const Vector3& t) {
+  constexpr double kStep_m = 1e-4;
+  double most = 0.0;
+  for (const Vector3& q : at) {
+    for (int a = 0; a < 3; ++a) {
+      const Vector3 step = kStep_m * Vector3::Unit(a);
+      most = std::max(most, (model.V_at(q + step, t) - model.V_at(q - step, t)).norm() / (2 * kStep_m));
     }
   }
   return most;
 }
 
 /// Along an axis V of tables is linear between nodes and multilinear in the other two: its derivative is
-/// largest on the grid lines. For polynomials this is the mean slope over an eighth of the volume.
-double max_gradient(const VolumetricModel& model, const Vector3& t) {
+/// largest on the grid lines.
+double max_step_of_tables(const VolumetricModel& model, const Vector3& t) {
   double most = 0.0;
   const MachineNodes& nodes = model.layout().nodes();
   for (const Vector3& q : tensor_grid(nodes)) {
@@ -38,13 +63,38 @@ double max_gradient(const VolumetricModel& model, const Vector3& t) {
       }
       Vector3 beside = q;
       beside(k) = *next;
-      if (!counts(model, q) || !counts(model, beside)) {
-        continue;
-      }
       most = std::max(most, (model.V_at(beside, t) - model.V_at(q, t)).norm() / (*next - q(k)));
     }
   }
   return most;
+}
+
+/// Below this share the volume has shrunk: what readings and lattice scatter by is less.
+constexpr double kSameVolume = 0.98;
+
+void compare_volumes(Verdict& verdict, const VolumetricModel& candidate, const VolumetricModel& active,
+                     const GateLimits& limits) {
+  const double kept = kept_share(active.validity(), candidate.validity());
+  if (kept >= kSameVolume) {
+    return;
+  }
+  const std::string seen = message("holds in ", 100 * kept, " % of the volume the active model holds in");
+  if (limits.accept_smaller_volume) {
+    verdict.notes.push_back(message(seen, ", accepted by name"));
+  } else {
+    verdict.reasons.push_back(message(seen, "; to replace that one, accept ", kSmallerVolume));
+  }
+}
+
+void say_what_was_compared(Verdict& verdict, bool holds_for_tool) {
+  const HeldOutFigures& h = verdict.held_out;
+  if (!holds_for_tool) {
+    verdict.notes.emplace_back("not compared with the active model: that one holds for another tool offset");
+  } else if (h.observations_beside_active < h.observations) {
+    verdict.notes.push_back(message("compared with the active model on ", h.observations_beside_active,
+                                    " of ", h.observations,
+                                    " held-out observations: the others lie outside its volume"));
+  }
 }
 
 void require_better(Verdict& verdict, double candidate, double other, double min_improvement,
@@ -59,12 +109,55 @@ void require_better(Verdict& verdict, double candidate, double other, double min
 
 }  // namespace
 
-Verdict decide(const VolumetricModel& candidate, const HeldOutFigures& held_out, const GateLimits& limits) {
+double kept_share(const ValidityVolume& before, const ValidityVolume& after) {
+  constexpr int kCells = 32;
+  Vector3 low = Vector3::Zero(), high = Vector3::Zero(), centre = Vector3::Zero();
+  const std::span<const Vector3> vertices = before.vertices_m();
+  if (vertices.empty()) {
+    return 1.0;
+  }
+  low = high = vertices.front();
+  for (const Vector3& v : vertices) {
+    low = low.cwiseMin(v);
+    high = high.cwiseMax(v);
+    centre += v / static_cast<double>(vertices.size());
+  }
+  std::size_t asked = 0, kept = 0;
+  const auto ask = [&](const Vector3& q) {
+    ++asked;
+    kept += after.contains(q);
+  };
+  for (int x = 0; x < kCells; ++x) {
+    for (int y = 0; y < kCells; ++y) {
+      for (int z = 0; z < kCells; ++z) {
+        const Vector3 at = (Vector3(x, y, z).array() + 0.5) / kCells;
+        const Vector3 q = low + at.cwiseProduct(high - low);
+        if (before.contains(q)) {
+          ask(q);
+        }
+      }
+    }
+  }
+  if (asked == 0) {  // thinner than a cell and tilted
+    for (const Vector3& v : vertices) {
+      ask(0.5 * (v + centre));
+    }
+  }
+  return static_cast<double>(kept) / static_cast<double>(asked);
+}
+
+Verdict decide(const VolumetricModel& candidate, const HeldOutFigures& held_out, const GateLimits& limits,
+               const VolumetricModel* active) {
   Verdict verdict;
   verdict.held_out = held_out;
   const Vector3 t = candidate.tool_offsets_m().front();
-  verdict.max_error_m = max_error_m(candidate, t);
-  verdict.max_gradient = max_gradient(candidate, t);
+  const std::vector<Vector3> at = places(candidate);
+  verdict.max_error_m = max_error_m(candidate, at, t);
+  verdict.max_gradient =
+      candidate.polynomials() == nullptr ? max_step_of_tables(candidate, t) : max_slope(candidate, at, t);
+  if (at.empty()) {
+    verdict.reasons.emplace_back("the model holds nowhere: its size and gradient cannot be tested");
+  }
   if (held_out.observations == 0) {
     verdict.reasons.emplace_back("nothing was held out to test the model with");
   }
@@ -73,8 +166,8 @@ Verdict decide(const VolumetricModel& candidate, const HeldOutFigures& held_out,
   if (held_out.active) {
     // The candidate's figure comes from fits to a part of the run, the active model from all of its own: on
     // an unchanged machine the active model stays.
-    require_better(verdict, held_out.candidate, *held_out.active, limits.min_improvement,
-                   "of the active model, so the active model still holds");
+    require_better(verdict, held_out.candidate_beside_active.value_or(held_out.candidate), *held_out.active,
+                   limits.min_improvement, "of the active model, so the active model still holds");
   }
   if (!(verdict.max_error_m <= limits.max_error_m)) {
     verdict.reasons.push_back(message("largest error ", 1e6 * verdict.max_error_m, " um exceeds ",
@@ -83,6 +176,13 @@ Verdict decide(const VolumetricModel& candidate, const HeldOutFigures& held_out,
   if (!(verdict.max_gradient <= limits.max_gradient)) {
     verdict.reasons.push_back(message("steepest change ", 1e6 * verdict.max_gradient, " um/m exceeds ",
                                       1e6 * limits.max_gradient, " um/m"));
+  }
+  if (active != nullptr) {
+    const bool holds_for_tool = active->holds_for_tool(t);
+    say_what_was_compared(verdict, holds_for_tool);
+    if (holds_for_tool) {
+      compare_volumes(verdict, candidate, *active, limits);
+    }
   }
   verdict.accepted = verdict.reasons.empty();
   return verdict;

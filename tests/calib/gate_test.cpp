@@ -3,6 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 
 #include "abbe/calib/model_comparison.hpp"
@@ -60,6 +61,67 @@ TEST(Gate, RefusesImplausibleMagnitudeAndGradient) {
   const Verdict verdict = decide(positioning_model(2e-3), figures(100, 1));
   EXPECT_THAT(verdict.reasons,
               ElementsAre(HasSubstr("largest error 6000 um"), HasSubstr("steepest change 10000")));
+}
+
+TEST(Gate, ComparesWithTheActiveModelOnTheSameObservations) {
+  HeldOutFigures f = figures(100, 1.2, 1.1);
+  f.candidate_beside_active = 1.0;
+  f.observations_beside_active = 300;
+  const VolumetricModel model = positioning_model(1e-6);
+  const Verdict verdict = decide(model, f, {}, &model);
+  EXPECT_TRUE(verdict.accepted);
+  EXPECT_THAT(verdict.notes, ElementsAre(HasSubstr("300 of 1000")));
+}
+
+/// EXX as above, but only of the lower part of the machine.
+VolumetricModel lower_part(const VolumetricModel& whole, double share) {
+  std::vector<Vector3> corners(whole.validity().vertices_m().begin(), whole.validity().vertices_m().end());
+  for (Vector3& v : corners) {
+    v.z() = share * v.z() + (1 - share) * whole.layout().nodes()[2].nodes_m.front();
+  }
+  return *VolumetricModel::from_vector(whole.layout(), whole.gauge(), whole.tool_offsets_m(), whole.U(),
+                                       whole.covariance(), *ValidityVolume::hull_of(corners));
+}
+
+TEST(Gate, LetsASmallerVolumeReplaceALargerOneOnlyByName) {
+  const VolumetricModel whole = positioning_model(1e-6), part = lower_part(whole, 0.5);
+  HeldOutFigures f = figures(100, 1.0, 1.1);
+  f.observations_beside_active = f.observations;
+  EXPECT_NEAR(kept_share(whole.validity(), part.validity()), 0.5, 0.04);
+  EXPECT_THAT(decide(part, f, {}, &whole).reasons, ElementsAre(HasSubstr("smaller-volume")));
+  EXPECT_TRUE(decide(whole, f, {}, &part).accepted);
+  const Verdict told = decide(part, f, {.accept_smaller_volume = true}, &whole);
+  EXPECT_TRUE(told.accepted);
+  EXPECT_THAT(told.notes, ElementsAre(HasSubstr("accepted by name")));
+}
+
+/// V_x = c3 P3(u) over a slab 2 mm thick, tilted so that no node of a grid over its box lies inside.
+VolumetricModel thin_slab(double c3_m) {
+  const evemu::ReadingBox box{Vector3::Zero(), Vector3(0.3, 0.3, 0.3)};
+  const auto design = *evemu::ScaledDesign::of(*KinematicChain::parse("[w b X Y Z t]"), 3, box);
+  const auto size = static_cast<Eigen::Index>(design.size());
+  Eigen::VectorXd c = Eigen::VectorXd::Zero(size);
+  const auto& names = design.equivalent().names();
+  const auto cubic = std::find(names.begin(), names.end(), "k_dxx3");
+  EXPECT_NE(cubic, names.end());
+  c(cubic - names.begin()) = c3_m;
+  std::vector<Vector3> corners;
+  for (const Vector3& v : {Vector3(-0.3, -0.3, -0.3), Vector3(0.3, -0.3, 0.25), Vector3(-0.3, 0.3, -0.2),
+                           Vector3(0.3, 0.3, 0.3)}) {
+    corners.push_back(v);
+    corners.push_back(v + Vector3(0, 0, 0.002));
+  }
+  return *VolumetricModel::from_polynomials(
+      *evemu::EvemuModel::of(design, Vector3::Zero(), c, Eigen::MatrixXd::Zero(size, size)), Gauge::Ball1,
+      Vector3::Zero(), *ValidityVolume::hull_of(corners));
+}
+
+TEST(Gate, SeesTheSlopeOfPolynomialsInAThinVolume) {
+  // P3' = 6 at the end of the span of 0.3 m.
+  const Verdict verdict = decide(thin_slab(0.5e-3), figures(100, 1));
+  EXPECT_NEAR(verdict.max_gradient, 6 * 0.5e-3 / 0.3, 1e-4);
+  EXPECT_NEAR(verdict.max_error_m, 0.5e-3, 1e-6);
+  EXPECT_THAT(verdict.reasons, ElementsAre(HasSubstr("steepest change")));
 }
 
 TEST(Gate, RefusesWithoutTestData) {

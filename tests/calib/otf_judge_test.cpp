@@ -3,6 +3,9 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <vector>
+
 #include "abbe/calib/otf/identify.hpp"
 #include "otf_run.hpp"
 
@@ -66,6 +69,42 @@ TEST(Judge, PrefersANewModelToThatOfAnotherMachine) {
   ASSERT_TRUE(verdict);
   EXPECT_TRUE(verdict->accepted);
   EXPECT_GT(verdict->held_out.active.value(), 10.0);
+}
+
+TEST(Judge, ComparesWhereTheActiveModelHoldsOnly) {
+  const MadeRun run = make_run({.seed = 1});
+  const Identification id = identified(run);
+  const VolumetricModel& m = id.solution.model;
+  std::vector<Vector3> lower(m.validity().vertices_m().begin(), m.validity().vertices_m().end());
+  const auto z_of = [](const Vector3& a, const Vector3& b) { return a.z() < b.z(); };
+  const auto [low, high] = std::minmax_element(lower.begin(), lower.end(), z_of);
+  const double bottom = low->z(), middle = 0.5 * (bottom + high->z());
+  for (Vector3& v : lower) {
+    v.z() = v.z() > middle ? middle : bottom;
+  }
+  // Right where it holds; nonsense above, where nobody may ask it.
+  Eigen::VectorXd U = m.U();
+  const ParameterLayout& layout = m.layout();
+  const auto& z_nodes = layout.nodes()[2].nodes_m;
+  const std::vector<Parameter> parameters = m.parameters();
+  for (std::size_t i = 0; i < parameters.size(); ++i) {
+    const auto motion = error_motion(parameters[i].name);
+    const double node_m = parameters[i].position_m.value_or(bottom);
+    const auto above = std::upper_bound(z_nodes.begin(), z_nodes.end(), middle);
+    if (motion && motion->axis == Axis::Z && node_m > middle && above != z_nodes.end() && node_m > *above) {
+      U(static_cast<Eigen::Index>(i)) += 1e-3;
+    }
+  }
+  const VolumetricModel active = *VolumetricModel::from_vector(
+      layout, Gauge::G1, m.tool_offsets_m(), U, m.covariance(), *ValidityVolume::hull_of(lower));
+  const auto held = held_out(id.observations, &active, run.options);
+  ASSERT_TRUE(held);
+  EXPECT_GT(held->observations_beside_active, 0u);
+  EXPECT_LT(held->observations_beside_active, held->observations);
+  EXPECT_LT(held->active.value(), 2.0);
+  // As good where the smaller one holds, and it holds in more.
+  EXPECT_THAT(judge(id.observations, id.solution, &active, {}, run.options)->notes,
+              Contains(HasSubstr("lie outside its volume")));
 }
 
 TEST(Judge, DoesNotDependOnTheGaugeOfTheActiveModel) {

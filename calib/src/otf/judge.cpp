@@ -1,7 +1,10 @@
 #include "abbe/calib/otf/judge.hpp"
 
 #include <Eigen/Dense>
+#include <algorithm>
 #include <cmath>
+#include <cstddef>
+#include <iterator>
 
 #include "message.hpp"
 
@@ -12,6 +15,10 @@ namespace {
 struct Remainder {
   double whitened_squares = 0.0;
   double squares_m2 = 0.0;
+  std::size_t rows = 0;
+
+  [[nodiscard]] double rms() const { return std::sqrt(whitened_squares / static_cast<double>(rows)); }
+  [[nodiscard]] double rms_m() const { return std::sqrt(squares_m2 / static_cast<double>(rows)); }
 };
 
 /// The last six entries of a row are the rigid ones.
@@ -43,6 +50,7 @@ void add_without_rigid(Remainder& total, const Observations& o, std::span<const 
     total.whitened_squares += whitened * whitened;
     total.squares_m2 += rest_m * rest_m;
   }
+  total.rows += rows.size();
 }
 
 double predicted_by_fit(const Observations& o, std::size_t row, const Eigen::VectorXd& U) {
@@ -61,6 +69,19 @@ double predicted_by_model(const Observations& o, std::size_t row, const Volumetr
     sum += model.V_at(o.sub_points_m[r.first_sub_point + k], o.target_offset_m);
   }
   return r.direction.dot(sum) / static_cast<double>(r.sub_points);
+}
+
+/// The rows a model speaks of: all their sub-points lie where it holds.
+std::vector<std::size_t> inside(const Observations& o, std::span<const std::size_t> rows,
+                                const ValidityVolume& volume) {
+  std::vector<std::size_t> found;
+  std::copy_if(rows.begin(), rows.end(), std::back_inserter(found), [&](std::size_t row) {
+    const Observation& r = o.rows[row];
+    const auto begin = o.sub_points_m.begin() + static_cast<std::ptrdiff_t>(r.first_sub_point);
+    return std::all_of(begin, begin + static_cast<std::ptrdiff_t>(r.sub_points),
+                       [&](const Vector3& q) { return volume.contains(q); });
+  });
+  return found;
 }
 
 /// Residuals of some rows under one contender's prediction.
@@ -99,10 +120,6 @@ Result<Adjustment> fit_without(const std::vector<NormalEquations>& parts, std::s
   return a;
 }
 
-double root_mean(double squares, std::size_t n) {
-  return std::sqrt(squares / static_cast<double>(n));
-}
-
 }  // namespace
 
 Result<HeldOutFigures> held_out(const Observations& o, const VolumetricModel* active,
@@ -115,7 +132,7 @@ Result<HeldOutFigures> held_out(const Observations& o, const VolumetricModel* ac
   }
   const bool with_active = active != nullptr && active->holds_for_tool(o.target_offset_m);
   const std::vector<NormalEquations> parts = equations_by_fold(o, folds);
-  Remainder none, candidate, other;
+  Remainder none, candidate, other, candidate_beside;
   for (std::size_t f = 0; f < folds; ++f) {
     const Result<Adjustment> fit = fit_without(parts, f, o, options);
     if (!fit) {
@@ -128,25 +145,28 @@ Result<HeldOutFigures> held_out(const Observations& o, const VolumetricModel* ac
       }
     }
     add_without_rigid(none, o, rows, residuals(o, rows, [](std::size_t) { return 0.0; }));
-    add_without_rigid(candidate, o, rows,
-                      residuals(o, rows, [&](std::size_t i) { return predicted_by_fit(o, i, fit->U); }));
+    const auto by_fit = [&](std::size_t i) { return predicted_by_fit(o, i, fit->U); };
+    add_without_rigid(candidate, o, rows, residuals(o, rows, by_fit));
     if (with_active) {
-      add_without_rigid(other, o, rows,
-                        residuals(o, rows, [&](std::size_t i) { return predicted_by_model(o, i, *active); }));
+      const std::vector<std::size_t> both = inside(o, rows, active->validity());
+      add_without_rigid(candidate_beside, o, both, residuals(o, both, by_fit));
+      add_without_rigid(other, o, both,
+                        residuals(o, both, [&](std::size_t i) { return predicted_by_model(o, i, *active); }));
     }
     if (options.progress) {
       options.progress(Stage::Judge, static_cast<double>(f + 1) / static_cast<double>(folds));
     }
   }
-  const std::size_t n = o.rows.size();
-  HeldOutFigures figures{.no_compensation = root_mean(none.whitened_squares, n),
-                         .candidate = root_mean(candidate.whitened_squares, n),
-                         .observations = n,
-                         .no_compensation_rms_m = root_mean(none.squares_m2, n),
-                         .candidate_rms_m = root_mean(candidate.squares_m2, n)};
-  if (with_active) {
-    figures.active = root_mean(other.whitened_squares, n);
-    figures.active_rms_m = root_mean(other.squares_m2, n);
+  HeldOutFigures figures{.no_compensation = none.rms(),
+                         .candidate = candidate.rms(),
+                         .observations = o.rows.size(),
+                         .no_compensation_rms_m = none.rms_m(),
+                         .candidate_rms_m = candidate.rms_m()};
+  if (other.rows > 0) {
+    figures.active = other.rms();
+    figures.active_rms_m = other.rms_m();
+    figures.candidate_beside_active = candidate_beside.rms();
+    figures.observations_beside_active = other.rows;
   }
   return figures;
 }
@@ -154,7 +174,7 @@ Result<HeldOutFigures> held_out(const Observations& o, const VolumetricModel* ac
 Result<Verdict> judge(const Observations& o, const Solution& solution, const VolumetricModel* active,
                       const GateLimits& limits, const Options& options) {
   return held_out(o, active, options).map([&](const HeldOutFigures& figures) {
-    return decide(solution.model, figures, limits);
+    return decide(solution.model, figures, limits, active);
   });
 }
 

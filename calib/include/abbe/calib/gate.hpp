@@ -1,11 +1,13 @@
 #pragma once
 /// When a model may be trusted, whatever method it came from: it predicts observations it was not fitted to
-/// better than no compensation and better than the active model, and it is of a size and smoothness a machine
-/// can have.
+/// better than no compensation and, where the active model holds, better than that one; it holds where the
+/// active model does, unless a smaller volume is accepted by name; and it is of a size and smoothness a
+/// machine can have.
 
 #include <cstddef>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "abbe/calib/volumetric_model.hpp"
@@ -17,8 +19,13 @@ namespace abbe::calib {
 struct HeldOutFigures {
   double no_compensation = 0.0;
   double candidate = 0.0;
-  std::optional<double> active{};  ///< none: no active model, or it does not hold for this tool
   std::size_t observations = 0;
+  /// Of the observations inside the active model's volume; none: there is no active model, it does not hold
+  /// for this tool, or nothing lies inside. Outside, tables end and polynomials run away: to do better there
+  /// means nothing.
+  std::optional<double> active{};
+  std::optional<double> candidate_beside_active{};  ///< on the same observations as `active`
+  std::size_t observations_beside_active = 0;
   /// the same, unweighted, in m: for people
   double no_compensation_rms_m = 0.0;
   double candidate_rms_m = 0.0;
@@ -29,19 +36,31 @@ struct GateLimits {
   double max_error_m = 1e-3;     ///< |V| anywhere; 1 mm: larger is a machine to be repaired, or a wrong path
   double max_gradient = 5e-3;    ///< |dV/dq|, m/m; 5 mm/m: 250 um between nodes 50 mm apart
   double min_improvement = 0.0;  ///< required relative drop of the held-out figure; 0: merely better
+  bool accept_smaller_volume = false;  ///< than that of the active model
 };
+
+/// The name under which a configuration lets a model replace one that holds in more of the machine.
+inline constexpr std::string_view kSmallerVolume = "smaller-volume";
+
+/// Share of the volume of `before` that lies in `after`, from points on a lattice over `before`: to a few
+/// per cent.
+[[nodiscard]] double kept_share(const ValidityVolume& before, const ValidityVolume& after);
 
 /// Accepted only if `reasons` is empty.
 struct Verdict {
   bool accepted = false;
   std::vector<std::string> reasons;  ///< one sentence with numbers for every broken rule
+  std::vector<std::string> notes;    ///< what else to know about the comparison; breaks no rule
   HeldOutFigures held_out;
-  double max_error_m = 0.0;  ///< of the candidate on the grid of its nodes
-  double max_gradient = 0.0;
+  double max_error_m = 0.0;   ///< of the candidate, where decide() looked
+  double max_gradient = 0.0;  ///< |dV/dq| along an axis, there
 };
 
-/// Pure. Magnitude and gradient are taken on the tensor grid of the nodes (V is linear between them along
-/// each axis).
-[[nodiscard]] Verdict decide(const VolumetricModel& candidate, const HeldOutFigures&, const GateLimits& = {});
+/// Pure. `active` may be null. Magnitude and gradient of tables are taken on the tensor grid of the nodes (V
+/// is linear between them along each axis); of polynomials, where it holds: at the vertices of its hull (all
+/// of them readings), halfway between any two, and at the nodes inside. A model with no such place is
+/// refused.
+[[nodiscard]] Verdict decide(const VolumetricModel& candidate, const HeldOutFigures&, const GateLimits& = {},
+                             const VolumetricModel* active = nullptr);
 
 }  // namespace abbe::calib

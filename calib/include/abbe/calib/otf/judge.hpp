@@ -11,7 +11,8 @@
 
 namespace abbe::calib::otf {
 
-/// `active` may be null; it is left out of the comparison if it does not hold for this run's target offset.
+/// `active` may be null; it is compared on the rows inside its volume, and left out if it does not hold for
+/// this run's target offset.
 /// RankDeficient if the legs outside a fold do not determine the model, TooFewObservations with fewer legs
 /// than folds.
 [[nodiscard]] Result<HeldOutFigures> held_out(const Observations&, const VolumetricModel* active,

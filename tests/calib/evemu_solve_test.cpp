@@ -4,7 +4,9 @@
 #include <gtest/gtest.h>
 
 #include <Eigen/Dense>
+#include <algorithm>
 #include <numbers>
+#include <random>
 
 #include "abbe/calib/evemu/judge.hpp"
 #include "evemu_study.hpp"
@@ -223,6 +225,13 @@ TEST(EvemuSolution, CorrectsACommand) {
   EXPECT_LT((c->c_m + s.model.V_at(p + c->c_m, Vector3::Zero())).norm(), 1e-9);
 }
 
+JudgeOptions generous() {
+  JudgeOptions options;
+  options.limits.max_error_m = 10e-3;  // the machine has 3.3 mm
+  options.limits.max_gradient = 0.1;
+  return options;
+}
+
 TEST(RotationReference, TurnsAShapeOntoWhatIsKnown) {
   const Field V = table3_machine();
   const Observations o =
@@ -244,15 +253,142 @@ TEST(RotationReference, TurnsAShapeOntoWhatIsKnown) {
 TEST(RotationReference, NeedsPointsOffALine) {
   const Solution s = *solve(reference_observations());
   const std::vector<BallError> line{
-      {1, 1, {0.1, 0, 0}, {}}, {1, 2, {0.2, 0, 0}, {}}, {1, 3, {0.3, 0, 0}, {}}};
+      {1, 1, {0.3, 0.15, 0.05}, {}}, {1, 2, {0.35, 0.15, 0.05}, {}}, {1, 3, {0.4, 0.15, 0.05}, {}}};
   EXPECT_EQ(with_rotation_reference(s, {line, 1e-6}).error().code, ErrorCode::DegenerateGeometry);
 }
 
-JudgeOptions generous() {
-  JudgeOptions options;
-  options.limits.max_error_m = 10e-3;  // the machine has 3.3 mm
-  options.limits.max_gradient = 0.1;
-  return options;
+/// Six places well inside the balls' hull, far apart.
+std::vector<Vector3> places_inside(const ValidityVolume& hull) {
+  std::vector<Vector3> places;
+  const std::span<const Vector3> vertices = hull.vertices_m();
+  const Vector3 centre = bounding_box(vertices).centre_m;
+  for (Eigen::Index a = 0; a < 3; ++a) {
+    const auto [low, high] = std::minmax_element(
+        vertices.begin(), vertices.end(), [a](const Vector3& p, const Vector3& q) { return p(a) < q(a); });
+    places.push_back(centre + 0.8 * (*low - centre));
+    places.push_back(centre + 0.8 * (*high - centre));
+  }
+  return places;
+}
+
+/// V there, in the frame of something that stands turned and moved and has noise of its own.
+std::vector<BallError> reference_points(const ValidityVolume& hull, const Field& V, const Vector3& turned_rad,
+                                        double sigma_m, unsigned seed) {
+  std::mt19937_64 random(seed);
+  std::normal_distribution<double> normal(0.0, sigma_m);
+  std::vector<BallError> points;
+  for (const Vector3& q : places_inside(hull)) {
+    const Vector3 noise(normal(random), normal(random), normal(random));
+    points.push_back({1, 1, q, V(q) + turned_rad.cross(q) + Vector3(1e-3, 2e-3, 0) + noise});
+  }
+  return points;
+}
+
+TEST(RotationReference, RefusesWhatIsNotOfThisMachine) {
+  const Field V = table3_machine();
+  const Field of_other_sign = [&](const Vector3& q) -> Vector3 { return -V(q); };
+  const Field of_other_place = [&](const Vector3& q) { return V(q + Vector3(-0.1, 0.05, 0.0)); };
+  const Solution s = *solve(simulated(reference_layout(), V, {8e-6, 0.1e-3}, 1));
+  const ValidityVolume& hull = s.model.validity();
+  EXPECT_TRUE(with_rotation_reference(s, {reference_points(hull, V, {1e-4, 0, -2e-4}, 5e-6, 1), 5e-6}));
+  for (const Field& wrong : {of_other_sign, of_other_place}) {
+    const auto refused =
+        with_rotation_reference(s, {reference_points(hull, wrong, Vector3::Zero(), 5e-6, 1), 5e-6});
+    ASSERT_FALSE(refused);
+    EXPECT_EQ(refused.error().code, ErrorCode::BadInput);
+    EXPECT_THAT(refused.error().text, HasSubstr("does not fit the model"));
+  }
+}
+
+TEST(RotationReference, IsLessCertainWhereItDoesNotFitWell) {
+  constexpr double kStated_m = 18e-6, kNoise_m = 34e-6;
+  const Field V = table3_machine();
+  const Solution s = *solve(simulated(reference_layout(), V, {8e-6, 0.0}, 1), {.estimator = Estimator::Ols});
+  const auto turned = [&](double noise_m, unsigned seed) {
+    const auto points = reference_points(s.model.validity(), V, Vector3::Zero(), noise_m, seed);
+    return with_rotation_reference(s, {points, kStated_m});
+  };
+  const auto exact = turned(1e-9, 1);
+  ASSERT_TRUE(exact);
+  EXPECT_EQ(exact->rotation.reference->widened, 1.0);
+  std::size_t widened = 0;
+  for (unsigned seed = 1; seed <= 20; ++seed) {
+    const auto noisy = turned(kNoise_m, seed);
+    if (!noisy || noisy->rotation.reference->widened == 1.0) {
+      continue;
+    }
+    ++widened;
+    EXPECT_NEAR(noisy->rotation.cov_rad2.trace() / exact->rotation.cov_rad2.trace(),
+                noisy->rotation.reference->widened, 1e-6);
+  }
+  EXPECT_GT(widened, 0u);
+}
+
+TEST(RotationReference, MayBeTheBallsThemselvesMeasuredByAnother) {
+  const Field V = table3_machine();
+  const Observations o =
+      *observe(reference_touches("touched_sig3um.csv"), reference_calibrator(), reference_machine());
+  std::mt19937_64 random(3);
+  std::normal_distribution<double> normal(0.0, 5e-6);
+  std::vector<BallError> points;
+  for (const auto& position : reference_layout().true_m) {
+    for (const Vector3& truth : position) {
+      const Vector3 q = reading_of(V, truth), noise(normal(random), normal(random), normal(random));
+      points.push_back({1, 1, q, V(q) + noise});
+    }
+  }
+  const auto turned = with_rotation_reference(*solve(o), {points, 5e-6});
+  ASSERT_TRUE(turned) << turned.error().text;
+  EXPECT_EQ(turned->rotation.reference->points, points.size());
+  RecordProperty("chi2_per_dof",
+                 std::to_string(turned->rotation.reference->chi2 / turned->rotation.reference->dof));
+}
+
+TEST(RotationReference, LeavesPointsOutsideTheBallsOutAndNamesThem) {
+  const Field V = table3_machine();
+  const Observations o = simulated(reference_layout(), V, {8e-6, 0.1e-3}, 1);
+  const Solution s = *solve(o);
+  auto points = reference_points(s.model.validity(), V, Vector3::Zero(), 5e-6, 1);
+  points.resize(4);
+  points[1].reading_m.z() = 0.5;
+  const auto turned = with_rotation_reference(s, {points, 5e-6});
+  ASSERT_TRUE(turned) << turned.error().text;
+  EXPECT_THAT(turned->rotation.reference->outside, testing::ElementsAre(2u));
+  EXPECT_THAT(judge(o, *turned, nullptr, generous())->notes, Contains(HasSubstr("1 of 4 points")));
+  points[0].reading_m.z() = 0.5;
+  const auto refused = with_rotation_reference(s, {points, 5e-6});
+  ASSERT_FALSE(refused);
+  EXPECT_THAT(refused.error().text, HasSubstr("outside: point 1, 2"));
+}
+
+/// Least squares and noise balls share: the one case in which the shape's covariance is exact.
+TEST(RotationReference, StatesAnUncertaintyThatCovers) {
+  const Field V = table3_machine();
+  constexpr unsigned kSeeds = 60;
+  std::size_t covered = 0, asked = 0;
+  for (unsigned seed = 1; seed <= kSeeds; ++seed) {
+    const Observations o = simulated(reference_layout(), V, {8e-6, 0.0}, seed);
+    const Solution s = *solve(o, {.estimator = Estimator::Ols});
+    const auto points = reference_points(s.model.validity(), V, Vector3::Zero(), 3e-6, seed);
+    const auto turned = with_rotation_reference(s, {points, 3e-6});
+    if (!turned) {
+      continue;  // one in 1000
+    }
+    const Vector3 ball1 = V(o.ball1_m);
+    for (const Vector3& q : places_inside(s.model.validity())) {
+      const VolumetricError e = turned->model.error_at(q, Vector3::Zero());
+      const Vector3 off = V(q) - ball1 - e.V_m;
+      for (Eigen::Index k = 0; k < 3; ++k, ++asked) {
+        covered += std::abs(off(k)) <= 1.96 * std::sqrt(e.cov_V_m2(k, k));
+      }
+    }
+  }
+  // 1080 answers, 18 of a seed not independent: 95 % to 2 %. Of the reference's noise alone: 0.7.
+  const double share = static_cast<double>(covered) / static_cast<double>(asked);
+  EXPECT_GT(share, 0.91);
+  EXPECT_LT(share, 0.99);
+  EXPECT_GT(asked, 18u * (kSeeds - 3));
+  RecordProperty("covered", std::to_string(share));
 }
 
 TEST(EvemuJudge, AcceptsAModelOfTheMachineItWasMeasuredOn) {
@@ -291,6 +427,28 @@ TEST(EvemuJudge, CallsAShapeAShapeUnlessToldOtherwise) {
   JudgeOptions told = generous();
   told.accept_shape_only = true;
   EXPECT_TRUE(judge(o, s, nullptr, told)->accepted);
+}
+
+TEST(EvemuJudge, ComparesAtBallsInsideTheActiveModelsVolumeOnly) {
+  const Observations o = reference_observations();
+  const Solution s = *solve(o);
+  std::vector<Vector3> near;
+  for (const Vector3& v : s.model.validity().vertices_m()) {
+    near.push_back(o.ball1_m + 0.6 * (v - o.ball1_m));
+  }
+  near.push_back(o.ball1_m - 0.01 * (near.back() - o.ball1_m));  // Ball1 is within, not at the tip
+  near.push_back(o.ball1_m + Vector3(-0.01, 0.01, 0.01));
+  near.push_back(o.ball1_m + Vector3(-0.01, -0.01, -0.01));
+  const VolumetricModel smaller = *VolumetricModel::from_polynomials(
+      *s.model.polynomials(), Gauge::Ball1, Vector3::Zero(), *ValidityVolume::hull_of(near));
+  const auto held = held_out(o, s.statistics.s_m, &smaller);
+  ASSERT_TRUE(held) << held.error().text;
+  EXPECT_GT(held->observations_beside_active, 0u);
+  EXPECT_LT(held->observations_beside_active, held->observations);
+  // A model of few balls in the place of one of the whole machine: only by name.
+  Solution candidate = s;
+  candidate.model = smaller;
+  EXPECT_THAT(judge(o, candidate, &s.model, generous())->reasons, Contains(HasSubstr(kSmallerVolume)));
 }
 
 TEST(EvemuJudge, ComparesWithTheActiveModelWhateverItsRotation) {

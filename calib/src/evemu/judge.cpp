@@ -3,6 +3,8 @@
 #include <Eigen/Dense>
 #include <cmath>
 #include <functional>
+#include <optional>
+#include <utility>
 
 #include "abbe/calib/evemu/design_rows.hpp"
 #include "evemu/fit_coefficients.hpp"
@@ -33,6 +35,7 @@ Eigen::VectorXd relative_to_ball1(const Observations& position,
 struct Remainder {
   double whitened_squares = 0.0;
   double squares_m2 = 0.0;
+  std::size_t components = 0;  ///< without those of Ball1, which is no observation
 
   void add(const Observations& position, const Eigen::VectorXd& r) {
     const Eigen::MatrixXd S = pose_rotation_rows(position);
@@ -41,8 +44,22 @@ struct Remainder {
     const Eigen::Vector3d omega = S_white.colPivHouseholderQr().solve(r_white);
     whitened_squares += (r_white - S_white * omega).squaredNorm();
     squares_m2 += (r - S * omega).squaredNorm();
+    components += 3 * (position.rows.size() - 1);
   }
+  [[nodiscard]] double rms() const { return std::sqrt(whitened_squares / static_cast<double>(components)); }
+  [[nodiscard]] double rms_m() const { return std::sqrt(squares_m2 / static_cast<double>(components)); }
 };
+
+/// The balls of a position a model speaks of. Without Ball1 inside there are none: V is relative to it.
+std::optional<Observations> inside(const Observations& position, const ValidityVolume& volume) {
+  if (!volume.contains(position.rows[position_rows(position).front().ball1].reading_m)) {
+    return std::nullopt;
+  }
+  Observations part = position;
+  part.seen.clear();
+  std::erase_if(part.rows, [&](const BallError& r) { return !volume.contains(r.reading_m); });
+  return part.rows.size() > 1 ? std::optional{std::move(part)} : std::nullopt;
+}
 
 }  // namespace
 
@@ -59,7 +76,7 @@ Result<HeldOutFigures> held_out(const Observations& o, double s_m, const Volumet
     return tl::unexpected(design.error());
   }
   const bool with_active = active != nullptr && active->holds_for_tool(o.machine.tool_offset_m);
-  Remainder none, candidate, other;
+  Remainder none, candidate, other, candidate_beside;
   for (const PositionRows& p : positions) {
     const Observations rest = part_of(o, p.position, true), left_out = part_of(o, p.position, false);
     const Result<Fit> fit = fit_with(problem_of(rest, *design, options), options);
@@ -69,25 +86,29 @@ Result<HeldOutFigures> held_out(const Observations& o, double s_m, const Volumet
     }
     const Eigen::VectorXd y = observed_m(left_out);
     none.add(left_out, y);
-    candidate.add(left_out, y - relative_to_ball1(left_out, [&](const Vector3& q) -> Vector3 {
-                              return design->B(q) * fit->c_m;
-                            }));
-    if (with_active) {
-      other.add(left_out, y - relative_to_ball1(left_out, [&](const Vector3& q) {
-                            return active->V_at(q, o.machine.tool_offset_m);
-                          }));
+    const auto by_fit = [&](const Vector3& q) -> Vector3 { return design->B(q) * fit->c_m; };
+    candidate.add(left_out, y - relative_to_ball1(left_out, by_fit));
+    if (!with_active) {
+      continue;
+    }
+    if (const auto both = inside(left_out, active->validity())) {
+      const Eigen::VectorXd y_both = observed_m(*both);
+      candidate_beside.add(*both, y_both - relative_to_ball1(*both, by_fit));
+      other.add(*both, y_both - relative_to_ball1(*both, [&](const Vector3& q) {
+                         return active->V_at(q, o.machine.tool_offset_m);
+                       }));
     }
   }
-  const std::size_t n = 3 * (o.rows.size() - positions.size());
-  const auto root_mean = [&](double squares) { return std::sqrt(squares / static_cast<double>(n)); };
-  HeldOutFigures figures{.no_compensation = root_mean(none.whitened_squares) / s_m,
-                         .candidate = root_mean(candidate.whitened_squares) / s_m,
-                         .observations = n,
-                         .no_compensation_rms_m = root_mean(none.squares_m2),
-                         .candidate_rms_m = root_mean(candidate.squares_m2)};
-  if (with_active) {
-    figures.active = root_mean(other.whitened_squares) / s_m;
-    figures.active_rms_m = root_mean(other.squares_m2);
+  HeldOutFigures figures{.no_compensation = none.rms() / s_m,
+                         .candidate = candidate.rms() / s_m,
+                         .observations = none.components,
+                         .no_compensation_rms_m = none.rms_m(),
+                         .candidate_rms_m = candidate.rms_m()};
+  if (other.components > 0) {
+    figures.active = other.rms() / s_m;
+    figures.active_rms_m = other.rms_m();
+    figures.candidate_beside_active = candidate_beside.rms() / s_m;
+    figures.observations_beside_active = other.components;
   }
   return figures;
 }
@@ -99,12 +120,21 @@ Result<Verdict> judge(const Observations& o, const Solution& solution, const Vol
   solve.sparse.chosen = solution.sparse;
   solve.sparse.bootstrap_runs = 0;
   return held_out(o, solution.statistics.s_m, active, solve).map([&](const HeldOutFigures& figures) {
-    Verdict verdict = decide(solution.model, figures, options.limits);
+    Verdict verdict = decide(solution.model, figures, options.limits, active);
     if (!solution.rotation.referenced && !options.accept_shape_only) {
       const double u_rad = std::sqrt(solution.rotation.cov_rad2.trace() / 3.0);
       verdict.reasons.push_back(
           message("shape only: the machine measured the blocks itself, so a rotation of about ", 1e6 * u_rad,
                   " urad about Ball1 is unknown; give a rotation reference or accept ", kShapeOnly));
+    }
+    if (const auto& fit = solution.rotation.reference; fit && !fit->outside.empty()) {
+      verdict.notes.push_back(message("rotation reference: ", fit->outside.size(), " of ",
+                                      fit->outside.size() + fit->points,
+                                      " points lie outside the volume the balls span and were not used"));
+    }
+    if (const auto& fit = solution.rotation.reference; fit && fit->widened > 1.0) {
+      verdict.notes.push_back(message("rotation reference: chi-square ", fit->widened,
+                                      " per degree of freedom, in the rotation's uncertainty"));
     }
     verdict.accepted = verdict.reasons.empty();
     return verdict;

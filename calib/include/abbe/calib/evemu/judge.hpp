@@ -21,7 +21,8 @@ struct JudgeOptions {
   SolveOptions solve{};
 };
 
-/// `active` may be null; it is left out if it does not hold for the tool. Needs 3 positions, else
+/// `active` may be null; it is compared at the balls inside its volume, of positions whose Ball1 is, and left
+/// out if it does not hold for the tool. Needs 3 positions, else
 /// TooFewObservations; RankDeficient if those that stay do not determine the model.
 [[nodiscard]] Result<HeldOutFigures> held_out(const Observations&, double s_m, const VolumetricModel* active,
                                               const SolveOptions& = {});

@@ -91,13 +91,23 @@ struct Statistics {
   int iterations = 0;
 };
 
+/// How a rotation reference went with the model.
+struct ReferenceFit {
+  std::size_t points = 0;            ///< used
+  std::vector<std::size_t> outside;  ///< numbers, from 1, of points outside the balls' hull: not used
+  double chi2 = 0.0;                 ///< of the residuals after turning and moving
+  double dof = 0.0;
+  double widened = 1.0;  ///< what the rotation's covariance was multiplied with for it
+};
+
 /// The rotation about Ball1 that no touch can see.
 struct MeanRotation {
   /// What the estimate had before it was set to the blocks' direction: with block touches, the prior's
   /// choice; with errors only, the mean of the pose rotations found.
   Vector3 removed_rad = Vector3::Zero();
-  Matrix3 cov_rad2 = Matrix3::Zero();  ///< is in the model's covariance
-  bool referenced = false;             ///< known from elsewhere: the model is more than a shape
+  Matrix3 cov_rad2 = Matrix3::Zero();       ///< is in the model's covariance
+  bool referenced = false;                  ///< known from elsewhere: the model is more than a shape
+  std::optional<ReferenceFit> reference{};  ///< of with_rotation_reference()
 };
 
 struct Solution {
@@ -124,11 +134,17 @@ struct Solution {
 
 /// V known independently at some readings, relative to each other in the machine's directions.
 struct RotationReference {
-  std::span<const BallError> points;  ///< position and ball do not count; >= 3 not on a line
+  std::span<const BallError> points;  ///< position and ball do not count; >= 3 in the hull, not on a line
   double sigma_m = 1e-6;              ///< standard uncertainty of V, per component, independent
 };
-/// The same solution turned (and moved) onto the reference; the rotation's uncertainty becomes that of the
-/// reference.
+/// The same solution turned onto the reference, which may have its own origin. The rotation omega fits
+/// r = V_reference - V_model by generalised least squares, omega = K r, over the noise of the reference and
+/// what the model's shape may be off at its points (B C B^T). Both are then in the covariance:
+///     C' = (1 - G K B) C (1 - G K B)^T + sigma^2 G K K^T G^T,    G: c of a rotation about Ball1.
+/// Points outside the balls' hull (by 2 % of its size) are left out and named. Residuals larger than a right
+/// reference has once in 1000 widen the rotation's covariance by chi-square per degree of freedom; beyond 4
+/// they are BadInput: another frame, sign or artefact. That test sees what the machine's errors have beside a
+/// rigid motion; any reference of a machine that has nothing else passes.
 [[nodiscard]] Result<Solution> with_rotation_reference(Solution, const RotationReference&);
 
 }  // namespace abbe::calib::evemu

@@ -124,7 +124,7 @@ TEST_F(Cli, WritesAReportThatNeedsNoNetwork) {
   EXPECT_THAT(page, StartsWith("<!doctype html>"));
   const auto document = read_model(folder_ / "out/model.json");
   ASSERT_TRUE(document);
-  for (const std::string& shown : {document->machine, model_id(document->model, "otf"), std::string("EXX"),
+  for (const std::string& shown : {document->machine, model_id(*document), std::string("EXX"),
                                    std::string("squareness"), std::string("Chart.js")}) {
     EXPECT_THAT(page, HasSubstr(shown == "squareness" ? "Squareness" : shown));
   }
@@ -136,7 +136,7 @@ TEST_F(Cli, KeepsAModelWithTheVerdictAgainstTheActiveOne) {
   const auto store = folder_ / "kept";
   const auto keep = fmt::format("--keep '{}'", store.string());
   ASSERT_EQ(identify(files_.path, files_.tracker, folder_ / "k1", keep).exit, 0);
-  const auto id = model_id(read_model(folder_ / "k1/model.json")->model, "otf");
+  const auto id = model_id(*read_model(folder_ / "k1/model.json"));
   ASSERT_EQ(abbe(fmt::format("model activate {} --store '{}'", id, store.string())).exit, 0);
   const auto again = identify(files_.path, files_.tracker, folder_ / "k2", keep + " --json");
   ASSERT_EQ(again.exit, 5) << again.err;
@@ -144,6 +144,27 @@ TEST_F(Cli, KeepsAModelWithTheVerdictAgainstTheActiveOne) {
   const auto gate = nlohmann::json::parse(again.out).at("gate");
   EXPECT_FALSE(gate.at("accepted"));
   EXPECT_THAT(gate.at("reasons").at(0).get<std::string>(), HasSubstr("the active model still holds"));
+}
+
+TEST_F(Cli, AModelOfAnotherConfigurationDoesNotLockOutItsReplacement) {
+  const auto store = folder_ / "replaced";
+  const auto keep = fmt::format("--keep '{}' --json", store.string());
+  const auto before = nlohmann::json::parse(identify(files_.path, files_.tracker, folder_ / "r1", keep).out);
+  ASSERT_EQ(
+      abbe(fmt::format("model activate {} --store '{}'", before.at("id").get<std::string>(), store.string()))
+          .exit,
+      0);
+  auto machine = text_of(files_.machine);
+  machine.replace(machine.find("small mill"), 10, "moved mill");
+  const auto ran = abbe(fmt::format("identify otf --machine '{}' --path '{}' --tracker '{}' -o '{}' {}",
+                                    write("moved.toml", machine).string(), files_.path.string(),
+                                    files_.tracker.string(), (folder_ / "r2").string(), keep));
+  ASSERT_EQ(ran.exit, 0) << ran.err;
+  const auto after = nlohmann::json::parse(ran.out);
+  EXPECT_TRUE(after.at("gate").at("accepted")) << ran.out;
+  EXPECT_THAT(after.at("gate").at("notes").at(0).get<std::string>(), HasSubstr("another machine"));
+  EXPECT_EQ(after.at("hash"), before.at("hash"));
+  EXPECT_NE(after.at("id"), before.at("id"));
 }
 
 TEST_F(Cli, ComparesTwoModels) {

@@ -120,6 +120,20 @@ TEST_F(ModelAuthorityTest, OfAnotherMachineConfigurationItIsStale) {
   EXPECT_THAT(standing.reason, HasSubstr("another machine configuration"));
 }
 
+TEST_F(ModelAuthorityTest, OnlyAModelOfThisMachineConfigurationMustBeBeaten) {
+  auto other = document(1);
+  other.machine_hash = "of another machine";
+  auto authority = open();
+  EXPECT_EQ(authority.to_beat(), nullptr);
+  ASSERT_TRUE(add(authority, other, {.accepted = true}, actor("calibrate otf"), kNow));
+  EXPECT_NE(authority.in_force(), nullptr);
+  EXPECT_EQ(authority.to_beat(), nullptr);
+  // The same model, found again under the configuration the daemon has.
+  ASSERT_TRUE(add(authority, document(1), {.accepted = true}, actor("calibrate otf"), kNow));
+  EXPECT_EQ(fresh_standing(authority).status, ModelStatus::MODEL_ACTIVE);
+  EXPECT_NE(authority.to_beat(), nullptr);
+}
+
 TEST_F(ModelAuthorityTest, WhereTheControlCorrectsAlreadyNoModelIsActive) {
   config_.encoder.emplace().axes_compensated = true;
   auto authority = open();

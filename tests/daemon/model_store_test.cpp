@@ -63,8 +63,19 @@ TEST_F(ModelStoreTest, KeepsWhatIsAddedAndGivesItBack) {
   const auto id = add(1);
   const auto document = open().load(id);
   ASSERT_TRUE(document);
-  EXPECT_EQ(model_hash(document->model, "otf").substr(0, 16), id);
+  EXPECT_EQ(model_id(*document), id);
+  EXPECT_EQ(model_hash(document->model, "otf"), model_hash(synthetic_document(1).model, "otf"));
   EXPECT_EQ(open().find(id.substr(0, 6)).value(), id);
+}
+
+TEST_F(ModelStoreTest, KeepsTheSameModelForEachMachineConfigurationItWasMadeFor) {
+  auto document = synthetic_document(1);
+  const auto before = open().add(document, true, {}, actor("daemon")).value();
+  document.machine_hash = "cd34";
+  const auto after = open().add(document, false, {"no better"}, actor("daemon")).value();
+  ASSERT_NE(before, after);
+  EXPECT_EQ(open().load(before)->machine_hash, "ab12");
+  EXPECT_EQ(open().load(after)->machine_hash, "cd34");
 }
 
 TEST_F(ModelStoreTest, ActivatesAndRollsBackThroughSeveralModels) {

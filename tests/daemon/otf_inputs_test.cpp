@@ -34,6 +34,8 @@ TEST(OtfInputs, TheGateOfTheConfigurationDecidesHowARunIsJudged) {
   EXPECT_EQ(otf_options({}, gate).held_out_folds, 10u);
   EXPECT_EQ(gate_limits(gate).max_error_m, 2e-3);
   EXPECT_EQ(gate_limits(gate).max_gradient, 1e-2);
+  EXPECT_FALSE(gate_limits(gate).accept_smaller_volume);
+  EXPECT_TRUE(gate_limits({.accept = {"smaller-volume"}}).accept_smaller_volume);
 }
 
 }  // namespace

@@ -2,9 +2,11 @@
 
 #include <fmt/format.h>
 
+#include <nlohmann/json.hpp>
 #include <system_error>
 #include <utility>
 
+#include "abbe/daemon/model_keeper.hpp"
 #include "abbe/daemon/model_store.hpp"
 #include "cli/daemon_socket.hpp"
 #include "cli/terminal.hpp"
@@ -24,6 +26,16 @@ Result<std::optional<ModelDocument>> active_model(const std::string& store) {
   if (!document) return tl::make_unexpected(document.error());
   active = std::move(*document);
   return active;
+}
+
+void ModelToBeat::say(calib::Verdict& verdict) const {
+  if (!left_out.empty()) verdict.notes.push_back(left_out);
+}
+
+ModelToBeat to_beat(const std::optional<ModelDocument>& active, const Config& config) {
+  if (!active) return {};
+  if (active->machine_hash != machine_hash(config)) return {nullptr, std::string{kOfAnotherMachine}};
+  return {&active->model, {}};
 }
 
 Result<void> keep(const std::string& store, const ModelDocument& document, const calib::Verdict& verdict,
@@ -48,6 +60,10 @@ Result<void> write_results(const std::filesystem::path& folder, const ModelDocum
   return {};
 }
 
+nlohmann::json verdict_json(const calib::Verdict& verdict) {
+  return {{"accepted", verdict.accepted}, {"reasons", verdict.reasons}, {"notes", verdict.notes}};
+}
+
 void print_verdict(const calib::Verdict& verdict) {
   constexpr int kGreen = 2, kYellow = 3, kStdout = 1;
   constexpr double kUmPerM = 1e6;
@@ -56,6 +72,7 @@ void print_verdict(const calib::Verdict& verdict) {
   fmt::print("gate        {}\n", verdict.accepted ? coloured("would accept", kGreen, kStdout)
                                                   : coloured("would refuse", kYellow, kStdout));
   for (const auto& reason : verdict.reasons) fmt::print("            {}\n", reason);
+  for (const auto& note : verdict.notes) fmt::print("note        {}\n", note);
 }
 
 int exit_code(const calib::Verdict& verdict) {

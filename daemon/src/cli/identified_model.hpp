@@ -3,6 +3,7 @@
 
 #include <filesystem>
 #include <map>
+#include <nlohmann/json_fwd.hpp>
 #include <optional>
 #include <string>
 
@@ -15,6 +16,18 @@ namespace abbe::daemon {
 /// The active model of the store the result will be kept in; none if `store` is empty.
 [[nodiscard]] Result<std::optional<ModelDocument>> active_model(const std::string& store);
 
+/// What a candidate must do better than.
+struct ModelToBeat {
+  const calib::VolumetricModel* model = nullptr;
+  std::string left_out;  ///< why the active model is not asked; empty: there is none, or it is asked
+
+  void say(calib::Verdict& verdict) const;  ///< adds `left_out` to its notes
+};
+
+/// The active model if it was made for the machine of `config`: another configuration's is STALE there, and
+/// must not lock out the one that replaces it.
+[[nodiscard]] ModelToBeat to_beat(const std::optional<ModelDocument>& active, const Config& config);
+
 /// Adds the model to the store, by whom and by `command`; nothing if `store` is empty.
 [[nodiscard]] Result<void> keep(const std::string& store, const ModelDocument& document,
                                 const calib::Verdict& verdict, const std::string& command);
@@ -22,6 +35,9 @@ namespace abbe::daemon {
 /// model.json and `more` (file name to text) into the folder, which is created if needed. Error Io.
 [[nodiscard]] Result<void> write_results(const std::filesystem::path& folder, const ModelDocument& document,
                                          const std::map<std::string, std::string>& more);
+
+/// Whether it is accepted, why not, and what else to know.
+[[nodiscard]] nlohmann::json verdict_json(const calib::Verdict& verdict);
 
 /// The held-out residuals and what the gate would do, on stdout.
 void print_verdict(const calib::Verdict& verdict);

@@ -191,9 +191,10 @@ Result<Outcome> identify(const IdentifyEvemuArguments& arguments) {
     solution = evemu::with_rotation_reference(std::move(*solution),
                                               {input->reference->points, input->reference->sigma_m});
   if (!solution) return tl::make_unexpected(error_of(solution.error()));
-  auto verdict =
-      evemu::judge(input->observations, *solution, *active ? &(*active)->model : nullptr, *judging);
+  const auto other = to_beat(*active, input->config);
+  auto verdict = evemu::judge(input->observations, *solution, other.model, *judging);
   if (!verdict) return tl::make_unexpected(error_of(verdict.error()));
+  other.say(*verdict);
   return Outcome{std::move(input->config), std::move(input->sources), std::move(input->observations),
                  std::move(*solution), std::move(*verdict)};
 }
@@ -228,28 +229,27 @@ double u_rotation_urad(const evemu::Solution& solution) {
 void print_json(const Outcome& outcome, const ModelDocument& document, const std::filesystem::path& folder) {
   const auto& s = outcome.solution->statistics;
   const auto& held_out = outcome.verdict.held_out;
-  nlohmann::json object{
-      {"model", (folder / "model.json").string()},
-      {"id", model_id(document.model, document.method)},
-      {"hash", model_hash(document.model, document.method)},
-      {"estimator", document.estimator},
-      {"covariance", evemu::name(outcome.solution->covariance)},
-      {"positions", s.positions},
-      {"balls", s.balls},
-      {"observations", s.observations},
-      {"unknowns", s.unknowns},
-      {"rank", s.rank},
-      {"condition", s.condition},
-      {"effective_parameters", s.effective_parameters},
-      {"noise_um", s.s_m * kMicro_per_1},
-      {"pose_rotation_urad", s.w_rad * kMicro_per_1},
-      {"u_mean_rotation_urad", u_rotation_urad(*outcome.solution)},
-      {"shape_only", !outcome.solution->rotation.referenced},
-      {"residual_rms_before_um", s.before.rms_m * kMicro_per_1},
-      {"residual_rms_after_um", s.after.rms_m * kMicro_per_1},
-      {"held_out_rms_before_um", held_out.no_compensation_rms_m * kMicro_per_1},
-      {"held_out_rms_after_um", held_out.candidate_rms_m * kMicro_per_1},
-      {"gate", {{"accepted", outcome.verdict.accepted}, {"reasons", outcome.verdict.reasons}}}};
+  nlohmann::json object{{"model", (folder / "model.json").string()},
+                        {"id", model_id(document)},
+                        {"hash", model_hash(document.model, document.method)},
+                        {"estimator", document.estimator},
+                        {"covariance", evemu::name(outcome.solution->covariance)},
+                        {"positions", s.positions},
+                        {"balls", s.balls},
+                        {"observations", s.observations},
+                        {"unknowns", s.unknowns},
+                        {"rank", s.rank},
+                        {"condition", s.condition},
+                        {"effective_parameters", s.effective_parameters},
+                        {"noise_um", s.s_m * kMicro_per_1},
+                        {"pose_rotation_urad", s.w_rad * kMicro_per_1},
+                        {"u_mean_rotation_urad", u_rotation_urad(*outcome.solution)},
+                        {"shape_only", !outcome.solution->rotation.referenced},
+                        {"residual_rms_before_um", s.before.rms_m * kMicro_per_1},
+                        {"residual_rms_after_um", s.after.rms_m * kMicro_per_1},
+                        {"held_out_rms_before_um", held_out.no_compensation_rms_m * kMicro_per_1},
+                        {"held_out_rms_after_um", held_out.candidate_rms_m * kMicro_per_1},
+                        {"gate", verdict_json(outcome.verdict)}};
   if (const auto& choice = outcome.solution->sparse)
     object["chosen"] = {{"lambda", choice->lambda.back()}, {"gamma", choice->gamma}};
   fmt::print("{}\n", object.dump(1));
@@ -258,8 +258,8 @@ void print_json(const Outcome& outcome, const ModelDocument& document, const std
 void print_summary(const Outcome& outcome, const ModelDocument& document,
                    const std::filesystem::path& folder) {
   const auto& s = outcome.solution->statistics;
-  fmt::print("model       {}  ({} coefficients, tool and machine \"{}\")\n",
-             model_id(document.model, document.method), s.unknowns, document.machine);
+  fmt::print("model       {}  ({} coefficients, tool and machine \"{}\")\n", model_id(document), s.unknowns,
+             document.machine);
   fmt::print("artefact    {} positions, {} ball centres\n", s.positions, s.balls);
   fmt::print(
       "solution    {}: {} observations, rank {} of {}, condition {:.3g}, {:.1f} effective parameters\n",

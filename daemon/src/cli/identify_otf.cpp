@@ -87,7 +87,7 @@ Outcome outcome_of(OtfCandidate candidate, const Config& config, std::vector<Inp
           s.blocks, s.blocks_used};
 }
 
-Result<Outcome> from_files(const Arguments& arguments, const calib::VolumetricModel* active,
+Result<Outcome> from_files(const Arguments& arguments, const std::optional<ModelDocument>& active,
                            ProgressBar& bar) {
   auto files = read_files(arguments, bar);
   if (!files) return tl::make_unexpected(files.error());
@@ -99,9 +99,11 @@ Result<Outcome> from_files(const Arguments& arguments, const calib::VolumetricMo
   auto found = otf::identify(files->tracker.points, *machine, otf_path(files->path.vertices_m),
                              otf_noise(files->config.machine), options);
   if (!found) return tl::make_unexpected(error_of(found.error()));
+  const auto other = to_beat(active, files->config);
   auto verdict =
-      otf::judge(found->observations, found->solution, active, gate_limits(files->config.gate), options);
+      otf::judge(found->observations, found->solution, other.model, gate_limits(files->config.gate), options);
   if (!verdict) return tl::make_unexpected(error_of(verdict.error()));
+  other.say(*verdict);
   return outcome_of({std::move(found->solution), std::move(*verdict)}, files->config,
                     std::move(files->sources));
 }
@@ -119,16 +121,18 @@ Result<OtfCandidate> last_complete_run(ReplayReport replayed, const std::string&
   return fail(ErrorCode::DataInsufficient, fmt::format("{}: holds no complete calibration: {}", file, why));
 }
 
-Result<Outcome> from_recording(const Arguments& arguments, const calib::VolumetricModel* active,
+Result<Outcome> from_recording(const Arguments& arguments, const std::optional<ModelDocument>& active,
                                ProgressBar& bar) {
   const auto recording = open_recording(arguments.recording, arguments.machine);
   if (!recording) return tl::make_unexpected(recording.error());
+  const auto other = to_beat(active, recording->config);
   auto replayed =
       replay(recording->reader, recording->config,
-             {.active = active, .progress = [&bar](double share) { bar.show("replaying", share); }});
+             {.active = other.model, .progress = [&bar](double share) { bar.show("replaying", share); }});
   if (!replayed) return tl::make_unexpected(replayed.error());
   auto candidate = last_complete_run(std::move(*replayed), arguments.recording);
   if (!candidate) return tl::make_unexpected(candidate.error());
+  other.say(candidate->verdict);
   return outcome_of(std::move(*candidate), recording->config, {recording->source});
 }
 
@@ -145,7 +149,7 @@ void print_json(const Outcome& outcome, const std::filesystem::path& folder) {
   const auto& s = outcome.document.statistics;
   const nlohmann::json object{
       {"model", (folder / "model.json").string()},
-      {"id", model_id(outcome.document.model, outcome.document.method)},
+      {"id", model_id(outcome.document)},
       {"hash", model_hash(outcome.document.model, outcome.document.method)},
       {"samples", s.samples},
       {"lost_samples", s.lost_samples},
@@ -161,14 +165,13 @@ void print_json(const Outcome& outcome, const std::filesystem::path& folder) {
       {"residual_rms_after_um", s.after.rms_m * kMicro},
       {"held_out_rms_before_um", outcome.verdict.held_out.no_compensation_rms_m * kMicro},
       {"held_out_rms_after_um", outcome.verdict.held_out.candidate_rms_m * kMicro},
-      {"gate", {{"accepted", outcome.verdict.accepted}, {"reasons", outcome.verdict.reasons}}}};
+      {"gate", verdict_json(outcome.verdict)}};
   fmt::print("{}\n", object.dump(1));
 }
 
 void print_summary(const Outcome& outcome, const std::filesystem::path& folder) {
   const auto& s = outcome.document.statistics;
-  fmt::print("model       {}  ({} tables, tool and machine \"{}\")\n",
-             model_id(outcome.document.model, outcome.document.method),
+  fmt::print("model       {}  ({} tables, tool and machine \"{}\")\n", model_id(outcome.document),
              outcome.document.model.layout().tables().size(), outcome.document.machine);
   fmt::print("samples     {}, {} lost; {} of {} blocks used\n", s.samples, s.lost_samples,
              outcome.blocks_used, outcome.blocks);
@@ -183,9 +186,8 @@ void print_summary(const Outcome& outcome, const std::filesystem::path& folder) 
 Result<Outcome> identify(const Arguments& arguments, ProgressBar& bar) {
   const auto active = active_model(arguments.keep);
   if (!active) return tl::make_unexpected(active.error());
-  const calib::VolumetricModel* const compared = *active ? &(*active)->model : nullptr;
-  return arguments.recording.empty() ? from_files(arguments, compared, bar)
-                                     : from_recording(arguments, compared, bar);
+  return arguments.recording.empty() ? from_files(arguments, *active, bar)
+                                     : from_recording(arguments, *active, bar);
 }
 
 int run(const Arguments& arguments) {

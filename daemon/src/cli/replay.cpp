@@ -47,6 +47,7 @@ json calibration_json(const ReplayedCalibration& c) {
   out["model_id"] = c.model_id;
   out["accepted"] = verdict.accepted;
   out["reasons"] = verdict.reasons;
+  out["notes"] = verdict.notes;
   out["points_sha256"] = c.points_sha256;
   return out;
 }

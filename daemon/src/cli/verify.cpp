@@ -132,7 +132,7 @@ nlohmann::json figures(const verify::RatioStatistics& s) {
 void print_json(const VerifyOutcome& outcome) {
   const auto& c = outcome.verification.comparison;
   const auto& turned = c.turned;
-  nlohmann::json object{{"model", model_id(outcome.document.model, outcome.document.method)},
+  nlohmann::json object{{"model", model_id(outcome.document)},
                         {"points", outcome.verification.observations.readings_m.size()},
                         {"inside", c.inside.size()},
                         {"before", figures(c.before)},
@@ -152,8 +152,7 @@ void print_ratio(const char* what, const verify::RatioStatistics& s) {
 void print_summary(const VerifyOutcome& outcome, const VerifyArguments& arguments) {
   const auto& v = outcome.verification;
   const auto& c = v.comparison;
-  fmt::print("model       {}  (machine \"{}\", {})\n",
-             model_id(outcome.document.model, outcome.document.method), outcome.document.machine,
+  fmt::print("model       {}  (machine \"{}\", {})\n", model_id(outcome.document), outcome.document.machine,
              outcome.document.method);
   fmt::print("points      {}, {} of them where the model holds\n", v.observations.readings_m.size(),
              c.inside.size());

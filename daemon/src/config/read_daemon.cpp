@@ -100,8 +100,9 @@ void read_gate(Section& root, Config& out) {
   section.get("holdout_fraction", gate.holdout_fraction, kPlain, {0.05, 0.5});
   if (section.get("accept", gate.accept)) {
     for (const auto& name : gate.accept)
-      if (name != calib::evemu::kShapeOnly)
-        section.fault("accept", fmt::format("\"{}\": must be \"{}\"", name, calib::evemu::kShapeOnly));
+      if (name != calib::evemu::kShapeOnly && name != calib::kSmallerVolume)
+        section.fault("accept", fmt::format("\"{}\": must be \"{}\" or \"{}\"", name,
+                                            calib::evemu::kShapeOnly, calib::kSmallerVolume));
   }
   section.close();
 }

@@ -84,9 +84,18 @@ std::string model_hash(const calib::VolumetricModel& model, std::string_view met
   return out.hex();
 }
 
-std::string model_id(const calib::VolumetricModel& model, std::string_view method) {
+std::string model_id(const calib::VolumetricModel& model, std::string_view method,
+                     std::string_view machine_hash) {
+  Canonical out;
+  out.text("abbe/model-id/1");
+  out.text(model_hash(model, method));
+  out.text(machine_hash);
   constexpr std::size_t kDigits = 16;
-  return model_hash(model, method).substr(0, kDigits);
+  return out.hex().substr(0, kDigits);
+}
+
+std::string model_id(const ModelDocument& document) {
+  return model_id(document.model, document.method, document.machine_hash);
 }
 
 }  // namespace abbe::daemon

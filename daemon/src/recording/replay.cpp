@@ -229,7 +229,7 @@ class Calibrations {
     c.outcome = identify(run, config_, options_.active);
     if (*c.outcome) {
       c.model_hash = model_hash(model_of(**c.outcome), method_of(**c.outcome));
-      c.model_id = model_id(model_of(**c.outcome), method_of(**c.outcome));
+      c.model_id = model_id(model_of(**c.outcome), method_of(**c.outcome), machine_hash(config_));
     }
     done_.push_back(std::move(c));
     identified_ = true;

@@ -39,6 +39,14 @@ void add_rotation(HtmlReport& page, const evemu::Solution& solution) {
             "left (for a machine of 3 mm R_resmag near 0.9, whatever the estimator); after the best-fit "
             "rotation about Ball1 only the shape counts. Give a rotation reference, or accept the shape by "
             "name.");
+  if (rotation.reference) {
+    page.paragraph(fmt::format(
+        "Rotation reference: {} points, {} more outside the volume the balls span were not used; chi-square "
+        "of the residuals over the uncertainties of reference and model {:.1f} with {:.0f} degrees of "
+        "freedom.",
+        rotation.reference->points, rotation.reference->outside.size(), rotation.reference->chi2,
+        rotation.reference->dof));
+  }
   page.facts({{"standard uncertainty of the rotation (in the model's covariance)",
                fmt::format("{:.1f} urad per axis", u_urad)},
               {"rotation taken out of the estimate",
@@ -170,7 +178,7 @@ void add_origin(HtmlReport& page, const ModelDocument& document, const evemu::So
   page.facts(
       {{"machine", document.machine},
        {"kinematic chain (ISO 10791-6)", document.model.layout().chain().text()},
-       {"model", model_id(document.model, document.method)},
+       {"model", model_id(document)},
        {"method", fmt::format("{}, {}", document.method, document.estimator)},
        {"gauge", std::string{calib::name(document.model.gauge())}},
        {"created (UTC)", to_text(document.created)},

@@ -26,6 +26,7 @@ void add_verdict(HtmlReport& page, const calib::Verdict& verdict, std::string_vi
   page.heading("Verdict");
   page.paragraph(verdict.accepted ? "The gate accepts the model." : "The gate refuses the model:");
   for (const auto& reason : verdict.reasons) page.paragraph(reason);
+  for (const auto& note : verdict.notes) page.paragraph(note);
   const auto& figures = verdict.held_out;
   std::vector<std::pair<std::string, std::string>> facts{
       {fmt::format("left at {} the fit did not see, without compensation", held_out),
@@ -34,7 +35,8 @@ void add_verdict(HtmlReport& page, const calib::Verdict& verdict, std::string_vi
       {"the same in standard deviations of the measurement (1: noise alone)",
        fmt::format("{:.2f} without, {:.2f} with the model", figures.no_compensation, figures.candidate)}};
   if (figures.active_rms_m)
-    facts.emplace_back("with the model active until now", um_text(*figures.active_rms_m, decimals) + " rms");
+    facts.emplace_back("with the model active until now, where it holds",
+                       um_text(*figures.active_rms_m, decimals) + " rms");
   facts.emplace_back("largest error in the volume", um_text(verdict.max_error_m, decimals));
   page.facts(facts);
 }

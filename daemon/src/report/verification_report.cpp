@@ -206,7 +206,7 @@ void add_origin(HtmlReport& page, const ModelDocument& document, const Verificat
   page.heading("Model");
   page.facts({{"machine", document.machine},
               {"kinematic chain (ISO 10791-6)", document.model.layout().chain().text()},
-              {"model", model_id(document.model, document.method)},
+              {"model", model_id(document)},
               {"method", fmt::format("{}, {}", document.method, document.estimator)},
               {"gauge", std::string{calib::name(document.model.gauge())}},
               {"created (UTC)", to_text(document.created)}});

@@ -23,8 +23,9 @@ std::string verdict_text(const calib::Verdict& verdict) {
       fmt::format("held-out residual rms {:.3f} um, without compensation {:.3f} um{}",
                   h.candidate_rms_m * 1e6, h.no_compensation_rms_m * 1e6,
                   h.active_rms_m ? fmt::format(", active model {:.3f} um", *h.active_rms_m * 1e6) : "");
-  if (verdict.accepted) return "accepted: " + figures;
-  return fmt::format("refused: {} ({})", fmt::join(verdict.reasons, "; "), figures);
+  const std::string notes = verdict.notes.empty() ? "" : fmt::format("; {}", fmt::join(verdict.notes, "; "));
+  if (verdict.accepted) return "accepted: " + figures + notes;
+  return fmt::format("refused: {} ({}{})", fmt::join(verdict.reasons, "; "), figures, notes);
 }
 
 template <class T>
@@ -101,7 +102,8 @@ std::vector<SessionEvent> CalibrationService::turn(std::span<const protocol::Sna
 
 void CalibrationService::begin_identification(CalibrationRun run) {
   std::optional<calib::VolumetricModel> active;
-  if (const auto* in_force = authority_.in_force()) active = in_force->model;
+  if (const auto* to_beat = authority_.to_beat()) active = *to_beat;
+  active_left_out_ = !active && authority_.in_force() != nullptr;
   std::future<RecordingDigest> digest;
   if (recorder_ != nullptr) digest = recorder_->digest();
   identified_share_ = 0.0;
@@ -129,6 +131,7 @@ void CalibrationService::keep(Result<Identified> identified, HostTime now) {
     return;
   }
   verdict_ = verdict_of(identified->candidate);
+  if (active_left_out_) verdict_.notes.emplace_back(kOfAnotherMachine);
   held_out_ = verdict_.held_out;
   const auto created = utc_.to_utc(now);
   keeping_since_ = authority_.revision();

@@ -71,7 +71,9 @@ calib::otf::Options otf_options(std::span<const calib::otf::TrackerObservation> 
 }
 
 calib::GateLimits gate_limits(const GateConfig& gate) {
-  return {.max_error_m = gate.max_error_m, .max_gradient = gate.max_gradient};
+  return {.max_error_m = gate.max_error_m,
+          .max_gradient = gate.max_gradient,
+          .accept_smaller_volume = gate.accepts(calib::kSmallerVolume)};
 }
 
 Error error_of(const calib::Error& error) {

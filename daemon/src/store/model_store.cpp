@@ -108,7 +108,7 @@ Result<std::string> ModelStore::add(const ModelDocument& document, bool accepted
   if (!lock) return tl::make_unexpected(lock.error());
   auto state = read_state(folder_);
   if (!state) return tl::make_unexpected(state.error());
-  const auto id = model_id(document.model, document.method);
+  const auto id = model_id(document);
   // A damaged file of the same id is written again: what it should have held is in our hands.
   if (!load(id))
     if (const auto written = replace_file(model_path(id), to_json(document)); !written)
@@ -208,7 +208,7 @@ StoreStamp ModelStore::stamp() const noexcept {
 
 Result<ModelDocument> ModelStore::load(const std::string& id) const {
   auto document = read_model(model_path(id));
-  if (document && model_id(document->model, document->method) != id)
+  if (document && model_id(*document) != id)
     return fail(ErrorCode::BadInput,
                 fmt::format("{}: holds another model than its name says", model_path(id).string()));
   return document;

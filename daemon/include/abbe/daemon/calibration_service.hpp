@@ -60,6 +60,7 @@ class CalibrationService {
   std::future<Result<KeptModel>> keeping_;
   std::uint64_t keeping_since_ = 0;  // revision of the authority when the keeping began
   calib::Verdict verdict_;           // of the model being kept
+  bool active_left_out_ = false;     // it was made for another machine configuration
   std::atomic<double> identified_share_{0.0};
   std::optional<calib::HeldOutFigures> held_out_;
 };

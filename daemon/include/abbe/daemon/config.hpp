@@ -273,8 +273,9 @@ struct GateConfig {
   /// Share of the legs of an on-the-fly run that a fit does not see while it is judged by them. Models of a
   /// ball array are judged by positions held out, one after the other.
   double holdout_fraction = 0.2;
-  /// What no data of a method can show and this shop takes as it is, by name: "evemu-shape-only", a ball
-  /// array's model whose rotation about Ball1 nobody has referenced.
+  /// What this shop takes as it is, by name: "evemu-shape-only", a ball array's model whose rotation about
+  /// Ball1 nobody has referenced; "smaller-volume", a model in place of one that holds in more of the
+  /// machine.
   std::vector<std::string> accept;
 
   [[nodiscard]] bool accepts(std::string_view name) const;

@@ -50,6 +50,10 @@ class ModelAuthority {
   [[nodiscard]] const ModelInForce* in_force() const noexcept {
     return active_.model ? &*active_.model : nullptr;
   }
+  /// What a new model must be better than: the one in force, if it was made for this machine configuration.
+  [[nodiscard]] const calib::VolumetricModel* to_beat() const noexcept {
+    return active_.model && active_.made_for_this_machine ? &active_.model->model : nullptr;
+  }
 
  private:
   ModelAuthority(ModelKeeper keeper, bool axes_compensated);

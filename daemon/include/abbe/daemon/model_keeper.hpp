@@ -6,6 +6,7 @@
 #include <filesystem>
 #include <optional>
 #include <string>
+#include <string_view>
 
 #include "abbe/calib/gate.hpp"
 #include "abbe/daemon/config.hpp"
@@ -22,6 +23,10 @@ struct ActiveModel {
   bool made_for_this_machine = false;
   std::string fault;
 };
+
+/// Said where a candidate is not compared with the active model.
+inline constexpr std::string_view kOfAnotherMachine =
+    "not compared with the active model: that one was made for another machine configuration";
 
 /// A model that is in the store now.
 struct KeptModel {

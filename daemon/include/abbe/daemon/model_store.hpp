@@ -58,7 +58,7 @@ class ModelStore {
   /// alone).
   [[nodiscard]] static Result<ModelStore> open(const std::filesystem::path& folder);
 
-  /// Keeps a model with the gate's verdict; returns its id. A model that is there already (same hash) is not
+  /// Keeps a model with the gate's verdict; returns its id. A model that is there already (same id) is not
   /// written again, but the event is.
   [[nodiscard]] Result<std::string> add(const ModelDocument& document, bool accepted,
                                         std::vector<std::string> reasons, const StoreActor& actor);

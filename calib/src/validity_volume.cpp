@@ -166,4 +166,36 @@ bool ValidityVolume::contains(const Vector3& p) const {
                      [&](const HalfSpace& f) { return f.outward.dot(p) <= f.offset_m + kTolerance_m; });
 }
 
+std::vector<Vector3> spread_subset(std::span<const Vector3> points_m, std::size_t most) {
+  if (points_m.size() <= most) {
+    return {points_m.begin(), points_m.end()};
+  }
+  Vector3 mean = Vector3::Zero();
+  for (const Vector3& p : points_m) {
+    mean += p / static_cast<double>(points_m.size());
+  }
+  // Distance to the nearest one chosen; at first to the mean, which is none of them.
+  std::vector<double> distance_m;
+  for (const Vector3& p : points_m) {
+    distance_m.push_back((p - mean).norm());
+  }
+  std::vector<bool> chosen(points_m.size(), false);
+  for (std::size_t n = 0; n < most; ++n) {
+    const auto farthest =
+        static_cast<std::size_t>(std::max_element(distance_m.begin(), distance_m.end()) - distance_m.begin());
+    chosen[farthest] = true;
+    for (std::size_t i = 0; i < points_m.size(); ++i) {
+      const double to_it_m = (points_m[i] - points_m[farthest]).norm();
+      distance_m[i] = n == 0 ? to_it_m : std::min(distance_m[i], to_it_m);
+    }
+  }
+  std::vector<Vector3> subset;
+  for (std::size_t i = 0; i < points_m.size(); ++i) {
+    if (chosen[i]) {
+      subset.push_back(points_m[i]);
+    }
+  }
+  return subset;
+}
+
 }  // namespace abbe::calib

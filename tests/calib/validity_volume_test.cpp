@@ -2,6 +2,10 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <cmath>
+#include <vector>
+
 #include <random>
 
 namespace {
@@ -97,6 +101,28 @@ TEST(ValidityVolume, RefusesAFlatOne) {
 
 TEST(ValidityVolume, OfNothingContainsNothing) {
   EXPECT_FALSE(ValidityVolume().contains(Vector3::Zero()));
+}
+
+TEST(SpreadSubset, LosesNoSide) {
+  std::vector<Vector3> sphere;
+  constexpr int kPoints = 2000;
+  for (int i = 0; i < kPoints; ++i) {  // a spiral, as even as points on a sphere get
+    const double z = 1.0 - (2.0 * i + 1.0) / kPoints, turn = 2.399963 * i, r = std::sqrt(1.0 - z * z);
+    sphere.emplace_back(z, r * std::cos(turn), r * std::sin(turn));
+  }
+  const std::vector<Vector3> some = spread_subset(sphere, 512);
+  ASSERT_EQ(some.size(), 512u);
+  // No place of the sphere is farther from the subset than a few times the distance of 512 even points.
+  double farthest = 0.0;
+  for (const Vector3& p : sphere) {
+    double nearest = 2.0;
+    for (const Vector3& s : some) {
+      nearest = std::min(nearest, (p - s).norm());
+    }
+    farthest = std::max(farthest, nearest);
+  }
+  EXPECT_LT(farthest, 0.2);
+  EXPECT_EQ(spread_subset(sphere, 2000).size(), 2000u);
 }
 
 }  // namespace

@@ -80,5 +80,21 @@ TEST_F(PolynomialPublication, ItsMessagesFitAndTheGridDoesNotClaimToBeLinear) {
   }
 }
 
+TEST_F(PolynomialPublication, TheGridIsFineAndItsUncertaintyHoldsBetweenNodesToo) {
+  std::size_t nodes = 0;
+  const v1::GridNode* inside = nullptr;
+  const auto slices = grid_messages(model, {});
+  for (const auto& slice : slices) {
+    nodes += slice.nodes().size();
+    for (const auto& node : slice.nodes())
+      if (node.inside()) inside = &node;
+  }
+  EXPECT_GT(nodes, 3000u);
+  ASSERT_NE(inside, nullptr);
+  const Vector3 q(inside->position_m()[0], inside->position_m()[1], inside->position_m()[2]);
+  const auto e = model.model.error_at(q, Vector3::Zero());
+  EXPECT_GT(inside->cov_m2()[0] + inside->cov_m2()[3] + inside->cov_m2()[5], e.cov_V_m2.trace());
+}
+
 }  // namespace
 }  // namespace abbe::daemon

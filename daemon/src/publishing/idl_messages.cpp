@@ -4,6 +4,7 @@
 #include <array>
 #include <cstddef>
 
+#include "abbe/calib/interpolation_grid.hpp"
 #include "abbe/daemon/live_view.hpp"
 
 namespace abbe::daemon {
@@ -38,42 +39,22 @@ std::array<double, 6> upper_triangle(const calib::Matrix3& c) {
   return {c(0, 0), c(0, 1), c(0, 2), c(1, 1), c(1, 2), c(2, 2)};
 }
 
-/// `count` >= 2 of them, evenly by number, the ends always.
-std::vector<double> thinned(const std::vector<double>& nodes_m, std::size_t count) {
-  std::vector<double> out;
-  for (std::size_t i = 0; i < count; ++i) out.push_back(nodes_m[i * (nodes_m.size() - 1) / (count - 1)]);
-  return out;
-}
-
-using GridAxes = std::array<std::vector<double>, 3>;
-
-/// All nodes if they are no more than a grid may have, else the axis with most nodes gives some up, again and
-/// again.
-GridAxes grid_axes(const calib::MachineNodes& nodes) {
-  std::array<std::size_t, 3> count{};
-  for (std::size_t a = 0; a < 3; ++a) count[a] = nodes[a].nodes_m.size();
-  while (count[0] * count[1] * count[2] > kMostGridNodes) --*std::max_element(count.begin(), count.end());
-  GridAxes axes;
-  for (std::size_t a = 0; a < 3; ++a) axes[a] = thinned(nodes[a].nodes_m, count[a]);
-  return axes;
-}
-
-/// Where there are more than fit, some: a hull of fewer vertices lies inside the true one.
+/// A hull of fewer vertices lies inside the true one: evenly spread, it loses little on every side.
 std::vector<v1::HullVertex> hull_of(const calib::ValidityVolume& validity) {
   std::vector<v1::HullVertex> hull;
-  for (const calib::Vector3& p :
-       validity.vertices_m().first(std::min(kHullBound, validity.vertices_m().size()))) {
+  for (const calib::Vector3& p : calib::spread_subset(validity.vertices_m(), kHullBound))
     hull.emplace_back().position_m(array(p));
-  }
   return hull;
 }
 
-v1::GridNode grid_node(const ModelInForce& m, const calib::Vector3& q_m, const calib::Vector3& tool_m) {
+v1::GridNode grid_node(const ModelInForce& m, const calib::InterpolationGrid& grid,
+                       const std::array<std::size_t, 3>& at, const calib::Vector3& tool_m) {
+  const calib::Vector3 q_m(grid.axes_m[0][at[0]], grid.axes_m[1][at[1]], grid.axes_m[2][at[2]]);
   const auto e = m.model.error_at(q_m, tool_m);
   v1::GridNode node;
   node.position_m(array(q_m));
   node.error_m(array(e.V_m));
-  node.cov_m2(upper_triangle(e.cov_V_m2));
+  node.cov_m2(upper_triangle(e.cov_V_m2 + calib::interpolation_moment(m.model, grid, at)));
   node.inside(e.inside);
   return node;
 }
@@ -142,19 +123,15 @@ v1::ErrorModel model_message(const ModelInForce& in_force, const Stamp& stamp) {
 }
 
 std::vector<v1::ErrorGrid> grid_messages(const ModelInForce& in_force, const Stamp& stamp) {
-  const GridAxes axes = grid_axes(in_force.model.layout().nodes());
+  const auto grid = calib::interpolation_grid(in_force.model, kMostGridNodes);
   const calib::Vector3 tool_m = in_force.model.tool_offsets_m().front();
   std::vector<v1::GridNode> all;
-  for (const double x : axes[0]) {
-    for (const double y : axes[1]) {
-      for (const double z : axes[2]) all.push_back(grid_node(in_force, {x, y, z}, tool_m));
+  for (std::size_t x = 0; x < grid.axes_m[0].size(); ++x) {
+    for (std::size_t y = 0; y < grid.axes_m[1].size(); ++y) {
+      for (std::size_t z = 0; z < grid.axes_m[2].size(); ++z)
+        all.push_back(grid_node(in_force, grid, {x, y, z}, tool_m));
     }
   }
-  const auto& nodes = in_force.model.layout().nodes();
-  // Said of tables that are all there: only they are linear in between.
-  const bool every_node =
-      in_force.model.polynomials() == nullptr &&
-      all.size() == nodes[0].nodes_m.size() * nodes[1].nodes_m.size() * nodes[2].nodes_m.size();
   const std::size_t slices = (all.size() + kNodesPerSlice - 1) / kNodesPerSlice;
   std::vector<v1::ErrorGrid> messages;
   for (std::size_t slice = 0; slice < slices; ++slice) {
@@ -167,7 +144,7 @@ std::vector<v1::ErrorGrid> grid_messages(const ModelInForce& in_force, const Sta
     m.sequence_number(stamp.sequence_number);
     m.model_id(in_force.id);
     m.tool_offset_m(array(tool_m));
-    m.every_node(every_node);
+    m.every_node(grid.every_node);
     m.nodes(std::vector<v1::GridNode>(begin,
                                       begin + static_cast<std::ptrdiff_t>(std::min(left, kNodesPerSlice))));
     messages.push_back(std::move(m));

@@ -1,6 +1,7 @@
 #pragma once
 /// The volume a model's data covered: the convex hull of axis positions. Outside, a model extrapolates.
 
+#include <cstddef>
 #include <span>
 #include <vector>
 
@@ -30,5 +31,9 @@ class ValidityVolume {
   std::vector<HalfSpace> faces_;
   std::vector<Vector3> vertices_m_;
 };
+
+/// At most `most` of the points, spread evenly: again and again the one farthest from those chosen, beginning
+/// with the one farthest from their mean. In the order they had; all of them if they are no more.
+[[nodiscard]] std::vector<Vector3> spread_subset(std::span<const Vector3> points_m, std::size_t most);
 
 }  // namespace abbe::calib

@@ -35,8 +35,8 @@ struct Stamp {
 
 [[nodiscard]] v1::Snapshot snapshot_message(const protocol::Snapshot&, protocol::UtcOffset, const Stamp&);
 [[nodiscard]] v1::ErrorModel model_message(const ModelInForce&, const Stamp&);
-/// V on the tensor grid of the model's nodes, in slices of the IDL's bound. Of more than 4096 nodes some are
-/// left out, and every_node is false.
+/// V on calib::interpolation_grid() of 4096 nodes, in slices of the IDL's bound. cov_m2 includes what linear
+/// interpolation misses where every_node is false.
 [[nodiscard]] std::vector<v1::ErrorGrid> grid_messages(const ModelInForce&, const Stamp&);
 [[nodiscard]] v1::ModelState state_message(v1::ModelStatus, std::string_view reason, const ModelInForce*,
                                            std::chrono::nanoseconds validity, const Stamp&);

@@ -1,0 +1,138 @@
+#include "abbe/calib/interpolation_grid.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+namespace abbe::calib {
+namespace {
+
+/// `count` >= 2 of them, evenly by number, the ends always.
+std::vector<double> thinned(const std::vector<double>& nodes_m, std::size_t count) {
+  std::vector<double> out;
+  for (std::size_t i = 0; i < count; ++i) {
+    out.push_back(nodes_m[i * (nodes_m.size() - 1) / (count - 1)]);
+  }
+  return out;
+}
+
+InterpolationGrid of_tables(const MachineNodes& nodes, std::size_t most_nodes) {
+  std::array<std::size_t, 3> count{};
+  for (std::size_t a = 0; a < 3; ++a) {
+    count[a] = nodes[a].nodes_m.size();
+  }
+  InterpolationGrid grid{{}, true};
+  while (count[0] * count[1] * count[2] > most_nodes) {
+    --*std::max_element(count.begin(), count.end());
+    grid.every_node = false;
+  }
+  for (std::size_t a = 0; a < 3; ++a) {
+    grid.axes_m[a] = thinned(nodes[a].nodes_m, count[a]);
+  }
+  return grid;
+}
+
+/// How much a line through the whole box along each axis misses halfway, at most, by the second differences
+/// on a lattice.
+std::array<double, 3> bend_m(const VolumetricModel& model, const evemu::ReadingBox& box) {
+  constexpr std::array kAt{-0.8, -0.4, 0.0, 0.4, 0.8};
+  constexpr double kStep = 0.2;  // of the half width: beside the lattice, within the box
+  const Vector3& t = model.tool_offsets_m().front();
+  std::array<double, 3> most{};
+  for (const double x : kAt) {
+    for (const double y : kAt) {
+      for (const double z : kAt) {
+        const Vector3 q = box.centre_m + Vector3(x, y, z).cwiseProduct(box.half_width_m);
+        const Vector3 V = model.V_at(q, t);
+        for (int a = 0; a < 3; ++a) {
+          const Vector3 step = kStep * box.half_width_m(a) * Vector3::Unit(a);
+          const Vector3 second = model.V_at(q + step, t) - 2 * V + model.V_at(q - step, t);
+          auto& of_axis = most[static_cast<std::size_t>(a)];
+          of_axis = std::max(of_axis, second.norm() / (2 * kStep * kStep));
+        }
+      }
+    }
+  }
+  return most;
+}
+
+/// The axis that misses most gets one node more, until they are used up: the misses go with 1 / cells^2.
+std::array<std::size_t, 3> counts_for(const std::array<double, 3>& bend_m, std::size_t most_nodes) {
+  std::array<std::size_t, 3> count{2, 2, 2};
+  std::array<bool, 3> full{};
+  while (!(full[0] && full[1] && full[2])) {
+    std::size_t worst = 3;
+    double most = -1.0;
+    for (std::size_t a = 0; a < 3; ++a) {
+      const double cells = static_cast<double>(count[a] - 1);
+      if (const double miss = bend_m[a] / (cells * cells); !full[a] && miss > most) {
+        most = miss;
+        worst = a;
+      }
+    }
+    ++count[worst];
+    if (count[0] * count[1] * count[2] > most_nodes) {
+      --count[worst];
+      full[worst] = true;
+    }
+  }
+  return count;
+}
+
+InterpolationGrid of_polynomials(const VolumetricModel& model, std::size_t most_nodes) {
+  const evemu::ReadingBox box = evemu::bounding_box(model.validity().vertices_m());
+  const std::array<std::size_t, 3> count = counts_for(bend_m(model, box), most_nodes);
+  InterpolationGrid grid;
+  for (std::size_t a = 0; a < 3; ++a) {
+    const auto k = static_cast<Eigen::Index>(a);
+    const double cells = static_cast<double>(count[a] - 1);
+    for (std::size_t i = 0; i < count[a]; ++i) {
+      const double u = 2.0 * static_cast<double>(i) / cells - 1.0;
+      grid.axes_m[a].push_back(box.centre_m(k) + u * box.half_width_m(k));
+    }
+  }
+  return grid;
+}
+
+/// What interpolation misses halfway from `q` to its neighbour at `beside_m` along axis `a`.
+Vector3 miss_halfway(const VolumetricModel& model, const Vector3& q, Eigen::Index a, double beside_m) {
+  const Vector3& t = model.tool_offsets_m().front();
+  Vector3 beside = q;
+  beside(a) = beside_m;
+  return model.V_at(0.5 * (q + beside), t) - 0.5 * (model.V_at(q, t) + model.V_at(beside, t));
+}
+
+}  // namespace
+
+InterpolationGrid interpolation_grid(const VolumetricModel& model, std::size_t most_nodes) {
+  return model.polynomials() == nullptr ? of_tables(model.layout().nodes(), most_nodes)
+                                        : of_polynomials(model, most_nodes);
+}
+
+Matrix3 interpolation_moment(const VolumetricModel& model, const InterpolationGrid& grid,
+                             const std::array<std::size_t, 3>& node) {
+  if (grid.every_node) {
+    return Matrix3::Zero();
+  }
+  const GridAxes& axes = grid.axes_m;
+  const Vector3 q(axes[0][node[0]], axes[1][node[1]], axes[2][node[2]]);
+  Matrix3 squares = Matrix3::Zero();
+  Vector3 sum = Vector3::Zero();
+  for (std::size_t a = 0; a < 3; ++a) {
+    const auto k = static_cast<Eigen::Index>(a);
+    Vector3 miss = Vector3::Zero();
+    if (node[a] > 0) {
+      miss = miss_halfway(model, q, k, axes[a][node[a] - 1]);
+    }
+    if (node[a] + 1 < axes[a].size()) {
+      const Vector3 other = miss_halfway(model, q, k, axes[a][node[a] + 1]);
+      miss = other.norm() > miss.norm() ? other : miss;
+    }
+    squares += miss * miss.transpose();
+    sum += miss;
+  }
+  constexpr double kSquare = 8.0 / 15.0, kProduct = 4.0 / 9.0;
+  return (kSquare - kProduct) * squares + kProduct * sum * sum.transpose();
+}
+
+}  // namespace abbe::calib

@@ -176,6 +176,27 @@ TEST(WholeRun, WidensTheUncertaintyWhenTheTrackerIsWorseThanStated) {
   EXPECT_NEAR(b->solution.model.covariance().trace() / a->solution.model.covariance().trace(), 9.0, 0.5);
 }
 
+TEST(WholeRun, KnowsWhatAnErrorAllRangesShareDoesToTheModel) {
+  constexpr double kScale = 1e-5;  // large against second orders of the errors, 30 um in 1 m
+  MadeRun run = make_run({.seed = 5, .noise_factor = 0.0, .error_scale_m = 1e-6});
+  const auto right = identify(run.samples, run.machine, run.path, run.noise, run.options);
+  run.noise.u_scale = kScale;
+  const auto unsure = identify(run.samples, run.machine, run.path, run.noise, run.options);
+  for (TrackerObservation& s : run.samples) {
+    s.p_tracker_m *= 1.0 + kScale;
+  }
+  const auto wrong = identify(run.samples, run.machine, run.path, run.noise, run.options);
+  ASSERT_TRUE(right && unsure && wrong);
+  const Eigen::VectorXd moved = wrong->solution.model.U() - right->solution.model.U();
+  const Eigen::MatrixXd added = unsure->solution.model.covariance() - right->solution.model.covariance();
+  // Table by table, in units of the largest: EXX grows by 1e-5 of its axis.
+  const double largest_m = moved.cwiseAbs().maxCoeff();
+  EXPECT_GT(largest_m, 0.3 * kScale);
+  EXPECT_LT((added.diagonal().cwiseMax(0.0).cwiseSqrt() - moved.cwiseAbs()).cwiseAbs().maxCoeff(),
+            0.02 * largest_m);
+  EXPECT_GT(added(0, 2) * moved(0) * moved(2), -1e-30);  // one cause: fully correlated
+}
+
 TEST(WholeRun, GivesTheSameBitsForTheSameInput) {
   const MadeRun run = make_run({.seed = 5});
   const auto first = identify(run.samples, run.machine, run.path, run.noise, run.options);

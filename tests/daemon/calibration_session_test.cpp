@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <optional>
 
 #include "abbe/daemon/device_options.hpp"
 
@@ -40,6 +41,7 @@ class Drive {
   /// What the tracker's clock says besides host time; 500 s at first.
   void set_device_clock(std::chrono::nanoseconds ahead) { device_ahead_ = ahead; }
   void lose_axes() { axes_known_ = false; }
+  void set_environment(const protocol::EnvironmentSample& e) { environment_ = e; }
   [[nodiscard]] HostTime now() const { return now_; }
 
  private:
@@ -51,6 +53,8 @@ class Drive {
     s.has_tracker_point = true;
     s.tracker_point.device_time = protocol::DeviceTime{now_.time_since_epoch() + device_ahead_};
     s.tracker_point.p_tracker_m = q_;
+    s.has_environment = environment_.has_value();
+    if (environment_) s.environment = *environment_;
     session_.take(s);
     now_ += kPeriod;
   }
@@ -60,6 +64,7 @@ class Drive {
   HostTime now_{10s};
   std::chrono::nanoseconds device_ahead_ = 500s;
   bool axes_known_ = true;
+  std::optional<protocol::EnvironmentSample> environment_;
 };
 
 const std::vector<AxisPosition> kPath{{0, 0, 0}, {0.1, 0, 0}, {0.1, 0.1, 0}, {0.1, 0.1, 0.1}};
@@ -91,6 +96,33 @@ TEST(CalibrationSession, TheRunBeginsAndEndsInStandstill) {
   EXPECT_EQ((*run)[run->size() - 20].p_tracker_m, kPath.back());
   EXPECT_LT(run->size(),
             3000u + 2u * 200u + 10u);  // 300 mm at 0.1 mm each, and 0.4 s of standstill at either end
+}
+
+TEST(CalibrationSession, TheRunKnowsItsScalesAndItsAir) {
+  AcquisitionOptions options;
+  constexpr double kAlpha = 10e-6, kFixed_m = -0.05;
+  options.environment.thermal = {{0, {.axis = "X", .alpha_per_K = kAlpha, .fixed_m = kFixed_m}}};
+  options.environment.air.assumed_index = 1.00027;
+  CalibrationSession session{options};
+  ASSERT_TRUE(session.start({OtfRequest{kPath}, HostTime{10s}}));
+  Drive drive{session};
+  protocol::EnvironmentSample warm;
+  warm.air_temperature_K = 294.0;
+  warm.air_pressure_Pa = 101'000.0;
+  warm.relative_humidity = 0.4;
+  warm.temperature_K[0] = 293.15 + 5.0;
+  drive.set_environment(warm);
+  drive.stand(kPath[0], 1s);
+  for (std::size_t i = 1; i < kPath.size(); ++i) drive.move(kPath[i]);
+  drive.stand(kPath.back(), 2s);
+  const auto taken = session.take_run();
+  ASSERT_TRUE(taken);
+  const auto& run = std::get<OtfRun>(*taken);
+  for (std::size_t i = 0; i < kPath.size(); ++i) {
+    EXPECT_NEAR(run.path_m[i][0] - kPath[i][0], 5.0 * kAlpha * (kPath[i][0] - kFixed_m), 1e-12);
+    EXPECT_EQ(run.path_m[i][1], kPath[i][1]);
+  }
+  EXPECT_NEAR(run.u_scale, 2e-7, 0.3e-7);  // 0.2 K: 1.9e-7, 30 Pa: 0.8e-7
 }
 
 TEST(CalibrationSession, ASlowTrackerStandsLongEnoughForTwentyPoints) {

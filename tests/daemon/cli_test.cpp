@@ -167,6 +167,45 @@ TEST_F(Cli, AModelOfAnotherConfigurationDoesNotLockOutItsReplacement) {
   EXPECT_NE(after.at("id"), before.at("id"));
 }
 
+TEST_F(Cli, SaysThatFilesHoldNoTemperaturesOfScales) {
+  const auto warm = write("warm.toml", text_of(files_.machine) + R"([encoder]
+transport = "udp"
+peer_host = "10.0.0.8"
+peer_port = 20000
+nodes = [{axis = "X", node = 1}, {axis = "Y", node = 2}, {axis = "Z", node = 3}]
+[[environment]]
+name = "rtd"
+map = "icpdas-zt2005-c8"
+serial = "/dev/serial/by-id/rs485"
+inputs = ["scale_x"]
+[[thermal]]
+axis = "X"
+temperature = "scale_x"
+alpha_um_per_m_K = 8
+u_alpha_um_per_m_K = 0.5
+u_temperature_K = 0.2
+fixed_mm = 0
+)");
+  const auto command = [&](const std::string& more) {
+    return abbe(fmt::format("identify otf --machine '{}' --path '{}' --tracker '{}' -o '{}' {}",
+                            warm.string(), files_.path.string(), files_.tracker.string(),
+                            (folder_ / "warm").string(), more));
+  };
+  const auto refused = command("");
+  EXPECT_EQ(refused.exit, 3) << refused.err;
+  EXPECT_THAT(refused.err, HasSubstr("--path-corrected"));
+  EXPECT_EQ(command("--path-corrected").exit, 0);
+}
+
+TEST_F(Cli, AnUncertainIndexOfTheAirWidensTheModel) {
+  const auto ran = identify(files_.path, files_.tracker, folder_ / "air", "--u-scale-ppm 10");
+  ASSERT_EQ(ran.exit, 0) << ran.err;
+  const auto plain = read_model(folder_ / "out/model.json"), wide = read_model(folder_ / "air/model.json");
+  ASSERT_TRUE(plain && wide);
+  EXPECT_EQ(plain->model.U(), wide->model.U());
+  EXPECT_GT(wide->model.covariance().trace(), 1.01 * plain->model.covariance().trace());
+}
+
 TEST_F(Cli, ComparesTwoModels) {
   const auto model = (folder_ / "out/model.json").string();
   const auto same = abbe(fmt::format("model compare '{0}' '{0}' --json", model));

@@ -87,6 +87,7 @@ void clear_fixed(const Eigen::MatrixXd& K, Adjustment& a) {
     a.U(fixed) = 0.0;
     a.covariance.row(fixed).setZero();
     a.covariance.col(fixed).setZero();
+    a.dU_dg.row(fixed).setZero();
   }
 }
 
@@ -167,6 +168,7 @@ Result<Adjustment> adjust(const NormalEquations& N, const ParameterLayout& layou
   a.rank = s.rank;
   a.null_combinations = unknowns - s.rank;
   a.condition = s.condition;
+  a.dU_dg = Q;
   clear_fixed(K, a);
   return a;
 }

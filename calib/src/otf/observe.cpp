@@ -49,6 +49,10 @@ Result<void> check(const Noise& noise) {
                    message("tracker noise: sigma_range ", noise.sigma_range_m, " m, sigma_angle ",
                            noise.sigma_angle_rad, " rad: both must be positive"));
   }
+  if (!(noise.u_scale >= 0) || !std::isfinite(noise.u_scale)) {
+    return failure(ErrorCode::BadInput,
+                   message("tracker noise: u_scale ", noise.u_scale, ": must not be negative"));
+  }
   return {};
 }
 
@@ -173,7 +177,8 @@ Result<Observations> observe_blocks(const BlockSeries& series, const Machine& ma
   }
   Observations o{.layout = *std::move(layout),
                  .target_offset_m = machine.target_offset_m,
-                 .alignment = *std::move(alignment)};
+                 .alignment = *std::move(alignment),
+                 .u_scale = noise.u_scale};
   o.samples = series.samples;
   o.lost_samples = series.lost_samples;
   o.blocks = series.blocks.size();

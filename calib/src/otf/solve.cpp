@@ -78,6 +78,21 @@ Statistics statistics(const Observations& o, const Adjustment& a, const Residual
   return s;
 }
 
+/// How U moves per relative change of all ranges. The constant part of the lever only moves the rigid
+/// unknowns.
+Eigen::VectorXd dU_dscale(const Observations& o, const Adjustment& a) {
+  const Vector3& tracker_m = o.alignment.T_machine_tracker.t_m;
+  Eigen::VectorXd g = Eigen::VectorXd::Zero(a.U.size());
+  for (std::size_t i = 0; i < o.rows.size(); ++i) {
+    const Observation& row = o.rows[i];
+    const double s_m = row.direction.dot(row.axis_position_m + o.target_offset_m - tracker_m);
+    for (const SparseRows::Entry& e : o.A.row(i)) {
+      g(static_cast<Eigen::Index>(e.column)) += row.weight * e.value * s_m;
+    }
+  }
+  return a.dU_dg * g;
+}
+
 void report(const Options& options, double fraction) {
   if (options.progress) {
     options.progress(Stage::Solve, fraction);
@@ -106,6 +121,10 @@ Result<Solution> solve(const Observations& o, const Options& options) {
   Residuals residuals{residuals_m(o, {}), residuals_m(o, a->U)};
   const Statistics figures = statistics(o, *a, residuals);
   a->covariance *= figures.covariance_factor;
+  if (o.u_scale > 0.0) {
+    const Eigen::VectorXd moved = o.u_scale * dU_dscale(o, *a);
+    a->covariance += moved * moved.transpose();
+  }
   const auto n = static_cast<Eigen::Index>(o.layout.model_size());
   Result<VolumetricModel> model =
       VolumetricModel::from_vector(o.layout, Gauge::G1, std::array{o.target_offset_m}, a->U.head(n),

@@ -26,10 +26,14 @@ namespace {
 
 namespace otf = calib::otf;
 
+constexpr double kPpmPer1 = 1e6;
+
 struct Arguments {
   std::string machine, path, tracker, recording, keep, out;
   std::string estimator = "two-step";
   std::size_t block_samples = 0;  // 0: by travel
+  double u_scale_ppm = 0.0;
+  bool path_corrected = false;
   bool json = false;
 };
 
@@ -87,17 +91,31 @@ Outcome outcome_of(OtfCandidate candidate, const Config& config, std::vector<Inp
           s.blocks, s.blocks_used};
 }
 
+/// The daemon applies a model to positions corrected by [[thermal]]: a model of uncorrected ones holds what
+/// the scales grew by, and it would be corrected twice.
+Result<void> check_scales(const Arguments& arguments, const Config& config) {
+  if (config.thermal.empty() || arguments.path_corrected) return {};
+  return fail(ErrorCode::BadInput,
+              "identify otf: [[thermal]] is configured, and tracker.csv holds no temperatures: use "
+              "--recording, or give a path corrected for the temperature of the scales and say "
+              "--path-corrected");
+}
+
 Result<Outcome> from_files(const Arguments& arguments, const std::optional<ModelDocument>& active,
                            ProgressBar& bar) {
   auto files = read_files(arguments, bar);
   if (!files) return tl::make_unexpected(files.error());
+  if (const auto fine = check_scales(arguments, files->config); !fine)
+    return tl::make_unexpected(fine.error());
   const auto machine = otf_machine(files->config.machine);
   if (!machine) return tl::make_unexpected(machine.error());
   otf::Options options = otf_options(files->tracker.points, files->config.gate);
   if (arguments.block_samples > 0) options.block_samples = arguments.block_samples;
   options.progress = [&](otf::Stage stage, double fraction) { bar.show(words(stage), fraction); };
-  auto found = otf::identify(files->tracker.points, *machine, otf_path(files->path.vertices_m),
-                             otf_noise(files->config.machine), options);
+  otf::Noise noise = otf_noise(files->config.machine);
+  noise.u_scale = arguments.u_scale_ppm / kPpmPer1;
+  auto found =
+      otf::identify(files->tracker.points, *machine, otf_path(files->path.vertices_m), noise, options);
   if (!found) return tl::make_unexpected(error_of(found.error()));
   const auto other = to_beat(active, files->config);
   auto verdict =
@@ -223,6 +241,16 @@ void add_identify_otf(CLI::App& parent, int& exit) {
       "--recording", arguments->recording,
       "what the daemon recorded (.mcap) instead of path and tracker: its last complete run, with\n"
       "the recorded configuration unless --machine is given");
+  auto* u_scale =
+      command
+          ->add_option("--u-scale-ppm", arguments->u_scale_ppm,
+                       "standard uncertainty all ranges have in common (index of the air): 0.2 for "
+                       "0.2 K and 30 Pa")
+          ->check(CLI::NonNegativeNumber);
+  auto* corrected =
+      command->add_flag("--path-corrected", arguments->path_corrected,
+                        "the path's positions are corrected for the temperature of the scales ([[thermal]])");
+  recording->excludes(u_scale)->excludes(corrected);
   path->needs(machine, tracker);
   tracker->needs(path);
   recording->excludes(path)->excludes(tracker);

@@ -188,6 +188,7 @@ AssemblerOptions assembler_options(const Config& config) {
 AcquisitionOptions acquisition_options(const Config& config) {
   AcquisitionOptions options;
   options.arrival_patience = stretched(options.arrival_patience, config.daemon.speed);
+  options.environment = environment_use(config);
   if (!config.tracker) return options;
   const std::chrono::duration<double> period{1.0 / config.tracker->point_rate_hz};
   const auto holding = [&period](double points) {

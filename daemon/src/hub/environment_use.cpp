@@ -94,6 +94,58 @@ void EnvironmentMerge::forget(HostTime oldest) {
   for (auto& samples : devices_) forget_before(samples, oldest - lag_);
 }
 
+namespace {
+
+calib::Expansion expansion(const ThermalConfig& config, double temperature_K) {
+  return {config.alpha_per_K, config.u_alpha_per_K, temperature_K, config.u_temperature_K};
+}
+
+}  // namespace
+
+std::optional<EnvironmentEffect> effect_of(const protocol::Snapshot& s,
+                                           const EnvironmentUseOptions& options) {
+  EnvironmentEffect effect;
+  for (const ThermalAxis& thermal : options.thermal) {
+    if (thermal.axis >= effect.growth.size()) continue;
+    const double t_K =
+        s.has_environment ? s.environment.temperature_K[thermal.config.temperature] : kNotAvailable;
+    if (std::isnan(t_K)) return std::nullopt;
+    effect.growth[thermal.axis] = calib::growth(expansion(thermal.config, t_K));
+  }
+  if (options.air.assumed_index) {
+    const auto index =
+        s.has_environment ? index_of_air(s.environment, options.air) : Result<calib::RefractiveIndex>{};
+    if (!s.has_environment || !index) return std::nullopt;
+    effect.u_scale = index->u_n / index->n;
+  }
+  return effect;
+}
+
+std::array<double, 3> grown(std::array<double, 3> reading_m, const EnvironmentEffect& effect,
+                            const EnvironmentUseOptions& options) {
+  for (const ThermalAxis& thermal : options.thermal) {
+    const std::size_t a = thermal.axis;
+    if (a >= reading_m.size()) continue;
+    const double fixed_m = thermal.config.fixed_m;
+    reading_m[a] = fixed_m + (reading_m[a] - fixed_m) * effect.growth[a];
+  }
+  return reading_m;
+}
+
+void MeanEffect::take(const EnvironmentEffect& effect) {
+  for (std::size_t a = 0; a < effect.growth.size(); ++a) sum_.growth[a] += effect.growth[a];
+  sum_.u_scale += effect.u_scale;
+  ++count_;
+}
+
+EnvironmentEffect MeanEffect::mean() const {
+  if (count_ == 0) return {};
+  EnvironmentEffect mean = sum_;
+  for (double& growth : mean.growth) growth /= static_cast<double>(count_);
+  mean.u_scale /= static_cast<double>(count_);
+  return mean;
+}
+
 void correct_for_temperature(protocol::Snapshot& s, const EnvironmentUseOptions& options) {
   for (const ThermalAxis& thermal : options.thermal) {
     const std::size_t a = thermal.axis;
@@ -105,8 +157,7 @@ void correct_for_temperature(protocol::Snapshot& s, const EnvironmentUseOptions&
       s.head.flags |= SampleFlag::AxisMissing;
       continue;
     }
-    const calib::Expansion scale{thermal.config.alpha_per_K, thermal.config.u_alpha_per_K, t_K,
-                                 thermal.config.u_temperature_K};
+    const calib::Expansion scale = expansion(thermal.config, t_K);
     const auto position = calib::true_position(s.position[a], thermal.config.fixed_m, scale);
     s.position[a] = position.value_m;
     s.velocity[a] *= calib::growth(scale);

@@ -131,7 +131,10 @@ std::optional<CalibrationRun> CalibrationSession::take_run() {
   if (status_.state != SessionState::Identifying || !acquisition_) return std::nullopt;
   CalibrationRun run;
   if (auto* otf = std::get_if<OtfAcquisition>(&*acquisition_)) {
-    run = OtfRun{.path_m = path_m_, .points = otf->release()};
+    const EnvironmentEffect effect = otf->environment();
+    std::vector<AxisPosition> path_m = path_m_;
+    for (AxisPosition& q_m : path_m) q_m = grown(q_m, effect, otf_options_.environment);
+    run = OtfRun{.path_m = std::move(path_m), .points = otf->release(), .u_scale = effect.u_scale};
   } else {
     run = std::get<EvemuAcquisition>(*acquisition_).release();
   }

@@ -75,10 +75,12 @@ void OtfAcquisition::take(const Snapshot& snapshot) {
   }
   const Vector3 q{snapshot.position[0], snapshot.position[1], snapshot.position[2]};
   track_standstill(point, q);
-  if (phase_ == Phase::WaitingAtStart)
+  if (phase_ == Phase::WaitingAtStart) {
     wait_at_start(point, q);
-  else if (phase_ == Phase::Running)
+  } else if (phase_ == Phase::Running) {
+    if (const auto effect = effect_of(snapshot, options_.environment)) environment_.take(*effect);
     run(point, q);
+  }
 }
 
 void OtfAcquisition::tick(HostTime now) {

@@ -46,8 +46,9 @@ Result<OtfCandidate> identify_run(const OtfRun& run, const MachineConfig& machin
       progress(overall(stage, fraction));
     };
   }
-  auto observations =
-      calib::otf::observe(points, *machine, otf_path(run.path_m), otf_noise(machine_config), options);
+  calib::otf::Noise noise = otf_noise(machine_config);
+  noise.u_scale = run.u_scale;
+  auto observations = calib::otf::observe(points, *machine, otf_path(run.path_m), noise, options);
   if (!observations) return tl::unexpected(error_of(observations.error()));
   auto solution = calib::otf::solve(*observations, options);
   if (!solution) return tl::unexpected(error_of(solution.error()));

@@ -53,7 +53,7 @@ struct SessionEvent {
 class CalibrationSession {
  public:
   explicit CalibrationSession(AcquisitionOptions otf = {}, EvemuAcquisitionOptions evemu = {})
-      : otf_options_(otf), evemu_options_(std::move(evemu)) {}
+      : otf_options_(std::move(otf)), evemu_options_(std::move(evemu)) {}
 
   /// Refused while a session is running; BadInput for a task that is none.
   [[nodiscard]] Result<void> start(CalibrationRequest request);

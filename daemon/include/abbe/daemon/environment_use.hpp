@@ -4,7 +4,9 @@
 /// the air. Composition only: the formulas are calib's. Deterministic, so that a replay is the live run
 /// again. Ordinary world; not thread-safe.
 
+#include <array>
 #include <chrono>
+#include <cstddef>
 #include <deque>
 #include <optional>
 #include <vector>
@@ -27,6 +29,30 @@ struct EnvironmentUseOptions {
   std::chrono::nanoseconds max_age{std::chrono::seconds{60}};
   std::vector<ThermalAxis> thermal;
   AirConfig air;
+};
+
+/// What the environment of an instant did to what was measured then.
+struct EnvironmentEffect {
+  std::array<double, 3> growth{1.0, 1.0, 1.0};  ///< of the scales of X, Y, Z; 1 without [[thermal]]
+  double u_scale = 0.0;  ///< relative standard uncertainty of the index distances were corrected with
+};
+/// None: what is configured was not available then.
+[[nodiscard]] std::optional<EnvironmentEffect> effect_of(const protocol::Snapshot& snapshot,
+                                                         const EnvironmentUseOptions& options);
+
+/// Readings of X, Y, Z as true positions, as correct_for_temperature() makes them.
+[[nodiscard]] std::array<double, 3> grown(std::array<double, 3> reading_m, const EnvironmentEffect& effect,
+                                          const EnvironmentUseOptions& options);
+
+/// Mean over a run: temperatures of scales drift by less than what they are uncertain, or it is no run.
+class MeanEffect {
+ public:
+  void take(const EnvironmentEffect& effect);
+  [[nodiscard]] EnvironmentEffect mean() const;
+
+ private:
+  EnvironmentEffect sum_{{0.0, 0.0, 0.0}, 0.0};
+  std::size_t count_ = 0;
 };
 
 /// Every quantity from the device that measures it: at most one of [[environment]], else the tracker. A value

@@ -15,6 +15,7 @@
 
 #include "abbe/calib/otf/run.hpp"
 #include "abbe/daemon/acquisition_phase.hpp"
+#include "abbe/daemon/environment_use.hpp"
 #include "abbe/protocol/samples.hpp"
 
 namespace abbe::daemon {
@@ -48,7 +49,8 @@ struct AcquisitionOptions {
   std::chrono::nanoseconds wait_for_start =
       std::chrono::hours{1};  ///< for the machine to stand at P0 and leave
   std::chrono::nanoseconds longest_stop =
-      std::chrono::minutes{15};  ///< on the path: a longer one ends the run
+      std::chrono::minutes{15};       ///< on the path: a longer one ends the run
+  EnvironmentUseOptions environment;  ///< what snapshots were corrected with
   /// A packet out of order goes back by a burst (a third of a second); a clock that began anew by more.
   std::chrono::nanoseconds clock_began_anew = std::chrono::seconds{1};
 };
@@ -74,6 +76,8 @@ class OtfAcquisition {
   [[nodiscard]] double progress() const noexcept;  ///< 0 to 1 of the path length driven
   [[nodiscard]] const std::vector<RunPoint>& points() const noexcept { return points_; }
   [[nodiscard]] std::vector<RunPoint> release() noexcept { return std::move(points_); }
+  /// Mean over the run.
+  [[nodiscard]] EnvironmentEffect environment() const { return environment_.mean(); }
 
  private:
   [[nodiscard]] bool in_order(const RunPoint& point);
@@ -94,6 +98,7 @@ class OtfAcquisition {
   std::string reason_;
   std::deque<RunPoint> before_;  // standstill at the first vertex, the last keep_before of it
   std::vector<RunPoint> points_;
+  MeanEffect environment_;
   calib::Vector3 stand_at_ = calib::Vector3::Zero();  // where the current standstill began
   protocol::HostTime stand_since_{};
   bool stand_known_ = false;

@@ -16,8 +16,11 @@
 namespace abbe::daemon {
 
 struct OtfRun {
+  /// The path as snapshots see it: grown with the scales where [[thermal]] is configured. The model is of
+  /// corrected positions then; what a scale grew by is not in it a second time.
   std::vector<AxisPosition> path_m;
   std::vector<RunPoint> points;
+  double u_scale = 0.0;  ///< see calib::otf::Noise
 };
 
 struct OtfCandidate {

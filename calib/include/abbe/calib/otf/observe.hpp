@@ -50,6 +50,7 @@ struct Observations {
   std::vector<Observation> rows{};
   std::vector<Vector3> sub_points_m{};  ///< nominal axis positions a row is averaged over
   Alignment alignment{};
+  double u_scale = 0.0;              ///< see Noise
   std::vector<Vector3> covered_m{};  ///< axis positions whose hull the used blocks cover
   std::size_t samples = 0;
   std::size_t lost_samples = 0;

@@ -40,6 +40,9 @@ struct TrackerObservation {
 struct Noise {
   double sigma_range_m = 2e-6;    ///< along the beam, one sample
   double sigma_angle_rad = 3e-6;  ///< across the beam, both directions, one sample
+  /// Relative standard uncertainty all ranges of the run have in common (index of the air). No residual shows
+  /// it: it is a growth of the whole machine.
+  double u_scale = 0.0;
 };
 
 enum class Stage { Observe, Align, Solve, Judge };

@@ -4,8 +4,10 @@
 /// gauge). Because the combinations K fixes cost nothing, K U = 0 holds exactly and mu does not matter
 /// (minimal constraints). Covariance: Cov = Q H Q, Q = (H + mu K^T K)^-1, if weights are 1/sigma^2, else Q
 /// (A^T W^2 C W^2 A) Q: [Sanders 2023] eq. (12), corrected for the rotation into machine coordinates (in
-/// sigma_m already) and for the alignment, which is estimated along; the diagonal holds variances. Not
-/// estimable: see VolumetricModel. Rank and condition are those of the column-scaled data, without the gauge.
+/// sigma_m already) and for the alignment, which is estimated along; the diagonal holds variances. What all
+/// ranges are off by in common (Noise::u_scale) moves every row by s = direction . (place - tracker), and U
+/// by Q A^T W^2 s: u_scale^2 times the square of that is added, after the factor below. Not estimable: see
+/// VolumetricModel. Rank and condition are those of the column-scaled data, without the gauge.
 
 #include <Eigen/Core>
 #include <functional>
@@ -47,6 +49,7 @@ struct NormalEquations {
 struct Adjustment {
   Eigen::VectorXd U;           ///< fit_size(), in gauge G1
   Eigen::MatrixXd covariance;  ///< fit_size() squared
+  Eigen::MatrixXd dU_dg;       ///< Q: what a change of g does to U
   std::size_t rank = 0;
   std::size_t null_combinations = 0;  ///< what the gauge fixes: 20 for 14 tables
   double condition = 0.0;  ///< of the column-scaled design within its rank: sqrt of the eigenvalue ratio

@@ -112,6 +112,7 @@ void RecordedTracker::connected(HostTime now) {
 
 void RecordedTracker::disconnected() {
   framer_.reset();
+  connected_at_.reset();
   out_.clear();
   answered_.clear();
   due_.clear();
@@ -156,11 +157,11 @@ void RecordedTracker::carry_out(const Due& due) {
 }
 
 HostTime RecordedTracker::spoken_due() const {
-  if (!played_ || next_ >= connection().spoken.size() || stopped_) return HostTime::max();
+  if (!connected_at_ || next_ >= connection().spoken.size() || stopped_) return HostTime::max();
   const HostTime time = connection().spoken[next_].time;
   if (anchored_) return timeline_.due(time);
   const bool waits = connection().first_start && time >= *connection().first_start;
-  return waits ? HostTime::max() : connected_at_ + (time - connection().began);
+  return waits ? HostTime::max() : *connected_at_ + (time - connection().began);
 }
 
 HostTime RecordedTracker::next_due() const {

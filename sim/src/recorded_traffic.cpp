@@ -34,7 +34,11 @@ class TrafficReader {
   std::vector<RecordedDevice> finish() {
     std::vector<RecordedDevice> devices;
     for (auto& [name, device] : devices_) devices.push_back(std::move(device));
-    for (RecordedDevice& device : devices) device.kind = kind_of(device.blocks);
+    for (RecordedDevice& device : devices) {
+      // The recorder empties one ring after the other: what was sent may stand before what came earlier.
+      std::ranges::stable_sort(device.blocks, {}, &RecordedBlock::time);
+      device.kind = kind_of(device.blocks);
+    }
     return devices;
   }
 

@@ -112,6 +112,14 @@ TEST(RecordedTraffic, FindsTheDevicesOfARecording) {
   EXPECT_TRUE((*devices)[1].blocks[2].to_device);
 }
 
+/// A recorder empties one ring after the other.
+TEST(RecordedTraffic, IsInTheOrderOfTheWireWhateverThatOfTheFile) {
+  RecordedDevice device = recorded_tracker();
+  std::swap(device.blocks[2], device.blocks[1]);
+  const auto read = read_traffic(mcap_file({device}), "file").value();
+  EXPECT_TRUE(std::ranges::is_sorted(read.at(0).blocks, {}, &RecordedBlock::time));
+}
+
 TEST(RecordedTraffic, RefusesAFileThatIsNoRecording) {
   EXPECT_FALSE(read_traffic(std::as_bytes(std::span("PK zip")), "r.mcap"));
   EXPECT_FALSE(read_traffic(mcap_file({}), "r.mcap"));
@@ -218,6 +226,24 @@ TEST(RecordedTracker, BreaksTheConnectionThatBrokeAndGoesOnOnTheNext) {
   tracker.connected(kNow + 3s);
   const auto answer = emscon::decode_answer(reply(tracker, emscon::GetSystemStatus{}, kNow + 3s));
   EXPECT_EQ(std::get<emscon::SystemStatusAnswer>(answer.value()).serial_number, 4712);
+}
+
+TEST(RecordedTracker, KeepsWhatComesOfItselfUntilSomebodyIsThere) {
+  ReplayTimeline timeline;
+  RecordedDevice device = recorded_tracker();
+  device.blocks.insert(device.blocks.begin(), {{kThen, false, false, {}},
+                                               {kThen + 1ms, false, false,
+                                                packed(emscon::StatusChange{emscon::Event::ServerStarted})},
+                                               {kThen + 2ms, false, false, {}}});
+  RecordedTracker tracker(device, timeline);
+  tracker.connected(kNow);
+  tracker.disconnected();
+  tracker.advance(kNow + 1s);
+  EXPECT_TRUE(tracker.take_output().empty());
+  tracker.connected(kNow + 2s);
+  reply(tracker, emscon::StartMeasurement{}, kNow + 2s);
+  tracker.advance(kNow + 3s);
+  EXPECT_EQ(tracker.take_output(), packed(emscon::StatusChange{emscon::Event::MeasurementNotReady}));
 }
 
 TEST(RecordedTracker, SaysWhatIsNoPacketAsItCame) {

@@ -75,8 +75,8 @@ class RecordedTracker {
   protocol::emscon::PacketFramer framer_;
   std::vector<Connection> connections_;
   std::size_t connection_ = 0;
-  bool played_ = false;  ///< the present connection has been begun
-  HostTime connected_at_{};
+  bool played_ = false;                           ///< the present connection has been begun
+  std::optional<HostTime> connected_at_;          ///< nothing: nobody listens
   std::map<std::int32_t, std::size_t> answered_;  ///< on the present connection
   std::deque<Due> due_;
   std::size_t next_ = 0;   ///< of what is spoken

@@ -156,5 +156,13 @@ TEST(Recovery, OfTheEnvironment) {
                             {"garbage", FaultKind::ModbusGarbage, 200ms}});
 }
 
+TEST(Recovery, OfTheEnvironmentOnASerialLine) {
+  measure_all<SerialEnvironment>(FaultTarget::Environment,
+                                 {{"mute", FaultKind::Mute, 600ms, 1.0},
+                                  {"plugged out and in", FaultKind::Disconnect, 100ms},
+                                  {"exception", FaultKind::ModbusException, 200ms, 0.5, 6},
+                                  {"garbage", FaultKind::ModbusGarbage, 200ms}});
+}
+
 }  // namespace
 }  // namespace abbe::tests

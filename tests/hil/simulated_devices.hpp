@@ -2,6 +2,9 @@
 /// Each driver with its simulated device, for whoever gives the device a thread (ServedDevices) and the
 /// driver its turns.
 
+#include <fmt/format.h>
+#include <unistd.h>
+
 #include "abbe/drivers/can/encoder_device.hpp"
 #include "abbe/drivers/can/udp_can_bus.hpp"
 #include "abbe/drivers/counter_card/device.hpp"
@@ -140,6 +143,30 @@ struct Environment {
     options.map =
         drivers::known_map("comet-t7510", {.serial_number = sim::ModbusIdentity{}.serial_number}).value();
     options.period = kPeriod;
+    device = drivers::EnvironmentDevice::create(options, monotonic()).value();
+  }
+  std::size_t pop(Heads* heads = nullptr) {
+    return pop_all<protocol::EnvironmentSample>(device->samples(), heads);
+  }
+  [[nodiscard]] ServedDevices::Peer peer() const { return peer_of(*simulation); }
+
+  std::unique_ptr<sim::Simulation> simulation;
+  std::unique_ptr<drivers::EnvironmentDevice> device;
+};
+
+struct SerialEnvironment {
+  static constexpr const char* kName = "environment, Modbus RTU each 100 ms";
+
+  explicit SerialEnvironment(const Faults& faults = {}) {
+    const std::string link = fmt::format("/tmp/abbe-hil-{}-line", ::getpid());
+    sim::SimulationSetup setup;
+    setup.environment.push_back({.endpoint = sim::ModbusPtyEndpoint{link}});
+    simulation = open_simulation(setup, faults);
+    drivers::EnvironmentDeviceOptions options;
+    options.address = drivers::ModbusSerial{.path = link};
+    options.map =
+        drivers::known_map("comet-t7510", {.serial_number = sim::ModbusIdentity{}.serial_number}).value();
+    options.period = 100ms;
     device = drivers::EnvironmentDevice::create(options, monotonic()).value();
   }
   std::size_t pop(Heads* heads = nullptr) {

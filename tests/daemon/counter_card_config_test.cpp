@@ -52,8 +52,9 @@ TEST(CounterCardConfig, ReadsItsWiringInSi) {
 TEST(CounterCardConfig, StretchesTimeOutsWithTheSpeedOfTheSimulation) {
   const auto config = parse_config(card(kAxes), "abbed.toml");
   ASSERT_TRUE(config);
-  EXPECT_EQ(device_options(*config->counter_card, 10.0).session.silence, std::chrono::seconds{1});
-  EXPECT_EQ(device_options(*config->counter_card, 1.0).session.silence, std::chrono::milliseconds{100});
+  const auto real = device_options(*config->counter_card, 1.0).session.silence;
+  EXPECT_GT(real, std::chrono::milliseconds{0});
+  EXPECT_EQ(device_options(*config->counter_card, 10.0).session.silence, 10 * real);
 }
 
 TEST(CounterCardConfig, RefusesAnAxisScaleOfZero) {

@@ -7,12 +7,12 @@
 #include <exception>
 #include <string>
 
+#include "abbe/daemon/topics.hpp"
 #include "cdr_bounds.hpp"
 
 namespace abbe::daemon {
 namespace {
 
-constexpr std::size_t kHeaderBytes = 4;
 constexpr std::size_t kMaxPaddingBytes = 3;
 
 template <class T>
@@ -40,7 +40,7 @@ template <class T>
 Result<void> encode(const T& value, std::vector<std::byte>& payload) {
   payload.clear();
   if (const std::string broken = broken_bound(value); !broken.empty()) return refuse<T>("encode", broken);
-  payload.resize(kHeaderBytes + T::getCdrSerializedSize(value));
+  payload.resize(kCdrHeaderBytes + T::getCdrSerializedSize(value));
   try {
     eprosima::fastcdr::FastBuffer buffer(reinterpret_cast<char*>(payload.data()), payload.size());
     auto cdr = little_endian_cdr(buffer);
@@ -56,7 +56,7 @@ Result<void> encode(const T& value, std::vector<std::byte>& payload) {
 
 template <class T>
 Result<T> decode(std::span<const std::byte> payload) {
-  if (payload.size() < kHeaderBytes)
+  if (payload.size() < kCdrHeaderBytes)
     return refuse<T>("decode", std::to_string(payload.size()) + " bytes, no header");
   if (payload[0] != std::byte{0} || payload[1] != std::byte{1}) {
     return refuse<T>("decode", "encapsulation is not CDR_LE (00 01)");

@@ -15,7 +15,6 @@ struct Written {
   DdsBridge::WallTime at{};
 };
 
-constexpr std::size_t kHeaderBytes = 4;  // of a CDR payload
 constexpr const char* kSourceLost = "SOURCE_LOST";
 
 bool is_durable(Topic topic) {
@@ -65,7 +64,7 @@ struct DdsBridge::State {
     for (auto beyond = known.lower_bound(*slices); beyond != known.end(); beyond = known.erase(beyond))
       outlet.dispose(Topic::ErrorGrid, beyond->second);
     // The key is all that disposing takes.
-    const std::size_t head = kHeaderBytes + key->bytes.size();
+    const std::size_t head = kCdrHeaderBytes + key->bytes.size();
     known[*key->number].assign(payload.begin(), payload.begin() + static_cast<std::ptrdiff_t>(head));
   }
 

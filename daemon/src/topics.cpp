@@ -20,8 +20,6 @@ constexpr std::array<TopicTraits, kTopicCount> kTopics{{
      Key::Machine, 10s},
 }};
 
-constexpr std::size_t kHeaderBytes = 4;
-
 /// Reads CDR_LE from the end of the encapsulation header on, where alignment counts from.
 class KeyReader {
  public:
@@ -68,9 +66,9 @@ std::optional<Topic> topic_from(std::uint8_t value) noexcept {
 }
 
 std::optional<PayloadKey> payload_key(Topic topic, std::span<const std::byte> payload) noexcept {
-  if (payload.size() < kHeaderBytes || payload[0] != std::byte{0} || payload[1] != std::byte{1})
+  if (payload.size() < kCdrHeaderBytes || payload[0] != std::byte{0} || payload[1] != std::byte{1})
     return std::nullopt;
-  KeyReader reader(payload.subspan(kHeaderBytes));
+  KeyReader reader(payload.subspan(kCdrHeaderBytes));
   PayloadKey key;
   const auto machine = reader.text();
   if (!machine) return std::nullopt;
@@ -83,7 +81,7 @@ std::optional<PayloadKey> payload_key(Topic topic, std::span<const std::byte> pa
 
 std::optional<std::uint32_t> grid_slices(std::span<const std::byte> payload) noexcept {
   if (!payload_key(Topic::ErrorGrid, payload)) return std::nullopt;
-  KeyReader reader(payload.subspan(kHeaderBytes));
+  KeyReader reader(payload.subspan(kCdrHeaderBytes));
   static_cast<void>(reader.text());    // machine
   static_cast<void>(reader.number());  // slice
   return reader.number();

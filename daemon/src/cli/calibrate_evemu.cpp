@@ -11,11 +11,10 @@
 #include "cli/commands.hpp"
 #include "cli/follow_calibration.hpp"
 #include "cli/terminal.hpp"
+#include "units.hpp"
 
 namespace abbe::daemon {
 namespace {
-
-constexpr double kMicro_per_1 = 1e6;
 
 struct Arguments {
   FollowOptions follow;
@@ -32,7 +31,7 @@ Result<nlohmann::json> task_of(const Arguments& arguments) {
   if (!arguments.reference.empty()) {
     const auto points = read_errors_csv(arguments.reference);
     if (!points) return tl::make_unexpected(points.error());
-    request.reference = {points->errors, arguments.u_reference_um / kMicro_per_1};
+    request.reference = {points->errors, arguments.u_reference_um / kUmPerM};
     request.sources.push_back(points->source);
   }
   nlohmann::json task = to_json(std::move(request));

@@ -19,6 +19,7 @@
 #include "abbe/daemon/recording_reader.hpp"
 #include "cli/commands.hpp"
 #include "cli/terminal.hpp"
+#include "linear_axes.hpp"
 
 namespace abbe::daemon {
 namespace {
@@ -26,9 +27,6 @@ namespace {
 using nlohmann::json;
 using protocol::ProbeTrigger;
 using protocol::TouchFlag;
-
-// Places of X, Y, Z in a sample: a machine description names its axes in this order.
-constexpr std::size_t kLinearAxes = 3;
 
 struct Arguments {
   std::string recording;
@@ -41,8 +39,7 @@ struct Arguments {
 bool usable(const ProbeTrigger& touch) {
   constexpr protocol::TouchFlags kNotUsable =
       TouchFlag::SpeedUnsteady | TouchFlag::NoPosition | TouchFlag::Refused;
-  const bool known = (touch.missing_mask & ((1u << kLinearAxes) - 1)) == 0;
-  return (touch.touch_flags & kNotUsable) == 0 && touch.axis_count >= kLinearAxes && known;
+  return (touch.touch_flags & kNotUsable) == 0 && has_linear_axes(touch);
 }
 
 Result<std::vector<calib::probe::RecordedTouch>> touches_of(const Arguments& arguments) {

@@ -11,6 +11,7 @@
 #include "cli/daemon_socket.hpp"
 #include "cli/terminal.hpp"
 #include "files/text_file.hpp"
+#include "units.hpp"
 
 namespace abbe::daemon {
 
@@ -66,7 +67,6 @@ nlohmann::json verdict_json(const calib::Verdict& verdict) {
 
 void print_verdict(const calib::Verdict& verdict) {
   constexpr int kGreen = 2, kYellow = 3, kStdout = 1;
-  constexpr double kUmPerM = 1e6;
   fmt::print("held out    {:.3f} um rms without compensation, {:.3f} um with the model\n",
              verdict.held_out.no_compensation_rms_m * kUmPerM, verdict.held_out.candidate_rms_m * kUmPerM);
   fmt::print("gate        {}\n", verdict.accepted ? coloured("would accept", kGreen, kStdout)

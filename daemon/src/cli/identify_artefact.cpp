@@ -12,12 +12,10 @@
 #include "cli/terminal.hpp"
 #include "cli/vector_option.hpp"
 #include "files/text_file.hpp"
+#include "units.hpp"
 
 namespace abbe::daemon {
 namespace {
-
-constexpr double kMmPerM = 1e3;
-constexpr double kUmPerM = 1e6;
 
 struct IdentifyArtefactArguments {
   std::string touches, name, out;

@@ -20,13 +20,13 @@
 #include "cli/opened_recording.hpp"
 #include "cli/terminal.hpp"
 #include "files/text_file.hpp"
+#include "units.hpp"
 
 namespace abbe::daemon {
 
 namespace {
 
 namespace evemu = calib::evemu;
-constexpr double kMicro_per_1 = 1e6;
 
 struct IdentifyEvemuArguments {
   std::string machine, touches, calibrator, errors, recording, reference, keep, out;
@@ -146,7 +146,7 @@ Result<void> read_reference(const IdentifyEvemuArguments& arguments, Input& inpu
   const auto points = read_errors_csv(arguments.reference);
   if (!points) return tl::make_unexpected(points.error());
   input.sources.push_back(points->source);
-  input.reference = RotationPoints{points->errors, arguments.u_reference_um / kMicro_per_1};
+  input.reference = RotationPoints{points->errors, arguments.u_reference_um / kUmPerM};
   return {};
 }
 
@@ -223,7 +223,7 @@ Result<void> write_outputs(const std::filesystem::path& folder, const ModelDocum
 }
 
 double u_rotation_urad(const evemu::Solution& solution) {
-  return kMicro_per_1 * std::sqrt(solution.rotation.cov_rad2.trace() / 3.0);
+  return kUradPerRad * std::sqrt(solution.rotation.cov_rad2.trace() / 3.0);
 }
 
 void print_json(const Outcome& outcome, const ModelDocument& document, const std::filesystem::path& folder) {
@@ -241,14 +241,14 @@ void print_json(const Outcome& outcome, const ModelDocument& document, const std
                         {"rank", s.rank},
                         {"condition", s.condition},
                         {"effective_parameters", s.effective_parameters},
-                        {"noise_um", s.s_m * kMicro_per_1},
-                        {"pose_rotation_urad", s.w_rad * kMicro_per_1},
+                        {"noise_um", s.s_m * kUmPerM},
+                        {"pose_rotation_urad", s.w_rad * kUradPerRad},
                         {"u_mean_rotation_urad", u_rotation_urad(*outcome.solution)},
                         {"shape_only", !outcome.solution->rotation.referenced},
-                        {"residual_rms_before_um", s.before.rms_m * kMicro_per_1},
-                        {"residual_rms_after_um", s.after.rms_m * kMicro_per_1},
-                        {"held_out_rms_before_um", held_out.no_compensation_rms_m * kMicro_per_1},
-                        {"held_out_rms_after_um", held_out.candidate_rms_m * kMicro_per_1},
+                        {"residual_rms_before_um", s.before.rms_m * kUmPerM},
+                        {"residual_rms_after_um", s.after.rms_m * kUmPerM},
+                        {"held_out_rms_before_um", held_out.no_compensation_rms_m * kUmPerM},
+                        {"held_out_rms_after_um", held_out.candidate_rms_m * kUmPerM},
                         {"gate", verdict_json(outcome.verdict)}};
   if (const auto& choice = outcome.solution->sparse)
     object["chosen"] = {{"lambda", choice->lambda.back()}, {"gamma", choice->gamma}};
@@ -264,13 +264,13 @@ void print_summary(const Outcome& outcome, const ModelDocument& document,
   fmt::print(
       "solution    {}: {} observations, rank {} of {}, condition {:.3g}, {:.1f} effective parameters\n",
       document.estimator, s.observations, s.rank, s.unknowns, s.condition, s.effective_parameters);
-  fmt::print("noise       {:.2f} um per ball coordinate, {:.1f} urad per position\n", s.s_m * kMicro_per_1,
-             s.w_rad * kMicro_per_1);
+  fmt::print("noise       {:.2f} um per ball coordinate, {:.1f} urad per position\n", s.s_m * kUmPerM,
+             s.w_rad * kUradPerRad);
   if (const auto& choice = outcome.solution->sparse)
     fmt::print("chosen      lambda {:.3g}, gamma {:.3g}{}\n", choice->lambda.back(), choice->gamma,
                choice->curvature < 0.0 ? "; not convex there: other solutions may be near" : "");
-  fmt::print("residuals   {:.3f} um rms before, {:.3f} um after\n", s.before.rms_m * kMicro_per_1,
-             s.after.rms_m * kMicro_per_1);
+  fmt::print("residuals   {:.3f} um rms before, {:.3f} um after\n", s.before.rms_m * kUmPerM,
+             s.after.rms_m * kUmPerM);
   fmt::print("rotation    {}, u = {:.1f} urad about Ball1\n",
              outcome.solution->rotation.referenced ? "referenced" : "that of the blocks: shape only",
              u_rotation_urad(*outcome.solution));

@@ -19,6 +19,7 @@
 #include "cli/opened_recording.hpp"
 #include "cli/terminal.hpp"
 #include "files/text_file.hpp"
+#include "units.hpp"
 
 namespace abbe::daemon {
 
@@ -161,8 +162,6 @@ Result<void> write_outputs(const std::filesystem::path& folder, const Outcome& o
                         {"report.html", otf_report(document, outcome.residuals, outcome.verdict)}});
 }
 
-constexpr double kMicro = 1e6;
-
 void print_json(const Outcome& outcome, const std::filesystem::path& folder) {
   const auto& s = outcome.document.statistics;
   const nlohmann::json object{
@@ -179,10 +178,10 @@ void print_json(const Outcome& outcome, const std::filesystem::path& folder) {
       {"condition", s.condition},
       {"sigma0", s.sigma0},
       {"covariance_factor", s.covariance_factor},
-      {"residual_rms_before_um", s.before.rms_m * kMicro},
-      {"residual_rms_after_um", s.after.rms_m * kMicro},
-      {"held_out_rms_before_um", outcome.verdict.held_out.no_compensation_rms_m * kMicro},
-      {"held_out_rms_after_um", outcome.verdict.held_out.candidate_rms_m * kMicro},
+      {"residual_rms_before_um", s.before.rms_m * kUmPerM},
+      {"residual_rms_after_um", s.after.rms_m * kUmPerM},
+      {"held_out_rms_before_um", outcome.verdict.held_out.no_compensation_rms_m * kUmPerM},
+      {"held_out_rms_after_um", outcome.verdict.held_out.candidate_rms_m * kUmPerM},
       {"gate", verdict_json(outcome.verdict)}};
   fmt::print("{}\n", object.dump(1));
 }
@@ -195,8 +194,8 @@ void print_summary(const Outcome& outcome, const std::filesystem::path& folder) 
              outcome.blocks_used, outcome.blocks);
   fmt::print("solution    {} observations, {} unknowns, rank {}, condition {:.3g}, sigma0 {:.3f}\n",
              s.observations, s.unknowns, s.rank, s.condition, s.sigma0);
-  fmt::print("residuals   {:.3f} um rms before, {:.3f} um after\n", s.before.rms_m * kMicro,
-             s.after.rms_m * kMicro);
+  fmt::print("residuals   {:.3f} um rms before, {:.3f} um after\n", s.before.rms_m * kUmPerM,
+             s.after.rms_m * kUmPerM);
   print_verdict(outcome.verdict);
   fmt::print("written     {}, tables.csv, report.html\n", (folder / "model.json").string());
 }

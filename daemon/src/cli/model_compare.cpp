@@ -10,11 +10,10 @@
 #include "cli/commands.hpp"
 #include "cli/store_option.hpp"
 #include "cli/terminal.hpp"
+#include "units.hpp"
 
 namespace abbe::daemon {
 namespace {
-
-constexpr double kMicro = 1e6;
 
 struct Arguments {
   std::string a, b;
@@ -53,12 +52,12 @@ Result<Comparison> compare(const Arguments& arguments) {
 }
 
 nlohmann::json figures(const calib::VectorStatistics& s) {
-  return {{"mean_um", s.mean_m * kMicro}, {"rms_um", s.rms_m * kMicro}, {"max_um", s.max_m * kMicro}};
+  return {{"mean_um", s.mean_m * kUmPerM}, {"rms_um", s.rms_m * kUmPerM}, {"max_um", s.max_m * kUmPerM}};
 }
 
 void print(const char* what, const calib::VectorStatistics& s) {
-  fmt::print("{:<24}  {:>9.3f}  {:>9.3f}  {:>9.3f}\n", what, s.mean_m * kMicro, s.rms_m * kMicro,
-             s.max_m * kMicro);
+  fmt::print("{:<24}  {:>9.3f}  {:>9.3f}  {:>9.3f}\n", what, s.mean_m * kUmPerM, s.rms_m * kUmPerM,
+             s.max_m * kUmPerM);
 }
 
 int run(const Arguments& arguments) {

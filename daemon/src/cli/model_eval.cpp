@@ -11,13 +11,11 @@
 #include "cli/store_option.hpp"
 #include "cli/terminal.hpp"
 #include "cli/vector_option.hpp"
+#include "units.hpp"
 
 namespace abbe::daemon {
 
 namespace {
-
-constexpr double kMmPerM = 1e3;
-constexpr double kUmPerM = 1e6;
 
 struct Arguments {
   std::string model, points, tool;

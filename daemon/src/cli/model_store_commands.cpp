@@ -11,6 +11,7 @@
 #include "cli/store_option.hpp"
 #include "cli/terminal.hpp"
 #include "model/utc_text.hpp"
+#include "units.hpp"
 
 namespace abbe::daemon {
 
@@ -71,7 +72,6 @@ int list(const Arguments& arguments) {
 }
 
 void print_model(const ModelDocument& document, const StoreEntry& entry) {
-  constexpr double kMicro = 1e6;
   const auto& s = document.statistics;
   fmt::print("id          {}\nstate       {}\nadded       {}\n", entry.id, state_of(entry),
              to_text(entry.added));
@@ -81,8 +81,8 @@ void print_model(const ModelDocument& document, const StoreEntry& entry) {
              document.method, document.estimator, name(document.model.gauge()));
   fmt::print("solution    {} observations, {} unknowns, rank {}, condition {:.3g}, sigma0 {:.3f}\n",
              s.observations, s.unknowns, s.rank, s.condition, s.sigma0);
-  fmt::print("residuals   {:.3f} um rms before, {:.3f} um after\n", s.before.rms_m * kMicro,
-             s.after.rms_m * kMicro);
+  fmt::print("residuals   {:.3f} um rms before, {:.3f} um after\n", s.before.rms_m * kUmPerM,
+             s.after.rms_m * kUmPerM);
   for (const auto& input : document.inputs)
     fmt::print("input       {}  sha256 {}\n", input.name, input.sha256);
   fmt::print("\n{}", to_tables_csv(document.model));

@@ -5,12 +5,10 @@
 #include <charconv>
 #include <cmath>
 
+#include "units.hpp"
+
 namespace abbe::daemon {
-namespace {
-
-constexpr double kMmPerM = 1e3;
-
-}  // namespace
+namespace {}  // namespace
 
 Result<calib::Vector3> parse_mm(const std::string& option, const std::string& text) {
   const auto nonsense = [&] {

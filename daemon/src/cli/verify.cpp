@@ -18,13 +18,12 @@
 #include "cli/vector_option.hpp"
 #include "cli/verification_points.hpp"
 #include "files/text_file.hpp"
+#include "units.hpp"
 
 namespace abbe::daemon {
 namespace {
 
 namespace verify = calib::verify;
-constexpr double kMicro = 1e6;
-constexpr double kMilli = 1e3;
 
 struct VerifyArguments {
   std::string model, points, recording, out;
@@ -56,7 +55,7 @@ Result<verify::Options> options_of(const VerifyArguments& arguments) {
       return fail(ErrorCode::Usage, fmt::format("--grid-mm \"{}\": must be positive", arguments.grid));
     options.step_m = *step;
   }
-  if (arguments.least_distance_mm) options.least_distance_m = *arguments.least_distance_mm / kMilli;
+  if (arguments.least_distance_mm) options.least_distance_m = *arguments.least_distance_mm / kMmPerM;
   return options;
 }
 
@@ -113,7 +112,7 @@ Result<VerifyOutcome> compare(const VerifyArguments& arguments) {
 }
 
 nlohmann::json figures(const calib::VectorStatistics& s) {
-  return {{"mean_um", kMicro * s.mean_m}, {"rms_um", kMicro * s.rms_m}, {"max_um", kMicro * s.max_m}};
+  return {{"mean_um", kUmPerM * s.mean_m}, {"rms_um", kUmPerM * s.rms_m}, {"max_um", kUmPerM * s.max_m}};
 }
 
 nlohmann::json figures(const verify::RatioStatistics& s) {
@@ -132,15 +131,16 @@ nlohmann::json figures(const verify::RatioStatistics& s) {
 void print_json(const VerifyOutcome& outcome) {
   const auto& c = outcome.verification.comparison;
   const auto& turned = c.turned;
-  nlohmann::json object{{"model", model_id(outcome.document)},
-                        {"points", outcome.verification.observations.readings_m.size()},
-                        {"inside", c.inside.size()},
-                        {"before", figures(c.before)},
-                        {"after", figures(c.after)},
-                        {"R_turned", figures(c.R_turned)},
-                        {"R_stated", figures(c.R_stated)},
-                        {"turned_urad", {kMicro * turned(3), kMicro * turned(4), kMicro * turned(5)}},
-                        {"interpolation_rms_um", kMicro * c.interpolation_rms_m}};
+  nlohmann::json object{
+      {"model", model_id(outcome.document)},
+      {"points", outcome.verification.observations.readings_m.size()},
+      {"inside", c.inside.size()},
+      {"before", figures(c.before)},
+      {"after", figures(c.after)},
+      {"R_turned", figures(c.R_turned)},
+      {"R_stated", figures(c.R_stated)},
+      {"turned_urad", {kUradPerRad * turned(3), kUradPerRad * turned(4), kUradPerRad * turned(5)}},
+      {"interpolation_rms_um", kUmPerM * c.interpolation_rms_m}};
   fmt::print("{}\n", object.dump(1));
 }
 
@@ -158,16 +158,16 @@ void print_summary(const VerifyOutcome& outcome, const VerifyArguments& argument
              c.inside.size());
   fmt::print(
       "left        {:.3f} um rms (largest {:.3f}) without compensation, {:.3f} um ({:.3f}) with the model\n",
-      kMicro * c.before.rms_m, kMicro * c.before.max_m, kMicro * c.after.rms_m, kMicro * c.after.max_m);
+      kUmPerM * c.before.rms_m, kUmPerM * c.before.max_m, kUmPerM * c.after.rms_m, kUmPerM * c.after.max_m);
   fmt::print("frame       {}; model turned by {:.1f}, {:.1f}, {:.1f} urad\n",
              arguments.frame == "fit" ? "fitted to the readings: V's best rigid motion is not seen"
                                       : "the machine's axes",
-             kMicro * c.turned(3), kMicro * c.turned(4), kMicro * c.turned(5));
+             kUradPerRad * c.turned(3), kUradPerRad * c.turned(4), kUradPerRad * c.turned(5));
   fmt::print("{:<11} {:>7} {:>7} {:>7} {:>7} {:>7} {:>7} {:>7} {:>7} {:>8}\n", "R_resmag", "points", "mean",
              "std", "min", "25 %", "median", "75 %", "max", "above 1");
   print_ratio("  turned", c.R_turned);
   print_ratio("  as stated", c.R_stated);
-  fmt::print("grid        interpolation alone costs {:.3f} um rms\n", kMicro * c.interpolation_rms_m);
+  fmt::print("grid        interpolation alone costs {:.3f} um rms\n", kUmPerM * c.interpolation_rms_m);
   if (!arguments.out.empty())
     fmt::print("written     {}, grid.csv\n", (std::filesystem::path(arguments.out) / "report.html").string());
 }

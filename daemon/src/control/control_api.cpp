@@ -11,6 +11,7 @@
 
 #include "abbe/daemon/control_protocol.hpp"
 #include "control/refusal.hpp"
+#include "units.hpp"
 
 namespace abbe::daemon {
 namespace {
@@ -33,10 +34,6 @@ std::string_view status_name(v1::ModelStatus status) {
   return "INVALID";
 }
 
-double seconds(std::chrono::nanoseconds t) {
-  return std::chrono::duration<double>(t).count();
-}
-
 json device_json(const StreamHealth& h) {
   const auto& d = h.status;
   return {{"name", d.name},
@@ -51,8 +48,8 @@ json device_json(const StreamHealth& h) {
           {"clock",
            {{"settled", d.clock.settled},
             {"skew_ppm", d.clock.skew * 1e6},
-            {"residual_s", seconds(d.clock.residual)},
-            {"u_time_s", seconds(d.clock.u_time)}}},
+            {"residual_s", in_seconds(d.clock.residual)},
+            {"u_time_s", in_seconds(d.clock.u_time)}}},
           {"latency_p50_s", h.latency_p50_s},
           {"latency_p99_s", h.latency_p99_s}};
 }

@@ -4,21 +4,19 @@
 #include <cmath>
 #include <cstddef>
 
+#include "linear_axes.hpp"
+
 namespace abbe::daemon {
 
 namespace {
 
 using protocol::SampleFlag;
 
-constexpr std::size_t kLinearAxes = 3;
-constexpr unsigned kXyz = 0b111;
-
 }  // namespace
 
 bool axes_known(const protocol::Snapshot& view) noexcept {
   const auto flags = view.head.flags;
-  return view.axis_count >= kLinearAxes && (view.missing_mask & kXyz) == 0 &&
-         !has(flags, SampleFlag::BusOff) && !has(flags, SampleFlag::DeviceError) &&
+  return has_linear_axes(view) && !has(flags, SampleFlag::BusOff) && !has(flags, SampleFlag::DeviceError) &&
          std::all_of(view.position.begin(), view.position.begin() + kLinearAxes,
                      [](double q) { return std::isfinite(q); });
 }

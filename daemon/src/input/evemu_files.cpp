@@ -10,14 +10,13 @@
 #include "abbe/daemon/sha256.hpp"
 #include "config/section.hpp"
 #include "files/text_file.hpp"
-#include "input/number_table.hpp"
+#include "input/parsed_table.hpp"
+#include "units.hpp"
 
 namespace abbe::daemon {
 
 namespace {
 
-constexpr double kMmPerM = 1e3;
-constexpr double kUmPerM = 1e6;
 constexpr int kMostNumber = 1000;  // of positions and features: far above any procedure, far below overflow
 
 /// A whole number from 1; a fault otherwise.
@@ -32,22 +31,6 @@ int number_at(const NumberTable& table, std::size_t row, std::size_t column, std
 
 calib::Vector3 vector_at(const NumberTable& table, std::size_t row, std::size_t first, double per_m) {
   return {table.at(row, first) / per_m, table.at(row, first + 1) / per_m, table.at(row, first + 2) / per_m};
-}
-
-struct Parsed {
-  InputFile source;
-  NumberTable table;
-  Faults faults;
-};
-
-Result<Parsed> parse(const std::filesystem::path& file, const TableForm& form) {
-  const auto text = read_text(file);
-  if (!text) return tl::make_unexpected(text.error());
-  Faults faults(file.string());
-  auto table = parse_numbers(*text, {form}, faults);
-  if (table && table->rows() == 0) faults.add(1, 1, "", "has no rows");
-  if (!table) return tl::make_unexpected(faults.to_error());
-  return Parsed{{file.filename().string(), sha256_hex(*text)}, std::move(*table), std::move(faults)};
 }
 
 void read_balls(Section& root, calib::evemu::Calibrator& out) {
@@ -113,9 +96,10 @@ calib::evemu::Calibrator read_calibrator(Section& root, std::array<std::optional
 }  // namespace
 
 Result<TouchesFile> read_touches_csv(const std::filesystem::path& file) {
-  auto parsed =
-      parse(file, {{"position"}, {"kind", true, {"ball", "block"}}, {"index"}, {"x_mm"}, {"y_mm"}, {"z_mm"}});
+  auto parsed = parse_table(
+      file, {{{"position"}, {"kind", true, {"ball", "block"}}, {"index"}, {"x_mm"}, {"y_mm"}, {"z_mm"}}});
   if (!parsed) return tl::make_unexpected(parsed.error());
+  check_rows(*parsed, 1, "touches");
   auto& [source, table, faults] = *parsed;
   TouchesFile out{source, {}};
   for (std::size_t row = 0; row < table.rows(); ++row)
@@ -129,9 +113,10 @@ Result<TouchesFile> read_touches_csv(const std::filesystem::path& file) {
 }
 
 Result<BallErrorsFile> read_errors_csv(const std::filesystem::path& file) {
-  auto parsed =
-      parse(file, {{"position"}, {"ball"}, {"x_mm"}, {"y_mm"}, {"z_mm"}, {"ex_um"}, {"ey_um"}, {"ez_um"}});
+  auto parsed = parse_table(
+      file, {{{"position"}, {"ball"}, {"x_mm"}, {"y_mm"}, {"z_mm"}, {"ex_um"}, {"ey_um"}, {"ez_um"}}});
   if (!parsed) return tl::make_unexpected(parsed.error());
+  check_rows(*parsed, 1, "errors");
   auto& [source, table, faults] = *parsed;
   BallErrorsFile out{source, {}};
   for (std::size_t row = 0; row < table.rows(); ++row)

@@ -6,50 +6,23 @@
 #include <numbers>
 
 #include "abbe/calib/geometry.hpp"
-#include "abbe/daemon/sha256.hpp"
-#include "files/text_file.hpp"
-#include "input/number_table.hpp"
+#include "input/parsed_table.hpp"
+#include "units.hpp"
 
 namespace abbe::daemon {
 
 namespace {
 
-constexpr double kMmPerM = 1e3;
-constexpr double kUmPerM = 1e6;
 constexpr double kSecondsPerMinute = 60.0;
-
-struct Parsed {
-  InputFile source;
-  NumberTable table;
-  Faults faults;
-};
-
-/// Reads, hashes and parses; semantic checks of the caller go to `faults`, settle() gives the verdict.
-Result<Parsed> parse(const std::filesystem::path& file, const std::vector<TableForm>& forms,
-                     const ReadProgress& progress = {}) {
-  const auto text = read_text(file);
-  if (!text) return tl::make_unexpected(text.error());
-  Faults faults(file.string());
-  auto table = parse_numbers(*text, forms, faults, progress);
-  if (!table) return tl::make_unexpected(faults.to_error());
-  return Parsed{{file.filename().string(), sha256_hex(*text)}, std::move(*table), std::move(faults)};
-}
 
 AxisPosition position_m(const NumberTable& table, std::size_t row, std::size_t first) {
   return {table.at(row, first) / kMmPerM, table.at(row, first + 1) / kMmPerM,
           table.at(row, first + 2) / kMmPerM};
 }
 
-void check_rows(Parsed& parsed, std::size_t least, std::string_view what) {
-  const auto& table = parsed.table;
-  if (table.rows() >= least) return;
-  const auto line = table.rows() == 0 ? 1 : table.line(table.rows() - 1);
-  parsed.faults.add(line, 1, "", fmt::format("needs at least {} {}, has {}", least, what, table.rows()));
-}
-
 // Rows with a fault are left out of the checks below: they would only repeat it.
 
-void check_time_ascends(Parsed& parsed) {
+void check_time_ascends(ParsedTable& parsed) {
   const auto& table = parsed.table;
   std::optional<double> before_s;
   for (std::size_t row = 0; row < table.rows(); ++row) {
@@ -62,7 +35,7 @@ void check_time_ascends(Parsed& parsed) {
   }
 }
 
-void check_path(Parsed& parsed) {
+void check_path(ParsedTable& parsed) {
   const auto& table = parsed.table;
   for (std::size_t row = 0; row < table.rows(); ++row) {
     if (!table.sound(row)) continue;
@@ -75,7 +48,7 @@ void check_path(Parsed& parsed) {
 
 constexpr std::size_t kSpherical = 0;  // index of the form
 
-void check_spherical(Parsed& parsed) {
+void check_spherical(ParsedTable& parsed) {
   const auto& table = parsed.table;
   if (table.form() != kSpherical) return;
   for (std::size_t row = 0; row < table.rows(); ++row) {
@@ -106,7 +79,7 @@ calib::otf::TrackerObservation observation(const NumberTable& table, std::size_t
 }  // namespace
 
 Result<PathFile> read_path_csv(const std::filesystem::path& file) {
-  auto parsed = parse(file, {{{"x_mm"}, {"y_mm"}, {"z_mm"}, {"feed_mm_per_min", false}}});
+  auto parsed = parse_table(file, {{{"x_mm"}, {"y_mm"}, {"z_mm"}, {"feed_mm_per_min", false}}});
   if (!parsed) return tl::make_unexpected(parsed.error());
   check_rows(*parsed, 2, "vertices");
   check_path(*parsed);
@@ -121,10 +94,11 @@ Result<PathFile> read_path_csv(const std::filesystem::path& file) {
 }
 
 Result<TrackerFile> read_tracker_csv(const std::filesystem::path& file, const ReadProgress& progress) {
-  auto parsed = parse(file,
-                      {{{"time_s"}, {"range_mm"}, {"azimuth_rad"}, {"elevation_rad"}, {"status", false}},
-                       {{"time_s"}, {"x_mm"}, {"y_mm"}, {"z_mm"}, {"status", false}}},
-                      progress);
+  auto parsed =
+      parse_table(file,
+                  {{{"time_s"}, {"range_mm"}, {"azimuth_rad"}, {"elevation_rad"}, {"status", false}},
+                   {{"time_s"}, {"x_mm"}, {"y_mm"}, {"z_mm"}, {"status", false}}},
+                  progress);
   if (!parsed) return tl::make_unexpected(parsed.error());
   check_rows(*parsed, 1, "points");
   check_time_ascends(*parsed);
@@ -138,7 +112,7 @@ Result<TrackerFile> read_tracker_csv(const std::filesystem::path& file, const Re
 }
 
 Result<EncoderFile> read_encoder_csv(const std::filesystem::path& file, const ReadProgress& progress) {
-  auto parsed = parse(file, {{{"time_s"}, {"x_mm"}, {"y_mm"}, {"z_mm"}}}, progress);
+  auto parsed = parse_table(file, {{{"time_s"}, {"x_mm"}, {"y_mm"}, {"z_mm"}}}, progress);
   if (!parsed) return tl::make_unexpected(parsed.error());
   check_rows(*parsed, 1, "readings");
   check_time_ascends(*parsed);
@@ -151,7 +125,7 @@ Result<EncoderFile> read_encoder_csv(const std::filesystem::path& file, const Re
 }
 
 Result<PointsFile> read_points_csv(const std::filesystem::path& file) {
-  auto parsed = parse(file, {{{"x_mm"}, {"y_mm"}, {"z_mm"}}});
+  auto parsed = parse_table(file, {{{"x_mm"}, {"y_mm"}, {"z_mm"}}});
   if (!parsed) return tl::make_unexpected(parsed.error());
   check_rows(*parsed, 1, "points");
   if (parsed->faults.any()) return tl::make_unexpected(parsed->faults.to_error());
@@ -162,16 +136,16 @@ Result<PointsFile> read_points_csv(const std::filesystem::path& file) {
 }
 
 Result<KnownErrorsFile> read_known_errors_csv(const std::filesystem::path& file) {
-  auto parsed = parse(file, {{{"x_mm"},
-                              {"y_mm"},
-                              {"z_mm"},
-                              {"ex_um"},
-                              {"ey_um"},
-                              {"ez_um"},
-                              {"ux_um", false},
-                              {"uy_um", false},
-                              {"uz_um", false},
-                              {"inside", false}}});
+  auto parsed = parse_table(file, {{{"x_mm"},
+                                    {"y_mm"},
+                                    {"z_mm"},
+                                    {"ex_um"},
+                                    {"ey_um"},
+                                    {"ez_um"},
+                                    {"ux_um", false},
+                                    {"uy_um", false},
+                                    {"uz_um", false},
+                                    {"inside", false}}});
   if (!parsed) return tl::make_unexpected(parsed.error());
   check_rows(*parsed, 1, "points");
   if (parsed->faults.any()) return tl::make_unexpected(parsed->faults.to_error());
@@ -186,8 +160,8 @@ Result<KnownErrorsFile> read_known_errors_csv(const std::filesystem::path& file)
 }
 
 Result<VerificationFile> read_verification_csv(const std::filesystem::path& file) {
-  auto parsed =
-      parse(file, {{{"x_mm"}, {"y_mm"}, {"z_mm"}, {"tracker_x_mm"}, {"tracker_y_mm"}, {"tracker_z_mm"}}});
+  auto parsed = parse_table(
+      file, {{{"x_mm"}, {"y_mm"}, {"z_mm"}, {"tracker_x_mm"}, {"tracker_y_mm"}, {"tracker_z_mm"}}});
   if (!parsed) return tl::make_unexpected(parsed.error());
   check_rows(*parsed, 1, "points");
   if (parsed->faults.any()) return tl::make_unexpected(parsed->faults.to_error());

@@ -10,13 +10,12 @@
 #include "abbe/daemon/html_report.hpp"
 #include "model/utc_text.hpp"
 #include "report/sections.hpp"
+#include "units.hpp"
 
 namespace abbe::daemon {
 namespace {
 
 namespace evemu = calib::evemu;
-constexpr double kMicro = 1e6;
-constexpr double kMilli = 1e3;
 
 void add_verdict(HtmlReport& page, const calib::Verdict& verdict) {
   add_verdict(page, verdict, "positions");
@@ -28,7 +27,7 @@ void add_verdict(HtmlReport& page, const calib::Verdict& verdict) {
 void add_rotation(HtmlReport& page, const evemu::Solution& solution) {
   page.heading("The rotation nobody sees");
   const auto& rotation = solution.rotation;
-  const double u_urad = kMicro * std::sqrt(rotation.cov_rad2.trace() / 3.0);
+  const double u_urad = kUradPerRad * std::sqrt(rotation.cov_rad2.trace() / 3.0);
   page.paragraph(
       rotation.referenced
           ? "The rotation of the volume about Ball1 is referenced: it was known from elsewhere."
@@ -50,8 +49,8 @@ void add_rotation(HtmlReport& page, const evemu::Solution& solution) {
   page.facts({{"standard uncertainty of the rotation (in the model's covariance)",
                fmt::format("{:.1f} urad per axis", u_urad)},
               {"rotation taken out of the estimate",
-               fmt::format("{:.1f}, {:.1f}, {:.1f} urad", kMicro * rotation.removed_rad.x(),
-                           kMicro * rotation.removed_rad.y(), kMicro * rotation.removed_rad.z())}});
+               fmt::format("{:.1f}, {:.1f}, {:.1f} urad", kUradPerRad * rotation.removed_rad.x(),
+                           kUradPerRad * rotation.removed_rad.y(), kUradPerRad * rotation.removed_rad.z())}});
 }
 
 /// Components of all balls but Ball1, um.
@@ -61,7 +60,7 @@ std::vector<double> components_um(const evemu::Observations& o, const evemu::Sol
   for (std::size_t i = 0; i < o.rows.size(); ++i) {
     if (o.rows[i].ball == 1) continue;
     const calib::Vector3& v = before ? o.rows[i].V_m : solution.residuals_m[i];
-    for (const double component : v) out.push_back(component * kMicro);
+    for (const double component : v) out.push_back(component * kUmPerM);
   }
   return out;
 }
@@ -87,7 +86,7 @@ void add_residuals(HtmlReport& page, const evemu::Observations& o, const evemu::
       if (chart.curves.empty() || chart.curves.back().name != name)
         chart.curves.push_back({name, {}, {}, {}});
       chart.curves.back().x.push_back(o.rows[i].ball);
-      chart.curves.back().y.push_back(solution.residuals_m[i](c) * kMicro);
+      chart.curves.back().y.push_back(solution.residuals_m[i](c) * kUmPerM);
     }
     page.chart(chart);
   }
@@ -100,12 +99,12 @@ void add_poses(HtmlReport& page, const evemu::Solution& solution) {
       fmt::format("Each position may be turned about Ball1 by what its blocks were misread, {:.1f} urad per "
                   "axis as the data "
                   "have it.",
-                  kMicro * solution.statistics.w_rad));
+                  kUradPerRad * solution.statistics.w_rad));
   std::vector<std::vector<std::string>> rows;
   for (std::size_t p = 0; p < solution.pose_rotations_rad.size(); ++p) {
     const auto& r = solution.pose_rotations_rad[p];
-    rows.push_back({std::to_string(p + 1), fmt::format("{:.1f}", kMicro * r.x()),
-                    fmt::format("{:.1f}", kMicro * r.y()), fmt::format("{:.1f}", kMicro * r.z())});
+    rows.push_back({std::to_string(p + 1), fmt::format("{:.1f}", kUradPerRad * r.x()),
+                    fmt::format("{:.1f}", kUradPerRad * r.y()), fmt::format("{:.1f}", kUradPerRad * r.z())});
   }
   page.table({"position", "about x, urad", "about y, urad", "about z, urad"}, rows);
 }
@@ -163,9 +162,9 @@ void add_sections(HtmlReport& page, const calib::VolumetricModel& model) {
       if (!e.inside) continue;
       for (Eigen::Index c = 0; c < 3; ++c) {
         Curve& curve = chart.curves[static_cast<std::size_t>(c)];
-        curve.x.push_back(q(axis) * kMilli);
-        curve.y.push_back(e.V_m(c) * kMicro);
-        curve.u.push_back(std::sqrt(e.cov_V_m2(c, c)) * kMicro);
+        curve.x.push_back(q(axis) * kMmPerM);
+        curve.y.push_back(e.V_m(c) * kUmPerM);
+        curve.u.push_back(std::sqrt(e.cov_V_m2(c, c)) * kUmPerM);
       }
     }
     page.chart(chart);

@@ -8,12 +8,10 @@
 #include "abbe/daemon/html_report.hpp"
 #include "model/utc_text.hpp"
 #include "report/sections.hpp"
+#include "units.hpp"
 
 namespace abbe::daemon {
 namespace {
-
-constexpr double kMicro = 1e6;
-constexpr double kMilli = 1e3;
 
 constexpr int kDecimals = 3;
 
@@ -60,9 +58,9 @@ LineChart table_chart(const std::vector<calib::Parameter>& parameters, char axis
     if (!p.position_m || p.name.back() != axis || p.is_angle() != angles) continue;
     Curve& curve = curves[p.name];
     curve.name = p.name;
-    curve.x.push_back(*p.position_m * kMilli);
-    curve.y.push_back(p.value * kMicro);
-    curve.u.push_back(p.u * kMicro);
+    curve.x.push_back(*p.position_m * kMmPerM);
+    curve.y.push_back(p.value * kUmPerM);
+    curve.u.push_back(p.u * kUmPerM);
   }
   for (auto& [name, curve] : curves) chart.curves.push_back(std::move(curve));
   return chart;
@@ -84,7 +82,8 @@ void add_tables(HtmlReport& page, const calib::VolumetricModel& model) {
   std::vector<std::vector<std::string>> rows;
   for (const auto& p : parameters) {
     if (!p.position_m)
-      rows.push_back({p.name, fmt::format("{:.3f}", p.value * kMicro), fmt::format("{:.3f}", p.u * kMicro)});
+      rows.push_back(
+          {p.name, fmt::format("{:.3f}", p.value * kUmPerM), fmt::format("{:.3f}", p.u * kUmPerM)});
   }
   page.heading("Squareness");
   page.table({"", "urad", "u, urad"}, rows);

@@ -4,12 +4,10 @@
 
 #include <utility>
 
+#include "units.hpp"
+
 namespace abbe::daemon {
-namespace {
-
-constexpr double kUmPerM = 1e6;
-
-}  // namespace
+namespace {}  // namespace
 
 std::string um_text(double length_m, int decimals) {
   return fmt::format("{:.{}f} um", length_m * kUmPerM, decimals);

@@ -10,27 +10,26 @@
 #include "abbe/daemon/html_report.hpp"
 #include "model/utc_text.hpp"
 #include "report/sections.hpp"
+#include "units.hpp"
 
 namespace abbe::daemon {
 namespace {
 
 namespace verify = calib::verify;
-constexpr double kMicro = 1e6;
-constexpr double kMilli = 1e3;
 constexpr std::array<const char*, 3> kNames{"x", "y", "z"};
 
 std::string mm(const calib::Vector3& p_m) {
-  return fmt::format("{:.3f}, {:.3f}, {:.3f} mm", kMilli * p_m.x(), kMilli * p_m.y(), kMilli * p_m.z());
+  return fmt::format("{:.3f}, {:.3f}, {:.3f} mm", kMmPerM * p_m.x(), kMmPerM * p_m.y(), kMmPerM * p_m.z());
 }
 
 std::string urad(const calib::Vector3& r_rad) {
-  return fmt::format("{:.1f}, {:.1f}, {:.1f} urad", kMicro * r_rad.x(), kMicro * r_rad.y(),
-                     kMicro * r_rad.z());
+  return fmt::format("{:.1f}, {:.1f}, {:.1f} urad", kUradPerRad * r_rad.x(), kUradPerRad * r_rad.y(),
+                     kUradPerRad * r_rad.z());
 }
 
 std::vector<double> lengths_um(const std::vector<calib::Vector3>& v_m) {
   std::vector<double> out;
-  for (const auto& v : v_m) out.push_back(kMicro * v.norm());
+  for (const auto& v : v_m) out.push_back(kUmPerM * v.norm());
   return out;
 }
 
@@ -94,7 +93,7 @@ void add_frame(HtmlReport& page, const Verification& v) {
                c.origin_m ? mm(*c.origin_m) : std::string{"none: means are taken out"}},
               {"model turned by (rotation about the origin)", urad(c.turned.tail<3>())},
               {"grid: multiples of", mm(c.step_m)},
-              {"left out nearer to the origin than", fmt::format("{:.1f} mm", kMilli * c.least_distance_m)},
+              {"left out nearer to the origin than", fmt::format("{:.1f} mm", kMmPerM * c.least_distance_m)},
               {"what interpolating V_las linearly costs (seen on the model itself)",
                um_text(c.interpolation_rms_m) + " rms"}});
 }
@@ -161,7 +160,7 @@ using VectorAt = calib::Vector3 (*)(const verify::GridPoint&);
 
 void add_vectors(HtmlReport& page, const Plane& plane, const char* name, double magnification, VectorAt at) {
   VectorChart chart{.title = fmt::format("{}, {} = {:.3f} mm, arrows x {:g}", name,
-                                         kNames[static_cast<std::size_t>(plane.across)], kMilli * plane.at_m,
+                                         kNames[static_cast<std::size_t>(plane.across)], kMmPerM * plane.at_m,
                                          magnification),
                     .x_label = fmt::format("{}, mm", kNames[static_cast<std::size_t>(plane.right)]),
                     .y_label = fmt::format("{}, mm", kNames[static_cast<std::size_t>(plane.up)]),
@@ -169,9 +168,9 @@ void add_vectors(HtmlReport& page, const Plane& plane, const char* name, double 
                     .arrows = {},
                     .magnification = magnification};
   for (const auto* g : plane.points) {
-    const calib::Vector3 v = kMilli * at(*g);
+    const calib::Vector3 v = kMmPerM * at(*g);
     chart.arrows.push_back(
-        {kMilli * g->q_m(plane.right), kMilli * g->q_m(plane.up), v(plane.right), v(plane.up)});
+        {kMmPerM * g->q_m(plane.right), kMmPerM * g->q_m(plane.up), v(plane.right), v(plane.up)});
   }
   page.chart(chart);
 }
@@ -232,9 +231,9 @@ std::string to_grid_csv(const verify::Comparison& c) {
     for (const char* axis : kNames) text += fmt::format(",{}_{}_um", who, axis);
   text += ",R_stated,R_turned\n";
   for (const auto& g : c.grid) {
-    for (Eigen::Index i = 0; i < 3; ++i) text += fmt::format("{:.17g},", kMilli * g.q_m(i));
+    for (Eigen::Index i = 0; i < 3; ++i) text += fmt::format("{:.17g},", kMmPerM * g.q_m(i));
     for (const auto* v : {&g.V_las_m, &g.stated_m, &g.turned_m})
-      for (Eigen::Index i = 0; i < 3; ++i) text += fmt::format("{:.17g},", kMicro * (*v)(i));
+      for (Eigen::Index i = 0; i < 3; ++i) text += fmt::format("{:.17g},", kUmPerM * (*v)(i));
     text += fmt::format("{:.17g},{:.17g}\n", g.R_stated, g.R_turned);
   }
   return text;

@@ -7,18 +7,13 @@
 namespace abbe::daemon {
 namespace {
 
-template <class T>
-void update(Sha256& hash, const T& value) {
-  hash.update(std::as_bytes(std::span{&value, 1}));
-}
-
 std::string touches_sha256(std::span<const calib::evemu::Touch> touches) {
   Sha256 hash;
   for (const auto& t : touches) {
-    update(hash, t.position);
-    update(hash, t.feature);
-    update(hash, t.number);
-    for (const double p_m : t.p_m) update(hash, p_m);
+    hash.update_bytes_of(t.position);
+    hash.update_bytes_of(t.feature);
+    hash.update_bytes_of(t.number);
+    for (const double p_m : t.p_m) hash.update_bytes_of(p_m);
   }
   return hash.hex();
 }

@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "abbe/daemon/otf_inputs.hpp"
+#include "linear_axes.hpp"
 
 namespace abbe::daemon {
 namespace {
@@ -13,8 +14,6 @@ namespace {
 namespace evemu = calib::evemu;
 using protocol::HostTime;
 using protocol::TouchFlag;
-
-constexpr unsigned kXyz = 0b111;
 
 /// Why a touch is not used; empty: it is.
 std::string_view fault_of(const protocol::Snapshot& touch) {
@@ -29,7 +28,7 @@ std::string_view fault_of(const protocol::Snapshot& touch) {
   for (const auto& [flag, text] : kFaults) {
     if (has(flags, flag)) return text;
   }
-  if (touch.axis_count < 3 || (touch.missing_mask & kXyz) != 0) return "an axis was not known";
+  if (!has_linear_axes(touch)) return "an axis was not known";
   return {};
 }
 

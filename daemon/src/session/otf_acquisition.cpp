@@ -7,6 +7,8 @@
 
 #include "abbe/calib/otf/polyline.hpp"
 #include "abbe/daemon/otf_inputs.hpp"
+#include "linear_axes.hpp"
+#include "units.hpp"
 
 namespace abbe::daemon {
 namespace {
@@ -32,14 +34,6 @@ RunPoint run_point(const Snapshot& s) {
           .usable = !has(flags, SampleFlag::SpeedExceeded) && !has(flags, SampleFlag::PointInvalid)};
 }
 
-bool axes_known(const Snapshot& s) {
-  return s.axis_count >= 3 && (s.missing_mask & 0b111) == 0;
-}
-
-double seconds(std::chrono::nanoseconds t) {
-  return std::chrono::duration<double>(t).count();
-}
-
 }  // namespace
 
 OtfAcquisition::OtfAcquisition(const std::vector<AxisPosition>& path, HostTime from,
@@ -63,13 +57,13 @@ void OtfAcquisition::take(const Snapshot& snapshot) {
   if (!in_order(point)) return;
   if (phase_ == Phase::Running && point.time - last_time_ > options_.silence) {
     fail(fmt::format("no tracker point for {:.1f} s in the middle of the run",
-                     seconds(point.time - last_time_)));
+                     in_seconds(point.time - last_time_)));
   }
   last_time_ = point.time;
-  if (axes_known(snapshot)) axes_known_at_ = point.time;
+  if (has_linear_axes(snapshot)) axes_known_at_ = point.time;
   give_up_if_stuck(point.time);
   // Without axis positions the point keeps its place in the sequence, but decides nothing.
-  if (!axes_known(snapshot)) {
+  if (!has_linear_axes(snapshot)) {
     if (phase_ == Phase::Running) points_.push_back(point);
     return;
   }
@@ -85,7 +79,7 @@ void OtfAcquisition::take(const Snapshot& snapshot) {
 
 void OtfAcquisition::tick(HostTime now) {
   if (phase_ == Phase::Running && now - last_time_ > options_.arrival_patience) {
-    fail(fmt::format("no tracker point for {:.0f} s in the middle of the run", seconds(now - last_time_)));
+    fail(fmt::format("no tracker point for {:.0f} s in the middle of the run", in_seconds(now - last_time_)));
   } else if (phase_ == Phase::WaitingAtStart) {
     give_up_if_stuck(now - options_.arrival_patience);
   }
@@ -108,13 +102,13 @@ bool OtfAcquisition::in_order(const RunPoint& point) {
 void OtfAcquisition::give_up_if_stuck(HostTime point_time) {
   if (phase_ == Phase::WaitingAtStart && point_time - from_ > options_.wait_for_start) {
     fail(fmt::format("the machine did not stand at {} and drive off within {:.0f} min",
-                     text(path_.vertices_m.front()), seconds(options_.wait_for_start) / 60.0));
+                     text(path_.vertices_m.front()), in_seconds(options_.wait_for_start) / 60.0));
   } else if (phase_ == Phase::Running && point_time - axes_known_at_ > options_.silence) {
     fail(fmt::format("no axis positions for {:.1f} s in the middle of the run",
-                     seconds(point_time - axes_known_at_)));
+                     in_seconds(point_time - axes_known_at_)));
   } else if (phase_ == Phase::Running && point_time - stand_since_ > options_.longest_stop) {
     fail(fmt::format("the machine has stood still on its path for {:.0f} min",
-                     seconds(options_.longest_stop) / 60.0));
+                     in_seconds(options_.longest_stop) / 60.0));
   }
 }
 

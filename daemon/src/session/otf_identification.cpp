@@ -27,11 +27,6 @@ double overall(calib::otf::Stage stage, double fraction) {
   return fraction;
 }
 
-template <class T>
-void update(Sha256& hash, const T& value) {
-  hash.update(std::as_bytes(std::span{&value, 1}));
-}
-
 }  // namespace
 
 Result<OtfCandidate> identify_run(const OtfRun& run, const MachineConfig& machine_config,
@@ -60,9 +55,9 @@ Result<OtfCandidate> identify_run(const OtfRun& run, const MachineConfig& machin
 std::string points_sha256(std::span<const RunPoint> points) {
   Sha256 hash;
   for (const RunPoint& p : points) {
-    update(hash, p.device_time.time_since_epoch().count());
-    update(hash, p.p_tracker_m);
-    update(hash, static_cast<std::uint8_t>(p.usable));
+    hash.update_bytes_of(p.device_time.time_since_epoch().count());
+    hash.update_bytes_of(p.p_tracker_m);
+    hash.update_bytes_of(static_cast<std::uint8_t>(p.usable));
   }
   return hash.hex();
 }

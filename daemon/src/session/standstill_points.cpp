@@ -2,17 +2,16 @@
 
 #include <cmath>
 
+#include "linear_axes.hpp"
+
 namespace abbe::daemon {
 namespace {
 
 using protocol::SampleFlag;
 using protocol::Snapshot;
 
-constexpr std::uint8_t kLinearAxes = 0b111;  // X, Y, Z come first in a machine description
-
 bool has_axes(const Snapshot& s) {
-  return s.axis_count >= 3 && (s.missing_mask & kLinearAxes) == 0 &&
-         !has(s.head.flags, SampleFlag::AxisMissing);
+  return has_linear_axes(s) && !has(s.head.flags, SampleFlag::AxisMissing);
 }
 
 bool good_point(const Snapshot& s) {

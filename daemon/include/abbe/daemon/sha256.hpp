@@ -7,6 +7,7 @@
 #include <span>
 #include <string>
 #include <string_view>
+#include <type_traits>
 
 #include "abbe/daemon/error.hpp"
 
@@ -22,6 +23,10 @@ class Sha256 {
 
   void update(std::span<const std::byte> bytes);
   void update(std::string_view text);
+  /// The bytes of a value without padding, as they lie in memory.
+  template <class T>
+  requires std::is_trivially_copyable_v<T>
+  void update_bytes_of(const T& value) { update(std::as_bytes(std::span{&value, 1})); }
   [[nodiscard]] std::string hex();               ///< 64 lower-case digits; the hash is finished afterwards
   [[nodiscard]] std::string hex_so_far() const;  ///< of what was added until now; more may be added
 

@@ -25,6 +25,8 @@ enum class Topic : std::uint8_t {
 };
 inline constexpr std::size_t kTopicCount = 7;
 
+inline constexpr std::size_t kCdrHeaderBytes = 4;  ///< before the payload: representation and options
+
 struct TopicTraits {
   /// Live: only the newest sample counts, best effort, dropped rather than queued.
   /// Durable: the newest per key is kept, sent again to whoever comes late, and repeated.

@@ -1,0 +1,18 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+
+namespace abbe::daemon {
+
+// X, Y and Z come first in a machine description, and so in every sample.
+inline constexpr std::size_t kLinearAxes = 3;
+
+/// `sample`: whatever has axis_count and missing_mask.
+template <class Sample>
+[[nodiscard]] bool has_linear_axes(const Sample& sample) noexcept {
+  constexpr std::uint8_t kXyz = (1u << kLinearAxes) - 1u;
+  return sample.axis_count >= kLinearAxes && (sample.missing_mask & kXyz) == 0;
+}
+
+}  // namespace abbe::daemon

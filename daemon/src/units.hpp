@@ -1,0 +1,16 @@
+#pragma once
+
+#include <chrono>
+
+namespace abbe::daemon {
+
+// Files, reports and messages are in millimetres, micrometres and microradians.
+inline constexpr double kMmPerM = 1e3;
+inline constexpr double kUmPerM = 1e6;
+inline constexpr double kUradPerRad = 1e6;
+
+[[nodiscard]] inline double in_seconds(std::chrono::nanoseconds t) noexcept {
+  return std::chrono::duration<double>(t).count();
+}
+
+}  // namespace abbe::daemon

@@ -4,16 +4,20 @@
 
 #include <gmock/gmock.h>
 
+#include <Eigen/Geometry>
 #include <algorithm>
 #include <map>
+#include <numbers>
 #include <tuple>
 
+#include "abbe/calib/fit/plane.hpp"
 #include "abbe/calib/fit/sphere.hpp"
 #include "evemu_run.hpp"
 
 namespace abbe::calib::evemu {
 namespace {
 
+using testing::Contains;
 using testing::HasSubstr;
 using testing::SizeIs;
 
@@ -162,6 +166,75 @@ TEST(TouchGuide, ATouchFarFromAnyBallIsSaidWithTheNearestAndTheExpected) {
   EXPECT_EQ(t.touch(p).fate, TouchFate::Astray);
   EXPECT_THAT(t.notes_.back(), HasSubstr("is on no ball or block; nearest is ball 2, "));
   EXPECT_THAT(t.notes_.back(), HasSubstr("expected: ball 2"));
+  t.touch_position(4, 2);
+  EXPECT_EQ(t.guide_.next().position, 8);
+}
+
+/// Where a ball would be if block 2 looked to its other side: touches cannot tell before a ball was touched.
+Vector3 mirrored_centre(const Toucher& t, int position, int ball) {
+  const Vector3 ball1 = fit::fit_sphere(t.points(position, Feature::Ball, 1))->centre;
+  const Vector3 centre = fit::fit_sphere(t.points(position, Feature::Ball, ball))->centre;
+  const Vector3 n1 = fit::fit_plane(t.points(position, Feature::Block, 1), Vector3::UnitZ())->normal;
+  return ball1 + Eigen::AngleAxisd(std::numbers::pi, n1) * (centre - ball1);
+}
+
+Vector3 stray_at_mirrored(const Toucher& t, int position, int ball) {
+  return mirrored_centre(t, position, ball) + Vector3(0, 0, 12.7e-3 + 2e-3);
+}
+
+class StrayOnAMirroredBall : public testing::TestWithParam<int> {};
+
+TEST_P(StrayOnAMirroredBall, CostsNothing) {
+  Toucher t = toucher();
+  t.touch_all(4, Feature::Ball, 1);
+  t.touch_all(4, Feature::Block, 1);
+  t.touch_all(4, Feature::Block, 2);
+  t.touch(stray_at_mirrored(t, 4, GetParam()));
+  t.touch_position(4, 2);
+  EXPECT_FALSE(t.guide_.failure());
+  EXPECT_EQ(t.guide_.next().position, 8);
+  EXPECT_THAT(t.notes_, Contains(HasSubstr("set aside")));
+}
+
+INSTANTIATE_TEST_SUITE_P(TouchGuide, StrayOnAMirroredBall, testing::Values(2, 5, 9));
+
+TEST(TouchGuide, AStrayTouchThatWentOnDoesNotChangeWhatComesNext) {
+  Toucher t = toucher();
+  t.touch_all(4, Feature::Ball, 1);
+  t.touch_all(4, Feature::Block, 1);
+  t.touch_all(4, Feature::Block, 2);
+  t.touch(stray_at_mirrored(t, 4, 9));
+  t.touch_all(4, Feature::Ball, 2);
+  EXPECT_THAT(t.notes_.back(), HasSubstr("1 touch before lay on no ball, as ball 2 shows"));
+  EXPECT_EQ(name(t.guide_.next().on), "ball 3");
+}
+
+TEST(TouchGuide, KnowsTheSidesOfTheFacesAtLaterPositions) {
+  Toucher t = toucher();
+  t.touch_position(4);
+  t.touch_all(8, Feature::Ball, 1);
+  t.touch_all(8, Feature::Block, 1);
+  t.touch_all(8, Feature::Block, 2);
+  EXPECT_EQ(t.touch(stray_at_mirrored(t, 8, 2)).fate, TouchFate::Astray);
+  t.touch_position(8, 2);
+  EXPECT_EQ(t.guide_.next().position, 3);
+}
+
+TEST(TouchGuide, FacesSetAsideWhenSomebodyWentOnAreTouchedAgain) {
+  Toucher t = toucher();
+  t.touch_all(4, Feature::Ball, 1);
+  t.touch_all(4, Feature::Block, 1);
+  // Leans towards block 1: Ball2 is where it was, the angle between the faces is not.
+  const auto& face = t.points(4, Feature::Block, 2);
+  const Vector3 n1 = fit::fit_plane(t.points(4, Feature::Block, 1), Vector3::UnitZ())->normal;
+  const auto plane = *fit::fit_plane(face, Vector3::UnitX());
+  const Eigen::AngleAxisd lean(0.1, n1.cross(plane.normal).normalized());
+  for (std::size_t i = 0; i < 24; ++i) t.touch(plane.point + lean * (face[i] - plane.point));
+  EXPECT_EQ(t.touch(t.points(4, Feature::Ball, 2)[0]).fate, TouchFate::Astray);
+  EXPECT_THAT(t.notes_.back(), HasSubstr("mrad off the calibrator's angle"));
+  EXPECT_EQ(name(t.guide_.next().on), "block 1");
+  t.touch_all(4, Feature::Block, 1);
+  t.touch_all(4, Feature::Block, 2);
   t.touch_position(4, 2);
   EXPECT_EQ(t.guide_.next().position, 8);
 }

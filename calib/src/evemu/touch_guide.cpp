@@ -125,8 +125,7 @@ std::vector<Touch> TouchGuide::touches() const {
 }
 
 void TouchGuide::begin_position() {
-  const std::optional<Vector3> ball1_m = site_ ? site_->ball1_m() : std::nullopt;
-  site_ = std::make_unique<Site>(setup_->calibrator, setup_->options, ball1_m);
+  site_ = std::make_unique<Site>(setup_->calibrator, setup_->options, site_.get());
   passed_.assign(setup_->calibrator.balls.size() + 2, false);
   feature_ = kBall1;
 }
@@ -179,8 +178,7 @@ void TouchGuide::astray(const Vector3& p_m, GuidedTouch& out) {
 /// All points of it are there already. Ball1 again, with nothing missing elsewhere: the next position began.
 void TouchGuide::on_complete_feature(std::size_t feature, const Vector3& p_m, GuidedTouch& out) {
   if (feature == kBall1 && feature_ != kBall1 && all_have_enough()) {
-    pass_over_until(passed_.size(), out);
-    if (all_have_enough()) {
+    if (pass_over_until(passed_.size(), out) && all_have_enough()) {
       end_position(out);
       if (!complete() && !failure_) return put(kBall1, p_m, out);
     }
@@ -194,15 +192,19 @@ void TouchGuide::on_complete_feature(std::size_t feature, const Vector3& p_m, Gu
 }
 
 void TouchGuide::put(std::size_t feature, const Vector3& p_m, GuidedTouch& out) {
-  if (feature > feature_) pass_over_until(feature, out);
+  if (feature > feature_ && !pass_over_until(feature, out)) {
+    out.fate = TouchFate::Astray;  // what told it from other features is gone
+    return;
+  }
   feature_ = feature;
   site_->add(feature, p_m);
   if (site_->points(feature).size() == points_of(feature) && accept_feature(feature, out))
     go_on_from(feature, out);
 }
 
-/// Somebody went on: what is missing is said now, and asked for again at the end if it is too much.
-void TouchGuide::pass_over_until(std::size_t feature, GuidedTouch& out) {
+/// Somebody went on: what is missing is said now, and asked for again at the end if it is too much. False: a
+/// whole feature was set aside, which is expected now.
+bool TouchGuide::pass_over_until(std::size_t feature, GuidedTouch& out) {
   for (std::size_t f = feature_; f < feature; ++f) {
     const std::size_t points = site_->points(f).size();
     if (points >= points_of(f) || passed_[f]) continue;
@@ -213,8 +215,11 @@ void TouchGuide::pass_over_until(std::size_t feature, GuidedTouch& out) {
       out.notes.push_back(where() + tally(f) +
                           (has_enough(f) ? ", the rest was missed" : ": too few, it is asked for again"));
     }
-    if (has_enough(f)) (void)accept_feature(f, out);
+    if (points < least_of(f)) continue;
+    (void)accept_feature(f, out);
+    if (failure_ || site_->points(f).empty()) return false;
   }
+  return true;
 }
 
 bool TouchGuide::accept_feature(std::size_t feature, GuidedTouch& out) {
@@ -244,12 +249,25 @@ bool TouchGuide::accept_feature(std::size_t feature, GuidedTouch& out) {
       site_->faces_off_rad() > setup_->options.observe.max_block_tilt_rad) {
     const double off_mrad = kMmPerM * site_->faces_off_rad();
     site_->clear(kBlock1);
+    passed_[kBlock1] = false;
     set_feature_aside(kBlock2, message("the two faces stand ", off_mrad, " mrad off the calibrator's angle"),
                       out);
     feature_ = kBlock1;
     return false;
   }
+  if (feature > kBlock2) accept_ball(feature, out);
   return true;
+}
+
+void TouchGuide::accept_ball(std::size_t feature, GuidedTouch& out) {
+  const std::size_t dropped = site_->accept_ball(feature);
+  if (dropped == 0) return;
+  out.notes.push_back(where() + message(dropped, dropped == 1 ? " touch" : " touches",
+                                        " before lay on no ball, as ", name(feature_at(feature)),
+                                        " shows where all are: set aside"));
+  for (std::size_t f = feature + 1; f < passed_.size(); ++f) {
+    if (!has_enough(f)) passed_[f] = false;  // it was the stray touch that went on
+  }
 }
 
 void TouchGuide::go_on_from(std::size_t feature, GuidedTouch& out) {
@@ -277,6 +295,7 @@ void TouchGuide::end_position(GuidedTouch& out) {
     return set_position_aside(
         where() + message("the artefact stands as at position ", plan().positions[before], ": turn it"), out);
   }
+  site_->keep_sides();
   finished_.insert(finished_.end(), touches.begin(), touches.end());
   seen_.push_back(seen->T_self_uni.R);
   set_aside_in_a_row_ = 0;

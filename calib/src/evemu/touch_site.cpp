@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <limits>
 
 #include "abbe/calib/fit/plane.hpp"
@@ -62,11 +63,15 @@ TouchedFeature feature_at(std::size_t order) {
   return {Feature::Ball, static_cast<int>(order) - 1};
 }
 
-Site::Site(const Calibrator& calibrator, const GuideOptions& options, std::optional<Vector3> ball1_m)
+Site::Site(const Calibrator& calibrator, const GuideOptions& options, const Site* before)
     : calibrator_(calibrator),
       options_(options),
-      ball1_m_(std::move(ball1_m)),
-      points_(calibrator.balls.size() + 2) {}
+      points_(calibrator.balls.size() + 2),
+      accepted_(calibrator.balls.size() + 2, false) {
+  if (before == nullptr) return;
+  ball1_m_ = before->ball1_m_;
+  sides_ = before->sides_;
+}
 
 double Site::radius_m(std::size_t feature) const {
   const auto ball = static_cast<std::size_t>(feature_at(feature).number) - 1;
@@ -85,7 +90,7 @@ bool Site::has_point_near(std::size_t feature, const Vector3& p_m) const {
                              [&](const Vector3& q) { return (p_m - q).norm() < options_.same_place_m; });
 }
 
-std::optional<std::size_t> Site::feature_of(const Vector3& p_m, std::size_t expected) {
+std::optional<std::size_t> Site::feature_of(const Vector3& p_m, std::size_t expected) const {
   if (ball1_m_) {
     const double off_m = std::abs((p_m - *ball1_m_).norm() - radius_m(kBall1));
     if (off_m <= options_.observe.max_ball1_shift_m + options_.max_off_surface_m) return kBall1;
@@ -94,7 +99,7 @@ std::optional<std::size_t> Site::feature_of(const Vector3& p_m, std::size_t expe
     return kBall1;
   }
   if (const auto face = face_of(p_m, expected)) return face;
-  return ball_of(p_m);
+  return ball_of(p_m, expected);
 }
 
 /// Nothing is known yet: the touches of one ball are no farther apart than its diameter, or twice that of the
@@ -121,38 +126,76 @@ std::optional<std::size_t> Site::face_of(const Vector3& p_m, std::size_t expecte
     if (on_face(block, p_m)) return block;
   }
   const bool ball1_lacks = points_[kBall1].size() < options_.observe.least_points_per_ball;
-  if (expected > kBlock2 || (expected == kBall1 && ball1_lacks)) return std::nullopt;
+  const bool balls_known = !candidates_.empty();
+  if ((expected > kBlock2 && balls_known) || (expected == kBall1 && ball1_lacks)) return std::nullopt;
   if ((p_m - *ball1_m_).norm() > extent_m()) return std::nullopt;
-  for (std::size_t block = std::max(expected, kBlock1); block <= kBlock2; ++block) {
+  const std::size_t first = expected > kBlock2 ? kBlock1 : std::max(expected, kBlock1);
+  for (std::size_t block = first; block <= kBlock2; ++block) {
     if (!sure_face(points_[block], options_.max_off_surface_m)) return block;
   }
   return std::nullopt;
 }
 
-std::optional<std::size_t> Site::ball_of(const Vector3& p_m) {
+/// A ball of one pair of sides may be where another is with the other sides.
+std::optional<std::size_t> Site::ball_of(const Vector3& p_m, std::size_t expected) const {
+  for (const Candidate& candidate : candidates_) {
+    const std::size_t ball = nearest_ball(candidate, p_m);
+    if (ball + 2 == expected && off_ball_m(candidate, ball, p_m) <= options_.max_off_expected_m)
+      return expected;
+  }
   std::size_t ball = 0;
   if (nearest_ball_m(p_m, ball) > options_.max_off_expected_m) return std::nullopt;
-  const auto contradicts = [&](const std::vector<Vector3>& centres) {
-    const double off_m =
-        std::abs((p_m - centres[ball]).norm() - calibrator_.balls[ball].radius_m - calibrator_.tip_radius_m);
-    return off_m > options_.max_off_expected_m;
-  };
-  std::erase_if(candidates_, contradicts);
   return ball + 2;
+}
+
+double Site::off_ball_m(const Candidate& candidate, std::size_t ball, const Vector3& p_m) const {
+  const double radius = calibrator_.balls[ball].radius_m + calibrator_.tip_radius_m;
+  return std::abs((p_m - candidate.centres_m[ball]).norm() - radius);
+}
+
+std::size_t Site::nearest_ball(const Candidate& candidate, const Vector3& p_m) const {
+  std::size_t nearest = 1;
+  for (std::size_t i = 2; i < candidate.centres_m.size(); ++i) {
+    if (off_ball_m(candidate, i, p_m) < off_ball_m(candidate, nearest, p_m)) nearest = i;
+  }
+  return nearest;
 }
 
 double Site::nearest_ball_m(const Vector3& p_m, std::size_t& ball) const {
   double nearest = std::numeric_limits<double>::infinity();
-  for (const auto& centres : candidates_) {
-    for (std::size_t i = 1; i < centres.size(); ++i) {
-      const double radius = calibrator_.balls[i].radius_m + calibrator_.tip_radius_m;
-      const double off_m = std::abs((p_m - centres[i]).norm() - radius);
-      if (off_m >= nearest) continue;
-      nearest = off_m;
-      ball = i;
-    }
+  for (const Candidate& candidate : candidates_) {
+    const std::size_t i = nearest_ball(candidate, p_m);
+    const double off_m = off_ball_m(candidate, i, p_m);
+    if (off_m >= nearest) continue;
+    nearest = off_m;
+    ball = i;
   }
   return nearest;
+}
+
+/// One stray touch must not decide: the points of an accepted ball lie on one sphere of its size.
+void Site::rule_out_by(std::size_t feature) {
+  const auto agrees = [&](const Candidate& candidate) {
+    return std::ranges::all_of(points_[feature], [&](const Vector3& p) {
+      return off_ball_m(candidate, feature - 2, p) <= options_.max_off_expected_m;
+    });
+  };
+  if (std::ranges::any_of(candidates_, agrees)) std::erase_if(candidates_, std::not_fn(agrees));
+}
+
+std::size_t Site::accept_ball(std::size_t feature) {
+  accepted_[feature] = true;
+  rule_out_by(feature);
+  std::size_t dropped = 0;
+  for (std::size_t f = kBlock2 + 1; f < points_.size() && !candidates_.empty(); ++f) {
+    if (accepted_[f]) continue;
+    dropped += std::erase_if(points_[f], [&](const Vector3& p) {
+      return std::ranges::none_of(candidates_, [&](const Candidate& candidate) {
+        return off_ball_m(candidate, f - 2, p) <= options_.max_off_expected_m;
+      });
+    });
+  }
+  return dropped;
 }
 
 void Site::add(std::size_t feature, const Vector3& p_m) {
@@ -172,27 +215,59 @@ void Site::drop(std::size_t feature, std::size_t point) {
 
 void Site::clear(std::size_t feature) {
   points_[feature].clear();
+  accepted_[feature] = false;
   if (feature <= kBlock2) place_balls();
+}
+
+std::optional<fit::Plane> Site::face(std::size_t block) const {
+  auto plane =
+      likely_face(points_[block], options_.observe.least_points_per_block, options_.max_off_surface_m);
+  if (plane && (plane->point - *ball1_m_).dot(plane->normal) < 0.0) plane->normal = -plane->normal;
+  return plane;
+}
+
+/// Ball1 is so far off the face's plane that nothing a machine does brings it to the other side.
+bool Site::is_sided(const fit::Plane& face) const {
+  return (face.point - *ball1_m_).dot(face.normal) > 2.0 * options_.max_off_expected_m;
+}
+
+std::vector<double> Site::possible_sides(std::size_t block, const fit::Plane& face) const {
+  const auto& known = sides_[block - 1];
+  return known && is_sided(face) ? std::vector{*known} : std::vector{1.0, -1.0};
 }
 
 void Site::place_balls() {
   candidates_.clear();
-  const auto face = [this](std::size_t block) {
-    return likely_face(points_[block], options_.observe.least_points_per_block, options_.max_off_surface_m);
-  };
+  if (!ball1_m_) return;
   const auto n1 = face(kBlock1), n2 = face(kBlock2);
-  if (!ball1_m_ || !n1 || !n2) return;
+  if (!n1 || !n2) return;
   const auto& c = calibrator_;
   const RigidTransform T_pre_uni =
       *uniform_frame(c.balls.front().centre_m, c.blocks[0].normal, c.blocks[1].normal);
-  for (const double side_1 : {1.0, -1.0}) {
-    for (const double side_2 : {1.0, -1.0}) {
+  for (const double side_1 : possible_sides(kBlock1, *n1)) {
+    for (const double side_2 : possible_sides(kBlock2, *n2)) {
       const auto T_self_uni = uniform_frame(*ball1_m_, side_1 * n1->normal, side_2 * n2->normal);
       if (!T_self_uni) return;
-      auto& centres = candidates_.emplace_back();
+      auto& candidate = candidates_.emplace_back(Candidate{.side = {side_1, side_2}, .centres_m = {}});
       for (const auto& ball : c.balls)
-        centres.push_back(*T_self_uni * (T_pre_uni.R.transpose() * (ball.centre_m - T_pre_uni.t_m)));
+        candidate.centres_m.push_back(*T_self_uni *
+                                      (T_pre_uni.R.transpose() * (ball.centre_m - T_pre_uni.t_m)));
     }
+  }
+  for (std::size_t f = kBlock2 + 1; f < points_.size(); ++f) {
+    if (accepted_[f]) rule_out_by(f);
+  }
+}
+
+/// The artefact turns as a whole: a face that looks away from Ball1 does so at every position.
+void Site::keep_sides() {
+  if (candidates_.empty()) return;
+  for (const std::size_t block : {kBlock1, kBlock2}) {
+    const auto side_of = [block](const Candidate& candidate) { return candidate.side[block - 1]; };
+    const double side = side_of(candidates_.front());
+    const auto plane = face(block);
+    const bool agreed = std::ranges::all_of(candidates_, [&](const auto& c) { return side_of(c) == side; });
+    if (agreed && plane && is_sided(*plane)) sides_[block - 1] = side;
   }
 }
 

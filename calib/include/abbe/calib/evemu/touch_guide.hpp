@@ -3,9 +3,9 @@
 /// 3: at every position Ball1, Block1, Block2, then Ball2 to the last; the artefact turns about Ball1 between
 /// positions. Only the places of the touches decide, no clock and no command: a touch is told by where the
 /// features must be. Ball1 stands still; Ball1 and the two faces give the place of every other ball (the side
-/// of the faces follows from the balls that fit). So a missed, doubled or wrong touch is noticed, said, and
-/// costs nothing that was acquired: what is missing is asked for again. Lengths in m, machine coordinates.
-/// Ordinary world; not thread-safe.
+/// the faces look to follows from the first balls finished, and is known at later positions). So a missed,
+/// doubled or wrong touch is noticed, said, and costs nothing that was acquired: what is missing is asked for
+/// again. Lengths in m, machine coordinates. Ordinary world; not thread-safe.
 
 #include <cstddef>
 #include <memory>
@@ -98,8 +98,9 @@ class TouchGuide {
   void astray(const Vector3& p_m, GuidedTouch& out);
   void on_complete_feature(std::size_t feature, const Vector3& p_m, GuidedTouch& out);
   void put(std::size_t feature, const Vector3& p_m, GuidedTouch& out);
-  void pass_over_until(std::size_t feature, GuidedTouch& out);
+  [[nodiscard]] bool pass_over_until(std::size_t feature, GuidedTouch& out);
   [[nodiscard]] bool accept_feature(std::size_t feature, GuidedTouch& out);
+  void accept_ball(std::size_t feature, GuidedTouch& out);
   void go_on_from(std::size_t feature, GuidedTouch& out);
   void end_position(GuidedTouch& out);
   void set_feature_aside(std::size_t feature, const std::string& why, GuidedTouch& out);

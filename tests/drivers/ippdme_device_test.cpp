@@ -79,6 +79,7 @@ TEST(IppDevice, ReadsAtTheTouchWhatAMachineWithErrorsReads) {
   sim::IppDmeOptions options = machine_with_a_sphere();
   options.machine.truth.squareness.B0Z_rad = 100e-6;
   Stage stage{options};
+  ASSERT_TRUE(stage.state_becomes("ready")) << stage.device->status().last_fault;
   const Eigen::Vector3d centre{0.1, 0.2, -0.1};
   const std::vector<Eigen::Vector3d> normals = {
       Eigen::Vector3d{0.0, 0.0, 1.0}, Eigen::Vector3d{1.0, 0.0, 0.0}, Eigen::Vector3d{0.0, -0.6, 0.8}};
@@ -135,8 +136,28 @@ TEST(IppDevice, ForgetsTheTouchWhenTheConnectionIsLostOnTheWay) {
   EXPECT_TRUE(stage.touches.empty());
 }
 
+TEST(IppDevice, ForgetsWhatIsAskedOfAMachineThatIsAway) {
+  Stage stage;
+  stage.device->measure(on_top());
+  stage.turn();
+  EXPECT_EQ(stage.device->points_left(), 0u);
+  EXPECT_NE(stage.device->status().last_fault.find("asked to move while"), std::string::npos)
+      << stage.device->status().last_fault;
+  ASSERT_TRUE(stage.state_becomes("ready"));
+  stage.peer.unplug();
+  ASSERT_TRUE(stage.turns_until(30s, [&] { return !stage.device->status().connected; }));
+  stage.device->measure(on_top());
+  stage.turn();
+  stage.peer.listen();
+  ASSERT_TRUE(stage.state_becomes("ready"));
+  for (int i = 0; i < 100; ++i) stage.turn();
+  EXPECT_TRUE(stage.touches.empty());
+  EXPECT_EQ(stage.device->status().state, "ready");
+}
+
 TEST(IppDevice, SaysThatATouchFailedAndGoesOn) {
   Stage stage;
+  ASSERT_TRUE(stage.state_becomes("ready")) << stage.device->status().last_fault;
   stage.device->measure({.position_m = {0.3, 0.3, 0.0}});
   stage.device->measure(on_top());
   ASSERT_TRUE(stage.turns_until(60s, [&] { return stage.touches.size() == 2; }))

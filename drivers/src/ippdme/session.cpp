@@ -211,8 +211,16 @@ IppAction IppSession::take(const IppStopRequested&) {
   return connecting ? IppAction{IppClose{}} : IppAction{IppNothing{}};
 }
 
+/// Whoever asked saw the machine stand somewhere: what is asked of one that is away must not be driven when
+/// it returns.
 IppAction IppSession::take(const ProbePoint& point) {
   if (stopped_) return IppNothing{};
+  const bool ready_to_move =
+      state_ == IppState::Ready || state_ == IppState::Measuring || state_ == IppState::Clearing;
+  if (!ready_to_move) {
+    note(fmt::format("asked to move while {}: not done", name_of(state_)));
+    return IppNothing{};
+  }
   points_.push_back(point);
   return state_ == IppState::Ready && !pending_ ? ready() : IppAction{IppNothing{}};
 }

@@ -63,7 +63,8 @@ class IppDevice final : public Device, private SessionOverTcp<IppDevice, IppWord
   [[nodiscard]] DeviceStatus status() const override;
 
   /// Any thread: moves the machine and touches, in the order of the calls; one ProbeTrigger each, numbered
-  /// from 1 in that order. Points not yet begun are forgotten when the connection is lost.
+  /// from 1 in that order. Points not yet begun are forgotten when the connection is lost, and so
+  /// are all that come before the session is ready: a fault each time.
   void measure(const ProbePoint& point) { measure(std::span{&point, 1}); }
   /// All of them or, when the connection is lost in between, nothing of the rest: half a way to a touch leads
   /// through whatever stands there.

@@ -9,7 +9,8 @@
 ///     any -> Stopping -> Disconnected;   any -> Faulted -> Connecting (after a while)
 ///
 /// While nothing is measured the position is asked for every poll period, which also shows that the server
-/// lives. [I++ DME 1.4.3]
+/// lives. Points are taken while Ready, Measuring or Clearing; in any other state they are forgotten, which
+/// is a fault. [I++ DME 1.4.3]
 
 #include <array>
 #include <chrono>

@@ -188,6 +188,23 @@ TEST_F(ModelStoreTest, IsNotDisturbedByAHalfWrittenFile) {
   EXPECT_THAT(open().list().value(), SizeIs(1));
 }
 
+TEST_F(ModelStoreTest, ListsAModelWhoseFileIsGoneWithItsFault) {
+  const auto a = add(1);
+  fs::remove(open().model_path(a));
+  const auto entries = open().list().value();
+  ASSERT_THAT(entries, SizeIs(1));
+  EXPECT_EQ(entries[0].id, a);
+  EXPECT_THAT(entries[0].fault, HasSubstr(a));
+}
+
+TEST_F(ModelStoreTest, SaysThatItCannotBeListed) {
+  add(1);
+  const auto store = open();
+  fs::rename(folder_ / "models", folder_ / "elsewhere");
+  EXPECT_THAT(store.list().error().text, HasSubstr("list "));
+  EXPECT_EQ(store.find("0123").error().code, ErrorCode::Io);
+}
+
 TEST_F(ModelStoreTest, SaysThatTheStateIsDamaged) {
   add(1);
   fs::resize_file(folder_ / "state.json", 20);

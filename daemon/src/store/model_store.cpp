@@ -78,13 +78,27 @@ bool is_id(const std::string& text) {
 }
 
 /// The ids of the files in models/, in order of name.
-std::vector<std::string> ids_on_disk(const fs::path& folder) {
+Result<std::vector<std::string>> ids_on_disk(const fs::path& folder) {
   std::vector<std::string> ids;
-  std::error_code ignored;
-  for (fs::directory_iterator entry(folder / "models", ignored), end; entry != end; entry.increment(ignored))
+  std::error_code error;
+  for (fs::directory_iterator entry(folder / "models", error), end; !error && entry != end;
+       entry.increment(error))
     if (entry->path().extension() == ".json" && is_id(entry->path().stem().string()))
       ids.push_back(entry->path().stem().string());
+  if (error)
+    return fail(ErrorCode::Io, fmt::format("list {}: {}", (folder / "models").string(), error.message()));
   std::sort(ids.begin(), ids.end());
+  return ids;
+}
+
+/// Nothing takes a model out of the store: one that was added and has no file is lost, and is to be seen.
+Result<std::vector<std::string>> ids_in_store(const fs::path& folder, const StoreState& state) {
+  auto ids = ids_on_disk(folder);
+  if (!ids) return ids;
+  for (const auto& event : state.events)
+    if (event.action == StoreAction::Added) ids->push_back(event.id);
+  std::sort(ids->begin(), ids->end());
+  ids->erase(std::unique(ids->begin(), ids->end()), ids->end());
   return ids;
 }
 
@@ -158,8 +172,10 @@ Result<std::vector<StoreEntry>> ModelStore::list() const {
   const auto state = read_state(folder_);
   if (!state) return tl::make_unexpected(state.error());
   const auto active = state->active();
+  const auto ids = ids_in_store(folder_, *state);
+  if (!ids) return tl::make_unexpected(ids.error());
   std::vector<StoreEntry> entries;
-  for (const auto& id : ids_on_disk(folder_)) {
+  for (const auto& id : *ids) {
     StoreEntry entry;
     entry.id = id;
     entry.active = active == id;
@@ -222,9 +238,12 @@ Result<std::string> ModelStore::find(const std::string& prefix) const {
   }
   constexpr std::size_t kShortest = 4;
   std::vector<std::string> found;
-  if (prefix.size() >= kShortest)
-    for (const auto& id : ids_on_disk(folder_))
+  if (prefix.size() >= kShortest) {
+    const auto ids = ids_on_disk(folder_);
+    if (!ids) return tl::make_unexpected(ids.error());
+    for (const auto& id : *ids)
       if (id.starts_with(prefix)) found.push_back(id);
+  }
   if (found.size() == 1) return found.front();
   return fail(ErrorCode::Usage,
               fmt::format("model \"{}\": {} in {} begin with that", prefix,

@@ -18,6 +18,7 @@ using ::testing::IsEmpty;
 
 class OldRecordings : public ::testing::Test {
  protected:
+  OldRecordings() { EXPECT_TRUE(ModelStore::open(store_)); }
   void record(const std::string& name, std::chrono::hours ago) {
     std::ofstream{folder_.path() / name} << "content";
     fs::last_write_time(folder_.path() / name, now_ - ago);
@@ -27,9 +28,12 @@ class OldRecordings : public ::testing::Test {
     document.inputs = {{input, std::string(64, 'a')}};
     return ModelStore::open(store_)->add(document, true, {}, {"test", "test", {}}).value();
   }
-  [[nodiscard]] std::vector<std::string> removed() {
+  [[nodiscard]] Result<std::vector<fs::path>> remove(std::chrono::hours clock_ahead = 0h) {
+    return remove_old_recordings(folder_.path(), store_, {now_ + clock_ahead, 24h, "abbe-47"});
+  }
+  [[nodiscard]] std::vector<std::string> removed(std::chrono::hours clock_ahead = 0h) {
     std::vector<std::string> names;
-    const auto gone = remove_old_recordings(folder_.path(), store_, now_ - 24h);
+    const auto gone = remove(clock_ahead);
     EXPECT_TRUE(gone) << gone.error().text;
     if (gone)
       for (const auto& file : *gone) {
@@ -48,11 +52,43 @@ TEST_F(OldRecordings, AreRemovedWhenTheyAreOlder) {
   record("abbe-1.mcap", 25h);
   record("abbe-2.mcap.part", 25h);
   record("abbe-3.mcap", 23h);
+  record("abbe-4.mcap", 0h);
   EXPECT_THAT(removed(), ElementsAre("abbe-1.mcap", "abbe-2.mcap.part"));
   EXPECT_THAT(removed(), IsEmpty());
 }
 
+TEST_F(OldRecordings, OfThisRunStay) {
+  record("abbe-47.mcap", 100h);
+  record("abbe-47-2.mcap", 50h);
+  record("abbe-47-3.mcap.part", 50h);
+  record("abbe-471.mcap", 50h);
+  record("abbe-48.mcap", 0h);
+  EXPECT_THAT(removed(), ElementsAre("abbe-471.mcap"));
+}
+
+TEST_F(OldRecordings, StayWhenTheClockRunsAhead) {
+  record("abbe-1.mcap", 2h);
+  record("abbe-2.mcap", 1h);
+  record("abbe-47.mcap.part", -24h * 365);  // what this run writes is dated by the wrong clock, too
+  EXPECT_THAT(removed(24h * 365), IsEmpty());
+}
+
+TEST_F(OldRecordings, StayWhenOneIsDatedInTheFuture) {
+  record("abbe-1.mcap", 2h);
+  record("abbe-2.mcap", -24h * 365);
+  EXPECT_THAT(removed(), IsEmpty());
+}
+
+TEST_F(OldRecordings, DatedByADeadClockStay) {
+  record("abbe-1.mcap", 0h);
+  fs::last_write_time(folder_.path() / "abbe-1.mcap",
+                      std::chrono::file_clock::from_sys(std::chrono::sys_seconds{24h}));
+  record("abbe-2.mcap", 0h);
+  EXPECT_THAT(removed(), IsEmpty());
+}
+
 TEST_F(OldRecordings, ThatAModelNamesStay) {
+  record("abbe-9.mcap", 0h);
   record("abbe-1.mcap", 25h);
   record("abbe-1-2.mcap", 25h);
   record("abbe-4.mcap", 25h);
@@ -63,13 +99,32 @@ TEST_F(OldRecordings, ThatAModelNamesStay) {
 
 TEST_F(OldRecordings, StayAllWhileAModelCannotBeRead) {
   record("abbe-1.mcap", 25h);
+  record("abbe-2.mcap", 0h);
   const auto id = keep_model_of(1, "abbe-1.mcap");
   fs::resize_file(ModelStore::open(store_)->model_path(id), 10);
-  EXPECT_FALSE(remove_old_recordings(folder_.path(), store_, now_));
+  EXPECT_FALSE(remove());
   EXPECT_TRUE(fs::exists(folder_.path() / "abbe-1.mcap"));
 }
 
+TEST_F(OldRecordings, StayAllWhileAModelIsGone) {
+  record("abbe-1.mcap", 25h);
+  record("abbe-2.mcap", 0h);
+  fs::remove(ModelStore::open(store_)->model_path(keep_model_of(1, "abbe-1.mcap")));
+  EXPECT_FALSE(remove());
+  EXPECT_TRUE(fs::exists(folder_.path() / "abbe-1.mcap"));
+}
+
+TEST_F(OldRecordings, StayAllWithoutAStore) {
+  record("abbe-1.mcap", 25h);
+  record("abbe-2.mcap", 0h);
+  fs::remove_all(store_);
+  EXPECT_FALSE(remove());
+  EXPECT_TRUE(fs::exists(folder_.path() / "abbe-1.mcap"));
+  EXPECT_FALSE(fs::exists(store_));
+}
+
 TEST_F(OldRecordings, WhatOthersPutThereStays) {
+  record("abbe-9.mcap", 0h);
   record("notes.txt", 25h);
   record("reference.mcap", 25h);
   EXPECT_THAT(removed(), IsEmpty());

@@ -17,6 +17,7 @@
 #include <thread>
 #include <utility>
 
+#include "abbe/daemon/clock_steps.hpp"
 #include "abbe/daemon/control_api.hpp"
 #include "abbe/daemon/control_protocol.hpp"
 #include "abbe/daemon/dds_supervisor.hpp"
@@ -34,8 +35,9 @@ namespace {
 using namespace std::chrono_literals;
 using WallTime = std::chrono::steady_clock::time_point;
 
-constexpr auto kTidyPeriod = 1h;   // old recordings are looked for this often
-constexpr auto kHubPatience = 1s;  // thousands of turns; a hub silent for this long hangs
+constexpr auto kTidyPeriod = 1h;    // old recordings are looked for this often
+constexpr auto kTidyFirst = 10min;  // until then a time server has set a clock that started wrong
+constexpr auto kHubPatience = 1s;   // thousands of turns; a hub silent for this long hangs
 
 /// UTC less host time, both read now; the one constant that ever mentions the wall clock.
 protocol::UtcOffset utc_offset(const drivers::TimeSource& time) {
@@ -59,10 +61,10 @@ std::string recording_name() {
                      utc.tm_mday, utc.tm_hour, utc.tm_min, utc.tm_sec, ::getpid());
 }
 
-RecorderThreadOptions recorder_options(const Config& config) {
+RecorderThreadOptions recorder_options(const Config& config, const std::string& name) {
   RecorderThreadOptions options;
   options.recorder.directory = config.recording.dir;
-  options.recorder.name = recording_name();
+  options.recorder.name = name;
   options.recorder.chunk_bytes = config.recording.chunk_bytes;
   options.recorder.chunk_period = config.recording.chunk_period;
   options.recorder.min_free_bytes = config.recording.min_free_bytes;
@@ -129,7 +131,10 @@ struct Abbed::State {
   FileDescriptor control_listener;
   std::unique_ptr<ControlServer> control;
   std::future<Result<std::vector<std::filesystem::path>>> tidying;
-  WallTime next_tidying{};
+  const std::string recording = recording_name();
+  ClockSteps clock_steps{read_clocks()};
+  bool tidies = true;  // until the clock was set
+  WallTime next_tidying = WallTime::clock::now() + kTidyFirst;
 
   State(Config c, AbbedOptions o)
       : config(std::move(c)), options(std::move(o)), time(config.daemon.speed), utc(utc_offset(time)) {}
@@ -157,7 +162,7 @@ struct Abbed::State {
                        .speed = config.daemon.speed,
                        .configuration = options.configuration_text,
                        .versions = {{"abbe", ABBE_VERSION}, {kDatumRule, "2"}}};
-    auto opened = RecorderThread::start(recorder_options(config), std::move(info));
+    auto opened = RecorderThread::start(recorder_options(config, recording), std::move(info));
     if (!opened) return tl::unexpected(opened.error());
     recorder = std::move(*opened);
     return {};
@@ -246,12 +251,15 @@ struct Abbed::State {
         fmt::print(stderr, "abbed: removed {} recordings older than {} h\n", removed->size(),
                    config.recording.keep.count());
     }
-    if (tidying.valid() || now < next_tidying) return;
+    if (clock_steps.look(read_clocks()) && std::exchange(tidies, false))
+      fmt::print(stderr, "abbed: the clock was set: no old recordings are removed until the next start\n");
+    if (!tidies || tidying.valid() || now < next_tidying) return;
     next_tidying = now + kTidyPeriod;
-    tidying = start_aside([dir = config.recording.dir, models = config.daemon.models_dir(),
-                           until = std::filesystem::file_time_type::clock::now() - config.recording.keep] {
-      return remove_old_recordings(dir, models, until);
-    });
+    tidying = start_aside(
+        [dir = config.recording.dir, models = config.daemon.models_dir(),
+         rule = KeepRule{.now = std::filesystem::file_time_type::clock::now(),
+                         .keep = config.recording.keep,
+                         .running = recording}] { return remove_old_recordings(dir, models, rule); });
   }
 
   void run_hub(std::future<void>& may_run) noexcept {

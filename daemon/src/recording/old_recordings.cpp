@@ -16,8 +16,10 @@ namespace fs = std::filesystem;
 /// Models name "NAME.mcap", or "NAME.mcap.part (4711 bytes)" while it still grew: NAME, of all of them.
 Result<std::set<std::string>> named_by_models(const fs::path& folder) {
   std::set<std::string> names;
+  // Opening it would create it: what is not there (a disk that is not mounted) is no empty store.
   std::error_code error;
-  if (!fs::exists(folder, error) && !error) return names;
+  if (!fs::is_directory(folder / "models", error))
+    return fail(ErrorCode::Io, fmt::format("list {}: no model store is there", folder.string()));
   const auto store = ModelStore::open(folder);
   if (!store) return tl::unexpected(store.error());
   const auto entries = store->list();
@@ -34,19 +36,56 @@ bool is_ours(const std::string& name) {
   return name.starts_with("abbe-") && (name.ends_with(".mcap") || name.ends_with(".mcap.part"));
 }
 
+/// NAME.mcap, NAME-2.mcap ...
+bool is_of_run(const std::string& file, const std::string& name) {
+  return !name.empty() && file.starts_with(name) && (file[name.size()] == '.' || file[name.size()] == '-');
+}
+
+/// Nothing was recorded before: the real-time clock had lost its battery.
+fs::file_time_type earliest_date() {
+  using namespace std::chrono;
+  return file_clock::from_sys(sys_seconds{sys_days{year{2026} / January / 1}});
+}
+
+struct Dated {
+  fs::path file;
+  fs::file_time_type written;
+};
+
+Result<std::vector<Dated>> former_recordings(const fs::path& directory, const std::string& running) {
+  std::vector<Dated> found;
+  std::error_code error;
+  for (fs::directory_iterator entry(directory, error), end; !error && entry != end; entry.increment(error)) {
+    std::error_code unknown;
+    const std::string name = entry->path().filename();
+    const bool regular = entry->symlink_status(unknown).type() == fs::file_type::regular;
+    if (!regular || !is_ours(name) || is_of_run(name, running)) continue;
+    const auto written = entry->last_write_time(unknown);
+    if (!unknown) found.push_back({entry->path(), written});
+  }
+  if (error) return fail(ErrorCode::Io, fmt::format("list {}: {}", directory.string(), error.message()));
+  return found;
+}
+
+/// In order of name.
+std::vector<fs::path> outdated(const std::vector<Dated>& recordings, const KeepRule& rule) {
+  if (recordings.empty()) return {};
+  const auto newest = std::ranges::max(recordings, {}, &Dated::written).written;
+  const auto until = std::min(newest, rule.now) - rule.keep;
+  std::vector<fs::path> old;
+  for (const auto& [file, written] : recordings)
+    if (written < until && written >= earliest_date()) old.push_back(file);
+  std::sort(old.begin(), old.end());
+  return old;
+}
+
 }  // namespace
 
 Result<std::vector<fs::path>> remove_old_recordings(const fs::path& directory, const fs::path& store,
-                                                    fs::file_time_type until) {
-  std::vector<fs::path> old;
-  std::error_code error;
-  for (fs::directory_iterator entry(directory, error), end; !error && entry != end; entry.increment(error)) {
-    std::error_code ignored;
-    const bool regular = entry->symlink_status(ignored).type() == fs::file_type::regular;
-    if (regular && is_ours(entry->path().filename()) && entry->last_write_time(ignored) < until && !ignored)
-      old.push_back(entry->path());
-  }
-  if (error) return fail(ErrorCode::Io, fmt::format("list {}: {}", directory.string(), error.message()));
+                                                    const KeepRule& rule) {
+  const auto recordings = former_recordings(directory, rule.running);
+  if (!recordings) return tl::unexpected(recordings.error());
+  std::vector<fs::path> old = outdated(*recordings, rule);
   if (old.empty()) return old;
   const auto named = named_by_models(store);
   if (!named) return fail(named.error().code, fmt::format("keep all recordings: {}", named.error().text));
@@ -54,7 +93,7 @@ Result<std::vector<fs::path>> remove_old_recordings(const fs::path& directory, c
     const std::string name = file.filename();
     return named->contains(name.substr(0, name.find(".mcap")));
   });
-  std::sort(old.begin(), old.end());
+  std::error_code error;
   for (const fs::path& file : old)
     if (!fs::remove(file, error) && error)
       return fail(ErrorCode::Io, fmt::format("remove {}: {}", file.string(), error.message()));

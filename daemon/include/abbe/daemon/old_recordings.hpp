@@ -4,17 +4,25 @@
 
 #include <chrono>
 #include <filesystem>
+#include <string>
 #include <vector>
 
 #include "abbe/daemon/error.hpp"
 
 namespace abbe::daemon {
 
-/// Removes what abbed recorded in `directory` (abbe-*.mcap, abbe-*.mcap.part) and last wrote before `until`,
-/// except what any model in the store names among its inputs; returns what was removed. Nothing is removed if
-/// a model cannot be read: it might be the one that names a file.
+struct KeepRule {
+  std::filesystem::file_time_type now;
+  std::chrono::hours keep{};  ///< [recording] keep_days
+  std::string running;        ///< RecorderOptions::name of this run: its recordings stay, whatever their date
+};
+
+/// Removes what former runs of abbed recorded in `directory` (abbe-*.mcap, abbe-*.mcap.part) and last wrote
+/// longer than `keep` before the newest of those recordings (or before now, if that is earlier): a clock that
+/// runs ahead does not make them old. Kept is what any model in the store names among its inputs, and what is
+/// dated before there was an abbe: its clock was wrong. Returns what was removed. Nothing is removed if the
+/// store is not there or a model cannot be read: it might be the one that names a file.
 [[nodiscard]] Result<std::vector<std::filesystem::path>> remove_old_recordings(
-    const std::filesystem::path& directory, const std::filesystem::path& store,
-    std::filesystem::file_time_type until);
+    const std::filesystem::path& directory, const std::filesystem::path& store, const KeepRule& rule);
 
 }  // namespace abbe::daemon

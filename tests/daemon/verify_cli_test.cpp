@@ -5,6 +5,7 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <csignal>
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
@@ -226,6 +227,44 @@ TEST_F(VerifyCli, KeepsCollectedPointsThatAllowNoAnswer) {
   EXPECT_EQ(abbe("verify model.json --live --socket control.sock --count 3 -o out").exit, 1);
   EXPECT_TRUE(fs::exists(folder_ / "out/verification.csv"));
   EXPECT_EQ(abbe("verify model.json --live --socket control.sock").exit, 2);  // nowhere to keep them
+}
+
+TEST_F(VerifyCli, SaysThatTheDaemonWentAwayAndReportsWhatThereIs) {
+  const auto points = tracker_points(study::table3_machine());
+  const auto live = daemon_with(folder_ / "live.sock", points);
+  // Gives all it has, then knows nothing of a collection, as a daemon that was started anew.
+  const auto server = std::move(
+      *ControlServer::open(folder_ / "control.sock", [&](const nlohmann::json& request) -> nlohmann::json {
+        if (request.at("step") != "begin" && request.at("from") == points.size())
+          return {{"ok", false}, {"code", "refused"}, {"error", "no points are being collected"}};
+        return ask_daemon(folder_ / "live.sock", request).value();
+      }));
+  const auto ran = abbe("verify model.json --live --socket control.sock --json -o out");
+  EXPECT_EQ(ran.exit, 4) << ran.err;
+  EXPECT_THAT(ran.err, HasSubstr(fmt::format("after {} points", points.size())));
+  EXPECT_EQ(nlohmann::json::parse(ran.out)["points"], points.size());
+  EXPECT_TRUE(fs::exists(folder_ / "out/report.html"));
+}
+
+TEST_F(VerifyCli, KeepsPointsAsTheyComeWhateverEndsIt) {
+  const auto points = tracker_points(study::table3_machine());
+  const auto server = daemon_with(folder_ / "control.sock", points);
+  const auto exit_after = [&](const char* signal) {
+    fs::remove_all(folder_ / "out");
+    write("ended.sh",
+          fmt::format("'{}' verify model.json --live --socket control.sock -o out & p=$!\n"
+                      "for i in $(seq 1000); do test -e out/verification.csv && break; sleep 0.02; done\n"
+                      "kill -{} $p; wait $p\n",
+                      ABBE_PROGRAM, signal));
+    const int status =
+        std::system(fmt::format("cd '{}' && bash ended.sh >stdout 2>stderr", folder_.string()).c_str());
+    EXPECT_EQ(text_of(folder_ / "out/verification.csv"), text_of(folder_ / "verification.csv")) << signal;
+    return WIFEXITED(status) ? WEXITSTATUS(status) : -1;
+  };
+  EXPECT_EQ(exit_after("KILL"), 128 + SIGKILL);
+  EXPECT_EQ(exit_after("TERM"), 0);
+  EXPECT_EQ(exit_after("HUP"), 0);
+  EXPECT_TRUE(fs::exists(folder_ / "out/report.html"));
 }
 
 TEST_F(VerifyCli, NamesFileAndLineOfBadPoints) {

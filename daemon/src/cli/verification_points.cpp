@@ -20,6 +20,8 @@ namespace {
 using namespace std::chrono_literals;
 using nlohmann::json;
 
+using Keep = std::function<Result<void>(const VerificationFile&)>;
+
 constexpr auto kLook = 200ms;
 
 volatile std::sig_atomic_t interrupted = 0;  // written by the signal handler
@@ -27,7 +29,7 @@ volatile std::sig_atomic_t interrupted = 0;  // written by the signal handler
 void end_on_interrupt() {
   struct sigaction end {};
   end.sa_handler = [](int) { interrupted = 1; };
-  ::sigaction(SIGINT, &end, nullptr);
+  for (const int signal : {SIGINT, SIGTERM, SIGHUP}) ::sigaction(signal, &end, nullptr);
 }
 
 calib::Vector3 vector_of(const json& list) {
@@ -43,7 +45,7 @@ void tell(std::size_t number, const json& point) {
 
 /// One look at the daemon: new points are told and kept.
 Result<void> look(const std::filesystem::path& socket, const json& number, const char* step,
-                  VerificationFile& out) {
+                  VerificationFile& out, const Keep& keep) {
   const auto answer = ask_daemon(
       socket, {{"do", "verification"}, {"step", step}, {"number", number}, {"from", out.points.size()}});
   if (!answer) return tl::make_unexpected(answer.error());
@@ -51,14 +53,14 @@ Result<void> look(const std::filesystem::path& socket, const json& number, const
     out.points.push_back({vector_of(point.at("reading_m")), vector_of(point.at("tracker_m"))});
     tell(out.points.size(), point);
   }
-  return {};
+  return answer->at("points").empty() ? Result<void>{} : keep(out);
 }
 
 /// A daemon that went away takes no points with it.
-Result<VerificationFile> what_there_is(VerificationFile& points, const Error& error) {
+Result<LivePoints> what_there_is(VerificationFile& points, const Error& error) {
   if (points.points.empty()) return tl::make_unexpected(error);
-  (void)report(error);
-  return std::move(points);
+  Error cut_short{ErrorCode::Io, fmt::format("after {} points: {}", points.points.size(), error.text)};
+  return LivePoints{std::move(points), std::move(cut_short)};
 }
 
 }  // namespace
@@ -82,7 +84,8 @@ Result<VerificationFile> points_of_recording(const std::string& file) {
   return out;
 }
 
-Result<VerificationFile> points_of_daemon(const std::filesystem::path& socket, std::size_t count) {
+Result<LivePoints> points_of_daemon(const std::filesystem::path& socket, std::size_t count,
+                                    const Keep& keep) {
   const auto begun = ask_daemon(socket, {{"do", "verification"}, {"step", "begin"}});
   if (!begun) return tl::make_unexpected(begun.error());
   const json number = begun->at("number");
@@ -91,11 +94,12 @@ Result<VerificationFile> points_of_daemon(const std::filesystem::path& socket, s
   VerificationFile out;
   const auto all = [&] { return interrupted != 0 || (count != 0 && out.points.size() >= count); };
   for (; !all(); std::this_thread::sleep_for(kLook)) {
-    if (const auto looked = look(socket, number, "look", out); !looked)
+    if (const auto looked = look(socket, number, "look", out, keep); !looked)
       return what_there_is(out, looked.error());
   }
-  if (const auto ended = look(socket, number, "end", out); !ended) return what_there_is(out, ended.error());
-  return out;
+  if (const auto ended = look(socket, number, "end", out, keep); !ended)
+    return what_there_is(out, ended.error());
+  return LivePoints{std::move(out), {}};
 }
 
 }  // namespace abbe::daemon

@@ -1,7 +1,10 @@
 #pragma once
 /// Where the points of `abbe verify` come from when not out of a file.
 
+#include <cstddef>
 #include <filesystem>
+#include <functional>
+#include <optional>
 #include <string>
 
 #include "abbe/daemon/error.hpp"
@@ -12,9 +15,16 @@ namespace abbe::daemon {
 /// The standstills of a recording.
 [[nodiscard]] Result<VerificationFile> points_of_recording(const std::string& file);
 
+struct LivePoints {
+  VerificationFile file;           ///< from no file: `source` has no name
+  std::optional<Error> cut_short;  ///< why there are no more: the daemon went away (Io)
+};
+
 /// The standstills of the machine the daemon watches, one line on stderr for each, until there are `count`
-/// (0: no limit) or somebody presses Ctrl-C. They come from no file: `source` has no name.
-[[nodiscard]] Result<VerificationFile> points_of_daemon(const std::filesystem::path& socket,
-                                                        std::size_t count);
+/// (0: no limit) or somebody presses Ctrl-C (or SIGTERM, SIGHUP). `keep` gets all of them whenever there are
+/// new ones; what it says ends the collection.
+[[nodiscard]] Result<LivePoints> points_of_daemon(
+    const std::filesystem::path& socket, std::size_t count,
+    const std::function<Result<void>(const VerificationFile&)>& keep);
 
 }  // namespace abbe::daemon

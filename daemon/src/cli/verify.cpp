@@ -67,24 +67,34 @@ Result<void> create_folder(const std::filesystem::path& folder) {
 }
 
 /// Into OUT, where there is one, before anything can go wrong with them: nobody measures twice gladly.
-Result<VerificationFile> kept(const VerifyArguments& arguments, Result<VerificationFile> points) {
-  if (!points || arguments.out.empty()) return points;
-  if (auto made = create_folder(arguments.out); !made) return tl::make_unexpected(made.error());
+Result<void> keep(const VerifyArguments& arguments, const VerificationFile& points) {
+  if (arguments.out.empty()) return {};
+  if (auto made = create_folder(arguments.out); !made) return made;
   const auto file = std::filesystem::path(arguments.out) / "verification.csv";
-  if (auto written = replace_file(file, to_verification_csv(points->points)); !written)
-    return tl::make_unexpected(written.error());
-  return points;
+  return replace_file(file, to_verification_csv(points.points));
 }
 
-Result<VerificationFile> points_of(const VerifyArguments& arguments) {
-  if (!arguments.points.empty()) return read_verification_csv(arguments.points);
-  if (!arguments.recording.empty()) return kept(arguments, points_of_recording(arguments.recording));
+Result<LivePoints> from_file(Result<VerificationFile> points) {
+  if (!points) return tl::make_unexpected(points.error());
+  return LivePoints{std::move(*points), {}};
+}
+
+Result<LivePoints> points_of(const VerifyArguments& arguments) {
+  if (!arguments.points.empty()) return from_file(read_verification_csv(arguments.points));
+  const auto keep_them = [&arguments](const VerificationFile& points) { return keep(arguments, points); };
+  if (!arguments.recording.empty()) {
+    auto points = points_of_recording(arguments.recording);
+    if (points)
+      if (auto done = keep_them(*points); !done) return tl::make_unexpected(done.error());
+    return from_file(std::move(points));
+  }
   const auto socket = socket_path({arguments.socket, arguments.store.config});
   if (!socket) return tl::make_unexpected(socket.error());
-  return kept(arguments, points_of_daemon(*socket, arguments.count));
+  return points_of_daemon(*socket, arguments.count, keep_them);
 }
 
-Result<VerifyOutcome> compare(const VerifyArguments& arguments) {
+/// `cut_short` also if the points do not suffice because of it.
+Result<VerifyOutcome> compare(const VerifyArguments& arguments, std::optional<Error>& cut_short) {
   const auto options = options_of(arguments);
   if (!options) return tl::make_unexpected(options.error());
   auto document = model_named(arguments.model, arguments.store);
@@ -97,17 +107,19 @@ Result<VerifyOutcome> compare(const VerifyArguments& arguments) {
     if (!planes) return tl::make_unexpected(planes.error());
     v.planes_m = *planes;
   }
-  auto file = points_of(arguments);
-  if (!file) return tl::make_unexpected(file.error());
-  auto observed = verify::observe(file->points,
+  auto points = points_of(arguments);
+  if (!points) return tl::make_unexpected(points.error());
+  cut_short = std::move(points->cut_short);
+  VerificationFile& file = points->file;
+  auto observed = verify::observe(file.points,
                                   arguments.frame == "fit" ? verify::Frame::BestFit : verify::Frame::Machine);
   if (!observed) return tl::make_unexpected(error_of(observed.error()));
   auto compared = verify::compare(*observed, document->model, *tool_m, *options);
   if (!compared) return tl::make_unexpected(error_of(compared.error()));
   v.observations = std::move(*observed);
   v.comparison = std::move(*compared);
-  if (!file->source.name.empty()) v.inputs = {file->source};
-  v.lines = std::move(file->lines);
+  if (!file.source.name.empty()) v.inputs = {file.source};
+  v.lines = std::move(file.lines);
   return VerifyOutcome{std::move(*document), std::move(v)};
 }
 
@@ -181,11 +193,15 @@ Result<void> write_outputs(const std::filesystem::path& folder, const VerifyOutc
 }
 
 int run(const VerifyArguments& arguments) {
-  const auto outcome = compare(arguments);
-  if (!outcome) return report(outcome.error());
+  std::optional<Error> cut_short;
+  const auto outcome = compare(arguments, cut_short);
+  if (!outcome) {
+    const int code = report(outcome.error());
+    return cut_short ? report(*cut_short) : code;
+  }
   if (const auto written = write_outputs(arguments.out, *outcome); !written) return report(written.error());
   arguments.json ? print_json(*outcome) : print_summary(*outcome, arguments);
-  return 0;
+  return cut_short ? report(*cut_short) : 0;
 }
 
 void add_options(CLI::App& command, VerifyArguments& arguments) {

@@ -193,8 +193,8 @@ fixed_mm = 0
   };
   const auto refused = command("");
   EXPECT_EQ(refused.exit, 3) << refused.err;
-  EXPECT_THAT(refused.err, HasSubstr("--path-corrected"));
-  EXPECT_EQ(command("--path-corrected").exit, 0);
+  EXPECT_THAT(refused.err, HasSubstr("--scales-corrected"));
+  EXPECT_EQ(command("--scales-corrected").exit, 0);
 }
 
 TEST_F(Cli, AnUncertainIndexOfTheAirWidensTheModel) {

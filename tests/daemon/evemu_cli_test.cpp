@@ -180,6 +180,36 @@ TEST_F(EvemuCli, WritesModelsThatReadBackToTheSameBits) {
   EXPECT_EQ(to_json(*document), text);
 }
 
+TEST_F(EvemuCli, SaysThatFilesHoldNoTemperaturesOfScales) {
+  write("warm.toml", std::string{kMachine} + R"([encoder]
+transport = "udp"
+peer_host = "10.0.0.8"
+peer_port = 20000
+nodes = [{axis = "X", node = 1}, {axis = "Y", node = 2}, {axis = "Z", node = 3}]
+[[environment]]
+name = "rtd"
+map = "icpdas-zt2005-c8"
+serial = "/dev/serial/by-id/rs485"
+inputs = ["scale_x"]
+[[thermal]]
+axis = "X"
+temperature = "scale_x"
+alpha_um_per_m_K = 8
+u_alpha_um_per_m_K = 0.5
+u_temperature_K = 0.2
+fixed_mm = 0
+)");
+  const auto from_errors = [this](const std::string& more) {
+    return abbe("identify evemu --machine warm.toml --errors errors.csv -o out " + more);
+  };
+  expect_refused(from_errors(""), 3, "give errors corrected for the temperature of the scales");
+  expect_refused(
+      abbe("identify evemu --machine warm.toml --touches touches.csv --calibrator calibrator.toml -o out"), 3,
+      "give touches corrected for the temperature of the scales and say --scales-corrected");
+  EXPECT_EQ(from_errors("--scales-corrected").exit, kRefused);  // by the gate: the model is written
+  EXPECT_TRUE(read_model(folder_ / "out/model.json"));
+}
+
 /// [evemu] asks for less than the options' defaults do.
 constexpr std::string_view kWatched = R"([encoder]
 transport = "udp"

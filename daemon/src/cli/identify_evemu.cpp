@@ -18,6 +18,7 @@
 #include "cli/commands.hpp"
 #include "cli/identified_model.hpp"
 #include "cli/opened_recording.hpp"
+#include "cli/scales_corrected.hpp"
 #include "cli/terminal.hpp"
 #include "files/text_file.hpp"
 #include "units.hpp"
@@ -33,7 +34,7 @@ struct IdentifyEvemuArguments {
   std::optional<std::string> estimator, folds;  // these four: else what [evemu] says
   std::optional<int> order, positions;
   double u_reference_um = 1.0;
-  bool rotation_known = false, accept_shape_only = false, json = false;
+  bool rotation_known = false, scales_corrected = false, accept_shape_only = false, json = false;
 };
 
 /// What was measured, whatever it comes from.
@@ -93,6 +94,9 @@ Result<Input> from_files(const IdentifyEvemuArguments& arguments) {
   if (!hash) return tl::make_unexpected(hash.error());
   Input input;
   input.sources.push_back({std::filesystem::path(arguments.machine).filename().string(), *hash});
+  const auto* what = arguments.touches.empty() ? "errors" : "touches";
+  if (const auto fine = check_scales("identify evemu", what, *config, arguments.scales_corrected); !fine)
+    return tl::make_unexpected(fine.error());
   const auto machine = evemu_machine(config->machine);
   if (!machine) return tl::make_unexpected(machine.error());
   const auto options = observe_options(arguments, config->evemu, config->evemu.positions.size());
@@ -308,6 +312,7 @@ void add_options(CLI::App& command, IdentifyEvemuArguments& arguments) {
   calibrator->needs(touches);
   errors->needs(machine)->excludes(touches);
   recording->excludes(touches)->excludes(errors);
+  recording->excludes(add_scales_corrected(command, arguments.scales_corrected));
   command
       .add_option("--estimator", arguments.estimator,
                   "bayes-pose: priors by order, shared noise of Ball1, random pose rotations;\n"

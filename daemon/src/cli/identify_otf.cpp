@@ -17,6 +17,7 @@
 #include "cli/commands.hpp"
 #include "cli/identified_model.hpp"
 #include "cli/opened_recording.hpp"
+#include "cli/scales_corrected.hpp"
 #include "cli/terminal.hpp"
 #include "files/text_file.hpp"
 #include "units.hpp"
@@ -34,7 +35,7 @@ struct Arguments {
   std::string estimator = "two-step";
   std::size_t block_samples = 0;  // 0: by travel
   double u_scale_ppm = 0.0;
-  bool path_corrected = false;
+  bool scales_corrected = false;
   bool json = false;
 };
 
@@ -92,21 +93,12 @@ Outcome outcome_of(OtfCandidate candidate, const Config& config, std::vector<Inp
           s.blocks, s.blocks_used};
 }
 
-/// The daemon applies a model to positions corrected by [[thermal]]: a model of uncorrected ones holds what
-/// the scales grew by, and it would be corrected twice.
-Result<void> check_scales(const Arguments& arguments, const Config& config) {
-  if (config.thermal.empty() || arguments.path_corrected) return {};
-  return fail(ErrorCode::BadInput,
-              "identify otf: [[thermal]] is configured, and tracker.csv holds no temperatures: use "
-              "--recording, or give a path corrected for the temperature of the scales and say "
-              "--path-corrected");
-}
-
 Result<Outcome> from_files(const Arguments& arguments, const std::optional<ModelDocument>& active,
                            ProgressBar& bar) {
   auto files = read_files(arguments, bar);
   if (!files) return tl::make_unexpected(files.error());
-  if (const auto fine = check_scales(arguments, files->config); !fine)
+  if (const auto fine = check_scales("identify otf", "a path", files->config, arguments.scales_corrected);
+      !fine)
     return tl::make_unexpected(fine.error());
   const auto machine = otf_machine(files->config.machine);
   if (!machine) return tl::make_unexpected(machine.error());
@@ -246,9 +238,7 @@ void add_identify_otf(CLI::App& parent, int& exit) {
                        "standard uncertainty all ranges have in common (index of the air): 0.2 for "
                        "0.2 K and 30 Pa")
           ->check(CLI::NonNegativeNumber);
-  auto* corrected =
-      command->add_flag("--path-corrected", arguments->path_corrected,
-                        "the path's positions are corrected for the temperature of the scales ([[thermal]])");
+  auto* corrected = add_scales_corrected(*command, arguments->scales_corrected);
   recording->excludes(u_scale)->excludes(corrected);
   path->needs(machine, tracker);
   tracker->needs(path);

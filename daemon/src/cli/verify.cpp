@@ -213,7 +213,8 @@ void add_options(CLI::App& command, VerifyArguments& arguments) {
   auto* points = command.add_option(
       "--points", arguments.points,
       "verification.csv: x_mm,y_mm,z_mm,tracker_x_mm,tracker_y_mm,tracker_z_mm: scale reading and\n"
-      "independent measurement there, each in its own frame");
+      "independent measurement there, each in its own frame; with [[thermal]] the readings a model is\n"
+      "applied to: corrected for the temperature of the scales");
   auto* recording = command.add_option("--recording", arguments.recording,
                                        "what the daemon recorded (.mcap): wherever the machine stood still");
   auto* live =

@@ -7,6 +7,17 @@ namespace abbe::daemon {
 
 using protocol::HostTime;
 
+namespace {
+
+HostTime began_after(const RecordingReader& recording) {
+  for (const auto& attachment : recording.attachments())
+    if (attachment.name == kDatumStateName)
+      if (const auto state = datum_state_from_attachment(attachment)) return state->at;
+  return HostTime::min();
+}
+
+}  // namespace
+
 MarkSearch::MarkSearch(const Config& config) : config_(&config) {
   if (config.reference && config.counter_card)
     options_ = reference_options(*config.reference, *config.counter_card);
@@ -54,9 +65,11 @@ void MarkSearch::note(std::size_t i) {
 std::vector<ReplayedDatum> MarkSearch::compared(const RecordingReader& recording) const {
   std::vector<ReplayedDatum> all;
   std::vector<std::size_t> seen(axes_.size(), 0);
+  const HostTime begun = began_after(recording);
   for (const auto& attachment : recording.attachments()) {
     if (attachment.name != kDatumName) continue;
     const auto live = datum_from_attachment(attachment);
+    if (live && live->from < begun) continue;  // found in a former file
     for (std::size_t i = 0; live && i < axes_.size(); ++i) {
       if (options_.axes[i].live_axis != live->axis) continue;
       ReplayedDatum& datum = all.emplace_back();

@@ -5,11 +5,15 @@
 #include <algorithm>
 #include <array>
 #include <cerrno>
+#include <functional>
+#include <iterator>
+#include <map>
 #include <optional>
 #include <utility>
 
 #include "abbe/daemon/calibration_request.hpp"
 #include "abbe/daemon/calibration_session.hpp"
+#include "abbe/daemon/datum.hpp"
 #include "abbe/protocol/mcap/writer.hpp"
 #include "abbe/protocol/raw_bytes_cdr.hpp"
 #include "recording/file_front.hpp"
@@ -37,6 +41,19 @@ struct TimedAttachment {
   std::uint64_t time_ns = 0;
 };
 
+/// Whether the next file needs it. `settled`: axes of which nothing found earlier is in force; walked from
+/// the newest back.
+bool is_carried_on(const RecordingAttachment& attachment, const DatumState& state, std::uint32_t& settled) {
+  if (attachment.name == kReferenceRequestName || attachment.name == kDatumStateName) return false;
+  if (attachment.name != kDatumName) return true;
+  const auto datum = datum_from_attachment(attachment);
+  if (!datum || datum->from >= state.at) return true;
+  const std::uint32_t axis = 1u << datum->axis;
+  const bool in_force = (settled & axis) == 0;
+  settled |= axis;
+  return in_force;
+}
+
 }  // namespace
 
 struct Recorder::State {
@@ -52,9 +69,14 @@ struct Recorder::State {
   [[nodiscard]] IoResult write_front(RecordingFile& fresh, mcap::SummaryBuilder& fresh_summary) const;
   [[nodiscard]] IoResult end_file();
   [[nodiscard]] bool add(Stream stream, protocol::HostTime time, std::span<const std::byte> payload);
+  void put(Stream stream, protocol::HostTime logged, protocol::HostTime time,
+           std::span<const std::byte> payload);
   /// Marks `message` with what is missing before it, and adds it.
   template <class Message>
   void add_marked(Stream stream, protocol::HostTime time, std::string_view device, Message& message);
+  void add_carried_environment(protocol::HostTime time);
+  void carry_datum_on();
+  void keep_environment(const protocol::EnvironmentSample& sample, std::string_view device);
   void account(Stream stream, std::string_view device, std::uint32_t lost_before, bool added);
   void write_chunk();
   void lose_chunk();
@@ -77,6 +99,10 @@ struct Recorder::State {
   mcap::ChunkBuilder chunk;
   mcap::SummaryBuilder summary;
   std::array<std::uint32_t, recording::kStreamCount> sequences{};
+  std::map<std::string, protocol::EnvironmentSample, std::less<>> latest_environment;  ///< by device
+  bool environment_carried = true;       ///< the present file begins with it
+  std::uint64_t carried_in_chunk = 0;    ///< messages of it: they are in a former file, too
+  std::optional<DatumState> axes_known;  ///< as the last axis sample said
   RecorderStatus status;
   recording::LossLedger lost;  ///< not yet said by a later message
   recording::LossLedger
@@ -139,6 +165,7 @@ IoResult Recorder::State::begin_file() {
   if (std::filesystem::exists(finished, error))
     return tl::unexpected(recording::io_fault("create", finished, EEXIST));
   if (error) return tl::unexpected(recording::io_fault("look for", finished, error.value()));
+  if (part > 0) carry_datum_on();
   auto fresh = RecordingFile::create(path(part + 1, ".mcap.part"));
   if (!fresh) return tl::unexpected(fresh.error());
   mcap::SummaryBuilder fresh_summary;
@@ -149,6 +176,7 @@ IoResult Recorder::State::begin_file() {
   file = std::move(*fresh);
   summary = std::move(fresh_summary);
   sequences = {};
+  environment_carried = false;
   messages_in_file = 0;
   end_written = false;
   ++part;
@@ -192,10 +220,27 @@ bool Recorder::State::add(Stream stream, protocol::HostTime time, std::span<cons
     }
   }
   if (chunk.empty()) chunk_since = now;
-  const std::uint64_t log_time_ns = utc_ns(time);
-  chunk.add(mcap::Message{recording::channel_id(stream), sequences[recording::index(stream)]++, log_time_ns,
-                          log_time_ns, data});
+  if (!std::exchange(environment_carried, true)) add_carried_environment(time);
+  put(stream, time, time, data);
   return true;
+}
+
+void Recorder::State::put(Stream stream, protocol::HostTime logged, protocol::HostTime time,
+                          std::span<const std::byte> data) {
+  chunk.add(mcap::Message{recording::channel_id(stream), sequences[recording::index(stream)]++,
+                          utc_ns(logged), utc_ns(time), data});
+}
+
+/// Some devices speak only when something changes. Logged when the file begins, measured when it was.
+void Recorder::State::add_carried_environment(protocol::HostTime time) {
+  v1::EnvironmentSample message;
+  std::vector<std::byte> bytes;
+  for (const auto& [device, sample] : latest_environment) {
+    recording::fill(message, sample, device);
+    if (!encode(message, bytes)) continue;
+    put(Stream::Environment, time, sample.head.time, bytes);
+    ++carried_in_chunk;
+  }
 }
 
 template <class Message>
@@ -213,7 +258,7 @@ void Recorder::State::account(Stream stream, std::string_view device, std::uint3
 }
 
 void Recorder::State::lose_chunk() {
-  status.lost += chunk.message_count();
+  status.lost += chunk.message_count() - std::exchange(carried_in_chunk, 0);
   chunk.clear();
   lost.add(in_chunk);
   in_chunk.clear();
@@ -228,6 +273,7 @@ void Recorder::State::write_chunk() {
   if (!written) return enter_fault(written.error());
   summary.add(closed, offset);
   chunk.clear();
+  carried_in_chunk = 0;
   in_chunk.clear();
   unsynced = true;
   messages_in_file += messages;
@@ -240,6 +286,17 @@ void Recorder::State::write_chunk() {
   } else if (options.max_file_bytes > 0 && file->size() >= options.max_file_bytes && !calibrating) {
     go_on_in_next_file();
   }
+}
+
+/// What is in force of every axis, what was found since, and which axes nobody knows.
+void Recorder::State::carry_datum_on() {
+  if (!axes_known) return;
+  std::uint32_t settled = axes_known->unknown;
+  std::vector<TimedAttachment> carried;
+  for (auto kept = attachments.rbegin(); kept != attachments.rend(); ++kept)
+    if (is_carried_on(kept->attachment, *axes_known, settled)) carried.push_back(std::move(*kept));
+  carried.push_back({to_attachment(*axes_known), utc_ns(axes_known->at)});
+  attachments.assign(std::make_move_iterator(carried.rbegin()), std::make_move_iterator(carried.rend()));
 }
 
 void Recorder::State::go_on_in_next_file() {
@@ -330,6 +387,7 @@ void Recorder::record(const protocol::TrackerPoint& point, std::string_view devi
 void Recorder::record(const protocol::AxisSample& sample, std::string_view device) {
   recording::fill(state_->axis_sample, sample, device);
   state_->add_marked(Stream::AxisSample, sample.head.time, device, state_->axis_sample);
+  state_->axes_known = DatumState{.at = sample.head.time, .unknown = sample.missing_mask};
 }
 
 void Recorder::record(const protocol::ProbeTrigger& touch, std::string_view device) {
@@ -345,6 +403,15 @@ void Recorder::record(const protocol::TouchScan& scan, std::string_view device) 
 void Recorder::record(const protocol::EnvironmentSample& sample, std::string_view device) {
   recording::fill(state_->environment, sample, device);
   state_->add_marked(Stream::Environment, sample.head.time, device, state_->environment);
+  state_->keep_environment(sample, device);
+}
+
+void Recorder::State::keep_environment(const protocol::EnvironmentSample& sample, std::string_view device) {
+  auto latest = latest_environment.find(device);
+  if (latest == latest_environment.end()) latest = latest_environment.emplace(device, sample).first;
+  latest->second = sample;
+  latest->second.head.lost_before = 0;  // that is said where it was lost
+  latest->second.head.flags &= ~static_cast<protocol::SampleFlags>(protocol::SampleFlag::GapBefore);
 }
 
 void Recorder::record(protocol::RawBytes bytes) {
@@ -372,10 +439,9 @@ void Recorder::record(const v1::CalibrationEvent& event) {
 void Recorder::attach(RecordingAttachment attachment, protocol::HostTime time) {
   State& s = *state_;
   s.calibrating = s.calibrating || is_calibration_request(attachment.name);
+  if (s.status.state == RecorderStatus::State::Recording) s.write_chunk();  // a next file may begin here
   s.attachments.push_back({std::move(attachment), s.utc_ns(time)});
   if (s.status.state != RecorderStatus::State::Recording) return;  // the next file begins with it
-  s.write_chunk();
-  if (s.status.state != RecorderStatus::State::Recording) return;
   mcap::Buffer bytes;
   const TimedAttachment& kept = s.attachments.back();
   const auto index = recording::append_attachment(kept.attachment, kept.time_ns, s.file->size(), bytes);

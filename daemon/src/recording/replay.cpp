@@ -258,6 +258,12 @@ Result<Datum> datum_of(const RecordingReader& recording, const Config& config) {
   const bool asked = versions != recording.metadata().end() && versions->second.contains(kDatumRule);
   Datum datum{config, asked ? Datum::WithoutMarks::NeedAZero : Datum::WithoutMarks::Untouched};
   for (const auto& attachment : recording.attachments()) {
+    if (attachment.name != kDatumStateName) continue;
+    const auto state = datum_state_from_attachment(attachment);
+    if (!state) return tl::unexpected(state.error());
+    datum.go_on(*state);
+  }
+  for (const auto& attachment : recording.attachments()) {
     if (attachment.name != kDatumName) continue;
     const auto found = datum_from_attachment(attachment);
     if (!found) return tl::unexpected(found.error());
@@ -313,26 +319,32 @@ Result<ReplayReport> replay(const RecordingReader& recording, const Config& conf
 
   DeviceOrder device_order;
   std::uint32_t sequence = 0;  // of the message being delivered
+  HostTime logged{};           // the same
   RecordingSink sink;
+  const auto take_environment = [&](const protocol::EnvironmentSample& e, std::string_view device) {
+    const auto measuring = environment_place(config, device);
+    if (measuring) {
+      batch.measured_environment.push_back({*measuring, e});
+    } else {
+      batch.environment.push_back(e);
+    }
+  };
   if (options.source == ReplaySource::Samples) {
     sink.tracker_point = [&](const protocol::TrackerPoint& p, std::string_view) {
       device_order.take(sequence, p, batch.points);
     };
     sink.axis_sample = [&](const protocol::AxisSample& s, std::string_view) { batch.axes.push_back(s); };
-    sink.environment = [&](const protocol::EnvironmentSample& e, std::string_view device) {
-      const auto measuring = environment_place(config, device);
-      if (measuring) {
-        batch.measured_environment.push_back({*measuring, e});
-      } else {
-        batch.environment.push_back(e);
-      }
-    };
+    sink.environment = take_environment;
     sink.probe_trigger = [&](const protocol::ProbeTrigger& t, std::string_view) {
       batch.touches.push_back(t);
     };
   } else {
     sink.raw_block = [&](const protocol::RawBlock& b, std::string_view device) {
       raw.take(b, device, batch);
+    };
+    // The bytes of what a former file handed on are in that file.
+    sink.environment = [&](const protocol::EnvironmentSample& e, std::string_view device) {
+      if (e.head.time != logged) take_environment(e, device);
     };
   }
   sink.calibration_event = [&](const v1::CalibrationEvent& e) {
@@ -360,6 +372,7 @@ Result<ReplayReport> replay(const RecordingReader& recording, const Config& conf
   while (const auto message = cursor.next()) {
     pace.wait_for(message->time);
     sequence = message->sequence;
+    logged = message->time;
     if (!deliver(*message, sink)) ++report.undecodable;
     if (++taken % kMessagesPerTurn != 0) continue;
     marks->take(batch);

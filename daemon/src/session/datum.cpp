@@ -39,6 +39,12 @@ Datum::Datum(const Config& config, WithoutMarks without_marks) {
   }
 }
 
+void Datum::go_on(const DatumState& state) {
+  begun_ = true;
+  for (Axis& axis : axes_)
+    if ((state.unknown >> axis.place & 1u) != 0) axis.in_force.reset();
+}
+
 void Datum::found(const FoundDatum& datum) {
   for (Axis& axis : axes_)
     if (axis.place == datum.axis) axis.coming.push_back(datum);
@@ -107,6 +113,23 @@ RecordingAttachment to_attachment(const FoundDatum& datum) {
                      {"u", datum.u},
                      {"from_ns", datum.from.time_since_epoch().count()}};
   return {.name = std::string{kDatumName}, .media_type = "application/json", .content = content.dump()};
+}
+
+RecordingAttachment to_attachment(const DatumState& state) {
+  return {.name = std::string{kDatumStateName},
+          .media_type = "application/json",
+          .content = json{{"at_ns", state.at.time_since_epoch().count()}, {"unknown", state.unknown}}.dump()};
+}
+
+Result<DatumState> datum_state_from_attachment(const RecordingAttachment& attachment) {
+  try {
+    const json content = json::parse(attachment.content);
+    return DatumState{
+        .at = protocol::HostTime{std::chrono::nanoseconds{content.at("at_ns").get<std::int64_t>()}},
+        .unknown = content.at("unknown").get<std::uint8_t>()};
+  } catch (const json::exception& e) {
+    return fail(ErrorCode::BadInput, fmt::format("attachment {}: {}", attachment.name, e.what()));
+  }
 }
 
 RecordingAttachment reference_request(protocol::HostTime from) {

@@ -7,6 +7,7 @@
 /// Deterministic: decided by the samples' own times, so that a replay from raw bytes is the live run again.
 /// Ordinary world; not thread-safe.
 
+#include <cstdint>
 #include <deque>
 #include <optional>
 #include <string>
@@ -29,6 +30,12 @@ struct FoundDatum {
 /// Whether [reference] finds the zero of this axis.
 [[nodiscard]] bool has_marks(const Config& config, const std::string& axis);
 
+/// What was known of the axes when a further file of a recording began.
+struct DatumState {
+  protocol::HostTime at{};   ///< of the last sample before
+  std::uint8_t unknown = 0;  ///< missing_mask of that sample
+};
+
 class Datum {
  public:
   /// What is to be done with axes that have no marks. Untouched: recordings from before it was asked.
@@ -36,6 +43,8 @@ class Datum {
   /// Without [counter_card] nothing is ever changed.
   explicit Datum(const Config& config, WithoutMarks without_marks = WithoutMarks::NeedAZero);
 
+  /// Not at the first set-up of the card but where a former file ended. Before anything was found in this.
+  void go_on(const DatumState& state);
   /// In the order of time.
   void found(const FoundDatum& datum);
   /// Axis samples, touches and the scans around them.
@@ -69,6 +78,10 @@ inline constexpr const char* kDatumRule = "datum";
 inline constexpr std::string_view kReferenceRequestName = "reference.json";
 [[nodiscard]] RecordingAttachment reference_request(protocol::HostTime from);
 [[nodiscard]] Result<protocol::HostTime> reference_request_from(const RecordingAttachment& attachment);
+/// At the front of every further file; what was found before it and is still in force lies beside it.
+inline constexpr std::string_view kDatumStateName = "datum-state.json";
+[[nodiscard]] RecordingAttachment to_attachment(const DatumState& state);
+[[nodiscard]] Result<DatumState> datum_state_from_attachment(const RecordingAttachment& attachment);
 [[nodiscard]] RecordingAttachment to_attachment(const FoundDatum& datum);
 [[nodiscard]] Result<FoundDatum> datum_from_attachment(const RecordingAttachment& attachment);
 

@@ -14,7 +14,11 @@
 ///
 /// A file that has reached max_file_bytes is closed and recording goes on in the next, too, but never while a
 /// calibration is running: its run lies in one file. Nothing is missing in between; calibrations that are
-/// over are not asked for again in the next file.
+/// over are not asked for again in the next file, nor searches for reference marks.
+///
+/// Every further file stands for itself: its first messages repeat the last EnvironmentSample of each device
+/// (log_time: when the file began, publish_time and content: when it was measured), and its attachments are
+/// the datums still in force and which axes were not known (DatumState).
 ///
 /// One thread uses it, in the ordinary world: it allocates and makes blocking system calls.
 
@@ -90,7 +94,7 @@ class Recorder {
   void record(protocol::RawBytes bytes);
   void record(const v1::CalibrationEvent& event);
 
-  /// Written at once, and again into every later file of this recorder.
+  /// Written at once, and again into every later file of this recorder, except what was over by then.
   void attach(RecordingAttachment attachment, protocol::HostTime time);
 
   /// Call every turn, at least every 100 ms: closes the chunk, syncs and retries when it is time to.

@@ -1,0 +1,184 @@
+/// A recording cut into several files: each of them stands for itself.
+
+#include <gmock/gmock.h>
+
+#include "abbe/daemon/datum.hpp"
+#include "abbe/daemon/replay.hpp"
+#include "recording_fixture.hpp"
+
+namespace abbe::daemon {
+namespace {
+
+using namespace std::chrono_literals;
+using protocol::HostTime;
+using ::testing::ElementsAre;
+
+const std::string kWatched = R"([machine]
+name = "mill"
+chain = "[w X' b Y Z (C1) t]"
+[axes.X]
+min_mm = 0
+max_mm = 500
+[axes.Y]
+min_mm = 0
+max_mm = 500
+[axes.Z]
+min_mm = 0
+max_mm = 500
+[target]
+offset_mm = [0, 0, 0]
+[tracker]
+host = "127.0.0.1"
+[counter_card]
+transport = "usbip"
+port = 3240
+zero = "here"
+axes = [{axis = "X", channel = 0, step_nm = 250}, {axis = "Y", channel = 1, step_nm = 250},
+        {axis = "Z", channel = 2, step_nm = 250}]
+)";
+
+class FurtherFiles : public ::testing::Test {
+ protected:
+  FurtherFiles() {
+    auto options = example_options(folder_.path());
+    options.max_file_bytes = 1;  // every chunk is a full file
+    auto opened = Recorder::open(options, example_info(), {});
+    if (!opened) throw std::runtime_error(opened.error().text);
+    recorder_.emplace(std::move(*opened));
+  }
+  void record_axes(std::uint32_t i, std::uint8_t unknown) {
+    auto sample = example_axes(i);
+    sample.missing_mask = unknown;
+    recorder_->record(sample, "counter_card");
+  }
+  void find_datum(std::size_t axis, double reading_at_zero, HostTime from) {
+    recorder_->attach(to_attachment(FoundDatum{axis, reading_at_zero, 0.0, from}), from);
+  }
+  RecordingReader second() {
+    if (!recorder_->close()) throw std::runtime_error("close");
+    return read("run-2.mcap");
+  }
+  RecordingReader read(const std::string& name) {
+    auto reader = RecordingReader::open(folder_.path() / name);
+    if (!reader) throw std::runtime_error(reader.error().text);
+    return std::move(*reader);
+  }
+  /// reading_at_zero of the datums handed on, in order.
+  static std::vector<double> datums_of(const RecordingReader& reader) {
+    std::vector<double> datums;
+    for (const auto& a : reader.attachments())
+      if (a.name == kDatumName) datums.push_back(datum_from_attachment(a)->reading_at_zero);
+    return datums;
+  }
+
+  TemporaryFolder folder_;
+  std::optional<Recorder> recorder_;
+};
+
+TEST_F(FurtherFiles, BeginWithTheLastWeatherOfEveryDevice) {
+  recorder_->record(example_environment(1), "tracker");
+  recorder_->record(example_environment(2), "hall");
+  auto last = example_environment(3);
+  last.head.lost_before = 4;
+  last.head.flags |= protocol::SampleFlag::GapBefore;
+  recorder_->record(last, "tracker");
+  recorder_->flush();
+  recorder_->record(example_point(9), "tracker");
+  const auto reader = second();
+  std::vector<std::string> seen;
+  RecordingSink sink;
+  sink.environment = [&](const protocol::EnvironmentSample& e, std::string_view device) {
+    seen.emplace_back(device);
+    EXPECT_EQ(e.head.time, device == "hall" ? example_time(2) : example_time(3));
+    EXPECT_EQ(e.head.lost_before, 0u) << "said where they were lost";
+    EXPECT_FALSE(has(e.head.flags, protocol::SampleFlag::GapBefore));
+  };
+  sink.tracker_point = [&](const protocol::TrackerPoint&, std::string_view) { seen.emplace_back("point"); };
+  EXPECT_EQ(reader.read(sink), 0u);
+  EXPECT_THAT(seen, ElementsAre("hall", "tracker", "point"));
+  EXPECT_EQ(reader.time_range()->first, example_time(9)) << "the file is not as old as its weather";
+  EXPECT_EQ(recorder_->status().lost, 0u);
+}
+
+TEST_F(FurtherFiles, GiveTheirWeatherToAReplayAlsoFromRawBytes) {
+  recorder_->record(example_environment(1), "tracker");
+  recorder_->flush();
+  recorder_->record(protocol::to_raw_bytes(example_block(9), "somebody"));
+  recorder_->record(example_environment(10), "tracker");
+  const auto reader = second();
+  const auto config = parse_config(kWatched, "abbed.toml");
+  ASSERT_TRUE(config) << config.error().details.front();
+  const auto weather_of = [&](ReplaySource source) {
+    std::vector<HostTime> times;
+    ReplayOptions options{.source = source};
+    options.samples = [&](const Batch& batch, HostTime) {
+      for (const auto& e : batch.environment) times.push_back(e.head.time);
+    };
+    EXPECT_TRUE(replay(reader, *config, options));
+    return times;
+  };
+  EXPECT_THAT(weather_of(ReplaySource::Samples), ElementsAre(example_time(1), example_time(10)));
+  EXPECT_THAT(weather_of(ReplaySource::RawBytes), ElementsAre(example_time(1)));  // the other from its bytes
+}
+
+TEST_F(FurtherFiles, HandOnTheDatumsInForceOnly) {
+  recorder_->attach(reference_request(example_time(1)), example_time(1));
+  find_datum(0, 0.1, example_time(1));
+  find_datum(0, 0.2, example_time(2));
+  find_datum(1, 0.3, example_time(3));
+  record_axes(5, 0b110);  // Y and Z: a card that began anew
+  recorder_->flush();
+  record_axes(6, 0b110);
+  const auto reader = second();
+  EXPECT_THAT(datums_of(reader), ElementsAre(0.2));
+  std::vector<std::string> names;
+  for (const auto& a : reader.attachments()) names.push_back(a.name);
+  EXPECT_THAT(names, ElementsAre(kDatumStateName, kDatumName));
+  const auto state = datum_state_from_attachment(reader.attachments().front());
+  ASSERT_TRUE(state) << state.error().text;
+  EXPECT_EQ(state->at, example_time(5));
+  EXPECT_EQ(state->unknown, 0b110);
+}
+
+TEST_F(FurtherFiles, HandOnWhatWasFoundSinceTheLastSample) {
+  find_datum(0, 0.1, example_time(1));
+  record_axes(5, 0b110);
+  find_datum(1, 0.2, example_time(5));  // what waited fills the first file
+  record_axes(5, 0b110);
+  recorder_->flush();
+  record_axes(6, 0b100);
+  EXPECT_THAT(datums_of(second()), ElementsAre(0.1, 0.2));
+  EXPECT_THAT(datums_of(read("run-3.mcap")), ElementsAre(0.1, 0.2));
+}
+
+/// Whether the axes are missing in a sample at `t` after the file began.
+std::uint8_t missing_after(const DatumState& state, const std::vector<FoundDatum>& found, bool restarted) {
+  const auto config = parse_config(kWatched, "abbed.toml");
+  EXPECT_TRUE(config);
+  Datum datum{*config};
+  datum.go_on(state);
+  for (const auto& f : found) datum.found(f);
+  Batch batch;
+  auto& sample = batch.axes.emplace_back();
+  sample.head.time = state.at + 1s;
+  sample.axis_count = 3;
+  if (restarted) sample.head.flags |= protocol::SampleFlag::Restarted;
+  datum.apply(batch);
+  return batch.axes[0].missing_mask;
+}
+
+TEST(DatumState, AnAxisThatWasNotKnownIsNotKnownInTheNextFile) {
+  EXPECT_EQ(missing_after({HostTime{10s}, 0b010}, {}, false), 0b010);
+  EXPECT_EQ(missing_after({HostTime{10s}, 0b000}, {}, false), 0b000);
+}
+
+TEST(DatumState, NoSetUpIsTheFirstInAFurtherFile) {
+  EXPECT_EQ(missing_after({HostTime{10s}, 0b000}, {}, true), 0b111);
+}
+
+TEST(DatumState, WhatIsFoundLaterHolds) {
+  EXPECT_EQ(missing_after({HostTime{10s}, 0b110}, {{.axis = 1, .from = HostTime{10s}}}, false), 0b100);
+}
+
+}  // namespace
+}  // namespace abbe::daemon

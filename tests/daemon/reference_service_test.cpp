@@ -193,20 +193,81 @@ Batch counts(HostTime t, std::int64_t count, bool restarted = false) {
   return batch;
 }
 
+/// The card that was set up at 1 s, Z standing at `count` until 2 s.
+void stand(ReferenceService& service, std::int64_t count) {
+  for (int k = 0; k <= 10; ++k) {
+    Batch batch = counts(HostTime{1s + k * 100ms}, count, k == 0);
+    service.turn(batch);
+  }
+}
+
+StandHere z_at(HostTime now) {
+  return {.axes = {"Z"}, .now = now};
+}
+
 TEST(ReferenceService, AxesWithoutMarksAreNotKnownUntilSomebodySaysWhereTheyStand) {
   const auto config = config_of(kCard);
   ReferenceService service{config, nullptr};
   EXPECT_EQ(service.stand_at_offset({}).error().code, ErrorCode::Refused);
-  Batch batch = counts(HostTime{1s}, 400, true);
+  stand(service, 400);
+  EXPECT_THAT(service.without_zero(), ::testing::ElementsAre("X", "Y", "Z"));
+  Batch batch = counts(HostTime{2s}, 400);
   service.turn(batch);
   EXPECT_EQ(batch.axes[0].missing_mask, 0b111);
-  EXPECT_THAT(service.without_zero(), ::testing::ElementsAre("X", "Y", "Z"));
-  ASSERT_TRUE(service.stand_at_offset({"Z"}));
-  batch = counts(HostTime{2s}, 404);
+  ASSERT_TRUE(service.stand_at_offset(z_at(HostTime{2s})));
+  batch = counts(HostTime{3s}, 404);
   service.turn(batch);
   EXPECT_EQ(batch.axes[0].missing_mask, 0b011);
   EXPECT_NEAR(batch.axes[0].position[2], -1e-6, 1e-15);  // two readings of 0.1 mm apart
   EXPECT_THAT(service.without_zero(), ::testing::ElementsAre("X", "Y"));
+}
+
+TEST(ReferenceService, NobodyCanSayWhereAMovingAxisStands) {
+  const auto config = config_of(kCard);
+  ReferenceService service{config, nullptr};
+  stand(service, 400);
+  Batch batch = counts(HostTime{2s}, 440);
+  service.turn(batch);
+  const auto moving = service.stand_at_offset(z_at(HostTime{2s}));
+  ASSERT_FALSE(moving);
+  EXPECT_EQ(moving.error().code, ErrorCode::Refused);
+  EXPECT_THAT(moving.error().text, HasSubstr("Z moves"));
+  EXPECT_THAT(service.without_zero(), Contains("Z"));
+  EXPECT_TRUE(service.stand_at_offset({.axes = {"X"}, .now = HostTime{2s}}));
+  batch = counts(HostTime{2500ms}, 441);  // a count to and fro is no motion
+  service.turn(batch);
+  EXPECT_TRUE(service.stand_at_offset(z_at(HostTime{2500ms})));
+}
+
+TEST(ReferenceService, ASilentCardDoesNotSayWhereAxesAre) {
+  const auto config = config_of(kCard);
+  ReferenceService service{config, nullptr};
+  stand(service, 400);
+  const auto silent = service.stand_at_offset(z_at(HostTime{2600ms}));
+  ASSERT_FALSE(silent);
+  EXPECT_EQ(silent.error().code, ErrorCode::Refused);
+  EXPECT_THAT(silent.error().text, HasSubstr("silent for 0.6 s"));
+}
+
+TEST(ReferenceService, NoZeroChangesUnderACalibration) {
+  const auto config = config_of(kCard);
+  ReferenceService service{config, nullptr};
+  stand(service, 400);
+  auto here = z_at(HostTime{2s});
+  here.acquiring = true;
+  EXPECT_EQ(service.stand_at_offset(here).error().code, ErrorCode::Refused);
+  here.acquiring = false;
+  EXPECT_TRUE(service.stand_at_offset(here));
+}
+
+TEST(ReferenceService, NobodyKnowsAZeroExactly) {
+  const auto config = config_of(kCard);
+  ReferenceService service{config, nullptr};
+  stand(service, 400);
+  auto here = z_at(HostTime{2s});
+  EXPECT_GT(here.u, 0.0);
+  here.u = 0.0;
+  EXPECT_EQ(service.stand_at_offset(here).error().code, ErrorCode::Usage);
 }
 
 TEST(ReferenceService, ZeroHereHoldsForTheFirstSetUpOnly) {
@@ -233,17 +294,19 @@ TEST(ReferenceService, ItIsDecidedForEachAxis) {
   Batch batch = counts(HostTime{1s}, 0, true);
   service.turn(batch);
   EXPECT_EQ(batch.axes[0].missing_mask, 0b100);
-  EXPECT_EQ(service.stand_at_offset({"Z"}).error().code, ErrorCode::Usage);
+  EXPECT_EQ(service.stand_at_offset(z_at(HostTime{1s})).error().code, ErrorCode::Usage);
 }
 
 TEST(Datum, IsTheSameFromTheRecording) {
-  const FoundDatum datum{.axis = 2, .reading_at_zero = 0.1 + 1e-17, .u = 1e-7, .from = HostTime{123456789ns}};
+  const FoundDatum datum{
+      .axis = 2, .reading_at_zero = 0.1 + 1e-17, .u = 1e-7, .from = HostTime{123456789ns}, .stated = true};
   const auto back = datum_from_attachment(to_attachment(datum));
   ASSERT_TRUE(back) << back.error().text;
   EXPECT_EQ(back->axis, datum.axis);
   EXPECT_EQ(back->reading_at_zero, datum.reading_at_zero);
   EXPECT_EQ(back->u, datum.u);
   EXPECT_EQ(back->from, datum.from);
+  EXPECT_EQ(back->stated, datum.stated);
 }
 
 TEST(Datum, HoldsForWhatIsLaterThanItWasFound) {

@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "abbe/daemon/control_protocol.hpp"
+#include "abbe/daemon/reference_service.hpp"
 #include "cli/commands.hpp"
 #include "cli/daemon_socket.hpp"
 #include "cli/follow.hpp"
@@ -28,6 +29,7 @@ struct Arguments {
   bool cancel = false;
   bool here = false;
   std::vector<std::string> axes;
+  double u_um = 1e6 * StandHere::kByEye;
   bool json = false;
 };
 
@@ -93,7 +95,8 @@ int reference(const Arguments& arguments) {
   const auto answer = ask_daemon(*socket, {{"do", "reference"},
                                            {"cancel", arguments.cancel},
                                            {"here", arguments.here},
-                                           {"axes", arguments.axes}});
+                                           {"axes", arguments.axes},
+                                           {"u", arguments.u_um / 1e6}});
   if (!answer) return report(answer.error());
   return arguments.cancel || arguments.here ? 0 : follow_search(*socket, arguments.json);
 }
@@ -110,10 +113,18 @@ void add_reference(CLI::App& parent, int& exit) {
       "looking on (exit code 130), --cancel the search.");
   add_socket_options(*command, arguments->where);
   auto* cancel = command->add_flag("--cancel", arguments->cancel, "end the search that is running");
-  auto* here = command->add_flag("--here", arguments->here,
-                                 "no search: axes without marks stand where they read their offset, now");
+  auto* here = command->add_flag(
+      "--here", arguments->here,
+      "no search: axes without marks stand where they read their offset, now; refused while they\n"
+      "move, while the card is silent, and while a calibration takes readings");
   here->excludes(cancel);
   command->add_option("--axis", arguments->axes, "with --here: only these")->needs(here);
+  command
+      ->add_option("--u-um", arguments->u_um,
+                   "with --here: its standard uncertainty, um, of a rotary axis urad; 100: by eye")
+      ->check(CLI::PositiveNumber)
+      ->capture_default_str()
+      ->needs(here);
   command->add_flag("--json", arguments->json, "the result as JSON");
   command->callback([arguments, &exit] { exit = reference(*arguments); });
 }

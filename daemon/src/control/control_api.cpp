@@ -179,11 +179,19 @@ json cancel(const Hub& hub, const json& request) {
   return done ? json{{"ok", true}} : refusal(done.error());
 }
 
+StandHere stand_here(const HubParts& parts, const json& request) {
+  const SessionState state = parts.calibration.status().state;
+  StandHere here{.axes = request.value("axes", std::vector<std::string>{}), .now = parts.time.now()};
+  here.u = request.value("u", StandHere::kByEye);
+  here.patience = parts.time.host(here.patience);
+  here.acquiring = state == SessionState::Warming || state == SessionState::Acquiring;
+  return here;
+}
+
 json reference(const Hub& hub, const json& request) {
   if (hub.parts().reference == nullptr) return refusal({ErrorCode::Refused, "reference: not in this daemon"});
   ReferenceService& service = *hub.parts().reference;
-  auto done = request.value("here", false)
-                  ? service.stand_at_offset(request.value("axes", std::vector<std::string>{}))
+  auto done = request.value("here", false)     ? service.stand_at_offset(stand_here(hub.parts(), request))
               : request.value("cancel", false) ? service.cancel()
                                                : service.start();
   return done ? json{{"ok", true}} : refusal(done.error());

@@ -111,6 +111,7 @@ RecordingAttachment to_attachment(const FoundDatum& datum) {
   const json content{{"axis", datum.axis},
                      {"reading_at_zero", datum.reading_at_zero},
                      {"u", datum.u},
+                     {"stated", datum.stated},
                      {"from_ns", datum.from.time_since_epoch().count()}};
   return {.name = std::string{kDatumName}, .media_type = "application/json", .content = content.dump()};
 }
@@ -154,7 +155,8 @@ Result<FoundDatum> datum_from_attachment(const RecordingAttachment& attachment) 
         .axis = content.at("axis").get<std::size_t>(),
         .reading_at_zero = content.at("reading_at_zero").get<double>(),
         .u = content.at("u").get<double>(),
-        .from = protocol::HostTime{std::chrono::nanoseconds{content.at("from_ns").get<std::int64_t>()}}};
+        .from = protocol::HostTime{std::chrono::nanoseconds{content.at("from_ns").get<std::int64_t>()}},
+        .stated = content.value("stated", false)};
   } catch (const json::exception& e) {
     return fail(ErrorCode::BadInput, fmt::format("attachment {}: {}", attachment.name, e.what()));
   }

@@ -6,6 +6,15 @@
 #include <cmath>
 
 namespace abbe::daemon {
+namespace {
+
+using std::chrono_literals::operator""ms;
+
+constexpr auto kStandsFor = 500ms;
+constexpr double kStill = 2e-6;       // m or rad: drives in control hold their place within this
+constexpr double kStillCounts = 2.0;  // and no count says more than this
+
+}  // namespace
 
 ReferenceOptions reference_options(const ReferenceConfig& config, const CounterCardConfig& live) {
   ReferenceOptions options{.u_alignment = config.u_alignment};
@@ -50,7 +59,10 @@ Result<void> ReferenceService::cancel() {
 }
 
 void ReferenceService::turn(Batch& batch) {
-  for (const auto& sample : batch.axes) newest_ = std::max(newest_, sample.head.time);
+  for (const auto& sample : batch.axes) {
+    newest_ = std::max(newest_, sample.head.time);
+    watch_standing(sample);
+  }
   if (!batch.axes.empty()) latest_ = batch.axes.back();
   if (running_) look_for_marks(batch);
   datum_.apply(batch);
@@ -99,21 +111,60 @@ std::vector<std::string> ReferenceService::without_zero() const {
   return names;
 }
 
-Result<void> ReferenceService::stand_at_offset(const std::vector<std::string>& axes) {
+void ReferenceService::watch_standing(const protocol::AxisSample& sample) {
+  if (!config_.counter_card) return;
+  const auto& live = config_.counter_card->wiring.axes;
+  const bool anew = standing_.empty() || has(sample.head.flags, protocol::SampleFlag::Restarted);
+  standing_.resize(live.size());
+  for (std::size_t i = 0; i < live.size(); ++i) {
+    const double most = std::max(kStillCounts, kStill / std::abs(live[i].scale));
+    const double moved = std::abs(static_cast<double>(sample.count[i] - standing_[i].count));
+    if (anew || moved > most) standing_[i] = {sample.count[i], sample.head.time};
+  }
+}
+
+Result<void> ReferenceService::check_standing(std::size_t axis) const {
+  const auto& name = config_.counter_card->wiring.axes[axis].name;
+  if ((latest_->missing_mask >> axis & 1u) != 0)
+    return fail(ErrorCode::Refused, fmt::format("reference: {} is not counted now", name));
+  if (newest_ - standing_[axis].since < kStandsFor)
+    return fail(ErrorCode::Refused,
+                fmt::format("reference: {} moves, or has stood for less than {} ms: where it is is not known",
+                            name, kStandsFor.count()));
+  return {};
+}
+
+Result<void> ReferenceService::stand_at_offset(const StandHere& here) {
   const auto possible = without_marks();
-  for (const auto& name : axes)
+  for (const auto& name : here.axes)
     if (std::ranges::find(possible, name) == possible.end())
       return fail(ErrorCode::Usage,
                   fmt::format("reference: {} has marks, or is not counted by a card", name));
   if (possible.empty())
     return fail(ErrorCode::Usage, "reference: there is no axis whose zero somebody could know");
+  if (!(here.u > 0.0) || !std::isfinite(here.u))
+    return fail(ErrorCode::Usage, "reference: nobody knows a zero exactly: the uncertainty must be positive");
+  if (here.acquiring)
+    return fail(ErrorCode::Refused,
+                "reference: a calibration takes readings: another zero in the middle would tear them");
   if (!latest_) return fail(ErrorCode::Refused, "reference: the counter card has not said anything yet");
+  if (here.now - newest_ > here.patience)
+    return fail(ErrorCode::Refused, fmt::format("reference: the counter card has been silent for {:.1f} s",
+                                                std::chrono::duration<double>(here.now - newest_).count()));
   const auto& live = config_.counter_card->wiring.axes;
-  for (const auto& name : axes.empty() ? possible : axes) {
-    const auto place =
-        static_cast<std::size_t>(std::ranges::find(live, name, &drivers::CounterAxis::name) - live.begin());
+  std::vector<std::size_t> places;
+  for (const auto& name : here.axes.empty() ? possible : here.axes) {
+    places.push_back(
+        static_cast<std::size_t>(std::ranges::find(live, name, &drivers::CounterAxis::name) - live.begin()));
+    if (const auto stands = check_standing(places.back()); !stands) return stands;
+  }
+  for (const std::size_t place : places) {
     const double counted = live[place].scale * static_cast<double>(latest_->count[place]);
-    take_up(FoundDatum{.axis = place, .reading_at_zero = live[place].offset - counted, .from = newest_});
+    take_up(FoundDatum{.axis = place,
+                       .reading_at_zero = live[place].offset - counted,
+                       .u = here.u,
+                       .from = newest_,
+                       .stated = true});
   }
   return {};
 }

@@ -23,8 +23,9 @@ namespace abbe::daemon {
 struct FoundDatum {
   std::size_t axis = 0;          ///< place in AxisSample
   double reading_at_zero = 0.0;  ///< m or rad
-  double u = 0.0;
+  double u = 0.0;                ///< standard uncertainty, m or rad
   protocol::HostTime from{};
+  bool stated = false;  ///< somebody said so; else marks did
 };
 
 /// Whether [reference] finds the zero of this axis.

@@ -2,6 +2,8 @@
 /// `abbe reference` in the daemon: runs a ReferenceSession over the live samples and the marks of the second
 /// card, and gives every reading its datum. The hub's thread only; no call waits for anything.
 
+#include <chrono>
+#include <cstdint>
 #include <optional>
 #include <string>
 #include <vector>
@@ -20,6 +22,18 @@ namespace abbe::daemon {
 /// What a found axis says of count 0. m or rad.
 [[nodiscard]] double reading_at_zero(const ReferenceAxisConfig& marks, const AxisReference& found);
 
+/// Somebody says that axes stand where they read their offset.
+struct StandHere {
+  static constexpr double kByEye = 100e-6;
+
+  std::vector<std::string> axes;  ///< none: all that have no marks
+  double u = kByEye;              ///< standard uncertainty of that, m or rad
+  protocol::HostTime now{};
+  std::chrono::nanoseconds patience{
+      std::chrono::milliseconds{500}};  ///< an older sample is not where they are
+  bool acquiring = false;               ///< a calibration takes readings
+};
+
 class ReferenceService {
  public:
   struct AxisStatus {
@@ -35,9 +49,10 @@ class ReferenceService {
   /// Refused without [reference] and while one runs. Axes that are known already stay so until the new datum.
   [[nodiscard]] Result<void> start();
   [[nodiscard]] Result<void> cancel();
-  /// Somebody says that these axes stand where they read their offset; none: all that have no marks. Usage
-  /// for an axis that has marks or is not counted, Refused before anything came.
-  [[nodiscard]] Result<void> stand_at_offset(const std::vector<std::string>& axes);
+  /// Usage for an axis that has marks or is not counted, and for an uncertainty that is not positive. Refused
+  /// while a calibration takes readings, without a fresh sample, and unless the axes have stood for half a
+  /// second.
+  [[nodiscard]] Result<void> stand_at_offset(const StandHere& here);
   /// Every turn, before anybody else sees the batch.
   void turn(Batch& batch);
 
@@ -52,6 +67,8 @@ class ReferenceService {
   void take_up(std::size_t axis);
   void take_up(const FoundDatum& datum);
   [[nodiscard]] std::vector<std::string> without_marks() const;
+  void watch_standing(const protocol::AxisSample& sample);
+  [[nodiscard]] Result<void> check_standing(std::size_t axis) const;
   [[nodiscard]] double reading_at_zero(std::size_t axis) const;
 
   const Config& config_;
@@ -60,7 +77,12 @@ class ReferenceService {
   std::optional<ReferenceSession> session_;  ///< the latest
   std::vector<bool> taken_up_;
   bool running_ = false;
-  protocol::HostTime newest_{};  ///< of the live samples
+  struct Standing {
+    std::int64_t count = 0;
+    protocol::HostTime since{};
+  };
+  std::vector<Standing> standing_;  ///< as the axes of [counter_card]
+  protocol::HostTime newest_{};     ///< of the live samples
   std::optional<protocol::AxisSample> latest_;
   protocol::HostTime from_{};  ///< what came later belongs to the search
 };

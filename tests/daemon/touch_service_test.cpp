@@ -9,7 +9,10 @@
 namespace abbe::daemon {
 namespace {
 
+using namespace std::chrono_literals;
 using testing::HasSubstr;
+
+constexpr TouchService::WallTime kFirstTurn{100s};
 
 struct Machine final : SampleSource {
   void drain(Batch&) override {}
@@ -17,6 +20,11 @@ struct Machine final : SampleSource {
   void measure(std::span<const drivers::ProbePoint> points) override {
     asked.insert(asked.end(), points.begin(), points.end());
   }
+  Result<std::array<double, 3>> machine_position() const override {
+    if (!ready) return fail(ErrorCode::Refused, "measuring machine cmm is not ready: connecting");
+    return std::array<double, 3>{0.0, 0.0, 1.0};
+  }
+  bool ready = true;
   std::vector<drivers::ProbePoint> asked;
 };
 
@@ -52,12 +60,12 @@ TEST(TouchService, AsksForOneTouchAndItsWayAtATime) {
   ASSERT_EQ(machine.asked.size(), 2u);
   EXPECT_FALSE(machine.asked[0].touch);
   EXPECT_TRUE(machine.asked[1].touch);
-  service.turn({}, 1, "");
+  service.turn({}, 1, "", kFirstTurn);
   EXPECT_EQ(machine.asked.size(), 2u);
-  service.turn(touched(0.1), 1, "");
+  service.turn(touched(0.1), 1, "", kFirstTurn);
   EXPECT_EQ(machine.asked.size(), 3u);
   EXPECT_TRUE(service.status().running);
-  service.turn(touched(0.2), 0, "");
+  service.turn(touched(0.2), 0, "", kFirstTurn);
   EXPECT_FALSE(service.status().running);
   EXPECT_TRUE(service.status().reason.empty());
   ASSERT_EQ(service.status().touches.size(), 2u);
@@ -68,9 +76,9 @@ TEST(TouchService, EndsAtARefusedTouchWithWhatTheMachineSaid) {
   Machine machine;
   TouchService service{machine, true};
   ASSERT_TRUE(service.start(two_touches()));
-  service.turn(refused(), 0, "");
+  service.turn(refused(), 0, "", kFirstTurn);
   EXPECT_TRUE(service.status().running);  // why was not asked for in that turn
-  service.turn({}, 0, "PtMeas was refused: 1006 Surface not found");
+  service.turn({}, 0, "PtMeas was refused: 1006 Surface not found", kFirstTurn);
   EXPECT_FALSE(service.status().running);
   EXPECT_THAT(service.status().reason, HasSubstr("touch 1 of 2 was refused"));
   EXPECT_THAT(service.status().reason, HasSubstr("1006"));
@@ -81,8 +89,8 @@ TEST(TouchService, KeepsTheTouchesUntilTheMachineWentAway) {
   Machine machine;
   TouchService service{machine, true};
   ASSERT_TRUE(service.start(two_touches()));
-  service.turn(touched(0.1), 1, "");
-  service.turn({}, 0, "connection closed by the peer");
+  service.turn(touched(0.1), 1, "", kFirstTurn);
+  service.turn({}, 0, "connection closed by the peer", kFirstTurn);
   EXPECT_THAT(service.status().reason, HasSubstr("touch 2 of 2 was not made: connection closed"));
   EXPECT_EQ(service.status().touches.size(), 1u);
 }
@@ -91,7 +99,7 @@ TEST(TouchService, ATouchThatReportsNothingIsSaidToHaveReportedNothing) {
   Machine machine;
   TouchService service{machine, true};
   ASSERT_TRUE(service.start(two_touches()));
-  service.turn({}, 0, "");
+  service.turn({}, 0, "", kFirstTurn);
   EXPECT_THAT(service.status().reason, HasSubstr("the machine reported nothing"));
 }
 
@@ -113,11 +121,81 @@ TEST(TouchService, MakesAndKeepsTheTouchThatIsUnderWayWhenCancelled) {
   ASSERT_TRUE(service.cancel());
   EXPECT_TRUE(service.status().running);
   EXPECT_FALSE(service.start(two_touches()));  // that touch would count as its first one
-  service.turn(touched(0.1), 1, "");
+  service.turn(touched(0.1), 1, "", kFirstTurn);
   EXPECT_FALSE(service.status().running);
   EXPECT_EQ(service.status().reason, "cancelled");
   EXPECT_EQ(service.status().touches.size(), 1u);
   EXPECT_EQ(machine.asked.size(), 2u);
+}
+
+TEST(TouchService, EndsWhenNobodyLooksOnAnyMore) {
+  Machine machine;
+  TouchService service{machine, true};
+  ASSERT_TRUE(service.start(two_touches()));
+  service.turn({}, 2, "", kFirstTurn);
+  service.turn({}, 1, "", kFirstTurn + 1900ms);
+  (void)service.look();
+  service.turn({}, 1, "", kFirstTurn + 2100ms);
+  service.turn({}, 1, "", kFirstTurn + 4000ms);
+  EXPECT_TRUE(service.status().reason.empty()) << service.status().reason;
+  (void)service.status();  // the daemon's own looking is nobody's
+  service.turn({}, 1, "", kFirstTurn + 4200ms);
+  EXPECT_THAT(service.status().reason, HasSubstr("nobody looked on"));
+  EXPECT_TRUE(service.status().running);  // until the touch that is under way is made
+  service.turn(touched(0.1), 1, "", kFirstTurn + 4300ms);
+  EXPECT_FALSE(service.status().running);
+  EXPECT_EQ(service.status().touches.size(), 1u);
+  EXPECT_EQ(machine.asked.size(), 2u);  // the second touch was never begun
+}
+
+TEST(TouchService, CountsTheTimeAnewForEveryStart) {
+  Machine machine;
+  TouchService service{machine, true};
+  ASSERT_TRUE(service.start(two_touches()));
+  service.turn({}, 0, "", kFirstTurn);
+  ASSERT_FALSE(service.status().running);
+  ASSERT_TRUE(service.start(two_touches()));
+  service.turn({}, 2, "", kFirstTurn + 1h);
+  EXPECT_TRUE(service.status().reason.empty()) << service.status().reason;
+}
+
+TEST(TouchService, LeavesWhenAllWasTouchedAndRunsUntilItHas) {
+  Machine machine;
+  TouchService service{machine, true};
+  ASSERT_TRUE(service.start(two_touches(), {{.position_m = {0, 0, 0.5}, .touch = false}}));
+  service.turn(touched(0.1), 1, "", kFirstTurn);
+  service.turn(touched(0.2), 0, "", kFirstTurn);
+  EXPECT_TRUE(service.status().running);
+  ASSERT_EQ(machine.asked.size(), 4u);
+  EXPECT_EQ(machine.asked[3].position_m[2], 0.5);
+  EXPECT_FALSE(machine.asked[3].touch);
+  service.turn({}, 1, "", kFirstTurn);
+  EXPECT_TRUE(service.status().running);
+  service.turn({}, 0, "", kFirstTurn);
+  EXPECT_FALSE(service.status().running);
+  EXPECT_TRUE(service.status().reason.empty());
+}
+
+TEST(TouchService, DoesNotLeaveFromWhereItWasCancelled) {
+  Machine machine;
+  TouchService service{machine, true};
+  ASSERT_TRUE(service.start(two_touches(), {{.position_m = {0, 0, 0.5}, .touch = false}}));
+  ASSERT_TRUE(service.cancel());
+  service.turn(touched(0.1), 0, "", kFirstTurn);
+  EXPECT_FALSE(service.status().running);
+  EXPECT_EQ(machine.asked.size(), 2u);
+}
+
+TEST(TouchService, AsksNothingOfAMachineThatIsNotReady) {
+  Machine machine;
+  machine.ready = false;
+  TouchService service{machine, true};
+  const auto started = service.start(two_touches());
+  ASSERT_FALSE(started);
+  EXPECT_EQ(started.error().code, ErrorCode::Refused);
+  EXPECT_THAT(started.error().text, HasSubstr("not ready"));
+  EXPECT_FALSE(service.where());
+  EXPECT_TRUE(machine.asked.empty());
 }
 
 }  // namespace

@@ -241,6 +241,10 @@ json touch(const Hub& hub, const json& request) {
     auto done = service.cancel();
     return done ? json{{"ok", true}} : refusal(done.error());
   }
+  if (request.value("where", false)) {
+    const auto at = service.where();
+    return at ? json{{"ok", true}, {"at_m", *at}} : refusal(at.error());
+  }
   std::vector<TouchRequest> wanted;
   for (const json& point : request.at("points")) {
     TouchRequest& one = wanted.emplace_back();
@@ -248,13 +252,15 @@ json touch(const Hub& hub, const json& request) {
     one.point = place_from(point.at("at_m"), true);
     one.point.normal = point.at("normal").get<std::array<double, 3>>();
   }
-  auto started = service.start(std::move(wanted));
+  std::vector<drivers::ProbePoint> leave;
+  for (const json& place : request.value("leave", json::array())) leave.push_back(place_from(place, false));
+  auto started = service.start(std::move(wanted), std::move(leave));
   return started ? json{{"ok", true}} : refusal(started.error());
 }
 
 json touches(const Hub& hub, const json&) {
   if (hub.parts().touching == nullptr) return refusal({ErrorCode::Refused, "touch: not in this daemon"});
-  const TouchService::Status& status = hub.parts().touching->status();
+  const TouchService::Status& status = hub.parts().touching->look();
   json made = json::array();
   for (const auto& t : status.touches)
     made.push_back({{"at_m", {t.position[0], t.position[1], t.position[2]}}, {"u_m", t.u_position[0]}});

@@ -1,7 +1,13 @@
 #include "abbe/daemon/device_set.hpp"
 
+#include <fmt/format.h>
+
+#include <algorithm>
 #include <array>
+#include <cmath>
 #include <map>
+#include <optional>
+#include <string_view>
 #include <utility>
 
 #include "abbe/daemon/device_options.hpp"
@@ -22,6 +28,8 @@ using protocol::HostTime;
 // How much one call takes out of a ring: several bursts.
 constexpr std::size_t kMostSamples = 1024;
 constexpr std::size_t kMostBlocks = 128;
+constexpr auto kPositionIsOld =
+    std::chrono::seconds{1};  // wall time: a ready machine says it ten times in it
 
 Error error_of(const drivers::Error& error) {
   return {error.code == drivers::ErrorCode::BadConfiguration ? ErrorCode::BadInput : ErrorCode::Io,
@@ -97,6 +105,8 @@ struct DeviceSet::State {
   std::vector<Running<drivers::EnvironmentDevice>> environments;
   std::optional<Running<drivers::IppDevice>> cmm;
   bool cmm_is_the_axes = false;
+  std::optional<protocol::AxisSample> cmm_stands_at;
+  const drivers::TimeSource* time = nullptr;
   std::array<protocol::TrackerPoint, kMostSamples> points;
   std::array<protocol::AxisSample, kMostSamples> axes;
   std::array<protocol::EnvironmentSample, 16> environment;
@@ -137,6 +147,7 @@ struct DeviceSet::State {
 
 Result<DeviceSet> DeviceSet::start(const Config& config, const drivers::TimeSource& time) {
   auto state = std::make_unique<State>();
+  state->time = &time;
   if (config.encoder) {
     auto running =
         run(drivers::EncoderDevice::create(device_options(*config.encoder, config.daemon.speed),
@@ -235,11 +246,10 @@ void DeviceSet::drain_cmm(Batch& batch) {
   auto& device = *s.cmm->device;
   drain_ring(device.touches(), s.touches, batch.touches);
   drain_ring(device.raw(), s.blocks, batch.probe_raw);
-  if (s.cmm_is_the_axes) {
-    drain_ring(device.positions(), s.axes, batch.axes);
-  } else {
-    while (device.positions().pop(s.axes) == s.axes.size()) {
-    }
+  while (const std::size_t n = device.positions().pop(s.axes)) {
+    s.cmm_stands_at = s.axes[n - 1];
+    if (s.cmm_is_the_axes)
+      batch.axes.insert(batch.axes.end(), s.axes.begin(), s.axes.begin() + static_cast<std::ptrdiff_t>(n));
   }
 }
 
@@ -250,6 +260,25 @@ void DeviceSet::measure(std::span<const drivers::ProbePoint> points) {
 
 std::size_t DeviceSet::points_left() const {
   return state_->cmm ? state_->cmm->device->points_left() : 0;
+}
+
+Result<std::array<double, 3>> DeviceSet::machine_position() const {
+  if (!state_->cmm) return SampleSource::machine_position();
+  const auto status = state_->cmm->device->status();
+  const auto refused = [&](std::string_view why) {
+    return fail(ErrorCode::Refused,
+                fmt::format("measuring machine {} {}{}{}", status.name, why,
+                            status.last_fault.empty() ? "" : "; its last fault: ", status.last_fault));
+  };
+  if (status.state != drivers::name_of(drivers::IppState::Ready))
+    return refused(fmt::format("is not ready: {}", status.state));
+  const auto& at = state_->cmm_stands_at;
+  if (!at || state_->time->now() - at->head.time > state_->time->host(kPositionIsOld))
+    return refused("does not say where it stands");
+  const std::array<double, 3> place{at->position[0], at->position[1], at->position[2]};
+  if (!std::ranges::all_of(place, [](double p) { return std::isfinite(p); }))
+    return refused("does not say where it stands");
+  return place;
 }
 
 std::vector<StreamHealth> DeviceSet::health(HostTime now) {

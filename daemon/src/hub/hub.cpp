@@ -90,7 +90,7 @@ void Hub::turn(WallTime wall) {
   batch_.clear();
   const std::size_t points_left = parts_.devices.points_left();
   parts_.devices.drain(batch_);
-  touch(points_left);
+  touch(points_left, wall);
   if (parts_.reference != nullptr) parts_.reference->turn(batch_);
   const bool fresh = live_.take(batch_);
   const HostTime now = parts_.time.now();
@@ -109,7 +109,7 @@ void Hub::turn(WallTime wall) {
 }
 
 /// What the machine said last is asked for only when that matters: its health is not for every turn.
-void Hub::touch(std::size_t points_left) {
+void Hub::touch(std::size_t points_left, WallTime wall) {
   if (parts_.touching == nullptr || !parts_.touching->status().running) return;
   std::string seen;
   if (points_left == 0 && batch_.touches.empty()) {
@@ -117,7 +117,7 @@ void Hub::touch(std::size_t points_left) {
     for (const auto& h : health_)
       if (parts_.config.cmm && h.status.name == parts_.config.cmm->name) seen = h.status.last_fault;
   }
-  parts_.touching->turn(batch_, points_left, seen);
+  parts_.touching->turn(batch_, points_left, seen, wall);
 }
 
 void Hub::publish(bool fresh, HostTime now, WallTime wall) {

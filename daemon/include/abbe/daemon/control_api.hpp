@@ -3,9 +3,11 @@
 ///     {"do": "status"}
 ///     {"do": "calibrate", "method": "otf", "path_m": [[x, y, z], ...], "who": REMARK}
 ///     {"do": "cancel", "who": REMARK}
-///     {"do": "touch", "points": [{"way": [[x, y, z], ...], "at_m": [x, y, z], "normal": [i, j, k]}, ...]}
+///     {"do": "touch", "where": true}
+///     {"do": "touch", "points": [{"way": [[x, y, z], ...], "at_m": [x, y, z], "normal": [i, j, k]}, ...],
+///      "leave": [[x, y, z], ...]}
 ///     {"do": "touch", "cancel": true}
-///     {"do": "touches"}
+///     {"do": "touches"}: at least every 2 s, else the touching ends
 /// Who asked is "user", which the server sets; "who", if it says something else, is kept beside it.
 /// Lengths m. Models are activated and rolled back in the store; the daemon follows it. Runs on the hub's
 /// thread, through Hub::call().

@@ -2,6 +2,7 @@
 /// The configured devices with their rings and threads, as one thing the hub can drain. The devices' threads
 /// are theirs; every function here is for the hub's thread.
 
+#include <array>
 #include <chrono>
 #include <memory>
 #include <span>
@@ -31,6 +32,7 @@ class DeviceSet final : public SampleSource {
   [[nodiscard]] std::vector<std::string> warnings() const;
   void measure(std::span<const drivers::ProbePoint> points) override;
   [[nodiscard]] std::size_t points_left() const override;
+  [[nodiscard]] Result<std::array<double, 3>> machine_position() const override;
 
  private:
   void drain_cmm(Batch& batch);

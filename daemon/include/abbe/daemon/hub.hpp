@@ -72,7 +72,7 @@ class Hub {
   void run_calls();
   void publish(bool fresh, protocol::HostTime now, WallTime wall);
   void collect_health(protocol::HostTime now);
-  void touch(std::size_t points_left);
+  void touch(std::size_t points_left, WallTime wall);
 
   HubParts parts_;
   Assembler assembler_;

@@ -5,8 +5,8 @@
 #include <algorithm>
 #include <array>
 #include <map>
-#include <optional>
 #include <random>
+#include <string>
 #include <utility>
 #include <vector>
 
@@ -28,9 +28,14 @@ Calibrator array() {
 }
 const std::array<FaceToTouch, 2> kFaces{{{{0.08, 0.08, 0.0}, 8e-3}, {{0.12, 0.05, 0.0}, 8e-3}}};
 
-std::vector<PlannedTouch> plan(const ArtefactTouchOptions& options = {}) {
+const Vector3 kLow{0.3, -0.2, -0.05};  // beside the artefact
+
+ArtefactPlan whole_plan(const Vector3& from_m, const ArtefactTouchOptions& options = {}) {
   const auto c = array();
-  return plan_artefact_touches(c, kFaces, options).value();
+  return plan_artefact_touches(c, kFaces, from_m, options).value();
+}
+std::vector<PlannedTouch> plan(const ArtefactTouchOptions& options = {}) {
+  return whole_plan(kLow, options).touches;
 }
 
 double distance_to_way(const Vector3& p, const Vector3& a, const Vector3& b) {
@@ -60,11 +65,11 @@ TEST(ArtefactTouches, TouchesTheUpperHalfWithTheSurfaceOfTheTip) {
 TEST(ArtefactTouches, NoWayLeadsThroughABall) {
   const auto c = array();
   for (const std::size_t points : {5u, 8u, 13u, 25u}) {
-    std::optional<Vector3> here;
+    Vector3 here = kLow;
     for (const auto& t : plan({.points_per_ball = points})) {
       for (const Vector3& place : t.way_m) {
         for (const auto& ball : c.balls)
-          EXPECT_GT(distance_to_way(ball.centre_m, here.value_or(place), place), 1.3 * 14.5e-3);
+          EXPECT_GT(distance_to_way(ball.centre_m, here, place), 1.3 * 14.5e-3);
         here = place;
       }
       // The last of the way lies outward of the touch.
@@ -73,9 +78,50 @@ TEST(ArtefactTouches, NoWayLeadsThroughABall) {
   }
 }
 
+double top_of_everything() {
+  double top_m = 0.0;
+  for (const auto& ball : array().balls) top_m = std::max(top_m, ball.centre_m.z() + 14.5e-3);
+  return top_m;
+}
+
+TEST(ArtefactTouches, GoesUpFromWhereItStandsBeforeAnythingElse) {
+  // Between two balls: a straight way to above the first one leads through a ball.
+  const Vector3 from{0.04, 0.0, -0.01};
+  const auto way = whole_plan(from).touches.front().way_m;
+  ASSERT_EQ(way.size(), 3u);
+  EXPECT_NEAR((way[0] - from).head<2>().norm(), 0.0, 1e-12);
+  EXPECT_GT(way[0].z(), top_of_everything());
+  EXPECT_GT(way[1].z(), top_of_everything());
+}
+
+TEST(ArtefactTouches, DoesNotGoDownBeforeItGoesAcross) {
+  const Vector3 from{0.3, 0.3, 0.5};
+  const auto way = whole_plan(from).touches.front().way_m;
+  ASSERT_EQ(way.size(), 2u);
+  EXPECT_GT(way[0].z(), top_of_everything());
+  EXPECT_NEAR((way[0] - way[1]).head<2>().norm(), 0.0, 1e-12);
+}
+
+TEST(ArtefactTouches, EndsAboveEverything) {
+  const auto planned = whole_plan(kLow);
+  const auto& last = planned.touches.back();
+  ASSERT_EQ(planned.leave_m.size(), 2u);
+  EXPECT_NEAR((planned.leave_m[0] - last.at_m).normalized().dot(last.normal), 1.0, 1e-9);
+  EXPECT_NEAR((planned.leave_m[1] - planned.leave_m[0]).head<2>().norm(), 0.0, 1e-12);
+  EXPECT_GT(planned.leave_m[1].z(), top_of_everything());
+}
+
+TEST(ArtefactTouches, RefusesATipWithABallAboveIt) {
+  const auto under = plan_artefact_touches(array(), kFaces, {0.085, 0.0, -0.06}, {});
+  ASSERT_FALSE(under);
+  EXPECT_NE(under.error().text.find("ball 2 is above the tip"), std::string::npos) << under.error().text;
+  // As after a touch on its upper half that was the last one.
+  EXPECT_TRUE(plan_artefact_touches(array(), kFaces, {0.08 + 14.3e-3, 0.0, 2e-3}, {}));
+}
+
 TEST(ArtefactTouches, RefusesTooFewPoints) {
-  EXPECT_FALSE(plan_artefact_touches(array(), kFaces, {.points_per_ball = 4}));
-  EXPECT_FALSE(plan_artefact_touches(array(), kFaces, {.points_per_face = 3}));
+  EXPECT_FALSE(plan_artefact_touches(array(), kFaces, kLow, {.points_per_ball = 4}));
+  EXPECT_FALSE(plan_artefact_touches(array(), kFaces, kLow, {.points_per_face = 3}));
 }
 
 TEST(ArtefactTouches, TheFewestTouchesAreEnough) {
@@ -97,9 +143,9 @@ TEST(ArtefactTouches, MovedTouchesGiveTheArtefactThere) {
   std::mt19937_64 random(5);
   std::normal_distribution<double> noise(0.0, 0.2e-6);
   std::vector<Touch> touches;
-  const auto planned = plan_artefact_touches(there, faces, {});
+  const auto planned = plan_artefact_touches(there, faces, T * kLow, {});
   ASSERT_TRUE(planned) << planned.error().text;
-  for (const auto& t : *planned)
+  for (const auto& t : planned->touches)
     touches.push_back({1, t.feature, t.number, t.at_m + noise(random) * t.normal});
   const auto found = calibrated_artefact(there, faces, touches, 0.3e-6);
   ASSERT_TRUE(found) << found.error().text;

@@ -60,14 +60,25 @@ std::vector<Vector3> places_on_a_face(const FaceToTouch& face, const Vector3& no
 
 class Planner {
  public:
-  Planner(const Calibrator& nominal, const std::array<FaceToTouch, 2>& faces,
+  Planner(const Calibrator& nominal, const std::array<FaceToTouch, 2>& faces, const Vector3& from_m,
           const ArtefactTouchOptions& options)
-      : nominal_(nominal), options_(options), up_(nominal.blocks[0].normal.normalized()) {
+      : nominal_(nominal), options_(options), up_(nominal.blocks[0].normal.normalized()), here_(from_m) {
     for (const auto& ball : nominal.balls)
       top_m_ = std::max(top_m_, up_.dot(ball.centre_m) + kOuter * reach(ball));
     for (const auto& face : faces)
       top_m_ = std::max(top_m_, up_.dot(face.centre_m) + face.half_size_m + nominal.tip_radius_m);
     top_m_ += options.clearance_m;
+  }
+
+  /// The ball that the tip would meet on its way straight up from where it stands; null: none.
+  [[nodiscard]] const Calibrator::Ball* ball_above() const {
+    const auto above = [this](const Calibrator::Ball& ball) {
+      const Vector3 from_centre = here_ - ball.centre_m;
+      const double height = up_.dot(from_centre);
+      return height < 0.0 && (from_centre - height * up_).norm() < reach(ball) + options_.clearance_m;
+    };
+    const auto found = std::ranges::find_if(nominal_.balls, above);
+    return found == nominal_.balls.end() ? nullptr : &*found;
   }
 
   void touch(const Calibrator::Ball& ball) {
@@ -96,23 +107,25 @@ class Planner {
     for (const Vector3& place : places_on_a_face(face, n, options_.points_per_face)) {
       const Vector3 at = place + nominal_.tip_radius_m * n;
       const Vector3 outer = at + options_.clearance_m * n;
-      auto way = std::exchange(first, false) ? over_to(outer) : std::vector<Vector3>{*here_, outer};
+      auto way = std::exchange(first, false) ? over_to(outer) : std::vector<Vector3>{here_, outer};
       planned_.push_back({Feature::Block, block.number, std::move(way), at, n});
       here_ = outer;
     }
   }
 
-  [[nodiscard]] std::vector<PlannedTouch> planned() { return std::move(planned_); }
+  [[nodiscard]] ArtefactPlan planned() { return {std::move(planned_), {here_, raised(here_)}}; }
 
  private:
   [[nodiscard]] double reach(const Calibrator::Ball& ball) const {
     return ball.radius_m + nominal_.tip_radius_m;
   }
+  [[nodiscard]] bool high(const Vector3& p_m) const { return up_.dot(p_m) >= top_m_; }
   [[nodiscard]] Vector3 raised(const Vector3& p_m) const { return p_m + (top_m_ - up_.dot(p_m)) * up_; }
-  /// Where the machine comes from at first nobody knows: then only down from above.
+  /// Up, across, down; from higher than everything straight to above the place.
   [[nodiscard]] std::vector<Vector3> over_to(const Vector3& place_m) const {
     std::vector<Vector3> way;
-    if (here_) way = {*here_, raised(*here_)};
+    if (!planned_.empty()) way.push_back(here_);  // a touch ends at the face
+    if (!high(here_)) way.push_back(raised(here_));
     way.push_back(raised(place_m));
     way.push_back(place_m);
     return way;
@@ -130,21 +143,24 @@ class Planner {
   const ArtefactTouchOptions& options_;
   Vector3 up_;
   double top_m_ = -std::numeric_limits<double>::infinity();
-  std::optional<Vector3> here_;
+  Vector3 here_;  ///< from where the way to the next touch begins
   std::vector<PlannedTouch> planned_;
 };
 
 }  // namespace
 
-Result<std::vector<PlannedTouch>> plan_artefact_touches(const Calibrator& nominal,
-                                                        const std::array<FaceToTouch, 2>& faces,
-                                                        const ArtefactTouchOptions& options) {
+Result<ArtefactPlan> plan_artefact_touches(const Calibrator& nominal, const std::array<FaceToTouch, 2>& faces,
+                                           const Vector3& from_m, const ArtefactTouchOptions& options) {
   if (const auto sound = check(nominal); !sound) return failure(sound.error().code, sound.error().text);
   if (options.points_per_ball < kLeastBallPoints || options.points_per_face < kLeastFacePoints) {
     return failure(ErrorCode::BadInput, message("touches of an artefact: at least ", kLeastBallPoints,
                                                 " on a ball and ", kLeastFacePoints, " on a face"));
   }
-  Planner planner(nominal, faces, options);
+  Planner planner(nominal, faces, from_m, options);
+  if (const auto* ball = planner.ball_above()) {
+    return failure(ErrorCode::BadInput, message("touches of an artefact: ball ", ball->number,
+                                                " is above the tip: move the tip up beside it first"));
+  }
   for (const auto& ball : nominal.balls) planner.touch(ball);
   for (std::size_t i = 0; i < faces.size(); ++i) planner.touch(nominal.blocks[i], faces[i]);
   return planner.planned();

@@ -2,24 +2,20 @@
 /// where its nominal description says, fitted, and written as calibrator.toml with uncertainties.
 
 #include <fmt/format.h>
-#include <signal.h>
 
 #include <CLI/App.hpp>
 #include <CLI/Config.hpp>
 #include <CLI/Formatter.hpp>
-#include <chrono>
-#include <csignal>
 #include <filesystem>
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <numbers>
-#include <thread>
 #include <utility>
 
 #include "abbe/calib/evemu/artefact_touches.hpp"
-#include "abbe/daemon/control_protocol.hpp"
 #include "abbe/daemon/evemu_files.hpp"
 #include "abbe/daemon/otf_inputs.hpp"
+#include "cli/artefact_touching.hpp"
 #include "cli/commands.hpp"
 #include "cli/daemon_socket.hpp"
 #include "cli/terminal.hpp"
@@ -29,15 +25,12 @@ namespace abbe::daemon {
 namespace {
 
 namespace evemu = calib::evemu;
-using namespace std::chrono_literals;
 using nlohmann::json;
-
-constexpr auto kLookAtTouches = 200ms;
 
 struct CalibrateArtefactArguments {
   DaemonSocket where;
   std::string calibrator, touches, out = "calibrator.toml";
-  std::vector<double> at_mm{0.0, 0.0, 0.0};
+  std::vector<double> at_mm;
   double turn_deg = 0.0;
   std::size_t points = 13, face_points = 9;
   double clearance_mm = 5.0;
@@ -72,67 +65,6 @@ Result<Placed> placed(const CalibrateArtefactArguments& arguments) {
   return out;
 }
 
-json as_json(const std::vector<evemu::PlannedTouch>& plan) {
-  const auto three = [](const calib::Vector3& v) { return json{v.x(), v.y(), v.z()}; };
-  json points = json::array();
-  for (const auto& touch : plan) {
-    json way = json::array();
-    for (const auto& place : touch.way_m) way.push_back(three(place));
-    points.push_back({{"way", std::move(way)}, {"at_m", three(touch.at_m)}, {"normal", three(touch.normal)}});
-  }
-  return points;
-}
-
-/// What the machine made of the plan; `reason` is empty when it made all of it.
-struct Touched {
-  std::vector<evemu::Touch> touches;
-  double u_position_m = 0.0;
-  std::string reason;
-};
-
-Touched touched(const json& answer, const std::vector<evemu::PlannedTouch>& plan) {
-  Touched out{{}, 0.0, answer["reason"]};
-  for (const json& t : answer["touches"]) {
-    const auto& planned = plan[out.touches.size()];
-    const auto p = t["at_m"].get<std::array<double, 3>>();
-    out.touches.push_back(
-        {.position = 1, .feature = planned.feature, .number = planned.number, .p_m = {p[0], p[1], p[2]}});
-    out.u_position_m = t["u_m"];
-    if (out.touches.size() == plan.size()) break;
-  }
-  return out;
-}
-
-volatile std::sig_atomic_t touching_interrupted = 0;  // written by the signal handler
-
-/// A machine that nobody watches any more must not go on moving.
-void end_touches_on_interrupt() {
-  struct sigaction end {};
-  end.sa_handler = [](int) { touching_interrupted = 1; };
-  ::sigaction(SIGINT, &end, nullptr);
-  ::sigaction(SIGTERM, &end, nullptr);
-}
-
-Result<Touched> touch(const std::filesystem::path& socket, const std::vector<evemu::PlannedTouch>& plan) {
-  end_touches_on_interrupt();
-  const auto started = ask_daemon(socket, {{"do", "touch"}, {"points", as_json(plan)}});
-  if (!started) return tl::unexpected(started.error());
-  ProgressBar bar;
-  Touched so_far;
-  for (bool told = false;; std::this_thread::sleep_for(kLookAtTouches)) {
-    if (touching_interrupted != 0 && !std::exchange(told, true))
-      (void)ask_daemon(socket, {{"do", "touch"}, {"cancel", true}});
-    const auto answer = ask_daemon(socket, {{"do", "touches"}});
-    if (!answer) {
-      so_far.reason = answer.error().text;
-      return so_far;
-    }
-    so_far = touched(*answer, plan);
-    if (!(*answer)["running"].get<bool>()) return so_far;
-    bar.show("touching", static_cast<double>(so_far.touches.size()) / static_cast<double>(plan.size()));
-  }
-}
-
 Result<void> keep(const Touched& touched, const std::string& file) {
   std::string text = "position,kind,index,x_mm,y_mm,z_mm\n";
   for (const auto& t : touched.touches) {
@@ -141,6 +73,22 @@ Result<void> keep(const Touched& touched, const std::string& file) {
                         1e3 * t.p_m.y(), 1e3 * t.p_m.z());
   }
   return replace_file(file, text);
+}
+
+/// A calibrator.toml of an earlier run goes on naming the touches it is from: those that came to nothing go
+/// into a file of their own.
+Error kept_aside(Error error, const Touched& touched, const std::filesystem::path& touches) {
+  if (touched.touches.empty()) {
+    error.details.push_back("no touch was made");
+    return error;
+  }
+  auto file = touches;
+  file.replace_extension(".partial" + touches.extension().string());
+  const auto kept = keep(touched, file.string());
+  error.details.push_back(
+      kept ? fmt::format("{} touches until then: {}", touched.touches.size(), file.string())
+           : kept.error().text);
+  return error;
 }
 
 int print(const evemu::Calibrator& found, const evemu::Calibrator& nominal,
@@ -167,24 +115,26 @@ int calibrate(CalibrateArtefactArguments arguments) {
     arguments.touches = std::filesystem::path(arguments.out).replace_extension(".touches.csv").string();
   const auto artefact = placed(arguments);
   if (!artefact) return report(artefact.error());
-  const auto plan = evemu::plan_artefact_touches(artefact->nominal, artefact->faces,
+  const auto socket = socket_path(arguments.where);
+  if (!socket) return report(socket.error());
+  const auto stands = machine_position(*socket);
+  if (!stands) return report(stands.error());
+  const auto plan = evemu::plan_artefact_touches(artefact->nominal, artefact->faces, *stands,
                                                  {.points_per_ball = arguments.points,
                                                   .points_per_face = arguments.face_points,
                                                   .clearance_m = 1e-3 * arguments.clearance_mm});
   if (!plan) return report({ErrorCode::Usage, plan.error().text, {}});
-  const auto socket = socket_path(arguments.where);
-  if (!socket) return report(socket.error());
-  const auto made = touch(*socket, *plan);
+  const auto made = touch_artefact(*socket, *plan);
   if (!made) return report(made.error());
-  if (const auto kept = keep(*made, arguments.touches); !kept) return report(kept.error());
-  if (!made->reason.empty()) {
-    return report({ErrorCode::DataInsufficient,
-                   made->reason,
-                   {fmt::format("{} touches until then: {}", made->touches.size(), arguments.touches)}});
-  }
+  if (!made->reason.empty())
+    return report(kept_aside({ErrorCode::DataInsufficient,
+                              made->reason,
+                              {"the tip may stand low: raise it above everything before another run"}},
+                             *made, arguments.touches));
   const auto found =
       evemu::calibrated_artefact(artefact->nominal, artefact->faces, made->touches, made->u_position_m);
-  if (!found) return report(error_of(found.error()));
+  if (!found) return report(kept_aside(error_of(found.error()), *made, arguments.touches));
+  if (const auto kept = keep(*made, arguments.touches); !kept) return report(kept.error());
   std::array<std::optional<BlockFace>, 2> faces;
   for (std::size_t i = 0; i < faces.size(); ++i)
     faces[i] = BlockFace{artefact->faces[i].centre_m, artefact->faces[i].half_size_m};
@@ -206,19 +156,25 @@ void add_calibrate_artefact(CLI::App& parent, int& exit) {
       "A ball array on the measuring machine of the running daemon ([cmm]): touches its balls on their "
       "upper\n"
       "half and its blocks on the faces that the file names, and writes it as measured, with uncertainties.\n"
-      "The machine moves: the ways lead around the balls and above everything, around nothing else.\n"
-      "Ctrl-C ends it after the touch that is under way. Exit code 1 then, and when a touch was refused or "
+      "The machine moves: first straight up from where it stands, in the end up again; the ways lead around "
       "the\n"
-      "machine or the daemon went away: the touches until then are kept.");
+      "balls and above everything, around nothing else. Ctrl-C, a closed terminal or nobody asking for 2 s "
+      "end it\n"
+      "after the touch that is under way; the tip may stand low then. Exit code 1 then, and when a touch "
+      "was\n"
+      "refused or the machine or the daemon went away: the touches until then are kept (.partial.csv), and\n"
+      "what an earlier run has written stays.");
   command
       ->add_option("--calibrator", arguments->calibrator,
                    "nominal description: calibrator.toml, its blocks with x_mm, y_mm, z_mm, half_size_mm")
       ->required();
   command->add_option("-o,--output", arguments->out, "the artefact as measured")->capture_default_str();
-  command->add_option("--touches", arguments->touches, "where the touches go (default: beside the output)");
+  command->add_option("--touches", arguments->touches,
+                      "where the touches go (default: beside the output); .partial.csv if it fails");
   command->add_option("--at", arguments->at_mm, "where the artefact's origin stands, mm: x,y,z")
       ->delimiter(',')
-      ->expected(3);
+      ->expected(3)
+      ->required();
   command->add_option("--turn", arguments->turn_deg, "how far it is turned about z, degrees");
   command->add_option("--points", arguments->points, "on a ball, at least 5")->capture_default_str();
   command->add_option("--block-points", arguments->face_points, "on a block's face, at least 4")

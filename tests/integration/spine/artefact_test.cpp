@@ -8,6 +8,7 @@
 #include <random>
 #include <regex>
 
+#include "abbe/daemon/control_protocol.hpp"
 #include "abbe/daemon/evemu_files.hpp"
 #include "counter_card_run.hpp"
 
@@ -21,24 +22,29 @@ struct ArtefactRun : CounterCardRun {
   static constexpr double kNoise_um = 0.3;
   static constexpr double kMachine_um = 0.4;
   static constexpr int kBalls = 9;
+  static constexpr double kAt_mm = 100;  // beside where the machine stands: (0, 0, 0)
 
   /// Nine balls in an L and two faces; `off_mm`: how far each coordinate is from nominal.
-  static std::string artefact(double off_mm, double u_block_rad) {
+  static std::string artefact(double off_mm, double u_block_rad, double at_mm = 0.0) {
     std::mt19937_64 random(11);
     std::normal_distribution<double> off(0.0, off_mm);
     std::string text = "[calibrator]\nname = \"L\"\ntip_radius_mm = 1.5\n";
     for (int i = 1; i <= kBalls; ++i) {
       const double along = 60.0 * (i <= 5 ? i - 1 : i - 5);
       const double x = i <= 5 ? along : 0.0, y = i <= 5 ? 0.0 : along;
-      text += "[[ball]]\nnumber = " + std::to_string(i) + "\nx_mm = " + std::to_string(x + off(random)) +
-              "\ny_mm = " + std::to_string(y + off(random)) + "\nz_mm = " + std::to_string(60 + off(random)) +
+      text += "[[ball]]\nnumber = " + std::to_string(i) +
+              "\nx_mm = " + std::to_string(at_mm + x + off(random)) +
+              "\ny_mm = " + std::to_string(at_mm + y + off(random)) +
+              "\nz_mm = " + std::to_string(60 + off(random)) +
               "\nradius_mm = " + std::to_string(12.7 + off(random)) + "\n";
     }
     const double c = std::cos(u_block_rad), s = std::sin(u_block_rad);
     text += "[[block]]\nnumber = 1\nnormal = [" + std::to_string(s) + ", 0, " + std::to_string(c) +
-            "]\nx_mm = 60\ny_mm = 60\nz_mm = 40\nhalf_size_mm = 10\n";
+            "]\nx_mm = " + std::to_string(at_mm + 60) + "\ny_mm = " + std::to_string(at_mm + 60) +
+            "\nz_mm = 40\nhalf_size_mm = 10\n";
     text += "[[block]]\nnumber = 2\nnormal = [0, " + std::to_string(-c) + ", " + std::to_string(s) +
-            "]\nx_mm = 90\ny_mm = 80\nz_mm = 45\nhalf_size_mm = 10\n";
+            "]\nx_mm = " + std::to_string(at_mm + 90) + "\ny_mm = " + std::to_string(at_mm + 80) +
+            "\nz_mm = 45\nhalf_size_mm = 10\n";
     return text;
   }
   static std::string machine_table(int port) {
@@ -49,7 +55,7 @@ struct ArtefactRun : CounterCardRun {
   void start(const std::string& more = {}) {
     write_path("path.csv", {{0, 0, -50}, {1, 0, -50}});
     write("nominal.toml", artefact(0.0, 0.0));
-    write("true.toml", artefact(0.05, 2e-3));
+    write("true.toml", artefact(0.05, 2e-3, kAt_mm));
     write("machine.toml", text_of(file("machine.toml")) + machine_table(0));
     write("sim.toml", std::regex_replace(text_of(file("sim.toml")), std::regex{"standstill_s = 8"},
                                          "standstill_s = 1\nstart_when_streaming = false") +
@@ -63,17 +69,29 @@ struct ArtefactRun : CounterCardRun {
     ASSERT_NO_FATAL_FAILURE(start_abbed());
     ASSERT_TRUE(eventually([&] { return samples("cmm") > 2; })) << status().dump(1);
   }
-  [[nodiscard]] Outcome calibrate(std::vector<std::string> more = {}) const {
-    std::vector<std::string> command{ABBE_PROGRAM,           "calibrate", "artefact",         "--calibrator",
-                                     file("nominal.toml"),   "-c",        file("abbed.toml"), "-o",
-                                     file("calibrator.toml")};
-    command.insert(command.end(), more.begin(), more.end());
-    return run(command);
+  [[nodiscard]] std::vector<std::string> command(std::vector<std::string> more = {}) const {
+    std::vector<std::string> all{
+        ABBE_PROGRAM, "calibrate",        "artefact", "--calibrator",          file("nominal.toml"),
+        "-c",         file("abbed.toml"), "-o",       file("calibrator.toml"), "--at",
+        "100,100,0"};
+    all.insert(all.end(), more.begin(), more.end());
+    return all;
   }
-  [[nodiscard]] std::size_t kept_touches() const {
-    const std::string text = text_of(file("calibrator.touches.csv"));
+  [[nodiscard]] Outcome calibrate(std::vector<std::string> more = {}) const {
+    return run(command(std::move(more)));
+  }
+  /// What the daemon says of the touches; asking is looking on.
+  [[nodiscard]] json touches() const {
+    const auto answer = daemon::ask_daemon(file("run/control.sock"), {{"do", "touches"}});
+    return answer ? *answer : json{{"running", false}, {"reason", ""}, {"touches", json::array()}};
+  }
+  [[nodiscard]] bool has_touched() const { return !touches()["touches"].empty(); }
+  [[nodiscard]] std::size_t lines_of(const std::string& name) const {
+    const std::string text = text_of(file(name));
     return text.empty() ? 0 : static_cast<std::size_t>(std::count(text.begin(), text.end(), '\n')) - 1;
   }
+  [[nodiscard]] std::size_t kept_touches() const { return lines_of("calibrator.touches.csv"); }
+  [[nodiscard]] std::size_t touches_aside() const { return lines_of("calibrator.touches.partial.csv"); }
 };
 
 TEST_F(ArtefactRun, FindsTheBallsWithinTheStatedUncertainty) {
@@ -104,41 +122,61 @@ TEST_F(ArtefactRun, SaysWhyTheMachineRefusedATouchAndKeepsTheOthers) {
   ASSERT_NO_FATAL_FAILURE(start());
   write("nominal.toml", std::regex_replace(artefact(0.0, 0.0), std::regex{"number = 3\nx_mm = 120"},
                                            "number = 3\nx_mm = 150"));
+  write("calibrator.touches.csv", "of an earlier run\n");
   const auto refused = calibrate({"--points", "5"});
   EXPECT_EQ(refused.code, 1) << refused.out;
   EXPECT_THAT(refused.err, HasSubstr("touch 11 of"));
   EXPECT_THAT(refused.err, HasSubstr("1006 Surface not found"));
-  EXPECT_EQ(kept_touches(), 10u);
+  EXPECT_THAT(refused.err, HasSubstr("raise it"));
+  EXPECT_EQ(touches_aside(), 10u);
+  EXPECT_EQ(text_of(file("calibrator.touches.csv")), "of an earlier run\n");
   EXPECT_FALSE(std::filesystem::exists(file("calibrator.toml")));
 }
 
 TEST_F(ArtefactRun, SaysThatTheMachineWentAway) {
   ASSERT_NO_FATAL_FAILURE(start());
-  Program running({ABBE_PROGRAM, "calibrate", "artefact", "--calibrator", file("nominal.toml"), "-c",
-                   file("abbed.toml"), "-o", file("calibrator.toml")},
-                  file("artefact"));
-  const auto touched = [&] { return text_of(recordings().front()).size(); };
-  const auto before = touched();
-  ASSERT_TRUE(eventually([&] { return touched() > before + 4096; }));
+  Program running(command({"--points", "100"}), file("artefact"));
+  ASSERT_TRUE(eventually([&] { return has_touched(); }));
   simulator_->stop();
   EXPECT_EQ(running.wait_for_end(), 1);
   EXPECT_THAT(running.err(), HasSubstr("was not made"));
   EXPECT_THAT(running.err(), HasSubstr("touches until then"));
+  const auto away = calibrate();
+  EXPECT_EQ(away.code, 5) << away.err;
+  EXPECT_THAT(away.err, HasSubstr("not ready"));
 }
 
 TEST_F(ArtefactRun, EndsTheTouchingWhenInterrupted) {
   ASSERT_NO_FATAL_FAILURE(start());
-  Program running({ABBE_PROGRAM, "calibrate", "artefact", "--calibrator", file("nominal.toml"), "-c",
-                   file("abbed.toml"), "-o", file("calibrator.toml")},
-                  file("artefact"));
-  const auto recorded = [&] { return text_of(recordings().front()).size(); };
-  const auto before = recorded();
-  ASSERT_TRUE(eventually([&] { return recorded() > before + 4096; }));
-  running.signal(SIGINT);
-  EXPECT_EQ(running.wait_for_end(), 1);
-  EXPECT_THAT(running.err(), HasSubstr("cancelled"));
-  EXPECT_LT(kept_touches(), kBalls * 13u);
-  EXPECT_GT(kept_touches(), 0u);
+  for (const int signal : {SIGINT, SIGHUP}) {
+    Program running(command({"--points", "100"}), file("artefact"));
+    ASSERT_TRUE(eventually([&] { return touches()["running"] == true && has_touched(); }));
+    running.signal(signal);
+    EXPECT_EQ(running.wait_for_end(), 1);
+    EXPECT_THAT(running.err(), HasSubstr("cancelled"));
+    EXPECT_LT(touches_aside(), kBalls * 100u);
+    EXPECT_GT(touches_aside(), 0u);
+    EXPECT_EQ(kept_touches(), 0u);
+  }
+}
+
+TEST_F(ArtefactRun, EndsTheTouchingWhenWhoeverAskedIsGone) {
+  ASSERT_NO_FATAL_FAILURE(start());
+  Program running(command({"--points", "100"}), file("artefact"));
+  ASSERT_TRUE(eventually([&] { return has_touched(); }));
+  const auto before = touches()["touches"].size();
+  running.signal(SIGKILL);
+  (void)running.wait_for_end();
+  // To ask how far it is would be to look on; a plan without a point is refused otherwise while it goes on.
+  const auto over = [&] {
+    const auto answer =
+        daemon::ask_daemon(file("run/control.sock"), {{"do", "touch"}, {"points", json::array()}});
+    return !answer && answer.error().code == daemon::ErrorCode::Usage;
+  };
+  ASSERT_TRUE(eventually(over));
+  EXPECT_THAT(touches()["reason"].get<std::string>(), HasSubstr("nobody looked on"));
+  EXPECT_GE(touches()["touches"].size(), before);
+  EXPECT_LT(touches()["touches"].size(), touches()["asked"].get<std::size_t>());
 }
 
 TEST_F(ArtefactRun, NeedsAMeasuringMachineAndKnownFaces) {
@@ -150,8 +188,8 @@ TEST_F(ArtefactRun, NeedsAMeasuringMachineAndKnownFaces) {
   const auto none = calibrate();
   EXPECT_EQ(none.code, 5);
   EXPECT_THAT(none.err, HasSubstr("[cmm]"));
-  write("nominal.toml",
-        std::regex_replace(artefact(0.0, 0.0), std::regex{"x_mm = 90\ny_mm = 80\nz_mm = 45\n"}, ""));
+  write("nominal.toml", std::regex_replace(artefact(0.0, 0.0),
+                                           std::regex{"x_mm = 90[.0]*\ny_mm = 80[.0]*\nz_mm = 45\n"}, ""));
   const auto faceless = calibrate();
   EXPECT_EQ(faceless.code, 3);
   EXPECT_THAT(faceless.err, HasSubstr("block 2"));

@@ -104,7 +104,8 @@ class WireRun {
     artefact_ = std::make_unique<Program>(
         std::vector<std::string>{ABBE_PROGRAM, "calibrate", "artefact", "--calibrator",
                                  (kGolden / "artefact.toml").string(), "-c", file("abbed.toml"), "-o",
-                                 file("calibrator.toml"), "--points", "5", "--block-points", "4"},
+                                 file("calibrator.toml"), "--at", "0,0,0", "--points", "5", "--block-points",
+                                 "4"},
         folder_ / "artefact");
   }
   /// Until the daemon has as many samples as were checked, then no longer. What differs, for people; empty:
@@ -159,7 +160,7 @@ class WireRun {
   }
   [[nodiscard]] bool connected() const {
     const auto now = status();
-    return now.is_object() && now["streams"][0]["connected"].get<bool>();
+    return now.is_object() && now["streams"][0]["connected"].get<bool>() && now["streams"][0]["samples"] > 0;
   }
   [[nodiscard]] bool enough() const {
     if (simulator_->err().find("everything served") == std::string::npos) return false;

@@ -2,8 +2,8 @@
 /// Where to touch a ball array for its own calibration, on a machine that can be told where to go, and the
 /// ways there. Balls are touched on their upper half, faces on a square. Between two touches the tip stays
 /// 1.6 times as far from a ball's centre as in contact, so that a straight way of up to 60 degrees around it
-/// is free; between two features it goes up first, across above everything, then down. What else stands on
-/// the table is not known here. m; pure.
+/// is free; between two features it goes up first, across above everything, then down. So it does from where
+/// it stands at first, and in the end it goes up. What else stands on the table is not known here. m; pure.
 
 #include <array>
 #include <optional>
@@ -32,10 +32,17 @@ struct PlannedTouch {
   Vector3 normal = Vector3::UnitZ();
 };
 
-/// Up is the outward normal of block 1. BadInput: too few points, or as check(nominal).
-[[nodiscard]] Result<std::vector<PlannedTouch>> plan_artefact_touches(const Calibrator& nominal,
-                                                                      const std::array<FaceToTouch, 2>& faces,
-                                                                      const ArtefactTouchOptions& options);
+struct ArtefactPlan {
+  std::vector<PlannedTouch> touches;
+  std::vector<Vector3> leave_m;  ///< after the last touch: off the surface, then above everything
+};
+
+/// `from_m`: where the tip stands. Up is the outward normal of block 1. BadInput: too few points, a tip with
+/// a ball above it, or as check(nominal).
+[[nodiscard]] Result<ArtefactPlan> plan_artefact_touches(const Calibrator& nominal,
+                                                         const std::array<FaceToTouch, 2>& faces,
+                                                         const Vector3& from_m,
+                                                         const ArtefactTouchOptions& options);
 
 /// The artefact where it stands: every centre and normal moved.
 [[nodiscard]] Calibrator moved(const Calibrator& calibrator, const RigidTransform& T_machine_artefact);

@@ -2,6 +2,11 @@
 
 #include <gmock/gmock.h>
 
+#include <algorithm>
+#include <cstdlib>
+#include <iterator>
+#include <set>
+
 #include "abbe/daemon/datum.hpp"
 #include "abbe/daemon/replay.hpp"
 #include "recording_fixture.hpp"
@@ -149,6 +154,82 @@ TEST_F(FurtherFiles, HandOnWhatWasFoundSinceTheLastSample) {
   record_axes(6, 0b100);
   EXPECT_THAT(datums_of(second()), ElementsAre(0.1, 0.2));
   EXPECT_THAT(datums_of(read("run-3.mcap")), ElementsAre(0.1, 0.2));
+}
+
+/// A recording of a card that began anew while its axes moved, in files of some messages each.
+class CutRecording : public ::testing::Test {
+ protected:
+  static constexpr int kMessagesPerFile = 150;
+
+  CutRecording() {
+    const auto whole = folder_.path() / "whole.mcap";
+    const std::string unpack = std::string("gzip -dc '") + ABBE_GOLDEN_RECORDINGS +
+                               "/counter_card-restart.mcap.gz' >'" + whole.string() + "'";
+    EXPECT_EQ(std::system(unpack.c_str()), 0);
+    const auto card = std::move(*RecordingReader::open(whole));
+    auto options = example_options(folder_.path());
+    options.max_file_bytes = 1;
+    auto recorder = std::move(*Recorder::open(options, card.info(), {}));
+    int messages = 0;
+    const auto count = [&] {
+      if (++messages % kMessagesPerFile == 0) recorder.flush();
+    };
+    RecordingSink sink;
+    sink.axis_sample = [&](const protocol::AxisSample& s, std::string_view device) {
+      recorder.record(s, device);
+      count();
+    };
+    sink.raw_block = [&](const protocol::RawBlock& block, std::string_view device) {
+      recorder.record(protocol::to_raw_bytes(block, device));
+      count();
+    };
+    EXPECT_EQ(card.read(sink), 0u);
+    EXPECT_TRUE(recorder.close());
+  }
+  std::vector<protocol::AxisSample> samples(const RecordingReader& reader, ReplaySource source) {
+    const auto config = parse_config(reader.info().configuration, "recorded");
+    EXPECT_TRUE(config);
+    std::vector<protocol::AxisSample> all;
+    ReplayOptions options{.source = source};
+    options.samples = [&](const Batch& batch, HostTime) {
+      all.insert(all.end(), batch.axes.begin(), batch.axes.end());
+    };
+    EXPECT_TRUE(replay(reader, *config, options));
+    return all;
+  }
+  std::filesystem::path path(std::uint32_t number) {
+    return folder_.path() / ("run-" + std::to_string(number) + ".mcap");
+  }
+  bool exists(std::uint32_t number) { return std::filesystem::exists(path(number)); }
+  RecordingReader file(std::uint32_t number) { return std::move(*RecordingReader::open(path(number))); }
+  static HostTime time_of(const protocol::AxisSample& sample) { return sample.head.time; }
+
+  TemporaryFolder folder_;
+};
+
+// A card is read far more often than it is recorded, and every file begins that choice anew: what is read
+// again lies between samples of the live run.
+TEST_F(CutRecording, RawBytesOfEveryFileGiveTheAxesAsTheyWereKnownLive) {
+  constexpr double kBetween_m = 1e-3;  // 50 ms at some 20 mm/s
+  std::set<std::uint8_t> begun_with;
+  std::size_t compared = 0;
+  for (std::uint32_t n = 2; exists(n); ++n) {
+    const auto reader = file(n);
+    if (reader.attachments().empty()) continue;  // the card had not said anything yet
+    begun_with.insert(datum_state_from_attachment(reader.attachments().front())->unknown);
+    const auto live = samples(reader, ReplaySource::Samples);
+    for (const auto& again : samples(reader, ReplaySource::RawBytes)) {
+      const auto after = std::ranges::lower_bound(live, again.head.time, {}, time_of);
+      if (after == live.begin() || after == live.end()) continue;
+      const auto& before = *std::prev(after);
+      if (before.missing_mask != after->missing_mask) continue;
+      EXPECT_EQ(again.missing_mask, after->missing_mask) << "file " << n;
+      EXPECT_NEAR(again.position[0], 0.5 * (before.position[0] + after->position[0]), kBetween_m);
+      ++compared;
+    }
+  }
+  EXPECT_THAT(begun_with, ElementsAre(0b000, 0b111)) << "files from before and after the card began anew";
+  EXPECT_GT(compared, 50u);
 }
 
 /// Whether the axes are missing in a sample at `t` after the file began.

@@ -1,5 +1,6 @@
 #include "abbe/daemon/replay.hpp"
 
+#include <algorithm>
 #include <chrono>
 #include <map>
 #include <thread>
@@ -272,6 +273,30 @@ Result<Datum> datum_of(const RecordingReader& recording, const Config& config) {
   return datum;
 }
 
+/// A card that was set up while one file was written and spoke in the next: what a replay from the bytes of
+/// this next file cannot see, but the samples of the live run say.
+class SetUpBefore {
+ public:
+  explicit SetUpBefore(const RecordingReader& recording)
+      : possible_(std::ranges::any_of(recording.attachments(),
+                                      [](const auto& a) { return a.name == kDatumStateName; })) {}
+
+  void take_live(const protocol::SampleHead& head) {
+    if (possible_ && has(head.flags, protocol::SampleFlag::Restarted)) at_ = head.time;
+  }
+  /// Before `datum` is applied to the samples from the bytes.
+  void apply(const Batch& batch, Datum& datum) {
+    const bool seen = std::ranges::any_of(
+        batch.axes, [](const auto& s) { return has(s.head.flags, protocol::SampleFlag::Restarted); });
+    if (at_ && !seen) datum.go_on({.at = *at_, .unknown = 0xff});
+    at_.reset();
+  }
+
+ private:
+  bool possible_;
+  std::optional<HostTime> at_;
+};
+
 Result<std::vector<CalibrationRequest>> requests_of(const RecordingReader& recording) {
   std::vector<CalibrationRequest> requests;
   for (const auto& attachment : recording.attachments()) {
@@ -313,8 +338,14 @@ Result<ReplayReport> replay(const RecordingReader& recording, const Config& conf
   Calibrations calibrations{std::move(*requests), config, options};
   Assembler assembler{assembler_options(config)};
   RawDecoder raw{config};
-  ReplayReport report;
   Batch batch;
+  SetUpBefore set_up{recording};
+  const auto give_datum = [&] {
+    if (!from_raw) return;
+    set_up.apply(batch, *datum);
+    datum->apply(batch);
+  };
+  ReplayReport report;
   std::vector<protocol::Snapshot> snapshots;
 
   DeviceOrder device_order;
@@ -343,6 +374,7 @@ Result<ReplayReport> replay(const RecordingReader& recording, const Config& conf
       raw.take(b, device, batch);
     };
     // The bytes of what a former file handed on are in that file.
+    sink.axis_sample = [&](const protocol::AxisSample& s, std::string_view) { set_up.take_live(s.head); };
     sink.environment = [&](const protocol::EnvironmentSample& e, std::string_view device) {
       if (e.head.time != logged) take_environment(e, device);
     };
@@ -376,7 +408,7 @@ Result<ReplayReport> replay(const RecordingReader& recording, const Config& conf
     if (!deliver(*message, sink)) ++report.undecodable;
     if (++taken % kMessagesPerTurn != 0) continue;
     marks->take(batch);
-    if (from_raw) datum->apply(batch);
+    give_datum();
     if (options.samples) options.samples(batch, range->first);
     assembler.take(batch);
     batch.clear();
@@ -386,7 +418,7 @@ Result<ReplayReport> replay(const RecordingReader& recording, const Config& conf
   }
   device_order.finish(batch.points);
   marks->take(batch);
-  if (from_raw) datum->apply(batch);
+  give_datum();
   if (options.samples) options.samples(batch, range->first);
   assembler.take(batch);
   assembler.finish(snapshots);

@@ -41,8 +41,11 @@ Datum::Datum(const Config& config, WithoutMarks without_marks) {
 
 void Datum::go_on(const DatumState& state) {
   begun_ = true;
-  for (Axis& axis : axes_)
-    if ((state.unknown >> axis.place & 1u) != 0) axis.in_force.reset();
+  for (Axis& axis : axes_) {
+    if ((state.unknown >> axis.place & 1u) == 0) continue;
+    axis.in_force.reset();
+    std::erase_if(axis.coming, [&state](const FoundDatum& found) { return found.from < state.at; });
+  }
 }
 
 void Datum::found(const FoundDatum& datum) {

@@ -44,7 +44,7 @@ class Datum {
   /// Without [counter_card] nothing is ever changed.
   explicit Datum(const Config& config, WithoutMarks without_marks = WithoutMarks::NeedAZero);
 
-  /// Not at the first set-up of the card but where a former file ended. Before anything was found in this.
+  /// Not at the first set-up of the card but where a former file ended; what was found before is over.
   void go_on(const DatumState& state);
   /// In the order of time.
   void found(const FoundDatum& datum);

@@ -125,6 +125,22 @@ TEST(CalibrationSession, TheRunKnowsItsScalesAndItsAir) {
   EXPECT_NEAR(run.u_scale, 2e-7, 0.3e-7);  // 0.2 K: 1.9e-7, 30 Pa: 0.8e-7
 }
 
+TEST(CalibrationSession, TheRunKnowsWhatTheControllersAirLeaves) {
+  Config config;
+  config.tracker.emplace();
+  AcquisitionOptions options;
+  options.environment = environment_use(config);
+  CalibrationSession session{options};
+  ASSERT_TRUE(session.start({OtfRequest{kPath}, HostTime{10s}}));
+  Drive drive{session};
+  drive.stand(kPath[0], 1s);
+  for (std::size_t i = 1; i < kPath.size(); ++i) drive.move(kPath[i]);
+  drive.stand(kPath.back(), 2s);
+  const auto taken = session.take_run();
+  ASSERT_TRUE(taken);
+  EXPECT_NEAR(std::get<OtfRun>(*taken).u_scale, TrackerConfig::kControllersAir, 1e-18);
+}
+
 TEST(CalibrationSession, ASlowTrackerStandsLongEnoughForTwentyPoints) {
   Config config;
   config.tracker.emplace().point_rate_hz = 10.0;

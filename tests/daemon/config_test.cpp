@@ -93,6 +93,16 @@ nodes = [{axis = "X", node = 1, step_nm = 10, invert = true}, {axis = "Y", node 
   EXPECT_DOUBLE_EQ(config->encoder->nodes[1].step, 1e-9);
 }
 
+TEST(Config, TheControllersAirIsUncertainIfItCorrectsForIt) {
+  const auto u_scale = [](const std::string& more) {
+    return parse_config(kMachine + "[tracker]\nhost = \"t\"\n" + more, "abbed.toml")->tracker->u_scale;
+  };
+  EXPECT_DOUBLE_EQ(u_scale(""), 0.2e-6);
+  EXPECT_EQ(u_scale("weather = \"read\"\n"), 0.0);
+  EXPECT_DOUBLE_EQ(u_scale("weather = \"none\"\nu_scale_ppm = 1\n"), 1e-6);
+  EXPECT_EQ(u_scale("u_scale_ppm = 0\n"), 0.0);
+}
+
 TEST(Config, TakesARateOfZeroForWheneverSomethingNewCame) {
   const auto config = parse_config(kMachine + "[dds]\nsnapshot_hz = 0\ncompensation_hz = 0\n", "abbed.toml");
   ASSERT_TRUE(config) << config.error().details.front();

@@ -183,6 +183,16 @@ TEST(RawDistances, AreNotUsedWithoutTheAir) {
   EXPECT_TRUE(has(s.tracker_point.head.flags, SampleFlag::PointInvalid));
 }
 
+TEST(RawDistances, TheTrackersOwnScaleAddsToThatOfTheAir) {
+  EnvironmentUseOptions use;
+  use.tracker_u_scale = 0.3e-6;
+  const auto s = with_point(293.15);
+  EXPECT_DOUBLE_EQ(effect_of(s, use)->u_scale, 0.3e-6);
+  use.air.assumed_index = 1.00027;
+  const auto index = *index_of_air(s.environment, use.air);
+  EXPECT_DOUBLE_EQ(effect_of(s, use)->u_scale, std::hypot(0.3e-6, index.u_n / index.n));
+}
+
 TEST(RawDistances, AreLeftAloneUnlessConfigured) {
   auto s = with_point(303.15);
   correct_for_air(s, {});

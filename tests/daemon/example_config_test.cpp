@@ -124,6 +124,7 @@ TEST(ExampleConfig, ItsCommentedKeysAreTheDefaults) {
   EXPECT_EQ(full.machine, plain.machine);
   EXPECT_EQ(full.tracker->silence_timeout, plain.tracker->silence_timeout);
   EXPECT_EQ(full.tracker->weather, plain.tracker->weather);
+  EXPECT_EQ(full.tracker->u_scale, plain.tracker->u_scale);
   EXPECT_EQ(full.encoder->u_sampling_delay, plain.encoder->u_sampling_delay);
   EXPECT_EQ(full.air.wavelength_m, plain.air.wavelength_m);
   EXPECT_EQ(full.air.co2_ppm, plain.air.co2_ppm);

@@ -33,8 +33,8 @@ constexpr double kPpmPer1 = 1e6;
 struct Arguments {
   std::string machine, path, tracker, recording, keep, out;
   std::string estimator = "two-step";
-  std::size_t block_samples = 0;  // 0: by travel
-  double u_scale_ppm = 0.0;
+  std::size_t block_samples = 0;      // 0: by travel
+  std::optional<double> u_scale_ppm;  // else that of [tracker]
   bool scales_corrected = false;
   bool json = false;
 };
@@ -93,6 +93,11 @@ Outcome outcome_of(OtfCandidate candidate, const Config& config, std::vector<Inp
           s.blocks, s.blocks_used};
 }
 
+double u_scale(const Arguments& arguments, const Config& config) {
+  if (arguments.u_scale_ppm) return *arguments.u_scale_ppm / kPpmPer1;
+  return config.tracker ? config.tracker->u_scale : 0.0;
+}
+
 Result<Outcome> from_files(const Arguments& arguments, const std::optional<ModelDocument>& active,
                            ProgressBar& bar) {
   auto files = read_files(arguments, bar);
@@ -106,7 +111,7 @@ Result<Outcome> from_files(const Arguments& arguments, const std::optional<Model
   if (arguments.block_samples > 0) options.block_samples = arguments.block_samples;
   options.progress = [&](otf::Stage stage, double fraction) { bar.show(words(stage), fraction); };
   otf::Noise noise = otf_noise(files->config.machine);
-  noise.u_scale = arguments.u_scale_ppm / kPpmPer1;
+  noise.u_scale = u_scale(arguments, files->config);
   auto found =
       otf::identify(files->tracker.points, *machine, otf_path(files->path.vertices_m), noise, options);
   if (!found) return tl::make_unexpected(error_of(found.error()));
@@ -236,7 +241,7 @@ void add_identify_otf(CLI::App& parent, int& exit) {
       command
           ->add_option("--u-scale-ppm", arguments->u_scale_ppm,
                        "standard uncertainty all ranges have in common (index of the air): 0.2 for "
-                       "0.2 K and 30 Pa")
+                       "0.2 K and 30 Pa; default: that of [tracker], else 0")
           ->check(CLI::NonNegativeNumber);
   auto* corrected = add_scales_corrected(*command, arguments->scales_corrected);
   recording->excludes(u_scale)->excludes(corrected);

@@ -129,6 +129,8 @@ void read_tracker(Section& root, Config& out) {
   tracker.get_word<WeatherConfig>(
       "weather", config.weather,
       {{"none", WeatherConfig::None}, {"read", WeatherConfig::Read}, {"compute", WeatherConfig::Compute}});
+  if (!tracker.get("u_scale_ppm", config.u_scale, kMicro, kNotNegative))
+    config.u_scale = config.weather == WeatherConfig::Compute ? TrackerConfig::kControllersAir : 0.0;
   read_tracker_timeouts(tracker, config);
   if (!has_host && tracker.has("port") && !tracker.has("host"))
     tracker.fault("host", "missing, but a port is given");

@@ -116,6 +116,7 @@ EnvironmentUseOptions environment_use(const Config& config) {
     for (const auto& measured : device.map.measured) use.measured |= drivers::mask_of(measured);
   }
   use.air = config.air;
+  if (config.tracker) use.tracker_u_scale = config.tracker->u_scale;
   const auto axes = config.connected_axes();
   for (const ThermalConfig& thermal : config.thermal) {
     const auto axis = std::find(axes.begin(), axes.end(), thermal.axis);

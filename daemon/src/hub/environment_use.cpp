@@ -105,6 +105,7 @@ calib::Expansion expansion(const ThermalConfig& config, double temperature_K) {
 std::optional<EnvironmentEffect> effect_of(const protocol::Snapshot& s,
                                            const EnvironmentUseOptions& options) {
   EnvironmentEffect effect;
+  effect.u_scale = options.tracker_u_scale;
   for (const ThermalAxis& thermal : options.thermal) {
     if (thermal.axis >= effect.growth.size()) continue;
     const double t_K =
@@ -116,7 +117,7 @@ std::optional<EnvironmentEffect> effect_of(const protocol::Snapshot& s,
     const auto index =
         s.has_environment ? index_of_air(s.environment, options.air) : Result<calib::RefractiveIndex>{};
     if (!s.has_environment || !index) return std::nullopt;
-    effect.u_scale = index->u_n / index->n;
+    effect.u_scale = std::hypot(options.tracker_u_scale, index->u_n / index->n);
   }
   return effect;
 }

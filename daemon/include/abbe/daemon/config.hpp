@@ -76,6 +76,10 @@ struct TrackerConfig {
   double point_rate_hz = 500.0;                                              ///< continuous
   std::chrono::nanoseconds stationary_time{std::chrono::milliseconds{500}};  ///< a mean's; whole ms
   WeatherConfig weather = WeatherConfig::Compute;
+  /// Relative standard uncertainty that all its distances have in common: what the controller's own sensors
+  /// leave of the air (0.2 K and 30 Pa: 2e-7). Unless given, 0 without "compute": [air] says it then.
+  double u_scale = kControllersAir;
+  static constexpr double kControllersAir = 0.2 / 1e6;
   std::chrono::nanoseconds max_constant_delay{
       std::chrono::milliseconds{2}};  ///< bound of the unobservable part of the delay
   std::chrono::nanoseconds connect_timeout{std::chrono::seconds{3}};

@@ -29,12 +29,15 @@ struct EnvironmentUseOptions {
   std::chrono::nanoseconds max_age{std::chrono::seconds{60}};
   std::vector<ThermalAxis> thermal;
   AirConfig air;
+  double tracker_u_scale = 0.0;  ///< TrackerConfig::u_scale
 };
 
 /// What the environment of an instant did to what was measured then.
 struct EnvironmentEffect {
   std::array<double, 3> growth{1.0, 1.0, 1.0};  ///< of the scales of X, Y, Z; 1 without [[thermal]]
-  double u_scale = 0.0;  ///< relative standard uncertainty of the index distances were corrected with
+  /// Relative standard uncertainty all distances have in common: of the index they were corrected with, and
+  /// the tracker's own.
+  double u_scale = 0.0;
 };
 /// None: what is configured was not available then.
 [[nodiscard]] std::optional<EnvironmentEffect> effect_of(const protocol::Snapshot& snapshot,

@@ -429,6 +429,12 @@ TEST(EvemuJudge, CallsAShapeAShapeUnlessToldOtherwise) {
   EXPECT_TRUE(judge(o, s, nullptr, told)->accepted);
 }
 
+TEST(EvemuJudge, SaysThatTheArtefactCountsAsExact) {
+  const Observations o = reference_observations();
+  EXPECT_THAT(judge(o, *solve(o), nullptr, generous())->notes,
+              Contains(HasSubstr("own uncertainty and temperature are not in the covariance")));
+}
+
 TEST(EvemuJudge, ComparesAtBallsInsideTheActiveModelsVolumeOnly) {
   const Observations o = reference_observations();
   const Solution s = *solve(o);

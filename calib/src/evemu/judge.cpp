@@ -127,6 +127,7 @@ Result<Verdict> judge(const Observations& o, const Solution& solution, const Vol
           message("shape only: the machine measured the blocks itself, so a rotation of about ", 1e6 * u_rad,
                   " urad about Ball1 is unknown; give a rotation reference or accept ", kShapeOnly));
     }
+    verdict.notes.emplace_back("the artefact's own uncertainty and temperature are not in the covariance");
     if (const auto& fit = solution.rotation.reference; fit && !fit->outside.empty()) {
       verdict.notes.push_back(message("rotation reference: ", fit->outside.size(), " of ",
                                       fit->outside.size() + fit->points,

@@ -10,16 +10,16 @@ using namespace abbe::calib;
 using namespace abbe::calib::sparse;
 
 constexpr double kLambda = 0.7;
-constexpr std::array kPenalties{Penalty{PenaltyKind::Lasso, 0}, Penalty{PenaltyKind::Mcp, 1.5},
-                                Penalty{PenaltyKind::Mcp, 3.0}, Penalty{PenaltyKind::Scad, 2.2},
-                                Penalty{PenaltyKind::Scad, 3.7}};
+constexpr std::array kEveryPenalty{Penalty{PenaltyKind::Lasso, 0}, Penalty{PenaltyKind::Mcp, 1.5},
+                                   Penalty{PenaltyKind::Mcp, 3.0}, Penalty{PenaltyKind::Scad, 2.2},
+                                   Penalty{PenaltyKind::Scad, 3.7}};
 
 double objective(const Penalty& penalty, double z, double b) {
   return (z - b) * (z - b) / 2 + value(penalty, kLambda, std::abs(b));
 }
 
 TEST(SparsePenalty, MinimiserIsBelowEveryOtherCoefficient) {
-  for (const Penalty& penalty : kPenalties) {
+  for (const Penalty& penalty : kEveryPenalty) {
     for (double z = -4.0; z <= 4.0; z += 0.13) {
       const double best = objective(penalty, z, minimiser(penalty, kLambda, z));
       for (double b = -5.0; b <= 5.0; b += 0.01) {
@@ -33,7 +33,7 @@ TEST(SparsePenalty, MinimiserIsBelowEveryOtherCoefficient) {
 TEST(SparsePenalty, DerivativeIsTheSlopeOfTheValue) {
   constexpr double kStep =
       1e-6;  // the penalties are piecewise quadratic: central differences are exact to rounding
-  for (const Penalty& penalty : kPenalties) {
+  for (const Penalty& penalty : kEveryPenalty) {
     for (double t = 0.005; t < 4.0; t += 0.01) {
       const double slope =
           (value(penalty, kLambda, t + kStep) - value(penalty, kLambda, t - kStep)) / (2 * kStep);
@@ -43,7 +43,7 @@ TEST(SparsePenalty, DerivativeIsTheSlopeOfTheValue) {
 }
 
 TEST(SparsePenalty, ConcavityIsTheSteepestFallOfTheDerivative) {
-  for (const Penalty& penalty : kPenalties) {
+  for (const Penalty& penalty : kEveryPenalty) {
     double steepest = 0.0;
     for (double t = 0.0; t < 4.0; t += 0.01) {
       steepest = std::max(steepest,

@@ -100,7 +100,7 @@ class WireRun {
   /// What the measuring machine was asked then.
   void start_touching() {
     if (!name_.starts_with("cmm-")) return;
-    EXPECT_TRUE(eventually([&] { return connected(); })) << status().dump(1);
+    EXPECT_TRUE(eventually([&] { return ready_to_touch(); })) << status().dump(1);
     artefact_ = std::make_unique<Program>(
         std::vector<std::string>{ABBE_PROGRAM, "calibrate", "artefact", "--calibrator",
                                  (kGolden / "artefact.toml").string(), "-c", file("abbed.toml"), "-o",
@@ -158,9 +158,9 @@ class WireRun {
     const auto answer = daemon::ask_daemon(folder_ / "run" / "control.sock", {{"do", "status"}});
     return answer ? *answer : nlohmann::json{};
   }
-  [[nodiscard]] bool connected() const {
-    const auto now = status();
-    return now.is_object() && now["streams"][0]["connected"].get<bool>() && now["streams"][0]["samples"] > 0;
+  [[nodiscard]] bool ready_to_touch() const {
+    return daemon::ask_daemon(folder_ / "run" / "control.sock", {{"do", "touch"}, {"where", true}})
+        .has_value();
   }
   [[nodiscard]] bool enough() const {
     if (simulator_->err().find("everything served") == std::string::npos) return false;

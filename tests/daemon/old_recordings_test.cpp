@@ -29,7 +29,7 @@ class OldRecordings : public ::testing::Test {
     return ModelStore::open(store_)->add(document, true, {}, {"test", "test", {}}).value();
   }
   [[nodiscard]] Result<std::vector<fs::path>> remove(std::chrono::hours clock_ahead = 0h) {
-    return remove_old_recordings(folder_.path(), store_, {now_ + clock_ahead, 24h, "abbe-47"});
+    return remove_old_recordings(folder_.path(), store_, {now_ + clock_ahead, 24h, "abbe-47", lasted_});
   }
   [[nodiscard]] std::vector<std::string> removed(std::chrono::hours clock_ahead = 0h) {
     std::vector<std::string> names;
@@ -44,6 +44,7 @@ class OldRecordings : public ::testing::Test {
   }
 
   fs::file_time_type now_ = fs::file_time_type::clock::now();
+  std::chrono::hours lasted_ = 1h;
   TemporaryFolder folder_;
   fs::path store_ = folder_.path() / "models";
 };
@@ -57,13 +58,20 @@ TEST_F(OldRecordings, AreRemovedWhenTheyAreOlder) {
   EXPECT_THAT(removed(), IsEmpty());
 }
 
-TEST_F(OldRecordings, OfThisRunStay) {
+TEST_F(OldRecordings, OfThisRunAgeButTheOneThatIsWritten) {
   record("abbe-47.mcap", 100h);
-  record("abbe-47-2.mcap", 50h);
+  record("abbe-47-2.mcap", 23h);
   record("abbe-47-3.mcap.part", 50h);
   record("abbe-471.mcap", 50h);
   record("abbe-48.mcap", 0h);
-  EXPECT_THAT(removed(), ElementsAre("abbe-471.mcap"));
+  EXPECT_THAT(removed(), ElementsAre("abbe-47.mcap", "abbe-471.mcap"));
+}
+
+TEST_F(OldRecordings, OfAFormerRunAreOldWhenThisOneHasLastedLonger) {
+  record("abbe-1.mcap", 25h);
+  EXPECT_THAT(removed(), IsEmpty());  // it is the newest: the clock may be ahead
+  lasted_ = 25h;
+  EXPECT_THAT(removed(), ElementsAre("abbe-1.mcap"));
 }
 
 TEST_F(OldRecordings, StayWhenTheClockRunsAhead) {

@@ -255,11 +255,13 @@ struct Abbed::State {
       fmt::print(stderr, "abbed: the clock was set: no old recordings are removed until the next start\n");
     if (!tidies || tidying.valid() || now < next_tidying) return;
     next_tidying = now + kTidyPeriod;
-    tidying = start_aside(
-        [dir = config.recording.dir, models = config.daemon.models_dir(),
-         rule = KeepRule{.now = std::filesystem::file_time_type::clock::now(),
-                         .keep = config.recording.keep,
-                         .running = recording}] { return remove_old_recordings(dir, models, rule); });
+    tidying = start_aside([dir = config.recording.dir, models = config.daemon.models_dir(),
+                           rule = KeepRule{.now = std::filesystem::file_time_type::clock::now(),
+                                           .keep = config.recording.keep,
+                                           .running = recording,
+                                           .lasted = now - running_since}] {
+      return remove_old_recordings(dir, models, rule);
+    });
   }
 
   void run_hub(std::future<void>& may_run) noexcept {

@@ -52,29 +52,41 @@ struct Dated {
   fs::file_time_type written;
 };
 
-Result<std::vector<Dated>> former_recordings(const fs::path& directory, const std::string& running) {
-  std::vector<Dated> found;
+struct Recordings {
+  std::vector<Dated> former, own;
+};
+
+/// All but the one that is being written.
+Result<Recordings> recordings_in(const fs::path& directory, const std::string& running) {
+  Recordings found;
   std::error_code error;
   for (fs::directory_iterator entry(directory, error), end; !error && entry != end; entry.increment(error)) {
     std::error_code unknown;
     const std::string name = entry->path().filename();
     const bool regular = entry->symlink_status(unknown).type() == fs::file_type::regular;
-    if (!regular || !is_ours(name) || is_of_run(name, running)) continue;
+    const bool own = is_of_run(name, running);
+    if (!regular || !is_ours(name) || (own && name.ends_with(".part"))) continue;
     const auto written = entry->last_write_time(unknown);
-    if (!unknown) found.push_back({entry->path(), written});
+    if (!unknown) (own ? found.own : found.former).push_back({entry->path(), written});
   }
   if (error) return fail(ErrorCode::Io, fmt::format("list {}: {}", directory.string(), error.message()));
   return found;
 }
 
 /// In order of name.
-std::vector<fs::path> outdated(const std::vector<Dated>& recordings, const KeepRule& rule) {
-  if (recordings.empty()) return {};
-  const auto newest = std::ranges::max(recordings, {}, &Dated::written).written;
-  const auto until = std::min(newest, rule.now) - rule.keep;
+std::vector<fs::path> outdated(const Recordings& recordings, const KeepRule& rule) {
   std::vector<fs::path> old;
-  for (const auto& [file, written] : recordings)
-    if (written < until && written >= earliest_date()) old.push_back(file);
+  const auto add = [&old](const std::vector<Dated>& some, fs::file_time_type until) {
+    for (const auto& [file, written] : some)
+      if (written < until && written >= earliest_date()) old.push_back(file);
+  };
+  add(recordings.own, rule.now - rule.keep);
+  if (rule.lasted > rule.keep) {
+    add(recordings.former, fs::file_time_type::max());
+  } else if (!recordings.former.empty()) {
+    const auto newest = std::ranges::max(recordings.former, {}, &Dated::written).written;
+    add(recordings.former, std::min(newest, rule.now) - rule.keep);
+  }
   std::sort(old.begin(), old.end());
   return old;
 }
@@ -83,7 +95,7 @@ std::vector<fs::path> outdated(const std::vector<Dated>& recordings, const KeepR
 
 Result<std::vector<fs::path>> remove_old_recordings(const fs::path& directory, const fs::path& store,
                                                     const KeepRule& rule) {
-  const auto recordings = former_recordings(directory, rule.running);
+  const auto recordings = recordings_in(directory, rule.running);
   if (!recordings) return tl::unexpected(recordings.error());
   std::vector<fs::path> old = outdated(*recordings, rule);
   if (old.empty()) return old;

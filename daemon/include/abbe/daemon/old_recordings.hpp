@@ -14,14 +14,18 @@ namespace abbe::daemon {
 struct KeepRule {
   std::filesystem::file_time_type now;
   std::chrono::hours keep{};  ///< [recording] keep_days
-  std::string running;        ///< RecorderOptions::name of this run: its recordings stay, whatever their date
+  std::string running;        ///< RecorderOptions::name of this run
+  /// How long this run has lasted without its clock being set: what it found is at least that old.
+  std::chrono::nanoseconds lasted{};
 };
 
-/// Removes what former runs of abbed recorded in `directory` (abbe-*.mcap, abbe-*.mcap.part) and last wrote
-/// longer than `keep` before the newest of those recordings (or before now, if that is earlier): a clock that
-/// runs ahead does not make them old. Kept is what any model in the store names among its inputs, and what is
-/// dated before there was an abbe: its clock was wrong. Returns what was removed. Nothing is removed if the
-/// store is not there or a model cannot be read: it might be the one that names a file.
+/// Removes what abbed recorded in `directory` (abbe-*.mcap, abbe-*.mcap.part) and last wrote longer than
+/// `keep` ago. For what former runs wrote that is longer than `keep` before the newest of their recordings
+/// (or before now, if that is earlier), or any once this run has lasted longer than `keep`: a clock that runs
+/// ahead does not make them old. This run's own were dated by the clock it has now; the one it is writing
+/// (.part) stays. Kept is what any model in the store names among its inputs, and what is dated before there
+/// was an abbe: its clock was wrong. Returns what was removed. Nothing is removed if the store is not there
+/// or a model cannot be read: it might be the one that names a file.
 [[nodiscard]] Result<std::vector<std::filesystem::path>> remove_old_recordings(
     const std::filesystem::path& directory, const std::filesystem::path& store, const KeepRule& rule);
 

@@ -12,9 +12,10 @@
 #include <sstream>
 
 #include "abbe/calib/model_comparison.hpp"
-#include "abbe/daemon/control_protocol.hpp"
 #include "abbe/daemon/model_store.hpp"
 #include "abbe/daemon/recorder.hpp"
+#include "abbe_command.hpp"
+#include "config_texts.hpp"
 #include "synthetic_model.hpp"
 #include "synthetic_otf_run.hpp"
 
@@ -22,22 +23,13 @@ namespace abbe::daemon {
 namespace {
 
 namespace fs = std::filesystem;
+using test::Ran;
+using test::text_of;
 using ::testing::AllOf;
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
 using ::testing::Not;
 using ::testing::StartsWith;
-
-std::string text_of(const fs::path& file) {
-  std::ostringstream text;
-  text << std::ifstream(file, std::ios::binary).rdbuf();
-  return text.str();
-}
-
-struct Ran {
-  int exit = -1;
-  std::string out, err;
-};
 
 /// One folder for the whole suite: making the run is the slow part.
 class Cli : public ::testing::Test {
@@ -49,14 +41,7 @@ class Cli : public ::testing::Test {
   }
   static void TearDownTestSuite() { fs::remove_all(folder_); }
 
-  /// Arguments hold no quotes: every path comes from the test itself.
-  static Ran abbe(const std::string& arguments) {
-    const auto out = folder_ / "stdout", err = folder_ / "stderr";
-    const auto command =
-        fmt::format("'{}' {} >'{}' 2>'{}'", ABBE_PROGRAM, arguments, out.string(), err.string());
-    const int status = std::system(command.c_str());
-    return {WIFEXITED(status) ? WEXITSTATUS(status) : -1, text_of(out), text_of(err)};
-  }
+  static Ran abbe(const std::string& arguments) { return test::run_abbe(folder_, arguments); }
   static Ran identify(const fs::path& path, const fs::path& tracker, const fs::path& out,
                       const std::string& more = "") {
     return abbe(fmt::format("identify otf --machine '{}' --path '{}' --tracker '{}' -o '{}' {}",
@@ -168,24 +153,7 @@ TEST_F(Cli, AModelOfAnotherConfigurationDoesNotLockOutItsReplacement) {
 }
 
 TEST_F(Cli, SaysThatFilesHoldNoTemperaturesOfScales) {
-  const auto warm = write("warm.toml", text_of(files_.machine) + R"([encoder]
-transport = "udp"
-peer_host = "10.0.0.8"
-peer_port = 20000
-nodes = [{axis = "X", node = 1}, {axis = "Y", node = 2}, {axis = "Z", node = 3}]
-[[environment]]
-name = "rtd"
-map = "icpdas-zt2005-c8"
-serial = "/dev/serial/by-id/rs485"
-inputs = ["scale_x"]
-[[thermal]]
-axis = "X"
-temperature = "scale_x"
-alpha_um_per_m_K = 8
-u_alpha_um_per_m_K = 0.5
-u_temperature_K = 0.2
-fixed_mm = 0
-)");
+  const auto warm = write("warm.toml", text_of(files_.machine) + test::kWarmScales);
   const auto command = [&](const std::string& more) {
     return abbe(fmt::format("identify otf --machine '{}' --path '{}' --tracker '{}' -o '{}' {}",
                             warm.string(), files_.path.string(), files_.tracker.string(),
@@ -391,119 +359,6 @@ TEST_F(Cli, EvaluatesAModelOfTheStoreByItsNameThere) {
   EXPECT_EQ(eval("active").out, by_file.out);
   EXPECT_EQ(eval(id.substr(0, 8)).out, by_file.out);
   EXPECT_EQ(eval("ffff").exit, 2);
-}
-
-/// A daemon that goes through the given states, one a question; `at_question` is told how many there were.
-struct ScriptedDaemon {
-  std::vector<nlohmann::json> sessions;
-  std::function<void(std::size_t)> at_question = [](std::size_t) {};
-  std::size_t asked = 0;
-
-  nlohmann::json operator()(const nlohmann::json& request) {
-    if (request["do"] != "status") return {{"ok", true}};
-    at_question(asked);
-    const auto& session = sessions[std::min(asked++, sessions.size() - 1)];
-    return {{"ok", true}, {"session", session}};
-  }
-};
-
-nlohmann::json session(const std::string& state, const std::string& reason) {
-  return {
-      {"state", state}, {"reason", reason}, {"progress", 0.5}, {"model_id", state == "active" ? "abcd" : ""}};
-}
-
-TEST_F(Cli, CalibrateSaysWhatIsWaitedForAtEveryStep) {
-  const auto socket = folder_ / "told.sock";
-  const auto daemon = ControlServer::open(
-      socket,
-      ScriptedDaemon{{session("warming", "waiting for the machine to stand at (1.000, 2.000, 3.000) mm"),
-                      session("acquiring", "driving the path"), session("active", "accepted")}});
-  ASSERT_TRUE(daemon);
-  const auto ran =
-      abbe(fmt::format("calibrate otf --path '{}' --socket '{}'", files_.path.string(), socket.string()));
-  EXPECT_EQ(ran.exit, 0) << ran.err;
-  EXPECT_THAT(ran.err, AllOf(HasSubstr("warming: waiting for the machine to stand at (1.000"),
-                             HasSubstr("acquiring: driving the path")));
-  EXPECT_THAT(ran.out, StartsWith("active abcd"));
-}
-
-nlohmann::json refused_as(const std::string& code) {
-  auto refused = session("refused", "because");
-  refused["code"] = code;
-  return refused;
-}
-
-TEST_F(Cli, CalibrateExitsAsTheSessionWasRefused) {
-  const std::vector<std::pair<std::string, int>> codes{
-      {"data_insufficient", 1}, {"bad_input", 3}, {"io", 4}, {"refused", 5}};
-  for (const auto& [code, exit] : codes) {
-    const auto socket = folder_ / "code.sock";
-    const auto daemon = ControlServer::open(socket, ScriptedDaemon{{refused_as(code)}});
-    ASSERT_TRUE(daemon);
-    const auto ran =
-        abbe(fmt::format("calibrate otf --path '{}' --socket '{}'", files_.path.string(), socket.string()));
-    EXPECT_EQ(ran.exit, exit) << code;
-    EXPECT_THAT(ran.out, HasSubstr("because"));
-  }
-}
-
-TEST_F(Cli, ADaemonStartedAnewMeanwhileHasLostTheSession) {
-  const auto socket = folder_ / "lost.sock";
-  const auto daemon =
-      ControlServer::open(socket, ScriptedDaemon{{session("acquiring", "driving"), session("idle", "")}});
-  ASSERT_TRUE(daemon);
-  const auto ran =
-      abbe(fmt::format("calibrate otf --path '{}' --socket '{}'", files_.path.string(), socket.string()));
-  EXPECT_EQ(ran.exit, 4);
-  EXPECT_THAT(ran.err, HasSubstr("lost"));
-}
-
-TEST_F(Cli, ReferencePrintsEachAxisInItsUnits) {
-  const auto socket = folder_ / "reference.sock";
-  const auto axis = [](const char* name, const char* kind) {
-    return nlohmann::json{{"axis", name},  {"kind", kind}, {"state", "found"},          {"marks", 4},
-                          {"known", true}, {"u", 2e-6},    {"reading_at_zero", 0.0125}, {"reason", ""}};
-  };
-  const auto daemon = ControlServer::open(socket, [&](const nlohmann::json&) -> nlohmann::json {
-    return {{"ok", true},
-            {"reference", {{"running", false}, {"axes", {axis("X", "linear"), axis("C", "rotary")}}}}};
-  });
-  ASSERT_TRUE(daemon);
-  const auto ran = abbe(fmt::format("reference --socket '{}'", socket.string()));
-  EXPECT_EQ(ran.exit, 0) << ran.err;
-  EXPECT_THAT(ran.out, AllOf(HasSubstr("at 12.500000 mm, u = 2.000 um"),
-                             HasSubstr("at 0.012500000 rad, u = 2.000 urad")));
-}
-
-TEST_F(Cli, ASearchOfADaemonStartedAnewIsLost) {
-  const auto socket = folder_ / "search.sock";
-  std::atomic<int> asked = 0;
-  const auto daemon = ControlServer::open(socket, [&](const nlohmann::json&) -> nlohmann::json {
-    return {{"ok", true},
-            {"process", asked++ < 2 ? 1 : 2},
-            {"reference", {{"running", true}, {"axes", nlohmann::json::array()}}}};
-  });
-  ASSERT_TRUE(daemon);
-  const auto ran = abbe(fmt::format("reference --socket '{}'", socket.string()));
-  EXPECT_EQ(ran.exit, 4);
-  EXPECT_THAT(ran.err, HasSubstr("search for the marks is lost"));
-}
-
-TEST_F(Cli, CalibrateInterruptedSaysHowToCancel) {
-  const auto socket = folder_ / "left.sock", pid_file = folder_ / "left.pid";
-  ScriptedDaemon script{{session("acquiring", "driving the path")}};
-  script.at_question = [&pid_file](std::size_t n) {
-    if (n == 1) ::kill(std::stoi(text_of(pid_file)), SIGINT);
-  };
-  const auto daemon = ControlServer::open(socket, script);
-  ASSERT_TRUE(daemon);
-  const auto command =
-      fmt::format("sh -c 'echo $$ >{}; exec {} calibrate otf --path {} --socket {}' 2>{}", pid_file.string(),
-                  ABBE_PROGRAM, files_.path.string(), socket.string(), (folder_ / "left.err").string());
-  const int status = std::system(command.c_str());
-  ASSERT_TRUE(WIFEXITED(status));
-  EXPECT_EQ(WEXITSTATUS(status), 130);
-  EXPECT_THAT(text_of(folder_ / "left.err"), HasSubstr("--cancel --socket " + socket.string()));
 }
 
 }  // namespace

@@ -2,20 +2,19 @@
 
 #include <fmt/format.h>
 #include <gmock/gmock.h>
-#include <sys/wait.h>
 #include <unistd.h>
 
 #include <algorithm>
 #include <chrono>
-#include <cstdlib>
 #include <filesystem>
 #include <fstream>
 #include <nlohmann/json.hpp>
-#include <sstream>
 
 #include "abbe/daemon/calibration_request.hpp"
 #include "abbe/daemon/evemu_files.hpp"
 #include "abbe/daemon/model_document.hpp"
+#include "abbe_command.hpp"
+#include "config_texts.hpp"
 #include "evemu_run.hpp"
 #include "recording_fixture.hpp"
 
@@ -23,29 +22,11 @@ namespace abbe::daemon {
 namespace {
 
 namespace fs = std::filesystem;
+using test::Ran;
+using test::text_of;
 using ::testing::AllOf;
 using ::testing::HasSubstr;
 using ::testing::StartsWith;
-
-constexpr std::string_view kMachine = R"([machine]
-name = "weak portal"
-chain = "[w b Z X Y t]"
-[axes.X]
-min_mm = -100
-max_mm = 650
-[axes.Y]
-min_mm = -100
-max_mm = 400
-[axes.Z]
-min_mm = 0
-max_mm = 100
-)";
-
-std::string text_of(const fs::path& file) {
-  std::ostringstream text;
-  text << std::ifstream(file, std::ios::binary).rdbuf();
-  return text.str();
-}
 
 std::string calibrator_toml() {
   const auto c = tests::evemu::reference_calibrator();
@@ -89,16 +70,11 @@ std::string errors_csv() {
 // same.
 constexpr int kRefused = 5;
 
-struct Ran {
-  int exit = -1;
-  std::string out, err;
-};
-
 class EvemuCli : public ::testing::Test {
  protected:
   void SetUp() override {
     fs::create_directories(folder_);
-    write("machine.toml", std::string{kMachine});
+    write("machine.toml", std::string{test::kWeakPortal});
     write("calibrator.toml", calibrator_toml());
     write("touches.csv", touches_csv());
     write("errors.csv", errors_csv());
@@ -109,13 +85,7 @@ class EvemuCli : public ::testing::Test {
     std::ofstream(folder_ / name, std::ios::binary) << text;
     return folder_ / name;
   }
-  Ran abbe(const std::string& arguments) const {
-    const auto out = folder_ / "stdout", err = folder_ / "stderr";
-    const auto command = fmt::format("cd '{}' && '{}' {} >'{}' 2>'{}'", folder_.string(), ABBE_PROGRAM,
-                                     arguments, out.string(), err.string());
-    const int status = std::system(command.c_str());
-    return {WIFEXITED(status) ? WEXITSTATUS(status) : -1, text_of(out), text_of(err)};
-  }
+  Ran abbe(const std::string& arguments) const { return test::run_abbe(folder_, arguments); }
 
   Ran identify(const Touches& all) const {
     write("touches.csv", touches_csv(all));
@@ -181,24 +151,7 @@ TEST_F(EvemuCli, WritesModelsThatReadBackToTheSameBits) {
 }
 
 TEST_F(EvemuCli, SaysThatFilesHoldNoTemperaturesOfScales) {
-  write("warm.toml", std::string{kMachine} + R"([encoder]
-transport = "udp"
-peer_host = "10.0.0.8"
-peer_port = 20000
-nodes = [{axis = "X", node = 1}, {axis = "Y", node = 2}, {axis = "Z", node = 3}]
-[[environment]]
-name = "rtd"
-map = "icpdas-zt2005-c8"
-serial = "/dev/serial/by-id/rs485"
-inputs = ["scale_x"]
-[[thermal]]
-axis = "X"
-temperature = "scale_x"
-alpha_um_per_m_K = 8
-u_alpha_um_per_m_K = 0.5
-u_temperature_K = 0.2
-fixed_mm = 0
-)");
+  write("warm.toml", std::string{test::kWeakPortal} + test::kWarmScales);
   const auto from_errors = [this](const std::string& more) {
     return abbe("identify evemu --machine warm.toml --errors errors.csv -o out " + more);
   };
@@ -225,7 +178,7 @@ order = 2
 void record_touches(const fs::path& folder, const Touches& all) {
   using namespace std::chrono_literals;
   RecordingInfo info = example_info();
-  info.configuration = std::string{kMachine} + std::string{kWatched};
+  info.configuration = std::string{test::kWeakPortal} + std::string{kWatched};
   auto recorder = Recorder::open(example_options(folder), info, Recorder::WallTime{});
   ASSERT_TRUE(recorder) << recorder.error().text;
   constexpr protocol::HostTime kFrom{1000s};
@@ -386,7 +339,7 @@ TEST_F(EvemuCli, ChoosesSparseModelsByFolds) {
 TEST_F(EvemuCli, AcceptsAShapeWhenTheConfigurationSaysSoByName) {
   const std::string limits = "[gate]\nmax_error_mm = 10\nmax_gradient = 0.1\n";
   const auto accepted = [&](const std::string& gate) {
-    write("machine.toml", std::string{kMachine} + gate);
+    write("machine.toml", std::string{test::kWeakPortal} + gate);
     const auto ran = abbe(
         "identify evemu --machine machine.toml --touches touches.csv --calibrator calibrator.toml --json -o "
         "out");
@@ -398,7 +351,7 @@ TEST_F(EvemuCli, AcceptsAShapeWhenTheConfigurationSaysSoByName) {
   EXPECT_EQ(refused["accepted"], false);
   EXPECT_THAT(refused["reasons"][0].get<std::string>(), StartsWith("shape only"));
   EXPECT_EQ(accepted(limits + "accept = [\"evemu-shape-only\"]\n")["accepted"], true);
-  write("machine.toml", std::string{kMachine} + "[gate]\naccept = [\"everything\"]\n");
+  write("machine.toml", std::string{test::kWeakPortal} + "[gate]\naccept = [\"everything\"]\n");
   EXPECT_EQ(abbe("identify evemu --machine machine.toml --errors errors.csv -o out").exit, 3);
 }
 

@@ -9,6 +9,7 @@
 
 #include "abbe/daemon/datum.hpp"
 #include "abbe/daemon/replay.hpp"
+#include "config_texts.hpp"
 #include "recording_fixture.hpp"
 
 namespace abbe::daemon {
@@ -18,21 +19,7 @@ using namespace std::chrono_literals;
 using protocol::HostTime;
 using ::testing::ElementsAre;
 
-const std::string kWatched = R"([machine]
-name = "mill"
-chain = "[w X' b Y Z (C1) t]"
-[axes.X]
-min_mm = 0
-max_mm = 500
-[axes.Y]
-min_mm = 0
-max_mm = 500
-[axes.Z]
-min_mm = 0
-max_mm = 500
-[target]
-offset_mm = [0, 0, 0]
-[tracker]
+const std::string kWatched = std::string{test::kHalfMetreMill} + R"([tracker]
 host = "127.0.0.1"
 [counter_card]
 transport = "usbip"

@@ -9,11 +9,13 @@
 #include <thread>
 
 #include "synthetic_model.hpp"
+#include "text_files.hpp"
 
 namespace abbe::daemon {
 namespace {
 
 namespace fs = std::filesystem;
+using test::text_of;
 using namespace std::chrono_literals;
 using protocol::HostTime;
 using test::synthetic_document;
@@ -23,11 +25,6 @@ using v1::ModelStatus;
 constexpr protocol::UtcOffset kUtc{1'700'000'000s};
 constexpr HostTime kNow{1000s};
 constexpr auto kPatience = 500ms;
-
-std::string text_of(const fs::path& file) {
-  std::ifstream in{file};
-  return {std::istreambuf_iterator<char>{in}, {}};
-}
 
 class ModelAuthorityTest : public ::testing::Test {
  protected:

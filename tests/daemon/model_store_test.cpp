@@ -9,21 +9,18 @@
 #include <fstream>
 
 #include "synthetic_model.hpp"
+#include "text_files.hpp"
 
 namespace abbe::daemon {
 namespace {
 
 namespace fs = std::filesystem;
 using test::synthetic_document;
+using test::text_of;
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
 using ::testing::SizeIs;
-
-std::string text_of(const fs::path& file) {
-  std::ifstream in{file};
-  return {std::istreambuf_iterator<char>{in}, {}};
-}
 
 mode_t mode_of(const fs::path& file) {
   struct stat status {};

@@ -4,6 +4,8 @@
 
 #include <cmath>
 
+#include "config_texts.hpp"
+
 namespace abbe::daemon {
 namespace {
 
@@ -15,21 +17,7 @@ using protocol::SampleFlag;
 using ::testing::Contains;
 using ::testing::HasSubstr;
 
-const std::string kMachine = R"([machine]
-name = "mill"
-chain = "[w X' b Y Z (C1) t]"
-[axes.X]
-min_mm = 0
-max_mm = 500
-[axes.Y]
-min_mm = 0
-max_mm = 500
-[axes.Z]
-min_mm = 0
-max_mm = 500
-[target]
-offset_mm = [0, 0, 0]
-)";
+const std::string kMachine = test::kHalfMetreMill;
 const std::string kCard = R"([counter_card]
 transport = "usbip"
 port = 3240

@@ -6,13 +6,13 @@
 
 #include <Eigen/Geometry>
 #include <filesystem>
-#include <fstream>
 #include <random>
 #include <string>
 #include <vector>
 
 #include "abbe/sim/path_motion.hpp"
 #include "abbe/sim/truth_machine.hpp"
+#include "text_files.hpp"
 
 namespace abbe::daemon::test {
 
@@ -52,10 +52,6 @@ inline std::vector<Eigen::Vector3d> synthetic_path_m() {
 struct OtfFiles {
   std::filesystem::path machine, path, tracker;
 };
-
-inline void write_text(const std::filesystem::path& file, const std::string& text) {
-  std::ofstream(file, std::ios::binary) << text;
-}
 
 inline std::string synthetic_machine_toml() {
   std::string text = "[machine]\nname = \"small mill\"\nchain = \"[w b X Y Z t]\"\n";

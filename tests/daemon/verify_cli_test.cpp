@@ -16,6 +16,8 @@
 #include "abbe/daemon/control_protocol.hpp"
 #include "abbe/daemon/input_files.hpp"
 #include "abbe/daemon/model_document.hpp"
+#include "abbe_command.hpp"
+#include "config_texts.hpp"
 #include "evemu_study.hpp"
 #include "recording_fixture.hpp"
 #include "synthetic_model.hpp"
@@ -25,16 +27,12 @@ namespace {
 
 namespace fs = std::filesystem;
 namespace study = tests::evemu;
+using test::Ran;
+using test::text_of;
 using ::testing::AllOf;
 using ::testing::HasSubstr;
 using ::testing::Not;
 using ::testing::StartsWith;
-
-std::string text_of(const fs::path& file) {
-  std::ostringstream text;
-  text << std::ifstream(file, std::ios::binary).rdbuf();
-  return text.str();
-}
 
 ModelDocument ball_array_document() {
   const auto solution = *calib::evemu::solve(
@@ -59,11 +57,6 @@ std::vector<calib::verify::MeasuredPoint> tracker_points(const study::Field& V) 
   return points;
 }
 
-struct Ran {
-  int exit = -1;
-  std::string out, err;
-};
-
 class VerifyCli : public ::testing::Test {
  protected:
   void SetUp() override {
@@ -76,13 +69,7 @@ class VerifyCli : public ::testing::Test {
   void write(const std::string& name, const std::string& text) const {
     std::ofstream(folder_ / name, std::ios::binary) << text;
   }
-  Ran abbe(const std::string& arguments) const {
-    const auto out = folder_ / "stdout", err = folder_ / "stderr";
-    const auto command = fmt::format("cd '{}' && '{}' {} >'{}' 2>'{}'", folder_.string(), ABBE_PROGRAM,
-                                     arguments, out.string(), err.string());
-    const int status = std::system(command.c_str());
-    return {WIFEXITED(status) ? WEXITSTATUS(status) : -1, text_of(out), text_of(err)};
-  }
+  Ran abbe(const std::string& arguments) const { return test::run_abbe(folder_, arguments); }
 
   fs::path folder_ = fs::path(::testing::TempDir()) / fmt::format("verify_cli_{}", ::getpid());
 };
@@ -124,19 +111,7 @@ TEST_F(VerifyCli, TakesAModelOfTables) {
   EXPECT_GT(summary["before"]["max_um"].get<double>(), 1.0);
 }
 
-constexpr std::string_view kWatched = R"([machine]
-name = "weak portal"
-chain = "[w b Z X Y t]"
-[axes.X]
-min_mm = -100
-max_mm = 650
-[axes.Y]
-min_mm = -100
-max_mm = 400
-[axes.Z]
-min_mm = 0
-max_mm = 100
-[target]
+const std::string kWatched = std::string{test::kWeakPortal} + R"([target]
 offset_mm = [0, 0, 0]
 [tracker]
 host = "127.0.0.1"

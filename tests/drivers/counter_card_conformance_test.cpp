@@ -14,19 +14,9 @@ class FaultyCard {
   static constexpr bool kTornCanBeFinished = true;
 
   static std::set<std::string_view> shown(Fault fault) {
-    switch (fault) {
-      case Fault::None:
-        return {"streaming"};
-      case Fault::Mute:
-        return {"restarting", "loading", "arming"};
-      case Fault::Garbage:
-        return {"closed"};
-      case Fault::Unplugged:
-        return {"closed"};
-      case Fault::Restart:
-        return {"closed"};
-    }
-    return {};
+    if (fault == Fault::None) return {"streaming"};
+    if (fault == Fault::Mute) return {"restarting", "loading", "arming"};
+    return {"closed"};
   }
 
   drivers::Device& device() { return *bench_.device; }

@@ -18,19 +18,7 @@ class FaultyModbus {
   static constexpr bool kTornCanBeFinished = true;
 
   static std::set<std::string_view> shown(Fault fault) {
-    switch (fault) {
-      case Fault::None:
-        return {"reading"};
-      case Fault::Mute:
-        return {"closed"};
-      case Fault::Garbage:
-        return {"closed"};
-      case Fault::Unplugged:
-        return {"closed"};
-      case Fault::Restart:
-        return {"closed"};
-    }
-    return {};
+    return {fault == Fault::None ? "reading" : "closed"};
   }
 
   drivers::Device& device() { return *device_; }

@@ -14,21 +14,7 @@ class FaultyMeasuringMachine {
   static constexpr std::chrono::nanoseconds kRecoveryLimit = 30s;  // two turns a command
   static constexpr bool kTornCanBeFinished = true;
 
-  static std::set<std::string_view> shown(Fault fault) {
-    switch (fault) {
-      case Fault::None:
-        return {"ready"};
-      case Fault::Mute:
-        return {"faulted"};
-      case Fault::Garbage:
-        return {"faulted"};
-      case Fault::Unplugged:
-        return {"disconnected"};
-      case Fault::Restart:
-        return {"disconnected"};
-    }
-    return {};
-  }
+  static std::set<std::string_view> shown(Fault fault) { return shown_over_tcp(fault, "ready"); }
 
   drivers::Device& device() { return *device_; }
   drivers::SteppedTime& time() { return time_; }

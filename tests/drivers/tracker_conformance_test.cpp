@@ -11,25 +11,10 @@ class FaultyTracker {
  public:
   static constexpr std::chrono::nanoseconds kTurn = 200ms;  // bursts come every 324 to 344 ms
   static constexpr std::chrono::nanoseconds kSilenceLimit = 1500ms;
-  static constexpr std::chrono::nanoseconds kRecoveryLimit =
-      40s;  // a pause, set-up 6 s, Initialize 2 s
+  static constexpr std::chrono::nanoseconds kRecoveryLimit = 40s;  // a pause, set-up 6 s, Initialize 2 s
   static constexpr bool kTornCanBeFinished = true;
 
-  static std::set<std::string_view> shown(Fault fault) {
-    switch (fault) {
-      case Fault::None:
-        return {"streaming"};
-      case Fault::Mute:
-        return {"faulted"};
-      case Fault::Garbage:
-        return {"faulted"};
-      case Fault::Unplugged:
-        return {"disconnected"};
-      case Fault::Restart:
-        return {"disconnected"};
-    }
-    return {};
-  }
+  static std::set<std::string_view> shown(Fault fault) { return shown_over_tcp(fault, "streaming"); }
 
   drivers::Device& device() { return *device_; }
   drivers::SteppedTime& time() { return time_; }

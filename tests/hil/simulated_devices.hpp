@@ -47,7 +47,16 @@ inline std::unique_ptr<sim::Simulation> open_simulation(sim::SimulationSetup set
   return sim::Simulation::open(setup, monotonic().now()).value();
 }
 
-struct Encoders {
+/// A driver's device, and the simulator that serves it.
+template <class Device>
+struct Simulated {
+  [[nodiscard]] ServedDevices::Peer peer() const { return peer_of(*simulation); }
+
+  std::unique_ptr<sim::Simulation> simulation;
+  std::unique_ptr<Device> device;
+};
+
+struct Encoders : Simulated<drivers::EncoderDevice> {
   static constexpr const char* kName = "encoders, CAN over UDP, SYNC each 1 ms";
 
   explicit Encoders(const Faults& faults = {}) {
@@ -68,13 +77,9 @@ struct Encoders {
                  .value();
   }
   std::size_t pop(Heads* heads = nullptr) { return pop_all<protocol::AxisSample>(device->samples(), heads); }
-  [[nodiscard]] ServedDevices::Peer peer() const { return peer_of(*simulation); }
-
-  std::unique_ptr<sim::Simulation> simulation;
-  std::unique_ptr<drivers::EncoderDevice> device;
 };
 
-struct Tracker {
+struct Tracker : Simulated<drivers::TrackerDevice> {
   static constexpr const char* kName = "tracker, 500 points/s";
   static constexpr nanoseconds kPeriod = 2ms;
   static constexpr std::size_t kFirst = 200;
@@ -90,13 +95,9 @@ struct Tracker {
     device = drivers::TrackerDevice::create(options, monotonic()).value();
   }
   std::size_t pop(Heads* heads = nullptr) { return pop_all<protocol::TrackerPoint>(device->points(), heads); }
-  [[nodiscard]] ServedDevices::Peer peer() const { return peer_of(*simulation); }
-
-  std::unique_ptr<sim::Simulation> simulation;
-  std::unique_ptr<drivers::TrackerDevice> device;
 };
 
-struct CounterCard {
+struct CounterCard : Simulated<drivers::CounterCardDevice> {
   static constexpr const char* kName = "counter card, USB/IP in the process, a transfer each 1.5 ms";
   static constexpr nanoseconds kPeriod = 1500us;
   static constexpr std::size_t kFirst = 2000;
@@ -123,13 +124,9 @@ struct CounterCard {
     device = drivers::CounterCardDevice::create(options, std::move(link), monotonic()).value();
   }
   std::size_t pop(Heads* heads = nullptr) { return pop_all<protocol::AxisSample>(device->samples(), heads); }
-  [[nodiscard]] ServedDevices::Peer peer() const { return peer_of(*simulation); }
-
-  std::unique_ptr<sim::Simulation> simulation;
-  std::unique_ptr<drivers::CounterCardDevice> device;
 };
 
-struct Environment {
+struct Environment : Simulated<drivers::EnvironmentDevice> {
   static constexpr const char* kName = "environment, Modbus TCP each 100 ms";
   static constexpr nanoseconds kPeriod = 100ms;
   static constexpr std::size_t kFirst = 2;
@@ -148,13 +145,9 @@ struct Environment {
   std::size_t pop(Heads* heads = nullptr) {
     return pop_all<protocol::EnvironmentSample>(device->samples(), heads);
   }
-  [[nodiscard]] ServedDevices::Peer peer() const { return peer_of(*simulation); }
-
-  std::unique_ptr<sim::Simulation> simulation;
-  std::unique_ptr<drivers::EnvironmentDevice> device;
 };
 
-struct SerialEnvironment {
+struct SerialEnvironment : Simulated<drivers::EnvironmentDevice> {
   static constexpr const char* kName = "environment, Modbus RTU each 100 ms";
 
   explicit SerialEnvironment(const Faults& faults = {}) {
@@ -172,10 +165,6 @@ struct SerialEnvironment {
   std::size_t pop(Heads* heads = nullptr) {
     return pop_all<protocol::EnvironmentSample>(device->samples(), heads);
   }
-  [[nodiscard]] ServedDevices::Peer peer() const { return peer_of(*simulation); }
-
-  std::unique_ptr<sim::Simulation> simulation;
-  std::unique_ptr<drivers::EnvironmentDevice> device;
 };
 
 struct MeasuringMachine {

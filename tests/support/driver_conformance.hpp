@@ -39,6 +39,21 @@ namespace abbe::tests {
 
 enum class Fault { None, Mute, Garbage, Unplugged, Restart };
 
+/// The states of a session over TCP; `well`: of one without a fault.
+inline std::set<std::string_view> shown_over_tcp(Fault fault, std::string_view well) {
+  switch (fault) {
+    case Fault::None:
+      return {well};
+    case Fault::Mute:
+    case Fault::Garbage:
+      return {"faulted"};
+    case Fault::Unplugged:
+    case Fault::Restart:
+      return {"disconnected"};
+  }
+  return {};
+}
+
 /// What a driver's test implements. All calls come from one thread and return at once. Default constructed,
 /// the peer is there and well, the device is made and has had no turn yet.
 template <class P>

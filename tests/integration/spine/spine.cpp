@@ -53,7 +53,7 @@ position_mm = [-350, -320, -150]
 rotation_rad = [0.0013, -0.0342, 1.1003]
 )";
 
-constexpr const char* kDaemon = R"(
+constexpr const char* kDevices = R"(
 [tracker]
 host = "127.0.0.1"
 port = {tracker}
@@ -71,7 +71,20 @@ nodes = [
   {{ axis = "Y", node = 2, step_nm = 10 }},
   {{ axis = "Z", node = 3, step_nm = 10 }},
 ]
-[daemon]
+)";
+
+// The demo's walk between the corners and centres of its volume, as long as the 3 x 3 x 3 nodes here need it.
+constexpr std::size_t kLegs = 40;
+// The demo's volume (600 x 500 x 400 mm) on this one (200 mm each).
+constexpr std::array<double, 3> kShrink{200.0 / 600.0, 200.0 / 500.0, 200.0 / 400.0};
+
+std::uint16_t port_of(const std::string& ports, const std::string& name) {
+  const auto at = ports.find(name + "=");
+  return at == std::string::npos ? 0
+                                 : static_cast<std::uint16_t>(std::stoi(ports.substr(at + name.size() + 1)));
+}
+
+constexpr const char* kDaemon = R"([daemon]
 data_dir = "data"
 runtime_dir = "run"
 simulated = true
@@ -85,17 +98,6 @@ supervise = "{dds}"
 domain = {domain}
 profile = "{profile}"
 )";
-
-// The demo's walk between the corners and centres of its volume, as long as the 3 x 3 x 3 nodes here need it.
-constexpr std::size_t kLegs = 40;
-// The demo's volume (600 x 500 x 400 mm) on this one (200 mm each).
-constexpr std::array<double, 3> kShrink{200.0 / 600.0, 200.0 / 500.0, 200.0 / 400.0};
-
-std::uint16_t port_of(const std::string& ports, const std::string& name) {
-  const auto at = ports.find(name + "=");
-  return at == std::string::npos ? 0
-                                 : static_cast<std::uint16_t>(std::stoi(ports.substr(at + name.size() + 1)));
-}
 
 }  // namespace
 
@@ -138,10 +140,14 @@ Spine::Vertices Spine::path() {
 }
 
 void Spine::write_configuration(const std::string& dds) const {
-  write("abbed.toml", kMachine + fmt::format(kDaemon, fmt::arg("tracker", tracker_port_),
-                                             fmt::arg("can", can_port_), fmt::arg("speed", ABBE_SPINE_SPEED),
-                                             fmt::arg("dds", dds), fmt::arg("domain", domain_.text()),
-                                             fmt::arg("profile", ABBE_LOOPBACK_PROFILE)));
+  write("abbed.toml",
+        kMachine + fmt::format(kDevices, fmt::arg("tracker", tracker_port_), fmt::arg("can", can_port_)) +
+            daemon_tables(dds));
+}
+
+std::string Spine::daemon_tables(const std::string& dds) const {
+  return fmt::format(kDaemon, fmt::arg("speed", ABBE_SPINE_SPEED), fmt::arg("dds", dds),
+                     fmt::arg("domain", domain_.text()), fmt::arg("profile", ABBE_LOOPBACK_PROFILE));
 }
 
 void Spine::start_simulator() {

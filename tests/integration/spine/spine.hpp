@@ -38,6 +38,8 @@ class Spine : public testing::Test {
   static Vertices path();
   /// abbed.toml for the simulator's ports. `dds`: [dds] supervise.
   void write_configuration(const std::string& dds = "off") const;
+  /// [daemon], [recording] and [dds] of it, for who has other devices.
+  [[nodiscard]] std::string daemon_tables(const std::string& dds) const;
   [[nodiscard]] std::string file(const std::string& name) const { return (directory_ / name).string(); }
 
   // Programs.

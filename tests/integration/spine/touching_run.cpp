@@ -48,22 +48,9 @@ points_per_ball = 6
 points_per_block = 5
 )";
 
-constexpr const char* kDaemon = R"([evemu]
+constexpr const char* kEvemu = R"([evemu]
 points_per_ball = 6
 points_per_block = 5
-[daemon]
-data_dir = "data"
-runtime_dir = "run"
-simulated = true
-speed = {speed}
-realtime = "ignore"
-[recording]
-min_free_MB = 1
-chunk_kB = 16
-[dds]
-supervise = "{dds}"
-domain = {domain}
-profile = "{profile}"
 )";
 
 }  // namespace
@@ -91,10 +78,8 @@ void TouchingRun::start_touching_simulator(const std::vector<std::string>& more)
 
 void TouchingRun::write_touching_configuration(const std::string& gate, const std::string& dds,
                                                const std::string& probe) const {
-  write("abbed.toml",
-        kMachine + fmt::format("port = {}\n", usbip_port_) + kAxes + probe + "[gate]\n" + gate +
-            fmt::format(kDaemon, fmt::arg("speed", ABBE_SPINE_SPEED), fmt::arg("dds", dds),
-                        fmt::arg("domain", domain_.text()), fmt::arg("profile", ABBE_LOOPBACK_PROFILE)));
+  write("abbed.toml", kMachine + fmt::format("port = {}\n", usbip_port_) + kAxes + probe + "[gate]\n" + gate +
+                          kEvemu + daemon_tables(dds));
 }
 
 std::vector<std::string> TouchingRun::calibrate_command(const std::string& calibrator) const {

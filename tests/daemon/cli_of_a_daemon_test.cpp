@@ -1,0 +1,146 @@
+/// `abbe` where it asks a running daemon and waits for what comes of it.
+
+#include <gmock/gmock.h>
+#include <signal.h>
+
+#include <atomic>
+#include <functional>
+#include <nlohmann/json.hpp>
+
+#include "abbe/daemon/control_protocol.hpp"
+#include "abbe_command.hpp"
+#include "recording_fixture.hpp"
+
+namespace abbe::daemon {
+namespace {
+
+namespace fs = std::filesystem;
+using test::text_of;
+using ::testing::AllOf;
+using ::testing::HasSubstr;
+using ::testing::StartsWith;
+
+/// A daemon that goes through the given states, one a question; `at_question` is told how many there were.
+struct ScriptedDaemon {
+  std::vector<nlohmann::json> sessions;
+  std::function<void(std::size_t)> at_question = [](std::size_t) {};
+  std::size_t asked = 0;
+
+  nlohmann::json operator()(const nlohmann::json& request) {
+    if (request["do"] != "status") return {{"ok", true}};
+    at_question(asked);
+    const auto& session = sessions[std::min(asked++, sessions.size() - 1)];
+    return {{"ok", true}, {"session", session}};
+  }
+};
+
+nlohmann::json session(const std::string& state, const std::string& reason) {
+  return {
+      {"state", state}, {"reason", reason}, {"progress", 0.5}, {"model_id", state == "active" ? "abcd" : ""}};
+}
+
+class CliOfADaemon : public ::testing::Test {
+ protected:
+  CliOfADaemon() { test::write_text(path_, "x_mm,y_mm,z_mm\n0,0,0\n100,0,0\n"); }
+  [[nodiscard]] test::Ran calibrate(const fs::path& socket) const {
+    return test::run_abbe(folder_.path(), fmt::format("calibrate otf --path '{}' --socket '{}'",
+                                                      path_.string(), socket.string()));
+  }
+
+  TemporaryFolder folder_;
+  fs::path path_ = folder_.path() / "path.csv";
+};
+
+TEST_F(CliOfADaemon, CalibrateSaysWhatIsWaitedForAtEveryStep) {
+  const auto socket = folder_.path() / "told.sock";
+  const auto daemon = ControlServer::open(
+      socket,
+      ScriptedDaemon{{session("warming", "waiting for the machine to stand at (1.000, 2.000, 3.000) mm"),
+                      session("acquiring", "driving the path"), session("active", "accepted")}});
+  ASSERT_TRUE(daemon);
+  const auto ran = calibrate(socket);
+  EXPECT_EQ(ran.exit, 0) << ran.err;
+  EXPECT_THAT(ran.err, AllOf(HasSubstr("warming: waiting for the machine to stand at (1.000"),
+                             HasSubstr("acquiring: driving the path")));
+  EXPECT_THAT(ran.out, StartsWith("active abcd"));
+}
+
+nlohmann::json refused_as(const std::string& code) {
+  auto refused = session("refused", "because");
+  refused["code"] = code;
+  return refused;
+}
+
+TEST_F(CliOfADaemon, CalibrateExitsAsTheSessionWasRefused) {
+  const std::vector<std::pair<std::string, int>> codes{
+      {"data_insufficient", 1}, {"bad_input", 3}, {"io", 4}, {"refused", 5}};
+  for (const auto& [code, exit] : codes) {
+    const auto socket = folder_.path() / "code.sock";
+    const auto daemon = ControlServer::open(socket, ScriptedDaemon{{refused_as(code)}});
+    ASSERT_TRUE(daemon);
+    const auto ran = calibrate(socket);
+    EXPECT_EQ(ran.exit, exit) << code;
+    EXPECT_THAT(ran.out, HasSubstr("because"));
+  }
+}
+
+TEST_F(CliOfADaemon, ADaemonStartedAnewMeanwhileHasLostTheSession) {
+  const auto socket = folder_.path() / "lost.sock";
+  const auto daemon =
+      ControlServer::open(socket, ScriptedDaemon{{session("acquiring", "driving"), session("idle", "")}});
+  ASSERT_TRUE(daemon);
+  const auto ran = calibrate(socket);
+  EXPECT_EQ(ran.exit, 4);
+  EXPECT_THAT(ran.err, HasSubstr("lost"));
+}
+
+TEST_F(CliOfADaemon, ReferencePrintsEachAxisInItsUnits) {
+  const auto socket = folder_.path() / "reference.sock";
+  const auto axis = [](const char* name, const char* kind) {
+    return nlohmann::json{{"axis", name},  {"kind", kind}, {"state", "found"},          {"marks", 4},
+                          {"known", true}, {"u", 2e-6},    {"reading_at_zero", 0.0125}, {"reason", ""}};
+  };
+  const auto daemon = ControlServer::open(socket, [&](const nlohmann::json&) -> nlohmann::json {
+    return {{"ok", true},
+            {"reference", {{"running", false}, {"axes", {axis("X", "linear"), axis("C", "rotary")}}}}};
+  });
+  ASSERT_TRUE(daemon);
+  const auto ran = test::run_abbe(folder_.path(), fmt::format("reference --socket '{}'", socket.string()));
+  EXPECT_EQ(ran.exit, 0) << ran.err;
+  EXPECT_THAT(ran.out, AllOf(HasSubstr("at 12.500000 mm, u = 2.000 um"),
+                             HasSubstr("at 0.012500000 rad, u = 2.000 urad")));
+}
+
+TEST_F(CliOfADaemon, ASearchOfADaemonStartedAnewIsLost) {
+  const auto socket = folder_.path() / "search.sock";
+  std::atomic<int> asked = 0;
+  const auto daemon = ControlServer::open(socket, [&](const nlohmann::json&) -> nlohmann::json {
+    return {{"ok", true},
+            {"process", asked++ < 2 ? 1 : 2},
+            {"reference", {{"running", true}, {"axes", nlohmann::json::array()}}}};
+  });
+  ASSERT_TRUE(daemon);
+  const auto ran = test::run_abbe(folder_.path(), fmt::format("reference --socket '{}'", socket.string()));
+  EXPECT_EQ(ran.exit, 4);
+  EXPECT_THAT(ran.err, HasSubstr("search for the marks is lost"));
+}
+
+TEST_F(CliOfADaemon, CalibrateInterruptedSaysHowToCancel) {
+  const auto socket = folder_.path() / "left.sock", pid_file = folder_.path() / "left.pid";
+  ScriptedDaemon script{{session("acquiring", "driving the path")}};
+  script.at_question = [&pid_file](std::size_t n) {
+    if (n == 1) ::kill(std::stoi(text_of(pid_file)), SIGINT);
+  };
+  const auto daemon = ControlServer::open(socket, script);
+  ASSERT_TRUE(daemon);
+  const auto command =
+      fmt::format("sh -c 'echo $$ >{}; exec {} calibrate otf --path {} --socket {}' 2>{}", pid_file.string(),
+                  ABBE_PROGRAM, path_.string(), socket.string(), (folder_.path() / "left.err").string());
+  const int status = std::system(command.c_str());
+  ASSERT_TRUE(WIFEXITED(status));
+  EXPECT_EQ(WEXITSTATUS(status), 130);
+  EXPECT_THAT(text_of(folder_.path() / "left.err"), HasSubstr("--cancel --socket " + socket.string()));
+}
+
+}  // namespace
+}  // namespace abbe::daemon

@@ -189,7 +189,7 @@ TEST_F(CounterCardReceiverTest, GivesTheLatchInCountsOfTheClock) {
   EXPECT_EQ(receiver_.counters().edges, 1u);
 }
 
-TEST_F(CounterCardReceiverTest, TakesAJumpOfTheClockForARestartOfIt) {
+TEST_F(CounterCardReceiverTest, TakesAJumpOfTheClockWithAGapForARestartOfIt) {
   start();
   for (int i = 0; i < 50; ++i) push(card_.scans(40));
   card_.lose(40'000);  // one second
@@ -198,6 +198,19 @@ TEST_F(CounterCardReceiverTest, TakesAJumpOfTheClockForARestartOfIt) {
   EXPECT_TRUE(has(scans[0].axes.head.flags, SampleFlag::Restarted));
   EXPECT_LT(scans.back().axes.head.time, now_);
   EXPECT_EQ(receiver_.counters().clock_jumps, 1u);
+}
+
+TEST_F(CounterCardReceiverTest, CountsThatWentOnInStepAreThoseOfTheSameCardHoweverLateTheyCame) {
+  start();
+  now_ += 200ms;  // the host was busy when the first came
+  push(card_.scans(40));
+  now_ -= 200ms;
+  const auto scans = push(card_.scans(40));
+  ASSERT_FALSE(scans.empty());
+  EXPECT_EQ(receiver_.counters().clock_jumps, 1u);
+  EXPECT_FALSE(has(scans[0].axes.head.flags, SampleFlag::Restarted));
+  EXPECT_LT(scans.back().axes.head.time, now_);
+  EXPECT_GT(scans.back().axes.head.time, now_ - 2ms);
 }
 
 }  // namespace

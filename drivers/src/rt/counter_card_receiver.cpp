@@ -198,11 +198,15 @@ void CounterCardReceiver::follow_latch(const quad08::RawScan& raw, std::int64_t 
 void CounterCardReceiver::stamp() ABBE_RT {
   if (scan_count_ == 0) return;
   const auto youngest = device_time(scans_[scan_count_ - 1].clock_count);
+  const auto scans = std::span{scans_}.first(scan_count_);
   if (clock_.observe(youngest, arrival_) == ClockModel::Observed::Restarted) {
     ++counters_.clock_jumps;
-    scans_[0].axes.head.flags |= SampleFlag::Restarted;
+    // Counts that went on in step are those of the same card: only its relation to our clock began anew.
+    const auto gap = std::ranges::find_if(
+        scans, [](const CounterScan& s) { return has(s.axes.head.flags, SampleFlag::GapBefore); });
+    if (gap != scans.end()) gap->axes.head.flags |= SampleFlag::Restarted;
   }
-  for (auto& scan : std::span{scans_}.first(scan_count_)) {
+  for (auto& scan : scans) {
     const auto at = clock_.to_host(device_time(scan.clock_count));
     scan.axes.head.time = at.time;
     scan.axes.head.u_time = at.u_time;

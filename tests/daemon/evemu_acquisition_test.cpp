@@ -84,6 +84,19 @@ TEST_F(EvemuAcquisitionTest, ATouchWithAnAxisMissingIsNotUsed) {
   EXPECT_THAT(acquisition.take_notes(), testing::ElementsAre(HasSubstr("an axis was not known")));
 }
 
+TEST_F(EvemuAcquisitionTest, EndsWhenTouchesInARowCannotBeUsed) {
+  auto blind = touch_at(points_m[0], kFrom + 1s, 1);
+  blind.missing_mask = 0b010;
+  for (int i = 0; i < 19; ++i) acquisition.take(blind);
+  touch(0);  // one that can begins the count anew
+  for (int i = 0; i < 19; ++i) acquisition.take(blind);
+  EXPECT_EQ(acquisition.phase(), AcquisitionPhase::Running);
+  acquisition.take(blind);
+  EXPECT_EQ(acquisition.phase(), AcquisitionPhase::Failed);
+  EXPECT_THAT(acquisition.reason(), HasSubstr("20 touches one after the other"));
+  EXPECT_THAT(acquisition.reason(), HasSubstr("an axis was not known"));
+}
+
 TEST_F(EvemuAcquisitionTest, EndsWhenTheCardLostItsZeroInTheMiddle) {
   touch(0);
   auto after = touch_at(points_m[1], kFrom + 5s, 9);

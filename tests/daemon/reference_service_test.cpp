@@ -208,6 +208,7 @@ TEST(ReferenceService, AxesWithoutMarksAreNotKnownUntilSomebodySaysWhereTheyStan
   EXPECT_EQ(batch.axes[0].missing_mask, 0b011);
   EXPECT_NEAR(batch.axes[0].position[2], -1e-6, 1e-15);  // two readings of 0.1 mm apart
   EXPECT_THAT(service.without_zero(), ::testing::ElementsAre("X", "Y"));
+  EXPECT_EQ(service.unknown(), service.without_zero()) << "no axis of this card has marks";
 }
 
 TEST(ReferenceService, NobodyCanSayWhereAMovingAxisStands) {

@@ -1,6 +1,7 @@
 #include "abbe/daemon/control_api.hpp"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 #include <unistd.h>
 
 #include <array>
@@ -166,10 +167,21 @@ std::string who(const json& request) {
   return said.empty() || said == user ? user : fmt::format("{} (as {})", user, said);
 }
 
+/// Readings of an axis without a datum are used by nobody: a run would wait for them in vain.
+Result<void> check_zeros(const HubParts& parts) {
+  const auto unknown = parts.reference != nullptr ? parts.reference->unknown() : std::vector<std::string>{};
+  if (unknown.empty()) return {};
+  return fail(ErrorCode::Refused,
+              fmt::format("calibrate: nobody knows the zero of {}: `abbe reference` finds the marks, `abbe "
+                          "reference --here` says that the axes read their offset",
+                          fmt::join(unknown, ", ")));
+}
+
 json calibrate(const Hub& hub, const json& request) {
   const HubParts& parts = hub.parts();
   auto task = task_from_json(request, touch_plan(parts.config.evemu));
   if (!task) return refusal(task.error());
+  if (const auto known = check_zeros(parts); !known) return refusal(known.error());
   auto started = parts.calibration.start(std::move(*task), who(request), parts.time.now());
   return started ? json{{"ok", true}} : refusal(started.error());
 }

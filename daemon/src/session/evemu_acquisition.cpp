@@ -73,7 +73,8 @@ void EvemuAcquisition::take(const protocol::Snapshot& snapshot) {
                           options_.device, snapshot.trigger.touch);
     return;
   }
-  if (!usable(snapshot)) return;
+  if (const auto fault = fault_of(snapshot); !fault.empty()) return refuse(snapshot, fault);
+  refused_in_a_row_ = 0;
   const calib::Vector3 reading_m{snapshot.position[0], snapshot.position[1], snapshot.position[2]};
   for (const std::string& text : guide_.take(reading_m).notes) note(snapshot, text);
   if (guide_.taken() > 0 && phase_ == Phase::WaitingAtStart) phase_ = Phase::Running;
@@ -88,12 +89,13 @@ void EvemuAcquisition::take(const protocol::Snapshot& snapshot) {
   }
 }
 
-bool EvemuAcquisition::usable(const protocol::Snapshot& touch) {
-  const auto fault = fault_of(touch);
-  if (fault.empty()) return true;
+void EvemuAcquisition::refuse(const protocol::Snapshot& touch, std::string_view fault) {
   const auto next = guide_.next();
   note(touch, fmt::format("not used: {}; expected: {}", fault, evemu::name(next.on)));
-  return false;
+  if (++refused_in_a_row_ < options_.most_refused) return;
+  phase_ = Phase::Failed;
+  reason_ = fmt::format("{} touches one after the other could not be used, the last because {}",
+                        refused_in_a_row_, fault);
 }
 
 void EvemuAcquisition::note(const protocol::Snapshot& touch, const std::string& what) {

@@ -101,13 +101,18 @@ std::vector<std::string> ReferenceService::without_marks() const {
   return names;
 }
 
+std::vector<std::string> ReferenceService::unknown() const {
+  std::vector<std::string> names;
+  if (!config_.counter_card) return names;
+  const auto& axes = config_.counter_card->wiring.axes;
+  for (std::size_t i = 0; i < axes.size(); ++i)
+    if (!datum_.known(i)) names.push_back(axes[i].name);
+  return names;
+}
+
 std::vector<std::string> ReferenceService::without_zero() const {
-  auto names = without_marks();
-  std::erase_if(names, [this](const std::string& name) {
-    const auto& axes = config_.counter_card->wiring.axes;
-    const auto axis = std::ranges::find(axes, name, &drivers::CounterAxis::name);
-    return datum_.known(static_cast<std::size_t>(axis - axes.begin()));
-  });
+  auto names = unknown();
+  std::erase_if(names, [this](const std::string& name) { return has_marks(config_, name); });
   return names;
 }
 

@@ -44,6 +44,11 @@ TEST_F(ReferenceRun, FindsWhereTheCountersBegan) {
   ASSERT_NO_FATAL_FAILURE(start_both(second_card()));
   ASSERT_TRUE(eventually([&] { return samples("counter_card") > 100; })) << status().dump(1);
   EXPECT_FALSE(status()["reference"]["axes"][0]["known"].get<bool>());
+  write("path.csv", "x_mm,y_mm,z_mm\n0,0,0\n100,0,0\n");
+  const auto too_early =
+      run({ABBE_PROGRAM, "calibrate", "otf", "-c", file("abbed.toml"), "--path", file("path.csv")});
+  EXPECT_EQ(too_early.code, 5);
+  EXPECT_THAT(too_early.err, HasSubstr("nobody knows the zero of X, Y, Z")) << too_early.out;
   const auto found = run({ABBE_PROGRAM, "reference", "-c", file("abbed.toml"), "--json"});
   ASSERT_EQ(found.code, 0) << found.out << found.err;
   const json axes = json::parse(found.out)["axes"];

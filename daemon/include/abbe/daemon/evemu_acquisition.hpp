@@ -43,6 +43,7 @@ struct EvemuAcquisitionOptions {
   bool zero_is_lost_by_restart = true;
   /// Host time without a touch that ends the run: the artefact is turned and clamped by hand in between.
   std::chrono::nanoseconds longest_pause = std::chrono::hours{1};
+  std::size_t most_refused = 20;  ///< touches in a row that cannot be used; then the run ends
 };
 
 class EvemuAcquisition {
@@ -71,7 +72,7 @@ class EvemuAcquisition {
  private:
   EvemuAcquisition(EvemuRequest request, calib::evemu::TouchGuide guide, protocol::HostTime from,
                    EvemuAcquisitionOptions options);
-  [[nodiscard]] bool usable(const protocol::Snapshot& touch);
+  void refuse(const protocol::Snapshot& touch, std::string_view fault);
   void note(const protocol::Snapshot& touch, const std::string& what);
   void say_what_comes_next();
 
@@ -83,6 +84,7 @@ class EvemuAcquisition {
   std::string reason_;
   std::vector<std::string> notes_;
   protocol::HostTime last_touch_;
+  std::size_t refused_in_a_row_ = 0;
 };
 
 }  // namespace abbe::daemon

@@ -59,7 +59,9 @@ class ReferenceService {
   [[nodiscard]] bool configured() const noexcept { return config_.reference.has_value(); }
   [[nodiscard]] bool running() const noexcept { return running_; }
   [[nodiscard]] std::vector<AxisStatus> status() const;
-  /// Axes without marks that are not known now.
+  /// Axes of the counter card whose readings have no datum now.
+  [[nodiscard]] std::vector<std::string> unknown() const;
+  /// Those of them without marks.
   [[nodiscard]] std::vector<std::string> without_zero() const;
 
  private:

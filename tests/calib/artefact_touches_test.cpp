@@ -135,6 +135,19 @@ TEST(ArtefactTouches, TheFewestTouchesAreEnough) {
     EXPECT_LT((found->balls[i].centre_m - c.balls[i].centre_m).norm(), 1e-12);
 }
 
+TEST(ArtefactTouches, TheMeasuredArtefactGrowsAsTheNominalOne) {
+  auto c = array();
+  std::vector<Touch> touches;
+  for (const auto& t : plan({.points_per_ball = 5, .points_per_face = 4}))
+    touches.push_back({1, t.feature, t.number, t.at_m});
+  EXPECT_FALSE(calibrated_artefact(c, kFaces, touches, 0.0)->expansivity);
+  c.expansivity = {{11.5e-6, 0.5e-6}};
+  const auto found = calibrated_artefact(c, kFaces, touches, 0.0);
+  ASSERT_TRUE(found && found->expansivity);
+  EXPECT_EQ(found->expansivity->alpha_per_K, 11.5e-6);
+  EXPECT_EQ(found->expansivity->u_alpha_per_K, 0.5e-6);
+}
+
 TEST(ArtefactTouches, MovedTouchesGiveTheArtefactThere) {
   const RigidTransform T{Eigen::AngleAxisd(0.3, Vector3::UnitZ()).toRotationMatrix(), {0.5, 0.4, 0.1}};
   const auto there = moved(array(), T);

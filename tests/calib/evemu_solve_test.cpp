@@ -429,7 +429,7 @@ TEST(EvemuJudge, CallsAShapeAShapeUnlessToldOtherwise) {
   EXPECT_TRUE(judge(o, s, nullptr, told)->accepted);
 }
 
-TEST(EvemuJudge, SaysThatTheArtefactCountsAsExact) {
+TEST(EvemuJudge, SaysThatTheArtefactOfGivenErrorsIsNotInTheCovariance) {
   const Observations o = reference_observations();
   EXPECT_THAT(judge(o, *solve(o), nullptr, generous())->notes,
               Contains(HasSubstr("own uncertainty and temperature are not in the covariance")));

@@ -49,12 +49,59 @@ Result<void> check_blocks(const Calibrator& c) {
     if (!block.normal.allFinite() || !(block.normal.norm() > 0.0)) {
       return broken(c, ErrorCode::NotFinite, message("block ", block.number, " has no direction"));
     }
+    if (!std::isfinite(block.u_rad) || block.u_rad < 0.0) {
+      return broken(c, ErrorCode::BadInput,
+                    message("block ", block.number, " has u = ", block.u_rad, " rad"));
+    }
   }
   return uniform_frame(Vector3::Zero(), c.blocks[0].normal, c.blocks[1].normal)
       .map([](const RigidTransform&) {});
 }
 
+Result<void> check_expansivity(const Calibrator& c) {
+  if (!c.expansivity) {
+    return {};
+  }
+  const auto& [alpha_per_K, u_alpha_per_K] = *c.expansivity;
+  if (!std::isfinite(alpha_per_K) || !(u_alpha_per_K >= 0.0) || !std::isfinite(u_alpha_per_K)) {
+    return broken(c, ErrorCode::NotFinite,
+                  message("thermal expansion ", alpha_per_K, " per K, u = ", u_alpha_per_K));
+  }
+  return {};
+}
+
 }  // namespace
+
+Calibrator grown(const Calibrator& c, const Expansion& expansion) {
+  const double factor = growth(expansion);
+  Calibrator out = c;
+  for (Calibrator::Ball& ball : out.balls) {
+    ball.centre_m = c.balls.front().centre_m + factor * (ball.centre_m - c.balls.front().centre_m);
+    ball.radius_m *= factor;
+  }
+  return out;
+}
+
+double ArtefactUncertainty::u_scale() const {
+  return expansion ? u_growth(*expansion) / growth(*expansion) : 0.0;
+}
+
+bool ArtefactUncertainty::none() const {
+  const auto exact = [](double u) { return u == 0.0; };
+  return std::all_of(u_ball_m.begin(), u_ball_m.end(), exact) &&
+         std::all_of(u_block_rad.begin(), u_block_rad.end(), exact) && exact(u_scale());
+}
+
+ArtefactUncertainty uncertainty_of(const Calibrator& c, const std::optional<Expansion>& expansion) {
+  ArtefactUncertainty u;
+  for (const Calibrator::Ball& ball : c.balls) {
+    u.u_ball_m.push_back(ball.u_m);
+  }
+  u.u_block_rad = {c.blocks[0].u_rad, c.blocks[1].u_rad};
+  u.cosine_between_blocks = c.blocks[0].normal.normalized().dot(c.blocks[1].normal.normalized());
+  u.expansion = expansion;
+  return u;
+}
 
 Result<RigidTransform> uniform_frame(const Vector3& ball1_m, const Vector3& n1, const Vector3& n2) {
   const Vector3 z = n1.normalized(), across = n2.normalized().cross(z);
@@ -77,6 +124,9 @@ Result<void> check(const Calibrator& c) {
   }
   if (Result<void> balls = check_balls(c); !balls) {
     return balls;
+  }
+  if (Result<void> expansivity = check_expansivity(c); !expansivity) {
+    return expansivity;
   }
   std::vector<Vector3> centres;
   for (const Calibrator::Ball& ball : c.balls) {

@@ -178,6 +178,7 @@ Result<Calibrator> calibrated_artefact(const Calibrator& nominal, const std::arr
   auto found = precalibrated(nominal.name, touches, nominal.tip_radius_m,
                              {nominal.blocks[0].normal, nominal.blocks[1].normal});
   if (!found) return found;
+  found->expansivity = nominal.expansivity;
   for (auto& ball : found->balls) ball.u_m = std::hypot(ball.u_m, u_position_m);
   for (std::size_t i = 0; i < found->blocks.size(); ++i)
     found->blocks[i].u_rad = std::hypot(found->blocks[i].u_rad, u_position_m / faces[i].half_size_m);

@@ -2,6 +2,7 @@
 
 #include <Eigen/Dense>
 
+#include "abbe/calib/evemu/artefact_rows.hpp"
 #include "abbe/calib/evemu/design_rows.hpp"
 #include "message.hpp"
 
@@ -57,6 +58,9 @@ Result<Fit> fit_ols(const FitProblem& problem) {
   const Eigen::MatrixXd G = scale.asDiagonal() * (qr.colsPermutation() * R_inv);
   fit.covariance_m2 = s2 * G * Qt_C0_Q * G.transpose();
   fit.covariance_m2 = 0.5 * (fit.covariance_m2 + fit.covariance_m2.transpose()).eval();
+  if (problem.A.cols() > 0) {
+    fit.artefact_m = scale.asDiagonal() * qr.solve(problem.A);
+  }
   fit.s_m = std::sqrt(s2);
   fit.effective_parameters = static_cast<double>(n);
   fit.iterations = 1;
@@ -80,6 +84,9 @@ Result<Fit> fit_prior(PriorKind kind, const FitProblem& problem) {
   const auto n = static_cast<Eigen::Index>(problem.design.size());
   fit.c_m = p.mean.head(n);
   fit.covariance_m2 = p.covariance.topLeftCorner(n, n);
+  if (problem.A.cols() > 0) {
+    fit.artefact_m = gaussian.response(prior, h.s_m * h.s_m, white(problem.A)).topRows(n);
+  }
   fit.s_m = h.s_m;
   fit.w_rad = h.w_rad;
   fit.effective_parameters = p.effective_parameters;
@@ -101,11 +108,15 @@ FitProblem problem_of(const Observations& o, const ScaledDesign& design, const S
   // Without a prior, rows that are blind to a rotation cannot be solved, and the others are those of [Li
   // OMM].
   if (options.estimator != Estimator::BayesPose && options.estimator != Estimator::Ridge) {
-    return {o, design, design_rows(o, design, RowsFrom::Centres), observed_m(o), false};
+    return {o, design, design_rows(o, design, RowsFrom::Centres), observed_m(o), false, artefact_rows(o)};
   }
   const bool from_touches = options.use_touches && !o.seen.empty();
-  return {o, design, relative_rows(o, design, from_touches ? RowsFrom::Touches : RowsFrom::Centres),
-          observed_m(o), from_touches};
+  return {o,
+          design,
+          relative_rows(o, design, from_touches ? RowsFrom::Touches : RowsFrom::Centres),
+          observed_m(o),
+          from_touches,
+          artefact_rows(o)};
 }
 
 Result<Fit> fit_with(const FitProblem& problem, const SolveOptions& options) {

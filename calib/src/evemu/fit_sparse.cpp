@@ -124,8 +124,10 @@ Result<Eigen::MatrixXd> bootstrap(const FitProblem& problem, const Regression& r
   const auto runs = static_cast<Eigen::Index>(options.sparse.bootstrap_runs);
   Eigen::MatrixXd c(static_cast<Eigen::Index>(problem.design.size()), runs);
   for (Eigen::Index run = 0; run < runs; ++run) {
-    const Eigen::VectorXd scatter =
-        coloured(o, noise.s_m * draw(r.y.size())) + S * (noise.w_rad * draw(S.cols()));
+    Eigen::VectorXd scatter = coloured(o, noise.s_m * draw(r.y.size())) + S * (noise.w_rad * draw(S.cols()));
+    if (problem.A.cols() > 0) {
+      scatter += problem.A * draw(problem.A.cols());  // one array for all positions of a run
+    }
     const auto refit = path_to({r.X, fitted_mm + kMmPerM * scatter}, options.estimator, choice);
     if (!refit) {
       return tl::unexpected(refit.error());

@@ -61,6 +61,19 @@ std::optional<Observations> inside(const Observations& position, const ValidityV
   return part.rows.size() > 1 ? std::optional{std::move(part)} : std::nullopt;
 }
 
+void note_artefact(const Observations& o, Verdict& verdict) {
+  if (!o.artefact) {
+    verdict.notes.emplace_back("the artefact's own uncertainty and temperature are not in the covariance");
+    return;
+  }
+  if (o.artefact->none()) {
+    verdict.notes.emplace_back("the calibrator states no uncertainty: the array counts as exact");
+  }
+  if (!o.artefact->expansion) {
+    verdict.notes.emplace_back("the array counts as at 20 C");
+  }
+}
+
 }  // namespace
 
 Result<HeldOutFigures> held_out(const Observations& o, double s_m, const VolumetricModel* active,
@@ -127,7 +140,7 @@ Result<Verdict> judge(const Observations& o, const Solution& solution, const Vol
           message("shape only: the machine measured the blocks itself, so a rotation of about ", 1e6 * u_rad,
                   " urad about Ball1 is unknown; give a rotation reference or accept ", kShapeOnly));
     }
-    verdict.notes.emplace_back("the artefact's own uncertainty and temperature are not in the covariance");
+    note_artefact(o, verdict);
     if (const auto& fit = solution.rotation.reference; fit && !fit->outside.empty()) {
       verdict.notes.push_back(message("rotation reference: ", fit->outside.size(), " of ",
                                       fit->outside.size() + fit->points,

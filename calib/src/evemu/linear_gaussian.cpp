@@ -12,10 +12,10 @@ LinearGaussian::LinearGaussian(const Eigen::MatrixXd& X, const Eigen::MatrixXd& 
     : unknowns_(X.cols()), rows_(X.rows()) {
   Eigen::MatrixXd Z(X.rows(), X.cols() + S.cols());
   Z << X, S;
-  const Eigen::HouseholderQR<Eigen::MatrixXd> qr(Z);
+  qr_.compute(Z);
   const Eigen::Index m = std::min(Z.rows(), Z.cols());
-  R_ = qr.matrixQR().topRows(m).triangularView<Eigen::Upper>();
-  const Eigen::VectorXd turned = qr.householderQ().adjoint() * y;
+  R_ = qr_.matrixQR().topRows(m).triangularView<Eigen::Upper>();
+  const Eigen::VectorXd turned = qr_.householderQ().adjoint() * y;
   z_ = turned.head(m);
   rest_ = turned.tail(Z.rows() - m).squaredNorm();
 }
@@ -45,14 +45,32 @@ LinearGaussian::Evidence LinearGaussian::evidence(const Eigen::VectorXd& prior, 
   return e;
 }
 
-LinearGaussian::Posterior LinearGaussian::posterior(const Eigen::VectorXd& prior, double noise) const {
-  // Information form, scaled by the prior: no difference of large and small variances.
+/// Scaled by the prior: no difference of large and small variances.
+struct LinearGaussian::Information {
+  Eigen::VectorXd root;
+  Eigen::MatrixXd scaled;
+  Eigen::LLT<Eigen::MatrixXd> llt;
+};
+
+LinearGaussian::Information LinearGaussian::information(const Eigen::VectorXd& prior, double noise) const {
   const Eigen::VectorXd root = prior.cwiseSqrt();
   const Eigen::MatrixXd scaled = R_ * root.asDiagonal() / std::sqrt(noise);
   const Eigen::Index n = R_.cols();
   Eigen::MatrixXd information = Eigen::MatrixXd::Identity(n, n);
   information.selfadjointView<Eigen::Lower>().rankUpdate(scaled.transpose());
-  const Eigen::LLT<Eigen::MatrixXd> llt(information);
+  return {root, scaled, Eigen::LLT<Eigen::MatrixXd>(information)};
+}
+
+Eigen::MatrixXd LinearGaussian::response(const Eigen::VectorXd& prior, double noise,
+                                         const Eigen::MatrixXd& rows) const {
+  const auto [root, scaled, llt] = information(prior, noise);
+  const Eigen::MatrixXd turned = qr_.householderQ().adjoint() * rows;
+  return root.asDiagonal() * llt.solve(scaled.transpose() * (turned.topRows(R_.rows()) / std::sqrt(noise)));
+}
+
+LinearGaussian::Posterior LinearGaussian::posterior(const Eigen::VectorXd& prior, double noise) const {
+  const auto [root, scaled, llt] = information(prior, noise);
+  const Eigen::Index n = R_.cols();
   Posterior p;
   const Eigen::MatrixXd inverse = llt.solve(Eigen::MatrixXd::Identity(n, n));
   p.covariance = root.asDiagonal() * inverse * root.asDiagonal();

@@ -232,6 +232,38 @@ RigidTransform inverse(const RigidTransform& T) {
   return {T.R.transpose(), -(T.R.transpose() * T.t_m)};
 }
 
+std::optional<Expansion> expansion_of(const Calibrator& c, const ObserveOptions& options) {
+  if (!c.expansivity || !options.artefact_temperature) {
+    return std::nullopt;
+  }
+  return Expansion{c.expansivity->alpha_per_K, c.expansivity->u_alpha_per_K,
+                   options.artefact_temperature->temperature_K,
+                   options.artefact_temperature->u_temperature_K};
+}
+
+Result<void> check_temperature(const Calibrator& c, const ObserveOptions& options) {
+  const auto& given = options.artefact_temperature;
+  if (given && !(given->temperature_K > 0.0 && std::isfinite(given->temperature_K) &&
+                 given->u_temperature_K >= 0.0 && std::isfinite(given->u_temperature_K))) {
+    return failure(ErrorCode::BadInput, message("temperature of the array: ", given->temperature_K,
+                                                " K, u = ", given->u_temperature_K, " K"));
+  }
+  if (c.expansivity && !given) {
+    return failure(
+        ErrorCode::BadInput,
+        message("calibrator \"", c.name, "\" says how the array grows, but nothing says how warm it was"));
+  }
+  if (given && !c.expansivity) {
+    return failure(ErrorCode::BadInput, message("the temperature of the array is given, but calibrator \"",
+                                                c.name, "\" does not say how it grows"));
+  }
+  return {};
+}
+
+Calibrator at_the_machine(const Calibrator& c, const std::optional<Expansion>& expansion) {
+  return expansion ? grown(c, *expansion) : c;
+}
+
 /// Of a calibrator that has passed check().
 RigidTransform pre_to_uniform(const Calibrator& c) {
   return inverse(*uniform_frame(c.balls.front().centre_m, c.blocks[0].normal, c.blocks[1].normal));
@@ -303,11 +335,12 @@ std::size_t Observations::positions() const {
   return count;
 }
 
-Result<SeenArtefact> see_artefact(int position, std::span<const Touch> touches, const Calibrator& c,
+Result<SeenArtefact> see_artefact(int position, std::span<const Touch> touches, const Calibrator& at_20_C,
                                   const ObserveOptions& options) {
-  if (Result<void> sound = check(c); !sound) {
+  if (Result<void> sound = check(at_20_C); !sound) {
     return tl::unexpected(sound.error());
   }
+  const Calibrator c = at_the_machine(at_20_C, expansion_of(at_20_C, options));
   Touched touched;
   for (const Touch& touch : touches) {
     touched[{touch.feature, touch.number}].push_back(touch.p_m);
@@ -315,11 +348,16 @@ Result<SeenArtefact> see_artefact(int position, std::span<const Touch> touches, 
   return see(position, touched, c, pre_to_uniform(c), options);
 }
 
-Result<Observations> observe(std::span<const Touch> touches, const Calibrator& c, const Machine& machine,
-                             const ObserveOptions& options) {
-  if (Result<void> sound = check(c); !sound) {
+Result<Observations> observe(std::span<const Touch> touches, const Calibrator& at_20_C,
+                             const Machine& machine, const ObserveOptions& options) {
+  if (Result<void> sound = check(at_20_C); !sound) {
     return tl::unexpected(sound.error());
   }
+  if (Result<void> known = check_temperature(at_20_C, options); !known) {
+    return tl::unexpected(known.error());
+  }
+  const std::optional<Expansion> expansion = expansion_of(at_20_C, options);
+  const Calibrator c = at_the_machine(at_20_C, expansion);
   const Result<std::map<int, Touched>> positions = by_position(touches, options);
   if (!positions) {
     return tl::unexpected(positions.error());
@@ -327,6 +365,7 @@ Result<Observations> observe(std::span<const Touch> touches, const Calibrator& c
   Observations o;
   o.machine = machine;
   o.order = options.order;
+  o.artefact = uncertainty_of(c, expansion);
   for (const auto& [position, touched] : *positions) {
     Result<SeenArtefact> seen = see(position, touched, c, pre_to_uniform(c), options);
     if (!seen) {

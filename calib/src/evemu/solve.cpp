@@ -69,6 +69,10 @@ MeanRotation set_gauge(const FitProblem& problem, Fit& fit) {
   }
   fit.c_m = T * fit.c_m;
   fit.covariance_m2 = T * fit.covariance_m2 * T.transpose();
+  if (fit.artefact_m.cols() > 0) {
+    const Eigen::MatrixXd off_m = T * fit.artefact_m;
+    fit.covariance_m2 += off_m * off_m.transpose();
+  }
   if (!rotation.referenced) {
     fit.covariance_m2 += G * rotation.cov_rad2 * G.transpose();
   }
@@ -222,6 +226,7 @@ Result<Solution> solve(const Observations& o, const SolveOptions& options) {
                         .residuals_m = by_ball(residuals),
                         .pose_rotations_rad = fit->pose_rotations_rad,
                         .rotation = rotation,
+                        .artefact = o.artefact,
                         .statistics = statistics};
       });
 }

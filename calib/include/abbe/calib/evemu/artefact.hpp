@@ -6,10 +6,12 @@
 
 #include <Eigen/Core>
 #include <array>
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
 
+#include "abbe/calib/environment/thermal_expansion.hpp"
 #include "abbe/calib/fit/plane.hpp"
 #include "abbe/calib/fit/sphere.hpp"
 #include "abbe/calib/geometry.hpp"
@@ -26,17 +28,44 @@ struct Calibrator {
   struct Block {
     int number = 0;
     Vector3 normal = Vector3::UnitZ();  ///< outward
-    double u_rad = 0.0;
+    double u_rad = 0.0;                 ///< standard uncertainty of its direction, about each axis across it
+  };
+  struct Expansivity {
+    double alpha_per_K = 0.0;
+    double u_alpha_per_K = 0.0;
   };
   std::string name;
   double tip_radius_m = 0.0;
-  std::vector<Ball> balls;    ///< 1, 2, 3 ... in this order
-  std::vector<Block> blocks;  ///< 1 and 2
+  std::vector<Ball> balls;                   ///< 1, 2, 3 ... in this order, at 20 C
+  std::vector<Block> blocks;                 ///< 1 and 2
+  std::optional<Expansivity> expansivity{};  ///< none: nobody says how it grows
 };
 
 /// BadInput / NotFinite / DegenerateGeometry: numbers that are not 1, 2, 3 .., fewer than 4 balls, balls on a
 /// line, two balls in one place, other than two blocks, normals parallel.
 [[nodiscard]] Result<void> check(const Calibrator&);
+
+/// How warm the array is where it is touched.
+struct ArtefactTemperature {
+  double temperature_K = kReferenceTemperature_K;
+  double u_temperature_K = 0.0;  ///< standard uncertainty
+};
+
+/// The array at a temperature: centres about Ball1, and radii; directions stay.
+[[nodiscard]] Calibrator grown(const Calibrator&, const Expansion&);
+
+/// What is uncertain of the array itself, alike at all positions.
+struct ArtefactUncertainty {
+  std::vector<double> u_ball_m;          ///< of the centres, per coordinate, by ball
+  std::array<double, 2> u_block_rad{};   ///< as Calibrator::Block::u_rad
+  double cosine_between_blocks = 0.0;    ///< n1 . n2
+  std::optional<Expansion> expansion{};  ///< none: the array counts as at 20 C
+  /// Relative, of all its lengths: of the expansion.
+  [[nodiscard]] double u_scale() const;
+  /// Nothing is stated: the array counts as exact.
+  [[nodiscard]] bool none() const;
+};
+[[nodiscard]] ArtefactUncertainty uncertainty_of(const Calibrator&, const std::optional<Expansion>&);
 
 enum class Feature { Ball, Block };
 

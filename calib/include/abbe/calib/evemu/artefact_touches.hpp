@@ -49,7 +49,8 @@ struct ArtefactPlan {
 
 /// What the touches of a machine with the uncertainty `u_position_m` say: precalibrated(), its uncertainties
 /// widened by what the machine adds to every touch alike ([GUM] 5.1.2 eq. (10)): u to a centre, u over the
-/// half size of a face to its direction.
+/// half size of a face to its direction. How the array grows is nominal's. The machine must have measured it
+/// at 20 C, or have corrected what it reports.
 [[nodiscard]] Result<Calibrator> calibrated_artefact(const Calibrator& nominal,
                                                      const std::array<FaceToTouch, 2>& faces,
                                                      std::span<const Touch> touches, double u_position_m);

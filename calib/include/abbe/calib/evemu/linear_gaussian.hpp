@@ -5,6 +5,7 @@
 /// One QR of [X S] turns an evaluation of the marginal likelihood from N^3 into (columns)^3, with gradient.
 
 #include <Eigen/Core>
+#include <Eigen/QR>
 #include <span>
 
 namespace abbe::calib::evemu {
@@ -34,7 +35,15 @@ class LinearGaussian {
   };
   [[nodiscard]] Posterior posterior(const Eigen::VectorXd& prior, double noise_variance) const;
 
+  /// What the mean would be with each column of `rows` (whitened) in the place of y: the mean is linear in y.
+  [[nodiscard]] Eigen::MatrixXd response(const Eigen::VectorXd& prior, double noise_variance,
+                                         const Eigen::MatrixXd& rows) const;
+
  private:
+  struct Information;
+  [[nodiscard]] Information information(const Eigen::VectorXd& prior, double noise_variance) const;
+
+  Eigen::HouseholderQR<Eigen::MatrixXd> qr_;
   Eigen::MatrixXd R_;  ///< [X S] = Q R
   Eigen::VectorXd z_;  ///< Q^T y
   double rest_ = 0.0;  ///< |y|^2 - |z|^2, what no column reaches

@@ -11,6 +11,7 @@
 
 #include <Eigen/Core>
 #include <cstddef>
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
@@ -52,6 +53,8 @@ struct ObserveOptions {
   double max_ball1_shift_m = 1e-3;
   /// Thinnest against largest extent of all balls. Below, the third axis is not tested.
   double least_thickness = 1e-3;
+  /// Where the calibrator says how the array grows, and only there.
+  std::optional<ArtefactTemperature> artefact_temperature{};
 };
 
 /// Where the direction of the artefact came from. Blocks: the machine itself measured it, a rotation common
@@ -62,19 +65,21 @@ struct Observations {
   Machine machine;
   int order = 3;
   RotationOrigin rotation = RotationOrigin::Blocks;
-  std::vector<BallError> rows;        ///< by position, then ball; every position has Ball1
-  std::vector<SeenArtefact> seen;     ///< by position; empty when only errors were given
-  Vector3 ball1_m = Vector3::Zero();  ///< mean reading
+  std::vector<BallError> rows;                    ///< by position, then ball; every position has Ball1
+  std::vector<SeenArtefact> seen;                 ///< by position; empty when only errors were given
+  Vector3 ball1_m = Vector3::Zero();              ///< mean reading
+  std::optional<ArtefactUncertainty> artefact{};  ///< none when only errors were given
   [[nodiscard]] std::size_t positions() const;
 };
 
 /// Everything wrong with the touches is said by position and number, and named: TooFewObservations (points on
 /// a ball or block, a ball, block or position left out), BadInput (a ball touched under two numbers, blocks
-/// swapped, calibrator of another artefact or balls numbered differently, Ball1 moved), DegenerateGeometry
-/// (all balls in one plane).
+/// swapped, calibrator of another artefact or balls numbered differently, Ball1 moved; a temperature without
+/// an expansivity, or one without the other), DegenerateGeometry (all balls in one plane). With both, the
+/// array is taken as it is at that temperature.
 [[nodiscard]] Result<Observations> observe(std::span<const Touch>, const Calibrator&, const Machine&,
                                            const ObserveOptions& = {});
-/// One position alone, by the same rules.
+/// One position alone, by the same rules; without a temperature at 20 C, whatever the calibrator says.
 [[nodiscard]] Result<SeenArtefact> see_artefact(int position, std::span<const Touch> touches_of_it,
                                                 const Calibrator&, const ObserveOptions& = {});
 /// observe() from errors that were computed elsewhere; block rotations are then unknown.

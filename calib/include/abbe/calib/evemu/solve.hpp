@@ -8,10 +8,13 @@
 ///   lasso, mcp, scad  as in [Li OMM]: plain monomials in mm, ncvreg's semantics, lambda and gamma by
 ///              cross-validation; covariance by bootstrap (see CovarianceKind).
 /// Not estimable from touches: a rotation of V about Ball1 common to all positions (observe.hpp). It is set
-/// to what the blocks say (gauge Ball1-blocks), and its uncertainty is in the covariance. Also not in the
-/// covariance: that hyper-parameters are estimates (of nearly coplanar positions, a twentieth of the tilt of
-/// [Li OMM], the likelihood can take slopes of V for pose rotations), that a machine is no polynomial, and
-/// errors of the calibrator that all positions share.
+/// to what the blocks say (gauge Ball1-blocks), and its uncertainty is in the covariance. So are errors of
+/// the array that all positions share (artefact_rows.hpp): estimates are c = K y with the hyper-parameters
+/// fixed, which makes T (K A)(K A)^T T^T of them ([GUM] 5.1.2 eq. (10)), T: gauge; the bootstrap draws them
+/// once a run. The array is not estimated: c is the same whatever its uncertainty. What its errors leave in
+/// the residuals is in s and w as well and counts twice. Not in the covariance: that hyper-parameters are
+/// estimates (of nearly coplanar positions, a twentieth of the tilt of [Li OMM], the likelihood can take
+/// slopes of V for pose rotations), and that a machine is no polynomial.
 
 #include <cstddef>
 #include <cstdint>
@@ -121,6 +124,7 @@ struct Solution {
   std::vector<Vector3> residuals_m;
   std::vector<Vector3> pose_rotations_rad;  ///< estimated, by position; empty where not modelled
   MeanRotation rotation;
+  std::optional<ArtefactUncertainty> artefact;  ///< as observed; in the model's covariance
   Statistics statistics;
 };
 

@@ -1,0 +1,77 @@
+#include "abbe/calib/evemu/artefact_rows.hpp"
+
+#include <Eigen/Dense>
+#include <cmath>
+#include <functional>
+#include <vector>
+
+namespace abbe::calib::evemu {
+namespace {
+
+/// What an error of the array does to ball i (from 0) at a, both in the uniform frame.
+using Effect = std::function<Vector3(std::size_t ball, const Vector3& from_ball1_m)>;
+
+/// A turn d of the uniform frame turns what is carried into it the other way.
+Effect turned_by(const Vector3& d_rad) {
+  return [d_rad](std::size_t, const Vector3& a_m) -> Vector3 { return -d_rad.cross(a_m); };
+}
+
+void add_balls(const ArtefactUncertainty& u, std::vector<Effect>& effects) {
+  for (std::size_t b = 0; b < u.u_ball_m.size(); ++b) {
+    if (u.u_ball_m[b] == 0.0) {
+      continue;
+    }
+    for (Eigen::Index axis = 0; axis < 3; ++axis) {
+      const Vector3 delta_m = u.u_ball_m[b] * Vector3::Unit(axis);
+      effects.push_back([b, delta_m](std::size_t ball, const Vector3&) -> Vector3 {
+        const double share = (ball == b ? 1.0 : 0.0) - (b == 0 ? 1.0 : 0.0);
+        return share * delta_m;
+      });
+    }
+  }
+}
+
+/// uniform_frame(): z = n1, x = n2 x z / sine, so n2 = sine y + cosine z. A change of n1 by e turns z by
+/// z x e, and x by what it does to n2 x n1.
+void add_blocks(const ArtefactUncertainty& u, std::vector<Effect>& effects) {
+  const double cosine = u.cosine_between_blocks, sine = std::sqrt(1.0 - cosine * cosine);
+  const auto& [u1_rad, u2_rad] = u.u_block_rad;
+  if (u1_rad > 0.0) {
+    effects.push_back(turned_by({0.0, u1_rad, u1_rad * cosine / sine}));
+    effects.push_back(turned_by({-u1_rad, 0.0, 0.0}));
+  }
+  if (u2_rad > 0.0) {
+    effects.push_back(turned_by({0.0, 0.0, -u2_rad / sine}));
+  }
+}
+
+std::vector<Effect> effects_of(const ArtefactUncertainty& u) {
+  std::vector<Effect> effects;
+  add_balls(u, effects);
+  add_blocks(u, effects);
+  if (const double u_scale = u.u_scale(); u_scale > 0.0) {
+    effects.push_back([u_scale](std::size_t, const Vector3& a_m) -> Vector3 { return u_scale * a_m; });
+  }
+  return effects;
+}
+
+}  // namespace
+
+Eigen::MatrixXd artefact_rows(const Observations& o) {
+  const std::vector<Effect> effects = o.artefact ? effects_of(*o.artefact) : std::vector<Effect>{};
+  const auto columns = static_cast<Eigen::Index>(effects.size());
+  Eigen::MatrixXd A = Eigen::MatrixXd::Zero(static_cast<Eigen::Index>(3 * o.rows.size()), columns);
+  Eigen::Index row = 0;
+  for (const SeenArtefact& seen : o.seen) {
+    const Matrix3& R = seen.T_self_uni.R;
+    for (std::size_t b = 0; b < seen.balls.size(); ++b, row += 3) {
+      const Vector3 a_m = R.transpose() * (seen.ideal_m[b] - seen.ideal_m.front());
+      for (Eigen::Index k = 0; b > 0 && k < columns; ++k) {
+        A.block<3, 1>(row, k) = R * effects[static_cast<std::size_t>(k)](b, a_m);
+      }
+    }
+  }
+  return A;
+}
+
+}  // namespace abbe::calib::evemu

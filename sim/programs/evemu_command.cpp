@@ -120,7 +120,8 @@ Result<void> write_files(const EvemuOptions& options, const LoadedSetup& setup, 
   const auto write = [](const std::string& file, const auto& text) -> Result<void> {
     return file.empty() ? Result<void>{} : write_file(file, text());
   };
-  return write(options.calibrator_out, [&] { return format_calibrator_toml(array); })
+  return write(options.calibrator_out,
+               [&] { return format_calibrator_toml(reference_ball_array(), setup.array); })
       .and_then([&] { return write(options.truth_out, [&] { return truth_csv(truth, array); }); })
       .and_then([&] {
         return write(options.reference_out, [&] {
@@ -145,7 +146,7 @@ void narrate(const Simulation& simulation, HostTime now, double speed, int& said
 int run(const EvemuOptions& options) {
   auto setup = load(options);
   if (!setup) return report(setup.error());
-  const BallArray array = reference_ball_array();
+  const BallArray array = as_it_is(reference_ball_array(), setup->array);
   if (const auto written = write_files(options, *setup, array); !written) return report(written.error());
   const TruthMachine& truth = setup->simulation.truth;
   const TouchingProgram program = plan_touching(truth, array, setup->touching);
@@ -157,9 +158,7 @@ int run(const EvemuOptions& options) {
   const EventLoop loop(setup->speed);
   auto simulation = Simulation::open(setup->simulation, loop.clock().now());
   if (!simulation) return report(simulation.error());
-  Ports ports;
-  for (const UsbipServer& card : (*simulation)->counter_cards()) ports.usbip.push_back(card.port());
-  if (const auto announced = announce_ports(ports, options.ports_file); !announced)
+  if (const auto announced = announce_ports(ports_of(**simulation), options.ports_file); !announced)
     return report(announced.error());
   fmt::print(stderr, "{} touches{}\n", program.moves.size(),
              options.start_on_signal ? ", begin on SIGUSR1" : ", begin once the card is read");

@@ -8,6 +8,18 @@
 
 namespace abbe::sim {
 
+Ports ports_of(Simulation& simulation, const std::string& can_interface) {
+  Ports ports;
+  if (simulation.tracker()) ports.tracker = simulation.tracker()->port();
+  ports.can_interface = can_interface;
+  if (simulation.bus() && can_interface.empty()) ports.can = simulation.bus()->port();
+  for (const ModbusServer& server : simulation.environment())
+    ports.environment.push_back({server.name(), server.where(), server.port(), server.path()});
+  if (simulation.measuring_machine()) ports.cmm = simulation.measuring_machine()->port();
+  for (const UsbipServer& card : simulation.counter_cards()) ports.usbip.push_back(card.port());
+  return ports;
+}
+
 Result<void> announce_ports(const Ports& ports, const std::string& path) {
   std::string lines;
   if (ports.tracker) lines += fmt::format("tracker_port={}\n", *ports.tracker);

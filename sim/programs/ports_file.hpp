@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "abbe/sim/error.hpp"
+#include "abbe/sim/simulation.hpp"
 
 namespace abbe::sim {
 
@@ -28,6 +29,9 @@ struct Ports {
   std::optional<std::uint16_t> cmm;
   std::string can_interface;  ///< SocketCAN; no port then
 };
+
+/// Where the devices of a simulation listen; encoders on `can_interface` if it has a name.
+[[nodiscard]] Ports ports_of(Simulation& simulation, const std::string& can_interface = {});
 
 /// The file is there before anything is printed. Empty path: no file.
 [[nodiscard]] Result<void> announce_ports(const Ports& ports, const std::string& path);

@@ -71,18 +71,6 @@ class Narrator {
   int drawn_ = -1;
 };
 
-Ports ports_of(Simulation& simulation, const std::string& can_interface) {
-  Ports ports;
-  if (simulation.tracker()) ports.tracker = simulation.tracker()->port();
-  ports.can_interface = can_interface;
-  if (simulation.bus() && can_interface.empty()) ports.can = simulation.bus()->port();
-  for (const ModbusServer& server : simulation.environment())
-    ports.environment.push_back({server.name(), server.where(), server.port(), server.path()});
-  if (simulation.measuring_machine()) ports.cmm = simulation.measuring_machine()->port();
-  for (const UsbipServer& card : simulation.counter_cards()) ports.usbip.push_back(card.port());
-  return ports;
-}
-
 int run(const RunOptions& options) {
   const auto setup = load_setup(options.choices);
   if (!setup) return report(setup.error());

@@ -220,6 +220,16 @@ void read_sim_evemu(TomlSection section, LoadedSetup& setup) {
   section.refuse_unknown_keys();
 }
 
+/// The array that is touched then, against what its calibrator.toml says.
+void read_ball_array(TomlSection section, ArrayState& array) {
+  section.number("temperature_C", array.temperature_C, 1.0, {-50.0, 100.0});
+  section.number("alpha_um_per_m_K", array.alpha_per_K, kMicro, {-50.0, 50.0});
+  section.number("u_alpha_um_per_m_K", array.u_alpha_per_K, kMicro, {0.0, 50.0});
+  section.number("u_ball_um", array.u_ball_m, kMicro, kNotNegativeNumber);
+  section.number("u_block_urad", array.u_block_rad, kMicro, kNotNegativeNumber);
+  section.refuse_unknown_keys();
+}
+
 /// The tables the daemon reads too. Keys that only it knows are none of ours.
 void read_machine_tables(TomlSection root, Draft& draft) {
   SimulationSetup& simulation = draft.setup.simulation;
@@ -356,6 +366,7 @@ void read_sim(TomlSection sim, const std::string& file, Draft& draft) {
   read_environment(sim, simulation.environment);
   read_sim_counter_card(sim.child("counter_card"), simulation);
   read_sim_evemu(sim.child("evemu"), draft.setup);
+  read_ball_array(sim.child("ball_array"), draft.setup.array);
   read_probe(sim.child("probe"), simulation);
   std::string artefact;
   read_sim_cmm(sim.child("cmm"), simulation, artefact);
@@ -455,6 +466,7 @@ Result<void> make_path(const Draft& draft, PathPlan& path) {
 void share_seed_and_speed(Draft& draft) {
   SimulationSetup& simulation = draft.setup.simulation;
   simulation.tracker->model.seed = static_cast<std::uint64_t>(draft.seed);
+  draft.setup.array.seed = static_cast<std::uint64_t>(draft.seed);
   simulation.bus->speed = draft.setup.speed;
   for (EncoderNodeOptions& node : simulation.nodes) {
     node.seed = static_cast<std::uint64_t>(draft.seed);

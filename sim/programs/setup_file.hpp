@@ -7,6 +7,7 @@
 #include <optional>
 #include <string>
 
+#include "abbe/sim/ball_array.hpp"
 #include "abbe/sim/simulation.hpp"
 #include "abbe/sim/touching.hpp"
 #include "abbe/sim/weak_stiffness.hpp"
@@ -40,6 +41,7 @@ struct LoadedSetup {
   SimulationSetup simulation;
   TouchingOptions touching;             ///< [sim.evemu]
   WeakStiffnessOptions weak_stiffness;  ///< [sim.evemu]
+  ArrayState array;                     ///< [sim.ball_array]
   double speed = 1.0;
 };
 

@@ -2,15 +2,35 @@
 
 #include <fmt/format.h>
 
+#include <cstdint>
 #include <iterator>
 #include <numbers>
 
+#include "abbe/sim/noise.hpp"
 #include "units.hpp"
 
 namespace abbe::sim {
 namespace {
 
 using Eigen::Vector3d;
+
+constexpr double kUmPerM = 1e6;
+constexpr double kReference_C = 20.0;
+
+/// The errors of one array, in the order they are asked for.
+class ArrayErrors {
+ public:
+  explicit ArrayErrors(std::uint64_t seed) : seed_(seed) {}
+  double number(double u) { return u * gaussian(seed_, NoiseStream::Artefact, next_++); }
+  Vector3d vector(double u) {
+    const double x = number(u), y = number(u), z = number(u);
+    return {x, y, z};
+  }
+
+ private:
+  std::uint64_t seed_;
+  std::uint64_t next_ = 0;
+};
 
 }  // namespace
 
@@ -55,21 +75,45 @@ std::vector<Eigen::Isometry3d> reference_positions() {
   return positions;
 }
 
-std::string format_calibrator_toml(const BallArray& array) {
+BallArray as_it_is(const BallArray& stated, const ArrayState& state) {
+  ArrayErrors errors(state.seed);
+  BallArray array = stated;
+  for (ArrayBall& ball : array.balls) ball.centre_m += errors.vector(state.u_ball_m);
+  for (ArrayFace& face : array.faces) {
+    // What turns it about its own normal changes nothing.
+    const Vector3d turn = errors.vector(state.u_block_rad);
+    for (Vector3d* direction : {&face.normal, &face.half_1_m, &face.half_2_m})
+      *direction = Eigen::AngleAxisd(turn.norm(), turn.stableNormalized()) * *direction;
+  }
+  const double alpha_per_K = state.alpha_per_K + errors.number(state.u_alpha_per_K);
+  const double growth = 1.0 + alpha_per_K * (state.temperature_C - kReference_C);
+  for (ArrayBall& ball : array.balls) {
+    ball.centre_m *= growth;
+    ball.radius_m *= growth;
+  }
+  for (ArrayFace& face : array.faces) face.centre_m *= growth;
+  return array;
+}
+
+std::string format_calibrator_toml(const BallArray& array, const ArrayState& state) {
   std::string text = fmt::format("[calibrator]\nname = \"{}\"\ntip_radius_mm = {:.17g}\n", array.name,
                                  kMmPerM * array.tip_radius_m);
   const auto out = std::back_inserter(text);
+  if (state.alpha_per_K != 0.0)
+    fmt::format_to(out, "alpha_um_per_m_K = {:.17g}\nu_alpha_um_per_m_K = {:.17g}\n",
+                   kUmPerM * state.alpha_per_K, kUmPerM * state.u_alpha_per_K);
   for (std::size_t i = 0; i < array.balls.size(); ++i) {
     const Vector3d mm = kMmPerM * array.balls[i].centre_m;
     fmt::format_to(out,
                    "\n[[ball]]\nnumber = {}\nx_mm = {:.17g}\ny_mm = {:.17g}\nz_mm = {:.17g}\n"
-                   "radius_mm = {:.17g}\nu_um = 0\n",
-                   i + 1, mm.x(), mm.y(), mm.z(), kMmPerM * array.balls[i].radius_m);
+                   "radius_mm = {:.17g}\nu_um = {:.17g}\n",
+                   i + 1, mm.x(), mm.y(), mm.z(), kMmPerM * array.balls[i].radius_m,
+                   kUmPerM * state.u_ball_m);
   }
   for (std::size_t i = 0; i < array.faces.size(); ++i) {
     const Vector3d& n = array.faces[i].normal;
-    fmt::format_to(out, "\n[[block]]\nnumber = {}\nnormal = [{:.17g}, {:.17g}, {:.17g}]\nu_urad = 0\n", i + 1,
-                   n.x(), n.y(), n.z());
+    fmt::format_to(out, "\n[[block]]\nnumber = {}\nnormal = [{:.17g}, {:.17g}, {:.17g}]\nu_urad = {:.17g}\n",
+                   i + 1, n.x(), n.y(), n.z(), kUmPerM * state.u_block_rad);
   }
   return text;
 }

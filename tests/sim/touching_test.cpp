@@ -3,6 +3,8 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cmath>
+#include <string>
 
 #include "abbe/sim/weak_stiffness.hpp"
 
@@ -86,6 +88,54 @@ TEST(BallArray, StandsOnItsFirstBallAtEveryPosition) {
         (T_machine_array * reference_ball_array().balls.front().centre_m - Eigen::Vector3d(-0.09, 0.14, 0.03))
             .norm(),
         1e-15);
+}
+
+TEST(BallArray, IsAsStatedUnlessToldOtherwise) {
+  const BallArray stated = reference_ball_array(), is = as_it_is(stated, {});
+  for (std::size_t i = 0; i < stated.balls.size(); ++i) {
+    EXPECT_EQ(is.balls[i].centre_m, stated.balls[i].centre_m);
+    EXPECT_EQ(is.balls[i].radius_m, stated.balls[i].radius_m);
+  }
+  for (std::size_t i = 0; i < 2; ++i) {
+    EXPECT_EQ(is.faces[i].centre_m, stated.faces[i].centre_m);
+    EXPECT_EQ(is.faces[i].normal, stated.faces[i].normal);
+    EXPECT_EQ(is.faces[i].half_1_m, stated.faces[i].half_1_m);
+  }
+}
+
+TEST(BallArray, GrowsWithItsTemperature) {
+  const BallArray stated = reference_ball_array();
+  const BallArray warm = as_it_is(stated, {.temperature_C = 24.0, .alpha_per_K = 11.5e-6});
+  EXPECT_NEAR(warm.balls[5].centre_m.x() - stated.balls[5].centre_m.x(), 0.65 * 46e-6, 1e-15);
+  EXPECT_NEAR(warm.balls[5].radius_m / stated.balls[5].radius_m, 1.000046, 1e-15);
+  EXPECT_EQ(warm.faces[1].normal, stated.faces[1].normal);
+}
+
+TEST(BallArray, IsOffByWhatItsFileSays) {
+  const BallArray stated = reference_ball_array();
+  constexpr double kBall_m = 2e-6, kBlock_rad = 5e-6;
+  constexpr std::uint64_t kSeeds = 200;
+  double ball_m2 = 0.0, block_rad2 = 0.0;
+  for (std::uint64_t seed = 1; seed <= kSeeds; ++seed) {
+    const BallArray is = as_it_is(stated, {.u_ball_m = kBall_m, .u_block_rad = kBlock_rad, .seed = seed});
+    for (std::size_t i = 0; i < stated.balls.size(); ++i)
+      ball_m2 += (is.balls[i].centre_m - stated.balls[i].centre_m).squaredNorm() / (3.0 * 9.0 * kSeeds);
+    for (std::size_t i = 0; i < 2; ++i)
+      block_rad2 += (is.faces[i].normal - stated.faces[i].normal).squaredNorm() / (2.0 * 2.0 * kSeeds);
+  }
+  // 5400 and 800 numbers know a standard deviation to 1 and 2.5 %; four times that.
+  EXPECT_NEAR(std::sqrt(ball_m2) / kBall_m, 1.0, 0.04);
+  EXPECT_NEAR(std::sqrt(block_rad2) / kBlock_rad, 1.0, 0.1);
+}
+
+TEST(BallArray, StatesItsUncertaintyAndExpansionInItsFile) {
+  const auto text = format_calibrator_toml(
+      reference_ball_array(),
+      {.alpha_per_K = 12e-6, .u_alpha_per_K = 1e-6, .u_ball_m = 2e-6, .u_block_rad = 5e-6});
+  for (const char* line :
+       {"\nalpha_um_per_m_K = 12\n", "\nu_alpha_um_per_m_K = 1\n", "\nu_um = 2\n", "\nu_urad = 5\n"})
+    EXPECT_NE(text.find(line), std::string::npos) << line << text;
+  EXPECT_EQ(format_calibrator_toml(reference_ball_array()).find("alpha"), std::string::npos);
 }
 
 }  // namespace

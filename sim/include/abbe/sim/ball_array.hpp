@@ -5,6 +5,7 @@
 
 #include <Eigen/Geometry>
 #include <array>
+#include <cstdint>
 #include <string>
 #include <vector>
 
@@ -32,7 +33,20 @@ struct BallArray {
 /// T_machine_array of positions 1 to 8.
 [[nodiscard]] std::vector<Eigen::Isometry3d> reference_positions();
 
-/// calibrator.toml, as somebody measured it perfectly.
-[[nodiscard]] std::string format_calibrator_toml(const BallArray& array);
+/// How the array is against what its file says: at 20 C and as stated, unless told otherwise.
+struct ArrayState {
+  double temperature_C = 20.0;
+  double alpha_per_K = 0.0;  ///< 0: the file does not speak of it
+  double u_alpha_per_K = 0.0;
+  double u_ball_m = 0.0;     ///< of a centre, per coordinate
+  double u_block_rad = 0.0;  ///< of the direction of a face, about each axis across it
+  std::uint64_t seed = 1;
+};
+/// The array as it stands there: off what is stated by errors drawn with these uncertainties, and as long as
+/// its temperature makes it.
+[[nodiscard]] BallArray as_it_is(const BallArray& stated, const ArrayState& state);
+
+/// calibrator.toml of the array as stated.
+[[nodiscard]] std::string format_calibrator_toml(const BallArray& stated, const ArrayState& state = {});
 
 }  // namespace abbe::sim

@@ -18,6 +18,7 @@ enum class NoiseStream : std::uint64_t {
   Squareness,
   Backlash,
   Probe,
+  Artefact,
   Encoder = 1000,
   CounterCard = 2000,
 };

@@ -217,7 +217,7 @@ TEST_F(EvemuCli, IdentifiesFromARecordingAsFromTheTouchesInIt) {
   const auto recorded = nlohmann::json::parse(ran.out), read = nlohmann::json::parse(again.out);
   EXPECT_EQ(recorded["unknowns"], 31);
   EXPECT_EQ(recorded["observations"], read["observations"]);
-  // The calibrator file states uncertainties, the reference calibrator none; the fit knows neither.
+  // The calibrator file states uncertainties, the reference calibrator none: that is in the covariance alone.
   EXPECT_NEAR(recorded["residual_rms_after_um"].get<double>(), read["residual_rms_after_um"].get<double>(),
               1e-3);
   const auto inputs = nlohmann::json::parse(text_of(folder_ / "out/model.json"))["inputs"].dump();

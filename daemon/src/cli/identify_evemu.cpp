@@ -1,5 +1,6 @@
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <chrono>
 #include <cmath>
 #include <filesystem>
@@ -33,6 +34,8 @@ struct IdentifyEvemuArguments {
   std::string machine, touches, calibrator, errors, recording, reference, keep, out;
   std::optional<std::string> estimator, folds;  // these four: else what [evemu] says
   std::optional<int> order, positions;
+  std::optional<double> artefact_C;
+  double u_artefact_K = 0.0;
   double u_reference_um = 1.0;
   bool rotation_known = false, scales_corrected = false, accept_shape_only = false, json = false;
 };
@@ -53,10 +56,41 @@ struct Outcome {
   calib::Verdict verdict;
 };
 
+/// Without an option, what [evemu] says; a sensor's values are in no file.
+std::optional<evemu::ArtefactTemperature> artefact_temperature(const IdentifyEvemuArguments& arguments,
+                                                               const EvemuConfig& config) {
+  if (arguments.artefact_C)
+    return evemu::ArtefactTemperature{*arguments.artefact_C + kZeroCelsius_K, arguments.u_artefact_K};
+  if (config.artefact && !config.artefact->sensor)
+    return evemu::ArtefactTemperature{config.artefact->fixed_K, config.artefact->u_temperature_K};
+  return std::nullopt;
+}
+
+/// One without the other cannot be meant.
+Result<void> check_artefact(const IdentifyEvemuArguments& arguments, const evemu::Calibrator& calibrator,
+                            bool temperature_known) {
+  if (calibrator.expansivity && !temperature_known)
+    return fail(ErrorCode::BadInput,
+                fmt::format("{}: has alpha_um_per_m_K, but nothing says how warm the array was: give "
+                            "--artefact-C and --u-artefact-K (or [evemu] artefact_C and u_artefact_K in {})",
+                            arguments.calibrator, arguments.machine));
+  if (temperature_known && !calibrator.expansivity)
+    return fail(
+        ErrorCode::BadInput,
+        fmt::format("{}: [calibrator] needs alpha_um_per_m_K and u_alpha_um_per_m_K, for {} says how "
+                    "warm the array was",
+                    arguments.calibrator, arguments.artefact_C ? "--artefact-C" : "[evemu] artefact_C"));
+  return {};
+}
+
 Result<void> observe_touches(const IdentifyEvemuArguments& arguments, const evemu::Machine& machine,
                              const evemu::ObserveOptions& options, Input& input) {
   const auto calibrator = read_calibrator_toml(arguments.calibrator);
   if (!calibrator) return tl::make_unexpected(calibrator.error());
+  if (const auto fine =
+          check_artefact(arguments, calibrator->calibrator, options.artefact_temperature.has_value());
+      !fine)
+    return fine;
   const auto touches = read_touches_csv(arguments.touches);
   if (!touches) return tl::make_unexpected(touches.error());
   input.sources.insert(input.sources.end(), {touches->source, calibrator->source});
@@ -99,7 +133,8 @@ Result<Input> from_files(const IdentifyEvemuArguments& arguments) {
     return tl::make_unexpected(fine.error());
   const auto machine = evemu_machine(config->machine);
   if (!machine) return tl::make_unexpected(machine.error());
-  const auto options = observe_options(arguments, config->evemu, config->evemu.positions.size());
+  auto options = observe_options(arguments, config->evemu, config->evemu.positions.size());
+  options.artefact_temperature = artefact_temperature(arguments, config->evemu);
   const auto observe = arguments.touches.empty() ? observe_errors : observe_touches;
   if (const auto observed = observe(arguments, *machine, options, input); !observed)
     return tl::make_unexpected(observed.error());
@@ -135,9 +170,9 @@ Result<Input> from_recording(const IdentifyEvemuArguments& arguments) {
   if (!machine) return tl::make_unexpected(machine.error());
   const auto run = last_complete_run(*recording);
   if (!run) return tl::make_unexpected(run.error());
-  auto observed =
-      evemu::observe(run->touches, run->asked.calibrator, *machine,
-                     observe_options(arguments, recording->config.evemu, run->asked.plan.positions.size()));
+  auto options = observe_options(arguments, recording->config.evemu, run->asked.plan.positions.size());
+  options.artefact_temperature = run->artefact;
+  auto observed = evemu::observe(run->touches, run->asked.calibrator, *machine, options);
   if (!observed) return tl::make_unexpected(error_of(observed.error()));
   Input input{std::move(recording->config), {recording->source}, std::move(*observed), run->asked.reference};
   const auto entered = inputs_of(*run);
@@ -230,6 +265,26 @@ double u_rotation_urad(const evemu::Solution& solution) {
   return kUradPerRad * std::sqrt(solution.rotation.cov_rad2.trace() / 3.0);
 }
 
+nlohmann::json artefact_json(const evemu::ArtefactUncertainty& artefact) {
+  const auto most = [](const auto& u) { return *std::ranges::max_element(u); };
+  nlohmann::json object{{"u_ball_um", kUmPerM * most(artefact.u_ball_m)},
+                        {"u_block_urad", kUradPerRad * most(artefact.u_block_rad)}};
+  if (const auto& e = artefact.expansion)
+    object.update({{"temperature_C", e->temperature_K - kZeroCelsius_K},
+                   {"u_temperature_K", e->u_temperature_K},
+                   {"growth", calib::growth(*e)},
+                   {"u_growth", calib::u_growth(*e)}});
+  return object;
+}
+
+std::string artefact_text(const evemu::ArtefactUncertainty& artefact) {
+  const auto& e = artefact.expansion;
+  return e ? fmt::format(", at {:.3f} C (u = {:.3f} K) longer by {:.2f} um per metre (u = {:.2f})",
+                         e->temperature_K - kZeroCelsius_K, e->u_temperature_K,
+                         kUmPerM * (calib::growth(*e) - 1.0), kUmPerM * calib::u_growth(*e))
+           : ", counts as at 20 C";
+}
+
 void print_json(const Outcome& outcome, const ModelDocument& document, const std::filesystem::path& folder) {
   const auto& s = outcome.solution->statistics;
   const auto& held_out = outcome.verdict.held_out;
@@ -254,6 +309,7 @@ void print_json(const Outcome& outcome, const ModelDocument& document, const std
                         {"held_out_rms_before_um", held_out.no_compensation_rms_m * kUmPerM},
                         {"held_out_rms_after_um", held_out.candidate_rms_m * kUmPerM},
                         {"gate", verdict_json(outcome.verdict)}};
+  if (const auto& artefact = outcome.solution->artefact) object["artefact"] = artefact_json(*artefact);
   if (const auto& choice = outcome.solution->sparse)
     object["chosen"] = {{"lambda", choice->lambda.back()}, {"gamma", choice->gamma}};
   fmt::print("{}\n", object.dump(1));
@@ -264,7 +320,8 @@ void print_summary(const Outcome& outcome, const ModelDocument& document,
   const auto& s = outcome.solution->statistics;
   fmt::print("model       {}  ({} coefficients, tool and machine \"{}\")\n", model_id(document), s.unknowns,
              document.machine);
-  fmt::print("artefact    {} positions, {} ball centres\n", s.positions, s.balls);
+  fmt::print("artefact    {} positions, {} ball centres{}\n", s.positions, s.balls,
+             outcome.solution->artefact ? artefact_text(*outcome.solution->artefact) : "");
   fmt::print(
       "solution    {}: {} observations, rank {} of {}, condition {:.3g}, {:.1f} effective parameters\n",
       document.estimator, s.observations, s.rank, s.unknowns, s.condition, s.effective_parameters);
@@ -310,6 +367,14 @@ void add_options(CLI::App& command, IdentifyEvemuArguments& arguments) {
       "recorded configuration unless --machine is given");
   touches->needs(machine, calibrator);
   calibrator->needs(touches);
+  auto* artefact_C =
+      command.add_option("--artefact-C", arguments.artefact_C,
+                         "how warm the array was, where calibrator.toml has alpha_um_per_m_K;\n"
+                         "default: [evemu] artefact_C");
+  auto* u_artefact_K =
+      command.add_option("--u-artefact-K", arguments.u_artefact_K, "its standard uncertainty");
+  artefact_C->needs(calibrator, u_artefact_K)->check(CLI::Range(-50.0, 100.0));
+  u_artefact_K->needs(artefact_C)->check(CLI::Range(0.0, 50.0));
   errors->needs(machine)->excludes(touches);
   recording->excludes(touches)->excludes(errors);
   recording->excludes(add_scales_corrected(command, arguments.scales_corrected));

@@ -6,6 +6,7 @@
 #include "abbe/drivers/environment/known_maps.hpp"
 #include "config/message_bounds.hpp"
 #include "config/readers.hpp"
+#include "units.hpp"
 
 namespace abbe::daemon {
 
@@ -17,7 +18,6 @@ using drivers::modbus::RegisterType;
 using drivers::modbus::WordOrder;
 
 constexpr std::string_view kCustom = "custom";
-constexpr double kZeroCelsius_K = 273.15;
 
 /// The channel of a named temperature; a new name takes the next one.
 std::uint8_t channel_of(const std::string& name, Section& section, std::string_view key,

@@ -7,6 +7,7 @@
 #include "abbe/calib/evemu/scaled_design.hpp"
 #include "abbe/calib/evemu/solve.hpp"
 #include "config/readers.hpp"
+#include "units.hpp"
 
 namespace abbe::daemon {
 
@@ -28,6 +29,29 @@ void read_positions(Section& section, std::vector<int>& out) {
   for (const double position : given) out.push_back(static_cast<int>(position));
 }
 
+void read_artefact_temperature(Section& section, const std::vector<std::string>& temperatures,
+                               std::optional<ArtefactTemperatureConfig>& out) {
+  ArtefactTemperatureConfig artefact;
+  std::string sensor;
+  double fixed_C = 20.0;
+  const bool by_sensor = section.get("artefact_sensor", sensor);
+  const bool fixed = section.get("artefact_C", fixed_C, kPlain, {-50.0, 100.0});
+  const bool known = by_sensor || fixed;
+  const bool u = section.get("u_artefact_K", artefact.u_temperature_K, kPlain, {0.0, 50.0},
+                             known ? Need::Required : Need::Optional);
+  if (by_sensor && fixed) section.fault("artefact_C", "has no meaning with artefact_sensor");
+  if (u && !known) section.fault("u_artefact_K", "needs artefact_sensor or artefact_C");
+  if (by_sensor) {
+    const auto found = std::ranges::find(temperatures, sensor);
+    if (found == temperatures.end())
+      section.fault("artefact_sensor",
+                    fmt::format("no [[environment]] measures a temperature \"{}\"", sensor));
+    artefact.sensor = static_cast<std::uint8_t>(found - temperatures.begin());
+  }
+  artefact.fixed_K = fixed_C + kZeroCelsius_K;
+  if (known) out = artefact;
+}
+
 }  // namespace
 
 void read_evemu(Section& root, Config& out) {
@@ -46,6 +70,7 @@ void read_evemu(Section& root, Config& out) {
   section.get_integer("points_per_block", evemu.points_per_block,
                       static_cast<std::int64_t>(least.least_points_per_block), kMostPoints);
   section.get("longest_pause_s", evemu.longest_pause, kPlain, kPositive);
+  read_artefact_temperature(section, out.temperatures, evemu.artefact);
   section.close();
 }
 

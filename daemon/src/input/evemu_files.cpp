@@ -81,11 +81,23 @@ void read_blocks(Section& root, calib::evemu::Calibrator& out,
             [](const auto& a, const auto& b) { return a.number < b.number; });
 }
 
+void read_expansivity(Section& head, std::optional<calib::evemu::Calibrator::Expansivity>& out) {
+  calib::evemu::Calibrator::Expansivity given;
+  const bool alpha = head.get("alpha_um_per_m_K", given.alpha_per_K, kMicro, {-50.0, 50.0});
+  const bool u_alpha = head.get("u_alpha_um_per_m_K", given.u_alpha_per_K, kMicro, {0.0, 50.0});
+  if (alpha && u_alpha) out = given;
+  if (alpha && !head.has("u_alpha_um_per_m_K"))
+    head.fault("alpha_um_per_m_K", "needs u_alpha_um_per_m_K, too");
+  if (u_alpha && !head.has("alpha_um_per_m_K"))
+    head.fault("u_alpha_um_per_m_K", "needs alpha_um_per_m_K, too");
+}
+
 calib::evemu::Calibrator read_calibrator(Section& root, std::array<std::optional<BlockFace>, 2>& faces) {
   calib::evemu::Calibrator out;
   Section head = root.child("calibrator", Need::Required);
   head.get("name", out.name, Need::Required);
   head.get("tip_radius_mm", out.tip_radius_m, kMilli, kNotNegative, Need::Required);
+  read_expansivity(head, out.expansivity);
   head.close();
   read_balls(root, out);
   read_blocks(root, out, faces);
@@ -157,6 +169,9 @@ std::string calibrator_toml(const calib::evemu::Calibrator& calibrator,
   std::string out{comment};
   out += fmt::format("[calibrator]\nname = {}\ntip_radius_mm = {:.17g}\n",
                      nlohmann::json(calibrator.name).dump(), kMmPerM * calibrator.tip_radius_m);
+  if (const auto& grows = calibrator.expansivity)
+    out += fmt::format("alpha_um_per_m_K = {:.17g}\nu_alpha_um_per_m_K = {:.17g}\n",
+                       kUmPerM * grows->alpha_per_K, kUmPerM * grows->u_alpha_per_K);
   for (const auto& ball : calibrator.balls) {
     out += fmt::format("\n[[ball]]\nnumber = {}\n{}radius_mm = {:.17g}\nu_um = {:.3g}\n", ball.number,
                        place(ball.centre_m), kMmPerM * ball.radius_m, kUmPerM * ball.u_m);

@@ -35,7 +35,8 @@ ModelDocument evemu_document(const calib::evemu::Solution& solution, const Confi
           machine_hash(config),
           created,
           statistics(solution.statistics),
-          std::move(inputs)};
+          std::move(inputs),
+          solution.artefact ? solution.artefact->expansion : std::nullopt};
 }
 
 }  // namespace abbe::daemon

@@ -223,6 +223,16 @@ ModelStatistics read_statistics(Reader& in) {
   return s;
 }
 
+std::optional<calib::Expansion> read_artefact(Reader& in) {
+  const std::string path = "artefact";
+  if (!in.root().is_object() || !in.root().contains(path)) return std::nullopt;
+  const Json& artefact = in.root().at(path);
+  return calib::Expansion{in.number_of(artefact, path, "alpha_um_per_m_K", kMicroUnit),
+                          in.number_of(artefact, path, "u_alpha_um_per_m_K", kMicroUnit),
+                          in.number_of(artefact, path, "temperature_K", 0),
+                          in.number_of(artefact, path, "u_temperature_K", 0)};
+}
+
 std::vector<InputFile> read_inputs(Reader& in) {
   std::vector<InputFile> inputs;
   const Json* list = in.find(in.root(), "", "inputs");
@@ -247,13 +257,14 @@ Result<ModelDocument> read_document(Reader& in) {
   if (!model && !in.any()) in.fault("parameters", model.error().text);
   const auto statistics = read_statistics(in);
   const auto inputs = read_inputs(in);
+  const auto artefact = read_artefact(in);
   const auto method = in.text("method"), estimator = in.text("estimator"), machine = in.text("machine"),
              machine_hash = in.text("machine_hash"), hash = in.text("hash");
   if (model && !in.any() && hash != model_hash(*model, method))
     in.fault("hash", "is not the hash of the content: the file was changed or damaged");
   if (in.any()) return tl::make_unexpected(in.to_error());
-  return ModelDocument{std::move(*model), method,   estimator,  machine,
-                       machine_hash,      *created, statistics, inputs};
+  return ModelDocument{std::move(*model), method,     estimator, machine, machine_hash,
+                       *created,          statistics, inputs,    artefact};
 }
 
 }  // namespace

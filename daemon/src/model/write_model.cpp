@@ -114,6 +114,17 @@ void write_statistics(JsonText& out, const ModelStatistics& s) {
       residuals(s.before), residuals(s.after), s.iterations, JsonText::quoted(s.stop_reason)));
 }
 
+void write_artefact(JsonText& out, const calib::Expansion& artefact) {
+  out.key("artefact");
+  out.raw(fmt::format(
+      "{{\"temperature_K\": {}, \"u_temperature_K\": {}, \"alpha_um_per_m_K\": {}, \"u_alpha_um_per_m_K\": "
+      "{},\n"
+      "    \"growth\": {}, \"u_growth\": {}}}",
+      to_decimal(artefact.temperature_K, 0), to_decimal(artefact.u_temperature_K, 0),
+      to_decimal(artefact.alpha_per_K, kMicroUnit), to_decimal(artefact.u_alpha_per_K, kMicroUnit),
+      to_decimal(calib::growth(artefact), 0), to_decimal(calib::u_growth(artefact), 0)));
+}
+
 void write_inputs(JsonText& out, const std::vector<InputFile>& inputs) {
   out.key("inputs");
   out.raw("[");
@@ -146,6 +157,7 @@ std::string to_json(const ModelDocument& document) {
   else
     write_axes(out, model.layout());
   write_statistics(out, document.statistics);
+  if (document.artefact) write_artefact(out, *document.artefact);
   write_inputs(out, document.inputs);
   out.key("validity");
   out.raw(fmt::format("{{\"hull_mm\": {}}}", vectors_mm(model.validity().vertices_m())));

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <span>
 #include <vector>
 
 #include "abbe/daemon/html_report.hpp"
@@ -51,6 +52,35 @@ void add_rotation(HtmlReport& page, const evemu::Solution& solution) {
               {"rotation taken out of the estimate",
                fmt::format("{:.1f}, {:.1f}, {:.1f} urad", kUradPerRad * rotation.removed_rad.x(),
                            kUradPerRad * rotation.removed_rad.y(), kUradPerRad * rotation.removed_rad.z())}});
+}
+
+std::string range_text(std::span<const double> values, double per_si, const char* unit) {
+  const auto [least, most] = std::ranges::minmax(values);
+  return least == most ? fmt::format("{:.2f} {}", per_si * most, unit)
+                       : fmt::format("{:.2f} to {:.2f} {}", per_si * least, per_si * most, unit);
+}
+
+void add_array(HtmlReport& page, const evemu::ArtefactUncertainty& artefact) {
+  page.heading("The ball array");
+  page.paragraph(
+      "Its own errors are alike at all positions, no touch tells them from those of the machine. "
+      "They are in the model's covariance.");
+  std::vector<std::pair<std::string, std::string>> facts{
+      {"standard uncertainty of a ball centre, per coordinate", range_text(artefact.u_ball_m, kUmPerM, "um")},
+      {"of the direction of a block, about each axis across it",
+       range_text(artefact.u_block_rad, kUradPerRad, "urad")}};
+  if (const auto& e = artefact.expansion) {
+    facts.insert(facts.end(),
+                 {{"temperature", fmt::format("{:.3f} C, u = {:.3f} K", e->temperature_K - kZeroCelsius_K,
+                                              e->u_temperature_K)},
+                  {"thermal expansion", fmt::format("{:.2f} um/(m K), u = {:.2f}", kUmPerM * e->alpha_per_K,
+                                                    kUmPerM * e->u_alpha_per_K)},
+                  {"longer than at 20 C by the factor",
+                   fmt::format("{:.9f}, u = {:.2g}", calib::growth(*e), calib::u_growth(*e))}});
+  } else {
+    facts.emplace_back("temperature", "counts as 20 C");
+  }
+  page.facts(facts);
 }
 
 /// Components of all balls but Ball1, um.
@@ -198,6 +228,7 @@ std::string evemu_report(const ModelDocument& document, const evemu::Observation
   HtmlReport page(fmt::format("{}: calibration with a ball array", document.machine));
   add_verdict(page, verdict);
   add_rotation(page, solution);
+  if (solution.artefact) add_array(page, *solution.artefact);
   add_residuals(page, observations, solution);
   add_poses(page, solution);
   if (solution.sparse) add_choice(page, *solution.sparse);

@@ -29,7 +29,12 @@ json to_json(const evemu::Calibrator& c) {
         {{"number", b.number}, {"centre_m", xyz(b.centre_m)}, {"radius_m", b.radius_m}, {"u_m", b.u_m}});
   for (const auto& b : c.blocks)
     blocks.push_back({{"number", b.number}, {"normal", xyz(b.normal)}, {"u_rad", b.u_rad}});
-  return {{"name", c.name}, {"tip_radius_m", c.tip_radius_m}, {"balls", balls}, {"blocks", blocks}};
+  json out{{"name", c.name}, {"tip_radius_m", c.tip_radius_m}, {"balls", balls}, {"blocks", blocks}};
+  if (const auto& grows = c.expansivity) {
+    out["alpha_per_K"] = grows->alpha_per_K;
+    out["u_alpha_per_K"] = grows->u_alpha_per_K;
+  }
+  return out;
 }
 
 evemu::Calibrator calibrator_of(const json& object) {
@@ -41,6 +46,8 @@ evemu::Calibrator calibrator_of(const json& object) {
                        b.at("u_m").get<double>()});
   for (const json& b : object.at("blocks"))
     c.blocks.push_back({b.at("number").get<int>(), vector_of(b.at("normal")), b.at("u_rad").get<double>()});
+  if (object.contains("alpha_per_K"))
+    c.expansivity = {{object.at("alpha_per_K").get<double>(), object.at("u_alpha_per_K").get<double>()}};
   return c;
 }
 

@@ -45,6 +45,7 @@ EvemuAcquisition::EvemuAcquisition(EvemuRequest request, evemu::TouchGuide guide
                                    EvemuAcquisitionOptions options)
     : request_(std::move(request)),
       guide_(std::move(guide)),
+      thermometer_(options.artefact),
       from_(from),
       options_(std::move(options)),
       last_touch_(from) {
@@ -75,6 +76,13 @@ void EvemuAcquisition::take(const protocol::Snapshot& snapshot) {
   }
   if (const auto fault = fault_of(snapshot); !fault.empty()) return refuse(snapshot, fault);
   refused_in_a_row_ = 0;
+  if (!thermometer_.take(snapshot)) {
+    phase_ = Phase::Failed;
+    reason_ =
+        fmt::format("{} touch {}: the temperature \"{}\" of the array is not known: its device is silent",
+                    options_.device, snapshot.trigger.touch, options_.artefact_sensor);
+    return;
+  }
   const calib::Vector3 reading_m{snapshot.position[0], snapshot.position[1], snapshot.position[2]};
   for (const std::string& text : guide_.take(reading_m).notes) note(snapshot, text);
   if (guide_.taken() > 0 && phase_ == Phase::WaitingAtStart) phase_ = Phase::Running;
@@ -121,7 +129,7 @@ std::vector<std::string> EvemuAcquisition::take_notes() {
 }
 
 EvemuRun EvemuAcquisition::release() {
-  return {std::move(request_), guide_.touches()};
+  return {std::move(request_), guide_.touches(), thermometer_.over_the_run()};
 }
 
 }  // namespace abbe::daemon

@@ -1,5 +1,7 @@
 #include "abbe/daemon/evemu_identification.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <utility>
 
@@ -22,6 +24,26 @@ evemu::JudgeOptions judge_options(const Config& config) {
   return options;
 }
 
+/// One without the other cannot be meant.
+Result<void> check_temperature(const evemu::Calibrator& calibrator,
+                               const std::optional<ArtefactTemperatureConfig>& artefact) {
+  if (calibrator.expansivity && !artefact) {
+    return fail(
+        ErrorCode::Refused,
+        fmt::format("calibrate evemu: calibrator \"{}\" has alpha_um_per_m_K, but nothing says how warm "
+                    "the array is: add artefact_sensor or artefact_C, and u_artefact_K, to [evemu]",
+                    calibrator.name));
+  }
+  if (artefact && !calibrator.expansivity) {
+    return fail(
+        ErrorCode::Refused,
+        fmt::format("calibrate evemu: [evemu] {} says how warm the array is, but calibrator \"{}\" does "
+                    "not say how it grows: add alpha_um_per_m_K and u_alpha_um_per_m_K to its file",
+                    artefact->sensor ? "artefact_sensor" : "artefact_C", calibrator.name));
+  }
+  return {};
+}
+
 }  // namespace
 
 evemu::TouchPlan touch_plan(const EvemuConfig& config) {
@@ -32,6 +54,9 @@ EvemuAcquisitionOptions evemu_acquisition_options(const Config& config) {
   EvemuAcquisitionOptions options{.longest_pause = config.evemu.longest_pause};
   if (config.probe) options.device = config.probe->name;
   if (config.cmm) options.device = config.cmm->name;
+  options.artefact = config.evemu.artefact;
+  if (options.artefact && options.artefact->sensor)
+    options.artefact_sensor = config.temperatures[*options.artefact->sensor];
   // Marks find the same zero again, people only about.
   options.zero_is_lost_by_restart =
       config.probe && config.counter_card &&
@@ -51,6 +76,7 @@ Result<void> check_evemu(const EvemuRequest& request, const Config& config) {
                 "true): switch that off first, and say so in the configuration");
   }
   if (const auto machine = evemu_machine(config.machine); !machine) return tl::unexpected(machine.error());
+  if (auto fine = check_temperature(request.calibrator, config.evemu.artefact); !fine) return fine;
   const auto guide = evemu::TouchGuide::create(request.calibrator, request.plan);
   if (!guide) return fail(ErrorCode::BadInput, "calibrate evemu: " + guide.error().text);
   return {};
@@ -63,6 +89,7 @@ Result<EvemuCandidate> identify_touches(const EvemuRun& run, const Config& confi
   evemu::ObserveOptions observing;
   observing.order = config.evemu.order;
   observing.positions = static_cast<int>(run.asked.plan.positions.size());
+  observing.artefact_temperature = run.artefact;
   auto observations = evemu::observe(run.touches, run.asked.calibrator, *machine, observing);
   if (!observations) return tl::unexpected(error_of(observations.error()));
   const evemu::JudgeOptions judging = judge_options(config);

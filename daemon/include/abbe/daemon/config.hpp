@@ -285,6 +285,13 @@ struct GateConfig {
   [[nodiscard]] bool accepts(std::string_view name) const;
 };
 
+/// [evemu] artefact_sensor or artefact_C: how warm the ball array is while it is touched.
+struct ArtefactTemperatureConfig {
+  std::optional<std::uint8_t> sensor;  ///< index into Config::temperatures
+  double fixed_K = 293.15;             ///< without a sensor
+  double u_temperature_K = 0.0;        ///< standard: of the sensor, and of the array against it
+};
+
 /// [evemu]: calibration with a ball array.
 struct EvemuConfig {
   std::string estimator = "bayes-pose";  ///< one of calib::evemu::estimator()
@@ -294,6 +301,7 @@ struct EvemuConfig {
   std::size_t points_per_ball = 25;
   std::size_t points_per_block = 25;
   std::chrono::nanoseconds longest_pause{std::chrono::hours{1}};  ///< without a touch: the session ends
+  std::optional<ArtefactTemperatureConfig> artefact;              ///< none: the array counts as at 20 C
 };
 
 /// [control]

@@ -11,6 +11,7 @@
 
 #include "abbe/calib/evemu/touch_guide.hpp"
 #include "abbe/daemon/acquisition_phase.hpp"
+#include "abbe/daemon/artefact_thermometer.hpp"
 #include "abbe/daemon/error.hpp"
 #include "abbe/daemon/input_files.hpp"
 #include "abbe/protocol/samples.hpp"
@@ -34,6 +35,7 @@ struct EvemuRequest {
 struct EvemuRun {
   EvemuRequest asked;
   std::vector<calib::evemu::Touch> touches;
+  std::optional<calib::evemu::ArtefactTemperature> artefact;  ///< over the touches; none: nobody knows
 };
 
 struct EvemuAcquisitionOptions {
@@ -44,6 +46,10 @@ struct EvemuAcquisitionOptions {
   /// Host time without a touch that ends the run: the artefact is turned and clamped by hand in between.
   std::chrono::nanoseconds longest_pause = std::chrono::hours{1};
   std::size_t most_refused = 20;  ///< touches in a row that cannot be used; then the run ends
+  /// How warm the array is. A touch at which its sensor has no valid value ends the run: the model would need
+  /// it.
+  std::optional<ArtefactTemperatureConfig> artefact{};
+  std::string artefact_sensor{};  ///< its name
 };
 
 class EvemuAcquisition {
@@ -78,6 +84,7 @@ class EvemuAcquisition {
 
   EvemuRequest request_;
   calib::evemu::TouchGuide guide_;
+  ArtefactThermometer thermometer_;
   protocol::HostTime from_;
   EvemuAcquisitionOptions options_;
   Phase phase_ = Phase::WaitingAtStart;

@@ -37,8 +37,9 @@ struct BlockFace {
   double half_size_m = 5e-3;
 };
 
-/// calibrator.toml: `[calibrator] name, tip_radius_mm`; `[[ball]] number, x_mm, y_mm, z_mm, radius_mm, u_um`;
-/// `[[block]] number, normal, u_urad`, and where somebody is to touch it x_mm, y_mm, z_mm, half_size_mm.
+/// calibrator.toml, at 20 C: `[calibrator] name, tip_radius_mm, alpha_um_per_m_K, u_alpha_um_per_m_K` (both
+/// or none); `[[ball]] number, x_mm, y_mm, z_mm, radius_mm, u_um`; `[[block]] number, normal, u_urad`, and
+/// where somebody is to touch it x_mm, y_mm, z_mm, half_size_mm. u: standard uncertainties, 0 if left out.
 struct CalibratorFile {
   InputFile source;
   calib::evemu::Calibrator calibrator;

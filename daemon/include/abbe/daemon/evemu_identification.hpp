@@ -22,7 +22,8 @@ struct EvemuCandidate {
                                                       const calib::VolumetricModel* active);
 
 [[nodiscard]] calib::evemu::TouchPlan touch_plan(const EvemuConfig& config);
-/// Refused or BadInput if no touches would come of it: no probe, or a machine that has corrected them.
+/// Refused or BadInput if no model would come of it: no probe, a machine that has corrected its positions, an
+/// array that grows nobody knows how far.
 [[nodiscard]] Result<void> check_evemu(const EvemuRequest& request, const Config& config);
 [[nodiscard]] EvemuAcquisitionOptions evemu_acquisition_options(const Config& config);
 

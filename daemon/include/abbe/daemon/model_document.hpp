@@ -4,10 +4,12 @@
 
 #include <cstddef>
 #include <filesystem>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
 
+#include "abbe/calib/environment/thermal_expansion.hpp"
 #include "abbe/calib/evemu/solve.hpp"
 #include "abbe/calib/otf/solve.hpp"
 #include "abbe/calib/volumetric_model.hpp"
@@ -49,6 +51,7 @@ struct ModelDocument {
   protocol::UtcTime created{};
   ModelStatistics statistics;
   std::vector<InputFile> inputs;
+  std::optional<calib::Expansion> artefact{};  ///< of a ball array that counts as warm
 };
 
 /// The document of an OTF solution.

@@ -4,7 +4,8 @@
 // of bayes-pose to that of ols, same seeds: 8 um white <= 0.80; with 0.15 mrad pose rotations <= 0.52;
 // near-planar layout with 0.32 mrad, where ols leaves points above 1: none above 1; full touch chain: rms
 // left after the best-fit rotation about Ball1 <= 0.07 mm (ols 0.23); coverage of 95 % intervals over 300
-// seeds 93 to 97 % per component; hyper-parameters and solution <= 0.1 s on one core.
+// seeds 93 to 97 % per component, and at least 93 % with an array that is uncertain (2 um, 5 urad, 0.5 K);
+// hyper-parameters and solution <= 0.1 s on one core.
 //
 //   bench_evemu_accuracy [seeds = 100] [coverage seeds = 300]
 
@@ -15,7 +16,7 @@
 #include <cstdlib>
 #include <ctime>
 
-#include "evemu_study.hpp"
+#include "evemu_artefact.hpp"
 
 namespace {
 using namespace abbe::calib;
@@ -134,16 +135,36 @@ struct Coverage {
   std::size_t all = 0;
 };
 
-template <class Machine>
-void coverage(const char* what, const Machine& machine_of, const Noise& noise, unsigned seeds, bool asked) {
+/// Leaves the array as it is.
+struct ExactArray {
+  Observations operator()(Observations o, const Layout&, unsigned) const { return o; }
+};
+
+/// 2 um per ball coordinate, 5 urad per block, 0.5 K of steel, drawn anew for every seed; `stated`: the
+/// covariance is told.
+struct UncertainArray {
+  bool stated_too = true;
+  Observations operator()(Observations o, const Layout& layout, unsigned seed) const {
+    const Calibrator c = stated(reference_calibrator(), 2e-6, 5e-6);
+    ArtefactUncertainty u = uncertainty_of(c, Expansion{.alpha_per_K = 11.5e-6, .u_temperature_K = 0.5});
+    std::mt19937_64 random(seed + 5000);
+    const Calibrator found = drawn(c, u.u_scale(), random);
+    if (!stated_too) u = uncertainty_of(reference_calibrator(), std::nullopt);
+    return with_array(std::move(o), layout, found, u);
+  }
+};
+
+template <class Machine, class Array = ExactArray>
+void coverage(const char* what, const Machine& machine_of, const Noise& noise, unsigned seeds, bool asked,
+              const Array& array = {}, double most_percent = 97.0) {
   const Layout layout = reference_layout();
   std::array<Coverage, 3> found;
   const std::array<Estimator, 3> estimators{Estimator::Ols, Estimator::Ridge, Estimator::BayesPose};
   for (unsigned seed = 1; seed <= seeds; ++seed) {
     const Field V = machine_of(seed);
-    const Observations o = simulated(layout, V, noise, seed + 1000);
+    const Observations o = array(simulated(layout, V, noise, seed + 1000), layout, seed);
     for (std::size_t e = 0; e < estimators.size(); ++e) {
-      const Solution s = *solve(o, {.estimator = estimators[e]});
+      const Solution s = *solve(o, {.estimator = estimators[e], .use_touches = false});
       const std::vector<Vector3> grid = evaluation_grid(s.model.validity(), layout);
       for (std::size_t i = seed % 29; i < grid.size(); i += 29) {
         const VolumetricError at = s.model.error_at(grid[i], Vector3::Zero());
@@ -163,12 +184,12 @@ void coverage(const char* what, const Machine& machine_of, const Noise& noise, u
     for (const std::size_t in : found[e].in) {
       const double percent = 100.0 * static_cast<double>(in) / static_cast<double>(found[e].all);
       std::printf("  %5.2f %%", percent);
-      covered = covered && percent >= 93.0 && percent <= 97.0;
+      covered = covered && percent >= 93.0 && percent <= most_percent;
     }
     std::printf("\n");
   }
   constexpr unsigned kEnough = 300;  // with fewer, 2 % are chance
-  ask(!asked || covered || seeds < kEnough, "bayes covers 93 to 97 %");
+  ask(!asked || covered || seeds < kEnough, "bayes covers 93 % and not too much");
 }
 
 /// A machine out of the prior bayes-pose believes in.
@@ -237,6 +258,10 @@ int main(int argc, char** argv) {
   coverage(
       "Table 3, 8 um, 0.15 mrad", [](unsigned) { return table3_machine(); }, {8e-6, 0.15e-3}, coverage_seeds,
       false);
+  // What the array leaves in the residuals is in s and w, too, and counts twice: more than 95 %, never less.
+  coverage("prior machine, 3 um, uncertain array", drawn_machine, {3e-6, 0.0}, coverage_seeds, true,
+           UncertainArray{}, 100.0);
+  coverage("the same, not stated", drawn_machine, {3e-6, 0.0}, coverage_seeds, false, UncertainArray{false});
   coverage("Table 3 + sag + pitch, 8 um", imperfect_machine, {8e-6, 0.0}, coverage_seeds, false);
   return missed ? 1 : 0;
 }

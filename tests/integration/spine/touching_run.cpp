@@ -53,7 +53,38 @@ points_per_ball = 6
 points_per_block = 5
 )";
 
+constexpr const char* kWarmArray = R"([sim.ball_array]
+temperature_C = 23.4
+alpha_um_per_m_K = 11.5
+u_alpha_um_per_m_K = 0.5
+u_ball_um = 1
+u_block_urad = 3
+[[sim.environment]]
+name = "rtd"
+model = "zt2005_c8"
+input2_C = 23.4
+input2_swing = 0.05
+input2_swing_period_s = 120
+)";
+
+/// [evemu] comes right before it.
+constexpr const char* kSensor = R"(artefact_sensor = "array"
+u_artefact_K = 0.1
+[[environment]]
+name = "rtd"
+map = "icpdas-zt2005-c8"
+host = "127.0.0.1"
+port = {port}
+period_s = 0.5
+inputs = ["", "", "array"]
+)";
+
 }  // namespace
+
+void TouchingRun::warm_the_array() {
+  warm_ = true;
+  write("sim.toml", text_of(file("sim.toml")) + kWarmArray);
+}
 
 TouchingRun::TouchingRun() {
   write("machine.toml", fmt::format("{}{}", kMachine, kAxes));
@@ -70,16 +101,22 @@ void TouchingRun::start_touching_simulator(const std::vector<std::string>& more)
   simulator_ = start(std::move(command), "sim");
   ASSERT_TRUE(
       eventually([this] { return std::filesystem::exists(file("ports")) || !simulator_->running(); }));
-  const std::string ports = text_of(file("ports")), key = "usbip_port=";
-  const auto at = ports.find(key);
-  ASSERT_NE(at, std::string::npos) << simulator_->err();
-  usbip_port_ = std::stoi(ports.substr(at + key.size()));
+  const std::string ports = text_of(file("ports"));
+  const auto port = [&ports](const std::string& key) {
+    const auto at = ports.find(key);
+    return at == std::string::npos ? 0 : std::stoi(ports.substr(at + key.size()));
+  };
+  usbip_port_ = port("usbip_port=");
+  sensor_port_ = port("rtd_port=");
+  ASSERT_NE(usbip_port_, 0) << simulator_->err();
+  ASSERT_EQ(sensor_port_ != 0, warm_) << ports;
 }
 
 void TouchingRun::write_touching_configuration(const std::string& gate, const std::string& dds,
                                                const std::string& probe) const {
   write("abbed.toml", kMachine + fmt::format("port = {}\n", usbip_port_) + kAxes + probe + "[gate]\n" + gate +
-                          kEvemu + daemon_tables(dds));
+                          kEvemu + (warm_ ? fmt::format(kSensor, fmt::arg("port", sensor_port_)) : "") +
+                          daemon_tables(dds));
 }
 
 std::vector<std::string> TouchingRun::calibrate_command(const std::string& calibrator) const {

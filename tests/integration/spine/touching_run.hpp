@@ -14,6 +14,8 @@ namespace abbe::test {
 struct TouchingRun : Spine {
   TouchingRun();
 
+  /// Before the simulator starts: the array is warm and off what its file says, a sensor stands on it.
+  void warm_the_array();
   /// Few points: six a ball (two more than a sphere needs), five a block. `more`: options of abbe-sim evemu.
   void start_touching_simulator(const std::vector<std::string>& more = {});
   /// `gate`: lines of [gate]; `dds`: [dds] supervise.
@@ -31,7 +33,9 @@ struct TouchingRun : Spine {
   static constexpr const char* kProbe = "[probe]\ndelay_us = 5\njitter_us = 1\n";
 
  private:
+  bool warm_ = false;
   int usbip_port_ = 0;
+  int sensor_port_ = 0;
 };
 
 }  // namespace abbe::test

@@ -17,6 +17,7 @@ using testing::HasSubstr;
 
 struct WholeArray : TouchingRun {
   void start_everything() {
+    warm_the_array();
     ASSERT_NO_FATAL_FAILURE(start_touching_simulator());
 #ifdef ABBE_WITH_DDS
     write_touching_configuration(kAccepting, "child");
@@ -67,6 +68,14 @@ struct WholeArray : TouchingRun {
     EXPECT_TRUE(said["same_as_live"]) << said.dump(1);
   }
 
+  void expect_the_array_is_warm_in(const json& identified) const {
+    const json artefact = identified["artefact"];
+    EXPECT_NEAR(artefact["temperature_C"].get<double>(), 23.4, 0.05) << identified.dump(1);
+    EXPECT_GE(artefact["u_temperature_K"].get<double>(), 0.1);
+    EXPECT_NEAR(artefact["growth"].get<double>() - 1.0, 3.4 * 11.5e-6, 1e-6);
+    EXPECT_THAT(identified["gate"]["notes"].dump(), testing::Not(HasSubstr("20 C")));
+  }
+
   void expect_the_live_model_from(const std::string& recording, const std::string& live_id) const {
     const auto identified = run(
         {ABBE_PROGRAM, "identify", "evemu", "--recording", recording, "--json", "-o", file("identified")});
@@ -75,6 +84,7 @@ struct WholeArray : TouchingRun {
     ASSERT_TRUE(said.is_object()) << identified.out;
     EXPECT_EQ(said["id"], live_id);
     EXPECT_TRUE(said["gate"]["accepted"]) << said.dump(1);
+    expect_the_array_is_warm_in(said);
   }
 
   void expect_shape_only_without_acceptance() const {
@@ -92,6 +102,7 @@ struct WholeArray : TouchingRun {
 
 TEST_F(WholeArray, IsGuidedIdentifiedPublishedAndReplayedTheSame) {
   ASSERT_NO_FATAL_FAILURE(start_everything());
+  ASSERT_TRUE(eventually([this] { return samples("rtd") > 2; })) << status().dump(1);
   const auto calibrated = calibrate_touching();
   ASSERT_EQ(calibrated.code, 0) << calibrated.out << calibrated.err;
   EXPECT_EQ(session()["noted"], 0) << session().dump(1);
@@ -128,6 +139,18 @@ TEST_F(TouchingRun, SaysWhatIsMissedDoubledAndAstrayAndGoesOn) {
   EXPECT_THAT(notes.front(), HasSubstr("probe touch "));
   EXPECT_EQ(run({ABBE_PROGRAM, "calibrate", "evemu", "-c", file("abbed.toml"), "--cancel"}).code, 0);
   EXPECT_EQ(session()["state"], "refused");
+}
+
+TEST_F(TouchingRun, RefusesAnArrayThatGrowsWithoutAThermometer) {
+  ASSERT_NO_FATAL_FAILURE(start_touching_simulator());
+  write("grows.toml", std::regex_replace(text_of(file("calibrator.toml")), std::regex{"\\n\\n\\[\\[ball"},
+                                         "\nalpha_um_per_m_K = 12\nu_alpha_um_per_m_K = 1\n\n[[ball",
+                                         std::regex_constants::format_first_only));
+  write_touching_configuration();
+  ASSERT_NO_FATAL_FAILURE(start_abbed());
+  const auto refused = run(calibrate_command("grows.toml"));
+  EXPECT_EQ(refused.code, 5) << refused.out << refused.err;
+  EXPECT_THAT(refused.err, HasSubstr("add artefact_sensor or artefact_C, and u_artefact_K, to [evemu]"));
 }
 
 TEST_F(TouchingRun, RefusesTheCalibratorOfAnotherArtefactAtItsFirstBall) {

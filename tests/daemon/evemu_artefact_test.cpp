@@ -254,7 +254,11 @@ TEST(ArtefactConfiguration, NamesWhatCannotBeMeant) {
               HasSubstr("evemu.artefact_C: has no meaning with artefact_sensor"));
   EXPECT_THAT(faults_with("u_artefact_K = 0.2\n"),
               HasSubstr("evemu.u_artefact_K: needs artefact_sensor or artefact_C"));
-  EXPECT_THAT(faults_with("artefact_C = 400\nu_artefact_K = 0.2\n"), HasSubstr("evemu.artefact_C"));
+  EXPECT_THAT(
+      faults_with("artefact_C = 400\n"),
+      AllOf(HasSubstr("evemu.artefact_C: must be -50 to 100, not 400"), HasSubstr("u_artefact_K: missing")));
+  EXPECT_THAT(faults_with("artefact_sensor = 7\nu_artefact_K = 0.2\n"),
+              AllOf(HasSubstr("evemu.artefact_sensor: must be"), Not(HasSubstr("u_artefact_K"))));
 }
 
 const std::string kSensor = "artefact_sensor = \"plate\"\nu_artefact_K = 0.3\norder = 2\n";

@@ -34,20 +34,21 @@ void read_artefact_temperature(Section& section, const std::vector<std::string>&
   ArtefactTemperatureConfig artefact;
   std::string sensor;
   double fixed_C = 20.0;
-  const bool by_sensor = section.get("artefact_sensor", sensor);
-  const bool fixed = section.get("artefact_C", fixed_C, kPlain, {-50.0, 100.0});
+  const bool by_sensor = section.has("artefact_sensor"), fixed = section.has("artefact_C");
   const bool known = by_sensor || fixed;
-  const bool u = section.get("u_artefact_K", artefact.u_temperature_K, kPlain, {0.0, 50.0},
-                             known ? Need::Required : Need::Optional);
   if (by_sensor && fixed) section.fault("artefact_C", "has no meaning with artefact_sensor");
-  if (u && !known) section.fault("u_artefact_K", "needs artefact_sensor or artefact_C");
-  if (by_sensor) {
+  if (section.has("u_artefact_K") && !known)
+    section.fault("u_artefact_K", "needs artefact_sensor or artefact_C");
+  if (section.get("artefact_sensor", sensor)) {
     const auto found = std::ranges::find(temperatures, sensor);
     if (found == temperatures.end())
       section.fault("artefact_sensor",
                     fmt::format("no [[environment]] measures a temperature \"{}\"", sensor));
     artefact.sensor = static_cast<std::uint8_t>(found - temperatures.begin());
   }
+  section.get("artefact_C", fixed_C, kPlain, {-50.0, 100.0});
+  section.get("u_artefact_K", artefact.u_temperature_K, kPlain, {0.0, 50.0},
+              known ? Need::Required : Need::Optional);
   artefact.fixed_K = fixed_C + kZeroCelsius_K;
   if (known) out = artefact;
 }

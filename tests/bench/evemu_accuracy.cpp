@@ -4,7 +4,7 @@
 // of bayes-pose to that of ols, same seeds: 8 um white <= 0.80; with 0.15 mrad pose rotations <= 0.52;
 // near-planar layout with 0.32 mrad, where ols leaves points above 1: none above 1; full touch chain: rms
 // left after the best-fit rotation about Ball1 <= 0.07 mm (ols 0.23); coverage of 95 % intervals over 300
-// seeds 93 to 97 % per component, and at least 93 % with an array that is uncertain (2 um, 5 urad, 0.5 K);
+// seeds 93 to 97 % per component, also with an array that is uncertain (2 um, 5 urad, 0.5 K);
 // hyper-parameters and solution <= 0.1 s on one core.
 //
 //   bench_evemu_accuracy [seeds = 100] [coverage seeds = 300]
@@ -156,7 +156,7 @@ struct UncertainArray {
 
 template <class Machine, class Array = ExactArray>
 void coverage(const char* what, const Machine& machine_of, const Noise& noise, unsigned seeds, bool asked,
-              const Array& array = {}, double most_percent = 97.0) {
+              const Array& array = {}) {
   const Layout layout = reference_layout();
   std::array<Coverage, 3> found;
   const std::array<Estimator, 3> estimators{Estimator::Ols, Estimator::Ridge, Estimator::BayesPose};
@@ -184,12 +184,12 @@ void coverage(const char* what, const Machine& machine_of, const Noise& noise, u
     for (const std::size_t in : found[e].in) {
       const double percent = 100.0 * static_cast<double>(in) / static_cast<double>(found[e].all);
       std::printf("  %5.2f %%", percent);
-      covered = covered && percent >= 93.0 && percent <= most_percent;
+      covered = covered && percent >= 93.0 && percent <= 97.0;
     }
     std::printf("\n");
   }
   constexpr unsigned kEnough = 300;  // with fewer, 2 % are chance
-  ask(!asked || covered || seeds < kEnough, "bayes covers 93 % and not too much");
+  ask(!asked || covered || seeds < kEnough, "bayes covers 93 to 97 %");
 }
 
 /// A machine out of the prior bayes-pose believes in.
@@ -258,9 +258,9 @@ int main(int argc, char** argv) {
   coverage(
       "Table 3, 8 um, 0.15 mrad", [](unsigned) { return table3_machine(); }, {8e-6, 0.15e-3}, coverage_seeds,
       false);
-  // What the array leaves in the residuals is in s and w, too, and counts twice: more than 95 %, never less.
-  coverage("prior machine, 3 um, uncertain array", drawn_machine, {3e-6, 0.0}, coverage_seeds, true,
-           UncertainArray{}, 100.0);
+  // What the array leaves in the residuals is in s and w, too, and counts twice: rather more than 95 %.
+  coverage("prior machine, uncertain array", drawn_machine, {3e-6, 0.0}, coverage_seeds, true,
+           UncertainArray{});
   coverage("the same, not stated", drawn_machine, {3e-6, 0.0}, coverage_seeds, false, UncertainArray{false});
   coverage("Table 3 + sag + pitch, 8 um", imperfect_machine, {8e-6, 0.0}, coverage_seeds, false);
   return missed ? 1 : 0;

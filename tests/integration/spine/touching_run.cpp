@@ -44,6 +44,8 @@ machine = "machine.toml"
 seed = 3
 speed = {speed}
 [sim.evemu]
+probing_mm_per_s = 20
+travel_mm_per_s = 500
 points_per_ball = 6
 points_per_block = 5
 )";

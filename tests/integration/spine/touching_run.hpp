@@ -30,7 +30,7 @@ struct TouchingRun : Spine {
   /// This machine has errors of 3.3 mm, and nobody references the array's rotation.
   static constexpr const char* kAccepting =
       "max_error_mm = 10\nmax_gradient = 0.5\naccept = [\"evemu-shape-only\"]\n";
-  static constexpr const char* kProbe = "[probe]\ndelay_us = 5\njitter_us = 1\n";
+  static constexpr const char* kProbe = "[probe]\ndelay_us = 5\njitter_us = 1\nmax_speed_mm_s = 25\n";
 
  private:
   bool warm_ = false;

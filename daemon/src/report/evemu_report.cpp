@@ -63,7 +63,7 @@ std::string range_text(std::span<const double> values, double per_si, const char
 void add_array(HtmlReport& page, const evemu::ArtefactUncertainty& artefact) {
   page.heading("The ball array");
   page.paragraph(
-      "Its own errors are alike at all positions, no touch tells them from those of the machine. "
+      "Its own errors are alike at all positions: no touch tells them from those of the machine. "
       "They are in the model's covariance.");
   std::vector<std::pair<std::string, std::string>> facts{
       {"standard uncertainty of a ball centre, per coordinate", range_text(artefact.u_ball_m, kUmPerM, "um")},

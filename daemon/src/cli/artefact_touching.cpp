@@ -1,7 +1,5 @@
 #include "cli/artefact_touching.hpp"
 
-#include <signal.h>
-
 #include <array>
 #include <chrono>
 #include <csignal>
@@ -9,6 +7,8 @@
 #include <thread>
 
 #include "abbe/daemon/control_protocol.hpp"
+#include "cli/daemon_socket.hpp"
+#include "cli/interruption.hpp"
 #include "cli/terminal.hpp"
 
 namespace abbe::daemon {
@@ -20,7 +20,6 @@ using nlohmann::json;
 using std::chrono::steady_clock;
 
 constexpr auto kLookAtTouches = 200ms;
-constexpr auto kPatienceWithoutDaemon = 5s;
 
 json as_json(const std::vector<calib::Vector3>& way) {
   json places = json::array();
@@ -51,14 +50,6 @@ Touched touched(const json& answer, const evemu::ArtefactPlan& plan) {
   return out;
 }
 
-volatile std::sig_atomic_t interrupted = 0;  // written by the signal handler
-
-void end_touches_on_interrupt() {
-  struct sigaction end {};
-  end.sa_handler = [](int) { interrupted = 1; };
-  for (const int signal : {SIGINT, SIGTERM, SIGHUP, SIGQUIT}) ::sigaction(signal, &end, nullptr);
-}
-
 /// Whether the daemon heard it. That nothing is under way any more is as good.
 bool cancel(const std::filesystem::path& socket) {
   const auto answer = ask_daemon(socket, {{"do", "touch"}, {"cancel", true}});
@@ -70,7 +61,7 @@ Touched look_on(const std::filesystem::path& socket, const evemu::ArtefactPlan& 
   Touched so_far;
   bool told = false;
   for (auto answered = steady_clock::now();; std::this_thread::sleep_for(kLookAtTouches)) {
-    if (interrupted != 0 && !told) told = cancel(socket);
+    if (interrupted() && !told) told = cancel(socket);
     const auto answer = ask_daemon(socket, {{"do", "touches"}});
     if (!answer) {
       if (steady_clock::now() - answered < kPatienceWithoutDaemon) continue;
@@ -105,7 +96,7 @@ Result<calib::Vector3> machine_position(const std::filesystem::path& socket) {
 }
 
 Result<Touched> touch_artefact(const std::filesystem::path& socket, const evemu::ArtefactPlan& plan) {
-  end_touches_on_interrupt();
+  mark_interruptions({SIGINT, SIGTERM, SIGHUP, SIGQUIT});
   const auto started = ask_daemon(socket, as_json(plan));
   if (!started) {
     // An answer that did not come does not say that nothing was begun.

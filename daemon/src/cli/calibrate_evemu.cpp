@@ -16,7 +16,7 @@
 namespace abbe::daemon {
 namespace {
 
-struct Arguments {
+struct CalibrateEvemuArguments {
   FollowOptions follow;
   std::string calibrator, reference;
   double u_reference_um = 1.0;
@@ -24,7 +24,7 @@ struct Arguments {
 };
 
 /// The plan, where not said here, is the daemon's: left out.
-Result<nlohmann::json> task_of(const Arguments& arguments) {
+Result<nlohmann::json> task_of(const CalibrateEvemuArguments& arguments) {
   const auto calibrator = read_calibrator_toml(arguments.calibrator);
   if (!calibrator) return tl::make_unexpected(calibrator.error());
   EvemuRequest request{.calibrator = calibrator->calibrator, .sources = {calibrator->source}};
@@ -45,7 +45,7 @@ Result<nlohmann::json> task_of(const Arguments& arguments) {
   return task;
 }
 
-int calibrate(const Arguments& arguments) {
+int calibrate(const CalibrateEvemuArguments& arguments) {
   if (arguments.follow.cancel) return cancel_calibration(arguments.follow);
   if (arguments.calibrator.empty())
     return report({ErrorCode::Usage, "calibrate evemu: --calibrator is needed", {}});
@@ -56,7 +56,7 @@ int calibrate(const Arguments& arguments) {
 }  // namespace
 
 void add_calibrate_evemu(CLI::App& parent, int& exit) {
-  auto arguments = std::make_shared<Arguments>();
+  auto arguments = std::make_shared<CalibrateEvemuArguments>();
   auto* command = parent.add_subcommand(
       "evemu",
       "Local calibration with a ball array: says position by position what to touch next (ball 1,\n"

@@ -15,12 +15,12 @@
 namespace abbe::daemon {
 namespace {
 
-struct Arguments {
+struct CalibrateOtfArguments {
   FollowOptions follow;
   std::string path_file;
 };
 
-int calibrate(const Arguments& arguments) {
+int calibrate(const CalibrateOtfArguments& arguments) {
   if (arguments.follow.cancel) return cancel_calibration(arguments.follow);
   if (arguments.path_file.empty()) return report({ErrorCode::Usage, "calibrate otf: --path is needed", {}});
   const auto path = read_path_csv(arguments.path_file);
@@ -31,7 +31,7 @@ int calibrate(const Arguments& arguments) {
 }  // namespace
 
 void add_calibrate_otf(CLI::App& parent, int& exit) {
-  auto arguments = std::make_shared<Arguments>();
+  auto arguments = std::make_shared<CalibrateOtfArguments>();
   auto* command =
       parent.add_subcommand("otf",
                             "On the fly with a laser tracker: waits until the machine stands at "

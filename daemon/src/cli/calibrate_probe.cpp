@@ -28,7 +28,7 @@ using nlohmann::json;
 using protocol::ProbeTrigger;
 using protocol::TouchFlag;
 
-struct Arguments {
+struct CalibrateProbeArguments {
   std::string recording;
   std::uint32_t probe = 0;
   double sphere_radius_mm = 0.0;
@@ -42,7 +42,7 @@ bool usable(const ProbeTrigger& touch) {
   return (touch.touch_flags & kNotUsable) == 0 && has_linear_axes(touch);
 }
 
-Result<std::vector<calib::probe::RecordedTouch>> touches_of(const Arguments& arguments) {
+Result<std::vector<calib::probe::RecordedTouch>> touches_of(const CalibrateProbeArguments& arguments) {
   const auto recording = RecordingReader::open(arguments.recording);
   if (!recording) return tl::unexpected(recording.error());
   std::vector<calib::probe::RecordedTouch> touches;
@@ -119,7 +119,7 @@ int print_qualification(const calib::probe::Qualification& q, bool as_json) {
   return 0;
 }
 
-int calibrate(const Arguments& arguments) {
+int calibrate(const CalibrateProbeArguments& arguments) {
   const auto touches = touches_of(arguments);
   if (!touches) return report(touches.error());
   if (arguments.sphere_radius_mm > 0.0) {
@@ -137,7 +137,7 @@ int calibrate(const Arguments& arguments) {
 }  // namespace
 
 void add_calibrate_probe(CLI::App& parent, int& exit) {
-  auto arguments = std::make_shared<Arguments>();
+  auto arguments = std::make_shared<CalibrateProbeArguments>();
   auto* command = parent.add_subcommand(
       "probe",
       "A touch probe from recorded touches: its delay from one place touched at three feeds, or, with a "

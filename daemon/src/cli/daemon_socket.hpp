@@ -2,6 +2,7 @@
 /// How a command finds the running daemon: --socket, or the configuration that names it.
 
 #include <CLI/App.hpp>
+#include <chrono>
 #include <filesystem>
 #include <memory>
 #include <string>
@@ -9,6 +10,9 @@
 #include "abbe/daemon/error.hpp"
 
 namespace abbe::daemon {
+
+/// For so long whoever waits for something goes on asking a daemon that does not answer.
+inline constexpr std::chrono::seconds kPatienceWithoutDaemon{5};
 
 struct DaemonSocket {
   std::string socket = "/run/abbe/control.sock";

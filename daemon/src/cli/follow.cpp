@@ -1,13 +1,14 @@
 #include "cli/follow.hpp"
 
 #include <fmt/format.h>
-#include <signal.h>
 
 #include <chrono>
 #include <csignal>
 #include <thread>
 
 #include "abbe/daemon/control_protocol.hpp"
+#include "cli/daemon_socket.hpp"
+#include "cli/interruption.hpp"
 
 namespace abbe::daemon {
 namespace {
@@ -16,15 +17,6 @@ using namespace std::chrono_literals;
 using nlohmann::json;
 
 constexpr auto kLook = 200ms;  // how often a person's progress bar moves
-constexpr auto kPatienceWithoutDaemon = 5s;
-
-volatile std::sig_atomic_t interrupted = 0;  // written by the signal handler
-
-void leave_on_interrupt() {
-  struct sigaction leave {};
-  leave.sa_handler = [](int) { interrupted = 1; };
-  ::sigaction(SIGINT, &leave, nullptr);
-}
 
 int say_how_to_cancel(const Following& following) {
   constexpr int kInterrupted = 128 + SIGINT;  // what a shell reports
@@ -49,11 +41,11 @@ class SameDaemon {
 }  // namespace
 
 int follow(const Following& following, ProgressBar& bar) {
-  leave_on_interrupt();
+  mark_interruptions({SIGINT});
   SameDaemon same;
   auto answered = std::chrono::steady_clock::now();
   for (;; std::this_thread::sleep_for(kLook)) {
-    if (interrupted != 0) {
+    if (interrupted()) {
       bar.clear();
       return say_how_to_cancel(following);
     }

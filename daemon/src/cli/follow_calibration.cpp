@@ -18,7 +18,7 @@ namespace {
 
 using nlohmann::json;
 
-int print_verdict(const json& session, bool as_json) {
+int print_session_verdict(const json& session, bool as_json) {
   const std::string state = session["state"];
   // A session ends in a verdict; a daemon without one is not the one that was asked.
   if (state == "idle")
@@ -68,7 +68,7 @@ int follow_session(const std::filesystem::path& socket, const std::string& metho
     narrator.tell_notes(bar, session);
     if (state == "active" || state == "refused" || state == "idle") {
       bar.clear();
-      return print_verdict(session, as_json);
+      return print_session_verdict(session, as_json);
     }
     narrator.tell(bar, state, session["reason"]);
     bar.show(state, session["progress"].get<double>());

@@ -1,6 +1,7 @@
 #include "cli/identified_model.hpp"
 
 #include <fmt/format.h>
+#include <unistd.h>
 
 #include <nlohmann/json.hpp>
 #include <system_error>
@@ -66,11 +67,10 @@ nlohmann::json verdict_json(const calib::Verdict& verdict) {
 }
 
 void print_verdict(const calib::Verdict& verdict) {
-  constexpr int kGreen = 2, kYellow = 3, kStdout = 1;
   fmt::print("held out    {:.3f} um rms without compensation, {:.3f} um with the model\n",
              verdict.held_out.no_compensation_rms_m * kUmPerM, verdict.held_out.candidate_rms_m * kUmPerM);
-  fmt::print("gate        {}\n", verdict.accepted ? coloured("would accept", kGreen, kStdout)
-                                                  : coloured("would refuse", kYellow, kStdout));
+  fmt::print("gate        {}\n", verdict.accepted ? coloured("would accept", kGreen, STDOUT_FILENO)
+                                                  : coloured("would refuse", kYellow, STDOUT_FILENO));
   for (const auto& reason : verdict.reasons) fmt::print("            {}\n", reason);
   for (const auto& note : verdict.notes) fmt::print("note        {}\n", note);
 }

@@ -30,7 +30,7 @@ namespace otf = calib::otf;
 
 constexpr double kPpmPer1 = 1e6;
 
-struct Arguments {
+struct IdentifyOtfArguments {
   std::string machine, path, tracker, recording, keep, out;
   std::string estimator = "two-step";
   std::size_t block_samples = 0;      // 0: by travel
@@ -46,14 +46,14 @@ struct Files {
   std::vector<InputFile> sources;
 };
 
-struct Outcome {
+struct OtfOutcome {
   ModelDocument document;
   otf::Residuals residuals;
   calib::Verdict verdict;
   std::size_t blocks = 0, blocks_used = 0;
 };
 
-Result<Files> read_files(const Arguments& arguments, ProgressBar& bar) {
+Result<Files> read_files(const IdentifyOtfArguments& arguments, ProgressBar& bar) {
   auto config = load_config(arguments.machine);
   if (!config) return tl::make_unexpected(config.error());
   const auto hash = sha256_hex_of_file(arguments.machine);
@@ -86,20 +86,20 @@ protocol::UtcTime now() {
   return std::chrono::time_point_cast<std::chrono::nanoseconds>(std::chrono::system_clock::now());
 }
 
-Outcome outcome_of(OtfCandidate candidate, const Config& config, std::vector<InputFile> sources) {
+OtfOutcome outcome_of(OtfCandidate candidate, const Config& config, std::vector<InputFile> sources) {
   auto document = otf_document(candidate.solution, config, std::move(sources), now());
   const auto& s = candidate.solution.statistics;
   return {std::move(document), std::move(candidate.solution.residuals), std::move(candidate.verdict),
           s.blocks, s.blocks_used};
 }
 
-double u_scale(const Arguments& arguments, const Config& config) {
+double u_scale(const IdentifyOtfArguments& arguments, const Config& config) {
   if (arguments.u_scale_ppm) return *arguments.u_scale_ppm / kPpmPer1;
   return config.tracker ? config.tracker->u_scale : 0.0;
 }
 
-Result<Outcome> from_files(const Arguments& arguments, const std::optional<ModelDocument>& active,
-                           ProgressBar& bar) {
+Result<OtfOutcome> from_files(const IdentifyOtfArguments& arguments,
+                              const std::optional<ModelDocument>& active, ProgressBar& bar) {
   auto files = read_files(arguments, bar);
   if (!files) return tl::make_unexpected(files.error());
   if (const auto fine = check_scales("identify otf", "a path", files->config, arguments.scales_corrected);
@@ -137,8 +137,8 @@ Result<OtfCandidate> last_complete_run(ReplayReport replayed, const std::string&
   return fail(ErrorCode::DataInsufficient, fmt::format("{}: holds no complete calibration: {}", file, why));
 }
 
-Result<Outcome> from_recording(const Arguments& arguments, const std::optional<ModelDocument>& active,
-                               ProgressBar& bar) {
+Result<OtfOutcome> from_recording(const IdentifyOtfArguments& arguments,
+                                  const std::optional<ModelDocument>& active, ProgressBar& bar) {
   const auto recording = open_recording(arguments.recording, arguments.machine);
   if (!recording) return tl::make_unexpected(recording.error());
   const auto other = to_beat(active, recording->config);
@@ -152,14 +152,14 @@ Result<Outcome> from_recording(const Arguments& arguments, const std::optional<M
   return outcome_of(std::move(*candidate), recording->config, {recording->source});
 }
 
-Result<void> write_outputs(const std::filesystem::path& folder, const Outcome& outcome) {
+Result<void> write_outputs(const std::filesystem::path& folder, const OtfOutcome& outcome) {
   const ModelDocument& document = outcome.document;
   return write_results(folder, document,
                        {{"tables.csv", to_tables_csv(document.model)},
                         {"report.html", otf_report(document, outcome.residuals, outcome.verdict)}});
 }
 
-void print_json(const Outcome& outcome, const std::filesystem::path& folder) {
+void print_json(const OtfOutcome& outcome, const std::filesystem::path& folder) {
   const auto& s = outcome.document.statistics;
   const nlohmann::json object{
       {"model", (folder / "model.json").string()},
@@ -183,7 +183,7 @@ void print_json(const Outcome& outcome, const std::filesystem::path& folder) {
   fmt::print("{}\n", object.dump(1));
 }
 
-void print_summary(const Outcome& outcome, const std::filesystem::path& folder) {
+void print_summary(const OtfOutcome& outcome, const std::filesystem::path& folder) {
   const auto& s = outcome.document.statistics;
   fmt::print("model       {}  ({} tables, tool and machine \"{}\")\n", model_id(outcome.document),
              outcome.document.model.layout().tables().size(), outcome.document.machine);
@@ -197,14 +197,14 @@ void print_summary(const Outcome& outcome, const std::filesystem::path& folder) 
   fmt::print("written     {}, tables.csv, report.html\n", (folder / "model.json").string());
 }
 
-Result<Outcome> identify(const Arguments& arguments, ProgressBar& bar) {
+Result<OtfOutcome> identify(const IdentifyOtfArguments& arguments, ProgressBar& bar) {
   const auto active = active_model(arguments.keep);
   if (!active) return tl::make_unexpected(active.error());
   return arguments.recording.empty() ? from_files(arguments, *active, bar)
                                      : from_recording(arguments, *active, bar);
 }
 
-int run(const Arguments& arguments) {
+int run(const IdentifyOtfArguments& arguments) {
   ProgressBar bar;
   const auto outcome = identify(arguments, bar);
   bar.clear();
@@ -219,7 +219,7 @@ int run(const Arguments& arguments) {
 }  // namespace
 
 void add_identify_otf(CLI::App& parent, int& exit) {
-  auto arguments = std::make_shared<Arguments>();
+  auto arguments = std::make_shared<IdentifyOtfArguments>();
   auto* command = parent.add_subcommand(
       "otf",
       "From laser tracker points taken on the fly along a path.\n"

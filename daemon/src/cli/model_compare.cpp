@@ -8,6 +8,7 @@
 #include "abbe/calib/model_comparison.hpp"
 #include "abbe/daemon/otf_inputs.hpp"
 #include "cli/commands.hpp"
+#include "cli/figures.hpp"
 #include "cli/store_option.hpp"
 #include "cli/terminal.hpp"
 #include "units.hpp"
@@ -15,7 +16,7 @@
 namespace abbe::daemon {
 namespace {
 
-struct Arguments {
+struct ModelCompareArguments {
   std::string a, b;
   StoreOption store;
   bool json = false;
@@ -37,7 +38,7 @@ std::vector<calib::Vector3> common_points(const calib::VolumetricModel& a, const
   return points;
 }
 
-Result<Comparison> compare(const Arguments& arguments) {
+Result<Comparison> compare(const ModelCompareArguments& arguments) {
   const auto a = model_named(arguments.a, arguments.store);
   if (!a) return tl::make_unexpected(a.error());
   const auto b = model_named(arguments.b, arguments.store);
@@ -51,23 +52,19 @@ Result<Comparison> compare(const Arguments& arguments) {
   return Comparison{points.size(), *difference};
 }
 
-nlohmann::json figures(const calib::VectorStatistics& s) {
-  return {{"mean_um", s.mean_m * kUmPerM}, {"rms_um", s.rms_m * kUmPerM}, {"max_um", s.max_m * kUmPerM}};
-}
-
 void print(const char* what, const calib::VectorStatistics& s) {
   fmt::print("{:<24}  {:>9.3f}  {:>9.3f}  {:>9.3f}\n", what, s.mean_m * kUmPerM, s.rms_m * kUmPerM,
              s.max_m * kUmPerM);
 }
 
-int run(const Arguments& arguments) {
+int run(const ModelCompareArguments& arguments) {
   const auto found = compare(arguments);
   if (!found) return report(found.error());
   const auto& d = found->difference;
   if (arguments.json) {
     const nlohmann::json object{{"points", found->points},
-                                {"as_stated", figures(d.as_stated)},
-                                {"rigid_free", figures(d.rigid_free)}};
+                                {"as_stated", vector_figures(d.as_stated)},
+                                {"rigid_free", vector_figures(d.rigid_free)}};
     fmt::print("{}\n", object.dump(1));
     return 0;
   }
@@ -81,7 +78,7 @@ int run(const Arguments& arguments) {
 }  // namespace
 
 void add_model_compare(CLI::App& parent, int& exit) {
-  auto arguments = std::make_shared<Arguments>();
+  auto arguments = std::make_shared<ModelCompareArguments>();
   auto* command = parent.add_subcommand(
       "compare",
       "How far two models are apart at the nodes where both hold, for the tool of A; as they stand, and\n"

@@ -17,7 +17,7 @@ namespace abbe::daemon {
 
 namespace {
 
-struct Arguments {
+struct ModelEvalArguments {
   std::string model, points, tool;
   StoreOption store;
   bool correction = false;
@@ -44,7 +44,7 @@ Result<std::string> row(const calib::VolumetricModel& model, const AxisPosition&
   return text + (inside ? "1\n" : "0\n");
 }
 
-Result<std::string> evaluate(const Arguments& arguments) {
+Result<std::string> evaluate(const ModelEvalArguments& arguments) {
   const auto document = model_named(arguments.model, arguments.store);
   if (!document) return tl::make_unexpected(document.error());
   const auto points = read_points_csv(arguments.points);
@@ -63,7 +63,7 @@ Result<std::string> evaluate(const Arguments& arguments) {
   return text;
 }
 
-int run(const Arguments& arguments) {
+int run(const ModelEvalArguments& arguments) {
   const auto text = evaluate(arguments);
   if (!text) return report(text.error());
   if (std::fwrite(text->data(), 1, text->size(), stdout) != text->size() || std::fflush(stdout) != 0)
@@ -74,7 +74,7 @@ int run(const Arguments& arguments) {
 }  // namespace
 
 void add_model_eval(CLI::App& parent, int& exit) {
-  auto arguments = std::make_shared<Arguments>();
+  auto arguments = std::make_shared<ModelEvalArguments>();
   auto* command = parent.add_subcommand(
       "eval",
       "The volumetric error at given axis positions, as CSV on stdout.\n"

@@ -1,6 +1,7 @@
 /// `abbe model list|show|activate|rollback`: a machine's store of models.
 
 #include <fmt/format.h>
+#include <unistd.h>
 
 #include <chrono>
 #include <memory>
@@ -17,13 +18,13 @@ namespace abbe::daemon {
 
 namespace {
 
-struct Arguments {
+struct ModelStoreCommandsArguments {
   StoreOption store;
   std::string id, why;
   bool json = false, force = false;
 };
 
-StoreActor actor(const Arguments& arguments) {
+StoreActor actor(const ModelStoreCommandsArguments& arguments) {
   return {user_name(), arguments.why,
           std::chrono::time_point_cast<std::chrono::nanoseconds>(std::chrono::system_clock::now())};
 }
@@ -43,20 +44,19 @@ nlohmann::json to_json(const StoreEntry& entry) {
 }
 
 void print_table(const std::vector<StoreEntry>& entries) {
-  constexpr int kGreen = 2, kRed = 1, kStdout = 1;
   constexpr std::size_t kSeconds = 19;  // "2024-05-17T08:30:00"
   fmt::print("{:<16}  {:<19}  {:<6}  {:<20}  {}\n", "id", "added (UTC)", "method", "machine", "state");
   for (const auto& entry : entries) {
     auto state = state_of(entry);
-    if (entry.active) state = coloured(state, kGreen, kStdout);
-    if (!entry.fault.empty()) state = coloured(state, kRed, kStdout) + ": " + entry.fault;
+    if (entry.active) state = coloured(state, kGreen, STDOUT_FILENO);
+    if (!entry.fault.empty()) state = coloured(state, kRed, STDOUT_FILENO) + ": " + entry.fault;
     fmt::print("{:<16}  {:<19}  {:<6}  {:<20}  {}\n", entry.id, to_text(entry.added).substr(0, kSeconds),
                entry.method, entry.machine, state);
     for (const auto& reason : entry.reasons) fmt::print("{:18}{}\n", "", reason);
   }
 }
 
-int list(const Arguments& arguments) {
+int list(const ModelStoreCommandsArguments& arguments) {
   const auto store = open_store(arguments.store);
   if (!store) return report(store.error());
   const auto entries = store->list();
@@ -96,7 +96,7 @@ Result<StoreEntry> entry_of(const ModelStore& store, const std::string& id) {
   return fail(ErrorCode::Usage, fmt::format("model {}: not in the store", id));
 }
 
-int show(const Arguments& arguments) {
+int show(const ModelStoreCommandsArguments& arguments) {
   const auto store = open_store(arguments.store);
   if (!store) return report(store.error());
   const auto id = store->find(arguments.id);
@@ -113,7 +113,7 @@ int show(const Arguments& arguments) {
   return 0;
 }
 
-int activate(const Arguments& arguments) {
+int activate(const ModelStoreCommandsArguments& arguments) {
   auto store = open_store(arguments.store);
   if (!store) return report(store.error());
   const auto id = store->find(arguments.id);
@@ -124,7 +124,7 @@ int activate(const Arguments& arguments) {
   return 0;
 }
 
-int rollback(const Arguments& arguments) {
+int rollback(const ModelStoreCommandsArguments& arguments) {
   auto store = open_store(arguments.store);
   if (!store) return report(store.error());
   const auto id = store->rollback(actor(arguments));
@@ -136,7 +136,7 @@ int rollback(const Arguments& arguments) {
 }  // namespace
 
 void add_model_list(CLI::App& parent, int& exit) {
-  auto arguments = std::make_shared<Arguments>();
+  auto arguments = std::make_shared<ModelStoreCommandsArguments>();
   auto* command = parent.add_subcommand("list", "All models of the store, newest first");
   add_store_options(*command, arguments->store);
   command->add_flag("--json", arguments->json, "as a JSON array");
@@ -144,7 +144,7 @@ void add_model_list(CLI::App& parent, int& exit) {
 }
 
 void add_model_show(CLI::App& parent, int& exit) {
-  auto arguments = std::make_shared<Arguments>();
+  auto arguments = std::make_shared<ModelStoreCommandsArguments>();
   auto* command = parent.add_subcommand("show", "One model: where it came from, how good it is, its tables");
   command->add_option("ID", arguments->id, "id, the beginning of one, or \"active\"")->required();
   add_store_options(*command, arguments->store);
@@ -153,7 +153,7 @@ void add_model_show(CLI::App& parent, int& exit) {
 }
 
 void add_model_activate(CLI::App& parent, int& exit) {
-  auto arguments = std::make_shared<Arguments>();
+  auto arguments = std::make_shared<ModelStoreCommandsArguments>();
   auto* command =
       parent.add_subcommand("activate", "Make a model the active one; who did it and why is kept");
   command->add_option("ID", arguments->id, "id, or the beginning of one")->required();
@@ -169,7 +169,7 @@ void add_model_activate(CLI::App& parent, int& exit) {
 }
 
 void add_model_rollback(CLI::App& parent, int& exit) {
-  auto arguments = std::make_shared<Arguments>();
+  auto arguments = std::make_shared<ModelStoreCommandsArguments>();
   auto* command = parent.add_subcommand("rollback", "Go back to the model that was active before");
   add_store_options(*command, arguments->store);
   command->add_option("--why", arguments->why, "the reason, for the record");

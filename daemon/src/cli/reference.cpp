@@ -24,7 +24,7 @@ namespace {
 
 using nlohmann::json;
 
-struct Arguments {
+struct ReferenceArguments {
   DaemonSocket where;
   bool cancel = false;
   bool here = false;
@@ -48,7 +48,7 @@ std::string line_of(const json& axis) {
 }
 
 /// One line on stderr whenever there is news of an axis.
-class Narrator {
+class ReferenceNarrator {
  public:
   void tell(const json& reference) {
     for (const json& axis : reference["axes"]) {
@@ -75,7 +75,7 @@ int print_result(const json& reference, bool as_json) {
 
 int follow_search(const std::filesystem::path& socket, bool as_json) {
   ProgressBar no_bar{false};
-  Narrator narrator;
+  ReferenceNarrator narrator;
   const auto look = [&](const json& status) -> std::optional<int> {
     const json& found = status["reference"];
     if (!found["running"].get<bool>()) return print_result(found, as_json);
@@ -89,7 +89,7 @@ int follow_search(const std::filesystem::path& socket, bool as_json) {
                 no_bar);
 }
 
-int reference(const Arguments& arguments) {
+int reference(const ReferenceArguments& arguments) {
   const auto socket = socket_path(arguments.where);
   if (!socket) return report(socket.error());
   const auto answer = ask_daemon(*socket, {{"do", "reference"},
@@ -104,7 +104,7 @@ int reference(const Arguments& arguments) {
 }  // namespace
 
 void add_reference(CLI::App& parent, int& exit) {
-  auto arguments = std::make_shared<Arguments>();
+  auto arguments = std::make_shared<ReferenceArguments>();
   auto* command = parent.add_subcommand(
       "reference",
       "Find where the axes' counters began, from distance-coded marks: then drive each axis slowly over at\n"

@@ -21,7 +21,7 @@ namespace {
 
 using nlohmann::json;
 
-struct Arguments {
+struct ReplayArguments {
   std::string file;
   std::string config;
   bool raw = false;
@@ -30,7 +30,7 @@ struct Arguments {
   bool samples = false;
 };
 
-Result<Config> config_of(const Arguments& arguments, const RecordingReader& recording) {
+Result<Config> config_of(const ReplayArguments& arguments, const RecordingReader& recording) {
   if (!arguments.config.empty()) return load_config(arguments.config);
   return parse_config(recording.info().configuration, arguments.file + " (recorded configuration)");
 }
@@ -102,7 +102,7 @@ void print_json(const RecordingReader& recording, const ReplayReport& r, double 
 }
 
 /// With another configuration another model is what was asked for.
-int exit_code_of(const ReplayReport& report, const Arguments& arguments) {
+int exit_code_of(const ReplayReport& report, const ReplayArguments& arguments) {
   constexpr int kDone = 0, kNoAnswer = 1;
   const bool all_identified = std::all_of(report.calibrations.begin(), report.calibrations.end(),
                                           [](const auto& c) { return c.outcome && *c.outcome; });
@@ -110,7 +110,7 @@ int exit_code_of(const ReplayReport& report, const Arguments& arguments) {
   return all_identified && (!must_agree || same_as_live(report)) ? kDone : kNoAnswer;
 }
 
-int run(const Arguments& arguments) {
+int run(const ReplayArguments& arguments) {
   const auto start = std::chrono::steady_clock::now();
   const auto recording = RecordingReader::open(arguments.file);
   if (!recording) return report(recording.error());
@@ -141,7 +141,7 @@ int run(const Arguments& arguments) {
 }  // namespace
 
 void add_replay(CLI::App& parent, int& exit) {
-  auto arguments = std::make_shared<Arguments>();
+  auto arguments = std::make_shared<ReplayArguments>();
   auto* command = parent.add_subcommand(
       "replay",
       "A recording once more: the same snapshots, the same model.\n"

@@ -19,10 +19,6 @@ namespace {
 
 using nlohmann::json;
 
-constexpr int kRed = 1;
-constexpr int kGreen = 2;
-constexpr int kYellow = 3;
-
 int colour_of_model(const std::string& state) {
   if (state == "ACTIVE") return kGreen;
   return state == "INVALID" ? kRed : kYellow;

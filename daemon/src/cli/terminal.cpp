@@ -27,7 +27,6 @@ std::string coloured(std::string_view text, int colour, int fd) {
 }
 
 int report(const Error& error) {
-  constexpr int kRed = 1;
   fmt::print(stderr, "abbe: {} {}\n", coloured("error:", kRed, STDERR_FILENO), error.text);
   for (const auto& line : error.details) fmt::print(stderr, "  {}\n", line);
   return exit_code(error.code);

@@ -12,8 +12,9 @@ namespace abbe::daemon {
 /// A terminal that shows colours, and nobody set NO_COLOR (no-color.org).
 [[nodiscard]] bool shows_colour(int fd);
 
-/// `text` in a colour, or plain where the terminal would show it as garbage. ANSI colour 1 red, 2 green, 3
-/// yellow.
+inline constexpr int kRed = 1, kGreen = 2, kYellow = 3;  // as ANSI counts colours
+
+/// `text` in a colour, or plain where the terminal would show it as garbage.
 [[nodiscard]] std::string coloured(std::string_view text, int colour, int fd);
 
 /// "abbe: error: ..." and the details, one a line, on stderr; returns the exit code.

@@ -1,7 +1,6 @@
 #include "cli/verification_points.hpp"
 
 #include <fmt/format.h>
-#include <signal.h>
 
 #include <chrono>
 #include <csignal>
@@ -11,6 +10,7 @@
 #include "abbe/daemon/control_protocol.hpp"
 #include "abbe/daemon/replay.hpp"
 #include "abbe/daemon/verification_service.hpp"
+#include "cli/interruption.hpp"
 #include "cli/opened_recording.hpp"
 #include "cli/terminal.hpp"
 
@@ -22,15 +22,7 @@ using nlohmann::json;
 
 using Keep = std::function<Result<void>(const VerificationFile&)>;
 
-constexpr auto kLook = 200ms;
-
-volatile std::sig_atomic_t interrupted = 0;  // written by the signal handler
-
-void end_on_interrupt() {
-  struct sigaction end {};
-  end.sa_handler = [](int) { interrupted = 1; };
-  for (const int signal : {SIGINT, SIGTERM, SIGHUP}) ::sigaction(signal, &end, nullptr);
-}
+constexpr auto kLookAtPoints = 200ms;
 
 calib::Vector3 vector_of(const json& list) {
   return {list.at(0).get<double>(), list.at(1).get<double>(), list.at(2).get<double>()};
@@ -89,11 +81,11 @@ Result<LivePoints> points_of_daemon(const std::filesystem::path& socket, std::si
   const auto begun = ask_daemon(socket, {{"do", "verification"}, {"step", "begin"}});
   if (!begun) return tl::make_unexpected(begun.error());
   const json number = begun->at("number");
-  end_on_interrupt();
+  mark_interruptions({SIGINT, SIGTERM, SIGHUP});
   fmt::print(stderr, "abbe: stand still for some seconds at every point; Ctrl-C after the last one\n");
   VerificationFile out;
-  const auto all = [&] { return interrupted != 0 || (count != 0 && out.points.size() >= count); };
-  for (; !all(); std::this_thread::sleep_for(kLook)) {
+  const auto all = [&] { return interrupted() || (count != 0 && out.points.size() >= count); };
+  for (; !all(); std::this_thread::sleep_for(kLookAtPoints)) {
     if (const auto looked = look(socket, number, "look", out, keep); !looked)
       return what_there_is(out, looked.error());
   }

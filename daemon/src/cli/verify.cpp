@@ -13,6 +13,7 @@
 #include "abbe/daemon/verification_report.hpp"
 #include "cli/commands.hpp"
 #include "cli/daemon_socket.hpp"
+#include "cli/figures.hpp"
 #include "cli/store_option.hpp"
 #include "cli/terminal.hpp"
 #include "cli/vector_option.hpp"
@@ -123,10 +124,6 @@ Result<VerifyOutcome> compare(const VerifyArguments& arguments, std::optional<Er
   return VerifyOutcome{std::move(*document), std::move(v)};
 }
 
-nlohmann::json figures(const calib::VectorStatistics& s) {
-  return {{"mean_um", kUmPerM * s.mean_m}, {"rms_um", kUmPerM * s.rms_m}, {"max_um", kUmPerM * s.max_m}};
-}
-
 nlohmann::json figures(const verify::RatioStatistics& s) {
   return {{"count", s.count},
           {"mean", s.mean},
@@ -147,8 +144,8 @@ void print_json(const VerifyOutcome& outcome) {
       {"model", model_id(outcome.document)},
       {"points", outcome.verification.observations.readings_m.size()},
       {"inside", c.inside.size()},
-      {"before", figures(c.before)},
-      {"after", figures(c.after)},
+      {"before", vector_figures(c.before)},
+      {"after", vector_figures(c.after)},
       {"R_turned", figures(c.R_turned)},
       {"R_stated", figures(c.R_stated)},
       {"turned_urad", {kUradPerRad * turned(3), kUradPerRad * turned(4), kUradPerRad * turned(5)}},

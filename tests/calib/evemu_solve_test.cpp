@@ -252,8 +252,9 @@ TEST(RotationReference, TurnsAShapeOntoWhatIsKnown) {
 
 TEST(RotationReference, NeedsPointsOffALine) {
   const Solution s = *solve(reference_observations());
-  const std::vector<BallError> line{
-      {1, 1, {0.3, 0.15, 0.05}, {}}, {1, 2, {0.35, 0.15, 0.05}, {}}, {1, 3, {0.4, 0.15, 0.05}, {}}};
+  const std::vector<BallError> line{{1, 1, {0.3, 0.15, 0.05}, {0, 0, 0}},
+                                    {1, 2, {0.35, 0.15, 0.05}, {0, 0, 0}},
+                                    {1, 3, {0.4, 0.15, 0.05}, {0, 0, 0}}};
   EXPECT_EQ(with_rotation_reference(s, {line, 1e-6}).error().code, ErrorCode::DegenerateGeometry);
 }
 

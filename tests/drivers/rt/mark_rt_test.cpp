@@ -22,6 +22,8 @@ TEST(MarkWatcherRt, TakesNoMemory) {
 
 TEST(MarkWatcherRt, MakesNoSystemCall) {
   MarkWatcher watcher;
+  // The first virtual call makes UBSan look at the object through the kernel.
+  watcher.on_scan(scan_at_a_mark(0));
   tests::expect_no_system_call([&] {
     for (std::size_t i = 0; i < 1'000; ++i) watcher.on_scan(scan_at_a_mark(i));
   });

@@ -38,6 +38,8 @@ TEST(TouchDetectorRt, TakesNoMemory) {
 TEST(TouchDetectorRt, MakesNoSystemCall) {
   const auto source = scans(1'000);
   TouchDetector detector{quick()};
+  // The first virtual call makes UBSan look at the object through the kernel.
+  detector.on_scan(source.front());
   tests::expect_no_system_call([&] {
     for (const CounterScan& scan : source) detector.on_scan(scan);
   });

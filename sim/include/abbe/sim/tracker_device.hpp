@@ -130,7 +130,6 @@ class TrackerDevice {
   bool initialised_ = false;
 
   std::optional<Command> pending_;
-  std::uint64_t commands_ = 0;
   emscon::Units units_;
   emscon::SystemSettings settings_;
   emscon::Environment set_environment_;

@@ -34,13 +34,17 @@ function(abbe_compile_mathematics target)
   endif()
 endfunction()
 
+# A type a file keeps to itself looks, included by another, like one of a header.
+function(abbe_allow_local_types target)
+  target_compile_options(${target} PRIVATE $<$<CXX_COMPILER_ID:GNU>:-Wno-subobject-linkage>)
+endfunction()
+
 # What a checked build spends on a source file is mostly its headers' templates, parsed and instrumented again for
 # each: there, several files are compiled as one. What is local to a file therefore bears a name its room uses once.
 function(abbe_compile_together target)
   if(ABBE_SANITIZE AND NOT ABBE_FUZZ)
     set_target_properties(${target} PROPERTIES UNITY_BUILD ON UNITY_BUILD_BATCH_SIZE 8)
-    # A type a file keeps to itself looks, included, like one of a header.
-    target_compile_options(${target} PRIVATE -Wno-subobject-linkage)
+    abbe_allow_local_types(${target})
   endif()
 endfunction()
 
@@ -54,7 +58,7 @@ function(abbe_compile_subjects_together target)
       set_source_files_properties(${source} PROPERTIES UNITY_GROUP ${subject})
     endforeach()
     set_target_properties(${target} PROPERTIES UNITY_BUILD ON UNITY_BUILD_MODE GROUP)
-    target_compile_options(${target} PRIVATE -Wno-subobject-linkage)
+    abbe_allow_local_types(${target})
   endif()
 endfunction()
 

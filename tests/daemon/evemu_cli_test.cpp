@@ -181,16 +181,16 @@ void record_touches(const fs::path& folder, const Touches& all) {
   info.configuration = std::string{test::kWeakPortal} + std::string{kWatched};
   auto recorder = Recorder::open(example_options(folder), info, Recorder::WallTime{});
   ASSERT_TRUE(recorder) << recorder.error().text;
-  constexpr protocol::HostTime kFrom{1000s};
+  constexpr protocol::HostTime kBegin{1000s};
   EvemuRequest request{.calibrator = tests::evemu::reference_calibrator()};
   request.sources = {{"calibrator.toml", "abc"}};
-  recorder->attach(to_attachment({request, kFrom}), kFrom);
+  recorder->attach(to_attachment({request, kBegin}), kBegin);
   std::uint32_t number = 0;
   const auto record = [&](int position, Feature feature, int which) {
     for (const auto& t : all) {
       if (t.position != position || t.feature != feature || t.number != which) continue;
       protocol::ProbeTrigger touch;
-      touch.head.time = kFrom + ++number * 1s;
+      touch.head.time = kBegin + ++number * 1s;
       touch.touch = number;
       touch.axis_count = 3;
       std::copy_n(t.p_m.data(), 3, touch.position.begin());

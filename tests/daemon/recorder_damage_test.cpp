@@ -14,8 +14,8 @@
 namespace abbe::daemon {
 namespace {
 
-constexpr std::uint32_t kChunks = 3;
-constexpr std::uint32_t kPerChunk = 10;
+constexpr std::uint32_t kDamagedChunks = 3;
+constexpr std::uint32_t kPerDamagedChunk = 10;
 
 #ifdef __SANITIZE_THREAD__
 constexpr std::size_t kSummaryStep =
@@ -32,7 +32,8 @@ std::vector<std::string> texts(std::span<const RecordingLoss> losses) {
 
 class DamagedRecording : public ::testing::Test {
  protected:
-  DamagedRecording() : whole_(bytes_of_file(example_recording(folder_.path(), kChunks, kPerChunk))) {
+  DamagedRecording()
+      : whole_(bytes_of_file(example_recording(folder_.path(), kDamagedChunks, kPerDamagedChunk))) {
     find_chunks();
   }
 
@@ -57,7 +58,7 @@ class DamagedRecording : public ::testing::Test {
 };
 
 TEST_F(DamagedRecording, CutAtAnyByteKeepsEveryFinishedChunk) {
-  ASSERT_EQ(chunk_ends_.size(), kChunks);
+  ASSERT_EQ(chunk_ends_.size(), kDamagedChunks);
   const auto file = folder_.path() / "cut.mcap";
   write_file(file, whole_, whole_.size());
   const std::size_t data_end = chunk_ends_.back() + 1024;  // indexes and DataEnd lie behind the last chunk
@@ -67,8 +68,9 @@ TEST_F(DamagedRecording, CutAtAnyByteKeepsEveryFinishedChunk) {
         std::ranges::count_if(chunk_ends_, [cut](std::size_t end) { return end <= cut; }));
     const auto reader = RecordingReader::open(file);
     ASSERT_TRUE(reader) << "cut at " << cut;
-    ASSERT_GE(reader->message_count(), finished * kPerChunk) << "cut at " << cut;
-    ASSERT_LE(reader->message_count(), std::min(finished + 1, kChunks) * kPerChunk) << "cut at " << cut;
+    ASSERT_GE(reader->message_count(), finished * kPerDamagedChunk) << "cut at " << cut;
+    ASSERT_LE(reader->message_count(), std::min(finished + 1, kDamagedChunks) * kPerDamagedChunk)
+        << "cut at " << cut;
     std::uint32_t i = 0;
     for (auto cursor = reader->messages(); const auto message = cursor.next(); ++i) {
       ASSERT_EQ(message->time, example_time(i)) << "cut at " << cut;
@@ -90,8 +92,8 @@ TEST_F(DamagedRecording, CutInsideAChunkGivesItsWholeMessagesAndSaysWhere) {
   const std::size_t cut = (chunk_starts_[1] + chunk_ends_[1]) / 2;
   const auto reader = open(whole_, cut);
   ASSERT_TRUE(reader);
-  EXPECT_GT(reader->message_count(), kPerChunk);
-  EXPECT_LT(reader->message_count(), 2 * kPerChunk);
+  EXPECT_GT(reader->message_count(), kPerDamagedChunk);
+  EXPECT_LT(reader->message_count(), 2 * kPerDamagedChunk);
   EXPECT_FALSE(reader->closed_cleanly());
   ASSERT_EQ(reader->losses().size(), 1u);
   EXPECT_EQ(reader->losses()[0].offset, chunk_starts_[1]);
@@ -105,7 +107,7 @@ TEST_F(DamagedRecording, AFlippedBitCostsOneChunkAndIsSaid) {
   flipped[chunk_ends_[1] - 20] ^= 4;
   const auto reader = open(flipped, flipped.size());
   ASSERT_TRUE(reader);
-  EXPECT_EQ(reader->message_count(), (kChunks - 1) * kPerChunk);
+  EXPECT_EQ(reader->message_count(), (kDamagedChunks - 1) * kPerDamagedChunk);
   EXPECT_TRUE(reader->closed_cleanly());
   EXPECT_EQ(texts(reader->losses()),
             std::vector<std::string>{"chunk 2 at byte " + std::to_string(chunk_starts_[1]) +
@@ -117,7 +119,7 @@ TEST_F(DamagedRecording, ADamagedSummaryCostsNothing) {
   flipped[flipped.size() - 12] ^= 4;
   const auto reader = open(flipped, flipped.size());
   ASSERT_TRUE(reader);
-  EXPECT_EQ(reader->message_count(), kChunks * kPerChunk);
+  EXPECT_EQ(reader->message_count(), kDamagedChunks * kPerDamagedChunk);
   ASSERT_EQ(reader->losses().size(), 1u);
   EXPECT_NE(reader->losses()[0].what.find("indexes"), std::string::npos);
 }
@@ -131,7 +133,7 @@ TEST_F(DamagedRecording, NoSingleDamagedByteLosesMoreThanItsChunkOrConfusesTheRe
     damaged[at] = static_cast<char>(~damaged[at]);
     const auto reader = open(damaged, damaged.size());
     ASSERT_TRUE(reader) << "byte " << at;
-    EXPECT_GE(reader->message_count(), (kChunks - 1) * kPerChunk) << "byte " << at;
+    EXPECT_GE(reader->message_count(), (kDamagedChunks - 1) * kPerDamagedChunk) << "byte " << at;
     EXPECT_EQ(reader->read({}), 0u);
   }
 }

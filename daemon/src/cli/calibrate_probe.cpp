@@ -71,7 +71,7 @@ std::optional<Error> not_on_a_line(const calib::probe::ProbeDelayFit& fit) {
       {}};
 }
 
-Error error_of(const calib::Error& error) {
+Error insufficient(const calib::Error& error) {
   return {ErrorCode::DataInsufficient, error.text, {}};
 }
 
@@ -126,10 +126,10 @@ int calibrate(const CalibrateProbeArguments& arguments) {
     const auto q = calib::probe::qualify(calib::probe::around_sphere(*touches),
                                          {.sphere_radius_m = 1e-3 * arguments.sphere_radius_mm,
                                           .u_sphere_radius_m = 1e-6 * arguments.u_sphere_radius_um});
-    return q ? print_qualification(*q, arguments.json) : report(error_of(q.error()));
+    return q ? print_qualification(*q, arguments.json) : report(insufficient(q.error()));
   }
   const auto fit = calib::probe::fit_delay(calib::probe::same_place(*touches));
-  if (!fit) return report(error_of(fit.error()));
+  if (!fit) return report(insufficient(fit.error()));
   if (const auto refused = not_on_a_line(*fit)) return report(*refused);
   return print_delay(*fit, arguments.json);
 }

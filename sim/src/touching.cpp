@@ -134,12 +134,13 @@ double contact_s(const ProbingMove& move, const TruthMachine& truth, const PathM
 }  // namespace
 
 Vector3d reading_at_m(const TruthMachine& truth, const Vector3d& place_m) {
-  constexpr int kMostSteps = 200;  // slopes of V near 0.2 leave nothing after twenty
+  constexpr int kMostSteps = 200;       // slopes of V near 0.2 leave nothing after twenty
+  constexpr double kNothing_m = 1e-14;  // exactly equal is seldom reached: the last bit goes to and fro
   Vector3d q_m = place_m;
   for (int i = 0; i < kMostSteps; ++i) {
-    const Vector3d next_m = q_m + place_m - position_m(truth, q_m);
-    if (next_m == q_m) break;
-    q_m = next_m;
+    const Vector3d step_m = place_m - position_m(truth, q_m);
+    q_m += step_m;
+    if (step_m.squaredNorm() < kNothing_m * kNothing_m) break;
   }
   return q_m;
 }

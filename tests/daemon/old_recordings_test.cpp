@@ -71,6 +71,7 @@ TEST_F(OldRecordings, OfAFormerRunAreOldWhenThisOneHasLastedLonger) {
   record("abbe-1.mcap", 25h);
   EXPECT_THAT(removed(), IsEmpty());  // it is the newest: the clock may be ahead
   lasted_ = 25h;
+  record("abbe-2.mcap", 0h);  // brought here since
   EXPECT_THAT(removed(), ElementsAre("abbe-1.mcap"));
 }
 

@@ -81,8 +81,8 @@ std::vector<fs::path> outdated(const Recordings& recordings, const KeepRule& rul
       if (written < until && written >= earliest_date()) old.push_back(file);
   };
   add(recordings.own, rule.now - rule.keep);
-  if (rule.lasted > rule.keep) {
-    add(recordings.former, fs::file_time_type::max());
+  if (rule.lasted > rule.keep) {  // the clock has told the truth for as long as that
+    add(recordings.former, rule.now - rule.keep);
   } else if (!recordings.former.empty()) {
     const auto newest = std::ranges::max(recordings.former, {}, &Dated::written).written;
     add(recordings.former, std::min(newest, rule.now) - rule.keep);

@@ -205,9 +205,11 @@ TEST_F(CounterCardReceiverTest, CountsThatWentOnInStepAreThoseOfTheSameCardHowev
   now_ += 200ms;  // the host was busy when the first came
   push(card_.scans(40));
   now_ -= 200ms;
+  card_.lose(3);
   const auto scans = push(card_.scans(40));
   ASSERT_FALSE(scans.empty());
   EXPECT_EQ(receiver_.counters().clock_jumps, 1u);
+  EXPECT_TRUE(has(scans[0].axes.head.flags, SampleFlag::GapBefore));
   EXPECT_FALSE(has(scans[0].axes.head.flags, SampleFlag::Restarted));
   EXPECT_LT(scans.back().axes.head.time, now_);
   EXPECT_GT(scans.back().axes.head.time, now_ - 2ms);

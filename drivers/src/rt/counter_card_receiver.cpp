@@ -201,9 +201,12 @@ void CounterCardReceiver::stamp() ABBE_RT {
   const auto scans = std::span{scans_}.first(scan_count_);
   if (clock_.observe(youngest, arrival_) == ClockModel::Observed::Restarted) {
     ++counters_.clock_jumps;
-    // Counts that went on in step are those of the same card: only its relation to our clock began anew.
-    const auto gap = std::ranges::find_if(
-        scans, [](const CounterScan& s) { return has(s.axes.head.flags, SampleFlag::GapBefore); });
+    // Counts that went on in step, but for a gap too short for the jump, are those of the same card: only its
+    // relation to our clock began anew.
+    const double enough = 0.5 * std::chrono::duration<double>(ClockModelOptions{}.jump).count() * clock_hz_;
+    const auto gap = std::ranges::find_if(scans, [&](const CounterScan& s) {
+      return static_cast<double>(s.axes.head.lost_before) * metronome_.step >= enough;
+    });
     if (gap != scans.end()) gap->axes.head.flags |= SampleFlag::Restarted;
   }
   for (auto& scan : scans) {

@@ -46,7 +46,7 @@ std::string_view picked(std::string_view data) noexcept {
 
 void IppReceiver::sent(std::span<const std::byte> bytes, HostTime time) ABBE_RT {
   std::string_view line = chars(bytes);
-  line.remove_suffix(line.size() - std::min(line.size(), line.find('\r')));
+  if (line.size() >= 2 && line[line.size() - 2] == '\r' && line.back() == '\n') line.remove_suffix(2);
   const auto command = ippdme::parse_command(line);
   if (!command) return;
   Asked asked{.tag = command->tag, .time = time, .known = true};

@@ -4,14 +4,17 @@
 #include <fmt/ranges.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <map>
+#include <span>
 #include <string>
 #include <utility>
 
 #include "abbe/daemon/control_protocol.hpp"
 #include "control/refusal.hpp"
+#include "linear_axes.hpp"
 #include "units.hpp"
 
 namespace abbe::daemon {
@@ -92,12 +95,12 @@ json number(double value) {
 
 json environment_json(const protocol::Snapshot& live, const Config& config) {
   const auto& e = live.environment;
-  json out{{"air_temperature_C", number(e.air_temperature_K - 273.15)},
+  json out{{"air_temperature_C", number(e.air_temperature_K - kZeroCelsius_K)},
            {"air_pressure_hPa", number(e.air_pressure_Pa * 1e-2)},
            {"relative_humidity_percent", number(e.relative_humidity * 1e2)}};
   json temperatures = json::object();
   for (std::size_t i = 0; i < config.temperatures.size(); ++i)
-    temperatures[config.temperatures[i]] = number(e.temperature_K[i] - 273.15);
+    temperatures[config.temperatures[i]] = number(e.temperature_K[i] - kZeroCelsius_K);
   out["temperatures_C"] = std::move(temperatures);
   if (const auto index = index_of_air(e, config.air))
     out["refractive_index"] = {{"n", index->n}, {"u_n", index->u_n}};
@@ -167,9 +170,16 @@ std::string who(const json& request) {
   return said.empty() || said == user ? user : fmt::format("{} (as {})", user, said);
 }
 
-/// Readings of an axis without a datum are used by nobody: a run would wait for them in vain.
-Result<void> check_zeros(const HubParts& parts) {
-  const auto unknown = parts.reference != nullptr ? parts.reference->unknown() : std::vector<std::string>{};
+/// Readings of X, Y or Z without a datum are used by nobody: a run would wait for them in vain.
+Result<void> check_zeros(const HubParts& parts, const CalibrationTask& task) {
+  const bool by_cmm = std::holds_alternative<EvemuRequest>(task) && parts.config.cmm.has_value();
+  if (parts.reference == nullptr || by_cmm) return {};
+  auto unknown = parts.reference->unknown();
+  const auto linear =
+      std::span{parts.config.machine.axes}.first(std::min(kLinearAxes, parts.config.machine.axes.size()));
+  std::erase_if(unknown, [&linear](const std::string& name) {
+    return std::ranges::find(linear, name, &AxisConfig::name) == linear.end();
+  });
   if (unknown.empty()) return {};
   return fail(ErrorCode::Refused,
               fmt::format("calibrate: nobody knows the zero of {}: `abbe reference` finds the marks, `abbe "
@@ -181,7 +191,7 @@ json calibrate(const Hub& hub, const json& request) {
   const HubParts& parts = hub.parts();
   auto task = task_from_json(request, touch_plan(parts.config.evemu));
   if (!task) return refusal(task.error());
-  if (const auto known = check_zeros(parts); !known) return refusal(known.error());
+  if (const auto known = check_zeros(parts, *task); !known) return refusal(known.error());
   auto started = parts.calibration.start(std::move(*task), who(request), parts.time.now());
   return started ? json{{"ok", true}} : refusal(started.error());
 }

@@ -75,14 +75,11 @@ void EvemuAcquisition::take(const protocol::Snapshot& snapshot) {
     return;
   }
   if (const auto fault = fault_of(snapshot); !fault.empty()) return refuse(snapshot, fault);
-  refused_in_a_row_ = 0;
   if (!thermometer_.take(snapshot)) {
-    phase_ = Phase::Failed;
-    reason_ =
-        fmt::format("{} touch {}: the temperature \"{}\" of the array is not known: its device is silent",
-                    options_.device, snapshot.trigger.touch, options_.artefact_sensor);
-    return;
+    return refuse(snapshot,
+                  fmt::format("the temperature \"{}\" of the array was not known", options_.artefact_sensor));
   }
+  refused_in_a_row_ = 0;
   const calib::Vector3 reading_m{snapshot.position[0], snapshot.position[1], snapshot.position[2]};
   for (const std::string& text : guide_.take(reading_m).notes) note(snapshot, text);
   if (guide_.taken() > 0 && phase_ == Phase::WaitingAtStart) phase_ = Phase::Running;
@@ -100,7 +97,7 @@ void EvemuAcquisition::take(const protocol::Snapshot& snapshot) {
 void EvemuAcquisition::refuse(const protocol::Snapshot& touch, std::string_view fault) {
   const auto next = guide_.next();
   note(touch, fmt::format("not used: {}; expected: {}", fault, evemu::name(next.on)));
-  if (++refused_in_a_row_ < options_.most_refused) return;
+  if (++refused_in_a_row_ < options_.most_refused || phase_ != Phase::WaitingAtStart) return;
   phase_ = Phase::Failed;
   reason_ = fmt::format("{} touches one after the other could not be used, the last because {}",
                         refused_in_a_row_, fault);

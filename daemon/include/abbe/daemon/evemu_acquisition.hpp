@@ -45,7 +45,7 @@ struct EvemuAcquisitionOptions {
   bool zero_is_lost_by_restart = true;
   /// Host time without a touch that ends the run: the artefact is turned and clamped by hand in between.
   std::chrono::nanoseconds longest_pause = std::chrono::hours{1};
-  std::size_t most_refused = 20;  ///< touches in a row that cannot be used; then the run ends
+  std::size_t most_refused = 20;  ///< touches in a row that cannot be used end a run that has none yet
   /// How warm the array is. A touch at which its sensor has no valid value ends the run: the model would need
   /// it.
   std::optional<ArtefactTemperatureConfig> artefact{};

@@ -27,7 +27,9 @@ struct CalibrateEvemuArguments {
 Result<nlohmann::json> task_of(const CalibrateEvemuArguments& arguments) {
   const auto calibrator = read_calibrator_toml(arguments.calibrator);
   if (!calibrator) return tl::make_unexpected(calibrator.error());
-  EvemuRequest request{.calibrator = calibrator->calibrator, .sources = {calibrator->source}};
+  EvemuRequest request;
+  request.calibrator = calibrator->calibrator;
+  request.sources = {calibrator->source};
   if (!arguments.reference.empty()) {
     const auto points = read_errors_csv(arguments.reference);
     if (!points) return tl::make_unexpected(points.error());

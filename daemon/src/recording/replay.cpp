@@ -32,32 +32,36 @@ using protocol::HostTime;
 // cache.
 constexpr std::size_t kMessagesPerTurn = 256;
 
-/// Gives the points of a tracker in the order in which it measured them. A recording is read in the order of
-/// host time, and that is a mapping: while the clock model is still learning, a burst may begin before the
-/// end of the one before.
-class DeviceOrder {
+/// Gives messages of a stream in the order in which they were recorded: a recording is read in the order of
+/// host time. Points of a tracker are mapped to that: while the clock model is still learning, a burst may
+/// begin before the end of the one before. And bytes are stamped by the kernel: a busy driver reads an answer
+/// that came just before it sent the next question only after that.
+template <class Message>
+class RecordedOrder {
  public:
-  void take(std::uint32_t sequence, const protocol::TrackerPoint& point,
-            std::vector<protocol::TrackerPoint>& out) {
-    waiting_.emplace(sequence, point);
+  template <class Give>
+  void take(std::uint32_t sequence, Message message, const Give& give) {
+    waiting_.emplace(sequence, std::move(message));
     // Nothing is farther out of order than a few bursts: a number still missing then was lost with a damaged
     // chunk.
     while (!waiting_.empty() && (waiting_.begin()->first == next_ || waiting_.size() > kMostWaiting))
-      give_first(out);
+      give_first(give);
   }
-  void finish(std::vector<protocol::TrackerPoint>& out) {
-    while (!waiting_.empty()) give_first(out);
+  template <class Give>
+  void finish(const Give& give) {
+    while (!waiting_.empty()) give_first(give);
   }
 
  private:
   static constexpr std::size_t kMostWaiting = 4096;
-  void give_first(std::vector<protocol::TrackerPoint>& out) {
-    out.push_back(waiting_.begin()->second);
+  template <class Give>
+  void give_first(const Give& give) {
+    give(waiting_.begin()->second);
     next_ = waiting_.begin()->first + 1;
     waiting_.erase(waiting_.begin());
   }
 
-  std::map<std::uint32_t, protocol::TrackerPoint> waiting_;
+  std::map<std::uint32_t, Message> waiting_;
   std::uint32_t next_ = 0;
 };
 
@@ -348,7 +352,12 @@ Result<ReplayReport> replay(const RecordingReader& recording, const Config& conf
   ReplayReport report;
   std::vector<protocol::Snapshot> snapshots;
 
-  DeviceOrder device_order;
+  RecordedOrder<protocol::TrackerPoint> points_in_order;
+  const auto give_point = [&batch](const protocol::TrackerPoint& p) { batch.points.push_back(p); };
+  RecordedOrder<std::pair<protocol::RawBlock, std::string>> blocks_in_order;
+  const auto give_block = [&](const std::pair<protocol::RawBlock, std::string>& b) {
+    raw.take(b.first, b.second, batch);
+  };
   std::uint32_t sequence = 0;  // of the message being delivered
   HostTime logged{};           // the same
   RecordingSink sink;
@@ -362,7 +371,7 @@ Result<ReplayReport> replay(const RecordingReader& recording, const Config& conf
   };
   if (options.source == ReplaySource::Samples) {
     sink.tracker_point = [&](const protocol::TrackerPoint& p, std::string_view) {
-      device_order.take(sequence, p, batch.points);
+      points_in_order.take(sequence, p, give_point);
     };
     sink.axis_sample = [&](const protocol::AxisSample& s, std::string_view) { batch.axes.push_back(s); };
     sink.environment = take_environment;
@@ -371,7 +380,7 @@ Result<ReplayReport> replay(const RecordingReader& recording, const Config& conf
     };
   } else {
     sink.raw_block = [&](const protocol::RawBlock& b, std::string_view device) {
-      raw.take(b, device, batch);
+      blocks_in_order.take(sequence, {b, std::string{device}}, give_block);
     };
     // The bytes of what a former file handed on are in that file.
     sink.axis_sample = [&](const protocol::AxisSample& s, std::string_view) { set_up.take_live(s.head); };
@@ -416,7 +425,8 @@ Result<ReplayReport> replay(const RecordingReader& recording, const Config& conf
     hand_on();
     if (options.progress) options.progress(cursor.progress());
   }
-  device_order.finish(batch.points);
+  points_in_order.finish(give_point);
+  blocks_in_order.finish(give_block);
   marks->take(batch);
   give_datum();
   if (options.samples) options.samples(batch, range->first);

@@ -18,13 +18,13 @@ namespace abbe::daemon {
 
 namespace {
 
-struct ModelStoreCommandsArguments {
+struct ModelStoreArguments {
   StoreOption store;
   std::string id, why;
   bool json = false, force = false;
 };
 
-StoreActor actor(const ModelStoreCommandsArguments& arguments) {
+StoreActor actor(const ModelStoreArguments& arguments) {
   return {user_name(), arguments.why,
           std::chrono::time_point_cast<std::chrono::nanoseconds>(std::chrono::system_clock::now())};
 }
@@ -56,7 +56,7 @@ void print_table(const std::vector<StoreEntry>& entries) {
   }
 }
 
-int list(const ModelStoreCommandsArguments& arguments) {
+int list(const ModelStoreArguments& arguments) {
   const auto store = open_store(arguments.store);
   if (!store) return report(store.error());
   const auto entries = store->list();
@@ -96,7 +96,7 @@ Result<StoreEntry> entry_of(const ModelStore& store, const std::string& id) {
   return fail(ErrorCode::Usage, fmt::format("model {}: not in the store", id));
 }
 
-int show(const ModelStoreCommandsArguments& arguments) {
+int show(const ModelStoreArguments& arguments) {
   const auto store = open_store(arguments.store);
   if (!store) return report(store.error());
   const auto id = store->find(arguments.id);
@@ -113,7 +113,7 @@ int show(const ModelStoreCommandsArguments& arguments) {
   return 0;
 }
 
-int activate(const ModelStoreCommandsArguments& arguments) {
+int activate(const ModelStoreArguments& arguments) {
   auto store = open_store(arguments.store);
   if (!store) return report(store.error());
   const auto id = store->find(arguments.id);
@@ -124,7 +124,7 @@ int activate(const ModelStoreCommandsArguments& arguments) {
   return 0;
 }
 
-int rollback(const ModelStoreCommandsArguments& arguments) {
+int rollback(const ModelStoreArguments& arguments) {
   auto store = open_store(arguments.store);
   if (!store) return report(store.error());
   const auto id = store->rollback(actor(arguments));
@@ -136,7 +136,7 @@ int rollback(const ModelStoreCommandsArguments& arguments) {
 }  // namespace
 
 void add_model_list(CLI::App& parent, int& exit) {
-  auto arguments = std::make_shared<ModelStoreCommandsArguments>();
+  auto arguments = std::make_shared<ModelStoreArguments>();
   auto* command = parent.add_subcommand("list", "All models of the store, newest first");
   add_store_options(*command, arguments->store);
   command->add_flag("--json", arguments->json, "as a JSON array");
@@ -144,7 +144,7 @@ void add_model_list(CLI::App& parent, int& exit) {
 }
 
 void add_model_show(CLI::App& parent, int& exit) {
-  auto arguments = std::make_shared<ModelStoreCommandsArguments>();
+  auto arguments = std::make_shared<ModelStoreArguments>();
   auto* command = parent.add_subcommand("show", "One model: where it came from, how good it is, its tables");
   command->add_option("ID", arguments->id, "id, the beginning of one, or \"active\"")->required();
   add_store_options(*command, arguments->store);
@@ -153,7 +153,7 @@ void add_model_show(CLI::App& parent, int& exit) {
 }
 
 void add_model_activate(CLI::App& parent, int& exit) {
-  auto arguments = std::make_shared<ModelStoreCommandsArguments>();
+  auto arguments = std::make_shared<ModelStoreArguments>();
   auto* command =
       parent.add_subcommand("activate", "Make a model the active one; who did it and why is kept");
   command->add_option("ID", arguments->id, "id, or the beginning of one")->required();
@@ -169,7 +169,7 @@ void add_model_activate(CLI::App& parent, int& exit) {
 }
 
 void add_model_rollback(CLI::App& parent, int& exit) {
-  auto arguments = std::make_shared<ModelStoreCommandsArguments>();
+  auto arguments = std::make_shared<ModelStoreArguments>();
   auto* command = parent.add_subcommand("rollback", "Go back to the model that was active before");
   add_store_options(*command, arguments->store);
   command->add_option("--why", arguments->why, "the reason, for the record");

@@ -113,6 +113,33 @@ TEST(Assembler, AnAxisSampleThatComesLateChangesNothing) {
   }
 }
 
+TEST(Assembler, ASampleThatIsTakenBackCountsForNoSnapshot) {
+  Batch axes = axes_batch(kStart, kStart + 50ms);
+  AxisSample back = axes.axes[20];
+  back.missing_mask = 0b001;
+  axes.axes.insert(axes.axes.begin() + 21, back);
+  std::vector<Snapshot> at_once, one_by_one;
+  Assembler first{{}};
+  first.take(burst(kStart + 4ms, 20));
+  first.take(axes);
+  first.emit(at_once);
+  Assembler second{{}};
+  second.take(burst(kStart + 4ms, 20));
+  for (const AxisSample& sample : axes.axes) {
+    Batch one;
+    one.axes = {sample};
+    second.take(one);
+    second.emit(one_by_one);
+  }
+  ASSERT_EQ(at_once.size(), 20u);
+  ASSERT_EQ(one_by_one.size(), 20u);
+  for (std::size_t i = 0; i < 20; ++i) {
+    EXPECT_EQ(one_by_one[i].position, at_once[i].position) << i;
+    const bool between = std::chrono::abs(at_once[i].head.time - back.head.time) < 1ms;
+    EXPECT_EQ(one_by_one[i].missing_mask, between ? 0b001 : 0) << i;
+  }
+}
+
 TEST(Assembler, WaitsForAxesUntilTheWatermark) {
   Assembler assembler{{.watermark = 600ms}};
   std::vector<Snapshot> out;

@@ -1,5 +1,6 @@
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cstring>
 
 #include "abbe/drivers/can/encoder_device.hpp"
@@ -217,6 +218,17 @@ TEST_F(EncoderDeviceOnUdp, CountsPositionsThatAreTooShortAsFaults) {
   EXPECT_THAT(device->status().last_fault, testing::HasSubstr("too short"));
 }
 
+TEST_F(EncoderDeviceOnUdp, TellsOfANodeThatAnswersTwiceInACycle) {
+  begin_streaming();
+  const auto before = device->status().faults;
+  peer.send(std::array{can::encode_position(0x182, can::PositionType::Signed32, 5)});
+  turns(12);
+  EXPECT_EQ(std::ranges::count(samples, 0b10, &AxisSample::missing_mask), 1);
+  EXPECT_EQ(samples.back().missing_mask, 0);
+  EXPECT_EQ(device->status().faults, before + 1);
+  EXPECT_THAT(device->status().last_fault, testing::HasSubstr("second answers in a cycle"));
+}
+
 TEST_F(EncoderDeviceOnUdp, RefusesASyncThatOnlyTheKernelCouldSend) {
   EncoderDeviceOptions options;
   options.receiver.axes = {{.name = "X", .node = 1}};
@@ -243,7 +255,9 @@ TEST_F(EncoderDeviceOnUdp, ReplaysItsRawBytesToTheSameSamples) {
   turns(50);
   peer.node(1).mute = false;
   peer.move_to(-77);
-  turns(2000);
+  turns(1000);
+  peer.send(std::array{can::encode_position(0x181, can::PositionType::Signed32, 5)});
+  turns(1000);
   const auto options = [] {
     EncoderReceiverOptions o;
     o.axes = {{.name = "X", .node = 1}, {.name = "Y", .node = 2}};

@@ -50,8 +50,9 @@ void Assembler::take(const Batch& batch) {
   for (const auto& touch : batch.touches) newest_ = std::max(newest_, touch.head.time);
 }
 
-/// A bus that went off or began anew may report an instant before that of the last sample. Interpolation
-/// needs one sample an instant: the one that knows less stays, whichever came first.
+/// A bus that went off or began anew may report an instant before that of the last sample, and a second
+/// answer takes one back. Interpolation needs one sample an instant: the one that knows less stays, whichever
+/// came first.
 void Assembler::take(const AxisSample& sample) {
   const auto same = std::lower_bound(axes_.begin(), axes_.end(), sample.head.time, earlier);
   if (same == axes_.end() || same->head.time != sample.head.time) {
@@ -63,7 +64,7 @@ void Assembler::take(const AxisSample& sample) {
 
 bool Assembler::ready(HostTime t) const {
   if (newest_ - t > options_.watermark) return true;
-  return axes_.size() >= 2 && t <= axes_[axes_.size() - 2].head.time;
+  return axes_.size() >= 3 && t <= axes_[axes_.size() - 3].head.time;
 }
 
 void Assembler::emit(std::vector<Snapshot>& out) {

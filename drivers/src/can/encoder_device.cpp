@@ -190,16 +190,16 @@ void EncoderDevice::account(HostTime now) {
   }
   bus_seen_ = bus;
   missed_seen_ = missed;
-  count_short_frames(now);
+  tell_of(receiver_.counters().short_frames, short_seen_, "frames too short for a position", now);
+  tell_of(receiver_.counters().duplicate_frames, duplicates_seen_,
+          "second answers in a cycle: a node answers later than a SYNC period, or two have one number", now);
 }
 
-void EncoderDevice::count_short_frames(HostTime now) {
-  const auto shorts = receiver_.counters().short_frames;
-  if (shorts == short_seen_) return;
-  board_.faults.add(shorts - short_seen_ - 1);
-  board_.fault(now, fmt::format("CAN {}: read: {} frames too short for a position", bus_->name(),
-                                shorts - short_seen_));
-  short_seen_ = shorts;
+void EncoderDevice::tell_of(std::uint64_t count, std::uint64_t& seen, std::string_view what, HostTime now) {
+  if (count == seen) return;
+  board_.faults.add(count - seen - 1);
+  board_.fault(now, fmt::format("CAN {}: read: {} {}", bus_->name(), count - seen, what));
+  seen = count;
 }
 
 void EncoderDevice::show_state(HostTime now) {

@@ -3,6 +3,7 @@
 #include <cmath>
 #include <limits>
 #include <numbers>
+#include <utility>
 
 #include "abbe/protocol/can/cia406.hpp"
 #include "abbe/protocol/can/error_frame.hpp"
@@ -98,6 +99,8 @@ EncoderReceiver::Samples EncoderReceiver::on_time(HostTime now) ABBE_RT {
 EncoderReceiver::Samples EncoderReceiver::on_loss() ABBE_RT {
   out_count_ = 0;
   close_cycle();
+  look_for_debts(true);
+  received_mask_ = 0;
   gap_pending_ = true;
   return done();
 }
@@ -122,19 +125,32 @@ EncoderReceiver::Samples EncoderReceiver::on_frame(const can::CanFrame& frame, H
 
 void EncoderReceiver::begin_cycle(HostTime time, bool time_widened) ABBE_RT {
   close_cycle();
+  bool paused = false;
   if (sync_time_ && period_.count() > 0) {
     const auto periods = (time - *sync_time_ + period_ / 2) / period_;
-    if (periods > 1) {
+    paused = periods > 1;
+    if (paused) {
       lost_pending_ += static_cast<std::uint32_t>(std::min<std::int64_t>(periods - 1, 0xFFFF));
       counters_.missed_syncs += static_cast<std::uint64_t>(periods - 1);
     }
     ++cycle_;
   }
+  look_for_debts(paused);
   sync_time_ = time;
   time_widened_ = time_widened;
-  received_mask_ = 0;
+  received_mask_ = doubtful_mask_ = 0;
   open_ = true;
   check_heartbeats(time);
+}
+
+/// At the end of a cycle. `paused`: whatever was under way has come, or was lost.
+void EncoderReceiver::look_for_debts(bool paused) ABBE_RT {
+  for (std::size_t i = 0; i < axis_count_; ++i) {
+    auto& axis = axes_[i];
+    const bool unanswered = sync_time_ && ((received_mask_ >> i) & 1u) == 0;
+    axis.owes = !paused && (axis.owes || (axis.answers && unanswered));
+    axis.answers = axis.answers && !paused;
+  }
 }
 
 void EncoderReceiver::close_cycle() ABBE_RT {
@@ -148,7 +164,7 @@ void EncoderReceiver::emit(HostTime time) ABBE_RT {
     if (axes_[i].scale != 0.0) known = static_cast<std::uint8_t>(known | (1u << i));
   }
   const bool invalid = bus_off_;
-  const auto usable = invalid ? 0u : static_cast<unsigned>(received_mask_ & known);
+  const auto usable = invalid ? 0u : static_cast<unsigned>(received_mask_ & ~doubtful_mask_ & known);
   const auto missing = static_cast<std::uint8_t>(all_mask_ & ~usable);
   for (std::size_t i = 0; i < axis_count_; ++i) counters_.missing_answers += (missing >> i) & 1u;
   current_.head.time = time;
@@ -191,21 +207,41 @@ void EncoderReceiver::on_position(std::size_t i, const can::CanFrame& frame, Hos
   }
   hear();
   const auto bit = static_cast<std::uint8_t>(1u << i);
-  if (!open_) {
-    // After the last answer: its cycle had an older one. After the deadline: too late. Both leave the sample
-    // as it went.
-    ++((received_mask_ & bit) != 0 ? counters_.duplicate_frames : counters_.late_frames);
-    return;
-  }
-  if (time + period_ / kStampSlackParts < *sync_time_) {
+  axes_[i].answers = true;
+  if (sync_time_ && time + period_ / kStampSlackParts < *sync_time_) {
     ++counters_.late_frames;
+    axes_[i].owes = false;
     return;
   }
-  if ((received_mask_ & bit) != 0) ++counters_.duplicate_frames;
+  const bool again = (received_mask_ & bit) != 0;
+  if (again) ++counters_.duplicate_frames;
+  if (!open_) return again ? take_back(i) : count_late(i);
+  if (again || std::exchange(axes_[i].owes, false))
+    doubtful_mask_ = static_cast<std::uint8_t>(doubtful_mask_ | bit);
   take_position(i, *count);
   time_widened_ = time_widened_ || time_widened;
   received_mask_ = static_cast<std::uint8_t>(received_mask_ | bit);
   if (received_mask_ == all_mask_) close_cycle();
+}
+
+/// After the deadline: not used, but a debt less.
+void EncoderReceiver::count_late(std::size_t i) ABBE_RT {
+  ++counters_.late_frames;
+  if (!std::exchange(axes_[i].owes, false))
+    received_mask_ = static_cast<std::uint8_t>(received_mask_ | (1u << i));
+}
+
+/// The sample of this cycle has left with an answer that may be an older one.
+void EncoderReceiver::take_back(std::size_t i) ABBE_RT {
+  const auto bit = static_cast<std::uint8_t>(1u << i);
+  if ((current_.missing_mask & bit) != 0) return;
+  current_.missing_mask = static_cast<std::uint8_t>(current_.missing_mask | bit);
+  current_.head.flags |= SampleFlag::AxisMissing;
+  current_.head.flags &= ~static_cast<protocol::SampleFlags>(SampleFlag::GapBefore);
+  current_.head.lost_before = 0;
+  ++counters_.missing_answers;
+  ++counters_.samples;
+  if (out_count_ < out_.size()) out_[out_count_++] = current_;
 }
 
 /// A node was heard: who receives is on the bus.
@@ -251,6 +287,7 @@ void EncoderReceiver::on_heartbeat(Axis& axis, can::NodeState state, HostTime ti
   axis.heartbeat_lost = false;
   if (state != can::NodeState::BootUp) return;
   axis.emergency = 0;
+  axis.answers = axis.owes = false;
   axis.last_heartbeat.reset();  // it beats again only once it is configured
   if (axis.seen) restarted_pending_ = true;
 }

@@ -18,7 +18,8 @@ EncoderReceiverOptions two_axes() {
   return options;
 }
 
-/// Everything a bus can say, cycle after cycle, an axis missing in every third.
+/// Everything a bus can say, cycle after cycle, an axis missing in every third, a second answer in every
+/// fifth.
 void cycle(EncoderReceiver& receiver, std::size_t i) ABBE_RT {
   const HostTime t{1h + 1ms * i};
   const auto count = static_cast<std::int64_t>(i * 1000);
@@ -33,6 +34,8 @@ void cycle(EncoderReceiver& receiver, std::size_t i) ABBE_RT {
   }
   if (i % 3 != 0)
     (void)receiver.on_frame(can::encode_position(0x182, can::PositionType::Signed32, -count), t + 200us);
+  if (i % 5 == 0)
+    (void)receiver.on_frame(can::encode_position(0x181, can::PositionType::Signed32, count), t + 300us);
   (void)receiver.on_time(t + 900us);
 }
 

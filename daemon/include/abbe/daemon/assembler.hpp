@@ -4,12 +4,12 @@
 /// card, reported by a measuring machine) keeps them. Points come in their order, touches in theirs.
 ///
 /// Tracker points arrive in bursts, up to a third of a second late; axis samples arrive at once. A point is
-/// assembled as soon as two axis samples at or after its instant are there (the interpolation uses two on
-/// either side). If they do not come, it is assembled from what there is, flagged AxisMissing if that is not
-/// enough, once any stream has advanced `watermark` beyond it. Both rules look at the times in the samples
-/// only, and an axis or environment sample that comes after a later one is put in its place, so neither the
-/// order of arrival (within the watermark) nor the speed of a replay changes a result. Tracker points are
-/// given back in the order they were taken in.
+/// assembled as soon as three axis samples at or after its instant are there: the interpolation uses two on
+/// either side, and with the third nobody takes the second back any more. If they do not come, it is
+/// assembled from what there is, flagged AxisMissing if that is not enough, once any stream has advanced
+/// `watermark` beyond it. Both rules look at the times in the samples only, and an axis or environment sample
+/// that comes after a later one is put in its place, so neither the order of arrival (within the watermark)
+/// nor the speed of a replay changes a result. Tracker points are given back in the order they were taken in.
 /// Ordinary world; not thread-safe.
 
 #include <chrono>

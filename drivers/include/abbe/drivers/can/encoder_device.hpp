@@ -13,6 +13,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <string_view>
 
 #include "abbe/drivers/can/can_bus.hpp"
 #include "abbe/drivers/can/encoder_receiver.hpp"
@@ -68,7 +69,7 @@ class EncoderDevice final : public Device {
   void follow_bus_off(protocol::HostTime now);
   void send_sync();
   void follow_kernel_sync();
-  void count_short_frames(protocol::HostTime now);
+  void tell_of(std::uint64_t count, std::uint64_t& seen, std::string_view what, protocol::HostTime now);
   void send_configuration();
   [[nodiscard]] bool send(const can::CanFrame& frame);
   void read_batch(protocol::HostTime now, std::chrono::nanoseconds at_most);
@@ -103,6 +104,7 @@ class EncoderDevice final : public Device {
   CanBusCounters bus_seen_;
   std::uint64_t missed_seen_ = 0;
   std::uint64_t short_seen_ = 0;
+  std::uint64_t duplicates_seen_ = 0;
 
   std::array<ReceivedFrame, kBatch> batch_{};
   std::size_t batch_count_ = 0;

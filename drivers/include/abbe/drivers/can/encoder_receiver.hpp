@@ -7,9 +7,15 @@
 /// the deadline, the next SYNC or bus-off with the axes that did not answer marked in missing_mask: these
 /// keep their previous value. All axes carry one time: SYNC + sampling delay. An axis that never answered has
 /// position NaN. An answer that comes after its cycle is closed is counted and not used; one stamped before
-/// the SYNC cannot be its answer; a second one in a cycle replaces the first, which was late. A bus that is
-/// always late by a whole cycle cannot be told from one that is in time: the period must be longer than the
-/// slowest answer.
+/// the SYNC cannot be its answer.
+///
+/// An answer does not say to which SYNC. It is doubtful, and its axis missing, where it may be that to an
+/// earlier one: the first after cycles without any (but not where the node booted, or the SYNC paused for a
+/// period, in between), and those of a cycle in which the node answers twice. If the cycle's sample has left
+/// before the second one, it is given again, with the same time and cycle number and that axis missing: of
+/// two samples of one time the later takes back what the earlier said. What is left: a node that is late by
+/// whole periods for many cycles is doubtful at the beginning and at the end of that, not in between. The
+/// period must be longer than the slowest answer.
 ///
 /// The scale is configured or read along from the SDO answers on the bus (6005h:01, else 6501h; rotary:
 /// 6001h), so that a recording carries it. 0 is refused: the axis stays missing.
@@ -72,11 +78,11 @@ struct EncoderReceiverOptions {
 /// Since construction.
 struct EncoderCounters {
   std::uint64_t samples = 0;
-  std::uint64_t missing_answers = 0;  ///< axes x cycles
+  std::uint64_t missing_answers = 0;  ///< axes x cycles, the doubtful among them
   std::uint64_t late_frames = 0;
-  std::uint64_t duplicate_frames = 0;
-  std::uint64_t short_frames = 0;  ///< TPDOs too short for a position
-  std::uint64_t missed_syncs = 0;  ///< periods in which no SYNC was sent
+  std::uint64_t duplicate_frames = 0;  ///< answers after the first one in a cycle
+  std::uint64_t short_frames = 0;      ///< TPDOs too short for a position
+  std::uint64_t missed_syncs = 0;      ///< periods in which no SYNC was sent
   std::uint64_t emergencies = 0;
   std::uint64_t heartbeat_losses = 0;
   std::uint64_t bus_reports = 0;  ///< error frames
@@ -144,6 +150,8 @@ class EncoderReceiver {
     double offset = 0.0;        ///< reading at count 0
     std::uint64_t modulus = 0;  ///< 0: 2^64
     bool seen = false;
+    bool answers = false;         ///< has since it booted, without a pause of the SYNC
+    bool owes = false;            ///< the answer to an earlier SYNC may still come
     std::uint64_t raw = 0;        ///< the latest count as sent, modulo `modulus`
     std::uint16_t emergency = 0;  ///< the latest code; 0: none
     bool heartbeat_lost = false;
@@ -159,6 +167,9 @@ class EncoderReceiver {
   void on_position(std::size_t i, const can::CanFrame& frame, protocol::HostTime time,
                    bool time_widened) ABBE_RT;
   void hear() ABBE_RT;
+  void count_late(std::size_t i) ABBE_RT;
+  void take_back(std::size_t i) ABBE_RT;
+  void look_for_debts(bool paused) ABBE_RT;
   void take_position(std::size_t i, std::int64_t count) ABBE_RT;
   void on_node_frame(Axis& axis, const can::CanFrame& frame, protocol::HostTime time) ABBE_RT;
   void on_heartbeat(Axis& axis, can::NodeState state, protocol::HostTime time) ABBE_RT;
@@ -181,7 +192,8 @@ class EncoderReceiver {
   bool open_ = false;                            ///< a cycle waits for answers
   std::optional<protocol::HostTime> sync_time_;  ///< of the latest SYNC
   std::uint32_t cycle_ = 0;
-  std::uint8_t received_mask_ = 0;
+  std::uint8_t received_mask_ = 0;  ///< answered in the latest cycle, in time or not
+  std::uint8_t doubtful_mask_ = 0;  ///< maybe to another SYNC
   bool bus_off_ = false;
   bool bus_error_pending_ = false;  ///< since the previous sample
   bool restarted_pending_ = false;

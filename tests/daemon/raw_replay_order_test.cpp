@@ -1,0 +1,119 @@
+/// A driver may read bytes late: what it then had sent before counts for its samples, whatever the stamps
+/// say.
+
+#include <gmock/gmock.h>
+
+#include <cmath>
+#include <vector>
+
+#include "abbe/daemon/device_options.hpp"
+#include "abbe/daemon/replay.hpp"
+#include "abbe/drivers/can/encoder_receiver.hpp"
+#include "config_texts.hpp"
+#include "recording_fixture.hpp"
+
+namespace abbe::daemon {
+namespace {
+
+namespace can = protocol::can;
+using namespace std::chrono_literals;
+using protocol::AxisSample;
+using protocol::HostTime;
+using protocol::RawBlock;
+
+constexpr std::string_view kEncoders = R"([encoder]
+transport = "udp"
+peer_host = "127.0.0.1"
+peer_port = 1
+sync_period_us = 1000
+nodes = [{ axis = "X", node = 1, step_nm = 1 }, { axis = "Y", node = 2, step_nm = 1 }, { axis = "Z", node = 3, step_nm = 1 }]
+)";
+
+/// A live run by hand: what the driver would read, in its order, goes into its receiver and into a recording.
+class LiveEncoders {
+ public:
+  explicit LiveEncoders(const std::filesystem::path& folder)
+      : config_(*parse_config(test::kWeakPortal + std::string{kEncoders}, "abbed.toml")),
+        recorder_(*Recorder::open(example_options(folder), example_info(), {})),
+        receiver_(device_options(*config_.encoder, config_.daemon.speed).receiver) {}
+
+  void sync(HostTime t) { take(can::encode_sync(), t, RawBlock::Direction::ToDevice); }
+  void answer(can::NodeId node, std::int64_t count, HostTime t) {
+    take(can::encode_position(can::cob::tpdo(1, node), can::PositionType::Signed32, count), t,
+         RawBlock::Direction::FromDevice);
+  }
+  [[nodiscard]] RecordingReader recording() { return *RecordingReader::open(recorder_.close()->file); }
+  [[nodiscard]] const Config& config() const { return config_; }
+  [[nodiscard]] const std::vector<AxisSample>& samples() const { return samples_; }
+
+ private:
+  void take(const can::CanFrame& frame, HostTime t, RawBlock::Direction direction) {
+    RawBlock block;
+    block.time = t;
+    block.direction = direction;
+    can::DatagramWriter writer{block.bytes, sequence_++};
+    ASSERT_TRUE(writer.add(frame));
+    block.length = static_cast<std::uint16_t>(writer.finish().size());
+    recorder_.record(protocol::to_raw_bytes(block, config_.encoder->name));
+    receiver_.on_raw(block, [this](const AxisSample& sample) {
+      recorder_.record(sample, config_.encoder->name);
+      samples_.push_back(sample);
+    });
+  }
+
+  Config config_;
+  Recorder recorder_;
+  drivers::EncoderReceiver receiver_;
+  std::uint8_t sequence_ = 0;
+  std::vector<AxisSample> samples_;
+};
+
+std::vector<AxisSample> replayed(const RecordingReader& recording, const Config& config,
+                                 ReplaySource source) {
+  std::vector<AxisSample> samples;
+  const auto report =
+      replay(recording, config, {.source = source, .samples = [&](const Batch& batch, HostTime) {
+                                   samples.insert(samples.end(), batch.axes.begin(), batch.axes.end());
+                                 }});
+  EXPECT_TRUE(report.has_value());
+  return samples;
+}
+
+/// NaN of an axis that never answered among them.
+void expect_same(const std::vector<AxisSample>& found, const std::vector<AxisSample>& live) {
+  ASSERT_EQ(found.size(), live.size());
+  for (std::size_t i = 0; i < live.size(); ++i) {
+    EXPECT_EQ(found[i].head.time, live[i].head.time) << i;
+    EXPECT_EQ(found[i].head.flags, live[i].head.flags) << i;
+    EXPECT_EQ(found[i].cycle, live[i].cycle) << i;
+    EXPECT_EQ(found[i].missing_mask, live[i].missing_mask) << i;
+    EXPECT_EQ(found[i].count, live[i].count) << i;
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      EXPECT_TRUE(found[i].position[axis] == live[i].position[axis] ||
+                  (std::isnan(found[i].position[axis]) && std::isnan(live[i].position[axis])));
+    }
+  }
+}
+
+TEST(RawReplay, DecodesBytesInTheOrderInWhichTheDriverReadThem) {
+  const TemporaryFolder folder;
+  LiveEncoders live{folder.path()};
+  const HostTime start = example_time(0);
+  for (std::int64_t i = 0; i < 6; ++i) {
+    const HostTime sync = start + 1ms * i;
+    live.sync(sync);
+    // Each SYNC is sent before the answer is read that came just before it: as early as two clocks may
+    // differ.
+    if (i > 0) live.answer(3, 10 * (i - 1) + 2, sync - 10us);
+    live.answer(1, 10 * i, sync + 200us);
+    live.answer(2, 10 * i + 1, sync + 300us);
+  }
+  live.sync(start + 6ms);
+  ASSERT_GE(live.samples().size(), 6u);
+  const auto recording = live.recording();
+  expect_same(replayed(recording, live.config(), ReplaySource::Samples), live.samples());
+  expect_same(replayed(recording, live.config(), ReplaySource::RawBytes), live.samples());
+}
+
+}  // namespace
+}  // namespace abbe::daemon

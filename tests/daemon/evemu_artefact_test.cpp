@@ -407,7 +407,7 @@ TEST(WarmRun, GivesTheSameModelLiveFromItsRecordingAndFromACommand) {
   EXPECT_NEAR(run.artefact->u_temperature_K, std::hypot(0.3, 0.5 * last_K / std::sqrt(3.0)), 1e-3);
   const auto live = identify(CalibrationRun{run}, config, nullptr);
   ASSERT_TRUE(live) << live.error().text;
-  const auto hash = model_hash(model_of(*live), "evemu");
+  const auto hash = model_hash(document_of(*live, config, {}, {}));
 
   record_run(folder.path(), config_text(kSensor), request, batch);
   const auto reader = RecordingReader::open(folder.path() / "run.mcap");

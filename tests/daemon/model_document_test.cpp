@@ -4,6 +4,7 @@
 
 #include <bit>
 #include <cstdint>
+#include <set>
 
 #include "synthetic_model.hpp"
 
@@ -59,12 +60,12 @@ TEST(ModelDocument, WritesTheSameBytesAgain) {
 
 TEST(ModelDocument, HashLeavesOutDatesAndInputs) {
   auto document = synthetic_document(4);
-  const auto hash = model_hash(document.model, document.method);
+  const auto hash = model_hash(document);
   document.created += std::chrono::hours{1};
   document.inputs.clear();
   const auto read = parse_model(to_json(document), "model.json");
   ASSERT_TRUE(read);
-  EXPECT_EQ(model_hash(read->model, read->method), hash);
+  EXPECT_EQ(model_hash(*read), hash);
   EXPECT_THAT(hash, SizeIs(64));
 }
 
@@ -74,7 +75,69 @@ TEST(ModelDocument, HashFollowsOneBitOfOneParameter) {
   description.parameters[7].value = std::nextafter(description.parameters[7].value, 1.0);
   const auto other = calib::VolumetricModel::from_description(description);
   ASSERT_TRUE(other);
-  EXPECT_NE(model_hash(model, "otf"), model_hash(*other, "otf"));
+  EXPECT_NE(model_hash({model}), model_hash({*other}));
+}
+
+/// Of a glass array 3 K above 20 C.
+ModelDocument with_artefact(std::uint32_t seed) {
+  auto document = synthetic_document(seed);
+  document.artefact = calib::Expansion{
+      .alpha_per_K = 8e-6, .u_alpha_per_K = 1e-6, .temperature_K = 296.15, .u_temperature_K = 0.2};
+  return document;
+}
+
+TEST(ModelDocument, HashFollowsEveryNumberOfTheArtefact) {
+  const auto document = with_artefact(11);
+  std::set<std::string> hashes{model_hash(document), model_hash(synthetic_document(11))};
+  for (double calib::Expansion::*number :
+       {&calib::Expansion::alpha_per_K, &calib::Expansion::u_alpha_per_K, &calib::Expansion::temperature_K,
+        &calib::Expansion::u_temperature_K}) {
+    auto other = document;
+    other.artefact.value().*number *= 1.001;
+    hashes.insert(model_hash(other));
+  }
+  EXPECT_THAT(hashes, SizeIs(6));
+}
+
+TEST(ModelDocument, ReadsBackWithItsArtefact) {
+  const auto written = with_artefact(12);
+  const auto read = parse_model(to_json(written), "model.json");
+  ASSERT_TRUE(read) << read.error().details.front();
+  ASSERT_TRUE(read->artefact);
+  EXPECT_EQ(read->artefact->temperature_K, 296.15);
+  EXPECT_EQ(read->artefact->u_alpha_per_K, 1e-6);
+  EXPECT_EQ(model_id(*read), model_id(written));
+}
+
+TEST(ModelDocument, IsRefusedWhenItsArtefactWasChanged) {
+  const auto text =
+      replaced(to_json(with_artefact(13)), "\"temperature_K\": 296.15", "\"temperature_K\": 297.15");
+  const auto read = parse_model(text, "model.json");
+  ASSERT_FALSE(read);
+  EXPECT_THAT(read.error().details, ElementsAre(HasSubstr("hash: is not the hash of the content")));
+  auto without = to_json(with_artefact(13));
+  const auto from = without.find("  \"artefact\""), to = without.find("  \"inputs\"");
+  EXPECT_FALSE(parse_model(without.erase(from, to - from), "model.json"));
+}
+
+TEST(ModelDocument, NamesWhatCannotBeOfItsArtefact) {
+  const auto fault = [](const std::string& what, const std::string& with) {
+    const auto read = parse_model(replaced(to_json(with_artefact(14)), what, with), "model.json");
+    return read ? std::string{} : read.error().details.front();
+  };
+  EXPECT_THAT(fault("\"temperature_K\": 296.15", "\"temperature_K\": -3"),
+              HasSubstr("model.json: artefact.temperature_K: is not plausible: -3"));
+  EXPECT_THAT(fault("\"u_temperature_K\": 0.2", "\"u_temperature_K\": -0.2"),
+              HasSubstr("artefact.u_temperature_K: is not plausible"));
+  EXPECT_THAT(fault("\"alpha_um_per_m_K\": 8", "\"alpha_um_per_m_K\": 8000"),
+              HasSubstr("artefact.alpha_um_per_m_K: is not plausible"));
+  EXPECT_THAT(fault("\"u_alpha_um_per_m_K\": 1", "\"u_alpha_um_per_m_K\": -1"),
+              HasSubstr("artefact.u_alpha_um_per_m_K: is not plausible"));
+  EXPECT_THAT(fault("\"temperature_K\": 296.15", "\"temperature_K\": 1e999"),
+              HasSubstr("artefact.temperature_K: out of range"));
+  EXPECT_THAT(fault("\"temperature_K\": 296.15", "\"temperature_K\": \"warm\""),
+              HasSubstr("artefact.temperature_K: must be a number"));
+  EXPECT_THAT(fault("\"u_alpha_um_per_m_K\": 1,", ""), HasSubstr("artefact.u_alpha_um_per_m_K: missing"));
 }
 
 TEST(ModelDocument, WritesLengthsInMmAndErrorsInMicrometres) {

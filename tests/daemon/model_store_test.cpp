@@ -61,7 +61,7 @@ TEST_F(ModelStoreTest, KeepsWhatIsAddedAndGivesItBack) {
   const auto document = open().load(id);
   ASSERT_TRUE(document);
   EXPECT_EQ(model_id(*document), id);
-  EXPECT_EQ(model_hash(document->model, "otf"), model_hash(synthetic_document(1).model, "otf"));
+  EXPECT_EQ(model_hash(*document), model_hash(synthetic_document(1)));
   EXPECT_EQ(open().find(id.substr(0, 6)).value(), id);
 }
 

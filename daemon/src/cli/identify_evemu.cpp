@@ -290,7 +290,7 @@ void print_json(const Outcome& outcome, const ModelDocument& document, const std
   const auto& held_out = outcome.verdict.held_out;
   nlohmann::json object{{"model", (folder / "model.json").string()},
                         {"id", model_id(document)},
-                        {"hash", model_hash(document.model, document.method)},
+                        {"hash", model_hash(document)},
                         {"estimator", document.estimator},
                         {"covariance", evemu::name(outcome.solution->covariance)},
                         {"positions", s.positions},

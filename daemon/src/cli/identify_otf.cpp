@@ -164,7 +164,7 @@ void print_json(const OtfOutcome& outcome, const std::filesystem::path& folder) 
   const nlohmann::json object{
       {"model", (folder / "model.json").string()},
       {"id", model_id(outcome.document)},
-      {"hash", model_hash(outcome.document.model, outcome.document.method)},
+      {"hash", model_hash(outcome.document)},
       {"samples", s.samples},
       {"lost_samples", s.lost_samples},
       {"blocks", outcome.blocks},

@@ -72,30 +72,35 @@ void add_values(Canonical& out, const calib::VolumetricModel& model) {
     for (Eigen::Index j = i; j < covariance.cols(); ++j) out.number(covariance(i, j));
 }
 
+/// Last, and only where there is one: a model without has the hash it had before there were any.
+void add_artefact(Canonical& out, const calib::Expansion& artefact) {
+  out.text("artefact");
+  for (const double value :
+       {artefact.alpha_per_K, artefact.u_alpha_per_K, artefact.temperature_K, artefact.u_temperature_K})
+    out.number(value);
+}
+
 }  // namespace
 
-std::string model_hash(const calib::VolumetricModel& model, std::string_view method) {
+std::string model_hash(const ModelDocument& document) {
+  const auto& model = document.model;
   Canonical out;
   out.text("abbe/model/1");
-  out.text(method);
+  out.text(document.method);
   add_frame(out, model);
   add_values(out, model);
   out.vectors(model.validity().vertices_m());
+  if (document.artefact) add_artefact(out, *document.artefact);
   return out.hex();
 }
 
-std::string model_id(const calib::VolumetricModel& model, std::string_view method,
-                     std::string_view machine_hash) {
+std::string model_id(const ModelDocument& document) {
   Canonical out;
   out.text("abbe/model-id/1");
-  out.text(model_hash(model, method));
-  out.text(machine_hash);
+  out.text(model_hash(document));
+  out.text(document.machine_hash);
   constexpr std::size_t kDigits = 16;
   return out.hex().substr(0, kDigits);
-}
-
-std::string model_id(const ModelDocument& document) {
-  return model_id(document.model, document.method, document.machine_hash);
 }
 
 }  // namespace abbe::daemon

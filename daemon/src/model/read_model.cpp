@@ -56,6 +56,16 @@ class Reader {
     const Json* value = find(in, path, key);
     return value == nullptr ? 0.0 : number(*value, path + "." + key, shift);
   }
+  /// `least` and `most` in SI.
+  double number_within(const Json& in, const std::string& path, const std::string& key, int shift,
+                       double least, double most) {
+    const Json* value = find(in, path, key);
+    if (value == nullptr) return least;
+    const double si = number(*value, path + "." + key, shift);
+    if (std::isfinite(si) && (si < least || si > most))
+      fault(path + "." + key, fmt::format("is not plausible: {}", to_decimal(si, shift)));
+    return si;
+  }
   std::size_t count_of(const Json& in, const std::string& path, const std::string& key) {
     const Json* value = find(in, path, key);
     if (value == nullptr) return 0;
@@ -223,14 +233,21 @@ ModelStatistics read_statistics(Reader& in) {
   return s;
 }
 
+// Beyond what a sensor (-50 to 200 C), [evemu] and a calibrator's file (+-50 um/(m K)) may say.
+constexpr double kColdest_K = 173.15, kWarmest_K = 523.15;
+constexpr double kMostAlpha_per_K = 100e-6;
+
 std::optional<calib::Expansion> read_artefact(Reader& in) {
   const std::string path = "artefact";
   if (!in.root().is_object() || !in.root().contains(path)) return std::nullopt;
   const Json& artefact = in.root().at(path);
-  return calib::Expansion{in.number_of(artefact, path, "alpha_um_per_m_K", kMicroUnit),
-                          in.number_of(artefact, path, "u_alpha_um_per_m_K", kMicroUnit),
-                          in.number_of(artefact, path, "temperature_K", 0),
-                          in.number_of(artefact, path, "u_temperature_K", 0)};
+  const auto within = [&](const char* key, int shift, double least, double most) {
+    return in.number_within(artefact, path, key, shift, least, most);
+  };
+  return calib::Expansion{within("alpha_um_per_m_K", kMicroUnit, -kMostAlpha_per_K, kMostAlpha_per_K),
+                          within("u_alpha_um_per_m_K", kMicroUnit, 0.0, kMostAlpha_per_K),
+                          within("temperature_K", 0, kColdest_K, kWarmest_K),
+                          within("u_temperature_K", 0, 0.0, kWarmest_K - kColdest_K)};
 }
 
 std::vector<InputFile> read_inputs(Reader& in) {
@@ -260,11 +277,12 @@ Result<ModelDocument> read_document(Reader& in) {
   const auto artefact = read_artefact(in);
   const auto method = in.text("method"), estimator = in.text("estimator"), machine = in.text("machine"),
              machine_hash = in.text("machine_hash"), hash = in.text("hash");
-  if (model && !in.any() && hash != model_hash(*model, method))
-    in.fault("hash", "is not the hash of the content: the file was changed or damaged");
   if (in.any()) return tl::make_unexpected(in.to_error());
-  return ModelDocument{std::move(*model), method,     estimator, machine, machine_hash,
-                       *created,          statistics, inputs,    artefact};
+  ModelDocument document{std::move(*model), method,     estimator, machine, machine_hash,
+                         *created,          statistics, inputs,    artefact};
+  if (hash == model_hash(document)) return document;
+  in.fault("hash", "is not the hash of the content: the file was changed or damaged");
+  return tl::make_unexpected(in.to_error());
 }
 
 }  // namespace

@@ -141,7 +141,7 @@ std::string to_json(const ModelDocument& document) {
   JsonText out;
   out.member("schema", kModelSchema);
   out.member("abbe_version", kVersion);
-  out.member("hash", model_hash(model, document.method));
+  out.member("hash", model_hash(document));
   out.member("created", to_text(document.created));
   out.member("method", document.method);
   out.member("estimator", document.estimator);

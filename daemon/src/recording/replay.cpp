@@ -233,8 +233,9 @@ class Calibrations {
     ReplayedCalibration c{.ended = session_.status(), .points_sha256 = inputs_of(run).back().sha256};
     c.outcome = identify(run, config_, options_.active);
     if (*c.outcome) {
-      c.model_hash = model_hash(model_of(**c.outcome), method_of(**c.outcome));
-      c.model_id = model_id(model_of(**c.outcome), method_of(**c.outcome), machine_hash(config_));
+      const ModelDocument document = document_of(**c.outcome, config_, {}, {});
+      c.model_hash = model_hash(document);
+      c.model_id = model_id(document);
     }
     done_.push_back(std::move(c));
     identified_ = true;

@@ -63,14 +63,13 @@ struct ModelDocument {
                                            std::vector<InputFile> inputs, protocol::UtcTime created);
 
 /// SHA-256 in hex over what the model *says* (method, chain, basis, nodes, gauge, tools, parameters,
-/// covariance, validity), not over dates, inputs or statistics: the live model's hash equals the replay's.
-[[nodiscard]] std::string model_hash(const calib::VolumetricModel& model, std::string_view method);
+/// covariance, validity, and what warmth of a ball array was taken out of it), not over dates, inputs or
+/// statistics: the live model's hash equals the replay's.
+[[nodiscard]] std::string model_hash(const ModelDocument& document);
 
 /// How people and the store call a model: 16 digits of a hash over model_hash() and the machine configuration
 /// it was made for. The same model found again under another configuration is another document: one is STALE
 /// where the other is ACTIVE.
-[[nodiscard]] std::string model_id(const calib::VolumetricModel& model, std::string_view method,
-                                   std::string_view machine_hash);
 [[nodiscard]] std::string model_id(const ModelDocument& document);
 
 /// The text of model.json; the same document gives the same bytes.

@@ -200,6 +200,36 @@ TEST_F(CounterCardReceiverTest, TakesAJumpOfTheClockWithAGapForARestartOfIt) {
   EXPECT_EQ(receiver_.counters().clock_jumps, 1u);
 }
 
+TEST_F(CounterCardReceiverTest, FindsTheRestartAlsoWhereALateBatchHidTheJump) {
+  start();
+  for (int i = 0; i < 50; ++i) push(card_.scans(40));
+  card_.lose(3'000);  // 75 ms
+  now_ += 60ms;
+  const auto late = push(card_.scans(40));
+  now_ -= 60ms;
+  ASSERT_FALSE(late.empty());
+  EXPECT_EQ(receiver_.counters().clock_jumps, 0u);
+  EXPECT_FALSE(has(late[0].axes.head.flags, SampleFlag::Restarted));
+  const auto scans = push(card_.scans(40));
+  ASSERT_FALSE(scans.empty());
+  EXPECT_EQ(receiver_.counters().clock_jumps, 1u);
+  EXPECT_TRUE(has(scans[0].axes.head.flags, SampleFlag::Restarted));
+  EXPECT_FALSE(has(scans[1].axes.head.flags, SampleFlag::Restarted));
+}
+
+TEST_F(CounterCardReceiverTest, AnEarlierGapThatIsShorterThanTheJumpIsNotItsCause) {
+  start();
+  now_ += 200ms;  // the host was busy when the first came
+  push(card_.scans(40));
+  card_.lose(1'200);  // 30 ms
+  push(card_.scans(40));
+  now_ -= 200ms;
+  const auto scans = push(card_.scans(40));
+  ASSERT_FALSE(scans.empty());
+  EXPECT_EQ(receiver_.counters().clock_jumps, 1u);
+  for (const auto& scan : scans) EXPECT_FALSE(has(scan.axes.head.flags, SampleFlag::Restarted));
+}
+
 TEST_F(CounterCardReceiverTest, CountsThatWentOnInStepAreThoseOfTheSameCardHoweverLateTheyCame) {
   start();
   now_ += 200ms;  // the host was busy when the first came

@@ -10,6 +10,9 @@ namespace {
 
 using protocol::SampleFlag;
 
+/// How much later than a gap the clock's jump may be seen: no batch waits longer in a busy host.
+constexpr double kJumpSeenWithin_s = 1.0;
+
 std::uint32_t saturated(std::uint64_t n) ABBE_RT {
   return static_cast<std::uint32_t>(std::min<std::uint64_t>(n, std::numeric_limits<std::uint32_t>::max()));
 }
@@ -39,6 +42,7 @@ void CounterCardReceiver::counters_zeroed() ABBE_RT {
   candidate_.reset();
   clock_.reset();
   latch_.reset();
+  long_gap_.reset();
   zeroed_ = true;
   current_.clock_count = current_.latch_count = current_.latch_half_width = current_.edge_count = 0;
   current_.latched = false;
@@ -161,6 +165,10 @@ void CounterCardReceiver::count_lost(std::uint64_t clock_step, CounterScan& scan
   counters_.lost_scans += lost;
   scan.axes.head.lost_before = saturated(lost);
   scan.axes.head.flags |= SampleFlag::GapBefore;
+  const double gap_s = static_cast<double>(lost) * metronome_.step / clock_hz_;
+  // Half the jump: what the clock model calls one is not sharp.
+  if (gap_s >= 0.5 * std::chrono::duration<double>(ClockModelOptions{}.jump).count())
+    long_gap_ = {scan.clock_count + static_cast<std::int64_t>(clock_step), gap_s};
 }
 
 void CounterCardReceiver::unwrap(const quad08::RawScan& raw, CounterScan& scan) ABBE_RT {
@@ -199,21 +207,31 @@ void CounterCardReceiver::stamp() ABBE_RT {
   if (scan_count_ == 0) return;
   const auto youngest = device_time(scans_[scan_count_ - 1].clock_count);
   const auto scans = std::span{scans_}.first(scan_count_);
+  const std::chrono::duration<double> ahead = clock_.to_host(youngest).time - arrival_;
   if (clock_.observe(youngest, arrival_) == ClockModel::Observed::Restarted) {
     ++counters_.clock_jumps;
-    // Counts that went on in step, but for a gap too short for the jump, are those of the same card: only its
-    // relation to our clock began anew.
-    const double enough = 0.5 * std::chrono::duration<double>(ClockModelOptions{}.jump).count() * clock_hz_;
-    const auto gap = std::ranges::find_if(scans, [&](const CounterScan& s) {
-      return static_cast<double>(s.axes.head.lost_before) * metronome_.step >= enough;
-    });
-    if (gap != scans.end()) gap->axes.head.flags |= SampleFlag::Restarted;
+    mark_restart(scans, ahead.count());
   }
   for (auto& scan : scans) {
     const auto at = clock_.to_host(device_time(scan.clock_count));
     scan.axes.head.time = at.time;
     scan.axes.head.u_time = at.u_time;
     if (!at.settled) scan.axes.head.flags |= SampleFlag::ClockUnsettled;
+  }
+}
+
+/// Counts that went on in step, but for a gap too short for the jump, are those of the same card: only its
+/// relation to our clock began anew. A batch that came late may hide the jump: the gap was in one before, and
+/// is as long as the clock is ahead.
+void CounterCardReceiver::mark_restart(std::span<CounterScan> scans, double ahead_s) ABBE_RT {
+  const auto gap = std::exchange(long_gap_, std::nullopt);
+  if (!gap) return;
+  const auto after = std::ranges::find(scans, gap->clock_count, &CounterScan::clock_count);
+  const double since_s = static_cast<double>(scans.back().clock_count - gap->clock_count) / clock_hz_;
+  if (after != scans.end()) {
+    after->axes.head.flags |= SampleFlag::Restarted;
+  } else if (since_s < kJumpSeenWithin_s && gap->length_s >= ahead_s) {
+    scans.front().axes.head.flags |= SampleFlag::Restarted;
   }
 }
 

@@ -95,6 +95,10 @@ class CounterCardReceiver {
     double scale = 0.0;
     double offset = 0.0;
   };
+  struct LongGap {
+    std::int64_t clock_count = 0;  ///< of the scan after it
+    double length_s = 0.0;
+  };
 
   /// True: a message of scans is pushed.
   [[nodiscard]] bool join(const protocol::RawBlock& block) ABBE_RT;
@@ -111,6 +115,7 @@ class CounterCardReceiver {
   void unwrap(const quad08::RawScan& raw, CounterScan& scan) ABBE_RT;
   void follow_latch(const quad08::RawScan& raw, std::int64_t previous_clock, CounterScan& scan) ABBE_RT;
   void stamp() ABBE_RT;
+  void mark_restart(std::span<CounterScan> scans, double ahead_s) ABBE_RT;
   [[nodiscard]] bool beats(const quad08::RawScan& from, const quad08::RawScan& to) const ABBE_RT;
   [[nodiscard]] protocol::DeviceTime device_time(std::int64_t clock_count) const ABBE_RT;
 
@@ -138,7 +143,8 @@ class CounterCardReceiver {
   std::optional<quad08::RawScan> candidate_;  ///< held back until the next one confirms it
   protocol::SampleFlags pending_flags_ = 0;
   bool stream_restarted_ = false;
-  CounterScan current_;  ///< counts go on from scan to scan
+  std::optional<LongGap> long_gap_;  ///< the latest that may be a restart of the card
+  CounterScan current_;              ///< counts go on from scan to scan
   std::array<CounterScan, kBatch> scans_{};
   std::size_t scan_count_ = 0;
   bool zeroed_ = false;  ///< the stream is known from where the counters were set up

@@ -172,12 +172,13 @@ TEST_F(WarmArray, NeedsBothTemperatureAndExpansion) {
   write_array({.alpha_per_K = kAlpha_per_K});
   const auto no_temperature = identify();
   EXPECT_EQ(no_temperature.exit, 3);
-  EXPECT_THAT(no_temperature.err, AllOf(HasSubstr("calibrator.toml: has alpha_um_per_m_K"),
+  EXPECT_THAT(no_temperature.err, AllOf(HasSubstr("calibrator.toml has alpha_um_per_m_K"),
                                         HasSubstr("give --artefact-C and --u-artefact-K")));
   forget_expansion();
   const auto no_expansion = identify("--artefact-C 24 --u-artefact-K 0.5");
   EXPECT_EQ(no_expansion.exit, 3);
-  EXPECT_THAT(no_expansion.err, HasSubstr("needs alpha_um_per_m_K and u_alpha_um_per_m_K, for --artefact-C"));
+  EXPECT_THAT(no_expansion.err, AllOf(HasSubstr("--artefact-C says how warm"),
+                                      HasSubstr("add alpha_um_per_m_K and u_alpha_um_per_m_K to its file")));
   EXPECT_EQ(identify("--artefact-C 24").exit, 2);
   EXPECT_EQ(identify("--artefact-C 24 --u-artefact-K -1").exit, 2);
   EXPECT_FALSE(fs::exists(folder_ / "out"));
@@ -234,6 +235,25 @@ axes_compensated = false
 
 std::string config_text(const std::string& evemu) {
   return test::kWeakPortal + std::string{kWithASensor} + evemu;
+}
+
+TEST_F(WarmArray, HasItSaidThatItsSensorIsInNoFile) {
+  write_array({.temperature_C = 24.0, .alpha_per_K = kAlpha_per_K});
+  write("machine.toml", config_text("artefact_sensor = \"plate\"\nu_artefact_K = 0.3\n"));
+  const auto refused = identify();
+  EXPECT_EQ(refused.exit, 3);
+  EXPECT_THAT(refused.err, AllOf(HasSubstr("calibrator.toml has alpha_um_per_m_K"),
+                                 HasSubstr("artefact_sensor \"plate\" stands in no file of touches"),
+                                 HasSubstr("give --artefact-C and --u-artefact-K")));
+  const auto notes_of = [](const Ran& ran) {
+    EXPECT_EQ(ran.exit, kRefusedByTheGate) << ran.err;
+    return nlohmann::json::parse(ran.out)["gate"]["notes"].dump();
+  };
+  const std::string unknown = "how warm the array was is not known";
+  EXPECT_THAT(notes_of(identify("--artefact-C 24 --u-artefact-K 0.5")), Not(HasSubstr(unknown)));
+  forget_expansion();
+  EXPECT_THAT(notes_of(identify()), HasSubstr(unknown));
+  EXPECT_THAT(text_of(folder_ / "out/report.html"), HasSubstr(unknown));
 }
 
 std::string faults_with(const std::string& evemu) {

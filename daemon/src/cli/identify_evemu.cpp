@@ -11,6 +11,7 @@
 
 #include "abbe/calib/evemu/judge.hpp"
 #include "abbe/daemon/evemu_files.hpp"
+#include "abbe/daemon/evemu_identification.hpp"
 #include "abbe/daemon/evemu_report.hpp"
 #include "abbe/daemon/model_document.hpp"
 #include "abbe/daemon/otf_inputs.hpp"
@@ -66,21 +67,24 @@ std::optional<evemu::ArtefactTemperature> artefact_temperature(const IdentifyEve
   return std::nullopt;
 }
 
-/// One without the other cannot be meant.
+/// The sensor of the configuration, where it said nothing that could be read; empty: it was not asked.
+std::string silent_sensor(const IdentifyEvemuArguments& arguments, const Config& config) {
+  const auto& artefact = config.evemu.artefact;
+  if (arguments.touches.empty() || arguments.artefact_C || !artefact || !artefact->sensor) return {};
+  return fmt::format("[evemu] artefact_sensor \"{}\" stands in no file of touches",
+                     config.temperatures[*artefact->sensor]);
+}
+
 Result<void> check_artefact(const IdentifyEvemuArguments& arguments, const evemu::Calibrator& calibrator,
-                            bool temperature_known) {
-  if (calibrator.expansivity && !temperature_known)
-    return fail(ErrorCode::BadInput,
-                fmt::format("{}: has alpha_um_per_m_K, but nothing says how warm the array was: give "
-                            "--artefact-C and --u-artefact-K (or [evemu] artefact_C and u_artefact_K in {})",
-                            arguments.calibrator, arguments.machine));
-  if (temperature_known && !calibrator.expansivity)
-    return fail(
-        ErrorCode::BadInput,
-        fmt::format("{}: [calibrator] needs alpha_um_per_m_K and u_alpha_um_per_m_K, for {} says how "
-                    "warm the array was",
-                    arguments.calibrator, arguments.artefact_C ? "--artefact-C" : "[evemu] artefact_C"));
-  return {};
+                            bool temperature_known, const std::string& silent) {
+  const auto fault = warmth_fault(
+      calibrator, arguments.calibrator,
+      !temperature_known     ? ""
+      : arguments.artefact_C ? "--artefact-C"
+                             : "[evemu] artefact_C",
+      fmt::format("{}give --artefact-C and --u-artefact-K (or [evemu] artefact_C and u_artefact_K in {})",
+                  silent.empty() ? "" : silent + "; ", arguments.machine));
+  return fault.empty() ? Result<void>{} : fail(ErrorCode::BadInput, fault);
 }
 
 Result<void> observe_touches(const IdentifyEvemuArguments& arguments, const evemu::Machine& machine,
@@ -88,7 +92,8 @@ Result<void> observe_touches(const IdentifyEvemuArguments& arguments, const evem
   const auto calibrator = read_calibrator_toml(arguments.calibrator);
   if (!calibrator) return tl::make_unexpected(calibrator.error());
   if (const auto fine =
-          check_artefact(arguments, calibrator->calibrator, options.artefact_temperature.has_value());
+          check_artefact(arguments, calibrator->calibrator, options.artefact_temperature.has_value(),
+                         silent_sensor(arguments, input.config));
       !fine)
     return fine;
   const auto touches = read_touches_csv(arguments.touches);
@@ -135,10 +140,10 @@ Result<Input> from_files(const IdentifyEvemuArguments& arguments) {
   if (!machine) return tl::make_unexpected(machine.error());
   auto options = observe_options(arguments, config->evemu, config->evemu.positions.size());
   options.artefact_temperature = artefact_temperature(arguments, config->evemu);
+  input.config = std::move(*config);
   const auto observe = arguments.touches.empty() ? observe_errors : observe_touches;
   if (const auto observed = observe(arguments, *machine, options, input); !observed)
     return tl::make_unexpected(observed.error());
-  input.config = std::move(*config);
   return input;
 }
 
@@ -234,6 +239,9 @@ Result<Outcome> identify(const IdentifyEvemuArguments& arguments) {
   auto verdict = evemu::judge(input->observations, *solution, other.model, *judging);
   if (!verdict) return tl::make_unexpected(error_of(verdict.error()));
   other.say(*verdict);
+  if (const auto silent = silent_sensor(arguments, input->config); !silent.empty())
+    verdict->notes.push_back(
+        fmt::format("how warm the array was is not known: {}; --artefact-C says it", silent));
   return Outcome{std::move(input->config), std::move(input->sources), std::move(input->observations),
                  std::move(*solution), std::move(*verdict)};
 }
@@ -282,7 +290,7 @@ std::string artefact_text(const evemu::ArtefactUncertainty& artefact) {
   return e ? fmt::format(", at {:.3f} C (u = {:.3f} K) longer by {:.2f} um per metre (u = {:.2f})",
                          e->temperature_K - kZeroCelsius_K, e->u_temperature_K,
                          kUmPerM * (calib::growth(*e) - 1.0), kUmPerM * calib::u_growth(*e))
-           : ", counts as at 20 C";
+           : ", its temperature not known: counts as at 20 C";
 }
 
 void print_json(const Outcome& outcome, const ModelDocument& document, const std::filesystem::path& folder) {

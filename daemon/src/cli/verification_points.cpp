@@ -13,6 +13,7 @@
 #include "cli/interruption.hpp"
 #include "cli/opened_recording.hpp"
 #include "cli/terminal.hpp"
+#include "json_vector.hpp"
 
 namespace abbe::daemon {
 namespace {
@@ -23,10 +24,6 @@ using nlohmann::json;
 using Keep = std::function<Result<void>(const VerificationFile&)>;
 
 constexpr auto kLookAtPoints = 200ms;
-
-calib::Vector3 vector_of(const json& list) {
-  return {list.at(0).get<double>(), list.at(1).get<double>(), list.at(2).get<double>()};
-}
 
 void tell(std::size_t number, const json& point) {
   const calib::Vector3 q_mm = 1e3 * vector_of(point.at("reading_m"));

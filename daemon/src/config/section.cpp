@@ -25,7 +25,7 @@ std::string type_text(const toml::node& node) {
   return "a date or time";
 }
 
-std::optional<double> number(const toml::node& node) {
+std::optional<double> number_in(const toml::node& node) {
   if (!node.is_number()) return std::nullopt;
   return node.value<double>();
 }
@@ -103,7 +103,7 @@ std::vector<Section> Section::children(std::string_view key) {
 bool Section::get(std::string_view key, double& out, Unit unit, Bounds bounds, Need need) {
   const toml::node* node = find(key, need);
   if (node == nullptr) return false;
-  const auto value = number(*node);
+  const auto value = number_in(*node);
   if (!value) {
     fault_at(node->source().begin, key, fmt::format("must be a number, not {}", type_text(*node)));
     return false;
@@ -164,7 +164,7 @@ bool Section::get(std::string_view key, std::vector<double>& out, Unit unit, Nee
   }
   std::vector<double> values;
   for (const auto& element : *array) {
-    const auto value = number(element);
+    const auto value = number_in(element);
     if (value && std::isfinite(*value))
       values.push_back(*value / unit.per_si);
     else

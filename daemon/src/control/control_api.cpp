@@ -88,19 +88,19 @@ json model_json(const ModelStanding& standing) {
   return out;
 }
 
-/// NaN has no place in JSON: null.
-json number(double value) {
+/// NaN has no place in JSON.
+json number_or_null(double value) {
   return std::isnan(value) ? json{} : json(value);
 }
 
 json environment_json(const protocol::Snapshot& live, const Config& config) {
   const auto& e = live.environment;
-  json out{{"air_temperature_C", number(e.air_temperature_K - kZeroCelsius_K)},
-           {"air_pressure_hPa", number(e.air_pressure_Pa * 1e-2)},
-           {"relative_humidity_percent", number(e.relative_humidity * 1e2)}};
+  json out{{"air_temperature_C", number_or_null(e.air_temperature_K - kZeroCelsius_K)},
+           {"air_pressure_hPa", number_or_null(e.air_pressure_Pa * 1e-2)},
+           {"relative_humidity_percent", number_or_null(e.relative_humidity * 1e2)}};
   json temperatures = json::object();
   for (std::size_t i = 0; i < config.temperatures.size(); ++i)
-    temperatures[config.temperatures[i]] = number(e.temperature_K[i] - kZeroCelsius_K);
+    temperatures[config.temperatures[i]] = number_or_null(e.temperature_K[i] - kZeroCelsius_K);
   out["temperatures_C"] = std::move(temperatures);
   if (const auto index = index_of_air(e, config.air))
     out["refractive_index"] = {{"n", index->n}, {"u_n", index->u_n}};

@@ -78,7 +78,7 @@ void add_array(HtmlReport& page, const evemu::ArtefactUncertainty& artefact) {
                   {"longer than at 20 C by the factor",
                    fmt::format("{:.9f}, u = {:.2g}", calib::growth(*e), calib::u_growth(*e))}});
   } else {
-    facts.emplace_back("temperature", "counts as 20 C");
+    facts.emplace_back("temperature", "not known; counts as 20 C");
   }
   page.facts(facts);
 }

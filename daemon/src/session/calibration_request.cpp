@@ -4,6 +4,8 @@
 
 #include <nlohmann/json.hpp>
 
+#include "json_vector.hpp"
+
 namespace abbe::daemon {
 namespace {
 
@@ -15,11 +17,6 @@ constexpr std::string_view kPrefix = "calibration-", kSuffix = ".json";
 
 json xyz(const Vector3& v) {
   return {v.x(), v.y(), v.z()};
-}
-
-Vector3 vector_of(const json& list) {
-  const auto v = list.get<std::array<double, 3>>();
-  return {v[0], v[1], v[2]};
 }
 
 json to_json(const evemu::Calibrator& c) {

@@ -24,27 +24,19 @@ evemu::JudgeOptions judge_options(const Config& config) {
   return options;
 }
 
-/// One without the other cannot be meant.
-Result<void> check_temperature(const evemu::Calibrator& calibrator,
-                               const std::optional<ArtefactTemperatureConfig>& artefact) {
-  if (calibrator.expansivity && !artefact) {
-    return fail(
-        ErrorCode::Refused,
-        fmt::format("calibrate evemu: calibrator \"{}\" has alpha_um_per_m_K, but nothing says how warm "
-                    "the array is: add artefact_sensor or artefact_C, and u_artefact_K, to [evemu]",
-                    calibrator.name));
-  }
-  if (artefact && !calibrator.expansivity) {
-    return fail(
-        ErrorCode::Refused,
-        fmt::format("calibrate evemu: [evemu] {} says how warm the array is, but calibrator \"{}\" does "
-                    "not say how it grows: add alpha_um_per_m_K and u_alpha_um_per_m_K to its file",
-                    artefact->sensor ? "artefact_sensor" : "artefact_C", calibrator.name));
-  }
+}  // namespace
+
+std::string warmth_fault(const evemu::Calibrator& calibrator, std::string_view named,
+                         std::string_view thermometer, std::string_view remedy) {
+  if (calibrator.expansivity && thermometer.empty())
+    return fmt::format("{} has alpha_um_per_m_K, but nothing says how warm the array is: {}", named, remedy);
+  if (!calibrator.expansivity && !thermometer.empty())
+    return fmt::format(
+        "{} says how warm the array is, but {} does not say how it grows: add alpha_um_per_m_K and "
+        "u_alpha_um_per_m_K to its file",
+        thermometer, named);
   return {};
 }
-
-}  // namespace
 
 evemu::TouchPlan touch_plan(const EvemuConfig& config) {
   return {config.positions, config.points_per_ball, config.points_per_block};
@@ -76,7 +68,14 @@ Result<void> check_evemu(const EvemuRequest& request, const Config& config) {
                 "true): switch that off first, and say so in the configuration");
   }
   if (const auto machine = evemu_machine(config.machine); !machine) return tl::unexpected(machine.error());
-  if (auto fine = check_temperature(request.calibrator, config.evemu.artefact); !fine) return fine;
+  const auto& artefact = config.evemu.artefact;
+  const auto fault =
+      warmth_fault(request.calibrator, fmt::format("calibrator \"{}\"", request.calibrator.name),
+                   !artefact          ? ""
+                   : artefact->sensor ? "[evemu] artefact_sensor"
+                                      : "[evemu] artefact_C",
+                   "add artefact_sensor or artefact_C, and u_artefact_K, to [evemu]");
+  if (!fault.empty()) return fail(ErrorCode::Refused, "calibrate evemu: " + fault);
   const auto guide = evemu::TouchGuide::create(request.calibrator, request.plan);
   if (!guide) return fail(ErrorCode::BadInput, "calibrate evemu: " + guide.error().text);
   return {};

@@ -3,6 +3,9 @@
 /// [evemu], the same for a live session and its replay. Pure and deterministic. A tenth of a second with the
 /// default estimator, seconds with lasso, mcp, scad; runs on a thread of its own in the daemon.
 
+#include <string>
+#include <string_view>
+
 #include "abbe/calib/evemu/judge.hpp"
 #include "abbe/daemon/config.hpp"
 #include "abbe/daemon/error.hpp"
@@ -25,6 +28,11 @@ struct EvemuCandidate {
 /// Refused or BadInput if no model would come of it: no probe, a machine that has corrected its positions, an
 /// array that grows nobody knows how far.
 [[nodiscard]] Result<void> check_evemu(const EvemuRequest& request, const Config& config);
+/// How the array grows and how warm it is: one without the other cannot be meant. What is wrong, else empty.
+/// `named`: the calibrator, for people. `thermometer`: what says how warm it is; empty: nothing does.
+/// `remedy`: how to have it said.
+[[nodiscard]] std::string warmth_fault(const calib::evemu::Calibrator& calibrator, std::string_view named,
+                                       std::string_view thermometer, std::string_view remedy);
 [[nodiscard]] EvemuAcquisitionOptions evemu_acquisition_options(const Config& config);
 
 }  // namespace abbe::daemon

@@ -1,0 +1,17 @@
+#pragma once
+/// A place or direction in JSON: [x, y, z].
+
+#include <array>
+#include <nlohmann/json.hpp>
+
+#include "abbe/calib/geometry.hpp"
+
+namespace abbe::daemon {
+
+/// Throws what nlohmann::json throws.
+[[nodiscard]] inline calib::Vector3 vector_of(const nlohmann::json& list) {
+  const auto v = list.get<std::array<double, 3>>();
+  return {v[0], v[1], v[2]};
+}
+
+}  // namespace abbe::daemon

@@ -91,9 +91,8 @@ Result<void> observe_touches(const IdentifyEvemuArguments& arguments, const evem
                              const evemu::ObserveOptions& options, Input& input) {
   const auto calibrator = read_calibrator_toml(arguments.calibrator);
   if (!calibrator) return tl::make_unexpected(calibrator.error());
-  if (const auto fine =
-          check_artefact(arguments, calibrator->calibrator, options.artefact_temperature.has_value(),
-                         silent_sensor(arguments, input.config));
+  if (auto fine = check_artefact(arguments, calibrator->calibrator, options.artefact_temperature.has_value(),
+                                 silent_sensor(arguments, input.config));
       !fine)
     return fine;
   const auto touches = read_touches_csv(arguments.touches);

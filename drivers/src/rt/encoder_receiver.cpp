@@ -10,7 +10,6 @@
 
 namespace abbe::drivers {
 
-using protocol::AxisSample;
 using protocol::HostTime;
 using protocol::SampleFlag;
 

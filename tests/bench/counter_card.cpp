@@ -147,7 +147,7 @@ Result measure(std::uint16_t port, double rate_hz, std::chrono::duration<double>
     while (!stop) {
       device.wait(50ms);
       device.receive();
-      if (streaming || device.samples().pushed() == 0) continue;
+      if (streaming || device.status().samples == 0) continue;
       begin = std::chrono::steady_clock::now();
       cpu_at_begin_s = thread_cpu_s();
       streaming = true;

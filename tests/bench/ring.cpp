@@ -8,7 +8,7 @@
 // of 16.
 //
 // The sample ring is boost's queue behind the rule of the house (drop, count, mark), so against boost the
-// question is what the rule costs: one count for each push, a marked copy after each full queue, which this
+// question is what the rule costs: a look at what was lost, a marked copy after each full queue, which this
 // writer meets often.
 //
 //   bench_ring [rounds = 41] [samples per run = 200000]

@@ -50,7 +50,8 @@ class TrackerRealTimePath : public testing::Test {
 
 TEST_F(TrackerRealTimePath, AllocatesNothingOverTenThousandPoints) {
   expect_no_allocation(1000, [this](std::size_t i) { turn(i); });
-  EXPECT_EQ(ring_.pushed(), 10'000u);
+  std::vector<protocol::TrackerPoint> out(ring_.capacity());
+  EXPECT_EQ(ring_.pop(out), 10'000u);
 }
 
 TEST_F(TrackerRealTimePath, MakesNoSystemCall) {

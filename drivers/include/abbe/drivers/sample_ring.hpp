@@ -1,8 +1,8 @@
 #pragma once
 /// The border between the two worlds: decoded samples from the real-time side to the ordinary side. One
-/// writer, one reader, wait-free on both sides: boost::lockfree::spsc_queue behind the rule of the house. Full
-/// means: drop, count, and mark the next sample that fits with GapBefore and `lost_before`. All memory is taken
-/// and touched by the constructor.
+/// writer, one reader, wait-free on both sides: boost::lockfree::spsc_queue behind the rule of the house.
+/// Full means: drop, count, and mark the next sample that fits with GapBefore and `lost_before`. All memory
+/// is taken and touched by the constructor.
 
 #include <algorithm>
 #include <atomic>
@@ -41,7 +41,6 @@ class SampleRing {
       drop(1);
       return false;
     }
-    count(1);
     return true;
   }
 
@@ -56,9 +55,7 @@ class SampleRing {
       }
       n = 1;
     }
-    const std::size_t more = queue_.push(samples.data() + n, samples.size() - n);
-    count(more);
-    n += more;
+    n += queue_.push(samples.data() + n, samples.size() - n);
     if (n < samples.size()) drop(samples.size() - n);
     return n;
   }
@@ -68,19 +65,12 @@ class SampleRing {
 
   [[nodiscard]] std::size_t capacity() const noexcept { return capacity_; }
   /// Any thread.
-  [[nodiscard]] std::uint64_t pushed() const noexcept {
-    return pushed_.load(std::memory_order_relaxed);  // relaxed: a count for people, orders nothing
-  }
-  /// Any thread.
   [[nodiscard]] std::uint64_t dropped() const noexcept {
     return dropped_.load(std::memory_order_relaxed);  // relaxed: a count for people, orders nothing
   }
 
  private:
   /// The writer is the only one who stores: no read-modify-write.
-  void count(std::size_t n) ABBE_RT {
-    pushed_.store(pushed_.load(std::memory_order_relaxed) + n, std::memory_order_relaxed);
-  }
   [[gnu::cold, gnu::noinline]] void drop(std::size_t n) ABBE_RT {
     lost_ += n;
     dropped_.store(dropped_.load(std::memory_order_relaxed) + n, std::memory_order_relaxed);
@@ -96,7 +86,6 @@ class SampleRing {
       return false;
     }
     lost_ = 0;
-    count(1);
     return true;
   }
 
@@ -107,7 +96,6 @@ class SampleRing {
   boost::lockfree::spsc_queue<T, Memory> queue_;
   /// Writer only: dropped since the last sample that fitted. Apart from the queue, which the reader reads.
   alignas(kNoSharing) std::uint64_t lost_ = 0;
-  std::atomic<std::uint64_t> pushed_{0};
   std::atomic<std::uint64_t> dropped_{0};
 };
 

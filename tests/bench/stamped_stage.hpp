@@ -1,7 +1,7 @@
 #pragma once
 /// The simulated devices at real speed, which note when the last TPDO of a cycle and the last byte of a burst
-/// left. The stamp is taken before the system call that sends (so the call itself counts against abbe) and
-/// after it.
+/// left. What leaves is made before; the stamps are taken just before and after it is sent, so that the
+/// system call itself counts against abbe.
 
 #include <poll.h>
 
@@ -9,6 +9,7 @@
 #include <chrono>
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <vector>
 
 #include "abbe/sim/encoder_bus.hpp"
@@ -40,6 +41,7 @@ class StampedStage {
     auto bus = sim::EncoderBus::open({.speed = 1.0}, nodes, stage->machine_, now);
     if (!bus) return tl::unexpected(bus.error());
     stage->bus_ = std::make_unique<sim::EncoderBus>(std::move(*bus));
+    for (auto& node : stage->bus_->nodes()) node.delay_until(sim::HostTime::max(), kOnTheBus);
     return stage;
   }
 
@@ -62,22 +64,31 @@ class StampedStage {
         std::clamp<std::chrono::nanoseconds>(due - clock_.now(), {}, std::chrono::milliseconds{50});
     const timespec timeout{0, wait.count()};
     ::ppoll(fds.data(), fds.size(), &timeout, nullptr);
-    if ((fds[0].revents & POLLIN) != 0) {
-      stamp(cycles_, [&] { bus_->poll(clock_.now()); });
-    } else {
-      bus_->poll(clock_.now());
-    }
+    turn_bus((fds[0].revents & POLLIN) != 0);
     turn_tracker();
   }
 
  private:
   explicit StampedStage(sim::PathMotion path) : machine_({}, std::move(path)) {}
 
+  /// What three TPDOs and their SYNC take at 1 Mbit/s: how long after the SYNC the last one ends.
+  static constexpr std::chrono::microseconds kOnTheBus{400};
+
   template <class Send>
   static void stamp(std::vector<Departure>& departures, Send&& send) {
     const std::int64_t before_ns = monotonic_ns();
     send();
     departures.push_back({before_ns, monotonic_ns()});
+  }
+
+  void turn_bus(bool asked) {
+    const auto now = clock_.now();
+    if (!asked && answers_due_ && now >= *answers_due_) {
+      answers_due_.reset();
+      return stamp(cycles_, [&] { bus_->poll(now); });
+    }
+    bus_->poll(now);
+    if (asked) answers_due_ = bus_->next_due();
   }
 
   /// The points are made first: what leaves afterwards is only the sending.
@@ -93,6 +104,7 @@ class StampedStage {
   sim::VirtualMachine machine_;
   std::unique_ptr<sim::TrackerServer> tracker_;
   std::unique_ptr<sim::EncoderBus> bus_;
+  std::optional<sim::HostTime> answers_due_;  ///< to the SYNC that came last
   std::vector<Departure> cycles_, bursts_;
 };
 

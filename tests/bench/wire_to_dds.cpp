@@ -1,10 +1,10 @@
 // From the wire to DDS: how long after the last TPDO of a cycle, or the last byte of a burst, left the
 // simulated device a subscriber in another process has the sample, through abbed and abbe-dds as they are
-// installed, against a bare Fast DDS hop in the same rhythm, before and after in the same run (the better one
-// counts). The hub looks every P, so a sample waits P/2 in the mean and P at most before anything can happen
-// to it.
-// What else runs on the machine shows in the tails of both: `nice -n -20 bench_wire_to_dds` lets the whole
-// chain and the bare hop alike go before it.
+// installed, against a bare Fast DDS hop of almost the same rhythm that goes on beside it all the while: a
+// shared machine wakes a sleeping process within 30 us in one minute and within 200 us in the next. The hop
+// is measured alone before, too. The hub looks every P, so a sample waits P/2 in the mean and P at most
+// before anything can happen to it. What else runs on the machine shows in the tails of both: `nice -n -20
+// bench_wire_to_dds` lets the whole chain and the bare hop alike go before it.
 //   bench_wire_to_dds [--short]
 #include <fcntl.h>
 #include <fmt/format.h>
@@ -41,14 +41,16 @@ using namespace std::chrono_literals;
 namespace fs = std::filesystem;
 
 constexpr auto kHubPeriod = 250us;
-constexpr auto kSyncPeriod = 10ms;  // 100 Hz: the processors stay idle between two cycles
-constexpr double kHops = 3.0;       // the limits: P/2 + 3 hops in the middle, P + 3 hops in 99 of 100
+constexpr auto kSyncPeriod = 10ms;    // 100 Hz: the processors stay idle between two cycles
+constexpr auto kHopPeriod = 10100us;  // wanders through the cycles: seldom in their way, never always
+constexpr double kHops = 3.0;         // the limits: P/2 + 3 hops in the middle, P + 3 hops in 99 of 100
 constexpr std::int64_t kLongest_ns = 200'000'000;
 
 struct Plan {
   std::size_t cycles = 2500;
   std::size_t bursts = 75;
-  std::size_t hops = 700;  ///< before, and as many after
+  std::size_t hops_alone = 700;
+  std::size_t hops_beside = 2400;  ///< last no longer than the cycles
 };
 
 double us(std::int64_t ns) {
@@ -259,8 +261,8 @@ bool both_flow(const SnapshotLog& log) {
 }
 
 /// The whole chain, from the first SYNC to the last arrival. False: said on stderr.
-bool run_chain(StampedStage& stage, SnapshotLog& log, ForkedTask& subscriber, std::uint32_t domain,
-               const Plan& plan) {
+bool run_chain(StampedStage& stage, SnapshotLog& log, ForkedTask& subscriber, ForkedTask& hop,
+               std::uint32_t domain, const Plan& plan) {
   RunFolder folder;
   std::ofstream(folder.path() / "abbed.toml") << configuration(stage, domain);
   subscriber.begin();
@@ -272,6 +274,7 @@ bool run_chain(StampedStage& stage, SnapshotLog& log, ForkedTask& subscriber, st
   }
   const auto settled = std::chrono::steady_clock::now() + 3s;  // the clock model, caches, discovery
   turn_until(stage, 10s, [&] { return std::chrono::steady_clock::now() > settled; });
+  hop.begin();
   stage.forget();
   const auto enough = [&] {
     return stage.cycles().size() >= plan.cycles && stage.bursts().size() >= plan.bursts;
@@ -326,11 +329,6 @@ class IdleShare {
   double idle_ = 0.0, all_ = 0.0;
 };
 
-/// The better of the two in each figure: a disturbed hop must not excuse abbe.
-HopResult better(const HopResult& a, const HopResult& b) {
-  return {a.received + b.received, std::min(a.p50_us, b.p50_us), std::min(a.p99_us, b.p99_us)};
-}
-
 /// True: both limits were held.
 bool print_verdict(std::string_view what, const Path& path, const HopResult& hop) {
   const double P = us(std::chrono::nanoseconds{kHubPeriod}.count());
@@ -374,22 +372,27 @@ void print_shares(std::string_view what, const Path& path, const DeviceLatency& 
 
 int main(int argc, char** argv) {
   Plan plan;
-  if (argc > 1 && std::string_view(argv[1]) == "--short") plan = {300, 8, 200};
+  if (argc > 1 && std::string_view(argv[1]) == "--short") plan = {300, 8, 200, 250};
   const auto domain = static_cast<std::uint32_t>(::getpid() % 200 + 1);
-  HopOptions hop_options{.samples = plan.hops, .warm_up = 100, .period = kSyncPeriod, .domain = domain + 1};
-  hop_options.profile = ABBE_LOOPBACK_PROFILE;
+  const auto hop_of = [domain](std::size_t samples) {
+    return HopOptions{.samples = samples,
+                      .warm_up = 20,
+                      .period = kHopPeriod,
+                      .domain = domain + 1,
+                      .profile = ABBE_LOOPBACK_PROFILE};
+  };
 
   // Every process is forked here, before anything starts a thread.
-  auto& before = shared_memory<HopResult>();
-  auto& after = shared_memory<HopResult>();
+  auto& alone = shared_memory<HopResult>();
+  auto& beside = shared_memory<HopResult>();
   auto& log = shared_memory<SnapshotLog>();
-  ForkedTask hop_before([&] { before = measure_dds_hop(hop_options); });
-  ForkedTask hop_after([&] { after = measure_dds_hop(hop_options); });
+  ForkedTask hop_alone([&] { alone = measure_dds_hop(hop_of(plan.hops_alone)); });
+  ForkedTask hop_beside([&] { beside = measure_dds_hop(hop_of(plan.hops_beside)); });
   ForkedTask subscriber([&] { subscribe(log, {domain, ABBE_LOOPBACK_PROFILE}); });
 
   const std::string load_before = load_average();
-  hop_before.begin();
-  hop_before.wait();
+  hop_alone.begin();
+  hop_alone.wait();
   const bool device_is_prompt = stand_for_hardware();
   auto stage = StampedStage::open();
   if (!stage) {
@@ -397,18 +400,16 @@ int main(int argc, char** argv) {
     return 1;
   }
   IdleShare idle;
-  if (!run_chain(**stage, log, subscriber, domain, plan)) return 1;
+  if (!run_chain(**stage, log, subscriber, hop_beside, domain, plan)) return 1;
   const double idle_percent = idle.percent();
-  hop_after.begin();
-  hop_after.wait();
-  if (before.received == 0 || after.received == 0) {
+  hop_beside.wait();
+  if (alone.received == 0 || beside.received == 0) {
     fmt::print(stderr, "bench_wire_to_dds: the bare hop found no subscriber\n");
     return 1;
   }
 
   if (!device_is_prompt)
     fmt::print("the simulator runs without SCHED_FIFO: its own delays count against abbe\n");
-  const HopResult hop = better(before, after);
   const Path encoder = encoder_path(log, (*stage)->cycles());
   const Path tracker = tracker_path(log, (*stage)->bursts());
   fmt::print(
@@ -417,15 +418,14 @@ int main(int argc, char** argv) {
       kHubPeriod.count(), std::chrono::microseconds{kSyncPeriod}.count(), encoder.whole.size(),
       tracker.whole.size(), load_before, load_average(), idle_percent);
   fmt::print(
-      "bare Fast DDS hop, {} B every {} us, us: p50 {:.1f} p99 {:.1f} before, p50 {:.1f} p99 {:.1f} "
-      "after\n\n",
-      hop::kMessageBytes, hop_options.period.count(), before.p50_us, before.p99_us, after.p50_us,
-      after.p99_us);
+      "bare Fast DDS hop, {} B every {} us, us: p50 {:.1f} p99 {:.1f} beside, p50 {:.1f} p99 {:.1f} alone "
+      "before\n\n",
+      hop::kMessageBytes, kHopPeriod.count(), beside.p50_us, beside.p99_us, alone.p50_us, alone.p99_us);
   fmt::print("  {:<8} {:<30} {:>8} {:>9}   {:>5}\n", "device", "limit, us", "asked", "measured", "ratio");
-  const bool encoder_held = print_verdict("encoder", encoder, hop);
-  const bool tracker_held = print_verdict("tracker", tracker, hop);
+  const bool encoder_held = print_verdict("encoder", encoder, beside);
+  const bool tracker_held = print_verdict("tracker", tracker, beside);
   fmt::print("\n  {:<8} {:<36} {:>7} {:>8}\n", "device", "share, us", "p50", "p99");
-  print_shares("encoder", encoder, log.encoder, hop);
-  print_shares("tracker", tracker, log.tracker, hop);
+  print_shares("encoder", encoder, log.encoder, beside);
+  print_shares("tracker", tracker, log.tracker, beside);
   return encoder_held && tracker_held ? 0 : 1;
 }

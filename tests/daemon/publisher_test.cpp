@@ -53,6 +53,11 @@ class PublisherTest : public ::testing::Test {
     far_.emplace(directory_ / "dds.sock");
     publisher_->beat(kWall);
   }
+  void publish_live(const protocol::Snapshot& view, const ModelStanding& standing, protocol::HostTime now,
+                    Publisher::WallTime wall) {
+    publisher_->snapshot(view, now, wall);
+    publisher_->compensation(view, standing, now, wall);
+  }
   template <class T>
   std::vector<T> taken(Topic topic) {
     return messages<T>(far_->take(), topic);
@@ -66,7 +71,7 @@ class PublisherTest : public ::testing::Test {
 TEST_F(PublisherTest, LiveVectorsKeepToTheirRates) {
   std::size_t snapshots = 0, compensations = 0;
   for (auto t = 0ms; t < 1s; t += 1ms) {
-    publisher_->live(view(), active(), kNow + t, kWall + t);
+    publish_live(view(), active(), kNow + t, kWall + t);
     const auto seen = far_->take();
     snapshots += messages<v1::Snapshot>(seen, Topic::Snapshot).size();
     compensations += messages<v1::Compensation>(seen, Topic::Compensation).size();
@@ -77,7 +82,7 @@ TEST_F(PublisherTest, LiveVectorsKeepToTheirRates) {
 
 TEST_F(PublisherTest, ARateOfZeroIsEveryTime) {
   open({.machine = "mill", .snapshot_hz = 0.0, .compensation_hz = 0.0});
-  for (int i = 0; i < 5; ++i) publisher_->live(view(), active(), kNow, kWall);
+  for (int i = 0; i < 5; ++i) publish_live(view(), active(), kNow, kWall);
   const auto seen = far_->take();
   EXPECT_THAT(messages<v1::Snapshot>(seen, Topic::Snapshot), SizeIs(5));
   EXPECT_THAT(messages<v1::Compensation>(seen, Topic::Compensation), SizeIs(5));
@@ -86,7 +91,7 @@ TEST_F(PublisherTest, ARateOfZeroIsEveryTime) {
 TEST_F(PublisherTest, ACompensationCarriesTheStateOfTheModel) {
   auto standing = active();
   standing.status = ModelStatus::MODEL_STALE;
-  publisher_->live(view(), standing, kNow + 2ms, kWall);
+  publish_live(view(), standing, kNow + 2ms, kWall);
   const auto sent = taken<v1::Compensation>(Topic::Compensation);
   ASSERT_THAT(sent, SizeIs(1));
   EXPECT_EQ(sent[0].state(), ModelStatus::MODEL_STALE);
@@ -96,14 +101,14 @@ TEST_F(PublisherTest, ACompensationCarriesTheStateOfTheModel) {
 TEST_F(PublisherTest, WithAnAxisMissingNoCompensationIsActive) {
   auto broken = view();
   broken.missing_mask = 0b010;
-  publisher_->live(broken, active(), kNow, kWall);
+  publish_live(broken, active(), kNow, kWall);
   const auto sent = taken<v1::Compensation>(Topic::Compensation);
   ASSERT_THAT(sent, SizeIs(1));
   EXPECT_EQ(sent[0].state(), ModelStatus::MODEL_STALE);
 }
 
 TEST_F(PublisherTest, WithoutAxesThereIsASnapshotAndNoCompensation) {
-  publisher_->live({}, active(), kNow, kWall);
+  publish_live({}, active(), kNow, kWall);
   const auto seen = far_->take();
   EXPECT_THAT(messages<v1::Snapshot>(seen, Topic::Snapshot), SizeIs(1));
   EXPECT_THAT(messages<v1::Compensation>(seen, Topic::Compensation), SizeIs(0));
@@ -149,7 +154,7 @@ TEST_F(PublisherTest, TheAgeOfAModelCountsFromItsActivation) {
 
 TEST_F(PublisherTest, AMessageOutsideItsBoundsIsCountedAndNamed) {
   open({.machine = std::string(65, 'm')});
-  publisher_->live(view(), active(), kNow, kWall);
+  publish_live(view(), active(), kNow, kWall);
   EXPECT_EQ(publisher_->link().counters().refused, 2u);
   EXPECT_THAT(publisher_->refusal(), testing::HasSubstr("machine"));
 }

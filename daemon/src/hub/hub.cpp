@@ -121,14 +121,18 @@ void Hub::touch(std::size_t points_left, WallTime wall) {
 }
 
 void Hub::publish(bool fresh, HostTime now, WallTime wall) {
-  if (fresh && parts_.publisher != nullptr) parts_.publisher->live(live_.view(), standing(), now, wall);
+  Publisher* const publisher = parts_.publisher;
+  if (fresh && publisher != nullptr) {
+    publisher->snapshot(live_.view(), now, wall);
+    publisher->compensation(live_.view(), standing(), now, wall);
+  }
   if (wall >= next_health_) {
     next_health_ = wall + kHealthPeriod;
     (void)parts_.authority.follow_store(now);
     collect_health(now);
-    if (parts_.publisher != nullptr) parts_.publisher->health(health_, now);
+    if (publisher != nullptr) publisher->health(health_, now);
   }
-  if (parts_.publisher != nullptr) parts_.publisher->model(standing(), now, wall);
+  if (publisher != nullptr) publisher->model(standing(), now, wall);
 }
 
 void Hub::collect_health(HostTime now) {

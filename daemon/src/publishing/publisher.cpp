@@ -42,11 +42,13 @@ void Publisher::beat(WallTime wall) {
   link_.beat(wall);
 }
 
-void Publisher::live(const protocol::Snapshot& view, const ModelStanding& standing, protocol::HostTime now,
-                     WallTime wall) {
-  if (due(next_snapshot_, wall, period(options_.snapshot_hz))) {
+void Publisher::snapshot(const protocol::Snapshot& view, protocol::HostTime now, WallTime wall) {
+  if (due(next_snapshot_, wall, period(options_.snapshot_hz)))
     send(Topic::Snapshot, snapshot_message(view, utc_, stamp(now)));
-  }
+}
+
+void Publisher::compensation(const protocol::Snapshot& view, const ModelStanding& standing,
+                             protocol::HostTime now, WallTime wall) {
   if (view.axis_count < 3 || !due(next_compensation_, wall, period(options_.compensation_hz))) return;
   send(Topic::Compensation, compensation_message(standing.status, standing.model, view,
                                                  options_.tool_offset_m, options_.validity, stamp(now)));

@@ -49,9 +49,10 @@ class Publisher {
 
   /// Every turn, first thing: says the daemon is alive and lets the link breathe.
   void beat(WallTime wall);
-  /// Every turn in which something new came.
-  void live(const protocol::Snapshot& view, const ModelStanding& standing, protocol::HostTime now,
-            WallTime wall);
+  /// Every turn in which something new came; the snapshot first, subscribers wait for it.
+  void snapshot(const protocol::Snapshot& view, protocol::HostTime now, WallTime wall);
+  void compensation(const protocol::Snapshot& view, const ModelStanding& standing, protocol::HostTime now,
+                    WallTime wall);
   /// Every turn.
   void model(const ModelStanding& standing, protocol::HostTime now, WallTime wall);
   void health(std::span<const StreamHealth> streams, protocol::HostTime now);

@@ -1,6 +1,6 @@
-// Five axes and their SYNC at 1 kHz over UDP, for as long as wanted, on this computer and in its own time:
-// the one test of this folder that needs no guest. scripts/soak runs it; a computer that is busy with other
-// things may fail it.
+// Five axes and their SYNC at 1 kHz over UDP, for as long as wanted: in the guest, in virtual time, and by
+// scripts/soak also on this computer and in its own time, where other work, or a hypervisor that takes the
+// processor away for more than a period, may fail it.
 //
 // ABBE_HIL_SECONDS: default 5.
 

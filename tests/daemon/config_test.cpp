@@ -223,6 +223,15 @@ TEST(Config, KnowsTheTwoModesOfATracker) {
               ElementsAre(HasSubstr("tracker.stationary_time_ms")));
 }
 
+TEST(Config, LeavesTheProcessorsSleepToTheSystemUnlessTold) {
+  EXPECT_FALSE(parse_config(kMachine, "abbed.toml")->daemon.cpu_latency);
+  const auto config = parse_config(kMachine + "[daemon]\ncpu_latency_us = 0\n", "abbed.toml");
+  ASSERT_TRUE(config);
+  EXPECT_EQ(config->daemon.cpu_latency, std::chrono::microseconds{0});
+  EXPECT_THAT(faults_of(kMachine + "[daemon]\ncpu_latency_us = -1\n"),
+              ElementsAre(HasSubstr("daemon.cpu_latency_us")));
+}
+
 TEST(Config, RefusesPeriodsTheLivenessRulesForbid) {
   EXPECT_THAT(faults_of(kMachine + "[daemon]\nhub_period_us = 60000\n"),
               ElementsAre(HasSubstr("hub_period_us")));

@@ -25,6 +25,7 @@
 #include "abbe/daemon/hub.hpp"
 #include "abbe/daemon/old_recordings.hpp"
 #include "abbe/daemon/work_aside.hpp"
+#include "abbe/drivers/cpu_latency.hpp"
 #include "control/control_server.hpp"
 #include "control/unix_socket.hpp"
 #include "session/outcome.hpp"
@@ -115,6 +116,7 @@ struct Abbed::State {
   drivers::MonotonicTime time;
   protocol::UtcOffset utc;
   std::vector<std::string> warnings;
+  std::optional<drivers::CpuLatencyBound> cpu_latency;
   std::optional<ModelAuthority> authority;
   std::unique_ptr<RecorderThread> recorder;
   std::optional<CalibrationService> calibration;
@@ -194,6 +196,22 @@ struct Abbed::State {
     return {};
   }
 
+  /// Before the devices are: a processor that sleeps deeply delays their first stamps, too.
+  Result<void> bound_cpu_latency() {
+    if (!config.daemon.cpu_latency) return {};
+    auto bound = drivers::CpuLatencyBound::request(*config.daemon.cpu_latency);
+    if (!bound) return refused_by_system({ErrorCode::Io, "cpu_latency_us: " + bound.error().text});
+    cpu_latency.emplace(std::move(*bound));
+    return {};
+  }
+
+  /// An error where real time is enforced, else a warning.
+  Result<void> refused_by_system(const Error& error) {
+    if (config.daemon.realtime == RealTimeMode::Enforce) return tl::unexpected(error);
+    warnings.push_back(error.text);
+    return {};
+  }
+
   Result<void> start_devices() {
     auto started = DeviceSet::start(config, time);
     if (!started) return tl::unexpected(started.error());
@@ -206,11 +224,8 @@ struct Abbed::State {
   /// The thread waits until there is a hub to run; whether it may have its priority is known before.
   Result<void> start_hub_thread() {
     hub_thread = std::thread([this, may_run = hub_may_run.get_future()]() mutable { run_hub(may_run); });
-    if (auto set = set_priority(hub_thread, config.daemon); !set) {
-      if (config.daemon.realtime == RealTimeMode::Enforce) return set;
-      warnings.push_back(set.error().text);
-    }
-    return {};
+    const auto set = set_priority(hub_thread, config.daemon);
+    return set ? set : refused_by_system(set.error());
   }
 
   Result<void> listen_control() {
@@ -287,9 +302,9 @@ Result<std::unique_ptr<Abbed>> Abbed::start(Config config, AbbedOptions options)
   }
   using Step = Result<void> (State::*)();
   // The recorder last of all that may refuse: a start that fails again and again leaves no files behind.
-  for (const Step step :
-       {&State::refuse_second_daemon, &State::open_models, &State::open_dds, &State::start_devices,
-        &State::start_hub_thread, &State::listen_control, &State::open_recorder, &State::run}) {
+  for (const Step step : {&State::refuse_second_daemon, &State::open_models, &State::open_dds,
+                          &State::bound_cpu_latency, &State::start_devices, &State::start_hub_thread,
+                          &State::listen_control, &State::open_recorder, &State::run}) {
     if (auto done = ((*state).*step)(); !done) return tl::unexpected(done.error());
   }
   return std::unique_ptr<Abbed>{new Abbed{std::move(state)}};

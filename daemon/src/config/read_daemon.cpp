@@ -28,6 +28,8 @@ void read_scheduling(Section& section, DaemonConfig& out) {
   read_cpu(section, "tracker_cpu", out.tracker_cpu);
   read_cpu(section, "encoder_cpu", out.encoder_cpu);
   read_cpu(section, "hub_cpu", out.hub_cpu);
+  if (int us = 0; section.get_integer("cpu_latency_us", us, 0, 10'000))
+    out.cpu_latency = std::chrono::microseconds{us};
 }
 
 }  // namespace

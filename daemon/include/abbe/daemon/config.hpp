@@ -241,6 +241,7 @@ struct DaemonConfig {
   std::optional<int> tracker_cpu;  ///< the core the thread is bound to
   std::optional<int> encoder_cpu;
   std::optional<int> hub_cpu;
+  std::optional<std::chrono::microseconds> cpu_latency;  ///< bound on a processor's waking; none: not asked for
 };
 
 /// [recording]

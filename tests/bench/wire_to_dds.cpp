@@ -47,10 +47,10 @@ constexpr double kHops = 3.0;         // the limits: P/2 + 3 hops in the middle,
 constexpr std::int64_t kLongest_ns = 200'000'000;
 
 struct Plan {
-  std::size_t cycles = 2500;
-  std::size_t bursts = 75;
+  std::size_t cycles = 6500;
+  std::size_t bursts = 200;
   std::size_t hops_alone = 700;
-  std::size_t hops_beside = 2400;  ///< last no longer than the cycles
+  std::size_t hops_beside = 6200;  ///< last no longer than the cycles
 };
 
 double us(std::int64_t ns) {

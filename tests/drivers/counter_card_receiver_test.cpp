@@ -217,6 +217,37 @@ TEST_F(CounterCardReceiverTest, FindsTheRestartAlsoWhereALateBatchHidTheJump) {
   EXPECT_FALSE(has(scans[1].axes.head.flags, SampleFlag::Restarted));
 }
 
+TEST_F(CounterCardReceiverTest, AShorterGapAfterTheRestartDoesNotHideIt) {
+  start();
+  for (int i = 0; i < 50; ++i) push(card_.scans(40));
+  card_.lose(3'000);  // 75 ms
+  now_ += 100ms;
+  push(card_.scans(40));
+  card_.lose(1'200);  // 30 ms, which pass
+  now_ += 30ms;
+  push(card_.scans(40));
+  ASSERT_EQ(receiver_.counters().clock_jumps, 0u);
+  now_ -= 100ms;
+  const auto scans = push(card_.scans(40));
+  ASSERT_FALSE(scans.empty());
+  EXPECT_EQ(receiver_.counters().clock_jumps, 1u);
+  EXPECT_TRUE(has(scans[0].axes.head.flags, SampleFlag::Restarted));
+}
+
+TEST_F(CounterCardReceiverTest, AClockThatWasLateForLongIsNoRestartForAGapBefore) {
+  start();
+  for (int i = 0; i < 50; ++i) push(card_.scans(40));
+  now_ += 200ms;  // from now on all come late
+  bool restarted = false;
+  for (int i = 0; i < 6'000 && receiver_.counters().clock_jumps == 0; ++i) {
+    if (i == 4'800) card_.lose(1'200);  // 30 ms
+    for (const auto& scan : push(card_.scans(40)))
+      restarted = restarted || has(scan.axes.head.flags, SampleFlag::Restarted);
+  }
+  EXPECT_EQ(receiver_.counters().clock_jumps, 1u);
+  EXPECT_FALSE(restarted);
+}
+
 TEST_F(CounterCardReceiverTest, AnEarlierGapThatIsShorterThanTheJumpIsNotItsCause) {
   start();
   now_ += 200ms;  // the host was busy when the first came

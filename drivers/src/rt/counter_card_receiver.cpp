@@ -168,7 +168,18 @@ void CounterCardReceiver::count_lost(std::uint64_t clock_step, CounterScan& scan
   const double gap_s = static_cast<double>(lost) * metronome_.step / clock_hz_;
   // Half the jump: what the clock model calls one is not sharp.
   if (gap_s >= 0.5 * std::chrono::duration<double>(ClockModelOptions{}.jump).count())
-    long_gap_ = {scan.clock_count + static_cast<std::int64_t>(clock_step), gap_s};
+    keep_gap({scan.clock_count + static_cast<std::int64_t>(clock_step), gap_s});
+}
+
+/// A restart may be followed by a shorter gap before it is seen.
+void CounterCardReceiver::keep_gap(const LongGap& gap) ABBE_RT {
+  const bool longer_before = long_gap_ && long_gap_->length_s >= gap.length_s &&
+                             seconds_since(*long_gap_, gap.clock_count) < kJumpSeenWithin_s;
+  if (!longer_before) long_gap_ = gap;
+}
+
+double CounterCardReceiver::seconds_since(const LongGap& gap, std::int64_t clock_count) const ABBE_RT {
+  return static_cast<double>(clock_count - gap.clock_count) / clock_hz_;
 }
 
 void CounterCardReceiver::unwrap(const quad08::RawScan& raw, CounterScan& scan) ABBE_RT {
@@ -222,15 +233,15 @@ void CounterCardReceiver::stamp() ABBE_RT {
 
 /// Counts that went on in step, but for a gap too short for the jump, are those of the same card: only its
 /// relation to our clock began anew. A batch that came late may hide the jump: the gap was in one before, and
-/// is as long as the clock is ahead.
+/// is as long as the clock is ahead. A clock that is behind was late for long.
 void CounterCardReceiver::mark_restart(std::span<CounterScan> scans, double ahead_s) ABBE_RT {
   const auto gap = std::exchange(long_gap_, std::nullopt);
   if (!gap) return;
   const auto after = std::ranges::find(scans, gap->clock_count, &CounterScan::clock_count);
-  const double since_s = static_cast<double>(scans.back().clock_count - gap->clock_count) / clock_hz_;
+  const double since_s = seconds_since(*gap, scans.back().clock_count);
   if (after != scans.end()) {
     after->axes.head.flags |= SampleFlag::Restarted;
-  } else if (since_s < kJumpSeenWithin_s && gap->length_s >= ahead_s) {
+  } else if (ahead_s > 0.0 && since_s < kJumpSeenWithin_s && gap->length_s >= ahead_s) {
     scans.front().axes.head.flags |= SampleFlag::Restarted;
   }
 }

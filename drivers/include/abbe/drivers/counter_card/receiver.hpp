@@ -112,6 +112,8 @@ class CounterCardReceiver {
   void refuse(const quad08::RawScan& from, const quad08::RawScan& to) ABBE_RT;
   void accept(const quad08::RawScan& raw) ABBE_RT;
   void count_lost(std::uint64_t clock_step, CounterScan& scan) ABBE_RT;
+  void keep_gap(const LongGap& gap) ABBE_RT;
+  [[nodiscard]] double seconds_since(const LongGap& gap, std::int64_t clock_count) const ABBE_RT;
   void unwrap(const quad08::RawScan& raw, CounterScan& scan) ABBE_RT;
   void follow_latch(const quad08::RawScan& raw, std::int64_t previous_clock, CounterScan& scan) ABBE_RT;
   void stamp() ABBE_RT;
@@ -143,7 +145,7 @@ class CounterCardReceiver {
   std::optional<quad08::RawScan> candidate_;  ///< held back until the next one confirms it
   protocol::SampleFlags pending_flags_ = 0;
   bool stream_restarted_ = false;
-  std::optional<LongGap> long_gap_;  ///< the latest that may be a restart of the card
+  std::optional<LongGap> long_gap_;  ///< that may be a restart of the card: the longest of late
   CounterScan current_;              ///< counts go on from scan to scan
   std::array<CounterScan, kBatch> scans_{};
   std::size_t scan_count_ = 0;

@@ -4,8 +4,9 @@
 /// interrupt, and so its kernel time stamp, is late. Ordinary world.
 
 #include <chrono>
+#include <cstdio>
 #include <filesystem>
-#include <fstream>
+#include <memory>
 
 #include "abbe/drivers/error.hpp"
 
@@ -13,7 +14,7 @@ namespace abbe::drivers {
 
 inline constexpr const char* kCpuLatencyFile = "/dev/cpu_dma_latency";
 
-/// As long as it lives.
+/// As long as it lives; no child inherits it.
 class CpuLatencyBound {
  public:
   /// 0: processors without work spin instead of sleeping. Error: the file and what refused it.
@@ -21,9 +22,13 @@ class CpuLatencyBound {
                                                        const std::filesystem::path& file = kCpuLatencyFile);
 
  private:
-  explicit CpuLatencyBound(std::fstream held) : held_(std::move(held)) {}
+  struct Close {
+    void operator()(std::FILE* file) const noexcept { std::fclose(file); }
+  };
+  using File = std::unique_ptr<std::FILE, Close>;
+  explicit CpuLatencyBound(File held) : held_(std::move(held)) {}
 
-  std::fstream held_;  ///< closed: the bound is gone
+  File held_;  ///< closed: the bound is gone
 };
 
 }  // namespace abbe::drivers

@@ -98,6 +98,18 @@ TEST_F(PublisherTest, ACompensationCarriesTheStateOfTheModel) {
   EXPECT_EQ(sent[0].age_ns(), 2'000'000);
 }
 
+TEST_F(PublisherTest, WhatTakesAVectorBackWaitsForNoRate) {
+  publish_live(view(), active(), kNow, kWall);
+  auto broken = view();
+  broken.missing_mask = 0b010;
+  publish_live(broken, active(), kNow + 1ms, kWall + 1ms);
+  const auto seen = far_->take();
+  EXPECT_THAT(messages<v1::Snapshot>(seen, Topic::Snapshot), SizeIs(2));
+  const auto sent = messages<v1::Compensation>(seen, Topic::Compensation);
+  ASSERT_THAT(sent, SizeIs(2));
+  EXPECT_EQ(sent[1].state(), ModelStatus::MODEL_STALE);
+}
+
 TEST_F(PublisherTest, WithAnAxisMissingNoCompensationIsActive) {
   auto broken = view();
   broken.missing_mask = 0b010;

@@ -58,7 +58,10 @@ void Assembler::take(const AxisSample& sample) {
   if (same == axes_.end() || same->head.time != sample.head.time) {
     axes_.insert(same, sample);
   } else if (std::popcount(sample.missing_mask) > std::popcount(same->missing_mask)) {
+    const auto gap = same->head;
     *same = sample;
+    same->head.lost_before = std::max(gap.lost_before, sample.head.lost_before);
+    if (has(gap.flags, SampleFlag::GapBefore)) same->head.flags |= SampleFlag::GapBefore;
   }
 }
 

@@ -15,14 +15,15 @@ std::chrono::nanoseconds period(double rate_hz) {
   return rate_hz > 0.0 ? std::chrono::nanoseconds{static_cast<std::int64_t>(1e9 / rate_hz)} : 0ns;
 }
 
-/// True when it is time; the next time is a period after this one, not after the one that was due.
-bool due(Publisher::WallTime& next, Publisher::WallTime now, std::chrono::nanoseconds period) {
-  if (now < next) return false;
-  next = now + period;
+}  // namespace
+
+/// The next time is a period after this one, not after the one that was due.
+bool Publisher::due(Pace& pace, const protocol::Snapshot& view, WallTime now, double rate_hz) {
+  const bool takes_back = view.head.time == pace.time && view.missing_mask != pace.missing_mask;
+  if (now < pace.next && !takes_back) return false;
+  pace = {now + period(rate_hz), view.head.time, view.missing_mask};
   return true;
 }
-
-}  // namespace
 
 Publisher::Publisher(DdsLink link, PublisherOptions options, protocol::UtcOffset utc)
     : link_(std::move(link)), options_(std::move(options)), utc_(utc) {}
@@ -43,13 +44,13 @@ void Publisher::beat(WallTime wall) {
 }
 
 void Publisher::snapshot(const protocol::Snapshot& view, protocol::HostTime now, WallTime wall) {
-  if (due(next_snapshot_, wall, period(options_.snapshot_hz)))
+  if (due(snapshots_, view, wall, options_.snapshot_hz))
     send(Topic::Snapshot, snapshot_message(view, utc_, stamp(now)));
 }
 
 void Publisher::compensation(const protocol::Snapshot& view, const ModelStanding& standing,
                              protocol::HostTime now, WallTime wall) {
-  if (view.axis_count < 3 || !due(next_compensation_, wall, period(options_.compensation_hz))) return;
+  if (view.axis_count < 3 || !due(compensations_, view, wall, options_.compensation_hz)) return;
   send(Topic::Compensation, compensation_message(standing.status, standing.model, view,
                                                  options_.tool_offset_m, options_.validity, stamp(now)));
 }

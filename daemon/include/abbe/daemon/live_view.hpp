@@ -31,6 +31,7 @@ class LiveView {
 
  private:
   void take(const protocol::AxisSample& sample);
+  void take_back(const protocol::AxisSample& sample);
 
   drivers::InterpolationOptions interpolation_;
   EnvironmentUseOptions use_;

@@ -73,8 +73,14 @@ class Publisher {
   std::vector<std::byte> payload_;  // reused
   std::string refusal_;
   std::uint64_t sequence_number_ = 0;
-  WallTime next_snapshot_{};
-  WallTime next_compensation_{};
+  /// How often a live vector may go; one that takes back what went before it goes at once.
+  struct Pace {
+    WallTime next{};
+    protocol::HostTime time{};
+    std::uint8_t missing_mask = 0;
+  };
+  static bool due(Pace& pace, const protocol::Snapshot& view, WallTime now, double rate_hz);
+  Pace snapshots_, compensations_;
   WallTime next_state_{};
   v1::ModelStatus sent_status_ = v1::ModelStatus::MODEL_NONE;
   std::string sent_reason_;

@@ -211,6 +211,26 @@ TEST(EncoderReceiver, ASampleThatHasLeftIsTakenBackByASecondAnswer) {
   EXPECT_EQ(line.samples.back().missing_mask, 0);
 }
 
+TEST(EncoderReceiver, AnswersBeforeTheFirstSyncAreNoSamples) {
+  Line line;
+  for (int i = 0; i < 3; ++i) line.frame(position(1, 1000 + i), kStart + 100us * i);
+  EXPECT_TRUE(line.samples.empty());
+  line.cycle(kStart + 1ms, 2000);
+  ASSERT_EQ(line.samples.size(), 1u);
+  EXPECT_EQ(line.samples[0].missing_mask, 0);
+}
+
+TEST(EncoderReceiver, AnswersToASyncNobodyHeardTakeNothingBack) {
+  Line line;
+  line.cycle(kStart, 1000);
+  for (const can::NodeId node : kNodes) line.frame(position(node, 2000), kStart + 1200us);
+  EXPECT_EQ(line.samples.size(), 1u);
+  line.cycle(kStart + 2ms, 3000);
+  ASSERT_EQ(line.samples.size(), 2u);
+  EXPECT_EQ(line.samples[1].missing_mask, 0);
+  EXPECT_EQ(line.samples[1].head.lost_before, 1u);
+}
+
 TEST(EncoderReceiver, TheFirstAnswerAfterAnUnansweredCycleIsDoubtful) {
   Line line;
   line.cycle(kStart, 1000);

@@ -20,7 +20,7 @@ using sim::FaultKind;
 using testing::HasSubstr;
 
 constexpr std::size_t kAxes = 5;
-// An answer that is late by a whole period looks like a prompt one: long enough for an emulated, loaded
+// An answer that is late by a whole period casts doubt on the next: long enough for an emulated, loaded
 // processor.
 constexpr auto kPeriod = 10ms;
 

@@ -10,6 +10,12 @@ namespace abbe::drivers {
 using protocol::HostTime;
 using protocol::RawBlock;
 
+namespace {
+
+constexpr auto kToldAgainAfter = std::chrono::seconds{1};
+
+}  // namespace
+
 Result<std::unique_ptr<EncoderDevice>> EncoderDevice::create(const EncoderDeviceOptions& options,
                                                              std::unique_ptr<CanBus> bus,
                                                              const TimeSource& time) {
@@ -190,16 +196,19 @@ void EncoderDevice::account(HostTime now) {
   }
   bus_seen_ = bus;
   missed_seen_ = missed;
-  tell_of(receiver_.counters().short_frames, short_seen_, "frames too short for a position", now);
-  tell_of(receiver_.counters().duplicate_frames, duplicates_seen_,
-          "second answers in a cycle: a node answers later than a SYNC period, or two have one number", now);
+  tell_of(receiver_.counters().short_frames, shorts_told_, "frames too short for a position", now);
+  tell_of(
+      receiver_.counters().duplicate_frames, duplicates_told_,
+      "second answers in a cycle: a node answers later than a SYNC period, a SYNC left late, somebody else "
+      "sends SYNCs, too, or two nodes have one number",
+      now);
 }
 
-void EncoderDevice::tell_of(std::uint64_t count, std::uint64_t& seen, std::string_view what, HostTime now) {
-  if (count == seen) return;
-  board_.faults.add(count - seen - 1);
-  board_.fault(now, fmt::format("CAN {}: read: {} {}", bus_->name(), count - seen, what));
-  seen = count;
+void EncoderDevice::tell_of(std::uint64_t count, Told& told, std::string_view what, HostTime now) {
+  if (count == told.count || (told.at && now - *told.at < kToldAgainAfter)) return;
+  board_.faults.add(count - told.count - 1);
+  board_.fault(now, fmt::format("CAN {}: read: {} {}", bus_->name(), count - told.count, what));
+  told = {count, now};
 }
 
 void EncoderDevice::show_state(HostTime now) {

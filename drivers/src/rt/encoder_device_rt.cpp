@@ -1,6 +1,8 @@
 // The real-time half of the encoder device: what wait() read becomes samples. The other half is
 // can/encoder_device.cpp.
 
+#include <utility>
+
 #include "abbe/drivers/can/encoder_device.hpp"
 
 namespace abbe::drivers {
@@ -47,9 +49,10 @@ void EncoderDevice::record(HostTime time, RawBlock::Direction direction,
 void EncoderDevice::push(std::span<const protocol::AxisSample> samples) ABBE_RT {
   for (const auto& sample : samples) {
     (void)samples_.try_push(sample);
-    board_.samples.add();
     board_.set_last_sample(sample.head.time);
   }
+  const auto made = receiver_.counters().samples;  // one that is given again is none more
+  board_.samples.add(made - std::exchange(samples_seen_, made));
 }
 
 }  // namespace abbe::drivers

@@ -214,7 +214,7 @@ void EncoderReceiver::on_position(std::size_t i, const can::CanFrame& frame, Hos
   }
   const bool again = (received_mask_ & bit) != 0;
   if (again) ++counters_.duplicate_frames;
-  if (!open_) return again ? take_back(i) : count_late(i);
+  if (!open_) return again ? take_back(i, time) : count_late(i);
   if (again || std::exchange(axes_[i].owes, false))
     doubtful_mask_ = static_cast<std::uint8_t>(doubtful_mask_ | bit);
   take_position(i, *count);
@@ -230,16 +230,17 @@ void EncoderReceiver::count_late(std::size_t i) ABBE_RT {
     received_mask_ = static_cast<std::uint8_t>(received_mask_ | (1u << i));
 }
 
-/// The sample of this cycle has left with an answer that may be an older one.
-void EncoderReceiver::take_back(std::size_t i) ABBE_RT {
+/// The sample of this cycle has left with an answer that may be an older one. An answer that comes more than
+/// a period after the SYNC is one to a SYNC we do not know of, and says nothing of that sample.
+void EncoderReceiver::take_back(std::size_t i, HostTime time) ABBE_RT {
   const auto bit = static_cast<std::uint8_t>(1u << i);
-  if ((current_.missing_mask & bit) != 0) return;
+  const bool has_left = sync_time_ && time <= *sync_time_ + period_;
+  if (!has_left || (current_.missing_mask & bit) != 0) return;
   current_.missing_mask = static_cast<std::uint8_t>(current_.missing_mask | bit);
   current_.head.flags |= SampleFlag::AxisMissing;
   current_.head.flags &= ~static_cast<protocol::SampleFlags>(SampleFlag::GapBefore);
   current_.head.lost_before = 0;
   ++counters_.missing_answers;
-  ++counters_.samples;
   if (out_count_ < out_.size()) out_[out_count_++] = current_;
 }
 

@@ -39,7 +39,7 @@ struct AxesAt {
   protocol::HostTime time{};
   std::uint8_t axis_count = 0;
   std::uint8_t missing_mask =
-      0;  ///< bit i: axis i did not answer in an enclosing sample; its values are stale
+      0;  ///< bit i: axis i is not known in an enclosing sample; its values are stale
   protocol::SampleFlags flags = 0;                      ///< of the two enclosing samples together
   std::array<double, protocol::kMaxAxes> position{};    ///< m or rad
   std::array<double, protocol::kMaxAxes> velocity{};    ///< m/s or rad/s

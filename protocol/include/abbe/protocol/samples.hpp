@@ -22,7 +22,7 @@ enum class SampleFlag : std::uint32_t {
   GapBefore = 1u << 0,       ///< samples were lost before this one: see `lost_before`
   TimeWidened = 1u << 1,     ///< a kernel stamp it depends on was unusable, u_time was widened
   ClockUnsettled = 1u << 2,  ///< the device clock model has not converged yet
-  AxisMissing = 1u << 3,     ///< at least one axis did not answer in this cycle: see `missing_mask`
+  AxisMissing = 1u << 3,     ///< at least one axis is not known in this cycle: see `missing_mask`
   BusError = 1u << 4,        ///< the bus reported errors since the previous sample
   BusOff = 1u << 5,          ///< the CAN controller is bus-off: positions are the last known ones
   DeviceError = 1u << 6,     ///< the device itself reports an error (EMCY, alarm, bad status)
@@ -68,7 +68,7 @@ struct AxisSample {
   SampleHead head;
   std::uint32_t cycle = 0;  ///< SYNC or scan number since start, wraps
   std::uint8_t axis_count = 0;
-  std::uint8_t missing_mask = 0;  ///< bit i: axis i did not answer, its values are the previous ones
+  std::uint8_t missing_mask = 0;  ///< bit i: axis i did not answer, or not believably
   std::array<std::int64_t, kMaxAxes> count{};  ///< raw device counts
   std::array<double, kMaxAxes> position{};     ///< scale reading, m (linear) or rad (rotary)
 };

@@ -69,7 +69,12 @@ class EncoderDevice final : public Device {
   void follow_bus_off(protocol::HostTime now);
   void send_sync();
   void follow_kernel_sync();
-  void tell_of(std::uint64_t count, std::uint64_t& seen, std::string_view what, protocol::HostTime now);
+  /// Faults that come by the frame, told once a second.
+  struct Told {
+    std::uint64_t count = 0;
+    std::optional<protocol::HostTime> at;
+  };
+  void tell_of(std::uint64_t count, Told& told, std::string_view what, protocol::HostTime now);
   void send_configuration();
   [[nodiscard]] bool send(const can::CanFrame& frame);
   void read_batch(protocol::HostTime now, std::chrono::nanoseconds at_most);
@@ -103,8 +108,8 @@ class EncoderDevice final : public Device {
   protocol::HostTime last_heard_{};
   CanBusCounters bus_seen_;
   std::uint64_t missed_seen_ = 0;
-  std::uint64_t short_seen_ = 0;
-  std::uint64_t duplicates_seen_ = 0;
+  std::uint64_t samples_seen_ = 0;
+  Told shorts_told_, duplicates_told_;
 
   std::array<ReceivedFrame, kBatch> batch_{};
   std::size_t batch_count_ = 0;

@@ -4,8 +4,8 @@
 /// construction. One thread.
 ///
 /// A cycle begins when our SYNC goes out (on_sent). The sample leaves when the last axis has answered, or at
-/// the deadline, the next SYNC or bus-off with the axes that did not answer marked in missing_mask: these
-/// keep their previous value. All axes carry one time: SYNC + sampling delay. An axis that never answered has
+/// the deadline, the next SYNC or bus-off with the axes that are not known marked in missing_mask: who did not
+/// answer keeps the previous value. All axes carry one time: SYNC + sampling delay. An axis that never answered has
 /// position NaN. An answer that comes after its cycle is closed is counted and not used; one stamped before
 /// the SYNC cannot be its answer.
 ///
@@ -13,8 +13,9 @@
 /// earlier one: the first after cycles without any (but not where the node booted, or the SYNC paused for a
 /// period, in between), and those of a cycle in which the node answers twice. If the cycle's sample has left
 /// before the second one, it is given again, with the same time and cycle number and that axis missing: of
-/// two samples of one time the later takes back what the earlier said. What is left: a node that is late by
-/// whole periods for many cycles is doubtful at the beginning and at the end of that, not in between. The
+/// two samples of one time the later takes back what the earlier said. What is left: a node that is late in
+/// more than two cycles in a row is doubtful at the beginning and at the end of that, not in between; one that
+/// is late from its first answer on, or whose lateness survives a pause, not at the beginning either. The
 /// period must be longer than the slowest answer.
 ///
 /// The scale is configured or read along from the SDO answers on the bus (6005h:01, else 6501h; rotary:
@@ -168,7 +169,7 @@ class EncoderReceiver {
                    bool time_widened) ABBE_RT;
   void hear() ABBE_RT;
   void count_late(std::size_t i) ABBE_RT;
-  void take_back(std::size_t i) ABBE_RT;
+  void take_back(std::size_t i, protocol::HostTime time) ABBE_RT;
   void look_for_debts(bool paused) ABBE_RT;
   void take_position(std::size_t i, std::int64_t count) ABBE_RT;
   void on_node_frame(Axis& axis, const can::CanFrame& frame, protocol::HostTime time) ABBE_RT;

@@ -37,6 +37,7 @@ struct HopOptions {
   std::size_t samples = 3000;
   std::size_t warm_up = 200;  ///< sent first, not counted
   std::chrono::microseconds period{1000};
+  std::chrono::nanoseconds phase{};  ///< sent when CLOCK_MONOTONIC is a whole number of periods and this
   std::uint32_t domain = 96;
   std::filesystem::path profile;  ///< abbe-dds-loopback.xml
 };
@@ -162,7 +163,9 @@ inline bool send(const Shared& shared, const HopOptions& options) {
                      : nullptr;
   if (writer == nullptr || !wait_for_reader(*writer, shared)) return false;
   Message message;
+  const std::chrono::nanoseconds period = options.period;
   auto next = Clock::now();
+  next += period - (next.time_since_epoch() - options.phase) % period;
   for (std::size_t i = 0; i < options.warm_up + options.samples; ++i) {
     std::this_thread::sleep_until(next += options.period);
     message.number = static_cast<std::int64_t>(i);

@@ -59,7 +59,7 @@ class StampedStage {
     std::vector<pollfd> fds{{bus_->fd(), POLLIN, 0}, {tracker_->listener_fd(), POLLIN, 0}};
     const short events = static_cast<short>(tracker_->wants_write() ? POLLIN | POLLOUT : POLLIN);
     if (tracker_->client_fd() >= 0) fds.push_back({tracker_->client_fd(), events, 0});
-    const auto due = std::min(tracker_->next_due(), bus_->next_due());
+    const auto due = std::min(tracker_->next_due(), answers_due_.value_or(bus_->next_due()));
     const auto wait =
         std::clamp<std::chrono::nanoseconds>(due - clock_.now(), {}, std::chrono::milliseconds{50});
     const timespec timeout{0, wait.count()};
@@ -81,14 +81,18 @@ class StampedStage {
     departures.push_back({before_ns, monotonic_ns()});
   }
 
+  /// From a SYNC until its answers are due nothing else leaves: what is stamped holds the last TPDO.
   void turn_bus(bool asked) {
     const auto now = clock_.now();
-    if (!asked && answers_due_ && now >= *answers_due_) {
+    if (asked) {
+      bus_->poll(now);
+      answers_due_ = now + kOnTheBus;
+    } else if (!answers_due_) {
+      bus_->poll(now);
+    } else if (now >= *answers_due_) {
       answers_due_.reset();
-      return stamp(cycles_, [&] { bus_->poll(now); });
+      stamp(cycles_, [&] { bus_->poll(now); });
     }
-    bus_->poll(now);
-    if (asked) answers_due_ = bus_->next_due();
   }
 
   /// The points are made first: what leaves afterwards is only the sending.

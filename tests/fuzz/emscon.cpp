@@ -1,5 +1,6 @@
 // Any bytes, read as a controller's stream, as a client's, and as one packet: nothing may read past an end,
 // and what decodes must encode to bytes that decode and encode to themselves.
+// libFuzzer: -max_len=1024
 #include <cstdint>
 #include <cstdlib>
 #include <cstring>

@@ -1,5 +1,6 @@
 // Any bytes as an MCAP file: the summary, the linear scan, every record it yields and every message of every
 // chunk. Any bytes as a RawBytes payload: what decodes encodes to bytes that decode to the same.
+// libFuzzer: -max_len=2048
 
 #include <cstdint>
 #include <cstdlib>

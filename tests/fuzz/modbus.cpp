@@ -1,5 +1,6 @@
 // Any bytes as the answers of a Modbus device, over TCP and RTU, cut into pieces by the first byte: samples
 // hold what is plausible or NaN, and every request that decodes encodes to the same bytes.
+// libFuzzer: -max_len=600
 
 #include <array>
 #include <cmath>

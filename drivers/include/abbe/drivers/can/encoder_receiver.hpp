@@ -4,19 +4,19 @@
 /// construction. One thread.
 ///
 /// A cycle begins when our SYNC goes out (on_sent). The sample leaves when the last axis has answered, or at
-/// the deadline, the next SYNC or bus-off with the axes that are not known marked in missing_mask: who did not
-/// answer keeps the previous value. All axes carry one time: SYNC + sampling delay. An axis that never answered has
-/// position NaN. An answer that comes after its cycle is closed is counted and not used; one stamped before
-/// the SYNC cannot be its answer.
+/// the deadline, the next SYNC or bus-off with the axes that are not known marked in missing_mask: who did
+/// not answer keeps the previous value. All axes carry one time: SYNC + sampling delay. An axis that never
+/// answered has position NaN. An answer that comes after its cycle is closed is counted and not used; one
+/// stamped before the SYNC cannot be its answer.
 ///
 /// An answer does not say to which SYNC. It is doubtful, and its axis missing, where it may be that to an
 /// earlier one: the first after cycles without any (but not where the node booted, or the SYNC paused for a
 /// period, in between), and those of a cycle in which the node answers twice. If the cycle's sample has left
 /// before the second one, it is given again, with the same time and cycle number and that axis missing: of
 /// two samples of one time the later takes back what the earlier said. What is left: a node that is late in
-/// more than two cycles in a row is doubtful at the beginning and at the end of that, not in between; one that
-/// is late from its first answer on, or whose lateness survives a pause, not at the beginning either. The
-/// period must be longer than the slowest answer.
+/// more than two cycles in a row is doubtful at the beginning and at the end of that, not in between; one
+/// that is late from its first answer on, or whose lateness survives a pause, not at the beginning either.
+/// The period must be longer than the slowest answer.
 ///
 /// The scale is configured or read along from the SDO answers on the bus (6005h:01, else 6501h; rotary:
 /// 6001h), so that a recording carries it. 0 is refused: the axis stays missing.

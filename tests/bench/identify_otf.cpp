@@ -26,6 +26,7 @@
 #include "abbe/calib/rigid_body_model.hpp"
 #include "abbe/daemon/input_files.hpp"
 #include "abbe/daemon/model_document.hpp"
+#include "config_tables.hpp"
 
 namespace {
 
@@ -65,11 +66,13 @@ void convert_path(const fs::path& path_m, const fs::path& csv) {
 }
 
 void write_machine(const fs::path& toml) {
-  std::ofstream(toml)
-      << "[machine]\nname = \"case A\"\nchain = \"[w X' b Y Z (C1) t]\"\n"
-         "[axes.X]\nmin_mm = -300\nmax_mm = 300\n[axes.Y]\nmin_mm = -250\nmax_mm = 250\n"
-         "[axes.Z]\nmin_mm = -400\nmax_mm = 0\n[target]\noffset_mm = [20, -15, -120]\n"
-         "[model]\nnode_spacing_mm = 50\n[tracker]\nsigma_range_um = 2\nsigma_angle_urad = 3\n";
+  std::ofstream(toml) << to_toml(config_tables::Machine{.name = "case A",
+                                                        .x = {-300, 300},
+                                                        .y = {-250, 250},
+                                                        .z = {-400, 0},
+                                                        .target_offset_mm = {{20, -15, -120}},
+                                                        .node_spacing_mm = 50})
+                      << "[tracker]\nsigma_range_um = 2\nsigma_angle_urad = 3\n";
 }
 
 /// The true tables as a parameter vector in gauge G1.

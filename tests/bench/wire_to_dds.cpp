@@ -28,6 +28,7 @@
 #include <string_view>
 #include <vector>
 
+#include "config_tables.hpp"
 #include "dds_hop.hpp"
 #include "forked_task.hpp"
 #include "snapshot_log.hpp"
@@ -39,6 +40,7 @@ namespace {
 
 using namespace abbe::bench;  // NOLINT(google-build-using-namespace): a program, not a header
 using namespace std::chrono_literals;
+namespace config_tables = abbe::config_tables;
 namespace fs = std::filesystem;
 
 constexpr auto kHubPeriod = 250us;
@@ -166,47 +168,22 @@ class RunFolder {
 };
 
 std::string configuration(const StampedStage& stage, std::uint32_t domain) {
-  return fmt::format(R"([machine]
-name = "bench"
-chain = "[w X' b Y Z (C1) t]"
-[axes.X]
-min_mm = -300
-max_mm = 300
-[axes.Y]
-min_mm = -250
-max_mm = 250
-[axes.Z]
-min_mm = -400
-max_mm = 0
-[target]
-offset_mm = [20, -15, -120]
-[model]
-node_spacing_mm = 50
-[tracker]
-host = "127.0.0.1"
-port = {}
-point_rate_hz = 500
-[encoder]
-transport = "udp"
-peer_host = "127.0.0.1"
-peer_port = {}
-sync_period_us = {}
-nodes = [{{ axis = "X", node = 1, step_nm = 10 }}, {{ axis = "Y", node = 2, step_nm = 10 }}, {{ axis = "Z", node = 3, step_nm = 10 }}]
-[daemon]
-data_dir = "data"
-runtime_dir = "run"
-hub_period_us = {}
-simulated = true
-[recording]
-min_free_MB = 16
-[dds]
-domain = {}
-profile = "{}"
-snapshot_hz = 0
-compensation_hz = 0
-)",
-                     stage.tracker_port(), stage.can_port(), std::chrono::microseconds{kSyncPeriod}.count(),
-                     std::chrono::microseconds{kHubPeriod}.count(), domain, ABBE_LOOPBACK_PROFILE);
+  const config_tables::Machine machine{.name = "bench",
+                                       .x = {-300, 300},
+                                       .y = {-250, 250},
+                                       .z = {-400, 0},
+                                       .target_offset_mm = {{20, -15, -120}},
+                                       .node_spacing_mm = 50};
+  return to_toml(machine) + to_toml(config_tables::Tracker{.port = stage.tracker_port()}) +
+         to_toml(config_tables::Encoder{.peer_port = stage.can_port(),
+                                        .sync_period_us = std::chrono::microseconds{kSyncPeriod}.count(),
+                                        .step_nm = 10}) +
+         std::string{config_tables::kDaemonInItsFolder} +
+         fmt::format("hub_period_us = {}\n[recording]\nmin_free_MB = 16\n",
+                     std::chrono::microseconds{kHubPeriod}.count()) +
+         to_toml(config_tables::Dds{.domain = std::to_string(domain),
+                                    .profile = ABBE_LOOPBACK_PROFILE,
+                                    .more = "snapshot_hz = 0\ncompensation_hz = 0\n"});
 }
 
 /// Stopped with SIGTERM, as systemd would.

@@ -15,9 +15,9 @@
 #include "abbe/daemon/model_store.hpp"
 #include "abbe/daemon/recorder.hpp"
 #include "abbe_command.hpp"
-#include "config_texts.hpp"
 #include "synthetic_model.hpp"
 #include "synthetic_otf_run.hpp"
+#include "warm_scales.hpp"
 
 namespace abbe::daemon {
 namespace {

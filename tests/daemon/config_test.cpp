@@ -6,6 +6,8 @@
 #include <set>
 #include <string>
 
+#include "config_tables.hpp"
+
 namespace abbe::daemon {
 namespace {
 
@@ -17,24 +19,11 @@ using ::testing::HasSubstr;
 using ::testing::SizeIs;
 using ::testing::StartsWith;
 
-const std::string kMachine = R"([machine]
-name = "mill"
-chain = "[w X' b Y Z (C1) t]"
-[axes.X]
-min_mm = -300
-max_mm = 300
-[axes.Y]
-min_mm = -250
-max_mm = 250
-reference_mm = 10
-[axes.Z]
-min_mm = -400
-max_mm = -100
-[target]
-offset_mm = [20, -15, -120]
-[model]
-node_spacing_mm = 50
-)";
+const std::string kMachine = [] {
+  auto machine = config_tables::mill();
+  machine.y.reference_mm = 10;
+  return to_toml(machine);
+}();
 
 const std::string kCanBus = "[encoder]\ntransport = \"socketcan\"\ninterface = \"can0\"\n";
 const std::string kNodes = R"(nodes = [{axis = "X", node = 1}, {axis = "Y", node = 2}, {axis = "Z", node = 3}]

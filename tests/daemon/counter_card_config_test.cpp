@@ -4,7 +4,7 @@
 
 #include "abbe/daemon/config.hpp"
 #include "abbe/daemon/device_options.hpp"
-#include "mill.hpp"
+#include "config_tables.hpp"
 
 namespace abbe::daemon {
 namespace {
@@ -13,7 +13,7 @@ using ::testing::Contains;
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 
-const std::string kMachine = test::kMill;
+const std::string kMachine = to_toml(config_tables::mill());
 
 std::string card(const std::string& axes, const std::string& more = {}) {
   return kMachine +

@@ -11,7 +11,7 @@
 #include "abbe/daemon/config.hpp"
 #include "abbe/daemon/device_set.hpp"
 #include "abbe/sim/usbip_server.hpp"
-#include "mill.hpp"
+#include "config_tables.hpp"
 
 namespace abbe::daemon {
 namespace {
@@ -58,7 +58,7 @@ class CardInAThread {
 };
 
 Config configuration(std::uint16_t port, const std::string& serial_number = "01ABBE08") {
-  const std::string text = test::kMill + std::string(R"([counter_card]
+  const std::string text = to_toml(config_tables::mill()) + std::string(R"([counter_card]
 transport = "usbip"
 port = )") + std::to_string(port) +
                            "\nserial_number = \"" + serial_number + R"("

@@ -4,7 +4,7 @@
 
 #include "abbe/daemon/config.hpp"
 #include "abbe/daemon/device_options.hpp"
-#include "mill.hpp"
+#include "config_tables.hpp"
 
 namespace abbe::daemon {
 namespace {
@@ -13,7 +13,7 @@ using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
 
-const std::string kMachine = test::kMill + std::string(R"([encoder]
+const std::string kMachine = to_toml(config_tables::mill()) + std::string(R"([encoder]
 transport = "udp"
 peer_host = "10.0.0.8"
 peer_port = 20000

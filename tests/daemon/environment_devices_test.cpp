@@ -9,6 +9,7 @@
 #include "abbe/daemon/recorder_thread.hpp"
 #include "abbe/drivers/environment/receiver.hpp"
 #include "abbe/sim/modbus_server.hpp"
+#include "config_tables.hpp"
 #include "recording_fixture.hpp"
 
 namespace abbe::daemon {
@@ -20,13 +21,11 @@ using testing::HasSubstr;
 constexpr std::uint32_t kSerial = 20961234;
 
 Config config_with(std::uint16_t port, const std::string& device) {
-  const auto config = parse_config(
-      "[machine]\nname = \"M1\"\nchain = \"[w X' b Y Z t]\"\n"
-      "[axes.X]\nmin_mm = 0\nmax_mm = 500\n[axes.Y]\nmin_mm = 0\nmax_mm = 500\n"
-      "[axes.Z]\nmin_mm = 0\nmax_mm = 500\n[target]\noffset_mm = [0, 0, 0]\n"
-      "[[environment]]\nname = \"air\"\nhost = \"127.0.0.1\"\nperiod_s = 0.05\nport = " +
-          std::to_string(port) + "\n" + device,
-      "abbed.toml");
+  const auto config =
+      parse_config(to_toml(config_tables::half_metre_mill()) +
+                       "[[environment]]\nname = \"air\"\nhost = \"127.0.0.1\"\nperiod_s = 0.05\nport = " +
+                       std::to_string(port) + "\n" + device,
+                   "abbed.toml");
   EXPECT_TRUE(config) << config.error().details.front();
   return config ? *config : Config{};
 }

@@ -19,7 +19,7 @@
 #include "abbe/sim/ball_array.hpp"
 #include "abbe/sim/touching.hpp"
 #include "abbe_command.hpp"
-#include "config_texts.hpp"
+#include "config_tables.hpp"
 #include "evemu_run.hpp"
 #include "recording_fixture.hpp"
 
@@ -68,7 +68,7 @@ class WarmArray : public ::testing::Test {
  protected:
   void SetUp() override {
     fs::create_directories(folder_);
-    write("machine.toml", test::kWeakPortal);
+    write("machine.toml", to_toml(config_tables::weak_portal()));
   }
   void TearDown() override { fs::remove_all(folder_); }
   void write(const std::string& name, const std::string& text) const {
@@ -186,7 +186,8 @@ TEST_F(WarmArray, NeedsBothTemperatureAndExpansion) {
 
 TEST_F(WarmArray, MayHaveItsTemperatureInTheConfiguration) {
   write_array({.temperature_C = 24.0, .alpha_per_K = kAlpha_per_K});
-  write("machine.toml", std::string{test::kWeakPortal} + "[evemu]\nartefact_C = 24\nu_artefact_K = 0.5\n");
+  write("machine.toml",
+        to_toml(config_tables::weak_portal()) + "[evemu]\nartefact_C = 24\nu_artefact_K = 0.5\n");
   const auto ran = identify();
   ASSERT_EQ(ran.exit, kRefusedByTheGate) << ran.err;
   EXPECT_LT(error_near_the_far_end().V_m.norm(), 1e-6);
@@ -216,13 +217,7 @@ TEST_F(WarmArray, KeepsItsExpansionInItsFile) {
 }
 
 /// An array beside a sensor; [evemu] comes last.
-constexpr std::string_view kWithASensor = R"([encoder]
-transport = "udp"
-peer_host = "127.0.0.1"
-peer_port = 1
-sync_period_us = 100000
-nodes = [{ axis = "X", node = 1, step_nm = 1 }, { axis = "Y", node = 2, step_nm = 1 }, { axis = "Z", node = 3, step_nm = 1 }]
-[[environment]]
+constexpr const char* kWithASensor = R"([[environment]]
 name = "rtd"
 map = "icpdas-zt2005-c8"
 host = "127.0.0.1"
@@ -234,7 +229,7 @@ axes_compensated = false
 )";
 
 std::string config_text(const std::string& evemu) {
-  return test::kWeakPortal + std::string{kWithASensor} + evemu;
+  return to_toml(config_tables::weak_portal()) + to_toml(config_tables::Encoder{}) + kWithASensor + evemu;
 }
 
 TEST_F(WarmArray, HasItSaidThatItsSensorIsInNoFile) {

@@ -14,9 +14,10 @@
 #include "abbe/daemon/evemu_files.hpp"
 #include "abbe/daemon/model_document.hpp"
 #include "abbe_command.hpp"
-#include "config_texts.hpp"
+#include "config_tables.hpp"
 #include "evemu_run.hpp"
 #include "recording_fixture.hpp"
+#include "warm_scales.hpp"
 
 namespace abbe::daemon {
 namespace {
@@ -74,7 +75,7 @@ class EvemuCli : public ::testing::Test {
  protected:
   void SetUp() override {
     fs::create_directories(folder_);
-    write("machine.toml", std::string{test::kWeakPortal});
+    write("machine.toml", to_toml(config_tables::weak_portal()));
     write("calibrator.toml", calibrator_toml());
     write("touches.csv", touches_csv());
     write("errors.csv", errors_csv());
@@ -151,7 +152,7 @@ TEST_F(EvemuCli, WritesModelsThatReadBackToTheSameBits) {
 }
 
 TEST_F(EvemuCli, SaysThatFilesHoldNoTemperaturesOfScales) {
-  write("warm.toml", std::string{test::kWeakPortal} + test::kWarmScales);
+  write("warm.toml", to_toml(config_tables::weak_portal()) + test::kWarmScales);
   const auto from_errors = [this](const std::string& more) {
     return abbe("identify evemu --machine warm.toml --errors errors.csv -o out " + more);
   };
@@ -164,21 +165,14 @@ TEST_F(EvemuCli, SaysThatFilesHoldNoTemperaturesOfScales) {
 }
 
 /// [evemu] asks for less than the options' defaults do.
-constexpr std::string_view kWatched = R"([encoder]
-transport = "udp"
-peer_host = "127.0.0.1"
-peer_port = 1
-sync_period_us = 100000
-nodes = [{ axis = "X", node = 1, step_nm = 1 }, { axis = "Y", node = 2, step_nm = 1 }, { axis = "Z", node = 3, step_nm = 1 }]
-[evemu]
-order = 2
-)";
+const std::string kWatched =
+    to_toml(config_tables::weak_portal()) + to_toml(config_tables::Encoder{}) + "[evemu]\norder = 2\n";
 
 /// What the daemon records of a calibration: what was asked for, and one touch a second in the plan's order.
 void record_touches(const fs::path& folder, const Touches& all) {
   using namespace std::chrono_literals;
   RecordingInfo info = example_info();
-  info.configuration = std::string{test::kWeakPortal} + std::string{kWatched};
+  info.configuration = kWatched;
   auto recorder = Recorder::open(example_options(folder), info, Recorder::WallTime{});
   ASSERT_TRUE(recorder) << recorder.error().text;
   constexpr protocol::HostTime kBegin{1000s};
@@ -339,7 +333,7 @@ TEST_F(EvemuCli, ChoosesSparseModelsByFolds) {
 TEST_F(EvemuCli, AcceptsAShapeWhenTheConfigurationSaysSoByName) {
   const std::string limits = "[gate]\nmax_error_mm = 10\nmax_gradient = 0.1\n";
   const auto accepted = [&](const std::string& gate) {
-    write("machine.toml", std::string{test::kWeakPortal} + gate);
+    write("machine.toml", to_toml(config_tables::weak_portal()) + gate);
     const auto ran = abbe(
         "identify evemu --machine machine.toml --touches touches.csv --calibrator calibrator.toml --json -o "
         "out");
@@ -351,7 +345,7 @@ TEST_F(EvemuCli, AcceptsAShapeWhenTheConfigurationSaysSoByName) {
   EXPECT_EQ(refused["accepted"], false);
   EXPECT_THAT(refused["reasons"][0].get<std::string>(), StartsWith("shape only"));
   EXPECT_EQ(accepted(limits + "accept = [\"evemu-shape-only\"]\n")["accepted"], true);
-  write("machine.toml", std::string{test::kWeakPortal} + "[gate]\naccept = [\"everything\"]\n");
+  write("machine.toml", to_toml(config_tables::weak_portal()) + "[gate]\naccept = [\"everything\"]\n");
   EXPECT_EQ(abbe("identify evemu --machine machine.toml --errors errors.csv -o out").exit, 3);
 }
 

@@ -9,7 +9,7 @@
 
 #include "abbe/daemon/datum.hpp"
 #include "abbe/daemon/replay.hpp"
-#include "config_texts.hpp"
+#include "config_tables.hpp"
 #include "recording_fixture.hpp"
 
 namespace abbe::daemon {
@@ -19,7 +19,7 @@ using namespace std::chrono_literals;
 using protocol::HostTime;
 using ::testing::ElementsAre;
 
-const std::string kWatched = std::string{test::kHalfMetreMill} + R"([tracker]
+const std::string kWatched = to_toml(config_tables::half_metre_mill()) + R"([tracker]
 host = "127.0.0.1"
 [counter_card]
 transport = "usbip"

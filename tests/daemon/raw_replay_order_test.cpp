@@ -9,7 +9,7 @@
 #include "abbe/daemon/device_options.hpp"
 #include "abbe/daemon/replay.hpp"
 #include "abbe/drivers/can/encoder_receiver.hpp"
-#include "config_texts.hpp"
+#include "config_tables.hpp"
 #include "recording_fixture.hpp"
 
 namespace abbe::daemon {
@@ -21,19 +21,15 @@ using protocol::AxisSample;
 using protocol::HostTime;
 using protocol::RawBlock;
 
-constexpr std::string_view kEncoders = R"([encoder]
-transport = "udp"
-peer_host = "127.0.0.1"
-peer_port = 1
-sync_period_us = 1000
-nodes = [{ axis = "X", node = 1, step_nm = 1 }, { axis = "Y", node = 2, step_nm = 1 }, { axis = "Z", node = 3, step_nm = 1 }]
-)";
+std::string encoders_alone() {
+  return to_toml(config_tables::weak_portal()) + to_toml(config_tables::Encoder{.sync_period_us = 1000});
+}
 
 /// A live run by hand: what the driver would read, in its order, goes into its receiver and into a recording.
 class LiveEncoders {
  public:
   explicit LiveEncoders(const std::filesystem::path& folder)
-      : config_(*parse_config(test::kWeakPortal + std::string{kEncoders}, "abbed.toml")),
+      : config_(*parse_config(encoders_alone(), "abbed.toml")),
         recorder_(*Recorder::open(example_options(folder), example_info(), {})),
         receiver_(device_options(*config_.encoder, config_.daemon.speed).receiver) {}
 

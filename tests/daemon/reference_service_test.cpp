@@ -4,7 +4,7 @@
 
 #include <cmath>
 
-#include "config_texts.hpp"
+#include "config_tables.hpp"
 
 namespace abbe::daemon {
 namespace {
@@ -17,7 +17,7 @@ using protocol::SampleFlag;
 using ::testing::Contains;
 using ::testing::HasSubstr;
 
-const std::string kMachine = test::kHalfMetreMill;
+const std::string kMachine = to_toml(config_tables::half_metre_mill());
 const std::string kCard = R"([counter_card]
 transport = "usbip"
 port = 3240

@@ -17,7 +17,7 @@
 #include "abbe/daemon/input_files.hpp"
 #include "abbe/daemon/model_document.hpp"
 #include "abbe_command.hpp"
-#include "config_texts.hpp"
+#include "config_tables.hpp"
 #include "evemu_study.hpp"
 #include "recording_fixture.hpp"
 #include "synthetic_model.hpp"
@@ -111,24 +111,18 @@ TEST_F(VerifyCli, TakesAModelOfTables) {
   EXPECT_GT(summary["before"]["max_um"].get<double>(), 1.0);
 }
 
-const std::string kWatched = std::string{test::kWeakPortal} + R"([target]
-offset_mm = [0, 0, 0]
-[tracker]
-host = "127.0.0.1"
-mode = "stationary"
-[encoder]
-transport = "udp"
-peer_host = "127.0.0.1"
-peer_port = 1
-sync_period_us = 100000
-nodes = [{ axis = "X", node = 1, step_nm = 1 }, { axis = "Y", node = 2, step_nm = 1 }, { axis = "Z", node = 3, step_nm = 1 }]
-)";
+std::string watched_portal() {
+  auto machine = config_tables::weak_portal();
+  machine.target_offset_mm = {{0, 0, 0}};
+  return to_toml(machine) + "[tracker]\nhost = \"127.0.0.1\"\nmode = \"stationary\"\n" +
+         to_toml(config_tables::Encoder{});
+}
 
 /// Three seconds at every point, the next one reached at once.
 void record_standstills(const fs::path& folder, const std::vector<calib::verify::MeasuredPoint>& points) {
   using namespace std::chrono_literals;
   RecordingInfo info = example_info();
-  info.configuration = kWatched;
+  info.configuration = watched_portal();
   auto recorder = Recorder::open(example_options(folder), info, Recorder::WallTime{});
   ASSERT_TRUE(recorder) << recorder.error().text;
   constexpr int kSteps = 30;  // of 100 ms

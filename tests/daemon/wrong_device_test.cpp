@@ -8,6 +8,7 @@
 
 #include "abbe/daemon/device_set.hpp"
 #include "abbe/sim/modbus_server.hpp"
+#include "config_tables.hpp"
 
 namespace abbe::daemon {
 namespace {
@@ -15,10 +16,7 @@ namespace {
 using namespace std::chrono_literals;
 using testing::HasSubstr;
 
-const std::string kMachine =
-    "[machine]\nname = \"M1\"\nchain = \"[w X' b Y Z t]\"\n"
-    "[axes.X]\nmin_mm = 0\nmax_mm = 500\n[axes.Y]\nmin_mm = 0\nmax_mm = 500\n"
-    "[axes.Z]\nmin_mm = 0\nmax_mm = 500\n[target]\noffset_mm = [0, 0, 0]\n";
+const std::string kMachine = to_toml(config_tables::half_metre_mill());
 
 struct Expecting {
   std::string device;  ///< its table, without the port

@@ -13,8 +13,8 @@
 #include <nlohmann/json.hpp>
 #include <sstream>
 
+#include "config_tables.hpp"
 #include "figure.hpp"
-#include "mill.hpp"
 #include "process_use.hpp"
 #include "program.hpp"
 #include "run_time.hpp"
@@ -56,7 +56,7 @@ class WholeDaemon : public testing::Test {
   /// `simulated`: further tables of the simulator; `wired`: of both, `read`: of the daemon. PORT_OF(name) in
   /// them is the simulator's port of that name, 0 in its own file.
   void start_all(const std::string& simulated, const std::string& wired, const std::string& read) {
-    write("machine.toml", daemon::test::kMill + with_ports(wired));
+    write("machine.toml", to_toml(config_tables::mill()) + with_ports(wired));
     write("sim.toml", kSimulator + simulated);
     write("path.csv", path());
     // Above everything of abbed: what it stands for takes no processor time at all.
@@ -65,7 +65,7 @@ class WholeDaemon : public testing::Test {
                        "sim");
     ASSERT_TRUE(test::eventually(
         [this] { return std::filesystem::exists(file("ports")) || !simulator_->running(); }));
-    write("abbed.toml", daemon::test::kMill + with_ports(wired + kDaemon + read) +
+    write("abbed.toml", to_toml(config_tables::mill()) + with_ports(wired + kDaemon + read) +
                             fmt::format("[recording]\nmin_free_MB = 1\nraw = {}\n", records_raw()));
     abbed_ = start({ABBED_PROGRAM, "--config", file("abbed.toml")}, "abbed");
   }

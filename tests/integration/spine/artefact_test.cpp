@@ -62,10 +62,7 @@ struct ArtefactRun : CounterCardRun {
                           "[sim.cmm]\nartefact = \"true.toml\"\nnoise_um = " + std::to_string(kNoise_um) +
                           "\n" + more);
     ASSERT_NO_FATAL_FAILURE(start_simulator());
-    write_configuration();
-    const std::string whole = text_of(file("abbed.toml"));
-    write("abbed.toml", whole.substr(0, whole.find("[tracker]")) + machine_table(port("cmm_port")) +
-                            whole.substr(whole.find("[daemon]")));
+    write_configuration_of(machine_table(port("cmm_port")));
     ASSERT_NO_FATAL_FAILURE(start_abbed());
     ASSERT_TRUE(eventually([&] { return samples("cmm") > 2; })) << status().dump(1);
   }

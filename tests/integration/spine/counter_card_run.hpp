@@ -4,6 +4,7 @@
 #include <regex>
 #include <string>
 
+#include "config_tables.hpp"
 #include "program.hpp"
 #include "spine.hpp"
 
@@ -11,20 +12,7 @@ namespace abbe::test {
 
 struct CounterCardRun : Spine {
   static std::string wiring(const std::string& more) {
-    return "[counter_card]\ntransport = \"usbip\"\nzero = \"here\"\nserial_number = \"01ABBE08\"\nclock_MHz "
-           "= 1\n"
-           "scan_rate_hz = 1000\nlatch_channel = 6\n" +
-           more +
-           "axes = [\n"
-           "  { axis = \"X\", channel = 0, step_nm = 10 },\n"
-           "  { axis = \"Y\", channel = 1, step_nm = 10 },\n"
-           "  { axis = \"Z\", channel = 2, step_nm = 10 },\n]\n";
-  }
-  /// The simulator's port of that name; 0: it has none.
-  [[nodiscard]] int port(const std::string& name) const {
-    const std::string ports = text_of(file("ports"));
-    const auto at = ports.find(name + "=");
-    return at == std::string::npos ? 0 : std::stoi(ports.substr(at + name.size() + 1));
+    return to_toml(config_tables::CounterCard{.more = more});
   }
   [[nodiscard]] std::string card_at_its_port() const {
     return wiring(wiring_ + "port = " + std::to_string(port("usbip_port")) + "\n");
@@ -48,12 +36,8 @@ struct CounterCardRun : Spine {
   std::string speed_;   ///< of both; empty: the usual one
 
   void write_card_configuration(const std::string& card) {
-    write_configuration();
-    std::string text = text_of(file("abbed.toml"));
-    const auto encoder = text.find("[encoder]");
-    text.replace(encoder, text.find("[daemon]") - encoder, card);
-    if (!speed_.empty()) text = at_speed(text);
-    write("abbed.toml", text);
+    write_configuration_of(tracker_table() + card);
+    if (!speed_.empty()) write("abbed.toml", at_speed(text_of(file("abbed.toml"))));
   }
 };
 

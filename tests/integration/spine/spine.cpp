@@ -9,30 +9,21 @@
 
 #include "abbe/daemon/control_protocol.hpp"
 #include "abbe/daemon/input_files.hpp"
+#include "config_tables.hpp"
 
 namespace abbe::test {
 namespace {
 
 using nlohmann::json;
 
-constexpr const char* kMachine = R"(
-[machine]
-name = "spine"
-chain = "[w X' b Y Z (C1) t]"
-[axes.X]
-min_mm = -100
-max_mm = 100
-[axes.Y]
-min_mm = -100
-max_mm = 100
-[axes.Z]
-min_mm = -200
-max_mm = 0
-[target]
-offset_mm = [20, -15, -120]
-[model]
-node_spacing_mm = 100
-)";
+std::string machine_table() {
+  return to_toml(config_tables::Machine{.name = "spine",
+                                        .x = {-100, 100},
+                                        .y = {-100, 100},
+                                        .z = {-200, 0},
+                                        .target_offset_mm = {{20, -15, -120}},
+                                        .node_spacing_mm = 100});
+}
 
 constexpr const char* kSimulator = R"(
 [sim]
@@ -53,50 +44,16 @@ position_mm = [-350, -320, -150]
 rotation_rad = [0.0013, -0.0342, 1.1003]
 )";
 
-constexpr const char* kDevices = R"(
-[tracker]
-host = "127.0.0.1"
-port = {tracker}
-point_rate_hz = 500
-weather = "none"
-sigma_range_um = 2
-sigma_angle_urad = 3
-[encoder]
-transport = "udp"
-peer_host = "127.0.0.1"
-peer_port = {can}
-sync_period_us = 10000
-nodes = [
-  {{ axis = "X", node = 1, step_nm = 10 }},
-  {{ axis = "Y", node = 2, step_nm = 10 }},
-  {{ axis = "Z", node = 3, step_nm = 10 }},
-]
-)";
-
 // The demo's walk between the corners and centres of its volume, as long as the 3 x 3 x 3 nodes here need it.
 constexpr std::size_t kLegs = 40;
 // The demo's volume (600 x 500 x 400 mm) on this one (200 mm each).
 constexpr std::array<double, 3> kShrink{200.0 / 600.0, 200.0 / 500.0, 200.0 / 400.0};
 
-std::uint16_t port_of(const std::string& ports, const std::string& name) {
-  const auto at = ports.find(name + "=");
-  return at == std::string::npos ? 0
-                                 : static_cast<std::uint16_t>(std::stoi(ports.substr(at + name.size() + 1)));
-}
-
-constexpr const char* kDaemon = R"([daemon]
-data_dir = "data"
-runtime_dir = "run"
-simulated = true
-speed = {speed}
+constexpr const char* kDaemon = R"(speed = {}
 realtime = "ignore"
 [recording]
 min_free_MB = 1
 chunk_kB = 16
-[dds]
-supervise = "{dds}"
-domain = {domain}
-profile = "{profile}"
 )";
 
 }  // namespace
@@ -104,7 +61,7 @@ profile = "{profile}"
 Spine::Spine() {
   std::string name = testing::TempDir() + "abbe-spine-XXXXXX";
   directory_ = ::mkdtemp(name.data());
-  write("machine.toml", kMachine);
+  write("machine.toml", machine_table());
   write("sim.toml", fmt::format(kSimulator, fmt::arg("speed", ABBE_SPINE_SPEED)));
 }
 
@@ -140,25 +97,47 @@ Spine::Vertices Spine::path() {
 }
 
 void Spine::write_configuration(const std::string& dds) const {
-  write("abbed.toml",
-        kMachine + fmt::format(kDevices, fmt::arg("tracker", tracker_port_), fmt::arg("can", can_port_)) +
-            daemon_tables(dds));
+  write_configuration_of(
+      tracker_table() +
+          to_toml(config_tables::Encoder{.peer_port = can_port_, .sync_period_us = 10'000, .step_nm = 10}),
+      dds);
+}
+
+void Spine::write_configuration_of(const std::string& devices, const std::string& dds) const {
+  write("abbed.toml", machine_table() + devices + daemon_tables(dds));
+}
+
+std::string Spine::tracker_table() const {
+  return to_toml(config_tables::Tracker{
+      .port = tracker_port_, .more = "weather = \"none\"\nsigma_range_um = 2\nsigma_angle_urad = 3\n"});
 }
 
 std::string Spine::daemon_tables(const std::string& dds) const {
-  return fmt::format(kDaemon, fmt::arg("speed", ABBE_SPINE_SPEED), fmt::arg("dds", dds),
-                     fmt::arg("domain", domain_.text()), fmt::arg("profile", ABBE_LOOPBACK_PROFILE));
+  return std::string{config_tables::kDaemonInItsFolder} + fmt::format(kDaemon, ABBE_SPINE_SPEED) +
+         to_toml(config_tables::Dds{.domain = domain_.text(),
+                                    .profile = ABBE_LOOPBACK_PROFILE,
+                                    .more = fmt::format("supervise = \"{}\"\n", dds)});
 }
 
 void Spine::start_simulator() {
-  simulator_ =
-      start({ABBE_SIM_PROGRAM, "run", "--config", file("sim.toml"), "--ports-file", file("ports")}, "sim");
+  ASSERT_NO_FATAL_FAILURE(start_simulator_as(
+      {ABBE_SIM_PROGRAM, "run", "--config", file("sim.toml"), "--ports-file", file("ports")}));
+  tracker_port_ = port("tracker_port");
+  can_port_ = port("can_port");
+  ASSERT_NE(tracker_port_, 0) << simulator_->err();
+}
+
+void Spine::start_simulator_as(std::vector<std::string> command) {
+  simulator_ = start(std::move(command), "sim");
   ASSERT_TRUE(
       eventually([this] { return std::filesystem::exists(file("ports")) || !simulator_->running(); }));
+}
+
+std::uint16_t Spine::port(const std::string& name) const {
   const std::string ports = text_of(file("ports"));
-  tracker_port_ = port_of(ports, "tracker_port");
-  can_port_ = port_of(ports, "can_port");
-  ASSERT_NE(tracker_port_, 0) << simulator_->err();
+  const auto at = ports.find(name + "=");
+  return at == std::string::npos ? 0
+                                 : static_cast<std::uint16_t>(std::stoi(ports.substr(at + name.size() + 1)));
 }
 
 void Spine::start_abbed() {

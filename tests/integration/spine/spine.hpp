@@ -38,13 +38,19 @@ class Spine : public testing::Test {
   static Vertices path();
   /// abbed.toml for the simulator's ports. `dds`: [dds] supervise.
   void write_configuration(const std::string& dds = "off") const;
-  /// [daemon], [recording] and [dds] of it, for who has other devices.
+  /// The same with other devices.
+  void write_configuration_of(const std::string& devices, const std::string& dds = "off") const;
+  [[nodiscard]] std::string tracker_table() const;
+  /// [daemon], [recording] and [dds].
   [[nodiscard]] std::string daemon_tables(const std::string& dds) const;
   [[nodiscard]] std::string file(const std::string& name) const { return (directory_ / name).string(); }
 
   // Programs.
   void start_simulator();  ///< drives path.csv once the tracker streams; its ports are known afterwards
-  void start_abbed();      ///< returns when it answers
+  void start_simulator_as(std::vector<std::string> command);  ///< that writes the file "ports" when it is up
+  /// The simulator's port of that name; 0: it has none.
+  [[nodiscard]] std::uint16_t port(const std::string& name) const;
+  void start_abbed();  ///< returns when it answers
   /// Before start_abbed(), when it is to calibrate: at many times real time the standstill at the first
   /// vertex would be over before anybody could ask for a calibration.
   void hold_simulator() const;

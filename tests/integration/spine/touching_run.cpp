@@ -2,42 +2,23 @@
 
 #include <fmt/format.h>
 
+#include "config_tables.hpp"
+
 namespace abbe::test {
 namespace {
 
 using nlohmann::json;
 
-constexpr const char* kMachine = R"([machine]
-name = "weak"
-chain = "[w b Z X Y t]"
-[axes.X]
-min_mm = -150
-max_mm = 650
-[axes.Y]
-min_mm = -150
-max_mm = 400
-[axes.Z]
-min_mm = -50
-max_mm = 150
-[target]
-offset_mm = [0, 0, 0]
-[model]
-node_spacing_mm = 50
-[counter_card]
-transport = "usbip"
-zero = "here"
-serial_number = "01ABBE08"
-clock_MHz = 1
-scan_rate_hz = 500
-latch_channel = 6
-)";
-
-constexpr const char* kAxes = R"(axes = [
-  { axis = "X", channel = 0, step_nm = 10 },
-  { axis = "Y", channel = 1, step_nm = 10 },
-  { axis = "Z", channel = 2, step_nm = 10 },
-]
-)";
+std::string machine_tables(const std::string& at_its_port = {}) {
+  return to_toml(config_tables::Machine{.name = "weak",
+                                        .chain = "[w b Z X Y t]",
+                                        .x = {-150, 650},
+                                        .y = {-150, 400},
+                                        .z = {-50, 150},
+                                        .target_offset_mm = {{0, 0, 0}},
+                                        .node_spacing_mm = 50}) +
+         to_toml(config_tables::CounterCard{.scan_rate_hz = 500, .more = at_its_port});
+}
 
 constexpr const char* kSimulator = R"([sim]
 machine = "machine.toml"
@@ -89,7 +70,7 @@ void TouchingRun::warm_the_array() {
 }
 
 TouchingRun::TouchingRun() {
-  write("machine.toml", fmt::format("{}{}", kMachine, kAxes));
+  write("machine.toml", machine_tables());
   write("sim.toml", fmt::format(kSimulator, fmt::arg("speed", ABBE_SPINE_SPEED)));
 }
 
@@ -100,23 +81,16 @@ void TouchingRun::start_touching_simulator(const std::vector<std::string>& more)
       file("calibrator.toml"), "--truth-out",  file("truth.csv"), "--reference-out",
       file("reference.csv")};
   command.insert(command.end(), more.begin(), more.end());
-  simulator_ = start(std::move(command), "sim");
-  ASSERT_TRUE(
-      eventually([this] { return std::filesystem::exists(file("ports")) || !simulator_->running(); }));
-  const std::string ports = text_of(file("ports"));
-  const auto port = [&ports](const std::string& key) {
-    const auto at = ports.find(key);
-    return at == std::string::npos ? 0 : std::stoi(ports.substr(at + key.size()));
-  };
-  usbip_port_ = port("usbip_port=");
-  sensor_port_ = port("rtd_port=");
+  ASSERT_NO_FATAL_FAILURE(start_simulator_as(std::move(command)));
+  usbip_port_ = port("usbip_port");
+  sensor_port_ = port("rtd_port");
   ASSERT_NE(usbip_port_, 0) << simulator_->err();
-  ASSERT_EQ(sensor_port_ != 0, warm_) << ports;
+  ASSERT_EQ(sensor_port_ != 0, warm_) << text_of(file("ports"));
 }
 
 void TouchingRun::write_touching_configuration(const std::string& gate, const std::string& dds,
                                                const std::string& probe) const {
-  write("abbed.toml", kMachine + fmt::format("port = {}\n", usbip_port_) + kAxes + probe + "[gate]\n" + gate +
+  write("abbed.toml", machine_tables(fmt::format("port = {}\n", usbip_port_)) + probe + "[gate]\n" + gate +
                           kEvemu + (warm_ ? fmt::format(kSensor, fmt::arg("port", sensor_port_)) : "") +
                           daemon_tables(dds));
 }

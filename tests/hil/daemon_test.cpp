@@ -5,6 +5,7 @@
 #include "can_interface.hpp"
 #include "counter_card_daemon.hpp"
 #include "served_devices.hpp"
+#include "simulated_encoders.hpp"
 
 namespace abbe::tests {
 namespace {
@@ -15,7 +16,6 @@ using testing::HasSubstr;
 class DaemonOnCan : public WholeDaemon {
  protected:
   void start() {
-    constexpr const char* kSimulatedBus = "[sim.encoder]\ninterface = \"vcan7\"\n";
     constexpr const char* kBus = R"(
 [encoder]
 transport = "socketcan"
@@ -28,14 +28,16 @@ nodes = [
   { axis = "Z", node = 3, step_nm = 10 },
 ]
 )";
-    start_all(kSimulatedBus, kBus,
-              fmt::format("[cmm]\nhost = \"127.0.0.1\"\nport = {}\n", measuring_machine_.port()));
+    start_all("", "",
+              kBus + fmt::format("[cmm]\nhost = \"127.0.0.1\"\nport = {}\n", measuring_machine_.port()));
   }
 
   static constexpr double kEncoder_hz = 980.0;  // CAN_BCM makes each period a few us too long
   static constexpr double kMachine_hz = 9.0;    // reports at most 10 a second
 
   VirtualCan vcan_;
+  /// Not those of abbe-sim: while it makes a burst of the tracker, its nodes would answer periods late.
+  SimulatedEncoders encoders_{vcan_, 3, 91};
   sim::IppDmeServer measuring_machine_ = open_measuring_machine(drivers::MonotonicTime{}.now());
   ServedDevices served_{peer_of(measuring_machine_), 90};
 };

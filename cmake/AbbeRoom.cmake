@@ -42,7 +42,7 @@ endfunction()
 # What a checked build spends on a source file is mostly its headers' templates, parsed and instrumented again for
 # each: there, several files are compiled as one. What is local to a file therefore bears a name its room uses once.
 function(abbe_compile_together target)
-  if(ABBE_SANITIZE AND NOT ABBE_FUZZ)
+  if(ABBE_SANITIZE)
     set_target_properties(${target} PROPERTIES UNITY_BUILD ON UNITY_BUILD_BATCH_SIZE 8)
     abbe_allow_local_types(${target})
   endif()

@@ -407,7 +407,8 @@ int main(int argc, char** argv) {
   fmt::print(
       "bare Fast DDS hop, {} B every {} us, us: p50 {:.1f} p99 {:.1f} beside, p50 {:.1f} p99 {:.1f} alone "
       "before\n\n",
-      hop::kMessageBytes, kSyncPeriod.count(), beside.p50_us, beside.p99_us, alone.p50_us, alone.p99_us);
+      hop::kMessageBytes, std::chrono::microseconds{kSyncPeriod}.count(), beside.p50_us, beside.p99_us,
+      alone.p50_us, alone.p99_us);
   fmt::print("  {:<8} {:<30} {:>8} {:>9}   {:>5}\n", "device", "limit, us", "asked", "measured", "ratio");
   const bool encoder_held = print_verdict("encoder", encoder, beside, alone);
   const bool tracker_held = print_verdict("tracker", tracker, beside, alone);

@@ -1,60 +1,25 @@
-#include <gtest/gtest.h>
+#include <gmock/gmock.h>
 
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <map>
 #include <numbers>
-#include <random>
 #include <vector>
 
-#include "abbe/drivers/can/encoder_receiver.hpp"
 #include "abbe/protocol/can/error_frame.hpp"
+#include "encoder_line.hpp"
 
 namespace abbe::drivers {
 namespace {
 
-using namespace std::chrono_literals;
+using namespace encoder_line;
 using can::BusCondition;
-using protocol::AxisSample;
-using protocol::HostTime;
 using protocol::RawBlock;
 using protocol::SampleFlag;
 
-constexpr HostTime kStart{1h};
-constexpr std::array<can::NodeId, 3> kNodes{1, 2, 3};
-
-EncoderReceiverOptions three_axes(std::optional<double> scale = 1e-8) {
-  EncoderReceiverOptions options;
-  for (const can::NodeId node : kNodes) {
-    options.axes.push_back({.name = "XYZ" + std::to_string(node), .node = node, .scale = scale});
-  }
-  return options;
-}
-can::CanFrame position(can::NodeId node, std::int64_t count) {
-  return can::encode_position(can::cob::tpdo(1, node), can::PositionType::Signed32, count);
-}
 can::CanFrame bus_report(BusCondition condition) {
   return can::encode_error_frame({.conditions = static_cast<can::BusConditions>(condition)});
 }
-
-/// A receiver with a script of events; all samples are kept.
-struct Line {
-  explicit Line(const EncoderReceiverOptions& options = three_axes()) : receiver(options) {}
-
-  void keep(std::span<const AxisSample> s) { samples.insert(samples.end(), s.begin(), s.end()); }
-  void sync(HostTime t) { keep(receiver.on_sent(can::encode_sync(), t)); }
-  void frame(const can::CanFrame& f, HostTime t) { keep(receiver.on_frame(f, t)); }
-  void time(HostTime t) { keep(receiver.on_time(t)); }
-  /// A whole cycle in which the axes answer `count`, + 1, + 2.
-  void cycle(HostTime t, std::int64_t count) {
-    sync(t);
-    for (const can::NodeId node : kNodes) frame(position(node, count + node - 1), t + 100us * node);
-  }
-
-  EncoderReceiver receiver;
-  std::vector<AxisSample> samples;
-};
 
 TEST(EncoderReceiver, DatesAllAxesByTheSync) {
   auto options = three_axes();
@@ -144,194 +109,6 @@ TEST(EncoderReceiver, AnAxisNeverHeardHasNoPosition) {
   ASSERT_EQ(line.samples.size(), 1u);
   EXPECT_FALSE(std::isnan(line.samples[0].position[0]));
   EXPECT_TRUE(std::isnan(line.samples[0].position[1]));
-}
-
-TEST(EncoderReceiver, AnAnswerStampedBeforeTheSyncIsNotItsAnswer) {
-  Line line;
-  line.sync(kStart);
-  line.frame(position(1, 7), kStart - 100us);
-  line.time(kStart + 900us);
-  EXPECT_EQ(line.samples.at(0).missing_mask, 0b111);
-  EXPECT_EQ(line.receiver.counters().late_frames, 1u);
-}
-
-TEST(EncoderReceiver, WhoAnswersTwiceInACycleIsNotBelieved) {
-  Line line;
-  line.sync(kStart);
-  line.frame(position(1, 10), kStart + 10us);
-  line.frame(position(1, 20), kStart + 200us);
-  line.frame(position(2, 30), kStart + 300us);
-  line.frame(position(3, 40), kStart + 400us);
-  ASSERT_EQ(line.samples.size(), 1u);
-  EXPECT_EQ(line.samples[0].missing_mask, 0b001);
-  EXPECT_TRUE(has(line.samples[0].head.flags, SampleFlag::AxisMissing));
-  EXPECT_EQ(line.receiver.counters().duplicate_frames, 1u);
-}
-
-TEST(EncoderReceiver, ALateAnswerDoesNotPassForThatOfTheNextCycle) {
-  Line line;
-  line.cycle(kStart, 1000);
-  line.sync(kStart + 1ms);
-  line.frame(position(2, 2001), kStart + 1200us);
-  line.frame(position(3, 2002), kStart + 1300us);
-  line.time(kStart + 1800us);
-  line.sync(kStart + 2ms);
-  line.frame(position(2, 3001), kStart + 2200us);
-  line.frame(position(3, 3002), kStart + 2300us);
-  line.frame(position(1, 2000), kStart + 2400us);  // to the SYNC before
-  line.frame(position(1, 3000), kStart + 2500us);
-  ASSERT_EQ(line.samples.size(), 3u);
-  EXPECT_EQ(line.samples[1].missing_mask, 0b001);
-  EXPECT_EQ(line.samples[2].missing_mask, 0b001);
-  EXPECT_EQ(line.samples[2].count[1], 3001);
-  line.cycle(kStart + 3ms, 4000);
-  EXPECT_EQ(line.samples.back().missing_mask, 0);
-  EXPECT_EQ(line.samples.back().count[0], 4000);
-}
-
-TEST(EncoderReceiver, ASampleThatHasLeftIsTakenBackByASecondAnswer) {
-  Line line;
-  line.cycle(kStart, 1000);
-  line.cycle(kStart + 3ms, 2000);
-  line.frame(position(2, 3001), kStart + 3900us);
-  ASSERT_EQ(line.samples.size(), 3u);
-  const auto& as_it_left = line.samples[1];
-  const auto& taken_back = line.samples[2];
-  EXPECT_EQ(as_it_left.missing_mask, 0);
-  EXPECT_TRUE(has(as_it_left.head.flags, SampleFlag::GapBefore));
-  EXPECT_EQ(taken_back.head.time, as_it_left.head.time);
-  EXPECT_EQ(taken_back.cycle, as_it_left.cycle);
-  EXPECT_EQ(taken_back.count, as_it_left.count);
-  EXPECT_EQ(taken_back.missing_mask, 0b010);
-  EXPECT_EQ(taken_back.head.flags, static_cast<protocol::SampleFlags>(SampleFlag::AxisMissing));
-  EXPECT_EQ(taken_back.head.lost_before, 0u);
-  line.frame(position(2, 3001), kStart + 3950us);
-  EXPECT_EQ(line.samples.size(), 3u) << "that is said already";
-  line.cycle(kStart + 4ms, 4000);
-  EXPECT_EQ(line.samples.back().missing_mask, 0);
-}
-
-TEST(EncoderReceiver, AnswersBeforeTheFirstSyncAreNoSamples) {
-  Line line;
-  for (int i = 0; i < 3; ++i) line.frame(position(1, 1000 + i), kStart + 100us * i);
-  EXPECT_TRUE(line.samples.empty());
-  line.cycle(kStart + 1ms, 2000);
-  ASSERT_EQ(line.samples.size(), 1u);
-  EXPECT_EQ(line.samples[0].missing_mask, 0);
-}
-
-TEST(EncoderReceiver, AnswersToASyncNobodyHeardTakeNothingBack) {
-  Line line;
-  line.cycle(kStart, 1000);
-  for (const can::NodeId node : kNodes) line.frame(position(node, 2000), kStart + 1200us);
-  EXPECT_EQ(line.samples.size(), 1u);
-  line.cycle(kStart + 2ms, 3000);
-  ASSERT_EQ(line.samples.size(), 2u);
-  EXPECT_EQ(line.samples[1].missing_mask, 0);
-  EXPECT_EQ(line.samples[1].head.lost_before, 1u);
-}
-
-TEST(EncoderReceiver, TheFirstAnswerAfterAnUnansweredCycleIsDoubtful) {
-  Line line;
-  line.cycle(kStart, 1000);
-  line.sync(kStart + 1ms);
-  line.time(kStart + 1800us);
-  line.cycle(kStart + 2ms, 3000);
-  EXPECT_EQ(line.samples.back().missing_mask, 0b111);
-  line.cycle(kStart + 3ms, 4000);
-  EXPECT_EQ(line.samples.back().missing_mask, 0);
-  EXPECT_EQ(line.receiver.counters().missing_answers, 6u);
-}
-
-TEST(EncoderReceiver, AnAnswerThatIsKnownToBeLateLeavesNoDoubt) {
-  for (const bool before_the_sync : {true, false}) {
-    Line line;
-    line.cycle(kStart, 1000);
-    line.sync(kStart + 1ms);
-    line.frame(position(2, 2001), kStart + 1100us);
-    line.frame(position(3, 2002), kStart + 1100us);
-    if (before_the_sync) line.frame(position(1, 2000), kStart + 1900us);
-    line.sync(kStart + 2ms);
-    if (!before_the_sync) line.frame(position(1, 2000), kStart + 1900us);  // read late, stamped before
-    for (const can::NodeId node : kNodes) line.frame(position(node, 3000), kStart + 2100us);
-    EXPECT_EQ(line.samples.back().missing_mask, 0);
-    EXPECT_EQ(line.samples.back().count[0], 3000);
-    EXPECT_EQ(line.receiver.counters().late_frames, 1u);
-  }
-}
-
-TEST(EncoderReceiver, APauseOrABootUpLeavesNothingUnderWay) {
-  for (const bool paused : {true, false}) {
-    Line line;
-    line.cycle(kStart, 1000);
-    line.sync(kStart + 1ms);
-    line.time(kStart + 1800us);
-    if (!paused) {
-      for (const can::NodeId node : kNodes)
-        line.frame(can::encode_heartbeat(node, can::NodeState::BootUp), kStart + 1900us);
-    }
-    line.cycle(paused ? kStart + 5ms : kStart + 2ms, 3000);
-    EXPECT_EQ(line.samples.back().missing_mask, 0);
-  }
-}
-
-/// Answers of a cycle of 1 ms in the order in which they come.
-struct Answer {
-  HostTime at;
-  can::NodeId node;
-  std::int64_t count;
-};
-
-TEST(EncoderReceiver, JitterWithinThePeriodCastsNoDoubt) {
-  Line line;
-  std::mt19937 random{7};
-  std::uniform_int_distribution<int> sync_us{-80, 80}, answer_us{20, 690};
-  for (int i = 0; i < 2000; ++i) {
-    const HostTime sync = kStart + 1ms * i + 1us * sync_us(random);
-    std::vector<Answer> answers;
-    for (const can::NodeId node : kNodes) answers.push_back({sync + 1us * answer_us(random), node, i});
-    std::ranges::sort(answers, {}, &Answer::at);
-    line.sync(sync);
-    for (const auto& a : answers) line.frame(position(a.node, a.count), a.at);
-  }
-  ASSERT_EQ(line.samples.size(), 2000u);
-  for (const auto& sample : line.samples) ASSERT_EQ(sample.head.flags, 0u);
-}
-
-TEST(EncoderReceiver, BelievesNoOldAnswerOfANodeThatIsLateNowAndThen) {
-  constexpr int kCycles = 20'000;
-  Line line;
-  std::mt19937 random{11};
-  std::uniform_int_distribution<int> prompt_us{100, 700}, late_us{750, 1900}, chance{0, 9};
-  std::vector<Answer> answers;
-  HostTime latest{};
-  for (int i = 0, late_in_a_row = 0; i < kCycles; ++i) {
-    // Three late ones in a row would be a node that is always late: that cannot be seen.
-    late_in_a_row = chance(random) == 0 && late_in_a_row < 2 ? late_in_a_row + 1 : 0;
-    const HostTime sync = kStart + 1ms * i;
-    latest = std::max(latest + 1us, sync + 1us * (late_in_a_row > 0 ? late_us(random) : prompt_us(random)));
-    answers.push_back({latest, 1, i});
-    for (const can::NodeId node : {can::NodeId{2}, can::NodeId{3}})
-      answers.push_back({sync + 1us * prompt_us(random), node, i});
-  }
-  std::ranges::stable_sort(answers, {}, &Answer::at);
-  std::size_t next = 0;
-  for (int i = 0; i < kCycles; ++i) {
-    line.sync(kStart + 1ms * i);
-    for (; next < answers.size() && answers[next].at < kStart + 1ms * (i + 1); ++next) {
-      if (answers[next].at >= line.receiver.deadline()) line.time(line.receiver.deadline());
-      line.frame(position(answers[next].node, answers[next].count), answers[next].at);
-    }
-  }
-  std::map<std::uint32_t, AxisSample> last_word;
-  for (const auto& sample : line.samples) last_word[sample.cycle] = sample;
-  std::size_t believed = 0;
-  for (const auto& [cycle, sample] : last_word) {
-    if (sample.missing_mask != 0) continue;
-    ++believed;
-    ASSERT_EQ(sample.count[0], static_cast<std::int64_t>(cycle));
-  }
-  EXPECT_GT(believed, std::size_t{kCycles} / 2);
 }
 
 TEST(EncoderReceiver, UnwrapsThirtyTwoBitsInBothDirections) {

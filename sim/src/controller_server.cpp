@@ -81,14 +81,7 @@ void ControllerServer<Controller>::write() {
   const std::vector<std::byte> more = device_->take_output();
   if (!client_) return;
   unsent_.insert(unsent_.end(), more.begin(), more.end());
-  std::size_t done = 0;
-  while (done < unsent_.size()) {
-    const ssize_t size =
-        ::send(client_.get(), unsent_.data() + done, unsent_.size() - done, MSG_DONTWAIT | MSG_NOSIGNAL);
-    if (size <= 0) break;
-    done += static_cast<std::size_t>(size);
-  }
-  unsent_.erase(unsent_.begin(), unsent_.begin() + static_cast<std::ptrdiff_t>(done));
+  send_what_fits(client_, unsent_, most_per_poll_);
   if (unsent_.size() > kMostUnsent) drop_client();
 }
 

@@ -100,8 +100,7 @@ class ReplayedTerminal final : public ReplayedDevice {
   void poll(HostTime now) override { server_.poll(now); }
   [[nodiscard]] HostTime next_due() const override { return server_.next_due(); }
   void add_poll_fds(std::vector<pollfd>& fds) const override {
-    const short events = static_cast<short>(server_.wants_write() ? POLLIN | POLLOUT : POLLIN);
-    if (server_.fd() >= 0) fds.push_back({server_.fd(), events, 0});
+    add_client_fd(server_.fd(), server_.wants_write(), fds);
   }
   [[nodiscard]] bool finished() const override {
     return server_.device().finished() && !server_.wants_write();

@@ -6,6 +6,7 @@
 #include <sys/socket.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cerrno>
 #include <cstring>
 
@@ -67,6 +68,28 @@ sockaddr_storage loopback_address(std::uint16_t port) {
   sockaddr_storage storage{};
   std::memcpy(&storage, &address, sizeof address);
   return storage;
+}
+
+void send_what_fits(const Socket& client, std::vector<std::byte>& unsent, std::size_t most) {
+  most = std::min(most, unsent.size());
+  std::size_t done = 0;
+  while (done < most) {
+    const ssize_t size = ::send(client.get(), unsent.data() + done, most - done, MSG_DONTWAIT | MSG_NOSIGNAL);
+    if (size <= 0) break;
+    done += static_cast<std::size_t>(size);
+  }
+  unsent.erase(unsent.begin(), unsent.begin() + static_cast<std::ptrdiff_t>(done));
+}
+
+void add_client_fd(int client_fd, bool wants_write, std::vector<pollfd>& fds) {
+  const short events = static_cast<short>(wants_write ? POLLIN | POLLOUT : POLLIN);
+  if (client_fd >= 0) fds.push_back({client_fd, events, 0});
+}
+
+void add_server_fds(const Socket& listener, const Socket& client, bool wants_write,
+                    std::vector<pollfd>& fds) {
+  fds.push_back({listener.get(), POLLIN, 0});
+  add_client_fd(client.get(), wants_write, fds);
 }
 
 }  // namespace abbe::sim

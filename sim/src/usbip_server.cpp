@@ -211,14 +211,7 @@ void UsbipServer::send_part(std::size_t bytes) {
 
 void UsbipServer::write() {
   if (!client_ || hold_output_) return;
-  std::size_t done = 0;
-  while (done < unsent_.size()) {
-    const ssize_t size =
-        ::send(client_.get(), unsent_.data() + done, unsent_.size() - done, MSG_DONTWAIT | MSG_NOSIGNAL);
-    if (size <= 0) break;
-    done += static_cast<std::size_t>(size);
-  }
-  unsent_.erase(unsent_.begin(), unsent_.begin() + static_cast<std::ptrdiff_t>(done));
+  send_what_fits(client_, unsent_);
 }
 
 void UsbipServer::disconnect() {

@@ -5,6 +5,8 @@
 
 #include <poll.h>
 
+#include <cstddef>
+#include <limits>
 #include <memory>
 #include <utility>
 #include <vector>
@@ -32,11 +34,12 @@ class ControllerServer {
   [[nodiscard]] int listener_fd() const { return listener_.get(); }
   [[nodiscard]] int client_fd() const { return client_.get(); }  ///< -1 without a client
   [[nodiscard]] bool wants_write() const { return !unsent_.empty(); }
+  /// From now on: as a wire carries one segment after the other. The rest leaves with the next poll(), which
+  /// the caller paces: with add_poll_fds() it follows at once.
+  void send_per_poll(std::size_t bytes) { most_per_poll_ = bytes; }
   /// What to wait for besides the time.
   void add_poll_fds(std::vector<pollfd>& fds) const {
-    fds.push_back({listener_fd(), POLLIN, 0});
-    const short events = static_cast<short>(wants_write() ? POLLIN | POLLOUT : POLLIN);
-    if (client_fd() >= 0) fds.push_back({client_fd(), events, 0});
+    add_server_fds(listener_, client_, wants_write(), fds);
   }
   [[nodiscard]] Controller& device() { return *device_; }
   [[nodiscard]] const Controller& device() const { return *device_; }
@@ -55,6 +58,7 @@ class ControllerServer {
   std::uint16_t port_ = 0;
   std::unique_ptr<Controller> device_;
   std::vector<std::byte> unsent_;
+  std::size_t most_per_poll_ = std::numeric_limits<std::size_t>::max();
 };
 
 }  // namespace abbe::sim

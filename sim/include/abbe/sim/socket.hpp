@@ -1,11 +1,15 @@
 #pragma once
-/// A file descriptor with an owner, and the two kinds of loopback endpoint the simulator needs. All
-/// non-blocking.
+/// A file descriptor with an owner, the two kinds of loopback endpoint the simulator needs, and what a server
+/// with one client does with them. All non-blocking.
 
+#include <poll.h>
 #include <sys/socket.h>
 
+#include <cstddef>
 #include <cstdint>
+#include <limits>
 #include <utility>
+#include <vector>
 
 #include "abbe/sim/error.hpp"
 
@@ -38,5 +42,12 @@ class Socket {
 [[nodiscard]] std::uint16_t port_of(const Socket& socket);
 /// 127.0.0.1 with this port, as sendto() wants it.
 [[nodiscard]] sockaddr_storage loopback_address(std::uint16_t port);
+/// What the client takes without blocking, at most `most` bytes, leaves `unsent`.
+void send_what_fits(const Socket& client, std::vector<std::byte>& unsent,
+                    std::size_t most = std::numeric_limits<std::size_t>::max());
+/// What a server waits for from its client; -1: there is none.
+void add_client_fd(int client_fd, bool wants_write, std::vector<pollfd>& fds);
+/// The same with one client at a time; `client` may be closed.
+void add_server_fds(const Socket& listener, const Socket& client, bool wants_write, std::vector<pollfd>& fds);
 
 }  // namespace abbe::sim

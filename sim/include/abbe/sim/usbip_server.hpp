@@ -37,9 +37,7 @@ class UsbipServer {
   [[nodiscard]] bool wants_write() const { return !unsent_.empty(); }
   /// What to wait for besides the time.
   void add_poll_fds(std::vector<pollfd>& fds) const {
-    fds.push_back({listener_fd(), POLLIN, 0});
-    const short events = static_cast<short>(wants_write() ? POLLIN | POLLOUT : POLLIN);
-    if (client_fd() >= 0) fds.push_back({client_fd(), events, 0});
+    add_server_fds(listener_, client_, wants_write(), fds);
   }
   /// The simulated one; must not be asked for with another.
   [[nodiscard]] CounterCard& card() { return *simulated_; }

@@ -19,6 +19,10 @@ Result<std::string> read_file(const std::string& path) {
   return text.str();
 }
 
+std::string beside_file(const std::string& file, const std::string& path) {
+  return (std::filesystem::path(file).parent_path() / path).string();
+}
+
 Result<void> write_file(const std::string& path, std::string_view text) {
   if (path == "-") {
     if (std::fwrite(text.data(), 1, text.size(), stdout) != text.size() || std::fflush(stdout) != 0) {

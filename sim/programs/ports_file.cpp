@@ -34,7 +34,7 @@ Result<void> announce_ports(const Ports& ports, const std::string& path) {
     lines += fmt::format("usbip_port{}={}\n", i == 0 ? "" : fmt::format("_{}", i + 1), ports.usbip[i]);
   if (ports.cmm) lines += fmt::format("cmm_port={}\n", *ports.cmm);
   if (!path.empty()) {
-    if (const auto written = write_file(path, lines); !written) return written;
+    if (auto written = write_file(path, lines); !written) return written;
   }
   if (ports.tracker) fmt::print("tracker: emScon on 127.0.0.1:{}\n", *ports.tracker);
   if (ports.can) fmt::print("encoders: CAN over UDP on 127.0.0.1:{}\n", *ports.can);

@@ -12,7 +12,7 @@
 #include "abbe/sim/touching.hpp"
 #include "abbe/sim/weak_stiffness.hpp"
 
-namespace CLI {
+namespace CLI {  // NOLINT(readability-identifier-naming): the name of CLI11
 class App;
 }
 

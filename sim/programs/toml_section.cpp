@@ -4,10 +4,13 @@
 
 #include <cmath>
 
+#include "files.hpp"
+
 namespace abbe::sim {
 namespace {
 
 constexpr std::size_t kMostFaults = 20;
+constexpr std::int64_t kLastPort = 65535;
 
 }  // namespace
 
@@ -85,6 +88,13 @@ bool TomlSection::integer(std::string_view key, std::int64_t& value, std::int64_
   return true;
 }
 
+bool TomlSection::port(std::string_view key, std::uint16_t& value) {
+  std::int64_t seen = 0;
+  if (!integer(key, seen, 0, kLastPort)) return false;
+  value = static_cast<std::uint16_t>(seen);
+  return true;
+}
+
 bool TomlSection::text(std::string_view key, std::string& value) {
   const toml::node* node = find(key);
   if (node == nullptr) return false;
@@ -131,6 +141,20 @@ void TomlSection::refuse_unknown_keys() {
   for (const auto& [key, node] : *table_) {
     if (known_.find(key.str()) == known_.end()) faults_.add(&node, path_of(key.str()), "unknown key");
   }
+}
+
+Result<void> read_toml_file(const std::string& file, const std::function<void(TomlSection)>& reader) {
+  const auto text = read_file(file);
+  if (!text) return tl::unexpected(text.error());
+  try {
+    const toml::table table = toml::parse(*text, file);
+    TomlFaults faults(file);
+    reader(TomlSection(&table, "", faults));
+    if (faults.any()) return tl::unexpected(faults.error());
+  } catch (const toml::parse_error& e) {
+    return bad_input(fmt::format("{}:{}: {}", file, e.source().begin.line, e.description()));
+  }
+  return {};
 }
 
 }  // namespace abbe::sim

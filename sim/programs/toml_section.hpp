@@ -5,6 +5,7 @@
 #include <toml++/toml.h>
 #include <Eigen/Core>
 #include <cstdint>
+#include <functional>
 #include <optional>
 #include <set>
 #include <string>
@@ -35,7 +36,6 @@ struct NumberRange {
 inline constexpr NumberRange kAnyNumber{-1e12, 1e12};
 inline constexpr NumberRange kPositiveNumber{1e-12, 1e12};
 inline constexpr NumberRange kNotNegativeNumber{0.0, 1e12};
-inline constexpr std::int64_t kLastPort = 65535;
 inline constexpr double kMilli = 1e-3;
 inline constexpr double kMicro = 1e-6;
 
@@ -52,6 +52,7 @@ class TomlSection {
   /// Each sets `value` and says true if the key is there and good. `scale` turns the file's unit into SI.
   bool number(std::string_view key, double& value, double scale = 1.0, NumberRange range = kAnyNumber);
   bool integer(std::string_view key, std::int64_t& value, std::int64_t least, std::int64_t most);
+  bool port(std::string_view key, std::uint16_t& value);
   bool text(std::string_view key, std::string& value);
   bool flag(std::string_view key, bool& value);
   bool vector(std::string_view key, Eigen::Vector3d& value, double scale = 1.0);
@@ -69,5 +70,9 @@ class TomlSection {
   TomlFaults& faults_;
   std::set<std::string, std::less<>> known_;
 };
+
+/// Reads the parts of one file that `reader` knows. Io, or BadInput with every fault at once.
+[[nodiscard]] Result<void> read_toml_file(const std::string& file,
+                                          const std::function<void(TomlSection)>& reader);
 
 }  // namespace abbe::sim

@@ -69,8 +69,7 @@ Eigen::Vector3d error_m(const TruthMachine& truth, const Eigen::Vector3d& q_m,
 Result<std::array<Axis, 3>> parse_chain(std::string_view chain) {
   std::vector<Axis> found;
   for (std::size_t i = 0; i < chain.size(); ++i) {
-    const std::size_t axis = kAxisLetters.find(chain[i]);
-    if (axis != std::string_view::npos) found.push_back(kAxes[axis]);
+    if (const auto axis = axis_named(chain.substr(i, 1))) found.push_back(*axis);
   }
   std::array<Axis, 3> order{};
   std::vector<Axis> sorted = found;

@@ -23,9 +23,9 @@ struct Place {
 std::optional<Place> place_of(std::string_view name) {
   if (name.size() != 3 || name[0] != 'E') return std::nullopt;
   const std::size_t motion = kMotionLetters.find(name[1]);
-  const std::size_t axis = kAxisLetters.find(name[2]);
-  if (motion == std::string_view::npos || axis == std::string_view::npos) return std::nullopt;
-  return Place{kAxes[axis], motion};
+  const auto axis = axis_named(name.substr(2));
+  if (motion == std::string_view::npos || !axis) return std::nullopt;
+  return Place{*axis, motion};
 }
 
 std::string_view unit_of(std::size_t motion) {

@@ -12,6 +12,7 @@
 #include <Eigen/Core>
 #include <array>
 #include <cstddef>
+#include <optional>
 #include <string>
 #include <string_view>
 
@@ -23,6 +24,12 @@ namespace abbe::sim {
 enum class Axis : std::size_t { X = 0, Y = 1, Z = 2 };
 inline constexpr std::array<Axis, 3> kAxes{Axis::X, Axis::Y, Axis::Z};
 inline constexpr std::string_view kAxisLetters = "XYZ";
+/// "X", "Y" or "Z"; nullopt for anything else.
+[[nodiscard]] constexpr std::optional<Axis> axis_named(std::string_view name) {
+  const std::size_t place = name.size() == 1 ? kAxisLetters.find(name[0]) : std::string_view::npos;
+  if (place == std::string_view::npos) return std::nullopt;
+  return kAxes[place];
+}
 
 /// The six error motions of one axis: translations along x, y, z, then rotations about x, y, z.
 enum class Motion : std::size_t { EX = 0, EY = 1, EZ = 2, EA = 3, EB = 4, EC = 5 };

@@ -1,8 +1,4 @@
-#include "measuring_machine_setup.hpp"
-
-#include <fmt/format.h>
-
-#include "files.hpp"
+#include "read_measuring_machine.hpp"
 
 namespace abbe::sim {
 namespace {
@@ -40,9 +36,7 @@ void read_cmm(TomlSection section, SimulationSetup& simulation) {
   machine.machine.truth = {};
   std::string tool;
   if (section.text("tool", tool)) machine.tools.push_back(tool);
-  std::int64_t port = 0;
-  if (section.integer("port", port, 0, kLastPort))
-    simulation.measuring_machine_port = static_cast<std::uint16_t>(port);
+  section.port("port", simulation.measuring_machine_port);
   simulation.measuring_machine = machine;
 }
 
@@ -50,9 +44,7 @@ void read_sim_cmm(TomlSection section, SimulationSetup& simulation, std::string&
   if (!section.present()) return;
   if (!simulation.measuring_machine) return section.fault("", "there is no [cmm] in the machine file");
   IppDmeOptions& machine = *simulation.measuring_machine;
-  std::int64_t port = simulation.measuring_machine_port;
-  if (section.integer("port", port, 0, kLastPort))
-    simulation.measuring_machine_port = static_cast<std::uint16_t>(port);
+  section.port("port", simulation.measuring_machine_port);
   section.text("artefact", artefact_file);
   section.number("noise_um", machine.machine.noise_m, kMicro, kNotNegativeNumber);
   section.number("travel_mm_per_s", machine.travel_speed_m_s, kMilli, kPositiveNumber);
@@ -62,17 +54,7 @@ void read_sim_cmm(TomlSection section, SimulationSetup& simulation, std::string&
 }
 
 Result<void> read_artefact(const std::string& file, MeasuringMachine& machine) {
-  const auto text = read_file(file);
-  if (!text) return tl::unexpected(text.error());
-  try {
-    const toml::table table = toml::parse(*text, file);
-    TomlFaults faults(file);
-    read_features({&table, "", faults}, machine);
-    if (faults.any()) return tl::unexpected(faults.error());
-  } catch (const toml::parse_error& e) {
-    return bad_input(fmt::format("{}:{}: {}", file, e.source().begin.line, e.description()));
-  }
-  return {};
+  return read_toml_file(file, [&](TomlSection root) { read_features(std::move(root), machine); });
 }
 
 }  // namespace abbe::sim

@@ -1,4 +1,4 @@
-#include "environment_setup.hpp"
+#include "read_environment.hpp"
 
 #include <fmt/format.h>
 
@@ -25,15 +25,14 @@ void read_model(TomlSection& section, EnvironmentModel& model) {
 }
 
 void read_endpoint(TomlSection& section, ModbusServerOptions& options) {
-  std::int64_t port = 0;
+  std::uint16_t port = 0;
   std::string link;
   const bool on_terminal = section.text("link", link);
-  if (section.integer("port", port, 0, kLastPort) && on_terminal)
-    section.fault("port", "has no meaning with link");
+  if (section.port("port", port) && on_terminal) section.fault("port", "has no meaning with link");
   if (on_terminal) {
     options.endpoint = ModbusPtyEndpoint{link};
   } else {
-    options.endpoint = ModbusTcpEndpoint{static_cast<std::uint16_t>(port)};
+    options.endpoint = ModbusTcpEndpoint{port};
   }
 }
 

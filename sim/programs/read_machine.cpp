@@ -1,0 +1,93 @@
+#include "read_machine.hpp"
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "read_counter_card.hpp"
+#include "read_measuring_machine.hpp"
+
+namespace abbe::sim {
+namespace {
+
+void read_axes(TomlSection root, TruthMachine& truth) {
+  TomlSection axes = root.child("axes");
+  if (!axes.present()) return root.fault("axes", "missing");
+  for (const Axis axis : kAxes) {
+    const std::string_view name = kAxisLetters.substr(static_cast<std::size_t>(axis), 1);
+    TomlSection section = axes.child(name);
+    AxisRange& range = truth.axis(axis).range;
+    const bool has_min = section.number("min_mm", range.min_m, kMilli);
+    const bool has_max = section.number("max_mm", range.max_m, kMilli);
+    if (!has_min || !has_max) {
+      section.fault("", "needs min_mm and max_mm");
+    } else if (range.min_m >= range.max_m) {
+      section.fault("max_mm", "must exceed min_mm");
+    }
+    range.reference_m = range.min_m <= 0.0 && range.max_m >= 0.0 ? 0.0 : range.min_m;
+    section.number("reference_mm", range.reference_m, kMilli);
+  }
+}
+
+std::optional<EncoderNodeOptions> read_encoder_node(TomlSection& section) {
+  EncoderNodeOptions node;
+  std::string name;
+  std::int64_t id = 0;
+  double step_nm = 10.0;
+  section.text("axis", name);
+  const auto axis = axis_named(name);
+  if (!axis) {
+    section.fault("axis", "must be X, Y or Z");
+    return std::nullopt;
+  }
+  if (!section.integer("node", id, 1, can::kMaxNodeId)) section.fault("node", "missing");
+  section.number("step_nm", step_nm, 1.0, {1.0, 1e9});
+  section.number("offset_mm", node.offset_m, kMilli);
+  section.flag("invert", node.invert);
+  node.axis = *axis;
+  node.node = static_cast<can::NodeId>(id);
+  node.step_nm = static_cast<std::uint32_t>(step_nm);
+  return node;
+}
+
+void read_encoder_nodes(TomlSection& encoder, std::vector<EncoderNodeOptions>& nodes) {
+  std::vector<EncoderNodeOptions> seen;
+  for (TomlSection& section : encoder.children("nodes"))
+    if (const auto node = read_encoder_node(section)) seen.push_back(*node);
+  if (!seen.empty()) nodes = seen;
+}
+
+void read_chain(TomlSection root, TruthMachine& truth) {
+  TomlSection machine = root.child("machine");
+  std::string chain = "[w X b Y Z t]";
+  if (!machine.text("chain", chain)) root.fault("machine.chain", "missing");
+  if (const auto order = parse_chain(chain)) {
+    truth.order = *order;
+  } else {
+    machine.fault("chain", order.error().text);
+  }
+}
+
+}  // namespace
+
+void read_machine_tables(TomlSection root, SetupDraft& draft) {
+  SimulationSetup& simulation = draft.setup.simulation;
+  read_chain(root, simulation.truth);
+  read_axes(root, simulation.truth);
+  root.child("target").vector("offset_mm", simulation.truth.target_offset_m, kMilli);
+  TomlSection tracker = root.child("tracker");
+  tracker.number("sigma_range_um", simulation.tracker->model.sigma_range_m, kMicro, kNotNegativeNumber);
+  tracker.number("sigma_angle_urad", simulation.tracker->model.sigma_angle_rad, kMicro, kNotNegativeNumber);
+  tracker.port("port", simulation.tracker_port);
+  TomlSection encoder = root.child("encoder");
+  encoder.port("peer_port", simulation.bus->port);
+  encoder.port("local_port", simulation.bus->peer_port);
+  encoder.text("interface", simulation.bus->interface);
+  read_encoder_nodes(encoder, simulation.nodes);
+  read_counter_card(root.child("counter_card"), simulation);
+  read_reference(root.child("reference"), simulation);
+  read_cmm(root.child("cmm"), simulation);
+  root.child("daemon").number("speed", draft.setup.speed, 1.0, {1e-3, 1e4});
+}
+
+}  // namespace abbe::sim

@@ -1,0 +1,122 @@
+#include "read_sim.hpp"
+
+#include <chrono>
+#include <cstdint>
+
+#include "files.hpp"
+#include "read_counter_card.hpp"
+#include "read_environment.hpp"
+#include "read_faults.hpp"
+#include "read_measuring_machine.hpp"
+#include "read_touching.hpp"
+
+namespace abbe::sim {
+namespace {
+
+void read_duration(TomlSection& section, std::string_view key, std::chrono::nanoseconds& value,
+                   double scale) {
+  double seconds = 0.0;
+  if (section.number(key, seconds, scale, kNotNegativeNumber)) value = seconds_to_ns(seconds);
+}
+
+void read_truth(TomlSection section, const std::string& file, SetupDraft& draft) {
+  std::string shape = "linear";
+  section.number("mean_error_um", draft.random.mean_error_m, kMicro, kPositiveNumber);
+  section.number("node_spacing_mm", draft.random.node_spacing_m, kMilli, {0.1, 1e6});
+  section.number("backlash_um", draft.random.backlash_m, kMicro, kNotNegativeNumber);
+  section.text("shape", shape);
+  if (shape != "linear" && shape != "cubic") section.fault("shape", "must be \"linear\" or \"cubic\"");
+  draft.random.shape = shape == "cubic" ? Shape::Cubic : Shape::Linear;
+  std::string path;
+  if (section.text("file", path)) draft.truth_file = beside_file(file, path);
+  section.refuse_unknown_keys();
+}
+
+void read_thermal(TomlSection section, ThermalDrift& thermal) {
+  section.vector("growth_um_per_m", thermal.growth_per_m, kMicro);
+  section.vector("shift_um", thermal.shift_m, kMicro);
+  section.number("time_constant_s", thermal.time_constant_s, 1.0, kPositiveNumber);
+  section.refuse_unknown_keys();
+}
+
+void read_path(TomlSection section, const std::string& file, SetupDraft& draft) {
+  SimulationSetup& simulation = draft.setup.simulation;
+  std::string path;
+  if (section.text("file", path)) draft.path_file = beside_file(file, path);
+  section.number("feed_mm_per_min", simulation.path.feed_m_per_s, kMmPerMin, kPositiveNumber);
+  section.number("acceleration_mm_per_s2", simulation.path.acceleration_m_per_s2, kMilli, kPositiveNumber);
+  section.number("dwell_s", simulation.path.dwell_s, 1.0, kNotNegativeNumber);
+  read_duration(section, "standstill_s", simulation.standstill, 1.0);
+  section.flag("start_when_streaming", simulation.start_when_streaming);
+  section.refuse_unknown_keys();
+}
+
+void read_tracker(TomlSection section, SimulationSetup& simulation) {
+  TrackerOptions& tracker = *simulation.tracker;
+  TrackerModel& model = tracker.model;
+  section.port("port", simulation.tracker_port);
+  section.vector("position_mm", model.position_m, kMilli);
+  section.vector("rotation_rad", model.rotation_rad);
+  section.number("sigma_range_um", model.sigma_range_m, kMicro, kNotNegativeNumber);
+  section.number("sigma_angle_urad", model.sigma_angle_rad, kMicro, kNotNegativeNumber);
+  section.number("max_radial_speed_mm_per_s", model.max_radial_speed_m_per_s, kMilli, kPositiveNumber);
+  section.number("max_lateral_speed_mm_per_s", model.max_lateral_speed_m_per_s, kMilli, kPositiveNumber);
+  section.number("clock_offset_s", model.clock_offset_s, 1.0, {0.0, 2e9});
+  section.number("clock_drift_ppm", model.clock_drift_ppm, 1.0, {-1000.0, 1000.0});
+  read_duration(section, "delay_ms", tracker.delay, kMilli);
+  read_duration(section, "warm_up_s", tracker.warm_up, 1.0);
+  read_duration(section, "command_latency_ms", tracker.command_latency, kMilli);
+  read_duration(section, "initialize_s", tracker.initialize_time, 1.0);
+  section.number("air_temperature_C", tracker.air_temperature_C);
+  section.number("air_pressure_mbar", tracker.air_pressure_mbar);
+  section.number("air_humidity_percent", tracker.air_humidity_percent);
+  section.number("air_drift_K_per_hour", tracker.air_drift_K_per_hour);
+  section.refuse_unknown_keys();
+}
+
+void read_probe(TomlSection section, SimulationSetup& simulation) {
+  if (!section.present()) return;
+  TouchedSurface surface;
+  std::string name = "Z";
+  section.text("axis", name);
+  const auto axis = axis_named(name);
+  if (!axis) section.fault("axis", "must be X, Y or Z");
+  surface.axis = static_cast<int>(axis.value_or(Axis::Z));
+  if (!section.number("surface_mm", surface.surface_m, kMilli)) section.fault("surface_mm", "missing");
+  section.number("delay_us", surface.delay_s, kMicro, kNotNegativeNumber);
+  section.number("jitter_us", surface.jitter_s, kMicro, kNotNegativeNumber);
+  section.refuse_unknown_keys();
+  simulation.surface = surface;
+}
+
+}  // namespace
+
+void read_sim(TomlSection sim, const std::string& file, SetupDraft& draft) {
+  SimulationSetup& simulation = draft.setup.simulation;
+  std::string machine;
+  if (sim.text("machine", machine)) draft.machine_file = beside_file(file, machine);
+  sim.integer("seed", draft.seed, 0, INT64_MAX);
+  sim.number("speed", draft.setup.speed, 1.0, {1e-3, 1e4});
+  read_truth(sim.child("truth"), file, draft);
+  read_thermal(sim.child("thermal"), simulation.truth.thermal);
+  read_path(sim.child("path"), file, draft);
+  read_tracker(sim.child("tracker"), simulation);
+  TomlSection encoder = sim.child("encoder");
+  encoder.port("port", simulation.bus->port);
+  encoder.port("peer_port", simulation.bus->peer_port);
+  encoder.text("interface", simulation.bus->interface);
+  encoder.number("noise_nm", draft.encoder_noise_m, 1e-9, kNotNegativeNumber);
+  encoder.refuse_unknown_keys();
+  read_environment(sim, simulation.environment);
+  read_sim_counter_card(sim.child("counter_card"), simulation);
+  read_sim_evemu(sim.child("evemu"), draft.setup);
+  read_ball_array(sim.child("ball_array"), draft.setup.array);
+  read_probe(sim.child("probe"), simulation);
+  std::string artefact;
+  read_sim_cmm(sim.child("cmm"), simulation, artefact);
+  if (!artefact.empty()) draft.artefact_file = beside_file(file, artefact);
+  read_faults(sim, simulation.faults);
+  sim.refuse_unknown_keys();
+}
+
+}  // namespace abbe::sim

@@ -1,0 +1,14 @@
+#pragma once
+/// [sim] and all tables below it.
+
+#include <string>
+
+#include "setup_draft.hpp"
+#include "toml_section.hpp"
+
+namespace abbe::sim {
+
+/// `file` is the one `sim` stands in: paths in it are relative to its folder.
+void read_sim(TomlSection sim, const std::string& file, SetupDraft& draft);
+
+}  // namespace abbe::sim

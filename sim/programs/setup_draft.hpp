@@ -1,0 +1,26 @@
+#pragma once
+/// Everything the files say, before the truth is made of it. Each group of tables has a reader of its own
+/// that fills its part.
+
+#include <cstdint>
+#include <string>
+
+#include "abbe/sim/random_truth.hpp"
+#include "setup_file.hpp"
+
+namespace abbe::sim {
+
+inline constexpr double kMmPerMin = 1e-3 / 60.0;  ///< in m/s
+
+struct SetupDraft {
+  LoadedSetup setup;
+  RandomTruthOptions random;
+  std::string truth_file;
+  std::string path_file;
+  std::string machine_file;
+  std::string artefact_file;
+  std::int64_t seed = 1;
+  double encoder_noise_m = 5e-9;
+};
+
+}  // namespace abbe::sim

@@ -26,7 +26,7 @@ EventLoop::EventLoop(double speed) : clock_(speed) {
   sigemptyset(&held);
   sigaddset(&held, SIGINT);
   sigaddset(&held, SIGTERM);
-  sigprocmask(SIG_BLOCK, &held, &signals_while_waiting_);
+  sigprocmask(SIG_BLOCK, &held, &held_back_while_waiting_);
   prctl(PR_SET_TIMERSLACK, 1);  // ns; at 20 times real time the usual 50 us would be a millisecond
 }
 
@@ -34,13 +34,13 @@ bool EventLoop::stopped() const {
   return stop_requested != 0;
 }
 
-void EventLoop::wait(std::vector<pollfd>& fds, HostTime due) const {
+void wait(std::vector<pollfd>& fds, const SimClock& clock, HostTime due, const sigset_t* held_back) {
   std::chrono::nanoseconds wall = kLongestWait;
   if (due != HostTime::max()) {
-    wall = std::clamp(clock_.wall(due - clock_.now()), std::chrono::nanoseconds{0}, kLongestWait);
+    wall = std::clamp(clock.wall(due - clock.now()), std::chrono::nanoseconds{0}, kLongestWait);
   }
   const timespec timeout{wall.count() / 1'000'000'000, wall.count() % 1'000'000'000};
-  ppoll(fds.data(), fds.size(), &timeout, &signals_while_waiting_);
+  ppoll(fds.data(), fds.size(), &timeout, held_back);
 }
 
 }  // namespace abbe::sim

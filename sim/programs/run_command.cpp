@@ -9,6 +9,7 @@
 
 #include "abbe/sim/simulation.hpp"
 #include "abbe/sim/truth_table.hpp"
+#include "bus_thread.hpp"
 #include "commands.hpp"
 #include "event_loop.hpp"
 #include "files.hpp"
@@ -72,8 +73,9 @@ class Narrator {
 };
 
 int run(const RunOptions& options) {
-  const auto setup = load_setup(options.choices);
+  auto setup = load_setup(options.choices);
   if (!setup) return report(setup.error());
+  setup->simulation.bus_apart = true;
   if (!options.truth_out.empty()) {
     const auto written = write_file(options.truth_out, format_truth_csv(setup->simulation.truth));
     if (!written) return report(written.error());
@@ -84,6 +86,7 @@ int run(const RunOptions& options) {
   const Ports ports = ports_of(**simulation, setup->simulation.bus->interface);
   if (const auto announced = announce_ports(ports, options.ports_file); !announced)
     return report(announced.error());
+  BusThread encoders(**simulation, loop.clock());
   Narrator narrator(setup->speed);
   while (!loop.stopped()) {
     std::vector<pollfd> fds;
@@ -91,6 +94,7 @@ int run(const RunOptions& options) {
     loop.wait(fds, (*simulation)->next_due());
     const HostTime now = loop.clock().now();
     (*simulation)->poll(now);
+    encoders.check();
     narrator.look(**simulation, now);
   }
   return kDone;

@@ -10,9 +10,9 @@ Simulation::Simulation(TruthMachine truth, PathMotion path, const SimulationSetu
       start_when_streaming_(setup.start_when_streaming),
       held_(setup.held),
       standstill_(setup.standstill),
-      faults_(setup.faults) {
-  std::stable_sort(faults_.begin(), faults_.end(),
-                   [](const auto& a, const auto& b) { return a.fault.at_s < b.fault.at_s; });
+      bus_apart_(setup.bus_apart) {
+  for (const ScheduledFault& fault : setup.faults)
+    (fault.target == FaultTarget::Encoder ? bus_faults_ : faults_).add(fault);
 }
 
 Result<std::unique_ptr<Simulation>> Simulation::open(const SimulationSetup& setup, HostTime now) {
@@ -59,11 +59,21 @@ void Simulation::poll(HostTime now) {
   if (tracker_) tracker_->poll(now);
   start_machine(now);
   touch(now);
-  inject_faults(now);
-  if (bus_) bus_->poll(now);
+  while (const auto* fault = faults_.take_due(machine_, now)) inject(*fault, now);
+  if (!bus_apart_) poll_bus(now);
   for (ModbusServer& server : environment_) server.poll(now);
   for (UsbipServer& card : counter_cards_) card.poll(now);
   if (measuring_machine_) measuring_machine_->poll(now);
+}
+
+void Simulation::poll_bus(HostTime now) {
+  if (!bus_) return;
+  while (const auto* fault = bus_faults_.take_due(machine_, now)) bus_->inject(fault->fault, now);
+  bus_->poll(now);
+}
+
+HostTime Simulation::next_bus_due() const {
+  return bus_ ? std::min(bus_->next_due(), bus_faults_.next_due(machine_)) : HostTime::max();
 }
 
 void Simulation::start_machine(HostTime now) {
@@ -91,21 +101,11 @@ void Simulation::touch(HostTime now) {
   }
 }
 
-void Simulation::inject_faults(HostTime now) {
-  if (!machine_.started()) return;
-  for (; next_fault_ < faults_.size(); ++next_fault_) {
-    const ScheduledFault& next = faults_[next_fault_];
-    if (*machine_.started() + seconds_to_ns(next.fault.at_s) > now) return;
-    inject(next, now);
-  }
-}
-
 void Simulation::inject(const ScheduledFault& next, HostTime now) {
   if (next.target == FaultTarget::Tracker && tracker_) {
     tracker_->device().inject(next.fault, now);
     tracker_->poll(now);
   }
-  if (next.target == FaultTarget::Encoder && bus_) bus_->inject(next.fault, now);
   if (next.target == FaultTarget::MeasuringMachine && measuring_machine_)
     measuring_machine_->device().inject(next.fault, now);
   if (next.target == FaultTarget::Environment) inject_environment(next.fault, now);
@@ -120,21 +120,18 @@ void Simulation::inject_environment(const Fault& fault, HostTime now) {
 }
 
 HostTime Simulation::next_due() const {
-  HostTime due = HostTime::max();
+  HostTime due = faults_.next_due(machine_);
   if (tracker_) due = std::min(due, tracker_->next_due());
-  if (bus_) due = std::min(due, bus_->next_due());
+  if (!bus_apart_) due = std::min(due, next_bus_due());
   for (const ModbusServer& server : environment_) due = std::min(due, server.next_due());
   for (const UsbipServer& card : counter_cards_) due = std::min(due, card.next_due());
   if (measuring_machine_) due = std::min(due, measuring_machine_->next_due());
-  if (machine_.started() && next_fault_ < faults_.size()) {
-    due = std::min(due, *machine_.started() + seconds_to_ns(faults_[next_fault_].fault.at_s));
-  }
   return due;
 }
 
 void Simulation::add_poll_fds(std::vector<pollfd>& fds) const {
   if (tracker_) tracker_->add_poll_fds(fds);
-  if (bus_) fds.push_back({bus_->fd(), POLLIN, 0});
+  if (bus_ && !bus_apart_) fds.push_back({bus_->fd(), POLLIN, 0});
   for (const ModbusServer& server : environment_) server.add_poll_fds(fds);
   for (const UsbipServer& card : counter_cards_) card.add_poll_fds(fds);
   if (measuring_machine_) measuring_machine_->add_poll_fds(fds);

@@ -100,6 +100,25 @@ TEST_F(SimulationTest, FaultsComeAtTheirTime) {
   EXPECT_LT(simulation_->tracker()->client_fd(), 0);
 }
 
+TEST_F(SimulationTest, BusApartIsTurnedByPollBusAlone) {
+  SimulationSetup setup = small_setup();
+  setup.start_when_streaming = false;
+  setup.nodes = {{.node = 1, .axis = Axis::X}};
+  setup.bus_apart = true;
+  setup.faults = {{FaultTarget::Encoder, {FaultKind::BusOff, 1.0, 5.0, 0.0, 0}}};
+  open(setup);
+  const HostTime boot_due = simulation_->bus()->next_due();
+  EXPECT_EQ(simulation_->next_bus_due(), boot_due);
+  EXPECT_NE(simulation_->next_due(), boot_due);
+  std::vector<pollfd> fds;
+  simulation_->add_poll_fds(fds);
+  for (const pollfd& fd : fds) EXPECT_NE(fd.fd, simulation_->bus()->fd());
+  run(3100ms);
+  EXPECT_EQ(simulation_->bus()->next_due(), boot_due);  // nobody has turned it
+  simulation_->poll_bus(now_);
+  EXPECT_EQ(simulation_->next_bus_due(), now_ + 5s);  // booted, and the end of its bus-off
+}
+
 TEST_F(SimulationTest, NeverOversleepsWhatIsDue) {
   open(small_setup());
   stream();

@@ -1,7 +1,7 @@
 #pragma once
 /// The whole stage: machine, tracker, encoder bus, counter cards, a measuring machine and the timetable of
 /// faults, stepped together. poll(now) does what is due, never blocks and reads no clock; a program turns it
-/// with real time, a test with whatever it likes. Not thread-safe.
+/// with real time, a test with whatever it likes. Not thread-safe, but for poll_bus().
 
 #include <poll.h>
 
@@ -12,6 +12,7 @@
 
 #include "abbe/sim/counter_card_setup.hpp"
 #include "abbe/sim/encoder_bus.hpp"
+#include "abbe/sim/fault_timetable.hpp"
 #include "abbe/sim/ippdme_server.hpp"
 #include "abbe/sim/modbus_server.hpp"
 #include "abbe/sim/touched_surface.hpp"
@@ -31,6 +32,9 @@ struct SimulationSetup {
   std::uint16_t tracker_port = 0;
   std::optional<EncoderBusOptions> bus;
   std::vector<EncoderNodeOptions> nodes;
+  /// The bus is turned by poll_bus() alone. A SYNC is then answered as the machine stands, not as it would
+  /// after a start that the other thread is about to make: with a standstill nobody can tell.
+  bool bus_apart = false;
   std::vector<ModbusServerOptions> environment;
   std::vector<CounterCardSetup> counter_cards;
   std::optional<IppDmeOptions> measuring_machine;
@@ -46,6 +50,10 @@ class Simulation {
   [[nodiscard]] static Result<std::unique_ptr<Simulation>> open(const SimulationSetup& setup, HostTime now);
 
   void poll(HostTime now);
+  /// The encoders and their faults, with `bus_apart`. May run on a thread of its own, which then is the only
+  /// one to use bus().
+  void poll_bus(HostTime now);
+  [[nodiscard]] HostTime next_bus_due() const;
   /// Whoever held the machine waits no longer.
   void let_go(HostTime now);
   [[nodiscard]] HostTime next_due() const;
@@ -64,7 +72,6 @@ class Simulation {
   Simulation(TruthMachine truth, PathMotion path, const SimulationSetup& setup);
   void start_machine(HostTime now);
   void touch(HostTime now);
-  void inject_faults(HostTime now);
   void inject_environment(const Fault& fault, HostTime now);
   void inject(const ScheduledFault& next, HostTime now);
 
@@ -74,12 +81,13 @@ class Simulation {
   std::chrono::nanoseconds standstill_;
   std::optional<TrackerServer> tracker_;
   std::optional<EncoderBus> bus_;
+  bool bus_apart_;
+  FaultTimetable bus_faults_;
   std::vector<ModbusServer> environment_;
   std::deque<UsbipServer> counter_cards_;
   std::optional<IppDmeServer> measuring_machine_;
-  std::deque<double> edges_s_;          ///< that the probe's card does not know of yet
-  std::vector<ScheduledFault> faults_;  ///< by time
-  std::size_t next_fault_ = 0;
+  std::deque<double> edges_s_;  ///< that the probe's card does not know of yet
+  FaultTimetable faults_;       ///< of all but the bus
 };
 
 }  // namespace abbe::sim

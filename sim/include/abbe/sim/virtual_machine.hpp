@@ -1,7 +1,10 @@
 #pragma once
 /// A truth machine driven along its path: what scales and a tracker can observe of it at any host time. It
-/// stands at the first vertex until start() says when the motion begins. Not thread-safe.
+/// stands at the first vertex until start() says when the motion begins. Thread-safe.
 
+#include <atomic>
+#include <cstdint>
+#include <limits>
 #include <optional>
 #include <utility>
 
@@ -17,13 +20,19 @@ class VirtualMachine {
 
   /// The motion begins at `at`; only the first call counts.
   void start(HostTime at) {
-    if (!start_) start_ = at;
+    auto never = kNever;
+    start_.compare_exchange_strong(never, at.time_since_epoch().count());
   }
-  [[nodiscard]] std::optional<HostTime> started() const { return start_; }
+  [[nodiscard]] std::optional<HostTime> started() const {
+    const auto start = start_.load();
+    if (start == kNever) return std::nullopt;
+    return HostTime{std::chrono::nanoseconds{start}};
+  }
   /// When the path has been driven; nullopt before start().
   [[nodiscard]] std::optional<HostTime> finished() const {
-    if (!start_) return std::nullopt;
-    return *start_ + seconds_to_ns(path_.duration_s());
+    const auto start = started();
+    if (!start) return std::nullopt;
+    return *start + seconds_to_ns(path_.duration_s());
   }
 
   /// Scale readings q, m.
@@ -38,11 +47,16 @@ class VirtualMachine {
   [[nodiscard]] const PathMotion& path() const { return path_; }
 
  private:
-  [[nodiscard]] double elapsed_s(HostTime at) const { return start_ ? ns_to_seconds(at - *start_) : -1.0; }
+  static constexpr auto kNever = std::numeric_limits<std::int64_t>::max();
+
+  [[nodiscard]] double elapsed_s(HostTime at) const {
+    const auto start = started();
+    return start ? ns_to_seconds(at - *start) : -1.0;
+  }
 
   TruthMachine truth_;
   PathMotion path_;
-  std::optional<HostTime> start_;
+  std::atomic<std::int64_t> start_{kNever};  ///< ns of HostTime
 };
 
 }  // namespace abbe::sim

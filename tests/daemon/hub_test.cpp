@@ -119,6 +119,7 @@ TEST_F(HubTest, SaysThatItIsAliveWhetherOrNotAnythingComes) {
 
 TEST_F(HubTest, WhatTheDevicesBringGoesOutInTheSameTurn) {
   activate_a_model();
+  turn();  // lets abbe-dds in
   turn_with_axes();
   const auto sent = messages<v1::Compensation>(far_->take(), Topic::Compensation);
   ASSERT_THAT(sent, SizeIs(1));

@@ -85,8 +85,6 @@ ModelStanding Hub::standing() const {
 
 void Hub::turn(WallTime wall) {
   last_turn_ns_.store(wall.time_since_epoch().count(), std::memory_order_relaxed);
-  if (parts_.publisher != nullptr) parts_.publisher->beat(wall);
-
   batch_.clear();
   const std::size_t points_left = parts_.devices.points_left();
   parts_.devices.drain(batch_);
@@ -94,8 +92,9 @@ void Hub::turn(WallTime wall) {
   if (parts_.reference != nullptr) parts_.reference->turn(batch_);
   const bool fresh = live_.take(batch_);
   const HostTime now = parts_.time.now();
-  // Live first: subscribers wait for it; the recorder and the assembler have time.
+  // Live first: subscribers wait for it; abbe-dds's socket, the recorder and the assembler have time.
   publish(fresh, now, wall);
+  if (parts_.publisher != nullptr) parts_.publisher->beat(wall);
 
   if (parts_.recorder != nullptr && !batch_.empty()) parts_.recorder->hand_over(batch_);
   assembler_.take(batch_);

@@ -47,7 +47,7 @@ class Publisher {
 
   Publisher(DdsLink link, PublisherOptions options, protocol::UtcOffset utc);
 
-  /// Every turn, first thing: says the daemon is alive and lets the link breathe.
+  /// Every turn, behind what subscribers wait for: says the daemon is alive and lets the link breathe.
   void beat(WallTime wall);
   /// Every turn in which something new came; the snapshot first, subscribers wait for it.
   void snapshot(const protocol::Snapshot& view, protocol::HostTime now, WallTime wall);

@@ -9,7 +9,6 @@
 #include <vector>
 
 #include "abbe/daemon/html_report.hpp"
-#include "model/utc_text.hpp"
 #include "report/sections.hpp"
 #include "units.hpp"
 
@@ -203,22 +202,15 @@ void add_sections(HtmlReport& page, const calib::VolumetricModel& model) {
 
 void add_origin(HtmlReport& page, const ModelDocument& document, const evemu::Solution& solution) {
   const auto& s = solution.statistics;
-  page.heading("Model");
-  page.facts(
-      {{"machine", document.machine},
-       {"kinematic chain (ISO 10791-6)", document.model.layout().chain().text()},
-       {"model", model_id(document)},
-       {"method", fmt::format("{}, {}", document.method, document.estimator)},
-       {"gauge", std::string{calib::name(document.model.gauge())}},
-       {"created (UTC)", to_text(document.created)},
-       {"artefact", fmt::format("{} positions, {} ball centres", s.positions, s.balls)},
+  add_model_origin(
+      page, document, document.inputs,
+      {{"artefact", fmt::format("{} positions, {} ball centres", s.positions, s.balls)},
        {"observations", fmt::format("{} for {} coefficients, rank {}, condition {:.3g}, {:.1f} effective "
                                     "parameters",
                                     s.observations, s.unknowns, s.rank, s.condition, s.effective_parameters)},
        {"noise of a ball centre, per coordinate", um_text(s.s_m)},
        {"chi^2 per degree of freedom", fmt::format("{:.3f}", s.chi2_per_dof)},
        {"valid", "inside the hull of the ball centres, for one tool"}});
-  add_inputs(page, document.inputs);
 }
 
 }  // namespace

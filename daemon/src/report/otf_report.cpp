@@ -6,7 +6,6 @@
 #include <vector>
 
 #include "abbe/daemon/html_report.hpp"
-#include "model/utc_text.hpp"
 #include "report/sections.hpp"
 #include "units.hpp"
 
@@ -21,20 +20,14 @@ std::string um(double m) {
 
 void add_origin(HtmlReport& page, const ModelDocument& document) {
   const auto& s = document.statistics;
-  page.heading("Model");
-  page.facts({{"machine", document.machine},
-              {"kinematic chain (ISO 10791-6)", document.model.layout().chain().text()},
-              {"model", model_id(document)},
-              {"method", fmt::format("{}, {}", document.method, document.estimator)},
-              {"gauge", std::string{calib::name(document.model.gauge())}},
-              {"created (UTC)", to_text(document.created)},
-              {"samples", fmt::format("{}, {} lost", s.samples, s.lost_samples)},
-              {"observations", fmt::format("{} for {} unknowns, rank {}, condition {:.3g}", s.observations,
-                                           s.unknowns, s.rank, s.condition)},
-              {"sigma0",
-               fmt::format("{:.3f} (1: residuals as large as the stated uncertainties explain)", s.sigma0)},
-              {"covariance multiplied with", fmt::format("{:.3f}", s.covariance_factor)}});
-  add_inputs(page, document.inputs);
+  add_model_origin(
+      page, document, document.inputs,
+      {{"samples", fmt::format("{}, {} lost", s.samples, s.lost_samples)},
+       {"observations", fmt::format("{} for {} unknowns, rank {}, condition {:.3g}", s.observations,
+                                    s.unknowns, s.rank, s.condition)},
+       {"sigma0",
+        fmt::format("{:.3f} (1: residuals as large as the stated uncertainties explain)", s.sigma0)},
+       {"covariance multiplied with", fmt::format("{:.3f}", s.covariance_factor)}});
 }
 
 void add_residuals(HtmlReport& page, const ModelStatistics& s, const calib::otf::Residuals& residuals) {

@@ -2,12 +2,22 @@
 
 #include <fmt/format.h>
 
-#include <utility>
-
+#include "model/utc_text.hpp"
 #include "units.hpp"
 
 namespace abbe::daemon {
-namespace {}  // namespace
+namespace {
+
+/// Files with their hashes; nothing without files.
+void add_inputs(HtmlReport& page, const std::vector<InputFile>& inputs) {
+  if (inputs.empty()) return;
+  std::vector<std::vector<std::string>> rows;
+  rows.reserve(inputs.size());
+  for (const auto& input : inputs) rows.push_back({input.name, input.sha256});
+  page.table({"input", "SHA-256"}, rows);
+}
+
+}  // namespace
 
 std::string um_text(double length_m, int decimals) {
   return fmt::format("{:.{}f} um", length_m * kUmPerM, decimals);
@@ -39,11 +49,19 @@ void add_verdict(HtmlReport& page, const calib::Verdict& verdict, std::string_vi
   page.facts(facts);
 }
 
-void add_inputs(HtmlReport& page, const std::vector<InputFile>& inputs) {
-  if (inputs.empty()) return;
-  std::vector<std::vector<std::string>> rows;
-  for (const auto& input : inputs) rows.push_back({input.name, input.sha256});
-  page.table({"input", "SHA-256"}, rows);
+void add_model_origin(HtmlReport& page, const ModelDocument& document, const std::vector<InputFile>& inputs,
+                      const std::vector<std::pair<std::string, std::string>>& more) {
+  page.heading("Model");
+  std::vector<std::pair<std::string, std::string>> facts{
+      {"machine", document.machine},
+      {"kinematic chain (ISO 10791-6)", document.model.layout().chain().text()},
+      {"model", model_id(document)},
+      {"method", fmt::format("{}, {}", document.method, document.estimator)},
+      {"gauge", std::string{calib::name(document.model.gauge())}},
+      {"created (UTC)", to_text(document.created)}};
+  facts.insert(facts.end(), more.begin(), more.end());
+  page.facts(facts);
+  add_inputs(page, inputs);
 }
 
 }  // namespace abbe::daemon

@@ -3,11 +3,13 @@
 
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include "abbe/calib/gate.hpp"
 #include "abbe/daemon/html_report.hpp"
 #include "abbe/daemon/input_files.hpp"
+#include "abbe/daemon/model_document.hpp"
 
 namespace abbe::daemon {
 
@@ -19,7 +21,8 @@ namespace abbe::daemon {
 void add_verdict(HtmlReport& page, const calib::Verdict& verdict, std::string_view held_out,
                  int decimals = 2);
 
-/// Files with their hashes; nothing without files.
-void add_inputs(HtmlReport& page, const std::vector<InputFile>& inputs);
+/// Where a model comes from, what `more` there is to say of it, and the files this report was made from.
+void add_model_origin(HtmlReport& page, const ModelDocument& document, const std::vector<InputFile>& inputs,
+                      const std::vector<std::pair<std::string, std::string>>& more = {});
 
 }  // namespace abbe::daemon

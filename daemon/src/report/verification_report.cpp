@@ -8,7 +8,6 @@
 #include <numeric>
 
 #include "abbe/daemon/html_report.hpp"
-#include "model/utc_text.hpp"
 #include "report/sections.hpp"
 #include "units.hpp"
 
@@ -29,6 +28,7 @@ std::string urad(const calib::Vector3& r_rad) {
 
 std::vector<double> lengths_um(const std::vector<calib::Vector3>& v_m) {
   std::vector<double> out;
+  out.reserve(v_m.size());
   for (const auto& v : v_m) out.push_back(kUmPerM * v.norm());
   return out;
 }
@@ -201,17 +201,6 @@ void add_planes(HtmlReport& page, const Verification& v) {
   }
 }
 
-void add_origin(HtmlReport& page, const ModelDocument& document, const Verification& v) {
-  page.heading("Model");
-  page.facts({{"machine", document.machine},
-              {"kinematic chain (ISO 10791-6)", document.model.layout().chain().text()},
-              {"model", model_id(document)},
-              {"method", fmt::format("{}, {}", document.method, document.estimator)},
-              {"gauge", std::string{calib::name(document.model.gauge())}},
-              {"created (UTC)", to_text(document.created)}});
-  add_inputs(page, v.inputs);
-}
-
 }  // namespace
 
 std::string verification_report(const ModelDocument& document, const Verification& v) {
@@ -221,7 +210,7 @@ std::string verification_report(const ModelDocument& document, const Verificatio
   add_ratio(page, v.comparison);
   add_planes(page, v);
   add_frame(page, v);
-  add_origin(page, document, v);
+  add_model_origin(page, document, v.inputs);
   return page.text();
 }
 

@@ -70,8 +70,8 @@ void Datum::move_on(const protocol::SampleHead& head) {
   begun_ = true;
 }
 
-void Datum::apply(protocol::AxisSample& sample) {
-  move_on(sample.head);
+template <class Counted>
+void Datum::apply_to_counts(Counted& sample) const {
   for (const Axis& axis : axes_) {
     if (axis.in_force) {
       sample.position[axis.place] =
@@ -80,6 +80,11 @@ void Datum::apply(protocol::AxisSample& sample) {
       set_missing(sample, axis.place);
     }
   }
+}
+
+void Datum::apply(protocol::AxisSample& sample) {
+  move_on(sample.head);
+  apply_to_counts(sample);
 }
 
 void Datum::apply(protocol::ProbeTrigger& touch) const {
@@ -92,22 +97,11 @@ void Datum::apply(protocol::ProbeTrigger& touch) const {
   }
 }
 
-void Datum::apply(protocol::TouchScan& scan) const {
-  for (const Axis& axis : axes_) {
-    if (axis.in_force) {
-      scan.position[axis.place] =
-          axis.in_force->reading_at_zero + axis.step * static_cast<double>(scan.count[axis.place]);
-    } else {
-      set_missing(scan, axis.place);
-    }
-  }
-}
-
 void Datum::apply(Batch& batch) {
   if (axes_.empty()) return;
   for (auto& sample : batch.axes) apply(sample);
   for (auto& touch : batch.touches) apply(touch);
-  for (auto& scan : batch.touch_scans) apply(scan);
+  for (auto& scan : batch.touch_scans) apply_to_counts(scan);
 }
 
 RecordingAttachment to_attachment(const FoundDatum& datum) {

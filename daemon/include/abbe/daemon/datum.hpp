@@ -65,7 +65,8 @@ class Datum {
   void move_on(const protocol::SampleHead& head);
   void apply(protocol::AxisSample& sample);
   void apply(protocol::ProbeTrigger& touch) const;
-  void apply(protocol::TouchScan& scan) const;
+  template <class Counted>
+  void apply_to_counts(Counted& sample) const;
 
   std::vector<Axis> axes_;
   bool begun_ = false;  // a sample was seen: what begins anew now is not the first set-up

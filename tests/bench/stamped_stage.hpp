@@ -1,11 +1,13 @@
 #pragma once
 /// The simulated devices at real speed, which note when the last TPDO of a cycle and the last byte of a burst
-/// left. What leaves is made before; the stamps are taken just before and after it is sent, so that the
-/// system call itself counts against abbe.
+/// left. Both leave as their wires carry them: three TPDOs one after the other at 1 Mbit/s, a burst by
+/// Ethernet segments at 100 Mbit/s. What leaves is made before; the stamps are taken just before and after
+/// the last of it is sent, so that this system call itself counts against abbe.
 
 #include <poll.h>
 
 #include <algorithm>
+#include <array>
 #include <chrono>
 #include <cstdint>
 #include <memory>
@@ -35,13 +37,17 @@ class StampedStage {
                sim::TrackerOptions{.initialize_time = std::chrono::milliseconds{100}}, stage->machine_, now));
     if (!tracker) return tl::unexpected(tracker.error());
     stage->tracker_ = std::make_unique<sim::TrackerServer>(std::move(*tracker));
-    const std::vector<sim::EncoderNodeOptions> nodes{{.node = 1, .axis = sim::Axis::X},
-                                                     {.node = 2, .axis = sim::Axis::Y},
-                                                     {.node = 3, .axis = sim::Axis::Z}};
-    auto bus = sim::EncoderBus::open({.speed = 1.0}, nodes, stage->machine_, now);
+    const std::array<sim::EncoderNodeOptions, kNodes> nodes{{{.node = 1, .axis = sim::Axis::X},
+                                                             {.node = 2, .axis = sim::Axis::Y},
+                                                             {.node = 3, .axis = sim::Axis::Z}}};
+    // Without .speed a SYNC is dated by when it is read, and its answers leave at the times said here.
+    auto bus = sim::EncoderBus::open({}, nodes, stage->machine_, now);
     if (!bus) return tl::unexpected(bus.error());
     stage->bus_ = std::make_unique<sim::EncoderBus>(std::move(*bus));
-    for (auto& node : stage->bus_->nodes()) node.delay_until(sim::HostTime::max(), kOnTheBus);
+    std::chrono::nanoseconds on_the_bus = kSyncOnTheBus;
+    for (auto& node : stage->bus_->nodes())
+      node.delay_until(sim::HostTime::max(), on_the_bus += kTpdoOnTheBus);
+    stage->tracker_->send_per_poll(kSegmentBytes);
     return stage;
   }
 
@@ -57,9 +63,9 @@ class StampedStage {
   /// Waits until something is to do, and does it.
   void turn() {
     std::vector<pollfd> fds{{bus_->fd(), POLLIN, 0}, {tracker_->listener_fd(), POLLIN, 0}};
-    const short events = static_cast<short>(tracker_->wants_write() ? POLLIN | POLLOUT : POLLIN);
-    if (tracker_->client_fd() >= 0) fds.push_back({tracker_->client_fd(), events, 0});
-    const auto due = std::min(tracker_->next_due(), answers_due_.value_or(bus_->next_due()));
+    if (tracker_->client_fd() >= 0) fds.push_back({tracker_->client_fd(), POLLIN, 0});
+    const auto tracker_due = tracker_->wants_write() ? segment_due_ : tracker_->next_due();
+    const auto due = std::min(tracker_due, bus_->next_due());
     const auto wait =
         std::clamp<std::chrono::nanoseconds>(due - clock_.now(), {}, std::chrono::milliseconds{50});
     const timespec timeout{0, wait.count()};
@@ -71,44 +77,53 @@ class StampedStage {
  private:
   explicit StampedStage(sim::PathMotion path) : machine_({}, std::move(path)) {}
 
-  /// What three TPDOs and their SYNC take at 1 Mbit/s: how long after the SYNC the last one ends.
-  static constexpr std::chrono::microseconds kOnTheBus{400};
+  static constexpr std::size_t kNodes = 3;
+  // At 1 Mbit/s: a frame without data takes 44 bits, one with a position of 4 bytes 76; 3 more until the
+  // next, and at most 8 and 16 of stuffing.
+  static constexpr std::chrono::microseconds kSyncOnTheBus{55};
+  static constexpr std::chrono::microseconds kTpdoOnTheBus{95};
+  // At 100 Mbit/s a segment of an ordinary Ethernet takes, with its heads, 1538 bytes' time.
+  static constexpr std::size_t kSegmentBytes = 1448;
+  static constexpr std::chrono::microseconds kSegmentOnTheWire{123};
 
-  template <class Send>
-  static void stamp(std::vector<Departure>& departures, Send&& send) {
-    const std::int64_t before_ns = monotonic_ns();
-    send();
-    departures.push_back({before_ns, monotonic_ns()});
-  }
-
-  /// From a SYNC until its answers are due nothing else leaves: what is stamped holds the last TPDO.
+  /// The poll that sends the last answer to a SYNC is stamped. It was a SYNC that came if then an answer is
+  /// due when the first TPDO is: nothing else that comes over the bus is answered so late.
   void turn_bus(bool asked) {
     const auto now = clock_.now();
-    if (asked) {
-      bus_->poll(now);
-      answers_due_ = now + kOnTheBus;
-    } else if (!answers_due_) {
-      bus_->poll(now);
-    } else if (now >= *answers_due_) {
-      answers_due_.reset();
-      stamp(cycles_, [&] { bus_->poll(now); });
+    const std::int64_t before_ns = monotonic_ns();
+    bus_->poll(now);
+    if (last_answer_due_ && now >= *last_answer_due_) {
+      last_answer_due_.reset();
+      cycles_.push_back({before_ns, monotonic_ns()});
     }
+    if (asked && !last_answer_due_ && bus_->next_due() == now + kSyncOnTheBus + kTpdoOnTheBus)
+      last_answer_due_ = now + kSyncOnTheBus + kNodes * kTpdoOnTheBus;
   }
 
-  /// The points are made first: what leaves afterwards is only the sending.
+  /// The points are made first: what leaves afterwards is only the sending. The poll after which nothing is
+  /// left of a burst is stamped.
   void turn_tracker() {
     const auto now = clock_.now();
+    if (tracker_->wants_write() && now < segment_due_) return;
     const auto sent = tracker_->device().points_sent();
     tracker_->device().advance(now);
-    if (tracker_->device().points_sent() == sent) return tracker_->poll(now);
-    stamp(bursts_, [&] { tracker_->poll(now); });
+    in_burst_ = in_burst_ || tracker_->device().points_sent() != sent;
+    const std::int64_t before_ns = monotonic_ns();
+    tracker_->poll(now);
+    segment_due_ = now + kSegmentOnTheWire;
+    if (tracker_->wants_write() || !in_burst_) return;
+    in_burst_ = false;
+    bursts_.push_back({before_ns, monotonic_ns()});
   }
 
   sim::SimClock clock_{1.0};
   sim::VirtualMachine machine_;
   std::unique_ptr<sim::TrackerServer> tracker_;
   std::unique_ptr<sim::EncoderBus> bus_;
-  std::optional<sim::HostTime> answers_due_;  ///< to the SYNC that came last
+  std::chrono::nanoseconds answered_after_{};
+  std::optional<sim::HostTime> last_answer_due_;  ///< to the SYNC that came last
+  sim::HostTime segment_due_{};
+  bool in_burst_ = false;
   std::vector<Departure> cycles_, bursts_;
 };
 

@@ -29,7 +29,7 @@ struct CounterCardRun : Spine {
     ASSERT_NO_FATAL_FAILURE(start_abbed());
   }
   [[nodiscard]] std::string at_speed(const std::string& text) const {
-    return std::regex_replace(text, std::regex{"\nspeed = [0-9]+"}, "\nspeed = " + speed_);
+    return replaced(text, "\nspeed = [0-9]+", "\nspeed = " + speed_);
   }
 
   std::string wiring_;  ///< further keys of [counter_card], of both

@@ -9,6 +9,7 @@
 
 #include <fstream>
 #include <iterator>
+#include <regex>
 #include <thread>
 
 extern char** environ;
@@ -32,6 +33,12 @@ void wait_a_little() {
 std::string text_of(const std::filesystem::path& file) {
   std::ifstream in{file, std::ios::binary};
   return {std::istreambuf_iterator<char>{in}, {}};
+}
+
+std::string replaced(const std::string& text, const std::string& pattern, const std::string& by) {
+  const std::regex what{pattern};
+  EXPECT_TRUE(std::regex_search(text, what)) << "nothing like " << pattern << " in:\n" << text;
+  return std::regex_replace(text, what, by);
 }
 
 Program::Program(std::vector<std::string> command, std::filesystem::path log) : log_(std::move(log)) {

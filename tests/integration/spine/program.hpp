@@ -57,5 +57,7 @@ bool eventually(Condition seen, std::chrono::milliseconds at_most) {
 
 /// A whole file; empty when there is none.
 std::string text_of(const std::filesystem::path& file);
+/// `text` with `by` for everything that `pattern` (ECMAScript) finds; nothing found fails the test.
+std::string replaced(const std::string& text, const std::string& pattern, const std::string& by);
 
 }  // namespace abbe::test

@@ -2,8 +2,6 @@
 
 #include <gmock/gmock.h>
 
-#include <regex>
-
 #include "counter_card_run.hpp"
 
 namespace abbe::test {
@@ -18,8 +16,8 @@ struct ReferenceRun : CounterCardRun {
 
   void SetUp() override {
     speed_ = "1";
-    write("sim.toml", at_speed(std::regex_replace(text_of(file("sim.toml")), std::regex{"standstill_s = 2"},
-                                                  "standstill_s = 5")));
+    write("sim.toml",
+          at_speed(replaced(text_of(file("sim.toml")), "standstill_s = [0-9]+", "standstill_s = 5")));
   }
   /// Over the first marks of every scale at 4 mm/s, again and again.
   void write_traverses() const {

@@ -23,9 +23,7 @@ struct Refusals : Spine {
     return std::to_string(1 + std::count(text.begin(), text.begin() + static_cast<std::ptrdiff_t>(at), '\n'));
   }
   void replace(const std::string& what, const std::string& by) {
-    std::string text = text_of(file("abbed.toml"));
-    ASSERT_NE(text.find(what), std::string::npos);
-    write("abbed.toml", text.replace(text.find(what), what.size(), by));
+    write("abbed.toml", replaced(text_of(file("abbed.toml")), what, by));
   }
   [[nodiscard]] Outcome run_abbed(const std::string& option = "") const {
     std::vector<std::string> command{ABBED_PROGRAM, "--config", file("abbed.toml")};
@@ -45,7 +43,7 @@ TEST_F(Refusals, UnknownOptionIsUsage) {
 }
 
 TEST_F(Refusals, ThreeErrorsOfAConfigurationAreSaidAtOnceWithTheirLines) {
-  replace("max_mm = 100", "max_mm = -200");
+  replace("(axes.X.\nmin_mm = -100\nmax_mm =) 100", "$1 -200");
   replace("point_rate_hz = 500", "point_rate_Hz = 500");
   replace("chunk_kB = 16", "chunk_kB = \"much\"");
   const auto outcome = run_abbed();

@@ -84,8 +84,10 @@ TEST_F(ShortRun, IsCalibratedPublishedRecordedAndReplayedTheSame) {
   ASSERT_NO_FATAL_FAILURE(start_everything());
   const auto calibrated = calibrate("path.csv");
   ASSERT_EQ(calibrated.code, 0) << calibrated.out << calibrated.err;
+  // Where others keep the processors busy, answers may miss their cycles for half a second: STALE, as it
+  // should.
+  EXPECT_TRUE(eventually([&] { return status()["model"]["state"] == "ACTIVE"; })) << status().dump(1);
   const json model = status()["model"];
-  EXPECT_EQ(model["state"], "ACTIVE");
   ASSERT_NO_FATAL_FAILURE(expect_subscriber_sees_a_smaller_error());
   EXPECT_EQ(abbed_->stop(), 0) << abbed_->err();
   ASSERT_EQ(recordings().size(), 1u);

@@ -3,7 +3,6 @@
 
 #include <gmock/gmock.h>
 
-#include <regex>
 #include <sstream>
 
 #include "touching_run.hpp"
@@ -143,9 +142,8 @@ TEST_F(TouchingRun, SaysWhatIsMissedDoubledAndAstrayAndGoesOn) {
 
 TEST_F(TouchingRun, RefusesAnArrayThatGrowsWithoutAThermometer) {
   ASSERT_NO_FATAL_FAILURE(start_touching_simulator());
-  write("grows.toml", std::regex_replace(text_of(file("calibrator.toml")), std::regex{"\\n\\n\\[\\[ball"},
-                                         "\nalpha_um_per_m_K = 12\nu_alpha_um_per_m_K = 1\n\n[[ball",
-                                         std::regex_constants::format_first_only));
+  write("grows.toml", replaced(text_of(file("calibrator.toml")), "tip_radius_mm = .*",
+                               "$&\nalpha_um_per_m_K = 12\nu_alpha_um_per_m_K = 1"));
   write_touching_configuration();
   ASSERT_NO_FATAL_FAILURE(start_abbed());
   const auto refused = run(calibrate_command("grows.toml"));
@@ -155,8 +153,7 @@ TEST_F(TouchingRun, RefusesAnArrayThatGrowsWithoutAThermometer) {
 
 TEST_F(TouchingRun, RefusesTheCalibratorOfAnotherArtefactAtItsFirstBall) {
   ASSERT_NO_FATAL_FAILURE(start_touching_simulator());
-  write("other.toml", std::regex_replace(text_of(file("calibrator.toml")),
-                                         std::regex{"radius_mm = 12[.0-9]*"}, "radius_mm = 10"));
+  write("other.toml", replaced(text_of(file("calibrator.toml")), "radius_mm = 12[.0-9]*", "radius_mm = 10"));
   write_touching_configuration();
   ASSERT_NO_FATAL_FAILURE(start_abbed());
   const auto refused = calibrate_touching("other.toml");

@@ -145,14 +145,11 @@ class WireRun {
     const std::string ports = text_of(file("ports"));
     std::smatch seen;
     if (std::regex_search(ports, seen, std::regex{"_path=\"(.*)\""})) {
-      configuration = std::regex_replace(configuration, std::regex{"serial = \"[^\"]*\""},
-                                         "serial = \"" + seen[1].str() + "\"");
+      configuration = replaced(configuration, "serial = \"[^\"]*\"", "serial = \"" + seen[1].str() + "\"");
     } else if (std::regex_search(ports, seen, std::regex{"_port=([0-9]+)"})) {
-      configuration =
-          std::regex_replace(configuration, std::regex{"port = [0-9]+"}, "port = " + seen[1].str());
+      configuration = replaced(configuration, "port = [0-9]+", "port = " + seen[1].str());
     }
-    return std::regex_replace(configuration, std::regex{"simulated = true"},
-                              "simulated = true\nrealtime = \"ignore\"");
+    return replaced(configuration, "simulated = true", "simulated = true\nrealtime = \"ignore\"");
   }
   [[nodiscard]] nlohmann::json status() const {
     const auto answer = daemon::ask_daemon(folder_ / "run" / "control.sock", {{"do", "status"}});

@@ -20,7 +20,7 @@ namespace {
 using namespace abbe::daemon;  // NOLINT(google-build-using-namespace): a program, not a header
 using namespace std::chrono_literals;
 
-enum ExitCode { kDone = 0, kUsage = 2, kBadInput = 3, kIo = 4, kDefect = 70 };
+constexpr int kDone = 0, kUsage = 2, kBadInput = 3, kIo = 4, kDefect = 70;
 
 constexpr const char* kExitCodes =
     "Exit codes: 0 stopped by SIGTERM or SIGINT (or the configuration is good), 2 usage, 3 the configuration "

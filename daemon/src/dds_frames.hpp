@@ -23,7 +23,7 @@ namespace abbe::daemon {
 inline constexpr std::size_t kFrameHeaderBytes = 8;
 inline constexpr std::uint8_t kFrameVersion = 1;
 /// No topic comes near it: the largest, ErrorModel with 1024 parameters, is below 52 kB.
-inline constexpr std::size_t kMaxPayloadBytes = 64 * 1024;
+inline constexpr std::size_t kMaxPayloadBytes = std::size_t{64} * 1024;
 
 enum class FrameKind : std::uint8_t { Beat = 0, Publish = 1 };
 

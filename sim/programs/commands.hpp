@@ -7,7 +7,7 @@
 
 #include "abbe/sim/error.hpp"
 
-namespace CLI {
+namespace CLI {  // NOLINT(readability-identifier-naming): the name of CLI11
 class App;
 }
 

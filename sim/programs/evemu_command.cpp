@@ -88,14 +88,15 @@ std::string truth_csv(const TruthMachine& truth, const BallArray& array) {
     low = low.cwiseMin(q_m);
     high = high.cwiseMax(q_m);
   }
-  low = low.cwiseQuotient(step_m).array().ceil();
-  high = high.cwiseQuotient(step_m).array().floor();
+  using Steps = Eigen::Matrix<Eigen::Index, 3, 1>;
+  const Steps first = low.cwiseQuotient(step_m).array().ceil().cast<Eigen::Index>();
+  const Steps last = high.cwiseQuotient(step_m).array().floor().cast<Eigen::Index>();
   const Eigen::Vector3d V_ball1_m = error_m(truth, readings.front());
   std::string text = "x_mm,y_mm,z_mm,ex_um,ey_um,ez_um\n";
-  for (double x = low.x(); x <= high.x(); ++x) {
-    for (double y = low.y(); y <= high.y(); ++y) {
-      for (double z = low.z(); z <= high.z(); ++z)
-        text += error_row(truth, step_m.cwiseProduct(Eigen::Vector3d(x, y, z)), V_ball1_m);
+  for (Eigen::Index x = first.x(); x <= last.x(); ++x) {
+    for (Eigen::Index y = first.y(); y <= last.y(); ++y) {
+      for (Eigen::Index z = first.z(); z <= last.z(); ++z)
+        text += error_row(truth, step_m.cwiseProduct(Steps(x, y, z).cast<double>()), V_ball1_m);
     }
   }
   return text;

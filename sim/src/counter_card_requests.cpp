@@ -36,8 +36,8 @@ std::vector<std::byte> data_of(B... b) {
 std::vector<std::byte> configuration() {
   constexpr unsigned kLength = 25;
   return data_of(9, 2, kLength, 0, 1, quad08::kConfiguration, 0, 0x80, 250,  // bus powered, 500 mA
-                  9, 4, 0, 0, 1, 0xFF, 0, 0, 0,                               // one vendor interface
-                  7, 5, quad08::kScanEndpoint, 2, quad08::kPacketSize & 0xFFu, quad08::kPacketSize >> 8, 0);
+                 9, 4, 0, 0, 1, 0xFF, 0, 0, 0,                               // one vendor interface
+                 7, 5, quad08::kScanEndpoint, 2, quad08::kPacketSize & 0xFFu, quad08::kPacketSize >> 8, 0);
 }
 
 std::vector<std::byte> string(std::string_view text) {

@@ -10,7 +10,7 @@ namespace {
 
 using namespace std::chrono_literals;
 
-constexpr auto kBeat = 100ms;      // between heartbeats while nothing is replayed
+constexpr auto kBeat = 100ms;  // between heartbeats while nothing is replayed
 constexpr std::uint32_t kFirstTpdo = 0x180;
 constexpr std::uint32_t kLastTpdo = 0x4FF;
 constexpr std::uint32_t kFunction = 0x780;

@@ -11,7 +11,7 @@ namespace {
 /// Logarithms of s_d, rho, s_a, s, w.
 using Theta = Eigen::Matrix<double, 5, 1>;
 using Theta5x5 = Eigen::Matrix<double, 5, 5>;
-enum : Eigen::Index { kSd = 0, kRho = 1, kSa = 2, kS = 3, kW = 4 };
+constexpr Eigen::Index kSd = 0, kRho = 1, kSa = 2, kS = 3, kW = 4;
 
 HyperParameters parameters(const Theta& theta) {
   return {.s_d_m = std::exp(theta(kSd)),

@@ -60,8 +60,7 @@ TouchGuide::~TouchGuide() = default;
 Result<TouchGuide> TouchGuide::create(Calibrator calibrator, TouchPlan plan, GuideOptions options) {
   if (Result<void> sound = check(calibrator); !sound) return tl::unexpected(sound.error());
   if (Result<void> sound = check_plan(plan, options.observe); !sound) return tl::unexpected(sound.error());
-  return TouchGuide(
-      std::make_unique<const Setup>(Setup{std::move(calibrator), std::move(plan), std::move(options)}));
+  return TouchGuide(std::make_unique<const Setup>(Setup{std::move(calibrator), std::move(plan), options}));
 }
 
 const TouchPlan& TouchGuide::plan() const {

@@ -31,6 +31,7 @@ std::vector<FeedTouch> same_place(std::span<const RecordedTouch> touches, const 
   Vector3 direction = Vector3::Zero();
   for (const RecordedTouch& t : largest) direction += t.velocity_m_s.normalized();
   std::vector<FeedTouch> out;
+  out.reserve(largest.size());
   for (const RecordedTouch& t : largest)
     out.push_back({t.velocity_m_s.norm(), t.p_m.dot(direction.normalized())});
   return out;

@@ -82,11 +82,14 @@ std::vector<Vector3> grid_places(const VolumetricModel& model, const evemu::Read
                                  const Comparison& c) {
   const Vector3 low = (box.centre_m - box.half_width_m).cwiseQuotient(c.step_m),
                 high = (box.centre_m + box.half_width_m).cwiseQuotient(c.step_m);
+  using Steps = Eigen::Matrix<Eigen::Index, 3, 1>;
+  const Steps first = low.array().ceil().cast<Eigen::Index>(),
+              last = high.array().floor().cast<Eigen::Index>();
   std::vector<Vector3> places;
-  for (double i = std::ceil(low.x()); i <= high.x(); ++i) {
-    for (double j = std::ceil(low.y()); j <= high.y(); ++j) {
-      for (double k = std::ceil(low.z()); k <= high.z(); ++k) {
-        const Vector3 p = c.step_m.cwiseProduct(Vector3(i, j, k));
+  for (Eigen::Index i = first.x(); i <= last.x(); ++i) {
+    for (Eigen::Index j = first.y(); j <= last.y(); ++j) {
+      for (Eigen::Index k = first.z(); k <= last.z(); ++k) {
+        const Vector3 p = c.step_m.cwiseProduct(Steps(i, j, k).cast<double>());
         const bool near = c.origin_m && (p - *c.origin_m).norm() < c.least_distance_m;
         if (!near && model.validity().contains(p)) {
           places.push_back(p);

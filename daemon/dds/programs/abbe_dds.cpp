@@ -20,7 +20,7 @@ using abbe::daemon::DdsFeed;
 using abbe::daemon::Error;
 using abbe::daemon::ErrorCode;
 
-enum ExitCode { kDone = 0, kUsage = 2, kBadInput = 3, kIo = 4, kInternal = 70 };
+constexpr int kDone = 0, kUsage = 2, kBadInput = 3, kIo = 4, kInternal = 70;
 
 constexpr const char* kExitCodes =
     "Exit codes: 0 stopped by SIGTERM or SIGINT or because the parent is gone, 2 usage, 3 the configuration "

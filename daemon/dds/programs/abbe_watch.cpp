@@ -29,7 +29,7 @@ using daemon::Result;
 using daemon::Topic;
 using WallClock = std::chrono::steady_clock;
 
-enum ExitCode { kDone = 0, kNoAnswer = 1, kUsage = 2, kBadInput = 3, kIo = 4, kInternal = 70 };
+constexpr int kDone = 0, kNoAnswer = 1, kUsage = 2, kBadInput = 3, kIo = 4, kInternal = 70;
 
 constexpr const char* kExitCodes =
     "Exit codes: 0 done, 1 no model that may be applied arrived in time (said why), 2 usage, 3 a file or "

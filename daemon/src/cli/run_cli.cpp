@@ -45,6 +45,7 @@ Error exec_program(std::string_view name, int argc, const char* const* argv) {
   std::vector<std::string> words{program};
   for (int i = 2; i < argc; ++i) words.emplace_back(argv[i]);
   std::vector<char*> arguments;
+  arguments.reserve(words.size() + 1);
   for (auto& word : words) arguments.push_back(word.data());
   arguments.push_back(nullptr);
   ::execv(beside.c_str(), arguments.data());

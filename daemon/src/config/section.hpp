@@ -98,6 +98,7 @@ template <class Enum>
 bool Section::get_word(std::string_view key, Enum& out, std::vector<std::pair<std::string_view, Enum>> words,
                        Need need) {
   std::vector<std::string_view> names;
+  names.reserve(words.size());
   for (const auto& [name, value] : words) names.push_back(name);
   std::size_t index = 0;
   if (!take_word(key, index, names, need)) return false;

@@ -85,6 +85,7 @@ struct Running {
 };
 
 template <class D>
+// NOLINTNEXTLINE(performance-unnecessary-value-param): moved, which clang-tidy 14 does not see in a template
 Result<Running<D>> run(drivers::Result<std::unique_ptr<D>> device, drivers::DeviceThreadOptions options) {
   if (!device) return tl::unexpected(error_of(device.error()));
   auto thread = DeviceThread::start(**device, std::move(options));

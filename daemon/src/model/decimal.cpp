@@ -32,7 +32,7 @@ std::string move_point(const std::string& scientific, int shift) {
   } else if (count <= exponent + 1) {
     text.append(digits).append(static_cast<std::size_t>(exponent + 1 - count), '0');
   } else {
-    const auto whole = static_cast<std::size_t>(exponent + 1);
+    const auto whole = static_cast<std::size_t>(exponent) + 1;
     text.append(digits, 0, whole).append(1, '.').append(digits, whole);
   }
   return text;
@@ -45,7 +45,7 @@ std::string to_decimal(double value, int shift) {
   std::array<char, 32> buffer{};
   const auto end =
       std::to_chars(buffer.data(), buffer.data() + buffer.size(), value, std::chars_format::scientific).ptr;
-  const auto shortest = move_point(std::string(buffer.data(), end), shift);
+  auto shortest = move_point(std::string(buffer.data(), end), shift);
   if (from_decimal(std::strtold(shortest.c_str(), nullptr), shift) == value) return shortest;
   return move_point(fmt::format("{:.16e}", value), shift);  // 17 digits always name one double
 }

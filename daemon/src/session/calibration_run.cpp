@@ -45,12 +45,12 @@ std::string_view method_of(const Candidate& candidate) noexcept {
   return std::holds_alternative<OtfCandidate>(candidate) ? "otf" : "evemu";
 }
 
-const calib::VolumetricModel& model_of(const Candidate& candidate) noexcept {
+const calib::VolumetricModel& model_of(const Candidate& candidate) {
   return std::visit([](const auto& c) -> const calib::VolumetricModel& { return c.solution.model; },
                     candidate);
 }
 
-const calib::Verdict& verdict_of(const Candidate& candidate) noexcept {
+const calib::Verdict& verdict_of(const Candidate& candidate) {
   return std::visit([](const auto& c) -> const calib::Verdict& { return c.verdict; }, candidate);
 }
 

@@ -41,7 +41,7 @@ OtfAcquisition::OtfAcquisition(const std::vector<AxisPosition>& path, HostTime f
     : path_(otf_path(path)),
       driven_at_m_(calib::otf::lengths_to_vertices_m(path_)),
       from_(from),
-      options_(options) {
+      options_(std::move(options)) {
   reason_ = fmt::format("waiting for the machine to stand at {} with the tracker streaming",
                         text(path_.vertices_m.front()));
 }

@@ -8,7 +8,7 @@
 namespace abbe::daemon {
 namespace {
 
-using std::chrono_literals::operator""ms;
+using namespace std::chrono_literals;
 
 constexpr auto kStandsFor = 500ms;
 constexpr double kStill = 2e-6;       // m or rad: drives in control hold their place within this
@@ -161,7 +161,7 @@ Result<void> ReferenceService::stand_at_offset(const StandHere& here) {
   for (const auto& name : here.axes.empty() ? possible : here.axes) {
     places.push_back(
         static_cast<std::size_t>(std::ranges::find(live, name, &drivers::CounterAxis::name) - live.begin()));
-    if (const auto stands = check_standing(places.back()); !stands) return stands;
+    if (auto stands = check_standing(places.back()); !stands) return stands;
   }
   for (const std::size_t place : places) {
     const double counted = live[place].scale * static_cast<double>(latest_->count[place]);

@@ -175,7 +175,7 @@ Result<void> SocketCanBus::send(std::span<const can::CanFrame> frames) {
 Result<void> SocketCanBus::start_sync(std::chrono::nanoseconds period) {
   stop_sync();
   const auto no = [this](std::string_view what) {
-    const auto error = socket_error(ErrorCode::SystemRefused, name(), what, errno);
+    auto error = socket_error(ErrorCode::SystemRefused, name(), what, errno);
     stop_sync();
     return error;
   };

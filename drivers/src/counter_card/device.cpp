@@ -26,7 +26,7 @@ Result<void> check(const CounterCardOptions& options) {
   const auto refuse = [&](const char* what) {
     return tl::unexpected{Error{ErrorCode::BadConfiguration, fmt::format("{}: {}", options.name, what)}};
   };
-  if (const auto fine = check(options.receiver.wiring); !fine) return fine;
+  if (auto fine = check(options.receiver.wiring); !fine) return fine;
   if (options.transfer_time.count() <= 0) return refuse("the time of a transfer must be positive");
   if (options.transfers_in_flight < 2) return refuse("at least 2 transfers must be in flight");
   if (options.sample_every == 0) return refuse("a sample for every 0 scans");

@@ -82,7 +82,7 @@ Progress EnvironmentReceiver::measure(std::span<const std::byte> registers) ABBE
   for (std::size_t i = 0; i < spots_.size(); ++i) {
     if (spots_[i].read != read_) continue;
     const auto& place = map_.measured[i].place;
-    const auto bytes = registers.subspan(spots_[i].byte, 2u * modbus::register_count(place.type));
+    const auto bytes = registers.subspan(spots_[i].byte, std::size_t{2} * modbus::register_count(place.type));
     if (!take_value(i, modbus::decode_register(bytes, place.type, place.order))) return Progress::Failed;
   }
   pending_.reset();

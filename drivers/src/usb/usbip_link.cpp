@@ -13,7 +13,7 @@ namespace {
 
 using usbip::UrbStatus;
 
-constexpr std::size_t kBuffer = 512 * 1024;  // several of the largest transfers
+constexpr std::size_t kBuffer = std::size_t{512} * 1024;  // several of the largest transfers
 
 UsbOutcome outcome_of(UrbStatus status) {
   if (status == UrbStatus::Ok) return UsbOutcome::Done;

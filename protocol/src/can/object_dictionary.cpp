@@ -257,7 +257,7 @@ AbortCode ObjectDictionary::check_mapping(ObjectId object, std::uint64_t value) 
   }
   if (value > kMaxMapped) return AbortCode::ValueTooHigh;
   std::size_t bits = 0;
-  for (std::uint8_t sub = 1; sub <= value; ++sub) {
+  for (std::uint8_t sub = 1; sub <= static_cast<std::uint8_t>(value); ++sub) {
     const auto line = number(tpdo_mapping(number_of_pdo, sub)).value_or(0);
     if (line == 0) return AbortCode::NotMappable;
     bits += line & 0xFF;

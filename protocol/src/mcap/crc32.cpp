@@ -33,7 +33,7 @@ constexpr Tables kTables = make_tables();
 static_assert(std::endian::native == std::endian::little, "load() below reads little-endian words in place");
 
 std::uint32_t load(const std::byte* p) noexcept {
-  std::uint32_t word;
+  std::uint32_t word = 0;
   std::memcpy(&word, p, sizeof word);
   return word;
 }

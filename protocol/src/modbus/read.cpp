@@ -33,13 +33,13 @@ bool crc_agrees(std::span<const std::byte> frame) ABBE_RT {
 
 /// Unit, function and what follows, of either transport. Nothing: more must come.
 Outcome decode_body(std::span<const std::byte> body, const ReadRequest& request) ABBE_RT {
-  if (body.size() >= 1 && u8(body[0]) != request.unit) return fail(DecodeError::Unit);
+  if (!body.empty() && u8(body[0]) != request.unit) return fail(DecodeError::Unit);
   if (body.size() < 2) return std::nullopt;
   const auto function = static_cast<std::uint8_t>(request.function);
   if ((u8(body[1]) & ~kExceptionBit) != function) return fail(DecodeError::Function);
   if (body.size() < kAnswerHeadSize) return std::nullopt;
   if ((u8(body[1]) & kExceptionBit) != 0) return Outcome{Answer{{}, u8(body[2])}};
-  const std::size_t bytes = 2u * request.count;
+  const std::size_t bytes = std::size_t{2} * request.count;
   if (u8(body[2]) != bytes) return fail(DecodeError::Length);
   if (body.size() < kAnswerHeadSize + bytes) return std::nullopt;
   return Outcome{Answer{body.subspan(kAnswerHeadSize, bytes), std::nullopt}};
@@ -55,7 +55,7 @@ Outcome decode_tcp(std::span<const std::byte> bytes, const ReadRequest& request)
   }
   if (bytes.size() < kMbapSize) return std::nullopt;
   const std::size_t length = ByteReader{bytes.subspan(4)}.big<std::uint16_t>();
-  const std::size_t whole = kAnswerHeadSize + 2u * request.count;
+  const std::size_t whole = kAnswerHeadSize + std::size_t{2} * request.count;
   if (length != whole && length != kExceptionSize) return fail(DecodeError::Length);
   const auto answer = decode_body(bytes.subspan(kMbapSize), request);
   if (!answer || !*answer) return answer;

@@ -50,7 +50,7 @@ struct SessionEvent {
   SessionStatus status;
 };
 
-class CalibrationSession {
+class CalibrationSession {  // NOLINT(bugprone-exception-escape): a defaulted move of a variant
  public:
   explicit CalibrationSession(AcquisitionOptions otf = {}, EvemuAcquisitionOptions evemu = {})
       : otf_options_(std::move(otf)), evemu_options_(std::move(evemu)) {}

@@ -40,7 +40,7 @@ namespace abbe::daemon {
 struct RecorderOptions {
   std::filesystem::path directory;
   std::string name;  ///< without extension; neither NAME.mcap nor NAME.mcap.part may exist
-  std::size_t chunk_bytes = 1024 * 1024;  ///< at most this much is lost with a chunk, and
+  std::size_t chunk_bytes = std::size_t{1024} * 1024;  ///< at most this much is lost with a chunk, and
   std::chrono::nanoseconds chunk_period = std::chrono::milliseconds{500};  ///< at most this long
   std::chrono::nanoseconds sync_period = std::chrono::seconds{1};
   std::chrono::nanoseconds retry_period = std::chrono::seconds{5};  ///< after the disk was full or failed

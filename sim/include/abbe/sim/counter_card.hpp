@@ -58,7 +58,7 @@ struct CounterCardOptions {
   std::uint16_t product = quad08::kProduct;
   std::uint16_t firmware = 0x0104;
   std::array<CardChannel, quad08::kChannels> channels;
-  std::size_t fifo_bytes = 256 * 1024;
+  std::size_t fifo_bytes = std::size_t{256} * 1024;
   double pacer_deviation_ppm = 0.0;
   std::uint64_t seed = 1;
 };

@@ -34,7 +34,7 @@ struct CounterCardSetup {
   double clock_deviation_ppm = 0.0;
   std::optional<std::uint8_t> latch_channel = 6;
   std::optional<std::uint8_t> edge_channel = 7;
-  std::size_t fifo_bytes = 256 * 1024;
+  std::size_t fifo_bytes = std::size_t{256} * 1024;
   std::uint64_t seed = 1;
 };
 

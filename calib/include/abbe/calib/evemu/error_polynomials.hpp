@@ -27,7 +27,8 @@ inline constexpr int kMostOrder = 5;
 struct Monomial {
   std::array<int, 3> exponent{};
   [[nodiscard]] double at(const Vector3& p_mm) const;
-  friend auto operator<=>(const Monomial&, const Monomial&) = default;
+  // clang-tidy 14 takes the 0 that a defaulted <=> compares with for a pointer.
+  friend auto operator<=>(const Monomial&, const Monomial&) = default;  // NOLINT(modernize-use-nullptr)
 };
 
 /// A(row, coefficient) contains factor * monomial. Row 3 t + c: component c seen with tool t.

@@ -11,15 +11,9 @@ namespace {
 using namespace std::chrono_literals;
 
 constexpr auto kBeat = 100ms;  // between heartbeats while nothing is replayed
-constexpr std::uint32_t kFirstTpdo = 0x180;
-constexpr std::uint32_t kLastTpdo = 0x4FF;
 constexpr std::uint32_t kFunction = 0x780;
 constexpr std::uint32_t kNode = 0x07F;
 
-bool is_tpdo(const can::CanFrame& frame) {
-  return frame.is_standard_data() && frame.id >= kFirstTpdo && frame.id <= kLastTpdo &&
-         (frame.id & 0x80) != 0;
-}
 bool is_function(const can::CanFrame& frame, std::uint32_t function) {
   return frame.is_standard_data() && (frame.id & kFunction) == function && (frame.id & kNode) != 0;
 }
@@ -59,7 +53,7 @@ void RecordedBus::take(const can::CanFrame& frame, bool to_device, HostTime time
     }
     return;
   }
-  if (is_tpdo(frame)) {
+  if (can::cob::is_tpdo(frame)) {
     if (!cycles_.empty()) cycles_.back().answers.push_back({time - cycles_.back().sync, frame});
   } else if (is_function(frame, can::cob::kSdoResponse)) {
     const auto asked = asked_.find(static_cast<can::NodeId>(frame.id & kNode));

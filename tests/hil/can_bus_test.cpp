@@ -185,10 +185,41 @@ TEST_F(SocketCan, SaysThatTheInterfaceIsGone) {
   EXPECT_THAT(refused.error().text, HasSubstr("No such device"));
 }
 
-struct KernelSync : SocketCan {
+struct OwnSync : SocketCan {
   static constexpr std::array<std::uint32_t, 2> kWithSync{0x080, 0x181};
   void SetUp() override { ASSERT_TRUE(bus.open(kWithSync).has_value()); }
 };
+
+TEST_F(OwnSync, ComesBackAsAnEchoOfWhenItLeft) {
+  wait_for_stamps(bus, other, numbered(0));
+  const auto before = time.now();
+  ASSERT_TRUE(bus.send(std::array{can::encode_sync()}).has_value());
+  const auto after = time.now();
+  ASSERT_EQ(::usleep(50'000), 0);  // the echo waits in the kernel
+  const auto got = read(bus, 1);
+  ASSERT_EQ(got.size(), 1u);
+  EXPECT_TRUE(got[0].echo);
+  EXPECT_TRUE(can::decode_sync(got[0].frame).has_value());
+  EXPECT_FALSE(got[0].time_widened);
+  EXPECT_GE(got[0].time, before - 5ms);
+  EXPECT_LE(got[0].time, after + 5ms);
+}
+
+TEST_F(OwnSync, IsAllThatIsHeardOfWhatWeSend) {
+  ASSERT_TRUE(bus.send(std::array{numbered(1), can::encode_sync()}).has_value());
+  const auto got = read(bus, 1);
+  ASSERT_EQ(got.size(), 1u);
+  EXPECT_TRUE(got[0].echo);
+}
+
+TEST_F(OwnSync, IsToldFromThatOfAnotherProgram) {
+  ASSERT_TRUE(other.send(can::encode_sync()));
+  const auto got = read(bus, 1);
+  ASSERT_EQ(got.size(), 1u);
+  EXPECT_FALSE(got[0].echo);
+}
+
+struct KernelSync : OwnSync {};
 
 TEST_F(KernelSync, ComesBackAsAnEcho) {
   ASSERT_TRUE(bus.start_sync(2ms).has_value());

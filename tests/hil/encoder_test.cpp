@@ -173,18 +173,17 @@ TEST_P(EncodersOnVcan, ReplayFromTheRawBytesToTheSameSamples) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Sync, EncodersOnVcan, testing::Values(SyncSource::Thread, SyncSource::Kernel),
-                         [](const auto& instance) {
-                           return instance.param == SyncSource::Thread ? "ByTheThread" : "ByTheKernel";
-                         });
+                         sync_name);
 
-TEST(KernelSyncOfTheDevice, SeesAnotherSyncProducer) {
-  // Frames of this computer cannot be told from the kernel's own SYNC; but while that does not run, none is
-  // ours.
+class SyncOfTheDevice : public testing::TestWithParam<SyncSource> {};
+
+TEST_P(SyncOfTheDevice, SeesAnotherSyncProducer) {
+  // Frames of this computer cannot be told from the kernel's own SYNC; but before that has run, none is ours.
   drivers::MonotonicTime time;
   const VirtualCan vcan;
   drivers::EncoderDeviceOptions options;
   options.receiver.axes = SimulatedEncoders::axes(1);
-  options.sync = SyncSource::Kernel;
+  options.sync = GetParam();
   auto bus =
       std::make_unique<drivers::SocketCanBus>(drivers::SocketCanOptions{.interface = vcan.name()}, time);
   auto device = std::move(*drivers::EncoderDevice::create(options, std::move(bus), time));
@@ -194,6 +193,9 @@ TEST(KernelSyncOfTheDevice, SeesAnotherSyncProducer) {
   device->wait(100ms);
   EXPECT_THAT(device->status().last_fault, HasSubstr("somebody else sends SYNCs"));
 }
+
+INSTANTIATE_TEST_SUITE_P(Sync, SyncOfTheDevice, testing::Values(SyncSource::Thread, SyncSource::Kernel),
+                         sync_name);
 
 TEST(EncodersWithoutAnInterface, SayWhichIsMissingOnce) {
   drivers::MonotonicTime time;

@@ -142,6 +142,19 @@ TEST_F(Kvaser, TellsTheSyncWhenItHasLeftTheController) {
   for (std::size_t i = 1; i < got.size(); ++i) EXPECT_GT(got[i].time, got[i - 1].time);
 }
 
+TEST_F(Kvaser, TellsOurOwnSyncWhenItHasLeftTheController) {
+  SocketCanBus bus{{.interface = "can0"}, time};
+  ASSERT_TRUE(bus.open(std::array<std::uint32_t, 1>{can::cob::kSync}).has_value());
+  const CanSocket other{theirs};
+  for (int i = 0; i < 10; ++i) {
+    ASSERT_TRUE(bus.send(std::array{can::encode_sync()}).has_value());
+    const auto got = read(bus, 1);
+    ASSERT_EQ(got.size(), 1u);
+    EXPECT_TRUE(got[0].echo);
+    ASSERT_TRUE(other.receive(1000ms).has_value());
+  }
+}
+
 TEST_F(Kvaser, HearsARivalOfTheKernelsSync) {
   SocketCanBus bus{{.interface = "can0"}, time};
   ASSERT_TRUE(bus.open(std::array<std::uint32_t, 1>{can::cob::kSync}).has_value());
@@ -152,12 +165,14 @@ TEST_F(Kvaser, HearsARivalOfTheKernelsSync) {
   EXPECT_FALSE(got[0].echo);
 }
 
-TEST_F(Kvaser, StreamsFiveAxesThroughTheRealDriver) {
+struct KvaserStream : Kvaser, testing::WithParamInterface<drivers::SyncSource> {};
+
+TEST_P(KvaserStream, GivesFiveAxesThroughTheRealDriver) {
   const SimulatedEncoders encoders{theirs, 5};
   drivers::EncoderDeviceOptions options;
   options.receiver.axes = SimulatedEncoders::axes(5);
   options.receiver.sync_period = 5ms;  // an emulated controller on an emulated processor
-  options.sync = drivers::SyncSource::Kernel;
+  options.sync = GetParam();
   auto device = std::move(*drivers::EncoderDevice::create(
       options, std::make_unique<SocketCanBus>(drivers::SocketCanOptions{.interface = "can0"}, time), time));
   const auto thread = std::move(*drivers::DeviceThread::start(*device, {.name = "encoders", .priority = 50}));
@@ -170,6 +185,10 @@ TEST_F(Kvaser, StreamsFiveAxesThroughTheRealDriver) {
   EXPECT_GE(complete, 200u) << device->status().last_fault;
   EXPECT_EQ(device->status().state, "streaming");
 }
+
+INSTANTIATE_TEST_SUITE_P(Sync, KvaserStream,
+                         testing::Values(drivers::SyncSource::Thread, drivers::SyncSource::Kernel),
+                         sync_name);
 
 }  // namespace
 }  // namespace abbe::tests

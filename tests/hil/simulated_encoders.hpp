@@ -7,6 +7,7 @@
 
 #include <atomic>
 #include <mutex>
+#include <string>
 #include <thread>
 #include <vector>
 
@@ -17,6 +18,10 @@
 namespace abbe::tests {
 
 inline constexpr double kFeed_m_per_s = 0.1;
+
+inline std::string sync_name(const testing::TestParamInfo<drivers::SyncSource>& instance) {
+  return instance.param == drivers::SyncSource::Thread ? "ByTheThread" : "ByTheKernel";
+}
 
 class SimulatedEncoders {
  public:

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <thread>
+#include <utility>
 
 namespace abbe::drivers {
 
@@ -36,7 +37,8 @@ EncoderDevice::EncoderDevice(const EncoderDeviceOptions& options, std::unique_pt
       samples_(options.sample_capacity),
       raw_(options.raw_capacity_blocks),
       receiver_(options.receiver),
-      supervisor_(options.receiver.axes, options.supervisor) {
+      supervisor_(options.receiver.axes, options.supervisor),
+      sync_under_way_(answer_within(options.receiver)) {
   board_.set_state("closed");
 }
 
@@ -46,6 +48,7 @@ DeviceStatus EncoderDevice::status() const {
 
 void EncoderDevice::wait(std::chrono::nanoseconds at_most) {
   batch_count_ = 0;
+  all_read_ = true;
   turn_end_ = time_.now();
   if (!ensure_open(at_most)) return;
   follow_bus_off(turn_end_);
@@ -67,7 +70,7 @@ bool EncoderDevice::ensure_open(std::chrono::nanoseconds at_most) {
     return false;
   }
   auto ids = supervisor_.ids();
-  if (options_.sync == SyncSource::Kernel) ids.push_back(can::cob::kSync);
+  if (bus_->echoes_sync()) ids.push_back(can::cob::kSync);
   if (const auto opened = bus_->open(ids); !opened) {
     // The same refusal four times a second is one fault.
     if (opened.error().text != refusal_) board_.fault(now, opened.error().text);
@@ -76,6 +79,7 @@ bool EncoderDevice::ensure_open(std::chrono::nanoseconds at_most) {
     return false;
   }
   refusal_.clear();
+  rival_told_ = false;
   open_ = true;
   supervisor_.start(now);
   return true;
@@ -88,6 +92,7 @@ void EncoderDevice::close_bus(const Error& error) {
   open_ = false;
   kernel_sync_ = false;
   next_sync_.reset();
+  sync_under_way_.forget();
   reopen_at_ = now + options_.reopen_after;
   board_.set_connected(false);
   board_.set_state("closed");
@@ -97,6 +102,7 @@ void EncoderDevice::follow_bus_off(HostTime now) {
   if (receiver_.bus_off() == bus_was_off_) return;
   bus_was_off_ = receiver_.bus_off();
   next_sync_.reset();
+  sync_under_way_.forget();
   if (bus_was_off_) {
     board_.fault(now, fmt::format("CAN {}: bus off", bus_->name()));
   } else {
@@ -130,7 +136,7 @@ void EncoderDevice::send_sync() {
   const auto period = options_.receiver.sync_period;
   *next_sync_ +=
       period * ((now - *next_sync_) / period + 1);  // on the grid; the receiver counts what was left out
-  (void)send(can::encode_sync());
+  if (!sync_under_way_.waits(now)) (void)send(can::encode_sync());
 }
 
 void EncoderDevice::send_configuration() {
@@ -151,17 +157,21 @@ bool EncoderDevice::send(const can::CanFrame& frame) {
     }
     return false;
   }
+  if (bus_->echoes_sync() && can::decode_sync(frame)) {
+    sync_under_way_.sent(at);
+    return true;
+  }
   record(at, RawBlock::Direction::ToDevice, {&frame, 1});
   push(receiver_.on_sent(frame, at));
   return true;
 }
 
 void EncoderDevice::read_batch(HostTime now, std::chrono::nanoseconds at_most) {
-  auto until = std::min(now + at_most, receiver_.deadline());
+  auto until = std::min({now + at_most, receiver_.deadline(), sync_under_way_.deadline()});
   until = std::min(until, next_sync_.value_or(until));
   if (!receiver_.bus_off()) until = std::min(until, supervisor_.deadline());
   const auto budget = std::max(until - now, std::chrono::nanoseconds{0});
-  const auto read = bus_->read(batch_, time_.wall(budget));
+  const auto read = bus_->read(came_, time_.wall(budget));
   turn_end_ = time_.now();
   if (!read) {
     if (read.error().code != ErrorCode::Unreachable) return close_bus(read.error());
@@ -169,13 +179,21 @@ void EncoderDevice::read_batch(HostTime now, std::chrono::nanoseconds at_most) {
     unreachable_ = true;
     return;
   }
-  batch_count_ = *read;
+  const auto came = std::span{came_}.first(*read);
+  all_read_ = came.size() < kMostRead;
+  if (options_.sync == SyncSource::Thread && bus_->echoes_sync()) {
+    batch_count_ = sync_under_way_.settle(came, batch_, turn_end_);
+  } else {
+    std::ranges::copy(came, batch_.begin());
+    batch_count_ = came.size();
+  }
   for (const auto& received : std::span{batch_}.first(batch_count_)) {
     if (received.frame.is(can::FrameFlag::Error) || received.echo) continue;
-    if (can::decode_sync(received.frame) && !rival_told_) {
-      rival_told_ = true;
-      board_.fault(turn_end_,
-                   fmt::format("CAN {}: somebody else sends SYNCs on this bus, too", bus_->name()));
+    if (can::decode_sync(received.frame)) {  // no node of ours lives because of it
+      if (!std::exchange(rival_told_, true))
+        board_.fault(turn_end_,
+                     fmt::format("CAN {}: somebody else sends SYNCs on this bus, too", bus_->name()));
+      continue;
     }
     unreachable_ = false;
     last_heard_ = turn_end_;
@@ -200,7 +218,7 @@ void EncoderDevice::account(HostTime now) {
   tell_of(
       receiver_.counters().duplicate_frames, duplicates_told_,
       "second answers in a cycle: a node answers later than a SYNC period, a SYNC left late, somebody else "
-      "sends SYNCs, too, or two nodes have one number",
+      "sends SYNCs, too, the echo of a SYNC was lost, or two nodes have one number",
       now);
 }
 

@@ -48,4 +48,8 @@ Result<void> check(const EncoderReceiverOptions& options) {
   return {};
 }
 
+std::chrono::nanoseconds answer_within(const EncoderReceiverOptions& options) {
+  return options.answer_within.count() > 0 ? options.answer_within : options.sync_period * 4 / 5;
+}
+
 }  // namespace abbe::drivers

@@ -55,6 +55,7 @@ void SocketCanBus::close() noexcept {
   stop_sync();
   if (fd_ >= 0) ::close(fd_);
   fd_ = -1;
+  kernel_sent_ = false;
   last_overflow_ = 0;
 }
 
@@ -82,6 +83,9 @@ Result<void> SocketCanBus::configure(std::span<const std::uint32_t> ids) {
   const int on = 1;
   setsockopt(fd_, SOL_CAN_RAW, CAN_RAW_FD_FRAMES, &on,
              sizeof on);  // find_interface() asks whether it matters
+  if (setsockopt(fd_, SOL_CAN_RAW, CAN_RAW_RECV_OWN_MSGS, &on, sizeof on) != 0) {
+    return socket_error(ErrorCode::SystemRefused, name(), "ask for the echo of what is sent", errno);
+  }
   const int bytes_wanted = options_.receive_buffer_bytes;
   if (setsockopt(fd_, SOL_SOCKET, SO_RCVBUFFORCE, &bytes_wanted, sizeof bytes_wanted) != 0) {
     setsockopt(fd_, SOL_SOCKET, SO_RCVBUF, &bytes_wanted, sizeof bytes_wanted);
@@ -152,9 +156,11 @@ Result<std::size_t> SocketCanBus::read(std::span<ReceivedFrame> out, std::chrono
     }
     const auto frame = from_linux(batch_->frames[i], message.msg_len);
     if (!frame) continue;
-    // MSG_DONTROUTE: made on this computer [linux/can/raw.h].
-    const bool ours = (message.msg_hdr.msg_flags & MSG_DONTROUTE) != 0;
-    out[count].echo = ours && sync_fd_ >= 0 && can::decode_sync(*frame).has_value();
+    // MSG_CONFIRM: sent by this socket, MSG_DONTROUTE: on this computer [Linux, networking/can].
+    const bool by_us = (message.msg_hdr.msg_flags & MSG_CONFIRM) != 0;
+    const bool by_the_kernel = kernel_sent_ && (message.msg_hdr.msg_flags & MSG_DONTROUTE) != 0;
+    out[count].echo = (by_us || by_the_kernel) && can::decode_sync(*frame).has_value();
+    if (by_us && !out[count].echo) continue;
     out[count++].frame = *frame;
   }
   if (static_cast<unsigned>(got) < slots) stamps_.nothing_older_than(begun);
@@ -204,6 +210,7 @@ Result<void> SocketCanBus::start_sync(std::chrono::nanoseconds period) {
   std::memcpy(job.data() + sizeof head, &sync.frame, CAN_MTU);
   if (write(sync_fd_, job.data(), job.size()) != static_cast<ssize_t>(job.size()))
     return no("start the SYNC");
+  kernel_sent_ = true;
   return {};
 }
 

@@ -17,10 +17,9 @@ void EncoderDevice::receive() ABBE_RT {
     push(received.echo ? receiver_.on_sent(received.frame, received.time, received.time_widened)
                        : receiver_.on_frame(received.frame, received.time, received.time_widened));
   }
-  // A full batch may have more behind it: only a read that found the end says that nothing else came.
-  const bool all_read = batch_count_ < batch_.size();
   batch_count_ = 0;
-  if (!all_read || turn_end_ < receiver_.deadline()) return;
+  // Behind a full read there may be more: only one that found the end says that nothing else came.
+  if (!all_read_ || turn_end_ < receiver_.deadline()) return;
   (void)raw_.push_bytes(turn_end_, RawBlock::Direction::FromDevice, {});
   push(receiver_.on_time(turn_end_));
 }

@@ -49,7 +49,7 @@ EncoderReceiver::EncoderReceiver(const EncoderReceiverOptions& options)
     : axis_count_(std::min(options.axes.size(), axes_.size())),
       all_mask_(static_cast<std::uint8_t>((1u << axis_count_) - 1u)),
       period_(options.sync_period),
-      answer_within_(options.answer_within.count() > 0 ? options.answer_within : options.sync_period * 4 / 5),
+      answer_within_(answer_within(options)),
       sampling_delay_(options.sampling_delay),
       u_sampling_delay_(options.u_sampling_delay),
       u_widened_(widened(options.u_sampling_delay, options.sync_period)),

@@ -111,7 +111,7 @@ struct EncoderConfig {
   std::uint16_t peer_port = 0;   ///< UDP only
   SyncConfig sync = SyncConfig::Daemon;
   std::chrono::nanoseconds sync_period{std::chrono::milliseconds{1}};
-  std::chrono::nanoseconds sampling_delay{};  ///< from SYNC on the wire to the instant the node latches
+  std::chrono::nanoseconds sampling_delay{};  ///< from the SYNC (its echo; UDP: its send) to the node's latch
   std::chrono::nanoseconds u_sampling_delay =
       std::chrono::microseconds{50};  ///< its standard uncertainty; 0 only with simulated devices
   /// True: the control already corrects these readings. No model is ACTIVE then, and none can be identified:

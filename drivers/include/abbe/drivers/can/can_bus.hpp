@@ -20,7 +20,7 @@ struct ReceivedFrame {
   can::CanFrame frame;
   protocol::HostTime time{};  ///< arrival; of an echo: when it left
   bool time_widened = false;  ///< the kernel stamp was not believed: `time` is when user space saw it
-  bool echo = false;          ///< our own cyclic SYNC (start_sync), heard back as it left
+  bool echo = false;  ///< our own SYNC (start_sync() or, with echoes_sync(), send()), heard back as it left
 };
 
 /// What a transport lost or refused since it was made; never goes back.
@@ -54,6 +54,9 @@ class CanBus {
   [[nodiscard]] virtual Result<void> start_sync(std::chrono::nanoseconds period);
   virtual void stop_sync() noexcept {}
   [[nodiscard]] virtual bool has_sync() const noexcept { return false; }
+  /// read() also gives a SYNC of send() as an echo when it has left, if its identifier was among those of
+  /// open().
+  [[nodiscard]] virtual bool echoes_sync() const noexcept { return false; }
   [[nodiscard]] virtual CanBusCounters counters() const noexcept = 0;
   /// For people: "can0", "udp 127.0.0.1:20000".
   [[nodiscard]] virtual std::string name() const = 0;

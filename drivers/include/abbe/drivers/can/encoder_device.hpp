@@ -4,9 +4,9 @@
 ///
 /// The SYNC runs on the host clock at start + n x period: no drift; a period that could not be served is left
 /// out, counted, and marked as a gap on the next sample. It runs while at least one node is configured and
-/// the bus is not off. With SyncSource::Kernel the SYNC comes from the kernel's timer instead and its echo is
-/// the time: on a real controller when the frame was on the wire. States: "closed", "configuring", "silent",
-/// "degraded" (some nodes), "streaming" (all nodes), "bus off".
+/// the bus is not off. With SyncSource::Kernel the SYNC comes from the kernel's timer instead. On SocketCAN
+/// its echo is the time in both cases: on most controllers when the frame was on the wire. States:
+/// "closed", "configuring", "silent", "degraded" (some nodes), "streaming" (all nodes), "bus off".
 
 #include <array>
 #include <cstdint>
@@ -18,6 +18,7 @@
 #include "abbe/drivers/can/can_bus.hpp"
 #include "abbe/drivers/can/encoder_receiver.hpp"
 #include "abbe/drivers/can/encoder_supervisor.hpp"
+#include "abbe/drivers/can/sync_under_way.hpp"
 #include "abbe/drivers/device.hpp"
 #include "abbe/drivers/raw_ring.hpp"
 #include "abbe/drivers/sample_ring.hpp"
@@ -27,8 +28,8 @@
 namespace abbe::drivers {
 
 enum class SyncSource {
-  Thread,  ///< the device thread sends it, on any transport; its time is read just before
-  Kernel,  ///< CAN_BCM sends it, whatever the thread does; SocketCAN only; its time is the stamp of its echo
+  Thread,  ///< the device thread sends it, on any transport; without an echo its time is read just before
+  Kernel,  ///< CAN_BCM sends it, whatever the thread does; SocketCAN only
 };
 
 struct EncoderDeviceOptions {
@@ -60,7 +61,7 @@ class EncoderDevice final : public Device {
   [[nodiscard]] const EncoderReceiver& receiver() const noexcept { return receiver_; }
 
  private:
-  static constexpr std::size_t kBatch = 256;
+  static constexpr std::size_t kMostRead = 64;  ///< SocketCanBus gives no more at once
 
   EncoderDevice(const EncoderDeviceOptions& options, std::unique_ptr<CanBus> bus, const TimeSource& time);
 
@@ -95,9 +96,9 @@ class EncoderDevice final : public Device {
   StatusBoard board_;
   EncoderReceiver receiver_;
   EncoderSupervisor supervisor_;
+  SyncUnderWay sync_under_way_;
 
   bool open_ = false;
-  bool started_ = false;  ///< the supervisor was started once
   bool bus_was_off_ = false;
   bool unreachable_ = false;  ///< told already
   std::string refusal_;       ///< why it could not be opened, as told already
@@ -111,8 +112,10 @@ class EncoderDevice final : public Device {
   std::uint64_t samples_seen_ = 0;
   Told shorts_told_, duplicates_told_;
 
-  std::array<ReceivedFrame, kBatch> batch_{};
+  std::array<ReceivedFrame, kMostRead> came_{};
+  std::array<ReceivedFrame, kMostRead + 1> batch_{};  ///< what the receiver sees of it
   std::size_t batch_count_ = 0;
+  bool all_read_ = true;           ///< nothing else came
   protocol::HostTime turn_end_{};  ///< when the latest read returned
   std::uint8_t raw_sequence_ = 0;
   std::array<std::byte, protocol::RawBlock::kCapacity> datagram_{};

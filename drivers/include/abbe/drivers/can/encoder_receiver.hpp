@@ -75,6 +75,8 @@ struct EncoderReceiverOptions {
 };
 /// BadConfiguration names the axis and what is wrong with it.
 [[nodiscard]] Result<void> check(const EncoderReceiverOptions& options);
+/// What it says, or 0.8 of the period.
+[[nodiscard]] std::chrono::nanoseconds answer_within(const EncoderReceiverOptions& options);
 
 /// Since construction.
 struct EncoderCounters {

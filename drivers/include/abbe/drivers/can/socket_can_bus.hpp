@@ -37,6 +37,7 @@ class SocketCanBus final : public CanBus {
   [[nodiscard]] Result<void> start_sync(std::chrono::nanoseconds period) override;
   void stop_sync() noexcept override;
   [[nodiscard]] bool has_sync() const noexcept override { return true; }
+  [[nodiscard]] bool echoes_sync() const noexcept override { return true; }
   [[nodiscard]] CanBusCounters counters() const noexcept override;
   [[nodiscard]] std::string name() const override { return options_.interface; }
 
@@ -49,7 +50,8 @@ class SocketCanBus final : public CanBus {
   SocketCanOptions options_;
   const TimeSource& time_;
   int fd_ = -1;
-  int sync_fd_ = -1;  ///< CAN_BCM; closing it ends the SYNC
+  int sync_fd_ = -1;          ///< CAN_BCM; closing it ends the SYNC
+  bool kernel_sent_ = false;  ///< since open(): what was on its way when it ended is ours, too
   KernelStampMap stamps_;
   std::unique_ptr<Batch> batch_;
   std::uint64_t lost_ = 0;

@@ -31,6 +31,12 @@ inline constexpr std::uint32_t kHeartbeat = 0x700;    ///< + node
 [[nodiscard]] constexpr std::uint32_t tpdo(unsigned number, NodeId node) noexcept {
   return kTpdo1 + 0x100 * (number - 1) + node;
 }
+/// TPDO 1 to 4 of any node.
+[[nodiscard]] constexpr bool is_tpdo(const CanFrame& frame) noexcept {
+  constexpr std::uint32_t kFromNode = 0x80;  // else an RPDO
+  return frame.is_standard_data() && frame.id > kTpdo1 && frame.id < kSdoResponse &&
+         (frame.id & kFromNode) != 0;
+}
 }  // namespace cob
 
 enum class NmtCommand : std::uint8_t {

@@ -17,6 +17,8 @@
 
 namespace abbe::drivers {
 
+using protocol::HostTime;
+
 namespace {
 constexpr unsigned kSlots = 64;
 constexpr std::size_t kControlBytes = 256;
@@ -139,7 +141,7 @@ Result<std::size_t> SocketCanBus::read(std::span<ReceivedFrame> out, std::chrono
     return 0;
   }
   const auto clocks = read_clock_pair();
-  const auto now = time_.now();
+  const auto now = options_.speed > 0.0 ? HostTime{time_.host(clocks.monotonic)} : time_.now();
   std::size_t count = 0;
   for (unsigned i = 0; i < static_cast<unsigned>(got); ++i) {
     auto& message = batch_->messages[i];

@@ -11,6 +11,8 @@
 
 namespace abbe::drivers {
 
+using protocol::HostTime;
+
 namespace {
 
 /// Room in an Ethernet frame: a larger datagram would be cut into IP fragments, each of which can be lost.
@@ -130,9 +132,11 @@ Result<bool> UdpCanBus::receive_datagram() {
       const auto code = errno == ECONNREFUSED ? ErrorCode::Unreachable : ErrorCode::SystemRefused;
       return socket_error(code, name(), "receive", errno);
     }
-    const auto now = time_.now();
-    rest_arrival_ = {.time = now};
-    if (options_.speed > 0.0) rest_arrival_ = stamps_.arrival(stamp_of(message), read_clock_pair(), now);
+    rest_arrival_ = {.time = time_.now()};
+    if (options_.speed > 0.0) {
+      const auto clocks = read_clock_pair();
+      rest_arrival_ = stamps_.arrival(stamp_of(message), clocks, HostTime{time_.host(clocks.monotonic)});
+    }
     auto view = can::DatagramView::parse(std::span{buffer_}.first(static_cast<std::size_t>(size)));
     if (view) {
       gaps_.on_sequence(view->sequence());

@@ -2,7 +2,9 @@
 
 #include <sys/eventfd.h>
 
+#include <cerrno>
 #include <chrono>
+#include <system_error>
 
 #include "event_loop.hpp"
 
@@ -17,12 +19,18 @@ void turn(Simulation& simulation, const SimClock& clock, int stop_fd) {
   }
 }
 
+Socket made_event() {
+  Socket event(::eventfd(0, EFD_CLOEXEC));
+  if (!event) throw std::system_error(errno, std::generic_category(), "eventfd");
+  return event;
+}
+
 }  // namespace
 
 BusThread::BusThread(Simulation& simulation, SimClock clock)
-    : stop_(::eventfd(0, EFD_CLOEXEC)),
-      turning_(std::async(std::launch::async,
-                          [&simulation, clock, fd = stop_.get()] { turn(simulation, clock, fd); })) {}
+    : stop_(made_event()), turning_(std::async(std::launch::async, [&simulation, clock, fd = stop_.get()] {
+        turn(simulation, clock, fd);
+      })) {}
 
 BusThread::~BusThread() {
   ::eventfd_write(stop_.get(), 1);

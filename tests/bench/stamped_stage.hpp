@@ -87,7 +87,7 @@ class StampedStage {
   static constexpr std::chrono::microseconds kSegmentOnTheWire{123};
 
   /// The poll that sends the last answer to a SYNC is stamped. It was a SYNC that came if then an answer is
-  /// due when the first TPDO is: nothing else that comes over the bus is answered so late.
+  /// due when the first TPDO is. So is node 1's answer to its configuration: forget() before measuring.
   void turn_bus(bool asked) {
     const auto now = clock_.now();
     const std::int64_t before_ns = monotonic_ns();
@@ -120,7 +120,6 @@ class StampedStage {
   sim::VirtualMachine machine_;
   std::unique_ptr<sim::TrackerServer> tracker_;
   std::unique_ptr<sim::EncoderBus> bus_;
-  std::chrono::nanoseconds answered_after_{};
   std::optional<sim::HostTime> last_answer_due_;  ///< to the SYNC that came last
   sim::HostTime segment_due_{};
   bool in_burst_ = false;

@@ -1,7 +1,7 @@
 #pragma once
 /// The whole stage: machine, tracker, encoder bus, counter cards, a measuring machine and the timetable of
 /// faults, stepped together. poll(now) does what is due, never blocks and reads no clock; a program turns it
-/// with real time, a test with whatever it likes. Not thread-safe, but for poll_bus().
+/// with real time, a test with whatever it likes. Not thread-safe, but for the bus with `bus_apart`.
 
 #include <poll.h>
 

@@ -3,11 +3,9 @@
 #include <algorithm>
 #include <cstring>
 
-#include "abbe/drivers/can/encoder_device.hpp"
-#include "abbe/drivers/can/udp_can_bus.hpp"
 #include "abbe/drivers/device_thread.hpp"
 #include "abbe/protocol/can/error_frame.hpp"
-#include "encoder_peer.hpp"
+#include "encoder_device_on_udp.hpp"
 
 namespace abbe::drivers {
 namespace {
@@ -18,60 +16,6 @@ using protocol::AxisSample;
 using protocol::RawBlock;
 using protocol::SampleFlag;
 using tests::EncoderPeer;
-
-/// Two nodes and the device on one stepped clock. A turn is 1 ms, a SYNC period 4 ms.
-class EncoderDeviceOnUdp : public testing::Test {
- protected:
-  static constexpr auto kTurn = 1ms;
-
-  explicit EncoderDeviceOnUdp(std::vector<EncoderIdentity> identities = {{.node = 1}, {.node = 2}})
-      : peer(identities) {
-    EncoderDeviceOptions options;
-    options.receiver.axes = {{.name = "X", .node = 1}, {.name = "Y", .node = 2}};
-    options.receiver.sync_period = 4ms;
-    auto made = EncoderDevice::create(
-        options, std::make_unique<UdpCanBus>(UdpCanOptions{.peer_port = peer.port(), .speed = 0.0}, time),
-        time);
-    EXPECT_TRUE(made.has_value());
-    device = std::move(*made);
-  }
-
-  void turn() {
-    peer.serve(time.now());
-    peer.answer_sync();
-    device->wait(kTurn);
-    device->receive();
-    time.advance(kTurn);
-    std::array<AxisSample, 64> out{};
-    const auto n = device->samples().pop(out);
-    samples.insert(samples.end(), out.begin(), out.begin() + static_cast<std::ptrdiff_t>(n));
-    std::array<RawBlock, 256> blocks;  // NOLINT: filled by pop
-    const auto raw_count = device->raw().pop(blocks);
-    raw.insert(raw.end(), blocks.begin(), blocks.begin() + static_cast<std::ptrdiff_t>(raw_count));
-  }
-  void turns(int n) {
-    for (int i = 0; i < n; ++i) turn();
-  }
-  template <class Done>
-  bool turns_until(Done done, int limit = 5000) {
-    for (int i = 0; i < limit && !done(); ++i) turn();
-    return done();
-  }
-  bool state_becomes(std::string_view state) {
-    return turns_until([&] { return device->status().state == state; });
-  }
-  void begin_streaming() {
-    ASSERT_TRUE(state_becomes("streaming")) << device->status().last_fault;
-    ASSERT_TRUE(turns_until([&] { return !samples.empty() && samples.back().missing_mask == 0; }));
-    samples.clear();
-  }
-
-  SteppedTime time;
-  EncoderPeer peer;
-  std::unique_ptr<EncoderDevice> device;
-  std::vector<AxisSample> samples;
-  std::vector<RawBlock> raw;
-};
 
 TEST_F(EncoderDeviceOnUdp, ConfiguresAllNodesAndStreams) {
   begin_streaming();

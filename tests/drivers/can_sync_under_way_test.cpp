@@ -15,6 +15,7 @@ using protocol::HostTime;
 using testing::ElementsAre;
 using testing::IsEmpty;
 
+constexpr auto kSyncPeriod = 1ms;
 constexpr auto kAnswerWithin = 800us;
 
 ReceivedFrame echo(HostTime at) {
@@ -45,9 +46,9 @@ Seen frame(std::chrono::nanoseconds at) {
 
 class SyncUnderWayTest : public testing::Test {
  protected:
-  std::vector<Seen> settle(const std::vector<ReceivedFrame>& came, HostTime now) {
-    std::vector<ReceivedFrame> out(came.size() + 1);
-    out.resize(under_way.settle(came, out, now));
+  std::vector<Seen> settle(const std::vector<ReceivedFrame>& came, HostTime now, bool all_read = true) {
+    out.assign(came.size() + 1, {});
+    out.resize(under_way.settle(came, out, now, all_read));
     std::vector<Seen> seen;
     seen.reserve(out.size());
     for (const auto& received : out) {
@@ -57,7 +58,19 @@ class SyncUnderWayTest : public testing::Test {
     return seen;
   }
 
-  SyncUnderWay under_way{kAnswerWithin};
+  /// A whole cycle of node 1 before kStart.
+  void SetUp() override {
+    under_way.sent(kStart - kSyncPeriod);
+    (void)settle({echo(kStart - kSyncPeriod), answer(kStart - kSyncPeriod + 200us)}, kStart - 100us);
+  }
+
+  SyncUnderWay under_way{[] {
+    EncoderReceiverOptions options = encoder_line::three_axes();
+    options.sync_period = kSyncPeriod;
+    options.answer_within = kAnswerWithin;
+    return options;
+  }()};
+  std::vector<ReceivedFrame> out;
 };
 
 TEST_F(SyncUnderWayTest, LeavesWhenItsEchoSays) {
@@ -73,34 +86,57 @@ TEST_F(SyncUnderWayTest, LeavesWhenItsEchoSays) {
 TEST_F(SyncUnderWayTest, WithoutAnEchoCountsFromSendingWhenTheAnswersShouldHaveCome) {
   under_way.sent(kStart);
   EXPECT_THAT(settle({}, kStart + kAnswerWithin - 1ns), IsEmpty());
+  EXPECT_THAT(settle({}, kStart + kAnswerWithin, false), IsEmpty()) << "it may be behind what was read";
   EXPECT_THAT(settle({}, kStart + kAnswerWithin), ElementsAre(sync(0us)));
   EXPECT_THAT(settle({}, kStart + 2ms), IsEmpty()) << "once";
 }
 
-TEST_F(SyncUnderWayTest, KeepsOthersBackUntilItsEchoComesHoweverLate) {
+TEST_F(SyncUnderWayTest, KeepsOthersBackUntilItHasLeftAndItsAnswersHaveCome) {
   under_way.sent(kStart);
   ASSERT_THAT(settle({}, kStart + 1ms), ElementsAre(sync(0us)));
   EXPECT_TRUE(under_way.waits(kStart + 50ms));
   EXPECT_THAT(settle({echo(kStart + 50ms)}, kStart + 50ms), IsEmpty()) << "was counted";
-  EXPECT_FALSE(under_way.waits(kStart + 50ms));
+  EXPECT_TRUE(under_way.waits(kStart + 50ms + kSyncPeriod - 1ns));
+  EXPECT_FALSE(under_way.waits(kStart + 50ms + kSyncPeriod));
 }
 
 TEST_F(SyncUnderWayTest, IsGivenUpInTheEnd) {
   under_way.sent(kStart);
+  EXPECT_TRUE(under_way.waits(kStart + SyncUnderWay::kPatience - 1ns));
   EXPECT_FALSE(under_way.waits(kStart + SyncUnderWay::kPatience));
 }
 
-TEST_F(SyncUnderWayTest, CountsFromSendingWhereAnAnswerIsToldFirst) {
+TEST_F(SyncUnderWayTest, CountsFromSendingWhereItsAnswerIsToldFirst) {
   under_way.sent(kStart);
-  EXPECT_THAT(settle({answer(kStart + 200us), echo(kStart + 210us), answer(kStart + 300us)}, kStart + 310us),
-              ElementsAre(sync(0us), frame(200us), frame(300us)));
-  EXPECT_FALSE(under_way.waits(kStart + 310us));
+  EXPECT_THAT(settle({answer(kStart + 200us)}, kStart + 205us), ElementsAre(sync(0us), frame(200us)));
+  EXPECT_TRUE(out[0].time_widened);
+  EXPECT_FALSE(under_way.waits(kStart + 205us)) << "it has left";
+  under_way.sent(kStart + kSyncPeriod);
+  EXPECT_THAT(
+      settle({echo(kStart + 60us), answer(kStart + 1200us), echo(kStart + 1060us), answer(kStart + 1300us)},
+             kStart + 1310us),
+      ElementsAre(sync(1ms), frame(1200us), frame(1300us)))
+      << "the echo of the one before is none of this one";
 }
 
-TEST_F(SyncUnderWayTest, AnswersToTheOneBeforeAndOtherFramesSayNothingOfIt) {
+TEST_F(SyncUnderWayTest, LateAnswersToTheOneBeforeAndOtherFramesSayNothingOfIt) {
+  (void)settle({}, kStart);
   under_way.sent(kStart);
-  EXPECT_THAT(settle({answer(kStart - 10us), heartbeat(kStart + 20us), echo(kStart + 60us)}, kStart + 70us),
-              ElementsAre(frame(-10us), frame(20us), sync(60us)));
+  (void)settle({echo(kStart)}, kStart);  // node 1 does not answer this one in time
+  under_way.sent(kStart + kSyncPeriod);
+  EXPECT_THAT(settle({answer(kStart + 1010us), heartbeat(kStart + 1020us), echo(kStart + 1060us),
+                      answer(kStart + 1200us)},
+                     kStart + 1210us),
+              ElementsAre(frame(1010us), frame(1020us), sync(1060us), frame(1200us)));
+}
+
+TEST_F(SyncUnderWayTest, CountsFromSendingWhereTheStampOfItsEchoIsNotBelieved) {
+  under_way.sent(kStart);
+  auto late = echo(kStart + 5ms);
+  late.time_widened = true;
+  EXPECT_THAT(settle({late}, kStart + 5ms), ElementsAre(sync(0us)));
+  EXPECT_TRUE(out[0].time_widened);
+  EXPECT_FALSE(under_way.waits(kStart + 5ms));
 }
 
 TEST_F(SyncUnderWayTest, AnEchoOfNoneIsNone) {
@@ -110,12 +146,13 @@ TEST_F(SyncUnderWayTest, AnEchoOfNoneIsNone) {
   EXPECT_THAT(settle({echo(kStart)}, kStart + 1ms), IsEmpty());
 }
 
-TEST_F(SyncUnderWayTest, WhatIsSeenOfABusThatDoesNotSendIsASampleWithAllAxesMissing) {
+/// The receiver behind it.
+TEST_F(SyncUnderWayTest, GivesASampleWithAllAxesMissingOfABusThatDoesNotSend) {
   encoder_line::Line line;
-  line.cycle(kStart - 1ms, 100);
+  line.cycle(kStart - kSyncPeriod, 100);
   under_way.sent(kStart);
-  ASSERT_THAT(settle({}, kStart + kAnswerWithin), ElementsAre(sync(0us)));
-  line.sync(kStart);
+  (void)settle({}, kStart + kAnswerWithin);
+  for (const auto& received : out) line.keep(line.receiver.on_sent(received.frame, received.time));
   line.time(kStart + kAnswerWithin);
   ASSERT_EQ(line.samples.size(), 2u);
   EXPECT_EQ(line.samples[1].head.time, kStart);

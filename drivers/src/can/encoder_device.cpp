@@ -38,7 +38,7 @@ EncoderDevice::EncoderDevice(const EncoderDeviceOptions& options, std::unique_pt
       raw_(options.raw_capacity_blocks),
       receiver_(options.receiver),
       supervisor_(options.receiver.axes, options.supervisor),
-      sync_under_way_(answer_within(options.receiver)) {
+      sync_under_way_(options.receiver) {
   board_.set_state("closed");
 }
 
@@ -136,7 +136,11 @@ void EncoderDevice::send_sync() {
   const auto period = options_.receiver.sync_period;
   *next_sync_ +=
       period * ((now - *next_sync_) / period + 1);  // on the grid; the receiver counts what was left out
-  if (!sync_under_way_.waits(now)) (void)send(can::encode_sync());
+  if (sync_under_way_.waits(now)) {
+    ++kept_back_;
+    return;
+  }
+  (void)send(can::encode_sync());
 }
 
 void EncoderDevice::send_configuration() {
@@ -180,9 +184,9 @@ void EncoderDevice::read_batch(HostTime now, std::chrono::nanoseconds at_most) {
     return;
   }
   const auto came = std::span{came_}.first(*read);
-  all_read_ = came.size() < kMostRead;
+  all_read_ = came.size() < came_.size();
   if (options_.sync == SyncSource::Thread && bus_->echoes_sync()) {
-    batch_count_ = sync_under_way_.settle(came, batch_, turn_end_);
+    batch_count_ = sync_under_way_.settle(came, batch_, turn_end_, all_read_);
   } else {
     std::ranges::copy(came, batch_.begin());
     batch_count_ = came.size();
@@ -214,6 +218,8 @@ void EncoderDevice::account(HostTime now) {
   }
   bus_seen_ = bus;
   missed_seen_ = missed;
+  tell_of(kept_back_, kept_back_told_,
+          "SYNCs not sent: the one before has not left, or its echo comes later than a SYNC period", now);
   tell_of(receiver_.counters().short_frames, shorts_told_, "frames too short for a position", now);
   tell_of(
       receiver_.counters().duplicate_frames, duplicates_told_,

@@ -20,7 +20,7 @@ namespace abbe::drivers {
 using protocol::HostTime;
 
 namespace {
-constexpr unsigned kSlots = 64;
+constexpr unsigned kSlots = CanBus::kMostRead;
 constexpr std::size_t kControlBytes = 256;
 }  // namespace
 
@@ -29,9 +29,10 @@ struct SocketCanBus::Batch {
   std::array<iovec, kSlots> io{};
   std::array<mmsghdr, kSlots> messages{};
   alignas(cmsghdr) std::array<std::array<char, kControlBytes>, kSlots> control{};
+  unsigned used = kSlots;  ///< slots that are not as recvmmsg wants them
 
   void prepare() {
-    for (unsigned i = 0; i < kSlots; ++i) {
+    for (unsigned i = 0; i < used; ++i) {
       io[i] = {&frames[i], sizeof frames[i]};
       messages[i] = {};
       messages[i].msg_hdr.msg_iov = &io[i];
@@ -39,6 +40,7 @@ struct SocketCanBus::Batch {
       messages[i].msg_hdr.msg_control = control[i].data();
       messages[i].msg_hdr.msg_controllen = control[i].size();
     }
+    used = 0;
   }
 };
 
@@ -140,6 +142,7 @@ Result<std::size_t> SocketCanBus::read(std::span<ReceivedFrame> out, std::chrono
     stamps_.nothing_older_than(begun);
     return 0;
   }
+  batch_->used = static_cast<unsigned>(got);
   const auto clocks = read_clock_pair();
   const auto now = options_.speed > 0.0 ? HostTime{time_.host(clocks.monotonic)} : time_.now();
   std::size_t count = 0;

@@ -1,18 +1,33 @@
 #include "abbe/drivers/can/sync_under_way.hpp"
 
-#include "abbe/protocol/can/canopen.hpp"
-
 namespace abbe::drivers {
 
 using protocol::HostTime;
 
+namespace {
+
+/// What two readings of two clocks may disagree by, as a part of the period.
+constexpr int kStampSlackParts = 50;
+
+std::size_t node_of(const can::CanFrame& frame) {
+  return frame.id & can::kMaxNodeId;
+}
+
+}  // namespace
+
 void SyncUnderWay::sent(HostTime at) {
   sent_ = at;
-  counted_ = false;
+  left_ = Left::Unknown;
+}
+
+void SyncUnderWay::forget() {
+  sent_.reset();
+  answered_.reset();
 }
 
 bool SyncUnderWay::waits(HostTime now) const {
-  return sent_ && now < *sent_ + kPatience;
+  const bool may_leave = sent_ && left_ != Left::ByItsAnswer && now < *sent_ + kPatience;
+  return may_leave || now < answers_until_;
 }
 
 HostTime SyncUnderWay::deadline() const {
@@ -20,28 +35,43 @@ HostTime SyncUnderWay::deadline() const {
 }
 
 std::size_t SyncUnderWay::settle(std::span<const ReceivedFrame> came, std::span<ReceivedFrame> out,
-                                 HostTime now) {
+                                 HostTime now, bool all_read) {
   std::size_t count = 0;
   for (const auto& received : came) {
-    if (received.echo && !take_echo()) continue;
-    const bool answer = can::cob::is_tpdo(received.frame) && unheard() && received.time >= *sent_;
-    if (answer) out[count++] = count_from_sending();
+    if (received.echo) {
+      if (const auto sync = settle_echo(received)) out[count++] = *sync;
+      continue;
+    }
+    if (proves_that_it_left(received)) out[count++] = count_from_sending(Left::ByItsAnswer);
+    if (can::cob::is_tpdo(received.frame)) answered_.set(node_of(received.frame));
     out[count++] = received;
   }
-  if (now >= deadline()) out[count++] = count_from_sending();
+  if (all_read && now >= deadline()) out[count++] = count_from_sending(Left::TooLate);
   return count;
 }
 
-/// Whether it is one: the receiver has not seen this SYNC.
-bool SyncUnderWay::take_echo() {
-  const bool first = unheard();
+/// What the receiver is to see of an echo.
+std::optional<ReceivedFrame> SyncUnderWay::settle_echo(const ReceivedFrame& echo) {
+  if (!sent_ || echo.time + period_ / kStampSlackParts < *sent_) return std::nullopt;  // of one before
+  std::optional<ReceivedFrame> sync;
+  if (left_ == Left::Unknown) sync = echo.time_widened ? count_from_sending(Left::ByItsAnswer) : echo;
+  // Its cycle is over, and its answers come now: they must not meet the next one's.
+  if (left_ == Left::TooLate) answers_until_ = echo.time + period_;
   sent_.reset();
-  return first;
+  answered_.reset();
+  return sync;
 }
 
-ReceivedFrame SyncUnderWay::count_from_sending() {
-  counted_ = true;
-  return {.frame = can::encode_sync(), .time = *sent_, .echo = true};
+/// A node that has answered the SYNC before has no other one to answer.
+bool SyncUnderWay::proves_that_it_left(const ReceivedFrame& received) const {
+  return unheard() && can::cob::is_tpdo(received.frame) && received.time >= *sent_ &&
+         answered_.test(node_of(received.frame));
+}
+
+ReceivedFrame SyncUnderWay::count_from_sending(Left left) {
+  left_ = left;
+  answered_.reset();
+  return {.frame = can::encode_sync(), .time = *sent_, .time_widened = true, .echo = true};
 }
 
 }  // namespace abbe::drivers

@@ -159,6 +159,7 @@ std::size_t UdpCanBus::take_frames(std::span<ReceivedFrame> out) {
     }
     slot.time = rest_arrival_.time;
     slot.time_widened = rest_arrival_.widened;
+    slot.echo = false;
     const bool wanted = slot.frame.is_standard_data() && wanted_.test(slot.frame.id);
     if (wanted || slot.frame.is(can::FrameFlag::Error)) ++count;
   }

@@ -61,8 +61,6 @@ class EncoderDevice final : public Device {
   [[nodiscard]] const EncoderReceiver& receiver() const noexcept { return receiver_; }
 
  private:
-  static constexpr std::size_t kMostRead = 64;  ///< SocketCanBus gives no more at once
-
   EncoderDevice(const EncoderDeviceOptions& options, std::unique_ptr<CanBus> bus, const TimeSource& time);
 
   [[nodiscard]] bool ensure_open(std::chrono::nanoseconds at_most);
@@ -110,10 +108,11 @@ class EncoderDevice final : public Device {
   CanBusCounters bus_seen_;
   std::uint64_t missed_seen_ = 0;
   std::uint64_t samples_seen_ = 0;
-  Told shorts_told_, duplicates_told_;
+  std::uint64_t kept_back_ = 0;  ///< SYNCs
+  Told kept_back_told_, shorts_told_, duplicates_told_;
 
-  std::array<ReceivedFrame, kMostRead> came_{};
-  std::array<ReceivedFrame, kMostRead + 1> batch_{};  ///< what the receiver sees of it
+  std::array<ReceivedFrame, CanBus::kMostRead> came_{};
+  std::array<ReceivedFrame, CanBus::kMostRead + 1> batch_{};  ///< what the receiver sees of it
   std::size_t batch_count_ = 0;
   bool all_read_ = true;           ///< nothing else came
   protocol::HostTime turn_end_{};  ///< when the latest read returned

@@ -69,13 +69,13 @@ struct EncoderReceiverOptions {
   std::chrono::nanoseconds sync_period = std::chrono::milliseconds{1};
   std::chrono::nanoseconds answer_within{};  ///< after the SYNC; 0: 0.8 of the period
   std::chrono::nanoseconds
-      sampling_delay{};  ///< SYNC leaving us to position taken; device specific, to be calibrated
+      sampling_delay{};  ///< the SYNC's time to position taken; device specific, to be calibrated
   std::chrono::nanoseconds u_sampling_delay = std::chrono::microseconds{50};  ///< its standard uncertainty
   std::chrono::nanoseconds heartbeat_timeout = std::chrono::milliseconds{350};
 };
 /// BadConfiguration names the axis and what is wrong with it.
 [[nodiscard]] Result<void> check(const EncoderReceiverOptions& options);
-/// What it says, or 0.8 of the period.
+/// `options.answer_within`, or 0.8 of the period.
 [[nodiscard]] std::chrono::nanoseconds answer_within(const EncoderReceiverOptions& options);
 
 /// Since construction.

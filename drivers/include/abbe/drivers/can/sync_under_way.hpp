@@ -4,47 +4,59 @@
 /// and leave all at once when it can again.
 ///
 /// Without an echo in the time in which a node has to answer, the SYNC counts from when it was handed over,
-/// so that its cycle ends with all axes missing; so it does where an answer comes first, for some controllers
-/// tell what they received before what they sent. Its echo is then none any more. Sans-I/O. One thread.
+/// so that its cycle ends with all axes missing. So it does where a node answers first (some controllers tell
+/// what they received before what they sent), and where the echo's stamp was not believed; its time is then
+/// marked as widened. An echo that comes later is dropped. Sans-I/O. One thread.
 
+#include <bitset>
 #include <chrono>
 #include <cstddef>
+#include <cstdint>
 #include <optional>
 #include <span>
 
 #include "abbe/drivers/can/can_bus.hpp"
+#include "abbe/drivers/can/encoder_receiver.hpp"
+#include "abbe/protocol/can/canopen.hpp"
 #include "abbe/protocol/time.hpp"
 
 namespace abbe::drivers {
 
 class SyncUnderWay {
  public:
-  /// `answer_within`: as in EncoderReceiverOptions, and not 0.
-  explicit SyncUnderWay(std::chrono::nanoseconds answer_within) : answer_within_(answer_within) {}
+  explicit SyncUnderWay(const EncoderReceiverOptions& options)
+      : period_(options.sync_period), answer_within_(answer_within(options)) {}
 
   void sent(protocol::HostTime at);
   /// The bus was closed or went off: nothing is under way.
-  void forget() { sent_.reset(); }
-  /// It may still leave: no other one yet. At most kPatience, for an echo may be lost.
+  void forget();
+  /// It may still leave, or just has, and its answers come: no other one yet. At most kPatience, for an echo
+  /// may be lost.
   [[nodiscard]] bool waits(protocol::HostTime now) const;
   /// When settle() has something to do although nothing came; else HostTime::max().
   [[nodiscard]] protocol::HostTime deadline() const;
 
   /// What the receiver is to see of what read() gave until `now`: every SYNC once, as an echo, before its
-  /// answers. Returns how many are in `out`, at most one more than came.
+  /// answers. `all_read`: nothing else had come. Returns how many are in `out`, at most one more than came.
   [[nodiscard]] std::size_t settle(std::span<const ReceivedFrame> came, std::span<ReceivedFrame> out,
-                                   protocol::HostTime now);
+                                   protocol::HostTime now, bool all_read);
 
   static constexpr std::chrono::nanoseconds kPatience = std::chrono::milliseconds{100};
 
  private:
-  [[nodiscard]] bool take_echo();
-  [[nodiscard]] bool unheard() const { return sent_ && !counted_; }
-  [[nodiscard]] ReceivedFrame count_from_sending();
+  enum class Left : std::uint8_t { Unknown, ByItsAnswer, TooLate };
 
+  [[nodiscard]] bool unheard() const { return sent_ && left_ == Left::Unknown; }
+  [[nodiscard]] std::optional<ReceivedFrame> settle_echo(const ReceivedFrame& echo);
+  [[nodiscard]] bool proves_that_it_left(const ReceivedFrame& received) const;
+  [[nodiscard]] ReceivedFrame count_from_sending(Left left);
+
+  std::chrono::nanoseconds period_;
   std::chrono::nanoseconds answer_within_;
   std::optional<protocol::HostTime> sent_;
-  bool counted_ = false;  ///< the receiver has seen it
+  Left left_ = Left::Unknown;  ///< how the receiver came to see it, but for its echo
+  protocol::HostTime answers_until_{};
+  std::bitset<std::size_t{can::kMaxNodeId} + 1> answered_;  ///< nodes, the SYNC before
 };
 
 }  // namespace abbe::drivers

@@ -1,7 +1,6 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
-#include <cstring>
 
 #include "abbe/drivers/device_thread.hpp"
 #include "abbe/protocol/can/error_frame.hpp"
@@ -202,24 +201,7 @@ TEST_F(EncoderDeviceOnUdp, ReplaysItsRawBytesToTheSameSamples) {
   turns(1000);
   peer.send(std::array{can::encode_position(0x181, can::PositionType::Signed32, 5)});
   turns(1000);
-  const auto options = [] {
-    EncoderReceiverOptions o;
-    o.axes = {{.name = "X", .node = 1}, {.name = "Y", .node = 2}};
-    o.sync_period = 4ms;
-    return o;
-  }();
-  EncoderReceiver replay{options};
-  std::vector<AxisSample> replayed;
-  for (const auto& block : raw) replay.on_raw(block, [&](const AxisSample& s) { replayed.push_back(s); });
-  ASSERT_GT(replayed.size(), samples.size());  // begin_streaming() forgot the first ones
-  const auto* tail = &replayed[replayed.size() - samples.size()];
-  for (std::size_t i = 0; i < samples.size(); ++i) {
-    EXPECT_EQ(tail[i].head.time, samples[i].head.time);
-    EXPECT_EQ(tail[i].head.flags, samples[i].head.flags);
-    EXPECT_EQ(tail[i].missing_mask, samples[i].missing_mask);
-    EXPECT_EQ(tail[i].count, samples[i].count);
-    EXPECT_EQ(std::memcmp(&tail[i].position, &samples[i].position, sizeof samples[i].position), 0);
-  }
+  expect_the_same_from_raw_bytes();
 }
 
 TEST(EncoderDevice, StreamsInItsOwnThreadOnTheRealClock) {

@@ -4,6 +4,7 @@
 #include <gmock/gmock.h>
 
 #include <algorithm>
+#include <cstring>
 #include <memory>
 #include <utility>
 #include <vector>
@@ -20,15 +21,19 @@ class EncoderDeviceOnUdp : public testing::Test {
   static constexpr std::chrono::milliseconds kTurn{1};
 
   explicit EncoderDeviceOnUdp(std::vector<can::EncoderIdentity> identities = {{.node = 1}, {.node = 2}})
-      : peer(identities) {
-    set_up(std::make_unique<UdpCanBus>(udp(), time));
-  }
+      : peer(identities) {}
   [[nodiscard]] UdpCanOptions udp() const { return {.peer_port = peer.port(), .speed = 0.0}; }
-  void set_up(std::unique_ptr<CanBus> bus) {
+  virtual std::unique_ptr<CanBus> make_bus() { return std::make_unique<UdpCanBus>(udp(), time); }
+  static EncoderReceiverOptions two_axes() {
+    EncoderReceiverOptions options;
+    options.axes = {{.name = "X", .node = 1}, {.name = "Y", .node = 2}};
+    options.sync_period = 4 * kTurn;
+    return options;
+  }
+  void SetUp() override {
     EncoderDeviceOptions options;
-    options.receiver.axes = {{.name = "X", .node = 1}, {.name = "Y", .node = 2}};
-    options.receiver.sync_period = 4 * kTurn;
-    auto made = EncoderDevice::create(options, std::move(bus), time);
+    options.receiver = two_axes();
+    auto made = EncoderDevice::create(options, make_bus(), time);
     EXPECT_TRUE(made.has_value());
     device = std::move(*made);
   }
@@ -61,6 +66,22 @@ class EncoderDeviceOnUdp : public testing::Test {
     ASSERT_TRUE(state_becomes("streaming")) << device->status().last_fault;
     ASSERT_TRUE(turns_until([&] { return !samples.empty() && samples.back().missing_mask == 0; }));
     samples.clear();
+  }
+  /// `untold`: flags that raw bytes do not carry.
+  void expect_the_same_from_raw_bytes(protocol::SampleFlags untold = 0) const {
+    EncoderReceiver replay{two_axes()};
+    std::vector<protocol::AxisSample> replayed;
+    for (const auto& block : raw)
+      replay.on_raw(block, [&](const protocol::AxisSample& s) { replayed.push_back(s); });
+    ASSERT_GT(replayed.size(), samples.size());  // begin_streaming() forgot the first ones
+    const auto* tail = &replayed[replayed.size() - samples.size()];
+    for (std::size_t i = 0; i < samples.size(); ++i) {
+      EXPECT_EQ(tail[i].head.time, samples[i].head.time);
+      EXPECT_EQ(tail[i].head.flags, samples[i].head.flags & ~untold);
+      EXPECT_EQ(tail[i].missing_mask, samples[i].missing_mask);
+      EXPECT_EQ(tail[i].count, samples[i].count);
+      EXPECT_EQ(std::memcmp(&tail[i].position, &samples[i].position, sizeof samples[i].position), 0);
+    }
   }
 
   SteppedTime time;

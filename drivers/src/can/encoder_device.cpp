@@ -185,7 +185,7 @@ void EncoderDevice::read_batch(HostTime now, std::chrono::nanoseconds at_most) {
   }
   const auto came = std::span{came_}.first(*read);
   all_read_ = came.size() < came_.size();
-  if (options_.sync == SyncSource::Thread && bus_->echoes_sync()) {
+  if (options_.sync == SyncSource::Thread) {
     batch_count_ = sync_under_way_.settle(came, batch_, turn_end_, all_read_);
   } else {
     std::ranges::copy(came, batch_.begin());

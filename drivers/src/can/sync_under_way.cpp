@@ -6,9 +6,6 @@ using protocol::HostTime;
 
 namespace {
 
-/// What two readings of two clocks may disagree by, as a part of the period.
-constexpr int kStampSlackParts = 50;
-
 std::size_t node_of(const can::CanFrame& frame) {
   return frame.id & can::kMaxNodeId;
 }
@@ -17,16 +14,17 @@ std::size_t node_of(const can::CanFrame& frame) {
 
 void SyncUnderWay::sent(HostTime at) {
   sent_ = at;
-  left_ = Left::Unknown;
+  counted_ = Counted::NotYet;
 }
 
 void SyncUnderWay::forget() {
   sent_.reset();
+  answers_until_ = {};
   answered_.reset();
 }
 
 bool SyncUnderWay::waits(HostTime now) const {
-  const bool may_leave = sent_ && left_ != Left::ByItsAnswer && now < *sent_ + kPatience;
+  const bool may_leave = sent_ && counted_ != Counted::ByItsAnswer && now < *sent_ + kPatience;
   return may_leave || now < answers_until_;
 }
 
@@ -36,27 +34,27 @@ HostTime SyncUnderWay::deadline() const {
 
 std::size_t SyncUnderWay::settle(std::span<const ReceivedFrame> came, std::span<ReceivedFrame> out,
                                  HostTime now, bool all_read) {
-  std::size_t count = 0;
+  std::size_t n = 0;
   for (const auto& received : came) {
     if (received.echo) {
-      if (const auto sync = settle_echo(received)) out[count++] = *sync;
+      if (const auto sync = settle_echo(received)) out[n++] = *sync;
       continue;
     }
-    if (proves_that_it_left(received)) out[count++] = count_from_sending(Left::ByItsAnswer);
+    if (proves_that_it_left(received)) out[n++] = count(Counted::ByItsAnswer);
     if (can::cob::is_tpdo(received.frame)) answered_.set(node_of(received.frame));
-    out[count++] = received;
+    out[n++] = received;
   }
-  if (all_read && now >= deadline()) out[count++] = count_from_sending(Left::TooLate);
-  return count;
+  if (all_read && now >= deadline()) out[n++] = count(Counted::ByTheDeadline);
+  return n;
 }
 
 /// What the receiver is to see of an echo.
 std::optional<ReceivedFrame> SyncUnderWay::settle_echo(const ReceivedFrame& echo) {
-  if (!sent_ || echo.time + period_ / kStampSlackParts < *sent_) return std::nullopt;  // of one before
+  if (!sent_ || echo.time + stamp_slack(period_) < *sent_) return std::nullopt;  // of one before
   std::optional<ReceivedFrame> sync;
-  if (left_ == Left::Unknown) sync = echo.time_widened ? count_from_sending(Left::ByItsAnswer) : echo;
+  if (counted_ == Counted::NotYet) sync = echo.time_widened ? as_sent() : echo;
   // Its cycle is over, and its answers come now: they must not meet the next one's.
-  if (left_ == Left::TooLate) answers_until_ = echo.time + period_;
+  if (counted_ == Counted::ByTheDeadline) answers_until_ = echo.time + period_;
   sent_.reset();
   answered_.reset();
   return sync;
@@ -68,9 +66,14 @@ bool SyncUnderWay::proves_that_it_left(const ReceivedFrame& received) const {
          answered_.test(node_of(received.frame));
 }
 
-ReceivedFrame SyncUnderWay::count_from_sending(Left left) {
-  left_ = left;
+ReceivedFrame SyncUnderWay::count(Counted how) {
+  counted_ = how;
   answered_.reset();
+  return as_sent();
+}
+
+/// As if it had left when it was handed over.
+ReceivedFrame SyncUnderWay::as_sent() const {
   return {.frame = can::encode_sync(), .time = *sent_, .time_widened = true, .echo = true};
 }
 

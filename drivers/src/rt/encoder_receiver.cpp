@@ -17,9 +17,6 @@ namespace {
 
 constexpr std::uint64_t kModulus32 = std::uint64_t{1} << 32;
 constexpr double kMetresPerNanometre = 1e-9;
-/// What two readings of two clocks may disagree by, as a part of the period: a stamp this little before the
-/// SYNC is not before it.
-constexpr int kStampSlackParts = 50;
 
 /// [GUM] 4.3.7: the instant may be off by a period to either side.
 std::chrono::nanoseconds widened(std::chrono::nanoseconds u, std::chrono::nanoseconds period) ABBE_RT {
@@ -207,7 +204,7 @@ void EncoderReceiver::on_position(std::size_t i, const can::CanFrame& frame, Hos
   hear();
   const auto bit = static_cast<std::uint8_t>(1u << i);
   axes_[i].answers = true;
-  if (sync_time_ && time + period_ / kStampSlackParts < *sync_time_) {
+  if (sync_time_ && time + stamp_slack(period_) < *sync_time_) {
     ++counters_.late_frames;
     axes_[i].owes = false;
     return;

@@ -44,8 +44,8 @@ class CanBus {
   [[nodiscard]] virtual Result<void> open(std::span<const std::uint32_t> ids) = 0;
   virtual void close() noexcept = 0;
   /// Waits at most `wall` (the operating system's time, 0 = look only) and reads what is there, at most
-  /// out.size() and kMostRead; if it is fewer, nothing else was there. Error code Unreachable: nobody there
-  /// now, the bus stays open; any other code: close and open again.
+  /// out.size(), itself at most kMostRead; if it is fewer, nothing else was there. Error code Unreachable:
+  /// nobody there now, the bus stays open; any other code: close and open again.
   [[nodiscard]] virtual Result<std::size_t> read(std::span<ReceivedFrame> out,
                                                  std::chrono::nanoseconds wall) = 0;
   /// Errors as for read().

@@ -77,6 +77,10 @@ struct EncoderReceiverOptions {
 [[nodiscard]] Result<void> check(const EncoderReceiverOptions& options);
 /// `options.answer_within`, or 0.8 of the period.
 [[nodiscard]] std::chrono::nanoseconds answer_within(const EncoderReceiverOptions& options);
+/// What two readings of two clocks may disagree by: a stamp this little before the SYNC is not before it.
+[[nodiscard]] constexpr std::chrono::nanoseconds stamp_slack(std::chrono::nanoseconds sync_period) ABBE_RT {
+  return sync_period / 50;
+}
 
 /// Since construction.
 struct EncoderCounters {

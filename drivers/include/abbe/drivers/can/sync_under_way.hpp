@@ -44,18 +44,19 @@ class SyncUnderWay {
   static constexpr std::chrono::nanoseconds kPatience = std::chrono::milliseconds{100};
 
  private:
-  enum class Left : std::uint8_t { Unknown, ByItsAnswer, TooLate };
+  enum class Counted : std::uint8_t { NotYet, ByItsAnswer, ByTheDeadline };
 
-  [[nodiscard]] bool unheard() const { return sent_ && left_ == Left::Unknown; }
+  [[nodiscard]] bool unheard() const { return sent_ && counted_ == Counted::NotYet; }
   [[nodiscard]] std::optional<ReceivedFrame> settle_echo(const ReceivedFrame& echo);
   [[nodiscard]] bool proves_that_it_left(const ReceivedFrame& received) const;
-  [[nodiscard]] ReceivedFrame count_from_sending(Left left);
+  [[nodiscard]] ReceivedFrame count(Counted how);
+  [[nodiscard]] ReceivedFrame as_sent() const;
 
   std::chrono::nanoseconds period_;
   std::chrono::nanoseconds answer_within_;
   std::optional<protocol::HostTime> sent_;
-  Left left_ = Left::Unknown;  ///< how the receiver came to see it, but for its echo
-  protocol::HostTime answers_until_{};
+  Counted counted_ = Counted::NotYet;   ///< how the receiver came to see it without its echo
+  protocol::HostTime answers_until_{};  ///< of one that left after its cycle
   std::bitset<std::size_t{can::kMaxNodeId} + 1> answered_;  ///< nodes, the SYNC before
 };
 

@@ -73,8 +73,8 @@ void Program::signal(int number) const {
   if (pid_ != 0) ::kill(pid_, number);
 }
 
-int Program::wait_for_end() {
-  if (!eventually([this] { return !running(); })) {
+int Program::wait_for_end(std::chrono::milliseconds at_most) {
+  if (!eventually([this] { return !running(); }, at_most)) {
     signal(SIGKILL);
     eventually([this] { return !running(); });
   }

@@ -13,6 +13,7 @@ namespace abbe::test {
 
 constexpr std::chrono::seconds kPatience{
     60};  ///< for anything another process does; only a failure waits it out
+constexpr std::chrono::seconds kPatienceForARun{180};  ///< for a machine's whole run, on a slow computer too
 
 /// Asks every few milliseconds until `seen` says yes; false when it never did.
 template <class Condition>
@@ -32,8 +33,8 @@ class Program {
   [[nodiscard]] pid_t pid() const { return pid_; }
   [[nodiscard]] bool running();
   void signal(int number) const;
-  /// The exit code; minus the signal that ended it; after kPatience it is killed.
-  int wait_for_end();
+  /// The exit code; minus the signal that ended it; after `at_most` it is killed.
+  int wait_for_end(std::chrono::milliseconds at_most = kPatience);
   int stop();  ///< SIGTERM, then wait_for_end()
 
   [[nodiscard]] std::string out() const;

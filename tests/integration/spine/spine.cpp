@@ -168,7 +168,7 @@ Outcome Spine::calibrate(const std::string& path) const {
     return !calibration.running() || (now.is_object() && now["session"]["state"] == "warming");
   }));
   simulator_->signal(SIGCONT);
-  const int code = calibration.wait_for_end();
+  const int code = calibration.wait_for_end(kPatienceForARun);
   return {code, calibration.out(), calibration.err()};
 }
 

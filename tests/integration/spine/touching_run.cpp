@@ -106,7 +106,7 @@ Outcome TouchingRun::calibrate_touching(const std::string& calibrator) const {
     return !calibration.running() || (now.is_object() && now["state"] == "warming");
   }));
   let_machine_go();
-  const int code = calibration.wait_for_end();
+  const int code = calibration.wait_for_end(kPatienceForARun);
   return {code, calibration.out(), calibration.err()};
 }
 

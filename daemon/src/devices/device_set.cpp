@@ -213,6 +213,8 @@ DeviceSet::~DeviceSet() = default;
 DeviceSet::DeviceSet(DeviceSet&&) noexcept = default;
 DeviceSet& DeviceSet::operator=(DeviceSet&&) noexcept = default;
 
+/// Of each device the samples before the bytes: a driver hands them over the other way round, so bytes are
+/// never taken in a later turn than what was made of them. A replay stands on that.
 void DeviceSet::drain(Batch& batch) {
   State& s = *state_;
   if (s.encoder) {
@@ -221,6 +223,10 @@ void DeviceSet::drain(Batch& batch) {
   }
   if (s.counter_card) {  // the configuration allows one source of axes
     drain_ring(s.counter_card->device->samples(), s.axes, batch.axes);
+    if (s.touch_detector) {
+      drain_ring(s.touch_detector->touches(), s.touches, batch.touches);
+      drain_ring(s.touch_detector->windows(), s.touch_scans, batch.touch_scans);
+    }
     drain_ring(s.counter_card->device->raw(), s.blocks, batch.encoder_raw);
   }
   if (s.reference_card) {
@@ -228,10 +234,6 @@ void DeviceSet::drain(Batch& batch) {
       batch.marks.insert(batch.marks.end(), s.marks.begin(),
                          s.marks.begin() + static_cast<std::ptrdiff_t>(n));
     drain_ring(s.reference_card->device->raw(), s.blocks, batch.reference_raw);
-  }
-  if (s.touch_detector) {
-    drain_ring(s.touch_detector->touches(), s.touches, batch.touches);
-    drain_ring(s.touch_detector->windows(), s.touch_scans, batch.touch_scans);
   }
   if (s.tracker) {
     drain_ring(s.tracker->device->points(), s.points, batch.points);
@@ -246,12 +248,12 @@ void DeviceSet::drain_cmm(Batch& batch) {
   State& s = *state_;
   auto& device = *s.cmm->device;
   drain_ring(device.touches(), s.touches, batch.touches);
-  drain_ring(device.raw(), s.blocks, batch.probe_raw);
   while (const std::size_t n = device.positions().pop(s.axes)) {
     s.cmm_stands_at = s.axes[n - 1];
     if (s.cmm_is_the_axes)
       batch.axes.insert(batch.axes.end(), s.axes.begin(), s.axes.begin() + static_cast<std::ptrdiff_t>(n));
   }
+  drain_ring(device.raw(), s.blocks, batch.probe_raw);
 }
 
 void DeviceSet::measure(std::span<const drivers::ProbePoint> points) {

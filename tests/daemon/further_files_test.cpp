@@ -33,7 +33,8 @@ class FurtherFiles : public ::testing::Test {
  protected:
   FurtherFiles() {
     auto options = example_options(folder_.path());
-    options.max_file_bytes = 1;  // every chunk is a full file
+    options.max_file_bytes = 1;  // every flush, tick and attachment ends one that holds something
+    options.chunk_bytes = 2048;
     auto opened = Recorder::open(options, example_info(), {});
     if (!opened) throw std::runtime_error(opened.error().text);
     recorder_.emplace(std::move(*opened));
@@ -54,6 +55,18 @@ class FurtherFiles : public ::testing::Test {
     auto reader = RecordingReader::open(folder_.path() / name);
     if (!reader) throw std::runtime_error(reader.error().text);
     return std::move(*reader);
+  }
+  /// Instants of the tracker's weather that a replay gives.
+  static std::vector<HostTime> weather_of(const RecordingReader& reader, ReplaySource source) {
+    const auto config = parse_config(kWatched, "abbed.toml");
+    if (!config) throw std::runtime_error(config.error().details.front());
+    std::vector<HostTime> times;
+    ReplayOptions options{.source = source};
+    options.samples = [&](const Batch& batch, HostTime) {
+      for (const auto& e : batch.environment) times.push_back(e.head.time);
+    };
+    EXPECT_TRUE(replay(reader, *config, options));
+    return times;
   }
   /// reading_at_zero of the datums handed on, in order.
   static std::vector<double> datums_of(const RecordingReader& reader) {
@@ -96,21 +109,51 @@ TEST_F(FurtherFiles, GiveTheirWeatherToAReplayAlsoFromRawBytes) {
   recorder_->record(example_environment(1), "tracker");
   recorder_->flush();
   recorder_->record(protocol::to_raw_bytes(example_block(9), "somebody"));
-  recorder_->record(example_environment(10), "tracker");
+  recorder_->record(example_environment(10), "tracker", example_time(12));
   const auto reader = second();
-  const auto config = parse_config(kWatched, "abbed.toml");
-  ASSERT_TRUE(config) << config.error().details.front();
-  const auto weather_of = [&](ReplaySource source) {
-    std::vector<HostTime> times;
-    ReplayOptions options{.source = source};
-    options.samples = [&](const Batch& batch, HostTime) {
-      for (const auto& e : batch.environment) times.push_back(e.head.time);
-    };
-    EXPECT_TRUE(replay(reader, *config, options));
-    return times;
-  };
-  EXPECT_THAT(weather_of(ReplaySource::Samples), ElementsAre(example_time(1), example_time(10)));
-  EXPECT_THAT(weather_of(ReplaySource::RawBytes), ElementsAre(example_time(1)));  // the other from its bytes
+  EXPECT_THAT(weather_of(reader, ReplaySource::Samples), ElementsAre(example_time(1), example_time(10)));
+  EXPECT_THAT(weather_of(reader, ReplaySource::RawBytes), ElementsAre(example_time(1)))
+      << "the other from its bytes";
+}
+
+/// Of before: log_time was when a message was published, and that of 10 was published after it was measured.
+TEST_F(FurtherFiles, GiveTheirWeatherAlsoFromBeforeTurnsWereRecorded) {
+  recorder_->record(example_environment(1), "tracker");
+  recorder_->flush();
+  recorder_->record(example_environment(10), "tracker", example_time(12));
+  recorder_->record(example_environment(13), "tracker");
+  ASSERT_TRUE(recorder_->close());
+  EXPECT_THAT(weather_of(read("run-2.mcap"), ReplaySource::RawBytes), ElementsAre(example_time(1)));
+  const auto file = folder_.path() / "run-2.mcap";
+  auto bytes = bytes_of_file(file);
+  constexpr std::string_view kKey = "log_time";
+  const auto key = std::search(bytes.begin(), bytes.end(), kKey.begin(), kKey.end());
+  ASSERT_NE(key, bytes.end());
+  *key = 'x';
+  write_file(file, bytes, bytes.size());
+  EXPECT_THAT(weather_of(read("run-2.mcap"), ReplaySource::RawBytes),
+              ElementsAre(example_time(1), example_time(10)));
+}
+
+/// Three turns of several chunks each; one chunk fills a file.
+TEST_F(FurtherFiles, BeginWithAWholeTurn) {
+  for (std::uint32_t turn = 0; turn < 3; ++turn) {
+    const HostTime taken = example_time(10 * (turn + 1));
+    for (std::uint32_t i = 0; i < 20; ++i) {  // several chunks
+      recorder_->record(example_axes(10 * turn), "encoder", taken);
+      recorder_->record(example_point(10 * turn), "tracker", taken);
+    }
+    recorder_->tick({});
+  }
+  ASSERT_TRUE(recorder_->close());
+  std::set<HostTime> turns;
+  for (const std::string name : {"run.mcap", "run-2.mcap", "run-3.mcap"}) {
+    const auto reader = read(name);
+    EXPECT_EQ(reader.message_count(), 40u) << name;
+    turns.insert(reader.time_range()->first);
+    EXPECT_EQ(reader.time_range()->first, reader.time_range()->second) << name;
+  }
+  EXPECT_EQ(turns.size(), 3u);
 }
 
 TEST_F(FurtherFiles, HandOnTheDatumsInForceOnly) {

@@ -70,7 +70,7 @@ TEST_P(Golden, RawBytesGiveTheCheckedSamples) {
                 << "\n  now:     " << (f == found.end() ? "(end)" : *f);
 }
 
-/// In the order of a turn of the hub, which is not that of a replay.
+/// These recordings are from before the turns of the hub were recorded.
 TEST_P(Golden, RawBytesGiveTheSamplesOfTheLiveRun) {
   const std::string replay = "'" + std::string(ABBE_PROGRAM) + "' replay --samples '" + unpacked() + "'";
   auto live = output_of(replay);

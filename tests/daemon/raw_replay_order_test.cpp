@@ -1,8 +1,10 @@
 /// A driver may read bytes late: what it then had sent before counts for its samples, whatever the stamps
-/// say.
+/// say. And the hub may take bytes a turn before it takes what the driver makes of them.
 
 #include <gmock/gmock.h>
 
+#include <algorithm>
+#include <array>
 #include <cmath>
 #include <vector>
 
@@ -38,9 +40,16 @@ class LiveEncoders {
     take(can::encode_position(can::cob::tpdo(1, node), can::PositionType::Signed32, count), t,
          RawBlock::Direction::FromDevice);
   }
+  /// The hub takes the bytes from now on at `bytes`, the samples made of them at `samples`.
+  void turn(HostTime bytes, HostTime samples) {
+    bytes_taken_ = bytes;
+    samples_taken_ = samples;
+  }
+  void lose_samples() { samples_are_lost_ = true; }  ///< by the recorder, all of them
   [[nodiscard]] RecordingReader recording() { return *RecordingReader::open(recorder_.close()->file); }
   [[nodiscard]] const Config& config() const { return config_; }
   [[nodiscard]] const std::vector<AxisSample>& samples() const { return samples_; }
+  [[nodiscard]] const std::vector<HostTime>& turns() const { return turns_; }  ///< of samples()
 
  private:
   void take(const can::CanFrame& frame, HostTime t, RawBlock::Direction direction) {
@@ -50,10 +59,11 @@ class LiveEncoders {
     can::DatagramWriter writer{block.bytes, sequence_++};
     ASSERT_TRUE(writer.add(frame));
     block.length = static_cast<std::uint16_t>(writer.finish().size());
-    recorder_.record(protocol::to_raw_bytes(block, config_.encoder->name));
+    recorder_.record(protocol::to_raw_bytes(block, config_.encoder->name), bytes_taken_);
     receiver_.on_raw(block, [this](const AxisSample& sample) {
-      recorder_.record(sample, config_.encoder->name);
+      if (!samples_are_lost_) recorder_.record(sample, config_.encoder->name, samples_taken_);
       samples_.push_back(sample);
+      turns_.push_back(samples_taken_.value_or(sample.head.time));
     });
   }
 
@@ -62,6 +72,9 @@ class LiveEncoders {
   drivers::EncoderReceiver receiver_;
   std::uint8_t sequence_ = 0;
   std::vector<AxisSample> samples_;
+  std::vector<HostTime> turns_;
+  Recorder::Taken bytes_taken_, samples_taken_;
+  bool samples_are_lost_ = false;
 };
 
 std::vector<AxisSample> replayed(const RecordingReader& recording, const Config& config,
@@ -109,6 +122,65 @@ TEST(RawReplay, DecodesBytesInTheOrderInWhichTheDriverReadThem) {
   const auto recording = live.recording();
   expect_same(replayed(recording, live.config(), ReplaySource::Samples), live.samples());
   expect_same(replayed(recording, live.config(), ReplaySource::RawBytes), live.samples());
+}
+
+std::vector<HostTime> turns_from_bytes(const RecordingReader& recording, const Config& config) {
+  std::vector<HostTime> turns;
+  ReplayOptions options{.source = ReplaySource::RawBytes};
+  options.samples = [&](const Batch& batch, HostTime) {
+    turns.insert(turns.end(), batch.axes.size(), batch.taken);
+  };
+  EXPECT_TRUE(replay(recording, config, options));
+  return turns;
+}
+
+TEST(RawReplay, GivesSamplesInTheTurnsOfTheLiveRunNotInThoseOfTheirBytes) {
+  const TemporaryFolder folder;
+  LiveEncoders live{folder.path()};
+  const HostTime start = example_time(0);
+  for (std::int64_t i = 0; i < 20; ++i) {
+    const HostTime sync = start + 1ms * i;
+    live.turn(sync + 250us, i % 3 == 0 ? sync + 500us : sync + 250us);
+    live.sync(sync);
+    for (const can::NodeId node : std::array<can::NodeId, 3>{1, 2, 3}) live.answer(node, i, sync + 100us);
+  }
+  ASSERT_GE(live.turns().size(), 19u);
+  EXPECT_EQ(turns_from_bytes(live.recording(), live.config()), live.turns());
+}
+
+TEST(RawReplay, ASampleThatIsTakenBackComesInATurnOfItsOwn) {
+  const TemporaryFolder folder;
+  LiveEncoders live{folder.path()};
+  for (std::int64_t i = 0; i < 20; ++i) {
+    const HostTime sync = example_time(0) + 1ms * i;
+    live.turn(sync + 250us, sync + 500us);
+    live.sync(sync);
+    for (const can::NodeId node : std::array<can::NodeId, 3>{1, 2, 3}) live.answer(node, i, sync + 100us);
+    live.turn(sync + 500us, sync + 750us);
+    if (i % 4 == 2) live.answer(1, i, sync + 400us);  // twice in one cycle: neither counts
+  }
+  const auto& samples = live.samples();
+  const auto same_instant = [](const AxisSample& a, const AxisSample& b) {
+    return a.head.time == b.head.time;
+  };
+  ASSERT_NE(std::adjacent_find(samples.begin(), samples.end(), same_instant), samples.end());
+  const auto turns = live.turns();
+  EXPECT_EQ(turns_from_bytes(live.recording(), live.config()), turns);
+}
+
+TEST(RawReplay, WhatTheLiveRunDidNotHaveComesWithItsBytes) {
+  const TemporaryFolder folder;
+  LiveEncoders live{folder.path()};
+  live.lose_samples();
+  std::vector<HostTime> turns_of_bytes;
+  for (std::int64_t i = 0; i < 20; ++i) {
+    const HostTime sync = example_time(0) + 1ms * i;
+    turns_of_bytes.push_back(sync + 250us);
+    live.turn(turns_of_bytes.back(), turns_of_bytes.back());
+    live.sync(sync);
+    for (const can::NodeId node : std::array<can::NodeId, 3>{1, 2, 3}) live.answer(node, i, sync + 100us);
+  }
+  EXPECT_EQ(turns_from_bytes(live.recording(), live.config()), turns_of_bytes);
 }
 
 }  // namespace

@@ -73,7 +73,7 @@ TEST_F(DamagedRecording, CutAtAnyByteKeepsEveryFinishedChunk) {
         << "cut at " << cut;
     std::uint32_t i = 0;
     for (auto cursor = reader->messages(); const auto message = cursor.next(); ++i) {
-      ASSERT_EQ(message->time, example_time(i)) << "cut at " << cut;
+      ASSERT_EQ(message->taken, example_time(i)) << "cut at " << cut;
     }
     ASSERT_EQ(i, reader->message_count());
   }
@@ -220,7 +220,7 @@ TEST_F(KilledRecorders, LeaveEveryFinishedChunkReadableAtFiftyRandomMoments) {
     ASSERT_GE(reader->message_count(), killed.finished) << killed.file;
     std::uint32_t i = 0;
     for (auto cursor = reader->messages(); const auto message = cursor.next(); ++i) {
-      ASSERT_EQ(message->time, example_time(i)) << killed.file;
+      ASSERT_EQ(message->taken, example_time(i)) << killed.file;
     }
   }
 }

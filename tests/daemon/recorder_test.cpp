@@ -279,10 +279,10 @@ TEST_F(RecorderTest, LateSamplesAreGivenInOrderOfTimeAndEqualOnesAsRecorded) {
   std::string_view topic_before;
   std::size_t messages = 0;
   for (; const auto message = cursor.next(); ++messages) {
-    ASSERT_GE(message->time, before);
-    const bool recorded_later = message->time == before && topic_before == "abbe/v1/TrackerPoint";
+    ASSERT_GE(message->taken, before);
+    const bool recorded_later = message->taken == before && topic_before == "abbe/v1/TrackerPoint";
     ASSERT_FALSE(recorded_later) << "message " << messages;
-    before = message->time;
+    before = message->taken;
     topic_before = message->topic;
   }
   EXPECT_EQ(messages, 450u);

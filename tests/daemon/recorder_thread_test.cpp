@@ -24,9 +24,13 @@ class RecorderThreadTest : public ::testing::Test {
     if (!started) throw std::runtime_error(started.error().text);
     thread_ = std::move(*started);
   }
+  static protocol::HostTime taken_at(std::uint32_t first) {
+    return example_time(first) + std::chrono::seconds{1};
+  }
   /// One message of every stream in each of `count` places from `first` on.
   static Batch batch(std::uint32_t first, std::uint32_t count) {
     Batch b;
+    b.taken = taken_at(first);
     for (std::uint32_t i = first; i < first + count; ++i) {
       b.points.push_back(example_point(i));
       b.points.back().head.lost_before = 0;
@@ -55,6 +59,31 @@ TEST_F(RecorderThreadTest, RecordsWhatItIsHanded) {
   start(1 << 20);
   thread_->hand_over(batch(0, 10));
   EXPECT_EQ(finish().message_count(), 50u);
+}
+
+TEST_F(RecorderThreadTest, EveryMessageSaysInWhichTurnItWasTaken) {
+  start(1 << 20);
+  for (const std::uint32_t first : {0u, 10u}) {
+    Batch b = batch(first, 2);
+    b.touches.push_back(example_touch(first));
+    b.touch_scans.push_back(example_touch_scan(first));
+    for (const std::size_t device : {0u, 1u}) {
+      b.measured_environment.push_back({device, example_environment(first)});
+      b.environment_raw.push_back({device, example_block(first)});
+    }
+    b.probe_raw.push_back(example_block(first));
+    b.reference_raw.push_back(example_block(first));
+    thread_->hand_over(b);
+  }
+  const auto reader = finish();
+  auto cursor = reader.messages();
+  std::map<protocol::HostTime, int> messages_of_turn;
+  while (const auto message = cursor.next()) {
+    ++messages_of_turn[message->taken];
+    EXPECT_LT(message->published, message->taken) << "what was measured before";
+  }
+  EXPECT_THAT(messages_of_turn,
+              testing::ElementsAre(std::pair{taken_at(0), 18}, std::pair{taken_at(10), 18}));
 }
 
 TEST_F(RecorderThreadTest, WhatThereIsNoRoomForIsCountedWithItsRawBlocks) {

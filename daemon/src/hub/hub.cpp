@@ -88,10 +88,11 @@ void Hub::turn(WallTime wall) {
   batch_.clear();
   const std::size_t points_left = parts_.devices.points_left();
   parts_.devices.drain(batch_);
+  const HostTime now = parts_.time.now();
+  batch_.taken = now;
   touch(points_left, wall);
   if (parts_.reference != nullptr) parts_.reference->turn(batch_);
   const bool fresh = live_.take(batch_);
-  const HostTime now = parts_.time.now();
   // Live first: subscribers wait for it; abbe-dds's socket, the recorder and the assembler have time.
   publish(fresh, now, wall);
   if (parts_.publisher != nullptr) parts_.publisher->beat(wall);

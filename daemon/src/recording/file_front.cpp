@@ -47,7 +47,8 @@ void append_front(const RecordingInfo& info, const PartOf& part, mcap::SummaryBu
                           {"utc_offset_ns", fmt::format("{}", info.utc_offset.value.count())},
                           {"speed", fmt::format("{}", info.speed)},
                           {"part", fmt::format("{}", part.part)},
-                          {"follows", part.follows}};
+                          {"follows", part.follows},
+                          {kLogTime, "turn of the hub"}};
   append_metadata(kRecordingMetadata, recording, summary, out);
   append_metadata(kConfigurationMetadata,
                   {{"text", info.configuration}, {"sha256", sha256_hex(info.configuration)}}, summary, out);

@@ -1,6 +1,7 @@
 #pragma once
 /// The search for the reference marks once more, from the raw bytes of both cards in a recording: it begins
-/// when the live run was asked to, and what it finds stands beside what the live run found. One thread.
+/// when the live run was asked to (of a turn's bytes at once, which the live run may have had a turn later),
+/// and what it finds stands beside what the live run found. One thread.
 
 #include <optional>
 #include <vector>

@@ -6,7 +6,6 @@
 #include <array>
 #include <cerrno>
 #include <functional>
-#include <iterator>
 #include <map>
 #include <optional>
 #include <utility>
@@ -16,6 +15,7 @@
 #include "abbe/daemon/datum.hpp"
 #include "abbe/protocol/mcap/writer.hpp"
 #include "abbe/protocol/raw_bytes_cdr.hpp"
+#include "recording/carried_datum.hpp"
 #include "recording/file_front.hpp"
 #include "recording/loss_ledger.hpp"
 #include "recording/recording_file.hpp"
@@ -28,6 +28,7 @@ namespace mcap = protocol::mcap;
 using recording::IoFault;
 using recording::RecordingFile;
 using recording::Stream;
+using recording::TimedAttachment;
 using IoResult = tl::expected<void, IoFault>;
 
 namespace {
@@ -36,22 +37,13 @@ namespace {
 /// the limit would fill a directory with stumps.
 constexpr std::uint64_t kResumeMarginChunks = 16;
 
-struct TimedAttachment {
-  RecordingAttachment attachment;
-  std::uint64_t time_ns = 0;
+struct Dates {
+  protocol::HostTime taken;      ///< log_time
+  protocol::HostTime described;  ///< publish_time
 };
 
-/// Whether the next file needs it. `settled`: axes of which nothing found earlier is in force; walked from
-/// the newest back.
-bool is_carried_on(const RecordingAttachment& attachment, const DatumState& state, std::uint32_t& settled) {
-  if (attachment.name == kReferenceRequestName || attachment.name == kDatumStateName) return false;
-  if (attachment.name != kDatumName) return true;
-  const auto datum = datum_from_attachment(attachment);
-  if (!datum || datum->from >= state.at) return true;
-  const std::uint32_t axis = 1u << datum->axis;
-  const bool in_force = (settled & axis) == 0;
-  settled |= axis;
-  return in_force;
+Dates dates(protocol::HostTime described, Recorder::Taken taken) {
+  return {taken.value_or(described), described};
 }
 
 }  // namespace
@@ -68,17 +60,17 @@ struct Recorder::State {
   [[nodiscard]] IoResult begin_file();
   [[nodiscard]] IoResult write_front(RecordingFile& fresh, mcap::SummaryBuilder& fresh_summary) const;
   [[nodiscard]] IoResult end_file();
-  [[nodiscard]] bool add(Stream stream, protocol::HostTime time, std::span<const std::byte> payload);
-  void put(Stream stream, protocol::HostTime logged, protocol::HostTime time,
-           std::span<const std::byte> payload);
+  [[nodiscard]] bool add(Stream stream, Dates dates, std::span<const std::byte> payload);
+  void put(Stream stream, Dates dates, std::span<const std::byte> payload);
   /// Marks `message` with what is missing before it, and adds it.
   template <class Message>
-  void add_marked(Stream stream, protocol::HostTime time, std::string_view device, Message& message);
-  void add_carried_environment(protocol::HostTime time);
-  void carry_datum_on();
+  void add_marked(Stream stream, Dates dates, std::string_view device, Message& message);
+  void add_carried_environment(protocol::HostTime begin);
   void keep_environment(const protocol::EnvironmentSample& sample, std::string_view device);
   void account(Stream stream, std::string_view device, std::uint32_t lost_before, bool added);
   void write_chunk();
+  void end_turn();
+  [[nodiscard]] bool is_full() const;
   void lose_chunk();
   void sync_if_due();
   void enter_fault(const IoFault& fault);
@@ -165,7 +157,7 @@ IoResult Recorder::State::begin_file() {
   if (std::filesystem::exists(finished, error))
     return tl::unexpected(recording::io_fault("create", finished, EEXIST));
   if (error) return tl::unexpected(recording::io_fault("look for", finished, error.value()));
-  if (part > 0) carry_datum_on();
+  if (part > 0 && axes_known) recording::carry_datum_on(attachments, *axes_known, utc_ns(axes_known->at));
   auto fresh = RecordingFile::create(path(part + 1, ".mcap.part"));
   if (!fresh) return tl::unexpected(fresh.error());
   mcap::SummaryBuilder fresh_summary;
@@ -206,7 +198,7 @@ IoResult Recorder::State::end_file() {
 // --- messages
 // ------------------------------------------------------------------------------------------------------
 
-bool Recorder::State::add(Stream stream, protocol::HostTime time, std::span<const std::byte> data) {
+bool Recorder::State::add(Stream stream, Dates dates, std::span<const std::byte> data) {
   if (status.state != RecorderStatus::State::Recording) {
     ++status.lost;
     return false;
@@ -220,37 +212,36 @@ bool Recorder::State::add(Stream stream, protocol::HostTime time, std::span<cons
     }
   }
   if (chunk.empty()) chunk_since = now;
-  if (!std::exchange(environment_carried, true)) add_carried_environment(time);
-  put(stream, time, time, data);
+  if (!std::exchange(environment_carried, true)) add_carried_environment(dates.taken);
+  put(stream, dates, data);
   return true;
 }
 
-void Recorder::State::put(Stream stream, protocol::HostTime logged, protocol::HostTime time,
-                          std::span<const std::byte> data) {
+void Recorder::State::put(Stream stream, Dates dates, std::span<const std::byte> data) {
   chunk.add(mcap::Message{recording::channel_id(stream), sequences[recording::index(stream)]++,
-                          utc_ns(logged), utc_ns(time), data});
+                          utc_ns(dates.taken), utc_ns(dates.described), data});
 }
 
-/// Some devices speak only when something changes. Logged when the file begins, measured when it was.
-void Recorder::State::add_carried_environment(protocol::HostTime time) {
+/// Some devices speak only when something changes. Published again when the file begins; measured when it
+/// was.
+void Recorder::State::add_carried_environment(protocol::HostTime begin) {
   v1::EnvironmentSample message;
   std::vector<std::byte> bytes;
   for (const auto& [device, sample] : latest_environment) {
     recording::fill(message, sample, device);
     if (!encode(message, bytes)) continue;
-    put(Stream::Environment, time, sample.head.time, bytes);
+    put(Stream::Environment, {begin, begin}, bytes);
     ++carried_in_chunk;
   }
 }
 
 template <class Message>
-void Recorder::State::add_marked(Stream stream, protocol::HostTime time, std::string_view device,
-                                 Message& message) {
+void Recorder::State::add_marked(Stream stream, Dates dates, std::string_view device, Message& message) {
   const std::uint32_t missing = lost.take(stream, device);
   if (missing > 0) recording::mark_gap(message, missing);
   const bool encoded = encode(message, payload).has_value();
   if (!encoded) ++status.refused;
-  account(stream, device, missing, encoded && add(stream, time, payload));
+  account(stream, device, missing, encoded && add(stream, dates, payload));
 }
 
 void Recorder::State::account(Stream stream, std::string_view device, std::uint32_t lost_before, bool added) {
@@ -283,20 +274,18 @@ void Recorder::State::write_chunk() {
   if (file->free_bytes() < options.min_free_bytes) {
     enter_fault({ENOSPC, fmt::format("write {}: less than {} bytes would stay free", file->path().string(),
                                      options.min_free_bytes)});
-  } else if (options.max_file_bytes > 0 && file->size() >= options.max_file_bytes && !calibrating) {
-    go_on_in_next_file();
   }
 }
 
-/// What is in force of every axis, what was found since, and which axes nobody knows.
-void Recorder::State::carry_datum_on() {
-  if (!axes_known) return;
-  std::uint32_t settled = axes_known->unknown;
-  std::vector<TimedAttachment> carried;
-  for (auto kept = attachments.rbegin(); kept != attachments.rend(); ++kept)
-    if (is_carried_on(kept->attachment, *axes_known, settled)) carried.push_back(std::move(*kept));
-  carried.push_back({to_attachment(*axes_known), utc_ns(axes_known->at)});
-  attachments.assign(std::make_move_iterator(carried.rbegin()), std::make_move_iterator(carried.rend()));
+bool Recorder::State::is_full() const {
+  return status.state == RecorderStatus::State::Recording && messages_in_file > 0 &&
+         options.max_file_bytes > 0 && file->size() >= options.max_file_bytes && !calibrating;
+}
+
+/// Between two turns of the hub, so that a file begins with a whole one.
+void Recorder::State::end_turn() {
+  write_chunk();
+  if (is_full()) go_on_in_next_file();
 }
 
 void Recorder::State::go_on_in_next_file() {
@@ -379,30 +368,30 @@ Recorder::~Recorder() {
   if (state_) (void)close();
 }
 
-void Recorder::record(const protocol::TrackerPoint& point, std::string_view device) {
+void Recorder::record(const protocol::TrackerPoint& point, std::string_view device, Taken taken) {
   recording::fill(state_->tracker_point, point, device);
-  state_->add_marked(Stream::TrackerPoint, point.head.time, device, state_->tracker_point);
+  state_->add_marked(Stream::TrackerPoint, dates(point.head.time, taken), device, state_->tracker_point);
 }
 
-void Recorder::record(const protocol::AxisSample& sample, std::string_view device) {
+void Recorder::record(const protocol::AxisSample& sample, std::string_view device, Taken taken) {
   recording::fill(state_->axis_sample, sample, device);
-  state_->add_marked(Stream::AxisSample, sample.head.time, device, state_->axis_sample);
+  state_->add_marked(Stream::AxisSample, dates(sample.head.time, taken), device, state_->axis_sample);
   state_->axes_known = DatumState{.at = sample.head.time, .unknown = sample.missing_mask};
 }
 
-void Recorder::record(const protocol::ProbeTrigger& touch, std::string_view device) {
+void Recorder::record(const protocol::ProbeTrigger& touch, std::string_view device, Taken taken) {
   recording::fill(state_->touch, touch, device);
-  state_->add_marked(Stream::ProbeTrigger, touch.head.time, device, state_->touch);
+  state_->add_marked(Stream::ProbeTrigger, dates(touch.head.time, taken), device, state_->touch);
 }
 
-void Recorder::record(const protocol::TouchScan& scan, std::string_view device) {
+void Recorder::record(const protocol::TouchScan& scan, std::string_view device, Taken taken) {
   recording::fill(state_->touch_scan, scan, device);
-  state_->add_marked(Stream::TouchScan, scan.head.time, device, state_->touch_scan);
+  state_->add_marked(Stream::TouchScan, dates(scan.head.time, taken), device, state_->touch_scan);
 }
 
-void Recorder::record(const protocol::EnvironmentSample& sample, std::string_view device) {
+void Recorder::record(const protocol::EnvironmentSample& sample, std::string_view device, Taken taken) {
   recording::fill(state_->environment, sample, device);
-  state_->add_marked(Stream::Environment, sample.head.time, device, state_->environment);
+  state_->add_marked(Stream::Environment, dates(sample.head.time, taken), device, state_->environment);
   state_->keep_environment(sample, device);
 }
 
@@ -414,23 +403,23 @@ void Recorder::State::keep_environment(const protocol::EnvironmentSample& sample
   latest->second.head.flags &= ~static_cast<protocol::SampleFlags>(protocol::SampleFlag::GapBefore);
 }
 
-void Recorder::record(protocol::RawBytes bytes) {
+void Recorder::record(protocol::RawBytes bytes, Taken taken) {
   const std::uint32_t missing = state_->lost.take(Stream::RawBytes, bytes.device);
   bytes.lost_before += missing;
   const auto size = encode_cdr(bytes, state_->raw_payload);
   if (!size) ++state_->status.refused;
-  const bool added =
-      size && state_->add(Stream::RawBytes, bytes.time, std::span{state_->raw_payload}.first(*size));
+  const bool added = size && state_->add(Stream::RawBytes, dates(bytes.time, taken),
+                                         std::span{state_->raw_payload}.first(*size));
   state_->account(Stream::RawBytes, bytes.device, missing, added);
 }
 
-void Recorder::record(const v1::CalibrationEvent& event) {
+void Recorder::record(const v1::CalibrationEvent& event, Taken taken) {
   const protocol::HostTime time{std::chrono::nanoseconds{event.host_time_ns()}};
   if (!encode(event, state_->payload)) {
     ++state_->status.refused;
     return;
   }
-  (void)state_->add(Stream::CalibrationEvent, time, state_->payload);
+  (void)state_->add(Stream::CalibrationEvent, dates(time, taken), state_->payload);
   state_->calibrating = event.state() != name(SessionState::Active) &&
                         event.state() != name(SessionState::Refused) &&
                         event.state() != name(SessionState::Idle);
@@ -439,7 +428,7 @@ void Recorder::record(const v1::CalibrationEvent& event) {
 void Recorder::attach(RecordingAttachment attachment, protocol::HostTime time) {
   State& s = *state_;
   s.calibrating = s.calibrating || is_calibration_request(attachment.name);
-  if (s.status.state == RecorderStatus::State::Recording) s.write_chunk();  // a next file may begin here
+  if (s.status.state == RecorderStatus::State::Recording) s.end_turn();
   s.attachments.push_back({std::move(attachment), s.utc_ns(time)});
   if (s.status.state != RecorderStatus::State::Recording) return;  // the next file begins with it
   mcap::Buffer bytes;
@@ -456,12 +445,12 @@ void Recorder::tick(WallTime now) {
   s.now = now;
   if (s.status.state == RecorderStatus::State::Closed) return;
   if (s.status.state != RecorderStatus::State::Recording) return s.retry();
-  if (!s.chunk.empty() && now - s.chunk_since >= s.options.chunk_period) s.write_chunk();
+  if (s.is_full() || (!s.chunk.empty() && now - s.chunk_since >= s.options.chunk_period)) s.end_turn();
   if (s.status.state == RecorderStatus::State::Recording) s.sync_if_due();
 }
 
 void Recorder::flush() {
-  if (state_->status.state == RecorderStatus::State::Recording) state_->write_chunk();
+  if (state_->status.state == RecorderStatus::State::Recording) state_->end_turn();
 }
 
 RecordingDigest Recorder::digest() const {

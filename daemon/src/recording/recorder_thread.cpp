@@ -17,14 +17,37 @@ namespace {
 // How long a sample may wait in memory before it is encoded; a tenth of the shortest chunk.
 constexpr std::chrono::milliseconds kTurn{20};
 
+/// With the turn of the hub in which it came.
+template <class T>
+struct OfTurn {
+  protocol::HostTime taken;
+  T what;
+};
+
+/// Several devices measure the environment.
+struct EnvironmentOf {
+  std::string_view device;
+  protocol::EnvironmentSample sample;
+};
+
+template <class T>
+std::size_t size_of(const std::vector<OfTurn<T>>& waiting) noexcept {
+  return waiting.size() * sizeof(OfTurn<T>);
+}
+/// What append() will need for these.
+template <class As, class T>
+std::size_t size_as(const std::vector<T>& samples) noexcept {
+  return samples.size() * sizeof(OfTurn<As>);
+}
 template <class T>
 std::size_t size_of(const std::vector<T>& samples) noexcept {
-  return samples.size() * sizeof(T);
+  return size_as<T>(samples);
 }
 
 std::size_t bytes_of(const Batch& batch) noexcept {
-  std::size_t bytes = size_of(batch.points) + size_of(batch.axes) + size_of(batch.environment) +
-                      batch.measured_environment.size() * sizeof(protocol::EnvironmentSample);
+  std::size_t bytes = size_of(batch.points) + size_of(batch.axes) +
+                      size_as<EnvironmentOf>(batch.environment) +
+                      size_as<EnvironmentOf>(batch.measured_environment);
   bytes += size_of(batch.touches) + size_of(batch.touch_scans);
   for (const auto* blocks : {&batch.tracker_raw, &batch.encoder_raw, &batch.probe_raw, &batch.reference_raw})
     bytes += WaitingBlocks::bytes_of(*blocks);
@@ -37,35 +60,22 @@ struct Attachment {
   protocol::HostTime time{};
 };
 
-/// What waits of one device of [[environment]].
-struct WaitingMeasured {
-  std::vector<protocol::EnvironmentSample> samples;
-  WaitingBlocks raw;
-};
-
-/// What waits for the recorder.
+/// What waits for the recorder; of each topic in the order of the hub's turns, which its messages keep.
 struct Waiting {
-  std::vector<protocol::TrackerPoint> points;
-  std::vector<protocol::AxisSample> axes;
-  std::vector<protocol::EnvironmentSample> environment;
-  std::vector<protocol::ProbeTrigger> touches;
-  std::vector<protocol::TouchScan> touch_scans;
-  WaitingBlocks tracker_raw;
-  WaitingBlocks encoder_raw;
-  WaitingBlocks probe_raw;
-  WaitingBlocks reference_raw;
-  std::vector<WaitingMeasured> measured;  ///< in the order of RecorderThreadOptions::environment
-  std::vector<v1::CalibrationEvent> events;
+  std::vector<OfTurn<protocol::TrackerPoint>> points;
+  std::vector<OfTurn<protocol::AxisSample>> axes;
+  std::vector<OfTurn<EnvironmentOf>> environment;
+  std::vector<OfTurn<protocol::ProbeTrigger>> touches;
+  std::vector<OfTurn<protocol::TouchScan>> touch_scans;
+  WaitingBlocks raw;
+  std::vector<OfTurn<v1::CalibrationEvent>> events;
   std::vector<Attachment> attachments;
   std::vector<std::promise<RecordingDigest>> digests;
   bool full = false;  ///< what comes until the recorder has taken this is dropped: one hole, not many
 
   [[nodiscard]] std::size_t bytes() const noexcept {
-    std::size_t bytes = size_of(points) + size_of(axes) + size_of(environment) + size_of(touches) +
-                        size_of(touch_scans) + tracker_raw.bytes() + encoder_raw.bytes() + probe_raw.bytes() +
-                        reference_raw.bytes();
-    for (const auto& device : measured) bytes += size_of(device.samples) + device.raw.bytes();
-    return bytes;
+    return size_of(points) + size_of(axes) + size_of(environment) + size_of(touches) + size_of(touch_scans) +
+           raw.bytes();
   }
   /// Keeps the room for an ordinary turn, gives that of a stalled disk back.
   void clear() {
@@ -79,14 +89,7 @@ struct Waiting {
     environment.clear();
     touches.clear();
     touch_scans.clear();
-    tracker_raw.clear();
-    encoder_raw.clear();
-    probe_raw.clear();
-    reference_raw.clear();
-    for (auto& device : measured) {
-      device.samples.clear();
-      device.raw.clear();
-    }
+    raw.clear();
     events.clear();
     attachments.clear();
     digests.clear();
@@ -117,14 +120,17 @@ void say_dropped(protocol::SampleHead& head, std::uint32_t& dropped) {
 }
 
 template <class T>
-void append(std::vector<T>& to, const std::vector<T>& from, std::uint32_t& dropped) {
-  if (from.empty()) return;
-  say_dropped(to.insert(to.end(), from.begin(), from.end())->head, dropped);
+void append(std::vector<OfTurn<T>>& to, protocol::HostTime taken, const std::vector<T>& from,
+            std::uint32_t& dropped) {
+  for (const T& sample : from) {
+    to.push_back({taken, sample});
+    say_dropped(to.back().what.head, dropped);
+  }
 }
-template <class T>
-void append(std::vector<T>& to, const T& sample, std::uint32_t& dropped) {
-  to.push_back(sample);
-  say_dropped(to.back().head, dropped);
+void append(std::vector<OfTurn<EnvironmentOf>>& to, protocol::HostTime taken, const EnvironmentOf& from,
+            std::uint32_t& dropped) {
+  to.push_back({taken, from});
+  say_dropped(to.back().what.sample.head, dropped);
 }
 
 }  // namespace
@@ -194,21 +200,15 @@ struct RecorderThread::State {
 
   void write(Waiting& turn) {
     for (auto& a : turn.attachments) recorder.attach(std::move(a.what), a.time);
-    for (const auto& s : turn.axes) recorder.record(s, options.encoder);
-    for (const auto& s : turn.points) recorder.record(s, options.tracker);
-    for (const auto& s : turn.environment) recorder.record(s, options.tracker);
-    for (const auto& t : turn.touches) recorder.record(t, options.probe);
-    for (const auto& s : turn.touch_scans) recorder.record(s, options.probe);
-    turn.tracker_raw.for_each(options.tracker, [this](const auto& bytes) { recorder.record(bytes); });
-    turn.encoder_raw.for_each(options.encoder, [this](const auto& bytes) { recorder.record(bytes); });
-    turn.probe_raw.for_each(options.probe, [this](const auto& bytes) { recorder.record(bytes); });
-    turn.reference_raw.for_each(options.reference, [this](const auto& bytes) { recorder.record(bytes); });
-    for (std::size_t i = 0; i < turn.measured.size(); ++i) {
-      const std::string& device = options.environment.at(i);
-      for (const auto& s : turn.measured[i].samples) recorder.record(s, device);
-      turn.measured[i].raw.for_each(device, [this](const auto& bytes) { recorder.record(bytes); });
-    }
-    for (const auto& e : turn.events) recorder.record(e);
+    // First: a further file begins with the environment of before, which must not come after that of now.
+    for (const auto& [taken, e] : turn.environment) recorder.record(e.sample, e.device, taken);
+    for (const auto& [taken, s] : turn.axes) recorder.record(s, options.encoder, taken);
+    for (const auto& [taken, s] : turn.points) recorder.record(s, options.tracker, taken);
+    for (const auto& [taken, t] : turn.touches) recorder.record(t, options.probe, taken);
+    for (const auto& [taken, s] : turn.touch_scans) recorder.record(s, options.probe, taken);
+    turn.raw.for_each(
+        [this](const protocol::RawBytes& bytes, protocol::HostTime taken) { recorder.record(bytes, taken); });
+    for (const auto& [taken, e] : turn.events) recorder.record(e, taken);
     if (!turn.digests.empty()) recorder.flush();
     for (auto& d : turn.digests) d.set_value(recorder.digest());
     recorder.tick(Recorder::WallTime::clock::now());
@@ -248,25 +248,29 @@ void RecorderThread::hand_over(const Batch& batch) {
   Dropped& unsaid = state_->unsaid;
   waiting.full = waiting.full || waiting.bytes() + bytes_of(batch) > state_->options.most_waiting_bytes;
   if (waiting.full) return state_->drop(batch);
-  append(waiting.points, batch.points, unsaid.points);
-  append(waiting.axes, batch.axes, unsaid.axes);
-  append(waiting.environment, batch.environment, unsaid.environment);
+  const auto& names = state_->options;
+  const auto taken = batch.taken;
+  append(waiting.points, taken, batch.points, unsaid.points);
+  append(waiting.axes, taken, batch.axes, unsaid.axes);
+  for (const auto& sample : batch.environment)
+    append(waiting.environment, taken, {names.tracker, sample}, unsaid.environment);
   for (const auto& [device, sample] : batch.measured_environment)
-    append(place(waiting.measured, device).samples, sample, place(unsaid.measured, device).samples);
-  append(waiting.touches, batch.touches, unsaid.touches);
-  append(waiting.touch_scans, batch.touch_scans, unsaid.touch_scans);
-  if (!state_->options.raw) return;
-  waiting.tracker_raw.append(batch.tracker_raw, unsaid.tracker_raw);
-  waiting.encoder_raw.append(batch.encoder_raw, unsaid.encoder_raw);
-  waiting.probe_raw.append(batch.probe_raw, unsaid.probe_raw);
-  waiting.reference_raw.append(batch.reference_raw, unsaid.reference_raw);
+    append(waiting.environment, taken, {names.environment.at(device), sample},
+           place(unsaid.measured, device).samples);
+  append(waiting.touches, taken, batch.touches, unsaid.touches);
+  append(waiting.touch_scans, taken, batch.touch_scans, unsaid.touch_scans);
+  if (!names.raw) return;
+  waiting.raw.append(taken, names.tracker, batch.tracker_raw, unsaid.tracker_raw);
+  waiting.raw.append(taken, names.encoder, batch.encoder_raw, unsaid.encoder_raw);
+  waiting.raw.append(taken, names.probe, batch.probe_raw, unsaid.probe_raw);
+  waiting.raw.append(taken, names.reference, batch.reference_raw, unsaid.reference_raw);
   for (const auto& [device, block] : batch.environment_raw)
-    place(waiting.measured, device).raw.append(block, place(unsaid.measured, device).raw);
+    waiting.raw.append(taken, names.environment.at(device), block, place(unsaid.measured, device).raw);
 }
 
-void RecorderThread::hand_over(v1::CalibrationEvent event) {
+void RecorderThread::hand_over(v1::CalibrationEvent event, protocol::HostTime taken) {
   const std::lock_guard lock{state_->mutex};
-  state_->waiting.events.push_back(std::move(event));
+  state_->waiting.events.push_back({taken, std::move(event)});
 }
 
 void RecorderThread::attach(RecordingAttachment attachment, protocol::HostTime time) {

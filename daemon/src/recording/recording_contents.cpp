@@ -70,7 +70,7 @@ class Collector {
     ReadableChunk chunk{records, ~std::uint64_t{0}, 0, 0};
     mcap::MessageReader messages{records};
     while (const auto message = messages.next()) {
-      chunk.first_time_ns = std::min(chunk.first_time_ns, message->log_time_ns);
+      chunk.earliest_ns = std::min(chunk.earliest_ns, message->log_time_ns);
       chunk.last_time_ns = std::max(chunk.last_time_ns, message->log_time_ns);
       ++chunk.messages;
     }
@@ -140,7 +140,9 @@ Contents contents_of(mcap::Bytes file) {
   } else {
     collect_by_scan(file, collector);
   }
-  std::ranges::stable_sort(collector.contents.chunks, {}, &ReadableChunk::first_time_ns);
+  auto& chunks = collector.contents.chunks;
+  for (std::size_t i = chunks.size(); i-- > 1;)
+    chunks[i - 1].earliest_ns = std::min(chunks[i - 1].earliest_ns, chunks[i].earliest_ns);
   return std::move(collector.contents);  // NOLINT: a member is not moved out by itself
 }
 

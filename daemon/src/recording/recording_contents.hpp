@@ -14,14 +14,14 @@ namespace abbe::daemon::recording {
 /// A chunk whose messages can be read; its times are those of its messages, not those its head claims.
 struct ReadableChunk {
   protocol::mcap::Bytes records;
-  std::uint64_t first_time_ns = 0;
+  std::uint64_t earliest_ns = 0;  ///< of this chunk and all after it
   std::uint64_t last_time_ns = 0;
   std::uint64_t messages = 0;
 };
 
 struct Contents {
   std::map<std::uint16_t, std::string> topics;  ///< by channel
-  std::vector<ReadableChunk> chunks;            ///< with at least one message, by first time
+  std::vector<ReadableChunk> chunks;            ///< with at least one message, in file order
   std::map<std::string, std::map<std::string, std::string>> metadata;
   std::vector<RecordingAttachment> attachments;
   std::vector<RecordingLoss> losses;

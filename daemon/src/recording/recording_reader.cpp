@@ -106,7 +106,17 @@ struct RecordingReader::State {
   recording::MappedFile file;
   Contents contents;
   RecordingInfo info;
+  bool says_turns;  ///< else log_time is when it was published
 };
+
+namespace {
+
+bool says_turns(const Contents& contents) {
+  const auto entries = contents.metadata.find(std::string(recording::kRecordingMetadata));
+  return entries != contents.metadata.end() && entries->second.contains(recording::kLogTime);
+}
+
+}  // namespace
 
 Result<RecordingReader> RecordingReader::open(const std::filesystem::path& path) {
   auto file = recording::MappedFile::open(path);
@@ -121,7 +131,8 @@ Result<RecordingReader> RecordingReader::open(const std::filesystem::path& path)
                 fmt::format("read {}: no metadata \"{}\": not recorded by abbe, or cut at its front",
                             path.string(), recording::kRecordingMetadata));
   }
-  return RecordingReader{std::make_unique<State>(State{std::move(*file), std::move(contents), *info})};
+  const bool turns = says_turns(contents);
+  return RecordingReader{std::make_unique<State>(State{std::move(*file), std::move(contents), *info, turns})};
 }
 
 RecordingReader::RecordingReader(std::unique_ptr<State> state) : state_(std::move(state)) {}
@@ -157,7 +168,7 @@ std::optional<std::pair<protocol::HostTime, protocol::HostTime>> RecordingReader
   if (chunks.empty()) return std::nullopt;
   const auto last = std::ranges::max_element(chunks, {}, &ReadableChunk::last_time_ns);
   const auto offset = state_->info.utc_offset;
-  return std::pair{host_time(chunks.front().first_time_ns, offset), host_time(last->last_time_ns, offset)};
+  return std::pair{host_time(chunks.front().earliest_ns, offset), host_time(last->last_time_ns, offset)};
 }
 
 std::string RecordingReader::sha256() const {
@@ -178,8 +189,8 @@ std::uint64_t RecordingReader::read(const RecordingSink& sink) const {
 // --- messages by time
 // ----------------------------------------------------------------------------------------------
 
-/// Chunks overlap in time, because a device may deliver late. They are opened by their first time; a message
-/// is given once no chunk still closed can hold an earlier one.
+/// Chunks overlap in time, because the recorder empties one stream after the other. They are opened in file
+/// order; a message is given once no chunk still closed can hold an earlier one.
 struct RecordingReader::Cursor::State {
   const RecordingReader::State* recording = nullptr;
   std::size_t next_chunk = 0;
@@ -187,11 +198,12 @@ struct RecordingReader::Cursor::State {
       open;  ///< messages of opened chunks, by time; those before `given` are done with
   std::size_t given = 0;
   std::uint64_t given_in_all = 0;
+  std::map<std::uint16_t, std::uint64_t> latest_ns;  ///< by channel
 
   [[nodiscard]] bool must_open_chunk() const {
     const auto& chunks = recording->contents.chunks;
     if (next_chunk == chunks.size()) return false;
-    return given == open.size() || open[given].log_time_ns >= chunks[next_chunk].first_time_ns;
+    return given == open.size() || open[given].log_time_ns >= chunks[next_chunk].earliest_ns;
   }
   void open_chunk();
 };
@@ -206,7 +218,12 @@ void RecordingReader::Cursor::State::open_chunk() {
   given = 0;
   const auto before = static_cast<std::ptrdiff_t>(open.size());
   mcap::MessageReader messages{recording->contents.chunks[next_chunk++].records};
-  while (const auto message = messages.next()) open.push_back(*message);
+  while (auto message = messages.next()) {
+    if (!recording->says_turns) message->publish_time_ns = message->log_time_ns;
+    std::uint64_t& latest = latest_ns[message->channel_id];
+    latest = message->log_time_ns = std::max(message->log_time_ns, latest);
+    open.push_back(*message);
+  }
   const auto fresh = open.begin() + before;
   if (!std::is_sorted(fresh, open.end(), earlier)) std::sort(fresh, open.end(), earlier);
   std::inplace_merge(open.begin(), fresh, open.end(), earlier);
@@ -231,8 +248,8 @@ std::optional<RecordedMessage> RecordingReader::Cursor::next() {
   ++s.given_in_all;
   const auto topic = s.recording->contents.topics.find(message.channel_id);
   return RecordedMessage{topic == s.recording->contents.topics.end() ? std::string_view{} : topic->second,
-                         host_time(message.log_time_ns, s.recording->info.utc_offset), message.sequence,
-                         message.data};
+                         host_time(message.log_time_ns, s.recording->info.utc_offset),
+                         host_time(message.publish_time_ns, s.recording->info.utc_offset), message.data};
 }
 
 double RecordingReader::Cursor::progress() const noexcept {

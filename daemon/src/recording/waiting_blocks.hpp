@@ -1,6 +1,6 @@
 #pragma once
-/// Raw blocks that wait for the recorder, each with its own length: most are a twentieth of the room a
-/// RawBlock has.
+/// Raw blocks of all devices that wait for the recorder, each with its own length: most are a twentieth of
+/// the room a RawBlock has. The names of the devices outlive this.
 
 #include <span>
 #include <string_view>
@@ -23,28 +23,31 @@ class WaitingBlocks {
     return sizeof(Head) + block.length;
   }
   /// `dropped` blocks before these never came this far: the first one says so.
-  void append(const std::vector<protocol::RawBlock>& blocks, std::uint32_t& dropped) {
-    for (const auto& block : blocks) append(block, dropped);
+  void append(protocol::HostTime taken, std::string_view device,
+              const std::vector<protocol::RawBlock>& blocks, std::uint32_t& dropped) {
+    for (const auto& block : blocks) append(taken, device, block, dropped);
   }
-  void append(const protocol::RawBlock& block, std::uint32_t& dropped) {
+  void append(protocol::HostTime taken, std::string_view device, const protocol::RawBlock& block,
+              std::uint32_t& dropped) {
     const auto from = protocol::to_raw_bytes(block, {}).bytes;
-    heads_.push_back({block.time, block.lost_before + std::exchange(dropped, 0), block.direction,
-                      block.continued, from.size()});
+    heads_.push_back({taken, device, block.time, block.lost_before + std::exchange(dropped, 0),
+                      block.direction, block.continued, from.size()});
     bytes_.insert(bytes_.end(), from.begin(), from.end());
   }
   [[nodiscard]] std::size_t bytes() const noexcept { return heads_.size() * sizeof(Head) + bytes_.size(); }
 
-  /// sink(const protocol::RawBytes&), oldest first.
+  /// sink(const protocol::RawBytes&, taken), in the order in which they came.
   template <class Sink>
-  void for_each(std::string_view device, Sink&& sink) const {
+  void for_each(Sink&& sink) const {
     auto rest = std::span{bytes_};
     for (const Head& head : heads_) {
-      sink(protocol::RawBytes{.device = device,
+      sink(protocol::RawBytes{.device = head.device,
                               .time = head.time,
                               .lost_before = head.lost_before,
                               .direction = head.direction,
                               .continued = head.continued,
-                              .bytes = rest.first(head.length)});
+                              .bytes = rest.first(head.length)},
+           head.taken);
       rest = rest.subspan(head.length);
     }
   }
@@ -55,6 +58,8 @@ class WaitingBlocks {
 
  private:
   struct Head {
+    protocol::HostTime taken;
+    std::string_view device;
     protocol::HostTime time;
     std::uint32_t lost_before;
     protocol::RawBlock::Direction direction;

@@ -95,7 +95,7 @@ std::vector<SessionEvent> CalibrationService::turn(std::span<const protocol::Sna
   if (ready(keeping_)) conclude(outcome_of(keeping_), now);
   auto events = session_.take_events();
   if (recorder_ != nullptr) {
-    for (const auto& event : events) recorder_->hand_over(event_message(event, config_.machine.name));
+    for (const auto& event : events) recorder_->hand_over(event_message(event, config_.machine.name), now);
   }
   return events;
 }

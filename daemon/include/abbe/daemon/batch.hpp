@@ -21,6 +21,8 @@ struct RawFromEnvironment {
 };
 
 struct Batch {
+  protocol::HostTime
+      taken{};  ///< when: a recording keeps it, a replay gives the same turns again; clear() leaves it
   std::vector<protocol::TrackerPoint> points;
   std::vector<protocol::AxisSample> axes;
   std::vector<protocol::EnvironmentSample> environment;  ///< the weather of the tracker

@@ -3,21 +3,23 @@
 /// chunk that was open. NAME.mcap.part while it grows, NAME.mcap once closed cleanly; both are readable.
 ///
 /// Samples are XCDR1 messages of the IDL types (topics abbe/v1/TrackerPoint ..., schema encoding omgidl),
-/// dated in UTC = host time + UtcOffset; raw device bytes lie beside them. A chunk is closed at chunk_bytes
-/// or after chunk_period, written with its indexes by one pwrite and made durable (fdatasync) every
-/// sync_period.
+/// dated in UTC = host time + UtcOffset; raw device bytes lie beside them. publish_time is the instant that
+/// a message describes, log_time when the hub took it: messages of one log_time are one turn of the hub,
+/// which a replay gives again as one. A chunk is closed at chunk_bytes or after chunk_period, written with
+/// its indexes by one pwrite and made durable (fdatasync) every sync_period.
 ///
 /// A full or failing disk never stops the caller: record() and tick() cannot fail. The file is cut back to
 /// its last whole chunk and closed if there is room for that, messages are counted as lost, status() says
 /// why, and when there is room again recording goes on in NAME-2.mcap, NAME-3.mcap ... There the first
 /// message of every stream and device says in lost_before how many are missing.
 ///
-/// A file that has reached max_file_bytes is closed and recording goes on in the next, too, but never while a
-/// calibration is running: its run lies in one file. Nothing is missing in between; calibrations that are
-/// over are not asked for again in the next file, nor searches for reference marks.
+/// A file that has reached max_file_bytes is closed by the next tick(), flush() or attach(), and recording
+/// goes on in the next, too, but never while a calibration is running: its run lies in one file. Nothing is
+/// missing in between; calibrations that are over are not asked for again in the next file, nor searches for
+/// reference marks.
 ///
 /// Every further file stands for itself: its first messages repeat the last EnvironmentSample of each device
-/// (log_time: when the file began, publish_time and content: when it was measured), and its attachments are
+/// (log_time and publish_time: when the file began, content: when it was measured), and its attachments are
 /// the datums still in force and which axes were not known (DatumState).
 ///
 /// One thread uses it, in the ordinary world: it allocates and makes blocking system calls.
@@ -26,6 +28,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <memory>
+#include <optional>
 #include <string>
 #include <string_view>
 
@@ -86,21 +89,25 @@ class Recorder {
   Recorder(Recorder&&) noexcept;
   Recorder& operator=(Recorder&&) noexcept;
 
-  void record(const protocol::TrackerPoint& point, std::string_view device);
-  void record(const protocol::AxisSample& sample, std::string_view device);
-  void record(const protocol::ProbeTrigger& touch, std::string_view device);
-  void record(const protocol::TouchScan& scan, std::string_view device);
-  void record(const protocol::EnvironmentSample& sample, std::string_view device);
-  void record(protocol::RawBytes bytes);
-  void record(const v1::CalibrationEvent& event);
+  /// `taken`: when the hub had it; none: the instant it describes.
+  using Taken = std::optional<protocol::HostTime>;
+  void record(const protocol::TrackerPoint& point, std::string_view device, Taken taken = {});
+  void record(const protocol::AxisSample& sample, std::string_view device, Taken taken = {});
+  void record(const protocol::ProbeTrigger& touch, std::string_view device, Taken taken = {});
+  void record(const protocol::TouchScan& scan, std::string_view device, Taken taken = {});
+  void record(const protocol::EnvironmentSample& sample, std::string_view device, Taken taken = {});
+  void record(protocol::RawBytes bytes, Taken taken = {});
+  void record(const v1::CalibrationEvent& event, Taken taken = {});
 
   /// Written at once, and again into every later file of this recorder, except what was over by then.
   void attach(RecordingAttachment attachment, protocol::HostTime time);
 
-  /// Call every turn, at least every 100 ms: closes the chunk, syncs and retries when it is time to.
+  /// Call between two turns of the hub, at least every 100 ms: closes the chunk, syncs and retries when it is
+  /// time to.
   void tick(WallTime now);
 
-  /// Ends the open chunk now, so that everything recorded so far is in the file and in digest().
+  /// Between two turns of the hub: ends the open chunk now, so that everything recorded so far is in the file
+  /// and in digest().
   void flush();
 
   /// The hash of everything written to the present file until now.

@@ -36,7 +36,7 @@ class RecorderThread {
   ~RecorderThread();  ///< closes the file cleanly
 
   void hand_over(const Batch& batch);
-  void hand_over(v1::CalibrationEvent event);
+  void hand_over(v1::CalibrationEvent event, protocol::HostTime taken);
   void attach(RecordingAttachment attachment, protocol::HostTime time);
 
   /// Everything handed over before this call is on its way to the disk when the future is ready. A broken

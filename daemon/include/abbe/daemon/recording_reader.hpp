@@ -1,7 +1,8 @@
 #pragma once
-/// Opens a recording, complete or broken, and gives its messages in the order of their times: what `abbe
-/// replay` stands on. Whatever is damaged is passed over and said in losses();
-/// whole chunks are always given, of a chunk cut off by the end of the file every whole message.
+/// Opens a recording, complete or broken, and gives its messages in the order in which the hub took them,
+/// those of a topic in the order in which they were recorded: what `abbe replay` stands on. Whatever is
+/// damaged is passed over and said in losses(); whole chunks are always given, of a chunk cut off by the end
+/// of the file every whole message.
 ///
 /// The file is mapped: views stay valid as long as the reader, and the file must not be shortened meanwhile
 /// (a Recorder shortens its own file only after a failed write). Checksums are checked when the file is
@@ -35,9 +36,10 @@ struct RecordingLoss {
 /// One message as it lies in the file.
 struct RecordedMessage {
   std::string_view topic;  ///< "abbe/v1/TrackerPoint"
+  // Host times: the file's UTC dates less the recorded offset.
+  protocol::HostTime taken;  ///< when the hub took it; the same for all messages of a turn
   protocol::HostTime
-      time;  ///< host time of the instant described (the file's UTC date less the recorded offset)
-  std::uint32_t sequence = 0;          ///< of its topic, from 0 in every file
+      published;  ///< the instant described; of what a former file handed on: when this one began
   std::span<const std::byte> payload;  ///< CDR with its encapsulation header
 };
 
@@ -79,12 +81,13 @@ class RecordingReader {
 
   [[nodiscard]] std::uint64_t message_count() const noexcept;
   [[nodiscard]] std::uint64_t size_bytes() const noexcept;
-  /// First and last message; nothing if there are none.
+  /// When the first and the last message were taken; nothing if there are none.
   [[nodiscard]] std::optional<std::pair<protocol::HostTime, protocol::HostTime>> time_range() const noexcept;
   /// SHA-256 of the whole file in hex; reads all of it.
   [[nodiscard]] std::string sha256() const;
 
-  /// All messages, ordered by time, those of equal time as they were recorded.
+  /// All messages by `taken`, those of equal time as they were recorded. None comes before the one recorded
+  /// before it in its topic, even if its log_time says so: once that was the instant described.
   [[nodiscard]] Cursor messages() const;
   /// All messages to the sink. Returns how many wanted ones could not be decoded.
   std::uint64_t read(const RecordingSink& sink) const;

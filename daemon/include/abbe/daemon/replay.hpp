@@ -26,7 +26,8 @@ struct ReplayOptions {
   const calib::VolumetricModel* active =
       nullptr;  ///< what the gate compares with; null: no compensation alone
   std::function<void(double share)> progress;
-  /// Sees every sample as the assembler gets it, with the time of the recording's first message.
+  /// Sees every turn as the assembler gets it, with the time at which the recording's first message was
+  /// taken.
   std::function<void(const Batch& batch, protocol::HostTime begin)> samples;
   /// Sees every snapshot, in order.
   std::function<void(const protocol::Snapshot&)> snapshots;

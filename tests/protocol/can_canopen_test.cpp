@@ -150,5 +150,15 @@ TEST(ErrorFrame, IsNotADataFrame) {
   EXPECT_FALSE(decode_error_frame(standard_frame(0x040, {})));
 }
 
+TEST(EmergencyText, NamesTheNarrowestClassOfACode) {
+  EXPECT_STREQ(emergency_text(0x8130), "communication: life guard or heartbeat error");
+  EXPECT_STREQ(emergency_text(0x81F0), "communication");
+  EXPECT_STREQ(emergency_text(0x80AB), "monitoring");
+  EXPECT_STREQ(emergency_text(0x4200), "device temperature");
+  EXPECT_STREQ(emergency_text(0x5003), "device hardware");
+  EXPECT_STREQ(emergency_text(0xFF01), "device specific");
+  EXPECT_STREQ(emergency_text(0xA000), "code reserved by CiA 301");
+}
+
 }  // namespace
 }  // namespace abbe::protocol::can

@@ -1,5 +1,7 @@
 #include <gtest/gtest.h>
 
+#include <array>
+#include <span>
 #include <vector>
 
 #include "abbe/protocol/can/cia406.hpp"
@@ -135,6 +137,88 @@ TEST(EncoderConfigurator, NamesTheObjectAndTheReasonOfARefusal) {
   EXPECT_EQ(bench.configurator.error().fault, ConfigurationFault::Refused);
   EXPECT_EQ(bench.configurator.error().object, (ObjectId{0x1A00, 1}));
   EXPECT_EQ(bench.configurator.error().abort_code, AbortCode::NotMappable);
+}
+
+void fix(ObjectDictionary& objects, ObjectId object, std::uint32_t value, std::size_t size) {
+  const std::array bytes{std::byte(value), std::byte(value >> 8), std::byte(value >> 16),
+                         std::byte(value >> 24)};
+  ASSERT_TRUE(objects.add(object, Access::ReadOnly, std::span{bytes}.first(size)));
+}
+/// A TPDO 1 that cannot be mapped: these entries.
+void fix_mapping(ObjectDictionary& objects, std::span<const MappedObject> entries) {
+  fix(objects, {0x1A00, 0}, static_cast<std::uint32_t>(entries.size()), 1);
+  for (std::size_t i = 0; i < entries.size(); ++i)
+    fix(objects, {0x1A00, static_cast<std::uint8_t>(i + 1)}, encode_mapping(entries[i]), 4);
+}
+
+TEST(EncoderConfigurator, UsesAFixedMappingThatHoldsThePosition) {
+  Bench bench{{.node = 5}, {.node = 5}};
+  fix_mapping(bench.objects,
+              std::array{MappedObject{0x6030, 1, 16}, mapped_position(PositionType::Signed32)});
+  bench.run();
+  ASSERT_EQ(bench.configurator.state(), EncoderConfigurator::State::Ready)
+      << to_text(bench.configurator.error().fault);
+  EXPECT_TRUE(bench.configurator.description().fixed_mapping);
+  EXPECT_EQ(bench.configurator.description().position_byte, 2);
+  EXPECT_EQ(bench.objects.tpdo(1).transmission_type, 1);
+}
+
+TEST(EncoderConfigurator, RefusesAFixedMappingWithoutThePosition) {
+  Bench bench{{.node = 5}, {.node = 5}};
+  fix_mapping(bench.objects, std::array{MappedObject{0x6030, 1, 16}});
+  bench.run();
+  EXPECT_EQ(bench.configurator.error().fault, ConfigurationFault::FixedMapping);
+  EXPECT_EQ(bench.configurator.error().object.index, 0x1A00);
+}
+
+TEST(EncoderConfigurator, UsesAFirstEntryThatCannotBeWrittenWhereItIsThePosition) {
+  Bench bench{{.node = 5}, {.node = 5}};
+  fix(bench.objects, {0x1A00, 1}, encode_mapping(mapped_position(PositionType::Signed32)), 4);
+  bench.run();
+  EXPECT_EQ(bench.configurator.state(), EncoderConfigurator::State::Ready);
+  EXPECT_EQ(bench.objects.tpdo(1).mapped, 1);
+}
+
+TEST(EncoderConfigurator, DoesWithoutAHeartbeatThatCannotBeSet) {
+  Bench bench{{.node = 5}, {.node = 5}};
+  fix(bench.objects, object::kHeartbeatTime, 1000, 2);
+  bench.run();
+  EXPECT_EQ(bench.configurator.state(), EncoderConfigurator::State::Ready);
+}
+
+TEST(EncoderConfigurator, TakesAFixedTransmissionTypeOnlyIfItIsEverySync) {
+  for (const std::uint32_t type : {1u, 254u}) {
+    Bench bench{{.node = 5}, {.node = 5}};
+    fix(bench.objects, {0x1800, 2}, type, 1);
+    bench.run();
+    EXPECT_EQ(bench.configurator.error().fault,
+              type == 1 ? ConfigurationFault::None : ConfigurationFault::FixedType);
+  }
+}
+
+TEST(EncoderConfigurator, RefusesAStepOtherThanConfigured) {
+  for (const double configured : {10.0, 19.8}) {
+    Bench bench{{.node = 5, .step_nm = 20}, {.node = 5, .step_nm = configured}};
+    bench.run();
+    const bool rounded = configured > 19.0;
+    EXPECT_EQ(bench.configurator.error().fault,
+              rounded ? ConfigurationFault::None : ConfigurationFault::WrongStep);
+    EXPECT_EQ(bench.configurator.error().seen, rounded ? 0u : 20u);
+  }
+}
+
+TEST(EncoderConfigurator, TakesTheUnitsOfARotaryEncoderOnlyWhileScalingIsOn) {
+  for (const bool scaling : {true, false}) {
+    Bench bench{{.node = 5, .kind = object::EncoderKind::MultiTurn, .units_per_revolution = 36000},
+                {.node = 5}};
+    bench.objects.set_number(object::kOperatingParameters, scaling ? object::kScalingOn : 0);
+    bench.objects.set_number(object::kMeasuringStep, 65536);
+    fix(bench.objects, object::kRevolutions, 4096, 2);
+    bench.run();
+    EXPECT_EQ(bench.configurator.description().units_per_revolution, scaling ? 36000u : 65536u);
+    EXPECT_EQ(bench.configurator.description().revolutions.value_or(0), scaling ? 0u : 4096u);
+    EXPECT_EQ(bench.configurator.description().total_range.has_value(), scaling);
+  }
 }
 
 TEST(EncoderConfigurator, GivesUpOnAMuteNodeAfterAllRetries) {

@@ -74,6 +74,15 @@ inline std::vector<Request> requests() {
       GetObjectTemperature{},
       GetTriggerBoardInfo{},
       GetTrackerInfo{},
+      GetStationOrientation{},
+      GetTransformation{},
+      GetMeasurementMode{},
+      GetCoordinateSystemType{},
+      GetStationaryModeParams{},
+      GetContinuousTimeModeParams{},
+      GetContinuousDistanceModeParams{},
+      GetSearchParams{},
+      GetStatisticMode{},
   };
 }
 
@@ -98,6 +107,15 @@ inline std::vector<Answer> answers() {
       ObjectTemperatureAnswer{Status::Ok, 20.25},
       TriggerBoardInfoAnswer{Status::Ok, 1, 23, 3000, 4},
       info,
+      StationOrientationAnswer{Status::Ok, {{1, 2, 3}, {4, 5, 6}}},
+      TransformationAnswer{Status::Ok, {{1, 2, 3}, {4, 5, 6}, 7}},
+      MeasurementModeAnswer{Status::Ok, {MeasurementMode::SphereCentre}},
+      CoordinateSystemTypeAnswer{Status::Ok, {CoordinateSystem::SphericalClockwise}},
+      StationaryModeParamsAnswer{Status::Ok, {750, true}},
+      ContinuousTimeModeParamsAnswer{Status::Ok, {5, 100, true, RegionType::Box}},
+      ContinuousDistanceModeParamsAnswer{Status::Ok, {0.5, 100, true, RegionType::Box}},
+      SearchParamsAnswer{Status::Ok, {25.5, 9000}},
+      StatisticModeAnswer{Status::Ok, {StatisticMode::Extended, StatisticMode::Standard}},
   };
 }
 

@@ -132,6 +132,29 @@ TEST(IppDmeLineFramer, StopsAtWhatIsNoText) {
   }
 }
 
+TEST(IppDmeLineFramer, TakesAnyCharacterSetBetweenQuotes) {
+  const auto framer = std::make_unique<LineFramer>();
+  const std::string line = "E0000 ! Error(2,1001,Machine,\"Ber\xFChrung \xC3\xA4 \t\")";
+  framer->push(bytes_of(line + "\r\n00001 \xFC\r\n"));
+  const auto text = framer->next();
+  ASSERT_TRUE(text && *text);
+  EXPECT_EQ(parse_response(**text)->error.text, "Ber\xFChrung \xC3\xA4 \t");
+  const auto outside = framer->next();
+  ASSERT_TRUE(outside && !*outside);
+  EXPECT_EQ(outside->error(), LineError::IllegalCharacter);
+}
+
+TEST(IppDmeLineFramer, ResumesBehindTheNextEndOfALine) {
+  const auto framer = std::make_unique<LineFramer>();
+  framer->push(bytes_of("00001 \x01"));
+  ASSERT_FALSE(framer->next()->has_value());
+  framer->resume();
+  framer->push(bytes_of("rest of it \"\r"));
+  EXPECT_FALSE(framer->next());
+  framer->push(bytes_of("\nE0002 %\r\n"));
+  EXPECT_EQ(framer->next()->value(), "E0002 %");
+}
+
 TEST(IppDmeLineFramer, RefusesALineWithoutEnd) {
   const auto framer = std::make_unique<LineFramer>();
   const std::string most(kMaxLine, 'x');

@@ -15,6 +15,11 @@
 
 namespace abbe::protocol::emscon::wire {
 
+template <class P>
+inline constexpr bool kIsSetting = false;
+template <class Set, Command kId>
+inline constexpr bool kIsSetting<SettingAnswer<Set, kId>> = true;
+
 template <class T, class Packet>
 inline constexpr bool kIs = std::is_same_v<std::remove_const_t<T>, Packet>;
 
@@ -102,6 +107,9 @@ constexpr void fields(P& p, Io&& io) ABBE_RT {
     io(p.card_type, p.fpga_version, p.max_trigger_frequency_hz, p.error);
   } else if constexpr (kIs<P, TrackerInfoAnswer>) {
     io(p.sensor_type, p.name, p.serial_number, p.other, p.max_data_rate_hz, p.more);
+
+  } else if constexpr (kIsSetting<std::remove_const_t<P>>) {
+    io(p.set);
 
   } else if constexpr (kIs<P, ErrorResponse>) {
     io(p.command, p.status);

@@ -81,8 +81,12 @@ const char* name_of(Command c) ABBE_RT {
       return "Initialize";
     case Command::SetStationOrientation:
       return "SetStationOrientation";
+    case Command::GetStationOrientation:
+      return "GetStationOrientation";
     case Command::SetTransformation:
       return "SetTransformation";
+    case Command::GetTransformation:
+      return "GetTransformation";
     case Command::SetEnvironmentParams:
       return "SetEnvironmentParams";
     case Command::GetEnvironmentParams:
@@ -93,14 +97,24 @@ const char* name_of(Command c) ABBE_RT {
       return "GetRefractionParams";
     case Command::SetMeasurementMode:
       return "SetMeasurementMode";
+    case Command::GetMeasurementMode:
+      return "GetMeasurementMode";
     case Command::SetCoordinateSystemType:
       return "SetCoordinateSystemType";
+    case Command::GetCoordinateSystemType:
+      return "GetCoordinateSystemType";
     case Command::SetStationaryModeParams:
       return "SetStationaryModeParams";
+    case Command::GetStationaryModeParams:
+      return "GetStationaryModeParams";
     case Command::SetContinuousTimeModeParams:
       return "SetContinuousTimeModeParams";
+    case Command::GetContinuousTimeModeParams:
+      return "GetContinuousTimeModeParams";
     case Command::SetContinuousDistanceModeParams:
       return "SetContinuousDistanceModeParams";
+    case Command::GetContinuousDistanceModeParams:
+      return "GetContinuousDistanceModeParams";
     case Command::SetReflector:
       return "SetReflector";
     case Command::GetReflector:
@@ -109,6 +123,8 @@ const char* name_of(Command c) ABBE_RT {
       return "GetReflectors";
     case Command::SetSearchParams:
       return "SetSearchParams";
+    case Command::GetSearchParams:
+      return "GetSearchParams";
     case Command::SetSystemSettings:
       return "SetSystemSettings";
     case Command::GetSystemSettings:
@@ -125,6 +141,8 @@ const char* name_of(Command c) ABBE_RT {
       return "FindReflector";
     case Command::SetStatisticMode:
       return "SetStatisticMode";
+    case Command::GetStatisticMode:
+      return "GetStatisticMode";
     case Command::SetTriggerSource:
       return "SetTriggerSource";
     case Command::SetExternTriggerParams:

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cstring>
+#include <utility>
 
 #include "ippdme/scanner.hpp"
 
@@ -76,7 +77,7 @@ bool printable(char c) noexcept {
 const char* name_of(LineError error) ABBE_RT {
   switch (error) {
     case LineError::IllegalCharacter:
-      return "a character that is not printable ASCII";
+      return "a character that is not printable ASCII outside of a text in quotes";
     case LineError::TooLong:
       return "a line of more than 65536 characters";
     case LineError::BadTag:
@@ -208,7 +209,6 @@ std::size_t LineFramer::push(std::span<const std::byte> bytes) ABBE_RT {
 }
 
 tl::unexpected<LineError> LineFramer::refuse(LineError error) ABBE_RT {
-  reset();
   broken_ = true;
   return tl::unexpected(error);
 }
@@ -221,22 +221,39 @@ std::optional<tl::expected<std::string_view, LineError>> LineFramer::next() ABBE
   }
   for (; looked_ < end_; ++looked_) {
     const char c = buffer_[looked_];
-    if (c == '\r') {
-      if (looked_ + 1 == end_) return std::nullopt;  // its LF is still to come
-      if (buffer_[looked_ + 1] != '\n') return Line{refuse(LineError::IllegalCharacter)};
+    if (c == '\r' && looked_ + 1 == end_) return std::nullopt;  // its LF may still come
+    if (c == '\r' && buffer_[looked_ + 1] == '\n') {
       const std::string_view line{buffer_.data() + begin_, looked_ - begin_};
       begin_ = looked_ += 2;
+      quoted_ = false;
+      if (std::exchange(skipping_, false)) {
+        --looked_;  // the loop steps over it
+        continue;
+      }
       return Line{line};
     }
-    if (!printable(c)) return Line{refuse(LineError::IllegalCharacter)};
+    if (skipping_) {
+      begin_ = looked_ + 1;
+      continue;
+    }
+    if (c == '"') quoted_ = !quoted_;
+    // Servers write their texts in the user's language and character set.
+    if (!printable(c) && !quoted_) return Line{refuse(LineError::IllegalCharacter)};
     if (looked_ - begin_ >= kMaxLine) return Line{refuse(LineError::TooLong)};
   }
   return std::nullopt;
 }
 
+void LineFramer::resume() ABBE_RT {
+  if (!broken_) return;
+  begin_ = looked_;
+  broken_ = quoted_ = false;
+  skipping_ = true;
+}
+
 void LineFramer::reset() ABBE_RT {
   begin_ = looked_ = end_ = 0;
-  broken_ = false;
+  broken_ = skipping_ = quoted_ = false;
 }
 
 }  // namespace abbe::protocol::ippdme

@@ -82,6 +82,7 @@ ClosedChunk ChunkBuilder::close() {
 
   append_indexes();
   closed.bytes = buffer_;
+  closed.length = buffer_.size();
   closed.shares = shares_;
   return closed;
 }
@@ -127,7 +128,7 @@ void SummaryBuilder::add(const ClosedChunk& chunk, std::uint64_t offset) {
   index.chunk_start = offset;
   index.chunk_length = chunk.chunk_length;
   index.index_offsets = decltype(index.index_offsets){index_offsets};
-  index.index_length = chunk.bytes.size() - chunk.chunk_length;
+  index.index_length = chunk.length - chunk.chunk_length;
   index.compressed_size = index.uncompressed_size = chunk.records_size;
   append(chunks_, index);
   ++statistics_.chunk_count;

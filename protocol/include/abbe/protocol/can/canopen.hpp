@@ -85,6 +85,9 @@ enum class EmergencyCode : std::uint16_t {
   IdCollision = 0x8150,
   PdoLength = 0x8210,
 };
+/// The class of an emergency error code in words: "communication: CAN overrun", "device specific". Static
+/// storage.
+[[nodiscard]] const char* emergency_text(std::uint16_t code) noexcept;
 /// Bits of the error register 1001h [CiA 301].
 enum class ErrorRegister : std::uint8_t {
   Generic = 1u << 0,

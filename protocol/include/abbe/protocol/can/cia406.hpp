@@ -24,17 +24,20 @@ inline constexpr std::uint16_t kTpdoParameters =
 inline constexpr std::uint16_t kTpdoMapping = 0x1A00;  ///< + TPDO number - 1
 
 inline constexpr ObjectId kOperatingParameters{0x6000, 0};  ///< u16
-inline constexpr ObjectId kUnitsPerRevolution{0x6001, 0};   ///< u32, rotary
-inline constexpr ObjectId kTotalRange{0x6002, 0};           ///< u32, measuring units
-inline constexpr ObjectId kPreset{0x6003, 0};               ///< i32: writing makes it the present position
-inline constexpr ObjectId kPosition{0x6004, 0};             ///< i32 (linear) or u32 (rotary), PDO-mappable
-inline constexpr ObjectId kPositionStep{0x6005, 1};         ///< u32, nm per count (0.001 um)
-inline constexpr ObjectId kPosition64{0x6008, 0};           ///< 64 bit, PDO-mappable
+inline constexpr std::uint16_t kScalingOn =
+    0x0004;  ///< of 6000h, rotary: 6001h and 6002h hold; else 6501h, 6502h
+inline constexpr ObjectId kUnitsPerRevolution{0x6001, 0};  ///< u32, rotary
+inline constexpr ObjectId kTotalRange{0x6002, 0};          ///< u32, measuring units
+inline constexpr ObjectId kPreset{0x6003, 0};              ///< i32: writing makes it the present position
+inline constexpr ObjectId kPosition{0x6004, 0};            ///< i32 (linear) or u32 (rotary), PDO-mappable
+inline constexpr ObjectId kPositionStep{0x6005, 1};        ///< u32, nm per count (0.001 um)
+inline constexpr ObjectId kPosition64{0x6008, 0};          ///< 64 bit, PDO-mappable
 inline constexpr ObjectId kPreset64{0x6009, 0};
 inline constexpr ObjectId kMultiPosition{0x6020, 1};  ///< i32, sensor 1 of a multi-sensor device
 inline constexpr ObjectId kCyclicTimer{0x6200, 0};    ///< u16 ms, wired to 1800h:05
 inline constexpr ObjectId kOperatingStatus{0x6500, 0};
 inline constexpr ObjectId kMeasuringStep{0x6501, 0};  ///< u32, nm per count, read-only
+inline constexpr ObjectId kRevolutions{0x6502, 0};    ///< u16, rotary: revolutions that can be told apart
 inline constexpr ObjectId kAlarms{0x6503, 0};         ///< u16, bit 0: position error
 inline constexpr ObjectId kSupportedAlarms{0x6504, 0};
 inline constexpr ObjectId kWarnings{0x6505, 0};

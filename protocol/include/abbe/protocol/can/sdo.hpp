@@ -47,6 +47,12 @@ enum class AbortCode : std::uint32_t {
   LocalControl = 0x08000021,
   DeviceState = 0x08000022,
 };
+/// What the object is, not what the node is at the moment (booting, storing, a hardware fault): asking again
+/// does not change it.
+[[nodiscard]] constexpr bool is_lasting(AbortCode code) noexcept {
+  const auto value = static_cast<std::uint32_t>(code);
+  return value >> 24 == 0x06 && code != AbortCode::Hardware;
+}
 /// A short English name, "unknown abort code" for others. Static storage.
 [[nodiscard]] const char* to_text(AbortCode code) noexcept;
 

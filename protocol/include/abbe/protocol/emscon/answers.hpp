@@ -113,10 +113,33 @@ struct TrackerInfoAnswer {
   std::array<std::byte, 32> more{};
 };
 
-using Answer = std::variant<Acknowledge, SystemStatusAnswer, TrackerStatusAnswer, UnitsAnswer,
-                            EnvironmentAnswer, RefractionAnswer, ReflectorAnswer, ReflectorsAnswer,
-                            SystemSettingsAnswer, LongSystemParameterAnswer, MeasurementStatusInfoAnswer,
-                            ObjectTemperatureAnswer, TriggerBoardInfoAnswer, TrackerInfoAnswer>;
+/// The answers that hold what a setting's own request sets, in its layout.
+template <class Set, Command kId>
+struct SettingAnswer {
+  static constexpr Command kCommand = kId;
+  Status status = Status::Ok;
+  Set set;
+};
+using StationOrientationAnswer = SettingAnswer<SetStationOrientation, Command::GetStationOrientation>;
+using TransformationAnswer = SettingAnswer<SetTransformation, Command::GetTransformation>;
+using MeasurementModeAnswer = SettingAnswer<SetMeasurementMode, Command::GetMeasurementMode>;
+using CoordinateSystemTypeAnswer = SettingAnswer<SetCoordinateSystemType, Command::GetCoordinateSystemType>;
+using StationaryModeParamsAnswer = SettingAnswer<SetStationaryModeParams, Command::GetStationaryModeParams>;
+using ContinuousTimeModeParamsAnswer =
+    SettingAnswer<SetContinuousTimeModeParams, Command::GetContinuousTimeModeParams>;
+using ContinuousDistanceModeParamsAnswer =
+    SettingAnswer<SetContinuousDistanceModeParams, Command::GetContinuousDistanceModeParams>;
+using SearchParamsAnswer = SettingAnswer<SetSearchParams, Command::GetSearchParams>;
+using StatisticModeAnswer = SettingAnswer<SetStatisticMode, Command::GetStatisticMode>;
+
+using Answer =
+    std::variant<Acknowledge, SystemStatusAnswer, TrackerStatusAnswer, UnitsAnswer, EnvironmentAnswer,
+                 RefractionAnswer, ReflectorAnswer, ReflectorsAnswer, SystemSettingsAnswer,
+                 LongSystemParameterAnswer, MeasurementStatusInfoAnswer, ObjectTemperatureAnswer,
+                 TriggerBoardInfoAnswer, TrackerInfoAnswer, StationOrientationAnswer, TransformationAnswer,
+                 MeasurementModeAnswer, CoordinateSystemTypeAnswer, StationaryModeParamsAnswer,
+                 ContinuousTimeModeParamsAnswer, ContinuousDistanceModeParamsAnswer, SearchParamsAnswer,
+                 StatisticModeAnswer>;
 
 inline constexpr std::size_t kMaxAnswerSize = 164;
 

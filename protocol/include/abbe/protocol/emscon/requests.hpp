@@ -25,6 +25,15 @@ using GetUnits = BareRequest<Command::GetUnits>;
 using Initialize = BareRequest<Command::Initialize>;
 using GetEnvironmentParams = BareRequest<Command::GetEnvironmentParams>;
 using GetRefractionParams = BareRequest<Command::GetRefractionParams>;
+using GetStationOrientation = BareRequest<Command::GetStationOrientation>;
+using GetTransformation = BareRequest<Command::GetTransformation>;
+using GetMeasurementMode = BareRequest<Command::GetMeasurementMode>;
+using GetCoordinateSystemType = BareRequest<Command::GetCoordinateSystemType>;
+using GetStationaryModeParams = BareRequest<Command::GetStationaryModeParams>;
+using GetContinuousTimeModeParams = BareRequest<Command::GetContinuousTimeModeParams>;
+using GetContinuousDistanceModeParams = BareRequest<Command::GetContinuousDistanceModeParams>;
+using GetSearchParams = BareRequest<Command::GetSearchParams>;
+using GetStatisticMode = BareRequest<Command::GetStatisticMode>;
 using GetReflector = BareRequest<Command::GetReflector>;
 using GetReflectors = BareRequest<Command::GetReflectors>;
 using GetSystemSettings = BareRequest<Command::GetSystemSettings>;
@@ -167,11 +176,14 @@ using Request =
     std::variant<GetSystemStatus, GetTrackerStatus, SetUnits, GetUnits, Initialize, SetStationOrientation,
                  SetTransformation, SetEnvironmentParams, GetEnvironmentParams, SetRefractionParams,
                  GetRefractionParams, SetMeasurementMode, SetCoordinateSystemType, SetStationaryModeParams,
-                 SetContinuousTimeModeParams, SetContinuousDistanceModeParams, SetReflector, GetReflector,
-                 GetReflectors, SetSearchParams, SetSystemSettings, GetSystemSettings, StartMeasurement,
-                 StopMeasurement, GoBirdBath, GoPosition, FindReflector, SetStatisticMode, SetTriggerSource,
-                 SetExternTriggerParams, SetLongSystemParameter, GetLongSystemParameter,
-                 GetMeasurementStatusInfo, GetObjectTemperature, GetTriggerBoardInfo, GetTrackerInfo>;
+                 SetContinuousTimeModeParams, SetContinuousDistanceModeParams, GetStationOrientation,
+                 GetTransformation, GetMeasurementMode, GetCoordinateSystemType, GetStationaryModeParams,
+                 GetContinuousTimeModeParams, GetContinuousDistanceModeParams, GetSearchParams,
+                 GetStatisticMode, SetReflector, GetReflector, GetReflectors, SetSearchParams,
+                 SetSystemSettings, GetSystemSettings, StartMeasurement, StopMeasurement, GoBirdBath,
+                 GoPosition, FindReflector, SetStatisticMode, SetTriggerSource, SetExternTriggerParams,
+                 SetLongSystemParameter, GetLongSystemParameter, GetMeasurementStatusInfo,
+                 GetObjectTemperature, GetTriggerBoardInfo, GetTrackerInfo>;
 
 inline constexpr std::size_t kMaxRequestSize = 68;
 

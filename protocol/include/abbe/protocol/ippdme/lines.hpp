@@ -1,7 +1,8 @@
 #pragma once
 /// I++ DME: text lines between a client and the server of a measuring machine [I++ DME 1.4.3]. Printable
-/// ASCII, CR LF at the end, at most 65536 characters. LineFramer cuts a TCP stream into lines; the parsers
-/// are total, give views into the line and take no memory. Units on the wire: mm, s, degrees, Celsius, N.
+/// ASCII (between quotes any byte but CR LF: servers write their texts in the user's language), CR LF at the
+/// end, at most 65536 characters. LineFramer cuts a TCP stream into lines; the parsers are total, give views
+/// into the line and take no memory. Units on the wire: mm, s, degrees, Celsius, N.
 ///
 ///   CommandLine = (Tag | ETag) SP Name "(" [Argument {"," Argument}] ")"
 ///   Response    = (Tag | ETag) SP ( "&" | "%" | "#" SP Data | "!" SP Error(F1,F2,F3,"text") )
@@ -24,7 +25,7 @@ inline constexpr std::uint16_t kPort = 1294;
 inline constexpr std::size_t kMaxLine = 65536;
 
 enum class LineError : std::uint8_t {
-  IllegalCharacter,  ///< outside of 32 to 126
+  IllegalCharacter,  ///< outside of 32 to 126, and not between quotes
   TooLong,
   BadTag,       ///< not 5 digits, not E and 4 digits, or 00000
   NoSpace,      ///< position 6 is no space
@@ -43,6 +44,7 @@ struct Tag {
   friend bool operator==(const Tag&, const Tag&) = default;
 };
 inline constexpr Tag kUnsolicited{true, 0};
+inline constexpr Tag kAbort{true, 2};  ///< of our AbortE
 [[nodiscard]] std::string to_string(Tag tag);
 
 struct ErrorReport {
@@ -112,8 +114,11 @@ class LineFramer {
   /// gave nothing and no more than kMaxLine come at once.
   std::size_t push(std::span<const std::byte> bytes) ABBE_RT;
   /// The next line without its end, valid until the next push() or reset(). An error once; then nothing until
-  /// reset(): the peer speaks something else.
+  /// reset() or resume(): the peer speaks something else.
   [[nodiscard]] std::optional<tl::expected<std::string_view, LineError>> next() ABBE_RT;
+  /// After an error: continues behind the next end of a line. Called before next(), what came with the
+  /// illegal byte is not lost.
+  void resume() ABBE_RT;
   void reset() ABBE_RT;
 
  private:
@@ -124,6 +129,8 @@ class LineFramer {
   std::size_t looked_ = 0;  ///< before this is neither an end of line nor an illegal character
   std::size_t end_ = 0;
   bool broken_ = false;
+  bool skipping_ = false;  ///< to the next end of a line
+  bool quoted_ = false;    ///< at looked_
 };
 
 }  // namespace abbe::protocol::ippdme

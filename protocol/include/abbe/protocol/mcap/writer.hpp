@@ -31,6 +31,7 @@ struct ChannelShare {
 /// A chunk with its indexes, ready to be written in one piece. Views into the builder until its clear().
 struct ClosedChunk {
   Bytes bytes;                     ///< Chunk, then one MessageIndex per channel
+  std::uint64_t length = 0;        ///< of these bytes
   std::uint64_t chunk_length = 0;  ///< of the Chunk record alone
   std::uint64_t records_size = 0;
   std::uint64_t first_time_ns = 0;  ///< 0 if there are no messages

@@ -161,6 +161,11 @@ Verdict decide(const VolumetricModel& candidate, const HeldOutFigures& held_out,
   if (held_out.observations == 0) {
     verdict.reasons.emplace_back("nothing was held out to test the model with");
   }
+  if (held_out.not_held_out > 0) {
+    verdict.notes.push_back(message(held_out.not_held_out, " of ",
+                                    held_out.observations + held_out.not_held_out,
+                                    " observations were not held out: nothing else was measured there"));
+  }
   require_better(verdict, held_out.candidate, held_out.no_compensation, limits.min_improvement,
                  "without compensation");
   if (held_out.active) {

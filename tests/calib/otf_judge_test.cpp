@@ -133,6 +133,42 @@ TEST(Judge, LeavesOutAnActiveModelOfAnotherTool) {
   EXPECT_FALSE(held_out(id.observations, &other, run.options)->active);
 }
 
+/// Deals every row of the parameter with the fewest rows into one fold; returns how many it has.
+std::size_t give_a_node_to_one_fold(Observations& o, std::size_t folds) {
+  std::vector<std::size_t> rows_of(o.layout.fit_size() - 6, 0);
+  const auto each = [&](auto&& take) {
+    for (std::size_t i = 0; i < o.rows.size(); ++i) {
+      for (const auto& e : o.A.row(i)) {
+        if (e.value != 0.0 && e.column < rows_of.size()) {
+          take(o.rows[i], e.column);
+        }
+      }
+    }
+  };
+  each([&](const Observation&, std::size_t column) { ++rows_of[column]; });
+  const auto rarest = std::min_element(rows_of.begin(), rows_of.end());
+  const auto column = static_cast<std::size_t>(rarest - rows_of.begin());
+  each([&](Observation& row, std::size_t c) {
+    if (c == column) {
+      row.leg = row.leg / folds * folds;  // fold 0
+    }
+  });
+  return *rarest;
+}
+
+TEST(Judge, HoldsOutNothingThatAloneTouchesANode) {
+  const MadeRun run = make_run({});
+  Identification id = identified(run);
+  const std::size_t alone = give_a_node_to_one_fold(id.observations, run.options.held_out_folds);
+  const auto held = held_out(id.observations, nullptr, run.options);
+  ASSERT_TRUE(held) << held.error().text;
+  EXPECT_GE(held->not_held_out, alone);
+  EXPECT_EQ(held->observations + held->not_held_out, id.observations.rows.size());
+  EXPECT_NEAR(held->candidate, 1.0, 0.1);
+  EXPECT_THAT(judge(id.observations, id.solution, nullptr, {}, run.options)->notes,
+              Contains(HasSubstr("were not held out")));
+}
+
 TEST(Judge, NeedsLegsForEveryFold) {
   MadeRun run = make_run({});
   const Identification id = identified(run);

@@ -8,6 +8,8 @@
 
 #include "abbe/calib/model_comparison.hpp"
 #include "abbe/calib/otf/identify.hpp"
+#include "abbe/calib/otf/judge.hpp"
+#include "abbe/calib/otf/observe.hpp"
 #include "otf_run.hpp"
 
 namespace {
@@ -18,6 +20,26 @@ using testing::HasSubstr;
 
 Observations observed(const MadeRun& run) {
   return *observe(run.samples, run.machine, run.path, run.noise, run.options);
+}
+
+TEST(Identification, EndsWhenItIsStoppedWhereverItIs) {
+  MadeRun run = make_run({});
+  int asked = 0, stop_at = -1;
+  run.options.stopped = [&] { return asked++ == stop_at; };
+  const Observations o = observed(run);
+  ASSERT_TRUE(solve(o, run.options));
+  const int looks = asked;
+  ASSERT_GT(looks, 7);  // once in an update of the alignment, of which there are 7 at least
+  for (const int at : {0, looks / 2, looks - 1}) {
+    asked = 0;
+    stop_at = at;
+    const auto seen = observe(run.samples, run.machine, run.path, run.noise, run.options);
+    const auto error = seen ? solve(*seen, run.options).error() : seen.error();
+    EXPECT_THAT(error.text, HasSubstr("stopped before its end")) << stop_at;
+  }
+  stop_at = 0;
+  asked = 0;
+  EXPECT_FALSE(held_out(o, nullptr, run.options));
 }
 
 TEST(Adjustment, MeetsTheGaugeExactlyWhateverItsWeight) {

@@ -5,6 +5,7 @@
 #include <limits>
 
 #include "message.hpp"
+#include "otf/check_stopped.hpp"
 
 namespace abbe::calib::otf {
 namespace {
@@ -154,6 +155,9 @@ Result<void> refine(Alignment& a, Pairs& pairs, const BlockSeries& series, const
     a.iterations = update + 1;
     a.last_rms_m = pairs.rms_m;
     report(options, update);
+    if (Result<void> goes_on = check_stopped(options); !goes_on) {
+      return goes_on;
+    }
     if (update == 0) {
       a.first_rms_m = pairs.rms_m;
     }

@@ -7,6 +7,7 @@
 #include <iterator>
 
 #include "message.hpp"
+#include "otf/check_stopped.hpp"
 
 namespace abbe::calib::otf {
 namespace {
@@ -104,20 +105,58 @@ std::vector<NormalEquations> equations_by_fold(const Observations& o, std::size_
   return parts;
 }
 
-Result<Adjustment> fit_without(const std::vector<NormalEquations>& parts, std::size_t fold,
-                               const Observations& o, const Options& options) {
+/// Legs of the fold with an observation of a parameter that the other folds have none of.
+std::vector<bool> legs_needed(const Observations& o, const NormalEquations& others, std::size_t fold,
+                              std::size_t folds) {
+  std::vector<bool> needed(o.rows.back().leg + 1, false);
+  for (std::size_t i = 0; i < o.rows.size(); ++i) {
+    if (o.rows[i].leg % folds != fold) {
+      continue;
+    }
+    for (const SparseRows::Entry& e : o.A.row(i)) {
+      const auto column = static_cast<Eigen::Index>(e.column);
+      if (e.value != 0.0 && !(others.H(column, column) > 0.0)) {
+        needed[o.rows[i].leg] = true;
+      }
+    }
+  }
+  return needed;
+}
+
+struct HeldOutFold {
+  Eigen::VectorXd U;
+  std::vector<std::size_t> rows;  ///< that U was not fitted to
+};
+
+/// A leg that alone touches a node stays among what is fitted to. Where the rest does not determine the model
+/// even so, nothing is held out of this fold.
+Result<HeldOutFold> hold_out(const std::vector<NormalEquations>& parts, std::size_t fold,
+                             const Observations& o, const Options& options) {
   NormalEquations training(o.layout.fit_size());
   for (std::size_t f = 0; f < parts.size(); ++f) {
     if (f != fold) {
       training += parts[f];
     }
   }
-  Result<Adjustment> a = adjust(training, o.layout, options.gauge_weight);
+  const std::vector<bool> needed = legs_needed(o, training, fold, parts.size());
+  if (std::find(needed.begin(), needed.end(), true) != needed.end()) {
+    training += normal_equations(o, [&](const Observation& r) { return needed[r.leg]; });
+  }
+  const Result<Adjustment> a = adjust(training, o.layout, options.gauge_weight);
+  if (!a && a.error().code == ErrorCode::RankDeficient) {
+    return HeldOutFold{};
+  }
   if (!a) {
     return failure(a.error().code,
                    message("held-out test without fold ", fold, " of ", parts.size(), ": ", a.error().text));
   }
-  return a;
+  HeldOutFold held{a->U, {}};
+  for (std::size_t i = 0; i < o.rows.size(); ++i) {
+    if (o.rows[i].leg % parts.size() == fold && !needed[o.rows[i].leg]) {
+      held.rows.push_back(i);
+    }
+  }
+  return held;
 }
 
 }  // namespace
@@ -134,15 +173,16 @@ Result<HeldOutFigures> held_out(const Observations& o, const VolumetricModel* ac
   const std::vector<NormalEquations> parts = equations_by_fold(o, folds);
   Remainder none, candidate, other, candidate_beside;
   for (std::size_t f = 0; f < folds; ++f) {
-    const Result<Adjustment> fit = fit_without(parts, f, o, options);
+    if (Result<void> goes_on = check_stopped(options); !goes_on) {
+      return tl::unexpected(goes_on.error());
+    }
+    const Result<HeldOutFold> fit = hold_out(parts, f, o, options);
     if (!fit) {
       return tl::unexpected(fit.error());
     }
-    std::vector<std::size_t> rows;
-    for (std::size_t i = 0; i < o.rows.size(); ++i) {
-      if (o.rows[i].leg % folds == f) {
-        rows.push_back(i);
-      }
+    const std::vector<std::size_t>& rows = fit->rows;
+    if (rows.empty()) {
+      continue;
     }
     add_without_rigid(none, o, rows, residuals(o, rows, [](std::size_t) { return 0.0; }));
     const auto by_fit = [&](std::size_t i) { return predicted_by_fit(o, i, fit->U); };
@@ -157,9 +197,16 @@ Result<HeldOutFigures> held_out(const Observations& o, const VolumetricModel* ac
       options.progress(Stage::Judge, static_cast<double>(f + 1) / static_cast<double>(folds));
     }
   }
+  if (none.rows == 0) {
+    return failure(ErrorCode::RankDeficient,
+                   message("held-out test: without any one of ", folds,
+                           " folds the other legs do not determine the model; drive every part of the volume "
+                           "on more legs"));
+  }
   HeldOutFigures figures{.no_compensation = none.rms(),
                          .candidate = candidate.rms(),
-                         .observations = o.rows.size(),
+                         .observations = none.rows,
+                         .not_held_out = o.rows.size() - none.rows,
                          .no_compensation_rms_m = none.rms_m(),
                          .candidate_rms_m = candidate.rms_m()};
   if (other.rows > 0) {

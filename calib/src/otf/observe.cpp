@@ -5,6 +5,7 @@
 
 #include "abbe/calib/rigid_body_model.hpp"
 #include "message.hpp"
+#include "otf/check_stopped.hpp"
 
 namespace abbe::calib::otf {
 namespace {
@@ -188,9 +189,14 @@ Result<Observations> observe_blocks(const BlockSeries& series, const Machine& ma
                   sub_points(series, i, o.alignment, path, o.target_offset_m));
       ++o.blocks_used;
     }
-    if (options.progress && (i + 1) % 1000 == 0) {
-      options.progress(Stage::Observe,
-                       static_cast<double>(i + 1) / static_cast<double>(series.blocks.size()));
+    if ((i + 1) % 1000 == 0) {
+      if (options.progress) {
+        options.progress(Stage::Observe,
+                         static_cast<double>(i + 1) / static_cast<double>(series.blocks.size()));
+      }
+      if (Result<void> goes_on = check_stopped(options); !goes_on) {
+        return tl::unexpected(goes_on.error());
+      }
     }
   }
   o.covered_m = covered(o, path, options.corner_m);

@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "message.hpp"
+#include "otf/check_stopped.hpp"
 
 namespace abbe::calib::otf {
 namespace {
@@ -110,6 +111,9 @@ Result<Solution> solve(const Observations& o, const Options& options) {
   report(options, 0.0);
   const NormalEquations N = normal_equations(o);
   report(options, 0.5);
+  if (Result<void> goes_on = check_stopped(options); !goes_on) {
+    return tl::unexpected(goes_on.error());
+  }
   Result<Adjustment> a = adjust(N, o.layout, options.gauge_weight);
   if (!a) {
     return tl::unexpected(a.error());

@@ -20,6 +20,8 @@ struct HeldOutFigures {
   double no_compensation = 0.0;
   double candidate = 0.0;
   std::size_t observations = 0;
+  /// Fitted to in every fold: no other observation determines them, so they cannot be predicted.
+  std::size_t not_held_out = 0;
   /// Of the observations inside the active model's volume; none: there is no active model, it does not hold
   /// for this tool, or nothing lies inside. Outside, tables end and polynomials run away: to do better there
   /// means nothing.

@@ -13,8 +13,9 @@ namespace abbe::calib::otf {
 
 /// `active` may be null; it is compared on the rows inside its volume, and left out if it does not hold for
 /// this run's target offset.
-/// RankDeficient if the legs outside a fold do not determine the model, TooFewObservations with fewer legs
-/// than folds.
+/// A leg that alone touches a node of the tables is never held out: without it the node is anything. Such
+/// observations are counted. RankDeficient if no fold can be left out, TooFewObservations with fewer legs than
+/// folds.
 [[nodiscard]] Result<HeldOutFigures> held_out(const Observations&, const VolumetricModel* active,
                                               const Options& = {});
 

@@ -49,6 +49,9 @@ enum class Stage { Observe, Align, Solve, Judge };
 [[nodiscard]] std::string_view name(Stage);
 /// Called in the calling thread with 0 <= fraction <= 1, ascending within a stage.
 using Progress = std::function<void(Stage, double fraction)>;
+/// Asked in the calling thread, between steps of a second at most where the model has some hundred unknowns.
+/// True ends the computation with NotConverged.
+using Stopped = std::function<bool()>;
 
 struct Options {
   /// Samples per block mean. 100 samples are 0.2 s and 8.3 mm at 500 Hz and 2500 mm/min: fine against 50 mm
@@ -85,6 +88,7 @@ struct Options {
   /// Weighted observations for the held-out comparison are split by leg into this many parts.
   std::size_t held_out_folds = 5;
   Progress progress;  ///< may be empty
+  Stopped stopped;    ///< may be empty: never
 };
 
 }  // namespace abbe::calib::otf

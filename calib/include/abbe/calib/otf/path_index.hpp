@@ -1,0 +1,39 @@
+#pragma once
+/// Which legs of a path are near a point, without a look at all of them: boxes around runs of consecutive
+/// legs, in a binary tree. The same answers as nearest_on_leg() of every leg gives, to the last bit. Pure.
+
+#include <cstddef>
+#include <optional>
+#include <vector>
+
+#include "abbe/calib/otf/polyline.hpp"
+
+namespace abbe::calib::otf {
+
+class PathIndex {
+ public:
+  /// O(n) time and memory. The path may be empty.
+  explicit PathIndex(Path path);
+
+  [[nodiscard]] const Path& path() const noexcept { return path_; }
+  /// The first leg at or behind `from` that `p_m` is at most `within_m` away from.
+  [[nodiscard]] std::optional<std::size_t> first_within(const Vector3& p_m, double within_m,
+                                                        std::size_t from = 0) const;
+  /// To the nearest leg; infinite for less than two vertices.
+  [[nodiscard]] double distance_m(const Vector3& p_m) const;
+
+ private:
+  struct Box {
+    Vector3 low_m = Vector3::Zero();
+    Vector3 high_m = Vector3::Zero();
+  };
+  [[nodiscard]] Box box_of_leaf(std::size_t leaf) const;
+  [[nodiscard]] double off_box_m(std::size_t node, const Vector3& p_m) const;
+  [[nodiscard]] std::size_t legs() const noexcept;
+
+  Path path_;
+  std::size_t leaves_ = 0;  ///< a power of two; leaf i holds the legs from i * kLegsInLeaf on
+  std::vector<Box> boxes_;  ///< a heap: node k has the children 2 k and 2 k + 1, leaf i is node leaves_ + i
+};
+
+}  // namespace abbe::calib::otf

@@ -6,14 +6,16 @@
 #include <sys/mman.h>
 #include <sys/prctl.h>
 
+#include <algorithm>
 #include <array>
 #include <atomic>
 #include <cstring>
 #include <exception>
 #include <future>
-#include <mutex>
 #include <thread>
 #include <utility>
+
+#include "abbe/drivers/status_board.hpp"
 
 namespace abbe::drivers {
 namespace {
@@ -87,33 +89,62 @@ struct DeviceThread::State {
   std::vector<std::string> warnings;
   LatencyHistogram latency;
   std::atomic<bool> stop{false};
-  mutable std::mutex failure_mutex;  ///< taken when the loop has ended, never in it
-  std::optional<std::string> failure;
+  FaultText failure;               ///< what ended the loop the last time
+  std::atomic<bool> ended{false};  ///< from then until a wait() has returned again
+  std::atomic<std::uint64_t> failures{0};
   std::thread thread;
 
   State(Device& d, DeviceThreadOptions o) : device(d), options(std::move(o)) {}
 
+  [[nodiscard]] bool stopping() const noexcept {
+    return stop.load(std::memory_order_acquire);  // acquire: pairs with the release in DeviceThread::stop()
+  }
+
   void loop() {
-    while (
-        !stop.load(std::memory_order_acquire)) {  // acquire: pairs with the release in DeviceThread::stop()
+    while (!stopping()) {
       device.wait(options.wait_at_most);
+      if (ended.load(std::memory_order_relaxed)) [[unlikely]]
+        ended.store(false, std::memory_order_release);  // pairs with the acquire in failure()
       const auto begin = std::chrono::steady_clock::now();
       device.receive();
       latency.record(std::chrono::steady_clock::now() - begin);
     }
   }
 
-  /// The thread's top function: what the loop throws ends here and is kept.
+  void fail(const std::exception_ptr& cause) {
+    failure.set({}, in_words(cause));
+    ended.store(true, std::memory_order_release);  // pairs with the acquire in failure()
+    // release: pairs with the acquire in failures(); who sees the count sees that the loop has ended
+    failures.fetch_add(1, std::memory_order_release);
+  }
+
+  /// In steps, so that stop() is heard.
+  void pause(std::chrono::nanoseconds time) const {
+    const auto until = std::chrono::steady_clock::now() + time;
+    while (!stopping()) {
+      const auto left = until - std::chrono::steady_clock::now();
+      if (left <= std::chrono::nanoseconds{0}) return;
+      std::this_thread::sleep_for(std::min<std::chrono::nanoseconds>(left, options.wait_at_most));
+    }
+  }
+
+  /// The thread's top function: what the loop throws ends here and is kept, and the loop begins again.
   void run(std::promise<Refusals> ready) noexcept {
     Refusals refusals = prepare_this_thread(options);
     const bool go = refusals.empty() || options.mode == RealTimeMode::Ignore;
     ready.set_value(std::move(refusals));
     if (!go) return;
-    try {
-      loop();
-    } catch (...) {
-      const std::lock_guard lock(failure_mutex);
-      failure = in_words(std::current_exception());
+    for (auto back_off = options.first_back_off; !stopping();) {
+      const auto begun = std::chrono::steady_clock::now();
+      try {
+        loop();
+      } catch (...) {
+        fail(std::current_exception());
+        if (std::chrono::steady_clock::now() - begun > options.longest_back_off)
+          back_off = options.first_back_off;  // it ran well for a while
+        pause(back_off);
+        back_off = std::min(2 * back_off, options.longest_back_off);
+      }
     }
   }
 };
@@ -157,8 +188,25 @@ const LatencyHistogram& DeviceThread::latency() const noexcept {
 }
 
 std::optional<std::string> DeviceThread::failure() const {
-  const std::lock_guard lock(state_->failure_mutex);
-  return state_->failure;
+  // acquire: pairs with the releases in State::fail() and State::loop()
+  if (!state_->ended.load(std::memory_order_acquire)) return std::nullopt;
+  return state_->failure.read().text;
+}
+
+DeviceStatus DeviceThread::status() const {
+  DeviceStatus status = state_->device.status();
+  status.faults += failures();
+  if (const auto cause = failure()) {
+    status.state = "internal error";
+    status.connected = false;
+    status.last_fault =
+        fmt::format("{}: internal error, its thread starts again: {}", state_->options.name, *cause);
+  }
+  return status;
+}
+
+std::uint64_t DeviceThread::failures() const noexcept {
+  return state_->failures.load(std::memory_order_acquire);  // pairs with the release in State::fail()
 }
 
 }  // namespace abbe::drivers

@@ -10,15 +10,16 @@ FaultText::Read FaultText::read() const {
   std::array<std::uint64_t, kWords> words{};
   std::uint64_t length = 0;
   std::int64_t at_ns = 0;
-  for (;;) {
-    const std::uint64_t before =
-        sequence_.load(std::memory_order_acquire);  // pairs with the last release in set()
-    // acquire: pairs with the releases in set(); whoever sees a new word also sees the odd sequence before it
-    length = length_.load(std::memory_order_acquire);
-    at_ns = at_ns_.load(std::memory_order_acquire);
-    std::transform(words_.begin(), words_.end(), words.begin(),
+  for (bool whole = false; !whole;) {
+    const std::uint64_t latest =
+        complete_.load(std::memory_order_acquire);  // acquire: pairs with the last release in set()
+    const Text& from = texts_[latest % 2];
+    // acquire: pairs with the releases in set(); whoever sees a newer word also sees that it was begun
+    length = from.length.load(std::memory_order_acquire);
+    at_ns = from.at_ns.load(std::memory_order_acquire);
+    std::transform(from.words.begin(), from.words.end(), words.begin(),
                    [](const auto& w) { return w.load(std::memory_order_acquire); });
-    if (before % 2 == 0 && sequence_.load(std::memory_order_relaxed) == before) break;
+    whole = begun_.load(std::memory_order_relaxed) < latest + 2;
   }
   std::array<char, kCapacity> bytes{};
   std::memcpy(bytes.data(), words.data(), kCapacity);
@@ -43,6 +44,7 @@ DeviceStatus StatusBoard::read(std::string name, std::uint64_t dropped, std::uin
              .restarts = clock_restarts_.load(std::memory_order_relaxed)};
   s.last_sample =
       protocol::HostTime{std::chrono::nanoseconds{last_sample_ns_.load(std::memory_order_relaxed)}};
+  s.condition = condition_.read().text;
   auto [text, at] = fault_text_.read();
   s.last_fault = std::move(text);
   s.last_fault_at = at;

@@ -61,6 +61,7 @@ TEST_F(EncoderDeviceOnUdp, GoesOnWithTheOtherAxisWhenOneIsMute) {
   begin_streaming();
   peer.node(1).mute = true;
   ASSERT_TRUE(state_becomes("degraded"));
+  ASSERT_TRUE(turns_until([&] { return device->status().faults > 0; }));
   EXPECT_THAT(device->status().last_fault, testing::HasSubstr("encoder Y (node 2)"));
   samples.clear();
   turns(20);
@@ -127,20 +128,240 @@ TEST_F(EncoderDeviceOnUdp, SaysBusOffAndStopsTheSync) {
 
 TEST_F(EncoderDeviceOnUdp, ResetsAndReconfiguresTheNodesAfterBusOff) {
   begin_streaming();
-  for (auto condition : {can::BusCondition::BusOff, can::BusCondition::Restarted}) {
-    const std::array frame{
-        can::encode_error_frame({.conditions = static_cast<can::BusConditions>(condition)})};
-    peer.send(frame);
-    device->wait(kTurn);
-    device->receive();
-  }
+  const auto before = peer.nmt().size();
+  send_condition(can::BusCondition::BusOff);
+  send_condition(can::BusCondition::Restarted);
   turns(3);
-  EXPECT_TRUE(std::any_of(peer.nmt().begin(), peer.nmt().end(), [](const auto& m) {
-    return m.command == can::NmtCommand::ResetCommunication && m.node == can::kAllNodes;
-  }));
+  const auto resets =
+      std::ranges::count(peer.nmt(), can::NmtCommand::ResetCommunication, &can::NmtMessage::command);
+  EXPECT_EQ(resets, 2);
   samples.clear();
   ASSERT_TRUE(state_becomes("streaming"));
   ASSERT_TRUE(turns_until([&] { return !samples.empty() && samples.back().missing_mask == 0; }));
+  for (const auto& message : std::span{peer.nmt()}.subspan(before))
+    EXPECT_THAT(message.node, testing::AnyOf(1, 2)) << "the drives on this bus are not ours";
+}
+
+TEST_F(EncoderDeviceOnUdp, ListensAgainAfterALongBusOff) {
+  begin_streaming();
+  bus_is_off_for(2100);  // longer than ForeignSync::kShortBreak
+  const auto before = peer.nmt().size();
+  send_condition(can::BusCondition::Restarted);
+  turns(1400);
+  EXPECT_EQ(device->status().state, "listening");
+  EXPECT_EQ(peer.nmt().size(), before) << "a master that came meanwhile has configured the nodes";
+  samples.clear();
+  ASSERT_TRUE(state_becomes("streaming"));
+  ASSERT_TRUE(turns_until([&] { return !samples.empty() && samples.back().missing_mask == 0; }));
+}
+
+TEST_F(EncoderDeviceOnUdp, SendsNothingWhereAMasterCameWhileTheBusWasOff) {
+  begin_streaming();
+  bus_is_off_for(2100);
+  const auto before = peer.nmt().size();
+  send_condition(can::BusCondition::Restarted);
+  for (int i = 0; i < 4; ++i) {
+    turns(999);
+    peer.send(std::array{can::encode_sync()});
+  }
+  turns(1000);
+  EXPECT_EQ(device->status().state, "foreign SYNC");
+  EXPECT_EQ(peer.nmt().size(), before);
+}
+
+TEST_F(EncoderDeviceOnUdp, QuietOfABusThatIsOffIsNotListenedTo) {
+  turns(100);
+  ASSERT_EQ(device->status().state, "listening");
+  peer.talk_to(bus->local_port());
+  bus_is_off_for(1500);
+  send_condition(can::BusCondition::Restarted);
+  turns(1400);
+  EXPECT_EQ(device->status().state, "listening");
+  EXPECT_TRUE(state_becomes("streaming")) << device->status().last_fault;
+}
+
+TEST_F(EncoderDeviceOnUdp, ConfiguresNodesThatLostPowerWhileTheBusWasOffAndClosed) {
+  begin_streaming();
+  send_condition(can::BusCondition::BusOff);
+  ASSERT_TRUE(state_becomes("bus off"));
+  bus->fail_next_read();
+  peer.restart();
+  device->wait(kTurn);  // fails: closed
+  device->receive();
+  EXPECT_EQ(device->status().state, "closed");
+  samples.clear();
+  ASSERT_TRUE(state_becomes("streaming")) << device->status().state;
+  ASSERT_TRUE(turns_until([&] { return !samples.empty() && samples.back().missing_mask == 0; }));
+}
+
+TEST_F(EncoderDeviceOnUdp, AThreadThatWasHeldUpReconfiguresNobody) {
+  begin_streaming();
+  turns(200);
+  const auto nmt = peer.nmt().size();
+  const auto faults = device->status().faults;
+  samples.clear();
+  for (int i = 0; i < 5; ++i) {
+    peer.serve(time.now());
+    peer.answer_sync();
+    time.advance(500ms);
+    turns(kTurnsPerSync + i);
+  }
+  turns(40);
+  EXPECT_EQ(peer.nmt().size(), nmt);
+  EXPECT_EQ(device->status().faults, faults) << device->status().last_fault;
+  EXPECT_EQ(device->status().state, "streaming");
+  for (const auto& sample : samples) EXPECT_FALSE(has(sample.head.flags, SampleFlag::DeviceError));
+}
+
+TEST_F(EncoderDeviceOnUdp, ReportsANodeThatSendsEmcyAndDropsOut) {
+  begin_streaming();
+  const auto nmt = peer.nmt().size();
+  for (int i = 0; i < 10'000; ++i) {
+    if (i % 100 == 0)
+      peer.send(std::array{can::encode_emergency({.node = 1, .code = 0x8130, .error_register = 0x11})});
+    peer.serve(time.now());
+    peer.node(0).state = can::NodeState::PreOperational;
+    turn();
+    if (i < 1000) continue;
+    ASSERT_EQ(device->status().state, "degraded");
+  }
+  EXPECT_EQ(samples.back().missing_mask, 0b01);
+  EXPECT_THAT(device->status().condition,
+              testing::AllOf(testing::HasSubstr("X missing (node 1)"), testing::HasSubstr("EMCY 8130h"),
+                             testing::HasSubstr("heartbeat"), testing::Not(testing::HasSubstr("node 2"))));
+  EXPECT_THAT(device->status().last_fault,
+              testing::AllOf(testing::HasSubstr("encoder X (node 1)"), testing::HasSubstr("EMCY 8130h")));
+  EXPECT_LT(peer.nmt().size() - nmt, 30u) << "configured again once a second, not without a pause";
+}
+
+TEST_F(EncoderDeviceOnUdp, ReportsANodeThatLeavesOperationalByItself) {
+  begin_streaming();
+  turns(1500);
+  peer.node(0).state = can::NodeState::PreOperational;
+  ASSERT_TRUE(turns_until([&] { return device->status().faults > 0; }));
+  EXPECT_THAT(device->status().last_fault, testing::AllOf(testing::HasSubstr("encoder X (node 1)"),
+                                                          testing::HasSubstr("pre-operational")));
+  ASSERT_TRUE(
+      turns_until([&] { return device->status().condition.empty() && samples.back().missing_mask == 0; }));
+}
+
+TEST_F(EncoderDeviceOnUdp, UsesTheMappingOfAnEncoderThatCannotBeMapped) {
+  const std::array count{std::byte{2}};
+  const std::array speed{std::byte{0x10}, std::byte{1}, std::byte{0x30}, std::byte{0x60}};
+  const std::array place{std::byte{0x20}, std::byte{0}, std::byte{0x04}, std::byte{0x60}};
+  auto& objects = peer.node(0).objects;
+  objects.add({0x1A00, 0}, can::Access::ReadOnly, count);
+  objects.add({0x1A00, 1}, can::Access::ReadOnly, speed);
+  objects.add({0x1A00, 2}, can::Access::ReadOnly, place);
+  peer.move_to(123456);
+  begin_streaming();
+  turns(20);
+  EXPECT_EQ(samples.back().count[0], 123456);
+  EXPECT_EQ(samples.back().count[1], 123456);
+  expect_the_same_from_raw_bytes();
+}
+
+TEST_F(EncoderDeviceOnUdp, AsksAgainWhereTheMappingIsRefusedForTheMoment) {
+  constexpr std::uint32_t kSpeed = 0x60300110;
+  for (const auto code : {can::AbortCode::DeviceState, can::AbortCode::CannotStore}) {
+    for (const std::uint8_t sub : {std::uint8_t{0}, std::uint8_t{1}}) {
+      SCOPED_TRACE(int{sub});
+      peer.node(0).objects.reset();
+      peer.node(0).objects.set_number({0x1A00, 1}, kSpeed);
+      peer.node(0).refuses = {{0x1A00, sub}, code};
+      device = std::move(*EncoderDevice::create({.receiver = two_axes()}, make_bus(), time));
+      ASSERT_TRUE(turns_until([&] { return device->status().faults > 0; }));
+      EXPECT_THAT(device->status().last_fault,
+                  testing::AllOf(testing::HasSubstr("encoder X (node 1)"), testing::HasSubstr("refuses")));
+      turns(3000);
+      EXPECT_EQ(device->status().faults, 1u) << "however often it is asked";
+      peer.node(0).refuses.reset();
+      EXPECT_TRUE(state_becomes("streaming")) << device->status().last_fault;
+    }
+  }
+}
+
+TEST_F(EncoderDeviceOnUdp, ALastingRefusalOfTheMappingIsFinal) {
+  peer.node(0).objects.set_number({0x1A00, 1}, 0x60300110);
+  peer.node(0).refuses = {{0x1A00, 1}, can::AbortCode::NotMappable};
+  ASSERT_TRUE(turns_until([&] { return device->status().faults > 0; }));
+  peer.node(0).refuses.reset();
+  turns(5000);
+  EXPECT_EQ(device->status().state, "degraded") << "not asked again before it was switched off and on";
+}
+
+TEST_F(EncoderDeviceOnUdp, RefusesAnEncoderOfAnotherStepOnceWithBothValues) {
+  EncoderDeviceOptions options;
+  options.receiver = two_axes();
+  options.receiver.axes[0].scale = 10e-9;
+  device = std::move(*EncoderDevice::create(options, make_bus(), time));
+  peer.node(0).objects.set_number(can::object::kPositionStep, 20);
+  ASSERT_TRUE(turns_until([&] { return device->status().faults > 0; }));
+  EXPECT_THAT(device->status().last_fault,
+              testing::AllOf(testing::HasSubstr("encoder X (node 1)"), testing::HasSubstr("20 nm"),
+                             testing::HasSubstr("step_nm = 10")));
+  turns(8000);
+  EXPECT_EQ(device->status().faults, 1u);
+  EXPECT_EQ(std::ranges::count(peer.nmt(), 1, &can::NmtMessage::node), 1) << "not asked again";
+  EXPECT_EQ(device->status().state, "degraded");
+}
+
+TEST_F(EncoderDeviceOnUdp, NamesATunnelThatHoldsFramesBack) {
+  begin_streaming();
+  std::vector<can::CanFrame> held;
+  for (int i = 0; i < 3000; ++i) {
+    peer.serve(time.now());
+    const auto frames = peer.take_answer();
+    held.insert(held.end(), frames.begin(), frames.end());
+    if (i % 100 == 99) {
+      peer.send(held);
+      held.clear();
+    }
+    device->wait(kTurn);
+    device->receive();
+    time.advance(kTurn);
+  }
+  EXPECT_EQ(device->status().state, "degraded");
+  EXPECT_THAT(device->status().last_fault,
+              testing::AllOf(testing::HasSubstr("bundles"), testing::HasSubstr("cannelloni")));
+}
+
+TEST_F(EncoderDeviceOnUdp, NamesAnswersThatComeAfterTheirCycle) {
+  begin_streaming();
+  for (int i = 0; i < 3000; ++i) {
+    peer.serve(time.now());
+    if (const auto late = peer.take_answer(); !late.empty()) {
+      time.advance(3ms);  // 3.5 ms after the SYNC, 0.3 ms after the end of the cycle
+      peer.send(late);
+    }
+    device->wait(kTurn);
+    device->receive();
+    time.advance(500us);
+  }
+  EXPECT_EQ(device->status().state, "degraded");
+  EXPECT_THAT(device->status().last_fault, testing::HasSubstr("after the end of their cycle"));
+}
+
+TEST_F(EncoderDeviceOnUdp, ReportsStrangersOnItsPort) {
+  begin_streaming();
+  const int stranger = ::socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC, 0);
+  sockaddr_in to{};
+  to.sin_family = AF_INET;
+  to.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
+  to.sin_port = htons(bus->local_port());
+  std::array<std::byte, 64> buffer{};
+  can::DatagramWriter writer{buffer, 0};
+  ASSERT_TRUE(writer.add(can::encode_position(0x181, can::PositionType::Signed32, 99'999'999)));
+  const auto fake = writer.finish();
+  for (int i = 0; i < 200; ++i) {
+    ::sendto(stranger, fake.data(), fake.size(), 0, reinterpret_cast<const sockaddr*>(&to), sizeof to);
+    turn();
+  }
+  ::close(stranger);
+  for (const auto& sample : samples) EXPECT_LT(sample.count[0], 1000);
+  EXPECT_EQ(device->status().state, "streaming");
+  EXPECT_THAT(device->status().last_fault,
+              testing::AllOf(testing::HasSubstr("127.0.0.1:"), testing::HasSubstr("not the peer")));
 }
 
 TEST_F(EncoderDeviceOnUdp, CountsDatagramsThatAreMissing) {

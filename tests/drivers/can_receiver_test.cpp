@@ -223,6 +223,63 @@ TEST(EncoderReceiver, MarksTheSampleAfterABusErrorOnly) {
   EXPECT_FALSE(has(line.samples.at(1).head.flags, SampleFlag::BusError));
 }
 
+TEST(EncoderReceiver, AnOverflowOfTheControllerIsALoss) {
+  Line line;
+  line.cycle(kStart, 1000);
+  line.sync(kStart + 1ms);
+  line.frame(position(1, 2000), kStart + 1100us);
+  line.frame(bus_report(BusCondition::ReceiveOverflow), kStart + 1200us);
+  line.frame(position(2, 2001), kStart + 1300us);
+  line.cycle(kStart + 2ms, 3000);
+  ASSERT_EQ(line.samples.size(), 3u);
+  EXPECT_EQ(line.samples[1].missing_mask, 0b110);
+  EXPECT_EQ(line.samples[2].missing_mask, 0);
+  EXPECT_TRUE(has(line.samples[2].head.flags, SampleFlag::GapBefore));
+}
+
+TEST(EncoderReceiver, ReadsWhereAFixedMappingHasThePosition) {
+  Line line;
+  for (const can::NodeId node : kNodes) {
+    line.frame(can::standard_frame(0x580u + node, {0x4F, 0x00, 0x1A, 0, 2, 0, 0, 0}), kStart);
+    line.frame(can::standard_frame(0x580u + node, {0x43, 0x00, 0x1A, 1, 0x10, 1, 0x30, 0x60}), kStart);
+    line.frame(can::standard_frame(0x580u + node, {0x43, 0x00, 0x1A, 2, 0x20, 0, 0x04, 0x60}), kStart);
+  }
+  line.sync(kStart);
+  for (const can::NodeId node : kNodes)
+    line.frame(can::standard_frame(0x180u + node, {9, 9, 0xE8, 3, 0, 0}), kStart + 100us);
+  ASSERT_EQ(line.samples.size(), 1u);
+  EXPECT_EQ(line.samples[0].count[2], 1000);
+}
+
+TEST(EncoderReceiver, WaitsForAHeartbeatAsLongAsItsNodeSays) {
+  Line line;
+  line.frame(can::standard_frame(0x581, {0x4B, 0x17, 0x10, 0, 0xE8, 3, 0, 0}), kStart);  // 1000 ms
+  line.frame(can::encode_heartbeat(1, can::NodeState::Operational), kStart);
+  line.cycle(kStart + 2s, 1);
+  EXPECT_FALSE(has(line.samples.back().head.flags, SampleFlag::DeviceError));
+  line.cycle(kStart + 4s, 2);
+  EXPECT_TRUE(has(line.samples.back().head.flags, SampleFlag::DeviceError));
+}
+
+TEST(EncoderReceiver, TurnsARotaryEncoderWithoutScalingAtItsOwnRevolutions) {
+  EncoderReceiverOptions options;
+  options.axes = {
+      {.name = "C", .node = 1, .kind = AxisKind::Rotary, .position = can::PositionType::Unsigned32}};
+  Line line{options};
+  line.frame(can::standard_frame(0x581, {0x43, 0x01, 0x65, 0, 100, 0, 0, 0}),
+             kStart);  // 100 counts a revolution
+  line.frame(can::standard_frame(0x581, {0x4B, 0x02, 0x65, 0, 2, 0, 0, 0}), kStart);  // 2 revolutions
+  std::int64_t ms = 0;
+  for (const std::int64_t count : {190, 5}) {
+    line.sync(kStart + 1ms * ms);
+    line.frame(can::encode_position(0x181, can::PositionType::Unsigned32, count), kStart + 1ms * ms + 10us);
+    ++ms;
+  }
+  ASSERT_EQ(line.samples.size(), 2u);
+  EXPECT_EQ(line.samples[1].count[0], 205);
+  EXPECT_NEAR(line.samples[1].position[0], 2 * std::numbers::pi * 2.05, 1e-12);
+}
+
 TEST(EncoderReceiver, BusOffMakesAllAxesInvalidAtOnce) {
   Line line;
   line.cycle(kStart, 1000);

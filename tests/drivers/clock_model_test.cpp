@@ -101,6 +101,29 @@ TEST(ClockModel, HoldsTheSkewWithinItsBound) {
   EXPECT_LE(model.status().skew, 50.0001e-6);
 }
 
+TEST(ClockModel, ReportsASkewBeyondItsBoundAndNeverSettlesOnIt) {
+  for (const double skew : {300e-6, -300e-6}) {
+    ClockModel model;
+    BurstProfile profile(7, {.skew = skew});
+    run(profile, model, 120.0);
+    EXPECT_NEAR(model.skew_beyond_limit(), skew, 30e-6);
+    EXPECT_FALSE(model.status().settled);
+    EXPECT_GT(model.status().u_time, 4ms);  // 100 ppm over a minute
+  }
+}
+
+TEST(ClockModel, TakesNoScatterForASkewBeyondItsBound) {
+  constexpr std::uint64_t kManySeeds = 200;
+  for (std::uint64_t seed = 0; seed < kManySeeds; ++seed) {
+    ClockModel model;
+    BurstProfile profile(seed, {.skew = 60e-6});
+    for (int part = 1; part <= 6; ++part) {
+      run(profile, model, 20.0 * part);
+      ASSERT_EQ(model.skew_beyond_limit(), 0.0) << "seed " << seed;
+    }
+  }
+}
+
 TEST(ClockModel, IsUnsettledWithAnHonestUncertaintyAtFirst) {
   ClockModel model;
   EXPECT_FALSE(model.to_host(DeviceTime{}).settled);

@@ -47,6 +47,10 @@ class CounterCardReceiverTest : public testing::Test {
   void begin_stream() {
     receiver_.on_control(quad08::write(quad08::Register::DmaControl, quad08::dma::kChannel1On));
   }
+  void reopen() {
+    receiver_.on_control(quad08::read_firmware_version());
+    begin_stream();
+  }
   std::vector<CounterScan> push(std::span<const std::byte> bytes) {
     std::vector<CounterScan> all;
     now_ += 1ms;
@@ -154,6 +158,67 @@ TEST_F(CounterCardReceiverTest, KeepsCountsOverARestartOfTheScanAndMarksIt) {
   EXPECT_EQ(scans[0].axes.count[0], 4100);
   EXPECT_TRUE(has(scans[0].axes.head.flags, SampleFlag::GapBefore));
   EXPECT_EQ(scans[0].axes.head.lost_before, 400u);
+}
+
+TEST_F(CounterCardReceiverTest, AnOverrunInAHostThatWasHeldUpZeroesNothing) {
+  for (const int batches : {1, 50, 9'000}) {
+    start();
+    card_.x = 4000;
+    for (int i = 0; i < batches; ++i) push(card_.scans(40));
+    now_ += 2s;
+    push(card_.scans(40));  // from before: read two seconds late
+    card_.lose(2 * 40'000 + 4'000);
+    now_ += 100ms;
+    begin_stream();
+    const auto scans = push(card_.scans(40));
+    ASSERT_FALSE(scans.empty());
+    EXPECT_EQ(receiver_.counters().began_anew, 0u);
+    EXPECT_EQ(scans[0].axes.count[0], 4000);
+    EXPECT_TRUE(has(scans[0].axes.head.flags, SampleFlag::GapBefore));
+    EXPECT_FALSE(has(scans[0].axes.head.flags, SampleFlag::Restarted));
+    EXPECT_EQ(scans[0].axes.head.lost_before, 84'000u);
+  }
+}
+
+TEST_F(CounterCardReceiverTest, ALateBatchBeforeOrAfterTheCardWasOpenedAgainZeroesNothing) {
+  for (const auto& [before, after] : {std::pair{2s, 0s}, std::pair{0s, 2s}}) {
+    start();
+    for (int i = 0; i < 9'000; ++i) push(card_.scans(40));
+    now_ += before;
+    push(card_.scans(40));
+    card_.lose(10 * 40'000);
+    now_ += 10s - before;
+    reopen();
+    now_ += after;
+    ASSERT_FALSE(push(card_.scans(40)).empty());
+    EXPECT_EQ(receiver_.counters().began_anew, 0u);
+    now_ -= after;
+  }
+}
+
+TEST_F(CounterCardReceiverTest, AClockAheadOfTheHostsIsThatOfOtherCounters) {
+  start();
+  for (int i = 0; i < 9'000; ++i) push(card_.scans(40));
+  card_.lose(12 * 40'000);
+  now_ += 10s;
+  reopen();
+  push(card_.scans(40));
+  EXPECT_EQ(receiver_.counters().began_anew, 1u);
+}
+
+/// 32 bits go round in 72 minutes at 1 MHz: after a day the clock may have stood anywhere.
+TEST_F(CounterCardReceiverTest, AfterTooLongTheClockNoLongerTellsThatItIsTheSame) {
+  std::uint64_t anew = 0;
+  for (const auto& [outage, foreign] : {std::pair{8h, false}, std::pair{24h, true}}) {
+    start();
+    for (int i = 0; i < 100; ++i) push(card_.scans(40));
+    card_.lose(static_cast<std::size_t>(std::chrono::seconds{outage}.count()) * 40'000);
+    now_ += outage;
+    reopen();
+    ASSERT_FALSE(push(card_.scans(40)).empty());
+    anew += foreign ? 1 : 0;
+    EXPECT_EQ(receiver_.counters().began_anew, anew);
+  }
 }
 
 TEST_F(CounterCardReceiverTest, BeginsAnewWhenACounterIsSetUp) {

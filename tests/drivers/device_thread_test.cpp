@@ -24,12 +24,18 @@ class TurnCounter final : public drivers::Device {
   explicit TurnCounter(int throw_in_turn = -1) : throw_in_turn_(throw_in_turn) {}
   void wait(std::chrono::nanoseconds at_most) override {
     waited_at_most = at_most;
-    if (turns == throw_in_turn_) throw std::runtime_error("no such register");
+    if (turns == throw_in_turn_ && throws) throw std::runtime_error("no such register");
     std::this_thread::yield();
   }
   void receive() ABBE_RT override { ++turns; }
-  [[nodiscard]] drivers::DeviceStatus status() const override { return {}; }
+  [[nodiscard]] drivers::DeviceStatus status() const override {
+    drivers::DeviceStatus s;
+    s.state = "streaming";
+    s.connected = true;
+    return s;
+  }
 
+  std::atomic<bool> throws{true};
   std::atomic<int> turns{0};
   std::atomic<std::chrono::nanoseconds> waited_at_most{};
 
@@ -70,6 +76,45 @@ TEST(DeviceThread, HandsOverTheExceptionThatEndedIt) {
   wait_for([&] { return (*thread)->failure().has_value(); });
   EXPECT_EQ(*(*thread)->failure(), "no such register");
   EXPECT_EQ(device.turns, 3);
+}
+
+TEST(DeviceThread, NeverSaysThatADeviceStreamsWhoseLoopHasEnded) {
+  TurnCounter device(3);
+  const auto thread = DeviceThread::start(device, {.name = "tracker", .first_back_off = 1h});
+  ASSERT_TRUE(thread);
+  wait_for([&] { return (*thread)->failure().has_value(); });
+  wait_for([&] { return (*thread)->failures() == 1; });
+  const auto status = (*thread)->status();
+  EXPECT_EQ(status.state, "internal error");
+  EXPECT_FALSE(status.connected);
+  EXPECT_EQ(status.faults, 1u);
+  EXPECT_THAT(status.last_fault, testing::HasSubstr("tracker: internal error"));
+  EXPECT_THAT(status.last_fault, testing::HasSubstr("no such register"));
+}
+
+TEST(DeviceThread, WhoSeesThatItFailedSeesThatItHasEnded) {
+  for (int i = 0; i < 200; ++i) {
+    TurnCounter device(0);
+    const auto thread = DeviceThread::start(device, {.wait_at_most = 1us, .first_back_off = 1h});
+    ASSERT_TRUE(thread);
+    while ((*thread)->failures() == 0) {
+    }
+    ASSERT_FALSE((*thread)->status().connected) << i;
+  }
+}
+
+TEST(DeviceThread, BeginsAgainAfterAnException) {
+  TurnCounter device(3);
+  const auto thread =
+      DeviceThread::start(device, {.wait_at_most = 1ms, .first_back_off = 100us, .longest_back_off = 400us});
+  ASSERT_TRUE(thread);
+  wait_for([&] { return (*thread)->failures() > 4; });
+  EXPECT_FALSE((*thread)->status().connected);
+  device.throws = false;
+  wait_for([&] { return device.turns > 10; });
+  EXPECT_FALSE((*thread)->failure());
+  EXPECT_TRUE((*thread)->status().connected);
+  EXPECT_EQ((*thread)->status().faults, (*thread)->failures());
 }
 
 // No machine has processor 1023 in its set: a refusal that does not depend on who runs the test.

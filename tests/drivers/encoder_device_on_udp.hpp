@@ -11,23 +11,53 @@
 
 #include "abbe/drivers/can/encoder_device.hpp"
 #include "abbe/drivers/can/udp_can_bus.hpp"
+#include "abbe/protocol/can/error_frame.hpp"
 #include "encoder_peer.hpp"
 
 namespace abbe::drivers {
+
+/// UDP that can fail as an interface that goes down does.
+class FailingBus final : public CanBus {
+ public:
+  FailingBus(const UdpCanOptions& options, const TimeSource& time) : udp_(options, time) {}
+
+  void fail_next_read() { fails_ = true; }
+  [[nodiscard]] std::uint16_t local_port() const { return udp_.local_port(); }
+
+  Result<void> open(std::span<const std::uint32_t> ids) override { return udp_.open(ids); }
+  void close() noexcept override { udp_.close(); }
+  Result<CanRead> read(std::span<ReceivedFrame> out, std::chrono::nanoseconds wall) override {
+    if (!std::exchange(fails_, false)) return udp_.read(out, wall);
+    return tl::unexpected(Error{ErrorCode::SystemRefused, "CAN test: read: Network is down"});
+  }
+  Result<void> send(std::span<const can::CanFrame> frames) override { return udp_.send(frames); }
+  [[nodiscard]] CanBusCounters counters() const noexcept override { return udp_.counters(); }
+  [[nodiscard]] std::string name() const override { return udp_.name(); }
+  [[nodiscard]] std::string stranger() const override { return udp_.stranger(); }
+
+ private:
+  UdpCanBus udp_;
+  bool fails_ = false;
+};
 
 /// Two nodes and the device on one stepped clock. A turn is 1 ms, a SYNC period 4 ms.
 class EncoderDeviceOnUdp : public testing::Test {
  protected:
   static constexpr std::chrono::milliseconds kTurn{1};
+  static constexpr int kTurnsPerSync = 4;
 
   explicit EncoderDeviceOnUdp(std::vector<can::EncoderIdentity> identities = {{.node = 1}, {.node = 2}})
       : peer(identities) {}
   [[nodiscard]] UdpCanOptions udp() const { return {.peer_port = peer.port(), .speed = 0.0}; }
-  virtual std::unique_ptr<CanBus> make_bus() { return std::make_unique<UdpCanBus>(udp(), time); }
+  virtual std::unique_ptr<CanBus> make_bus() {
+    auto made = std::make_unique<FailingBus>(udp(), time);
+    bus = made.get();
+    return made;
+  }
   static EncoderReceiverOptions two_axes() {
     EncoderReceiverOptions options;
     options.axes = {{.name = "X", .node = 1}, {.name = "Y", .node = 2}};
-    options.sync_period = 4 * kTurn;
+    options.sync_period = kTurnsPerSync * kTurn;
     return options;
   }
   void SetUp() override {
@@ -50,6 +80,23 @@ class EncoderDeviceOnUdp : public testing::Test {
     std::array<protocol::RawBlock, 256> blocks;  // NOLINT: filled by pop
     const auto raw_count = device->raw().pop(blocks);
     raw.insert(raw.end(), blocks.begin(), blocks.begin() + static_cast<std::ptrdiff_t>(raw_count));
+  }
+  /// The controller of the device reports this.
+  void send_condition(can::BusCondition condition) {
+    peer.send(
+        std::array{can::encode_error_frame({.conditions = static_cast<can::BusConditions>(condition)})});
+    device->wait(kTurn);
+    device->receive();
+  }
+  /// Turns in which nothing is heard: a frame would show that the bus is back.
+  void bus_is_off_for(int turns) {
+    send_condition(can::BusCondition::BusOff);
+    for (int i = 0; i < turns; ++i) {
+      device->wait(kTurn);
+      device->receive();
+      time.advance(kTurn);
+    }
+    EXPECT_EQ(device->status().state, "bus off");
   }
   void turns(int n) {
     for (int i = 0; i < n; ++i) turn();
@@ -86,6 +133,7 @@ class EncoderDeviceOnUdp : public testing::Test {
 
   SteppedTime time;
   tests::EncoderPeer peer;
+  FailingBus* bus = nullptr;  ///< the device's
   std::unique_ptr<EncoderDevice> device;
   std::vector<protocol::AxisSample> samples;
   std::vector<protocol::RawBlock> raw;

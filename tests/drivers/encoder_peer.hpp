@@ -33,6 +33,15 @@ class EncoderPeer : public EncoderNodes {
 
   [[nodiscard]] std::uint16_t port() const { return port_; }
 
+  /// Whom to send to before anything came from there.
+  void talk_to(std::uint16_t port) {
+    to_.sin_family = AF_INET;
+    to_.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
+    to_.sin_port = htons(port);
+  }
+  /// Every frame that ever came.
+  [[nodiscard]] std::size_t frames_received() const { return frames_received_; }
+
   /// Reads what came; answers SDO and NMT, beats. A SYNC is only remembered: see answer_sync().
   void serve(HostTime now) {
     std::array<std::byte, 65536> buffer{};
@@ -44,7 +53,7 @@ class EncoderPeer : public EncoderNodes {
       auto view = can::DatagramView::parse(std::span{buffer}.first(static_cast<std::size_t>(n)));
       ASSERT_TRUE(view.has_value()) << "the device sent no CAN datagram";
       can::CanFrame frame;
-      while (view->next(frame)) on_frame(frame, now);
+      for (; view->next(frame); ++frames_received_) on_frame(frame, now);
     }
     beat(now);
   }
@@ -81,6 +90,7 @@ class EncoderPeer : public EncoderNodes {
   int fd_ = -1;
   std::uint16_t port_ = 0;
   sockaddr_in to_{};
+  std::size_t frames_received_ = 0;
   std::uint8_t sequence_ = 0;
 };
 

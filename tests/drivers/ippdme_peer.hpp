@@ -41,7 +41,14 @@ class IppDmePeer {
     const auto bytes = machine_->take_output();
     gathered_.append(reinterpret_cast<const char*>(bytes.data()), bytes.size());
   }
-  void say_gathered() { send(std::exchange(gathered_, {})); }
+  void say_gathered() {
+    if (!holding_) send(std::exchange(gathered_, {}));
+  }
+  /// What the machine says reaches nobody.
+  void hold_answers(bool hold) {
+    holding_ = hold;
+    gathered_.clear();
+  }
   void send(std::string_view text) {
     if (client_ && !text.empty()) ::send(client_.get(), text.data(), text.size(), MSG_NOSIGNAL);
   }
@@ -96,6 +103,7 @@ class IppDmePeer {
   sim::Socket client_;
   std::unique_ptr<sim::IppDmeDevice> machine_;
   std::string gathered_;
+  bool holding_ = false;
 };
 
 }  // namespace abbe::tests

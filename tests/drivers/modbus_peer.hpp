@@ -65,6 +65,7 @@ class ModbusPeer {
       sim::Socket accepted(::accept4(listener_.get(), nullptr, nullptr, SOCK_NONBLOCK | SOCK_CLOEXEC));
       if (accepted) {
         wire_ = std::move(accepted);
+        ++connections;
         asked_.reset();
         const int yes =
             1;  // else bytes after an answer wait for a delayed ACK, in a time the test does not have
@@ -135,6 +136,7 @@ class ModbusPeer {
   }
 
   std::size_t requests = 0;
+  std::size_t connections = 0;  ///< over TCP
 
  private:
   [[nodiscard]] std::string link() const { return folder_ + "/line"; }

@@ -52,10 +52,10 @@ inline ModbusBytes modbus_exception(modbus::Transport transport, const modbus::R
 }
 
 /// Air temperature at 10 and pressure at 11 in tenths, temperature 3 at 30; serial number in BCD at 100.
-inline drivers::RegisterMap small_map() {
+inline drivers::RegisterMap small_map(std::uint8_t unit = 7) {
   using drivers::Quantity;
-  const auto at = [](std::uint16_t address, modbus::RegisterType type = modbus::RegisterType::Int16) {
-    return drivers::RegisterPlace{7, modbus::Function::ReadHoldingRegisters, address, type,
+  const auto at = [unit](std::uint16_t address, modbus::RegisterType type = modbus::RegisterType::Int16) {
+    return drivers::RegisterPlace{unit, modbus::Function::ReadHoldingRegisters, address, type,
                                   modbus::WordOrder::HighFirst};
   };
   drivers::RegisterMap map;

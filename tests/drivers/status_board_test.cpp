@@ -53,10 +53,10 @@ TEST(FaultText, CutsWhatIsTooLong) {
 
 TEST(FaultText, CutsBetweenCharactersNotWithinOne) {
   FaultText text;
-  text.set(HostTime{}, std::string(FaultText::kCapacity - 1, 'x') + "\u00b5m");
+  text.set(HostTime{}, std::string(FaultText::kCapacity - 1, 'x').append("\u00b5m"));
   EXPECT_EQ(text.read().text, std::string(FaultText::kCapacity - 1, 'x'));
-  text.set(HostTime{}, std::string(FaultText::kCapacity - 2, 'x') + "\u00b5");
-  EXPECT_EQ(text.read().text, std::string(FaultText::kCapacity - 2, 'x') + "\u00b5");
+  text.set(HostTime{}, std::string(FaultText::kCapacity - 2, 'x').append("\u00b5"));
+  EXPECT_EQ(text.read().text, std::string(FaultText::kCapacity - 2, 'x').append("\u00b5"));
 }
 
 TEST(FaultText, NeverShowsPartsOfTwo) {

@@ -48,6 +48,13 @@ class TrackerDeviceTest : public testing::Test {
     }
     return true;
   }
+  /// The device thread is held up: the controller goes on, nobody reads.
+  void hold_up(std::chrono::nanoseconds duration) {
+    for (const auto end = time_.now() + duration; time_.now() < end; time_.advance(20ms)) {
+      peer_.serve(time_.now());
+      peer_.say_points();
+    }
+  }
   void collect() {
     std::array<TrackerPoint, 512> points{};
     while (const auto n = device_->points().pop(points))
@@ -197,6 +204,57 @@ TEST_F(TrackerDeviceTest, ComesBackAfterAReboot) {
   ASSERT_TRUE(run_until_state("disconnected"));
   EXPECT_THAT(device_->status().last_fault, HasSubstr("shutting down"));
   EXPECT_TRUE(run_until_state("streaming"));
+}
+
+TEST_F(TrackerDeviceTest, AThreadThatWasHeldUpReadsItsPointsBeforeItJudgesTheirSilence) {
+  make_device();
+  ASSERT_TRUE(run_until_state("streaming"));
+  run(5s);
+  hold_up(1500ms + 500ms);
+  run(1s);
+  EXPECT_EQ(device_->status().state, "streaming");
+  EXPECT_EQ(device_->status().faults, 0u) << device_->status().last_fault;
+  EXPECT_EQ(device_->status().gaps, 0u);
+}
+
+TEST_F(TrackerDeviceTest, AThreadThatWasHeldUpReadsTheAnswerBeforeItJudgesItLate) {
+  make_device();
+  ASSERT_TRUE(run_until_state("configuring"));
+  hold_up(3s + 1s);
+  ASSERT_TRUE(run_until_state("streaming"));
+  EXPECT_EQ(device_->status().faults, 0u) << device_->status().last_fault;
+}
+
+TEST_F(TrackerDeviceTest, PointsThatCameInTimeDoNotHideThatNoMoreCome) {
+  make_device();
+  ASSERT_TRUE(run_until_state("streaming"));
+  run(5s);
+  peer_.controller().inject({sim::FaultKind::Mute, 0.0, 60.0, 0.0, 0}, time_.now());
+  hold_up(4s);
+  run(1600ms);
+  EXPECT_THAT(device_->status().last_fault, HasSubstr("no points in 1.5 s"));
+}
+
+class FastClock : public TrackerDeviceTest {
+ protected:
+  FastClock() : TrackerDeviceTest(fast()) {}
+  static sim::TrackerOptions fast() {
+    sim::TrackerOptions o;
+    o.model.clock_drift_ppm = 300.0;
+    return o;
+  }
+};
+
+TEST_F(FastClock, IsReportedByNameAndItsPointsAreMarked) {
+  make_device();
+  ASSERT_TRUE(run_until_state("streaming"));
+  run(90s);
+  const auto status = device_->status();
+  EXPECT_FALSE(status.clock.settled);
+  EXPECT_THAT(status.last_fault, HasSubstr("ppm fast, a sound one at most 200 ppm"));
+  EXPECT_EQ(status.faults, 1u);
+  EXPECT_TRUE(has(points_.back().head.flags, SampleFlag::ClockUnsettled));
+  EXPECT_GT(points_.back().head.u_time, 4ms);  // 100 ppm over a minute are 6 ms, less what the scatter hides
 }
 
 class ColdTracker : public TrackerDeviceTest {

@@ -251,6 +251,17 @@ TEST_F(TrackerSessionTest, AControllerThatDiesWithoutABeamIsAFault) {
   EXPECT_EQ(session_.state(), TrackerState::Faulted);
 }
 
+TEST_F(TrackerSessionTest, AKeepAliveThatFallsDueWhileAnAnswerIsAwaitedIsNoDeadline) {
+  reach_streaming();
+  say(Event::MeasurementNotReady);  // the keep-alive is due at 5 s
+  let_pass(3900ms);
+  say(Event::MeasurementReady);
+  let_pass(1s);
+  ASSERT_THAT(sent_, ElementsAre(Command::StartMeasurement));
+  tick_after(200ms);
+  EXPECT_GT(session_.deadline(), now_);
+}
+
 TEST_F(TrackerSessionTest, PointsAfterTheBeamIsBackAreEnough) {
   reach_streaming();
   say(Event::MeasurementNotReady);

@@ -59,9 +59,16 @@ class TrackerSessionTest : public testing::Test {
     ASSERT_TRUE(std::holds_alternative<TrackerOpen>(action_));
     on(TrackerConnected{});
   }
-  void pass_query() { on(emscon::Answer{emscon::SystemStatusAnswer{}}); }
+  /// Up to the first setting; the questions before are answered, but with nothing.
+  void pass_query(
+      emscon::TrackerProcessorStatus processor = emscon::TrackerProcessorStatus::CompensationSet) {
+    emscon::SystemStatusAnswer status;
+    status.tracker_processor = processor;
+    on(emscon::Answer{status});
+    answer_until(Command::SetUnits);
+  }
   void answer_until(Command last) {
-    while (sent_.back() != last) answer();
+    for (int i = 0; i < 100 && sent_.back() != last; ++i) answer();
   }
   void reach_streaming() {
     connect();

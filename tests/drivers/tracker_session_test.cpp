@@ -17,9 +17,11 @@ TEST_F(TrackerSessionTest, AsksInTheOrderOfTheManual) {
   pass_query();
   answer_until(Command::StartMeasurement);
   EXPECT_THAT(sent_,
-              ElementsAre(Command::GetSystemStatus, Command::SetUnits, Command::SetSystemSettings,
-                          Command::Initialize, Command::SetStationOrientation, Command::SetTransformation,
-                          Command::SetCoordinateSystemType, Command::SetStatisticMode,
+              ElementsAre(Command::GetSystemStatus, Command::GetUnits, Command::GetCoordinateSystemType,
+                          Command::GetStatisticMode, Command::GetMeasurementMode,
+                          Command::GetContinuousTimeModeParams, Command::GetLongSystemParameter,
+                          Command::GetSystemSettings, Command::SetUnits, Command::SetSystemSettings,
+                          Command::Initialize, Command::SetCoordinateSystemType, Command::SetStatisticMode,
                           Command::SetMeasurementMode, Command::SetContinuousTimeModeParams,
                           Command::SetLongSystemParameter, Command::StartMeasurement));
 }
@@ -103,8 +105,8 @@ class StationarySession : public TrackerSessionTest {
   static TrackerSessionOptions stationary() {
     TrackerSessionOptions o;
     o.mode = TrackerMode::Stationary;
-    o.reflector_id = 3;
-    o.go_bird_bath = true;
+    o.reflector = "3";
+    o.home_after_initialize = true;
     o.weather = emscon::WeatherMonitor::None;
     return o;
   }
@@ -114,10 +116,10 @@ TEST_F(StationarySession, TellsEnvironmentReflectorAndMode) {
   connect();
   pass_query();
   answer_until(Command::StartMeasurement);
-  EXPECT_THAT(sent_, ElementsAre(Command::GetSystemStatus, Command::SetUnits, Command::SetSystemSettings,
-                                 Command::SetEnvironmentParams, Command::Initialize, Command::SetReflector,
-                                 Command::GoBirdBath, Command::SetStationOrientation,
-                                 Command::SetTransformation, Command::SetCoordinateSystemType,
+  sent_.erase(sent_.begin(), std::find(sent_.begin(), sent_.end(), Command::SetUnits));
+  EXPECT_THAT(sent_, ElementsAre(Command::SetUnits, Command::SetSystemSettings, Command::SetEnvironmentParams,
+                                 Command::Initialize, Command::GetReflector, Command::GetReflectors,
+                                 Command::SetReflector, Command::GoBirdBath, Command::SetCoordinateSystemType,
                                  Command::SetStatisticMode, Command::SetMeasurementMode,
                                  Command::SetStationaryModeParams, Command::StartMeasurement));
 }

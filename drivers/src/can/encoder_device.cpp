@@ -6,6 +6,8 @@
 #include <thread>
 #include <utility>
 
+#include "abbe/protocol/can/error_frame.hpp"
+
 namespace abbe::drivers {
 
 using protocol::HostTime;
@@ -13,7 +15,10 @@ using protocol::RawBlock;
 
 namespace {
 
-constexpr auto kToldAgainAfter = std::chrono::seconds{1};
+std::string every(const std::optional<std::chrono::nanoseconds>& period) {
+  if (!period) return {};
+  return fmt::format(" every {:.3f} ms", std::chrono::duration<double, std::milli>(*period).count());
+}
 
 }  // namespace
 
@@ -38,7 +43,9 @@ EncoderDevice::EncoderDevice(const EncoderDeviceOptions& options, std::unique_pt
       raw_(options.raw_capacity_blocks),
       receiver_(options.receiver),
       supervisor_(options.receiver.axes, options.supervisor),
-      sync_under_way_(options.receiver) {
+      sync_under_way_(options.receiver),
+      presence_(options.receiver.axes.size(), options.receiver.sync_period),
+      emergencies_(options.receiver.axes) {
   board_.set_state("closed");
 }
 
@@ -52,14 +59,77 @@ void EncoderDevice::wait(std::chrono::nanoseconds at_most) {
   turn_end_ = time_.now();
   if (!ensure_open(at_most)) return;
   follow_bus_off(turn_end_);
-  send_sync();
-  if (!receiver_.bus_off()) {
-    supervisor_.on_time(time_.now());
-    send_configuration();
-  }
-  if (open_) read_batch(time_.now(), at_most);
+
+  // A thread that was held up reads what came meanwhile before it sends the next SYNC: the heartbeats among
+  // it are not late.
+  const bool behind = is_behind(turn_end_);
+  if (sending_ && !behind) send_sync();
+  if (sending_ && !bus_off()) send_configuration();
+  if (open_) read_batch(time_.now(), behind ? std::chrono::nanoseconds{0} : at_most);
+  if (behind) caught_up_ = all_read_;
+
+  if (open_) judge(turn_end_);
   account(turn_end_);
   show_state(turn_end_);
+}
+
+bool EncoderDevice::is_behind(HostTime now) const {
+  return !caught_up_ && next_sync_ && now >= *next_sync_ + options_.receiver.sync_period;
+}
+
+/// What is due at `now`, by all that came before.
+void EncoderDevice::judge(HostTime now) {
+  if (external()) return follow_external_sync(now);
+  follow_foreign_sync(now);
+  if (!sending_ || !all_read_ || bus_off()) return;
+  if (kernel_sync_) supervisor_.on_sync(now);
+  supervisor_.on_time(now);
+}
+
+void EncoderDevice::follow_foreign_sync(HostTime now) {
+  if (bus_off()) return;                // its quiet says nothing about other producers
+  if (!all_read_ && !sending_) return;  // a SYNC may be among the rest
+  const bool may_send = foreign_.may_send(now);
+  if (may_send && !sending_) {
+    foreign_told_ = false;
+    sending_ = true;
+    supervisor_.start(now);
+  } else if (!may_send && sending_) {
+    stop_sending();
+  }
+  const bool measured = foreign_.period() || now - foreign_.last() >= ForeignSync::kListenFor;
+  if (!foreign_.present() || !measured || std::exchange(foreign_told_, true)) return;
+  board_.fault(now,
+               fmt::format("CAN {}: another SYNC producer is on this bus{}: nothing is sent. To use its SYNC "
+                           "set sync = \"external\"; else switch that producer off",
+                           bus_->name(), every(foreign_.period())));
+}
+
+void EncoderDevice::follow_external_sync(HostTime now) {
+  const auto period = options_.receiver.sync_period;
+  const auto patience = std::max(ForeignSync::kListenFor, 3 * period);
+  const bool missing = now - std::max(opened_at_, foreign_.last()) >= patience;
+  if (missing && all_read_ && !std::exchange(no_sync_told_, true))
+    board_.fault(now,
+                 fmt::format("CAN {}: no SYNC (080h) for {} ms: sync = \"external\" needs the machine's own",
+                             bus_->name(), patience / std::chrono::milliseconds{1}));
+  if (!missing) no_sync_told_ = false;
+  const auto heard = foreign_.period();
+  if (!heard || now - opened_at_ < ForeignSync::kListenFor) return;
+  const bool other = *heard < period * 9 / 10 || *heard > period * 11 / 10;
+  if (other && !period_told_)
+    board_.fault(now, fmt::format("CAN {}: the machine's SYNC comes{}, configured is sync_period_us = {}",
+                                  bus_->name(), every(heard), period / std::chrono::microseconds{1}));
+  period_told_ = other;
+}
+
+void EncoderDevice::stop_sending() {
+  sending_ = false;
+  supervisor_.stop();
+  if (kernel_sync_) bus_->stop_sync();
+  kernel_sync_ = false;
+  next_sync_.reset();
+  sync_under_way_.forget();
 }
 
 bool EncoderDevice::ensure_open(std::chrono::nanoseconds at_most) {
@@ -70,7 +140,7 @@ bool EncoderDevice::ensure_open(std::chrono::nanoseconds at_most) {
     return false;
   }
   auto ids = supervisor_.ids();
-  if (bus_->echoes_sync()) ids.push_back(can::cob::kSync);
+  ids.push_back(can::cob::kSync);
   if (const auto opened = bus_->open(ids); !opened) {
     // The same refusal four times a second is one fault.
     if (opened.error().text != refusal_) board_.fault(now, opened.error().text);
@@ -79,9 +149,11 @@ bool EncoderDevice::ensure_open(std::chrono::nanoseconds at_most) {
     return false;
   }
   refusal_.clear();
-  rival_told_ = false;
   open_ = true;
-  supervisor_.start(now);
+  opened_at_ = now;
+  reopened_ = receiver_.bus_off();
+  bus_was_off_ = false;
+  foreign_.opened(now);
   return true;
 }
 
@@ -90,28 +162,33 @@ void EncoderDevice::close_bus(const Error& error) {
   board_.fault(now, error.text);
   bus_->close();
   open_ = false;
-  kernel_sync_ = false;
-  next_sync_.reset();
-  sync_under_way_.forget();
+  stop_sending();
+  presence_.forget();
+  show_condition(now);
   reopen_at_ = now + options_.reopen_after;
   board_.set_connected(false);
   board_.set_state("closed");
 }
 
 void EncoderDevice::follow_bus_off(HostTime now) {
-  if (receiver_.bus_off() == bus_was_off_) return;
-  bus_was_off_ = receiver_.bus_off();
+  if (!receiver_.bus_off()) reopened_ = false;
+  if (bus_off() == bus_was_off_) return;
+  bus_was_off_ = bus_off();
   next_sync_.reset();
   sync_under_way_.forget();
   if (bus_was_off_) {
+    off_since_ = now;
     board_.fault(now, fmt::format("CAN {}: bus off", bus_->name()));
-  } else {
+  } else if (sending_ && now - off_since_ <= ForeignSync::kShortBreak) {
     supervisor_.bus_recovered(now);
+  } else if (!external()) {  // what was on the bus meanwhile is not known: as after it was opened
+    stop_sending();
+    foreign_.opened(now);
   }
 }
 
 bool EncoderDevice::syncing() const {
-  return !receiver_.bus_off() && supervisor_.ready() > 0;
+  return !bus_off() && supervisor_.ready() > 0;
 }
 
 void EncoderDevice::follow_kernel_sync() {
@@ -134,13 +211,15 @@ void EncoderDevice::send_sync() {
   if (!next_sync_) next_sync_ = now;
   if (now < *next_sync_) return;
   const auto period = options_.receiver.sync_period;
-  *next_sync_ +=
-      period * ((now - *next_sync_) / period + 1);  // on the grid; the receiver counts what was left out
+  const auto late = now - *next_sync_;
+  *next_sync_ += period * (late / period + 1);  // on the grid; the receiver counts what was left out
+  if (late >= period) return;                   // else two could follow each other closer than answers come
   if (sync_under_way_.waits(now)) {
     ++kept_back_;
     return;
   }
-  (void)send(can::encode_sync());
+  caught_up_ = false;
+  if (send(can::encode_sync())) supervisor_.on_sync(now);
 }
 
 void EncoderDevice::send_configuration() {
@@ -172,79 +251,43 @@ bool EncoderDevice::send(const can::CanFrame& frame) {
 
 void EncoderDevice::read_batch(HostTime now, std::chrono::nanoseconds at_most) {
   auto until = std::min({now + at_most, receiver_.deadline(), sync_under_way_.deadline()});
+  if (!external()) until = std::min(until, foreign_.deadline());
   until = std::min(until, next_sync_.value_or(until));
-  if (!receiver_.bus_off()) until = std::min(until, supervisor_.deadline());
+  if (sending_ && !bus_off()) until = std::min(until, supervisor_.deadline());
   const auto budget = std::max(until - now, std::chrono::nanoseconds{0});
   const auto read = bus_->read(came_, time_.wall(budget));
-  turn_end_ = time_.now();
+  turn_end_ = read ? read->until : time_.now();
   if (!read) {
     if (read.error().code != ErrorCode::Unreachable) return close_bus(read.error());
     if (!unreachable_) board_.fault(turn_end_, read.error().text);
     unreachable_ = true;
     return;
   }
-  const auto came = std::span{came_}.first(*read);
-  all_read_ = came.size() < came_.size();
+  const auto came = std::span{came_}.first(read->frames);
+  all_read_ = read->all;
   if (options_.sync == SyncSource::Thread) {
     batch_count_ = sync_under_way_.settle(came, batch_, turn_end_, all_read_);
   } else {
     std::ranges::copy(came, batch_.begin());
     batch_count_ = came.size();
   }
-  for (const auto& received : std::span{batch_}.first(batch_count_)) {
-    if (received.frame.is(can::FrameFlag::Error) || received.echo) continue;
-    if (can::decode_sync(received.frame)) {  // no node of ours lives because of it
-      if (!std::exchange(rival_told_, true))
-        board_.fault(turn_end_,
-                     fmt::format("CAN {}: somebody else sends SYNCs on this bus, too", bus_->name()));
-      continue;
-    }
-    unreachable_ = false;
-    last_heard_ = turn_end_;
-    supervisor_.on_frame(received.frame, turn_end_);
+  for (const auto& received : std::span{batch_}.first(batch_count_)) look_at(received);
+}
+
+/// What the ordinary world does with a frame; the receiver sees it afterwards.
+void EncoderDevice::look_at(const ReceivedFrame& received) {
+  if (const auto report = can::decode_error_frame(received.frame)) {
+    if (has(report->conditions, can::BusCondition::BusOff)) reopened_ = false;
+    return;
   }
-}
-
-void EncoderDevice::account(HostTime now) {
-  while (const auto text = supervisor_.take_fault()) board_.fault(now, *text);
-  const auto bus = bus_->counters();
-  const auto missed = receiver_.counters().missed_syncs;
-  board_.gaps.add(bus.lost - bus_seen_.lost + missed - missed_seen_);
-  board_.time_widened.add(bus.time_widened - bus_seen_.time_widened);
-  if (bus.refused != bus_seen_.refused) {
-    board_.faults.add(bus.refused - bus_seen_.refused - 1);
-    board_.fault(now, fmt::format("CAN {}: read: {} datagrams that are no CAN frames", bus_->name(),
-                                  bus.refused - bus_seen_.refused));
-  }
-  bus_seen_ = bus;
-  missed_seen_ = missed;
-  tell_of(kept_back_, kept_back_told_,
-          "SYNCs not sent: the one before has not left, or its echo comes later than a SYNC period", now);
-  tell_of(receiver_.counters().short_frames, shorts_told_, "frames too short for a position", now);
-  tell_of(
-      receiver_.counters().duplicate_frames, duplicates_told_,
-      "second answers in a cycle: a node answers later than a SYNC period, a SYNC left late, somebody else "
-      "sends SYNCs, too, the echo of a SYNC was lost, or two nodes have one number",
-      now);
-}
-
-void EncoderDevice::tell_of(std::uint64_t count, Told& told, std::string_view what, HostTime now) {
-  if (count == told.count || (told.at && now - *told.at < kToldAgainAfter)) return;
-  board_.faults.add(count - told.count - 1);
-  board_.fault(now, fmt::format("CAN {}: read: {} {}", bus_->name(), count - told.count, what));
-  told = {count, now};
-}
-
-void EncoderDevice::show_state(HostTime now) {
-  if (!open_) return;
-  const auto ready = supervisor_.ready();
-  const bool heard = last_heard_ != HostTime{} && now - last_heard_ < options_.supervisor.silence;
-  board_.set_connected(heard && !receiver_.bus_off());
-  board_.set_state(receiver_.bus_off()                  ? "bus off"
-                   : ready == supervisor_.nodes()       ? "streaming"
-                   : ready > 0                          ? "degraded"
-                   : heard || last_heard_ == HostTime{} ? "configuring"
-                                                        : "silent");
+  if (received.echo) return;
+  if (can::decode_sync(received.frame))
+    return foreign_.heard(received.time);  // no node of ours lives because of it
+  unreachable_ = false;
+  last_heard_ = turn_end_;
+  together_.on_frame(received);
+  emergencies_.on_frame(received.frame, turn_end_);
+  if (sending_) supervisor_.on_frame(received.frame, turn_end_);
 }
 
 }  // namespace abbe::drivers

@@ -3,6 +3,10 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "abbe/protocol/can/cia406.hpp"
 
 namespace abbe::drivers {
 
@@ -15,6 +19,34 @@ namespace {
 constexpr std::chrono::milliseconds kBetweenStarts{50};
 /// A heartbeat from before the NMT start may still be on its way: believe the second one.
 constexpr unsigned kIdleBeats = 2;
+/// A node that has answered for so long is well again: its next fault is a new one.
+constexpr std::chrono::seconds kSettledAfter{1};
+
+constexpr double kNanometresPerMetre = 1e9;
+
+/// What trying again does not change: it waits for another node, or for this one switched off and on.
+bool is_final(const can::ConfigurationError& error) {
+  switch (error.fault) {
+    case ConfigurationFault::WrongStep:
+    case ConfigurationFault::FixedMapping:
+    case ConfigurationFault::FixedType:
+      return true;
+    case ConfigurationFault::Refused:
+      return can::is_lasting(error.abort_code) && error.object.index >= can::object::kTpdoMapping &&
+             error.object.index <= can::object::kTpdoMapping + 1;
+    default:
+      return false;
+  }
+}
+
+/// "20 nm, configured is step_nm = 10".
+std::string steps(const EncoderAxis& axis, std::uint32_t seen) {
+  const double configured = std::abs(axis.scale.value_or(0.0)) * kNanometresPerMetre;
+  if (axis.kind == AxisKind::Linear)
+    return fmt::format("{} nm, configured is step_nm = {:.10g}", seen, configured);
+  return fmt::format("{} counts a revolution ({:.10g} nrad), configured is step_nrad = {:.10g}", seen,
+                     2.0 * std::numbers::pi * kNanometresPerMetre / seen, configured);
+}
 
 can::EncoderPlan plan_of(const EncoderAxis& axis, std::uint16_t heartbeat_ms) {
   can::EncoderPlan plan;
@@ -25,6 +57,9 @@ can::EncoderPlan plan_of(const EncoderAxis& axis, std::uint16_t heartbeat_ms) {
   plan.serial = axis.serial;
   plan.linear = axis.kind == AxisKind::Linear;
   plan.needs_scale = !axis.scale.has_value();
+  if (axis.scale && plan.linear.value_or(true)) plan.step_nm = std::abs(*axis.scale) * kNanometresPerMetre;
+  if (axis.scale && !plan.linear.value_or(true))
+    plan.units_per_revolution = 2.0 * std::numbers::pi / std::abs(*axis.scale);
   return plan;
 }
 
@@ -34,6 +69,12 @@ std::string describe(const EncoderAxis& axis, const can::ConfigurationError& err
   if (error.fault == ConfigurationFault::Refused) {
     text += fmt::format(": {} ({:08X}h)", to_text(error.abort_code),
                         static_cast<std::uint32_t>(error.abort_code));
+  } else if (error.fault == ConfigurationFault::WrongStep) {
+    text += ": " + steps(axis, error.seen);
+  } else if (error.fault == ConfigurationFault::FixedMapping) {
+    text += fmt::format(": try tpdo = {}", axis.tpdo == 1 ? 2 : 1);
+  } else if (error.fault == ConfigurationFault::FixedType) {
+    text += fmt::format(" but {}: try tpdo = {}", error.seen, axis.tpdo == 1 ? 2 : 1);
   } else if (error.seen != 0) {
     text += fmt::format(": {:08X}h", error.seen);
   }
@@ -71,9 +112,19 @@ void EncoderSupervisor::start(HostTime now) {
   for (auto& node : nodes_) configure(node, now);
 }
 
-void EncoderSupervisor::bus_recovered(HostTime now) {
-  broadcasts_.push_back(can::encode_nmt(can::NmtCommand::ResetCommunication, can::kAllNodes));
+void EncoderSupervisor::stop() {
+  resets_.clear();
   for (auto& node : nodes_) {
+    while (node.configurator.take_frame()) {
+    }
+    node.state = State::Waiting;
+    node.retry_at = HostTime::max();
+  }
+}
+
+void EncoderSupervisor::bus_recovered(HostTime now) {
+  for (auto& node : nodes_) {
+    resets_.push_back(can::encode_nmt(can::NmtCommand::ResetCommunication, node.axis.node));
     node.state = State::Waiting;  // the boot-up message starts it, or this time-out
     node.retry_at = now + options_.sdo.timeout;
   }
@@ -100,9 +151,16 @@ void EncoderSupervisor::on_frame(const can::CanFrame& frame, HostTime now) {
   }
 }
 
+void EncoderSupervisor::on_sync(HostTime now) {
+  for (auto& node : nodes_) {
+    if (node.state == State::Ready && !node.asked) node.asked = now;
+  }
+}
+
 void EncoderSupervisor::on_position(Node& node, HostTime now) {
-  node.positions_at = now;
-  if (node.state == State::Ready) node.told = ConfigurationFault::None;
+  node.asked.reset();
+  if (node.state == State::Ready && now - node.ready_at >= kSettledAfter)
+    node.told = ConfigurationFault::None;
 }
 
 void EncoderSupervisor::on_heartbeat(Node& node, can::NodeState state, HostTime now) {
@@ -114,7 +172,19 @@ void EncoderSupervisor::on_heartbeat(Node& node, can::NodeState state, HostTime 
     return configure(node, now);  // it is back
   }
   node.idle_beats = state == can::NodeState::Operational ? 0 : node.idle_beats + 1;
-  if (node.state == State::Ready && node.idle_beats >= kIdleBeats) configure(node, now);
+  if (node.state == State::Ready && node.idle_beats >= kIdleBeats) on_dropped(node, state, now);
+}
+
+/// It has left the state "operational" by itself. One that does so again and again is not configured without
+/// a pause.
+void EncoderSupervisor::on_dropped(Node& node, can::NodeState state, HostTime now) {
+  tell(node, ConfigurationFault::NotOperational,
+       fmt::format("encoder {} (node {}): left the state operational by itself ({}): is configured again",
+                   node.axis.name, node.axis.node,
+                   state == can::NodeState::Stopped ? "stopped" : "pre-operational"));
+  if (now - node.ready_at >= kSettledAfter) return configure(node, now);
+  node.state = State::Waiting;
+  node.retry_at = now + options_.retry_after;
 }
 
 void EncoderSupervisor::on_time(HostTime now) {
@@ -128,7 +198,7 @@ void EncoderSupervisor::on_time(HostTime now) {
         follow(node, now);
         break;
       case State::Ready:
-        if (now - node.positions_at < options_.silence) break;
+        if (!node.asked || now - *node.asked < options_.silence) break;
         tell(
             node, ConfigurationFault::Silent,
             fmt::format("encoder {} (node {}): listen: no position for {} ms", node.axis.name, node.axis.node,
@@ -142,11 +212,12 @@ void EncoderSupervisor::on_time(HostTime now) {
 void EncoderSupervisor::follow(Node& node, HostTime now) {
   if (node.configurator.state() == can::EncoderConfigurator::State::Ready) {
     node.state = State::Ready;
-    node.positions_at = now;
+    node.ready_at = now;
+    node.asked.reset();
   } else if (node.configurator.state() == can::EncoderConfigurator::State::Failed) {
     node.state = State::Waiting;
-    node.retry_at = now + options_.retry_after;
     const auto& error = node.configurator.error();
+    node.retry_at = is_final(error) ? HostTime::max() : now + options_.retry_after;
     tell(node, error.fault, describe(node.axis, error));
   }
 }
@@ -157,9 +228,9 @@ void EncoderSupervisor::tell(Node& node, ConfigurationFault fault, std::string t
 }
 
 std::optional<can::CanFrame> EncoderSupervisor::take_frame() {
-  if (!broadcasts_.empty()) {
-    const auto frame = broadcasts_.front();
-    broadcasts_.erase(broadcasts_.begin());
+  if (!resets_.empty()) {
+    const auto frame = resets_.front();
+    resets_.erase(resets_.begin());
     return frame;
   }
   for (auto& node : nodes_) {
@@ -180,7 +251,8 @@ HostTime EncoderSupervisor::deadline() const {
   for (const auto& node : nodes_) {
     const auto due = node.state == State::Waiting       ? node.retry_at
                      : node.state == State::Configuring ? node.configurator.deadline()
-                                                        : node.positions_at + options_.silence;
+                     : node.asked                       ? *node.asked + options_.silence
+                                                        : HostTime::max();
     earliest = std::min(earliest, due);
   }
   return earliest;

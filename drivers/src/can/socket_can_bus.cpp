@@ -10,9 +10,11 @@
 
 #include <array>
 #include <cstring>
+#include <utility>
 
 #include "abbe/drivers/can/linux_frame.hpp"
 #include "abbe/protocol/can/canopen.hpp"
+#include "abbe/protocol/can/error_frame.hpp"
 #include "can/socket_io.hpp"
 
 namespace abbe::drivers {
@@ -22,6 +24,12 @@ using protocol::HostTime;
 namespace {
 constexpr unsigned kSlots = CanBus::kMostRead;
 constexpr std::size_t kControlBytes = 256;
+
+/// What SO_RXQ_OVFL counts, among the frames: the controller would say the same of its own queue.
+can::CanFrame loss_mark() {
+  return can::encode_error_frame(
+      {.conditions = static_cast<can::BusConditions>(can::BusCondition::ReceiveOverflow)});
+}
 }  // namespace
 
 struct SocketCanBus::Batch {
@@ -59,8 +67,10 @@ void SocketCanBus::close() noexcept {
   stop_sync();
   if (fd_ >= 0) ::close(fd_);
   fd_ = -1;
-  kernel_sent_ = false;
+  left_over_ = left_over_ || sent_sync_ || kernel_sent_;
+  sent_sync_ = kernel_sent_ = false;
   last_overflow_ = 0;
+  held_.reset();
 }
 
 Result<void> SocketCanBus::open(std::span<const std::uint32_t> ids) {
@@ -130,50 +140,65 @@ Result<void> SocketCanBus::bind_to_interface(int index) {
   return {};
 }
 
-Result<std::size_t> SocketCanBus::read(std::span<ReceivedFrame> out, std::chrono::nanoseconds wall) {
-  wait_readable(fd_, wall);
+Result<CanRead> SocketCanBus::read(std::span<ReceivedFrame> out, std::chrono::nanoseconds wall) {
+  if (!held_) wait_readable(fd_, wall);
   batch_->prepare();
+  const auto until = time_.now();
   const auto begun = read_clock_pair();
-  const auto slots = static_cast<unsigned>(std::min<std::size_t>(kSlots, out.size()));
+  std::size_t count = 0;
+  if (held_) out[count++] = *std::exchange(held_, std::nullopt);
+  const auto slots = static_cast<unsigned>(std::min<std::size_t>(kSlots, out.size() - count));
   const int got = recvmmsg(fd_, batch_->messages.data(), slots, MSG_DONTWAIT, nullptr);
   if (got < 0) {
     if (errno != EAGAIN && errno != EWOULDBLOCK && errno != EINTR)
       return socket_error(ErrorCode::SystemRefused, name(), "receive", errno);  // ENETDOWN: it went down
+    if (errno == EINTR) return CanRead{.frames = count, .until = until};
     stamps_.nothing_older_than(begun);
-    return 0;
+    return CanRead{.frames = count, .all = true, .until = until};
   }
   batch_->used = static_cast<unsigned>(got);
   const auto clocks = read_clock_pair();
   const auto now = options_.speed > 0.0 ? HostTime{time_.host(clocks.monotonic)} : time_.now();
-  std::size_t count = 0;
+  bool marked = false;
   for (unsigned i = 0; i < static_cast<unsigned>(got); ++i) {
     auto& message = batch_->messages[i];
     const auto arrival =
         options_.speed > 0.0 ? stamps_.arrival(stamp_of(message.msg_hdr), clocks, now) : Arrival{.time = now};
-    out[count].time = arrival.time;
-    out[count].time_widened = arrival.widened;
+    ReceivedFrame received{.time = arrival.time, .time_widened = arrival.widened};
     for (auto* c = CMSG_FIRSTHDR(&message.msg_hdr); c != nullptr; c = CMSG_NXTHDR(&message.msg_hdr, c)) {
       if (c->cmsg_level != SOL_SOCKET || c->cmsg_type != SO_RXQ_OVFL) continue;
       std::uint32_t overflow = 0;  // cumulative for this socket
       std::memcpy(&overflow, CMSG_DATA(c), sizeof overflow);
+      if (overflow == last_overflow_) continue;
       lost_ += overflow - last_overflow_;
       last_overflow_ = overflow;
+      if (!std::exchange(marked, true)) out[count++] = {.frame = loss_mark(), .time = arrival.time};
     }
     const auto frame = from_linux(batch_->frames[i], message.msg_len);
     if (!frame) continue;
     // MSG_CONFIRM: sent by this socket, MSG_DONTROUTE: on this computer [Linux, networking/can].
     const bool by_us = (message.msg_hdr.msg_flags & MSG_CONFIRM) != 0;
-    const bool by_the_kernel = kernel_sent_ && (message.msg_hdr.msg_flags & MSG_DONTROUTE) != 0;
-    out[count].echo = (by_us || by_the_kernel) && can::decode_sync(*frame).has_value();
-    if (by_us && !out[count].echo) continue;
-    out[count++].frame = *frame;
+    const bool from_here = (message.msg_hdr.msg_flags & MSG_DONTROUTE) != 0;
+    const bool by_the_kernel = kernel_sent_ && from_here;
+    const bool sync = can::decode_sync(*frame).has_value();
+    received.echo = (by_us || by_the_kernel) && sync;
+    if (by_us && !received.echo) continue;
+    if (left_over_ && from_here && sync && !received.echo) continue;
+    received.frame = *frame;
+    if (count < out.size()) {
+      out[count++] = received;
+    } else {
+      held_ = received;
+    }
   }
-  if (static_cast<unsigned>(got) < slots) stamps_.nothing_older_than(begun);
-  return count;
+  const bool at_end = static_cast<unsigned>(got) < slots;  // also of those that are not handed on
+  if (at_end) stamps_.nothing_older_than(begun);
+  return CanRead{.frames = count, .all = at_end && !held_, .until = until};
 }
 
 Result<void> SocketCanBus::send(std::span<const can::CanFrame> frames) {
   for (const auto& frame : frames) {
+    sent_sync_ = sent_sync_ || can::decode_sync(frame).has_value();
     const auto out = to_linux(frame);
     if (write(fd_, &out.frame, out.size) >= 0) continue;
     // A full transmit queue empties by itself, or the bus is off and an error frame says so.

@@ -50,12 +50,14 @@ std::string UdpCanBus::name() const {
 }
 
 CanBusCounters UdpCanBus::counters() const noexcept {
-  return {gaps_.lost(), refused_, stamps_.widened()};
+  return {gaps_.lost(), refused_, stamps_.widened(), strangers_};
 }
 
 void UdpCanBus::close() noexcept {
-  if (fd_ >= 0) ::close(fd_);
-  fd_ = -1;
+  for (int* fd : {&fd_, &stranger_fd_}) {
+    if (*fd >= 0) ::close(*fd);
+    *fd = -1;
+  }
   bound_port_ = 0;
   rest_.reset();
 }
@@ -74,63 +76,113 @@ Result<void> UdpCanBus::open(std::span<const std::uint32_t> ids) {
   const auto peer = resolve(options_.peer_address, options_.peer_port);
   if (!peer) return tl::unexpected(peer.error());
   stamps_.nothing_older_than(read_clock_pair());
-  fd_ = socket(AF_INET, SOCK_DGRAM | SOCK_NONBLOCK | SOCK_CLOEXEC, 0);
-  if (fd_ < 0) return socket_error(ErrorCode::SystemRefused, name(), "socket", errno);
-  enable_stamps(fd_);
-  const auto* local_any = reinterpret_cast<const sockaddr*>(&*local);  // NOLINT: the sockets interface
-  if (bind(fd_, local_any, sizeof *local) != 0) {
+  return bind_and_connect(*local, *peer);
+}
+
+/// The port is bound alone, so that a taken one is refused; then shared with a second socket of ours. Once
+/// the first one is connected the kernel gives it the peer's datagrams, and the second one all others: a
+/// flood of those takes no room from the peer.
+Result<void> UdpCanBus::bind_and_connect(const sockaddr_in& local, const sockaddr_in& peer) {
+  const auto no = [this](std::string_view what) {
     const auto error = errno;
     close();
-    const auto what = fmt::format("bind {}:{}", options_.local_address, options_.local_port);
     return socket_error(ErrorCode::SystemRefused, name(), what, error);
-  }
-  // Connected: only the peer's datagrams come in, and nobody listening there shows as an error.
-  const auto* peer_any = reinterpret_cast<const sockaddr*>(&*peer);  // NOLINT: the sockets interface
-  if (connect(fd_, peer_any, sizeof *peer) != 0) {
-    const auto error = errno;
-    close();
-    return socket_error(ErrorCode::SystemRefused, name(), "connect", error);
-  }
+  };
+  peer_ = peer;
+  fd_ = socket(AF_INET, SOCK_DGRAM | SOCK_NONBLOCK | SOCK_CLOEXEC, 0);
+  if (fd_ < 0) return no("socket");
+  enable_stamps(fd_);
+  const auto* local_any = reinterpret_cast<const sockaddr*>(&local);  // NOLINT: the sockets interface
+  if (bind(fd_, local_any, sizeof local) != 0)
+    return no(fmt::format("bind {}:{}", options_.local_address, options_.local_port));
   sockaddr_in bound{};
   socklen_t length = sizeof bound;
   getsockname(fd_, reinterpret_cast<sockaddr*>(&bound), &length);  // NOLINT: the sockets interface
   bound_port_ = ntohs(bound.sin_port);
+  listen_for_strangers(bound);
+  const auto* peer_any = reinterpret_cast<const sockaddr*>(&peer_);  // NOLINT: the sockets interface
+  if (connect(fd_, peer_any, sizeof peer_) != 0) return no("connect");
   return {};
 }
 
-Result<std::size_t> UdpCanBus::read(std::span<ReceivedFrame> out, std::chrono::nanoseconds wall) {
-  auto count = take_frames(out);
-  if (count == 0) wait_readable(fd_, wall);
-  const auto begun = read_clock_pair();
-  while (count < out.size()) {
-    const auto received = receive_datagram();
-    if (!received && count == 0) return tl::unexpected(received.error());
-    if (!received) break;
-    if (!*received) {
-      stamps_.nothing_older_than(begun);
-      break;
-    }
-    count += take_frames(out.subspan(count));
-  }
-  return count;
+/// Without it strangers are refused all the same, but not counted.
+void UdpCanBus::listen_for_strangers(sockaddr_in local) {
+  const int on = 1;
+  setsockopt(fd_, SOL_SOCKET, SO_REUSEPORT, &on, sizeof on);
+  stranger_fd_ = socket(AF_INET, SOCK_DGRAM | SOCK_NONBLOCK | SOCK_CLOEXEC, 0);
+  if (stranger_fd_ < 0) return;
+  setsockopt(stranger_fd_, SOL_SOCKET, SO_REUSEPORT, &on, sizeof on);
+  const auto* any = reinterpret_cast<const sockaddr*>(&local);  // NOLINT: the sockets interface
+  if (bind(stranger_fd_, any, sizeof local) == 0) return;
+  ::close(stranger_fd_);
+  stranger_fd_ = -1;
 }
 
-/// The next datagram into the buffer; false when there is none. One that is no CAN datagram is counted and
-/// skipped.
-Result<bool> UdpCanBus::receive_datagram() {
+bool UdpCanBus::is_peer(const sockaddr_in& from) const {
+  return from.sin_addr.s_addr == peer_.sin_addr.s_addr && from.sin_port == peer_.sin_port;
+}
+
+void UdpCanBus::count_stranger(const sockaddr_in& from) {
+  std::array<char, INET_ADDRSTRLEN> text{};
+  ::inet_ntop(AF_INET, &from.sin_addr, text.data(), text.size());
+  ++strangers_;
+  stranger_ = fmt::format("{}:{}", text.data(), ntohs(from.sin_port));
+}
+
+void UdpCanBus::count_strangers() {
+  constexpr unsigned kMostAtOnce = 64;
+  if (stranger_fd_ < 0) return;
+  for (unsigned i = 0; i < kMostAtOnce; ++i) {
+    sockaddr_in from{};
+    socklen_t size = sizeof from;
+    auto* any = reinterpret_cast<sockaddr*>(&from);  // NOLINT: the sockets interface
+    if (::recvfrom(stranger_fd_, nullptr, 0, MSG_DONTWAIT, any, &size) < 0) return;
+    // What the peer sent before the first socket was connected is lost, not refused.
+    if (!is_peer(from)) count_stranger(from);
+  }
+}
+
+Result<CanRead> UdpCanBus::read(std::span<ReceivedFrame> out, std::chrono::nanoseconds wall) {
+  CanRead read{.frames = take_frames(out)};
+  if (read.frames == 0) wait_readable(fd_, wall);
+  count_strangers();
+  read.until = time_.now();
+  const auto begun = read_clock_pair();
+  while (read.frames < out.size()) {
+    const auto next = receive_datagram();
+    if (!next && read.frames == 0) return tl::unexpected(next.error());
+    read.all = next && *next == Next::Nothing;
+    if (read.all) stamps_.nothing_older_than(begun);
+    if (!next || *next != Next::Datagram) break;
+    read.frames += take_frames(out.subspan(read.frames));
+  }
+  return read;
+}
+
+/// The next datagram into the buffer. One that is no CAN datagram is counted and skipped; Unknown: many were,
+/// and there may be more.
+Result<UdpCanBus::Next> UdpCanBus::receive_datagram() {
   for (unsigned skipped = 0; skipped < 64; ++skipped) {  // a flood of garbage must not keep us here
     iovec io{buffer_.data(), buffer_.size()};
     alignas(cmsghdr) std::array<char, 256> control{};
+    sockaddr_in from{};
     msghdr message{};
+    message.msg_name = &from;
+    message.msg_namelen = sizeof from;
     message.msg_iov = &io;
     message.msg_iovlen = 1;
     message.msg_control = control.data();
     message.msg_controllen = control.size();
     const auto size = recvmsg(fd_, &message, MSG_DONTWAIT);
     if (size < 0) {
-      if (errno == EAGAIN || errno == EWOULDBLOCK || errno == EINTR) return false;
+      if (errno == EAGAIN || errno == EWOULDBLOCK) return Next::Nothing;
+      if (errno == EINTR) return Next::Unknown;
       const auto code = errno == ECONNREFUSED ? ErrorCode::Unreachable : ErrorCode::SystemRefused;
       return socket_error(code, name(), "receive", errno);
+    }
+    if (!is_peer(from)) {  // it came before the socket was connected
+      count_stranger(from);
+      continue;
     }
     rest_arrival_ = {.time = time_.now()};
     if (options_.speed > 0.0) {
@@ -141,11 +193,11 @@ Result<bool> UdpCanBus::receive_datagram() {
     if (view) {
       gaps_.on_sequence(view->sequence());
       rest_ = *view;
-      return true;
+      return Next::Datagram;
     }
     ++refused_;
   }
-  return false;
+  return Next::Unknown;
 }
 
 std::size_t UdpCanBus::take_frames(std::span<ReceivedFrame> out) {

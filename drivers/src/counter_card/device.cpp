@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 #include <utility>
 
 #include "abbe/protocol/usbip/urb.hpp"
@@ -20,6 +21,11 @@ CounterCardOptions completed(const CounterCardOptions& options, const UsbLink& l
   all.session.wiring = options.receiver.wiring;
   all.session.stream = {transfer_bytes(options), options.transfers_in_flight};
   return all;
+}
+
+std::string seconds_text(double behind_s) {
+  return fmt::format("its clock channel is {:.3f} s {} where it must be", std::abs(behind_s),
+                     behind_s < 0.0 ? "ahead of" : "behind");
 }
 
 Result<void> check(const CounterCardOptions& options) {
@@ -119,8 +125,9 @@ std::string CounterCardDevice::assumption() const {
 void CounterCardDevice::wait(std::chrono::nanoseconds at_most) {
   hand_over_scans();
   hand_over_events();
-  tell(CardTick{});
-  const auto until_due = session_.deadline() - time_.now();
+  tell(CardTick{read_until_});
+  read_until_ = time_.now();
+  const auto until_due = session_.deadline() - read_until_;
   events_ = link_->wait(time_.wall(std::clamp(until_due, std::chrono::nanoseconds{0}, at_most)));
   turn_end_ = time_.now();
   account();
@@ -129,6 +136,8 @@ void CounterCardDevice::wait(std::chrono::nanoseconds at_most) {
 
 /// What receive() made of the latest bytes.
 void CounterCardDevice::hand_over_scans() {
+  const auto anew = receiver_.counters().began_anew;
+  if (anew != std::exchange(began_anew_seen_, anew)) tell(CardBeganAnew{seconds_text(receiver_.behind_s())});
   if (const auto count = std::exchange(scans_, 0); count != 0) tell(CardScans{count});
   if (!receiver_.out_of_step()) {
     out_of_step_told_ = false;
@@ -148,9 +157,10 @@ void CounterCardDevice::hand_over_events() {
     } else if (const auto* lost = std::get_if<UsbLost>(&event)) {
       if (session_.connected()) raw_.push_bytes(turn_end_, RawBlock::Direction::ToDevice, {});
       tell(*lost);
-    } else if (std::holds_alternative<UsbOpened>(event)) {
+    } else if (const auto* opened = std::get_if<UsbOpened>(&event)) {
       raw_.push_bytes(turn_end_, RawBlock::Direction::FromDevice, {});
-      tell(UsbOpened{});
+      progress_.set_serial_number(opened->serial);
+      tell(*opened);
     } else {
       tell(UsbBulkStopped{});
     }
@@ -160,7 +170,7 @@ void CounterCardDevice::hand_over_events() {
 void CounterCardDevice::tell(const CardInput& input) {
   // An action that leaves nothing under way (starting the transfers) is followed by the next at once.
   for (bool again = act(session_.on(input, time_.now())); again;)
-    again = act(session_.on(CardTick{}, time_.now()));
+    again = act(session_.on(CardTick{read_until_}, time_.now()));
 }
 
 bool CounterCardDevice::act(const CardAction& action) {
@@ -186,7 +196,20 @@ void CounterCardDevice::send(const usb::Setup& setup) {
   link_->control(setup);
 }
 
+void CounterCardDevice::report_clock() {
+  const double skew = receiver_.skew_beyond_limit();
+  if (std::exchange(clock_reported_, skew != 0.0) || skew == 0.0) return;
+  constexpr double kPpm = 1e6;
+  board_.fault(
+      turn_end_,
+      fmt::format("{}: the clock of channel {} runs {:.0f} ppm {}, a sound one at most {:.0f} ppm: "
+                  "scans are marked ClockUnsettled; check the clock and clock_MHz",
+                  options_.session.peer, options_.receiver.wiring.clock_channel, kPpm * std::abs(skew),
+                  skew > 0.0 ? "fast" : "slow", kPpm * options_.receiver.clock.max_skew));
+}
+
 void CounterCardDevice::account() {
+  report_clock();
   const auto disagreements = receiver_.counters().latch_disagreements;
   if (disagreements != std::exchange(disagreements_seen_, disagreements)) {
     board_.fault(turn_end_,

@@ -4,7 +4,8 @@
 namespace abbe::drivers {
 namespace {
 
-constexpr double kQuartzDeviation = 500e-6;  // clock against pacer: two quartzes
+// Clock against pacer: two quartzes, each as far off the host's clock as the clock model believes of any.
+constexpr double kQuartzDeviation = 2.0 * ClockModelOptions{}.max_skew;
 constexpr double kReading_counts = 2.0;      // each reading is whole periods
 
 }  // namespace
@@ -31,6 +32,20 @@ CounterCardReceiver::CounterCardReceiver(const CounterCardReceiverOptions& optio
     current_.index_latched_mask = static_cast<std::uint8_t>(current_.index_latched_mask | bit);
     current_.axes.missing_mask = current_.index_latched_mask;
   }
+  if (options.goes_on_from) seed(*options.goes_on_from);
+}
+
+/// Counters are zeroed when they are set up: what they read is their count, but for whole rounds.
+void CounterCardReceiver::seed(const CounterCardProgress& from) {
+  const std::uint64_t round = quad08::modulus_of(width_) - 1;
+  quad08::RawScan& last = last_.emplace();
+  last[metronome_.place] = static_cast<std::uint64_t>(from.clock_count) & round;
+  current_.clock_count = from.clock_count;
+  for (std::size_t i = 0; i < current_.axes.axis_count; ++i) {
+    last[axes_[i].place] = static_cast<std::uint64_t>(from.count[i]) & round;
+    current_.axes.count[i] = from.count[i];
+  }
+  resumption_ = Resumption{.since = from.head.time, .begun = {}};
 }
 
 }  // namespace abbe::drivers

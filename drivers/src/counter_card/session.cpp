@@ -46,7 +46,10 @@ const char* name_of(CardState state) noexcept {
   return "?";
 }
 
-CounterCardSession::CounterCardSession(const CounterCardSessionOptions& options) : options_(options) {}
+CounterCardSession::CounterCardSession(const CounterCardSessionOptions& options)
+    : options_(options),
+      set_up_(options.set_up_serial.has_value()),
+      serial_(options.set_up_serial.value_or("")) {}
 
 CardAction CounterCardSession::on(const CardInput& input, HostTime now) {
   return std::visit([&](const auto& i) { return take(i, now); }, input);
@@ -66,7 +69,8 @@ HostTime CounterCardSession::deadline() const {
   return asked_at_;
 }
 
-CardAction CounterCardSession::take(const CardTick&, HostTime now) {
+CardAction CounterCardSession::take(const CardTick& tick, HostTime now) {
+  const HostTime until = std::min(now, tick.read_until);
   switch (state_) {
     case CardState::Closed:
       if (now < open_at_) return CardNothing{};
@@ -74,7 +78,7 @@ CardAction CounterCardSession::take(const CardTick&, HostTime now) {
       asked_at_ = now;
       return CardOpen{};
     case CardState::Opening:
-      if (now - asked_at_ < options_.open_timeout) return CardNothing{};
+      if (until - asked_at_ < options_.open_timeout) return CardNothing{};
       return fail(now, fmt::format("open: no answer in {}", in_milliseconds(options_.open_timeout)));
     case CardState::Testing:
     case CardState::SettingUp:
@@ -85,19 +89,20 @@ CardAction CounterCardSession::take(const CardTick&, HostTime now) {
       break;
   }
   if (asked_ || stopping_bulk_) {
-    if (now - asked_at_ < options_.control_timeout)
-      return silent(now) ? trouble_of_silence(now) : CardAction{CardNothing{}};
+    if (until - asked_at_ < options_.control_timeout)
+      return silent(until) ? trouble_of_silence(now) : CardAction{CardNothing{}};
     return fail(now, fmt::format("request: no answer in {}", in_milliseconds(options_.control_timeout)));
   }
-  return state_ == CardState::Streaming ? watch(now) : next_step(now);
+  if (state_ != CardState::Streaming) return next_step(now);
+  return !halt_ && silent(until) ? trouble_of_silence(now) : watch(now);
 }
 
 bool CounterCardSession::expects_scans() const {
   return state_ == CardState::Streaming && !halt_ && !troubled_;
 }
 
-bool CounterCardSession::silent(HostTime now) const {
-  return expects_scans() && now - last_scans_ >= options_.silence;
+bool CounterCardSession::silent(HostTime until) const {
+  return expects_scans() && until - last_scans_ >= options_.silence;
 }
 
 /// Also while the status is asked for: a card that is deaf answers neither.
@@ -107,21 +112,29 @@ CardAction CounterCardSession::trouble_of_silence(HostTime now) {
 
 /// Streaming, and nothing under way.
 CardAction CounterCardSession::watch(HostTime now) {
-  if (halt_) {
-    halt_ = false;
-    enter(CardState::Halting);
-    load(quad08::stop_sequence());
-    return next_step(now);
-  }
+  if (halt_) return halt(now);
   if (troubled_ && now >= retry_at_) return trouble(now, {});
-  if (silent(now)) return trouble_of_silence(now);
   if (now < next_status_) return CardNothing{};
   next_status_ = now + options_.status_period;
   return send(quad08::read(quad08::Register::Acquisition), now);
 }
 
-CardAction CounterCardSession::take(const UsbOpened&, HostTime now) {
+CardAction CounterCardSession::halt(HostTime now) {
+  halt_ = false;
+  enter(CardState::Halting);
+  load(quad08::stop_sequence());
+  return next_step(now);
+}
+
+CardAction CounterCardSession::take(const UsbOpened& opened, HostTime now) {
   if (state_ != CardState::Opening) return CardNothing{};
+  if (set_up_ && opened.serial != serial_) {
+    set_up_ = false;
+    report(
+        fmt::format("{}: its serial number is \"{}\", the counters of \"{}\" were set up: these begin anew",
+                    options_.peer, opened.serial, serial_));
+  }
+  serial_ = opened.serial;
   enter(CardState::Testing);
   load(quad08::open_sequence());
   return next_step(now);
@@ -147,15 +160,32 @@ CardAction CounterCardSession::next_step(HostTime now) {
 CardAction CounterCardSession::send(const usb::Setup& setup, HostTime now) {
   asked_ = true;
   asked_at_ = now;
+  tries_ = 1;
   return CardControl{setup};
+}
+
+/// One transfer that failed says nothing about the card: every request may be sent twice. Not so a wrong
+/// answer.
+std::optional<CardAction> CounterCardSession::send_again(const UsbControlDone& done, HostTime now) {
+  if (done.outcome == UsbOutcome::Done || tries_ >= options_.control_tries) return std::nullopt;
+  const unsigned tries = tries_ + 1;
+  CardAction again = send(done.setup, now);
+  tries_ = tries;
+  return again;
 }
 
 CardAction CounterCardSession::stage_done(HostTime now) {
   switch (state_) {
     case CardState::Testing:
-      enter_setting_up();
-      return next_step(now);
+      resuming_ = set_up_;
+      resumed_again_ = false;
+      if (!set_up_) {
+        enter_setting_up();
+        return next_step(now);
+      }
+      [[fallthrough]];
     case CardState::SettingUp:
+      set_up_ = true;
       enter(CardState::Loading);
       load(quad08::load_sequence(layout_of(options_.wiring), divisor_of(options_.wiring)));
       return next_step(now);
@@ -203,6 +233,7 @@ void CounterCardSession::enter_setting_up() {
 CardAction CounterCardSession::take(const UsbControlDone& done, HostTime now) {
   if (!asked_) return CardNothing{};
   asked_ = false;
+  if (auto again = send_again(done, now)) return *again;
   if (step_ < steps_.size()) {
     const auto& step = steps_[step_];
     const auto word = quad08::decode_word(done.bytes());
@@ -254,6 +285,10 @@ CardAction CounterCardSession::on_status(quad08::Status status, HostTime now) {
 CardAction CounterCardSession::take(const UsbBulkStopped&, HostTime now) {
   if (state_ != CardState::Halting) return CardNothing{};
   stopping_bulk_ = false;
+  if (!set_up_) {
+    enter_setting_up();
+    return next_step(now);
+  }
   enter(CardState::Loading);
   load(quad08::load_sequence(layout_of(options_.wiring), divisor_of(options_.wiring)));
   return next_step(now);
@@ -269,13 +304,30 @@ CardAction CounterCardSession::take(const UsbLost& lost, HostTime now) {
 CardAction CounterCardSession::take(const CardScans& scans, HostTime now) {
   if (scans.count == 0) return CardNothing{};
   last_scans_ = now;
-  troubled_ = false;
+  troubled_ = resuming_ = false;
   scans_since_fault_ = true;
   return CardNothing{};
 }
 
+CardAction CounterCardSession::take(const CardBeganAnew& anew, HostTime now) {
+  return state_ == CardState::Streaming && !halt_ ? set_up_again(now, anew.seen) : CardAction{CardNothing{}};
+}
+
+/// The counters stand or are others: the card was without power, or somebody else used it.
+CardAction CounterCardSession::set_up_again(HostTime now, const std::string& seen) {
+  report(fmt::format("{}: its counters did not go on{}{}: they are set up and begin anew", options_.peer,
+                     seen.empty() ? "" : ", ", seen));
+  set_up_ = resuming_ = troubled_ = false;
+  halt_ = true;
+  return asked_ ? CardAction{CardNothing{}} : watch(now);
+}
+
+/// Torn bytes look like a clock that stands, too (another counter's in its place): once the scan is started
+/// anew.
 CardAction CounterCardSession::take(const CardOutOfStep& out, HostTime now) {
-  return state_ == CardState::Streaming && !halt_ ? trouble(now, out.seen) : CardNothing{};
+  if (state_ != CardState::Streaming || halt_) return CardNothing{};
+  if (resuming_ && std::exchange(resumed_again_, true)) return set_up_again(now);
+  return trouble(now, out.seen);
 }
 
 CardAction CounterCardSession::take(const CardBulkFailed& failed, HostTime now) {
@@ -298,7 +350,7 @@ CardAction CounterCardSession::trouble(HostTime now, std::string text) {
 CardAction CounterCardSession::fail(HostTime now, std::string text) {
   if (!text.empty()) report(fmt::format("{}: {}", options_.peer, text));
   enter(CardState::Closed);
-  asked_ = stopping_bulk_ = halt_ = troubled_ = false;
+  asked_ = stopping_bulk_ = halt_ = troubled_ = resuming_ = false;
   open_at_ = now + options_.reopen_after;
   return CardClose{};
 }

@@ -28,21 +28,33 @@ auto in_ms(nanoseconds t) {
 
 Result<std::unique_ptr<EnvironmentDevice>> EnvironmentDevice::create(const EnvironmentDeviceOptions& options,
                                                                      const TimeSource& time) {
+  auto own = std::make_unique<EnvironmentLink>();
+  EnvironmentLink& link = *own;
+  auto device = create(options, time, link);
+  if (device) (*device)->own_link_ = std::move(own);
+  return device;
+}
+
+Result<std::unique_ptr<EnvironmentDevice>> EnvironmentDevice::create(const EnvironmentDeviceOptions& options,
+                                                                     const TimeSource& time,
+                                                                     EnvironmentLink& link) {
   if (const auto fine = check(options.map); !fine) return tl::unexpected(fine.error());
   if (!has_address(options.address))
     return tl::unexpected(
         Error{ErrorCode::BadConfiguration, options.name + ": host, port or path is missing"});
   if (options.period <= nanoseconds{0})
     return tl::unexpected(Error{ErrorCode::BadConfiguration, options.name + ": period must be above 0"});
-  return std::unique_ptr<EnvironmentDevice>{new EnvironmentDevice{options, time}};
+  return std::unique_ptr<EnvironmentDevice>{new EnvironmentDevice{options, time, link}};
 }
 
-EnvironmentDevice::EnvironmentDevice(const EnvironmentDeviceOptions& options, const TimeSource& time)
+EnvironmentDevice::EnvironmentDevice(const EnvironmentDeviceOptions& options, const TimeSource& time,
+                                     EnvironmentLink& link)
     : options_(options),
       time_(time),
       samples_(options.sample_capacity),
       raw_(options.raw_capacity_blocks),
-      receiver_(options.map, transport_of(options.address)) {
+      receiver_(options.map, transport_of(options.address)),
+      link_(link) {
   board_.set_state("closed");
 }
 
@@ -54,7 +66,17 @@ void EnvironmentDevice::wait(nanoseconds at_most) {
   heed_progress(time_.now());
   if (!ensure_open(at_most)) return;
   ask();
-  if (line_.is_open()) listen(at_most);
+  if (on_line()) listen(at_most);
+}
+
+bool EnvironmentDevice::busy() const noexcept {
+  return progress_ != Progress::Waiting || (on_line() && receiver_.awaiting());
+}
+
+HostTime EnvironmentDevice::due() const noexcept {
+  if (!link_.line.is_open()) return std::max(open_at_, link_.open_at);
+  if (!on_line()) return open_at_;
+  return receiver_.between_rounds() ? next_round_ : arrival_;
 }
 
 void EnvironmentDevice::heed_progress(HostTime now) {
@@ -65,6 +87,8 @@ void EnvironmentDevice::heed_progress(HostTime now) {
                 refused ? options_.refused_retry : options_.retry, refused ? "refused" : "closed");
   }
   if (progress == Progress::Waiting) return;
+  ++answers_;
+  ++link_.answers;
   board_.set_connected(true);
   board_.set_state(receiver_.proven() ? "reading" : "proving");
   if (progress == Progress::Sample) plan_next_round(now);
@@ -81,28 +105,35 @@ void EnvironmentDevice::plan_next_round(HostTime now) {
 }
 
 bool EnvironmentDevice::ensure_open(nanoseconds at_most) {
-  if (line_.is_open()) return true;
+  if (on_line()) return true;
   const auto now = time_.now();
-  if (now < open_at_) {
-    std::this_thread::sleep_for(time_.wall(std::min(at_most, nanoseconds{open_at_ - now})));
+  if (const auto from = due(); now < from) {
+    // Where others wait for the line it is theirs, now.
+    if (own_link_) std::this_thread::sleep_for(time_.wall(std::min(at_most, nanoseconds{from - now})));
     return false;
   }
-  if (const auto opened = line_.open(options_.address, options_.connect_timeout); !opened) {
-    fail(opened.error().text, options_.retry);
-    return false;
-  }
+  if (!link_.line.is_open() && !open_line()) return false;
+  opening_ = link_.openings;
   receiver_.begin();
   raw_.push_bytes(now, RawBlock::Direction::FromDevice, {});
   next_round_ = now;
+  arrival_ = now;
   board_.set_state("proving");
   return true;
+}
+
+bool EnvironmentDevice::open_line() {
+  const auto opened = link_.line.open(options_.address, options_.connect_timeout);
+  if (opened) ++link_.openings;
+  if (!opened) fail(opened.error().text, options_.retry);
+  return opened.has_value();
 }
 
 void EnvironmentDevice::ask() {
   const auto request = receiver_.next_request();
   const auto at = time_.now();  // before: no answer can be older than its question
   if (!request || (receiver_.between_rounds() && at < next_round_)) return;
-  if (const auto sent = line_.send(*request); !sent) return lose(sent.error().text);
+  if (const auto sent = link_.line.send(*request); !sent) return lose(sent.error().text);
   receiver_.sent(*request, at);
   answer_due_ = at + options_.answer_timeout;
   std::array<std::byte, modbus::kMaxAduSize> frame{};
@@ -113,27 +144,55 @@ void EnvironmentDevice::ask() {
 void EnvironmentDevice::listen(nanoseconds at_most) {
   const auto due = receiver_.awaiting() ? answer_due_ : next_round_;
   const auto budget = std::clamp(nanoseconds{due - time_.now()}, nanoseconds{0}, at_most);
-  const auto read = line_.read(buffer_, time_.wall(budget));
+  const auto read = link_.line.read(buffer_, time_.wall(budget));
   arrival_ = time_.now();
   if (!read) return lose(read.error().text);
   filled_ = *read;
   if (filled_ == 0 && receiver_.awaiting() && arrival_ >= answer_due_)
-    fail(fmt::format("no answer in {} ms", in_ms(options_.answer_timeout)), options_.retry);
+    fail(fmt::format("no answer in {} ms", in_ms(options_.answer_timeout)), options_.retry, "closed",
+         options_.answer_timeout);
 }
 
-/// The line has gone, and not by us: nothing sent, into a line that was open.
+/// Recorded as nothing sent, into a line that was open.
 void EnvironmentDevice::lose(std::string_view what) {
   raw_.push_bytes(time_.now(), RawBlock::Direction::ToDevice, {});
+  link_.line.close();
   fail(what, options_.retry);
 }
 
-void EnvironmentDevice::fail(std::string_view what, nanoseconds retry, const char* state) {
+void EnvironmentDevice::line_closed() noexcept {
+  if (std::exchange(opening_, 0) == 0) return;
+  board_.set_connected(false);
+  board_.set_state("closed");
+}
+
+/// Since the latest fault here: then the connection is not what failed.
+bool EnvironmentDevice::others_answered() noexcept {
+  const auto others = link_.answers - answers_;
+  return std::exchange(others_at_fault_, others) != others;
+}
+
+/// Of a connection that is closed by one all devices begin anew; one that stays open rests for as long as an
+/// answer may still come, and the others have their rounds before this device asks again.
+void EnvironmentDevice::leave_line(nanoseconds retry, nanoseconds quiet) {
+  const auto now = time_.now();
+  opening_ = 0;
+  open_at_ = now + retry;
+  if (link_.line.is_open() && others_answered()) {
+    open_at_ = now + std::max(retry, options_.period);
+    link_.quiet_until = now + quiet;
+    return;
+  }
+  link_.line.close();
+  link_.open_at = now + options_.retry;
+}
+
+void EnvironmentDevice::fail(std::string_view what, nanoseconds retry, const char* state, nanoseconds quiet) {
   const auto now = time_.now();
   board_.fault(now, fmt::format("{} {}: {}", options_.name, text_of(options_.address), what));
-  line_.close();
+  leave_line(retry, quiet);
   board_.set_connected(false);
   board_.set_state(state);
-  open_at_ = now + retry;
   filled_ = 0;
 }
 

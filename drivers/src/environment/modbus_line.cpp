@@ -1,14 +1,17 @@
 #include "abbe/drivers/environment/modbus_line.hpp"
 
+#include <fcntl.h>
 #include <fmt/format.h>
 #include <modbus/modbus.h>
 #include <poll.h>
+#include <sys/file.h>
 #include <unistd.h>
 
 #include <algorithm>
 #include <array>
 #include <cerrno>
 #include <ctime>
+#include <utility>
 
 namespace abbe::drivers {
 namespace {
@@ -60,6 +63,9 @@ ModbusLine::ModbusLine() = default;
 ModbusLine::~ModbusLine() = default;
 
 Result<void> ModbusLine::open(const ModbusAddress& address, nanoseconds wall) {
+  decltype(lock_) lock;
+  if (const auto* serial = std::get_if<ModbusSerial>(&address))
+    if (auto locked = lock.take(serial->path); !locked) return locked;
   decltype(context_) fresh{make_context(address)};
   if (!fresh) return failed("set up", errno);
   // libmodbus takes it for the connection, too; less than a microsecond would be refused.
@@ -71,11 +77,33 @@ Result<void> ModbusLine::open(const ModbusAddress& address, nanoseconds wall) {
   if (modbus_connect(fresh.get()) != 0) return failed("open", errno == EINPROGRESS ? ETIMEDOUT : errno);
   if (transport_of(address) == modbus::Transport::Rtu) modbus_flush(fresh.get());
   context_ = std::move(fresh);
+  lock_ = std::move(lock);
   return {};
 }
 
 void ModbusLine::close() noexcept {
   context_.reset();
+  lock_ = {};
+}
+
+SerialLock& SerialLock::operator=(SerialLock&& other) noexcept {
+  std::swap(fd_, other.fd_);
+  return *this;
+}
+
+SerialLock::~SerialLock() {
+  if (fd_ >= 0) ::close(fd_);
+}
+
+Result<void> SerialLock::take(const std::string& path) {
+  fd_ = ::open(path.c_str(), O_RDWR | O_NOCTTY | O_NONBLOCK | O_CLOEXEC);
+  if (fd_ < 0) return failed("open", errno);
+  if (::flock(fd_, LOCK_EX | LOCK_NB) == 0) return {};
+  if (errno != EWOULDBLOCK) return failed("lock", errno);
+  return tl::unexpected(
+      Error{ErrorCode::Unreachable,
+            "open: this serial line is in use, by an [[environment]] with another name of it "
+            "or by another program: give all devices of one line the same name"});
 }
 
 Result<void> ModbusLine::send(const modbus::ReadRequest& request) {

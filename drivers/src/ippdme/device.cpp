@@ -1,5 +1,7 @@
 #include "abbe/drivers/ippdme/device.hpp"
 
+#include <algorithm>
+#include <chrono>
 #include <utility>
 
 namespace abbe::drivers {
@@ -20,21 +22,43 @@ IppDevice::IppDevice(const IppDeviceOptions& options, TcpPeer peer, const TimeSo
       touches_(options.touch_capacity),
       positions_(options.position_capacity),
       raw_(options.raw_capacity_blocks),
-      receiver_(options.receiver) {
+      receiver_(options.receiver),
+      machine_{options.session.held, options.session.moving} {
   show();
 }
 
 IppDevice::~IppDevice() {
   try {
+    tell(IppStopRequested{});
+    await_standstill();
     leave(IppStopRequested{});
   } catch (...) {  // NOLINT(bugprone-empty-catch): out of memory; a server ends the session of a lost client
   }
 }
 
+/// Closing the connection before the answer has come would leave it to the server whether the machine stops.
+void IppDevice::await_standstill() {
+  constexpr auto kLook = std::chrono::milliseconds{20};
+  const auto& time_out = options_.session.command_timeout;
+  const auto until = std::chrono::steady_clock::now() + time_.wall(time_out);
+  while (session().state() == IppState::Aborting && std::chrono::steady_clock::now() < until) {
+    wait(time_.host(kLook));
+    receive();
+  }
+}
+
+void IppDevice::abort() {
+  requests_.put(IppAbortRequested{});
+}
+
+void IppDevice::release() {
+  requests_.put(IppReleaseRequested{});
+}
+
 void IppDevice::measure(std::span<const ProbePoint> points) {
-  const std::lock_guard lock{requests_mutex_};
-  requests_.insert(requests_.end(), points.begin(), points.end());
-  points_left_.fetch_add(points.size(), std::memory_order_release);  // pairs with points_left()
+  asked_.fetch_add(points.size(), std::memory_order_relaxed);
+  requests_.put(std::vector<ProbePoint>{points.begin(),
+                                        points.end()});  // orders what was asked before what is finished
 }
 
 void IppDevice::wait(std::chrono::nanoseconds at_most) {
@@ -43,7 +67,15 @@ void IppDevice::wait(std::chrono::nanoseconds at_most) {
   tell(IppTick{});
   poll(at_most);
   show();
+  report_machine();
   count_points();
+}
+
+void IppDevice::report_machine() {
+  const IppMachine machine{session().hold_reason(), session().moving()};
+  if (machine == machine_) return;
+  machine_ = machine;
+  if (options_.machine_changed) options_.machine_changed(machine);
 }
 
 DeviceStatus IppDevice::status() const {
@@ -51,22 +83,33 @@ DeviceStatus IppDevice::status() const {
 }
 
 void IppDevice::read_requests() {
-  std::vector<ProbePoint> requests;
-  {
-    const std::lock_guard lock{requests_mutex_};
-    requests.swap(requests_);
+  const auto requests = requests_.take();
+  const auto is_abort = [](const Request& r) { return std::holds_alternative<IppAbortRequested>(r); };
+  const auto asked_again = std::find_if(requests.rbegin(), requests.rend(), is_abort).base();
+  for (auto request = requests.begin(); request != requests.end(); ++request) {
+    if (const auto* points = std::get_if<std::vector<ProbePoint>>(&*request)) {
+      taken_ += points->size();
+      if (request >= asked_again) ask_for(*points);  // what was asked before a stop is not begun
+    } else if (is_abort(*request)) {
+      tell(IppAbortRequested{});
+    } else {
+      tell(IppReleaseRequested{});
+    }
   }
+}
+
+void IppDevice::ask_for(const std::vector<ProbePoint>& points) {
   const auto lost = session().fault().count;  // while they are told: what is behind is void
-  for (const ProbePoint& point : requests)
+  for (const ProbePoint& point : points)
     if (session().fault().count == lost) tell(point);
 }
 
 void IppDevice::count_points() {
-  const std::lock_guard lock{requests_mutex_};
-  points_left_.store(requests_.size() + session().points_left(), std::memory_order_release);
+  finished_.store(taken_ - session().points_left(), std::memory_order_release);  // pairs with points_left()
 }
 
 std::span<const std::byte> IppDevice::encode(const IppSend& command) {
+  report_machine();  // kept before the machine moves
   const auto bytes = std::as_bytes(std::span{command.line});
   const protocol::HostTime now = time_.now();  // once: a replay knows only the recorded one
   raw_.push_bytes(now, protocol::RawBlock::Direction::ToDevice, bytes);

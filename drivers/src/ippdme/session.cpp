@@ -3,52 +3,21 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <cmath>
 #include <utility>
+
+#include "ippdme/session_text.hpp"
 
 namespace abbe::drivers {
 namespace {
 
-using protocol::HostTime;
 using std::chrono::nanoseconds;
 
-constexpr HostTime kNever = HostTime::max();
-constexpr int kRepairable = 2;  // severity: from here on the command has failed
-constexpr int kUserNeeded = 3;  // and from here on ClearAllErrors alone does not mend it
 constexpr std::uint32_t kLastTag = 99'999;
 constexpr ippdme::Tag kMoveReportTag{true, 1};
-constexpr ippdme::Tag kAbortTag{true, 2};
-constexpr double kMillimetresPerMetre = 1e3;
-
-double seconds(nanoseconds d) {
-  return 1e-9 * static_cast<double>(d.count());
-}
+constexpr ippdme::Tag kWatchTag{true, 3};
 
 tl::unexpected<Error> bad(const IppSessionOptions& options, std::string_view what) {
   return tl::unexpected(Error{ErrorCode::BadConfiguration, fmt::format("{}: {}", options.peer, what)});
-}
-
-std::string said(const IppError& e) {
-  return fmt::format("{:04} {} (severity {})", e.code, e.text.view(), e.severity);
-}
-
-std::string_view method_name(std::string_view method) {
-  return method.substr(0, method.find('('));
-}
-
-std::string mm(double m) {
-  return ippdme::number_text(kMillimetresPerMetre * m);
-}
-
-std::string go_to(const ProbePoint& p) {
-  return fmt::format("GoTo(X({}),Y({}),Z({}))", mm(p.position_m[0]), mm(p.position_m[1]),
-                     mm(p.position_m[2]));
-}
-
-std::string pt_meas(const ProbePoint& p) {
-  const auto number = [](double v) { return ippdme::number_text(v); };
-  return fmt::format("PtMeas(X({}),Y({}),Z({}),IJK({},{},{}))", mm(p.position_m[0]), mm(p.position_m[1]),
-                     mm(p.position_m[2]), number(p.normal[0]), number(p.normal[1]), number(p.normal[2]));
 }
 
 }  // namespace
@@ -67,6 +36,10 @@ const char* name_of(IppState state) noexcept {
       return "ready";
     case IppState::Measuring:
       return "measuring";
+    case IppState::Aborting:
+      return "aborting";
+    case IppState::AwaitingRelease:
+      return "awaiting release";
     case IppState::Clearing:
       return "clearing";
     case IppState::Stopping:
@@ -91,14 +64,17 @@ Result<void> check(const IppSessionOptions& o) {
 }
 
 IppSession::IppSession(IppSessionOptions options)
-    : options_(std::move(options)), pause_(options_.first_pause) {
+    : options_(std::move(options)), pause_(options_.first_pause), may_home_(options_.home) {
   write_script();
+  if (options_.held.empty()) return;
+  (void)hold(options_.held);
+  moving_ = options_.moving;
+  if (moving_) due_ = {};  // connects for its AbortE
 }
 
 void IppSession::write_script() {
   using enum IppState;
-  script_ = {{.state = Opening, .method = "StartSession()"},
-             {.state = Opening, .method = "ClearAllErrors()"},
+  script_ = {{.state = Opening, .method = "StartSession()", .purpose = Purpose::Start},
              {.state = Opening, .method = "GetDMEVersion()", .purpose = Purpose::Version},
              {.state = Configuring, .method = "IsHomed()", .purpose = Purpose::IsHomed}};
   if (!options_.tool.empty())
@@ -107,37 +83,50 @@ void IppSession::write_script() {
   if (options_.move_reports) {
     script_.push_back({.state = Configuring,
                        .method = fmt::format("OnMoveReportE(Time({}),Dis(1),X(),Y(),Z())",
-                                             ippdme::number_text(seconds(options_.poll_period))),
-                       .optional = true,
-                       .event = true});
+                                             ippdme::number_text(ipp_text::seconds(options_.poll_period))),
+                       .event = kMoveReportTag});
   }
 }
 
-bool IppSession::online() const noexcept {
-  return state_ != IppState::Disconnected && state_ != IppState::Faulted && state_ != IppState::Connecting;
+/// A refusal of severity 2 or more would come again after every release.
+void IppSession::without_move_reports() {
+  options_.move_reports = false;
+  write_script();
 }
 
-HostTime IppSession::deadline() const noexcept {
-  if (stopped_ && !online()) return kNever;
+protocol::HostTime IppSession::deadline() const noexcept {
+  if (stopped_ && !open_) return ipp_text::kNever;
   return pending_ ? std::min(pending_->due, due_) : due_;
 }
 
-IppAction IppSession::on(const IppInput& input, HostTime now) {
+IppAction IppSession::on(const IppInput& input, protocol::HostTime now) {
   now_ = now;
   return std::visit([this](const auto& i) { return take(i); }, input);
 }
 
 void IppSession::note(const std::string& what) {
-  fault_.text = fmt::format("{}: {}", options_.peer, what);
+  fault_.text = held_ && what != hold_reason_ ? fmt::format("{}: {}; {}", options_.peer, hold_reason_, what)
+                                              : fmt::format("{}: {}", options_.peer, what);
+  last_note_ = what;
   ++fault_.count;
 }
 
 IppAction IppSession::give_up(IppState into, const std::string& what) {
   note(what);
-  pending_.reset();
   points_.clear();  // whoever asked begins anew: the machine may have moved
-  state_ = into;
-  due_ = stopped_ ? kNever : now_ + pause_;
+  if (state_ == IppState::Aborting) {
+    close_then_ = true;
+    return IppNothing{};
+  }
+  return moving_ && open_ ? stop_motion(true) : close(into);
+}
+
+IppAction IppSession::close(IppState into) {
+  pending_.reset();
+  open_ = in_session_ = false;
+  state_ = held_ && !stopped_ ? IppState::AwaitingRelease : into;
+  // An unfinished motion is aborted on the next connection, held or not.
+  due_ = stopped_ || (held_ && !moving_) ? ipp_text::kNever : now_ + pause_;
   pause_ = std::min(2 * pause_, options_.longest_pause);
   return IppClose{};
 }
@@ -145,79 +134,65 @@ IppAction IppSession::give_up(IppState into, const std::string& what) {
 // --- the connection
 
 IppAction IppSession::take(const IppTick&) {
+  if (state_ == IppState::Aborting) return now_ < due_ ? IppAction{IppNothing{}} : abort_unanswered();
   if (pending_ && now_ >= pending_->due) {
-    if (state_ == IppState::Stopping) {
-      pending_.reset();
-      state_ = IppState::Disconnected;
-      return IppClose{};
-    }
-    return give_up(
-        IppState::Faulted,
-        fmt::format("no answer to {} in {:g} s", method_name(pending_->step.method),
-                    seconds(pending_->step.moves ? options_.motion_timeout : options_.command_timeout)));
+    if (state_ == IppState::Stopping) return close(IppState::Disconnected);
+    const auto patience = pending_->step.moves ? options_.motion_timeout : options_.command_timeout;
+    return give_up(IppState::Faulted,
+                   fmt::format("no answer to {} in {:g} s", ipp_text::method_name(pending_->step.method),
+                               ipp_text::seconds(patience)));
   }
-  if (stopped_ || now_ < due_) return IppNothing{};
+  if (stopped_ || now_ < due_ || pending_) return IppNothing{};
   switch (state_) {
     case IppState::Disconnected:
     case IppState::Faulted:
-      state_ = IppState::Connecting;
-      due_ = now_ + options_.connect_timeout;
-      return IppOpen{};
+      return connect();
     case IppState::Connecting:
       return give_up(IppState::Disconnected,
-                     fmt::format("no connection in {:g} s", seconds(options_.connect_timeout)));
+                     fmt::format("no connection in {:g} s", ipp_text::seconds(options_.connect_timeout)));
     case IppState::Ready:
-      return pending_
-                 ? IppAction{IppNothing{}}
-                 : send({.state = IppState::Ready, .method = "Get(X(),Y(),Z())", .purpose = Purpose::Get});
+      return send({.state = IppState::Ready, .method = "Get(X(),Y(),Z())", .purpose = Purpose::Get});
+    case IppState::AwaitingRelease:  // whether the server is still there
+      if (!open_) return connect();
+      return send({.state = IppState::AwaitingRelease,
+                   .method = "GetErrStatusE()",
+                   .purpose = Purpose::Watch,
+                   .event = kWatchTag});
     default:
       return IppNothing{};
   }
 }
 
+IppAction IppSession::connect() {
+  state_ = IppState::Connecting;
+  due_ = now_ + options_.connect_timeout;
+  return IppOpen{};
+}
+
 IppAction IppSession::take(const IppConnected&) {
   if (state_ != IppState::Connecting) return IppNothing{};
+  open_ = true;
   step_ = 0;
   tag_ = 0;
-  due_ = kNever;
-  return next_step();
+  due_ = ipp_text::kNever;
+  if (!moving_ || (session_first_ && !held_)) return next_step();
+  if (!held_) note("the connection was lost while the machine was moving");
+  return stop_motion(false);
 }
 
 IppAction IppSession::take(const IppConnectionLost& lost) {
-  if (state_ == IppState::Stopping) {
-    pending_.reset();
-    state_ = IppState::Disconnected;
-  } else if (state_ == IppState::Connecting || online()) {
-    (void)give_up(IppState::Disconnected, lost.what);
-  }
-  return IppNothing{};  // there is nothing to close any more
-}
-
-IppAction IppSession::take(const IppStopRequested&) {
-  if (std::exchange(stopped_, true)) return IppNothing{};
-  const bool opened = online();
-  const bool moving = state_ == IppState::Measuring;
-  const bool connecting = state_ == IppState::Connecting;
-  due_ = kNever;
+  const bool awaited = state_ == IppState::Connecting || open_;
+  if (awaited && state_ != IppState::Stopping) note(lost.what);
   points_.clear();
-  pending_.reset();
-  state_ = opened ? IppState::Stopping : IppState::Disconnected;
-  if (opened) {
-    auto end = send({.state = IppState::Stopping, .method = "EndSession()", .purpose = Purpose::End});
-    // A machine that nobody watches any more must not go on moving.
-    if (moving) std::get<IppSend>(end).line.insert(0, ippdme::to_string(kAbortTag) + " AbortE()\r\n");
-    return end;
-  }
-  return connecting ? IppAction{IppClose{}} : IppAction{IppNothing{}};
+  if (awaited) (void)close(IppState::Disconnected);
+  return IppNothing{};  // there is nothing to close any more
 }
 
 /// Whoever asked saw the machine stand somewhere: what is asked of one that is away must not be driven when
 /// it returns.
 IppAction IppSession::take(const ProbePoint& point) {
   if (stopped_) return IppNothing{};
-  const bool ready_to_move =
-      state_ == IppState::Ready || state_ == IppState::Measuring || state_ == IppState::Clearing;
-  if (!ready_to_move) {
+  if (state_ != IppState::Ready && state_ != IppState::Measuring) {
     note(fmt::format("asked to move while {}: not done", name_of(state_)));
     return IppNothing{};
   }
@@ -229,12 +204,10 @@ IppAction IppSession::take(const ProbePoint& point) {
 
 IppAction IppSession::send(const Step& step) {
   state_ = step.state;
-  ippdme::Tag tag = kMoveReportTag;
-  if (!step.event) {
-    tag_ = tag_ % kLastTag + 1;
-    tag = {false, tag_};
-  }
-  due_ = kNever;  // nothing else until it is complete
+  moving_ = moving_ || step.moves;
+  if (!step.event) tag_ = tag_ % kLastTag + 1;
+  const ippdme::Tag tag = step.event.value_or(ippdme::Tag{false, tag_});
+  due_ = ipp_text::kNever;  // nothing else until it is complete
   const auto patience = step.moves ? options_.motion_timeout : options_.command_timeout;
   pending_ = Pending{.step = step, .tag = tag, .due = now_ + patience};
   return IppSend{fmt::format("{} {}\r\n", ippdme::to_string(tag), step.method)};
@@ -243,6 +216,7 @@ IppAction IppSession::send(const Step& step) {
 IppAction IppSession::next_step() {
   if (step_ < script_.size()) return send(script_[step_++]);
   pause_ = options_.first_pause;
+  may_home_ = false;
   due_ = now_;
   return ready();
 }
@@ -253,7 +227,7 @@ IppAction IppSession::ready() {
   const ProbePoint point = points_.front();
   points_.pop_front();
   return send({.state = IppState::Measuring,
-               .method = point.touch ? pt_meas(point) : go_to(point),
+               .method = point.touch ? ipp_text::pt_meas(point) : ipp_text::go_to(point),
                .purpose = point.touch ? Purpose::Touch : Purpose::Move,
                .moves = true});
 }
@@ -264,7 +238,9 @@ bool IppSession::foreign(ippdme::Tag tag) const noexcept {
 }
 
 IppAction IppSession::strange(std::string_view what, ippdme::Tag tag) {
-  if (state_ == IppState::Stopping) return IppNothing{};  // of what was under way
+  const bool late = state_ == IppState::Stopping || state_ == IppState::Aborting ||
+                    state_ == IppState::AwaitingRelease || state_ == IppState::Clearing;
+  if (late) return IppNothing{};  // of what was under way
   return give_up(
       IppState::Faulted,
       fmt::format("{} for {}, which was not asked{}", what, ippdme::to_string(tag),
@@ -272,7 +248,7 @@ IppAction IppSession::strange(std::string_view what, ippdme::Tag tag) {
 }
 
 IppAction IppSession::take(const IppAck& ack) {
-  if (!online()) return IppNothing{};
+  if (!open_) return IppNothing{};
   if (foreign(ack.tag)) return strange("an acknowledgement", ack.tag);
   if (!pending_ || ack.tag != pending_->tag) return IppNothing{};
   pending_->acknowledged = true;
@@ -280,25 +256,41 @@ IppAction IppSession::take(const IppAck& ack) {
 }
 
 IppAction IppSession::take(const IppData& data) {
-  if (!online()) return IppNothing{};
+  if (!open_) return IppNothing{};
   if (foreign(data.tag)) return strange("data", data.tag);
   if (pending_ && data.tag == pending_->tag) pending_->data = data.text.view();
   return IppNothing{};
 }
 
 IppAction IppSession::take(const IppError& error) {
-  if (!online() || state_ == IppState::Stopping) return IppNothing{};
-  if (error.severity < kRepairable) return IppNothing{};
-  if (pending_ && error.tag == pending_->tag) {
-    if (!pending_->error) pending_->error = error;
-    // An event command that is refused is never acknowledged.
-    return pending_->step.event ? done() : IppAction{IppNothing{}};
-  }
-  return give_up(IppState::Faulted, fmt::format("reports {}", said(error)));
+  if (!open_ || state_ == IppState::Stopping) return IppNothing{};
+  const bool failed = error.severity >= ipp_text::kRepairable;
+  const bool of_abort = error.tag == ippdme::kAbort && error.code != ipp_text::kAborted;
+  if (failed && of_abort && state_ == IppState::Aborting) return abort_refused(error);
+  if (failed && error.tag == kMoveReportTag) without_move_reports();
+  const bool mine = pending_ && error.tag == pending_->tag;
+  if (mine && failed && !pending_->error) pending_->error = error;
+  if (mine && pending_->step.event) return done();  // an event that is refused is never acknowledged
+  if (!failed) return IppNothing{};
+  if (mine && !(pending_->step.moves && error.severity >= ipp_text::kUserNeeded)) return IppNothing{};
+  return take_foreign(error);
+}
+
+/// Of no command that is under way, or one that must not go on.
+IppAction IppSession::take_foreign(const IppError& error) {
+  const std::string what = fmt::format("reports {}", ipp_text::text_of(error));
+  const bool held = state_ == IppState::Aborting || state_ == IppState::AwaitingRelease;
+  if (!held) return hold(what);
+  const bool ours = error.code == ipp_text::kAborted || error.tag == ippdme::kAbort;
+  if (ours) return IppNothing{};
+  hold_for(what);
+  note(what);
+  return IppNothing{};
 }
 
 IppAction IppSession::take(const IppComplete& complete) {
-  if (!online()) return IppNothing{};
+  if (!open_) return IppNothing{};
+  if (state_ == IppState::Aborting && complete.tag == ippdme::kAbort) return stopped_moving();
   if (foreign(complete.tag)) return strange("completion", complete.tag);
   if (!pending_ || complete.tag != pending_->tag) return IppNothing{};
   if (!pending_->acknowledged) return strange("completion before acknowledgement", complete.tag);
@@ -306,18 +298,22 @@ IppAction IppSession::take(const IppComplete& complete) {
 }
 
 IppAction IppSession::take(const IppNonsense& nonsense) {
-  if (!online()) return IppNothing{};
-  return give_up(IppState::Faulted, fmt::format("this is no I++ DME server: {}: \"{}\"",
-                                                ippdme::name_of(nonsense.error), nonsense.line.view()));
+  if (!open_) return IppNothing{};
+  return give_up(IppState::Faulted,
+                 fmt::format("this is no I++ DME server: {}: \"{}\"", ippdme::name_of(nonsense.error),
+                             ipp_text::escaped(nonsense.line.view())));
 }
 
 IppAction IppSession::done() {
   const Pending was = *std::exchange(pending_, std::nullopt);
-  if (was.error && !was.step.optional && was.step.purpose != Purpose::End) return failed(was);
+  if (was.step.moves) moving_ = false;
+  const bool tolerated = was.step.purpose == Purpose::End || was.step.purpose == Purpose::Watch;
+  if (was.error && !tolerated) return failed(was);
   switch (was.step.purpose) {
     case Purpose::End:
-      state_ = IppState::Disconnected;
-      return IppClose{};
+      return close(IppState::Disconnected);
+    case Purpose::Start:
+      return began_session();
     case Purpose::Version:
       if (was.data.empty()) return give_up(IppState::Faulted, "GetDMEVersion was answered without a version");
       return next_step();
@@ -328,9 +324,13 @@ IppAction IppSession::done() {
       return ready();
     case Purpose::Move:
     case Purpose::Touch:
-    case Purpose::Clear:
       due_ = now_;
       return ready();
+    case Purpose::Watch:
+      return await_release();
+    case Purpose::Clear:
+      step_ = 1;  // the session has begun
+      return next_step();
     case Purpose::Other:
       break;
   }
@@ -341,17 +341,23 @@ IppAction IppSession::judge_home(const std::string& data) {
   const bool homed = data.find('1') != std::string::npos;  // "IsHomed(1)" or "1"
   if (homed) return next_step();
   if (!options_.home) return give_up(IppState::Faulted, "the machine is not homed");
+  if (!may_home_) return hold("the machine is not homed any more");
   return send({.state = IppState::Configuring, .method = "Home()", .moves = true});
 }
 
+/// Another client's session, or ours of before, has not ended yet: it may soon.
 IppAction IppSession::failed(const Pending& was) {
-  const std::string what = fmt::format("{} was refused: {}", method_name(was.step.method), said(*was.error));
-  const bool moving = was.step.purpose == Purpose::Move;
-  const bool measuring = moving || was.step.purpose == Purpose::Touch || was.step.purpose == Purpose::Get;
-  if (!measuring || was.error->severity >= kUserNeeded) return give_up(IppState::Faulted, what);
-  note(what);
-  if (moving) points_.clear();  // the way to what comes next was not made
-  return send({.state = IppState::Clearing, .method = "ClearAllErrors()", .purpose = Purpose::Clear});
+  const std::string what = fmt::format("{} was refused: {}", ipp_text::method_name(was.step.method),
+                                       ipp_text::text_of(*was.error));
+  const bool busy = was.step.purpose == Purpose::Start && was.error->code == ipp_text::kProtocolError;
+  return busy && !moving_ ? give_up(IppState::Faulted, what) : hold(what);
+}
+
+IppAction IppSession::began_session() {
+  in_session_ = true;
+  if (!moving_) return next_step();
+  note("the connection was lost while the machine was moving");
+  return stop_motion(false);
 }
 
 }  // namespace abbe::drivers

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <numbers>
 
 namespace abbe::drivers {
 namespace {
@@ -66,7 +67,8 @@ bool ClockModel::jumped(const Point& p, protocol::HostTime arrival) ABBE_RT {
 
 void ClockModel::reset() ABBE_RT {
   count_ = 0;
-  slope_ = 0.0;
+  slope_ = free_slope_ = u_beyond_s_ = 0.0;
+  beyond_ = false;
   late_ = false;
 }
 
@@ -100,6 +102,7 @@ void ClockModel::fit() ABBE_RT {
   offset_s_ = lowest->offset_s;
   if (count_ == 1) quarter_s_ = three_quarters_s_ = pivot_s_;
   judge_lateness();
+  judge_skew();
 }
 
 /// Lower convex hull by monotone chain ([Andrew 1979]); the slope is that of the chord between the hull's
@@ -112,9 +115,9 @@ void ClockModel::fit_slope() ABBE_RT {
   const double span_s = points_[count_ - 1].device_s - begin_s;
   quarter_s_ = begin_s + 0.25 * span_s;
   three_quarters_s_ = begin_s + 0.75 * span_s;
-  const double free_slope = (hull_height(size, three_quarters_s_) - hull_height(size, quarter_s_)) /
-                            (three_quarters_s_ - quarter_s_);
-  slope_ = std::clamp(free_slope, -options_.max_skew, options_.max_skew);
+  free_slope_ = (hull_height(size, three_quarters_s_) - hull_height(size, quarter_s_)) /
+                (three_quarters_s_ - quarter_s_);
+  slope_ = std::clamp(free_slope_, -options_.max_skew, options_.max_skew);
 }
 
 std::size_t ClockModel::find_hull() ABBE_RT {
@@ -163,6 +166,33 @@ void ClockModel::judge_lateness() ABBE_RT {
   u_slope_ = lever_s > 0.0 ? std::min(u_limit, std::sqrt(2.0) * u_touch_s_ / lever_s) : u_limit;
 }
 
+/// By chance a slope is off by sqrt(2) u over the lever, u as in judge_lateness(), here over the line that is
+/// not held; twice that, beyond a bound that sound clocks keep well within, is no chance. The points lie off
+/// the line that is held by up to the excess times the window.
+void ClockModel::judge_skew() ABBE_RT {
+  constexpr double kNoChance = 2.0;
+  const double excess = std::abs(free_slope_) - options_.max_skew;
+  const double lever_s = three_quarters_s_ - quarter_s_;
+  if (excess <= 0.0 || lever_s <= 0.0) {
+    beyond_ = false;
+  } else if (count_ >= options_.settled_after) {
+    beyond_ = beyond_ || excess > kNoChance * std::numbers::sqrt2 * u_touch_of_free_line() / lever_s;
+  }
+  u_beyond_s_ = beyond_ ? excess * (last_device_s_ - points_[0].device_s) : 0.0;
+}
+
+double ClockModel::u_touch_of_free_line() const ABBE_RT {
+  std::array<double, kPoints> height{};
+  for (std::size_t i = 0; i < count_; ++i)
+    height[i] = points_[i].offset_s - free_slope_ * points_[i].device_s;
+  const auto begin = height.begin();
+  const auto end = begin + static_cast<std::ptrdiff_t>(count_);
+  const auto tenth = begin + static_cast<std::ptrdiff_t>(std::min<std::size_t>(count_ - 1, 10));
+  std::nth_element(begin, tenth, end);
+  const double n = static_cast<double>(count_);
+  return std::hypot(0.5 * (*tenth - *std::min_element(begin, tenth + 1)), kPriorLateness_s / (n * n));
+}
+
 double ClockModel::line_at(double device_s) const ABBE_RT {
   return offset_s_ + slope_ * (device_s - pivot_s_);
 }
@@ -174,13 +204,13 @@ HostInstant ClockModel::to_host(protocol::DeviceTime t) const ABBE_RT {
   const double outside_s = std::max({0.0, quarter_s_ - device_s, device_s - three_quarters_s_});
   const double u_constant_s =
       bound_s / std::sqrt(12.0);  // rectangular over [0, bound], estimate in its middle
-  const double u_s = std::hypot(u_constant_s, u_touch_s_, u_slope_ * outside_s);
+  const double u_s = std::hypot(std::hypot(u_constant_s, u_touch_s_, u_slope_ * outside_s), u_beyond_s_);
   return {origin_host_ + (t - origin_device_) + nanoseconds(line_at(device_s) - lowered_s_ - bound_s / 2.0),
           nanoseconds(u_s), settled()};
 }
 
 bool ClockModel::settled() const ABBE_RT {
-  return count_ >= options_.settled_after && !late_;
+  return count_ >= options_.settled_after && !late_ && !beyond_;
 }
 
 ClockStatus ClockModel::status() const ABBE_RT {

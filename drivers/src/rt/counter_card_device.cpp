@@ -30,7 +30,22 @@ void CounterCardDevice::take(const UsbBulkIn& bulk) ABBE_RT {
     scans_ += scans.size();
     board_.set_last_sample(scans.back().axes.head.time);
     board_.set_clock(receiver_.clock());
+    note_progress(scans.back());
   }
+  const auto withheld = receiver_.counters().withheld_scans;
+  scans_ += withheld - std::exchange(withheld_seen_, withheld);
+}
+
+void CounterCardDevice::note_progress(const CounterScan& scan) ABBE_RT {
+  constexpr std::chrono::seconds kPeriod{1};
+  const bool settled = !has(scan.axes.head.flags, protocol::SampleFlag::ClockUnsettled);
+  const auto since = scan.axes.head.time - progress_.head.time;
+  if (!settled || (since < kPeriod && since >= std::chrono::nanoseconds{0})) return;
+  progress_.head = scan.axes.head;
+  progress_.clock_count = scan.clock_count;
+  progress_.axis_count = scan.axes.axis_count;
+  progress_.count = scan.axes.count;
+  progress_ring_.try_push(progress_);
 }
 
 void CounterCardDevice::take(const UsbControlDone& done) ABBE_RT {

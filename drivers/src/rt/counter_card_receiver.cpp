@@ -13,6 +13,24 @@ using protocol::SampleFlag;
 /// How much later than a gap the clock's jump may be seen: no batch waits longer in a busy host.
 constexpr double kJumpSeenWithin_s = 1.0;
 
+/// How far a clock that went on may be from where it must be, by the host's: behind by what the newest batch
+/// is late (the host was busy), ahead by what the clock model is off, and twice what the two may differ by.
+constexpr double kLatest_s = 3.0;
+constexpr double kMostAhead_s = 1.0;
+constexpr double kLargestDrift = 1e-3;
+/// Of the clock's range: a wider interval would hold too many readings of other counters.
+constexpr double kWidestInterval = 0.02;
+
+/// The same of counters that an earlier run left. Both instants come from arrivals that are not late: the
+/// earlier from a settled clock model, this one from the least late of many. What is left is what the clock
+/// model calls a jump, and the rate beyond which it does not believe a clock.
+constexpr double kResumedWithin_s = std::chrono::duration<double>(ClockModelOptions{}.jump).count();
+constexpr double kResumedDrift = ClockModelOptions{}.max_skew;
+constexpr double kResumedShown_s = 0.25;    // long enough for a host that was held up to catch up
+constexpr double kResumedPatience_s = 3.0;  // as kLatest_s
+/// Narrower than kWidestInterval: nobody is there who saw the card fail.
+constexpr double kWidestResumed = 0.005;
+
 std::uint32_t saturated(std::uint64_t n) ABBE_RT {
   return static_cast<std::uint32_t>(std::min<std::uint64_t>(n, std::numeric_limits<std::uint32_t>::max()));
 }
@@ -32,6 +50,7 @@ protocol::DeviceTime CounterCardReceiver::device_time(std::int64_t clock_count) 
 }
 
 void CounterCardReceiver::on_control(const protocol::usb::Setup& setup) ABBE_RT {
+  if (setup == quad08::read_firmware_version()) reopened_ = last_.has_value();
   if (quad08::is_write(setup, quad08::Register::CounterSetup)) counters_zeroed();
   const bool transfer = quad08::is_write(setup, quad08::Register::DmaControl);
   if (transfer && setup.value == quad08::dma::kChannel1On) stream_began();
@@ -44,6 +63,8 @@ void CounterCardReceiver::counters_zeroed() ABBE_RT {
   latch_.reset();
   long_gap_.reset();
   zeroed_ = true;
+  reopened_ = false;
+  resumption_.reset();
   current_.clock_count = current_.latch_count = current_.latch_half_width = current_.edge_count = 0;
   current_.latched = false;
   pending_flags_ = static_cast<protocol::SampleFlags>(SampleFlag::Restarted);
@@ -57,6 +78,7 @@ void CounterCardReceiver::stream_began() ABBE_RT {
   candidate_.reset();
   refused_run_ = 0;
   stream_restarted_ = last_.has_value();
+  if (resumption_) resumption_ = Resumption{.since = resumption_->since, .begun = {}};
 }
 
 void CounterCardReceiver::bytes_lost() ABBE_RT {
@@ -119,9 +141,10 @@ void CounterCardReceiver::seek() ABBE_RT {
 
 void CounterCardReceiver::take(const quad08::RawScan& raw) ABBE_RT {
   if (candidate_ && beats(*candidate_, raw)) {
-    accept(*candidate_);
-    accept(raw);
+    const quad08::RawScan confirmed = *candidate_;
     candidate_.reset();
+    accept(confirmed);
+    accept(raw);
     refused_run_ = 0;
   } else if (candidate_) {
     refuse(*candidate_, raw);
@@ -140,18 +163,103 @@ void CounterCardReceiver::refuse(const quad08::RawScan& from, const quad08::RawS
 }
 
 void CounterCardReceiver::accept(const quad08::RawScan& raw) ABBE_RT {
+  const bool resuming = resumption_.has_value();
+  if (resuming && !resumed(raw)) {
+    ++counters_.withheld_scans;
+    return;
+  }
   CounterScan& scan = scans_[scan_count_++];
   current_.axes.head.flags = std::exchange(pending_flags_, 0);
   current_.axes.head.lost_before = 0;
   if (current_.axes.missing_mask != 0) current_.axes.head.flags |= SampleFlag::AxisMissing;
+  if (last_ && stream_restarted_ && !resuming) judge_first_scan(raw);
   if (last_) {
     const auto& from = (*last_)[metronome_.place];
-    count_lost(quad08::upward_step(from, raw[metronome_.place], width_), current_);
+    const auto wrapped = clock_wraps_ * quad08::modulus_of(width_);
+    count_lost(quad08::upward_step(from, raw[metronome_.place], width_) + wrapped, current_);
   }
   unwrap(raw, current_);
+  clock_wraps_ = 0;
   last_ = raw;
   ++counters_.scans;
   scan = current_;
+}
+
+/// Only a card that was opened again may be another session of it. One that stayed open counts on, however
+/// long the host was held up.
+void CounterCardReceiver::judge_first_scan(const quad08::RawScan& raw) ABBE_RT {
+  const bool same = goes_on(raw);
+  if (std::exchange(reopened_, false) && !same) begin_anew();
+}
+
+/// Whether these counters were counting all the time since the last scan: the clock channel stands where it
+/// must by the host's clock. A counter of 32 bits may have gone round meanwhile. The instant of the last scan
+/// comes from the clock model: its batch may have arrived late. A model that is not settled may be late, too.
+bool CounterCardReceiver::goes_on(const quad08::RawScan& raw) ABBE_RT {
+  const auto before = clock_.to_host(device_time(current_.clock_count));
+  const double elapsed_s = std::chrono::duration<double>(arrival_ - before.time).count();
+  const double behind_s = seconds_behind(raw, before.time);
+  const double most_behind_s = kLatest_s + kLargestDrift * elapsed_s;
+  const double most_ahead_s = (before.settled ? kMostAhead_s : kLatest_s) + kLargestDrift * elapsed_s;
+  const double round_s = static_cast<double>(quad08::modulus_of(width_)) / clock_hz_;
+  behind_s_ = std::remainder(behind_s, round_s);  // for people: which round it is in is not known
+  if (most_behind_s + most_ahead_s > kWidestInterval * round_s) return false;
+  return behind_s <= most_behind_s && -behind_s <= most_ahead_s;
+}
+
+/// How much less than the host's clock the clock channel counted since the last scan, at `since`. It may have
+/// gone round.
+double CounterCardReceiver::seconds_behind(const quad08::RawScan& raw, protocol::HostTime since) ABBE_RT {
+  const double elapsed_s = std::chrono::duration<double>(arrival_ - since).count();
+  const auto range = static_cast<double>(quad08::modulus_of(width_));
+  const auto step =
+      static_cast<double>(quad08::upward_step((*last_)[metronome_.place], raw[metronome_.place], width_));
+  const double wraps = std::max(0.0, std::round((elapsed_s * clock_hz_ - step) / range));
+  clock_wraps_ = static_cast<std::uint64_t>(wraps);
+  return elapsed_s - (wraps * range + step) / clock_hz_;
+}
+
+/// No arrival is early: the clock channel is behind by at most what the least late one shows, and one that
+/// shows it ahead by more than the clocks may differ refutes it at once.
+bool CounterCardReceiver::resumed(const quad08::RawScan& raw) ABBE_RT {
+  Resumption& r = *resumption_;
+  if (r.refused) return false;
+  const double behind_s = seconds_behind(raw, r.since);
+  r.least_behind_s = r.begun ? std::min(r.least_behind_s, behind_s) : behind_s;
+  if (!r.begun) r.begun = arrival_;
+
+  const double elapsed_s = std::chrono::duration<double>(arrival_ - r.since).count();
+  const double shown_s = std::chrono::duration<double>(arrival_ - *r.begun).count();
+  const double within_s = kResumedWithin_s + kResumedDrift * std::max(0.0, elapsed_s);
+  const double round_s = static_cast<double>(quad08::modulus_of(width_)) / clock_hz_;
+  const bool too_long = 2.0 * within_s > kWidestResumed * round_s;
+  const bool behind = r.least_behind_s > within_s;
+  r.refused = elapsed_s < 0.0 || too_long || r.least_behind_s < -within_s ||
+              (behind && shown_s >= kResumedPatience_s);
+  if (r.refused) {
+    behind_s_ = std::remainder(r.least_behind_s, round_s);
+    ++counters_.began_anew;
+  }
+  if (r.refused || behind || shown_s < kResumedShown_s) return false;
+  take_over(raw);
+  return true;
+}
+
+/// What the earlier run knew of edges is not known any more: those that came meanwhile are no news.
+void CounterCardReceiver::take_over(const quad08::RawScan& raw) ABBE_RT {
+  if (edge_place_) (*last_)[*edge_place_] = raw[*edge_place_];
+  if (latch_place_) latch_.begin_at(raw[*latch_place_]);
+  resumption_.reset();
+  reopened_ = false;
+}
+
+/// Other counters than before: as after a set-up, but for where they stand.
+void CounterCardReceiver::begin_anew() ABBE_RT {
+  ++counters_.began_anew;
+  counters_zeroed();
+  zeroed_ = stream_restarted_ = false;
+  clock_wraps_ = 0;
+  current_.axes.head.flags |= std::exchange(pending_flags_, 0);
 }
 
 void CounterCardReceiver::count_lost(std::uint64_t clock_step, CounterScan& scan) ABBE_RT {
@@ -187,7 +295,8 @@ void CounterCardReceiver::unwrap(const quad08::RawScan& raw, CounterScan& scan) 
   const auto& from = last_ ? *last_ : zeros;
   const std::int64_t previous_clock = scan.clock_count;
   const std::size_t clock = metronome_.place;
-  scan.clock_count += static_cast<std::int64_t>(quad08::upward_step(from[clock], raw[clock], width_));
+  scan.clock_count += static_cast<std::int64_t>(quad08::upward_step(from[clock], raw[clock], width_) +
+                                                clock_wraps_ * quad08::modulus_of(width_));
   for (std::size_t i = 0; i < scan.axes.axis_count; ++i) {
     const Axis& axis = axes_[i];
     const std::int64_t before = last_ ? scan.axes.count[i] : 0;

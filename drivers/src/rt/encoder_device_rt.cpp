@@ -48,6 +48,7 @@ void EncoderDevice::record(HostTime time, RawBlock::Direction direction,
 void EncoderDevice::push(std::span<const protocol::AxisSample> samples) ABBE_RT {
   for (const auto& sample : samples) {
     (void)samples_.try_push(sample);
+    presence_.on_sample(sample);
     board_.set_last_sample(sample.head.time);
   }
   const auto made = receiver_.counters().samples;  // one that is given again is none more

@@ -50,7 +50,8 @@ EncoderReceiver::EncoderReceiver(const EncoderReceiverOptions& options)
       sampling_delay_(options.sampling_delay),
       u_sampling_delay_(options.u_sampling_delay),
       u_widened_(widened(options.u_sampling_delay, options.sync_period)),
-      heartbeat_timeout_(options.heartbeat_timeout) {
+      heartbeat_timeout_(options.heartbeat_timeout),
+      external_sync_(options.external_sync) {
   for (std::size_t i = 0; i < axis_count_; ++i) {
     const auto& from = options.axes[i];
     auto& axis = axes_[i];
@@ -58,6 +59,9 @@ EncoderReceiver::EncoderReceiver(const EncoderReceiverOptions& options)
     axis.kind = from.kind;
     axis.type = from.position;
     axis.tpdo_id = can::cob::tpdo(from.tpdo, from.node);
+    axis.mapping = static_cast<std::uint16_t>(can::object::kTpdoMapping + from.tpdo - 1);
+    axis.position_byte = from.position_byte;
+    axis.heartbeat_timeout = options.heartbeat_timeout;
     axis.scale_configured = from.scale.has_value();
     axis.scale = from.scale.value_or(0.0);
     axis.offset = from.offset;
@@ -94,11 +98,15 @@ EncoderReceiver::Samples EncoderReceiver::on_time(HostTime now) ABBE_RT {
 
 EncoderReceiver::Samples EncoderReceiver::on_loss() ABBE_RT {
   out_count_ = 0;
+  lose();
+  return done();
+}
+
+void EncoderReceiver::lose() ABBE_RT {
   close_cycle();
   look_for_debts(true);
   received_mask_ = 0;
   gap_pending_ = true;
-  return done();
 }
 
 EncoderReceiver::Samples EncoderReceiver::on_frame(const can::CanFrame& frame, HostTime time,
@@ -107,6 +115,8 @@ EncoderReceiver::Samples EncoderReceiver::on_frame(const can::CanFrame& frame, H
   if (time >= deadline()) close_cycle();
   if (frame.is(can::FrameFlag::Error)) {
     on_bus_report(frame, time);
+  } else if (external_sync_ && can::decode_sync(frame)) {
+    begin_cycle(time, time_widened);
   } else if (frame.is_standard_data()) {
     for (std::size_t i = 0; i < axis_count_; ++i) {
       if (frame.id == axes_[i].tpdo_id) {
@@ -196,7 +206,7 @@ protocol::SampleFlags EncoderReceiver::take_flags(std::uint8_t missing) ABBE_RT 
 
 void EncoderReceiver::on_position(std::size_t i, const can::CanFrame& frame, HostTime time,
                                   bool time_widened) ABBE_RT {
-  const auto count = can::decode_position(frame.payload(), axes_[i].type);
+  const auto count = can::decode_position(frame.payload(), axes_[i].type, axes_[i].position_byte);
   if (!count) {
     ++counters_.short_frames;
     return;
@@ -292,7 +302,7 @@ void EncoderReceiver::on_heartbeat(Axis& axis, can::NodeState state, HostTime ti
 void EncoderReceiver::check_heartbeats(HostTime time) ABBE_RT {
   for (std::size_t i = 0; i < axis_count_; ++i) {
     auto& axis = axes_[i];
-    if (!axis.last_heartbeat || axis.heartbeat_lost || time - *axis.last_heartbeat <= heartbeat_timeout_)
+    if (!axis.last_heartbeat || axis.heartbeat_lost || time - *axis.last_heartbeat <= axis.heartbeat_timeout)
       continue;
     axis.heartbeat_lost = true;
     ++counters_.heartbeat_losses;
@@ -305,6 +315,7 @@ void EncoderReceiver::on_bus_report(const can::CanFrame& frame, HostTime time) A
   ++counters_.bus_reports;
   using can::BusCondition;
   if (report->conditions != static_cast<can::BusConditions>(BusCondition::Active)) bus_error_pending_ = true;
+  if (has(report->conditions, BusCondition::ReceiveOverflow)) lose();
   const bool back =
       has(report->conditions, BusCondition::Restarted) || has(report->conditions, BusCondition::Active);
   if (has(report->conditions, BusCondition::BusOff) && !bus_off_) {
@@ -318,14 +329,37 @@ void EncoderReceiver::on_bus_report(const can::CanFrame& frame, HostTime time) A
 }
 
 void EncoderReceiver::on_sdo_answer(Axis& axis, const can::CanFrame& frame) ABBE_RT {
+  if (external_sync_) return;  // between others: how the PDO is mapped is configured
+  const auto index = static_cast<std::uint16_t>(frame.byte(1) | (frame.byte(2) << 8));
+  const can::ObjectId object{index, frame.byte(3)};
+  constexpr std::uint8_t kWritten = 0x60;
+  if (frame.length == 8 && frame.byte(0) == kWritten && object == can::ObjectId{axis.mapping, 1})
+    axis.position_byte = 0;
   // Expedited upload answer with its size: 4Fh, 4Bh, 47h, 43h for 1 to 4 bytes [CiA 301].
   const auto command = frame.byte(0);
   if (frame.length != 8 || (command & 0xF3) != 0x43) return;
   const std::size_t bytes = 4u - ((command >> 2) & 3u);
   std::uint32_t value = 0;
   for (std::size_t i = 0; i < bytes; ++i) value |= std::uint32_t{frame.byte(4 + i)} << (8 * i);
-  const auto index = static_cast<std::uint16_t>(frame.byte(1) | (frame.byte(2) << 8));
-  learn(axis, {index, frame.byte(3)}, value);
+  if (index == axis.mapping) {
+    learn_mapping(axis, object.sub, value);
+  } else {
+    learn(axis, object, value);
+  }
+}
+
+/// The entries of a mapping that could not be written are read one after the other.
+void EncoderReceiver::learn_mapping(Axis& axis, std::uint8_t sub, std::uint32_t value) ABBE_RT {
+  constexpr unsigned kBitsPerByte = 8;
+  if (sub <= 1) axis.bits_before = 0;
+  if (sub == 0) return;
+  const auto wanted = can::mapped_position(axis.type);
+  const auto mapped = can::decode_mapping(value);
+  const bool multi_sensor = can::ObjectId{mapped.index, mapped.sub} == can::object::kMultiPosition;
+  if (mapped == wanted || (multi_sensor && mapped.bits == wanted.bits)) {
+    axis.position_byte = static_cast<std::uint8_t>(axis.bits_before / kBitsPerByte);
+  }
+  axis.bits_before += mapped.bits;
 }
 
 void EncoderReceiver::learn(Axis& axis, can::ObjectId object, std::uint32_t value) ABBE_RT {
@@ -333,7 +367,12 @@ void EncoderReceiver::learn(Axis& axis, can::ObjectId object, std::uint32_t valu
   const bool linear = axis.kind == AxisKind::Linear;
   const bool step = linear && (object == obj::kPositionStep || object == obj::kMeasuringStep);
   const bool turn = !linear && (object == obj::kUnitsPerRevolution || object == obj::kMeasuringStep);
-  if (step || turn) {
+  if (object == obj::kHeartbeatTime) {
+    // What it beats by itself, where it could not be told: three beats may fail.
+    axis.heartbeat_timeout =
+        std::max(heartbeat_timeout_, std::chrono::nanoseconds{std::chrono::milliseconds{value}} * 7 / 2);
+  } else if (step || turn) {
+    axis.units = turn ? value : 0;
     if (axis.scale_configured) return;
     if (value == 0) {
       ++counters_.scale_refusals;
@@ -344,6 +383,11 @@ void EncoderReceiver::learn(Axis& axis, can::ObjectId object, std::uint32_t valu
   } else if (!linear && object == obj::kTotalRange && !axis.wrap_configured && value > 1) {
     axis.modulus = value;
     axis.raw %= value;
+  } else if (!linear && object == obj::kRevolutions && !axis.wrap_configured && value > 0 && axis.units > 1) {
+    // Without scaling the position begins anew after the revolutions that can be told apart.
+    const auto counts = std::uint64_t{axis.units} * value;
+    axis.modulus = axis.type == can::PositionType::Signed64 ? counts : std::min(counts, kModulus32);
+    axis.raw %= axis.modulus;
   }
 }
 

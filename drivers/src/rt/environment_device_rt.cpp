@@ -2,6 +2,7 @@
 #include <utility>
 
 #include "abbe/drivers/environment/device.hpp"
+#include "abbe/drivers/environment/line.hpp"
 
 namespace abbe::drivers {
 
@@ -14,6 +15,10 @@ void EnvironmentDevice::receive() ABBE_RT {
   samples_.try_push(receiver_.sample());
   board_.samples.add();
   board_.set_last_sample(receiver_.sample().head.time);
+}
+
+void EnvironmentLine::receive() ABBE_RT {
+  if (active_ != nullptr) active_->receive();
 }
 
 }  // namespace abbe::drivers

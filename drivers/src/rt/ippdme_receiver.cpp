@@ -52,6 +52,10 @@ void IppReceiver::sent(std::span<const std::byte> bytes, HostTime time) ABBE_RT 
   Asked asked{.tag = command->tag, .time = time, .known = true};
   if (command->method == "Get") asked.purpose = Purpose::Position;
   if (command->method == "OnMoveReportE") asked.purpose = Purpose::MoveReport;
+  if (command->tag == ippdme::kAbort) {
+    aborting_ = true;
+    return framer_.resume();
+  }
   if (command->method == "PtMeas") {
     asked.purpose = Purpose::Touch;
     asked.touch = ++touches_;
@@ -75,13 +79,13 @@ void IppReceiver::push(std::span<const std::byte> bytes, HostTime arrival) ABBE_
   arrival_ = arrival;
   if (bytes.empty()) {
     framer_.reset();
-    silenced_ = false;
+    silenced_ = aborting_ = false;
     position_restarted_ = touch_restarted_ = true;
     error_due_.reset();
     for (Asked& asked : asked_) asked.known = false;
     return;
   }
-  if (!silenced_) framer_.push(bytes);
+  framer_.push(bytes);
 }
 
 std::optional<IppMessage> IppReceiver::next() ABBE_RT {
@@ -90,17 +94,37 @@ std::optional<IppMessage> IppReceiver::next() ABBE_RT {
     error_due_.reset();
     return due;
   }
-  while (!silenced_) {
+  for (;;) {
     const auto line = framer_.next();
     if (!line) return std::nullopt;
-    if (!*line) return nonsense(line->error(), {});
-    if (auto message = understand(**line)) return message;
+    if (silenced_) {
+      if (!*line) framer_.resume();
+      if (!*line) continue;
+      if (auto message = of_the_abort(**line)) return message;
+    } else if (!*line) {
+      return nonsense(line->error(), {});
+    } else if (auto message = understand(**line)) {
+      return message;
+    }
   }
-  return std::nullopt;
+}
+
+IppError IppReceiver::refusal_of(const ippdme::Response& response) ABBE_RT {
+  return {response.tag, response.error.severity, response.error.code, text_of(response.error.text)};
+}
+
+/// Nothing else is believed of a server that sent what is no line of the protocol.
+std::optional<IppMessage> IppReceiver::of_the_abort(std::string_view line) ABBE_RT {
+  const auto response = ippdme::parse_response(line);
+  if (!response || response->tag != ippdme::kAbort) return std::nullopt;
+  if (response->kind == ippdme::Response::Kind::Error) return refusal_of(*response);
+  if (response->kind != ippdme::Response::Kind::Complete) return std::nullopt;
+  return IppMessage{IppComplete{response->tag}};
 }
 
 IppMessage IppReceiver::nonsense(ippdme::LineError error, std::string_view line) ABBE_RT {
   silenced_ = true;
+  if (aborting_) framer_.resume();  // its answer may be behind
   return IppNonsense{error, text_of(line)};
 }
 
@@ -202,6 +226,7 @@ IppMessage IppReceiver::error(const ippdme::Response& response) ABBE_RT {
   asked->warned = true;
   if (response.error.severity < kRepairable) return report;
   error_due_ = report;
+  asked->known = false;  // an abort is a second error of the same command, not a second touch
   return touch({}, between(asked->time), asked->touch, true);
 }
 

@@ -26,14 +26,14 @@ void FaultText::set(protocol::HostTime at, std::string_view text) ABBE_RT {
   std::array<std::uint64_t, kWords> words{};
   std::memcpy(words.data(), bytes.data(), kCapacity);
 
-  const std::uint64_t sequence = sequence_.load(std::memory_order_relaxed);  // own counter
-  sequence_.store(sequence + 1, std::memory_order_relaxed);  // made visible by the releases that follow
-  // release: pairs with the acquires in read(); carries the odd sequence along
-  length_.store(length, std::memory_order_release);
-  at_ns_.store(at.time_since_epoch().count(), std::memory_order_release);
-  for (std::size_t i = 0; i < kWords; ++i) words_[i].store(words[i], std::memory_order_release);
-  sequence_.store(sequence + 2,
-                  std::memory_order_release);  // release: pairs with the first acquire in read()
+  const std::uint64_t next = begun_.load(std::memory_order_relaxed) + 1;  // own counter
+  begun_.store(next, std::memory_order_relaxed);  // made visible by the releases that follow
+  Text& to = texts_[next % 2];
+  // release: pairs with the acquires in read(); carries the count of texts begun along
+  to.length.store(length, std::memory_order_release);
+  to.at_ns.store(at.time_since_epoch().count(), std::memory_order_release);
+  for (std::size_t i = 0; i < kWords; ++i) to.words[i].store(words[i], std::memory_order_release);
+  complete_.store(next, std::memory_order_release);  // release: pairs with the first acquire in read()
 }
 
 void StatusBoard::set_clock(const ClockStatus& clock) ABBE_RT {

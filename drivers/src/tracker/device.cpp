@@ -1,5 +1,9 @@
 #include "abbe/drivers/tracker/device.hpp"
 
+#include <fmt/format.h>
+
+#include <chrono>
+#include <cmath>
 #include <utility>
 
 namespace abbe::drivers {
@@ -35,6 +39,7 @@ TrackerDevice::TrackerDevice(const TrackerDeviceOptions& options, TcpPeer peer, 
 
 TrackerDevice::~TrackerDevice() {
   try {
+    put_back_settings();
     leave(TrackerStopRequested{});
   } catch (
       ...) {  // NOLINT(bugprone-empty-catch): out of memory; the closed connection stops the controller too
@@ -43,9 +48,63 @@ TrackerDevice::~TrackerDevice() {
 
 void TrackerDevice::wait(std::chrono::nanoseconds at_most) {
   read_mail();
-  tell(TrackerTick{});
-  poll(at_most);
+  carry_orders();
+  if (!reads_before_due()) {
+    tell(TrackerTick{});
+    poll(at_most);
+  }
+  report_clock();
+  report_cause();
   show();
+}
+
+/// The session gives each step its time; a stepped clock gives it none.
+void TrackerDevice::put_back_settings() {
+  constexpr auto kLook = std::chrono::milliseconds{20};
+  const auto until = std::chrono::steady_clock::now() + time_.wall(options_.session.leave_within);
+  while (!finish() && std::chrono::steady_clock::now() < until) {
+    wait(time_.host(kLook));
+    receive();
+  }
+}
+
+void TrackerDevice::carry_orders() {
+  keep_report();  // of an order that ended in read_mail(): the session keeps one
+  for (TrackerOrder& order : orders_.take()) {
+    tell(std::move(order));
+    keep_report();
+  }
+  keep_report();
+}
+
+void TrackerDevice::keep_report() {
+  if (auto report = session().take_report()) reports_.put(std::move(*report));
+}
+
+void TrackerDevice::report_clock() {
+  const double skew = receiver_.skew_beyond_limit();
+  if (std::exchange(clock_reported_, skew != 0.0) || skew == 0.0) return;
+  constexpr double kPpm = 1e6;
+  board_.fault(time_.now(),
+               fmt::format("{}: the tracker's clock runs {:.0f} ppm {}, a sound one at most {:.0f} ppm: its "
+                           "points are marked ClockUnsettled, have it checked",
+                           peer_.name, kPpm * std::abs(skew), skew > 0.0 ? "fast" : "slow",
+                           kPpm * options_.clock.max_skew));
+}
+
+/// A state that is no fault has a cause, too. Faults are in show().
+void TrackerDevice::report_cause() {
+  const std::string& cause = session().cause();
+  if (cause == cause_reported_) return;
+  cause_reported_ = cause;
+  const bool fault = session().fault().text.ends_with(cause);
+  if (!cause.empty() && !fault) board_.note(time_.now(), peer_.name + ": " + cause);
+}
+
+bool TrackerDevice::finish() {
+  tell(TrackerStopRequested{});
+  show();
+  return session().has_left();
 }
 
 DeviceStatus TrackerDevice::status() const {

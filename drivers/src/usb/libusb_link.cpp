@@ -4,6 +4,7 @@
 #include <libusb-1.0/libusb.h>
 
 #include <algorithm>
+#include <optional>
 #include <thread>
 #include <utility>
 #include <vector>
@@ -15,7 +16,8 @@ namespace {
 
 constexpr int kInterface = 0;
 constexpr std::size_t kLargestAnswer = usb::kMaxDescriptor;
-/// Cancelled transfers come back at once; a host controller that hangs does not.
+/// Cancelled transfers come back at once; those of a host controller that hangs do not. They are waited for
+/// so many turns, then for one turn each time the device is to be opened.
 constexpr int kMostCloseTurns = 20;
 constexpr timeval kCloseTurn{0, 50'000};
 
@@ -59,6 +61,13 @@ struct LibusbLink::State {
     bool lent = false;  ///< its bytes are read until the next wait()
   };
 
+  /// A device with the right vendor and product, where it was plugged in.
+  struct Seen {
+    std::uint8_t bus;
+    std::uint8_t address;
+    std::string serial;
+  };
+
   State(const UsbIdentity& wanted, const TimeSource& source) : identity(wanted), time(source) {
     init_error = libusb_init(&context);
     if (init_error != 0) return;
@@ -72,6 +81,7 @@ struct LibusbLink::State {
   ~State() {
     if (context == nullptr) return;
     close();
+    if (handle != nullptr) return;  // the library still has our transfers: they are left to it
     free_bulk();
     libusb_free_transfer(control_transfer);
     libusb_exit(context);
@@ -89,43 +99,71 @@ struct LibusbLink::State {
     close();
     events.clear();
     lost = false;
+    if (handle != nullptr) {
+      return lose(ErrorCode::Unreachable,
+                  "its cancelled transfers have not come back: the USB host controller hangs");
+    }
     if (init_error != 0) return lose(ErrorCode::SystemRefused, "libusb: " + words_for(init_error));
     if (!find()) return;
     if (!take_over()) {
       libusb_close(std::exchange(handle, nullptr));
       return;
     }
-    events.emplace_back(UsbOpened{});
+    events.emplace_back(UsbOpened{serial});
   }
 
-  /// Opens the one with the right serial number.
+  /// Opens the one with the right serial number. Another one may be streaming to somebody else: it is opened
+  /// once, for its serial number, and not again as long as it stays plugged in.
   bool find() {
     const DeviceList list{context};
-    std::vector<std::string> serials;
+    std::vector<Seen> there;
     std::string refused;
+    libusb_device* ours = nullptr;
     for (libusb_device* device : list.all()) {
       libusb_device_descriptor d{};
       if (libusb_get_device_descriptor(device, &d) != 0) continue;
       if (d.idVendor != identity.vendor || d.idProduct != identity.product) continue;
-      libusb_device_handle* candidate = nullptr;
-      if (const int error = libusb_open(device, &candidate); error != 0) {
-        refused = words_for(error);
-        continue;
+      auto one = look_at(device, d.iSerialNumber, refused);
+      if (!one) continue;
+      if (ours == nullptr && wrong_serial(identity, one->serial).empty()) {
+        ours = device;
+        serial = one->serial;
       }
-      serials.push_back(serial_of(candidate, d.iSerialNumber));
-      const bool right = wrong_serial(identity, serials.back()).empty();
-      if (right && handle == nullptr) {
-        handle = candidate;
-      } else {
-        libusb_close(candidate);
+      there.push_back(std::move(*one));
+    }
+    cards = std::move(there);
+    std::vector<std::string> serials;
+    for (const Seen& one : cards) serials.push_back(one.serial);
+    if (identity.serial.empty() && serials.size() > 1) ours = nullptr;
+    if (ours != nullptr) {
+      if (const int error = libusb_open(ours, &handle); error != 0) {
+        handle = nullptr;
+        serials.clear();
+        refused = words_for(error);
       }
     }
     return judge(serials, refused);
   }
 
+  /// A device that is plugged in again has another address.
+  std::optional<Seen> look_at(libusb_device* device, std::uint8_t serial_string, std::string& refused) const {
+    Seen one{libusb_get_bus_number(device), libusb_get_device_address(device), {}};
+    const auto known = std::ranges::find_if(cards, [&](const Seen& s) {
+      return s.bus == one.bus && s.address == one.address && !s.serial.empty();
+    });
+    if (known != cards.end()) return *known;
+    libusb_device_handle* candidate = nullptr;
+    if (const int error = libusb_open(device, &candidate); error != 0) {
+      refused = words_for(error);
+      return std::nullopt;
+    }
+    one.serial = serial_of(candidate, serial_string);
+    libusb_close(candidate);
+    return one;
+  }
+
   bool judge(const std::vector<std::string>& serials, const std::string& refused) {
     if (identity.serial.empty() && serials.size() > 1) {
-      libusb_close(std::exchange(handle, nullptr));
       lose(ErrorCode::BadConfiguration, fmt::format("{} are there ({}): the serial number must be configured",
                                                     serials.size(), fmt::join(serials, ", ")));
     } else if (handle == nullptr && !serials.empty()) {
@@ -161,18 +199,23 @@ struct LibusbLink::State {
 
   void close() noexcept {
     if (handle == nullptr) return;
-    closing = true;
-    streaming = stopping = false;
-    for (auto& bulk : bulks) libusb_cancel_transfer(bulk.transfer);
-    if (control_under_way) libusb_cancel_transfer(control_transfer);
-    for (int turn = 0; (in_flight != 0 || control_under_way) && turn < kMostCloseTurns; ++turn) {
+    const bool first = !std::exchange(closing, true);
+    if (first) {
+      streaming = stopping = false;
+      for (auto& bulk : bulks) libusb_cancel_transfer(bulk.transfer);
+      if (control_under_way) libusb_cancel_transfer(control_transfer);
+    }
+    for (int turn = first ? 0 : kMostCloseTurns - 1; busy() && turn < kMostCloseTurns; ++turn) {
       timeval patience = kCloseTurn;
       libusb_handle_events_timeout_completed(context, &patience, nullptr);
     }
+    if (busy()) return;  // still closing: what the library has is neither freed nor used again
     libusb_release_interface(handle, kInterface);
     libusb_close(std::exchange(handle, nullptr));
     closing = false;
   }
+
+  [[nodiscard]] bool busy() const noexcept { return in_flight != 0 || control_under_way; }
 
   void free_bulk() noexcept {
     for (auto& bulk : bulks) libusb_free_transfer(bulk.transfer);
@@ -180,7 +223,7 @@ struct LibusbLink::State {
   }
 
   void control(const usb::Setup& setup) {
-    if (handle == nullptr) return;
+    if (handle == nullptr || closing) return;
     control_setup = setup;
     if (setup == usb::clear_halt(identity.bulk_endpoint)) return clear_halt();
     libusb_fill_control_setup(control_buffer.data(), setup.request_type, setup.request, setup.value,
@@ -202,7 +245,7 @@ struct LibusbLink::State {
   }
 
   void start_bulk(const UsbBulkStream& stream) {
-    if (handle == nullptr || streaming || in_flight != 0) return;
+    if (handle == nullptr || closing || streaming || in_flight != 0) return;
     if (bulks.size() != stream.in_flight || bulks.front().buffer.size() != stream.transfer_bytes) {
       free_bulk();
       bulks.resize(stream.in_flight);
@@ -228,7 +271,7 @@ struct LibusbLink::State {
   }
 
   void stop_bulk() {
-    if (handle == nullptr) return;
+    if (handle == nullptr || closing) return;
     streaming = false;
     stopping = true;
     for (auto& bulk : bulks) libusb_cancel_transfer(bulk.transfer);
@@ -305,7 +348,9 @@ struct LibusbLink::State {
   libusb_context* context = nullptr;
   int init_error = 0;
   libusb_device_handle* handle = nullptr;
-  bool closing = false;
+  std::vector<Seen> cards;  ///< at the latest find()
+  std::string serial;       ///< of the one that was opened
+  bool closing = false;     ///< with a handle: its transfers have not come back yet
   bool lost = false;
 
   usb::Setup control_setup;

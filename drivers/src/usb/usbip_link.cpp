@@ -280,13 +280,14 @@ void UsbipLink::inspect(std::span<const std::byte> bytes) {
       break;
     case Inspection::Serial: {
       const auto text = usb::decode_string(bytes);
-      const auto wrong = wrong_serial(options_.identity, text ? text->view() : std::string_view{});
+      serial_ = text ? text->view() : std::string_view{};
+      const auto wrong = wrong_serial(options_.identity, serial_);
       if (!wrong.empty()) return lose(ErrorCode::Protocol, wrong);
       break;
     }
     case Inspection::Select:
       state_ = State::Open;
-      early_events_.emplace_back(UsbOpened{});
+      early_events_.emplace_back(UsbOpened{serial_});
       return;
   }
   inspection_ = static_cast<Inspection>(static_cast<unsigned>(inspection_) + 1);
@@ -299,6 +300,7 @@ void UsbipLink::inspected_device(std::span<const std::byte> bytes) {
   const auto wrong = wrong_ids(options_.identity, device->vendor, device->product);
   if (!wrong.empty()) return lose(ErrorCode::Protocol, wrong);
   serial_string_ = device->serial_string;
+  serial_.clear();
   inspection_ = Inspection::Configuration;
   ask_next();
 }

@@ -21,7 +21,10 @@ namespace abbe::drivers {
 struct ClockModelOptions {
   std::chrono::nanoseconds window =
       std::chrono::seconds{60};  ///< long enough for a skew of 1 ppm, short enough to follow temperature
-  double max_skew = 200e-6;      ///< quartz in a cabinet; beyond it a slope is an artefact of late arrivals
+  /// Quartz in a cabinet: beyond it a slope is an artefact of late arrivals. If more arrivals confirm it, the
+  /// clock is reported (skew_beyond_limit()), never settled, and its u_time holds the
+  /// disagreement.
+  double max_skew = 200e-6;
   std::chrono::nanoseconds max_constant_delay =
       std::chrono::milliseconds{2};  ///< bound of the smallest delay (device + wire + kernel)
   std::chrono::nanoseconds jump =
@@ -58,6 +61,9 @@ class ClockModel {
 
   [[nodiscard]] ClockStatus status() const ABBE_RT;
 
+  /// The rate that arrivals show, when it is beyond max_skew and not by chance; else 0.
+  [[nodiscard]] double skew_beyond_limit() const ABBE_RT { return beyond_ ? -free_slope_ : 0.0; }
+
  private:
   struct Point {
     double device_s = 0.0;  ///< device time since origin_device_
@@ -75,6 +81,8 @@ class ClockModel {
   std::size_t find_hull() ABBE_RT;
   [[nodiscard]] double hull_height(std::size_t hull_size, double device_s) const ABBE_RT;
   void judge_lateness() ABBE_RT;
+  void judge_skew() ABBE_RT;
+  [[nodiscard]] double u_touch_of_free_line() const ABBE_RT;
   [[nodiscard]] double line_at(double device_s) const ABBE_RT;
   [[nodiscard]] bool settled() const ABBE_RT;
 
@@ -89,6 +97,9 @@ class ClockModel {
   double offset_s_ = 0.0;  ///< of the line at device_s = pivot_s_
   double pivot_s_ = 0.0;
   double slope_ = 0.0;             ///< d offset / d device time
+  double free_slope_ = 0.0;        ///< before it was held within the bound
+  double u_beyond_s_ = 0.0;        ///< what the free slope adds over the window; 0 unless beyond_
+  bool beyond_ = false;            ///< the free slope is beyond the bound, and not by chance
   double quarter_s_ = 0.0;         ///< of the observed device time: the slope is that between here ...
   double three_quarters_s_ = 0.0;  ///< ... and here
   double median_lateness_s_ = 0.0;

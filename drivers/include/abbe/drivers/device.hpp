@@ -35,6 +35,7 @@ struct DeviceStatus {
   std::uint64_t time_widened = 0;  ///< receives whose kernel stamp could not be used
   ClockStatus clock;
   protocol::HostTime last_sample{};  ///< the instant the latest sample describes; epoch if none yet
+  std::string condition;             ///< what is wrong at this moment: "X missing (node 1)"; empty: nothing
   std::string last_fault;            ///< "what was tried: what was seen"; empty if none yet
   protocol::HostTime last_fault_at{};
 };

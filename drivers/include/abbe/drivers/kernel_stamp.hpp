@@ -6,7 +6,8 @@
 /// since then as the monotonic clock did (else one of them was stepped, and the age may be wrong by that
 /// step). The bound moves only with nothing_older_than(), so every stamp of one batch is held against the
 /// same. A stamp that is not accepted leaves the user-space time, widened, and is counted. A wall-clock step
-/// therefore changes no arrival. Pure: every time is handed in. One thread.
+/// therefore changes no arrival. The kernel begins to stamp a moment after the first socket asked (one of its
+/// workers switches it on): what comes before has none. Pure: every time is handed in. One thread.
 
 #include <chrono>
 #include <cstdint>

@@ -29,12 +29,13 @@ class Counter {
   std::atomic<std::uint64_t> value_{0};
 };
 
-/// The latest text, cut at kCapacity, replaced without locks: a sequence counter says whether a reader saw
-/// one text or parts of two, and the reader tries again. The writer never waits. [Boehm 2012] for the fences
+/// The latest text, cut at kCapacity, replaced without locks. There is room for two: while one is written the
+/// other can be read, so that a reader of high priority never waits for a writer that was preempted. A reader
+/// tries again only if two texts were begun while it read. The writer never waits. [Boehm 2012] for the fences
 /// of a seqlock.
 class FaultText {
  public:
-  static constexpr std::size_t kCapacity = 192;
+  static constexpr std::size_t kCapacity = 248;  ///< as much as a Health message carries
 
   /// Writer thread.
   void set(protocol::HostTime at, std::string_view text) ABBE_RT;
@@ -48,10 +49,14 @@ class FaultText {
 
  private:
   static constexpr std::size_t kWords = kCapacity / sizeof(std::uint64_t);
-  std::atomic<std::uint64_t> sequence_{0};  ///< odd while being written
-  std::atomic<std::uint64_t> length_{0};
-  std::atomic<std::int64_t> at_ns_{0};
-  std::array<std::atomic<std::uint64_t>, kWords> words_{};
+  struct Text {
+    std::atomic<std::uint64_t> length{0};
+    std::atomic<std::int64_t> at_ns{0};
+    std::array<std::atomic<std::uint64_t>, kWords> words{};
+  };
+  std::array<Text, 2> texts_;             ///< the n-th text lies in texts_[n % 2]
+  std::atomic<std::uint64_t> begun_{0};   ///< texts whose writing has begun
+  std::atomic<std::uint64_t> complete_{0};
 };
 
 class StatusBoard {
@@ -62,6 +67,8 @@ class StatusBoard {
   void set_state(const char* literal) ABBE_RT {
     state_.store(literal, std::memory_order_release);  // release: pairs with the acquire in read()
   }
+  /// What keeps the device from measuring though it is no fault ("no beam"): the text alone, not counted.
+  void note(protocol::HostTime at, std::string_view text) ABBE_RT { fault_text_.set(at, text); }
   void set_connected(bool yes) ABBE_RT { connected_.store(yes, std::memory_order_relaxed); }
   void set_last_sample(protocol::HostTime t) ABBE_RT {
     last_sample_ns_.store(t.time_since_epoch().count(), std::memory_order_relaxed);
@@ -73,6 +80,9 @@ class StatusBoard {
     faults.add();
     fault_text_.set(at, text);
   }
+
+  /// What is wrong from now on; empty: nothing.
+  void set_condition(protocol::HostTime now, std::string_view text) ABBE_RT { condition_.set(now, text); }
 
   /// Any thread; allocates. The rings' own counts are handed in, so that they are kept once.
   [[nodiscard]] DeviceStatus read(std::string name, std::uint64_t dropped, std::uint64_t raw_dropped) const;
@@ -88,6 +98,7 @@ class StatusBoard {
   std::atomic<std::int64_t> clock_u_time_ns_{0};
   std::atomic<std::uint64_t> clock_restarts_{0};
   FaultText fault_text_;
+  FaultText condition_;
 };
 
 }  // namespace abbe::drivers

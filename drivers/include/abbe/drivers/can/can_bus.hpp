@@ -28,6 +28,16 @@ struct CanBusCounters {
   std::uint64_t lost = 0;          ///< the kernel's queue was full, or datagrams missing in the sequence
   std::uint64_t refused = 0;       ///< datagrams that are no CAN frames
   std::uint64_t time_widened = 0;  ///< arrivals whose kernel stamp could not be used
+  std::uint64_t strangers = 0;     ///< datagrams of others than the peer: refused
+};
+
+/// What read() gave. The bus may have looked at more frames than it hands on: `frames` alone says nothing of
+/// what else is there.
+struct CanRead {
+  std::size_t frames = 0;
+  bool all = false;  ///< nothing else was there
+  protocol::HostTime
+      until{};  ///< after the wait, before the first look: what came before this is among them, if `all`
 };
 
 class CanBus {
@@ -44,10 +54,10 @@ class CanBus {
   [[nodiscard]] virtual Result<void> open(std::span<const std::uint32_t> ids) = 0;
   virtual void close() noexcept = 0;
   /// Waits at most `wall` (the operating system's time, 0 = look only) and reads what is there, at most
-  /// out.size(), itself at most kMostRead; if it is fewer, nothing else was there. Error code Unreachable:
-  /// nobody there now, the bus stays open; any other code: close and open again.
-  [[nodiscard]] virtual Result<std::size_t> read(std::span<ReceivedFrame> out,
-                                                 std::chrono::nanoseconds wall) = 0;
+  /// out.size(), itself at most kMostRead. Where the kernel had no room for frames, an error frame
+  /// ReceiveOverflow stands in their place. Error code Unreachable: nobody there now, the bus stays open; any
+  /// other code: close and open again.
+  [[nodiscard]] virtual Result<CanRead> read(std::span<ReceivedFrame> out, std::chrono::nanoseconds wall) = 0;
   /// Errors as for read().
   [[nodiscard]] virtual Result<void> send(std::span<const can::CanFrame> frames) = 0;
   /// Lets the operating system send the SYNC every `period` from now on, whatever this thread does, until
@@ -60,6 +70,8 @@ class CanBus {
   /// open().
   [[nodiscard]] virtual bool echoes_sync() const noexcept { return false; }
   [[nodiscard]] virtual CanBusCounters counters() const noexcept = 0;
+  /// Where the latest stranger's datagram came from: "127.0.0.1:4711"; empty: there was none.
+  [[nodiscard]] virtual std::string stranger() const { return {}; }
   /// For people: "can0", "udp 127.0.0.1:20000".
   [[nodiscard]] virtual std::string name() const = 0;
 };

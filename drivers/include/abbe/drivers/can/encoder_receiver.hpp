@@ -3,11 +3,11 @@
 /// give the same samples, so replay from raw bytes uses it unchanged. Real time: no allocation after
 /// construction. One thread.
 ///
-/// A cycle begins when our SYNC goes out (on_sent). The sample leaves when the last axis has answered, or at
-/// the deadline, the next SYNC or bus-off with the axes that are not known marked in missing_mask: who did
-/// not answer keeps the previous value. All axes carry one time: SYNC + sampling delay. An axis that never
-/// answered has position NaN. An answer that comes after its cycle is closed is counted and not used; one
-/// stamped before the SYNC cannot be its answer.
+/// A cycle begins when our SYNC goes out (on_sent), or with external_sync when the machine's arrives. The
+/// sample leaves when the last axis has answered, or at the deadline, the next SYNC or bus-off with the axes
+/// that are not known marked in missing_mask: who did not answer keeps the previous value. All axes carry one
+/// time: SYNC + sampling delay. An axis that never answered has position NaN. An answer that comes after its
+/// cycle is closed is counted and not used; one stamped before the SYNC cannot be its answer.
 ///
 /// An answer does not say to which SYNC. It is doubtful, and its axis missing, where it may be that to an
 /// earlier one: the first after cycles without any (but not where the node booted, or the SYNC paused for a
@@ -19,7 +19,9 @@
 /// The period must be longer than the slowest answer.
 ///
 /// The scale is configured or read along from the SDO answers on the bus (6005h:01, else 6501h; rotary:
-/// 6001h), so that a recording carries it. 0 is refused: the axis stays missing.
+/// 6001h, else 6501h), so that a recording carries it. 0 is refused: the axis stays missing. So is the place
+/// of the position in a mapping that could not be written, and the period of a heartbeat that could not be
+/// set.
 ///
 /// Raw blocks of a CAN bus: each is one whole datagram of protocol/can/udp_framing.hpp with all its frames at
 /// one host time. FromDevice: as received. ToDevice: as sent, the SYNC among them. FromDevice without frames
@@ -56,9 +58,10 @@ struct EncoderAxis {
   can::NodeId node = 1;
   AxisKind kind = AxisKind::Linear;
   can::PositionType position = can::PositionType::Signed32;
-  std::uint8_t tpdo = 1;          ///< 1 or 2
-  std::optional<double> scale{};  ///< m or rad per count, negative reverses; none: ask the encoder
-  double offset = 0.0;            ///< m or rad: the reading at count 0
+  std::uint8_t tpdo = 1;           ///< 1 or 2
+  std::uint8_t position_byte = 0;  ///< where in the TPDO the position begins
+  std::optional<double> scale{};   ///< m or rad per count, negative reverses; none: ask the encoder
+  double offset = 0.0;             ///< m or rad: the reading at count 0
   std::uint64_t wrap_counts =
       0;  ///< counts after which it begins anew; 0: what the encoder says, else 2^32 (2^64)
   std::optional<std::uint32_t> serial{};  ///< checked when given
@@ -72,6 +75,7 @@ struct EncoderReceiverOptions {
       sampling_delay{};  ///< the SYNC's time to position taken; device specific, to be calibrated
   std::chrono::nanoseconds u_sampling_delay = std::chrono::microseconds{50};  ///< its standard uncertainty
   std::chrono::nanoseconds heartbeat_timeout = std::chrono::milliseconds{350};
+  bool external_sync = false;  ///< the machine's SYNC begins a cycle, as it arrives, not ours
 };
 /// BadConfiguration names the axis and what is wrong with it.
 [[nodiscard]] Result<void> check(const EncoderReceiverOptions& options);
@@ -151,6 +155,11 @@ class EncoderReceiver {
     AxisKind kind{};
     can::PositionType type{};
     std::uint32_t tpdo_id = 0;
+    std::uint16_t mapping = 0;  ///< the object of it, 1A00h or 1A01h
+    std::uint8_t position_byte = 0;
+    std::uint32_t bits_before = 0;  ///< the entry of a mapping that is read next
+    std::uint32_t units = 0;        ///< rotary: counts a revolution, as read
+    std::chrono::nanoseconds heartbeat_timeout{};
     bool scale_configured = false;
     bool wrap_configured = false;
     double scale = 0.0;         ///< 0: unknown
@@ -168,6 +177,7 @@ class EncoderReceiver {
 
   void begin_cycle(protocol::HostTime time, bool time_widened) ABBE_RT;
   void close_cycle() ABBE_RT;
+  void lose() ABBE_RT;
   void emit(protocol::HostTime time) ABBE_RT;
   [[nodiscard]] protocol::SampleFlags take_flags(std::uint8_t missing) ABBE_RT;
   [[nodiscard]] Samples done() const ABBE_RT { return {out_.data(), out_count_}; }
@@ -182,6 +192,7 @@ class EncoderReceiver {
   void on_heartbeat(Axis& axis, can::NodeState state, protocol::HostTime time) ABBE_RT;
   void on_bus_report(const can::CanFrame& frame, protocol::HostTime time) ABBE_RT;
   void on_sdo_answer(Axis& axis, const can::CanFrame& frame) ABBE_RT;
+  void learn_mapping(Axis& axis, std::uint8_t sub, std::uint32_t value) ABBE_RT;
   void learn(Axis& axis, can::ObjectId object, std::uint32_t value) ABBE_RT;
   void check_heartbeats(protocol::HostTime time) ABBE_RT;
   void count_bad_block() ABBE_RT { ++counters_.bad_blocks; }
@@ -195,6 +206,7 @@ class EncoderReceiver {
   std::chrono::nanoseconds u_sampling_delay_;
   std::chrono::nanoseconds u_widened_;
   std::chrono::nanoseconds heartbeat_timeout_;
+  bool external_sync_;
 
   bool open_ = false;                            ///< a cycle waits for answers
   std::optional<protocol::HostTime> sync_time_;  ///< of the latest SYNC

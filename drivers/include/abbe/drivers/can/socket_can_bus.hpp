@@ -5,6 +5,7 @@
 
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <string>
 
 #include "abbe/drivers/can/can_bus.hpp"
@@ -31,8 +32,7 @@ class SocketCanBus final : public CanBus {
 
   [[nodiscard]] Result<void> open(std::span<const std::uint32_t> ids) override;
   void close() noexcept override;
-  [[nodiscard]] Result<std::size_t> read(std::span<ReceivedFrame> out,
-                                         std::chrono::nanoseconds wall) override;
+  [[nodiscard]] Result<CanRead> read(std::span<ReceivedFrame> out, std::chrono::nanoseconds wall) override;
   [[nodiscard]] Result<void> send(std::span<const can::CanFrame> frames) override;
   [[nodiscard]] Result<void> start_sync(std::chrono::nanoseconds period) override;
   void stop_sync() noexcept override;
@@ -52,8 +52,12 @@ class SocketCanBus final : public CanBus {
   int fd_ = -1;
   int sync_fd_ = -1;          ///< CAN_BCM; closing it ends the SYNC
   bool kernel_sent_ = false;  ///< since open(): what was on its way when it ended is ours, too
+  bool sent_sync_ = false;    ///< since open()
+  /// A socket closed before sent a SYNC: one of this computer that is no echo may be its, still on the way.
+  bool left_over_ = false;
   KernelStampMap stamps_;
   std::unique_ptr<Batch> batch_;
+  std::optional<ReceivedFrame> held_;  ///< found no room beside the mark of a loss
   std::uint64_t lost_ = 0;
   std::uint32_t last_overflow_ = 0;  ///< SO_RXQ_OVFL counts per socket
 };

@@ -3,6 +3,8 @@
 /// and abbe-sim. All frames of a datagram get the arrival time of the datagram; a tunnel that buffers makes
 /// it a late one, which costs nothing here: positions are dated by the SYNC.
 
+#include <netinet/in.h>
+
 #include <array>
 #include <bitset>
 #include <cstdint>
@@ -17,7 +19,7 @@
 namespace abbe::drivers {
 
 struct UdpCanOptions {
-  /// The peer may be on any network of this computer; connected, only its datagrams come in.
+  /// The peer may be on any network of this computer; only its datagrams, by address and port, are taken.
   std::string local_address = "0.0.0.0";
   std::uint16_t local_port = 0;            ///< 0: the kernel chooses, see local_port()
   std::string peer_address = "127.0.0.1";  ///< IPv4, or a name that open() looks up
@@ -34,23 +36,33 @@ class UdpCanBus final : public CanBus {
 
   [[nodiscard]] Result<void> open(std::span<const std::uint32_t> ids) override;
   void close() noexcept override;
-  [[nodiscard]] Result<std::size_t> read(std::span<ReceivedFrame> out,
-                                         std::chrono::nanoseconds wall) override;
+  [[nodiscard]] Result<CanRead> read(std::span<ReceivedFrame> out, std::chrono::nanoseconds wall) override;
   [[nodiscard]] Result<void> send(std::span<const can::CanFrame> frames) override;
   [[nodiscard]] CanBusCounters counters() const noexcept override;
+  [[nodiscard]] std::string stranger() const override { return stranger_; }
   [[nodiscard]] std::string name() const override;
 
   /// The port bound to; 0 while closed.
   [[nodiscard]] std::uint16_t local_port() const noexcept { return bound_port_; }
 
  private:
-  [[nodiscard]] Result<bool> receive_datagram();
+  [[nodiscard]] Result<void> bind_and_connect(const sockaddr_in& local, const sockaddr_in& peer);
+  void listen_for_strangers(sockaddr_in local);
+  void count_strangers();
+  void count_stranger(const sockaddr_in& from);
+  [[nodiscard]] bool is_peer(const sockaddr_in& from) const;
+  enum class Next : std::uint8_t { Datagram, Nothing, Unknown };
+  [[nodiscard]] Result<Next> receive_datagram();
   std::size_t take_frames(std::span<ReceivedFrame> out);
   [[nodiscard]] Result<void> send_datagram(std::span<const std::byte> datagram);
 
   UdpCanOptions options_;
   const TimeSource& time_;
   int fd_ = -1;
+  int stranger_fd_ = -1;  ///< the same port, not connected: what others than the peer send arrives there
+  sockaddr_in peer_{};
+  std::uint64_t strangers_ = 0;
+  std::string stranger_;
   std::uint16_t bound_port_ = 0;
   std::bitset<can::CanFrame::kStandardMask + 1> wanted_;
   KernelStampMap stamps_;

@@ -1,8 +1,9 @@
 #pragma once
 /// A USB-QUAD08 counter card as a Device: CounterCardReceiver and CounterCardSession around one USB link.
 /// wait(): sends what the session asks for, collects what the card sent. receive(): bytes to scans, raw
-/// blocks. States: those of CardState. After the card was unplugged or restarted its counters begin at zero
-/// where the axes then stand (SampleFlag::Restarted): positions are true again once a datum was taken.
+/// blocks. States: those of CardState. After the connection was lost the counts go on if the card's clock
+/// channel did. After the card was without power its counters begin at zero where the axes then stand
+/// (SampleFlag::Restarted): positions are true again once a datum was taken.
 
 #include <array>
 #include <cstddef>
@@ -61,12 +62,16 @@ class CounterCardDevice final : public Device {
   /// One reader each. No samples come from a card all of whose axes are latched on their index.
   [[nodiscard]] SampleRing<protocol::AxisSample>& samples() noexcept { return samples_; }
   [[nodiscard]] RawRing& raw() noexcept { return raw_; }
+  /// Once a second while the clock model is settled, after the sample of that scan; one reader.
+  [[nodiscard]] SampleRing<CounterCardProgress>& progress() noexcept { return progress_ring_; }
   /// The device thread's own view.
   [[nodiscard]] const CounterCardReceiver& receiver() const noexcept { return receiver_; }
   /// What the configuration takes for granted, in a sentence; empty if nothing.
   [[nodiscard]] std::string assumption() const;
 
  private:
+  static constexpr std::size_t kProgressCapacity = 16;
+
   CounterCardDevice(const CounterCardOptions& options, std::unique_ptr<UsbLink> link, const TimeSource& time,
                     CounterScanSink* sink);
 
@@ -78,11 +83,13 @@ class CounterCardDevice final : public Device {
   void hand_over_events();
   void hand_over_scans();
   void account();
+  void report_clock();
   void show();
 
   void take(const UsbControlDone& done) ABBE_RT;
   void take(const UsbBulkIn& bulk) ABBE_RT;
   void push(const CounterScan& scan) ABBE_RT;
+  void note_progress(const CounterScan& scan) ABBE_RT;
   void record(const protocol::usbip::SubmitReply& reply, std::span<const std::byte> data,
               protocol::HostTime time) ABBE_RT;
 
@@ -94,17 +101,23 @@ class CounterCardDevice final : public Device {
   ScanThinning thinning_;
   SampleRing<protocol::AxisSample> samples_;
   RawRing raw_;
+  SampleRing<CounterCardProgress> progress_ring_{kProgressCapacity};
   StatusBoard board_;
   CounterCardReceiver receiver_;
   CounterCardSession session_;
 
   std::span<const UsbEvent> events_;  ///< of the latest wait(); the session hears of them in the next
   protocol::HostTime turn_end_{};
-  std::size_t scans_ = 0;  ///< of the latest receive()
+  protocol::HostTime read_until_{};  ///< what came before was read by the latest wait()
+  std::size_t scans_ = 0;            ///< of the latest receive()
   bool out_of_step_told_ = false;
   std::uint64_t faults_seen_ = 0;
   std::uint64_t gaps_seen_ = 0;
   std::uint64_t disagreements_seen_ = 0;
+  std::uint64_t began_anew_seen_ = 0;
+  std::uint64_t withheld_seen_ = 0;
+  bool clock_reported_ = false;   ///< too far off
+  CounterCardProgress progress_;  ///< the latest
   std::uint32_t raw_sequence_ = 0;
 
   std::array<std::byte, CounterCardReceiver::kLongestMessage> message_{};

@@ -22,6 +22,7 @@
 
 #include "abbe/drivers/clock_model.hpp"
 #include "abbe/drivers/counter_card/latch.hpp"
+#include "abbe/drivers/counter_card/progress.hpp"
 #include "abbe/drivers/counter_card/scan.hpp"
 #include "abbe/drivers/counter_card/wiring.hpp"
 #include "abbe/protocol/quad08/stream.hpp"
@@ -36,6 +37,11 @@ struct CounterCardReceiverOptions {
   CounterCardWiring wiring;
   ClockModelOptions clock{.max_constant_delay =
                               std::chrono::milliseconds{1}};  ///< FIFO, bus, host controller
+  /// The counters as an earlier run of the program left them. Their scans are withheld until the clock
+  /// channel has shown, for 0.25 s, that it stands where it must if they went on (to 50 ms and 200 ppm of the
+  /// time between); then the counts go on after a gap. Else CounterCardCounters::began_anew, and no scans
+  /// before the counters were set up.
+  std::optional<CounterCardProgress> goes_on_from;
 };
 
 /// Since construction.
@@ -47,6 +53,8 @@ struct CounterCardCounters {
   std::uint64_t edges = 0;                ///< changes of the latch
   std::uint64_t latch_disagreements = 0;  ///< latches outside the scan in which they came
   std::uint64_t clock_jumps = 0;          ///< the time base went away from the host's clock
+  std::uint64_t began_anew = 0;           ///< an opened card did not continue the clock's count
+  std::uint64_t withheld_scans = 0;       ///< while it was not known whether the counters went on
 };
 
 class CounterCardReceiver {
@@ -60,8 +68,8 @@ class CounterCardReceiver {
   CounterCardReceiver(const CounterCardReceiver&) = delete;
   CounterCardReceiver& operator=(const CounterCardReceiver&) = delete;
 
-  /// A control request on its way to the card: setting a counter up zeroes it, starting the data transfer
-  /// begins the stream anew.
+  /// A control request on its way to the card: asking for the firmware version opens it, setting a counter up
+  /// zeroes it, starting the data transfer begins the stream anew.
   void on_control(const protocol::usb::Setup& setup) ABBE_RT;
   /// Bytes of the scan endpoint; then next() until it gives nothing. The bytes are borrowed until then.
   void push(std::span<const std::byte> bytes, protocol::HostTime arrival) ABBE_RT;
@@ -75,6 +83,9 @@ class CounterCardReceiver {
   /// What the clock channel counted in the latest scan that was refused, and what it had to.
   [[nodiscard]] std::uint64_t refused_step() const ABBE_RT { return refused_step_; }
   [[nodiscard]] double expected_step() const ABBE_RT { return metronome_.step; }
+  /// How far the clock channel was behind where it must stand, s, when the counters were last seen not to go
+  /// on.
+  [[nodiscard]] double behind_s() const ABBE_RT { return behind_s_; }
 
   /// Replay: one raw block; every scan it completes to sink(const CounterScan&). Total.
   template <class Sink>
@@ -86,6 +97,7 @@ class CounterCardReceiver {
 
   [[nodiscard]] const CounterCardCounters& counters() const ABBE_RT { return counters_; }
   [[nodiscard]] ClockStatus clock() const ABBE_RT { return clock_.status(); }
+  [[nodiscard]] double skew_beyond_limit() const ABBE_RT { return clock_.skew_beyond_limit(); }
 
  private:
   static constexpr std::size_t kBatch = 512;
@@ -94,6 +106,13 @@ class CounterCardReceiver {
     std::size_t place = 0;
     double scale = 0.0;
     double offset = 0.0;
+  };
+  /// Counters of an earlier run, as long as it is not known whether they went on.
+  struct Resumption {
+    protocol::HostTime since{};               ///< of `last_`
+    std::optional<protocol::HostTime> begun;  ///< first scan withheld
+    double least_behind_s = 0.0;
+    bool refused = false;
   };
   struct LongGap {
     std::int64_t clock_count = 0;  ///< of the scan after it
@@ -112,6 +131,13 @@ class CounterCardReceiver {
   void refuse(const quad08::RawScan& from, const quad08::RawScan& to) ABBE_RT;
   void accept(const quad08::RawScan& raw) ABBE_RT;
   void count_lost(std::uint64_t clock_step, CounterScan& scan) ABBE_RT;
+  void judge_first_scan(const quad08::RawScan& raw) ABBE_RT;
+  [[nodiscard]] bool goes_on(const quad08::RawScan& raw) ABBE_RT;
+  [[nodiscard]] double seconds_behind(const quad08::RawScan& raw, protocol::HostTime since) ABBE_RT;
+  void seed(const CounterCardProgress& from);
+  [[nodiscard]] bool resumed(const quad08::RawScan& raw) ABBE_RT;
+  void take_over(const quad08::RawScan& raw) ABBE_RT;
+  void begin_anew() ABBE_RT;
   void keep_gap(const LongGap& gap) ABBE_RT;
   [[nodiscard]] double seconds_since(const LongGap& gap, std::int64_t clock_count) const ABBE_RT;
   void unwrap(const quad08::RawScan& raw, CounterScan& scan) ABBE_RT;
@@ -142,6 +168,10 @@ class CounterCardReceiver {
   std::uint64_t refused_step_ = 0;
   std::size_t refused_run_ = 0;
   std::optional<quad08::RawScan> last_;       ///< accepted
+  bool reopened_ = false;                     ///< the card was closed since
+  std::optional<Resumption> resumption_;
+  double behind_s_ = 0.0;
+  std::uint64_t clock_wraps_ = 0;             ///< whole ranges the clock counted while the stream stood
   std::optional<quad08::RawScan> candidate_;  ///< held back until the next one confirms it
   protocol::SampleFlags pending_flags_ = 0;
   bool stream_restarted_ = false;

@@ -1,12 +1,14 @@
 #pragma once
 /// What is to be said to a counter card, and when: open and self-test, counter set-up, scan start, status
-/// poll, restart after an overrun, open again after it was unplugged. Sans-I/O: inputs and a time in, one
-/// action out; after each input ask again with CardTick until nothing is to be done. Ordinary world. One
-/// thread.
+/// poll, restart after an overrun, open again after it was unplugged. To set a counter up zeroes it: after
+/// opening again the scan is started without, and only if the card does not go on counting its clock is it
+/// set up. Sans-I/O: inputs and a time in, one action out; after each input ask again with CardTick until
+/// nothing is to be done. Ordinary world. One thread.
 
 #include <chrono>
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <variant>
 #include <vector>
@@ -29,21 +31,33 @@ struct CounterCardSessionOptions {
   std::chrono::nanoseconds reopen_after = std::chrono::milliseconds{250};
   std::chrono::nanoseconds retry_after =
       std::chrono::milliseconds{500};  ///< after a restart that brought no scans
+  unsigned control_tries = 3;  ///< of a request the card refuses or that fails, before the device is closed
+  /// The card of this serial number was set up by an earlier run of the program: its counters are set up only
+  /// if they do not go on.
+  std::optional<std::string> set_up_serial;
 };
 
 // Inputs.
-struct CardTick {};
+struct CardTick {
+  /// Whatever came before this instant was handed over: only what is overdue then is missing. A host that was
+  /// held up looks first.
+  protocol::HostTime read_until = protocol::HostTime::max();
+};
 struct CardScans {
   std::size_t count = 0;
 };
 struct CardOutOfStep {
   std::string seen;
 };
+/// The clock channel did not go on from where it was: another session of the card.
+struct CardBeganAnew {
+  std::string seen;  ///< how that showed; may be empty
+};
 struct CardBulkFailed {
   UsbOutcome outcome = UsbOutcome::Failed;
 };
 using CardInput = std::variant<CardTick, UsbOpened, UsbControlDone, UsbBulkStopped, UsbLost, CardScans,
-                               CardOutOfStep, CardBulkFailed>;
+                               CardOutOfStep, CardBeganAnew, CardBulkFailed>;
 
 // Actions.
 struct CardNothing {};
@@ -60,7 +74,7 @@ enum class CardState : std::uint8_t {
   Closed,
   Opening,
   Testing,    ///< firmware version and registers
-  SettingUp,  ///< counters; zeroes them
+  SettingUp,  ///< counters; zeroes them. Left out while they may still count
   Loading,    ///< stops what ran, loads scan list and pacer
   Arming,     ///< data transfer on, list started, until the card is ready
   Streaming,
@@ -94,13 +108,14 @@ class CounterCardSession {
 
  private:
   using Now = protocol::HostTime;
-  CardAction take(const CardTick&, Now now);
-  CardAction take(const UsbOpened&, Now now);
+  CardAction take(const CardTick& tick, Now now);
+  CardAction take(const UsbOpened& opened, Now now);
   CardAction take(const UsbControlDone& done, Now now);
   CardAction take(const UsbBulkStopped&, Now now);
   CardAction take(const UsbLost& lost, Now now);
   CardAction take(const CardScans& scans, Now now);
   CardAction take(const CardOutOfStep& out, Now now);
+  CardAction take(const CardBeganAnew& anew, Now now);
   CardAction take(const CardBulkFailed& failed, Now now);
 
   void load(const quad08::Sequence& sequence);
@@ -109,12 +124,15 @@ class CounterCardSession {
   CardAction next_step(Now now);
   CardAction stage_done(Now now);
   CardAction send(const usb::Setup& setup, Now now);
+  [[nodiscard]] std::optional<CardAction> send_again(const UsbControlDone& done, Now now);
+  CardAction set_up_again(Now now, const std::string& seen = {});
   CardAction refused_step(const quad08::Step& step, const UsbControlDone& done, Now now);
   CardAction on_status(quad08::Status status, Now now);
   [[nodiscard]] bool expects_scans() const;
-  [[nodiscard]] bool silent(Now now) const;
+  [[nodiscard]] bool silent(Now until) const;
   CardAction trouble_of_silence(Now now);
   CardAction watch(Now now);
+  CardAction halt(Now now);
   CardAction trouble(Now now, std::string text);
   CardAction fail(Now now, std::string text);
   void report(std::string text);
@@ -128,7 +146,12 @@ class CounterCardSession {
   bool halt_ = false;      ///< as soon as the control transfer under way is answered
   bool troubled_ = false;  ///< restarted, and no scans since: not again before retry_at_
   bool scans_since_fault_ = false;
+  bool set_up_ = false;    ///< the counters were, by this session or an earlier run
+  std::string serial_;     ///< of the card that was set up
+  bool resuming_ = false;  ///< scans are expected from counters that were set up before the card was opened
+  bool resumed_again_ = false;  ///< these were out of step once, and the scan was started anew
   unsigned status_tries_ = 0;
+  unsigned tries_ = 0;  ///< of the control transfer under way
   Now open_at_{};
   Now asked_at_{};
   Now last_scans_{};

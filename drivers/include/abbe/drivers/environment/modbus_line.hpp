@@ -9,6 +9,7 @@
 #include <memory>
 #include <span>
 #include <string>
+#include <utility>
 #include <variant>
 
 #include "abbe/drivers/error.hpp"
@@ -40,6 +41,24 @@ using ModbusAddress = std::variant<ModbusTcp, ModbusSerial>;
 /// "10.0.0.7:502", "/dev/ttyUSB0 19200 8E1"
 [[nodiscard]] std::string text_of(const ModbusAddress& address);
 
+/// A serial line for one connection only. Two names of a line whose device is not plugged in at the start are
+/// not known to be one: whoever opens it second is told. So is a program that locks in this way (flock).
+/// TIOCEXCL would keep out others, too, but not root, and is not given back by a process that is killed while
+/// another one has the line open.
+class SerialLock {
+ public:
+  SerialLock() = default;
+  SerialLock(SerialLock&& other) noexcept { *this = std::move(other); }
+  SerialLock& operator=(SerialLock&& other) noexcept;
+  ~SerialLock();  ///< gives it back
+
+  /// Unreachable: no such path, or somebody has it. Called once.
+  [[nodiscard]] Result<void> take(const std::string& path);
+
+ private:
+  int fd_ = -1;
+};
+
 class ModbusLine {
  public:
   ModbusLine();
@@ -47,7 +66,8 @@ class ModbusLine {
   ModbusLine(const ModbusLine&) = delete;
   ModbusLine& operator=(const ModbusLine&) = delete;
 
-  /// Blocks for `wall` at most (and a name server). Unreachable: refused, no route, no such path; Timeout.
+  /// Blocks for `wall` at most (and a name server). Unreachable: refused, no route, no such path, a serial
+  /// line that is in use; Timeout.
   [[nodiscard]] Result<void> open(const ModbusAddress& address, std::chrono::nanoseconds wall);
   [[nodiscard]] bool is_open() const noexcept { return context_ != nullptr; }
   void close() noexcept;
@@ -61,6 +81,7 @@ class ModbusLine {
   struct Free {
     void operator()(_modbus* context) const noexcept;
   };
+  SerialLock lock_;  ///< given back after the line is closed
   std::unique_ptr<_modbus, Free> context_;
 };
 

@@ -7,8 +7,8 @@
 #include <atomic>
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <memory>
-#include <mutex>
 #include <span>
 #include <string>
 #include <variant>
@@ -17,11 +17,19 @@
 #include "abbe/drivers/device.hpp"
 #include "abbe/drivers/ippdme/receiver.hpp"
 #include "abbe/drivers/ippdme/session.hpp"
+#include "abbe/drivers/mailbox.hpp"
 #include "abbe/drivers/raw_ring.hpp"
 #include "abbe/drivers/sample_ring.hpp"
 #include "abbe/drivers/session_over_tcp.hpp"
 
 namespace abbe::drivers {
+
+/// What the next run must know.
+struct IppMachine {
+  std::string held;     ///< why the machine awaits a release; empty: it does not
+  bool moving = false;  ///< a motion is under way, or was when the connection was lost
+  friend bool operator==(const IppMachine&, const IppMachine&) = default;
+};
 
 struct IppDeviceOptions {
   std::string name = "cmm";
@@ -29,6 +37,10 @@ struct IppDeviceOptions {
   std::uint16_t port = ippdme::kPort;
   IppSessionOptions session;  ///< `peer` is made from name, host and port
   IppReceiverOptions receiver;
+  /// Device thread: what must be kept over a restart, and handed back in session.held and session.moving.
+  /// Called with each change: before the first command of a motion is sent, when the machine has stopped,
+  /// when a hold begins or ends.
+  std::function<void(const IppMachine&)> machine_changed;
   std::size_t touch_capacity = 256;
   std::size_t position_capacity = 256;  ///< 25 s at 10 a second
   std::size_t raw_capacity_blocks = 256;
@@ -55,7 +67,8 @@ class IppDevice final : public Device, private SessionOverTcp<IppDevice, IppWord
   /// wait().
   [[nodiscard]] static Result<std::unique_ptr<IppDevice>> create(const IppDeviceOptions& options,
                                                                  const TimeSource& time);
-  /// Stops a motion that is under way and ends the session, without waiting for the answer.
+  /// Stops a motion that is under way, waits for the answer to AbortE (at most command_timeout), and ends the
+  /// session without waiting for the answer.
   ~IppDevice() override;
 
   void wait(std::chrono::nanoseconds at_most) override;
@@ -69,10 +82,18 @@ class IppDevice final : public Device, private SessionOverTcp<IppDevice, IppWord
   /// All of them or, when the connection is lost in between, nothing of the rest: half a way to a touch leads
   /// through whatever stands there.
   void measure(std::span<const ProbePoint> points);
+  /// Any thread: stops a motion that is under way (AbortE) and forgets all points. The session awaits
+  /// release(), whether or not the machine moved.
+  void abort();
+  /// Any thread: a person has looked at the machine: errors are cleared, the session begins anew. Nothing
+  /// happens unless the state is "awaiting release".
+  void release();
   /// Any thread: how many of them are neither done nor given up. 0: the touches of all that were begun are in
   /// the ring.
   [[nodiscard]] std::size_t points_left() const noexcept {
-    return points_left_.load(std::memory_order_acquire);  // pairs with the releases in measure() and wait()
+    // acquire: pairs with the release in count_points(). In this order: never less than there are.
+    const auto finished = finished_.load(std::memory_order_acquire);
+    return asked_.load(std::memory_order_relaxed) - finished;
   }
 
   /// One reader each.
@@ -89,7 +110,10 @@ class IppDevice final : public Device, private SessionOverTcp<IppDevice, IppWord
   void connected();
   void disconnected() {}
   void read_requests();
+  void ask_for(const std::vector<ProbePoint>& points);
+  void await_standstill();
   void count_points();
+  void report_machine();
 
   void take(const protocol::AxisSample& sample) ABBE_RT;
   void take(const protocol::ProbeTrigger& touch) ABBE_RT;
@@ -104,9 +128,12 @@ class IppDevice final : public Device, private SessionOverTcp<IppDevice, IppWord
   RawRing raw_;
   IppReceiver receiver_;
 
-  std::mutex requests_mutex_;
-  std::vector<ProbePoint> requests_;  // under requests_mutex_
-  std::atomic<std::size_t> points_left_{0};
+  using Request = std::variant<std::vector<ProbePoint>, IppAbortRequested, IppReleaseRequested>;
+  Mailbox<Request> requests_;  ///< the hub asks and takes no lock
+  std::size_t taken_ = 0;      ///< points out of it, by the device thread
+  std::atomic<std::size_t> asked_{0};
+  std::atomic<std::size_t> finished_{0};
+  IppMachine machine_;  ///< as reported
 };
 
 }  // namespace abbe::drivers

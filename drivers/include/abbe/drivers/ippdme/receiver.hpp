@@ -55,7 +55,7 @@ struct IppError {
   int code = 0;
   IppText text;
 };
-/// A line that no I++ DME server sends. Nothing more comes after it until a new connection.
+/// A line that no I++ DME server sends. After it only the answers to AbortE come, until a new connection.
 struct IppNonsense {
   ippdme::LineError error{};
   IppText line;
@@ -91,6 +91,8 @@ class IppReceiver {
 
   [[nodiscard]] Asked* find(ippdme::Tag tag) ABBE_RT;
   [[nodiscard]] std::optional<IppMessage> understand(std::string_view line) ABBE_RT;
+  [[nodiscard]] static IppError refusal_of(const ippdme::Response& response) ABBE_RT;
+  [[nodiscard]] static std::optional<IppMessage> of_the_abort(std::string_view line) ABBE_RT;
   [[nodiscard]] std::optional<IppMessage> data(const ippdme::Response& response,
                                                std::string_view line) ABBE_RT;
   [[nodiscard]] IppMessage nonsense(ippdme::LineError error, std::string_view line) ABBE_RT;
@@ -103,7 +105,8 @@ class IppReceiver {
 
   IppReceiverOptions options_;
   protocol::HostTime arrival_{};
-  bool silenced_ = false;
+  bool aborting_ = false;            ///< AbortE was sent on this connection
+  bool silenced_ = false;            ///< but for the answers to AbortE
   bool position_restarted_ = false;  ///< for the first sample of each kind after a new connection
   bool touch_restarted_ = false;
   std::uint32_t cycle_ = 0;

@@ -3,14 +3,23 @@
 /// host time in, at most one action out. One command at a time, the next when the one before is complete.
 /// Ordinary world: allocates. One thread.
 ///
-///   Disconnected -> Connecting -> Opening (StartSession, ClearAllErrors, GetDMEVersion)
+///   Disconnected -> Connecting -> Opening (StartSession, GetDMEVersion)
 ///     -> Configuring (IsHomed [Home], SetTool, OnPtMeasReport, OnMoveReportE) -> Ready <-> Measuring
-///     Ready, Measuring -> Clearing -> Ready after an error that a client can mend
-///     any -> Stopping -> Disconnected;   any -> Faulted -> Connecting (after a while)
+///   any with an unfinished motion -> Aborting (AbortE) -> AwaitingRelease, whatever the cause
+///   any -> AwaitingRelease after an error of severity 2 or more
+///   AwaitingRelease -> Clearing (ClearAllErrors) -> Opening, or Connecting, only by IppReleaseRequested
+///   any -> Stopping -> Disconnected;   any without a motion -> Faulted -> Connecting (after a while)
+///
+/// No connection with an unfinished motion is closed before AbortE is answered or command_timeout has passed.
+/// When such a connection is lost, the next one begins with AbortE, before StartSession: servers queue
+/// commands behind a motion, and StartSession clears errors. A session starts only after a release. Only for
+/// a server that refuses AbortE outside a session, or does not answer it, a session is started first. While
+/// AwaitingRelease nothing is sent that moves the machine or clears an error.
+/// Home is sent in the first session and after a release, never after a mere loss of the connection.
 ///
 /// While nothing is measured the position is asked for every poll period, which also shows that the server
-/// lives. Points are taken while Ready, Measuring or Clearing; in any other state they are forgotten, which
-/// is a fault. [I++ DME 1.4.3]
+/// lives. Points are taken while Ready or Measuring; in any other state they are forgotten, which is a fault.
+/// [I++ DME 1.4.3]
 
 #include <array>
 #include <chrono>
@@ -34,6 +43,8 @@ enum class IppState {
   Configuring,
   Ready,
   Measuring,
+  Aborting,
+  AwaitingRelease,
   Clearing,
   Stopping,
   Faulted,
@@ -53,8 +64,10 @@ struct ProbePoint {
 struct IppSessionOptions {
   std::string peer = "measuring machine";  ///< how messages name it: "cmm 10.0.0.9:1294"
   bool home = false;                       ///< may send a machine home that is not; else that is a fault
+  std::string held;                        ///< not empty: awaits a release from the start, for this reason
+  bool moving = false;                     ///< with held: a motion may be under way, is aborted first
   std::string tool;                        ///< set before measuring; empty: the one that is set
-  bool move_reports = true;                ///< ask for positions while moving; a refusal is no fault
+  bool move_reports = true;  ///< ask for positions while moving; a refusal of severity 1 is no fault
   std::chrono::nanoseconds poll_period = std::chrono::milliseconds{100};
   std::chrono::nanoseconds connect_timeout = std::chrono::seconds{3};
   std::chrono::nanoseconds command_timeout = std::chrono::seconds{3};
@@ -71,9 +84,12 @@ struct IppConnected {};
 struct IppConnectionLost {
   std::string what;
 };
-struct IppStopRequested {};
-using IppInput = std::variant<IppTick, IppConnected, IppConnectionLost, IppStopRequested, ProbePoint, IppAck,
-                              IppComplete, IppData, IppError, IppNonsense>;
+struct IppStopRequested {};     ///< ends the session
+struct IppAbortRequested {};    ///< stops a motion and forgets all points; awaits a release, moving or not
+struct IppReleaseRequested {};  ///< by a person who has looked at the machine
+using IppInput =
+    std::variant<IppTick, IppConnected, IppConnectionLost, IppStopRequested, IppAbortRequested,
+                 IppReleaseRequested, ProbePoint, IppAck, IppComplete, IppData, IppError, IppNonsense>;
 
 struct IppNothing {};
 struct IppOpen {};   ///< open a connection, then say IppConnected or IppConnectionLost
@@ -93,9 +109,16 @@ class IppSession {
   [[nodiscard]] protocol::HostTime deadline() const noexcept;
 
   [[nodiscard]] IppState state() const noexcept { return state_; }
+  /// Until a person releases the machine; also while its motion is still being stopped.
+  [[nodiscard]] bool held() const noexcept { return held_; }
+  /// Why; empty if it is not held. What is refused while it is held does not change it.
+  [[nodiscard]] const std::string& hold_reason() const noexcept { return hold_reason_; }
+  /// A motion was sent and its end not reported, on this connection or an earlier one.
+  [[nodiscard]] bool moving() const noexcept { return moving_; }
   /// Asked for and neither done nor given up.
   [[nodiscard]] std::size_t points_left() const noexcept {
-    return points_.size() + (state_ == IppState::Measuring ? 1 : 0);
+    const bool one = state_ == IppState::Measuring || state_ == IppState::Aborting;
+    return points_.size() + (one ? 1 : 0);
   }
   struct Fault {
     std::uint64_t count = 0;
@@ -104,14 +127,13 @@ class IppSession {
   [[nodiscard]] const Fault& fault() const noexcept { return fault_; }
 
  private:
-  enum class Purpose { Other, Version, IsHomed, Get, Move, Touch, Clear, End };
+  enum class Purpose { Other, Start, Version, IsHomed, Get, Move, Touch, Clear, Watch, End };
   struct Step {
     IppState state;
     std::string method;  ///< with its arguments
     Purpose purpose = Purpose::Other;
-    bool optional = false;
     bool moves = false;
-    bool event = false;  ///< is done when acknowledged
+    std::optional<ippdme::Tag> event = {};  ///< its tag; is done when acknowledged
   };
   struct Pending {
     Step step;
@@ -127,23 +149,38 @@ class IppSession {
   [[nodiscard]] IppAction take(const IppConnected&);
   [[nodiscard]] IppAction take(const IppConnectionLost& lost);
   [[nodiscard]] IppAction take(const IppStopRequested&);
+  [[nodiscard]] IppAction take(const IppAbortRequested&);
+  [[nodiscard]] IppAction take(const IppReleaseRequested&);
   [[nodiscard]] IppAction take(const ProbePoint& point);
   [[nodiscard]] IppAction take(const IppAck& ack);
   [[nodiscard]] IppAction take(const IppComplete& complete);
   [[nodiscard]] IppAction take(const IppData& data);
   [[nodiscard]] IppAction take(const IppError& error);
+  [[nodiscard]] IppAction take_foreign(const IppError& error);
   [[nodiscard]] IppAction take(const IppNonsense& nonsense);
 
-  [[nodiscard]] bool online() const noexcept;
   [[nodiscard]] bool foreign(ippdme::Tag tag) const noexcept;
   [[nodiscard]] IppAction strange(std::string_view what, ippdme::Tag tag);
   [[nodiscard]] IppAction send(const Step& step);
+  [[nodiscard]] IppAction connect();
   [[nodiscard]] IppAction next_step();
   [[nodiscard]] IppAction done();
   [[nodiscard]] IppAction failed(const Pending& was);
   [[nodiscard]] IppAction ready();
   [[nodiscard]] IppAction judge_home(const std::string& data);
   [[nodiscard]] IppAction give_up(IppState into, const std::string& what);
+  [[nodiscard]] IppAction close(IppState into);
+  [[nodiscard]] IppAction goodbye();
+  [[nodiscard]] IppAction hold(const std::string& what);
+  [[nodiscard]] IppAction await_release();
+  [[nodiscard]] IppAction stop_motion(bool close_then);
+  [[nodiscard]] IppAction stopped_moving();
+  [[nodiscard]] IppAction abort_unanswered();
+  [[nodiscard]] IppAction abort_refused(const IppError& error);
+  [[nodiscard]] bool releasable() const noexcept;
+  void hold_for(const std::string& reason);
+  [[nodiscard]] IppAction began_session();
+  void without_move_reports();
   void note(const std::string& what);
 
   IppSessionOptions options_;
@@ -157,6 +194,16 @@ class IppSession {
   std::optional<Pending> pending_;
   std::deque<ProbePoint> points_;
   bool stopped_ = false;
+  bool open_ = false;        ///< the connection
+  bool in_session_ = false;  ///< StartSession was accepted on it
+  bool moving_ = false;      ///< a motion was asked for and its end not reported, also on a lost connection
+  bool close_then_ = false;  ///< when the motion has stopped: what comes on this connection is not trusted
+  bool held_ = false;        ///< until a person releases the machine
+  std::string hold_reason_;
+  std::string last_note_;       ///< without the peer and the reason of a hold
+  std::string stop_reason_;     ///< last_note_ when AbortE was sent
+  bool session_first_ = false;  ///< the server does not abort outside a session
+  bool may_home_;
   Fault fault_;
 };
 

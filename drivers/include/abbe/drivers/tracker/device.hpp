@@ -8,10 +8,14 @@
 #include <cstddef>
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <string>
+#include <utility>
 #include <variant>
+#include <vector>
 
 #include "abbe/drivers/device.hpp"
+#include "abbe/drivers/mailbox.hpp"
 #include "abbe/drivers/raw_ring.hpp"
 #include "abbe/drivers/sample_ring.hpp"
 #include "abbe/drivers/session_over_tcp.hpp"
@@ -56,12 +60,21 @@ class TrackerDevice final : public Device, private SessionOverTcp<TrackerDevice,
   /// wait().
   [[nodiscard]] static Result<std::unique_ptr<TrackerDevice>> create(const TrackerDeviceOptions& options,
                                                                      const TimeSource& time);
-  /// Asks a measuring controller to stop, without waiting for its answer.
+  /// Stops the measurement and puts back the settings that abbe changed: at most
+  /// TrackerSessionOptions::leave_within.
   ~TrackerDevice() override;
 
   void wait(std::chrono::nanoseconds at_most) override;
   void receive() ABBE_RT override;
   [[nodiscard]] DeviceStatus status() const override;
+  /// Stops the measurement and puts back the settings that abbe changed.
+  /// Device thread. True once nothing is left to say; until then wait() and receive() go on.
+  [[nodiscard]] bool finish();
+
+  /// Any thread. One at a time; what cannot be done is refused in its report.
+  void order(TrackerOrder order) { orders_.put(std::move(order)); }
+  /// Any thread: of each order one, when it ended.
+  [[nodiscard]] std::vector<TrackerOrderReport> reports() { return reports_.take(); }
 
   /// One reader each.
   [[nodiscard]] SampleRing<protocol::TrackerPoint>& points() noexcept { return points_; }
@@ -76,6 +89,11 @@ class TrackerDevice final : public Device, private SessionOverTcp<TrackerDevice,
   [[nodiscard]] std::span<const std::byte> encode(const TrackerSend& command);
   void connected() { began_ = true; }
   void disconnected() { began_ = false; }
+  void carry_orders();
+  void keep_report();
+  void put_back_settings();
+  void report_clock();
+  void report_cause();
 
   void take(const TrackerBurst& burst) ABBE_RT;
   void take(const protocol::EnvironmentSample& sample) ABBE_RT { environment_.try_push(sample); }
@@ -90,7 +108,11 @@ class TrackerDevice final : public Device, private SessionOverTcp<TrackerDevice,
   SampleRing<protocol::EnvironmentSample> environment_;
   RawRing raw_;
   TrackerReceiver receiver_;
+  Mailbox<TrackerOrder> orders_;
+  Mailbox<TrackerOrderReport> reports_;
 
+  bool clock_reported_ = false;
+  std::string cause_reported_;
   std::uint64_t gaps_seen_ = 0;
   bool began_ = false;  ///< a new connection, not yet told to the receiver
   std::array<std::byte, emscon::kMaxRequestSize> command_{};

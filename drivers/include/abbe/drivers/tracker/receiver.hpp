@@ -83,6 +83,7 @@ class TrackerReceiver {
 
   [[nodiscard]] const TrackerCounters& counters() const ABBE_RT { return counters_; }
   [[nodiscard]] ClockStatus clock() const ABBE_RT { return clock_.status(); }
+  [[nodiscard]] double skew_beyond_limit() const ABBE_RT { return clock_.skew_beyond_limit(); }
 
  private:
   struct LastPoint {

@@ -41,7 +41,9 @@ enum class UsbOutcome : std::uint8_t {
 };
 
 /// Opened: it is the configured device and its configuration is selected.
-struct UsbOpened {};
+struct UsbOpened {
+  std::string serial;  ///< empty: the device has none
+};
 struct UsbControlDone {
   static constexpr std::size_t kCapacity = 64;
   usb::Setup setup;

@@ -79,6 +79,7 @@ class UsbipLink final : public UsbLink {
   Inspection inspection_ = Inspection::Device;
   std::uint32_t device_id_ = 0;
   std::uint8_t serial_string_ = 0;
+  std::string serial_;
   std::uint32_t sequence_ = 0;
   usb::Setup control_setup_;
   std::vector<Pending> pending_;

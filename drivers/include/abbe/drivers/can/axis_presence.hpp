@@ -1,0 +1,48 @@
+#pragma once
+/// Which axes are current: an axis is absent when the samples of the last 150 ms, at least three, all missed
+/// it, and until a sample first had it. Counted in samples, not in time: a device thread that was held up
+/// made no sample in which an axis could be missing. Real time; one thread.
+
+#include <algorithm>
+#include <array>
+#include <chrono>
+#include <cstddef>
+#include <cstdint>
+
+#include "abbe/protocol/rt.hpp"
+#include "abbe/protocol/samples.hpp"
+
+namespace abbe::drivers {
+
+class AxisPresence {
+ public:
+  static constexpr std::chrono::nanoseconds kMissingFor = std::chrono::milliseconds{150};
+  static constexpr std::int64_t kFewestSamples = 3;
+
+  AxisPresence(std::size_t axes, std::chrono::nanoseconds sync_period)
+      : axes_(std::min<std::size_t>(axes, protocol::kMaxAxes)),
+        limit_(std::max(kMissingFor / sync_period, kFewestSamples)) {
+    forget();
+  }
+
+  /// The bus was closed: no axis is current.
+  void forget() ABBE_RT { missed_.fill(limit_); }
+  void on_sample(const protocol::AxisSample& sample) ABBE_RT {
+    for (std::size_t i = 0; i < axes_; ++i) {
+      const bool missing = ((sample.missing_mask >> i) & 1u) != 0;
+      missed_[i] = missing ? std::min(missed_[i] + 1, limit_) : 0;
+    }
+  }
+  [[nodiscard]] std::uint8_t absent() const ABBE_RT {
+    unsigned mask = 0;
+    for (std::size_t i = 0; i < axes_; ++i) mask |= missed_[i] >= limit_ ? 1u << i : 0u;
+    return static_cast<std::uint8_t>(mask);
+  }
+
+ private:
+  std::size_t axes_;
+  std::int64_t limit_;
+  std::array<std::int64_t, protocol::kMaxAxes> missed_{};  ///< samples in a row
+};
+
+}  // namespace abbe::drivers

@@ -1,0 +1,124 @@
+// How a motion ends that must not go on, and the wait for a person's release after it.
+#include <fmt/format.h>
+
+#include <utility>
+
+#include "abbe/drivers/ippdme/session.hpp"
+#include "ippdme/session_text.hpp"
+
+namespace abbe::drivers {
+
+/// A machine that nobody watches any more must not go on moving.
+IppAction IppSession::stop_motion(bool close_then) {
+  pending_.reset();
+  points_.clear();
+  close_then_ = close_then;
+  stop_reason_ = last_note_;
+  state_ = IppState::Aborting;
+  due_ = now_ + options_.command_timeout;
+  return IppSend{ippdme::to_string(ippdme::kAbort) + " AbortE()\r\n"};
+}
+
+IppAction IppSession::stopped_moving() {
+  moving_ = false;
+  if (stopped_) return goodbye();
+  hold_for(stop_reason_);
+  return close_then_ ? close(IppState::AwaitingRelease) : await_release();
+}
+
+/// The next connection begins with another AbortE. Outside a session silence may mean that the server wants
+/// one first: the next connection tries it the other way. A machine that is held gets no session.
+IppAction IppSession::abort_unanswered() {
+  note(fmt::format("no answer to AbortE in {:g} s: the machine may still be moving",
+                   ipp_text::seconds(options_.command_timeout)));
+  if (!in_session_) session_first_ = !session_first_ && !held_;
+  return stopped_ ? goodbye() : close(IppState::Faulted);
+}
+
+/// Outside a session the server may want one first. A machine that is held gets none: a person must look.
+IppAction IppSession::abort_refused(const IppError& error) {
+  if (!in_session_ && !held_ && !session_first_ && !stopped_) {
+    session_first_ = true;
+    return next_step();
+  }
+  const std::string what =
+      fmt::format("AbortE was refused: {}: the machine may still be moving", ipp_text::text_of(error));
+  note(what);
+  if (stopped_) return goodbye();
+  hold_for(what);
+  session_first_ = false;
+  const bool again = in_session_;  // outside of it
+  (void)close(IppState::AwaitingRelease);
+  if (!again) due_ = ipp_text::kNever;
+  return IppClose{};
+}
+
+/// The first reason stays until the release.
+void IppSession::hold_for(const std::string& reason) {
+  if (!std::exchange(held_, true)) hold_reason_ = reason;
+}
+
+IppAction IppSession::hold(const std::string& what) {
+  hold_for(what);
+  note(what);
+  points_.clear();
+  return moving_ && open_ ? stop_motion(false) : await_release();
+}
+
+IppAction IppSession::await_release() {
+  pending_.reset();
+  state_ = IppState::AwaitingRelease;
+  due_ = open_ && in_session_ ? now_ + 10 * options_.poll_period : ipp_text::kNever;
+  return IppNothing{};
+}
+
+IppAction IppSession::take(const IppAbortRequested&) {
+  points_.clear();
+  const bool ended = state_ == IppState::Aborting || state_ == IppState::Stopping || held_ || stopped_;
+  if (ended || (moving_ && !open_)) return IppNothing{};  // the next connection begins with AbortE
+  if (open_ && !moving_) return hold("stopped by request");
+  note("stopped by request");
+  if (open_) return stop_motion(false);
+  hold_for("stopped by request");
+  return close(IppState::AwaitingRelease);
+}
+
+/// Also between the tries to send the AbortE of a motion that an earlier connection left unfinished.
+bool IppSession::releasable() const noexcept {
+  const bool trying = state_ == IppState::Connecting || (state_ == IppState::Aborting && !in_session_);
+  return !stopped_ && (state_ == IppState::AwaitingRelease || (held_ && trying));
+}
+
+/// Errors are cleared here and nowhere else.
+IppAction IppSession::take(const IppReleaseRequested&) {
+  if (!releasable()) return IppNothing{};
+  held_ = moving_ = session_first_ = false;  // a person has looked
+  hold_reason_.clear();
+  may_home_ = options_.home;
+  pause_ = options_.first_pause;
+  if (open_ && in_session_)
+    return send({.state = IppState::Clearing, .method = "ClearAllErrors()", .purpose = Purpose::Clear});
+  if (open_) return close(IppState::Disconnected);
+  if (state_ == IppState::Connecting) return IppNothing{};
+  state_ = IppState::Disconnected;
+  due_ = now_;
+  return IppNothing{};
+}
+
+IppAction IppSession::take(const IppStopRequested&) {
+  if (std::exchange(stopped_, true)) return IppNothing{};
+  points_.clear();
+  if (state_ == IppState::Aborting) return IppNothing{};
+  return moving_ && open_ ? stop_motion(false) : goodbye();
+}
+
+IppAction IppSession::goodbye() {
+  const bool connecting = state_ == IppState::Connecting;
+  due_ = ipp_text::kNever;
+  pending_.reset();
+  if (open_) return send({.state = IppState::Stopping, .method = "EndSession()", .purpose = Purpose::End});
+  state_ = IppState::Disconnected;
+  return connecting ? IppAction{IppClose{}} : IppAction{IppNothing{}};
+}
+
+}  // namespace abbe::drivers

@@ -1,0 +1,26 @@
+#pragma once
+/// What the session writes: commands for the server, and what the server reported in words for people.
+
+#include <string>
+#include <string_view>
+
+#include "abbe/drivers/ippdme/session.hpp"
+
+namespace abbe::drivers::ipp_text {
+
+inline constexpr protocol::HostTime kNever = protocol::HostTime::max();
+inline constexpr int kRepairable = 2;     ///< severity: from here on the command has failed
+inline constexpr int kUserNeeded = 3;     ///< and from here on a motion is not waited for
+inline constexpr int kAborted = 6;        ///< code: the command ended because of our AbortE
+inline constexpr int kProtocolError = 8;  ///< code: for StartSession, another session has not ended yet
+
+[[nodiscard]] double seconds(std::chrono::nanoseconds d);
+/// Bytes outside of printable ASCII as \\xE4.
+[[nodiscard]] std::string escaped(std::string_view text);
+/// "1006 Surface not found (severity 2)"
+[[nodiscard]] std::string text_of(const IppError& error);
+[[nodiscard]] std::string_view method_name(std::string_view method);
+[[nodiscard]] std::string go_to(const ProbePoint& point);
+[[nodiscard]] std::string pt_meas(const ProbePoint& point);
+
+}  // namespace abbe::drivers::ipp_text

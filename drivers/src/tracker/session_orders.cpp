@@ -1,0 +1,214 @@
+/// What a person asks of a tracker, and the reflectors its controller knows.
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+#include <charconv>
+#include <utility>
+
+#include "abbe/drivers/tracker/session.hpp"
+#include "refusals.hpp"
+
+namespace abbe::drivers {
+namespace {
+
+constexpr double kMillimetresPerMetre = 1000.0;
+constexpr std::int32_t kMostReflectors = 256;  // a controller that lists more is not listened to for ever
+
+/// A terminal obeys control characters.
+bool is_control(char32_t c) {
+  return c < 0x20 || (c >= 0x7F && c < 0xA0);
+}
+
+/// UTF-16 as the controller sends it; a lone surrogate or a control character becomes a question mark.
+std::string utf8_of(const emscon::Name& name) {
+  std::string out;
+  const auto put = [&out](char32_t c) {
+    if (c < 0x80) {
+      out += static_cast<char>(c);
+    } else if (c < 0x800) {
+      out += static_cast<char>(0xC0 | c >> 6);
+      out += static_cast<char>(0x80 | (c & 0x3F));
+    } else if (c < 0x10000) {
+      out += static_cast<char>(0xE0 | c >> 12);
+      out += static_cast<char>(0x80 | (c >> 6 & 0x3F));
+      out += static_cast<char>(0x80 | (c & 0x3F));
+    } else {
+      out += static_cast<char>(0xF0 | c >> 18);
+      out += static_cast<char>(0x80 | (c >> 12 & 0x3F));
+      out += static_cast<char>(0x80 | (c >> 6 & 0x3F));
+      out += static_cast<char>(0x80 | (c & 0x3F));
+    }
+  };
+  for (std::size_t i = 0; i < name.size() && name[i] != 0; ++i) {
+    const char32_t unit = name[i];
+    const bool high = unit >= 0xD800 && unit < 0xDC00;
+    const bool pair = high && i + 1 < name.size() && name[i + 1] >= 0xDC00 && name[i + 1] < 0xE000;
+    if (pair) {
+      put(0x10000 + ((unit - 0xD800) << 10) + (static_cast<char32_t>(name[++i]) - 0xDC00));
+    } else {
+      put((unit >= 0xD800 && unit < 0xE000) || is_control(unit) ? U'?' : unit);
+    }
+  }
+  return out;
+}
+
+std::optional<std::int32_t> as_id(const std::string& text) {
+  std::int32_t id = 0;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), id);
+  if (error != std::errc{} || end != text.data() + text.size()) return std::nullopt;
+  return id;
+}
+
+}  // namespace
+
+const char* name_of(TrackerOrder::What what) noexcept {
+  switch (what) {
+    case TrackerOrder::What::Initialize:
+      return "initialize";
+    case TrackerOrder::What::ListReflectors:
+      return "reflector list";
+    case TrackerOrder::What::SetReflector:
+      return "reflector set";
+    case TrackerOrder::What::GoHome:
+      return "home";
+    case TrackerOrder::What::FindReflector:
+      return "find";
+  }
+  return "order";
+}
+
+// --- reflectors
+
+/// Which one is in use, then the list, one answer each; SetReflector follows when the list is there.
+void TrackerSession::plan_reflector(TrackerState state, bool of_order) {
+  plan(state, emscon::GetReflector{}, true, of_order);
+  plan(state, emscon::GetReflectors{}, as_id(wanted_reflector()).has_value(), of_order);
+}
+
+const std::string& TrackerSession::wanted_reflector() const {
+  const bool ordered = order_begun_ && order_->what == TrackerOrder::What::SetReflector;
+  return ordered ? order_->reflector : options_.reflector;
+}
+
+bool TrackerSession::list_complete(const emscon::Answer& answer) {
+  const auto* one = std::get_if<emscon::ReflectorsAnswer>(&answer);
+  if (one == nullptr) return true;
+  reflectors_.push_back({one->internal_id, utf8_of(one->name), reflector_in_use_ == one->internal_id});
+  return static_cast<std::int32_t>(reflectors_.size()) >= std::min(one->total, kMostReflectors);
+}
+
+/// The list is there: plans SetReflector unless the reflector is set already, which would cost the beam.
+/// Returns what is wrong with the name.
+std::string TrackerSession::choose_reflector() {
+  if (order_begun_ && order_->what == TrackerOrder::What::ListReflectors) return {};
+  const std::string& wanted = wanted_reflector();
+  const auto id = as_id(wanted);
+  const auto known = std::find_if(reflectors_.begin(), reflectors_.end(),
+                                  [&](const TrackerReflector& r) { return r.name == wanted || r.id == id; });
+  if (known == reflectors_.end() && !reflectors_.empty()) {
+    std::vector<std::string> names;
+    for (const TrackerReflector& r : reflectors_) names.push_back(fmt::format("\"{}\" ({})", r.name, r.id));
+    return fmt::format("reflector \"{}\" is not in the controller's list: known are {}", wanted,
+                       fmt::join(names, ", "));
+  }
+  const std::int32_t chosen = known != reflectors_.end() ? known->id : id.value_or(0);
+  if (reflector_in_use_ == chosen) return {};
+  const Step list = plan_[step_ - 1];
+  if (!list.of_order && !reflector_before_) reflector_before_ = reflector_in_use_;
+  plan_.insert(plan_.begin() + static_cast<std::ptrdiff_t>(step_),
+               Step{list.state, emscon::SetReflector{chosen}, false, list.of_order});
+  return {};
+}
+
+// --- orders
+
+bool TrackerSession::takes_orders() const noexcept {
+  return !stopped_ && (state_ == TrackerState::Streaming || without_beam() ||
+                       (state_ == TrackerState::Ready && options_.mode == TrackerMode::Stationary));
+}
+
+TrackerAction TrackerSession::take(const TrackerOrder& order) {
+  const auto refuse_order = [&](std::string text) -> TrackerAction {
+    report_ = TrackerOrderReport{order.number, Outcome::Refused, std::move(text), {}};
+    return TrackerNothing{};
+  };
+  if (order_) return refuse_order(fmt::format("{} is under way", name_of(order_->what)));
+  if (!takes_orders()) {
+    return refuse_order(
+        fmt::format("the tracker is {}{}{}", name_of(state_), cause_.empty() ? "" : ": ", cause_));
+  }
+  order_ = order;
+  order_begun_ = false;
+  return pending_ ? TrackerAction{TrackerNothing{}} : begin_order();
+}
+
+TrackerAction TrackerSession::begin_order() {
+  using enum TrackerState;
+  order_begun_ = true;
+  const TrackerOrder& order = *order_;
+  const bool measuring = state_ == Streaming || state_ == BeamLost;
+  if (order.what == TrackerOrder::What::ListReflectors) {
+    const auto restart_at = restart_at_;  // a beam that is back is measured after the list, too
+    new_plan(Goal::Stay);
+    restart_at_ = restart_at;
+    plan(state_, emscon::GetReflector{}, true, true);
+    plan(state_, emscon::GetReflectors{}, false, true);
+    return next_step();
+  }
+  new_plan(Goal::Stream);
+  due_ = kNever;
+  cause_ = fmt::format("\"{}\" was asked for", name_of(order.what));
+  if (measuring) plan(Moving, emscon::StopMeasurement{}, true);
+  switch (order.what) {
+    case TrackerOrder::What::Initialize:
+      plan(Initialising, emscon::Initialize{}, false, true);
+      if (options_.home_after_initialize) plan(Moving, emscon::GoBirdBath{}, false, true);
+      break;
+    case TrackerOrder::What::SetReflector:
+      plan_reflector(Moving, true);
+      break;
+    case TrackerOrder::What::GoHome:
+      plan(Moving, emscon::GoBirdBath{}, false, true);
+      break;
+    case TrackerOrder::What::FindReflector:
+      plan(Moving, emscon::FindReflector{kMillimetresPerMetre * order.distance_m}, false, true);
+      break;
+    case TrackerOrder::What::ListReflectors:
+      break;
+  }
+  plan(Ready, emscon::StartMeasurement{});
+  return next_step();
+}
+
+std::string TrackerSession::outcome_of(const TrackerOrder& order) const {
+  switch (order.what) {
+    case TrackerOrder::What::Initialize:
+      return "the tracker is initialised";
+    case TrackerOrder::What::ListReflectors:
+      return fmt::format("the controller knows {} reflectors", reflectors_.size());
+    case TrackerOrder::What::SetReflector:
+      return fmt::format("reflector {} is set", order.reflector);
+    case TrackerOrder::What::GoHome:
+      return "the beam is at the bird bath";
+    case TrackerOrder::What::FindReflector:
+      return "the reflector was found";
+  }
+  return {};
+}
+
+void TrackerSession::end_order(Outcome outcome, const std::string& text) {
+  if (!order_) return;
+  TrackerOrderReport report{order_->number, outcome, text, {}};
+  if (report.done() && order_->what == TrackerOrder::What::ListReflectors) report.reflectors = reflectors_;
+  if (report.done() && order_->what == TrackerOrder::What::SetReflector) {
+    options_.reflector = order_->reflector;  // also after the next connection
+    reflector_before_.reset();               // a person's choice stays
+  }
+  report_ = std::move(report);
+  order_.reset();
+  order_begun_ = false;
+}
+
+}  // namespace abbe::drivers

@@ -1,0 +1,82 @@
+#pragma once
+/// A driver of a measuring machine, the simulated machine's server and their common time, for tests.
+
+#include <algorithm>
+#include <array>
+#include <memory>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "abbe/drivers/ippdme/device.hpp"
+#include "ippdme_peer.hpp"
+
+namespace abbe::tests {
+
+inline sim::IppDmeOptions machine_with_a_sphere() {
+  sim::IppDmeOptions o;
+  o.machine.spheres = {{.centre_m = {0.1, 0.2, -0.1}, .radius_m = 12.5e-3}};
+  return o;
+}
+
+/// A driver, its server and their common time.
+struct IppStage {
+  explicit IppStage(const sim::IppDmeOptions& machine = machine_with_a_sphere(),
+                    drivers::IppDeviceOptions options = {})
+      : peer(time.now(), machine) {
+    options.port = peer.port();
+    device = drivers::IppDevice::create(options, time).value();
+  }
+  void turn() {
+    peer.serve(time.now());
+    peer.say_gathered();
+    device->wait(std::chrono::milliseconds{20});
+    device->receive();
+    time.advance(std::chrono::milliseconds{20});
+    std::array<protocol::ProbeTrigger, 16> out{};
+    const std::size_t n = device->touches().pop(out);
+    touches.insert(touches.end(), out.begin(), out.begin() + static_cast<std::ptrdiff_t>(n));
+  }
+  template <class Done>
+  bool turns_until(std::chrono::nanoseconds limit, Done done) {
+    for (const auto end = time.now() + limit; !done(); turn())
+      if (time.now() >= end) return false;
+    return true;
+  }
+  void turns_for(std::chrono::nanoseconds duration) {
+    (void)turns_until(duration, [] { return false; });
+  }
+  [[nodiscard]] std::string state() const { return std::string{device->status().state}; }
+  [[nodiscard]] std::string last_fault() const { return device->status().last_fault; }
+  [[nodiscard]] std::ptrdiff_t times_heard(std::string_view command) {
+    const auto& heard = peer.machine().heard();
+    return std::ranges::count(heard, command);
+  }
+  bool state_becomes(std::string_view state) {
+    return turns_until(std::chrono::seconds{30}, [&] { return device->status().state == state; });
+  }
+
+  drivers::SteppedTime time;
+  IppDmePeer peer;
+  std::unique_ptr<drivers::IppDevice> device;
+  std::vector<protocol::ProbeTrigger> touches;
+};
+
+inline sim::IppDmeOptions not_homed(std::chrono::nanoseconds home_time = sim::IppDmeOptions{}.home_time) {
+  sim::IppDmeOptions machine = machine_with_a_sphere();
+  machine.homed = false;
+  machine.home_time = home_time;
+  return machine;
+}
+
+inline drivers::IppDeviceOptions that_may_home() {
+  drivers::IppDeviceOptions options;
+  options.session.home = true;
+  return options;
+}
+
+inline drivers::ProbePoint on_top() {
+  return {.position_m = {0.1, 0.2, -0.1 + 12.5e-3 + 2e-3}, .normal = {0, 0, 1}};
+}
+
+}  // namespace abbe::tests

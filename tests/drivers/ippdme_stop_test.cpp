@@ -1,0 +1,418 @@
+/// What stops a measuring machine, and what happens after it: AbortE before any connection with a motion is
+/// closed, and nothing that moves or clears before a person has released the machine.
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <atomic>
+#include <cmath>
+#include <thread>
+
+#include "ippdme_stage.hpp"
+
+namespace abbe::tests {
+namespace {
+
+using namespace std::chrono_literals;
+using drivers::IppDevice;
+using drivers::IppDeviceOptions;
+using drivers::ProbePoint;
+using protocol::TouchFlag;
+using testing::HasSubstr;
+
+constexpr std::string_view kHeld = "awaiting release";
+
+/// Ready, then on its way: 0.5 m at 0.2 m/s.
+struct MovingStage : IppStage {
+  explicit MovingStage(IppDeviceOptions options = {},
+                       const sim::IppDmeOptions& machine = machine_with_a_sphere())
+      : IppStage(machine, std::move(options)) {
+    EXPECT_TRUE(state_becomes("ready")) << last_fault();
+    device->measure({.position_m = {0.3, 0.4, 0.0}, .touch = false});
+    EXPECT_TRUE(turns_until(1s, [this] { return peer.machine().moving(); }));
+  }
+  /// Stopped by one AbortE and held; nothing clears or moves for a minute.
+  void expect_stopped_and_held() {
+    EXPECT_TRUE(turns_until(10s, [this] { return state() == kHeld; })) << state() << ": " << last_fault();
+    EXPECT_FALSE(peer.machine().moving());
+    EXPECT_EQ(times_heard("AbortE()"), 1);
+    const auto commands = times_heard("ClearAllErrors()") + times_heard("StartSession()");
+    device->measure(on_top());
+    turns_for(60s);
+    EXPECT_EQ(state(), kHeld);
+    EXPECT_EQ(times_heard("ClearAllErrors()") + times_heard("StartSession()"), commands);
+    EXPECT_FALSE(peer.machine().moving());
+    EXPECT_EQ(peer.machine().touches(), 0u);
+    EXPECT_EQ(device->points_left(), 0u);
+  }
+  [[nodiscard]] std::size_t commands() { return peer.machine().heard().size(); }
+  [[nodiscard]] std::vector<std::string> commands_after(std::size_t n) {
+    const auto& heard = peer.machine().heard();
+    return {heard.begin() + static_cast<std::ptrdiff_t>(n), heard.end()};
+  }
+  void inject(sim::FaultKind kind, double value = 0.0) {
+    peer.machine().inject({.kind = kind, .value = value}, time.now());
+  }
+};
+
+TEST(IppStop, AStrangeTagWhileMovingIsAbortedFirst) {
+  MovingStage stage;
+  stage.inject(sim::FaultKind::OddTag);
+  stage.expect_stopped_and_held();
+  EXPECT_THAT(stage.last_fault(), HasSubstr("asked to move while awaiting release"));
+}
+
+TEST(IppStop, ATimeOutWhileMovingIsAbortedFirst) {
+  IppDeviceOptions options;
+  options.session.motion_timeout = 500ms;
+  MovingStage stage{options};
+  ASSERT_TRUE(stage.turns_until(2s, [&] { return stage.device->status().faults > 0; }));
+  EXPECT_THAT(stage.last_fault(), HasSubstr("no answer to GoTo in 0.5 s"));
+  stage.expect_stopped_and_held();
+}
+
+TEST(IppStop, GarbageWhileMovingIsAbortedFirst) {
+  for (const std::string garbage :
+       {"220 mail.example.com ESMTP\r\n", "\x01\x02 garbage\r\n", "\xE4\r\n", "00007 ! Error(2,\r\n"}) {
+    MovingStage stage;
+    stage.peer.send(garbage);
+    ASSERT_TRUE(stage.turns_until(1s, [&] { return stage.device->status().faults > 0; }));
+    EXPECT_THAT(stage.last_fault(), HasSubstr("this is no I++ DME server"));
+    stage.expect_stopped_and_held();
+    EXPECT_FALSE(stage.device->status().connected);
+  }
+}
+
+TEST(IppStop, ARequestStopsTheMotionAndForgetsThePoints) {
+  MovingStage stage;
+  stage.device->measure(on_top());
+  stage.device->abort();
+  stage.expect_stopped_and_held();
+}
+
+TEST(IppStop, ARequestWithoutAMotionHoldsWithoutAnAbort) {
+  for (const auto before : {0s, 1s, 5s}) {  // not connected, connected, ready
+    IppStage stage;
+    stage.turns_for(before);
+    stage.device->abort();
+    stage.turns_for(10s);
+    EXPECT_EQ(stage.state(), kHeld);
+    EXPECT_EQ(stage.times_heard("AbortE()"), 0);
+    stage.device->release();
+    EXPECT_TRUE(stage.state_becomes("ready")) << stage.last_fault();
+  }
+}
+
+TEST(IppRelease, TheHoldOutlivesTheDevice) {
+  std::string kept;
+  IppDeviceOptions options;
+  options.machine_changed = [&](const drivers::IppMachine& machine) { kept = machine.held; };
+  {
+    MovingStage stage{options};
+    stage.inject(sim::FaultKind::EmergencyStop);
+    ASSERT_TRUE(stage.state_becomes(kHeld));
+  }
+  EXPECT_THAT(kept, HasSubstr("0500 Emergency stop"));
+  options.session.held = kept;
+  IppStage stage{machine_with_a_sphere(), options};
+  stage.turns_for(60s);
+  EXPECT_EQ(stage.state(), kHeld);
+  EXPECT_THAT(stage.last_fault(), HasSubstr("0500 Emergency stop"));
+  EXPECT_THAT(stage.peer.machine().heard(), testing::IsEmpty());
+  stage.device->release();
+  EXPECT_TRUE(stage.state_becomes("ready")) << stage.last_fault();
+  EXPECT_EQ(kept, "");
+}
+
+TEST(IppStop, AMotionOnALostConnectionIsAbortedOnTheNextOne) {
+  MovingStage stage;
+  stage.peer.hang_up();
+  ASSERT_TRUE(stage.turns_until(1s, [&] { return !stage.device->status().connected; }));
+  EXPECT_TRUE(stage.peer.machine().moving());
+  stage.expect_stopped_and_held();
+}
+
+TEST(IppStop, AMotionOnALostConnectionIsAbortedBeforeASessionIsStarted) {
+  MovingStage stage;
+  const auto before = stage.commands();
+  stage.peer.hang_up();
+  ASSERT_TRUE(stage.state_becomes(kHeld));
+  EXPECT_FALSE(stage.peer.machine().moving());
+  EXPECT_THAT(stage.commands_after(before), testing::ElementsAre("AbortE()"));
+  EXPECT_THAT(stage.last_fault(), HasSubstr("the connection was lost while the machine was moving"));
+  stage.device->release();
+  ASSERT_TRUE(stage.state_becomes("ready")) << stage.last_fault();
+  EXPECT_EQ(stage.commands_after(before).at(1), "StartSession()");
+}
+
+TEST(IppStop, AServerThatAbortsOnlyInASessionGetsOneFirst) {
+  sim::IppDmeOptions machine = machine_with_a_sphere();
+  machine.aborts_outside_session = false;
+  MovingStage stage{{}, machine};
+  const auto before = stage.commands();
+  stage.peer.hang_up();
+  ASSERT_TRUE(stage.turns_until(30s, [&] { return stage.state() == kHeld; })) << stage.last_fault();
+  EXPECT_FALSE(stage.peer.machine().moving());
+  const auto heard = stage.commands_after(before);
+  ASSERT_GE(heard.size(), 3u);
+  EXPECT_EQ(heard[0], "AbortE()");
+  EXPECT_EQ(heard[1], "StartSession()");
+  EXPECT_EQ(heard[2], "AbortE()");
+}
+
+/// The error came first, so the machine was held when the connection was lost.
+TEST(IppStop, AHeldMachineThatMayStillMoveIsAbortedOnTheNextConnection) {
+  MovingStage stage;
+  stage.peer.hold_answers(true);
+  stage.peer.send("E0000 ! Error(2,1001,Machine,\"Air pressure\")\r\n");
+  ASSERT_TRUE(stage.turns_until(1s, [&] { return stage.times_heard("AbortE()") == 1; }));
+  const auto before = stage.commands();
+  stage.peer.hang_up();
+  stage.peer.hold_answers(false);
+  ASSERT_TRUE(stage.turns_until(10s, [&] { return stage.commands() > before; }));
+  stage.turns_for(10s);
+  EXPECT_THAT(stage.commands_after(before), testing::ElementsAre("AbortE()"));
+  EXPECT_EQ(stage.state(), kHeld);
+  EXPECT_THAT(stage.last_fault(), HasSubstr("1001 Air pressure"));
+}
+
+TEST(IppStop, ARefusedAbortIsNoStandstill) {
+  sim::IppDmeOptions machine = machine_with_a_sphere();
+  machine.refuses_aborts = true;
+  drivers::IppMachine kept;
+  IppDeviceOptions options;
+  options.machine_changed = [&](const drivers::IppMachine& m) { kept = m; };
+  MovingStage stage{options, machine};
+  const auto before = stage.commands();
+  stage.device->abort();
+  stage.turns_for(30s);
+  EXPECT_EQ(stage.state(), kHeld);
+  EXPECT_THAT(stage.last_fault(), HasSubstr("AbortE was refused: 0500"));
+  EXPECT_THAT(stage.last_fault(), HasSubstr("the machine may still be moving"));
+  EXPECT_TRUE(kept.moving);
+  EXPECT_THAT(stage.commands_after(before), testing::Each("AbortE()"));
+  stage.device->release();
+  EXPECT_TRUE(stage.state_becomes("ready")) << stage.last_fault();
+}
+
+TEST(IppStop, GarbageBehindAnAbortDoesNotHideItsAnswer) {
+  for (const std::string garbage : {"\x01\x02 garbage\r\n", "220 mail.example.com ESMTP\r\n"}) {
+    MovingStage stage;
+    stage.peer.hold_answers(true);
+    stage.device->abort();
+    ASSERT_TRUE(stage.turns_until(1s, [&] { return stage.times_heard("AbortE()") == 1; }));
+    stage.peer.send(garbage + "E0002 %\r\n");  // in one read
+    ASSERT_TRUE(stage.turns_until(1s, [&] { return stage.state() == kHeld; })) << stage.state();
+    EXPECT_THAT(stage.last_fault(), Not(HasSubstr("no answer to AbortE")));
+  }
+}
+
+TEST(IppRelease, TheReasonOfAHoldStaysWhateverIsRefusedMeanwhile) {
+  std::string kept;
+  IppDeviceOptions options;
+  options.machine_changed = [&](const drivers::IppMachine& machine) { kept = machine.held; };
+  MovingStage stage{options};
+  stage.inject(sim::FaultKind::EmergencyStop);
+  stage.device->measure(on_top());
+  ASSERT_TRUE(stage.state_becomes(kHeld));
+  stage.device->measure(on_top());
+  stage.turns_for(1s);
+  EXPECT_THAT(stage.last_fault(), HasSubstr("0500 Emergency stop"));
+  EXPECT_THAT(stage.last_fault(), HasSubstr("asked to move while awaiting release"));
+  EXPECT_EQ(kept, "reports 0500 Emergency stop (severity 3)");
+}
+
+TEST(IppStop, AMotionIsKeptBeforeItBeginsAndForgottenAtRest) {
+  std::vector<bool> moving;
+  IppDeviceOptions options;
+  options.machine_changed = [&](const drivers::IppMachine& m) { moving.push_back(m.moving); };
+  MovingStage stage{options};
+  EXPECT_THAT(moving, testing::ElementsAre(true));
+  ASSERT_TRUE(stage.state_becomes("ready"));
+  EXPECT_THAT(moving, testing::ElementsAre(true, false));
+}
+
+TEST(IppStop, AMotionOnALostConnectionOutlivesTheDevice) {
+  drivers::IppMachine kept;
+  IppDeviceOptions options;
+  options.machine_changed = [&](const drivers::IppMachine& m) { kept = m; };
+  MovingStage stage{options};
+  stage.peer.hang_up();
+  ASSERT_TRUE(stage.turns_until(1s, [&] { return !stage.device->status().connected; }));
+  stage.device.reset();
+  EXPECT_TRUE(kept.moving);
+
+  const auto before = stage.commands();
+  options.port = stage.peer.port();
+  options.session.held = "abbed ended while the machine was moving";
+  options.session.moving = true;
+  stage.device = IppDevice::create(options, stage.time).value();
+  ASSERT_TRUE(stage.turns_until(5s, [&] { return stage.commands() > before; }));
+  stage.turns_for(10s);
+  EXPECT_EQ(stage.state(), kHeld);
+  EXPECT_FALSE(stage.peer.machine().moving());
+  EXPECT_THAT(stage.commands_after(before), testing::ElementsAre("AbortE()"));
+  EXPECT_FALSE(kept.moving);
+  EXPECT_THAT(kept.held, HasSubstr("abbed ended"));
+  stage.device->release();
+  EXPECT_TRUE(stage.state_becomes("ready")) << stage.last_fault();
+  EXPECT_EQ(kept, drivers::IppMachine{});
+}
+
+TEST(IppStop, AnUnansweredAbortIsRepeatedOnTheNextConnection) {
+  MovingStage stage;
+  stage.peer.hold_answers(true);
+  stage.device->abort();
+  ASSERT_TRUE(stage.turns_until(10s, [&] { return !stage.device->status().connected; }));
+  EXPECT_THAT(stage.last_fault(), HasSubstr("no answer to AbortE in 3 s: the machine may still be moving"));
+  stage.peer.hold_answers(false);
+  ASSERT_TRUE(stage.state_becomes(kHeld)) << stage.state();
+  EXPECT_EQ(stage.times_heard("AbortE()"), 2);
+}
+
+TEST(IppStop, HomingIsAbortedWhenTheDeviceEnds) {
+  IppStage stage{not_homed(20s), that_may_home()};
+  ASSERT_TRUE(stage.turns_until(5s, [&] { return stage.peer.machine().moving(); }));
+  stage.device.reset();
+  stage.peer.serve(stage.time.now());
+  EXPECT_FALSE(stage.peer.machine().moving());
+  EXPECT_EQ(stage.times_heard("AbortE()"), 1);
+}
+
+/// A client that waits for the answer: in real time, the server in another thread.
+TEST(IppStop, TheEndOfTheDeviceWaitsForTheAnswerToItsAbort) {
+  drivers::MonotonicTime time;
+  IppDmePeer peer{time.now(), machine_with_a_sphere()};
+  IppDeviceOptions options;
+  options.port = peer.port();
+  auto device = IppDevice::create(options, time).value();
+  std::atomic<bool> over{false};
+  std::thread server([&] {
+    while (!over) {
+      peer.serve(time.now());
+      peer.say_gathered();
+    }
+  });
+  const auto turns_until = [&](std::string_view state) {
+    for (int i = 0; i < 10'000 && device->status().state != state; ++i) {
+      device->wait(1ms);
+      device->receive();
+    }
+    return device->status().state == state;
+  };
+  EXPECT_TRUE(turns_until("ready"));
+  device->measure({.position_m = {3.0, 4.0, 0.0}, .touch = false});
+  EXPECT_TRUE(turns_until("measuring"));
+  device.reset();
+  over = true;
+  server.join();
+  EXPECT_FALSE(peer.machine().moving());
+  EXPECT_EQ(peer.machine().heard().back(), "EndSession()");
+}
+
+TEST(IppRelease, AnErrorOfSeverityTwoOrMoreHoldsTheMachine) {
+  for (const int severity : {2, 3, 9}) {
+    MovingStage stage;
+    stage.inject(sim::FaultKind::ErrorReport, severity);
+    ASSERT_TRUE(stage.turns_until(1s, [&] { return stage.device->status().faults > 0; }));
+    EXPECT_THAT(stage.last_fault(), HasSubstr("(severity " + std::to_string(severity) + ")"));
+    stage.expect_stopped_and_held();
+    EXPECT_TRUE(stage.device->status().connected);
+  }
+}
+
+TEST(IppRelease, AWarningHoldsNothing) {
+  for (const int severity : {0, 1}) {
+    MovingStage stage;
+    stage.inject(sim::FaultKind::ErrorReport, severity);
+    ASSERT_TRUE(stage.turns_until(10s, [&] { return stage.state() == "ready"; }));
+    EXPECT_EQ(stage.device->status().faults, 0u);
+    EXPECT_EQ(stage.times_heard("AbortE()"), 0);
+  }
+}
+
+TEST(IppRelease, NothingMovesOrClearsAfterAnEmergencyStop) {
+  MovingStage stage;
+  stage.inject(sim::FaultKind::EmergencyStop);
+  ASSERT_TRUE(stage.turns_until(1s, [&] { return stage.device->status().faults > 0; }));
+  EXPECT_THAT(stage.last_fault(), HasSubstr("0500 Emergency stop"));
+  stage.expect_stopped_and_held();
+}
+
+TEST(IppRelease, ARefusedTouchHoldsTheMachineUntilAPersonReleasesIt) {
+  IppStage stage;
+  ASSERT_TRUE(stage.state_becomes("ready")) << stage.last_fault();
+  stage.device->measure({.position_m = {0.3, 0.3, 0.0}});
+  ASSERT_TRUE(stage.state_becomes(kHeld));
+  ASSERT_EQ(stage.touches.size(), 1u);
+  EXPECT_TRUE(has(stage.touches[0].touch_flags, TouchFlag::NoPosition));
+  EXPECT_TRUE(std::isnan(stage.touches[0].position[0]));
+  EXPECT_THAT(stage.last_fault(), HasSubstr("1006 Surface not found"));
+  EXPECT_EQ(stage.times_heard("ClearAllErrors()"), 0);
+  stage.device->release();
+  ASSERT_TRUE(stage.state_becomes("ready")) << stage.last_fault();
+  EXPECT_EQ(stage.times_heard("ClearAllErrors()"), 1);
+  stage.device->measure(on_top());
+  ASSERT_TRUE(stage.turns_until(60s, [&] { return stage.touches.size() == 2; })) << stage.last_fault();
+  EXPECT_EQ(stage.touches[1].touch_flags, 0u);
+}
+
+TEST(IppRelease, TheHoldOutlivesTheConnectionAndThePowerOfTheServer) {
+  MovingStage stage;
+  stage.inject(sim::FaultKind::EmergencyStop);
+  ASSERT_TRUE(stage.state_becomes(kHeld));
+  stage.peer.restart(stage.time.now());
+  stage.turns_for(60s);
+  EXPECT_EQ(stage.state(), kHeld);
+  EXPECT_FALSE(stage.device->status().connected);
+  EXPECT_THAT(stage.peer.machine().heard(), testing::IsEmpty());
+  stage.device->release();
+  ASSERT_TRUE(stage.state_becomes("ready")) << stage.last_fault();
+}
+
+TEST(IppRelease, AReleaseWhileTheEmergencyStopIsPressedHoldsAgain) {
+  MovingStage stage;
+  stage.peer.machine().press_emergency_stop(stage.time.now(), stage.time.now() + 20s);
+  ASSERT_TRUE(stage.state_becomes(kHeld));
+  stage.device->release();
+  stage.turns_for(1s);
+  ASSERT_EQ(stage.state(), kHeld);
+  EXPECT_THAT(stage.last_fault(), HasSubstr("ClearAllErrors was refused: 0500 Emergency stop"));
+  stage.turns_for(20s);
+  stage.device->release();
+  EXPECT_TRUE(stage.state_becomes("ready")) << stage.last_fault();
+}
+
+TEST(IppRelease, AReleaseWithoutAHoldDoesNothing) {
+  MovingStage stage;
+  stage.device->release();
+  ASSERT_TRUE(stage.turns_until(10s, [&] { return stage.state() == "ready"; }));
+  EXPECT_EQ(stage.times_heard("ClearAllErrors()"), 0);
+  EXPECT_EQ(stage.times_heard("AbortE()"), 0);
+}
+
+TEST(IppRelease, AMachineThatLostItsHomeIsNotSentHomeWithoutARelease) {
+  IppStage stage{not_homed(1s), that_may_home()};
+  ASSERT_TRUE(stage.state_becomes("ready")) << stage.last_fault();
+  stage.peer.restart(stage.time.now());
+  ASSERT_TRUE(stage.state_becomes(kHeld)) << stage.last_fault();
+  EXPECT_THAT(stage.last_fault(), HasSubstr("not homed any more"));
+  EXPECT_EQ(stage.times_heard("Home()"), 0);
+  stage.device->release();
+  ASSERT_TRUE(stage.state_becomes("ready")) << stage.last_fault();
+  EXPECT_EQ(stage.times_heard("Home()"), 1);
+}
+
+TEST(IppDevice, AnErrorTextInAnyCharacterSetIsReadAndShownEscaped) {
+  MovingStage stage;
+  stage.inject(sim::FaultKind::NotAscii);
+  ASSERT_TRUE(stage.turns_until(10s, [&] { return stage.state() == "ready"; }));
+  EXPECT_EQ(stage.device->status().faults, 0u);
+  stage.peer.send("E0000 ! Error(2,1001,Maschine,\"Ber\xFChrung\")\r\n");
+  ASSERT_TRUE(stage.state_becomes(kHeld));
+  EXPECT_THAT(stage.last_fault(), HasSubstr("1001 Ber\\xFChrung (severity 2)"));
+  EXPECT_TRUE(stage.device->status().connected);
+}
+
+}  // namespace
+}  // namespace abbe::tests

@@ -57,6 +57,15 @@ void read_encoder_nodes(TomlSection& encoder, std::vector<EncoderNodeOptions>& n
   if (!seen.empty()) nodes = seen;
 }
 
+/// With sync = "external" the machine sends the SYNC, and the machine is here.
+void read_sync(TomlSection& encoder, SimulationSetup& simulation) {
+  std::string sync;
+  encoder.text("sync", sync);
+  double period_us = 1000.0;
+  encoder.number("sync_period_us", period_us, 1.0, {100.0, 1e6});
+  if (sync == "external") simulation.sync_period = seconds_to_ns(period_us * 1e-6);
+}
+
 void read_chain(TomlSection root, TruthMachine& truth) {
   TomlSection machine = root.child("machine");
   std::string chain = "[w X b Y Z t]";
@@ -83,6 +92,7 @@ void read_machine_tables(TomlSection root, SetupDraft& draft) {
   encoder.port("peer_port", simulation.bus->port);
   encoder.port("local_port", simulation.bus->peer_port);
   encoder.text("interface", simulation.bus->interface);
+  read_sync(encoder, simulation);
   read_encoder_nodes(encoder, simulation.nodes);
   read_counter_card(root.child("counter_card"), simulation);
   read_reference(root.child("reference"), simulation);

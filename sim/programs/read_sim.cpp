@@ -67,6 +67,7 @@ void read_tracker(TomlSection section, SimulationSetup& simulation) {
   read_duration(section, "warm_up_s", tracker.warm_up, 1.0);
   read_duration(section, "command_latency_ms", tracker.command_latency, kMilli);
   read_duration(section, "initialize_s", tracker.initialize_time, 1.0);
+  read_duration(section, "fetch_beam_s", tracker.fetch_beam, 1.0);
   section.number("air_temperature_C", tracker.air_temperature_C);
   section.number("air_pressure_mbar", tracker.air_pressure_mbar);
   section.number("air_humidity_percent", tracker.air_humidity_percent);
@@ -106,6 +107,9 @@ void read_sim(TomlSection sim, const std::string& file, SetupDraft& draft) {
   encoder.port("peer_port", simulation.bus->peer_port);
   encoder.text("interface", simulation.bus->interface);
   encoder.number("noise_nm", draft.encoder_noise_m, 1e-9, kNotNegativeNumber);
+  double sync_period_us = 0.0;
+  if (encoder.number("sync_period_us", sync_period_us, 1.0, {100.0, 1e6}))
+    simulation.sync_period = seconds_to_ns(sync_period_us * 1e-6);
   encoder.refuse_unknown_keys();
   read_environment(sim, simulation.environment);
   read_sim_counter_card(sim.child("counter_card"), simulation);

@@ -13,6 +13,7 @@
 #include "event_loop.hpp"
 #include "files.hpp"
 #include "ports_file.hpp"
+#include "toml_section.hpp"
 
 namespace abbe::sim {
 namespace {
@@ -47,16 +48,13 @@ Result<void> read_places(const ReplayOptions& options, ReplaySetup& setup) {
 
 /// The serial numbers that the daemon expected of its cards when it recorded them.
 void read_serials(const std::string& configuration, std::map<std::string, std::string>& serials) {
-  try {
-    const toml::table root = toml::parse(configuration);
-    for (const auto& [table, usual] :
-         {std::pair{"counter_card", "counter_card"}, std::pair{"reference", "reference_card"}}) {
-      const auto serial = root[table]["serial_number"].value<std::string>();
-      const auto name = root[table]["name"].value<std::string>();
-      if (serial) serials[name.value_or(usual)] = *serial;
-    }
-  } catch (const toml::parse_error&) {
-    return;  // of a daemon of another age: the bytes are served all the same
+  const auto root = parse_toml(configuration, "recorded configuration");
+  if (!root) return;  // of a daemon of another age: the bytes are served all the same
+  for (const auto& [table, usual] :
+       {std::pair{"counter_card", "counter_card"}, std::pair{"reference", "reference_card"}}) {
+    const auto serial = (*root)[table]["serial_number"].value<std::string>();
+    const auto name = (*root)[table]["name"].value<std::string>();
+    if (serial) serials[name.value_or(usual)] = *serial;
   }
 }
 

@@ -2,8 +2,10 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 
+#include "abbe/protocol/toml_nesting.hpp"
 #include "files.hpp"
 
 namespace abbe::sim {
@@ -143,17 +145,29 @@ void TomlSection::refuse_unknown_keys() {
   }
 }
 
-Result<void> read_toml_file(const std::string& file, const std::function<void(TomlSection)>& reader) {
-  const auto text = read_file(file);
-  if (!text) return tl::unexpected(text.error());
+Result<toml::table> parse_toml(std::string_view text, const std::string& file) {
+  constexpr protocol::TomlBounds kBounds;
+  if (text.size() > kBounds.bytes)
+    return bad_input(fmt::format("{}: {} bytes, at most {} are read", file, text.size(), kBounds.bytes));
+  if (const auto at = protocol::toml_deeper_than(text, kBounds.depth)) {
+    const auto line = 1 + std::ranges::count(text.substr(0, *at), '\n');
+    return bad_input(fmt::format("{}:{}: nested deeper than {}", file, line, kBounds.depth));
+  }
   try {
-    const toml::table table = toml::parse(*text, file);
-    TomlFaults faults(file);
-    reader(TomlSection(&table, "", faults));
-    if (faults.any()) return tl::unexpected(faults.error());
+    return toml::parse(text, file);
   } catch (const toml::parse_error& e) {
     return bad_input(fmt::format("{}:{}: {}", file, e.source().begin.line, e.description()));
   }
+}
+
+Result<void> read_toml_file(const std::string& file, const std::function<void(TomlSection)>& reader) {
+  const auto text = read_file(file);
+  if (!text) return tl::unexpected(text.error());
+  const auto table = parse_toml(*text, file);
+  if (!table) return tl::unexpected(table.error());
+  TomlFaults faults(file);
+  reader(TomlSection(&*table, "", faults));
+  if (faults.any()) return tl::unexpected(faults.error());
   return {};
 }
 

@@ -71,6 +71,9 @@ class TomlSection {
   std::set<std::string, std::less<>> known_;
 };
 
+/// BadInput ("FILE:LINE: ...") also for a text beyond protocol::TomlBounds, which no parser sees then.
+[[nodiscard]] Result<toml::table> parse_toml(std::string_view text, const std::string& file);
+
 /// Reads the parts of one file that `reader` knows. Io, or BadInput with every fault at once.
 [[nodiscard]] Result<void> read_toml_file(const std::string& file,
                                           const std::function<void(TomlSection)>& reader);

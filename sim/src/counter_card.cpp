@@ -71,13 +71,15 @@ void CounterCard::make_scan(HostTime at) {
       out.little(value);
     }
   }
-  const auto scan = out.written();
+  const auto whole = out.written();
+  const auto scan = whole.subspan(std::min(std::exchange(torn_, 0), whole.size()));
   fifo_.insert(fifo_.end(), scan.begin(), scan.end());
   ++scans_made_;
 }
 
 std::uint64_t CounterCard::value_of(std::size_t channel, HostTime at) {
   Counter& counter = counters_[channel];
+  if (!counter.set_up) return 0;
   if (counter.setup.latch_on_index) return latched_value(channel, at);
   const auto count = static_cast<std::uint64_t>(signal_count(channel, at) - counter.zero);
   return count & (quad08::modulus_of(quad08::CountWidth::Bits48) - 1);

@@ -69,6 +69,10 @@ Answer CounterCard::control(const usb::Setup& setup, HostTime now) {
 }
 
 ControlAnswer CounterCard::answer(const usb::Setup& setup, HostTime now) {
+  if (failing_controls_ > 0) {
+    --failing_controls_;
+    return {ControlAnswer::Outcome::Stalled, {}};
+  }
   auto data = control(setup, now);
   if (!data) return {ControlAnswer::Outcome::Stalled, {}};
   return {ControlAnswer::Outcome::Done, std::move(*data)};
@@ -231,6 +235,7 @@ void CounterCard::set_up_counter(std::uint16_t value, HostTime now) {
   const auto setup = quad08::decode_counter_setup(value);
   const std::size_t channel = bank_ & kCounterBits;
   counters_[channel] = Counter{};
+  counters_[channel].set_up = true;
   if (setup) counters_[channel].setup = *setup;
   counters_[channel].zero = signal_count(channel, now);
   counters_[channel].set_up_at = now;

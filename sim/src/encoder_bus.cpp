@@ -7,6 +7,7 @@ namespace abbe::sim {
 namespace {
 
 constexpr std::uint16_t kGenericEmergency = 0x1000;
+constexpr double kTunnelTimeout_s = 0.1;  // cannelloni's default
 
 bool concerns(const Fault& fault, const EncoderNode& node) {
   return fault.node == 0 || fault.node == node.node();
@@ -24,9 +25,27 @@ Result<EncoderBus> EncoderBus::open(const EncoderBusOptions& options,
   return bus;
 }
 
+void EncoderBus::produce_sync(std::chrono::nanoseconds period, HostTime first) {
+  sync_period_ = period;
+  next_sync_ = first;
+}
+
+/// One at most: what was missed is not made up for.
+void EncoderBus::send_sync(HostTime now) {
+  if (now < next_sync_) return;
+  const HostTime at = next_sync_ + sync_period_ * ((now - next_sync_) / sync_period_);
+  next_sync_ = at + sync_period_;
+  waiting_.push_back({at, can::encode_sync()});
+  std::ranges::stable_sort(waiting_, {}, &TimedFrame::due);
+  if (bus_off_until_) return;
+  for (EncoderNode& node : nodes_) node.on_frame(can::encode_sync(), at);
+  collect();
+}
+
 void EncoderBus::poll(HostTime now) {
   end_bus_off(now);
   receive(now);
+  send_sync(now);
   for (EncoderNode& node : nodes_) node.advance(now);
   std::erase_if(all_clears_, [&](const AllClear& clear) {
     if (now < clear.due) return false;
@@ -41,14 +60,17 @@ void EncoderBus::poll(HostTime now) {
 
 HostTime EncoderBus::next_due() const {
   HostTime due = waiting_.empty() ? HostTime::max() : waiting_.front().due;
+  if (!waiting_.empty() && due < next_bundle_ && due < bundle_until_)
+    due = std::min(next_bundle_, bundle_until_);
   for (const EncoderNode& node : nodes_) due = std::min(due, node.next_due());
   for (const AllClear& clear : all_clears_) due = std::min(due, clear.due);
   if (bus_off_until_) due = std::min(due, *bus_off_until_);
-  return due;
+  return std::min(due, next_sync_);
 }
 
 void EncoderBus::receive(HostTime now) {
   for (const ArrivedFrame& arrived : port_->receive()) {
+    ++frames_received_;
     if (bus_off_until_) continue;
     for (EncoderNode& node : nodes_) node.on_frame(arrived.frame, now - arrived.age);
     collect();
@@ -66,6 +88,10 @@ void EncoderBus::collect() {
 }
 
 void EncoderBus::send_due(HostTime now) {
+  if (now < bundle_until_) {
+    if (now < next_bundle_) return;
+    next_bundle_ = now + bundle_every_;
+  }
   const auto end = std::find_if(waiting_.begin(), waiting_.end(),
                                 [now](const TimedFrame& timed) { return timed.due > now; });
   if (!bus_off_until_) {
@@ -97,6 +123,13 @@ void EncoderBus::inject(const Fault& fault, HostTime now) {
     return;
   }
   if (fault.kind == FaultKind::BusGarbage) return port_->send_garbage();
+  if (fault.kind == FaultKind::Overflow) return send_error_frame(can::BusCondition::ReceiveOverflow);
+  if (fault.kind == FaultKind::Bundled) {
+    bundle_until_ = until;
+    bundle_every_ = seconds_to_ns(fault.value > 0.0 ? fault.value : kTunnelTimeout_s);
+    next_bundle_ = now + bundle_every_;
+    return;
+  }
   for (EncoderNode& node : nodes_) {
     if (!concerns(fault, node)) continue;
     switch (fault.kind) {

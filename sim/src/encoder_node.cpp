@@ -60,6 +60,18 @@ void EncoderNode::boot(HostTime at, bool forget_objects) {
   boot_at_ = at + options_.boot_time;
 }
 
+/// As the machine's control does: TPDO 1 at every SYNC, a heartbeat, operational.
+void EncoderNode::configure() {
+  constexpr std::uint64_t kEverySync = 1;
+  constexpr std::uint64_t kHeartbeat_ms = 100;
+  objects_.set_number({can::object::kTpdoParameters, 2}, kEverySync);
+  objects_.set_number({can::object::kTpdoParameters, 5}, 0);
+  objects_.set_number({can::object::kTpdoParameters + 1, 1},
+                      can::cob::tpdo(2, options_.node) | can::object::kPdoDisabled);
+  objects_.set_number(can::object::kHeartbeatTime, kHeartbeat_ms);
+  state_ = can::NodeState::Operational;
+}
+
 void EncoderNode::restart(HostTime now) {
   boot(now, true);
 }
@@ -128,6 +140,7 @@ void EncoderNode::advance(HostTime now) {
     last_heartbeat_ = boot_at_;
     last_event_.fill(boot_at_);
     send(can::encode_heartbeat(options_.node, can::NodeState::BootUp), boot_at_);
+    if (options_.configured) configure();
   }
   if (const auto abort = sdo_.on_time(now)) send(*abort, now);
   const auto period = heartbeat_period();

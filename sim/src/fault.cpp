@@ -22,11 +22,13 @@ constexpr std::array kTrackerFaults{
     Name{"busy", FaultKind::Busy},
     Name{"weather", FaultKind::Weather},
     Name{"garbage", FaultKind::TrackerGarbage},
+    Name{"reflector_away", FaultKind::ReflectorAway},
 };
 constexpr std::array kEncoderFaults{
     Name{"mute", FaultKind::Mute},          Name{"late", FaultKind::Late},
     Name{"restart", FaultKind::Restart},    Name{"emergency", FaultKind::Emergency},
     Name{"garbage", FaultKind::BusGarbage}, Name{"bus_off", FaultKind::BusOff},
+    Name{"bundled", FaultKind::Bundled},    Name{"overflow", FaultKind::Overflow},
 };
 constexpr std::array kEnvironmentFaults{
     Name{"mute", FaultKind::Mute},
@@ -47,12 +49,17 @@ constexpr std::array kCounterCardFaults{
     Name{"lost_scans", FaultKind::LostScans},
     Name{"clock_jump", FaultKind::ClockJump},
     Name{"garbage", FaultKind::UsbGarbage},
+    Name{"fail_request", FaultKind::FailRequest},
+    Name{"disconnect", FaultKind::Disconnect},
 };
 
 constexpr std::array kMeasuringMachineFaults{
     Name{"mute", FaultKind::Mute},
     Name{"disconnect", FaultKind::Disconnect},
     Name{"emergency_stop", FaultKind::EmergencyStop},
+    Name{"error", FaultKind::ErrorReport},
+    Name{"odd_tag", FaultKind::OddTag},
+    Name{"not_ascii", FaultKind::NotAscii},
     Name{"refuse_touch", FaultKind::RefuseTouch},
     Name{"refuse_way", FaultKind::RefuseWay},
     Name{"garbage", FaultKind::LineGarbage},

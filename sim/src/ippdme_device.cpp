@@ -61,8 +61,9 @@ void IppDmeDevice::connected(HostTime) {
 void IppDmeDevice::disconnected() {
   session_ = wants_close_ = false;
   queue_.clear();
-  motion_.reset();
   move_report_.reset();
+  if (motion_) motion_->unheard = true;
+  if (!options_.keeps_moving) motion_.reset();
 }
 
 std::vector<std::byte> IppDmeDevice::take_output() {
@@ -109,10 +110,16 @@ void IppDmeDevice::inject(const Fault& fault, HostTime now) {
   constexpr int kOutOfLimits = 2500;
   if (fault.kind == FaultKind::Mute) {
     disconnected();  // it forgets what it was about
+    motion_.reset();
     mute_until_ = now + seconds_to_ns(fault.duration_s);
   }
   if (fault.kind == FaultKind::Disconnect) wants_close_ = true;
-  if (fault.kind == FaultKind::EmergencyStop) press_emergency_stop();
+  if (fault.kind == FaultKind::EmergencyStop)
+    press_emergency_stop(now, now + seconds_to_ns(fault.duration_s));
+  if (fault.kind == FaultKind::ErrorReport) report_error(static_cast<int>(fault.value));
+  if (fault.kind == FaultKind::OddTag) say("98765 %");
+  if (fault.kind == FaultKind::NotAscii)
+    say("E0000 ! Error(1,0504,Maschine,\"Druckluft zu niedrig f\xFCr T\xE4ster\")");
   if (fault.kind == FaultKind::RefuseTouch)
     refuse_touch_ = fault.value > 0.0 ? static_cast<int>(fault.value) : kSurfaceNotFound;
   if (fault.kind == FaultKind::RefuseWay)
@@ -134,6 +141,10 @@ void IppDmeDevice::receive(std::span<const std::byte> bytes, HostTime now) {
         framer_->reset();
         return;
       }
+      if (!std::ranges::all_of(**line, [](char c) { return c >= ' ' && c <= '~'; })) {
+        say("E0000 ! Error(3,0007,Server,\"Illegal character\")");
+        continue;
+      }
       on_line(**line, now);
     }
     if (taken == 0) return;
@@ -150,6 +161,9 @@ void IppDmeDevice::on_line(std::string_view line, HostTime now) {
     return;
   }
   const Command command{parsed->tag, std::string(parsed->method), std::string(parsed->arguments)};
+  heard_.push_back(command.method + "(" + command.arguments + ")");
+  if (heard_.size() > kMostHeard) heard_.pop_front();
+  if (command.method == "AbortE" && !options_.answers_aborts) return;
   acknowledge(command.tag);
   if (command.tag.event) {
     on_event(command, now);
@@ -160,7 +174,13 @@ void IppDmeDevice::on_line(std::string_view line, HostTime now) {
 
 void IppDmeDevice::on_event(const Command& command, HostTime now) {
   if (command.method == "AbortE") {
-    abort(now);
+    if (options_.refuses_aborts) {
+      fault(command, 3, 500, "Refused by the simulation");
+    } else if (!session_ && !options_.aborts_outside_session) {
+      fault(command, 3, 8, "Protocol error");
+    } else {
+      abort(now);
+    }
   } else if (command.method == "GetErrStatusE") {
     data(command.tag, failed_ ? "ErrStatus(1)" : "ErrStatus(0)");
   } else if (command.method == "OnMoveReportE" && session_) {
@@ -174,7 +194,8 @@ void IppDmeDevice::on_event(const Command& command, HostTime now) {
 
 void IppDmeDevice::abort(HostTime now) {
   position_m_ = reading_m(now);
-  if (motion_) queue_.push_front(std::exchange(motion_, std::nullopt)->command);
+  if (motion_ && !motion_->unheard) queue_.push_front(motion_->command);
+  motion_.reset();
   for (const Command& command : queue_) {
     fault(command, 2, 6, "Transaction aborted");
     complete(command.tag);
@@ -183,7 +204,15 @@ void IppDmeDevice::abort(HostTime now) {
   failed_ = true;
 }
 
-void IppDmeDevice::press_emergency_stop() {
+/// An error that is of no command.
+void IppDmeDevice::report_error(int severity) {
+  const int code = severity >= 9 ? 503 : severity >= 3 ? 1009 : severity == 2 ? 1001 : 504;
+  fault({ippdme::kUnsolicited, "Machine", {}}, severity, code, "From the simulation");
+}
+
+void IppDmeDevice::press_emergency_stop(HostTime now, HostTime pulled_out_at) {
+  position_m_ = reading_m(now);
+  emergency_until_ = pulled_out_at;
   motion_.reset();
   queue_.clear();
   failed_ = true;
@@ -231,6 +260,8 @@ void IppDmeDevice::carry_out(const Command& command, HostTime now) {
   if (!session_ && !always) return fault(command, 3, 8, "Protocol error");
   const bool mends = command.method == "ClearAllErrors" || command.method == "GetXtdErrStatus" || always;
   if (failed_ && !mends) return fault(command, 2, 514, "Use ClearAllErrors to continue");
+  if (now < emergency_until_ && command.method == "ClearAllErrors")
+    return fault(command, 3, 500, "Emergency stop");
   if (carry_out_session(command) || carry_out_tools(command) || carry_out_motion(command, now) ||
       carry_out_reports(command, now))
     return;
@@ -367,6 +398,7 @@ void IppDmeDevice::end_motion() {
   const Motion motion = *std::exchange(motion_, std::nullopt);
   position_m_ = motion.to_m;
   homed_ = homed_ || motion.homing;
+  if (motion.unheard) return;
   if (motion.probing && refuse_touch_ != 0) {
     fault(motion.command, 2, std::exchange(refuse_touch_, 0), "Refused by the simulation");
   } else if (motion.command.method == "GoTo" && refuse_way_ != 0) {

@@ -40,11 +40,15 @@ RecordedBus::RecordedBus(std::unique_ptr<CanPort> port, const RecordedDevice& de
     if (!view) continue;
     for (can::CanFrame frame; view->next(frame);) take(frame, block.to_device, block.time);
   }
+  if (external()) state_ = can::NodeState::Operational;  // by the machine's control
 }
 
 void RecordedBus::take(const can::CanFrame& frame, bool to_device, HostTime time) {
   if (to_device) {
-    if (can::decode_sync(frame)) cycles_.push_back({time, {}});
+    if (can::decode_sync(frame)) {
+      cycles_.push_back({time, {}});
+      foreign_sync_ = false;
+    }
     if (is_function(frame, can::cob::kSdoRequest)) {
       const auto node = static_cast<can::NodeId>(frame.id & kNode);
       if (const auto unanswered = asked_.find(node); unanswered != asked_.end())
@@ -53,7 +57,13 @@ void RecordedBus::take(const can::CanFrame& frame, bool to_device, HostTime time
     }
     return;
   }
-  if (can::cob::is_tpdo(frame)) {
+  if (can::decode_sync(frame)) {
+    ++foreign_syncs_;
+    foreign_sync_ = true;
+    spoken_.push_back({time, frame});
+  } else if (can::cob::is_tpdo(frame) && foreign_sync_) {
+    spoken_.push_back({time, frame});
+  } else if (can::cob::is_tpdo(frame)) {
     if (!cycles_.empty()) cycles_.back().answers.push_back({time - cycles_.back().sync, frame});
   } else if (is_function(frame, can::cob::kSdoResponse)) {
     const auto asked = asked_.find(static_cast<can::NodeId>(frame.id & kNode));
@@ -69,6 +79,7 @@ void RecordedBus::take(const can::CanFrame& frame, bool to_device, HostTime time
 void RecordedBus::poll(HostTime now) {
   for (const ArrivedFrame& arrived : port_->receive()) on_frame(arrived.frame, now);
   send_late(now);
+  if (leads_ && external() && port_->has_listener()) timeline_.start(spoken_.front().time, now);
   keep_alive(now);
   if (!timeline_.running()) next_spoken_ = 0;
   for (; next_spoken_ < spoken_.size() && timeline_.due(spoken_[next_spoken_].time) <= now; ++next_spoken_) {

@@ -26,9 +26,13 @@ Result<std::unique_ptr<Simulation>> Simulation::open(const SimulationSetup& setu
     simulation->tracker_.emplace(std::move(*tracker));
   }
   if (setup.bus) {
-    auto bus = EncoderBus::open(*setup.bus, setup.nodes, simulation->machine_, now);
+    auto nodes = setup.nodes;
+    for (EncoderNodeOptions& node : nodes) node.configured = setup.sync_period.count() > 0;
+    auto bus = EncoderBus::open(*setup.bus, nodes, simulation->machine_, now);
     if (!bus) return tl::unexpected(bus.error());
     simulation->bus_.emplace(std::move(*bus));
+    if (setup.sync_period.count() > 0)
+      simulation->bus_->produce_sync(setup.sync_period, now + setup.sync_period);
   }
   for (const ModbusServerOptions& options : setup.environment) {
     auto server = ModbusServer::open(options, now);

@@ -1,7 +1,9 @@
 /// What the controller does with each command: answers, refusals, and the state they leave behind.
 
 #include <algorithm>
+#include <array>
 #include <string_view>
+#include <utility>
 
 #include "abbe/sim/tracker_device.hpp"
 
@@ -9,6 +11,17 @@ namespace abbe::sim {
 namespace {
 
 constexpr std::chrono::seconds kReflectorSearch{1};
+
+struct Reflector {
+  std::int32_t id;
+  std::u16string_view name;
+  emscon::TargetType type;
+};
+constexpr std::array kKnownReflectors{
+    Reflector{0, u"SMR 1.5 inch", emscon::TargetType::CornerCube},
+    Reflector{1, u"SMR 0.5 inch", emscon::TargetType::CornerCube},
+    Reflector{4, u"Cat eye 75 mm", emscon::TargetType::CatEye},
+};
 
 template <class T>
 const T* as(const emscon::Request& request) {
@@ -40,7 +53,7 @@ emscon::Status TrackerDevice::outcome(const emscon::Request& request, HostTime a
   using emscon::Status;
   if (as<emscon::Initialize>(request)) {
     if (at < warm_at_) return Status::NotWarmedUp;
-    initialised_ = true;
+    initialise(at);
     return Status::Ok;
   }
   if (as<emscon::StartMeasurement>(request)) return start_measurement(at);
@@ -63,25 +76,62 @@ emscon::Status TrackerDevice::outcome(const emscon::Request& request, HostTime a
     return continuous_ = *r, Status::Ok;
   }
   if (const auto* r = as<emscon::SetCoordinateSystemType>(request)) {
-    return r->type == emscon::CoordinateSystem::RightHanded ? Status::Ok : Status::NotImplemented;
+    using enum emscon::CoordinateSystem;
+    if (r->type != RightHanded && r->type != LeftHandedX) return Status::NotImplemented;
+    return coordinates_ = r->type, Status::Ok;
   }
   if (const auto* r = as<emscon::SetReflector>(request)) {
-    if (r->internal_id != 0) return Status::WrongParameter1;
-    return reflector_ = r->internal_id, Status::Ok;
+    const bool known = std::ranges::any_of(kKnownReflectors, [&](auto& k) { return k.id == r->internal_id; });
+    if (!known) return Status::WrongParameter1;
+    if (std::exchange(reflector_, r->internal_id) != r->internal_id)
+      send_event(emscon::Event::ReflectorChanged);
+    return Status::Ok;
   }
-  if (const auto* r = as<emscon::SetStatisticMode>(request))
-    return continuous_statistics_ = r->continuous, Status::Ok;
+  if (const auto* r = as<emscon::SetStatisticMode>(request)) return statistics_ = *r, Status::Ok;
   if (as<emscon::SetContinuousDistanceModeParams>(request)) return Status::NotImplemented;
+  if (const auto* r = as<emscon::SetTransformation>(request)) return transformation_ = *r, Status::Ok;
+  if (const auto* r = as<emscon::SetStationOrientation>(request)) return orientation_ = *r, Status::Ok;
+  if (const auto* r = as<emscon::SetSearchParams>(request)) return search_ = *r, Status::Ok;
+  if (const auto* r = as<emscon::SetLongSystemParameter>(request))
+    return long_parameters_[r->parameter] = r->value, Status::Ok;
   if (const auto* r = as<emscon::SetTriggerSource>(request)) {
     return r->source == emscon::TriggerSource::Internal ? Status::Ok : Status::NotImplemented;
   }
+  if (const auto* r = as<emscon::FindReflector>(request); r && !(r->approximate_distance > 0.0))
+    return Status::WrongParameter1;
   if (as<emscon::FindReflector>(request) || as<emscon::GoBirdBath>(request) ||
       as<emscon::GoPosition>(request)) {
-    return initialised_ ? Status::Ok : Status::TrackerNotInitialized;
+    return initialised_ ? move_beam(at) : Status::TrackerNotInitialized;
   }
-  // Orientation, transformation, search and long parameters are taken and change nothing: the packet rate of
-  // bursts, for example, is what real controllers do whatever they are asked.
+  // Orientation, search and long parameters are remembered and change nothing: the packet rate of bursts, for
+  // example, is what real controllers do whatever they are asked.
   return Status::Ok;
+}
+
+/// The motors turn, the beam is lost, and with it a measurement that runs.
+void TrackerDevice::initialise(HostTime at) {
+  initialised_ = true;
+  ++initializations_;
+  if (stream_ || single_due_) send_event(emscon::Event::MeasurementNotReady);
+  stream_.reset();
+  single_due_.reset();
+  if (options_.fetch_beam.count() == 0) return;
+  distance_set_ = false;
+  beam_back_ = at + options_.fetch_beam;
+}
+
+/// To the reflector, wherever it is: the beam holds it from then on.
+emscon::Status TrackerDevice::move_beam(HostTime at) {
+  if (stream_ || single_due_) return emscon::Status::UsageConflict;
+  if (reflector_away_.holds(at)) {  // the head has turned away from whatever it held
+    distance_set_ = false;
+    beam_back_ = std::max(beam_back_.value_or(at), reflector_away_.until);
+    return emscon::Status::NoDistanceSet;
+  }
+  ++beam_moves_;
+  beam_broken_.until = std::min(beam_broken_.until, at);
+  if (beam_back_) return_beam();
+  return emscon::Status::Ok;
 }
 
 emscon::Status TrackerDevice::set_mode(emscon::MeasurementMode mode) {
@@ -96,6 +146,7 @@ emscon::Status TrackerDevice::set_mode(emscon::MeasurementMode mode) {
 
 emscon::Status TrackerDevice::start_measurement(HostTime at) {
   if (!initialised_) return emscon::Status::TrackerNotInitialized;
+  if (!distance_set_) return emscon::Status::NoDistanceSet;
   if (beam_back_) return emscon::Status::MeasurementNotReady;
   if (stream_ || single_due_) return emscon::Status::InternalProcessActive;
   if (mode_ == emscon::MeasurementMode::Stationary) {
@@ -118,6 +169,27 @@ emscon::Status TrackerDevice::start_measurement(HostTime at) {
   if (!first_stream_) first_stream_ = host_time(options_.model, power_on_, stream.next_point);
   stream_ = stream;
   return emscon::Status::Ok;
+}
+
+bool TrackerDevice::answer_setting(const emscon::Request& request) {
+  using emscon::Status;
+  const auto tell = [this](const auto& answer) { return send(emscon::Answer{answer}), true; };
+  if (as<emscon::GetTransformation>(request))
+    return tell(emscon::TransformationAnswer{Status::Ok, transformation_});
+  if (as<emscon::GetStationOrientation>(request))
+    return tell(emscon::StationOrientationAnswer{Status::Ok, orientation_});
+  if (as<emscon::GetMeasurementMode>(request))
+    return tell(emscon::MeasurementModeAnswer{Status::Ok, {mode_}});
+  if (as<emscon::GetCoordinateSystemType>(request))
+    return tell(emscon::CoordinateSystemTypeAnswer{Status::Ok, {coordinates_}});
+  if (as<emscon::GetStationaryModeParams>(request))
+    return tell(emscon::StationaryModeParamsAnswer{Status::Ok, stationary_});
+  if (as<emscon::GetContinuousTimeModeParams>(request))
+    return tell(emscon::ContinuousTimeModeParamsAnswer{Status::Ok, continuous_});
+  if (as<emscon::GetSearchParams>(request)) return tell(emscon::SearchParamsAnswer{Status::Ok, search_});
+  if (as<emscon::GetStatisticMode>(request))
+    return tell(emscon::StatisticModeAnswer{Status::Ok, statistics_});
+  return false;
 }
 
 bool TrackerDevice::answer_query(const emscon::Request& request, HostTime at) {
@@ -151,18 +223,26 @@ bool TrackerDevice::answer_query(const emscon::Request& request, HostTime at) {
     return send(emscon::Answer{emscon::ReflectorAnswer{emscon::Status::Ok, reflector_}}), true;
   }
   if (as<emscon::GetReflectors>(request)) {
-    emscon::ReflectorsAnswer a;
-    a.total = 1;
-    const std::u16string_view name = u"SMR 1.5 inch";
-    std::copy(name.begin(), name.end(), a.name.begin());
-    return send(emscon::Answer{a}), true;
+    for (const Reflector& known : kKnownReflectors) {
+      emscon::ReflectorsAnswer a;
+      a.total = static_cast<std::int32_t>(kKnownReflectors.size());
+      a.internal_id = known.id;
+      a.target_type = known.type;
+      std::copy(known.name.begin(), known.name.end(), a.name.begin());
+      send(emscon::Answer{a});
+    }
+    return true;
   }
   if (as<emscon::GetSystemSettings>(request)) {
     return send(emscon::Answer{emscon::SystemSettingsAnswer{emscon::Status::Ok, settings_}}), true;
   }
   if (const auto* r = as<emscon::GetLongSystemParameter>(request)) {
-    return send(emscon::Answer{emscon::LongSystemParameterAnswer{emscon::Status::Ok, r->parameter, 3}}), true;
+    const auto set = long_parameters_.find(r->parameter);
+    const std::int32_t value = set == long_parameters_.end() ? 3 : set->second;
+    return send(emscon::Answer{emscon::LongSystemParameterAnswer{emscon::Status::Ok, r->parameter, value}}),
+           true;
   }
+  if (answer_setting(request)) return true;
   if (as<emscon::GetMeasurementStatusInfo>(request)) {
     using Bit = emscon::MeasurementStatusBit;
     emscon::MeasurementStatusInfoAnswer a;

@@ -161,6 +161,7 @@ void TrackerDevice::step(HostTime at) {
 void TrackerDevice::return_beam() {
   if (!settings_.keep_last_position) stream_.reset();
   beam_back_.reset();
+  distance_set_ = true;
   send_event(emscon::Event::DistanceSet);
   send_event(emscon::Event::MeasurementReady);
 }
@@ -171,6 +172,8 @@ void TrackerDevice::finish_boot(HostTime at) {
   warm_at_ = at + options_.warm_up;
   warm_announced_ = options_.warm_up.count() == 0;
   initialised_ = false;
+  distance_set_ = true;
+  beam_back_.reset();
   grid_.reset();
   settings_ = {};
   units_ = {};
@@ -186,7 +189,10 @@ emscon::MultiPoint TrackerDevice::point_at(DeviceTime t) {
   const auto index = static_cast<std::uint64_t>((t - grid_->first) / grid_->separation);
   noise_next_ = std::max(noise_next_, noise_base_ + index + 1);
   const TrackerView view = observe(options_.model, machine_, at, noise_base_ + index);
-  const Eigen::Vector3d p = length_per_metre(units_.length) * view.p_tracker_m;
+  Eigen::Vector3d p = length_per_metre(units_.length) * view.p_tracker_m;
+  // Of a transformation the shift alone: enough to see that somebody left one switched on.
+  if (settings_.apply_transformation) p += Eigen::Vector3d::Map(transformation_.translation.data());
+  if (coordinates_ == emscon::CoordinateSystem::LeftHandedX) p.x() = -p.x();
   return {status_of(view.speed, at), emscon::TrackerClockReading::from(t), {p.x(), p.y(), p.z()}};
 }
 
@@ -214,7 +220,7 @@ void TrackerDevice::emit_burst(HostTime at) {
 
 void TrackerDevice::emit_points(std::span<const emscon::MultiPoint> points) {
   while (!points.empty()) {
-    const bool extended = continuous_statistics_ == emscon::StatisticMode::Extended;
+    const bool extended = statistics_.continuous == emscon::StatisticMode::Extended;
     const std::size_t most =
         extended ? std::min(kPointsPerPacket, emscon::kMaxExtendedMultiPoints) : kPointsPerPacket;
     const auto part = points.first(std::min(points.size(), most));
@@ -290,6 +296,9 @@ void TrackerDevice::inject(const Fault& fault, HostTime now) {
       return;
     case FaultKind::PrismError:
       prism_fault_ = {now, until};
+      return;
+    case FaultKind::ReflectorAway:
+      reflector_away_ = {now, until};
       return;
     case FaultKind::Stall:
       stall_until_ = until;

@@ -263,6 +263,12 @@ void UsbipServer::inject(const Fault& fault, HostTime now) {
     case FaultKind::LostScans:
       simulated_->lose_scans(static_cast<std::size_t>(std::max(1.0, fault.value)));
       break;
+    case FaultKind::FailRequest:
+      simulated_->fail_controls(static_cast<std::size_t>(std::max(1.0, fault.value)));
+      break;
+    case FaultKind::Disconnect:  // the card goes on
+      disconnect();
+      break;
     case FaultKind::ClockJump:
       simulated_->jump_clock(static_cast<std::int64_t>(fault.value));
       break;

@@ -186,6 +186,49 @@ TEST_F(EncoderBusTest, AllNodesAnswerOneSyncInOneDatagram) {
   EXPECT_EQ(frames[2].id, can::cob::tpdo(1, 3));
 }
 
+TEST_F(EncoderBusTest, HoldsFramesBackAsATunnelDoes) {
+  send(can::encode_sync());
+  receive();
+  bus_.inject({FaultKind::Bundled, 0.0, 10.0, 20e-3, 0}, now_);
+  for (int i = 0; i < 3; ++i) send(can::encode_sync());
+  EXPECT_FALSE(test::readable(peer_.get(), 0));
+  bus_.poll(now_ += 20ms);
+  EXPECT_EQ(receive().size(), 9u);
+}
+
+TEST_F(EncoderBusTest, OverflowIsAnErrorFrame) {
+  send(can::encode_sync());
+  receive();
+  bus_.inject({FaultKind::Overflow, 0.0, 0.0, 0.0, 0}, now_);
+  EXPECT_TRUE(
+      can::has(can::decode_error_frame(receive().at(0))->conditions, can::BusCondition::ReceiveOverflow));
+}
+
+TEST_F(EncoderBusTest, ProducesTheSyncItselfWhenTold) {
+  send(can::encode_sync());  // the bus knows whom to send to
+  receive();
+  bus_.produce_sync(4ms, now_ + 4ms);
+  EXPECT_EQ(bus_.next_due(), now_ + 4ms);
+  for (int i = 0; i < 2; ++i) {
+    bus_.poll(now_ += 4ms);
+    const auto frames = receive();
+    ASSERT_EQ(frames.size(), 4u);
+    EXPECT_TRUE(can::decode_sync(frames[0]));
+    EXPECT_EQ(frames[1].id, can::cob::tpdo(1, 1));
+  }
+}
+
+TEST(ConfiguredEncoderNode, AnswersASyncWithoutBeingConfigured) {
+  const VirtualMachine machine = test::standing_machine();
+  EncoderNode node({.node = 5, .noise_m = 0.0, .configured = true}, machine, kPowerOn);
+  node.advance(kPowerOn);
+  frames_of(node);
+  node.on_frame(can::encode_sync(), kPowerOn + 1ms);
+  const auto frames = frames_of(node);
+  ASSERT_EQ(frames.size(), 1u);
+  EXPECT_EQ(frames[0].id, can::cob::tpdo(1, 5));
+}
+
 TEST_F(EncoderBusTest, LateNodeIsLateAndTheOthersAreNot) {
   send(can::encode_sync());
   receive();

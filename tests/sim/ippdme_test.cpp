@@ -106,6 +106,46 @@ TEST(IppDmeDevice, IsMuteForAWhileAndForgetsItsSession) {
             std::string::npos);
 }
 
+TEST(IppDmeDevice, KeepsMovingWhenTheConnectionClosesAndRemembersWhatItHeard) {
+  IppDmeDevice machine{with_a_sphere(), kStart};
+  machine.connected(kStart);
+  (void)ask(machine, "00001 StartSession()");
+  (void)ask(machine, "00002 GoTo(X(200))");
+  machine.disconnected();
+  EXPECT_TRUE(machine.moving());
+  machine.connected(kStart);
+  EXPECT_EQ(ask(machine, "00001 StartSession()", kStart + 500ms, kStart + 500ms), "00001 &|");  // waits
+  EXPECT_NE(ask(machine, "E0002 AbortE()", kStart + 500ms, kStart + 2s).find("E0002 %"), std::string::npos);
+  EXPECT_NEAR(machine.reading_m(kStart + 2s)[0], 0.1, 1e-9);
+  EXPECT_EQ(machine.heard().back(), "AbortE()");
+  EXPECT_EQ(machine.heard().size(), 4u);
+}
+
+TEST(IppDmeDevice, AnEmergencyStopIsNotClearedWhileItIsPressed) {
+  IppDmeDevice machine{with_a_sphere(), kStart};
+  machine.connected(kStart);
+  (void)ask(machine, "00001 StartSession()");
+  (void)ask(machine, "00002 GoTo(X(200))");
+  machine.inject({.kind = FaultKind::EmergencyStop, .duration_s = 1.0}, kStart + 500ms);
+  EXPECT_NEAR(machine.reading_m(kStart + 2s)[0], 0.1, 1e-9);
+  EXPECT_NE(ask(machine, "00003 ClearAllErrors()", kStart + 600ms, kStart + 600ms).find("Error(3,0500"),
+            std::string::npos);
+  EXPECT_EQ(ask(machine, "00004 ClearAllErrors()", kStart + 2s, kStart + 2s), "00004 &|00004 %|");
+}
+
+TEST(IppDmeDevice, SendsOddTagsErrorsAndOtherCharacters) {
+  IppDmeDevice machine{with_a_sphere(), kStart};
+  machine.connected(kStart);
+  machine.inject({.kind = FaultKind::OddTag}, kStart);
+  machine.inject({.kind = FaultKind::ErrorReport, .value = 9}, kStart);
+  machine.inject({.kind = FaultKind::NotAscii}, kStart);
+  const auto said = machine.take_output();
+  const std::string_view text{reinterpret_cast<const char*>(said.data()), said.size()};
+  EXPECT_EQ(text.substr(0, 9), "98765 %\r\n");
+  EXPECT_NE(text.find("E0000 ! Error(9,0503,Machine,"), std::string::npos);
+  EXPECT_NE(text.find("f\xFCr"), std::string::npos);
+}
+
 TEST(IppDmeDevice, RefusesTheNextTouchWithTheErrorThatIsWanted) {
   IppDmeDevice machine{with_a_sphere(), kStart};
   machine.connected(kStart);

@@ -58,6 +58,26 @@ TEST_F(Program, HelpNamesItsCommandsAndExitCodes) {
   EXPECT_THAT(help.output, HasSubstr("Exit codes"));
 }
 
+/// A parser recurses, and so do the copies of what it made.
+TEST_F(Program, RefusesATomlFileThatNestsTooDeepOrIsTooLarge) {
+  std::string key = "a";
+  for (int i = 0; i < 40'000; ++i) key += ".a";
+  const std::string brackets = "x = " + std::string(40'000, '[');
+  const std::string machine = " --machine " + demo_ + "/machine.toml";
+  for (const auto& text : {key + " = 1\n", "\n\n" + brackets + "\n", "[" + key + "]\n"}) {
+    const std::string file = write("deep.toml", text);
+    for (const auto& arguments : {"run --machine " + file, "run --config " + file + machine}) {
+      const Outcome outcome = run(arguments);
+      EXPECT_EQ(outcome.code, 3) << outcome.output;
+      EXPECT_THAT(outcome.output, HasSubstr("nested deeper than 64"));
+      EXPECT_THAT(outcome.output, HasSubstr(text.front() == '\n' ? "deep.toml:3: " : "deep.toml:1: "));
+    }
+  }
+  const Outcome large = run("run --machine " + write("large.toml", std::string(2 << 20, '#')));
+  EXPECT_EQ(large.code, 3);
+  EXPECT_THAT(large.output, HasSubstr("at most 1048576 are read"));
+}
+
 TEST_F(Program, SaysWhenNoMachineOrNoPathWasGiven) {
   EXPECT_EQ(run("run").code, 2);
   const Outcome no_path = run("run --machine " + demo_ + "/machine.toml");

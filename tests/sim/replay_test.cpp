@@ -368,6 +368,42 @@ TEST_F(RecordedBusTest, IsSilentWhereTheNodeWas) {
   EXPECT_EQ(answered, (std::vector<bool>{true, false}));
 }
 
+// sync = "external": nothing was sent to the nodes, and nothing will be.
+TEST_F(RecordedBusTest, AnotherProducersSyncAndItsAnswersComeByThemselves) {
+  RecordedDevice device;
+  const auto came = [&device](HostTime time, const can::CanFrame& frame) {
+    device.blocks.push_back({.time = time, .to_device = false, .bytes = datagram(std::span(&frame, 1))});
+  };
+  for (int cycle = 0; cycle < 3; ++cycle) {
+    came(kThen + 4ms * cycle, can::encode_sync());
+    came(kThen + 4ms * cycle + 1ms, can::encode_position(0x181, can::PositionType::Signed32, 500 + cycle));
+  }
+  ReplayTimeline timeline;
+  RecordedBus bus = RecordedBus::open({}, device, timeline, true).value();
+  EXPECT_EQ(bus.syncs(), 3u);
+  const Socket peer = test::connected(SOCK_DGRAM, bus.port());
+  const can::CanFrame hello = can::encode_heartbeat(9, can::NodeState::Operational);
+  test::send_bytes(peer, datagram(std::span(&hello, 1)));  // whom to send to
+  test::readable(bus.fd());
+  std::vector<std::int64_t> positions;
+  std::size_t syncs = 0;
+  for (auto now = kNow; now < kNow + 20ms; now += 1ms) {
+    bus.poll(now);
+    while (test::readable(peer.get(), 0)) {
+      const auto bytes = test::receive_bytes(peer);
+      auto view = can::DatagramView::parse(bytes);
+      for (can::CanFrame f; view && view->next(f);) {
+        if (can::decode_sync(f)) ++syncs;
+        if (f.id == 0x181)
+          positions.push_back(*can::decode_position(f.payload(), can::PositionType::Signed32));
+      }
+    }
+  }
+  EXPECT_EQ(syncs, 3u);
+  EXPECT_EQ(positions, (std::vector<std::int64_t>{500, 501, 502}));
+  EXPECT_TRUE(bus.finished());
+}
+
 TEST_F(RecordedBusTest, WithoutATrackerTheFirstSyncStartsTheRecording) {
   ReplayTimeline timeline;
   RecordedBus alone = RecordedBus::open({}, recorded_encoders(), timeline, true).value();

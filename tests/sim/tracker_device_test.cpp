@@ -68,6 +68,32 @@ TEST(TrackerDevice, AnswersEveryCommandOfADriversWayToStreaming) {
   EXPECT_FALSE(script.device.streaming());
 }
 
+TEST(TrackerDevice, SearchesForAReflectorAndSaysWhenThereIsNone) {
+  const VirtualMachine machine = test::standing_machine();
+  TrackerScript script(machine);
+  EXPECT_EQ(script.ask(emscon::FindReflector{2500.0}), Status::TrackerNotInitialized);
+  ASSERT_EQ(script.ask(emscon::Initialize{}), Status::Ok);
+  EXPECT_EQ(script.ask(emscon::FindReflector{2500.0}), Status::Ok);
+  EXPECT_EQ(script.ask(emscon::FindReflector{0.0}), Status::WrongParameter1);
+  script.device.inject({FaultKind::ReflectorAway, 0.0, 60.0, 0.0, 0}, script.now);
+  EXPECT_EQ(script.ask(emscon::FindReflector{2500.0}), Status::NoDistanceSet);
+  EXPECT_EQ(script.ask(emscon::GoBirdBath{}), Status::NoDistanceSet);
+  EXPECT_EQ(script.ask(emscon::StartMeasurement{}), Status::NoDistanceSet);
+  script.run(60s);
+  EXPECT_THAT(script.events, Contains(emscon::Event::DistanceSet));
+  EXPECT_EQ(script.ask(emscon::GoBirdBath{}), Status::Ok);
+  EXPECT_EQ(script.device.beam_moves(), 2u);
+}
+
+TEST(TrackerDevice, RefusesAReflectorItDoesNotKnow) {
+  const VirtualMachine machine = test::standing_machine();
+  TrackerScript script(machine);
+  EXPECT_EQ(script.ask(emscon::SetReflector{4}), Status::Ok);
+  EXPECT_EQ(script.ask(emscon::SetReflector{7}), Status::WrongParameter1);
+  script.ask(emscon::GetReflector{});
+  EXPECT_EQ(std::get<emscon::ReflectorAnswer>(script.answers.back()).internal_id, 4);
+}
+
 TEST(TrackerDevice, MeasuresOnlyAfterInitialize) {
   const VirtualMachine machine = test::standing_machine();
   TrackerScript script(machine);

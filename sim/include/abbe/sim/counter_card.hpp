@@ -6,7 +6,8 @@
 ///
 /// Takes for granted what nobody has seen on hardware yet: a counter with latch-on-index gives, in a scan,
 /// its count at the latest index edge since it was set up, and 0 before; the FIFO's depth (`fifo_bytes`);
-/// that a FIFO that is full ends the scan with status bit 4.
+/// that a FIFO that is full ends the scan with status bit 4; that a counter stands at 0 until it is set up,
+/// and goes on whatever happens on the bus as long as the card has power.
 
 #include <array>
 #include <cstddef>
@@ -86,9 +87,12 @@ class CounterCard final : public ExportedCard {
 
   // Misbehaviour.
   void overrun() { overrun_ = true; }
+  /// The next scan lacks its first bytes: those that follow stand elsewhere until the scan starts anew.
+  void tear(std::size_t bytes) { torn_ = bytes; }
   void lose_scans(std::size_t count);          ///< the next ones are never seen
   void jump_clock(std::int64_t counts);        ///< all clock counters, at once
   void corrupt_register(std::uint16_t value);  ///< the self-test register reads this from now on
+  void fail_controls(std::size_t count) { failing_controls_ = count; }  ///< the next ones are stalled
 
   [[nodiscard]] const CounterCardOptions& options() const { return options_; }
   [[nodiscard]] std::uint64_t scans_made() const { return scans_made_; }
@@ -96,6 +100,7 @@ class CounterCard final : public ExportedCard {
  private:
   struct Counter {
     quad08::CounterSetup setup{.register_reading = true};
+    bool set_up = false;    ///< since the power came: else it stands at 0
     std::int64_t zero = 0;  ///< count of the signal when it was set up
     HostTime set_up_at{};
     std::optional<double> last_reading;  ///< of a scale, at the previous scan
@@ -127,6 +132,7 @@ class CounterCard final : public ExportedCard {
   std::uint16_t bank_ = 0;
   std::uint16_t mark_ = 0;
   std::optional<std::uint16_t> corrupted_mark_;
+  std::size_t failing_controls_ = 0;
   std::vector<std::uint16_t> scan_words_;
   quad08::ScanLayout layout_;
   std::uint64_t divisor_ = 0;
@@ -144,6 +150,7 @@ class CounterCard final : public ExportedCard {
   std::deque<HostTime> edges_;
   std::int64_t edges_forgotten_ = 0;
   std::deque<std::byte> fifo_;
+  std::size_t torn_ = 0;  ///< bytes the next scan lacks
 };
 
 }  // namespace abbe::sim

@@ -25,8 +25,13 @@ class EncoderBus {
                                                std::span<const EncoderNodeOptions> nodes,
                                                const VirtualMachine& machine, HostTime now);
 
+  /// A SYNC every `period` from `first` on, as the machine's own control sends it.
+  void produce_sync(std::chrono::nanoseconds period, HostTime first);
+
   void poll(HostTime now);
   [[nodiscard]] HostTime next_due() const;
+  /// Frames that came from the other side, whatever they were.
+  [[nodiscard]] std::uint64_t frames_received() const { return frames_received_; }
   [[nodiscard]] int fd() const { return port_->fd(); }
   [[nodiscard]] std::uint16_t port() const { return port_->port(); }
   [[nodiscard]] std::deque<EncoderNode>& nodes() { return nodes_; }
@@ -37,6 +42,7 @@ class EncoderBus {
   explicit EncoderBus(std::unique_ptr<CanPort> port) : port_(std::move(port)) {}
 
   void receive(HostTime now);
+  void send_sync(HostTime now);
   void collect();
   void send_due(HostTime now);
   void send_error_frame(can::BusCondition condition);
@@ -46,6 +52,12 @@ class EncoderBus {
   std::deque<EncoderNode> nodes_;    ///< a deque: the nodes stay where they were made
   std::vector<TimedFrame> waiting_;  ///< by due time
   std::optional<HostTime> bus_off_until_;
+  std::chrono::nanoseconds sync_period_{};
+  HostTime next_sync_ = HostTime::max();
+  std::uint64_t frames_received_ = 0;
+  HostTime bundle_until_ = HostTime::min();
+  HostTime next_bundle_{};
+  std::chrono::nanoseconds bundle_every_{};
   struct AllClear {
     HostTime due;
     std::uint8_t node;

@@ -25,6 +25,8 @@ struct EncoderNodeOptions {
   double noise_m = 5e-9;  ///< standard deviation of one reading before it is rounded to counts
   std::uint64_t seed = 1;
   std::chrono::nanoseconds boot_time = std::chrono::milliseconds{200};  ///< from reset to boot-up message
+  /// The machine's control has configured it: after its boot-up message it beats, and answers every SYNC.
+  bool configured = false;
 };
 
 struct TimedFrame {
@@ -61,6 +63,7 @@ class EncoderNode {
   void on_nmt(const can::NmtMessage& message, HostTime at);
   void on_sync(HostTime at);
   void boot(HostTime at, bool forget_objects);
+  void configure();
   void sample(HostTime at);
   void send(const can::CanFrame& frame, HostTime at);
   [[nodiscard]] std::chrono::nanoseconds heartbeat_period() const;

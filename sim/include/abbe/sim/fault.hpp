@@ -20,11 +20,14 @@ enum class FaultKind {
   Busy,            ///< commands are answered with ServerBusy
   Weather,         ///< the air becomes `value` K warmer at once, with its events
   TrackerGarbage,  ///< bytes that are no packet
+  ReflectorAway,   ///< bird bath and search find none
   // encoder
   Late,        ///< frames leave `value` s late
   Restart,     ///< the node boots anew
   Emergency,   ///< EMCY with code `value`; after `duration_s` the all-clear
   BusGarbage,  ///< datagrams that are no CAN frames
+  Bundled,     ///< frames are held back and leave together every `value` s, as a tunnel does
+  Overflow,    ///< error frame: the controller had no room for what it received
   BusOff,      ///< error frame bus-off, silence, then the error frame restarted
   // environment (and Mute, Late, Disconnect: port or terminal gone for `duration_s`)
   ModbusException,  ///< every request is answered with exception `value` (0: 6, busy)
@@ -38,8 +41,12 @@ enum class FaultKind {
   LostScans,    ///< the next `value` scans are never seen
   ClockJump,    ///< the counted clock jumps by `value` counts
   UsbGarbage,   ///< bytes that are no USB/IP
+  FailRequest,  ///< the next `value` control transfers fail (0: one)
   // measuring machine; it also is mute and disconnects
-  EmergencyStop,  ///< somebody pressed it
+  EmergencyStop,  ///< somebody pressed it; pulled out again after `duration_s`
+  ErrorReport,    ///< an error of severity `value` that is of no command
+  OddTag,         ///< an answer to a command that was not sent
+  NotAscii,       ///< a warning with letters that are not ASCII
   RefuseTouch,    ///< the next touch ends with error `value` (0: 1006, surface not found)
   RefuseWay,      ///< the next GoTo does (0: 2500, out of limits)
   LineGarbage,    ///< bytes that are no lines

@@ -5,7 +5,9 @@
 /// Not thread-safe. [I++ DME 1.4.3]
 ///
 /// Chosen here, because the specification leaves it open: a touch reports the centre of the tip, and its data
-/// line comes when the machine has retracted.
+/// line comes when the machine has retracted; a machine that moves when its connection closes goes on to
+/// where it was sent (`keeps_moving`), and commands of the next connection, StartSession too, wait until it
+/// stands: what a client must reckon with.
 
 #include <array>
 #include <cstddef>
@@ -35,6 +37,10 @@ struct IppDmeOptions {
   double probing_speed_m_s = 5e-3;
   std::chrono::nanoseconds home_time = std::chrono::seconds{2};
   bool speaks_move_reports = true;
+  bool keeps_moving = true;  ///< when the connection closes
+  bool answers_aborts = true;
+  bool aborts_outside_session = true;  ///< else AbortE is an error there
+  bool refuses_aborts = false;         ///< with error 0500, and moves on
 };
 
 class IppDmeDevice {
@@ -56,12 +62,17 @@ class IppDmeDevice {
 
   void inject(const Fault& fault, HostTime now);
 
-  /// The emergency stop is pressed: an unsolicited error, motion ends.
-  void press_emergency_stop();
+  /// The emergency stop is pressed: an unsolicited error, motion ends. Errors cannot be cleared before it is
+  /// pulled out again.
+  void press_emergency_stop(HostTime now, HostTime pulled_out_at);
   /// Somebody touches by hand.
   void touch_by_hand(const Eigen::Vector3d& reading_m);
 
   [[nodiscard]] bool in_session() const { return session_; }
+  [[nodiscard]] bool moving() const { return motion_.has_value(); }
+  /// What came in, without tags: "PtMeas(X(1),Y(2),Z(3))"; the last kMostHeard, of all connections.
+  static constexpr std::size_t kMostHeard = 4096;
+  [[nodiscard]] const std::deque<std::string>& heard() const { return heard_; }
   [[nodiscard]] std::uint64_t touches() const { return touches_; }
   /// Scale readings.
   [[nodiscard]] Eigen::Vector3d reading_m(HostTime now) const;
@@ -81,6 +92,7 @@ class IppDmeDevice {
     HostTime end;
     std::optional<Probing> probing;
     bool homing = false;
+    bool unheard = false;  ///< whoever asked is gone
   };
   struct MoveReport {
     ippdme::Tag tag;
@@ -101,6 +113,7 @@ class IppDmeDevice {
   void begin_touch(const Command& command, HostTime now);
   void end_motion();
   void abort(HostTime now);
+  void report_error(int severity);
 
   void say(std::string_view line);
   void acknowledge(ippdme::Tag tag) { say(ippdme::to_string(tag) + " &"); }
@@ -125,6 +138,8 @@ class IppDmeDevice {
   Eigen::Vector3d position_m_ = Eigen::Vector3d::Zero();
   std::uint64_t touches_ = 0;
   HostTime mute_until_ = HostTime::min();
+  HostTime emergency_until_ = HostTime::min();
+  std::deque<std::string> heard_;
   int refuse_touch_ = 0;  ///< the next one, with this error; 0: not
   int refuse_way_ = 0;    ///< likewise
   bool wants_close_ = false;

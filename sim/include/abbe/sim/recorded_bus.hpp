@@ -1,10 +1,11 @@
 #pragma once
 /// The encoders of a recording on their port again. The n-th SYNC from the start is answered with the
 /// frames that answered the n-th SYNC then, as late as then, SDO requests with the recorded responses to the
-/// same request or with silence where that was the answer, everything else (heartbeats, EMCY, error frames)
-/// comes with its original timing. Until the recording
-/// starts nodes are kept alive with heartbeats and the first positions. Without a tracker in the recording it
-/// starts with the first SYNC. Steppable, not thread-safe.
+/// same request or with silence where that was the answer, everything else (heartbeats, EMCY, error frames,
+/// the SYNC of another producer and the positions that answered it) comes with its original timing. Until the
+/// recording starts nodes are kept alive with heartbeats and the first positions. Without a tracker in the
+/// recording it starts with the first SYNC, or, where none was sent to the nodes, as soon as somebody
+/// listens. Steppable, not thread-safe.
 
 #include <map>
 #include <memory>
@@ -31,7 +32,7 @@ class RecordedBus {
   [[nodiscard]] int fd() const { return port_->fd(); }
   [[nodiscard]] std::uint16_t port() const { return port_->port(); }
   [[nodiscard]] bool finished() const { return timeline_.running() && next_spoken_ >= spoken_.size(); }
-  [[nodiscard]] std::size_t syncs() const { return cycles_.size(); }
+  [[nodiscard]] std::size_t syncs() const { return cycles_.size() + foreign_syncs_; }
 
  private:
   struct Answer {
@@ -61,6 +62,8 @@ class RecordedBus {
   void send_late(HostTime now);
   void on_sdo(const can::CanFrame& frame);
   void keep_alive(HostTime now);
+  /// Nothing but the SYNC of another producer was on the bus.
+  [[nodiscard]] bool external() const { return cycles_.empty() && foreign_syncs_ > 0; }
   [[nodiscard]] std::size_t cycle_at(HostTime recorded) const;
 
   std::unique_ptr<CanPort> port_;
@@ -68,6 +71,8 @@ class RecordedBus {
   bool leads_;
   std::set<can::NodeId> nodes_;
   std::vector<Cycle> cycles_;
+  std::size_t foreign_syncs_ = 0;
+  bool foreign_sync_ = false;  ///< while the recording is read: the latest SYNC was another producer's
   std::vector<Spoken> spoken_;
   std::vector<Spoken> late_;  ///< of cycles already asked for, by the time they leave
   std::map<SdoRequest, SdoResponses> sdo_;

@@ -32,6 +32,8 @@ struct SimulationSetup {
   std::uint16_t tracker_port = 0;
   std::optional<EncoderBusOptions> bus;
   std::vector<EncoderNodeOptions> nodes;
+  /// The machine's own control sends the SYNC and has configured the nodes; 0: neither.
+  std::chrono::nanoseconds sync_period{};
   /// The bus is turned by poll_bus() alone. A SYNC is then answered as the machine stands, not as it would
   /// after a start that the other thread is about to make: with a standstill nobody can tell.
   bool bus_apart = false;

@@ -5,11 +5,12 @@
 ///
 /// Chosen here, because no public source says: a broken beam is an error packet with status Unknown for
 /// StartMeasurement, then event NotReady; when the beam is back comes event Ready, and points go on by
-/// themselves if keepLastPosition is set.
+/// themselves if keepLastPosition is set. GoBirdBath and FindReflector that meet no reflector: NoDistanceSet.
 
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <map>
 #include <optional>
 #include <span>
 #include <vector>
@@ -31,6 +32,9 @@ struct TrackerOptions {
   std::chrono::nanoseconds warm_up{};  ///< from power-on until the laser is stable
   std::chrono::nanoseconds command_latency = std::chrono::milliseconds{10};
   std::chrono::nanoseconds initialize_time = std::chrono::seconds{2};
+  /// Initialize drops the beam; so long does somebody take to bring the reflector. 0: it lies in the bird
+  /// bath, where the beam goes.
+  std::chrono::nanoseconds fetch_beam{};
   double air_temperature_C = 20.0;
   double air_pressure_mbar = 1013.25;
   double air_humidity_percent = 50.0;
@@ -62,6 +66,9 @@ class TrackerDevice {
   [[nodiscard]] std::optional<HostTime> first_stream() const { return first_stream_; }
   [[nodiscard]] bool streaming() const { return stream_.has_value(); }
   [[nodiscard]] std::uint64_t points_sent() const { return points_sent_; }
+  [[nodiscard]] std::uint64_t initializations() const { return initializations_; }
+  /// GoBirdBath, FindReflector and GoPosition that were carried out.
+  [[nodiscard]] std::uint64_t beam_moves() const { return beam_moves_; }
 
  private:
   struct Command {
@@ -89,6 +96,9 @@ class TrackerDevice {
   [[nodiscard]] emscon::Status start_measurement(HostTime at);
   [[nodiscard]] emscon::Status set_mode(emscon::MeasurementMode mode);
   bool answer_query(const emscon::Request& request, HostTime at);
+  bool answer_setting(const emscon::Request& request);
+  void initialise(HostTime at);
+  [[nodiscard]] emscon::Status move_beam(HostTime at);
   [[nodiscard]] std::chrono::nanoseconds latency(const emscon::Request& request) const;
 
   // What happens by itself.
@@ -128,6 +138,9 @@ class TrackerDevice {
   bool warm_announced_ = true;
   std::optional<HostTime> booting_until_;
   bool initialised_ = false;
+  bool distance_set_ = true;
+  std::uint64_t initializations_ = 0;
+  std::uint64_t beam_moves_ = 0;
 
   std::optional<Command> pending_;
   emscon::Units units_;
@@ -136,7 +149,12 @@ class TrackerDevice {
   emscon::Refraction refraction_;
   emscon::SetContinuousTimeModeParams continuous_;
   emscon::SetStationaryModeParams stationary_;
-  emscon::StatisticMode continuous_statistics_ = emscon::StatisticMode::Standard;
+  emscon::SetStatisticMode statistics_;
+  emscon::SetTransformation transformation_;
+  emscon::SetStationOrientation orientation_;
+  emscon::SetSearchParams search_;
+  emscon::CoordinateSystem coordinates_ = emscon::CoordinateSystem::RightHanded;
+  std::map<emscon::LongParameter, std::int32_t> long_parameters_;
   emscon::MeasurementMode mode_ = emscon::MeasurementMode::Stationary;
   std::int32_t reflector_ = 0;
 
@@ -159,6 +177,7 @@ class TrackerDevice {
   Window beam_broken_;
   Window speed_fault_;
   Window prism_fault_;
+  Window reflector_away_;
   HostTime mute_until_ = HostTime::min();
   HostTime busy_until_ = HostTime::min();
   std::optional<HostTime> stall_until_;

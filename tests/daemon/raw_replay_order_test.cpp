@@ -40,6 +40,9 @@ class LiveEncoders {
     take(can::encode_position(can::cob::tpdo(1, node), can::PositionType::Signed32, count), t,
          RawBlock::Direction::FromDevice);
   }
+  void all_answer(std::int64_t count, HostTime t) {
+    for (const auto& axis : config_.encoder->nodes) answer(axis.node, count, t);
+  }
   /// The hub takes the bytes from now on at `bytes`, the samples made of them at `samples`.
   void turn(HostTime bytes, HostTime samples) {
     bytes_taken_ = bytes;
@@ -142,7 +145,7 @@ TEST(RawReplay, GivesSamplesInTheTurnsOfTheLiveRunNotInThoseOfTheirBytes) {
     const HostTime sync = start + 1ms * i;
     live.turn(sync + 250us, i % 3 == 0 ? sync + 500us : sync + 250us);
     live.sync(sync);
-    for (const can::NodeId node : std::array<can::NodeId, 3>{1, 2, 3}) live.answer(node, i, sync + 100us);
+    live.all_answer(i, sync + 100us);
   }
   ASSERT_GE(live.turns().size(), 19u);
   EXPECT_EQ(turns_from_bytes(live.recording(), live.config()), live.turns());
@@ -155,7 +158,7 @@ TEST(RawReplay, ASampleThatIsTakenBackComesInATurnOfItsOwn) {
     const HostTime sync = example_time(0) + 1ms * i;
     live.turn(sync + 250us, sync + 500us);
     live.sync(sync);
-    for (const can::NodeId node : std::array<can::NodeId, 3>{1, 2, 3}) live.answer(node, i, sync + 100us);
+    live.all_answer(i, sync + 100us);
     live.turn(sync + 500us, sync + 750us);
     if (i % 4 == 2) live.answer(1, i, sync + 400us);  // twice in one cycle: neither counts
   }
@@ -178,7 +181,7 @@ TEST(RawReplay, WhatTheLiveRunDidNotHaveComesWithItsBytes) {
     turns_of_bytes.push_back(sync + 250us);
     live.turn(turns_of_bytes.back(), turns_of_bytes.back());
     live.sync(sync);
-    for (const can::NodeId node : std::array<can::NodeId, 3>{1, 2, 3}) live.answer(node, i, sync + 100us);
+    live.all_answer(i, sync + 100us);
   }
   EXPECT_EQ(turns_from_bytes(live.recording(), live.config()), turns_of_bytes);
 }

@@ -171,11 +171,16 @@ TEST_F(RecorderTest, AnExistingRecordingIsNeverOverwritten) {
   EXPECT_NE(second.error().text.find("run.mcap: File exists"), std::string::npos) << second.error().text;
 }
 
-TEST_F(RecorderTest, AMissingFolderIsSaid) {
-  const auto recorder =
-      Recorder::open(example_options(folder_.path() / "nowhere"), example_info(), WallTime{});
-  ASSERT_FALSE(recorder);
-  EXPECT_NE(recorder.error().text.find("nowhere"), std::string::npos) << recorder.error().text;
+TEST_F(RecorderTest, AFolderThatCannotBeMadeIsSaidAndTriedAgain) {
+  const auto nowhere = folder_.path() / "nowhere";
+  write_file(nowhere, {'x'}, 1);
+  auto recorder = Recorder::open(example_options(nowhere), example_info(), WallTime{100s});
+  ASSERT_TRUE(recorder) << "acquisition does not wait for a disk";
+  EXPECT_EQ(recorder->status().state, State::Failed);
+  EXPECT_NE(recorder->status().fault.find("nowhere"), std::string::npos) << recorder->status().fault;
+  std::filesystem::remove(nowhere);
+  recorder->tick(WallTime{105s});
+  EXPECT_EQ(recorder->status().state, State::Recording);
 }
 
 TEST_F(RecorderTest, AChunkIsClosedAfterItsPeriod) {

@@ -9,6 +9,7 @@
 #include <filesystem>
 #include <fstream>
 #include <iterator>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -48,6 +49,23 @@ inline FileBytes bytes_of_file(const std::filesystem::path& file) {
 inline void write_file(const std::filesystem::path& file, const FileBytes& bytes, std::size_t size) {
   std::ofstream out(file, std::ios::binary | std::ios::trunc);
   out.write(bytes.data(), static_cast<std::streamsize>(size));
+}
+
+/// In the middle of chunk `number`, counted from 0.
+inline std::size_t place_in_chunk(const FileBytes& recording, std::size_t number) {
+  protocol::mcap::LinearScan scan{std::as_bytes(std::span{recording})};
+  while (const auto item = scan.next())
+    if (item->chunk && number-- == 0) return item->record.offset + item->record.content.size() / 2;
+  ADD_FAILURE() << "too few chunks";
+  return 0;
+}
+
+/// Flips one bit there.
+inline void damage_chunk(const std::filesystem::path& file, std::size_t number) {
+  auto bytes = bytes_of_file(file);
+  const auto at = place_in_chunk(bytes, number);
+  bytes[at] = static_cast<char>(bytes[at] ^ 1);
+  write_file(file, bytes, bytes.size());
 }
 
 // 2026-03-01 12:00:00 UTC at host time 1000 s.

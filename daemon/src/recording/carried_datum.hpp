@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "abbe/daemon/calibration_request.hpp"
+#include "abbe/daemon/counting_state.hpp"
 #include "abbe/daemon/datum.hpp"
 #include "abbe/daemon/recording_info.hpp"
 
@@ -21,7 +22,9 @@ struct TimedAttachment {
 /// the newest back.
 inline bool is_carried_on(const RecordingAttachment& attachment, const DatumState& state,
                           std::uint32_t& settled) {
-  if (attachment.name == kReferenceRequestName || attachment.name == kDatumStateName) return false;
+  if (attachment.name == kReferenceRequestName || attachment.name == kDatumStateName ||
+      attachment.name == kCountingStateName)
+    return false;
   if (attachment.name != kDatumName) return true;
   const auto datum = datum_from_attachment(attachment);
   if (!datum || datum->from >= state.at) return true;

@@ -6,6 +6,7 @@
 #include <map>
 
 #include "abbe/daemon/sha256.hpp"
+#include "recording/metadata_checksum.hpp"
 #include "recording/streams.hpp"
 
 namespace abbe::daemon::recording {
@@ -14,8 +15,9 @@ namespace {
 namespace mcap = protocol::mcap;
 using Entries = std::vector<std::pair<std::string, std::string>>;
 
-void append_metadata(std::string_view name, const Entries& entries, mcap::SummaryBuilder& summary,
+void append_metadata(std::string_view name, Entries entries, mcap::SummaryBuilder& summary,
                      mcap::Buffer& out) {
+  entries.emplace_back(kChecksum, metadata_sha256(name, {entries.begin(), entries.end()}));
   mcap::Buffer packed;
   for (const auto& [key, value] : entries) mcap::StringMap::pack(packed, key, value);
   const std::size_t offset = out.size();

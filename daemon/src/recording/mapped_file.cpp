@@ -20,7 +20,7 @@ tl::unexpected<Error> io_error(const char* verb, const std::filesystem::path& fi
 }  // namespace
 
 Result<MappedFile> MappedFile::open(const std::filesystem::path& file) {
-  const int fd = ::open(file.c_str(), O_RDONLY | O_CLOEXEC);
+  const int fd = ::open(file.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK | O_NOCTTY);  // waits for no pipe
   if (fd < 0) return io_error("open", file, errno);
   struct stat status {};
   if (::fstat(fd, &status) != 0 || !S_ISREG(status.st_mode)) {

@@ -27,7 +27,7 @@ Result<std::set<std::string>> named_by_models(const fs::path& folder) {
   for (const auto& entry : *entries) {
     const auto document = store->load(entry.id);
     if (!document) return tl::unexpected(document.error());
-    for (const auto& input : document->inputs) names.insert(input.name.substr(0, input.name.find(".mcap")));
+    for (const auto& input : document->inputs) names.insert(input.name.substr(0, input.name.find('.')));
   }
   return names;
 }
@@ -103,7 +103,7 @@ Result<std::vector<fs::path>> remove_old_recordings(const fs::path& directory, c
   if (!named) return fail(named.error().code, fmt::format("keep all recordings: {}", named.error().text));
   std::erase_if(old, [&named](const fs::path& file) {
     const std::string name = file.filename();
-    return named->contains(name.substr(0, name.find(".mcap")));
+    return named->contains(name.substr(0, name.find('.')));  // also NAME.damaged.mcap
   });
   std::error_code error;
   for (const fs::path& file : old)

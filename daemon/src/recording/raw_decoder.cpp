@@ -8,7 +8,7 @@
 
 namespace abbe::daemon {
 
-RawDecoder::RawDecoder(const Config& config) {
+RawDecoder::RawDecoder(const Config& config, const std::optional<drivers::CounterCardProgress>& left) {
   if (config.tracker) {
     tracker_name_ = config.tracker->name;
     tracker_ = std::make_unique<drivers::TrackerReceiver>(
@@ -25,8 +25,9 @@ RawDecoder::RawDecoder(const Config& config) {
   if (config.counter_card) {
     card_name_ = config.counter_card->name;
     thinning_ = drivers::ScanThinning{config.counter_card->sample_every};
-    card_ = std::make_unique<drivers::CounterCardReceiver>(
-        device_options(*config.counter_card, config.daemon.speed).receiver);
+    auto options = device_options(*config.counter_card, config.daemon.speed).receiver;
+    options.goes_on_from = left;
+    card_ = std::make_unique<drivers::CounterCardReceiver>(options);
   }
   if (config.reference) {
     reference_name_ = config.reference->card.name;

@@ -23,7 +23,9 @@ namespace abbe::daemon {
 
 class RawDecoder {
  public:
-  explicit RawDecoder(const Config& config);
+  /// `left`: as the live run was told (CounterCardReceiverOptions::goes_on_from).
+  explicit RawDecoder(const Config& config,
+                      const std::optional<drivers::CounterCardProgress>& left = std::nullopt);
 
   /// Appends to `batch` what the bytes complete; those of a device that `config` does not have give nothing.
   void take(const protocol::RawBlock& block, std::string_view device, Batch& batch);

@@ -2,13 +2,14 @@
 
 #include <fmt/format.h>
 
+#include <atomic>
 #include <chrono>
-#include <condition_variable>
-#include <mutex>
 #include <thread>
 #include <utility>
 #include <vector>
 
+#include "abbe/daemon/wake_up.hpp"
+#include "abbe/daemon/calibration_request.hpp"
 #include "recording/waiting_blocks.hpp"
 
 namespace abbe::daemon {
@@ -16,6 +17,10 @@ namespace {
 
 // How long a sample may wait in memory before it is encoded; a tenth of the shortest chunk.
 constexpr std::chrono::milliseconds kTurn{20};
+// How long the recorder waits when the hub is just adding to what waits.
+constexpr std::chrono::microseconds kHubAdds{50};
+// What waits is kept in parts: a vector that grows is copied, and the hub does that.
+constexpr std::size_t kMostInOnePart = 1 << 20;
 
 /// With the turn of the hub in which it came.
 template <class T>
@@ -60,6 +65,11 @@ struct Attachment {
   protocol::HostTime time{};
 };
 
+struct WantedDigest {
+  std::promise<RecordingDigest> promise;
+  std::uint64_t dropped = 0;  ///< messages that never came this far since a calibration was asked for
+};
+
 /// What waits for the recorder; of each topic in the order of the hub's turns, which its messages keep.
 struct Waiting {
   std::vector<OfTurn<protocol::TrackerPoint>> points;
@@ -70,17 +80,19 @@ struct Waiting {
   WaitingBlocks raw;
   std::vector<OfTurn<v1::CalibrationEvent>> events;
   std::vector<Attachment> attachments;
-  std::vector<std::promise<RecordingDigest>> digests;
+  std::vector<WantedDigest> digests;
   bool full = false;  ///< what comes until the recorder has taken this is dropped: one hole, not many
+  std::unique_ptr<Waiting> earlier;  ///< the parts before this one
+  std::size_t bytes_earlier = 0;
 
-  [[nodiscard]] std::size_t bytes() const noexcept {
+  [[nodiscard]] std::size_t bytes_here() const noexcept {
     return size_of(points) + size_of(axes) + size_of(environment) + size_of(touches) + size_of(touch_scans) +
            raw.bytes();
   }
+  [[nodiscard]] std::size_t bytes() const noexcept { return bytes_earlier + bytes_here(); }
   /// Keeps the room for an ordinary turn, gives that of a stalled disk back.
   void clear() {
-    constexpr std::size_t kOrdinary = 1 << 20;
-    if (bytes() > kOrdinary) {
+    if (bytes() > kMostInOnePart) {
       *this = {};
       return;
     }
@@ -135,53 +147,93 @@ void append(std::vector<OfTurn<EnvironmentOf>>& to, protocol::HostTime taken, co
 
 }  // namespace
 
+/// The hub and the recorder share one pointer: to the Waiting that is being filled, null while the hub adds to
+/// it. The hub always finds it there, because the recorder leaves an empty one for the one it takes; the
+/// recorder tries again when the hub is adding.
 struct RecorderThread::State {
   RecorderThreadOptions options;
   Recorder recorder;
-  mutable std::mutex mutex;
-  std::condition_variable stop_asked;
-  Waiting waiting;            // under mutex
-  RecorderStatus status;      // under mutex, a copy of the recorder's own
-  Dropped unsaid;             // under mutex
-  std::uint64_t dropped = 0;  // under mutex
-  bool stopping = false;      // under mutex
+  std::atomic<Waiting*> waiting{new Waiting};
+  std::atomic<RecorderStatus*> news{nullptr};  // put here by the recorder, taken by status()
+  RecorderStatus known;                        // the thread's that asks for status()
+  Dropped unsaid;                              // the hub's
+  std::uint64_t dropped_before_run = 0;        // the hub's
+  std::string defect;                          // the recorder's: not yet handed to the recorder
+  std::atomic<std::uint64_t> dropped{0};
+  std::atomic<bool> stopping{false};
+  WakeUp wake_up;
   std::thread thread;
 
   State(RecorderThreadOptions o, Recorder r) : options(std::move(o)), recorder(std::move(r)) {}
+  State(const State&) = delete;
+  State& operator=(const State&) = delete;
+  ~State() {
+    delete waiting.load(std::memory_order_relaxed);
+    delete news.load(std::memory_order_relaxed);
+  }
 
-  void serve() {
-    Waiting turn;
-    for (bool last = false; !last;) {
-      {
-        std::unique_lock lock{mutex};
-        stop_asked.wait_for(lock, kTurn, [this] { return stopping || !waiting.digests.empty(); });
-        last = stopping;
-        std::swap(turn, waiting);
+  /// While the hub adds: the recorder finds nothing to take.
+  struct Adding {
+    explicit Adding(State& s) : state(s), to(s.waiting.exchange(nullptr, std::memory_order_acquire)) {}
+    Adding(const Adding&) = delete;
+    Adding& operator=(const Adding&) = delete;
+    // release: pairs with the acquire in take_waiting()
+    ~Adding() { state.waiting.store(to, std::memory_order_release); }
+    Waiting* operator->() const noexcept { return to; }
+
+    State& state;
+    Waiting* to;  // acquired: pairs with the release in take_waiting()
+  };
+
+  [[nodiscard]] std::unique_ptr<Waiting> take_waiting(std::unique_ptr<Waiting> empty) {
+    for (;;) {
+      Waiting* full = waiting.load(std::memory_order_relaxed);
+      if (full != nullptr && waiting.compare_exchange_strong(full, empty.get(), std::memory_order_acq_rel)) {
+        (void)empty.release();
+        return std::unique_ptr<Waiting>{full};
       }
-      const std::string defect = write_all(turn);
-      turn.clear();  // whoever waits for a digest that was not made learns of it
-      const std::lock_guard lock{mutex};
-      status = recorder.status();
-      if (defect.empty()) continue;
-      status.state = RecorderStatus::State::Failed;
-      status.fault = defect;
+      std::this_thread::sleep_for(kHubAdds);
     }
   }
 
-  /// What went wrong, if something did that only a defect or a lack of memory explains.
-  std::string write_all(Waiting& turn) {
+  void serve() {
+    auto turn = std::make_unique<Waiting>();
+    for (bool last = false; !last;) {
+      (void)wake_up.wait_for(kTurn);
+      last = stopping.load(std::memory_order_acquire);  // pairs with the release in ~RecorderThread()
+      turn = take_waiting(std::move(turn));
+      write_all(*turn);
+      turn->clear();  // whoever waits for a digest that was not made learns of it
+      report();
+    }
+  }
+
+  void report() {
+    auto status = std::make_unique<RecorderStatus>(recorder.status());
+    // release: pairs with the acquire in status(); the one nobody has asked for is replaced
+    delete news.exchange(status.release(), std::memory_order_acq_rel);
+  }
+
+  /// Only a defect or a lack of memory throws: the recorder begins a new file then, as after a disk fault.
+  void write_all(Waiting& turn) {
     try {
+      if (!defect.empty()) recorder.fail(std::exchange(defect, {}));
       write(turn);
-      return {};
-    } catch (const std::exception& defect) {
-      return fmt::format("recorder: {}", defect.what());
+      return;
+    } catch (const std::exception& e) {
+      defect = std::string{"recorder: "} + e.what();
+    }
+    try {
+      recorder.fail(defect);
+      defect.clear();
+    } catch (const std::exception&) {  // NOLINT(bugprone-empty-catch): tried again in the next turn
     }
   }
 
   void drop(const Batch& batch) {
     const auto lose = [this](std::uint32_t& unsaid_of, std::size_t messages) {
       unsaid_of += static_cast<std::uint32_t>(messages);
-      dropped += messages;
+      dropped.fetch_add(messages, std::memory_order_relaxed);  // a count orders nothing
     };
     lose(unsaid.points, batch.points.size());
     lose(unsaid.axes, batch.axes.size());
@@ -199,6 +251,18 @@ struct RecorderThread::State {
   }
 
   void write(Waiting& turn) {
+    std::vector<std::unique_ptr<Waiting>> earlier;  // the latest first
+    for (auto part = std::move(turn.earlier); part != nullptr;) {
+      auto before = std::move(part->earlier);
+      earlier.push_back(std::move(part));
+      part = std::move(before);
+    }
+    for (; !earlier.empty(); earlier.pop_back()) write_part(*earlier.back());
+    write_part(turn);
+    recorder.tick(Recorder::WallTime::clock::now());
+  }
+
+  void write_part(Waiting& turn) {
     for (auto& a : turn.attachments) recorder.attach(std::move(a.what), a.time);
     // First: a further file begins with the environment of before, which must not come after that of now.
     for (const auto& [taken, e] : turn.environment) recorder.record(e.sample, e.device, taken);
@@ -210,8 +274,22 @@ struct RecorderThread::State {
         [this](const protocol::RawBytes& bytes, protocol::HostTime taken) { recorder.record(bytes, taken); });
     for (const auto& [taken, e] : turn.events) recorder.record(e, taken);
     if (!turn.digests.empty()) recorder.flush();
-    for (auto& d : turn.digests) d.set_value(recorder.digest());
-    recorder.tick(Recorder::WallTime::clock::now());
+    for (auto& wanted : turn.digests) {
+      RecordingDigest digest = recorder.digest();
+      if (digest.gap.empty() && wanted.dropped > 0)
+        digest.gap = fmt::format("{} messages of the run are missing", wanted.dropped);
+      wanted.promise.set_value(std::move(digest));
+    }
+  }
+
+  /// Begins a further part when this one is so large that to let it grow would take long.
+  static void make_room(Adding& waiting) {
+    if (waiting->bytes_here() < kMostInOnePart) return;
+    auto next = std::make_unique<Waiting>();
+    next->bytes_earlier = waiting->bytes();
+    next->full = waiting->full;
+    next->earlier.reset(waiting.to);
+    waiting.to = next.release();
   }
 };
 
@@ -220,7 +298,7 @@ Result<std::unique_ptr<RecorderThread>> RecorderThread::start(RecorderThreadOpti
   auto recorder = Recorder::open(options.recorder, std::move(info), Recorder::WallTime::clock::now());
   if (!recorder) return tl::unexpected(recorder.error());
   auto state = std::make_unique<State>(std::move(options), std::move(*recorder));
-  state->status = state->recorder.status();
+  state->known = state->recorder.status();
   return std::unique_ptr<RecorderThread>{new RecorderThread{std::move(state)}};
 }
 
@@ -229,11 +307,8 @@ RecorderThread::RecorderThread(std::unique_ptr<State> state) : state_(std::move(
 }
 
 RecorderThread::~RecorderThread() {
-  {
-    const std::lock_guard lock{state_->mutex};
-    state_->stopping = true;
-  }
-  state_->stop_asked.notify_one();
+  state_->stopping.store(true, std::memory_order_release);  // release: pairs with the acquire in serve()
+  state_->wake_up.signal();
   state_->thread.join();
   try {
     (void)state_->recorder.close();  // what could not be finished stays readable as .part
@@ -243,11 +318,12 @@ RecorderThread::~RecorderThread() {
 }
 
 void RecorderThread::hand_over(const Batch& batch) {
-  const std::lock_guard lock{state_->mutex};
-  Waiting& waiting = state_->waiting;
+  State::Adding adding{*state_};
   Dropped& unsaid = state_->unsaid;
-  waiting.full = waiting.full || waiting.bytes() + bytes_of(batch) > state_->options.most_waiting_bytes;
-  if (waiting.full) return state_->drop(batch);
+  adding->full = adding->full || adding->bytes() + bytes_of(batch) > state_->options.most_waiting_bytes;
+  if (adding->full) return state_->drop(batch);
+  State::make_room(adding);
+  Waiting& waiting = *adding.to;
   const auto& names = state_->options;
   const auto taken = batch.taken;
   append(waiting.points, taken, batch.points, unsaid.points);
@@ -269,34 +345,36 @@ void RecorderThread::hand_over(const Batch& batch) {
 }
 
 void RecorderThread::hand_over(v1::CalibrationEvent event, protocol::HostTime taken) {
-  const std::lock_guard lock{state_->mutex};
-  state_->waiting.events.push_back({taken, std::move(event)});
+  State::Adding waiting{*state_};
+  waiting->events.push_back({taken, std::move(event)});
 }
 
 void RecorderThread::attach(RecordingAttachment attachment, protocol::HostTime time) {
-  const std::lock_guard lock{state_->mutex};
-  state_->waiting.attachments.push_back({std::move(attachment), time});
+  if (is_calibration_request(attachment.name)) state_->dropped_before_run = dropped();
+  State::Adding waiting{*state_};
+  waiting->attachments.push_back({std::move(attachment), time});
 }
 
 std::future<RecordingDigest> RecorderThread::digest() {
   std::promise<RecordingDigest> promise;
   auto future = promise.get_future();
   {
-    const std::lock_guard lock{state_->mutex};
-    state_->waiting.digests.push_back(std::move(promise));
+    State::Adding waiting{*state_};
+    waiting->digests.push_back({std::move(promise), dropped() - state_->dropped_before_run});
   }
-  state_->stop_asked.notify_one();
+  state_->wake_up.signal();
   return future;
 }
 
-RecorderStatus RecorderThread::status() const {
-  const std::lock_guard lock{state_->mutex};
-  return state_->status;
+const RecorderStatus& RecorderThread::status() const {
+  // acquire: pairs with the release in report()
+  const std::unique_ptr<RecorderStatus> news{state_->news.exchange(nullptr, std::memory_order_acq_rel)};
+  if (news) state_->known = std::move(*news);
+  return state_->known;
 }
 
 std::uint64_t RecorderThread::dropped() const noexcept {
-  const std::lock_guard lock{state_->mutex};
-  return state_->dropped;
+  return state_->dropped.load(std::memory_order_relaxed);
 }
 
 }  // namespace abbe::daemon

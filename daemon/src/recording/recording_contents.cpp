@@ -20,9 +20,10 @@ std::map<std::string, std::string> owned(mcap::StringMap entries) {
 class Collector {
  public:
   Contents contents;
+  bool cut_is_damage = false;
 
-  void lost(std::uint64_t offset, std::uint64_t bytes, std::string what) {
-    contents.losses.push_back({offset, bytes, std::move(what)});
+  void lost(std::uint64_t offset, std::uint64_t bytes, std::string what, bool inside = true) {
+    contents.losses.push_back({offset, bytes, std::move(what), inside});
   }
   void add(const mcap::Channel& channel) { contents.topics.emplace(channel.id, channel.topic); }
 
@@ -43,7 +44,8 @@ class Collector {
   void add(const mcap::ScannedChunk& chunk, std::uint64_t bytes) {
     ++chunk_number_;
     const auto damaged = [&](std::string_view how) {
-      lost(chunk.offset, bytes, fmt::format("chunk {} at byte {}: {}", chunk_number_, chunk.offset, how));
+      lost(chunk.offset, bytes, fmt::format("chunk {} at byte {}: {}", chunk_number_, chunk.offset, how),
+           chunk.state != ChunkState::Cut || cut_is_damage);
     };
     switch (chunk.state) {
       case ChunkState::Whole:
@@ -86,14 +88,14 @@ void collect_by_summary(mcap::Bytes file, const mcap::Summary& summary, Collecto
   for (const auto& channel : summary.channels) collector.add(channel);
   for (const auto& index : summary.metadata) {
     const auto record = mcap::record_at(file, index.offset, mcap::Opcode::Metadata);
-    if (record)
+    if (record && record->end() - record->offset == index.length)
       collector.add_metadata(*record);
     else
       collector.lost(index.offset, index.length, fmt::format("metadata {} is damaged", index.name));
   }
   for (const auto& index : summary.attachments) {
     const auto record = mcap::record_at(file, index.offset, mcap::Opcode::Attachment);
-    if (record)
+    if (record && record->end() - record->offset == index.length)
       collector.add_attachment(*record);
     else
       collector.lost(index.offset, index.length, fmt::format("attachment {} is damaged", index.name));
@@ -113,7 +115,15 @@ void collect(const mcap::LinearScan::Item& item, Collector& collector) {
   if (const auto channel = mcap::decode<mcap::Channel>(item.record.content)) collector.add(*channel);
 }
 
+/// What a killed recorder or a power cut leaves behind the last whole record: a torn one, or zeros.
+bool is_torn(mcap::Bytes rest) {
+  return rest.front() != std::byte{0} ||
+         std::ranges::all_of(rest, [](std::byte b) { return b == std::byte{0}; });
+}
+
 void collect_by_scan(mcap::Bytes file, Collector& collector) {
+  // It was closed: what does not go on to its end is no torn end.
+  collector.cut_is_damage = mcap::ends_with_magic(file);
   mcap::LinearScan scan{file};
   bool cut_chunk = false;
   while (const auto item = scan.next()) {
@@ -124,9 +134,10 @@ void collect_by_scan(mcap::Bytes file, Collector& collector) {
   collector.contents.closed_cleanly = scan.complete();
   if (scan.complete()) {
     collector.lost(end, file.size() - end,
-                   fmt::format("the indexes at byte {} are damaged: walked instead", end));
+                   fmt::format("the indexes at byte {} are damaged: walked instead", end), false);
   } else if (end < file.size() && !cut_chunk) {
-    collector.lost(end, file.size() - end, fmt::format("cut off or damaged from byte {} on", end));
+    collector.lost(end, file.size() - end, fmt::format("cut off or damaged from byte {} on", end),
+                   collector.cut_is_damage || !is_torn(file.subspan(end)));
   }
 }
 

@@ -2,6 +2,7 @@
 
 #include <fcntl.h>
 #include <fmt/format.h>
+#include <sys/file.h>
 #include <sys/statvfs.h>
 #include <unistd.h>
 
@@ -9,6 +10,7 @@
 #include <cstdio>
 #include <cstring>
 #include <limits>
+#include <optional>
 #include <utility>
 
 namespace abbe::daemon::recording {
@@ -59,6 +61,8 @@ tl::expected<RecordingFile, IoFault> RecordingFile::create(const std::filesystem
   const int fd = ::open(part.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0640);
   if (fd < 0) return unexpected(io_fault("create", part, errno));
   RecordingFile file{fd, part};
+  // For whoever closes what a killed recorder left: this one is still being written.
+  (void)::flock(fd, LOCK_EX | LOCK_NB);
   if (const auto synced = sync_directory_of(part); !synced) {
     file.discard();
     return unexpected(synced.error());
@@ -71,6 +75,7 @@ RecordingFile::RecordingFile(int fd, std::filesystem::path path)
 
 RecordingFile::RecordingFile(RecordingFile&& other) noexcept
     : fd_(std::exchange(other.fd_, -1)),
+      damaged_(other.damaged_),
       path_(std::move(other.path_)),
       size_(other.size_),
       hash_(std::move(other.hash_)) {}
@@ -79,6 +84,7 @@ RecordingFile& RecordingFile::operator=(RecordingFile&& other) noexcept {
   if (this != &other) {
     close();
     fd_ = std::exchange(other.fd_, -1);
+    damaged_ = other.damaged_;
     path_ = std::move(other.path_);
     size_ = other.size_;
     hash_ = std::move(other.hash_);
@@ -115,19 +121,39 @@ tl::expected<void, IoFault> RecordingFile::append(std::span<const std::byte> pie
 }
 
 tl::expected<void, IoFault> RecordingFile::sync() {
-  if (::fdatasync(fd_) != 0) return unexpected(io_fault("fdatasync", path_, errno));
-  return {};
+  if (::fdatasync(fd_) == 0) return {};
+  const IoFault fault = io_fault("fdatasync", path_, errno);
+  mark_damaged();
+  return unexpected(fault);
 }
 
-tl::expected<void, IoFault> RecordingFile::finish(const std::filesystem::path& finished) {
+std::filesystem::path RecordingFile::finished_path() const {
+  auto finished = path_;
+  finished.replace_extension();  // .part
+  if (damaged_ && finished.stem().extension() != ".damaged") finished.replace_extension(".damaged.mcap");
+  return finished;
+}
+
+void RecordingFile::mark_damaged() {
+  damaged_ = true;
+  auto part = finished_path();
+  part += ".part";
+  if (rename_to_new(path_, part) == 0) path_ = std::move(part);
+}
+
+tl::expected<void, IoFault> RecordingFile::finish() {
+  if (!is_open()) return {};
   // Nothing may stand behind the last magic, should cutting back a torn piece have failed earlier.
   if (::ftruncate(fd_, static_cast<off_t>(size_)) != 0) return unexpected(io_fault("truncate", path_, errno));
-  if (::fsync(fd_) != 0) return unexpected(io_fault("fsync", path_, errno));
+  std::optional<IoFault> unproven;
+  if (::fsync(fd_) != 0 && !std::exchange(damaged_, true)) unproven = io_fault("fsync", path_, errno);
+  const auto finished = finished_path();
   if (const int error = rename_to_new(path_, finished); error != 0) {
     return unexpected(io_fault("rename", path_, error));
   }
   path_ = finished;
   close();
+  if (unproven) return unexpected(*unproven);
   return sync_directory_of(path_);
 }
 

@@ -9,6 +9,7 @@
 #include "abbe/daemon/sha256.hpp"
 #include "abbe/protocol/raw_bytes_cdr.hpp"
 #include "recording/mapped_file.hpp"
+#include "recording/metadata_checksum.hpp"
 #include "recording/recording_contents.hpp"
 #include "recording/sample_messages.hpp"
 #include "recording/streams.hpp"
@@ -45,6 +46,7 @@ std::optional<RecordingInfo> info_of(const Contents& contents) {
   const auto versions = contents.metadata.find(std::string(recording::kVersionsMetadata));
   if (versions != contents.metadata.end())
     info.versions.assign(versions->second.begin(), versions->second.end());
+  std::erase_if(info.versions, [](const auto& entry) { return entry.first == recording::kChecksum; });
   return info;
 }
 
@@ -106,6 +108,7 @@ struct RecordingReader::State {
   recording::MappedFile file;
   Contents contents;
   RecordingInfo info;
+  MetadataCheck configuration;
   bool says_turns;  ///< else log_time is when it was published
 };
 
@@ -132,7 +135,10 @@ Result<RecordingReader> RecordingReader::open(const std::filesystem::path& path)
                             path.string(), recording::kRecordingMetadata));
   }
   const bool turns = says_turns(contents);
-  return RecordingReader{std::make_unique<State>(State{std::move(*file), std::move(contents), *info, turns})};
+  const auto metadata = recording::judge_metadata(contents.metadata);
+  if (!metadata.damage.empty()) contents.losses.push_back({0, 0, metadata.damage});
+  return RecordingReader{std::make_unique<State>(
+      State{std::move(*file), std::move(contents), *info, metadata.configuration, turns})};
 }
 
 RecordingReader::RecordingReader(std::unique_ptr<State> state) : state_(std::move(state)) {}
@@ -154,6 +160,17 @@ bool RecordingReader::closed_cleanly() const noexcept {
 }
 std::span<const RecordingLoss> RecordingReader::losses() const noexcept {
   return state_->contents.losses;
+}
+MetadataCheck RecordingReader::configuration_check() const noexcept {
+  return state_->configuration;
+}
+std::string RecordingReader::damage() const {
+  const auto inside = [](const RecordingLoss& loss) { return loss.inside; };
+  const auto first = std::ranges::find_if(losses(), inside);
+  if (first == losses().end()) return {};
+  const auto more = std::ranges::count_if(losses(), inside) - 1;
+  return fmt::format("the recording is damaged: {}{}", first->what,
+                     more > 0 ? fmt::format(" (and {} more places)", more) : "");
 }
 std::uint64_t RecordingReader::message_count() const noexcept {
   return state_->contents.messages;

@@ -1,5 +1,7 @@
 #include "abbe/daemon/replay.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <chrono>
 #include <thread>
@@ -8,6 +10,7 @@
 #include "abbe/daemon/assembler.hpp"
 #include "abbe/daemon/calibration_request.hpp"
 #include "abbe/daemon/calibration_session.hpp"
+#include "abbe/daemon/counting_state.hpp"
 #include "abbe/daemon/datum.hpp"
 #include "abbe/daemon/device_options.hpp"
 #include "abbe/daemon/model_document.hpp"
@@ -27,8 +30,10 @@ constexpr auto kLongestAhead = std::chrono::seconds{10};
 /// The calibrations the recording asks for, one after the other.
 class Calibrations {
  public:
-  Calibrations(std::vector<CalibrationRequest> requests, const Config& config, const ReplayOptions& options)
-      : requests_(std::move(requests)),
+  Calibrations(const RecordingReader& recording, std::vector<CalibrationRequest> requests,
+               const Config& config, const ReplayOptions& options)
+      : recording_(recording),
+        requests_(std::move(requests)),
         config_(config),
         options_(options),
         session_(acquisition_options(config), evemu_acquisition_options(config)) {}
@@ -40,7 +45,10 @@ class Calibrations {
   }
   void take(const protocol::Snapshot& snapshot) {
     session_.take(snapshot);
-    if (auto run = session_.take_run()) options_.runs ? hand_over(std::move(*run)) : identify_again(*run);
+    auto acquired = session_.take_run();
+    if (!acquired) return;
+    CalibrationRun run = run_of(std::move(*acquired));
+    options_.runs ? hand_over(std::move(run)) : identify_again(run);
   }
 
   [[nodiscard]] std::vector<ReplayedCalibration> finish() {
@@ -70,6 +78,7 @@ class Calibrations {
     ReplayedCalibration c{.ended = session_.status(), .points_sha256 = inputs_of(run).back().sha256};
     c.outcome = identify(run, config_, options_.active);
     if (*c.outcome) {
+      std::visit([this](auto& candidate) { judge_recording(recording_, candidate.verdict); }, **c.outcome);
       const ModelDocument document = document_of(**c.outcome, config_, {}, {});
       c.model_hash = model_hash(document);
       c.model_id = model_id(document);
@@ -78,6 +87,7 @@ class Calibrations {
     identified_ = true;
   }
 
+  const RecordingReader& recording_;
   std::vector<CalibrationRequest> requests_;
   const Config& config_;
   const ReplayOptions& options_;
@@ -184,11 +194,22 @@ Result<Attached> attached_to(const RecordingReader& recording, const Config& con
   return Attached{std::move(*requests), std::move(*datum), std::move(*marks)};
 }
 
+/// How far an earlier run had left the counters, where this one was told; one that cannot be read is as good
+/// as none: the counters read the same but for whole rounds.
+std::optional<drivers::CounterCardProgress> left_progress(const RecordingReader& recording) {
+  for (const auto& attachment : recording.attachments()) {
+    if (attachment.name != kCountingStateName) continue;
+    if (const auto state = counting_state_from_text(attachment.content, attachment.name))
+      return state->counting.progress;
+  }
+  return std::nullopt;
+}
+
 /// Samples from raw bytes, in the turns in which the live run had them.
 class FromBytes {
  public:
   FromBytes(const RecordingReader& recording, const Config& config)
-      : decoder_(config), ahead_(recording.messages()), next_(ahead_.next()) {
+      : decoder_(config, left_progress(recording)), ahead_(recording.messages()), next_(ahead_.next()) {
     sink_.tracker_point = [this](const auto& p, std::string_view) { expect(points_, p); };
     sink_.axis_sample = [this](const auto& s, std::string_view) { expect(axes_, s); };
     sink_.probe_trigger = [this](const auto& t, std::string_view) { expect(touches_, t); };
@@ -238,7 +259,7 @@ class Replay {
         options_(options),
         datum_(std::move(attached.datum)),
         marks_(std::move(attached.marks)),
-        calibrations_(std::move(attached.requests), config, options),
+        calibrations_(recording, std::move(attached.requests), config, options),
         assembler_(assembler_options(config)),
         set_up_(recording) {
     if (options.source == ReplaySource::Samples) {
@@ -348,6 +369,26 @@ class Replay {
 };
 
 }  // namespace
+
+void judge_recording(const RecordingReader& recording, calib::Verdict& verdict) {
+  if (auto damage = recording.damage(); !damage.empty()) {
+    verdict.accepted = false;
+    verdict.reasons.push_back(std::move(damage));
+  }
+  if (recording.configuration_check() == MetadataCheck::Unchecked)
+    verdict.notes.emplace_back(
+        "the recorded configuration has no checksum: a damaged bit in it would not show");
+}
+
+Result<Config> recorded_config(const RecordingReader& recording, const std::string& file) {
+  if (recording.configuration_check() == MetadataCheck::Damaged)
+    return fail(
+        ErrorCode::BadInput,
+        fmt::format("{}: the recorded configuration is damaged (its checksum is wrong): give the file it was "
+                    "recorded with",
+                    file));
+  return parse_config(recording.info().configuration, file + " (recorded configuration)");
+}
 
 Result<ReplayReport> replay(const RecordingReader& recording, const Config& config,
                             const ReplayOptions& options) {

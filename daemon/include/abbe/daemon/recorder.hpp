@@ -11,7 +11,9 @@
 /// A full or failing disk never stops the caller: record() and tick() cannot fail. The file is cut back to
 /// its last whole chunk and closed if there is room for that, messages are counted as lost, status() says
 /// why, and when there is room again recording goes on in NAME-2.mcap, NAME-3.mcap ... There the first
-/// message of every stream and device says in lost_before how many are missing.
+/// message of every stream and device says in lost_before how many are missing. Where the disk reported an
+/// error (fdatasync, fsync), the file counts as damaged and is called NAME.damaged.mcap: Linux reports an
+/// error of write-back once, so a later success proves nothing. The last fault stays in status().last_fault.
 ///
 /// A file that has reached max_file_bytes is closed by the next tick(), flush() or attach(), and recording
 /// goes on in the next, too, but never while a calibration is running: its run lies in one file. Nothing is
@@ -60,6 +62,8 @@ struct RecorderStatus {
   };
   State state = State::Closed;
   std::string fault;           ///< empty while Recording: "write rec.mcap.part: No space left on device"
+  std::string last_fault;      ///< stays when recording goes on, and says in which file that was
+  std::uint32_t faults = 0;    ///< how often recording was interrupted
   std::filesystem::path file;  ///< the present (or last) file
   std::uint32_t files = 0;     ///< how many were begun
   std::uint64_t bytes = 0;     ///< written to the present file in whole chunks
@@ -75,6 +79,9 @@ struct RecordingDigest {
   std::string sha256;  ///< hex
   std::uint64_t bytes = 0;
   std::filesystem::path file;
+  /// What the recording lacks of the run asked for last: "12 messages of the run are missing". Empty:
+  /// nothing.
+  std::string gap;
 };
 
 class Recorder {
@@ -82,8 +89,8 @@ class Recorder {
   /// Wall time even with simulated devices: what a power cut costs does not run at simulated speed.
   using WallTime = std::chrono::steady_clock::time_point;
 
-  /// Creates the file. Error (Io): the directory cannot be written or a file of that name exists. A full disk
-  /// is not an error: recording begins when there is room.
+  /// Creates the file, and the directory if needed. Error (Io): a file of that name exists. A disk that is
+  /// full, read-only or failing is not an error: recording begins when it can be written.
   [[nodiscard]] static Result<Recorder> open(RecorderOptions options, RecordingInfo info, WallTime now);
   ~Recorder();  ///< closes cleanly if close() was not called
   Recorder(Recorder&&) noexcept;
@@ -109,6 +116,10 @@ class Recorder {
   /// Between two turns of the hub: ends the open chunk now, so that everything recorded so far is in the file
   /// and in digest().
   void flush();
+
+  /// Something went wrong that only a defect or a lack of memory explains: the open chunk is lost, the file
+  /// is closed, and recording goes on in the next one after retry_period.
+  void fail(const std::string& what);
 
   /// The hash of everything written to the present file until now.
   [[nodiscard]] RecordingDigest digest() const;

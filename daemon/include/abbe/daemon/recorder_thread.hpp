@@ -2,7 +2,8 @@
 /// The recorder on a thread of its own, so that a slow disk never holds up the hub. What the hub hands over
 /// waits in memory; when more than `most_waiting_bytes` would wait, further batches are dropped and counted
 /// until the recorder has taken what waits, and the next message of every stream says in lost_before how many
-/// it were. Functions may be called from any thread.
+/// it were. All functions are for one thread, the hub's: it hands over without a lock and never waits for the
+/// recorder. Only dropped() is for any thread.
 
 #include <cstdint>
 #include <future>
@@ -42,7 +43,8 @@ class RecorderThread {
   /// Everything handed over before this call is on its way to the disk when the future is ready. A broken
   /// promise if the recorder failed at it.
   [[nodiscard]] std::future<RecordingDigest> digest();
-  [[nodiscard]] RecorderStatus status() const;
+  /// As the recorder reported it last, at most two of its turns (40 ms) ago. Valid until the next call.
+  [[nodiscard]] const RecorderStatus& status() const;
   [[nodiscard]] std::uint64_t dropped() const noexcept;  ///< messages handed over for which there was no room
 
  private:

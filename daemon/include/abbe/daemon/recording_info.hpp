@@ -13,7 +13,8 @@
 namespace abbe::daemon {
 
 /// MCAP metadata records "abbe.recording" (machine, utc_offset_ns, speed, part, follows),
-/// "abbe.configuration" (text, sha256) and "abbe.versions".
+/// "abbe.configuration" (text, sha256) and "abbe.versions", each with entries_sha256 over all its other
+/// entries.
 struct RecordingInfo {
   std::string machine;
   protocol::UtcOffset utc_offset;  ///< dates in the file = host time + this

@@ -26,11 +26,21 @@
 
 namespace abbe::daemon {
 
+/// What a checksum says of the recorded configuration.
+enum class MetadataCheck : std::uint8_t {
+  Right,
+  Unchecked,  ///< recorded before configurations had a checksum
+  Damaged,
+};
+
 /// One damage: "cut off at byte 4711, inside a chunk: 12 of its messages could be read".
 struct RecordingLoss {
   std::uint64_t offset = 0;  ///< where in the file it begins
   std::uint64_t bytes = 0;   ///< how many bytes of the file are affected
   std::string what;
+  /// Something inside is missing or wrong. Not so where only the end is missing, as after a kill or a power
+  /// cut, or only an index: what stands there is whole.
+  bool inside = true;
 };
 
 /// One message as it lies in the file.
@@ -38,8 +48,8 @@ struct RecordedMessage {
   std::string_view topic;  ///< "abbe/v1/TrackerPoint"
   // Host times: the file's UTC dates less the recorded offset.
   protocol::HostTime taken;  ///< when the hub took it; the same for all messages of a turn
-  protocol::HostTime
-      published;  ///< the instant described; of what a former file handed on: when this one began
+  /// The instant described; of what a former file handed on: when this one began.
+  protocol::HostTime published;
   std::span<const std::byte> payload;  ///< CDR with its encapsulation header
 };
 
@@ -78,6 +88,10 @@ class RecordingReader {
   /// What is missing or was passed over; empty for a whole recording, also for one still open at a chunk's
   /// end.
   [[nodiscard]] std::span<const RecordingLoss> losses() const noexcept;
+  /// In one sentence what is damaged inside: "the recording is damaged: chunk 3 ... (and 2 more places)". A
+  /// model identified from it may be off by more than its uncertainty. Empty: nothing.
+  [[nodiscard]] std::string damage() const;
+  [[nodiscard]] MetadataCheck configuration_check() const noexcept;
 
   [[nodiscard]] std::uint64_t message_count() const noexcept;
   [[nodiscard]] std::uint64_t size_bytes() const noexcept;

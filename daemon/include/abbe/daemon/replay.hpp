@@ -60,8 +60,16 @@ struct ReplayReport {
   std::chrono::nanoseconds recorded{};  ///< from the first to the last message
 };
 
+/// The rule: a claim may never be surer than the data. What is damaged inside a recording is missing in what
+/// is identified from it, so the gate refuses such a model, by name; a recorded configuration without a
+/// checksum is a note.
+void judge_recording(const RecordingReader& recording, calib::Verdict& verdict);
+
+/// The recorded configuration. BadInput if its checksum is wrong, or what parse_config() says.
+[[nodiscard]] Result<Config> recorded_config(const RecordingReader& recording, const std::string& file);
+
 /// `config` is the one the recording was made with (RecordingInfo::configuration). BadInput for a recording
-/// whose calibration request cannot be read.
+/// whose calibration request cannot be read. The verdicts have gone through judge_recording().
 [[nodiscard]] Result<ReplayReport> replay(const RecordingReader& recording, const Config& config,
                                           const ReplayOptions& options);
 

@@ -1,9 +1,12 @@
 // How to apply abbe's correction, with Fast DDS and the types fastddsgen makes of abbe_v1.idl:
-//   fastdds_subscriber DOMAIN [PROFILES.xml]
-// prints for every Compensation whether it may be applied. Fast DDS calls the listener from one thread of its
-// own.
+//   fastdds_subscriber DOMAIN [PROFILES.xml [KEYS]]
+// prints for every Compensation of every machine whether it may be applied. KEYS is the folder of one
+// subscriber that `abbe dds keys` made, where abbed has keys, too. Fast DDS calls the listener from threads
+// of its own. To be copied with abbe/dds/publisher_pin.hpp.
 #include <unistd.h>
 
+#include <algorithm>
+#include <chrono>
 #include <cstdint>
 #include <cstdio>
 #include <cstdlib>
@@ -13,72 +16,202 @@
 #include <fastdds/dds/subscriber/DataReaderListener.hpp>
 #include <fastdds/dds/subscriber/SampleInfo.hpp>
 #include <fastdds/dds/subscriber/Subscriber.hpp>
+#include <map>
 #include <mutex>
+#include <optional>
+#include <set>
 #include <string>
 
+#include "abbe/dds/publisher_pin.hpp"
 #include "abbe_v1PubSubTypes.h"
 
 using namespace eprosima::fastdds::dds;
+using abbe::dds::ParticipantId;
+using abbe::dds::PublisherPin;
+using abbe::dds::text_of;
 using abbe::v1::Compensation;
 using abbe::v1::ModelState;
+using Writer = InstanceHandle_t;  // a DDS writer, by its GUID
 
 namespace {
 
-/// How long a vector has waited for us: the listener's lock, and whatever else kept this thread.
-std::int64_t waited_ns(const SampleInfo& info) {
-  eprosima::fastrtps::Time_t now;
-  eprosima::fastrtps::Time_t::now(now);
-  return now.to_ns() - info.reception_timestamp.to_ns();
-}
+using SteadyClock = std::chrono::steady_clock;
 
-/// The rule of abbe_v1.idl. `answered_for`: a writer of ModelState keeps its lease; `age_ns`: with our own
-/// waiting.
-const char* why_not(const Compensation& c, std::int64_t age_ns, const ModelState& state, bool answered_for) {
-  if (!answered_for) return "nobody answers for the model";
+/// ModelState is repeated every second, also if nothing changes.
+constexpr std::chrono::milliseconds kLongestSilence{1500};
+
+/// How much longer a vector was on its way than the quickest one of its publisher: in the network, in a
+/// socket while this process stood still, waiting for the lock. The two clocks need not agree; they may drift
+/// apart by 200 ppm.
+class Delay {
+ public:
+  std::int64_t of_ns(const Compensation& c) {
+    constexpr std::int64_t kSecond_ns = 1'000'000'000;
+    const std::int64_t now_ns = SteadyClock::now().time_since_epoch().count();
+    const std::int64_t offset_ns = now_ns - (c.host_time_ns() + c.age_ns());
+    // Another clock than the publisher's before, unless the first vector shows the same within 20 ms.
+    if (inherited_ && std::abs(offset_ns - least_ns_) > kSecond_ns / 50) first_ns_ = 0;
+    inherited_ = false;
+    if (first_ns_ == 0) first_ns_ = last_ns_ = now_ns, least_ns_ = offset_ns;
+    least_ns_ = std::min(offset_ns, least_ns_ + std::min(now_ns - last_ns_, kSecond_ns) / 5000);
+    last_ns_ = now_ns;
+    known_ = now_ns - first_ns_ > kSecond_ns / 5;
+    return offset_ns - least_ns_;
+  }
+  /// The quickest vector of the first 0.2 s is the measure: those before may all have waited.
+  [[nodiscard]] bool known() const { return known_; }
+  /// For the publisher that comes after this one: abbe-dds after a restart has the same clock.
+  [[nodiscard]] Delay for_next_publisher() const {
+    Delay next = *this;
+    next.inherited_ = next.first_ns_ != 0;
+    return next;
+  }
+
+ private:
+  bool known_ = false, inherited_ = false;
+  std::int64_t first_ns_ = 0, last_ns_ = 0, least_ns_ = 0;
+};
+
+/// What one participant says about one machine. It lives and dies for itself.
+struct Publisher {
+  ModelState state;
+  Writer state_from;  ///< unknown: no state counts
+  SteadyClock::time_point heard{};
+  Delay delay;
+};
+
+/// There may be several machines in a domain. Only what the pinned publisher says is used.
+struct Machine {
+  PublisherPin pin;
+  std::map<ParticipantId, Publisher> publishers;
+  std::optional<SteadyClock::time_point> rival_reported;
+};
+
+/// The rule of abbe_v1.idl. `alive`: the writer of the state keeps its lease. `age_ns`: with what the vector
+/// waited since it was published.
+const char* why_not(const Compensation& c, std::int64_t age_ns, const Publisher& publisher, bool alive) {
+  const ModelState& state = publisher.state;
+  if (!alive) return "the ModelState publisher is not alive";
   if (state.state() != abbe::v1::MODEL_ACTIVE || c.state() != abbe::v1::MODEL_ACTIVE)
     return "the model is not ACTIVE";
   if (c.model_id() != state.model_id()) return "the vector is of another model";
   if (!c.inside()) return "outside the volume the data covered";
   if (!c.tool_ok()) return "the model does not hold for this tool";
+  if (!publisher.delay.known()) return "how quick the way can be is not known yet";
   if (age_ns > c.validity_ns()) return "too old";
   return nullptr;
 }
 
 class Listener : public DataReaderListener {
+  /// Called for every change of one writer. What a lost writer said counts no longer, also when it comes
+  /// back: it repeats its state within a second.
   void on_liveliness_changed(DataReader*, const LivelinessChangedStatus& status) override {
     const std::lock_guard lock(mutex_);
-    answered_for_ = status.alive_count > 0;
-    std::printf("answered_for %d\n", answered_for_ ? 1 : 0);
+    const Writer writer = status.last_publication_handle;
+    if (status.alive_count_change > 0) alive_.insert(writer);
+    if (status.alive_count_change >= 0) return;
+    alive_.erase(writer);
+    for (auto& [name, machine] : machines_) {
+      for (auto& [id, publisher] : machine.publishers) {
+        if (publisher.state_from != writer) continue;
+        publisher.state_from = Writer();
+        if (machine.pin.pinned() == id) std::printf("%s: not alive\n", name.c_str());
+      }
+    }
   }
 
   void on_data_available(DataReader* reader) override {
     const std::lock_guard lock(mutex_);
     const bool is_state = reader->get_topicdescription()->get_name() == "abbe/v1/ModelState";
     SampleInfo info;
+    ModelState state;
+    Compensation vector;
     const auto ok = ReturnCode_t::RETCODE_OK;
-    Compensation c;
-    while (is_state && reader->take_next_sample(&state_, &info) == ok) {
-      if (info.valid_data)
-        std::printf("state %u %s\n", static_cast<unsigned>(state_.state()), state_.reason().c_str());
+    while (is_state && reader->take_next_sample(&state, &info) == ok) {
+      if (info.valid_data) keep(state, info.publication_handle);
     }
-    while (!is_state && reader->take_next_sample(&c, &info) == ok) {
-      if (info.valid_data) decide(c, c.age_ns() + waited_ns(info));
+    while (!is_state && reader->take_next_sample(&vector, &info) == ok) {
+      if (info.valid_data) decide(vector, info.publication_handle);
     }
   }
 
-  void decide(const Compensation& c, std::int64_t age_ns) {
-    if (const char* reason = why_not(c, age_ns, state_, answered_for_)) {
-      std::printf("do not apply: %s\n", reason);
+  struct Source {
+    Publisher& publisher;
+    bool pinned;  ///< else what it says is kept and not used
+  };
+  Source heard(const std::string& name, const Writer& writer) {
+    using Verdict = PublisherPin::Verdict;
+    ParticipantId id{};
+    for (std::size_t i = 0; i < id.size(); ++i) id[i] = writer.value[i];
+    Machine& machine = machines_[name];
+    const auto former = machine.pin.pinned();
+    const Verdict verdict = machine.pin.heard(id, SteadyClock::now());
+    const auto [found, is_new] = machine.publishers.try_emplace(id);
+    if (is_new && former) found->second.delay = machine.publishers[*former].delay.for_next_publisher();
+    if (verdict == Verdict::NewlyPinned)
+      std::printf("%s: publisher is %s\n", name.c_str(), text_of(id).c_str());
+    if (verdict == Verdict::Rival) report_rival(name, machine, id);
+    std::erase_if(machine.publishers, [&](const auto& p) { return !machine.pin.remembers(p.first); });
+    return {found->second, machine.pin.pinned() == id};
+  }
+
+  /// Its address is for instance in the output of `abbe watch`.
+  static void report_rival(const std::string& name, Machine& machine, const ParticipantId& id) {
+    constexpr std::chrono::seconds kReportPeriod{10};
+    const auto now = SteadyClock::now();
+    if (machine.rival_reported && now - *machine.rival_reported < kReportPeriod) return;
+    machine.rival_reported = now;
+    std::printf("%s: rival publisher %s is ignored\n", name.c_str(), text_of(id).c_str());
+  }
+
+  /// Also of a publisher that is not pinned: it may be the next one.
+  void keep(const ModelState& state, const Writer& writer) {
+    const auto [publisher, pinned] = heard(state.machine(), writer);
+    publisher.state = state;
+    publisher.state_from = writer;
+    publisher.heard = SteadyClock::now();
+    alive_.insert(writer);  // Fast DDS may report two changes at once in the wrong order
+    if (!pinned) return;
+    std::printf("%s: state %u %s\n", state.machine().c_str(), static_cast<unsigned>(state.state()),
+                state.reason().c_str());
+  }
+
+  void decide(const Compensation& c, const Writer& writer) {
+    const auto [publisher, pinned] = heard(c.machine(), writer);
+    const std::int64_t age_ns = c.age_ns() + publisher.delay.of_ns(c);
+    if (!pinned) return;
+    const bool alive =
+        alive_.contains(publisher.state_from) && SteadyClock::now() - publisher.heard < kLongestSilence;
+    if (const char* reason = why_not(c, age_ns, publisher, alive)) {
+      std::printf("%s: do not apply: %s\n", c.machine().c_str(), reason);
     } else {
-      std::printf("apply V = %.3f %.3f %.3f um\n", c.vector_m()[0] * 1e6, c.vector_m()[1] * 1e6,
-                  c.vector_m()[2] * 1e6);
+      const double age_ms = static_cast<double>(age_ns) * 1e-6;
+      std::printf("%s: apply V = %.3f %.3f %.3f um, %.3f ms old\n", c.machine().c_str(),
+                  c.vector_m()[0] * 1e6, c.vector_m()[1] * 1e6, c.vector_m()[2] * 1e6, age_ms);
     }
   }
 
   std::mutex mutex_;
-  ModelState state_;
-  bool answered_for_ = false;
+  std::map<std::string, Machine> machines_;
+  std::set<Writer> alive_;  ///< of ModelState
 };
+
+/// DDS Security: who has no keys of the same authority can neither publish to us nor read.
+void use_keys(const std::string& folder, DomainParticipantQos& qos) {
+  const std::string auth = "dds.sec.auth.builtin.PKI-DH.";
+  const std::string access = "dds.sec.access.builtin.Access-Permissions.";
+  const std::string file = "file://" + folder + "/";
+  auto& properties = qos.properties().properties();
+  properties.emplace_back("dds.sec.auth.plugin", "builtin.PKI-DH");
+  properties.emplace_back(auth + "identity_ca", file + "identity_ca.crt");
+  properties.emplace_back(auth + "identity_certificate", file + "identity.crt");
+  properties.emplace_back(auth + "private_key", file + "identity.key");
+  properties.emplace_back("dds.sec.access.plugin", "builtin.Access-Permissions");
+  properties.emplace_back(access + "permissions_ca", file + "permissions_ca.crt");
+  properties.emplace_back(access + "governance", file + "governance.p7s");
+  properties.emplace_back(access + "permissions", file + "permissions.p7s");
+  properties.emplace_back("dds.sec.crypto.plugin", "builtin.AES-GCM-GMAC");
+}
 
 /// Without these two calls Fast DDS announces a TypeObject, which Cyclone DDS does not take and older Fast
 /// DDS may not survive.
@@ -106,6 +239,7 @@ int main(int argc, char** argv) {
        factory->get_participant_qos_from_profile("abbe", participant_qos) != ReturnCode_t::RETCODE_OK)) {
     return 3;
   }
+  if (argc > 3) use_keys(argv[3], participant_qos);
   auto* participant =
       factory->create_participant(argc > 1 ? static_cast<unsigned>(std::atoi(argv[1])) : 0, participant_qos);
   if (participant == nullptr) return 4;

@@ -4,12 +4,14 @@
 #include <unistd.h>
 
 #include <CLI/CLI.hpp>
+#include <chrono>
 #include <cstdio>
 #include <exception>
 #include <string>
 
 #include "abbe/daemon/config.hpp"
 #include "abbe/daemon/dds_bridge.hpp"
+#include "abbe/dds/announcer.hpp"
 #include "abbe/dds/participant.hpp"
 #include "abbe/dds/writers.hpp"
 
@@ -79,6 +81,7 @@ abbe::daemon::Result<void> take_from_config(Options& options) {
   options.socket = config->dds.socket;
   options.participant.domain = config->dds.domain;
   options.participant.profiles = config->dds.profile;
+  options.participant.security = config->dds.security;
   return {};
 }
 
@@ -91,9 +94,11 @@ int run(const Options& options) {
 
   DdsBridge bridge(*writers);
   DdsFeed feed(options.socket, bridge);
+  abbe::dds::Announcer announcer(*participant, *writers);
   bool alive = false;
   while (stop_requested == 0 && !parent_is_gone(options)) {
     feed.turn();
+    announcer.turn(std::chrono::steady_clock::now());
     say_when_it_changes(bridge, alive);
   }
   bridge.lost();
@@ -109,6 +114,7 @@ int main(int argc, char** argv) {
       "lost."};
   app.footer(kExitCodes);
   Options options;
+  options.participant.role = abbe::daemon::DdsRole::Daemon;
   auto* const socket =
       app.add_option("--socket", options.socket, "Unix socket of abbed; waits for it if it is not there");
   auto* const domain =
@@ -116,11 +122,16 @@ int main(int argc, char** argv) {
   auto* const profile = app.add_option(
       "--profile", options.participant.profiles,
       "XML file with a participant profile \"abbe\" (default: built in, UDP on every interface)");
-  app.add_option("-c,--config", options.config,
-                 "socket, domain and profile from this abbed.toml, which says supervise = \"systemd\"")
+  auto* const security =
+      app.add_option("--security", options.participant.security,
+                     "keys from `abbe dds keys` (default: DDS Security is off, unless the profile has it)");
+  app.add_option(
+         "-c,--config", options.config,
+         "socket, domain, profile and security from this abbed.toml, which says supervise = \"systemd\"")
       ->excludes(socket)
       ->excludes(domain)
-      ->excludes(profile);
+      ->excludes(profile)
+      ->excludes(security);
   app.add_option("--parent", options.parent,
                  "leave when this process is no longer the parent (given by abbed)");
   try {

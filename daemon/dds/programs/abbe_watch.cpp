@@ -11,12 +11,15 @@
 #include <map>
 #include <optional>
 #include <string>
+#include <utility>
 
 #include "abbe/daemon/cdr.hpp"
 #include "abbe/daemon/input_files.hpp"
 #include "abbe/dds/grid_nodes.hpp"
 #include "abbe/dds/json_lines.hpp"
 #include "abbe/dds/participant.hpp"
+#include "abbe/dds/participant_addresses.hpp"
+#include "abbe/dds/publisher_pin.hpp"
 #include "abbe/dds/readers.hpp"
 #include "abbe/dds/received_model.hpp"
 
@@ -35,6 +38,9 @@ constexpr const char* kExitCodes =
     "Exit codes: 0 done, 1 no model that may be applied arrived in time (said why), 2 usage, 3 a file or "
     "profile cannot be\n"
     "used, 4 no participant or output file can be created, 70 an exception nobody expected.";
+
+/// ModelState is repeated every second, also if nothing changes.
+constexpr std::chrono::milliseconds kLongestSilence{1500};
 
 volatile sig_atomic_t stop_requested = 0;
 
@@ -69,60 +75,105 @@ std::string micrometres(const std::array<double, 3>& v_m) {
   return fmt::format("{:+.2f} {:+.2f} {:+.2f} um", v_m[0] * 1e6, v_m[1] * 1e6, v_m[2] * 1e6);
 }
 
-std::string millimetres(const std::vector<double>& position_m) {
+/// A missing axis has no position: the last one is not where it is.
+std::string millimetres(const std::vector<double>& position_m, unsigned missing_mask) {
   std::string text;
-  for (const double p : position_m) text += fmt::format("{:10.4f}", p * 1e3);
+  for (std::size_t axis = 0; axis < position_m.size(); ++axis) {
+    const bool missing = (missing_mask >> axis & 1u) != 0;
+    text += missing ? fmt::format("{:>10}", '-') : fmt::format("{:10.4f}", position_m[axis] * 1e3);
+  }
   return text + " mm";
 }
 
 /// What is known of every machine, and what of it is worth a line.
 class Watch {
  public:
-  explicit Watch(const Options& options) : options_(options) {}
+  Watch(const Options& options, const dds::Readers& readers, const dds::ParticipantAddresses& addresses)
+      : options_(options), readers_(readers), addresses_(addresses) {}
 
-  void take(Topic topic, std::span<const std::byte> payload, bool answered_for) {
-    const auto key = daemon::payload_key(topic, payload);
+  void take(const dds::Arrival& arrival) {
+    using Verdict = dds::PublisherPin::Verdict;
+    const auto key = daemon::payload_key(arrival.topic, arrival.payload);
     if (!key || (!options_.machine.empty() && key->machine != options_.machine)) return;
-    if (options_.json) print_json(topic, payload);
-    auto& model = machines_[std::string(key->machine)];
-    switch (topic) {
-      case Topic::ModelState:
-        return with<v1::ModelState>(payload, [&](auto& m) { show_state(model, m); });
-      case Topic::ErrorModel:
-        return with<v1::ErrorModel>(payload, [&](auto& m) { show_model(model, m); });
-      case Topic::ErrorGrid:
-        return with<v1::ErrorGrid>(payload, [&](auto& m) { model.slice(m); });
-      case Topic::Health:
-        return with<v1::Health>(payload, [&](auto& m) { show_health(m); });
-      case Topic::CalibrationEvent:
-        return with<v1::CalibrationEvent>(payload, [&](auto& m) { show_event(m); });
-      case Topic::Snapshot:
-        return with<v1::Snapshot>(payload, [&](auto& m) { live_position_ = millimetres(m.position()); });
-      case Topic::Compensation:
-        return with<v1::Compensation>(
-            payload, [&](auto& m) { show_vector(m, dds::decide(m, model.state(), answered_for)); });
+    const std::string name(key->machine);
+    auto& machine = machines_[name];
+    const auto from = dds::participant_of(arrival.writer);
+    const auto former = machine.pin.pinned();
+    const auto verdict = machine.pin.heard(from, WallClock::now());
+    auto& publisher = machine.publisher(from);
+    keep(arrival, publisher);
+    if (verdict == Verdict::Waiting) return;
+    if (verdict == Verdict::Rival) return report_rival(name, machine, from);
+    if (former && former != from) show_successor(name, from, *former);
+    show(arrival, name, machine, publisher);
+  }
+
+  /// Publishers that are no longer alive. What such a one said counts no longer, also when it comes back: it
+  /// repeats its state within a second.
+  void notice_losses() {
+    for (auto& [name, machine] : machines_) {
+      for (auto& [id, publisher] : machine.publishers)
+        if (!alive(publisher)) publisher.state_from.reset();
+      show_liveness(name, machine);
     }
   }
 
   /// A machine whose model may be applied, with everything the options need of it.
-  [[nodiscard]] const dds::ReceivedModel* applicable(bool answered_for) const {
-    for (const auto& [name, model] : machines_) {
-      if (!model.model() || !model.decide(answered_for).apply) continue;
+  [[nodiscard]] const dds::ReceivedModel* applicable() const {
+    for (const auto& [name, machine] : machines_) {
+      const Publisher& publisher = machine.pinned();
+      const auto& model = publisher.model;
+      if (!model.model() || !model.decide(alive(publisher)).apply) continue;
       if (model.model()->model_id() == model.state()->model_id()) return &model;
     }
     return nullptr;
   }
 
-  [[nodiscard]] std::string why_not(bool answered_for) const {
+  [[nodiscard]] std::string why_not() const {
     std::string text;
-    for (const auto& [name, model] : machines_) {
-      const auto decision = model.decide(answered_for);
+    for (const auto& [name, machine] : machines_) {
+      const auto decision = machine.pinned().model.decide(alive(machine.pinned()));
       text += name + ": " + (decision.apply ? std::string("no ErrorModel received") : decision.reason) + "; ";
     }
     return text.empty() ? "nothing received" : text;
   }
 
  private:
+  /// What one participant says about one machine. It lives and dies for itself.
+  struct Publisher {
+    dds::ReceivedModel model;
+    std::optional<dds::WriterId> state_from;  ///< writer of the ModelState that counts
+    WallClock::time_point heard{};            ///< from it
+    std::string position;
+    dds::Delay delay;
+    std::optional<std::chrono::nanoseconds> waited;  ///< of the last vector
+  };
+
+  /// Several may be in a domain. Only what the pinned publisher says is used.
+  struct Machine {
+    dds::PublisherPin pin;
+    std::map<dds::ParticipantId, Publisher> publishers;
+    bool shown_alive = false;
+    std::string shown_state, shown_model;
+    WallClock::time_point last_live{};
+    std::optional<WallClock::time_point> rival_reported;
+
+    /// Something was heard of the machine.
+    [[nodiscard]] const Publisher& pinned() const { return publishers.at(*pin.pinned()); }
+
+    Publisher& publisher(const dds::ParticipantId& id) {
+      const auto [found, is_new] = publishers.try_emplace(id);
+      if (is_new && pin.pinned() != id) found->second.delay = pinned().delay.for_next_publisher();
+      if (is_new) std::erase_if(publishers, [&](const auto& p) { return !pin.remembers(p.first); });
+      return found->second;
+    }
+  };
+
+  [[nodiscard]] bool alive(const Publisher& publisher) const {
+    return publisher.state_from && WallClock::now() - publisher.heard < kLongestSilence &&
+           readers_.is_alive(*publisher.state_from);
+  }
+
   template <class T, class F>
   void with(std::span<const std::byte> payload, F&& use) {
     if (auto value = daemon::decode<T>(payload)) {
@@ -130,6 +181,47 @@ class Watch {
     } else {
       std::fprintf(stderr, "abbe-watch: %s\n", value.error().text.c_str());
     }
+  }
+
+  /// Also of a publisher that is not pinned: it may be the next one.
+  void keep(const dds::Arrival& arrival, Publisher& publisher) {
+    switch (arrival.topic) {
+      case Topic::ModelState:
+        return with<v1::ModelState>(arrival.payload, [&](auto& m) {
+          publisher.state_from = arrival.writer;
+          publisher.heard = WallClock::now();
+          publisher.model.state(m);
+        });
+      case Topic::ErrorModel:
+        return with<v1::ErrorModel>(arrival.payload, [&](auto& m) { publisher.model.model(m); });
+      case Topic::ErrorGrid:
+        return with<v1::ErrorGrid>(arrival.payload, [&](auto& m) { publisher.model.slice(m); });
+      case Topic::Snapshot:
+        return with<v1::Snapshot>(arrival.payload, [&](auto& m) {
+          publisher.position = millimetres(m.position(), m.missing_mask());
+        });
+      case Topic::Compensation:
+        return with<v1::Compensation>(
+            arrival.payload, [&](auto& m) { publisher.waited = publisher.delay.of(m, WallClock::now()); });
+      case Topic::Health:
+      case Topic::CalibrationEvent:
+        return;  // only shown
+    }
+  }
+
+  /// A sample of the pinned publisher, which is kept.
+  void show(const dds::Arrival& arrival, const std::string& name, Machine& machine,
+            const Publisher& publisher) {
+    const auto& payload = arrival.payload;
+    if (options_.json) print_json(arrival.topic, payload);
+    show_liveness(name, machine);
+    show_state(name, machine, publisher);
+    if (arrival.topic == Topic::ErrorModel) show_model(machine, publisher);
+    if (arrival.topic == Topic::Health) with<v1::Health>(payload, [&](auto& m) { show_health(m); });
+    if (arrival.topic == Topic::CalibrationEvent)
+      with<v1::CalibrationEvent>(payload, [&](auto& m) { show_event(m); });
+    if (arrival.topic == Topic::Compensation)
+      with<v1::Compensation>(payload, [&](auto& m) { show_vector(machine, publisher, m); });
   }
 
   void print_json(Topic topic, std::span<const std::byte> payload) {
@@ -143,57 +235,97 @@ class Watch {
     std::fflush(stdout);
   }
 
-  void show_state(dds::ReceivedModel& model, const v1::ModelState& s) {
-    const auto& old = model.state();
-    if (!old || old->state() != s.state() || old->reason() != s.reason() || old->model_id() != s.model_id()) {
-      print(fmt::format("{}  model {} is {}{}{}", s.machine(), s.model_id().empty() ? "-" : s.model_id(),
-                        dds::name_of(s.state()), s.reason().empty() ? "" : ": ", s.reason()));
+  void show_liveness(const std::string& name, Machine& machine) {
+    const bool now = alive(machine.pinned());
+    if (std::exchange(machine.shown_alive, now) == now) return;
+    if (options_.json) {
+      fmt::print("{{\"machine\":\"{}\",\"publisher_alive\":{}}}\n", name, now);
+      std::fflush(stdout);
     }
-    model.state(s);
+    print(fmt::format("{}  {}", name, now ? "publisher is alive" : "publisher is not alive: do not apply"));
   }
 
-  void show_model(dds::ReceivedModel& model, const v1::ErrorModel& m) {
-    if (!model.model() || model.model()->model_id() != m.model_id()) {
-      print(fmt::format("{}  received model {}: {} {}, gauge {}, {} parameters, chain {}", m.machine(),
-                        m.model_id(), m.method(), m.estimator(), m.gauge(), m.parameters().size(),
-                        m.chain()));
+  /// As its announcement has it, which is as true as the participant is honest.
+  [[nodiscard]] std::string described(const dds::ParticipantId& id) const {
+    const auto address = addresses_.of(id);
+    return dds::text_of(id) + (address.empty() ? "" : ", announced at " + address);
+  }
+
+  void show_successor(const std::string& name, const dds::ParticipantId& id,
+                      const dds::ParticipantId& former) {
+    if (options_.json) {
+      fmt::print("{{\"machine\":\"{}\",\"publisher\":\"{}\",\"former\":\"{}\"}}\n", name, dds::text_of(id),
+                 dds::text_of(former));
+      std::fflush(stdout);
     }
-    model.model(m);
+    print(fmt::format("{}  publisher is now {}: {} is silent", name, described(id), dds::text_of(former)));
+  }
+
+  void report_rival(const std::string& name, Machine& machine, const dds::ParticipantId& id) {
+    constexpr std::chrono::seconds kReportPeriod{10};
+    const auto now = WallClock::now();
+    if (machine.rival_reported && now - *machine.rival_reported < kReportPeriod) return;
+    machine.rival_reported = now;
+    if (options_.json) {
+      fmt::print("{{\"machine\":\"{}\",\"rival\":\"{}\",\"address\":\"{}\"}}\n", name, dds::text_of(id),
+                 addresses_.of(id));
+      std::fflush(stdout);
+    }
+    print(fmt::format("{}  rival publisher {}: ignored; stop it, or use keys (abbe dds keys)", name,
+                      described(id)));
+  }
+
+  void show_state(const std::string& name, Machine& machine, const Publisher& publisher) {
+    const auto& s = publisher.model.state();
+    if (!s) return;
+    const std::string line =
+        fmt::format("{}  model {} is {}{}{}", name, s->model_id().empty() ? "-" : s->model_id(),
+                    dds::name_of(s->state()), s->reason().empty() ? "" : ": ", s->reason());
+    if (std::exchange(machine.shown_state, line) != line) print(line);
+  }
+
+  void show_model(Machine& machine, const Publisher& publisher) {
+    const auto& m = publisher.model.model();
+    if (!m || std::exchange(machine.shown_model, m->model_id()) == m->model_id()) return;
+    print(fmt::format("{}  received model {}: {} {}, gauge {}, {} parameters, chain {}", m->machine(),
+                      m->model_id(), m->method(), m->estimator(), m->gauge(), m->parameters().size(),
+                      m->chain()));
   }
 
   void show_health(const v1::Health& h) {
     const std::string line = fmt::format("{}  {} {}{}{}", h.machine(), h.stream(), h.state(),
                                          h.fault().empty() ? "" : ": ", h.fault());
-    if (std::exchange(health_[h.stream()], line) != line) print(line);
+    if (std::exchange(health_[{h.machine(), h.stream()}], line) != line) print(line);
   }
 
   void show_event(const v1::CalibrationEvent& e) {
     const std::string line = fmt::format("{}  calibration {} {}{}{}", e.machine(), e.method(), e.state(),
                                          e.reason().empty() ? "" : ": ", e.reason());
-    if (std::exchange(calibration_, line) != line) print(line);
+    if (std::exchange(calibration_[e.machine()], line) != line) print(line);
   }
 
   /// The one line that is always true; on a terminal it stands still, elsewhere it comes once a second.
-  void show_vector(const v1::Compensation& c, const dds::Decision& decision) {
+  void show_vector(Machine& machine, const Publisher& publisher, const v1::Compensation& c) {
     const auto now = WallClock::now();
     if (options_.json ||
-        now - last_live_ < (on_terminal_ ? std::chrono::milliseconds{100} : std::chrono::seconds{1}))
+        now - machine.last_live < (on_terminal_ ? std::chrono::milliseconds{100} : std::chrono::seconds{1}))
       return;
-    last_live_ = now;
+    machine.last_live = now;
+    const auto decision = dds::decide(c, publisher.waited, publisher.model.state(), alive(publisher));
     const std::string line =
-        fmt::format("{}  {}  V {}  {}", c.machine(), live_position_, micrometres(c.vector_m()),
+        fmt::format("{}  {}  V {}  {}", c.machine(), publisher.position, micrometres(c.vector_m()),
                     decision.apply ? "apply" : "do not apply: " + decision.reason);
     std::printf(on_terminal_ ? "\r\033[K%s" : "%s\n", line.c_str());
     std::fflush(stdout);
   }
 
   const Options& options_;
+  const dds::Readers& readers_;
+  const dds::ParticipantAddresses& addresses_;
   const bool on_terminal_ = ::isatty(STDOUT_FILENO) != 0;
-  std::map<std::string, dds::ReceivedModel> machines_;
-  std::map<std::string, std::string> health_;
-  std::string calibration_;
-  std::string live_position_;
-  WallClock::time_point last_live_{};
+  std::map<std::string, Machine> machines_;
+  std::map<std::pair<std::string, std::string>, std::string> health_;  // by machine and stream
+  std::map<std::string, std::string> calibration_;                     // by machine
 };
 
 void print_comparison(const Options& options, const calib::FieldComparison& c, const std::string& model_id) {
@@ -233,32 +365,23 @@ Result<void> use_model(const Options& options, const dds::ReceivedModel& model,
   return {};
 }
 
-int watch(const Options& options, dds::Readers& readers,
+int watch(const Options& options, dds::Readers& readers, const dds::ParticipantAddresses& addresses,
           const std::optional<daemon::KnownErrorsFile>& known) {
-  Watch watch(options);
+  Watch watch(options, readers, addresses);
   const auto start = WallClock::now();
-  bool answered_for = false;
   while (stop_requested == 0 &&
          std::chrono::duration<double>(WallClock::now() - start).count() < options.timeout_s) {
     readers.wait(std::chrono::milliseconds{100});
-    if (const bool now = readers.state_is_answered_for(); now != answered_for) {
-      answered_for = now;
-      if (options.json)
-        std::printf("{\"state_is_answered_for\":%s}\n", now ? "true" : "false");
-      else
-        std::printf("%s\n", now ? "abbe is there" : "abbe is gone: do not apply");
-      std::fflush(stdout);
-    }
-    readers.take(
-        [&](Topic topic, std::span<const std::byte> payload) { watch.take(topic, payload, answered_for); });
+    readers.take([&](const dds::Arrival& arrival) { watch.take(arrival); });
+    watch.notice_losses();
     if (!options.ends_with_model()) continue;
-    if (const auto* model = watch.applicable(answered_for)) {
+    if (const auto* model = watch.applicable()) {
       const auto used = use_model(options, *model, known);
       return used ? kDone : exit_code_of(used.error());
     }
   }
   if (!options.ends_with_model()) return kDone;
-  std::fprintf(stderr, "abbe-watch: no model that may be applied: %s\n", watch.why_not(answered_for).c_str());
+  std::fprintf(stderr, "abbe-watch: no model that may be applied: %s\n", watch.why_not().c_str());
   return kNoAnswer;
 }
 
@@ -275,12 +398,15 @@ int run(const Options& options) {
   constexpr std::array kTopics{Topic::ModelState,      Topic::ErrorModel, Topic::ErrorGrid,
                                Topic::Snapshot,        Topic::Health,     Topic::Compensation,
                                Topic::CalibrationEvent};
+  if (!participant->is_secure())
+    std::fprintf(stderr, "abbe-watch: %s\n", daemon::dds_security_is_off(options.participant.domain).c_str());
+  const dds::ParticipantAddresses addresses(*participant);
   auto readers = dds::Readers::create(*participant, kTopics);
   if (!readers) return exit_code_of(readers.error());
   struct sigaction action {};
   action.sa_handler = [](int) { stop_requested = 1; };
   for (const int signal : {SIGTERM, SIGINT}) ::sigaction(signal, &action, nullptr);
-  return watch(options, *readers, known);
+  return watch(options, *readers, addresses, known);
 }
 
 }  // namespace
@@ -292,6 +418,8 @@ int main(int argc, char** argv) {
   app.add_option("--domain", options.participant.domain, "DDS domain, 0 to 232")->capture_default_str();
   app.add_option("--profile", options.participant.profiles,
                  "XML file with a participant profile \"abbe\" (default: built in, UDP on every interface)");
+  app.add_option("--security", options.participant.security,
+                 "keys from `abbe dds keys`, as the publisher's (default: DDS Security is off)");
   app.add_option("--machine", options.machine, "only this machine (default: all)");
   app.add_flag("--json", options.json, "one JSON object a line for every sample");
   app.add_flag("--until-model", options.until_model,

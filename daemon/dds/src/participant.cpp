@@ -6,12 +6,15 @@
 #include <fastdds/dds/log/StdoutErrConsumer.hpp>
 #include <fastdds/dds/topic/TypeSupport.hpp>
 
+#include <chrono>
 #include <cstdlib>
 #include <fstream>
 #include <string>
 
+#include "abbe/dds/message_filter.hpp"
 #include "abbe/dds/payload_type.hpp"
 #include "builtin_profile.hpp"
+#include "interfaces.hpp"
 
 namespace abbe::dds {
 namespace {
@@ -46,7 +49,31 @@ Result<fast::DomainParticipantQos> read_profile(const std::filesystem::path& fil
   return qos;
 }
 
+bool has_security(const fast::DomainParticipantQos& qos) {
+  return eprosima::fastrtps::rtps::PropertyPolicyHelper::find_property(qos.properties(),
+                                                                       "dds.sec.access.plugin") != nullptr;
+}
+
+Result<void> add_security(const ParticipantOptions& options, fast::DomainParticipantQos& qos) {
+  if (options.security.empty()) return {};
+  if (has_security(qos)) {
+    return fail(ErrorCode::BadInput, options.profiles.string() +
+                                         ": has dds.sec properties of its own, and security = " +
+                                         options.security.string() + " names keys, too: remove one");
+  }
+  const auto identity =
+      daemon::find_dds_identity(options.security, options.role, std::chrono::system_clock::now());
+  if (!identity) return tl::make_unexpected(identity.error());
+  for (const auto& [name, value] : daemon::dds_security_properties(*identity))
+    qos.properties().properties().emplace_back(name, value);
+  return {};
+}
+
 }  // namespace
+
+bool Participant::is_secure() const {
+  return has_security(participant_->get_qos());
+}
 
 void Participant::Deleter::operator()(fast::DomainParticipant* participant) const noexcept {
   participant->delete_contained_entities();
@@ -59,13 +86,18 @@ Result<Participant> Participant::create(const ParticipantOptions& options) {
     return fail(ErrorCode::Usage, "domain " + std::to_string(options.domain) + ": the highest is " +
                                       std::to_string(kHighestDomain));
   }
-  const auto qos = read_profile(options.profiles);
+  auto qos = read_profile(options.profiles);
   if (!qos) return tl::make_unexpected(qos.error());
+  // Without one Fast DDS makes a participant that nobody ever hears.
+  if (auto up = interface_of_profile_is_up(*qos); !up) return tl::make_unexpected(up.error());
+  if (auto secured = add_security(options, *qos); !secured) return tl::make_unexpected(secured.error());
+  for (auto& transport : qos->transport().user_transports) transport = with_message_filter(transport);
   auto* participant =
       fast::DomainParticipantFactory::get_instance()->create_participant(options.domain, *qos);
   if (participant == nullptr) {
     return fail(ErrorCode::Io, "domain " + std::to_string(options.domain) +
-                                   ": no participant can be created (ports or interfaces of the profile)");
+                                   ": no participant can be created (ports or interfaces of the profile" +
+                                   (has_security(*qos) ? ", or its keys and permissions)" : ")"));
   }
   return Participant(participant);
 }

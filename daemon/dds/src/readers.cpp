@@ -1,13 +1,19 @@
 #include "abbe/dds/readers.hpp"
 
+#include <fastdds/dds/core/condition/GuardCondition.hpp>
 #include <fastdds/dds/core/condition/StatusCondition.hpp>
 #include <fastdds/dds/core/condition/WaitSet.hpp>
 #include <fastdds/dds/core/status/LivelinessChangedStatus.hpp>
 #include <fastdds/dds/domain/DomainParticipant.hpp>
 #include <fastdds/dds/subscriber/DataReader.hpp>
+#include <fastdds/dds/subscriber/DataReaderListener.hpp>
 #include <fastdds/dds/subscriber/SampleInfo.hpp>
 #include <fastdds/dds/subscriber/Subscriber.hpp>
 
+#include <algorithm>
+#include <map>
+#include <mutex>
+#include <set>
 #include <string>
 #include <utility>
 #include <vector>
@@ -19,9 +25,62 @@ namespace abbe::dds {
 namespace {
 
 namespace fast = eprosima::fastdds::dds;
+using Time = eprosima::fastrtps::rtps::Time_t;  // of the wall clock
 const auto kOk = eprosima::fastrtps::types::ReturnCode_t::RETCODE_OK;
 
+WriterId writer_id(const eprosima::fastrtps::rtps::InstanceHandle_t& publication) {
+  WriterId id{};
+  for (std::size_t i = 0; i < id.size(); ++i) id[i] = publication.value[i];
+  return id;
+}
+
+/// Which writers keep their lease. Fast DDS calls it for every change of one of them, from threads of its
+/// own; a status that is asked for later would name the last one only.
+class AliveWriters final : public fast::DataReaderListener {
+ public:
+  [[nodiscard]] bool contains(const WriterId& writer) const {
+    const std::lock_guard lock(mutex_);
+    return alive_.contains(writer);
+  }
+
+  fast::GuardCondition changed;  ///< the status condition would be reset by whoever asks for the status
+
+  /// Fast DDS may report two changes at once in the wrong order. What arrived before its writer was lost, and
+  /// lay in the reader until now, is no sign of life.
+  void heard(const WriterId& writer, const Time& arrived) {
+    const std::lock_guard lock(mutex_);
+    const auto lost = lost_at_.find(writer);
+    if (lost == lost_at_.end() || lost->second < arrived) alive_.insert(writer);
+  }
+
+ private:
+  void on_liveliness_changed(fast::DataReader* /*reader*/,
+                             const fast::LivelinessChangedStatus& status) override {
+    const std::lock_guard lock(mutex_);
+    const WriterId writer = writer_id(status.last_publication_handle);
+    if (status.alive_count_change > 0) {
+      alive_.insert(writer);
+      lost_at_.erase(writer);
+    }
+    if (status.alive_count_change < 0) {
+      alive_.erase(writer);
+      Time::now(lost_at_[writer]);
+    }
+    changed.set_trigger_value(true);
+  }
+
+  mutable std::mutex mutex_;
+  std::set<WriterId> alive_;
+  std::map<WriterId, Time> lost_at_;  ///< the last time
+};
+
 }  // namespace
+
+ParticipantId participant_of(const WriterId& writer) noexcept {
+  ParticipantId id{};
+  std::copy_n(writer.begin(), id.size(), id.begin());
+  return id;
+}
 
 struct Readers::State {
   struct Reader {
@@ -29,22 +88,25 @@ struct Readers::State {
     fast::DataReader* reader;
   };
   std::vector<Reader> readers;
-  fast::DataReader* model_state = nullptr;
+  AliveWriters alive;
   fast::WaitSet waiting;
   fast::ConditionSeq active;
   Payload payload;
 
+  State() { waiting.attach_condition(alive.changed); }
   ~State() {
-    for (const Reader& r : readers) waiting.detach_condition(r.reader->get_statuscondition());
+    for (const Reader& r : readers) {
+      r.reader->set_listener(nullptr);
+      waiting.detach_condition(r.reader->get_statuscondition());
+    }
+    waiting.detach_condition(alive.changed);
   }
 
   void add(daemon::Topic topic, fast::DataReader* reader) {
     auto& condition = reader->get_statuscondition();
-    condition.set_enabled_statuses(fast::StatusMask::data_available()
-                                   << fast::StatusMask::liveliness_changed());
+    condition.set_enabled_statuses(fast::StatusMask::data_available());
     waiting.attach_condition(condition);
     readers.push_back({topic, reader});
-    if (topic == daemon::Topic::ModelState) model_state = reader;
   }
 };
 
@@ -60,7 +122,9 @@ Result<Readers> Readers::create(Participant& participant, std::span<const daemon
   for (const daemon::Topic t : topics) {
     const auto topic = participant.topic(t);
     if (!topic) return tl::make_unexpected(topic.error());
-    auto* reader = subscriber->create_datareader(*topic, reader_qos(t));
+    const bool is_state = t == daemon::Topic::ModelState;
+    auto* reader = subscriber->create_datareader(*topic, reader_qos(t), is_state ? &state->alive : nullptr,
+                                                 fast::StatusMask::liveliness_changed());
     if (reader == nullptr) {
       return fail(ErrorCode::Io,
                   "reader of " + std::string(daemon::traits(t).name) + ": Fast DDS refuses it");
@@ -73,21 +137,23 @@ Result<Readers> Readers::create(Participant& participant, std::span<const daemon
 void Readers::wait(std::chrono::milliseconds at_most) {
   state_->waiting.wait(state_->active,
                        eprosima::fastrtps::Duration_t(static_cast<double>(at_most.count()) / 1e3));
+  state_->alive.changed.set_trigger_value(false);
 }
 
-void Readers::take(const OnPayload& on_payload) {
+void Readers::take(const OnArrival& on_arrival) {
   for (const State::Reader& r : state_->readers) {
     fast::SampleInfo info;
     while (r.reader->take_next_sample(&state_->payload, &info) == kOk) {
-      if (info.valid_data) on_payload(r.topic, state_->payload.bytes);
+      if (!info.valid_data) continue;
+      const WriterId writer = writer_id(info.publication_handle);
+      if (r.topic == daemon::Topic::ModelState) state_->alive.heard(writer, info.reception_timestamp);
+      on_arrival({r.topic, state_->payload.bytes, writer});
     }
   }
 }
 
-bool Readers::state_is_answered_for() const {
-  if (state_->model_state == nullptr) return false;
-  fast::LivelinessChangedStatus status;
-  return state_->model_state->get_liveliness_changed_status(status) == kOk && status.alive_count > 0;
+bool Readers::is_alive(const WriterId& writer) const {
+  return state_->alive.contains(writer);
 }
 
 }  // namespace abbe::dds

@@ -1,6 +1,8 @@
 #include "abbe/dds/received_model.hpp"
 
+#include <algorithm>
 #include <array>
+#include <cstdint>
 #include <utility>
 
 namespace abbe::dds {
@@ -10,9 +12,9 @@ Decision refuse(std::string reason) {
   return {false, std::move(reason)};
 }
 
-Decision decide_by_state(const std::optional<v1::ModelState>& state, bool answered_for) {
+Decision decide_by_state(const std::optional<v1::ModelState>& state, bool publisher_alive) {
   if (!state) return refuse("no ModelState received");
-  if (!answered_for) return refuse("nobody answers for ModelState");
+  if (!publisher_alive) return refuse("the ModelState publisher is not alive");
   if (state->state() != v1::MODEL_ACTIVE) {
     return refuse(std::string("ModelState is ") + name_of(state->state()) +
                   (state->reason().empty() ? "" : ": " + state->reason()));
@@ -53,22 +55,49 @@ std::optional<std::vector<v1::GridNode>> ReceivedModel::grid() const {
   return nodes;
 }
 
-Decision ReceivedModel::decide(bool answered_for) const {
-  Decision decision = decide_by_state(state_, answered_for);
+Decision ReceivedModel::decide(bool publisher_alive) const {
+  Decision decision = decide_by_state(state_, publisher_alive);
   if (decision.apply && !grid())
     return refuse("the grid of model " + state_->model_id() + " is not complete");
   return decision;
 }
 
-Decision decide(const v1::Compensation& c, const std::optional<v1::ModelState>& state, bool answered_for) {
-  Decision decision = decide_by_state(state, answered_for);
+Decision decide(const v1::Compensation& c, std::optional<std::chrono::nanoseconds> waited,
+                const std::optional<v1::ModelState>& state, bool publisher_alive) {
+  Decision decision = decide_by_state(state, publisher_alive);
   if (!decision.apply) return decision;
   if (c.state() != v1::MODEL_ACTIVE) return refuse(std::string("vector is ") + name_of(c.state()));
   if (c.model_id() != state->model_id()) return refuse("vector is of another model");
   if (!c.inside()) return refuse("outside the volume the data covered");
   if (!c.tool_ok()) return refuse("the model does not hold for this tool");
-  if (c.age_ns() > c.validity_ns()) return refuse("older than its validity");
+  if (!waited) return refuse("how quick the way can be is not known yet");
+  // A stranger may send any value: no sum of two of them.
+  if (c.age_ns() < 0 || c.validity_ns() < 0 || c.age_ns() > c.validity_ns() - waited->count()) return refuse("older than its validity");
   return decision;
+}
+
+std::optional<std::chrono::nanoseconds> Delay::of(const v1::Compensation& vector, Instant now) {
+  constexpr std::chrono::nanoseconds kLongestStep = std::chrono::seconds{1};
+  // What no sender of ours says, and what sums of would overflow.
+  constexpr std::int64_t kLongest_ns = std::int64_t{1} << 60;
+  for (const std::int64_t time : {vector.host_time_ns(), vector.age_ns()})
+    if (time < 0 || time > kLongest_ns) return std::nullopt;
+  const std::chrono::nanoseconds published{vector.host_time_ns() + vector.age_ns()};
+  const std::chrono::nanoseconds offset = now.time_since_epoch() - published;
+  const bool same_clock = least_ && std::chrono::abs(offset - *least_) <= kSameClock;
+  if (std::exchange(inherited_, false) && !same_clock) *this = {};
+  const auto drifted = least_ ? *least_ + std::min(now - last_, kLongestStep) / kDrift : offset;
+  least_ = std::min(offset, drifted);
+  last_ = now;
+  if (!first_) first_ = now;
+  if (now - *first_ <= kFirst) return std::nullopt;
+  return offset - *least_;
+}
+
+Delay Delay::for_next_publisher() const {
+  Delay next = *this;
+  next.inherited_ = true;
+  return next;
 }
 
 }  // namespace abbe::dds

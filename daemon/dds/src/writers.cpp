@@ -15,6 +15,19 @@ std::size_t index_of(daemon::Topic topic) {
   return static_cast<std::size_t>(topic);
 }
 
+/// Empty if the site's permissions do not allow it: then joining takes up to a second.
+std::vector<eprosima::fastdds::dds::DataWriter*> writer_nobody_reads(
+    Participant& participant, eprosima::fastdds::dds::Publisher& publisher) {
+  namespace fast = eprosima::fastdds::dds;
+  const std::string type(daemon::traits(daemon::Topic::CalibrationEvent).type_name);
+  auto* topic = participant.get().create_topic("abbe/v1/Announcement", type, fast::TOPIC_QOS_DEFAULT);
+  auto* writer = topic == nullptr
+                     ? nullptr
+                     : publisher.create_datawriter(topic, writer_qos(daemon::Topic::CalibrationEvent));
+  if (writer == nullptr) return {};
+  return {writer};
+}
+
 }  // namespace
 
 Result<Writers> Writers::create(Participant& participant) {
@@ -32,6 +45,10 @@ Result<Writers> Writers::create(Participant& participant) {
     }
     writers.writers_[index_of(traits.topic)] = writer;
   }
+  if (participant.is_secure())
+    writers.announced_ = writer_nobody_reads(participant, *publisher);
+  else
+    writers.announced_.assign(writers.writers_.begin(), writers.writers_.end());
   return writers;
 }
 
@@ -49,6 +66,12 @@ void Writers::dispose(daemon::Topic topic, std::span<const std::byte> payload) {
 
 void Writers::assert_liveliness() {
   writers_[index_of(daemon::Topic::ModelState)]->assert_liveliness();
+}
+
+void Writers::announce(std::size_t index) {
+  // Fast DDS announces whenever the quality of service is set, also to what it was.
+  const auto unchanged = announced_[index]->get_qos();
+  announced_[index]->set_qos(unchanged);
 }
 
 void Writers::wait_for_state_acknowledged(std::chrono::milliseconds at_most) {

@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 
 #include <fstream>
+#include <sstream>
 #include <thread>
 
 #include "abbe/daemon/dds_link.hpp"
@@ -39,6 +40,20 @@ TEST_F(AbbeDds, ProfileThatIsNoProfileEndsWithThree) {
 
 TEST_F(AbbeDds, DomainWithoutPortsEndsWithTwo) {
   EXPECT_EQ(exit_code({"--socket", socket, "--domain", "233"}), 2);
+}
+
+// Fast DDS would make a participant that nobody hears, also when the network has come.
+TEST_F(AbbeDds, WithoutAnInterfaceOfItsProfileItEndsWithFour) {
+  std::stringstream text;
+  text << std::ifstream(ABBE_LOOPBACK_PROFILE).rdbuf();
+  std::string profile = text.str();
+  const std::string named = "<interfaceWhiteList><address>127.0.0.1<";
+  ASSERT_NE(profile.find(named), std::string::npos);
+  profile.replace(profile.find(named), named.size(), "<interfaceWhiteList><address>203.0.113.1<");
+  std::ofstream(directory_ / "absent.xml") << profile;
+  EXPECT_EQ(exit_code({"--socket", socket, "--domain", domain_.text(), "--profile", directory_ / "absent.xml",
+                       "--parent", "1"}),
+            4);
 }
 
 TEST_F(AbbeDds, AsAServiceItRefusesAConfigurationThatMakesItAChild) {

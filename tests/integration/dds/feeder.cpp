@@ -1,7 +1,10 @@
 // Stands for abbed: publishes the sample messages over a DdsLink until it is killed, and supervises abbe-dds
-// as abbed does.   dds_feeder SOCKET [ABBE_DDS ARGUMENT...] Prints "child PID" whenever abbe-dds was started.
+// as abbed does.   dds_feeder SOCKET MACHINE [ABBE_DDS ARGUMENT...]
+// Prints "child PID" whenever abbe-dds was started. The first component of its vectors tells when they were
+// made: CLOCK_MONOTONIC modulo 1000 s, in units of 1e-6.
 #include <cstdio>
 #include <optional>
+#include <string>
 #include <thread>
 
 #include "abbe/daemon/dds_link.hpp"
@@ -17,7 +20,7 @@ using daemon::Topic;
 
 class Feeder {
  public:
-  explicit Feeder(DdsLink link) : link_(std::move(link)) {
+  Feeder(DdsLink link, std::string machine) : link_(std::move(link)), machine_(std::move(machine)) {
     send(Topic::ErrorModel, test::error_model());
     for (const auto& slice : test::grid_slices()) send(Topic::ErrorGrid, slice);
   }
@@ -29,25 +32,34 @@ class Feeder {
       send(Topic::ModelState, test::active_state(++sequence_));
       next_state_ = now + std::chrono::seconds{1};
     }
-    send(Topic::Snapshot, test::snapshot(++sequence_));
-    send(Topic::Compensation, test::compensation(++sequence_));
+    send(Topic::Snapshot, test::snapshot(++sequence_), now);
+    send(Topic::Compensation, vector(now), now);
   }
 
  private:
+  v1::Compensation vector(DdsLink::WallTime now) {
+    auto vector = test::compensation(++sequence_);  // 1 ms old
+    const std::int64_t made_ns = now.time_since_epoch().count() - vector.age_ns();
+    vector.host_time_ns(made_ns);
+    vector.vector_m()[0] = static_cast<double>(made_ns % 1'000'000'000'000) * 1e-9;
+    return vector;
+  }
   template <class T>
-  void send(Topic topic, const T& message) {
-    if (daemon::encode(message, payload_)) link_.publish(topic, payload_);
+  void send(Topic topic, T message, DdsLink::WallTime at = DdsLink::WallTime::clock::now()) {
+    message.machine(machine_);
+    if (daemon::encode(message, payload_)) link_.publish(topic, payload_, at);
   }
 
   DdsLink link_;
+  std::string machine_;
   std::vector<std::byte> payload_;
   std::uint64_t sequence_ = 0;
   DdsLink::WallTime next_state_{};
 };
 
 std::optional<DdsSupervisor> supervisor_for(int argc, char** argv) {
-  if (argc < 3) return std::nullopt;
-  auto started = DdsSupervisor::start({.program = argv[2], .arguments = {argv + 3, argv + argc}},
+  if (argc < 4) return std::nullopt;
+  auto started = DdsSupervisor::start({.program = argv[3], .arguments = {argv + 4, argv + argc}},
                                       std::chrono::steady_clock::now());
   if (!started) std::fprintf(stderr, "%s\n", started.error().text.c_str());
   if (!started) return std::nullopt;
@@ -57,13 +69,13 @@ std::optional<DdsSupervisor> supervisor_for(int argc, char** argv) {
 }  // namespace
 
 int main(int argc, char** argv) {
-  if (argc < 2) return 2;
+  if (argc < 3) return 2;
   auto link = DdsLink::listen(argv[1]);
   if (!link) {
     std::fprintf(stderr, "%s\n", link.error().text.c_str());
     return 4;
   }
-  Feeder feeder(std::move(*link));
+  Feeder feeder(std::move(*link), argv[2]);
   auto supervisor = supervisor_for(argc, argv);
   pid_t announced = 0;
   for (;;) {

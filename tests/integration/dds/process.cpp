@@ -8,12 +8,13 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <utility>
 
 extern char** environ;
 
 namespace abbe::test {
 
-Process::Process(std::vector<std::string> command) {
+Process::Process(std::vector<std::string> command, OnLine on_line) : on_line_(std::move(on_line)) {
   std::vector<char*> argv;
   for (std::string& word : command) argv.push_back(word.data());
   argv.push_back(nullptr);
@@ -86,7 +87,12 @@ void Process::read(int fd) {
     rest.append(chunk, static_cast<std::size_t>(n));
     const std::lock_guard lock(mutex_);
     for (std::size_t end = 0; (end = rest.find('\n')) != std::string::npos; rest.erase(0, end + 1)) {
-      lines_.push_back({rest.substr(0, end), now});
+      Line line{rest.substr(0, end), now};
+      if (on_line_) {
+        on_line_(line);
+      } else {
+        lines_.push_back(std::move(line));
+      }
     }
     changed_.notify_all();
   }

@@ -3,6 +3,7 @@
 /// at the end.
 
 #include <sys/types.h>
+
 #include <chrono>
 #include <condition_variable>
 #include <functional>
@@ -23,7 +24,9 @@ struct Line {
 
 class Process {
  public:
-  explicit Process(std::vector<std::string> command);
+  /// `on_line`: takes every line, from a thread of its own; then none is kept here.
+  using OnLine = std::function<void(const Line&)>;
+  explicit Process(std::vector<std::string> command, OnLine on_line = nullptr);
   ~Process();
   Process(const Process&) = delete;
   Process& operator=(const Process&) = delete;
@@ -44,6 +47,7 @@ class Process {
   void read(int fd);
 
   pid_t pid_ = 0;
+  OnLine on_line_;
   std::mutex mutex_;
   std::condition_variable changed_;
   std::vector<Line> lines_;

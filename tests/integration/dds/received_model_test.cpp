@@ -2,10 +2,15 @@
 
 #include <gtest/gtest.h>
 
+#include <cstdint>
+#include <limits>
+
 #include "sample_messages.hpp"
 
 namespace abbe::dds {
 namespace {
+
+using namespace std::chrono_literals;
 
 ReceivedModel complete() {
   ReceivedModel model;
@@ -15,12 +20,12 @@ ReceivedModel complete() {
   return model;
 }
 
-TEST(ReceivedModel, CompleteActiveAndAnsweredForIsApplied) {
+TEST(ReceivedModel, CompleteActiveAndAliveIsApplied) {
   EXPECT_TRUE(complete().decide(true).apply);
 }
 
-TEST(ReceivedModel, NobodyAnsweringIsARefusal) {
-  EXPECT_EQ(complete().decide(false).reason, "nobody answers for ModelState");
+TEST(ReceivedModel, PublisherNotAliveIsARefusal) {
+  EXPECT_EQ(complete().decide(false).reason, "the ModelState publisher is not alive");
 }
 
 TEST(ReceivedModel, AnyStateButActiveIsARefusal) {
@@ -80,20 +85,84 @@ TEST(ReceivedModel, GridOfAnotherModelThanTheStateIsARefusal) {
 }
 
 TEST(Decide, AppliesAGoodVector) {
-  EXPECT_TRUE(decide(test::compensation(1), test::active_state(1), true).apply);
+  EXPECT_TRUE(decide(test::compensation(1), 0ms, test::active_state(1), true).apply);
 }
 
 TEST(Decide, RefusesEachBreachOfTheRule) {
   const auto refused = [](auto&& spoil) {
     auto c = test::compensation(1);
     spoil(c);
-    return !decide(c, test::active_state(1), true).apply;
+    return !decide(c, 0ms, test::active_state(1), true).apply;
   };
   EXPECT_TRUE(refused([](auto& c) { c.inside(false); }));
   EXPECT_TRUE(refused([](auto& c) { c.tool_ok(false); }));
   EXPECT_TRUE(refused([](auto& c) { c.state(v1::MODEL_DRIFT); }));
   EXPECT_TRUE(refused([](auto& c) { c.age_ns(c.validity_ns() + 1); }));
   EXPECT_TRUE(refused([](auto& c) { c.model_id("another"); }));
+}
+
+TEST(Decide, CountsWhatTheVectorWaited) {
+  const auto c = test::compensation(1);  // 1 of 500 ms old
+  EXPECT_TRUE(decide(c, 499ms, test::active_state(1), true).apply);
+  EXPECT_FALSE(decide(c, 500ms, test::active_state(1), true).apply);
+}
+
+/// A vector that was published at `host_time` of another clock, 2 ms after the instant it describes.
+v1::Compensation vector_of(std::chrono::nanoseconds host_time) {
+  v1::Compensation c;
+  c.host_time_ns((host_time - 2ms).count());
+  c.age_ns(std::chrono::nanoseconds{2ms}.count());
+  return c;
+}
+
+TEST(Delay, IsWhatAVectorNeededMoreThanTheQuickest) {
+  Delay delay;
+  const Delay::Instant ours{5000s};
+  for (auto t = 0ms; t <= 200ms; t += 10ms) EXPECT_FALSE(delay.of(vector_of(70s + t), ours + t + 300us));
+  EXPECT_EQ(delay.of(vector_of(70s + 210ms), ours + 210ms + 200us), 0ns);
+  const auto waited = delay.of(vector_of(70s + 220ms), ours + 420ms + 200us);
+  EXPECT_NEAR(static_cast<double>(waited.value().count()), 200e6, 50e3);  // less what clocks may drift apart
+}
+
+TEST(Delay, LearnsNothingFromTimesOutOfRange) {
+  Delay delay;
+  const Delay::Instant ours{5000s};
+  for (auto t = 0ms; t <= 210ms; t += 10ms) (void)delay.of(vector_of(70s + t), ours + t);
+  for (const auto time : {std::numeric_limits<std::int64_t>::max(), std::numeric_limits<std::int64_t>::min()}) {
+    v1::Compensation strange = vector_of(70s);
+    strange.host_time_ns(time);
+    EXPECT_FALSE(delay.of(strange, ours + 220ms));
+    strange.age_ns(time);
+    EXPECT_FALSE(delay.of(strange, ours + 220ms));
+    v1::Compensation aged = test::compensation(1);
+    aged.age_ns(time);
+    EXPECT_FALSE(decide(aged, 1ms, test::active_state(1), true).apply);
+  }
+  EXPECT_EQ(delay.of(vector_of(70s + 230ms), ours + 230ms), 0ns);
+}
+
+TEST(Delay, LongSilenceDoesNotMakeASlowVectorQuick) {
+  Delay delay;
+  const Delay::Instant ours{5000s};
+  for (auto t = 0ms; t <= 200ms; t += 10ms) EXPECT_FALSE(delay.of(vector_of(70s + t), ours + t));
+  EXPECT_GT(delay.of(vector_of(100s), ours + 30s + 5ms), 4ms);
+}
+
+TEST(Delay, OfTheNextPublisherHoldsOnIfItsClockIsTheSame) {
+  Delay delay;
+  const Delay::Instant ours{5000s};
+  for (auto t = 0ms; t <= 210ms; t += 10ms) (void)delay.of(vector_of(70s + t), ours + t);
+  Delay restarted = delay.for_next_publisher();
+  EXPECT_GT(restarted.of(vector_of(70s + 500ms), ours + 502ms), 1900us);
+  Delay another = delay.for_next_publisher();
+  EXPECT_FALSE(another.of(vector_of(70s + 400ms), ours + 500ms));
+}
+
+TEST(Delay, FollowsAClockThatRunsSlowerBy150Ppm) {
+  Delay delay;
+  const Delay::Instant ours{5000s};
+  for (int i = 0; i < 100'000; i += 100)
+    EXPECT_LT(delay.of(vector_of(70s + i * 1ms), ours + i * 1ms + i * 150ns).value_or(0ns), 1ms) << i;
 }
 
 }  // namespace

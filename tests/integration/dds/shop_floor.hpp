@@ -10,6 +10,7 @@
 
 #include "domain_claim.hpp"
 #include "process.hpp"
+#include "sample_messages.hpp"
 
 namespace abbe::test {
 
@@ -25,11 +26,17 @@ class ShopFloor : public testing::Test {
     std::filesystem::remove_all(directory_);
   }
 
-  void start_feeder() {
-    const std::string socket = directory_ / "dds.sock";
-    feeder_ = std::make_unique<Process>(
-        std::vector<std::string>{ABBE_FEEDER_PROGRAM, socket, ABBE_DDS_PROGRAM, "--socket", socket,
-                                 "--domain", domain_.text(), "--profile", ABBE_LOOPBACK_PROFILE});
+  /// `more`: further arguments of abbe-dds.
+  void start_feeder(const std::vector<std::string>& more = {}) { feeder_ = feeder_of(kMachine, more); }
+
+  [[nodiscard]] std::unique_ptr<Process> feeder_of(const std::string& machine,
+                                                   const std::vector<std::string>& more = {}) const {
+    const std::string socket = directory_ / (machine + ".sock");
+    std::vector<std::string> command{
+        ABBE_FEEDER_PROGRAM, socket,         machine,     ABBE_DDS_PROGRAM,     "--socket", socket,
+        "--domain",          domain_.text(), "--profile", profile_};
+    command.insert(command.end(), more.begin(), more.end());
+    return std::make_unique<Process>(std::move(command));
   }
 
   [[nodiscard]] std::vector<std::string> watch(std::vector<std::string> options) const {
@@ -46,10 +53,11 @@ class ShopFloor : public testing::Test {
   }
 
   /// abbe-dds as the supervisor last announced it.
-  pid_t abbe_dds_pid() {
-    EXPECT_TRUE(feeder_->wait_for("child"));
+  pid_t abbe_dds_pid() { return abbe_dds_pid(*feeder_); }
+  static pid_t abbe_dds_pid(Process& feeder) {
+    EXPECT_TRUE(feeder.wait_for("child"));
     pid_t pid = 0;
-    for (const Line& line : feeder_->lines()) {
+    for (const Line& line : feeder.lines()) {
       if (line.text.starts_with("child ")) pid = std::stoi(line.text.substr(6));
     }
     return pid;
@@ -57,6 +65,7 @@ class ShopFloor : public testing::Test {
 
   DomainClaim domain_;
   std::filesystem::path directory_;
+  std::string profile_ = ABBE_LOOPBACK_PROFILE;  ///< of abbe-dds
   std::unique_ptr<Process> feeder_;
 };
 

@@ -6,6 +6,7 @@
 #include <filesystem>
 #include <memory>
 
+#include "abbe/daemon/dds_security.hpp"
 #include "abbe/daemon/error.hpp"
 #include "abbe/daemon/topics.hpp"
 
@@ -28,12 +29,15 @@ struct ParticipantOptions {
   std::uint32_t domain = 0;
   std::filesystem::path
       profiles;  ///< XML file with a participant profile "abbe"; empty: the built-in abbe-dds.xml
+  std::filesystem::path security;  ///< keys as `abbe dds keys` makes them; empty: what the profile says
+  daemon::DdsRole role = daemon::DdsRole::Subscriber;
 };
 
 class Participant {
  public:
   /// Error: Usage for a domain above kHighestDomain, BadInput for a profile that cannot be read or has no
-  /// participant "abbe", Io if no participant can be created (no port, no interface).
+  /// participant "abbe", and for keys that cannot be used, Io if no participant can be created (no port), or no
+  /// interface of the profile is up.
   [[nodiscard]] static Result<Participant> create(const ParticipantOptions& options);
 
   /// The topic with its payload type, registered without TypeObject and TypeInformation. Error Io: Fast DDS
@@ -41,6 +45,9 @@ class Participant {
   [[nodiscard]] Result<eprosima::fastdds::dds::Topic*> topic(daemon::Topic topic);
 
   [[nodiscard]] eprosima::fastdds::dds::DomainParticipant& get() const noexcept { return *participant_; }
+
+  /// Keys of `security` or of the profile keep strangers out.
+  [[nodiscard]] bool is_secure() const;
 
  private:
   struct Deleter {

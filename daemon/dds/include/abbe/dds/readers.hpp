@@ -1,20 +1,34 @@
 #pragma once
-/// Readers of topics of abbe, for programs that subscribe: payloads as they arrive, and whether somebody
-/// answers for the state of the model. Used by one thread.
+/// Readers of topics of abbe, for programs that subscribe: payloads as they arrive, by whom, and whether a
+/// publisher of ModelState is alive. Used by one thread.
 
+#include <array>
 #include <chrono>
 #include <cstddef>
+#include <cstdint>
 #include <functional>
 #include <memory>
 #include <span>
 
 #include "abbe/dds/participant.hpp"
+#include "abbe/dds/publisher_pin.hpp"
 
 namespace abbe::dds {
 
+/// The GUID of a DDS writer. Every machine has a publisher with writers of its own.
+using WriterId = std::array<std::uint8_t, 16>;
+
+[[nodiscard]] ParticipantId participant_of(const WriterId& writer) noexcept;
+
+struct Arrival {
+  daemon::Topic topic;
+  std::span<const std::byte> payload;
+  WriterId writer;
+};
+
 class Readers {
  public:
-  using OnPayload = std::function<void(daemon::Topic, std::span<const std::byte>)>;
+  using OnArrival = std::function<void(const Arrival&)>;
 
   /// `participant` must outlive the readers. Error Io: Fast DDS refuses one.
   [[nodiscard]] static Result<Readers> create(Participant& participant,
@@ -28,10 +42,10 @@ class Readers {
 
   /// Everything that has arrived, topic by topic in the order given to create(). Bytes are a stranger's:
   /// decode them.
-  void take(const OnPayload& on_payload);
+  void take(const OnArrival& on_arrival);
 
-  /// Writers of ModelState that keep their lease; false also if ModelState was not asked for.
-  [[nodiscard]] bool state_is_answered_for() const;
+  /// Whether this writer of ModelState keeps its lease; false also if ModelState was not asked for.
+  [[nodiscard]] bool is_alive(const WriterId& writer) const;
 
  private:
   struct State;

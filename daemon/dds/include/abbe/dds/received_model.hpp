@@ -2,6 +2,7 @@
 /// What one machine has told a subscriber about its errors, and whether it may be applied by the rule of
 /// abbe_v1.idl. Pure; used by one thread. SI: m.
 
+#include <chrono>
 #include <cstddef>
 #include <cstdint>
 #include <map>
@@ -34,8 +35,8 @@ class ReceivedModel {
   /// All nodes of the state's model in the order of the slices; nothing while a slice is missing.
   [[nodiscard]] std::optional<std::vector<v1::GridNode>> grid() const;
 
-  /// May the grid be applied? `answered_for`: a writer of ModelState keeps its lease.
-  [[nodiscard]] Decision decide(bool answered_for) const;
+  /// May the grid be applied? `publisher_alive`: the writer of the state keeps its lease.
+  [[nodiscard]] Decision decide(bool publisher_alive) const;
 
  private:
   std::optional<v1::ModelState> state_;
@@ -44,9 +45,34 @@ class ReceivedModel {
   std::map<std::string, Slices> slices_;  // by model
 };
 
-/// May this vector be applied, as it arrived just now?
+/// May this vector be applied, that was published `waited` ago? Nothing: that is not known yet.
 [[nodiscard]] Decision decide(const v1::Compensation& compensation,
-                              const std::optional<v1::ModelState>& state, bool answered_for);
+                              std::optional<std::chrono::nanoseconds> waited,
+                              const std::optional<v1::ModelState>& state, bool publisher_alive);
+
+/// How much longer the vectors of one publisher were on their way than the quickest of them: in the network,
+/// in a socket while this process stood still. The two clocks need not agree; they may drift apart by kDrift.
+class Delay {
+ public:
+  using Instant = std::chrono::steady_clock::time_point;
+  static constexpr int kDrift = 5000;  ///< one part in so many, 200 ppm
+
+  static constexpr std::chrono::milliseconds kFirst{200};  ///< shows how quick the way can be
+
+  /// Nothing until then: the first vectors may all have waited.
+  [[nodiscard]] std::optional<std::chrono::nanoseconds> of(const v1::Compensation& vector, Instant now);
+
+  /// For the publisher that comes after this one, which may have the same clock: abbe-dds after a restart.
+  /// Then what is known holds on; a first vector farther than kSameClock from it shows another clock.
+  [[nodiscard]] Delay for_next_publisher() const;
+  static constexpr std::chrono::milliseconds kSameClock{20};
+
+ private:
+  bool inherited_ = false;
+  std::optional<Instant> first_;
+  std::optional<std::chrono::nanoseconds> least_;  ///< from the publisher's clock to ours, and the way
+  Instant last_{};
+};
 
 [[nodiscard]] const char* name_of(v1::ModelStatus status) noexcept;  ///< "ACTIVE"
 

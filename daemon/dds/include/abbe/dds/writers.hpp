@@ -5,6 +5,7 @@
 #include <chrono>
 #include <cstddef>
 #include <span>
+#include <vector>
 
 #include "abbe/daemon/dds_bridge.hpp"
 #include "abbe/dds/participant.hpp"
@@ -30,12 +31,20 @@ class Writers final : public daemon::DdsOutlet {
   /// Says to the readers of ModelState: somebody answers for it.
   void assert_liveliness() override;
 
+  /// Sends the announcement of a writer once more, to every participant that is known, with a heartbeat of
+  /// discovery. `index` < announced(). With DDS Security that is one more writer, which nobody reads: with
+  /// every announcement Fast DDS sends a writer's keys to all of its readers again, and Cyclone DDS 0.10 does
+  /// not survive that (daemon/docs/dds.md, "Found again").
+  void announce(std::size_t index);
+  [[nodiscard]] std::size_t announced() const noexcept { return announced_.size(); }
+
   /// Waits until every reader has acknowledged ModelState, or the time is over.
   void wait_for_state_acknowledged(std::chrono::milliseconds at_most);
 
  private:
   Writers() = default;
   std::array<eprosima::fastdds::dds::DataWriter*, daemon::kTopicCount> writers_{};
+  std::vector<eprosima::fastdds::dds::DataWriter*> announced_;
   Payload buffer_;
 };
 

@@ -1,0 +1,88 @@
+// Two machines on one domain: no subscriber holds an ACTIVE of a dead machine for more than 1.5 s, none
+// applies a vector whose age is understated by more than 1 ms, none stays orphaned. A few rounds;
+// `scripts/soak live-truth` runs ABBE_LIVE_TRUTH_ROUNDS random ones.
+#include "live_truth.hpp"
+
+#include <fmt/format.h>
+#include <gtest/gtest.h>
+
+#include <cstdlib>
+
+#include "figure.hpp"
+#include "shop_floor.hpp"
+
+namespace abbe::test {
+namespace {
+
+class LiveTruthTest : public ShopFloor {
+ protected:
+  [[nodiscard]] LiveTruth::Parts parts() const {
+    // Nothing but the blows is to hold a subscriber up: real-time priority where it is to be had.
+    std::vector<std::string> fast{ABBE_STAMPED_FAST_SUBSCRIBER, domain_.text(), ABBE_LOOPBACK_PROFILE};
+    std::vector<std::string> cyclone{ABBE_STAMPED_CYCLONE_SUBSCRIBER, domain_.text()};
+    for (auto* command : {&fast, &cyclone})
+      if (real_time_) command->insert(command->begin(), {"/usr/bin/chrt", "-f", "10"});
+    return {[this](const std::string& name) { return feeder_of(name); }, fast, cyclone, own_network_};
+  }
+  static bool real_time_permitted() {
+    const sched_param ordinary{}, first{.sched_priority = 10};
+    const bool permitted = ::sched_setscheduler(0, SCHED_FIFO, &first) == 0;
+    ::sched_setscheduler(0, SCHED_OTHER, &ordinary);
+    return permitted;
+  }
+  static void report(const LiveTruthFigures& f) {
+    for (const auto& failure : f.failures) fmt::print("  {}\n", failure);
+    tests::print_figure("an ACTIVE of a dead machine, two machines, kills, stops and outages", "<= 1.5 s",
+                        "{:.2f} s at most, {} longer, {} rounds", f.longest_hold_s, f.held_too_long,
+                        f.rounds);
+    tests::print_figure("age of applied vectors understated", "<= 1 ms", "{:.3f} ms at most, {} more of {}",
+                        f.worst_understatement_ms, f.understated, f.applied);
+    tests::print_figure("subscribers orphaned", "0", "{}; all apply again after {:.2f} s at most", f.orphaned,
+                        f.longest_return_s);
+  }
+  void expect_truth(const LiveTruthFigures& f) const {
+    report(f);
+    EXPECT_EQ(f.held_too_long, 0);
+    // Else a subscriber may be held up between its decision and the stamp of its line.
+    if (real_time_) {
+      EXPECT_EQ(f.understated, 0u);
+    }
+    EXPECT_EQ(f.orphaned, 0);
+    EXPECT_GT(f.applied, 0u);
+  }
+
+  bool own_network_ = enter_own_network();
+  bool real_time_ = real_time_permitted();
+};
+
+TEST_F(LiveTruthTest, HoldsThroughKillsStopsAndAnOutage) {
+  LiveTruth truth(parts());
+  ASSERT_TRUE(truth.begin());
+  truth.round(LiveTruth::Blow::KillMachine, 1.6);
+  truth.round(LiveTruth::Blow::StopAbbeDds, 3.0);
+  truth.round(LiveTruth::Blow::StopSubscriber, 1.2);
+  if (own_network_) truth.round(LiveTruth::Blow::Outage, 4.0);
+  expect_truth(truth.figures());
+}
+
+TEST_F(LiveTruthTest, HoldsForRandomRounds) {
+  const char* const rounds = std::getenv("ABBE_LIVE_TRUTH_ROUNDS");
+  if (rounds == nullptr) GTEST_SKIP() << "scripts/soak live-truth";
+  const char* const given = std::getenv("ABBE_LIVE_TRUTH_SEED");
+  const auto seed = given != nullptr ? static_cast<unsigned>(std::atoi(given)) : 1u;
+  std::mt19937 random(seed);
+  LiveTruth truth(parts());
+  ASSERT_TRUE(truth.begin());
+  while (truth.figures().rounds < std::atoi(rounds)) {
+    truth.random_round(random);
+    const auto so_far = truth.figures();
+    fmt::print("  round {}: held {:.2f} s, understated {:.3f} ms ({}), orphaned {}\n", so_far.rounds,
+               so_far.longest_hold_s, so_far.worst_understatement_ms, so_far.understated, so_far.orphaned);
+    std::fflush(stdout);
+  }
+  fmt::print("seed {}\n", seed);
+  expect_truth(truth.figures());
+}
+
+}  // namespace
+}  // namespace abbe::test

@@ -1,0 +1,169 @@
+#include "abbe/dds/message_filter.hpp"
+
+#include <gtest/gtest.h>
+
+#include <array>
+#include <vector>
+
+namespace abbe::dds {
+namespace {
+
+using Bytes = std::vector<std::uint8_t>;
+
+constexpr std::uint8_t kPublications = 0x03, kSubscriptions = 0x04, kSomebodys = 0x12;
+constexpr std::uint16_t kTypeObject = 0x0072, kTypeInformation = 0x0075, kTopicName = 0x0005;
+
+void append_u16(Bytes& out, std::uint16_t v, bool little_endian = true) {
+  const auto low = static_cast<std::uint8_t>(v & 0xff), high = static_cast<std::uint8_t>(v >> 8);
+  out.insert(out.end(), {little_endian ? low : high, little_endian ? high : low});
+}
+
+/// A DATA submessage of `writer` with `rest` behind its sequence number.
+Bytes data_message(std::uint8_t writer, std::uint8_t flags, std::uint16_t to_inline_qos, const Bytes& rest,
+                   std::uint8_t kind = 0x15) {
+  const bool little_endian = (flags & 1) != 0;
+  Bytes body{0, 0};  // extra flags
+  append_u16(body, to_inline_qos, little_endian);
+  body.insert(body.end(), {0, 0, writer, 0xc7, 0, 0, writer, 0xc2, 0, 0, 0, 0, 1, 0, 0, 0});
+  body.insert(body.end(), rest.begin(), rest.end());
+  Bytes message{'R', 'T', 'P', 'S', 2, 3, 1, 15, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0};
+  message.insert(message.end(), {kind, flags});
+  append_u16(message, static_cast<std::uint16_t>(body.size()), little_endian);
+  message.insert(message.end(), body.begin(), body.end());
+  return message;
+}
+
+/// One DATA submessage with a list of parameters, each of four bytes.
+Bytes announcement(std::uint8_t writer, const std::vector<std::uint16_t>& parameters,
+                   bool little_endian = true, std::uint8_t kind = 0x15) {
+  Bytes list{0, static_cast<std::uint8_t>(little_endian ? 3 : 2), 0, 0};
+  for (const auto id : parameters) {
+    append_u16(list, id, little_endian);
+    append_u16(list, 4, little_endian);
+    list.insert(list.end(), {1, 2, 3, 4});
+  }
+  append_u16(list, 1, little_endian);
+  append_u16(list, 0, little_endian);
+  return data_message(writer, little_endian ? 5 : 4, 16, list, kind);
+}
+
+struct MessageFilter : testing::TestWithParam<bool> {};
+
+TEST_P(MessageFilter, BlanksTypesAndNothingElse) {
+  for (const auto writer : {kPublications, kSubscriptions}) {
+    Bytes message = announcement(writer, {kTopicName, kTypeObject, kTypeInformation}, GetParam());
+    EXPECT_EQ(filter_message(message), message.size());
+    EXPECT_EQ(message, announcement(writer, {kTopicName, 0xbfff, 0xbfff}, GetParam()));
+  }
+}
+
+TEST_P(MessageFilter, LeavesOtherWritersAndOtherParametersAlone) {
+  for (const auto& untouched : {announcement(kSomebodys, {kTypeObject}, GetParam()),
+                                announcement(kPublications, {kTopicName}, GetParam())}) {
+    Bytes message = untouched;
+    EXPECT_EQ(filter_message(message), message.size());
+    EXPECT_EQ(message, untouched);
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(BothByteOrders, MessageFilter, testing::Bool());
+
+TEST(MessageFilterInput, RefusesAnnouncementsInFragments) {
+  Bytes message = announcement(kPublications, {kTypeObject}, true, 0x16);
+  EXPECT_EQ(filter_message(message), 0u);
+}
+
+Bytes with_statistics(std::uint16_t length, std::size_t bytes) {
+  Bytes message = announcement(kSomebodys, {kTopicName});
+  message.insert(message.end(),
+                 {0x80, 1, static_cast<std::uint8_t>(length & 0xff), static_cast<std::uint8_t>(length >> 8)});
+  message.resize(message.size() + bytes);
+  return message;
+}
+
+TEST(MessageFilterInput, CutsStatisticsOffTheEndAndDropsMessagesThatHaveThemElsewhere) {
+  const std::size_t before = announcement(kSomebodys, {kTopicName}).size();
+  for (const std::uint16_t length : {std::uint16_t{8}, std::uint16_t{56}}) {
+    Bytes message = with_statistics(length, length);
+    EXPECT_EQ(filter_message(message), before);
+  }
+  Bytes in_the_middle = with_statistics(8, 16);
+  EXPECT_EQ(filter_message(in_the_middle), 0u);
+}
+
+TEST(MessageFilterInput, DropsLengthsThatLie) {
+  Bytes too_long = with_statistics(400, 8);
+  EXPECT_EQ(filter_message(too_long), 0u);
+  Bytes odd = announcement(kSomebodys, {kTopicName});
+  odd[22] = static_cast<std::uint8_t>(odd[22] - 2);
+  EXPECT_EQ(filter_message(odd), 0u);
+}
+
+/// Fast DDS reads a signed number, and takes what is below 16 for 16.
+TEST(MessageFilterInput, DropsAnnouncementsWhoseParametersAreElsewhereForFastDds) {
+  const Bytes list{0, 3, 0, 0, 0x72, 0, 4, 0, 1, 2, 3, 4, 1, 0, 0, 0};
+  for (const auto to_inline_qos : std::array<std::uint16_t, 5>{0x0000, 0x0008, 0x000f, 0x8000, 0xffff}) {
+    Bytes message = data_message(kPublications, 5, to_inline_qos, list);
+    EXPECT_EQ(filter_message(message), 0u) << to_inline_qos;
+  }
+  Bytes beyond = data_message(kPublications, 5, 400, list);
+  EXPECT_EQ(filter_message(beyond), 0u);
+}
+
+/// Fast DDS aligns to four bytes, others do not.
+TEST(MessageFilterInput, DropsAnnouncementsWithParametersThatAreNotAligned) {
+  for (const auto length : std::array<std::uint8_t, 4>{1, 2, 3, 5}) {
+    Bytes list{0, 3, 0, 0, 0x0a, 0x80, length, 0};
+    list.resize(list.size() + 4 * ((length + 3u) / 4));
+    list.insert(list.end(), {0x72, 0, 4, 0, 1, 2, 3, 4, 1, 0, 0, 0});
+    Bytes message = data_message(kPublications, 5, 16, list);
+    EXPECT_EQ(filter_message(message), 0u) << int{length};
+    list.erase(list.begin(), list.begin() + 4);
+    list.insert(list.end(), {0, 3, 0, 0, 0x72, 0, 4, 0, 1, 2, 3, 4, 1, 0, 0, 0});
+    Bytes inline_qos = data_message(kPublications, 7, 16, list);
+    EXPECT_EQ(filter_message(inline_qos), 0u) << int{length};
+  }
+}
+
+TEST(MessageFilterInput, DropsAnnouncementsWhoseListDoesNotEnd) {
+  for (const Bytes& end : {Bytes{}, Bytes{1, 0}, Bytes{0x0a, 0x80, 40, 0}}) {
+    Bytes list{0, 3, 0, 0, 0x72, 0, 4, 0, 1, 2, 3, 4};
+    list.insert(list.end(), end.begin(), end.end());
+    Bytes message = data_message(kPublications, 5, 16, list);
+    EXPECT_EQ(filter_message(message), 0u) << end.size();
+  }
+}
+
+TEST(MessageFilterInput, BlanksTypesBehindInlineQos) {
+  const Bytes list{0x70, 0, 4, 0, 9, 9, 9, 9, 1, 0, 0, 0, 0, 3, 0, 0, 0x72, 0, 4, 0, 1, 2, 3, 4, 1, 0, 0, 0};
+  Bytes blanked = list;
+  blanked[16] = 0xff, blanked[17] = 0xbf;
+  Bytes message = data_message(kPublications, 7, 16, list);
+  EXPECT_EQ(filter_message(message), message.size());
+  EXPECT_EQ(message, data_message(kPublications, 7, 16, blanked));
+}
+
+TEST(MessageFilterInput, LeavesAWithdrawalWithoutAListAlone) {
+  const Bytes inline_qos{0x71, 0, 4, 0, 0, 0, 0, 3, 1, 0, 0, 0};  // status: disposed and unregistered
+  const Bytes untouched = data_message(kPublications, 3, 16, inline_qos);
+  Bytes message = untouched;
+  EXPECT_EQ(filter_message(message), message.size());
+  EXPECT_EQ(message, untouched);
+}
+
+/// With AddressSanitizer: every cut, and every length that lies.
+TEST(MessageFilterInput, NeverReadsBeyondTheMessage) {
+  const Bytes whole = announcement(kPublications, {kTopicName, kTypeObject, kTypeInformation});
+  for (std::size_t cut = 0; cut <= whole.size(); ++cut) {
+    Bytes message(whole.begin(), whole.begin() + static_cast<std::ptrdiff_t>(cut));
+    static_cast<void>(filter_message(message));
+    for (std::size_t at = 20; at < cut; ++at) {
+      Bytes lying = Bytes(whole.begin(), whole.begin() + static_cast<std::ptrdiff_t>(cut));
+      lying[at] = 0xff;
+      static_cast<void>(filter_message(lying));
+    }
+  }
+}
+
+}  // namespace
+}  // namespace abbe::dds

@@ -2,6 +2,7 @@
 // alive.
 #include <fmt/format.h>
 #include <signal.h>
+#include <unistd.h>
 
 #include <CLI/CLI.hpp>
 #include <chrono>
@@ -13,7 +14,9 @@
 
 #include "abbe/daemon/abbed.hpp"
 #include "abbe/daemon/config.hpp"
+#include "abbe/daemon/dds_security.hpp"
 #include "abbe/daemon/service_manager.hpp"
+#include "abbe/daemon/work_aside.hpp"
 
 namespace {
 
@@ -24,9 +27,9 @@ constexpr int kDone = 0, kUsage = 2, kBadInput = 3, kIo = 4, kDefect = 70;
 
 constexpr const char* kExitCodes =
     "Exit codes: 0 stopped by SIGTERM or SIGINT (or the configuration is good), 2 usage, 3 the configuration "
-    "is bad,\n"
-    "4 the system refused something (socket, directory, port, priority), 70 the hub hangs or a defect "
-    "ended abbed: systemd starts it anew.";
+    "is bad or cannot be read,\n"
+    "4 the system refused something (socket, directory, port, priority), 70 the hub hangs (also when it "
+    "does not end\nwithin 5 s after a signal) or a defect ended abbed: systemd starts it anew.";
 
 constexpr auto kTurn = 20ms;  // how often abbe-dds is looked after
 
@@ -46,6 +49,13 @@ std::string dds_program() {
   std::error_code error;
   const auto beside = std::filesystem::read_symlink("/proc/self/exe", error).parent_path() / "abbe-dds";
   return !error && std::filesystem::exists(beside, error) ? beside.string() : "abbe-dds";
+}
+
+Result<void> check_dds_keys(const std::filesystem::path& security) {
+  if (security.empty()) return {};
+  const auto identity = find_dds_identity(security, DdsRole::Daemon, std::chrono::system_clock::now());
+  if (!identity) return tl::unexpected(identity.error());
+  return {};
 }
 
 /// Blocked before any thread is started, so that only the main thread ever takes them.
@@ -100,8 +110,10 @@ int abbed_main(int argc, char** argv) {
   }
 
   auto config = load_config(file);
-  if (!config) return refuse(config.error());
+  // Also where it cannot be read: it does not come back by itself, and systemd would start abbed for ever.
+  if (!config) return refuse({ErrorCode::BadInput, config.error().text, config.error().details});
   if (check_only) {
+    if (auto usable = check_dds_keys(config->dds.security); !usable) return refuse(usable.error());
     fmt::print("{}: good\n", file);
     return kDone;
   }
@@ -119,6 +131,10 @@ int abbed_main(int argc, char** argv) {
   tell_stopping();
   abbed->reset();
   fmt::print(stderr, "abbed: stopped\n");
+  if (work_left_running()) {  // an identification between two looks at its stop
+    std::fflush(nullptr);
+    ::_exit(code);
+  }
   return code;
 }
 

@@ -1,5 +1,6 @@
 #include "abbe/daemon/dds_bridge.hpp"
 
+#include <algorithm>
 #include <map>
 #include <string>
 #include <vector>
@@ -48,6 +49,9 @@ struct DdsBridge::State {
   std::map<std::string, std::map<std::uint32_t, std::vector<std::byte>>> slices_written;
   std::uint64_t written = 0;
   std::uint64_t refused = 0;
+  std::uint64_t outdated = 0;
+
+  [[nodiscard]] bool silent(WallTime now) const { return now - last_beat > kSilence; }
 
   void write(Topic topic, std::span<const std::byte> payload) {
     ++(outlet.write(topic, payload) ? written : refused);
@@ -66,6 +70,16 @@ struct DdsBridge::State {
     // The key is all that disposing takes.
     const std::size_t head = kCdrHeaderBytes + key->bytes.size();
     known[*key->number].assign(payload.begin(), payload.begin() + static_cast<std::ptrdiff_t>(head));
+  }
+
+  void write_live(Topic topic, std::span<std::byte> payload, WallTime::duration waited) {
+    if (waited > kLongestWait) {
+      ++outdated;
+    } else if (topic == Topic::Compensation && !add_to_age(payload, waited)) {
+      ++refused;
+    } else {
+      write(topic, payload);
+    }
   }
 
   void write_what_is_due(WallTime now) {
@@ -97,20 +111,22 @@ void DdsBridge::connected() {
   state_->durable.entries().clear();
 }
 
-void DdsBridge::beat(WallTime now) {
-  state_->alive = true;
-  state_->last_beat = now;
+void DdsBridge::beat(WallTime at, WallTime now) {
+  state_->last_beat = std::max(state_->last_beat, std::min(at, now));
+  state_->alive |= !state_->silent(now);
 }
 
-void DdsBridge::publish(Topic topic, std::span<const std::byte> payload, WallTime now) {
+void DdsBridge::publish(Topic topic, std::span<std::byte> payload, WallTime at, WallTime now) {
+  // Behind an old beat there may stand newer ones: turn() judges.
+  const bool alive = state_->alive && !state_->silent(now);
   const auto key = payload_key(topic, payload);
   if (!key) {
     ++state_->refused;
   } else if (is_durable(topic)) {
     state_->durable.keep(topic, key->bytes, payload);
-    if (state_->alive) state_->write_what_is_due(now);
-  } else if (state_->alive) {
-    state_->write(topic, payload);
+    if (alive) state_->write_what_is_due(now);
+  } else if (alive) {
+    state_->write_live(topic, payload, std::max(now - at, WallTime::duration::zero()));
   }
 }
 
@@ -120,7 +136,7 @@ void DdsBridge::lost() {
 
 void DdsBridge::turn(WallTime now) {
   State& s = *state_;
-  if (s.alive && now - s.last_beat > kSilence) s.tell_that_source_is_lost();
+  if (s.alive && s.silent(now)) s.tell_that_source_is_lost();
   if (!s.alive) return;
   s.write_what_is_due(now);
   if (now - s.last_assert < kAssertPeriod) return;
@@ -136,6 +152,9 @@ std::uint64_t DdsBridge::written() const noexcept {
 }
 std::uint64_t DdsBridge::refused() const noexcept {
   return state_->refused;
+}
+std::uint64_t DdsBridge::outdated() const noexcept {
+  return state_->outdated;
 }
 
 }  // namespace abbe::daemon

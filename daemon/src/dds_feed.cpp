@@ -31,22 +31,39 @@ struct DdsFeed::State {
     bridge.lost();
   }
 
+  /// All that waits: what abbed said last stands at the end of it.
   void read() {
+    constexpr int kMostReads = 64;  // more than the kernel keeps for a socket
+    for (int i = 0; i < kMostReads && read_once(); ++i) {
+    }
+  }
+
+  /// Whether there may be more.
+  bool read_once() {
     const auto room = frames.room();
     const ssize_t n = ::recv(peer.get(), room.data(), room.size(), MSG_DONTWAIT);
-    if (n < 0 && (errno == EAGAIN || errno == EINTR)) return;
+    if (n < 0 && (errno == EAGAIN || errno == EINTR)) return false;
     if (n > 0) frames.filled(static_cast<std::size_t>(n));
     feed();
-    if (n <= 0 || frames.broken()) disconnect();
+    if (n > 0 && !frames.broken()) return static_cast<std::size_t>(n) == room.size();
+    disconnect();
+    return false;
+  }
+
+  /// Shows abbed that this loop runs. An answer that does not fit is not needed: abbed does not read.
+  void answer() const {
+    const std::byte alive{};
+    static_cast<void>(::send(peer.get(), &alive, 1, MSG_DONTWAIT | MSG_NOSIGNAL));
   }
 
   void feed() {
     while (const auto frame = frames.next()) {
       const auto now = std::chrono::steady_clock::now();
       if (frame->kind == FrameKind::Beat) {
-        bridge.beat(now);
+        bridge.beat(frame->at, now);
+        answer();
       } else {
-        bridge.publish(frame->topic, frame->payload, now);
+        bridge.publish(frame->topic, frame->payload, frame->at, now);
       }
     }
   }

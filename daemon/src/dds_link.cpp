@@ -3,6 +3,7 @@
 #include <sys/socket.h>
 #include <unistd.h>
 
+#include <array>
 #include <cerrno>
 #include <utility>
 
@@ -13,36 +14,58 @@
 namespace abbe::daemon {
 namespace {
 
+/// The hub's cycle must not last as long as somebody connects.
+constexpr int kNewcomersInACycle = 4;
+
 struct Pending {
   bool to_send = true;
 };
+
+/// By the kernel: what the other end says of itself proves nothing.
+bool may_connect(int fd, const DdsProcess* process) {
+  ucred credentials{};
+  socklen_t size = sizeof credentials;
+  if (::getsockopt(fd, SOL_SOCKET, SO_PEERCRED, &credentials, &size) != 0) return false;
+  if (process == nullptr) return credentials.uid == ::geteuid();
+  // 0: a process of another PID namespace, as which DdsProcess knows none.
+  return credentials.pid != 0 && credentials.pid == process->pid();
+}
 
 }  // namespace
 
 struct DdsLink::State {
   std::filesystem::path path;
   FileDescriptor listener;
+  DdsProcess* process = nullptr;
   FileDescriptor peer;
   std::vector<std::byte> out;  ///< what the kernel has not taken yet: at most the rest of one frame
   std::size_t out_begin = 0;
   RetainedPayloads<Pending> durable;
+  RetainedPayloads<WallTime>
+      live;  ///< empty unless the socket is full; with the instants their ages count to
   WallTime last_beat{};
   DdsLinkCounters counters;
 
   void accept_newest();
-  void notice_departure();
+  void read_answers();
   void disconnect();
   bool send_waiting();
   bool send_now(const Frame& frame);
-  void send_durable();
+  bool send_durable();
+  void send_live();
+  void send_or_keep(const Frame& frame, const PayloadKey& key);
 };
 
 /// A newer abbe-dds replaces the older one: the older one is hung or already replaced by whoever supervises
 /// it.
 void DdsLink::State::accept_newest() {
-  for (;;) {
+  for (int i = 0; i < kNewcomersInACycle; ++i) {
     FileDescriptor accepted(::accept4(listener.get(), nullptr, nullptr, SOCK_NONBLOCK | SOCK_CLOEXEC));
     if (!accepted) return;
+    if (!may_connect(accepted.get(), process)) {
+      ++counters.strangers;
+      continue;
+    }
     disconnect();
     peer = std::move(accepted);
     ++counters.connections;
@@ -51,10 +74,11 @@ void DdsLink::State::accept_newest() {
   }
 }
 
-/// abbe-dds never speaks; readable means it is gone.
-void DdsLink::State::notice_departure() {
-  std::byte ignored{};
-  const ssize_t n = ::recv(peer.get(), &ignored, 1, MSG_DONTWAIT);
+/// abbe-dds sends one byte for each beat it has read, and nothing else.
+void DdsLink::State::read_answers() {
+  std::array<std::byte, 64> bytes{};
+  const ssize_t n = ::recv(peer.get(), bytes.data(), bytes.size(), MSG_DONTWAIT);
+  if (n > 0 && process != nullptr) process->answered(WallTime::clock::now());
   if (n == 0 || (n < 0 && errno != EAGAIN && errno != EINTR)) disconnect();
 }
 
@@ -62,6 +86,8 @@ void DdsLink::State::disconnect() {
   peer = FileDescriptor{};
   out.clear();
   out_begin = 0;
+  counters.dropped_live += live.entries().size();
+  live.entries().clear();
 }
 
 /// Whether the socket is free for the next frame.
@@ -83,27 +109,52 @@ bool DdsLink::State::send_waiting() {
   return static_cast<bool>(peer);
 }
 
+/// Whether it is on its way; never after a disconnection.
 bool DdsLink::State::send_now(const Frame& frame) {
   if (!send_waiting()) return false;
   append_frame(out, frame);
   send_waiting();
+  return static_cast<bool>(peer);
+}
+
+/// Whether none waits any more.
+bool DdsLink::State::send_durable() {
+  for (auto& entry : durable.entries()) {
+    if (!entry.extra.to_send) continue;
+    if (!send_now({FrameKind::Publish, entry.topic, WallTime::clock::now(), entry.payload})) return false;
+    entry.extra.to_send = false;
+  }
   return true;
 }
 
-void DdsLink::State::send_durable() {
-  for (auto& entry : durable.entries()) {
-    if (!entry.extra.to_send) continue;
-    if (!send_now({FrameKind::Publish, entry.topic, entry.payload})) return;
-    entry.extra.to_send = false;
-  }
+void DdsLink::State::send_live() {
+  auto& waiting = live.entries();
+  auto next = waiting.begin();
+  while (next != waiting.end() && send_now({FrameKind::Publish, next->topic, next->extra, next->payload}))
+    ++next;
+  if (peer) waiting.erase(waiting.begin(), next);  // else disconnect() has dropped them
 }
 
-Result<DdsLink> DdsLink::listen(const std::filesystem::path& socket) {
+/// Of a live topic: what waits gives way to what is newer.
+void DdsLink::State::send_or_keep(const Frame& frame, const PayloadKey& key) {
+  if (live.entries().empty() && send_now(frame)) return;
+  if (!peer) {
+    ++counters.dropped_live;
+    return;
+  }
+  const std::size_t waiting = live.entries().size();
+  live.keep(frame.topic, key.bytes, frame.payload).extra = frame.at;
+  if (live.entries().size() == waiting) ++counters.dropped_live;
+  send_live();
+}
+
+Result<DdsLink> DdsLink::listen(const std::filesystem::path& socket, DdsLinkPeer peer) {
   auto listener = listen_unix(socket);
   if (!listener) return tl::make_unexpected(listener.error());
   auto state = std::make_unique<State>();
   state->path = socket;
   state->listener = std::move(*listener);
+  state->process = peer.process;
   return DdsLink(std::move(state));
 }
 
@@ -117,7 +168,7 @@ DdsLink::~DdsLink() {
   if (state_) ::unlink(state_->path.c_str());
 }
 
-void DdsLink::publish(Topic topic, std::span<const std::byte> payload) {
+void DdsLink::publish(Topic topic, std::span<const std::byte> payload, WallTime at) {
   const auto key = payload_key(topic, payload);
   if (!key || payload.size() > kMaxPayloadBytes) {
     ++state_->counters.refused;
@@ -126,26 +177,33 @@ void DdsLink::publish(Topic topic, std::span<const std::byte> payload) {
   if (traits(topic).kind == TopicTraits::Kind::Durable) {
     state_->durable.keep(topic, key->bytes, payload);
     state_->send_durable();
-  } else if (!state_->send_now({FrameKind::Publish, topic, payload})) {
-    ++state_->counters.dropped_live;
+  } else {
+    state_->send_or_keep({FrameKind::Publish, topic, at, payload}, *key);
   }
 }
 
 void DdsLink::beat(WallTime now) {
   if (now - state_->last_beat < kBeatPeriod) return;
-  // A beat that does not fit is not queued: abbe-dds has not read for a while and will judge for itself.
-  if (state_->send_now({FrameKind::Beat, {}, {}})) state_->last_beat = now;
+  if (state_->process != nullptr) state_->process->asked(now);
+  // A beat that does not fit is not queued: abbe-dds has not read for a while and will judge for itself. Nor
+  // does it overtake a state: abbe-dds would repeat the one before.
+  if (state_->send_durable() && state_->send_now({FrameKind::Beat, {}, now, {}})) state_->last_beat = now;
 }
 
 void DdsLink::poll() {
   state_->accept_newest();
-  if (state_->peer) state_->notice_departure();
+  if (state_->peer) state_->read_answers();
   state_->send_durable();
+  state_->send_live();
   state_->send_waiting();
 }
 
 bool DdsLink::connected() const noexcept {
   return static_cast<bool>(state_->peer);
+}
+
+const DdsProcess* DdsLink::process() const noexcept {
+  return state_->process;
 }
 
 const DdsLinkCounters& DdsLink::counters() const noexcept {

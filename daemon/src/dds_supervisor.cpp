@@ -18,6 +18,8 @@ extern char** environ;
 namespace abbe::daemon {
 namespace {
 
+using namespace std::chrono_literals;
+
 std::string describe_end(int status) {
   if (WIFSIGNALED(status)) return "signal " + std::to_string(WTERMSIG(status));
   return "exit code " + std::to_string(WEXITSTATUS(status));
@@ -74,6 +76,7 @@ DdsSupervisor::DdsSupervisor(DdsSupervisor&& other) noexcept
       next_start_(other.next_start_),
       delay_(other.delay_),
       restarts_(other.restarts_),
+      hung_(other.hung_),
       last_end_(std::move(other.last_end_)) {}
 
 DdsSupervisor& DdsSupervisor::operator=(DdsSupervisor&& other) noexcept {
@@ -85,6 +88,7 @@ DdsSupervisor& DdsSupervisor::operator=(DdsSupervisor&& other) noexcept {
   next_start_ = other.next_start_;
   delay_ = other.delay_;
   restarts_ = other.restarts_;
+  hung_ = other.hung_;
   last_end_ = std::move(other.last_end_);
   return *this;
 }
@@ -109,22 +113,42 @@ Result<void> DdsSupervisor::spawn(WallTime now) {
   if (error != 0) return fail(ErrorCode::Io, "start " + program + ": " + std::strerror(error));
   pid_ = child;
   started_ = now;
+  hung_ = false;
+  if (options_.process != nullptr) options_.process->started(child, now);
   return {};
+}
+
+void DdsSupervisor::kill_if_hung() noexcept {
+  if (options_.process == nullptr || hung_) return;
+  const DdsProcess& process = *options_.process;
+  const auto patience = process.has_answered() ? options_.hung_after : options_.hung_at_start;
+  if (process.silent_for() <= patience) return;
+  hung_ = true;
+  ::kill(pid_, SIGKILL);
+}
+
+bool DdsSupervisor::reap(WallTime now) {
+  int status = 0;
+  if (::waitpid(pid_, &status, WNOHANG) != pid_) return false;
+  pid_ = 0;
+  last_end_ = describe_end(status);
+  if (options_.process != nullptr) options_.process->ended({status, hung_, std::chrono::system_clock::now()});
+  const bool died_at_start = now - started_ < options_.steady_after;
+  // What a signal ends may be well the next time; what exits has a reason that stays.
+  const auto longest = WIFSIGNALED(status) ? options_.first_delay : options_.longest_delay;
+  delay_ = died_at_start ? std::clamp(2 * delay_, options_.first_delay, longest) : 0ms;
+  next_start_ = now + delay_;
+  return true;
 }
 
 void DdsSupervisor::poll(WallTime now) {
   if (pid_ != 0) {
-    int status = 0;
-    if (::waitpid(pid_, &status, WNOHANG) != pid_) return;
-    pid_ = 0;
-    last_end_ = describe_end(status);
-    const bool died_at_start = now - started_ < options_.steady_after;
-    delay_ = !died_at_start ? std::chrono::milliseconds{0}
-                            : std::clamp(2 * delay_, options_.first_delay, options_.longest_delay);
-    next_start_ = now + delay_;
+    kill_if_hung();
+    if (!reap(now)) return;
   }
   if (now < next_start_) return;
   ++restarts_;
+  if (options_.process != nullptr) options_.process->restarted();
   if (!spawn(now)) {
     last_end_ = "could not be started";
     delay_ = options_.longest_delay;

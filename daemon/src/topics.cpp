@@ -43,6 +43,14 @@ class KeyReader {
     return std::string_view(begin, *length - 1);
   }
 
+  /// Past `bytes` that are aligned to `alignment`, whatever they hold.
+  bool skip(std::size_t alignment, std::size_t bytes) {
+    const std::size_t at = (offset_ + alignment - 1) / alignment * alignment;
+    if (at > body_.size() || bytes > body_.size() - at) return false;
+    offset_ = at + bytes;
+    return true;
+  }
+
   [[nodiscard]] std::span<const std::byte> read_so_far() const { return body_.first(offset_); }
 
  private:
@@ -85,6 +93,39 @@ std::optional<std::uint32_t> grid_slices(std::span<const std::byte> payload) noe
   static_cast<void>(reader.text());    // machine
   static_cast<void>(reader.number());  // slice
   return reader.number();
+}
+
+bool set_sequence_number(Topic topic, std::span<std::byte> payload, std::uint64_t number) noexcept {
+  if ((topic != Topic::ErrorModel && topic != Topic::ErrorGrid) || !payload_key(topic, payload)) return false;
+  const auto body = payload.subspan(kCdrHeaderBytes);
+  KeyReader reader(body);
+  if (!reader.text()) return false;                                    // machine
+  if (topic == Topic::ErrorGrid && !reader.skip(4, 4 + 4)) return false;  // slice, slices
+  if (!reader.skip(8, 8)) return false;
+  const auto place = body.subspan(reader.read_so_far().size() - 8, 8);
+  for (std::size_t i = 0; i < 8; ++i) place[i] = static_cast<std::byte>(number >> (8 * i) & 0xffu);
+  return true;
+}
+
+bool add_to_age(std::span<std::byte> compensation, std::chrono::nanoseconds more) noexcept {
+  if (!payload_key(Topic::Compensation, compensation)) return false;
+  const auto body = compensation.subspan(kCdrHeaderBytes);
+  KeyReader reader(body);
+  constexpr std::size_t kDoubles = 3 + 3 + 3 + 6;  // position, tool offset, vector, covariance
+  const bool whole = reader.text().has_value()     // machine
+                     && reader.skip(8, 8 + 8)      // sequence_number, host_time_ns
+                     && reader.skip(4, 4 + 4)      // kind, state
+                     && reader.skip(1, 1 + 1)      // inside, tool_ok
+                     && reader.skip(8, kDoubles * 8) && reader.text().has_value()  // model_id
+                     && reader.skip(8, 8);                                         // age_ns
+  const std::size_t end = reader.read_so_far().size();
+  if (!whole || !reader.skip(8, 8) || reader.read_so_far().size() != body.size()) return false;
+  const auto age = body.subspan(end - 8, 8);
+  std::uint64_t ns = 0;
+  for (std::size_t i = 0; i < 8; ++i) ns |= std::to_integer<std::uint64_t>(age[i]) << (8 * i);
+  ns += static_cast<std::uint64_t>(more.count());
+  for (std::size_t i = 0; i < 8; ++i) age[i] = static_cast<std::byte>(ns >> (8 * i) & 0xffu);
+  return true;
 }
 
 }  // namespace abbe::daemon

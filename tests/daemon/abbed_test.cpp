@@ -11,6 +11,7 @@ namespace abbe::daemon {
 namespace {
 
 namespace fs = std::filesystem;
+using ::testing::Contains;
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
 
@@ -31,7 +32,8 @@ class AbbedTest : public ::testing::Test {
   ~AbbedTest() override { fs::remove_all(directory_); }
 
   [[nodiscard]] std::vector<fs::path> recordings() const {
-    const fs::directory_iterator files{config_.recording.dir}, end;
+    std::error_code missing;
+    const fs::directory_iterator files{config_.recording.dir, missing}, end;
     return {files, end};
   }
 
@@ -54,6 +56,27 @@ TEST_F(AbbedTest, RecordsWhileItRunsAndKeepsNoFileThatHoldsNothing) {
   abbed->reset();
   EXPECT_THAT(recordings(), IsEmpty());
   EXPECT_FALSE(fs::exists(config_.control.socket));
+}
+
+// As a disk that is read-only or not mounted.
+TEST_F(AbbedTest, RunsWithoutADiskAndReportsIt) {
+  config_.daemon.data_dir = directory_ / "data";
+  config_.recording.dir = directory_ / "data" / "recordings";
+  std::ofstream{directory_ / "data"} << "in the way";
+  const auto abbed = Abbed::start(config_, {});
+  ASSERT_TRUE(abbed) << abbed.error().text;
+  EXPECT_THAT((*abbed)->warnings(), Contains(HasSubstr("nothing is recorded: ")));
+  EXPECT_THAT((*abbed)->warnings(), Contains(HasSubstr("models")));
+  EXPECT_TRUE((*abbed)->alive());
+}
+
+TEST_F(AbbedTest, ClosesWhatAKilledOneLeftOpen) {
+  fs::create_directories(config_.recording.dir);
+  const fs::path left = config_.recording.dir / "abbe-killed.mcap.part";
+  std::ofstream{left};
+  auto abbed = Abbed::start(config_, {});
+  ASSERT_TRUE(abbed) << abbed.error().text;
+  while (fs::exists(left)) std::this_thread::yield();  // it holds nothing, and is removed
 }
 
 // What is removed later, and what never: OldRecordings.

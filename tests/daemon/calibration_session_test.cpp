@@ -88,14 +88,41 @@ TEST(CalibrationSession, TheRunBeginsAndEndsInStandstill) {
   drive.stand(kPath[0], 5s);
   for (std::size_t i = 1; i < kPath.size(); ++i) drive.move(kPath[i]);
   drive.stand(kPath.back(), 2s);
-  const auto taken = session.take_run();
-  ASSERT_TRUE(taken);
-  const std::vector<RunPoint>* run = &std::get<OtfRun>(*taken).points;
+  auto acquired = session.take_run();
+  ASSERT_TRUE(acquired);
+  const CalibrationRun taken = run_of(std::move(*acquired));
+  const std::vector<RunPoint>* run = &std::get<OtfRun>(taken).points;
   ASSERT_GT(run->size(), 1000u);
   EXPECT_EQ((*run)[19].p_tracker_m, kPath[0]);
   EXPECT_EQ((*run)[run->size() - 20].p_tracker_m, kPath.back());
   EXPECT_LT(run->size(),
             3000u + 2u * 200u + 10u);  // 300 mm at 0.1 mm each, and 0.4 s of standstill at either end
+}
+
+TEST(CalibrationSession, EverySessionHasANumberOfItsOwn) {
+  CalibrationSession session;
+  EXPECT_EQ(session.status().id, 0u);
+  ASSERT_TRUE(session.start({OtfRequest{kPath}, HostTime{10s}}));
+  EXPECT_EQ(session.status().id, 1u);
+  EXPECT_FALSE(session.start({OtfRequest{kPath}, HostTime{10s}}));
+  ASSERT_TRUE(session.cancel("anna", HostTime{11s}));
+  EXPECT_EQ(session.status().id, 1u);
+  ASSERT_TRUE(session.start({OtfRequest{kPath}, HostTime{12s}}));
+  EXPECT_EQ(session.status().id, 2u);
+}
+
+TEST(CalibrationSession, AMachineThatCyclesOnItsPathIsGivenUpAtABound) {
+  AcquisitionOptions options;
+  options.most_points = 5000;
+  CalibrationSession session{options};
+  ASSERT_TRUE(session.start({OtfRequest{kPath}, HostTime{10s}}));
+  Drive drive{session};
+  drive.stand(kPath[0], 1s);
+  for (int cycle = 0; cycle < 4; ++cycle)
+    for (const std::size_t vertex : {1u, 0u}) drive.move(kPath[vertex]);
+  EXPECT_EQ(session.status().state, SessionState::Refused);
+  EXPECT_NE(session.status().reason.find("5000 tracker points and does not end"), std::string::npos)
+      << session.status().reason;
 }
 
 TEST(CalibrationSession, TheRunKnowsItsScalesAndItsAir) {
@@ -115,9 +142,10 @@ TEST(CalibrationSession, TheRunKnowsItsScalesAndItsAir) {
   drive.stand(kPath[0], 1s);
   for (std::size_t i = 1; i < kPath.size(); ++i) drive.move(kPath[i]);
   drive.stand(kPath.back(), 2s);
-  const auto taken = session.take_run();
-  ASSERT_TRUE(taken);
-  const auto& run = std::get<OtfRun>(*taken);
+  auto acquired = session.take_run();
+  ASSERT_TRUE(acquired);
+  const CalibrationRun taken = run_of(std::move(*acquired));
+  const auto& run = std::get<OtfRun>(taken);
   for (std::size_t i = 0; i < kPath.size(); ++i) {
     EXPECT_NEAR(run.path_m[i][0] - kPath[i][0], 5.0 * kAlpha * (kPath[i][0] - kFixed_m), 1e-12);
     EXPECT_EQ(run.path_m[i][1], kPath[i][1]);
@@ -136,9 +164,10 @@ TEST(CalibrationSession, TheRunKnowsWhatTheControllersAirLeaves) {
   drive.stand(kPath[0], 1s);
   for (std::size_t i = 1; i < kPath.size(); ++i) drive.move(kPath[i]);
   drive.stand(kPath.back(), 2s);
-  const auto taken = session.take_run();
-  ASSERT_TRUE(taken);
-  EXPECT_NEAR(std::get<OtfRun>(*taken).u_scale, TrackerConfig::kControllersAir, 1e-18);
+  auto acquired = session.take_run();
+  ASSERT_TRUE(acquired);
+  const CalibrationRun taken = run_of(std::move(*acquired));
+  EXPECT_NEAR(std::get<OtfRun>(taken).u_scale, TrackerConfig::kControllersAir, 1e-18);
 }
 
 TEST(CalibrationSession, ASlowTrackerStandsLongEnoughForTwentyPoints) {
@@ -227,9 +256,10 @@ TEST(CalibrationSession, LeavesOutPointsThatCameOutOfOrder) {
   for (std::size_t i = 2; i < kPath.size(); ++i) drive.move(kPath[i]);
   drive.stand(kPath.back(), 2s);
   EXPECT_NE(session.status().reason.find("25 left out"), std::string::npos) << session.status().reason;
-  const auto taken = session.take_run();
-  ASSERT_TRUE(taken);
-  const std::vector<RunPoint>* run = &std::get<OtfRun>(*taken).points;
+  auto acquired = session.take_run();
+  ASSERT_TRUE(acquired);
+  const CalibrationRun taken = run_of(std::move(*acquired));
+  const std::vector<RunPoint>* run = &std::get<OtfRun>(taken).points;
   for (std::size_t i = 1; i < run->size(); ++i) ASSERT_GT((*run)[i].device_time, (*run)[i - 1].device_time);
 }
 

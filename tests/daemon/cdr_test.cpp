@@ -3,15 +3,19 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <chrono>
 #include <map>
 #include <random>
 #include <sstream>
 #include <string>
 
+#include "abbe/daemon/topics.hpp"
+
 namespace abbe::daemon {
 namespace {
 
 using testing::HasSubstr;
+using namespace std::chrono_literals;
 
 v1::Snapshot some_snapshot() {
   v1::Snapshot s;
@@ -187,6 +191,33 @@ void expect_bounds_of_idl(const std::string& type) {
   for (const MemberBound& b : member_bounds<T>()) checked[std::string(b.member)] = b.bound;
   EXPECT_EQ(checked, bounds_in_idl(type)) << type;
   EXPECT_FALSE(checked.empty());
+}
+
+TEST(AddToAge, ChangesTheAgeAndNothingElseWhateverTheLengthsOfTheTexts) {
+  for (std::size_t length = 0; length < 64; ++length) {
+    v1::Compensation vector;
+    vector.machine(std::string(length, 'm'));
+    vector.model_id(std::string(length * 7 % 64, 'i'));
+    vector.cov_m2()[5] = 1e-12;
+    vector.age_ns(5'000'000'001);
+    vector.validity_ns(500'000'000);
+    std::vector<std::byte> payload, expected;
+    ASSERT_TRUE(encode(vector, payload));
+    ASSERT_TRUE(add_to_age(payload, 7ms));
+    vector.age_ns(5'007'000'001);
+    ASSERT_TRUE(encode(vector, expected));
+    EXPECT_EQ(payload, expected) << length;
+  }
+}
+
+TEST(AddToAge, RefusesBytesThatAreNoCompensation) {
+  std::vector<std::byte> payload;
+  ASSERT_TRUE(encode(v1::Compensation{}, payload));
+  auto longer = payload;
+  longer.push_back(std::byte{});
+  EXPECT_FALSE(add_to_age(longer, 7ms));
+  for (; !payload.empty(); payload.pop_back())
+    EXPECT_FALSE(add_to_age(std::span(payload).first(payload.size() - 1), 7ms)) << payload.size();
 }
 
 TEST(Cdr, BoundsCheckedAreThoseOfTheIdl) {

@@ -28,7 +28,10 @@ class CliCalibrateProbe : public ::testing::Test {
   void record(const std::vector<protocol::ProbeTrigger>& touches) const {
     auto recorder = Recorder::open(example_options(folder_), example_info(), Recorder::WallTime{});
     ASSERT_TRUE(recorder);
-    for (const auto& touch : touches) recorder->record(touch, "probe");
+    for (const auto& touch : touches) {
+      recorder->record(touch, "probe");
+      recorder->flush();  // a chunk each
+    }
     ASSERT_TRUE(recorder->close());
   }
   /// Exit code and standard output.
@@ -69,6 +72,15 @@ TEST_F(CliCalibrateProbe, FindsTheDelayFromThreeFeeds) {
   const auto json = nlohmann::json::parse(out);
   EXPECT_NEAR(json["delay_us"].get<double>(), 2000.0, 0.01);
   EXPECT_EQ(json["feeds"], 3);
+}
+
+TEST_F(CliCalibrateProbe, ADamagedRecordingShowsItsResultAndEndsWithOne) {
+  record(touches_at({1e-3, 4e-3, 8e-3, 1e-3, 4e-3, 8e-3, 1e-3, 4e-3, 8e-3}));
+  damage_chunk(folder_ / "run.mcap", 1);
+  const auto [exit, out] = calibrate("");
+  EXPECT_EQ(exit, 1);
+  EXPECT_THAT(out, HasSubstr("delay_us = "));
+  EXPECT_THAT(out, HasSubstr("the recording is damaged: chunk 2"));
 }
 
 TEST_F(CliCalibrateProbe, SaysWhatIsMissing) {

@@ -26,7 +26,7 @@ struct ScriptedDaemon {
   std::function<void(std::size_t)> at_question = [](std::size_t) {};
   std::size_t asked = 0;
 
-  nlohmann::json operator()(const nlohmann::json& request) {
+  nlohmann::json operator()(const nlohmann::json& request, const ControlPeer&) {
     if (request["do"] != "status") return {{"ok", true}};
     at_question(asked);
     const auto& session = sessions[std::min(asked++, sessions.size() - 1)];
@@ -94,16 +94,43 @@ TEST_F(CliOfADaemon, ADaemonStartedAnewMeanwhileHasLostTheSession) {
   EXPECT_THAT(ran.err, HasSubstr("lost"));
 }
 
+TEST_F(CliOfADaemon, CalibrateReportsTheVerdictOfItsOwnSessionOnly) {
+  const auto socket = folder_.path() / "own.sock";
+  const auto numbered = [](int id, const std::string& state) {
+    auto one = session(state, "of session " + std::to_string(id));
+    one["id"] = id;
+    if (state == "refused") one["code"] = "data_insufficient";
+    return one;
+  };
+  std::atomic<bool> kept = true;
+  const auto daemon =
+      ControlServer::open(socket, [&](const nlohmann::json& request, const ControlPeer&) -> nlohmann::json {
+        if (request["do"] == "calibrate") return {{"ok", true}, {"session", 7}};
+        return {{"ok", true},
+                {"session", numbered(8, "active")},
+                {"ended_sessions", {numbered(kept ? 7 : 6, "refused")}}};
+      });
+  ASSERT_TRUE(daemon);
+  const auto refused = calibrate(socket);
+  EXPECT_EQ(refused.exit, 1);
+  EXPECT_THAT(refused.out, HasSubstr("of session 7"));
+  kept = false;
+  const auto lost = calibrate(socket);
+  EXPECT_EQ(lost.exit, 4);
+  EXPECT_THAT(lost.err, HasSubstr("calibration 7 has ended"));
+}
+
 TEST_F(CliOfADaemon, ReferencePrintsEachAxisInItsUnits) {
   const auto socket = folder_.path() / "reference.sock";
   const auto axis = [](const char* name, const char* kind) {
     return nlohmann::json{{"axis", name},  {"kind", kind}, {"state", "found"},          {"marks", 4},
                           {"known", true}, {"u", 2e-6},    {"reading_at_zero", 0.0125}, {"reason", ""}};
   };
-  const auto daemon = ControlServer::open(socket, [&](const nlohmann::json&) -> nlohmann::json {
-    return {{"ok", true},
-            {"reference", {{"running", false}, {"axes", {axis("X", "linear"), axis("C", "rotary")}}}}};
-  });
+  const auto daemon =
+      ControlServer::open(socket, [&](const nlohmann::json&, const ControlPeer&) -> nlohmann::json {
+        return {{"ok", true},
+                {"reference", {{"running", false}, {"axes", {axis("X", "linear"), axis("C", "rotary")}}}}};
+      });
   ASSERT_TRUE(daemon);
   const auto ran = test::run_abbe(folder_.path(), fmt::format("reference --socket '{}'", socket.string()));
   EXPECT_EQ(ran.exit, 0) << ran.err;
@@ -114,11 +141,12 @@ TEST_F(CliOfADaemon, ReferencePrintsEachAxisInItsUnits) {
 TEST_F(CliOfADaemon, ASearchOfADaemonStartedAnewIsLost) {
   const auto socket = folder_.path() / "search.sock";
   std::atomic<int> asked = 0;
-  const auto daemon = ControlServer::open(socket, [&](const nlohmann::json&) -> nlohmann::json {
-    return {{"ok", true},
-            {"process", asked++ < 2 ? 1 : 2},
-            {"reference", {{"running", true}, {"axes", nlohmann::json::array()}}}};
-  });
+  const auto daemon =
+      ControlServer::open(socket, [&](const nlohmann::json&, const ControlPeer&) -> nlohmann::json {
+        return {{"ok", true},
+                {"process", asked++ < 2 ? 1 : 2},
+                {"reference", {{"running", true}, {"axes", nlohmann::json::array()}}}};
+      });
   ASSERT_TRUE(daemon);
   const auto ran = test::run_abbe(folder_.path(), fmt::format("reference --socket '{}'", socket.string()));
   EXPECT_EQ(ran.exit, 4);

@@ -6,6 +6,7 @@
 #include <set>
 #include <string>
 
+#include "abbe/daemon/device_options.hpp"
 #include "config_tables.hpp"
 
 namespace abbe::daemon {
@@ -14,8 +15,10 @@ namespace {
 using std::chrono::microseconds;
 
 using ::testing::AllOf;
+using ::testing::Contains;
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
+using ::testing::Not;
 using ::testing::SizeIs;
 using ::testing::StartsWith;
 
@@ -42,6 +45,39 @@ TEST(Config, ReadsAMachineInSI) {
   EXPECT_EQ(machine.target_offset_m, (std::array<double, 3>{0.02, -0.015, -0.12}));
   EXPECT_THAT(machine.nodes_m.at("X"), SizeIs(13));
   EXPECT_EQ(machine.nodes_m.at("X").back(), 0.3);
+}
+
+std::string dotted(int parts) {
+  std::string key = "a";
+  for (int i = 1; i < parts; ++i) key += ".a";
+  return key;
+}
+
+TEST(Config, NestingIsBoundedBeforeParsing) {
+  const std::string quoted_dots = "# a.a.a.a\n[x]\nname = \"" + dotted(200) + "\"\n";
+  EXPECT_THAT(faults_of(quoted_dots), Not(Contains(HasSubstr("nested deeper"))));
+  std::string numbers = "many = [0.5";
+  for (int i = 0; i < 200; ++i) numbers += ", 0.5";
+  EXPECT_THAT(faults_of(numbers + "]\n"), Not(Contains(HasSubstr("nested deeper"))));
+  const auto deep = StartsWith("abbed.toml:2:");
+  for (const auto& text : {dotted(40'000) + " = 1\n", "[" + dotted(40'000) + "]\n",
+                           "[[" + dotted(40'000) + "]]\n", "x = {" + dotted(40'000) + " = 1}\n",
+                           "x = " + std::string(40'000, '['), "\"\".'b' . " + dotted(40'000) + " = 1\n",
+                           "x = [\"\"\"\\\"\"\"\"\"\", " + std::string(40'000, '[')}) {
+    EXPECT_THAT(faults_of("\n" + text), ElementsAre(AllOf(deep, HasSubstr("nested deeper than 64"))))
+        << text.substr(0, 30);
+  }
+}
+
+TEST(Config, LevelsOfTablesKeysAndValuesAddUp) {
+  EXPECT_THAT(faults_of("[" + dotted(30) + "]\n" + dotted(30) + " = {" + dotted(30) + " = 1}\n"),
+              ElementsAre(HasSubstr("nested deeper")));
+}
+
+TEST(Config, ATextOfMoreThanAMegabyteIsNotParsed) {
+  const auto config = parse_config(std::string((1u << 20) + 1, '#'), "abbed.toml");
+  ASSERT_FALSE(config);
+  EXPECT_THAT(config.error().text, HasSubstr("at most 1048576 are read"));
 }
 
 TEST(Config, PutsTheReferenceAtZeroIfInsideElseAtTheMinimum) {
@@ -82,6 +118,42 @@ nodes = [{axis = "X", node = 1, step_nm = 10, invert = true}, {axis = "Y", node 
   EXPECT_DOUBLE_EQ(config->encoder->nodes[1].step, 1e-9);
 }
 
+TEST(Config, ReadsWhichReflectorTheTrackerHoldsAndHowItGetsThere) {
+  const std::string tracker = kMachine + "[tracker]\nhost = \"h\"\n";
+  const auto plain = parse_config(tracker + "reflector = \"\"\n", "abbed.toml");
+  ASSERT_TRUE(plain) << plain.error().details.front();
+  EXPECT_EQ(plain->tracker->reflector, "");
+  EXPECT_FALSE(plain->tracker->home_after_initialize || plain->tracker->search);
+  EXPECT_FALSE(device_options(*plain->tracker, 1.0).session.search);
+  const auto config = parse_config(tracker + R"(reflector = "SMR 1.5\""
+home_after_initialize = true
+search_radius_mm = 30
+search_timeout_s = 7.5
+)",
+                                   "abbed.toml");
+  ASSERT_TRUE(config) << config.error().details.front();
+  const auto session = device_options(*config->tracker, 1.0).session;
+  EXPECT_EQ(session.reflector, "SMR 1.5\"");
+  EXPECT_TRUE(session.home_after_initialize);
+  ASSERT_TRUE(session.search);
+  EXPECT_DOUBLE_EQ(session.search->radius, 30.0);
+  EXPECT_EQ(session.search->timeout_ms, 7500);
+}
+
+TEST(Config, RefusesASearchWithoutBothBoundsAndNamesNoControllerHas) {
+  const std::string tracker = kMachine + "[tracker]\nhost = \"h\"\n";
+  EXPECT_THAT(faults_of(tracker + "search_radius_mm = 30\n"),
+              ElementsAre(AllOf(HasSubstr("tracker.search_timeout_s"), HasSubstr("takes both or none"))));
+  EXPECT_THAT(faults_of(tracker + "search_timeout_s = 30\n"),
+              ElementsAre(AllOf(HasSubstr("tracker.search_radius_mm"), HasSubstr("takes both or none"))));
+  EXPECT_THAT(faults_of(tracker + "search_radius_mm = 0\nsearch_timeout_s = 1e9\n"),
+              ElementsAre(HasSubstr("tracker.search_radius_mm"), HasSubstr("tracker.search_timeout_s")));
+  EXPECT_THAT(faults_of(tracker + "home_after_initialize = 1\n"),
+              ElementsAre(HasSubstr("tracker.home_after_initialize: must be true or false")));
+  EXPECT_THAT(faults_of(tracker + "reflector = \"" + std::string(97, 'x') + "\"\n"),
+              ElementsAre(HasSubstr("tracker.reflector: must be at most 96 bytes")));
+}
+
 TEST(Config, TheControllersAirIsUncertainIfItCorrectsForIt) {
   const auto u_scale = [](const std::string& more) {
     return parse_config(kMachine + "[tracker]\nhost = \"t\"\n" + more, "abbed.toml")->tracker->u_scale;
@@ -97,6 +169,13 @@ TEST(Config, TakesARateOfZeroForWheneverSomethingNewCame) {
   ASSERT_TRUE(config) << config.error().details.front();
   EXPECT_EQ(config->dds.snapshot_hz, 0.0);
   EXPECT_EQ(config->dds.compensation_hz, 0.0);
+}
+
+TEST(Config, KeysOfDdsSecurityAreMeantFromTheFilesFolder) {
+  const auto config = parse_config(kMachine + "[dds]\nsecurity = \"keys/daemon\"\n", "/etc/abbe/abbed.toml");
+  ASSERT_TRUE(config) << config.error().details.front();
+  EXPECT_EQ(config->dds.security, "/etc/abbe/keys/daemon");
+  EXPECT_EQ(parse_config(kMachine, "abbed.toml")->dds.security, "");
 }
 
 TEST(Config, RefusesANegativeRate) {
@@ -264,7 +343,33 @@ TEST(Config, LetsTheKernelSendTheSyncOnSocketCanOnly) {
   ASSERT_TRUE(config) << config.error().details.front();
   EXPECT_EQ(config->encoder->sync, SyncConfig::Kernel);
   const std::string udp = "[encoder]\ntransport = \"udp\"\npeer_host = \"10.0.0.8\"\npeer_port = 20000\n";
-  EXPECT_THAT(faults_of(kMachine + udp + by_kernel), ElementsAre(HasSubstr("encoder.sync: has no meaning")));
+  EXPECT_THAT(faults_of(kMachine + udp + by_kernel), ElementsAre(HasSubstr("encoder.sync")));
+}
+
+TEST(Config, TakesTheMachinesOwnSyncOnEitherTransport) {
+  const std::string external = "sync = \"external\"\n";
+  const auto config = parse_config(
+      kMachine + kCanBus + external +
+          R"(nodes = [{axis = "X", node = 1, tpdo = 2, position_byte = 2}, {axis = "Y", node = 2}, {axis = "Z", node = 3}]
+)",
+      "abbed.toml");
+  ASSERT_TRUE(config) << config.error().details.front();
+  EXPECT_EQ(config->encoder->sync, SyncConfig::External);
+  EXPECT_EQ(config->encoder->nodes[0].tpdo, 2);
+  EXPECT_EQ(config->encoder->nodes[0].position_byte, 2);
+  const std::string udp = "[encoder]\ntransport = \"udp\"\npeer_host = \"10.0.0.8\"\npeer_port = 20000\n";
+  EXPECT_THAT(faults_of(kMachine + udp + external + kNodes),
+              ElementsAre(AllOf(HasSubstr("encoder.local_port"), HasSubstr("sends nothing"))));
+  EXPECT_THAT(faults_of(kMachine + udp + "local_port = 20000\n" + external + kNodes), SizeIs(0));
+}
+
+TEST(Config, RefusesWhereANodeIsToldWhatItIsAskedFor) {
+  EXPECT_THAT(
+      faults_of(
+          kMachine + kCanBus +
+          R"(nodes = [{axis = "X", node = 1, position_byte = 2}, {axis = "Y", node = 2}, {axis = "Z", node = 3}]
+)"),
+      ElementsAre(AllOf(HasSubstr("position_byte"), HasSubstr("external"))));
 }
 
 TEST(Config, RefusesKeysOfTheOtherTransport) {

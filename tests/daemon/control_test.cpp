@@ -13,6 +13,8 @@
 #include <cstring>
 #include <filesystem>
 #include <fstream>
+#include <string>
+#include <vector>
 
 #include "abbe/daemon/control_protocol.hpp"
 
@@ -35,7 +37,7 @@ class Control : public testing::Test {
   std::filesystem::path directory_;
 };
 
-json echo(const json& request) {
+json echo(const json& request, const ControlPeer&) {
   return {{"ok", true}, {"heard", request}};
 }
 
@@ -59,7 +61,7 @@ TEST_F(Control, ARequestLargerThanAnyBufferArrivesWhole) {
 TEST_F(Control, ARefusalArrivesAsTheErrorItWas) {
   for (const auto code : {ErrorCode::DataInsufficient, ErrorCode::Usage, ErrorCode::BadInput, ErrorCode::Io,
                           ErrorCode::Refused}) {
-    const auto server = ControlServer::open(socket(), [code](const json&) {
+    const auto server = ControlServer::open(socket(), [code](const json&, const ControlPeer&) {
       return refusal({code, "a session is running"});
     });
     ASSERT_TRUE(server);
@@ -71,7 +73,9 @@ TEST_F(Control, ARefusalArrivesAsTheErrorItWas) {
 }
 
 TEST_F(Control, AnAnswerThatSaysNothingIsARefusal) {
-  const auto server = ControlServer::open(socket(), [](const json&) { return json{{"ok", "perhaps"}}; });
+  const auto server = ControlServer::open(socket(), [](const json&, const ControlPeer&) {
+    return json{{"ok", "perhaps"}};
+  });
   ASSERT_TRUE(server);
   const auto answer = ask_daemon(socket(), {{"do", "status"}});
   ASSERT_FALSE(answer);
@@ -79,7 +83,7 @@ TEST_F(Control, AnAnswerThatSaysNothingIsARefusal) {
 }
 
 TEST_F(Control, AMemberOfTheWrongTypeIsAnAnswerNotACrash) {
-  const auto server = ControlServer::open(socket(), [](const json& request) {
+  const auto server = ControlServer::open(socket(), [](const json& request, const ControlPeer&) {
     return json{{"ok", true}, {"n", request.at("n").get<int>()}};
   });
   ASSERT_TRUE(server);
@@ -91,7 +95,7 @@ TEST_F(Control, AMemberOfTheWrongTypeIsAnAnswerNotACrash) {
 }
 
 TEST_F(Control, BytesThatAreNoTextAreReplacedAndTheSocketLivesOn) {
-  const auto server = ControlServer::open(socket(), [](const json&) {
+  const auto server = ControlServer::open(socket(), [](const json&, const ControlPeer&) {
     return json{{"ok", true}, {"fault", "tracker says \xff\xc3"}};
   });
   ASSERT_TRUE(server);
@@ -112,6 +116,20 @@ TEST_F(Control, WhoAsksIsWhatTheKernelSays) {
   EXPECT_EQ((*answer)["heard"]["who"], "anna");
 }
 
+TEST_F(Control, ThePeersGroupsAreWhatTheKernelSays) {
+  std::vector<gid_t> groups;
+  const auto server = ControlServer::open(socket(), [&](const json&, const ControlPeer& peer) {
+    groups = peer.groups;
+    return json{{"ok", peer.uid == ::geteuid()}};
+  });
+  ASSERT_TRUE(server);
+  ASSERT_TRUE(ask_daemon(socket(), {{"do", "status"}}));
+  std::vector<gid_t> mine(static_cast<std::size_t>(::getgroups(0, nullptr)));
+  ASSERT_GE(::getgroups(static_cast<int>(mine.size()), mine.data()), 0);
+  mine.push_back(::getegid());
+  EXPECT_EQ(groups, mine);
+}
+
 /// A client of its own, for what ask_daemon() would never do.
 class RawClient {
  public:
@@ -127,6 +145,14 @@ class RawClient {
   }
   [[nodiscard]] bool send(const std::string& text) const {
     return ::send(fd_, text.data(), text.size(), MSG_NOSIGNAL) == static_cast<ssize_t>(text.size());
+  }
+  /// All that comes until the server closes.
+  [[nodiscard]] std::string read_to_end() const {
+    std::string all;
+    std::array<char, 4096> buffer{};
+    for (ssize_t n = 0; (n = ::read(fd_, buffer.data(), buffer.size())) > 0;)
+      all.append(buffer.data(), static_cast<std::size_t>(n));
+    return all;
   }
   [[nodiscard]] bool readable(std::chrono::milliseconds time_out) const {
     pollfd wait{fd_, POLLIN, 0};
@@ -151,7 +177,7 @@ class RawClient {
 TEST_F(Control, AClientThatNeverReadsGetsNoMoreAnswersThanFitAndKeepsNobodyWaiting) {
   constexpr int kAsked = 200;
   std::atomic<int> answered = 0;
-  const auto server = ControlServer::open(socket(), [&](const json& request) {
+  const auto server = ControlServer::open(socket(), [&](const json& request, const ControlPeer&) {
     if (request["do"] == "much") ++answered;
     return json{{"ok", true}, {"text", std::string(request["do"] == "much" ? 1u << 19 : 1u, 'x')}};
   });
@@ -165,6 +191,54 @@ TEST_F(Control, AClientThatNeverReadsGetsNoMoreAnswersThanFitAndKeepsNobodyWaiti
   for (int i = 0; i < 20; ++i) ASSERT_TRUE(ask_daemon(socket(), {{"do", "little"}}));
   EXPECT_LT(answered, 20);
   EXPECT_EQ(greedy.read_lines(kAsked), kAsked);
+}
+
+TEST_F(Control, ALineOfBracketsIsRefusedAndTheServerLivesOn) {
+  const auto server = ControlServer::open(socket(), echo);
+  ASSERT_TRUE(server);
+  const RawClient client;
+  client.connect(socket());
+  ASSERT_TRUE(client.send("{\"do\": \"status\", \"x\": " + std::string(140'000, '[') +
+                          std::string(140'000, ']') + "}\n"));
+  ASSERT_TRUE(client.readable(60s));
+  EXPECT_TRUE(ask_daemon(socket(), {{"do", "status"}}));
+}
+
+TEST_F(Control, IdleConnectionsLockNobodyOut) {
+  const auto server = ControlServer::open(socket(), echo);
+  ASSERT_TRUE(server);
+  const std::vector<RawClient> idle(40);
+  for (const auto& client : idle) client.connect(socket());
+  EXPECT_TRUE(ask_daemon(socket(), {{"do", "cancel"}}));
+  EXPECT_NE(idle.front().read_to_end().find("closed for a newer connection"), std::string::npos);
+  EXPECT_TRUE(idle.back().send("{\"do\": \"status\"}\n"));
+  EXPECT_EQ(idle.back().read_lines(1), 1);
+}
+
+TEST_F(Control, AnIdleConnectionIsClosed) {
+  const auto server = ControlServer::open(socket(), echo, {.idle = 20ms});
+  ASSERT_TRUE(server);
+  const RawClient client;
+  client.connect(socket());
+  EXPECT_NE(client.read_to_end().find("idle for 20 ms"), std::string::npos);
+}
+
+TEST_F(Control, AListenerThatAcceptsNobodyIsGivenUp) {
+  const int deaf = ::socket(AF_UNIX, SOCK_STREAM, 0);
+  sockaddr_un address{};
+  address.sun_family = AF_UNIX;
+  std::strcpy(address.sun_path, socket().c_str());
+  ASSERT_EQ(::bind(deaf, reinterpret_cast<const sockaddr*>(&address), sizeof address), 0);
+  ASSERT_EQ(::listen(deaf, 0), 0);
+  const RawClient first;
+  first.connect(socket());
+  const auto answer = ask_daemon(socket(), {{"do", "status"}}, 20ms);
+  ASSERT_FALSE(answer);
+  EXPECT_NE(answer.error().text.find("accepted nobody in 20 ms"), std::string::npos) << answer.error().text;
+  const auto second = ControlServer::open(socket(), echo);  // alive, though deaf: its socket is left to it
+  ASSERT_FALSE(second);
+  EXPECT_NE(second.error().text.find("another daemon"), std::string::npos) << second.error().text;
+  ::close(deaf);
 }
 
 /// Nobody can open anything while it lives.

@@ -39,6 +39,13 @@ std::vector<std::byte> snapshot() {
   return payload_of(snapshot);
 }
 
+std::vector<std::byte> vector_of_age(std::chrono::nanoseconds age) {
+  v1::Compensation vector;
+  vector.machine("m");
+  vector.age_ns(age.count());
+  return payload_of(vector);
+}
+
 std::vector<std::byte> model() {
   v1::ErrorModel model;
   model.machine("m");
@@ -77,6 +84,9 @@ struct Recorded final : DdsOutlet {
     for (const Write& w : writes) n += w.topic == topic;
     return n;
   }
+  [[nodiscard]] std::chrono::nanoseconds last_age() const {
+    return std::chrono::nanoseconds{decode<v1::Compensation>(writes.back().payload).value().age_ns()};
+  }
   [[nodiscard]] v1::ModelState last_state() const {
     for (auto w = writes.rbegin(); w != writes.rend(); ++w) {
       if (w->topic == Topic::ModelState) return decode<v1::ModelState>(w->payload).value();
@@ -93,26 +103,29 @@ struct DdsBridgeTest : testing::Test {
   /// abbed lives for `duration`: beats and turns every 50 ms.
   void live(std::chrono::milliseconds duration) {
     for (const WallTime end = t + duration; t < end; t += 50ms) {
-      bridge.beat(t);
+      bridge.beat(t, t);
       bridge.turn(t);
     }
   }
   void silent(std::chrono::milliseconds duration) {
     for (const WallTime end = t + duration; t < end; t += 50ms) bridge.turn(t);
   }
+  void publish(Topic topic, std::vector<std::byte> payload, std::chrono::milliseconds waited = 0ms) {
+    bridge.publish(topic, payload, t - waited, t);
+  }
 };
 
 TEST_F(DdsBridgeTest, WritesPayloadsUnchanged) {
-  bridge.beat(t);
-  bridge.publish(Topic::Snapshot, snapshot(), t);
+  bridge.beat(t, t);
+  publish(Topic::Snapshot, snapshot());
   ASSERT_EQ(outlet.writes.size(), 1u);
   EXPECT_EQ(outlet.writes[0].payload, snapshot());
 }
 
 TEST_F(DdsBridgeTest, SlicesBeyondASmallerGridAreDisposedAndNotRepeated) {
-  bridge.beat(t);
-  for (std::uint32_t i = 0; i < 3; ++i) bridge.publish(Topic::ErrorGrid, slice(i, 3), t);
-  bridge.publish(Topic::ErrorGrid, slice(0, 1), t);
+  bridge.beat(t, t);
+  for (std::uint32_t i = 0; i < 3; ++i) publish(Topic::ErrorGrid, slice(i, 3));
+  publish(Topic::ErrorGrid, slice(0, 1));
   EXPECT_EQ(outlet.disposed, (std::vector<std::uint32_t>{1, 2}));
   const int written = outlet.count(Topic::ErrorGrid);
   live(10s + 50ms);
@@ -120,19 +133,19 @@ TEST_F(DdsBridgeTest, SlicesBeyondASmallerGridAreDisposedAndNotRepeated) {
 }
 
 TEST_F(DdsBridgeTest, SlicesOfAnAbbedBeforeAreDisposedToo) {
-  bridge.beat(t);
-  for (std::uint32_t i = 0; i < 3; ++i) bridge.publish(Topic::ErrorGrid, slice(i, 3), t);
+  bridge.beat(t, t);
+  for (std::uint32_t i = 0; i < 3; ++i) publish(Topic::ErrorGrid, slice(i, 3));
   bridge.connected();
-  bridge.publish(Topic::ErrorGrid, slice(0, 2), t);
+  publish(Topic::ErrorGrid, slice(0, 2));
   EXPECT_TRUE(outlet.disposed.empty());
-  bridge.beat(t);
+  bridge.beat(t, t);
   bridge.turn(t);
   EXPECT_EQ(outlet.disposed, (std::vector<std::uint32_t>{2}));
 }
 
 TEST_F(DdsBridgeTest, WritesNothingBeforeTheFirstBeat) {
-  bridge.publish(Topic::Snapshot, snapshot(), t);
-  bridge.publish(Topic::ModelState, active("m", 1), t);
+  publish(Topic::Snapshot, snapshot());
+  publish(Topic::ModelState, active("m", 1));
   silent(200ms);
   EXPECT_TRUE(outlet.writes.empty());
   live(50ms);
@@ -142,8 +155,8 @@ TEST_F(DdsBridgeTest, WritesNothingBeforeTheFirstBeat) {
 
 TEST_F(DdsBridgeTest, SilenceInvalidatesEveryMachineOnceAndWithin550Milliseconds) {
   live(100ms);
-  bridge.publish(Topic::ModelState, active("a", 1), t);
-  bridge.publish(Topic::ModelState, active("b", 1), t);
+  publish(Topic::ModelState, active("a", 1));
+  publish(Topic::ModelState, active("b", 1));
   silent(600ms);
   EXPECT_FALSE(bridge.source_alive());
   EXPECT_EQ(outlet.count(Topic::ModelState), 4);
@@ -153,7 +166,7 @@ TEST_F(DdsBridgeTest, SilenceInvalidatesEveryMachineOnceAndWithin550Milliseconds
 
 TEST_F(DdsBridgeTest, InvalidStateSaysWhyAndKeepsTheModel) {
   live(100ms);
-  bridge.publish(Topic::ModelState, active("m", 7), t);
+  publish(Topic::ModelState, active("m", 7));
   bridge.lost();
   const auto state = outlet.last_state();
   EXPECT_EQ(state.state(), v1::MODEL_INVALID);
@@ -174,26 +187,26 @@ TEST_F(DdsBridgeTest, LivelinessIsAssertedOnlyWhileTheSourceIsAlive) {
 TEST_F(DdsBridgeTest, LiveSamplesStopWithTheSource) {
   live(100ms);
   silent(600ms);
-  bridge.publish(Topic::Snapshot, snapshot(), t);
+  publish(Topic::Snapshot, snapshot());
   EXPECT_EQ(outlet.count(Topic::Snapshot), 0);
 }
 
 TEST_F(DdsBridgeTest, BackAgainTheModelIsRepublishedButTheStateWaitsForTheSource) {
   live(100ms);
-  bridge.publish(Topic::ErrorModel, model(), t);
-  bridge.publish(Topic::ModelState, active("m", 1), t);
+  publish(Topic::ErrorModel, model());
+  publish(Topic::ModelState, active("m", 1));
   silent(600ms);
   live(200ms);
   EXPECT_EQ(outlet.count(Topic::ErrorModel), 2);
   EXPECT_EQ(outlet.last_state().state(), v1::MODEL_INVALID);
-  bridge.publish(Topic::ModelState, active("m", 3), t);
+  publish(Topic::ModelState, active("m", 3));
   EXPECT_EQ(outlet.last_state().state(), v1::MODEL_ACTIVE);
 }
 
 TEST_F(DdsBridgeTest, DurableTopicsAreRepeated) {
   live(100ms);
-  bridge.publish(Topic::ErrorModel, model(), t);
-  bridge.publish(Topic::ModelState, active("m", 1), t);
+  publish(Topic::ErrorModel, model());
+  publish(Topic::ModelState, active("m", 1));
   live(30s + 50ms);
   EXPECT_EQ(outlet.count(Topic::ErrorModel), 4);
   EXPECT_EQ(outlet.count(Topic::ModelState), 31);
@@ -201,8 +214,8 @@ TEST_F(DdsBridgeTest, DurableTopicsAreRepeated) {
 
 TEST_F(DdsBridgeTest, ANewSourceVoidsWhatTheOldOneSaid) {
   live(100ms);
-  bridge.publish(Topic::ErrorModel, model(), t);
-  bridge.publish(Topic::ModelState, active("m", 1), t);
+  publish(Topic::ErrorModel, model());
+  publish(Topic::ModelState, active("m", 1));
   bridge.connected();
   EXPECT_EQ(outlet.last_state().state(), v1::MODEL_INVALID);
   outlet.writes.clear();
@@ -212,29 +225,88 @@ TEST_F(DdsBridgeTest, ANewSourceVoidsWhatTheOldOneSaid) {
 
 TEST_F(DdsBridgeTest, BytesThatAreNoPayloadAreRefused) {
   live(100ms);
-  bridge.publish(Topic::ModelState, std::vector<std::byte>(16), t);
+  publish(Topic::ModelState, std::vector<std::byte>(16));
   EXPECT_EQ(bridge.refused(), 1u);
   EXPECT_TRUE(outlet.writes.empty());
 }
 
-TEST_F(DdsBridgeTest, FeedCarriesWhatTheLinkSends) {
-  std::string name = testing::TempDir() + "abbe-feed-XXXXXX";
-  const std::filesystem::path directory = ::mkdtemp(name.data());
-  {
-    std::optional<DdsLink> link(DdsLink::listen(directory / "dds.sock").value());
-    DdsFeed feed(directory / "dds.sock", bridge);
-    link->publish(Topic::ModelState, active("m", 1));
-    while (outlet.writes.empty()) {
-      feed.turn();
+TEST_F(DdsBridgeTest, AVectorsAgeCountsWhatItWaitedOnItsWay) {
+  live(100ms);
+  publish(Topic::Compensation, vector_of_age(3ms), 40ms);
+  EXPECT_EQ(outlet.last_age(), 43ms);
+}
+
+TEST_F(DdsBridgeTest, LiveSamplesThatWaitedLongerThanATenthOfASecondAreDiscarded) {
+  live(100ms);
+  publish(Topic::Compensation, vector_of_age(3ms), 101ms);
+  publish(Topic::Snapshot, snapshot(), 101ms);
+  EXPECT_TRUE(outlet.writes.empty());
+  EXPECT_EQ(bridge.outdated(), 2u);
+}
+
+// abbe-dds stood still for 3 s: it finds the beats and states of then.
+TEST_F(DdsBridgeTest, WhatWasSentBeforeAStallKeepsNothingAlive) {
+  live(100ms);
+  publish(Topic::ModelState, active("m", 1));
+  t += 3s;
+  const int assertions = outlet.assertions;
+  bridge.beat(t - 2900ms, t);
+  publish(Topic::ModelState, active("m", 3), 2800ms);
+  EXPECT_EQ(outlet.count(Topic::ModelState), 1);
+  bridge.turn(t);
+  EXPECT_EQ(outlet.last_state().reason(), "SOURCE_LOST");
+  EXPECT_EQ(outlet.assertions, assertions);
+}
+
+TEST_F(DdsBridgeTest, AStallOfItsOwnIsNoSilenceOfAbbed) {
+  live(100ms);
+  publish(Topic::ModelState, active("m", 1));
+  t += 800ms;
+  for (auto ago = 700ms; ago > 0ms; ago -= 100ms) bridge.beat(t - ago, t);
+  bridge.turn(t);
+  EXPECT_TRUE(bridge.source_alive());
+  EXPECT_EQ(outlet.last_state().state(), v1::MODEL_ACTIVE);
+}
+
+/// abbed's end of the socket and this one.
+struct DdsFeedTest : DdsBridgeTest {
+  DdsFeedTest() {
+    link.emplace(DdsLink::listen(directory / "dds.sock").value());
+    feed.emplace(directory / "dds.sock", bridge);
+  }
+  ~DdsFeedTest() override { std::filesystem::remove_all(directory); }
+  void run_until(const auto& done) {
+    while (!done()) {
+      feed->turn();
       link->poll();
       link->beat(std::chrono::steady_clock::now());
     }
-    EXPECT_EQ(outlet.last_state().state(), v1::MODEL_ACTIVE);
-    link.reset();
-    while (feed.connected()) feed.turn();
-    EXPECT_EQ(outlet.last_state().reason(), "SOURCE_LOST");
   }
-  std::filesystem::remove_all(directory);
+  std::filesystem::path directory = [] {
+    std::string name = testing::TempDir() + "abbe-feed-XXXXXX";
+    return std::filesystem::path{::mkdtemp(name.data())};
+  }();
+  std::optional<DdsLink> link;
+  std::optional<DdsFeed> feed;
+};
+
+TEST_F(DdsFeedTest, CarriesWhatTheLinkSends) {
+  link->publish(Topic::ModelState, active("m", 1));
+  run_until([this] { return !outlet.writes.empty(); });
+  EXPECT_EQ(outlet.last_state().state(), v1::MODEL_ACTIVE);
+  link.reset();
+  while (feed->connected()) feed->turn();
+  EXPECT_EQ(outlet.last_state().reason(), "SOURCE_LOST");
+}
+
+TEST_F(DdsFeedTest, CountsFromTheInstantOfTheSender) {
+  run_until([this] { return bridge.source_alive(); });
+  link->publish(Topic::Compensation, vector_of_age(3ms), std::chrono::steady_clock::now() - 1s);
+  run_until([this] { return bridge.outdated() == 1; });
+  link->publish(Topic::Compensation, vector_of_age(3ms), std::chrono::steady_clock::now() - 20ms);
+  run_until([this] { return !outlet.writes.empty() || bridge.outdated() == 2; });
+  if (bridge.outdated() == 2) GTEST_SKIP() << "this process was held up for 80 ms";
+  EXPECT_GE(outlet.last_age(), 23ms);
 }
 
 }  // namespace

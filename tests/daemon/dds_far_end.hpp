@@ -6,7 +6,9 @@
 #include <sys/un.h>
 #include <unistd.h>
 
+#include <chrono>
 #include <cstddef>
+#include <cstring>
 #include <filesystem>
 #include <string>
 #include <vector>
@@ -21,6 +23,7 @@ struct FarEnd {
   struct Seen {
     int kind = -1;
     int topic = -1;
+    std::chrono::nanoseconds at{};  ///< of CLOCK_MONOTONIC
     std::vector<std::byte> payload;
   };
 
@@ -42,14 +45,20 @@ struct FarEnd {
     }
     std::vector<Seen> seen;
     for (;;) {
-      if (bytes.size() < 8) return seen;
+      if (bytes.size() < 16) return seen;
       const std::size_t length = std::to_integer<std::size_t>(bytes[0]) |
                                  std::to_integer<std::size_t>(bytes[1]) << 8 |
                                  std::to_integer<std::size_t>(bytes[2]) << 16;
-      if (bytes.size() < 8 + length) return seen;
-      seen.push_back({std::to_integer<int>(bytes[4]), std::to_integer<int>(bytes[5]), {}});
-      seen.back().payload.assign(bytes.begin() + 8, bytes.begin() + 8 + static_cast<std::ptrdiff_t>(length));
-      bytes.erase(bytes.begin(), bytes.begin() + 8 + static_cast<std::ptrdiff_t>(length));
+      if (bytes.size() < 16 + length) return seen;
+      std::int64_t at_ns = 0;
+      std::memcpy(&at_ns, &bytes[8], sizeof(at_ns));
+      seen.push_back({std::to_integer<int>(bytes[4]),
+                      std::to_integer<int>(bytes[5]),
+                      std::chrono::nanoseconds{at_ns},
+                      {}});
+      const auto end = bytes.begin() + 16 + static_cast<std::ptrdiff_t>(length);
+      seen.back().payload.assign(bytes.begin() + 16, end);
+      bytes.erase(bytes.begin(), end);
     }
   }
 

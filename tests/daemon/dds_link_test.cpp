@@ -3,9 +3,11 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <poll.h>
+#include <signal.h>
 #include <sys/socket.h>
 #include <sys/stat.h>
 #include <sys/un.h>
+#include <sys/wait.h>
 #include <unistd.h>
 
 #include <cstdlib>
@@ -19,6 +21,7 @@ namespace abbe::daemon {
 namespace {
 
 using test::FarEnd;
+using test::messages;
 
 using namespace std::chrono_literals;
 
@@ -67,6 +70,15 @@ class DdsLinkTest : public testing::Test {
   std::filesystem::path path_;
   std::optional<DdsLink> link_;
 };
+
+TEST_F(DdsLinkTest, TakesFewNewcomersInACycleAndAllInTheEnd) {
+  std::vector<std::unique_ptr<FarEnd>> newcomers;
+  for (int i = 0; i < 10; ++i) newcomers.push_back(std::make_unique<FarEnd>(path_));
+  link_->poll();
+  EXPECT_LT(link_->counters().connections, 10u);
+  for (int i = 0; i < 10; ++i) link_->poll();
+  EXPECT_EQ(link_->counters().connections, 10u);
+}
 
 TEST_F(DdsLinkTest, HandsOverThePayloadUnchanged) {
   FarEnd far(path_);
@@ -135,6 +147,59 @@ TEST_F(DdsLinkTest, NeverBlocksOnAPeerThatDoesNotReadAndKeepsWhatIsDurable) {
   EXPECT_TRUE(state_came);
 }
 
+/// Live samples are sent until the socket takes no more and `surplus` of them had to go.
+std::uint64_t fill(DdsLink& link, std::uint64_t surplus) {
+  std::uint64_t n = 0;
+  while (link.counters().dropped_live < surplus) link.publish(Topic::Snapshot, snapshot_payload(++n));
+  return n;
+}
+
+std::vector<FarEnd::Seen> drain(DdsLink& link, FarEnd& far) {
+  std::vector<FarEnd::Seen> all;
+  for (int i = 0; i < 3; ++i) {
+    for (auto& frame : far.take()) all.push_back(std::move(frame));
+    link.poll();
+  }
+  return all;
+}
+
+TEST_F(DdsLinkTest, FullSocketDropsTheOldestLiveSampleAndKeepsTheNewest) {
+  FarEnd far(path_);
+  link_->poll();
+  const std::uint64_t newest = fill(*link_, 10);
+  const auto seen = messages<v1::Snapshot>(drain(*link_, far), Topic::Snapshot);
+  ASSERT_FALSE(seen.empty());
+  EXPECT_EQ(seen.back().sequence_number(), newest);
+  EXPECT_EQ(seen.size() + link_->counters().dropped_live, newest);
+}
+
+TEST_F(DdsLinkTest, FramesCarryTheInstantTheyWereSaid) {
+  FarEnd far(path_);
+  link_->poll();
+  link_->publish(Topic::Snapshot, snapshot_payload(1), DdsLink::WallTime{17ms});
+  link_->beat(DdsLink::WallTime{18s});
+  const auto seen = far.take();
+  ASSERT_EQ(seen.size(), 2u);
+  EXPECT_EQ(seen[0].at, 17ms);
+  EXPECT_EQ(seen[1].at, 18s);
+}
+
+// Else abbe-dds would take the state before for what abbed says now.
+TEST_F(DdsLinkTest, ABeatDoesNotOvertakeAState) {
+  FarEnd far(path_);
+  link_->poll();
+  fill(*link_, 1);
+  link_->publish(Topic::ModelState, state_payload("a", 7));
+  bool state_came = false;
+  for (auto now = DdsLink::WallTime{100s}; !state_came; now += 100ms) {
+    link_->beat(now);
+    for (const auto& frame : far.take()) {
+      EXPECT_TRUE(frame.kind != 0 || state_came);
+      state_came |= frame.topic == static_cast<int>(Topic::ModelState) && frame.kind == 1;
+    }
+  }
+}
+
 TEST_F(DdsLinkTest, BeatsEvery100MillisecondsHoweverOftenItIsCalled) {
   FarEnd far(path_);
   link_->poll();
@@ -151,6 +216,57 @@ TEST_F(DdsLinkTest, NoticesThatThePeerLeft) {
   }
   link_->poll();
   EXPECT_FALSE(link_->connected());
+}
+
+/// Another process connects to `path` and holds the connection until it is killed.
+class OtherProcess {
+ public:
+  explicit OtherProcess(const std::filesystem::path& path) : pid_(::fork()) {
+    if (pid_ != 0) return;
+    const FarEnd far(path);
+    ::pause();
+  }
+  ~OtherProcess() {
+    ::kill(pid_, SIGKILL);
+    ::waitpid(pid_, nullptr, 0);
+  }
+  OtherProcess(const OtherProcess&) = delete;
+  OtherProcess& operator=(const OtherProcess&) = delete;
+
+ private:
+  pid_t pid_;
+};
+
+TEST_F(DdsLinkTest, OnlyTheSupervisedProcessMayConnect) {
+  DdsProcess process;
+  process.started(::getpid(), DdsLink::WallTime{1s});
+  const auto socket = directory_ / "supervised.sock";
+  auto link = DdsLink::listen(socket, {.process = &process});
+  ASSERT_TRUE(link.has_value());
+  FarEnd far(socket);
+  link->poll();
+  ASSERT_TRUE(link->connected());
+  const OtherProcess other(socket);
+  while (link->counters().strangers == 0) link->poll();
+  EXPECT_EQ(link->counters().connections, 1u);
+  link->publish(Topic::Snapshot, snapshot_payload(1));
+  EXPECT_EQ(far.take().size(), 1u);
+}
+
+TEST_F(DdsLinkTest, AnAnswerShowsThatThePeerReads) {
+  DdsProcess process;
+  process.started(::getpid(), DdsLink::WallTime{1ns});
+  const auto socket = directory_ / "supervised.sock";
+  auto link = DdsLink::listen(socket, {.process = &process});
+  ASSERT_TRUE(link.has_value());
+  const FarEnd far(socket);
+  link->poll();
+  link->beat(DdsLink::WallTime::clock::now());
+  EXPECT_FALSE(process.has_answered());
+  ASSERT_EQ(::send(far.fd, "", 1, 0), 1);
+  link->poll();
+  EXPECT_TRUE(process.has_answered());
+  EXPECT_TRUE(link->connected());
 }
 
 TEST_F(DdsLinkTest, RefusesBytesThatAreNoPayload) {

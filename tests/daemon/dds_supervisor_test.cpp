@@ -73,6 +73,69 @@ TEST(DdsSupervisor, BacksOffWhenTheChildDiesAtStart) {
   EXPECT_EQ(supervisor->restarts(), 2u);
 }
 
+TEST(DdsSupervisor, ASignalAtStartCostsTheFirstDelayEveryTime) {
+  auto supervisor = DdsSupervisor::start(shell("kill -SEGV $$"), WallTime{});
+  ASSERT_TRUE(supervisor.has_value());
+  for (int death = 1; death <= 3; ++death) {
+    const auto died = WallTime{death * 1s};
+    wait_for_end(supervisor->pid());
+    supervisor->poll(died);
+    EXPECT_EQ(supervisor->pid(), 0);
+    supervisor->poll(died + 100ms);
+    ASSERT_NE(supervisor->pid(), 0) << "death " << death;
+  }
+}
+
+/// Asks and never answers, after one answer.
+TEST(DdsSupervisor, EndsAndReplacesAChildThatDoesNotAnswer) {
+  DdsProcess process;
+  auto options = shell("exec sleep 60");
+  options.process = &process;
+  auto supervisor = DdsSupervisor::start(options, WallTime{1s});
+  ASSERT_TRUE(supervisor.has_value());
+  const pid_t hung = supervisor->pid();
+  EXPECT_EQ(process.pid(), hung);
+  process.answered(WallTime{2s});
+  for (auto at = 1s + 0ms; at <= 4s; at += 100ms) process.asked(WallTime{at});
+  supervisor->poll(WallTime{4s});
+  EXPECT_EQ(supervisor->pid(), hung);
+  process.asked(WallTime{4s + 1ms});
+  supervisor->poll(WallTime{4s + 1ms});
+  wait_for_end(hung);
+  supervisor->poll(WallTime{4s + 20ms});
+  EXPECT_NE(supervisor->pid(), hung);
+  EXPECT_EQ(process.pid(), supervisor->pid());
+  EXPECT_EQ(process.restarts(), 1u);
+  ASSERT_TRUE(process.last_end());
+  EXPECT_NE(process.last_end()->text().find("did not answer"), std::string::npos);
+}
+
+TEST(DdsSupervisor, AHubThatDoesNotAskIsNotTheChildsFault) {
+  DdsProcess process;
+  auto options = shell("exec sleep 60");
+  options.process = &process;
+  auto supervisor = DdsSupervisor::start(options, WallTime{1s});
+  ASSERT_TRUE(supervisor.has_value());
+  process.asked(WallTime{2s});
+  process.answered(WallTime{2s});
+  const pid_t child = supervisor->pid();
+  supervisor->poll(WallTime{60s});
+  EXPECT_EQ(supervisor->pid(), child);
+  EXPECT_EQ(process.silent_for(), 0ns);
+}
+
+/// As all of abbed after SIGSTOP and SIGCONT: the answer to the beat before lies unread.
+TEST(DdsProcess, AfterAPauseOfTheHubItsSilenceBeginsAnew) {
+  DdsProcess process;
+  process.started(4711, WallTime{1s});
+  for (auto at = 1s + 0ms; at <= 2s; at += 100ms) process.asked(WallTime{at});
+  process.answered(WallTime{1900ms});
+  process.asked(WallTime{5s});
+  EXPECT_EQ(process.silent_for(), 0ns);
+  for (auto at = 5s + 100ms; at <= 7s; at += 100ms) process.asked(WallTime{at});
+  EXPECT_EQ(process.silent_for(), 2s);
+}
+
 TEST(DdsSupervisor, TellsTheChildWhoItsParentIs) {
   const std::string me = std::to_string(::getpid());
   auto supervisor =

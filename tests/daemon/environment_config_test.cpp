@@ -9,6 +9,7 @@
 namespace abbe::daemon {
 namespace {
 
+using ::testing::AllOf;
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
@@ -128,6 +129,19 @@ TEST(EnvironmentConfiguration, RefusesADeviceWithoutAnAddressOrWithTwo) {
       faults_of("[[environment]]\nname = \"a\"\nmap = \"vaisala-indigo520-hmp\"\nhost = \"h\"\nserial = "
                 "\"/dev/ttyS0\"\n"),
       HasSubstr("needs one of host"));
+}
+
+TEST(EnvironmentConfiguration, DevicesOnOneSerialLineHaveTheSameSettings) {
+  const auto second = [](const std::string& settings) {
+    return "[[environment]]\nname = \"table\"\nmap = \"icpdas-zt2005-c8\"\nserial = "
+           "\"/dev/serial/by-id/rs485\"\n" +
+           settings + "unit = 4\ninputs = [\"table\"]\n";
+  };
+  EXPECT_THAT(faults_of(kScales + second("baud = 9600\nparity = \"none\"\nstop_bits = 2\n")), IsEmpty());
+  for (const std::string settings : {"baud = 19200\nparity = \"none\"\nstop_bits = 2\n", "baud = 9600\n"})
+    EXPECT_THAT(faults_of(kScales + second(settings)),
+                AllOf(HasSubstr("\"table\""), HasSubstr("\"rtd\""), HasSubstr("9600 8N2"),
+                      HasSubstr("/dev/serial/by-id/rs485"), HasSubstr("same baud, parity and stop_bits")));
 }
 
 TEST(ThermalConfiguration, FindsTheAxisAmongTheEncodersAndTheTemperatureByName) {

@@ -51,9 +51,10 @@ protocol::Snapshot touch_at(const Vector3& p_m, HostTime time, std::uint32_t num
 }
 
 struct EvemuAcquisitionTest : testing::Test {
+  EvemuAcquisitionTest() { acquisition.begin(kFrom); }
   void touch(std::size_t i) { acquisition.take(touch_at(points_m.at(i), kFrom + 1s * (i + 1), number++)); }
 
-  EvemuAcquisition acquisition = *EvemuAcquisition::create(request(), kFrom, {.device = "probe 1"});
+  EvemuAcquisition acquisition = *EvemuAcquisition::create(request(), {.device = "probe 1"});
   std::vector<Vector3> points_m = touched_points_m();
   std::uint32_t number = 1;
 };

@@ -331,8 +331,8 @@ TEST(ArtefactThermometer, KnowsWhenItsSensorIsSilent) {
 
 TEST(ArtefactThermometer, NoTouchIsUsedWhileItsSensorIsSilent) {
   const auto config = *parse_config(config_text(kSensor), "abbed.toml");
-  auto acquisition = *EvemuAcquisition::create({.calibrator = growing()}, protocol::HostTime{10s},
-                                               evemu_acquisition_options(config));
+  auto acquisition = *EvemuAcquisition::create({.calibrator = growing()}, evemu_acquisition_options(config));
+  acquisition.begin(protocol::HostTime{10s});
   auto touch = at_temperature(std::nan(""));
   touch.head.time = protocol::HostTime{11s};
   touch.has_trigger = true;
@@ -389,9 +389,9 @@ EvemuRun live_run(const CalibrationRequest& request, const Batch& batch, const C
   assembler.take(batch);
   assembler.finish(snapshots);
   for (const auto& snapshot : snapshots) session.take(snapshot);
-  auto run = session.take_run();
-  EXPECT_TRUE(run) << session.status().reason;
-  return run ? std::get<EvemuRun>(*run) : EvemuRun{};
+  auto acquired = session.take_run();
+  EXPECT_TRUE(acquired) << session.status().reason;
+  return acquired ? std::get<EvemuRun>(run_of(std::move(*acquired))) : EvemuRun{};
 }
 
 void record_run(const fs::path& folder, const std::string& configuration, const CalibrationRequest& request,

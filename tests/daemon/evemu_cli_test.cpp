@@ -27,6 +27,7 @@ using test::Ran;
 using test::text_of;
 using ::testing::AllOf;
 using ::testing::HasSubstr;
+using ::testing::Not;
 using ::testing::StartsWith;
 
 std::string calibrator_toml() {
@@ -178,6 +179,8 @@ void record_touches(const fs::path& folder, const Touches& all) {
   constexpr protocol::HostTime kBegin{1000s};
   EvemuRequest request{.calibrator = tests::evemu::reference_calibrator()};
   request.sources = {{"calibrator.toml", "abc"}};
+  recorder->record(example_axes(0), "encoder");
+  recorder->flush();  // a chunk that holds nothing of the run
   recorder->attach(to_attachment({request, kBegin}), kBegin);
   std::uint32_t number = 0;
   const auto record = [&](int position, Feature feature, int which) {
@@ -219,6 +222,17 @@ TEST_F(EvemuCli, IdentifiesFromARecordingAsFromTheTouchesInIt) {
   const auto other = abbe("identify evemu --recording run.mcap --order 3 --estimator ols --json -o other");
   ASSERT_EQ(other.exit, kRefused) << other.err;
   EXPECT_EQ(nlohmann::json::parse(other.out)["unknowns"], 45);
+}
+
+TEST_F(EvemuCli, ADamagedRecordingIsInTheVerdictAndInTheModel) {
+  record_touches(folder_, touches());
+  const std::string identify = "identify evemu --recording run.mcap -o out";
+  EXPECT_THAT(abbe(identify).out, Not(HasSubstr("damaged")));
+  damage_chunk(folder_ / "run.mcap", 0);
+  const auto ran = abbe(identify);
+  EXPECT_EQ(ran.exit, kRefused) << ran.err;
+  EXPECT_THAT(ran.out, HasSubstr("the recording is damaged: chunk 1"));
+  EXPECT_THAT(text_of(folder_ / "out/model.json"), HasSubstr("\"recording_gap\": \"the recording is damaged"));
 }
 
 TEST_F(EvemuCli, SaysWhatARecordingWithoutACompleteRunLacks) {

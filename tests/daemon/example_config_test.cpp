@@ -125,6 +125,8 @@ TEST(ExampleConfig, ItsCommentedKeysAreTheDefaults) {
   EXPECT_EQ(full.tracker->silence_timeout, plain.tracker->silence_timeout);
   EXPECT_EQ(full.tracker->weather, plain.tracker->weather);
   EXPECT_EQ(full.tracker->u_scale, plain.tracker->u_scale);
+  EXPECT_EQ(full.tracker->reflector, plain.tracker->reflector);
+  EXPECT_EQ(full.tracker->home_after_initialize, plain.tracker->home_after_initialize);
   EXPECT_EQ(full.encoder->u_sampling_delay, plain.encoder->u_sampling_delay);
   EXPECT_EQ(full.air.wavelength_m, plain.air.wavelength_m);
   EXPECT_EQ(full.air.co2_ppm, plain.air.co2_ppm);
@@ -140,6 +142,9 @@ TEST(ExampleConfig, ItsCommentedKeysAreTheDefaults) {
   EXPECT_EQ(full.gate.max_error_m, plain.gate.max_error_m);
   EXPECT_EQ(full.gate.max_gradient, plain.gate.max_gradient);
   EXPECT_EQ(full.control.socket, plain.control.socket);
+  EXPECT_EQ(full.control.look_group, plain.control.look_group);
+  EXPECT_EQ(full.control.change_group, plain.control.change_group);
+  EXPECT_EQ(full.control.move_group, plain.control.move_group);
 }
 
 }  // namespace

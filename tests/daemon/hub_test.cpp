@@ -1,13 +1,12 @@
 #include "abbe/daemon/hub.hpp"
 
 #include <gmock/gmock.h>
-#include <stdlib.h>
+#include <unistd.h>
 
+#include <algorithm>
 #include <future>
 
-#include "abbe/daemon/control_api.hpp"
-#include "dds_far_end.hpp"
-#include "synthetic_model.hpp"
+#include "hub_bench.hpp"
 
 namespace abbe::daemon {
 namespace {
@@ -15,24 +14,13 @@ namespace {
 using namespace std::chrono_literals;
 using nlohmann::json;
 using protocol::HostTime;
-using test::FarEnd;
 using test::messages;
+using test::myself;
+using ::testing::AllOf;
+using ::testing::HasSubstr;
 using ::testing::SizeIs;
+using ::testing::StartsWith;
 using v1::ModelStatus;
-
-/// Host and wall time as one, moved by the test.
-class OneClock final : public drivers::TimeSource {
- public:
-  [[nodiscard]] HostTime now() const noexcept override { return HostTime{100s} + passed; }
-  [[nodiscard]] std::chrono::nanoseconds wall(std::chrono::nanoseconds host) const noexcept override {
-    return host;
-  }
-  [[nodiscard]] std::chrono::nanoseconds host(std::chrono::nanoseconds wall) const noexcept override {
-    return wall;
-  }
-  [[nodiscard]] Hub::WallTime wall_now() const { return Hub::WallTime{100s} + passed; }
-  std::chrono::nanoseconds passed{};
-};
 
 struct FakeDevices final : SampleSource {
   void drain(Batch& batch) override {
@@ -47,40 +35,14 @@ struct FakeDevices final : SampleSource {
   Batch next;
 };
 
-class HubTest : public ::testing::Test {
+class HubTest : public test::HubBench<FakeDevices> {
  protected:
-  HubTest() {
-    std::string name = testing::TempDir() + "abbe-hub-XXXXXX";
-    directory_ = ::mkdtemp(name.data());
-    config_.machine.name = "mill";
-    config_.machine.target_offset_m = {0.02, -0.015, -0.12};
-    authority_.emplace(ModelAuthority::open(directory_, config_, {}, time_.now()).value());
-    calibration_.emplace(config_, *authority_, nullptr, protocol::UtcOffset{});
-    publisher_.emplace(
-        DdsLink::listen(directory_ / "dds.sock").value(),
-        PublisherOptions{
-            .machine = "mill", .tool_offset_m = config_.machine.target_offset_m, .compensation_hz = 0.0},
-        protocol::UtcOffset{});
-    far_.emplace(directory_ / "dds.sock");
-    hub_.emplace(HubParts{.config = config_,
-                          .time = time_,
-                          .devices = devices_,
-                          .authority = *authority_,
-                          .calibration = *calibration_,
-                          .publisher = &*publisher_});
-  }
-  ~HubTest() override { std::filesystem::remove_all(directory_); }
+  HubTest() { make_hub(); }
 
   void activate_a_model() {
-    auto document = test::synthetic_document(1);
-    document.machine_hash = machine_hash(config_);
-    auto kept = authority_->keeper().keep(document, {.accepted = true}, {"anna", "test", {}}, time_.now());
+    auto kept = keep_a_model();
     ASSERT_TRUE(kept) << kept.error().text;
     authority_->take_up(std::move(kept->active).value());
-  }
-  void turn(std::chrono::nanoseconds later = 1ms) {
-    time_.passed += later;
-    hub_->turn(time_.wall_now());
   }
   void turn_with_axes(std::chrono::nanoseconds later = 1ms) {
     protocol::AxisSample sample;
@@ -95,16 +57,6 @@ class HubTest : public ::testing::Test {
     for (const auto& m : messages<v1::ModelState>(far_->take(), Topic::ModelState)) out.push_back(m.state());
     return out;
   }
-
-  OneClock time_;
-  Config config_;
-  FakeDevices devices_;
-  std::filesystem::path directory_;
-  std::optional<ModelAuthority> authority_;
-  std::optional<CalibrationService> calibration_;
-  std::optional<Publisher> publisher_;
-  std::optional<FarEnd> far_;
-  std::optional<Hub> hub_;
 };
 
 TEST_F(HubTest, SaysThatItIsAliveWhetherOrNotAnythingComes) {
@@ -159,10 +111,11 @@ TEST_F(HubTest, SaysHowTheStreamsAreOnceASecond) {
     const auto more = messages<v1::Health>(far_->take(), Topic::Health);
     sent.insert(sent.end(), more.begin(), more.end());
   }
-  ASSERT_THAT(sent, SizeIs(3 * 3));  // at the first turn and twice a second later
+  ASSERT_THAT(sent, SizeIs(3 * 4));  // at the first turn and twice a second later
   EXPECT_EQ(sent[0].stream(), "encoder");
   EXPECT_EQ(sent[1].stream(), "models");
   EXPECT_EQ(sent[2].stream(), "dds");
+  EXPECT_EQ(sent[3].stream(), "dds_security");
 }
 
 TEST_F(HubTest, RefusesToCalibrateAxesTheControlCorrectsAlready) {
@@ -181,6 +134,23 @@ TEST_F(HubTest, RefusesToCalibrateOnTheFlyWithAStationaryTracker) {
   ASSERT_FALSE(started);
   EXPECT_EQ(started.error().code, ErrorCode::Refused);
   EXPECT_THAT(started.error().text, testing::HasSubstr("stationary"));
+}
+
+TEST_F(HubTest, StatusShowsNoPositionThatIsNotCurrent) {
+  const auto positions = [this] { return ask({{"do", "status"}})["position_m"]; };
+  turn_with_axes();
+  EXPECT_EQ(positions(), json({0.01, -0.02, -0.25}));
+  protocol::AxisSample without_x;
+  without_x.head.time = time_.now() + 1ms;
+  without_x.head.flags = static_cast<protocol::SampleFlags>(protocol::SampleFlag::AxisMissing);
+  without_x.axis_count = 3;
+  without_x.missing_mask = 0b001;
+  without_x.position = {0.01, -0.02, -0.25};
+  devices_.next.axes.push_back(without_x);
+  turn();
+  EXPECT_EQ(positions(), json({nullptr, -0.02, -0.25}));
+  turn(600ms);
+  EXPECT_EQ(positions(), json({nullptr, nullptr, nullptr})) << "no sample for longer than the axes are known";
 }
 
 TEST_F(HubTest, RunsATaskOfAnotherThreadAtItsNextTurn) {
@@ -213,6 +183,50 @@ TEST_F(HubTest, ATaskThatThrowsThrowsInTheThreadThatAsked) {
   turn();
 }
 
+TEST_F(HubTest, ARequestIsRefusedWithoutTheRoleItTakes) {
+  config_.control = {.look_group = "abbe-no-such-look",
+                     .change_group = "abbe-no-such-change",
+                     .move_group = "abbe-no-such-move"};
+  const ControlPeer stranger{.user = "anna", .uid = ::geteuid() + 1};
+  for (const ControlVerb& verb : control_verbs()) {
+    json request{{"do", verb.name}};
+    if (!verb.member.empty()) request[verb.member] = true;
+    const json answer = answer_request(*hub_, request, stranger, 0ms);
+    EXPECT_EQ(answer["code"], "refused") << request;
+    const std::string role = verb.role == Role::Move ? "move" : verb.role == Role::Change ? "change" : "look";
+    EXPECT_THAT(answer["error"].get<std::string>(),
+                AllOf(StartsWith(verb.name + ": "), HasSubstr("anna"), HasSubstr("abbe-no-such-" + role)));
+  }
+}
+
+TEST_F(HubTest, WhatMovesAMachineOrChangesWhatIsInForceIsNotOpenToWhoeverLooks) {
+  const auto role_of = [](const std::string& name, const std::string& member) {
+    const auto verbs = control_verbs();
+    const auto found = std::ranges::find_if(
+        verbs, [&](const ControlVerb& v) { return v.name == name && v.member == member; });
+    return found == verbs.end() ? Role::Look : found->role;
+  };
+  EXPECT_EQ(role_of("touch", ""), Role::Move);
+  EXPECT_EQ(role_of("touches", ""), Role::Move);
+  EXPECT_EQ(role_of("touch", "cancel"), Role::Look);
+  EXPECT_EQ(role_of("calibrate", ""), Role::Change);
+  EXPECT_EQ(role_of("cancel", ""), Role::Change);
+  EXPECT_EQ(role_of("reference", "here"), Role::Change);
+  EXPECT_EQ(role_of("tracker", ""), Role::Move);
+}
+
+TEST_F(HubTest, WhoeverOnlyLooksGivesTheTrackerNoOrderThatMovesIt) {
+  config_.control = {.change_group = "abbe-no-such-change", .move_group = "abbe-no-such-move"};
+  const ControlPeer looks{.user = "anna", .uid = ::geteuid() + 1};
+  for (const char* order : {"initialize", "home", "find", "reflector set"}) {
+    const json answer = answer_on_hub(*hub_, {{"do", "tracker"}, {"order", order}}, looks);
+    EXPECT_THAT(answer["error"].get<std::string>(),
+                HasSubstr("moves a machine or tracker, which anna may not"));
+  }
+  EXPECT_THAT(answer_on_hub(*hub_, {{"do", "tracker_reflectors"}}, looks)["error"].get<std::string>(),
+              HasSubstr("not in this daemon"));
+}
+
 TEST_F(HubTest, CollectsStandstillsForWhoeverAsksOverTheSocket) {
   config_.tracker.emplace().host = "127.0.0.1";
   VerificationService verification{config_};
@@ -223,7 +237,7 @@ TEST_F(HubTest, CollectsStandstillsForWhoeverAsksOverTheSocket) {
                    .calibration = *calibration_,
                    .verification = &verification}};
   const auto ask = [&](const json& request) {
-    auto answer = std::async(std::launch::async, [&] { return answer_request(hub, request, 60s); });
+    auto answer = std::async(std::launch::async, [&] { return answer_request(hub, request, myself(), 60s); });
     while (answer.wait_for(0s) != std::future_status::ready) hub.turn(time_.wall_now());
     return answer.get();
   };

@@ -62,6 +62,33 @@ TEST(LiveView, AnAxisThatIsTakenBackLeavesTheOthersAsTheyWere) {
   EXPECT_EQ(live.view().velocity[1], 0.0);
 }
 
+TEST(LiveView, DoesNotShowThePointOfATrackerThatDied) {
+  LiveView live{AssemblerOptions{}};
+  protocol::TrackerPoint point;
+  point.head.time = kStart;
+  point.p_tracker_m = {1.0, 2.0, 3.0};
+  live.take(of(point));
+  live.take(of(axes_at(kStart + 1s, 0.1)));
+  EXPECT_TRUE(live.view().has_tracker_point);
+  live.take(of(axes_at(kStart + 1s + 1ms, 0.1)));
+  EXPECT_FALSE(live.view().has_tracker_point);
+  EXPECT_EQ(live.view().tracker_point.p_tracker_m, (std::array<double, 3>{}));
+  point.head.time = kStart + 1500ms;
+  live.take(of(point));
+  EXPECT_TRUE(live.view().has_tracker_point) << "the beam is back";
+}
+
+TEST(LiveView, DoesNotShowATouchOfLongAgo) {
+  LiveView live{AssemblerOptions{}};
+  Batch touch;
+  touch.touches.emplace_back().head.time = kStart;
+  live.take(touch);
+  live.take(of(axes_at(kStart + 1s, 0.1)));
+  EXPECT_TRUE(live.view().has_trigger);
+  live.take(of(axes_at(kStart + 1s + 1ms, 0.1)));
+  EXPECT_FALSE(live.view().has_trigger);
+}
+
 TEST(LiveView, SaysThatNothingCame) {
   LiveView live{AssemblerOptions{}};
   EXPECT_FALSE(live.take(Batch{}));

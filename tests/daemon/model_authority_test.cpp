@@ -3,11 +3,15 @@
 #include <gmock/gmock.h>
 #include <sched.h>
 #include <sys/stat.h>
+#include <unistd.h>
 
 #include <fstream>
-#include <set>
+#include <future>
+#include <memory>
 #include <thread>
 
+#include "abbe/daemon/cdr.hpp"
+#include "abbe/daemon/work_aside.hpp"
 #include "synthetic_model.hpp"
 #include "text_files.hpp"
 
@@ -34,7 +38,7 @@ class ModelAuthorityTest : public ::testing::Test {
   }
   ~ModelAuthorityTest() override { fs::remove_all(folder_); }
 
-  ModelAuthority open() { return ModelAuthority::open(folder_, config_, kUtc, kNow).value(); }
+  ModelAuthority open() { return ModelAuthority::open(folder_, config_, kUtc, kNow); }
   /// Somebody's command, in a process of its own as it were.
   ModelStore store() { return ModelStore::open(folder_).value(); }
   [[nodiscard]] ModelDocument document(unsigned seed) const {
@@ -71,6 +75,18 @@ class ModelAuthorityTest : public ::testing::Test {
       fs::path(::testing::TempDir()) /
       (std::string("authority_") + ::testing::UnitTest::GetInstance()->current_test_info()->name());
 };
+
+/// As the service does every five seconds, where the last step failed.
+TEST_F(ModelAuthorityTest, AModelThatIsKeptAgainIsEnteredOnce) {
+  auto authority = open();
+  for (int i = 0; i < 3; ++i) ASSERT_TRUE(add(authority, document(1), {.accepted = true}, actor("t"), kNow));
+  const auto history = store().history().value();
+  ASSERT_EQ(history.size(), 2u);
+  EXPECT_EQ(history[0].action, StoreAction::Added);
+  EXPECT_EQ(history[1].action, StoreAction::Activated);
+  ASSERT_TRUE(add(authority, document(1), {.accepted = true}, actor("t", kNow + 1s), kNow));
+  EXPECT_EQ(store().history()->size(), 4u) << "another calibration";
+}
 
 TEST_F(ModelAuthorityTest, WithoutAModelTheStateIsNone) {
   const auto standing = fresh_standing(open());
@@ -222,24 +238,6 @@ TEST_F(ModelAuthorityTest, AModelFileThatWasRepairedComesIntoForce) {
   EXPECT_EQ(fresh_standing(authority).status, ModelStatus::MODEL_ACTIVE);
 }
 
-/// The store with a pipe in the place of state.json: whoever reads it waits until the test writes into it.
-class SlowStore {
- public:
-  explicit SlowStore(fs::path state) : state_(std::move(state)), saved_(state_.string() + ".saved") {
-    fs::rename(state_, saved_);
-    if (::mkfifo(state_.c_str(), 0600) != 0) throw std::runtime_error{"mkfifo"};
-  }
-  /// Waits until it is being read, puts the file back and gives the reader `text`.
-  void answer(const std::string& text) {
-    std::ofstream pipe{state_};
-    fs::rename(saved_, state_);
-    pipe << text;
-  }
-
- private:
-  fs::path state_, saved_;
-};
-
 TEST_F(ModelAuthorityTest, WhatWasReadBeforeAnotherModelWasTakenUpIsNotTakenUp) {
   auto authority = open();
   ASSERT_TRUE(add(authority, document(1), {.accepted = true}, actor("first"), kNow));
@@ -247,11 +245,12 @@ TEST_F(ModelAuthorityTest, WhatWasReadBeforeAnotherModelWasTakenUpIsNotTakenUp) 
   const std::string before = text_of(folder_ / "state.json");
   auto kept = authority.keeper().keep(document(2), {.accepted = true}, actor("second", kNow + 1s), kNow);
   ASSERT_TRUE(kept);
-  SlowStore slow{folder_ / "state.json"};
-  ASSERT_EQ(authority.follow_store(kNow), ModelAuthority::Following::Reading);
+  const std::string after = text_of(folder_ / "state.json");
+  std::ofstream{folder_ / "state.json"} << before;
+  (void)authority.follow_store(kNow);  // reads what was before, and is asked for it only below
   authority.take_up(std::move(*kept->active));
-  slow.answer(before);
   EXPECT_FALSE(follow(authority));
+  std::ofstream{folder_ / "state.json"} << after;
   EXPECT_EQ(fresh_standing(authority).model->id, kept->id);
   EXPECT_FALSE(follow(authority));
   EXPECT_EQ(fresh_standing(authority).model->id, kept->id);
@@ -271,19 +270,39 @@ TEST_F(ModelAuthorityTest, WhatWasKeptBeforeARollbackIsNotTakenUpAfterIt) {
   EXPECT_EQ(fresh_standing(authority).model->id, first);
 }
 
-std::set<std::string> threads() {
-  std::set<std::string> ids;
-  for (const auto& entry : fs::directory_iterator{"/proc/self/task"}) ids.insert(entry.path().filename());
-  return ids;
+TEST_F(ModelAuthorityTest, AModelIsEncodedWhereItIsRead) {
+  auto authority = open();
+  ASSERT_TRUE(add(authority, document(1), {.accepted = true}, actor("calibrate otf"), kNow));
+  const auto standing = fresh_standing(authority);
+  ASSERT_NE(standing.publication, nullptr);
+  const auto model = decode<v1::ErrorModel>(standing.publication->model);
+  ASSERT_TRUE(model);
+  EXPECT_EQ(*model, model_message(*standing.model, {.machine = "mill"}));
+  EXPECT_EQ(standing.publication->slices.size(), grid_messages(*standing.model, {.machine = "mill"}).size());
+}
+
+TEST_F(ModelAuthorityTest, TheModelOfBeforeIsDestroyedOnAnotherThread) {
+  auto authority = open();
+  const auto destroyed = std::make_shared<std::promise<std::thread::id>>();
+  ActiveModel first;
+  first.model = std::shared_ptr<const ModelInForce>{
+      new ModelInForce{.id = "first", .model = document(1).model}, [destroyed](const ModelInForce* m) {
+        delete m;
+        destroyed->set_value(std::this_thread::get_id());
+      }};
+  authority.take_up(std::move(first));
+  ASSERT_EQ(authority.in_force()->id, "first");
+  authority.take_up(ActiveModel{});
+  EXPECT_NE(destroyed->get_future().get(), std::this_thread::get_id());
 }
 
 // The hub is pinned and has a real-time priority; here a batch thread on one processor stands for it.
-TEST_F(ModelAuthorityTest, TheStoreIsReadOnAnOrdinaryThreadHoweverTheHubRuns) {
-  auto authority = open();
-  ASSERT_TRUE(add(authority, document(1), {.accepted = true}, actor("first"), kNow));
-  const std::string state = text_of(folder_ / "state.json");
-  SlowStore slow{folder_ / "state.json"};
-  std::set<std::string> before;
+TEST(WorkAside, RunsOnAnOrdinaryThreadHoweverTheHubRuns) {
+  struct Seen {
+    int policy = -1;
+    cpu_set_t cpus{};
+  };
+  Seen seen;
   std::thread hub{[&] {
     const sched_param none{};
     ASSERT_EQ(::sched_setscheduler(0, SCHED_BATCH, &none), 0);
@@ -291,21 +310,17 @@ TEST_F(ModelAuthorityTest, TheStoreIsReadOnAnOrdinaryThreadHoweverTheHubRuns) {
     CPU_ZERO(&one);
     CPU_SET(::sched_getcpu(), &one);
     ASSERT_EQ(::sched_setaffinity(0, sizeof one, &one), 0);
-    before = threads();
-    EXPECT_EQ(authority.follow_store(kNow), ModelAuthority::Following::Reading);
+    seen = start_aside([] {
+             Seen of_worker{.policy = ::sched_getscheduler(0)};
+             (void)::sched_getaffinity(0, sizeof of_worker.cpus, &of_worker.cpus);
+             return of_worker;
+           }).get();
   }};
   hub.join();
-  const std::ofstream pipe{folder_ / "state.json"};  // returns when the worker has opened its end
-  std::set<std::string> now = threads();
-  for (const auto& id : before) now.erase(id);
-  ASSERT_EQ(now.size(), 1u);
-  const pid_t worker = std::stoi(*now.begin());
-  EXPECT_EQ(::sched_getscheduler(worker), SCHED_OTHER);
-  cpu_set_t of_worker, of_process;
-  ASSERT_EQ(::sched_getaffinity(worker, sizeof of_worker, &of_worker), 0);
+  EXPECT_EQ(seen.policy, SCHED_OTHER);
+  cpu_set_t of_process;
   ASSERT_EQ(::sched_getaffinity(::getpid(), sizeof of_process, &of_process), 0);
-  EXPECT_TRUE(CPU_EQUAL(&of_worker, &of_process));
-  slow.answer(state);
+  EXPECT_TRUE(CPU_EQUAL(&seen.cpus, &of_process));
 }
 
 TEST_F(ModelAuthorityTest, ADamagedActiveModelIsInvalidAndNotUsed) {
@@ -317,6 +332,55 @@ TEST_F(ModelAuthorityTest, ADamagedActiveModelIsInvalidAndNotUsed) {
   EXPECT_THAT(standing.reason, HasSubstr(id));
   EXPECT_EQ(standing.model, nullptr);
   EXPECT_FALSE(follow(authority));
+}
+
+TEST_F(ModelAuthorityTest, ADamagedStateIsSetAsideAtTheStartAndReportedUntilAModelIsActivated) {
+  const auto id = add(open(), document(1), {.accepted = true}, actor("calibrate otf"), kNow).value();
+  fs::resize_file(folder_ / "state.json", 30);
+  auto authority = open();
+  const std::string aside = "state.json.damaged-2023-11-14T22-30-00Z";
+  EXPECT_TRUE(fs::exists(folder_ / aside));
+  EXPECT_EQ(fresh_standing(authority).status, ModelStatus::MODEL_INVALID);
+  EXPECT_THAT(fresh_standing(authority).reason, HasSubstr(aside));
+  EXPECT_THAT(authority.fault(), HasSubstr(aside));
+  EXPECT_THAT(open().fault(), HasSubstr(aside)) << "also after another restart";
+  ASSERT_TRUE(store().activate(id, actor("it was this one"), true));
+  EXPECT_TRUE(follow(authority));
+  EXPECT_EQ(authority.fault(), "");
+  EXPECT_EQ(fresh_standing(authority).status, ModelStatus::MODEL_ACTIVE);
+}
+
+// A read-only disk, a missing permission: root is refused nothing, so a file stands for them.
+TEST_F(ModelAuthorityTest, AStoreThatCannotBeMadeIsReportedAndTriedAgain) {
+  std::ofstream{folder_} << "in the way";
+  auto authority = open();
+  EXPECT_THAT(authority.fault(), HasSubstr(folder_.string()));
+  EXPECT_EQ(fresh_standing(authority).status, ModelStatus::MODEL_INVALID);
+  fs::remove(folder_);
+  EXPECT_TRUE(follow(authority));
+  EXPECT_EQ(authority.fault(), "");
+  EXPECT_EQ(fresh_standing(authority).status, ModelStatus::MODEL_NONE);
+}
+
+TEST_F(ModelAuthorityTest, TheStartRemovesWhatKilledProcessesLeftInTheStore) {
+  const auto id = add(open(), document(1), {.accepted = true}, actor("calibrate otf"), kNow).value();
+  const auto left = {folder_ / "state.json.999999999.new", folder_ / "models" / (id + ".json.999999999.new")};
+  const auto living = folder_ / ("state.json." + std::to_string(::getppid()) + ".new");
+  for (const auto& file : left) std::ofstream{file} << "half";
+  std::ofstream{living} << "half";
+  (void)open();
+  for (const auto& file : left) EXPECT_FALSE(fs::exists(file)) << file;
+  EXPECT_TRUE(fs::exists(living)) << "it may be writing";
+}
+
+TEST_F(ModelAuthorityTest, AModelThatNoReplayCanCheckSaysSo) {
+  auto unchecked = document(1);
+  unchecked.recording_gap = "12 messages of the run are missing";
+  auto authority = open();
+  ASSERT_TRUE(add(authority, unchecked, {.accepted = true}, actor("calibrate otf"), kNow));
+  EXPECT_EQ(fresh_standing(authority).status, ModelStatus::MODEL_ACTIVE);
+  EXPECT_EQ(fresh_standing(authority).reason,
+            "accepted by the gate; no replay can check this model: 12 messages of the run are missing");
 }
 
 TEST_F(ModelAuthorityTest, AModelThatCannotBePublishedIsNotTakenUp) {

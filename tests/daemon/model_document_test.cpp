@@ -170,6 +170,15 @@ TEST(ModelDocument, ReportsEveryFaultAtOnce) {
                                                              HasSubstr("statistics.sigma0: missing")}));
 }
 
+TEST(ModelDocument, IsRefusedBeforeItIsParsedWhenItNestsTooDeep) {
+  for (const std::string& text : {std::string(100'000, '['), "{\"a\":" + std::string(17, '[')}) {
+    const auto read = parse_model(text, "model.json");
+    ASSERT_FALSE(read);
+    EXPECT_EQ(read.error().code, ErrorCode::BadInput);
+    EXPECT_THAT(read.error().text, HasSubstr("model.json: nested deeper than 16"));
+  }
+}
+
 TEST(ModelDocument, IsRefusedWhenCutAnywhere) {
   const auto text = to_json(synthetic_document(9));
   for (std::size_t length = 0; length + 2 < text.size(); length += 997) {

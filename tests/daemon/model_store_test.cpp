@@ -1,7 +1,10 @@
 #include "abbe/daemon/model_store.hpp"
 
+#include <fcntl.h>
+#include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <signal.h>
+#include <sys/file.h>
 #include <sys/stat.h>
 #include <sys/wait.h>
 #include <unistd.h>
@@ -200,6 +203,51 @@ TEST_F(ModelStoreTest, SaysThatItCannotBeListed) {
   fs::rename(folder_ / "models", folder_ / "elsewhere");
   EXPECT_THAT(store.list().error().text, HasSubstr("list "));
   EXPECT_EQ(store.find("0123").error().code, ErrorCode::Io);
+}
+
+TEST_F(ModelStoreTest, WaitsForNoPipeThatLiesInIt) {
+  add(1);
+  const auto piped = add(2);
+  fs::remove(open().model_path(piped));
+  ASSERT_EQ(::mkfifo(open().model_path(piped).c_str(), 0600), 0);
+  const auto entries = open().list().value();
+  ASSERT_THAT(entries, SizeIs(2));
+  for (const auto& entry : entries)
+    EXPECT_EQ(entry.fault.find("is not a regular file") != std::string::npos, entry.id == piped)
+        << entry.fault;
+  fs::remove(folder_ / "state.json");
+  ASSERT_EQ(::mkfifo((folder_ / "state.json").c_str(), 0600), 0);
+  EXPECT_THAT(ModelStore::open(folder_).error().text, HasSubstr("is not a regular file"));
+}
+
+// Anybody who can open the lock can hold it.
+TEST_F(ModelStoreTest, TheLockBelongsToWhoMayWriteToTheStore) {
+  fs::create_directories(folder_);
+  fs::permissions(folder_, fs::perms{0755});
+  add(1);
+  EXPECT_EQ(mode_of(folder_ / "lock"), 0600u);
+  fs::permissions(folder_ / "lock", fs::perms{0644});  // as versions before made it
+  add(2);
+  EXPECT_EQ(mode_of(folder_ / "lock"), 0600u);
+  fs::permissions(folder_, fs::perms{0775});
+  add(3);
+  EXPECT_EQ(mode_of(folder_ / "lock"), 0660u);
+}
+
+TEST_F(ModelStoreTest, AModelIsOnTheDiskAlsoWhenTheLockIsHeldAndTheHolderIsNamed) {
+  add(1);
+  const int lock = ::open((folder_ / "lock").c_str(), O_RDONLY | O_CLOEXEC);
+  ASSERT_EQ(::flock(lock, LOCK_EX), 0);
+  const auto document = synthetic_document(2);
+  const auto added = open().add(document, true, {}, actor("daemon"));
+  ASSERT_FALSE(added);
+  EXPECT_THAT(added.error().text, HasSubstr("held it for 5 s"));
+  if (std::ifstream{"/proc/locks"}.peek() != std::ifstream::traits_type::eof()) {
+    EXPECT_THAT(added.error().text, HasSubstr(fmt::format("(process {})", ::getpid())));
+  }
+  EXPECT_TRUE(open().load(model_id(document)));
+  ::close(lock);
+  EXPECT_TRUE(open().add(document, true, {}, actor("daemon")));
 }
 
 TEST_F(ModelStoreTest, SaysThatTheStateIsDamaged) {

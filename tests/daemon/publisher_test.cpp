@@ -23,6 +23,7 @@ constexpr HostTime kNow{100s};
 constexpr WallTime kWall{50s};
 
 const ModelInForce kModel{.id = "m", .method = "otf", .model = test::synthetic_model(1)};
+const ModelPublication kPublication = encode_model(kModel, "mill").value();
 
 protocol::Snapshot view() {
   protocol::Snapshot v;
@@ -33,7 +34,11 @@ protocol::Snapshot view() {
 }
 
 ModelStanding active(std::uint64_t revision = 1) {
-  return {.status = ModelStatus::MODEL_ACTIVE, .reason = "accepted", .model = &kModel, .revision = revision};
+  return {.status = ModelStatus::MODEL_ACTIVE,
+          .reason = "accepted",
+          .model = &kModel,
+          .publication = &kPublication,
+          .revision = revision};
 }
 
 class PublisherTest : public ::testing::Test {
@@ -135,6 +140,19 @@ TEST_F(PublisherTest, ModelAndGridGoOutOncePerRevision) {
   seen = far_->take();
   EXPECT_THAT(messages<v1::ErrorModel>(seen, Topic::ErrorModel), SizeIs(1));
   EXPECT_THAT(messages<v1::ModelState>(seen, Topic::ModelState), SizeIs(1));
+}
+
+TEST_F(PublisherTest, WhatWasEncodedElsewhereGoesOutWithSequenceNumbersOfThisPublisher) {
+  publish_live(view(), active(), kNow, kWall);  // has numbers already
+  const auto before = taken<v1::Compensation>(Topic::Compensation).at(0).sequence_number();
+  publisher_->model(active(), kNow, kWall);
+  const auto seen = far_->take();
+  const auto models = messages<v1::ErrorModel>(seen, Topic::ErrorModel);
+  ASSERT_THAT(models, SizeIs(1));
+  EXPECT_EQ(models[0], model_message(kModel, {.machine = "mill", .sequence_number = before + 1}));
+  auto expected = grid_messages(kModel, {.machine = "mill"});
+  for (std::size_t i = 0; i < expected.size(); ++i) expected[i].sequence_number(before + 2 + i);
+  EXPECT_EQ(messages<v1::ErrorGrid>(seen, Topic::ErrorGrid), expected);
 }
 
 TEST_F(PublisherTest, TheStateGoesOutEverySecondAndAtOnceWhenItChanges) {

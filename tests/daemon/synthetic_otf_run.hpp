@@ -67,26 +67,38 @@ inline std::string synthetic_path_csv() {
   return text;
 }
 
-/// Spherical form, tracker frame turned and moved against the machine.
-inline std::string synthetic_tracker_csv() {
+struct SyntheticPoint {
+  double time_s = 0.0;
+  Eigen::Vector3d q_m, p_tracker_m;
+};
+
+/// Tracker frame turned and moved against the machine. `stand_s`: after the last leg.
+inline std::vector<SyntheticPoint> synthetic_points(double dwell_s = 0.2, double stand_s = 0.2) {
   const auto truth = synthetic_truth();
   sim::PathPlan plan;
   for (const auto& q : synthetic_path_m()) plan.vertices.push_back({q});
-  plan.dwell_s = 0.2;  // the standstill at both ends must hold 20 points
+  plan.dwell_s = dwell_s;  // the standstill at both ends must hold 20 points
   const auto motion = sim::PathMotion::plan(plan).value();
   const Eigen::Matrix3d R_machine_tracker =
       Eigen::AngleAxisd(1.1, Eigen::Vector3d(0.02, -0.03, 1).normalized()).matrix();
   const Eigen::Vector3d tracker_m(-0.9, -0.7, -0.3);
-  std::string text = "time_s,range_mm,azimuth_rad,elevation_rad\n";
-  const auto count = static_cast<int>((motion.duration_s() + 0.2) * kPointRate_Hz);
+  std::vector<SyntheticPoint> points;
+  const auto count = static_cast<int>((motion.duration_s() + stand_s) * kPointRate_Hz);
   for (int i = 0; i < count; ++i) {
     const double time_s = i / kPointRate_Hz;
     const auto state = motion.at(time_s);
-    const Eigen::Vector3d p_m =
-        R_machine_tracker.transpose() * (sim::position_m(truth, state.q_m) - tracker_m);
+    points.push_back(
+        {time_s, state.q_m, R_machine_tracker.transpose() * (sim::position_m(truth, state.q_m) - tracker_m)});
+  }
+  return points;
+}
+
+/// Spherical form.
+inline std::string synthetic_tracker_csv() {
+  std::string text = "time_s,range_mm,azimuth_rad,elevation_rad\n";
+  for (const auto& [time_s, q_m, p_m] : synthetic_points())
     text += fmt::format("{},{:.17g},{:.17g},{:.17g}\n", time_s, p_m.norm() * 1e3, std::atan2(p_m[1], p_m[0]),
                         std::asin(p_m[2] / p_m.norm()));
-  }
   return text;
 }
 

@@ -3,6 +3,8 @@
 #include <gmock/gmock.h>
 
 #include <limits>
+#include <optional>
+#include <string>
 
 #include "abbe/daemon/touch_service.hpp"
 
@@ -24,17 +26,23 @@ struct Machine final : SampleSource {
     if (!ready) return fail(ErrorCode::Refused, "measuring machine cmm is not ready: connecting");
     return std::array<double, 3>{0.0, 0.0, 1.0};
   }
+  void stop_machine() override { ++stopped; }
+  std::optional<std::string> release_awaited() const override {
+    return stopped > 0 ? std::optional<std::string>{"stopped by request"} : std::nullopt;
+  }
+  std::optional<TipPlace> tip_place() const override { return TipPlace{{0.1, 0.2, 0.0075}, 100ms}; }
   bool ready = true;
+  int stopped = 0;
   std::vector<drivers::ProbePoint> asked;
 };
 
-std::vector<TouchRequest> two_touches() {
+TouchJob two_touches(std::vector<drivers::ProbePoint> leave = {}) {
   TouchRequest one;
   one.way = {{.position_m = {0, 0, 1}, .touch = false}};
   one.point = {.position_m = {0, 0, 0.1}};
   TouchRequest two;
   two.point = {.position_m = {0, 0, 0.2}};
-  return {one, two};
+  return touch_job({one, two}, std::move(leave)).value();
 }
 
 Batch touched(double z_m) {
@@ -70,6 +78,16 @@ TEST(TouchService, AsksForOneTouchAndItsWayAtATime) {
   EXPECT_TRUE(service.status().reason.empty());
   ASSERT_EQ(service.status().touches.size(), 2u);
   EXPECT_EQ(service.status().touches[1].position[2], 0.2);
+}
+
+TEST(TouchService, AJobHasABound) {
+  const std::vector<TouchRequest> touches(TouchJob::kMostTouches);
+  EXPECT_TRUE(touch_job(touches));
+  EXPECT_THAT(touch_job(std::vector<TouchRequest>(touches.size() + 1)).error().text,
+              HasSubstr("more than one request may hold"));
+  TouchRequest roundabout;
+  roundabout.way.resize(TouchJob::kMostPlaces);
+  EXPECT_EQ(touch_job({roundabout}).error().code, ErrorCode::Usage);
 }
 
 TEST(TouchService, EndsAtARefusedTouchWithWhatTheMachineSaid) {
@@ -108,24 +126,52 @@ TEST(TouchService, RefusesWhatCannotBe) {
   TouchService none{machine, false};
   EXPECT_THAT(none.start(two_touches()).error().text, HasSubstr("[cmm]"));
   TouchService service{machine, true};
-  EXPECT_FALSE(service.start({}));
+  EXPECT_FALSE(touch_job({}));
   EXPECT_FALSE(service.cancel());
   ASSERT_TRUE(service.start(two_touches()));
   EXPECT_EQ(service.start(two_touches()).error().code, ErrorCode::Refused);
 }
 
-TEST(TouchService, MakesAndKeepsTheTouchThatIsUnderWayWhenCancelled) {
+TEST(TouchService, StopsTheMotionWhenCancelledAndSaysWhereTheTipStands) {
   Machine machine;
   TouchService service{machine, true};
   ASSERT_TRUE(service.start(two_touches()));
   ASSERT_TRUE(service.cancel());
+  EXPECT_EQ(machine.stopped, 1);
   EXPECT_TRUE(service.status().running);
-  EXPECT_FALSE(service.start(two_touches()));  // that touch would count as its first one
-  service.turn(touched(0.1), 1, "", kFirstTurn);
+  EXPECT_FALSE(service.start(two_touches()));  // the machine does not stand yet
+  service.turn(refused(), 1, "", kFirstTurn);
+  EXPECT_TRUE(service.status().running);
+  service.turn({}, 0, "", kFirstTurn);
   EXPECT_FALSE(service.status().running);
-  EXPECT_EQ(service.status().reason, "cancelled");
+  EXPECT_EQ(service.status().reason,
+            "cancelled; the tip was reported at X 100.000, Y 200.000, Z 7.500 mm 0.1 s before; look at the "
+            "machine, then `abbe machine release`");
+  EXPECT_EQ(machine.asked.size(), 2u);
+}
+
+TEST(TouchService, KeepsTheTouchThatWasMadeBeforeTheMachineStopped) {
+  Machine machine;
+  TouchService service{machine, true};
+  ASSERT_TRUE(service.start(two_touches()));
+  ASSERT_TRUE(service.cancel());
+  service.turn(touched(0.1), 0, "", kFirstTurn);
+  EXPECT_FALSE(service.status().running);
   EXPECT_EQ(service.status().touches.size(), 1u);
   EXPECT_EQ(machine.asked.size(), 2u);
+}
+
+TEST(TouchService, StopsTheMachineAlsoOnItsWayOut) {
+  Machine machine;
+  TouchService service{machine, true};
+  ASSERT_TRUE(service.start(two_touches({{.position_m = {0, 0, 0.5}, .touch = false}})));
+  service.turn(touched(0.1), 1, "", kFirstTurn);
+  service.turn(touched(0.2), 0, "", kFirstTurn);
+  ASSERT_TRUE(service.cancel());
+  EXPECT_EQ(machine.stopped, 1);
+  service.turn({}, 0, "", kFirstTurn);
+  EXPECT_FALSE(service.status().running);
+  EXPECT_THAT(service.status().reason, HasSubstr("the tip was reported at"));
 }
 
 TEST(TouchService, EndsWhenNobodyLooksOnAnyMore) {
@@ -141,10 +187,12 @@ TEST(TouchService, EndsWhenNobodyLooksOnAnyMore) {
   (void)service.status();  // the daemon's own looking is nobody's
   service.turn({}, 1, "", kFirstTurn + 4200ms);
   EXPECT_THAT(service.status().reason, HasSubstr("nobody looked on"));
-  EXPECT_TRUE(service.status().running);  // until the touch that is under way is made
-  service.turn(touched(0.1), 1, "", kFirstTurn + 4300ms);
+  EXPECT_TRUE(service.status().running);  // until the machine stands
+  EXPECT_EQ(machine.stopped, 1);
+  service.turn({}, 1, "", kFirstTurn + 4300ms);
+  EXPECT_EQ(machine.stopped, 1);
+  service.turn({}, 0, "", kFirstTurn + 4400ms);
   EXPECT_FALSE(service.status().running);
-  EXPECT_EQ(service.status().touches.size(), 1u);
   EXPECT_EQ(machine.asked.size(), 2u);  // the second touch was never begun
 }
 
@@ -162,7 +210,7 @@ TEST(TouchService, CountsTheTimeAnewForEveryStart) {
 TEST(TouchService, LeavesWhenAllWasTouchedAndRunsUntilItHas) {
   Machine machine;
   TouchService service{machine, true};
-  ASSERT_TRUE(service.start(two_touches(), {{.position_m = {0, 0, 0.5}, .touch = false}}));
+  ASSERT_TRUE(service.start(two_touches({{.position_m = {0, 0, 0.5}, .touch = false}})));
   service.turn(touched(0.1), 1, "", kFirstTurn);
   service.turn(touched(0.2), 0, "", kFirstTurn);
   EXPECT_TRUE(service.status().running);
@@ -179,7 +227,7 @@ TEST(TouchService, LeavesWhenAllWasTouchedAndRunsUntilItHas) {
 TEST(TouchService, DoesNotLeaveFromWhereItWasCancelled) {
   Machine machine;
   TouchService service{machine, true};
-  ASSERT_TRUE(service.start(two_touches(), {{.position_m = {0, 0, 0.5}, .touch = false}}));
+  ASSERT_TRUE(service.start(two_touches({{.position_m = {0, 0, 0.5}, .touch = false}})));
   ASSERT_TRUE(service.cancel());
   service.turn(touched(0.1), 0, "", kFirstTurn);
   EXPECT_FALSE(service.status().running);

@@ -42,6 +42,28 @@ TEST(VerificationService, CollectsBetweenBeginAndEnd) {
   EXPECT_DOUBLE_EQ((*service.points(*number))->points()[1].mean.reading_m.x(), 0.2);
 }
 
+TEST(VerificationService, OneThatNobodyEndsStopsAtItsBound) {
+  const Config config = watched();
+  VerificationService service(config);
+  const auto number = service.begin();
+  ASSERT_TRUE(number);
+  EXPECT_EQ(service.stopped(), "");
+  std::vector<Snapshot> points(3, standstill(0s, 0.0).front());  // of one standstill
+  for (std::size_t i = 0; i < VerificationService::kMostPoints + 10; ++i) {
+    for (std::size_t k = 0; k < points.size(); ++k) {
+      points[k].head.time = protocol::HostTime{2s * i + 600ms * k};
+      points[k].position[0] = 0.001 * static_cast<double>(i % 2);
+    }
+    service.turn(points);
+  }
+  EXPECT_EQ((*service.points(*number))->points().size(), VerificationService::kMostPoints);
+  EXPECT_THAT(service.stopped(), testing::HasSubstr("10000 standstills are the most"));
+  ASSERT_TRUE(service.end(*number));
+  EXPECT_EQ((*service.points(*number))->points().size(), VerificationService::kMostPoints);
+  ASSERT_TRUE(service.begin());
+  EXPECT_EQ(service.stopped(), "");
+}
+
 TEST(VerificationService, BelongsToWhoeverBeganLast) {
   const Config config = watched();
   VerificationService service(config);

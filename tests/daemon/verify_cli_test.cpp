@@ -132,6 +132,7 @@ void record_standstills(const fs::path& folder, const std::vector<calib::verify:
     axes.head.time = protocol::HostTime{1000s + static_cast<std::int64_t>(i) * 100ms};
     axes.axis_count = 3;
     std::copy_n(p.reading_m.data(), 3, axes.position.begin());
+    if (i % (kSteps * 20) == 0) recorder->flush();  // twenty points a chunk
     recorder->record(axes, "encoder");
     if (i % 5 != 2) continue;
     protocol::TrackerPoint seen;
@@ -160,10 +161,23 @@ TEST_F(VerifyCli, TakesTheStandstillsOfARecording) {
   }
 }
 
+TEST_F(VerifyCli, ADamagedRecordingShowsItsResultAndEndsWithOne) {
+  const auto points = tracker_points(study::table3_machine());
+  record_standstills(folder_, points);
+  damage_chunk(folder_ / "run.mcap", 5);
+  const auto ran = abbe("verify model.json --recording run.mcap --json -o out");
+  EXPECT_EQ(ran.exit, 1);
+  EXPECT_THAT(ran.err, HasSubstr("the recording is damaged: chunk 6"));
+  const auto summary = nlohmann::json::parse(ran.out);
+  EXPECT_LT(summary["points"], points.size());
+  EXPECT_THAT(summary["cut_short"].get<std::string>(), HasSubstr("the recording is damaged: chunk 6"));
+  EXPECT_THAT(text_of(folder_ / "out/report.html"), HasSubstr("the recording is damaged: chunk 6"));
+}
+
 /// A daemon that has found `points`.
 std::unique_ptr<ControlServer> daemon_with(const fs::path& socket,
                                            const std::vector<calib::verify::MeasuredPoint>& points) {
-  return std::move(*ControlServer::open(socket, [points](const nlohmann::json& request) {
+  return std::move(*ControlServer::open(socket, [points](const nlohmann::json& request, const ControlPeer&) {
     const auto list = [](const calib::Vector3& v) { return nlohmann::json{v.x(), v.y(), v.z()}; };
     if (request.at("step") == "begin") return nlohmann::json{{"ok", true}, {"number", 7}};
     EXPECT_EQ(request.at("number"), 7);
@@ -202,8 +216,8 @@ TEST_F(VerifyCli, SaysThatTheDaemonWentAwayAndReportsWhatThereIs) {
   const auto points = tracker_points(study::table3_machine());
   const auto live = daemon_with(folder_ / "live.sock", points);
   // Gives all it has, then knows nothing of a collection, as a daemon that was started anew.
-  const auto server = std::move(
-      *ControlServer::open(folder_ / "control.sock", [&](const nlohmann::json& request) -> nlohmann::json {
+  const auto server = std::move(*ControlServer::open(
+      folder_ / "control.sock", [&](const nlohmann::json& request, const ControlPeer&) -> nlohmann::json {
         if (request.at("step") != "begin" && request.at("from") == points.size())
           return {{"ok", false}, {"code", "refused"}, {"error", "no points are being collected"}};
         return ask_daemon(folder_ / "live.sock", request).value();

@@ -7,12 +7,14 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <atomic>
 #include <chrono>
 #include <cstdio>
 #include <cstring>
 #include <ctime>
 #include <exception>
 #include <future>
+#include <mutex>
 #include <optional>
 #include <thread>
 #include <utility>
@@ -20,13 +22,20 @@
 #include "abbe/daemon/clock_steps.hpp"
 #include "abbe/daemon/control_api.hpp"
 #include "abbe/daemon/control_protocol.hpp"
+#include "abbe/daemon/counting_state_thread.hpp"
+#include "abbe/daemon/dds_security.hpp"
 #include "abbe/daemon/dds_supervisor.hpp"
+#include "abbe/daemon/device_options.hpp"
 #include "abbe/daemon/device_set.hpp"
+#include "abbe/daemon/exit_deadline.hpp"
 #include "abbe/daemon/hub.hpp"
+#include "abbe/daemon/journal_thread.hpp"
+#include "abbe/daemon/left_recordings.hpp"
 #include "abbe/daemon/old_recordings.hpp"
 #include "abbe/daemon/work_aside.hpp"
 #include "abbe/drivers/cpu_latency.hpp"
 #include "control/control_server.hpp"
+#include "control/model_status_name.hpp"
 #include "control/unix_socket.hpp"
 #include "session/outcome.hpp"
 
@@ -39,6 +48,8 @@ using WallTime = std::chrono::steady_clock::time_point;
 constexpr auto kTidyPeriod = 1h;    // old recordings are looked for this often
 constexpr auto kTidyFirst = 10min;  // until then a time server has set a clock that started wrong
 constexpr auto kHubPatience = 1s;   // thousands of turns; a hub silent for this long hangs
+constexpr auto kEndPatience = 5s;   // for the control socket (3 s at most) and the hub to end
+constexpr int kHubHangs = 70;       // exit code
 
 /// UTC less host time, both read now; the one constant that ever mentions the wall clock.
 protocol::UtcOffset utc_offset(const drivers::TimeSource& time) {
@@ -87,7 +98,10 @@ PublisherOptions publisher_options(const Config& config) {
           .tool_offset_m = config.machine.target_offset_m,
           .snapshot_hz = config.dds.snapshot_hz,
           .compensation_hz = config.dds.compensation_hz,
-          .validity = config.dds.validity};
+          .validity = config.dds.validity,
+          .security_warning = dds_is_secured(config.dds.security, config.dds.profile)
+                                  ? std::string{}
+                                  : dds_security_is_off(config.dds.domain)};
 }
 
 /// The hub is soft real time: above the ordinary programs, below the devices. A refusal is a warning in mode
@@ -122,17 +136,28 @@ struct Abbed::State {
   std::optional<CalibrationService> calibration;
   std::optional<ReferenceService> reference;
   std::optional<VerificationService> verification;
+  DdsProcess dds_process;
   std::optional<Publisher> publisher;
   std::optional<DdsSupervisor> supervisor;
   std::optional<DeviceSet> devices;
   std::optional<TouchService> touching;
+  std::optional<TrackerService> tracker;
   std::optional<Hub> hub;
   WallTime running_since;
   std::promise<void> hub_may_run;  // or it is broken: abbed was refused
   std::thread hub_thread;
   FileDescriptor control_listener;
   std::unique_ptr<ControlServer> control;
+  std::mutex participant_mutex;
+  std::optional<ObservedParticipant> participant;  // under participant_mutex
+  std::optional<JournalThread> journal;
+  const std::string boot = boot_id();
+  LeftCounting left_counting;
+  std::optional<CountingStateThread> counting_state;
   std::future<Result<std::vector<std::filesystem::path>>> tidying;
+  // The work's own: nothing waits for it at the end.
+  const std::shared_ptr<std::atomic<bool>> stop_closing = std::make_shared<std::atomic<bool>>(false);
+  std::future<Result<std::vector<LeftRecording>>> closing_left;
   const std::string recording = recording_name();
   ClockSteps clock_steps{read_clocks()};
   bool tidies = true;  // until the clock was set
@@ -143,7 +168,15 @@ struct Abbed::State {
   State(const State&) = delete;
   State& operator=(const State&) = delete;
   ~State() {
+    const ExitDeadline deadline{
+        kEndPatience, kHubHangs,
+        fmt::format("abbed: the hub does not end within {} s: exit code {}; what was "
+                    "recorded stays readable in {}.mcap.part\n",
+                    std::chrono::seconds{kEndPatience}.count(), kHubHangs, recording)};
+    *stop_closing = true;
     control.reset();
+    journal.reset();  // these ask the hub once more
+    counting_state.reset();
     if (control_listener) ::unlink(config.control.socket.c_str());
     if (hub) hub->stop();
     hub_may_run = {};
@@ -153,7 +186,7 @@ struct Abbed::State {
   /// Asked before anything is opened: a second abbed that got as far as the socket for abbe-dds would, merely
   /// by trying it, cut the first one off from its abbe-dds.
   Result<void> refuse_second_daemon() {
-    if (!connect_unix(config.control.socket)) return {};
+    if (!is_listened_at(config.control.socket)) return {};
     return fail(ErrorCode::Io, fmt::format("listen {}: another daemon already answers there",
                                            config.control.socket.string()));
   }
@@ -167,33 +200,52 @@ struct Abbed::State {
     auto opened = RecorderThread::start(recorder_options(config, recording), std::move(info));
     if (!opened) return tl::unexpected(opened.error());
     recorder = std::move(*opened);
+    if (const auto status = recorder->status(); !status.fault.empty())
+      warnings.push_back(fmt::format("nothing is recorded: {}", status.fault));
     return {};
   }
 
   Result<void> open_models() {
-    auto opened = ModelAuthority::open(config.daemon.models_dir(), config, utc, time.now());
-    if (!opened) return tl::unexpected(opened.error());
-    authority.emplace(std::move(*opened));
+    authority.emplace(ModelAuthority::open(config.daemon.models_dir(), config, utc, time.now()));
+    if (!authority->fault().empty()) warnings.push_back(authority->fault());
     return {};
   }
 
   Result<void> open_dds() {
     if (config.dds.supervise == Supervise::Off) return {};
-    auto link = DdsLink::listen(config.dds.socket);
+    const bool supervised = config.dds.supervise == Supervise::Child;
+    auto link = DdsLink::listen(config.dds.socket, {.process = supervised ? &dds_process : nullptr});
     if (!link) return tl::unexpected(link.error());
     publisher.emplace(std::move(*link), publisher_options(config), utc);
-    if (config.dds.supervise != Supervise::Child) return {};
+    check_dds_security();
+    if (!supervised) return {};
     DdsSupervisor::Options child{
         .program = options.dds_program,
         .arguments = {"--socket", config.dds.socket.string(), "--domain", std::to_string(config.dds.domain)},
-        .priority = config.dds.priority};
+        .priority = config.dds.priority,
+        .process = &dds_process};
     if (!config.dds.profile.empty()) {
       child.arguments.insert(child.arguments.end(), {"--profile", config.dds.profile.string()});
+    }
+    if (!config.dds.security.empty()) {
+      child.arguments.insert(child.arguments.end(), {"--security", config.dds.security.string()});
     }
     auto started = DdsSupervisor::start(std::move(child), WallTime::clock::now());
     if (!started) return tl::unexpected(started.error());
     supervisor.emplace(std::move(*started));
     return {};
+  }
+
+  /// A warning only: acquisition and recording go on where abbe-dds cannot, and it refuses unusable keys
+  /// itself.
+  void check_dds_security() {
+    if (!dds_is_secured(config.dds.security, config.dds.profile)) {
+      warnings.push_back(dds_security_is_off(config.dds.domain));
+    } else if (!config.dds.security.empty()) {
+      const auto identity =
+          find_dds_identity(config.dds.security, DdsRole::Daemon, std::chrono::system_clock::now());
+      if (!identity) warnings.push_back(identity.error().text + "; nothing is published over DDS until then");
+    }
   }
 
   /// Before the devices are: a processor that sleeps deeply delays their first stamps, too.
@@ -213,7 +265,11 @@ struct Abbed::State {
   }
 
   Result<void> start_devices() {
-    auto started = DeviceSet::start(config, time);
+    left_counting = daemon::left_counting(config, boot);
+    if (!left_counting.warning.empty()) warnings.push_back(left_counting.warning);
+    std::optional<drivers::CounterCardProgress> left;
+    if (left_counting.state) left = left_counting.state->counting.progress;
+    auto started = DeviceSet::start(config, time, left);
     if (!started) return tl::unexpected(started.error());
     devices.emplace(std::move(*started));
     const auto refused = devices->warnings();
@@ -237,9 +293,15 @@ struct Abbed::State {
 
   Result<void> run() {
     calibration.emplace(config, *authority, recorder.get(), utc);
-    reference.emplace(config, recorder.get());
+    std::optional<Counting> left;
+    if (left_counting.state) {
+      recorder->attach(to_attachment(*left_counting.state), time.now());
+      left = left_counting.state->counting;
+    }
+    reference.emplace(config, recorder.get(), std::move(left));
     verification.emplace(config);
     touching.emplace(*devices, config.cmm.has_value());
+    tracker.emplace(*devices, longest_tracker_order(config));
     hub.emplace(HubParts{.config = config,
                          .time = time,
                          .devices = *devices,
@@ -249,12 +311,68 @@ struct Abbed::State {
                          .recorder = recorder.get(),
                          .reference = &*reference,
                          .touching = &*touching,
-                         .verification = &*verification});
+                         .verification = &*verification,
+                         .tracker = &*tracker});
     running_since = WallTime::clock::now();
     hub_may_run.set_value();
+    closing_left = start_aside([dir = config.recording.dir, running = recording, stop = stop_closing] {
+      return close_left_recordings(dir, running, *stop);
+    });
     control = serve_control(std::move(control_listener), config.control.socket,
-                            [this](const nlohmann::json& request) { return answer_request(*hub, request); });
+                            [this](const nlohmann::json& request, const ControlPeer& peer) {
+                              return answer_request(*hub, request, peer);
+                            });
+    journal.emplace(config.machine.name, open_journal(), [this] { return observe(); });
+    if (config.counter_card) {
+      counting_state.emplace(
+          counting_state_file(config.daemon.data_dir),
+          [this, set_up = counting_set_up(config)] { return look_at_counting(set_up); },
+          [](const std::string& fault) { fmt::print(stderr, "abbed: {}\n", fault); });
+    }
     return {};
+  }
+
+  /// For a later run; nothing for a card that another could be taken for. Any thread but the hub's.
+  std::optional<CountingState> look_at_counting(const std::string& set_up) {
+    if (boot.empty()) return std::nullopt;
+    auto seen = hub->call(
+        [this] {
+          return std::pair{reference->counting(), reference->carried_on()};
+        },
+        kHubPatience);
+    if (!seen || !seen->first || seen->first->progress.serial_number().empty()) return std::nullopt;
+    if (left_counting.state) {
+      left_counting.state.reset();
+      if (!seen->second.empty())
+        fmt::print(stderr, "abbed: the counter card counted on: {} stay referenced\n",
+                   fmt::join(seen->second, ", "));
+    }
+    return CountingState{.boot_id = boot, .set_up = set_up, .counting = std::move(*seen->first)};
+  }
+
+  /// What the journal follows; any thread but the hub's.
+  Observed observe() {
+    auto seen = hub->call(
+        [this] {
+          const ModelStanding standing = hub->standing();
+          return Observed{.streams = hub->health(),
+                          .session = calibration->status(),
+                          .model = {.state = std::string{status_name(standing.status)},
+                                    .id = standing.model != nullptr ? standing.model->id : "",
+                                    .reason = standing.reason}};
+        },
+        kHubPatience);
+    Observed now = seen ? std::move(*seen) : Observed{.hub_answers = false};
+    const std::lock_guard lock{participant_mutex};
+    now.participant = participant;
+    return now;
+  }
+
+  void supervise(WallTime now) {
+    if (!supervisor) return;
+    supervisor->poll(now);
+    const std::lock_guard lock{participant_mutex};
+    participant = {.restarts = supervisor->restarts(), .last_end = supervisor->last_end()};
   }
 
   void tidy_recordings(WallTime now) {
@@ -279,7 +397,23 @@ struct Abbed::State {
     });
   }
 
+  void report_left_recordings() {
+    if (!closing_left.valid() || closing_left.wait_for(0s) != std::future_status::ready) return;
+    const auto closed = outcome_of(closing_left);
+    if (!closed) return fmt::print(stderr, "abbed: {}\n", closed.error().text);
+    for (const auto& left : *closed) {
+      if (!left.fault.empty())
+        fmt::print(stderr, "abbed: left as it is by a killed abbed: {}\n", left.fault);
+      else
+        fmt::print(stderr, "abbed: {} {}, left open by a killed abbed\n",
+                   left.messages > 0 ? fmt::format("closed, with {} messages,", left.messages)
+                                     : std::string{"removed, without messages,"},
+                   left.file.string());
+    }
+  }
+
   void run_hub(std::future<void>& may_run) noexcept {
+    (void)::pthread_setname_np(::pthread_self(), "abbe-hub");
     try {
       may_run.get();
     } catch (const std::future_error&) {
@@ -295,9 +429,9 @@ struct Abbed::State {
 
 Result<std::unique_ptr<Abbed>> Abbed::start(Config config, AbbedOptions options) {
   auto state = std::make_unique<State>(std::move(config), std::move(options));
-  for (const auto& directory :
-       {state->config.daemon.data_dir, state->config.daemon.runtime_dir, state->config.recording.dir,
-        state->config.control.socket.parent_path(), state->config.dds.socket.parent_path()}) {
+  prepare_work_aside();
+  for (const auto& directory : {state->config.daemon.runtime_dir, state->config.control.socket.parent_path(),
+                                state->config.dds.socket.parent_path()}) {
     if (auto made = make_directory(directory); !made) return tl::unexpected(made.error());
   }
   using Step = Result<void> (State::*)();
@@ -315,8 +449,9 @@ Abbed::~Abbed() = default;
 
 void Abbed::turn() {
   const auto now = WallTime::clock::now();
-  if (state_->supervisor) state_->supervisor->poll(now);
+  state_->supervise(now);
   state_->tidy_recordings(now);
+  state_->report_left_recordings();
 }
 
 bool Abbed::alive() const {

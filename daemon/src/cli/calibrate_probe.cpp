@@ -42,14 +42,19 @@ bool usable(const ProbeTrigger& touch) {
   return (touch.touch_flags & kNotUsable) == 0 && has_linear_axes(touch);
 }
 
-Result<std::vector<calib::probe::RecordedTouch>> touches_of(const CalibrateProbeArguments& arguments) {
+struct Touches {
+  std::vector<calib::probe::RecordedTouch> usable;
+  std::string damage;  ///< of the recording; empty: none
+};
+
+Result<Touches> touches_of(const CalibrateProbeArguments& arguments) {
   const auto recording = RecordingReader::open(arguments.recording);
   if (!recording) return tl::unexpected(recording.error());
-  std::vector<calib::probe::RecordedTouch> touches;
+  Touches touches{{}, recording->damage()};
   RecordingSink sink;
   sink.probe_trigger = [&](const ProbeTrigger& t, std::string_view) {
     if (!usable(t) || (arguments.probe != 0 && t.probe != arguments.probe)) return;
-    touches.push_back(
+    touches.usable.push_back(
         {{t.position[0], t.position[1], t.position[2]}, {t.velocity[0], t.velocity[1], t.velocity[2]}});
   };
   (void)recording->read(sink);
@@ -119,19 +124,26 @@ int print_qualification(const calib::probe::Qualification& q, bool as_json) {
   return 0;
 }
 
-int calibrate(const CalibrateProbeArguments& arguments) {
-  const auto touches = touches_of(arguments);
-  if (!touches) return report(touches.error());
+int fit(const CalibrateProbeArguments& arguments, const std::vector<calib::probe::RecordedTouch>& touches) {
   if (arguments.sphere_radius_mm > 0.0) {
-    const auto q = calib::probe::qualify(calib::probe::around_sphere(*touches),
+    const auto q = calib::probe::qualify(calib::probe::around_sphere(touches),
                                          {.sphere_radius_m = 1e-3 * arguments.sphere_radius_mm,
                                           .u_sphere_radius_m = 1e-6 * arguments.u_sphere_radius_um});
     return q ? print_qualification(*q, arguments.json) : report(insufficient(q.error()));
   }
-  const auto fit = calib::probe::fit_delay(calib::probe::same_place(*touches));
+  const auto fit = calib::probe::fit_delay(calib::probe::same_place(touches));
   if (!fit) return report(insufficient(fit.error()));
   if (const auto refused = not_on_a_line(*fit)) return report(*refused);
   return print_delay(*fit, arguments.json);
+}
+
+/// Touches that are missing or wrong may be those that would not have fitted: the result is shown, and refused.
+int calibrate(const CalibrateProbeArguments& arguments) {
+  const auto touches = touches_of(arguments);
+  if (!touches) return report(touches.error());
+  const int exit = fit(arguments, touches->usable);
+  if (exit != 0 || touches->damage.empty()) return exit;
+  return report({ErrorCode::DataInsufficient, fmt::format("{}: {}", arguments.recording, touches->damage), {}});
 }
 
 }  // namespace
@@ -141,7 +153,8 @@ void add_calibrate_probe(CLI::App& parent, int& exit) {
   auto* command = parent.add_subcommand(
       "probe",
       "A touch probe from recorded touches: its delay from one place touched at three feeds, or, with a "
-      "sphere's radius, its effective tip radius and lobing");
+      "sphere's radius, its effective tip radius and lobing.\n"
+      "Exit code 1, with the result all the same, if the recording is damaged inside.");
   command->add_option("--recording", arguments->recording, "a recording with touches")->required();
   command->add_option("--probe", arguments->probe, "only touches of this probe; 0: all");
   command->add_option("--sphere-radius-mm", arguments->sphere_radius_mm,

@@ -14,6 +14,8 @@ void add_identify_artefact(CLI::App& parent, int& exit);
 void add_calibrate_otf(CLI::App& parent, int& exit);
 void add_calibrate_evemu(CLI::App& parent, int& exit);
 void add_reference(CLI::App& parent, int& exit);
+void add_machine(CLI::App& parent, int& exit);
+void add_tracker(CLI::App& parent, int& exit);
 void add_calibrate_probe(CLI::App& parent, int& exit);
 void add_calibrate_artefact(CLI::App& parent, int& exit);
 void add_replay(CLI::App& parent, int& exit);

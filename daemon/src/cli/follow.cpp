@@ -20,8 +20,12 @@ constexpr auto kLook = 200ms;  // how often a person's progress bar moves
 
 int say_how_to_cancel(const Following& following) {
   constexpr int kInterrupted = 128 + SIGINT;  // what a shell reports
-  fmt::print(stderr, "abbe: {} goes on; end it with: {} --socket {}\n", following.what, following.cancel,
-             following.socket.string());
+  if (following.cancel.empty()) {
+    fmt::print(stderr, "abbe: {} goes on; no command ends it\n", following.what);
+  } else {
+    fmt::print(stderr, "abbe: {} goes on; end it with: {} --socket {}\n", following.what, following.cancel,
+               following.socket.string());
+  }
   return kInterrupted;
 }
 

@@ -1,6 +1,6 @@
 #pragma once
-/// Looking on while the daemon works, until it is done: the same for calibrations and the search for
-/// reference marks.
+/// Looking on while the daemon works, until it is done: the same for calibrations, the search for reference
+/// marks and orders to a tracker.
 
 #include <filesystem>
 #include <functional>
@@ -15,7 +15,7 @@ namespace abbe::daemon {
 struct Following {
   std::filesystem::path socket;
   std::string what;    ///< "the calibration": said when somebody stops looking on
-  std::string cancel;  ///< the command that would end it
+  std::string cancel;  ///< the command that would end it; empty: none does
   /// Given the answer to "status": the exit code once it is over, and what came of it said.
   std::function<std::optional<int>(const nlohmann::json& status)> look;
 };

@@ -5,6 +5,7 @@
 #include <CLI/Config.hpp>
 #include <CLI/Formatter.hpp>
 #include <algorithm>
+#include <cstdint>
 #include <optional>
 #include <utility>
 
@@ -59,11 +60,30 @@ class Narrator {
   std::size_t noted_ = 0;
 };
 
-int follow_session(const std::filesystem::path& socket, const std::string& method, bool as_json) {
+/// The session with this number, running or ended; another one's verdict is not ours. 0: of a daemon that
+/// does not number them.
+std::optional<json> session_in(const json& status, std::uint64_t id) {
+  if (id == 0 || status["session"].value("id", std::uint64_t{0}) == id) return status["session"];
+  for (const json& ended : status.value("ended_sessions", json::array()))
+    if (ended.value("id", std::uint64_t{0}) == id) return ended;
+  return std::nullopt;
+}
+
+int follow_session(const std::filesystem::path& socket, const std::string& method, std::uint64_t id,
+                   bool as_json) {
   ProgressBar bar;
   Narrator narrator;
   const auto look = [&](const json& status) -> std::optional<int> {
-    const json& session = status["session"];
+    const auto found = session_in(status, id);
+    if (!found) {
+      bar.clear();
+      return report(
+          {ErrorCode::Io,
+           fmt::format("calibration {} has ended, and its verdict is not kept after so many others: "
+                       "`abbe model list` shows what it may have left",
+                       id)});
+    }
+    const json& session = *found;
     const std::string state = session["state"];
     narrator.tell_notes(bar, session);
     if (state == "active" || state == "refused" || state == "idle") {
@@ -105,7 +125,8 @@ int run_calibration(const FollowOptions& options, json task) {
   task["who"] = user_name();
   const auto started = ask_daemon(*socket, task);
   if (!started) return report(started.error());
-  return options.detach ? 0 : follow_session(*socket, method, options.json);
+  const auto id = started->value("session", std::uint64_t{0});
+  return options.detach ? 0 : follow_session(*socket, method, id, options.json);
 }
 
 }  // namespace abbe::daemon

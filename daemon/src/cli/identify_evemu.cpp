@@ -4,6 +4,7 @@
 #include <chrono>
 #include <cmath>
 #include <filesystem>
+#include <functional>
 #include <map>
 #include <memory>
 #include <nlohmann/json.hpp>
@@ -47,6 +48,8 @@ struct Input {
   std::vector<InputFile> sources;
   evemu::Observations observations;
   std::optional<RotationPoints> reference;
+  std::function<void(calib::Verdict&)> judge_source = [](calib::Verdict&) {};  ///< a damaged recording
+  std::string recording_gap{};
 };
 
 struct Outcome {
@@ -55,6 +58,7 @@ struct Outcome {
   evemu::Observations observations;
   std::optional<evemu::Solution> solution;
   calib::Verdict verdict;
+  std::string recording_gap;
 };
 
 /// Without an option, what [evemu] says; a sensor's values are in no file.
@@ -181,6 +185,9 @@ Result<Input> from_recording(const IdentifyEvemuArguments& arguments) {
   Input input{std::move(recording->config), {recording->source}, std::move(*observed), run->asked.reference};
   const auto entered = inputs_of(*run);
   input.sources.insert(input.sources.end(), entered.begin(), entered.end());
+  input.recording_gap = recording->reader.damage();
+  input.judge_source = [reader = std::make_shared<RecordingReader>(std::move(recording->reader))](
+                           calib::Verdict& verdict) { judge_recording(*reader, verdict); };
   return input;
 }
 
@@ -238,11 +245,12 @@ Result<Outcome> identify(const IdentifyEvemuArguments& arguments) {
   auto verdict = evemu::judge(input->observations, *solution, other.model, *judging);
   if (!verdict) return tl::make_unexpected(error_of(verdict.error()));
   other.say(*verdict);
+  input->judge_source(*verdict);
   if (const auto silent = silent_sensor(arguments, input->config); !silent.empty())
     verdict->notes.push_back(
         fmt::format("how warm the array was is not known: {}; --artefact-C says it", silent));
   return Outcome{std::move(input->config), std::move(input->sources), std::move(input->observations),
-                 std::move(*solution), std::move(*verdict)};
+                 std::move(*solution),     std::move(*verdict),       std::move(input->recording_gap)};
 }
 
 /// The surface lambda and gamma were chosen from; cells no path reached are left out.
@@ -350,7 +358,8 @@ int run(const IdentifyEvemuArguments& arguments) {
   const auto outcome = identify(arguments);
   if (!outcome) return report(outcome.error());
   const auto now = std::chrono::time_point_cast<std::chrono::nanoseconds>(std::chrono::system_clock::now());
-  const auto document = evemu_document(*outcome->solution, outcome->config, outcome->sources, now);
+  auto document = evemu_document(*outcome->solution, outcome->config, outcome->sources, now);
+  document.recording_gap = outcome->recording_gap;
   if (const auto written = write_outputs(arguments.out, document, *outcome); !written)
     return report(written.error());
   if (const auto kept = keep(arguments.keep, document, outcome->verdict, "abbe identify evemu"); !kept)

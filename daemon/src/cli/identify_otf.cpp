@@ -149,7 +149,9 @@ Result<OtfOutcome> from_recording(const IdentifyOtfArguments& arguments,
   auto candidate = last_complete_run(std::move(*replayed), arguments.recording);
   if (!candidate) return tl::make_unexpected(candidate.error());
   other.say(candidate->verdict);
-  return outcome_of(std::move(*candidate), recording->config, {recording->source});
+  auto outcome = outcome_of(std::move(*candidate), recording->config, {recording->source});
+  outcome.document.recording_gap = recording->reader.damage();
+  return outcome;
 }
 
 Result<void> write_outputs(const std::filesystem::path& folder, const OtfOutcome& outcome) {
@@ -225,7 +227,9 @@ void add_identify_otf(CLI::App& parent, int& exit) {
       "From laser tracker points taken on the fly along a path.\n"
       "Writes model.json, tables.csv and report.html to OUT and says how well the model "
       "predicts legs it was not fitted to.\n"
-      "Exit code 5 if the gate would refuse it; everything is written all the same.");
+      "Exit code 5 if the gate would refuse it, as it does where the recording is damaged inside; "
+      "everything\n"
+      "is written all the same.");
   auto* machine =
       command->add_option("--machine", arguments->machine, "machine.toml, or the daemon's abbed.toml");
   auto* path = command->add_option("--path", arguments->path,

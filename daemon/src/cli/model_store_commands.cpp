@@ -7,11 +7,11 @@
 #include <memory>
 #include <nlohmann/json.hpp>
 
+#include "abbe/daemon/utc_text.hpp"
 #include "cli/commands.hpp"
 #include "cli/daemon_socket.hpp"
 #include "cli/store_option.hpp"
 #include "cli/terminal.hpp"
-#include "model/utc_text.hpp"
 #include "units.hpp"
 
 namespace abbe::daemon {
@@ -85,6 +85,8 @@ void print_model(const ModelDocument& document, const StoreEntry& entry) {
              s.after.rms_m * kUmPerM);
   for (const auto& input : document.inputs)
     fmt::print("input       {}  sha256 {}\n", input.name, input.sha256);
+  if (!document.recording_gap.empty())
+    fmt::print("            {}\n", cannot_be_checked(document.recording_gap));
   fmt::print("\n{}", to_tables_csv(document.model));
 }
 

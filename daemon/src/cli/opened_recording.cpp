@@ -3,6 +3,7 @@
 #include <filesystem>
 #include <utility>
 
+#include "abbe/daemon/replay.hpp"
 #include "abbe/daemon/sha256.hpp"
 
 namespace abbe::daemon {
@@ -10,8 +11,7 @@ namespace abbe::daemon {
 Result<OpenedRecording> open_recording(const std::string& file, const std::string& config) {
   auto reader = RecordingReader::open(file);
   if (!reader) return tl::make_unexpected(reader.error());
-  auto read = config.empty() ? parse_config(reader->info().configuration, file + " (recorded configuration)")
-                             : load_config(config);
+  auto read = config.empty() ? recorded_config(*reader, file) : load_config(config);
   if (!read) return tl::make_unexpected(read.error());
   const auto hash = sha256_hex_of_file(file);
   if (!hash) return tl::make_unexpected(hash.error());

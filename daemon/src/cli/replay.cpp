@@ -32,7 +32,7 @@ struct ReplayArguments {
 
 Result<Config> config_of(const ReplayArguments& arguments, const RecordingReader& recording) {
   if (!arguments.config.empty()) return load_config(arguments.config);
-  return parse_config(recording.info().configuration, arguments.file + " (recorded configuration)");
+  return recorded_config(recording, arguments.file);
 }
 
 json calibration_json(const ReplayedCalibration& c) {
@@ -60,7 +60,7 @@ bool same_as_live(const ReplayReport& report) {
   return ids == report.live_model_ids;
 }
 
-void print_report(const ReplayReport& r, double wall_s) {
+void print_report(const RecordingReader& recording, const ReplayReport& r, double wall_s) {
   const double recorded_s = std::chrono::duration<double>(r.recorded).count();
   fmt::print("{} snapshots, {:.1f} s recorded, replayed in {:.2f} s: {:.0f} x real time\n", r.snapshots,
              recorded_s, wall_s, recorded_s / wall_s);
@@ -78,6 +78,10 @@ void print_report(const ReplayReport& r, double wall_s) {
     fmt::print("reference    {}: count 0 is at {:.6f} mm live, {} from the marks in the bytes\n", d.axis,
                1e3 * d.live, d.again ? fmt::format("{:.6f} mm", 1e3 * *d.again) : "not found");
   }
+  if (const auto damage = recording.damage(); !damage.empty()) fmt::print("DAMAGED      {}\n", damage);
+  if (r.undecodable > 0) fmt::print("DAMAGED      {} messages cannot be decoded\n", r.undecodable);
+  if (recording.configuration_check() == MetadataCheck::Unchecked)
+    fmt::print("unchecked    the recorded configuration has no checksum\n");
   for (const auto& id : r.live_model_ids) fmt::print("live         model {}\n", id);
   if (!r.live_model_ids.empty())
     fmt::print("{}\n", same_as_live(r) ? "the same as live" : "NOT the same as live");
@@ -90,6 +94,8 @@ void print_json(const RecordingReader& recording, const ReplayReport& r, double 
            {"wall_s", wall_s},
            {"live_model_ids", r.live_model_ids},
            {"same_as_live", same_as_live(r)},
+           {"damage", recording.damage()},
+           {"configuration_checked", recording.configuration_check() == MetadataCheck::Right},
            {"reference", json::array()},
            {"losses", json::array()},
            {"calibrations", json::array()}};
@@ -102,12 +108,14 @@ void print_json(const RecordingReader& recording, const ReplayReport& r, double 
 }
 
 /// With another configuration another model is what was asked for.
-int exit_code_of(const ReplayReport& report, const ReplayArguments& arguments) {
+int exit_code_of(const RecordingReader& recording, const ReplayReport& report,
+                 const ReplayArguments& arguments) {
   constexpr int kDone = 0, kNoAnswer = 1;
   const bool all_identified = std::all_of(report.calibrations.begin(), report.calibrations.end(),
                                           [](const auto& c) { return c.outcome && *c.outcome; });
+  const bool sound = recording.damage().empty() && report.undecodable == 0;
   const bool must_agree = !report.live_model_ids.empty() && arguments.config.empty();
-  return all_identified && (!must_agree || same_as_live(report)) ? kDone : kNoAnswer;
+  return sound && all_identified && (!must_agree || same_as_live(report)) ? kDone : kNoAnswer;
 }
 
 int run(const ReplayArguments& arguments) {
@@ -129,13 +137,13 @@ int run(const ReplayArguments& arguments) {
   bar.clear();
   if (!result) return report(result.error());
   const double wall_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
-  if (arguments.samples) return exit_code_of(*result, arguments);
+  if (arguments.samples) return exit_code_of(*recording, *result, arguments);
   if (arguments.json) {
     print_json(*recording, *result, wall_s);
   } else {
-    print_report(*result, wall_s);
+    print_report(*recording, *result, wall_s);
   }
-  return exit_code_of(*result, arguments);
+  return exit_code_of(*recording, *result, arguments);
 }
 
 }  // namespace
@@ -145,7 +153,8 @@ void add_replay(CLI::App& parent, int& exit) {
   auto* command = parent.add_subcommand(
       "replay",
       "A recording once more: the same snapshots, the same model.\n"
-      "Exit code 1 if a calibration gives no model, or (unless -c is given) another than live.");
+      "Exit code 1 if a calibration gives no model, or (unless -c is given) another than live, or if the\n"
+      "recording is damaged inside; 3 if the recorded configuration is, and no -c is given.");
   command->add_option("FILE", arguments->file, "recording (.mcap, also an unfinished .mcap.part)")
       ->required();
   command->add_flag("--raw", arguments->raw, "from the raw device bytes instead of the decoded samples");

@@ -14,6 +14,7 @@
 #include <vector>
 
 #include "cli/commands.hpp"
+#include "cli/dds_keys.hpp"
 #include "cli/terminal.hpp"
 
 namespace abbe::daemon {
@@ -63,6 +64,8 @@ void add_commands(CLI::App& app, int& exit) {
   add_calibrate_probe(*calibrate, exit);
   add_calibrate_artefact(*calibrate, exit);
   add_reference(app, exit);
+  add_machine(app, exit);
+  add_tracker(app, exit);
   add_replay(app, exit);
   auto* identify = app.add_subcommand(
       "identify", "Identify a machine's geometric errors, or an artefact, from recorded files");
@@ -80,6 +83,9 @@ void add_commands(CLI::App& app, int& exit) {
   add_model_show(*model, exit);
   add_model_activate(*model, exit);
   add_model_rollback(*model, exit);
+  auto* dds = app.add_subcommand("dds", "Keep strangers out of the DDS domain");
+  dds->require_subcommand(1);
+  add_dds_keys(*dds, exit);
 }
 
 int parse_and_run(int argc, const char* const* argv) {

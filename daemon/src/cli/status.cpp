@@ -32,6 +32,8 @@ void print_stream(const json& s) {
              s["rate_hz"].get<double>(), s["samples"].get<std::uint64_t>(), s["dropped"].get<std::uint64_t>(),
              s["gaps"].get<std::uint64_t>(), s.contains("faults") ? s["faults"].get<std::uint64_t>() : 0,
              s["last_fault"].get<std::string>());
+  if (const auto condition = s.value("condition", std::string{}); !condition.empty())
+    fmt::print("           {}\n", coloured(condition, kYellow, STDOUT_FILENO));
 }
 
 std::string value_text(const json& value, int digits, std::string_view unit) {
@@ -64,12 +66,32 @@ void print_next(const json& next) {
              next["points"].get<std::size_t>());
 }
 
+void print_release_awaited(const json& awaited) {
+  fmt::print("{}    {}\n           nothing moves before a person has looked at the machine; then: {}\n",
+             coloured("RELEASE", kRed, STDOUT_FILENO), awaited["reason"].get<std::string>(),
+             awaited["command"].get<std::string>());
+}
+
+void print_dds(const json& dds) {
+  fmt::print("dds        {}, {} messages", dds["connected"].get<bool>() ? "connected" : "not connected",
+             dds["sent"].get<std::uint64_t>());
+  if (const auto restarts = dds.value("restarts", std::uint64_t{0}); restarts > 0)
+    fmt::print(", abbe-dds restarted {} times", restarts);
+  fmt::print("\n");
+  if (dds.contains("last_end")) fmt::print("           last end: {}\n", dds["last_end"].get<std::string>());
+  if (const auto refused = dds.value("refused_connections", std::uint64_t{0}); refused > 0)
+    fmt::print("           {} connections to its socket by other processes were refused\n", refused);
+  const auto security = dds.value("security", std::string{"on"});
+  fmt::print("           {}\n", security == "on" ? "DDS Security is on" : security);
+}
+
 void print_status(const json& status) {
   const json& model = status["model"];
   const std::string state = model["state"];
   fmt::print("machine    {}\n", status["machine"].get<std::string>());
   fmt::print("model      {} {} ({})\n", coloured(state, colour_of_model(state), STDOUT_FILENO),
              model.value("id", "-"), model["reason"].get<std::string>());
+  if (status.contains("release_awaited")) print_release_awaited(status["release_awaited"]);
   const json& session = status["session"];
   fmt::print("session    {}, {:.0f} %, {} points: {}\n", session["state"].get<std::string>(),
              100.0 * session["progress"].get<double>(), session["points"].get<std::uint64_t>(),
@@ -84,11 +106,7 @@ void print_status(const json& status) {
   }
   if (status.contains("environment")) print_environment(status["environment"]);
   if (status.contains("recording")) fmt::print("recording  {}\n", status["recording"].get<std::string>());
-  if (status.contains("dds")) {
-    fmt::print("dds        {}, {} messages\n",
-               status["dds"]["connected"].get<bool>() ? "connected" : "not connected",
-               status["dds"]["sent"].get<std::uint64_t>());
-  }
+  if (status.contains("dds")) print_dds(status["dds"]);
   fmt::print("\n{:<10} {:<14} {:>10} {:>10} {:>7} {:>5} {:>7}  {}\n", "stream", "state", "rate", "samples",
              "dropped", "gaps", "faults", "last fault");
   for (const json& stream : status["streams"]) print_stream(stream);

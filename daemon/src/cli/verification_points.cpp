@@ -32,9 +32,9 @@ void tell(std::size_t number, const json& point) {
              1e6 * point.at("scatter_m").get<double>());
 }
 
-/// One look at the daemon: new points are told and kept.
-Result<void> look(const std::filesystem::path& socket, const json& number, const char* step,
-                  VerificationFile& out, const Keep& keep) {
+/// One look at the daemon: new points are told and kept. Why no more come; empty: they may.
+Result<std::string> look(const std::filesystem::path& socket, const json& number, const char* step,
+                         VerificationFile& out, const Keep& keep) {
   const auto answer = ask_daemon(
       socket, {{"do", "verification"}, {"step", step}, {"number", number}, {"from", out.points.size()}});
   if (!answer) return tl::make_unexpected(answer.error());
@@ -42,7 +42,9 @@ Result<void> look(const std::filesystem::path& socket, const json& number, const
     out.points.push_back({vector_of(point.at("reading_m")), vector_of(point.at("tracker_m"))});
     tell(out.points.size(), point);
   }
-  return answer->at("points").empty() ? Result<void>{} : keep(out);
+  if (!answer->at("points").empty())
+    if (const auto kept = keep(out); !kept) return tl::make_unexpected(kept.error());
+  return answer->value("stopped", std::string{});
 }
 
 /// A daemon that went away takes no points with it.
@@ -54,7 +56,7 @@ Result<LivePoints> what_there_is(VerificationFile& points, const Error& error) {
 
 }  // namespace
 
-Result<VerificationFile> points_of_recording(const std::string& file) {
+Result<LivePoints> points_of_recording(const std::string& file) {
   const auto recording = open_recording(file);
   if (!recording) return tl::make_unexpected(recording.error());
   const Config& config = recording->config;
@@ -68,8 +70,10 @@ Result<VerificationFile> points_of_recording(const std::string& file) {
               .snapshots = [&standstills](const protocol::Snapshot& s) { standstills.take(s); }});
   if (!replayed) return tl::make_unexpected(replayed.error());
   standstills.finish();
-  VerificationFile out{recording->source, {}, {}};
-  for (const auto& p : standstills.points()) out.points.push_back(p.mean);
+  LivePoints out{{recording->source, {}, {}}, {}};
+  for (const auto& p : standstills.points()) out.file.points.push_back(p.mean);
+  if (const auto damage = recording->reader.damage(); !damage.empty())
+    out.cut_short = Error{ErrorCode::DataInsufficient, fmt::format("{}: {}", file, damage), {}};
   return out;
 }
 
@@ -83,8 +87,11 @@ Result<LivePoints> points_of_daemon(const std::filesystem::path& socket, std::si
   VerificationFile out;
   const auto all = [&] { return interrupted() || (count != 0 && out.points.size() >= count); };
   for (; !all(); std::this_thread::sleep_for(kLookAtPoints)) {
-    if (const auto looked = look(socket, number, "look", out, keep); !looked)
-      return what_there_is(out, looked.error());
+    const auto looked = look(socket, number, "look", out, keep);
+    if (!looked) return what_there_is(out, looked.error());
+    if (looked->empty()) continue;
+    fmt::print(stderr, "abbe: {}\n", *looked);
+    break;
   }
   if (const auto ended = look(socket, number, "end", out, keep); !ended)
     return what_there_is(out, ended.error());

@@ -86,8 +86,8 @@ Result<LivePoints> points_of(const VerifyArguments& arguments) {
   if (!arguments.recording.empty()) {
     auto points = points_of_recording(arguments.recording);
     if (points)
-      if (auto done = keep_them(*points); !done) return tl::make_unexpected(done.error());
-    return from_file(std::move(points));
+      if (auto done = keep_them(points->file); !done) return tl::make_unexpected(done.error());
+    return points;
   }
   const auto socket = socket_path({arguments.socket, arguments.store.config});
   if (!socket) return tl::make_unexpected(socket.error());
@@ -121,6 +121,7 @@ Result<VerifyOutcome> compare(const VerifyArguments& arguments, std::optional<Er
   v.comparison = std::move(*compared);
   if (!file.source.name.empty()) v.inputs = {file.source};
   v.lines = std::move(file.lines);
+  if (cut_short) v.cut_short = cut_short->text;
   return VerifyOutcome{std::move(*document), std::move(v)};
 }
 
@@ -149,7 +150,8 @@ void print_json(const VerifyOutcome& outcome) {
       {"R_turned", figures(c.R_turned)},
       {"R_stated", figures(c.R_stated)},
       {"turned_urad", {kUradPerRad * turned(3), kUradPerRad * turned(4), kUradPerRad * turned(5)}},
-      {"interpolation_rms_um", kUmPerM * c.interpolation_rms_m}};
+      {"interpolation_rms_um", kUmPerM * c.interpolation_rms_m},
+      {"cut_short", outcome.verification.cut_short}};
   fmt::print("{}\n", object.dump(1));
 }
 
@@ -251,7 +253,8 @@ void add_verify(CLI::App& parent, int& exit) {
   auto* command = parent.add_subcommand(
       "verify",
       "Compare a model with independent measurements, of a laser tracker for example: what is left with and\n"
-      "without it, and R_resmag = |what is left| / |what was there| on a grid inside its volume.");
+      "without it, and R_resmag = |what is left| / |what was there| on a grid inside its volume.\n"
+      "Exit code 1, with the result all the same, if the recording is damaged inside.");
   add_options(*command, *arguments);
   command->callback([arguments, &exit] {
     const bool has_points = !arguments->points.empty() || !arguments->recording.empty() || arguments->live;

@@ -6,6 +6,7 @@
 #include <sstream>
 
 #include "abbe/daemon/sha256.hpp"
+#include "config/bounded_toml.hpp"
 #include "config/readers.hpp"
 
 namespace abbe::daemon {
@@ -64,17 +65,10 @@ std::string reading_text(const ReferenceConfig& reference) {
 }  // namespace
 
 Result<Config> parse_config(std::string_view text, const std::filesystem::path& file) {
+  const auto table = parse_toml(text, file.string());
+  if (!table) return tl::make_unexpected(table.error());
   Faults faults(file.string());
-  toml::table table;
-  try {
-    table = toml::parse(text, file.string());
-  } catch (const toml::parse_error& error) {
-    // A parser that lost its way guesses from there on: the first fault of syntax is the only one worth
-    // showing.
-    faults.add(error.source().begin.line, error.source().begin.column, "", error.description());
-    return tl::make_unexpected(faults.to_error());
-  }
-  Section root(&table, "", {1, 1}, faults);
+  Section root(&*table, "", {1, 1}, faults);
   auto config = read_all(root, file.parent_path());
   if (faults.any()) return tl::make_unexpected(faults.to_error());
   return config;

@@ -90,6 +90,7 @@ void read_dds(Section& root, const std::filesystem::path& base, Config& out) {
       "supervise", dds.supervise,
       {{"child", Supervise::Child}, {"systemd", Supervise::Systemd}, {"off", Supervise::Off}});
   section.get("profile", dds.profile, base);
+  section.get("security", dds.security, base);
   section.get("socket", dds.socket, base);
   section.close();
 }
@@ -113,6 +114,9 @@ void read_control(Section& root, const std::filesystem::path& base, Config& out)
   Section section = root.child("control");
   out.control.socket = out.daemon.runtime_dir / "control.sock";
   section.get("socket", out.control.socket, base);
+  section.get_maybe_empty("look_group", out.control.look_group);
+  section.get_maybe_empty("change_group", out.control.change_group);
+  section.get_maybe_empty("move_group", out.control.move_group);
   section.close();
 }
 

@@ -3,6 +3,7 @@
 #include <cmath>
 #include <set>
 
+#include "abbe/drivers/tracker/order.hpp"
 #include "config/machine_order.hpp"
 #include "config/message_bounds.hpp"
 #include "config/readers.hpp"
@@ -56,6 +57,31 @@ void read_tracker_timeouts(Section& tracker, TrackerConfig& out) {
   tracker.get("silence_timeout_s", out.silence_timeout, kPlain, kPositive);
 }
 
+void read_search(Section& tracker, TrackerConfig& out) {
+  constexpr Bounds kRadius_mm{0.1, 10e3}, kTimeout_s{0.1, 600.0};
+  TrackerSearchConfig search;
+  const bool radius = tracker.get("search_radius_mm", search.radius_m, kMilli, kRadius_mm);
+  const bool timeout = tracker.get("search_timeout_s", search.timeout, kPlain, kTimeout_s);
+  if (radius && timeout) out.search = search;
+  const auto misses = [&](std::string_view given, std::string_view missing) {
+    if (tracker.has(given) && !tracker.has(missing))
+      tracker.fault(missing,
+                    fmt::format("missing, but {} is given: the controller takes both or none", given));
+  };
+  misses("search_radius_mm", "search_timeout_s");
+  misses("search_timeout_s", "search_radius_mm");
+}
+
+/// Which reflector the beam holds, and how it gets there.
+void read_beam(Section& tracker, TrackerConfig& out) {
+  tracker.get_maybe_empty("reflector", out.reflector);
+  if (out.reflector.size() > drivers::kLongestReflectorName)
+    tracker.fault("reflector", fmt::format("must be at most {} bytes long: no controller has a longer name",
+                                           drivers::kLongestReflectorName));
+  tracker.get("home_after_initialize", out.home_after_initialize);
+  read_search(tracker, out);
+}
+
 /// Keys that only make sense on the other transport are refused: they would be silently ignored.
 void refuse(Section& encoder, std::initializer_list<std::string_view> keys, std::string_view transport) {
   for (const auto key : keys)
@@ -72,18 +98,40 @@ void read_transport(Section& encoder, EncoderConfig& out) {
       static_cast<void>(encoder.has(key));
   } else if (out.transport == EncoderTransport::SocketCan) {
     encoder.get("interface", out.interface, Need::Required);
-    encoder.get_word<SyncConfig>("sync", out.sync,
-                                 {{"daemon", SyncConfig::Daemon}, {"kernel", SyncConfig::Kernel}});
+    encoder.get_word<SyncConfig>(
+        "sync", out.sync,
+        {{"daemon", SyncConfig::Daemon}, {"kernel", SyncConfig::Kernel}, {"external", SyncConfig::External}});
     refuse(encoder, {"local_port", "peer_host", "peer_port"}, "socketcan");
   } else {
     encoder.get_integer("local_port", out.local_port, 0, 65535);
     encoder.get("peer_host", out.peer_host, Need::Required);
     encoder.get_integer("peer_port", out.peer_port, 1, 65535, Need::Required);
-    refuse(encoder, {"interface", "sync"}, "udp");
+    encoder.get_word<SyncConfig>("sync", out.sync,
+                                 {{"daemon", SyncConfig::Daemon}, {"external", SyncConfig::External}});
+    if (out.sync == SyncConfig::External && out.local_port == 0)
+      encoder.fault("local_port",
+                    "missing: with sync = \"external\" abbed sends nothing the peer could answer to");
+    refuse(encoder, {"interface"}, "udp");
   }
 }
 
-EncoderNodeConfig read_node(Section& section, const MachineConfig& machine) {
+/// Where a node is not asked how it is configured, the configuration must say it.
+void read_mapping(Section& section, SyncConfig sync, EncoderNodeConfig& node) {
+  constexpr int kLastByte = 4;  // 8 bytes, 4 of them the position
+  section.get_integer("tpdo", node.tpdo, 1, 2);
+  if (node.kind == AxisKind::Rotary)
+    section.get_integer("wrap_counts", node.wrap_counts, 2, std::int64_t{1} << 32);
+  if (sync != SyncConfig::External) {
+    if (section.has("position_byte"))
+      section.fault("position_byte", "only with sync = \"external\": else the node is asked");
+    return;
+  }
+  section.get_integer("position_byte", node.position_byte, 0, kLastByte);
+  if (node.kind == AxisKind::Rotary && node.wrap_counts == 0)
+    section.fault("wrap_counts", "missing: with sync = \"external\" the node is not asked for it");
+}
+
+EncoderNodeConfig read_node(Section& section, const MachineConfig& machine, SyncConfig sync) {
   EncoderNodeConfig node;
   const bool named = section.get("axis", node.axis, Need::Required);
   const AxisConfig* axis = machine.find_axis(node.axis);
@@ -95,6 +143,7 @@ EncoderNodeConfig read_node(Section& section, const MachineConfig& machine) {
   section.get(linear ? "offset_mm" : "offset_rad", node.offset, linear ? kMilli : kPlain, kAny);
   bool invert = false;
   if (section.get("invert", invert) && invert) node.step = -node.step;
+  read_mapping(section, sync, node);
   section.close();
   return node;
 }
@@ -104,7 +153,7 @@ void read_nodes(Section& encoder, const MachineConfig& machine, EncoderConfig& o
   std::set<std::string> axes;
   std::set<int> ids;
   for (auto& section : encoder.children("nodes")) {
-    auto node = read_node(section, machine);
+    auto node = read_node(section, machine, out.sync);
     if (!node.axis.empty() && !axes.insert(node.axis).second)
       section.fault("axis", fmt::format("axis {} has two nodes", node.axis));
     if (node.node != 0 && !ids.insert(node.node).second)
@@ -132,6 +181,7 @@ void read_tracker(Section& root, Config& out) {
   if (!tracker.get("u_scale_ppm", config.u_scale, kMicro, kNotNegative))
     config.u_scale = config.weather == WeatherConfig::Compute ? TrackerConfig::kControllersAir : 0.0;
   read_tracker_timeouts(tracker, config);
+  read_beam(tracker, config);
   if (!has_host && tracker.has("port") && !tracker.has("host"))
     tracker.fault("host", "missing, but a port is given");
   tracker.close();

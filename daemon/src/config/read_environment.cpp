@@ -4,6 +4,7 @@
 #include <set>
 
 #include "abbe/drivers/environment/known_maps.hpp"
+#include "abbe/drivers/environment/link.hpp"
 #include "config/message_bounds.hpp"
 #include "config/readers.hpp"
 #include "units.hpp"
@@ -208,9 +209,25 @@ EnvironmentConfig read_device(Section& device, Config& out) {
   return config;
 }
 
+/// Devices on one line are asked one after the other; a line has one baud rate.
+void check_line(const EnvironmentConfig& config, const Config& out, Section& section) {
+  for (const auto& other : out.environment) {
+    if (!drivers::same_line(config.address, other.address) ||
+        drivers::same_settings(config.address, other.address))
+      continue;
+    section.fault(
+        "serial",
+        fmt::format("[[environment]] \"{}\" and [[environment]] \"{}\" are on one serial line "
+                    "with different settings ({}; {}): give both the same baud, parity and stop_bits",
+                    config.name, other.name, drivers::text_of(config.address),
+                    drivers::text_of(other.address)));
+    return;
+  }
+}
+
 /// The names of Health's streams must differ: those of the devices, and the daemon's own.
 void take_name(const std::string& name, std::set<std::string>& names, Section& section) {
-  static const std::set<std::string> kOwn{"recorder", "models", "dds"};
+  static const std::set<std::string> kOwn{"recorder", "models", "dds", "dds_security"};
   if (name.empty()) return;
   if (kOwn.contains(name))
     section.fault("name", fmt::format("\"{}\" is what the daemon calls a part of its own", name));
@@ -238,6 +255,7 @@ void read_environment(Section& root, Config& out) {
   for (auto& section : root.children("environment")) {
     auto config = read_device(section, out);
     take_name(config.name, names, section);
+    check_line(config, out, section);
     for (const auto& measured : config.map.measured) {
       const auto bit = drivers::mask_of(measured);
       if ((seen & bit) != 0 && measured.quantity != Quantity::Temperature)

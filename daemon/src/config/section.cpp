@@ -143,6 +143,14 @@ bool Section::get(std::string_view key, std::string& out, Need need) {
   return true;
 }
 
+bool Section::get_maybe_empty(std::string_view key, std::string& out) {
+  const toml::node* node = find(key, Need::Optional);
+  const bool empty = node != nullptr && node->value_exact<std::string>() == std::string{};
+  if (!empty) return get(key, out);
+  out.clear();
+  return true;
+}
+
 bool Section::get(std::string_view key, bool& out, Need need) {
   const toml::node* node = find(key, need);
   if (node == nullptr) return false;

@@ -52,7 +52,8 @@ class Section {
   [[nodiscard]] std::vector<Section> children(std::string_view key);  ///< an array of tables
 
   bool get(std::string_view key, double& out, Unit unit, Bounds bounds, Need need = Need::Optional);
-  bool get(std::string_view key, std::string& out, Need need = Need::Optional);
+  bool get(std::string_view key, std::string& out, Need need = Need::Optional);  ///< not empty
+  bool get_maybe_empty(std::string_view key, std::string& out);
   bool get(std::string_view key, bool& out, Need need = Need::Optional);
   bool get(std::string_view key, std::chrono::nanoseconds& out, Unit unit, Bounds bounds,
            Need need = Need::Optional);

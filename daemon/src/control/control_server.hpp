@@ -11,6 +11,7 @@ namespace abbe::daemon {
 /// Serves a socket that listens at `path` already (listen_unix()): nothing is refused any more.
 [[nodiscard]] std::unique_ptr<ControlServer> serve_control(FileDescriptor listener,
                                                            const std::filesystem::path& path,
-                                                           ControlServer::Handler handler);
+                                                           ControlServer::Handler handler,
+                                                           const ControlLimits& limits = {});
 
 }  // namespace abbe::daemon

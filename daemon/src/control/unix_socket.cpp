@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 #include <sys/socket.h>
 #include <sys/stat.h>
+#include <sys/time.h>
 #include <sys/un.h>
 
 #include <cerrno>
@@ -32,20 +33,52 @@ Error failed(const char* what, const std::filesystem::path& path) {
 
 }  // namespace
 
-Result<FileDescriptor> connect_unix(const std::filesystem::path& path) {
+void set_send_time_out(int fd, std::chrono::milliseconds time_out) noexcept {
+  const auto ms = time_out.count();
+  const timeval most{.tv_sec = ms / 1000, .tv_usec = ms % 1000 * 1000};
+  (void)::setsockopt(fd, SOL_SOCKET, SO_SNDTIMEO, &most, sizeof most);
+}
+
+Result<FileDescriptor> connect_unix(const std::filesystem::path& path, std::chrono::milliseconds time_out) {
   auto address = address_of(path);
   if (!address) return tl::unexpected(address.error());
   FileDescriptor fd{::socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0)};
+  if (!fd) return tl::unexpected(failed("connect", path));
+  set_send_time_out(fd.get(),
+                    time_out);  // unix(7): connect() waits for a place in the backlog at most so long
   const auto* generic = reinterpret_cast<const sockaddr*>(&*address);  // the socket API's own idiom
+  if (::connect(fd.get(), generic, sizeof *address) != 0) {
+    if (errno != EAGAIN) return tl::unexpected(failed("connect", path));
+    return fail(ErrorCode::Io,
+                fmt::format("connect {}: the process that listens there accepted nobody in {} ms",
+                            path.string(), time_out.count()));
+  }
+  set_send_time_out(fd.get(), std::chrono::milliseconds{0});
+  return fd;
+}
+
+Result<FileDescriptor> connect_unix_datagrams(const std::filesystem::path& path) {
+  const auto address = address_of(path);
+  if (!address) return tl::unexpected(address.error());
+  FileDescriptor fd{::socket(AF_UNIX, SOCK_DGRAM | SOCK_CLOEXEC, 0)};
+  const auto* generic = reinterpret_cast<const sockaddr*>(&*address);
   if (!fd || ::connect(fd.get(), generic, sizeof *address) != 0)
     return tl::unexpected(failed("connect", path));
   return fd;
 }
 
+bool is_listened_at(const std::filesystem::path& path) {
+  const auto address = address_of(path);
+  if (!address) return false;
+  const FileDescriptor fd{::socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0)};
+  const auto* generic = reinterpret_cast<const sockaddr*>(&*address);
+  return fd && (::connect(fd.get(), generic, sizeof *address) == 0 || errno == EAGAIN);
+}
+
 Result<FileDescriptor> listen_unix(const std::filesystem::path& path) {
   auto address = address_of(path);
   if (!address) return tl::unexpected(address.error());
-  if (connect_unix(path)) {
+  if (is_listened_at(path)) {
     return tl::unexpected(
         Error{ErrorCode::Io, fmt::format("listen {}: another daemon already answers there", path.string())});
   }

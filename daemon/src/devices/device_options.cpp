@@ -28,6 +28,18 @@ WeatherMonitor weather_monitor(WeatherConfig weather) {
   return WeatherMonitor::None;
 }
 
+drivers::SyncSource sync_source(SyncConfig sync) {
+  switch (sync) {
+    case SyncConfig::Daemon:
+      return drivers::SyncSource::Thread;
+    case SyncConfig::Kernel:
+      return drivers::SyncSource::Kernel;
+    case SyncConfig::External:
+      return drivers::SyncSource::External;
+  }
+  return drivers::SyncSource::Thread;
+}
+
 std::chrono::nanoseconds nanoseconds_of(double seconds) {
   return std::chrono::nanoseconds{std::llround(1e9 * seconds)};
 }
@@ -53,15 +65,28 @@ drivers::TrackerDeviceOptions device_options(const TrackerConfig& config, double
   options.session.command_timeout = stretched(config.command_timeout, speed);
   options.session.initialize_timeout = stretched(config.initialize_timeout, speed);
   options.session.silence_timeout = stretched(config.silence_timeout, speed);
+  options.session.reflector = config.reflector;
+  options.session.home_after_initialize = config.home_after_initialize;
+  if (config.search) {
+    constexpr double kUnitsPerMetre = 1e3;  // abbe sets mm
+    options.session.search = protocol::emscon::SetSearchParams{
+        .radius = kUnitsPerMetre * config.search->radius_m,
+        .timeout_ms = static_cast<std::int32_t>(config.search->timeout / std::chrono::milliseconds{1})};
+  }
   options.clock.max_constant_delay = config.max_constant_delay;
   return options;
+}
+
+std::chrono::nanoseconds longest_tracker_order(const Config& config) {
+  if (!config.tracker) return {};
+  return drivers::longest_order(device_options(*config.tracker, config.daemon.speed).session);
 }
 
 drivers::EncoderDeviceOptions device_options(const EncoderConfig& config, double speed) {
   drivers::EncoderDeviceOptions options;
   options.name = config.name;
-  options.sync =
-      config.sync == SyncConfig::Kernel ? drivers::SyncSource::Kernel : drivers::SyncSource::Thread;
+  options.sync = sync_source(config.sync);
+  options.receiver.external_sync = config.sync == SyncConfig::External;
   options.receiver.sync_period = config.sync_period;
   options.receiver.sampling_delay = config.sampling_delay;
   options.receiver.u_sampling_delay = config.u_sampling_delay;
@@ -76,6 +101,9 @@ drivers::EncoderDeviceOptions device_options(const EncoderConfig& config, double
     axis.kind = node.kind == AxisKind::Rotary ? drivers::AxisKind::Rotary : drivers::AxisKind::Linear;
     axis.scale = node.step;
     axis.offset = node.offset;
+    axis.tpdo = static_cast<std::uint8_t>(node.tpdo);
+    axis.position_byte = static_cast<std::uint8_t>(node.position_byte);
+    axis.wrap_counts = static_cast<std::uint64_t>(node.wrap_counts);
     options.receiver.axes.push_back(axis);
   }
   return options;

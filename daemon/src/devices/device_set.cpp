@@ -14,10 +14,12 @@
 #include "abbe/drivers/can/socket_can_bus.hpp"
 #include "abbe/drivers/can/udp_can_bus.hpp"
 #include "abbe/drivers/device_thread.hpp"
+#include "abbe/drivers/environment/line.hpp"
 #include "abbe/drivers/sampling/mark_watcher.hpp"
 #include "abbe/drivers/sampling/touch_detector.hpp"
 #include "abbe/drivers/usb/libusb_link.hpp"
 #include "abbe/drivers/usb/usbip_link.hpp"
+#include "devices/machine_hold.hpp"
 
 namespace abbe::daemon {
 namespace {
@@ -30,6 +32,9 @@ constexpr std::size_t kMostSamples = 1024;
 constexpr std::size_t kMostBlocks = 128;
 constexpr auto kPositionIsOld =
     std::chrono::seconds{1};  // wall time: a ready machine says it ten times in it
+
+// How long a request to stop the machine may wait for its thread: 2 mm at 200 mm/s.
+constexpr auto kStopIsHeard = std::chrono::milliseconds{10};
 
 Error error_of(const drivers::Error& error) {
   return {error.code == drivers::ErrorCode::BadConfiguration ? ErrorCode::BadInput : ErrorCode::Io,
@@ -93,6 +98,28 @@ Result<Running<D>> run(drivers::Result<std::unique_ptr<D>> device, drivers::Devi
   return Running<D>{std::move(*device), std::move(*thread)};
 }
 
+/// One of the devices of a line.
+struct OnLine {
+  drivers::EnvironmentDevice* device;
+  const DeviceThread* thread;
+};
+
+/// The devices of the configuration, those of one line together.
+std::vector<std::vector<std::size_t>> devices_of_lines(const std::vector<EnvironmentConfig>& devices) {
+  std::vector<std::vector<std::size_t>> lines;
+  for (std::size_t i = 0; i < devices.size(); ++i) {
+    const auto with_it = std::ranges::find_if(lines, [&](const auto& line) {
+      return drivers::same_line(devices[line.front()].address, devices[i].address);
+    });
+    if (with_it != lines.end()) {
+      with_it->push_back(i);
+    } else {
+      lines.push_back({i});
+    }
+  }
+  return lines;
+}
+
 }  // namespace
 
 struct DeviceSet::State {
@@ -103,10 +130,12 @@ struct DeviceSet::State {
   std::optional<Running<drivers::EncoderDevice>> encoder;
   std::optional<Running<drivers::CounterCardDevice>> counter_card;
   std::optional<Running<drivers::CounterCardDevice>> reference_card;
-  std::vector<Running<drivers::EnvironmentDevice>> environments;
+  std::vector<Running<drivers::EnvironmentLine>> environment_lines;
+  std::vector<OnLine> environments;  // in the order of the configuration
   std::optional<Running<drivers::IppDevice>> cmm;
   bool cmm_is_the_axes = false;
   std::optional<protocol::AxisSample> cmm_stands_at;
+  std::optional<drivers::CounterCardProgress> card_progress;
   const drivers::TimeSource* time = nullptr;
   std::array<protocol::TrackerPoint, kMostSamples> points;
   std::array<protocol::AxisSample, kMostSamples> axes;
@@ -126,12 +155,8 @@ struct DeviceSet::State {
     }
   }
 
-  StreamHealth health_of(const drivers::Device& device, const DeviceThread& thread, HostTime now) {
-    StreamHealth h{.status = device.status()};
-    if (const auto failure = thread.failure()) {
-      h.status.state = "ended by a defect";
-      h.status.last_fault = *failure;
-    }
+  StreamHealth health_of(const DeviceThread& thread, HostTime now) {
+    StreamHealth h{.status = thread.status()};
     const auto latency = thread.latency().read();
     h.latency_p50_s = std::chrono::duration<double>(latency.quantile(0.50)).count();
     h.latency_p99_s = std::chrono::duration<double>(latency.quantile(0.99)).count();
@@ -146,7 +171,8 @@ struct DeviceSet::State {
   }
 };
 
-Result<DeviceSet> DeviceSet::start(const Config& config, const drivers::TimeSource& time) {
+Result<DeviceSet> DeviceSet::start(const Config& config, const drivers::TimeSource& time,
+                                   const std::optional<drivers::CounterCardProgress>& left) {
   auto state = std::make_unique<State>();
   state->time = &time;
   if (config.encoder) {
@@ -159,7 +185,11 @@ Result<DeviceSet> DeviceSet::start(const Config& config, const drivers::TimeSour
     state->encoder.emplace(std::move(*running));
   }
   if (config.counter_card) {
-    const auto options = device_options(*config.counter_card, config.daemon.speed);
+    auto options = device_options(*config.counter_card, config.daemon.speed);
+    if (left) {
+      options.receiver.goes_on_from = left;
+      options.session.set_up_serial = std::string{left->serial_number()};
+    }
     auto link = make_link(*config.counter_card, drivers::identity_of(options), time);
     if (config.probe) {
       state->touch_detector = std::make_unique<drivers::TouchDetector>(
@@ -191,16 +221,25 @@ Result<DeviceSet> DeviceSet::start(const Config& config, const drivers::TimeSour
     if (!running) return tl::unexpected(running.error());
     state->tracker.emplace(std::move(*running));
   }
-  for (const EnvironmentConfig& device : config.environment) {
+  state->environments.resize(config.environment.size());
+  for (const auto& devices : devices_of_lines(config.environment)) {
+    std::vector<drivers::EnvironmentDeviceOptions> options;
+    for (const std::size_t i : devices)
+      options.push_back(device_options(config.environment[i], config.daemon.speed));
     // Once a second and never in a hurry: an ordinary thread.
-    auto running = run(drivers::EnvironmentDevice::create(device_options(device, config.daemon.speed), time),
+    auto running = run(drivers::EnvironmentLine::create(options, time),
                        thread_options(config.daemon, "abbe-environ", 0, std::nullopt));
     if (!running) return tl::unexpected(running.error());
-    state->environments.push_back(std::move(*running));
+    for (std::size_t k = 0; k < devices.size(); ++k)
+      state->environments[devices[k]] = {&running->device->device(k), running->thread.get()};
+    state->environment_lines.push_back(std::move(*running));
   }
   if (config.cmm) {
-    auto running = run(drivers::IppDevice::create(device_options(*config.cmm, config.daemon.speed), time),
-                       thread_options(config.daemon, "abbe-cmm", 0, std::nullopt));
+    auto options = device_options(*config.cmm, config.daemon.speed);
+    keep_hold(config.daemon.data_dir, options);
+    auto thread = thread_options(config.daemon, "abbe-cmm", 0, std::nullopt);
+    thread.wait_at_most = kStopIsHeard;
+    auto running = run(drivers::IppDevice::create(options, time), std::move(thread));
     if (!running) return tl::unexpected(running.error());
     state->cmm.emplace(std::move(*running));
     state->cmm_is_the_axes = config.cmm_reads_axes();
@@ -223,6 +262,8 @@ void DeviceSet::drain(Batch& batch) {
   }
   if (s.counter_card) {  // the configuration allows one source of axes
     drain_ring(s.counter_card->device->samples(), s.axes, batch.axes);
+    for (drivers::CounterCardProgress p; s.counter_card->device->progress().pop({&p, 1}) != 0;)
+      s.card_progress = p;
     if (s.touch_detector) {
       drain_ring(s.touch_detector->touches(), s.touches, batch.touches);
       drain_ring(s.touch_detector->windows(), s.touch_scans, batch.touch_scans);
@@ -244,6 +285,10 @@ void DeviceSet::drain(Batch& batch) {
   if (s.cmm) drain_cmm(batch);
 }
 
+std::optional<drivers::CounterCardProgress> DeviceSet::card_progress() {
+  return std::exchange(state_->card_progress, std::nullopt);
+}
+
 void DeviceSet::drain_cmm(Batch& batch) {
   State& s = *state_;
   auto& device = *s.cmm->device;
@@ -261,18 +306,46 @@ void DeviceSet::measure(std::span<const drivers::ProbePoint> points) {
   state_->cmm->device->measure(points);
 }
 
+void DeviceSet::stop_machine() {
+  if (state_->cmm) state_->cmm->device->abort();
+}
+
+std::optional<std::string> DeviceSet::release_awaited() const {
+  if (!state_->cmm) return std::nullopt;
+  const auto status = state_->cmm->device->status();
+  if (status.state != drivers::name_of(drivers::IppState::AwaitingRelease)) return std::nullopt;
+  return status.last_fault;
+}
+
+Result<void> DeviceSet::release_machine() {
+  if (!state_->cmm) return SampleSource::release_machine();
+  const auto status = state_->cmm->device->status();
+  if (!release_awaited())
+    return fail(ErrorCode::Refused,
+                fmt::format("machine: {} awaits no release: it is {}", status.name, status.state));
+  state_->cmm->device->release();
+  return {};
+}
+
+std::optional<TipPlace> DeviceSet::tip_place() const {
+  const auto& at = state_->cmm_stands_at;
+  if (!at || at->missing_mask != 0) return std::nullopt;
+  return TipPlace{{at->position[0], at->position[1], at->position[2]}, state_->time->now() - at->head.time};
+}
+
 std::size_t DeviceSet::points_left() const {
   return state_->cmm ? state_->cmm->device->points_left() : 0;
 }
 
 Result<std::array<double, 3>> DeviceSet::machine_position() const {
   if (!state_->cmm) return SampleSource::machine_position();
-  const auto status = state_->cmm->device->status();
+  const auto status = state_->cmm->thread->status();
   const auto refused = [&](std::string_view why) {
     return fail(ErrorCode::Refused,
                 fmt::format("measuring machine {} {}{}{}", status.name, why,
                             status.last_fault.empty() ? "" : "; its last fault: ", status.last_fault));
   };
+  if (release_awaited()) return refused("awaits a release by a person (`abbe machine release`)");
   if (status.state != drivers::name_of(drivers::IppState::Ready))
     return refused(fmt::format("is not ready: {}", status.state));
   const auto& at = state_->cmm_stands_at;
@@ -284,19 +357,32 @@ Result<std::array<double, 3>> DeviceSet::machine_position() const {
   return place;
 }
 
+std::optional<drivers::DeviceStatus> DeviceSet::tracker_status() const {
+  if (!state_->tracker) return std::nullopt;
+  return state_->tracker->thread->status();
+}
+
+void DeviceSet::order_tracker(drivers::TrackerOrder order) {
+  if (state_->tracker) state_->tracker->device->order(std::move(order));
+}
+
+std::vector<drivers::TrackerOrderReport> DeviceSet::tracker_reports() {
+  return state_->tracker ? state_->tracker->device->reports() : std::vector<drivers::TrackerOrderReport>{};
+}
+
 std::vector<StreamHealth> DeviceSet::health(HostTime now) {
   std::vector<StreamHealth> out;
   if (state_->tracker)
-    out.push_back(state_->health_of(*state_->tracker->device, *state_->tracker->thread, now));
+    out.push_back(state_->health_of(*state_->tracker->thread, now));
   if (state_->encoder)
-    out.push_back(state_->health_of(*state_->encoder->device, *state_->encoder->thread, now));
+    out.push_back(state_->health_of(*state_->encoder->thread, now));
   if (state_->counter_card)
-    out.push_back(state_->health_of(*state_->counter_card->device, *state_->counter_card->thread, now));
+    out.push_back(state_->health_of(*state_->counter_card->thread, now));
   if (state_->reference_card)
-    out.push_back(state_->health_of(*state_->reference_card->device, *state_->reference_card->thread, now));
+    out.push_back(state_->health_of(*state_->reference_card->thread, now));
   for (const auto& running : state_->environments)
-    out.push_back(state_->health_of(*running.device, *running.thread, now));
-  if (state_->cmm) out.push_back(state_->health_of(*state_->cmm->device, *state_->cmm->thread, now));
+    out.push_back(state_->health_of(*running.thread, now));
+  if (state_->cmm) out.push_back(state_->health_of(*state_->cmm->thread, now));
   return out;
 }
 
@@ -312,7 +398,7 @@ std::vector<std::string> DeviceSet::warnings() const {
     add(**card);
     if (auto assumed = (*card)->device->assumption(); !assumed.empty()) out.push_back(std::move(assumed));
   }
-  for (const auto& running : state_->environments) add(running);
+  for (const auto& running : state_->environment_lines) add(running);
   if (state_->cmm) add(*state_->cmm);
   return out;
 }

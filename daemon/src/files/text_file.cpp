@@ -37,10 +37,10 @@ bool sync_folder(const std::filesystem::path& folder) {
 
 }  // namespace
 
-Result<std::string> read_text(const std::filesystem::path& file) {
-  const FileDescriptor fd(::open(file.c_str(), O_RDONLY | O_CLOEXEC));
-  struct stat status {};
-  if (fd.get() < 0 || ::fstat(fd.get(), &status) != 0) return io_failure("read", file);
+namespace {
+
+Result<std::string> read_all(const FileDescriptor& fd, const struct stat& status,
+                             const std::filesystem::path& file) {
   std::string text(static_cast<std::size_t>(status.st_size), '\0');
   std::size_t have = 0;
   for (;;) {
@@ -53,6 +53,28 @@ Result<std::string> read_text(const std::filesystem::path& file) {
   }
   text.resize(have);
   return text;
+}
+
+}  // namespace
+
+Result<std::string> read_text(const std::filesystem::path& file) {
+  const FileDescriptor fd(::open(file.c_str(), O_RDONLY | O_CLOEXEC));
+  struct stat status {};
+  if (fd.get() < 0 || ::fstat(fd.get(), &status) != 0) return io_failure("read", file);
+  return read_all(fd, status, file);
+}
+
+Result<std::string> read_regular_file(const std::filesystem::path& file) {
+  constexpr off_t kMost_bytes = off_t{1} << 30;
+  const FileDescriptor fd(::open(file.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK | O_NOCTTY));
+  struct stat status {};
+  // ENXIO: a socket, or a device without anything behind it.
+  if (!fd && errno != ENXIO) return io_failure("read", file);
+  if (!fd || ::fstat(fd.get(), &status) != 0 || !S_ISREG(status.st_mode))
+    return fail(ErrorCode::BadInput, fmt::format("read {}: is not a regular file", file.string()));
+  if (status.st_size > kMost_bytes)
+    return fail(ErrorCode::BadInput, fmt::format("read {}: has more than 1 GiB", file.string()));
+  return read_all(fd, status, file);
 }
 
 namespace {

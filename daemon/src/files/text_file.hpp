@@ -12,6 +12,10 @@ namespace abbe::daemon {
 /// The bytes of a file. One read, not a mapping: a file that shrinks under a mapping kills the process.
 [[nodiscard]] Result<std::string> read_text(const std::filesystem::path& file);
 
+/// The same of what must be a regular file of at most 1 GiB: a pipe or device in its place is BadInput and is
+/// not waited for.
+[[nodiscard]] Result<std::string> read_regular_file(const std::filesystem::path& file);
+
 /// Writes a new file beside the old one, forces it to the disk and renames it: after a power cut either the
 /// old or the new content is there. Owner and mode stay those of the file; a new file gets those of its
 /// folder (never writable by others), whoever writes it: what root writes for the daemon, the daemon can

@@ -4,10 +4,10 @@
 #include <sys/prctl.h>
 
 #include <ctime>
-#include <future>
 #include <utility>
 
 #include "abbe/daemon/device_options.hpp"
+#include "abbe/daemon/wake_up.hpp"
 
 namespace abbe::daemon {
 namespace {
@@ -26,29 +26,38 @@ void sleep_until(std::chrono::steady_clock::time_point t) {
 }
 
 StreamHealth health_of(const RecorderThread& recorder) {
-  const RecorderStatus r = recorder.status();
+  const RecorderStatus& r = recorder.status();
   StreamHealth h;
   h.status.name = "recorder";
   h.status.state = name(r.state);
   h.status.connected = r.state == RecorderStatus::State::Recording;
   h.status.samples = r.messages;
   h.status.dropped = r.lost + r.refused + recorder.dropped();
-  h.status.last_fault = r.fault;
-  if (r.fault.empty() && r.refused > 0) {
+  h.status.faults = r.faults;
+  h.status.last_fault = r.last_fault;
+  if (r.last_fault.empty() && r.refused > 0) {
     h.status.last_fault =
         fmt::format("{} messages outside the bounds of the IDL are not recorded", r.refused);
   }
   return h;
 }
 
-/// The model store, as far as it can be followed.
-StreamHealth health_of(const ModelAuthority& authority) {
+/// The model store, as far as it can be followed and written.
+StreamHealth health_of(const ModelAuthority& authority, const CalibrationService& calibration) {
+  const std::string& unstored = calibration.not_stored();
   StreamHealth h;
   h.status.name = "models";
-  h.status.connected = authority.fault().empty();
-  h.status.state = h.status.connected ? "followed" : "unreadable";
-  h.status.last_fault = authority.fault();
+  h.status.connected = authority.fault().empty() && unstored.empty();
+  h.status.state = !unstored.empty() ? "not stored" : h.status.connected ? "followed" : "unreadable";
+  h.status.last_fault = unstored.empty() ? authority.fault() : unstored;
   return h;
+}
+
+/// How abbe-dds fared; nothing while it has never ended.
+std::string report_of(const DdsProcess& process) {
+  const auto end = process.last_end();
+  if (!end) return {};
+  return fmt::format("abbe-dds was restarted {} times; last end: {}", process.restarts(), end->text());
 }
 
 StreamHealth health_of(const Publisher& publisher) {
@@ -61,19 +70,37 @@ StreamHealth health_of(const Publisher& publisher) {
   h.status.dropped = link.counters().dropped_live;
   h.status.faults = link.counters().refused;
   h.status.last_fault = publisher.refusal();
+  if (h.status.last_fault.empty() && link.process() != nullptr)
+    h.status.last_fault = report_of(*link.process());
+  return h;
+}
+
+/// Strangers on the domain: kept out by keys, or not.
+StreamHealth health_of_security(const Publisher& publisher) {
+  StreamHealth h;
+  h.status.name = "dds_security";
+  h.status.last_fault = publisher.security_warning();
+  h.status.connected = h.status.last_fault.empty();
+  h.status.state = h.status.connected ? "on" : "off";
   return h;
 }
 
 }  // namespace
 
 struct Hub::Call {
-  std::function<nlohmann::json()> task;
+  std::function<void()> task;
+  std::exception_ptr thrown;
   std::atomic<bool> claimed{false};  // by the hub, which runs it then, or by the caller, who has given up
-  std::promise<nlohmann::json> result;
+  WakeUp done;
 };
 
 Hub::Hub(HubParts parts)
     : parts_(parts), assembler_(assembler_options(parts.config)), live_(assembler_options(parts.config)) {}
+
+Hub::~Hub() {
+  run_calls();
+  for (Call* const call : given_up_.take()) delete call;
+}
 
 Hub::WallTime Hub::last_turn() const noexcept {
   return WallTime{std::chrono::nanoseconds{last_turn_ns_.load(std::memory_order_relaxed)}};
@@ -91,7 +118,11 @@ void Hub::turn(WallTime wall) {
   const HostTime now = parts_.time.now();
   batch_.taken = now;
   touch(points_left, wall);
-  if (parts_.reference != nullptr) parts_.reference->turn(batch_);
+  if (parts_.tracker != nullptr) parts_.tracker->turn(now);
+  if (parts_.reference != nullptr) {
+    parts_.reference->turn(batch_);
+    parts_.reference->take(parts_.devices.card_progress());
+  }
   const bool fresh = live_.take(batch_);
   // Live first: subscribers wait for it; abbe-dds's socket, the recorder and the assembler have time.
   publish(fresh, now, wall);
@@ -137,9 +168,11 @@ void Hub::publish(bool fresh, HostTime now, WallTime wall) {
 
 void Hub::collect_health(HostTime now) {
   health_ = parts_.devices.health(now);
-  health_.push_back(health_of(parts_.authority));
+  health_.push_back(health_of(parts_.authority, parts_.calibration));
   if (parts_.recorder != nullptr) health_.push_back(health_of(*parts_.recorder));
-  if (parts_.publisher != nullptr) health_.push_back(health_of(*parts_.publisher));
+  if (parts_.publisher == nullptr) return;
+  health_.push_back(health_of(*parts_.publisher));
+  health_.push_back(health_of_security(*parts_.publisher));
 }
 
 void Hub::run() {
@@ -157,34 +190,35 @@ void Hub::run() {
   }
 }
 
-std::optional<nlohmann::json> Hub::call(std::function<nlohmann::json()> task,
-                                        std::chrono::milliseconds time_out) {
-  auto call = std::make_shared<Call>();
+bool Hub::run_in_turn(std::function<void()> task, std::chrono::milliseconds time_out) {
+  for (Call* const old : given_up_.take()) delete old;
+  auto call = std::make_unique<Call>();
   call->task = std::move(task);
-  auto result = call->result.get_future();
-  {
-    const std::lock_guard lock{calls_mutex_};
-    calls_.push_back(call);
+  calls_.put(call.get());
+  if (!call->done.wait_for(time_out)) {
+    // The hub still has it among its calls.
+    if (!call->claimed.exchange(true)) {
+      (void)call.release();
+      return false;
+    }
+    call->done.wait();  // a task that has begun is as good as done
   }
-  // A task that has begun is as good as done: its result is waited for.
-  if (result.wait_for(time_out) != std::future_status::ready && !call->claimed.exchange(true))
-    return std::nullopt;
-  return result.get();
+  if (call->thrown) std::rethrow_exception(call->thrown);
+  return true;
 }
 
 void Hub::run_calls() {
-  std::vector<std::shared_ptr<Call>> calls;
-  {
-    const std::lock_guard lock{calls_mutex_};
-    calls.swap(calls_);
-  }
-  for (const auto& call : calls) {
-    if (call->claimed.exchange(true)) continue;
-    try {
-      call->result.set_value(call->task());
-    } catch (...) {  // a member of the wrong type in the request: the caller gets it
-      call->result.set_exception(std::current_exception());
+  for (Call* const call : calls_.take()) {
+    if (call->claimed.exchange(true)) {
+      given_up_.put(call);
+      continue;
     }
+    try {
+      call->task();
+    } catch (...) {  // a member of the wrong type in the request: the caller gets it
+      call->thrown = std::current_exception();
+    }
+    call->done.signal();  // the caller frees it now
   }
 }
 

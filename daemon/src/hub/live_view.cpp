@@ -1,6 +1,7 @@
 #include "abbe/daemon/live_view.hpp"
 
 #include <algorithm>
+#include <chrono>
 #include <cmath>
 #include <cstddef>
 
@@ -11,6 +12,25 @@ namespace abbe::daemon {
 namespace {
 
 using protocol::SampleFlag;
+
+/// Three bursts of a tracker.
+constexpr std::chrono::seconds kCurrentFor{1};
+
+/// The message has one instant, that of the axes, and none for the point: of a tracker that lost its beam or
+/// its connection the last point would look as fresh as the axes.
+void forget_what_is_not_current(protocol::Snapshot& view) {
+  const auto old = [&view](const protocol::SampleHead& head) {
+    return view.head.time - head.time > kCurrentFor;
+  };
+  if (view.has_tracker_point && old(view.tracker_point.head)) {
+    view.has_tracker_point = false;
+    view.tracker_point = {};
+  }
+  if (view.has_trigger && old(view.trigger.head)) {
+    view.has_trigger = false;
+    view.trigger = {};
+  }
+}
 
 }  // namespace
 
@@ -39,6 +59,7 @@ bool LiveView::take(const Batch& batch) {
     view_.has_trigger = true;
     view_.trigger = batch.touches.back();
   }
+  forget_what_is_not_current(view_);
   return !batch.axes.empty() || !batch.points.empty() || !batch.touches.empty() ||
          !batch.environment.empty() || !batch.measured_environment.empty();
 }

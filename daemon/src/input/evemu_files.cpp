@@ -8,6 +8,7 @@
 
 #include "abbe/daemon/otf_inputs.hpp"
 #include "abbe/daemon/sha256.hpp"
+#include "config/bounded_toml.hpp"
 #include "config/section.hpp"
 #include "files/text_file.hpp"
 #include "input/parsed_table.hpp"
@@ -143,15 +144,10 @@ Result<BallErrorsFile> read_errors_csv(const std::filesystem::path& file) {
 Result<CalibratorFile> read_calibrator_toml(const std::filesystem::path& file) {
   const auto text = read_text(file);
   if (!text) return tl::make_unexpected(text.error());
+  const auto table = parse_toml(*text, file.string());
+  if (!table) return tl::make_unexpected(table.error());
   Faults faults(file.string());
-  toml::table table;
-  try {
-    table = toml::parse(*text, file.string());
-  } catch (const toml::parse_error& error) {
-    faults.add(error.source().begin.line, error.source().begin.column, "", error.description());
-    return tl::make_unexpected(faults.to_error());
-  }
-  Section root(&table, "", {1, 1}, faults);
+  Section root(&*table, "", {1, 1}, faults);
   std::array<std::optional<BlockFace>, 2> faces;
   auto calibrator = read_calibrator(root, faces);
   if (faults.any()) return tl::make_unexpected(faults.to_error());

@@ -4,15 +4,21 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
+#include "abbe/daemon/bounded_json.hpp"
 #include "abbe/daemon/model_document.hpp"
+#include "abbe/daemon/utc_text.hpp"
 #include "files/text_file.hpp"
 #include "model/decimal.hpp"
 #include "model/model_format.hpp"
-#include "model/utc_text.hpp"
 
 namespace abbe::daemon {
 
 namespace {
+
+/// n (n + 1) / 2 numbers of the covariance of n parameters are the largest array: n = 20,000 fits. to_json()
+/// nests five deep.
+constexpr JsonBounds kModelBounds{
+    .bytes = std::size_t{1} << 30, .depth = 16, .values = std::size_t{1} << 28};
 
 /// long double: see decimal.hpp.
 using Json =
@@ -250,6 +256,12 @@ std::optional<calib::Expansion> read_artefact(Reader& in) {
                           within("u_temperature_K", 0, 0.0, kWarmest_K - kColdest_K)};
 }
 
+/// Missing in models whose recording is whole, and in those of before.
+std::string read_recording_gap(Reader& in) {
+  const std::string key = "recording_gap";
+  return in.root().is_object() && in.root().contains(key) ? in.text(key) : std::string{};
+}
+
 std::vector<InputFile> read_inputs(Reader& in) {
   std::vector<InputFile> inputs;
   const Json* list = in.find(in.root(), "", "inputs");
@@ -275,11 +287,12 @@ Result<ModelDocument> read_document(Reader& in) {
   const auto statistics = read_statistics(in);
   const auto inputs = read_inputs(in);
   const auto artefact = read_artefact(in);
+  const auto recording_gap = read_recording_gap(in);
   const auto method = in.text("method"), estimator = in.text("estimator"), machine = in.text("machine"),
              machine_hash = in.text("machine_hash"), hash = in.text("hash");
   if (in.any()) return tl::make_unexpected(in.to_error());
-  ModelDocument document{std::move(*model), method,     estimator, machine, machine_hash,
-                         *created,          statistics, inputs,    artefact};
+  ModelDocument document{std::move(*model), method,     estimator, machine,  machine_hash,
+                         *created,          statistics, inputs,    artefact, recording_gap};
   if (hash == model_hash(document)) return document;
   in.fault("hash", "is not the hash of the content: the file was changed or damaged");
   return tl::make_unexpected(in.to_error());
@@ -288,6 +301,7 @@ Result<ModelDocument> read_document(Reader& in) {
 }  // namespace
 
 Result<ModelDocument> parse_model(std::string_view text, const std::string& file) {
+  if (auto within = check_json(text, file, kModelBounds); !within) return tl::make_unexpected(within.error());
   try {
     const auto root = Json::parse(text);
     Reader reader(root, file);

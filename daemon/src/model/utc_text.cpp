@@ -1,4 +1,4 @@
-#include "model/utc_text.hpp"
+#include "abbe/daemon/utc_text.hpp"
 
 #include <fmt/format.h>
 
@@ -7,6 +7,11 @@
 namespace abbe::daemon {
 
 using namespace std::chrono;
+
+namespace {
+/// Whole years that nanoseconds since 1970 hold in 64 bits.
+constexpr int first_year = 1678, last_year = 2261;
+}  // namespace
 
 std::string to_text(protocol::UtcTime time) {
   const auto day = floor<days>(time);
@@ -27,8 +32,10 @@ std::optional<protocol::UtcTime> utc_from_text(std::string_view text) {
       std::sscanf(owned.c_str(), "%4d-%2u-%2uT%2u:%2u:%2u.%9u%c", &y, &mo, &d, &h, &mi, &s, &ns, &zone) != 8)
     return std::nullopt;
   const year_month_day date{year{y}, month{mo}, day{d}};
-  if (zone != 'Z' || !date.ok() || h > 23 || mi > 59 || s > 59) return std::nullopt;
-  return sys_days{date} + hours{h} + minutes{mi} + seconds{s} + nanoseconds{ns};
+  if (y < first_year || y > last_year || !date.ok() || h > 23 || mi > 59 || s > 59) return std::nullopt;
+  const protocol::UtcTime time = sys_days{date} + hours{h} + minutes{mi} + seconds{s} + nanoseconds{ns};
+  if (to_text(time) != text) return std::nullopt;  // sscanf takes signs and spaces, too
+  return time;
 }
 
 }  // namespace abbe::daemon

@@ -4,9 +4,9 @@
 
 #include "abbe/daemon/model_document.hpp"
 #include "abbe/daemon/sha256.hpp"
+#include "abbe/daemon/utc_text.hpp"
 #include "model/decimal.hpp"
 #include "model/model_format.hpp"
-#include "model/utc_text.hpp"
 
 namespace abbe::daemon {
 
@@ -136,6 +136,10 @@ void write_inputs(JsonText& out, const std::vector<InputFile>& inputs) {
 
 }  // namespace
 
+std::string cannot_be_checked(std::string_view recording_gap) {
+  return fmt::format("no replay can check this model: {}", recording_gap);
+}
+
 std::string to_json(const ModelDocument& document) {
   const auto& model = document.model;
   JsonText out;
@@ -159,6 +163,7 @@ std::string to_json(const ModelDocument& document) {
   write_statistics(out, document.statistics);
   if (document.artefact) write_artefact(out, *document.artefact);
   write_inputs(out, document.inputs);
+  if (!document.recording_gap.empty()) out.member("recording_gap", document.recording_gap);
   out.key("validity");
   out.raw(fmt::format("{{\"hull_mm\": {}}}", vectors_mm(model.validity().vertices_m())));
   write_parameters(out, model);

@@ -29,12 +29,18 @@ Publisher::Publisher(DdsLink link, PublisherOptions options, protocol::UtcOffset
     : link_(std::move(link)), options_(std::move(options)), utc_(utc) {}
 
 template <class T>
-void Publisher::send(Topic topic, const T& message) {
+void Publisher::send(Topic topic, const T& message, WallTime at) {
   // Outside the IDL's bounds: the configuration should have refused what led here. The link counts the empty
   // payload.
   if (auto encoded = encode(message, payload_); !encoded) {
     refusal_ = fmt::format("{} not sent: {}", traits(topic).name, encoded.error().text);
   }
+  link_.publish(topic, payload_, at);
+}
+
+void Publisher::send_encoded(Topic topic, std::span<const std::byte> payload) {
+  payload_.assign(payload.begin(), payload.end());
+  (void)set_sequence_number(topic, payload_, ++sequence_number_);
   link_.publish(topic, payload_);
 }
 
@@ -45,20 +51,21 @@ void Publisher::beat(WallTime wall) {
 
 void Publisher::snapshot(const protocol::Snapshot& view, protocol::HostTime now, WallTime wall) {
   if (due(snapshots_, view, wall, options_.snapshot_hz))
-    send(Topic::Snapshot, snapshot_message(view, utc_, stamp(now)));
+    send(Topic::Snapshot, snapshot_message(view, utc_, stamp(now)), wall);
 }
 
 void Publisher::compensation(const protocol::Snapshot& view, const ModelStanding& standing,
                              protocol::HostTime now, WallTime wall) {
   if (view.axis_count < 3 || !due(compensations_, view, wall, options_.compensation_hz)) return;
   send(Topic::Compensation, compensation_message(standing.status, standing.model, view,
-                                                 options_.tool_offset_m, options_.validity, stamp(now)));
+                                                 options_.tool_offset_m, options_.validity, stamp(now)),
+       wall);
 }
 
 void Publisher::model(const ModelStanding& standing, protocol::HostTime now, WallTime wall) {
-  if (standing.model != nullptr && standing.revision != sent_revision_) {
-    send(Topic::ErrorModel, model_message(*standing.model, stamp(now)));
-    for (const auto& slice : grid_messages(*standing.model, stamp(now))) send(Topic::ErrorGrid, slice);
+  if (standing.publication != nullptr && standing.revision != sent_revision_) {
+    send_encoded(Topic::ErrorModel, standing.publication->model);
+    for (const auto& slice : standing.publication->slices) send_encoded(Topic::ErrorGrid, slice);
     sent_revision_ = standing.revision;
     next_state_ = wall;
   }

@@ -2,7 +2,7 @@
 
 #include <fmt/format.h>
 
-#include "model/utc_text.hpp"
+#include "abbe/daemon/utc_text.hpp"
 #include "units.hpp"
 
 namespace abbe::daemon {

@@ -36,6 +36,7 @@ std::vector<double> lengths_um(const std::vector<calib::Vector3>& v_m) {
 void add_left(HtmlReport& page, const Verification& v) {
   const auto& c = v.comparison;
   page.heading("What is left at the measured points");
+  if (!v.cut_short.empty()) page.paragraph("Points are missing: " + v.cut_short + ".");
   page.paragraph(
       fmt::format("{} of {} measured points lie where the model holds. Without and with compensation, each "
                   "after its own best rigid motion of the instrument: how well both could be set up.",

@@ -2,9 +2,12 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <charconv>
 #include <nlohmann/json.hpp>
 
 #include "json_vector.hpp"
+#include "session/attachment_content.hpp"
 
 namespace abbe::daemon {
 namespace {
@@ -14,6 +17,9 @@ using calib::Vector3;
 using nlohmann::json;
 
 constexpr std::string_view kPrefix = "calibration-", kSuffix = ".json";
+// How an attachment begins, and the places for its number.
+constexpr std::string_view kFromKey = R"({"from_ns":)";
+constexpr std::size_t kDigitsOfFrom = 20;
 
 json xyz(const Vector3& v) {
   return {v.x(), v.y(), v.z()};
@@ -119,16 +125,30 @@ bool is_calibration_request(std::string_view attachment_name) noexcept {
 }
 
 RecordingAttachment to_attachment(const CalibrationRequest& request) {
-  json content = to_json(request.task);
-  content["from_ns"] = request.from.time_since_epoch().count();
-  return {.name = fmt::format("{}{}{}", kPrefix, method_of(request.task), kSuffix),
+  auto attachment = to_attachment(request.task);
+  set_from(attachment, request.from);
+  return attachment;
+}
+
+RecordingAttachment to_attachment(const CalibrationTask& task) {
+  std::string content = to_json(task).dump();
+  content.replace(0, 1, fmt::format("{}{:{}},", kFromKey, 0, kDigitsOfFrom));
+  return {.name = fmt::format("{}{}{}", kPrefix, method_of(task), kSuffix),
           .media_type = "application/json",
-          .content = content.dump()};
+          .content = std::move(content)};
+}
+
+void set_from(RecordingAttachment& attachment, protocol::HostTime from) noexcept {
+  char* const place = attachment.content.data() + kFromKey.size();
+  std::fill_n(place, kDigitsOfFrom, ' ');  // which JSON allows before and behind a number
+  (void)std::to_chars(place, place + kDigitsOfFrom, from.time_since_epoch().count());
 }
 
 Result<CalibrationRequest> from_attachment(const RecordingAttachment& attachment) {
   try {
-    const json content = json::parse(attachment.content);
+    const auto parsed = content_of(attachment);
+    if (!parsed) return tl::unexpected(parsed.error());
+    const json& content = *parsed;
     const protocol::HostTime from{std::chrono::nanoseconds{content.at("from_ns").get<std::int64_t>()}};
     auto task = task_from_json(content);
     if (!task)

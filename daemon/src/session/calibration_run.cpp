@@ -21,14 +21,13 @@ std::string touches_sha256(std::span<const calib::evemu::Touch> touches) {
 }  // namespace
 
 Result<Candidate> identify(const CalibrationRun& run, const Config& config,
-                           const calib::VolumetricModel* active,
-                           const std::function<void(double)>& progress) {
+                           const calib::VolumetricModel* active, const IdentificationWatch& watch) {
   if (const auto* otf = std::get_if<OtfRun>(&run)) {
-    auto found = identify_run(*otf, config.machine, config.gate, active, progress);
+    auto found = identify_run(*otf, config.machine, config.gate, active, watch);
     if (!found) return tl::unexpected(found.error());
     return std::move(*found);
   }
-  auto found = identify_touches(std::get<EvemuRun>(run), config, active);
+  auto found = identify_touches(std::get<EvemuRun>(run), config, active, watch.stopped);
   if (!found) return tl::unexpected(found.error());
   return std::move(*found);
 }

@@ -17,6 +17,8 @@ namespace {
 
 using protocol::HostTime;
 
+constexpr std::chrono::milliseconds kLookForStop{100};
+
 std::string verdict_text(const calib::Verdict& verdict) {
   const auto& h = verdict.held_out;
   const std::string figures =
@@ -26,6 +28,31 @@ std::string verdict_text(const calib::Verdict& verdict) {
   const std::string notes = verdict.notes.empty() ? "" : fmt::format("; {}", fmt::join(verdict.notes, "; "));
   if (verdict.accepted) return "accepted: " + figures + notes;
   return fmt::format("refused: {} ({}{})", fmt::join(verdict.reasons, "; "), figures, notes);
+}
+
+// A full disk or a lock takes a person or a clean-up; what it costs to ask is one small file.
+constexpr auto kKeepAgain = std::chrono::seconds{5};
+// Longer than a disk needs that is only slow: a model does not wait for its recording.
+constexpr auto kDigestPatience = std::chrono::seconds{10};
+
+/// What the recorder has of the run. Never fails: without a recording the digest says so.
+RecordingDigest digest_of(std::future<RecordingDigest>& wanted, const std::atomic<bool>& stopped) {
+  try {
+    for (auto waited = kLookForStop; !stopped && waited < kDigestPatience; waited += kLookForStop)
+      if (wanted.wait_for(kLookForStop) == std::future_status::ready) return wanted.get();
+    return {.gap = "the recorder did not answer: its disk stalls"};
+  } catch (const std::exception&) {  // a broken promise
+    return {.gap = "the recorder failed"};
+  }
+}
+
+/// A recording with a gap is named, but not as what the model can be checked with: its hash stands behind
+/// that of the data.
+void cite(const RecordingDigest& recording, std::vector<InputFile>& inputs) {
+  if (recording.bytes == 0) return;
+  // The hash is that of the first `bytes` bytes: the recording goes on.
+  const auto name = fmt::format("{} ({} bytes)", recording.file.filename().string(), recording.bytes);
+  inputs.insert(recording.gap.empty() ? inputs.begin() : inputs.end(), {name, recording.sha256});
 }
 
 template <class T>
@@ -38,14 +65,43 @@ bool ready(const std::future<T>& work) {
 CalibrationService::CalibrationService(const Config& config, ModelAuthority& authority,
                                        RecorderThread* recorder, protocol::UtcOffset utc)
     : config_(config),
+      shared_config_(std::make_shared<const Config>(config)),
       authority_(authority),
       recorder_(recorder),
       utc_(utc),
       session_(acquisition_options(config), evemu_acquisition_options(config)) {}
 
 CalibrationService::~CalibrationService() {
-  if (identification_.valid()) identification_.wait();
-  if (keeping_.valid()) keeping_.wait();
+  const WallTime until = WallTime::clock::now() + kStopPatience;
+  watch_->stopped = true;
+  stop_identification(until - kLastTry);
+  if (!to_keep_) return;
+  if (const auto kept = try_once_more(until); !kept)
+    fmt::print(stderr, "abbed: model {} is lost: {}; `abbe identify {} --recording` finds it again\n",
+               to_keep_->id, kept.error().text, to_keep_->document.method);
+}
+
+/// One that had come to its end already is not lost.
+void CalibrationService::stop_identification(WallTime until) {
+  if (!identification_.valid() || identification_.wait_until(until) != std::future_status::ready) return;
+  (void)sign(outcome_of(identification_), latest_turn_);
+}
+
+Result<void> CalibrationService::try_once_more(WallTime until) {
+  if (keeping_.valid()) {
+    if (keeping_.wait_until(until - kLastTry) != std::future_status::ready)
+      return fail(ErrorCode::Io, "the store has not answered");
+    if (outcome_of(keeping_)) return {};
+  }
+  ModelKeeper keeper = authority_.keeper();
+  keeper.set_lock_patience(kLastTry);
+  keeping_ = start_abandonable([keeper = std::move(keeper), model = to_keep_]() mutable {
+    return keeper.keep(model->document, model->verdict, model->actor, {});
+  });
+  if (keeping_.wait_until(until) != std::future_status::ready)
+    return fail(ErrorCode::Io, "the store has not answered");
+  const auto kept = outcome_of(keeping_);
+  return kept ? Result<void>{} : tl::unexpected(kept.error());
 }
 
 Result<void> CalibrationService::check(const CalibrationTask& task) const {
@@ -56,11 +112,6 @@ Result<void> CalibrationService::check(const CalibrationTask& task) const {
                     "switch its compensation off first, and say so in the configuration",
                     method_of(task)));
   }
-  if (identification_.valid()) {
-    return fail(
-        ErrorCode::Refused,
-        fmt::format("calibrate {}: the identification of a cancelled run is still ending", method_of(task)));
-  }
   if (const auto* otf = std::get_if<OtfRequest>(&task)) {
     if (config_.tracker && config_.tracker->mode == TrackerModeConfig::Stationary)
       return fail(ErrorCode::Refused,
@@ -70,29 +121,56 @@ Result<void> CalibrationService::check(const CalibrationTask& task) const {
   return check_evemu(std::get<EvemuRequest>(task), config_);
 }
 
-Result<void> CalibrationService::start(CalibrationTask task, const std::string& who, HostTime now) {
-  if (auto fine = check(task); !fine) return fine;
-  CalibrationRequest request{.task = std::move(task), .from = now};
-  const RecordingAttachment attachment = to_attachment(request);
-  if (auto started = session_.start(std::move(request)); !started) return started;
+Result<PreparedCalibration> CalibrationService::prepare(CalibrationTask task) const {
+  if (auto fine = check(task); !fine) return tl::unexpected(fine.error());
+  RecordingAttachment attachment = to_attachment(task);
+  auto session = session_.prepare(std::move(task));
+  if (!session) return tl::unexpected(session.error());
+  return PreparedCalibration{std::move(*session), std::move(attachment)};
+}
+
+Result<std::uint64_t> CalibrationService::start(PreparedCalibration&& prepared, const std::string& who,
+                                                HostTime now) {
+  if (identification_.valid() && !session_.running())
+    return fail(ErrorCode::Refused,
+                fmt::format("calibrate {}: the identification of a cancelled run is still ending",
+                            prepared.session.method));
+  SessionStatus before = session_.status();
+  if (auto started = session_.start(std::move(prepared.session), now); !started)
+    return tl::unexpected(started.error());
+  if (before.id != 0) ended_.push_back(std::move(before));
+  if (ended_.size() > kEndedKept) ended_.pop_front();
   who_ = who;
-  if (recorder_ != nullptr) recorder_->attach(attachment, now);
-  return {};
+  set_from(prepared.attachment, now);
+  if (recorder_ != nullptr) recorder_->attach(std::move(prepared.attachment), now);
+  return session_.status().id;
+}
+
+Result<std::uint64_t> CalibrationService::start(CalibrationTask task, const std::string& who, HostTime now) {
+  auto prepared = prepare(std::move(task));
+  if (!prepared) return tl::unexpected(prepared.error());
+  return start(std::move(*prepared), who, now);
 }
 
 Result<void> CalibrationService::cancel(const std::string& who, HostTime now) {
   if (keeping_.valid())
     return fail(ErrorCode::Refused, "cancel: the model is being put into the store already");
-  return session_.cancel(who, now);
+  watch_->stopped = true;
+  auto cancelled = session_.cancel(who, now);
+  if (cancelled) discard_unstored();
+  return cancelled;
 }
 
 std::vector<SessionEvent> CalibrationService::turn(std::span<const protocol::Snapshot> snapshots,
                                                    HostTime now) {
+  latest_turn_ = now;
   for (const auto& snapshot : snapshots) session_.take(snapshot);
   session_.tick(now);
   if (auto run = session_.take_run()) begin_identification(std::move(*run));
+  if (auto in_vain = session_.take_discarded()) destroy_aside(std::move(*in_vain));
   if (ready(identification_)) keep(outcome_of(identification_), now);
   if (ready(keeping_)) conclude(outcome_of(keeping_), now);
+  if (to_keep_ && !keeping_.valid() && now >= keep_again_at_) begin_keeping(now);
   auto events = session_.take_events();
   if (recorder_ != nullptr) {
     for (const auto& event : events) recorder_->hand_over(event_message(event, config_.machine.name), now);
@@ -100,63 +178,93 @@ std::vector<SessionEvent> CalibrationService::turn(std::span<const protocol::Sna
   return events;
 }
 
-void CalibrationService::begin_identification(CalibrationRun run) {
-  std::optional<calib::VolumetricModel> active;
-  if (const auto* to_beat = authority_.to_beat()) active = *to_beat;
+void CalibrationService::begin_identification(AcquiredRun acquired) {
+  auto active = authority_.to_beat();
   active_left_out_ = !active && authority_.in_force() != nullptr;
   std::future<RecordingDigest> digest;
   if (recorder_ != nullptr) digest = recorder_->digest();
-  identified_share_ = 0.0;
-  identification_ = start_aside([this, run = std::move(run), active = std::move(active),
-                                 digest = std::move(digest)]() mutable -> Result<Identified> {
-    std::vector<InputFile> inputs;
-    if (digest.valid()) {
-      const RecordingDigest d = digest.get();
-      // The hash is that of the first `bytes` bytes: the recording goes on.
-      inputs.push_back({fmt::format("{} ({} bytes)", d.file.filename().string(), d.bytes), d.sha256});
-    }
-    const auto entered = inputs_of(run);
-    inputs.insert(inputs.end(), entered.begin(), entered.end());
-    auto candidate = identify(run, config_, active ? &*active : nullptr,
-                              [this](double share) { identified_share_ = share; });
-    if (!candidate) return tl::unexpected(candidate.error());
-    return Identified{std::move(*candidate), std::move(inputs)};
-  });
+  watch_ = std::make_shared<Watch>();
+  identification_ =
+      start_abandonable([watch = watch_, config = shared_config_, acquired = std::move(acquired),
+                         active = std::move(active),
+                         digest = std::move(digest)]() mutable -> Result<Identified> {
+        const CalibrationRun run = run_of(std::move(acquired));
+        std::vector<InputFile> inputs = inputs_of(run);
+        auto candidate = identify(run, *config, active ? &active->model : nullptr,
+                                  {.progress = [&watch](double share) { watch->share = share; },
+                                   .stopped = [&watch] { return watch->stopped.load(); }});
+        if (!candidate) return tl::unexpected(candidate.error());
+        RecordingDigest recording =
+            digest.valid() ? digest_of(digest, watch->stopped) : RecordingDigest{};
+        cite(recording, inputs);
+        auto document = document_of(*candidate, *config, std::move(inputs), {});
+        document.recording_gap = recording.gap;
+        auto id = model_id(document);
+        auto why = fmt::format("calibrate {}", method_of(*candidate));
+        return Identified{.model = std::make_shared<ToKeep>(ToKeep{.id = std::move(id),
+                                                                   .document = std::move(document),
+                                                                   .verdict = verdict_of(*candidate),
+                                                                   .actor = {.who = {}, .why = std::move(why), .when = {}}}),
+                          .recording_gap = std::move(recording.gap)};
+      });
+}
+
+/// Whether there is a model to keep: the session was not cancelled meanwhile, and the data allowed one.
+bool CalibrationService::sign(Result<Identified> identified, HostTime now) {
+  if (session_.status().state != SessionState::Identifying) {
+    destroy_aside(std::move(identified));
+    return false;
+  }
+  if (!identified) {
+    session_.not_identified(identified.error(), now);
+    return false;
+  }
+  to_keep_ = std::move(identified->model);
+  calib::Verdict& verdict = to_keep_->verdict;
+  if (active_left_out_) verdict.notes.emplace_back(kOfAnotherMachine);
+  if (!identified->recording_gap.empty())
+    verdict.notes.push_back(cannot_be_checked(identified->recording_gap));
+  const auto created = utc_.to_utc(now);
+  to_keep_->document.created = to_keep_->actor.when = created;
+  to_keep_->actor.who = who_;
+  return true;
 }
 
 void CalibrationService::keep(Result<Identified> identified, HostTime now) {
-  if (session_.status().state != SessionState::Identifying) return;  // cancelled meanwhile
-  if (!identified) {
-    session_.not_identified(identified.error(), now);
-    return;
-  }
-  verdict_ = verdict_of(identified->candidate);
-  if (active_left_out_) verdict_.notes.emplace_back(kOfAnotherMachine);
+  if (!sign(std::move(identified), now)) return;
+  verdict_ = to_keep_->verdict;
   held_out_ = verdict_.held_out;
-  const auto created = utc_.to_utc(now);
+  begin_keeping(now);
+}
+
+void CalibrationService::begin_keeping(HostTime now) {
   keeping_since_ = authority_.revision();
-  keeping_ = start_aside(
-      [keeper = authority_.keeper(), verdict = verdict_, now,
-       actor = StoreActor{.who = who_,
-                          .why = fmt::format("calibrate {}", method_of(identified->candidate)),
-                          .when = created},
-       document = document_of(identified->candidate, config_, std::move(identified->inputs),
-                              created)]() mutable { return keeper.keep(document, verdict, actor, now); });
+  keeping_ = start_abandonable([keeper = authority_.keeper(), model = to_keep_, now]() mutable {
+    return keeper.keep(model->document, model->verdict, model->actor, now);
+  });
+}
+
+void CalibrationService::discard_unstored() {
+  if (to_keep_) destroy_aside(std::exchange(to_keep_, nullptr));
+  not_stored_.clear();
 }
 
 void CalibrationService::conclude(Result<KeptModel> kept, HostTime now) {
   if (!kept) {
-    session_.not_identified(
-        {kept.error().code, fmt::format("identified, but not kept: {}", kept.error().text), {}}, now);
+    keep_again_at_ = now + kKeepAgain;
+    not_stored_ = fmt::format("model {} is not stored: {}", to_keep_->id, kept.error().text);
+    session_.not_stored(
+        fmt::format("{}; tried again every {} s, cancel discards it", not_stored_, kKeepAgain.count()), now);
     return;
   }
+  discard_unstored();
   if (kept->active) authority_.take_up(std::move(*kept->active), keeping_since_);
   session_.judged(kept->id, verdict_.accepted, verdict_text(verdict_), now);
 }
 
 SessionStatus CalibrationService::status() const {
   SessionStatus s = session_.status();
-  if (s.state == SessionState::Identifying) s.progress = identified_share_;
+  if (s.state == SessionState::Identifying) s.progress = watch_->share;
   return s;
 }
 

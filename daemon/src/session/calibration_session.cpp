@@ -22,37 +22,43 @@ bool CalibrationSession::running() const noexcept {
 }
 
 bool CalibrationSession::acquiring() const noexcept {
-  return status_.state == SessionState::Warming || status_.state == SessionState::Acquiring;
+  return takes_readings(status_.state);
 }
 
-Result<CalibrationSession::Acquisition> CalibrationSession::acquisition(
-    const CalibrationRequest& request) const {
-  if (const auto* touching = std::get_if<EvemuRequest>(&request.task)) {
-    auto made = EvemuAcquisition::create(*touching, request.from, evemu_options_);
+Result<PreparedSession> CalibrationSession::prepare(CalibrationTask task) const {
+  const std::string_view method = method_of(task);
+  if (auto* touching = std::get_if<EvemuRequest>(&task)) {
+    auto made = EvemuAcquisition::create(std::move(*touching), evemu_options_);
     if (!made) return tl::unexpected(made.error());
-    return std::move(*made);
+    return PreparedSession{.method = method, .path_m = {}, .acquisition = std::move(*made)};
   }
-  const auto& path_m = std::get<OtfRequest>(request.task).path_m;
+  auto& path_m = std::get<OtfRequest>(task).path_m;
   if (path_m.size() < 2)
     return fail(ErrorCode::BadInput, "calibrate otf: a path needs at least two vertices");
-  return OtfAcquisition{path_m, request.from, otf_options_};
+  OtfAcquisition made{path_m, otf_options_};
+  return PreparedSession{.method = method, .path_m = std::move(path_m), .acquisition = std::move(made)};
+}
+
+Result<void> CalibrationSession::start(PreparedSession&& prepared, HostTime from) {
+  if (running()) {
+    return fail(ErrorCode::Refused, fmt::format("calibrate {}: a session is {} already", prepared.method,
+                                                name(status_.state)));
+  }
+  std::visit([from](auto& a) { a.begin(from); }, prepared.acquisition);
+  acquisition_.emplace(std::move(prepared.acquisition));
+  std::swap(path_m_, prepared.path_m);
+  status_ = {};
+  status_.id = ++started_;
+  status_.method = prepared.method;
+  if (const auto* touching = std::get_if<EvemuAcquisition>(&*acquisition_)) status_.next = touching->next();
+  enter(SessionState::Warming, std::visit([](const auto& a) { return a.reason(); }, *acquisition_), from);
+  return {};
 }
 
 Result<void> CalibrationSession::start(CalibrationRequest request) {
-  if (running()) {
-    return fail(ErrorCode::Refused, fmt::format("calibrate {}: a session is {} already",
-                                                method_of(request.task), name(status_.state)));
-  }
-  auto made = acquisition(request);
-  if (!made) return tl::unexpected(made.error());
-  acquisition_.emplace(std::move(*made));
-  status_ = {};
-  status_.method = method_of(request.task);
-  if (auto* otf = std::get_if<OtfRequest>(&request.task)) path_m_ = std::move(otf->path_m);
-  if (const auto* touching = std::get_if<EvemuAcquisition>(&*acquisition_)) status_.next = touching->next();
-  enter(SessionState::Warming, std::visit([](const auto& a) { return a.reason(); }, *acquisition_),
-        request.from);
-  return {};
+  auto prepared = prepare(std::move(request.task));
+  if (!prepared) return tl::unexpected(prepared.error());
+  return start(std::move(*prepared), request.from);
 }
 
 Result<void> CalibrationSession::cancel(std::string who, HostTime now) {
@@ -73,22 +79,11 @@ void CalibrationSession::tick(HostTime now) {
   follow_acquisition(now);
 }
 
-namespace {
-
-std::size_t points_of(const OtfAcquisition& a) {
-  return a.points().size();
-}
-std::size_t points_of(const EvemuAcquisition& a) {
-  return a.points();
-}
-
-}  // namespace
-
 void CalibrationSession::follow_acquisition(HostTime now) {
   const auto [phase, reason] = std::visit(
       [this](const auto& a) {
         status_.progress = a.progress();
-        status_.points = points_of(a);
+        status_.points = a.points();
         return std::pair{a.phase(), a.reason()};
       },
       *acquisition_);
@@ -127,20 +122,23 @@ void CalibrationSession::follow_guidance(EvemuAcquisition& touching, HostTime no
   if (same_state && touching.reason() != status_.reason) enter(status_.state, touching.reason(), now);
 }
 
-std::optional<CalibrationRun> CalibrationSession::take_run() {
+std::optional<AcquiredRun> CalibrationSession::take_run() {
   if (status_.state != SessionState::Identifying || !acquisition_) return std::nullopt;
-  CalibrationRun run;
-  if (auto* otf = std::get_if<OtfAcquisition>(&*acquisition_)) {
-    const EnvironmentEffect effect = otf->environment();
-    std::vector<AxisPosition> path_m = path_m_;
-    for (AxisPosition& q_m : path_m) q_m = grown(q_m, effect, otf_options_.environment);
-    run = OtfRun{.path_m = std::move(path_m), .points = otf->release(), .u_scale = effect.u_scale};
-  } else {
-    run = std::get<EvemuAcquisition>(*acquisition_).release();
-  }
+  AcquiredRun acquired{.path_m = std::exchange(path_m_, {}),
+                       .acquisition = std::move(*acquisition_),
+                       .environment = otf_options_.environment};
   acquisition_.reset();
   status_.progress = 0.0;
-  return run;
+  return acquired;
+}
+
+CalibrationRun run_of(AcquiredRun acquired) {
+  if (auto* touching = std::get_if<EvemuAcquisition>(&acquired.acquisition)) return touching->release();
+  auto& otf = std::get<OtfAcquisition>(acquired.acquisition);
+  const EnvironmentEffect effect = otf.environment();
+  for (AxisPosition& q_m : acquired.path_m) q_m = grown(q_m, effect, acquired.environment);
+  return OtfRun{
+      .path_m = std::move(acquired.path_m), .points = otf.release(), .u_scale = effect.u_scale};
 }
 
 void CalibrationSession::judged(std::string model_id, bool passed, std::string reason, HostTime now) {
@@ -157,6 +155,11 @@ void CalibrationSession::not_identified(const Error& why, HostTime now) {
   enter(SessionState::Refused, why.text, now);
 }
 
+void CalibrationSession::not_stored(std::string reason, HostTime now) {
+  if (status_.state != SessionState::Identifying || reason == status_.reason) return;
+  enter(SessionState::Identifying, std::move(reason), now);
+}
+
 std::vector<SessionEvent> CalibrationSession::take_events() {
   return std::exchange(events_, {});
 }
@@ -167,7 +170,7 @@ void CalibrationSession::enter(SessionState state, std::string reason, HostTime 
   if (state == SessionState::Active || state == SessionState::Refused) {
     status_.progress = 1.0;
     status_.next.reset();
-    acquisition_.reset();
+    if (acquisition_) discarded_ = std::exchange(acquisition_, std::nullopt);
   }
   events_.push_back({now, status_});
 }

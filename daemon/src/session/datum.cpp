@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <nlohmann/json.hpp>
 
+#include "session/attachment_content.hpp"
+
 namespace abbe::daemon {
 namespace {
 
@@ -56,6 +58,13 @@ void Datum::found(const FoundDatum& datum) {
 bool Datum::known(std::size_t place) const {
   const auto axis = std::ranges::find(axes_, place, &Axis::place);
   return axis == axes_.end() || axis->in_force || !axis->coming.empty();
+}
+
+std::vector<FoundDatum> Datum::in_force() const {
+  std::vector<FoundDatum> all;
+  for (const Axis& axis : axes_)
+    if (axis.in_force) all.push_back(*axis.in_force);
+  return all;
 }
 
 void Datum::move_on(const protocol::SampleHead& head) {
@@ -121,7 +130,9 @@ RecordingAttachment to_attachment(const DatumState& state) {
 
 Result<DatumState> datum_state_from_attachment(const RecordingAttachment& attachment) {
   try {
-    const json content = json::parse(attachment.content);
+    const auto parsed = content_of(attachment);
+    if (!parsed) return tl::unexpected(parsed.error());
+    const json& content = *parsed;
     return DatumState{
         .at = protocol::HostTime{std::chrono::nanoseconds{content.at("at_ns").get<std::int64_t>()}},
         .unknown = content.at("unknown").get<std::uint8_t>()};
@@ -138,7 +149,9 @@ RecordingAttachment reference_request(protocol::HostTime from) {
 
 Result<protocol::HostTime> reference_request_from(const RecordingAttachment& attachment) {
   try {
-    const auto ns = json::parse(attachment.content).at("from_ns").get<std::int64_t>();
+    const auto content = content_of(attachment);
+    if (!content) return tl::unexpected(content.error());
+    const auto ns = content->at("from_ns").get<std::int64_t>();
     return protocol::HostTime{std::chrono::nanoseconds{ns}};
   } catch (const json::exception& e) {
     return fail(ErrorCode::BadInput, fmt::format("attachment {}: {}", attachment.name, e.what()));
@@ -147,7 +160,9 @@ Result<protocol::HostTime> reference_request_from(const RecordingAttachment& att
 
 Result<FoundDatum> datum_from_attachment(const RecordingAttachment& attachment) {
   try {
-    const json content = json::parse(attachment.content);
+    const auto parsed = content_of(attachment);
+    if (!parsed) return tl::unexpected(parsed.error());
+    const json& content = *parsed;
     return FoundDatum{
         .axis = content.at("axis").get<std::size_t>(),
         .reading_at_zero = content.at("reading_at_zero").get<double>(),

@@ -34,21 +34,18 @@ std::string_view fault_of(const protocol::Snapshot& touch) {
 
 }  // namespace
 
-Result<EvemuAcquisition> EvemuAcquisition::create(EvemuRequest request, HostTime from,
-                                                  EvemuAcquisitionOptions options) {
+Result<EvemuAcquisition> EvemuAcquisition::create(EvemuRequest request, EvemuAcquisitionOptions options) {
   auto guide = evemu::TouchGuide::create(request.calibrator, request.plan);
   if (!guide) return tl::unexpected(error_of(guide.error()));
-  return EvemuAcquisition{std::move(request), std::move(*guide), from, std::move(options)};
+  return EvemuAcquisition{std::move(request), std::move(*guide), std::move(options)};
 }
 
-EvemuAcquisition::EvemuAcquisition(EvemuRequest request, evemu::TouchGuide guide, HostTime from,
+EvemuAcquisition::EvemuAcquisition(EvemuRequest request, evemu::TouchGuide guide,
                                    EvemuAcquisitionOptions options)
     : request_(std::move(request)),
       guide_(std::move(guide)),
       thermometer_(options.artefact),
-      from_(from),
-      options_(std::move(options)),
-      last_touch_(from) {
+      options_(std::move(options)) {
   say_what_comes_next();
 }
 

@@ -57,7 +57,22 @@ EvemuAcquisitionOptions evemu_acquisition_options(const Config& config) {
   return options;
 }
 
+/// Every touch is held against every ball, in the daemon's cycle: real arrays have ten balls, eight positions.
+Result<void> check_size(const EvemuRequest& request) {
+  constexpr std::size_t kMostBalls = 100, kMostPositions = 100, kMostPoints = 1000;
+  const auto& plan = request.plan;
+  const std::size_t balls = request.calibrator.balls.size(), blocks = request.calibrator.blocks.size();
+  if (balls <= kMostBalls && blocks <= kMostBalls && plan.positions.size() <= kMostPositions &&
+      plan.points_per_ball <= kMostPoints && plan.points_per_block <= kMostPoints)
+    return {};
+  return fail(ErrorCode::BadInput,
+              fmt::format("calibrate evemu: an array has at most {} balls and blocks, a plan at most {} positions "
+                          "with {} points a ball or block",
+                          kMostBalls, kMostPositions, kMostPoints));
+}
+
 Result<void> check_evemu(const EvemuRequest& request, const Config& config) {
+  if (auto fits = check_size(request); !fits) return fits;
   if (!config.probe && !config.cmm) {
     return fail(ErrorCode::Refused,
                 "calibrate evemu: neither [probe] nor [cmm] is in the configuration: no touches would come");
@@ -82,7 +97,8 @@ Result<void> check_evemu(const EvemuRequest& request, const Config& config) {
 }
 
 Result<EvemuCandidate> identify_touches(const EvemuRun& run, const Config& config,
-                                        const calib::VolumetricModel* active) {
+                                        const calib::VolumetricModel* active,
+                                        const std::function<bool()>& stopped) {
   const auto machine = evemu_machine(config.machine);
   if (!machine) return tl::unexpected(machine.error());
   evemu::ObserveOptions observing;
@@ -98,6 +114,8 @@ Result<EvemuCandidate> identify_touches(const EvemuRun& run, const Config& confi
     solution = evemu::with_rotation_reference(std::move(*solution), {points, sigma_m});
   }
   if (!solution) return tl::unexpected(error_of(solution.error()));
+  if (stopped && stopped())
+    return fail(ErrorCode::DataInsufficient, "identification: stopped before its end");
   auto verdict = evemu::judge(*observations, *solution, active, judging);
   if (!verdict) return tl::unexpected(error_of(verdict.error()));
   return EvemuCandidate{std::move(*observations), std::move(*solution), std::move(*verdict)};

@@ -43,19 +43,22 @@ bool same(const StoreEvent& a, const StoreEvent& b) {
 ModelAuthority::ModelAuthority(ModelKeeper keeper, bool axes_compensated)
     : keeper_(std::move(keeper)), axes_compensated_(axes_compensated), seen_(keeper_.stamp()) {}
 
-Result<ModelAuthority> ModelAuthority::open(const std::filesystem::path& store_folder, const Config& config,
-                                            protocol::UtcOffset utc, HostTime now) {
-  auto keeper = ModelKeeper::open(store_folder, config, utc);
-  if (!keeper) return tl::unexpected(keeper.error());
-  ModelAuthority authority{std::move(*keeper), config.axes_compensated()};
-  auto active = authority.keeper_.read_active(now);
-  if (!active) return tl::unexpected(active.error());
-  authority.take_up(std::move(*active));
+ModelAuthority ModelAuthority::open(const std::filesystem::path& store_folder, const Config& config,
+                                    protocol::UtcOffset utc, HostTime now) {
+  ModelKeeper keeper{store_folder, config, utc};
+  keeper.tidy_store(now);
+  ModelAuthority authority{std::move(keeper), config.axes_compensated()};
+  if (auto active = authority.keeper_.read_active(now)) {
+    authority.take_up(std::move(*active));
+  } else {
+    authority.active_.fault = active.error().text;
+    authority.read_again_ = true;
+  }
   return authority;
 }
 
 void ModelAuthority::take_up(ActiveModel active) {
-  active_ = std::move(active);
+  destroy_aside(std::exchange(active_, std::move(active)));
   ++revision_;
 }
 
@@ -63,46 +66,67 @@ void ModelAuthority::take_up(ActiveModel active, std::uint64_t since) {
   if (since == revision_) {
     take_up(std::move(active));
   } else {
-    seen_.reset();
+    read_again_ = true;
+    destroy_aside(std::move(active));
   }
 }
 
 ModelAuthority::Following ModelAuthority::follow_store(HostTime now) {
-  if (!reading_.valid()) {
-    const StoreStamp stamp = keeper_.stamp();
-    const bool to_repair = !active_.fault.empty() && now >= next_repair_;
-    if (stamp == seen_ && !to_repair) return Following::Unchanged;
-    seen_ = stamp;
-    next_repair_ = now + kRepairPeriod;
-    reading_since_ = revision_;
-    reading_ = start_aside([keeper = keeper_, now] { return keeper.read_active(now); });
-  }
-  if (reading_.wait_for(std::chrono::seconds{0}) != std::future_status::ready) return Following::Reading;
-  auto active = outcome_of(reading_);
-  if (!active) {
-    // What is in force stays; said in standing() and in health(), and tried again at the next call.
-    fault_ = active.error().text;
-    seen_.reset();
+  if (!looking_.valid()) begin_to_look(now);
+  if (looking_.wait_for(std::chrono::seconds{0}) == std::future_status::ready)
+    return conclude_look(outcome_of(looking_), now);
+  if (now - looking_from_ > kStorePatience)
+    fault_ = fmt::format("the model store has not answered for {} s", kStorePatience.count());
+  return Following::Reading;
+}
+
+void ModelAuthority::begin_to_look(HostTime now) {
+  const bool to_repair = !active_.fault.empty() && now >= next_repair_;
+  const bool read_anyway = std::exchange(read_again_, false) || to_repair;
+  looking_from_ = now;
+  looking_since_ = revision_;
+  looking_ = start_abandonable([keeper = keeper_, seen = seen_, read_anyway, now]() -> Result<Look> {
+    Look look{.stamp = keeper.stamp()};
+    if (look.stamp == seen && !read_anyway) return look;
+    auto active = keeper.read_active(now);
+    if (!active) return tl::unexpected(active.error());
+    look.active = std::move(*active);
+    return look;
+  });
+}
+
+ModelAuthority::Following ModelAuthority::conclude_look(Result<Look> look, HostTime now) {
+  if (!look) {
+    // What is in force stays; said in standing() and in health(), and read again by the next look.
+    fault_ = look.error().text;
+    read_again_ = true;
     return Following::Unchanged;
   }
+  seen_ = look->stamp;
   fault_.clear();
-  if (same(active->activation, active_.activation) && active->fault == active_.fault)
+  if (!look->active) return Following::Unchanged;
+  next_repair_ = now + kRepairPeriod;
+  if (same(look->active->activation, active_.activation) && look->active->fault == active_.fault) {
+    destroy_aside(std::move(*look->active));
     return Following::Unchanged;
+  }
   const auto before = revision_;
-  take_up(std::move(*active), reading_since_);
+  take_up(std::move(*look->active), looking_since_);
   return revision_ == before ? Following::Unchanged : Following::TakenUp;
 }
 
 ModelStanding ModelAuthority::standing(HostTime now, std::optional<HostTime> axes_known_at,
                                        std::chrono::nanoseconds patience) const {
   ModelStanding s = standing_by_store(now, axes_known_at, patience);
-  if (!fault_.empty()) s.reason += fmt::format("; not known what was activated since: {}", fault_);
+  if (!fault_.empty() && fault_ != s.reason)
+    s.reason += fmt::format("; not known what was activated since: {}", fault_);
   return s;
 }
 
 ModelStanding ModelAuthority::standing_by_store(HostTime now, std::optional<HostTime> axes_known_at,
                                                 std::chrono::nanoseconds patience) const {
   ModelStanding s{.model = in_force(), .revision = revision_};
+  if (s.model != nullptr) s.publication = &active_.publication;
   if (!active_.model) {
     s.status = active_.fault.empty() ? v1::ModelStatus::MODEL_NONE : v1::ModelStatus::MODEL_INVALID;
     s.reason = active_.fault.empty() ? "no model has been activated" : active_.fault;
@@ -121,6 +145,7 @@ ModelStanding ModelAuthority::standing_by_store(HostTime now, std::optional<Host
   } else {
     s.status = v1::ModelStatus::MODEL_ACTIVE;
     s.reason = reason_of(active_.activation);
+    if (!active_.recording_gap.empty()) s.reason += "; " + cannot_be_checked(active_.recording_gap);
   }
   return s;
 }

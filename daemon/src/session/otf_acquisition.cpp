@@ -21,6 +21,7 @@ using protocol::Snapshot;
 // Off its leg for longer than this, the machine is on a later one: the beam was away while it turned a
 // corner. Shorter than that, only the mapping of the tracker's clock moved.
 constexpr auto kCornerMissed = std::chrono::milliseconds{500};
+constexpr std::size_t kPointsInBlock = 1024;  // 56 KiB: a second of a fast tracker
 
 std::string text(const Vector3& q) {
   return fmt::format("({:.3f}, {:.3f}, {:.3f}) mm", q[0] * 1e3, q[1] * 1e3, q[2] * 1e3);
@@ -36,14 +37,31 @@ RunPoint run_point(const Snapshot& s) {
 
 }  // namespace
 
-OtfAcquisition::OtfAcquisition(const std::vector<AxisPosition>& path, HostTime from,
-                               AcquisitionOptions options)
+void RunPoints::push_back(const RunPoint& point) {
+  if (blocks_.empty() || blocks_.back().size() == kPointsInBlock) blocks_.emplace_back().reserve(kPointsInBlock);
+  blocks_.back().push_back(point);
+  ++size_;
+}
+
+void RunPoints::pop_back() noexcept {
+  blocks_.back().pop_back();
+  if (blocks_.back().empty()) blocks_.pop_back();
+  --size_;
+}
+
+std::vector<RunPoint> RunPoints::joined() const {
+  std::vector<RunPoint> all;
+  all.reserve(size_);
+  for (const auto& block : blocks_) all.insert(all.end(), block.begin(), block.end());
+  return all;
+}
+
+OtfAcquisition::OtfAcquisition(const std::vector<AxisPosition>& path, AcquisitionOptions options)
     : path_(otf_path(path)),
-      driven_at_m_(calib::otf::lengths_to_vertices_m(path_)),
-      from_(from),
+      driven_at_m_(calib::otf::lengths_to_vertices_m(path_.path())),
       options_(std::move(options)) {
   reason_ = fmt::format("waiting for the machine to stand at {} with the tracker streaming",
-                        text(path_.vertices_m.front()));
+                        text(path_.path().vertices_m.front()));
 }
 
 double OtfAcquisition::progress() const noexcept {
@@ -64,7 +82,7 @@ void OtfAcquisition::take(const Snapshot& snapshot) {
   give_up_if_stuck(point.time);
   // Without axis positions the point keeps its place in the sequence, but decides nothing.
   if (!has_linear_axes(snapshot)) {
-    if (phase_ == Phase::Running) points_.push_back(point);
+    if (phase_ == Phase::Running) keep(point);
     return;
   }
   const Vector3 q{snapshot.position[0], snapshot.position[1], snapshot.position[2]};
@@ -102,7 +120,7 @@ bool OtfAcquisition::in_order(const RunPoint& point) {
 void OtfAcquisition::give_up_if_stuck(HostTime point_time) {
   if (phase_ == Phase::WaitingAtStart && point_time - from_ > options_.wait_for_start) {
     fail(fmt::format("the machine did not stand at {} and drive off within {:.0f} min",
-                     text(path_.vertices_m.front()), in_seconds(options_.wait_for_start) / 60.0));
+                     text(path_.path().vertices_m.front()), in_seconds(options_.wait_for_start) / 60.0));
   } else if (phase_ == Phase::Running && point_time - axes_known_at_ > options_.silence) {
     fail(fmt::format("no axis positions for {:.1f} s in the middle of the run",
                      in_seconds(point_time - axes_known_at_)));
@@ -124,7 +142,8 @@ void OtfAcquisition::wait_at_start(const RunPoint& point, const Vector3& q) {
   const bool stood_long_enough =
       !before_.empty() && before_.back().time - before_.front().time >= options_.stand_before;
   if (left_standstill && stood_long_enough) {
-    points_.assign(before_.begin(), before_.end());
+    points_ = {};
+    for (const RunPoint& p : before_) points_.push_back(p);
     before_.clear();
     phase_ = Phase::Running;
     reason_ = "driving the path";
@@ -133,14 +152,25 @@ void OtfAcquisition::wait_at_start(const RunPoint& point, const Vector3& q) {
     return;
   }
   if (left_standstill) before_.clear();
-  if ((q - path_.vertices_m.front()).norm() > options_.vertex_tolerance_m || !point.usable) return;
+  if ((q - path_.path().vertices_m.front()).norm() > options_.vertex_tolerance_m || !point.usable) return;
   before_.push_back(point);
   while (before_.back().time - before_.front().time > options_.keep_before) before_.pop_front();
 }
 
-void OtfAcquisition::run(const RunPoint& point, const Vector3& q) {
+void OtfAcquisition::keep(const RunPoint& point) {
   points_.push_back(point);
-  if (const double off_m = distance_to_path_m(path_, q); off_m > options_.path_tolerance_m) {
+  if (points_.size() < options_.most_points) return;
+  fail(fmt::format(
+      "the run has {} tracker points and does not end: the machine cycles on its path, or the path is "
+      "too long for this rate",
+      points_.size()));
+}
+
+void OtfAcquisition::run(const RunPoint& point, const Vector3& q) {
+  keep(point);
+  if (phase_ == Phase::Failed) return;
+  if (!path_.first_within(q, options_.path_tolerance_m)) {
+    const double off_m = path_.distance_m(q);
     fail(fmt::format(
         "machine at {} is {:.1f} mm away from every leg of the path: another path is being driven", text(q),
         off_m * 1e3));
@@ -155,27 +185,26 @@ void OtfAcquisition::run(const RunPoint& point, const Vector3& q) {
 }
 
 void OtfAcquisition::follow_path(const RunPoint& point, const Vector3& q) {
-  const std::size_t last = path_.vertices_m.size() - 2;
-  while (leg_ < last && (q - path_.vertices_m[leg_ + 1]).norm() <= options_.vertex_tolerance_m) ++leg_;
+  const std::size_t last = path_.path().vertices_m.size() - 2;
+  while (leg_ < last && (q - path_.path().vertices_m[leg_ + 1]).norm() <= options_.vertex_tolerance_m) ++leg_;
   const auto on_leg = [&](std::size_t leg) {
-    return calib::otf::nearest_on_leg(path_.vertices_m[leg], path_.vertices_m[leg + 1], q);
+    return calib::otf::nearest_on_leg(path_.path().vertices_m[leg], path_.path().vertices_m[leg + 1], q);
   };
   calib::otf::OnLeg here = on_leg(leg_);
-  for (std::size_t later = leg_ + 1; here.off_m > options_.path_tolerance_m && later <= last; ++later) {
+  if (here.off_m > options_.path_tolerance_m) {
     if (point.time - on_leg_at_ < kCornerMissed) return;
-    const calib::otf::OnLeg there = on_leg(later);
-    if (there.off_m > options_.path_tolerance_m) continue;
-    leg_ = later;
-    here = there;
+    const auto later = path_.first_within(q, options_.path_tolerance_m, leg_ + 1);
+    if (!later) return;
+    leg_ = *later;
+    here = on_leg(leg_);
   }
-  if (here.off_m > options_.path_tolerance_m) return;
   on_leg_at_ = point.time;
   driven_m_ = driven_at_m_[leg_] + here.along_m;
 }
 
 bool OtfAcquisition::complete(HostTime now, const Vector3& q) const {
-  return leg_ + 2 == path_.vertices_m.size() &&
-         (q - path_.vertices_m.back()).norm() <= options_.vertex_tolerance_m &&
+  return leg_ + 2 == path_.path().vertices_m.size() &&
+         (q - path_.path().vertices_m.back()).norm() <= options_.vertex_tolerance_m &&
          now - stand_since_ >= options_.stand_after;
 }
 

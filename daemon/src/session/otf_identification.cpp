@@ -31,16 +31,17 @@ double overall(calib::otf::Stage stage, double fraction) {
 
 Result<OtfCandidate> identify_run(const OtfRun& run, const MachineConfig& machine_config,
                                   const GateConfig& gate, const calib::VolumetricModel* active,
-                                  const std::function<void(double)>& progress) {
+                                  const IdentificationWatch& watch) {
   const auto machine = otf_machine(machine_config);
   if (!machine) return tl::unexpected(machine.error());
   const auto points = otf_observations(run.points);
   calib::otf::Options options = otf_options(points, gate);
-  if (progress) {
-    options.progress = [&progress](calib::otf::Stage stage, double fraction) {
-      progress(overall(stage, fraction));
+  if (watch.progress) {
+    options.progress = [&watch](calib::otf::Stage stage, double fraction) {
+      watch.progress(overall(stage, fraction));
     };
   }
+  options.stopped = watch.stopped;
   calib::otf::Noise noise = otf_noise(machine_config);
   noise.u_scale = run.u_scale;
   auto observations = calib::otf::observe(points, *machine, otf_path(run.path_m), noise, options);

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 namespace abbe::daemon {
 namespace {
@@ -37,8 +38,9 @@ double reading_at_zero(const ReferenceAxisConfig& marks, const AxisReference& fo
   return marks.zero_mark + (marks.reversed ? -found.offset : found.offset);
 }
 
-ReferenceService::ReferenceService(const Config& config, RecorderThread* recorder)
-    : config_(config), recorder_(recorder), datum_(config) {}
+ReferenceService::ReferenceService(const Config& config, RecorderThread* recorder,
+                                   std::optional<Counting> left)
+    : config_(config), recorder_(recorder), datum_(config), left_(std::move(left)) {}
 
 Result<void> ReferenceService::start() {
   if (!configured())
@@ -59,13 +61,46 @@ Result<void> ReferenceService::cancel() {
 }
 
 void ReferenceService::turn(Batch& batch) {
+  if (left_ && !batch.axes.empty()) take_up_left(batch.axes.front());
   for (const auto& sample : batch.axes) {
+    if (has(sample.head.flags, protocol::SampleFlag::Restarted)) {
+      began_anew_ = sample.head.time;
+      progress_.reset();
+    }
     newest_ = std::max(newest_, sample.head.time);
     watch_standing(sample);
   }
   if (!batch.axes.empty()) latest_ = batch.axes.back();
   if (running_) look_for_marks(batch);
   datum_.apply(batch);
+}
+
+/// A run that goes on is recorded as a further file is.
+void ReferenceService::take_up_left(const protocol::AxisSample& first) {
+  const Counting left = *std::exchange(left_, std::nullopt);
+  if (has(first.head.flags, protocol::SampleFlag::Restarted)) return;
+  const DatumState nothing_known{.at = first.head.time - 1ns, .unknown = 0xff};
+  newest_ = first.head.time;
+  datum_.go_on(nothing_known);
+  if (recorder_ != nullptr) recorder_->attach(to_attachment(nothing_known), newest_);
+  for (FoundDatum datum : left.datum) {
+    datum.from = nothing_known.at;
+    take_up(datum);
+    carried_on_.push_back(config_.counter_card->wiring.axes[datum.axis].name);
+  }
+}
+
+/// Samples come first: one that shows that the counters began anew must be known before what came after it.
+void ReferenceService::take(const std::optional<drivers::CounterCardProgress>& progress) {
+  if (progress) coming_ = progress;
+  if (!coming_ || coming_->head.time > newest_) return;
+  if (coming_->head.time >= began_anew_) progress_ = coming_;
+  coming_.reset();
+}
+
+std::optional<Counting> ReferenceService::counting() const {
+  if (!progress_) return std::nullopt;
+  return Counting{.progress = *progress_, .datum = datum_.in_force()};
 }
 
 void ReferenceService::look_for_marks(const Batch& batch) {

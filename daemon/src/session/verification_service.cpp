@@ -1,6 +1,11 @@
 #include "abbe/daemon/verification_service.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
+#include <utility>
+
+#include "abbe/daemon/work_aside.hpp"
 
 namespace abbe::daemon {
 
@@ -24,7 +29,7 @@ Result<void> check_verification(const Config& config) {
 
 Result<std::uint64_t> VerificationService::begin() {
   if (auto possible = check_verification(config_); !possible) return tl::make_unexpected(possible.error());
-  points_ = StandstillPoints{standstill_options(config_)};
+  destroy_aside(std::exchange(points_, StandstillPoints{standstill_options(config_)}));
   running_ = true;
   return ++number_;
 }
@@ -43,8 +48,17 @@ Result<const StandstillPoints*> VerificationService::points(std::uint64_t number
 }
 
 void VerificationService::turn(std::span<const protocol::Snapshot> snapshots) {
-  if (!running_) return;
-  for (const auto& snapshot : snapshots) points_.take(snapshot);
+  for (const auto& snapshot : snapshots) {
+    if (!running_) return;
+    points_.take(snapshot);
+    running_ = points_.points().size() < kMostPoints;
+  }
+}
+
+std::string VerificationService::stopped() const {
+  if (points_.points().size() < kMostPoints) return {};
+  return fmt::format("verify: {} standstills are the most one verification holds: later ones are not taken",
+                     kMostPoints);
 }
 
 }  // namespace abbe::daemon

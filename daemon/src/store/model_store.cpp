@@ -1,18 +1,13 @@
 #include "abbe/daemon/model_store.hpp"
 
-#include <fcntl.h>
 #include <fmt/format.h>
-#include <sys/file.h>
 #include <sys/stat.h>
 
 #include <algorithm>
-#include <cerrno>
-#include <chrono>
-#include <cstring>
-#include <thread>
+#include <utility>
 
-#include "files/file_descriptor.hpp"
 #include "files/text_file.hpp"
+#include "store/store_lock.hpp"
 #include "store/store_state.hpp"
 
 namespace abbe::daemon {
@@ -20,39 +15,6 @@ namespace abbe::daemon {
 namespace {
 
 namespace fs = std::filesystem;
-
-constexpr auto kLockPatience =
-    std::chrono::seconds{5};  // a change takes milliseconds; the next is queued behind it
-constexpr auto kLockLook = std::chrono::milliseconds{10};
-
-/// Created as the folder is, so that whoever uses the store after root can lock it, too. flock() asks for no
-/// more than reading.
-FileDescriptor open_lock(const fs::path& file) {
-  FileDescriptor lock{::open(file.c_str(), O_RDONLY | O_CLOEXEC | O_NOFOLLOW)};
-  if (lock || errno != ENOENT) return lock;
-  lock = FileDescriptor{::open(file.c_str(), O_RDONLY | O_CREAT | O_EXCL | O_CLOEXEC | O_NOFOLLOW, 0600)};
-  if (lock) take_after_folder(lock.get(), file.parent_path());
-  // Lost against another process: it is there now.
-  else if (errno == EEXIST)
-    lock = FileDescriptor{::open(file.c_str(), O_RDONLY | O_CLOEXEC | O_NOFOLLOW)};
-  return lock;
-}
-
-/// Orders the changes of several processes: unlocked when the descriptor is closed or the process dies.
-Result<FileDescriptor> lock_store(const fs::path& folder) {
-  const auto failure = [&folder](std::string_view seen) {
-    return fail(ErrorCode::Io, fmt::format("lock the model store {}: {}", folder.string(), seen));
-  };
-  FileDescriptor lock = open_lock(folder / "lock");
-  if (!lock) return failure(std::strerror(errno));
-  const auto until = std::chrono::steady_clock::now() + kLockPatience;
-  while (::flock(lock.get(), LOCK_EX | LOCK_NB) != 0) {
-    if (errno != EWOULDBLOCK && errno != EINTR) return failure(std::strerror(errno));
-    if (std::chrono::steady_clock::now() > until) return failure("another process has held it for 5 s");
-    std::this_thread::sleep_for(kLockLook);
-  }
-  return lock;
-}
 
 fs::path state_path(const fs::path& folder) {
   return folder / "state.json";
@@ -63,7 +25,7 @@ Result<StoreState> read_state(const fs::path& folder) {
   const auto file = state_path(folder);
   std::error_code seen;
   if (fs::status(file, seen).type() == fs::file_type::not_found) return StoreState{};
-  const auto text = read_text(file);
+  const auto text = read_regular_file(file);
   if (!text) return tl::make_unexpected(text.error());
   return store_state_from_text(*text, file.string());
 }
@@ -105,9 +67,14 @@ Result<std::vector<std::string>> ids_in_store(const fs::path& folder, const Stor
 }  // namespace
 
 Result<ModelStore> ModelStore::open(const fs::path& folder) {
-  if (const auto made = create_folder(folder / "models"); !made) return tl::make_unexpected(made.error());
+  ModelStore store{folder};
+  if (const auto made = store.create(); !made) return tl::make_unexpected(made.error());
   if (const auto state = read_state(folder); !state) return tl::make_unexpected(state.error());
-  return ModelStore(folder);
+  return store;
+}
+
+Result<void> ModelStore::create() const {
+  return create_folder(folder_ / "models");
 }
 
 ModelStore::ModelStore(fs::path folder) : folder_(std::move(folder)), state_file_(state_path(folder_)) {}
@@ -118,23 +85,27 @@ fs::path ModelStore::model_path(const std::string& id) const {
 
 Result<std::string> ModelStore::add(const ModelDocument& document, bool accepted,
                                     std::vector<std::string> reasons, const StoreActor& actor) {
-  const auto lock = lock_store(folder_);
-  if (!lock) return tl::make_unexpected(lock.error());
-  auto state = read_state(folder_);
-  if (!state) return tl::make_unexpected(state.error());
   const auto id = model_id(document);
-  // A damaged file of the same id is written again: what it should have held is in our hands.
+  // First, and without the lock: the file of an id has one content, whoever writes it, and must not wait for
+  // whoever holds the lock. A damaged file of the same id is written again: what it should have held is in
+  // our hands.
   if (!load(id))
     if (const auto written = replace_file(model_path(id), to_json(document)); !written)
       return tl::make_unexpected(written.error());
+  const auto lock = lock_store(folder_, lock_patience_);
+  if (!lock) return tl::make_unexpected(lock.error());
+  auto state = read_state(folder_);
+  if (!state) return tl::make_unexpected(state.error());
   StoreEvent event{StoreAction::Added, id, actor, accepted, std::move(reasons)};
+  // A change whose last step failed (fsync of the folder, or what follows it) is asked for again.
+  if (const auto* last = state->last_added(id); last != nullptr && *last == event) return id;
   if (const auto done = append(folder_, std::move(*state), std::move(event)); !done)
     return tl::make_unexpected(done.error());
   return id;
 }
 
 Result<void> ModelStore::activate(const std::string& id, const StoreActor& actor, bool force) {
-  const auto lock = lock_store(folder_);
+  const auto lock = lock_store(folder_, lock_patience_);
   if (!lock) return tl::make_unexpected(lock.error());
   auto state = read_state(folder_);
   if (!state) return tl::make_unexpected(state.error());
@@ -152,7 +123,7 @@ Result<void> ModelStore::activate(const std::string& id, const StoreActor& actor
 }
 
 Result<std::string> ModelStore::rollback(const StoreActor& actor) {
-  const auto lock = lock_store(folder_);
+  const auto lock = lock_store(folder_, lock_patience_);
   if (!lock) return tl::make_unexpected(lock.error());
   auto state = read_state(folder_);
   if (!state) return tl::make_unexpected(state.error());
@@ -223,7 +194,10 @@ StoreStamp ModelStore::stamp() const noexcept {
 }
 
 Result<ModelDocument> ModelStore::load(const std::string& id) const {
-  auto document = read_model(model_path(id));
+  const auto file = model_path(id);
+  const auto text = read_regular_file(file);
+  if (!text) return tl::make_unexpected(text.error());
+  auto document = parse_model(*text, file.string());
   if (document && model_id(*document) != id)
     return fail(ErrorCode::BadInput,
                 fmt::format("{}: holds another model than its name says", model_path(id).string()));

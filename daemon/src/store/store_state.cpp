@@ -6,7 +6,8 @@
 #include <array>
 #include <nlohmann/json.hpp>
 
-#include "model/utc_text.hpp"
+#include "abbe/daemon/bounded_json.hpp"
+#include "abbe/daemon/utc_text.hpp"
 
 namespace abbe::daemon {
 
@@ -92,8 +93,11 @@ std::string to_text(const StoreState& state) {
 }
 
 Result<StoreState> store_state_from_text(std::string_view text, const std::string& file) {
+  // An event of an hour for ever, and no deeper than abbe writes.
+  const auto parsed = parse_json(text, file, {.bytes = 256u << 20, .depth = 8, .values = 20'000'000});
+  if (!parsed) return tl::make_unexpected(parsed.error());
+  const json& root = *parsed;
   try {
-    const auto root = json::parse(text);
     if (root.at("schema").get<std::string>() != kSchema)
       return fail(ErrorCode::BadInput, fmt::format("{}: schema must be \"{}\"", file, kSchema));
     StoreState state;

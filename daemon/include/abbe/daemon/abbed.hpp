@@ -1,7 +1,8 @@
 #pragma once
-/// The daemon put together: devices, recorder, hub, calibration, publisher and control API, from one configuration.
-/// Nothing here but the wiring and the order of starting and stopping.
+/// The daemon put together: devices, recorder, hub, calibration, publisher and control API, from one
+/// configuration. Nothing here but the wiring and the order of starting and stopping.
 
+#include <filesystem>
 #include <memory>
 #include <string>
 #include <vector>
@@ -14,8 +15,8 @@ namespace abbe::daemon {
 
 /// How abbed was started.
 struct AbbedOptions {
-  std::string configuration_text;   ///< the file as it was read; goes into the recording
-  std::string dds_program;          ///< abbe-dds, started as a child if the configuration says so
+  std::string configuration_text;  ///< the file as it was read; goes into the recording
+  std::string dds_program;         ///< abbe-dds, started as a child if the configuration says so
 };
 
 class Abbed {

@@ -21,8 +21,8 @@ struct RawFromEnvironment {
 };
 
 struct Batch {
-  protocol::HostTime
-      taken{};  ///< when: a recording keeps it, a replay gives the same turns again; clear() leaves it
+  /// When: a recording keeps it, and a replay gives the same turns again. clear() leaves it.
+  protocol::HostTime taken{};
   std::vector<protocol::TrackerPoint> points;
   std::vector<protocol::AxisSample> axes;
   std::vector<protocol::EnvironmentSample> environment;  ///< the weather of the tracker

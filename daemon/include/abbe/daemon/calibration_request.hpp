@@ -38,6 +38,9 @@ struct CalibrationRequest {
 /// As an attachment of the recording: "calibration-otf.json", "calibration-evemu.json".
 [[nodiscard]] bool is_calibration_request(std::string_view attachment_name) noexcept;
 [[nodiscard]] RecordingAttachment to_attachment(const CalibrationRequest& request);
+/// The same in two steps, of which only the first grows with the task.
+[[nodiscard]] RecordingAttachment to_attachment(const CalibrationTask& task);
+void set_from(RecordingAttachment& attachment, protocol::HostTime from) noexcept;
 [[nodiscard]] Result<CalibrationRequest> from_attachment(const RecordingAttachment& attachment);
 
 }  // namespace abbe::daemon

@@ -17,10 +17,10 @@ namespace abbe::daemon {
 using CalibrationRun = std::variant<OtfRun, EvemuRun>;
 using Candidate = std::variant<OtfCandidate, EvemuCandidate>;
 
-/// `active` may be null; `progress` is called with 0 to 1 in the calling thread, and may be empty.
+/// `active` may be null.
 [[nodiscard]] Result<Candidate> identify(const CalibrationRun& run, const Config& config,
                                          const calib::VolumetricModel* active,
-                                         const std::function<void(double)>& progress = {});
+                                         const IdentificationWatch& watch = {});
 
 /// What the run consists of, for the model's document: the files that were given, and "points" or "touches"
 /// with the SHA-256 of what entered the identification.

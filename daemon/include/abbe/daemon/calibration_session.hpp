@@ -16,6 +16,7 @@
 #include <optional>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <variant>
 #include <vector>
 
@@ -28,8 +29,13 @@ namespace abbe::daemon {
 
 enum class SessionState : std::uint8_t { Idle, Warming, Acquiring, Identifying, Judged, Active, Refused };
 [[nodiscard]] std::string_view name(SessionState state) noexcept;
+/// Whatever devices measure now may belong to the run.
+[[nodiscard]] constexpr bool takes_readings(SessionState state) noexcept {
+  return state == SessionState::Warming || state == SessionState::Acquiring;
+}
 
 struct SessionStatus {
+  std::uint64_t id = 0;  ///< counts the sessions of this process from 1; 0: none yet
   SessionState state = SessionState::Idle;
   std::string method = "otf";
   std::string reason;                                  ///< why it is in this state, or what to do now
@@ -50,12 +56,35 @@ struct SessionEvent {
   SessionStatus status;
 };
 
+using Acquisition = std::variant<OtfAcquisition, EvemuAcquisition>;
+
+/// A task that was checked and made ready to start: what grows with the request is done.
+struct PreparedSession {
+  std::string_view method;
+  std::vector<AxisPosition> path_m;  ///< of an on-the-fly run
+  Acquisition acquisition;
+};
+
+/// What a session has acquired, as it stood when the run was complete.
+struct AcquiredRun {
+  std::vector<AxisPosition> path_m;
+  Acquisition acquisition;
+  EnvironmentUseOptions environment;
+};
+/// For the identification: points in one piece, the path as the snapshots saw it. O(n) in points and vertices.
+[[nodiscard]] CalibrationRun run_of(AcquiredRun acquired);
+
 class CalibrationSession {  // NOLINT(bugprone-exception-escape): a defaulted move of a variant
  public:
   explicit CalibrationSession(AcquisitionOptions otf = {}, EvemuAcquisitionOptions evemu = {})
       : otf_options_(std::move(otf)), evemu_options_(std::move(evemu)) {}
 
-  /// Refused while a session is running; BadInput for a task that is none.
+  /// BadInput for a task that is none. Any thread, also while another uses the session.
+  [[nodiscard]] Result<PreparedSession> prepare(CalibrationTask task) const;
+  /// Refused while a session is running. What the session before left is in `prepared` then: whoever prepared
+  /// it destroys that, too.
+  [[nodiscard]] Result<void> start(PreparedSession&& prepared, protocol::HostTime from);
+  /// Both.
   [[nodiscard]] Result<void> start(CalibrationRequest request);
   /// Ends a running session as refused; what was acquired stays in the recording.
   [[nodiscard]] Result<void> cancel(std::string who, protocol::HostTime now);
@@ -66,11 +95,15 @@ class CalibrationSession {  // NOLINT(bugprone-exception-escape): a defaulted mo
   void tick(protocol::HostTime now);
 
   /// The acquired run, once, when the state has become Identifying.
-  [[nodiscard]] std::optional<CalibrationRun> take_run();
+  [[nodiscard]] std::optional<AcquiredRun> take_run();
+  /// What was acquired in vain, once, for whoever has the time to destroy it.
+  [[nodiscard]] std::optional<Acquisition> take_discarded() { return std::exchange(discarded_, std::nullopt); }
 
   /// The identification is done: a model was judged, or the data did not allow one.
   void judged(std::string model_id, bool passed, std::string reason, protocol::HostTime now);
   void not_identified(const Error& why, protocol::HostTime now);
+  /// A judged model waits for the store; an event whenever the reason changes.
+  void not_stored(std::string reason, protocol::HostTime now);
 
   [[nodiscard]] const SessionStatus& status() const noexcept { return status_; }
   [[nodiscard]] bool running() const noexcept;
@@ -78,9 +111,6 @@ class CalibrationSession {  // NOLINT(bugprone-exception-escape): a defaulted mo
   [[nodiscard]] std::vector<SessionEvent> take_events();
 
  private:
-  using Acquisition = std::variant<OtfAcquisition, EvemuAcquisition>;
-
-  [[nodiscard]] Result<Acquisition> acquisition(const CalibrationRequest& request) const;
   [[nodiscard]] bool acquiring() const noexcept;
   void follow_acquisition(protocol::HostTime now);
   void follow_guidance(EvemuAcquisition& touching, protocol::HostTime now);
@@ -89,7 +119,8 @@ class CalibrationSession {  // NOLINT(bugprone-exception-escape): a defaulted mo
   AcquisitionOptions otf_options_;
   EvemuAcquisitionOptions evemu_options_;
   std::vector<AxisPosition> path_m_;  ///< of an on-the-fly run
-  std::optional<Acquisition> acquisition_;
+  std::optional<Acquisition> acquisition_, discarded_;
+  std::uint64_t started_ = 0;  ///< how many sessions
   SessionStatus status_;
   std::vector<SessionEvent> events_;
 };

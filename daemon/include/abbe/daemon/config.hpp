@@ -67,6 +67,12 @@ enum class WeatherConfig {
 /// no run on the fly is possible then.
 enum class TrackerModeConfig { Continuous, Stationary };
 
+/// emScon sets both together.
+struct TrackerSearchConfig {
+  double radius_m = 0.0;
+  std::chrono::nanoseconds timeout{};  ///< whole ms
+};
+
 /// [tracker]: the instrument on the wire.
 struct TrackerConfig {
   std::string name = "tracker";
@@ -87,10 +93,16 @@ struct TrackerConfig {
   std::chrono::nanoseconds initialize_timeout{std::chrono::seconds{120}};
   std::chrono::nanoseconds silence_timeout{
       std::chrono::milliseconds{1500}};  ///< no data while streaming: a fault
+  std::string reflector;                 ///< name or id in the controller's list; empty: the one that is set
+  bool home_after_initialize = false;    ///< the beam to the bird bath after Initialize
+  std::optional<TrackerSearchConfig>
+      search;  ///< around where the beam points; none: as set in the controller
 };
 
 enum class EncoderTransport { Udp, SocketCan };
-enum class SyncConfig { Daemon, Kernel };  ///< who sends the SYNC: the device thread, or CAN_BCM on its timer
+/// Who sends the SYNC: the device thread, CAN_BCM on its timer, or the machine (then abbed sends nothing at
+/// all).
+enum class SyncConfig { Daemon, Kernel, External };
 
 /// One element of [encoder] nodes. reading = offset + count * step, the step negative when `invert = true`.
 struct EncoderNodeConfig {
@@ -99,6 +111,9 @@ struct EncoderNodeConfig {
   double step = 1e-9;     ///< m or rad per count, signed
   double offset = 0.0;    ///< m or rad: the reading at count 0
   AxisKind kind = AxisKind::Linear;
+  int tpdo = 1;                  ///< 1 or 2: which one carries the position
+  int position_byte = 0;         ///< where in it; External only, else the node is asked
+  std::int64_t wrap_counts = 0;  ///< rotary: counts after which it begins anew; 0: the node is asked
 };
 
 /// [encoder]: CANopen encoders on one bus.
@@ -241,7 +256,8 @@ struct DaemonConfig {
   std::optional<int> tracker_cpu;  ///< the core the thread is bound to
   std::optional<int> encoder_cpu;
   std::optional<int> hub_cpu;
-  std::optional<std::chrono::microseconds> cpu_latency;  ///< bound on a processor's waking; none: not asked for
+  std::optional<std::chrono::microseconds>
+      cpu_latency;  ///< bound on a processor's waking; none: not asked for
 };
 
 /// [recording]
@@ -266,9 +282,10 @@ struct DdsConfig {
   std::chrono::nanoseconds validity{
       std::chrono::milliseconds{500}};  ///< a subscriber must not apply older vectors
   Supervise supervise = Supervise::Child;
-  int priority = 20;              ///< SCHED_FIFO of abbe-dds, below hub and devices; 0: an ordinary process
-  std::filesystem::path profile;  ///< XML profiles; empty: the built-in ones
-  std::filesystem::path socket;   ///< default: runtime_dir/dds.sock
+  int priority = 20;               ///< SCHED_FIFO of abbe-dds, below hub and devices; 0: an ordinary process
+  std::filesystem::path profile;   ///< XML profiles; empty: the built-in ones
+  std::filesystem::path security;  ///< keys as `abbe dds keys` makes them; empty: none, what the profile says
+  std::filesystem::path socket;    ///< default: runtime_dir/dds.sock
 };
 
 /// [gate]: what a model must satisfy before it may become active.
@@ -305,9 +322,12 @@ struct EvemuConfig {
   std::optional<ArtefactTemperatureConfig> artefact;              ///< none: the array counts as at 20 C
 };
 
-/// [control]
+/// [control]. Root and the daemon's own user may ask for everything; see control_roles.hpp.
 struct ControlConfig {
-  std::filesystem::path socket;  ///< default: runtime_dir/control.sock
+  std::filesystem::path socket;              ///< default: runtime_dir/control.sock
+  std::string look_group;                    ///< empty: everybody who may open the socket
+  std::string change_group = "abbe-change";  ///< may change what is in force; empty: nobody else
+  std::string move_group = "abbe-move";      ///< may move a machine; empty: nobody else
 };
 
 /// The whole file. `[tracker]` without host, a missing `[encoder]`, a missing `[counter_card]` mean "not

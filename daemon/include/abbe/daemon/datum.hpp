@@ -52,6 +52,8 @@ class Datum {
   void apply(Batch& batch);
 
   [[nodiscard]] bool known(std::size_t axis) const;
+  /// As of the newest sample applied.
+  [[nodiscard]] std::vector<FoundDatum> in_force() const;
 
  private:
   struct Axis {

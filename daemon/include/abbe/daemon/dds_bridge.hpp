@@ -1,13 +1,16 @@
 #pragma once
 /// The rules of abbe-dds, without DDS: what abbed hands over goes to an outlet, and abbed's silence is told
 /// to everybody.
-/// - alive: a beat within kSilence. Only then is anything but INVALID written, and liveliness asserted.
+/// - alive: a beat sent within kSilence, however late it is read. Only then is anything but INVALID written,
+/// and liveliness asserted.
 /// - silent, or the socket closed: every ModelState known goes out once more as MODEL_INVALID, reason
 /// SOURCE_LOST; then
 ///   nothing, so that the lease of ModelState's writer ends too.
 /// - back: durable topics go out again. The state only once abbed says it anew, so that no old ACTIVE comes
 /// to life.
 /// - durable topics are repeated as their traits say.
+/// - a vector's age counts what it waited on its way here; live samples that waited longer than kLongestWait
+/// are discarded.
 /// - slices of ErrorGrid beyond those of the newest grid are disposed. Used by one thread; time is handed in.
 
 #include <chrono>
@@ -37,6 +40,8 @@ class DdsBridge {
   using WallTime = std::chrono::steady_clock::time_point;
   static constexpr std::chrono::milliseconds kSilence{500};
   static constexpr std::chrono::milliseconds kAssertPeriod{200};
+  static constexpr std::chrono::milliseconds kLongestWait{
+      100};  ///< a tenth of a second of old vectors helps nobody
 
   /// `outlet` must outlive the bridge.
   explicit DdsBridge(DdsOutlet& outlet);
@@ -46,14 +51,16 @@ class DdsBridge {
 
   void
   connected();  ///< a new abbed, which will say everything durable again: what the old one said is forgotten
-  void beat(WallTime now);
-  void publish(Topic topic, std::span<const std::byte> payload, WallTime now);
+  /// `at`: when abbed said it. The age in the payload of a vector is changed in place.
+  void beat(WallTime at, WallTime now);
+  void publish(Topic topic, std::span<std::byte> payload, WallTime at, WallTime now);
   void lost();              ///< the socket closed, or abbe-dds is leaving
   void turn(WallTime now);  ///< silence, liveliness, repetition: call at least every 50 ms
 
   [[nodiscard]] bool source_alive() const noexcept;
   [[nodiscard]] std::uint64_t written() const noexcept;
-  [[nodiscard]] std::uint64_t refused() const noexcept;  ///< by the outlet
+  [[nodiscard]] std::uint64_t refused() const noexcept;   ///< by the outlet
+  [[nodiscard]] std::uint64_t outdated() const noexcept;  ///< live samples that had waited too long
 
  private:
   struct State;

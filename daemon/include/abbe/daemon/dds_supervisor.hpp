@@ -1,8 +1,9 @@
 #pragma once
-/// Starts abbe-dds as a child of abbed and starts it again when it dies: at once if it had been up for a
-/// while, with a growing delay if it dies at start (bad profile, port in use). Knows its child by pid only;
-/// the child inherits none of abbed's capabilities.
-/// Used by one thread that is not real-time; never blocks but in the destructor.
+/// Starts abbe-dds as a child of abbed and starts it again when it ends: at once if it had been up for a
+/// while, after `first_delay` if a signal ends it at start, with a growing delay if it exits at start (bad
+/// profile, port in use). A child that does not answer the hub is killed and so started again. Knows its
+/// child by pid only; the child inherits none of abbed's capabilities. Used by one thread that is not
+/// real-time; never blocks but in the destructor.
 
 #include <sys/types.h>
 
@@ -12,6 +13,7 @@
 #include <string>
 #include <vector>
 
+#include "abbe/daemon/dds_process.hpp"
 #include "abbe/daemon/error.hpp"
 
 namespace abbe::daemon {
@@ -28,6 +30,10 @@ class DdsSupervisor {
     std::chrono::milliseconds first_delay{100};    ///< after a death at start; doubles
     std::chrono::milliseconds longest_delay{5000};
     std::chrono::milliseconds stop_patience{3000};  ///< destructor: SIGTERM, then this long, then SIGKILL
+    /// Outlives the supervisor; null: nobody asks the child whether it hangs.
+    DdsProcess* process = nullptr;
+    std::chrono::milliseconds hung_after{2000};       ///< no answer for this long
+    std::chrono::milliseconds hung_at_start{10'000};  ///< not one answer since its start
   };
 
   /// Error (Io) if the program cannot be started at all (missing, not executable).
@@ -36,7 +42,7 @@ class DdsSupervisor {
   DdsSupervisor(DdsSupervisor&&) noexcept;
   DdsSupervisor& operator=(DdsSupervisor&&) noexcept;
 
-  /// Notices a death and starts again when it is time. Call every turn, at least every 50 ms.
+  /// Notices an end or a hang and starts again when it is time. Call every cycle, at least every 50 ms.
   void poll(WallTime now);
 
   [[nodiscard]] pid_t pid() const noexcept { return pid_; }  ///< 0 while there is none
@@ -47,6 +53,8 @@ class DdsSupervisor {
  private:
   explicit DdsSupervisor(Options options) : options_(std::move(options)) {}
   Result<void> spawn(WallTime now);
+  void kill_if_hung() noexcept;
+  [[nodiscard]] bool reap(WallTime now);  ///< whether there is no child any more
   void stop() noexcept;
 
   Options options_;
@@ -55,6 +63,7 @@ class DdsSupervisor {
   WallTime next_start_{};
   std::chrono::milliseconds delay_{0};
   std::uint64_t restarts_ = 0;
+  bool hung_ = false;  // the child was killed because it did not answer
   std::string last_end_;
 };
 

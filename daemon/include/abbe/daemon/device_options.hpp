@@ -15,6 +15,8 @@
 namespace abbe::daemon {
 
 [[nodiscard]] drivers::TrackerDeviceOptions device_options(const TrackerConfig& config, double speed);
+/// Host time after which an order to the tracker has been reported; 0 without a tracker.
+[[nodiscard]] std::chrono::nanoseconds longest_tracker_order(const Config& config);
 [[nodiscard]] drivers::EncoderDeviceOptions device_options(const EncoderConfig& config, double speed);
 [[nodiscard]] drivers::CounterCardOptions device_options(const CounterCardConfig& config, double speed);
 [[nodiscard]] drivers::EnvironmentDeviceOptions device_options(const EnvironmentConfig& config, double speed);

@@ -5,6 +5,7 @@
 #include <array>
 #include <chrono>
 #include <memory>
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
@@ -21,7 +22,10 @@ class DeviceSet final : public SampleSource {
  public:
   /// Creates the devices and starts their threads. Io when the system refuses what real-time mode `enforce`
   /// asks for, BadInput for a device that cannot be opened as configured. `time` must outlive the set.
-  [[nodiscard]] static Result<DeviceSet> start(const Config& config, const drivers::TimeSource& time);
+  /// `left`: how far an earlier run left the counters of [counter_card], which then go on if the card did.
+  [[nodiscard]] static Result<DeviceSet> start(
+      const Config& config, const drivers::TimeSource& time,
+      const std::optional<drivers::CounterCardProgress>& left = std::nullopt);
   ~DeviceSet() override;  ///< stops all threads
   DeviceSet(DeviceSet&&) noexcept;
   DeviceSet& operator=(DeviceSet&&) noexcept;
@@ -30,9 +34,17 @@ class DeviceSet final : public SampleSource {
   [[nodiscard]] std::vector<StreamHealth> health(protocol::HostTime now) override;
   /// What the system refused in real-time mode `ignore`, one sentence each.
   [[nodiscard]] std::vector<std::string> warnings() const;
+  [[nodiscard]] std::optional<drivers::CounterCardProgress> card_progress() override;
   void measure(std::span<const drivers::ProbePoint> points) override;
+  void stop_machine() override;
+  [[nodiscard]] std::optional<std::string> release_awaited() const override;
+  [[nodiscard]] Result<void> release_machine() override;
+  [[nodiscard]] std::optional<TipPlace> tip_place() const override;
   [[nodiscard]] std::size_t points_left() const override;
   [[nodiscard]] Result<std::array<double, 3>> machine_position() const override;
+  [[nodiscard]] std::optional<drivers::DeviceStatus> tracker_status() const override;
+  void order_tracker(drivers::TrackerOrder order) override;
+  [[nodiscard]] std::vector<drivers::TrackerOrderReport> tracker_reports() override;
 
  private:
   void drain_cmm(Batch& batch);

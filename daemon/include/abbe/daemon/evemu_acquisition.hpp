@@ -56,9 +56,12 @@ class EvemuAcquisition {
  public:
   using Phase = AcquisitionPhase;
 
-  /// BadInput for a calibrator or plan that is none. `from`: touches before this instant do not count.
-  [[nodiscard]] static Result<EvemuAcquisition> create(EvemuRequest request, protocol::HostTime from,
+  /// BadInput for a calibrator or plan that is none.
+  [[nodiscard]] static Result<EvemuAcquisition> create(EvemuRequest request,
                                                        EvemuAcquisitionOptions options = {});
+
+  /// Before the first snapshot. Touches before `from` do not count.
+  void begin(protocol::HostTime from) noexcept { from_ = last_touch_ = from; }
 
   void take(const protocol::Snapshot& snapshot);
   void tick(protocol::HostTime now);
@@ -76,8 +79,7 @@ class EvemuAcquisition {
   [[nodiscard]] EvemuRun release();
 
  private:
-  EvemuAcquisition(EvemuRequest request, calib::evemu::TouchGuide guide, protocol::HostTime from,
-                   EvemuAcquisitionOptions options);
+  EvemuAcquisition(EvemuRequest request, calib::evemu::TouchGuide guide, EvemuAcquisitionOptions options);
   void refuse(const protocol::Snapshot& touch, std::string_view fault);
   void note(const protocol::Snapshot& touch, const std::string& what);
   void say_what_comes_next();
@@ -85,12 +87,12 @@ class EvemuAcquisition {
   EvemuRequest request_;
   calib::evemu::TouchGuide guide_;
   ArtefactThermometer thermometer_;
-  protocol::HostTime from_;
+  protocol::HostTime from_{};
   EvemuAcquisitionOptions options_;
   Phase phase_ = Phase::WaitingAtStart;
   std::string reason_;
   std::vector<std::string> notes_;
-  protocol::HostTime last_touch_;
+  protocol::HostTime last_touch_{};
   std::size_t refused_in_a_row_ = 0;
 };
 

@@ -3,6 +3,7 @@
 /// [evemu], the same for a live session and its replay. Pure and deterministic. A tenth of a second with the
 /// default estimator, seconds with lasso, mcp, scad; runs on a thread of its own in the daemon.
 
+#include <functional>
 #include <string>
 #include <string_view>
 
@@ -20,9 +21,11 @@ struct EvemuCandidate {
 };
 
 /// `active` may be null. DataInsufficient or BadInput, with what is wrong with the touches, by position and
-/// number. A run without rotation reference is judged "shape only" unless [gate] accepts that by name.
+/// number. `stopped`: as in IdentificationWatch. A run without rotation reference is judged "shape only"
+/// unless [gate] accepts that by name.
 [[nodiscard]] Result<EvemuCandidate> identify_touches(const EvemuRun& run, const Config& config,
-                                                      const calib::VolumetricModel* active);
+                                                      const calib::VolumetricModel* active,
+                                                      const std::function<bool()>& stopped = {});
 
 [[nodiscard]] calib::evemu::TouchPlan touch_plan(const EvemuConfig& config);
 /// Refused or BadInput if no model would come of it: no probe, a machine that has corrected its positions, an

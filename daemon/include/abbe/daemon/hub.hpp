@@ -2,15 +2,16 @@
 /// The loop of the ordinary world: every `hub_period` it empties the rings and hands what came to the
 /// recorder, the assembler (and so to the calibration), the live view and the publisher. It says "alive" to
 /// abbe-dds first thing in every turn, so that a hung hub falls silent. Other threads reach it through
-/// call().
+/// call(). In a turn it takes no lock that an ordinary thread may hold, and no disk is read or written.
 
 #include <atomic>
 #include <chrono>
+#include <exception>
 #include <functional>
 #include <memory>
-#include <mutex>
-#include <nlohmann/json.hpp>
 #include <optional>
+#include <type_traits>
+#include <utility>
 #include <vector>
 
 #include "abbe/daemon/assembler.hpp"
@@ -22,7 +23,9 @@
 #include "abbe/daemon/reference_service.hpp"
 #include "abbe/daemon/sample_source.hpp"
 #include "abbe/daemon/touch_service.hpp"
+#include "abbe/daemon/tracker_service.hpp"
 #include "abbe/daemon/verification_service.hpp"
+#include "abbe/drivers/mailbox.hpp"
 #include "abbe/drivers/time_source.hpp"
 
 namespace abbe::daemon {
@@ -40,6 +43,7 @@ struct HubParts {
   ReferenceService* reference = nullptr;
   TouchService* touching = nullptr;
   VerificationService* verification = nullptr;
+  TrackerService* tracker = nullptr;
 };
 
 class Hub {
@@ -47,6 +51,9 @@ class Hub {
   using WallTime = Publisher::WallTime;
 
   explicit Hub(HubParts parts);
+  Hub(const Hub&) = delete;
+  Hub& operator=(const Hub&) = delete;
+  ~Hub();
 
   /// One turn; the hub's thread.
   void turn(WallTime wall);
@@ -57,9 +64,15 @@ class Hub {
   [[nodiscard]] WallTime last_turn() const noexcept;
 
   /// Runs `task` on the hub's thread at its next turn and gives back its result; from any other thread.
-  /// Nothing if the hub does not get round to it in `time_out`; it never runs then.
-  [[nodiscard]] std::optional<nlohmann::json> call(std::function<nlohmann::json()> task,
-                                                   std::chrono::milliseconds time_out);
+  /// Nothing if the hub does not get round to it in `time_out`; it never runs then. What `task` holds is
+  /// destroyed on the calling thread. It is to be short: parse before, format after.
+  template <class Task>
+  [[nodiscard]] auto call(Task task, std::chrono::milliseconds time_out)
+      -> std::optional<std::invoke_result_t<Task&>> {
+    std::optional<std::invoke_result_t<Task&>> result;
+    if (!run_in_turn([&] { result.emplace(task()); }, time_out)) return std::nullopt;
+    return result;
+  }
 
   // For tasks that run on the hub's thread.
   [[nodiscard]] const LiveView& live() const noexcept { return live_; }
@@ -69,6 +82,7 @@ class Hub {
 
  private:
   struct Call;
+  [[nodiscard]] bool run_in_turn(std::function<void()> task, std::chrono::milliseconds time_out);
   void run_calls();
   void publish(bool fresh, protocol::HostTime now, WallTime wall);
   void collect_health(protocol::HostTime now);
@@ -83,8 +97,8 @@ class Hub {
   WallTime next_health_{};
   std::atomic<std::int64_t> last_turn_ns_{0};
   std::atomic<bool> stopping_{false};
-  std::mutex calls_mutex_;
-  std::vector<std::shared_ptr<Call>> calls_;  // under calls_mutex_
+  drivers::Mailbox<Call*> calls_;    // owned by who calls, unless given up
+  drivers::Mailbox<Call*> given_up_;  // by callers, seen by the hub: freed by the next caller
 };
 
 }  // namespace abbe::daemon

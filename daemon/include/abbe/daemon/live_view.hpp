@@ -26,6 +26,10 @@ class LiveView {
   /// True if anything new came.
   bool take(const Batch& batch);
   [[nodiscard]] const protocol::Snapshot& view() const noexcept { return view_; }
+  /// The instant of the latest axis sample, whatever was missing in it.
+  [[nodiscard]] std::optional<protocol::HostTime> axes_at() const noexcept {
+    return previous_ ? std::optional{previous_->head.time} : std::nullopt;
+  }
   /// The latest instant at which axes_known() held; none yet: nothing.
   [[nodiscard]] std::optional<protocol::HostTime> axes_known_at() const noexcept { return axes_known_at_; }
 

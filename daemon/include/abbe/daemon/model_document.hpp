@@ -52,7 +52,12 @@ struct ModelDocument {
   ModelStatistics statistics;
   std::vector<InputFile> inputs;
   std::optional<calib::Expansion> artefact{};  ///< of a ball array that counts as warm
+  /// What the recording of the run lacks; empty: nothing, or nothing was recorded on purpose. Such a model is
+  /// as sure as the data it was identified from, but no replay can check it.
+  std::string recording_gap{};
 };
+/// For the verdict of a model whose recording has this gap.
+[[nodiscard]] std::string cannot_be_checked(std::string_view recording_gap);
 
 /// The document of an OTF solution.
 [[nodiscard]] ModelDocument otf_document(const calib::otf::Solution& solution, const Config& config,

@@ -4,6 +4,7 @@
 /// Ordinary world.
 
 #include <filesystem>
+#include <memory>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -11,16 +12,19 @@
 #include "abbe/calib/gate.hpp"
 #include "abbe/daemon/config.hpp"
 #include "abbe/daemon/idl_messages.hpp"
+#include "abbe/daemon/model_publication.hpp"
 #include "abbe/daemon/model_store.hpp"
 
 namespace abbe::daemon {
 
-/// What the store says is active, read and checked. Without a model `fault` says why; both empty: nothing is
-/// active.
+/// What the store says is active, read, checked and encoded. Without a model `fault` says why; both empty:
+/// nothing is active. The model is shared with an identification that compares with it.
 struct ActiveModel {
   StoreEvent activation;  ///< default: nothing was ever activated
-  std::optional<ModelInForce> model;
+  std::shared_ptr<const ModelInForce> model;
+  ModelPublication publication;  ///< of `model`
   bool made_for_this_machine = false;
+  std::string recording_gap;  ///< ModelDocument::recording_gap
   std::string fault;
 };
 
@@ -36,10 +40,17 @@ struct KeptModel {
 
 class ModelKeeper {
  public:
-  [[nodiscard]] static Result<ModelKeeper> open(const std::filesystem::path& store_folder,
-                                                const Config& config, protocol::UtcOffset utc);
+  /// Does not touch the disk.
+  ModelKeeper(const std::filesystem::path& store_folder, const Config& config, protocol::UtcOffset utc);
 
-  /// Keeps a judged model, activates it if the gate accepted it, and reads it back.
+  /// For the start of the daemon: removes what killed processes left in the store and sets a damaged state
+  /// aside. Best effort; what does not work out is an error of read_active().
+  void tidy_store(protocol::HostTime now);
+
+  /// See ModelStore.
+  void set_lock_patience(std::chrono::nanoseconds patience) noexcept { store_.set_lock_patience(patience); }
+  /// Keeps a judged model, activates it if the gate accepted it, and reads it back. May be repeated with the
+  /// same `actor` after an error: what the store has of it already is not entered again.
   [[nodiscard]] Result<KeptModel> keep(const ModelDocument& document, const calib::Verdict& verdict,
                                        const StoreActor& actor, protocol::HostTime now);
   /// An error only if the store itself cannot be read; a damaged model is a `fault`.
@@ -48,10 +59,10 @@ class ModelKeeper {
   [[nodiscard]] StoreStamp stamp() const noexcept { return store_.stamp(); }
 
  private:
-  ModelKeeper(ModelStore store, std::string machine_hash, protocol::UtcOffset utc)
-      : store_(std::move(store)), machine_hash_(std::move(machine_hash)), utc_(utc) {}
+  [[nodiscard]] Result<void> activate_once(const std::string& id, const StoreActor& actor);
 
   ModelStore store_;
+  std::string machine_;
   std::string machine_hash_;
   protocol::UtcOffset utc_;
 };

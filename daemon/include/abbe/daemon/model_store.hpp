@@ -3,10 +3,12 @@
 ///     models/ID.json   one model.json each, never changed once written
 ///     state.json       every event in order (added, activated, rolled back), replaced as a whole
 /// Each write goes to a new file, to the disk, then over the old name: after a power cut the old or the new
-/// state is there, never half of one. Several processes may use a store (a lock file orders them; a change
-/// that gets no lock for five seconds fails); one object belongs to one thread. A model file that cannot be
-/// read is listed with its fault and stands in nobody's way.
+/// state is there, never half of one. Several processes may use a store (a lock file orders them, which only
+/// who may write to the folder can open; a change that gets no lock for kLockPatience fails); one object
+/// belongs to one thread. A model file that cannot be read is listed with its fault and stands in nobody's
+/// way. Only regular files are read: a pipe or device laid there is a fault, not a wait.
 
+#include <chrono>
 #include <cstdint>
 #include <filesystem>
 #include <optional>
@@ -22,6 +24,7 @@ struct StoreActor {
   std::string who;
   std::string why;
   protocol::UtcTime when{};
+  bool operator==(const StoreActor&) const = default;
 };
 
 enum class StoreAction { Added, Activated, Forced, RolledBack };
@@ -32,6 +35,7 @@ struct StoreEvent {
   StoreActor actor;
   bool accepted = false;             ///< Added: what the gate said
   std::vector<std::string> reasons;  ///< Added: why it was refused
+  bool operator==(const StoreEvent&) const = default;
 };
 
 struct StoreEntry {
@@ -58,8 +62,27 @@ class ModelStore {
   /// alone).
   [[nodiscard]] static Result<ModelStore> open(const std::filesystem::path& folder);
 
+  /// The same without touching the disk: for who goes on without a store until there is one.
+  explicit ModelStore(std::filesystem::path folder);
+  /// The folder, if it is not there.
+  [[nodiscard]] Result<void> create() const;
+
+  static constexpr std::chrono::seconds kLockPatience{5};  ///< a change takes milliseconds
+  /// For who has less time.
+  void set_lock_patience(std::chrono::nanoseconds patience) noexcept { lock_patience_ = patience; }
+
+  /// Renames a state.json that is no state (damaged, a pipe ...) to state.json.damaged-DATE. Which model was
+  /// active is not known then, and the models that are there count as never judged. Not while another process
+  /// changes the store.
+  [[nodiscard]] Result<void> set_aside_damaged_state(protocol::UtcTime now);
+  /// The newest name of such a file; empty: there is none.
+  [[nodiscard]] std::string damaged_state() const;
+  /// Removes what processes that are gone left of a write (NAME.PID.new). Best effort. At the start of a
+  /// process, before it writes: what bears its own number is somebody else's.
+  void remove_leftovers() const;
+
   /// Keeps a model with the gate's verdict; returns its id. A model that is there already (same id) is not
-  /// written again, but the event is.
+  /// written again, but the event is, unless it is the one before once more (same verdict and actor).
   [[nodiscard]] Result<std::string> add(const ModelDocument& document, bool accepted,
                                         std::vector<std::string> reasons, const StoreActor& actor);
 
@@ -87,9 +110,9 @@ class ModelStore {
   [[nodiscard]] std::filesystem::path model_path(const std::string& id) const;
 
  private:
-  explicit ModelStore(std::filesystem::path folder);
   std::filesystem::path folder_;
   std::filesystem::path state_file_;
+  std::chrono::nanoseconds lock_patience_ = kLockPatience;
 };
 
 }  // namespace abbe::daemon

@@ -6,6 +6,7 @@
 
 #include <array>
 #include <chrono>
+#include <cstddef>
 #include <cstdint>
 #include <deque>
 #include <optional>
@@ -13,6 +14,7 @@
 #include <utility>
 #include <vector>
 
+#include "abbe/calib/otf/path_index.hpp"
 #include "abbe/calib/otf/run.hpp"
 #include "abbe/daemon/acquisition_phase.hpp"
 #include "abbe/daemon/environment_use.hpp"
@@ -29,6 +31,22 @@ struct RunPoint {
   std::array<double, 3> p_tracker_m{};
   bool usable =
       true;  ///< false: too fast, prism error or trigger violation; it holds its place in the sequence
+};
+
+/// Points of a run in blocks: one more never copies those before.
+class RunPoints {
+ public:
+  void push_back(const RunPoint& point);
+  void pop_back() noexcept;
+  [[nodiscard]] const RunPoint& back() const noexcept { return blocks_.back().back(); }
+  [[nodiscard]] bool empty() const noexcept { return blocks_.empty(); }
+  [[nodiscard]] std::size_t size() const noexcept { return size_; }
+  /// All of them, O(n).
+  [[nodiscard]] std::vector<RunPoint> joined() const;
+
+ private:
+  std::vector<std::vector<RunPoint>> blocks_;  // none is empty
+  std::size_t size_ = 0;
 };
 
 struct AcquisitionOptions {
@@ -49,7 +67,10 @@ struct AcquisitionOptions {
   std::chrono::nanoseconds wait_for_start =
       std::chrono::hours{1};  ///< for the machine to stand at P0 and leave
   std::chrono::nanoseconds longest_stop =
-      std::chrono::minutes{15};       ///< on the path: a longer one ends the run
+      std::chrono::minutes{15};  ///< on the path: a longer one ends the run
+  /// Of a run: 67 min at 1000 points a second, 200 MB. A machine that cycles on its path would fill the
+  /// memory.
+  std::size_t most_points = 4'000'000;
   EnvironmentUseOptions environment;  ///< what snapshots were corrected with
   /// A packet out of order goes back by a burst (a third of a second); a clock that began anew by more.
   std::chrono::nanoseconds clock_began_anew = std::chrono::seconds{1};
@@ -59,10 +80,12 @@ class OtfAcquisition {
  public:
   using Phase = AcquisitionPhase;
 
-  /// `path`: vertices of the polyline, at least two. `from`: snapshots before this instant are not looked at.
-  OtfAcquisition(const std::vector<AxisPosition>& path, protocol::HostTime from,
-                 AcquisitionOptions options = {});
+  /// `path`: vertices of the polyline, at least two. O(n): everything that grows with the path, but release(),
+  /// is done here.
+  explicit OtfAcquisition(const std::vector<AxisPosition>& path, AcquisitionOptions options = {});
 
+  /// Before the first snapshot. Those before `from` are not looked at.
+  void begin(protocol::HostTime from) noexcept { from_ = from; }
   /// Points whose device time does not ascend are left out and counted.
   void take(const protocol::Snapshot& snapshot);
   /// Fails what nothing arrives for any more; `now` is host time. Never needed for a replay: what it fails
@@ -74,14 +97,16 @@ class OtfAcquisition {
     return reason_;
   }                                                ///< why Failed, or what is waited for
   [[nodiscard]] double progress() const noexcept;  ///< 0 to 1 of the path length driven
-  [[nodiscard]] const std::vector<RunPoint>& points() const noexcept { return points_; }
-  [[nodiscard]] std::vector<RunPoint> release() noexcept { return std::move(points_); }
+  [[nodiscard]] std::size_t points() const noexcept { return points_.size(); }
+  /// The points of the run; O(n).
+  [[nodiscard]] std::vector<RunPoint> release() { return std::exchange(points_, {}).joined(); }
   /// Mean over the run.
   [[nodiscard]] EnvironmentEffect environment() const { return environment_.mean(); }
 
  private:
   [[nodiscard]] bool in_order(const RunPoint& point);
   void give_up_if_stuck(protocol::HostTime point_time);
+  void keep(const RunPoint& point);
   void wait_at_start(const RunPoint& point, const calib::Vector3& q);
   void run(const RunPoint& point, const calib::Vector3& q);
   void track_standstill(const RunPoint& point, const calib::Vector3& q);
@@ -90,14 +115,14 @@ class OtfAcquisition {
   void trim_end();
   void fail(std::string reason);
 
-  calib::otf::Path path_;
+  calib::otf::PathIndex path_;
   std::vector<double> driven_at_m_;  // every vertex
-  protocol::HostTime from_;
+  protocol::HostTime from_{};
   AcquisitionOptions options_;
   Phase phase_ = Phase::WaitingAtStart;
   std::string reason_;
   std::deque<RunPoint> before_;  // standstill at the first vertex, the last keep_before of it
-  std::vector<RunPoint> points_;
+  RunPoints points_;
   MeanEffect environment_;
   calib::Vector3 stand_at_ = calib::Vector3::Zero();  // where the current standstill began
   protocol::HostTime stand_since_{};

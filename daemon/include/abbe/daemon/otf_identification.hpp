@@ -23,16 +23,22 @@ struct OtfRun {
   double u_scale = 0.0;  ///< see calib::otf::Noise
 };
 
+/// How an identification is watched from outside; both are called in its thread and may be empty.
+struct IdentificationWatch {
+  std::function<void(double)> progress = {};  ///< 0 to 1
+  std::function<bool()> stopped = {};         ///< true: it ends soon, with an Error
+};
+
 struct OtfCandidate {
   calib::otf::Solution solution;
   calib::Verdict verdict;
 };
 
-/// `active` may be null. `progress` is called with 0 to 1 in the calling thread, and may be empty.
+/// `active` may be null.
 /// DataInsufficient when the run does not determine the model, with what is missing.
 [[nodiscard]] Result<OtfCandidate> identify_run(const OtfRun& run, const MachineConfig& machine,
                                                 const GateConfig& gate, const calib::VolumetricModel* active,
-                                                const std::function<void(double)>& progress = {});
+                                                const IdentificationWatch& watch = {});
 
 /// SHA-256 in hex over the points as they entered the identification: times, positions and whether usable.
 [[nodiscard]] std::string points_sha256(std::span<const RunPoint> points);

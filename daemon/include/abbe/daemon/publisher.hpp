@@ -14,6 +14,7 @@
 
 #include "abbe/daemon/dds_link.hpp"
 #include "abbe/daemon/idl_messages.hpp"
+#include "abbe/daemon/model_publication.hpp"
 
 namespace abbe::daemon {
 
@@ -23,6 +24,7 @@ struct PublisherOptions {
   double snapshot_hz = 50.0;                                           ///< 0: whenever something new came
   double compensation_hz = 100.0;                                      ///< 0: whenever something new came
   std::chrono::nanoseconds validity = std::chrono::milliseconds{500};  ///< of a live vector, host time
+  std::string security_warning;  ///< what to report of DDS Security; empty: it is on
 };
 
 /// What may be said of the model in force at this moment.
@@ -30,6 +32,7 @@ struct ModelStanding {
   v1::ModelStatus status = v1::ModelStatus::MODEL_NONE;
   std::string reason;
   const ModelInForce* model = nullptr;
+  const ModelPublication* publication = nullptr;  ///< of `model`
   std::uint64_t revision = 0;  ///< changes whenever another model comes into force
 };
 
@@ -61,10 +64,12 @@ class Publisher {
   /// Why the last message that could not be encoded was not sent; empty: all could.
   [[nodiscard]] const std::string& refusal() const noexcept { return refusal_; }
   [[nodiscard]] const DdsLink& link() const noexcept { return link_; }
+  [[nodiscard]] const std::string& security_warning() const noexcept { return options_.security_warning; }
 
  private:
   template <class T>
-  void send(Topic topic, const T& message);
+  void send(Topic topic, const T& message, WallTime at = WallTime::clock::now());
+  void send_encoded(Topic topic, std::span<const std::byte> payload);
   [[nodiscard]] Stamp stamp(protocol::HostTime now) { return {options_.machine, ++sequence_number_, now}; }
 
   DdsLink link_;

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "abbe/daemon/config.hpp"
+#include "abbe/daemon/counting_state.hpp"
 #include "abbe/daemon/datum.hpp"
 #include "abbe/daemon/recorder_thread.hpp"
 #include "abbe/daemon/reference_session.hpp"
@@ -43,8 +44,9 @@ class ReferenceService {
     bool known = false;            ///< readings have a datum now
   };
 
-  /// `recorder` may be null.
-  ReferenceService(const Config& config, RecorderThread* recorder);
+  /// `recorder` may be null. `left`: the datum of an earlier run, taken up if the first sample shows that the
+  /// counters went on, else dropped.
+  ReferenceService(const Config& config, RecorderThread* recorder, std::optional<Counting> left = {});
 
   /// Refused without [reference] and while one runs. Axes that are known already stay so until the new datum.
   [[nodiscard]] Result<void> start();
@@ -55,7 +57,13 @@ class ReferenceService {
   [[nodiscard]] Result<void> stand_at_offset(const StandHere& here);
   /// Every turn, before anybody else sees the batch.
   void turn(Batch& batch);
+  /// After turn(): how far the card has come, as the devices say.
+  void take(const std::optional<drivers::CounterCardProgress>& progress);
 
+  /// What a later run would have to know; nothing while the counters just began anew.
+  [[nodiscard]] std::optional<Counting> counting() const;
+  /// Axes whose datum of an earlier run was taken up.
+  [[nodiscard]] const std::vector<std::string>& carried_on() const noexcept { return carried_on_; }
   [[nodiscard]] bool configured() const noexcept { return config_.reference.has_value(); }
   [[nodiscard]] bool running() const noexcept { return running_; }
   [[nodiscard]] std::vector<AxisStatus> status() const;
@@ -70,6 +78,7 @@ class ReferenceService {
   void take_up(const FoundDatum& datum);
   [[nodiscard]] std::vector<std::string> without_marks() const;
   void watch_standing(const protocol::AxisSample& sample);
+  void take_up_left(const protocol::AxisSample& first);
   [[nodiscard]] Result<void> check_standing(std::size_t axis) const;
   [[nodiscard]] double reading_at_zero(std::size_t axis) const;
 
@@ -87,6 +96,11 @@ class ReferenceService {
   protocol::HostTime newest_{};     ///< of the live samples
   std::optional<protocol::AxisSample> latest_;
   protocol::HostTime from_{};  ///< what came later belongs to the search
+  std::optional<Counting> left_;
+  std::vector<std::string> carried_on_;
+  protocol::HostTime began_anew_{};                     ///< the counters; of the sample that showed it
+  std::optional<drivers::CounterCardProgress> coming_;  ///< later than the newest sample
+  std::optional<drivers::CounterCardProgress> progress_;
 };
 
 }  // namespace abbe::daemon

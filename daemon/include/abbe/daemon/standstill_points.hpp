@@ -8,7 +8,6 @@
 #include <chrono>
 #include <cstddef>
 #include <deque>
-#include <vector>
 
 #include "abbe/calib/verify/observe.hpp"
 #include "abbe/protocol/samples.hpp"
@@ -37,7 +36,7 @@ class StandstillPoints {
   /// The standstill that still goes on ends now.
   void finish();
 
-  [[nodiscard]] const std::vector<StandstillPoint>& points() const noexcept { return points_; }
+  [[nodiscard]] const std::deque<StandstillPoint>& points() const noexcept { return points_; }
   /// Tracker points of the present standstill that count so far.
   [[nodiscard]] std::size_t standing() const noexcept { return taken_; }
 
@@ -50,7 +49,7 @@ class StandstillPoints {
   void add(const Sample& sample);
 
   StandstillOptions options_;
-  std::vector<StandstillPoint> points_;
+  std::deque<StandstillPoint> points_;  // one more never copies those before
   bool running_ = false;
   Sample first_;                // of the standstill; sums are relative to it
   std::deque<Sample> pending_;  // nearer than `settle` to the newest

@@ -61,4 +61,11 @@ struct PayloadKey {
 /// How many slices the grid has that this payload of ErrorGrid is a part of. Nothing if it is none.
 [[nodiscard]] std::optional<std::uint32_t> grid_slices(std::span<const std::byte> payload) noexcept;
 
+/// Writes sequence_number of a payload of ErrorModel or ErrorGrid, in place. False, and nothing changed, if it
+/// is none.
+[[nodiscard]] bool set_sequence_number(Topic topic, std::span<std::byte> payload, std::uint64_t number) noexcept;
+
+/// Adds to age_ns of a payload of Compensation, in place. False, and nothing changed, if it is none.
+[[nodiscard]] bool add_to_age(std::span<std::byte> compensation, std::chrono::nanoseconds more) noexcept;
+
 }  // namespace abbe::daemon

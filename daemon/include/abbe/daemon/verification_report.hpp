@@ -16,6 +16,7 @@ struct Verification {
   calib::verify::Comparison comparison;
   std::vector<InputFile> inputs;
   std::vector<std::size_t> lines;  ///< of the points in their file; may be empty
+  std::string cut_short{};         ///< why some of the points are missing or may be wrong; empty: none is
   /// Where the planes of vectors lie, one coordinate for each axis; default: the middle of the grid.
   std::optional<calib::Vector3> planes_m;
 };

@@ -1,0 +1,99 @@
+#include "abbe/daemon/dds_security.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <sys/stat.h>
+
+#include <cstdlib>
+#include <fstream>
+
+namespace abbe::daemon {
+namespace {
+
+using namespace std::chrono_literals;
+namespace fs = std::filesystem;
+
+class DdsSecurity : public testing::Test {
+ protected:
+  DdsSecurity() {
+    std::string name = testing::TempDir() + "abbe-keys-XXXXXX";
+    root_ = ::mkdtemp(name.data());
+    keys_ = root_ / "keys";
+  }
+  ~DdsSecurity() override { fs::remove_all(root_); }
+
+  void make(int subscribers = 2) {
+    const auto made = make_dds_keys({.folder = keys_, .subscribers = subscribers}, now_);
+    ASSERT_TRUE(made) << made.error().text;
+  }
+  [[nodiscard]] static mode_t mode_of(const fs::path& file) {
+    struct stat status {};
+    EXPECT_EQ(::stat(file.c_str(), &status), 0) << file;
+    return status.st_mode & 0777;
+  }
+
+  const std::chrono::system_clock::time_point now_ = std::chrono::system_clock::now();
+  fs::path root_;
+  fs::path keys_;
+};
+
+TEST_F(DdsSecurity, PrivateKeysAreReadableByTheirOwnerOnly) {
+  make();
+  for (const char* key :
+       {"ca.key", "daemon/identity.key", "subscriber-1/identity.key", "subscriber-2/identity.key"})
+    EXPECT_EQ(mode_of(keys_ / key), 0600u) << key;
+}
+
+TEST_F(DdsSecurity, NothingIsOverwritten) {
+  make();
+  const auto again = make_dds_keys({.folder = keys_}, now_);
+  ASSERT_FALSE(again);
+  EXPECT_EQ(again.error().code, ErrorCode::Refused);
+  EXPECT_THAT(again.error().text, testing::HasSubstr("nothing is overwritten"));
+}
+
+TEST_F(DdsSecurity, EachRoleFindsItsIdentityInTheFolder) {
+  make();
+  const auto daemon = find_dds_identity(keys_, DdsRole::Daemon, now_);
+  const auto subscriber = find_dds_identity(keys_, DdsRole::Subscriber, now_);
+  const auto second = find_dds_identity(keys_ / "subscriber-2", DdsRole::Subscriber, now_);
+  ASSERT_TRUE(daemon && subscriber && second);
+  EXPECT_EQ(daemon->folder, keys_ / "daemon");
+  EXPECT_EQ(subscriber->folder, keys_ / "subscriber-1");
+  EXPECT_EQ(second->folder, keys_ / "subscriber-2");
+}
+
+TEST_F(DdsSecurity, AMissingFileIsNamed) {
+  make();
+  fs::remove(keys_ / "daemon/governance.p7s");
+  const auto found = find_dds_identity(keys_, DdsRole::Daemon, now_);
+  ASSERT_FALSE(found);
+  EXPECT_THAT(found.error().text, testing::AllOf(testing::HasSubstr("daemon/governance.p7s"),
+                                                 testing::HasSubstr("abbe dds keys")));
+}
+
+TEST_F(DdsSecurity, AKeyEverybodyCanReadIsRefused) {
+  make();
+  ASSERT_EQ(::chmod((keys_ / "daemon/identity.key").c_str(), 0644), 0);
+  const auto found = find_dds_identity(keys_, DdsRole::Daemon, now_);
+  ASSERT_FALSE(found);
+  EXPECT_THAT(found.error().text, testing::HasSubstr("chmod 600"));
+}
+
+TEST_F(DdsSecurity, AnExpiredIdentityIsRefusedWithItsDates) {
+  make();
+  const auto found = find_dds_identity(keys_, DdsRole::Daemon, now_ + std::chrono::days{3651});
+  ASSERT_FALSE(found);
+  EXPECT_THAT(found.error().text, testing::HasSubstr("make new keys"));
+}
+
+TEST_F(DdsSecurity, AProfileOfTheSiteMayHaveItsOwn) {
+  const fs::path profile = root_ / "dds.xml";
+  std::ofstream(profile) << "<name>dds.sec.access.plugin</name>";
+  EXPECT_TRUE(dds_is_secured({}, profile));
+  EXPECT_TRUE(dds_is_secured(keys_, {}));
+  EXPECT_FALSE(dds_is_secured({}, {}));
+}
+
+}  // namespace
+}  // namespace abbe::daemon

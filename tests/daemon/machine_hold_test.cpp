@@ -1,0 +1,90 @@
+/// DATA_DIR/machine-hold as a start finds it: what it cannot read it must not take for "nothing is held".
+
+#include <gmock/gmock.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <filesystem>
+#include <string>
+
+#include "abbe/daemon/config.hpp"
+#include "abbe/daemon/device_set.hpp"
+#include "config_tables.hpp"
+#include "recording_fixture.hpp"
+#include "text_files.hpp"
+
+namespace abbe::daemon {
+namespace {
+
+namespace fs = std::filesystem;
+using ::testing::AllOf;
+using ::testing::HasSubstr;
+
+class MachineHold : public ::testing::Test {
+ protected:
+  MachineHold() {
+    // Nobody listens at port 1: nothing but the file says whether a release is awaited.
+    auto config = parse_config(
+        to_toml(config_tables::half_metre_mill()) + "[cmm]\nhost = \"127.0.0.1\"\nport = 1\n", "abbed.toml");
+    EXPECT_TRUE(config) << config.error().details.front();
+    config_ = *config;
+    config_.daemon.data_dir = folder_.path();
+  }
+  [[nodiscard]] fs::path file() const { return folder_.path() / "machine-hold"; }
+  /// Why a start awaits a release; empty: it does not.
+  [[nodiscard]] std::string awaited() const {
+    const auto devices = DeviceSet::start(config_, time_);
+    EXPECT_TRUE(devices) << devices.error().text;
+    return devices ? devices->release_awaited().value_or("") : "no devices";
+  }
+
+  TemporaryFolder folder_;
+  drivers::MonotonicTime time_;
+  Config config_;
+};
+
+TEST_F(MachineHold, WithoutAFileNothingIsHeld) {
+  EXPECT_EQ(awaited(), "");
+}
+
+TEST_F(MachineHold, KeepsTheReason) {
+  test::write_text(file(), "emergency stop (error 0512)");
+  EXPECT_THAT(awaited(),
+              AllOf(HasSubstr("since before the restart"), HasSubstr("emergency stop (error 0512)")));
+}
+
+TEST_F(MachineHold, AFileThatCannotBeReadHoldsTheMachine) {
+  test::write_text(file(), "emergency stop");
+  ASSERT_EQ(::chmod(file().c_str(), 0), 0);
+  if (::geteuid() == 0) {  // root may read it all the same: a link to itself cannot be read by anybody
+    fs::remove(file());
+    fs::create_symlink(file(), file());
+  }
+  EXPECT_THAT(awaited(), AllOf(HasSubstr("unknown reason"), HasSubstr("cannot be read")));
+}
+
+TEST_F(MachineHold, ADirectoryInItsPlaceHoldsTheMachine) {
+  fs::create_directory(file());
+  EXPECT_THAT(awaited(), AllOf(HasSubstr("unknown reason"), HasSubstr("cannot be read")));
+}
+
+TEST_F(MachineHold, APipeInItsPlaceHoldsTheMachineAndNotTheStart) {
+  ASSERT_EQ(::mkfifo(file().c_str(), 0600), 0);
+  EXPECT_THAT(awaited(), AllOf(HasSubstr("unknown reason"), HasSubstr("is not a regular file")));
+}
+
+// Written before a motion under way had a line of its own: the reason alone, or nothing at all.
+TEST_F(MachineHold, TheOldFormatHoldsTheMachine) {
+  test::write_text(file(), "since before the restart: AbortE was refused");
+  EXPECT_EQ(awaited(), "cmm 127.0.0.1:1: since before the restart: AbortE was refused");
+  test::write_text(file(), "");
+  EXPECT_THAT(awaited(), HasSubstr("unknown reason"));
+}
+
+TEST_F(MachineHold, AMotionUnderWayHoldsTheMachine) {
+  test::write_text(file(), "a motion is under way\n");
+  EXPECT_THAT(awaited(), HasSubstr("ended while the machine was moving"));
+}
+
+}  // namespace
+}  // namespace abbe::daemon

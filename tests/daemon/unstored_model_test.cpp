@@ -1,0 +1,194 @@
+// What becomes of a model that was identified while disk, store or recorder failed.
+
+#include "abbe/daemon/calibration_service.hpp"
+
+#include <fcntl.h>
+#include <gmock/gmock.h>
+#include <sys/file.h>
+#include <unistd.h>
+
+#include <fstream>
+#include <limits>
+#include <thread>
+
+#include "abbe/daemon/exit_deadline.hpp"
+#include "synthetic_otf_run.hpp"
+
+namespace abbe::daemon {
+namespace {
+
+namespace fs = std::filesystem;
+using namespace std::chrono_literals;
+using protocol::HostTime;
+using ::testing::HasSubstr;
+using ::testing::IsEmpty;
+using ::testing::Not;
+using ::testing::SizeIs;
+
+class UnstoredModel : public ::testing::Test {
+ protected:
+  UnstoredModel() : config_(parse_config(test::synthetic_machine_toml(), "machine.toml").value()) {
+    fs::remove_all(folder_);
+  }
+  ~UnstoredModel() override { fs::remove_all(folder_); }
+
+  void start(RecorderThread* recorder = nullptr) {
+    authority_.emplace(ModelAuthority::open(folder_ / "models", config_, {}, now_));
+    service_.emplace(config_, *authority_, recorder, protocol::UtcOffset{});
+    OtfRequest request;
+    for (const auto& q : test::synthetic_path_m()) request.path_m.push_back({q[0], q[1], q[2]});
+    ASSERT_TRUE(service_->start(std::move(request), "anna", now_));
+  }
+  void drive() {
+    for (const auto& point : test::synthetic_points(0.4, 2.0)) {
+      now_ = HostTime{100s} + std::chrono::duration_cast<std::chrono::nanoseconds>(
+                                  std::chrono::duration<double>(point.time_s));
+      protocol::Snapshot s;
+      s.head.time = now_;
+      s.axis_count = 3;
+      s.has_tracker_point = true;
+      s.tracker_point.device_time = protocol::DeviceTime{now_.time_since_epoch()};
+      for (std::size_t a = 0; a < 3; ++a) {
+        s.position[a] = point.q_m[static_cast<Eigen::Index>(a)];
+        s.tracker_point.p_tracker_m[a] = point.p_tracker_m[static_cast<Eigen::Index>(a)];
+      }
+      (void)service_->turn({&s, 1}, now_);
+    }
+  }
+  /// Until what runs on the other threads has come to `done`.
+  template <class Done>
+  void turn_until(Done done) {
+    while (!done()) {
+      (void)service_->turn({}, now_);
+      std::this_thread::yield();
+    }
+  }
+  /// As a full disk or a missing permission: a file is where the models belong.
+  void block_store() const {
+    fs::remove(folder_ / "models" / "models");
+    std::ofstream{folder_ / "models" / "models"} << "in the way";
+  }
+  void free_store() const { fs::remove(folder_ / "models" / "models"); }
+  /// With a model that waits for the store, as abbed does after SIGTERM.
+  [[noreturn]] void end_while_the_lock_is_held() {
+    start();
+    block_store();
+    drive();
+    turn_until([this] { return !service_->not_stored().empty(); });
+    free_store();
+    const int lock = ::open((folder_ / "models" / "lock").c_str(), O_RDONLY | O_CREAT | O_CLOEXEC, 0600);
+    const bool held = ::flock(lock, LOCK_EX) == 0;
+    const ExitDeadline deadline{5s, 70, "the end was held up\n"};
+    service_.reset();
+    ::_exit(held ? 0 : 1);
+  }
+  [[nodiscard]] SessionState state() const { return service_->status().state; }
+  void turn_until_over() {
+    turn_until([this] { return state() == SessionState::Active || state() == SessionState::Refused; });
+  }
+  [[nodiscard]] ModelDocument stored() const {
+    const auto store = ModelStore::open(folder_ / "models").value();
+    return store.load(store.list().value().front().id).value();
+  }
+
+  fs::path folder_ =
+      fs::path(::testing::TempDir()) /
+      (std::string("unstored_") + ::testing::UnitTest::GetInstance()->current_test_info()->name());
+  Config config_;
+  HostTime now_{100s};
+  std::optional<ModelAuthority> authority_;
+  std::optional<CalibrationService> service_;
+};
+
+TEST_F(UnstoredModel, AModelTheStoreDoesNotTakeIsKeptTriedAgainAndReported) {
+  start();
+  block_store();
+  drive();
+  turn_until([this] { return !service_->not_stored().empty(); });
+  EXPECT_EQ(state(), SessionState::Identifying);
+  EXPECT_THAT(service_->not_stored(), HasSubstr("is not stored"));
+  EXPECT_THAT(service_->status().reason, HasSubstr("tried again every 5 s"));
+  free_store();
+  now_ += 4s;
+  for (int i = 0; i < 3; ++i) (void)service_->turn({}, now_);
+  EXPECT_THAT(service_->not_stored(), Not(IsEmpty())) << "not before its time";
+  now_ += 1s;
+  turn_until_over();
+  EXPECT_EQ(state(), SessionState::Active) << service_->status().reason;
+  EXPECT_THAT(service_->not_stored(), IsEmpty());
+  EXPECT_EQ(authority_->in_force()->id, model_id(stored()));
+}
+
+TEST_F(UnstoredModel, CancelDiscardsAModelTheStoreDoesNotTake) {
+  start();
+  block_store();
+  drive();
+  turn_until([this] { return !service_->not_stored().empty(); });
+  ASSERT_TRUE(service_->cancel("anna", now_));
+  EXPECT_EQ(state(), SessionState::Refused);
+  EXPECT_THAT(service_->not_stored(), IsEmpty());
+  free_store();
+  now_ += 10s;
+  (void)service_->turn({}, now_);
+  EXPECT_THAT(ModelStore::open(folder_ / "models").value().list().value(), IsEmpty());
+}
+
+TEST_F(UnstoredModel, TheEndOfTheDaemonTriesOnceMoreToStoreTheModel) {
+  start();
+  block_store();
+  drive();
+  turn_until([this] { return !service_->not_stored().empty(); });
+  free_store();
+  service_.reset();
+  EXPECT_THAT(ModelStore::open(folder_ / "models").value().list().value(), SizeIs(1));
+}
+
+TEST_F(UnstoredModel, TheEndOfTheDaemonIsNotHeldUpByWhoHoldsTheStoresLock) {
+  GTEST_FLAG_SET(death_test_style, "threadsafe");
+  EXPECT_EXIT(end_while_the_lock_is_held(), ::testing::ExitedWithCode(0),
+              "is lost: lock the model store .* has held it for 1 s");
+}
+
+TEST_F(UnstoredModel, AModelWhoseIdentificationHasJustEndedIsStoredAtTheEndOfTheDaemon) {
+  start();
+  drive();
+  while (service_->status().progress < 1.0) std::this_thread::yield();  // nothing looks at its outcome
+  service_.reset();
+  EXPECT_THAT(ModelStore::open(folder_ / "models").value().list().value(), SizeIs(1));
+}
+
+TEST_F(UnstoredModel, AModelWhoseRunIsNotRecordedIsActiveAndSaysThatNoReplayCanCheckIt) {
+  RecorderThreadOptions options;
+  options.recorder.directory = folder_ / "recordings";
+  options.recorder.name = "abbe-full";
+  options.recorder.min_free_bytes = std::numeric_limits<std::uint64_t>::max() / 2;
+  auto recorder = RecorderThread::start(std::move(options), {.machine = "mill"});
+  ASSERT_TRUE(recorder);
+  start(recorder->get());
+  drive();
+  turn_until_over();
+  ASSERT_EQ(state(), SessionState::Active) << service_->status().reason;
+  EXPECT_THAT(service_->status().reason, HasSubstr("no replay can check this model: nothing is recorded"));
+  const auto document = stored();
+  EXPECT_THAT(document.recording_gap, HasSubstr("nothing is recorded"));
+  EXPECT_THAT(document.inputs, SizeIs(1)) << "no recording of 0 bytes is cited";
+  EXPECT_EQ(document.inputs.front().name, "points");
+}
+
+TEST_F(UnstoredModel, AWholeRecordingIsWhatTheModelIsIdentifiedFrom) {
+  RecorderThreadOptions options;
+  options.recorder.directory = folder_ / "recordings";
+  options.recorder.name = "abbe-whole";
+  auto recorder = RecorderThread::start(std::move(options), {.machine = "mill"});
+  ASSERT_TRUE(recorder);
+  start(recorder->get());
+  drive();
+  turn_until_over();
+  ASSERT_EQ(state(), SessionState::Active) << service_->status().reason;
+  EXPECT_THAT(stored().recording_gap, IsEmpty());
+  EXPECT_THAT(stored().inputs.front().name, HasSubstr("abbe-whole.mcap.part"));
+  EXPECT_THAT(stored().inputs.front().sha256, SizeIs(64));
+}
+
+}  // namespace
+}  // namespace abbe::daemon

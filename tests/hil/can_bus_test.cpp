@@ -42,8 +42,8 @@ struct SocketCan : testing::Test {
     while (all.size() < wanted) {
       const auto n = from.read(some, 1s);
       EXPECT_TRUE(n.has_value());
-      if (n.value_or(0) == 0) break;
-      all.insert(all.end(), some.begin(), some.begin() + static_cast<std::ptrdiff_t>(*n));
+      if (!n || n->frames == 0) break;
+      all.insert(all.end(), some.begin(), some.begin() + static_cast<std::ptrdiff_t>(n->frames));
     }
     return all;
   }
@@ -62,7 +62,7 @@ TEST_F(SocketCan, DeliversOnlyTheIdentifiersAskedFor) {
   EXPECT_EQ(got[0].frame, sent[1]);
   EXPECT_EQ(got[1].frame, sent[5]);
   std::array<ReceivedFrame, 4> more{};
-  EXPECT_EQ(bus.read(more, 0s).value_or(1), 0u);
+  EXPECT_EQ(bus.read(more, 0s).value_or(drivers::CanRead{.frames = 1}).frames, 0u);
 }
 
 TEST_F(SocketCan, DatesAFrameByTheKernelNotByWhenItWasRead) {
@@ -106,7 +106,12 @@ TEST_F(SocketCan, CountsWhatDidNotFitIntoTheKernelsQueue) {
   ASSERT_LT(got, kSent);
   // The kernel tells with the next frame.
   ASSERT_TRUE(other.send(numbered(kSent)));
-  ASSERT_EQ(read(narrow, 1).size(), 1u);
+  const auto after = read(narrow, 2);
+  ASSERT_EQ(after.size(), 2u);
+  const auto mark = can::decode_error_frame(after[0].frame);
+  ASSERT_TRUE(mark.has_value()) << "the loss is marked where it was";
+  EXPECT_TRUE(has(mark->conditions, can::BusCondition::ReceiveOverflow));
+  EXPECT_EQ(after[1].frame, numbered(kSent));
   EXPECT_EQ(narrow.counters().lost, kSent - got);
 }
 
@@ -156,6 +161,22 @@ TEST_F(SocketCan, ReportsWhatTheControllerSaysOfTheBus) {
     ASSERT_TRUE(report.has_value());
     EXPECT_TRUE(has(report->conditions, condition));
   }
+}
+
+TEST_F(SocketCan, AFullReadWithAFrameOfItsOwnAmongItIsNotTheEnd) {
+  constexpr std::array<std::uint32_t, 1> kOwn{0x181};
+  ASSERT_TRUE(bus.open(kOwn).has_value());
+  ASSERT_TRUE(bus.send(std::array{numbered(0)}).has_value());  // its echo comes back and is not handed on
+  for (std::uint32_t i = 1; i <= 8; ++i) ASSERT_TRUE(other.send(numbered(i)));
+  std::array<ReceivedFrame, 8> some{};
+  const auto first = bus.read(some, 1s);
+  ASSERT_TRUE(first.has_value());
+  EXPECT_EQ(first->frames, 7u);
+  EXPECT_FALSE(first->all);
+  const auto second = bus.read(some, 1s);
+  ASSERT_TRUE(second.has_value());
+  EXPECT_EQ(second->frames, 1u);
+  EXPECT_TRUE(second->all);
 }
 
 TEST_F(SocketCan, SaysThatTheInterfaceWentDownAndOpensAgainWhenItIsUp) {

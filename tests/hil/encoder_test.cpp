@@ -189,9 +189,12 @@ TEST_P(SyncOfTheDevice, SeesAnotherSyncProducer) {
   auto device = std::move(*drivers::EncoderDevice::create(options, std::move(bus), time));
   device->wait(1ms);
   const CanSocket rival{vcan};
-  ASSERT_TRUE(rival.send(can::encode_sync()));
-  device->wait(100ms);
-  EXPECT_THAT(device->status().last_fault, HasSubstr("somebody else sends SYNCs"));
+  for (int i = 0; i < 2; ++i) {
+    ASSERT_TRUE(rival.send(can::encode_sync()));
+    device->wait(100ms);
+  }
+  EXPECT_EQ(device->status().state, "foreign SYNC");
+  EXPECT_THAT(device->status().last_fault, HasSubstr("another SYNC producer"));
 }
 
 INSTANTIATE_TEST_SUITE_P(Sync, SyncOfTheDevice, testing::Values(SyncSource::Thread, SyncSource::Kernel),

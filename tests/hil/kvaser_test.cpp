@@ -55,8 +55,8 @@ struct Kvaser : testing::Test {
     while (all.size() < wanted) {
       const auto n = from.read(some, 500ms);
       EXPECT_TRUE(n.has_value());
-      if (n.value_or(0) == 0) break;
-      all.insert(all.end(), some.begin(), some.begin() + static_cast<std::ptrdiff_t>(*n));
+      if (!n || n->frames == 0) break;
+      all.insert(all.end(), some.begin(), some.begin() + static_cast<std::ptrdiff_t>(n->frames));
     }
     return all;
   }

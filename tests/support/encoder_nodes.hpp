@@ -7,6 +7,7 @@
 #include <deque>
 #include <optional>
 #include <span>
+#include <utility>
 #include <vector>
 
 #include "abbe/protocol/can/object_dictionary.hpp"
@@ -27,6 +28,20 @@ struct PeerNode {
   std::optional<HostTime> last_heartbeat;
   bool mute = false;         ///< says nothing at all
   bool no_position = false;  ///< answers SDO, sends no TPDO
+  /// Writing this object is refused for this reason.
+  std::optional<std::pair<can::ObjectId, can::AbortCode>> refuses;
+
+  [[nodiscard]] std::optional<can::CanFrame> answer(const can::CanFrame& frame, HostTime now) {
+    const bool download =
+        frame.is_standard_data() && frame.id == can::cob::kSdoRequest + id && frame.byte(0) >> 5 == 1;
+    const auto low = frame.byte(1), high = frame.byte(2), sub = frame.byte(3);
+    const can::ObjectId object{static_cast<std::uint16_t>(low | high << 8), sub};
+    if (!download || !refuses || refuses->first != object) return server.on_frame(frame, now);
+    const auto code = static_cast<std::uint32_t>(refuses->second);
+    const auto byte = [code](unsigned shift) { return static_cast<std::uint8_t>(code >> shift); };
+    return can::standard_frame(can::cob::kSdoResponse + id,
+                               {0x80, low, high, sub, byte(0), byte(8), byte(16), byte(24)});
+  }
 };
 
 class EncoderNodes {
@@ -92,7 +107,7 @@ class EncoderNodes {
     }
     for (auto& node : nodes_) {
       if (node.mute) continue;
-      if (const auto answer = node.server.on_frame(frame, now)) answers.push_back(*answer);
+      if (const auto answer = node.answer(frame, now)) answers.push_back(*answer);
     }
     if (!answers.empty()) send(answers);
   }

@@ -81,6 +81,30 @@ struct ArtefactRun : CounterCardRun {
     const auto answer = daemon::ask_daemon(file("run/control.sock"), {{"do", "touches"}});
     return answer ? *answer : json{{"running", false}, {"reason", ""}, {"touches", json::array()}};
   }
+  [[nodiscard]] json machine() const {
+    const auto answer = daemon::ask_daemon(file("run/control.sock"), {{"do", "machine"}});
+    return answer ? *answer : json{{"release_awaited", false}};
+  }
+  /// The tip stays where it is while fifty positions would have been reported, and the status says what to
+  /// do.
+  void expect_standing_until_released() const {
+    const json tip = machine()["tip_m"];
+    EXPECT_TRUE(machine()["release_awaited"]) << machine().dump();
+    EXPECT_EQ(status()["release_awaited"]["command"], "abbe machine release");
+    EXPECT_THAT(run({ABBE_PROGRAM, "status", "-c", file("abbed.toml")}).out,
+                HasSubstr("abbe machine release"));
+    const auto refused = calibrate();
+    EXPECT_EQ(refused.code, 5) << refused.out;
+    EXPECT_THAT(refused.err, HasSubstr("abbe machine release"));
+    EXPECT_EQ(machine()["tip_m"], tip);
+  }
+  void release() const {
+    EXPECT_EQ(run({ABBE_PROGRAM, "machine", "release", "-c", file("abbed.toml")}).code, 0);
+    EXPECT_TRUE(eventually([&] {
+      const auto at = daemon::ask_daemon(file("run/control.sock"), {{"do", "touch"}, {"where", true}});
+      return at.has_value();
+    })) << status().dump(1);
+  }
   [[nodiscard]] bool has_touched() const { return !touches()["touches"].empty(); }
   [[nodiscard]] std::size_t lines_of(const std::string& name) const {
     const std::string text = text_of(file(name));
@@ -148,7 +172,9 @@ TEST_F(ArtefactRun, EndsTheTouchingWhenInterrupted) {
     ASSERT_TRUE(eventually([&] { return touches()["running"] == true && has_touched(); }));
     running.signal(signal);
     EXPECT_EQ(running.wait_for_end(), 1);
-    EXPECT_THAT(running.err(), HasSubstr("cancelled"));
+    EXPECT_THAT(running.err(), HasSubstr("cancelled; the tip was reported at X "));
+    expect_standing_until_released();
+    release();
     EXPECT_LT(touches_aside(), kBalls * 100u);
     EXPECT_GT(touches_aside(), 0u);
     EXPECT_EQ(kept_touches(), 0u);
@@ -162,14 +188,10 @@ TEST_F(ArtefactRun, EndsTheTouchingWhenWhoeverAskedIsGone) {
   const auto before = touches()["touches"].size();
   running.signal(SIGKILL);
   (void)running.wait_for_end();
-  // To ask how far it is would be to look on; a plan without a point is refused otherwise while it goes on.
-  const auto over = [&] {
-    const auto answer =
-        daemon::ask_daemon(file("run/control.sock"), {{"do", "touch"}, {"points", json::array()}});
-    return !answer && answer.error().code == daemon::ErrorCode::Usage;
-  };
-  ASSERT_TRUE(eventually(over));
+  // To ask how far it is would be to look on; where the machine is may be asked.
+  ASSERT_TRUE(eventually([&] { return machine().value("release_awaited", false); }));
   EXPECT_THAT(touches()["reason"].get<std::string>(), HasSubstr("nobody looked on"));
+  expect_standing_until_released();
   EXPECT_GE(touches()["touches"].size(), before);
   EXPECT_LT(touches()["touches"].size(), touches()["asked"].get<std::size_t>());
 }

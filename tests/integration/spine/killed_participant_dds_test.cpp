@@ -43,5 +43,21 @@ TEST_F(KilledDds, IsReplacedWhileAcquisitionGoesOn) {
   EXPECT_EQ(encoder["dropped"], 0);
 }
 
+TEST_F(KilledDds, IsKilledAndReplacedWhenItHangs) {
+  write_path("path.csv", path());
+  ASSERT_NO_FATAL_FAILURE(start_simulator());
+  write_configuration("child");
+  ASSERT_NO_FATAL_FAILURE(start_abbed());
+  ASSERT_TRUE(eventually([this] { return connections() == 1; }));
+  const pid_t hung = abbe_dds();
+  ASSERT_EQ(::kill(hung, SIGSTOP), 0);
+  EXPECT_TRUE(eventually([this] { return connections() == 2; }));
+  const auto dds = status()["dds"];
+  EXPECT_NE(dds["process"], hung);
+  EXPECT_EQ(dds["restarts"], 1);
+  EXPECT_THAT(dds["last_end"].get<std::string>(), testing::HasSubstr("did not answer"));
+  EXPECT_THAT(dds["security"].get<std::string>(), testing::HasSubstr("DDS Security is off: anyone on domain"));
+}
+
 }  // namespace
 }  // namespace abbe::test

@@ -56,15 +56,25 @@ TEST_F(Refusals, ThreeErrorsOfAConfigurationAreSaidAtOnceWithTheirLines) {
 
 TEST_F(Refusals, MissingConfigurationIsNamed) {
   const auto outcome = run({ABBED_PROGRAM, "--config", file("none.toml")});
-  EXPECT_EQ(outcome.code, 4);
+  EXPECT_EQ(outcome.code, 3);
   EXPECT_THAT(outcome.err, HasSubstr("none.toml"));
 }
 
-TEST_F(Refusals, FileInPlaceOfTheDataDirectoryIsNamed) {
+// systemd does not start it again: that takes a person.
+TEST_F(Refusals, UnreadableConfigurationIsThatOfABadOne) {
+  std::filesystem::create_directory(file("folder.toml"));
+  const auto outcome = run({ABBED_PROGRAM, "--config", file("folder.toml")});
+  EXPECT_EQ(outcome.code, 3);
+  EXPECT_THAT(outcome.err, HasSubstr("folder.toml"));
+}
+
+/// As a disk that is read-only or not mounted: acquisition and live publishing come first.
+TEST_F(Refusals, FileInPlaceOfTheDataDirectoryIsNamedAndAbbedRuns) {
   write("data", "");
-  const auto outcome = run_abbed();
-  EXPECT_EQ(outcome.code, 4);
-  EXPECT_THAT(outcome.err, HasSubstr(file("data")));
+  ASSERT_NO_FATAL_FAILURE(start_abbed());
+  EXPECT_THAT(stream("models").value("last_fault", ""), HasSubstr(file("data")));
+  EXPECT_EQ(abbed_->stop(), 0) << abbed_->err();
+  EXPECT_THAT(abbed_->err(), HasSubstr("warning"));
 }
 
 }  // namespace

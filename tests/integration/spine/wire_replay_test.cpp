@@ -211,12 +211,12 @@ Lines lasting_differences(std::span<const std::string> names) {
 
 /// Of every device, and of every kind of fault one that its driver must get over.
 Lines chosen() {
-  Lines names{"tracker-disconnect",     "encoder-mute",      "counter_card-unplug",
+  Lines names{"tracker-disconnect",     "encoder-restart",   "counter_card-unplug",
               "environment-disconnect", "serial-disconnect", "cmm-plain"};
   // Sanitized programs need the machine's time for themselves.
   if (!ABBE_SANITIZED)
-    names.insert(names.end(), {"tracker-garbage", "tracker-mute", "encoder-restart", "counter_card-overrun",
-                               "environment-late", "serial-garbage", "cmm-refuse_touch"});
+    names.insert(names.end(), {"tracker-garbage", "tracker-mute", "counter_card-overrun", "environment-late",
+                               "serial-garbage", "cmm-refuse_touch"});
   return names;
 }
 Lines all() {

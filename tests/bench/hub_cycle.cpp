@@ -1,0 +1,390 @@
+// How long the longest cycle of the hub lasts while what grows is as large as it may be: models of as many
+// parameters as can be published, with covariance, come into force (which is checked); a request of almost
+// 4 MB, a path of 1e5 vertices, comes over the control socket; the machine drives the whole path, seen by a
+// tracker in bursts of 332 points, and the run is identified; requests for the status come as fast as they are
+// answered. A bare thread of the same priority and period, which does the same little work in each of its
+// cycles, runs beside it: what the machine takes away from it, it takes away from the hub, too. Beside the wall
+// time the processor time of the longest cycle: what the hub itself did in it.
+//   bench_hub_cycle [--short]          as root, or with CAP_SYS_NICE, for real-time priority
+// Exit code 1: a cycle longer than 2 ms, or a model that did not come into force.
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+#include <pthread.h>
+#include <stdlib.h>
+#include <sys/mman.h>
+#include <sys/prctl.h>
+#include <sys/socket.h>
+#include <sys/un.h>
+#include <time.h>
+#include <unistd.h>
+
+#include <array>
+#include <atomic>
+#include <cmath>
+#include <filesystem>
+#include <random>
+#include <string_view>
+#include <thread>
+
+#include "abbe/calib/interpolation_grid.hpp"
+#include "abbe/daemon/control_api.hpp"
+#include "abbe/daemon/hub.hpp"
+#include "abbe/daemon/work_aside.hpp"
+#include "abbe/drivers/status_board.hpp"
+#include "config_tables.hpp"
+#include "figure.hpp"
+#include "synthetic_model.hpp"
+
+namespace {
+
+using namespace abbe;  // NOLINT(google-build-using-namespace): a program, not a header
+using namespace std::chrono_literals;
+using daemon::Hub;
+using nlohmann::json;
+using protocol::HostTime;
+using std::chrono::nanoseconds;
+using Clock = std::chrono::steady_clock;
+
+constexpr auto kPeriod = 250us;
+constexpr auto kAsked = 2ms;
+constexpr int kPriority = 30;
+constexpr std::size_t kVertices = 100'000;
+constexpr std::size_t kBurst = 332;  // points of one packet: 1 kHz, every 332 ms
+constexpr std::size_t kMostParameters = 1024;  // of ErrorModel in the IDL
+constexpr std::size_t kMostGridNodes = 4096;   // that are published
+
+std::int64_t cpu_ns() {
+  timespec t{};
+  ::clock_gettime(CLOCK_THREAD_CPUTIME_ID, &t);
+  return std::int64_t{t.tv_sec} * 1'000'000'000 + t.tv_nsec;
+}
+
+/// Written by one thread, read and begun anew by another.
+struct Longest {
+  std::atomic<std::int64_t> wall_ns{0}, cpu_ns{0};
+  std::atomic<std::uint64_t> cycles{0};
+
+  void take(std::int64_t wall, std::int64_t cpu) {
+    if (wall > wall_ns) wall_ns = wall;
+    if (cpu > cpu_ns) cpu_ns = cpu;
+    ++cycles;
+  }
+};
+
+double ms(std::int64_t ns) {
+  return 1e-6 * static_cast<double>(ns);
+}
+
+/// SCHED_FIFO for the calling thread, if it may.
+bool real_time() {
+  ::prctl(PR_SET_TIMERSLACK, 1UL);
+  const sched_param parameters{.sched_priority = kPriority};
+  return ::pthread_setschedparam(::pthread_self(), SCHED_FIFO, &parameters) == 0;
+}
+
+template <class Cycle>
+void run_periodically(const std::atomic<bool>& stop, Longest& longest, Cycle&& cycle) {
+  (void)real_time();
+  for (auto next = Clock::now(); !stop;) {
+    const auto begin = Clock::now();
+    const auto cpu = cpu_ns();
+    cycle(begin);
+    longest.take(nanoseconds{Clock::now() - begin}.count(), cpu_ns() - cpu);
+    next = std::max(next + kPeriod, Clock::now());
+    std::this_thread::sleep_until(next);
+  }
+}
+
+/// What the bare thread does: some 20 us of arithmetic.
+void little_work() {
+  volatile double sum = 0.0;
+  for (int i = 0; i < 10'000; ++i) sum = sum + 1.0 / (i + 1);
+}
+
+/// Rows along X, 25 mm beside each other, in layers; 0.6 mm from vertex to vertex. The digits behind make the
+/// request as long as it may be.
+std::vector<std::array<double, 3>> long_path() {
+  constexpr std::size_t kInRow = 668, kRows = 17;
+  constexpr double kStep_m = 0.6e-3, kRow_m = 25e-3, kLayer_m = 30e-3, kDigit_m = 1e-8;
+  std::mt19937 random{14};
+  std::uniform_int_distribution<int> digits(0, 99);
+  const auto rounded = [&](double p_m) { return kDigit_m * (std::round(p_m / kDigit_m) + digits(random)); };
+  std::vector<std::array<double, 3>> path;
+  for (std::size_t row = 0; path.size() < kVertices; ++row) {
+    for (std::size_t i = 0; i < kInRow && path.size() < kVertices; ++i) {
+      const std::size_t along = row % 2 == 0 ? i : kInRow - 1 - i;
+      const std::size_t layer = row / kRows, beside = layer % 2 == 0 ? row % kRows : kRows - 1 - row % kRows;
+      path.push_back({rounded(-0.2 + kStep_m * static_cast<double>(along)),
+                      rounded(-0.2 + kRow_m * static_cast<double>(beside)),
+                      rounded(-0.38 + kLayer_m * static_cast<double>(layer))});
+    }
+  }
+  return path;
+}
+
+/// The largest that can be published: the number of parameters is linear in how fine the nodes are.
+calib::VolumetricModel largest_model(unsigned seed) {
+  static const std::size_t finer = [] {
+    const auto parameters = [](double f) { return daemon::test::synthetic_model(1, f).parameters().size(); };
+    return 1 + (kMostParameters - parameters(1.0)) / (parameters(2.0) - parameters(1.0));
+  }();
+  return daemon::test::synthetic_model(seed, static_cast<double>(finer));
+}
+
+/// The machine stands at the first vertex for a second, drives three vertices a millisecond, and stands at the
+/// last. Encoders 1 kHz.
+class DrivenMachine final : public daemon::SampleSource {
+ public:
+  DrivenMachine(const drivers::TimeSource& time, std::vector<std::array<double, 3>> path)
+      : time_(time), path_(std::move(path)) {}
+
+  void drain(daemon::Batch& batch) override {
+    const auto now = time_.now();
+    if (next_ == HostTime{}) next_ = now;
+    for (; next_ <= now; next_ += 1ms) {
+      const auto at = place();
+      auto& axes = batch.axes.emplace_back();
+      axes.head.time = next_;
+      axes.axis_count = 3;
+      std::copy(at.begin(), at.end(), axes.position.begin());
+      protocol::TrackerPoint point;
+      point.head.time = next_;
+      point.device_time = protocol::DeviceTime{next_.time_since_epoch()};
+      point.p_tracker_m = {2.0 + at[0], at[1], at[2]};
+      burst_.push_back(point);
+      batch.encoder_raw.emplace_back().length = 32;
+    }
+    if (burst_.size() < kBurst) return;
+    batch.points.insert(batch.points.end(), burst_.begin(), burst_.end());
+    burst_.clear();
+  }
+  [[nodiscard]] std::vector<daemon::StreamHealth> health(HostTime) override {
+    std::vector<daemon::StreamHealth> all(8);
+    for (auto& h : all) h.status = board_.read("encoder", 0, 0);
+    return all;
+  }
+  void drive() { driving_ = true; }
+
+ private:
+  std::array<double, 3> place() {
+    constexpr std::size_t kStands = 1000, kVerticesInStep = 3;
+    if (driving_) ++driven_;
+    const std::size_t way = driven_ < kStands ? 0 : kVerticesInStep * (driven_ - kStands);
+    return path_[std::min(way, path_.size() - 1)];
+  }
+
+  const drivers::TimeSource& time_;
+  std::vector<std::array<double, 3>> path_;
+  drivers::StatusBoard board_;
+  HostTime next_{};
+  std::vector<protocol::TrackerPoint> burst_;
+  std::atomic<bool> driving_{false};
+  std::size_t driven_ = 0;
+};
+
+/// abbe-dds, as far as the hub can tell: takes everything from the socket.
+void swallow(const std::filesystem::path& socket) {
+  const int fd = ::socket(AF_UNIX, SOCK_STREAM, 0);
+  sockaddr_un address{};
+  address.sun_family = AF_UNIX;
+  socket.string().copy(address.sun_path, sizeof(address.sun_path) - 1);
+  if (::connect(fd, reinterpret_cast<const sockaddr*>(&address), sizeof(address)) != 0) return;
+  std::vector<char> buffer(1 << 16);
+  while (::recv(fd, buffer.data(), buffer.size(), 0) > 0) {
+  }
+  ::close(fd);
+}
+
+daemon::Config configuration() {
+  auto config = daemon::parse_config(
+      to_toml(config_tables::mill()) + to_toml(config_tables::Tracker{.port = 1}) +
+          to_toml(config_tables::Encoder{}) + std::string{config_tables::kDaemonInItsFolder},
+      "abbed.toml");
+  if (!config)
+    throw std::runtime_error(config.error().text + ": " +
+                             fmt::format("{}", fmt::join(config.error().details, "; ")));
+  return std::move(*config);
+}
+
+class Bench {
+ public:
+  explicit Bench(bool brief) : seconds_(brief ? 1 : 5) {
+    std::string name = std::filesystem::temp_directory_path() / "abbe-hub-cycle-XXXXXX";
+    folder_ = ::mkdtemp(name.data());
+    daemon::prepare_work_aside();
+    daemon::RecorderThreadOptions options;
+    options.recorder.directory = folder_;
+    options.recorder.name = "run";
+    recorder_ = daemon::RecorderThread::start(std::move(options), {"mill", {}, 1.0, "", {}}).value();
+    authority_.emplace(open_models());
+    calibration_.emplace(config_, *authority_, recorder_.get(), protocol::UtcOffset{});
+    publisher_.emplace(
+        daemon::DdsLink::listen(folder_ / "dds.sock").value(),
+        daemon::PublisherOptions{.machine = "mill", .snapshot_hz = 0.0, .compensation_hz = 0.0},
+        protocol::UtcOffset{});
+    (void)largest_model(1);  // before anything is measured
+    hub_.emplace(daemon::HubParts{.config = config_,
+                                  .time = time_,
+                                  .devices = machine_,
+                                  .authority = *authority_,
+                                  .calibration = *calibration_,
+                                  .publisher = &*publisher_,
+                                  .recorder = recorder_.get()});
+    dds_ = std::thread{[this] { swallow(folder_ / "dds.sock"); }};
+    hub_thread_ = std::thread{
+        [this] { run_periodically(stop_, hub_longest_, [this](auto wall) { hub_->turn(wall); }); }};
+    control_ = daemon::ControlServer::open(folder_ / "control.sock",
+                                           [this](const json& request, const daemon::ControlPeer& peer) {
+                                             return daemon::answer_request(*hub_, request, peer, 60s);
+                                           })
+                   .value();
+    bare_thread_ =
+        std::thread{[this] { run_periodically(stop_, bare_longest_, [](auto) { little_work(); }); }};
+  }
+  Bench(const Bench&) = delete;
+  Bench& operator=(const Bench&) = delete;
+  ~Bench() {
+    control_.reset();
+    stop_ = true;
+    hub_thread_.join();
+    bare_thread_.join();
+    publisher_.reset();
+    dds_.join();
+    hub_.reset();
+    calibration_.reset();
+    recorder_.reset();
+    std::filesystem::remove_all(folder_);
+  }
+
+  /// Runs `what`, then prints the longest cycles since the last call.
+  template <class What>
+  void measure(std::string_view name, What&& what) {
+    begin_anew();
+    what();
+    report(name, hub_longest_, bare_longest_);
+    worst_ns_ = std::max(worst_ns_, hub_longest_.wall_ns.load());
+    worst_bare_ns_ = std::max(worst_bare_ns_, bare_longest_.wall_ns.load());
+  }
+
+  void stream() const { std::this_thread::sleep_for(seconds_ * 1s); }
+  /// As somebody's `abbe model activate` would; the daemon follows the store.
+  void put_models_in_force() {
+    for (unsigned seed = 1; seed <= 3; ++seed) {
+      auto document = daemon::test::synthetic_document(seed);
+      document.model = largest_model(seed);
+      document.machine_hash = daemon::machine_hash(config_);
+      const auto grid = calib::interpolation_grid(document.model, kMostGridNodes);
+      nodes_ = grid.axes_m[0].size() * grid.axes_m[1].size() * grid.axes_m[2].size();
+      parameters_ = document.model.parameters().size();
+      const daemon::StoreActor actor{"bench", "", protocol::UtcTime{seed * 1s}};
+      auto kept = authority_keeper_->keep(document, {.accepted = true}, actor, time_.now());
+      if (!kept) throw std::runtime_error(kept.error().text);
+      if (is_in_force(kept->id)) ++in_force_;
+    }
+  }
+  [[nodiscard]] bool is_in_force(const std::string& id) {
+    json model;
+    for (const auto end = Clock::now() + 20s; Clock::now() < end; std::this_thread::sleep_for(100ms)) {
+      model = ask({{"do", "status"}})["model"];
+      if (model["state"] == "ACTIVE" && model.value("id", "") == id) return true;
+    }
+    fmt::print("model {} did not come into force: {}\n", id, model.dump());
+    return false;
+  }
+  void ask_for_the_path() {
+    const json request{{"do", "calibrate"}, {"method", "otf"}, {"path_m", path_}};
+    request_bytes_ = request.dump().size();
+    (void)ask(request);
+  }
+  /// The whole path, until the run is being identified.
+  void drive() {
+    machine_.drive();
+    json session;
+    for (const auto end = Clock::now() + 60s; Clock::now() < end; std::this_thread::sleep_for(200ms)) {
+      session = ask({{"do", "status"}})["session"];
+      if (session["state"] == "acquiring") points_ = session["points"];
+      if (session["state"] != "acquiring" && session["state"] != "warming") break;
+    }
+    if (session["state"] != "identifying") throw std::runtime_error(session.dump());
+  }
+  void ask_for_status() {
+    for (const auto end = Clock::now() + seconds_ * 1s; Clock::now() < end;) (void)ask({{"do", "status"}});
+  }
+  /// Also where the identification has ended by itself.
+  void cancel() {
+    (void)daemon::ask_daemon(folder_ / "control.sock", {{"do", "cancel"}}, 60s);
+    stream();
+  }
+  [[nodiscard]] bool conclude() const {
+    const bool within = worst_ns_ <= nanoseconds{kAsked}.count();
+    fmt::print("{} of 3 models of {} parameters and {} grid nodes came into force; path of {} vertices in {:.2f} MB, "
+               "{} points matched\n",
+               in_force_, parameters_, nodes_, path_.size(), 1e-6 * static_cast<double>(request_bytes_), points_);
+    tests::print_figure("hub cycle, longest", "2 ms",
+                        "{:.3f} ms, a bare thread of the same priority {:.3f} ms", ms(worst_ns_),
+                        ms(worst_bare_ns_));
+    return within && in_force_ == 3;
+  }
+
+ private:
+  daemon::ModelAuthority open_models() {
+    auto authority = daemon::ModelAuthority::open(folder_ / "models", config_, {}, time_.now());
+    authority_keeper_.emplace(authority.keeper());
+    return authority;
+  }
+  json ask(const json& request) const {
+    auto answer = daemon::ask_daemon(folder_ / "control.sock", request, 60s);
+    if (!answer) throw std::runtime_error(answer.error().text);
+    return std::move(*answer);
+  }
+  void begin_anew() {
+    for (Longest* l : {&hub_longest_, &bare_longest_}) l->wall_ns = l->cpu_ns = 0, l->cycles = 0;
+  }
+  static void report(std::string_view name, const Longest& hub, const Longest& bare) {
+    fmt::print("{:<28} hub {:7.3f} ms ({:7.3f} ms of it its own) in {:>6} cycles   bare thread {:7.3f} ms\n",
+               name, ms(hub.wall_ns), ms(hub.cpu_ns), hub.cycles.load(), ms(bare.wall_ns));
+    std::fflush(stdout);
+  }
+
+  int seconds_;
+  std::filesystem::path folder_;
+  daemon::Config config_ = configuration();
+  drivers::MonotonicTime time_{1.0};
+  const std::vector<std::array<double, 3>> path_ = long_path();
+  DrivenMachine machine_{time_, path_};
+  std::unique_ptr<daemon::RecorderThread> recorder_;
+  std::optional<daemon::ModelKeeper> authority_keeper_;
+  std::optional<daemon::ModelAuthority> authority_;
+  std::optional<daemon::CalibrationService> calibration_;
+  std::optional<daemon::Publisher> publisher_;
+  std::optional<Hub> hub_;
+  std::unique_ptr<daemon::ControlServer> control_;
+  std::atomic<bool> stop_{false};
+  Longest hub_longest_, bare_longest_;
+  std::thread dds_, hub_thread_, bare_thread_;
+  std::int64_t worst_ns_ = 0, worst_bare_ns_ = 0;
+  std::size_t parameters_ = 0, nodes_ = 0, in_force_ = 0, request_bytes_ = 0, points_ = 0;
+};
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  const bool brief = argc > 1 && std::string_view{argv[1]} == "--short";
+  try {
+    if (::mlockall(MCL_CURRENT | MCL_FUTURE) != 0) fmt::print("memory is not locked: not allowed\n");
+    std::thread{[] {
+      if (!real_time()) fmt::print("no real-time priority: not allowed; both threads are ordinary ones\n");
+    }}.join();
+    Bench bench{brief};
+    bench.measure("streaming", [&] { bench.stream(); });
+    bench.measure("models into force", [&] { bench.put_models_in_force(); });
+    bench.measure("request for 1e5 vertices", [&] { bench.ask_for_the_path(); });
+    bench.measure("the whole path driven", [&] { bench.drive(); });
+    bench.measure("status again and again", [&] { bench.ask_for_status(); });
+    bench.measure("cancelled", [&] { bench.cancel(); });
+    return bench.conclude() ? 0 : 1;
+  } catch (const std::exception& e) {
+    fmt::print(stderr, "hub_cycle: {}\n", e.what());
+    return 2;
+  }
+}

@@ -6,6 +6,7 @@
 #include <gtest/gtest.h>
 #include <linux/can.h>
 #include <linux/can/raw.h>
+#include <linux/net_tstamp.h>
 #include <net/if.h>
 #include <poll.h>
 #include <sys/ioctl.h>
@@ -117,7 +118,25 @@ class CanSocket {
   int fd_;
 };
 
-/// Until the kernel stamps what comes: a worker of its own switches that on some time after it was asked for.
+/// Asks for receive stamps for as long as the program runs. A worker of the kernel switches stamping off some time after
+/// the last socket that asked was closed: a test that opened its own in between had a stamp for its first frame and none
+/// for the frames after it.
+class StampedSocket {
+ public:
+  StampedSocket() : fd_(::socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC, 0)) {
+    const unsigned flags = SOF_TIMESTAMPING_RX_SOFTWARE | SOF_TIMESTAMPING_SOFTWARE;
+    if (::setsockopt(fd_, SOL_SOCKET, SO_TIMESTAMPING, &flags, sizeof flags) != 0) std::abort();
+  }
+  StampedSocket(const StampedSocket&) = delete;
+  StampedSocket& operator=(const StampedSocket&) = delete;
+  ~StampedSocket() { ::close(fd_); }
+
+ private:
+  int fd_;
+};
+inline const StampedSocket kStampedSocket;
+
+/// Until the kernel stamps what comes: its worker switches that on some time after it was asked for.
 template <class Bus>
 void wait_for_stamps(Bus& bus, const CanSocket& other, const can::CanFrame& frame) {
   std::array<drivers::ReceivedFrame, 4> some{};

@@ -2,287 +2,32 @@
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
-#include <unistd.h>
 
 #include <algorithm>
 #include <array>
-#include <cmath>
-#include <deque>
 #include <functional>
 #include <memory>
-#include <optional>
 #include <span>
 #include <string>
 #include <utility>
 #include <vector>
 
 #include "abbe/daemon/control_protocol.hpp"
-#include "control/model_status_name.hpp"
-#include "control/refusal.hpp"
+#include "control/motion_requests.hpp"
+#include "control/status_reply.hpp"
 #include "control/tracker_requests.hpp"
 #include "linear_axes.hpp"
-#include "units.hpp"
 
 namespace abbe::daemon {
 namespace {
 
 using nlohmann::json;
 
-// A request goes three steps: what it says is read on the thread that asks, however much it is; what the hub has
-// to do or to look at for it is short; the answer is written on the thread that asks again.
-using Reply = std::function<json()>;
-using OnHub = std::function<Reply(const Hub&)>;
-
-Reply reply(json answer) {
-  return [answer = std::move(answer)] { return answer; };
-}
-Reply reply(const Error& error) {
-  return [error] { return refusal(error); };
-}
-Reply reply_done(const Result<void>& done) {
-  return done ? reply(json{{"ok", true}}) : reply(done.error());
-}
-
-// As the hub: without axis positions for this long (wall time) they are not known.
-constexpr std::chrono::milliseconds kPositionIsOld{500};
-
-json device_json(const StreamHealth& h) {
-  const auto& d = h.status;
-  return {{"name", d.name},
-          {"state", d.state},
-          {"connected", d.connected},
-          {"rate_hz", h.rate_hz},
-          {"samples", d.samples},
-          {"dropped", d.dropped + d.raw_dropped},
-          {"gaps", d.gaps},
-          {"faults", d.faults},
-          {"condition", d.condition},
-          {"last_fault", d.last_fault},
-          {"clock",
-           {{"settled", d.clock.settled},
-            {"skew_ppm", d.clock.skew * 1e6},
-            {"residual_s", in_seconds(d.clock.residual)},
-            {"u_time_s", in_seconds(d.clock.u_time)}}},
-          {"latency_p50_s", h.latency_p50_s},
-          {"latency_p99_s", h.latency_p99_s}};
-}
-
-json next_json(const calib::evemu::NextTouch& next) {
-  return {{"position", next.position},
-          {"place", next.place + 1},
-          {"on", calib::evemu::name(next.on)},
-          {"touched", next.touched},
-          {"points", next.points}};
-}
-
-json session_json(const SessionStatus& s, const std::optional<calib::HeldOutFigures>& held_out) {
-  json out{{"id", s.id},
-           {"state", name(s.state)},
-           {"method", s.method},
-           {"reason", s.reason},
-           {"progress", s.progress},
-           {"points", s.points},
-           {"model_id", s.model_id},
-           {"notes", s.notes},
-           {"noted", s.noted}};
-  if (s.state == SessionState::Refused) out["code"] = word_of(s.refused_as);
-  if (s.next) out["next"] = next_json(*s.next);
-  if (held_out) {
-    out["held_out_rms_um"] = {{"candidate", held_out->candidate_rms_m * 1e6},
-                              {"no_compensation", held_out->no_compensation_rms_m * 1e6}};
-  }
-  return out;
-}
-
-/// The model in force as the hub saw it.
-struct SeenModel {
-  explicit SeenModel(const ModelStanding& standing)
-      : status(standing.status), reason(standing.reason), known(standing.model != nullptr) {
-    if (!known) return;
-    id = standing.model->id;
-    method = standing.model->method;
-    recording_sha256 = standing.model->recording_sha256;
-  }
-  v1::ModelStatus status;
-  std::string reason;
-  bool known;
-  std::string id, method, recording_sha256;
-};
-
-json model_json(const SeenModel& model) {
-  json out{{"state", status_name(model.status)}, {"reason", model.reason}};
-  if (model.known) {
-    out["id"] = model.id;
-    out["method"] = model.method;
-    out["recording_sha256"] = model.recording_sha256;
-  }
-  return out;
-}
-
-/// NaN has no place in JSON.
-json number_or_null(double value) {
-  return std::isnan(value) ? json{} : json(value);
-}
-
-json environment_json(const protocol::Snapshot& live, const Config& config) {
-  const auto& e = live.environment;
-  json out{{"air_temperature_C", number_or_null(e.air_temperature_K - kZeroCelsius_K)},
-           {"air_pressure_hPa", number_or_null(e.air_pressure_Pa * 1e-2)},
-           {"relative_humidity_percent", number_or_null(e.relative_humidity * 1e2)}};
-  json temperatures = json::object();
-  for (std::size_t i = 0; i < config.temperatures.size(); ++i)
-    temperatures[config.temperatures[i]] = number_or_null(e.temperature_K[i] - kZeroCelsius_K);
-  out["temperatures_C"] = std::move(temperatures);
-  if (const auto index = index_of_air(e, config.air))
-    out["refractive_index"] = {{"n", index->n}, {"u_n", index->u_n}};
-  return out;
-}
-
-std::string_view name(AxisReference::State state) {
-  switch (state) {
-    case AxisReference::State::Searching:
-      return "searching";
-    case AxisReference::State::Found:
-      return "found";
-    case AxisReference::State::Failed:
-      return "failed";
-  }
-  return "failed";
-}
-
-struct SeenReference {
-  bool running = false;
-  std::vector<ReferenceService::AxisStatus> axes;
-};
-
-json reference_json(const SeenReference& reference, const MachineConfig& machine) {
-  json axes = json::array();
-  for (const auto& axis : reference.axes) {
-    const AxisConfig* known = machine.find_axis(axis.name);
-    const bool rotary = known != nullptr && known->kind == AxisKind::Rotary;
-    json& out = axes.emplace_back(json{{"axis", axis.name},
-                                       {"kind", rotary ? "rotary" : "linear"},
-                                       {"known", axis.known},
-                                       {"state", name(axis.found.state)},
-                                       {"marks", axis.found.marks},
-                                       {"reason", axis.found.reason}});
-    if (axis.found.state != AxisReference::State::Found) continue;
-    out["reading_at_zero"] = axis.reading_at_zero;
-    out["u"] = axis.found.u_offset;
-  }
-  return {{"running", reference.running}, {"axes", std::move(axes)}};
-}
-
-/// A position that is not current is null: the last one would pass for where the axis is.
-json positions_json(const protocol::Snapshot& live, bool old) {
-  json positions = json::array();
-  for (std::size_t axis = 0; axis < live.axis_count; ++axis) {
-    const bool missing =
-        old || (live.missing_mask >> axis & 1u) != 0 || has(live.head.flags, protocol::SampleFlag::BusOff);
-    positions.push_back(missing ? json{} : number_or_null(live.position[axis]));
-  }
-  return positions;
-}
-
-struct SeenLink {
-  explicit SeenLink(const Publisher& publisher)
-      : connected(publisher.link().connected()),
-        counters(publisher.link().counters()),
-        security(publisher.security_warning().empty() ? "on" : publisher.security_warning()),
-        process(publisher.link().process()) {}
-  bool connected;
-  DdsLinkCounters counters;
-  std::string security;
-  const DdsProcess* process;  ///< for any thread
-};
-
-json dds_json(const SeenLink& link) {
-  json out{{"connected", link.connected},
-           {"sent", link.counters.sent},
-           {"dropped_live", link.counters.dropped_live},
-           {"connections", link.counters.connections},
-           {"refused_connections", link.counters.strangers},
-           {"security", link.security}};
-  if (link.process != nullptr) {
-    out["process"] = link.process->pid();
-    out["restarts"] = link.process->restarts();
-    if (const auto end = link.process->last_end()) out["last_end"] = end->text();
-  }
-  return out;
-}
-
-/// What `status` tells, copied on the hub's thread.
-struct SeenStatus {
-  std::vector<StreamHealth> streams;
-  SeenModel model;
-  SessionStatus session;
-  std::optional<calib::HeldOutFigures> held_out;
-  std::deque<SessionStatus> ended;
-  protocol::Snapshot live;
-  bool positions_are_old = true;
-  std::optional<SeenReference> reference;
-  std::optional<std::vector<std::string>> without_zero;
-  std::optional<std::string> release_awaited, recording;
-  std::optional<SeenTracker> tracker;
-  std::optional<SeenLink> dds;
-};
-
-SeenStatus look_at_status(const Hub& hub) {
-  const HubParts& parts = hub.parts();
-  const auto axes_at = hub.live().axes_at();
-  SeenStatus seen{.streams = hub.health(),
-            .model = SeenModel{hub.standing()},
-            .session = parts.calibration.status(),
-            .held_out = parts.calibration.held_out(),
-            .ended = parts.calibration.ended(),
-            .live = hub.live().view(),
-            .positions_are_old = !axes_at || parts.time.now() - *axes_at > parts.time.host(kPositionIsOld),
-            .reference = {},
-            .without_zero = {},
-            .release_awaited = parts.devices.release_awaited(),
-            .recording = {},
-            .tracker = look_at_tracker(parts),
-            .dds = {}};
-  if (const auto* reference = parts.reference; reference != nullptr) {
-    if (reference->configured())
-      seen.reference = SeenReference{.running = reference->running(), .axes = reference->status()};
-    seen.without_zero = reference->without_zero();
-  }
-  if (parts.recorder != nullptr) seen.recording = parts.recorder->status().file.string();
-  if (parts.publisher != nullptr) seen.dds.emplace(*parts.publisher);
-  return seen;
-}
-
-json status_json(const SeenStatus& seen, const Config& config) {
-  json devices = json::array();
-  for (const auto& h : seen.streams) devices.push_back(device_json(h));
-  json out{{"ok", true},
-           {"process", ::getpid()},
-           {"machine", config.machine.name},
-           {"model", model_json(seen.model)},
-           {"session", session_json(seen.session, seen.held_out)},
-           {"streams", std::move(devices)}};
-  json& ended = out["ended_sessions"] = json::array();
-  for (const auto& session : seen.ended) ended.push_back(session_json(session, {}));
-  out["position_m"] = positions_json(seen.live, seen.positions_are_old);
-  if (seen.live.has_environment) out["environment"] = environment_json(seen.live, config);
-  if (seen.reference) out["reference"] = reference_json(*seen.reference, config.machine);
-  if (seen.without_zero) out["axes_without_zero"] = *seen.without_zero;
-  if (seen.release_awaited)
-    out["release_awaited"] = {{"reason", *seen.release_awaited}, {"command", "abbe machine release"}};
-  if (seen.tracker) out["tracker"] = tracker_json(*seen.tracker);
-  if (seen.recording) out["recording"] = *seen.recording;
-  if (seen.dds) out["dds"] = dds_json(*seen.dds);
-  return out;
-}
-
 Result<OnHub> status(const HubParts&, const json&) {
-  return [](const Hub& hub) -> Reply {
-    return [seen = look_at_status(hub), &config = hub.parts().config] { return status_json(seen, config); };
-  };
+  return status_reply;
 }
 
-/// For terminals and the journal, and for ever in the store.
+/// Shown on terminals, written to the journal and kept in the store.
 std::string remark_of(std::string who) {
   constexpr std::size_t kMost = 64;
   if (who.size() > kMost) {
@@ -302,7 +47,7 @@ std::string who(const json& request) {
   return said.empty() || said == user ? user : fmt::format("{} (as {})", user, said);
 }
 
-/// Readings of X, Y or Z without a datum are used by nobody: a run would wait for them in vain.
+/// No method uses readings of X, Y or Z without a datum: a run would wait for them in vain.
 Result<void> check_zeros(const HubParts& parts, const PreparedSession& task) {
   const bool by_cmm =
       std::holds_alternative<EvemuAcquisition>(task.acquisition) && parts.config.cmm.has_value();
@@ -367,11 +112,11 @@ OnHub with_reference(std::function<Result<void>(ReferenceService&, const HubPart
 }
 
 Result<OnHub> reference_here(const HubParts&, const json& request) {
-  return with_reference([axes = request.value("axes", std::vector<std::string>{}),
-                         u = request.value("u", StandHere::kByEye)](ReferenceService& service,
-                                                                    const HubParts& parts) {
-    return service.stand_at_offset(stand_here(parts, axes, u));
-  });
+  return with_reference(
+      [axes = request.value("axes", std::vector<std::string>{}), u = request.value("u", StandHere::kByEye)](
+          ReferenceService& service, const HubParts& parts) {
+        return service.stand_at_offset(stand_here(parts, axes, u));
+      });
 }
 
 Result<OnHub> cancel_reference(const HubParts&, const json&) {
@@ -417,9 +162,10 @@ Reply look_at_verification(VerificationService& service, std::uint64_t number, s
   if (!found) return reply(found.error());
   const auto& all = (*found)->points();
   const auto first = all.begin() + static_cast<std::ptrdiff_t>(std::min(from, all.size()));
-  return [seen = SeenPoints{.standing = (*found)->standing(),
-                            .points = {first, all.end()},
-                            .stopped = service.stopped()}] { return verification_json(seen); };
+  return [seen = SeenPoints{
+              .standing = (*found)->standing(), .points = {first, all.end()}, .stopped = service.stopped()}] {
+    return verification_json(seen);
+  };
 }
 
 /// {"step": "begin"} gives a number; {"step": "look" | "end", "number": .., "from": k} the points from the
@@ -427,118 +173,12 @@ Reply look_at_verification(VerificationService& service, std::uint64_t number, s
 Result<OnHub> verification(const HubParts& parts, const json& request) {
   if (parts.verification == nullptr) return fail(ErrorCode::Refused, "verify: not in this daemon");
   const auto step = request.at("step").get<std::string>();
-  if (step == "begin")
-    return [](const Hub& hub) { return begin_verification(*hub.parts().verification); };
+  if (step == "begin") return [](const Hub& hub) { return begin_verification(*hub.parts().verification); };
   if (step != "end" && step != "look")
     return fail(ErrorCode::Usage, fmt::format("verification: unknown step {}", step));
   return [number = request.at("number").get<std::uint64_t>(), from = request.value("from", std::size_t{0}),
           end = step == "end"](const Hub& hub) {
     return look_at_verification(*hub.parts().verification, number, from, end);
-  };
-}
-
-drivers::ProbePoint place_from(const json& place, bool touch) {
-  return {.position_m = place.get<std::array<double, 3>>(), .touch = touch};
-}
-
-OnHub with_touching(std::function<Reply(TouchService&)> task) {
-  return [task = std::move(task)](const Hub& hub) {
-    TouchService* const service = hub.parts().touching;
-    return service == nullptr ? reply(Error{ErrorCode::Refused, "touch: not in this daemon"}) : task(*service);
-  };
-}
-
-Result<OnHub> cancel_touching(const HubParts&, const json&) {
-  return with_touching([](TouchService& service) { return reply_done(service.cancel()); });
-}
-
-Result<OnHub> where_it_stands(const HubParts&, const json&) {
-  return with_touching([](TouchService& service) {
-    const auto at = service.where();
-    return at ? reply(json{{"ok", true}, {"at_m", *at}}) : reply(at.error());
-  });
-}
-
-Result<OnHub> touch(const HubParts&, const json& request) {
-  std::vector<TouchRequest> wanted;
-  for (const json& point : request.at("points")) {
-    TouchRequest& one = wanted.emplace_back();
-    for (const json& place : point.at("way")) one.way.push_back(place_from(place, false));
-    one.point = place_from(point.at("at_m"), true);
-    one.point.normal = point.at("normal").get<std::array<double, 3>>();
-  }
-  std::vector<drivers::ProbePoint> leave;
-  for (const json& place : request.value("leave", json::array())) leave.push_back(place_from(place, false));
-  auto job = touch_job(std::move(wanted), std::move(leave));
-  if (!job) return tl::unexpected(job.error());
-  return with_touching([shared = std::make_shared<TouchJob>(std::move(*job))](TouchService& service) {
-    return reply_done(service.start(std::move(*shared)));
-  });
-}
-
-/// What became of a job; of each touch only what is answered.
-struct SeenTouches {
-  struct Made {
-    std::array<double, 3> at_m{};
-    double u_m = 0.0;
-  };
-  bool running = false;
-  std::size_t asked = 0;
-  std::string reason;
-  std::vector<Made> touches;
-};
-
-json touches_json(const SeenTouches& seen) {
-  json made = json::array();
-  for (const auto& t : seen.touches) made.push_back({{"at_m", t.at_m}, {"u_m", t.u_m}});
-  return {{"ok", true},
-          {"running", seen.running},
-          {"asked", seen.asked},
-          {"reason", seen.reason},
-          {"touches", std::move(made)}};
-}
-
-Result<OnHub> touches(const HubParts&, const json&) {
-  return with_touching([](TouchService& service) -> Reply {
-    const TouchService::Status& status = service.look();
-    SeenTouches seen{.running = status.running, .asked = status.asked, .reason = status.reason, .touches = {}};
-    seen.touches.reserve(status.touches.size());
-    for (const auto& t : status.touches)
-      seen.touches.push_back({{t.position[0], t.position[1], t.position[2]}, t.u_position[0]});
-    return [seen = std::move(seen)] { return touches_json(seen); };
-  });
-}
-
-/// For a person who has looked at the machine.
-Result<OnHub> release_machine(const HubParts&, const json&) {
-  return [](const Hub& hub) {
-    SampleSource& devices = hub.parts().devices;
-    const auto awaited = devices.release_awaited();
-    const auto released = devices.release_machine();
-    return released ? reply(json{{"ok", true}, {"released", awaited.value_or("")}}) : reply(released.error());
-  };
-}
-
-/// Every motion.
-Result<OnHub> stop_machine(const HubParts&, const json&) {
-  return [](const Hub& hub) {
-    auto* const touching = hub.parts().touching;
-    if (touching == nullptr || !touching->status().running || !touching->cancel())
-      hub.parts().devices.stop_machine();
-    return reply(json{{"ok", true}});
-  };
-}
-
-Result<OnHub> machine(const HubParts&, const json&) {
-  return [](const Hub& hub) {
-    SampleSource& devices = hub.parts().devices;
-    const auto awaited = devices.release_awaited();
-    json out{{"ok", true}, {"release_awaited", awaited.has_value()}, {"reason", awaited.value_or("")}};
-    if (const auto tip = devices.tip_place()) {
-      out["tip_m"] = tip->at_m;
-      out["tip_age_s"] = in_seconds(tip->age);
-    }
-    return reply(std::move(out));
   };
 }
 

@@ -28,7 +28,7 @@ constexpr const char* kExitCodes =
     "Exit codes: 0 stopped by SIGTERM or SIGINT or because the parent is gone, 2 usage, 3 the configuration "
     "or "
     "the profile cannot be used,\n"
-    "4 no participant or writer can be created, 70 an exception nobody expected.";
+    "4 no participant or writer can be created, 70 an unexpected exception.";
 
 volatile sig_atomic_t stop_requested = 0;
 

@@ -37,7 +37,7 @@ constexpr int kDone = 0, kNoAnswer = 1, kUsage = 2, kBadInput = 3, kIo = 4, kInt
 constexpr const char* kExitCodes =
     "Exit codes: 0 done, 1 no model that may be applied arrived in time (said why), 2 usage, 3 a file or "
     "profile cannot be\n"
-    "used, 4 no participant or output file can be created, 70 an exception nobody expected.";
+    "used, 4 no participant or output file can be created, 70 an unexpected exception.";
 
 /// ModelState is repeated every second, also if nothing changes.
 constexpr std::chrono::milliseconds kLongestSilence{1500};

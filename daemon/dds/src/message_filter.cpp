@@ -27,8 +27,8 @@ constexpr std::uint32_t kPublicationsWriter = 0x000003c2, kSubscriptionsWriter =
 /// What a type is announced with: TypeInformation, TypeObject, TypeIdentifier.
 constexpr std::array<std::uint16_t, 3> kTypeParameters{0x0075, 0x0072, 0x0069};
 constexpr std::uint16_t kSentinel = 0x0001;
-/// Vendor-specific and without the bit "must understand": skipped by everybody who does not know it.
-constexpr std::uint16_t kNobodysParameter = 0xbfff;
+/// Vendor-specific and without the bit "must understand": no implementation assigns it, so every receiver skips it.
+constexpr std::uint16_t kUnusedParameterId = 0xbfff;
 
 class Reader {
  public:
@@ -98,7 +98,7 @@ bool blank_types(Bytes body, std::uint8_t flags) {
   Reader list(body, little_endian);
   const auto end = walk_parameters(list, at + 4, [&list](std::uint16_t id, std::size_t place) {
     if (std::ranges::find(kTypeParameters, id) != kTypeParameters.end())
-      list.put_u16(place, kNobodysParameter);
+      list.put_u16(place, kUnusedParameterId);
   });
   return end.has_value();
 }
@@ -154,7 +154,7 @@ std::size_t filter_message(std::span<std::uint8_t> message) noexcept {
 
     const Bytes body = message.subspan(at, length);
     if (kind == kStatistics) return last ? at - kSubmessageHeaderBytes : 0;
-    if (kind == kDataFrag && is_announcement(body)) return 0;  // nobody can look into it
+    if (kind == kDataFrag && is_announcement(body)) return 0;  // a fragment cannot be checked
     if (kind == kData && is_announcement(body) && !blank_types(body, flags)) return 0;
     at += length;
   }

@@ -88,7 +88,7 @@ Result<Participant> Participant::create(const ParticipantOptions& options) {
   }
   auto qos = read_profile(options.profiles);
   if (!qos) return tl::make_unexpected(qos.error());
-  // Without one Fast DDS makes a participant that nobody ever hears.
+  // Without one Fast DDS makes a participant that sends nothing and reports no error.
   if (auto up = interface_of_profile_is_up(*qos); !up) return tl::make_unexpected(up.error());
   if (auto secured = add_security(options, *qos); !secured) return tl::make_unexpected(secured.error());
   for (auto& transport : qos->transport().user_transports) transport = with_message_filter(transport);

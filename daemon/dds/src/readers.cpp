@@ -43,7 +43,7 @@ class AliveWriters final : public fast::DataReaderListener {
     return alive_.contains(writer);
   }
 
-  fast::GuardCondition changed;  ///< the status condition would be reset by whoever asks for the status
+  fast::GuardCondition changed;  ///< reading a status resets its status condition
 
   /// Fast DDS may report two changes at once in the wrong order. What arrived before its writer was lost, and
   /// lay in the reader until now, is no sign of life.

@@ -78,7 +78,7 @@ Decision decide(const v1::Compensation& c, std::optional<std::chrono::nanosecond
 
 std::optional<std::chrono::nanoseconds> Delay::of(const v1::Compensation& vector, Instant now) {
   constexpr std::chrono::nanoseconds kLongestStep = std::chrono::seconds{1};
-  // What no sender of ours says, and what sums of would overflow.
+  // No abbe-dds sends more, and sums of larger values overflow.
   constexpr std::int64_t kLongest_ns = std::int64_t{1} << 60;
   for (const std::int64_t time : {vector.host_time_ns(), vector.age_ns()})
     if (time < 0 || time > kLongest_ns) return std::nullopt;

@@ -16,7 +16,7 @@ std::size_t index_of(daemon::Topic topic) {
 }
 
 /// Empty if the site's permissions do not allow it: then joining takes up to a second.
-std::vector<eprosima::fastdds::dds::DataWriter*> writer_nobody_reads(
+std::vector<eprosima::fastdds::dds::DataWriter*> announcement_writer(
     Participant& participant, eprosima::fastdds::dds::Publisher& publisher) {
   namespace fast = eprosima::fastdds::dds;
   const std::string type(daemon::traits(daemon::Topic::CalibrationEvent).type_name);
@@ -46,7 +46,7 @@ Result<Writers> Writers::create(Participant& participant) {
     writers.writers_[index_of(traits.topic)] = writer;
   }
   if (participant.is_secure())
-    writers.announced_ = writer_nobody_reads(participant, *publisher);
+    writers.announced_ = announcement_writer(participant, *publisher);
   else
     writers.announced_.assign(writers.writers_.begin(), writers.writers_.end());
   return writers;

@@ -41,7 +41,7 @@ class DdsBridge {
   static constexpr std::chrono::milliseconds kSilence{500};
   static constexpr std::chrono::milliseconds kAssertPeriod{200};
   static constexpr std::chrono::milliseconds kLongestWait{
-      100};  ///< a tenth of a second of old vectors helps nobody
+      100};  ///< an older vector is of no use to a control
 
   /// `outlet` must outlive the bridge.
   explicit DdsBridge(DdsOutlet& outlet);

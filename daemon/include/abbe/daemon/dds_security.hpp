@@ -19,7 +19,7 @@
 
 namespace abbe::daemon {
 
-/// What it means that there are no keys, and what to do; reported wherever somebody looks.
+/// What it means that there are no keys, and what to do; for the log, `abbe status` and Health.
 [[nodiscard]] std::string dds_security_is_off(std::uint32_t domain);
 
 /// Keys are named, or the profile of the site has dds.sec properties of its own.

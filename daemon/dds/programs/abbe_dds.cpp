@@ -1,5 +1,6 @@
 // abbe-dds: the DDS participant of abbe, a process of its own so that nothing a stranger sends can stop
 // abbed.
+#include <linux/close_range.h>
 #include <signal.h>
 #include <unistd.h>
 
@@ -7,11 +8,13 @@
 #include <chrono>
 #include <cstdio>
 #include <exception>
+#include <optional>
 #include <string>
 
 #include "abbe/daemon/config.hpp"
 #include "abbe/daemon/dds_bridge.hpp"
 #include "abbe/dds/announcer.hpp"
+#include "abbe/dds/interface_watch.hpp"
 #include "abbe/dds/participant.hpp"
 #include "abbe/dds/writers.hpp"
 
@@ -85,7 +88,10 @@ abbe::daemon::Result<void> take_from_config(Options& options) {
   return {};
 }
 
-int run(const Options& options) {
+/// The exit code, or nothing where a new address calls for another participant.
+std::optional<int> publish(const Options& options) {
+  using Clock = std::chrono::steady_clock;
+  abbe::dds::InterfaceWatch interfaces(Clock::now());
   auto participant = abbe::dds::Participant::create(options.participant);
   if (!participant) return refuse(participant.error());
   auto writers = abbe::dds::Writers::create(*participant);
@@ -98,12 +104,25 @@ int run(const Options& options) {
   bool alive = false;
   while (stop_requested == 0 && !parent_is_gone(options)) {
     feed.turn();
-    announcer.turn(std::chrono::steady_clock::now());
+    announcer.turn(Clock::now());
     say_when_it_changes(bridge, alive);
+    if (const auto added = interfaces.turn(participant->allowed_addresses(), Clock::now())) {
+      std::fprintf(stderr, "abbe-dds: address %s came up: the participant is created again to use it\n",
+                   added->c_str());
+      return std::nullopt;
+    }
   }
   bridge.lost();
   writers->wait_for_state_acknowledged(std::chrono::seconds{1});
   return kDone;
+}
+
+/// Returns only if that fails.
+int start_again(char** argv) {
+  ::close_range(3, ~0u, CLOSE_RANGE_CLOEXEC);
+  ::execv("/proc/self/exe", argv);
+  std::perror("abbe-dds: /proc/self/exe");
+  return kIo;
 }
 
 }  // namespace
@@ -146,7 +165,8 @@ int main(int argc, char** argv) {
     if (!options.config.empty()) {
       if (auto taken = take_from_config(options); !taken) return refuse(taken.error());
     }
-    return run(options);
+    if (const auto code = publish(options)) return *code;
+    return start_again(argv);
   } catch (const std::exception& e) {
     std::fprintf(stderr, "abbe-dds: %s\n", e.what());
     return kInternal;

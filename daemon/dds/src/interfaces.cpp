@@ -2,6 +2,8 @@
 
 #include <arpa/inet.h>
 #include <fastdds/rtps/transport/UDPTransportDescriptor.h>
+#include <fmt/format.h>
+#include <fmt/ranges.h>
 #include <ifaddrs.h>
 #include <net/if.h>
 #include <netinet/in.h>
@@ -13,42 +15,48 @@
 #include <vector>
 
 namespace abbe::dds {
-namespace {
 
-/// What Fast DDS 2.9 compares with a white list: IPv4 addresses, not names of interfaces.
-std::vector<std::string> addresses_that_are_up() {
-  std::vector<std::string> addresses;
+std::vector<InterfaceAddress> running_addresses() {
+  constexpr unsigned kUsed = IFF_UP | IFF_RUNNING;
+  std::vector<InterfaceAddress> addresses;
   ifaddrs* all = nullptr;
   if (::getifaddrs(&all) != 0) return addresses;
   for (const ifaddrs* i = all; i != nullptr; i = i->ifa_next) {
-    if (i->ifa_addr == nullptr || i->ifa_addr->sa_family != AF_INET || (i->ifa_flags & IFF_UP) == 0) continue;
+    if (i->ifa_addr == nullptr || i->ifa_addr->sa_family != AF_INET || (i->ifa_flags & kUsed) != kUsed)
+      continue;
     std::array<char, INET_ADDRSTRLEN> text{};
     const auto* address = reinterpret_cast<const sockaddr_in*>(i->ifa_addr);
     if (::inet_ntop(AF_INET, &address->sin_addr, text.data(), text.size()) != nullptr)
-      addresses.emplace_back(text.data());
+      addresses.push_back({::if_nametoindex(i->ifa_name), text.data()});
   }
   ::freeifaddrs(all);
+  std::ranges::sort(addresses);
   return addresses;
 }
 
-}  // namespace
-
-daemon::Result<void> interface_of_profile_is_up(const eprosima::fastdds::dds::DomainParticipantQos& qos) {
+std::vector<std::string> white_list(const eprosima::fastdds::dds::DomainParticipantQos& qos) {
   using Udp = eprosima::fastdds::rtps::UDPTransportDescriptor;
-  std::string named;
-  const auto up = addresses_that_are_up();
+  std::vector<std::string> all;
   for (const auto& transport : qos.transport().user_transports) {
     const auto udp = std::dynamic_pointer_cast<const Udp>(transport);
-    // Of other transports, and of UDP on every interface, nothing is asked.
     if (!udp || udp->interfaceWhiteList.empty()) return {};
-    for (const auto& interface : udp->interfaceWhiteList) {
-      if (std::ranges::find(up, interface) != up.end()) return {};
-      named += (named.empty() ? "" : ", ") + interface;
-    }
+    all.insert(all.end(), udp->interfaceWhiteList.begin(), udp->interfaceWhiteList.end());
   }
-  if (named.empty()) return {};
-  return daemon::fail(daemon::ErrorCode::Io, "no interface of the profile is up (addresses " + named +
-                                                 "): bring the network up, or change interfaceWhiteList");
+  return all;
+}
+
+daemon::Result<void> interface_of_profile_is_up(const eprosima::fastdds::dds::DomainParticipantQos& qos) {
+  const auto named = white_list(qos);
+  const auto up = running_addresses();
+  const auto is_named = [&named](const std::string& address) {
+    return std::ranges::find(named, address) != named.end();
+  };
+  if (named.empty() || std::ranges::any_of(up, is_named, &InterfaceAddress::address)) return {};
+  return daemon::fail(
+      daemon::ErrorCode::Io,
+      fmt::format("no interface of the profile is up (addresses {}): bring the network up, or change "
+                  "interfaceWhiteList",
+                  fmt::join(named, ", ")));
 }
 
 }  // namespace abbe::dds

@@ -10,6 +10,7 @@
 #include <cstdlib>
 #include <fstream>
 #include <string>
+#include <utility>
 
 #include "abbe/dds/message_filter.hpp"
 #include "abbe/dds/payload_type.hpp"
@@ -91,6 +92,7 @@ Result<Participant> Participant::create(const ParticipantOptions& options) {
   // Without one Fast DDS makes a participant that sends nothing and reports no error.
   if (auto up = interface_of_profile_is_up(*qos); !up) return tl::make_unexpected(up.error());
   if (auto secured = add_security(options, *qos); !secured) return tl::make_unexpected(secured.error());
+  auto allowed = white_list(*qos);
   for (auto& transport : qos->transport().user_transports) transport = with_message_filter(transport);
   auto* participant =
       fast::DomainParticipantFactory::get_instance()->create_participant(options.domain, *qos);
@@ -99,7 +101,7 @@ Result<Participant> Participant::create(const ParticipantOptions& options) {
                                    ": no participant can be created (ports or interfaces of the profile" +
                                    (has_security(*qos) ? ", or its keys and permissions)" : ")"));
   }
-  return Participant(participant);
+  return Participant(participant, std::move(allowed));
 }
 
 Result<fast::Topic*> Participant::topic(daemon::Topic topic) {

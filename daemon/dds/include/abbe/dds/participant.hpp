@@ -5,6 +5,9 @@
 #include <cstdint>
 #include <filesystem>
 #include <memory>
+#include <string>
+#include <utility>
+#include <vector>
 
 #include "abbe/daemon/dds_security.hpp"
 #include "abbe/daemon/error.hpp"
@@ -36,8 +39,8 @@ struct ParticipantOptions {
 class Participant {
  public:
   /// Error: Usage for a domain above kHighestDomain, BadInput for a profile that cannot be read or has no
-  /// participant "abbe", and for keys that cannot be used, Io if no participant can be created (no port), or no
-  /// interface of the profile is up.
+  /// participant "abbe", and for keys that cannot be used, Io if no participant can be created (no port), or
+  /// no interface of the profile is up.
   [[nodiscard]] static Result<Participant> create(const ParticipantOptions& options);
 
   /// The topic with its payload type, registered without TypeObject and TypeInformation. Error Io: Fast DDS
@@ -49,12 +52,19 @@ class Participant {
   /// Keys of `security` or of the profile keep strangers out.
   [[nodiscard]] bool is_secure() const;
 
+  /// IPv4 addresses that the profile allows (interfaceWhiteList); empty: all.
+  [[nodiscard]] const std::vector<std::string>& allowed_addresses() const noexcept {
+    return allowed_addresses_;
+  }
+
  private:
   struct Deleter {
     void operator()(eprosima::fastdds::dds::DomainParticipant* participant) const noexcept;
   };
-  explicit Participant(eprosima::fastdds::dds::DomainParticipant* participant) : participant_(participant) {}
+  Participant(eprosima::fastdds::dds::DomainParticipant* participant, std::vector<std::string> allowed)
+      : participant_(participant), allowed_addresses_(std::move(allowed)) {}
   std::unique_ptr<eprosima::fastdds::dds::DomainParticipant, Deleter> participant_;
+  std::vector<std::string> allowed_addresses_;
 };
 
 }  // namespace abbe::dds

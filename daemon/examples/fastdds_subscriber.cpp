@@ -2,9 +2,10 @@
 //   fastdds_subscriber DOMAIN [PROFILES.xml [KEYS]]
 // prints for every Compensation of every machine whether it may be applied. KEYS is the folder of one
 // subscriber that `abbe dds keys` made, where abbed has keys, too. Fast DDS calls the listener from threads
-// of its own. To be copied with abbe/dds/publisher_pin.hpp.
+// of its own. To be copied with abbe/dds/publisher_pin.hpp and message_filter (daemon/dds).
 #include <unistd.h>
 
+#include <fastdds/rtps/transport/UDPv4TransportDescriptor.h>
 #include <algorithm>
 #include <chrono>
 #include <cstdint>
@@ -17,11 +18,13 @@
 #include <fastdds/dds/subscriber/SampleInfo.hpp>
 #include <fastdds/dds/subscriber/Subscriber.hpp>
 #include <map>
+#include <memory>
 #include <mutex>
 #include <optional>
 #include <set>
 #include <string>
 
+#include "abbe/dds/message_filter.hpp"
 #include "abbe/dds/publisher_pin.hpp"
 #include "abbe_v1PubSubTypes.h"
 
@@ -213,6 +216,17 @@ void use_keys(const std::string& folder, DomainParticipantQos& qos) {
   properties.emplace_back("dds.sec.crypto.plugin", "builtin.AES-GCM-GMAC");
 }
 
+/// What anyone on the domain can announce ends a process with Fast DDS 2.9 (abbe/dds/message_filter.hpp).
+void filter_messages(DomainParticipantQos& qos) {
+  auto& transports = qos.transport();
+  if (transports.user_transports.empty()) {
+    transports.use_builtin_transports = false;
+    transports.user_transports.push_back(
+        std::make_shared<eprosima::fastdds::rtps::UDPv4TransportDescriptor>());
+  }
+  for (auto& transport : transports.user_transports) transport = abbe::dds::with_message_filter(transport);
+}
+
 /// Without these two calls Fast DDS announces a TypeObject, which Cyclone DDS does not take and older Fast
 /// DDS may not survive.
 TypeSupport quiet(TopicDataType* type) {
@@ -240,6 +254,7 @@ int main(int argc, char** argv) {
     return 3;
   }
   if (argc > 3) use_keys(argv[3], participant_qos);
+  filter_messages(participant_qos);
   auto* participant =
       factory->create_participant(argc > 1 ? static_cast<unsigned>(std::atoi(argv[1])) : 0, participant_qos);
   if (participant == nullptr) return 4;

@@ -7,6 +7,7 @@
 #include "abbe/drivers/can/socket_can_bus.hpp"
 #include "abbe/drivers/can/udp_can_bus.hpp"
 #include "encoder_peer.hpp"
+#include "stamped_socket.hpp"
 
 namespace abbe::drivers {
 namespace {

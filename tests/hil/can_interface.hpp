@@ -6,7 +6,6 @@
 #include <gtest/gtest.h>
 #include <linux/can.h>
 #include <linux/can/raw.h>
-#include <linux/net_tstamp.h>
 #include <net/if.h>
 #include <poll.h>
 #include <sys/ioctl.h>
@@ -25,6 +24,7 @@
 #include "abbe/drivers/can/linux_frame.hpp"
 #include "abbe/protocol/can/canopen.hpp"
 #include "abbe/protocol/can/error_frame.hpp"
+#include "stamped_socket.hpp"
 
 namespace abbe::tests {
 
@@ -117,24 +117,6 @@ class CanSocket {
  private:
   int fd_;
 };
-
-/// Asks for receive stamps for as long as the program runs. A worker of the kernel switches stamping off some time after
-/// the last socket that asked was closed: a test that opened its own in between had a stamp for its first frame and none
-/// for the frames after it.
-class StampedSocket {
- public:
-  StampedSocket() : fd_(::socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC, 0)) {
-    const unsigned flags = SOF_TIMESTAMPING_RX_SOFTWARE | SOF_TIMESTAMPING_SOFTWARE;
-    if (::setsockopt(fd_, SOL_SOCKET, SO_TIMESTAMPING, &flags, sizeof flags) != 0) std::abort();
-  }
-  StampedSocket(const StampedSocket&) = delete;
-  StampedSocket& operator=(const StampedSocket&) = delete;
-  ~StampedSocket() { ::close(fd_); }
-
- private:
-  int fd_;
-};
-inline const StampedSocket kStampedSocket;
 
 /// Until the kernel stamps what comes: its worker switches that on some time after it was asked for.
 template <class Bus>

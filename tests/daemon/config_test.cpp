@@ -7,7 +7,7 @@
 #include <string>
 
 #include "abbe/daemon/device_options.hpp"
-#include "config_tables.hpp"
+#include "config_fixture.hpp"
 
 namespace abbe::daemon {
 namespace {
@@ -21,21 +21,6 @@ using ::testing::HasSubstr;
 using ::testing::Not;
 using ::testing::SizeIs;
 using ::testing::StartsWith;
-
-const std::string kMachine = [] {
-  auto machine = config_tables::mill();
-  machine.y.reference_mm = 10;
-  return to_toml(machine);
-}();
-
-const std::string kCanBus = "[encoder]\ntransport = \"socketcan\"\ninterface = \"can0\"\n";
-const std::string kNodes = R"(nodes = [{axis = "X", node = 1}, {axis = "Y", node = 2}, {axis = "Z", node = 3}]
-)";
-
-std::vector<std::string> faults_of(const std::string& text) {
-  const auto config = parse_config(text, "abbed.toml");
-  return config ? std::vector<std::string>{} : config.error().details;
-}
 
 TEST(Config, ReadsAMachineInSI) {
   const auto config = parse_config(kMachine, "machine.toml");
@@ -305,76 +290,6 @@ TEST(Config, RefusesPeriodsTheLivenessRulesForbid) {
               ElementsAre(HasSubstr("hub_period_us")));
   EXPECT_THAT(faults_of(kMachine + kCanBus + "sync_period_us = 200000\n" + kNodes),
               ElementsAre(HasSubstr("sync_period_us")));
-}
-
-TEST(Config, PutsTheNodesInTheOrderOfTheMachinesAxes) {
-  const auto config = parse_config(kMachine + kCanBus + R"(nodes = [
-  {axis = "B", node = 9}, {axis = "Z", node = 3}, {axis = "W", node = 4}, {axis = "X", node = 1}, {axis = "Y", node = 2}]
-[axes.B]
-kind = "rotary"
-min_rad = -1
-max_rad = 1
-[axes.W]
-min_mm = 0
-max_mm = 100
-)",
-                                   "abbed.toml");
-  ASSERT_TRUE(config) << config.error().details.front();
-  std::string order;
-  for (const auto& node : config->encoder->nodes) order += node.axis + std::to_string(node.node);
-  EXPECT_EQ(order, "X1Y2Z3W4B9");
-}
-
-TEST(Config, RefusesAnEncoderWithoutXyz) {
-  EXPECT_THAT(faults_of(kMachine + kCanBus + R"(nodes = [{axis = "X", node = 5}, {axis = "Z", node = 6}])"),
-              ElementsAre(HasSubstr("encoder.nodes: axis Y has no node")));
-}
-
-TEST(Config, RefusesTwoNodesOnOneId) {
-  EXPECT_THAT(faults_of(kMachine + kCanBus +
-                        R"(nodes = [{axis = "X", node = 5}, {axis = "Y", node = 5}, {axis = "Z", node = 6}]
-)"),
-              ElementsAre(HasSubstr("encoder.nodes[1].node: node id 5 is used twice")));
-}
-
-TEST(Config, LetsTheKernelSendTheSyncOnSocketCanOnly) {
-  const std::string by_kernel = "sync = \"kernel\"\n" + kNodes;
-  const auto config = parse_config(kMachine + kCanBus + by_kernel, "abbed.toml");
-  ASSERT_TRUE(config) << config.error().details.front();
-  EXPECT_EQ(config->encoder->sync, SyncConfig::Kernel);
-  const std::string udp = "[encoder]\ntransport = \"udp\"\npeer_host = \"10.0.0.8\"\npeer_port = 20000\n";
-  EXPECT_THAT(faults_of(kMachine + udp + by_kernel), ElementsAre(HasSubstr("encoder.sync")));
-}
-
-TEST(Config, TakesTheMachinesOwnSyncOnEitherTransport) {
-  const std::string external = "sync = \"external\"\n";
-  const auto config = parse_config(
-      kMachine + kCanBus + external +
-          R"(nodes = [{axis = "X", node = 1, tpdo = 2, position_byte = 2}, {axis = "Y", node = 2}, {axis = "Z", node = 3}]
-)",
-      "abbed.toml");
-  ASSERT_TRUE(config) << config.error().details.front();
-  EXPECT_EQ(config->encoder->sync, SyncConfig::External);
-  EXPECT_EQ(config->encoder->nodes[0].tpdo, 2);
-  EXPECT_EQ(config->encoder->nodes[0].position_byte, 2);
-  const std::string udp = "[encoder]\ntransport = \"udp\"\npeer_host = \"10.0.0.8\"\npeer_port = 20000\n";
-  EXPECT_THAT(faults_of(kMachine + udp + external + kNodes),
-              ElementsAre(AllOf(HasSubstr("encoder.local_port"), HasSubstr("sends nothing"))));
-  EXPECT_THAT(faults_of(kMachine + udp + "local_port = 20000\n" + external + kNodes), SizeIs(0));
-}
-
-TEST(Config, RefusesWhereANodeIsToldWhatItIsAskedFor) {
-  EXPECT_THAT(
-      faults_of(
-          kMachine + kCanBus +
-          R"(nodes = [{axis = "X", node = 1, position_byte = 2}, {axis = "Y", node = 2}, {axis = "Z", node = 3}]
-)"),
-      ElementsAre(AllOf(HasSubstr("position_byte"), HasSubstr("external"))));
-}
-
-TEST(Config, RefusesKeysOfTheOtherTransport) {
-  EXPECT_THAT(faults_of(kMachine + kCanBus + "peer_port = 9\n" + kNodes),
-              ElementsAre(HasSubstr("encoder.peer_port: has no meaning")));
 }
 
 TEST(Config, RefusesNodesThatDoNotSpanTheTravel) {

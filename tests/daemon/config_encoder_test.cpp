@@ -1,0 +1,88 @@
+// [encoder]: nodes, SYNC and transport.
+
+#include <gmock/gmock.h>
+
+#include <string>
+
+#include "config_fixture.hpp"
+
+namespace abbe::daemon {
+namespace {
+
+using ::testing::AllOf;
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+using ::testing::SizeIs;
+
+TEST(ConfigEncoder, PutsTheNodesInTheOrderOfTheMachinesAxes) {
+  const auto config = parse_config(kMachine + kCanBus + R"(nodes = [
+  {axis = "B", node = 9}, {axis = "Z", node = 3}, {axis = "W", node = 4}, {axis = "X", node = 1}, {axis = "Y", node = 2}]
+[axes.B]
+kind = "rotary"
+min_rad = -1
+max_rad = 1
+[axes.W]
+min_mm = 0
+max_mm = 100
+)",
+                                   "abbed.toml");
+  ASSERT_TRUE(config) << config.error().details.front();
+  std::string order;
+  for (const auto& node : config->encoder->nodes) order += node.axis + std::to_string(node.node);
+  EXPECT_EQ(order, "X1Y2Z3W4B9");
+}
+
+TEST(ConfigEncoder, RefusesAnEncoderWithoutXyz) {
+  EXPECT_THAT(faults_of(kMachine + kCanBus + R"(nodes = [{axis = "X", node = 5}, {axis = "Z", node = 6}])"),
+              ElementsAre(HasSubstr("encoder.nodes: axis Y has no node")));
+}
+
+TEST(ConfigEncoder, RefusesTwoNodesOnOneId) {
+  EXPECT_THAT(faults_of(kMachine + kCanBus +
+                        R"(nodes = [{axis = "X", node = 5}, {axis = "Y", node = 5}, {axis = "Z", node = 6}]
+)"),
+              ElementsAre(HasSubstr("encoder.nodes[1].node: node id 5 is used twice")));
+}
+
+TEST(ConfigEncoder, LetsTheKernelSendTheSyncOnSocketCanOnly) {
+  const std::string by_kernel = "sync = \"kernel\"\n" + kNodes;
+  const auto config = parse_config(kMachine + kCanBus + by_kernel, "abbed.toml");
+  ASSERT_TRUE(config) << config.error().details.front();
+  EXPECT_EQ(config->encoder->sync, SyncConfig::Kernel);
+  const std::string udp = "[encoder]\ntransport = \"udp\"\npeer_host = \"10.0.0.8\"\npeer_port = 20000\n";
+  EXPECT_THAT(faults_of(kMachine + udp + by_kernel), ElementsAre(HasSubstr("encoder.sync")));
+}
+
+TEST(ConfigEncoder, TakesTheMachinesOwnSyncOnEitherTransport) {
+  const std::string external = "sync = \"external\"\n";
+  const auto config = parse_config(
+      kMachine + kCanBus + external +
+          R"(nodes = [{axis = "X", node = 1, tpdo = 2, position_byte = 2}, {axis = "Y", node = 2}, {axis = "Z", node = 3}]
+)",
+      "abbed.toml");
+  ASSERT_TRUE(config) << config.error().details.front();
+  EXPECT_EQ(config->encoder->sync, SyncConfig::External);
+  EXPECT_EQ(config->encoder->nodes[0].tpdo, 2);
+  EXPECT_EQ(config->encoder->nodes[0].position_byte, 2);
+  const std::string udp = "[encoder]\ntransport = \"udp\"\npeer_host = \"10.0.0.8\"\npeer_port = 20000\n";
+  EXPECT_THAT(faults_of(kMachine + udp + external + kNodes),
+              ElementsAre(AllOf(HasSubstr("encoder.local_port"), HasSubstr("sends nothing"))));
+  EXPECT_THAT(faults_of(kMachine + udp + "local_port = 20000\n" + external + kNodes), SizeIs(0));
+}
+
+TEST(ConfigEncoder, RefusesWhereANodeIsToldWhatItIsAskedFor) {
+  EXPECT_THAT(
+      faults_of(
+          kMachine + kCanBus +
+          R"(nodes = [{axis = "X", node = 1, position_byte = 2}, {axis = "Y", node = 2}, {axis = "Z", node = 3}]
+)"),
+      ElementsAre(AllOf(HasSubstr("position_byte"), HasSubstr("external"))));
+}
+
+TEST(ConfigEncoder, RefusesKeysOfTheOtherTransport) {
+  EXPECT_THAT(faults_of(kMachine + kCanBus + "peer_port = 9\n" + kNodes),
+              ElementsAre(HasSubstr("encoder.peer_port: has no meaning")));
+}
+
+}  // namespace
+}  // namespace abbe::daemon

@@ -27,7 +27,7 @@ constexpr std::uint32_t kPublicationsWriter = 0x000003c2, kSubscriptionsWriter =
 /// What a type is announced with: TypeInformation, TypeObject, TypeIdentifier.
 constexpr std::array<std::uint16_t, 3> kTypeParameters{0x0075, 0x0072, 0x0069};
 constexpr std::uint16_t kSentinel = 0x0001;
-/// Vendor-specific and without the bit "must understand": no implementation assigns it, so every receiver skips it.
+/// Vendor-specific and without the bit "must understand": a receiver that does not know it skips it.
 constexpr std::uint16_t kUnusedParameterId = 0xbfff;
 
 class Reader {
@@ -80,8 +80,8 @@ bool is_announcement(Bytes body) {
   return writer == kPublicationsWriter || writer == kSubscriptionsWriter;
 }
 
-/// False where it is not an announcement as the standard has it, of which receivers would take another part for
-/// the parameters: the message is not handed on then.
+/// False where it is not an announcement as the standard has it, of which receivers would take another part
+/// for the parameters: the message is not handed on then.
 bool blank_types(Bytes body, std::uint8_t flags) {
   const Reader header(body, (flags & kLittleEndian) != 0);
   const std::size_t to_inline_qos = header.u16(2);

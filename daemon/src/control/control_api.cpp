@@ -47,7 +47,7 @@ std::string who(const json& request) {
   return said.empty() || said == user ? user : fmt::format("{} (as {})", user, said);
 }
 
-/// No method uses readings of X, Y or Z without a datum: a run would wait for them in vain.
+/// No method uses readings of X, Y or Z without a datum: a run would never get them.
 Result<void> check_zeros(const HubParts& parts, const PreparedSession& task) {
   const bool by_cmm =
       std::holds_alternative<EvemuAcquisition>(task.acquisition) && parts.config.cmm.has_value();
@@ -222,11 +222,11 @@ constexpr std::array kVerbs{
     Verb{"verification", "", Role::Look, verification},
     Verb{"touch", "cancel", Role::Look, cancel_touching},  // whoever sees a machine move may stop it
     Verb{"touch", "where", Role::Look, where_it_stands},
-    Verb{"touch", "", Role::Move, touch},
-    Verb{"touches", "", Role::Move, touches},  // without it a movement ends
+    Verb{"touch", "", Role::Move, begin_touching},
+    Verb{"touches", "", Role::Move, look_at_touches},  // without it a movement ends
     Verb{"machine", "release", Role::Move, release_machine},
     Verb{"machine", "stop", Role::Look, stop_machine},
-    Verb{"machine", "", Role::Look, machine},
+    Verb{"machine", "", Role::Look, machine_state},
     Verb{"tracker", "", Role::Move, tracker_order},
     Verb{"tracker_reflectors", "", Role::Look, tracker_reflectors},
 };

@@ -60,7 +60,7 @@ Result<OnHub> where_it_stands(const HubParts&, const json&) {
   });
 }
 
-Result<OnHub> touch(const HubParts&, const json& request) {
+Result<OnHub> begin_touching(const HubParts&, const json& request) {
   std::vector<TouchRequest> wanted;
   for (const json& point : request.at("points")) {
     TouchRequest& one = wanted.emplace_back();
@@ -77,7 +77,7 @@ Result<OnHub> touch(const HubParts&, const json& request) {
   });
 }
 
-Result<OnHub> touches(const HubParts&, const json&) {
+Result<OnHub> look_at_touches(const HubParts&, const json&) {
   return with_touching([](TouchService& service) -> Reply {
     const TouchService::Status& status = service.look();
     SeenTouches seen{
@@ -107,7 +107,7 @@ Result<OnHub> stop_machine(const HubParts&, const json&) {
   };
 }
 
-Result<OnHub> machine(const HubParts&, const json&) {
+Result<OnHub> machine_state(const HubParts&, const json&) {
   return [](const Hub& hub) {
     SampleSource& devices = hub.parts().devices;
     const auto awaited = devices.release_awaited();

@@ -188,7 +188,7 @@ json dds_json(const SeenLink& link) {
   return out;
 }
 
-/// What `status` tells, copied on the hub's thread.
+/// What `status` reports, copied on the hub's thread.
 struct SeenStatus {
   std::vector<StreamHealth> streams;
   SeenModel model;

@@ -5,7 +5,7 @@
 /// abbe-dds. A beat says that nothing durable waits any more. Used by one thread, the one that assembles snapshots, so that a hung abbed stops beating. The
 /// real-time threads never come here: it makes system calls and allocates.
 /// ModelState is to be published at least once a second: its age changes, and abbe-dds forgets it when abbed
-/// was silent, so that no old ACTIVE comes to life.
+/// was silent, so that a stale ACTIVE is never published again.
 
 #include <chrono>
 #include <cstddef>

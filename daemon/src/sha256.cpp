@@ -8,6 +8,9 @@
 #include <cstring>
 #include <fstream>
 #include <new>
+#include <span>
+#include <string>
+#include <string_view>
 
 namespace abbe::daemon {
 
@@ -25,8 +28,13 @@ std::string finish(EVP_MD_CTX* context) {
   std::array<unsigned char, EVP_MAX_MD_SIZE> digest{};
   unsigned int size = 0;
   EVP_DigestFinal_ex(context, digest.data(), &size);
+  constexpr std::string_view kDigits = "0123456789abcdef";
   std::string text;
-  for (unsigned int i = 0; i < size; ++i) fmt::format_to(std::back_inserter(text), "{:02x}", digest[i]);
+  text.reserve(2 * size);
+  for (const unsigned char byte : std::span{digest}.first(size)) {
+    text += kDigits[byte >> 4];
+    text += kDigits[byte & 0xf];
+  }
   return text;
 }
 

@@ -57,9 +57,9 @@ void DdsProcess::asked(WallTime now) noexcept {
 }
 
 std::chrono::nanoseconds DdsProcess::silent_for() const noexcept {
-  const std::int64_t heard = std::max({started_ns_.load(std::memory_order_relaxed),
-                                       answered_ns_.load(std::memory_order_relaxed),
-                                       asks_since_ns_.load(std::memory_order_relaxed)});
+  const std::int64_t heard =
+      std::max({started_ns_.load(std::memory_order_relaxed), answered_ns_.load(std::memory_order_relaxed),
+                asks_since_ns_.load(std::memory_order_relaxed)});
   return std::chrono::nanoseconds{
       std::max<std::int64_t>(0, asked_ns_.load(std::memory_order_relaxed) - heard)};
 }

@@ -1,10 +1,10 @@
 // How long the longest cycle of the hub lasts while what grows is as large as it may be: models of as many
 // parameters as can be published, with covariance, come into force (which is checked); a request of almost
 // 4 MB, a path of 1e5 vertices, comes over the control socket; the machine drives the whole path, seen by a
-// tracker in bursts of 332 points, and the run is identified; requests for the status come as fast as they are
-// answered. A bare thread of the same priority and period, which does the same little work in each of its
-// cycles, runs beside it: what the machine takes away from it, it takes away from the hub, too. Beside the wall
-// time the processor time of the longest cycle: what the hub itself did in it.
+// tracker in bursts of 332 points, and the run is identified; requests for the status come as fast as they
+// are answered. A bare thread of the same priority and period, which does the same little work in each of its
+// cycles, runs beside it: what the machine takes away from it, it takes away from the hub, too. Beside the
+// wall time the processor time of the longest cycle: what the hub itself did in it.
 //   bench_hub_cycle [--short]          as root, or with CAP_SYS_NICE, for real-time priority
 // Exit code 1: a cycle longer than 2 ms, or a model that did not come into force.
 #include <fmt/format.h>
@@ -49,7 +49,7 @@ constexpr auto kPeriod = 250us;
 constexpr auto kAsked = 2ms;
 constexpr int kPriority = 30;
 constexpr std::size_t kVertices = 100'000;
-constexpr std::size_t kBurst = 332;  // points of one packet: 1 kHz, every 332 ms
+constexpr std::size_t kBurst = 332;            // points of one packet: 1 kHz, every 332 ms
 constexpr std::size_t kMostParameters = 1024;  // of ErrorModel in the IDL
 constexpr std::size_t kMostGridNodes = 4096;   // that are published
 
@@ -131,8 +131,8 @@ calib::VolumetricModel largest_model(unsigned seed) {
   return daemon::test::synthetic_model(seed, static_cast<double>(finer));
 }
 
-/// The machine stands at the first vertex for a second, drives three vertices a millisecond, and stands at the
-/// last. Encoders 1 kHz.
+/// The machine stands at the first vertex for a second, drives three vertices a millisecond, and stands at
+/// the last. Encoders 1 kHz.
 class DrivenMachine final : public daemon::SampleSource {
  public:
   DrivenMachine(const drivers::TimeSource& time, std::vector<std::array<double, 3>> path)
@@ -233,11 +233,10 @@ class Bench {
     dds_ = std::thread{[this] { swallow(folder_ / "dds.sock"); }};
     hub_thread_ = std::thread{
         [this] { run_periodically(stop_, hub_longest_, [this](auto wall) { hub_->turn(wall); }); }};
-    control_ = daemon::ControlServer::open(folder_ / "control.sock",
-                                           [this](const json& request, const daemon::ControlPeer& peer) {
-                                             return daemon::answer_request(*hub_, request, peer, 60s);
-                                           })
-                   .value();
+    control_ = daemon::ControlServer::open(folder_ / "control.sock", [this](const json& request,
+                                                                            const daemon::ControlPeer& peer) {
+                 return daemon::answer_request(*hub_, request, peer, 60s);
+               }).value();
     bare_thread_ =
         std::thread{[this] { run_periodically(stop_, bare_longest_, [](auto) { little_work(); }); }};
   }
@@ -317,9 +316,11 @@ class Bench {
   }
   [[nodiscard]] bool conclude() const {
     const bool within = worst_ns_ <= nanoseconds{kAsked}.count();
-    fmt::print("{} of 3 models of {} parameters and {} grid nodes came into force; path of {} vertices in {:.2f} MB, "
-               "{} points matched\n",
-               in_force_, parameters_, nodes_, path_.size(), 1e-6 * static_cast<double>(request_bytes_), points_);
+    fmt::print(
+        "{} of 3 models of {} parameters and {} grid nodes came into force; path of {} vertices in {:.2f} "
+        "MB, "
+        "{} points matched\n",
+        in_force_, parameters_, nodes_, path_.size(), 1e-6 * static_cast<double>(request_bytes_), points_);
     tests::print_figure("hub cycle, longest", "2 ms",
                         "{:.3f} ms, a bare thread of the same priority {:.3f} ms", ms(worst_ns_),
                         ms(worst_bare_ns_));

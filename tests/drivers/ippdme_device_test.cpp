@@ -22,8 +22,7 @@ TEST(IppDevice, MeasuresWhatIsAsked) {
   IppStage stage;
   ASSERT_TRUE(stage.state_becomes("ready")) << stage.last_fault();
   stage.device->measure(on_top());
-  ASSERT_TRUE(stage.turns_until(30s, [&] { return !stage.touches.empty(); }))
-      << stage.last_fault();
+  ASSERT_TRUE(stage.turns_until(30s, [&] { return !stage.touches.empty(); })) << stage.last_fault();
   const ProbeTrigger& t = stage.touches[0];
   EXPECT_EQ(t.latch, protocol::TouchLatch::Reported);
   EXPECT_EQ(t.touch_flags, 0u);
@@ -76,8 +75,7 @@ TEST(IppDevice, ForgetsWhatIsBehindAWayThatWasRefused) {
   stage.device->measure(on_top());
   ASSERT_TRUE(stage.turns_until(30s, [&] { return stage.device->points_left() == 0; }));
   EXPECT_TRUE(stage.touches.empty());
-  EXPECT_NE(stage.last_fault().find("GoTo was refused: 2500"), std::string::npos)
-      << stage.last_fault();
+  EXPECT_NE(stage.last_fault().find("GoTo was refused: 2500"), std::string::npos) << stage.last_fault();
 }
 
 TEST(IppDevice, ForgetsTheTouchWhenTheConnectionIsLostOnTheWay) {
@@ -98,8 +96,7 @@ TEST(IppDevice, ForgetsWhatIsAskedOfAMachineThatIsAway) {
   stage.device->measure(on_top());
   stage.turn();
   EXPECT_EQ(stage.device->points_left(), 0u);
-  EXPECT_NE(stage.last_fault().find("asked to move while"), std::string::npos)
-      << stage.last_fault();
+  EXPECT_NE(stage.last_fault().find("asked to move while"), std::string::npos) << stage.last_fault();
   ASSERT_TRUE(stage.state_becomes("ready"));
   stage.peer.unplug();
   ASSERT_TRUE(stage.turns_until(30s, [&] { return !stage.device->status().connected; }));
@@ -136,8 +133,7 @@ TEST(IppDevice, RefusesAToolThatTheMachineDoesNotHave) {
   options.session.tool = "ruby 9";
   IppStage stage{machine_with_a_sphere(), options};
   ASSERT_TRUE(stage.state_becomes("awaiting release"));
-  EXPECT_NE(stage.last_fault().find("SetTool was refused: 1502 Tool not found"),
-            std::string::npos)
+  EXPECT_NE(stage.last_fault().find("SetTool was refused: 1502 Tool not found"), std::string::npos)
       << stage.last_fault();
 }
 

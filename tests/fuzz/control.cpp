@@ -2,8 +2,8 @@
 // measuring machine that no device is behind: every answer is an object with "ok", and one line. The first
 // byte chooses who asks.
 //
-// No look for leaks after each input that leaves memory behind (a session's notes): it takes half of the time, and the
-// tests of the control socket run with it.
+// No look for leaks after each input that leaves memory behind (a session's notes): it takes half of the
+// time, and the tests of the control socket run with it.
 //
 // libFuzzer: -max_len=4096 -dict=tests/fuzz/control.dict -detect_leaks=0
 

@@ -372,16 +372,11 @@ std::vector<drivers::TrackerOrderReport> DeviceSet::tracker_reports() {
 
 std::vector<StreamHealth> DeviceSet::health(HostTime now) {
   std::vector<StreamHealth> out;
-  if (state_->tracker)
-    out.push_back(state_->health_of(*state_->tracker->thread, now));
-  if (state_->encoder)
-    out.push_back(state_->health_of(*state_->encoder->thread, now));
-  if (state_->counter_card)
-    out.push_back(state_->health_of(*state_->counter_card->thread, now));
-  if (state_->reference_card)
-    out.push_back(state_->health_of(*state_->reference_card->thread, now));
-  for (const auto& running : state_->environments)
-    out.push_back(state_->health_of(*running.thread, now));
+  if (state_->tracker) out.push_back(state_->health_of(*state_->tracker->thread, now));
+  if (state_->encoder) out.push_back(state_->health_of(*state_->encoder->thread, now));
+  if (state_->counter_card) out.push_back(state_->health_of(*state_->counter_card->thread, now));
+  if (state_->reference_card) out.push_back(state_->health_of(*state_->reference_card->thread, now));
+  for (const auto& running : state_->environments) out.push_back(state_->health_of(*running.thread, now));
   if (state_->cmm) out.push_back(state_->health_of(*state_->cmm->thread, now));
   return out;
 }

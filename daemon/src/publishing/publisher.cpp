@@ -57,8 +57,9 @@ void Publisher::snapshot(const protocol::Snapshot& view, protocol::HostTime now,
 void Publisher::compensation(const protocol::Snapshot& view, const ModelStanding& standing,
                              protocol::HostTime now, WallTime wall) {
   if (view.axis_count < 3 || !due(compensations_, view, wall, options_.compensation_hz)) return;
-  send(Topic::Compensation, compensation_message(standing.status, standing.model, view,
-                                                 options_.tool_offset_m, options_.validity, stamp(now)),
+  send(Topic::Compensation,
+       compensation_message(standing.status, standing.model, view, options_.tool_offset_m, options_.validity,
+                            stamp(now)),
        wall);
 }
 

@@ -32,13 +32,14 @@ std::uint64_t length_at(mcap::Bytes bytes, std::size_t at) {
   return number;
 }
 
-/// What stands behind a torn record is its own rest. A whole chunk there: the record is no torn end, its length
-/// is damaged.
+/// What stands behind a torn record is its own rest. A whole chunk there: the record is no torn end, its
+/// length is damaged.
 bool holds_a_whole_chunk(mcap::Bytes tail) {
   constexpr std::byte kChunk{static_cast<std::uint8_t>(mcap::Opcode::Chunk)};
   constexpr std::size_t kRecordsSizeAt = mcap::kRecordHeadSize + kChunkHeadBytes - 8;
   constexpr std::size_t kLeast = mcap::kRecordHeadSize + kChunkHeadBytes;
-  for (auto at = std::ranges::find(tail, kChunk); at != tail.end(); at = std::find(at + 1, tail.end(), kChunk)) {
+  for (auto at = std::ranges::find(tail, kChunk); at != tail.end();
+       at = std::find(at + 1, tail.end(), kChunk)) {
     const auto record = tail.subspan(static_cast<std::size_t>(at - tail.begin()));
     if (record.size() < kLeast) return false;
     const std::uint64_t length = length_at(record, 1);

@@ -8,8 +8,8 @@
 #include <utility>
 #include <vector>
 
-#include "abbe/daemon/wake_up.hpp"
 #include "abbe/daemon/calibration_request.hpp"
+#include "abbe/daemon/wake_up.hpp"
 #include "recording/waiting_blocks.hpp"
 
 namespace abbe::daemon {
@@ -147,8 +147,8 @@ void append(std::vector<OfTurn<EnvironmentOf>>& to, protocol::HostTime taken, co
 
 }  // namespace
 
-/// The hub and the recorder share one pointer: to the Waiting that is being filled, null while the hub adds to
-/// it. The hub always finds it there, because the recorder leaves an empty one for the one it takes; the
+/// The hub and the recorder share one pointer: to the Waiting that is being filled, null while the hub adds
+/// to it. The hub always finds it there, because the recorder leaves an empty one for the one it takes; the
 /// recorder tries again when the hub is adding.
 struct RecorderThread::State {
   RecorderThreadOptions options;

@@ -184,29 +184,28 @@ void CalibrationService::begin_identification(AcquiredRun acquired) {
   std::future<RecordingDigest> digest;
   if (recorder_ != nullptr) digest = recorder_->digest();
   watch_ = std::make_shared<Watch>();
-  identification_ =
-      start_abandonable([watch = watch_, config = shared_config_, acquired = std::move(acquired),
-                         active = std::move(active),
-                         digest = std::move(digest)]() mutable -> Result<Identified> {
-        const CalibrationRun run = run_of(std::move(acquired));
-        std::vector<InputFile> inputs = inputs_of(run);
-        auto candidate = identify(run, *config, active ? &active->model : nullptr,
-                                  {.progress = [&watch](double share) { watch->share = share; },
-                                   .stopped = [&watch] { return watch->stopped.load(); }});
-        if (!candidate) return tl::unexpected(candidate.error());
-        RecordingDigest recording =
-            digest.valid() ? digest_of(digest, watch->stopped) : RecordingDigest{};
-        cite(recording, inputs);
-        auto document = document_of(*candidate, *config, std::move(inputs), {});
-        document.recording_gap = recording.gap;
-        auto id = model_id(document);
-        auto why = fmt::format("calibrate {}", method_of(*candidate));
-        return Identified{.model = std::make_shared<ToKeep>(ToKeep{.id = std::move(id),
-                                                                   .document = std::move(document),
-                                                                   .verdict = verdict_of(*candidate),
-                                                                   .actor = {.who = {}, .why = std::move(why), .when = {}}}),
-                          .recording_gap = std::move(recording.gap)};
-      });
+  identification_ = start_abandonable([watch = watch_, config = shared_config_,
+                                       acquired = std::move(acquired), active = std::move(active),
+                                       digest = std::move(digest)]() mutable -> Result<Identified> {
+    const CalibrationRun run = run_of(std::move(acquired));
+    std::vector<InputFile> inputs = inputs_of(run);
+    auto candidate = identify(run, *config, active ? &active->model : nullptr,
+                              {.progress = [&watch](double share) { watch->share = share; },
+                               .stopped = [&watch] { return watch->stopped.load(); }});
+    if (!candidate) return tl::unexpected(candidate.error());
+    RecordingDigest recording = digest.valid() ? digest_of(digest, watch->stopped) : RecordingDigest{};
+    cite(recording, inputs);
+    auto document = document_of(*candidate, *config, std::move(inputs), {});
+    document.recording_gap = recording.gap;
+    auto id = model_id(document);
+    auto why = fmt::format("calibrate {}", method_of(*candidate));
+    return Identified{
+        .model = std::make_shared<ToKeep>(ToKeep{.id = std::move(id),
+                                                 .document = std::move(document),
+                                                 .verdict = verdict_of(*candidate),
+                                                 .actor = {.who = {}, .why = std::move(why), .when = {}}}),
+        .recording_gap = std::move(recording.gap)};
+  });
 }
 
 /// Whether there is a model to keep: the session was not cancelled meanwhile, and the data allowed one.

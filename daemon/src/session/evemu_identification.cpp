@@ -57,7 +57,8 @@ EvemuAcquisitionOptions evemu_acquisition_options(const Config& config) {
   return options;
 }
 
-/// Every touch is held against every ball, in the daemon's cycle: real arrays have ten balls, eight positions.
+/// Every touch is held against every ball, in the daemon's cycle: real arrays have ten balls, eight
+/// positions.
 Result<void> check_size(const EvemuRequest& request) {
   constexpr std::size_t kMostBalls = 100, kMostPositions = 100, kMostPoints = 1000;
   const auto& plan = request.plan;
@@ -65,10 +66,11 @@ Result<void> check_size(const EvemuRequest& request) {
   if (balls <= kMostBalls && blocks <= kMostBalls && plan.positions.size() <= kMostPositions &&
       plan.points_per_ball <= kMostPoints && plan.points_per_block <= kMostPoints)
     return {};
-  return fail(ErrorCode::BadInput,
-              fmt::format("calibrate evemu: an array has at most {} balls and blocks, a plan at most {} positions "
-                          "with {} points a ball or block",
-                          kMostBalls, kMostPositions, kMostPoints));
+  return fail(
+      ErrorCode::BadInput,
+      fmt::format("calibrate evemu: an array has at most {} balls and blocks, a plan at most {} positions "
+                  "with {} points a ball or block",
+                  kMostBalls, kMostPositions, kMostPoints));
 }
 
 Result<void> check_evemu(const EvemuRequest& request, const Config& config) {

@@ -19,10 +19,11 @@ Result<TouchJob> touch_job(std::vector<TouchRequest> touches, std::vector<driver
   std::size_t places = leave.size();
   for (const TouchRequest& touch : touches) places += touch.way.size() + 1;
   if (touches.size() > TouchJob::kMostTouches || places > TouchJob::kMostPlaces)
-    return fail(ErrorCode::Usage,
-                fmt::format("touch: {} touches with {} places are more than one request may hold ({} and {}): "
-                            "ask for them one part after the other",
-                            touches.size(), places, TouchJob::kMostTouches, TouchJob::kMostPlaces));
+    return fail(
+        ErrorCode::Usage,
+        fmt::format("touch: {} touches with {} places are more than one request may hold ({} and {}): "
+                    "ask for them one part after the other",
+                    touches.size(), places, TouchJob::kMostTouches, TouchJob::kMostPlaces));
   TouchJob job{.touches = std::move(touches), .leave = std::move(leave), .made = {}};
   job.made.reserve(job.touches.size());
   return job;

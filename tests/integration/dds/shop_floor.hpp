@@ -32,9 +32,9 @@ class ShopFloor : public testing::Test {
   [[nodiscard]] std::unique_ptr<Process> feeder_of(const std::string& machine,
                                                    const std::vector<std::string>& more = {}) const {
     const std::string socket = directory_ / (machine + ".sock");
-    std::vector<std::string> command{
-        ABBE_FEEDER_PROGRAM, socket,         machine,     ABBE_DDS_PROGRAM,     "--socket", socket,
-        "--domain",          domain_.text(), "--profile", profile_};
+    std::vector<std::string> command{ABBE_FEEDER_PROGRAM, socket,  machine,    ABBE_DDS_PROGRAM,
+                                     "--socket",          socket,  "--domain", domain_.text(),
+                                     "--profile",         profile_};
     command.insert(command.end(), more.begin(), more.end());
     return std::make_unique<Process>(std::move(command));
   }

@@ -45,12 +45,12 @@ class Recovery {
 
   void measure() {
     drivers::DeviceStatus before;
-    const auto streams = [&] {
-      const auto now = monotonic().now();
-      if (now < begin_) before = driver_.device->status();
-      return usable_since(HostTime{}) && now > begin_ - kJustBefore;
-    };
-    ASSERT_TRUE(turns_until(begin_, streams)) << driver_.device->status().last_fault;
+    // On a busy computer one turn may outlast the time just before the fault.
+    (void)turns_until(begin_ - kJustBefore, [&] {
+      if (monotonic().now() < begin_) before = driver_.device->status();
+      return false;
+    });
+    ASSERT_TRUE(usable_since(HostTime{})) << driver_.device->status().last_fault;
     std::erase_if(heads_, [this](const auto& head) { return head.time < begin_ - kJustBefore; });
     ASSERT_TRUE(turns_until(begin_ + 10s, [&] { return shows(before); })) << "never visible";
     const auto visible = std::max(seen_at_, begin_) - begin_;

@@ -205,6 +205,19 @@ TEST(CalibrationSession, ABeamLostAroundACornerDoesNotLoseThePath) {
   EXPECT_EQ(session.status().state, SessionState::Identifying) << session.status().reason;
 }
 
+TEST(CalibrationSession, ShortLegsAtTheEndThatNoPointFellOnDoNotKeepTheRunGoing) {
+  auto path = kPath;
+  for (const double z : {0.103, 0.106, 0.109}) path.push_back({0.1, 0.1, z});
+  CalibrationSession session;
+  ASSERT_TRUE(session.start({OtfRequest{path}, HostTime{10s}}));
+  Drive drive{session};
+  drive.stand(path[0], 1s);
+  for (std::size_t i = 1; i < kPath.size(); ++i) drive.move(path[i]);
+  drive.jump(path.back());
+  drive.stand(path.back(), 2s);
+  EXPECT_EQ(session.status().state, SessionState::Identifying) << session.status().reason;
+}
+
 TEST(CalibrationSession, AClockMappingThatJumpsBackDoesNotAddWay) {
   CalibrationSession session;
   ASSERT_TRUE(session.start({OtfRequest{kPath}, HostTime{10s}}));

@@ -38,7 +38,8 @@ RunPoint run_point(const Snapshot& s) {
 }  // namespace
 
 void RunPoints::push_back(const RunPoint& point) {
-  if (blocks_.empty() || blocks_.back().size() == kPointsInBlock) blocks_.emplace_back().reserve(kPointsInBlock);
+  if (blocks_.empty() || blocks_.back().size() == kPointsInBlock)
+    blocks_.emplace_back().reserve(kPointsInBlock);
   blocks_.back().push_back(point);
   ++size_;
 }
@@ -202,8 +203,10 @@ void OtfAcquisition::follow_path(const RunPoint& point, const Vector3& q) {
   driven_m_ = driven_at_m_[leg_] + here.along_m;
 }
 
+/// Of short legs the last ones may have been passed between two points: what is left of the path lies within
+/// its tolerance.
 bool OtfAcquisition::complete(HostTime now, const Vector3& q) const {
-  return leg_ + 2 == path_.path().vertices_m.size() &&
+  return driven_at_m_.back() - driven_at_m_[leg_ + 1] <= options_.path_tolerance_m &&
          (q - path_.path().vertices_m.back()).norm() <= options_.vertex_tolerance_m &&
          now - stand_since_ >= options_.stand_after;
 }

@@ -304,7 +304,9 @@ class Bench {
       if (session["state"] == "acquiring") points_ = session["points"];
       if (session["state"] != "acquiring" && session["state"] != "warming") break;
     }
-    if (session["state"] != "identifying") throw std::runtime_error(session.dump());
+    // Or the identification has ended already.
+    if (session["state"] == "acquiring" || session["state"] == "warming")
+      throw std::runtime_error(session.dump());
   }
   void ask_for_status() {
     for (const auto end = Clock::now() + seconds_ * 1s; Clock::now() < end;) (void)ask({{"do", "status"}});

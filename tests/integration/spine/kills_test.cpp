@@ -30,8 +30,8 @@ unsigned number_from(const char* variable, unsigned otherwise) {
 
 class Kills : public Spine {
  protected:
-  // A start, a run at 25 times real time, its identification and the store: the moments lie anywhere in it.
-  static constexpr std::chrono::milliseconds kWholeRun{6000};
+  // A start, a run of 55 s of host time, its identification and the store: the moments lie anywhere in it.
+  static constexpr std::chrono::milliseconds kWholeRun{2000 + 100'000 / ABBE_SPINE_SPEED};
 
   Kills() : seed_(number_from("ABBE_KILLS_SEED", std::random_device{}())), random_(seed_) {
     RecordProperty("seed", std::to_string(seed_));

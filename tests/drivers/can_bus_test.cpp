@@ -192,14 +192,21 @@ TEST(UdpCanBus, ReachesAPeerOnAnotherComputer) {
   EXPECT_TRUE(opened.has_value()) << opened.error().text;
 }
 
-TEST(UdpCanBus, HearsNobodyButItsPeer) {
-  UdpLine line;
-  const int stranger = ::socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC, 0);
+/// Of another process than the peer, connected to where the bus receives.
+int socket_to(const drivers::UdpCanBus& bus) {
+  const int fd = ::socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC, 0);
   sockaddr_in to{};
   to.sin_family = AF_INET;
   to.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
-  to.sin_port = htons(line.bus.local_port());
-  EXPECT_GT(::sendto(stranger, "no", 2, 0, reinterpret_cast<const sockaddr*>(&to), sizeof to), 0);
+  to.sin_port = htons(bus.local_port());
+  EXPECT_EQ(::connect(fd, reinterpret_cast<const sockaddr*>(&to), sizeof to), 0);
+  return fd;
+}
+
+TEST(UdpCanBus, HearsNobodyButItsPeer) {
+  UdpLine line;
+  const int stranger = socket_to(line.bus);
+  EXPECT_GT(::send(stranger, "no", 2, 0), 0);
   sockaddr_in from{};
   socklen_t size = sizeof from;
   ::getsockname(stranger, reinterpret_cast<sockaddr*>(&from), &size);
@@ -213,15 +220,10 @@ TEST(UdpCanBus, HearsNobodyButItsPeer) {
 
 TEST(UdpCanBus, TakesNoRoomFromItsPeerForAFloodOfStrangers) {
   UdpLine line;
-  const int stranger = ::socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC, 0);
-  sockaddr_in to{};
-  to.sin_family = AF_INET;
-  to.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
-  to.sin_port = htons(line.bus.local_port());
+  const int stranger = socket_to(line.bus);
   const std::vector<char> big(8192);
   for (int i = 0; i < 500; ++i)  // more than any receive buffer holds
-    ::sendto(stranger, big.data(), big.size(), MSG_DONTWAIT, reinterpret_cast<const sockaddr*>(&to),
-             sizeof to);
+    ::send(stranger, big.data(), big.size(), MSG_DONTWAIT);
   ::close(stranger);
   line.peer.send(std::array{can::standard_frame(0x181, {1})});
   EXPECT_EQ(line.bus.read(line.frames, 1s).value_or(CanRead{}).frames, 1u);

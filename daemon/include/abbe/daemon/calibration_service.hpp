@@ -48,7 +48,7 @@ class CalibrationService {
   /// Refused or BadInput for a task of which no calibration could come with this configuration. Any thread but
   /// the hub's.
   [[nodiscard]] Result<PreparedCalibration> prepare(CalibrationTask task) const;
-  /// The id of the session. Refused while there is one. Whoever prepared it destroys `prepared`.
+  /// The id of the session. Refused while there is one. The caller destroys `prepared`.
   [[nodiscard]] Result<std::uint64_t> start(PreparedCalibration&& prepared, const std::string& who,
                                             protocol::HostTime now);
   /// Both, for who has no real-time thread.

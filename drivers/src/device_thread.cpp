@@ -3,11 +3,8 @@
 #include <fmt/format.h>
 #include <pthread.h>
 #include <sched.h>
-#include <sys/mman.h>
-#include <sys/prctl.h>
 
 #include <algorithm>
-#include <array>
 #include <atomic>
 #include <cstring>
 #include <exception>
@@ -15,6 +12,7 @@
 #include <thread>
 #include <utility>
 
+#include "abbe/drivers/real_time_memory.hpp"
 #include "abbe/drivers/status_board.hpp"
 
 namespace abbe::drivers {
@@ -24,17 +22,6 @@ using Refusals = std::vector<std::string>;
 
 std::string reason(int error_number) {
   return std::strerror(error_number);
-}
-
-/// Locked pages are still gathered into huge ones by khugepaged, an ordinary thread of the least priority: on
-/// a busy computer a device thread that touches one meanwhile was seen to wait for 0.5 s.
-void lock_memory(Refusals& refusals) {
-  if (prctl(PR_SET_THP_DISABLE, 1, 0, 0, 0) != 0)
-    refusals.push_back(fmt::format("no huge pages: {}", reason(errno)));
-  if (mlockall(MCL_CURRENT | MCL_FUTURE) != 0) {
-    refusals.push_back(
-        fmt::format("mlockall: {} (CAP_IPC_LOCK or LimitMEMLOCK=infinity is needed)", reason(errno)));
-  }
 }
 
 void set_priority(int priority, Refusals& refusals) {
@@ -54,18 +41,10 @@ void set_affinity(int cpu, Refusals& refusals) {
   }
 }
 
-/// The loop must not fault a stack page in later. 64 kB is far above what any receive() was seen to use.
-[[gnu::noinline]] void touch_stack() {
-  std::array<volatile char, 64 * 1024> room;  // NOLINT: touched, not initialised, on purpose
-  constexpr std::size_t kPage = 4096;
-  for (std::size_t i = 0; i < room.size(); i += kPage) room[i] = 0;
-}
-
 Refusals prepare_this_thread(const DeviceThreadOptions& o) {
-  Refusals refusals;
   pthread_setname_np(pthread_self(), o.name.substr(0, 15).c_str());
-  touch_stack();
-  if (o.lock_memory) lock_memory(refusals);
+  touch_stack();  // far more than any receive() was seen to use
+  Refusals refusals = o.lock_memory ? lock_memory() : Refusals{};
   if (o.cpu) set_affinity(*o.cpu, refusals);
   if (o.priority != 0) set_priority(o.priority, refusals);
   return refusals;

@@ -10,9 +10,9 @@
 #include <algorithm>
 
 #include "abbe/drivers/can/socket_can_bus.hpp"
+#include "abbe/drivers/real_time_memory.hpp"
 #include "busy_world.hpp"
 #include "figure.hpp"
-#include "locked_memory.hpp"
 #include "run_time.hpp"
 #include "simulated_encoders.hpp"
 
@@ -124,7 +124,7 @@ struct Case {
 
 class DeadlinesInVirtualTime : public testing::TestWithParam<Case> {
  protected:
-  void SetUp() override { ASSERT_TRUE(lock_memory()); }
+  void SetUp() override { ASSERT_TRUE(drivers::lock_memory().empty()); }
   void begin() {
     ASSERT_TRUE(device.state_becomes("streaming")) << device.status().last_fault;
     ::usleep(1'000'000);  // the kernel cleans up after whoever ran before

@@ -5,9 +5,9 @@
 
 #include <gtest/gtest.h>
 
+#include "abbe/drivers/real_time_memory.hpp"
 #include "busy_world.hpp"
 #include "figure.hpp"
-#include "locked_memory.hpp"
 #include "run_time.hpp"
 #include "simulated_devices.hpp"
 
@@ -88,7 +88,7 @@ double us(nanoseconds t) {
 template <class Driver>
 class DriverDeadlines : public testing::Test {
  protected:
-  void SetUp() override { ASSERT_TRUE(lock_memory()); }
+  void SetUp() override { ASSERT_TRUE(drivers::lock_memory().empty()); }
 
   void expect_samples_within_a_period(bool busy) {
     const BusyWorld world{busy};

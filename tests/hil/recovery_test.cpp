@@ -3,8 +3,8 @@
 
 #include <gtest/gtest.h>
 
+#include "abbe/drivers/real_time_memory.hpp"
 #include "figure.hpp"
-#include "locked_memory.hpp"
 #include "simulated_devices.hpp"
 
 namespace abbe::tests {
@@ -111,7 +111,7 @@ class Recovery {
 
 template <class Driver>
 void measure_all(FaultTarget target, const std::vector<Row>& rows) {
-  ASSERT_TRUE(lock_memory());
+  ASSERT_TRUE(drivers::lock_memory().empty());
   for (const auto& row : rows) {
     SCOPED_TRACE(row.name);
     Recovery<Driver>{target, row}.measure();

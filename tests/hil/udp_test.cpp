@@ -6,9 +6,9 @@
 
 #include "abbe/drivers/can/udp_can_bus.hpp"
 #include "abbe/drivers/device_thread.hpp"
+#include "abbe/drivers/real_time_memory.hpp"
 #include "bare_period.hpp"
 #include "figure.hpp"
-#include "locked_memory.hpp"
 #include "run_time.hpp"
 #include "simulated_encoders.hpp"
 
@@ -20,7 +20,7 @@ using namespace std::chrono_literals;
 constexpr std::size_t kAxes = 5;
 
 TEST(FiveAxesOverUdp, AreNeverMissing) {
-  EXPECT_TRUE(::geteuid() != 0 || lock_memory());
+  EXPECT_TRUE(::geteuid() != 0 || drivers::lock_memory().empty());
   drivers::MonotonicTime time;
   const int first = ::geteuid() == 0 ? 90 : 0;
   const SimulatedEncoders encoders{sim::CanPortOptions{.speed = 1.0}, kAxes, first};

@@ -34,6 +34,7 @@
 #include "abbe/daemon/old_recordings.hpp"
 #include "abbe/daemon/work_aside.hpp"
 #include "abbe/drivers/cpu_latency.hpp"
+#include "abbe/drivers/real_time_memory.hpp"
 #include "control/control_server.hpp"
 #include "control/model_status_name.hpp"
 #include "control/unix_socket.hpp"
@@ -414,6 +415,7 @@ struct Abbed::State {
 
   void run_hub(std::future<void>& may_run) noexcept {
     (void)::pthread_setname_np(::pthread_self(), "abbe-hub");
+    drivers::prepare_heap_of_this_thread();
     try {
       may_run.get();
     } catch (const std::future_error&) {
@@ -428,6 +430,7 @@ struct Abbed::State {
 };
 
 Result<std::unique_ptr<Abbed>> Abbed::start(Config config, AbbedOptions options) {
+  drivers::keep_heap();
   auto state = std::make_unique<State>(std::move(config), std::move(options));
   prepare_work_aside();
   for (const auto& directory : {state->config.daemon.runtime_dir, state->config.control.socket.parent_path(),

@@ -24,7 +24,7 @@ enum class RealTimeMode {
 struct DeviceThreadOptions {
   std::string name = "device";  ///< shown by top; the kernel keeps 15 characters
   RealTimeMode mode = RealTimeMode::Ignore;
-  bool lock_memory = false;  ///< mlockall, present and future, no huge pages; of the whole process
+  bool lock_memory = false;  ///< lock_memory() of real_time_memory.hpp; of the whole process
   int priority = 0;          ///< SCHED_FIFO 1..99; 0 stays with the ordinary scheduler
   std::optional<int> cpu;    ///< the one processor to run on; none: anywhere
   std::chrono::nanoseconds wait_at_most =

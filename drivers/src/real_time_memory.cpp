@@ -1,0 +1,60 @@
+#include "abbe/drivers/real_time_memory.hpp"
+
+#include <fmt/format.h>
+#include <malloc.h>
+#include <sys/mman.h>
+#include <sys/prctl.h>
+
+#include <array>
+#include <cerrno>
+#include <cstddef>
+#include <cstring>
+#include <memory>
+
+namespace abbe::drivers {
+namespace {
+
+constexpr std::size_t kPage = 4096;
+constexpr int kMB = 1 << 20;
+
+std::string refusal(const char* tried) {
+  return fmt::format("{}: {}", tried, std::strerror(errno));
+}
+
+}  // namespace
+
+std::vector<std::string> lock_memory() {
+  std::vector<std::string> refusals;
+  if (prctl(PR_SET_THP_DISABLE, 1, 0, 0, 0) != 0) refusals.push_back(refusal("no huge pages"));
+  // In two calls: one with all three flags would not load what is mapped now.
+  if (mlockall(MCL_CURRENT) != 0 || mlockall(MCL_FUTURE | MCL_ONFAULT) != 0)
+    refusals.push_back(refusal("mlockall") + " (CAP_IPC_LOCK or LimitMEMLOCK=infinity is needed)");
+  return refusals;
+}
+
+void keep_heap() noexcept {
+  (void)mallopt(M_MMAP_THRESHOLD, 32 * kMB);  // the most that glibc accepts
+  (void)mallopt(M_TRIM_THRESHOLD, 64 * kMB);
+  (void)mallopt(M_TOP_PAD, kMB);
+  // Threads beyond this number share heaps, and their locks. glibc's default, 8 per processor, is fewer than
+  // the threads of abbed on a small computer.
+  (void)mallopt(M_ARENA_MAX, 64);
+}
+
+[[gnu::noinline]] void touch_stack() noexcept {
+  std::array<volatile char, 64 * 1024> room;  // NOLINT: touched, not initialised, on purpose
+  for (std::size_t i = 0; i < room.size(); i += kPage) room[i] = 0;
+}
+
+void prepare_heap_of_this_thread() {
+  touch_stack();
+  // Blocks below any threshold for a mapping of their own; freed together they become one.
+  constexpr std::size_t kBlock = 64 * 1024, kBlocks = 256;
+  std::array<std::unique_ptr<volatile char[]>, kBlocks> blocks;  // NOLINT: an array of raw memory
+  for (auto& block : blocks) {
+    block.reset(new volatile char[kBlock]);
+    for (std::size_t i = 0; i < kBlock; i += kPage) block[i] = 0;
+  }
+}
+
+}  // namespace abbe::drivers

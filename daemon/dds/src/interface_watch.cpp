@@ -53,9 +53,13 @@ InterfaceWatch::~InterfaceWatch() {
 std::optional<std::string> InterfaceWatch::turn(const std::vector<std::string>& allowed,
                                                 Clock::time_point now) {
   if (netlink_ < 0) return std::nullopt;
-  if (has_messages(netlink_)) changed_ = now;
-  if (!changed_ || now - *changed_ < kSettles || now - begun_ < kShortestLife) return std::nullopt;
-  changed_.reset();
+  if (has_messages(netlink_)) {
+    last_change_ = now;
+    if (!first_change_) first_change_ = now;
+  }
+  if (!first_change_ || now - begun_ < kShortestLife) return std::nullopt;
+  if (now - *last_change_ < kSettles && now - *first_change_ < kLongestWait) return std::nullopt;
+  first_change_.reset();
 
   const auto running = running_addresses();
   std::vector<InterfaceAddress> added;

@@ -8,9 +8,11 @@
 #include <cstdlib>
 #include <filesystem>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
+#include "figure.hpp"
 #include "shop_floor.hpp"
 
 namespace abbe::test {
@@ -94,6 +96,18 @@ struct LateNetwork : ShopFloor {
     return std::ranges::count_if(lines, [](const Line& line) { return line.text.starts_with("child "); });
   }
 
+  /// Between two vectors that it applied, one after the other.
+  static double longest_gap_s(Process& subscriber) {
+    std::chrono::duration<double> longest{0};
+    std::optional<Clock::time_point> before;
+    for (const Line& line : subscriber.lines()) {
+      if (line.text.find("vmc-3: apply V") == std::string::npos) continue;
+      if (before) longest = std::max<std::chrono::duration<double>>(longest, line.came - *before);
+      before = line.came;
+    }
+    return longest.count();
+  }
+
   TwoHosts hosts;
 };
 
@@ -108,6 +122,8 @@ TEST_F(LateNetwork, AnAddressThatCameAfterTheStartIsUsed) {
   for (Process* far : {far_fast.get(), far_cyclone.get()})
     EXPECT_TRUE(far->wait_for("vmc-3: apply V", {}, std::chrono::seconds{30})) << far->transcript();
   EXPECT_TRUE(beside->wait_for("vmc-3: apply V", Clock::now())) << "the first subscriber receives again";
+  tests::print_figure("abbe-dds uses a new address: gap of a subscriber that was there", "-", "{:.2f} s",
+                      longest_gap_s(*beside));
   EXPECT_EQ(starts(), 1) << "abbe-dds executes itself in the same process";
 }
 

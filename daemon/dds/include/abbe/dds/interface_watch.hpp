@@ -20,6 +20,8 @@ class InterfaceWatch {
   using Clock = std::chrono::steady_clock;
   /// An interface that comes up gets its addresses one after the other, and a cable bounces.
   static constexpr std::chrono::milliseconds kSettles{500};
+  /// Interfaces that never rest, as containers that come and go, delay it no longer than that.
+  static constexpr std::chrono::seconds kLongestWait{5};
   /// A participant lives for so long at least: interfaces that come and go must not keep abbe-dds from
   /// publishing.
   static constexpr std::chrono::seconds kShortestLife{5};
@@ -38,8 +40,8 @@ class InterfaceWatch {
  private:
   int netlink_ = -1;
   Clock::time_point begun_;
-  std::optional<Clock::time_point> changed_;
-  std::vector<InterfaceAddress> known_;  ///< sorted
+  std::optional<Clock::time_point> first_change_, last_change_;  ///< since the interfaces were last read
+  std::vector<InterfaceAddress> known_;                          ///< sorted
 };
 
 }  // namespace abbe::dds

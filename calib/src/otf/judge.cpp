@@ -6,6 +6,7 @@
 #include <cstddef>
 #include <iterator>
 
+#include "abbe/calib/model_comparison.hpp"
 #include "message.hpp"
 #include "otf/check_stopped.hpp"
 
@@ -159,6 +160,61 @@ Result<HeldOutFold> hold_out(const std::vector<NormalEquations>& parts, std::siz
   return held;
 }
 
+/// Reasons before those that only follow from them.
+void add_alternatives(Verdict& verdict, const std::vector<Alternative>& others) {
+  std::vector<std::string> reasons;
+  for (const Alternative& other : others) {
+    const std::string text = message(other.text, ": it moves the model by ", 1e6 * other.bias_m,
+                                     " um rms, beside an uncertainty of ", 1e6 * other.u_m, " um");
+    if (other.cause == Cause::CorrelatedNoise) {
+      reasons.push_back(other.text);
+    } else {
+      (other.bias_m > other.u_m ? reasons : verdict.notes).push_back(text);
+    }
+  }
+  const bool only_noise = reasons.size() == 1 && others.front().cause == Cause::CorrelatedNoise;
+  if (only_noise && verdict.reasons.empty()) {  // the uncertainty covers it
+    verdict.notes.insert(verdict.notes.begin(), reasons.front());
+    return;
+  }
+  verdict.reasons.insert(verdict.reasons.begin(), reasons.begin(), reasons.end());
+}
+
+/// Half: what is left by a correction whose error is twice its uncertainty is not larger than the correction.
+constexpr double kMostUncertainty = 0.5;
+
+void require_certainty(Verdict& verdict, const CorrectionSize& size) {
+  if (!(size.u_m <= kMostUncertainty * size.V_m)) {
+    verdict.reasons.push_back(message("the correction is ", 1e6 * size.V_m,
+                                      " um rms, its standard uncertainty ", 1e6 * size.u_m,
+                                      " um: more than half of it"));
+  }
+}
+
+/// Of V = s p + rigid motion, least squares over the nodes.
+double common_growth(const VolumetricModel& model) {
+  const std::vector<Vector3> at = tensor_grid(model.layout().nodes());
+  const Vector3& t = model.tool_offsets_m().front();
+  Vector3 centre = Vector3::Zero();
+  for (const Vector3& q : at) {
+    centre += q / static_cast<double>(at.size());
+  }
+  double along = 0.0, squares = 0.0;
+  for (const Vector3& q : at) {  // about the centre, translation and rotation do not matter
+    along += model.V_at(q, t).dot(q - centre);
+    squares += (q - centre).squaredNorm();
+  }
+  return along / squares;
+}
+
+void require_plausible_growth(Verdict& verdict, double growth, double most) {
+  if (!(std::abs(growth) <= most)) {
+    verdict.reasons.push_back(message("the machine is larger by ", 1e6 * growth,
+                                      " um/m in all directions, allowed are ", 1e6 * most,
+                                      ": wrong scale of the path, of the ranges or of a temperature"));
+  }
+}
+
 }  // namespace
 
 Result<HeldOutFigures> held_out(const Observations& o, const VolumetricModel* active,
@@ -220,9 +276,17 @@ Result<HeldOutFigures> held_out(const Observations& o, const VolumetricModel* ac
 
 Result<Verdict> judge(const Observations& o, const Solution& solution, const VolumetricModel* active,
                       const GateLimits& limits, const Options& options) {
-  return held_out(o, active, options).map([&](const HeldOutFigures& figures) {
-    return decide(solution.model, figures, limits, active);
-  });
+  const Result<std::vector<Alternative>> others = alternatives(o, solution, options);
+  const Result<HeldOutFigures> figures = held_out(o, active, options);
+  if (!others || !figures) {
+    return tl::unexpected(others ? figures.error() : others.error());
+  }
+  Verdict verdict = decide(solution.model, *figures, limits, active);
+  add_alternatives(verdict, *others);
+  require_plausible_growth(verdict, common_growth(solution.model), limits.max_growth);
+  require_certainty(verdict, correction_size(solution.model));
+  verdict.accepted = verdict.reasons.empty();
+  return verdict;
 }
 
 }  // namespace abbe::calib::otf

@@ -43,6 +43,15 @@ class MeanColumns {
   std::size_t count_ = 0;
 };
 
+MeanColumns mean_columns(const ParameterLayout& layout, const Vector3& t,
+                         std::span<const Vector3> sub_points_m) {
+  MeanColumns columns;
+  for (const Vector3& q : sub_points_m) {
+    columns.add(design_columns_with_rigid(layout, q, t).span());
+  }
+  return columns;
+}
+
 Result<void> check(const Noise& noise) {
   if (!(noise.sigma_range_m > 0) || !(noise.sigma_angle_rad > 0) || !std::isfinite(noise.sigma_range_m) ||
       !std::isfinite(noise.sigma_angle_rad)) {
@@ -53,6 +62,12 @@ Result<void> check(const Noise& noise) {
   if (!(noise.u_scale >= 0) || !std::isfinite(noise.u_scale)) {
     return failure(ErrorCode::BadInput,
                    message("tracker noise: u_scale ", noise.u_scale, ": must not be negative"));
+  }
+  for (const double u : noise.u_axis_scale) {
+    if (!(u >= 0) || !std::isfinite(u)) {
+      return failure(ErrorCode::BadInput,
+                     message("scales: relative uncertainty ", u, ": must not be negative"));
+    }
   }
   return {};
 }
@@ -137,10 +152,7 @@ std::span<const SparseRows::Entry> SparseRows::row(std::size_t i) const {
 }
 
 void append_rows(Observations& o, const PointOnPath& point, std::span<const Vector3> sub_points_m) {
-  MeanColumns columns;
-  for (const Vector3& q : sub_points_m) {
-    columns.add(design_columns_with_rigid(o.layout, q, o.target_offset_m).span());
-  }
+  const MeanColumns columns = mean_columns(o.layout, o.target_offset_m, sub_points_m);
   const std::size_t first = o.sub_points_m.size();
   o.sub_points_m.insert(o.sub_points_m.end(), sub_points_m.begin(), sub_points_m.end());
   const auto append = [&](const Vector3& a, double sigma_m) {
@@ -151,6 +163,22 @@ void append_rows(Observations& o, const PointOnPath& point, std::span<const Vect
   };
   append(point.frame.a2, point.frame.sigma2_m);
   append(point.frame.a3, point.frame.sigma3_m);
+}
+
+Observations with_layout(const Observations& o, ParameterLayout layout) {
+  Observations other = o;
+  other.layout = std::move(layout);
+  other.A = {};
+  MeanColumns columns;
+  for (std::size_t i = 0; i < o.rows.size(); ++i) {
+    const Observation& row = o.rows[i];
+    if (i == 0 || row.first_sub_point != o.rows[i - 1].first_sub_point) {  // the rows of a block share them
+      columns = mean_columns(other.layout, o.target_offset_m,
+                             std::span(o.sub_points_m).subspan(row.first_sub_point, row.sub_points));
+    }
+    other.A.append(columns.along(row.direction));
+  }
+  return other;
 }
 
 Result<Observations> observe(std::span<const TrackerObservation> samples, const Machine& machine,
@@ -179,7 +207,9 @@ Result<Observations> observe_blocks(const BlockSeries& series, const Machine& ma
   Observations o{.layout = *std::move(layout),
                  .target_offset_m = machine.target_offset_m,
                  .alignment = *std::move(alignment),
-                 .u_scale = noise.u_scale};
+                 .vertices_m = path.vertices_m,
+                 .u_scale = noise.u_scale,
+                 .u_axis_scale = noise.u_axis_scale};
   o.samples = series.samples;
   o.lost_samples = series.lost_samples;
   o.blocks = series.blocks.size();

@@ -3,7 +3,9 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <optional>
 
+#include "abbe/calib/otf/lack_of_fit.hpp"
 #include "message.hpp"
 #include "otf/check_stopped.hpp"
 
@@ -47,12 +49,14 @@ ResidualStatistics residual_statistics(const Observations& o, std::span<const do
   return s;
 }
 
-/// Turbulence, vibration or a tracker worse than its data sheet show here first; they must not leave as a
-/// small uncertainty. Smaller residuals than stated prove nothing and change nothing.
-double covariance_factor(double chi2_per_dof, std::size_t dof) {
+/// Turbulence, vibration, a tracker worse than its data sheet and effects the model does not have show here
+/// first; they must not leave as a small uncertainty. Smaller residuals than stated prove nothing and change
+/// nothing.
+double covariance_factor(const ResidualNoise& noise, std::size_t dof) {
   constexpr double kNormal999 = 3.090;  // 99.9 % quantile; chi2/dof has standard deviation sqrt(2/dof)
   const double unsuspicious = 1.0 + kNormal999 * std::sqrt(2.0 / static_cast<double>(dof));
-  return chi2_per_dof > unsuspicious ? chi2_per_dof : 1.0;
+  const double factor = noise.covariance_factor();
+  return factor > unsuspicious ? factor : 1.0;
 }
 
 Statistics statistics(const Observations& o, const Adjustment& a, const Residuals& residuals) {
@@ -70,7 +74,9 @@ Statistics statistics(const Observations& o, const Adjustment& a, const Residual
   s.chi2 = chi2(o, residuals.after_m);
   s.chi2_per_dof = s.chi2 / static_cast<double>(s.degrees_of_freedom);
   s.sigma0 = std::sqrt(s.chi2_per_dof);
-  s.covariance_factor = covariance_factor(s.chi2_per_dof, s.degrees_of_freedom);
+  const ResidualNoise noise = residual_noise(o, residuals.after_m, s.degrees_of_freedom);
+  s.correlation = noise.correlation;
+  s.covariance_factor = covariance_factor(noise, s.degrees_of_freedom);
   s.before = residual_statistics(o, residuals.before_m);
   s.after = residual_statistics(o, residuals.after_m);
   s.iterations = 1;
@@ -92,6 +98,18 @@ Eigen::VectorXd dU_dscale(const Observations& o, const Adjustment& a) {
     }
   }
   return a.dU_dg * g;
+}
+
+/// How U moves per relative change of the scale of an axis: its positioning table has the slope 1, and is
+/// zero at the reference.
+Eigen::VectorXd dU_daxis_scale(const ParameterLayout& layout, Axis axis) {
+  Eigen::VectorXd slope = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(layout.fit_size()));
+  const AxisNodes& nodes = layout.nodes()[index(axis)];
+  const std::optional<Table> positioning = layout.find({static_cast<Motion>(index(axis)), axis});
+  for (std::size_t i = 0; positioning && i < nodes.nodes_m.size(); ++i) {
+    slope(static_cast<Eigen::Index>(positioning->offset + i)) = nodes.nodes_m[i] - nodes.reference_m;
+  }
+  return slope;
 }
 
 void report(const Options& options, double fraction) {
@@ -127,6 +145,10 @@ Result<Solution> solve(const Observations& o, const Options& options) {
   a->covariance *= figures.covariance_factor;
   if (o.u_scale > 0.0) {
     const Eigen::VectorXd moved = o.u_scale * dU_dscale(o, *a);
+    a->covariance += moved * moved.transpose();
+  }
+  for (const Axis axis : kAllAxes) {
+    const Eigen::VectorXd moved = o.u_axis_scale[index(axis)] * dU_daxis_scale(o.layout, axis);
     a->covariance += moved * moved.transpose();
   }
   const auto n = static_cast<Eigen::Index>(o.layout.model_size());

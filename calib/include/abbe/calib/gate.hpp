@@ -35,9 +35,12 @@ struct HeldOutFigures {
 };
 
 struct GateLimits {
-  double max_error_m = 1e-3;     ///< |V| anywhere; 1 mm: larger is a machine to be repaired, or a wrong path
-  double max_gradient = 5e-3;    ///< |dV/dq|, m/m; 5 mm/m: 250 um between nodes 50 mm apart
-  double min_improvement = 0.0;  ///< required relative drop of the held-out figure; 0: merely better
+  double max_error_m = 1e-3;   ///< |V| anywhere; 1 mm: larger is a machine to be repaired, or a wrong path
+  double max_gradient = 5e-3;  ///< |dV/dq|, m/m; 5 mm/m: 250 um between nodes 50 mm apart
+  /// |growth of the machine alike in all directions|: 200 um/m; larger is a wrong unit, path, range or
+  /// temperature.
+  double max_growth = 200e-6;
+  double min_improvement = 0.0;        ///< required relative drop of the held-out figure; 0: merely better
   bool accept_smaller_volume = false;  ///< than that of the active model
 };
 

@@ -7,6 +7,7 @@
 /// the same rows, and is compared by what remains. That makes the comparison independent of gauges, too.
 
 #include "abbe/calib/gate.hpp"
+#include "abbe/calib/otf/lack_of_fit.hpp"
 #include "abbe/calib/otf/solve.hpp"
 
 namespace abbe::calib::otf {
@@ -14,12 +15,13 @@ namespace abbe::calib::otf {
 /// `active` may be null; it is compared on the rows inside its volume, and left out if it does not hold for
 /// this run's target offset.
 /// A leg that alone touches a node of the tables is never held out: without it the node is anything. Such
-/// observations are counted. RankDeficient if no fold can be left out, TooFewObservations with fewer legs than
-/// folds.
+/// observations are counted. RankDeficient if no fold can be left out, TooFewObservations with fewer legs
+/// than folds.
 [[nodiscard]] Result<HeldOutFigures> held_out(const Observations&, const VolumetricModel* active,
                                               const Options& = {});
 
-/// held_out() and the limits of the gate.
+/// held_out(), the limits of the gate, and what the residuals show: an alternative that moves the model by
+/// more than its uncertainty refuses it, and so does an uncertainty of half the correction and more.
 [[nodiscard]] Result<Verdict> judge(const Observations&, const Solution&, const VolumetricModel* active,
                                     const GateLimits& = {}, const Options& = {});
 

@@ -4,6 +4,7 @@
 /// information without synchronised clocks (weight 0 in [Sanders 2023] eq. (4)).
 
 #include <Eigen/Core>
+#include <array>
 #include <cstddef>
 #include <span>
 #include <vector>
@@ -50,8 +51,10 @@ struct Observations {
   std::vector<Observation> rows{};
   std::vector<Vector3> sub_points_m{};  ///< nominal axis positions a row is averaged over
   Alignment alignment{};
-  double u_scale = 0.0;              ///< see Noise
-  std::vector<Vector3> covered_m{};  ///< axis positions whose hull the used blocks cover
+  std::vector<Vector3> vertices_m{};     ///< of the path, axis positions
+  double u_scale = 0.0;                  ///< see Noise
+  std::array<double, 3> u_axis_scale{};  ///< see Noise
+  std::vector<Vector3> covered_m{};      ///< axis positions whose hull the used blocks cover
   std::size_t samples = 0;
   std::size_t lost_samples = 0;
   std::size_t blocks = 0;
@@ -70,6 +73,9 @@ struct PointOnPath {
   double samples = 1.0;  ///< in the mean
 };
 void append_rows(Observations&, const PointOnPath&, std::span<const Vector3> sub_points_m);
+
+/// The same observations for other tables: another order of the axes, other nodes.
+[[nodiscard]] Observations with_layout(const Observations&, ParameterLayout);
 
 [[nodiscard]] Result<Observations> observe(std::span<const TrackerObservation>, const Machine&, const Path&,
                                            const Noise&, const Options& = {});

@@ -5,6 +5,7 @@
 /// both directions across it. Correlated noise (turbulence) makes stated uncertainties too small, by 12 to 24
 /// times at 1 s.
 
+#include <array>
 #include <cstddef>
 #include <functional>
 #include <span>
@@ -43,6 +44,9 @@ struct Noise {
   /// Relative standard uncertainty all ranges of the run have in common (index of the air). No residual shows
   /// it: it is a growth of the whole machine.
   double u_scale = 0.0;
+  /// Relative standard uncertainty of the length of the scales of X, Y, Z (their temperature and expansion),
+  /// in common for all readings of an axis. No residual shows it either: it is a positioning error.
+  std::array<double, 3> u_axis_scale{};
 };
 
 enum class Stage { Observe, Align, Solve, Judge };

@@ -82,9 +82,10 @@ struct Statistics {
   double condition = 0.0;
   double chi2 = 0.0;
   double chi2_per_dof = 0.0;
-  double sigma0 = 0.0;  ///< sqrt(chi2_per_dof)
-  /// What the covariance was multiplied with: chi2_per_dof where the residuals are larger than the stated
-  /// uncertainties explain (beyond the 99.9 % quantile of chi2/dof), else 1 [Birge 1932].
+  double sigma0 = 0.0;       ///< sqrt(chi2_per_dof)
+  double correlation = 1.0;  ///< blocks that carry the information of one, see ResidualNoise
+  /// What the covariance was multiplied with: chi2_per_dof times `correlation` where that is more than the
+  /// stated uncertainties explain (beyond the 99.9 % quantile of chi2/dof), else 1 [Birge 1932].
   double covariance_factor = 1.0;
   ResidualStatistics before;  ///< deviations after the alignment, no model
   ResidualStatistics after;

@@ -1,0 +1,59 @@
+#include "otf/added_columns.hpp"
+
+#include <Eigen/Dense>
+
+namespace abbe::calib::otf {
+
+AddedColumns::AddedColumns(std::size_t columns, std::size_t unknowns) {
+  const auto k = static_cast<Eigen::Index>(columns), n = static_cast<Eigen::Index>(unknowns);
+  CWC_ = Eigen::MatrixXd::Zero(k, k);
+  CWA_ = Eigen::MatrixXd::Zero(k, n);
+  CWr_ = Eigen::VectorXd::Zero(k);
+}
+
+void AddedColumns::add(const Observation& o, std::span<const SparseRows::Entry> row, double residual_m,
+                       std::span<const double> values) {
+  const Eigen::Map<const Eigen::VectorXd> c(values.data(), static_cast<Eigen::Index>(values.size()));
+  const double weight = 1.0 / (o.sigma_m * o.sigma_m);
+  CWC_.noalias() += weight * c * c.transpose();
+  CWr_ += weight * residual_m * c;
+  for (const SparseRows::Entry& e : row) {
+    CWA_.col(static_cast<Eigen::Index>(e.column)) += weight * e.value * c;
+  }
+}
+
+AddedColumns& AddedColumns::operator-=(const AddedColumns& other) {
+  CWC_ -= other.CWC_;
+  CWA_ -= other.CWA_;
+  CWr_ -= other.CWr_;
+  return *this;
+}
+
+AddedColumns::Estimate AddedColumns::estimate(const Eigen::MatrixXd& Q) const {
+  const Eigen::MatrixXd QAWC = Q * CWA_.transpose();
+  const Eigen::Index k = CWr_.size();
+  // Columns of unit length first. What the model follows itself up to 1e-6 of its length says nothing.
+  constexpr double kFollowed = 1e-6;
+  Eigen::VectorXd scale(k);
+  for (Eigen::Index i = 0; i < k; ++i) {
+    scale(i) = CWC_(i, i) > 0.0 ? 1.0 / std::sqrt(CWC_(i, i)) : 0.0;
+  }
+  const Eigen::MatrixXd S = scale.asDiagonal() * (CWC_ - CWA_ * QAWC) * scale.asDiagonal();
+  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(0.5 * (S + S.transpose()));
+  const Eigen::VectorXd g = eigen.eigenvectors().transpose() * scale.asDiagonal() * CWr_;
+  Estimate e;
+  Eigen::VectorXd d = Eigen::VectorXd::Zero(k);
+  for (Eigen::Index i = 0; i < k; ++i) {
+    const double value = eigen.eigenvalues()(i);
+    if (value > kFollowed) {
+      e.drop += g(i) * g(i) / value;
+      d += g(i) / value * eigen.eigenvectors().col(i);
+      ++e.columns;
+    }
+  }
+  e.d = scale.asDiagonal() * d;
+  e.dU = QAWC * e.d;
+  return e;
+}
+
+}  // namespace abbe::calib::otf

@@ -1,0 +1,195 @@
+#include "otf/alternative_columns.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "abbe/calib/rigid_body_model.hpp"
+#include "message.hpp"
+
+namespace abbe::calib::otf {
+namespace {
+
+constexpr std::size_t kRigid = 6, kDrift = 9, kBacklash = 18, kShift = 3;
+
+std::vector<std::array<int, 3>> directions_of(const std::vector<Vector3>& vertices_m) {
+  constexpr double kRests_m = 1e-6;  // an axis that moves by less holds the side of its last motion
+  std::vector<std::array<int, 3>> all;
+  std::array<int, 3> now{};
+  for (std::size_t leg = 0; leg + 1 < vertices_m.size(); ++leg) {
+    const Vector3 way = vertices_m[leg + 1] - vertices_m[leg];
+    for (Eigen::Index a = 0; a < 3; ++a) {
+      if (std::abs(way(a)) > kRests_m) {
+        now[static_cast<std::size_t>(a)] = way(a) > 0.0 ? 1 : -1;
+      }
+    }
+    all.push_back(now);
+  }
+  return all;
+}
+
+std::string um(const Vector3& v_m) {
+  return message("(", 1e6 * v_m.x(), ", ", 1e6 * v_m.y(), ", ", 1e6 * v_m.z(), ") um");
+}
+
+}  // namespace
+
+AlternativeColumns::AlternativeColumns(const Observations& o)
+    : o_(o), direction_(directions_of(o.vertices_m)) {
+  for (const Observation& row : o.rows) {
+    centre_m_ += row.axis_position_m / static_cast<double>(o.rows.size());
+  }
+  last_block_ = static_cast<double>(std::max<std::size_t>(1, o.rows.back().block));
+}
+
+void AlternativeColumns::rigid(const Observation& row, Values& v) const {
+  const Vector3 moment = (row.axis_position_m - centre_m_).cross(row.direction);
+  for (std::size_t k = 0; k < 3; ++k) {
+    v[k] = row.direction(static_cast<Eigen::Index>(k));
+    v[3 + k] = moment(static_cast<Eigen::Index>(k));
+  }
+}
+
+std::size_t AlternativeColumns::values(const Added& added, const Observation& row, Values& v) const {
+  switch (added.cause) {
+    case Cause::Moved:
+      rigid(row, v);
+      return row.block >= added.place ? kRigid : 0;
+    case Cause::Drift: {
+      rigid(row, v);
+      for (Eigen::Index k = 0; k < 3; ++k) {
+        v[kRigid + static_cast<std::size_t>(k)] = row.direction(k) * (row.axis_position_m(k) - centre_m_(k));
+      }
+      const double time = static_cast<double>(row.block) / last_block_ - 0.5;  // of the run
+      for (std::size_t k = 0; k < kDrift; ++k) {
+        v[k] *= time;
+      }
+      return kDrift;
+    }
+    case Cause::Backlash:
+      for (const Axis axis : kAllAxes) {
+        const Vector3 l = lever(o_.layout.chain(), axis, row.axis_position_m, o_.target_offset_m);
+        const Vector3 moment = l.cross(row.direction);
+        const double half = 0.5 * direction_[row.leg][index(axis)];
+        for (std::size_t k = 0; k < 3; ++k) {
+          v[kRigid * index(axis) + k] = half * row.direction(static_cast<Eigen::Index>(k));
+          v[kRigid * index(axis) + 3 + k] = half * moment(static_cast<Eigen::Index>(k));
+        }
+      }
+      return kBacklash;
+    case Cause::Vertex: {
+      const bool ends_here = row.leg + 1 == added.place, begins_here = row.leg == added.place;
+      if (!ends_here && !begins_here) {
+        return 0;
+      }
+      const Vector3 &from = o_.vertices_m[row.leg], &to = o_.vertices_m[row.leg + 1];
+      const double share = (row.axis_position_m - from).dot(to - from) / (to - from).squaredNorm();
+      for (std::size_t k = 0; k < kShift; ++k) {
+        v[k] = (ends_here ? share : 1.0 - share) * row.direction(static_cast<Eigen::Index>(k));
+      }
+      return kShift;
+    }
+    case Cause::Leg:
+      for (std::size_t k = 0; k < kShift; ++k) {
+        v[k] = row.direction(static_cast<Eigen::Index>(k));
+      }
+      return row.leg == added.place ? kShift : 0;
+    case Cause::RangeOffset:
+      v[0] = row.direction.dot(
+          (row.axis_position_m + o_.target_offset_m - o_.alignment.T_machine_tracker.t_m).normalized());
+      return 1;
+    default:
+      return 0;
+  }
+}
+
+/// All places of a step in one pass: the sums behind a place are those of all rows less those before.
+AlternativeColumns::Family AlternativeColumns::steps(std::span<const double> residual_m) const {
+  constexpr std::size_t kPlaces = 100, kMargin = 2;
+  const std::size_t rows = o_.rows.size(), stride = std::max<std::size_t>(2, rows / kPlaces);
+  AddedColumns sum(kRigid, o_.layout.fit_size());
+  Family before;
+  Values v{};
+  for (std::size_t i = 0; i < rows; ++i) {
+    const bool new_block = i == 0 || o_.rows[i].block != o_.rows[i - 1].block;
+    if (new_block && i / stride > before.size() && i >= kMargin * stride && i + kMargin * stride <= rows) {
+      before.emplace_back(Added{Cause::Moved, o_.rows[i].block}, sum);
+    }
+    rigid(o_.rows[i], v);
+    sum.add(o_.rows[i], o_.A.row(i), residual_m[i], std::span(v).first(kRigid));
+  }
+  for (auto& [added, sums] : before) {
+    AddedColumns behind = sum;
+    behind -= sums;
+    sums = std::move(behind);
+  }
+  return before;
+}
+
+std::vector<AlternativeColumns::Family> AlternativeColumns::sums(std::span<const double> residual_m) const {
+  const auto family = [&](Cause cause, std::size_t places, std::size_t columns) {
+    Family all;
+    for (std::size_t place = 0; place < places; ++place) {
+      all.emplace_back(Added{cause, place}, AddedColumns(columns, o_.layout.fit_size()));
+    }
+    return all;
+  };
+  const std::size_t vertices = o_.vertices_m.size();
+  std::vector<Family> all{family(Cause::Drift, 1, kDrift), family(Cause::Backlash, 1, kBacklash),
+                          family(Cause::RangeOffset, 1, 1), family(Cause::Vertex, vertices, kShift),
+                          family(Cause::Leg, vertices - 1, kShift)};
+  Values v{};
+  for (std::size_t i = 0; i < o_.rows.size(); ++i) {
+    const Observation& row = o_.rows[i];
+    const auto add = [&](std::pair<Added, AddedColumns>& one) {
+      if (const std::size_t count = values(one.first, row, v); count > 0) {
+        one.second.add(row, o_.A.row(i), residual_m[i], std::span(v).first(count));
+      }
+    };
+    for (const std::size_t of_every_row : {0U, 1U, 2U}) {
+      add(all[of_every_row].front());
+    }
+    add(all[3][row.leg]);
+    add(all[3][row.leg + 1]);
+    add(all[4][row.leg]);
+  }
+  all.push_back(steps(residual_m));
+  return all;
+}
+
+std::string AlternativeColumns::text(const Added& added, const Eigen::VectorXd& d) const {
+  const Vector3 shift = d.size() >= 3 ? Vector3(d.head<3>()) : Vector3::Zero();
+  switch (added.cause) {
+    case Cause::Moved: {
+      const auto at = std::find_if(o_.rows.begin(), o_.rows.end(),
+                                   [&](const Observation& row) { return row.block >= added.place; });
+      return message("the tracker or the machine moved by ", 1e6 * shift.norm(), " um and ",
+                     1e6 * d.segment<3>(3).norm(), " urad on leg ", at == o_.rows.end() ? 0 : at->leg,
+                     " (block ", added.place, ")");
+    }
+    case Cause::Drift:
+      return message("the tracker or the machine drifts: by ", 1e6 * shift.norm(), " um, ",
+                     1e6 * d.segment<3>(3).norm(), " urad and ", 1e6 * d.tail<3>().norm(),
+                     " um/m of length in the run");
+    case Cause::Backlash: {
+      std::string all;
+      for (const Axis axis : kAllAxes) {
+        const auto of_axis = d.segment<6>(static_cast<Eigen::Index>(kRigid * index(axis)));
+        all += message(all.empty() ? "" : ", ", letter(axis), " ", um(of_axis.head<3>()), " and ",
+                       1e6 * of_axis.tail<3>().norm(), " urad");
+      }
+      return message("the axes have backlash: ", all);
+    }
+    case Cause::Vertex:
+      return message("vertex ", added.place, " was driven at ", um(shift), " from where the path says");
+    case Cause::Leg:
+      return message("leg ", added.place, " was driven or measured at ", um(shift),
+                     " from where the path says");
+    case Cause::RangeOffset:
+      return message("all ranges of the tracker have an offset of ", 1e6 * d(0),
+                     " um: home position or reflector");
+    default:
+      return {};
+  }
+}
+
+}  // namespace abbe::calib::otf

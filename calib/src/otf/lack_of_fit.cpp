@@ -1,0 +1,396 @@
+#include "abbe/calib/otf/lack_of_fit.hpp"
+
+#include <Eigen/Dense>
+#include <algorithm>
+#include <cmath>
+#include <optional>
+
+#include "abbe/calib/model_comparison.hpp"
+#include "abbe/calib/rigid_body_model.hpp"
+#include "message.hpp"
+#include "otf/added_columns.hpp"
+#include "otf/alternative_columns.hpp"
+#include "otf/check_stopped.hpp"
+
+namespace abbe::calib::otf {
+namespace {
+
+/// Of a false alarm in a run without a fault, over all alternatives together.
+constexpr double kFalseAlarm = 1e-4;
+constexpr double kCauses = 9.0;
+/// Only a model that misses by that much is worth another design: it costs an adjustment each.
+constexpr double kSuspicious = 2.0;
+
+std::size_t series_end(const Observations& o, std::size_t begin) {
+  std::size_t end = begin;
+  while (end < o.rows.size() && o.rows[end].leg == o.rows[begin].leg) {
+    ++end;
+  }
+  return end;
+}
+
+/// Whitened residuals of one leg along a2 or a3: every second row.
+std::vector<double> whitened(const Observations& o, std::span<const double> residual_m, std::size_t begin,
+                             std::size_t end) {
+  std::vector<double> w;
+  for (std::size_t i = begin; i < end; i += 2) {
+    w.push_back(residual_m[i] / o.rows[i].sigma_m);
+  }
+  return w;
+}
+
+double median(std::vector<double> values) {
+  if (values.empty()) {
+    return 0.0;
+  }
+  const auto middle = values.begin() + std::ssize(values) / 2;
+  std::nth_element(values.begin(), middle, values.end());
+  return *middle;
+}
+
+/// Upper bound of the quantile of chi2 with k degrees of freedom for probability 1 - e^-x [Laurent 2000].
+double chi2_bound(double k, double x) {
+  return k + 2.0 * std::sqrt(k * x) + 2.0 * x;
+}
+
+/// At most about 9 nodes of each axis, the ends included.
+std::vector<Vector3> places(const MachineNodes& nodes) {
+  constexpr std::size_t kCells = 8;
+  MachineNodes few;
+  for (const Axis a : kAllAxes) {
+    const std::vector<double>& all = nodes[index(a)].nodes_m;
+    const std::size_t step = std::max<std::size_t>(1, (all.size() - 1 + kCells - 1) / kCells);
+    for (std::size_t i = 0; i + 1 < all.size(); i += step) {
+      few[index(a)].nodes_m.push_back(all[i]);
+    }
+    few[index(a)].nodes_m.push_back(all.back());
+  }
+  return tensor_grid(few);
+}
+
+/// V at some places is D U; without the best-fit rigid motion it is P D U. D^T P D: the sum of squares of
+/// what any U and any covariance bring there. [m^2 per U^2], and the number of places.
+class RigidFreeNorm {
+ public:
+  RigidFreeNorm(const ParameterLayout& layout, const Vector3& t) {
+    const std::vector<Vector3> at = places(layout.nodes());
+    const auto n = static_cast<Eigen::Index>(layout.model_size());
+    const auto rows = 3 * std::ssize(at);
+    Eigen::MatrixXd D = Eigen::MatrixXd::Zero(rows, n), rigid(rows, 6);
+    for (Eigen::Index i = 0; i < std::ssize(at); ++i) {
+      const Vector3& q = at[static_cast<std::size_t>(i)];
+      const DesignColumns columns = design_columns(layout, q, t);
+      for (const Column& c : columns.span()) {
+        D.block<3, 1>(3 * i, static_cast<Eigen::Index>(c.parameter)) = c.dV_dU;
+      }
+      rigid.block<3, 3>(3 * i, 0).setIdentity();
+      rigid.block<3, 3>(3 * i, 3) = rotation_effect(q + t);
+    }
+    const Eigen::MatrixXd basis =
+        rigid.householderQr().householderQ() * Eigen::MatrixXd::Identity(rows, rigid.cols());
+    const Eigen::MatrixXd shared = basis.transpose() * D;
+    norm_ = D.transpose() * D - shared.transpose() * shared;
+    places_ = static_cast<double>(at.size());
+  }
+
+  [[nodiscard]] double rms_m(const Eigen::VectorXd& U) const {
+    const auto model = U.head(norm_.rows());
+    return std::sqrt(std::max(0.0, model.dot(norm_ * model)) / places_);
+  }
+  [[nodiscard]] double rms_u_m(const Eigen::MatrixXd& covariance) const {
+    const auto model = covariance.topLeftCorner(norm_.rows(), norm_.rows());
+    return std::sqrt(std::max(0.0, norm_.cwiseProduct(model).sum()) / places_);
+  }
+
+ private:
+  Eigen::MatrixXd norm_;
+  double places_ = 1.0;
+};
+
+/// The model, and what is needed to hold alternatives against it.
+struct Fit {
+  const Observations& o;
+  const std::vector<double>& residual_m;
+  Adjustment adjustment;
+  ResidualNoise noise;
+  std::size_t degrees_of_freedom = 0;
+  double chi2 = 0.0;
+  RigidFreeNorm norm;
+  double u_white_m = 0.0;
+
+  /// chi2 beyond what noise from block to block explains.
+  [[nodiscard]] double excess() const {
+    return chi2 - static_cast<double>(degrees_of_freedom) * noise.local * noise.local;
+  }
+};
+
+Result<Fit> fit_of(const Observations& o, const Solution& solution, const Options& options) {
+  Result<Adjustment> a = adjust(normal_equations(o), o.layout, options.gauge_weight);
+  if (!a) {
+    return tl::unexpected(a.error());
+  }
+  const std::size_t dof = solution.statistics.degrees_of_freedom;
+  Fit fit{.o = o,
+          .residual_m = solution.residuals.after_m,
+          .adjustment = *std::move(a),
+          .noise = residual_noise(o, solution.residuals.after_m, dof),
+          .degrees_of_freedom = dof,
+          .chi2 = solution.statistics.chi2,
+          .norm = RigidFreeNorm(o.layout, o.target_offset_m)};
+  fit.u_white_m = fit.norm.rms_u_m(fit.adjustment.covariance);
+  return fit;
+}
+
+/// What is left of the residuals once the alternative is part of the model.
+std::vector<double> residuals_with(const Fit& fit, const AlternativeColumns& columns, const Added& added,
+                                   const AddedColumns::Estimate& e) {
+  std::vector<double> r = fit.residual_m;
+  AlternativeColumns::Values values{};
+  for (std::size_t i = 0; i < r.size(); ++i) {
+    for (const SparseRows::Entry& entry : fit.o.A.row(i)) {
+      r[i] += entry.value * e.dU(static_cast<Eigen::Index>(entry.column));
+    }
+    const std::size_t count = columns.values(added, fit.o.rows[i], values);
+    for (std::size_t k = 0; k < count; ++k) {
+      r[i] -= values[k] * e.d(static_cast<Eigen::Index>(k));
+    }
+  }
+  return r;
+}
+
+/// Added columns that are significant, the best of their cause.
+std::optional<Alternative> best_of(const Fit& fit, const AlternativeColumns& columns,
+                                   std::span<const std::pair<Added, AddedColumns>> family) {
+  const Added* best = nullptr;
+  AddedColumns::Estimate best_estimate;
+  const double x = std::log(kCauses * static_cast<double>(family.size()) / kFalseAlarm);
+  const double noise = std::max(1.0, fit.noise.local);
+  for (const auto& [added, sums] : family) {
+    AddedColumns::Estimate e = sums.estimate(fit.adjustment.dU_dg);
+    const bool significant = e.drop > noise * noise * chi2_bound(static_cast<double>(e.columns), x);
+    if (significant && e.drop > best_estimate.drop) {
+      best = &added;
+      best_estimate = std::move(e);
+    }
+  }
+  if (best == nullptr) {
+    return std::nullopt;
+  }
+  const std::vector<double> left = residuals_with(fit, columns, *best, best_estimate);
+  const double factor =
+      residual_noise(fit.o, left, fit.degrees_of_freedom - best_estimate.columns).covariance_factor();
+  return Alternative{
+      .cause = best->cause,
+      .text = columns.text(*best, best_estimate.d),
+      .explained = std::clamp(best_estimate.drop / std::max(fit.excess(), best_estimate.drop), 0.0, 1.0),
+      .bias_m = fit.norm.rms_m(best_estimate.dU),
+      .u_m = fit.u_white_m * std::sqrt(factor)};
+}
+
+/// The same observations adjusted with another design.
+std::optional<Alternative> other_design(const Fit& fit, const Solution& solution,
+                                        Result<ParameterLayout> layout, Cause cause, std::string text,
+                                        const Options& options) {
+  if (!layout) {
+    return std::nullopt;
+  }
+  const Observations other = with_layout(fit.o, *std::move(layout));
+  const Result<Adjustment> a = adjust(normal_equations(other), other.layout, options.gauge_weight);
+  if (!a || other.rows.size() <= a->rank) {
+    return std::nullopt;
+  }
+  std::vector<double> left(other.rows.size());
+  double chi2 = 0.0;
+  for (std::size_t i = 0; i < left.size(); ++i) {
+    left[i] = other.rows[i].y_m;
+    for (const SparseRows::Entry& e : other.A.row(i)) {
+      left[i] -= e.value * a->U(static_cast<Eigen::Index>(e.column));
+    }
+    chi2 += left[i] * left[i] / (other.rows[i].sigma_m * other.rows[i].sigma_m);
+  }
+  const double drop = fit.chi2 - chi2;
+  constexpr double kClearlyBetter = 0.5;
+  if (!(drop > kClearlyBetter * fit.excess())) {
+    return std::nullopt;
+  }
+  std::vector<Vector3> points, difference;
+  const Vector3& t = fit.o.target_offset_m;
+  for (const Vector3& q : places(other.layout.nodes())) {
+    points.push_back(q + t);
+    difference.push_back(solution.model.V_at(q, t) -
+                         volumetric_error(other.layout, {a->U.data(), other.layout.model_size()}, q, t));
+  }
+  const auto bias = rigid_free(points, difference);
+  const double factor = residual_noise(other, left, other.rows.size() - a->rank).covariance_factor();
+  return Alternative{.cause = cause,
+                     .text = std::move(text),
+                     .explained = std::clamp(drop / fit.excess(), 0.0, 1.0),
+                     .bias_m = bias ? bias->rigid_free.rms_m : 0.0,
+                     .u_m = fit.u_white_m * std::sqrt(factor)};
+}
+
+std::optional<Alternative> other_order(const Fit& fit, const Solution& solution, const Options& options) {
+  std::array<char, 3> order{'X', 'Y', 'Z'};
+  std::string used;
+  for (const Axis a : fit.o.layout.chain().order_w_to_t()) {
+    used += letter(a);
+  }
+  std::optional<Alternative> best;
+  do {
+    const std::string letters(order.begin(), order.end());
+    if (letters == used) {
+      continue;
+    }
+    const auto chain = KinematicChain::parse(message("[w b ", order[0], " ", order[1], " ", order[2], " t]"));
+    if (!chain) {
+      continue;
+    }
+    auto found =
+        other_design(fit, solution, ParameterLayout::observable_with_one_target(*chain, fit.o.layout.nodes()),
+                     Cause::ChainOrder,
+                     message("the axes carry each other in the order ", letters, " from workpiece to tool, ",
+                             "not ", used, " as the machine's chain says"),
+                     options);
+    if (found && (!best || found->explained > best->explained)) {
+      best = std::move(found);
+    }
+  } while (std::next_permutation(order.begin(), order.end()));
+  return best;
+}
+
+std::optional<Alternative> closer_nodes(const Fit& fit, const Solution& solution, const Options& options) {
+  MachineNodes closer = fit.o.layout.nodes();
+  double widest_m = 0.0;
+  for (AxisNodes& axis : closer) {
+    std::vector<double> nodes_m;
+    for (std::size_t i = 0; i + 1 < axis.nodes_m.size(); ++i) {
+      nodes_m.push_back(axis.nodes_m[i]);
+      nodes_m.push_back(0.5 * (axis.nodes_m[i] + axis.nodes_m[i + 1]));
+      widest_m = std::max(widest_m, axis.nodes_m[i + 1] - axis.nodes_m[i]);
+    }
+    nodes_m.push_back(axis.nodes_m.back());
+    axis.nodes_m = std::move(nodes_m);
+  }
+  constexpr std::size_t kMostUnknowns = 800;  // a second for the adjustment
+  auto layout = ParameterLayout::observable_with_one_target(fit.o.layout.chain(), closer);
+  if (layout && layout->fit_size() > kMostUnknowns) {
+    return std::nullopt;
+  }
+  return other_design(
+      fit, solution, std::move(layout), Cause::NodeSpacing,
+      message("the nodes are too far apart (", 1e3 * widest_m, " mm) for the errors of this machine"),
+      options);
+}
+
+}  // namespace
+
+double ResidualNoise::covariance_factor() const {
+  return std::max(1.0, sigma0 * sigma0 * correlation);
+}
+
+ResidualNoise residual_noise(const Observations& o, std::span<const double> residual_m,
+                             std::size_t degrees_of_freedom) {
+  constexpr std::size_t kLags = 200;
+  std::vector<double> products(kLags + 1, 0.0), second_differences;
+  std::vector<std::size_t> pairs(kLags + 1, 0);
+  for (std::size_t begin = 0; begin < o.rows.size();) {
+    const std::size_t end = series_end(o, begin);
+    for (const std::size_t first : {begin, begin + 1}) {
+      const std::vector<double> w = whitened(o, residual_m, first, end);
+      for (std::size_t i = 0; i < w.size(); ++i) {
+        for (std::size_t lag = 0; lag <= std::min(kLags, i); ++lag) {
+          products[lag] += w[i] * w[i - lag];
+          ++pairs[lag];
+        }
+        if (i >= 2) {
+          second_differences.push_back(std::abs(w[i] - 2.0 * w[i - 1] + w[i - 2]));
+        }
+      }
+    }
+    begin = end;
+  }
+  constexpr double kMadToSigma = 1.4826, kOfSecondDifference = 6.0;  // variances 1 + 4 + 1
+  ResidualNoise noise;
+  noise.sigma0 = std::sqrt(products[0] / static_cast<double>(std::max<std::size_t>(1, degrees_of_freedom)));
+  noise.local = kMadToSigma * median(std::move(second_differences)) / std::sqrt(kOfSecondDifference);
+  constexpr double kNormal999 =
+      3.090;  // 99.9 % quantile; the coefficient of n pairs of noise scatters by 1/sqrt(n)
+  for (std::size_t lag = 1; lag <= kLags && pairs[lag] > 0; ++lag) {
+    const auto n = static_cast<double>(pairs[lag]);
+    const double coefficient = products[lag] / n / (products[0] / static_cast<double>(pairs[0]));
+    if (!(coefficient > kNormal999 / std::sqrt(n))) {
+      break;
+    }
+    noise.correlation += 2.0 * coefficient;
+  }
+  return noise;
+}
+
+CorrectionSize correction_size(const VolumetricModel& model) {
+  const RigidFreeNorm norm(model.layout(), model.tool_offsets_m().front());
+  return {norm.rms_m(model.U()), norm.rms_u_m(model.covariance())};
+}
+
+std::string_view name(Cause cause) {
+  switch (cause) {
+    case Cause::Moved:
+      return "moved";
+    case Cause::Drift:
+      return "drift";
+    case Cause::Backlash:
+      return "backlash";
+    case Cause::Vertex:
+      return "vertex";
+    case Cause::Leg:
+      return "leg";
+    case Cause::RangeOffset:
+      return "range-offset";
+    case Cause::ChainOrder:
+      return "chain-order";
+    case Cause::NodeSpacing:
+      return "node-spacing";
+    case Cause::CorrelatedNoise:
+      return "correlated-noise";
+  }
+  return "";
+}
+
+Result<std::vector<Alternative>> alternatives(const Observations& o, const Solution& solution,
+                                              const Options& options) {
+  const Result<Fit> fit = fit_of(o, solution, options);
+  if (!fit) {
+    return tl::unexpected(fit.error());
+  }
+  const AlternativeColumns columns(o);
+  std::vector<Alternative> found;
+  for (const auto& family : columns.sums(solution.residuals.after_m)) {
+    if (Result<void> goes_on = check_stopped(options); !goes_on) {
+      return tl::unexpected(goes_on.error());
+    }
+    if (auto best = best_of(*fit, columns, family)) {
+      found.push_back(*std::move(best));
+    }
+  }
+  if (fit->noise.covariance_factor() > kSuspicious && fit->excess() > 0.0) {
+    for (auto better : {other_order(*fit, solution, options), closer_nodes(*fit, solution, options)}) {
+      if (better) {
+        found.push_back(*std::move(better));
+      }
+    }
+  }
+  std::stable_sort(found.begin(), found.end(),
+                   [](const Alternative& a, const Alternative& b) { return a.explained > b.explained; });
+  constexpr double kHalf = 0.5;
+  if (fit->noise.correlation > kSuspicious && (found.empty() || found.front().explained < kHalf)) {
+    found.insert(found.begin(),
+                 {.cause = Cause::CorrelatedNoise,
+                  .text = message("the residuals are correlated over ", fit->noise.correlation,
+                                  " blocks: air turbulence, vibration, or an effect the model does not have"),
+                  .explained = 1.0,
+                  .bias_m = 0.0,
+                  .u_m = fit->u_white_m * std::sqrt(fit->noise.covariance_factor())});
+  }
+  return found;
+}
+
+}  // namespace abbe::calib::otf

@@ -65,6 +65,15 @@ TEST_F(LiveTruthTest, HoldsThroughKillsStopsAndAnOutage) {
   expect_truth(truth.figures());
 }
 
+/// Longer than the lease that Fast DDS gives a participant by default: abbe-dds would drop it, but not it
+/// abbe-dds.
+TEST_F(LiveTruthTest, NoSubscriberIsOrphanedByALongPause) {
+  LiveTruth truth(parts());
+  ASSERT_TRUE(truth.begin());
+  truth.round(LiveTruth::Blow::StopSubscriber, 22.0);
+  expect_truth(truth.figures());
+}
+
 TEST_F(LiveTruthTest, HoldsForRandomRounds) {
   const char* const rounds = std::getenv("ABBE_LIVE_TRUTH_ROUNDS");
   if (rounds == nullptr) GTEST_SKIP() << "scripts/soak live-truth";

@@ -25,12 +25,14 @@ class Drive {
 
   void stand(AxisPosition q, std::chrono::nanoseconds how_long) {
     q_ = q;
+    speed_m_per_s_ = 0.0;
     for (auto t = 0ns; t < how_long; t += kPeriod) show();
   }
   void move(AxisPosition to) {
     const AxisPosition from = q_;
     const double way = std::hypot(to[0] - from[0], to[1] - from[1], to[2] - from[2]);
     const int steps = static_cast<int>(std::ceil(way / kStep_m));
+    speed_m_per_s_ = kStep_m / std::chrono::duration<double>(kPeriod).count();
     for (int i = 1; i <= steps; ++i) {
       for (std::size_t a = 0; a < 3; ++a) q_[a] = from[a] + (to[a] - from[a]) * i / steps;
       show();
@@ -50,6 +52,7 @@ class Drive {
     s.head.time = now_;
     s.axis_count = axes_known_ ? 3 : 0;
     for (std::size_t a = 0; a < 3; ++a) s.position[a] = q_[a];
+    s.velocity[0] = speed_m_per_s_;
     s.has_tracker_point = true;
     s.tracker_point.device_time = protocol::DeviceTime{now_.time_since_epoch() + device_ahead_};
     s.tracker_point.p_tracker_m = q_;
@@ -61,6 +64,7 @@ class Drive {
 
   CalibrationSession& session_;
   AxisPosition q_{};
+  double speed_m_per_s_ = 0.0;
   HostTime now_{10s};
   std::chrono::nanoseconds device_ahead_ = 500s;
   bool axes_known_ = true;
@@ -79,6 +83,42 @@ TEST(CalibrationSession, GoesThroughItsStatesAlongThePath) {
   EXPECT_EQ(session.status().state, SessionState::Acquiring);
   drive.stand(kPath.back(), 2s);
   EXPECT_EQ(session.status().state, SessionState::Identifying);
+}
+
+std::string reason_of_a_run_along(const std::vector<AxisPosition>& file,
+                                  const AcquisitionOptions& options = {}) {
+  CalibrationSession session{options};
+  EXPECT_TRUE(session.start({OtfRequest{file}, HostTime{10s}}));
+  Drive drive{session};
+  drive.stand(kPath[0], 1s);
+  for (std::size_t i = 1; i < kPath.size(); ++i) {
+    drive.move(kPath[i]);
+    drive.stand(kPath[i], i + 1 < kPath.size() ? 100ms : 2s);
+  }
+  return session.status().state == SessionState::Refused ? session.status().reason : "";
+}
+
+TEST(CalibrationSession, ScalesThatContradictAVertexEndTheRun) {
+  auto file = kPath;
+  file[2][1] += 0.4e-3;
+  const std::string reason = reason_of_a_run_along(file);
+  EXPECT_NE(reason.find("at vertex 2 Y reads 100.000 mm, the path says 100.400 mm, 0.020 mm allowed"),
+            std::string::npos)
+      << reason;
+}
+
+TEST(CalibrationSession, ScalesThatContradictAPathOfAnotherSizeEndTheRun) {
+  auto file = kPath;
+  for (AxisPosition& q : file)
+    for (double& x : q) x *= 0.999;
+  EXPECT_NE(reason_of_a_run_along(file).find("at vertex 1 X reads 100.000 mm"), std::string::npos);
+}
+
+TEST(CalibrationSession, AMachineMayMissItsCommandByTheTolerance) {
+  auto file = kPath;
+  file[3][2] += 15e-6;
+  EXPECT_EQ(reason_of_a_run_along(file), "");
+  EXPECT_NE(reason_of_a_run_along(file, {.reading_tolerance_m = 10e-6}), "");
 }
 
 TEST(CalibrationSession, TheRunBeginsAndEndsInStandstill) {

@@ -100,6 +100,7 @@ void read_gate(Section& root, Config& out) {
   auto& gate = out.gate;
   section.get("max_error_mm", gate.max_error_m, kMilli, kPositive);
   section.get("max_gradient", gate.max_gradient, kPlain, kPositive);
+  section.get("path_tolerance_mm", gate.path_tolerance_m, kMilli, kPositive);
   section.get("holdout_fraction", gate.holdout_fraction, kPlain, {0.05, 0.5});
   if (section.get("accept", gate.accept)) {
     for (const auto& name : gate.accept)

@@ -218,6 +218,7 @@ AcquisitionOptions acquisition_options(const Config& config) {
   AcquisitionOptions options;
   options.arrival_patience = stretched(options.arrival_patience, config.daemon.speed);
   options.environment = environment_use(config);
+  options.reading_tolerance_m = config.gate.path_tolerance_m;
   if (!config.tracker) return options;
   const std::chrono::duration<double> period{1.0 / config.tracker->point_rate_hz};
   const auto holding = [&period](double points) {

@@ -112,6 +112,7 @@ std::optional<EnvironmentEffect> effect_of(const protocol::Snapshot& s,
         s.has_environment ? s.environment.temperature_K[thermal.config.temperature] : kNotAvailable;
     if (std::isnan(t_K)) return std::nullopt;
     effect.growth[thermal.axis] = calib::growth(expansion(thermal.config, t_K));
+    effect.u_growth[thermal.axis] = calib::u_growth(expansion(thermal.config, t_K));
   }
   if (options.air.assumed_index) {
     const auto index =
@@ -134,7 +135,10 @@ std::array<double, 3> grown(std::array<double, 3> reading_m, const EnvironmentEf
 }
 
 void MeanEffect::take(const EnvironmentEffect& effect) {
-  for (std::size_t a = 0; a < effect.growth.size(); ++a) sum_.growth[a] += effect.growth[a];
+  for (std::size_t a = 0; a < effect.growth.size(); ++a) {
+    sum_.growth[a] += effect.growth[a];
+    sum_.u_growth[a] += effect.u_growth[a];
+  }
   sum_.u_scale += effect.u_scale;
   ++count_;
 }
@@ -143,6 +147,7 @@ EnvironmentEffect MeanEffect::mean() const {
   if (count_ == 0) return {};
   EnvironmentEffect mean = sum_;
   for (double& growth : mean.growth) growth /= static_cast<double>(count_);
+  for (double& u : mean.u_growth) u /= static_cast<double>(count_);
   mean.u_scale /= static_cast<double>(count_);
   return mean;
 }

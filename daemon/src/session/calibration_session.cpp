@@ -137,8 +137,10 @@ CalibrationRun run_of(AcquiredRun acquired) {
   auto& otf = std::get<OtfAcquisition>(acquired.acquisition);
   const EnvironmentEffect effect = otf.environment();
   for (AxisPosition& q_m : acquired.path_m) q_m = grown(q_m, effect, acquired.environment);
-  return OtfRun{
-      .path_m = std::move(acquired.path_m), .points = otf.release(), .u_scale = effect.u_scale};
+  return OtfRun{.path_m = std::move(acquired.path_m),
+                .points = otf.release(),
+                .u_scale = effect.u_scale,
+                .u_axis_scale = effect.u_growth};
 }
 
 void CalibrationSession::judged(std::string model_id, bool passed, std::string reason, HostTime now) {

@@ -44,6 +44,7 @@ Result<OtfCandidate> identify_run(const OtfRun& run, const MachineConfig& machin
   options.stopped = watch.stopped;
   calib::otf::Noise noise = otf_noise(machine_config);
   noise.u_scale = run.u_scale;
+  noise.u_axis_scale = run.u_axis_scale;
   auto observations = calib::otf::observe(points, *machine, otf_path(run.path_m), noise, options);
   if (!observations) return tl::unexpected(error_of(observations.error()));
   auto solution = calib::otf::solve(*observations, options);

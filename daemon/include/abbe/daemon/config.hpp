@@ -292,6 +292,8 @@ struct DdsConfig {
 struct GateConfig {
   double max_error_m = 1e-3;   ///< largest |V| inside the validity volume
   double max_gradient = 5e-3;  ///< largest |dV/dq|, m per m; 250 um between nodes 50 mm apart
+  /// By which the scales may read something else at a vertex of an on-the-fly path, beside their uncertainty.
+  double path_tolerance_m = 20e-6;
   /// Share of the legs of an on-the-fly run that a fit does not see while it is judged by them. Models of a
   /// ball array are judged by positions held out, one after the other.
   double holdout_fraction = 0.2;

@@ -35,6 +35,7 @@ struct EnvironmentUseOptions {
 /// What the environment of an instant did to what was measured then.
 struct EnvironmentEffect {
   std::array<double, 3> growth{1.0, 1.0, 1.0};  ///< of the scales of X, Y, Z; 1 without [[thermal]]
+  std::array<double, 3> u_growth{};             ///< relative standard uncertainty of it; 0 without [[thermal]]
   /// Relative standard uncertainty all distances have in common: of the index they were corrected with, and
   /// the tracker's own.
   double u_scale = 0.0;
@@ -54,7 +55,7 @@ class MeanEffect {
   [[nodiscard]] EnvironmentEffect mean() const;
 
  private:
-  EnvironmentEffect sum_{{0.0, 0.0, 0.0}, 0.0};
+  EnvironmentEffect sum_{.growth = {0.0, 0.0, 0.0}};
   std::size_t count_ = 0;
 };
 

@@ -18,6 +18,7 @@
 #include "abbe/calib/otf/run.hpp"
 #include "abbe/daemon/acquisition_phase.hpp"
 #include "abbe/daemon/environment_use.hpp"
+#include "abbe/daemon/vertex_readings.hpp"
 #include "abbe/protocol/samples.hpp"
 
 namespace abbe::daemon {
@@ -50,9 +51,10 @@ class RunPoints {
 };
 
 struct AcquisitionOptions {
-  double stand_tolerance_m = 0.2e-3;  ///< a machine that moves less than this is standing
-  double vertex_tolerance_m = 2e-3;   ///< how near to the first and last vertex the machine must stand
-  double path_tolerance_m = 10e-3;    ///< farther from every leg than this means another path is being driven
+  double stand_tolerance_m = 0.2e-3;   ///< a machine that moves less than this is standing
+  double vertex_tolerance_m = 2e-3;    ///< how near to the first and last vertex the machine must stand
+  double reading_tolerance_m = 20e-6;  ///< see VertexReadings
+  double path_tolerance_m = 10e-3;  ///< farther from every leg than this means another path is being driven
   std::chrono::nanoseconds stand_before =
       std::chrono::milliseconds{200};  ///< 20 points at 100 Hz, see [calib] alignment
   std::chrono::nanoseconds keep_before =
@@ -80,8 +82,8 @@ class OtfAcquisition {
  public:
   using Phase = AcquisitionPhase;
 
-  /// `path`: vertices of the polyline, at least two. O(n): everything that grows with the path, but release(),
-  /// is done here.
+  /// `path`: vertices of the polyline, at least two. O(n): everything that grows with the path, but
+  /// release(), is done here.
   explicit OtfAcquisition(const std::vector<AxisPosition>& path, AcquisitionOptions options = {});
 
   /// Before the first snapshot. Those before `from` are not looked at.
@@ -111,6 +113,8 @@ class OtfAcquisition {
   void run(const RunPoint& point, const calib::Vector3& q);
   void track_standstill(const RunPoint& point, const calib::Vector3& q);
   void follow_path(const RunPoint& point, const calib::Vector3& q);
+  /// Fails where the scales read something else than the path says.
+  void compare_with_path(const protocol::Snapshot& snapshot, const calib::Vector3& q);
   [[nodiscard]] bool complete(protocol::HostTime now, const calib::Vector3& q) const;
   void trim_end();
   void fail(std::string reason);
@@ -124,6 +128,7 @@ class OtfAcquisition {
   std::deque<RunPoint> before_;  // standstill at the first vertex, the last keep_before of it
   RunPoints points_;
   MeanEffect environment_;
+  VertexReadings readings_{options_.reading_tolerance_m};
   calib::Vector3 stand_at_ = calib::Vector3::Zero();  // where the current standstill began
   protocol::HostTime stand_since_{};
   bool stand_known_ = false;

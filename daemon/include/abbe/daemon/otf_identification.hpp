@@ -3,6 +3,7 @@
 /// its replay. Pure and deterministic: equal points give equal bits. About a second; runs on a thread of its
 /// own in the daemon.
 
+#include <array>
 #include <functional>
 #include <span>
 #include <vector>
@@ -21,6 +22,7 @@ struct OtfRun {
   std::vector<AxisPosition> path_m;
   std::vector<RunPoint> points;
   double u_scale = 0.0;  ///< see calib::otf::Noise
+  std::array<double, 3> u_axis_scale{};  ///< see calib::otf::Noise
 };
 
 /// How an identification is watched from outside; both are called in its thread and may be empty.

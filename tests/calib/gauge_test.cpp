@@ -3,6 +3,8 @@
 #include <gtest/gtest.h>
 
 #include <Eigen/Dense>
+#include <algorithm>
+#include <cmath>
 #include <functional>
 
 #include "abbe/calib/model_comparison.hpp"
@@ -110,6 +112,30 @@ TEST_P(Nullity, IsRemovedExactlyByGaugeG1) {
       K * unobservable_combinations(one_target_, std::array{kTarget}).colwise().normalized();
   Eigen::ColPivHouseholderQR<Eigen::MatrixXd> factor(KN);
   EXPECT_EQ(factor.setThreshold(1e-9).rank(), 20);
+}
+
+/// Nodes are rounded on their way from range and spacing: 1e-17 m beside the reference is at the reference.
+TEST(GaugeG1, FixesTheNodeAtTheReferenceAloneForEveryRangeAndSpacing) {
+  std::size_t beside = 0;
+  for (int half_mm = 10; half_mm <= 1500; half_mm += 10) {
+    for (const int spacing_mm : {10, 15, 20, 25, 30, 40, 45, 50, 60, 75, 100, 150}) {
+      for (const int low_mm : {-half_mm, -half_mm / 2, -half_mm / 6}) {
+        otf::Machine machine = case_a_machine();
+        machine.nodes[0] = *equidistant_nodes(1e-3 * low_mm, 1e-3 * half_mm, 1e-3 * spacing_mm);
+        const auto& nodes = machine.nodes[0].nodes_m;
+        const bool at_node =
+            std::any_of(nodes.begin(), nodes.end(), [](double x) { return std::abs(x) < 1e-12; });
+        beside +=
+            std::any_of(nodes.begin(), nodes.end(), [](double x) { return x != 0.0 && std::abs(x) < 1e-12; });
+        const ParameterLayout layout = *ParameterLayout::with_tables(
+            machine.chain, machine.nodes, std::array{ErrorMotion{Motion::X, Axis::X}});
+        const Eigen::MatrixXd K = gauge_conditions(Gauge::G1, layout);
+        ASSERT_EQ((K.array() != 0.0).count(), at_node ? 1 : 2)
+            << low_mm << " to " << half_mm << " every " << spacing_mm;
+      }
+    }
+  }
+  EXPECT_GT(beside, 50u);  // the ranges this test is about
 }
 
 TEST(GaugeG1, Has24ConditionsFor18Tables) {

@@ -1,5 +1,7 @@
 #include "abbe/calib/volumetric_model.hpp"
 
+#include <Eigen/Cholesky>
+#include <algorithm>
 #include <cmath>
 #include <limits>
 
@@ -44,6 +46,29 @@ Result<void> check_covariance(const Eigen::MatrixXd& C, std::size_t parameters) 
     return failure(ErrorCode::BadInput, "model: covariance has a negative variance");
   }
   return {};
+}
+
+/// For which tools a model of these offsets holds.
+struct ToolSpan {
+  bool any = false;
+  Vector3 line = Vector3::Zero();
+};
+
+/// Offsets that differ by less than the tolerance count as one, and as on a line when so close to it.
+ToolSpan tool_span(std::span<const Vector3> offsets_m) {
+  const Vector3& first = offsets_m.front();
+  Vector3 along = Vector3::Zero();
+  for (const Vector3& t : offsets_m) {
+    along = (t - first).norm() > along.norm() ? Vector3(t - first) : along;
+  }
+  if (!(along.norm() > VolumetricModel::kToolTolerance_m)) {
+    return {};
+  }
+  const Vector3 line = along.normalized();
+  const bool beside = std::any_of(offsets_m.begin(), offsets_m.end(), [&](const Vector3& t) {
+    return (t - first - line * line.dot(t - first)).norm() > VolumetricModel::kToolTolerance_m;
+  });
+  return {beside, line};
 }
 
 /// The tables a list of stored parameters speaks of, in order of first appearance.
@@ -193,6 +218,9 @@ Result<VolumetricModel> VolumetricModel::from_polynomials(evemu::EvemuModel mode
   if (!layout) {
     return failure(layout.error().code, message("model: ", layout.error().text));
   }
+  const ToolSpan tools = tool_span(tool_offsets_m);
+  model.holds_for_any_tool_ = tools.any;
+  model.tool_line_ = tools.line;
   VolumetricModel result(*std::move(layout));
   result.gauge_ = gauge;
   result.tool_offsets_m_ = {tool_offset_m};
@@ -264,13 +292,14 @@ bool VolumetricModel::holds_for_tool(const Vector3& tool_offset_m) const {
   if (!tool_offset_m.allFinite()) {
     return false;
   }
-  return holds_for_any_tool() || (tool_offset_m - tool_offsets_m_.front()).norm() <= kToolTolerance_m;
+  return holds_for_any_tool_ || (tool_offset_m - lever_offset_m(tool_offset_m)).norm() <= kToolTolerance_m;
 }
 
-const Vector3& VolumetricModel::lever_offset_m(const Vector3& asked_m) const {
-  // The tables of one tool contain its lever; using a slightly different one here would count the change for
-  // some of the rotations only.
-  return holds_for_any_tool() ? asked_m : tool_offsets_m_.front();
+Vector3 VolumetricModel::lever_offset_m(const Vector3& asked_m) const {
+  // Tables contain the lever across the line of their tools; using a slightly different one here would count
+  // the change for some of the rotations only.
+  const Vector3& first = tool_offsets_m_.front();
+  return holds_for_any_tool_ ? asked_m : Vector3(first + tool_line_ * tool_line_.dot(asked_m - first));
 }
 
 VolumetricError VolumetricModel::error_at(const Vector3& axis_position_m,

@@ -122,7 +122,7 @@ TEST(Adjustment, UncertaintyCoversTheTruth) {
   Observations o = observed(run);
   Eigen::VectorXd with_rigid = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(o.layout.fit_size()));
   with_rigid.head(run.truth.size()) = run.truth;
-  const Eigen::VectorXd truth = to_gauge(Gauge::G1, o.layout, o.target_offset_m, with_rigid);
+  const Eigen::VectorXd truth = *to_gauge(Gauge::G1, o.layout, std::array{o.target_offset_m}, with_rigid);
   std::mt19937_64 random(99);
   std::normal_distribution<double> normal;
   std::size_t inside = 0, all = 0;

@@ -48,8 +48,8 @@ struct ModelDescription {
   MachineNodes nodes;
   Basis basis = Basis::Linear;
   Gauge gauge = Gauge::G1;
-  /// One offset: the model holds for this tool only. Several: all tables were identified, it holds for any
-  /// tool.
+  /// One offset: the model holds for this tool only. Several (all 18 tables): for any tool where three of
+  /// them are not on a line, else for tools on that line: the rotation about it is not determined.
   std::vector<Vector3> tool_offsets_m;
   std::vector<Parameter> parameters;  ///< in the order of ParameterLayout, without the rigid ones
   Eigen::MatrixXd covariance;         ///< parameters x parameters, full, symmetric, m^2, m rad, rad^2
@@ -105,8 +105,7 @@ class VolumetricModel {
 
  private:
   VolumetricModel(ParameterLayout layout) : layout_(std::move(layout)) {}
-  [[nodiscard]] bool holds_for_any_tool() const { return tool_offsets_m_.size() > 1; }
-  [[nodiscard]] const Vector3& lever_offset_m(const Vector3& asked_m) const;
+  [[nodiscard]] Vector3 lever_offset_m(const Vector3& asked_m) const;
 
   ParameterLayout layout_;
   std::optional<evemu::EvemuModel> polynomials_;
@@ -116,5 +115,7 @@ class VolumetricModel {
   Eigen::MatrixXd covariance_;
   ValidityVolume validity_;
 };
+  bool holds_for_any_tool_ = false;
+  Vector3 tool_line_ = Vector3::Zero();  ///< unit length; zero: the model holds for one tool
 
 }  // namespace abbe::calib

@@ -250,7 +250,7 @@ Result<VolumetricModel> polynomials_from(const ModelDescription& d) {
   for (std::size_t i = 0; i < d.parameters.size(); ++i) {
     c_m(static_cast<Eigen::Index>(i)) = d.parameters[i].value;
   }
-  Result<ValidityVolume> validity = ValidityVolume::hull_of(d.validity_hull_m);
+  Result<ValidityVolume> validity = ValidityVolume::of_vertices(d.validity_hull_m);
   if (!validity) {
     return tl::unexpected(validity.error());
   }
@@ -281,7 +281,7 @@ Result<VolumetricModel> VolumetricModel::from_description(ModelDescription d) {
   for (std::size_t i = 0; i < d.parameters.size(); ++i) {
     U(static_cast<Eigen::Index>(i)) = d.parameters[i].value;
   }
-  Result<ValidityVolume> validity = ValidityVolume::hull_of(d.validity_hull_m);
+  Result<ValidityVolume> validity = ValidityVolume::of_vertices(d.validity_hull_m);
   if (!validity) {
     return tl::unexpected(validity.error());
   }

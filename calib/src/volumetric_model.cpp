@@ -30,7 +30,7 @@ Matrix3 propagate(const DesignColumns& columns, const Eigen::MatrixXd& covarianc
   return half + half.transpose();
 }
 
-Result<void> check_covariance(const Eigen::MatrixXd& C, std::size_t parameters) {
+Result<void> check_shape(const Eigen::MatrixXd& C, std::size_t parameters) {
   const auto n = static_cast<Eigen::Index>(parameters);
   if (C.rows() != n || C.cols() != n) {
     return failure(ErrorCode::BadInput, message("model: covariance is ", C.rows(), " x ", C.cols(),
@@ -168,6 +168,26 @@ std::vector<Parameter> named(const ParameterLayout& layout, const Eigen::VectorX
 
 }  // namespace
 
+Result<void> check_covariance(const Eigen::MatrixXd& C) {
+  if (Result<void> fine = check_shape(C, static_cast<std::size_t>(C.rows())); !fine) {
+    return fine;
+  }
+  // Correlations; a variance below 1e-12 of the largest is rounding of what the gauge fixes.
+  const double least = 1e-12 * (C.size() > 0 ? C.diagonal().maxCoeff() : 0.0);
+  const Eigen::VectorXd scale = C.diagonal().unaryExpr(
+      [&](double variance) { return least > 0 ? 1 / std::sqrt(std::max(variance, least)) : 1.0; });
+  Eigen::MatrixXd correlation = scale.asDiagonal() * C * scale.asDiagonal();
+  // A covariance in a gauge is singular; that of ill-conditioned data (1e5) has eigenvalues wrong by 1e-6.
+  constexpr double kRounding = 1e-6;
+  correlation.diagonal().array() += kRounding;
+  if (Eigen::LLT<Eigen::Ref<Eigen::MatrixXd>>(correlation).info() != Eigen::Success) {
+    return failure(ErrorCode::BadInput,
+                   "model: covariance is not positive semidefinite: some combination of parameters has a "
+                   "negative variance");
+  }
+  return {};
+}
+
 Result<VolumetricModel> VolumetricModel::from_vector(const ParameterLayout& layout, Gauge gauge,
                                                      std::span<const Vector3> tool_offsets_m,
                                                      const Eigen::VectorXd& U,
@@ -180,7 +200,7 @@ Result<VolumetricModel> VolumetricModel::from_vector(const ParameterLayout& layo
   if (!U.allFinite()) {
     return failure(ErrorCode::NotFinite, "model: a parameter is not a number");
   }
-  if (Result<void> fine = check_covariance(covariance, layout.model_size()); !fine) {
+  if (Result<void> fine = check_shape(covariance, layout.model_size()); !fine) {
     return tl::unexpected(fine.error());
   }
   if (tool_offsets_m.empty()) {
@@ -198,6 +218,9 @@ Result<VolumetricModel> VolumetricModel::from_vector(const ParameterLayout& layo
   VolumetricModel model(layout);
   model.gauge_ = gauge;
   model.tool_offsets_m_.assign(tool_offsets_m.begin(), tool_offsets_m.end());
+  const ToolSpan tools = tool_span(tool_offsets_m);
+  model.holds_for_any_tool_ = tools.any;
+  model.tool_line_ = tools.line;
   model.U_ = U;
   model.covariance_ = covariance;
   model.validity_ = std::move(validity);
@@ -218,9 +241,6 @@ Result<VolumetricModel> VolumetricModel::from_polynomials(evemu::EvemuModel mode
   if (!layout) {
     return failure(layout.error().code, message("model: ", layout.error().text));
   }
-  const ToolSpan tools = tool_span(tool_offsets_m);
-  model.holds_for_any_tool_ = tools.any;
-  model.tool_line_ = tools.line;
   VolumetricModel result(*std::move(layout));
   result.gauge_ = gauge;
   result.tool_offsets_m_ = {tool_offset_m};
@@ -264,6 +284,9 @@ Result<VolumetricModel> polynomials_from(const ModelDescription& d) {
 }  // namespace
 
 Result<VolumetricModel> VolumetricModel::from_description(ModelDescription d) {
+  if (Result<void> fine = check_covariance(d.covariance); !fine) {
+    return tl::unexpected(fine.error());
+  }
   if (d.polynomials) {
     return polynomials_from(d);
   }

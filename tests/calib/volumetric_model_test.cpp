@@ -171,6 +171,26 @@ TEST(VolumetricModel, RefusesADescriptionThatDoesNotAddUp) {
   EXPECT_EQ(code_of(d), ErrorCode::BadInput);
 }
 
+/// No single variance is negative, that of the difference of two parameters is.
+TEST(VolumetricModel, RefusesACovarianceThatIsNotPositive) {
+  ModelDescription d = model_of(random_model(1e-4)).description();
+  EXPECT_TRUE(check_covariance(d.covariance));
+  d.covariance(4, 5) = d.covariance(5, 4) = 1.01 * std::sqrt(d.covariance(4, 4) * d.covariance(5, 5));
+  const auto refused = VolumetricModel::from_description(d);
+  ASSERT_FALSE(refused);
+  EXPECT_EQ(refused.error().code, ErrorCode::BadInput);
+  EXPECT_NE(refused.error().text.find("positive semidefinite"), std::string::npos);
+}
+
+TEST(VolumetricModel, AcceptsTheCovarianceOfFixedAndOfFullyCorrelatedValues) {
+  ModelDescription d = model_of(random_model(1e-4)).description();
+  const Eigen::VectorXd one = d.covariance.col(0);
+  d.covariance = one * one.transpose();
+  d.covariance.row(3).setZero();
+  d.covariance.col(3).setZero();
+  EXPECT_TRUE(VolumetricModel::from_description(d));
+}
+
 TEST(RigidFreeDifference, IsZeroBetweenTwoGaugesOfOneMachine) {
   const Made m = random_model(1e-4);
   Eigen::VectorXd U = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(m.layout.fit_size()));

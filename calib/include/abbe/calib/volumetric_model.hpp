@@ -29,6 +29,10 @@ struct VolumetricError {
   bool tool_ok = false;                ///< the model holds for this tool offset
 };
 
+/// What a covariance must be: square, finite, symmetric and, to rounding, positive semidefinite; else
+/// BadInput or NotFinite. Costs n^3 / 3.
+[[nodiscard]] Result<void> check_covariance(const Eigen::MatrixXd&);
+
 struct Correction {
   Vector3 c_m = Vector3::Zero();  ///< add to the nominal position before commanding it
   int evaluations = 0;
@@ -111,11 +115,11 @@ class VolumetricModel {
   std::optional<evemu::EvemuModel> polynomials_;
   Gauge gauge_ = Gauge::G1;
   std::vector<Vector3> tool_offsets_m_;
+  bool holds_for_any_tool_ = false;
+  Vector3 tool_line_ = Vector3::Zero();  ///< unit length; zero: the model holds for one tool
   Eigen::VectorXd U_;
   Eigen::MatrixXd covariance_;
   ValidityVolume validity_;
 };
-  bool holds_for_any_tool_ = false;
-  Vector3 tool_line_ = Vector3::Zero();  ///< unit length; zero: the model holds for one tool
 
 }  // namespace abbe::calib

@@ -1,23 +1,38 @@
 #include "abbe/calib/gauge.hpp"
 
 #include <Eigen/Dense>
-#include <array>
+#include <algorithm>
+#include <cmath>
+#include <iterator>
 #include <vector>
 
 #include "abbe/calib/model_comparison.hpp"
 #include "abbe/calib/rigid_body_model.hpp"
+#include "message.hpp"
 
 namespace abbe::calib {
 namespace {
 
 using Condition = Eigen::RowVectorXd;
 
+/// A node within this share of a cell is the place asked for: nodes computed from a range are off by rounding
+/// (1e-16). The condition then fixes this node alone, and its zero is exact. With its neighbour weighted by
+/// less than 1e-6, the variance of the node is below 1e-12 of the neighbour's, where rounding decides its
+/// sign. V moves by the gradient times 1e-6 cells: 0.25 nm at the steepest 5 mm/m and 50 mm.
+constexpr double kAtNode = 1e-6;
+
 Condition zero_at(const ParameterLayout& layout, const Table& table, double position_m) {
   Condition k = Condition::Zero(static_cast<Eigen::Index>(layout.fit_size()));
   const BasisRow b = basis_row(layout.nodes()[index(table.motion.axis)].nodes_m, position_m);
   const auto first = static_cast<Eigen::Index>(table.offset + b.first);
-  k(first) = b.weight[0];
-  k(first + 1) = b.weight[1];
+  if (std::abs(b.weight[1]) < kAtNode) {
+    k(first) = 1.0;
+  } else if (std::abs(b.weight[0]) < kAtNode) {
+    k(first + 1) = 1.0;
+  } else {
+    k(first) = b.weight[0];
+    k(first + 1) = b.weight[1];
+  }
   return k;
 }
 
@@ -43,13 +58,19 @@ Eigen::MatrixXd gauge_conditions(Gauge, const ParameterLayout& layout) {
 }
 
 Eigen::MatrixXd unobservable_combinations(const ParameterLayout& layout, std::span<const Vector3> targets_m) {
-  const auto n = static_cast<Eigen::Index>(layout.fit_size());
+  const auto parameters = static_cast<Eigen::Index>(layout.fit_size());
+  const Eigen::Index n = parameters + 3 * std::max<Eigen::Index>(0, std::ssize(targets_m) - 1);
   Eigen::MatrixXd H = Eigen::MatrixXd::Zero(n, n);
-  for (const Vector3& t : targets_m) {
+  for (std::size_t target = 0; target < targets_m.size(); ++target) {
     for (const Vector3& q : tensor_grid(layout.nodes())) {
-      const DesignColumns columns = design_columns_with_rigid(layout, q, t);
-      for (const Column& i : columns.span()) {
-        for (const Column& j : columns.span()) {
+      const DesignColumns columns = design_columns_with_rigid(layout, q, targets_m[target]);
+      std::vector<Column> row(columns.span().begin(), columns.span().end());
+      for (std::size_t k = 0; k < 3 && target > 0; ++k) {
+        row.push_back(
+            {layout.fit_size() + 3 * (target - 1) + k, Vector3::Unit(static_cast<Eigen::Index>(k))});
+      }
+      for (const Column& i : row) {
+        for (const Column& j : row) {
           H(static_cast<Eigen::Index>(i.parameter), static_cast<Eigen::Index>(j.parameter)) +=
               i.dV_dU.dot(j.dV_dU);
         }
@@ -66,13 +87,19 @@ Eigen::MatrixXd unobservable_combinations(const ParameterLayout& layout, std::sp
   while (nullity < n && eigen.eigenvalues()(nullity) < kZero * eigen.eigenvalues()(n - 1)) {
     ++nullity;
   }
-  return scale.asDiagonal() * eigen.eigenvectors().leftCols(nullity);
+  return (scale.asDiagonal() * eigen.eigenvectors().leftCols(nullity)).topRows(parameters);
 }
 
-Eigen::VectorXd to_gauge(Gauge gauge, const ParameterLayout& layout, const Vector3& target_offset_m,
-                         const Eigen::VectorXd& U) {
-  const Eigen::MatrixXd N = unobservable_combinations(layout, std::array{target_offset_m});
+Result<Eigen::VectorXd> to_gauge(Gauge gauge, const ParameterLayout& layout,
+                                 std::span<const Vector3> targets_m, const Eigen::VectorXd& U) {
+  const Eigen::MatrixXd N = unobservable_combinations(layout, targets_m);
   const Eigen::MatrixXd K = gauge_conditions(gauge, layout);
+  if (N.cols() > K.rows()) {
+    return failure(ErrorCode::DegenerateGeometry,
+                   message("gauge: ", targets_m.size(), " tool offsets leave ", N.cols(), " combinations of ",
+                           layout.tables().size(), " tables undetermined, the gauge fixes ", K.rows(),
+                           "; 18 tables need three offsets that are not on a line"));
+  }
   const Eigen::VectorXd z = (K * N).colPivHouseholderQr().solve(-(K * U));
   return U + N * z;
 }

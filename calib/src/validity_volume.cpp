@@ -1,9 +1,10 @@
 #include "abbe/calib/validity_volume.hpp"
 
-#include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
+#include "convex_hull.hpp"
 #include "message.hpp"
 
 namespace abbe::calib {
@@ -12,11 +13,6 @@ namespace {
 /// Points closer than this to a plane lie in it: far below the micrometre a position means, far above
 /// rounding.
 constexpr double kFlat_m = 1e-9;
-
-struct Plane {
-  Vector3 outward;
-  double offset_m;
-};
 
 bool by_coordinates(const Vector3& a, const Vector3& b) {
   return std::lexicographical_compare(a.data(), a.data() + 3, b.data(), b.data() + 3);
@@ -30,130 +26,45 @@ std::vector<Vector3> distinct(std::span<const Vector3> points) {
   return sorted;
 }
 
-bool all_below(std::span<const Vector3> points, const Plane& plane) {
-  return std::all_of(points.begin(), points.end(),
-                     [&](const Vector3& p) { return plane.outward.dot(p) <= plane.offset_m + kFlat_m; });
+tl::unexpected<Error> flat(std::size_t points) {
+  return failure(ErrorCode::DegenerateGeometry,
+                 message("validity volume: ", points, " different points do not enclose a volume"));
 }
 
-bool is_known(const std::vector<Plane>& planes, const Plane& plane) {
-  constexpr double kSameDirection = 1e-9;
-  return std::any_of(planes.begin(), planes.end(), [&](const Plane& p) {
-    return (p.outward - plane.outward).norm() < kSameDirection &&
-           std::abs(p.offset_m - plane.offset_m) < kFlat_m;
-  });
-}
-
-/// Every plane through three points that has all others on one side. Brute force, because it does not mind
-/// the many coplanar points of a lattice.
-std::vector<Plane> supporting_planes(std::span<const Vector3> points) {
-  std::vector<Plane> planes;
-  for (std::size_t i = 0; i < points.size(); ++i) {
-    for (std::size_t j = i + 1; j < points.size(); ++j) {
-      for (std::size_t k = j + 1; k < points.size(); ++k) {
-        const Vector3 e1 = points[j] - points[i], e2 = points[k] - points[i];
-        const Vector3 normal = e1.cross(e2);
-        if (normal.norm() < kFlat_m * std::max(e1.norm(), e2.norm())) {
-          continue;
-        }
-        const Vector3 unit = normal.normalized();
-        for (const Vector3& outward : {unit, Vector3(-unit)}) {
-          const Plane plane{outward, outward.dot(points[i])};
-          if (all_below(points, plane) && !is_known(planes, plane)) {
-            planes.push_back(plane);
-          }
-        }
-      }
-    }
+Result<void> check_finite(std::span<const Vector3> points) {
+  if (!std::all_of(points.begin(), points.end(), [](const Vector3& p) { return p.allFinite(); })) {
+    return failure(ErrorCode::NotFinite, "validity volume: a point is not a number");
   }
-  return planes;
-}
-
-/// Points in the extreme along 26 directions: a first hull of few points that swallows most of the others.
-std::vector<Vector3> extremes(std::span<const Vector3> points) {
-  std::vector<Vector3> found;
-  for (int x = -1; x <= 1; ++x) {
-    for (int y = -1; y <= 1; ++y) {
-      for (int z = -1; z <= 1; ++z) {
-        const Vector3 d(x, y, z);
-        found.push_back(
-            *std::max_element(points.begin(), points.end(),
-                              [&](const Vector3& a, const Vector3& b) { return d.dot(a) < d.dot(b); }));
-      }
-    }
-  }
-  return distinct(found);
-}
-
-/// Of `points`, the farthest outside of each face; the faces of a few points meet most of the others at once.
-std::vector<Vector3> farthest_outside(std::span<const Plane> planes, std::span<const Vector3> points) {
-  std::vector<Vector3> found;
-  for (const Plane& face : planes) {
-    const auto height = [&](const Vector3& p) { return face.outward.dot(p) - face.offset_m; };
-    const auto farthest =
-        std::max_element(points.begin(), points.end(),
-                         [&](const Vector3& a, const Vector3& b) { return height(a) < height(b); });
-    if (height(*farthest) > kFlat_m) {
-      found.push_back(*farthest);
-    }
-  }
-  return distinct(found);
-}
-
-/// A vertex lies in three faces or more with independent directions.
-bool is_vertex(std::span<const Plane> planes, const Vector3& p) {
-  Matrix3 directions = Matrix3::Zero();
-  for (const Plane& f : planes) {
-    if (std::abs(f.outward.dot(p) - f.offset_m) < 2 * kFlat_m) {
-      directions += f.outward * f.outward.transpose();
-    }
-  }
-  constexpr double kIndependent = 1e-12;
-  return directions.determinant() > kIndependent;
-}
-
-struct Hull {
-  std::vector<Plane> planes;
-  std::vector<Vector3> on_surface;
-};
-
-bool is_inside(std::span<const Plane> planes, const Vector3& p) {
-  return std::all_of(planes.begin(), planes.end(),
-                     [&](const Plane& f) { return f.outward.dot(p) < f.offset_m - kFlat_m; });
-}
-
-/// The hull of the extremes grows by what lies outside until nothing does, so that the brute force sees the
-/// corners (8 for a box of any number of points) and not the path between them.
-Hull hull_of_distinct(std::span<const Vector3> points) {
-  Hull hull{{}, extremes(points)};
-  std::vector<Vector3> beyond;
-  do {
-    hull.on_surface.insert(hull.on_surface.end(), beyond.begin(), beyond.end());
-    hull.planes = supporting_planes(hull.on_surface);
-    std::erase_if(hull.on_surface, [&](const Vector3& p) { return is_inside(hull.planes, p); });
-    beyond = farthest_outside(hull.planes, points);
-  } while (!beyond.empty());
-  return hull;
+  return {};
 }
 
 }  // namespace
 
+ValidityVolume::ValidityVolume(std::vector<Vector3> vertices_m)
+    : faces_(hull_faces(vertices_m)), vertices_m_(std::move(vertices_m)) {}
+
 Result<ValidityVolume> ValidityVolume::hull_of(std::span<const Vector3> axis_positions_m) {
-  for (const Vector3& p : axis_positions_m) {
-    if (!p.allFinite()) {
-      return failure(ErrorCode::NotFinite, "validity volume: a point is not a number");
-    }
+  if (Result<void> finite = check_finite(axis_positions_m); !finite) {
+    return tl::unexpected(finite.error());
   }
   const std::vector<Vector3> points = distinct(axis_positions_m);
-  const Hull hull = points.size() < 4 ? Hull{} : hull_of_distinct(points);
-  ValidityVolume volume;
-  for (const Plane& plane : hull.planes) {
-    volume.faces_.push_back({plane.outward, plane.offset_m});
+  std::vector<Vector3> vertices;
+  for (const std::size_t i : hull_corners(points, kFlat_m)) {
+    vertices.push_back(points[i]);
   }
-  std::copy_if(points.begin(), points.end(), std::back_inserter(volume.vertices_m_),
-               [&](const Vector3& p) { return is_vertex(hull.planes, p); });
-  if (volume.faces_.size() < 4 || volume.vertices_m_.size() < 4) {
-    return failure(ErrorCode::DegenerateGeometry,
-                   message("validity volume: ", points.size(), " different points do not enclose a volume"));
+  return vertices.empty() ? flat(points.size()) : of_vertices(vertices);
+}
+
+Result<ValidityVolume> ValidityVolume::of_vertices(std::span<const Vector3> vertices_m) {
+  if (Result<void> finite = check_finite(vertices_m); !finite) {
+    return tl::unexpected(finite.error());
+  }
+  std::vector<Vector3> sorted(vertices_m.begin(), vertices_m.end());
+  std::sort(sorted.begin(), sorted.end(), by_coordinates);
+  const std::size_t points = sorted.size();
+  ValidityVolume volume(std::move(sorted));
+  if (volume.faces_.empty()) {
+    return flat(points);
   }
   return volume;
 }

@@ -1,5 +1,7 @@
 #include "abbe/calib/volumetric_model.hpp"
 
+#include <Eigen/Cholesky>
+#include <algorithm>
 #include <cmath>
 #include <limits>
 
@@ -28,7 +30,7 @@ Matrix3 propagate(const DesignColumns& columns, const Eigen::MatrixXd& covarianc
   return half + half.transpose();
 }
 
-Result<void> check_covariance(const Eigen::MatrixXd& C, std::size_t parameters) {
+Result<void> check_shape(const Eigen::MatrixXd& C, std::size_t parameters) {
   const auto n = static_cast<Eigen::Index>(parameters);
   if (C.rows() != n || C.cols() != n) {
     return failure(ErrorCode::BadInput, message("model: covariance is ", C.rows(), " x ", C.cols(),
@@ -44,6 +46,29 @@ Result<void> check_covariance(const Eigen::MatrixXd& C, std::size_t parameters) 
     return failure(ErrorCode::BadInput, "model: covariance has a negative variance");
   }
   return {};
+}
+
+/// For which tools a model of these offsets holds.
+struct ToolSpan {
+  bool any = false;
+  Vector3 line = Vector3::Zero();
+};
+
+/// Offsets that differ by less than the tolerance count as one, and as on a line when so close to it.
+ToolSpan tool_span(std::span<const Vector3> offsets_m) {
+  const Vector3& first = offsets_m.front();
+  Vector3 along = Vector3::Zero();
+  for (const Vector3& t : offsets_m) {
+    along = (t - first).norm() > along.norm() ? Vector3(t - first) : along;
+  }
+  if (!(along.norm() > VolumetricModel::kToolTolerance_m)) {
+    return {};
+  }
+  const Vector3 line = along.normalized();
+  const bool beside = std::any_of(offsets_m.begin(), offsets_m.end(), [&](const Vector3& t) {
+    return (t - first - line * line.dot(t - first)).norm() > VolumetricModel::kToolTolerance_m;
+  });
+  return {beside, line};
 }
 
 /// The tables a list of stored parameters speaks of, in order of first appearance.
@@ -143,6 +168,26 @@ std::vector<Parameter> named(const ParameterLayout& layout, const Eigen::VectorX
 
 }  // namespace
 
+Result<void> check_covariance(const Eigen::MatrixXd& C) {
+  if (Result<void> fine = check_shape(C, static_cast<std::size_t>(C.rows())); !fine) {
+    return fine;
+  }
+  // Correlations; a variance below 1e-12 of the largest is rounding of what the gauge fixes.
+  const double least = 1e-12 * (C.size() > 0 ? C.diagonal().maxCoeff() : 0.0);
+  const Eigen::VectorXd scale = C.diagonal().unaryExpr(
+      [&](double variance) { return least > 0 ? 1 / std::sqrt(std::max(variance, least)) : 1.0; });
+  Eigen::MatrixXd correlation = scale.asDiagonal() * C * scale.asDiagonal();
+  // A covariance in a gauge is singular; that of ill-conditioned data (1e5) has eigenvalues wrong by 1e-6.
+  constexpr double kRounding = 1e-6;
+  correlation.diagonal().array() += kRounding;
+  if (Eigen::LLT<Eigen::Ref<Eigen::MatrixXd>>(correlation).info() != Eigen::Success) {
+    return failure(ErrorCode::BadInput,
+                   "model: covariance is not positive semidefinite: some combination of parameters has a "
+                   "negative variance");
+  }
+  return {};
+}
+
 Result<VolumetricModel> VolumetricModel::from_vector(const ParameterLayout& layout, Gauge gauge,
                                                      std::span<const Vector3> tool_offsets_m,
                                                      const Eigen::VectorXd& U,
@@ -155,7 +200,7 @@ Result<VolumetricModel> VolumetricModel::from_vector(const ParameterLayout& layo
   if (!U.allFinite()) {
     return failure(ErrorCode::NotFinite, "model: a parameter is not a number");
   }
-  if (Result<void> fine = check_covariance(covariance, layout.model_size()); !fine) {
+  if (Result<void> fine = check_shape(covariance, layout.model_size()); !fine) {
     return tl::unexpected(fine.error());
   }
   if (tool_offsets_m.empty()) {
@@ -173,6 +218,9 @@ Result<VolumetricModel> VolumetricModel::from_vector(const ParameterLayout& layo
   VolumetricModel model(layout);
   model.gauge_ = gauge;
   model.tool_offsets_m_.assign(tool_offsets_m.begin(), tool_offsets_m.end());
+  const ToolSpan tools = tool_span(tool_offsets_m);
+  model.holds_for_any_tool_ = tools.any;
+  model.tool_line_ = tools.line;
   model.U_ = U;
   model.covariance_ = covariance;
   model.validity_ = std::move(validity);
@@ -222,7 +270,7 @@ Result<VolumetricModel> polynomials_from(const ModelDescription& d) {
   for (std::size_t i = 0; i < d.parameters.size(); ++i) {
     c_m(static_cast<Eigen::Index>(i)) = d.parameters[i].value;
   }
-  Result<ValidityVolume> validity = ValidityVolume::hull_of(d.validity_hull_m);
+  Result<ValidityVolume> validity = ValidityVolume::of_vertices(d.validity_hull_m);
   if (!validity) {
     return tl::unexpected(validity.error());
   }
@@ -236,6 +284,9 @@ Result<VolumetricModel> polynomials_from(const ModelDescription& d) {
 }  // namespace
 
 Result<VolumetricModel> VolumetricModel::from_description(ModelDescription d) {
+  if (Result<void> fine = check_covariance(d.covariance); !fine) {
+    return tl::unexpected(fine.error());
+  }
   if (d.polynomials) {
     return polynomials_from(d);
   }
@@ -253,7 +304,7 @@ Result<VolumetricModel> VolumetricModel::from_description(ModelDescription d) {
   for (std::size_t i = 0; i < d.parameters.size(); ++i) {
     U(static_cast<Eigen::Index>(i)) = d.parameters[i].value;
   }
-  Result<ValidityVolume> validity = ValidityVolume::hull_of(d.validity_hull_m);
+  Result<ValidityVolume> validity = ValidityVolume::of_vertices(d.validity_hull_m);
   if (!validity) {
     return tl::unexpected(validity.error());
   }
@@ -264,13 +315,14 @@ bool VolumetricModel::holds_for_tool(const Vector3& tool_offset_m) const {
   if (!tool_offset_m.allFinite()) {
     return false;
   }
-  return holds_for_any_tool() || (tool_offset_m - tool_offsets_m_.front()).norm() <= kToolTolerance_m;
+  return holds_for_any_tool_ || (tool_offset_m - lever_offset_m(tool_offset_m)).norm() <= kToolTolerance_m;
 }
 
-const Vector3& VolumetricModel::lever_offset_m(const Vector3& asked_m) const {
-  // The tables of one tool contain its lever; using a slightly different one here would count the change for
-  // some of the rotations only.
-  return holds_for_any_tool() ? asked_m : tool_offsets_m_.front();
+Vector3 VolumetricModel::lever_offset_m(const Vector3& asked_m) const {
+  // Tables contain the lever across the line of their tools; using a slightly different one here would count
+  // the change for some of the rotations only.
+  const Vector3& first = tool_offsets_m_.front();
+  return holds_for_any_tool_ ? asked_m : Vector3(first + tool_line_ * tool_line_.dot(asked_m - first));
 }
 
 VolumetricError VolumetricModel::error_at(const Vector3& axis_position_m,

@@ -73,7 +73,7 @@ void against_scad(unsigned seeds) {
     for (unsigned seed = 1; seed <= seeds; ++seed) {
       const Observations o = simulated(reference_layout(), V, noise, seed);
       SolveOptions options{.estimator = Estimator::Scad};
-      options.sparse.bootstrap_runs = 0;
+      options.sparse.bootstrap_runs = 2;
       const auto start = std::chrono::steady_clock::now();
       const Solution scad = *solve(o, options), bayes = *solve(o);
       scad_s += std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count() / seeds;

@@ -97,7 +97,7 @@ Eigen::VectorXd true_parameters(const calib::ParameterLayout& layout, const cali
   U[squareness] = tables.at("A0Z")[0];
   U[squareness + 1] = tables.at("B0Z")[0];
   U[squareness + 2] = tables.at("C0Y")[0];
-  return calib::to_gauge(calib::Gauge::G1, layout, tool_m, U);
+  return calib::to_gauge(calib::Gauge::G1, layout, std::array{tool_m}, U).value();
 }
 
 /// How wrong the model is against the true tables, mean absolute error in G1; infinite without one.

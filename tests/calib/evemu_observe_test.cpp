@@ -196,6 +196,44 @@ TEST(EvemuInput, TakesErrorsThatWereComputedElsewhere) {
               HasSubstr("position 2: Ball1 was left out"));
 }
 
+/// Four touches of every ball, three of every block: as many as unknowns.
+std::vector<Touch> fewest_touches() {
+  const Calibrator truth = reference_calibrator();
+  std::vector<Touch> touches;
+  for (const auto& ball : truth.balls) {
+    for (const Vector3& d : {Vector3(0, 0, 1), Vector3(1, 0, 0), Vector3(0, 1, 0), Vector3(-1, 0, 0)}) {
+      touches.push_back({1, Feature::Ball, ball.number, ball.centre_m + (ball.radius_m + 2e-3) * d});
+    }
+  }
+  for (const auto& block : truth.blocks) {
+    const Vector3 a = block.normal.unitOrthogonal(), b = block.normal.cross(a);
+    for (const auto& [i, j] : {std::pair(-1, -1), {1, -1}, {0, 1}}) {
+      touches.push_back({1, Feature::Block, block.number, 0.02 * i * a + 0.02 * j * b});
+    }
+  }
+  return touches;
+}
+
+TEST(Calibrator, OfTouchesWithoutRedundancyHasTheUncertaintyOfATouch) {
+  const auto c = precalibrated("few", fewest_touches(), 2e-3, {Vector3::UnitZ(), Vector3::UnitY()}, 1e-6);
+  ASSERT_TRUE(c) << c.error().text;
+  for (const auto& ball : c->balls) {
+    EXPECT_GT(ball.u_m, 0.5e-6);
+    EXPECT_LT(ball.u_m, 3e-6);  // four touches on one half do not average
+  }
+  EXPECT_NEAR(c->blocks[0].u_rad, 1e-6 / 0.03, 0.5e-6 / 0.03);  // touches 20 to 40 mm apart
+}
+
+TEST(Calibrator, OfTouchesWithoutRedundancyIsNotExact) {
+  for (const auto& u_touch_m : {std::optional<double>{}, std::optional{0.0}}) {
+    const auto c =
+        precalibrated("few", fewest_touches(), 2e-3, {Vector3::UnitZ(), Vector3::UnitY()}, u_touch_m);
+    ASSERT_FALSE(c);
+    EXPECT_EQ(c.error().code, ErrorCode::TooFewObservations);
+    EXPECT_THAT(c.error().text, HasSubstr("ball 1: 4 touches do not show"));
+  }
+}
+
 TEST(Calibrator, TakesTheTipOutOfItsPrecalibration) {
   // Touches of an array at its calibrated place, by a tip of 2 mm radius.
   const Calibrator truth = reference_calibrator();

@@ -5,6 +5,7 @@
 
 #include <Eigen/Dense>
 #include <algorithm>
+#include <limits>
 #include <numbers>
 #include <random>
 
@@ -102,6 +103,18 @@ TEST(LinearGaussian, HasTheGradientOfItsEvidence) {
                           problem.evidence(p.prior, noise * std::exp(-h)).log_likelihood) /
                          (2 * h);
   EXPECT_NEAR(e.by_log_noise, numeric, 1e-7);
+}
+
+/// One prior far above the others and a noise below rounding: the covariance of y is singular.
+TEST(LinearGaussian, HasNoLikelihoodWhereRoundingLeavesNoCovariance) {
+  SmallProblem p = small_problem();
+  p.prior.setConstant(1.0);
+  p.prior(6) = 1e30;
+  const auto e = LinearGaussian(p.X, p.S, p.y).evidence(p.prior, 1e-40);
+  EXPECT_EQ(e.log_likelihood, -std::numeric_limits<double>::infinity());
+  EXPECT_EQ(e.by_log_prior, Eigen::VectorXd::Zero(7));
+  const auto posterior = LinearGaussian(p.X, p.S, p.y).posterior(p.prior, 0.0);
+  EXPECT_FALSE(posterior.mean.allFinite());
 }
 
 TEST(LinearGaussian, HasThePosteriorOfTheFullCovariance) {

@@ -22,13 +22,13 @@ const Observations& observations() {
   return o;
 }
 
-/// A small grid, no bootstrap: tests are about the glue.
+/// A small grid, the smallest bootstrap: tests are about the glue.
 SolveOptions quick(Estimator estimator, FoldsBy folds = FoldsBy::Position) {
   SolveOptions options{.estimator = estimator};
   options.sparse.folds = folds;
   options.sparse.lambda = sparse::log_spaced(1e-1, 1e-6, 16);
   options.sparse.gamma = {2.5, 20.0};
-  options.sparse.bootstrap_runs = 0;
+  options.sparse.bootstrap_runs = 2;
   return options;
 }
 
@@ -109,6 +109,39 @@ TEST(EvemuSparse, HasABootstrapOfTheSizeOfTheNoise) {
                u_ols_m = std::sqrt(ols.model.error_at(q, Vector3::Zero()).cov_V_m2.trace());
   EXPECT_GT(u_m, 0.2 * u_ols_m);  // shrinking takes scatter away, not all of it
   EXPECT_LT(u_m, 2.0 * u_ols_m);
+}
+
+TEST(EvemuSparse, NeedsABootstrapForItsUncertainty) {
+  for (const int runs : {-1, 0, 1}) {
+    SolveOptions options = quick(Estimator::Lasso);
+    options.sparse.bootstrap_runs = runs;
+    const auto refused = solve(observations(), options);
+    ASSERT_FALSE(refused) << runs;
+    EXPECT_EQ(refused.error().code, ErrorCode::BadInput);
+    EXPECT_THAT(refused.error().text, testing::HasSubstr("bootstrap_runs = "));
+  }
+}
+
+/// The budget of sweeps ends before the lambda that was chosen.
+TEST(EvemuSparse, IsNotConvergedAboveTheLambdaItWasAskedFor) {
+  SolveOptions options = quick(Estimator::Lasso);
+  options.sparse.chosen = solve(observations(), options)->sparse;
+  options.sparse.max_sweeps = 20;
+  const auto refused = solve(observations(), options);
+  ASSERT_FALSE(refused);
+  EXPECT_EQ(refused.error().code, ErrorCode::NotConverged);
+  EXPECT_THAT(refused.error().text, testing::HasSubstr("max_sweeps = 20 end at lambda"));
+}
+
+/// Without position 8 the chosen path takes more than the 10,000 sweeps of the search.
+TEST(EvemuSparse, RefitsWithTheLambdaThatWasChosen) {
+  SolveOptions options = quick(Estimator::Scad);
+  options.sparse.chosen = solve(observations(), options)->sparse;
+  EXPECT_TRUE(held_out(observations(), 1e-6, nullptr, options));
+  options.sparse.max_sweeps = 10000;
+  const auto refused = held_out(observations(), 1e-6, nullptr, options);
+  ASSERT_FALSE(refused);
+  EXPECT_THAT(refused.error().text, testing::HasSubstr("without position 8: sparse fit (scad, gamma 2.5)"));
 }
 
 TEST(EvemuSparse, PredictsPositionsItWasNotFittedTo) {

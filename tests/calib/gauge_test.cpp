@@ -3,6 +3,8 @@
 #include <gtest/gtest.h>
 
 #include <Eigen/Dense>
+#include <algorithm>
+#include <cmath>
 #include <functional>
 
 #include "abbe/calib/model_comparison.hpp"
@@ -112,6 +114,30 @@ TEST_P(Nullity, IsRemovedExactlyByGaugeG1) {
   EXPECT_EQ(factor.setThreshold(1e-9).rank(), 20);
 }
 
+/// Nodes are rounded on their way from range and spacing: 1e-17 m beside the reference is at the reference.
+TEST(GaugeG1, FixesTheNodeAtTheReferenceAloneForEveryRangeAndSpacing) {
+  std::size_t beside = 0;
+  for (int half_mm = 10; half_mm <= 1500; half_mm += 10) {
+    for (const int spacing_mm : {10, 15, 20, 25, 30, 40, 45, 50, 60, 75, 100, 150}) {
+      for (const int low_mm : {-half_mm, -half_mm / 2, -half_mm / 6}) {
+        otf::Machine machine = case_a_machine();
+        machine.nodes[0] = *equidistant_nodes(1e-3 * low_mm, 1e-3 * half_mm, 1e-3 * spacing_mm);
+        const auto& nodes = machine.nodes[0].nodes_m;
+        const bool at_node =
+            std::any_of(nodes.begin(), nodes.end(), [](double x) { return std::abs(x) < 1e-12; });
+        beside +=
+            std::any_of(nodes.begin(), nodes.end(), [](double x) { return x != 0.0 && std::abs(x) < 1e-12; });
+        const ParameterLayout layout = *ParameterLayout::with_tables(
+            machine.chain, machine.nodes, std::array{ErrorMotion{Motion::X, Axis::X}});
+        const Eigen::MatrixXd K = gauge_conditions(Gauge::G1, layout);
+        ASSERT_EQ((K.array() != 0.0).count(), at_node ? 1 : 2)
+            << low_mm << " to " << half_mm << " every " << spacing_mm;
+      }
+    }
+  }
+  EXPECT_GT(beside, 50u);  // the ranges this test is about
+}
+
 TEST(GaugeG1, Has24ConditionsFor18Tables) {
   const otf::Machine machine = case_a_machine();
   EXPECT_EQ(gauge_conditions(Gauge::G1, *ParameterLayout::all_tables(machine.chain, machine.nodes)).rows(),
@@ -124,7 +150,7 @@ TEST(GaugeG1, ConversionMeetsTheConditionsAndChangesNoMeasurement) {
   std::mt19937_64 random(5);
   Eigen::VectorXd U = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(layout.fit_size()));
   U.head(static_cast<Eigen::Index>(layout.model_size())) = random_tables(layout, 1e-4, random);
-  const Eigen::VectorXd G1 = to_gauge(Gauge::G1, layout, kTarget, U);
+  const Eigen::VectorXd G1 = *to_gauge(Gauge::G1, layout, std::array{kTarget}, U);
   EXPECT_LT((gauge_conditions(Gauge::G1, layout) * G1).norm(), 1e-15);
   const DesignColumns design = design_columns_with_rigid(layout, Vector3(0.2, 0.1, -0.05), kTarget);
   Vector3 change = Vector3::Zero();
@@ -132,6 +158,41 @@ TEST(GaugeG1, ConversionMeetsTheConditionsAndChangesNoMeasurement) {
     change += c.dV_dU * (G1 - U)(static_cast<Eigen::Index>(c.parameter));
   }
   EXPECT_LT(change.norm(), 1e-15);
+}
+
+/// 18 tables, three tools: what one of them alone leaves open is not moved.
+TEST(GaugeG1, ConversionOf18TablesKeepsWhatEveryToolMeasures) {
+  const otf::Machine machine = coarse_machine("[w X' b Y Z t]");
+  const ParameterLayout layout = *ParameterLayout::all_tables(machine.chain, machine.nodes);
+  std::mt19937_64 random(5);
+  Eigen::VectorXd U = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(layout.fit_size()));
+  const auto n = static_cast<Eigen::Index>(layout.model_size());
+  U.head(n) = random_tables(layout, 1e-4, random);
+  const Result<Eigen::VectorXd> G1 = to_gauge(Gauge::G1, layout, kThreeTargets, U);
+  ASSERT_TRUE(G1) << G1.error().text;
+  EXPECT_LT((gauge_conditions(Gauge::G1, layout) * *G1).norm(), 1e-15);
+  const Eigen::VectorXd moved = *G1 - U;
+  for (const Vector3& t : {kThreeTargets[1], Vector3(0.3, -0.2, 0.1)}) {
+    std::vector<Vector3> points, change;
+    for (const Vector3& q : tensor_grid(machine.nodes)) {
+      points.push_back(q + t);
+      change.push_back(volumetric_error(layout, {moved.data(), layout.model_size()}, q, t));
+    }
+    EXPECT_LT(rigid_free(points, change)->rigid_free.max_m, 1e-15);
+  }
+}
+
+TEST(GaugeG1, Of18TablesNeedsThreeToolsThatAreNotOnALine) {
+  const otf::Machine machine = coarse_machine("[w X' b Y Z t]");
+  const ParameterLayout layout = *ParameterLayout::all_tables(machine.chain, machine.nodes);
+  const Eigen::VectorXd U = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(layout.fit_size()));
+  const Vector3 step(0.1, 0.0, 0.05);
+  for (const auto& tools : {std::vector{kTarget}, std::vector{kTarget, Vector3(kTarget + step)},
+                            std::vector{kTarget, Vector3(kTarget + step), Vector3(kTarget - step)}}) {
+    const Result<Eigen::VectorXd> G1 = to_gauge(Gauge::G1, layout, tools, U);
+    ASSERT_FALSE(G1) << tools.size();
+    EXPECT_EQ(G1.error().code, ErrorCode::DegenerateGeometry);
+  }
 }
 
 TEST(GaugeG1, LeavesTheReferenceTablesAsTheyAre) {

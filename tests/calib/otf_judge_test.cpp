@@ -169,6 +169,29 @@ TEST(Judge, HoldsOutNothingThatAloneTouchesANode) {
               Contains(HasSubstr("were not held out")));
 }
 
+/// A volume that holds a few observations of every fold only: a rigid motion fits six of them exactly, under
+/// any model.
+TEST(Judge, ComparesNothingWhereARigidMotionFitsAnyModel) {
+  const MadeRun run = make_run({.seed = 1});
+  const Identification id = identified(run);
+  const VolumetricModel& m = id.solution.model;
+  const Observation& row = id.observations.rows[id.observations.rows.size() / 2];
+  const Vector3 at = id.observations.sub_points_m[row.first_sub_point + row.sub_points / 2];
+  std::vector<Vector3> around;
+  for (int corner = 0; corner < 8; ++corner) {
+    const Vector3 d((corner & 1) != 0 ? 1 : -1, (corner & 2) != 0 ? 1 : -1, (corner & 4) != 0 ? 1 : -1);
+    around.emplace_back(at + 0.012 * d);  // a block is 16 mm long
+  }
+  const VolumetricModel active = *VolumetricModel::from_vector(
+      m.layout(), Gauge::G1, m.tool_offsets_m(), m.U(), m.covariance(), *ValidityVolume::hull_of(around));
+  ASSERT_TRUE(active.validity().contains(at));
+  const auto held = held_out(id.observations, &active, run.options);
+  ASSERT_TRUE(held) << held.error().text;
+  EXPECT_FALSE(held->active) << *held->active << " against " << *held->candidate_beside_active;
+  EXPECT_EQ(held->observations_beside_active, 0u);
+  EXPECT_TRUE(judge(id.observations, id.solution, &active, {}, run.options)->accepted);
+}
+
 TEST(Judge, NeedsLegsForEveryFold) {
   MadeRun run = make_run({});
   const Identification id = identified(run);

@@ -4,7 +4,11 @@
 #include <gtest/gtest.h>
 
 #include <Eigen/Dense>
+#include <algorithm>
+#include <array>
 #include <cmath>
+#include <iterator>
+#include <utility>
 
 #include "abbe/calib/model_comparison.hpp"
 #include "abbe/calib/otf/identify.hpp"
@@ -75,6 +79,21 @@ TEST(Adjustment, HasNoUncertaintyWhereTheGaugeFixesAValue) {
   EXPECT_GT(a.covariance(first_straightness + 1, first_straightness + 1), 0.0);
 }
 
+TEST(Adjustment, HasNoNegativeVarianceWhereRoundingPutsANodeBesideTheReference) {
+  for (const auto& [half_m, spacing_m] : {std::pair{0.36, 0.06}, {0.65, 0.05}}) {
+    MadeRun run = make_run({});
+    const AxisNodes x = *equidistant_nodes(-half_m, half_m, spacing_m);
+    std::vector<double> within;
+    std::copy_if(x.nodes_m.begin(), x.nodes_m.end(), std::back_inserter(within),
+                 [](double node_m) { return std::abs(node_m) < 0.301; });
+    run.machine.nodes[0].nodes_m = within;
+    const Observations o = observed(run);
+    const Adjustment a = *adjust(normal_equations(o), o.layout);
+    EXPECT_GE(a.covariance.diagonal().minCoeff(), 0.0) << half_m;
+    EXPECT_TRUE(solve(o, run.options)) << half_m;
+  }
+}
+
 /// Var of any weighted least-squares estimate, from its definition: the sandwich holds for weights that are
 /// wrong.
 TEST(Adjustment, StatesTheCovarianceOfWrongWeights) {
@@ -103,7 +122,7 @@ TEST(Adjustment, UncertaintyCoversTheTruth) {
   Observations o = observed(run);
   Eigen::VectorXd with_rigid = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(o.layout.fit_size()));
   with_rigid.head(run.truth.size()) = run.truth;
-  const Eigen::VectorXd truth = to_gauge(Gauge::G1, o.layout, o.target_offset_m, with_rigid);
+  const Eigen::VectorXd truth = *to_gauge(Gauge::G1, o.layout, std::array{o.target_offset_m}, with_rigid);
   std::mt19937_64 random(99);
   std::normal_distribution<double> normal;
   std::size_t inside = 0, all = 0;

@@ -84,6 +84,25 @@ TEST(ProbeDelay, StatesAnUncertaintyThatHoldsForFewTouches) {
   EXPECT_GE(coverage({}, {1e-3, 2e-3, 3e-3, 4e-3, 6e-3, 8e-3}, 3).share, 0.93);
 }
 
+/// The same, and three feeds: their disagreement is one number, which is known to nobody better than
+/// Student's t with one degree of freedom says.
+TEST(ProbeDelay, StatesAnUncertaintyThatHoldsWhereThreeFeedsDoNotAgree) {
+  std::mt19937 random(8);
+  std::normal_distribution<double> normal;
+  int held = 0;
+  constexpr int kRuns = 2000;
+  for (int run = 0; run < kRuns; ++run) {
+    auto some = touches({.jitter_s = 0.0}, kThreeFeeds, 10, random);
+    for (int feed = 0; feed < 3; ++feed) {
+      const double off_m = 5e-6 * normal(random);
+      for (int i = 0; i < 10; ++i) some[static_cast<std::size_t>(10 * feed + i)].along_m += off_m;
+    }
+    const auto fit = fit_delay(some).value();
+    held += std::abs(fit.delay_s - Truth{}.delay_s) <= 1.96 * fit.u_delay_s ? 1 : 0;
+  }
+  EXPECT_NEAR(static_cast<double>(held) / kRuns, 0.95, 0.015);  // three standard deviations of the share
+}
+
 /// Every feed has an error of its own (the surface was warmer, the control overshot): the touches at a feed
 /// know nothing of it, the misfit does.
 TEST(ProbeDelay, WidensItsUncertaintyWhereTheFeedsDoNotAgree) {
@@ -93,8 +112,12 @@ TEST(ProbeDelay, WidensItsUncertaintyWhereTheFeedsDoNotAgree) {
   for (std::size_t i = 0; i < some.size(); ++i) some[i].along_m += i / 20 % 2 == 0 ? 0.2e-6 : -0.2e-6;
   const auto after = fit_delay(some).value();
   ASSERT_GT(after.misfit, 4.0);
-  EXPECT_NEAR(after.u_delay_s / before.u_delay_s, std::sqrt(after.misfit / std::max(1.0, before.misfit)),
-              0.05 * std::sqrt(after.misfit));
+  ASSERT_LT(before.misfit, 1.0);
+  EXPECT_EQ(before.dof, 76.0);
+  EXPECT_EQ(after.dof, 2.0);
+  constexpr double kStudent2Over76 = 4.3027 / 1.9917;
+  EXPECT_NEAR(after.u_delay_s / before.u_delay_s, kStudent2Over76 * std::sqrt(after.misfit),
+              0.05 * kStudent2Over76 * std::sqrt(after.misfit));
 }
 
 TEST(ProbeDelay, ShowsPlacesThatLieOnNoLine) {

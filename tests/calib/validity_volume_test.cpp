@@ -2,11 +2,12 @@
 
 #include <gtest/gtest.h>
 
+#include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
-#include <vector>
-
+#include <ctime>
 #include <random>
+#include <vector>
 
 namespace {
 using namespace abbe::calib;
@@ -90,6 +91,141 @@ TEST(ValidityVolume, OfALongPathAroundABoxIsThatBox) {
   const Result<ValidityVolume> volume = ValidityVolume::hull_of(points);
   ASSERT_TRUE(volume) << volume.error().text;
   EXPECT_EQ(volume->vertices_m().size(), 8u);
+}
+
+/// A corner 2 um above the middle of a face of 0.3 m.
+TEST(ValidityVolume, KeepsAnApexJustAboveAFace) {
+  for (const double height_m : {2e-6, 10e-6, 50e-6}) {
+    std::vector<Vector3> points{{0, 0, 0}, {0.3, 0, 0}, {0, 0.3, 0}, {0.3, 0.3, 0}, {0.15, 0.15, -0.2}};
+    points.emplace_back(0.15, 0.15, height_m);
+    const ValidityVolume live = *ValidityVolume::hull_of(points);
+    const ValidityVolume stored = *ValidityVolume::of_vertices(live.vertices_m());
+    EXPECT_EQ(live.vertices_m().size(), 6u);
+    EXPECT_TRUE(live.contains(points.back()));
+    EXPECT_TRUE(stored.contains(points.back()));
+    EXPECT_FALSE(stored.contains({0.15, 0.15, height_m + 1.1e-6}));
+  }
+}
+
+enum class Shape { Sphere, Lattice, OnCube, Wavy };
+constexpr double kSide_m = 0.3;
+
+/// 150 points, turned and flattened at random: many coplanar ones, many almost so.
+std::vector<Vector3> points_of(Shape shape, double flat, std::mt19937_64& random) {
+  std::normal_distribution<double> normal;
+  std::uniform_int_distribution<int> step(0, 4), axis(0, 2);
+  const Matrix3 R = Eigen::Quaterniond(normal(random), normal(random), normal(random), normal(random))
+                        .normalized()
+                        .toRotationMatrix();
+  std::vector<Vector3> points;
+  for (int i = 0; i < 150; ++i) {
+    Vector3 p(normal(random), normal(random), normal(random));
+    if (shape == Shape::Sphere) {
+      p.normalize();
+    } else if (shape == Shape::OnCube) {
+      p(axis(random)) = step(random) < 2 ? -1.0 : 1.0;
+      p = p.cwiseMax(-1.0).cwiseMin(1.0);
+    } else {
+      p = Vector3(step(random), step(random), shape == Shape::Wavy ? 1e-2 * normal(random) : step(random)) /
+          4;
+    }
+    p.z() *= flat;
+    points.push_back(kSide_m * (R * p));
+  }
+  return points;
+}
+
+TEST(ValidityVolume, ContainsTheSameAfterItWasStored) {
+  std::mt19937_64 random(3);
+  std::normal_distribution<double> normal;
+  std::size_t differ = 0, inside = 0, tried = 0;
+  for (const Shape shape : {Shape::Sphere, Shape::Lattice, Shape::OnCube, Shape::Wavy}) {
+    for (const double flat : {1.0, 1.0, 1e-2, 1e-4, 1e-5}) {
+      const std::vector<Vector3> points = points_of(shape, flat, random);
+      const ValidityVolume live = *ValidityVolume::hull_of(points);
+      const ValidityVolume stored = *ValidityVolume::of_vertices(live.vertices_m());
+      for (int i = 0; i < 1000; ++i) {  // close to a point, most of them at the border
+        const double away_m = i % 2 == 0 ? 1e-6 : 1e-3;
+        const Vector3 q = points[static_cast<std::size_t>(i) % points.size()] +
+                          away_m * Vector3(normal(random), normal(random), normal(random));
+        differ += live.contains(q) != stored.contains(q) ? 1 : 0;
+        inside += live.contains(q) ? 1 : 0;
+        ++tried;
+      }
+    }
+  }
+  EXPECT_EQ(differ, 0u);
+  EXPECT_GT(inside, tried / 20);
+  EXPECT_LT(inside, tried / 20 * 19);
+}
+
+/// Planes through three points that have all others on one side, by brute force.
+bool in_brute_force_hull(const std::vector<Vector3>& points, const Vector3& q, double tolerance_m) {
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    for (std::size_t j = 0; j < i; ++j) {
+      for (std::size_t k = 0; k < j; ++k) {
+        const Vector3 n = (points[j] - points[i]).cross(points[k] - points[i]).normalized();
+        const auto height = [&](const Vector3& p) { return n.dot(p - points[i]); };
+        double low = 0.0, high = 0.0;
+        for (const Vector3& p : points) {
+          low = std::min(low, height(p));
+          high = std::max(high, height(p));
+        }
+        if ((high < 1e-12 && height(q) > tolerance_m) || (low > -1e-12 && height(q) < -tolerance_m)) {
+          return false;
+        }
+      }
+    }
+  }
+  return true;
+}
+
+TEST(ValidityVolume, IsTheHullThatBruteForceFinds) {
+  std::mt19937_64 random(4);
+  std::normal_distribution<double> normal;
+  for (const Shape shape : {Shape::Sphere, Shape::Lattice, Shape::OnCube, Shape::Wavy}) {
+    std::vector<Vector3> points = points_of(shape, 1.0, random);
+    points.resize(24);
+    const ValidityVolume volume = *ValidityVolume::hull_of(points);
+    for (const Vector3& p : points) {
+      EXPECT_TRUE(volume.contains(p));
+    }
+    for (int i = 0; i < 20; ++i) {
+      const Vector3 q = 0.12 * Vector3(normal(random), normal(random), normal(random));
+      EXPECT_EQ(volume.contains(q), in_brute_force_hull(points, q, ValidityVolume::kTolerance_m));
+    }
+  }
+}
+
+TEST(ValidityVolume, OfPointsOnItsFacesHasTheCornersOfTheCubeOnly) {
+  std::mt19937_64 random(5);
+  std::uniform_real_distribution<double> place(-1.0, 1.0);
+  const Matrix3 R = Eigen::AngleAxisd(0.4, Vector3(1, 2, 3).normalized()).toRotationMatrix();
+  std::vector<Vector3> points;
+  for (int i = 0; i < 1000; ++i) {
+    Vector3 p(place(random), place(random), place(random));
+    p(i % 3) = i % 2 == 0 ? 1.0 : -1.0;
+    points.emplace_back(kSide_m * (R * p));
+  }
+  for (int corner = 0; corner < 8; ++corner) {
+    const Vector3 p((corner & 1) != 0 ? 1 : -1, (corner & 2) != 0 ? 1 : -1, (corner & 4) != 0 ? 1 : -1);
+    points.emplace_back(kSide_m * (R * p));
+  }
+  EXPECT_EQ(ValidityVolume::hull_of(points)->vertices_m().size(), 8u);
+}
+
+TEST(ValidityVolume, OfFiveThousandVerticesTakesNoTime) {
+  std::mt19937_64 random(6);
+  std::normal_distribution<double> normal;
+  std::vector<Vector3> points;
+  for (int i = 0; i < 5000; ++i) {
+    points.push_back(kSide_m * Vector3(normal(random), normal(random), normal(random)).normalized());
+  }
+  const std::clock_t before = std::clock();
+  const Result<ValidityVolume> volume = ValidityVolume::hull_of(points);
+  const double cpu_s = static_cast<double>(std::clock() - before) / CLOCKS_PER_SEC;
+  EXPECT_EQ(volume->vertices_m().size(), points.size());
+  EXPECT_LT(cpu_s, 5.0);  // 0.07 s were seen, ten times that under a sanitizer; n^3 takes half an hour
 }
 
 TEST(ValidityVolume, RefusesAFlatOne) {

@@ -2,7 +2,10 @@
 
 #include <gtest/gtest.h>
 
+#include <array>
 #include <cmath>
+#include <string>
+#include <vector>
 
 #include "abbe/calib/model_comparison.hpp"
 #include "abbe/calib/rigid_body_model.hpp"
@@ -82,6 +85,32 @@ TEST(VolumetricModel, Of18TablesHoldsForAnyTool) {
             1e-18);
 }
 
+VolumetricModel of_18_tables(const std::vector<Vector3>& tools) {
+  const otf::Machine machine = coarse_machine("[w X' b Y Z t]");
+  const ParameterLayout layout = *ParameterLayout::all_tables(machine.chain, machine.nodes);
+  std::mt19937_64 random(2);
+  const Eigen::VectorXd U = random_tables(layout, 1e-4, random);
+  return *VolumetricModel::from_vector(layout, Gauge::G1, tools, U,
+                                       Eigen::MatrixXd::Identity(U.size(), U.size()), whole_volume(layout));
+}
+
+TEST(VolumetricModel, OfToolsOnALineHoldsForToolsOnThatLineOnly) {
+  const std::vector<Vector3> two{{0, 0, 0}, {0.1, 0, 0}}, three{{0, 0, 0}, {0.1, 0, 0}, {0.3, 1e-4, 0}};
+  for (const VolumetricModel& model : {of_18_tables(two), of_18_tables(three)}) {
+    EXPECT_TRUE(model.holds_for_tool({0.2, 0, 0}));
+    EXPECT_FALSE(model.holds_for_tool({0.1, 0.05, 0}));
+    EXPECT_TRUE(model.error_at(Vector3::Zero(), {0.2, 0, 0.05}).V_m.array().isNaN().all());
+    // Close to the line: the rotation about it, which no tool has shown, must not count.
+    EXPECT_EQ(model.V_at({0.1, 0.1, -0.1}, {0.2, 0, 4e-4}), model.V_at({0.1, 0.1, -0.1}, {0.2, 0, 0}));
+  }
+}
+
+TEST(VolumetricModel, OfOneToolGivenTwiceHoldsForThatOne) {
+  const VolumetricModel model = of_18_tables({{0, 0, 0}, {1e-4, 0, 0}, {0, 1e-4, 0}});
+  EXPECT_TRUE(model.holds_for_tool({0, 0, 4e-4}));
+  EXPECT_FALSE(model.holds_for_tool({0.1, 0, 0}));
+}
+
 TEST(VolumetricModel, CorrectionBringsAPoorMachineToTheNominalPoint) {
   const VolumetricModel model = model_of(random_model(1e-3));  // errors of some mm
   const Vector3 p(0.11, -0.03, -0.22);
@@ -142,12 +171,32 @@ TEST(VolumetricModel, RefusesADescriptionThatDoesNotAddUp) {
   EXPECT_EQ(code_of(d), ErrorCode::BadInput);
 }
 
+/// No single variance is negative, that of the difference of two parameters is.
+TEST(VolumetricModel, RefusesACovarianceThatIsNotPositive) {
+  ModelDescription d = model_of(random_model(1e-4)).description();
+  EXPECT_TRUE(check_covariance(d.covariance));
+  d.covariance(4, 5) = d.covariance(5, 4) = 1.01 * std::sqrt(d.covariance(4, 4) * d.covariance(5, 5));
+  const auto refused = VolumetricModel::from_description(d);
+  ASSERT_FALSE(refused);
+  EXPECT_EQ(refused.error().code, ErrorCode::BadInput);
+  EXPECT_NE(refused.error().text.find("positive semidefinite"), std::string::npos);
+}
+
+TEST(VolumetricModel, AcceptsTheCovarianceOfFixedAndOfFullyCorrelatedValues) {
+  ModelDescription d = model_of(random_model(1e-4)).description();
+  const Eigen::VectorXd one = d.covariance.col(0);
+  d.covariance = one * one.transpose();
+  d.covariance.row(3).setZero();
+  d.covariance.col(3).setZero();
+  EXPECT_TRUE(VolumetricModel::from_description(d));
+}
+
 TEST(RigidFreeDifference, IsZeroBetweenTwoGaugesOfOneMachine) {
   const Made m = random_model(1e-4);
   Eigen::VectorXd U = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(m.layout.fit_size()));
   U.head(m.U.size()) = m.U;
   Made other = m;
-  other.U = to_gauge(Gauge::G1, m.layout, kTool, U).head(m.U.size());
+  other.U = to_gauge(Gauge::G1, m.layout, std::array{kTool}, U)->head(m.U.size());
   const auto difference =
       rigid_free_difference(model_of(m), model_of(other), kTool, tensor_grid(m.layout.nodes()));
   ASSERT_TRUE(difference);

@@ -158,6 +158,24 @@ TEST(ModelDocument, IsRefusedWhenANumberWasChanged) {
   EXPECT_THAT(read.error().details, ElementsAre(HasSubstr("hash: is not the hash of the content")));
 }
 
+/// Its own hash is right: no single variance is negative, that of a difference of two parameters is.
+TEST(ModelDocument, IsRefusedWithACovarianceThatIsNotPositive) {
+  const auto document = synthetic_document(11);
+  Eigen::MatrixXd covariance = document.model.covariance();
+  Eigen::Index i = 0;
+  while (!(covariance(i, i) > 0.0 && covariance(i + 1, i + 1) > 0.0)) ++i;
+  covariance(i, i + 1) = covariance(i + 1, i) = 2.0 * std::sqrt(covariance(i, i) * covariance(i + 1, i + 1));
+  auto changed = document;
+  changed.model = calib::VolumetricModel::from_vector(document.model.layout(), document.model.gauge(),
+                                                      document.model.tool_offsets_m(), document.model.U(),
+                                                      covariance, document.model.validity())
+                      .value();
+  const auto read = parse_model(to_json(changed), "model.json");
+  ASSERT_FALSE(read);
+  EXPECT_THAT(read.error().details,
+              ElementsAre(AllOf(HasSubstr("model.json: covariance: "), HasSubstr("positive semidefinite"))));
+}
+
 TEST(ModelDocument, ReportsEveryFaultAtOnce) {
   auto text = to_json(synthetic_document(8));
   text = replaced(text, "\"gauge\": \"G1\"", "\"gauge\": \"G7\"");

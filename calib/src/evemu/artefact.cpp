@@ -70,6 +70,21 @@ Result<void> check_expansivity(const Calibrator& c) {
   return {};
 }
 
+/// Of a touch, where residuals do not show it: as many touches as unknowns leave none.
+Result<std::optional<double>> noise_of(std::size_t touches, std::size_t unknowns,
+                                       std::optional<double> u_touch_m) {
+  if (touches != unknowns) {
+    return std::optional<double>{};
+  }
+  if (!u_touch_m || !(*u_touch_m > 0.0) || !std::isfinite(*u_touch_m)) {
+    return failure(ErrorCode::TooFewObservations,
+                   message(touches,
+                           " touches do not show how uncertain they are: touch one place more, or "
+                           "state the uncertainty of a touch"));
+  }
+  return u_touch_m;
+}
+
 }  // namespace
 
 Calibrator grown(const Calibrator& c, const Expansion& expansion) {
@@ -140,7 +155,8 @@ Result<void> check(const Calibrator& c) {
 }
 
 Result<Calibrator> precalibrated(std::string name, std::span<const Touch> touches, double tip_radius_m,
-                                 const std::array<Vector3, 2>& outward) {
+                                 const std::array<Vector3, 2>& outward, std::optional<double> u_touch_m) {
+  constexpr std::size_t kBallUnknowns = 4, kBlockUnknowns = 3;
   std::map<int, std::vector<Vector3>> balls, blocks;
   for (const Touch& t : touches) {
     (t.feature == Feature::Ball ? balls : blocks)[t.number].push_back(t.p_m);
@@ -149,18 +165,25 @@ Result<Calibrator> precalibrated(std::string name, std::span<const Touch> touche
   c.name = std::move(name);
   c.tip_radius_m = tip_radius_m;
   for (const auto& [number, points] : balls) {
-    const Result<fit::Sphere> sphere = fit::fit_sphere(points);
+    const Result<fit::Sphere> sphere =
+        noise_of(points.size(), kBallUnknowns, u_touch_m).and_then([&](std::optional<double> known) {
+          return fit::fit_sphere(points, known);
+        });
     if (!sphere) {
       return broken(c, sphere.error().code, message("ball ", number, ": ", sphere.error().text));
     }
-    const double u_m = std::sqrt(sphere->covariance.topLeftCorner<3, 3>().trace() / 3.0);
-    c.balls.push_back({number, sphere->centre, sphere->radius - tip_radius_m, u_m});
+    const double u_centre_m = std::sqrt(sphere->covariance.topLeftCorner<3, 3>().trace() / 3.0);
+    c.balls.push_back({number, sphere->centre, sphere->radius - tip_radius_m, u_centre_m});
   }
   for (const auto& [number, points] : blocks) {
     if (number != 1 && number != 2) {
       return broken(c, ErrorCode::BadInput, message("there is no block ", number));
     }
-    const Result<fit::Plane> plane = fit::fit_plane(points, outward[static_cast<std::size_t>(number) - 1]);
+    const Vector3& towards = outward[static_cast<std::size_t>(number) - 1];
+    const Result<fit::Plane> plane =
+        noise_of(points.size(), kBlockUnknowns, u_touch_m).and_then([&](std::optional<double> known) {
+          return fit::fit_plane(points, towards, known);
+        });
     if (!plane) {
       return broken(c, plane.error().code, message("block ", number, ": ", plane.error().text));
     }

@@ -176,7 +176,7 @@ Calibrator moved(const Calibrator& calibrator, const RigidTransform& T_machine_a
 Result<Calibrator> calibrated_artefact(const Calibrator& nominal, const std::array<FaceToTouch, 2>& faces,
                                        std::span<const Touch> touches, double u_position_m) {
   auto found = precalibrated(nominal.name, touches, nominal.tip_radius_m,
-                             {nominal.blocks[0].normal, nominal.blocks[1].normal});
+                             {nominal.blocks[0].normal, nominal.blocks[1].normal}, u_position_m);
   if (!found) return found;
   found->expansivity = nominal.expansivity;
   for (auto& ball : found->balls) ball.u_m = std::hypot(ball.u_m, u_position_m);

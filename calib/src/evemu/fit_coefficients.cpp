@@ -72,8 +72,12 @@ Result<Fit> fit_prior(PriorKind kind, const FitProblem& problem) {
   const std::size_t positions = o.positions();
   const auto white = [&](const Eigen::MatrixXd& rows) { return without_ball1(o, whitened(o, rows)); };
   const LinearGaussian gaussian(white(problem.X), white(pose_rotation_rows(o)), white(problem.y));
+  const Result<HyperParameters> hyper = most_likely(kind, problem.design, positions, gaussian);
+  if (!hyper) {
+    return tl::unexpected(hyper.error());
+  }
   Fit fit;
-  fit.hyper = most_likely(kind, problem.design, positions, gaussian);
+  fit.hyper = *hyper;
   const HyperParameters& h = *fit.hyper;
   const Eigen::VectorXd prior = prior_variances(kind, problem.design, positions, h);
   const LinearGaussian::Posterior p = gaussian.posterior(prior, h.s_m * h.s_m);

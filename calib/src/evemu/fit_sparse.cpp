@@ -5,6 +5,7 @@
 #include "abbe/calib/sparse/cross_validation.hpp"
 #include "abbe/calib/sparse/optimality.hpp"
 #include "evemu/fit_coefficients.hpp"
+#include "message.hpp"
 #include "units.hpp"
 
 namespace abbe::calib::evemu {
@@ -98,8 +99,22 @@ Eigen::VectorXd scaled_from_named(const ScaledDesign& design, Eigen::VectorXd wi
   return (scale.asDiagonal() * M).fullPivLu().solve(scale.cwiseProduct(beta)) / kMmPerM;
 }
 
-Result<sparse::Path> path_to(const Regression& r, Estimator estimator, const SparseChoice& choice) {
-  return sparse::fit_path(r.X, r.y, {kind_of(estimator), choice.gamma}, path_along(choice.lambda));
+/// Down to the chosen lambda: the coefficients of a larger one are those of another estimator.
+Result<sparse::Path> path_to(const Regression& r, const SolveOptions& asked, const SparseChoice& choice) {
+  sparse::PathOptions options = path_along(choice.lambda);
+  options.max_sweeps = asked.sparse.max_sweeps;
+  return sparse::fit_path(r.X, r.y, {kind_of(asked.estimator), choice.gamma}, options)
+      .and_then([&](sparse::Path path) -> Result<sparse::Path> {
+        const auto reached = static_cast<std::size_t>(path.reached());
+        if (reached == choice.lambda.size() && !path.budget_exhausted) {
+          return path;
+        }
+        return failure(ErrorCode::NotConverged,
+                       message("sparse fit (", name(asked.estimator), ", gamma ", choice.gamma,
+                               "): max_sweeps = ", options.max_sweeps, " end at lambda ",
+                               path.lambda[std::max<std::size_t>(reached, 1) - 1], ", number ", reached,
+                               " of ", choice.lambda.size(), "; choose a larger lambda"));
+      });
 }
 
 Eigen::VectorXd at_end(const sparse::Path& path) {
@@ -128,7 +143,7 @@ Result<Eigen::MatrixXd> bootstrap(const FitProblem& problem, const Regression& r
     if (problem.A.cols() > 0) {
       scatter += problem.A * draw(problem.A.cols());  // one array for all positions of a run
     }
-    const auto refit = path_to({r.X, fitted_mm + kMmPerM * scatter}, options.estimator, choice);
+    const auto refit = path_to({r.X, fitted_mm + kMmPerM * scatter}, options, choice);
     if (!refit) {
       return tl::unexpected(refit.error());
     }
@@ -169,7 +184,7 @@ Result<Fit> fit_sparse(const FitProblem& problem, const SolveOptions& options) {
   if (!choice) {
     return tl::unexpected(choice.error());
   }
-  const Result<sparse::Path> path = path_to(r, options.estimator, *choice);
+  const Result<sparse::Path> path = path_to(r, options, *choice);
   if (!path) {
     return tl::unexpected(path.error());
   }

@@ -4,6 +4,7 @@
 #include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <numbers>
 
 namespace abbe::calib::evemu {
@@ -29,6 +30,11 @@ LinearGaussian::Evidence LinearGaussian::evidence(const Eigen::VectorXd& prior, 
   K.diagonal().array() += noise;
   const Eigen::LLT<Eigen::MatrixXd> llt(K);
   Evidence e;
+  if (llt.info() != Eigen::Success) {
+    e.log_likelihood = -std::numeric_limits<double>::infinity();
+    e.by_log_prior = Eigen::VectorXd::Zero(prior.size());
+    return e;
+  }
   const Eigen::MatrixXd L_inv_scaled = llt.matrixL().solve(scaled);
   const Eigen::VectorXd L_inv_z = llt.matrixL().solve(z_);
   const Eigen::VectorXd projected = L_inv_scaled.transpose() * L_inv_z;
@@ -72,6 +78,10 @@ LinearGaussian::Posterior LinearGaussian::posterior(const Eigen::VectorXd& prior
   const auto [root, scaled, llt] = information(prior, noise);
   const Eigen::Index n = R_.cols();
   Posterior p;
+  if (llt.info() != Eigen::Success) {
+    constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
+    return {Eigen::VectorXd::Constant(n, kNaN), Eigen::MatrixXd::Constant(n, n, kNaN), kNaN, kNaN};
+  }
   const Eigen::MatrixXd inverse = llt.solve(Eigen::MatrixXd::Identity(n, n));
   p.covariance = root.asDiagonal() * inverse * root.asDiagonal();
   p.covariance = 0.5 * (p.covariance + p.covariance.transpose()).eval();

@@ -5,6 +5,8 @@
 #include <cmath>
 #include <limits>
 
+#include "message.hpp"
+
 namespace abbe::calib::evemu {
 namespace {
 
@@ -167,8 +169,8 @@ Eigen::VectorXd prior_variances(PriorKind kind, const ScaledDesign& design, std:
   return v;
 }
 
-HyperParameters most_likely(PriorKind kind, const ScaledDesign& design, std::size_t positions,
-                            const LinearGaussian& problem) {
+Result<HyperParameters> most_likely(PriorKind kind, const ScaledDesign& design, std::size_t positions,
+                                    const LinearGaussian& problem) {
   Objective f{kind, design, positions, problem};
   // The likelihood can have one maximum that calls the scatter noise and one that calls it pose rotation.
   const std::array<HyperParameters, 3> starts{
@@ -182,6 +184,9 @@ HyperParameters most_likely(PriorKind kind, const ScaledDesign& design, std::siz
     if (found.value < best.value) {
       best = found;
     }
+  }
+  if (!std::isfinite(best.value)) {
+    return failure(ErrorCode::NotConverged, message("bayes: none of ", used, " starts has a likelihood"));
   }
   HyperParameters h = parameters(best.theta);
   if (kind == PriorKind::Ridge) {

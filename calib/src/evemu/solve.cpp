@@ -142,6 +142,19 @@ Statistics statistics_of(const FitProblem& problem, const Fit& fit, const Eigen:
   return s;
 }
 
+/// Noise and covariance of the sparse estimators come from the bootstrap alone.
+Result<void> check(const SolveOptions& options) {
+  const bool is_sparse = options.estimator == Estimator::Lasso || options.estimator == Estimator::Mcp ||
+                         options.estimator == Estimator::Scad;
+  constexpr int kLeastRuns = 2;
+  if (is_sparse && options.sparse.bootstrap_runs < kLeastRuns) {
+    return failure(ErrorCode::BadInput,
+                   message("ball array: bootstrap_runs = ", options.sparse.bootstrap_runs,
+                           " gives no uncertainty, needs at least ", kLeastRuns));
+  }
+  return {};
+}
+
 std::vector<Vector3> by_ball(const Eigen::VectorXd& r) {
   std::vector<Vector3> balls;
   for (Eigen::Index i = 0; i + 2 < r.size(); i += 3) {
@@ -187,6 +200,9 @@ Result<ScaledDesign> design_of(const Observations& o) {
 }
 
 Result<Solution> solve(const Observations& o, const SolveOptions& options) {
+  if (Result<void> fine = check(options); !fine) {
+    return tl::unexpected(fine.error());
+  }
   constexpr std::size_t kLeastPositions = 2;
   if (o.positions() < kLeastPositions) {
     return failure(ErrorCode::TooFewObservations,

@@ -23,6 +23,10 @@ struct Remainder {
   [[nodiscard]] double rms_m() const { return std::sqrt(squares_m2 / static_cast<double>(rows)); }
 };
 
+/// Of the best-fit rigid motion: so many rows or fewer it fits exactly, whatever the model. What is left of
+/// them is rounding, and compares nothing.
+constexpr std::size_t kRigidUnknowns = 6;
+
 /// The last six entries of a row are the rigid ones.
 Vector6 rigid_row(std::span<const SparseRows::Entry> row) {
   Vector6 r;
@@ -237,14 +241,15 @@ Result<HeldOutFigures> held_out(const Observations& o, const VolumetricModel* ac
       return tl::unexpected(fit.error());
     }
     const std::vector<std::size_t>& rows = fit->rows;
-    if (rows.empty()) {
+    if (rows.size() <= kRigidUnknowns) {
       continue;
     }
     add_without_rigid(none, o, rows, residuals(o, rows, [](std::size_t) { return 0.0; }));
     const auto by_fit = [&](std::size_t i) { return predicted_by_fit(o, i, fit->U); };
     add_without_rigid(candidate, o, rows, residuals(o, rows, by_fit));
-    if (with_active) {
-      const std::vector<std::size_t> both = inside(o, rows, active->validity());
+    const std::vector<std::size_t> both =
+        with_active ? inside(o, rows, active->validity()) : std::vector<std::size_t>{};
+    if (both.size() > kRigidUnknowns) {
       add_without_rigid(candidate_beside, o, both, residuals(o, both, by_fit));
       add_without_rigid(other, o, both,
                         residuals(o, both, [&](std::size_t i) { return predicted_by_model(o, i, *active); }));

@@ -3,6 +3,7 @@
 #include <Eigen/Core>
 #include <Eigen/LU>
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <vector>
 
@@ -103,10 +104,12 @@ Scatter scatter_of(const std::vector<Feed>& feeds) {
   return scatter;
 }
 
-/// Student's t for 95 % over that of the normal distribution; Cornish and Fisher's series, to 0.1 % from 6
-/// degrees of freedom on.
+/// Student's t for 95 % over that of the normal distribution: [GUM] table G.2, and from 6 degrees of freedom
+/// on Cornish and Fisher's series, to 0.1 %.
 double student_over_normal(double dof) {
   constexpr double z = 1.959964;
+  constexpr std::array kT95{12.706205, 4.302653, 3.182446, 2.776445, 2.570582};
+  if (dof < 5.5) return kT95.at(static_cast<std::size_t>(std::lround(dof)) - 1) / z;
   constexpr double z2 = z * z;
   const double first = (z2 + 1) / (4 * dof);
   const double second = (5 * z2 * z2 + 16 * z2 + 3) / (96 * dof * dof);
@@ -164,7 +167,8 @@ Result<ProbeDelayFit> fit_delay(std::span<const FeedTouch> touches, const DelayO
     const double residual = f.along_m - fit.origin_m - fit.delay_s * f.speed_m_s;
     fit.misfit += weight(f) * residual * residual / static_cast<double>(feeds->size() - 2);
   }
-  fit.dof = static_cast<double>(fit.touches - fit.feeds);
+  // Feeds that do not agree say how uncertain the line is, and there are few of them.
+  fit.dof = static_cast<double>(fit.misfit > 1.0 ? fit.feeds - 2 : fit.touches - fit.feeds);
   fit.u_delay_s *= std::sqrt(std::max(1.0, fit.misfit)) * student_over_normal(fit.dof);
   double squares = 0.0;
   for (const FeedTouch& t : touches) {

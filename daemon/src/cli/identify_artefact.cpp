@@ -5,6 +5,7 @@
 
 #include <array>
 #include <memory>
+#include <optional>
 
 #include "abbe/daemon/evemu_files.hpp"
 #include "abbe/daemon/otf_inputs.hpp"
@@ -21,6 +22,7 @@ struct IdentifyArtefactArguments {
   std::string touches, name, out;
   std::string outward_1 = "0,0,1", outward_2 = "0,1,0";
   double tip_radius_mm = 0.0, machine_tip_radius_mm = -1.0;
+  std::optional<double> u_touch_um;
 };
 
 struct Precalibrated {
@@ -40,8 +42,11 @@ Result<Precalibrated> precalibrate(const IdentifyArtefactArguments& arguments) {
       return fail(ErrorCode::BadInput,
                   fmt::format("{}: positions {} and {}: an artefact is calibrated in one", arguments.touches,
                               touches->touches.front().position, touch.position));
-  auto calibrator = calib::evemu::precalibrated(arguments.name, touches->touches,
-                                                arguments.tip_radius_mm / kMmPerM, {*outward_1, *outward_2});
+  std::optional<double> u_touch_m;
+  if (arguments.u_touch_um) u_touch_m = *arguments.u_touch_um / kUmPerM;
+  auto calibrator =
+      calib::evemu::precalibrated(arguments.name, touches->touches, arguments.tip_radius_mm / kMmPerM,
+                                  {*outward_1, *outward_2}, u_touch_m);
   if (!calibrator) return tl::make_unexpected(error_of(calibrator.error()));
   if (arguments.machine_tip_radius_mm >= 0.0)
     calibrator->tip_radius_m = arguments.machine_tip_radius_mm / kMmPerM;
@@ -88,6 +93,11 @@ void add_identify_artefact(CLI::App& parent, int& exit) {
       ->add_option("--machine-tip-radius-mm", arguments->machine_tip_radius_mm,
                    "of the probe that will touch it on the machine to be calibrated; default: the same")
       ->check(CLI::NonNegativeNumber);
+  command
+      ->add_option("--u-touch-um", arguments->u_touch_um,
+                   "standard uncertainty of a touch, for balls of 4 touches and blocks of 3; more of them "
+                   "show it themselves")
+      ->check(CLI::PositiveNumber);
   command->add_option("--outward-1", arguments->outward_1, "x,y,z: roughly where the face of block 1 looks")
       ->capture_default_str();
   command->add_option("--outward-2", arguments->outward_2, "the same for block 2")->capture_default_str();

@@ -17,8 +17,7 @@ namespace {
 
 /// n (n + 1) / 2 numbers of the covariance of n parameters are the largest array: n = 20,000 fits. to_json()
 /// nests five deep.
-constexpr JsonBounds kModelBounds{
-    .bytes = std::size_t{1} << 30, .depth = 16, .values = std::size_t{1} << 28};
+constexpr JsonBounds kModelBounds{.bytes = std::size_t{1} << 30, .depth = 16, .values = std::size_t{1} << 28};
 
 /// long double: see decimal.hpp.
 using Json =
@@ -282,7 +281,10 @@ Result<ModelDocument> read_document(Reader& in) {
   }
   const auto created = utc_from_text(in.text("created"));
   if (!created) in.fault("created", "must be a UTC time such as 2024-05-17T08:30:00.000000000Z");
-  auto model = calib::VolumetricModel::from_description(read_description(in));
+  auto description = read_description(in);
+  if (const auto sound = calib::check_covariance(description.covariance); !sound && !in.any())
+    in.fault("covariance", sound.error().text);
+  auto model = calib::VolumetricModel::from_description(std::move(description));
   if (!model && !in.any()) in.fault("parameters", model.error().text);
   const auto statistics = read_statistics(in);
   const auto inputs = read_inputs(in);

@@ -1,8 +1,8 @@
 #pragma once
 /// When a model may be trusted, whatever method it came from: it predicts observations it was not fitted to
 /// better than no compensation and, where the active model holds, better than that one; it holds where the
-/// active model does, unless a smaller volume is accepted by name; and it is of a size and smoothness a
-/// machine can have.
+/// active model does but for a rim of 2 %, unless a smaller volume is accepted by name; and it is of a size
+/// and smoothness a machine can have.
 
 #include <cstddef>
 #include <optional>
@@ -48,8 +48,8 @@ struct GateLimits {
 inline constexpr std::string_view kSmallerVolume = "smaller-volume";
 
 /// Share of the volume of `before` that lies in `after`, from points on a lattice over `before`: to a few
-/// per cent.
-[[nodiscard]] double kept_share(const ValidityVolume& before, const ValidityVolume& after);
+/// per cent. What lies beside `after` by no more than `rim` of its width counts as in it.
+[[nodiscard]] double kept_share(const ValidityVolume& before, const ValidityVolume& after, double rim = 0.0);
 
 /// Accepted only if `reasons` is empty.
 struct Verdict {

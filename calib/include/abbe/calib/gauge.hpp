@@ -38,12 +38,16 @@ enum class Gauge { G1, Ball1Blocks, Ball1 };
 [[nodiscard]] Eigen::MatrixXd gauge_conditions(Gauge, const ParameterLayout&);
 
 /// Basis of the combinations (columns, fit_size() rows) that no measurement of `targets_m` anywhere in the
-/// volume can see: the null space of complete 3D data on all node positions.
+/// volume can see: the null space of complete 3D data on all node positions. The offset of every target but
+/// the first is known up to a constant only.
 [[nodiscard]] Eigen::MatrixXd unobservable_combinations(const ParameterLayout&,
                                                         std::span<const Vector3> targets_m);
 
-/// U + N z with K (U + N z) = 0. Both vectors have fit_size() entries.
-[[nodiscard]] Eigen::VectorXd to_gauge(Gauge, const ParameterLayout&, const Vector3& target_offset_m,
-                                       const Eigen::VectorXd& U);
+/// U + N z with K (U + N z) = 0. Both vectors have fit_size() entries. The result predicts for the tools of
+/// `targets_m` what U does, up to a rigid motion and, for each, a constant. DegenerateGeometry where the
+/// targets leave more undetermined than the gauge has conditions: 18 tables need three that are not on a
+/// line, and then the same holds for every tool.
+[[nodiscard]] Result<Eigen::VectorXd> to_gauge(Gauge, const ParameterLayout&,
+                                               std::span<const Vector3> targets_m, const Eigen::VectorXd& U);
 
 }  // namespace abbe::calib

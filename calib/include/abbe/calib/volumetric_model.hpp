@@ -29,6 +29,10 @@ struct VolumetricError {
   bool tool_ok = false;                ///< the model holds for this tool offset
 };
 
+/// What a covariance must be: square, finite, symmetric and, to rounding, positive semidefinite; else
+/// BadInput or NotFinite. Costs n^3 / 3.
+[[nodiscard]] Result<void> check_covariance(const Eigen::MatrixXd&);
+
 struct Correction {
   Vector3 c_m = Vector3::Zero();  ///< add to the nominal position before commanding it
   int evaluations = 0;
@@ -48,8 +52,8 @@ struct ModelDescription {
   MachineNodes nodes;
   Basis basis = Basis::Linear;
   Gauge gauge = Gauge::G1;
-  /// One offset: the model holds for this tool only. Several: all tables were identified, it holds for any
-  /// tool.
+  /// One offset: the model holds for this tool only. Several (all 18 tables): for any tool where three of
+  /// them are not on a line, else for tools on that line: the rotation about it is not determined.
   std::vector<Vector3> tool_offsets_m;
   std::vector<Parameter> parameters;  ///< in the order of ParameterLayout, without the rigid ones
   Eigen::MatrixXd covariance;         ///< parameters x parameters, full, symmetric, m^2, m rad, rad^2
@@ -105,13 +109,14 @@ class VolumetricModel {
 
  private:
   VolumetricModel(ParameterLayout layout) : layout_(std::move(layout)) {}
-  [[nodiscard]] bool holds_for_any_tool() const { return tool_offsets_m_.size() > 1; }
-  [[nodiscard]] const Vector3& lever_offset_m(const Vector3& asked_m) const;
+  [[nodiscard]] Vector3 lever_offset_m(const Vector3& asked_m) const;
 
   ParameterLayout layout_;
   std::optional<evemu::EvemuModel> polynomials_;
   Gauge gauge_ = Gauge::G1;
   std::vector<Vector3> tool_offsets_m_;
+  bool holds_for_any_tool_ = false;
+  Vector3 tool_line_ = Vector3::Zero();  ///< unit length; zero: the model holds for one tool
   Eigen::VectorXd U_;
   Eigen::MatrixXd covariance_;
   ValidityVolume validity_;

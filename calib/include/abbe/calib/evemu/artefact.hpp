@@ -94,8 +94,11 @@ struct SeenArtefact {
 };
 
 /// A calibrator from touches of its own calibration (one position, on a good machine). `outward`: roughly
-/// where the faces of the blocks look. Radii are those of the fits without the tip's.
+/// where the faces of the blocks look. Radii are those of the fits without the tip's. Uncertainties are those
+/// of the residuals. Four touches of a ball and three of a block leave none: `u_touch_m`, the standard
+/// uncertainty of a touch, takes their place, and TooFewObservations says where it is missing.
 [[nodiscard]] Result<Calibrator> precalibrated(std::string name, std::span<const Touch>, double tip_radius_m,
-                                               const std::array<Vector3, 2>& outward);
+                                               const std::array<Vector3, 2>& outward,
+                                               std::optional<double> u_touch_m = {});
 
 }  // namespace abbe::calib::evemu

@@ -20,7 +20,9 @@ class LinearGaussian {
   [[nodiscard]] Eigen::Index rows() const { return rows_; }
 
   struct Evidence {
-    double log_likelihood = 0.0;   ///< of y, natural logarithm
+    /// Of y, natural logarithm. Minus infinity, with derivatives of zero, where rounding leaves no covariance
+    /// of y (noise 1e-8 of what the prior makes of it): nothing is known there, least of all a maximum.
+    double log_likelihood = 0.0;
     Eigen::VectorXd by_log_prior;  ///< derivative by the logarithm of each column's prior variance
     double by_log_noise = 0.0;     ///< by log s^2
   };
@@ -33,6 +35,7 @@ class LinearGaussian {
     double effective_parameters = 0.0;       ///< trace of d(X b)/dy: degrees of freedom b spends
     double effective_pose_parameters = 0.0;  ///< the same of omega
   };
+  /// NaN where rounding leaves no posterior information matrix.
   [[nodiscard]] Posterior posterior(const Eigen::VectorXd& prior, double noise_variance) const;
 
   /// What the mean would be with each column of `rows` (whitened) in the place of y: the mean is linear in y.

@@ -33,8 +33,9 @@ struct HyperParameters {
                                               const HyperParameters&);
 
 /// Quasi-Newton from a few starts within fixed bounds (s 1 nm to 1 mm, w 0.01 urad to 10 mrad, ...).
-/// Deterministic. `problem`: whitened rows of design and pose rotations.
-[[nodiscard]] HyperParameters most_likely(PriorKind, const ScaledDesign&, std::size_t positions,
-                                          const LinearGaussian& problem);
+/// Deterministic. `problem`: whitened rows of design and pose rotations. NotConverged where no start has a
+/// likelihood.
+[[nodiscard]] Result<HyperParameters> most_likely(PriorKind, const ScaledDesign&, std::size_t positions,
+                                                  const LinearGaussian& problem);
 
 }  // namespace abbe::calib::evemu

@@ -61,8 +61,11 @@ struct SparseOptions {
   /// Grid to choose from; empty: the one of [Li OMM], 100 lambdas 1e-1 .. 1e-10 mm, 50 gammas up to 100.
   std::vector<double> lambda{}, gamma{};
   std::uint64_t seed = 1;                ///< of the bootstrap, and of folds over rows
-  int bootstrap_runs = 100;              ///< a standard deviation to 7 %; 0: no covariance
+  int bootstrap_runs = 100;              ///< a standard deviation to 7 %; at least 2
   std::optional<SparseChoice> chosen{};  ///< set: no search
+  /// Of the path to the chosen lambda, in the fit and in every refit: what ends before it is NotConverged.
+  /// The search has the 10,000 of ncvreg; with those, one of eight refits without a position ended early.
+  long max_sweeps = 1'000'000;
 };
 
 struct SolveOptions {

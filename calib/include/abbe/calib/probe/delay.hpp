@@ -30,10 +30,10 @@ struct DelayOptions {
 struct ProbeDelayFit {
   double delay_s = 0.0;  ///< to be added to the one the touches were compensated with
   /// Half width of the 95 % interval over 1.96: the deviation the scatter gives, times sqrt(misfit) where
-  /// that exceeds 1 [Birge 1932], times Student's t for `dof` over the normal one [GUM] G.3, because the
-  /// scatter is an estimate (1.25 with nine touches).
+  /// that exceeds 1 [Birge 1932], times Student's t for `dof` over the normal one [GUM] G.3, because either
+  /// is an estimate (1.25 with nine touches; 6.5 where three feeds are not on a line).
   double u_delay_s = 0.0;
-  double dof = 0.0;          ///< touches - feeds: what the scatter is known from
+  double dof = 0.0;  ///< what u is known from: touches - feeds, or feeds - 2 where the misfit exceeds 1
   double u_jitter_s = 0.0;   ///< deviation from touch to touch
   double u_scatter_m = 0.0;  ///< deviation that does not depend on the feed
   double origin_m = 0.0;     ///< place of the surface

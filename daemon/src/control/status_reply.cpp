@@ -20,9 +20,6 @@ namespace {
 
 using nlohmann::json;
 
-// As the hub: without axis positions for this long (wall time) they are not known.
-constexpr std::chrono::milliseconds kPositionIsOld{500};
-
 json device_json(const StreamHealth& h) {
   const auto& d = h.status;
   return {{"name", d.name},
@@ -214,7 +211,7 @@ SeenStatus look_at_status(const Hub& hub) {
       .held_out = parts.calibration.held_out(),
       .ended = parts.calibration.ended(),
       .live = hub.live().view(),
-      .positions_are_old = !axes_at || parts.time.now() - *axes_at > parts.time.host(kPositionIsOld),
+      .positions_are_old = !axes_at || parts.time.now() - *axes_at > parts.time.host(kAxesPatience),
       .reference = {},
       .without_zero = {},
       .release_awaited = parts.devices.release_awaited(),

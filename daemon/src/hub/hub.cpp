@@ -16,8 +16,6 @@ using namespace std::chrono_literals;
 using protocol::HostTime;
 
 constexpr auto kHealthPeriod = 1s;
-// Without axis positions for this long (wall time, also with simulated devices) the model in force is STALE.
-constexpr auto kAxesPatience = 500ms;
 
 void sleep_until(std::chrono::steady_clock::time_point t) {
   const auto ns = t.time_since_epoch().count();  // steady_clock is CLOCK_MONOTONIC
@@ -95,7 +93,9 @@ struct Hub::Call {
 };
 
 Hub::Hub(HubParts parts)
-    : parts_(parts), assembler_(assembler_options(parts.config)), live_(assembler_options(parts.config)) {}
+    : parts_(parts),
+      assembler_(assembler_options(parts.config)),
+      live_(assembler_options(parts.config), parts.time) {}
 
 Hub::~Hub() {
   run_calls();

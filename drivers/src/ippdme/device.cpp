@@ -64,8 +64,10 @@ void IppDevice::measure(std::span<const ProbePoint> points) {
 void IppDevice::wait(std::chrono::nanoseconds at_most) {
   read_mail();
   read_requests();
-  tell(IppTick{});
-  poll(at_most);
+  if (!reads_before_due()) {
+    tell(IppTick{});
+    poll(at_most);
+  }
   show();
   report_machine();
   count_points();

@@ -103,6 +103,19 @@ TEST(IppStop, ARequestWithoutAMotionHoldsWithoutAnAbort) {
   }
 }
 
+TEST(IppRelease, AMotionThatIsBeingStoppedCannotBeReleased) {
+  MovingStage stage;
+  stage.peer.hold_answers(true);
+  stage.peer.send("E0000 ! Error(2,1001,Machine,\"Air pressure\")\r\n");
+  ASSERT_TRUE(stage.turns_until(1s, [&] { return stage.state() == "aborting"; })) << stage.state();
+  EXPECT_TRUE(stage.device->held());
+  EXPECT_FALSE(stage.device->releasable());
+  stage.peer.hold_answers(false);
+  ASSERT_TRUE(stage.turns_until(10s, [&] { return stage.device->releasable(); })) << stage.state();
+  stage.device->release();
+  ASSERT_TRUE(stage.turns_until(10s, [&] { return !stage.device->held(); })) << stage.state();
+}
+
 TEST(IppRelease, TheHoldOutlivesTheDevice) {
   std::string kept;
   IppDeviceOptions options;

@@ -24,7 +24,7 @@ IppDevice::IppDevice(const IppDeviceOptions& options, TcpPeer peer, const TimeSo
       raw_(options.raw_capacity_blocks),
       receiver_(options.receiver),
       machine_{options.session.held, options.session.moving} {
-  show();
+  show_session();
 }
 
 IppDevice::~IppDevice() {
@@ -68,9 +68,15 @@ void IppDevice::wait(std::chrono::nanoseconds at_most) {
     tell(IppTick{});
     poll(at_most);
   }
-  show();
+  show_session();
   report_machine();
   count_points();
+}
+
+void IppDevice::show_session() {
+  show();
+  held_.store(session().held(), std::memory_order_relaxed);
+  releasable_.store(session().releasable(), std::memory_order_relaxed);
 }
 
 void IppDevice::report_machine() {

@@ -86,8 +86,13 @@ class IppDevice final : public Device, private SessionOverTcp<IppDevice, IppWord
   /// release(), whether or not the machine moved.
   void abort();
   /// Any thread: a person has looked at the machine: errors are cleared, the session begins anew. Nothing
-  /// happens unless the state is "awaiting release".
+  /// happens unless releasable().
   void release();
+  /// Any thread: the machine awaits a release, whatever the state: also while its server is away, or its
+  /// motion is still being stopped.
+  [[nodiscard]] bool held() const noexcept { return held_.load(std::memory_order_relaxed); }
+  /// Any thread: held(), and its motion is not still being stopped.
+  [[nodiscard]] bool releasable() const noexcept { return releasable_.load(std::memory_order_relaxed); }
   /// Any thread: how many of them are neither done nor given up. 0: the touches of all that were begun are in
   /// the ring.
   [[nodiscard]] std::size_t points_left() const noexcept {
@@ -114,6 +119,7 @@ class IppDevice final : public Device, private SessionOverTcp<IppDevice, IppWord
   void await_standstill();
   void count_points();
   void report_machine();
+  void show_session();
 
   void take(const protocol::AxisSample& sample) ABBE_RT;
   void take(const protocol::ProbeTrigger& touch) ABBE_RT;
@@ -133,6 +139,9 @@ class IppDevice final : public Device, private SessionOverTcp<IppDevice, IppWord
   std::size_t taken_ = 0;      ///< points out of it, by the device thread
   std::atomic<std::size_t> asked_{0};
   std::atomic<std::size_t> finished_{0};
+  // relaxed: each stands for itself
+  std::atomic<bool> held_{false};
+  std::atomic<bool> releasable_{false};
   IppMachine machine_;  ///< as reported
 };
 

@@ -310,6 +310,10 @@ void DeviceSet::stop_machine() {
   if (state_->cmm) state_->cmm->device->abort();
 }
 
+void DeviceSet::end_machine() {
+  if (state_->cmm) state_->cmm->device->end();
+}
+
 std::optional<std::string> DeviceSet::release_awaited() const {
   if (!state_->cmm) return std::nullopt;
   if (!state_->cmm->device->held()) return std::nullopt;

@@ -93,6 +93,10 @@ class IppDevice final : public Device, private SessionOverTcp<IppDevice, IppWord
   [[nodiscard]] bool held() const noexcept { return held_.load(std::memory_order_relaxed); }
   /// Any thread: held(), and its motion is not still being stopped.
   [[nodiscard]] bool releasable() const noexcept { return releasable_.load(std::memory_order_relaxed); }
+  /// Any thread, takes no lock: a motion that is under way is stopped and the session ends, as when this is
+  /// destroyed; nothing is begun any more, and no release is awaited. For a program that ends and cannot tell
+  /// whether it will come to destroy this.
+  void end();
   /// Any thread: how many of them are neither done nor given up. 0: the touches of all that were begun are in
   /// the ring.
   [[nodiscard]] std::size_t points_left() const noexcept {
@@ -134,7 +138,8 @@ class IppDevice final : public Device, private SessionOverTcp<IppDevice, IppWord
   RawRing raw_;
   IppReceiver receiver_;
 
-  using Request = std::variant<std::vector<ProbePoint>, IppAbortRequested, IppReleaseRequested>;
+  using Request =
+      std::variant<std::vector<ProbePoint>, IppAbortRequested, IppReleaseRequested, IppStopRequested>;
   Mailbox<Request> requests_;  ///< the hub asks and takes no lock
   std::size_t taken_ = 0;      ///< points out of it, by the device thread
   std::atomic<std::size_t> asked_{0};

@@ -379,7 +379,10 @@ struct Abbed::State {
     if (!supervisor) return;
     supervisor->poll(now);
     const std::lock_guard lock{participant_mutex};
-    participant = {.restarts = supervisor->restarts(), .last_end = supervisor->last_end()};
+    const auto& end = supervisor->last_end();
+    participant = {.restarts = supervisor->restarts(),
+                   .last_end = end ? end->text() : std::string{},
+                   .start_fault = supervisor->start_fault()};
   }
 
   void tidy_recordings(WallTime now) {

@@ -52,6 +52,15 @@ Result<void> ModelKeeper::activate_once(const std::string& id, const StoreActor&
   return done ? Result<void>{} : store_.activate(id, actor);
 }
 
+Result<ActiveModel> ModelKeeper::read_active_or_set_aside(protocol::HostTime now) {
+  auto active = read_active(now);
+  if (active) return active;
+  store_.set_lock_patience(kAsidePatience);
+  if (const auto aside = store_.set_aside_damaged_state(utc_.to_utc(now)); !aside)
+    return fail(active.error().code, fmt::format("{}; {}", active.error().text, aside.error().text));
+  return read_active(now);
+}
+
 Result<ActiveModel> ModelKeeper::read_active(protocol::HostTime now) const {
   if (const auto made = store_.create(); !made) return tl::unexpected(made.error());
   const auto activation = store_.activation();

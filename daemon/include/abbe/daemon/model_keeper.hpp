@@ -3,6 +3,7 @@
 /// with all the waiting for disk and locks that takes. For any thread but the hub's; a copy for each.
 /// Ordinary world.
 
+#include <chrono>
 #include <filesystem>
 #include <memory>
 #include <optional>
@@ -55,6 +56,9 @@ class ModelKeeper {
                                        const StoreActor& actor, protocol::HostTime now);
   /// An error only if the store itself cannot be read; a damaged model is a `fault`.
   [[nodiscard]] Result<ActiveModel> read_active(protocol::HostTime now) const;
+  /// The same; a state that is damaged is set aside first. Waits for the store's lock at most kAsidePatience.
+  [[nodiscard]] Result<ActiveModel> read_active_or_set_aside(protocol::HostTime now);
+  static constexpr std::chrono::seconds kAsidePatience{1};
   /// Whether read_active() may say something else than when this was the same. One system call.
   [[nodiscard]] StoreStamp stamp() const noexcept { return store_.stamp(); }
 

@@ -32,10 +32,14 @@ void ModelKeeper::tidy_store(protocol::HostTime now) {
 }
 
 Result<KeptModel> ModelKeeper::keep(const ModelDocument& document, const calib::Verdict& verdict,
-                                    const StoreActor& actor, protocol::HostTime now) {
+                                    const StoreActor& actor, protocol::HostTime now,
+                                    const std::atomic<bool>* discarded) {
+  const auto is_discarded = [discarded] { return discarded != nullptr && *discarded; };
   if (const auto made = store_.create(); !made) return tl::unexpected(made.error());
+  if (is_discarded()) return fail(ErrorCode::Refused, "the model was discarded");
   const auto id = store_.add(document, verdict.accepted, verdict.reasons, actor);
   if (!id) return tl::unexpected(id.error());
+  if (is_discarded()) return fail(ErrorCode::Refused, "the model was discarded");
   if (!verdict.accepted) return KeptModel{*id, std::nullopt};
   if (auto done = activate_once(*id, actor); !done) return tl::unexpected(done.error());
   auto active = read_active(now);

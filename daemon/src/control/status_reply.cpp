@@ -160,10 +160,12 @@ json positions_json(const protocol::Snapshot& live, bool old) {
 
 struct SeenLink {
   explicit SeenLink(const Publisher& publisher)
-      : connected(publisher.link().connected()),
+      : state(publisher.link().state()),
+        connected(publisher.link().answers()),
         counters(publisher.link().counters()),
         security(publisher.security_warning().empty() ? "on" : publisher.security_warning()),
         process(publisher.link().process()) {}
+  std::string_view state;
   bool connected;
   DdsLinkCounters counters;
   std::string security;
@@ -171,7 +173,8 @@ struct SeenLink {
 };
 
 json dds_json(const SeenLink& link) {
-  json out{{"connected", link.connected},
+  json out{{"state", link.state},
+           {"connected", link.connected},
            {"sent", link.counters.sent},
            {"dropped_live", link.counters.dropped_live},
            {"connections", link.counters.connections},

@@ -62,8 +62,8 @@ StreamHealth health_of(const Publisher& publisher) {
   const DdsLink& link = publisher.link();
   StreamHealth h;
   h.status.name = "dds";
-  h.status.state = link.connected() ? "connected" : "waiting";
-  h.status.connected = link.connected();
+  h.status.state = link.state();
+  h.status.connected = link.answers();
   h.status.samples = link.counters().sent;
   h.status.dropped = link.counters().dropped_live;
   h.status.faults = link.counters().refused;

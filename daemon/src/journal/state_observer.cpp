@@ -41,8 +41,8 @@ StreamKind kind_of(const std::string& stream) {
   if (stream == "models")
     return {"", kStoreId, "check the files in models below [daemon] data_dir", Urgency::Error};
   if (stream == "dds")
-    return {"link to ", kLinkId, "nothing is published until abbe-dds connects: see its own lines",
-            Urgency::Warning};
+    return {"link to ", kLinkId,
+            "nothing is published until abbe-dds connects and answers: see its own lines", Urgency::Warning};
   if (stream == "dds_security")
     return {"", kSecurityId, "anyone on the domain can publish as this machine", Urgency::Warning};
   return {"device ", kDeviceId,

@@ -5,6 +5,7 @@
 
 #include <array>
 #include <cerrno>
+#include <optional>
 #include <utility>
 
 #include "control/unix_socket.hpp"
@@ -31,6 +32,24 @@ bool may_connect(int fd, const DdsProcess* process) {
   return credentials.pid != 0 && credentials.pid == process->pid();
 }
 
+/// The beats of one connection that abbe-dds has not answered yet.
+class Beats {
+ public:
+  void ask(DdsLink::WallTime now) {
+    // After a pause of the hub, or of all of abbed, the silence begins anew.
+    if (!unanswered_since_ || now - asked_ > DdsProcess::kPause) unanswered_since_ = now;
+    asked_ = now;
+  }
+  void answered() { unanswered_since_.reset(); }
+  [[nodiscard]] std::chrono::nanoseconds silence() const {
+    return unanswered_since_ ? asked_ - *unanswered_since_ : std::chrono::nanoseconds{0};
+  }
+
+ private:
+  std::optional<DdsLink::WallTime> unanswered_since_;
+  DdsLink::WallTime asked_{};
+};
+
 }  // namespace
 
 struct DdsLink::State {
@@ -44,6 +63,7 @@ struct DdsLink::State {
   RetainedPayloads<WallTime>
       live;  ///< empty unless the socket is full; with the instants their ages count to
   WallTime last_beat{};
+  Beats beats;
   DdsLinkCounters counters;
 
   void accept_newest();
@@ -69,6 +89,7 @@ void DdsLink::State::accept_newest() {
     disconnect();
     peer = std::move(accepted);
     ++counters.connections;
+    beats = {};
     last_beat = {};  // the newcomer is owed a beat at once
     for (auto& entry : durable.entries()) entry.extra.to_send = true;
   }
@@ -78,6 +99,7 @@ void DdsLink::State::accept_newest() {
 void DdsLink::State::read_answers() {
   std::array<std::byte, 64> bytes{};
   const ssize_t n = ::recv(peer.get(), bytes.data(), bytes.size(), MSG_DONTWAIT);
+  if (n > 0) beats.answered();
   if (n > 0 && process != nullptr) process->answered(WallTime::clock::now());
   if (n == 0 || (n < 0 && errno != EAGAIN && errno != EINTR)) disconnect();
 }
@@ -184,6 +206,7 @@ void DdsLink::publish(Topic topic, std::span<const std::byte> payload, WallTime 
 
 void DdsLink::beat(WallTime now) {
   if (now - state_->last_beat < kBeatPeriod) return;
+  state_->beats.ask(now);
   if (state_->process != nullptr) state_->process->asked(now);
   // A beat that does not fit is not queued: abbe-dds has not read for a while and will judge for itself. Nor
   // does it overtake a state: abbe-dds would repeat the one before.
@@ -200,6 +223,15 @@ void DdsLink::poll() {
 
 bool DdsLink::connected() const noexcept {
   return static_cast<bool>(state_->peer);
+}
+
+bool DdsLink::answers() const noexcept {
+  return connected() && state_->beats.silence() <= kUnanswered;
+}
+
+const char* DdsLink::state() const noexcept {
+  if (!connected()) return "waiting";
+  return answers() ? "connected" : "does not answer";
 }
 
 const DdsProcess* DdsLink::process() const noexcept {

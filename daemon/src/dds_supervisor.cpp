@@ -20,11 +20,6 @@ namespace {
 
 using namespace std::chrono_literals;
 
-std::string describe_end(int status) {
-  if (WIFSIGNALED(status)) return "signal " + std::to_string(WTERMSIG(status));
-  return "exit code " + std::to_string(WEXITSTATUS(status));
-}
-
 /// The child starts the same whatever thread of abbed starts it: no signal blocked or ignored, real-time only
 /// as asked. Its threads inherit that.
 class SpawnAttributes {
@@ -77,7 +72,8 @@ DdsSupervisor::DdsSupervisor(DdsSupervisor&& other) noexcept
       delay_(other.delay_),
       restarts_(other.restarts_),
       hung_(other.hung_),
-      last_end_(std::move(other.last_end_)) {}
+      last_end_(other.last_end_),
+      start_fault_(std::move(other.start_fault_)) {}
 
 DdsSupervisor& DdsSupervisor::operator=(DdsSupervisor&& other) noexcept {
   if (this == &other) return *this;
@@ -89,7 +85,8 @@ DdsSupervisor& DdsSupervisor::operator=(DdsSupervisor&& other) noexcept {
   delay_ = other.delay_;
   restarts_ = other.restarts_;
   hung_ = other.hung_;
-  last_end_ = std::move(other.last_end_);
+  last_end_ = other.last_end_;
+  start_fault_ = std::move(other.start_fault_);
   return *this;
 }
 
@@ -131,8 +128,8 @@ bool DdsSupervisor::reap(WallTime now) {
   int status = 0;
   if (::waitpid(pid_, &status, WNOHANG) != pid_) return false;
   pid_ = 0;
-  last_end_ = describe_end(status);
-  if (options_.process != nullptr) options_.process->ended({status, hung_, std::chrono::system_clock::now()});
+  last_end_ = DdsEnd{status, hung_, std::chrono::system_clock::now()};
+  if (options_.process != nullptr) options_.process->ended(*last_end_);
   const bool died_at_start = now - started_ < options_.steady_after;
   // What a signal ends may be well the next time; what exits has a reason that stays.
   const auto longest = WIFSIGNALED(status) ? options_.first_delay : options_.longest_delay;
@@ -147,13 +144,15 @@ void DdsSupervisor::poll(WallTime now) {
     if (!reap(now)) return;
   }
   if (now < next_start_) return;
-  ++restarts_;
-  if (options_.process != nullptr) options_.process->restarted();
-  if (!spawn(now)) {
-    last_end_ = "could not be started";
+  if (const auto started = spawn(now); !started) {
+    start_fault_ = started.error().text;
     delay_ = options_.longest_delay;
     next_start_ = now + delay_;
+    return;
   }
+  start_fault_.clear();
+  ++restarts_;
+  if (options_.process != nullptr) options_.process->restarted();
 }
 
 void DdsSupervisor::stop() noexcept {

@@ -1,12 +1,18 @@
 #include "abbe/daemon/counting_state.hpp"
 
 #include <gmock/gmock.h>
+#include <unistd.h>
 
+#include <atomic>
+#include <chrono>
 #include <fstream>
+#include <thread>
 
 #include "abbe/daemon/counting_state_thread.hpp"
 #include "abbe/daemon/reference_service.hpp"
+#include "abbe/daemon/work_aside.hpp"
 #include "config_tables.hpp"
+#include "failing_disk.hpp"
 #include "recording_fixture.hpp"
 #include "text_files.hpp"
 
@@ -201,6 +207,29 @@ TEST(CountingStateThread, ReportsADiskThatRefusesOnce) {
   }
   ASSERT_EQ(faults.size(), 1u);
   EXPECT_THAT(faults[0], HasSubstr("would not be referenced"));
+}
+
+TEST(CountingStateThread, ADiskThatDoesNotAnswerDoesNotHoldUpTheEnd) {
+  const TemporaryFolder folder;
+  std::vector<std::string> faults;
+  std::atomic<int> disk{-1};
+  const auto begun = std::chrono::steady_clock::now();
+  {
+    const CountingStateThread thread{counting_state_file(folder.path() / "data"),
+                                     [&disk] {
+                                       disk = test::make_stall(SYS_fsync);
+                                       return CountingState{
+                                           .boot_id = kBoot, .set_up = "{}", .counting = some_counting()};
+                                     },
+                                     [&faults](const std::string& fault) { faults.push_back(fault); }, 1h};
+  }
+  EXPECT_LT(std::chrono::steady_clock::now() - begun, CountingStateThread::kEndPatience + 1s);
+  if (disk < 0) GTEST_SKIP() << "no seccomp listener";
+  EXPECT_THAT(faults, testing::ElementsAre(HasSubstr("its disk has not answered for 3 s")));
+  EXPECT_TRUE(work_left_running());
+  ::close(disk);
+  while (work_left_running()) std::this_thread::yield();
+  EXPECT_EQ(faults.size(), 1u);
 }
 
 }  // namespace

@@ -71,6 +71,34 @@ class DdsLinkTest : public testing::Test {
   std::optional<DdsLink> link_;
 };
 
+TEST_F(DdsLinkTest, AnAbbeDdsThatDoesNotAnswerIsNotReportedAsConnected) {
+  EXPECT_STREQ(link_->state(), "waiting");
+  const FarEnd hung(path_);
+  link_->poll();
+  DdsLink::WallTime now{100s};
+  const auto beats_for = [&](std::chrono::nanoseconds duration) {
+    for (const auto end = now + duration; now < end;) link_->beat(now += 100ms);
+  };
+  beats_for(1100ms);
+  EXPECT_TRUE(link_->answers());
+  beats_for(100ms);
+  EXPECT_TRUE(link_->connected());
+  EXPECT_FALSE(link_->answers());
+  EXPECT_STREQ(link_->state(), "does not answer");
+  ASSERT_EQ(::send(hung.fd, "", 1, 0), 1);
+  link_->poll();
+  beats_for(1s);
+  EXPECT_TRUE(link_->answers());
+  now += 10s;  // abbed was stopped
+  beats_for(100ms);
+  EXPECT_TRUE(link_->answers());
+  beats_for(2s);
+  EXPECT_FALSE(link_->answers());
+  const FarEnd next(path_);
+  link_->poll();
+  EXPECT_STREQ(link_->state(), "connected");
+}
+
 TEST_F(DdsLinkTest, TakesFewNewcomersInACycleAndAllInTheEnd) {
   std::vector<std::unique_ptr<FarEnd>> newcomers;
   for (int i = 0; i < 10; ++i) newcomers.push_back(std::make_unique<FarEnd>(path_));

@@ -87,12 +87,51 @@ TEST_F(DdsSecurity, AnExpiredIdentityIsRefusedWithItsDates) {
   EXPECT_THAT(found.error().text, testing::HasSubstr("make new keys"));
 }
 
+/// The profile of a site: `inside` stands in <rtps> of the participant profile of that name.
+std::string profile_text(const std::string& inside, const std::string& name = "abbe") {
+  return R"(<?xml version="1.0" encoding="UTF-8"?>
+<dds xmlns="http://www.eprosima.com/XMLSchemas/fastRTPS_Profiles"><profiles><participant profile_name=")" +
+         name + "\"><rtps>" + inside + "</rtps></participant></profiles></dds>";
+}
+
+std::string properties(const std::vector<std::string>& names) {
+  std::string text = "<propertiesPolicy><properties>";
+  for (const auto& name : names) text += "<property><name>" + name + "</name><value>x</value></property>";
+  return text + "</properties></propertiesPolicy>";
+}
+
+const std::string kOwn = properties({"dds.sec.auth.plugin", "dds.sec.access.plugin"});
+
 TEST_F(DdsSecurity, AProfileOfTheSiteMayHaveItsOwn) {
   const fs::path profile = root_ / "dds.xml";
-  std::ofstream(profile) << "<name>dds.sec.access.plugin</name>";
+  std::ofstream(profile) << profile_text(kOwn);
   EXPECT_TRUE(dds_is_secured({}, profile));
   EXPECT_TRUE(dds_is_secured(keys_, {}));
   EXPECT_FALSE(dds_is_secured({}, {}));
+  EXPECT_FALSE(dds_is_secured({}, root_ / "absent.xml"));
+  // Without <dds> around it, as Fast DDS allows.
+  const std::string text = profile_text(kOwn);
+  const auto begin = text.find("<profiles>");
+  std::ofstream(profile) << text.substr(begin, text.rfind("</dds>") - begin);
+  EXPECT_TRUE(dds_is_secured({}, profile));
+}
+
+TEST_F(DdsSecurity, OnlyTheParticipantProfileThatIsUsedCounts) {
+  const fs::path profile = root_ / "dds.xml";
+  for (const std::string& text : {
+           profile_text("<!-- " + kOwn + " -->"),                              // a comment
+           profile_text(kOwn, "robot"),                                        // another participant
+           profile_text("<name>dds.sec.access.plugin</name>"),                 // no property
+           profile_text(properties({"dds.sec.access.plugin"})),                // no authentication
+           profile_text(properties({"dds.sec.auth.plugin"})),                  // no access
+           std::string{"<dds><profiles><participant profile_name=\"abbe\">"},  // cut off
+           "<!-- dds.sec.auth.plugin dds.sec.access.plugin -->" + profile_text(""),
+           std::string{"<!-- nothing else -->"},
+           std::string{},
+       }) {
+    std::ofstream(profile) << text;
+    EXPECT_FALSE(dds_is_secured({}, profile)) << text;
+  }
 }
 
 }  // namespace

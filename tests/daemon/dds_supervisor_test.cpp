@@ -11,6 +11,7 @@
 #include <unistd.h>
 
 #include <array>
+#include <filesystem>
 #include <optional>
 #include <string>
 #include <thread>
@@ -35,6 +36,12 @@ void wait_for_end(pid_t pid) {
   ASSERT_EQ(::waitid(P_PID, static_cast<id_t>(pid), &info, WEXITED | WNOWAIT), 0);
 }
 
+/// How the last child ended, without the time.
+std::string end_of(const DdsSupervisor& supervisor) {
+  const std::string text = supervisor.last_end() ? supervisor.last_end()->text() : "";
+  return text.substr(0, text.find(" at "));
+}
+
 TEST(DdsSupervisor, RefusesAProgramThatDoesNotExist) {
   DdsSupervisor::Options options;
   options.program = "/nonexistent/abbe-dds";
@@ -51,7 +58,7 @@ TEST(DdsSupervisor, StartsAgainAtOnceAfterADeathInSteadyState) {
   EXPECT_NE(supervisor->pid(), 0);
   EXPECT_NE(supervisor->pid(), first);
   EXPECT_EQ(supervisor->restarts(), 1u);
-  EXPECT_EQ(supervisor->last_end(), "signal 9");
+  EXPECT_EQ(end_of(*supervisor), "signal 9 (Killed)");
 }
 
 TEST(DdsSupervisor, BacksOffWhenTheChildDiesAtStart) {
@@ -60,7 +67,7 @@ TEST(DdsSupervisor, BacksOffWhenTheChildDiesAtStart) {
   wait_for_end(supervisor->pid());
   supervisor->poll(WallTime{1ms});
   EXPECT_EQ(supervisor->pid(), 0);
-  EXPECT_EQ(supervisor->last_end(), "exit code 3");
+  EXPECT_EQ(end_of(*supervisor), "exit code 3");
   supervisor->poll(WallTime{100ms});
   EXPECT_EQ(supervisor->pid(), 0);
   supervisor->poll(WallTime{101ms});
@@ -107,7 +114,36 @@ TEST(DdsSupervisor, EndsAndReplacesAChildThatDoesNotAnswer) {
   EXPECT_EQ(process.pid(), supervisor->pid());
   EXPECT_EQ(process.restarts(), 1u);
   ASSERT_TRUE(process.last_end());
-  EXPECT_NE(process.last_end()->text().find("did not answer"), std::string::npos);
+  EXPECT_EQ(end_of(*supervisor), "it did not answer and was ended by abbed");
+  EXPECT_EQ(process.last_end()->text(), supervisor->last_end()->text());
+}
+
+TEST(DdsSupervisor, AProgramThatIsGoneIsReportedAndTriedAgain) {
+  const auto program =
+      std::filesystem::path{::testing::TempDir()} / ("abbe-gone-" + std::to_string(::getpid()));
+  std::filesystem::create_symlink("/bin/sh", program);
+  DdsProcess process;
+  auto options = shell("exec sleep 60");
+  options.program = program;
+  options.process = &process;
+  auto supervisor = DdsSupervisor::start(options, WallTime{});
+  ASSERT_TRUE(supervisor.has_value());
+  std::filesystem::remove(program);
+  const pid_t first = supervisor->pid();
+  ::kill(first, SIGKILL);
+  wait_for_end(first);
+  supervisor->poll(WallTime{10s});
+  EXPECT_EQ(supervisor->pid(), 0);
+  EXPECT_EQ(supervisor->restarts(), 0u);
+  EXPECT_NE(supervisor->start_fault().find("No such file"), std::string::npos) << supervisor->start_fault();
+  EXPECT_EQ(end_of(*supervisor), "signal 9 (Killed)");
+  std::filesystem::create_symlink("/bin/sh", program);
+  supervisor->poll(WallTime{15s});
+  EXPECT_NE(supervisor->pid(), 0);
+  EXPECT_EQ(supervisor->restarts(), 1u);
+  EXPECT_EQ(process.restarts(), 1u);
+  EXPECT_EQ(supervisor->start_fault(), "");
+  std::filesystem::remove(program);
 }
 
 TEST(DdsSupervisor, AHubThatDoesNotAskIsNotTheChildsFault) {
@@ -143,7 +179,7 @@ TEST(DdsSupervisor, TellsTheChildWhoItsParentIs) {
   ASSERT_TRUE(supervisor.has_value());
   wait_for_end(supervisor->pid());
   supervisor->poll(WallTime{1ms});
-  EXPECT_EQ(supervisor->last_end(), "exit code 7");
+  EXPECT_EQ(end_of(*supervisor), "exit code 7");
 }
 
 /// CAP_IPC_LOCK in the calling thread's ambient set, as systemd gives it to abbed. False where the system
@@ -168,7 +204,7 @@ TEST(DdsSupervisor, TheChildInheritsNoCapability) {
     ASSERT_TRUE(supervisor.has_value());
     wait_for_end(supervisor->pid());
     supervisor->poll(WallTime{1ms});
-    ended = supervisor->last_end();
+    ended = end_of(*supervisor);
   })
       .join();
   if (!ended) GTEST_SKIP() << "this user may not raise an ambient capability";

@@ -200,7 +200,8 @@ TEST(RawDistances, AreLeftAloneUnlessConfigured) {
 }
 
 TEST(LiveView, ShowsCorrectedPositionsAndTheNewestTemperatures) {
-  LiveView view{AssemblerOptions{.environment = with_scale()}};
+  const drivers::MonotonicTime time;
+  LiveView view{AssemblerOptions{.environment = with_scale()}, time};
   auto batch = measured({scale_at(kStart, 296.15)});
   protocol::AxisSample axes;
   axes.head.time = kStart;
@@ -213,7 +214,8 @@ TEST(LiveView, ShowsCorrectedPositionsAndTheNewestTemperatures) {
 }
 
 TEST(LiveView, DoesNotKnowTheAxesWithoutTheTemperatureOfTheirScale) {
-  LiveView view{AssemblerOptions{.environment = with_scale()}};
+  const drivers::MonotonicTime time;
+  LiveView view{AssemblerOptions{.environment = with_scale()}, time};
   Batch batch;
   protocol::AxisSample axes;
   axes.head.time = kStart;

@@ -203,8 +203,18 @@ TEST_F(StateObserverTest, SessionModelRecorderLinkParticipantAndHubAreFollowed) 
   EXPECT_THAT(full[0].message, AllOf(HasSubstr("recorder: disk full"), HasSubstr("[recording] dir")));
   now_.participant = ObservedParticipant{};
   EXPECT_THAT(lines(), ElementsAre("abbe-dds: started"));
-  now_.participant = ObservedParticipant{.restarts = 1, .last_end = "signal 9"};
-  EXPECT_THAT(lines(), ElementsAre(HasSubstr("ended by signal 9; started again, 1 times")));
+  now_.participant->start_fault = "start abbe-dds: No such file or directory";
+  now_.participant->last_end = "signal 9 (Killed) at 2026-11-22T16:58:22Z";
+  EXPECT_THAT(
+      lines(),
+      ElementsAre(AllOf(HasSubstr("abbe-dds: ended: signal 9 (Killed) at 2026-11-22T16:58:22Z; cannot be "),
+                        HasSubstr("started again: start abbe-dds: No such file"))));
+  now_.participant =
+      ObservedParticipant{.restarts = 1,
+                          .last_end = "it did not answer and was ended by abbed at 2026-11-22T16:58:22Z",
+                          .start_fault = {}};
+  EXPECT_THAT(lines(), ElementsAre(HasSubstr("abbe-dds: ended: it did not answer and was ended by abbed at "
+                                             "2026-11-22T16:58:22Z; started again, 1 times")));
   now_.hub_answers = false;
   now_.streams.clear();
   EXPECT_THAT(lines(), ElementsAre(HasSubstr("hub: has not answered")));

@@ -14,6 +14,7 @@ using protocol::SampleFlag;
 using protocol::Snapshot;
 
 constexpr HostTime kStart{100s};
+const drivers::MonotonicTime kTime;
 
 AxisSample axes_at(HostTime t, double x_m) {
   AxisSample a;
@@ -25,18 +26,20 @@ AxisSample axes_at(HostTime t, double x_m) {
 
 Batch of(const AxisSample& sample) {
   Batch b;
+  b.taken = sample.head.time;
   b.axes.push_back(sample);
   return b;
 }
 
 Batch of(const protocol::TrackerPoint& point) {
   Batch b;
+  b.taken = point.head.time;
   b.points.push_back(point);
   return b;
 }
 
 TEST(LiveView, ShowsTheLatestAxesAndHowFastTheyMove) {
-  LiveView live{AssemblerOptions{}};
+  LiveView live{AssemblerOptions{}, kTime};
   EXPECT_TRUE(live.take(of(axes_at(kStart, 0.1))));
   EXPECT_TRUE(live.take(of(axes_at(kStart + 1ms, 0.1001))));
   EXPECT_EQ(live.view().head.time, kStart + 1ms);
@@ -46,7 +49,7 @@ TEST(LiveView, ShowsTheLatestAxesAndHowFastTheyMove) {
 }
 
 TEST(LiveView, AnAxisThatIsTakenBackLeavesTheOthersAsTheyWere) {
-  LiveView live{AssemblerOptions{}};
+  LiveView live{AssemblerOptions{}, kTime};
   live.take(of(axes_at(kStart, 0.1)));
   auto sample = axes_at(kStart + 1ms, 0.1001);
   sample.position[1] += 1e-4;
@@ -63,7 +66,7 @@ TEST(LiveView, AnAxisThatIsTakenBackLeavesTheOthersAsTheyWere) {
 }
 
 TEST(LiveView, DoesNotShowThePointOfATrackerThatDied) {
-  LiveView live{AssemblerOptions{}};
+  LiveView live{AssemblerOptions{}, kTime};
   protocol::TrackerPoint point;
   point.head.time = kStart;
   point.p_tracker_m = {1.0, 2.0, 3.0};
@@ -79,8 +82,9 @@ TEST(LiveView, DoesNotShowThePointOfATrackerThatDied) {
 }
 
 TEST(LiveView, DoesNotShowATouchOfLongAgo) {
-  LiveView live{AssemblerOptions{}};
+  LiveView live{AssemblerOptions{}, kTime};
   Batch touch;
+  touch.taken = kStart;
   touch.touches.emplace_back().head.time = kStart;
   live.take(touch);
   live.take(of(axes_at(kStart + 1s, 0.1)));
@@ -89,14 +93,63 @@ TEST(LiveView, DoesNotShowATouchOfLongAgo) {
   EXPECT_FALSE(live.view().has_trigger);
 }
 
+/// What an environment device reports while all others are silent.
+Batch weather_at(HostTime t) {
+  Batch b;
+  b.taken = t;
+  b.measured_environment.emplace_back().sample.head.time = t;
+  return b;
+}
+
+TEST(LiveView, JudgesByTheClockWhatIsCurrentWhileOnlyTheEnvironmentReports) {
+  LiveView live{AssemblerOptions{}, kTime};
+  live.take(of(axes_at(kStart, 0.1)));
+  protocol::TrackerPoint point;
+  point.head.time = kStart;
+  live.take(of(point));
+  live.take(weather_at(kStart + 500ms));
+  EXPECT_EQ(live.view().missing_mask, 0);
+  live.take(weather_at(kStart + 501ms));
+  EXPECT_EQ(live.view().missing_mask, 0b1111);
+  EXPECT_TRUE(has(live.view().head.flags, SampleFlag::AxisMissing));
+  EXPECT_FALSE(axes_known(live.view()));
+  EXPECT_TRUE(live.view().has_tracker_point);
+  live.take(weather_at(kStart + 1001ms));
+  EXPECT_FALSE(live.view().has_tracker_point);
+  live.take(of(axes_at(kStart + 2s, 0.1)));
+  EXPECT_EQ(live.view().missing_mask, 0) << "the encoders are back";
+}
+
+TEST(LiveView, ReportsOnceThatTheAxesAreNoLongerKnownThoughNothingCame) {
+  LiveView live{AssemblerOptions{}, kTime};
+  live.take(of(axes_at(kStart, 0.1)));
+  Batch nothing;
+  nothing.taken = kStart + 500ms;
+  EXPECT_FALSE(live.take(nothing));
+  nothing.taken = kStart + 501ms;
+  EXPECT_TRUE(live.take(nothing));
+  EXPECT_EQ(live.view().missing_mask, 0b1111);
+  EXPECT_FALSE(live.take(nothing));
+}
+
+TEST(LiveView, OfSimulatedDevicesTheWallTimeCounts) {
+  const drivers::MonotonicTime ten_times{10.0};
+  LiveView live{AssemblerOptions{}, ten_times};
+  live.take(of(axes_at(kStart, 0.1)));
+  live.take(weather_at(kStart + 5s));
+  EXPECT_EQ(live.view().missing_mask, 0);
+  live.take(weather_at(kStart + 5001ms));
+  EXPECT_EQ(live.view().missing_mask, 0b1111);
+}
+
 TEST(LiveView, SaysThatNothingCame) {
-  LiveView live{AssemblerOptions{}};
+  LiveView live{AssemblerOptions{}, kTime};
   EXPECT_FALSE(live.take(Batch{}));
   EXPECT_FALSE(live.axes_known_at());
 }
 
 TEST(LiveView, ATrackerPointDoesNotMakeTheAxesYounger) {
-  LiveView live{AssemblerOptions{}};
+  LiveView live{AssemblerOptions{}, kTime};
   live.take(of(axes_at(kStart, 0.1)));
   protocol::TrackerPoint point;
   point.head.time = kStart + 1s;
@@ -112,7 +165,7 @@ TEST(LiveView, KnowsTheAxesOnlyWhileEachOfXyzAnswersWithoutAFault) {
   const auto nonsense = [](AxisSample& a) { a.position[1] = std::numeric_limits<double>::quiet_NaN(); };
   const auto too_few = [](AxisSample& a) { a.axis_count = 2; };
   for (void (*break_it)(AxisSample&) : {+missing, +bus_off, +alarm, +nonsense, +too_few}) {
-    LiveView live{AssemblerOptions{}};
+    LiveView live{AssemblerOptions{}, kTime};
     live.take(of(axes_at(kStart, 0.1)));
     EXPECT_TRUE(axes_known(live.view()));
     auto broken = axes_at(kStart + 1ms, 0.1);
@@ -124,7 +177,7 @@ TEST(LiveView, KnowsTheAxesOnlyWhileEachOfXyzAnswersWithoutAFault) {
 }
 
 TEST(LiveView, AMissingRotaryAxisDoesNotHideXyz) {
-  LiveView live{AssemblerOptions{}};
+  LiveView live{AssemblerOptions{}, kTime};
   auto sample = axes_at(kStart, 0.1);
   sample.missing_mask = 0b1000;
   sample.head.flags |= SampleFlag::AxisMissing;

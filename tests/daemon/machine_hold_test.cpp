@@ -1,11 +1,15 @@
 /// DATA_DIR/machine-hold as a start finds it: what it cannot read it must not take for "nothing is held".
 
+#include <arpa/inet.h>
 #include <gmock/gmock.h>
+#include <sys/socket.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include <array>
 #include <filesystem>
 #include <string>
+#include <thread>
 
 #include "abbe/daemon/config.hpp"
 #include "abbe/daemon/device_set.hpp"
@@ -79,6 +83,55 @@ TEST_F(MachineHold, TheOldFormatHoldsTheMachine) {
   EXPECT_EQ(awaited(), "cmm 127.0.0.1:1: since before the restart: AbortE was refused");
   test::write_text(file(), "");
   EXPECT_THAT(awaited(), HasSubstr("unknown reason"));
+}
+
+/// A computer that answers nobody: each try to connect lasts.
+class SilentPeer {
+ public:
+  SilentPeer() {
+    sockaddr_in at{};
+    at.sin_family = AF_INET;
+    at.sin_addr.s_addr = ::htonl(INADDR_LOOPBACK);
+    socklen_t length = sizeof at;
+    auto* const address = reinterpret_cast<sockaddr*>(&at);
+    EXPECT_EQ(::bind(sockets_[0], address, length), 0);
+    EXPECT_EQ(::listen(sockets_[0], 0), 0);
+    EXPECT_EQ(::getsockname(sockets_[0], address, &length), 0);
+    for (std::size_t i = 1; i < sockets_.size(); ++i) (void)::connect(sockets_[i], address, length);
+    port_ = ::ntohs(at.sin_port);
+  }
+  SilentPeer(const SilentPeer&) = delete;
+  SilentPeer& operator=(const SilentPeer&) = delete;
+  ~SilentPeer() {
+    for (const int socket : sockets_) ::close(socket);
+  }
+  [[nodiscard]] std::uint16_t port() const { return port_; }
+
+ private:
+  static int make() { return ::socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0); }
+  std::array<int, 4> sockets_{make(), make(), make(), make()};  ///< the listener and who fills its queue
+  std::uint16_t port_ = 0;
+};
+
+TEST_F(MachineHold, IsReportedAndReleasedWhileTheServerIsAway) {
+  const SilentPeer peer;
+  config_.cmm->port = peer.port();
+  test::write_text(file(), "a motion is under way\n");
+  auto devices = DeviceSet::start(config_, time_);
+  ASSERT_TRUE(devices) << devices.error().text;
+  const auto state = [&] { return devices->health(time_.now()).front().status.state; };
+  for (int i = 0; i < 1000 && state() != "connecting"; ++i)
+    std::this_thread::sleep_for(std::chrono::milliseconds{5});
+  ASSERT_EQ(state(), "connecting");
+  EXPECT_THAT(devices->release_awaited().value_or(""), HasSubstr("ended while the machine was moving"));
+  const auto released = devices->release_machine();
+  EXPECT_TRUE(released) << released.error().text;
+  for (int i = 0; i < 1000 && devices->release_awaited(); ++i)
+    std::this_thread::sleep_for(std::chrono::milliseconds{5});
+  EXPECT_FALSE(devices->release_awaited());
+  const auto again = devices->release_machine();
+  ASSERT_FALSE(again);
+  EXPECT_THAT(again.error().text, HasSubstr("awaits no release"));
 }
 
 TEST_F(MachineHold, AMotionUnderWayHoldsTheMachine) {

@@ -350,6 +350,43 @@ TEST_F(ModelAuthorityTest, ADamagedStateIsSetAsideAtTheStartAndReportedUntilAMod
   EXPECT_EQ(fresh_standing(authority).status, ModelStatus::MODEL_ACTIVE);
 }
 
+// As where the disk is read-only at the start, or the store's lock is held: the name is taken.
+TEST_F(ModelAuthorityTest, ADamagedStateThatCouldNotBeSetAsideAtTheStartIsLater) {
+  (void)add(open(), document(1), {.accepted = true}, actor("calibrate otf"), kNow).value();
+  fs::resize_file(folder_ / "state.json", 30);
+  const auto aside = folder_ / "state.json.damaged-2023-11-14T22-30-00Z";
+  std::ofstream{aside} << "of before";
+  auto authority = open();
+  for (int look = 0; look < 3; ++look) EXPECT_FALSE(follow(authority));
+  EXPECT_THAT(authority.fault(), HasSubstr("rename"));
+  EXPECT_FALSE(authority.keeper().keep(document(2), {.accepted = true}, actor("calibrate otf"), kNow));
+  fs::remove(aside);
+  EXPECT_TRUE(follow(authority));
+  EXPECT_EQ(fs::file_size(aside), 30u);
+  EXPECT_THAT(authority.fault(), HasSubstr(aside.filename().string()));
+  EXPECT_TRUE(add(authority, document(2), {.accepted = true}, actor("calibrate otf"), kNow));
+  follow(authority);
+  EXPECT_EQ(authority.fault(), "");
+}
+
+TEST_F(ModelAuthorityTest, AStateThatIsDamagedLaterIsSetAsideAndTheModelStaysInForce) {
+  auto authority = open();
+  const auto id = add(authority, document(1), {.accepted = true}, actor("calibrate otf"), kNow).value();
+  fs::resize_file(folder_ / "state.json", 30);
+  EXPECT_FALSE(follow(authority));
+  EXPECT_TRUE(fs::exists(folder_ / "state.json")) << "somebody may be writing it";
+  for (int look = 0; look < 3; ++look) EXPECT_FALSE(follow(authority));
+  EXPECT_FALSE(fs::exists(folder_ / "state.json"));
+  EXPECT_EQ(fresh_standing(authority).model->id, id);
+  EXPECT_EQ(fresh_standing(authority).status, ModelStatus::MODEL_ACTIVE);
+  EXPECT_THAT(authority.fault(), HasSubstr("kept as state.json.damaged-"));
+  const auto second = add(authority, document(2), {.accepted = true}, actor("calibrate otf"), kNow);
+  ASSERT_TRUE(second) << second.error().text;
+  follow(authority);
+  EXPECT_EQ(authority.fault(), "");
+  EXPECT_EQ(fresh_standing(authority).model->id, *second);
+}
+
 // A read-only disk, a missing permission: root is refused nothing, so a file stands for them.
 TEST_F(ModelAuthorityTest, AStoreThatCannotBeMadeIsReportedAndTriedAgain) {
   std::ofstream{folder_} << "in the way";

@@ -12,6 +12,7 @@
 #include <thread>
 
 #include "abbe/daemon/exit_deadline.hpp"
+#include "abbe/daemon/work_aside.hpp"
 #include "synthetic_otf_run.hpp"
 
 namespace abbe::daemon {
@@ -131,6 +132,37 @@ TEST_F(UnstoredModel, CancelDiscardsAModelTheStoreDoesNotTake) {
   now_ += 10s;
   (void)service_->turn({}, now_);
   EXPECT_THAT(ModelStore::open(folder_ / "models").value().list().value(), IsEmpty());
+}
+
+/// Whoever waits for the store's lock waits as for a disk that stalls, at most 5 s of real time.
+TEST_F(UnstoredModel, CancelDiscardsAModelForWhichTheStoreDoesNotAnswer) {
+  start();
+  const int lock = ::open((folder_ / "models" / "lock").c_str(), O_RDONLY | O_CREAT | O_CLOEXEC, 0600);
+  ASSERT_EQ(::flock(lock, LOCK_EX), 0);
+  drive();
+  turn_until([this] { return service_->held_out().has_value(); });
+  const auto early = service_->cancel("anna", now_);
+  ASSERT_FALSE(early);
+  EXPECT_THAT(early.error().text, HasSubstr("being put into the store"));
+  now_ += 6s;
+  (void)service_->turn({}, now_);
+  EXPECT_THAT(service_->not_stored(), HasSubstr("the store has not answered for 5 s"));
+  EXPECT_THAT(service_->status().reason, HasSubstr("cancel discards it"));
+  const auto cancelled = service_->cancel("anna", now_);
+  ASSERT_TRUE(cancelled) << cancelled.error().text;
+  EXPECT_EQ(state(), SessionState::Refused);
+  EXPECT_THAT(service_->status().reason,
+              HasSubstr("cancelled by anna; the store does not answer and may still"));
+  EXPECT_THAT(service_->not_stored(), IsEmpty());
+  OtfRequest next;
+  for (const auto& q : test::synthetic_path_m()) next.path_m.push_back({q[0], q[1], q[2]});
+  EXPECT_TRUE(service_->start(std::move(next), "anna", now_)) << "the next calibration";
+
+  ::close(lock);
+  while (work_left_running()) std::this_thread::yield();
+  (void)service_->turn({}, now_);
+  EXPECT_NE(state(), SessionState::Active);
+  EXPECT_FALSE(ModelStore::open(folder_ / "models").value().activation().value());
 }
 
 TEST_F(UnstoredModel, TheEndOfTheDaemonTriesOnceMoreToStoreTheModel) {

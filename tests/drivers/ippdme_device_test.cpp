@@ -128,6 +128,24 @@ TEST(IppDevice, FollowsThePositionAtMostTenTimesASecond) {
   EXPECT_LE(n, 21u);
 }
 
+TEST(IppDevice, AnAnswerThatWaitsForTheThreadIsNoTimeOut) {
+  IppStage stage;
+  ASSERT_TRUE(stage.state_becomes("ready")) << stage.last_fault();
+  const auto answered = [&stage, asked = stage.times_heard("Get(X(),Y(),Z())")] {
+    stage.peer.serve(stage.time.now());
+    return stage.times_heard("Get(X(),Y(),Z())") > asked;
+  };
+  while (!answered()) stage.turn();
+  stage.time.advance(100ms);
+  stage.peer.serve(stage.time.now());
+  stage.peer.say_gathered();
+  stage.time.advance(4s);  // more than command_timeout: the process was stopped
+  stage.turns_for(1s);
+  EXPECT_EQ(stage.device->status().faults, 0u) << stage.last_fault();
+  EXPECT_EQ(stage.state(), "ready");
+  EXPECT_EQ(stage.times_heard("StartSession()"), 1);
+}
+
 TEST(IppDevice, RefusesAToolThatTheMachineDoesNotHave) {
   IppDeviceOptions options;
   options.session.tool = "ruby 9";

@@ -103,6 +103,38 @@ TEST(IppStop, ARequestWithoutAMotionHoldsWithoutAnAbort) {
   }
 }
 
+TEST(IppStop, AnEndByRequestStopsTheMotionAndHoldsNothing) {
+  drivers::IppMachine kept;
+  IppDeviceOptions options;
+  options.machine_changed = [&](const drivers::IppMachine& m) { kept = m; };
+  MovingStage stage{options};
+  stage.device->measure(on_top());
+  stage.device->end();
+  ASSERT_TRUE(stage.turns_until(10s, [&] { return stage.state() == "disconnected"; })) << stage.state();
+  EXPECT_FALSE(stage.peer.machine().moving());
+  EXPECT_EQ(stage.times_heard("AbortE()"), 1);
+  EXPECT_EQ(stage.peer.machine().heard().back(), "EndSession()");
+  EXPECT_FALSE(stage.device->held());
+  EXPECT_EQ(kept, drivers::IppMachine{});
+  stage.device->measure(on_top());
+  stage.turns_for(10s);
+  EXPECT_EQ(stage.state(), "disconnected") << "nothing is begun any more";
+  EXPECT_EQ(stage.device->points_left(), 0u);
+}
+
+TEST(IppRelease, AMotionThatIsBeingStoppedCannotBeReleased) {
+  MovingStage stage;
+  stage.peer.hold_answers(true);
+  stage.peer.send("E0000 ! Error(2,1001,Machine,\"Air pressure\")\r\n");
+  ASSERT_TRUE(stage.turns_until(1s, [&] { return stage.state() == "aborting"; })) << stage.state();
+  EXPECT_TRUE(stage.device->held());
+  EXPECT_FALSE(stage.device->releasable());
+  stage.peer.hold_answers(false);
+  ASSERT_TRUE(stage.turns_until(10s, [&] { return stage.device->releasable(); })) << stage.state();
+  stage.device->release();
+  ASSERT_TRUE(stage.turns_until(10s, [&] { return !stage.device->held(); })) << stage.state();
+}
+
 TEST(IppRelease, TheHoldOutlivesTheDevice) {
   std::string kept;
   IppDeviceOptions options;

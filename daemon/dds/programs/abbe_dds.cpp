@@ -13,6 +13,7 @@
 
 #include "abbe/daemon/config.hpp"
 #include "abbe/daemon/dds_bridge.hpp"
+#include "abbe/daemon/service_manager.hpp"
 #include "abbe/dds/announcer.hpp"
 #include "abbe/dds/interface_watch.hpp"
 #include "abbe/dds/participant.hpp"
@@ -88,6 +89,28 @@ abbe::daemon::Result<void> take_from_config(Options& options) {
   return {};
 }
 
+/// As a service: systemd kills it when its loop stands still. The notification socket that a child has from
+/// abbed is abbed's.
+class ServiceManager {
+ public:
+  using Instant = std::chrono::steady_clock::time_point;
+
+  explicit ServiceManager(const Options& options) {
+    if (options.parent != 0) return;
+    period_ = abbe::daemon::watchdog_period();
+    abbe::daemon::tell_ready("publishing");
+  }
+  void turn(Instant now) {
+    if (!period_ || now < next_) return;
+    abbe::daemon::tell_alive();
+    next_ = now + *period_;
+  }
+
+ private:
+  std::optional<std::chrono::microseconds> period_;
+  Instant next_{};
+};
+
 /// The exit code, or nothing where a new address calls for another participant.
 std::optional<int> publish(const Options& options) {
   using Clock = std::chrono::steady_clock;
@@ -98,6 +121,7 @@ std::optional<int> publish(const Options& options) {
   if (!writers) return refuse(writers.error());
   stop_on_signals();
 
+  ServiceManager manager(options);
   DdsBridge bridge(*writers);
   DdsFeed feed(options.socket, bridge);
   abbe::dds::Announcer announcer(*participant, *writers);
@@ -105,6 +129,7 @@ std::optional<int> publish(const Options& options) {
   while (stop_requested == 0 && !parent_is_gone(options)) {
     feed.turn();
     announcer.turn(Clock::now());
+    manager.turn(Clock::now());
     say_when_it_changes(bridge, alive);
     if (const auto added = interfaces.turn(participant->allowed_addresses(), Clock::now())) {
       std::fprintf(stderr, "abbe-dds: address %s came up: the participant is created again to use it\n",

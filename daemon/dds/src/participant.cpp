@@ -21,7 +21,6 @@ namespace abbe::dds {
 namespace {
 
 namespace fast = eprosima::fastdds::dds;
-constexpr const char* kProfileName = "abbe";
 const auto kOk = eprosima::fastrtps::types::ReturnCode_t::RETCODE_OK;
 
 /// Standard output belongs to what a program prints; Fast DDS writes its errors there unless told otherwise.
@@ -44,20 +43,25 @@ Result<fast::DomainParticipantQos> read_profile(const std::filesystem::path& fil
                           : factory->load_XML_profiles_file(name);
   if (loaded != kOk) return fail(ErrorCode::BadInput, name + ": is not a Fast DDS XML profile file");
   fast::DomainParticipantQos qos;
-  if (factory->get_participant_qos_from_profile(kProfileName, qos) != kOk) {
-    return fail(ErrorCode::BadInput, name + ": has no participant profile \"" + kProfileName + "\"");
+  if (factory->get_participant_qos_from_profile(daemon::kDdsProfileName, qos) != kOk) {
+    return fail(ErrorCode::BadInput,
+                name + ": has no participant profile \"" + daemon::kDdsProfileName + "\"");
   }
   return qos;
 }
 
+bool has_property(const fast::DomainParticipantQos& qos, const char* name) {
+  return eprosima::fastrtps::rtps::PropertyPolicyHelper::find_property(qos.properties(), name) != nullptr;
+}
+
+/// Without authentication Fast DDS switches security off, whatever access says.
 bool has_security(const fast::DomainParticipantQos& qos) {
-  return eprosima::fastrtps::rtps::PropertyPolicyHelper::find_property(qos.properties(),
-                                                                       "dds.sec.access.plugin") != nullptr;
+  return has_property(qos, "dds.sec.auth.plugin") && has_property(qos, "dds.sec.access.plugin");
 }
 
 Result<void> add_security(const ParticipantOptions& options, fast::DomainParticipantQos& qos) {
   if (options.security.empty()) return {};
-  if (has_security(qos)) {
+  if (has_property(qos, "dds.sec.auth.plugin") || has_property(qos, "dds.sec.access.plugin")) {
     return fail(ErrorCode::BadInput, options.profiles.string() +
                                          ": has dds.sec properties of its own, and security = " +
                                          options.security.string() + " names keys, too: remove one");

@@ -49,7 +49,7 @@ using WallTime = std::chrono::steady_clock::time_point;
 constexpr auto kTidyPeriod = 1h;    // old recordings are looked for this often
 constexpr auto kTidyFirst = 10min;  // until then a time server has set a clock that started wrong
 constexpr auto kHubPatience = 1s;   // thousands of turns; a hub silent for this long hangs
-constexpr auto kEndPatience = 5s;   // for the control socket (3 s at most) and the hub to end
+constexpr auto kEndPatience = 5s;   // for the control socket (3 s at most), the journal and the hub to end
 constexpr int kHubHangs = 70;       // exit code
 
 /// UTC less host time, both read now; the one constant that ever mentions the wall clock.
@@ -147,6 +147,7 @@ struct Abbed::State {
   WallTime running_since;
   std::promise<void> hub_may_run;  // or it is broken: abbed was refused
   std::thread hub_thread;
+  std::atomic<bool> hub_has_ended{false};
   FileDescriptor control_listener;
   std::unique_ptr<ControlServer> control;
   std::mutex participant_mutex;
@@ -169,19 +170,25 @@ struct Abbed::State {
   State(const State&) = delete;
   State& operator=(const State&) = delete;
   ~State() {
+    if (devices) devices->end_machine();  // first of all: whatever hangs, nothing goes on moving
+    *stop_closing = true;
+    end_hub();
+    counting_state.reset();  // waits for the disk
+  }
+
+  void end_hub() {
     const ExitDeadline deadline{
         kEndPatience, kHubHangs,
         fmt::format("abbed: the hub does not end within {} s: exit code {}; what was "
                     "recorded stays readable in {}.mcap.part\n",
                     std::chrono::seconds{kEndPatience}.count(), kHubHangs, recording)};
-    *stop_closing = true;
     control.reset();
     journal.reset();  // these ask the hub once more
-    counting_state.reset();
     if (control_listener) ::unlink(config.control.socket.c_str());
     if (hub) hub->stop();
     hub_may_run = {};
     if (hub_thread.joinable()) hub_thread.join();
+    hub_has_ended.store(true, std::memory_order_release);  // pairs with the acquire in look_at_counting()
   }
 
   /// Asked before anything is opened: a second abbed that got as far as the socket for abbe-dds would, merely
@@ -336,11 +343,10 @@ struct Abbed::State {
   /// For a later run; nothing for a card that another could be taken for. Any thread but the hub's.
   std::optional<CountingState> look_at_counting(const std::string& set_up) {
     if (boot.empty()) return std::nullopt;
-    auto seen = hub->call(
-        [this] {
-          return std::pair{reference->counting(), reference->carried_on()};
-        },
-        kHubPatience);
+    const auto look = [this] { return std::pair{reference->counting(), reference->carried_on()}; };
+    // acquire: pairs with the release in end_hub(); nothing else uses what the hub had any more
+    auto seen =
+        hub_has_ended.load(std::memory_order_acquire) ? std::optional{look()} : hub->call(look, kHubPatience);
     if (!seen || !seen->first || seen->first->progress.serial_number().empty()) return std::nullopt;
     if (left_counting.state) {
       left_counting.state.reset();
@@ -373,7 +379,10 @@ struct Abbed::State {
     if (!supervisor) return;
     supervisor->poll(now);
     const std::lock_guard lock{participant_mutex};
-    participant = {.restarts = supervisor->restarts(), .last_end = supervisor->last_end()};
+    const auto& end = supervisor->last_end();
+    participant = {.restarts = supervisor->restarts(),
+                   .last_end = end ? end->text() : std::string{},
+                   .start_fault = supervisor->start_fault()};
   }
 
   void tidy_recordings(WallTime now) {

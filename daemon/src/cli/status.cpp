@@ -73,7 +73,12 @@ void print_release_awaited(const json& awaited) {
 }
 
 void print_dds(const json& dds) {
-  fmt::print("dds        {}, {} messages", dds["connected"].get<bool>() ? "connected" : "not connected",
+  const bool connected = dds["connected"].get<bool>();
+  const auto state = dds.value("state", std::string{});  // not from an abbed of before
+  fmt::print("dds        {}, {} messages",
+             connected                    ? "connected"
+             : state == "does not answer" ? "abbe-dds does not answer"
+                                          : "not connected",
              dds["sent"].get<std::uint64_t>());
   if (const auto restarts = dds.value("restarts", std::uint64_t{0}); restarts > 0)
     fmt::print(", abbe-dds restarted {} times", restarts);

@@ -20,9 +20,6 @@ namespace {
 
 using nlohmann::json;
 
-// As the hub: without axis positions for this long (wall time) they are not known.
-constexpr std::chrono::milliseconds kPositionIsOld{500};
-
 json device_json(const StreamHealth& h) {
   const auto& d = h.status;
   return {{"name", d.name},
@@ -163,10 +160,12 @@ json positions_json(const protocol::Snapshot& live, bool old) {
 
 struct SeenLink {
   explicit SeenLink(const Publisher& publisher)
-      : connected(publisher.link().connected()),
+      : state(publisher.link().state()),
+        connected(publisher.link().answers()),
         counters(publisher.link().counters()),
         security(publisher.security_warning().empty() ? "on" : publisher.security_warning()),
         process(publisher.link().process()) {}
+  std::string_view state;
   bool connected;
   DdsLinkCounters counters;
   std::string security;
@@ -174,7 +173,8 @@ struct SeenLink {
 };
 
 json dds_json(const SeenLink& link) {
-  json out{{"connected", link.connected},
+  json out{{"state", link.state},
+           {"connected", link.connected},
            {"sent", link.counters.sent},
            {"dropped_live", link.counters.dropped_live},
            {"connections", link.counters.connections},
@@ -214,7 +214,7 @@ SeenStatus look_at_status(const Hub& hub) {
       .held_out = parts.calibration.held_out(),
       .ended = parts.calibration.ended(),
       .live = hub.live().view(),
-      .positions_are_old = !axes_at || parts.time.now() - *axes_at > parts.time.host(kPositionIsOld),
+      .positions_are_old = !axes_at || parts.time.now() - *axes_at > parts.time.host(kAxesPatience),
       .reference = {},
       .without_zero = {},
       .release_awaited = parts.devices.release_awaited(),

@@ -310,20 +310,26 @@ void DeviceSet::stop_machine() {
   if (state_->cmm) state_->cmm->device->abort();
 }
 
+void DeviceSet::end_machine() {
+  if (state_->cmm) state_->cmm->device->end();
+}
+
 std::optional<std::string> DeviceSet::release_awaited() const {
   if (!state_->cmm) return std::nullopt;
-  const auto status = state_->cmm->device->status();
-  if (status.state != drivers::name_of(drivers::IppState::AwaitingRelease)) return std::nullopt;
-  return status.last_fault;
+  if (!state_->cmm->device->held()) return std::nullopt;
+  return state_->cmm->device->status().last_fault;
 }
 
 Result<void> DeviceSet::release_machine() {
   if (!state_->cmm) return SampleSource::release_machine();
-  const auto status = state_->cmm->device->status();
-  if (!release_awaited())
-    return fail(ErrorCode::Refused,
-                fmt::format("machine: {} awaits no release: it is {}", status.name, status.state));
-  state_->cmm->device->release();
+  auto& device = *state_->cmm->device;
+  const auto status = device.status();
+  const auto refused = [&](std::string_view why) {
+    return fail(ErrorCode::Refused, fmt::format("machine: {} {}: it is {}", status.name, why, status.state));
+  };
+  if (!device.held()) return refused("awaits no release");
+  if (!device.releasable()) return refused("cannot be released before its motion was stopped");
+  device.release();
   return {};
 }
 

@@ -16,8 +16,6 @@ using namespace std::chrono_literals;
 using protocol::HostTime;
 
 constexpr auto kHealthPeriod = 1s;
-// Without axis positions for this long (wall time, also with simulated devices) the model in force is STALE.
-constexpr auto kAxesPatience = 500ms;
 
 void sleep_until(std::chrono::steady_clock::time_point t) {
   const auto ns = t.time_since_epoch().count();  // steady_clock is CLOCK_MONOTONIC
@@ -64,8 +62,8 @@ StreamHealth health_of(const Publisher& publisher) {
   const DdsLink& link = publisher.link();
   StreamHealth h;
   h.status.name = "dds";
-  h.status.state = link.connected() ? "connected" : "waiting";
-  h.status.connected = link.connected();
+  h.status.state = link.state();
+  h.status.connected = link.answers();
   h.status.samples = link.counters().sent;
   h.status.dropped = link.counters().dropped_live;
   h.status.faults = link.counters().refused;
@@ -95,7 +93,9 @@ struct Hub::Call {
 };
 
 Hub::Hub(HubParts parts)
-    : parts_(parts), assembler_(assembler_options(parts.config)), live_(assembler_options(parts.config)) {}
+    : parts_(parts),
+      assembler_(assembler_options(parts.config)),
+      live_(assembler_options(parts.config), parts.time) {}
 
 Hub::~Hub() {
   run_calls();

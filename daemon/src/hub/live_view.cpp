@@ -4,6 +4,7 @@
 #include <chrono>
 #include <cmath>
 #include <cstddef>
+#include <cstdint>
 
 #include "linear_axes.hpp"
 
@@ -13,25 +14,8 @@ namespace {
 
 using protocol::SampleFlag;
 
-/// Three bursts of a tracker.
+/// Three bursts of a tracker, in wall time.
 constexpr std::chrono::seconds kCurrentFor{1};
-
-/// The message has one instant, that of the axes, and none for the point: of a tracker that lost its beam or
-/// its connection the last point would look as fresh as the axes.
-void forget_what_is_not_current(protocol::Snapshot& view) {
-  const auto old = [&view](const protocol::SampleHead& head) {
-    return view.head.time - head.time > kCurrentFor;
-  };
-  if (view.has_tracker_point && old(view.tracker_point.head)) {
-    view.has_tracker_point = false;
-    view.tracker_point = {};
-  }
-  if (view.has_trigger && old(view.trigger.head)) {
-    view.has_trigger = false;
-    view.trigger = {};
-  }
-}
-
 }  // namespace
 
 bool axes_known(const protocol::Snapshot& view) noexcept {
@@ -39,6 +23,15 @@ bool axes_known(const protocol::Snapshot& view) noexcept {
   return has_linear_axes(view) && !has(flags, SampleFlag::BusOff) && !has(flags, SampleFlag::DeviceError) &&
          std::all_of(view.position.begin(), view.position.begin() + kLinearAxes,
                      [](double q) { return std::isfinite(q); });
+}
+
+LiveView::LiveView(const AssemblerOptions& options, const drivers::TimeSource& time)
+    : interpolation_(options.interpolation),
+      use_(options.environment),
+      environment_(use_, {}),
+      current_for_(time.host(kCurrentFor)),
+      axes_patience_(time.host(kAxesPatience)) {
+  view_.axes_compensated = options.axes_compensated;
 }
 
 bool LiveView::take(const Batch& batch) {
@@ -59,8 +52,8 @@ bool LiveView::take(const Batch& batch) {
     view_.has_trigger = true;
     view_.trigger = batch.touches.back();
   }
-  forget_what_is_not_current(view_);
-  return !batch.axes.empty() || !batch.points.empty() || !batch.touches.empty() ||
+  const bool forgotten = forget_what_is_not_current(batch.taken);
+  return forgotten || !batch.axes.empty() || !batch.points.empty() || !batch.touches.empty() ||
          !batch.environment.empty() || !batch.measured_environment.empty();
 }
 
@@ -86,6 +79,32 @@ void LiveView::take_back(const protocol::AxisSample& sample) {
     if ((sample.missing_mask >> axis & 1u) != 0) view_.velocity[axis] = view_.u_position[axis] = 0.0;
   }
   previous_ = sample;
+}
+
+/// The message has one instant, that of the axes, and none for the point: of a tracker that lost its beam or
+/// its connection the last point would look as fresh as the axes.
+bool LiveView::forget_what_is_not_current(protocol::HostTime now) {
+  bool forgotten = false;
+  const auto forget = [&](bool& has, auto& sample) {
+    if (!has || now - sample.head.time <= current_for_) return;
+    has = false;
+    sample = {};
+    forgotten = true;
+  };
+  forget(view_.has_tracker_point, view_.tracker_point);
+  forget(view_.has_trigger, view_.trigger);
+  return mark_axes_missing(now) || forgotten;
+}
+
+/// The last positions stay in the view; the mask says that they are not where the axes are now.
+bool LiveView::mark_axes_missing(protocol::HostTime now) {
+  if (!previous_ || now - previous_->head.time <= axes_patience_) return false;
+  const auto all = static_cast<std::uint8_t>((1u << view_.axis_count) - 1u);
+  if (view_.missing_mask == all) return false;
+  view_.missing_mask = all;
+  view_.head.flags |= SampleFlag::AxisMissing;
+  view_.velocity = view_.u_position = {};
+  return true;
 }
 
 }  // namespace abbe::daemon

@@ -41,8 +41,8 @@ StreamKind kind_of(const std::string& stream) {
   if (stream == "models")
     return {"", kStoreId, "check the files in models below [daemon] data_dir", Urgency::Error};
   if (stream == "dds")
-    return {"link to ", kLinkId, "nothing is published until abbe-dds connects: see its own lines",
-            Urgency::Warning};
+    return {"link to ", kLinkId,
+            "nothing is published until abbe-dds connects and answers: see its own lines", Urgency::Warning};
   if (stream == "dds_security")
     return {"", kSecurityId, "anyone on the domain can publish as this machine", Urgency::Warning};
   return {"device ", kDeviceId,
@@ -107,16 +107,25 @@ ObservedPart part_of(const ObservedModel& model) {
 
 ObservedPart part_of(const ObservedParticipant& participant) {
   ObservedPart part{.key = "participant",
-                    .state = std::to_string(participant.restarts),
+                    .state = fmt::format("{}\n{}", participant.restarts, participant.start_fault),
                     .message = "abbe-dds: started",
                     .message_id = kParticipantId,
                     .fields = {{"ABBE_RESTARTS", std::to_string(participant.restarts)}}};
-  if (participant.restarts == 0 && participant.last_end.empty()) return part;
-  part.urgency = Urgency::Warning;
-  part.message = fmt::format(
-      "abbe-dds: ended by {}; started again, {} times since abbed started; its own lines say more",
-      participant.last_end, participant.restarts);
-  part.fields.push_back({"ABBE_FAULT", participant.last_end});
+  const auto ended = [&participant] {
+    return participant.last_end.empty() ? std::string{} : fmt::format("ended: {}; ", participant.last_end);
+  };
+  if (!participant.start_fault.empty()) {
+    part.urgency = Urgency::Error;
+    part.message = fmt::format("abbe-dds: {}cannot be started again: {}; tried again every few seconds",
+                               ended(), participant.start_fault);
+    part.fields.push_back({"ABBE_FAULT", participant.start_fault});
+  } else if (participant.restarts > 0) {
+    part.urgency = Urgency::Warning;
+    part.message =
+        fmt::format("abbe-dds: {}started again, {} times since abbed started; its own lines say more",
+                    ended(), participant.restarts);
+    part.fields.push_back({"ABBE_FAULT", participant.last_end});
+  }
   return part;
 }
 

@@ -60,13 +60,6 @@ std::string dds_security_is_off(std::uint32_t domain) {
       domain);
 }
 
-bool dds_is_secured(const fs::path& security, const fs::path& profile) {
-  if (!security.empty()) return true;
-  if (profile.empty()) return false;
-  const auto text = read_text(profile);
-  return text && text->find("dds.sec.access.plugin") != std::string::npos;
-}
-
 Result<DdsIdentity> find_dds_identity(const fs::path& folder, DdsRole role,
                                       std::chrono::system_clock::time_point now) {
   const fs::path identity = fs::absolute(identity_in(folder, role));

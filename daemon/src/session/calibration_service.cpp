@@ -153,12 +153,28 @@ Result<std::uint64_t> CalibrationService::start(CalibrationTask task, const std:
 }
 
 Result<void> CalibrationService::cancel(const std::string& who, HostTime now) {
-  if (keeping_.valid())
+  const bool stalls = store_stalls(now);
+  if (keeping_.valid() && !stalls)
     return fail(ErrorCode::Refused, "cancel: the model is being put into the store already");
   watch_->stopped = true;
-  auto cancelled = session_.cancel(who, now);
-  if (cancelled) discard_unstored();
-  return cancelled;
+  const std::string late =
+      stalls ? fmt::format("; the store does not answer and may still take model {}", to_keep_->id) : "";
+  auto cancelled = session_.cancel(who + late, now);
+  if (!cancelled) return cancelled;
+  keeping_ = {};
+  discard_unstored();
+  return {};
+}
+
+bool CalibrationService::store_stalls(HostTime now) const {
+  return keeping_.valid() && now - keeping_from_ > ModelAuthority::kStorePatience;
+}
+
+void CalibrationService::report_stalled_store(HostTime now) {
+  if (!store_stalls(now) || !not_stored_.empty()) return;
+  not_stored_ = fmt::format("model {} is not stored: the store has not answered for {} s", to_keep_->id,
+                            ModelAuthority::kStorePatience.count());
+  session_.not_stored(not_stored_ + "; cancel discards it", now);
 }
 
 std::vector<SessionEvent> CalibrationService::turn(std::span<const protocol::Snapshot> snapshots,
@@ -171,6 +187,7 @@ std::vector<SessionEvent> CalibrationService::turn(std::span<const protocol::Sna
   if (ready(identification_)) keep(outcome_of(identification_), now);
   if (ready(keeping_)) conclude(outcome_of(keeping_), now);
   if (to_keep_ && !keeping_.valid() && now >= keep_again_at_) begin_keeping(now);
+  report_stalled_store(now);
   auto events = session_.take_events();
   if (recorder_ != nullptr) {
     for (const auto& event : events) recorder_->hand_over(event_message(event, config_.machine.name), now);
@@ -200,10 +217,10 @@ void CalibrationService::begin_identification(AcquiredRun acquired) {
     auto id = model_id(document);
     auto why = fmt::format("calibrate {}", method_of(*candidate));
     return Identified{
-        .model = std::make_shared<ToKeep>(ToKeep{.id = std::move(id),
-                                                 .document = std::move(document),
-                                                 .verdict = verdict_of(*candidate),
-                                                 .actor = {.who = {}, .why = std::move(why), .when = {}}}),
+        .model = std::shared_ptr<ToKeep>(new ToKeep{.id = std::move(id),
+                                                    .document = std::move(document),
+                                                    .verdict = verdict_of(*candidate),
+                                                    .actor = {.who = {}, .why = std::move(why), .when = {}}}),
         .recording_gap = std::move(recording.gap)};
   });
 }
@@ -237,14 +254,18 @@ void CalibrationService::keep(Result<Identified> identified, HostTime now) {
 }
 
 void CalibrationService::begin_keeping(HostTime now) {
+  keeping_from_ = now;
   keeping_since_ = authority_.revision();
   keeping_ = start_abandonable([keeper = authority_.keeper(), model = to_keep_, now]() mutable {
-    return keeper.keep(model->document, model->verdict, model->actor, now);
+    return keeper.keep(model->document, model->verdict, model->actor, now, &model->discarded);
   });
 }
 
 void CalibrationService::discard_unstored() {
-  if (to_keep_) destroy_aside(std::exchange(to_keep_, nullptr));
+  if (to_keep_) {
+    to_keep_->discarded = true;
+    destroy_aside(std::exchange(to_keep_, nullptr));
+  }
   not_stored_.clear();
 }
 

@@ -85,26 +85,39 @@ void ModelAuthority::begin_to_look(HostTime now) {
   const bool read_anyway = std::exchange(read_again_, false) || to_repair;
   looking_from_ = now;
   looking_since_ = revision_;
-  looking_ = start_abandonable([keeper = keeper_, seen = seen_, read_anyway, now]() -> Result<Look> {
-    Look look{.stamp = keeper.stamp()};
-    if (look.stamp == seen && !read_anyway) return look;
-    auto active = keeper.read_active(now);
-    if (!active) return tl::unexpected(active.error());
-    look.active = std::move(*active);
-    return look;
-  });
+  looking_ = start_abandonable(
+      [keeper = keeper_, seen = seen_, failed = failed_, read_anyway, now]() mutable -> Result<Look> {
+        Look look{.stamp = keeper.stamp()};
+        if (look.stamp == seen && !read_anyway) return look;
+        // Not at the first sight: somebody may be writing it in place.
+        auto active = look.stamp == failed ? keeper.read_active_or_set_aside(now) : keeper.read_active(now);
+        if (active)
+          look.active = std::move(*active);
+        else
+          look.fault = std::move(active.error().text);
+        return look;
+      });
+}
+
+/// What is in force stays; reported in standing() and in health(), and read again by the next look.
+ModelAuthority::Following ModelAuthority::report_look(std::string fault) {
+  fault_ = std::move(fault);
+  read_again_ = true;
+  return Following::Unchanged;
 }
 
 ModelAuthority::Following ModelAuthority::conclude_look(Result<Look> look, HostTime now) {
-  if (!look) {
-    // What is in force stays; said in standing() and in health(), and read again by the next look.
-    fault_ = look.error().text;
-    read_again_ = true;
-    return Following::Unchanged;
+  if (!look) return report_look(look.error().text);
+  failed_.reset();
+  if (!look->fault.empty()) {
+    failed_ = look->stamp;
+    return report_look(std::move(look->fault));
   }
   seen_ = look->stamp;
   fault_.clear();
   if (!look->active) return Following::Unchanged;
+  const bool unknown = look->active->activation.id.empty() && !look->active->fault.empty();
+  if (unknown && active_.model != nullptr) return report_look(std::move(look->active->fault));
   next_repair_ = now + kRepairPeriod;
   if (same(look->active->activation, active_.activation) && look->active->fault == active_.fault) {
     destroy_aside(std::move(*look->active));

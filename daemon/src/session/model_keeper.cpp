@@ -32,10 +32,14 @@ void ModelKeeper::tidy_store(protocol::HostTime now) {
 }
 
 Result<KeptModel> ModelKeeper::keep(const ModelDocument& document, const calib::Verdict& verdict,
-                                    const StoreActor& actor, protocol::HostTime now) {
+                                    const StoreActor& actor, protocol::HostTime now,
+                                    const std::atomic<bool>* discarded) {
+  const auto is_discarded = [discarded] { return discarded != nullptr && *discarded; };
   if (const auto made = store_.create(); !made) return tl::unexpected(made.error());
+  if (is_discarded()) return fail(ErrorCode::Refused, "the model was discarded");
   const auto id = store_.add(document, verdict.accepted, verdict.reasons, actor);
   if (!id) return tl::unexpected(id.error());
+  if (is_discarded()) return fail(ErrorCode::Refused, "the model was discarded");
   if (!verdict.accepted) return KeptModel{*id, std::nullopt};
   if (auto done = activate_once(*id, actor); !done) return tl::unexpected(done.error());
   auto active = read_active(now);
@@ -50,6 +54,15 @@ Result<void> ModelKeeper::activate_once(const std::string& id, const StoreActor&
     return event.action == StoreAction::Activated && event.id == id && event.actor == actor;
   });
   return done ? Result<void>{} : store_.activate(id, actor);
+}
+
+Result<ActiveModel> ModelKeeper::read_active_or_set_aside(protocol::HostTime now) {
+  auto active = read_active(now);
+  if (active) return active;
+  store_.set_lock_patience(kAsidePatience);
+  if (const auto aside = store_.set_aside_damaged_state(utc_.to_utc(now)); !aside)
+    return fail(active.error().code, fmt::format("{}; {}", active.error().text, aside.error().text));
+  return read_active(now);
 }
 
 Result<ActiveModel> ModelKeeper::read_active(protocol::HostTime now) const {

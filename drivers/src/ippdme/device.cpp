@@ -24,7 +24,7 @@ IppDevice::IppDevice(const IppDeviceOptions& options, TcpPeer peer, const TimeSo
       raw_(options.raw_capacity_blocks),
       receiver_(options.receiver),
       machine_{options.session.held, options.session.moving} {
-  show();
+  show_session();
 }
 
 IppDevice::~IppDevice() {
@@ -51,6 +51,10 @@ void IppDevice::abort() {
   requests_.put(IppAbortRequested{});
 }
 
+void IppDevice::end() {
+  requests_.put(IppStopRequested{});
+}
+
 void IppDevice::release() {
   requests_.put(IppReleaseRequested{});
 }
@@ -64,11 +68,19 @@ void IppDevice::measure(std::span<const ProbePoint> points) {
 void IppDevice::wait(std::chrono::nanoseconds at_most) {
   read_mail();
   read_requests();
-  tell(IppTick{});
-  poll(at_most);
-  show();
+  if (!reads_before_due()) {
+    tell(IppTick{});
+    poll(at_most);
+  }
+  show_session();
   report_machine();
   count_points();
+}
+
+void IppDevice::show_session() {
+  show();
+  held_.store(session().held(), std::memory_order_relaxed);
+  releasable_.store(session().releasable(), std::memory_order_relaxed);
 }
 
 void IppDevice::report_machine() {
@@ -85,13 +97,17 @@ DeviceStatus IppDevice::status() const {
 void IppDevice::read_requests() {
   const auto requests = requests_.take();
   const auto is_abort = [](const Request& r) { return std::holds_alternative<IppAbortRequested>(r); };
-  const auto asked_again = std::find_if(requests.rbegin(), requests.rend(), is_abort).base();
+  const auto is_end = [](const Request& r) { return std::holds_alternative<IppStopRequested>(r); };
+  const auto stops = [&](const Request& r) { return is_abort(r) || is_end(r); };
+  const auto asked_again = std::find_if(requests.rbegin(), requests.rend(), stops).base();
   for (auto request = requests.begin(); request != requests.end(); ++request) {
     if (const auto* points = std::get_if<std::vector<ProbePoint>>(&*request)) {
       taken_ += points->size();
       if (request >= asked_again) ask_for(*points);  // what was asked before a stop is not begun
     } else if (is_abort(*request)) {
       tell(IppAbortRequested{});
+    } else if (is_end(*request)) {
+      tell(IppStopRequested{});
     } else {
       tell(IppReleaseRequested{});
     }

@@ -1,6 +1,14 @@
 #include <fmt/format.h>
 #include <gtest/gtest.h>
+#include <poll.h>
+#include <signal.h>
+#include <sys/socket.h>
+#include <sys/un.h>
+#include <unistd.h>
 
+#include <algorithm>
+#include <array>
+#include <cstdlib>
 #include <fstream>
 #include <sstream>
 #include <thread>
@@ -88,6 +96,67 @@ TEST_F(AbbeDds, HelpListsTheExitCodes) {
   Process help({ABBE_DDS_PROGRAM, "--help"});
   EXPECT_EQ(help.wait_for_end(), 0);
   EXPECT_NE(help.transcript().find("Exit codes: 0 stopped"), std::string::npos);
+}
+
+/// What a process reports to the service manager.
+class NotifySocket {
+ public:
+  explicit NotifySocket(const std::string& path) {
+    sockaddr_un at{};
+    at.sun_family = AF_UNIX;
+    path.copy(at.sun_path, sizeof at.sun_path - 1);
+    EXPECT_EQ(::bind(fd_, reinterpret_cast<const sockaddr*>(&at), sizeof at), 0);
+    ::setenv("NOTIFY_SOCKET", path.c_str(), 1);
+    ::setenv("WATCHDOG_USEC", "200000", 1);
+  }
+  NotifySocket(const NotifySocket&) = delete;
+  NotifySocket& operator=(const NotifySocket&) = delete;
+  ~NotifySocket() {
+    ::unsetenv("NOTIFY_SOCKET");
+    ::unsetenv("WATCHDOG_USEC");
+    ::close(fd_);
+  }
+  /// The next message; empty: none within `at_most`.
+  [[nodiscard]] std::string next(std::chrono::milliseconds at_most = std::chrono::seconds{20}) const {
+    pollfd ready{fd_, POLLIN, 0};
+    if (::poll(&ready, 1, static_cast<int>(at_most.count())) <= 0) return {};
+    std::array<char, 256> text{};
+    const auto n = ::recv(fd_, text.data(), text.size(), 0);
+    return {text.data(), static_cast<std::size_t>(std::max<ssize_t>(n, 0))};
+  }
+
+ private:
+  int fd_ = ::socket(AF_UNIX, SOCK_DGRAM | SOCK_CLOEXEC, 0);
+};
+
+TEST_F(AbbeDds, AsAServiceItFeedsTheWatchdogOnlyWhileItsLoopRuns) {
+  write_config("systemd");
+  const NotifySocket manager(directory_ / "notify");
+  const Process service({ABBE_DDS_PROGRAM, "--config", config});
+  EXPECT_TRUE(manager.next().starts_with("READY=1"));
+  for (int i = 0; i < 5; ++i) EXPECT_EQ(manager.next(), "WATCHDOG=1");
+  service.signal(SIGSTOP);
+  while (!manager.next(std::chrono::milliseconds{500}).empty()) {
+  }
+  EXPECT_EQ(manager.next(std::chrono::seconds{1}), "");
+  service.signal(SIGCONT);
+  EXPECT_EQ(manager.next(), "WATCHDOG=1");
+}
+
+/// The notification socket it has inherited is abbed's.
+TEST_F(AbbeDds, AsAChildItTellsTheServiceManagerNothing) {
+  auto link = daemon::DdsLink::listen(socket);
+  ASSERT_TRUE(link) << link.error().text;
+  const NotifySocket manager(directory_ / "notify");
+  const Process child({ABBE_DDS_PROGRAM, "--socket", socket, "--domain", domain_.text(), "--profile",
+                       ABBE_LOOPBACK_PROFILE, "--parent", std::to_string(::getpid())});
+  const auto deadline = Clock::now() + std::chrono::seconds{20};
+  while (!link->connected() && Clock::now() < deadline) {
+    link->poll();
+    std::this_thread::sleep_for(std::chrono::milliseconds{5});
+  }
+  ASSERT_TRUE(link->connected());
+  EXPECT_EQ(manager.next(std::chrono::milliseconds{500}), "");
 }
 
 }  // namespace

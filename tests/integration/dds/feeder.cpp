@@ -1,8 +1,12 @@
 // Stands for abbed: publishes the sample messages over a DdsLink until it is killed, and supervises abbe-dds
 // as abbed does.   dds_feeder SOCKET MACHINE [ABBE_DDS ARGUMENT...]
 // Prints "child PID" whenever abbe-dds was started. The first component of its vectors tells when they were
-// made: CLOCK_MONOTONIC modulo 1000 s, in units of 1e-6.
+// made: CLOCK_MONOTONIC modulo 1000 s, in units of 1e-6. With ABBE_FEEDER_STALE in its environment the state
+// is STALE until SIGUSR1.
+#include <signal.h>
+
 #include <cstdio>
+#include <cstdlib>
 #include <optional>
 #include <string>
 #include <thread>
@@ -18,6 +22,14 @@ using daemon::DdsLink;
 using daemon::DdsSupervisor;
 using daemon::Topic;
 
+volatile sig_atomic_t stale = 0;
+
+v1::ModelState state(std::uint64_t sequence) {
+  auto state = test::active_state(sequence);
+  if (stale != 0) state.state(v1::MODEL_STALE);
+  return state;
+}
+
 class Feeder {
  public:
   Feeder(DdsLink link, std::string machine) : link_(std::move(link)), machine_(std::move(machine)) {
@@ -29,7 +41,7 @@ class Feeder {
     link_.poll();
     link_.beat(now);
     if (now >= next_state_) {
-      send(Topic::ModelState, test::active_state(++sequence_));
+      send(Topic::ModelState, state(++sequence_));
       next_state_ = now + std::chrono::seconds{1};
     }
     send(Topic::Snapshot, test::snapshot(++sequence_), now);
@@ -70,6 +82,8 @@ std::optional<DdsSupervisor> supervisor_for(int argc, char** argv) {
 
 int main(int argc, char** argv) {
   if (argc < 3) return 2;
+  stale = std::getenv("ABBE_FEEDER_STALE") != nullptr ? 1 : 0;
+  ::signal(SIGUSR1, [](int) { stale = 0; });
   auto link = DdsLink::listen(argv[1]);
   if (!link) {
     std::fprintf(stderr, "%s\n", link.error().text.c_str());

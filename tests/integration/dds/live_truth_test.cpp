@@ -20,9 +20,16 @@ class LiveTruthTest : public ShopFloor {
     // Nothing but the blows is to hold a subscriber up: real-time priority where it is to be had.
     std::vector<std::string> fast{ABBE_STAMPED_FAST_SUBSCRIBER, domain_.text(), ABBE_LOOPBACK_PROFILE};
     std::vector<std::string> cyclone{ABBE_STAMPED_CYCLONE_SUBSCRIBER, domain_.text()};
+    std::vector<std::string> of_abbe_dds;
+    if (!keys_.empty()) {
+      fast.push_back(keys_ / "subscriber-1");
+      cyclone.push_back(keys_ / "subscriber-2");
+      of_abbe_dds = {"--security", keys_};
+    }
     for (auto* command : {&fast, &cyclone})
       if (real_time_) command->insert(command->begin(), {"/usr/bin/chrt", "-f", "10"});
-    return {[this](const std::string& name) { return feeder_of(name); }, fast, cyclone, own_network_};
+    return {[this, of_abbe_dds](const std::string& name) { return feeder_of(name, of_abbe_dds); }, fast,
+            cyclone, own_network_};
   }
   static bool real_time_permitted() {
     const sched_param ordinary{}, first{.sched_priority = 10};
@@ -30,15 +37,17 @@ class LiveTruthTest : public ShopFloor {
     ::sched_setscheduler(0, SCHED_OTHER, &ordinary);
     return permitted;
   }
-  static void report(const LiveTruthFigures& f) {
+  void report(const LiveTruthFigures& f) const {
+    const std::string keys = keys_.empty() ? "" : ", with keys";
     for (const auto& failure : f.failures) fmt::print("  {}\n", failure);
-    tests::print_figure("an ACTIVE of a dead machine, two machines, kills, stops and outages", "<= 1.5 s",
-                        "{:.2f} s at most, {} longer, {} rounds", f.longest_hold_s, f.held_too_long,
-                        f.rounds);
-    tests::print_figure("age of applied vectors understated", "<= 1 ms", "{:.3f} ms at most, {} more of {}",
-                        f.worst_understatement_ms, f.understated, f.applied);
-    tests::print_figure("subscribers orphaned", "0", "{}; all apply again after {:.2f} s at most", f.orphaned,
-                        f.longest_return_s);
+    tests::print_figure("an ACTIVE of a dead machine, two machines, kills, stops and outages" + keys,
+                        "<= 1.5 s", "{:.2f} s at most, {} longer, {} rounds", f.longest_hold_s,
+                        f.held_too_long, f.rounds);
+    tests::print_figure("age of applied vectors understated" + keys, "<= 1 ms",
+                        "{:.3f} ms at most, {} more of {}", f.worst_understatement_ms, f.understated,
+                        f.applied);
+    tests::print_figure("subscribers orphaned" + keys, "0", "{}; all apply again after {:.2f} s at most",
+                        f.orphaned, f.longest_return_s);
   }
   void expect_truth(const LiveTruthFigures& f) const {
     report(f);
@@ -51,18 +60,41 @@ class LiveTruthTest : public ShopFloor {
     EXPECT_GT(f.applied, 0u);
   }
 
+  void hold_through_kills_stops_and_an_outage() {
+    LiveTruth truth(parts());
+    ASSERT_TRUE(truth.begin());
+    truth.round(LiveTruth::Blow::KillMachine, 1.6);
+    truth.round(LiveTruth::Blow::StopAbbeDds, 3.0);
+    truth.round(LiveTruth::Blow::StopSubscriber, 1.2);
+    if (own_network_) truth.round(LiveTruth::Blow::Outage, 4.0);
+    expect_truth(truth.figures());
+  }
+  void hold_for_random_rounds() {
+    const char* const rounds = std::getenv("ABBE_LIVE_TRUTH_ROUNDS");
+    if (rounds == nullptr) GTEST_SKIP() << "scripts/soak live-truth";
+    const char* const given = std::getenv("ABBE_LIVE_TRUTH_SEED");
+    const auto seed = given != nullptr ? static_cast<unsigned>(std::atoi(given)) : 1u;
+    std::mt19937 random(seed);
+    LiveTruth truth(parts());
+    ASSERT_TRUE(truth.begin());
+    while (truth.figures().rounds < std::atoi(rounds)) {
+      truth.random_round(random);
+      const auto so_far = truth.figures();
+      fmt::print("  round {}: held {:.2f} s, understated {:.3f} ms ({}), orphaned {}\n", so_far.rounds,
+                 so_far.longest_hold_s, so_far.worst_understatement_ms, so_far.understated, so_far.orphaned);
+      std::fflush(stdout);
+    }
+    fmt::print("seed {}\n", seed);
+    expect_truth(truth.figures());
+  }
+
+  std::filesystem::path keys_;  ///< empty: without
   bool own_network_ = enter_own_network();
   bool real_time_ = real_time_permitted();
 };
 
 TEST_F(LiveTruthTest, HoldsThroughKillsStopsAndAnOutage) {
-  LiveTruth truth(parts());
-  ASSERT_TRUE(truth.begin());
-  truth.round(LiveTruth::Blow::KillMachine, 1.6);
-  truth.round(LiveTruth::Blow::StopAbbeDds, 3.0);
-  truth.round(LiveTruth::Blow::StopSubscriber, 1.2);
-  if (own_network_) truth.round(LiveTruth::Blow::Outage, 4.0);
-  expect_truth(truth.figures());
+  hold_through_kills_stops_and_an_outage();
 }
 
 /// Longer than the lease that Fast DDS gives a participant by default: abbe-dds would drop it, but not it
@@ -75,22 +107,21 @@ TEST_F(LiveTruthTest, NoSubscriberIsOrphanedByALongPause) {
 }
 
 TEST_F(LiveTruthTest, HoldsForRandomRounds) {
-  const char* const rounds = std::getenv("ABBE_LIVE_TRUTH_ROUNDS");
-  if (rounds == nullptr) GTEST_SKIP() << "scripts/soak live-truth";
-  const char* const given = std::getenv("ABBE_LIVE_TRUTH_SEED");
-  const auto seed = given != nullptr ? static_cast<unsigned>(std::atoi(given)) : 1u;
-  std::mt19937 random(seed);
-  LiveTruth truth(parts());
-  ASSERT_TRUE(truth.begin());
-  while (truth.figures().rounds < std::atoi(rounds)) {
-    truth.random_round(random);
-    const auto so_far = truth.figures();
-    fmt::print("  round {}: held {:.2f} s, understated {:.3f} ms ({}), orphaned {}\n", so_far.rounds,
-               so_far.longest_hold_s, so_far.worst_understatement_ms, so_far.understated, so_far.orphaned);
-    std::fflush(stdout);
-  }
-  fmt::print("seed {}\n", seed);
-  expect_truth(truth.figures());
+  hold_for_random_rounds();
+}
+
+/// DDS Security on, with one authority for both machines.
+class LiveTruthWithKeys : public LiveTruthTest {
+ protected:
+  void SetUp() override { keys_ = make_keys("keys"); }
+};
+
+TEST_F(LiveTruthWithKeys, HoldsThroughKillsStopsAndAnOutage) {
+  hold_through_kills_stops_and_an_outage();
+}
+
+TEST_F(LiveTruthWithKeys, HoldsForRandomRounds) {
+  hold_for_random_rounds();
 }
 
 }  // namespace

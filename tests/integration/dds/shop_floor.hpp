@@ -3,11 +3,13 @@
 
 #include <gtest/gtest.h>
 
+#include <chrono>
 #include <cstdlib>
 #include <filesystem>
 #include <memory>
 #include <string>
 
+#include "abbe/daemon/dds_security.hpp"
 #include "domain_claim.hpp"
 #include "process.hpp"
 #include "sample_messages.hpp"
@@ -50,6 +52,15 @@ class ShopFloor : public testing::Test {
   }
   [[nodiscard]] std::vector<std::string> cyclone_subscriber() const {
     return {ABBE_CYCLONE_SUBSCRIBER, domain_.text()};
+  }
+
+  /// Keys of a new authority, for abbe-dds and two subscribers.
+  [[nodiscard]] std::filesystem::path make_keys(const char* name) const {
+    const auto folder = directory_ / name;
+    const auto made =
+        daemon::make_dds_keys({.folder = folder, .subscribers = 2}, std::chrono::system_clock::now());
+    EXPECT_TRUE(made) << made.error().text;
+    return folder;
   }
 
   /// abbe-dds as the supervisor last announced it.

@@ -3,10 +3,13 @@
 #include <signal.h>
 
 #include <algorithm>
+#include <array>
+#include <cmath>
 #include <cstdio>
+#include <cstdlib>
+#include <fstream>
 #include <nlohmann/json.hpp>
 
-#include "abbe/daemon/dds_security.hpp"
 #include "shop_floor.hpp"
 
 namespace abbe::test {
@@ -24,13 +27,6 @@ std::string stranger_seconds() {
 
 class Strangers : public ShopFloor {
  protected:
-  [[nodiscard]] std::filesystem::path make_keys(const char* name) const {
-    const auto folder = directory_ / name;
-    const auto made =
-        daemon::make_dds_keys({.folder = folder, .subscribers = 2}, std::chrono::system_clock::now());
-    EXPECT_TRUE(made) << made.error().text;
-    return folder;
-  }
   [[nodiscard]] std::vector<std::string> stranger(const std::string& what,
                                                   const std::string& keys = {}) const {
     std::vector<std::string> command{ABBE_DDS_STRANGER, domain_.text(), what};
@@ -47,6 +43,10 @@ class Strangers : public ShopFloor {
     return subscriber.transcript().find(kFake) != std::string::npos;
   }
 };
+
+double milliseconds(Clock::duration duration) {
+  return std::chrono::duration<double, std::milli>(duration).count();
+}
 
 /// What a watcher printed of the vectors.
 struct Vectors {
@@ -125,7 +125,7 @@ TEST_F(StrangersWithSecurity, NothingIsBelievedNobodyDiesNothingIsLost) {
   EXPECT_EQ(watcher.transcript().find("0.000999,0.000999"), std::string::npos);
   EXPECT_EQ(starts(), 1);
   const Vectors vectors = vectors_of(watcher);
-  const double gap_ms = std::chrono::duration<double, std::milli>(vectors.longest_gap).count();
+  const double gap_ms = milliseconds(vectors.longest_gap);
   const VectorCount counted = counted_by(counter);
   std::printf(
       "figure: strangers with security: believed 0, deaths %ld, vectors lost %ld of %ld; a watcher that "
@@ -206,33 +206,73 @@ TEST_F(StrangersWithoutSecurity, ARivalDoesNotTakeThePlaceOfARestartedPublisher)
   expect_no_fake();
 }
 
-TEST_F(Strangers, AnnouncedTypesDoNotEndAbbeDdsOrASubscriberWithoutSecurity) {
-  start_feeder();
-  Process fast(fast_subscriber());
-  Process cyclone(cyclone_subscriber());
-  for (Process* subscriber : {&fast, &cyclone})
-    ASSERT_TRUE(subscriber->wait_for("vmc-3: apply V")) << subscriber->transcript();
-  Process types(stranger("types"));
-  ASSERT_TRUE(types.wait_for("started"));
-  // Discovery takes up to a second; 300 vectors come in three.
-  EXPECT_FALSE(feeder_->wait_for("child", Clock::now(), 3s)) << "abbe-dds was started again";
-  for (Process* subscriber : {&fast, &cyclone})
-    EXPECT_TRUE(subscriber->wait_for("vmc-3: apply V", Clock::now())) << subscriber->transcript();
+/// Without keys, with a watcher that prints every vector.
+class UninvitedWithoutSecurity : public Strangers {
+ protected:
+  void SetUp() override {
+    start_feeder();
+    for (Process* subscriber : {&fast, &cyclone})
+      ASSERT_TRUE(subscriber->wait_for("vmc-3: apply V")) << subscriber->transcript();
+    ASSERT_TRUE(watcher.wait_for(R"({"topic":"abbe/v1/Compensation")"));
+  }
+  /// While `what` acts for three seconds (discovery takes up to one) and after it.
+  void expect_nothing_ends_and_no_gap_of_half_a_second(const char* what) {
+    {
+      Process uninvited(stranger(what));
+      ASSERT_TRUE(uninvited.wait_for("started"));
+      EXPECT_FALSE(feeder_->wait_for("child", Clock::now(), 3s)) << "abbe-dds was started again";
+    }
+    for (Process* subscriber : {&fast, &cyclone})
+      EXPECT_TRUE(subscriber->wait_for("vmc-3: apply V", Clock::now())) << subscriber->transcript();
+    ASSERT_TRUE(watcher.wait_for(R"({"topic":"abbe/v1/Compensation")", Clock::now()));
+    const Vectors vectors = vectors_of(watcher);
+    const double gap_ms = milliseconds(vectors.longest_gap);
+    std::printf("figure: %s without security: longest gap %.0f ms of %ld vectors\n", what, gap_ms,
+                vectors.seen);
+    EXPECT_GT(vectors.seen, 100);
+    EXPECT_LT(gap_ms, 500.0);
+  }
+
+  Process fast{fast_subscriber()};
+  Process cyclone{cyclone_subscriber()};
+  Process watcher{watch({"--json"})};
+};
+
+TEST_F(UninvitedWithoutSecurity, AnnouncedTypesEndNothingAndMakeNoGap) {
+  expect_nothing_ends_and_no_gap_of_half_a_second("types");
 }
 
-TEST_F(Strangers, GarbageDoesNotEndAbbeDdsOrASubscriberWithoutSecurity) {
+TEST_F(UninvitedWithoutSecurity, GarbageEndsNothingAndMakesNoGap) {
+  expect_nothing_ends_and_no_gap_of_half_a_second("garbage");
+}
+
+/// The watcher has model and grid of vmc-3 and waits for its state; the stranger's state is ACTIVE and its
+/// grid has the same model_id.
+TEST_F(Strangers, AFakeGridBesideTheTrueOneIsNotBelieved) {
+  ::setenv("ABBE_FEEDER_STALE", "1", 1);
   start_feeder();
-  Process fast(fast_subscriber());
-  Process cyclone(cyclone_subscriber());
-  for (Process* subscriber : {&fast, &cyclone})
-    ASSERT_TRUE(subscriber->wait_for("vmc-3: apply V")) << subscriber->transcript();
-  {
-    Process garbage(stranger("garbage"));
-    ASSERT_TRUE(garbage.wait_for("started"));
-    EXPECT_FALSE(feeder_->wait_for("child", Clock::now(), 3s)) << "abbe-dds was started again";
+  ::unsetenv("ABBE_FEEDER_STALE");
+  const auto csv = directory_ / "grid.csv";
+  Process watcher(watch({"--grid-csv", csv, "--timeout", "30"}));
+  ASSERT_TRUE(watcher.wait_for("vmc-3  publisher is alive")) << watcher.transcript();
+  Process fake(stranger("fake"));
+  ASSERT_TRUE(watcher.wait_for("vmc-3  rival publisher ")) << watcher.transcript();
+  EXPECT_FALSE(watcher.wait_for("nothing", Clock::now(), 2s));  // time for its grid
+  EXPECT_FALSE(std::filesystem::exists(csv)) << "the stranger's state was believed";
+
+  feeder_->signal(SIGUSR1);
+  ASSERT_EQ(watcher.wait_for_end(), 0) << watcher.transcript();
+  std::ifstream written(csv);
+  std::string line;
+  std::size_t nodes = 0;
+  for (std::getline(written, line); std::getline(written, line); ++nodes) {
+    std::array<double, 3> error_um{};
+    ASSERT_EQ(std::sscanf(line.c_str(), "%*f,%*f,%*f,%lf,%lf,%lf", &error_um[0], &error_um[1], &error_um[2]),
+              3)
+        << line;
+    for (const double e : error_um) EXPECT_LT(std::abs(e), 100.0) << line;
   }
-  for (Process* subscriber : {&fast, &cyclone})
-    EXPECT_TRUE(subscriber->wait_for("vmc-3: apply V", Clock::now())) << subscriber->transcript();
+  EXPECT_EQ(nodes, kNodesPerAxis * kNodesPerAxis * kNodesPerAxis);
 }
 
 TEST_F(Strangers, WatchReportsThatSecurityIsOff) {

@@ -1,4 +1,4 @@
-/// abbed is killed while a measuring machine moves at its command.
+/// abbed is killed, or its hub hangs, while a measuring machine moves at its command.
 
 #include <gmock/gmock.h>
 #include <poll.h>
@@ -11,6 +11,7 @@
 
 #include "abbe/daemon/control_protocol.hpp"
 #include "abbe/sim/ippdme_server.hpp"
+#include "hung_hub.hpp"
 #include "spine.hpp"
 
 namespace abbe::test {
@@ -136,6 +137,23 @@ TEST_F(KilledWhileMoving, HomingIsAbortedByTheNextStart) {
   ASSERT_NO_FATAL_FAILURE(start_at(machine, "home = true\n"));
   ASSERT_TRUE(eventually([&] { return machine.moving() && machine.heard().back().starts_with("Home"); }));
   expect_stopped_by_the_next_start(machine, "Home");
+}
+
+TEST_F(KilledWhileMoving, AHubThatHangsDoesNotKeepTheEndFromStoppingTheMachine) {
+  MachineInAThread machine{slow_machine()};
+  ASSERT_NO_FATAL_FAILURE(start_at(machine));
+  ASSERT_TRUE(eventually([&] { return ask(touch_request()).has_value(); })) << status().dump(1);
+  ASSERT_TRUE(eventually([&] { return machine.moving() && machine.heard().back().starts_with("PtMeas"); }));
+  const pid_t hub = thread_of(abbed_->pid(), "abbe-hub");
+  ASSERT_GT(hub, 0);
+  if (!stop_thread(hub)) GTEST_SKIP() << "ptrace is not allowed here";
+
+  abbed_->signal(SIGTERM);
+  EXPECT_TRUE(eventually([&] { return !machine.moving(); }, std::chrono::seconds{3}))
+      << "before exit code 70";
+  keep_stopped_to_the_end(hub);
+  EXPECT_EQ(abbed_->wait_for_end(), 70);
+  EXPECT_THAT(machine.heard(), testing::Contains("AbortE()"));
 }
 
 }  // namespace

@@ -3,8 +3,9 @@
 /// a thread of its own, and puts it in force if the gate accepted it. A model that the store does not take
 /// (disk full, read-only, locked) stays in memory, is tried again every five seconds and reported until it is
 /// stored or its session is cancelled; there is one at most, because its session goes on. Used by the hub's
-/// thread only, but for prepare(); no call waits for anything, and none does work that grows with path, points
-/// or model: that is done where a task is prepared, where a run is identified, and where a model is stored.
+/// thread only, but for prepare(); no call waits for anything, and none does work that grows with path,
+/// points or model: that is done where a task is prepared, where a run is identified, and where a model is
+/// stored.
 
 #include <atomic>
 #include <chrono>
@@ -45,8 +46,8 @@ class CalibrationService {
   CalibrationService(const CalibrationService&) = delete;
   CalibrationService& operator=(const CalibrationService&) = delete;
 
-  /// Refused or BadInput for a task of which no calibration could come with this configuration. Any thread but
-  /// the hub's.
+  /// Refused or BadInput for a task of which no calibration could come with this configuration. Any thread
+  /// but the hub's.
   [[nodiscard]] Result<PreparedCalibration> prepare(CalibrationTask task) const;
   /// The id of the session. Refused while there is one. The caller destroys `prepared`.
   [[nodiscard]] Result<std::uint64_t> start(PreparedCalibration&& prepared, const std::string& who,
@@ -54,8 +55,10 @@ class CalibrationService {
   /// Both, for who has no real-time thread.
   [[nodiscard]] Result<std::uint64_t> start(CalibrationTask task, const std::string& who,
                                             protocol::HostTime now);
-  /// Refused without a session, and while the model is being put into the store. An identification is told to
-  /// stop; until it has, no other session starts. Discards a model that the store does not take.
+  /// Refused without a session, and while the model is being put into a store that may still answer within
+  /// kStorePatience of the authority. An identification is told to stop; until it has, no other session
+  /// starts. Discards a model that the store does not take; of a store that does not answer the session's
+  /// reason says that the model may still come into it. It is not activated then, unless that had begun.
   [[nodiscard]] Result<void> cancel(const std::string& who, protocol::HostTime now);
 
   /// Every turn: new snapshots, and the outcome of what has ended on the other thread. Returns changes of
@@ -78,6 +81,7 @@ class CalibrationService {
     ModelDocument document;
     calib::Verdict verdict;
     StoreActor actor;
+    std::atomic<bool> discarded{false};  ///< nobody waits for it any more
   };
   /// Made where the run was identified; the hub adds who and when.
   struct Identified {
@@ -96,6 +100,8 @@ class CalibrationService {
   void keep(Result<Identified> identified, protocol::HostTime now);
   void discard_unstored();
   void begin_keeping(protocol::HostTime now);
+  void report_stalled_store(protocol::HostTime now);
+  [[nodiscard]] bool store_stalls(protocol::HostTime now) const;
   void conclude(Result<KeptModel> kept, protocol::HostTime now);
   void stop_identification(WallTime until);
   [[nodiscard]] Result<void> try_once_more(WallTime until);
@@ -110,6 +116,7 @@ class CalibrationService {
   std::future<Result<Identified>> identification_;
   std::shared_ptr<ToKeep> to_keep_;  // shared with the thread that stores it
   std::future<Result<KeptModel>> keeping_;
+  protocol::HostTime keeping_from_{};
   protocol::HostTime keep_again_at_{};
   std::string not_stored_;
   std::uint64_t keeping_since_ = 0;  // revision of the authority when the keeping began

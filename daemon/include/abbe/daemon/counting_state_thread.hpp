@@ -1,12 +1,12 @@
 #pragma once
 /// An ordinary thread that keeps DATA_DIR/counting-state.json: looks once a second, writes when the datum of
-/// an axis changed, else every 5 s, and at the end. A disk that hangs holds up nothing but this thread.
+/// an axis changed, else every 5 s, and at the end. A disk that hangs holds up nothing but this thread, and
+/// not the end: a thread that still waits for it after kEndPatience is left running, see work_left_running().
 
 #include <chrono>
-#include <condition_variable>
 #include <filesystem>
 #include <functional>
-#include <mutex>
+#include <memory>
 #include <optional>
 #include <string>
 #include <thread>
@@ -17,32 +17,21 @@ namespace abbe::daemon {
 
 class CountingStateThread {
  public:
-  using Clock = std::chrono::steady_clock;
+  static constexpr std::chrono::seconds kEndPatience{3};
 
   /// `look` runs on the new thread; nothing: the file stays as it is. `report` gets each new fault of the
-  /// file once, on the new thread, too.
+  /// file once, on the new thread, too; a disk that does not answer at the end on the thread that destroys
+  /// this. Neither is called after the end.
   CountingStateThread(std::filesystem::path file, std::function<std::optional<CountingState>()> look,
                       std::function<void(const std::string&)> report,
                       std::chrono::milliseconds period = std::chrono::seconds{1});
-  ~CountingStateThread();  ///< looks and writes once more
+  ~CountingStateThread();  ///< looks and writes once more, within kEndPatience
   CountingStateThread(const CountingStateThread&) = delete;
   CountingStateThread& operator=(const CountingStateThread&) = delete;
 
  private:
-  void run();
-  void look(bool last);
-  void write(const CountingState& state);
-
-  std::filesystem::path file_;
-  std::function<std::optional<CountingState>()> look_;
-  std::function<void(const std::string&)> report_;
-  std::chrono::milliseconds period_;
-  std::optional<CountingState> written_;
-  Clock::time_point written_at_{};
-  std::string fault_;
-  std::mutex mutex_;
-  std::condition_variable wake_;
-  bool stopping_ = false;  // under mutex_
+  struct Work;
+  std::shared_ptr<Work> work_;  // with the thread, which may outlive this
   std::thread thread_;
 };
 

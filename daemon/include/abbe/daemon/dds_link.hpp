@@ -2,10 +2,10 @@
 /// abbed's end of the local socket to abbe-dds. abbed listens, abbe-dds connects, so abbe-dds may die and
 /// come back. Nothing here ever blocks: what the socket does not take at once waits, newest per key, until it
 /// does; older live samples are dropped and counted, durable topics are all sent again to every new
-/// abbe-dds. A beat says that nothing durable waits any more. Used by one thread, the one that assembles snapshots, so that a hung abbed stops beating. The
-/// real-time threads never come here: it makes system calls and allocates.
-/// ModelState is to be published at least once a second: its age changes, and abbe-dds forgets it when abbed
-/// was silent, so that a stale ACTIVE is never published again.
+/// abbe-dds. A beat says that nothing durable waits any more. Used by one thread, the one that assembles
+/// snapshots, so that a hung abbed stops beating. The real-time threads never come here: it makes system
+/// calls and allocates. ModelState is to be published at least once a second: its age changes, and abbe-dds
+/// forgets it when abbed was silent, so that a stale ACTIVE is never published again.
 
 #include <chrono>
 #include <cstddef>
@@ -61,6 +61,11 @@ class DdsLink {
   void poll();
 
   [[nodiscard]] bool connected() const noexcept;
+  /// Connected, and no beat is without an answer for longer than kUnanswered: else abbe-dds hangs.
+  [[nodiscard]] bool answers() const noexcept;
+  static constexpr std::chrono::seconds kUnanswered{1};
+  /// A literal: "connected", "does not answer", "waiting".
+  [[nodiscard]] const char* state() const noexcept;
   [[nodiscard]] const DdsLinkCounters& counters() const noexcept;
   [[nodiscard]] const DdsProcess* process() const noexcept;  ///< null: abbed does not supervise it
 

@@ -22,7 +22,11 @@ namespace abbe::daemon {
 /// What it means that there are no keys, and what to do; for the log, `abbe status` and Health.
 [[nodiscard]] std::string dds_security_is_off(std::uint32_t domain);
 
-/// Keys are named, or the profile of the site has dds.sec properties of its own.
+/// The participant profile that abbe's programs use, whatever else a site's file holds.
+inline constexpr const char* kDdsProfileName = "abbe";
+
+/// Keys are named, or that profile in the file of the site has dds.sec properties of its own: plugins for
+/// authentication and access. A file that is no XML is not.
 [[nodiscard]] bool dds_is_secured(const std::filesystem::path& security,
                                   const std::filesystem::path& profile);
 

@@ -10,6 +10,7 @@
 #include <chrono>
 #include <cstdint>
 #include <filesystem>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -47,8 +48,10 @@ class DdsSupervisor {
 
   [[nodiscard]] pid_t pid() const noexcept { return pid_; }  ///< 0 while there is none
   [[nodiscard]] std::uint64_t restarts() const noexcept { return restarts_; }
-  /// How the last child ended, for the log and Health: "exit code 3", "signal 9"; empty if none has.
-  [[nodiscard]] const std::string& last_end() const noexcept { return last_end_; }
+  /// How the last child ended; none: none has.
+  [[nodiscard]] const std::optional<DdsEnd>& last_end() const noexcept { return last_end_; }
+  /// Why the next child cannot be started, which is tried again; empty: it can.
+  [[nodiscard]] const std::string& start_fault() const noexcept { return start_fault_; }
 
  private:
   explicit DdsSupervisor(Options options) : options_(std::move(options)) {}
@@ -64,7 +67,8 @@ class DdsSupervisor {
   std::chrono::milliseconds delay_{0};
   std::uint64_t restarts_ = 0;
   bool hung_ = false;  // the child was killed because it did not answer
-  std::string last_end_;
+  std::optional<DdsEnd> last_end_;
+  std::string start_fault_;
 };
 
 }  // namespace abbe::daemon

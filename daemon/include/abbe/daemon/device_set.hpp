@@ -1,6 +1,6 @@
 #pragma once
 /// The configured devices with their rings and threads, as one thing the hub can drain. The devices' threads
-/// are theirs; every function here is for the hub's thread.
+/// are theirs; every function here but end_machine() is for the hub's thread.
 
 #include <array>
 #include <chrono>
@@ -37,6 +37,9 @@ class DeviceSet final : public SampleSource {
   [[nodiscard]] std::optional<drivers::CounterCardProgress> card_progress() override;
   void measure(std::span<const drivers::ProbePoint> points) override;
   void stop_machine() override;
+  /// Any thread, takes no lock: a motion of the measuring machine is stopped and its session ends, whether or
+  /// not this is ever destroyed. No release is awaited.
+  void end_machine();
   [[nodiscard]] std::optional<std::string> release_awaited() const override;
   [[nodiscard]] Result<void> release_machine() override;
   [[nodiscard]] std::optional<TipPlace> tip_place() const override;

@@ -3,14 +3,19 @@
 /// SYNC, the latest tracker point (up to a third of a second older) and the latest environment.
 /// Identification never uses it. Ordinary world; not thread-safe.
 
+#include <chrono>
 #include <optional>
 
 #include "abbe/daemon/assembler.hpp"
 #include "abbe/daemon/batch.hpp"
 #include "abbe/daemon/environment_use.hpp"
+#include "abbe/drivers/time_source.hpp"
 #include "abbe/protocol/samples.hpp"
 
 namespace abbe::daemon {
+
+/// Without axis samples for this long (wall time, also with simulated devices) the positions are not known.
+inline constexpr std::chrono::milliseconds kAxesPatience{500};
 
 /// X, Y and Z stand where a live view says, at its instant: all answered, from a bus and nodes without a
 /// fault. Else the positions are the last known ones, however fresh the instant looks.
@@ -18,12 +23,10 @@ namespace abbe::daemon {
 
 class LiveView {
  public:
-  explicit LiveView(const AssemblerOptions& options)
-      : interpolation_(options.interpolation), use_(options.environment), environment_(use_, {}) {
-    view_.axes_compensated = options.axes_compensated;
-  }
+  LiveView(const AssemblerOptions& options, const drivers::TimeSource& time);
 
-  /// True if anything new came.
+  /// True if anything new came, or something shown is no longer current at `batch.taken`: after 1 s the
+  /// tracker point and the touch are forgotten, after kAxesPatience all axes are missing.
   bool take(const Batch& batch);
   [[nodiscard]] const protocol::Snapshot& view() const noexcept { return view_; }
   /// The instant of the latest axis sample, whatever was missing in it.
@@ -36,10 +39,13 @@ class LiveView {
  private:
   void take(const protocol::AxisSample& sample);
   void take_back(const protocol::AxisSample& sample);
+  bool forget_what_is_not_current(protocol::HostTime now);
+  bool mark_axes_missing(protocol::HostTime now);
 
   drivers::InterpolationOptions interpolation_;
   EnvironmentUseOptions use_;
   EnvironmentMerge environment_;
+  std::chrono::nanoseconds current_for_, axes_patience_;
   protocol::Snapshot view_{};
   std::optional<protocol::AxisSample> previous_;
   std::optional<protocol::HostTime> axes_known_at_;

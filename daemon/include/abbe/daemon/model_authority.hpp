@@ -40,8 +40,10 @@ class ModelAuthority {
   enum class Following : std::uint8_t { Unchanged, Reading, TakenUp };
   /// Takes up another model if somebody has activated or rolled back one in the store (`abbe model ...`
   /// does). Never waits and never touches the disk: a call begins to look on an ordinary thread, which reads
-  /// the store if its file has changed, and a later call takes the outcome. A store that cannot be read, or
-  /// has not answered for kStorePatience, is said in standing() and fault(), and read again.
+  /// the store if its file has changed, and a later call takes the outcome. A damaged state that a second
+  /// look finds as the first did is set aside; the model in force stays until one is activated. A store that
+  /// cannot be read, or has not answered for kStorePatience, is said in standing() and fault(), and read
+  /// again.
   Following follow_store(protocol::HostTime now);
   static constexpr std::chrono::seconds kStorePatience{5};
   /// Why the store, or the model it says is active, could not be read the last time; empty: it could.
@@ -51,9 +53,7 @@ class ModelAuthority {
   [[nodiscard]] ModelStanding standing(protocol::HostTime now,
                                        std::optional<protocol::HostTime> axes_known_at,
                                        std::chrono::nanoseconds patience) const;
-  [[nodiscard]] const ModelInForce* in_force() const noexcept {
-    return active_.model.get();
-  }
+  [[nodiscard]] const ModelInForce* in_force() const noexcept { return active_.model.get(); }
   /// What a new model must be better than: the one in force, if it was made for this machine configuration.
   [[nodiscard]] std::shared_ptr<const ModelInForce> to_beat() const noexcept {
     return active_.made_for_this_machine ? active_.model : nullptr;
@@ -68,15 +68,18 @@ class ModelAuthority {
   /// The store as it was found on an ordinary thread.
   struct Look {
     StoreStamp stamp;
-    std::optional<ActiveModel> active;  ///< read, because the stamp was another one
+    std::optional<ActiveModel> active = {};  ///< read, because the stamp was another one
+    std::string fault = {};                  ///< why it could not be read
   };
   void begin_to_look(protocol::HostTime now);
   Following conclude_look(Result<Look> look, protocol::HostTime now);
+  Following report_look(std::string fault);
 
   ModelKeeper keeper_;
   bool axes_compensated_;
-  std::optional<StoreStamp> seen_;  // of the store as `active_` was read from it
-  bool read_again_ = false;         // whatever its stamp
+  std::optional<StoreStamp> seen_;    // of the store as `active_` was read from it
+  bool read_again_ = false;           // whatever its stamp
+  std::optional<StoreStamp> failed_;  // of the store as the last look could not read it
   ActiveModel active_;
   std::string fault_;
   protocol::HostTime next_repair_{};

@@ -3,6 +3,8 @@
 /// with all the waiting for disk and locks that takes. For any thread but the hub's; a copy for each.
 /// Ordinary world.
 
+#include <atomic>
+#include <chrono>
 #include <filesystem>
 #include <memory>
 #include <optional>
@@ -50,11 +52,16 @@ class ModelKeeper {
   /// See ModelStore.
   void set_lock_patience(std::chrono::nanoseconds patience) noexcept { store_.set_lock_patience(patience); }
   /// Keeps a judged model, activates it if the gate accepted it, and reads it back. May be repeated with the
-  /// same `actor` after an error: what the store has of it already is not entered again.
+  /// same `actor` after an error: what the store has of it already is not entered again. Refused, and nothing
+  /// further done, once `discarded` is true; null: never.
   [[nodiscard]] Result<KeptModel> keep(const ModelDocument& document, const calib::Verdict& verdict,
-                                       const StoreActor& actor, protocol::HostTime now);
+                                       const StoreActor& actor, protocol::HostTime now,
+                                       const std::atomic<bool>* discarded = nullptr);
   /// An error only if the store itself cannot be read; a damaged model is a `fault`.
   [[nodiscard]] Result<ActiveModel> read_active(protocol::HostTime now) const;
+  /// The same; a state that is damaged is set aside first. Waits for the store's lock at most kAsidePatience.
+  [[nodiscard]] Result<ActiveModel> read_active_or_set_aside(protocol::HostTime now);
+  static constexpr std::chrono::seconds kAsidePatience{1};
   /// Whether read_active() may say something else than when this was the same. One system call.
   [[nodiscard]] StoreStamp stamp() const noexcept { return store_.stamp(); }
 

@@ -21,7 +21,8 @@ namespace abbe::daemon {
 /// abbe-dds as a child of abbed.
 struct ObservedParticipant {
   std::uint64_t restarts = 0;
-  std::string last_end;  ///< "signal 9"
+  std::string last_end;     ///< "signal 9 (Killed) at 2026-11-22T16:58:22Z"; empty: never
+  std::string start_fault;  ///< why it cannot be started; empty: it runs, or will
 };
 
 struct ObservedModel {

@@ -86,8 +86,17 @@ class IppDevice final : public Device, private SessionOverTcp<IppDevice, IppWord
   /// release(), whether or not the machine moved.
   void abort();
   /// Any thread: a person has looked at the machine: errors are cleared, the session begins anew. Nothing
-  /// happens unless the state is "awaiting release".
+  /// happens unless releasable().
   void release();
+  /// Any thread: the machine awaits a release, whatever the state: also while its server is away, or its
+  /// motion is still being stopped.
+  [[nodiscard]] bool held() const noexcept { return held_.load(std::memory_order_relaxed); }
+  /// Any thread: held(), and its motion is not still being stopped.
+  [[nodiscard]] bool releasable() const noexcept { return releasable_.load(std::memory_order_relaxed); }
+  /// Any thread, takes no lock: a motion that is under way is stopped and the session ends, as when this is
+  /// destroyed; nothing is begun any more, and no release is awaited. For a program that ends and cannot tell
+  /// whether it will come to destroy this.
+  void end();
   /// Any thread: how many of them are neither done nor given up. 0: the touches of all that were begun are in
   /// the ring.
   [[nodiscard]] std::size_t points_left() const noexcept {
@@ -114,6 +123,7 @@ class IppDevice final : public Device, private SessionOverTcp<IppDevice, IppWord
   void await_standstill();
   void count_points();
   void report_machine();
+  void show_session();
 
   void take(const protocol::AxisSample& sample) ABBE_RT;
   void take(const protocol::ProbeTrigger& touch) ABBE_RT;
@@ -128,11 +138,15 @@ class IppDevice final : public Device, private SessionOverTcp<IppDevice, IppWord
   RawRing raw_;
   IppReceiver receiver_;
 
-  using Request = std::variant<std::vector<ProbePoint>, IppAbortRequested, IppReleaseRequested>;
+  using Request =
+      std::variant<std::vector<ProbePoint>, IppAbortRequested, IppReleaseRequested, IppStopRequested>;
   Mailbox<Request> requests_;  ///< the hub asks and takes no lock
   std::size_t taken_ = 0;      ///< points out of it, by the device thread
   std::atomic<std::size_t> asked_{0};
   std::atomic<std::size_t> finished_{0};
+  // relaxed: each stands for itself
+  std::atomic<bool> held_{false};
+  std::atomic<bool> releasable_{false};
   IppMachine machine_;  ///< as reported
 };
 

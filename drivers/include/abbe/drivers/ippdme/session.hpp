@@ -111,6 +111,8 @@ class IppSession {
   [[nodiscard]] IppState state() const noexcept { return state_; }
   /// Until a person releases the machine; also while its motion is still being stopped.
   [[nodiscard]] bool held() const noexcept { return held_; }
+  /// Whether IppReleaseRequested has an effect: held, and its motion is not still being stopped.
+  [[nodiscard]] bool releasable() const noexcept;
   /// Why; empty if it is not held. What is refused while it is held does not change it.
   [[nodiscard]] const std::string& hold_reason() const noexcept { return hold_reason_; }
   /// A motion was sent and its end not reported, on this connection or an earlier one.
@@ -177,7 +179,6 @@ class IppSession {
   [[nodiscard]] IppAction stopped_moving();
   [[nodiscard]] IppAction abort_unanswered();
   [[nodiscard]] IppAction abort_refused(const IppError& error);
-  [[nodiscard]] bool releasable() const noexcept;
   void hold_for(const std::string& reason);
   [[nodiscard]] IppAction began_session();
   void without_move_reports();

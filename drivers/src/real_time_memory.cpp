@@ -23,12 +23,21 @@ std::string refusal(const char* tried) {
 
 }  // namespace
 
-std::vector<std::string> lock_memory() {
+namespace {
+
+std::vector<std::string> lock_now() {
   std::vector<std::string> refusals;
   if (prctl(PR_SET_THP_DISABLE, 1, 0, 0, 0) != 0) refusals.push_back(refusal("no huge pages"));
   // In two calls: one with all three flags would not load what is mapped now.
   if (mlockall(MCL_CURRENT) != 0 || mlockall(MCL_FUTURE | MCL_ONFAULT) != 0)
     refusals.push_back(refusal("mlockall") + " (CAP_IPC_LOCK or LimitMEMLOCK=infinity is needed)");
+  return refusals;
+}
+
+}  // namespace
+
+std::vector<std::string> lock_memory() {
+  static const std::vector<std::string> refusals = lock_now();
   return refusals;
 }
 

@@ -17,12 +17,12 @@ using namespace abbe::tests::otf;
 using testing::HasSubstr;
 using testing::IsEmpty;
 
-Identification identified(const MadeRun& run) {
+Identification identification_of(const MadeRun& run) {
   return *identify(run.samples, run.machine, run.path, run.noise, run.options);
 }
 
 std::vector<Alternative> found_in(const MadeRun& run) {
-  const Identification id = identified(run);
+  const Identification id = identification_of(run);
   return *alternatives(id.observations, id.solution, run.options);
 }
 
@@ -33,7 +33,7 @@ TEST(LackOfFit, NothingIsFoundInASoundRun) {
 }
 
 TEST(LackOfFit, WhiteNoiseWidensNoCovariance) {
-  const Identification id = identified(make_run({}));
+  const Identification id = identification_of(make_run({}));
   EXPECT_EQ(id.solution.statistics.correlation, 1.0);
   EXPECT_EQ(id.solution.statistics.covariance_factor, 1.0);
 }
@@ -50,7 +50,7 @@ TEST(LackOfFit, CorrelatedNoiseWidensTheCovariance) {
     noise_m = keep * noise_m + 3e-6 * std::sqrt(1.0 - keep * keep) * fresh;
     sample.p_tracker_m += noise_m;
   }
-  const Statistics s = identified(run).solution.statistics;
+  const Statistics s = identification_of(run).solution.statistics;
   EXPECT_NEAR(s.correlation, (1.0 + rho) / (1.0 - rho), 2.5);
   EXPECT_NEAR(s.covariance_factor, s.correlation * s.chi2_per_dof, 1e-9 * s.covariance_factor);
 }
@@ -79,7 +79,7 @@ class NamedCause : public testing::TestWithParam<Case> {};
 TEST_P(NamedCause, IsTheFirstReason) {
   MadeRun run = make_run({});
   GetParam().put_in(run);
-  const Identification id = identified(run);
+  const Identification id = identification_of(run);
   const auto found = alternatives(id.observations, id.solution, run.options);
   ASSERT_TRUE(found) << found.error().text;
   ASSERT_FALSE(found->empty());
@@ -106,7 +106,7 @@ INSTANTIATE_TEST_SUITE_P(
                          }},
                     Case{Cause::Vertex, "vertex 20 was driven at (",
                          [](MadeRun& run) { run.path.vertices_m[20] += Vector3(0.1e-3, 0.1e-3, -0.1e-3); }},
-                    Case{Cause::RangeOffset, "offset of 30",
+                    Case{Cause::RangeOffset, "all ranges of the tracker have an offset of ",
                          [](MadeRun& run) {
                            move_samples(run, [](double, const Vector3& p) {
                              return Vector3(0.3e-3 * p.normalized());
@@ -120,7 +120,7 @@ INSTANTIATE_TEST_SUITE_P(
 TEST(LackOfFit, RefusesACorrectionOfTheSizeOfItsUncertainty) {
   MadeRun run = make_run({.error_scale_m = 1e-6});
   run.noise.u_axis_scale = {20e-6, 20e-6, 20e-6};  // 2 K of steel
-  const Identification id = identified(run);
+  const Identification id = identification_of(run);
   const auto verdict = judge(id.observations, id.solution, nullptr, {}, run.options);
   ASSERT_TRUE(verdict);
   EXPECT_THAT(verdict->reasons, testing::Contains(HasSubstr("more than half of it")));
@@ -130,9 +130,9 @@ TEST(LackOfFit, RefusesACorrectionOfTheSizeOfItsUncertainty) {
 TEST(LackOfFit, ScalesOfTheAxesEnterTheUncertainty) {
   MadeRun run = make_run({});
   const Vector3 q(0.3, 0.0, 0.0), t = run.machine.target_offset_m;
-  const double without_m2 = identified(run).solution.model.error_at(q, t).cov_V_m2(0, 0);
+  const double without_m2 = identification_of(run).solution.model.error_at(q, t).cov_V_m2(0, 0);
   run.noise.u_axis_scale = {5e-6, 0.0, 0.0};
-  const double with_m2 = identified(run).solution.model.error_at(q, t).cov_V_m2(0, 0);
+  const double with_m2 = identification_of(run).solution.model.error_at(q, t).cov_V_m2(0, 0);
   EXPECT_NEAR(with_m2 - without_m2, 1.5e-6 * 1.5e-6, 1e-16);
 }
 

@@ -21,6 +21,7 @@ namespace {
 struct Tally {
   int runs = 0, accepted = 0, worse = 0, too_sure = 0, named = 0;
   double left_over_u = 0.0, largest_left_over_u = 0.0;
+  std::size_t covered = 0, intervals = 0;
   std::string other_reason;
 };
 
@@ -40,6 +41,8 @@ void count(Tally& t, const Outcome& o, const Fault& fault) {
   t.worse += o.left_m > o.before_m;
   t.too_sure += o.left_m > 3.0 * o.u_m;
   t.left_over_u += o.left_m / o.u_m;
+  t.covered += o.covered;
+  t.intervals += o.intervals;
   t.largest_left_over_u = std::max(t.largest_left_over_u, o.left_m / o.u_m);
 }
 
@@ -97,6 +100,10 @@ int main(int argc, char** argv) {
   print_figure("never worse, on the fly: accepted models wrong by more than 3 u", "0", "{}", all.too_sure);
   print_figure("never worse, on the fly: faultless runs accepted", ">= 97 %", "{} of {}", none.accepted,
                none.runs);
+  print_figure("never worse, on the fly: 95 % intervals of faultless runs cover", "94 to 97 %", "{:.1f} %",
+               none.intervals > 0
+                   ? 100.0 * static_cast<double>(none.covered) / static_cast<double>(none.intervals)
+                   : 0.0);
   print_figure("never worse, on the fly: cause named first", ">= 90 %", "{} of {} refused", seen.named,
                seen.runs);
   return all.worse + all.too_sure > 0 || none.accepted * 100 < 97 * none.runs ||

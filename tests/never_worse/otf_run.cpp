@@ -49,7 +49,8 @@ void make_machine(OtfRun& run, double spacing_m) {
   for (const sim::Axis a : sim::kAxes) {
     const auto& range = run.truth.axis(a).range;
     auto nodes = calib::equidistant_nodes(range.min_m, range.max_m, spacing_m);
-    run.machine.nodes[static_cast<std::size_t>(a)] = *nodes;
+    nodes->reference_m = range.reference_m;  // where the truth is zero: intervals hold in the gauge
+    run.machine.nodes[static_cast<std::size_t>(a)] = *std::move(nodes);
   }
 }
 
@@ -128,7 +129,15 @@ void compare(Outcome& outcome, const OtfRun& run, const calib::VolumetricModel& 
   const auto before = calib::rigid_free(points, truth), left = calib::rigid_free(points, difference);
   outcome.before_m = before->rigid_free.mean_m;
   outcome.left_m = left->rigid_free.mean_m;
+  constexpr double kNormal975 = 1.95996, kFixed_m = 1e-9;  // by the gauge: no interval
   for (std::size_t i = 0; i < points.size(); ++i) {
+    for (Eigen::Index k = 0; k < 3; ++k) {
+      const double u_m = std::sqrt(std::max(0.0, cov[i](k, k)));
+      if (u_m > kFixed_m) {
+        ++outcome.intervals;
+        outcome.covered += std::abs(difference[i](k)) <= kNormal975 * u_m;
+      }
+    }
     outcome.u_m += std::sqrt(std::max(0.0, cov[i].trace())) / static_cast<double>(points.size());
   }
 }

@@ -165,10 +165,10 @@ Result<Calibrator> precalibrated(std::string name, std::span<const Touch> touche
   c.name = std::move(name);
   c.tip_radius_m = tip_radius_m;
   for (const auto& [number, points] : balls) {
-    const Result<fit::Sphere> sphere =
-        noise_of(points.size(), kBallUnknowns, u_touch_m).and_then([&](std::optional<double> known) {
-          return fit::fit_sphere(points, known);
-        });
+    const Result<fit::Sphere> sphere = noise_of(points.size(), kBallUnknowns, u_touch_m)
+                                           .and_then([&, &seen = points](std::optional<double> known) {
+                                             return fit::fit_sphere(seen, known);
+                                           });
     if (!sphere) {
       return broken(c, sphere.error().code, message("ball ", number, ": ", sphere.error().text));
     }
@@ -180,10 +180,10 @@ Result<Calibrator> precalibrated(std::string name, std::span<const Touch> touche
       return broken(c, ErrorCode::BadInput, message("there is no block ", number));
     }
     const Vector3& towards = outward[static_cast<std::size_t>(number) - 1];
-    const Result<fit::Plane> plane =
-        noise_of(points.size(), kBlockUnknowns, u_touch_m).and_then([&](std::optional<double> known) {
-          return fit::fit_plane(points, towards, known);
-        });
+    const Result<fit::Plane> plane = noise_of(points.size(), kBlockUnknowns, u_touch_m)
+                                         .and_then([&, &seen = points](std::optional<double> known) {
+                                           return fit::fit_plane(seen, towards, known);
+                                         });
     if (!plane) {
       return broken(c, plane.error().code, message("block ", number, ": ", plane.error().text));
     }

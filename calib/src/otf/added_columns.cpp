@@ -1,6 +1,7 @@
 #include "otf/added_columns.hpp"
 
 #include <Eigen/Dense>
+#include <cmath>
 
 namespace abbe::calib::otf {
 
@@ -29,10 +30,11 @@ AddedColumns& AddedColumns::operator-=(const AddedColumns& other) {
   return *this;
 }
 
-AddedColumns::Estimate AddedColumns::estimate(const Eigen::MatrixXd& Q) const {
+AddedColumns::Estimate AddedColumns::estimate(const Eigen::MatrixXd& Q, double least_drop) const {
   const Eigen::MatrixXd QAWC = Q * CWA_.transpose();
   const Eigen::Index k = CWr_.size();
-  // Columns of unit length first. What the model follows itself up to 1e-6 of its length says nothing.
+  // Columns of unit length first. What the model follows itself up to 1e-6 of its squared length says
+  // nothing.
   constexpr double kFollowed = 1e-6;
   Eigen::VectorXd scale(k);
   for (Eigen::Index i = 0; i < k; ++i) {
@@ -43,15 +45,18 @@ AddedColumns::Estimate AddedColumns::estimate(const Eigen::MatrixXd& Q) const {
   const Eigen::VectorXd g = eigen.eigenvectors().transpose() * scale.asDiagonal() * CWr_;
   Estimate e;
   Eigen::VectorXd d = Eigen::VectorXd::Zero(k);
+  Eigen::MatrixXd root = Eigen::MatrixXd::Zero(k, k);
   for (Eigen::Index i = 0; i < k; ++i) {
     const double value = eigen.eigenvalues()(i);
-    if (value > kFollowed) {
+    if (value > kFollowed && g(i) * g(i) / value >= least_drop) {
       e.drop += g(i) * g(i) / value;
       d += g(i) / value * eigen.eigenvectors().col(i);
+      root.col(i) = eigen.eigenvectors().col(i) / std::sqrt(value);
       ++e.columns;
     }
   }
   e.d = scale.asDiagonal() * d;
+  e.root_cov_dU = QAWC * scale.asDiagonal() * root;
   e.dU = QAWC * e.d;
   return e;
 }

@@ -21,12 +21,15 @@ class AddedColumns {
   AddedColumns& operator-=(const AddedColumns&);
 
   struct Estimate {
-    double drop = 0.0;        ///< of chi2
-    std::size_t columns = 0;  ///< that the data determine
-    Eigen::VectorXd d;        ///< of each added column
-    Eigen::VectorXd dU;       ///< Q A^T W^2 C d: what U has of it without them
+    double drop = 0.0;            ///< of chi2
+    std::size_t columns = 0;      ///< that the data determine
+    Eigen::VectorXd d;            ///< of each added column
+    Eigen::VectorXd dU;           ///< Q A^T W^2 C d: what U has of it without them
+    Eigen::MatrixXd root_cov_dU;  ///< by that U is less certain with them: cov = root root^T
   };
-  [[nodiscard]] Estimate estimate(const Eigen::MatrixXd& Q) const;
+  /// A direction of d counts that lowers chi2 by `least_drop` or more. Weaker ones are noise, which columns
+  /// that the model almost follows would multiply. Weights of the rows are taken as 1/sigma^2.
+  [[nodiscard]] Estimate estimate(const Eigen::MatrixXd& Q, double least_drop) const;
 
  private:
   Eigen::MatrixXd CWC_, CWA_;

@@ -126,17 +126,19 @@ AlternativeColumns::Family AlternativeColumns::steps(std::span<const double> res
 }
 
 std::vector<AlternativeColumns::Family> AlternativeColumns::sums(std::span<const double> residual_m) const {
-  const auto family = [&](Cause cause, std::size_t places, std::size_t columns) {
-    Family all;
-    for (std::size_t place = 0; place < places; ++place) {
-      all.emplace_back(Added{cause, place}, AddedColumns(columns, o_.layout.fit_size()));
+  std::vector<Family> all(5);
+  // A path may have 1e5 vertices; only those of legs that are used have columns. Rows come in the order of
+  // legs.
+  const auto columns_of = [&](std::size_t family, Cause cause, std::size_t place,
+                              std::size_t columns) -> auto& {
+    const auto is_it = [&](const auto& one) { return one.first.place == place; };
+    const auto last = all[family].rbegin();
+    const auto end = last + std::min<std::ptrdiff_t>(2, std::ssize(all[family]));
+    if (const auto found = std::find_if(last, end, is_it); found != end) {
+      return *found;
     }
-    return all;
+    return all[family].emplace_back(Added{cause, place}, AddedColumns(columns, o_.layout.fit_size()));
   };
-  const std::size_t vertices = o_.vertices_m.size();
-  std::vector<Family> all{family(Cause::Drift, 1, kDrift), family(Cause::Backlash, 1, kBacklash),
-                          family(Cause::RangeOffset, 1, 1), family(Cause::Vertex, vertices, kShift),
-                          family(Cause::Leg, vertices - 1, kShift)};
   Values v{};
   for (std::size_t i = 0; i < o_.rows.size(); ++i) {
     const Observation& row = o_.rows[i];
@@ -145,12 +147,12 @@ std::vector<AlternativeColumns::Family> AlternativeColumns::sums(std::span<const
         one.second.add(row, o_.A.row(i), residual_m[i], std::span(v).first(count));
       }
     };
-    for (const std::size_t of_every_row : {0U, 1U, 2U}) {
-      add(all[of_every_row].front());
-    }
-    add(all[3][row.leg]);
-    add(all[3][row.leg + 1]);
-    add(all[4][row.leg]);
+    add(columns_of(0, Cause::Drift, 0, kDrift));
+    add(columns_of(1, Cause::Backlash, 0, kBacklash));
+    add(columns_of(2, Cause::RangeOffset, 0, 1));
+    add(columns_of(3, Cause::Vertex, row.leg, kShift));
+    add(columns_of(3, Cause::Vertex, row.leg + 1, kShift));
+    add(columns_of(4, Cause::Leg, row.leg, kShift));
   }
   all.push_back(steps(residual_m));
   return all;
@@ -163,8 +165,8 @@ std::string AlternativeColumns::text(const Added& added, const Eigen::VectorXd& 
       const auto at = std::find_if(o_.rows.begin(), o_.rows.end(),
                                    [&](const Observation& row) { return row.block >= added.place; });
       return message("the tracker or the machine moved by ", 1e6 * shift.norm(), " um and ",
-                     1e6 * d.segment<3>(3).norm(), " urad on leg ", at == o_.rows.end() ? 0 : at->leg,
-                     " (block ", added.place, ")");
+                     1e6 * d.segment<3>(3).norm(), " urad (at the centre of the path) on leg ",
+                     at == o_.rows.end() ? 0 : at->leg, " (block ", added.place, ")");
     }
     case Cause::Drift:
       return message("the tracker or the machine drifts: by ", 1e6 * shift.norm(), " um, ",

@@ -30,7 +30,7 @@ class AlternativeColumns {
   std::size_t values(const Added&, const Observation&, Values&) const;
   /// Over all rows, by cause. O(rows).
   [[nodiscard]] std::vector<Family> sums(std::span<const double> residual_m) const;
-  /// "the tracker or the machine moved by 52.1 um and 3.2 urad after leg 30": `d` of the columns.
+  /// "the tracker or the machine moved by 52.1 um and 3.2 urad ... on leg 30": `d` of the columns.
   [[nodiscard]] std::string text(const Added&, const Eigen::VectorXd& d) const;
 
  private:

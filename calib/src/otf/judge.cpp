@@ -171,15 +171,10 @@ void add_alternatives(Verdict& verdict, const std::vector<Alternative>& others) 
     const std::string text = message(other.text, ": it moves the model by ", 1e6 * other.bias_m,
                                      " um rms, beside an uncertainty of ", 1e6 * other.u_m, " um");
     if (other.cause == Cause::CorrelatedNoise) {
-      reasons.push_back(other.text);
-    } else {
-      (other.bias_m > other.u_m ? reasons : verdict.notes).push_back(text);
+      verdict.notes.push_back(other.text);
+    } else {  // written so that a NaN figure is refused
+      (!(other.bias_m <= other.u_m) ? reasons : verdict.notes).push_back(text);
     }
-  }
-  const bool only_noise = reasons.size() == 1 && others.front().cause == Cause::CorrelatedNoise;
-  if (only_noise && verdict.reasons.empty()) {  // the uncertainty covers it
-    verdict.notes.insert(verdict.notes.begin(), reasons.front());
-    return;
   }
   verdict.reasons.insert(verdict.reasons.begin(), reasons.begin(), reasons.end());
 }
@@ -216,6 +211,31 @@ void require_plausible_growth(Verdict& verdict, double growth, double most) {
     verdict.reasons.push_back(message("the machine is larger by ", 1e6 * growth,
                                       " um/m in all directions, allowed are ", 1e6 * most,
                                       ": wrong scale of the path, of the ranges or of a temperature"));
+  }
+}
+
+/// Scales that no residual shows, and no uncertainty was given for.
+void note_what_u_leaves_out(Verdict& verdict, const Observations& o) {
+  const std::vector<Vector3> at = tensor_grid(o.layout.nodes());
+  Vector3 centre = Vector3::Zero();
+  for (const Vector3& q : at) {
+    centre += q / static_cast<double>(at.size());
+  }
+  double squares = 0.0;
+  for (const Vector3& q : at) {
+    squares += (q - centre).squaredNorm();
+  }
+  const double lever_m = std::sqrt(squares / static_cast<double>(at.size()));
+  constexpr double kSteel_per_K = 11.5e-6;
+  if (!(o.u_scale > 0.0)) {
+    verdict.notes.push_back(message(
+        "not in the uncertainty: the scale of the tracker's ranges; 1 um/m would be ", lever_m, " um rms"));
+  }
+  if (*std::max_element(o.u_axis_scale.begin(), o.u_axis_scale.end()) <= 0.0) {
+    verdict.notes.push_back(
+        message("not in the uncertainty: the temperature of the machine's scales; 1 K of steel "
+                "would be ",
+                1e6 * kSteel_per_K * lever_m, " um rms"));
   }
 }
 
@@ -290,6 +310,7 @@ Result<Verdict> judge(const Observations& o, const Solution& solution, const Vol
   add_alternatives(verdict, *others);
   require_plausible_growth(verdict, common_growth(solution.model), limits.max_growth);
   require_certainty(verdict, correction_size(solution.model));
+  note_what_u_leaves_out(verdict, o);
   verdict.accepted = verdict.reasons.empty();
   return verdict;
 }

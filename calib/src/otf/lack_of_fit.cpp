@@ -3,6 +3,7 @@
 #include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <optional>
 
 #include "abbe/calib/model_comparison.hpp"
@@ -97,6 +98,11 @@ class RigidFreeNorm {
     const auto model = U.head(norm_.rows());
     return std::sqrt(std::max(0.0, model.dot(norm_ * model)) / places_);
   }
+  /// Root of the sum of squares of rms_m() of the columns.
+  [[nodiscard]] double rms_of_columns_m(const Eigen::MatrixXd& U) const {
+    const auto model = U.topRows(norm_.rows());
+    return std::sqrt(std::max(0.0, (norm_ * model).cwiseProduct(model).sum()) / places_);
+  }
   [[nodiscard]] double rms_u_m(const Eigen::MatrixXd& covariance) const {
     const auto model = covariance.topLeftCorner(norm_.rows(), norm_.rows());
     return std::sqrt(std::max(0.0, norm_.cwiseProduct(model).sum()) / places_);
@@ -159,15 +165,19 @@ std::vector<double> residuals_with(const Fit& fit, const AlternativeColumns& col
 }
 
 /// Added columns that are significant, the best of their cause.
-std::optional<Alternative> best_of(const Fit& fit, const AlternativeColumns& columns,
-                                   std::span<const std::pair<Added, AddedColumns>> family) {
+Result<std::optional<Alternative>> best_of(const Fit& fit, const AlternativeColumns& columns,
+                                           std::span<const std::pair<Added, AddedColumns>> family,
+                                           const Options& options) {
   const Added* best = nullptr;
   AddedColumns::Estimate best_estimate;
   const double x = std::log(kCauses * static_cast<double>(family.size()) / kFalseAlarm);
-  const double noise = std::max(1.0, fit.noise.local);
+  const double noise = std::max(1.0, fit.noise.local * fit.noise.local);
   for (const auto& [added, sums] : family) {
-    AddedColumns::Estimate e = sums.estimate(fit.adjustment.dU_dg);
-    const bool significant = e.drop > noise * noise * chi2_bound(static_cast<double>(e.columns), x);
+    if (Result<void> goes_on = check_stopped(options); !goes_on) {
+      return tl::unexpected(goes_on.error());
+    }
+    AddedColumns::Estimate e = sums.estimate(fit.adjustment.dU_dg, noise * chi2_bound(1.0, x));
+    const bool significant = e.drop > noise * chi2_bound(static_cast<double>(e.columns), x);
     if (significant && e.drop > best_estimate.drop) {
       best = &added;
       best_estimate = std::move(e);
@@ -176,25 +186,35 @@ std::optional<Alternative> best_of(const Fit& fit, const AlternativeColumns& col
   if (best == nullptr) {
     return std::nullopt;
   }
+  const auto columns_added = static_cast<double>(best_estimate.columns);
   const std::vector<double> left = residuals_with(fit, columns, *best, best_estimate);
   const double factor =
       residual_noise(fit.o, left, fit.degrees_of_freedom - best_estimate.columns).covariance_factor();
+  // With the true cause only noise is left; slow noise lowers chi2 of every alternative a little.
+  if (!(best_estimate.drop > std::max(noise, factor) * chi2_bound(columns_added, x))) {
+    return std::nullopt;
+  }
+  const double added_u_m = fit.norm.rms_of_columns_m(best_estimate.root_cov_dU);
   return Alternative{
       .cause = best->cause,
       .text = columns.text(*best, best_estimate.d),
       .explained = std::clamp(best_estimate.drop / std::max(fit.excess(), best_estimate.drop), 0.0, 1.0),
       .bias_m = fit.norm.rms_m(best_estimate.dU),
-      .u_m = fit.u_white_m * std::sqrt(factor)};
+      .u_m = std::hypot(fit.u_white_m, added_u_m) * std::sqrt(factor)};
 }
 
 /// The same observations adjusted with another design.
-std::optional<Alternative> other_design(const Fit& fit, const Solution& solution,
-                                        Result<ParameterLayout> layout, Cause cause, std::string text,
-                                        const Options& options) {
-  if (!layout) {
+Result<std::optional<Alternative>> other_design(const Fit& fit, const Solution& solution,
+                                                Result<ParameterLayout> layout, Cause cause, std::string text,
+                                                const Options& options) {
+  constexpr std::size_t kMostUnknowns = 800;  // a second for the adjustment
+  if (!layout || layout->fit_size() > kMostUnknowns) {
     return std::nullopt;
   }
   const Observations other = with_layout(fit.o, *std::move(layout));
+  if (Result<void> goes_on = check_stopped(options); !goes_on) {
+    return tl::unexpected(goes_on.error());
+  }
   const Result<Adjustment> a = adjust(normal_equations(other), other.layout, options.gauge_weight);
   if (!a || other.rows.size() <= a->rank) {
     return std::nullopt;
@@ -209,8 +229,12 @@ std::optional<Alternative> other_design(const Fit& fit, const Solution& solution
     chi2 += left[i] * left[i] / (other.rows[i].sigma_m * other.rows[i].sigma_m);
   }
   const double drop = fit.chi2 - chi2;
+  const double factor = residual_noise(other, left, other.rows.size() - a->rank).covariance_factor();
+  const double more = std::max(1.0, static_cast<double>(a->rank) - static_cast<double>(fit.adjustment.rank));
+  const double bound =
+      std::max(fit.noise.local * fit.noise.local, factor) * chi2_bound(more, std::log(kCauses / kFalseAlarm));
   constexpr double kClearlyBetter = 0.5;
-  if (!(drop > kClearlyBetter * fit.excess())) {
+  if (!(drop > kClearlyBetter * fit.excess() && drop > bound)) {
     return std::nullopt;
   }
   std::vector<Vector3> points, difference;
@@ -221,15 +245,18 @@ std::optional<Alternative> other_design(const Fit& fit, const Solution& solution
                          volumetric_error(other.layout, {a->U.data(), other.layout.model_size()}, q, t));
   }
   const auto bias = rigid_free(points, difference);
-  const double factor = residual_noise(other, left, other.rows.size() - a->rank).covariance_factor();
+  const double u_m = RigidFreeNorm(other.layout, t).rms_u_m(a->covariance) * std::sqrt(factor);
+  // Tables that are too coarse are wrong everywhere: what their widened uncertainty covers refuses nothing.
+  const double stated_u_m = fit.u_white_m * std::sqrt(fit.noise.covariance_factor());
   return Alternative{.cause = cause,
                      .text = std::move(text),
                      .explained = std::clamp(drop / fit.excess(), 0.0, 1.0),
-                     .bias_m = bias ? bias->rigid_free.rms_m : 0.0,
-                     .u_m = fit.u_white_m * std::sqrt(factor)};
+                     .bias_m = bias ? bias->rigid_free.rms_m : std::numeric_limits<double>::infinity(),
+                     .u_m = cause == Cause::NodeSpacing ? std::max(u_m, stated_u_m) : u_m};
 }
 
-std::optional<Alternative> other_order(const Fit& fit, const Solution& solution, const Options& options) {
+Result<std::optional<Alternative>> other_order(const Fit& fit, const Solution& solution,
+                                               const Options& options) {
   std::array<char, 3> order{'X', 'Y', 'Z'};
   std::string used;
   for (const Axis a : fit.o.layout.chain().order_w_to_t()) {
@@ -251,14 +278,18 @@ std::optional<Alternative> other_order(const Fit& fit, const Solution& solution,
                      message("the axes carry each other in the order ", letters, " from workpiece to tool, ",
                              "not ", used, " as the machine's chain says"),
                      options);
-    if (found && (!best || found->explained > best->explained)) {
-      best = std::move(found);
+    if (!found) {
+      return found;
+    }
+    if (*found && (!best || (*found)->explained > best->explained)) {
+      best = *std::move(found);
     }
   } while (std::next_permutation(order.begin(), order.end()));
   return best;
 }
 
-std::optional<Alternative> closer_nodes(const Fit& fit, const Solution& solution, const Options& options) {
+Result<std::optional<Alternative>> closer_nodes(const Fit& fit, const Solution& solution,
+                                                const Options& options) {
   MachineNodes closer = fit.o.layout.nodes();
   double widest_m = 0.0;
   for (AxisNodes& axis : closer) {
@@ -271,11 +302,7 @@ std::optional<Alternative> closer_nodes(const Fit& fit, const Solution& solution
     nodes_m.push_back(axis.nodes_m.back());
     axis.nodes_m = std::move(nodes_m);
   }
-  constexpr std::size_t kMostUnknowns = 800;  // a second for the adjustment
   auto layout = ParameterLayout::observable_with_one_target(fit.o.layout.chain(), closer);
-  if (layout && layout->fit_size() > kMostUnknowns) {
-    return std::nullopt;
-  }
   return other_design(
       fit, solution, std::move(layout), Cause::NodeSpacing,
       message("the nodes are too far apart (", 1e3 * widest_m, " mm) for the errors of this machine"),
@@ -312,7 +339,10 @@ ResidualNoise residual_noise(const Observations& o, std::span<const double> resi
   constexpr double kMadToSigma = 1.4826, kOfSecondDifference = 6.0;  // variances 1 + 4 + 1
   ResidualNoise noise;
   noise.sigma0 = std::sqrt(products[0] / static_cast<double>(std::max<std::size_t>(1, degrees_of_freedom)));
-  noise.local = kMadToSigma * median(std::move(second_differences)) / std::sqrt(kOfSecondDifference);
+  constexpr std::size_t kEnough = 30;  // below, legs are too short to tell fast from slow
+  const bool tells = second_differences.size() >= kEnough;
+  noise.local = !tells ? noise.sigma0
+                       : kMadToSigma * median(std::move(second_differences)) / std::sqrt(kOfSecondDifference);
   constexpr double kNormal999 =
       3.090;  // 99.9 % quantile; the coefficient of n pairs of noise scatters by 1/sqrt(n)
   for (std::size_t lag = 1; lag <= kLags && pairs[lag] > 0; ++lag) {
@@ -364,24 +394,30 @@ Result<std::vector<Alternative>> alternatives(const Observations& o, const Solut
   const AlternativeColumns columns(o);
   std::vector<Alternative> found;
   for (const auto& family : columns.sums(solution.residuals.after_m)) {
-    if (Result<void> goes_on = check_stopped(options); !goes_on) {
-      return tl::unexpected(goes_on.error());
+    Result<std::optional<Alternative>> best = best_of(*fit, columns, family, options);
+    if (!best) {
+      return tl::unexpected(best.error());
     }
-    if (auto best = best_of(*fit, columns, family)) {
-      found.push_back(*std::move(best));
+    if (*best) {
+      found.push_back(**std::move(best));
     }
   }
   if (fit->noise.covariance_factor() > kSuspicious && fit->excess() > 0.0) {
-    for (auto better : {other_order(*fit, solution, options), closer_nodes(*fit, solution, options)}) {
-      if (better) {
-        found.push_back(*std::move(better));
+    for (const auto design : {other_order, closer_nodes}) {
+      Result<std::optional<Alternative>> better = design(*fit, solution, options);
+      if (!better) {
+        return tl::unexpected(better.error());
+      }
+      if (*better) {
+        found.push_back(**std::move(better));
       }
     }
   }
   std::stable_sort(found.begin(), found.end(),
                    [](const Alternative& a, const Alternative& b) { return a.explained > b.explained; });
   constexpr double kHalf = 0.5;
-  if (fit->noise.correlation > kSuspicious && (found.empty() || found.front().explained < kHalf)) {
+  if (fit->noise.correlation > kSuspicious && fit->noise.covariance_factor() > kSuspicious &&
+      (found.empty() || found.front().explained < kHalf)) {
     found.insert(found.begin(),
                  {.cause = Cause::CorrelatedNoise,
                   .text = message("the residuals are correlated over ", fit->noise.correlation,

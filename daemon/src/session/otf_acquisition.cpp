@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <cmath>
 #include <utility>
 
 #include "abbe/calib/otf/polyline.hpp"
@@ -90,16 +89,22 @@ void OtfAcquisition::take(const Snapshot& snapshot) {
   const Vector3 q{snapshot.position[0], snapshot.position[1], snapshot.position[2]};
   track_standstill(point, q);
   if (phase_ == Phase::WaitingAtStart) {
-    wait_at_start(point, q);
     compare_with_path(snapshot, q);
+    wait_at_start(point, q);
+    if (stand_since_ == point.time && phase_ == Phase::WaitingAtStart) readings_.forget();
   } else if (phase_ == Phase::Running) {
     if (const auto effect = effect_of(snapshot, options_.environment)) environment_.take(*effect);
     run(point, q);
     if (phase_ != Phase::Failed) compare_with_path(snapshot, q);
+    if (phase_ == Phase::Complete)
+      if (auto contradiction = readings_.contradiction()) fail(*std::move(contradiction));
   }
 }
 
 void OtfAcquisition::compare_with_path(const Snapshot& s, const Vector3& q) {
+  const auto before = std::exchange(before_q_, std::pair{s.head.time, q});
+  if (!before || s.head.time <= before->first) return;
+  const double speed_m_per_s = (q - before->second).norm() / in_seconds(s.head.time - before->first);
   const auto& vertices = path_.path().vertices_m;
   const auto near = [&](std::size_t i) { return (q - vertices[i]).norm() <= options_.vertex_tolerance_m; };
   const std::size_t vertex = near(leg_) ? leg_ : leg_ + 1;
@@ -109,13 +114,11 @@ void OtfAcquisition::compare_with_path(const Snapshot& s, const Vector3& q) {
   const auto effect = effect_of(s, options_.environment);
   if (!effect) return;
   const AxisPosition path_m = grown({nominal[0], nominal[1], nominal[2]}, *effect, options_.environment);
-  auto contradiction =
-      readings_.take({.vertex = vertex,
-                      .reading_m = q,
-                      .path_m = {path_m[0], path_m[1], path_m[2]},
-                      .u_m = {s.u_position[0], s.u_position[1], s.u_position[2]},
-                      .speed_m_per_s = std::hypot(s.velocity[0], s.velocity[1], s.velocity[2])});
-  if (phase_ == Phase::Complete && !contradiction) contradiction = readings_.contradiction();
+  auto contradiction = readings_.take({.vertex = vertex,
+                                       .reading_m = q,
+                                       .path_m = {path_m[0], path_m[1], path_m[2]},
+                                       .u_m = {s.u_position[0], s.u_position[1], s.u_position[2]},
+                                       .speed_m_per_s = speed_m_per_s});
   if (contradiction && phase_ != Phase::WaitingAtStart) fail(*std::move(contradiction));
 }
 

@@ -20,17 +20,16 @@ std::optional<std::string> VertexReadings::take(const VertexReading& reading) {
 std::optional<std::string> VertexReadings::contradiction() const {
   if (!slowest_ || slowest_->speed_m_per_s > kStands_m_per_s) return std::nullopt;
   constexpr double kCoverage = 3.0;
+  const VertexReading& seen = *slowest_;
+  const calib::Vector3 allowed_m = tolerance_m_ + (kCoverage * seen.u_m).array();
   Eigen::Index axis = 0;
-  const calib::Vector3 off_m = slowest_->reading_m - slowest_->path_m;
-  off_m.cwiseAbs().maxCoeff(&axis);
-  const double allowed_m = tolerance_m_ + kCoverage * slowest_->u_m(axis);
-  if (std::abs(off_m(axis)) <= allowed_m) return std::nullopt;
+  const double most = ((seen.reading_m - seen.path_m).array().abs() / allowed_m.array()).maxCoeff(&axis);
+  if (most <= 1.0) return std::nullopt;
   return fmt::format(
       "the scales contradict the path: at vertex {} {} reads {:.3f} mm, the path says {:.3f} mm, {:.3f} mm "
       "allowed "
       "([gate] path_tolerance_mm): the control drives another path than this one, or it compensates",
-      slowest_->vertex, "XYZ"[axis], 1e3 * slowest_ -> reading_m(axis), 1e3 * slowest_ -> path_m(axis),
-      1e3 * allowed_m);
+      seen.vertex, "XYZ"[axis], 1e3 * seen.reading_m(axis), 1e3 * seen.path_m(axis), 1e3 * allowed_m(axis));
 }
 
 }  // namespace abbe::daemon

@@ -129,6 +129,7 @@ class OtfAcquisition {
   RunPoints points_;
   MeanEffect environment_;
   VertexReadings readings_{options_.reading_tolerance_m};
+  std::optional<std::pair<protocol::HostTime, calib::Vector3>> before_q_;  // the last known positions
   calib::Vector3 stand_at_ = calib::Vector3::Zero();  // where the current standstill began
   protocol::HostTime stand_since_{};
   bool stand_known_ = false;

@@ -20,8 +20,9 @@ struct VertexReading {
 
 class VertexReadings {
  public:
-  /// A machine that is faster does not stand: a control that rounds the corners has no reading there.
-  static constexpr double kStands_m_per_s = 5e-3;
+  /// Between two points. A machine that is faster does not stand: a control that rounds the corners has no
+  /// reading there.
+  static constexpr double kStands_m_per_s = 1e-3;
 
   /// `tolerance_m`: by which a standing machine may miss its command (following error, in-position window).
   explicit VertexReadings(double tolerance_m) : tolerance_m_(tolerance_m) {}
@@ -29,6 +30,8 @@ class VertexReadings {
   /// Readings near a vertex, in the order of time; the slowest and latest of a vertex counts. Returns what
   /// the vertex before contradicts, once this is another one.
   [[nodiscard]] std::optional<std::string> take(const VertexReading& reading);
+  /// The machine stands elsewhere now, and its run has not begun.
+  void forget() { slowest_.reset(); }
   /// Of the last vertex.
   [[nodiscard]] std::optional<std::string> contradiction() const;
 

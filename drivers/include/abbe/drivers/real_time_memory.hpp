@@ -13,7 +13,7 @@ namespace abbe::drivers {
 /// lock of the address space for 7 to 30 ms. No huge pages: locked pages are still gathered into huge ones by
 /// khugepaged, an ordinary thread of the lowest priority; on a busy computer a device thread that touched one
 /// meanwhile waited for 0.5 s.
-/// Returns what the system refused, one sentence each. Any thread.
+/// Once: later calls change nothing. Returns what the system refused, one sentence each. Any thread.
 [[nodiscard]] std::vector<std::string> lock_memory();
 
 /// For the whole process, before its threads start: freed memory stays in the heap, which grows in steps of

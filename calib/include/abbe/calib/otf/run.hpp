@@ -2,8 +2,8 @@
 /// What a run of on-the-fly calibration with a laser tracker ([Sanders 2023]) is made of: the machine, the
 /// path it drove, the tracker's points, how noisy they are, and the choices of the evaluation. All SI. Noise
 /// model: white, Gaussian, independent between samples; sigma_range along the beam, sigma_angle * range in
-/// both directions across it. Correlated noise (turbulence) makes stated uncertainties too small, by 12 to 24
-/// times at 1 s.
+/// both directions across it. Correlated noise (turbulence) is seen in the residuals and widens the stated
+/// uncertainties.
 
 #include <array>
 #include <cstddef>

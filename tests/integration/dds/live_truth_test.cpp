@@ -69,6 +69,17 @@ class LiveTruthTest : public ShopFloor {
     if (own_network_) truth.round(LiveTruth::Blow::Outage, 4.0);
     expect_truth(truth.figures());
   }
+  /// With keys Fast DDS and Cyclone DDS do not authenticate again whom they have not forgotten themselves:
+  /// nobody may forget anybody within 30 s.
+  void hold_through_the_longest_stops_and_outage() {
+    if (std::getenv("ABBE_LIVE_TRUTH_ROUNDS") == nullptr) GTEST_SKIP() << "scripts/soak live-truth";
+    LiveTruth truth(parts());
+    ASSERT_TRUE(truth.begin());
+    truth.round(LiveTruth::Blow::StopAbbeDds, 30.0);
+    truth.round(LiveTruth::Blow::StopSubscriber, 30.0);
+    if (own_network_) truth.round(LiveTruth::Blow::Outage, 30.0);
+    expect_truth(truth.figures());
+  }
   void hold_for_random_rounds() {
     const char* const rounds = std::getenv("ABBE_LIVE_TRUTH_ROUNDS");
     if (rounds == nullptr) GTEST_SKIP() << "scripts/soak live-truth";
@@ -106,6 +117,10 @@ TEST_F(LiveTruthTest, NoSubscriberIsOrphanedByALongPause) {
   expect_truth(truth.figures());
 }
 
+TEST_F(LiveTruthTest, HoldsThroughTheLongestStopsAndOutage) {
+  hold_through_the_longest_stops_and_outage();
+}
+
 TEST_F(LiveTruthTest, HoldsForRandomRounds) {
   hold_for_random_rounds();
 }
@@ -118,6 +133,10 @@ class LiveTruthWithKeys : public LiveTruthTest {
 
 TEST_F(LiveTruthWithKeys, HoldsThroughKillsStopsAndAnOutage) {
   hold_through_kills_stops_and_an_outage();
+}
+
+TEST_F(LiveTruthWithKeys, HoldsThroughTheLongestStopsAndOutage) {
+  hold_through_the_longest_stops_and_outage();
 }
 
 TEST_F(LiveTruthWithKeys, HoldsForRandomRounds) {

@@ -251,7 +251,7 @@ int main(int argc, char** argv) {
   // The default of 20 s is shorter than a pause of this process may last: abbe-dds would drop this
   // participant, which would not announce its readers again.
   participant_qos.wire_protocol().builtin.discovery_config.leaseDuration =
-      eprosima::fastrtps::Duration_t(100, 0);
+      eprosima::fastrtps::Duration_t(40, 0);
   if (argc > 2 &&
       (factory->load_XML_profiles_file(argv[2]) != ReturnCode_t::RETCODE_OK ||
        factory->get_participant_qos_from_profile("abbe", participant_qos) != ReturnCode_t::RETCODE_OK)) {

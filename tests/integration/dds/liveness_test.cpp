@@ -99,7 +99,7 @@ TEST_F(DdsLiveness, AHungAbbeDdsIsNotTrusted) {
 TEST_F(ShopFloor, CycloneIsNotOrphanedByAParticipantItForgot) {
   std::stringstream text;
   text << std::ifstream(ABBE_LOOPBACK_PROFILE).rdbuf();
-  const std::string lease = "<leaseDuration><sec>100<";
+  const std::string lease = "<leaseDuration><sec>40<";
   std::string profile = text.str();
   ASSERT_NE(profile.find(lease), std::string::npos);
   profile_ = directory_ / "short-lease.xml";

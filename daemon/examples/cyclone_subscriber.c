@@ -269,9 +269,6 @@ static dds_qos_t* qos_with_keys(const char* folder) {
   set_file(qos, "dds.sec.access.permissions_ca", folder, "permissions_ca.crt");
   set_file(qos, "dds.sec.access.governance", folder, "governance.p7s");
   set_file(qos, "dds.sec.access.permissions", folder, "permissions.p7s");
-  /* As long as abbe-dds's. Whoever is forgotten by one side only is not let in again, so nobody may forget the
-     other in an outage. A dead publisher is noticed by the liveliness of its ModelState. */
-  dds_qset_liveliness(qos, DDS_LIVELINESS_AUTOMATIC, DDS_SECS(40));
   return qos;
 }
 

@@ -12,6 +12,7 @@
 #include "otf/added_columns.hpp"
 #include "otf/alternative_columns.hpp"
 #include "otf/check_stopped.hpp"
+#include "otf/row_residuals.hpp"
 
 namespace abbe::calib::otf {
 namespace {
@@ -219,16 +220,8 @@ Result<std::optional<Alternative>> other_design(const Fit& fit, const Solution& 
   if (!a || other.rows.size() <= a->rank) {
     return std::nullopt;
   }
-  std::vector<double> left(other.rows.size());
-  double chi2 = 0.0;
-  for (std::size_t i = 0; i < left.size(); ++i) {
-    left[i] = other.rows[i].y_m;
-    for (const SparseRows::Entry& e : other.A.row(i)) {
-      left[i] -= e.value * a->U(static_cast<Eigen::Index>(e.column));
-    }
-    chi2 += left[i] * left[i] / (other.rows[i].sigma_m * other.rows[i].sigma_m);
-  }
-  const double drop = fit.chi2 - chi2;
+  const std::vector<double> left = residuals_m(other, a->U);
+  const double drop = fit.chi2 - chi2(other, left);
   const double factor = residual_noise(other, left, other.rows.size() - a->rank).covariance_factor();
   const double more = std::max(1.0, static_cast<double>(a->rank) - static_cast<double>(fit.adjustment.rank));
   const double bound =

@@ -8,32 +8,10 @@
 #include "abbe/calib/otf/lack_of_fit.hpp"
 #include "message.hpp"
 #include "otf/check_stopped.hpp"
+#include "otf/row_residuals.hpp"
 
 namespace abbe::calib::otf {
 namespace {
-
-/// y - A U of every row; y itself for an empty U.
-std::vector<double> residuals_m(const Observations& o, const Eigen::VectorXd& U) {
-  std::vector<double> r(o.rows.size());
-  for (std::size_t i = 0; i < r.size(); ++i) {
-    r[i] = o.rows[i].y_m;
-    if (U.size() > 0) {
-      for (const SparseRows::Entry& e : o.A.row(i)) {
-        r[i] -= e.value * U(static_cast<Eigen::Index>(e.column));
-      }
-    }
-  }
-  return r;
-}
-
-double chi2(const Observations& o, std::span<const double> r) {
-  double sum = 0.0;
-  for (std::size_t i = 0; i < r.size(); ++i) {
-    const double whitened = r[i] / o.rows[i].sigma_m;
-    sum += whitened * whitened;
-  }
-  return sum;
-}
 
 ResidualStatistics residual_statistics(const Observations& o, std::span<const double> r) {
   ResidualStatistics s;
@@ -119,6 +97,28 @@ void report(const Options& options, double fraction) {
 }
 
 }  // namespace
+
+std::vector<double> residuals_m(const Observations& o, const Eigen::VectorXd& U) {
+  std::vector<double> r(o.rows.size());
+  for (std::size_t i = 0; i < r.size(); ++i) {
+    r[i] = o.rows[i].y_m;
+    if (U.size() > 0) {
+      for (const SparseRows::Entry& e : o.A.row(i)) {
+        r[i] -= e.value * U(static_cast<Eigen::Index>(e.column));
+      }
+    }
+  }
+  return r;
+}
+
+double chi2(const Observations& o, std::span<const double> r) {
+  double sum = 0.0;
+  for (std::size_t i = 0; i < r.size(); ++i) {
+    const double whitened = r[i] / o.rows[i].sigma_m;
+    sum += whitened * whitened;
+  }
+  return sum;
+}
 
 Result<Solution> solve(const Observations& o, const Options& options) {
   const std::size_t needed = o.layout.fit_size();

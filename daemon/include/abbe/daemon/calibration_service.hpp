@@ -56,7 +56,7 @@ class CalibrationService {
   [[nodiscard]] Result<std::uint64_t> start(CalibrationTask task, const std::string& who,
                                             protocol::HostTime now);
   /// Refused without a session, and while the model is being put into a store that may still answer within
-  /// kStorePatience of the authority. An identification is told to stop; until it has, no other session
+  /// kStorePatience of the authority. An identification is asked to stop; until it has, no other session
   /// starts. Discards a model that the store does not take; of a store that does not answer the session's
   /// reason says that the model may still come into it. It is not activated then, unless that had begun.
   [[nodiscard]] Result<void> cancel(const std::string& who, protocol::HostTime now);
@@ -81,7 +81,7 @@ class CalibrationService {
     ModelDocument document;
     calib::Verdict verdict;
     StoreActor actor;
-    std::atomic<bool> discarded{false};  ///< nobody waits for it any more
+    std::atomic<bool> discarded{false};  ///< cancelled: not to be stored
   };
   /// Made where the run was identified; the hub adds who and when.
   struct Identified {

@@ -42,7 +42,7 @@ class ModelAuthority {
   /// does). Never waits and never touches the disk: a call begins to look on an ordinary thread, which reads
   /// the store if its file has changed, and a later call takes the outcome. A damaged state that a second
   /// look finds as the first did is set aside; the model in force stays until one is activated. A store that
-  /// cannot be read, or has not answered for kStorePatience, is said in standing() and fault(), and read
+  /// cannot be read, or has not answered for kStorePatience, is reported in standing() and fault(), and read
   /// again.
   Following follow_store(protocol::HostTime now);
   static constexpr std::chrono::seconds kStorePatience{5};

@@ -1,5 +1,5 @@
 #pragma once
-/// What the residuals of a run show beyond noise. The model is held against alternatives, each of which adds
+/// What the residuals of a run show beyond noise. The model is compared with alternatives, each of which adds
 /// a few columns C to the adjustment y = A U + C d (the tracker moved, the machine drifts, an axis has
 /// backlash, a vertex or a leg of the path was driven elsewhere, the ranges have an offset), or replaces its
 /// design (another order of the axes, closer nodes). With r the residuals of the model, Q = (A^T W^2 A)^-1 in

@@ -20,6 +20,14 @@ if(ABBE_SANITIZE)
   endif()
 endif()
 
+# Identification gives the same bits on every processor. Eigen without vectors sums in one order, whatever the width of the
+# registers, where the data lie in memory and how large the caches are; nothing is fused into one rounding.
+add_compile_options(-ffp-contract=off)
+function(abbe_same_bits target)
+  target_compile_definitions(${target} PUBLIC EIGEN_DONT_VECTORIZE EIGEN_NO_CPUID EIGEN_DEFAULT_L1_CACHE_SIZE=32768
+                             EIGEN_DEFAULT_L2_CACHE_SIZE=262144 EIGEN_DEFAULT_L3_CACHE_SIZE=2097152)
+endfunction()
+
 # For code that computes little: in sanitizer builds the optimizer would take longer than it saves.
 function(abbe_compile_fast target)
   if(ABBE_SANITIZE)

@@ -1,16 +1,16 @@
 #include "abbe/calib/geometry.hpp"
 
 #include <Eigen/SVD>
-#include <cmath>
 
+#include "elementary.hpp"
 #include "message.hpp"
 
 namespace abbe::calib {
 
 Vector3 from_spherical(double range_m, double azimuth_rad, double elevation_rad) {
-  const double in_plane_m = range_m * std::cos(elevation_rad);
-  return {in_plane_m * std::cos(azimuth_rad), in_plane_m * std::sin(azimuth_rad),
-          range_m * std::sin(elevation_rad)};
+  const SinCos azimuth = sin_cos(azimuth_rad), elevation = sin_cos(elevation_rad);
+  const double in_plane_m = range_m * elevation.cos;
+  return {in_plane_m * azimuth.cos, in_plane_m * azimuth.sin, range_m * elevation.sin};
 }
 
 Result<Matrix3> rotation_from_cross_covariance(const Matrix3& cross) {

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <utility>
 
+#include "abbe/calib/root_sum_of_squares.hpp"
 #include "message.hpp"
 
 namespace abbe::calib {
@@ -109,7 +110,8 @@ double saturation_vapour_pressure_Pa(double temperature_K) noexcept {
   const double B = K[2] * O * O + K[3] * O + K[4];
   const double C = K[5] * O * O + K[6] * O + K[7];
   const double X = -B + std::sqrt(B * B - 4.0 * A * C);
-  return 1e6 * std::pow(2.0 * C / X, 4);
+  const double root = 2.0 * C / X;
+  return 1e6 * (root * root) * (root * root);
 }
 
 double u_of_equation(IndexEquation equation) noexcept {
@@ -144,7 +146,7 @@ Result<RefractiveIndex> refractive_index(const Air& air, double vacuum_wavelengt
       std::hypot(part(&Air::temperature_K, air.u_temperature_K), part(&Air::pressure_Pa, air.u_pressure_Pa),
                  part(&Air::relative_humidity, air.u_relative_humidity));
   return RefractiveIndex{index_of(air, vacuum_wavelength_m, equation),
-                         std::hypot(u_air, u_of_equation(equation))};
+                         root_sum_of_squares(u_air, u_of_equation(equation))};
 }
 
 double distance_factor(double n_assumed, double n) noexcept {

@@ -6,6 +6,8 @@
 #include <numbers>
 #include <utility>
 
+#include "abbe/calib/root_sum_of_squares.hpp"
+#include "elementary.hpp"
 #include "message.hpp"
 
 namespace abbe::calib::evemu {
@@ -15,8 +17,8 @@ constexpr std::size_t kLeastBallPoints = 5;
 constexpr std::size_t kLeastFacePoints = 4;
 constexpr double kRingUpper_rad = 45.0 * std::numbers::pi / 180.0;
 constexpr double kRingLower_rad = 80.0 * std::numbers::pi / 180.0;
-constexpr double kOuter = 1.6;  // of the distance in contact
-constexpr double kFarthestAround_rad = 60.0 * std::numbers::pi / 180.0;
+constexpr double kOuter = 1.6;                // of the distance in contact
+constexpr double kCosOfFarthestAround = 0.5;  // 60 degrees
 
 Vector3 across(const Vector3& up) {
   return up.unitOrthogonal();
@@ -36,11 +38,11 @@ std::vector<Vector3> normals_on_a_ball(const Vector3& up, std::size_t points) {
   };
   for (const auto& [polar_rad, n, first] :
        {Ring{kRingUpper_rad, upper, 0.0}, Ring{kRingLower_rad, lower, 0.5}}) {
+    const SinCos polar = sin_cos(polar_rad);
     for (std::size_t i = 0; i < n; ++i) {
-      const double around =
-          2.0 * std::numbers::pi * (first + static_cast<double>(i)) / static_cast<double>(n);
-      normals.push_back(std::cos(polar_rad) * up +
-                        std::sin(polar_rad) * (std::cos(around) * x + std::sin(around) * y));
+      const SinCos around =
+          sin_cos(2.0 * std::numbers::pi * (first + static_cast<double>(i)) / static_cast<double>(n));
+      normals.push_back(polar.cos * up + polar.sin * (around.cos * x + around.sin * y));
     }
   }
   return normals;
@@ -51,8 +53,9 @@ std::vector<Vector3> places_on_a_face(const FaceToTouch& face, const Vector3& no
   const Vector3 x = across(normal), y = normal.cross(x);
   std::vector<Vector3> places;
   for (std::size_t i = 0; i + 1 < points; ++i) {
-    const double around = 2.0 * std::numbers::pi * static_cast<double>(i) / static_cast<double>(points - 1);
-    places.push_back(face.centre_m + face.half_size_m * (std::cos(around) * x + std::sin(around) * y));
+    const SinCos around =
+        sin_cos(2.0 * std::numbers::pi * static_cast<double>(i) / static_cast<double>(points - 1));
+    places.push_back(face.centre_m + face.half_size_m * (around.cos * x + around.sin * y));
   }
   places.push_back(face.centre_m);
   return places;
@@ -92,7 +95,7 @@ class Planner {
         way = over_to(outer);
       } else {
         way.push_back(ball.centre_m + kOuter * reach(ball) * before);
-        if (std::acos(std::clamp(before.dot(n), -1.0, 1.0)) > kFarthestAround_rad) go_over(ball, way, n);
+        if (before.dot(n) < kCosOfFarthestAround) go_over(ball, way, n);
         way.push_back(outer);
       }
       planned_.push_back({Feature::Ball, ball.number, std::move(way), ball.centre_m + reach(ball) * n, n});
@@ -179,9 +182,9 @@ Result<Calibrator> calibrated_artefact(const Calibrator& nominal, const std::arr
                              {nominal.blocks[0].normal, nominal.blocks[1].normal}, u_position_m);
   if (!found) return found;
   found->expansivity = nominal.expansivity;
-  for (auto& ball : found->balls) ball.u_m = std::hypot(ball.u_m, u_position_m);
+  for (auto& ball : found->balls) ball.u_m = root_sum_of_squares(ball.u_m, u_position_m);
   for (std::size_t i = 0; i < found->blocks.size(); ++i)
-    found->blocks[i].u_rad = std::hypot(found->blocks[i].u_rad, u_position_m / faces[i].half_size_m);
+    found->blocks[i].u_rad = root_sum_of_squares(found->blocks[i].u_rad, u_position_m / faces[i].half_size_m);
   return found;
 }
 

@@ -1,9 +1,9 @@
 #include <Eigen/Dense>
 #include <algorithm>
-#include <random>
 
 #include "abbe/calib/sparse/cross_validation.hpp"
 #include "abbe/calib/sparse/optimality.hpp"
+#include "elementary.hpp"
 #include "evemu/fit_coefficients.hpp"
 #include "message.hpp"
 #include "units.hpp"
@@ -125,12 +125,11 @@ Eigen::VectorXd at_end(const sparse::Path& path) {
 Result<Eigen::MatrixXd> bootstrap(const FitProblem& problem, const Regression& r,
                                   const Eigen::VectorXd& fitted_mm, const SolveOptions& options,
                                   const SparseChoice& choice, const HyperParameters& noise) {
-  std::mt19937_64 random(options.sparse.seed);
-  std::normal_distribution<double> normal;
+  NormalDeviates normal(options.sparse.seed);
   const auto draw = [&](Eigen::Index n) {
     Eigen::VectorXd z(n);
     for (double& value : z) {
-      value = normal(random);
+      value = normal.next();
     }
     return z;
   };
@@ -139,7 +138,8 @@ Result<Eigen::MatrixXd> bootstrap(const FitProblem& problem, const Regression& r
   const auto runs = static_cast<Eigen::Index>(options.sparse.bootstrap_runs);
   Eigen::MatrixXd c(static_cast<Eigen::Index>(problem.design.size()), runs);
   for (Eigen::Index run = 0; run < runs; ++run) {
-    Eigen::VectorXd scatter = coloured(o, noise.s_m * draw(r.y.size())) + S * (noise.w_rad * draw(S.cols()));
+    const Eigen::VectorXd of_rows = draw(r.y.size()), of_poses = draw(S.cols());  // in this order everywhere
+    Eigen::VectorXd scatter = coloured(o, noise.s_m * of_rows) + S * (noise.w_rad * of_poses);
     if (problem.A.cols() > 0) {
       scatter += problem.A * draw(problem.A.cols());  // one array for all positions of a run
     }

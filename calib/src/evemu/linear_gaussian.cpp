@@ -5,9 +5,15 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <numbers>
+
+#include "elementary.hpp"
 
 namespace abbe::calib::evemu {
+namespace {
+
+constexpr double kLog2Pi = 1.8378770664093454836;  // log(2 pi)
+
+}  // namespace
 
 LinearGaussian::LinearGaussian(const Eigen::MatrixXd& X, const Eigen::MatrixXd& S, const Eigen::VectorXd& y)
     : unknowns_(X.cols()), rows_(X.rows()) {
@@ -38,10 +44,10 @@ LinearGaussian::Evidence LinearGaussian::evidence(const Eigen::VectorXd& prior, 
   const Eigen::MatrixXd L_inv_scaled = llt.matrixL().solve(scaled);
   const Eigen::VectorXd L_inv_z = llt.matrixL().solve(z_);
   const Eigen::VectorXd projected = L_inv_scaled.transpose() * L_inv_z;
-  const double log_det = 2.0 * llt.matrixLLT().diagonal().array().log().sum();
+  const double log_det = 2.0 * llt.matrixLLT().diagonal().unaryExpr(&natural_logarithm).sum();
   e.log_likelihood =
-      -0.5 * (log_det + L_inv_z.squaredNorm() + static_cast<double>(out_of_reach) * std::log(noise) +
-              rest_ / noise + static_cast<double>(rows_) * std::log(2.0 * std::numbers::pi));
+      -0.5 * (log_det + L_inv_z.squaredNorm() + static_cast<double>(out_of_reach) * natural_logarithm(noise) +
+              rest_ / noise + static_cast<double>(rows_) * kLog2Pi);
   const Eigen::VectorXd used = L_inv_scaled.colwise().squaredNorm();
   e.by_log_prior = 0.5 * (projected.cwiseAbs2() - used);
   // trace(K^-1) s^2 = m - trace(K^-1 R D R^T); z^T K^-2 z from one more solve.

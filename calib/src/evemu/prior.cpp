@@ -5,6 +5,7 @@
 #include <cmath>
 #include <limits>
 
+#include "elementary.hpp"
 #include "message.hpp"
 
 namespace abbe::calib::evemu {
@@ -16,16 +17,17 @@ using Theta5x5 = Eigen::Matrix<double, 5, 5>;
 constexpr Eigen::Index kSd = 0, kRho = 1, kSa = 2, kS = 3, kW = 4;
 
 HyperParameters parameters(const Theta& theta) {
-  return {.s_d_m = std::exp(theta(kSd)),
-          .rho = std::exp(theta(kRho)),
-          .s_a_m = std::exp(theta(kSa)),
-          .s_m = std::exp(theta(kS)),
-          .w_rad = std::exp(theta(kW))};
+  return {.s_d_m = exponential(theta(kSd)),
+          .rho = exponential(theta(kRho)),
+          .s_a_m = exponential(theta(kSa)),
+          .s_m = exponential(theta(kS)),
+          .w_rad = exponential(theta(kW))};
 }
 
 Theta logarithms(const HyperParameters& h) {
   Theta theta;
-  theta << std::log(h.s_d_m), std::log(h.rho), std::log(h.s_a_m), std::log(h.s_m), std::log(h.w_rad);
+  theta << natural_logarithm(h.s_d_m), natural_logarithm(h.rho), natural_logarithm(h.s_a_m),
+      natural_logarithm(h.s_m), natural_logarithm(h.w_rad);
   return theta;
 }
 
@@ -158,7 +160,7 @@ Eigen::VectorXd prior_variances(PriorKind kind, const ScaledDesign& design, std:
     if (f.kind == FunctionKind::Constant) {
       sd_m = kConstantPrior_m;
     } else if (kind == PriorKind::BayesPose) {
-      sd_m = (f.kind == FunctionKind::Rotation ? h.s_a_m : h.s_d_m) * std::pow(h.rho, f.order - 1);
+      sd_m = (f.kind == FunctionKind::Rotation ? h.s_a_m : h.s_d_m) * power(h.rho, f.order - 1);
       if (f.kind == FunctionKind::Translation && f.order == 1) {
         sd_m = std::max(sd_m, kLinearPrior_m);
       }

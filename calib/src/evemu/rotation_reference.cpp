@@ -112,7 +112,8 @@ Turn turn_onto(const Rows& rows, const Eigen::MatrixXd& C_shape, double sigma_m)
 double chi2_of_one_in_1000(double dof) {
   constexpr double kNormal = 3.0902;  // one-sided 99.9 %
   const double s = 2.0 / (9.0 * dof);
-  return dof * std::pow(1.0 - s + kNormal * std::sqrt(s), 3);
+  const double root = 1.0 - s + kNormal * std::sqrt(s);
+  return dof * root * root * root;
 }
 
 /// The covariance of the shape alone: without the rotation set_gauge() put in.

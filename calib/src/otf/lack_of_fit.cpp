@@ -8,6 +8,8 @@
 
 #include "abbe/calib/model_comparison.hpp"
 #include "abbe/calib/rigid_body_model.hpp"
+#include "abbe/calib/root_sum_of_squares.hpp"
+#include "elementary.hpp"
 #include "message.hpp"
 #include "otf/added_columns.hpp"
 #include "otf/alternative_columns.hpp"
@@ -171,7 +173,7 @@ Result<std::optional<Alternative>> best_of(const Fit& fit, const AlternativeColu
                                            const Options& options) {
   const Added* best = nullptr;
   AddedColumns::Estimate best_estimate;
-  const double x = std::log(kCauses * static_cast<double>(family.size()) / kFalseAlarm);
+  const double x = natural_logarithm(kCauses * static_cast<double>(family.size()) / kFalseAlarm);
   const double noise = std::max(1.0, fit.noise.local * fit.noise.local);
   for (const auto& [added, sums] : family) {
     if (Result<void> goes_on = check_stopped(options); !goes_on) {
@@ -201,7 +203,7 @@ Result<std::optional<Alternative>> best_of(const Fit& fit, const AlternativeColu
       .text = columns.text(*best, best_estimate.d),
       .explained = std::clamp(best_estimate.drop / std::max(fit.excess(), best_estimate.drop), 0.0, 1.0),
       .bias_m = fit.norm.rms_m(best_estimate.dU),
-      .u_m = std::hypot(fit.u_white_m, added_u_m) * std::sqrt(factor)};
+      .u_m = root_sum_of_squares(fit.u_white_m, added_u_m) * std::sqrt(factor)};
 }
 
 /// The same observations adjusted with another design.
@@ -224,8 +226,8 @@ Result<std::optional<Alternative>> other_design(const Fit& fit, const Solution& 
   const double drop = fit.chi2 - chi2(other, left);
   const double factor = residual_noise(other, left, other.rows.size() - a->rank).covariance_factor();
   const double more = std::max(1.0, static_cast<double>(a->rank) - static_cast<double>(fit.adjustment.rank));
-  const double bound =
-      std::max(fit.noise.local * fit.noise.local, factor) * chi2_bound(more, std::log(kCauses / kFalseAlarm));
+  const double bound = std::max(fit.noise.local * fit.noise.local, factor) *
+                       chi2_bound(more, natural_logarithm(kCauses / kFalseAlarm));
   constexpr double kClearlyBetter = 0.5;
   if (!(drop > kClearlyBetter * fit.excess() && drop > bound)) {
     return std::nullopt;

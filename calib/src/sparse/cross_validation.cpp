@@ -6,6 +6,7 @@
 #include <numeric>
 #include <utility>
 
+#include "elementary.hpp"
 #include "message.hpp"
 #include "sparse/held_out.hpp"
 #include "sparse/lane_batch.hpp"
@@ -187,9 +188,9 @@ std::vector<double> equally_spaced(double first, double last, int count) {
 }
 
 std::vector<double> log_spaced(double first, double last, int count) {
-  std::vector<double> values = equally_spaced(std::log(first), std::log(last), count);
+  std::vector<double> values = equally_spaced(natural_logarithm(first), natural_logarithm(last), count);
   for (double& v : values) {
-    v = std::exp(v);
+    v = exponential(v);
   }
   return values;
 }

@@ -6,6 +6,7 @@
 #include <limits>
 
 #include "abbe/calib/environment/thermal_expansion.hpp"
+#include "abbe/calib/root_sum_of_squares.hpp"
 
 namespace abbe::daemon {
 namespace {
@@ -118,7 +119,7 @@ std::optional<EnvironmentEffect> effect_of(const protocol::Snapshot& s,
     const auto index =
         s.has_environment ? index_of_air(s.environment, options.air) : Result<calib::RefractiveIndex>{};
     if (!s.has_environment || !index) return std::nullopt;
-    effect.u_scale = std::hypot(options.tracker_u_scale, index->u_n / index->n);
+    effect.u_scale = calib::root_sum_of_squares(options.tracker_u_scale, index->u_n / index->n);
   }
   return effect;
 }
@@ -167,7 +168,7 @@ void correct_for_temperature(protocol::Snapshot& s, const EnvironmentUseOptions&
     const auto position = calib::true_position(s.position[a], thermal.config.fixed_m, scale);
     s.position[a] = position.value_m;
     s.velocity[a] *= calib::growth(scale);
-    s.u_position[a] = std::hypot(s.u_position[a], position.u_m);
+    s.u_position[a] = calib::root_sum_of_squares(s.u_position[a], position.u_m);
   }
 }
 

@@ -72,7 +72,8 @@ void write_machine(const fs::path& toml) {
                                                         .z = {-400, 0},
                                                         .target_offset_mm = {{20, -15, -120}},
                                                         .node_spacing_mm = 50})
-                      << "[tracker]\nsigma_range_um = 2\nsigma_angle_urad = 3\n";
+                      << "[tracker]\nsigma_range_um = 2\nsigma_angle_urad = 3\n"
+                         "[gate]\naccept = [\"path-orientation\"]\n";
 }
 
 /// The true tables as a parameter vector in gauge G1.

@@ -165,6 +165,30 @@ TEST_F(Cli, SaysThatFilesHoldNoTemperaturesOfScales) {
   EXPECT_EQ(command("--scales-corrected").exit, 0);
 }
 
+TEST_F(Cli, WithoutEvidenceOfThePathsOrientationTheGateRefuses) {
+  auto machine = text_of(files_.machine);
+  machine.erase(machine.find(test::kTrackerPlacement));
+  const auto command = [&](const std::string& more) {
+    return abbe(fmt::format("identify otf --machine '{}' --path '{}' --tracker '{}' -o '{}' {}",
+                            write("bare.toml", machine).string(), files_.path.string(),
+                            files_.tracker.string(), (folder_ / "bare").string(), more));
+  };
+  const auto refused = command("");
+  EXPECT_EQ(refused.exit, 5);
+  EXPECT_THAT(refused.out,
+              AllOf(HasSubstr("turned by 180 degrees about X, Y or Z"), HasSubstr("tracker.position_mm")));
+  EXPECT_EQ(command("--accept-path-orientation").exit, 0);
+}
+
+TEST_F(Cli, NamesTheSignsThatAreReversedInThePath) {
+  std::string turned = "x_mm,y_mm,z_mm\n";
+  for (const auto& q : test::synthetic_path_m())
+    turned += fmt::format("{},{},{}\n", -q[0] * 1e3, -q[1] * 1e3, q[2] * 1e3);
+  const auto ran = identify(write("turned.csv", turned), files_.tracker, folder_ / "turned");
+  EXPECT_EQ(ran.exit, 5) << ran.err;
+  EXPECT_THAT(ran.out, AllOf(HasSubstr("180 degrees about Z"), HasSubstr("signs of the other two axes")));
+}
+
 TEST_F(Cli, AnUncertainIndexOfTheAirWidensTheModel) {
   const auto ran = identify(files_.path, files_.tracker, folder_ / "air", "--u-scale-ppm 10");
   ASSERT_EQ(ran.exit, 0) << ran.err;

@@ -81,6 +81,23 @@ TEST(Config, OfAMachineAloneHasNoDevices) {
   EXPECT_FALSE(config->encoder);
 }
 
+TEST(Config, ReadsWhereTheTrackerStandsAndItsVertical) {
+  const auto config = parse_config(
+      kMachine + "[tracker]\nvertical = \"-Y\"\nposition_mm = [2100, 900, -300]\n", "machine.toml");
+  ASSERT_TRUE(config) << config.error().details.front();
+  EXPECT_EQ(config->machine.tracker_vertical, TrackerVertical::MinusY);
+  EXPECT_EQ(config->machine.tracker_position_m, (std::array{2.1, 0.9, -0.3}));
+}
+
+TEST(Config, RefusesAVerticalThatIsNoAxisAndAPlaceOfTwoNumbers) {
+  const auto config =
+      parse_config(kMachine + "[tracker]\nvertical = \"up\"\nposition_mm = [2100, 900]\n", "machine.toml");
+  ASSERT_FALSE(config);
+  EXPECT_THAT(config.error().details,
+              UnorderedElementsAre(HasSubstr("tracker.vertical"),
+                                   AllOf(HasSubstr("tracker.position_mm"), HasSubstr("three numbers"))));
+}
+
 TEST(Config, ReadsDevicesOfTheDaemon) {
   const auto config = parse_config(kMachine + R"(
 [tracker]

@@ -31,7 +31,7 @@ TEST(OtfPath, ThatCanBeIdentifiedIsTaken) {
 
 TEST(OtfInputs, TheGateOfTheConfigurationDecidesHowARunIsJudged) {
   const GateConfig gate{.max_error_m = 2e-3, .max_gradient = 1e-2, .holdout_fraction = 0.1};
-  EXPECT_EQ(otf_options({}, gate).held_out_folds, 10u);
+  EXPECT_EQ(otf_options({}, machine(), gate).held_out_folds, 10u);
   EXPECT_EQ(gate_limits(gate).max_error_m, 2e-3);
   EXPECT_EQ(gate_limits(gate).max_gradient, 1e-2);
   EXPECT_FALSE(gate_limits(gate).accept_smaller_volume);

@@ -53,11 +53,15 @@ struct OtfFiles {
   std::filesystem::path machine, path, tracker;
 };
 
+/// Evidence of the path's orientation.
+inline constexpr const char* kTrackerPlacement =
+    "[tracker]\nvertical = \"+Z\"\nposition_mm = [-900, -700, -200]\n";
+
 inline std::string synthetic_machine_toml() {
   std::string text = "[machine]\nname = \"small mill\"\nchain = \"[w b X Y Z t]\"\n";
   for (const char axis : sim::kAxisLetters)
     text += fmt::format("[axes.{}]\nmin_mm = -60\nmax_mm = 60\n", axis);
-  return text + "[target]\noffset_mm = [20, -15, -120]\n[model]\nnode_spacing_mm = 60\n";
+  return text + "[target]\noffset_mm = [20, -15, -120]\n[model]\nnode_spacing_mm = 60\n" + kTrackerPlacement;
 }
 
 inline std::string synthetic_path_csv() {

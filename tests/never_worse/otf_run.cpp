@@ -162,6 +162,11 @@ void move_tracker(OtfRun& run, double share, double angle_rad, double shift_m) {
   run.moved = [T, share](double time) { return time > share ? T : calib::RigidTransform{}; };
 }
 
+/// Two signs reversed in the file.
+void turn_path(OtfRun& run, const Vector3& signs) {
+  for (Vector3& q : run.path_m) q = signs.cwiseProduct(q);
+}
+
 void displace_vertex(OtfRun& run, double by_m) {
   const std::size_t i = 3 + run.random() % (run.path_m.size() - 6);
   Vector3 by = by_m * direction(run.random);
@@ -200,6 +205,8 @@ OtfRun random_otf_run(std::uint64_t seed) {
   run.T_machine_tracker.R = (Eigen::AngleAxisd(uniform(random, -M_PI, M_PI), Vector3::UnitZ()) *
                              Eigen::AngleAxisd(uniform(random, -0.1, 0.1), Vector3::UnitX()))
                                 .toRotationMatrix();
+  run.evidence.up = Vector3::UnitZ();
+  run.evidence.tracker_m = run.T_machine_tracker.t_m + 0.15 * direction(random);
   // Within their stated uncertainties.
   run.noise.u_scale = 0.45e-6;  // 0.3 ppm of the instrument, 0.33 ppm of the air
   run.range_scale = 1.0 + 0.45e-6 * normal(random);
@@ -213,7 +220,7 @@ OtfRun random_otf_run(std::uint64_t seed) {
 std::vector<Fault> otf_faults() {
   const std::vector<std::string> moved{"moved"}, vertex{"vertex"}, chain{"order"}, nodes{"nodes"},
       drift{"drift", "moved"}, backlash{"backlash"}, noise{"correlated", "half of it"},
-      align{"alignment", "path", "travel", "adjustment"};
+      align{"alignment", "path", "travel", "adjustment"}, turned{"orientation", "travel"};
   return {
       {"none", [](OtfRun&) {}, {}},
       {"tracker turned by 200 urad at half", [](OtfRun& r) { move_tracker(r, 0.5, 200e-6, 0.0); }, moved},
@@ -268,6 +275,9 @@ std::vector<Fault> otf_faults() {
          make_machine(r, kNode_m);
        },
        align},
+      {"path turned by 180 degrees about X", [](OtfRun& r) { turn_path(r, Vector3(1, -1, -1)); }, turned},
+      {"path turned by 180 degrees about Y", [](OtfRun& r) { turn_path(r, Vector3(-1, 1, -1)); }, turned},
+      {"path turned by 180 degrees about Z", [](OtfRun& r) { turn_path(r, Vector3(-1, -1, 1)); }, turned},
       {"two vertices swapped", [](OtfRun& r) { std::swap(r.path_m[10], r.path_m[13]); }, align},
       {"travel entered a fifth too small",
        [](OtfRun& r) {
@@ -296,6 +306,7 @@ Outcome identify_and_compare(OtfRun run) {
   }
   calib::otf::Options options;
   options.block_samples = calib::otf::suitable_block_samples(samples);
+  options.orientation = run.evidence;
   const auto found = calib::otf::identify(samples, run.machine, path, run.noise, options);
   if (!found) {
     return refused(found.error().text);

@@ -35,6 +35,7 @@ struct OtfRun {
   calib::otf::Machine machine;
   std::vector<Vector3> path_m;
   calib::otf::Noise noise;
+  calib::otf::OrientationEvidence evidence;
   std::mt19937_64 random;
 };
 

@@ -89,6 +89,7 @@ inline MadeRun make_run(const MadeRunOptions& wanted) {
   run.machine = coarse_machine(wanted.chain);
   run.path = case_a_path();
   run.options.block_samples = 10;  // 16 mm
+  run.options.orientation.scales_agree = true;
   const calib::ParameterLayout layout = layout_of(run.machine);
   run.truth = random_tables(layout, wanted.error_scale_m, random);
   run.T_machine_tracker = case_a_alignment(true);

@@ -7,6 +7,7 @@
 #include <iterator>
 
 #include "abbe/calib/model_comparison.hpp"
+#include "abbe/calib/otf/orientation.hpp"
 #include "message.hpp"
 #include "otf/check_stopped.hpp"
 
@@ -309,6 +310,7 @@ Result<Verdict> judge(const Observations& o, const Solution& solution, const Vol
   Verdict verdict = decide(solution.model, *figures, limits, active);
   add_alternatives(verdict, *others);
   require_plausible_growth(verdict, common_growth(solution.model), limits.max_growth);
+  require_orientation(verdict, {o.vertices_m}, o.layout.nodes(), o.alignment.T_machine_tracker, options.orientation);
   require_certainty(verdict, correction_size(solution.model));
   note_what_u_leaves_out(verdict, o);
   verdict.accepted = verdict.reasons.empty();

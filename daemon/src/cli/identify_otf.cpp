@@ -35,7 +35,7 @@ struct IdentifyOtfArguments {
   std::string estimator = "two-step";
   std::size_t block_samples = 0;      // 0: by travel
   std::optional<double> u_scale_ppm;  // else that of [tracker]
-  bool scales_corrected = false;
+  bool scales_corrected = false, accept_path_orientation = false;
   bool json = false;
 };
 
@@ -107,7 +107,8 @@ Result<OtfOutcome> from_files(const IdentifyOtfArguments& arguments,
     return tl::make_unexpected(fine.error());
   const auto machine = otf_machine(files->config.machine);
   if (!machine) return tl::make_unexpected(machine.error());
-  otf::Options options = otf_options(files->tracker.points, files->config.gate);
+  otf::Options options = otf_options(files->tracker.points, files->config.machine, files->config.gate);
+  if (arguments.accept_path_orientation) options.orientation.accepted = true;
   if (arguments.block_samples > 0) options.block_samples = arguments.block_samples;
   options.progress = [&](otf::Stage stage, double fraction) { bar.show(words(stage), fraction); };
   otf::Noise noise = otf_noise(files->config.machine);
@@ -248,7 +249,11 @@ void add_identify_otf(CLI::App& parent, int& exit) {
                        "0.2 K and 30 Pa; default: that of [tracker], else 0")
           ->check(CLI::NonNegativeNumber);
   auto* corrected = add_scales_corrected(*command, arguments->scales_corrected);
-  recording->excludes(u_scale)->excludes(corrected);
+  auto* orientation = command->add_flag("--accept-path-orientation", arguments->accept_path_orientation,
+                                        "judge the model although nothing excludes that the path is turned "
+                                        "by 180 degrees (two signs\nreversed); "
+                                        "as [gate] accept = [\"path-orientation\"]");
+  recording->excludes(u_scale)->excludes(corrected)->excludes(orientation);
   path->needs(machine, tracker);
   tracker->needs(path);
   recording->excludes(path)->excludes(tracker);

@@ -17,6 +17,24 @@ void read_noise(Section& tracker, MachineConfig& machine) {
   tracker.get("sigma_angle_urad", machine.sigma_angle_rad, kMicro, kPositive);
 }
 
+void read_placement(Section& tracker, MachineConfig& machine) {
+  TrackerVertical vertical = TrackerVertical::PlusZ;
+  if (tracker.get_word<TrackerVertical>("vertical", vertical,
+                                        {{"+X", TrackerVertical::PlusX},
+                                         {"-X", TrackerVertical::MinusX},
+                                         {"+Y", TrackerVertical::PlusY},
+                                         {"-Y", TrackerVertical::MinusY},
+                                         {"+Z", TrackerVertical::PlusZ},
+                                         {"-Z", TrackerVertical::MinusZ}}))
+    machine.tracker_vertical = vertical;
+  std::vector<double> position_m;
+  if (!tracker.get("position_mm", position_m, kMilli)) return;
+  if (position_m.size() == 3)
+    machine.tracker_position_m = {position_m[0], position_m[1], position_m[2]};
+  else
+    tracker.fault("position_mm", "must be three numbers, x, y, z in machine coordinates");
+}
+
 /// emScon measures every whole number of milliseconds: a rate in between would silently become another.
 void read_point_rate(Section& tracker, TrackerConfig& out) {
   constexpr double kRounded = 5e-3;  // 333 stands for 333.3
@@ -170,6 +188,7 @@ void read_nodes(Section& encoder, const MachineConfig& machine, EncoderConfig& o
 void read_tracker(Section& root, Config& out) {
   Section tracker = root.child("tracker");
   read_noise(tracker, out.machine);
+  read_placement(tracker, out.machine);
   TrackerConfig config;
   const bool has_host = tracker.get("host", config.host);
   get_bounded(tracker, "name", config.name, bound_of<v1::TrackerPoint>("device"));

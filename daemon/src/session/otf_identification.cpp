@@ -35,7 +35,8 @@ Result<OtfCandidate> identify_run(const OtfRun& run, const MachineConfig& machin
   const auto machine = otf_machine(machine_config);
   if (!machine) return tl::unexpected(machine.error());
   const auto points = otf_observations(run.points);
-  calib::otf::Options options = otf_options(points, gate);
+  calib::otf::Options options = otf_options(points, machine_config, gate);
+  options.orientation.scales_agree = true;  // without them no run begins, and they are compared at the vertices
   if (watch.progress) {
     options.progress = [&watch](calib::otf::Stage stage, double fraction) {
       watch.progress(overall(stage, fraction));

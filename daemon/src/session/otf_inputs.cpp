@@ -8,9 +8,26 @@
 #include <string>
 
 #include "abbe/calib/otf/blocks.hpp"
+#include "abbe/calib/otf/orientation.hpp"
 #include "abbe/calib/otf/polyline.hpp"
 
 namespace abbe::daemon {
+namespace {
+
+calib::Vector3 direction_of(TrackerVertical vertical) {
+  const auto number = static_cast<int>(vertical);
+  return (number % 2 == 0 ? 1.0 : -1.0) * calib::Vector3::Unit(number / 2);
+}
+
+calib::otf::OrientationEvidence orientation_evidence(const MachineConfig& machine, const GateConfig& gate) {
+  calib::otf::OrientationEvidence evidence;
+  if (machine.tracker_vertical) evidence.up = direction_of(*machine.tracker_vertical);
+  if (const auto& p = machine.tracker_position_m) evidence.tracker_m = calib::Vector3(p->data());
+  evidence.accepted = gate.accepts(calib::otf::kPathOrientation);
+  return evidence;
+}
+
+}  // namespace
 
 Result<calib::otf::Machine> otf_machine(const MachineConfig& machine) {
   auto chain = calib::KinematicChain::parse(machine.chain);
@@ -63,10 +80,11 @@ std::vector<calib::otf::TrackerObservation> otf_observations(std::span<const Run
 }
 
 calib::otf::Options otf_options(std::span<const calib::otf::TrackerObservation> points,
-                                const GateConfig& gate) {
+                                const MachineConfig& machine, const GateConfig& gate) {
   calib::otf::Options options;
   options.block_samples = calib::otf::suitable_block_samples(points);
   options.held_out_folds = static_cast<std::size_t>(std::lround(1.0 / gate.holdout_fraction));
+  options.orientation = orientation_evidence(machine, gate);
   return options;
 }
 

@@ -104,7 +104,7 @@ void print_on_the_fly_from_samples() {
     samples.push_back({static_cast<double>(samples.size()) / 250.0,
                        p - Vector3(2.0, 1.0, -1.2) + 6e-6 * Vector3(noise.data()), true});
   }
-  const otf::Options options{.block_samples = 10};
+  const otf::Options options{.block_samples = 10, .orientation = {.scales_agree = true}};
   const auto run = otf::identify(samples, machine, path, {}, options);
   print_model("on-the-fly, samples", must(run, "identify").solution.model);
   const auto verdict = otf::judge(run->observations, run->solution, nullptr, {}, options);

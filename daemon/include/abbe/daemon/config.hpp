@@ -42,6 +42,9 @@ enum class BasisConfig { Linear };
 
 /// [machine], [axes.*], [target], [model], and the noise figures of [tracker]: what identification needs to
 /// know.
+/// Direction of a machine axis along which the vertical axis of a levelled tracker points.
+enum class TrackerVertical { PlusX, MinusX, PlusY, MinusY, PlusZ, MinusZ };
+
 struct MachineConfig {
   std::string name;
   std::string chain;             ///< ISO 10791-6 style, "[w X' b Y Z (C1) t]"
@@ -53,6 +56,8 @@ struct MachineConfig {
       nodes_m;                    ///< of every linear axis, ascending, both ends of travel included
   double sigma_range_m = 2e-6;    ///< standard deviation of one tracker range
   double sigma_angle_rad = 3e-6;  ///< standard deviation of one tracker direction, perpendicular to the beam
+  std::optional<TrackerVertical> tracker_vertical;          ///< none: the tracker is not levelled
+  std::optional<std::array<double, 3>> tracker_position_m;  ///< machine coordinates, to 0.5 m
   [[nodiscard]] const AxisConfig* find_axis(std::string_view name) const noexcept;
   friend bool operator==(const MachineConfig&, const MachineConfig&) = default;
 };
@@ -299,7 +304,7 @@ struct GateConfig {
   double holdout_fraction = 0.2;
   /// What this shop takes as it is, by name: "evemu-shape-only", a ball array's model whose rotation about
   /// Ball1 nobody has referenced; "smaller-volume", a model in place of one that holds in more of the
-  /// machine.
+  /// machine; "path-orientation", a path file that may be turned by 180 degrees (calib/otf/orientation).
   std::vector<std::string> accept;
 
   [[nodiscard]] bool accepts(std::string_view name) const;

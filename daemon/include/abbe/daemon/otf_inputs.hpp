@@ -21,9 +21,10 @@ namespace abbe::daemon {
 [[nodiscard]] Result<void> check_otf_path(std::span<const AxisPosition> path_m, const MachineConfig& machine);
 /// Time is the tracker's own clock from the first point on.
 [[nodiscard]] std::vector<calib::otf::TrackerObservation> otf_observations(std::span<const RunPoint> points);
-/// How these points are fitted and judged under [gate]: the same for the daemon, a replay and files.
+/// How these points are fitted and judged under [gate]: the same for the daemon, a replay and files. Of the
+/// evidence of the path's orientation what is configured; whether scales agreed is the caller's to add.
 [[nodiscard]] calib::otf::Options otf_options(std::span<const calib::otf::TrackerObservation> points,
-                                              const GateConfig& gate);
+                                              const MachineConfig& machine, const GateConfig& gate);
 [[nodiscard]] calib::GateLimits gate_limits(const GateConfig& gate);
 
 /// An error of the mathematics in the daemon's words and exit codes.

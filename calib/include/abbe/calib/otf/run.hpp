@@ -8,6 +8,7 @@
 #include <array>
 #include <cstddef>
 #include <functional>
+#include <optional>
 #include <span>
 #include <string_view>
 #include <vector>
@@ -47,6 +48,14 @@ struct Noise {
   /// Relative standard uncertainty of the length of the scales of X, Y, Z (their temperature and expansion),
   /// in common for all readings of an axis. No residual shows it either: it is a positioning error.
   std::array<double, 3> u_axis_scale{};
+};
+
+/// What besides ranges and path decides how the path lies in the machine; see orientation.hpp.
+struct OrientationEvidence {
+  bool scales_agree = false;    ///< they were read along the path and agreed with it
+  std::optional<Vector3> up{};  ///< unit vector, machine axes: where the z axis of a levelled tracker points
+  std::optional<Vector3> tracker_m{};  ///< its place, machine coordinates, to 0.5 m
+  bool accepted = false;               ///< without evidence, by name
 };
 
 enum class Stage { Observe, Align, Solve, Judge };
@@ -91,6 +100,7 @@ struct Options {
   double gauge_weight = 1.0;
   /// Weighted observations for the held-out comparison are split by leg into this many parts.
   std::size_t held_out_folds = 5;
+  OrientationEvidence orientation;
   Progress progress;  ///< may be empty
   Stopped stopped;    ///< may be empty: never
 };

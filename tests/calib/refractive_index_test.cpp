@@ -51,6 +51,53 @@ TEST(RefractiveIndex, AgreesWithTheDryAirOfThePaper) {
   EXPECT_NEAR((index_of(air(30, 100'000, 0), IndexEquation::Ciddor) - 1.0) * 1e8, 25937.2, 0.06);
 }
 
+struct Co2Row {
+  double t_C, p_Pa, rh_percent, co2_ppm, n;
+};
+
+// 633 nm; computed with M. Polyanskiy's program of [Ciddor 1996] (refractiveindex.info), of another vapour
+// pressure.
+constexpr Co2Row kCo2Table[]{{20, 101325, 50, 0, 1.0002713082},   {20, 101325, 50, 400, 1.0002713656},
+                             {20, 101325, 0, 1000, 1.0002718797}, {20, 101325, 50, 1000, 1.0002714516},
+                             {25, 98000, 40, 1000, 1.0002580765}, {18, 101325, 50, 2000, 1.0002735170}};
+
+class Co2Table : public testing::TestWithParam<Co2Row> {};
+
+TEST_P(Co2Table, IsReproducedByBothGreatEquations) {
+  Air a = air(GetParam().t_C, GetParam().p_Pa, GetParam().rh_percent);
+  a.co2_ppm = GetParam().co2_ppm;
+  EXPECT_NEAR(index_of(a, IndexEquation::Ciddor), GetParam().n, 1e-9);
+  EXPECT_NEAR(index_of(a, IndexEquation::Edlen), GetParam().n, 5e-9);  // the equations agree to 4e-9
+}
+
+INSTANTIATE_TEST_SUITE_P(RefractiveIndex, Co2Table, testing::ValuesIn(kCo2Table));
+
+// 1 ppm of CO2 is 0.534e-6 of n - 1 = 2.7e-4 [Ciddor 1996], [Bonsch & Potulski 1998]: 1.45e-10.
+TEST(RefractiveIndex, StatesTheUncertaintyOfCo2ForEveryEquation) {
+  Air a = air(20, 101'325, 50);
+  a.u_co2_ppm = 200.0;
+  for (const auto equation : {IndexEquation::Ciddor, IndexEquation::Edlen, IndexEquation::ShopFloor}) {
+    const double expected = std::hypot(u_of_equation(equation), 200.0 * 1.45e-10);
+    EXPECT_NEAR(refractive_index(a, kHeliumNeon_m, equation)->u_n, expected, 0.01 * expected);
+  }
+}
+
+TEST(RefractiveIndex, CountsTheCo2ThatAFormulaLeavesOut) {
+  Air a = air(20, 101'325, 50);
+  a.co2_ppm = 1000.0;
+  const auto u_n = [&a](IndexEquation e) { return refractive_index(a, kHeliumNeon_m, e)->u_n; };
+  EXPECT_NEAR(u_n(IndexEquation::ShopFloor), std::hypot(1.5e-7, 7.9e-8), 2e-9);
+  EXPECT_DOUBLE_EQ(u_n(IndexEquation::Edlen), u_of_equation(IndexEquation::Edlen));
+}
+
+// Root mean square of n - n(20 C, 1013.25 hPa, 50 %) over the shop floor's box, by quadrature with the
+// program of Co2Table: 1.0443e-5. n is not linear over 15 K: 1 %.
+TEST(AssumedAir, IsUncertainByWhatAShopFloorCanBe) {
+  const double u = u_of_assumed_air(air(20, 101'325, 50), kHeliumNeon_m, IndexEquation::Ciddor).value();
+  EXPECT_NEAR(u / 1.0443e-5, 1.0, 0.015);
+  EXPECT_FALSE(u_of_assumed_air(air(-5, 101'325, 50), kHeliumNeon_m, IndexEquation::Ciddor));
+}
+
 TEST(RefractiveIndex, IsThatOfTheVapourPressureOfWater) {
   EXPECT_NEAR(saturation_vapour_pressure_Pa(293.15), 2339.21, 0.01);
 }
@@ -77,6 +124,7 @@ TEST(RefractiveIndex, StatesTheScatterThatUncertainAirCauses) {
   a.u_temperature_K = 0.2;
   a.u_pressure_Pa = 30.0;
   a.u_relative_humidity = 0.03;
+  a.u_co2_ppm = 100.0;
   const auto stated = refractive_index(a, kHeliumNeon_m, IndexEquation::Ciddor).value();
   std::mt19937 random{1};
   std::normal_distribution<double> unit;
@@ -87,6 +135,7 @@ TEST(RefractiveIndex, StatesTheScatterThatUncertainAirCauses) {
     drawn.temperature_K += a.u_temperature_K * unit(random);
     drawn.pressure_Pa += a.u_pressure_Pa * unit(random);
     drawn.relative_humidity += a.u_relative_humidity * unit(random);
+    drawn.co2_ppm += a.u_co2_ppm * unit(random);
     const double d = index_of(drawn, IndexEquation::Ciddor) - stated.n;
     sum2 += d * d;
   }

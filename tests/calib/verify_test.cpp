@@ -129,6 +129,50 @@ TEST(Verification, SaysWhatInterpolationCosts) {
   EXPECT_GT(c.interpolation_rms_m, 1e-6);
 }
 
+VolumetricModel scaled_tables(double factor) {
+  const auto nodes = *equidistant_nodes(0.0, 0.4, 0.05);
+  const auto layout = *ParameterLayout::observable_with_one_target(*KinematicChain::parse("[w b Z X Y t]"),
+                                                                   {nodes, nodes, nodes});
+  const auto n = static_cast<Eigen::Index>(layout.model_size());
+  Eigen::VectorXd U(n);
+  for (Eigen::Index i = 0; i < n; ++i) U(i) = factor * 50e-6 * std::sin(2.0 * static_cast<double>(i));
+  const auto hull = box_of({0, 0, 0}, {0.4, 0.4, 0.4}, {2, 2, 2});
+  const std::vector<Vector3> tools{Vector3::Zero()};
+  return *VolumetricModel::from_vector(layout, Gauge::G1, tools, U, Eigen::MatrixXd::Zero(n, n),
+                                       *ValidityVolume::hull_of(hull));
+}
+
+// Nodes every 50 mm, points every 200 mm: between them the tables bend by tens of um, a good model leaves 0.1
+// um.
+TEST(Verification, GivesNoRatioWhereInterpolationCostsMoreThanIsLeft) {
+  std::mt19937 random(3);
+  std::normal_distribution<double> normal(0.0, 0.05e-6);
+  const auto model = scaled_tables(1.0);
+  const Field truth = [&](const Vector3& q) -> Vector3 {
+    return model.V_at(q, Vector3::Zero()) + Vector3(normal(random), normal(random), normal(random));
+  };
+  const auto c = verified(truth, model, box_of({0, 0, 0}, {0.4, 0.4, 0.4}, {3, 3, 3}), Frame::BestFit);
+  EXPECT_GT(c.R_turned.above_1, 0u);  // what frightened
+  EXPECT_FALSE(ratios_hold(c));
+  EXPECT_EQ(effect_at_points(c), Effect::Better);
+}
+
+TEST(Verification, SeesThatAModelOfTheWrongSignIsWorse) {
+  const auto c = verified(field_of(scaled_tables(-1.0)), scaled_tables(1.0),
+                          box_of({0, 0, 0}, {0.4, 0.4, 0.4}, {9, 9, 9}), Frame::BestFit);
+  EXPECT_EQ(effect_at_points(c), Effect::Worse);
+  EXPECT_TRUE(ratios_hold(c));  // the points are at the nodes
+}
+
+TEST(Verification, SeesNoEffectInNoise) {
+  std::mt19937 random(5);
+  std::normal_distribution<double> normal(0.0, 20e-6);
+  const Field noise = [&](const Vector3&) { return Vector3(normal(random), normal(random), normal(random)); };
+  const auto c =
+      verified(noise, scaled_tables(1e-4), box_of({0, 0, 0}, {0.4, 0.4, 0.4}, {5, 5, 5}), Frame::BestFit);
+  EXPECT_EQ(effect_at_points(c), Effect::NotSeen);
+}
+
 TEST(Verification, SeesTheRotationOnlyInTheMachinesAxes) {
   const auto model = reference_model("true");
   const Vector3 omega(2e-4, -3e-4, 5e-4), ball1(-0.09, 0.14, 0.03);

@@ -1,6 +1,6 @@
 #include "abbe/daemon/calibration_session.hpp"
 
-#include <gtest/gtest.h>
+#include <gmock/gmock.h>
 
 #include <cmath>
 #include <optional>
@@ -208,6 +208,23 @@ TEST(CalibrationSession, TheRunKnowsWhatTheControllersAirLeaves) {
   ASSERT_TRUE(acquired);
   const CalibrationRun taken = run_of(std::move(*acquired));
   EXPECT_NEAR(std::get<OtfRun>(taken).u_scale, TrackerConfig::kControllersAir, 1e-18);
+}
+
+TEST(CalibrationSession, TheRunNamesAirThatNobodyMeasured) {
+  Config config;
+  config.tracker.emplace().weather = WeatherConfig::None;
+  AcquisitionOptions options;
+  options.environment = environment_use(config);
+  CalibrationSession session{options};
+  ASSERT_TRUE(session.start({OtfRequest{kPath}, HostTime{10s}}));
+  Drive drive{session};
+  drive.stand(kPath[0], 1s);
+  for (std::size_t i = 1; i < kPath.size(); ++i) drive.move(kPath[i]);
+  drive.stand(kPath.back(), 2s);
+  auto acquired = session.take_run();
+  ASSERT_TRUE(acquired);
+  const CalibrationRun taken = run_of(std::move(*acquired));
+  EXPECT_THAT(std::get<OtfRun>(taken).unmeasured_air.value_or(""), testing::HasSubstr("air not measured"));
 }
 
 TEST(CalibrationSession, ASlowTrackerStandsLongEnoughForTwentyPoints) {

@@ -198,6 +198,21 @@ TEST_F(Cli, AnUncertainIndexOfTheAirWidensTheModel) {
   EXPECT_GT(wide->model.covariance().trace(), 1.01 * plain->model.covariance().trace());
 }
 
+/// `identify otf` with another machine.toml.
+std::string with_machine(const test::OtfFiles& files, const fs::path& machine, const fs::path& path,
+                         const fs::path& out) {
+  return fmt::format("identify otf --machine '{}' --path '{}' --tracker '{}' -o '{}'", machine.string(),
+                     path.string(), files.tracker.string(), out.string());
+}
+
+TEST_F(Cli, TheVerdictNamesAirThatNobodyMeasured) {
+  const auto machine =
+      write("no_air.toml", test::synthetic_machine_toml() +
+                               "[tracker]\nhost = \"t\"\nweather = \"none\"\nu_scale_ppm = 1\n");
+  const auto ran = abbe(with_machine(files_, machine, files_.path, folder_ / "no_air"));
+  EXPECT_THAT(ran.out, AllOf(HasSubstr("air not measured"), HasSubstr("20 C, 1013.25 hPa, 50 %"))) << ran.err;
+}
+
 TEST_F(Cli, ComparesTwoModels) {
   const auto model = (folder_ / "out/model.json").string();
   const auto same = abbe(fmt::format("model compare '{0}' '{0}' --json", model));

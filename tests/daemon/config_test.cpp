@@ -7,6 +7,7 @@
 #include <string>
 
 #include "abbe/daemon/device_options.hpp"
+#include "abbe/daemon/unmeasured_air.hpp"
 #include "config_fixture.hpp"
 
 namespace abbe::daemon {
@@ -161,9 +162,31 @@ TEST(Config, TheControllersAirIsUncertainIfItCorrectsForIt) {
     return parse_config(kMachine + "[tracker]\nhost = \"t\"\n" + more, "abbed.toml")->tracker->u_scale;
   };
   EXPECT_DOUBLE_EQ(u_scale(""), 0.2e-6);
-  EXPECT_EQ(u_scale("weather = \"read\"\n"), 0.0);
+  EXPECT_EQ(u_scale("weather = \"read\"\n[air]\nassumed_index = 1.00027\n"), 0.0);
   EXPECT_DOUBLE_EQ(u_scale("weather = \"none\"\nu_scale_ppm = 1\n"), 1e-6);
   EXPECT_EQ(u_scale("u_scale_ppm = 0\n"), 0.0);
+}
+
+// 1.044e-5 by quadrature over 15 to 30 C, 950 to 1050 hPa, 10 to 90 %: see
+// tests/calib/refractive_index_test.cpp.
+TEST(Config, AirNobodyCorrectsForIsUncertainAsThatOfAShopFloor) {
+  for (const char* weather : {"none", "read"}) {
+    const auto config =
+        parse_config(kMachine + "[tracker]\nhost = \"t\"\nweather = \"" + weather + "\"\n", "abbed.toml");
+    ASSERT_TRUE(config);
+    EXPECT_NEAR(config->tracker->u_scale, 1.044e-5, 2e-7);
+    EXPECT_THAT(unmeasured_air_text(*config, config->tracker->u_scale).value_or(""), HasSubstr(weather));
+  }
+}
+
+TEST(Config, TheControllerIsSetToTheAirThatIsStated) {
+  const auto config = parse_config(kMachine + "[tracker]\nhost = \"t\"\nweather = \"none\"\n", "abbed.toml");
+  ASSERT_TRUE(config);
+  const auto set = device_options(*config->tracker, 1.0).session.environment;
+  EXPECT_NEAR(set.temperature, 20.0, 1e-9);
+  EXPECT_NEAR(set.pressure, 1013.25, 1e-9);
+  EXPECT_NEAR(set.humidity, 50.0, 1e-9);
+  EXPECT_THAT(unmeasured_air_text(*config, 0.0).value_or(""), HasSubstr("20 C, 1013.25 hPa, 50 %"));
 }
 
 TEST(Config, TakesARateOfZeroForWheneverSomethingNewCame) {

@@ -181,6 +181,16 @@ TEST(ThermalConfiguration, RefusesATemperatureNobodyMeasures) {
       HasSubstr("no [[environment]] measures it"));
 }
 
+TEST(AirConfiguration, TakesTheUncertaintyOfCo2) {
+  EXPECT_DOUBLE_EQ(config_of("[air]\nu_co2_ppm = 50\n").air.u_co2_ppm, 50.0);
+  EXPECT_THAT(faults_of("[air]\nu_co2_ppm = -1\n"), HasSubstr("air.u_co2_ppm"));
+}
+
+TEST(AirConfiguration, RefusesToCorrectForAirThatNobodyMeasures) {
+  EXPECT_THAT(faults_of("[tracker]\nhost = \"t\"\nweather = \"none\"\n[air]\nassumed_index = 1.00027\n"),
+              HasSubstr("an [[environment]] must measure"));
+}
+
 TEST(AirConfiguration, RefusesToCorrectDistancesTwice) {
   EXPECT_THAT(faults_of("[tracker]\nhost = \"t\"\n[air]\nassumed_index = 1.00027\n"),
               HasSubstr("the controller computes the index already"));

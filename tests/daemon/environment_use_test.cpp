@@ -89,6 +89,17 @@ TEST(EnvironmentMerge, NeverFallsBackToTheTrackerForWhatADeviceIsToMeasure) {
   EXPECT_TRUE(std::isnan(e->air_temperature_K));
 }
 
+TEST(EnvironmentMerge, IsWithoutAirThatATrackerAssumes) {
+  EnvironmentMerge merge{{}, kLag};
+  Batch b;
+  b.environment = {weather(kStart, 293.15)};
+  b.environment[0].measured = 0;
+  merge.take(b);
+  EXPECT_FALSE(merge.at(kStart + 1s));
+  merge.take(measured({scale_at(kStart, 293.0)}));
+  EXPECT_TRUE(std::isnan(merge.at(kStart + 1s)->air_temperature_K));
+}
+
 TEST(EnvironmentMerge, MergesTheTemperaturesOfSeveralDevices) {
   EnvironmentMerge merge{{}, kLag};
   auto other = weather(kStart, 0.0);

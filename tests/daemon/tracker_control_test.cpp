@@ -160,6 +160,14 @@ class TrackerControl : public ::testing::Test {
   std::unique_ptr<Abbed> abbed_;
 };
 
+TEST_F(TrackerControl, AirThatTheControllerWasSetToIsNotShownAsMeasured) {
+  ASSERT_NO_FATAL_FAILURE(start_measuring(kPatient + "weather = \"none\"\n"));
+  const auto status = ask({{"do", "status"}});
+  ASSERT_TRUE(status);
+  EXPECT_FALSE(status->contains("environment")) << (*status)["environment"];
+  EXPECT_THAT(status->value("unmeasured_air", ""), testing::HasSubstr("20 C, 1013.25 hPa, 50 %"));
+}
+
 TEST_F(TrackerControl, AnOrderIsCarriedOutAndTheMeasurementGoesOn) {
   ASSERT_NO_FATAL_FAILURE(start_measuring());
   EXPECT_EQ(carried_out({{"do", "tracker"}, {"order", "initialize"}})["text"], "the tracker is initialised");

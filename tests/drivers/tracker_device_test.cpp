@@ -94,6 +94,19 @@ TEST_F(TrackerDeviceTest, TellsTheWeather) {
   EXPECT_NEAR(samples[0].relative_humidity, 0.5, 1e-6);
 }
 
+TEST_F(TrackerDeviceTest, MarksAirThatTheControllerWasSetToAsNotMeasured) {
+  auto assuming = options();
+  assuming.session.weather = emscon::WeatherMonitor::None;
+  assuming.session.environment = {.temperature = 18.0, .pressure = 980.0, .humidity = 30.0};
+  device_ = TrackerDevice::create(assuming, time_).value();
+  ASSERT_TRUE(run_until_state("streaming"));
+  run(1s);
+  std::array<protocol::EnvironmentSample, 4> samples{};
+  ASSERT_GE(device_->environment().pop(samples), 1u);
+  EXPECT_EQ(samples[0].measured, 0);
+  EXPECT_NEAR(samples[0].air_temperature_K, 291.15, 1e-9);
+}
+
 TEST_F(TrackerDeviceTest, ComesBackAfterALostBeamOnTheSameConnection) {
   make_device();
   ASSERT_TRUE(run_until_state("streaming"));

@@ -147,6 +147,7 @@ host = "127.0.0.1"
 port = PORT_OF(tracker_port)
 point_rate_hz = 500
 weather = "none"
+u_scale_ppm = 0
 [[environment]]
 name = "air"
 map = "comet-t7510"

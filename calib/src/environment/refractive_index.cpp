@@ -2,6 +2,7 @@
 
 #include <array>
 #include <cmath>
+#include <numbers>
 #include <utility>
 
 #include "abbe/calib/root_sum_of_squares.hpp"
@@ -11,7 +12,8 @@ namespace abbe::calib {
 namespace {
 
 constexpr double kZeroCelsius_K = 273.15;
-constexpr double kGasConstant = 8.314472;  // J/(mol K), CODATA 2002: that of the equation's tables
+constexpr double kGasConstant = 8.314472;   // J/(mol K), CODATA 2002: that of the equation's tables
+constexpr double kStandardCo2_ppm = 450.0;  // of all three equations
 
 double per_square_um(double wavelength_m) {
   const double um = wavelength_m * 1e6;
@@ -20,6 +22,11 @@ double per_square_um(double wavelength_m) {
 
 double vapour_pressure_Pa(const Air& air) {
   return air.relative_humidity * saturation_vapour_pressure_Pa(air.temperature_K);
+}
+
+/// Of n - 1 of dry air [Ciddor 1996] eq. (2).
+double co2_factor(const Air& air) {
+  return 1.0 + kCo2PerPpm * (air.co2_ppm - kStandardCo2_ppm);
 }
 
 /// Compressibility of moist air [Ciddor 1996] eq. (12).
@@ -43,7 +50,7 @@ double ciddor(const Air& air, double wavelength_m) {
 
   const double r_as = 1e-8 * (5792105.0 / (238.0185 - S) + 167917.0 / (57.362 - S));
   const double r_vs = 1.022e-8 * (295.235 + 2.6422 * S - 0.03238 * S * S + 0.004028 * S * S * S);
-  const double r_axs = r_as * (1.0 + 5.34e-7 * (air.co2_ppm - 450.0));
+  const double r_axs = r_as * co2_factor(air);
   const double M_a = 0.0289635 + 1.2011e-8 * (air.co2_ppm - 400.0);  // kg/mol, dry air
   constexpr double kMolarVapour = 0.018015;                          // kg/mol
   constexpr double kStandardCompressibility = 0.9995922115;          // dry air, 15 C, 101325 Pa
@@ -56,14 +63,14 @@ double ciddor(const Air& air, double wavelength_m) {
   return 1.0 + rho_a / rho_axs * r_axs + rho_v / kVapourDensity * r_vs;
 }
 
-/// [Birch & Downs 1993, 1994]
+/// [Birch & Downs 1993, 1994] for 450 ppm; the CO2 factor is that of [Ciddor 1996].
 double edlen(const Air& air, double wavelength_m) {
   const double S = per_square_um(wavelength_m);
   const double t = air.temperature_K - kZeroCelsius_K;
   const double p = air.pressure_Pa;
   const double n_s_minus_1 = 1e-8 * (8342.54 + 2406147.0 / (130.0 - S) + 15998.0 / (38.9 - S));
   const double X = (1.0 + 1e-8 * (0.601 - 0.00972 * t) * p) / (1.0 + 0.003661 * t);
-  return 1.0 + p * n_s_minus_1 * X / 96095.43 -
+  return 1.0 + co2_factor(air) * p * n_s_minus_1 * X / 96095.43 -
          1e-10 * (292.75 / (t + kZeroCelsius_K)) * (3.7345 - 0.0401 * S) * vapour_pressure_Pa(air);
 }
 
@@ -95,6 +102,19 @@ double share(Air air, double Air::*quantity, double u, double wavelength_m, Inde
   air.*quantity = value - u;
   return 0.5 * (up - index_of(air, wavelength_m, equation));
 }
+
+/// The shop-floor formula has no CO2 in it: its distance from 450 ppm is not corrected, and counts in full.
+double share_of_co2(const Air& air, double wavelength_m, IndexEquation equation) {
+  if (equation != IndexEquation::ShopFloor)
+    return share(air, &Air::co2_ppm, air.u_co2_ppm, wavelength_m, equation);
+  return kCo2PerPpm * (shop_floor(air) - 1.0) * root_sum_of_squares(air.co2_ppm - kStandardCo2_ppm, air.u_co2_ppm);
+}
+
+struct Range {
+  double min = 0.0, max = 0.0;
+  [[nodiscard]] double mean() const { return 0.5 * (min + max); }
+  [[nodiscard]] double u() const { return 0.5 * (max - min) / std::numbers::sqrt3; }  // rectangular
+};
 
 bool within(double value, double min, double max) {
   return value >= min && value <= max;  // false for NaN
@@ -135,7 +155,7 @@ Result<RefractiveIndex> refractive_index(const Air& air, double vacuum_wavelengt
     return failure(ErrorCode::BadInput, message("refractive index: wavelength of ", vacuum_wavelength_m,
                                                 " m; valid for 0.35e-6 to 1.2e-6"));
   const bool sure = within(air.u_temperature_K, 0.0, 50.0) && within(air.u_pressure_Pa, 0.0, 1e5) &&
-                    within(air.u_relative_humidity, 0.0, 1.0);
+                    within(air.u_relative_humidity, 0.0, 1.0) && within(air.u_co2_ppm, 0.0, 2000.0);
   if (!sure)
     return failure(ErrorCode::BadInput, "refractive index: an uncertainty of the air is negative or none");
 
@@ -145,8 +165,29 @@ Result<RefractiveIndex> refractive_index(const Air& air, double vacuum_wavelengt
   const double u_air =
       std::hypot(part(&Air::temperature_K, air.u_temperature_K), part(&Air::pressure_Pa, air.u_pressure_Pa),
                  part(&Air::relative_humidity, air.u_relative_humidity));
+  const double u_co2 = share_of_co2(air, vacuum_wavelength_m, equation);
   return RefractiveIndex{index_of(air, vacuum_wavelength_m, equation),
-                         root_sum_of_squares(u_air, u_of_equation(equation))};
+                         std::hypot(u_air, u_co2, u_of_equation(equation))};
+}
+
+Air shop_floor_air() noexcept {
+  constexpr Range kCelsius{15.0, 30.0}, kPascal{95'000.0, 105'000.0}, kHumidity{0.1, 0.9},
+      kCo2_ppm{400.0, 1000.0};
+  return {.temperature_K = kZeroCelsius_K + kCelsius.mean(),
+          .pressure_Pa = kPascal.mean(),
+          .relative_humidity = kHumidity.mean(),
+          .co2_ppm = kCo2_ppm.mean(),
+          .u_temperature_K = kCelsius.u(),
+          .u_pressure_Pa = kPascal.u(),
+          .u_relative_humidity = kHumidity.u(),
+          .u_co2_ppm = kCo2_ppm.u()};
+}
+
+Result<double> u_of_assumed_air(const Air& assumed, double vacuum_wavelength_m, IndexEquation equation) {
+  const auto n_assumed = refractive_index(assumed, vacuum_wavelength_m, equation);
+  const auto there = refractive_index(shop_floor_air(), vacuum_wavelength_m, equation);
+  if (!n_assumed || !there) return tl::unexpected(n_assumed ? there.error() : n_assumed.error());
+  return root_sum_of_squares(there->u_n, there->n - n_assumed->n) / there->n;
 }
 
 double distance_factor(double n_assumed, double n) noexcept {

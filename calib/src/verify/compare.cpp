@@ -13,6 +13,7 @@ namespace abbe::calib::verify {
 namespace {
 
 constexpr std::size_t kLeastPoints = 4;  // a rigid motion from fewer leaves nothing to see
+constexpr double kNothing_m = 1e-9;      // no instrument sees less; a ratio to it says nothing
 
 Vector3 mean_of(std::span<const Vector3> v) {
   Vector3 sum = Vector3::Zero();
@@ -229,7 +230,6 @@ Result<void> turn_model(Comparison& c) {
 }
 
 void rate(Comparison& c) {
-  constexpr double kNothing_m = 1e-9;  // no instrument sees less; a ratio to it says nothing
   std::erase_if(c.grid, [&](const GridPoint& g) { return g.V_las_m.norm() < kNothing_m; });
   std::vector<double> stated, turned;
   for (GridPoint& g : c.grid) {
@@ -290,6 +290,26 @@ RatioStatistics ratio_statistics(std::vector<double> ratios) {
   s.p75 = percentile(ratios, 0.75);
   s.max = ratios.back();
   return s;
+}
+
+Effect effect_at_points(const Comparison& c) noexcept {
+  const auto n = static_cast<double>(c.left_before_m.size());
+  double sum = 0.0, squares = 0.0;
+  for (std::size_t i = 0; i < c.left_before_m.size(); ++i) {
+    const double gained = c.left_before_m[i].squaredNorm() - c.left_after_m[i].squaredNorm();
+    sum += gained;
+    squares += gained * gained;
+  }
+  const double mean = sum / n;
+  const double standard_error = std::sqrt(std::max(squares / n - mean * mean, 0.0) / (n - 1.0));
+  if (!(std::abs(mean) > 2.0 * standard_error)) {
+    return Effect::NotSeen;
+  }
+  return mean > 0.0 ? Effect::Better : Effect::Worse;
+}
+
+bool ratios_hold(const Comparison& c) noexcept {
+  return c.interpolation_rms_m <= std::max(kMostInterpolation * c.after.rms_m, kNothing_m);
 }
 
 Result<Comparison> compare(const Observations& o, const VolumetricModel& model, const Vector3& tool_offset_m,

@@ -14,6 +14,7 @@
 #include "abbe/daemon/otf_report.hpp"
 #include "abbe/daemon/replay.hpp"
 #include "abbe/daemon/sha256.hpp"
+#include "abbe/daemon/unmeasured_air.hpp"
 #include "cli/commands.hpp"
 #include "cli/identified_model.hpp"
 #include "cli/opened_recording.hpp"
@@ -121,6 +122,7 @@ Result<OtfOutcome> from_files(const IdentifyOtfArguments& arguments,
       otf::judge(found->observations, found->solution, other.model, gate_limits(files->config.gate), options);
   if (!verdict) return tl::make_unexpected(error_of(verdict.error()));
   other.say(*verdict);
+  if (auto air = unmeasured_air_text(files->config, noise.u_scale)) verdict->notes.push_back(*std::move(air));
   return outcome_of({std::move(found->solution), std::move(*verdict)}, files->config,
                     std::move(files->sources));
 }

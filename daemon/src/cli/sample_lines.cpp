@@ -58,6 +58,7 @@ std::string line_of(const protocol::AxisSample& s, protocol::HostTime begin) {
 std::string line_of(const protocol::EnvironmentSample& e, protocol::HostTime begin, std::string_view what) {
   const std::array air{e.air_temperature_K, e.air_pressure_Pa, e.relative_humidity};
   std::string out = head_of(what, e.head, begin) + values(air, "{:.6g}");
+  if (e.measured == 0) out += " assumed";
   for (std::size_t i = 0; i < e.temperature_K.size(); ++i)
     if ((e.measured & protocol::temperature_bit(i)) != 0)
       out += fmt::format(" T{}={:.6g}", i, e.temperature_K[i]);

@@ -110,6 +110,9 @@ void print_status(const json& status) {
     fmt::print(" not known: `abbe reference --here` where they read their offset\n");
   }
   if (status.contains("environment")) print_environment(status["environment"]);
+  if (status.contains("unmeasured_air"))
+    fmt::print("tracker    {}\n",
+               coloured(status["unmeasured_air"].get<std::string>(), kYellow, STDOUT_FILENO));
   if (status.contains("recording")) fmt::print("recording  {}\n", status["recording"].get<std::string>());
   if (status.contains("dds")) print_dds(status["dds"]);
   fmt::print("\n{:<10} {:<14} {:>10} {:>10} {:>7} {:>5} {:>7}  {}\n", "stream", "state", "rate", "samples",

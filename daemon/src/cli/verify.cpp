@@ -138,20 +138,37 @@ nlohmann::json figures(const verify::RatioStatistics& s) {
           {"share_above_1", static_cast<double>(s.above_1) / static_cast<double>(s.count)}};
 }
 
+const char* name(verify::Effect effect) {
+  switch (effect) {
+    case verify::Effect::Better:
+      return "better";
+    case verify::Effect::NotSeen:
+      return "not seen";
+    case verify::Effect::Worse:
+      return "worse";
+  }
+  return "";
+}
+
 void print_json(const VerifyOutcome& outcome) {
   const auto& c = outcome.verification.comparison;
   const auto& turned = c.turned;
   nlohmann::json object{
+      {"effect", name(verify::effect_at_points(c))},
       {"model", model_id(outcome.document)},
       {"points", outcome.verification.observations.readings_m.size()},
       {"inside", c.inside.size()},
       {"before", vector_figures(c.before)},
       {"after", vector_figures(c.after)},
-      {"R_turned", figures(c.R_turned)},
-      {"R_stated", figures(c.R_stated)},
       {"turned_urad", {kUradPerRad * turned(3), kUradPerRad * turned(4), kUradPerRad * turned(5)}},
       {"interpolation_rms_um", kUmPerM * c.interpolation_rms_m},
       {"cut_short", outcome.verification.cut_short}};
+  if (const auto why = why_no_ratio(c)) {
+    object["R_not_given"] = *why;
+  } else {
+    object["R_turned"] = figures(c.R_turned);
+    object["R_stated"] = figures(c.R_stated);
+  }
   fmt::print("{}\n", object.dump(1));
 }
 
@@ -160,9 +177,19 @@ void print_ratio(const char* what, const verify::RatioStatistics& s) {
              s.count, s.mean, s.standard_deviation, s.min, s.p25, s.median, s.p75, s.max, s.above_1);
 }
 
+void print_ratios(const verify::Comparison& c) {
+  if (const auto why = why_no_ratio(c)) return fmt::print("R_resmag    not given: {}\n", *why);
+  fmt::print("{:<11} {:>7} {:>7} {:>7} {:>7} {:>7} {:>7} {:>7} {:>7} {:>8}\n", "R_resmag", "points", "mean",
+             "std", "min", "25 %", "median", "75 %", "max", "above 1");
+  print_ratio("  turned", c.R_turned);
+  print_ratio("  as stated", c.R_stated);
+  fmt::print("grid        interpolation alone costs {:.3f} um rms\n", kUmPerM * c.interpolation_rms_m);
+}
+
 void print_summary(const VerifyOutcome& outcome, const VerifyArguments& arguments) {
   const auto& v = outcome.verification;
   const auto& c = v.comparison;
+  fmt::print("verdict     {}\n", verdict_text(c));
   fmt::print("model       {}  (machine \"{}\", {})\n", model_id(outcome.document), outcome.document.machine,
              outcome.document.method);
   fmt::print("points      {}, {} of them where the model holds\n", v.observations.readings_m.size(),
@@ -174,11 +201,7 @@ void print_summary(const VerifyOutcome& outcome, const VerifyArguments& argument
              arguments.frame == "fit" ? "fitted to the readings: V's best rigid motion is not seen"
                                       : "the machine's axes",
              kUradPerRad * c.turned(3), kUradPerRad * c.turned(4), kUradPerRad * c.turned(5));
-  fmt::print("{:<11} {:>7} {:>7} {:>7} {:>7} {:>7} {:>7} {:>7} {:>7} {:>8}\n", "R_resmag", "points", "mean",
-             "std", "min", "25 %", "median", "75 %", "max", "above 1");
-  print_ratio("  turned", c.R_turned);
-  print_ratio("  as stated", c.R_stated);
-  fmt::print("grid        interpolation alone costs {:.3f} um rms\n", kUmPerM * c.interpolation_rms_m);
+  print_ratios(c);
   if (!arguments.out.empty())
     fmt::print("written     {}, grid.csv\n", (std::filesystem::path(arguments.out) / "report.html").string());
 }
@@ -252,8 +275,9 @@ void add_verify(CLI::App& parent, int& exit) {
   auto arguments = std::make_shared<VerifyArguments>();
   auto* command = parent.add_subcommand(
       "verify",
-      "Compare a model with independent measurements, of a laser tracker for example: what is left with and\n"
-      "without it, and R_resmag = |what is left| / |what was there| on a grid inside its volume.\n"
+      "Compare a model with independent measurements, of a laser tracker for example: first the verdict,\n"
+      "better or worse with the model; then what is left with and without it; where interpolating between\n"
+      "the points costs little, R_resmag = |what is left| / |what was there| on a grid inside its volume.\n"
       "Exit code 1, with the result all the same, if the recording is damaged inside.");
   add_options(*command, *arguments);
   command->callback([arguments, &exit] {

@@ -3,6 +3,7 @@
 #include <cmath>
 #include <set>
 
+#include "abbe/daemon/unmeasured_air.hpp"
 #include "abbe/drivers/tracker/order.hpp"
 #include "config/machine_order.hpp"
 #include "config/message_bounds.hpp"
@@ -185,6 +186,17 @@ void read_nodes(Section& encoder, const MachineConfig& machine, EncoderConfig& o
 
 }  // namespace
 
+namespace {
+
+/// `air` is read after [tracker]; null: not there.
+double default_u_scale(WeatherConfig weather, const toml::node* air) {
+  if (weather == WeatherConfig::Compute) return TrackerConfig::kControllersAir;
+  const bool corrected = air != nullptr && air->is_table() && air->as_table()->contains("assumed_index");
+  return corrected ? 0.0 : u_of_unmeasured_air();
+}
+
+}  // namespace
+
 void read_tracker(Section& root, Config& out) {
   Section tracker = root.child("tracker");
   read_noise(tracker, out.machine);
@@ -198,7 +210,7 @@ void read_tracker(Section& root, Config& out) {
       "weather", config.weather,
       {{"none", WeatherConfig::None}, {"read", WeatherConfig::Read}, {"compute", WeatherConfig::Compute}});
   if (!tracker.get("u_scale_ppm", config.u_scale, kMicro, kNotNegative))
-    config.u_scale = config.weather == WeatherConfig::Compute ? TrackerConfig::kControllersAir : 0.0;
+    config.u_scale = default_u_scale(config.weather, root.node("air"));
   read_tracker_timeouts(tracker, config);
   read_beam(tracker, config);
   if (!has_host && tracker.has("port") && !tracker.has("host"))

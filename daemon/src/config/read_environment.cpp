@@ -296,6 +296,17 @@ void read_thermal(Section& root, Config& out) {
   }
 }
 
+namespace {
+
+bool all_of_the_air_is_measured(const Config& config) {
+  protocol::EnvironmentMask seen = 0;
+  for (const auto& device : config.environment)
+    for (const auto& measured : device.map.measured) seen |= drivers::mask_of(measured);
+  return (seen & protocol::kAllOfTheAir) == protocol::kAllOfTheAir;
+}
+
+}  // namespace
+
 void read_air(Section& root, Config& out) {
   Section air = root.child("air");
   AirConfig& config = out.air;
@@ -308,12 +319,18 @@ void read_air(Section& root, Config& out) {
   air.get("u_temperature_K", config.u_temperature_K, kPlain, {0.0, 10.0});
   air.get("u_pressure_Pa", config.u_pressure_Pa, kPlain, {0.0, 1e4});
   air.get("u_humidity_percent", config.u_relative_humidity, {100.0}, {0.0, 100.0});
+  air.get("u_co2_ppm", config.u_co2_ppm, kPlain, {0.0, 2000.0});
   air.get("max_age_s", config.max_age, kPlain, kPositive);
   double assumed = 1.0;
   if (air.get("assumed_index", assumed, kPlain, {1.0, 1.001})) {
     config.assumed_index = assumed;
     if (out.tracker && out.tracker->weather == WeatherConfig::Compute)
       air.fault("assumed_index", "the controller computes the index already (tracker.weather = \"compute\")");
+    if (out.tracker && out.tracker->weather == WeatherConfig::None && !all_of_the_air_is_measured(out))
+      air.fault("assumed_index",
+                "with tracker.weather = \"none\" an [[environment]] must measure temperature, pressure and "
+                "humidity "
+                "of the air");
   }
   air.close();
 }

@@ -11,6 +11,7 @@
 #include <utility>
 #include <vector>
 
+#include "abbe/daemon/unmeasured_air.hpp"
 #include "control/model_status_name.hpp"
 #include "control/tracker_requests.hpp"
 #include "units.hpp"
@@ -244,6 +245,8 @@ json status_json(const SeenStatus& seen, const Config& config) {
   for (const auto& session : seen.ended) ended.push_back(session_json(session, {}));
   out["position_m"] = positions_json(seen.live, seen.positions_are_old);
   if (seen.live.has_environment) out["environment"] = environment_json(seen.live, config);
+  if (const auto air = config.tracker ? unmeasured_air_text(config, config.tracker->u_scale) : std::nullopt)
+    out["unmeasured_air"] = *air;
   if (seen.reference) out["reference"] = reference_json(*seen.reference, config.machine);
   if (seen.without_zero) out["axes_without_zero"] = *seen.without_zero;
   if (seen.release_awaited)

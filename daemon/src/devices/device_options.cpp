@@ -4,6 +4,9 @@
 #include <chrono>
 #include <cmath>
 
+#include "abbe/daemon/unmeasured_air.hpp"
+#include "units.hpp"
+
 namespace abbe::daemon {
 namespace {
 
@@ -26,6 +29,12 @@ WeatherMonitor weather_monitor(WeatherConfig weather) {
       return WeatherMonitor::ReadAndCompute;
   }
   return WeatherMonitor::None;
+}
+
+protocol::emscon::Environment controller_units(const calib::Air& air) {
+  return {.temperature = air.temperature_K - kZeroCelsius_K,
+          .pressure = air.pressure_Pa * 1e-2,  // mbar
+          .humidity = air.relative_humidity * 1e2};
 }
 
 drivers::SyncSource sync_source(SyncConfig sync) {
@@ -61,6 +70,7 @@ drivers::TrackerDeviceOptions device_options(const TrackerConfig& config, double
   options.session.stationary_time_ms =
       static_cast<std::int32_t>(config.stationary_time / std::chrono::milliseconds{1});
   options.session.weather = weather_monitor(config.weather);
+  options.session.environment = controller_units(assumed_air());
   options.session.connect_timeout = stretched(config.connect_timeout, speed);
   options.session.command_timeout = stretched(config.command_timeout, speed);
   options.session.initialize_timeout = stretched(config.initialize_timeout, speed);
@@ -144,7 +154,10 @@ EnvironmentUseOptions environment_use(const Config& config) {
     for (const auto& measured : device.map.measured) use.measured |= drivers::mask_of(measured);
   }
   use.air = config.air;
-  if (config.tracker) use.tracker_u_scale = config.tracker->u_scale;
+  if (config.tracker) {
+    use.tracker_u_scale = config.tracker->u_scale;
+    use.unmeasured_air = unmeasured_air_text(config, config.tracker->u_scale);
+  }
   const auto axes = config.connected_axes();
   for (const ThermalConfig& thermal : config.thermal) {
     const auto axis = std::find(axes.begin(), axes.end(), thermal.axis);

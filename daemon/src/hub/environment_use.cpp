@@ -75,7 +75,7 @@ std::optional<EnvironmentSample> EnvironmentMerge::at(HostTime t) const {
   merged.measured = 0;
   merged.air_temperature_K = merged.air_pressure_Pa = merged.relative_humidity = kNotAvailable;
   bool any = false;
-  if (const auto* weather = in_force(weather_, t)) {
+  if (const auto* weather = in_force(weather_, t); weather != nullptr && weather->measured != 0) {
     // The controller says its weather when it changes: how old it is says nothing.
     merge(*weather, static_cast<EnvironmentMask>(weather->measured & ~measured_), false, merged);
     any = true;
@@ -179,7 +179,8 @@ Result<calib::RefractiveIndex> index_of_air(const EnvironmentSample& environment
                        .co2_ppm = config.co2_ppm,
                        .u_temperature_K = config.u_temperature_K,
                        .u_pressure_Pa = config.u_pressure_Pa,
-                       .u_relative_humidity = config.u_relative_humidity};
+                       .u_relative_humidity = config.u_relative_humidity,
+                       .u_co2_ppm = config.u_co2_ppm};
   auto index = calib::refractive_index(air, config.wavelength_m, config.equation);
   if (!index) return fail(ErrorCode::DataInsufficient, index.error().text);
   return *index;

@@ -33,6 +33,30 @@ std::vector<double> lengths_um(const std::vector<calib::Vector3>& v_m) {
   return out;
 }
 
+const char* words(verify::Effect effect) {
+  switch (effect) {
+    case verify::Effect::Better:
+      return "better with the model";
+    case verify::Effect::NotSeen:
+      return "neither better nor worse with the model";
+    case verify::Effect::Worse:
+      return "WORSE with the model: do not use it";
+  }
+  return "";
+}
+
+std::size_t points_that_gained(const verify::Comparison& c) {
+  std::size_t gained = 0;
+  for (std::size_t i = 0; i < c.inside.size(); ++i)
+    gained += c.left_after_m[i].norm() < c.left_before_m[i].norm() ? 1 : 0;
+  return gained;
+}
+
+void add_verdict(HtmlReport& page, const Verification& v) {
+  page.heading("Verdict");
+  page.paragraph(verdict_text(v.comparison) + ".");
+}
+
 void add_left(HtmlReport& page, const Verification& v) {
   const auto& c = v.comparison;
   page.heading("What is left at the measured points");
@@ -116,6 +140,7 @@ std::vector<std::string> ratio_row(const char* what, const verify::RatioStatisti
 
 void add_ratio(HtmlReport& page, const verify::Comparison& c) {
   page.heading("R_resmag: what is left of every vector");
+  if (const auto why = why_no_ratio(c)) return page.paragraph("Not given: " + *why + ".");
   page.paragraph(
       "|V_las - V_model| / |V_las| on a grid inside the model's volume; below 1 the model helps, above it "
       "harms [Li OMM, eqs. 20, 21]. What \"turned\" and \"as stated\" mean, and why the second one may be "
@@ -204,8 +229,23 @@ void add_planes(HtmlReport& page, const Verification& v) {
 
 }  // namespace
 
+std::string verdict_text(const verify::Comparison& c) {
+  return fmt::format("{}: {:.3f} um rms left, {:.3f} um without it; {} of {} points gained",
+                     words(verify::effect_at_points(c)), kUmPerM * c.after.rms_m, kUmPerM * c.before.rms_m,
+                     points_that_gained(c), c.inside.size());
+}
+
+std::optional<std::string> why_no_ratio(const verify::Comparison& c) {
+  if (verify::ratios_hold(c)) return std::nullopt;
+  return fmt::format(
+      "interpolating between the measured points costs {:.3f} um rms, not small against the {:.3f} um left; "
+      "more points nearer to each other make it smaller",
+      kUmPerM * c.interpolation_rms_m, kUmPerM * c.after.rms_m);
+}
+
 std::string verification_report(const ModelDocument& document, const Verification& v) {
   HtmlReport page(fmt::format("{}: verification of a model", document.machine));
+  add_verdict(page, v);
   add_left(page, v);
   add_farthest(page, v);
   add_ratio(page, v.comparison);

@@ -41,8 +41,8 @@ Result<PreparedSession> CalibrationSession::prepare(CalibrationTask task) const 
 
 Result<void> CalibrationSession::start(PreparedSession&& prepared, HostTime from) {
   if (running()) {
-    return fail(ErrorCode::Refused, fmt::format("calibrate {}: a session is {} already", prepared.method,
-                                                name(status_.state)));
+    return fail(ErrorCode::Refused,
+                fmt::format("calibrate {}: a session is {} already", prepared.method, name(status_.state)));
   }
   std::visit([from](auto& a) { a.begin(from); }, prepared.acquisition);
   acquisition_.emplace(std::move(prepared.acquisition));
@@ -140,7 +140,8 @@ CalibrationRun run_of(AcquiredRun acquired) {
   return OtfRun{.path_m = std::move(acquired.path_m),
                 .points = otf.release(),
                 .u_scale = effect.u_scale,
-                .u_axis_scale = effect.u_growth};
+                .u_axis_scale = effect.u_growth,
+                .unmeasured_air = acquired.environment.unmeasured_air};
 }
 
 void CalibrationSession::judged(std::string model_id, bool passed, std::string reason, HostTime now) {

@@ -52,6 +52,7 @@ Result<OtfCandidate> identify_run(const OtfRun& run, const MachineConfig& machin
   if (!solution) return tl::unexpected(error_of(solution.error()));
   auto verdict = calib::otf::judge(*observations, *solution, active, gate_limits(gate), options);
   if (!verdict) return tl::unexpected(error_of(verdict.error()));
+  if (run.unmeasured_air) verdict->notes.push_back(*run.unmeasured_air);
   return OtfCandidate{std::move(*solution), std::move(*verdict)};
 }
 

@@ -255,6 +255,7 @@ void TrackerReceiver::weather(const emscon::Environment& environment,
   sample.air_temperature_K = environment.temperature + kZeroCelsius_K;
   sample.air_pressure_Pa = environment.pressure * kPascalsPerMillibar;
   sample.relative_humidity = environment.humidity * kPerPercent;
+  if (!options_.air_measured) sample.measured = 0;
   weather_due_ = sample;
 }
 

@@ -14,6 +14,7 @@ TrackerReceiverOptions receiver_options(const TrackerDeviceOptions& options) {
   const bool periodic = options.session.mode == TrackerMode::ContinuousTime;
   receiver.time_separation = std::chrono::milliseconds{periodic ? options.session.time_separation_ms : 0};
   receiver.stationary_time = std::chrono::milliseconds{options.session.stationary_time_ms};
+  receiver.air_measured = options.session.weather != emscon::WeatherMonitor::None;
   return receiver;
 }
 

@@ -109,7 +109,8 @@ void Spine::write_configuration_of(const std::string& devices, const std::string
 
 std::string Spine::tracker_table() const {
   return to_toml(config_tables::Tracker{
-      .port = tracker_port_, .more = "weather = \"none\"\nsigma_range_um = 2\nsigma_angle_urad = 3\n"});
+      .port = tracker_port_,
+      .more = "weather = \"none\"\nu_scale_ppm = 0\nsigma_range_um = 2\nsigma_angle_urad = 3\n"});
 }
 
 std::string Spine::daemon_tables(const std::string& dds) const {

@@ -87,8 +87,9 @@ struct TrackerConfig {
   double point_rate_hz = 500.0;                                              ///< continuous
   std::chrono::nanoseconds stationary_time{std::chrono::milliseconds{500}};  ///< a mean's; whole ms
   WeatherConfig weather = WeatherConfig::Compute;
-  /// Relative standard uncertainty that all its distances have in common: what the controller's own sensors
-  /// leave of the air (0.2 K and 30 Pa: 2e-7). Unless given, 0 without "compute": [air] says it then.
+  /// Relative standard uncertainty that all its distances have in common. Unless given: with "compute" what
+  /// the controller's own sensors leave of the air (0.2 K and 30 Pa: 2e-7); with [air] assumed_index 0, that
+  /// of [air] is added; else nobody corrects for measured air: u_of_unmeasured_air().
   double u_scale = kControllersAir;
   static constexpr double kControllersAir = 0.2 / 1e6;
   std::chrono::nanoseconds max_constant_delay{
@@ -210,6 +211,7 @@ struct AirConfig {
   double u_temperature_K = 0.2;
   double u_pressure_Pa = 30.0;
   double u_relative_humidity = 0.03;
+  double u_co2_ppm = 200.0;  ///< people and burners add 50 to 1000 ppm to the 430 outside; nobody measures it
   std::chrono::nanoseconds max_age{std::chrono::seconds{60}};  ///< an older value is not available any more
   /// The tracker's distances are raw: computed with this index. Then they are corrected to the air measured.
   std::optional<double> assumed_index;

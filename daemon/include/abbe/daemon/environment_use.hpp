@@ -9,6 +9,7 @@
 #include <cstddef>
 #include <deque>
 #include <optional>
+#include <string>
 #include <vector>
 
 #include "abbe/daemon/batch.hpp"
@@ -29,13 +30,14 @@ struct EnvironmentUseOptions {
   std::chrono::nanoseconds max_age{std::chrono::seconds{60}};
   std::vector<ThermalAxis> thermal;
   AirConfig air;
-  double tracker_u_scale = 0.0;  ///< TrackerConfig::u_scale
+  double tracker_u_scale = 0.0;               ///< TrackerConfig::u_scale
+  std::optional<std::string> unmeasured_air;  ///< unmeasured_air_text()
 };
 
 /// What the environment of an instant did to what was measured then.
 struct EnvironmentEffect {
   std::array<double, 3> growth{1.0, 1.0, 1.0};  ///< of the scales of X, Y, Z; 1 without [[thermal]]
-  std::array<double, 3> u_growth{};             ///< relative standard uncertainty of it; 0 without [[thermal]]
+  std::array<double, 3> u_growth{};  ///< relative standard uncertainty of it; 0 without [[thermal]]
   /// Relative standard uncertainty all distances have in common: of the index they were corrected with, and
   /// the tracker's own.
   double u_scale = 0.0;
@@ -60,7 +62,7 @@ class MeanEffect {
 };
 
 /// Every quantity from the device that measures it: at most one of [[environment]], else the tracker. A value
-/// of a device that has been silent for longer than max_age is NaN.
+/// of a device that has been silent for longer than max_age is NaN. Air that a tracker assumes is not merged.
 class EnvironmentMerge {
  public:
   /// A sample of [[environment]] is in force from `lag` after its instant: by then it has come, whatever the

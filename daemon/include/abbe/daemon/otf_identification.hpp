@@ -5,7 +5,9 @@
 
 #include <array>
 #include <functional>
+#include <optional>
 #include <span>
+#include <string>
 #include <vector>
 
 #include "abbe/calib/gate.hpp"
@@ -21,8 +23,10 @@ struct OtfRun {
   /// corrected positions then; what a scale grew by is not in it a second time.
   std::vector<AxisPosition> path_m;
   std::vector<RunPoint> points;
-  double u_scale = 0.0;  ///< see calib::otf::Noise
+  double u_scale = 0.0;                  ///< see calib::otf::Noise
   std::array<double, 3> u_axis_scale{};  ///< see calib::otf::Noise
+  /// Note of the verdict: the air the ranges were corrected for without measuring it. None: it was measured.
+  std::optional<std::string> unmeasured_air;
 };
 
 /// How an identification is watched from outside; both are called in its thread and may be empty.

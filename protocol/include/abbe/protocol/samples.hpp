@@ -134,8 +134,8 @@ struct TouchScan {
   std::array<double, kMaxAxes> position{};  ///< m or rad
 };
 
-/// What an EnvironmentSample speaks of: a bit set. A NaN whose bit is set is measured here but not available
-/// now.
+/// What an EnvironmentSample measures: a bit set. A NaN whose bit is set is measured here but not available
+/// now. A number whose bit is not set is assumed: the device was set to it.
 using EnvironmentMask = std::uint16_t;
 inline constexpr EnvironmentMask kAirTemperature = 1u << 0;
 inline constexpr EnvironmentMask kAirPressure = 1u << 1;

@@ -53,12 +53,27 @@ struct Comparison {
   std::vector<Vector3> left_before_m, left_after_m;
   VectorStatistics before, after;
   /// Linear interpolation of the model from the measured points against the model itself, on the grid and
-  /// relative to the origin, rms: about what interpolating V_las costs. R_resmag cannot be better than that.
+  /// relative to the origin, rms: about what interpolating V_las costs. R_resmag says something of the model
+  /// only where that is small against what is left: ratios_hold().
   double interpolation_rms_m = 0.0;
   std::vector<GridPoint> grid;
   Vector6 turned = Vector6::Zero();  ///< the model's motion: [m] (0 with an origin), rotation [rad]
   RatioStatistics R_stated, R_turned;
 };
+
+/// What the model does at the measured points inside its volume.
+enum class Effect { Better, NotSeen, Worse };
+
+/// From the mean over the points of |left_before|^2 - |left_after|^2, against twice its standard error (s /
+/// sqrt(n), [GUM] 4.2.3); nearer to zero, the points show no effect. Neighbouring points err alike, so that
+/// the standard error is rather too small.
+[[nodiscard]] Effect effect_at_points(const Comparison&) noexcept;
+
+/// Of the rms that is left at the points. A third of it adds 5 % in quadrature.
+inline constexpr double kMostInterpolation = 1.0 / 3.0;
+
+/// True: interpolation costs at most kMostInterpolation of what is left (or less than 1 nm).
+[[nodiscard]] bool ratios_hold(const Comparison&) noexcept;
 
 /// NotApplicable: the model does not hold for the tool. TooFewObservations: less than 4 measured points
 /// inside the validity volume, or less than 4 grid points inside both it and the measured points' hull.

@@ -37,6 +37,9 @@ struct TrackerReceiverOptions {
   std::chrono::nanoseconds time_separation = std::chrono::milliseconds{2};
   /// How long a stationary measurement takes; its result says nothing of its own time.
   std::chrono::nanoseconds stationary_time = std::chrono::milliseconds{500};
+  /// The controller reads its weather station. False: the air it reports is what it was set to; the samples
+  /// carry these values, and `measured` is 0.
+  bool air_measured = true;
 };
 
 /// Points of one packet, valid until the next call to push() or next().

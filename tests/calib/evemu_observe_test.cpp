@@ -165,6 +165,49 @@ TEST(EvemuInput, NamesCoplanarPositions) {
   EXPECT_THAT(e.text, HasSubstr("coplanar"));
 }
 
+TEST(EvemuInput, NamesTwoBallsUnderEachOthersNumber) {
+  const Error e = refusal([](Touches& touches, Calibrator&) {
+    for (Touch& t : touches) {
+      const bool ball = t.position == 4 && t.feature == Feature::Ball;
+      if (ball && (t.number == 2 || t.number == 6)) t.number = 8 - t.number;
+    }
+  });
+  EXPECT_EQ(e.code, ErrorCode::BadInput);
+  EXPECT_THAT(e.text, HasSubstr("position 4: the balls do not have the shape"));
+  EXPECT_THAT(e.text, HasSubstr("they fit with balls 2 and 6 swapped"));
+}
+
+TEST(EvemuInput, NamesTouchesInMetres) {
+  const Error e = refusal([](Touches& touches, Calibrator&) {
+    for (Touch& t : touches) t.p_m *= 1e-3;
+  });
+  EXPECT_THAT(e.text, HasSubstr("they fit with lengths in m where mm belong"));
+}
+
+TEST(EvemuInput, NamesATouchBesideItsSurface) {
+  const Error e = refusal([](Touches& touches, Calibrator&) {
+    const auto on_block = std::ranges::find_if(touches, [](const Touch& t) {
+      return t.position == 3 && t.feature == Feature::Block && t.number == 2;
+    });
+    on_block->p_m += Vector3::Constant(5e-3);
+  });
+  EXPECT_EQ(e.code, ErrorCode::BadInput);
+  EXPECT_THAT(e.text, HasSubstr("position 3: block 2: the touch at"));
+}
+
+TEST(EvemuInput, NamesAPositionThatWasNotTurned) {
+  const Error e = refusal([](Touches& touches, Calibrator&) {
+    std::vector<Touch> again;
+    for (const Touch& t : touches) {
+      if (t.position == 3) again.push_back({7, t.feature, t.number, t.p_m});
+    }
+    std::erase_if(touches, [](const Touch& t) { return t.position == 7; });
+    touches.insert(touches.end(), again.begin(), again.end());
+  });
+  EXPECT_EQ(e.code, ErrorCode::BadInput);
+  EXPECT_THAT(e.text, HasSubstr("position 7: the artefact stands as at position 3"));
+}
+
 TEST(EvemuInput, NamesABall1ThatMoved) {
   const Error e = refusal([](Touches& touches, Calibrator&) {
     for (Touch& t : touches) {
@@ -194,6 +237,51 @@ TEST(EvemuInput, TakesErrorsThatWereComputedElsewhere) {
   std::erase_if(without, [](const BallError& e) { return e.position == 2 && e.ball == 1; });
   EXPECT_THAT(observe_errors(without, reference_machine()).error().text,
               HasSubstr("position 2: Ball1 was left out"));
+}
+
+/// Five touches of every ball, four of every block, in the calibrator's own axes; ball 5 is out of the plane
+/// of the others: without it a mirror image is the array turned over.
+std::string seen_through(const Matrix3& M) {
+  Calibrator c = reference_calibrator();
+  c.balls[4].centre_m.z() += 0.020;
+  std::vector<Touch> touches;
+  for (const auto& ball : c.balls) {
+    for (const Vector3& d :
+         {Vector3(0, 0, 1), Vector3(1, 0, 0), Vector3(0, 1, 0), Vector3(-1, 0, 0), Vector3(0, -1, 0)})
+      touches.push_back(
+          {1, Feature::Ball, ball.number, M * (ball.centre_m + (ball.radius_m + c.tip_radius_m) * d)});
+  }
+  for (const auto& block : c.blocks) {
+    const Vector3 a = block.normal.unitOrthogonal(), b = block.normal.cross(a);
+    for (const auto& [i, j] : {std::pair(-1, -1), {1, -1}, {-1, 1}, {1, 1}})
+      touches.push_back({1, Feature::Block, block.number, M * (0.02 * i * a + 0.02 * j * b)});
+  }
+  const auto seen = see_artefact(1, touches, c);
+  return seen ? "accepted" : seen.error().text;
+}
+
+TEST(EvemuInput, NamesMirroredTouches) {
+  EXPECT_EQ(seen_through(Matrix3::Identity()), "accepted");
+  EXPECT_THAT(seen_through(Vector3(1, -1, 1).asDiagonal()),
+              HasSubstr("they fit with one axis reversed or two axes"));
+  EXPECT_THAT(seen_through(Matrix3{{0, 1, 0}, {1, 0, 0}, {0, 0, 1}}),
+              HasSubstr("they fit with one axis reversed"));
+}
+
+/// What observe_errors() says to errors whose V was mapped by `L`.
+std::string refusal_of_errors(const Matrix3& L) {
+  auto errors = reference_errors();
+  for (BallError& e : errors) e.V_m = L * e.V_m;
+  const auto o = observe_errors(errors, reference_machine());
+  return o ? "accepted" : o.error().text;
+}
+
+TEST(EvemuInput, NamesWhatWasDoneToErrors) {
+  EXPECT_EQ(refusal_of_errors(Matrix3::Identity()), "accepted");
+  EXPECT_THAT(refusal_of_errors(-Matrix3::Identity()), HasSubstr("with all signs reversed"));
+  EXPECT_THAT(refusal_of_errors(1e-3 * Matrix3::Identity()), HasSubstr("with errors in mm where um belong"));
+  EXPECT_THAT(refusal_of_errors(Vector3(1, -1, 1).asDiagonal()), HasSubstr("with Y reversed in errors"));
+  EXPECT_THAT(refusal_of_errors(Matrix3{{0, 1, 0}, {1, 0, 0}, {0, 0, 1}}), HasSubstr("with X and Y swapped"));
 }
 
 /// Four touches of every ball, three of every block: as many as unknowns.

@@ -117,7 +117,22 @@ TEST(Alignment, RefusesAPathOfTheRightLengthButAnotherShape) {
   }
   const Refusal r = refusal(run, other);
   EXPECT_EQ(r.code, ErrorCode::AlignmentFailed);
-  EXPECT_THAT(r.text, HasSubstr("mm"));
+  EXPECT_THAT(r.text, HasSubstr("they fit with"));
+  EXPECT_THAT(r.text, HasSubstr("reversed"));
+}
+
+TEST(Alignment, NamesAPathThatWasDrivenBackwards) {
+  const MadeRun run = make_run({});
+  Path other = run.path;
+  std::reverse(other.vertices_m.begin(), other.vertices_m.end());
+  EXPECT_THAT(refusal(run, other).text, HasSubstr("they fit with the path driven backwards"));
+}
+
+TEST(Alignment, NamesAPathInMetres) {
+  const MadeRun run = make_run({});
+  Path other = run.path;
+  for (Vector3& v : other.vertices_m) v *= 1e-3;
+  EXPECT_THAT(refusal(run, other).text, HasSubstr("they fit with lengths in m where mm belong (path)"));
 }
 
 TEST(Alignment, RefusesARunThatEndsEarly) {

@@ -69,6 +69,15 @@ TEST(PathCheck, NamesTheVertexTheAxisAndItsTravel) {
   EXPECT_THAT(refused.error().text, HasSubstr("vertex 2 at Y 501 mm, the axis travels -100 to 500 mm"));
 }
 
+// X travels -100 to 500 mm, as do Y and Z: -500 lies inside once it is reversed.
+TEST(PathCheck, NamesTheMistakeThatPutsAllVerticesInside) {
+  const auto refused = check(Path{{{0, 0, 0}, {-0.5, 0, 0}, {-0.5, 0.5, 0.5}}}, travel());
+  ASSERT_FALSE(refused);
+  EXPECT_THAT(refused.error().text, testing::EndsWith("; all are inside with X reversed"));
+  const auto microns = check(Path{{{0, 0, 0}, {300, 0, 0}, {300, 400, 0}}}, travel());
+  EXPECT_THAT(microns.error().text, HasSubstr("all are inside with lengths in um where mm belong"));
+}
+
 TEST(PathCheck, TakesVerticesAtTheEndsOfTheTravel) {
   EXPECT_TRUE(check(Path{{{-0.1, 0, 0}, {0.5, 0, 0}, {0.5, 0.5, 0.5}}}, travel()));
 }

@@ -1,7 +1,7 @@
 /// Verification against an independent instrument: the reference solutions of the ball array on their own
 /// grid, and tracker points of a machine whose errors are known.
 
-#include <gtest/gtest.h>
+#include <gmock/gmock.h>
 
 #include <algorithm>
 #include <random>
@@ -247,6 +247,7 @@ TEST(Verification, RefusesMixedUpRowsAndMirroredFrames) {
   auto mirrored = points;
   for (auto& p : mirrored) p.measured_m.y() = -p.measured_m.y();
   EXPECT_EQ(observe(mirrored).error().code, ErrorCode::AlignmentFailed);
+  EXPECT_THAT(observe(mirrored).error().text, testing::HasSubstr("they fit with one axis reversed"));
   std::mt19937 random(1);
   for (std::size_t i = 1; i < points.size(); ++i)
     std::swap(points[i].measured_m, points[random() % i].measured_m);

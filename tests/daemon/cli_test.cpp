@@ -213,6 +213,35 @@ TEST_F(Cli, TheVerdictNamesAirThatNobodyMeasured) {
   EXPECT_THAT(ran.out, AllOf(HasSubstr("air not measured"), HasSubstr("20 C, 1013.25 hPa, 50 %"))) << ran.err;
 }
 
+TEST_F(Cli, NamesLineAndColumnOfAVertexOutsideTheTravel) {
+  auto text = test::synthetic_path_csv();
+  text += "10,60.5,0\n";
+  const auto ran = identify(write("outside.csv", text), files_.tracker, folder_ / "outside");
+  EXPECT_EQ(ran.exit, 3);
+  EXPECT_THAT(ran.err,
+              AllOf(HasSubstr("outside.csv:63:1: y_mm: 60.5"), HasSubstr("axis Y travels -60 to 60 mm")));
+  EXPECT_FALSE(fs::exists(folder_ / "outside"));
+}
+
+TEST_F(Cli, DoesNotTakeAMissingTargetForZero) {
+  auto text = test::synthetic_machine_toml();
+  const auto target = text.find("[target]");
+  text.erase(target, text.find("[model]") - target);
+  const auto ran =
+      abbe(with_machine(files_, write("no_target.toml", text), files_.path, folder_ / "no_target"));
+  EXPECT_EQ(ran.exit, 3);
+  EXPECT_THAT(ran.err, HasSubstr("add [target] with offset_mm = [x, y, z]"));
+}
+
+TEST_F(Cli, NamesAPathThatIsAMirrorImage) {
+  std::string text = "x_mm,y_mm,z_mm\n";
+  for (const auto& q : test::synthetic_path_m())
+    text += fmt::format("{},{},{}\n", -1e3 * q[0], 1e3 * q[1], 1e3 * q[2]);
+  const auto ran = identify(write("mirrored.csv", text), files_.tracker, folder_ / "mirrored");
+  EXPECT_EQ(ran.exit, 1);
+  EXPECT_THAT(ran.err, AllOf(HasSubstr("they fit with"), HasSubstr("X reversed")));
+}
+
 TEST_F(Cli, ComparesTwoModels) {
   const auto model = (folder_ / "out/model.json").string();
   const auto same = abbe(fmt::format("model compare '{0}' '{0}' --json", model));

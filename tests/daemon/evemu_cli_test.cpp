@@ -9,6 +9,7 @@
 #include <filesystem>
 #include <fstream>
 #include <nlohmann/json.hpp>
+#include <regex>
 
 #include "abbe/daemon/calibration_request.hpp"
 #include "abbe/daemon/evemu_files.hpp"
@@ -232,7 +233,8 @@ TEST_F(EvemuCli, ADamagedRecordingIsInTheVerdictAndInTheModel) {
   const auto ran = abbe(identify);
   EXPECT_EQ(ran.exit, kRefused) << ran.err;
   EXPECT_THAT(ran.out, HasSubstr("the recording is damaged: chunk 1"));
-  EXPECT_THAT(text_of(folder_ / "out/model.json"), HasSubstr("\"recording_gap\": \"the recording is damaged"));
+  EXPECT_THAT(text_of(folder_ / "out/model.json"),
+              HasSubstr("\"recording_gap\": \"the recording is damaged"));
 }
 
 TEST_F(EvemuCli, SaysWhatARecordingWithoutACompleteRunLacks) {
@@ -382,6 +384,45 @@ TEST_F(EvemuCli, NamesAPositionThatIsMissing) {
   const auto ran = abbe("identify evemu --machine machine.toml --errors errors.csv -o out");
   EXPECT_EQ(ran.exit, 1);
   EXPECT_THAT(ran.err, HasSubstr("position 4: left out"));
+}
+
+TEST_F(EvemuCli, NamesLineAndColumnOfWhatLiesOutsideTheTravel) {
+  auto all = touches();
+  for (auto& t : all) t.p_m.x() = -t.p_m.x();
+  const auto ran = identify(all);
+  expect_refused(ran, 3, "axis X travels -150 to 650 mm; all are inside with X reversed");
+  EXPECT_TRUE(std::regex_search(ran.err, std::regex("touches\\.csv:[0-9]+:1: x_mm: -"))) << ran.err;
+}
+
+TEST_F(EvemuCli, NamesTheLineWhereTheTouchesOfAPositionDoNotFit) {
+  auto all = touches();
+  for (auto& t : all)
+    if (t.position == 2 && t.feature == calib::evemu::Feature::Ball && (t.number == 2 || t.number == 6))
+      t.number = 8 - t.number;
+  const auto ran = identify(all);
+  const auto first = std::ranges::find(all, 2, &calib::evemu::Touch::position) - all.begin();
+  expect_refused(ran, 3, fmt::format("touches.csv:{}: position 2: the balls", first + 2));
+  EXPECT_THAT(ran.err, HasSubstr("they fit with balls 2 and 6 swapped"));
+}
+
+TEST_F(EvemuCli, NamesErrorsOfTheOppositeSign) {
+  auto all = tests::evemu::reference_errors();
+  std::string text = "position,ball,x_mm,y_mm,z_mm,ex_um,ey_um,ez_um\n";
+  for (const auto& e : all)
+    text += fmt::format("{},{},{:.17g},{:.17g},{:.17g},{:.17g},{:.17g},{:.17g}\n", e.position, e.ball,
+                        1e3 * e.reading_m.x(), 1e3 * e.reading_m.y(), 1e3 * e.reading_m.z(), -1e6 * e.V_m.x(),
+                        -1e6 * e.V_m.y(), -1e6 * e.V_m.z());
+  write("errors.csv", text);
+  const auto ran = abbe("identify evemu --machine machine.toml --errors errors.csv -o out");
+  expect_refused(ran, 3, "errors.csv: errors: distances between the balls");
+  EXPECT_THAT(ran.err, HasSubstr("with all signs reversed"));
+}
+
+TEST_F(EvemuCli, DoesNotTakeAMissingTargetForZero) {
+  auto machine = config_tables::weak_portal();
+  machine.target_offset_mm.reset();
+  write("machine.toml", to_toml(machine));
+  expect_refused(identify(touches()), 3, "[target] offset_mm is missing");
 }
 
 TEST_F(EvemuCli, NeedsTouchesOrErrors) {

@@ -45,6 +45,7 @@ class HubBench : public ::testing::Test {
   HubBench() {
     config_.machine.name = "mill";
     config_.machine.target_offset_m = {0.02, -0.015, -0.12};
+    config_.machine.target_given = true;
   }
 
   /// With the configuration, the recorder and the verification as they are now.

@@ -147,7 +147,6 @@ TEST_F(VerifyCli, SaysFirstThatABadModelMakesItWorse) {
 
 std::string watched_portal() {
   auto machine = config_tables::weak_portal();
-  machine.target_offset_mm = {{0, 0, 0}};
   return to_toml(machine) + "[tracker]\nhost = \"127.0.0.1\"\nmode = \"stationary\"\n" +
          to_toml(config_tables::Encoder{});
 }

@@ -44,7 +44,12 @@ inline Machine half_metre_mill() {
 
 /// Of [Li OMM]: base, Z, X, Y, probe.
 inline Machine weak_portal() {
-  return {.name = "weak portal", .chain = "[w b Z X Y t]", .x = {-100, 650}, .y = {-100, 400}, .z = {0, 100}};
+  return {.name = "weak portal",
+          .chain = "[w b Z X Y t]",
+          .x = {-150, 650},
+          .y = {-150, 400},
+          .z = {-50, 150},
+          .target_offset_mm = {{0, 0, 0}}};
 }
 
 /// [tracker], a simulated one.

@@ -5,7 +5,9 @@
 #include <array>
 #include <cmath>
 #include <map>
+#include <numeric>
 
+#include "abbe/calib/axis_mistakes.hpp"
 #include "abbe/calib/fit/point_set.hpp"
 #include "evemu/angle.hpp"
 #include "message.hpp"
@@ -113,18 +115,101 @@ Result<void> check_twice(int position, std::span<const fit::Sphere> balls) {
   return {};
 }
 
+/// "; they fit with lengths in m where mm belong"
+std::string radii_fit_with(std::span<const fit::Sphere> balls, const Calibrator& c) {
+  constexpr double kSame = 0.05;  // relative: radii that the touches know to a few per cent
+  for (const UnitMistake& mistake : unit_mistakes()) {
+    bool all = true;
+    for (std::size_t i = 0; i < balls.size(); ++i) {
+      const double expected_m = c.balls[i].radius_m + c.tip_radius_m;
+      all = all && std::abs(mistake.factor * balls[i].radius / expected_m - 1.0) < kSame;
+    }
+    if (all) {
+      return "; they fit with " + mistake.text;
+    }
+  }
+  return "";
+}
+
 Result<void> check_radii(int position, std::span<const fit::Sphere> balls, const Calibrator& c,
                          const ObserveOptions& options) {
   for (std::size_t i = 0; i < balls.size(); ++i) {
     const double expected_m = c.balls[i].radius_m + c.tip_radius_m;
     if (!(std::abs(balls[i].radius - expected_m) <= options.max_radius_mismatch_m)) {
-      return at_position(position, ErrorCode::BadInput,
-                         message("ball ", i + 1, " has radius ", balls[i].radius * kMmPerM,
-                                 " mm, calibrator \"", c.name, "\" and tip make ", expected_m * kMmPerM,
-                                 " mm: calibrator file of another artefact, or another tip"));
+      return at_position(
+          position, ErrorCode::BadInput,
+          message("ball ", i + 1, " has radius ", balls[i].radius * kMmPerM, " mm, calibrator \"", c.name,
+                  "\" and tip make ", expected_m * kMmPerM,
+                  " mm: calibrator file of another artefact, or another tip", radii_fit_with(balls, c)));
     }
   }
   return {};
+}
+
+/// Of the touches of a ball or block, the one farthest from its surface.
+template <class Distance>
+Result<void> check_surface(int position, Feature feature, int number, std::span<const Vector3> points,
+                           Distance distance_m, const ObserveOptions& options) {
+  const auto farthest =
+      std::max_element(points.begin(), points.end(),
+                       [&](const Vector3& a, const Vector3& b) { return distance_m(a) < distance_m(b); });
+  if (!(distance_m(*farthest) <= options.max_off_surface_m)) {
+    return at_position(
+        position, ErrorCode::BadInput,
+        message(name_of(feature), " ", number, ": the touch at (", kMmPerM * farthest->transpose(),
+                ") mm is ", kMmPerM * distance_m(*farthest), " mm off the surface of the others"));
+  }
+  return {};
+}
+
+Result<void> check_spheres(int position, std::span<const fit::Sphere> balls, const Touched& touched,
+                           const Calibrator& c, const ObserveOptions& options) {
+  for (std::size_t i = 0; i < balls.size(); ++i) {
+    const fit::Sphere& s = balls[i];
+    const auto off_m = [&s](const Vector3& p) { return std::abs((p - s.centre).norm() - s.radius); };
+    const int number = c.balls[i].number;
+    if (Result<void> on = check_surface(position, Feature::Ball, number, touched.at({Feature::Ball, number}),
+                                        off_m, options);
+        !on) {
+      return on;
+    }
+  }
+  return {};
+}
+
+/// "; they fit with ...": a reflection, other numbers. Empty: with nothing that was tried.
+std::string balls_fit_with(std::span<const Vector3> calibrated, std::span<const Vector3> seen,
+                           const ObserveOptions& options) {
+  const auto fits = [&](const std::vector<Vector3>& from) {
+    const Result<RigidTransform> T = fit_rigid(from, seen);
+    for (std::size_t i = 0; T && i < from.size(); ++i) {
+      if ((*T * from[i] - seen[i]).norm() > options.max_shape_mismatch_m) {
+        return false;
+      }
+    }
+    return T.has_value();
+  };
+  std::vector<std::string> texts;
+  std::vector<Vector3> mirrored;
+  for (const Vector3& p : calibrated) {
+    mirrored.emplace_back(-p.x(), p.y(), p.z());
+  }
+  if (fits(mirrored)) {
+    texts.emplace_back("one axis reversed or two axes swapped (a mirror image)");
+  }
+  if (fits({calibrated.rbegin(), calibrated.rend()})) {
+    texts.emplace_back("the balls numbered backwards");
+  }
+  for (std::size_t i = 0; i < calibrated.size(); ++i) {
+    for (std::size_t j = i + 1; j < calibrated.size(); ++j) {
+      std::vector<Vector3> swapped(calibrated.begin(), calibrated.end());
+      std::swap(swapped[i], swapped[j]);
+      if (fits(swapped)) {
+        texts.push_back(message("balls ", i + 1, " and ", j + 1, " swapped"));
+      }
+    }
+  }
+  return texts.empty() ? "" : "; they fit with " + joined_with_or(texts);
 }
 
 /// Machine from calibration coordinates, by the balls alone.
@@ -149,11 +234,11 @@ Result<RigidTransform> rough_pose(int position, std::span<const fit::Sphere> bal
     }
   }
   if (worst_m > options.max_shape_mismatch_m) {
-    return at_position(
-        position, ErrorCode::BadInput,
-        message("the balls do not have the shape of calibrator \"", c.name, "\": ball ", worst + 1, " is ",
-                worst_m * kMmPerM,
-                " mm off: calibrator file of another artefact, or balls numbered differently"));
+    return at_position(position, ErrorCode::BadInput,
+                       message("the balls do not have the shape of calibrator \"", c.name, "\": ball ",
+                               worst + 1, " is ", worst_m * kMmPerM,
+                               " mm off: calibrator file of another artefact, or balls numbered differently",
+                               balls_fit_with(from, to, options)));
   }
   return *T;
 }
@@ -170,6 +255,12 @@ Result<void> fit_blocks(SeenArtefact& seen, const Touched& touched, const Calibr
                          message("block ", b + 1, ": ", plane.error().text));
     }
     seen.blocks[b] = *plane;
+    const auto off_m = [&plane](const Vector3& p) { return std::abs((p - plane->point).dot(plane->normal)); };
+    if (Result<void> on = check_surface(seen.position, Feature::Block, static_cast<int>(b) + 1,
+                                        seen.block_points_m[b], off_m, options);
+        !on) {
+      return on;
+    }
   }
   const auto fits = [&](std::size_t plane, std::size_t block) {
     return line_angle_rad(seen.blocks[plane].normal, nominal[block]) <= options.max_block_tilt_rad;
@@ -208,6 +299,9 @@ Result<SeenArtefact> see(int position, const Touched& touched, const Calibrator&
   }
   if (Result<void> radii = check_radii(position, seen.balls, c, options); !radii) {
     return tl::unexpected(radii.error());
+  }
+  if (Result<void> on = check_spheres(position, seen.balls, touched, c, options); !on) {
+    return tl::unexpected(on.error());
   }
   const Result<RigidTransform> pose = rough_pose(position, seen.balls, c, options);
   if (!pose) {
@@ -315,6 +409,62 @@ Result<void> place_ball1(Observations& o, const ObserveOptions& options) {
   return {};
 }
 
+/// Scatter, over the positions, of the distances between balls at reading + L V: 0 for the true places of one
+/// artefact, whatever V has of a rotation.
+double shape_scatter_m(const Observations& o, const Matrix3& L) {
+  std::map<std::pair<int, int>, std::vector<double>> distances_m;
+  for (std::size_t i = 0; i < o.rows.size(); ++i) {
+    for (std::size_t j = i + 1; j < o.rows.size() && o.rows[j].position == o.rows[i].position; ++j) {
+      const Vector3 a = o.rows[i].reading_m + L * o.rows[i].V_m, b = o.rows[j].reading_m + L * o.rows[j].V_m;
+      distances_m[{o.rows[i].ball, o.rows[j].ball}].push_back((b - a).norm());
+    }
+  }
+  double squares = 0.0, free = 0.0;
+  for (const auto& [balls, d] : distances_m) {
+    const double mean = std::accumulate(d.begin(), d.end(), 0.0) / static_cast<double>(d.size());
+    for (const double x : d) {
+      squares += (x - mean) * (x - mean);
+    }
+    free += static_cast<double>(d.size()) - 1.0;
+  }
+  return free > 0.0 ? std::sqrt(squares / free) : 0.0;
+}
+
+/// What V may have suffered on its way into the file.
+std::vector<AxisMistake> mistakes_of_errors() {
+  std::vector<AxisMistake> all{
+      {"all signs reversed (V = actual - nominal, in um)", -Matrix3::Identity()},
+      {"errors in mm where um belong", 1e3 * Matrix3::Identity()},
+      {"errors in mm where um belong and all signs reversed", -1e3 * Matrix3::Identity()},
+      {"errors in nm where um belong", 1e-3 * Matrix3::Identity()}};
+  for (const AxisMistake& mistake : axis_mistakes()) {
+    all.push_back({mistake.text + " in errors or readings", mistake.M});
+  }
+  return all;
+}
+
+/// Noise of reading and V together leaves a scatter, too: only a change that leaves a third of it names a
+/// mistake.
+Result<void> check_one_shape(const Observations& o) {
+  constexpr double kClearly = 1.0 / 3.0, kLeast_m = 1e-6;
+  const double given_m = shape_scatter_m(o, Matrix3::Identity());
+  double best_m = std::max(kClearly * given_m, kLeast_m / 10.0);
+  std::string text;
+  for (const AxisMistake& mistake : mistakes_of_errors()) {
+    if (const double scatter_m = shape_scatter_m(o, mistake.M); scatter_m < best_m) {
+      best_m = scatter_m;
+      text = mistake.text;
+    }
+  }
+  if (given_m < kLeast_m || text.empty()) {
+    return {};
+  }
+  return failure(
+      ErrorCode::BadInput,
+      message("errors: distances between the balls differ by ", kUmPerM * given_m,
+              " um rms from position to position; they fit (", kUmPerM * best_m, " um) with ", text));
+}
+
 Result<Observations> finish(Observations o, const ObserveOptions& options) {
   if (Result<void> placed = place_ball1(o, options); !placed) {
     return tl::unexpected(placed.error());
@@ -333,6 +483,16 @@ std::size_t Observations::positions() const {
     count += i == 0 || rows[i].position != rows[i - 1].position ? 1 : 0;
   }
   return count;
+}
+
+std::optional<std::size_t> stands_as_at(const Matrix3& R_self_uni, std::span<const Matrix3> before,
+                                        double least_turn_rad) {
+  for (std::size_t i = 0; i < before.size(); ++i) {
+    if (Eigen::AngleAxisd(before[i].transpose() * R_self_uni).angle() < least_turn_rad) {
+      return i;
+    }
+  }
+  return std::nullopt;
 }
 
 Result<SeenArtefact> see_artefact(int position, std::span<const Touch> touches, const Calibrator& at_20_C,
@@ -366,6 +526,7 @@ Result<Observations> observe(std::span<const Touch> touches, const Calibrator& a
   o.machine = machine;
   o.order = options.order;
   o.artefact = uncertainty_of(c, expansion);
+  std::vector<Matrix3> turned;
   for (const auto& [position, touched] : *positions) {
     Result<SeenArtefact> seen = see(position, touched, c, pre_to_uniform(c), options);
     if (!seen) {
@@ -377,6 +538,12 @@ Result<Observations> observe(std::span<const Touch> touches, const Calibrator& a
       const Vector3 V_m = i == 0 ? Vector3(Vector3::Zero()) : Vector3(seen->ideal_m[i] - reading_m);
       o.rows.push_back({position, c.balls[i].number, reading_m, V_m});
     }
+    if (const auto before = stands_as_at(seen->T_self_uni.R, turned, options.least_turn_rad)) {
+      return at_position(position, ErrorCode::BadInput,
+                         message("the artefact stands as at position ", o.seen[*before].position,
+                                 ": touches of one position twice, or it was not turned"));
+    }
+    turned.push_back(seen->T_self_uni.R);
     o.seen.push_back(*std::move(seen));
   }
   return finish(std::move(o), options);
@@ -418,6 +585,9 @@ Result<Observations> observe_errors(std::span<const BallError> errors, const Mac
       return at_position(position, ErrorCode::BadInput,
                          message("positions are numbered 1 to ", options.positions));
     }
+  }
+  if (Result<void> one = check_one_shape(o); !one) {
+    return tl::unexpected(one.error());
   }
   return finish(std::move(o), options);
 }

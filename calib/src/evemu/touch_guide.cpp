@@ -288,12 +288,10 @@ void TouchGuide::end_position(GuidedTouch& out) {
   const std::vector<Touch> touches = site_->touches(position);
   const auto seen = see_artefact(position, touches, setup_->calibrator, setup_->options.observe);
   if (!seen) return set_position_aside(seen.error().text, out);
-  for (std::size_t before = 0; before < seen_.size(); ++before) {
-    const double turn_rad = Eigen::AngleAxisd(seen_[before].transpose() * seen->T_self_uni.R).angle();
-    if (turn_rad >= setup_->options.least_turn_rad) continue;
+  if (const auto before = stands_as_at(seen->T_self_uni.R, seen_, setup_->options.observe.least_turn_rad))
     return set_position_aside(
-        where() + message("the artefact stands as at position ", plan().positions[before], ": turn it"), out);
-  }
+        where() + message("the artefact stands as at position ", plan().positions[*before], ": turn it"),
+        out);
   site_->keep_sides();
   finished_.insert(finished_.end(), touches.begin(), touches.end());
   seen_.push_back(seen->T_self_uni.R);

@@ -93,7 +93,7 @@ bool Site::has_point_near(std::size_t feature, const Vector3& p_m) const {
 std::optional<std::size_t> Site::feature_of(const Vector3& p_m, std::size_t expected) const {
   if (ball1_m_) {
     const double off_m = std::abs((p_m - *ball1_m_).norm() - radius_m(kBall1));
-    if (off_m <= options_.observe.max_ball1_shift_m + options_.max_off_surface_m) return kBall1;
+    if (off_m <= options_.observe.max_ball1_shift_m + options_.observe.max_off_surface_m) return kBall1;
   } else {
     if (!near_first_ball(p_m)) return std::nullopt;
     return kBall1;
@@ -112,10 +112,10 @@ bool Site::near_first_ball(const Vector3& p_m) const {
 }
 
 bool Site::on_face(std::size_t block, const Vector3& p_m) const {
-  const auto face = sure_face(points_[block], options_.max_off_surface_m);
+  const auto face = sure_face(points_[block], options_.observe.max_off_surface_m);
   if (!face) return false;
   constexpr double kBeyond_m = 20e-3;  // of the points there are: a face is a few centimetres large
-  return std::abs((p_m - face->point).dot(face->normal)) <= options_.max_off_surface_m &&
+  return std::abs((p_m - face->point).dot(face->normal)) <= options_.observe.max_off_surface_m &&
          (p_m - face->point).norm() <= 2.0 * spread_m(points_[block], face->point) + kBeyond_m;
 }
 
@@ -131,7 +131,7 @@ std::optional<std::size_t> Site::face_of(const Vector3& p_m, std::size_t expecte
   if ((p_m - *ball1_m_).norm() > extent_m()) return std::nullopt;
   const std::size_t first = expected > kBlock2 ? kBlock1 : std::max(expected, kBlock1);
   for (std::size_t block = first; block <= kBlock2; ++block) {
-    if (!sure_face(points_[block], options_.max_off_surface_m)) return block;
+    if (!sure_face(points_[block], options_.observe.max_off_surface_m)) return block;
   }
   return std::nullopt;
 }
@@ -220,8 +220,8 @@ void Site::clear(std::size_t feature) {
 }
 
 std::optional<fit::Plane> Site::face(std::size_t block) const {
-  auto plane =
-      likely_face(points_[block], options_.observe.least_points_per_block, options_.max_off_surface_m);
+  auto plane = likely_face(points_[block], options_.observe.least_points_per_block,
+                           options_.observe.max_off_surface_m);
   if (plane && (plane->point - *ball1_m_).dot(plane->normal) < 0.0) plane->normal = -plane->normal;
   return plane;
 }
@@ -279,14 +279,14 @@ FeatureCheck Site::check_ball(std::size_t feature) const {
   const std::vector<Vector3>& points = points_[feature];
   const auto fits = [&](const fit::Sphere& s) {
     return std::abs(s.radius - radius_m(feature)) <= options_.observe.max_radius_mismatch_m &&
-           largest(s.residuals) <= options_.max_off_surface_m;
+           largest(s.residuals) <= options_.observe.max_off_surface_m;
   };
   const auto sphere = fit::fit_sphere(points);
   if (sphere && fits(*sphere)) return {.fine = true};
   FeatureCheck found;
   // One sphere, with more points than it needs, but of another size.
   if (sphere && points.size() > options_.observe.least_points_per_ball &&
-      largest(sphere->residuals) <= options_.max_off_surface_m)
+      largest(sphere->residuals) <= options_.observe.max_off_surface_m)
     found.other_radius_m = sphere->radius;
   for (std::size_t i = 0; i < points.size() && !found.other_radius_m; ++i) {
     const auto rest = fit::fit_sphere(without(points, i));
@@ -300,7 +300,7 @@ FeatureCheck Site::check_ball(std::size_t feature) const {
 FeatureCheck Site::check_face(std::size_t feature) const {
   const std::vector<Vector3>& points = points_[feature];
   const auto face_of_some = [this](const std::vector<Vector3>& some) {
-    return likely_face(some, 3, options_.max_off_surface_m);
+    return likely_face(some, 3, options_.observe.max_off_surface_m);
   };
   if (face_of_some(points)) return {.fine = true};
   FeatureCheck found;

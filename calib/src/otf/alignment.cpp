@@ -4,6 +4,7 @@
 #include <cmath>
 #include <limits>
 
+#include "abbe/calib/axis_mistakes.hpp"
 #include "message.hpp"
 #include "otf/check_stopped.hpp"
 
@@ -178,10 +179,8 @@ Result<void> refine(Alignment& a, Pairs& pairs, const BlockSeries& series, const
   }
 }
 
-}  // namespace
-
-Result<Alignment> align(const BlockSeries& series, const Machine& machine, const Path& path,
-                        const Options& options) {
+Result<Alignment> align_as_given(const BlockSeries& series, const Machine& machine, const Path& path,
+                                 const Options& options) {
   if (Result<void> fine = check(series, path); !fine) {
     return tl::unexpected(fine.error());
   }
@@ -208,6 +207,60 @@ Result<Alignment> align(const BlockSeries& series, const Machine& machine, const
     return tl::unexpected(fine.error());
   }
   a.used = std::move(pairs.used);
+  return a;
+}
+
+Path times(const Matrix3& M, Path path) {
+  for (Vector3& vertex : path.vertices_m) {
+    vertex = M * vertex;
+  }
+  return path;
+}
+
+/// A rigid fit cannot tell one reflection from another: those that stay inside the travel.
+std::string reflections(const Path& path, const MachineNodes& travel) {
+  std::vector<std::string> texts;
+  for (const AxisMistake& mistake : axis_mistakes()) {
+    if (mistake.M.determinant() < 0.0 && outside_travel(times(mistake.M, path).vertices_m, travel).empty()) {
+      texts.push_back(mistake.text);
+    }
+  }
+  return texts.empty() ? "one axis of the path or of the tracker's frame reversed, or two swapped"
+                       : joined_with_or(texts) + ", or with such a tracker frame";
+}
+
+/// "; they fit with the path driven backwards". Empty: with none of the mistakes that were tried.
+std::string fits_with(const BlockSeries& series, const Machine& machine, const Path& path, Options options) {
+  options.progress = {};
+  const auto fits = [&](const Path& other) {
+    return align_as_given(series, machine, other, options).has_value();
+  };
+  std::vector<std::string> texts;
+  if (fits({{path.vertices_m.rbegin(), path.vertices_m.rend()}})) {
+    texts.emplace_back("the path driven backwards");
+  }
+  if (fits(times(Vector3(-1.0, 1.0, 1.0).asDiagonal(), path))) {
+    texts.push_back(reflections(path, machine.nodes));
+  }
+  for (const UnitMistake& mistake : unit_mistakes()) {
+    for (const auto& [factor, file] :
+         {std::pair{mistake.factor, "path"}, {1.0 / mistake.factor, "tracker"}}) {
+      if (fits(times(factor * Matrix3::Identity(), path))) {
+        texts.push_back(message(mistake.text, " (", file, ")"));
+      }
+    }
+  }
+  return texts.empty() ? "" : "; they fit with " + joined_with_or(texts);
+}
+
+}  // namespace
+
+Result<Alignment> align(const BlockSeries& series, const Machine& machine, const Path& path,
+                        const Options& options) {
+  Result<Alignment> a = align_as_given(series, machine, path, options);
+  if (!a && (a.error().code == ErrorCode::AlignmentFailed || a.error().code == ErrorCode::NotConverged)) {
+    a.error().text += fits_with(series, machine, path, options);
+  }
   return a;
 }
 

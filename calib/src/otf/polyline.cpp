@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <limits>
 
+#include "abbe/calib/axis_mistakes.hpp"
 #include "message.hpp"
 
 namespace abbe::calib::otf {
@@ -80,17 +81,15 @@ Result<void> check(const Path& path) {
 }
 
 Result<void> check(const Path& path, const MachineNodes& travel) {
-  constexpr double kRounding_m = 1e-9;  // of a file in mm
-  for (std::size_t i = 0; i < path.vertices_m.size(); ++i) {
-    for (Eigen::Index a = 0; a < 3; ++a) {
-      const auto& nodes_m = travel[static_cast<std::size_t>(a)].nodes_m;
-      const double q_m = path.vertices_m[i][a];
-      if (q_m < nodes_m.front() - kRounding_m || q_m > nodes_m.back() + kRounding_m) {
-        return failure(ErrorCode::BadInput,
-                       message("path: vertex ", i, " at ", "XYZ"[a], " ", 1e3 * q_m, " mm, the axis travels ",
-                               1e3 * nodes_m.front(), " to ", 1e3 * nodes_m.back(), " mm"));
-      }
-    }
+  const std::vector<OutsideTravel> outside = outside_travel(path.vertices_m, travel);
+  if (!outside.empty()) {
+    const auto [vertex, axis] = outside.front();
+    const auto& nodes_m = travel[axis].nodes_m;
+    return failure(ErrorCode::BadInput,
+                   message("path: vertex ", vertex, " at ", "XYZ"[axis], " ",
+                           1e3 * path.vertices_m[vertex][static_cast<Eigen::Index>(axis)],
+                           " mm, the axis travels ", 1e3 * nodes_m.front(), " to ", 1e3 * nodes_m.back(),
+                           " mm", inside_travel_with(path.vertices_m, travel)));
   }
   return check(path);
 }

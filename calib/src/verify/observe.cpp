@@ -1,5 +1,8 @@
 #include "abbe/calib/verify/observe.hpp"
 
+#include <algorithm>
+
+#include "abbe/calib/axis_mistakes.hpp"
 #include "abbe/calib/model_comparison.hpp"
 #include "message.hpp"
 #include "verify/extent.hpp"
@@ -14,6 +17,44 @@ Result<void> check_finite(std::span<const MeasuredPoint> points) {
     }
   }
   return {};
+}
+
+/// "; they fit with ...": a reflection, another unit, the rows backwards. Empty: with none of them.
+std::string fits_with(const Observations& o, double most_rms_m) {
+  const auto fits = [&](const Matrix3& M, bool backwards) {
+    std::vector<Vector3> from;
+    for (const Vector3& p : o.measured_m) {
+      from.emplace_back(M * p);
+    }
+    if (backwards) {
+      std::reverse(from.begin(), from.end());
+    }
+    const auto T = fit_rigid(from, o.readings_m);
+    std::vector<Vector3> left;
+    for (std::size_t i = 0; T && i < from.size(); ++i) {
+      left.emplace_back(*T * from[i] - o.readings_m[i]);
+    }
+    return T && vector_statistics(left).rms_m <= most_rms_m;
+  };
+  std::vector<std::string> texts;
+  if (fits(Matrix3::Identity(), false)) {
+    texts.emplace_back("a frame that is fitted to the readings (--frame fit)");
+  }
+  if (fits(Vector3(-1.0, 1.0, 1.0).asDiagonal(), false)) {
+    texts.emplace_back("one axis reversed or two axes swapped (a left-handed frame)");
+  }
+  if (fits(Matrix3::Identity(), true)) {
+    texts.emplace_back("the measured points in the opposite order");
+  }
+  for (const UnitMistake& mistake : unit_mistakes()) {
+    for (const auto& [factor, of] :
+         {std::pair{mistake.factor, "measured points"}, {1.0 / mistake.factor, "readings"}}) {
+      if (fits(factor * Matrix3::Identity(), false)) {
+        texts.push_back(message(mistake.text, " (", of, ")"));
+      }
+    }
+  }
+  return texts.empty() ? "" : "; they fit with " + joined_with_or(texts);
 }
 
 Result<void> check_misfit(const Observations& o, const Extent& extent) {
@@ -32,7 +73,8 @@ Result<void> check_misfit(const Observations& o, const Extent& extent) {
         message("verification: readings and measured points of ", extent.diagonal_m(), " m extent leave ",
                 rms_m, " m rms",
                 o.frame == Frame::BestFit ? " after the best rigid motion" : " in the machine's axes",
-                ": rows mixed up, another unit, or a left-handed frame"));
+                ": rows mixed up, another unit, or a left-handed frame",
+                fits_with(o, kMostMisfit * extent.diagonal_m())));
   }
   return {};
 }

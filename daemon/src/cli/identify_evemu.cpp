@@ -24,6 +24,7 @@
 #include "cli/scales_corrected.hpp"
 #include "cli/terminal.hpp"
 #include "files/text_file.hpp"
+#include "input/travel_faults.hpp"
 #include "units.hpp"
 
 namespace abbe::daemon {
@@ -91,6 +92,38 @@ Result<void> check_artefact(const IdentifyEvemuArguments& arguments, const evemu
   return fault.empty() ? Result<void>{} : fail(ErrorCode::BadInput, fault);
 }
 
+std::vector<calib::Vector3> positions_of(const std::vector<evemu::Touch>& touches) {
+  std::vector<calib::Vector3> out;
+  for (const evemu::Touch& touch : touches) out.push_back(touch.p_m);
+  return out;
+}
+
+std::vector<calib::Vector3> positions_of(const std::vector<evemu::BallError>& errors) {
+  std::vector<calib::Vector3> out;
+  for (const evemu::BallError& error : errors) out.push_back(error.reading_m);
+  return out;
+}
+
+tl::unexpected<Error> in_file(const std::string& file, const calib::Error& error) {
+  Error out = error_of(error);
+  out.text = fmt::format("{}: {}", file, out.text);
+  return tl::unexpected(std::move(out));
+}
+
+/// ":42", where the touches of the first position begin that no artefact is seen in; empty: it is not one
+/// position's.
+std::string line_at_fault(const TouchesFile& file, const evemu::Calibrator& calibrator,
+                          const evemu::ObserveOptions& options) {
+  std::map<int, std::vector<evemu::Touch>> by_position;
+  for (const evemu::Touch& touch : file.touches) by_position[touch.position].push_back(touch);
+  for (const auto& [position, touches] : by_position) {
+    if (evemu::see_artefact(position, touches, calibrator, options)) continue;
+    const auto first = std::ranges::find(file.touches, position, &evemu::Touch::position);
+    return fmt::format(":{}", file.lines[static_cast<std::size_t>(first - file.touches.begin())]);
+  }
+  return {};
+}
+
 Result<void> observe_touches(const IdentifyEvemuArguments& arguments, const evemu::Machine& machine,
                              const evemu::ObserveOptions& options, Input& input) {
   const auto calibrator = read_calibrator_toml(arguments.calibrator);
@@ -101,9 +134,15 @@ Result<void> observe_touches(const IdentifyEvemuArguments& arguments, const evem
     return fine;
   const auto touches = read_touches_csv(arguments.touches);
   if (!touches) return tl::make_unexpected(touches.error());
+  if (auto inside = check_travel(arguments.touches, positions_of(touches->touches), touches->lines,
+                                 input.config.machine);
+      !inside)
+    return inside;
   input.sources.insert(input.sources.end(), {touches->source, calibrator->source});
   auto observed = evemu::observe(touches->touches, calibrator->calibrator, machine, options);
-  if (!observed) return tl::make_unexpected(error_of(observed.error()));
+  if (!observed)
+    return in_file(arguments.touches + line_at_fault(*touches, calibrator->calibrator, options),
+                   observed.error());
   input.observations = std::move(*observed);
   return {};
 }
@@ -112,11 +151,15 @@ Result<void> observe_errors(const IdentifyEvemuArguments& arguments, const evemu
                             const evemu::ObserveOptions& options, Input& input) {
   const auto errors = read_errors_csv(arguments.errors);
   if (!errors) return tl::make_unexpected(errors.error());
+  if (auto inside =
+          check_travel(arguments.errors, positions_of(errors->errors), errors->lines, input.config.machine);
+      !inside)
+    return inside;
   input.sources.push_back(errors->source);
   const auto rotation =
       arguments.rotation_known ? evemu::RotationOrigin::Independent : evemu::RotationOrigin::Blocks;
   auto observed = evemu::observe_errors(errors->errors, machine, rotation, options);
-  if (!observed) return tl::make_unexpected(error_of(observed.error()));
+  if (!observed) return in_file(arguments.errors, observed.error());
   input.observations = std::move(*observed);
   return {};
 }
@@ -139,6 +182,8 @@ Result<Input> from_files(const IdentifyEvemuArguments& arguments) {
   const auto* what = arguments.touches.empty() ? "errors" : "touches";
   if (const auto fine = check_scales("identify evemu", what, *config, arguments.scales_corrected); !fine)
     return tl::make_unexpected(fine.error());
+  if (const auto given = require_target(config->machine); !given)
+    return fail(given.error().code, fmt::format("{}: {}", arguments.machine, given.error().text));
   const auto machine = evemu_machine(config->machine);
   if (!machine) return tl::make_unexpected(machine.error());
   auto options = observe_options(arguments, config->evemu, config->evemu.positions.size());
@@ -174,6 +219,8 @@ Result<EvemuRun> last_complete_run(const OpenedRecording& recording) {
 Result<Input> from_recording(const IdentifyEvemuArguments& arguments) {
   auto recording = open_recording(arguments.recording, arguments.machine);
   if (!recording) return tl::make_unexpected(recording.error());
+  if (const auto given = require_target(recording->config.machine); !given)
+    return tl::make_unexpected(given.error());
   const auto machine = evemu_machine(recording->config.machine);
   if (!machine) return tl::make_unexpected(machine.error());
   const auto run = last_complete_run(*recording);
@@ -195,6 +242,10 @@ Result<void> read_reference(const IdentifyEvemuArguments& arguments, Input& inpu
   if (arguments.reference.empty()) return {};
   const auto points = read_errors_csv(arguments.reference);
   if (!points) return tl::make_unexpected(points.error());
+  if (auto inside = check_travel(arguments.reference, positions_of(points->errors), points->lines,
+                                 input.config.machine);
+      !inside)
+    return inside;
   input.sources.push_back(points->source);
   input.reference = RotationPoints{points->errors, arguments.u_reference_um / kUmPerM};
   return {};

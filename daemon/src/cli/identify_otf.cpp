@@ -21,6 +21,7 @@
 #include "cli/scales_corrected.hpp"
 #include "cli/terminal.hpp"
 #include "files/text_file.hpp"
+#include "input/travel_faults.hpp"
 #include "units.hpp"
 
 namespace abbe::daemon {
@@ -99,12 +100,23 @@ double u_scale(const IdentifyOtfArguments& arguments, const Config& config) {
   return config.tracker ? config.tracker->u_scale : 0.0;
 }
 
+/// As a session of the daemon does before the machine drives; outside the travel with line and column.
+Result<void> check_path(const std::string& file, const PathFile& path, const MachineConfig& machine) {
+  if (auto inside = check_travel(file, otf_path(path.vertices_m).vertices_m, path.lines, machine); !inside)
+    return inside;
+  auto fine = check_otf_path(path.vertices_m, machine);
+  if (!fine) fine.error().text = fmt::format("{}: {}", file, fine.error().text);
+  return fine;
+}
+
 Result<OtfOutcome> from_files(const IdentifyOtfArguments& arguments,
                               const std::optional<ModelDocument>& active, ProgressBar& bar) {
   auto files = read_files(arguments, bar);
   if (!files) return tl::make_unexpected(files.error());
   if (const auto fine = check_scales("identify otf", "a path", files->config, arguments.scales_corrected);
       !fine)
+    return tl::make_unexpected(fine.error());
+  if (const auto fine = check_path(arguments.path, files->path, files->config.machine); !fine)
     return tl::make_unexpected(fine.error());
   const auto machine = otf_machine(files->config.machine);
   if (!machine) return tl::make_unexpected(machine.error());
@@ -144,6 +156,8 @@ Result<OtfOutcome> from_recording(const IdentifyOtfArguments& arguments,
                                   const std::optional<ModelDocument>& active, ProgressBar& bar) {
   const auto recording = open_recording(arguments.recording, arguments.machine);
   if (!recording) return tl::make_unexpected(recording.error());
+  if (const auto given = require_target(recording->config.machine); !given)
+    return tl::make_unexpected(given.error());
   const auto other = to_beat(active, recording->config);
   auto replayed =
       replay(recording->reader, recording->config,

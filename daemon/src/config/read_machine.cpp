@@ -137,7 +137,8 @@ void read_machine(Section& root, MachineConfig& out) {
   Section target = root.child("target");
   std::vector<double> offset_m;
   if (target.get("offset_mm", offset_m, kMilli)) {
-    if (offset_m.size() == 3)
+    out.target_given = offset_m.size() == 3;
+    if (out.target_given)
       std::copy(offset_m.begin(), offset_m.end(), out.target_offset_m.begin());
     else
       target.fault("offset_mm", "must be three numbers, x, y, z");

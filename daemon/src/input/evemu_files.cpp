@@ -114,13 +114,15 @@ Result<TouchesFile> read_touches_csv(const std::filesystem::path& file) {
   if (!parsed) return tl::make_unexpected(parsed.error());
   check_rows(*parsed, 1, "touches");
   auto& [source, table, faults] = *parsed;
-  TouchesFile out{source, {}};
-  for (std::size_t row = 0; row < table.rows(); ++row)
+  TouchesFile out{source, {}, {}};
+  for (std::size_t row = 0; row < table.rows(); ++row) {
+    out.lines.push_back(table.line(row));
     out.touches.push_back(
         {.position = number_at(table, row, 0, "position", faults),
          .feature = table.at(row, 1) < 0.5 ? calib::evemu::Feature::Ball : calib::evemu::Feature::Block,
          .number = number_at(table, row, 2, "index", faults),
          .p_m = vector_at(table, row, 3, kMmPerM)});
+  }
   if (faults.any()) return tl::make_unexpected(faults.to_error());
   return out;
 }
@@ -131,12 +133,14 @@ Result<BallErrorsFile> read_errors_csv(const std::filesystem::path& file) {
   if (!parsed) return tl::make_unexpected(parsed.error());
   check_rows(*parsed, 1, "errors");
   auto& [source, table, faults] = *parsed;
-  BallErrorsFile out{source, {}};
-  for (std::size_t row = 0; row < table.rows(); ++row)
+  BallErrorsFile out{source, {}, {}};
+  for (std::size_t row = 0; row < table.rows(); ++row) {
+    out.lines.push_back(table.line(row));
     out.errors.push_back({.position = number_at(table, row, 0, "position", faults),
                           .ball = number_at(table, row, 1, "ball", faults),
                           .reading_m = vector_at(table, row, 2, kMmPerM),
                           .V_m = vector_at(table, row, 5, kUmPerM)});
+  }
   if (faults.any()) return tl::make_unexpected(faults.to_error());
   return out;
 }

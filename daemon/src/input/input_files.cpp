@@ -85,9 +85,10 @@ Result<PathFile> read_path_csv(const std::filesystem::path& file) {
   check_path(*parsed);
   if (parsed->faults.any()) return tl::make_unexpected(parsed->faults.to_error());
   const auto& table = parsed->table;
-  PathFile path{parsed->source, {}, {}};
+  PathFile path{parsed->source, {}, {}, {}};
   for (std::size_t row = 0; row < table.rows(); ++row) {
     path.vertices_m.push_back(position_m(table, row, 0));
+    path.lines.push_back(table.line(row));
     if (table.has(3)) path.feed_m_per_s.push_back(table.at(row, 3) / kMmPerM / kSecondsPerMinute);
   }
   return path;

@@ -84,6 +84,7 @@ Result<void> check_evemu(const EvemuRequest& request, const Config& config) {
                 "calibrate evemu: the measuring machine corrects what it reports ([cmm] axes_compensated = "
                 "true): switch that off first, and say so in the configuration");
   }
+  if (const auto given = require_target(config.machine); !given) return given;
   if (const auto machine = evemu_machine(config.machine); !machine) return tl::unexpected(machine.error());
   const auto& artefact = config.evemu.artefact;
   const auto fault =

@@ -59,7 +59,18 @@ calib::otf::Path otf_path(std::span<const AxisPosition> path_m) {
   return path;
 }
 
+Result<void> require_target(const MachineConfig& machine) {
+  if (machine.target_given) return {};
+  return fail(
+      ErrorCode::BadInput,
+      fmt::format("machine {}: [target] offset_mm is missing: add [target] with offset_mm = [x, y, z], the "
+                  "reflector's or stylus tip's centre as seen from the tool reference point, in mm along the "
+                  "machine's axes; [0, 0, 0] where both are one point",
+                  machine.name));
+}
+
 Result<void> check_otf_path(std::span<const AxisPosition> path_m, const MachineConfig& machine) {
+  if (auto given = require_target(machine); !given) return given;
   const auto known = otf_machine(machine);
   if (!known) return tl::unexpected(known.error());
   const auto fine = calib::otf::check(otf_path(path_m), known->nodes);

@@ -51,6 +51,8 @@ struct MachineConfig {
   std::vector<AxisConfig> axes;  ///< X, Y, Z, then further linear ones, then rotary ones by name
   std::array<double, 3>
       target_offset_m{};  ///< reflector centre relative to the tool reference point, machine axes
+  bool target_given =
+      false;  ///< [target] offset_mm is there; else the zeros above are no offset: require_target()
   BasisConfig basis = BasisConfig::Linear;
   std::map<std::string, std::vector<double>>
       nodes_m;                    ///< of every linear axis, ascending, both ends of travel included

@@ -21,6 +21,7 @@ namespace abbe::daemon {
 struct TouchesFile {
   InputFile source;
   std::vector<calib::evemu::Touch> touches;
+  std::vector<std::size_t> lines;  ///< of the touches in the file
 };
 [[nodiscard]] Result<TouchesFile> read_touches_csv(const std::filesystem::path& file);
 
@@ -28,6 +29,7 @@ struct TouchesFile {
 struct BallErrorsFile {
   InputFile source;
   std::vector<calib::evemu::BallError> errors;
+  std::vector<std::size_t> lines;  ///< of the errors in the file
 };
 [[nodiscard]] Result<BallErrorsFile> read_errors_csv(const std::filesystem::path& file);
 

@@ -35,6 +35,7 @@ struct PathFile {
   InputFile source;
   std::vector<AxisPosition> vertices_m;
   std::vector<double> feed_m_per_s;  ///< as long as vertices_m, or empty if the file has no such column
+  std::vector<std::size_t> lines;    ///< of the vertices in the file
 };
 [[nodiscard]] Result<PathFile> read_path_csv(const std::filesystem::path& file);
 

@@ -17,7 +17,10 @@ namespace abbe::daemon {
 [[nodiscard]] Result<calib::otf::Machine> otf_machine(const MachineConfig& machine);
 [[nodiscard]] calib::otf::Noise otf_noise(const MachineConfig& machine);
 [[nodiscard]] calib::otf::Path otf_path(std::span<const AxisPosition> path_m);
-/// BadInput when no run along the path could be identified: too few vertices, on a line, outside the travel.
+/// BadInput where [target] offset_mm is missing: every calibration needs it, and zeros would pass for it.
+[[nodiscard]] Result<void> require_target(const MachineConfig& machine);
+/// BadInput when no run along the path could be identified: too few vertices, on a line, outside the travel;
+/// no [target].
 [[nodiscard]] Result<void> check_otf_path(std::span<const AxisPosition> path_m, const MachineConfig& machine);
 /// Time is the tracker's own clock from the first point on.
 [[nodiscard]] std::vector<calib::otf::TrackerObservation> otf_observations(std::span<const RunPoint> points);

@@ -14,7 +14,7 @@ namespace abbe::daemon {
 /// What the controller is set to with weather = "none": 20 C, 1013.25 hPa, 50 %.
 [[nodiscard]] calib::Air assumed_air() noexcept;
 
-/// Relative standard uncertainty of all distances then, against the air of a shop floor: 1.1e-5.
+/// Relative standard uncertainty of all distances then, against the air of a shop floor: 1.05e-5.
 [[nodiscard]] double u_of_unmeasured_air() noexcept;
 
 [[nodiscard]] bool air_is_unmeasured(const Config& config) noexcept;

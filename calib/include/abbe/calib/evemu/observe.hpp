@@ -51,6 +51,10 @@ struct ObserveOptions {
   double max_block_tilt_rad = 0.05;
   /// Ball1 stands still while the artefact turns about it; V is relative to it, so it must be one place.
   double max_ball1_shift_m = 1e-3;
+  /// Smallest turn between two positions; less is the same position again.
+  double least_turn_rad = 2e-3;
+  /// Off the surface the others of a feature lie on. Machine errors near 3 mm bend a sphere by 0.4 mm.
+  double max_off_surface_m = 1e-3;
   /// Thinnest against largest extent of all balls. Below, the third axis is not tested.
   double least_thickness = 1e-3;
   /// Where the calibrator says how the array grows, and only there.
@@ -74,15 +78,22 @@ struct Observations {
 
 /// Everything wrong with the touches is said by position and number, and named: TooFewObservations (points on
 /// a ball or block, a ball, block or position left out), BadInput (a ball touched under two numbers, blocks
-/// swapped, calibrator of another artefact or balls numbered differently, Ball1 moved; a temperature without
-/// an expansivity, or one without the other), DegenerateGeometry (all balls in one plane). With both, the
-/// array is taken as it is at that temperature.
+/// swapped, a touch beside its surface, calibrator of another artefact or balls numbered differently, Ball1
+/// moved, an artefact that was not turned; a temperature without an expansivity, or one without the other),
+/// DegenerateGeometry (all balls in one plane). Where the balls fit mirrored, renumbered or in another unit,
+/// the error says so. With temperature and expansivity the array is taken as it is at that temperature.
 [[nodiscard]] Result<Observations> observe(std::span<const Touch>, const Calibrator&, const Machine&,
                                            const ObserveOptions& = {});
 /// One position alone, by the same rules; without a temperature at 20 C, whatever the calibrator says.
 [[nodiscard]] Result<SeenArtefact> see_artefact(int position, std::span<const Touch> touches_of_it,
                                                 const Calibrator&, const ObserveOptions& = {});
-/// observe() from errors that were computed elsewhere; block rotations are then unknown.
+/// The earlier position at which the artefact stood as it does now.
+[[nodiscard]] std::optional<std::size_t> stands_as_at(const Matrix3& R_self_uni,
+                                                      std::span<const Matrix3> before, double least_turn_rad);
+
+/// observe() from errors that were computed elsewhere; block rotations are then unknown. BadInput also where
+/// reading + V makes an artefact of another shape at every position, and of one shape with signs, axes or
+/// unit of V changed: the change that fits is named.
 [[nodiscard]] Result<Observations> observe_errors(std::span<const BallError>, const Machine&,
                                                   RotationOrigin rotation = RotationOrigin::Blocks,
                                                   const ObserveOptions& = {});

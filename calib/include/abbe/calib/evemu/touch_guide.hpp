@@ -25,15 +25,11 @@ struct TouchPlan {
 };
 
 struct GuideOptions {
-  ObserveOptions observe{};  ///< fewest points, tolerances of shape; `positions` comes from the plan
+  ObserveOptions observe{};  ///< fewest points, tolerances; `positions` comes from the plan
   /// Two touches nearer than this are one place touched twice: repeatability is far below, points far above.
   double same_place_m = 50e-6;
-  /// Off the surface the others of a feature lie on. Machine errors near 3 mm bend a sphere by 0.4 mm.
-  double max_off_surface_m = 1e-3;
   /// Off the sphere a ball is expected at: errors near 3 mm over the length of the array, and the faces'.
   double max_off_expected_m = 5e-3;
-  /// Smallest turn between two positions; less is the same position again.
-  double least_turn_rad = 2e-3;
   /// Touches on nothing known, one after the other, that end the guiding.
   std::size_t most_astray = 20;
 };

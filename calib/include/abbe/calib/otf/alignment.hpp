@@ -31,7 +31,8 @@ struct Alignment {
                                                            double direction_m);
 
 /// Errors of check(Path). AlignmentFailed: the points do not fit this path
-/// (length, rms). NotConverged: max_alignment_updates used up.
+/// (length, rms). NotConverged: max_alignment_updates used up. Both name what they fit instead: the path
+/// driven backwards, reflected, in another unit of length.
 [[nodiscard]] Result<Alignment> align(const BlockSeries&, const Machine&, const Path&, const Options&);
 
 }  // namespace abbe::calib::otf

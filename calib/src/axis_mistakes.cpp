@@ -1,0 +1,104 @@
+#include "abbe/calib/axis_mistakes.hpp"
+
+#include "message.hpp"
+
+namespace abbe::calib {
+namespace {
+
+constexpr double kRounding_m = 1e-9;
+
+Matrix3 reversed(std::span<const Eigen::Index> axes) {
+  Matrix3 M = Matrix3::Identity();
+  for (const Eigen::Index a : axes) {
+    M(a, a) = -1.0;
+  }
+  return M;
+}
+
+/// Row i takes what was given as axis from[i].
+Matrix3 reordered(const std::array<Eigen::Index, 3>& from) {
+  Matrix3 M = Matrix3::Zero();
+  for (Eigen::Index i = 0; i < 3; ++i) {
+    M(i, from[static_cast<std::size_t>(i)]) = 1.0;
+  }
+  return M;
+}
+
+bool is_inside(double q_m, const AxisNodes& axis) {
+  return q_m >= axis.nodes_m.front() - kRounding_m && q_m <= axis.nodes_m.back() + kRounding_m;
+}
+
+bool all_inside(std::span<const Vector3> points_m, const Matrix3& M, const MachineNodes& travel) {
+  for (const Vector3& p : points_m) {
+    const Vector3 q = M * p;
+    for (std::size_t a = 0; a < 3; ++a) {
+      if (!is_inside(q[static_cast<Eigen::Index>(a)], travel[a])) {
+        return false;
+      }
+    }
+  }
+  return true;
+}
+
+}  // namespace
+
+const std::vector<AxisMistake>& axis_mistakes() {
+  static const std::vector<AxisMistake> all{{"X reversed", reversed(std::array<Eigen::Index, 1>{0})},
+                                            {"Y reversed", reversed(std::array<Eigen::Index, 1>{1})},
+                                            {"Z reversed", reversed(std::array<Eigen::Index, 1>{2})},
+                                            {"X and Y swapped", reordered({1, 0, 2})},
+                                            {"X and Z swapped", reordered({2, 1, 0})},
+                                            {"Y and Z swapped", reordered({0, 2, 1})},
+                                            {"X and Y reversed", reversed(std::array<Eigen::Index, 2>{0, 1})},
+                                            {"X and Z reversed", reversed(std::array<Eigen::Index, 2>{0, 2})},
+                                            {"Y and Z reversed", reversed(std::array<Eigen::Index, 2>{1, 2})},
+                                            {"the axes in the order Y, Z, X", reordered({2, 0, 1})},
+                                            {"the axes in the order Z, X, Y", reordered({1, 2, 0})}};
+  return all;
+}
+
+const std::vector<UnitMistake>& unit_mistakes() {
+  static const std::vector<UnitMistake> all{{"lengths in m where mm belong", 1e3},
+                                            {"lengths in um where mm belong", 1e-3},
+                                            {"lengths in inches where mm belong", 25.4}};
+  return all;
+}
+
+std::vector<OutsideTravel> outside_travel(std::span<const Vector3> points_m, const MachineNodes& travel) {
+  std::vector<OutsideTravel> found;
+  for (std::size_t i = 0; i < points_m.size(); ++i) {
+    for (std::size_t a = 0; a < 3; ++a) {
+      if (!is_inside(points_m[i][static_cast<Eigen::Index>(a)], travel[a])) {
+        found.push_back({i, a});
+      }
+    }
+  }
+  return found;
+}
+
+std::string inside_travel_with(std::span<const Vector3> points_m, const MachineNodes& travel) {
+  std::vector<std::string> texts;
+  for (const AxisMistake& mistake : axis_mistakes()) {
+    if (all_inside(points_m, mistake.M, travel)) {
+      texts.push_back(mistake.text);
+    }
+  }
+  // What becomes smaller fits most machines: a unit is named where no axis explains it.
+  const bool explained = !texts.empty();
+  for (const UnitMistake& mistake : unit_mistakes()) {
+    if (!explained && all_inside(points_m, mistake.factor * Matrix3::Identity(), travel)) {
+      texts.push_back(mistake.text);
+    }
+  }
+  return texts.empty() ? "" : "; all are inside with " + joined_with_or(texts);
+}
+
+std::string joined_with_or(std::span<const std::string> texts) {
+  std::string out;
+  for (const std::string& text : texts) {
+    out += message(out.empty() ? "" : ", or with ", text);
+  }
+  return out;
+}
+
+}  // namespace abbe::calib

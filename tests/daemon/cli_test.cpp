@@ -208,7 +208,7 @@ std::string with_machine(const test::OtfFiles& files, const fs::path& machine, c
 TEST_F(Cli, TheVerdictNamesAirThatNobodyMeasured) {
   const auto machine =
       write("no_air.toml", test::synthetic_machine_toml() +
-                               "[tracker]\nhost = \"t\"\nweather = \"none\"\nu_scale_ppm = 1\n");
+                               "host = \"t\"\nweather = \"none\"\nu_scale_ppm = 1\n" /* of [tracker] */);
   const auto ran = abbe(with_machine(files_, machine, files_.path, folder_ / "no_air"));
   EXPECT_THAT(ran.out, AllOf(HasSubstr("air not measured"), HasSubstr("20 C, 1013.25 hPa, 50 %"))) << ran.err;
 }

@@ -124,7 +124,7 @@ std::string points_of_tables(const ModelDocument& document, double factor) {
   return to_verification_csv(points);
 }
 
-TEST_F(VerifyCli, DoesNotFrightenAboutAVeryGoodModel) {
+TEST_F(VerifyCli, GivesNoRatioForAGoodModelOnACoarseGrid) {
   const auto document = test::synthetic_document(3);
   write("tables.json", to_json(document));
   write("points.csv", points_of_tables(document, 1.0));

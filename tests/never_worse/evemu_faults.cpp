@@ -29,7 +29,8 @@ int any_position(EvemuRun& run) {
 void move_within(EvemuRun& run, double shift_m, double angle_rad) {
   const int position = any_position(run);
   const double from = uniform(run.random, 0.15, 0.9);
-  const Vector3 shift = shift_m * direction(run.random), turn = angle_rad * direction(run.random);
+  const Vector3 shift = shift_m * direction(run.random);
+  const Vector3 turn = angle_rad * direction(run.random);
   run.moved = [=](const TouchTime& t) {
     return t.position == position && t.in_position > from ? turned_and_shifted(turn, shift)
                                                           : Isometry3d::Identity();
@@ -39,7 +40,8 @@ void move_within(EvemuRun& run, double shift_m, double angle_rad) {
 /// Ball1 is not put back where it was.
 void move_between(EvemuRun& run) {
   for (Isometry3d& T : run.T_machine_array) {
-    T.pretranslate(log_uniform(run.random, 5e-6, 200e-6) * direction(run.random));
+    const double by_m = log_uniform(run.random, 5e-6, 200e-6);
+    T.pretranslate(by_m * direction(run.random));
   }
 }
 
@@ -56,7 +58,8 @@ void swap_balls(EvemuRun& run) {
 void displace_ball_once(EvemuRun& run) {
   const int position = any_position(run);
   const Vector3 centre = run.array.balls[1 + run.random() % (run.array.balls.size() - 1)].centre_m;
-  const Vector3 by = log_uniform(run.random, 10e-6, 200e-6) * direction(run.random);
+  const double by_m = log_uniform(run.random, 10e-6, 200e-6);
+  const Vector3 by = by_m * direction(run.random);
   const double near_m = 0.02;
   run.bent = [=](const TouchTime& t, const Vector3& place) -> Vector3 {
     return t.position == position && (place - centre).norm() < near_m ? by : Vector3::Zero();
@@ -101,8 +104,8 @@ void creep(EvemuRun& run, double end_m) {
   std::map<int, std::pair<Vector3, Vector3>> to;
   const double length_m = run.array.balls.back().centre_m.x();
   for (std::size_t i = 0; i < run.T_machine_array.size(); ++i) {
-    to[static_cast<int>(i) + 1] = {end_m / length_m * direction(run.random),
-                                   0.5 * end_m * direction(run.random)};
+    const Vector3 turn = end_m / length_m * direction(run.random);
+    to[static_cast<int>(i) + 1] = {turn, 0.5 * end_m * direction(run.random)};
   }
   run.moved = [to](const TouchTime& t) {
     const double share = 1.0 - std::exp(-3.0 * t.in_position);
@@ -154,11 +157,21 @@ void for_every_touch(EvemuRun& run, const std::function<void(Vector3&)>& act) {
   };
 }
 
+/// One coordinate of one ball in its table.
+void spoil_the_file(EvemuRun& run, double low_m, double high_m) {
+  const std::size_t ball = any_ball(run);
+  const auto axis = static_cast<Eigen::Index>(run.random() % 3);
+  const double by_m = run.random() % 2 == 0 ? 1.0 : -1.0;
+  run.calibrator.balls[ball].centre_m(axis) += by_m * log_uniform(run.random, low_m, high_m);
+}
+
 double over(EvemuRun& run, double low, double high) {
   return log_uniform(run.random, low, high);
 }
-double sign(EvemuRun& run) {
-  return run.random() % 2 == 0 ? 1.0 : -1.0;
+/// Either sign.
+double signed_over(EvemuRun& run, double low, double high) {
+  const double sign = run.random() % 2 == 0 ? 1.0 : -1.0;
+  return sign * over(run, low, high);
 }
 
 }  // namespace
@@ -176,24 +189,14 @@ std::vector<Fault<EvemuRun>> evemu_faults() {
        [](EvemuRun& r) { move_within(r, 0.0, over(r, 20e-6, 500e-6)); }, moved},
       {"array shifted between positions", move_between, {}},
       {"balls swapped in the table", swap_balls, {"numbered"}},
-      {"ball coordinate wrong by 100..500 um",
-       [](EvemuRun& r) {
-         r.calibrator.balls[any_ball(r)].centre_m(static_cast<Eigen::Index>(r.random() % 3)) +=
-             sign(r) * over(r, 100e-6, 500e-6);
-       },
-       file},
-      {"ball coordinate wrong by 20..100 um",
-       [](EvemuRun& r) {
-         r.calibrator.balls[any_ball(r)].centre_m(static_cast<Eigen::Index>(r.random() % 3)) +=
-             sign(r) * over(r, 20e-6, 100e-6);
-       },
-       file},
+      {"ball coordinate wrong by 100..500 um", [](EvemuRun& r) { spoil_the_file(r, 100e-6, 500e-6); }, file},
+      {"ball coordinate wrong by 20..100 um", [](EvemuRun& r) { spoil_the_file(r, 20e-6, 100e-6); }, file},
       {"ball elsewhere in one position", displace_ball_once, {"ball"}},
       {"dirt of 20..100 um under one touch", [](EvemuRun& r) { spoil_touch(r, over(r, 20e-6, 100e-6)); },
        touch},
       {"false trigger of 0.5..5 mm", [](EvemuRun& r) { spoil_touch(r, over(r, 0.5e-3, 5e-3)); }, touch},
       {"array's temperature wrong by 2..10 K",
-       [](EvemuRun& r) { r.observe.artefact_temperature->temperature_K += sign(r) * over(r, 2.0, 10.0); },
+       [](EvemuRun& r) { r.observe.artefact_temperature->temperature_K += signed_over(r, 2.0, 10.0); },
        {},
        false},
       {"expansion of another material",
@@ -204,17 +207,18 @@ std::vector<Fault<EvemuRun>> evemu_faults() {
       {"array creeps by 10..100 um", [](EvemuRun& r) { creep(r, over(r, 10e-6, 100e-6)); }, clamping},
       {"tip offset wrong by 2..20 mm",
        [](EvemuRun& r) {
-         const Vector3 by = over(r, 2e-3, 20e-3) * direction(r.random);
+         const double by_m = over(r, 2e-3, 20e-3);
+         const Vector3 by = by_m * direction(r.random);
          r.machine.tool_offset_m += by;
          r.stated_tool_offset_m = by;
        },
        {},
        false},
       {"tip diameter wrong by 20..300 um",
-       [](EvemuRun& r) { r.calibrator.tip_radius_m += 0.5 * sign(r) * over(r, 20e-6, 300e-6); },
+       [](EvemuRun& r) { r.calibrator.tip_radius_m += 0.5 * signed_over(r, 20e-6, 300e-6); },
        {"tip"}},
       {"tip diameter wrong by 0.5..2 mm",
-       [](EvemuRun& r) { r.calibrator.tip_radius_m += 0.5 * sign(r) * over(r, 0.5e-3, 2e-3); },
+       [](EvemuRun& r) { r.calibrator.tip_radius_m += 0.5 * signed_over(r, 0.5e-3, 2e-3); },
        {"tip"}},
       {"machine drifts by 20..100 um", [](EvemuRun& r) { drift(r, over(r, 20e-6, 100e-6)); }, {"drift"}},
       {"axis mirrored",
@@ -247,7 +251,7 @@ std::vector<Fault<EvemuRun>> evemu_faults() {
        {"slow"}},
       {"five times the noise", [](EvemuRun& r) { r.sigma_touch_m *= 5.0; }, {}},
       {"another axis order", other_chain, {"order"}},
-      {"screw pitch of 5..30 um", [](EvemuRun& r) { waves(r, over(r, 5e-6, 30e-6), 0.01); }, {"polynomial"}},
+      {"screw pitch of 5..30 um", [](EvemuRun& r) { waves(r, over(r, 5e-6, 30e-6), 0.01); }, {"pitch"}},
       {"waves of 5..30 um over the volume",
        [](EvemuRun& r) { waves(r, over(r, 5e-6, 30e-6), 0.25); },
        {"polynomial"}},

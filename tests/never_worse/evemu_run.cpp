@@ -72,9 +72,14 @@ sim::ErrorFunction cubic(const std::array<double, 3>& c, double centre_m, double
   return sim::ErrorFunction::polynomial(std::move(in_q));
 }
 
-/// Errors of order 3 in the readings, about `size` large; those along an axis grow by no more than a scale.
+/// Errors of order 3 in the readings, about `size` large; the linear error of an axis along itself is a
+/// scale, relative to its travel.
 void draw_errors(EvemuRun& run, double size) {
   std::mt19937_64& random = run.random;
+  double longest_m = 0.0;
+  for (const sim::AxisTruth& axis : run.truth.axes) {
+    longest_m = std::max(longest_m, 0.5 * (axis.range.max_m - axis.range.min_m));
+  }
   for (const sim::Axis a : sim::kAxes) {
     sim::AxisTruth& axis = run.truth.axis(a);
     const double centre_m = 0.5 * (axis.range.min_m + axis.range.max_m);
@@ -85,11 +90,15 @@ void draw_errors(EvemuRun& run, double size) {
       for (std::size_t k = 0; k < 3; ++k) {
         c[k] = amplitude * normal(random) / std::pow(2.0, static_cast<double>(k));
       }
+      if (m == static_cast<std::size_t>(a)) {
+        constexpr double kOfScales = 0.1;  // the best part of a machine: 100 um/m where others are 250 um
+        for (double& order : c) order *= kOfScales * half_m / longest_m;
+      }
       axis.error[m] = cubic(c, centre_m, half_m);
     }
   }
-  run.truth.squareness = {2.0 * size * normal(random), 2.0 * size * normal(random),
-                          2.0 * size * normal(random)};
+  const Vector3 squareness = 2.0 * size * normal3(random);
+  run.truth.squareness = {squareness.x(), squareness.y(), squareness.z()};
 }
 
 std::vector<int> shuffled(std::mt19937_64& random, std::size_t count) {
@@ -327,7 +336,9 @@ EvemuRun random_evemu_run(std::uint64_t seed) {
   run.truth.order = *sim::parse_chain(chain);
   const sim::BallArray stated = random_array(random);
   const std::size_t positions = 8 + random() % 3;
-  const Vector3 ball1_m(uniform(random, -0.2, 0.0), uniform(random, 0.0, 0.2), uniform(random, 0.0, 0.1));
+  const double x_m = uniform(random, -0.2, 0.0), y_m = uniform(random, 0.0, 0.2),
+               z_m = uniform(random, 0.0, 0.1);
+  const Vector3 ball1_m(x_m, y_m, z_m);
   run.array = stated;
   run.T_machine_array = random_positions(random, ball1_m, positions);
   run.order = shuffled(random, positions);

@@ -8,14 +8,26 @@
 
 #include "abbe/calib/fit/point_set.hpp"
 #include "evemu/angle.hpp"
+#include "evemu/touch_checks.hpp"
 #include "message.hpp"
 #include "units.hpp"
 
 namespace abbe::calib::evemu {
 namespace {
 
-/// Touched points of one position by feature and number.
-using Touched = std::map<std::pair<Feature, int>, std::vector<Vector3>>;
+/// Touched points of one ball or block.
+struct TouchedPoints {
+  std::vector<Vector3> points_m;
+  double index_sum = 0.0;  ///< of their places among all touches
+
+  void add(const Vector3& p_m, std::size_t index) {
+    points_m.push_back(p_m);
+    index_sum += static_cast<double>(index);
+  }
+  [[nodiscard]] double mean_index() const { return index_sum / static_cast<double>(points_m.size()); }
+};
+/// Of one position, by feature and number.
+using Touched = std::map<std::pair<Feature, int>, TouchedPoints>;
 
 const char* name_of(Feature feature) {
   return feature == Feature::Ball ? "ball" : "block";
@@ -31,7 +43,7 @@ Result<std::map<int, Touched>> by_position(std::span<const Touch> touches, const
     if (!touches[i].p_m.allFinite()) {
       return at_position(touches[i].position, ErrorCode::NotFinite, message("touch ", i, " is not a number"));
     }
-    found[touches[i].position][{touches[i].feature, touches[i].number}].push_back(touches[i].p_m);
+    found[touches[i].position][{touches[i].feature, touches[i].number}].add(touches[i].p_m, i);
   }
   for (int p = 1; p <= options.positions; ++p) {
     if (!found.contains(p)) {
@@ -60,7 +72,7 @@ Result<void> check_complete(int position, const Touched& touched, const Calibrat
   }
   const auto require = [&](Feature feature, int number, std::size_t least) -> Result<void> {
     const auto at = touched.find({feature, number});
-    const std::size_t points = at == touched.end() ? 0 : at->second.size();
+    const std::size_t points = at == touched.end() ? 0 : at->second.points_m.size();
     if (points == 0) {
       return at_position(position, ErrorCode::TooFewObservations,
                          message(name_of(feature), " ", number, " was left out"));
@@ -89,7 +101,7 @@ Result<void> check_complete(int position, const Touched& touched, const Calibrat
 Result<std::vector<fit::Sphere>> fit_balls(int position, const Touched& touched, const Calibrator& c) {
   std::vector<fit::Sphere> spheres;
   for (const Calibrator::Ball& ball : c.balls) {
-    Result<fit::Sphere> sphere = fit::fit_sphere(touched.at({Feature::Ball, ball.number}));
+    Result<fit::Sphere> sphere = fit::fit_sphere(touched.at({Feature::Ball, ball.number}).points_m);
     if (!sphere) {
       return at_position(position, sphere.error().code,
                          message("ball ", ball.number, ": ", sphere.error().text));
@@ -97,6 +109,19 @@ Result<std::vector<fit::Sphere>> fit_balls(int position, const Touched& touched,
     spheres.push_back(*sphere);
   }
   return spheres;
+}
+
+Result<void> check_single_touches(int position, const Touched& touched, const ObserveOptions& options) {
+  for (const auto& [feature, points] : touched) {
+    const auto wrong = feature.first == Feature::Ball
+                           ? wrong_touch_on_ball(points.points_m, options.max_off_surface_m)
+                           : wrong_touch_on_face(points.points_m, options.max_off_surface_m);
+    if (wrong) {
+      return at_position(position, ErrorCode::BadInput,
+                         message(name_of(feature.first), " ", feature.second, ": ", *wrong));
+    }
+  }
+  return {};
 }
 
 Result<void> check_twice(int position, std::span<const fit::Sphere> balls) {
@@ -117,6 +142,9 @@ Result<void> check_radii(int position, std::span<const fit::Sphere> balls, const
                          const ObserveOptions& options) {
   for (std::size_t i = 0; i < balls.size(); ++i) {
     const double expected_m = c.balls[i].radius_m + c.tip_radius_m;
+    if (const auto unit = wrong_unit(balls[i].radius, expected_m)) {
+      return at_position(position, ErrorCode::BadInput, message("ball ", i + 1, " has a radius ", *unit));
+    }
     if (!(std::abs(balls[i].radius - expected_m) <= options.max_radius_mismatch_m)) {
       return at_position(position, ErrorCode::BadInput,
                          message("ball ", i + 1, " has radius ", balls[i].radius * kMmPerM,
@@ -163,7 +191,9 @@ Result<void> fit_blocks(SeenArtefact& seen, const Touched& touched, const Calibr
   std::array<Vector3, 2> nominal;
   for (std::size_t b = 0; b < 2; ++b) {
     nominal[b] = T_machine_pre.R * c.blocks[b].normal.normalized();
-    seen.block_points_m[b] = touched.at({Feature::Block, static_cast<int>(b) + 1});
+    const TouchedPoints& face = touched.at({Feature::Block, static_cast<int>(b) + 1});
+    seen.block_points_m[b] = face.points_m;
+    seen.block_index[b] = face.mean_index();
     Result<fit::Plane> plane = fit::fit_plane(seen.block_points_m[b], nominal[b]);
     if (!plane) {
       return at_position(seen.position, plane.error().code,
@@ -193,6 +223,9 @@ Result<SeenArtefact> see(int position, const Touched& touched, const Calibrator&
   if (Result<void> complete = check_complete(position, touched, c, options); !complete) {
     return tl::unexpected(complete.error());
   }
+  if (Result<void> single = check_single_touches(position, touched, options); !single) {
+    return tl::unexpected(single.error());
+  }
   SeenArtefact seen;
   seen.position = position;
   Result<std::vector<fit::Sphere>> balls = fit_balls(position, touched, c);
@@ -201,7 +234,9 @@ Result<SeenArtefact> see(int position, const Touched& touched, const Calibrator&
   }
   seen.balls = *std::move(balls);
   for (const Calibrator::Ball& ball : c.balls) {
-    seen.ball_points_m.push_back(touched.at({Feature::Ball, ball.number}));
+    const TouchedPoints& points = touched.at({Feature::Ball, ball.number});
+    seen.ball_points_m.push_back(points.points_m);
+    seen.ball_index.push_back(points.mean_index());
   }
   if (Result<void> twice = check_twice(position, seen.balls); !twice) {
     return tl::unexpected(twice.error());
@@ -222,6 +257,12 @@ Result<SeenArtefact> see(int position, const Touched& touched, const Calibrator&
     return at_position(position, frame.error().code, frame.error().text);
   }
   seen.T_self_uni = *frame;
+  if (touched_from_below(seen)) {
+    return at_position(
+        position, ErrorCode::BadInput,
+        message("the balls were touched from below, against the normal of block 1 of calibrator \"", c.name,
+                "\": an axis is mirrored, or two axes are swapped, or the normal points inward"));
+  }
   for (const Calibrator::Ball& ball : c.balls) {
     seen.ideal_m.push_back(seen.T_self_uni * (T_uni_pre * ball.centre_m));
   }
@@ -342,8 +383,8 @@ Result<SeenArtefact> see_artefact(int position, std::span<const Touch> touches, 
   }
   const Calibrator c = at_the_machine(at_20_C, expansion_of(at_20_C, options));
   Touched touched;
-  for (const Touch& touch : touches) {
-    touched[{touch.feature, touch.number}].push_back(touch.p_m);
+  for (std::size_t i = 0; i < touches.size(); ++i) {
+    touched[{touches[i].feature, touches[i].number}].add(touches[i].p_m, i);
   }
   return see(position, touched, c, pre_to_uniform(c), options);
 }
@@ -378,6 +419,12 @@ Result<Observations> observe(std::span<const Touch> touches, const Calibrator& a
       o.rows.push_back({position, c.balls[i].number, reading_m, V_m});
     }
     o.seen.push_back(*std::move(seen));
+  }
+  if (Result<void> turned = check_turns(o.seen, options.least_turn_rad); !turned) {
+    return tl::unexpected(turned.error());
+  }
+  for (const Calibrator::Ball& ball : c.balls) {
+    o.contact_radius_m.push_back(ball.radius_m + c.tip_radius_m);
   }
   return finish(std::move(o), options);
 }

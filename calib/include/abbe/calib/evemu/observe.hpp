@@ -51,6 +51,10 @@ struct ObserveOptions {
   double max_block_tilt_rad = 0.05;
   /// Ball1 stands still while the artefact turns about it; V is relative to it, so it must be one place.
   double max_ball1_shift_m = 1e-3;
+  /// Smallest turn of the array between two positions; less is one position touched twice.
+  double least_turn_rad = 2e-3;
+  /// Distance of one touch from the surface that the others of its ball or face show.
+  double max_off_surface_m = 0.15e-3;
   /// Thinnest against largest extent of all balls. Below, the third axis is not tested.
   double least_thickness = 1e-3;
   /// Where the calibrator says how the array grows, and only there.
@@ -69,14 +73,17 @@ struct Observations {
   std::vector<SeenArtefact> seen;                 ///< by position; empty when only errors were given
   Vector3 ball1_m = Vector3::Zero();              ///< mean reading
   std::optional<ArtefactUncertainty> artefact{};  ///< none when only errors were given
+  /// Calibrated radius of a ball at its temperature, and that of the tip, by ball; empty as `seen`.
+  std::vector<double> contact_radius_m{};
   [[nodiscard]] std::size_t positions() const;
 };
 
 /// Everything wrong with the touches is said by position and number, and named: TooFewObservations (points on
-/// a ball or block, a ball, block or position left out), BadInput (a ball touched under two numbers, blocks
-/// swapped, calibrator of another artefact or balls numbered differently, Ball1 moved; a temperature without
-/// an expansivity, or one without the other), DegenerateGeometry (all balls in one plane). With both, the
-/// array is taken as it is at that temperature.
+/// a ball or block, a ball, block or position left out), BadInput (coordinates in another unit, one touch far
+/// off the others of its feature, a mirrored or swapped axis, a position touched twice, a ball touched under
+/// two numbers, blocks swapped, calibrator of another artefact or balls numbered differently, Ball1 moved; a
+/// temperature without an expansivity, or one without the other), DegenerateGeometry (all balls in one
+/// plane). With both, the array is taken as it is at that temperature.
 [[nodiscard]] Result<Observations> observe(std::span<const Touch>, const Calibrator&, const Machine&,
                                            const ObserveOptions& = {});
 /// One position alone, by the same rules; without a temperature at 20 C, whatever the calibrator says.

@@ -48,8 +48,16 @@ double least_s_d_m(const DesignFunction& f, const ScaledDesign& design) {
   return is_scale(f) ? kScalePrior * design.arm_unit_m() : kLinearPrior_m;
 }
 
+/// Of a scale: what the axis has of its own [m^2]. To it comes s_a^2.
+double own_scale_variance_m2(const DesignFunction& f, const ScaledDesign& design, double s_d_m) {
+  const double half_m = design.box().half_width_m(static_cast<Eigen::Index>(f.axis));
+  const double sd_m = std::max(s_d_m, least_s_d_m(f, design)) * half_m / design.arm_unit_m();
+  return sd_m * sd_m;
+}
+
 /// d log(variance) / d theta of one column.
-Theta sensitivity(PriorKind kind, const DesignFunction* f, const ScaledDesign& design, double s_d_m) {
+Theta sensitivity(PriorKind kind, const DesignFunction* f, const ScaledDesign& design,
+                  const HyperParameters& h) {
   Theta d = Theta::Zero();
   if (f == nullptr) {
     d(kW) = kind == PriorKind::BayesPose ? 2.0 : 0.0;
@@ -60,7 +68,11 @@ Theta sensitivity(PriorKind kind, const DesignFunction* f, const ScaledDesign& d
   } else if (f->kind == FunctionKind::Rotation) {
     d(kSa) = 2.0;
     d(kRho) = 2.0 * (f->order - 1);
-  } else if (f->order > 1 || s_d_m > least_s_d_m(*f, design)) {
+  } else if (is_scale(*f)) {
+    const double own_m2 = own_scale_variance_m2(*f, design, h.s_d_m), abbe_m2 = h.s_a_m * h.s_a_m;
+    d(kSd) = h.s_d_m > least_s_d_m(*f, design) ? 2.0 * own_m2 / (own_m2 + abbe_m2) : 0.0;
+    d(kSa) = 2.0 * abbe_m2 / (own_m2 + abbe_m2);
+  } else if (f->order > 1 || h.s_d_m > least_s_d_m(*f, design)) {
     d(kSd) = 2.0;
     d(kRho) = 2.0 * (f->order - 1);
   }
@@ -89,7 +101,7 @@ struct Objective {
         continue;  // known
       }
       const DesignFunction* f = column < design.size() ? &design.functions()[column] : nullptr;
-      gradient -= e.by_log_prior(j) * sensitivity(kind, f, design, h.s_d_m);
+      gradient -= e.by_log_prior(j) * sensitivity(kind, f, design, h);
     }
     gradient(kS) -= 2.0 * e.by_log_noise;
     return -e.log_likelihood;
@@ -176,11 +188,8 @@ Eigen::VectorXd prior_variances(PriorKind kind, const ScaledDesign& design, std:
     } else if (kind == PriorKind::BayesPose) {
       sd_m = (f.kind == FunctionKind::Rotation ? h.s_a_m : h.s_d_m) * std::pow(h.rho, f.order - 1);
       if (f.kind == FunctionKind::Translation && f.order == 1) {
-        sd_m = std::max(sd_m, least_s_d_m(f, design));
-        // A scale is a relative length: the same in all axes, a smaller contribution over a shorter travel.
-        sd_m *= is_scale(f)
-                    ? design.box().half_width_m(static_cast<Eigen::Index>(f.axis)) / design.arm_unit_m()
-                    : 1.0;
+        sd_m = is_scale(f) ? std::sqrt(own_scale_variance_m2(f, design, h.s_d_m) + h.s_a_m * h.s_a_m)
+                           : std::max(sd_m, least_s_d_m(f, design));
       }
     }
     v(static_cast<Eigen::Index>(j)) = sd_m * sd_m;

@@ -3,9 +3,10 @@
 /// marginal likelihood). On the scaled design, where every coefficient is the size of its contribution:
 ///   constants: 5 mm;
 ///   bayes-pose: linear translations max(s_d, 2 mm), since squareness knows no smallness; but along the
-///     axis itself, where they are a scale, max(s_d, 200 um/m arm) half width / arm (arm: the largest half
-///     width): of a flat array nothing else limits the scale of the axis across it; order k translations
-///     s_d rho^(k-1); rotations s_a rho^(k-1) times arm; random pose rotations of w;
+///     axis itself, where they are a scale, max(s_d, 100 um/m arm) half width / arm (arm: the largest half
+///     width), and s_a for rotations at an unknown offset: of a flat array nothing else limits the scale
+///     of the axis across it; order k translations s_d rho^(k-1); rotations s_a rho^(k-1) times arm; random
+///     pose rotations of w;
 ///   ridge: everything but the constants t, no pose rotations.
 
 #include <Eigen/Core>
@@ -18,7 +19,7 @@ namespace abbe::calib::evemu {
 
 inline constexpr double kConstantPrior_m = 5e-3;
 inline constexpr double kLinearPrior_m = 2e-3;
-inline constexpr double kScalePrior = 200e-6;  ///< as GateLimits::max_growth
+inline constexpr double kScalePrior = 100e-6;  ///< half of GateLimits::max_growth
 
 enum class PriorKind { Ridge, BayesPose };
 

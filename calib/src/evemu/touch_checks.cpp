@@ -61,7 +61,10 @@ std::optional<std::string> wrong_touch(std::span<const Vector3> points, std::siz
       rest_m = rest->rms_m;
     }
   }
-  if (!(worst_m > most_off_m && worst_m > kClear * rest_m)) {
+  // The surface through few others is extrapolated to the touch, and what bends it with it.
+  constexpr double kExtrapolated = 2.0;
+  const double least_m = (points.size() < 4 * unknowns ? kExtrapolated : 1.0) * most_off_m;
+  if (!(worst_m > least_m && worst_m > kClear * rest_m)) {
     return std::nullopt;
   }
   const bool located = points.size() > unknowns + 2;

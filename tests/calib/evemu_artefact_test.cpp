@@ -344,7 +344,9 @@ TEST(EvemuJudge, SaysWhatItTakesTheArrayFor) {
   grows.expansivity = {{kSteel_per_K, 1e-6}};
   ObserveOptions warm;
   warm.artefact_temperature = {295.0, 0.2};
-  EXPECT_THAT(notes_on(seen_with(grows, warm)), testing::IsEmpty());
+  const auto known = notes_on(seen_with(grows, warm));
+  EXPECT_THAT(known, Not(Contains(HasSubstr("counts as"))));
+  EXPECT_THAT(known, Contains(HasSubstr("1 K of wrong temperature")));
 }
 
 }  // namespace

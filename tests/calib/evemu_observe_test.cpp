@@ -147,6 +147,77 @@ TEST(EvemuInput, NamesTheCalibratorOfAnotherArtefact) {
   EXPECT_THAT(radius.text, HasSubstr("calibrator file of another artefact, or another tip"));
 }
 
+TEST(EvemuInput, NamesAnotherUnitOfLength) {
+  for (const double unit : {1000.0, 0.001, 1.0 / 25.4}) {
+    const Error e = refusal([&](Touches& touches, Calibrator&) {
+      for (Touch& t : touches) {
+        t.p_m *= unit;
+      }
+    });
+    EXPECT_EQ(e.code, ErrorCode::BadInput);
+    EXPECT_THAT(e.text, HasSubstr("they fit with lengths in"));
+  }
+}
+
+TEST(EvemuInput, NamesAFalseTrigger) {
+  const Error on_ball = refusal([](Touches& touches, Calibrator&) {
+    std::vector<Touch*> of_ball;
+    Vector3 sum = Vector3::Zero();
+    for (Touch& t : touches) {
+      if (t.position == 3 && t.feature == Feature::Ball && t.number == 4) {
+        of_ball.push_back(&t);
+        sum += t.p_m;
+      }
+    }
+    Vector3& p_m = of_ball.at(6)->p_m;
+    p_m += 0.5e-3 * (p_m - sum / 25.0).normalized();
+  });
+  EXPECT_EQ(on_ball.code, ErrorCode::BadInput);
+  EXPECT_THAT(on_ball.text, HasSubstr("position 3: ball 4: touch 7 of 25 lies"));
+  const Error on_block = refusal([](Touches& touches, Calibrator&) {
+    int touch = 0;
+    for (Touch& t : touches) {
+      if (t.position == 5 && t.feature == Feature::Block && t.number == 2 && ++touch == 3) {
+        t.p_m += Vector3(0.0, 1e-3, 0.0);
+      }
+    }
+  });
+  EXPECT_THAT(on_block.text, HasSubstr("position 5: block 2: touch 3 of 25 lies"));
+}
+
+TEST(EvemuInput, NamesMirroredAndSwappedAxes) {
+  const Error mirrored = refusal([](Touches& touches, Calibrator&) {
+    for (Touch& t : touches) {
+      t.p_m.x() = -t.p_m.x();
+    }
+  });
+  EXPECT_EQ(mirrored.code, ErrorCode::BadInput);
+  EXPECT_THAT(mirrored.text, HasSubstr("an axis is mirrored"));
+  const Error swapped = refusal([](Touches& touches, Calibrator&) {
+    for (Touch& t : touches) {
+      std::swap(t.p_m.x(), t.p_m.y());
+    }
+  });
+  EXPECT_THAT(swapped.text, HasSubstr("two axes are swapped"));
+}
+
+TEST(EvemuInput, NamesAPositionTouchedTwice) {
+  const Error e = refusal([](Touches& touches, Calibrator&) {
+    Touches again;
+    for (const Touch& t : touches) {
+      if (t.position == 3) {
+        again.push_back(t);
+        again.back().position = 7;
+        again.back().p_m += Vector3(20e-6, 10e-6, 0.0);
+      }
+    }
+    std::erase_if(touches, [](const Touch& t) { return t.position == 7; });
+    touches.insert(touches.end(), again.begin(), again.end());
+  });
+  EXPECT_EQ(e.code, ErrorCode::BadInput);
+  EXPECT_THAT(e.text, HasSubstr("the artefact stands as at position 3"));
+}
+
 TEST(EvemuInput, NamesCoplanarPositions) {
   const Error e = refusal([](Touches& touches, Calibrator&) {
     for (Touch& t : touches) {  // eight times the first position, turned about z only

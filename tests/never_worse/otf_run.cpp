@@ -10,19 +10,12 @@
 #include "abbe/calib/otf/polyline.hpp"
 #include "abbe/sim/random_truth.hpp"
 #include "otf_reference.hpp"
+#include "random_numbers.hpp"
 
 namespace abbe::tests::never_worse {
 namespace {
 
 constexpr double kNode_m = 0.05;
-
-double uniform(std::mt19937_64& random, double low, double high) {
-  return low + (high - low) * (static_cast<double>(random() >> 11U) / 9007199254740992.0);
-}
-double normal(std::mt19937_64& random) {  // Box-Muller: the same numbers with every library
-  const double radius = std::sqrt(-2.0 * std::log(1.0 - uniform(random, 0.0, 1.0)));
-  return radius * std::cos(2.0 * M_PI * uniform(random, 0.0, 1.0));
-}
 
 /// The reference path stretched to the travel of this machine.
 std::vector<Vector3> stretched_path(const sim::TruthMachine& truth) {
@@ -151,10 +144,6 @@ calib::RigidTransform about(const Vector3& centre, const Vector3& rotation_rad, 
   return T;
 }
 
-Vector3 direction(std::mt19937_64& random) {
-  return Vector3(normal(random), normal(random), normal(random)).normalized();
-}
-
 /// The tracker stands elsewhere from `share` of the run on: turned about its own place and shifted.
 void move_tracker(OtfRun& run, double share, double angle_rad, double shift_m) {
   const auto T =
@@ -217,7 +206,7 @@ OtfRun random_otf_run(std::uint64_t seed) {
   return run;
 }
 
-std::vector<Fault> otf_faults() {
+std::vector<Fault<OtfRun>> otf_faults() {
   const std::vector<std::string> moved{"moved"}, vertex{"vertex"}, chain{"order"}, nodes{"nodes"},
       drift{"drift", "moved"}, backlash{"backlash"}, noise{"correlated", "half of it"},
       align{"alignment", "path", "travel", "adjustment"}, turned{"orientation", "travel"};

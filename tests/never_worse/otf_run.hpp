@@ -11,6 +11,7 @@
 #include "abbe/calib/otf/judge.hpp"
 #include "abbe/sim/path_motion.hpp"
 #include "abbe/sim/truth_machine.hpp"
+#include "campaign.hpp"
 
 namespace abbe::tests::never_worse {
 
@@ -39,25 +40,10 @@ struct OtfRun {
   std::mt19937_64 random;
 };
 
-struct Fault {
-  std::string name;
-  std::function<void(OtfRun&)> put_in;
-  std::vector<std::string> causes;  ///< one of them stands in the first reason of a refusal
-  bool visible = true;              ///< false: nothing that is known contradicts it
-};
-[[nodiscard]] std::vector<Fault> otf_faults();
+[[nodiscard]] std::vector<Fault<OtfRun>> otf_faults();
 
 [[nodiscard]] OtfRun random_otf_run(std::uint64_t seed);
 
-struct Outcome {
-  bool accepted = false;
-  std::string first_reason;
-  double before_m = 0.0;  ///< mean |V| of the truth, without rigid motion
-  double left_m = 0.0;    ///< mean |V of the model - V|, without rigid motion
-  double u_m = 0.0;       ///< mean stated standard uncertainty: root of the trace
-  double sigma0 = 0.0;
-  std::size_t covered = 0, intervals = 0;  ///< components of V inside their 95 % interval
-};
 [[nodiscard]] Outcome identify_and_compare(OtfRun run);
 
 }  // namespace abbe::tests::never_worse

@@ -24,6 +24,10 @@ Eigen::MatrixXd without_ball1(const Observations& o, const Eigen::MatrixXd& rows
 
 }  // namespace
 
+Eigen::MatrixXd white_rows(const Observations& o, const Eigen::MatrixXd& rows) {
+  return without_ball1(o, whitened(o, rows));
+}
+
 Result<Fit> fit_ols(const FitProblem& problem) {
   const Eigen::Index n = problem.X.cols();
   const Eigen::VectorXd scale = problem.X.colwise().norm().cwiseMax(1e-300).cwiseInverse();
@@ -70,7 +74,7 @@ Result<Fit> fit_ols(const FitProblem& problem) {
 Result<Fit> fit_prior(PriorKind kind, const FitProblem& problem) {
   const Observations& o = problem.observations;
   const std::size_t positions = o.positions();
-  const auto white = [&](const Eigen::MatrixXd& rows) { return without_ball1(o, whitened(o, rows)); };
+  const auto white = [&](const Eigen::MatrixXd& rows) { return white_rows(o, rows); };
   const LinearGaussian gaussian(white(problem.X), white(pose_rotation_rows(o)), white(problem.y));
   const Result<HyperParameters> hyper = most_likely(kind, problem.design, positions, gaussian);
   if (!hyper) {

@@ -34,6 +34,9 @@ struct Fit {
   int iterations = 0;
 };
 
+/// whitened() rows but those of Ball1, whose error is zero by definition.
+[[nodiscard]] Eigen::MatrixXd white_rows(const Observations&, const Eigen::MatrixXd& rows);
+
 /// The rows of `observations` on a design that may be that of more positions.
 [[nodiscard]] FitProblem problem_of(const Observations&, const ScaledDesign&, const SolveOptions&);
 [[nodiscard]] Result<Fit> fit_with(const FitProblem&, const SolveOptions&);

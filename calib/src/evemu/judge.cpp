@@ -1,12 +1,15 @@
 #include "abbe/calib/evemu/judge.hpp"
 
 #include <Eigen/Dense>
+#include <algorithm>
 #include <cmath>
 #include <functional>
 #include <optional>
 #include <utility>
 
 #include "abbe/calib/evemu/design_rows.hpp"
+#include "abbe/calib/evemu/lack_of_fit.hpp"
+#include "certainty.hpp"
 #include "evemu/fit_coefficients.hpp"
 #include "message.hpp"
 
@@ -74,6 +77,41 @@ void note_artefact(const Observations& o, Verdict& verdict) {
   }
 }
 
+/// A model may be wrong by its stated uncertainty and half of it: beyond, an alternative refuses it.
+constexpr double kCoveredByU = 1.5;
+
+/// Reasons before those that only follow from them.
+void add_alternatives(Verdict& verdict, const std::vector<Alternative>& others, double stated_u_m) {
+  std::vector<std::string> reasons;
+  for (const Alternative& other : others) {
+    const std::string text = with_effect(other.text, other.bias_m, stated_u_m);
+    // Written so that a NaN figure is refused.
+    const bool covered =
+        other.bias_m <= other.u_m && std::hypot(other.bias_m, other.u_m) <= kCoveredByU * stated_u_m;
+    (covered ? verdict.notes : reasons).push_back(text);
+  }
+  verdict.reasons.insert(verdict.reasons.begin(), reasons.begin(), reasons.end());
+}
+
+/// Of the balls about Ball1.
+double extent_m(const Observations& o) {
+  double most_m = 0.0;
+  for (const BallError& row : o.rows) {
+    most_m = std::max(most_m, (row.reading_m - o.ball1_m).norm());
+  }
+  return most_m;
+}
+
+/// What no touch shows.
+void note_what_touches_do_not_show(Verdict& verdict, const Observations& o, double extent_m) {
+  constexpr double kSteel_per_K = 11.5e-6;
+  verdict.notes.push_back(
+      message("all lengths come from the array: 1 K of wrong temperature of a steel array would be ",
+              1e6 * kSteel_per_K * extent_m, " um over ", extent_m, " m; no touch shows it"));
+  verdict.notes.push_back(message("holds for the tool offset (", o.machine.tool_offset_m.transpose(),
+                                  ") m as configured; no touch shows it"));
+}
+
 }  // namespace
 
 Result<HeldOutFigures> held_out(const Observations& o, double s_m, const VolumetricModel* active,
@@ -132,6 +170,10 @@ Result<Verdict> judge(const Observations& o, const Solution& solution, const Vol
   solve.estimator = solution.estimator;
   solve.sparse.chosen = solution.sparse;
   solve.sparse.bootstrap_runs = 0;
+  const Result<std::vector<Alternative>> others = alternatives(o, solution);
+  if (!others) {
+    return tl::unexpected(others.error());
+  }
   return held_out(o, solution.statistics.s_m, active, solve).map([&](const HeldOutFigures& figures) {
     Verdict verdict = decide(solution.model, figures, options.limits, active);
     if (!solution.rotation.referenced && !options.accept_shape_only) {
@@ -140,7 +182,11 @@ Result<Verdict> judge(const Observations& o, const Solution& solution, const Vol
           message("shape only: the machine measured the blocks itself, so a rotation of about ", 1e6 * u_rad,
                   " urad about Ball1 is unknown; give a rotation reference or accept ", kShapeOnly));
     }
+    const CorrectionSize size = correction_size(o, solution);
+    add_alternatives(verdict, *others, size.u_m);
+    require_certainty(verdict, size.V_m, size.u_m);
     note_artefact(o, verdict);
+    note_what_touches_do_not_show(verdict, o, extent_m(o));
     if (const auto& fit = solution.rotation.reference; fit && !fit->outside.empty()) {
       verdict.notes.push_back(message("rotation reference: ", fit->outside.size(), " of ",
                                       fit->outside.size() + fit->points,

@@ -10,14 +10,26 @@
 #include "abbe/calib/axis_mistakes.hpp"
 #include "abbe/calib/fit/point_set.hpp"
 #include "evemu/angle.hpp"
+#include "evemu/touch_checks.hpp"
 #include "message.hpp"
 #include "units.hpp"
 
 namespace abbe::calib::evemu {
 namespace {
 
-/// Touched points of one position by feature and number.
-using Touched = std::map<std::pair<Feature, int>, std::vector<Vector3>>;
+/// Touched points of one ball or block.
+struct TouchedPoints {
+  std::vector<Vector3> points_m;
+  double index_sum = 0.0;  ///< of their places among all touches
+
+  void add(const Vector3& p_m, std::size_t index) {
+    points_m.push_back(p_m);
+    index_sum += static_cast<double>(index);
+  }
+  [[nodiscard]] double mean_index() const { return index_sum / static_cast<double>(points_m.size()); }
+};
+/// Of one position, by feature and number.
+using Touched = std::map<std::pair<Feature, int>, TouchedPoints>;
 
 const char* name_of(Feature feature) {
   return feature == Feature::Ball ? "ball" : "block";
@@ -33,7 +45,7 @@ Result<std::map<int, Touched>> by_position(std::span<const Touch> touches, const
     if (!touches[i].p_m.allFinite()) {
       return at_position(touches[i].position, ErrorCode::NotFinite, message("touch ", i, " is not a number"));
     }
-    found[touches[i].position][{touches[i].feature, touches[i].number}].push_back(touches[i].p_m);
+    found[touches[i].position][{touches[i].feature, touches[i].number}].add(touches[i].p_m, i);
   }
   for (int p = 1; p <= options.positions; ++p) {
     if (!found.contains(p)) {
@@ -62,7 +74,7 @@ Result<void> check_complete(int position, const Touched& touched, const Calibrat
   }
   const auto require = [&](Feature feature, int number, std::size_t least) -> Result<void> {
     const auto at = touched.find({feature, number});
-    const std::size_t points = at == touched.end() ? 0 : at->second.size();
+    const std::size_t points = at == touched.end() ? 0 : at->second.points_m.size();
     if (points == 0) {
       return at_position(position, ErrorCode::TooFewObservations,
                          message(name_of(feature), " ", number, " was left out"));
@@ -91,7 +103,7 @@ Result<void> check_complete(int position, const Touched& touched, const Calibrat
 Result<std::vector<fit::Sphere>> fit_balls(int position, const Touched& touched, const Calibrator& c) {
   std::vector<fit::Sphere> spheres;
   for (const Calibrator::Ball& ball : c.balls) {
-    Result<fit::Sphere> sphere = fit::fit_sphere(touched.at({Feature::Ball, ball.number}));
+    Result<fit::Sphere> sphere = fit::fit_sphere(touched.at({Feature::Ball, ball.number}).points_m);
     if (!sphere) {
       return at_position(position, sphere.error().code,
                          message("ball ", ball.number, ": ", sphere.error().text));
@@ -99,6 +111,19 @@ Result<std::vector<fit::Sphere>> fit_balls(int position, const Touched& touched,
     spheres.push_back(*sphere);
   }
   return spheres;
+}
+
+Result<void> check_single_touches(int position, const Touched& touched, const ObserveOptions& options) {
+  for (const auto& [feature, points] : touched) {
+    const auto wrong = feature.first == Feature::Ball
+                           ? wrong_touch_on_ball(points.points_m, options.least_false_touch_m)
+                           : wrong_touch_on_face(points.points_m, options.least_false_touch_m);
+    if (wrong) {
+      return at_position(position, ErrorCode::BadInput,
+                         message(name_of(feature.first), " ", feature.second, ": ", *wrong));
+    }
+  }
+  return {};
 }
 
 Result<void> check_twice(int position, std::span<const fit::Sphere> balls) {
@@ -141,37 +166,6 @@ Result<void> check_radii(int position, std::span<const fit::Sphere> balls, const
           message("ball ", i + 1, " has radius ", balls[i].radius * kMmPerM, " mm, calibrator \"", c.name,
                   "\" and tip make ", expected_m * kMmPerM,
                   " mm: calibrator file of another artefact, or another tip", radii_fit_with(balls, c)));
-    }
-  }
-  return {};
-}
-
-/// Of the touches of a ball or block, the one farthest from its surface.
-template <class Distance>
-Result<void> check_surface(int position, Feature feature, int number, std::span<const Vector3> points,
-                           Distance distance_m, const ObserveOptions& options) {
-  const auto farthest =
-      std::max_element(points.begin(), points.end(),
-                       [&](const Vector3& a, const Vector3& b) { return distance_m(a) < distance_m(b); });
-  if (!(distance_m(*farthest) <= options.max_off_surface_m)) {
-    return at_position(
-        position, ErrorCode::BadInput,
-        message(name_of(feature), " ", number, ": the touch at (", kMmPerM * farthest->transpose(),
-                ") mm is ", kMmPerM * distance_m(*farthest), " mm off the surface of the others"));
-  }
-  return {};
-}
-
-Result<void> check_spheres(int position, std::span<const fit::Sphere> balls, const Touched& touched,
-                           const Calibrator& c, const ObserveOptions& options) {
-  for (std::size_t i = 0; i < balls.size(); ++i) {
-    const fit::Sphere& s = balls[i];
-    const auto off_m = [&s](const Vector3& p) { return std::abs((p - s.centre).norm() - s.radius); };
-    const int number = c.balls[i].number;
-    if (Result<void> on = check_surface(position, Feature::Ball, number, touched.at({Feature::Ball, number}),
-                                        off_m, options);
-        !on) {
-      return on;
     }
   }
   return {};
@@ -248,19 +242,15 @@ Result<void> fit_blocks(SeenArtefact& seen, const Touched& touched, const Calibr
   std::array<Vector3, 2> nominal;
   for (std::size_t b = 0; b < 2; ++b) {
     nominal[b] = T_machine_pre.R * c.blocks[b].normal.normalized();
-    seen.block_points_m[b] = touched.at({Feature::Block, static_cast<int>(b) + 1});
+    const TouchedPoints& face = touched.at({Feature::Block, static_cast<int>(b) + 1});
+    seen.block_points_m[b] = face.points_m;
+    seen.block_index[b] = face.mean_index();
     Result<fit::Plane> plane = fit::fit_plane(seen.block_points_m[b], nominal[b]);
     if (!plane) {
       return at_position(seen.position, plane.error().code,
                          message("block ", b + 1, ": ", plane.error().text));
     }
     seen.blocks[b] = *plane;
-    const auto off_m = [&plane](const Vector3& p) { return std::abs((p - plane->point).dot(plane->normal)); };
-    if (Result<void> on = check_surface(seen.position, Feature::Block, static_cast<int>(b) + 1,
-                                        seen.block_points_m[b], off_m, options);
-        !on) {
-      return on;
-    }
   }
   const auto fits = [&](std::size_t plane, std::size_t block) {
     return line_angle_rad(seen.blocks[plane].normal, nominal[block]) <= options.max_block_tilt_rad;
@@ -284,6 +274,9 @@ Result<SeenArtefact> see(int position, const Touched& touched, const Calibrator&
   if (Result<void> complete = check_complete(position, touched, c, options); !complete) {
     return tl::unexpected(complete.error());
   }
+  if (Result<void> single = check_single_touches(position, touched, options); !single) {
+    return tl::unexpected(single.error());
+  }
   SeenArtefact seen;
   seen.position = position;
   Result<std::vector<fit::Sphere>> balls = fit_balls(position, touched, c);
@@ -292,16 +285,15 @@ Result<SeenArtefact> see(int position, const Touched& touched, const Calibrator&
   }
   seen.balls = *std::move(balls);
   for (const Calibrator::Ball& ball : c.balls) {
-    seen.ball_points_m.push_back(touched.at({Feature::Ball, ball.number}));
+    const TouchedPoints& points = touched.at({Feature::Ball, ball.number});
+    seen.ball_points_m.push_back(points.points_m);
+    seen.ball_index.push_back(points.mean_index());
   }
   if (Result<void> twice = check_twice(position, seen.balls); !twice) {
     return tl::unexpected(twice.error());
   }
   if (Result<void> radii = check_radii(position, seen.balls, c, options); !radii) {
     return tl::unexpected(radii.error());
-  }
-  if (Result<void> on = check_spheres(position, seen.balls, touched, c, options); !on) {
-    return tl::unexpected(on.error());
   }
   const Result<RigidTransform> pose = rough_pose(position, seen.balls, c, options);
   if (!pose) {
@@ -316,6 +308,12 @@ Result<SeenArtefact> see(int position, const Touched& touched, const Calibrator&
     return at_position(position, frame.error().code, frame.error().text);
   }
   seen.T_self_uni = *frame;
+  if (touched_from_below(seen)) {
+    return at_position(
+        position, ErrorCode::BadInput,
+        message("the balls were touched from below, against the normal of block 1 of calibrator \"", c.name,
+                "\": an axis is mirrored, or two axes are swapped, or the normal points inward"));
+  }
   for (const Calibrator::Ball& ball : c.balls) {
     seen.ideal_m.push_back(seen.T_self_uni * (T_uni_pre * ball.centre_m));
   }
@@ -502,8 +500,8 @@ Result<SeenArtefact> see_artefact(int position, std::span<const Touch> touches, 
   }
   const Calibrator c = at_the_machine(at_20_C, expansion_of(at_20_C, options));
   Touched touched;
-  for (const Touch& touch : touches) {
-    touched[{touch.feature, touch.number}].push_back(touch.p_m);
+  for (std::size_t i = 0; i < touches.size(); ++i) {
+    touched[{touches[i].feature, touches[i].number}].add(touches[i].p_m, i);
   }
   return see(position, touched, c, pre_to_uniform(c), options);
 }
@@ -545,6 +543,9 @@ Result<Observations> observe(std::span<const Touch> touches, const Calibrator& a
     }
     turned.push_back(seen->T_self_uni.R);
     o.seen.push_back(*std::move(seen));
+  }
+  for (const Calibrator::Ball& ball : c.balls) {
+    o.contact_radius_m.push_back(ball.radius_m + c.tip_radius_m);
   }
   return finish(std::move(o), options);
 }

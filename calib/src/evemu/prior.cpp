@@ -6,6 +6,7 @@
 #include <limits>
 
 #include "elementary.hpp"
+#include "evemu/refit.hpp"
 #include "message.hpp"
 
 namespace abbe::calib::evemu {
@@ -39,8 +40,26 @@ const Bounds& bounds() {
   return b;
 }
 
+/// The error of an axis along itself, linear: its scale.
+bool is_scale(const DesignFunction& f) {
+  return f.kind == FunctionKind::Translation && f.order == 1 && f.part[0].component == f.axis;
+}
+
+/// Below this s_d the prior of linear translations does not depend on it.
+double least_s_d_m(const DesignFunction& f, const ScaledDesign& design) {
+  return is_scale(f) ? kScalePrior * design.arm_unit_m() : kLinearPrior_m;
+}
+
+/// Of a scale: what the axis has of its own [m^2]. To it comes s_a^2.
+double own_scale_variance_m2(const DesignFunction& f, const ScaledDesign& design, double s_d_m) {
+  const double half_m = design.box().half_width_m(static_cast<Eigen::Index>(f.axis));
+  const double sd_m = std::max(s_d_m, least_s_d_m(f, design)) * half_m / design.arm_unit_m();
+  return sd_m * sd_m;
+}
+
 /// d log(variance) / d theta of one column.
-Theta sensitivity(PriorKind kind, const DesignFunction* f, double s_d_m) {
+Theta sensitivity(PriorKind kind, const DesignFunction* f, const ScaledDesign& design,
+                  const HyperParameters& h) {
   Theta d = Theta::Zero();
   if (f == nullptr) {
     d(kW) = kind == PriorKind::BayesPose ? 2.0 : 0.0;
@@ -51,7 +70,11 @@ Theta sensitivity(PriorKind kind, const DesignFunction* f, double s_d_m) {
   } else if (f->kind == FunctionKind::Rotation) {
     d(kSa) = 2.0;
     d(kRho) = 2.0 * (f->order - 1);
-  } else if (f->order > 1 || s_d_m > kLinearPrior_m) {
+  } else if (is_scale(*f)) {
+    const double own_m2 = own_scale_variance_m2(*f, design, h.s_d_m), abbe_m2 = h.s_a_m * h.s_a_m;
+    d(kSd) = h.s_d_m > least_s_d_m(*f, design) ? 2.0 * own_m2 / (own_m2 + abbe_m2) : 0.0;
+    d(kSa) = 2.0 * abbe_m2 / (own_m2 + abbe_m2);
+  } else if (f->order > 1 || h.s_d_m > least_s_d_m(*f, design)) {
     d(kSd) = 2.0;
     d(kRho) = 2.0 * (f->order - 1);
   }
@@ -64,18 +87,23 @@ struct Objective {
   const ScaledDesign& design;
   std::size_t positions;
   const LinearGaussian& problem;
+  std::span<const double> added;
   int evaluations = 0;
 
   double operator()(const Theta& theta, Theta& gradient) {
     ++evaluations;
     const HyperParameters h = parameters(theta);
-    const LinearGaussian::Evidence e =
-        problem.evidence(prior_variances(kind, design, positions, h), h.s_m * h.s_m);
+    const Eigen::VectorXd prior =
+        with_added(prior_variances(kind, design, positions, h), design.size(), added);
+    const LinearGaussian::Evidence e = problem.evidence(prior, h.s_m * h.s_m);
     gradient.setZero();
     for (Eigen::Index j = 0; j < e.by_log_prior.size(); ++j) {
       const auto column = static_cast<std::size_t>(j);
+      if (column >= design.size() && column < design.size() + added.size()) {
+        continue;  // known
+      }
       const DesignFunction* f = column < design.size() ? &design.functions()[column] : nullptr;
-      gradient -= e.by_log_prior(j) * sensitivity(kind, f, h.s_d_m);
+      gradient -= e.by_log_prior(j) * sensitivity(kind, f, design, h);
     }
     gradient(kS) -= 2.0 * e.by_log_noise;
     return -e.log_likelihood;
@@ -162,7 +190,8 @@ Eigen::VectorXd prior_variances(PriorKind kind, const ScaledDesign& design, std:
     } else if (kind == PriorKind::BayesPose) {
       sd_m = (f.kind == FunctionKind::Rotation ? h.s_a_m : h.s_d_m) * power(h.rho, f.order - 1);
       if (f.kind == FunctionKind::Translation && f.order == 1) {
-        sd_m = std::max(sd_m, kLinearPrior_m);
+        sd_m = is_scale(f) ? std::sqrt(own_scale_variance_m2(f, design, h.s_d_m) + h.s_a_m * h.s_a_m)
+                           : std::max(sd_m, least_s_d_m(f, design));
       }
     }
     v(static_cast<Eigen::Index>(j)) = sd_m * sd_m;
@@ -171,9 +200,18 @@ Eigen::VectorXd prior_variances(PriorKind kind, const ScaledDesign& design, std:
   return v;
 }
 
+Eigen::VectorXd with_added(const Eigen::VectorXd& variances, std::size_t design_size,
+                           std::span<const double> added) {
+  const auto n = static_cast<Eigen::Index>(design_size), k = static_cast<Eigen::Index>(added.size());
+  Eigen::VectorXd all(variances.size() + k);
+  all << variances.head(n), Eigen::Map<const Eigen::VectorXd>(added.data(), k),
+      variances.tail(variances.size() - n);
+  return all;
+}
+
 Result<HyperParameters> most_likely(PriorKind kind, const ScaledDesign& design, std::size_t positions,
-                                    const LinearGaussian& problem) {
-  Objective f{kind, design, positions, problem};
+                                    const LinearGaussian& problem, std::span<const double> added) {
+  Objective f{kind, design, positions, problem, added};
   // The likelihood can have one maximum that calls the scatter noise and one that calls it pose rotation.
   const std::array<HyperParameters, 3> starts{
       HyperParameters{.s_d_m = 5e-4, .rho = 0.6, .s_a_m = 5e-4, .s_m = 1e-5, .w_rad = 1e-4},
@@ -197,6 +235,20 @@ Result<HyperParameters> most_likely(PriorKind kind, const ScaledDesign& design, 
     h.w_rad = 0.0;
   }
   h.log_likelihood = -best.value;
+  h.evaluations = f.evaluations;
+  return h;
+}
+
+Result<HyperParameters> most_likely_near(const HyperParameters& start, const ScaledDesign& design,
+                                         std::size_t positions, const LinearGaussian& problem,
+                                         std::span<const double> added) {
+  Objective f{PriorKind::BayesPose, design, positions, problem, added};
+  const Minimum found = descend(f, logarithms(start));
+  if (!std::isfinite(found.value)) {
+    return failure(ErrorCode::NotConverged, "bayes: no likelihood near the estimate");
+  }
+  HyperParameters h = parameters(found.theta);
+  h.log_likelihood = -found.value;
   h.evaluations = f.evaluations;
   return h;
 }

@@ -8,6 +8,7 @@
 
 #include "abbe/calib/model_comparison.hpp"
 #include "abbe/calib/otf/orientation.hpp"
+#include "certainty.hpp"
 #include "message.hpp"
 #include "otf/check_stopped.hpp"
 
@@ -169,8 +170,7 @@ Result<HeldOutFold> hold_out(const std::vector<NormalEquations>& parts, std::siz
 void add_alternatives(Verdict& verdict, const std::vector<Alternative>& others) {
   std::vector<std::string> reasons;
   for (const Alternative& other : others) {
-    const std::string text = message(other.text, ": it moves the model by ", 1e6 * other.bias_m,
-                                     " um rms, beside an uncertainty of ", 1e6 * other.u_m, " um");
+    const std::string text = with_effect(other.text, other.bias_m, other.u_m);
     if (other.cause == Cause::CorrelatedNoise) {
       verdict.notes.push_back(other.text);
     } else {  // written so that a NaN figure is refused
@@ -178,17 +178,6 @@ void add_alternatives(Verdict& verdict, const std::vector<Alternative>& others) 
     }
   }
   verdict.reasons.insert(verdict.reasons.begin(), reasons.begin(), reasons.end());
-}
-
-/// Half: what is left by a correction whose error is twice its uncertainty is not larger than the correction.
-constexpr double kMostUncertainty = 0.5;
-
-void require_certainty(Verdict& verdict, const CorrectionSize& size) {
-  if (!(size.u_m <= kMostUncertainty * size.V_m)) {
-    verdict.reasons.push_back(message("the correction is ", 1e6 * size.V_m,
-                                      " um rms, its standard uncertainty ", 1e6 * size.u_m,
-                                      " um: more than half of it"));
-  }
 }
 
 /// Of V = s p + rigid motion, least squares over the nodes.
@@ -311,7 +300,8 @@ Result<Verdict> judge(const Observations& o, const Solution& solution, const Vol
   add_alternatives(verdict, *others);
   require_plausible_growth(verdict, common_growth(solution.model), limits.max_growth);
   require_orientation(verdict, {o.vertices_m}, o.layout.nodes(), o.alignment.T_machine_tracker, options.orientation);
-  require_certainty(verdict, correction_size(solution.model));
+  const CorrectionSize size = correction_size(solution.model);
+  require_certainty(verdict, size.V_m, size.u_m);
   note_what_u_leaves_out(verdict, o);
   verdict.accepted = verdict.reasons.empty();
   return verdict;

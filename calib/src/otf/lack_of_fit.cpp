@@ -10,11 +10,13 @@
 #include "abbe/calib/rigid_body_model.hpp"
 #include "abbe/calib/root_sum_of_squares.hpp"
 #include "elementary.hpp"
+#include "chi2_bound.hpp"
 #include "message.hpp"
 #include "otf/added_columns.hpp"
 #include "otf/alternative_columns.hpp"
 #include "otf/check_stopped.hpp"
 #include "otf/row_residuals.hpp"
+#include "rigid_free_norm.hpp"
 
 namespace abbe::calib::otf {
 namespace {
@@ -52,11 +54,6 @@ double median(std::vector<double> values) {
   return *middle;
 }
 
-/// Upper bound of the quantile of chi2 with k degrees of freedom for probability 1 - e^-x [Laurent 2000].
-double chi2_bound(double k, double x) {
-  return k + 2.0 * std::sqrt(k * x) + 2.0 * x;
-}
-
 /// At most about 9 nodes of each axis, the ends included.
 std::vector<Vector3> places(const MachineNodes& nodes) {
   constexpr std::size_t kCells = 8;
@@ -72,49 +69,22 @@ std::vector<Vector3> places(const MachineNodes& nodes) {
   return tensor_grid(few);
 }
 
-/// V at some places is D U; without the best-fit rigid motion it is P D U. D^T P D: the sum of squares of
-/// what any U and any covariance bring there. [m^2 per U^2], and the number of places.
-class RigidFreeNorm {
- public:
-  RigidFreeNorm(const ParameterLayout& layout, const Vector3& t) {
-    const std::vector<Vector3> at = places(layout.nodes());
-    const auto n = static_cast<Eigen::Index>(layout.model_size());
-    const auto rows = 3 * std::ssize(at);
-    Eigen::MatrixXd D = Eigen::MatrixXd::Zero(rows, n), rigid(rows, 6);
-    for (Eigen::Index i = 0; i < std::ssize(at); ++i) {
-      const Vector3& q = at[static_cast<std::size_t>(i)];
-      const DesignColumns columns = design_columns(layout, q, t);
-      for (const Column& c : columns.span()) {
-        D.block<3, 1>(3 * i, static_cast<Eigen::Index>(c.parameter)) = c.dV_dU;
-      }
-      rigid.block<3, 3>(3 * i, 0).setIdentity();
-      rigid.block<3, 3>(3 * i, 3) = rotation_effect(q + t);
+/// Of the tables' values U, at some nodes.
+RigidFreeNorm rigid_free_norm(const ParameterLayout& layout, const Vector3& t) {
+  const std::vector<Vector3> at = places(layout.nodes());
+  Eigen::MatrixXd D =
+      Eigen::MatrixXd::Zero(3 * std::ssize(at), static_cast<Eigen::Index>(layout.model_size()));
+  std::vector<Vector3> points;
+  for (Eigen::Index i = 0; i < std::ssize(at); ++i) {
+    const Vector3& q = at[static_cast<std::size_t>(i)];
+    const DesignColumns columns = design_columns(layout, q, t);
+    for (const Column& c : columns.span()) {
+      D.block<3, 1>(3 * i, static_cast<Eigen::Index>(c.parameter)) = c.dV_dU;
     }
-    const Eigen::MatrixXd basis =
-        rigid.householderQr().householderQ() * Eigen::MatrixXd::Identity(rows, rigid.cols());
-    const Eigen::MatrixXd shared = basis.transpose() * D;
-    norm_ = D.transpose() * D - shared.transpose() * shared;
-    places_ = static_cast<double>(at.size());
+    points.emplace_back(q + t);
   }
-
-  [[nodiscard]] double rms_m(const Eigen::VectorXd& U) const {
-    const auto model = U.head(norm_.rows());
-    return std::sqrt(std::max(0.0, model.dot(norm_ * model)) / places_);
-  }
-  /// Root of the sum of squares of rms_m() of the columns.
-  [[nodiscard]] double rms_of_columns_m(const Eigen::MatrixXd& U) const {
-    const auto model = U.topRows(norm_.rows());
-    return std::sqrt(std::max(0.0, (norm_ * model).cwiseProduct(model).sum()) / places_);
-  }
-  [[nodiscard]] double rms_u_m(const Eigen::MatrixXd& covariance) const {
-    const auto model = covariance.topLeftCorner(norm_.rows(), norm_.rows());
-    return std::sqrt(std::max(0.0, norm_.cwiseProduct(model).sum()) / places_);
-  }
-
- private:
-  Eigen::MatrixXd norm_;
-  double places_ = 1.0;
-};
+  return {D, points};
+}
 
 /// The model, and what is needed to hold alternatives against it.
 struct Fit {
@@ -145,7 +115,7 @@ Result<Fit> fit_of(const Observations& o, const Solution& solution, const Option
           .noise = residual_noise(o, solution.residuals.after_m, dof),
           .degrees_of_freedom = dof,
           .chi2 = solution.statistics.chi2,
-          .norm = RigidFreeNorm(o.layout, o.target_offset_m)};
+          .norm = rigid_free_norm(o.layout, o.target_offset_m)};
   fit.u_white_m = fit.norm.rms_u_m(fit.adjustment.covariance);
   return fit;
 }
@@ -240,7 +210,7 @@ Result<std::optional<Alternative>> other_design(const Fit& fit, const Solution& 
                          volumetric_error(other.layout, {a->U.data(), other.layout.model_size()}, q, t));
   }
   const auto bias = rigid_free(points, difference);
-  const double u_m = RigidFreeNorm(other.layout, t).rms_u_m(a->covariance) * std::sqrt(factor);
+  const double u_m = rigid_free_norm(other.layout, t).rms_u_m(a->covariance) * std::sqrt(factor);
   // Tables that are too coarse are wrong everywhere: what their widened uncertainty covers refuses nothing.
   const double stated_u_m = fit.u_white_m * std::sqrt(fit.noise.covariance_factor());
   return Alternative{.cause = cause,
@@ -352,7 +322,7 @@ ResidualNoise residual_noise(const Observations& o, std::span<const double> resi
 }
 
 CorrectionSize correction_size(const VolumetricModel& model) {
-  const RigidFreeNorm norm(model.layout(), model.tool_offsets_m().front());
+  const RigidFreeNorm norm = rigid_free_norm(model.layout(), model.tool_offsets_m().front());
   return {norm.rms_m(model.U()), norm.rms_u_m(model.covariance())};
 }
 

@@ -91,6 +91,10 @@ struct SeenArtefact {
   std::array<std::vector<Vector3>, 2> block_points_m;
   RigidTransform T_self_uni;
   std::vector<Vector3> ideal_m;  ///< [Li OMM] eq. (12): where the balls should be
+  /// When each ball was touched: mean index of its touches among all of the run, in the order they were
+  /// given.
+  std::vector<double> ball_index;
+  std::array<double, 2> block_index{};  ///< the same of the blocks
 };
 
 /// A calibrator from touches of its own calibration (one position, on a good machine). `outward`: roughly

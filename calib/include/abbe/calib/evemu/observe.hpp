@@ -55,6 +55,9 @@ struct ObserveOptions {
   double least_turn_rad = 2e-3;
   /// Off the surface the others of a feature lie on. Machine errors near 3 mm bend a sphere by 0.4 mm.
   double max_off_surface_m = 1e-3;
+  /// A touch farther than this from the surface through the others of its ball or face, which lie ten times
+  /// better, is false.
+  double least_false_touch_m = 0.15e-3;
   /// Thinnest against largest extent of all balls. Below, the third axis is not tested.
   double least_thickness = 1e-3;
   /// Where the calibrator says how the array grows, and only there.
@@ -73,12 +76,14 @@ struct Observations {
   std::vector<SeenArtefact> seen;                 ///< by position; empty when only errors were given
   Vector3 ball1_m = Vector3::Zero();              ///< mean reading
   std::optional<ArtefactUncertainty> artefact{};  ///< none when only errors were given
+  /// Calibrated radius of a ball at its temperature, and that of the tip, by ball; empty as `seen`.
+  std::vector<double> contact_radius_m{};
   [[nodiscard]] std::size_t positions() const;
 };
 
 /// Everything wrong with the touches is said by position and number, and named: TooFewObservations (points on
 /// a ball or block, a ball, block or position left out), BadInput (a ball touched under two numbers, blocks
-/// swapped, a touch beside its surface, calibrator of another artefact or balls numbered differently, Ball1
+/// swapped, a false touch, balls touched from below, calibrator of another artefact or balls numbered differently, Ball1
 /// moved, an artefact that was not turned; a temperature without an expansivity, or one without the other),
 /// DegenerateGeometry (all balls in one plane). Where the balls fit mirrored, renumbered or in another unit,
 /// the error says so. With temperature and expansivity the array is taken as it is at that temperature.

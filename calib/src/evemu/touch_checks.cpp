@@ -1,0 +1,99 @@
+#include "evemu/touch_checks.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <functional>
+#include <utility>
+
+#include "message.hpp"
+#include "units.hpp"
+
+namespace abbe::calib::evemu {
+namespace {
+
+/// How well points lie on a surface, and how far a point lies from it.
+struct Surface {
+  double rms_m = 0.0;
+  double largest_m = 0.0;  ///< residual
+  std::function<double(const Vector3&)> distance_m;
+};
+using FitSurface = std::function<std::optional<Surface>(std::span<const Vector3>)>;
+
+std::optional<Surface> sphere_through(std::span<const Vector3> points) {
+  const auto s = fit::fit_sphere(points);
+  if (!s) {
+    return std::nullopt;
+  }
+  return Surface{s->residuals.rms, std::max(-s->residuals.min, s->residuals.max),
+                 [c = s->centre, r = s->radius](const Vector3& p) { return std::abs((p - c).norm() - r); }};
+}
+
+std::optional<Surface> plane_through(std::span<const Vector3> points) {
+  // Which side is outward does not matter here; one of three directions does not lie in the plane.
+  for (Eigen::Index axis = 0; axis < 3; ++axis) {
+    if (const auto s = fit::fit_plane(points, Vector3(Vector3::Unit(axis)))) {
+      return Surface{s->residuals.rms, std::max(-s->residuals.min, s->residuals.max),
+                     [at = s->point, n = s->normal](const Vector3& p) { return std::abs(n.dot(p - at)); }};
+    }
+  }
+  return std::nullopt;
+}
+
+std::optional<std::string> wrong_touch(std::span<const Vector3> points, std::size_t unknowns,
+                                       double most_off_m, const FitSurface& fit) {
+  constexpr double kShare = 0.25;  // of its distance from the others a touch keeps at least, of six on a ball
+  constexpr double kClear = 10.0;  // the others lie that much better
+  const std::optional<Surface> all = fit(points);
+  if (!all || all->largest_m < kShare * most_off_m || points.size() < unknowns + 2) {
+    return std::nullopt;
+  }
+  std::size_t worst = 0;
+  double worst_m = 0.0, rest_m = 0.0;
+  for (std::size_t k = 0; k < points.size(); ++k) {
+    std::vector<Vector3> others(points.begin(), points.end());
+    others.erase(others.begin() + static_cast<std::ptrdiff_t>(k));
+    const std::optional<Surface> rest = fit(others);
+    if (rest && (worst_m == 0.0 || rest->rms_m < rest_m)) {
+      worst = k;
+      worst_m = rest->distance_m(points[k]);
+      rest_m = rest->rms_m;
+    }
+  }
+  // The surface through few others is extrapolated to the touch, and what bends it with it.
+  constexpr double kExtrapolated = 2.0;
+  const double least_m = (points.size() < 4 * unknowns ? kExtrapolated : 1.0) * most_off_m;
+  if (!(worst_m > least_m && worst_m > kClear * rest_m)) {
+    return std::nullopt;
+  }
+  const bool located = points.size() > unknowns + 2;
+  return message(
+      located ? message("touch ", worst + 1, " of ", points.size()) : message("one touch of ", points.size()),
+      " lies ", worst_m * kMmPerM,
+      " mm off the surface of the others: a false trigger, or dirt; touch there again");
+}
+
+}  // namespace
+
+std::optional<std::string> wrong_touch_on_ball(std::span<const Vector3> points_m, double most_off_m) {
+  constexpr std::size_t kUnknowns = 4;
+  return wrong_touch(points_m, kUnknowns, most_off_m, sphere_through);
+}
+
+std::optional<std::string> wrong_touch_on_face(std::span<const Vector3> points_m, double most_off_m) {
+  constexpr std::size_t kUnknowns = 3;
+  return wrong_touch(points_m, kUnknowns, most_off_m, plane_through);
+}
+
+bool touched_from_below(const SeenArtefact& seen) {
+  Vector3 mean = Vector3::Zero();
+  for (std::size_t b = 0; b < seen.balls.size(); ++b) {
+    for (const Vector3& p : seen.ball_points_m[b]) {
+      mean += (p - seen.balls[b].centre).normalized() / static_cast<double>(seen.ball_points_m[b].size());
+    }
+  }
+  constexpr double kClearly = 0.2;  // touches all around a ball have 0, on its upper half about 0.5
+  return mean.dot(seen.T_self_uni.R.col(2)) < -kClearly * static_cast<double>(seen.balls.size());
+}
+
+}  // namespace abbe::calib::evemu

@@ -1,0 +1,29 @@
+#pragma once
+/// Touches against the spheres and planes of the others of their feature, once V of a model is taken out of
+/// them: what is left is the probe's, or a fault.
+
+#include <Eigen/Core>
+#include <string>
+#include <vector>
+
+#include "abbe/calib/evemu/lack_of_fit.hpp"
+
+namespace abbe::calib::evemu {
+
+/// A significant one.
+struct TouchFinding {
+  Cause cause = Cause::Touch;
+  std::string text;
+  double log_likelihood = 0.0;
+  Eigen::VectorXd rows_m;  ///< what it does to the errors seen, 3 rows.size(); empty: not computed
+};
+
+struct TouchResiduals {
+  double sigma_m = 0.0;     ///< of one touch along the normal; from the median, which faults do not move
+  double s_centre_m = 0.0;  ///< of a ball's centre per coordinate that follows, root mean square
+  std::vector<TouchFinding> findings;
+};
+/// `false_alarm`: family-wise probability. Needs touches (Observations::seen).
+[[nodiscard]] TouchResiduals touch_residuals(const Observations&, const VolumetricModel&, double false_alarm);
+
+}  // namespace abbe::calib::evemu

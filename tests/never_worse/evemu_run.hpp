@@ -1,0 +1,57 @@
+#pragma once
+/// A random machine, a ball array touched on it, and the faults that happen there on a shop floor; then what
+/// the gate says of it and what the model is worth against the truth. Deterministic from the seed.
+
+#include <Eigen/Geometry>
+#include <functional>
+#include <random>
+#include <vector>
+
+#include "abbe/calib/evemu/judge.hpp"
+#include "abbe/sim/ball_array.hpp"
+#include "abbe/sim/truth_machine.hpp"
+#include "campaign.hpp"
+
+namespace abbe::tests::never_worse {
+
+using calib::Vector3;
+
+/// When something is touched, as shares of the position's and of the session's touches.
+struct TouchTime {
+  int position = 1;
+  double in_position = 0.0, in_session = 0.0;
+};
+
+/// What the machine and the array are, and what is known of them; a fault changes one or the other.
+struct EvemuRun {
+  // the world
+  sim::TruthMachine truth;
+  sim::BallArray array;                            ///< as it stands there, in its own frame
+  std::vector<Eigen::Isometry3d> T_machine_array;  ///< of positions 1, 2, ...
+  std::vector<int> order;                          ///< in which the positions are touched
+  std::size_t points_per_ball = 13, points_per_face = 9;
+  double sigma_touch_m = 1e-6;
+  double slow_noise_m = 0.0;  ///< standard deviation of a shift of all touches that changes over a quarter of
+                              ///< a position
+  /// Beside T_machine_array, about Ball1 of the position; may be empty.
+  std::function<Eigen::Isometry3d(const TouchTime&)> moved;
+  /// Displacement of a place of the array, in its own frame; may be empty.
+  std::function<Vector3(const TouchTime&, const Vector3& place_m)> bent;
+  /// Beside V, in machine coordinates; may be empty.
+  std::function<Vector3(const TouchTime&, const Vector3& q_m)> drift;
+  std::function<void(std::vector<calib::evemu::Touch>&)> spoil;  ///< the list of touches; may be empty
+  Vector3 stated_tool_offset_m = Vector3::Zero();  ///< from the tip that touched to the stated one
+  // what is configured
+  calib::evemu::Calibrator calibrator;
+  calib::evemu::Machine machine;
+  calib::evemu::ObserveOptions observe;
+  calib::evemu::JudgeOptions judge;
+  std::mt19937_64 random;
+};
+
+[[nodiscard]] std::vector<Fault<EvemuRun>> evemu_faults();
+[[nodiscard]] EvemuRun random_evemu_run(std::uint64_t seed);
+[[nodiscard]] std::vector<calib::evemu::Touch> touches_of(EvemuRun& run);
+[[nodiscard]] Outcome identify_and_compare_evemu(EvemuRun run);
+
+}  // namespace abbe::tests::never_worse

@@ -1,0 +1,40 @@
+// The campaign of scripts/soak never-worse, short: a few machines, and of every kind of fault the ones that
+// were accepted once.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+
+#include "evemu_run.hpp"
+
+namespace {
+using namespace abbe::tests::never_worse;
+
+Campaign<EvemuRun> ball_array(const std::vector<std::string>& parts) {
+  Campaign<EvemuRun> campaign{"ball array", evemu_faults(), random_evemu_run, identify_and_compare_evemu};
+  std::erase_if(campaign.faults, [&](const Fault<EvemuRun>& f) {
+    return std::none_of(parts.begin(), parts.end(),
+                        [&](const std::string& part) { return f.name.find(part) != std::string::npos; });
+  });
+  return campaign;
+}
+
+constexpr std::uint64_t kFirstSeed = 1;
+
+TEST(NeverWorseBallArray, NoAcceptedModelIsWorseThanNone) {
+  const auto campaign = ball_array({"within", "wrong by 20..100", "mirrored", "swapped", "order", "creeps"});
+  ASSERT_EQ(campaign.faults.size(), 9u);
+  const auto tallies = tallies_of(campaign, 1, kFirstSeed);
+  for (std::size_t i = 0; i < tallies.size(); ++i) {
+    EXPECT_EQ(tallies[i].worse, 0) << campaign.faults[i].name;
+    EXPECT_EQ(tallies[i].too_sure, 0) << campaign.faults[i].name;
+  }
+}
+
+TEST(NeverWorseBallArray, SoundRunsAreAccepted) {
+  const auto none = tallies_of(ball_array({"none"}), 4, kFirstSeed).front();
+  EXPECT_EQ(none.accepted, none.runs) << none.other_reason;
+  EXPECT_EQ(none.worse, 0);
+}
+
+}  // namespace

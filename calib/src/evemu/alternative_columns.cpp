@@ -6,6 +6,7 @@
 #include <cmath>
 #include <functional>
 
+#include "elementary.hpp"
 #include "message.hpp"
 #include "units.hpp"
 
@@ -171,9 +172,9 @@ void slow_noise(const Observations& o, const Columns& c, std::vector<Added>& all
     Eigen::MatrixXd covariance(n, n);
     for (Eigen::Index i = 0; i < n; ++i) {
       for (Eigen::Index j = 0; j < n; ++j) {
-        covariance(i, j) =
-            std::exp(-kPer_position * std::abs(Columns::in_position(o.seen[p], static_cast<std::size_t>(i)) -
-                                               Columns::in_position(o.seen[p], static_cast<std::size_t>(j))));
+        covariance(i, j) = exponential(
+            -kPer_position * std::abs(Columns::in_position(o.seen[p], static_cast<std::size_t>(i)) -
+                                      Columns::in_position(o.seen[p], static_cast<std::size_t>(j))));
       }
     }
     const Eigen::MatrixXd L = covariance.llt().matrixL();

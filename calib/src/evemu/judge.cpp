@@ -1,4 +1,5 @@
 #include "abbe/calib/evemu/judge.hpp"
+#include "abbe/calib/root_sum_of_squares.hpp"
 
 #include <Eigen/Dense>
 #include <algorithm>
@@ -87,7 +88,7 @@ void add_alternatives(Verdict& verdict, const std::vector<Alternative>& others, 
     const std::string text = with_effect(other.text, other.bias_m, stated_u_m);
     // Written so that a NaN figure is refused.
     const bool covered =
-        other.bias_m <= other.u_m && std::hypot(other.bias_m, other.u_m) <= kCoveredByU * stated_u_m;
+        other.bias_m <= other.u_m && root_sum_of_squares(other.bias_m, other.u_m) <= kCoveredByU * stated_u_m;
     (covered ? verdict.notes : reasons).push_back(text);
   }
   verdict.reasons.insert(verdict.reasons.begin(), reasons.begin(), reasons.end());

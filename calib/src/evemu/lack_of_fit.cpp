@@ -9,6 +9,7 @@
 
 #include "abbe/calib/evemu/artefact_rows.hpp"
 #include "abbe/calib/evemu/design_rows.hpp"
+#include "elementary.hpp"
 #include "evemu/alternative_columns.hpp"
 #include "evemu/fit_coefficients.hpp"
 #include "evemu/refit.hpp"
@@ -146,7 +147,7 @@ Result<Refit> base_of(const Rows& rows) {
 }
 
 double threshold(double family) {
-  return std::log(kCauses * family / kFalseAlarm);
+  return natural_logarithm(kCauses * family / kFalseAlarm);
 }
 
 /// The best of one cause: from the screen the place, from a fit of its own how likely it is.

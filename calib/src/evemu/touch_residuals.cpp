@@ -6,6 +6,7 @@
 #include <optional>
 
 #include "chi2_bound.hpp"
+#include "elementary.hpp"
 #include "message.hpp"
 #include "units.hpp"
 
@@ -171,13 +172,13 @@ std::optional<TouchFinding> worst_touch(const Observations& o, const std::vector
     }
   }
   // Two-sided tail of the normal distribution: below exp(-w^2 / 2).
-  if (worst == nullptr || !(0.5 * w * w > std::log(touches / false_alarm))) {
+  if (worst == nullptr || !(0.5 * w * w > natural_logarithm(touches / false_alarm))) {
     return std::nullopt;
   }
   const FeatureResiduals& f = *worst;
   const double size_m = f.r_m(touch) / f.free(touch);
   const double rest_m2 = f.r_m.squaredNorm() - f.r_m(touch) * size_m;
-  const double x = std::log(static_cast<double>(all.size()) / false_alarm);
+  const double x = natural_logarithm(static_cast<double>(all.size()) / false_alarm);
   if (rest_m2 > sigma_m * sigma_m * chi2_bound(std::max(0.0, f.dof() - 1.0), x)) {
     return std::nullopt;  // not one touch
   }
@@ -201,7 +202,7 @@ std::optional<TouchFinding> worst_form(const Observations& o, const std::vector<
       worst = &f, excess = chi2 - f.dof();
     }
   }
-  const double x = std::log(static_cast<double>(all.size()) / false_alarm);
+  const double x = natural_logarithm(static_cast<double>(all.size()) / false_alarm);
   if (worst == nullptr || !(excess + worst->dof() > chi2_bound(worst->dof(), x))) {
     return std::nullopt;
   }
@@ -237,7 +238,7 @@ std::optional<TouchFinding> backlash(const Observations& o, const std::vector<Fe
   shown.compute(N);
   const Vector3 b = shown.solve(g);
   const double drop = g.dot(b) / (sigma_m * sigma_m);
-  if (!(drop > chi2_bound(3.0, std::log(1.0 / false_alarm)))) {
+  if (!(drop > chi2_bound(3.0, natural_logarithm(1.0 / false_alarm)))) {
     return std::nullopt;
   }
   Eigen::VectorXd rows = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(3 * o.rows.size()));

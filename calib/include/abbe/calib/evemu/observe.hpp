@@ -83,10 +83,11 @@ struct Observations {
 
 /// Everything wrong with the touches is said by position and number, and named: TooFewObservations (points on
 /// a ball or block, a ball, block or position left out), BadInput (a ball touched under two numbers, blocks
-/// swapped, a false touch, balls touched from below, calibrator of another artefact or balls numbered differently, Ball1
-/// moved, an artefact that was not turned; a temperature without an expansivity, or one without the other),
-/// DegenerateGeometry (all balls in one plane). Where the balls fit mirrored, renumbered or in another unit,
-/// the error says so. With temperature and expansivity the array is taken as it is at that temperature.
+/// swapped, a false touch, balls touched from below, calibrator of another artefact or balls numbered
+/// differently, Ball1 moved, an artefact that was not turned; a temperature without an expansivity, or one
+/// without the other), DegenerateGeometry (all balls in one plane). Where the balls fit mirrored, renumbered
+/// or in another unit, the error says so. With temperature and expansivity the array is taken as it is at
+/// that temperature.
 [[nodiscard]] Result<Observations> observe(std::span<const Touch>, const Calibrator&, const Machine&,
                                            const ObserveOptions& = {});
 /// One position alone, by the same rules; without a temperature at 20 C, whatever the calibrator says.

@@ -1,5 +1,4 @@
 #include "abbe/calib/evemu/judge.hpp"
-#include "abbe/calib/root_sum_of_squares.hpp"
 
 #include <Eigen/Dense>
 #include <algorithm>
@@ -10,6 +9,7 @@
 
 #include "abbe/calib/evemu/design_rows.hpp"
 #include "abbe/calib/evemu/lack_of_fit.hpp"
+#include "abbe/calib/root_sum_of_squares.hpp"
 #include "certainty.hpp"
 #include "evemu/fit_coefficients.hpp"
 #include "message.hpp"

@@ -138,13 +138,19 @@ Result<void> check_twice(int position, std::span<const fit::Sphere> balls) {
   return {};
 }
 
+Result<void> check_unit(int position, std::span<const fit::Sphere> balls, const Calibrator& c) {
+  for (std::size_t i = 0; i < balls.size(); ++i) {
+    if (const auto unit = wrong_unit(balls[i].radius, c.balls[i].radius_m + c.tip_radius_m)) {
+      return at_position(position, ErrorCode::BadInput, message("ball ", i + 1, " has a radius ", *unit));
+    }
+  }
+  return {};
+}
+
 Result<void> check_radii(int position, std::span<const fit::Sphere> balls, const Calibrator& c,
                          const ObserveOptions& options) {
   for (std::size_t i = 0; i < balls.size(); ++i) {
     const double expected_m = c.balls[i].radius_m + c.tip_radius_m;
-    if (const auto unit = wrong_unit(balls[i].radius, expected_m)) {
-      return at_position(position, ErrorCode::BadInput, message("ball ", i + 1, " has a radius ", *unit));
-    }
     if (!(std::abs(balls[i].radius - expected_m) <= options.max_radius_mismatch_m)) {
       return at_position(position, ErrorCode::BadInput,
                          message("ball ", i + 1, " has radius ", balls[i].radius * kMmPerM,
@@ -223,14 +229,17 @@ Result<SeenArtefact> see(int position, const Touched& touched, const Calibrator&
   if (Result<void> complete = check_complete(position, touched, c, options); !complete) {
     return tl::unexpected(complete.error());
   }
-  if (Result<void> single = check_single_touches(position, touched, options); !single) {
-    return tl::unexpected(single.error());
-  }
   SeenArtefact seen;
   seen.position = position;
   Result<std::vector<fit::Sphere>> balls = fit_balls(position, touched, c);
   if (!balls) {
     return tl::unexpected(balls.error());
+  }
+  if (Result<void> unit = check_unit(position, *balls, c); !unit) {
+    return tl::unexpected(unit.error());
+  }
+  if (Result<void> single = check_single_touches(position, touched, options); !single) {
+    return tl::unexpected(single.error());
   }
   seen.balls = *std::move(balls);
   for (const Calibrator::Ball& ball : c.balls) {

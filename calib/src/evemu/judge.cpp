@@ -87,8 +87,9 @@ void add_alternatives(Verdict& verdict, const std::vector<Alternative>& others, 
   for (const Alternative& other : others) {
     const std::string text = with_effect(other.text, other.bias_m, stated_u_m);
     // Written so that a NaN figure is refused.
-    const bool covered =
-        other.bias_m <= other.u_m && root_sum_of_squares(other.bias_m, other.u_m) <= kCoveredByU * stated_u_m;
+    // Scatter without a cause is no white noise, and the uncertainty is that of white noise.
+    const bool covered = other.cause != Cause::Scatter && other.bias_m <= other.u_m &&
+                         root_sum_of_squares(other.bias_m, other.u_m) <= kCoveredByU * stated_u_m;
     (covered ? verdict.notes : reasons).push_back(text);
   }
   verdict.reasons.insert(verdict.reasons.begin(), reasons.begin(), reasons.end());

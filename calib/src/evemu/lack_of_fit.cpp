@@ -275,7 +275,7 @@ std::optional<Alternative> unexplained_scatter(const Rows& rows, const Refit& ba
       .text = message("ball centres scatter by ", s_m * kUmPerM,
                       " um about the model, their touches let them scatter by ", touches.s_centre_m * kUmPerM,
                       " um: the errors of this machine are no polynomials of order ", rows.o.order,
-                      " (pitch of a screw, a travelling weight), or the array is not rigid"),
+                      " (pitch of a screw, a travelling weight), or the array is not rigid, or slow noise"),
       .log_likelihood = 0.0,
       .bias_m = excess_m,
       .u_m = rows.norm.rms_u_m(base.covariance_m2)};
@@ -290,14 +290,13 @@ std::optional<Alternative> scatter_of_touches(const Rows& rows, const Refit& bas
   if (!(within_m > kTwice * u_m)) {
     return std::nullopt;
   }
-  return Alternative{
-      .cause = Cause::Scatter,
-      .text = message("touches scatter by ", touches.sigma_m * kUmPerM,
-                      " um about their balls and blocks: the pitch of a screw, which the model does "
-                      "not follow, or a probe that does not repeat"),
-      .log_likelihood = 0.0,
-      .bias_m = within_m,
-      .u_m = u_m};
+  return Alternative{.cause = Cause::Scatter,
+                     .text = message("touches scatter by ", touches.sigma_m * kUmPerM,
+                                     " um about their balls and blocks: backlash or the pitch of a screw, "
+                                     "which the model does not follow, or a probe that does not repeat"),
+                     .log_likelihood = 0.0,
+                     .bias_m = within_m,
+                     .u_m = u_m};
 }
 
 }  // namespace

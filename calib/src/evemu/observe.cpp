@@ -171,6 +171,12 @@ Result<void> check_radii(int position, std::span<const fit::Sphere> balls, const
   return {};
 }
 
+/// In another unit of length every touch seems false.
+Result<void> check_unit(int position, std::span<const fit::Sphere> balls, const Calibrator& c,
+                        const ObserveOptions& options) {
+  return radii_fit_with(balls, c).empty() ? Result<void>{} : check_radii(position, balls, c, options);
+}
+
 /// "; they fit with ...": a reflection, other numbers. Empty: with nothing that was tried.
 std::string balls_fit_with(std::span<const Vector3> calibrated, std::span<const Vector3> seen,
                            const ObserveOptions& options) {
@@ -274,14 +280,17 @@ Result<SeenArtefact> see(int position, const Touched& touched, const Calibrator&
   if (Result<void> complete = check_complete(position, touched, c, options); !complete) {
     return tl::unexpected(complete.error());
   }
-  if (Result<void> single = check_single_touches(position, touched, options); !single) {
-    return tl::unexpected(single.error());
-  }
   SeenArtefact seen;
   seen.position = position;
   Result<std::vector<fit::Sphere>> balls = fit_balls(position, touched, c);
   if (!balls) {
     return tl::unexpected(balls.error());
+  }
+  if (Result<void> unit = check_unit(position, *balls, c, options); !unit) {
+    return tl::unexpected(unit.error());
+  }
+  if (Result<void> single = check_single_touches(position, touched, options); !single) {
+    return tl::unexpected(single.error());
   }
   seen.balls = *std::move(balls);
   for (const Calibrator::Ball& ball : c.balls) {

@@ -1,6 +1,7 @@
 #pragma once
 /// What the gates of all methods ask of the uncertainty.
 
+#include <cmath>
 #include <string>
 
 #include "abbe/calib/gate.hpp"
@@ -21,6 +22,9 @@ inline void require_certainty(Verdict& verdict, double V_m, double u_m) {
 
 /// "the axes have backlash: it moves the model by 12 um rms, beside an uncertainty of 2 um".
 inline std::string with_effect(const std::string& cause, double bias_m, double u_m) {
+  if (std::isnan(bias_m)) {
+    return cause;  // its effect is not known
+  }
   return message(cause, ": it moves the model by ", 1e6 * bias_m, " um rms, beside an uncertainty of ",
                  1e6 * u_m, " um");
 }

@@ -21,17 +21,17 @@ RigidFreeNorm::RigidFreeNorm(const Eigen::MatrixXd& D, std::span<const Vector3> 
 
 double RigidFreeNorm::rms_m(const Eigen::VectorXd& c) const {
   const auto model = c.head(norm_.rows());
-  return std::sqrt(std::max(0.0, model.dot(norm_ * model)));
+  return std::sqrt(std::max(model.dot(norm_ * model), 0.0));
 }
 
 double RigidFreeNorm::rms_of_columns_m(const Eigen::MatrixXd& c) const {
   const auto model = c.topRows(norm_.rows());
-  return std::sqrt(std::max(0.0, (norm_ * model).cwiseProduct(model).sum()));
+  return std::sqrt(std::max((norm_ * model).cwiseProduct(model).sum(), 0.0));
 }
 
 double RigidFreeNorm::rms_u_m(const Eigen::MatrixXd& covariance) const {
   const auto model = covariance.topLeftCorner(norm_.rows(), norm_.rows());
-  return std::sqrt(std::max(0.0, norm_.cwiseProduct(model).sum()));
+  return std::sqrt(std::max(norm_.cwiseProduct(model).sum(), 0.0));
 }
 
 }  // namespace abbe::calib

@@ -22,19 +22,21 @@ MachineNodes travels(double from_z_m, double to_z_m) {
 
 const Path kPath{{{-0.3, -0.25, 0.0}, {0.3, 0.2, 0.1}, {0.1, 0.25, -0.1}, {-0.2, 0.1, 0.1}}};
 
+const Vector3 kTarget_m(0.0, 0.3, -0.4);
+
 /// A levelled tracker 2 m beside the machine.
 const RigidTransform kTracker{Matrix3::Identity(), {2.0, 1.0, -0.5}};
 
 Verdict verdict_with(const OrientationEvidence& evidence, const RigidTransform& T = kTracker) {
   Verdict verdict;
-  require_orientation(verdict, kPath, travels(-0.1, 0.1), T, evidence);
+  require_orientation(verdict, kPath, travels(-0.1, 0.1), kTarget_m, T, evidence);
   return verdict;
 }
 
-/// Turned by 180 degrees about Z, as after a path file with reversed X and Y.
+/// What the alignment gives with X and Y reversed in the path file: the target moves by turn q + offset.
 RigidTransform about_z(RigidTransform T) {
   const Matrix3 turn = Vector3(-1, -1, 1).asDiagonal();
-  return {turn * T.R, turn * T.t_m};
+  return {turn * T.R, turn * (T.t_m - kTarget_m) + kTarget_m};
 }
 
 TEST(PathOrientation, HalfTurnsThatStayInTheTravelArePossible) {
@@ -75,29 +77,30 @@ TEST(PathOrientation, ThePlaceOfTheTrackerIsEnough) {
   EXPECT_THAT(verdict_with({.tracker_m = kTracker.t_m + Vector3(0.2, -0.2, 0.1)}).reasons, IsEmpty());
 }
 
-/// 0.6 m from the axis X a half turn about X moves the tracker by 1.2 m, 0.4 m from it by less than its place
-/// is known to.
+/// 0.4 m from the line along X through the target offset, a half turn moves the tracker by 0.8 m: not more
+/// than twice what its place is known to.
 TEST(PathOrientation, APlaceNearAnAxisLeavesTheTurnAboutItOpen) {
-  const RigidTransform near_x{Matrix3::Identity(), {2.0, 0.4, 0.0}};
+  const RigidTransform near_x{Matrix3::Identity(), {2.0, 0.7, -0.4}};
   EXPECT_THAT(verdict_with({.tracker_m = near_x.t_m}, near_x).reasons,
               ElementsAre(HasSubstr("degrees about X (")));
 }
 
 TEST(PathOrientation, APlaceThatFitsAfterAHalfTurnNamesIt) {
-  EXPECT_THAT(verdict_with({.tracker_m = kTracker.t_m}, about_z(kTracker)).reasons,
-              Contains(AllOf(HasSubstr("from the place that is given"), HasSubstr("by 180 degrees about Z"),
-                             HasSubstr("signs of the other two axes are reversed"))));
+  EXPECT_THAT(
+      verdict_with({.tracker_m = kTracker.t_m}, about_z(kTracker)).reasons,
+      ElementsAre(AllOf(HasSubstr("from the place that is given"), HasSubstr("by 180 degrees about Z"),
+                        HasSubstr("signs of the other two axes are reversed"))));
 }
 
 TEST(PathOrientation, ALevelledTrackerUpsideDownNamesTheFirstTurnThatHelps) {
   const Matrix3 turn = Vector3(1, -1, -1).asDiagonal();
   EXPECT_THAT(verdict_with({.up = Vector3::UnitZ()}, {turn, turn * kTracker.t_m}).reasons,
-              Contains(AllOf(HasSubstr("180 degrees off"), HasSubstr("by 180 degrees about X"))));
+              ElementsAre(AllOf(HasSubstr("180 degrees off"), HasSubstr("by 180 degrees about X"))));
 }
 
-TEST(PathOrientation, EvidenceThatNoHalfTurnExplainsIsSaidSo) {
+TEST(PathOrientation, EvidenceThatNoHalfTurnExplainsNamesWhatToCheck) {
   EXPECT_THAT(verdict_with({.tracker_m = Vector3(5, 5, 5)}).reasons,
-              Contains(HasSubstr("check the evidence and the axes of the path file")));
+              ElementsAre(HasSubstr("check the evidence and the axes of the path file")));
 }
 
 /// The whole way: X and Y reversed in the file, and nothing in the residuals.

@@ -107,7 +107,8 @@ double share(Air air, double Air::*quantity, double u, double wavelength_m, Inde
 double share_of_co2(const Air& air, double wavelength_m, IndexEquation equation) {
   if (equation != IndexEquation::ShopFloor)
     return share(air, &Air::co2_ppm, air.u_co2_ppm, wavelength_m, equation);
-  return kCo2PerPpm * (shop_floor(air) - 1.0) * root_sum_of_squares(air.co2_ppm - kStandardCo2_ppm, air.u_co2_ppm);
+  return kCo2PerPpm * (shop_floor(air) - 1.0) *
+         root_sum_of_squares(air.co2_ppm - kStandardCo2_ppm, air.u_co2_ppm);
 }
 
 struct Range {
@@ -162,12 +163,12 @@ Result<RefractiveIndex> refractive_index(const Air& air, double vacuum_wavelengt
   const auto part = [&](double Air::*quantity, double u) {
     return share(air, quantity, u, vacuum_wavelength_m, equation);
   };
-  const double u_air =
-      std::hypot(part(&Air::temperature_K, air.u_temperature_K), part(&Air::pressure_Pa, air.u_pressure_Pa),
-                 part(&Air::relative_humidity, air.u_relative_humidity));
+  const double u_air = root_sum_of_squares(root_sum_of_squares(part(&Air::temperature_K, air.u_temperature_K),
+                                                               part(&Air::pressure_Pa, air.u_pressure_Pa)),
+                                           part(&Air::relative_humidity, air.u_relative_humidity));
   const double u_co2 = share_of_co2(air, vacuum_wavelength_m, equation);
   return RefractiveIndex{index_of(air, vacuum_wavelength_m, equation),
-                         std::hypot(u_air, u_co2, u_of_equation(equation))};
+                         root_sum_of_squares(root_sum_of_squares(u_air, u_co2), u_of_equation(equation))};
 }
 
 Air shop_floor_air() noexcept {

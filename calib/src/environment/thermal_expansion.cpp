@@ -12,7 +12,7 @@ double growth(const Expansion& e) noexcept {
 
 double u_growth(const Expansion& e) noexcept {
   return root_sum_of_squares((e.temperature_K - kReferenceTemperature_K) * e.u_alpha_per_K,
-                    e.alpha_per_K * e.u_temperature_K);
+                             e.alpha_per_K * e.u_temperature_K);
 }
 
 UncertainLength length_at_reference(double length_m, const Expansion& part) noexcept {
@@ -28,7 +28,8 @@ UncertainLength true_position(double reading_m, double fixed_m, const Expansion&
 UncertainLength length_at_reference(double reading_m, const Expansion& scale,
                                     const Expansion& part) noexcept {
   const double ratio = growth(scale) / growth(part);
-  const double u_ratio = ratio * root_sum_of_squares(u_growth(scale) / growth(scale), u_growth(part) / growth(part));
+  const double u_ratio =
+      ratio * root_sum_of_squares(u_growth(scale) / growth(scale), u_growth(part) / growth(part));
   return {reading_m * ratio, std::abs(reading_m) * u_ratio};
 }
 

@@ -82,15 +82,19 @@ void note_artefact(const Observations& o, Verdict& verdict) {
 constexpr double kCoveredByU = 1.5;
 
 /// Reasons before those that only follow from them.
-void add_alternatives(Verdict& verdict, const std::vector<Alternative>& others, double stated_u_m) {
+void add_alternatives(Verdict& verdict, const std::vector<Alternative>& others, const CorrectionSize& size) {
   std::vector<std::string> reasons;
   for (const Alternative& other : others) {
-    const std::string text = with_effect(other.text, other.bias_m, stated_u_m);
     // Written so that a NaN figure is refused.
-    // Scatter without a cause is no white noise, and the uncertainty is that of white noise.
-    const bool covered = other.cause != Cause::Scatter && other.bias_m <= other.u_m &&
-                         root_sum_of_squares(other.bias_m, other.u_m) <= kCoveredByU * stated_u_m;
-    (covered ? verdict.notes : reasons).push_back(text);
+    if (other.cause ==
+        Cause::Scatter) {  // is in u as white noise: refused only where the model is small beside it
+      const bool small = other.bias_m <= kMostUncertainty * size.V_m;
+      (small ? verdict.notes : reasons).push_back(other.text);
+      continue;
+    }
+    const bool covered =
+        other.bias_m <= other.u_m && root_sum_of_squares(other.bias_m, other.u_m) <= kCoveredByU * size.u_m;
+    (covered ? verdict.notes : reasons).push_back(with_effect(other.text, other.bias_m, size.u_m));
   }
   verdict.reasons.insert(verdict.reasons.begin(), reasons.begin(), reasons.end());
 }
@@ -185,7 +189,7 @@ Result<Verdict> judge(const Observations& o, const Solution& solution, const Vol
                   " urad about Ball1 is unknown; give a rotation reference or accept ", kShapeOnly));
     }
     const CorrectionSize size = correction_size(o, solution);
-    add_alternatives(verdict, *others, size.u_m);
+    add_alternatives(verdict, *others, size);
     require_certainty(verdict, size.V_m, size.u_m);
     note_artefact(o, verdict);
     note_what_touches_do_not_show(verdict, o, extent_m(o));

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
 #include <optional>
 #include <utility>
 
@@ -127,7 +128,7 @@ class Screen {
       // log N(y; K + t^2 C C^T) - log N(y; K) = g^T M^-1 g t^2 / 2 - log |M| / 2,  M = 1 + t^2 G^T G
       const double t2 = size_m * size_m;
       const Eigen::LLT<Eigen::MatrixXd> M(Eigen::MatrixXd::Identity(GG.rows(), GG.cols()) + t2 * GG);
-      const double log_det = 2.0 * M.matrixLLT().diagonal().array().log().sum();
+      const double log_det = 2.0 * M.matrixLLT().diagonal().unaryExpr(&natural_logarithm).sum();
       const double value = 0.5 * (t2 * g.dot(M.solve(g)) - log_det);
       if (value > best.log_likelihood) {
         best = {value, size_m};
@@ -250,7 +251,8 @@ std::vector<Alternative> of_touches(const Rows& rows, const Refit& base, const T
       prior_variances(PriorKind::BayesPose, rows.design, rows.positions, rows.hyper);
   std::vector<Alternative> found;
   for (const TouchFinding& f : touches.findings) {
-    double bias_m = 0.0;
+    // What only scatters has no known effect: NaN, and refuses.
+    double bias_m = std::numeric_limits<double>::quiet_NaN();
     if (f.rows_m.size() > 0) {
       const Eigen::MatrixXd dc =
           gaussian.response(prior, rows.hyper.s_m * rows.hyper.s_m, white_rows(rows.o, f.rows_m));

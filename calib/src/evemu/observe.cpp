@@ -115,9 +115,8 @@ Result<std::vector<fit::Sphere>> fit_balls(int position, const Touched& touched,
 
 Result<void> check_single_touches(int position, const Touched& touched, const ObserveOptions& options) {
   for (const auto& [feature, points] : touched) {
-    const auto wrong = feature.first == Feature::Ball
-                           ? wrong_touch_on_ball(points.points_m, options.least_false_touch_m)
-                           : wrong_touch_on_face(points.points_m, options.least_false_touch_m);
+    const auto wrong = feature.first == Feature::Ball ? wrong_touch_on_ball(points.points_m, options)
+                                                      : wrong_touch_on_face(points.points_m, options);
     if (wrong) {
       return at_position(position, ErrorCode::BadInput,
                          message(name_of(feature.first), " ", feature.second, ": ", *wrong));
@@ -442,8 +441,7 @@ std::vector<AxisMistake> mistakes_of_errors() {
   std::vector<AxisMistake> all{
       {"all signs reversed (V = actual - nominal, in um)", -Matrix3::Identity()},
       {"errors in mm where um belong", 1e3 * Matrix3::Identity()},
-      {"errors in mm where um belong and all signs reversed", -1e3 * Matrix3::Identity()},
-      {"errors in nm where um belong", 1e-3 * Matrix3::Identity()}};
+      {"errors in mm where um belong and all signs reversed", -1e3 * Matrix3::Identity()}};
   for (const AxisMistake& mistake : axis_mistakes()) {
     all.push_back({mistake.text + " in errors or readings", mistake.M});
   }

@@ -73,16 +73,28 @@ std::optional<std::string> wrong_touch(std::span<const Vector3> points, std::siz
       " mm off the surface of the others: a false trigger, or dirt; touch there again");
 }
 
-}  // namespace
-
-std::optional<std::string> wrong_touch_on_ball(std::span<const Vector3> points_m, double most_off_m) {
-  constexpr std::size_t kUnknowns = 4;
-  return wrong_touch(points_m, kUnknowns, most_off_m, sphere_through);
+std::optional<std::string> rough_surface(const std::optional<Surface>& all, double most_off_m) {
+  if (!all || all->largest_m <= most_off_m) {
+    return std::nullopt;
+  }
+  return message("its touches lie up to ", all->largest_m * kMmPerM,
+                 " mm off one surface: false triggers, or touches of another feature");
 }
 
-std::optional<std::string> wrong_touch_on_face(std::span<const Vector3> points_m, double most_off_m) {
+}  // namespace
+
+std::optional<std::string> wrong_touch_on_ball(std::span<const Vector3> points_m,
+                                               const ObserveOptions& options) {
+  constexpr std::size_t kUnknowns = 4;
+  auto one = wrong_touch(points_m, kUnknowns, options.least_false_touch_m, sphere_through);
+  return one ? one : rough_surface(sphere_through(points_m), options.max_off_surface_m);
+}
+
+std::optional<std::string> wrong_touch_on_face(std::span<const Vector3> points_m,
+                                               const ObserveOptions& options) {
   constexpr std::size_t kUnknowns = 3;
-  return wrong_touch(points_m, kUnknowns, most_off_m, plane_through);
+  auto one = wrong_touch(points_m, kUnknowns, options.least_false_touch_m, plane_through);
+  return one ? one : rough_surface(plane_through(points_m), options.max_off_surface_m);
 }
 
 bool touched_from_below(const SeenArtefact& seen) {

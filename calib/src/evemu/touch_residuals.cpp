@@ -109,13 +109,18 @@ std::vector<FeatureResiduals> all_features(const Observations& o, const Volumetr
   return all;
 }
 
+/// A touch that alone determines a part of its surface has no residual.
+constexpr double kLeastFree = 0.05;
+
 /// Median absolute value of one residual over the root of its free share; 1.4826: of normal noise.
 double pooled_sigma_m(const std::vector<FeatureResiduals>& all) {
   constexpr double kMadToSigma = 1.4826;
   std::vector<double> values;
   for (const FeatureResiduals& f : all) {
     for (Eigen::Index k = 0; k < f.r_m.size(); ++k) {
-      values.push_back(std::abs(f.r_m(k)) / std::sqrt(f.free(k)));
+      if (f.free(k) >= kLeastFree) {
+        values.push_back(std::abs(f.r_m(k)) / std::sqrt(f.free(k)));
+      }
     }
   }
   if (values.empty()) {
@@ -165,6 +170,9 @@ std::optional<TouchFinding> worst_touch(const Observations& o, const std::vector
   for (const FeatureResiduals& f : all) {
     touches += static_cast<double>(f.r_m.size());
     for (Eigen::Index k = 0; k < f.r_m.size(); ++k) {
+      if (f.free(k) < kLeastFree) {
+        continue;
+      }
       const double w_k = std::abs(f.r_m(k)) / (sigma_m * std::sqrt(f.free(k)));
       if (w_k > w) {
         worst = &f, touch = k, w = w_k;

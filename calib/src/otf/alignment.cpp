@@ -233,6 +233,9 @@ std::string reflections(const Path& path, const MachineNodes& travel) {
 std::string fits_with(const BlockSeries& series, const Machine& machine, const Path& path, Options options) {
   options.progress = {};
   const auto fits = [&](const Path& other) {
+    if (options.stopped && options.stopped()) {
+      return false;
+    }
     return align_as_given(series, machine, other, options).has_value();
   };
   std::vector<std::string> texts;
@@ -258,7 +261,9 @@ std::string fits_with(const BlockSeries& series, const Machine& machine, const P
 Result<Alignment> align(const BlockSeries& series, const Machine& machine, const Path& path,
                         const Options& options) {
   Result<Alignment> a = align_as_given(series, machine, path, options);
-  if (!a && (a.error().code == ErrorCode::AlignmentFailed || a.error().code == ErrorCode::NotConverged)) {
+  const bool stopped = options.stopped && options.stopped();
+  if (!a && !stopped &&
+      (a.error().code == ErrorCode::AlignmentFailed || a.error().code == ErrorCode::NotConverged)) {
     a.error().text += fits_with(series, machine, path, options);
   }
   return a;

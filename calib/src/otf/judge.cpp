@@ -299,8 +299,8 @@ Result<Verdict> judge(const Observations& o, const Solution& solution, const Vol
   Verdict verdict = decide(solution.model, *figures, limits, active);
   add_alternatives(verdict, *others);
   require_plausible_growth(verdict, common_growth(solution.model), limits.max_growth);
-  require_orientation(verdict, {o.vertices_m}, o.layout.nodes(), o.alignment.T_machine_tracker,
-                      options.orientation);
+  require_orientation(verdict, {o.vertices_m}, o.layout.nodes(), o.target_offset_m,
+                      o.alignment.T_machine_tracker, options.orientation);
   const CorrectionSize size = correction_size(solution.model);
   require_certainty(verdict, size.V_m, size.u_m);
   note_what_u_leaves_out(verdict, o);

@@ -51,17 +51,36 @@ std::string cure(const Vector3& found, const Vector3& given, double at_most) {
   return "; check the evidence and the axes of the path file";
 }
 
-/// Adds a reason where `found` contradicts `given`; else keeps of `open` what the evidence does not exclude.
-void hold_against(Verdict& verdict, std::vector<Axis>& open, const Vector3& found, const Vector3& given,
-                  double at_most, const std::string& what) {
+/// False and a reason where `found` contradicts `given`; else keeps of `open` what the evidence does not
+/// exclude.
+bool agrees(Verdict& verdict, std::vector<Axis>& open, const Vector3& found, const Vector3& given,
+            double at_most, const std::string& what) {
   if (!((found - given).norm() <= at_most)) {
     verdict.reasons.push_back(message("path orientation: ", what, cure(found, given, at_most)));
-    return;
+    return false;
   }
   const auto excluded = [&](Axis about) {
     return (half_turned(found, about) - given).norm() > 2.0 * at_most;
   };
   open.erase(std::remove_if(open.begin(), open.end(), excluded), open.end());
+  return true;
+}
+
+bool agrees_with_up(Verdict& verdict, std::vector<Axis>& open, const RigidTransform& T_machine_tracker,
+                    const Vector3& up) {
+  const Vector3 found = T_machine_tracker.R.col(2);
+  const double off_rad = 2.0 * std::asin(std::min(1.0, 0.5 * (found - up).norm()));
+  return agrees(verdict, open, found, up, kUpTolerance,
+                message("the axis of the levelled tracker does not point along the machine's up but is ",
+                        180.0 / std::numbers::pi * off_rad, " degrees off"));
+}
+
+/// The path turns about the machine's zero, what the tracker sees about the target offset.
+bool agrees_with_place(Verdict& verdict, std::vector<Axis>& open, const Vector3& found_m,
+                       const Vector3& given_m, const Vector3& target_offset_m) {
+  return agrees(
+      verdict, open, found_m - target_offset_m, given_m - target_offset_m, kPlaceTolerance_m,
+      message("the tracker comes out ", (found_m - given_m).norm(), " m from the place that is given"));
 }
 
 }  // namespace
@@ -78,23 +97,14 @@ std::vector<Axis> possible_half_turns(const Path& path, const MachineNodes& node
 }
 
 void require_orientation(Verdict& verdict, const Path& path, const MachineNodes& nodes,
-                         const RigidTransform& T_machine_tracker, const OrientationEvidence& evidence) {
+                         const Vector3& target_offset_m, const RigidTransform& T_machine_tracker,
+                         const OrientationEvidence& evidence) {
   std::vector<Axis> open = possible_half_turns(path, nodes);
   if (evidence.scales_agree) open.clear();
-  if (evidence.up) {
-    const Vector3 found = T_machine_tracker.R.col(2);
-    hold_against(verdict, open, found, *evidence.up, kUpTolerance,
-                 message("the axis of the levelled tracker does not point along the machine's up but is ",
-                         180.0 / std::numbers::pi * 2.0 *
-                             std::asin(std::min(1.0, 0.5 * (found - *evidence.up).norm())),
-                         " degrees off"));
-  }
-  if (evidence.tracker_m) {
-    const Vector3& found = T_machine_tracker.t_m;
-    hold_against(verdict, open, found, *evidence.tracker_m, kPlaceTolerance_m,
-                 message("the tracker comes out ", (found - *evidence.tracker_m).norm(),
-                         " m from the place that is given"));
-  }
+  if (evidence.up && !agrees_with_up(verdict, open, T_machine_tracker, *evidence.up)) return;
+  if (evidence.tracker_m &&
+      !agrees_with_place(verdict, open, T_machine_tracker.t_m, *evidence.tracker_m, target_offset_m))
+    return;
   if (open.empty()) return;
   const std::string text =
       message("path orientation: the path file would fit as well turned by 180 degrees about ", list_of(open),

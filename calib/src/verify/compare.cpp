@@ -301,8 +301,9 @@ Effect effect_at_points(const Comparison& c) noexcept {
     squares += gained * gained;
   }
   const double mean = sum / n;
+  constexpr double kClearly = 3.0;
   const double standard_error = std::sqrt(std::max(squares / n - mean * mean, 0.0) / (n - 1.0));
-  if (!(std::abs(mean) > 2.0 * standard_error)) {
+  if (!(std::abs(mean) > kClearly * standard_error)) {
     return Effect::NotSeen;
   }
   return mean > 0.0 ? Effect::Better : Effect::Worse;

@@ -40,11 +40,11 @@ struct AxisConfig {
 
 enum class BasisConfig { Linear };
 
-/// [machine], [axes.*], [target], [model], and the noise figures of [tracker]: what identification needs to
-/// know.
 /// Direction of a machine axis along which the vertical axis of a levelled tracker points.
 enum class TrackerVertical { PlusX, MinusX, PlusY, MinusY, PlusZ, MinusZ };
 
+/// [machine], [axes.*], [target], [model], and the noise figures of [tracker]: what identification needs to
+/// know.
 struct MachineConfig {
   std::string name;
   std::string chain;             ///< ISO 10791-6 style, "[w X' b Y Z (C1) t]"

@@ -22,7 +22,7 @@ inline constexpr std::string_view kPathOrientation = "path-orientation";
 
 /// What the evidence of `options` contradicts, as reasons that refuse the model, and which possible half
 /// turns it leaves open: that refuses the model, too, unless accepted by name (then it is a note).
-void require_orientation(Verdict&, const Path&, const MachineNodes&, const RigidTransform& T_machine_tracker,
-                         const OrientationEvidence&);
+void require_orientation(Verdict&, const Path&, const MachineNodes&, const Vector3& target_offset_m,
+                         const RigidTransform& T_machine_tracker, const OrientationEvidence&);
 
 }  // namespace abbe::calib::otf

@@ -64,7 +64,7 @@ struct Comparison {
 /// What the model does at the measured points inside its volume.
 enum class Effect { Better, NotSeen, Worse };
 
-/// From the mean over the points of |left_before|^2 - |left_after|^2, against twice its standard error (s /
+/// From the mean over the points of |left_before|^2 - |left_after|^2, against three times its standard error (s /
 /// sqrt(n), [GUM] 4.2.3); nearer to zero, the points show no effect. Neighbouring points err alike, so that
 /// the standard error is rather too small.
 [[nodiscard]] Effect effect_at_points(const Comparison&) noexcept;

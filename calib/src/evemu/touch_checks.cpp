@@ -42,10 +42,13 @@ std::optional<Surface> plane_through(std::span<const Vector3> points) {
 
 std::optional<std::string> wrong_touch(std::span<const Vector3> points, std::size_t unknowns,
                                        double most_off_m, const FitSurface& fit) {
-  constexpr double kShare = 0.25;  // of its distance from the others a touch keeps at least, of six on a ball
+  constexpr double kShare = 0.25;  // of its distance from the others is its residual at least
   constexpr double kClear = 10.0;  // the others lie that much better
+  // A machine with errors of some mm bends a sphere by 0.4 mm. Few touches lie well on another sphere by
+  // chance.
+  constexpr std::size_t kPerUnknown = 4;
   const std::optional<Surface> all = fit(points);
-  if (!all || all->largest_m < kShare * most_off_m || points.size() < unknowns + 2) {
+  if (!all || all->largest_m < kShare * most_off_m || points.size() < kPerUnknown * unknowns) {
     return std::nullopt;
   }
   std::size_t worst = 0;
@@ -60,17 +63,11 @@ std::optional<std::string> wrong_touch(std::span<const Vector3> points, std::siz
       rest_m = rest->rms_m;
     }
   }
-  // The surface through few others is extrapolated to the touch, and what bends it with it.
-  constexpr double kExtrapolated = 2.0;
-  const double least_m = (points.size() < 4 * unknowns ? kExtrapolated : 1.0) * most_off_m;
-  if (!(worst_m > least_m && worst_m > kClear * rest_m)) {
+  if (!(worst_m > most_off_m && worst_m > kClear * rest_m)) {
     return std::nullopt;
   }
-  const bool located = points.size() > unknowns + 2;
-  return message(
-      located ? message("touch ", worst + 1, " of ", points.size()) : message("one touch of ", points.size()),
-      " lies ", worst_m * kMmPerM,
-      " mm off the surface of the others: a false trigger, or dirt; touch there again");
+  return message("touch ", worst + 1, " of ", points.size(), " lies ", worst_m * kMmPerM,
+                 " mm off the surface of the others: a false trigger, or dirt; touch there again");
 }
 
 std::optional<std::string> rough_surface(const std::optional<Surface>& all, double most_off_m) {

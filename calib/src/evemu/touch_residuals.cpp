@@ -280,11 +280,17 @@ TouchResiduals touch_residuals(const Observations& o, const VolumetricModel& mod
     }
   }
   found.s_centre_m = found.sigma_m * std::sqrt(squares / std::max(1.0, count));
-  for (const auto& test : {worst_touch, worst_form, backlash}) {
-    if (auto finding = test(o, all, found.sigma_m, false_alarm)) {
+  const auto add = [&](std::optional<TouchFinding> finding) {
+    if (finding) {
       found.findings.push_back(*std::move(finding));
     }
+  };
+  auto touch = worst_touch(o, all, found.sigma_m, false_alarm);
+  if (!touch) {  // else its ball or block scatters because of it
+    add(worst_form(o, all, found.sigma_m, false_alarm));
   }
+  add(std::move(touch));
+  add(backlash(o, all, found.sigma_m, false_alarm));
   return found;
 }
 

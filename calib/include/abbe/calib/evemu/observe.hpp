@@ -56,7 +56,7 @@ struct ObserveOptions {
   /// Off the surface the others of a feature lie on. Machine errors near 3 mm bend a sphere by 0.4 mm.
   double max_off_surface_m = 1e-3;
   /// A touch farther than this from the surface through the others of its ball or face, which lie ten times
-  /// better, is false.
+  /// better, is false; only where there are four touches for each unknown (16 on a ball, 12 on a face).
   double least_false_touch_m = 0.15e-3;
   /// Thinnest against largest extent of all balls. Below, the third axis is not tested.
   double least_thickness = 1e-3;

@@ -38,15 +38,16 @@ sim::BallArray random_array(std::mt19937_64& random) {
   return array;
 }
 
-/// Fanned about Ball1 as in [Li OMM], tilted and rolled three to four times as far: there, with 2 to 5
-/// degrees, nothing shows the scale of the axis across the array.
+/// Fanned about Ball1 as in [Li OMM], tilted and rolled as there by 2 to 5 degrees, where little shows the
+/// scale of the axis across the array, or up to four times as far.
 std::vector<Isometry3d> random_positions(std::mt19937_64& random, const Vector3& ball1_m, std::size_t count) {
   constexpr double kRadPerDeg = M_PI / 180.0;
+  const double farther = uniform(random, 1.0, 4.0);
   std::vector<Isometry3d> positions;
   for (std::size_t i = 0; i < count; ++i) {
     const double fan = 16.0 - 14.0 * static_cast<double>(i % 4) / 3.0 + uniform(random, -1.0, 1.0);
-    const double tilt = (i % 8 < 4 ? 1.0 : -1.0) * uniform(random, 8.0, 15.0);
-    const double roll = (i % 2 == 0 ? 1.0 : -1.0) * uniform(random, 5.0, 12.0);
+    const double tilt = (i % 8 < 4 ? 1.0 : -1.0) * farther * uniform(random, 1.8, 3.2);
+    const double roll = (i % 2 == 0 ? 1.0 : -1.0) * farther * uniform(random, 2.5, 5.0);
     Isometry3d T = Isometry3d::Identity();
     T.translate(ball1_m + 50e-6 * normal3(random));  // put on its seat again by hand
     T.rotate(Eigen::AngleAxisd(fan * kRadPerDeg, Vector3::UnitZ()));

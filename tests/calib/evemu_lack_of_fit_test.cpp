@@ -111,18 +111,18 @@ INSTANTIATE_TEST_SUITE_P(
                                }},
                     ArrayFault{Cause::Touch, "touch 7 of 25",
                                [](ArrayRun& r) {
-                                 int touch = 0;
-                                 for (Touch& t : r.touches) {
+                                 int number = 0;
+                                 for (Touch& one : r.touches) {
                                    const bool there =
-                                       t.position == 2 && t.feature == Feature::Block && t.number == 1;
-                                   if (there && ++touch == 7) t.p_m.z() += 0.12e-3;
+                                       one.position == 2 && one.feature == Feature::Block && one.number == 1;
+                                   if (there && ++number == 7) one.p_m.z() += 0.12e-3;
                                  }
                                }},
                     ArrayFault{Cause::Drift, "drifts", [](ArrayRun& r) {
                                  double at = 0.0;
-                                 for (Touch& t : r.touches) {
+                                 for (Touch& one : r.touches) {
                                    const double share = ++at / static_cast<double>(r.touches.size());
-                                   t.p_m.x() -= 0.3e-3 * share * t.p_m.x();
+                                   one.p_m.x() -= 0.3e-3 * share * one.p_m.x();
                                  }
                                }}));
 

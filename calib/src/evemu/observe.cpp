@@ -551,9 +551,6 @@ Result<Observations> observe(std::span<const Touch> touches, const Calibrator& a
     turned.push_back(seen->T_self_uni.R);
     o.seen.push_back(*std::move(seen));
   }
-  for (const Calibrator::Ball& ball : c.balls) {
-    o.contact_radius_m.push_back(ball.radius_m + c.tip_radius_m);
-  }
   return finish(std::move(o), options);
 }
 

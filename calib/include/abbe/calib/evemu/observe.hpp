@@ -76,8 +76,6 @@ struct Observations {
   std::vector<SeenArtefact> seen;                 ///< by position; empty when only errors were given
   Vector3 ball1_m = Vector3::Zero();              ///< mean reading
   std::optional<ArtefactUncertainty> artefact{};  ///< none when only errors were given
-  /// Calibrated radius of a ball at its temperature, and that of the tip, by ball; empty as `seen`.
-  std::vector<double> contact_radius_m{};
   [[nodiscard]] std::size_t positions() const;
 };
 

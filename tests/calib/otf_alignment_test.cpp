@@ -5,6 +5,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
+#include <random>
 
 #include "otf_run.hpp"
 
@@ -51,6 +53,46 @@ TEST(LegAssignment, GoesOnThroughLostBlocks) {
   ASSERT_TRUE(leg);
   EXPECT_EQ(leg->at(1), 0u);
   EXPECT_EQ(leg->at(4), 1u);
+}
+
+/// Squared distance from the leg, and (0.02 m)^2 (1 - cos) of the angle between travel and leg.
+double cost_on_leg(const std::vector<Vector3>& points, std::size_t i, const Path& path, std::size_t leg) {
+  const Vector3 from = path.vertices_m[leg], way = path.vertices_m[leg + 1] - from;
+  const double share = std::clamp((points[i] - from).dot(way) / way.squaredNorm(), 0.0, 1.0);
+  const Vector3 travel = points[std::min(i + 1, points.size() - 1)] - points[i == 0 ? 0 : i - 1];
+  const double cosine = travel.dot(way) / travel.norm() / way.norm();
+  return (points[i] - from - share * way).squaredNorm() + 0.02 * 0.02 * (1.0 - cosine);
+}
+
+/// The cheapest of all assignments that visit every leg in order.
+std::vector<std::size_t> cheapest(const std::vector<Vector3>& points, const Path& path) {
+  const std::size_t n = points.size(), m = path.vertices_m.size() - 1;
+  std::vector<bool> advances(n - 1, false);
+  std::fill(advances.end() - static_cast<std::ptrdiff_t>(m - 1), advances.end(), true);
+  std::vector<std::size_t> best;
+  double least = std::numeric_limits<double>::infinity();
+  do {
+    std::vector<std::size_t> leg{0};
+    for (const bool advance : advances) leg.push_back(leg.back() + (advance ? 1 : 0));
+    double sum = 0.0;
+    for (std::size_t i = 0; i < n; ++i) sum += cost_on_leg(points, i, path, leg[i]);
+    if (sum < least) least = sum, best = leg;
+  } while (std::next_permutation(advances.begin(), advances.end()));
+  return best;
+}
+
+TEST(LegAssignment, IsTheCheapestOfAll) {
+  std::mt19937 random(11);
+  std::normal_distribution<double> normal(0.0, 0.05);
+  const auto place = [&] { return Vector3(normal(random), normal(random), normal(random)); };
+  for (const auto& [n, m] : {std::pair{9, 4}, {9, 9}, {9, 8}, {10, 2}, {7, 1}}) {
+    Path path;
+    std::vector<Vector3> points;
+    for (int i = 0; i <= m; ++i) path.vertices_m.push_back(place());
+    for (int i = 0; i < n; ++i) points.push_back(place());
+    EXPECT_EQ(assign_legs(points, path, 0.02).value(), cheapest(points, path))
+        << n << " blocks, " << m << " legs";
+  }
 }
 
 TEST(LegAssignment, NeedsABlockForEveryLeg) {

@@ -1,6 +1,7 @@
 #include "abbe/calib/gate.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <span>
 #include <vector>
 
@@ -134,6 +135,53 @@ void compare_volumes(Verdict& verdict, const VolumetricModel& candidate, const V
   }
 }
 
+struct Growth {
+  double value = 0.0;
+  double u = 0.0;  ///< at most: as if the errors of all places were one error
+};
+
+/// Of the candidate against the active model, where both hold.
+Growth growth_against(const VolumetricModel& candidate, const VolumetricModel& active, const Vector3& t) {
+  constexpr std::size_t kEnough = 1000;
+  const std::vector<Vector3> all = points_inside(active.validity());
+  std::vector<Vector3> at, difference_m;
+  for (std::size_t i = 0; i < all.size(); i += 1 + all.size() / kEnough) {
+    if (candidate.validity().contains(all[i])) {
+      at.push_back(all[i]);
+    }
+  }
+  const Vector3 centre = mean(at);
+  double u_along = 0.0, squares = 0.0;
+  for (const Vector3& q : at) {
+    const VolumetricError a = candidate.error_at(q, t), b = active.error_at(q, t);
+    const Vector3 way = q - centre;
+    difference_m.push_back(a.V_m - b.V_m);
+    u_along += std::sqrt(std::max(0.0, way.dot((a.cov_V_m2 + b.cov_V_m2) * way)));
+    squares += way.squaredNorm();
+  }
+  return {growth(at, difference_m), squares > 0.0 ? u_along / squares : 0.0};
+}
+
+/// No residual shows a wrong scale of path, ranges or temperature; the active model does.
+void compare_scales(Verdict& verdict, const VolumetricModel& candidate, const VolumetricModel& active,
+                    const GateLimits& limits) {
+  const Growth g = growth_against(candidate, active, candidate.tool_offsets_m().front());
+  constexpr double kCoverage = 2.0;
+  // Written so that a NaN figure is refused.
+  if (std::abs(g.value) <= limits.max_growth_change + kCoverage * g.u) {
+    return;
+  }
+  const std::string seen =
+      message("the machine is larger by ", 1e6 * g.value,
+              " um/m in all directions than in the active model (standard uncertainty at most ", 1e6 * g.u,
+              " um/m): wrong scale of the path, of the ranges or of a temperature");
+  if (limits.accept_scale_change) {
+    verdict.notes.push_back(message(seen, ", accepted by name"));
+  } else {
+    verdict.reasons.push_back(message(seen, "; if the machine was changed, accept ", kScaleChange));
+  }
+}
+
 void say_what_was_compared(Verdict& verdict, bool holds_for_tool) {
   const HeldOutFigures& h = verdict.held_out;
   if (!holds_for_tool) {
@@ -211,6 +259,7 @@ Verdict decide(const VolumetricModel& candidate, const HeldOutFigures& held_out,
     say_what_was_compared(verdict, holds_for_tool);
     if (holds_for_tool) {
       compare_volumes(verdict, candidate, *active, limits);
+      compare_scales(verdict, candidate, *active, limits);
     }
   }
   verdict.accepted = verdict.reasons.empty();

@@ -61,6 +61,19 @@ Result<ModelDifference> rigid_free(std::span<const Vector3> points_m, std::span<
   return result;
 }
 
+double growth(std::span<const Vector3> points_m, std::span<const Vector3> V_m) {
+  Vector3 centre = Vector3::Zero();
+  for (const Vector3& p : points_m) {
+    centre += p / static_cast<double>(points_m.size());
+  }
+  double along = 0.0, squares = 0.0;
+  for (std::size_t i = 0; i < points_m.size(); ++i) {
+    along += V_m[i].dot(points_m[i] - centre);
+    squares += (points_m[i] - centre).squaredNorm();
+  }
+  return squares > 0.0 ? along / squares : 0.0;
+}
+
 Result<ModelDifference> rigid_free_difference(const VolumetricModel& a, const VolumetricModel& b,
                                               const Vector3& tool_offset_m,
                                               std::span<const Vector3> axis_positions_m) {

@@ -68,6 +68,38 @@ TEST(Gate, RefusesImplausibleMagnitudeAndGradient) {
               ElementsAre(HasSubstr("largest error 6000 um"), HasSubstr("steepest change 10000")));
 }
 
+/// Every axis longer by `growth`, with this standard uncertainty of every parameter.
+VolumetricModel grown_model(double growth, double u_m) {
+  const otf::Machine machine = coarse_machine("[w X' b Y Z t]");
+  const ParameterLayout layout = layout_of(machine);
+  Eigen::VectorXd U = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(layout.model_size()));
+  for (const Axis a : kAllAxes) {
+    const auto table = layout.find({static_cast<Motion>(index(a)), a});
+    const AxisNodes& nodes = machine.nodes[index(a)];
+    for (std::size_t i = 0; i < nodes.nodes_m.size(); ++i) {
+      U(static_cast<Eigen::Index>(table->offset + i)) = growth * (nodes.nodes_m[i] - nodes.reference_m);
+    }
+  }
+  return *VolumetricModel::from_vector(layout, Gauge::G1, std::array{machine.target_offset_m}, U,
+                                       u_m * u_m * Eigen::MatrixXd::Identity(U.size(), U.size()),
+                                       *ValidityVolume::hull_of(tensor_grid(machine.nodes)));
+}
+
+TEST(Gate, RefusesAnotherScaleThanTheActiveModels) {
+  const VolumetricModel active = grown_model(10e-6, 0.0), candidate = grown_model(110e-6, 0.0);
+  EXPECT_THAT(decide(candidate, figures(100, 1.0, 1.1), {}, &active).reasons,
+              ElementsAre(AllOf(HasSubstr("larger by 100 um/m"), HasSubstr("accept scale-change"))));
+  const Verdict accepted = decide(candidate, figures(100, 1.0, 1.1), {.accept_scale_change = true}, &active);
+  EXPECT_TRUE(accepted.accepted);
+  EXPECT_THAT(accepted.notes, testing::Contains(HasSubstr("accepted by name")));
+}
+
+TEST(Gate, AScaleWithinTheUncertaintyIsThatOfTheActiveModel) {
+  const VolumetricModel active = grown_model(0.0, 0.0);
+  EXPECT_TRUE(decide(grown_model(15e-6, 0.0), figures(100, 1.0, 1.1), {}, &active).accepted);
+  EXPECT_TRUE(decide(grown_model(110e-6, 100e-6), figures(100, 1.0, 1.1), {}, &active).accepted);
+}
+
 TEST(Gate, ComparesWithTheActiveModelOnTheSameObservations) {
   HeldOutFigures f = figures(100, 1.2, 1.1);
   f.candidate_beside_active = 1.0;

@@ -1,8 +1,9 @@
 #pragma once
 /// When a model may be trusted, whatever method it came from: it predicts observations it was not fitted to
 /// better than no compensation and, where the active model holds, better than that one; it holds where the
-/// active model does but for a rim of 2 %, unless a smaller volume is accepted by name; and it is of a size
-/// and smoothness a machine can have.
+/// active model does but for a rim of 2 %, unless a smaller volume is accepted by name; its scale is that of
+/// the active model, unless a change is accepted by name; and it is of a size and smoothness a machine can
+/// have.
 
 #include <cstddef>
 #include <optional>
@@ -40,12 +41,19 @@ struct GateLimits {
   /// |growth of the machine alike in all directions|: 200 um/m; larger is a wrong unit, path, range or
   /// temperature.
   double max_growth = 200e-6;
+  /// |growth alike in all directions against the active model| beside twice its standard uncertainty: 20 um/m
+  /// are 1.7 K of steel. More is a wrong scale of path, ranges or temperature, or another machine.
+  double max_growth_change = 20e-6;
   double min_improvement = 0.0;        ///< required relative drop of the held-out figure; 0: merely better
   bool accept_smaller_volume = false;  ///< than that of the active model
+  bool accept_scale_change = false;    ///< beyond max_growth_change
 };
 
 /// The name under which a configuration lets a model replace one that holds in more of the machine.
 inline constexpr std::string_view kSmallerVolume = "smaller-volume";
+
+/// The name under which a configuration lets a model replace one from which its scale differs.
+inline constexpr std::string_view kScaleChange = "scale-change";
 
 /// Share of the volume of `before` that lies in `after`, from points on a lattice over `before`: to a few
 /// per cent. What lies beside `after` by no more than `rim` of its width counts as in it.

@@ -26,6 +26,10 @@ struct ModelDifference {
 [[nodiscard]] Result<ModelDifference> rigid_free(std::span<const Vector3> points_m,
                                                  std::span<const Vector3> difference_m);
 
+/// Least squares s of V = s p + rigid motion: about the mean of the points, translation and rotation do not
+/// matter. 0 for points in one place.
+[[nodiscard]] double growth(std::span<const Vector3> points_m, std::span<const Vector3> V_m);
+
 /// a - b at `axis_positions_m`. NotApplicable if one of them does not hold for the tool.
 [[nodiscard]] Result<ModelDifference> rigid_free_difference(const VolumetricModel& a,
                                                             const VolumetricModel& b,

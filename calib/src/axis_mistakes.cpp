@@ -1,11 +1,11 @@
 #include "abbe/calib/axis_mistakes.hpp"
 
+#include <algorithm>
+
 #include "message.hpp"
 
 namespace abbe::calib {
 namespace {
-
-constexpr double kRounding_m = 1e-9;
 
 Matrix3 reversed(std::span<const Eigen::Index> axes) {
   Matrix3 M = Matrix3::Identity();
@@ -24,20 +24,15 @@ Matrix3 reordered(const std::array<Eigen::Index, 3>& from) {
   return M;
 }
 
-bool is_inside(double q_m, const AxisNodes& axis) {
-  return q_m >= axis.nodes_m.front() - kRounding_m && q_m <= axis.nodes_m.back() + kRounding_m;
+bool is_inside(double q_m, const AxisNodes& axis, double tolerance_m) {
+  return q_m >= axis.nodes_m.front() - tolerance_m && q_m <= axis.nodes_m.back() + tolerance_m;
 }
 
 bool all_inside(std::span<const Vector3> points_m, const Matrix3& M, const MachineNodes& travel) {
-  for (const Vector3& p : points_m) {
+  return std::all_of(points_m.begin(), points_m.end(), [&](const Vector3& p) {
     const Vector3 q = M * p;
-    for (std::size_t a = 0; a < 3; ++a) {
-      if (!is_inside(q[static_cast<Eigen::Index>(a)], travel[a])) {
-        return false;
-      }
-    }
-  }
-  return true;
+    return outside_travel(std::span(&q, 1), travel).empty();
+  });
 }
 
 }  // namespace
@@ -64,11 +59,12 @@ const std::vector<UnitMistake>& unit_mistakes() {
   return all;
 }
 
-std::vector<OutsideTravel> outside_travel(std::span<const Vector3> points_m, const MachineNodes& travel) {
+std::vector<OutsideTravel> outside_travel(std::span<const Vector3> points_m, const MachineNodes& travel,
+                                          double tolerance_m) {
   std::vector<OutsideTravel> found;
   for (std::size_t i = 0; i < points_m.size(); ++i) {
     for (std::size_t a = 0; a < 3; ++a) {
-      if (!is_inside(points_m[i][static_cast<Eigen::Index>(a)], travel[a])) {
+      if (!is_inside(points_m[i][static_cast<Eigen::Index>(a)], travel[a], tolerance_m)) {
         found.push_back({i, a});
       }
     }

@@ -39,14 +39,49 @@ RigidTransform about_z(RigidTransform T) {
   return {turn * T.R, turn * (T.t_m - kTarget_m) + kTarget_m};
 }
 
+Matrix3 half_turn(double x, double y, double z) {
+  return Vector3(x, y, z).asDiagonal();
+}
+
 TEST(PathOrientation, HalfTurnsThatStayInTheTravelArePossible) {
-  EXPECT_THAT(possible_half_turns(kPath, travels(-0.1, 0.1)), ElementsAre(Axis::X, Axis::Y, Axis::Z));
+  EXPECT_THAT(possible_turns(kPath, travels(-0.1, 0.1)),
+              ElementsAre(half_turn(1, -1, -1), half_turn(-1, 1, -1), half_turn(-1, -1, 1)));
 }
 
 TEST(PathOrientation, ATravelOnOneSideOfZeroShowsReversedSigns) {
   Path path = kPath;
   for (Vector3& q : path.vertices_m) q.z() -= 0.2;
-  EXPECT_THAT(possible_half_turns(path, travels(-0.4, 0.0)), ElementsAre(Axis::Z));
+  EXPECT_THAT(possible_turns(path, travels(-0.4, 0.0)), ElementsAre(half_turn(-1, -1, 1)));
+}
+
+/// Three equal travels about zero: every proper rotation of a cube but the identity.
+TEST(PathOrientation, ACubeOfTravelsAllowsAll23Rotations) {
+  const AxisNodes axis = *equidistant_nodes(-0.3, 0.3, 0.1);
+  const auto turns = possible_turns(kPath, {axis, axis, axis});
+  EXPECT_EQ(turns.size(), 23u);
+  for (const Matrix3& R : turns) {
+    EXPECT_NEAR(R.determinant(), 1.0, 1e-12);
+    EXPECT_TRUE((R * R.transpose()).isIdentity()) << R;
+  }
+}
+
+/// X and Y of a path exchanged with one sign reversed: a quarter turn about Z.
+TEST(PathOrientation, QuarterTurnsAreNamedByTheirColumns) {
+  const MachineNodes equal{*equidistant_nodes(-0.3, 0.3, 0.1), *equidistant_nodes(-0.3, 0.3, 0.1),
+                           *equidistant_nodes(-0.4, 0.0, 0.1)};
+  Path path = kPath;
+  for (Vector3& q : path.vertices_m) q.z() -= 0.2;
+  Verdict open, contradicted;
+  require_orientation(open, path, equal, kTarget_m, kTracker, {});
+  EXPECT_THAT(open.reasons, ElementsAre(AllOf(HasSubstr("turned by 180 degrees about Z ("),
+                                              HasSubstr("read as (-y, x, z) or (y, -x, z)"))));
+  // Tracker found at the place turned by -90 degrees about Z.
+  Matrix3 quarter = Matrix3::Zero();
+  quarter(0, 1) = 1, quarter(1, 0) = -1, quarter(2, 2) = 1;
+  const RigidTransform found{quarter * kTracker.R, quarter * (kTracker.t_m - kTarget_m) + kTarget_m};
+  require_orientation(contradicted, path, equal, kTarget_m, found, {.tracker_m = kTracker.t_m});
+  EXPECT_THAT(contradicted.reasons,
+              ElementsAre(HasSubstr("columns (x, y, z) of the path file read as (-y, x, z)")));
 }
 
 TEST(PathOrientation, WithoutEvidenceTheModelIsRefusedAndWhatHelpsIsNamed) {

@@ -2,10 +2,13 @@
 
 #include <Eigen/Geometry>
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <numbers>
+#include <optional>
 #include <string>
 
+#include "abbe/calib/axis_mistakes.hpp"
 #include "message.hpp"
 
 namespace abbe::calib::otf {
@@ -13,18 +16,26 @@ namespace {
 
 constexpr double kTravelTolerance_m = 1e-3;
 
-Vector3 half_turned(const Vector3& v, Axis about) {
-  const Vector3 direction = Vector3::Unit(static_cast<Eigen::Index>(index(about)));
-  return 2.0 * direction.dot(v) * direction - v;
-}
-
-bool within_travel(const Vector3& q, const MachineNodes& nodes) {
-  for (std::size_t a = 0; a < nodes.size(); ++a) {
-    const double x = q(static_cast<Eigen::Index>(a));
-    if (x < nodes[a].nodes_m.front() - kTravelTolerance_m) return false;
-    if (x > nodes[a].nodes_m.back() + kTravelTolerance_m) return false;
-  }
-  return true;
+/// Rows and columns of R hold one 1 or -1 each, and its determinant is 1: all but the identity. Half turns
+/// about X, Y and Z come first.
+const std::vector<Matrix3>& turns_of_axes() {
+  static const std::vector<Matrix3> all = [] {
+    std::vector<Matrix3> turns;
+    std::array<Eigen::Index, 3> from{0, 1, 2};
+    do {
+      for (const int signs : {6, 5, 3, 7, 1, 2, 4, 0}) {  // bit i: row i is negative
+        Matrix3 R = Matrix3::Zero();
+        for (Eigen::Index i = 0; i < 3; ++i) {
+          R(i, from[static_cast<std::size_t>(i)]) = (signs >> i & 1) != 0 ? -1.0 : 1.0;
+        }
+        if (R.determinant() > 0.0 && !R.isIdentity()) {
+          turns.push_back(R);
+        }
+      }
+    } while (std::next_permutation(from.begin(), from.end()));
+    return turns;
+  }();
+  return all;
 }
 
 /// Of a direction: its chord is the angle in rad for small angles. 10 degrees: axes of a machine are not that
@@ -33,40 +44,90 @@ constexpr double kUpTolerance = 0.17;
 /// Where the tracker stands, by a tape measure.
 constexpr double kPlaceTolerance_m = 0.5;
 
-std::string list_of(const std::vector<Axis>& axes) {
+/// The axis of a half turn about X, Y or Z.
+std::optional<Axis> half_turn_about(const Matrix3& R) {
+  for (const Axis axis : kAllAxes) {
+    const auto k = static_cast<Eigen::Index>(index(axis));
+    if (R.isDiagonal() && R(k, k) > 0.0) {
+      return axis;
+    }
+  }
+  return std::nullopt;
+}
+
+/// "(-y, x, z)": what the turned path has in its columns.
+std::string columns(const Matrix3& R) {
+  std::string text;
+  for (Eigen::Index i = 0; i < 3; ++i) {
+    for (Eigen::Index k = 0; k < 3; ++k) {
+      if (R(i, k) != 0.0) {
+        text += message(text.empty() ? "" : ", ", R(i, k) < 0.0 ? "-" : "", "xyz"[k]);
+      }
+    }
+  }
+  return "(" + text + ")";
+}
+
+/// "A", "A or B", "A, B or C", "A, B, C or 4 others".
+std::string list_of(std::vector<std::string> texts) {
+  constexpr std::size_t kMost = 3;
+  if (texts.size() > kMost + 1) {
+    texts[kMost] = message(texts.size() - kMost, " others");
+    texts.resize(kMost + 1);
+  }
   std::string list;
-  for (std::size_t i = 0; i < axes.size(); ++i) {
-    if (i > 0) list += i + 1 < axes.size() ? ", " : " or ";
-    list += letter(axes[i]);
+  for (std::size_t i = 0; i < texts.size(); ++i) {
+    if (i > 0) list += i + 1 < texts.size() ? ", " : " or ";
+    list += texts[i];
   }
   return list;
 }
 
-/// The half turn that brings `found` to `given`, as words.
+/// "turned by 180 degrees about X or Z (signs of the other two axes reversed), or with x, y, z read as ..."
+std::string list_of_turns(const std::vector<Matrix3>& turns) {
+  std::vector<std::string> half, other;
+  for (const Matrix3& R : turns) {
+    const auto about = half_turn_about(R);
+    about ? half.push_back(message(letter(*about))) : other.push_back(columns(R));
+  }
+  std::string text;
+  if (!half.empty()) {
+    text = message("turned by 180 degrees about ", list_of(half), " (signs of the other two axes reversed)");
+  }
+  if (!other.empty()) {
+    text += message(half.empty() ? "" : ", or ", "with its columns (x, y, z) read as ", list_of(other));
+  }
+  return text;
+}
+
+/// The turn that brings `found` to `given`, as words.
 std::string cure(const Vector3& found, const Vector3& given, double at_most) {
-  for (const Axis about : kAllAxes)
-    if ((half_turned(found, about) - given).norm() <= at_most)
-      return message("; it does after a turn by 180 degrees about ", letter(about),
-                     ": the signs of the other two axes are reversed in the path file");
+  for (const Matrix3& R : turns_of_axes()) {
+    if (!((R * found - given).norm() <= at_most)) {
+      continue;
+    }
+    const auto about = half_turn_about(R);
+    return about ? message("; it does after a turn by 180 degrees about ", letter(*about),
+                           ": the signs of the other two axes are reversed in the path file")
+                 : message("; it does with the columns (x, y, z) of the path file read as ", columns(R));
+  }
   return "; check the evidence and the axes of the path file";
 }
 
 /// False and a reason where `found` contradicts `given`; else keeps of `open` what the evidence does not
 /// exclude.
-bool agrees(Verdict& verdict, std::vector<Axis>& open, const Vector3& found, const Vector3& given,
+bool agrees(Verdict& verdict, std::vector<Matrix3>& open, const Vector3& found, const Vector3& given,
             double at_most, const std::string& what) {
   if (!((found - given).norm() <= at_most)) {
     verdict.reasons.push_back(message("path orientation: ", what, cure(found, given, at_most)));
     return false;
   }
-  const auto excluded = [&](Axis about) {
-    return (half_turned(found, about) - given).norm() > 2.0 * at_most;
-  };
+  const auto excluded = [&](const Matrix3& R) { return (R * found - given).norm() > 2.0 * at_most; };
   open.erase(std::remove_if(open.begin(), open.end(), excluded), open.end());
   return true;
 }
 
-bool agrees_with_up(Verdict& verdict, std::vector<Axis>& open, const RigidTransform& T_machine_tracker,
+bool agrees_with_up(Verdict& verdict, std::vector<Matrix3>& open, const RigidTransform& T_machine_tracker,
                     const Vector3& up) {
   const Vector3 found = T_machine_tracker.R.col(2);
   const double off_rad = 2.0 * std::asin(std::min(1.0, 0.5 * (found - up).norm()));
@@ -76,7 +137,7 @@ bool agrees_with_up(Verdict& verdict, std::vector<Axis>& open, const RigidTransf
 }
 
 /// The path turns about the machine's zero, what the tracker sees about the target offset.
-bool agrees_with_place(Verdict& verdict, std::vector<Axis>& open, const Vector3& found_m,
+bool agrees_with_place(Verdict& verdict, std::vector<Matrix3>& open, const Vector3& found_m,
                        const Vector3& given_m, const Vector3& target_offset_m) {
   return agrees(
       verdict, open, found_m - target_offset_m, given_m - target_offset_m, kPlaceTolerance_m,
@@ -85,13 +146,12 @@ bool agrees_with_place(Verdict& verdict, std::vector<Axis>& open, const Vector3&
 
 }  // namespace
 
-std::vector<Axis> possible_half_turns(const Path& path, const MachineNodes& nodes) {
-  std::vector<Axis> possible;
-  for (const Axis about : kAllAxes) {
-    const bool stays = std::all_of(path.vertices_m.begin(), path.vertices_m.end(), [&](const Vector3& q) {
-      return within_travel(half_turned(q, about), nodes);
-    });
-    if (stays) possible.push_back(about);
+std::vector<Matrix3> possible_turns(const Path& path, const MachineNodes& nodes) {
+  std::vector<Matrix3> possible;
+  for (const Matrix3& R : turns_of_axes()) {
+    std::vector<Vector3> turned = path.vertices_m;
+    for (Vector3& q : turned) q = R * q;
+    if (outside_travel(turned, nodes, kTravelTolerance_m).empty()) possible.push_back(R);
   }
   return possible;
 }
@@ -99,16 +159,15 @@ std::vector<Axis> possible_half_turns(const Path& path, const MachineNodes& node
 void require_orientation(Verdict& verdict, const Path& path, const MachineNodes& nodes,
                          const Vector3& target_offset_m, const RigidTransform& T_machine_tracker,
                          const OrientationEvidence& evidence) {
-  std::vector<Axis> open = possible_half_turns(path, nodes);
+  std::vector<Matrix3> open = possible_turns(path, nodes);
   if (evidence.scales_agree) open.clear();
   if (evidence.up && !agrees_with_up(verdict, open, T_machine_tracker, *evidence.up)) return;
   if (evidence.tracker_m &&
       !agrees_with_place(verdict, open, T_machine_tracker.t_m, *evidence.tracker_m, target_offset_m))
     return;
   if (open.empty()) return;
-  const std::string text =
-      message("path orientation: the path file would fit as well turned by 180 degrees about ", list_of(open),
-              " (signs of the other two axes reversed), and nothing given excludes it");
+  const std::string text = message("path orientation: the path file would fit as well ", list_of_turns(open),
+                                   ", and nothing given excludes it");
   if (evidence.accepted) {
     verdict.notes.push_back(text);
   } else {

@@ -30,9 +30,10 @@ struct OutsideTravel {
   std::size_t point = 0;
   std::size_t axis = 0;
 };
-/// By point, then axis; 1 nm beyond the ends counts as inside (a file in mm).
+/// By point, then axis; up to `tolerance_m` beyond the ends counts as inside (1 nm: a file in mm).
 [[nodiscard]] std::vector<OutsideTravel> outside_travel(std::span<const Vector3> points_m,
-                                                        const MachineNodes& travel);
+                                                        const MachineNodes& travel,
+                                                        double tolerance_m = 1e-9);
 
 /// "; all are inside with Y reversed, or with X and Y swapped". Empty: with none of the mistakes.
 [[nodiscard]] std::string inside_travel_with(std::span<const Vector3> points_m, const MachineNodes& travel);

@@ -36,6 +36,8 @@ TEST(OtfInputs, TheGateOfTheConfigurationDecidesHowARunIsJudged) {
   EXPECT_EQ(gate_limits(gate).max_gradient, 1e-2);
   EXPECT_FALSE(gate_limits(gate).accept_smaller_volume);
   EXPECT_TRUE(gate_limits({.accept = {"smaller-volume"}}).accept_smaller_volume);
+  EXPECT_FALSE(gate_limits(gate).accept_scale_change);
+  EXPECT_TRUE(gate_limits({.accept = {"scale-change"}}).accept_scale_change);
 }
 
 }  // namespace

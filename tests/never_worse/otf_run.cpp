@@ -199,6 +199,8 @@ OtfRun random_otf_run(std::uint64_t seed) {
   // Within their stated uncertainties.
   run.noise.u_scale = 0.45e-6;  // 0.3 ppm of the instrument, 0.33 ppm of the air
   run.range_scale = 1.0 + 0.45e-6 * normal(random);
+  run.noise.u_range_offset_m = 6e-6;
+  run.range_offset_m = 6e-6 * normal(random);
   for (Eigen::Index a = 0; a < 3; ++a) {
     run.noise.u_axis_scale[static_cast<std::size_t>(a)] = 2.3e-6;  // 0.2 K of steel
     run.scale(a) = 1.0 + 2.3e-6 * normal(random);

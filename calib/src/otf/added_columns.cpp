@@ -56,7 +56,27 @@ AddedColumns::Estimate AddedColumns::estimate(const Eigen::MatrixXd& Q, double l
     }
   }
   e.d = scale.asDiagonal() * d;
+  e.u = (scale.asDiagonal() * root).rowwise().norm();
   e.root_cov_dU = QAWC * scale.asDiagonal() * root;
+  e.dU = QAWC * e.d;
+  return e;
+}
+
+AddedColumns::Estimate AddedColumns::estimate_with_prior(const Eigen::MatrixXd& Q, double u,
+                                                         double factor) const {
+  const Eigen::MatrixXd QAWC = Q * CWA_.transpose();
+  const Eigen::Index k = CWr_.size();
+  const Eigen::MatrixXd S = (CWC_ - CWA_ * QAWC) / factor;
+  Eigen::MatrixXd information = 0.5 * (S + S.transpose());
+  information.diagonal().array() += 1.0 / (u * u);
+  const Eigen::LLT<Eigen::MatrixXd> llt(information);
+  Estimate e;
+  e.columns = static_cast<std::size_t>(k);
+  e.d = llt.solve(CWr_ / factor);
+  e.drop = e.d.dot(CWr_) / factor;
+  const Eigen::MatrixXd root = llt.matrixU().solve(Eigen::MatrixXd::Identity(k, k));
+  e.u = root.rowwise().norm();
+  e.root_cov_dU = QAWC * root;
   e.dU = QAWC * e.d;
   return e;
 }

@@ -94,8 +94,7 @@ std::size_t AlternativeColumns::values(const Added& added, const Observation& ro
       }
       return row.leg == added.place ? kShift : 0;
     case Cause::RangeOffset:
-      v[0] = row.direction.dot(
-          (row.axis_position_m + o_.target_offset_m - o_.alignment.T_machine_tracker.t_m).normalized());
+      v[0] = drow_drange_offset(o_, row);
       return 1;
     default:
       return 0;

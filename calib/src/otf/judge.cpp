@@ -180,20 +180,13 @@ void add_alternatives(Verdict& verdict, const std::vector<Alternative>& others) 
   verdict.reasons.insert(verdict.reasons.begin(), reasons.begin(), reasons.end());
 }
 
-/// Of V = s p + rigid motion, least squares over the nodes.
 double common_growth(const VolumetricModel& model) {
   const std::vector<Vector3> at = tensor_grid(model.layout().nodes());
-  const Vector3& t = model.tool_offsets_m().front();
-  Vector3 centre = Vector3::Zero();
+  std::vector<Vector3> V_m;
   for (const Vector3& q : at) {
-    centre += q / static_cast<double>(at.size());
+    V_m.push_back(model.V_at(q, model.tool_offsets_m().front()));
   }
-  double along = 0.0, squares = 0.0;
-  for (const Vector3& q : at) {  // about the centre, translation and rotation do not matter
-    along += model.V_at(q, t).dot(q - centre);
-    squares += (q - centre).squaredNorm();
-  }
-  return along / squares;
+  return growth(at, V_m);
 }
 
 void require_plausible_growth(Verdict& verdict, double growth, double most) {
@@ -289,8 +282,9 @@ Result<HeldOutFigures> held_out(const Observations& o, const VolumetricModel* ac
   return figures;
 }
 
-Result<Verdict> judge(const Observations& o, const Solution& solution, const VolumetricModel* active,
+Result<Verdict> judge(const Observations& measured, const Solution& solution, const VolumetricModel* active,
                       const GateLimits& limits, const Options& options) {
+  const Observations o = without_range_offset(measured, solution.range_offset.value_m);
   const Result<std::vector<Alternative>> others = alternatives(o, solution, options);
   const Result<HeldOutFigures> figures = held_out(o, active, options);
   if (!others || !figures) {

@@ -176,6 +176,32 @@ Result<std::optional<Alternative>> best_of(const Fit& fit, const AlternativeColu
       .u_m = root_sum_of_squares(fit.u_white_m, added_u_m) * std::sqrt(factor)};
 }
 
+/// What the data show of the offset of the ranges beyond its prior. `sums`: of residuals less `estimated`.
+Result<std::optional<Alternative>> offset_beyond_prior(const Fit& fit, const AlternativeColumns& columns,
+                                                       const AlternativeColumns::Family& family,
+                                                       const RangeOffset& estimated) {
+  const auto& [added, sums] = family.front();
+  AddedColumns::Estimate e = sums.estimate(fit.adjustment.dU_dg, 0.0);
+  if (e.columns == 0) {
+    return std::nullopt;  // the model follows the offset: the prior alone decides
+  }
+  constexpr double kNormal99 = 2.576;  // 99 % of a normal deviate lie within
+  const double factor = fit.noise.covariance_factor();
+  const double beyond_m = e.d(0), of_data_m = estimated.value_m + beyond_m;
+  const double u_of_data_m = e.u(0) * std::sqrt(factor);
+  if (!(std::abs(of_data_m) > kNormal99 * root_sum_of_squares(u_of_data_m, fit.o.u_range_offset_m))) {
+    return std::nullopt;
+  }
+  e.d(0) = of_data_m;
+  return Alternative{
+      .cause = Cause::RangeOffset,
+      .text = message(columns.text(added, e.d), "; stated are ", 1e6 * fit.o.u_range_offset_m, " um"),
+      .explained = std::clamp(e.drop / std::max(fit.excess(), e.drop), 0.0, 1.0),
+      .bias_m = fit.norm.rms_m(e.dU),
+      .u_m =
+          root_sum_of_squares(fit.u_white_m, fit.norm.rms_of_columns_m(e.root_cov_dU)) * std::sqrt(factor)};
+}
+
 /// The same observations adjusted with another design.
 Result<std::optional<Alternative>> other_design(const Fit& fit, const Solution& solution,
                                                 Result<ParameterLayout> layout, Cause cause, std::string text,
@@ -359,7 +385,11 @@ Result<std::vector<Alternative>> alternatives(const Observations& o, const Solut
   const AlternativeColumns columns(o);
   std::vector<Alternative> found;
   for (const auto& family : columns.sums(solution.residuals.after_m)) {
-    Result<std::optional<Alternative>> best = best_of(*fit, columns, family, options);
+    const bool has_prior =
+        o.u_range_offset_m > 0.0 && !family.empty() && family.front().first.cause == Cause::RangeOffset;
+    Result<std::optional<Alternative>> best =
+        has_prior ? offset_beyond_prior(*fit, columns, family, solution.range_offset)
+                  : best_of(*fit, columns, family, options);
     if (!best) {
       return tl::unexpected(best.error());
     }

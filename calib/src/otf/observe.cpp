@@ -63,6 +63,10 @@ Result<void> check(const Noise& noise) {
     return failure(ErrorCode::BadInput,
                    message("tracker noise: u_scale ", noise.u_scale, ": must not be negative"));
   }
+  if (!(noise.u_range_offset_m >= 0) || !std::isfinite(noise.u_range_offset_m)) {
+    return failure(ErrorCode::BadInput, message("tracker noise: u_range_offset ", noise.u_range_offset_m,
+                                                " m: must not be negative"));
+  }
   for (const double u : noise.u_axis_scale) {
     if (!(u >= 0) || !std::isfinite(u)) {
       return failure(ErrorCode::BadInput,
@@ -165,6 +169,20 @@ void append_rows(Observations& o, const PointOnPath& point, std::span<const Vect
   append(point.frame.a3, point.frame.sigma3_m);
 }
 
+double drow_drange_offset(const Observations& o, const Observation& row) {
+  const Vector3 beam_m = row.axis_position_m + o.target_offset_m - o.alignment.T_machine_tracker.t_m;
+  return row.direction.dot(beam_m.normalized());
+}
+
+Observations without_range_offset(Observations o, double range_offset_m) {
+  if (range_offset_m != 0.0) {
+    for (Observation& row : o.rows) {
+      row.y_m -= range_offset_m * drow_drange_offset(o, row);
+    }
+  }
+  return o;
+}
+
 Observations with_layout(const Observations& o, ParameterLayout layout) {
   Observations other = o;
   other.layout = std::move(layout);
@@ -209,7 +227,8 @@ Result<Observations> observe_blocks(const BlockSeries& series, const Machine& ma
                  .alignment = *std::move(alignment),
                  .vertices_m = path.vertices_m,
                  .u_scale = noise.u_scale,
-                 .u_axis_scale = noise.u_axis_scale};
+                 .u_axis_scale = noise.u_axis_scale,
+                 .u_range_offset_m = noise.u_range_offset_m};
   o.samples = series.samples;
   o.lost_samples = series.lost_samples;
   o.blocks = series.blocks.size();

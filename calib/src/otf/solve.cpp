@@ -7,6 +7,7 @@
 
 #include "abbe/calib/otf/lack_of_fit.hpp"
 #include "message.hpp"
+#include "otf/added_columns.hpp"
 #include "otf/check_stopped.hpp"
 #include "otf/row_residuals.hpp"
 
@@ -90,6 +91,17 @@ Eigen::VectorXd dU_daxis_scale(const ParameterLayout& layout, Axis axis) {
   return slope;
 }
 
+/// The offset of the ranges beside the adjustment `a`, whose residuals are `residual_m`.
+AddedColumns::Estimate range_offset(const Observations& o, const Adjustment& a,
+                                    std::span<const double> residual_m, double factor) {
+  AddedColumns sums(1, o.layout.fit_size());
+  for (std::size_t i = 0; i < o.rows.size(); ++i) {
+    const double c = drow_drange_offset(o, o.rows[i]);
+    sums.add(o.rows[i], o.A.row(i), residual_m[i], std::span(&c, 1));
+  }
+  return sums.estimate_with_prior(a.dU_dg, o.u_range_offset_m, factor);
+}
+
 void report(const Options& options, double fraction) {
   if (options.progress) {
     options.progress(Stage::Solve, fraction);
@@ -141,8 +153,19 @@ Result<Solution> solve(const Observations& o, const Options& options) {
     return tl::unexpected(validity.error());
   }
   Residuals residuals{residuals_m(o, {}), residuals_m(o, a->U)};
-  const Statistics figures = statistics(o, *a, residuals);
+  Statistics figures = statistics(o, *a, residuals);
+  RangeOffset offset;
+  Eigen::MatrixXd root_of_offset = Eigen::MatrixXd::Zero(a->U.size(), 1);
+  if (o.u_range_offset_m > 0.0) {
+    const auto e = range_offset(o, *a, residuals.after_m, figures.covariance_factor);
+    offset = {e.d(0), e.u(0)};
+    root_of_offset = e.root_cov_dU;
+    a->U -= e.dU;
+    residuals.after_m = residuals_m(without_range_offset(o, offset.value_m), a->U);
+    figures = statistics(o, *a, residuals);
+  }
   a->covariance *= figures.covariance_factor;
+  a->covariance += root_of_offset * root_of_offset.transpose();
   if (o.u_scale > 0.0) {
     const Eigen::VectorXd moved = o.u_scale * dU_dscale(o, *a);
     a->covariance += moved * moved.transpose();
@@ -165,7 +188,8 @@ Result<Solution> solve(const Observations& o, const Options& options) {
                   .covariance_with_rigid = a->covariance,
                   .T_machine_tracker = o.alignment.T_machine_tracker,
                   .statistics = figures,
-                  .residuals = std::move(residuals)};
+                  .residuals = std::move(residuals),
+                  .range_offset = offset};
 }
 
 }  // namespace abbe::calib::otf

@@ -105,11 +105,11 @@ void read_gate(Section& root, Config& out) {
   section.get("holdout_fraction", gate.holdout_fraction, kPlain, {0.05, 0.5});
   if (section.get("accept", gate.accept)) {
     for (const auto& name : gate.accept)
-      if (name != calib::evemu::kShapeOnly && name != calib::kSmallerVolume &&
+      if (name != calib::evemu::kShapeOnly && name != calib::kSmallerVolume && name != calib::kScaleChange &&
           name != calib::otf::kPathOrientation)
-        section.fault("accept",
-                      fmt::format("\"{}\": must be \"{}\", \"{}\" or \"{}\"", name, calib::evemu::kShapeOnly,
-                                  calib::kSmallerVolume, calib::otf::kPathOrientation));
+        section.fault("accept", fmt::format("\"{}\": must be \"{}\", \"{}\", \"{}\" or \"{}\"", name,
+                                            calib::evemu::kShapeOnly, calib::kSmallerVolume,
+                                            calib::kScaleChange, calib::otf::kPathOrientation));
   }
   section.close();
 }

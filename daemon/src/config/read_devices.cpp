@@ -16,6 +16,7 @@ namespace {
 void read_noise(Section& tracker, MachineConfig& machine) {
   tracker.get("sigma_range_um", machine.sigma_range_m, kMicro, kPositive);
   tracker.get("sigma_angle_urad", machine.sigma_angle_rad, kMicro, kPositive);
+  tracker.get("u_range_offset_um", machine.u_range_offset_m, kMicro, kNotNegative);
 }
 
 void read_placement(Section& tracker, MachineConfig& machine) {

@@ -49,7 +49,9 @@ Result<calib::otf::Machine> otf_machine(const MachineConfig& machine) {
 }
 
 calib::otf::Noise otf_noise(const MachineConfig& machine) {
-  return {.sigma_range_m = machine.sigma_range_m, .sigma_angle_rad = machine.sigma_angle_rad};
+  return {.sigma_range_m = machine.sigma_range_m,
+          .sigma_angle_rad = machine.sigma_angle_rad,
+          .u_range_offset_m = machine.u_range_offset_m};
 }
 
 calib::otf::Path otf_path(std::span<const AxisPosition> path_m) {
@@ -102,7 +104,8 @@ calib::otf::Options otf_options(std::span<const calib::otf::TrackerObservation> 
 calib::GateLimits gate_limits(const GateConfig& gate) {
   return {.max_error_m = gate.max_error_m,
           .max_gradient = gate.max_gradient,
-          .accept_smaller_volume = gate.accepts(calib::kSmallerVolume)};
+          .accept_smaller_volume = gate.accepts(calib::kSmallerVolume),
+          .accept_scale_change = gate.accepts(calib::kScaleChange)};
 }
 
 Error error_of(const calib::Error& error) {

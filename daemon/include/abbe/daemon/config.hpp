@@ -58,6 +58,9 @@ struct MachineConfig {
       nodes_m;                    ///< of every linear axis, ascending, both ends of travel included
   double sigma_range_m = 2e-6;    ///< standard deviation of one tracker range
   double sigma_angle_rad = 3e-6;  ///< standard deviation of one tracker direction, perpendicular to the beam
+  /// Of the offset all ranges have in common. 10 um as limit of error of home position and reflector: 10 um /
+  /// sqrt(3).
+  double u_range_offset_m = 6e-6;
   std::optional<TrackerVertical> tracker_vertical;          ///< none: the tracker is not levelled
   std::optional<std::array<double, 3>> tracker_position_m;  ///< machine coordinates, to 0.5 m
   [[nodiscard]] const AxisConfig* find_axis(std::string_view name) const noexcept;
@@ -308,7 +311,8 @@ struct GateConfig {
   double holdout_fraction = 0.2;
   /// What this shop takes as it is, by name: "evemu-shape-only", a ball array's model whose rotation about
   /// Ball1 nobody has referenced; "smaller-volume", a model in place of one that holds in more of the
-  /// machine; "path-orientation", a path file that may be turned by 180 degrees (calib/otf/orientation).
+  /// machine; "scale-change", one whose scale is another; "path-orientation", a path file that may be turned
+  /// (calib/otf/orientation).
   std::vector<std::string> accept;
 
   [[nodiscard]] bool accepts(std::string_view name) const;

@@ -54,6 +54,7 @@ struct Observations {
   std::vector<Vector3> vertices_m{};     ///< of the path, axis positions
   double u_scale = 0.0;                  ///< see Noise
   std::array<double, 3> u_axis_scale{};  ///< see Noise
+  double u_range_offset_m = 0.0;         ///< see Noise
   std::vector<Vector3> covered_m{};      ///< axis positions whose hull the used blocks cover
   std::size_t samples = 0;
   std::size_t lost_samples = 0;
@@ -73,6 +74,11 @@ struct PointOnPath {
   double samples = 1.0;  ///< in the mean
 };
 void append_rows(Observations&, const PointOnPath&, std::span<const Vector3> sub_points_m);
+
+/// What an offset of all ranges moves a row by, per m of offset.
+[[nodiscard]] double drow_drange_offset(const Observations&, const Observation& row);
+/// The same observations, as ranges less this offset give them.
+[[nodiscard]] Observations without_range_offset(Observations, double range_offset_m);
 
 /// The same observations for other tables: another order of the axes, other nodes.
 [[nodiscard]] Observations with_layout(const Observations&, ParameterLayout);

@@ -48,6 +48,9 @@ struct Noise {
   /// Relative standard uncertainty of the length of the scales of X, Y, Z (their temperature and expansion),
   /// in common for all readings of an axis. No residual shows it either: it is a positioning error.
   std::array<double, 3> u_axis_scale{};
+  /// Standard uncertainty of the offset that all ranges have in common (home position, reflector). Positive:
+  /// the adjustment estimates the offset, with this prior. 0: the ranges have none.
+  double u_range_offset_m = 0.0;
 };
 
 /// What besides ranges and path decides how the path lies in the machine; see orientation.hpp.

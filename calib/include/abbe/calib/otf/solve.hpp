@@ -6,7 +6,9 @@
 /// (A^T W^2 C W^2 A) Q: [Sanders 2023] eq. (12), corrected for the rotation into machine coordinates (in
 /// sigma_m already) and for the alignment, which is estimated along; the diagonal holds variances. What all
 /// ranges are off by in common (Noise::u_scale) moves every row by s = direction . (place - tracker), and U
-/// by Q A^T W^2 s: u_scale^2 times the square of that is added, after the factor below. Not estimable: see
+/// by Q A^T W^2 s: u_scale^2 times the square of that is added, after the factor below. An offset d of all
+/// ranges with the prior N(0, u_range_offset^2) is one more unknown with the column C: with S = C^T W^2 C -
+/// C^T W^2 A Q A^T W^2 C, d = C^T W^2 r / (S + 1/u^2), and U moves by -Q A^T W^2 C d. Not estimable: see
 /// VolumetricModel. Rank and condition are those of the column-scaled data, without the gauge.
 
 #include <Eigen/Core>
@@ -95,6 +97,12 @@ struct Statistics {
   StopReason stop = StopReason::Direct;
 };
 
+/// Offset of all ranges, where Noise::u_range_offset_m gives it a prior; else 0.
+struct RangeOffset {
+  double value_m = 0.0;
+  double u_m = 0.0;
+};
+
 struct Solution {
   VolumetricModel model;  ///< gauge G1, rigid unknowns at 0
   Estimator estimator = Estimator::TwoStep;
@@ -102,7 +110,8 @@ struct Solution {
   Eigen::MatrixXd covariance_with_rigid;
   RigidTransform T_machine_tracker;
   Statistics statistics;
-  Residuals residuals;
+  Residuals residuals;  ///< after_m: less the range offset, too
+  RangeOffset range_offset;
 };
 
 [[nodiscard]] Result<Solution> solve(const Observations&, const Options& = {});

@@ -180,6 +180,59 @@ TEST_F(Cli, WithoutEvidenceOfThePathsOrientationTheGateRefuses) {
   EXPECT_EQ(command("--accept-path-orientation").exit, 0);
 }
 
+/// `identify otf` with another machine.toml.
+std::string with_machine(const test::OtfFiles& files, const fs::path& machine, const fs::path& path,
+                         const fs::path& out) {
+  return fmt::format("identify otf --machine '{}' --path '{}' --tracker '{}' -o '{}'", machine.string(),
+                     path.string(), files.tracker.string(), out.string());
+}
+
+/// Readings at 100 Hz: 0.5 s at every vertex, 0.1 s from one to the next.
+std::string scales_csv(double factor) {
+  std::string text = "time_s,x_mm,y_mm,z_mm\n";
+  double time_s = 0.0;
+  const auto path = test::synthetic_path_m();
+  for (std::size_t i = 0; i < path.size(); ++i) {
+    for (int k = 0; k < 60; ++k, time_s += 0.01) {
+      const double share = i + 1 < path.size() ? std::max(0.0, (k - 50) / 10.0) : 0.0;
+      const Eigen::Vector3d q =
+          1e3 * factor * (path[i] + share * (path[std::min(i + 1, path.size() - 1)] - path[i]));
+      text += fmt::format("{:.2f},{:.6f},{:.6f},{:.6f}\n", time_s, q.x(), q.y(), q.z());
+    }
+  }
+  return text;
+}
+
+TEST_F(Cli, ScalesThatAgreeWithThePathAreEvidenceOfItsOrientation) {
+  auto machine = text_of(files_.machine);
+  machine.erase(machine.find(test::kTrackerPlacement));
+  const auto ran = abbe(with_machine(files_, write("bare.toml", machine), files_.path, folder_ / "scales") +
+                        fmt::format(" --encoder '{}'", write("encoder.csv", scales_csv(1.0)).string()));
+  EXPECT_EQ(ran.exit, 0) << ran.out << ran.err;
+  const auto document = read_model(folder_ / "scales/model.json");
+  ASSERT_TRUE(document);
+  EXPECT_EQ(document->inputs.back().name, "encoder.csv");
+}
+
+TEST_F(Cli, ScalesThatContradictThePathAreNamedByVertexAndAxis) {
+  const auto ran = identify(files_.path, files_.tracker, folder_ / "scaled",
+                            fmt::format("--encoder '{}'", write("scaled.csv", scales_csv(0.999)).string()));
+  EXPECT_EQ(ran.exit, 3);
+  EXPECT_THAT(ran.err,
+              AllOf(HasSubstr("scaled.csv: the scales contradict the path: at vertex 0 X reads -59.940"),
+                    HasSubstr("the path says -60.000 mm")));
+  EXPECT_FALSE(fs::exists(folder_ / "scaled"));
+}
+
+TEST_F(Cli, ScalesOfAnotherPathAreRefusedWithTheVertexTheyMiss) {
+  std::string text = scales_csv(1.0);
+  text.resize(text.rfind('\n', text.size() / 2) + 1);
+  const auto ran = identify(files_.path, files_.tracker, folder_ / "half_scales",
+                            fmt::format("--encoder '{}'", write("half.csv", text).string()));
+  EXPECT_EQ(ran.exit, 3);
+  EXPECT_THAT(ran.err, HasSubstr("half.csv: the scales do not reach vertex"));
+}
+
 TEST_F(Cli, NamesTheSignsThatAreReversedInThePath) {
   std::string turned = "x_mm,y_mm,z_mm\n";
   for (const auto& q : test::synthetic_path_m())
@@ -198,11 +251,17 @@ TEST_F(Cli, AnUncertainIndexOfTheAirWidensTheModel) {
   EXPECT_GT(wide->model.covariance().trace(), 1.01 * plain->model.covariance().trace());
 }
 
-/// `identify otf` with another machine.toml.
-std::string with_machine(const test::OtfFiles& files, const fs::path& machine, const fs::path& path,
-                         const fs::path& out) {
-  return fmt::format("identify otf --machine '{}' --path '{}' --tracker '{}' -o '{}'", machine.string(),
-                     path.string(), files.tracker.string(), out.string());
+TEST_F(Cli, TheSummaryHasTheOffsetOfTheRanges) {
+  const auto command = [&](const std::string& more) {
+    const auto machine = write("offset.toml", test::synthetic_machine_toml() + more /* of [tracker] */);
+    return nlohmann::json::parse(
+        abbe(with_machine(files_, machine, files_.path, folder_ / "offset") + " --json").out);
+  };
+  const auto by_default = command(""), none = command("u_range_offset_um = 0\n");
+  EXPECT_LE(by_default.at("u_range_offset_um").get<double>(), 6.0);
+  EXPECT_GT(by_default.at("u_range_offset_um").get<double>(), 0.0);
+  EXPECT_EQ(none.at("u_range_offset_um").get<double>(), 0.0);
+  EXPECT_NE(by_default.at("hash"), none.at("hash"));
 }
 
 TEST_F(Cli, TheVerdictNamesAirThatNobodyMeasured) {

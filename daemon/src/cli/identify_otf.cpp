@@ -22,6 +22,7 @@
 #include "cli/terminal.hpp"
 #include "files/text_file.hpp"
 #include "input/travel_faults.hpp"
+#include "session/path_readings.hpp"
 #include "units.hpp"
 
 namespace abbe::daemon {
@@ -33,7 +34,7 @@ namespace otf = calib::otf;
 constexpr double kPpmPer1 = 1e6;
 
 struct IdentifyOtfArguments {
-  std::string machine, path, tracker, recording, keep, out;
+  std::string machine, path, tracker, encoder, recording, keep, out;
   std::string estimator = "two-step";
   std::size_t block_samples = 0;      // 0: by travel
   std::optional<double> u_scale_ppm;  // else that of [tracker]
@@ -45,6 +46,7 @@ struct Files {
   Config config;
   PathFile path;
   TrackerFile tracker;
+  std::optional<EncoderFile> encoder;
   std::vector<InputFile> sources;
 };
 
@@ -53,6 +55,7 @@ struct OtfOutcome {
   otf::Residuals residuals;
   calib::Verdict verdict;
   std::size_t blocks = 0, blocks_used = 0;
+  otf::RangeOffset range_offset;
 };
 
 Result<Files> read_files(const IdentifyOtfArguments& arguments, ProgressBar& bar) {
@@ -67,7 +70,16 @@ Result<Files> read_files(const IdentifyOtfArguments& arguments, ProgressBar& bar
   if (!tracker) return tl::make_unexpected(tracker.error());
   std::vector<InputFile> sources{
       {std::filesystem::path(arguments.machine).filename().string(), *hash}, path->source, tracker->source};
-  return Files{std::move(*config), std::move(*path), std::move(*tracker), std::move(sources)};
+  std::optional<EncoderFile> encoder;
+  if (!arguments.encoder.empty()) {
+    auto read = read_encoder_csv(arguments.encoder,
+                                 [&](double fraction) { bar.show("reading the scales", fraction); });
+    if (!read) return tl::make_unexpected(read.error());
+    sources.push_back(read->source);
+    encoder = std::move(*read);
+  }
+  return Files{std::move(*config), std::move(*path), std::move(*tracker), std::move(encoder),
+               std::move(sources)};
 }
 
 std::string_view words(otf::Stage stage) {
@@ -91,8 +103,9 @@ protocol::UtcTime now() {
 OtfOutcome outcome_of(OtfCandidate candidate, const Config& config, std::vector<InputFile> sources) {
   auto document = otf_document(candidate.solution, config, std::move(sources), now());
   const auto& s = candidate.solution.statistics;
-  return {std::move(document), std::move(candidate.solution.residuals), std::move(candidate.verdict),
-          s.blocks, s.blocks_used};
+  return {
+      std::move(document), std::move(candidate.solution.residuals), std::move(candidate.verdict), s.blocks,
+      s.blocks_used,       candidate.solution.range_offset};
 }
 
 double u_scale(const IdentifyOtfArguments& arguments, const Config& config) {
@@ -109,6 +122,14 @@ Result<void> check_path(const std::string& file, const PathFile& path, const Mac
   return fine;
 }
 
+/// At how many vertices the scales were compared with the path where the machine stood; of a run without
+/// readings none. What contradicts the path is an error.
+Result<std::size_t> vertices_compared(const IdentifyOtfArguments& arguments, const Files& files) {
+  if (!files.encoder) return 0;
+  return compare_with_path(arguments.encoder, files.encoder->rows, files.path.vertices_m,
+                           files.config.gate.path_tolerance_m);
+}
+
 Result<OtfOutcome> from_files(const IdentifyOtfArguments& arguments,
                               const std::optional<ModelDocument>& active, ProgressBar& bar) {
   auto files = read_files(arguments, bar);
@@ -118,10 +139,13 @@ Result<OtfOutcome> from_files(const IdentifyOtfArguments& arguments,
     return tl::make_unexpected(fine.error());
   if (const auto fine = check_path(arguments.path, files->path, files->config.machine); !fine)
     return tl::make_unexpected(fine.error());
+  const auto stood = vertices_compared(arguments, *files);
+  if (!stood) return tl::make_unexpected(stood.error());
   const auto machine = otf_machine(files->config.machine);
   if (!machine) return tl::make_unexpected(machine.error());
   otf::Options options = otf_options(files->tracker.points, files->config.machine, files->config.gate);
   if (arguments.accept_path_orientation) options.orientation.accepted = true;
+  if (files->encoder) options.orientation.scales_agree = true;
   if (arguments.block_samples > 0) options.block_samples = arguments.block_samples;
   options.progress = [&](otf::Stage stage, double fraction) { bar.show(words(stage), fraction); };
   otf::Noise noise = otf_noise(files->config.machine);
@@ -134,6 +158,9 @@ Result<OtfOutcome> from_files(const IdentifyOtfArguments& arguments,
       otf::judge(found->observations, found->solution, other.model, gate_limits(files->config.gate), options);
   if (!verdict) return tl::make_unexpected(error_of(verdict.error()));
   other.say(*verdict);
+  if (files->encoder && *stood == 0)
+    verdict->notes.emplace_back(
+        "the scales were compared with the path to 2 mm only: the machine stands at no vertex");
   if (auto air = unmeasured_air_text(files->config, noise.u_scale)) verdict->notes.push_back(*std::move(air));
   return outcome_of({std::move(found->solution), std::move(*verdict)}, files->config,
                     std::move(files->sources));
@@ -194,6 +221,8 @@ void print_json(const OtfOutcome& outcome, const std::filesystem::path& folder) 
       {"condition", s.condition},
       {"sigma0", s.sigma0},
       {"covariance_factor", s.covariance_factor},
+      {"range_offset_um", outcome.range_offset.value_m * kUmPerM},
+      {"u_range_offset_um", outcome.range_offset.u_m * kUmPerM},
       {"residual_rms_before_um", s.before.rms_m * kUmPerM},
       {"residual_rms_after_um", s.after.rms_m * kUmPerM},
       {"held_out_rms_before_um", outcome.verdict.held_out.no_compensation_rms_m * kUmPerM},
@@ -212,6 +241,9 @@ void print_summary(const OtfOutcome& outcome, const std::filesystem::path& folde
              s.observations, s.unknowns, s.rank, s.condition, s.sigma0);
   fmt::print("residuals   {:.3f} um rms before, {:.3f} um after\n", s.before.rms_m * kUmPerM,
              s.after.rms_m * kUmPerM);
+  if (outcome.range_offset.u_m > 0.0)
+    fmt::print("ranges      offset {:.3f} um, standard uncertainty {:.3f} um\n",
+               outcome.range_offset.value_m * kUmPerM, outcome.range_offset.u_m * kUmPerM);
   print_verdict(outcome.verdict);
   fmt::print("written     {}, tables.csv, report.html\n", (folder / "model.json").string());
 }
@@ -254,6 +286,10 @@ void add_identify_otf(CLI::App& parent, int& exit) {
   auto* tracker = command->add_option("--tracker", arguments->tracker,
                                       "tracker.csv: time_s,range_mm,azimuth_rad,elevation_rad[,status]\n"
                                       "or time_s,x_mm,y_mm,z_mm[,status]");
+  auto* encoder = command->add_option(
+      "--encoder", arguments->encoder,
+      "encoder.csv: time_s,x_mm,y_mm,z_mm, what the scales read along the path, any clock; compared with\n"
+      "the vertices of the path, to [gate] path_tolerance_mm where the machine stands");
   auto* recording = command->add_option(
       "--recording", arguments->recording,
       "what the daemon recorded (.mcap) instead of path and tracker: its last complete run, with\n"
@@ -272,7 +308,8 @@ void add_identify_otf(CLI::App& parent, int& exit) {
   recording->excludes(u_scale)->excludes(corrected)->excludes(orientation);
   path->needs(machine, tracker);
   tracker->needs(path);
-  recording->excludes(path)->excludes(tracker);
+  encoder->needs(path);
+  recording->excludes(path)->excludes(tracker)->excludes(encoder);
   command->add_option(
       "--keep", arguments->keep,
       "also keep the model in this store, judged against the model active there; activate it with\n"

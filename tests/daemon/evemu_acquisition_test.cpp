@@ -77,6 +77,25 @@ TEST_F(EvemuAcquisitionTest, ATouchTheProbeIsNotQualifiedForIsNamedAndNotUsed) {
                                    "ball 1"));
 }
 
+TEST_F(EvemuAcquisitionTest, ATouchOutsideTheTravelIsNamedAndNotUsed) {
+  calib::MachineNodes travel;
+  for (std::size_t a = 0; a < 3; ++a) travel[a].nodes_m = {-2.0, 2.0};
+  const double x_m = points_m[0].x();
+  travel[0].nodes_m = {x_m - 0.3, x_m - 0.1};
+  auto narrow = *EvemuAcquisition::create(request(), {.device = "probe 1", .travel = travel});
+  narrow.begin(kFrom);
+  narrow.take(touch_at(points_m[0], kFrom + 1s, 7));
+  EXPECT_EQ(narrow.points(), 0u);
+  EXPECT_THAT(narrow.take_notes(),
+              testing::ElementsAre(testing::AllOf(testing::StartsWith("probe 1 touch 7: not used: X "),
+                                                  HasSubstr("outside its travel"), HasSubstr("[axes.X]"))));
+  travel[0].nodes_m = {x_m - 0.3, x_m + 0.1};
+  auto wide = *EvemuAcquisition::create(request(), {.device = "probe 1", .travel = travel});
+  wide.begin(kFrom);
+  wide.take(touch_at(points_m[0], kFrom + 1s, 7));
+  EXPECT_EQ(wide.points(), 1u);
+}
+
 TEST_F(EvemuAcquisitionTest, ATouchWithAnAxisMissingIsNotUsed) {
   auto blind = touch_at(points_m[0], kFrom + 1s, 1);
   blind.missing_mask = 0b010;

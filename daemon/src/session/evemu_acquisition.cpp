@@ -3,10 +3,13 @@
 #include <fmt/format.h>
 
 #include <array>
+#include <span>
 #include <utility>
 
+#include "abbe/calib/axis_mistakes.hpp"
 #include "abbe/daemon/otf_inputs.hpp"
 #include "linear_axes.hpp"
+#include "units.hpp"
 
 namespace abbe::daemon {
 namespace {
@@ -30,6 +33,20 @@ std::string_view fault_of(const protocol::Snapshot& touch) {
   }
   if (!has_linear_axes(touch)) return "an axis was not known";
   return {};
+}
+
+/// Empty: it is inside.
+std::string outside(const calib::Vector3& reading_m, const std::optional<calib::MachineNodes>& travel) {
+  constexpr double kTolerance_m = 1e-3;
+  if (!travel) return {};
+  const auto found = calib::outside_travel(std::span(&reading_m, 1), *travel, kTolerance_m);
+  if (found.empty()) return {};
+  const std::size_t axis = found.front().axis;
+  const auto& nodes_m = (*travel)[axis].nodes_m;
+  return fmt::format(
+      "{0} {1:.3f} mm is outside its travel, {2:g} to {3:g} mm: [axes.{0}] or the zero of the axis",
+      "XYZ"[axis], kMmPerM * reading_m[static_cast<Eigen::Index>(axis)], kMmPerM * nodes_m.front(),
+      kMmPerM * nodes_m.back());
 }
 
 }  // namespace
@@ -72,12 +89,13 @@ void EvemuAcquisition::take(const protocol::Snapshot& snapshot) {
     return;
   }
   if (const auto fault = fault_of(snapshot); !fault.empty()) return refuse(snapshot, fault);
+  const calib::Vector3 reading_m{snapshot.position[0], snapshot.position[1], snapshot.position[2]};
+  if (const auto fault = outside(reading_m, options_.travel); !fault.empty()) return refuse(snapshot, fault);
   if (!thermometer_.take(snapshot)) {
     return refuse(snapshot,
                   fmt::format("the temperature \"{}\" of the array was not known", options_.artefact_sensor));
   }
   refused_in_a_row_ = 0;
-  const calib::Vector3 reading_m{snapshot.position[0], snapshot.position[1], snapshot.position[2]};
   for (const std::string& text : guide_.take(reading_m).notes) note(snapshot, text);
   if (guide_.taken() > 0 && phase_ == Phase::WaitingAtStart) phase_ = Phase::Running;
   if (const auto& failure = guide_.failure()) {

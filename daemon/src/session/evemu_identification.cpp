@@ -44,6 +44,7 @@ evemu::TouchPlan touch_plan(const EvemuConfig& config) {
 
 EvemuAcquisitionOptions evemu_acquisition_options(const Config& config) {
   EvemuAcquisitionOptions options{.longest_pause = config.evemu.longest_pause};
+  if (const auto machine = otf_machine(config.machine)) options.travel = machine->nodes;
   if (config.probe) options.device = config.probe->name;
   if (config.cmm) options.device = config.cmm->name;
   options.artefact = config.evemu.artefact;

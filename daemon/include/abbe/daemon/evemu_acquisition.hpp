@@ -9,6 +9,7 @@
 #include <string>
 #include <vector>
 
+#include "abbe/calib/axis_table.hpp"
 #include "abbe/calib/evemu/touch_guide.hpp"
 #include "abbe/daemon/acquisition_phase.hpp"
 #include "abbe/daemon/artefact_thermometer.hpp"
@@ -45,6 +46,8 @@ struct EvemuAcquisitionOptions {
   bool zero_is_lost_by_restart = true;
   /// Host time without a touch that ends the run: the artefact is turned and clamped by hand in between.
   std::chrono::nanoseconds longest_pause = std::chrono::hours{1};
+  /// Touches more than 1 mm outside are not used; thermal correction moves readings by less. None: no limit.
+  std::optional<calib::MachineNodes> travel{};
   std::size_t most_refused = 20;  ///< touches in a row that cannot be used end a run that has none yet
   /// How warm the array is. A touch at which its sensor has no valid value ends the run: the model would need
   /// it.

@@ -12,6 +12,7 @@
 #include "abbe/daemon/otf_identification.hpp"
 #include "abbe/daemon/otf_inputs.hpp"
 #include "abbe/daemon/otf_report.hpp"
+#include "abbe/daemon/path_readings.hpp"
 #include "abbe/daemon/replay.hpp"
 #include "abbe/daemon/sha256.hpp"
 #include "abbe/daemon/unmeasured_air.hpp"
@@ -22,7 +23,6 @@
 #include "cli/terminal.hpp"
 #include "files/text_file.hpp"
 #include "input/travel_faults.hpp"
-#include "session/path_readings.hpp"
 #include "units.hpp"
 
 namespace abbe::daemon {

@@ -1,4 +1,4 @@
-#include "session/path_readings.hpp"
+#include "abbe/daemon/path_readings.hpp"
 
 #include <fmt/format.h>
 

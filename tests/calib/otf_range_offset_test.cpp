@@ -3,7 +3,10 @@
 #include <gtest/gtest.h>
 
 #include <Eigen/Dense>
+#include <cmath>
 #include <limits>
+#include <optional>
+#include <string>
 
 #include "abbe/calib/otf/identify.hpp"
 #include "otf_run.hpp"
@@ -113,6 +116,27 @@ TEST(RangeOffset, WithinItsStatedUncertaintyNothingIsSaid) {
   ASSERT_TRUE(verdict) << verdict.error().text;
   EXPECT_THAT(verdict->reasons, Not(Contains(HasSubstr("offset of"))));
   EXPECT_THAT(verdict->notes, Not(Contains(HasSubstr("offset of"))));
+}
+
+/// The limit in the verdict's note, um; none: there is no such note.
+std::optional<double> noted_limit_um(double u_m) {
+  const MadeRun run = run_with_offset(0.0, u_m);
+  const Identification id = identification(run);
+  const auto verdict = judge(id.observations, id.solution, nullptr, {}, run.options);
+  for (const std::string& note : verdict->notes) {
+    const std::string before = "an offset below ";
+    if (const auto at = note.find(before); at != std::string::npos)
+      return std::stod(note.substr(at + before.size()));
+  }
+  return std::nullopt;
+}
+
+/// What the run shows of the offset by itself is its uncertainty with a prior of 1 m.
+TEST(RangeOffset, ALimitIsNotedWhereTheDataKnowLessThanThePrior) {
+  const double u_m = identification(run_with_offset(0.0, 1.0)).solution.range_offset.u_m;
+  ASSERT_TRUE(noted_limit_um(0.5 * u_m));
+  EXPECT_NEAR(*noted_limit_um(0.5 * u_m), 2.576 * std::sqrt(1.25) * 1e6 * u_m, 1e-3 * 1e6 * u_m);
+  EXPECT_FALSE(noted_limit_um(2.0 * u_m));
 }
 
 TEST(RangeOffset, ANegativeUncertaintyIsRefused) {

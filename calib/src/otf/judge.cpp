@@ -8,6 +8,7 @@
 
 #include "abbe/calib/model_comparison.hpp"
 #include "abbe/calib/otf/orientation.hpp"
+#include "abbe/calib/root_sum_of_squares.hpp"
 #include "certainty.hpp"
 #include "message.hpp"
 #include "otf/check_stopped.hpp"
@@ -222,6 +223,21 @@ void note_what_u_leaves_out(Verdict& verdict, const Observations& o) {
   }
 }
 
+/// An offset of the ranges that the model follows: its prior decides, and the data do not show more of it.
+void note_undetermined_offset(Verdict& verdict, const RangeOffset& offset, double prior_m) {
+  const double share = offset.u_m / prior_m;  // 1: the data say nothing
+  constexpr double kDataKnowLess = 0.7;       // than the prior: 1/sqrt(2)
+  if (!(prior_m > 0.0) || !(share > kDataKnowLess)) {
+    return;
+  }
+  const double u_of_data_m = offset.u_m / std::sqrt(std::max(1e-12, 1.0 - share * share));
+  constexpr double kNormal99 = 2.576;
+  verdict.notes.push_back(
+      message("the run hardly determines the offset of the tracker's ranges: ", 1e6 * prior_m,
+              " um are stated, and an offset below ",
+              1e6 * kNormal99 * root_sum_of_squares(u_of_data_m, prior_m), " um would not be noticed"));
+}
+
 }  // namespace
 
 Result<HeldOutFigures> held_out(const Observations& o, const VolumetricModel* active,
@@ -298,6 +314,7 @@ Result<Verdict> judge(const Observations& measured, const Solution& solution, co
   const CorrectionSize size = correction_size(solution.model);
   require_certainty(verdict, size.V_m, size.u_m);
   note_what_u_leaves_out(verdict, o);
+  note_undetermined_offset(verdict, solution.range_offset, o.u_range_offset_m);
   verdict.accepted = verdict.reasons.empty();
   return verdict;
 }

@@ -3,6 +3,7 @@
 
 #include <cmath>
 #include <string>
+#include <string_view>
 
 #include "abbe/calib/gate.hpp"
 #include "message.hpp"
@@ -12,11 +13,14 @@ namespace abbe::calib {
 /// Half: what is left by a correction whose error is twice its uncertainty is not larger than the correction.
 inline constexpr double kMostUncertainty = 0.5;
 
+/// Of Verdict::causes.
+inline constexpr std::string_view kUncertain = "uncertainty";
+
 /// Root mean squares of V and its standard uncertainty, without rigid motion. NaN is refused.
 inline void require_certainty(Verdict& verdict, double V_m, double u_m) {
   if (!(u_m <= kMostUncertainty * V_m)) {
-    verdict.reasons.push_back(message("the correction is ", 1e6 * V_m, " um rms, its standard uncertainty ",
-                                      1e6 * u_m, " um: more than half of it"));
+    verdict.refuse(kUncertain, message("the correction is ", 1e6 * V_m, " um rms, its standard uncertainty ",
+                                       1e6 * u_m, " um: more than half of it"));
   }
 }
 

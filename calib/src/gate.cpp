@@ -131,7 +131,7 @@ void compare_volumes(Verdict& verdict, const VolumetricModel& candidate, const V
   } else if (limits.accept_smaller_volume) {
     verdict.notes.push_back(message(seen, ", accepted by name"));
   } else {
-    verdict.reasons.push_back(message(seen, "; to replace that one, accept ", kSmallerVolume));
+    verdict.refuse("volume", message(seen, "; to replace that one, accept ", kSmallerVolume));
   }
 }
 
@@ -178,7 +178,7 @@ void compare_scales(Verdict& verdict, const VolumetricModel& candidate, const Vo
   if (limits.accept_scale_change) {
     verdict.notes.push_back(message(seen, ", accepted by name"));
   } else {
-    verdict.reasons.push_back(message(seen, "; if the machine was changed, accept ", kScaleChange));
+    verdict.refuse("scale-change", message(seen, "; if the machine was changed, accept ", kScaleChange));
   }
 }
 
@@ -197,13 +197,23 @@ void require_better(Verdict& verdict, double candidate, double other, double min
                     const char* than) {
   // Written so that a NaN figure is refused.
   if (!(candidate < other * (1.0 - min_improvement))) {
-    verdict.reasons.push_back(
-        message("held-out residual ", candidate, " sigma is not better than ", other, " sigma ", than,
-                min_improvement > 0 ? message(" by ", 100 * min_improvement, " %") : ""));
+    verdict.refuse("held-out",
+                   message("held-out residual ", candidate, " sigma is not better than ", other, " sigma ",
+                           than, min_improvement > 0 ? message(" by ", 100 * min_improvement, " %") : ""));
   }
 }
 
 }  // namespace
+
+void Verdict::refuse(std::string_view cause, std::string text) {
+  refuse(cause, std::move(text), reasons.size());
+}
+
+void Verdict::refuse(std::string_view cause, std::string text, std::size_t before) {
+  const auto at = static_cast<std::ptrdiff_t>(before);
+  reasons.insert(reasons.begin() + at, std::move(text));
+  causes.insert(causes.begin() + at, std::string(cause));
+}
 
 double kept_share(const ValidityVolume& before, const ValidityVolume& after, double rim) {
   const std::vector<Vector3> asked = points_inside(before);
@@ -228,10 +238,10 @@ Verdict decide(const VolumetricModel& candidate, const HeldOutFigures& held_out,
   verdict.max_gradient =
       candidate.polynomials() == nullptr ? max_step_of_tables(candidate, t) : max_slope(candidate, at, t);
   if (at.empty()) {
-    verdict.reasons.emplace_back("the model holds nowhere: its size and gradient cannot be tested");
+    verdict.refuse("nowhere", "the model holds nowhere: its size and gradient cannot be tested");
   }
   if (held_out.observations == 0) {
-    verdict.reasons.emplace_back("nothing was held out to test the model with");
+    verdict.refuse("held-out", "nothing was held out to test the model with");
   }
   if (held_out.not_held_out > 0) {
     verdict.notes.push_back(message(held_out.not_held_out, " of ",
@@ -247,12 +257,12 @@ Verdict decide(const VolumetricModel& candidate, const HeldOutFigures& held_out,
                    limits.min_improvement, "of the active model, so the active model still holds");
   }
   if (!(verdict.max_error_m <= limits.max_error_m)) {
-    verdict.reasons.push_back(message("largest error ", 1e6 * verdict.max_error_m, " um exceeds ",
-                                      1e6 * limits.max_error_m, " um"));
+    verdict.refuse("size", message("largest error ", 1e6 * verdict.max_error_m, " um exceeds ",
+                                   1e6 * limits.max_error_m, " um"));
   }
   if (!(verdict.max_gradient <= limits.max_gradient)) {
-    verdict.reasons.push_back(message("steepest change ", 1e6 * verdict.max_gradient, " um/m exceeds ",
-                                      1e6 * limits.max_gradient, " um/m"));
+    verdict.refuse("slope", message("steepest change ", 1e6 * verdict.max_gradient, " um/m exceeds ",
+                                    1e6 * limits.max_gradient, " um/m"));
   }
   if (active != nullptr) {
     const bool holds_for_tool = active->holds_for_tool(t);

@@ -3,11 +3,17 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <cmath>
 #include <functional>
+#include <limits>
+#include <map>
 #include <ostream>
 #include <string>
 
 #include "abbe/calib/evemu/judge.hpp"
+#include "elementary.hpp"
+#include "evemu/touch_residuals.hpp"
 #include "evemu_run.hpp"
 
 namespace {
@@ -19,27 +25,15 @@ using testing::HasSubstr;
 using testing::IsEmpty;
 using testing::Not;
 
-/// The touches of the prototype, in the order of [Li OMM] section 3: Ball1, blocks, the other balls.
 struct ArrayRun {
-  std::vector<Touch> touches;
+  std::vector<Touch> touches = touches_in_order(reference_touches("touched_sig3um.csv"));
   Calibrator calibrator = reference_calibrator();
   Machine machine = reference_machine();
-
-  ArrayRun() {
-    for (int position = 1; position <= 8; ++position) {
-      take(position, [](const Touch& t) { return t.feature == Feature::Ball && t.number == 1; });
-      take(position, [](const Touch& t) { return t.feature == Feature::Block; });
-      take(position, [](const Touch& t) { return t.feature == Feature::Ball && t.number > 1; });
-    }
-  }
-
- private:
-  void take(int position, const std::function<bool(const Touch&)>& which) {
-    for (const Touch& t : reference_touches("touched_sig3um.csv")) {
-      if (t.position == position && which(t)) touches.push_back(t);
-    }
-  }
 };
+
+Observations observed(const ArrayRun& run, const ObserveOptions& options = {}) {
+  return *observe(run.touches, run.calibrator, run.machine, options);
+}
 
 struct ArrayFault {
   Cause cause;
@@ -51,7 +45,7 @@ void PrintTo(const ArrayFault& f, std::ostream* out) {
 }
 
 std::vector<Alternative> found_in(const ArrayRun& run) {
-  const Observations o = *observe(run.touches, run.calibrator, run.machine);
+  const Observations o = observed(run);
   return *alternatives(o, *solve(o));
 }
 
@@ -72,13 +66,17 @@ TEST_P(EvemuLackOfFit, IsTheCauseNamedFirst) {
   EXPECT_THAT(found.front().text, HasSubstr(GetParam().words));
 }
 
-Verdict verdict_of(const ArrayRun& run) {
-  const Observations o = *observe(run.touches, run.calibrator, run.machine);
+JudgeOptions generous() {
   JudgeOptions options;
   options.accept_shape_only = true;
   options.limits.max_error_m = 0.01;
   options.limits.max_gradient = 0.5;
-  return *judge(o, *solve(o), nullptr, options);
+  return options;
+}
+
+Verdict verdict_of(const ArrayRun& run) {
+  const Observations o = observed(run);
+  return *judge(o, *solve(o), nullptr, generous());
 }
 
 // What the uncertainty covers, on a machine of 3 mm, is a note.
@@ -134,6 +132,127 @@ TEST(EvemuJudge, RefusesWhatAFaultMovesByMoreThanItsUncertainty) {
   ASSERT_FALSE(verdict.accepted);
   EXPECT_THAT(verdict.reasons.front(), HasSubstr("position 3, ball 9"));
   EXPECT_THAT(verdict.reasons.front(), HasSubstr("it moves the model by"));
+  EXPECT_EQ(verdict.causes.front(), "ball");
+  EXPECT_EQ(verdict.causes.size(), verdict.reasons.size());
+}
+
+// A ball whose touches have no place in the order: alternatives in time have no columns.
+TEST(EvemuJudge, RefusesARunThatCannotBeComparedWithAnAlternative) {
+  const Observations o = observed({});
+  const Solution solution = *solve(o);
+  Observations broken = o;
+  broken.seen[2].ball_index[4] = std::numeric_limits<double>::quiet_NaN();
+  const Verdict verdict = *judge(broken, solution, nullptr, generous());
+  EXPECT_FALSE(verdict.accepted);
+  EXPECT_THAT(verdict.reasons, Contains(HasSubstr("the comparison with cause \"creep\" failed")));
+  EXPECT_THAT(verdict.causes, Contains("creep"));
+}
+
+TEST(EvemuLackOfFit, NamesTouchesThatNoSurfaceFits) {
+  Observations o = observed({});
+  const Solution solution = *solve(o);
+  o.seen[1].ball_points_m[2][0].x() = std::numeric_limits<double>::quiet_NaN();
+  const TouchResiduals residuals = touch_residuals(o, solution.model, 1e-5);
+  EXPECT_THAT(residuals.failed, testing::ElementsAre("position 2, ball 3"));
+}
+
+TEST(EvemuJudge, NotesADesignThatDoesNotExist) {
+  ObserveOptions options;
+  options.order = kMostOrder;
+  const Observations o = observed({}, options);
+  const Verdict verdict = *judge(o, *solve(o), nullptr, generous());
+  EXPECT_THAT(verdict.notes, Contains(HasSubstr("not compared with polynomials of order")));
+  EXPECT_THAT(verdict.causes, Not(Contains("order")));
+}
+
+TEST(EvemuJudge, StopsBetweenAlternatives) {
+  const Observations o = observed({});
+  JudgeOptions options = generous();
+  int asked = 0;
+  options.watch.stopped = [&] { return ++asked == 20; };
+  const auto verdict = judge(o, *solve(o), nullptr, options);
+  ASSERT_FALSE(verdict);
+  EXPECT_EQ(verdict.error().code, ErrorCode::NotConverged);
+  EXPECT_EQ(asked, 20);
+}
+
+TEST(EvemuJudge, ReportsProgressUpToTheEnd) {
+  const Observations o = observed({});
+  JudgeOptions options = generous();
+  std::vector<double> fractions;
+  options.watch.progress = [&](double fraction) { fractions.push_back(fraction); };
+  ASSERT_TRUE(judge(o, *solve(o), nullptr, options));
+  ASSERT_THAT(fractions, Not(IsEmpty()));
+  EXPECT_TRUE(std::is_sorted(fractions.begin(), fractions.end()));
+  EXPECT_DOUBLE_EQ(fractions.back(), 1.0);
+}
+
+/// Ball1 is touched last, its blocks before it.
+ArrayRun touched_backwards() {
+  ArrayRun run;
+  std::reverse(run.touches.begin(), run.touches.end());
+  return run;
+}
+
+TEST(EvemuLackOfFit, CountsFromTheFirstTouchOfAPosition) {
+  ArrayRun run = touched_backwards();
+  for (Touch& t : run.touches) {
+    const bool after = t.feature == Feature::Block || t.number <= 4;
+    if (t.position == 6 && after) t.p_m += Vector3(90e-6, -60e-6, 120e-6);
+  }
+  const auto found = found_in(run);
+  ASSERT_THAT(found, Not(IsEmpty()));
+  EXPECT_THAT(found.front().text, HasSubstr("position 6: the array moved before ball 4"));
+}
+
+TEST(EvemuLackOfFit, FindsNothingWhereBall1IsTouchedLast) {
+  for (const Alternative& a : found_in(touched_backwards())) {
+    EXPECT_LT(a.bias_m, 0.1 * a.u_m) << a.text;
+  }
+}
+
+// Two balls at every position, of which none scatters enough to be found alone.
+TEST(EvemuLackOfFit, FindsBallsThatMovedALittleWhileTheyWereTouched) {
+  ArrayRun run;
+  std::map<std::pair<int, int>, int> count;
+  for (Touch& t : run.touches) {
+    const bool chosen = t.number == 1 + t.position || t.number == 1 + (t.position + 4) % 9;
+    if (t.feature == Feature::Ball && chosen && ++count[{t.position, t.number}] % 2 == 0) {
+      t.p_m += Vector3::Constant(8e-6);
+    }
+  }
+  EXPECT_THAT(found_in(run), Contains(testing::Field(&Alternative::text, HasSubstr(" balls scatter by"))));
+}
+
+/// All touches of a position shift together, uncorrelated over a quarter of them.
+ArrayRun with_slow_noise(double sd_m) {
+  ArrayRun run;
+  NormalDeviates random(11);
+  const double keep = std::exp(-4.0 * 8.0 / static_cast<double>(run.touches.size()));
+  Vector3 shift = Vector3::Zero();
+  for (Touch& t : run.touches) {
+    for (Eigen::Index k = 0; k < 3; ++k) {
+      shift(k) = keep * shift(k) + std::sqrt(1.0 - keep * keep) * sd_m * random.next();
+    }
+    t.p_m += shift;
+  }
+  return run;
+}
+
+TEST(EvemuLackOfFit, FindsTheSizeOfSlowNoise) {
+  const Solution plain = *solve(observed({}));
+  EXPECT_EQ(plain.slow_noise, 0.0);
+  const Solution slow = *solve(observed(with_slow_noise(20e-6)));
+  // 64 balls and what is lost within them: to a third.
+  EXPECT_NEAR(slow.statistics.slow_noise_m, 20e-6, 7e-6);
+  EXPECT_GT(correction_size(observed({}), slow).u_m, 1.5 * correction_size(observed({}), plain).u_m);
+}
+
+TEST(EvemuJudge, NotesSlowNoise) {
+  const Verdict verdict = verdict_of(with_slow_noise(20e-6));
+  std::vector<std::string> all = verdict.reasons;
+  all.insert(all.end(), verdict.notes.begin(), verdict.notes.end());
+  EXPECT_THAT(all, Contains(HasSubstr("slow noise: within positions")));
 }
 
 }  // namespace

@@ -89,6 +89,7 @@ TEST(Gate, RefusesAnotherScaleThanTheActiveModels) {
   const VolumetricModel active = grown_model(10e-6, 0.0), candidate = grown_model(110e-6, 0.0);
   EXPECT_THAT(decide(candidate, figures(100, 1.0, 1.1), {}, &active).reasons,
               ElementsAre(AllOf(HasSubstr("larger by 100 um/m"), HasSubstr("accept scale-change"))));
+  EXPECT_THAT(decide(candidate, figures(100, 1.0, 1.1), {}, &active).causes, ElementsAre("scale-change"));
   const Verdict accepted = decide(candidate, figures(100, 1.0, 1.1), {.accept_scale_change = true}, &active);
   EXPECT_TRUE(accepted.accepted);
   EXPECT_THAT(accepted.notes, testing::Contains(HasSubstr("accepted by name")));

@@ -27,16 +27,8 @@ EvemuRequest request() {
 std::vector<Vector3> touched_points_m() {
   std::vector<Vector3> points;
   const auto all = tests::evemu::reference_touches("touched_noiseless.csv");
-  const auto add = [&](int position, calib::evemu::Feature feature, int number) {
-    for (const auto& t : all)
-      if (t.position == position && t.feature == feature && t.number == number) points.push_back(t.p_m);
-  };
-  for (const int position : calib::evemu::TouchPlan{}.positions) {
-    add(position, calib::evemu::Feature::Ball, 1);
-    add(position, calib::evemu::Feature::Block, 1);
-    add(position, calib::evemu::Feature::Block, 2);
-    for (int ball = 2; ball <= 9; ++ball) add(position, calib::evemu::Feature::Ball, ball);
-  }
+  for (const auto& t : tests::evemu::touches_in_order(all, calib::evemu::TouchPlan{}.positions))
+    points.push_back(t.p_m);
   return points;
 }
 

@@ -28,7 +28,6 @@ namespace {
 
 namespace fs = std::filesystem;
 using namespace std::chrono_literals;
-using calib::evemu::Feature;
 using test::Ran;
 using test::text_of;
 using ::testing::AllOf;
@@ -358,24 +357,16 @@ Batch warm_run(const CalibrationRequest& request) {
     sample.temperature_K[0] = 296.0 + 1e-3 * number;
     batch.measured_environment.push_back({0, sample});
   };
-  const auto touch = [&](int position, Feature feature, int which) {
-    for (const auto& t : all) {
-      if (t.position != position || t.feature != feature || t.number != which) continue;
-      protocol::ProbeTrigger trigger;
-      measure(0ms);
-      measure(500ms);
-      trigger.head.time = request.from + ++number * 1s;
-      trigger.touch = number;
-      trigger.axis_count = 3;
-      std::copy_n(t.p_m.data(), 3, trigger.position.begin());
-      batch.touches.push_back(trigger);
-    }
-  };
-  for (const int position : std::get<EvemuRequest>(request.task).plan.positions) {
-    touch(position, Feature::Ball, 1);
-    touch(position, Feature::Block, 1);
-    touch(position, Feature::Block, 2);
-    for (int ball = 2; ball <= 9; ++ball) touch(position, Feature::Ball, ball);
+  const auto& positions = std::get<EvemuRequest>(request.task).plan.positions;
+  for (const auto& t : tests::evemu::touches_in_order(all, positions)) {
+    protocol::ProbeTrigger trigger;
+    measure(0ms);
+    measure(500ms);
+    trigger.head.time = request.from + ++number * 1s;
+    trigger.touch = number;
+    trigger.axis_count = 3;
+    std::copy_n(t.p_m.data(), 3, trigger.position.begin());
+    batch.touches.push_back(trigger);
   }
   return batch;
 }

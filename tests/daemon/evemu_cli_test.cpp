@@ -184,22 +184,13 @@ void record_touches(const fs::path& folder, const Touches& all) {
   recorder->flush();  // a chunk that holds nothing of the run
   recorder->attach(to_attachment({request, kBegin}), kBegin);
   std::uint32_t number = 0;
-  const auto record = [&](int position, Feature feature, int which) {
-    for (const auto& t : all) {
-      if (t.position != position || t.feature != feature || t.number != which) continue;
-      protocol::ProbeTrigger touch;
-      touch.head.time = kBegin + ++number * 1s;
-      touch.touch = number;
-      touch.axis_count = 3;
-      std::copy_n(t.p_m.data(), 3, touch.position.begin());
-      recorder->record(touch, "probe");
-    }
-  };
-  for (const int position : request.plan.positions) {
-    record(position, Feature::Ball, 1);
-    record(position, Feature::Block, 1);
-    record(position, Feature::Block, 2);
-    for (int ball = 2; ball <= 9; ++ball) record(position, Feature::Ball, ball);
+  for (const auto& t : tests::evemu::touches_in_order(all, request.plan.positions)) {
+    protocol::ProbeTrigger touch;
+    touch.head.time = kBegin + ++number * 1s;
+    touch.touch = number;
+    touch.axis_count = 3;
+    std::copy_n(t.p_m.data(), 3, touch.position.begin());
+    recorder->record(touch, "probe");
   }
   ASSERT_TRUE(recorder->close());
 }

@@ -21,20 +21,36 @@ namespace abbe::tests::never_worse {
 
 struct Outcome {
   bool accepted = false;
-  std::string first_reason;
-  double before_m = 0.0;  ///< mean |V| of the truth, without rigid motion
-  double left_m = 0.0;    ///< mean |V of the model - V|, without rigid motion
-  double u_m = 0.0;       ///< mean stated standard uncertainty: root of the trace
+  std::string first_reason, first_cause;  ///< cause: of Verdict::causes; empty where an error came first
+  double before_m = 0.0;                  ///< mean |V| of the truth, without rigid motion
+  double left_m = 0.0;                    ///< mean |V of the model - V|, without rigid motion
+  double u_m = 0.0;                       ///< mean stated standard uncertainty: root of the trace
   double sigma0 = 0.0;
   std::size_t covered = 0, intervals = 0;  ///< components of V inside their 95 % interval
+};
+
+/// What names a fault: the cause of the first reason of a verdict, or words in the text of an error that
+/// comes before any verdict. Nothing: it need not be named.
+struct Names {
+  std::vector<std::string> causes{}, words{};
+
+  [[nodiscard]] bool empty() const { return causes.empty() && words.empty(); }
+  [[nodiscard]] bool hold(const Outcome& o) const {
+    if (!o.first_cause.empty()) {
+      return std::find(causes.begin(), causes.end(), o.first_cause) != causes.end();
+    }
+    return std::any_of(words.begin(), words.end(), [&](const std::string& word) {
+      return o.first_reason.find(word) != std::string::npos;
+    });
+  }
 };
 
 template <class Run>
 struct Fault {
   std::string name;
   std::function<void(Run&)> put_in;
-  std::vector<std::string> causes;  ///< one of them stands in the first reason of a refusal
-  bool visible = true;              ///< false: nothing that is known contradicts it
+  Names names;
+  bool visible = true;  ///< false: nothing that is known contradicts it
 };
 
 template <class Run>
@@ -51,14 +67,11 @@ struct Tally {
   std::size_t covered = 0, intervals = 0;
   std::string other_reason;
 
-  void count(const Outcome& o, const std::vector<std::string>& causes) {
+  void count(const Outcome& o, const Names& names) {
     ++runs;
     if (!o.accepted) {
-      const bool by_name =
-          causes.empty() || std::any_of(causes.begin(), causes.end(), [&](const std::string& cause) {
-            return o.first_reason.find(cause) != std::string::npos;
-          });
-      by_name ? void(++named) : void(other_reason = o.first_reason);
+      const bool by_name = names.empty() || names.hold(o);
+      by_name ? void(++named) : void(other_reason = o.first_cause + ": " + o.first_reason);
       return;
     }
     ++accepted;
@@ -86,11 +99,11 @@ std::vector<Tally> tallies_of(const Campaign<Run>& campaign, int machines, std::
       fault.put_in(run);
       const Outcome o = campaign.identify_and_compare(std::move(run));
       const std::lock_guard lock{mutex};
-      tallies[i % faults].count(o, fault.causes);
+      tallies[i % faults].count(o, fault.names);
       if (verbose)
-        fmt::print("{} seed {}: {} before {:.2f} left {:.3f} u {:.3f} um sigma0 {:.2f} {}\n", fault.name,
+        fmt::print("{} seed {}: {} before {:.2f} left {:.3f} u {:.3f} um sigma0 {:.2f} {}: {}\n", fault.name,
                    seed, o.accepted ? "accepted" : "refused", 1e6 * o.before_m, 1e6 * o.left_m, 1e6 * o.u_m,
-                   o.sigma0, o.first_reason);
+                   o.sigma0, o.first_cause, o.first_reason);
     }
   };
   { std::jthread one{work}, two{work}; }
@@ -119,7 +132,7 @@ bool print_figures(const Campaign<Run>& campaign, const std::vector<Tally>& tall
     if (fault.name == "none") none = t;
     if (!fault.visible) continue;
     all.runs += t.runs, all.accepted += t.accepted, all.worse += t.worse, all.too_sure += t.too_sure;
-    if (!fault.causes.empty()) seen.runs += t.runs - t.accepted, seen.named += t.named;
+    if (!fault.names.empty()) seen.runs += t.runs - t.accepted, seen.named += t.named;
   }
   const auto figure = [&](std::string_view what) {
     return fmt::format("never worse, {}: {}", campaign.method, what);

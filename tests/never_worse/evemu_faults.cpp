@@ -177,8 +177,12 @@ double signed_over(EvemuRun& run, double low, double high) {
 }  // namespace
 
 std::vector<Fault<EvemuRun>> evemu_faults() {
-  const std::vector<std::string> moved{"moved"}, touch{"touch "}, file{"calibrator file", "ball's place"},
-      clamping{"clamp", "bent", "creep", "moved"}, handed{"mirror", "swapped"}, position{"position"};
+  // No polynomials: from ball to ball like noise of the balls, or like slow noise.
+  const Names waves_named{{"order", "scatter", "slow-noise"}};
+  // An array that moves while a ball is touched makes that one scatter (form).
+  const Names moved{{"moved", "form"}}, touch{{"touch"}, {"touch ", "false trigger"}},
+      file{{"array-file"}, {"calibrator file"}}, clamping{{"bent", "creep", "moved"}},
+      handed{{}, {"mirror", "swapped"}}, position{{}, {"position"}};
   return {
       {"none", [](EvemuRun&) {}, {}},
       {"array shifted by 50..200 um within", [](EvemuRun& r) { move_within(r, over(r, 50e-6, 200e-6), 0.0); },
@@ -188,10 +192,10 @@ std::vector<Fault<EvemuRun>> evemu_faults() {
       {"array turned by 20..500 urad within",
        [](EvemuRun& r) { move_within(r, 0.0, over(r, 20e-6, 500e-6)); }, moved},
       {"array shifted between positions", move_between, {}},
-      {"balls swapped in the table", swap_balls, {"numbered"}},
+      {"balls swapped in the table", swap_balls, {{}, {"numbered"}}},
       {"ball coordinate wrong by 100..500 um", [](EvemuRun& r) { spoil_the_file(r, 100e-6, 500e-6); }, file},
       {"ball coordinate wrong by 20..100 um", [](EvemuRun& r) { spoil_the_file(r, 20e-6, 100e-6); }, file},
-      {"ball elsewhere in one position", displace_ball_once, {"ball"}},
+      {"ball elsewhere in one position", displace_ball_once, {{"ball"}}},
       {"dirt of 20..100 um under one touch", [](EvemuRun& r) { spoil_touch(r, over(r, 20e-6, 100e-6)); },
        touch},
       {"false trigger of 0.5..5 mm", [](EvemuRun& r) { spoil_touch(r, over(r, 0.5e-3, 5e-3)); }, touch},
@@ -203,7 +207,7 @@ std::vector<Fault<EvemuRun>> evemu_faults() {
        [](EvemuRun& r) { r.calibrator.expansivity->alpha_per_K = r.random() % 2 == 0 ? 23e-6 : 0.5e-6; },
        {},
        false},
-      {"array bent anew by 10..50 um", [](EvemuRun& r) { bend(r, over(r, 10e-6, 50e-6)); }, clamping},
+      {"array bent by 10..50 um per position", [](EvemuRun& r) { bend(r, over(r, 10e-6, 50e-6)); }, clamping},
       {"array creeps by 10..100 um", [](EvemuRun& r) { creep(r, over(r, 10e-6, 100e-6)); }, clamping},
       {"tip offset wrong by 2..20 mm",
        [](EvemuRun& r) {
@@ -216,11 +220,11 @@ std::vector<Fault<EvemuRun>> evemu_faults() {
        false},
       {"tip diameter wrong by 20..300 um",
        [](EvemuRun& r) { r.calibrator.tip_radius_m += 0.5 * signed_over(r, 20e-6, 300e-6); },
-       {"tip"}},
+       {{}, {"tip"}}},
       {"tip diameter wrong by 0.5..2 mm",
        [](EvemuRun& r) { r.calibrator.tip_radius_m += 0.5 * signed_over(r, 0.5e-3, 2e-3); },
-       {"tip"}},
-      {"machine drifts by 20..100 um", [](EvemuRun& r) { drift(r, over(r, 20e-6, 100e-6)); }, {"drift"}},
+       {{}, {"tip"}}},
+      {"machine drifts by 20..100 um", [](EvemuRun& r) { drift(r, over(r, 20e-6, 100e-6)); }, {{"drift"}}},
       {"axis mirrored",
        [](EvemuRun& r) {
          const auto a = static_cast<Eigen::Index>(r.random() % 3);
@@ -235,7 +239,7 @@ std::vector<Fault<EvemuRun>> evemu_faults() {
        handed},
       {"touches in mm where m are read",
        [](EvemuRun& r) { for_every_touch(r, [](Vector3& p) { p *= 1000.0; }); },
-       {"lengths in"}},
+       {{}, {"lengths in"}}},
       {"one position fewer than planned", [](EvemuRun& r) { r.order.pop_back(); }, position},
       {"one position more than planned", [](EvemuRun& r) { --r.observe.positions; }, position},
       {"one position touched twice", touch_position_twice, position},
@@ -245,16 +249,15 @@ std::vector<Fault<EvemuRun>> evemu_faults() {
            for (std::size_t m = 0; m < 3; ++m) axis.backlash[m] = over(r, 5e-6, 20e-6);
          }
        },
-       {"backlash"}},
+       {{"backlash"}}},
       {"slow noise of 3..20 um in a position",
        [](EvemuRun& r) { r.slow_noise_m = over(r, 3e-6, 20e-6); },
-       {"slow"}},
+       {{"slow-noise"}}},
       {"five times the noise", [](EvemuRun& r) { r.sigma_touch_m *= 5.0; }, {}},
-      {"another axis order", other_chain, {"order"}},
-      {"screw pitch of 5..30 um", [](EvemuRun& r) { waves(r, over(r, 5e-6, 30e-6), 0.01); }, {"pitch"}},
-      {"waves of 5..30 um over the volume",
-       [](EvemuRun& r) { waves(r, over(r, 5e-6, 30e-6), 0.25); },
-       {"polynomial"}},
+      {"another axis order", other_chain, {{"chain-order"}}},
+      {"screw pitch of 5..30 um", [](EvemuRun& r) { waves(r, over(r, 5e-6, 30e-6), 0.01); }, waves_named},
+      {"waves of 5..30 um over the volume", [](EvemuRun& r) { waves(r, over(r, 5e-6, 30e-6), 0.25); },
+       waves_named},
   };
 }
 

@@ -399,6 +399,7 @@ Outcome identify_and_compare_evemu(EvemuRun run) {
   Outcome outcome;
   outcome.accepted = verdict->accepted;
   outcome.first_reason = verdict->accepted ? "" : verdict->reasons.front();
+  outcome.first_cause = verdict->accepted ? "" : verdict->causes.front();
   outcome.sigma0 = 1e6 * solution->statistics.s_m;
   compare(outcome, run, solution->model);
   return outcome;

@@ -31,6 +31,13 @@ TEST(NeverWorseBallArray, NoAcceptedModelIsWorseThanNone) {
   }
 }
 
+// With noise that is white in the model, the first of them was wrong by 3.1 u.
+TEST(NeverWorseBallArray, SlowNoiseIsInTheUncertainty) {
+  const auto slow = tallies_of(ball_array({"slow noise"}), 2, 5000).front();
+  EXPECT_EQ(slow.runs, 2);
+  EXPECT_EQ(slow.too_sure, 0) << slow.largest_left_over_u;
+}
+
 TEST(NeverWorseBallArray, SoundRunsAreAccepted) {
   const auto none = tallies_of(ball_array({"none"}), 4, kFirstSeed).front();
   EXPECT_EQ(none.accepted, none.runs) << none.other_reason;

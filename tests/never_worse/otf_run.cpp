@@ -209,9 +209,10 @@ OtfRun random_otf_run(std::uint64_t seed) {
 }
 
 std::vector<Fault<OtfRun>> otf_faults() {
-  const std::vector<std::string> moved{"moved"}, vertex{"vertex"}, chain{"order"}, nodes{"nodes"},
-      drift{"drift", "moved"}, backlash{"backlash"}, noise{"correlated", "half of it"},
-      align{"alignment", "path", "travel", "adjustment"}, turned{"orientation", "travel"};
+  const Names moved{{"moved"}}, vertex{{"vertex"}}, chain{{"chain-order"}}, nodes{{"node-spacing"}},
+      drift{{"drift", "moved"}}, backlash{{"backlash"}}, noise{{"correlated-noise", "uncertainty"}},
+      align{{"orientation"}, {"alignment", "path", "travel", "adjustment"}},
+      turned{{"orientation"}, {"orientation", "travel"}};
   return {
       {"none", [](OtfRun&) {}, {}},
       {"tracker turned by 200 urad at half", [](OtfRun& r) { move_tracker(r, 0.5, 200e-6, 0.0); }, moved},
@@ -259,7 +260,7 @@ std::vector<Fault<OtfRun>> otf_faults() {
       {"beam lost for 5 %", [](OtfRun& r) { r.lost_from = 0.4, r.lost_to = 0.45; }, align},
       {"last third missing",
        [](OtfRun& r) { r.lost_from = 0.66, r.lost_to = 1.1; },
-       {"alignment", "tracker", "standstill", "samples"}},
+       {{}, {"alignment", "tracker", "standstill", "samples"}}},
       {"path mirrored",
        [](OtfRun& r) {
          for (Vector3& q : r.path_m) q.x() = -q.x();
@@ -277,16 +278,16 @@ std::vector<Fault<OtfRun>> otf_faults() {
            r.machine.nodes[a] = *calib::equidistant_nodes(0.8 * range.min_m, 0.8 * range.max_m, kNode_m);
          }
        },
-       {"travel", "travels"}},
+       {{}, {"travel"}}},
       {"range offset of twice its stated uncertainty", [](OtfRun& r) { r.range_offset_m = 12e-6; }, {}},
       // Eight times what is stated: not every path shows it, and the verdict says up to where it does not.
-      {"range offset of 50 um", [](OtfRun& r) { r.range_offset_m = 50e-6; }, {"range"}, false},
+      {"range offset of 50 um", [](OtfRun& r) { r.range_offset_m = 50e-6; }, {{"range-offset"}}, false},
       {"ranges wrong by 100 ppm", [](OtfRun& r) { r.range_scale *= 1.0001; }, {}, false},
       {"path wrong by 0.1 %",
        [](OtfRun& r) {
          for (Vector3& q : r.path_m) q *= 0.999;
        },
-       {"scale"},
+       {{"growth"}},
        false},
   };
 }
@@ -311,6 +312,7 @@ Outcome identify_and_compare(OtfRun run) {
   Outcome outcome;
   outcome.accepted = verdict->accepted;
   outcome.first_reason = verdict->accepted ? "" : verdict->reasons.front();
+  outcome.first_cause = verdict->accepted ? "" : verdict->causes.front();
   outcome.sigma0 = found->solution.statistics.sigma0;
   compare(outcome, run, found->solution.model);
   return outcome;

@@ -5,187 +5,90 @@
 #include <array>
 #include <cmath>
 #include <functional>
+#include <utility>
 
-#include "elementary.hpp"
 #include "message.hpp"
 #include "units.hpp"
 
 namespace abbe::calib::evemu {
 namespace {
 
-/// What a displacement of the balls does to the errors seen, position by position.
-class Columns {
- public:
-  explicit Columns(const Observations& o) : o_(o), balls_(o.seen.front().balls.size()) {
-    for (const SeenArtefact& s : o.seen) {
-      first_ = std::min({first_, s.block_index[0], s.block_index[1], least(s.ball_index)});
-      last_ = std::max({last_, s.block_index[0], s.block_index[1], most(s.ball_index)});
-    }
-    for (std::size_t b = 0; b < balls_; ++b) {
-      arm_m_ = std::max(arm_m_, from_ball1_m(o.seen.front(), b).norm());
-    }
-  }
-
-  [[nodiscard]] std::size_t balls() const { return balls_; }
-  [[nodiscard]] double arm_m() const { return arm_m_; }
-  [[nodiscard]] Eigen::MatrixXd zero(Eigen::Index columns) const {
-    return Eigen::MatrixXd::Zero(static_cast<Eigen::Index>(3 * o_.rows.size()), columns);
-  }
-  [[nodiscard]] static Eigen::Index row(const Columns& c, std::size_t position, std::size_t ball) {
-    return static_cast<Eigen::Index>(3 * (position * c.balls_ + ball));
-  }
-  /// Of ball b, in the machine's directions.
-  [[nodiscard]] static Vector3 from_ball1_m(const SeenArtefact& s, std::size_t b) {
-    return s.ideal_m[b] - s.ideal_m.front();
-  }
-  /// 0 to 1 over the run, and over a position.
-  [[nodiscard]] double in_run(double index) const { return (index - first_) / std::max(1.0, last_ - first_); }
-  [[nodiscard]] static double in_position(const SeenArtefact& s, std::size_t b) {
-    const double from = s.ball_index.front(), to = most(s.ball_index);
-    return to > from ? (s.ball_index[b] - from) / (to - from) : 0.0;
-  }
-
- private:
-  static double least(const std::vector<double>& v) { return *std::min_element(v.begin(), v.end()); }
-  static double most(const std::vector<double>& v) { return *std::max_element(v.begin(), v.end()); }
-
-  const Observations& o_;
-  std::size_t balls_;
-  double arm_m_ = 0.0, first_ = 1e300, last_ = 0.0;
-};
-
 using Rows3 = Eigen::Matrix<double, 3, Eigen::Dynamic>;
 
-/// A shift, and a turn about Ball1 of one arm.
-Rows3 shift_and_turn(const Vector3& from_ball1_m, double arm_m) {
-  Rows3 rows(3, 6);
-  rows << Matrix3::Identity(), rotation_effect(from_ball1_m) / arm_m;
-  return rows;
+/// Of ball b, in the machine's directions.
+Vector3 from_ball1_m(const SeenArtefact& s, std::size_t b) {
+  return s.ideal_m[b] - s.ideal_m.front();
 }
 
-void single_balls(const Observations& o, const Columns& c, std::vector<Added>& all) {
-  for (std::size_t p = 0; p < o.seen.size(); ++p) {
-    for (std::size_t b = 0; b < c.balls(); ++b) {
-      Eigen::MatrixXd C = c.zero(3);
-      for (std::size_t i = 1; i < c.balls(); ++i) {
-        const double share = (i == b ? -1.0 : 0.0) + (b == 0 ? 1.0 : 0.0);
-        C.middleRows<3>(Columns::row(c, p, i)) = share * Matrix3::Identity();
-      }
-      all.push_back({Cause::Ball, p, b, std::move(C)});
-    }
+/// First and last index of what was touched.
+std::pair<double, double> touched_between(std::span<const SeenArtefact> seen) {
+  std::pair<double, double> between{seen.front().ball_index.front(), seen.front().ball_index.front()};
+  const auto widen = [&](double index) {
+    between = {std::min(between.first, index), std::max(between.second, index)};
+  };
+  for (const SeenArtefact& s : seen) {
+    std::for_each(s.ball_index.begin(), s.ball_index.end(), widen);
+    std::for_each(s.block_index.begin(), s.block_index.end(), widen);
   }
+  return between;
 }
 
-void balls_of_the_file(const Observations& o, const Columns& c, std::vector<Added>& all) {
-  for (std::size_t b = 0; b < c.balls(); ++b) {
-    Eigen::MatrixXd C = c.zero(3);
-    for (std::size_t p = 0; p < o.seen.size(); ++p) {
-      for (std::size_t i = 1; i < c.balls(); ++i) {
-        const double share = (i == b ? 1.0 : 0.0) - (b == 0 ? 1.0 : 0.0);
-        C.middleRows<3>(Columns::row(c, p, i)) = share * o.seen[p].T_self_uni.R;
-      }
-    }
-    all.push_back({Cause::ArrayFile, 0, b, std::move(C)});
-  }
-}
-
-/// From ball b on. Between Ball1 and the next one there are the blocks.
-void steps(const Observations& o, const Columns& c, std::vector<Added>& all) {
-  for (std::size_t p = 0; p < o.seen.size(); ++p) {
-    const SeenArtefact& s = o.seen[p];
-    for (std::size_t b = 1; b + 1 < c.balls(); ++b) {
-      Eigen::MatrixXd C = c.zero(6);
-      for (std::size_t i = 1; i < c.balls(); ++i) {
-        if (s.ball_index[i] >= s.ball_index[b]) {
-          C.middleRows<3>(Columns::row(c, p, i)) = -shift_and_turn(Columns::from_ball1_m(s, i), c.arm_m());
-        }
-      }
-      all.push_back({Cause::Moved, p, b, std::move(C)});
-    }
-  }
-}
-
-/// Columns of its own for every position.
-void by_position(Cause cause, Eigen::Index count, const Observations& o, const Columns& c,
-                 const std::function<Rows3(const SeenArtefact&, std::size_t ball)>& displaced,
-                 std::vector<Added>& all) {
-  Eigen::MatrixXd C = c.zero(count * std::ssize(o.seen));
-  for (std::size_t p = 0; p < o.seen.size(); ++p) {
-    for (std::size_t i = 1; i < c.balls(); ++i) {
-      C.block(Columns::row(c, p, i), count * static_cast<Eigen::Index>(p), 3, count) =
-          -displaced(o.seen[p], i);
-    }
-  }
-  all.push_back({cause, 0, 0, std::move(C)});
+double share_of(const std::pair<double, double>& between, double index) {
+  return (index - between.first) / std::max(1.0, between.second - between.first);
 }
 
 /// A bow of the long leg upwards and sideways, of the short one upwards, a twist.
 Rows3 bow(const SeenArtefact& s, std::size_t ball, double arm_m) {
-  const Vector3 a = s.T_self_uni.R.transpose() * Columns::from_ball1_m(s, ball) / arm_m;
+  const Vector3 a = s.T_self_uni.R.transpose() * from_ball1_m(s, ball) / arm_m;
   Rows3 rows(3, 4);
   const Vector3 y = s.T_self_uni.R.col(1), z = s.T_self_uni.R.col(2);
   rows << a.x() * a.x() * z, a.x() * a.x() * y, a.y() * a.y() * z, a.x() * a.y() * z;
   return rows;
 }
 
-/// By what V = G (p - p1) turns the blocks.
-Vector3 turn_of_blocks(const SeenArtefact& s, const Matrix3& G) {
+/// By what G (p - p1) turns the frame of the blocks, times share[b] when block b is touched.
+Vector3 turn_of_blocks(const SeenArtefact& s, const Matrix3& G, const std::array<double, 2>& share) {
   const Vector3 &n1 = s.blocks[0].normal, &n2 = s.blocks[1].normal;
   const Vector3 z = s.T_self_uni.R.col(2), y = s.T_self_uni.R.col(1);
-  const auto changed = [&](const Vector3& n) -> Vector3 {
-    const Vector3 d = -G.transpose() * n;
+  const auto changed = [&](const Vector3& n, double by) -> Vector3 {
+    const Vector3 d = -by * (G.transpose() * n);
     return d - n * n.dot(d);
   };
-  const Vector3 dz = changed(n1), dx = (changed(n2).cross(z) + n2.cross(dz)) / n2.cross(n1).norm();
+  const Vector3 dz = changed(n1, share[0]);
+  const Vector3 dx = (changed(n2, share[1]).cross(z) + n2.cross(dz)) / n2.cross(n1).norm();
   return z.cross(dz) + z * y.dot(dx);
 }
 
-/// The machine expands, shears and shifts at constant rates: V changes by t (G (p - p1) + v).
-void drift(const Observations& o, const Columns& c, std::vector<Added>& all) {
-  const std::array<std::pair<int, int>, 6> strains{{{0, 0}, {1, 1}, {2, 2}, {0, 1}, {0, 2}, {1, 2}}};
-  Eigen::MatrixXd C = c.zero(9);
-  for (std::size_t p = 0; p < o.seen.size(); ++p) {
-    const SeenArtefact& s = o.seen[p];
-    for (std::size_t i = 1; i < c.balls(); ++i) {
-      const Vector3 a = Columns::from_ball1_m(s, i);
-      const double t = c.in_run(s.ball_index[i]) - 0.5;
-      Eigen::Index k = 0;
-      for (const auto& [u, v] : strains) {
-        Matrix3 G = Matrix3::Zero();
-        G(u, v) = 1.0 / c.arm_m();
-        G(v, u) = G(u, v);
-        C.block<3, 1>(Columns::row(c, p, i), k++) = t * (G * a - turn_of_blocks(s, G).cross(a));
-      }
-      C.block<3, 3>(Columns::row(c, p, i), k) =
-          (t + 0.5 - c.in_run(s.ball_index.front())) * Matrix3::Identity();
-    }
-  }
-  all.push_back({Cause::Drift, 0, 0, std::move(C)});
+/// Share of a motion that is done when the touch of an index is made.
+using Share = std::function<double(double index)>;
+
+/// Of G (p - p1), what is seen of a ball: beside what it turns the blocks by.
+Vector3 seen_of(const SeenArtefact& s, std::size_t ball, const Matrix3& G, const Share& share) {
+  const Vector3 a = from_ball1_m(s, ball);
+  const Vector3 blocks = turn_of_blocks(s, G, {share(s.block_index[0]), share(s.block_index[1])});
+  return share(s.ball_index[ball]) * (G * a) - blocks.cross(a);
 }
 
-/// A shift that changes from ball to ball, uncorrelated over a quarter of a position.
-void slow_noise(const Observations& o, const Columns& c, std::vector<Added>& all) {
-  constexpr double kPer_position = 4.0;
-  const auto n = static_cast<Eigen::Index>(c.balls());
-  Eigen::MatrixXd C = c.zero(3 * n * std::ssize(o.seen));
-  for (std::size_t p = 0; p < o.seen.size(); ++p) {
-    Eigen::MatrixXd covariance(n, n);
-    for (Eigen::Index i = 0; i < n; ++i) {
-      for (Eigen::Index j = 0; j < n; ++j) {
-        covariance(i, j) = exponential(
-            -kPer_position * std::abs(Columns::in_position(o.seen[p], static_cast<std::size_t>(i)) -
-                                      Columns::in_position(o.seen[p], static_cast<std::size_t>(j))));
-      }
-    }
-    const Eigen::MatrixXd L = covariance.llt().matrixL();
-    for (Eigen::Index i = 1; i < n; ++i) {
-      for (Eigen::Index j = 0; j < n; ++j) {
-        C.block<3, 3>(Columns::row(c, p, static_cast<std::size_t>(i)),
-                      3 * (n * static_cast<Eigen::Index>(p) + j)) = (L(i, j) - L(0, j)) * Matrix3::Identity();
-      }
-    }
+/// A shift, beside that of Ball1.
+Matrix3 seen_shift(const SeenArtefact& s, std::size_t ball, const Share& share) {
+  return (share(s.ball_index[ball]) - share(s.ball_index.front())) * Matrix3::Identity();
+}
+
+/// An array that shifts, and turns about Ball1 by one arm.
+Rows3 shifted_and_turned(const SeenArtefact& s, std::size_t ball, double arm_m, const Share& share) {
+  Rows3 rows(3, 6);
+  rows.leftCols<3>() = seen_shift(s, ball, share);
+  for (Eigen::Index k = 0; k < 3; ++k) {
+    const Matrix3 turn = -rotation_effect(Vector3::Unit(k) / arm_m);
+    rows.col(3 + k) = seen_of(s, ball, turn, share);
   }
-  all.push_back({Cause::SlowNoise, 0, 0, std::move(C)});
+  return rows;
+}
+
+/// Something is touched before this ball, and something else after it: the others are single balls.
+bool between_others(const SeenArtefact& s, std::size_t ball) {
+  const auto [first, last] = touched_between({&s, 1});
+  return s.ball_index[ball] > first && s.ball_index[ball] < last;
 }
 
 std::string um(double m) {
@@ -193,6 +96,10 @@ std::string um(double m) {
 }
 std::string vector_um(const Vector3& v_m) {
   return message("x ", v_m.x() * kUmPerM, ", y ", v_m.y() * kUmPerM, ", z ", v_m.z() * kUmPerM, " um");
+}
+
+Eigen::Index columns_by_position(Cause cause) {
+  return cause == Cause::Bent ? 4 : 6;
 }
 
 /// Root mean square over positions, of the largest column.
@@ -207,26 +114,125 @@ double largest_rms(const Eigen::VectorXd& d, Eigen::Index count) {
 
 }  // namespace
 
-std::vector<Added> alternative_columns(const Observations& o) {
-  std::vector<Added> all;
-  if (o.seen.empty()) {
-    return all;
+AlternativeColumns::AlternativeColumns(const Observations& o) : o_(o) {
+  for (std::size_t b = 0; !o.seen.empty() && b < o.seen.front().balls.size(); ++b) {
+    arm_m_ = std::max(arm_m_, from_ball1_m(o.seen.front(), b).norm());
   }
-  const Columns c(o);
-  single_balls(o, c, all);
-  balls_of_the_file(o, c, all);
-  steps(o, c, all);
-  by_position(
-      Cause::Creep, 6, o, c,
-      [&](const SeenArtefact& s, std::size_t b) -> Rows3 {
-        return Columns::in_position(s, b) * shift_and_turn(Columns::from_ball1_m(s, b), c.arm_m());
-      },
-      all);
-  by_position(
-      Cause::Bent, 4, o, c, [&](const SeenArtefact& s, std::size_t b) { return bow(s, b, c.arm_m()); }, all);
-  drift(o, c, all);
-  slow_noise(o, c, all);
+}
+
+std::vector<std::vector<Added>> AlternativeColumns::families() const {
+  if (o_.seen.empty()) {
+    return {};
+  }
+  std::vector<Added> balls, of_the_file, steps;
+  const std::size_t count = o_.seen.front().balls.size();
+  for (std::size_t b = 0; b < count; ++b) {
+    of_the_file.push_back({Cause::ArrayFile, 0, b});
+    for (std::size_t p = 0; p < o_.seen.size(); ++p) {
+      balls.push_back({Cause::Ball, p, b});
+      if (between_others(o_.seen[p], b)) {
+        steps.push_back({Cause::Moved, p, b});
+      }
+    }
+  }
+  std::vector<std::vector<Added>> all{balls, of_the_file};
+  if (!steps.empty()) {
+    all.push_back(steps);
+  }
+  for (const Cause cause : {Cause::Creep, Cause::Bent, Cause::Drift}) {
+    all.push_back({Added{cause, 0, 0}});
+  }
   return all;
+}
+
+/// Rows of every ball but Ball1, whose rows stay zero.
+template <class Block>
+Eigen::MatrixXd AlternativeColumns::filled(Eigen::Index columns, const Block& block) const {
+  const std::size_t balls = o_.seen.front().balls.size();
+  Eigen::MatrixXd C = Eigen::MatrixXd::Zero(static_cast<Eigen::Index>(3 * o_.rows.size()), columns);
+  for (std::size_t p = 0; p < o_.seen.size(); ++p) {
+    for (std::size_t i = 1; i < balls; ++i) {
+      block(C.middleRows<3>(static_cast<Eigen::Index>(3 * (p * balls + i))), p, i);
+    }
+  }
+  return C;
+}
+
+Eigen::MatrixXd AlternativeColumns::of_balls(const Added& a) const {
+  const auto share = [&](std::size_t i) {
+    return (i == a.feature ? 1.0 : 0.0) - (a.feature == 0 ? 1.0 : 0.0);
+  };
+  return filled(3, [&](auto rows, std::size_t p, std::size_t i) {
+    if (a.cause == Cause::ArrayFile) {
+      rows = share(i) * o_.seen[p].T_self_uni.R;
+    } else if (p == a.seen) {
+      rows = -share(i) * Matrix3::Identity();
+    }
+  });
+}
+
+Eigen::MatrixXd AlternativeColumns::of_step(const Added& a) const {
+  const double at = o_.seen[a.seen].ball_index[a.feature];
+  return filled(6, [&](auto rows, std::size_t p, std::size_t i) {
+    if (p == a.seen) {
+      rows =
+          -shifted_and_turned(o_.seen[p], i, arm_m_, [&](double index) { return index >= at ? 1.0 : 0.0; });
+    }
+  });
+}
+
+/// Columns of its own for every position.
+Eigen::MatrixXd AlternativeColumns::by_position(Cause cause) const {
+  const Eigen::Index count = columns_by_position(cause);
+  return filled(count * std::ssize(o_.seen), [&](auto rows, std::size_t p, std::size_t i) {
+    const SeenArtefact& s = o_.seen[p];
+    auto here = rows.middleCols(count * static_cast<Eigen::Index>(p), count);
+    if (cause == Cause::Bent) {
+      here = -bow(s, i, arm_m_);
+    } else {
+      const auto between = touched_between({&s, 1});
+      here = -shifted_and_turned(s, i, arm_m_, [&](double index) { return share_of(between, index); });
+    }
+  });
+}
+
+/// The machine expands, shears and shifts at constant rates: V changes by t (G (p - p1) + v).
+Eigen::MatrixXd AlternativeColumns::of_drift() const {
+  const std::array<std::pair<int, int>, 6> strains{{{0, 0}, {1, 1}, {2, 2}, {0, 1}, {0, 2}, {1, 2}}};
+  const auto between = touched_between(o_.seen);
+  const auto share = [&](double index) { return share_of(between, index) - 0.5; };
+  return filled(9, [&](auto rows, std::size_t p, std::size_t i) {
+    Eigen::Index k = 0;
+    for (const auto& strain : strains) {
+      Matrix3 G = Matrix3::Zero();
+      G(strain.first, strain.second) = 1.0 / arm_m_;
+      G(strain.second, strain.first) = 1.0 / arm_m_;
+      rows.col(k++) = seen_of(o_.seen[p], i, G, share);
+    }
+    rows.template rightCols<3>() = seen_shift(o_.seen[p], i, share);
+  });
+}
+
+Eigen::MatrixXd AlternativeColumns::of(const Added& a) const {
+  switch (a.cause) {
+    case Cause::Ball:
+    case Cause::ArrayFile:
+      return of_balls(a);
+    case Cause::Moved:
+      return of_step(a);
+    case Cause::Drift:
+      return of_drift();
+    default:
+      return by_position(a.cause);
+  }
+}
+
+std::string where(const Added& a, const Observations& o) {
+  if (a.cause == Cause::ArrayFile) {
+    return message(", ball ", a.feature + 1);
+  }
+  const bool placed = a.cause == Cause::Ball || a.cause == Cause::Moved;
+  return placed ? message(", position ", o.seen[a.seen].position, ", ball ", a.feature + 1) : std::string();
 }
 
 std::string text_of(const Added& a, const Eigen::VectorXd& d, const Observations& o) {
@@ -242,25 +248,22 @@ std::string text_of(const Added& a, const Eigen::VectorXd& d, const Observations
       return message("the calibrator file's place of ball ", ball, " is off by ", um(d.norm()), " (",
                      vector_um(d),
                      " along its axes), alike at all positions: wrong file or entry, or the ball "
-                     "was displaced since; calibrate the array anew");
+                     "was displaced since; calibrate the array again");
     case Cause::Moved:
       return message("position ", position, ": the array moved before ball ", ball, " was touched, by ",
                      um(d.head<3>().norm()), " and ", um(d.tail<3>().norm()),
                      " of turn at its end; clamp it and touch the position again");
     case Cause::Creep:
-      return message("the array creeps after clamping: it moves by up to ", um(largest_rms(d, 6)),
+      return message("the array creeps after clamping: it moves by up to ",
+                     um(largest_rms(d, columns_by_position(a.cause))),
                      " (rms) in a position; wait after clamping, or clamp it better");
     case Cause::Bent:
-      return message("the array is bent anew at every position, by ", um(largest_rms(d, 4)),
-                     " (rms): clamping, or its supports");
+      return message("every position bends the array differently, by ",
+                     um(largest_rms(d, columns_by_position(a.cause))), " (rms): clamping, or its supports");
     case Cause::Drift:
       return message("the machine drifts: within the session it expands or shears by ",
                      um(d.head<6>().norm()), " over the array and shifts by ", um(d.tail<3>().norm()),
                      "; let it warm up");
-    case Cause::SlowNoise:
-      return message("slow noise: within positions all touches shift by ",
-                     um(std::sqrt(d.squaredNorm() / static_cast<double>(d.size()))),
-                     " (rms): vibration, temperature, or a probe that does not repeat");
     default:
       return {};
   }

@@ -46,7 +46,7 @@ Result<Fit> fit_ols(const FitProblem& problem) {
   const Eigen::MatrixXd C0_Q = times_ball_covariance(problem.observations, Q);
   double trace_C0 = 0.0;
   for (const PositionRows& p : position_rows(problem.observations)) {
-    trace_C0 += 3.0 * ball_covariance(p).trace();
+    trace_C0 += 3.0 * ball_covariance(problem.observations, p).trace();
   }
   const Eigen::MatrixXd Qt_C0_Q = Q.transpose() * C0_Q;
   const double left = trace_C0 - Qt_C0_Q.trace();

@@ -11,7 +11,9 @@
 #include "abbe/calib/evemu/lack_of_fit.hpp"
 #include "abbe/calib/root_sum_of_squares.hpp"
 #include "certainty.hpp"
+#include "evemu/check_stopped.hpp"
 #include "evemu/fit_coefficients.hpp"
+#include "evemu/slow_noise.hpp"
 #include "message.hpp"
 
 namespace abbe::calib::evemu {
@@ -34,6 +36,17 @@ Eigen::VectorXd relative_to_ball1(const Observations& position,
     V.segment<3>(static_cast<Eigen::Index>(3 * i)) = V_at(position.rows[i].reading_m) - V1;
   }
   return V;
+}
+
+/// `watch` of a part of a computation, its progress from `low` to `high` of the whole.
+Watch part_of(const Watch& watch, double low, double high) {
+  Watch part{.stopped = watch.stopped};
+  if (watch.progress) {
+    part.progress = [whole = watch.progress, low, high](double fraction) {
+      whole(low + (high - low) * fraction);
+    };
+  }
+  return part;
 }
 
 struct Remainder {
@@ -81,22 +94,45 @@ void note_artefact(const Observations& o, Verdict& verdict) {
 /// A model may be wrong by its stated uncertainty and half of it: beyond, an alternative refuses it.
 constexpr double kCoveredByU = 1.5;
 
+/// Written so that a NaN figure is refused.
+bool is_covered(const Alternative& other, const CorrectionSize& size) {
+  if (other.cause ==
+      Cause::Scatter) {  // is in u as white noise: refused only where the model is small beside it
+    return other.bias_m <= kMostUncertainty * size.V_m;
+  }
+  return other.bias_m <= other.u_m && root_sum_of_squares(other.bias_m, other.u_m) <= kCoveredByU * size.u_m;
+}
+
 /// Reasons before those that only follow from them.
 void add_alternatives(Verdict& verdict, const std::vector<Alternative>& others, const CorrectionSize& size) {
-  std::vector<std::string> reasons;
+  std::size_t reasons = 0;
   for (const Alternative& other : others) {
-    // Written so that a NaN figure is refused.
-    if (other.cause ==
-        Cause::Scatter) {  // is in u as white noise: refused only where the model is small beside it
-      const bool small = other.bias_m <= kMostUncertainty * size.V_m;
-      (small ? verdict.notes : reasons).push_back(other.text);
-      continue;
+    const bool scatter = other.cause == Cause::Scatter;
+    const std::string text = scatter ? other.text : with_effect(other.text, other.bias_m, size.u_m);
+    if (other.comparison == Comparison::Impossible || is_covered(other, size)) {
+      verdict.notes.push_back(text);
+    } else {
+      verdict.refuse(name(other.cause), text, reasons++);
     }
-    const bool covered =
-        other.bias_m <= other.u_m && root_sum_of_squares(other.bias_m, other.u_m) <= kCoveredByU * size.u_m;
-    (covered ? verdict.notes : reasons).push_back(with_effect(other.text, other.bias_m, size.u_m));
   }
-  verdict.reasons.insert(verdict.reasons.begin(), reasons.begin(), reasons.end());
+}
+
+/// Slow noise that the estimate has in its covariance explains scatter and uncertainty: before the first of
+/// them.
+void add_slow_noise(Verdict& verdict, const Solution& solution) {
+  if (!(solution.slow_noise > 0.0)) {
+    return;
+  }
+  const std::string text = slow_noise_text(solution.statistics.slow_noise_m) + "; it is in the uncertainty";
+  const auto follows = [](const std::string& cause) {
+    return cause == name(Cause::Scatter) || cause == kUncertain;
+  };
+  const auto first = std::find_if(verdict.causes.begin(), verdict.causes.end(), follows);
+  if (first == verdict.causes.end()) {
+    verdict.notes.push_back(text);
+  } else {
+    verdict.refuse(name(Cause::SlowNoise), text, static_cast<std::size_t>(first - verdict.causes.begin()));
+  }
 }
 
 /// Of the balls about Ball1.
@@ -121,7 +157,7 @@ void note_what_touches_do_not_show(Verdict& verdict, const Observations& o, doub
 }  // namespace
 
 Result<HeldOutFigures> held_out(const Observations& o, double s_m, const VolumetricModel* active,
-                                const SolveOptions& options) {
+                                const SolveOptions& options, const Watch& watch) {
   const std::vector<PositionRows> positions = position_rows(o);
   constexpr std::size_t kLeastPositions = 3;
   if (positions.size() < kLeastPositions) {
@@ -135,6 +171,9 @@ Result<HeldOutFigures> held_out(const Observations& o, double s_m, const Volumet
   const bool with_active = active != nullptr && active->holds_for_tool(o.machine.tool_offset_m);
   Remainder none, candidate, other, candidate_beside;
   for (const PositionRows& p : positions) {
+    if (Result<void> goes_on = check_stopped(watch); !goes_on) {
+      return tl::unexpected(goes_on.error());
+    }
     const Observations rest = part_of(o, p.position, true), left_out = part_of(o, p.position, false);
     const Result<Fit> fit = fit_with(problem_of(rest, *design, options), options);
     if (!fit) {
@@ -145,6 +184,9 @@ Result<HeldOutFigures> held_out(const Observations& o, double s_m, const Volumet
     none.add(left_out, y);
     const auto by_fit = [&](const Vector3& q) -> Vector3 { return design->B(q) * fit->c_m; };
     candidate.add(left_out, y - relative_to_ball1(left_out, by_fit));
+    if (watch.progress) {
+      watch.progress(static_cast<double>(&p - positions.data() + 1) / static_cast<double>(positions.size()));
+    }
     if (!with_active) {
       continue;
     }
@@ -170,41 +212,47 @@ Result<HeldOutFigures> held_out(const Observations& o, double s_m, const Volumet
   return figures;
 }
 
-Result<Verdict> judge(const Observations& o, const Solution& solution, const VolumetricModel* active,
-                      const JudgeOptions& options) {
+Result<Verdict> judge(const Observations& observations, const Solution& solution,
+                      const VolumetricModel* active, const JudgeOptions& options) {
+  const Observations o = with_slow_noise(observations, solution.slow_noise);
   SolveOptions solve = options.solve;
   solve.estimator = solution.estimator;
   solve.sparse.chosen = solution.sparse;
   solve.sparse.bootstrap_runs = 0;
-  const Result<std::vector<Alternative>> others = alternatives(o, solution);
+  const Result<std::vector<Alternative>> others = alternatives(o, solution, part_of(options.watch, 0.0, 0.5));
   if (!others) {
     return tl::unexpected(others.error());
   }
-  return held_out(o, solution.statistics.s_m, active, solve).map([&](const HeldOutFigures& figures) {
-    Verdict verdict = decide(solution.model, figures, options.limits, active);
-    if (!solution.rotation.referenced && !options.accept_shape_only) {
-      const double u_rad = std::sqrt(solution.rotation.cov_rad2.trace() / 3.0);
-      verdict.reasons.push_back(
-          message("shape only: the machine measured the blocks itself, so a rotation of about ", 1e6 * u_rad,
-                  " urad about Ball1 is unknown; give a rotation reference or accept ", kShapeOnly));
-    }
-    const CorrectionSize size = correction_size(o, solution);
-    add_alternatives(verdict, *others, size);
-    require_certainty(verdict, size.V_m, size.u_m);
-    note_artefact(o, verdict);
-    note_what_touches_do_not_show(verdict, o, extent_m(o));
-    if (const auto& fit = solution.rotation.reference; fit && !fit->outside.empty()) {
-      verdict.notes.push_back(message("rotation reference: ", fit->outside.size(), " of ",
-                                      fit->outside.size() + fit->points,
-                                      " points lie outside the volume the balls span and were not used"));
-    }
-    if (const auto& fit = solution.rotation.reference; fit && fit->widened > 1.0) {
-      verdict.notes.push_back(message("rotation reference: chi-square ", fit->widened,
-                                      " per degree of freedom, in the rotation's uncertainty"));
-    }
-    verdict.accepted = verdict.reasons.empty();
-    return verdict;
-  });
+  const Watch second_half = part_of(options.watch, 0.5, 1.0);
+  return held_out(o, solution.statistics.s_m, active, solve, second_half)
+      .map([&](const HeldOutFigures& figures) {
+        Verdict verdict = decide(solution.model, figures, options.limits, active);
+        if (!solution.rotation.referenced && !options.accept_shape_only) {
+          const double u_rad = std::sqrt(solution.rotation.cov_rad2.trace() / 3.0);
+          verdict.refuse(
+              kShapeOnly,
+              message("shape only: the machine measured the blocks itself, so a rotation of about ",
+                      1e6 * u_rad, " urad about Ball1 is unknown; give a rotation reference or accept ",
+                      kShapeOnly));
+        }
+        const CorrectionSize size = correction_size(o, solution);
+        add_alternatives(verdict, *others, size);
+        require_certainty(verdict, size.V_m, size.u_m);
+        add_slow_noise(verdict, solution);
+        note_artefact(o, verdict);
+        note_what_touches_do_not_show(verdict, o, extent_m(o));
+        if (const auto& fit = solution.rotation.reference; fit && !fit->outside.empty()) {
+          verdict.notes.push_back(message("rotation reference: ", fit->outside.size(), " of ",
+                                          fit->outside.size() + fit->points,
+                                          " points lie outside the volume the balls span and were not used"));
+        }
+        if (const auto& fit = solution.rotation.reference; fit && fit->widened > 1.0) {
+          verdict.notes.push_back(message("rotation reference: chi-square ", fit->widened,
+                                          " per degree of freedom, in the rotation's uncertainty"));
+        }
+        verdict.accepted = verdict.reasons.empty();
+        return verdict;
+      });
 }
 
 }  // namespace abbe::calib::evemu

@@ -4,16 +4,21 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <iterator>
 #include <limits>
 #include <optional>
+#include <span>
+#include <tuple>
 #include <utility>
 
 #include "abbe/calib/evemu/artefact_rows.hpp"
 #include "abbe/calib/evemu/design_rows.hpp"
 #include "elementary.hpp"
 #include "evemu/alternative_columns.hpp"
+#include "evemu/check_stopped.hpp"
 #include "evemu/fit_coefficients.hpp"
 #include "evemu/refit.hpp"
+#include "evemu/slow_noise.hpp"
 #include "evemu/touch_residuals.hpp"
 #include "message.hpp"
 #include "rigid_free_norm.hpp"
@@ -60,7 +65,7 @@ Result<Rows> rows_of(const Observations& o, const ScaledDesign& design, const So
             .y = white_rows(o, problem.y),
             .hyper = {},
             .norm = norm_over_balls(o, design)};
-  if (solution.estimator == Estimator::BayesPose && solution.hyper) {
+  if (solution.estimator == Estimator::BayesPose && solution.hyper && solution.slow_noise == 0.0) {
     rows.hyper = *solution.hyper;
     return rows;
   }
@@ -94,42 +99,53 @@ Result<Refit> refit(const Rows& rows, const ScaledDesign& design, const Eigen::M
   const Eigen::VectorXd prior =
       with_added(prior_variances(PriorKind::BayesPose, design, rows.positions, *hyper), design.size(), added);
   const auto p = gaussian.posterior(prior, hyper->s_m * hyper->s_m);
+  if (!p.mean.allFinite() || !p.covariance.allFinite()) {
+    return failure(ErrorCode::NotConverged,
+                   message("bayes: no solution at s = ", hyper->s_m, " m, w = ", hyper->w_rad, " rad"));
+  }
   const Eigen::Index n = X.cols();
   return Refit{*hyper, p.mean.head(n), p.mean.segment(n + rows.A.cols(), C.cols()),
                p.covariance.topLeftCorner(n, n)};
 }
 
-/// Covariance of y at the hyper-parameters of the estimate: what an alternative would make more likely.
+/// What an alternative would make more likely at the hyper-parameters of the estimate. There y has the
+/// covariance s^2 1 + U U^T, U: columns of design, pose rotations and array, each times its prior standard
+/// deviation. With Q1 the upper rows of Q, (U above s 1) = Q R,
+///     (s^2 1 + U U^T)^-1 = (1 - Q1 Q1^T) / s^2.
 class Screen {
  public:
-  explicit Screen(const Rows& rows) {
-    const HyperParameters& h = rows.hyper;
-    const Eigen::VectorXd prior =
-        prior_variances(PriorKind::BayesPose, rows.design, rows.positions, h).head(rows.X.cols());
-    const Eigen::MatrixXd X = rows.X * prior.cwiseSqrt().asDiagonal();
-    Eigen::MatrixXd covariance = h.s_m * h.s_m * Eigen::MatrixXd::Identity(X.rows(), X.rows());
-    covariance.noalias() += X * X.transpose() + h.w_rad * h.w_rad * rows.S * rows.S.transpose();
-    covariance.noalias() += rows.A * rows.A.transpose();
-    llt_.compute(covariance);
-    z_ = llt_.matrixL().solve(rows.y);
+  explicit Screen(const Rows& rows) : y_(rows.y), s2_(rows.hyper.s_m * rows.hyper.s_m) {
+    const Eigen::VectorXd root =
+        prior_variances(PriorKind::BayesPose, rows.design, rows.positions, rows.hyper).cwiseSqrt();
+    const Eigen::Index n = rows.X.rows(), x = rows.X.cols(), w = rows.S.cols(), m = x + w + rows.A.cols();
+    Eigen::MatrixXd U(n + m, m);
+    U.topRows(n) << rows.X * root.head(x).asDiagonal(), rows.S * root.tail(w).asDiagonal(), rows.A;
+    U.bottomRows(m) = rows.hyper.s_m * Eigen::MatrixXd::Identity(m, m);
+    Q1_ = (U.householderQr().householderQ() * Eigen::MatrixXd::Identity(n + m, m)).topRows(n);
+    Q1_y_ = Q1_.transpose() * y_;
   }
 
   struct Gain {
     double log_likelihood = 0.0;
     double size_m = 0.0;
   };
-  /// By the best of kSizes_m.
+  /// By the best of kSizes_m. NaN: there is no likelihood.
   [[nodiscard]] Gain gain(const Eigen::MatrixXd& C) const {
-    const Eigen::MatrixXd G = llt_.matrixL().solve(C);
-    const Eigen::MatrixXd GG = G.transpose() * G;
-    const Eigen::VectorXd g = G.transpose() * z_;
-    Gain best{-1e300, 0.0};
+    const auto [first, count] = rows_in_use(C);
+    const auto used = C.middleRows(first, count);
+    const Eigen::MatrixXd P = Q1_.middleRows(first, count).transpose() * used;
+    const Eigen::MatrixXd GG = (used.transpose() * used - P.transpose() * P) / s2_;
+    const Eigen::VectorXd g = (used.transpose() * y_.segment(first, count) - P.transpose() * Q1_y_) / s2_;
+    Gain best{-std::numeric_limits<double>::infinity(), 0.0};
     for (const double size_m : kSizes_m) {
-      // log N(y; K + t^2 C C^T) - log N(y; K) = g^T M^-1 g t^2 / 2 - log |M| / 2,  M = 1 + t^2 G^T G
+      // log N(y; K + t^2 C C^T) - log N(y; K) = g^T M^-1 g t^2 / 2 - log |M| / 2,  M = 1 + t^2 C^T K^-1 C
       const double t2 = size_m * size_m;
       const Eigen::LLT<Eigen::MatrixXd> M(Eigen::MatrixXd::Identity(GG.rows(), GG.cols()) + t2 * GG);
       const double log_det = 2.0 * M.matrixLLT().diagonal().unaryExpr(&natural_logarithm).sum();
       const double value = 0.5 * (t2 * g.dot(M.solve(g)) - log_det);
+      if (M.info() != Eigen::Success || !std::isfinite(value)) {
+        return {std::numeric_limits<double>::quiet_NaN(), size_m};
+      }
       if (value > best.log_likelihood) {
         best = {value, size_m};
       }
@@ -138,8 +154,25 @@ class Screen {
   }
 
  private:
-  Eigen::LLT<Eigen::MatrixXd> llt_;
-  Eigen::VectorXd z_;
+  struct RowsInUse {
+    Eigen::Index first, count;
+  };
+  /// From the first to the last row that is not zero.
+  static RowsInUse rows_in_use(const Eigen::MatrixXd& C) {
+    Eigen::Index first = 0, end = C.rows();
+    while (first < end && C.row(first).isZero(0.0)) {
+      ++first;
+    }
+    while (end > first && C.row(end - 1).isZero(0.0)) {
+      --end;
+    }
+    return {first, end - first};
+  }
+
+  const Eigen::VectorXd& y_;
+  double s2_;
+  Eigen::MatrixXd Q1_;
+  Eigen::VectorXd Q1_y_;
 };
 
 /// The estimate itself, with the array's uncertainty among the columns: what alternatives are compared with.
@@ -151,60 +184,124 @@ double threshold(double family) {
   return natural_logarithm(kCauses * family / kFalseAlarm);
 }
 
-/// The best of one cause: from the screen the place, from a fit of its own how likely it is.
-Result<std::optional<Alternative>> best_of(const Rows& rows, const Refit& base, const Screen& screen,
-                                           std::span<const Added> family) {
-  const Added* best = nullptr;
-  Screen::Gain most;
-  for (const Added& added : family) {
-    const Screen::Gain gain = screen.gain(white_rows(rows.o, added.columns));
-    if (best == nullptr || gain.log_likelihood > most.log_likelihood) {
-      best = &added, most = gain;
-    }
-  }
-  if (best == nullptr || !(most.log_likelihood > 0.0)) {
-    return std::nullopt;
-  }
-  const auto with = refit(rows, rows.design, rows.X, white_rows(rows.o, best->columns), most.size_m);
-  if (!with) {
-    return std::nullopt;  // no likelihood there
-  }
-  const double gain = with->hyper.log_likelihood - base.hyper.log_likelihood;
-  const double tried = static_cast<double>(family.size() * kSizes_m.size());
-  if (!(gain > threshold(tried))) {
-    return std::nullopt;
-  }
-  return Alternative{.cause = best->cause,
-                     .text = text_of(*best, with->d_m, rows.o),
-                     .log_likelihood = gain,
-                     .bias_m = rows.norm.rms_m(with->c_m - base.c_m),
-                     .u_m = rows.norm.rms_u_m(with->covariance_m2)};
+/// The alternative may hold: a model that was not compared with it is refused.
+Alternative not_compared(Cause cause, const std::string& place, const std::string& why) {
+  constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
+  return {.cause = cause,
+          .text = message("the comparison with cause \"", name(cause), "\"", place, " failed: ", why,
+                          "; look at the touches there and calibrate again"),
+          .bias_m = kNaN,
+          .u_m = kNaN,
+          .comparison = Comparison::Failed};
 }
 
-/// The same errors with another design in the place of X.
-std::optional<Alternative> other_design(const Rows& rows, const Refit& base,
-                                        const Result<ScaledDesign>& design, Cause cause, std::string text) {
-  if (!design) {
-    return std::nullopt;
+Alternative impossible(Cause cause, std::string text) {
+  constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
+  return {.cause = cause,
+          .text = std::move(text),
+          .bias_m = kNaN,
+          .u_m = kNaN,
+          .comparison = Comparison::Impossible};
+}
+
+/// What is compared, and the results.
+struct Comparisons {
+  const Rows& rows;
+  const Refit& base;
+  const Watch& watch;
+  std::vector<Alternative> found{}, not_made{};
+
+  void add(Alternative alternative) {
+    (alternative.comparison == Comparison::Made ? found : not_made).push_back(std::move(alternative));
   }
+};
+
+struct Screened {
+  const Added* best = nullptr;
+  Screen::Gain gain{0.0, 0.0};
+};
+
+/// The best of one cause, its place and size. None where an alternative cannot be compared.
+Result<Screened> screened(Comparisons& all, const AlternativeColumns& columns, const Screen& screen,
+                          std::span<const Added> family) {
+  Screened most;
+  for (const Added& added : family) {
+    if (Result<void> goes_on = check_stopped(all.watch); !goes_on) {
+      return tl::unexpected(goes_on.error());
+    }
+    const Screen::Gain gain = screen.gain(white_rows(all.rows.o, columns.of(added)));
+    if (!std::isfinite(gain.log_likelihood)) {
+      all.add(not_compared(added.cause, where(added, all.rows.o), "the data have no likelihood with it"));
+      return Screened{};
+    }
+    if (gain.log_likelihood > most.gain.log_likelihood) {
+      most = {&added, gain};
+    }
+  }
+  return most;
+}
+
+/// From the screen the best of one cause, from a fit of its own how likely it is.
+Result<void> compare_with(Comparisons& all, const AlternativeColumns& columns, const Screen& screen,
+                          std::span<const Added> family) {
+  const Result<Screened> best = screened(all, columns, screen, family);
+  if (!best) {
+    return tl::unexpected(best.error());
+  }
+  if (best->best == nullptr) {
+    return {};
+  }
+  const Rows& rows = all.rows;
+  const Added& added = *best->best;
+  const auto with =
+      refit(rows, rows.design, rows.X, white_rows(rows.o, columns.of(added)), best->gain.size_m);
+  if (!with) {
+    all.add(not_compared(added.cause, where(added, rows.o), with.error().text));
+    return {};
+  }
+  const double gain = with->hyper.log_likelihood - all.base.hyper.log_likelihood;
+  if (gain > threshold(static_cast<double>(family.size() * kSizes_m.size()))) {
+    all.add({.cause = added.cause,
+             .text = text_of(added, with->d_m, rows.o),
+             .log_likelihood = gain,
+             .bias_m = rows.norm.rms_m(with->c_m - all.base.c_m),
+             .u_m = rows.norm.rms_u_m(with->covariance_m2)});
+  }
+  return {};
+}
+
+/// The same errors with another design in the place of X. `what`: "the order of axes XYZ".
+void compare_with_design(Comparisons& all, const Result<ScaledDesign>& design, Cause cause,
+                         const std::string& what, std::string text) {
+  if (!design) {
+    all.add(impossible(cause, message("not compared with ", what, ": ", design.error().text)));
+    return;
+  }
+  const Rows& rows = all.rows;
   const FitProblem problem = problem_of(rows.o, *design, {});
   const auto with =
       refit(rows, *design, white_rows(rows.o, problem.X), Eigen::MatrixXd(rows.X.rows(), 0), 1.0);
-  if (!with || !(with->hyper.log_likelihood - base.hyper.log_likelihood > threshold(6.0))) {
-    return std::nullopt;
+  if (!with) {
+    all.add(not_compared(cause, ", " + what + ",", with.error().text));
+    return;
+  }
+  const double gain = with->hyper.log_likelihood - all.base.hyper.log_likelihood;
+  constexpr double kDesigns = 6.0;
+  if (!(gain > threshold(kDesigns))) {
+    return;
   }
   std::vector<Vector3> points;
   Eigen::MatrixXd difference(static_cast<Eigen::Index>(3 * rows.o.rows.size()), 1);
   for (Eigen::Index i = 0; i < std::ssize(rows.o.rows); ++i) {
     const Vector3& q = rows.o.rows[static_cast<std::size_t>(i)].reading_m;
     points.push_back(q);
-    difference.middleRows<3>(3 * i) = design->B(q) * with->c_m - rows.design.B(q) * base.c_m;
+    difference.middleRows<3>(3 * i) = design->B(q) * with->c_m - rows.design.B(q) * all.base.c_m;
   }
-  return Alternative{.cause = cause,
-                     .text = std::move(text),
-                     .log_likelihood = with->hyper.log_likelihood - base.hyper.log_likelihood,
-                     .bias_m = RigidFreeNorm(difference, points).rms_m(Eigen::VectorXd::Ones(1)),
-                     .u_m = norm_over_balls(rows.o, *design).rms_u_m(with->covariance_m2)};
+  all.add({.cause = cause,
+           .text = std::move(text),
+           .log_likelihood = gain,
+           .bias_m = RigidFreeNorm(difference, points).rms_m(Eigen::VectorXd::Ones(1)),
+           .u_m = norm_over_balls(rows.o, *design).rms_u_m(with->covariance_m2)});
 }
 
 std::string letters(const KinematicChain& chain) {
@@ -215,41 +312,90 @@ std::string letters(const KinematicChain& chain) {
   return text;
 }
 
-std::optional<Alternative> other_order_of_axes(const Rows& rows, const Refit& base) {
+/// One of each cause.
+void keep_the_most_likely(std::vector<Alternative>& found, std::size_t from) {
+  const auto first = found.begin() + static_cast<std::ptrdiff_t>(from);
+  if (first == found.end()) {
+    return;
+  }
+  std::iter_swap(first, std::max_element(first, found.end(), [](const auto& a, const auto& b) {
+                   return a.log_likelihood < b.log_likelihood;
+                 }));
+  found.erase(first + 1, found.end());
+}
+
+Result<void> compare_orders_of_axes(Comparisons& all) {
+  const Rows& rows = all.rows;
   const std::string used = letters(rows.o.machine.chain);
+  const std::size_t before = all.found.size();
   std::string order = "XYZ";
-  std::optional<Alternative> best;
   do {
-    const auto chain = KinematicChain::parse(message("[w b ", order[0], " ", order[1], " ", order[2], " t]"));
-    if (order == used || !chain) {
+    if (order == used) {
       continue;
     }
-    auto found =
-        other_design(rows, base, ScaledDesign::of(*chain, rows.o.order, rows.design.box()), Cause::ChainOrder,
-                     message("the axes carry each other in the order ", order,
-                             " from workpiece to tool, not ", used, " as the machine's chain says"));
-    if (found && (!best || found->log_likelihood > best->log_likelihood)) {
-      best = std::move(found);
+    if (Result<void> goes_on = check_stopped(all.watch); !goes_on) {
+      return goes_on;
     }
+    const auto design = KinematicChain::parse(message("[w b ", order[0], " ", order[1], " ", order[2], " t]"))
+                            .and_then([&](const KinematicChain& chain) {
+                              return ScaledDesign::of(chain, rows.o.order, rows.design.box());
+                            });
+    compare_with_design(all, design, Cause::ChainOrder, message("the order of axes ", order),
+                        message("the axes carry each other in the order ", order,
+                                " from workpiece to tool, not ", used, " as the machine's chain says"));
   } while (std::next_permutation(order.begin(), order.end()));
-  return best;
+  keep_the_most_likely(all.found, before);
+  return {};
 }
 
-std::optional<Alternative> higher_order(const Rows& rows, const Refit& base) {
-  if (rows.o.order >= kMostOrder) {
-    return std::nullopt;
+Result<void> compare_higher_order(Comparisons& all) {
+  const Rows& rows = all.rows;
+  if (Result<void> goes_on = check_stopped(all.watch); !goes_on) {
+    return goes_on;
   }
-  return other_design(rows, base, ScaledDesign::of(rows.o.machine.chain, rows.o.order + 1, rows.design.box()),
-                      Cause::Order,
+  compare_with_design(all, ScaledDesign::of(rows.o.machine.chain, rows.o.order + 1, rows.design.box()),
+                      Cause::Order, message("polynomials of order ", rows.o.order + 1),
                       message("the errors of this machine are no polynomials of order ", rows.o.order,
                               ": order ", rows.o.order + 1, " fits better; set it as order"));
+  return {};
 }
 
-std::vector<Alternative> of_touches(const Rows& rows, const Refit& base, const TouchResiduals& touches) {
+/// Slow noise, for estimates without it. That of bayes-pose was compared when it was made.
+Result<void> compare_slow_noise(Comparisons& all, const Solution& solution) {
+  const Rows& rows = all.rows;
+  if (solution.estimator == Estimator::BayesPose || rows.o.seen.empty()) {
+    return {};
+  }
+  const auto slow = likely_slow_noise(rows.o, rows.design, rows.hyper);
+  if (!slow) {
+    all.add(not_compared(Cause::SlowNoise, "", slow.error().text));
+    return {};
+  }
+  constexpr double kSizes = 7.0;
+  if (!(slow->log_likelihood > threshold(kSizes))) {
+    return {};
+  }
+  const Observations o = with_slow_noise(rows.o, slow->per_s);
+  const auto with = rows_of(o, rows.design, solution);
+  const auto fit = with.and_then([](const Rows& r) { return base_of(r); });
+  if (!fit) {
+    all.add(not_compared(Cause::SlowNoise, "", fit.error().text));
+    return {};
+  }
+  all.add({.cause = Cause::SlowNoise,
+           .text = slow_noise_text(slow->per_s * fit->hyper.s_m),
+           .log_likelihood = slow->log_likelihood,
+           .bias_m = rows.norm.rms_m(fit->c_m - all.base.c_m),
+           .u_m = rows.norm.rms_u_m(fit->covariance_m2)});
+  return {};
+}
+
+void compare_touches(Comparisons& all, const TouchResiduals& touches) {
+  const Rows& rows = all.rows;
   const LinearGaussian gaussian(rows.X, rows.S, rows.y);
   const Eigen::VectorXd prior =
       prior_variances(PriorKind::BayesPose, rows.design, rows.positions, rows.hyper);
-  std::vector<Alternative> found;
+  const double u_m = rows.norm.rms_u_m(all.base.covariance_m2);
   for (const TouchFinding& f : touches.findings) {
     // What only scatters has no known effect: NaN, and refuses.
     double bias_m = std::numeric_limits<double>::quiet_NaN();
@@ -258,9 +404,43 @@ std::vector<Alternative> of_touches(const Rows& rows, const Refit& base, const T
           gaussian.response(prior, rows.hyper.s_m * rows.hyper.s_m, white_rows(rows.o, f.rows_m));
       bias_m = rows.norm.rms_m(dc.col(0).head(rows.X.cols()));
     }
-    found.push_back({f.cause, f.text, f.log_likelihood, bias_m, rows.norm.rms_u_m(base.covariance_m2)});
+    all.add({f.cause, f.text, f.log_likelihood, bias_m, u_m});
   }
-  return found;
+  for (const std::string& place : touches.failed) {
+    all.add(not_compared(Cause::Touch, ", " + place,
+                         "no sphere or plane fits its touches once the model's V is taken out of them"));
+  }
+  if (!touches.not_compared.empty()) {
+    all.add(impossible(Cause::Touch, touches.not_compared));
+  }
+}
+
+Result<void> compare_all(Comparisons& all, const Solution& solution) {
+  const AlternativeColumns columns(all.rows.o);
+  const Screen screen(all.rows);
+  const std::vector<std::vector<Added>> families = columns.families();
+  const double steps = static_cast<double>(families.size()) + 3.0;
+  double done = 0.0;
+  const auto report = [&] {
+    if (all.watch.progress) {
+      all.watch.progress(++done / steps);
+    }
+  };
+  for (const std::vector<Added>& family : families) {
+    if (Result<void> compared = compare_with(all, columns, screen, family); !compared) {
+      return compared;
+    }
+    report();
+  }
+  for (const auto& compare : {compare_orders_of_axes, compare_higher_order}) {
+    if (Result<void> compared = compare(all); !compared) {
+      return compared;
+    }
+    report();
+  }
+  Result<void> compared = compare_slow_noise(all, solution);
+  report();
+  return compared;
 }
 
 /// What the balls scatter by beyond touches and array is somewhere in the machine.
@@ -316,52 +496,41 @@ CorrectionSize correction_size(const Observations& o, const Solution& solution) 
   return {norm.rms_m(model.c_m()), norm.rms_u_m(model.covariance_m2())};
 }
 
-Result<std::vector<Alternative>> alternatives(const Observations& o, const Solution& solution) {
+Result<std::vector<Alternative>> alternatives(const Observations& observations, const Solution& solution,
+                                              const Watch& watch) {
+  // Slow noise of any size would follow an array that moved once, too.
+  const Observations o = with_slow_noise(observations, 0.0);
   const Result<ScaledDesign> design = design_of(o);
   if (!design) {
     return tl::unexpected(design.error());
   }
-  const Result<Rows> rows = rows_of(o, *design, solution);
-  if (!rows) {
-    return tl::unexpected(rows.error());
-  }
-  const Result<Refit> base = base_of(*rows);
+  const auto rows = rows_of(o, *design, solution);
+  const auto base = rows.and_then([](const Rows& r) { return base_of(r); });
   if (!base) {
-    return tl::unexpected(base.error());
+    return failure(base.error().code, message("lack of fit, the estimate itself: ", base.error().text));
   }
+  Comparisons all{*rows, *base, watch};
   const TouchResiduals touches = touch_residuals(o, solution.model, kFalseAlarm / kCauses);
-  std::vector<Alternative> found = of_touches(*rows, *base, touches);
-  const Screen screen(*rows);
-  const std::vector<Added> added = alternative_columns(o);
-  for (auto from = added.begin(); from != added.end();) {
-    const auto to = std::find_if(from, added.end(), [&](const Added& a) { return a.cause != from->cause; });
-    auto best = best_of(*rows, *base, screen, {from, to});
-    if (!best) {
-      return tl::unexpected(best.error());
-    }
-    if (*best) {
-      found.push_back(**std::move(best));
-    }
-    from = to;
+  compare_touches(all, touches);
+  if (Result<void> compared = compare_all(all, solution); !compared) {
+    return tl::unexpected(compared.error());
   }
-  for (const auto& design_test : {other_order_of_axes, higher_order}) {
-    if (auto better = design_test(*rows, *base)) {
-      found.push_back(*std::move(better));
-    }
-  }
-  // First what moves the model: backlash is highly significant and leaves the centres where they are.
+  // First what moves the model: backlash is highly significant and leaves the centres where they are. Of that
+  // one touch off its surface first: its ball is off its place, or the array seems to have moved, because of
+  // it.
   constexpr double kMatters = 0.1;
   const auto key = [](const Alternative& a) {
-    return std::pair(!(a.bias_m > kMatters * a.u_m), -a.log_likelihood);
+    return std::tuple(!(a.bias_m > kMatters * a.u_m), a.cause != Cause::Touch, -a.log_likelihood);
   };
-  std::stable_sort(found.begin(), found.end(),
+  std::stable_sort(all.found.begin(), all.found.end(),
                    [&](const Alternative& a, const Alternative& b) { return key(a) < key(b); });
   for (const auto& scatter_test : {scatter_of_touches, unexplained_scatter}) {
     if (auto scatter = scatter_test(*rows, *base, touches)) {
-      found.push_back(*std::move(scatter));
+      all.add(*std::move(scatter));
     }
   }
-  return found;
+  std::move(all.not_made.begin(), all.not_made.end(), std::back_inserter(all.found));
+  return std::move(all.found);
 }
 
 }  // namespace abbe::calib::evemu

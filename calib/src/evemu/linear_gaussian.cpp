@@ -76,6 +76,9 @@ LinearGaussian::Information LinearGaussian::information(const Eigen::VectorXd& p
 Eigen::MatrixXd LinearGaussian::response(const Eigen::VectorXd& prior, double noise,
                                          const Eigen::MatrixXd& rows) const {
   const auto [root, scaled, llt] = information(prior, noise);
+  if (llt.info() != Eigen::Success) {
+    return Eigen::MatrixXd::Constant(R_.cols(), rows.cols(), std::numeric_limits<double>::quiet_NaN());
+  }
   const Eigen::MatrixXd turned = qr_.householderQ().adjoint() * rows;
   return root.asDiagonal() * llt.solve(scaled.transpose() * (turned.topRows(R_.rows()) / std::sqrt(noise)));
 }

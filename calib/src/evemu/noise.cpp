@@ -1,6 +1,10 @@
 #include "abbe/calib/evemu/noise.hpp"
 
 #include <Eigen/Cholesky>
+#include <algorithm>
+#include <cmath>
+
+#include "elementary.hpp"
 
 namespace abbe::calib::evemu {
 namespace {
@@ -12,7 +16,7 @@ template <class Act>
 Eigen::MatrixXd by_position(const Observations& o, const Eigen::MatrixXd& rows, const Act& act) {
   Eigen::MatrixXd result(rows.rows(), rows.cols());
   for (const PositionRows& p : position_rows(o)) {
-    const Eigen::LLT<Eigen::MatrixXd> llt(ball_covariance(p));
+    const Eigen::LLT<Eigen::MatrixXd> llt(ball_covariance(o, p));
     const auto count = static_cast<Eigen::Index>(p.count);
     for (Eigen::Index c = 0; c < 3; ++c) {
       const auto at = Eigen::seqN(3 * static_cast<Eigen::Index>(p.first) + c, count, 3);
@@ -22,7 +26,47 @@ Eigen::MatrixXd by_position(const Observations& o, const Eigen::MatrixXd& rows, 
   return result;
 }
 
+/// k_ij - k_i1 - k_1j + k_11 of the balls of a position.
+Eigen::MatrixXd slow_covariance(const SeenArtefact& seen) {
+  constexpr double kPerPosition = 4.0;
+  const std::vector<double> t = times_in_position(seen);
+  const auto k = [&](Eigen::Index i, Eigen::Index j) {
+    return exponential(-kPerPosition *
+                       std::abs(t[static_cast<std::size_t>(i)] - t[static_cast<std::size_t>(j)]));
+  };
+  Eigen::MatrixXd C(std::ssize(t), std::ssize(t));
+  for (Eigen::Index i = 0; i < C.rows(); ++i) {
+    for (Eigen::Index j = 0; j < C.cols(); ++j) {
+      C(i, j) = k(i, j) - k(i, 0) - k(0, j) + 1.0;
+    }
+  }
+  return C;
+}
+
 }  // namespace
+
+std::vector<double> times_in_position(const SeenArtefact& s) {
+  double first = std::min(s.block_index[0], s.block_index[1]);
+  double last = std::max(s.block_index[0], s.block_index[1]);
+  for (const double index : s.ball_index) {
+    first = std::min(first, index), last = std::max(last, index);
+  }
+  std::vector<double> t;
+  for (const double index : s.ball_index) {
+    t.push_back(last > first ? (index - first) / (last - first) : 0.0);
+  }
+  return t;
+}
+
+double log_det_of_noise(const Observations& o) {
+  double sum = 0.0;
+  for (const PositionRows& p : position_rows(o)) {
+    const Eigen::MatrixXd L = ball_covariance(o, p).llt().matrixL();
+    const auto ball1 = static_cast<Eigen::Index>(p.ball1 - p.first);
+    sum += 3.0 * (L.diagonal().unaryExpr(&natural_logarithm).sum() - natural_logarithm(L(ball1, ball1)));
+  }
+  return sum;
+}
 
 std::vector<PositionRows> position_rows(const Observations& o) {
   std::vector<PositionRows> found;
@@ -38,9 +82,14 @@ std::vector<PositionRows> position_rows(const Observations& o) {
   return found;
 }
 
-Eigen::MatrixXd ball_covariance(const PositionRows& p) {
+Eigen::MatrixXd ball_covariance(const Observations& o, const PositionRows& p) {
   const auto n = static_cast<Eigen::Index>(p.count), first = static_cast<Eigen::Index>(p.ball1 - p.first);
   Eigen::MatrixXd C = Eigen::MatrixXd::Ones(n, n) + Eigen::MatrixXd::Identity(n, n);
+  const auto seen = std::find_if(o.seen.begin(), o.seen.end(),
+                                 [&](const SeenArtefact& s) { return s.position == p.position; });
+  if (o.slow_noise > 0.0 && seen != o.seen.end()) {
+    C += o.slow_noise * o.slow_noise * slow_covariance(*seen);
+  }
   C.row(first).setZero();
   C.col(first).setZero();
   C(first, first) = kBall1Variance;

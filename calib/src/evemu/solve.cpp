@@ -8,6 +8,7 @@
 
 #include "abbe/calib/evemu/design_rows.hpp"
 #include "evemu/fit_coefficients.hpp"
+#include "evemu/slow_noise.hpp"
 #include "message.hpp"
 #include "singular_values.hpp"
 
@@ -133,6 +134,7 @@ Statistics statistics_of(const FitProblem& problem, const Fit& fit, const Eigen:
   s.degrees_of_freedom = static_cast<double>(s.observations) - fit.effective_parameters - fit.pose_parameters;
   s.s_m = fit.s_m;
   s.w_rad = fit.w_rad;
+  s.slow_noise_m = o.slow_noise * fit.s_m;
   s.before = residual_figures(o, problem.y);
   s.after = residual_figures(o, r);
   if (fit.s_m > 0.0) {
@@ -217,6 +219,15 @@ Result<Solution> solve(const Observations& o, const SolveOptions& options) {
   if (!fit) {
     return tl::unexpected(fit.error());
   }
+  if (options.estimator == Estimator::BayesPose && problem.from_touches && o.slow_noise == 0.0) {
+    const Result<SlowNoise> slow = likely_slow_noise(o, *design, *fit->hyper);
+    if (!slow) {
+      return tl::unexpected(slow.error());
+    }
+    if (slow->log_likelihood > kWorthSlowNoise) {
+      return solve(with_slow_noise(o, slow->per_s), options);
+    }
+  }
   const Eigen::VectorXd residuals = residuals_of(problem, *fit);
   const Statistics statistics = statistics_of(problem, *fit, residuals);
   const Eigen::VectorXd raw_c_m = fit->c_m;
@@ -243,6 +254,7 @@ Result<Solution> solve(const Observations& o, const SolveOptions& options) {
                         .pose_rotations_rad = fit->pose_rotations_rad,
                         .rotation = rotation,
                         .artefact = o.artefact,
+                        .slow_noise = o.slow_noise,
                         .statistics = statistics};
       });
 }

@@ -43,7 +43,7 @@ std::optional<FeatureResiduals> of_ball(const SeenArtefact& s, std::size_t ball,
                                         const VolumetricModel& model) {
   const std::vector<Vector3> points = without_V(s.ball_points_m[ball], model);
   const auto sphere = fit::fit_sphere(points);
-  if (!sphere || points.size() < 5) {
+  if (!sphere) {
     return std::nullopt;
   }
   FeatureResiduals f{.feature = Feature::Ball, .index = ball};
@@ -66,7 +66,7 @@ std::optional<FeatureResiduals> of_block(const SeenArtefact& s, std::size_t bloc
                                          const VolumetricModel& model) {
   const std::vector<Vector3> points = without_V(s.block_points_m[block], model);
   const auto plane = fit::fit_plane(points, s.blocks[block].normal);
-  if (!plane || points.size() < 4) {
+  if (!plane) {
     return std::nullopt;
   }
   FeatureResiduals f{.feature = Feature::Block, .index = block};
@@ -90,20 +90,40 @@ std::optional<FeatureResiduals> of_block(const SeenArtefact& s, std::size_t bloc
   return f;
 }
 
-std::vector<FeatureResiduals> all_features(const Observations& o, const VolumetricModel& model) {
-  std::vector<FeatureResiduals> all;
-  const auto add = [&](std::size_t seen, std::optional<FeatureResiduals> f) {
-    if (f) {
-      f->seen = seen;
-      all.push_back(*std::move(f));
+std::string place_of(const Observations& o, std::size_t seen, Feature feature, std::size_t index) {
+  return message("position ", o.seen[seen].position, ", ", feature == Feature::Ball ? "ball " : "block ",
+                 index + 1);
+}
+
+struct Features {
+  std::vector<FeatureResiduals> compared;
+  std::vector<std::string> failed;  ///< places
+};
+
+/// Those with more touches than unknowns.
+Features all_features(const Observations& o, const VolumetricModel& model) {
+  constexpr std::size_t kUnknownsOfBall = 4, kUnknownsOfBlock = 3;
+  Features all;
+  const auto add = [&](std::size_t seen, Feature feature, std::size_t index,
+                       std::optional<FeatureResiduals> f) {
+    if (!f || !f->r_m.allFinite() || !f->response.allFinite()) {
+      all.failed.push_back(place_of(o, seen, feature, index));
+      return;
     }
+    f->seen = seen;
+    all.compared.push_back(*std::move(f));
   };
   for (std::size_t p = 0; p < o.seen.size(); ++p) {
-    for (std::size_t b = 0; b < o.seen[p].balls.size(); ++b) {
-      add(p, of_ball(o.seen[p], b, model));
+    const SeenArtefact& s = o.seen[p];
+    for (std::size_t b = 0; b < s.balls.size(); ++b) {
+      if (s.ball_points_m[b].size() > kUnknownsOfBall) {
+        add(p, Feature::Ball, b, of_ball(s, b, model));
+      }
     }
     for (std::size_t b = 0; b < 2; ++b) {
-      add(p, of_block(o.seen[p], b, model));
+      if (s.block_points_m[b].size() > kUnknownsOfBlock) {
+        add(p, Feature::Block, b, of_block(s, b, model));
+      }
     }
   }
   return all;
@@ -132,8 +152,15 @@ double pooled_sigma_m(const std::vector<FeatureResiduals>& all) {
 }
 
 std::string place_of(const Observations& o, const FeatureResiduals& f) {
-  return message("position ", o.seen[f.seen].position, ", ", f.feature == Feature::Ball ? "ball " : "block ",
-                 f.index + 1);
+  return place_of(o, f.seen, f.feature, f.index);
+}
+
+double count_of_touches(const std::vector<FeatureResiduals>& all) {
+  double count = 0.0;
+  for (const FeatureResiduals& f : all) {
+    count += static_cast<double>(f.r_m.size());
+  }
+  return count;
 }
 
 /// What a displacement of the touches along their normals does to the errors seen.
@@ -166,9 +193,8 @@ std::optional<TouchFinding> worst_touch(const Observations& o, const std::vector
                                         double sigma_m, double false_alarm) {
   const FeatureResiduals* worst = nullptr;
   Eigen::Index touch = 0;
-  double w = 0.0, touches = 0.0;
+  double w = 0.0;
   for (const FeatureResiduals& f : all) {
-    touches += static_cast<double>(f.r_m.size());
     for (Eigen::Index k = 0; k < f.r_m.size(); ++k) {
       if (f.free(k) < kLeastFree) {
         continue;
@@ -180,7 +206,7 @@ std::optional<TouchFinding> worst_touch(const Observations& o, const std::vector
     }
   }
   // Two-sided tail of the normal distribution: below exp(-w^2 / 2).
-  if (worst == nullptr || !(0.5 * w * w > natural_logarithm(touches / false_alarm))) {
+  if (worst == nullptr || !(0.5 * w * w > natural_logarithm(count_of_touches(all) / false_alarm))) {
     return std::nullopt;
   }
   const FeatureResiduals& f = *worst;
@@ -223,21 +249,110 @@ std::optional<TouchFinding> worst_form(const Observations& o, const std::vector<
                       .rows_m = {}};
 }
 
+/// -ln of an upper bound of the probability that a share of the sum of squares of a + b degrees of freedom, a
+/// of them, exceeds `share` (Chernoff's bound of the beta distribution); 0 below the mean.
+double surprise(double share, double a, double b) {
+  const double mean = a / (a + b);
+  if (!(share > mean && share < 1.0)) {
+    return 0.0;
+  }
+  return 0.5 * (a * natural_logarithm(mean / share) + b * natural_logarithm((1.0 - mean) / (1.0 - share)));
+}
+
+/// Squares of what is left of one ball or face, and their number that is free.
+struct FormSquares {
+  const FeatureResiduals* of;
+  double m2, dof;
+};
+
+/// A wrong slope of the model's V makes an ellipsoid of a ball: that, too, is taken out. None where nothing
+/// is left.
+std::optional<FormSquares> form_squares(const FeatureResiduals& f) {
+  if (f.feature == Feature::Block) {
+    return f.dof() > 0.0 ? std::optional(FormSquares{&f, f.r_m.squaredNorm(), f.dof()}) : std::nullopt;
+  }
+  constexpr Eigen::Index kUnknowns = 9;  // radius and place, five strains
+  if (f.r_m.size() <= kUnknowns) {
+    return std::nullopt;
+  }
+  const auto x = f.normals.col(0).array(), y = f.normals.col(1).array(), z = f.normals.col(2).array();
+  Eigen::MatrixXd design(f.r_m.size(), kUnknowns);
+  design << Eigen::VectorXd::Ones(f.r_m.size()), f.normals, (x * y).matrix(), (y * z).matrix(),
+      (z * x).matrix(), (x * x - y * y).matrix(), (z * z).matrix();
+  const Eigen::ColPivHouseholderQR<Eigen::MatrixXd> qr(design);
+  const Eigen::VectorXd left = f.r_m - design * qr.solve(f.r_m);
+  return FormSquares{&f, left.squaredNorm(), static_cast<double>(f.r_m.size() - qr.rank())};
+}
+
+/// The k features that scatter most against the others, for every k from 2: with white noise of any size they
+/// have a share of all squares that follows the beta distribution, whichever k of them are chosen. Balls and
+/// faces are compared among themselves: a backlash or a probe with lobes shows on balls alone.
+std::optional<TouchFinding> form_of_several(const Observations& o, const std::vector<FeatureResiduals>& all,
+                                            Feature kind, double false_alarm) {
+  std::vector<FormSquares> sorted;
+  double total_m2 = 0.0, total_dof = 0.0;
+  for (const FeatureResiduals& f : all) {
+    if (const auto squares = f.feature == kind ? form_squares(f) : std::nullopt) {
+      sorted.push_back(*squares);
+      total_m2 += squares->m2;
+      total_dof += squares->dof;
+    }
+  }
+  std::stable_sort(sorted.begin(), sorted.end(),
+                   [](const FormSquares& a, const FormSquares& b) { return a.m2 * b.dof > b.m2 * a.dof; });
+  const auto count = static_cast<double>(sorted.size());
+  double m2 = 0.0, dof = 0.0, k = 0.0, log_choices = 0.0, most = natural_logarithm(count / false_alarm);
+  std::optional<TouchFinding> found;
+  for (const FormSquares& f : sorted) {
+    log_choices += natural_logarithm((count - k) / (k + 1.0));
+    k += 1.0;
+    m2 += f.m2;
+    dof += f.dof;
+    const double beyond_choice = surprise(m2 / total_m2, dof, total_dof - dof) - log_choices;
+    if (k < 2.0 || !(beyond_choice > most)) {
+      continue;
+    }
+    most = beyond_choice;
+    found = TouchFinding{
+        .cause = Cause::Form,
+        .text = message("touches of ", k, kind == Feature::Ball ? " balls" : " block faces", " scatter by ",
+                        std::sqrt(m2 / dof) * kUmPerM, " um, those of the others by ",
+                        std::sqrt((total_m2 - m2) / (total_dof - dof)) * kUmPerM, " um, most of all at ",
+                        place_of(o, *sorted.front().of),
+                        ": the array or balls moved while they were touched, or surfaces are dirty"),
+        .log_likelihood = beyond_choice,
+        .rows_m = {}};
+  }
+  return found;
+}
+
 /// Readings differ by b_a between the two directions of axis a: |n_a| b_a / 2 along the normal.
-std::optional<TouchFinding> backlash(const Observations& o, const std::vector<FeatureResiduals>& all,
-                                     double sigma_m, double false_alarm) {
+Eigen::MatrixXd along_of_backlash(const FeatureResiduals& f) {
+  return 0.5 * f.normals.cwiseAbs();
+}
+
+/// What it leaves in the residuals of a ball.
+Eigen::MatrixXd residuals_of_backlash(const FeatureResiduals& ball) {
+  const Eigen::MatrixXd half = along_of_backlash(ball);
+  Eigen::MatrixXd design(half.rows(), 4);
+  design << ball.normals, Eigen::VectorXd::Ones(half.rows());
+  return half - design * (ball.response * half);
+}
+
+struct Backlash {
+  Vector3 b_m = Vector3::Zero();
+  double drop = 0.0;  ///< of chi2; 0: not significant
+};
+
+Backlash significant_backlash(const std::vector<FeatureResiduals>& all, double sigma_m, double false_alarm) {
   Matrix3 N = Matrix3::Zero();
   Vector3 g = Vector3::Zero();
   for (const FeatureResiduals& f : all) {
-    if (f.feature != Feature::Ball) {
-      continue;
+    if (f.feature == Feature::Ball) {
+      const Eigen::MatrixXd left = residuals_of_backlash(f);
+      N += left.transpose() * left;
+      g += left.transpose() * f.r_m;
     }
-    const Eigen::MatrixXd half = 0.5 * f.normals.cwiseAbs();
-    Eigen::MatrixXd design(half.rows(), 4);
-    design << f.normals, Eigen::VectorXd::Ones(half.rows());
-    const Eigen::MatrixXd free = half - design * (f.response * half);
-    N += free.transpose() * free;
-    g += free.transpose() * f.r_m;
   }
   // Directions that the touches hardly tell from radius and place count as none.
   constexpr double kShown = 0.02;
@@ -246,28 +361,53 @@ std::optional<TouchFinding> backlash(const Observations& o, const std::vector<Fe
   shown.compute(N);
   const Vector3 b = shown.solve(g);
   const double drop = g.dot(b) / (sigma_m * sigma_m);
-  if (!(drop > chi2_bound(3.0, natural_logarithm(1.0 / false_alarm)))) {
-    return std::nullopt;
-  }
-  Eigen::VectorXd rows = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(3 * o.rows.size()));
-  for (const FeatureResiduals& f : all) {
-    if (f.feature == Feature::Ball) {
-      rows += effect_m(o, f, 0.5 * f.normals.cwiseAbs() * b);
+  return drop > chi2_bound(3.0, natural_logarithm(1.0 / false_alarm)) ? Backlash{b, drop} : Backlash{};
+}
+
+std::vector<FeatureResiduals> without(const Backlash& backlash, std::vector<FeatureResiduals> all) {
+  for (FeatureResiduals& f : all) {
+    if (backlash.drop > 0.0 && f.feature == Feature::Ball) {
+      f.r_m -= residuals_of_backlash(f) * backlash.b_m;
     }
   }
-  return TouchFinding{
-      .cause = Cause::Backlash,
-      .text = message("the touches depend on the side they come from: backlash of X ", b.x() * kUmPerM,
-                      ", Y ", b.y() * kUmPerM, ", Z ", b.z() * kUmPerM, " um, or a probe with lobes"),
-      .log_likelihood = 0.5 * drop,
-      .rows_m = std::move(rows)};
+  return all;
+}
+
+TouchFinding finding_of(const Backlash& backlash, const Observations& o,
+                        const std::vector<FeatureResiduals>& all) {
+  Eigen::VectorXd rows = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(3 * o.rows.size()));
+  const Vector3& b = backlash.b_m;
+  for (const FeatureResiduals& f : all) {
+    if (f.feature == Feature::Ball) {
+      rows += effect_m(o, f, along_of_backlash(f) * b);
+    }
+  }
+  return {.cause = Cause::Backlash,
+          .text = message("the touches depend on the side they come from: backlash of X ", b.x() * kUmPerM,
+                          ", Y ", b.y() * kUmPerM, ", Z ", b.z() * kUmPerM, " um, or a probe with lobes"),
+          .log_likelihood = 0.5 * backlash.drop,
+          .rows_m = std::move(rows)};
+}
+
+std::string why_not_compared(const Observations& o, const Features& features) {
+  if (o.seen.empty()) {
+    return "errors were given without touches: not compared are single touches, balls off their places, an "
+           "array "
+           "that moved, creeps or is bent, a drift, and slow noise";
+  }
+  return features.compared.empty() && features.failed.empty()
+             ? "single touches are not compared: no ball has 5 touches, no block 4"
+             : "";
 }
 
 }  // namespace
 
 TouchResiduals touch_residuals(const Observations& o, const VolumetricModel& model, double false_alarm) {
-  const std::vector<FeatureResiduals> all = all_features(o, model);
+  Features features = all_features(o, model);
+  const std::vector<FeatureResiduals>& all = features.compared;
   TouchResiduals found;
+  found.not_compared = why_not_compared(o, features);
+  found.failed = std::move(features.failed);
   found.sigma_m = pooled_sigma_m(all);
   if (!(found.sigma_m > 0.0)) {
     return found;
@@ -280,17 +420,24 @@ TouchResiduals touch_residuals(const Observations& o, const VolumetricModel& mod
     }
   }
   found.s_centre_m = found.sigma_m * std::sqrt(squares / std::max(1.0, count));
-  const auto add = [&](std::optional<TouchFinding> finding) {
-    if (finding) {
-      found.findings.push_back(*std::move(finding));
-    }
-  };
+  const Backlash backlash = significant_backlash(all, found.sigma_m, false_alarm);
   auto touch = worst_touch(o, all, found.sigma_m, false_alarm);
+  std::optional<TouchFinding> form;
   if (!touch) {  // else its ball or block scatters because of it
-    add(worst_form(o, all, found.sigma_m, false_alarm));
+    const std::vector<FeatureResiduals> left = without(backlash, all);
+    form = worst_form(o, left, found.sigma_m, 0.5 * false_alarm);
+    for (const Feature kind : {Feature::Ball, Feature::Block}) {
+      form = form ? form : form_of_several(o, left, kind, 0.25 * false_alarm);
+    }
   }
-  add(std::move(touch));
-  add(backlash(o, all, found.sigma_m, false_alarm));
+  for (std::optional<TouchFinding>* finding : {&form, &touch}) {
+    if (*finding) {
+      found.findings.push_back(*std::move(*finding));
+    }
+  }
+  if (backlash.drop > 0.0) {
+    found.findings.push_back(finding_of(backlash, o, all));
+  }
   return found;
 }
 

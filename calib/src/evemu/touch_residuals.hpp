@@ -22,6 +22,8 @@ struct TouchResiduals {
   double sigma_m = 0.0;     ///< of one touch along the normal; from the median, which faults do not move
   double s_centre_m = 0.0;  ///< of a ball's centre per coordinate that follows, root mean square
   std::vector<TouchFinding> findings;
+  std::vector<std::string> failed;  ///< "position 3, ball 4": no surface or no finite residuals
+  std::string not_compared;         ///< why none was compared; else empty
 };
 /// `false_alarm`: family-wise probability. Needs touches (Observations::seen).
 [[nodiscard]] TouchResiduals touch_residuals(const Observations&, const VolumetricModel&, double false_alarm);

@@ -169,16 +169,17 @@ Result<HeldOutFold> hold_out(const std::vector<NormalEquations>& parts, std::siz
 
 /// Reasons before those that only follow from them.
 void add_alternatives(Verdict& verdict, const std::vector<Alternative>& others) {
-  std::vector<std::string> reasons;
+  std::size_t reasons = 0;
   for (const Alternative& other : others) {
     const std::string text = with_effect(other.text, other.bias_m, other.u_m);
     if (other.cause == Cause::CorrelatedNoise) {
       verdict.notes.push_back(other.text);
-    } else {  // written so that a NaN figure is refused
-      (!(other.bias_m <= other.u_m) ? reasons : verdict.notes).push_back(text);
+    } else if (other.bias_m <= other.u_m) {
+      verdict.notes.push_back(text);
+    } else {  // and where a figure is NaN
+      verdict.refuse(name(other.cause), text, reasons++);
     }
   }
-  verdict.reasons.insert(verdict.reasons.begin(), reasons.begin(), reasons.end());
 }
 
 double common_growth(const VolumetricModel& model) {
@@ -192,9 +193,9 @@ double common_growth(const VolumetricModel& model) {
 
 void require_plausible_growth(Verdict& verdict, double growth, double most) {
   if (!(std::abs(growth) <= most)) {
-    verdict.reasons.push_back(message("the machine is larger by ", 1e6 * growth,
-                                      " um/m in all directions, allowed are ", 1e6 * most,
-                                      ": wrong scale of the path, of the ranges or of a temperature"));
+    verdict.refuse("growth",
+                   message("the machine is larger by ", 1e6 * growth, " um/m in all directions, allowed are ",
+                           1e6 * most, ": wrong scale of the path, of the ranges or of a temperature"));
   }
 }
 

@@ -119,7 +119,7 @@ std::string cure(const Vector3& found, const Vector3& given, double at_most) {
 bool agrees(Verdict& verdict, std::vector<Matrix3>& open, const Vector3& found, const Vector3& given,
             double at_most, const std::string& what) {
   if (!((found - given).norm() <= at_most)) {
-    verdict.reasons.push_back(message("path orientation: ", what, cure(found, given, at_most)));
+    verdict.refuse("orientation", message("path orientation: ", what, cure(found, given, at_most)));
     return false;
   }
   const auto excluded = [&](const Matrix3& R) { return (R * found - given).norm() > 2.0 * at_most; };
@@ -171,10 +171,10 @@ void require_orientation(Verdict& verdict, const Path& path, const MachineNodes&
   if (evidence.accepted) {
     verdict.notes.push_back(text);
   } else {
-    verdict.reasons.push_back(message(text,
-                                      "; give a recording with the scales, tracker.vertical or "
-                                      "tracker.position_mm, or accept ",
-                                      kPathOrientation));
+    verdict.refuse("orientation", message(text,
+                                          "; give a recording with the scales, tracker.vertical or "
+                                          "tracker.position_mm, or accept ",
+                                          kPathOrientation));
   }
 }
 

@@ -373,7 +373,7 @@ class Replay {
 void judge_recording(const RecordingReader& recording, calib::Verdict& verdict) {
   if (auto damage = recording.damage(); !damage.empty()) {
     verdict.accepted = false;
-    verdict.reasons.push_back(std::move(damage));
+    verdict.refuse("damage", std::move(damage));
   }
   if (recording.configuration_check() == MetadataCheck::Unchecked)
     verdict.notes.emplace_back(

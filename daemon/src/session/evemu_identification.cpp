@@ -111,7 +111,8 @@ Result<EvemuCandidate> identify_touches(const EvemuRun& run, const Config& confi
   observing.artefact_temperature = run.artefact;
   auto observations = evemu::observe(run.touches, run.asked.calibrator, *machine, observing);
   if (!observations) return tl::unexpected(error_of(observations.error()));
-  const evemu::JudgeOptions judging = judge_options(config);
+  evemu::JudgeOptions judging = judge_options(config);
+  judging.watch.stopped = stopped;
   auto solution = evemu::solve(*observations, judging.solve);
   if (solution && run.asked.reference) {
     const auto& [points, sigma_m] = *run.asked.reference;

@@ -63,10 +63,18 @@ inline constexpr std::string_view kScaleChange = "scale-change";
 struct Verdict {
   bool accepted = false;
   std::vector<std::string> reasons;  ///< one sentence with numbers for every broken rule
-  std::vector<std::string> notes;    ///< what else to know about the comparison; breaks no rule
+  /// Of `reasons`, one each in the same order, for programs: the name of a Cause of the method's
+  /// lack_of_fit.hpp, or held-out, nowhere, size, slope, volume, scale-change, growth, uncertainty,
+  /// orientation, shape-only, damage.
+  std::vector<std::string> causes;
+  std::vector<std::string> notes;  ///< what else to know about the comparison; breaks no rule
   HeldOutFigures held_out;
   double max_error_m = 0.0;   ///< of the candidate, where decide() looked
   double max_gradient = 0.0;  ///< |dV/dq| along an axis, there
+
+  /// One reason more: last, or before that of index `before`.
+  void refuse(std::string_view cause, std::string text);
+  void refuse(std::string_view cause, std::string text, std::size_t before);
 };
 
 /// Pure. `active` may be null. Magnitude and gradient of tables are taken on the tensor grid of the nodes (V

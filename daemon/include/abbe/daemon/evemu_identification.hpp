@@ -21,8 +21,8 @@ struct EvemuCandidate {
 };
 
 /// `active` may be null. DataInsufficient or BadInput, with what is wrong with the touches, by position and
-/// number. `stopped`: as in IdentificationWatch. A run without rotation reference is judged "shape only"
-/// unless [gate] accepts that by name.
+/// number. `stopped`: as in IdentificationWatch, asked while the run is judged. A run without rotation
+/// reference is judged "shape only" unless [gate] accepts that by name.
 [[nodiscard]] Result<EvemuCandidate> identify_touches(const EvemuRun& run, const Config& config,
                                                       const calib::VolumetricModel* active,
                                                       const std::function<bool()>& stopped = {});

@@ -7,6 +7,7 @@
 /// rotation common to all positions (observe.hpp). A model with an unreferenced rotation is a shape: it is
 /// refused unless somebody accepts that by name.
 
+#include "abbe/calib/evemu/lack_of_fit.hpp"
 #include "abbe/calib/evemu/solve.hpp"
 #include "abbe/calib/gate.hpp"
 
@@ -19,13 +20,14 @@ struct JudgeOptions {
   GateLimits limits{};
   bool accept_shape_only = false;
   SolveOptions solve{};
+  Watch watch{};  ///< progress: the first half for lack of fit, the second for the held-out test
 };
 
 /// `active` may be null; it is compared at the balls inside its volume, of positions whose Ball1 is, and left
 /// out if it does not hold for the tool. Needs 3 positions, else
 /// TooFewObservations; RankDeficient if those that stay do not determine the model.
 [[nodiscard]] Result<HeldOutFigures> held_out(const Observations&, double s_m, const VolumetricModel* active,
-                                              const SolveOptions& = {});
+                                              const SolveOptions& = {}, const Watch& = {});
 
 /// held_out(), the limits of the gate, and the rotation.
 [[nodiscard]] Result<Verdict> judge(const Observations&, const Solution&, const VolumetricModel* active,

@@ -39,6 +39,7 @@ class LinearGaussian {
   [[nodiscard]] Posterior posterior(const Eigen::VectorXd& prior, double noise_variance) const;
 
   /// What the mean would be with each column of `rows` (whitened) in the place of y: the mean is linear in y.
+  /// NaN where rounding leaves no posterior information matrix.
   [[nodiscard]] Eigen::MatrixXd response(const Eigen::VectorXd& prior, double noise_variance,
                                          const Eigen::MatrixXd& rows) const;
 

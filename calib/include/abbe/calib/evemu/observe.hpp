@@ -76,6 +76,9 @@ struct Observations {
   std::vector<SeenArtefact> seen;                 ///< by position; empty when only errors were given
   Vector3 ball1_m = Vector3::Zero();              ///< mean reading
   std::optional<ArtefactUncertainty> artefact{};  ///< none when only errors were given
+  /// Standard deviation of slow noise over that of a ball centre (noise.hpp); 0: none. solve() estimates it
+  /// where it is 0.
+  double slow_noise = 0.0;
   [[nodiscard]] std::size_t positions() const;
 };
 

@@ -4,7 +4,8 @@
 ///   ridge      shrinks everything but the constants, amount by marginal likelihood.
 ///   bayes-pose the default: priors by order, shared noise of Ball1 and random pose rotations, their sizes by
 ///              marginal likelihood (prior.hpp); what the machine's errors do to spheres and blocks is in the
-///              design when their touches are there.
+///              design when their touches are there. So is slow noise (noise.hpp) in the covariance of the
+///              balls, where the data are e^2 times as likely with it.
 ///   lasso, mcp, scad  as in [Li OMM]: plain monomials in mm, ncvreg's semantics, lambda and gamma by
 ///              cross-validation; covariance by bootstrap (see CovarianceKind).
 /// Not estimable from touches: a rotation of V about Ball1 common to all positions (observe.hpp). It is set
@@ -92,6 +93,7 @@ struct Statistics {
   double degrees_of_freedom = 0.0;    ///< observations - those of coefficients and pose rotations
   double s_m = 0.0;                   ///< noise of a ball centre per coordinate
   double w_rad = 0.0;                 ///< random pose rotation per axis; 0 where not estimated
+  double slow_noise_m = 0.0;          ///< of slow noise per coordinate, beside s_m (noise.hpp)
   double chi2_per_dof = 0.0;          ///< of whitened residuals over s; 0 without s
   ResidualFigures before, after;
   int iterations = 0;
@@ -128,6 +130,8 @@ struct Solution {
   std::vector<Vector3> pose_rotations_rad;  ///< estimated, by position; empty where not modelled
   MeanRotation rotation;
   std::optional<ArtefactUncertainty> artefact;  ///< as observed; in the model's covariance
+  /// Observations::slow_noise as given or, by bayes-pose from touches, as estimated.
+  double slow_noise = 0.0;
   Statistics statistics;
 };
 

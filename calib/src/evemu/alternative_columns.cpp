@@ -60,22 +60,22 @@ Vector3 turn_of_blocks(const SeenArtefact& s, const Matrix3& G, const std::array
 }
 
 /// Share of a motion that is done when the touch of an index is made.
-using Share = std::function<double(double index)>;
+using DoneShare = std::function<double(double index)>;
 
 /// Of G (p - p1), what is seen of a ball: beside what it turns the blocks by.
-Vector3 seen_of(const SeenArtefact& s, std::size_t ball, const Matrix3& G, const Share& share) {
+Vector3 seen_of(const SeenArtefact& s, std::size_t ball, const Matrix3& G, const DoneShare& share) {
   const Vector3 a = from_ball1_m(s, ball);
   const Vector3 blocks = turn_of_blocks(s, G, {share(s.block_index[0]), share(s.block_index[1])});
   return share(s.ball_index[ball]) * (G * a) - blocks.cross(a);
 }
 
 /// A shift, beside that of Ball1.
-Matrix3 seen_shift(const SeenArtefact& s, std::size_t ball, const Share& share) {
+Matrix3 seen_shift(const SeenArtefact& s, std::size_t ball, const DoneShare& share) {
   return (share(s.ball_index[ball]) - share(s.ball_index.front())) * Matrix3::Identity();
 }
 
 /// An array that shifts, and turns about Ball1 by one arm.
-Rows3 shifted_and_turned(const SeenArtefact& s, std::size_t ball, double arm_m, const Share& share) {
+Rows3 shifted_and_turned(const SeenArtefact& s, std::size_t ball, double arm_m, const DoneShare& share) {
   Rows3 rows(3, 6);
   rows.leftCols<3>() = seen_shift(s, ball, share);
   for (Eigen::Index k = 0; k < 3; ++k) {

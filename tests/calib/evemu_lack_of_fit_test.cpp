@@ -66,7 +66,7 @@ TEST_P(EvemuLackOfFit, IsTheCauseNamedFirst) {
   EXPECT_THAT(found.front().text, HasSubstr(GetParam().words));
 }
 
-JudgeOptions generous() {
+JudgeOptions wide_limits() {
   JudgeOptions options;
   options.accept_shape_only = true;
   options.limits.max_error_m = 0.01;
@@ -76,7 +76,7 @@ JudgeOptions generous() {
 
 Verdict verdict_of(const ArrayRun& run) {
   const Observations o = observed(run);
-  return *judge(o, *solve(o), nullptr, generous());
+  return *judge(o, *solve(o), nullptr, wide_limits());
 }
 
 // What the uncertainty covers, on a machine of 3 mm, is a note.
@@ -142,7 +142,7 @@ TEST(EvemuJudge, RefusesARunThatCannotBeComparedWithAnAlternative) {
   const Solution solution = *solve(o);
   Observations broken = o;
   broken.seen[2].ball_index[4] = std::numeric_limits<double>::quiet_NaN();
-  const Verdict verdict = *judge(broken, solution, nullptr, generous());
+  const Verdict verdict = *judge(broken, solution, nullptr, wide_limits());
   EXPECT_FALSE(verdict.accepted);
   EXPECT_THAT(verdict.reasons, Contains(HasSubstr("the comparison with cause \"creep\" failed")));
   EXPECT_THAT(verdict.causes, Contains("creep"));
@@ -160,14 +160,14 @@ TEST(EvemuJudge, NotesADesignThatDoesNotExist) {
   ObserveOptions options;
   options.order = kMostOrder;
   const Observations o = observed({}, options);
-  const Verdict verdict = *judge(o, *solve(o), nullptr, generous());
+  const Verdict verdict = *judge(o, *solve(o), nullptr, wide_limits());
   EXPECT_THAT(verdict.notes, Contains(HasSubstr("not compared with polynomials of order")));
   EXPECT_THAT(verdict.causes, Not(Contains("order")));
 }
 
 TEST(EvemuJudge, StopsBetweenAlternatives) {
   const Observations o = observed({});
-  JudgeOptions options = generous();
+  JudgeOptions options = wide_limits();
   int asked = 0;
   options.watch.stopped = [&] { return ++asked == 20; };
   const auto verdict = judge(o, *solve(o), nullptr, options);
@@ -178,7 +178,7 @@ TEST(EvemuJudge, StopsBetweenAlternatives) {
 
 TEST(EvemuJudge, ReportsProgressUpToTheEnd) {
   const Observations o = observed({});
-  JudgeOptions options = generous();
+  JudgeOptions options = wide_limits();
   std::vector<double> fractions;
   options.watch.progress = [&](double fraction) { fractions.push_back(fraction); };
   ASSERT_TRUE(judge(o, *solve(o), nullptr, options));

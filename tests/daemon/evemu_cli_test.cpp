@@ -197,6 +197,9 @@ void record_touches(const fs::path& folder, const Touches& all) {
 
 TEST_F(EvemuCli, IdentifiesFromARecordingAsFromTheTouchesInIt) {
   record_touches(folder_, touches());
+  // The order of the touches is their time: slow noise is correlated along it.
+  const auto positions = calib::evemu::TouchPlan{}.positions;
+  write("touches.csv", touches_csv(tests::evemu::touches_in_order(touches(), positions)));
   const auto ran = abbe("identify evemu --recording run.mcap --json -o out");
   ASSERT_EQ(ran.exit, kRefused) << ran.err;
   const auto again = abbe(

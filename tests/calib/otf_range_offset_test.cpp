@@ -132,7 +132,7 @@ std::optional<double> noted_limit_um(double u_m) {
 }
 
 /// What the run shows of the offset by itself is its uncertainty with a prior of 1 m.
-TEST(RangeOffset, ALimitIsNotedWhereTheDataKnowLessThanThePrior) {
+TEST(RangeOffset, ALimitIsNotedWhereTheDataDetermineItLessThanThePrior) {
   const double u_m = identification(run_with_offset(0.0, 1.0)).solution.range_offset.u_m;
   ASSERT_TRUE(noted_limit_um(0.5 * u_m));
   EXPECT_NEAR(*noted_limit_um(0.5 * u_m), 2.576 * std::sqrt(1.25) * 1e6 * u_m, 1e-3 * 1e6 * u_m);

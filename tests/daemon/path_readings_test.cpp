@@ -67,7 +67,7 @@ TEST(PathReadings, AVertexOutOfReachIsNamedWithTheClosestReading) {
   EXPECT_THAT(stood.error().text, HasSubstr("do not reach vertex 1 of the path, (100.000, 0.000, 0.000) mm"));
 }
 
-/// Of vertices 3 mm apart nobody can tell at which the machine stands.
+/// The readings do not show at which of two vertices 3 mm apart the machine stands.
 TEST(PathReadings, VerticesCloseToEachOtherAreNotCompared) {
   std::vector<AxisPosition> path_m{{0, 0, 0}, {0.1, 0, 0}, {0.103, 0, 0}, {0.2, 0, 0}};
   const auto stood = compare_with_path("e.csv", driven(path_m), path_m, kTolerance_m);

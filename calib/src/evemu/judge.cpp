@@ -11,7 +11,7 @@
 #include "abbe/calib/evemu/lack_of_fit.hpp"
 #include "abbe/calib/root_sum_of_squares.hpp"
 #include "certainty.hpp"
-#include "evemu/check_stopped.hpp"
+#include "check_stopped.hpp"
 #include "evemu/fit_coefficients.hpp"
 #include "evemu/slow_noise.hpp"
 #include "message.hpp"
@@ -171,7 +171,7 @@ Result<HeldOutFigures> held_out(const Observations& o, double s_m, const Volumet
   const bool with_active = active != nullptr && active->holds_for_tool(o.machine.tool_offset_m);
   Remainder none, candidate, other, candidate_beside;
   for (const PositionRows& p : positions) {
-    if (Result<void> goes_on = check_stopped(watch); !goes_on) {
+    if (Result<void> goes_on = check_stopped(watch.stopped); !goes_on) {
       return tl::unexpected(goes_on.error());
     }
     const Observations rest = part_of(o, p.position, true), left_out = part_of(o, p.position, false);

@@ -13,11 +13,12 @@
 
 #include "abbe/calib/evemu/artefact_rows.hpp"
 #include "abbe/calib/evemu/design_rows.hpp"
+#include "check_stopped.hpp"
 #include "elementary.hpp"
 #include "evemu/alternative_columns.hpp"
-#include "evemu/check_stopped.hpp"
 #include "evemu/fit_coefficients.hpp"
 #include "evemu/refit.hpp"
+#include "evemu/screen.hpp"
 #include "evemu/slow_noise.hpp"
 #include "evemu/touch_residuals.hpp"
 #include "message.hpp"
@@ -30,8 +31,6 @@ namespace {
 /// Of a false alarm in a run without a fault, over all alternatives together.
 constexpr double kFalseAlarm = 1e-4;
 constexpr double kCauses = 13.0;
-/// Prior standard deviations of a displacement that are tried.
-constexpr std::array<double, 4> kSizes_m{10e-6, 30e-6, 100e-6, 300e-6};
 
 RigidFreeNorm norm_over_balls(const Observations& o, const ScaledDesign& design) {
   Eigen::MatrixXd B(static_cast<Eigen::Index>(3 * o.rows.size()), static_cast<Eigen::Index>(design.size()));
@@ -108,73 +107,6 @@ Result<Refit> refit(const Rows& rows, const ScaledDesign& design, const Eigen::M
                p.covariance.topLeftCorner(n, n)};
 }
 
-/// What an alternative would make more likely at the hyper-parameters of the estimate. There y has the
-/// covariance s^2 1 + U U^T, U: columns of design, pose rotations and array, each times its prior standard
-/// deviation. With Q1 the upper rows of Q, (U above s 1) = Q R,
-///     (s^2 1 + U U^T)^-1 = (1 - Q1 Q1^T) / s^2.
-class Screen {
- public:
-  explicit Screen(const Rows& rows) : y_(rows.y), s2_(rows.hyper.s_m * rows.hyper.s_m) {
-    const Eigen::VectorXd root =
-        prior_variances(PriorKind::BayesPose, rows.design, rows.positions, rows.hyper).cwiseSqrt();
-    const Eigen::Index n = rows.X.rows(), x = rows.X.cols(), w = rows.S.cols(), m = x + w + rows.A.cols();
-    Eigen::MatrixXd U(n + m, m);
-    U.topRows(n) << rows.X * root.head(x).asDiagonal(), rows.S * root.tail(w).asDiagonal(), rows.A;
-    U.bottomRows(m) = rows.hyper.s_m * Eigen::MatrixXd::Identity(m, m);
-    Q1_ = (U.householderQr().householderQ() * Eigen::MatrixXd::Identity(n + m, m)).topRows(n);
-    Q1_y_ = Q1_.transpose() * y_;
-  }
-
-  struct Gain {
-    double log_likelihood = 0.0;
-    double size_m = 0.0;
-  };
-  /// By the best of kSizes_m. NaN: there is no likelihood.
-  [[nodiscard]] Gain gain(const Eigen::MatrixXd& C) const {
-    const auto [first, count] = rows_in_use(C);
-    const auto used = C.middleRows(first, count);
-    const Eigen::MatrixXd P = Q1_.middleRows(first, count).transpose() * used;
-    const Eigen::MatrixXd GG = (used.transpose() * used - P.transpose() * P) / s2_;
-    const Eigen::VectorXd g = (used.transpose() * y_.segment(first, count) - P.transpose() * Q1_y_) / s2_;
-    Gain best{-std::numeric_limits<double>::infinity(), 0.0};
-    for (const double size_m : kSizes_m) {
-      // log N(y; K + t^2 C C^T) - log N(y; K) = g^T M^-1 g t^2 / 2 - log |M| / 2,  M = 1 + t^2 C^T K^-1 C
-      const double t2 = size_m * size_m;
-      const Eigen::LLT<Eigen::MatrixXd> M(Eigen::MatrixXd::Identity(GG.rows(), GG.cols()) + t2 * GG);
-      const double log_det = 2.0 * M.matrixLLT().diagonal().unaryExpr(&natural_logarithm).sum();
-      const double value = 0.5 * (t2 * g.dot(M.solve(g)) - log_det);
-      if (M.info() != Eigen::Success || !std::isfinite(value)) {
-        return {std::numeric_limits<double>::quiet_NaN(), size_m};
-      }
-      if (value > best.log_likelihood) {
-        best = {value, size_m};
-      }
-    }
-    return best;
-  }
-
- private:
-  struct RowsInUse {
-    Eigen::Index first, count;
-  };
-  /// From the first to the last row that is not zero.
-  static RowsInUse rows_in_use(const Eigen::MatrixXd& C) {
-    Eigen::Index first = 0, end = C.rows();
-    while (first < end && C.row(first).isZero(0.0)) {
-      ++first;
-    }
-    while (end > first && C.row(end - 1).isZero(0.0)) {
-      --end;
-    }
-    return {first, end - first};
-  }
-
-  const Eigen::VectorXd& y_;
-  double s2_;
-  Eigen::MatrixXd Q1_;
-  Eigen::VectorXd Q1_y_;
-};
-
 /// The estimate itself, with the array's uncertainty among the columns: what alternatives are compared with.
 Result<Refit> base_of(const Rows& rows) {
   return refit(rows, rows.design, rows.X, Eigen::MatrixXd(rows.X.rows(), 0), 1.0);
@@ -226,7 +158,7 @@ Result<Screened> screened(Comparisons& all, const AlternativeColumns& columns, c
                           std::span<const Added> family) {
   Screened most;
   for (const Added& added : family) {
-    if (Result<void> goes_on = check_stopped(all.watch); !goes_on) {
+    if (Result<void> goes_on = check_stopped(all.watch.stopped); !goes_on) {
       return tl::unexpected(goes_on.error());
     }
     const Screen::Gain gain = screen.gain(white_rows(all.rows.o, columns.of(added)));
@@ -260,7 +192,7 @@ Result<void> compare_with(Comparisons& all, const AlternativeColumns& columns, c
     return {};
   }
   const double gain = with->hyper.log_likelihood - all.base.hyper.log_likelihood;
-  if (gain > threshold(static_cast<double>(family.size() * kSizes_m.size()))) {
+  if (gain > threshold(static_cast<double>(family.size() * Screen::kSizes_m.size()))) {
     all.add({.cause = added.cause,
              .text = text_of(added, with->d_m, rows.o),
              .log_likelihood = gain,
@@ -333,7 +265,7 @@ Result<void> compare_orders_of_axes(Comparisons& all) {
     if (order == used) {
       continue;
     }
-    if (Result<void> goes_on = check_stopped(all.watch); !goes_on) {
+    if (Result<void> goes_on = check_stopped(all.watch.stopped); !goes_on) {
       return goes_on;
     }
     const auto design = KinematicChain::parse(message("[w b ", order[0], " ", order[1], " ", order[2], " t]"))
@@ -350,7 +282,7 @@ Result<void> compare_orders_of_axes(Comparisons& all) {
 
 Result<void> compare_higher_order(Comparisons& all) {
   const Rows& rows = all.rows;
-  if (Result<void> goes_on = check_stopped(all.watch); !goes_on) {
+  if (Result<void> goes_on = check_stopped(all.watch.stopped); !goes_on) {
     return goes_on;
   }
   compare_with_design(all, ScaledDesign::of(rows.o.machine.chain, rows.o.order + 1, rows.design.box()),
@@ -417,7 +349,10 @@ void compare_touches(Comparisons& all, const TouchResiduals& touches) {
 
 Result<void> compare_all(Comparisons& all, const Solution& solution) {
   const AlternativeColumns columns(all.rows.o);
-  const Screen screen(all.rows);
+  const Rows& rows = all.rows;
+  const Screen screen(rows.X, rows.S, rows.A, rows.y,
+                      prior_variances(PriorKind::BayesPose, rows.design, rows.positions, rows.hyper),
+                      rows.hyper.s_m);
   const std::vector<std::vector<Added>> families = columns.families();
   const double steps = static_cast<double>(families.size()) + 3.0;
   double done = 0.0;

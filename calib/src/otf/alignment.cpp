@@ -5,8 +5,8 @@
 #include <limits>
 
 #include "abbe/calib/axis_mistakes.hpp"
+#include "check_stopped.hpp"
 #include "message.hpp"
-#include "otf/check_stopped.hpp"
 
 namespace abbe::calib::otf {
 namespace {
@@ -156,7 +156,7 @@ Result<void> refine(Alignment& a, Pairs& pairs, const BlockSeries& series, const
     a.iterations = update + 1;
     a.last_rms_m = pairs.rms_m;
     report(options, update);
-    if (Result<void> goes_on = check_stopped(options); !goes_on) {
+    if (Result<void> goes_on = check_stopped(options.stopped); !goes_on) {
       return goes_on;
     }
     if (update == 0) {

@@ -10,8 +10,8 @@
 #include "abbe/calib/otf/orientation.hpp"
 #include "abbe/calib/root_sum_of_squares.hpp"
 #include "certainty.hpp"
+#include "check_stopped.hpp"
 #include "message.hpp"
-#include "otf/check_stopped.hpp"
 
 namespace abbe::calib::otf {
 namespace {
@@ -226,9 +226,9 @@ void note_what_u_leaves_out(Verdict& verdict, const Observations& o) {
 
 /// An offset of the ranges that the model follows: its prior decides, and the data do not show more of it.
 void note_undetermined_offset(Verdict& verdict, const RangeOffset& offset, double prior_m) {
-  const double share = offset.u_m / prior_m;  // 1: the data say nothing
-  constexpr double kDataKnowLess = 0.7;       // than the prior: 1/sqrt(2)
-  if (!(prior_m > 0.0) || !(share > kDataKnowLess)) {
+  const double share = offset.u_m / prior_m;  // 1: the data determine nothing
+  constexpr double kOfEqualWeight = 0.7;      // data and prior: 1/sqrt(2)
+  if (!(prior_m > 0.0) || !(share > kOfEqualWeight)) {
     return;
   }
   const double u_of_data_m = offset.u_m / std::sqrt(std::max(1e-12, 1.0 - share * share));
@@ -253,7 +253,7 @@ Result<HeldOutFigures> held_out(const Observations& o, const VolumetricModel* ac
   const std::vector<NormalEquations> parts = equations_by_fold(o, folds);
   Remainder none, candidate, other, candidate_beside;
   for (std::size_t f = 0; f < folds; ++f) {
-    if (Result<void> goes_on = check_stopped(options); !goes_on) {
+    if (Result<void> goes_on = check_stopped(options.stopped); !goes_on) {
       return tl::unexpected(goes_on.error());
     }
     const Result<HeldOutFold> fit = hold_out(parts, f, o, options);

@@ -9,12 +9,12 @@
 #include "abbe/calib/model_comparison.hpp"
 #include "abbe/calib/rigid_body_model.hpp"
 #include "abbe/calib/root_sum_of_squares.hpp"
+#include "check_stopped.hpp"
 #include "chi2_bound.hpp"
 #include "elementary.hpp"
 #include "message.hpp"
 #include "otf/added_columns.hpp"
 #include "otf/alternative_columns.hpp"
-#include "otf/check_stopped.hpp"
 #include "otf/row_residuals.hpp"
 #include "rigid_free_norm.hpp"
 
@@ -146,7 +146,7 @@ Result<std::optional<Alternative>> best_of(const Fit& fit, const AlternativeColu
   const double x = natural_logarithm(kCauses * static_cast<double>(family.size()) / kFalseAlarm);
   const double noise = std::max(1.0, fit.noise.local * fit.noise.local);
   for (const auto& [added, sums] : family) {
-    if (Result<void> goes_on = check_stopped(options); !goes_on) {
+    if (Result<void> goes_on = check_stopped(options.stopped); !goes_on) {
       return tl::unexpected(goes_on.error());
     }
     AddedColumns::Estimate e = sums.estimate(fit.adjustment.dU_dg, noise * chi2_bound(1.0, x));
@@ -211,7 +211,7 @@ Result<std::optional<Alternative>> other_design(const Fit& fit, const Solution& 
     return std::nullopt;
   }
   const Observations other = with_layout(fit.o, *std::move(layout));
-  if (Result<void> goes_on = check_stopped(options); !goes_on) {
+  if (Result<void> goes_on = check_stopped(options.stopped); !goes_on) {
     return tl::unexpected(goes_on.error());
   }
   const Result<Adjustment> a = adjust(normal_equations(other), other.layout, options.gauge_weight);

@@ -4,8 +4,8 @@
 #include <cmath>
 
 #include "abbe/calib/rigid_body_model.hpp"
+#include "check_stopped.hpp"
 #include "message.hpp"
-#include "otf/check_stopped.hpp"
 
 namespace abbe::calib::otf {
 namespace {
@@ -243,7 +243,7 @@ Result<Observations> observe_blocks(const BlockSeries& series, const Machine& ma
         options.progress(Stage::Observe,
                          static_cast<double>(i + 1) / static_cast<double>(series.blocks.size()));
       }
-      if (Result<void> goes_on = check_stopped(options); !goes_on) {
+      if (Result<void> goes_on = check_stopped(options.stopped); !goes_on) {
         return tl::unexpected(goes_on.error());
       }
     }

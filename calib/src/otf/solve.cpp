@@ -6,9 +6,9 @@
 #include <optional>
 
 #include "abbe/calib/otf/lack_of_fit.hpp"
+#include "check_stopped.hpp"
 #include "message.hpp"
 #include "otf/added_columns.hpp"
-#include "otf/check_stopped.hpp"
 #include "otf/row_residuals.hpp"
 
 namespace abbe::calib::otf {
@@ -141,7 +141,7 @@ Result<Solution> solve(const Observations& o, const Options& options) {
   report(options, 0.0);
   const NormalEquations N = normal_equations(o);
   report(options, 0.5);
-  if (Result<void> goes_on = check_stopped(options); !goes_on) {
+  if (Result<void> goes_on = check_stopped(options.stopped); !goes_on) {
     return tl::unexpected(goes_on.error());
   }
   Result<Adjustment> a = adjust(N, o.layout, options.gauge_weight);

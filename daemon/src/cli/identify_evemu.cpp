@@ -24,6 +24,7 @@
 #include "cli/scales_corrected.hpp"
 #include "cli/terminal.hpp"
 #include "files/text_file.hpp"
+#include "input/touches_not_seen.hpp"
 #include "input/travel_faults.hpp"
 #include "units.hpp"
 
@@ -110,20 +111,6 @@ tl::unexpected<Error> in_file(const std::string& file, const calib::Error& error
   return tl::unexpected(std::move(out));
 }
 
-/// ":42", where the touches of the first position begin that no artefact is seen in; empty: it is not one
-/// position's.
-std::string line_at_fault(const TouchesFile& file, const evemu::Calibrator& calibrator,
-                          const evemu::ObserveOptions& options) {
-  std::map<int, std::vector<evemu::Touch>> by_position;
-  for (const evemu::Touch& touch : file.touches) by_position[touch.position].push_back(touch);
-  for (const auto& [position, touches] : by_position) {
-    if (evemu::see_artefact(position, touches, calibrator, options)) continue;
-    const auto first = std::ranges::find(file.touches, position, &evemu::Touch::position);
-    return fmt::format(":{}", file.lines[static_cast<std::size_t>(first - file.touches.begin())]);
-  }
-  return {};
-}
-
 Result<void> observe_touches(const IdentifyEvemuArguments& arguments, const evemu::Machine& machine,
                              const evemu::ObserveOptions& options, Input& input) {
   const auto calibrator = read_calibrator_toml(arguments.calibrator);
@@ -141,7 +128,7 @@ Result<void> observe_touches(const IdentifyEvemuArguments& arguments, const evem
   input.sources.insert(input.sources.end(), {touches->source, calibrator->source});
   auto observed = evemu::observe(touches->touches, calibrator->calibrator, machine, options);
   if (!observed)
-    return in_file(arguments.touches + line_at_fault(*touches, calibrator->calibrator, options),
+    return in_file(arguments.touches + line_not_seen(*touches, calibrator->calibrator, options),
                    observed.error());
   input.observations = std::move(*observed);
   return {};

@@ -13,8 +13,8 @@ namespace {
 
 using calib::Vector3;
 
-/// How near to a vertex the machine must come.
-constexpr double kNear_m = 2e-3;
+/// How near to a vertex the machine must come, as in a session.
+const double kNear_m = AcquisitionOptions{}.vertex_tolerance_m;
 
 Vector3 vector(const AxisPosition& q) {
   return {q[0], q[1], q[2]};
@@ -39,7 +39,7 @@ double speed_m_per_s(std::span<const EncoderRow> readings, std::size_t i) {
   return way.norm() / (readings[after].time_s - readings[before].time_s);
 }
 
-/// Of vertices closer to each other nothing says at which the machine stands.
+/// False: a neighbour is so near that the readings do not show at which of the two the machine stands.
 bool stands_alone(std::span<const AxisPosition> path_m, std::size_t i) {
   const auto far = [&](std::size_t a, std::size_t b) {
     return (vector(path_m[a]) - vector(path_m[b])).norm() > 2.0 * kNear_m;

@@ -1,0 +1,311 @@
+#include "evemu/touched_position.hpp"
+
+#include <Eigen/Dense>
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include "abbe/calib/axis_mistakes.hpp"
+#include "evemu/angle.hpp"
+#include "evemu/touch_checks.hpp"
+#include "units.hpp"
+
+namespace abbe::calib::evemu {
+namespace {
+
+const char* name_of(Feature feature) {
+  return feature == Feature::Ball ? "ball" : "block";
+}
+
+Result<void> check_complete(int position, const Touched& touched, const Calibrator& c,
+                            const ObserveOptions& options) {
+  for (const auto& [feature, points] : touched) {
+    const int most = feature.first == Feature::Ball ? static_cast<int>(c.balls.size()) : 2;
+    if (feature.second < 1 || feature.second > most) {
+      return at_position(position, ErrorCode::BadInput,
+                         message("the calibrator has no ", name_of(feature.first), " ", feature.second));
+    }
+  }
+  const auto require = [&](Feature feature, int number, std::size_t least) -> Result<void> {
+    const auto at = touched.find({feature, number});
+    const std::size_t points = at == touched.end() ? 0 : at->second.points_m.size();
+    if (points == 0) {
+      return at_position(position, ErrorCode::TooFewObservations,
+                         message(name_of(feature), " ", number, " was left out"));
+    }
+    if (points < least) {
+      return at_position(
+          position, ErrorCode::TooFewObservations,
+          message(name_of(feature), " ", number, " has too few points: ", points, ", needs ", least));
+    }
+    return {};
+  };
+  for (const Calibrator::Ball& ball : c.balls) {
+    if (Result<void> enough = require(Feature::Ball, ball.number, options.least_points_per_ball); !enough) {
+      return enough;
+    }
+  }
+  for (const Calibrator::Block& block : c.blocks) {
+    if (Result<void> enough = require(Feature::Block, block.number, options.least_points_per_block);
+        !enough) {
+      return enough;
+    }
+  }
+  return {};
+}
+
+Result<std::vector<fit::Sphere>> fit_balls(int position, const Touched& touched, const Calibrator& c) {
+  std::vector<fit::Sphere> spheres;
+  for (const Calibrator::Ball& ball : c.balls) {
+    Result<fit::Sphere> sphere = fit::fit_sphere(touched.at({Feature::Ball, ball.number}).points_m);
+    if (!sphere) {
+      return at_position(position, sphere.error().code,
+                         message("ball ", ball.number, ": ", sphere.error().text));
+    }
+    spheres.push_back(*sphere);
+  }
+  return spheres;
+}
+
+Result<void> check_single_touches(int position, const Touched& touched, const ObserveOptions& options) {
+  for (const auto& [feature, points] : touched) {
+    const auto wrong = feature.first == Feature::Ball ? wrong_touch_on_ball(points.points_m, options)
+                                                      : wrong_touch_on_face(points.points_m, options);
+    if (wrong) {
+      return at_position(position, ErrorCode::BadInput,
+                         message(name_of(feature.first), " ", feature.second, ": ", *wrong));
+    }
+  }
+  return {};
+}
+
+Result<void> check_twice(int position, std::span<const fit::Sphere> balls) {
+  for (std::size_t i = 0; i < balls.size(); ++i) {
+    for (std::size_t j = 0; j < i; ++j) {
+      const double apart_m = (balls[i].centre - balls[j].centre).norm();
+      if (apart_m < 0.5 * (balls[i].radius + balls[j].radius)) {
+        return at_position(position, ErrorCode::BadInput,
+                           message("one ball was touched twice, as ball ", j + 1, " and as ball ", i + 1,
+                                   " (centres ", apart_m * kMmPerM, " mm apart)"));
+      }
+    }
+  }
+  return {};
+}
+
+/// "; they fit with lengths in m where mm belong"
+std::string radii_fit_with(std::span<const fit::Sphere> balls, const Calibrator& c) {
+  constexpr double kSame = 0.05;  // relative: radii that the touches know to a few per cent
+  for (const UnitMistake& mistake : unit_mistakes()) {
+    bool all = true;
+    for (std::size_t i = 0; i < balls.size(); ++i) {
+      const double expected_m = c.balls[i].radius_m + c.tip_radius_m;
+      all = all && std::abs(mistake.factor * balls[i].radius / expected_m - 1.0) < kSame;
+    }
+    if (all) {
+      return "; they fit with " + mistake.text;
+    }
+  }
+  return "";
+}
+
+Result<void> check_radii(int position, std::span<const fit::Sphere> balls, const Calibrator& c,
+                         const ObserveOptions& options) {
+  for (std::size_t i = 0; i < balls.size(); ++i) {
+    const double expected_m = c.balls[i].radius_m + c.tip_radius_m;
+    if (!(std::abs(balls[i].radius - expected_m) <= options.max_radius_mismatch_m)) {
+      return at_position(
+          position, ErrorCode::BadInput,
+          message("ball ", i + 1, " has radius ", balls[i].radius * kMmPerM, " mm, calibrator \"", c.name,
+                  "\" and tip make ", expected_m * kMmPerM,
+                  " mm: calibrator file of another artefact, or another tip", radii_fit_with(balls, c)));
+    }
+  }
+  return {};
+}
+
+/// In another unit of length every touch seems false.
+Result<void> check_unit(int position, std::span<const fit::Sphere> balls, const Calibrator& c,
+                        const ObserveOptions& options) {
+  return radii_fit_with(balls, c).empty() ? Result<void>{} : check_radii(position, balls, c, options);
+}
+
+/// "; they fit with ...": a reflection, other numbers. Empty: with nothing that was tried.
+std::string balls_fit_with(std::span<const Vector3> calibrated, std::span<const Vector3> seen,
+                           const ObserveOptions& options) {
+  const auto fits = [&](const std::vector<Vector3>& from) {
+    const Result<RigidTransform> T = fit_rigid(from, seen);
+    for (std::size_t i = 0; T && i < from.size(); ++i) {
+      if ((*T * from[i] - seen[i]).norm() > options.max_shape_mismatch_m) {
+        return false;
+      }
+    }
+    return T.has_value();
+  };
+  std::vector<std::string> texts;
+  std::vector<Vector3> mirrored;
+  for (const Vector3& p : calibrated) {
+    mirrored.emplace_back(-p.x(), p.y(), p.z());
+  }
+  if (fits(mirrored)) {
+    texts.emplace_back("one axis reversed or two axes swapped (a mirror image)");
+  }
+  if (fits({calibrated.rbegin(), calibrated.rend()})) {
+    texts.emplace_back("the balls numbered backwards");
+  }
+  for (std::size_t i = 0; i < calibrated.size(); ++i) {
+    for (std::size_t j = i + 1; j < calibrated.size(); ++j) {
+      std::vector<Vector3> swapped(calibrated.begin(), calibrated.end());
+      std::swap(swapped[i], swapped[j]);
+      if (fits(swapped)) {
+        texts.push_back(message("balls ", i + 1, " and ", j + 1, " swapped"));
+      }
+    }
+  }
+  return texts.empty() ? "" : "; they fit with " + joined_with_or(texts);
+}
+
+/// Machine from calibration coordinates, by the balls alone.
+Result<RigidTransform> rough_pose(int position, std::span<const fit::Sphere> balls, const Calibrator& c,
+                                  const ObserveOptions& options) {
+  std::vector<Vector3> from, to;
+  for (std::size_t i = 0; i < balls.size(); ++i) {
+    from.push_back(c.balls[i].centre_m);
+    to.push_back(balls[i].centre);
+  }
+  const Result<RigidTransform> T = fit_rigid(from, to);
+  if (!T) {
+    return at_position(position, T.error().code, T.error().text);
+  }
+  double worst_m = 0.0;
+  std::size_t worst = 0;
+  for (std::size_t i = 0; i < balls.size(); ++i) {
+    const double off_m = (*T * from[i] - to[i]).norm();
+    if (off_m > worst_m) {
+      worst_m = off_m;
+      worst = i;
+    }
+  }
+  if (worst_m > options.max_shape_mismatch_m) {
+    return at_position(position, ErrorCode::BadInput,
+                       message("the balls do not have the shape of calibrator \"", c.name, "\": ball ",
+                               worst + 1, " is ", worst_m * kMmPerM,
+                               " mm off: calibrator file of another artefact, or balls numbered differently",
+                               balls_fit_with(from, to, options)));
+  }
+  return *T;
+}
+
+Result<void> fit_blocks(SeenArtefact& seen, const Touched& touched, const Calibrator& c,
+                        const RigidTransform& T_machine_pre, const ObserveOptions& options) {
+  std::array<Vector3, 2> nominal;
+  for (std::size_t b = 0; b < 2; ++b) {
+    nominal[b] = T_machine_pre.R * c.blocks[b].normal.normalized();
+    const TouchedPoints& face = touched.at({Feature::Block, static_cast<int>(b) + 1});
+    seen.block_points_m[b] = face.points_m;
+    seen.block_index[b] = face.mean_index();
+    Result<fit::Plane> plane = fit::fit_plane(seen.block_points_m[b], nominal[b]);
+    if (!plane) {
+      return at_position(seen.position, plane.error().code,
+                         message("block ", b + 1, ": ", plane.error().text));
+    }
+    seen.blocks[b] = *plane;
+  }
+  const auto fits = [&](std::size_t plane, std::size_t block) {
+    return line_angle_rad(seen.blocks[plane].normal, nominal[block]) <= options.max_block_tilt_rad;
+  };
+  if (!(fits(0, 0) && fits(1, 1))) {
+    if (fits(0, 1) && fits(1, 0)) {
+      return at_position(seen.position, ErrorCode::BadInput, "blocks 1 and 2 are swapped");
+    }
+    const std::size_t wrong = fits(0, 0) ? 1 : 0;
+    return at_position(
+        seen.position, ErrorCode::BadInput,
+        message("block ", wrong + 1, " is tilted by ",
+                line_angle_rad(seen.blocks[wrong].normal, nominal[wrong]) * kMmPerM,
+                " mrad against calibrator \"", c.name, "\": another face, or another artefact"));
+  }
+  return {};
+}
+
+}  // namespace
+
+Result<std::map<int, Touched>> by_position(std::span<const Touch> touches, const ObserveOptions& options) {
+  std::map<int, Touched> found;
+  for (std::size_t i = 0; i < touches.size(); ++i) {
+    if (!touches[i].p_m.allFinite()) {
+      return at_position(touches[i].position, ErrorCode::NotFinite, message("touch ", i, " is not a number"));
+    }
+    found[touches[i].position][{touches[i].feature, touches[i].number}].add(touches[i].p_m, i);
+  }
+  for (int p = 1; p <= options.positions; ++p) {
+    if (!found.contains(p)) {
+      return at_position(
+          p, ErrorCode::TooFewObservations,
+          message("left out: nothing was touched there, of ", options.positions, " positions"));
+    }
+  }
+  for (const auto& [position, touched] : found) {
+    if (position < 1 || position > options.positions) {
+      return at_position(position, ErrorCode::BadInput,
+                         message("positions are numbered 1 to ", options.positions));
+    }
+  }
+  return found;
+}
+
+Result<SeenArtefact> see(int position, const Touched& touched, const Calibrator& c,
+                         const RigidTransform& T_uni_pre, const ObserveOptions& options) {
+  if (Result<void> complete = check_complete(position, touched, c, options); !complete) {
+    return tl::unexpected(complete.error());
+  }
+  SeenArtefact seen;
+  seen.position = position;
+  Result<std::vector<fit::Sphere>> balls = fit_balls(position, touched, c);
+  if (!balls) {
+    return tl::unexpected(balls.error());
+  }
+  if (Result<void> unit = check_unit(position, *balls, c, options); !unit) {
+    return tl::unexpected(unit.error());
+  }
+  if (Result<void> single = check_single_touches(position, touched, options); !single) {
+    return tl::unexpected(single.error());
+  }
+  seen.balls = *std::move(balls);
+  for (const Calibrator::Ball& ball : c.balls) {
+    const TouchedPoints& points = touched.at({Feature::Ball, ball.number});
+    seen.ball_points_m.push_back(points.points_m);
+    seen.ball_index.push_back(points.mean_index());
+  }
+  if (Result<void> twice = check_twice(position, seen.balls); !twice) {
+    return tl::unexpected(twice.error());
+  }
+  if (Result<void> radii = check_radii(position, seen.balls, c, options); !radii) {
+    return tl::unexpected(radii.error());
+  }
+  const Result<RigidTransform> pose = rough_pose(position, seen.balls, c, options);
+  if (!pose) {
+    return tl::unexpected(pose.error());
+  }
+  if (Result<void> blocks = fit_blocks(seen, touched, c, *pose, options); !blocks) {
+    return tl::unexpected(blocks.error());
+  }
+  Result<RigidTransform> frame =
+      uniform_frame(seen.balls.front().centre, seen.blocks[0].normal, seen.blocks[1].normal);
+  if (!frame) {
+    return at_position(position, frame.error().code, frame.error().text);
+  }
+  seen.T_self_uni = *frame;
+  if (touched_from_below(seen)) {
+    return at_position(
+        position, ErrorCode::BadInput,
+        message("the balls were touched from below, against the normal of block 1 of calibrator \"", c.name,
+                "\": an axis is mirrored, or two axes are swapped, or the normal points inward"));
+  }
+  for (const Calibrator::Ball& ball : c.balls) {
+    seen.ideal_m.push_back(seen.T_self_uni * (T_uni_pre * ball.centre_m));
+  }
+  return seen;
+}
+
+}  // namespace abbe::calib::evemu

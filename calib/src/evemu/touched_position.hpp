@@ -1,0 +1,43 @@
+#pragma once
+/// The touches of one position of the ball array, and the array that is seen in them.
+
+#include <map>
+#include <span>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "abbe/calib/evemu/observe.hpp"
+#include "message.hpp"
+
+namespace abbe::calib::evemu {
+
+/// Touched points of one ball or block.
+struct TouchedPoints {
+  std::vector<Vector3> points_m;
+  double index_sum = 0.0;  ///< of their places among all touches
+
+  void add(const Vector3& p_m, std::size_t index) {
+    points_m.push_back(p_m);
+    index_sum += static_cast<double>(index);
+  }
+  [[nodiscard]] double mean_index() const { return index_sum / static_cast<double>(points_m.size()); }
+};
+/// Of one position, by feature and number.
+using Touched = std::map<std::pair<Feature, int>, TouchedPoints>;
+
+[[nodiscard]] inline tl::unexpected<Error> at_position(int position, ErrorCode code,
+                                                       const std::string& what) {
+  return failure(code, message("position ", position, ": ", what));
+}
+
+/// TooFewObservations where a position of 1 to ObserveOptions::positions has no touch; BadInput, NotFinite.
+[[nodiscard]] Result<std::map<int, Touched>> by_position(std::span<const Touch>, const ObserveOptions&);
+
+/// Spheres, planes and pose of a position. `at_machine`: the calibrator at the array's temperature;
+/// `T_uni_pre`: from its coordinates into the uniform frame. BadInput that names what does not fit, and with
+/// which mistake it would.
+[[nodiscard]] Result<SeenArtefact> see(int position, const Touched&, const Calibrator& at_machine,
+                                       const RigidTransform& T_uni_pre, const ObserveOptions&);
+
+}  // namespace abbe::calib::evemu

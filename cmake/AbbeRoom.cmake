@@ -23,7 +23,11 @@ endif()
 # Identification gives the same bits on every processor. Eigen without vectors sums in one order, whatever the width of the
 # registers, where the data lie in memory and how large the caches are; nothing is fused into one rounding.
 add_compile_options(-ffp-contract=off)
+option(ABBE_SAME_BITS "Eigen without vectors: the same bits on every processor" ON)
 function(abbe_same_bits target)
+  if(NOT ABBE_SAME_BITS)
+    return()
+  endif()
   target_compile_definitions(${target} PUBLIC EIGEN_DONT_VECTORIZE EIGEN_NO_CPUID EIGEN_DEFAULT_L1_CACHE_SIZE=32768
                              EIGEN_DEFAULT_L2_CACHE_SIZE=262144 EIGEN_DEFAULT_L3_CACHE_SIZE=2097152)
 endfunction()

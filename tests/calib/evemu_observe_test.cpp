@@ -136,6 +136,24 @@ TEST(EvemuInput, NamesABallLeftOut) {
   EXPECT_THAT(e.text, HasSubstr("position 5: ball 9 was left out"));
 }
 
+// Too few touches to test one of them against the sphere of the others alone.
+TEST(EvemuInput, NamesAFalseTouchAmongFewByTheRadiusOfTheBall) {
+  const Error e = refusal([](Touches& touches, Calibrator&) {
+    int touch = 0;
+    std::erase_if(touches, [&](const Touch& t) {
+      return t.position == 2 && t.feature == Feature::Ball && t.number == 6 && ++touch % 2 == 0;
+    });
+    touch = 0;
+    for (Touch& t : touches) {
+      const bool there = t.position == 2 && t.feature == Feature::Ball && t.number == 6;
+      if (there && ++touch == 13) t.p_m.y() += 1.6e-3;
+    }
+  });
+  EXPECT_EQ(e.code, ErrorCode::BadInput);
+  EXPECT_THAT(e.text, AllOf(HasSubstr("position 2: ball 6 has radius"), HasSubstr("without touch 13 of 13"),
+                            HasSubstr("a false trigger")));
+}
+
 TEST(EvemuInput, NamesTheCalibratorOfAnotherArtefact) {
   const Error shape = refusal([](Touches&, Calibrator& c) { c.balls[7].centre_m.y() -= 0.010; });
   EXPECT_EQ(shape.code, ErrorCode::BadInput);

@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstddef>
+#include <optional>
 
 #include "abbe/calib/axis_mistakes.hpp"
 #include "evemu/angle.hpp"
@@ -109,25 +111,54 @@ std::string radii_fit_with(std::span<const fit::Sphere> balls, const Calibrator&
   return "";
 }
 
-Result<void> check_radii(int position, std::span<const fit::Sphere> balls, const Calibrator& c,
-                         const ObserveOptions& options) {
+/// The touch without which the others lie on a sphere of this radius, much better than all of them.
+std::optional<std::size_t> touch_off_radius(std::span<const Vector3> points_m, double radius_m,
+                                            double mismatch_m) {
+  constexpr double kClear = 2.0;
+  const Result<fit::Sphere> all = fit::fit_sphere(points_m);
+  double least_m = all ? all->residuals.rms / kClear : 0.0;
+  std::optional<std::size_t> found;
+  for (std::size_t k = 0; k < points_m.size(); ++k) {
+    std::vector<Vector3> others(points_m.begin(), points_m.end());
+    others.erase(others.begin() + static_cast<std::ptrdiff_t>(k));
+    const Result<fit::Sphere> s = fit::fit_sphere(others);
+    if (s && std::abs(s->radius - radius_m) <= mismatch_m && s->residuals.rms < least_m) {
+      least_m = s->residuals.rms;
+      found = k;
+    }
+  }
+  return found;
+}
+
+std::string why_another_radius(std::span<const fit::Sphere> balls, std::span<const Vector3> points_m,
+                               double expected_m, const Calibrator& c, const ObserveOptions& options) {
+  if (const auto k = touch_off_radius(points_m, expected_m, options.max_radius_mismatch_m)) {
+    return message("without touch ", *k + 1, " of ", points_m.size(),
+                   " it has that radius: a false trigger, or dirt; touch there again");
+  }
+  return "calibrator file of another artefact, or another tip" + radii_fit_with(balls, c);
+}
+
+Result<void> check_radii(int position, const Touched& touched, std::span<const fit::Sphere> balls,
+                         const Calibrator& c, const ObserveOptions& options) {
   for (std::size_t i = 0; i < balls.size(); ++i) {
     const double expected_m = c.balls[i].radius_m + c.tip_radius_m;
     if (!(std::abs(balls[i].radius - expected_m) <= options.max_radius_mismatch_m)) {
-      return at_position(
-          position, ErrorCode::BadInput,
-          message("ball ", i + 1, " has radius ", balls[i].radius * kMmPerM, " mm, calibrator \"", c.name,
-                  "\" and tip make ", expected_m * kMmPerM,
-                  " mm: calibrator file of another artefact, or another tip", radii_fit_with(balls, c)));
+      const auto& points_m = touched.at({Feature::Ball, c.balls[i].number}).points_m;
+      return at_position(position, ErrorCode::BadInput,
+                         message("ball ", i + 1, " has radius ", balls[i].radius * kMmPerM,
+                                 " mm, calibrator \"", c.name, "\" and tip make ", expected_m * kMmPerM,
+                                 " mm: ", why_another_radius(balls, points_m, expected_m, c, options)));
     }
   }
   return {};
 }
 
 /// In another unit of length every touch seems false.
-Result<void> check_unit(int position, std::span<const fit::Sphere> balls, const Calibrator& c,
-                        const ObserveOptions& options) {
-  return radii_fit_with(balls, c).empty() ? Result<void>{} : check_radii(position, balls, c, options);
+Result<void> check_unit(int position, const Touched& touched, std::span<const fit::Sphere> balls,
+                        const Calibrator& c, const ObserveOptions& options) {
+  return radii_fit_with(balls, c).empty() ? Result<void>{}
+                                          : check_radii(position, touched, balls, c, options);
 }
 
 /// "; they fit with ...": a reflection, other numbers. Empty: with nothing that was tried.
@@ -265,7 +296,7 @@ Result<SeenArtefact> see(int position, const Touched& touched, const Calibrator&
   if (!balls) {
     return tl::unexpected(balls.error());
   }
-  if (Result<void> unit = check_unit(position, *balls, c, options); !unit) {
+  if (Result<void> unit = check_unit(position, touched, *balls, c, options); !unit) {
     return tl::unexpected(unit.error());
   }
   if (Result<void> single = check_single_touches(position, touched, options); !single) {
@@ -280,7 +311,7 @@ Result<SeenArtefact> see(int position, const Touched& touched, const Calibrator&
   if (Result<void> twice = check_twice(position, seen.balls); !twice) {
     return tl::unexpected(twice.error());
   }
-  if (Result<void> radii = check_radii(position, seen.balls, c, options); !radii) {
+  if (Result<void> radii = check_radii(position, touched, seen.balls, c, options); !radii) {
     return tl::unexpected(radii.error());
   }
   const Result<RigidTransform> pose = rough_pose(position, seen.balls, c, options);

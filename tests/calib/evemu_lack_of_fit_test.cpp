@@ -224,6 +224,26 @@ TEST(EvemuLackOfFit, FindsBallsThatMovedALittleWhileTheyWereTouched) {
   EXPECT_THAT(found_in(run), Contains(testing::Field(&Alternative::text, HasSubstr(" balls scatter by"))));
 }
 
+// When X turns round, the tip shifts by 40 um along Y.
+TEST(EvemuLackOfFit, FindsBacklashAcrossTheAxisThatTurnsRound) {
+  ArrayRun run;
+  const Observations o = observed(run);
+  for (Touch& t : run.touches) {
+    if (t.feature == Feature::Ball) {
+      const auto position = static_cast<std::size_t>(t.position) - 1,
+                 ball = static_cast<std::size_t>(t.number) - 1;
+      const Vector3 n = (t.p_m - o.seen[position].balls[ball].centre).normalized();
+      t.p_m += std::copysign(20e-6, n.x()) * n.y() * n;
+    }
+  }
+  const auto found = found_in(run);
+  const auto backlash = std::find_if(found.begin(), found.end(),
+                                     [](const Alternative& a) { return a.cause == Cause::Backlash; });
+  ASSERT_NE(backlash, found.end());
+  EXPECT_THAT(backlash->text, HasSubstr("across them"));
+  EXPECT_GT(backlash->log_likelihood, 500.0);
+}
+
 /// All touches of a position shift together, uncorrelated over a quarter of them.
 ArrayRun with_slow_noise(double sd_m) {
   ArrayRun run;

@@ -326,27 +326,37 @@ std::optional<TouchFinding> form_of_several(const Observations& o, const std::ve
   return found;
 }
 
-/// Readings differ by b_a between the two directions of axis a: |n_a| b_a / 2 along the normal.
+/// When axis a turns round, the place differs by the vector b_a from what its reading says: a touch against n
+/// comes to lie by sum_a sign(n_a) b_a . n / 2 farther out. Column 3 a + m: component m of b_a.
+constexpr Eigen::Index kBacklashes = 9;
+
 Eigen::MatrixXd along_of_backlash(const FeatureResiduals& f) {
-  return 0.5 * f.normals.cwiseAbs();
+  Eigen::MatrixXd along(f.normals.rows(), kBacklashes);
+  for (Eigen::Index a = 0; a < 3; ++a) {
+    const Eigen::ArrayXd side = f.normals.col(a).array().sign();
+    for (Eigen::Index m = 0; m < 3; ++m) {
+      along.col(3 * a + m) = 0.5 * side * f.normals.col(m).array();
+    }
+  }
+  return along;
 }
 
 /// What it leaves in the residuals of a ball.
 Eigen::MatrixXd residuals_of_backlash(const FeatureResiduals& ball) {
-  const Eigen::MatrixXd half = along_of_backlash(ball);
-  Eigen::MatrixXd design(half.rows(), 4);
-  design << ball.normals, Eigen::VectorXd::Ones(half.rows());
-  return half - design * (ball.response * half);
+  const Eigen::MatrixXd along = along_of_backlash(ball);
+  Eigen::MatrixXd design(along.rows(), 4);
+  design << ball.normals, Eigen::VectorXd::Ones(along.rows());
+  return along - design * (ball.response * along);
 }
 
 struct Backlash {
-  Vector3 b_m = Vector3::Zero();
+  Eigen::VectorXd b_m = Eigen::VectorXd::Zero(kBacklashes);
   double drop = 0.0;  ///< of chi2; 0: not significant
 };
 
 Backlash significant_backlash(const std::vector<FeatureResiduals>& all, double sigma_m, double false_alarm) {
-  Matrix3 N = Matrix3::Zero();
-  Vector3 g = Vector3::Zero();
+  Eigen::MatrixXd N = Eigen::MatrixXd::Zero(kBacklashes, kBacklashes);
+  Eigen::VectorXd g = Eigen::VectorXd::Zero(kBacklashes);
   for (const FeatureResiduals& f : all) {
     if (f.feature == Feature::Ball) {
       const Eigen::MatrixXd left = residuals_of_backlash(f);
@@ -356,12 +366,13 @@ Backlash significant_backlash(const std::vector<FeatureResiduals>& all, double s
   }
   // Directions that the touches hardly tell from radius and place count as none.
   constexpr double kShown = 0.02;
-  Eigen::CompleteOrthogonalDecomposition<Matrix3> shown;
+  Eigen::CompleteOrthogonalDecomposition<Eigen::MatrixXd> shown;
   shown.setThreshold(kShown);
   shown.compute(N);
-  const Vector3 b = shown.solve(g);
+  const Eigen::VectorXd b = shown.solve(g);
   const double drop = g.dot(b) / (sigma_m * sigma_m);
-  return drop > chi2_bound(3.0, natural_logarithm(1.0 / false_alarm)) ? Backlash{b, drop} : Backlash{};
+  const double bound = chi2_bound(static_cast<double>(kBacklashes), natural_logarithm(1.0 / false_alarm));
+  return drop > bound ? Backlash{b, drop} : Backlash{};
 }
 
 std::vector<FeatureResiduals> without(const Backlash& backlash, std::vector<FeatureResiduals> all) {
@@ -376,15 +387,17 @@ std::vector<FeatureResiduals> without(const Backlash& backlash, std::vector<Feat
 TouchFinding finding_of(const Backlash& backlash, const Observations& o,
                         const std::vector<FeatureResiduals>& all) {
   Eigen::VectorXd rows = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(3 * o.rows.size()));
-  const Vector3& b = backlash.b_m;
   for (const FeatureResiduals& f : all) {
     if (f.feature == Feature::Ball) {
-      rows += effect_m(o, f, along_of_backlash(f) * b);
+      rows += effect_m(o, f, along_of_backlash(f) * backlash.b_m);
     }
   }
+  const Matrix3 b_um = kUmPerM * Eigen::Map<const Matrix3>(backlash.b_m.data());  // column a: of axis a
+  const Matrix3 aside_um = b_um - Matrix3(b_um.diagonal().asDiagonal());
   return {.cause = Cause::Backlash,
-          .text = message("the touches depend on the side they come from: backlash of X ", b.x() * kUmPerM,
-                          ", Y ", b.y() * kUmPerM, ", Z ", b.z() * kUmPerM, " um, or a probe with lobes"),
+          .text = message("the touches depend on the side they come from: backlash of X ", b_um(0, 0), ", Y ",
+                          b_um(1, 1), ", Z ", b_um(2, 2), " um along the axes, up to ",
+                          aside_um.cwiseAbs().maxCoeff(), " um across them, or a probe with lobes"),
           .log_likelihood = 0.5 * backlash.drop,
           .rows_m = std::move(rows)};
 }

@@ -38,6 +38,21 @@ TEST(NeverWorseBallArray, SlowNoiseIsInTheUncertainty) {
   EXPECT_EQ(slow.too_sure, 0) << slow.largest_left_over_u;
 }
 
+// The false touch makes the uncertainty so large that this covers it, and the ball centres scatter.
+TEST(NeverWorseBallArray, AFalseTouchIsNamedBeforeTheScatterThatFollows) {
+  const auto tally = tallies_of(ball_array({"false trigger"}), 1, 7004).front();
+  EXPECT_EQ(tally.accepted, 0);
+  EXPECT_EQ(tally.named, 1) << tally.other_reason;
+}
+
+// Accepted, it was wrong by 3.3 u: the errors within a ball were compared with the uncertainty of another
+// estimate.
+TEST(NeverWorseBallArray, ErrorsWithinABallAreNotLargeBesideTheUncertainty) {
+  const auto screw = tallies_of(ball_array({"screw pitch"}), 1, 8092).front();
+  EXPECT_EQ(screw.runs, 1);
+  EXPECT_EQ(screw.too_sure, 0) << screw.largest_left_over_u;
+}
+
 TEST(NeverWorseBallArray, SoundRunsAreAccepted) {
   const auto none = tallies_of(ball_array({"none"}), 4, kFirstSeed).front();
   EXPECT_EQ(none.accepted, none.runs) << none.other_reason;

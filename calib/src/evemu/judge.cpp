@@ -5,6 +5,7 @@
 #include <cmath>
 #include <functional>
 #include <optional>
+#include <string_view>
 #include <utility>
 
 #include "abbe/calib/evemu/design_rows.hpp"
@@ -96,38 +97,51 @@ constexpr double kCoveredByU = 1.5;
 
 /// Written so that a NaN figure is refused.
 bool is_covered(const Alternative& other, const CorrectionSize& size) {
-  if (other.cause ==
-      Cause::Scatter) {  // is in u as white noise: refused only where the model is small beside it
-    return other.bias_m <= kMostUncertainty * size.V_m;
+  if (other.cause == Cause::Scatter) {  // is in u as white noise
+    const double most_m = std::max(std::sqrt(3.0) * kScatterOfProbes_m, kScatterBesideU * size.u_m);
+    return other.bias_m <= std::min(most_m, kMostUncertainty * size.V_m);
   }
   return other.bias_m <= other.u_m && root_sum_of_squares(other.bias_m, other.u_m) <= kCoveredByU * size.u_m;
 }
 
-/// Reasons before those that only follow from them.
-void add_alternatives(Verdict& verdict, const std::vector<Alternative>& others, const CorrectionSize& size) {
+/// What any of the other causes does to the touches and to the uncertainty.
+bool only_follows(std::string_view cause) {
+  return cause == name(Cause::Scatter) || cause == name(Cause::Form) || cause == kUncertain;
+}
+
+/// Reasons before those that only follow from them. Without any other reason a likely alternative is the one
+/// they follow from, although the uncertainty covers it: it made that uncertainty large.
+void add_alternatives(Verdict& verdict, std::vector<Alternative> others, const CorrectionSize& size) {
+  const auto refuses = [&](const Alternative& a) {
+    return a.comparison != Comparison::Impossible && !is_covered(a, size);
+  };
+  const auto is_cause = [](const Alternative& a) {
+    return a.comparison == Comparison::Made && !only_follows(name(a.cause));
+  };
+  const bool refused = std::any_of(verdict.causes.begin(), verdict.causes.end(), only_follows) ||
+                       std::any_of(others.begin(), others.end(), refuses);
+  const bool cause_is_known = std::any_of(others.begin(), others.end(),
+                                          [&](const Alternative& a) { return is_cause(a) && refuses(a); });
+  std::stable_partition(others.begin(), others.end(), is_cause);
   std::size_t reasons = 0;
   for (const Alternative& other : others) {
-    const bool scatter = other.cause == Cause::Scatter;
-    const std::string text = scatter ? other.text : with_effect(other.text, other.bias_m, size.u_m);
-    if (other.comparison == Comparison::Impossible || is_covered(other, size)) {
-      verdict.notes.push_back(text);
-    } else {
+    const std::string text =
+        other.cause == Cause::Scatter ? other.text : with_effect(other.text, other.bias_m, size.u_m);
+    if (refuses(other) || (refused && !cause_is_known && is_cause(other))) {
       verdict.refuse(name(other.cause), text, reasons++);
+    } else {
+      verdict.notes.push_back(text);
     }
   }
 }
 
-/// Slow noise that the estimate has in its covariance explains scatter and uncertainty: before the first of
-/// them.
+/// Slow noise that the estimate has in its covariance comes before the first reason that only follows.
 void add_slow_noise(Verdict& verdict, const Solution& solution) {
   if (!(solution.slow_noise > 0.0)) {
     return;
   }
   const std::string text = slow_noise_text(solution.statistics.slow_noise_m) + "; it is in the uncertainty";
-  const auto follows = [](const std::string& cause) {
-    return cause == name(Cause::Scatter) || cause == kUncertain;
-  };
-  const auto first = std::find_if(verdict.causes.begin(), verdict.causes.end(), follows);
+  const auto first = std::find_if(verdict.causes.begin(), verdict.causes.end(), only_follows);
   if (first == verdict.causes.end()) {
     verdict.notes.push_back(text);
   } else {
@@ -236,8 +250,8 @@ Result<Verdict> judge(const Observations& observations, const Solution& solution
                       kShapeOnly));
         }
         const CorrectionSize size = correction_size(o, solution);
-        add_alternatives(verdict, *others, size);
         require_certainty(verdict, size.V_m, size.u_m);
+        add_alternatives(verdict, *others, size);
         add_slow_noise(verdict, solution);
         note_artefact(o, verdict);
         note_what_touches_do_not_show(verdict, o, extent_m(o));

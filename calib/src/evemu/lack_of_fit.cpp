@@ -322,21 +322,26 @@ Result<void> compare_slow_noise(Comparisons& all, const Solution& solution) {
   return {};
 }
 
+/// With what the finding does to the errors seen as one unknown more, up to a few times as large as found.
+/// What only scatters has no known effect: NaN, and refuses.
+Alternative compared_touch(const Rows& rows, const Refit& base, const TouchFinding& f) {
+  constexpr double kNaN = std::numeric_limits<double>::quiet_NaN(), kFewTimes = 3.0;
+  Alternative found{f.cause, f.text, f.log_likelihood, kNaN, rows.norm.rms_u_m(base.covariance_m2)};
+  if (f.rows_m.size() == 0) {
+    return found;
+  }
+  const auto with = refit(rows, rows.design, rows.X, white_rows(rows.o, f.rows_m), kFewTimes);
+  if (!with) {
+    return not_compared(f.cause, ", " + f.text + ",", with.error().text);
+  }
+  found.bias_m = rows.norm.rms_m(with->c_m - base.c_m);
+  found.u_m = rows.norm.rms_u_m(with->covariance_m2);
+  return found;
+}
+
 void compare_touches(Comparisons& all, const TouchResiduals& touches) {
-  const Rows& rows = all.rows;
-  const LinearGaussian gaussian(rows.X, rows.S, rows.y);
-  const Eigen::VectorXd prior =
-      prior_variances(PriorKind::BayesPose, rows.design, rows.positions, rows.hyper);
-  const double u_m = rows.norm.rms_u_m(all.base.covariance_m2);
   for (const TouchFinding& f : touches.findings) {
-    // What only scatters has no known effect: NaN, and refuses.
-    double bias_m = std::numeric_limits<double>::quiet_NaN();
-    if (f.rows_m.size() > 0) {
-      const Eigen::MatrixXd dc =
-          gaussian.response(prior, rows.hyper.s_m * rows.hyper.s_m, white_rows(rows.o, f.rows_m));
-      bias_m = rows.norm.rms_m(dc.col(0).head(rows.X.cols()));
-    }
-    all.add({f.cause, f.text, f.log_likelihood, bias_m, u_m});
+    all.add(compared_touch(all.rows, all.base, f));
   }
   for (const std::string& place : touches.failed) {
     all.add(not_compared(Cause::Touch, ", " + place,
@@ -399,12 +404,10 @@ std::optional<Alternative> unexplained_scatter(const Rows& rows, const Refit& ba
 }
 
 /// A noise of the probe averages out in the model, what the machine has within a ball does not: no touch
-/// tells them apart. Twice: then it is larger than the 95 % interval of every point.
-std::optional<Alternative> scatter_of_touches(const Rows& rows, const Refit& base,
-                                              const TouchResiduals& touches) {
-  constexpr double kTwice = 2.0;
-  const double u_m = rows.norm.rms_u_m(base.covariance_m2), within_m = std::sqrt(3.0) * touches.sigma_m;
-  if (!(within_m > kTwice * u_m)) {
+/// tells them apart. `u_m`: of the model.
+std::optional<Alternative> scatter_of_touches(double u_m, const TouchResiduals& touches) {
+  const double within_m = std::sqrt(3.0) * touches.sigma_m;
+  if (!(within_m > kScatterBesideU * u_m)) {
     return std::nullopt;
   }
   return Alternative{.cause = Cause::Scatter,
@@ -450,6 +453,9 @@ Result<std::vector<Alternative>> alternatives(const Observations& observations, 
   if (Result<void> compared = compare_all(all, solution); !compared) {
     return tl::unexpected(compared.error());
   }
+  if (auto scatter = scatter_of_touches(correction_size(observations, solution).u_m, touches)) {
+    all.add(*std::move(scatter));
+  }
   // First what moves the model: backlash is highly significant and leaves the centres where they are. Of that
   // one touch off its surface first: its ball is off its place, or the array seems to have moved, because of
   // it.
@@ -459,10 +465,8 @@ Result<std::vector<Alternative>> alternatives(const Observations& observations, 
   };
   std::stable_sort(all.found.begin(), all.found.end(),
                    [&](const Alternative& a, const Alternative& b) { return key(a) < key(b); });
-  for (const auto& scatter_test : {scatter_of_touches, unexplained_scatter}) {
-    if (auto scatter = scatter_test(*rows, *base, touches)) {
-      all.add(*std::move(scatter));
-    }
+  if (auto scatter = unexplained_scatter(*rows, *base, touches)) {
+    all.add(*std::move(scatter));
   }
   std::move(all.not_made.begin(), all.not_made.end(), std::back_inserter(all.found));
   return std::move(all.found);

@@ -36,6 +36,11 @@ enum class Cause {
 };
 [[nodiscard]] std::string_view name(Cause);
 
+/// Scatter beyond that many times the uncertainty of the model may be errors of the machine that it does not
+/// follow: it could be wrong by three times its uncertainty. Up to kScatterOfProbes_m it is a probe's, which
+/// averages out.
+inline constexpr double kScatterBesideU = 1.5, kScatterOfProbes_m = 3e-6;
+
 /// Failed: the data cannot be compared with the alternative, which may hold. Impossible: the alternative does
 /// not exist for these observations.
 enum class Comparison { Made, Failed, Impossible };

@@ -150,7 +150,7 @@ TEST(EvemuInput, NamesAFalseTouchAmongFewByTheRadiusOfTheBall) {
     }
   });
   EXPECT_EQ(e.code, ErrorCode::BadInput);
-  EXPECT_THAT(e.text, AllOf(HasSubstr("position 2: ball 6 has radius"), HasSubstr("without touch 13 of 13"),
+  EXPECT_THAT(e.text, AllOf(HasSubstr("position 2: ball 6 has radius"), HasSubstr("without touch 13 of 13 it comes nearer"),
                             HasSubstr("a false trigger")));
 }
 

@@ -49,8 +49,8 @@ TEST(NeverWorseBallArray, AFalseTouchIsNamedBeforeTheScatterThatFollows) {
 // estimate.
 TEST(NeverWorseBallArray, ErrorsWithinABallAreNotLargeBesideTheUncertainty) {
   const auto screw = tallies_of(ball_array({"screw pitch"}), 1, 8092).front();
-  EXPECT_EQ(screw.runs, 1);
-  EXPECT_EQ(screw.too_sure, 0) << screw.largest_left_over_u;
+  EXPECT_EQ(screw.accepted, 0) << screw.largest_left_over_u;
+  EXPECT_EQ(screw.named, 1) << screw.other_reason;
 }
 
 TEST(NeverWorseBallArray, SoundRunsAreAccepted) {

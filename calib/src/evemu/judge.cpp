@@ -98,8 +98,9 @@ constexpr double kCoveredByU = 1.5;
 /// Written so that a NaN figure is refused.
 bool is_covered(const Alternative& other, const CorrectionSize& size) {
   if (other.cause == Cause::Scatter) {  // is in u as white noise
-    const double most_m = std::max(std::sqrt(3.0) * kScatterOfProbes_m, kScatterBesideU * size.u_m);
-    return other.bias_m <= std::min(most_m, kMostUncertainty * size.V_m);
+    const bool of_a_probe = other.bias_m <= std::sqrt(3.0) * kScatterOfProbes_m;
+    return other.bias_m <= kMostUncertainty * size.V_m &&
+           (of_a_probe || other.bias_m <= kScatterBesideU * size.u_m);
   }
   return other.bias_m <= other.u_m && root_sum_of_squares(other.bias_m, other.u_m) <= kCoveredByU * size.u_m;
 }
@@ -109,8 +110,17 @@ bool only_follows(std::string_view cause) {
   return cause == name(Cause::Scatter) || cause == name(Cause::Form) || cause == kUncertain;
 }
 
-/// Reasons before those that only follow from them. Without any other reason a likely alternative is the one
-/// they follow from, although the uncertainty covers it: it made that uncertainty large.
+/// Whether the reasons so far may follow from an alternative that the uncertainty covers.
+bool may_be_behind(const Alternative& a, const CorrectionSize& size, bool only_form) {
+  constexpr double kMatters = 0.1, kMuchSurer = 0.7;
+  const bool in_time = a.cause == Cause::Touch || a.cause == Cause::Moved || a.cause == Cause::Creep ||
+                       a.cause == Cause::Drift || a.cause == Cause::SlowNoise;
+  const bool matters = a.bias_m > kMatters * size.u_m || a.u_m < kMuchSurer * size.u_m;
+  return matters && (in_time || !only_form);
+}
+
+/// Reasons before those that only follow from them. Where no cause refuses, a likely alternative comes first
+/// although the uncertainty covers it: it made that uncertainty, or the scatter, large.
 void add_alternatives(Verdict& verdict, std::vector<Alternative> others, const CorrectionSize& size) {
   const auto refuses = [&](const Alternative& a) {
     return a.comparison != Comparison::Impossible && !is_covered(a, size);
@@ -118,16 +128,24 @@ void add_alternatives(Verdict& verdict, std::vector<Alternative> others, const C
   const auto is_cause = [](const Alternative& a) {
     return a.comparison == Comparison::Made && !only_follows(name(a.cause));
   };
-  const bool refused = std::any_of(verdict.causes.begin(), verdict.causes.end(), only_follows) ||
-                       std::any_of(others.begin(), others.end(), refuses);
-  const bool cause_is_known = std::any_of(others.begin(), others.end(),
-                                          [&](const Alternative& a) { return is_cause(a) && refuses(a); });
+  const auto any = [&](const auto& condition) {
+    return std::any_of(others.begin(), others.end(),
+                       [&](const Alternative& a) { return refuses(a) && condition(a); });
+  };
+  const bool cause_is_known = any(is_cause);
+  const bool form = any([](const Alternative& a) { return a.cause == Cause::Form; });
+  const bool scatter =
+      any([](const Alternative& a) { return a.cause == Cause::Scatter; }) ||
+      std::find(verdict.causes.begin(), verdict.causes.end(), kUncertain) != verdict.causes.end();
   std::stable_partition(others.begin(), others.end(), is_cause);
+
   std::size_t reasons = 0;
   for (const Alternative& other : others) {
     const std::string text =
         other.cause == Cause::Scatter ? other.text : with_effect(other.text, other.bias_m, size.u_m);
-    if (refuses(other) || (refused && !cause_is_known && is_cause(other))) {
+    const bool is_behind =
+        !cause_is_known && (form || scatter) && is_cause(other) && may_be_behind(other, size, !scatter);
+    if (refuses(other) || is_behind) {
       verdict.refuse(name(other.cause), text, reasons++);
     } else {
       verdict.notes.push_back(text);

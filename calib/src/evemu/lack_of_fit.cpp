@@ -84,13 +84,13 @@ struct Refit {
   Eigen::MatrixXd covariance_m2;  ///< of c
 };
 
-Result<Refit> refit(const Rows& rows, const ScaledDesign& design, const Eigen::MatrixXd& X,
-                    const Eigen::MatrixXd& C, double size_m) {
+Result<Refit> refit_to(const Eigen::VectorXd& y, const Rows& rows, const ScaledDesign& design,
+                       const Eigen::MatrixXd& X, const Eigen::MatrixXd& C, double size_m) {
   Eigen::MatrixXd all(X.rows(), X.cols() + rows.A.cols() + C.cols());
   all << X, rows.A, C;
   std::vector<double> added(static_cast<std::size_t>(rows.A.cols()), 1.0);
   added.resize(added.size() + static_cast<std::size_t>(C.cols()), size_m * size_m);
-  const LinearGaussian gaussian(all, rows.S, rows.y);
+  const LinearGaussian gaussian(all, rows.S, y);
   const auto hyper = most_likely_near(rows.hyper, design, rows.positions, gaussian, added);
   if (!hyper) {
     return tl::unexpected(hyper.error());
@@ -105,6 +105,11 @@ Result<Refit> refit(const Rows& rows, const ScaledDesign& design, const Eigen::M
   const Eigen::Index n = X.cols();
   return Refit{*hyper, p.mean.head(n), p.mean.segment(n + rows.A.cols(), C.cols()),
                p.covariance.topLeftCorner(n, n)};
+}
+
+Result<Refit> refit(const Rows& rows, const ScaledDesign& design, const Eigen::MatrixXd& X,
+                    const Eigen::MatrixXd& C, double size_m) {
+  return refit_to(rows.y, rows, design, X, C, size_m);
 }
 
 /// The estimate itself, with the array's uncertainty among the columns: what alternatives are compared with.
@@ -322,25 +327,31 @@ Result<void> compare_slow_noise(Comparisons& all, const Solution& solution) {
   return {};
 }
 
-/// With what the finding does to the errors seen as one unknown more, up to a few times as large as found.
-/// What only scatters has no known effect: NaN, and refuses.
+/// Without what the finding does to the errors seen, whose size the touches know: the more, the more likely
+/// it is. What only scatters has no known effect: NaN, and refuses.
 Alternative compared_touch(const Rows& rows, const Refit& base, const TouchFinding& f) {
-  constexpr double kNaN = std::numeric_limits<double>::quiet_NaN(), kFewTimes = 3.0;
+  constexpr double kNaN = std::numeric_limits<double>::quiet_NaN(), kKnownTo = 0.3;
   Alternative found{f.cause, f.text, f.log_likelihood, kNaN, rows.norm.rms_u_m(base.covariance_m2)};
   if (f.rows_m.size() == 0) {
     return found;
   }
-  const auto with = refit(rows, rows.design, rows.X, white_rows(rows.o, f.rows_m), kFewTimes);
+  const Eigen::VectorXd effect = white_rows(rows.o, f.rows_m);
+  const double known_to = std::max(kKnownTo, 1.0 / std::sqrt(2.0 * f.log_likelihood));
+  const auto with = refit_to(rows.y - effect, rows, rows.design, rows.X, effect, known_to);
   if (!with) {
-    return not_compared(f.cause, ", " + f.text + ",", with.error().text);
+    found.text += message("; its effect could not be computed: ", with.error().text);
+    return found;
   }
   found.bias_m = rows.norm.rms_m(with->c_m - base.c_m);
   found.u_m = rows.norm.rms_u_m(with->covariance_m2);
   return found;
 }
 
-void compare_touches(Comparisons& all, const TouchResiduals& touches) {
+Result<void> compare_touches(Comparisons& all, const TouchResiduals& touches) {
   for (const TouchFinding& f : touches.findings) {
+    if (Result<void> goes_on = check_stopped(all.watch.stopped); !goes_on) {
+      return goes_on;
+    }
     all.add(compared_touch(all.rows, all.base, f));
   }
   for (const std::string& place : touches.failed) {
@@ -350,6 +361,7 @@ void compare_touches(Comparisons& all, const TouchResiduals& touches) {
   if (!touches.not_compared.empty()) {
     all.add(impossible(Cause::Touch, touches.not_compared));
   }
+  return {};
 }
 
 Result<void> compare_all(Comparisons& all, const Solution& solution) {
@@ -404,19 +416,19 @@ std::optional<Alternative> unexplained_scatter(const Rows& rows, const Refit& ba
 }
 
 /// A noise of the probe averages out in the model, what the machine has within a ball does not: no touch
-/// tells them apart. `u_m`: of the model.
-std::optional<Alternative> scatter_of_touches(double u_m, const TouchResiduals& touches) {
-  const double within_m = std::sqrt(3.0) * touches.sigma_m;
-  if (!(within_m > kScatterBesideU * u_m)) {
+/// tells them apart. Backlash that was found is not in it: the model is the mean of both sides.
+std::optional<Alternative> scatter_of_touches(const CorrectionSize& size, const TouchResiduals& touches) {
+  const double within_m = std::sqrt(3.0) * touches.sigma_of_no_cause_m;
+  if (!(within_m > kScatterBesideU * size.u_m)) {
     return std::nullopt;
   }
   return Alternative{.cause = Cause::Scatter,
-                     .text = message("touches scatter by ", touches.sigma_m * kUmPerM,
+                     .text = message("touches scatter by ", touches.sigma_of_no_cause_m * kUmPerM,
                                      " um about their balls and blocks: backlash or the pitch of a screw, "
                                      "which the model does not follow, or a probe that does not repeat"),
                      .log_likelihood = 0.0,
                      .bias_m = within_m,
-                     .u_m = u_m};
+                     .u_m = size.u_m};
 }
 
 }  // namespace
@@ -449,13 +461,15 @@ Result<std::vector<Alternative>> alternatives(const Observations& observations, 
   }
   Comparisons all{*rows, *base, watch};
   const TouchResiduals touches = touch_residuals(o, solution.model, kFalseAlarm / kCauses);
-  compare_touches(all, touches);
-  if (Result<void> compared = compare_all(all, solution); !compared) {
+  const Result<void> compared =
+      compare_touches(all, touches).and_then([&] { return compare_all(all, solution); });
+  if (!compared) {
     return tl::unexpected(compared.error());
   }
-  if (auto scatter = scatter_of_touches(correction_size(observations, solution).u_m, touches)) {
+  if (auto scatter = scatter_of_touches(correction_size(observations, solution), touches)) {
     all.add(*std::move(scatter));
   }
+  // Touches that scatter everywhere come before the features that scatter most.
   // First what moves the model: backlash is highly significant and leaves the centres where they are. Of that
   // one touch off its surface first: its ball is off its place, or the array seems to have moved, because of
   // it.

@@ -327,13 +327,16 @@ std::optional<TouchFinding> form_of_several(const Observations& o, const std::ve
 }
 
 /// When axis a turns round, the place differs by the vector b_a from what its reading says: a touch against n
-/// comes to lie by sum_a sign(n_a) b_a . n / 2 farther out. Column 3 a + m: component m of b_a.
+/// comes to lie by sum_a sign(n_a) b_a . n / 2 farther out. Column 3 a + m: component m of b_a. An axis that
+/// hardly moves on the way to the touch stands on either side.
 constexpr Eigen::Index kBacklashes = 9;
+constexpr double kLeastMotion = 0.1;  // of the way to the touch
 
 Eigen::MatrixXd along_of_backlash(const FeatureResiduals& f) {
   Eigen::MatrixXd along(f.normals.rows(), kBacklashes);
   for (Eigen::Index a = 0; a < 3; ++a) {
-    const Eigen::ArrayXd side = f.normals.col(a).array().sign();
+    const Eigen::ArrayXd n_a = f.normals.col(a).array();
+    const Eigen::ArrayXd side = (n_a.abs() > kLeastMotion).select(n_a.sign(), 0.0);
     for (Eigen::Index m = 0; m < 3; ++m) {
       along.col(3 * a + m) = 0.5 * side * f.normals.col(m).array();
     }
@@ -351,9 +354,29 @@ Eigen::MatrixXd residuals_of_backlash(const FeatureResiduals& ball) {
 
 struct Backlash {
   Eigen::VectorXd b_m = Eigen::VectorXd::Zero(kBacklashes);
-  double drop = 0.0;  ///< of chi2; 0: not significant
+  double drop = 0.0;    ///< of chi2; 0: not significant
+  double dof = 0.0;     ///< unknowns that the touches show
+  bool across = false;  ///< any of them across the axes
 };
 
+/// Unknowns of some columns only. A priori of 100 um: what the touches hardly tell from radius and place
+/// stays near zero.
+Backlash backlash_of(const std::vector<Eigen::Index>& columns, const Eigen::MatrixXd& N,
+                     const Eigen::VectorXd& g, double sigma_m) {
+  constexpr double kPrior_m = 100e-6;
+  const double least = (sigma_m / kPrior_m) * (sigma_m / kPrior_m);
+  const Eigen::MatrixXd N_columns = N(columns, columns);
+  const Eigen::VectorXd g_columns = g(columns);
+  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(N_columns);
+  const Eigen::ArrayXd shown = eigen.eigenvalues().array().max(0.0);
+  const Eigen::ArrayXd along = (eigen.eigenvectors().transpose() * g_columns).array();
+  const Eigen::VectorXd b = eigen.eigenvectors() * (along / (shown + least)).matrix();
+  Backlash found{.drop = g_columns.dot(b) / (sigma_m * sigma_m), .dof = (shown / (shown + least)).sum()};
+  found.b_m(columns) = b;
+  return found;
+}
+
+/// Along the axes; across them, too, where that explains significantly more.
 Backlash significant_backlash(const std::vector<FeatureResiduals>& all, double sigma_m, double false_alarm) {
   Eigen::MatrixXd N = Eigen::MatrixXd::Zero(kBacklashes, kBacklashes);
   Eigen::VectorXd g = Eigen::VectorXd::Zero(kBacklashes);
@@ -364,15 +387,14 @@ Backlash significant_backlash(const std::vector<FeatureResiduals>& all, double s
       g += left.transpose() * f.r_m;
     }
   }
-  // Directions that the touches hardly tell from radius and place count as none.
-  constexpr double kShown = 0.02;
-  Eigen::CompleteOrthogonalDecomposition<Eigen::MatrixXd> shown;
-  shown.setThreshold(kShown);
-  shown.compute(N);
-  const Eigen::VectorXd b = shown.solve(g);
-  const double drop = g.dot(b) / (sigma_m * sigma_m);
-  const double bound = chi2_bound(static_cast<double>(kBacklashes), natural_logarithm(1.0 / false_alarm));
-  return drop > bound ? Backlash{b, drop} : Backlash{};
+  const double x = natural_logarithm(2.0 / false_alarm);
+  Backlash along = backlash_of({0, 4, 8}, N, g, sigma_m);
+  if (!(along.drop > chi2_bound(along.dof, x))) {
+    along = {};
+  }
+  Backlash across = backlash_of({0, 1, 2, 3, 4, 5, 6, 7, 8}, N, g, sigma_m);
+  across.across = true;
+  return across.drop - along.drop > chi2_bound(across.dof - along.dof, x) ? across : along;
 }
 
 std::vector<FeatureResiduals> without(const Backlash& backlash, std::vector<FeatureResiduals> all) {
@@ -434,13 +456,18 @@ TouchResiduals touch_residuals(const Observations& o, const VolumetricModel& mod
   }
   found.s_centre_m = found.sigma_m * std::sqrt(squares / std::max(1.0, count));
   const Backlash backlash = significant_backlash(all, found.sigma_m, false_alarm);
+  const std::vector<FeatureResiduals> left = without(backlash, all);
+  found.sigma_of_no_cause_m = pooled_sigma_m(left);
   auto touch = worst_touch(o, all, found.sigma_m, false_alarm);
   std::optional<TouchFinding> form;
   if (!touch) {  // else its ball or block scatters because of it
-    const std::vector<FeatureResiduals> left = without(backlash, all);
     form = worst_form(o, left, found.sigma_m, 0.5 * false_alarm);
-    for (const Feature kind : {Feature::Ball, Feature::Block}) {
-      form = form ? form : form_of_several(o, left, kind, 0.25 * false_alarm);
+    // Where an axis hardly moves on the way to a touch, backlash across it is left in the touch.
+    if (!form && !backlash.across) {
+      form = form_of_several(o, left, Feature::Ball, 0.25 * false_alarm);
+    }
+    if (!form) {
+      form = form_of_several(o, left, Feature::Block, 0.25 * false_alarm);
     }
   }
   for (std::optional<TouchFinding>* finding : {&form, &touch}) {

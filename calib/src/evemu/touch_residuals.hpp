@@ -20,6 +20,7 @@ struct TouchFinding {
 
 struct TouchResiduals {
   double sigma_m = 0.0;     ///< of one touch along the normal; from the median, which faults do not move
+  double sigma_of_no_cause_m = 0.0;  ///< the same without the backlash that was found
   double s_centre_m = 0.0;  ///< of a ball's centre per coordinate that follows, root mean square
   std::vector<TouchFinding> findings;
   std::vector<std::string> failed;  ///< "position 3, ball 4": no surface or no finite residuals

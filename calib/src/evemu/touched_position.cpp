@@ -111,18 +111,23 @@ std::string radii_fit_with(std::span<const fit::Sphere> balls, const Calibrator&
   return "";
 }
 
-/// The touch without which the others lie on a sphere of this radius, much better than all of them.
-std::optional<std::size_t> touch_off_radius(std::span<const Vector3> points_m, double radius_m,
-                                            double mismatch_m) {
-  constexpr double kClear = 2.0;
+/// The touch without which the others lie much better on a sphere whose radius is at most half as far from
+/// this one.
+std::optional<std::size_t> touch_off_radius(std::span<const Vector3> points_m, double radius_m) {
+  constexpr std::size_t kUnknowns = 4, kRedundant = 2;
+  constexpr double kClear = 3.0;
   const Result<fit::Sphere> all = fit::fit_sphere(points_m);
-  double least_m = all ? all->residuals.rms / kClear : 0.0;
+  if (!all || points_m.size() <= kUnknowns + kRedundant) {
+    return std::nullopt;
+  }
+  const double most_off_m = 0.5 * std::abs(all->radius - radius_m);
+  double least_m = all->residuals.rms / kClear;
   std::optional<std::size_t> found;
   for (std::size_t k = 0; k < points_m.size(); ++k) {
     std::vector<Vector3> others(points_m.begin(), points_m.end());
     others.erase(others.begin() + static_cast<std::ptrdiff_t>(k));
     const Result<fit::Sphere> s = fit::fit_sphere(others);
-    if (s && std::abs(s->radius - radius_m) <= mismatch_m && s->residuals.rms < least_m) {
+    if (s && std::abs(s->radius - radius_m) <= most_off_m && s->residuals.rms < least_m) {
       least_m = s->residuals.rms;
       found = k;
     }
@@ -131,10 +136,10 @@ std::optional<std::size_t> touch_off_radius(std::span<const Vector3> points_m, d
 }
 
 std::string why_another_radius(std::span<const fit::Sphere> balls, std::span<const Vector3> points_m,
-                               double expected_m, const Calibrator& c, const ObserveOptions& options) {
-  if (const auto k = touch_off_radius(points_m, expected_m, options.max_radius_mismatch_m)) {
+                               double expected_m, const Calibrator& c) {
+  if (const auto k = touch_off_radius(points_m, expected_m)) {
     return message("without touch ", *k + 1, " of ", points_m.size(),
-                   " it has that radius: a false trigger, or dirt; touch there again");
+                   " it comes nearer to that: a false trigger, or dirt; touch there again");
   }
   return "calibrator file of another artefact, or another tip" + radii_fit_with(balls, c);
 }
@@ -148,7 +153,7 @@ Result<void> check_radii(int position, const Touched& touched, std::span<const f
       return at_position(position, ErrorCode::BadInput,
                          message("ball ", i + 1, " has radius ", balls[i].radius * kMmPerM,
                                  " mm, calibrator \"", c.name, "\" and tip make ", expected_m * kMmPerM,
-                                 " mm: ", why_another_radius(balls, points_m, expected_m, c, options)));
+                                 " mm: ", why_another_radius(balls, points_m, expected_m, c)));
     }
   }
   return {};

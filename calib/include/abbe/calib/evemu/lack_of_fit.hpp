@@ -36,10 +36,12 @@ enum class Cause {
 };
 [[nodiscard]] std::string_view name(Cause);
 
-/// Scatter beyond that many times the uncertainty of the model may be errors of the machine that it does not
-/// follow: it could be wrong by three times its uncertainty. Up to kScatterOfProbes_m it is a probe's, which
-/// averages out.
-inline constexpr double kScatterBesideU = 1.5, kScatterOfProbes_m = 3e-6;
+/// Of touches or ball centres, as a length in space (root of the trace). No touch tells a probe's noise,
+/// which averages out in the model, from short waves of the machine, which the model does not follow and
+/// which are left beside its u: u and 1.5 u together are 1.8 u.
+inline constexpr double kScatterBesideU = 1.5;
+/// Standard deviation of one touch along the normal that may be a probe's, whatever u is.
+inline constexpr double kScatterOfProbes_m = 3e-6;
 
 /// Failed: the data cannot be compared with the alternative, which may hold. Impossible: the alternative does
 /// not exist for these observations.
@@ -70,9 +72,9 @@ struct Watch {
 };
 
 /// The significant ones (family-wise error probability 1e-4), the most likely first, but those that move the
-/// model by less than a tenth of its uncertainty last; one of each cause. Then comparisons that were not
-/// made. The columns of one alternative at a time are in memory. NotConverged where the estimate itself has
-/// no likelihood, or when stopped.
+/// model by less than a tenth of its uncertainty last; one of each cause, of scatter up to two, behind the
+/// others. Then comparisons that were not made. The columns of one alternative at a time are in memory.
+/// NotConverged where the estimate itself has no likelihood, or when stopped.
 [[nodiscard]] Result<std::vector<Alternative>> alternatives(const Observations&, const Solution&,
                                                             const Watch& = {});
 

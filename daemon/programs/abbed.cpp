@@ -12,11 +12,11 @@
 #include <iterator>
 #include <string>
 
-#include "abbe/daemon/abbed.hpp"
-#include "abbe/daemon/config.hpp"
-#include "abbe/daemon/dds_security.hpp"
-#include "abbe/daemon/service_manager.hpp"
-#include "abbe/daemon/work_aside.hpp"
+#include "abbe/base/service_manager.hpp"
+#include "abbe/config/config.hpp"
+#include "abbe/messages/dds_security.hpp"
+#include "abbe/pipeline/work_aside.hpp"
+#include "abbe/service/abbed.hpp"
 
 namespace {
 

@@ -26,11 +26,11 @@
 #include <thread>
 
 #include "abbe/calib/interpolation_grid.hpp"
-#include "abbe/daemon/control_api.hpp"
-#include "abbe/daemon/hub.hpp"
-#include "abbe/daemon/work_aside.hpp"
 #include "abbe/drivers/real_time_memory.hpp"
 #include "abbe/drivers/status_board.hpp"
+#include "abbe/pipeline/work_aside.hpp"
+#include "abbe/service/control_api.hpp"
+#include "abbe/service/hub.hpp"
 #include "config_tables.hpp"
 #include "figure.hpp"
 #include "synthetic_model.hpp"

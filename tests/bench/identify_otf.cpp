@@ -24,8 +24,8 @@
 #include "abbe/calib/gauge.hpp"
 #include "abbe/calib/model_comparison.hpp"
 #include "abbe/calib/rigid_body_model.hpp"
-#include "abbe/daemon/input_files.hpp"
-#include "abbe/daemon/model_document.hpp"
+#include "abbe/model/model_document.hpp"
+#include "abbe/tables/input_files.hpp"
 #include "config_tables.hpp"
 
 namespace {

@@ -19,9 +19,9 @@
 #include <string_view>
 #include <vector>
 
-#include "abbe/daemon/cdr.hpp"
-#include "abbe/daemon/dds_link.hpp"
-#include "abbe/daemon/dds_supervisor.hpp"
+#include "abbe/messages/cdr.hpp"
+#include "abbe/messages/dds_link.hpp"
+#include "abbe/publishing/dds_supervisor.hpp"
 
 extern char** environ;
 

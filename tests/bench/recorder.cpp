@@ -13,8 +13,8 @@
 #include <string>
 #include <vector>
 
-#include "abbe/daemon/recorder.hpp"
-#include "abbe/daemon/recording_reader.hpp"
+#include "abbe/recording/recorder.hpp"
+#include "abbe/recording/recording_reader.hpp"
 
 namespace {
 

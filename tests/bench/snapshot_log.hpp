@@ -19,10 +19,10 @@
 #include <string_view>
 #include <thread>
 
-#include "abbe/daemon/cdr.hpp"
 #include "abbe/dds/participant.hpp"
 #include "abbe/dds/payload_type.hpp"
 #include "abbe/dds/qos.hpp"
+#include "abbe/messages/cdr.hpp"
 
 namespace abbe::bench {
 

@@ -1,4 +1,4 @@
-#include "abbe/daemon/abbed.hpp"
+#include "abbe/service/abbed.hpp"
 
 #include <gmock/gmock.h>
 #include <stdlib.h>

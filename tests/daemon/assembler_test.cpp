@@ -1,4 +1,4 @@
-#include "abbe/daemon/assembler.hpp"
+#include "abbe/pipeline/assembler.hpp"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-#include "abbe/daemon/bounded_json.hpp"
+#include "abbe/base/bounded_json.hpp"
 
 #include <gtest/gtest.h>
 

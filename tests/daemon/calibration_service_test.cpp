@@ -1,4 +1,4 @@
-#include "abbe/daemon/calibration_service.hpp"
+#include "abbe/service/calibration_service.hpp"
 
 #include <gmock/gmock.h>
 
@@ -6,8 +6,8 @@
 #include <optional>
 #include <thread>
 
-#include "abbe/daemon/config.hpp"
-#include "abbe/daemon/work_aside.hpp"
+#include "abbe/config/config.hpp"
+#include "abbe/pipeline/work_aside.hpp"
 #include "recording_fixture.hpp"
 #include "synthetic_otf_run.hpp"
 

@@ -1,11 +1,13 @@
-#include "abbe/daemon/calibration_session.hpp"
+#include "abbe/methods/calibration_session.hpp"
 
 #include <gmock/gmock.h>
 
 #include <cmath>
 #include <optional>
 
-#include "abbe/daemon/device_options.hpp"
+#include "abbe/devices/device_options.hpp"
+#include "abbe/methods/otf_inputs.hpp"
+#include "abbe/pipeline/environment_use.hpp"
 
 namespace abbe::daemon {
 namespace {

@@ -1,4 +1,4 @@
-#include "abbe/daemon/cdr.hpp"
+#include "abbe/messages/cdr.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -9,7 +9,7 @@
 #include <sstream>
 #include <string>
 
-#include "abbe/daemon/topics.hpp"
+#include "abbe/messages/topics.hpp"
 
 namespace abbe::daemon {
 namespace {

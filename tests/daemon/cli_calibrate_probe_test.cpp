@@ -8,7 +8,7 @@
 #include <nlohmann/json.hpp>
 #include <sstream>
 
-#include "abbe/daemon/recorder.hpp"
+#include "abbe/recording/recorder.hpp"
 #include "recording_fixture.hpp"
 
 namespace abbe::daemon {

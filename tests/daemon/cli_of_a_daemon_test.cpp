@@ -7,7 +7,7 @@
 #include <functional>
 #include <nlohmann/json.hpp>
 
-#include "abbe/daemon/control_protocol.hpp"
+#include "abbe/base/control_protocol.hpp"
 #include "abbe_command.hpp"
 #include "recording_fixture.hpp"
 

@@ -12,8 +12,8 @@
 #include <sstream>
 
 #include "abbe/calib/model_comparison.hpp"
-#include "abbe/daemon/model_store.hpp"
-#include "abbe/daemon/recorder.hpp"
+#include "abbe/model/model_store.hpp"
+#include "abbe/recording/recorder.hpp"
 #include "abbe_command.hpp"
 #include "synthetic_model.hpp"
 #include "synthetic_otf_run.hpp"

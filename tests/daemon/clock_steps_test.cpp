@@ -1,4 +1,4 @@
-#include "abbe/daemon/clock_steps.hpp"
+#include "abbe/base/clock_steps.hpp"
 
 #include <gtest/gtest.h>
 

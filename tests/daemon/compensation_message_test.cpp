@@ -1,6 +1,6 @@
 #include <gtest/gtest.h>
 
-#include "abbe/daemon/idl_messages.hpp"
+#include "abbe/publishing/idl_messages.hpp"
 #include "synthetic_model.hpp"
 
 namespace abbe::daemon {

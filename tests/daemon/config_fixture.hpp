@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "abbe/daemon/config.hpp"
+#include "abbe/config/config.hpp"
 #include "config_tables.hpp"
 
 namespace abbe::daemon {

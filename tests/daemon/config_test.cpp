@@ -1,4 +1,4 @@
-#include "abbe/daemon/config.hpp"
+#include "abbe/config/config.hpp"
 
 #include <gmock/gmock.h>
 
@@ -6,8 +6,8 @@
 #include <set>
 #include <string>
 
-#include "abbe/daemon/device_options.hpp"
-#include "abbe/daemon/unmeasured_air.hpp"
+#include "abbe/config/unmeasured_air.hpp"
+#include "abbe/devices/device_options.hpp"
 #include "config_fixture.hpp"
 
 namespace abbe::daemon {

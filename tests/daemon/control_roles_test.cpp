@@ -1,4 +1,4 @@
-#include "abbe/daemon/control_roles.hpp"
+#include "abbe/service/control_roles.hpp"
 
 #include <gmock/gmock.h>
 #include <grp.h>

@@ -16,7 +16,7 @@
 #include <string>
 #include <vector>
 
-#include "abbe/daemon/control_protocol.hpp"
+#include "abbe/base/control_protocol.hpp"
 
 namespace abbe::daemon {
 namespace {

@@ -2,8 +2,8 @@
 
 #include <string>
 
-#include "abbe/daemon/config.hpp"
-#include "abbe/daemon/device_options.hpp"
+#include "abbe/config/config.hpp"
+#include "abbe/devices/device_options.hpp"
 #include "config_tables.hpp"
 
 namespace abbe::daemon {

@@ -8,8 +8,8 @@
 #include <string>
 #include <thread>
 
-#include "abbe/daemon/config.hpp"
-#include "abbe/daemon/device_set.hpp"
+#include "abbe/config/config.hpp"
+#include "abbe/devices/device_set.hpp"
 #include "abbe/sim/usbip_server.hpp"
 #include "config_tables.hpp"
 

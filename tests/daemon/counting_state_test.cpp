@@ -1,4 +1,4 @@
-#include "abbe/daemon/counting_state.hpp"
+#include "abbe/pipeline/counting_state.hpp"
 
 #include <gmock/gmock.h>
 #include <unistd.h>
@@ -8,9 +8,9 @@
 #include <fstream>
 #include <thread>
 
-#include "abbe/daemon/counting_state_thread.hpp"
-#include "abbe/daemon/reference_service.hpp"
-#include "abbe/daemon/work_aside.hpp"
+#include "abbe/pipeline/work_aside.hpp"
+#include "abbe/service/counting_state_thread.hpp"
+#include "abbe/service/reference_service.hpp"
 #include "config_tables.hpp"
 #include "failing_disk.hpp"
 #include "recording_fixture.hpp"

@@ -7,9 +7,9 @@
 #include <algorithm>
 #include <string_view>
 
-#include "abbe/daemon/recording_reader.hpp"
-#include "abbe/daemon/replay.hpp"
 #include "abbe/protocol/mcap/reader.hpp"
+#include "abbe/recording/recording_reader.hpp"
+#include "abbe/replay/replay.hpp"
 #include "abbe_command.hpp"
 #include "recording_fixture.hpp"
 #include "synthetic_otf_recording.hpp"

@@ -1,4 +1,4 @@
-#include "abbe/daemon/dds_bridge.hpp"
+#include "abbe/messages/dds_bridge.hpp"
 
 #include <gtest/gtest.h>
 
@@ -8,8 +8,8 @@
 #include <string>
 #include <vector>
 
-#include "abbe/daemon/cdr.hpp"
-#include "abbe/daemon/dds_link.hpp"
+#include "abbe/messages/cdr.hpp"
+#include "abbe/messages/dds_link.hpp"
 
 namespace abbe::daemon {
 namespace {

@@ -13,8 +13,8 @@
 #include <string>
 #include <vector>
 
-#include "abbe/daemon/cdr.hpp"
-#include "abbe/daemon/topics.hpp"
+#include "abbe/messages/cdr.hpp"
+#include "abbe/messages/topics.hpp"
 
 namespace abbe::daemon::test {
 

@@ -1,4 +1,4 @@
-#include "abbe/daemon/dds_link.hpp"
+#include "abbe/messages/dds_link.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

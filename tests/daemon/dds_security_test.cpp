@@ -1,4 +1,4 @@
-#include "abbe/daemon/dds_security.hpp"
+#include "abbe/messages/dds_security.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

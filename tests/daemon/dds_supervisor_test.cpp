@@ -1,4 +1,4 @@
-#include "abbe/daemon/dds_supervisor.hpp"
+#include "abbe/publishing/dds_supervisor.hpp"
 
 #include <gtest/gtest.h>
 #include <linux/capability.h>

@@ -2,8 +2,9 @@
 
 #include <string>
 
-#include "abbe/daemon/config.hpp"
-#include "abbe/daemon/device_options.hpp"
+#include "abbe/config/config.hpp"
+#include "abbe/devices/device_options.hpp"
+#include "abbe/pipeline/environment_use.hpp"
 #include "config_tables.hpp"
 
 namespace abbe::daemon {

@@ -5,9 +5,9 @@
 #include <chrono>
 #include <thread>
 
-#include "abbe/daemon/device_set.hpp"
-#include "abbe/daemon/recorder_thread.hpp"
+#include "abbe/devices/device_set.hpp"
 #include "abbe/drivers/environment/receiver.hpp"
+#include "abbe/recording/recorder_thread.hpp"
 #include "abbe/sim/modbus_server.hpp"
 #include "config_tables.hpp"
 #include "recording_fixture.hpp"

@@ -1,11 +1,11 @@
-#include "abbe/daemon/environment_use.hpp"
+#include "abbe/pipeline/environment_use.hpp"
 
 #include <gtest/gtest.h>
 
 #include <cmath>
 
-#include "abbe/daemon/assembler.hpp"
-#include "abbe/daemon/live_view.hpp"
+#include "abbe/pipeline/assembler.hpp"
+#include "abbe/pipeline/live_view.hpp"
 
 namespace abbe::daemon {
 namespace {

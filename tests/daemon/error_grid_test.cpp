@@ -2,7 +2,7 @@
 
 #include <gmock/gmock.h>
 
-#include "abbe/daemon/idl_messages.hpp"
+#include "abbe/publishing/idl_messages.hpp"
 #include "synthetic_model.hpp"
 
 namespace abbe::daemon {

@@ -1,10 +1,10 @@
 /// Touches as the hub brings them: usable or not, with device and reason; the session that is made of them.
-#include "abbe/daemon/evemu_acquisition.hpp"
+#include "abbe/methods/evemu_acquisition.hpp"
 
 #include <gmock/gmock.h>
 
 #include <nlohmann/json.hpp>
-#include "abbe/daemon/calibration_session.hpp"
+#include "abbe/methods/calibration_session.hpp"
 
 #include "evemu_run.hpp"
 

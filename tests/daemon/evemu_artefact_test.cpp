@@ -10,14 +10,15 @@
 #include <nlohmann/json.hpp>
 #include <regex>
 
-#include "abbe/daemon/artefact_thermometer.hpp"
-#include "abbe/daemon/assembler.hpp"
-#include "abbe/daemon/calibration_session.hpp"
-#include "abbe/daemon/device_options.hpp"
-#include "abbe/daemon/evemu_files.hpp"
-#include "abbe/daemon/replay.hpp"
+#include "abbe/devices/device_options.hpp"
+#include "abbe/methods/artefact_thermometer.hpp"
+#include "abbe/methods/calibration_session.hpp"
+#include "abbe/methods/otf_inputs.hpp"
+#include "abbe/pipeline/assembler.hpp"
+#include "abbe/replay/replay.hpp"
 #include "abbe/sim/ball_array.hpp"
 #include "abbe/sim/touching.hpp"
+#include "abbe/tables/evemu_files.hpp"
 #include "abbe_command.hpp"
 #include "config_tables.hpp"
 #include "evemu_run.hpp"

@@ -11,9 +11,9 @@
 #include <nlohmann/json.hpp>
 #include <regex>
 
-#include "abbe/daemon/calibration_request.hpp"
-#include "abbe/daemon/evemu_files.hpp"
-#include "abbe/daemon/model_document.hpp"
+#include "abbe/methods/calibration_request.hpp"
+#include "abbe/model/model_document.hpp"
+#include "abbe/tables/evemu_files.hpp"
 #include "abbe_command.hpp"
 #include "config_tables.hpp"
 #include "evemu_run.hpp"

@@ -9,7 +9,7 @@
 #include <string>
 #include <vector>
 
-#include "abbe/daemon/config.hpp"
+#include "abbe/config/config.hpp"
 
 namespace abbe::daemon {
 namespace {

@@ -1,4 +1,4 @@
-#include "abbe/daemon/exit_deadline.hpp"
+#include "abbe/base/exit_deadline.hpp"
 
 #include <gtest/gtest.h>
 #include <unistd.h>

@@ -7,8 +7,8 @@
 #include <iterator>
 #include <set>
 
-#include "abbe/daemon/datum.hpp"
-#include "abbe/daemon/replay.hpp"
+#include "abbe/pipeline/datum.hpp"
+#include "abbe/replay/replay.hpp"
 #include "config_tables.hpp"
 #include "recording_fixture.hpp"
 

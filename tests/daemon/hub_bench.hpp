@@ -1,6 +1,6 @@
 #pragma once
-/// A hub of the daemon's own parts, the far end of its link, and a clock that the test moves. Devices: what the
-/// test puts in the devices' place.
+/// A hub of the daemon's own parts, the far end of its link, and a clock that the test moves. Devices: what
+/// the test puts in the devices' place.
 
 #include <gtest/gtest.h>
 #include <unistd.h>
@@ -10,8 +10,8 @@
 #include <memory>
 #include <optional>
 
-#include "abbe/daemon/control_api.hpp"
-#include "abbe/daemon/hub.hpp"
+#include "abbe/service/control_api.hpp"
+#include "abbe/service/hub.hpp"
 #include "dds_far_end.hpp"
 #include "recording_fixture.hpp"
 #include "synthetic_model.hpp"

@@ -6,8 +6,8 @@
 #include <mutex>
 #include <thread>
 
-#include "abbe/daemon/work_aside.hpp"
 #include "abbe/drivers/status_board.hpp"
+#include "abbe/pipeline/work_aside.hpp"
 #include "allocation_count.hpp"
 #include "config_tables.hpp"
 #include "hub_bench.hpp"

@@ -1,4 +1,4 @@
-#include "abbe/daemon/hub.hpp"
+#include "abbe/service/hub.hpp"
 
 #include <gmock/gmock.h>
 #include <unistd.h>

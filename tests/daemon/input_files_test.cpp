@@ -1,11 +1,11 @@
-#include "abbe/daemon/input_files.hpp"
+#include "abbe/tables/input_files.hpp"
 
 #include <gmock/gmock.h>
 
 #include <fstream>
 #include <string>
 
-#include "abbe/daemon/sha256.hpp"
+#include "abbe/base/sha256.hpp"
 
 namespace abbe::daemon {
 namespace {
@@ -156,7 +156,7 @@ TEST_F(InputFiles, ReadKnownErrorsInMicrometres) {
   ASSERT_TRUE(errors) << errors.error().details.front();
   ASSERT_THAT(errors->errors_m, SizeIs(1));
   EXPECT_EQ(errors->points_m[0], (AxisPosition{0.01, 0.02, 0.03}));
-  EXPECT_LT((errors->errors_m[0] - calib::Vector3(1e-6, 2e-6, 3e-6)).norm(), 1e-20);
+  EXPECT_LT((calib::Vector3(errors->errors_m[0].data()) - calib::Vector3(1e-6, 2e-6, 3e-6)).norm(), 1e-20);
 }
 
 TEST_F(InputFiles, RefuseKnownErrorsWithoutAComponentOrARow) {

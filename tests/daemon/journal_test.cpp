@@ -1,4 +1,4 @@
-#include "abbe/daemon/journal.hpp"
+#include "abbe/base/journal.hpp"
 
 #include <fmt/format.h>
 #include <gmock/gmock.h>
@@ -12,7 +12,7 @@
 #include <stdexcept>
 #include <string>
 
-#include "abbe/daemon/journal_thread.hpp"
+#include "abbe/service/journal_thread.hpp"
 #include "recording_fixture.hpp"
 
 namespace abbe::daemon {

@@ -1,6 +1,6 @@
 // Recordings that a killed recorder left open are closed as it would have closed them.
 
-#include "abbe/daemon/left_recordings.hpp"
+#include "abbe/recording/left_recordings.hpp"
 
 #include <gmock/gmock.h>
 #include <sys/wait.h>

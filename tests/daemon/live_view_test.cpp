@@ -1,4 +1,4 @@
-#include "abbe/daemon/live_view.hpp"
+#include "abbe/pipeline/live_view.hpp"
 
 #include <gtest/gtest.h>
 

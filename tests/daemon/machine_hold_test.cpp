@@ -11,8 +11,8 @@
 #include <string>
 #include <thread>
 
-#include "abbe/daemon/config.hpp"
-#include "abbe/daemon/device_set.hpp"
+#include "abbe/config/config.hpp"
+#include "abbe/devices/device_set.hpp"
 #include "config_tables.hpp"
 #include "recording_fixture.hpp"
 #include "text_files.hpp"

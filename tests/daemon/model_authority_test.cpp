@@ -1,4 +1,4 @@
-#include "abbe/daemon/model_authority.hpp"
+#include "abbe/service/model_authority.hpp"
 
 #include <gmock/gmock.h>
 #include <sched.h>
@@ -10,8 +10,8 @@
 #include <memory>
 #include <thread>
 
-#include "abbe/daemon/cdr.hpp"
-#include "abbe/daemon/work_aside.hpp"
+#include "abbe/messages/cdr.hpp"
+#include "abbe/pipeline/work_aside.hpp"
 #include "synthetic_model.hpp"
 #include "text_files.hpp"
 

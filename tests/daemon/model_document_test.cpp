@@ -1,4 +1,4 @@
-#include "abbe/daemon/model_document.hpp"
+#include "abbe/model/model_document.hpp"
 
 #include <gmock/gmock.h>
 

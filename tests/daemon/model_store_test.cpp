@@ -1,4 +1,4 @@
-#include "abbe/daemon/model_store.hpp"
+#include "abbe/model/model_store.hpp"
 
 #include <fcntl.h>
 #include <fmt/format.h>

@@ -1,10 +1,10 @@
-#include "abbe/daemon/old_recordings.hpp"
+#include "abbe/recording/old_recordings.hpp"
 
 #include <gmock/gmock.h>
 
 #include <fstream>
 
-#include "abbe/daemon/model_store.hpp"
+#include "abbe/model/model_store.hpp"
 #include "recording_fixture.hpp"
 #include "synthetic_model.hpp"
 

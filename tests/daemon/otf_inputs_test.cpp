@@ -1,4 +1,4 @@
-#include "abbe/daemon/otf_inputs.hpp"
+#include "abbe/methods/otf_inputs.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

@@ -4,8 +4,8 @@
 #include <gmock/gmock.h>
 
 #include "abbe/calib/evemu/solve.hpp"
-#include "abbe/daemon/cdr.hpp"
-#include "abbe/daemon/idl_messages.hpp"
+#include "abbe/messages/cdr.hpp"
+#include "abbe/publishing/idl_messages.hpp"
 #include "evemu_run.hpp"
 
 namespace abbe::daemon {

@@ -1,4 +1,4 @@
-#include "abbe/daemon/publisher.hpp"
+#include "abbe/publishing/publisher.hpp"
 
 #include <gmock/gmock.h>
 #include <stdlib.h>

@@ -8,9 +8,9 @@
 #include <cmath>
 #include <vector>
 
-#include "abbe/daemon/device_options.hpp"
-#include "abbe/daemon/replay.hpp"
+#include "abbe/devices/device_options.hpp"
 #include "abbe/drivers/can/encoder_receiver.hpp"
+#include "abbe/replay/replay.hpp"
 #include "config_tables.hpp"
 #include "recording_fixture.hpp"
 

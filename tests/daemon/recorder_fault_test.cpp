@@ -4,8 +4,8 @@
 
 #include <filesystem>
 
-#include "abbe/daemon/calibration_request.hpp"
-#include "abbe/daemon/recorder_thread.hpp"
+#include "abbe/methods/calibration_request.hpp"
+#include "abbe/recording/recorder_thread.hpp"
 #include "failing_disk.hpp"
 #include "recording_fixture.hpp"
 

@@ -1,8 +1,8 @@
-#include "abbe/daemon/recorder.hpp"
+#include "abbe/recording/recorder.hpp"
 
 #include <algorithm>
 
-#include "abbe/daemon/sha256.hpp"
+#include "abbe/base/sha256.hpp"
 #include "abbe/protocol/raw_bytes_cdr.hpp"
 #include "recording_fixture.hpp"
 

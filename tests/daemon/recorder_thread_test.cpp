@@ -1,4 +1,4 @@
-#include "abbe/daemon/recorder_thread.hpp"
+#include "abbe/recording/recorder_thread.hpp"
 
 #include <gmock/gmock.h>
 

@@ -13,9 +13,9 @@
 #include <string>
 #include <vector>
 
-#include "abbe/daemon/recorder.hpp"
-#include "abbe/daemon/recording_reader.hpp"
 #include "abbe/protocol/mcap/reader.hpp"
+#include "abbe/recording/recorder.hpp"
+#include "abbe/recording/recording_reader.hpp"
 
 namespace abbe::daemon {
 

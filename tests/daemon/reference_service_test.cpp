@@ -1,4 +1,4 @@
-#include "abbe/daemon/reference_service.hpp"
+#include "abbe/service/reference_service.hpp"
 
 #include <gmock/gmock.h>
 

@@ -1,4 +1,4 @@
-#include "abbe/daemon/reference_session.hpp"
+#include "abbe/pipeline/reference_session.hpp"
 
 #include <gtest/gtest.h>
 

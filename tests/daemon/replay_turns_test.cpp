@@ -9,9 +9,9 @@
 #include <filesystem>
 #include <stdexcept>
 
-#include "abbe/daemon/assembler.hpp"
-#include "abbe/daemon/device_options.hpp"
-#include "abbe/daemon/replay.hpp"
+#include "abbe/devices/device_options.hpp"
+#include "abbe/pipeline/assembler.hpp"
+#include "abbe/replay/replay.hpp"
 #include "config_tables.hpp"
 #include "recording_fixture.hpp"
 

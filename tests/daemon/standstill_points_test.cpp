@@ -1,6 +1,6 @@
 #include <gtest/gtest.h>
 
-#include "abbe/daemon/standstill_points.hpp"
+#include "abbe/pipeline/standstill_points.hpp"
 
 namespace abbe::daemon {
 namespace {

@@ -6,8 +6,8 @@
 #include <chrono>
 #include <filesystem>
 
-#include "abbe/daemon/calibration_request.hpp"
-#include "abbe/daemon/recorder.hpp"
+#include "abbe/methods/calibration_request.hpp"
+#include "abbe/recording/recorder.hpp"
 #include "config_tables.hpp"
 #include "synthetic_otf_run.hpp"
 

@@ -6,7 +6,7 @@
 #include <optional>
 #include <string>
 
-#include "abbe/daemon/touch_service.hpp"
+#include "abbe/pipeline/touch_service.hpp"
 
 namespace abbe::daemon {
 namespace {

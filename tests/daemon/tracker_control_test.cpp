@@ -10,8 +10,8 @@
 #include <string>
 #include <thread>
 
-#include "abbe/daemon/abbed.hpp"
-#include "abbe/daemon/control_protocol.hpp"
+#include "abbe/base/control_protocol.hpp"
+#include "abbe/service/abbed.hpp"
 #include "abbe/sim/tracker_server.hpp"
 #include "abbe_command.hpp"
 #include "config_tables.hpp"

@@ -1,6 +1,6 @@
 /// Orders to a tracker, and what is said of those that nobody reports.
 
-#include "abbe/daemon/tracker_service.hpp"
+#include "abbe/service/tracker_service.hpp"
 
 #include <gmock/gmock.h>
 

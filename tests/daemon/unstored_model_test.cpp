@@ -1,6 +1,6 @@
 // What becomes of a model that was identified while disk, store or recorder failed.
 
-#include "abbe/daemon/calibration_service.hpp"
+#include "abbe/service/calibration_service.hpp"
 
 #include <fcntl.h>
 #include <gmock/gmock.h>
@@ -11,8 +11,8 @@
 #include <limits>
 #include <thread>
 
-#include "abbe/daemon/exit_deadline.hpp"
-#include "abbe/daemon/work_aside.hpp"
+#include "abbe/base/exit_deadline.hpp"
+#include "abbe/pipeline/work_aside.hpp"
 #include "synthetic_otf_run.hpp"
 
 namespace abbe::daemon {

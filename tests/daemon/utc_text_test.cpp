@@ -1,4 +1,4 @@
-#include "abbe/daemon/utc_text.hpp"
+#include "abbe/base/utc_text.hpp"
 
 #include <gtest/gtest.h>
 
@@ -21,8 +21,9 @@ TEST(UtcText, RefusesYearsThatNanosecondsDoNotHold) {
 }
 
 TEST(UtcText, RefusesAnyOtherForm) {
-  for (const char* text : {"2024-05-17T08:30:00.123456789z", "2024- 5-17T08:30:00.123456789Z", "2024-05-17T08:30:00.+23456789Z",
-                           "2024-02-30T08:30:00.000000000Z", "2024-05-17T24:00:00.000000000Z", "-024-05-17T08:30:00.123456789Z"})
+  for (const char* text :
+       {"2024-05-17T08:30:00.123456789z", "2024- 5-17T08:30:00.123456789Z", "2024-05-17T08:30:00.+23456789Z",
+        "2024-02-30T08:30:00.000000000Z", "2024-05-17T24:00:00.000000000Z", "-024-05-17T08:30:00.123456789Z"})
     EXPECT_FALSE(utc_from_text(text)) << text;
 }
 

@@ -1,4 +1,4 @@
-#include "abbe/daemon/verification_service.hpp"
+#include "abbe/service/verification_service.hpp"
 
 #include <gmock/gmock.h>
 

@@ -12,10 +12,10 @@
 #include <nlohmann/json.hpp>
 #include <sstream>
 
+#include "abbe/base/control_protocol.hpp"
 #include "abbe/calib/evemu/solve.hpp"
-#include "abbe/daemon/control_protocol.hpp"
-#include "abbe/daemon/input_files.hpp"
-#include "abbe/daemon/model_document.hpp"
+#include "abbe/model/model_document.hpp"
+#include "abbe/tables/input_files.hpp"
 #include "abbe_command.hpp"
 #include "config_tables.hpp"
 #include "evemu_study.hpp"

@@ -1,4 +1,4 @@
-#include "abbe/daemon/work_aside.hpp"
+#include "abbe/pipeline/work_aside.hpp"
 
 #include <gtest/gtest.h>
 #include <sys/resource.h>

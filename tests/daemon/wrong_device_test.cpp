@@ -6,7 +6,7 @@
 #include <string>
 #include <thread>
 
-#include "abbe/daemon/device_set.hpp"
+#include "abbe/devices/device_set.hpp"
 #include "abbe/sim/modbus_server.hpp"
 #include "config_tables.hpp"
 

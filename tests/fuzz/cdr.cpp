@@ -7,8 +7,8 @@
 #include <span>
 #include <vector>
 
-#include "abbe/daemon/cdr.hpp"
-#include "abbe/daemon/topics.hpp"
+#include "abbe/messages/cdr.hpp"
+#include "abbe/messages/topics.hpp"
 
 namespace {
 

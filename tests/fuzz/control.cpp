@@ -22,9 +22,9 @@
 #include <string>
 #include <string_view>
 
-#include "abbe/daemon/bounded_json.hpp"
-#include "abbe/daemon/control_api.hpp"
-#include "control/json_line.hpp"
+#include "abbe/base/bounded_json.hpp"
+#include "abbe/service/control_api.hpp"
+#include "json_line.hpp"
 
 namespace {
 

@@ -10,9 +10,9 @@
 #include <string>
 
 #include "abbe/protocol/mcap/records.hpp"
-#include "recording/metadata_checksum.hpp"
-#include "recording/recording_contents.hpp"
-#include "recording/streams.hpp"
+#include "metadata_checksum.hpp"
+#include "recording_contents.hpp"
+#include "streams.hpp"
 
 namespace {
 

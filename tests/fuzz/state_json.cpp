@@ -5,7 +5,7 @@
 #include <cstdlib>
 #include <string_view>
 
-#include "store/store_state.hpp"
+#include "store_state.hpp"
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   using namespace abbe::daemon;  // NOLINT(google-build-using-namespace): a program, not a header

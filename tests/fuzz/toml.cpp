@@ -9,8 +9,8 @@
 #include <cstdlib>
 #include <string_view>
 
-#include "abbe/daemon/config.hpp"
-#include "config/bounded_toml.hpp"
+#include "abbe/config/bounded_toml.hpp"
+#include "abbe/config/config.hpp"
 
 namespace {
 

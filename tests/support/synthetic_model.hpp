@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "abbe/calib/axis_table.hpp"
-#include "abbe/daemon/model_document.hpp"
+#include "abbe/model/model_document.hpp"
 
 namespace abbe::daemon::test {
 

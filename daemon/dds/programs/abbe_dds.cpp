@@ -11,13 +11,13 @@
 #include <optional>
 #include <string>
 
-#include "abbe/daemon/config.hpp"
-#include "abbe/daemon/dds_bridge.hpp"
-#include "abbe/daemon/service_manager.hpp"
+#include "abbe/base/service_manager.hpp"
+#include "abbe/config/config.hpp"
 #include "abbe/dds/announcer.hpp"
 #include "abbe/dds/interface_watch.hpp"
 #include "abbe/dds/participant.hpp"
 #include "abbe/dds/writers.hpp"
+#include "abbe/messages/dds_bridge.hpp"
 
 namespace {
 

@@ -13,8 +13,7 @@
 #include <string>
 #include <utility>
 
-#include "abbe/daemon/cdr.hpp"
-#include "abbe/daemon/input_files.hpp"
+#include "abbe/base/known_errors.hpp"
 #include "abbe/dds/grid_nodes.hpp"
 #include "abbe/dds/json_lines.hpp"
 #include "abbe/dds/participant.hpp"
@@ -22,6 +21,7 @@
 #include "abbe/dds/publisher_pin.hpp"
 #include "abbe/dds/readers.hpp"
 #include "abbe/dds/received_model.hpp"
+#include "abbe/messages/cdr.hpp"
 
 namespace {
 
@@ -348,6 +348,12 @@ void print_comparison(const Options& options, const calib::FieldComparison& c, c
   row("after:  best-fit rigid motion removed", c.after_rigid_free);
 }
 
+std::vector<calib::Vector3> vectors(const std::vector<std::array<double, 3>>& rows) {
+  std::vector<calib::Vector3> out;
+  for (const auto& row : rows) out.emplace_back(row[0], row[1], row[2]);
+  return out;
+}
+
 Result<void> use_model(const Options& options, const dds::ReceivedModel& model,
                        const std::optional<daemon::KnownErrorsFile>& known) {
   const auto nodes = model.grid();
@@ -357,9 +363,7 @@ Result<void> use_model(const Options& options, const dds::ReceivedModel& model,
   if (!known) return {};
   const auto lattice = dds::lattice_of(*nodes);
   if (!lattice) return tl::make_unexpected(lattice.error());
-  std::vector<calib::Vector3> positions_m;
-  for (const auto& q : known->points_m) positions_m.emplace_back(q[0], q[1], q[2]);
-  const auto comparison = calib::compare(positions_m, known->errors_m, *lattice);
+  const auto comparison = calib::compare(vectors(known->points_m), vectors(known->errors_m), *lattice);
   if (!comparison) return daemon::fail(ErrorCode::DataInsufficient, comparison.error().text);
   print_comparison(options, *comparison, model.state()->model_id());
   return {};

@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "abbe/daemon/error.hpp"
+#include "abbe/base/error.hpp"
 #include "abbe/dds/interface_address.hpp"
 
 namespace abbe::dds {

@@ -2,8 +2,8 @@
 
 #include <nlohmann/json.hpp>
 
-#include "abbe/daemon/cdr.hpp"
 #include "abbe/dds/received_model.hpp"
+#include "abbe/messages/cdr.hpp"
 
 namespace abbe::dds {
 namespace {

@@ -13,7 +13,7 @@
 #include <sstream>
 #include <thread>
 
-#include "abbe/daemon/dds_link.hpp"
+#include "abbe/messages/dds_link.hpp"
 #include "shop_floor.hpp"
 
 namespace abbe::test {

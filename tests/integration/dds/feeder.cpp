@@ -11,8 +11,8 @@
 #include <string>
 #include <thread>
 
-#include "abbe/daemon/dds_link.hpp"
-#include "abbe/daemon/dds_supervisor.hpp"
+#include "abbe/messages/dds_link.hpp"
+#include "abbe/publishing/dds_supervisor.hpp"
 #include "sample_messages.hpp"
 
 namespace {

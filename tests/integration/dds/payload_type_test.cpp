@@ -5,7 +5,7 @@
 #include <fastdds/rtps/common/SerializedPayload.h>
 #include <gtest/gtest.h>
 
-#include "abbe/daemon/cdr.hpp"
+#include "abbe/messages/cdr.hpp"
 #include "abbe_v1PubSubTypes.h"
 #include "sample_messages.hpp"
 

@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "abbe/daemon/cdr.hpp"
+#include "abbe/messages/cdr.hpp"
 
 namespace abbe::test {
 

@@ -9,7 +9,7 @@
 #include <memory>
 #include <string>
 
-#include "abbe/daemon/dds_security.hpp"
+#include "abbe/messages/dds_security.hpp"
 #include "domain_claim.hpp"
 #include "process.hpp"
 #include "sample_messages.hpp"

@@ -16,10 +16,10 @@
 #include <thread>
 #include <utility>
 
-#include "abbe/daemon/cdr.hpp"
 #include "abbe/dds/participant.hpp"
 #include "abbe/dds/payload_type.hpp"
 #include "abbe/dds/qos.hpp"
+#include "abbe/messages/cdr.hpp"
 
 namespace abbe::test {
 namespace {

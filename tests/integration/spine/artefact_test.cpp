@@ -7,8 +7,8 @@
 #include <fstream>
 #include <random>
 
-#include "abbe/daemon/control_protocol.hpp"
-#include "abbe/daemon/evemu_files.hpp"
+#include "abbe/base/control_protocol.hpp"
+#include "abbe/tables/evemu_files.hpp"
 #include "counter_card_run.hpp"
 
 namespace abbe::test {

@@ -6,7 +6,7 @@
 
 #include <fstream>
 
-#include "abbe/daemon/counting_state.hpp"
+#include "abbe/pipeline/counting_state.hpp"
 #include "counter_card_run.hpp"
 
 namespace abbe::test {

@@ -9,7 +9,7 @@
 #include <mutex>
 #include <thread>
 
-#include "abbe/daemon/control_protocol.hpp"
+#include "abbe/base/control_protocol.hpp"
 #include "abbe/sim/ippdme_server.hpp"
 #include "hung_hub.hpp"
 #include "spine.hpp"

@@ -12,8 +12,8 @@
 #include <random>
 #include <set>
 
-#include "abbe/daemon/model_store.hpp"
-#include "abbe/daemon/recording_reader.hpp"
+#include "abbe/model/model_store.hpp"
+#include "abbe/recording/recording_reader.hpp"
 #include "spine.hpp"
 
 namespace abbe::test {

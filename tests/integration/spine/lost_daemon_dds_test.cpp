@@ -6,8 +6,8 @@
 
 #include <sstream>
 
-#include "abbe/daemon/config.hpp"
-#include "abbe/daemon/model_store.hpp"
+#include "abbe/config/config.hpp"
+#include "abbe/model/model_store.hpp"
 #include "spine.hpp"
 #include "synthetic_model.hpp"
 

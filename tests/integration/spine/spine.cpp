@@ -7,8 +7,8 @@
 #include <algorithm>
 #include <fstream>
 
-#include "abbe/daemon/control_protocol.hpp"
-#include "abbe/daemon/input_files.hpp"
+#include "abbe/base/control_protocol.hpp"
+#include "abbe/tables/input_files.hpp"
 #include "config_tables.hpp"
 
 namespace abbe::test {

@@ -21,8 +21,8 @@
 #include <string>
 #include <vector>
 
-#include "abbe/daemon/control_protocol.hpp"
-#include "abbe/daemon/recording_reader.hpp"
+#include "abbe/base/control_protocol.hpp"
+#include "abbe/recording/recording_reader.hpp"
 #include "program.hpp"
 
 namespace abbe::test {

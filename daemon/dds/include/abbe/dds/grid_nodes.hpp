@@ -4,8 +4,8 @@
 #include <filesystem>
 #include <span>
 
+#include "abbe/base/error.hpp"
 #include "abbe/calib/error_lattice.hpp"
-#include "abbe/daemon/error.hpp"
 #include "abbe_v1.h"
 
 namespace abbe::dds {

@@ -6,8 +6,8 @@
 #include <span>
 #include <string>
 
-#include "abbe/daemon/error.hpp"
-#include "abbe/daemon/topics.hpp"
+#include "abbe/base/error.hpp"
+#include "abbe/messages/topics.hpp"
 
 namespace abbe::dds {
 

@@ -9,9 +9,9 @@
 #include <utility>
 #include <vector>
 
-#include "abbe/daemon/dds_security.hpp"
-#include "abbe/daemon/error.hpp"
-#include "abbe/daemon/topics.hpp"
+#include "abbe/base/error.hpp"
+#include "abbe/messages/dds_security.hpp"
+#include "abbe/messages/topics.hpp"
 
 namespace eprosima::fastdds::dds {
 class DomainParticipant;

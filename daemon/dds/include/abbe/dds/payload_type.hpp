@@ -9,7 +9,7 @@
 #include <cstddef>
 #include <vector>
 
-#include "abbe/daemon/topics.hpp"
+#include "abbe/messages/topics.hpp"
 
 namespace abbe::dds {
 

@@ -5,7 +5,7 @@
 #include <fastdds/dds/publisher/qos/DataWriterQos.hpp>
 #include <fastdds/dds/subscriber/qos/DataReaderQos.hpp>
 
-#include "abbe/daemon/topics.hpp"
+#include "abbe/messages/topics.hpp"
 
 namespace abbe::dds {
 

@@ -10,7 +10,7 @@
 #include <string>
 #include <vector>
 
-#include "abbe/daemon/error.hpp"
+#include "abbe/base/error.hpp"
 #include "abbe_v1.h"
 
 namespace abbe::dds {

@@ -7,9 +7,9 @@
 #include <span>
 #include <vector>
 
-#include "abbe/daemon/dds_bridge.hpp"
 #include "abbe/dds/participant.hpp"
 #include "abbe/dds/payload_type.hpp"
+#include "abbe/messages/dds_bridge.hpp"
 
 namespace eprosima::fastdds::dds {
 class DataWriter;

@@ -1,0 +1,17 @@
+#pragma once
+
+#include <filesystem>
+#include <memory>
+
+#include "abbe/base/control_protocol.hpp"
+#include "abbe/base/file_descriptor.hpp"
+
+namespace abbe::daemon {
+
+/// Serves a socket that listens at `path` already (listen_unix()): nothing is refused any more.
+[[nodiscard]] std::unique_ptr<ControlServer> serve_control(FileDescriptor listener,
+                                                           const std::filesystem::path& path,
+                                                           ControlServer::Handler handler,
+                                                           const ControlLimits& limits = {});
+
+}  // namespace abbe::daemon

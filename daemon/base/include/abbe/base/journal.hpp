@@ -1,0 +1,47 @@
+#pragma once
+/// Structured log lines. Under systemd they go to the journal in its native protocol, with their fields;
+/// elsewhere to stderr, as text with the same content. Ordinary threads only.
+
+#include <filesystem>
+#include <memory>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "abbe/base/error.hpp"
+
+namespace abbe::daemon {
+
+/// Values of syslog(3).
+enum class Urgency { Error = 3, Warning = 4, Notice = 5, Info = 6 };
+
+struct JournalField {
+  std::string name;  ///< "ABBE_DEVICE"
+  std::string value;
+};
+
+struct JournalEntry {
+  Urgency urgency = Urgency::Info;
+  std::string message;          ///< what happened, where, what to do
+  std::string_view message_id;  ///< 32 hexadecimal digits, the same for every line of its kind
+  std::vector<JournalField> fields = {};
+};
+
+class JournalSink {
+ public:
+  virtual ~JournalSink() = default;
+  virtual void write(const JournalEntry& entry) = 0;
+};
+
+/// systemd's JOURNAL_NATIVE_PROTOCOL: one datagram an entry. What the journal does not take in 50 ms is lost,
+/// and counted in the next entry. An Error if nobody listens at `socket`.
+[[nodiscard]] Result<std::unique_ptr<JournalSink>> native_journal(
+    const std::filesystem::path& socket = "/run/systemd/journal/socket");
+
+/// "abbed: MESSAGE [ABBE_DEVICE=tracker ...]"; control characters, which a device may have sent, as '?'.
+[[nodiscard]] std::unique_ptr<JournalSink> text_journal(int fd);
+
+/// The journal if it reads this process's stderr (JOURNAL_STREAM of systemd.exec(5)), else stderr.
+[[nodiscard]] std::unique_ptr<JournalSink> open_journal();
+
+}  // namespace abbe::daemon

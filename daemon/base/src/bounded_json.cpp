@@ -1,0 +1,73 @@
+#include "abbe/base/bounded_json.hpp"
+
+#include <fmt/format.h>
+
+#include <string>
+
+namespace abbe::daemon {
+namespace {
+
+using nlohmann::json;
+
+/// The byte after the string that begins at `quote`, or the end of a text that does not close it.
+std::size_t end_of_string(std::string_view text, std::size_t quote) {
+  for (std::size_t i = quote + 1; i < text.size(); ++i) {
+    if (text[i] == '\\')
+      ++i;
+    else if (text[i] == '"')
+      return i + 1;
+  }
+  return text.size();
+}
+
+/// Depth and values as any parser would count them up to its first error.
+Result<void> check_structure(std::string_view text, std::string_view what, const JsonBounds& bounds) {
+  std::size_t depth = 0;
+  std::size_t values = 1;
+  for (std::size_t i = 0; i < text.size();) {
+    const char c = text[i];
+    if (c == '"') {
+      i = end_of_string(text, i);
+      continue;
+    }
+    const bool opens = c == '[' || c == '{';
+    if (opens && ++depth > bounds.depth)
+      return fail(ErrorCode::BadInput,
+                  fmt::format("{}: nested deeper than {} at byte {}", what, bounds.depth, i + 1));
+    if ((c == ']' || c == '}') && depth > 0) --depth;
+    if ((opens || c == ',') && ++values > bounds.values)
+      return fail(ErrorCode::BadInput, fmt::format("{}: more than {} values", what, bounds.values));
+    ++i;
+  }
+  return {};
+}
+
+/// "[json.exception.parse_error.101] parse error at line 1, column 2: syntax error ...": from "syntax" on.
+std::string_view cause_of(std::string_view text) {
+  const std::size_t place = text.find("column ");
+  const std::size_t colon = text.find(": ", place == std::string_view::npos ? 0 : place);
+  return colon == std::string_view::npos ? text : text.substr(colon + 2);
+}
+
+}  // namespace
+
+Result<void> check_json(std::string_view text, std::string_view what, const JsonBounds& bounds) {
+  if (text.size() > bounds.bytes)
+    return fail(ErrorCode::BadInput,
+                fmt::format("{}: {} bytes, at most {} are read", what, text.size(), bounds.bytes));
+  return check_structure(text, what, bounds);
+}
+
+Result<json> parse_json(std::string_view text, std::string_view what, const JsonBounds& bounds) {
+  if (auto sound = check_json(text, what, bounds); !sound) return tl::unexpected(sound.error());
+  try {
+    return json::parse(text);
+  } catch (const json::parse_error& error) {
+    return fail(ErrorCode::BadInput,
+                fmt::format("{}: not JSON at byte {}: {}", what, error.byte, cause_of(error.what())));
+  } catch (const json::exception& error) {  // a number too large for a double
+    return fail(ErrorCode::BadInput, fmt::format("{}: {}", what, error.what()));
+  }
+}
+
+}  // namespace abbe::daemon

@@ -1,0 +1,89 @@
+#include <fmt/format.h>
+#include <poll.h>
+#include <sys/socket.h>
+
+#include <algorithm>
+#include <array>
+#include <cerrno>
+#include <cstdint>
+#include <cstring>
+#include <string>
+#include <string_view>
+
+#include "abbe/base/bounded_json.hpp"
+#include "abbe/base/control_protocol.hpp"
+#include "abbe/base/refusal.hpp"
+#include "abbe/base/unix_socket.hpp"
+#include "json_line.hpp"
+
+namespace abbe::daemon {
+namespace {
+
+using nlohmann::json;
+using Clock = std::chrono::steady_clock;
+
+constexpr std::size_t kLongestAnswer = 64u << 20;  // 10^5 standstills of a verification take 20 MB
+
+Error no_answer(const std::filesystem::path& path, std::string seen) {
+  return {ErrorCode::Io, fmt::format("daemon at {}: {}", path.string(), seen)};
+}
+
+Result<void> send_line(int fd, const std::string& line, const std::filesystem::path& path) {
+  for (std::size_t sent = 0; sent < line.size();) {
+    const ssize_t n = ::send(fd, line.data() + sent, line.size() - sent, MSG_NOSIGNAL);
+    if (n < 0 && errno == EINTR) continue;
+    if (n < 0 && errno == EAGAIN) return tl::unexpected(no_answer(path, "takes no request"));
+    if (n <= 0) return tl::unexpected(no_answer(path, std::strerror(errno)));
+    sent += static_cast<std::size_t>(n);
+  }
+  return {};
+}
+
+/// Milliseconds until `end`, at least 0.
+int rest_until(Clock::time_point end) {
+  return static_cast<int>(
+      std::max<std::int64_t>(0, std::chrono::ceil<std::chrono::milliseconds>(end - Clock::now()).count()));
+}
+
+Result<std::string> receive_line(int fd, std::chrono::milliseconds time_out,
+                                 const std::filesystem::path& path) {
+  const auto end = Clock::now() + time_out;
+  std::string line;
+  std::array<char, 65536> buffer;  // NOLINT: read() fills what is used
+  for (;;) {
+    pollfd wait{fd, POLLIN, 0};
+    const int ready = ::poll(&wait, 1, rest_until(end));
+    if (ready < 0 && errno == EINTR) continue;
+    if (ready == 0)
+      return tl::unexpected(no_answer(path, fmt::format("no answer in {} ms", time_out.count())));
+    const ssize_t n = ::read(fd, buffer.data(), buffer.size());
+    if (n <= 0) return tl::unexpected(no_answer(path, "closed the connection without an answer"));
+    const std::string_view came{buffer.data(), static_cast<std::size_t>(n)};
+    line += came.substr(0, came.find('\n'));
+    if (came.find('\n') != std::string_view::npos) return line;
+    if (line.size() > kLongestAnswer) return tl::unexpected(no_answer(path, "answered without an end"));
+  }
+}
+
+}  // namespace
+
+Result<json> ask_daemon(const std::filesystem::path& socket_path, const json& request,
+                        std::chrono::milliseconds time_out) {
+  auto fd = connect_unix(socket_path, time_out);
+  if (!fd) return tl::unexpected(Error{fd.error().code, fd.error().text + " (is abbed running?)"});
+  set_send_time_out(fd->get(), time_out);
+  if (auto sent = send_line(fd->get(), line_of(request), socket_path); !sent)
+    return tl::unexpected(sent.error());
+  const auto line = receive_line(fd->get(), time_out, socket_path);
+  if (!line) return tl::unexpected(line.error());
+  auto parsed = parse_json(*line, "answer", {.bytes = kLongestAnswer, .values = kLongestAnswer});
+  if (!parsed) return tl::unexpected(no_answer(socket_path, parsed.error().text));
+  json& answer = *parsed;
+  if (!answer.is_object())
+    return tl::unexpected(no_answer(socket_path, "answered something that is not a JSON object"));
+  const auto ok = answer.find("ok");
+  if (ok == answer.end() || *ok != true) return tl::unexpected(error_of_refusal(answer));
+  return answer;
+}
+
+}  // namespace abbe::daemon

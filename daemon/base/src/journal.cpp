@@ -1,0 +1,106 @@
+#include "abbe/base/journal.hpp"
+
+#include <fmt/format.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <array>
+#include <chrono>
+#include <cstdint>
+#include <cstdlib>
+#include <utility>
+
+#include "abbe/base/file_descriptor.hpp"
+#include "abbe/base/unix_socket.hpp"
+
+namespace abbe::daemon {
+namespace {
+
+// A journal that is stopped takes nothing; abbed must end all the same.
+constexpr std::chrono::milliseconds kJournalPatience{50};
+
+/// A value with a line break goes behind its length, 64 bits, little-endian first.
+void append_field(std::string& datagram, std::string_view name, std::string_view value) {
+  datagram += name;
+  if (value.find('\n') == std::string_view::npos) {
+    datagram += '=';
+  } else {
+    datagram += '\n';
+    for (int byte = 0; byte < 8; ++byte)
+      datagram += static_cast<char>(static_cast<std::uint64_t>(value.size()) >> 8 * byte & 0xff);
+  }
+  datagram += value;
+  datagram += '\n';
+}
+
+class NativeJournal final : public JournalSink {
+ public:
+  explicit NativeJournal(FileDescriptor socket) : socket_(std::move(socket)) {}
+
+  void write(const JournalEntry& entry) override {
+    std::string datagram;
+    append_field(datagram, "MESSAGE",
+                 refused_ == 0 ? entry.message
+                               : fmt::format("{}; {} lines before this were not taken by the journal",
+                                             entry.message, refused_));
+    append_field(datagram, "PRIORITY", std::to_string(static_cast<int>(entry.urgency)));
+    append_field(datagram, "SYSLOG_IDENTIFIER", "abbed");
+    append_field(datagram, "MESSAGE_ID", entry.message_id);
+    for (const auto& [name, value] : entry.fields) append_field(datagram, name, value);
+    if (refused_ > 0) append_field(datagram, "ABBE_NOT_TAKEN", std::to_string(refused_));
+    refused_ = ::write(socket_.get(), datagram.data(), datagram.size()) < 0 ? refused_ + 1 : 0;
+  }
+
+ private:
+  FileDescriptor socket_;
+  std::uint64_t refused_ = 0;  ///< entries before this one that the journal did not take
+};
+
+class TextJournal final : public JournalSink {
+ public:
+  explicit TextJournal(int fd) : fd_(fd) {}
+
+  void write(const JournalEntry& entry) override {
+    std::string line = fmt::format("abbed: {} [", entry.message);
+    for (const auto& [name, value] : entry.fields)
+      if (name != "ABBE_FAULT") line += fmt::format("{}={} ", name, value);  // it stands in the message
+    line.back() = ']';
+    std::ranges::replace_if(
+        line, [](char c) { return static_cast<unsigned char>(c) < 0x20 || c == 0x7f; }, '?');
+    line += '\n';
+    (void)!::write(fd_, line.data(), line.size());
+  }
+
+ private:
+  int fd_;
+};
+
+/// JOURNAL_STREAM is "DEVICE:INODE" of the stream that leads to the journal.
+bool stderr_is_in_the_journal() {
+  const char* stream = std::getenv("JOURNAL_STREAM");
+  struct stat status {};
+  if (stream == nullptr || ::fstat(STDERR_FILENO, &status) != 0) return false;
+  return fmt::format("{}:{}", status.st_dev, status.st_ino) == stream;
+}
+
+}  // namespace
+
+Result<std::unique_ptr<JournalSink>> native_journal(const std::filesystem::path& socket) {
+  auto connected = connect_unix_datagrams(socket);
+  if (!connected) return tl::unexpected(connected.error());
+  set_send_time_out(connected->get(), kJournalPatience);
+  return std::make_unique<NativeJournal>(std::move(*connected));
+}
+
+std::unique_ptr<JournalSink> text_journal(int fd) {
+  return std::make_unique<TextJournal>(fd);
+}
+
+std::unique_ptr<JournalSink> open_journal() {
+  if (stderr_is_in_the_journal())
+    if (auto journal = native_journal()) return std::move(*journal);
+  return text_journal(STDERR_FILENO);
+}
+
+}  // namespace abbe::daemon

@@ -1,0 +1,26 @@
+#include "abbe/base/service_manager.hpp"
+
+#include <fmt/format.h>
+#include <systemd/sd-daemon.h>
+
+#include <cstdint>
+
+namespace abbe::daemon {
+
+void tell_ready(std::string_view status) {
+  sd_notify(0, fmt::format("READY=1\nSTATUS={}", status).c_str());
+}
+void tell_stopping() {
+  sd_notify(0, "STOPPING=1");
+}
+void tell_alive() {
+  sd_notify(0, "WATCHDOG=1");
+}
+
+std::optional<std::chrono::microseconds> watchdog_period() {
+  std::uint64_t period_us = 0;
+  if (sd_watchdog_enabled(0, &period_us) <= 0) return std::nullopt;
+  return std::chrono::microseconds{period_us / 2};
+}
+
+}  // namespace abbe::daemon

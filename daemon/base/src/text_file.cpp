@@ -1,0 +1,162 @@
+#include "abbe/base/text_file.hpp"
+
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <cstring>
+#include <optional>
+
+#include "abbe/base/file_descriptor.hpp"
+
+namespace abbe::daemon {
+
+namespace {
+
+tl::unexpected<Error> io_failure(std::string_view verb, const std::filesystem::path& file) {
+  return fail(ErrorCode::Io, fmt::format("{} {}: {}", verb, file.string(), std::strerror(errno)));
+}
+
+bool write_all(int fd, std::string_view text) {
+  while (!text.empty()) {
+    const auto written = ::write(fd, text.data(), text.size());
+    if (written < 0 && errno == EINTR) continue;
+    if (written <= 0) return false;
+    text.remove_prefix(static_cast<std::size_t>(written));
+  }
+  return true;
+}
+
+/// The name in the folder is on the disk only after the folder itself is.
+bool sync_folder(const std::filesystem::path& folder) {
+  const FileDescriptor fd(::open(folder.empty() ? "." : folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC));
+  return fd.get() >= 0 && ::fsync(fd.get()) == 0;
+}
+
+}  // namespace
+
+namespace {
+
+Result<std::string> read_all(const FileDescriptor& fd, const struct stat& status,
+                             const std::filesystem::path& file) {
+  std::string text(static_cast<std::size_t>(status.st_size), '\0');
+  std::size_t have = 0;
+  for (;;) {
+    if (have == text.size()) text.resize(text.size() + 65536);  // a pipe, or a file that still grows
+    const auto got = ::read(fd.get(), text.data() + have, text.size() - have);
+    if (got < 0 && errno == EINTR) continue;
+    if (got < 0) return io_failure("read", file);
+    if (got == 0) break;
+    have += static_cast<std::size_t>(got);
+  }
+  text.resize(have);
+  return text;
+}
+
+}  // namespace
+
+Result<std::string> read_text(const std::filesystem::path& file) {
+  const FileDescriptor fd(::open(file.c_str(), O_RDONLY | O_CLOEXEC));
+  struct stat status {};
+  if (fd.get() < 0 || ::fstat(fd.get(), &status) != 0) return io_failure("read", file);
+  return read_all(fd, status, file);
+}
+
+Result<std::string> read_regular_file(const std::filesystem::path& file) {
+  constexpr off_t kMost_bytes = off_t{1} << 30;
+  const FileDescriptor fd(::open(file.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK | O_NOCTTY));
+  struct stat status {};
+  // ENXIO: a socket, or a device without anything behind it.
+  if (!fd && errno != ENXIO) return io_failure("read", file);
+  if (!fd || ::fstat(fd.get(), &status) != 0 || !S_ISREG(status.st_mode))
+    return fail(ErrorCode::BadInput, fmt::format("read {}: is not a regular file", file.string()));
+  if (status.st_size > kMost_bytes)
+    return fail(ErrorCode::BadInput, fmt::format("read {}: has more than 1 GiB", file.string()));
+  return read_all(fd, status, file);
+}
+
+namespace {
+
+struct Ownership {
+  uid_t owner;
+  gid_t group;
+  mode_t mode;
+};
+
+void give(int fd, const Ownership& to) noexcept {
+  struct stat status {};
+  if (::fstat(fd, &status) != 0) return;
+  if (status.st_uid != to.owner && ::fchown(fd, to.owner, to.group) == 0) status.st_gid = to.group;
+  // Not root: the group still may be one of ours.
+  if (status.st_gid != to.group) (void)!::fchown(fd, static_cast<uid_t>(-1), to.group);
+  (void)::fchmod(fd, to.mode);
+}
+
+std::optional<Ownership> of_a_file_in(const std::filesystem::path& folder) noexcept {
+  constexpr mode_t kFileModes = 0664;
+  struct stat status {};
+  if (::stat(folder.empty() ? "." : folder.c_str(), &status) != 0) return std::nullopt;
+  return Ownership{status.st_uid, status.st_gid, status.st_mode & kFileModes};
+}
+
+/// Nothing but a regular file is replaced with its owner and mode.
+std::optional<Ownership> ownership_of(const std::filesystem::path& file) noexcept {
+  struct stat status {};
+  if (::lstat(file.c_str(), &status) != 0 || !S_ISREG(status.st_mode))
+    return of_a_file_in(file.parent_path());
+  return Ownership{status.st_uid, status.st_gid, status.st_mode & 0777U};
+}
+
+/// The folder belongs to somebody else when root writes into it: a link laid there in wait is not followed.
+FileDescriptor create_fresh(const std::filesystem::path& file) {
+  constexpr int kFlags = O_WRONLY | O_CREAT | O_EXCL | O_NOFOLLOW | O_CLOEXEC;
+  ::unlink(file.c_str());  // left by a process of the same number that was killed
+  return FileDescriptor{::open(file.c_str(), kFlags, 0600)};
+}
+
+}  // namespace
+
+void take_after_folder(int fd, const std::filesystem::path& folder) noexcept {
+  if (const auto ownership = of_a_file_in(folder)) give(fd, *ownership);
+}
+
+Result<void> create_folder(const std::filesystem::path& folder) {
+  std::error_code error;
+  if (folder.empty() || std::filesystem::is_directory(folder, error)) return {};
+  if (auto above = create_folder(folder.parent_path()); !above) return above;
+  if (::mkdir(folder.c_str(), 0777) != 0)
+    return errno == EEXIST ? Result<void>{} : io_failure("create", folder);
+  struct stat above {};
+  const auto parent = folder.parent_path();
+  const FileDescriptor fd(::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_NOFOLLOW | O_CLOEXEC));
+  // Only root makes folders in another's folder that the other must be able to use.
+  if (fd && ::geteuid() == 0 && ::stat(parent.empty() ? "." : parent.c_str(), &above) == 0 &&
+      above.st_uid != 0)
+    give(fd.get(), {above.st_uid, above.st_gid, above.st_mode & 0777U});
+  return {};
+}
+
+Result<void> replace_file(const std::filesystem::path& file, std::string_view text) {
+  const std::filesystem::path fresh = fmt::format("{}.{}.new", file.string(), ::getpid());
+  {
+    const FileDescriptor fd = create_fresh(fresh);
+    if (fd.get() < 0) return io_failure("write", fresh);
+    if (const auto ownership = ownership_of(file)) give(fd.get(), *ownership);
+    if (!write_all(fd.get(), text) || ::fsync(fd.get()) != 0) {
+      const auto failure = io_failure("write", fresh);
+      ::unlink(fresh.c_str());
+      return failure;
+    }
+  }
+  if (::rename(fresh.c_str(), file.c_str()) != 0) {
+    const auto failure = io_failure("replace", file);
+    ::unlink(fresh.c_str());
+    return failure;
+  }
+  if (!sync_folder(file.parent_path())) return io_failure("sync the folder of", file);
+  return {};
+}
+
+}  // namespace abbe::daemon

@@ -1,0 +1,109 @@
+#include "artefact_touching.hpp"
+
+#include <array>
+#include <chrono>
+#include <csignal>
+#include <nlohmann/json.hpp>
+#include <thread>
+
+#include "abbe/base/control_protocol.hpp"
+#include "daemon_socket.hpp"
+#include "interruption.hpp"
+#include "terminal.hpp"
+
+namespace abbe::daemon {
+namespace {
+
+namespace evemu = calib::evemu;
+using namespace std::chrono_literals;
+using nlohmann::json;
+using std::chrono::steady_clock;
+
+constexpr auto kLookAtTouches = 200ms;
+
+json as_json(const std::vector<calib::Vector3>& way) {
+  json places = json::array();
+  for (const auto& p : way) places.push_back({p.x(), p.y(), p.z()});
+  return places;
+}
+
+json as_json(const evemu::ArtefactPlan& plan) {
+  json points = json::array();
+  for (const auto& touch : plan.touches) {
+    points.push_back({{"way", as_json(touch.way_m)},
+                      {"at_m", {touch.at_m.x(), touch.at_m.y(), touch.at_m.z()}},
+                      {"normal", {touch.normal.x(), touch.normal.y(), touch.normal.z()}}});
+  }
+  return {{"do", "touch"}, {"points", std::move(points)}, {"leave", as_json(plan.leave_m)}};
+}
+
+Touched touched(const json& answer, const evemu::ArtefactPlan& plan) {
+  Touched out{{}, 0.0, answer["reason"]};
+  for (const json& t : answer["touches"]) {
+    if (out.touches.size() == plan.touches.size()) break;
+    const auto& planned = plan.touches[out.touches.size()];
+    const auto p = t["at_m"].get<std::array<double, 3>>();
+    out.touches.push_back(
+        {.position = 1, .feature = planned.feature, .number = planned.number, .p_m = {p[0], p[1], p[2]}});
+    out.u_position_m = t["u_m"];
+  }
+  return out;
+}
+
+/// Whether the daemon heard it. That nothing is under way any more is as good.
+bool cancel(const std::filesystem::path& socket) {
+  const auto answer = ask_daemon(socket, {{"do", "touch"}, {"cancel", true}});
+  return answer || answer.error().code == ErrorCode::Refused;
+}
+
+Touched look_on(const std::filesystem::path& socket, const evemu::ArtefactPlan& plan) {
+  ProgressBar bar;
+  Touched so_far;
+  bool told = false;
+  for (auto answered = steady_clock::now();; std::this_thread::sleep_for(kLookAtTouches)) {
+    if (interrupted() && !told) told = cancel(socket);
+    const auto answer = ask_daemon(socket, {{"do", "touches"}});
+    if (!answer) {
+      if (steady_clock::now() - answered < kPatienceWithoutDaemon) continue;
+      (void)cancel(socket);
+      so_far.reason = answer.error().text;
+      return so_far;
+    }
+    answered = steady_clock::now();
+    Touched now = touched(*answer, plan);
+    const bool running = (*answer)["running"].get<bool>();
+    const bool others = (*answer)["asked"] != plan.touches.size() ||
+                        now.touches.size() < so_far.touches.size() ||
+                        (!running && now.reason.empty() && now.touches.size() < plan.touches.size());
+    if (others) {
+      so_far.reason = "the touches are lost: the daemon was started anew, or makes those of somebody else";
+      return so_far;
+    }
+    so_far = std::move(now);
+    if (!running) return so_far;
+    bar.show("touching",
+             static_cast<double>(so_far.touches.size()) / static_cast<double>(plan.touches.size()));
+  }
+}
+
+}  // namespace
+
+Result<calib::Vector3> machine_position(const std::filesystem::path& socket) {
+  const auto answer = ask_daemon(socket, {{"do", "touch"}, {"where", true}});
+  if (!answer) return tl::unexpected(answer.error());
+  const auto p = (*answer)["at_m"].get<std::array<double, 3>>();
+  return calib::Vector3{p[0], p[1], p[2]};
+}
+
+Result<Touched> touch_artefact(const std::filesystem::path& socket, const evemu::ArtefactPlan& plan) {
+  mark_interruptions({SIGINT, SIGTERM, SIGHUP, SIGQUIT});
+  const auto started = ask_daemon(socket, as_json(plan));
+  if (!started) {
+    // An answer that did not come does not say that nothing was begun.
+    if (started.error().code == ErrorCode::Io) (void)cancel(socket);
+    return tl::unexpected(started.error());
+  }
+  return look_on(socket, plan);
+}
+
+}  // namespace abbe::daemon

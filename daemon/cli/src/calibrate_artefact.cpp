@@ -1,0 +1,190 @@
+/// `abbe calibrate artefact`: a ball array measured by the measuring machine of the running daemon: touched
+/// where its nominal description says, fitted, and written as calibrator.toml with uncertainties.
+
+#include <fmt/format.h>
+
+#include <CLI/App.hpp>
+#include <CLI/Config.hpp>
+#include <CLI/Formatter.hpp>
+#include <filesystem>
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <numbers>
+#include <utility>
+
+#include "abbe/base/text_file.hpp"
+#include "abbe/calib/evemu/artefact_touches.hpp"
+#include "abbe/methods/otf_inputs.hpp"
+#include "abbe/tables/evemu_files.hpp"
+#include "artefact_touching.hpp"
+#include "commands.hpp"
+#include "daemon_socket.hpp"
+#include "terminal.hpp"
+
+namespace abbe::daemon {
+namespace {
+
+namespace evemu = calib::evemu;
+using nlohmann::json;
+
+struct CalibrateArtefactArguments {
+  DaemonSocket where;
+  std::string calibrator, touches, out = "calibrator.toml";
+  std::vector<double> at_mm;
+  double turn_deg = 0.0;
+  std::size_t points = 13, face_points = 9;
+  double clearance_mm = 5.0;
+  bool json = false;
+};
+
+/// The nominal artefact where it stands on the machine's table.
+struct Placed {
+  evemu::Calibrator nominal;
+  std::array<evemu::FaceToTouch, 2> faces;
+};
+
+Result<Placed> placed(const CalibrateArtefactArguments& arguments) {
+  const auto file = read_calibrator_toml(arguments.calibrator);
+  if (!file) return tl::unexpected(file.error());
+  const double turn_rad = arguments.turn_deg * std::numbers::pi / 180.0;
+  const auto& at = arguments.at_mm;
+  const calib::RigidTransform T_machine_artefact{
+      Eigen::AngleAxisd(turn_rad, calib::Vector3::UnitZ()).toRotationMatrix(),
+      1e-3 * calib::Vector3{at[0], at[1], at[2]}};
+  Placed out{evemu::moved(file->calibrator, T_machine_artefact), {}};
+  for (std::size_t i = 0; i < out.faces.size(); ++i) {
+    if (!file->faces[i]) {
+      return fail(ErrorCode::BadInput,
+                  fmt::format("{}: block {}: x_mm, y_mm, z_mm are missing: the middle of "
+                              "the face that is to be touched",
+                              arguments.calibrator, i + 1));
+    }
+    out.faces[i] = {T_machine_artefact.R * file->faces[i]->centre_m + T_machine_artefact.t_m,
+                    file->faces[i]->half_size_m};
+  }
+  return out;
+}
+
+Result<void> keep(const Touched& touched, const std::string& file) {
+  std::string text = "position,kind,index,x_mm,y_mm,z_mm\n";
+  for (const auto& t : touched.touches) {
+    text += fmt::format("{},{},{},{:.17g},{:.17g},{:.17g}\n", t.position,
+                        t.feature == evemu::Feature::Ball ? "ball" : "block", t.number, 1e3 * t.p_m.x(),
+                        1e3 * t.p_m.y(), 1e3 * t.p_m.z());
+  }
+  return replace_file(file, text);
+}
+
+/// A calibrator.toml of an earlier run goes on naming the touches it is from: those that came to nothing go
+/// into a file of their own.
+Error kept_aside(Error error, const Touched& touched, const std::filesystem::path& touches) {
+  if (touched.touches.empty()) {
+    error.details.push_back("no touch was made");
+    return error;
+  }
+  auto file = touches;
+  file.replace_extension(".partial" + touches.extension().string());
+  const auto kept = keep(touched, file.string());
+  error.details.push_back(
+      kept ? fmt::format("{} touches until then: {}", touched.touches.size(), file.string())
+           : kept.error().text);
+  return error;
+}
+
+int print(const evemu::Calibrator& found, const evemu::Calibrator& nominal,
+          const CalibrateArtefactArguments& arguments) {
+  json balls = json::array();
+  for (std::size_t i = 0; i < found.balls.size(); ++i) {
+    const auto& ball = found.balls[i];
+    const auto& before = nominal.balls[i];
+    balls.push_back({{"number", ball.number},
+                     {"moved_um", 1e6 * (ball.centre_m - before.centre_m).norm()},
+                     {"radius_um", 1e6 * (ball.radius_m - before.radius_m)},
+                     {"u_um", 1e6 * ball.u_m}});
+    if (!arguments.json)
+      fmt::print("ball {}: {:.2f} um from nominal, radius {:+.2f} um, u = {:.2f} um\n", ball.number,
+                 balls.back()["moved_um"].get<double>(), balls.back()["radius_um"].get<double>(),
+                 1e6 * ball.u_m);
+  }
+  if (arguments.json) fmt::print("{}\n", json{{"calibrator", arguments.out}, {"balls", balls}}.dump(1));
+  return 0;
+}
+
+int calibrate(CalibrateArtefactArguments arguments) {
+  if (arguments.touches.empty())
+    arguments.touches = std::filesystem::path(arguments.out).replace_extension(".touches.csv").string();
+  const auto artefact = placed(arguments);
+  if (!artefact) return report(artefact.error());
+  const auto socket = socket_path(arguments.where);
+  if (!socket) return report(socket.error());
+  const auto stands = machine_position(*socket);
+  if (!stands) return report(stands.error());
+  const auto plan = evemu::plan_artefact_touches(artefact->nominal, artefact->faces, *stands,
+                                                 {.points_per_ball = arguments.points,
+                                                  .points_per_face = arguments.face_points,
+                                                  .clearance_m = 1e-3 * arguments.clearance_mm});
+  if (!plan) return report({ErrorCode::Usage, plan.error().text, {}});
+  const auto made = touch_artefact(*socket, *plan);
+  if (!made) return report(made.error());
+  if (!made->reason.empty())
+    return report(kept_aside({ErrorCode::DataInsufficient,
+                              made->reason,
+                              {"the tip may stand low: raise it above everything before another run"}},
+                             *made, arguments.touches));
+  const auto found =
+      evemu::calibrated_artefact(artefact->nominal, artefact->faces, made->touches, made->u_position_m);
+  if (!found) return report(kept_aside(error_of(found.error()), *made, arguments.touches));
+  if (const auto kept = keep(*made, arguments.touches); !kept) return report(kept.error());
+  std::array<std::optional<BlockFace>, 2> faces;
+  for (std::size_t i = 0; i < faces.size(); ++i)
+    faces[i] = BlockFace{artefact->faces[i].centre_m, artefact->faces[i].half_size_m};
+  const auto text = calibrator_toml(
+      *found, faces,
+      fmt::format("# measured with {} touches: {}; in the coordinates of the measuring machine\n"
+                  "# u: standard uncertainty (k = 1), of the fit and of the machine\n",
+                  made->touches.size(), std::filesystem::path(arguments.touches).filename().string()));
+  if (const auto written = replace_file(arguments.out, text); !written) return report(written.error());
+  return print(*found, artefact->nominal, arguments);
+}
+
+}  // namespace
+
+void add_calibrate_artefact(CLI::App& parent, int& exit) {
+  auto arguments = std::make_shared<CalibrateArtefactArguments>();
+  auto* command = parent.add_subcommand(
+      "artefact",
+      "A ball array on the measuring machine of the running daemon ([cmm]): touches its balls on their "
+      "upper\n"
+      "half and its blocks on the faces that the file names, and writes it as measured, with uncertainties.\n"
+      "The machine moves: first straight up from where it stands, in the end up again; the ways lead around "
+      "the\n"
+      "balls and above everything, around nothing else. Ctrl-C, a closed terminal or nobody asking for 2 s "
+      "end it\n"
+      "after the touch that is under way; the tip may stand low then. Exit code 1 then, and when a touch "
+      "was\n"
+      "refused or the machine or the daemon went away: the touches until then are kept (.partial.csv), and\n"
+      "what an earlier run has written stays.");
+  command
+      ->add_option("--calibrator", arguments->calibrator,
+                   "nominal description: calibrator.toml, its blocks with x_mm, y_mm, z_mm, half_size_mm")
+      ->required();
+  command->add_option("-o,--output", arguments->out, "the artefact as measured")->capture_default_str();
+  command->add_option("--touches", arguments->touches,
+                      "where the touches go (default: beside the output); .partial.csv if it fails");
+  command->add_option("--at", arguments->at_mm, "where the artefact's origin stands, mm: x,y,z")
+      ->delimiter(',')
+      ->expected(3)
+      ->required();
+  command->add_option("--turn", arguments->turn_deg, "how far it is turned about z, degrees");
+  command->add_option("--points", arguments->points, "on a ball, at least 5")->capture_default_str();
+  command->add_option("--block-points", arguments->face_points, "on a block's face, at least 4")
+      ->capture_default_str();
+  command->add_option("--clearance", arguments->clearance_mm, "of the tip on its ways, mm")
+      ->check(CLI::PositiveNumber)
+      ->capture_default_str();
+  add_socket_options(*command, arguments->where);
+  command->add_flag("--json", arguments->json, "the result as JSON");
+  command->callback([arguments, &exit] { exit = calibrate(*arguments); });
+}
+
+}  // namespace abbe::daemon

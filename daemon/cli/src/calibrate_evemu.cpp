@@ -1,0 +1,83 @@
+/// `abbe calibrate evemu`: the running daemon guides through the touching of a ball array and identifies.
+
+#include <CLI/App.hpp>
+#include <CLI/Config.hpp>
+#include <CLI/Formatter.hpp>
+#include <memory>
+#include <string>
+
+#include "abbe/base/units.hpp"
+#include "abbe/methods/calibration_request.hpp"
+#include "abbe/tables/evemu_files.hpp"
+#include "commands.hpp"
+#include "follow_calibration.hpp"
+#include "terminal.hpp"
+
+namespace abbe::daemon {
+namespace {
+
+struct CalibrateEvemuArguments {
+  FollowOptions follow;
+  std::string calibrator, reference;
+  double u_reference_um = 1.0;
+  std::size_t points_per_ball = 0, points_per_block = 0;  // 0: as the daemon's configuration says
+};
+
+/// The plan, where not said here, is the daemon's: left out.
+Result<nlohmann::json> task_of(const CalibrateEvemuArguments& arguments) {
+  const auto calibrator = read_calibrator_toml(arguments.calibrator);
+  if (!calibrator) return tl::make_unexpected(calibrator.error());
+  EvemuRequest request;
+  request.calibrator = calibrator->calibrator;
+  request.sources = {calibrator->source};
+  if (!arguments.reference.empty()) {
+    const auto points = read_errors_csv(arguments.reference);
+    if (!points) return tl::make_unexpected(points.error());
+    request.reference = {points->errors, arguments.u_reference_um / kUmPerM};
+    request.sources.push_back(points->source);
+  }
+  nlohmann::json task = to_json(std::move(request));
+  task.erase("positions");
+  const auto keep = [&task](const char* key, std::size_t points) {
+    task.erase(key);
+    if (points > 0) task[key] = points;
+  };
+  keep("points_per_ball", arguments.points_per_ball);
+  keep("points_per_block", arguments.points_per_block);
+  return task;
+}
+
+int calibrate(const CalibrateEvemuArguments& arguments) {
+  if (arguments.follow.cancel) return cancel_calibration(arguments.follow);
+  if (arguments.calibrator.empty())
+    return report({ErrorCode::Usage, "calibrate evemu: --calibrator is needed", {}});
+  const auto task = task_of(arguments);
+  return task ? run_calibration(arguments.follow, *task) : report(task.error());
+}
+
+}  // namespace
+
+void add_calibrate_evemu(CLI::App& parent, int& exit) {
+  auto arguments = std::make_shared<CalibrateEvemuArguments>();
+  auto* command = parent.add_subcommand(
+      "evemu",
+      "Local calibration with a ball array: says position by position what to touch next (ball 1,\n"
+      "block 1, block 2, ball 2 ...), notices missed, doubled and wrong touches, then identifies.\n"
+      "Ctrl-C ends the looking on (exit code 130), --cancel the calibration.");
+  auto* calibrator = command->add_option("--calibrator", arguments->calibrator, "calibrator.toml");
+  auto* reference =
+      command->add_option("--rotation-reference", arguments->reference,
+                          "errors.csv of points where V is known independently: turns the model onto them");
+  command->add_option("--u-reference-um", arguments->u_reference_um, "standard uncertainty of that V")
+      ->needs(reference)
+      ->check(CLI::PositiveNumber)
+      ->capture_default_str();
+  command->add_option("--points-per-ball", arguments->points_per_ball, "default: [evemu] of the daemon")
+      ->check(CLI::Range(1, 1000));
+  command->add_option("--points-per-block", arguments->points_per_block, "default: [evemu] of the daemon")
+      ->check(CLI::Range(1, 1000));
+  add_follow_options(*command, arguments->follow, calibrator);
+  command->callback([arguments, &exit] { exit = calibrate(*arguments); });
+}
+
+}  // namespace abbe::daemon

@@ -1,0 +1,32 @@
+#include "daemon_socket.hpp"
+
+#include <fmt/format.h>
+#include <pwd.h>
+#include <unistd.h>
+
+#include <CLI/Config.hpp>
+#include <CLI/Formatter.hpp>
+
+#include "abbe/config/config.hpp"
+
+namespace abbe::daemon {
+
+void add_socket_options(CLI::App& command, DaemonSocket& where) {
+  auto* socket =
+      command.add_option("--socket", where.socket, "control socket of abbed")->capture_default_str();
+  command.add_option("-c,--config", where.config, "take the socket from this abbed.toml")->excludes(socket);
+}
+
+Result<std::filesystem::path> socket_path(const DaemonSocket& where) {
+  if (where.config.empty()) return std::filesystem::path{where.socket};
+  auto config = load_config(where.config);
+  if (!config) return tl::unexpected(config.error());
+  return config->control.socket;
+}
+
+std::string user_name() {
+  const passwd* user = ::getpwuid(::getuid());
+  return user != nullptr ? user->pw_name : fmt::format("uid {}", ::getuid());
+}
+
+}  // namespace abbe::daemon

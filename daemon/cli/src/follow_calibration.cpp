@@ -1,0 +1,132 @@
+#include "follow_calibration.hpp"
+
+#include <fmt/format.h>
+
+#include <CLI/Config.hpp>
+#include <CLI/Formatter.hpp>
+#include <algorithm>
+#include <cstdint>
+#include <optional>
+#include <utility>
+
+#include "abbe/base/control_protocol.hpp"
+#include "abbe/base/refusal.hpp"
+#include "follow.hpp"
+#include "terminal.hpp"
+
+namespace abbe::daemon {
+namespace {
+
+using nlohmann::json;
+
+int print_session_verdict(const json& session, bool as_json) {
+  const std::string state = session["state"];
+  // A session ends in a verdict; a daemon without one is not the one that was asked.
+  if (state == "idle")
+    return report({ErrorCode::Io, "the calibration is lost: the daemon was started anew", {}});
+  if (as_json) {
+    fmt::print("{}\n", session.dump(1));
+  } else {
+    fmt::print("{} {}\n{}\n", state, session["model_id"].get<std::string>(),
+               session["reason"].get<std::string>());
+  }
+  return state == "active" ? 0 : exit_code(error_of_refusal(session).code);
+}
+
+/// One line whenever the daemon is about something else: "warming: waiting for the machine to stand at ...",
+/// and one for everything it noticed meanwhile.
+class Narrator {
+ public:
+  void tell_notes(ProgressBar& bar, const json& session) {
+    const auto noted = session.value("noted", std::size_t{0});
+    const json notes = session.value("notes", json::array());
+    if (noted < noted_) noted_ = 0;  // another session
+    const std::size_t fresh = std::min(noted - noted_, notes.size());
+    if (fresh > 0) bar.clear();
+    for (std::size_t i = notes.size() - fresh; i < notes.size(); ++i)
+      fmt::print(stderr, "  {}\n", notes[i].get<std::string>());
+    noted_ = noted;
+  }
+  void tell(ProgressBar& bar, const std::string& state, const std::string& reason) {
+    std::string line = fmt::format("{}: {}", state, reason);
+    if (line == told_) return;
+    bar.clear();
+    fmt::print(stderr, "{}\n", line);
+    told_ = std::move(line);
+  }
+
+ private:
+  std::string told_;
+  std::size_t noted_ = 0;
+};
+
+/// The session with this number, running or ended; another one's verdict is not ours. 0: of a daemon that
+/// does not number them.
+std::optional<json> session_in(const json& status, std::uint64_t id) {
+  if (id == 0 || status["session"].value("id", std::uint64_t{0}) == id) return status["session"];
+  for (const json& ended : status.value("ended_sessions", json::array()))
+    if (ended.value("id", std::uint64_t{0}) == id) return ended;
+  return std::nullopt;
+}
+
+int follow_session(const std::filesystem::path& socket, const std::string& method, std::uint64_t id,
+                   bool as_json) {
+  ProgressBar bar;
+  Narrator narrator;
+  const auto look = [&](const json& status) -> std::optional<int> {
+    const auto found = session_in(status, id);
+    if (!found) {
+      bar.clear();
+      return report(
+          {ErrorCode::Io,
+           fmt::format("calibration {} has ended, and its verdict is not kept after so many others: "
+                       "`abbe model list` shows what it may have left",
+                       id)});
+    }
+    const json& session = *found;
+    const std::string state = session["state"];
+    narrator.tell_notes(bar, session);
+    if (state == "active" || state == "refused" || state == "idle") {
+      bar.clear();
+      return print_session_verdict(session, as_json);
+    }
+    narrator.tell(bar, state, session["reason"]);
+    bar.show(state, session["progress"].get<double>());
+    return std::nullopt;
+  };
+  return follow({.socket = socket,
+                 .what = "the calibration",
+                 .cancel = fmt::format("abbe calibrate {} --cancel", method),
+                 .look = look},
+                bar);
+}
+
+}  // namespace
+
+void add_follow_options(CLI::App& command, FollowOptions& options, CLI::Option* excluded) {
+  add_socket_options(command, options.where);
+  command.add_flag("--detach", options.detach, "return as soon as the daemon waits for the machine");
+  command.add_flag("--cancel", options.cancel, "end the calibration that is running")->excludes(excluded);
+  command.add_flag("--json", options.json, "the verdict as JSON");
+}
+
+int cancel_calibration(const FollowOptions& options) {
+  const auto socket = socket_path(options.where);
+  if (!socket) return report(socket.error());
+  const auto answer = ask_daemon(*socket, {{"do", "cancel"}, {"who", user_name()}});
+  return answer ? 0 : report(answer.error());
+}
+
+int run_calibration(const FollowOptions& options, json task) {
+  const auto socket = socket_path(options.where);
+  if (!socket) return report(socket.error());
+  const auto method = task.at("method").get<std::string>();
+  task["do"] = "calibrate";
+  task["who"] = user_name();
+  const auto started = ask_daemon(*socket, task);
+  if (!started) return report(started.error());
+  const auto id = started->value("session", std::uint64_t{0});
+  return options.detach ? 0 : follow_session(*socket, method, id, options.json);
+}
+
+}  // namespace abbe::daemon

@@ -1,0 +1,82 @@
+#include "identified_model.hpp"
+
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include <nlohmann/json.hpp>
+#include <system_error>
+#include <utility>
+
+#include "abbe/base/text_file.hpp"
+#include "abbe/base/units.hpp"
+#include "abbe/model/model_document.hpp"
+#include "abbe/model/model_store.hpp"
+#include "daemon_socket.hpp"
+#include "terminal.hpp"
+
+namespace abbe::daemon {
+
+Result<std::optional<ModelDocument>> active_model(const std::string& store) {
+  std::optional<ModelDocument> active;
+  if (store.empty()) return active;
+  const auto opened = ModelStore::open(store);
+  if (!opened) return tl::make_unexpected(opened.error());
+  const auto id = opened->active_id();
+  if (!id) return tl::make_unexpected(id.error());
+  if (!*id) return active;
+  auto document = opened->load(**id);
+  if (!document) return tl::make_unexpected(document.error());
+  active = std::move(*document);
+  return active;
+}
+
+void ModelToBeat::say(calib::Verdict& verdict) const {
+  if (!left_out.empty()) verdict.notes.push_back(left_out);
+}
+
+ModelToBeat to_beat(const std::optional<ModelDocument>& active, const Config& config) {
+  if (!active) return {};
+  if (active->machine_hash != machine_hash(config)) return {nullptr, std::string{kOfAnotherMachine}};
+  return {&active->model, {}};
+}
+
+Result<void> keep(const std::string& store, const ModelDocument& document, const calib::Verdict& verdict,
+                  const std::string& command) {
+  if (store.empty()) return {};
+  auto opened = ModelStore::open(store);
+  if (!opened) return tl::make_unexpected(opened.error());
+  const auto id =
+      opened->add(document, verdict.accepted, verdict.reasons, {user_name(), command, document.created});
+  if (!id) return tl::make_unexpected(id.error());
+  return {};
+}
+
+Result<void> write_results(const std::filesystem::path& folder, const ModelDocument& document,
+                           const std::map<std::string, std::string>& more) {
+  std::error_code failed;
+  std::filesystem::create_directories(folder, failed);
+  if (failed) return fail(ErrorCode::Io, fmt::format("create {}: {}", folder.string(), failed.message()));
+  if (auto done = replace_file(folder / "model.json", to_json(document)); !done) return done;
+  for (const auto& [name, text] : more)
+    if (auto done = replace_file(folder / name, text); !done) return done;
+  return {};
+}
+
+nlohmann::json verdict_json(const calib::Verdict& verdict) {
+  return {{"accepted", verdict.accepted}, {"reasons", verdict.reasons}, {"notes", verdict.notes}};
+}
+
+void print_verdict(const calib::Verdict& verdict) {
+  fmt::print("held out    {:.3f} um rms without compensation, {:.3f} um with the model\n",
+             verdict.held_out.no_compensation_rms_m * kUmPerM, verdict.held_out.candidate_rms_m * kUmPerM);
+  fmt::print("gate        {}\n", verdict.accepted ? coloured("would accept", kGreen, STDOUT_FILENO)
+                                                  : coloured("would refuse", kYellow, STDOUT_FILENO));
+  for (const auto& reason : verdict.reasons) fmt::print("            {}\n", reason);
+  for (const auto& note : verdict.notes) fmt::print("note        {}\n", note);
+}
+
+int exit_code(const calib::Verdict& verdict) {
+  return verdict.accepted ? 0 : exit_code(ErrorCode::Refused);
+}
+
+}  // namespace abbe::daemon

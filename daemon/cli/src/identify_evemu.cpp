@@ -1,0 +1,492 @@
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <filesystem>
+#include <functional>
+#include <map>
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <optional>
+
+#include "abbe/base/sha256.hpp"
+#include "abbe/base/text_file.hpp"
+#include "abbe/base/units.hpp"
+#include "abbe/calib/evemu/judge.hpp"
+#include "abbe/methods/evemu_identification.hpp"
+#include "abbe/methods/evemu_report.hpp"
+#include "abbe/methods/otf_inputs.hpp"
+#include "abbe/model/model_document.hpp"
+#include "abbe/replay/replay.hpp"
+#include "abbe/tables/evemu_files.hpp"
+#include "abbe/tables/touches_not_seen.hpp"
+#include "abbe/tables/travel_faults.hpp"
+#include "commands.hpp"
+#include "identified_model.hpp"
+#include "opened_recording.hpp"
+#include "scales_corrected.hpp"
+#include "terminal.hpp"
+
+namespace abbe::daemon {
+
+namespace {
+
+namespace evemu = calib::evemu;
+
+struct IdentifyEvemuArguments {
+  std::string machine, touches, calibrator, errors, recording, reference, keep, out;
+  std::optional<std::string> estimator, folds;  // these four: else what [evemu] says
+  std::optional<int> order, positions;
+  std::optional<double> artefact_C;
+  double u_artefact_K = 0.0;
+  double u_reference_um = 1.0;
+  bool rotation_known = false, scales_corrected = false, accept_shape_only = false, json = false;
+};
+
+/// What was measured, whatever it comes from.
+struct Input {
+  Config config;
+  std::vector<InputFile> sources;
+  evemu::Observations observations;
+  std::optional<RotationPoints> reference;
+  std::function<void(calib::Verdict&)> judge_source = [](calib::Verdict&) {};  ///< a damaged recording
+  std::string recording_gap{};
+};
+
+struct Outcome {
+  Config config;
+  std::vector<InputFile> sources;
+  evemu::Observations observations;
+  std::optional<evemu::Solution> solution;
+  calib::Verdict verdict;
+  std::string recording_gap;
+};
+
+/// Without an option, what [evemu] says; a sensor's values are in no file.
+std::optional<evemu::ArtefactTemperature> artefact_temperature(const IdentifyEvemuArguments& arguments,
+                                                               const EvemuConfig& config) {
+  if (arguments.artefact_C)
+    return evemu::ArtefactTemperature{*arguments.artefact_C + kZeroCelsius_K, arguments.u_artefact_K};
+  if (config.artefact && !config.artefact->sensor)
+    return evemu::ArtefactTemperature{config.artefact->fixed_K, config.artefact->u_temperature_K};
+  return std::nullopt;
+}
+
+/// The sensor of the configuration, where it said nothing that could be read; empty: it was not asked.
+std::string silent_sensor(const IdentifyEvemuArguments& arguments, const Config& config) {
+  const auto& artefact = config.evemu.artefact;
+  if (arguments.touches.empty() || arguments.artefact_C || !artefact || !artefact->sensor) return {};
+  return fmt::format("[evemu] artefact_sensor \"{}\" stands in no file of touches",
+                     config.temperatures[*artefact->sensor]);
+}
+
+Result<void> check_artefact(const IdentifyEvemuArguments& arguments, const evemu::Calibrator& calibrator,
+                            bool temperature_known, const std::string& silent) {
+  const auto fault = warmth_fault(
+      calibrator, arguments.calibrator,
+      !temperature_known     ? ""
+      : arguments.artefact_C ? "--artefact-C"
+                             : "[evemu] artefact_C",
+      fmt::format("{}give --artefact-C and --u-artefact-K (or [evemu] artefact_C and u_artefact_K in {})",
+                  silent.empty() ? "" : silent + "; ", arguments.machine));
+  return fault.empty() ? Result<void>{} : fail(ErrorCode::BadInput, fault);
+}
+
+std::vector<calib::Vector3> positions_of(const std::vector<evemu::Touch>& touches) {
+  std::vector<calib::Vector3> out;
+  for (const evemu::Touch& touch : touches) out.push_back(touch.p_m);
+  return out;
+}
+
+std::vector<calib::Vector3> positions_of(const std::vector<evemu::BallError>& errors) {
+  std::vector<calib::Vector3> out;
+  for (const evemu::BallError& error : errors) out.push_back(error.reading_m);
+  return out;
+}
+
+tl::unexpected<Error> in_file(const std::string& file, const calib::Error& error) {
+  Error out = error_of(error);
+  out.text = fmt::format("{}: {}", file, out.text);
+  return tl::unexpected(std::move(out));
+}
+
+Result<void> observe_touches(const IdentifyEvemuArguments& arguments, const evemu::Machine& machine,
+                             const evemu::ObserveOptions& options, Input& input) {
+  const auto calibrator = read_calibrator_toml(arguments.calibrator);
+  if (!calibrator) return tl::make_unexpected(calibrator.error());
+  if (auto fine = check_artefact(arguments, calibrator->calibrator, options.artefact_temperature.has_value(),
+                                 silent_sensor(arguments, input.config));
+      !fine)
+    return fine;
+  const auto touches = read_touches_csv(arguments.touches);
+  if (!touches) return tl::make_unexpected(touches.error());
+  if (auto inside = check_travel(arguments.touches, positions_of(touches->touches), touches->lines,
+                                 input.config.machine);
+      !inside)
+    return inside;
+  input.sources.insert(input.sources.end(), {touches->source, calibrator->source});
+  auto observed = evemu::observe(touches->touches, calibrator->calibrator, machine, options);
+  if (!observed)
+    return in_file(arguments.touches + line_not_seen(*touches, calibrator->calibrator, options),
+                   observed.error());
+  input.observations = std::move(*observed);
+  return {};
+}
+
+Result<void> observe_errors(const IdentifyEvemuArguments& arguments, const evemu::Machine& machine,
+                            const evemu::ObserveOptions& options, Input& input) {
+  const auto errors = read_errors_csv(arguments.errors);
+  if (!errors) return tl::make_unexpected(errors.error());
+  if (auto inside =
+          check_travel(arguments.errors, positions_of(errors->errors), errors->lines, input.config.machine);
+      !inside)
+    return inside;
+  input.sources.push_back(errors->source);
+  const auto rotation =
+      arguments.rotation_known ? evemu::RotationOrigin::Independent : evemu::RotationOrigin::Blocks;
+  auto observed = evemu::observe_errors(errors->errors, machine, rotation, options);
+  if (!observed) return in_file(arguments.errors, observed.error());
+  input.observations = std::move(*observed);
+  return {};
+}
+
+evemu::ObserveOptions observe_options(const IdentifyEvemuArguments& arguments, const EvemuConfig& config,
+                                      std::size_t positions) {
+  evemu::ObserveOptions options;
+  options.order = arguments.order.value_or(config.order);
+  options.positions = arguments.positions.value_or(static_cast<int>(positions));
+  return options;
+}
+
+Result<Input> from_files(const IdentifyEvemuArguments& arguments) {
+  auto config = load_config(arguments.machine);
+  if (!config) return tl::make_unexpected(config.error());
+  const auto hash = sha256_hex_of_file(arguments.machine);
+  if (!hash) return tl::make_unexpected(hash.error());
+  Input input;
+  input.sources.push_back({std::filesystem::path(arguments.machine).filename().string(), *hash});
+  const auto* what = arguments.touches.empty() ? "errors" : "touches";
+  if (const auto fine = check_scales("identify evemu", what, *config, arguments.scales_corrected); !fine)
+    return tl::make_unexpected(fine.error());
+  if (const auto given = require_target(config->machine); !given)
+    return fail(given.error().code, fmt::format("{}: {}", arguments.machine, given.error().text));
+  const auto machine = evemu_machine(config->machine);
+  if (!machine) return tl::make_unexpected(machine.error());
+  auto options = observe_options(arguments, config->evemu, config->evemu.positions.size());
+  options.artefact_temperature = artefact_temperature(arguments, config->evemu);
+  input.config = std::move(*config);
+  const auto observe = arguments.touches.empty() ? observe_errors : observe_touches;
+  if (const auto observed = observe(arguments, *machine, options, input); !observed)
+    return tl::make_unexpected(observed.error());
+  return input;
+}
+
+/// The last run of the recording that was touched to its end.
+Result<EvemuRun> last_complete_run(const OpenedRecording& recording) {
+  std::optional<EvemuRun> last;
+  ProgressBar bar;
+  const auto replayed = replay(recording.reader, recording.config,
+                               {.progress = [&bar](double share) { bar.show("replaying", share); },
+                                .runs =
+                                    [&last](CalibrationRun run) {
+                                      if (auto* touched = std::get_if<EvemuRun>(&run))
+                                        last = std::move(*touched);
+                                    }});
+  if (!replayed) return tl::make_unexpected(replayed.error());
+  if (last) return std::move(*last);
+  std::string why = "none was asked for";
+  for (const auto& c : replayed->calibrations)
+    if (c.ended.method == "evemu") why = c.ended.reason;
+  return fail(
+      ErrorCode::DataInsufficient,
+      fmt::format("{}: holds no complete calibration with a ball array: {}", recording.source.name, why));
+}
+
+Result<Input> from_recording(const IdentifyEvemuArguments& arguments) {
+  auto recording = open_recording(arguments.recording, arguments.machine);
+  if (!recording) return tl::make_unexpected(recording.error());
+  if (const auto given = require_target(recording->config.machine); !given)
+    return tl::make_unexpected(given.error());
+  const auto machine = evemu_machine(recording->config.machine);
+  if (!machine) return tl::make_unexpected(machine.error());
+  const auto run = last_complete_run(*recording);
+  if (!run) return tl::make_unexpected(run.error());
+  auto options = observe_options(arguments, recording->config.evemu, run->asked.plan.positions.size());
+  options.artefact_temperature = run->artefact;
+  auto observed = evemu::observe(run->touches, run->asked.calibrator, *machine, options);
+  if (!observed) return tl::make_unexpected(error_of(observed.error()));
+  Input input{std::move(recording->config), {recording->source}, std::move(*observed), run->asked.reference};
+  const auto entered = inputs_of(*run);
+  input.sources.insert(input.sources.end(), entered.begin(), entered.end());
+  input.recording_gap = recording->reader.damage();
+  input.judge_source = [reader = std::make_shared<RecordingReader>(std::move(recording->reader))](
+                           calib::Verdict& verdict) { judge_recording(*reader, verdict); };
+  return input;
+}
+
+Result<void> read_reference(const IdentifyEvemuArguments& arguments, Input& input) {
+  if (arguments.reference.empty()) return {};
+  const auto points = read_errors_csv(arguments.reference);
+  if (!points) return tl::make_unexpected(points.error());
+  if (auto inside = check_travel(arguments.reference, positions_of(points->errors), points->lines,
+                                 input.config.machine);
+      !inside)
+    return inside;
+  input.sources.push_back(points->source);
+  input.reference = RotationPoints{points->errors, arguments.u_reference_um / kUmPerM};
+  return {};
+}
+
+/// A word, or a file with one fold number for each of the 3 rows of every ball, by position and ball.
+Result<evemu::SparseOptions> sparse_options(const std::string& given, std::vector<InputFile>& sources) {
+  evemu::SparseOptions options;
+  if (const auto by = evemu::folds_by(given)) {
+    options.folds = *by;
+    return options;
+  }
+  const auto text = read_text(given);
+  if (!text) return tl::make_unexpected(text.error());
+  auto folds = calib::sparse::parse_folds(*text);
+  if (!folds) return fail(ErrorCode::BadInput, fmt::format("{}: {}", given, folds.error().text));
+  sources.push_back({std::filesystem::path(given).filename().string(), sha256_hex(*text)});
+  options.given_folds = std::move(*folds);
+  return options;
+}
+
+Result<evemu::JudgeOptions> judge_options(const IdentifyEvemuArguments& arguments, Input& input) {
+  const Config& config = input.config;
+  evemu::JudgeOptions options;
+  options.solve.estimator = *evemu::estimator(arguments.estimator.value_or(config.evemu.estimator));
+  options.limits = gate_limits(config.gate);
+  options.accept_shape_only = arguments.accept_shape_only || config.gate.accepts(evemu::kShapeOnly);
+  auto sparse = sparse_options(arguments.folds.value_or(config.evemu.folds), input.sources);
+  if (!sparse) return tl::make_unexpected(sparse.error());
+  options.solve.sparse = std::move(*sparse);
+  return options;
+}
+
+Result<Outcome> identify(const IdentifyEvemuArguments& arguments) {
+  const auto active = active_model(arguments.keep);
+  if (!active) return tl::make_unexpected(active.error());
+  auto input = arguments.recording.empty() ? from_files(arguments) : from_recording(arguments);
+  if (!input) return tl::make_unexpected(input.error());
+  const auto judging = judge_options(arguments, *input);
+  if (!judging) return tl::make_unexpected(judging.error());
+  if (const auto read = read_reference(arguments, *input); !read) return tl::make_unexpected(read.error());
+  auto solution = evemu::solve(input->observations, judging->solve);
+  if (solution && input->reference)
+    solution = evemu::with_rotation_reference(std::move(*solution),
+                                              {input->reference->points, input->reference->sigma_m});
+  if (!solution) return tl::make_unexpected(error_of(solution.error()));
+  const auto other = to_beat(*active, input->config);
+  auto verdict = evemu::judge(input->observations, *solution, other.model, *judging);
+  if (!verdict) return tl::make_unexpected(error_of(verdict.error()));
+  other.say(*verdict);
+  input->judge_source(*verdict);
+  if (const auto silent = silent_sensor(arguments, input->config); !silent.empty())
+    verdict->notes.push_back(
+        fmt::format("how warm the array was is not known: {}; --artefact-C says it", silent));
+  return Outcome{std::move(input->config), std::move(input->sources), std::move(input->observations),
+                 std::move(*solution),     std::move(*verdict),       std::move(input->recording_gap)};
+}
+
+/// The surface lambda and gamma were chosen from; cells no path reached are left out.
+std::string to_surface_csv(const evemu::SparseChoice& choice) {
+  std::string text = "gamma,lambda,error_um2\n";
+  constexpr double kUm2PerMm2 = 1e6;
+  for (std::size_t g = 0; g < choice.all_gamma.size(); ++g)
+    for (std::size_t l = 0; l < choice.all_lambda.size(); ++l) {
+      const double error =
+          choice.error_mm2(static_cast<Eigen::Index>(l), static_cast<Eigen::Index>(g)) * kUm2PerMm2;
+      if (std::isfinite(error))
+        text += fmt::format("{:.17g},{:.17g},{:.17g}\n", choice.all_gamma[g], choice.all_lambda[l], error);
+    }
+  return text;
+}
+
+Result<void> write_outputs(const std::filesystem::path& folder, const ModelDocument& document,
+                           const Outcome& outcome) {
+  std::map<std::string, std::string> files{
+      {"coefficients.csv", to_coefficients_csv(*document.model.polynomials())},
+      {"report.html", evemu_report(document, outcome.observations, *outcome.solution, outcome.verdict)}};
+  if (const auto& choice = outcome.solution->sparse) files["cross_validation.csv"] = to_surface_csv(*choice);
+  return write_results(folder, document, files);
+}
+
+double u_rotation_urad(const evemu::Solution& solution) {
+  return kUradPerRad * std::sqrt(solution.rotation.cov_rad2.trace() / 3.0);
+}
+
+nlohmann::json artefact_json(const evemu::ArtefactUncertainty& artefact) {
+  const auto most = [](const auto& u) { return *std::ranges::max_element(u); };
+  nlohmann::json object{{"u_ball_um", kUmPerM * most(artefact.u_ball_m)},
+                        {"u_block_urad", kUradPerRad * most(artefact.u_block_rad)}};
+  if (const auto& e = artefact.expansion)
+    object.update({{"temperature_C", e->temperature_K - kZeroCelsius_K},
+                   {"u_temperature_K", e->u_temperature_K},
+                   {"growth", calib::growth(*e)},
+                   {"u_growth", calib::u_growth(*e)}});
+  return object;
+}
+
+std::string artefact_text(const evemu::ArtefactUncertainty& artefact) {
+  const auto& e = artefact.expansion;
+  return e ? fmt::format(", at {:.3f} C (u = {:.3f} K) longer by {:.2f} um per metre (u = {:.2f})",
+                         e->temperature_K - kZeroCelsius_K, e->u_temperature_K,
+                         kUmPerM * (calib::growth(*e) - 1.0), kUmPerM * calib::u_growth(*e))
+           : ", its temperature not known: counts as at 20 C";
+}
+
+void print_json(const Outcome& outcome, const ModelDocument& document, const std::filesystem::path& folder) {
+  const auto& s = outcome.solution->statistics;
+  const auto& held_out = outcome.verdict.held_out;
+  nlohmann::json object{{"model", (folder / "model.json").string()},
+                        {"id", model_id(document)},
+                        {"hash", model_hash(document)},
+                        {"estimator", document.estimator},
+                        {"covariance", evemu::name(outcome.solution->covariance)},
+                        {"positions", s.positions},
+                        {"balls", s.balls},
+                        {"observations", s.observations},
+                        {"unknowns", s.unknowns},
+                        {"rank", s.rank},
+                        {"condition", s.condition},
+                        {"effective_parameters", s.effective_parameters},
+                        {"noise_um", s.s_m * kUmPerM},
+                        {"pose_rotation_urad", s.w_rad * kUradPerRad},
+                        {"u_mean_rotation_urad", u_rotation_urad(*outcome.solution)},
+                        {"shape_only", !outcome.solution->rotation.referenced},
+                        {"residual_rms_before_um", s.before.rms_m * kUmPerM},
+                        {"residual_rms_after_um", s.after.rms_m * kUmPerM},
+                        {"held_out_rms_before_um", held_out.no_compensation_rms_m * kUmPerM},
+                        {"held_out_rms_after_um", held_out.candidate_rms_m * kUmPerM},
+                        {"gate", verdict_json(outcome.verdict)}};
+  if (const auto& artefact = outcome.solution->artefact) object["artefact"] = artefact_json(*artefact);
+  if (const auto& choice = outcome.solution->sparse)
+    object["chosen"] = {{"lambda", choice->lambda.back()}, {"gamma", choice->gamma}};
+  fmt::print("{}\n", object.dump(1));
+}
+
+void print_summary(const Outcome& outcome, const ModelDocument& document,
+                   const std::filesystem::path& folder) {
+  const auto& s = outcome.solution->statistics;
+  fmt::print("model       {}  ({} coefficients, tool and machine \"{}\")\n", model_id(document), s.unknowns,
+             document.machine);
+  fmt::print("artefact    {} positions, {} ball centres{}\n", s.positions, s.balls,
+             outcome.solution->artefact ? artefact_text(*outcome.solution->artefact) : "");
+  fmt::print(
+      "solution    {}: {} observations, rank {} of {}, condition {:.3g}, {:.1f} effective parameters\n",
+      document.estimator, s.observations, s.rank, s.unknowns, s.condition, s.effective_parameters);
+  fmt::print("noise       {:.2f} um per ball coordinate, {:.1f} urad per position\n", s.s_m * kUmPerM,
+             s.w_rad * kUradPerRad);
+  if (const auto& choice = outcome.solution->sparse)
+    fmt::print("chosen      lambda {:.3g}, gamma {:.3g}{}\n", choice->lambda.back(), choice->gamma,
+               choice->curvature < 0.0 ? "; not convex there: other solutions may be near" : "");
+  fmt::print("residuals   {:.3f} um rms before, {:.3f} um after\n", s.before.rms_m * kUmPerM,
+             s.after.rms_m * kUmPerM);
+  fmt::print("rotation    {}, u = {:.1f} urad about Ball1\n",
+             outcome.solution->rotation.referenced ? "referenced" : "that of the blocks: shape only",
+             u_rotation_urad(*outcome.solution));
+  print_verdict(outcome.verdict);
+  fmt::print("written     {}, coefficients.csv, report.html\n", (folder / "model.json").string());
+}
+
+int run(const IdentifyEvemuArguments& arguments) {
+  const auto outcome = identify(arguments);
+  if (!outcome) return report(outcome.error());
+  const auto now = std::chrono::time_point_cast<std::chrono::nanoseconds>(std::chrono::system_clock::now());
+  auto document = evemu_document(*outcome->solution, outcome->config, outcome->sources, now);
+  document.recording_gap = outcome->recording_gap;
+  if (const auto written = write_outputs(arguments.out, document, *outcome); !written)
+    return report(written.error());
+  if (const auto kept = keep(arguments.keep, document, outcome->verdict, "abbe identify evemu"); !kept)
+    return report(kept.error());
+  arguments.json ? print_json(*outcome, document, arguments.out)
+                 : print_summary(*outcome, document, arguments.out);
+  return exit_code(outcome->verdict);
+}
+
+void add_options(CLI::App& command, IdentifyEvemuArguments& arguments) {
+  auto* machine =
+      command.add_option("--machine", arguments.machine, "machine.toml, or the daemon's abbed.toml");
+  auto* touches = command.add_option("--touches", arguments.touches,
+                                     "touches.csv: position,kind,index,x_mm,y_mm,z_mm; kind ball or block");
+  auto* calibrator = command.add_option("--calibrator", arguments.calibrator, "calibrator.toml");
+  auto* errors = command.add_option("--errors", arguments.errors,
+                                    "errors.csv instead: position,ball,x_mm,y_mm,z_mm,ex_um,ey_um,ez_um");
+  auto* recording = command.add_option(
+      "--recording", arguments.recording,
+      "what the daemon recorded (.mcap) instead: its last complete run with a ball array, with the\n"
+      "recorded configuration unless --machine is given");
+  touches->needs(machine, calibrator);
+  calibrator->needs(touches);
+  auto* artefact_C =
+      command.add_option("--artefact-C", arguments.artefact_C,
+                         "how warm the array was, where calibrator.toml has alpha_um_per_m_K;\n"
+                         "default: [evemu] artefact_C");
+  auto* u_artefact_K =
+      command.add_option("--u-artefact-K", arguments.u_artefact_K, "its standard uncertainty");
+  artefact_C->needs(calibrator, u_artefact_K)->check(CLI::Range(-50.0, 100.0));
+  u_artefact_K->needs(artefact_C)->check(CLI::Range(0.0, 50.0));
+  errors->needs(machine)->excludes(touches);
+  recording->excludes(touches)->excludes(errors);
+  recording->excludes(add_scales_corrected(command, arguments.scales_corrected));
+  command
+      .add_option("--estimator", arguments.estimator,
+                  "bayes-pose: priors by order, shared noise of Ball1, random pose rotations;\n"
+                  "ols: least squares; ridge: one prior for all;\n"
+                  "lasso, mcp, scad: penalised, chosen by cross-validation over 50 x 100 values;\n"
+                  "default: that of [evemu], which is bayes-pose")
+      ->check(CLI::IsMember({"bayes-pose", "ols", "ridge", "lasso", "mcp", "scad"}));
+  command.add_option(
+      "--folds", arguments.folds,
+      "what lasso, mcp and scad hold out together: position, ball, row (as published: leaks the\n"
+      "noise rows share), or a file of one fold number a row; default: that of [evemu]: position");
+  command.add_option("--order", arguments.order, "of the polynomials; default: that of [evemu]: 3")
+      ->check(CLI::Range(evemu::kLeastOrder, evemu::kMostOrder));
+  command
+      .add_option("--positions", arguments.positions,
+                  "positions of the artefact that must be there; default: those that were asked for: 8")
+      ->check(CLI::Range(2, 1000));
+  command
+      .add_flag("--rotation-known", arguments.rotation_known,
+                "the errors' directions do not come from the artefact's blocks")
+      ->needs(errors);
+  command.add_option("--rotation-reference", arguments.reference,
+                     "errors.csv of points where V is known independently: turns the model onto them");
+  command
+      .add_option("--u-reference-um", arguments.u_reference_um, "standard uncertainty of the reference's V")
+      ->check(CLI::PositiveNumber)
+      ->capture_default_str();
+  command.add_flag("--accept-shape-only", arguments.accept_shape_only,
+                   "judge the model although its rotation about Ball1 is unknown; as [gate] accept =\n"
+                   "[\"evemu-shape-only\"]");
+  command.add_option("--keep", arguments.keep,
+                     "also keep the model in this store, judged against the model active there");
+  command.add_flag("--json", arguments.json, "the summary as one JSON object");
+  command.add_option("-o,--out", arguments.out, "folder for the results; created if needed")->required();
+}
+
+}  // namespace
+
+void add_identify_evemu(CLI::App& parent, int& exit) {
+  auto arguments = std::make_shared<IdentifyEvemuArguments>();
+  auto* command = parent.add_subcommand("evemu",
+                                        "From a ball array touched at several positions.\n"
+                                        "Writes model.json, coefficients.csv and report.html to OUT and says "
+                                        "how well the model predicts positions it was "
+                                        "not fitted to.\n"
+                                        "Exit code 5 if the gate would refuse it; everything is written all "
+                                        "the same.");
+  add_options(*command, *arguments);
+  command->callback([arguments, &exit] {
+    exit = arguments->touches.empty() && arguments->errors.empty() && arguments->recording.empty()
+               ? report({ErrorCode::Usage,
+                         "identify evemu needs --machine with --touches and --calibrator or "
+                         "with --errors, or --recording"})
+               : run(*arguments);
+  });
+}
+
+}  // namespace abbe::daemon

@@ -1,0 +1,334 @@
+#include <fmt/format.h>
+
+#include <chrono>
+#include <filesystem>
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <optional>
+
+#include "abbe/base/sha256.hpp"
+#include "abbe/base/text_file.hpp"
+#include "abbe/base/units.hpp"
+#include "abbe/calib/otf/identify.hpp"
+#include "abbe/config/unmeasured_air.hpp"
+#include "abbe/methods/otf_identification.hpp"
+#include "abbe/methods/otf_inputs.hpp"
+#include "abbe/methods/otf_report.hpp"
+#include "abbe/methods/path_readings.hpp"
+#include "abbe/model/model_document.hpp"
+#include "abbe/replay/replay.hpp"
+#include "abbe/tables/input_files.hpp"
+#include "abbe/tables/travel_faults.hpp"
+#include "commands.hpp"
+#include "identified_model.hpp"
+#include "opened_recording.hpp"
+#include "scales_corrected.hpp"
+#include "terminal.hpp"
+
+namespace abbe::daemon {
+
+namespace {
+
+namespace otf = calib::otf;
+
+constexpr double kPpmPer1 = 1e6;
+
+struct IdentifyOtfArguments {
+  std::string machine, path, tracker, encoder, recording, keep, out;
+  std::string estimator = "two-step";
+  std::size_t block_samples = 0;      // 0: by travel
+  std::optional<double> u_scale_ppm;  // else that of [tracker]
+  bool scales_corrected = false, accept_path_orientation = false;
+  bool json = false;
+};
+
+struct Files {
+  Config config;
+  PathFile path;
+  TrackerFile tracker;
+  std::optional<EncoderFile> encoder;
+  std::vector<InputFile> sources;
+};
+
+struct OtfOutcome {
+  ModelDocument document;
+  otf::Residuals residuals;
+  calib::Verdict verdict;
+  std::size_t blocks = 0, blocks_used = 0;
+  otf::RangeOffset range_offset;
+};
+
+Result<Files> read_files(const IdentifyOtfArguments& arguments, ProgressBar& bar) {
+  auto config = load_config(arguments.machine);
+  if (!config) return tl::make_unexpected(config.error());
+  const auto hash = sha256_hex_of_file(arguments.machine);
+  if (!hash) return tl::make_unexpected(hash.error());
+  auto path = read_path_csv(arguments.path);
+  if (!path) return tl::make_unexpected(path.error());
+  auto tracker = read_tracker_csv(arguments.tracker,
+                                  [&](double fraction) { bar.show("reading the tracker", fraction); });
+  if (!tracker) return tl::make_unexpected(tracker.error());
+  std::vector<InputFile> sources{
+      {std::filesystem::path(arguments.machine).filename().string(), *hash}, path->source, tracker->source};
+  std::optional<EncoderFile> encoder;
+  if (!arguments.encoder.empty()) {
+    auto read = read_encoder_csv(arguments.encoder,
+                                 [&](double fraction) { bar.show("reading the scales", fraction); });
+    if (!read) return tl::make_unexpected(read.error());
+    sources.push_back(read->source);
+    encoder = std::move(*read);
+  }
+  return Files{std::move(*config), std::move(*path), std::move(*tracker), std::move(encoder),
+               std::move(sources)};
+}
+
+std::string_view words(otf::Stage stage) {
+  switch (stage) {
+    case otf::Stage::Observe:
+      return "averaging blocks";
+    case otf::Stage::Align:
+      return "aligning";
+    case otf::Stage::Solve:
+      return "solving";
+    case otf::Stage::Judge:
+      return "judging";
+  }
+  return "";
+}
+
+protocol::UtcTime now() {
+  return std::chrono::time_point_cast<std::chrono::nanoseconds>(std::chrono::system_clock::now());
+}
+
+OtfOutcome outcome_of(OtfCandidate candidate, const Config& config, std::vector<InputFile> sources) {
+  auto document = otf_document(candidate.solution, config, std::move(sources), now());
+  const auto& s = candidate.solution.statistics;
+  return {
+      std::move(document), std::move(candidate.solution.residuals), std::move(candidate.verdict), s.blocks,
+      s.blocks_used,       candidate.solution.range_offset};
+}
+
+double u_scale(const IdentifyOtfArguments& arguments, const Config& config) {
+  if (arguments.u_scale_ppm) return *arguments.u_scale_ppm / kPpmPer1;
+  return config.tracker ? config.tracker->u_scale : 0.0;
+}
+
+/// As a session of the daemon does before the machine drives; outside the travel with line and column.
+Result<void> check_path(const std::string& file, const PathFile& path, const MachineConfig& machine) {
+  if (auto inside = check_travel(file, otf_path(path.vertices_m).vertices_m, path.lines, machine); !inside)
+    return inside;
+  auto fine = check_otf_path(path.vertices_m, machine);
+  if (!fine) fine.error().text = fmt::format("{}: {}", file, fine.error().text);
+  return fine;
+}
+
+/// At how many vertices the scales were compared with the path where the machine stood; of a run without
+/// readings none. What contradicts the path is an error.
+Result<std::size_t> vertices_compared(const IdentifyOtfArguments& arguments, const Files& files) {
+  if (!files.encoder) return 0;
+  return compare_with_path(arguments.encoder, files.encoder->rows, files.path.vertices_m,
+                           files.config.gate.path_tolerance_m);
+}
+
+Result<OtfOutcome> from_files(const IdentifyOtfArguments& arguments,
+                              const std::optional<ModelDocument>& active, ProgressBar& bar) {
+  auto files = read_files(arguments, bar);
+  if (!files) return tl::make_unexpected(files.error());
+  if (const auto fine = check_scales("identify otf", "a path", files->config, arguments.scales_corrected);
+      !fine)
+    return tl::make_unexpected(fine.error());
+  if (const auto fine = check_path(arguments.path, files->path, files->config.machine); !fine)
+    return tl::make_unexpected(fine.error());
+  const auto stood = vertices_compared(arguments, *files);
+  if (!stood) return tl::make_unexpected(stood.error());
+  const auto machine = otf_machine(files->config.machine);
+  if (!machine) return tl::make_unexpected(machine.error());
+  otf::Options options = otf_options(files->tracker.points, files->config.machine, files->config.gate);
+  if (arguments.accept_path_orientation) options.orientation.accepted = true;
+  if (files->encoder) options.orientation.scales_agree = true;
+  if (arguments.block_samples > 0) options.block_samples = arguments.block_samples;
+  options.progress = [&](otf::Stage stage, double fraction) { bar.show(words(stage), fraction); };
+  otf::Noise noise = otf_noise(files->config.machine);
+  noise.u_scale = u_scale(arguments, files->config);
+  auto found =
+      otf::identify(files->tracker.points, *machine, otf_path(files->path.vertices_m), noise, options);
+  if (!found) return tl::make_unexpected(error_of(found.error()));
+  const auto other = to_beat(active, files->config);
+  auto verdict =
+      otf::judge(found->observations, found->solution, other.model, gate_limits(files->config.gate), options);
+  if (!verdict) return tl::make_unexpected(error_of(verdict.error()));
+  other.say(*verdict);
+  if (files->encoder && *stood == 0)
+    verdict->notes.emplace_back(
+        "the scales were compared with the path to 2 mm only: the machine stands at no vertex");
+  if (auto air = unmeasured_air_text(files->config, noise.u_scale)) verdict->notes.push_back(*std::move(air));
+  return outcome_of({std::move(found->solution), std::move(*verdict)}, files->config,
+                    std::move(files->sources));
+}
+
+/// The last run of the recording that was driven to its end.
+Result<OtfCandidate> last_complete_run(ReplayReport replayed, const std::string& file) {
+  std::string why = replayed.calibrations.empty() ? "no calibration was asked for" : "";
+  for (auto c = replayed.calibrations.rbegin(); c != replayed.calibrations.rend(); ++c) {
+    if (c->outcome && *c->outcome) {
+      if (auto* otf = std::get_if<OtfCandidate>(&**c->outcome)) return std::move(*otf);
+      continue;
+    }
+    if (why.empty()) why = c->outcome ? c->outcome->error().text : c->ended.reason;
+  }
+  return fail(ErrorCode::DataInsufficient, fmt::format("{}: holds no complete calibration: {}", file, why));
+}
+
+Result<OtfOutcome> from_recording(const IdentifyOtfArguments& arguments,
+                                  const std::optional<ModelDocument>& active, ProgressBar& bar) {
+  const auto recording = open_recording(arguments.recording, arguments.machine);
+  if (!recording) return tl::make_unexpected(recording.error());
+  if (const auto given = require_target(recording->config.machine); !given)
+    return tl::make_unexpected(given.error());
+  const auto other = to_beat(active, recording->config);
+  auto replayed =
+      replay(recording->reader, recording->config,
+             {.active = other.model, .progress = [&bar](double share) { bar.show("replaying", share); }});
+  if (!replayed) return tl::make_unexpected(replayed.error());
+  auto candidate = last_complete_run(std::move(*replayed), arguments.recording);
+  if (!candidate) return tl::make_unexpected(candidate.error());
+  other.say(candidate->verdict);
+  auto outcome = outcome_of(std::move(*candidate), recording->config, {recording->source});
+  outcome.document.recording_gap = recording->reader.damage();
+  return outcome;
+}
+
+Result<void> write_outputs(const std::filesystem::path& folder, const OtfOutcome& outcome) {
+  const ModelDocument& document = outcome.document;
+  return write_results(folder, document,
+                       {{"tables.csv", to_tables_csv(document.model)},
+                        {"report.html", otf_report(document, outcome.residuals, outcome.verdict)}});
+}
+
+void print_json(const OtfOutcome& outcome, const std::filesystem::path& folder) {
+  const auto& s = outcome.document.statistics;
+  const nlohmann::json object{
+      {"model", (folder / "model.json").string()},
+      {"id", model_id(outcome.document)},
+      {"hash", model_hash(outcome.document)},
+      {"samples", s.samples},
+      {"lost_samples", s.lost_samples},
+      {"blocks", outcome.blocks},
+      {"blocks_used", outcome.blocks_used},
+      {"observations", s.observations},
+      {"unknowns", s.unknowns},
+      {"rank", s.rank},
+      {"condition", s.condition},
+      {"sigma0", s.sigma0},
+      {"covariance_factor", s.covariance_factor},
+      {"range_offset_um", outcome.range_offset.value_m * kUmPerM},
+      {"u_range_offset_um", outcome.range_offset.u_m * kUmPerM},
+      {"residual_rms_before_um", s.before.rms_m * kUmPerM},
+      {"residual_rms_after_um", s.after.rms_m * kUmPerM},
+      {"held_out_rms_before_um", outcome.verdict.held_out.no_compensation_rms_m * kUmPerM},
+      {"held_out_rms_after_um", outcome.verdict.held_out.candidate_rms_m * kUmPerM},
+      {"gate", verdict_json(outcome.verdict)}};
+  fmt::print("{}\n", object.dump(1));
+}
+
+void print_summary(const OtfOutcome& outcome, const std::filesystem::path& folder) {
+  const auto& s = outcome.document.statistics;
+  fmt::print("model       {}  ({} tables, tool and machine \"{}\")\n", model_id(outcome.document),
+             outcome.document.model.layout().tables().size(), outcome.document.machine);
+  fmt::print("samples     {}, {} lost; {} of {} blocks used\n", s.samples, s.lost_samples,
+             outcome.blocks_used, outcome.blocks);
+  fmt::print("solution    {} observations, {} unknowns, rank {}, condition {:.3g}, sigma0 {:.3f}\n",
+             s.observations, s.unknowns, s.rank, s.condition, s.sigma0);
+  fmt::print("residuals   {:.3f} um rms before, {:.3f} um after\n", s.before.rms_m * kUmPerM,
+             s.after.rms_m * kUmPerM);
+  if (outcome.range_offset.u_m > 0.0)
+    fmt::print("ranges      offset {:.3f} um, standard uncertainty {:.3f} um\n",
+               outcome.range_offset.value_m * kUmPerM, outcome.range_offset.u_m * kUmPerM);
+  print_verdict(outcome.verdict);
+  fmt::print("written     {}, tables.csv, report.html\n", (folder / "model.json").string());
+}
+
+Result<OtfOutcome> identify(const IdentifyOtfArguments& arguments, ProgressBar& bar) {
+  const auto active = active_model(arguments.keep);
+  if (!active) return tl::make_unexpected(active.error());
+  return arguments.recording.empty() ? from_files(arguments, *active, bar)
+                                     : from_recording(arguments, *active, bar);
+}
+
+int run(const IdentifyOtfArguments& arguments) {
+  ProgressBar bar;
+  const auto outcome = identify(arguments, bar);
+  bar.clear();
+  if (!outcome) return report(outcome.error());
+  if (const auto written = write_outputs(arguments.out, *outcome); !written) return report(written.error());
+  if (const auto kept = keep(arguments.keep, outcome->document, outcome->verdict, "abbe identify otf"); !kept)
+    return report(kept.error());
+  arguments.json ? print_json(*outcome, arguments.out) : print_summary(*outcome, arguments.out);
+  return exit_code(outcome->verdict);
+}
+
+}  // namespace
+
+void add_identify_otf(CLI::App& parent, int& exit) {
+  auto arguments = std::make_shared<IdentifyOtfArguments>();
+  auto* command = parent.add_subcommand(
+      "otf",
+      "From laser tracker points taken on the fly along a path.\n"
+      "Writes model.json, tables.csv and report.html to OUT and says how well the model "
+      "predicts legs it was not fitted to.\n"
+      "Exit code 5 if the gate would refuse it, as it does where the recording is damaged inside; "
+      "everything\n"
+      "is written all the same.");
+  auto* machine =
+      command->add_option("--machine", arguments->machine, "machine.toml, or the daemon's abbed.toml");
+  auto* path = command->add_option("--path", arguments->path,
+                                   "path.csv: x_mm,y_mm,z_mm, the vertices that were driven");
+  auto* tracker = command->add_option("--tracker", arguments->tracker,
+                                      "tracker.csv: time_s,range_mm,azimuth_rad,elevation_rad[,status]\n"
+                                      "or time_s,x_mm,y_mm,z_mm[,status]");
+  auto* encoder = command->add_option(
+      "--encoder", arguments->encoder,
+      "encoder.csv: time_s,x_mm,y_mm,z_mm, what the scales read along the path, any clock; compared with\n"
+      "the vertices of the path, to [gate] path_tolerance_mm where the machine stands");
+  auto* recording = command->add_option(
+      "--recording", arguments->recording,
+      "what the daemon recorded (.mcap) instead of path and tracker: its last complete run, with\n"
+      "the recorded configuration unless --machine is given");
+  auto* u_scale =
+      command
+          ->add_option("--u-scale-ppm", arguments->u_scale_ppm,
+                       "standard uncertainty all ranges have in common (index of the air): 0.2 for "
+                       "0.2 K and 30 Pa; default: that of [tracker], else 0")
+          ->check(CLI::NonNegativeNumber);
+  auto* corrected = add_scales_corrected(*command, arguments->scales_corrected);
+  auto* orientation = command->add_flag("--accept-path-orientation", arguments->accept_path_orientation,
+                                        "judge the model although nothing excludes that the path is turned "
+                                        "by 180 degrees (two signs\nreversed); "
+                                        "as [gate] accept = [\"path-orientation\"]");
+  recording->excludes(u_scale)->excludes(corrected)->excludes(orientation);
+  path->needs(machine, tracker);
+  tracker->needs(path);
+  encoder->needs(path);
+  recording->excludes(path)->excludes(tracker)->excludes(encoder);
+  command->add_option(
+      "--keep", arguments->keep,
+      "also keep the model in this store, judged against the model active there; activate it with\n"
+      "abbe model activate");
+  command->add_option("--estimator", arguments->estimator, "two-step: align, then adjust")
+      ->check(CLI::IsMember({"two-step"}))
+      ->capture_default_str();
+  command
+      ->add_option("--block-samples", arguments->block_samples,
+                   "samples per block mean; default: 8.3 mm of travel")
+      ->check(CLI::Range(10, 1000));
+  command->add_flag("--json", arguments->json, "the summary as one JSON object");
+  command->add_option("-o,--out", arguments->out, "folder for the results; created if needed")->required();
+  command->callback([arguments, &exit] {
+    exit =
+        arguments->tracker.empty() && arguments->recording.empty()
+            ? report({ErrorCode::Usage, "identify otf needs --machine, --path and --tracker, or --recording"})
+            : run(*arguments);
+  });
+}
+
+}  // namespace abbe::daemon

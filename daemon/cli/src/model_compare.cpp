@@ -1,0 +1,95 @@
+/// `abbe model compare A B`: how far two models are apart where both hold.
+
+#include <fmt/format.h>
+
+#include <memory>
+#include <nlohmann/json.hpp>
+
+#include "abbe/base/units.hpp"
+#include "abbe/calib/model_comparison.hpp"
+#include "abbe/methods/otf_inputs.hpp"
+#include "commands.hpp"
+#include "figures.hpp"
+#include "store_option.hpp"
+#include "terminal.hpp"
+
+namespace abbe::daemon {
+namespace {
+
+struct ModelCompareArguments {
+  std::string a, b;
+  StoreOption store;
+  bool json = false;
+};
+
+struct Comparison {
+  std::size_t points = 0;
+  calib::ModelDifference difference;
+};
+
+/// The nodes of both models that lie in the validity volume of both.
+std::vector<calib::Vector3> common_points(const calib::VolumetricModel& a, const calib::VolumetricModel& b) {
+  std::vector<calib::Vector3> points;
+  for (const auto* nodes : {&a.layout().nodes(), &b.layout().nodes()}) {
+    for (const calib::Vector3& q : calib::tensor_grid(*nodes)) {
+      if (a.validity().contains(q) && b.validity().contains(q)) points.push_back(q);
+    }
+  }
+  return points;
+}
+
+Result<Comparison> compare(const ModelCompareArguments& arguments) {
+  const auto a = model_named(arguments.a, arguments.store);
+  if (!a) return tl::make_unexpected(a.error());
+  const auto b = model_named(arguments.b, arguments.store);
+  if (!b) return tl::make_unexpected(b.error());
+  const auto points = common_points(a->model, b->model);
+  const auto difference =
+      calib::rigid_free_difference(a->model, b->model, a->model.tool_offsets_m().front(), points);
+  if (!difference)
+    return fail(ErrorCode::DataInsufficient,
+                fmt::format("{} and {}: {}", arguments.a, arguments.b, difference.error().text));
+  return Comparison{points.size(), *difference};
+}
+
+void print(const char* what, const calib::VectorStatistics& s) {
+  fmt::print("{:<24}  {:>9.3f}  {:>9.3f}  {:>9.3f}\n", what, s.mean_m * kUmPerM, s.rms_m * kUmPerM,
+             s.max_m * kUmPerM);
+}
+
+int run(const ModelCompareArguments& arguments) {
+  const auto found = compare(arguments);
+  if (!found) return report(found.error());
+  const auto& d = found->difference;
+  if (arguments.json) {
+    const nlohmann::json object{{"points", found->points},
+                                {"as_stated", vector_figures(d.as_stated)},
+                                {"rigid_free", vector_figures(d.rigid_free)}};
+    fmt::print("{}\n", object.dump(1));
+    return 0;
+  }
+  fmt::print("|V(A) - V(B)| at {} nodes where both hold, um\n", found->points);
+  fmt::print("{:<24}  {:>9}  {:>9}  {:>9}\n", "", "mean", "rms", "largest");
+  print("as stated", d.as_stated);
+  print("without a rigid motion", d.rigid_free);
+  return 0;
+}
+
+}  // namespace
+
+void add_model_compare(CLI::App& parent, int& exit) {
+  auto arguments = std::make_shared<ModelCompareArguments>();
+  auto* command = parent.add_subcommand(
+      "compare",
+      "How far two models are apart at the nodes where both hold, for the tool of A; as they stand, and\n"
+      "without the rigid motion of the whole volume that no measurement can see.");
+  command
+      ->add_option("A", arguments->a, "model.json; or, of the store, an id, the beginning of one, \"active\"")
+      ->required();
+  command->add_option("B", arguments->b, "the other one")->required();
+  add_store_options(*command, arguments->store);
+  command->add_flag("--json", arguments->json, "as one JSON object");
+  command->callback([arguments, &exit] { exit = run(*arguments); });
+}
+
+}  // namespace abbe::daemon

@@ -1,0 +1,181 @@
+/// `abbe model list|show|activate|rollback`: a machine's store of models.
+
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include <chrono>
+#include <memory>
+#include <nlohmann/json.hpp>
+
+#include "abbe/base/units.hpp"
+#include "abbe/base/utc_text.hpp"
+#include "commands.hpp"
+#include "daemon_socket.hpp"
+#include "store_option.hpp"
+#include "terminal.hpp"
+
+namespace abbe::daemon {
+
+namespace {
+
+struct ModelStoreArguments {
+  StoreOption store;
+  std::string id, why;
+  bool json = false, force = false;
+};
+
+StoreActor actor(const ModelStoreArguments& arguments) {
+  return {user_name(), arguments.why,
+          std::chrono::time_point_cast<std::chrono::nanoseconds>(std::chrono::system_clock::now())};
+}
+
+std::string state_of(const StoreEntry& entry) {
+  if (!entry.fault.empty()) return "damaged";
+  if (entry.active) return entry.accepted ? "active" : "active (forced)";
+  return entry.accepted ? "accepted" : "refused";
+}
+
+nlohmann::json to_json(const StoreEntry& entry) {
+  return {{"id", entry.id},           {"state", state_of(entry)},
+          {"active", entry.active},   {"accepted", entry.accepted},
+          {"reasons", entry.reasons}, {"added", to_text(entry.added)},
+          {"method", entry.method},   {"machine", entry.machine},
+          {"fault", entry.fault}};
+}
+
+void print_table(const std::vector<StoreEntry>& entries) {
+  constexpr std::size_t kSeconds = 19;  // "2024-05-17T08:30:00"
+  fmt::print("{:<16}  {:<19}  {:<6}  {:<20}  {}\n", "id", "added (UTC)", "method", "machine", "state");
+  for (const auto& entry : entries) {
+    auto state = state_of(entry);
+    if (entry.active) state = coloured(state, kGreen, STDOUT_FILENO);
+    if (!entry.fault.empty()) state = coloured(state, kRed, STDOUT_FILENO) + ": " + entry.fault;
+    fmt::print("{:<16}  {:<19}  {:<6}  {:<20}  {}\n", entry.id, to_text(entry.added).substr(0, kSeconds),
+               entry.method, entry.machine, state);
+    for (const auto& reason : entry.reasons) fmt::print("{:18}{}\n", "", reason);
+  }
+}
+
+int list(const ModelStoreArguments& arguments) {
+  const auto store = open_store(arguments.store);
+  if (!store) return report(store.error());
+  const auto entries = store->list();
+  if (!entries) return report(entries.error());
+  if (arguments.json) {
+    nlohmann::json array = nlohmann::json::array();
+    for (const auto& entry : *entries) array.push_back(to_json(entry));
+    fmt::print("{}\n", array.dump(1));
+  } else {
+    print_table(*entries);
+  }
+  return 0;
+}
+
+void print_model(const ModelDocument& document, const StoreEntry& entry) {
+  const auto& s = document.statistics;
+  fmt::print("id          {}\nstate       {}\nadded       {}\n", entry.id, state_of(entry),
+             to_text(entry.added));
+  for (const auto& reason : entry.reasons) fmt::print("            {}\n", reason);
+  fmt::print("created     {}\nmachine     {}, chain {}\nmethod      {}, {}, gauge {}\n",
+             to_text(document.created), document.machine, document.model.layout().chain().text(),
+             document.method, document.estimator, name(document.model.gauge()));
+  fmt::print("solution    {} observations, {} unknowns, rank {}, condition {:.3g}, sigma0 {:.3f}\n",
+             s.observations, s.unknowns, s.rank, s.condition, s.sigma0);
+  fmt::print("residuals   {:.3f} um rms before, {:.3f} um after\n", s.before.rms_m * kUmPerM,
+             s.after.rms_m * kUmPerM);
+  for (const auto& input : document.inputs)
+    fmt::print("input       {}  sha256 {}\n", input.name, input.sha256);
+  if (!document.recording_gap.empty())
+    fmt::print("            {}\n", cannot_be_checked(document.recording_gap));
+  fmt::print("\n{}", to_tables_csv(document.model));
+}
+
+Result<StoreEntry> entry_of(const ModelStore& store, const std::string& id) {
+  const auto entries = store.list();
+  if (!entries) return tl::make_unexpected(entries.error());
+  for (const auto& entry : *entries)
+    if (entry.id == id) return entry;
+  return fail(ErrorCode::Usage, fmt::format("model {}: not in the store", id));
+}
+
+int show(const ModelStoreArguments& arguments) {
+  const auto store = open_store(arguments.store);
+  if (!store) return report(store.error());
+  const auto id = store->find(arguments.id);
+  if (!id) return report(id.error());
+  const auto document = store->load(*id);
+  if (!document) return report(document.error());
+  if (arguments.json) {
+    fmt::print("{}", to_json(*document));
+    return 0;
+  }
+  const auto entry = entry_of(*store, *id);
+  if (!entry) return report(entry.error());
+  print_model(*document, *entry);
+  return 0;
+}
+
+int activate(const ModelStoreArguments& arguments) {
+  auto store = open_store(arguments.store);
+  if (!store) return report(store.error());
+  const auto id = store->find(arguments.id);
+  if (!id) return report(id.error());
+  if (const auto done = store->activate(*id, actor(arguments), arguments.force); !done)
+    return report(done.error());
+  fmt::print("active: {}\n", *id);
+  return 0;
+}
+
+int rollback(const ModelStoreArguments& arguments) {
+  auto store = open_store(arguments.store);
+  if (!store) return report(store.error());
+  const auto id = store->rollback(actor(arguments));
+  if (!id) return report(id.error());
+  fmt::print("active: {}\n", *id);
+  return 0;
+}
+
+}  // namespace
+
+void add_model_list(CLI::App& parent, int& exit) {
+  auto arguments = std::make_shared<ModelStoreArguments>();
+  auto* command = parent.add_subcommand("list", "All models of the store, newest first");
+  add_store_options(*command, arguments->store);
+  command->add_flag("--json", arguments->json, "as a JSON array");
+  command->callback([arguments, &exit] { exit = list(*arguments); });
+}
+
+void add_model_show(CLI::App& parent, int& exit) {
+  auto arguments = std::make_shared<ModelStoreArguments>();
+  auto* command = parent.add_subcommand("show", "One model: where it came from, how good it is, its tables");
+  command->add_option("ID", arguments->id, "id, the beginning of one, or \"active\"")->required();
+  add_store_options(*command, arguments->store);
+  command->add_flag("--json", arguments->json, "the whole model.json");
+  command->callback([arguments, &exit] { exit = show(*arguments); });
+}
+
+void add_model_activate(CLI::App& parent, int& exit) {
+  auto arguments = std::make_shared<ModelStoreArguments>();
+  auto* command =
+      parent.add_subcommand("activate", "Make a model the active one; who did it and why is kept");
+  command->add_option("ID", arguments->id, "id, or the beginning of one")->required();
+  add_store_options(*command, arguments->store);
+  command->add_option("--why", arguments->why, "the reason, for the record; needed with --force");
+  command->add_flag("--force", arguments->force, "also a model the gate refused");
+  command->callback([arguments, &exit] {
+    exit = arguments->force && arguments->why.empty()
+               ? report({ErrorCode::Usage,
+                         "--force needs --why: a forced activation is recorded with its reason"})
+               : activate(*arguments);
+  });
+}
+
+void add_model_rollback(CLI::App& parent, int& exit) {
+  auto arguments = std::make_shared<ModelStoreArguments>();
+  auto* command = parent.add_subcommand("rollback", "Go back to the model that was active before");
+  add_store_options(*command, arguments->store);
+  command->add_option("--why", arguments->why, "the reason, for the record");
+  command->callback([arguments, &exit] { exit = rollback(*arguments); });
+}
+
+}  // namespace abbe::daemon

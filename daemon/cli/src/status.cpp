@@ -1,0 +1,147 @@
+/// `abbe status`: what the running daemon sees, does and publishes.
+
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include <CLI/App.hpp>
+#include <CLI/Config.hpp>
+#include <CLI/Formatter.hpp>
+#include <memory>
+#include <string>
+
+#include "abbe/base/control_protocol.hpp"
+#include "commands.hpp"
+#include "daemon_socket.hpp"
+#include "terminal.hpp"
+
+namespace abbe::daemon {
+namespace {
+
+using nlohmann::json;
+
+int colour_of_model(const std::string& state) {
+  if (state == "ACTIVE") return kGreen;
+  return state == "INVALID" ? kRed : kYellow;
+}
+
+void print_stream(const json& s) {
+  const bool connected = s["connected"];
+  fmt::print("{:<10} {:<14} {:>8.1f}/s {:>10} {:>7} {:>5} {:>7}  {}\n", s["name"].get<std::string>(),
+             coloured(fmt::format("{:<14}", s["state"].get<std::string>()), connected ? kGreen : kYellow,
+                      STDOUT_FILENO),
+             s["rate_hz"].get<double>(), s["samples"].get<std::uint64_t>(), s["dropped"].get<std::uint64_t>(),
+             s["gaps"].get<std::uint64_t>(), s.contains("faults") ? s["faults"].get<std::uint64_t>() : 0,
+             s["last_fault"].get<std::string>());
+  if (const auto condition = s.value("condition", std::string{}); !condition.empty())
+    fmt::print("           {}\n", coloured(condition, kYellow, STDOUT_FILENO));
+}
+
+std::string value_text(const json& value, int digits, std::string_view unit) {
+  return value.is_number() ? fmt::format("{:.{}f} {}", value.get<double>(), digits, unit)
+                           : fmt::format("- {}", unit);
+}
+
+void print_environment(const json& e) {
+  fmt::print("air        {}, {}, {}", value_text(e["air_temperature_C"], 2, "C"),
+             value_text(e["air_pressure_hPa"], 2, "hPa"), value_text(e["relative_humidity_percent"], 1, "%"));
+  if (e.contains("refractive_index")) {
+    const json& index = e["refractive_index"];
+    fmt::print(", n = {:.9f} (u = {:.1e})", index["n"].get<double>(), index["u_n"].get<double>());
+  }
+  fmt::print("\n");
+  for (const auto& [name, value] : e["temperatures_C"].items())
+    fmt::print("           {} {}\n", name, value_text(value, 2, "C"));
+}
+
+void print_reference(const json& reference) {
+  fmt::print("reference  {}", reference["running"].get<bool>() ? "looking for marks" : "");
+  for (const json& axis : reference["axes"])
+    fmt::print("{} {}", axis["axis"].get<std::string>(), axis["known"].get<bool>() ? "known " : "not known ");
+  fmt::print("\n");
+}
+
+void print_next(const json& next) {
+  fmt::print("next       {} of position {}, {} of {} points touched\n", next["on"].get<std::string>(),
+             next["position"].get<int>(), next["touched"].get<std::size_t>(),
+             next["points"].get<std::size_t>());
+}
+
+void print_release_awaited(const json& awaited) {
+  fmt::print("{}    {}\n           nothing moves before a person has looked at the machine; then: {}\n",
+             coloured("RELEASE", kRed, STDOUT_FILENO), awaited["reason"].get<std::string>(),
+             awaited["command"].get<std::string>());
+}
+
+void print_dds(const json& dds) {
+  const bool connected = dds["connected"].get<bool>();
+  const auto state = dds.value("state", std::string{});  // not from an abbed of before
+  fmt::print("dds        {}, {} messages",
+             connected                    ? "connected"
+             : state == "does not answer" ? "abbe-dds does not answer"
+                                          : "not connected",
+             dds["sent"].get<std::uint64_t>());
+  if (const auto restarts = dds.value("restarts", std::uint64_t{0}); restarts > 0)
+    fmt::print(", abbe-dds restarted {} times", restarts);
+  fmt::print("\n");
+  if (dds.contains("last_end")) fmt::print("           last end: {}\n", dds["last_end"].get<std::string>());
+  if (const auto refused = dds.value("refused_connections", std::uint64_t{0}); refused > 0)
+    fmt::print("           {} connections to its socket by other processes were refused\n", refused);
+  const auto security = dds.value("security", std::string{"on"});
+  fmt::print("           {}\n", security == "on" ? "DDS Security is on" : security);
+}
+
+void print_status(const json& status) {
+  const json& model = status["model"];
+  const std::string state = model["state"];
+  fmt::print("machine    {}\n", status["machine"].get<std::string>());
+  fmt::print("model      {} {} ({})\n", coloured(state, colour_of_model(state), STDOUT_FILENO),
+             model.value("id", "-"), model["reason"].get<std::string>());
+  if (status.contains("release_awaited")) print_release_awaited(status["release_awaited"]);
+  const json& session = status["session"];
+  fmt::print("session    {}, {:.0f} %, {} points: {}\n", session["state"].get<std::string>(),
+             100.0 * session["progress"].get<double>(), session["points"].get<std::uint64_t>(),
+             session["reason"].get<std::string>());
+  if (session.contains("next")) print_next(session["next"]);
+  for (const json& note : session["notes"]) fmt::print("           {}\n", note.get<std::string>());
+  if (status.contains("reference")) print_reference(status["reference"]);
+  if (const json axes = status.value("axes_without_zero", json::array()); !axes.empty()) {
+    fmt::print("zero       of");
+    for (const json& axis : axes) fmt::print(" {}", axis.get<std::string>());
+    fmt::print(" not known: `abbe reference --here` where they read their offset\n");
+  }
+  if (status.contains("environment")) print_environment(status["environment"]);
+  if (status.contains("unmeasured_air"))
+    fmt::print("tracker    {}\n",
+               coloured(status["unmeasured_air"].get<std::string>(), kYellow, STDOUT_FILENO));
+  if (status.contains("recording")) fmt::print("recording  {}\n", status["recording"].get<std::string>());
+  if (status.contains("dds")) print_dds(status["dds"]);
+  fmt::print("\n{:<10} {:<14} {:>10} {:>10} {:>7} {:>5} {:>7}  {}\n", "stream", "state", "rate", "samples",
+             "dropped", "gaps", "faults", "last fault");
+  for (const json& stream : status["streams"]) print_stream(stream);
+}
+
+int status(const DaemonSocket& where, bool as_json) {
+  const auto socket = socket_path(where);
+  if (!socket) return report(socket.error());
+  const auto answer = ask_daemon(*socket, {{"do", "status"}});
+  if (!answer) return report(answer.error());
+  if (as_json) {
+    fmt::print("{}\n", answer->dump(1));
+  } else {
+    print_status(*answer);
+  }
+  return 0;
+}
+
+}  // namespace
+
+void add_status(CLI::App& parent, int& exit) {
+  auto where = std::make_shared<DaemonSocket>();
+  auto as_json = std::make_shared<bool>(false);
+  auto* command = parent.add_subcommand("status", "What the running daemon sees, does and publishes");
+  add_socket_options(*command, *where);
+  command->add_flag("--json", *as_json, "as one JSON object");
+  command->callback([where, as_json, &exit] { exit = status(*where, *as_json); });
+}
+
+}  // namespace abbe::daemon

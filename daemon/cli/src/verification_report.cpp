@@ -1,0 +1,272 @@
+#include "abbe/cli/verification_report.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <numeric>
+
+#include "abbe/base/units.hpp"
+#include "abbe/report/html_report.hpp"
+#include "abbe/report/sections.hpp"
+
+namespace abbe::daemon {
+namespace {
+
+namespace verify = calib::verify;
+constexpr std::array<const char*, 3> kNames{"x", "y", "z"};
+
+std::string mm(const calib::Vector3& p_m) {
+  return fmt::format("{:.3f}, {:.3f}, {:.3f} mm", kMmPerM * p_m.x(), kMmPerM * p_m.y(), kMmPerM * p_m.z());
+}
+
+std::string urad(const calib::Vector3& r_rad) {
+  return fmt::format("{:.1f}, {:.1f}, {:.1f} urad", kUradPerRad * r_rad.x(), kUradPerRad * r_rad.y(),
+                     kUradPerRad * r_rad.z());
+}
+
+std::vector<double> lengths_um(const std::vector<calib::Vector3>& v_m) {
+  std::vector<double> out;
+  out.reserve(v_m.size());
+  for (const auto& v : v_m) out.push_back(kUmPerM * v.norm());
+  return out;
+}
+
+const char* words(verify::Effect effect) {
+  switch (effect) {
+    case verify::Effect::Better:
+      return "better with the model";
+    case verify::Effect::NotSeen:
+      return "neither better nor worse with the model";
+    case verify::Effect::Worse:
+      return "WORSE with the model: do not use it";
+  }
+  return "";
+}
+
+std::size_t points_that_gained(const verify::Comparison& c) {
+  std::size_t gained = 0;
+  for (std::size_t i = 0; i < c.inside.size(); ++i)
+    gained += c.left_after_m[i].norm() < c.left_before_m[i].norm() ? 1 : 0;
+  return gained;
+}
+
+void add_verdict(HtmlReport& page, const Verification& v) {
+  page.heading("Verdict");
+  page.paragraph(verdict_text(v.comparison) + ".");
+}
+
+void add_left(HtmlReport& page, const Verification& v) {
+  const auto& c = v.comparison;
+  page.heading("What is left at the measured points");
+  if (!v.cut_short.empty()) page.paragraph("Points are missing: " + v.cut_short + ".");
+  page.paragraph(
+      fmt::format("{} of {} measured points lie where the model holds. Without and with compensation, each "
+                  "after its own best rigid motion of the instrument: how well both could be set up.",
+                  c.inside.size(), v.observations.readings_m.size()));
+  const auto row = [](const char* what, const calib::VectorStatistics& s) {
+    return std::vector<std::string>{what, um_text(s.mean_m), um_text(s.rms_m), um_text(s.max_m)};
+  };
+  page.table({"", "mean", "rms", "largest"},
+             {row("without compensation", c.before), row("with the model", c.after)});
+  page.chart(Histogram{"left at the measured points",
+                       "um",
+                       {{"without compensation", lengths_um(c.left_before_m)},
+                        {"with the model", lengths_um(c.left_after_m)}}});
+}
+
+/// One wrong row, a jump of the beam for example, stands out here.
+void add_farthest(HtmlReport& page, const Verification& v) {
+  constexpr std::size_t kShown = 5;
+  const auto& c = v.comparison;
+  std::vector<std::size_t> order(c.inside.size());
+  std::iota(order.begin(), order.end(), std::size_t{0});
+  const auto shown = static_cast<std::ptrdiff_t>(std::min(kShown, order.size()));
+  std::partial_sort(order.begin(), order.begin() + shown, order.end(), [&](std::size_t a, std::size_t b) {
+    return c.left_after_m[a].norm() > c.left_after_m[b].norm();
+  });
+  std::vector<std::vector<std::string>> rows;
+  for (std::size_t i = 0; i < static_cast<std::size_t>(shown); ++i) {
+    const std::size_t point = c.inside[order[i]];
+    rows.push_back(
+        {v.lines.empty() ? fmt::format("point {}", point + 1) : fmt::format("line {}", v.lines[point]),
+         mm(v.observations.readings_m[point]), um_text(c.left_after_m[order[i]].norm())});
+  }
+  page.table({"farthest from the model", "reading", "left"}, rows);
+}
+
+void add_frame(HtmlReport& page, const Verification& v) {
+  const auto& o = v.observations;
+  const auto& c = v.comparison;
+  page.heading("Frames");
+  page.paragraph(
+      o.frame == verify::Frame::BestFit
+          ? "Nobody knows where the instrument stood but through these points: its frame was fitted onto the "
+            "readings. That takes out of V_las the rigid motion that fits it best (six numbers): nothing can "
+            "be said here of where the volume lies or how it is turned, only of its shape."
+          : "The instrument's axes were given as those of the machine: V_las keeps its rotation.");
+  page.paragraph(
+      "\"As stated\" compares with V as the model has it. \"Turned\" gives the model the small rigid motion "
+      "that fits V_las best, so that shapes are compared: a model from a ball array whose rotation nobody "
+      "referenced, and any model against a fitted frame, can only be judged like this.");
+  const Eigen::Quaterniond q(o.T_machine_tracker.R);
+  page.facts({{"instrument in the machine", mm(o.T_machine_tracker.t_m)},
+              {"its rotation (quaternion w, x, y, z)",
+               fmt::format("{:.9f}, {:.9f}, {:.9f}, {:.9f}", q.w(), q.x(), q.y(), q.z())},
+              {"origin, where V is set to zero",
+               c.origin_m ? mm(*c.origin_m) : std::string{"none: means are taken out"}},
+              {"model turned by (rotation about the origin)", urad(c.turned.tail<3>())},
+              {"grid: multiples of", mm(c.step_m)},
+              {"left out nearer to the origin than", fmt::format("{:.1f} mm", kMmPerM * c.least_distance_m)},
+              {"what interpolating V_las linearly costs (seen on the model itself)",
+               um_text(c.interpolation_rms_m) + " rms"}});
+}
+
+std::vector<std::string> ratio_row(const char* what, const verify::RatioStatistics& s) {
+  const auto text = [](double x) { return fmt::format("{:.3f}", x); };
+  return {what,
+          std::to_string(s.count),
+          text(s.mean),
+          text(s.standard_deviation),
+          text(s.min),
+          text(s.p25),
+          text(s.median),
+          text(s.p75),
+          text(s.max),
+          fmt::format("{} ({:.1f} %)", s.above_1,
+                      100.0 * static_cast<double>(s.above_1) / static_cast<double>(s.count))};
+}
+
+void add_ratio(HtmlReport& page, const verify::Comparison& c) {
+  page.heading("R_resmag: what is left of every vector");
+  if (const auto why = why_no_ratio(c)) return page.paragraph("Not given: " + *why + ".");
+  page.paragraph(
+      "|V_las - V_model| / |V_las| on a grid inside the model's volume; below 1 the model helps, above it "
+      "harms [Li OMM, eqs. 20, 21]. What \"turned\" and \"as stated\" mean, and why the second one may be "
+      "near 1 for a good model, is said under \"Frames\".");
+  page.table({"", "points", "mean", "std", "min", "25 %", "median", "75 %", "max", "above 1"},
+             {ratio_row("turned", c.R_turned), ratio_row("as stated", c.R_stated)});
+  std::vector<double> stated, turned;
+  for (const auto& g : c.grid) {
+    stated.push_back(g.R_stated);
+    turned.push_back(g.R_turned);
+  }
+  page.chart(Histogram{"R_resmag, turned", "R_resmag", {{"turned", turned}}});
+  page.chart(Histogram{"R_resmag, as stated", "R_resmag", {{"as stated", stated}}});
+}
+
+/// 1, 2 or 5 times a power of ten, not above `x`.
+double round_number(double x) {
+  const double ten = std::pow(10.0, std::floor(std::log10(x)));
+  for (const double digit : {5.0, 2.0})
+    if (digit * ten <= x) return digit * ten;
+  return ten;
+}
+
+struct Plane {
+  Eigen::Index across = 2, right = 0, up = 1;
+  double at_m = 0.0;
+  std::vector<const verify::GridPoint*> points;
+};
+
+/// The layer of the grid nearest to `wanted`.
+Plane plane_of(const verify::Comparison& c, Eigen::Index across, double wanted_m) {
+  Plane plane{.across = across, .right = across == 0 ? 1 : 0, .up = across == 2 ? 1 : 2};
+  const auto nearest = std::min_element(c.grid.begin(), c.grid.end(), [&](const auto& a, const auto& b) {
+    return std::abs(a.q_m(across) - wanted_m) < std::abs(b.q_m(across) - wanted_m);
+  });
+  plane.at_m = nearest->q_m(across);
+  for (const auto& g : c.grid)
+    if (std::abs(g.q_m(across) - plane.at_m) < 0.5 * c.step_m(across)) plane.points.push_back(&g);
+  return plane;
+}
+
+using VectorAt = calib::Vector3 (*)(const verify::GridPoint&);
+
+void add_vectors(HtmlReport& page, const Plane& plane, const char* name, double magnification, VectorAt at) {
+  VectorChart chart{.title = fmt::format("{}, {} = {:.3f} mm, arrows x {:g}", name,
+                                         kNames[static_cast<std::size_t>(plane.across)], kMmPerM * plane.at_m,
+                                         magnification),
+                    .x_label = fmt::format("{}, mm", kNames[static_cast<std::size_t>(plane.right)]),
+                    .y_label = fmt::format("{}, mm", kNames[static_cast<std::size_t>(plane.up)]),
+                    .name = name,
+                    .arrows = {},
+                    .magnification = magnification};
+  for (const auto* g : plane.points) {
+    const calib::Vector3 v = kMmPerM * at(*g);
+    chart.arrows.push_back(
+        {kMmPerM * g->q_m(plane.right), kMmPerM * g->q_m(plane.up), v(plane.right), v(plane.up)});
+  }
+  page.chart(chart);
+}
+
+/// As Fig. 12 of [Li OMM]: measured, model, and what is left, in planes across z, x and y.
+void add_planes(HtmlReport& page, const Verification& v) {
+  const auto& c = v.comparison;
+  calib::Vector3 low = c.grid.front().q_m, high = low;
+  double longest_m = 1e-9;
+  for (const auto& g : c.grid) {
+    low = low.cwiseMin(g.q_m);
+    high = high.cwiseMax(g.q_m);
+    longest_m = std::max(longest_m, g.V_las_m.norm());
+  }
+  const calib::Vector3 wanted = v.planes_m.value_or(0.5 * (low + high));
+  constexpr double kOfTheVolume = 0.1;  // the longest arrow, against the diagonal
+  const double magnification = round_number(kOfTheVolume * (high - low).norm() / longest_m);
+  page.heading("Vectors in three planes");
+  page.paragraph(
+      "From each reading (dot) towards the true place. Measured, as the turned model has it, and their "
+      "difference, all drawn alike.");
+  for (const Eigen::Index across : {2, 0, 1}) {
+    const Plane plane = plane_of(c, across, wanted(across));
+    add_vectors(page, plane, "measured", magnification, [](const auto& g) { return g.V_las_m; });
+    add_vectors(page, plane, "model", magnification, [](const auto& g) { return g.turned_m; });
+    add_vectors(page, plane, "left", magnification,
+                [](const auto& g) -> calib::Vector3 { return g.V_las_m - g.turned_m; });
+  }
+}
+
+}  // namespace
+
+std::string verdict_text(const verify::Comparison& c) {
+  return fmt::format("{}: {:.3f} um rms left, {:.3f} um without it; {} of {} points gained",
+                     words(verify::effect_at_points(c)), kUmPerM * c.after.rms_m, kUmPerM * c.before.rms_m,
+                     points_that_gained(c), c.inside.size());
+}
+
+std::optional<std::string> why_no_ratio(const verify::Comparison& c) {
+  if (verify::ratios_hold(c)) return std::nullopt;
+  return fmt::format(
+      "interpolating between the measured points costs {:.3f} um rms, not small against the {:.3f} um left; "
+      "more points nearer to each other make it smaller",
+      kUmPerM * c.interpolation_rms_m, kUmPerM * c.after.rms_m);
+}
+
+std::string verification_report(const ModelDocument& document, const Verification& v) {
+  HtmlReport page(fmt::format("{}: verification of a model", document.machine));
+  add_verdict(page, v);
+  add_left(page, v);
+  add_farthest(page, v);
+  add_ratio(page, v.comparison);
+  add_planes(page, v);
+  add_frame(page, v);
+  add_model_origin(page, document, v.inputs);
+  return page.text();
+}
+
+std::string to_grid_csv(const verify::Comparison& c) {
+  std::string text = "x_mm,y_mm,z_mm";
+  for (const char* who : {"las", "model", "turned"})
+    for (const char* axis : kNames) text += fmt::format(",{}_{}_um", who, axis);
+  text += ",R_stated,R_turned\n";
+  for (const auto& g : c.grid) {
+    for (Eigen::Index i = 0; i < 3; ++i) text += fmt::format("{:.17g},", kMmPerM * g.q_m(i));
+    for (const auto* v : {&g.V_las_m, &g.stated_m, &g.turned_m})
+      for (Eigen::Index i = 0; i < 3; ++i) text += fmt::format("{:.17g},", kUmPerM * (*v)(i));
+    text += fmt::format("{:.17g},{:.17g}\n", g.R_stated, g.R_turned);
+  }
+  return text;
+}
+
+}  // namespace abbe::daemon

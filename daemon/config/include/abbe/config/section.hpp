@@ -1,0 +1,110 @@
+#pragma once
+/// One table of a TOML file while it is being read: every get() names the key, its unit and its bounds; a
+/// fault goes to the list instead of stopping, and close() refuses every key nobody asked for. A Section of a
+/// table that is not there gives the defaults, so a reader has no branches.
+
+#include <toml++/toml.h>
+#include <chrono>
+#include <cstdint>
+#include <filesystem>
+#include <limits>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "abbe/base/faults.hpp"
+
+namespace abbe::daemon {
+
+/// How a number in the file becomes SI: value / per_si, so that 300 mm is exactly the double 0.3 m.
+struct Unit {
+  double per_si = 1.0;
+};
+inline constexpr Unit kPlain{1.0};
+inline constexpr Unit kMilli{1e3};
+inline constexpr Unit kMicro{1e6};
+inline constexpr Unit kNano{1e9};
+
+/// Closed bounds, in the unit of the file.
+struct Bounds {
+  double min = -std::numeric_limits<double>::infinity();
+  double max = std::numeric_limits<double>::infinity();
+};
+inline constexpr Bounds kAny{};
+inline constexpr Bounds kPositive{std::numeric_limits<double>::min(),
+                                  std::numeric_limits<double>::infinity()};
+inline constexpr Bounds kNotNegative{0.0, std::numeric_limits<double>::infinity()};
+
+enum class Need { Optional, Required };
+
+class Section {
+ public:
+  Section(const toml::table* table, std::string path, toml::source_position where, Faults& faults);
+
+  [[nodiscard]] bool present() const noexcept { return table_ != nullptr; }
+  [[nodiscard]] bool has(std::string_view key) const;  ///< also marks the key as known
+  [[nodiscard]] const std::string& path() const noexcept { return path_; }
+  [[nodiscard]] const toml::node* node(
+      std::string_view key) const;  ///< null if absent; for keys of several types
+  [[nodiscard]] std::vector<std::string> keys() const;
+  [[nodiscard]] Section child(std::string_view key, Need need = Need::Optional);
+  [[nodiscard]] std::vector<Section> children(std::string_view key);  ///< an array of tables
+
+  bool get(std::string_view key, double& out, Unit unit, Bounds bounds, Need need = Need::Optional);
+  bool get(std::string_view key, std::string& out, Need need = Need::Optional);  ///< not empty
+  bool get_maybe_empty(std::string_view key, std::string& out);
+  bool get(std::string_view key, bool& out, Need need = Need::Optional);
+  bool get(std::string_view key, std::chrono::nanoseconds& out, Unit unit, Bounds bounds,
+           Need need = Need::Optional);
+  bool get(std::string_view key, std::vector<double>& out, Unit unit, Need need = Need::Optional);
+  bool get(std::string_view key, std::vector<std::string>& out);
+  template <class Integer>
+  bool get_integer(std::string_view key, Integer& out, std::int64_t min, std::int64_t max,
+                   Need need = Need::Optional);
+  /// One of the given words; out receives its enumerator.
+  template <class Enum>
+  bool get_word(std::string_view key, Enum& out, std::vector<std::pair<std::string_view, Enum>> words,
+                Need need = Need::Optional);
+  /// A path; a relative one is meant from `base`.
+  bool get(std::string_view key, std::filesystem::path& out, const std::filesystem::path& base);
+
+  void fault(std::string_view key, std::string_view what);  ///< at the key, or at the table if it has none
+  void close();  ///< refuses the keys nobody asked for; call when all is read
+
+ private:
+  [[nodiscard]] const toml::node* find(std::string_view key, Need need);
+  void fault_at(toml::source_position at, std::string_view key, std::string_view what);
+  [[nodiscard]] std::string full(std::string_view key) const;
+  bool take_integer(std::string_view key, std::int64_t& out, std::int64_t min, std::int64_t max, Need need);
+  bool take_word(std::string_view key, std::size_t& out, const std::vector<std::string_view>& words,
+                 Need need);
+
+  const toml::table* table_;
+  std::string path_;
+  toml::source_position where_;
+  Faults* faults_;
+  mutable std::vector<std::string> known_;
+};
+
+template <class Integer>
+bool Section::get_integer(std::string_view key, Integer& out, std::int64_t min, std::int64_t max, Need need) {
+  std::int64_t value = 0;
+  if (!take_integer(key, value, min, max, need)) return false;
+  out = static_cast<Integer>(value);
+  return true;
+}
+
+template <class Enum>
+bool Section::get_word(std::string_view key, Enum& out, std::vector<std::pair<std::string_view, Enum>> words,
+                       Need need) {
+  std::vector<std::string_view> names;
+  names.reserve(words.size());
+  for (const auto& [name, value] : words) names.push_back(name);
+  std::size_t index = 0;
+  if (!take_word(key, index, names, need)) return false;
+  out = words[index].second;
+  return true;
+}
+
+}  // namespace abbe::daemon

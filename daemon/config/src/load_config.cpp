@@ -1,0 +1,116 @@
+#include <fmt/format.h>
+
+#include <cerrno>
+#include <cstring>
+#include <fstream>
+#include <sstream>
+
+#include "abbe/base/sha256.hpp"
+#include "abbe/config/bounded_toml.hpp"
+#include "readers.hpp"
+
+namespace abbe::daemon {
+
+namespace {
+
+Config read_all(Section& root, const std::filesystem::path& base) {
+  Config config;
+  read_machine(root, config.machine);
+  read_daemon(root, base,
+              config);  // before the devices: what may be said of them depends on [daemon] simulated
+  read_tracker(root, config);
+  read_encoder(root, config);
+  read_counter_card(root, config);
+  read_reference(root, config);
+  read_probe(root, config);
+  read_cmm(root, config);
+  read_environment(root, config);  // after the devices whose names must differ
+  read_thermal(root, config);
+  read_air(root, config);
+  read_recording(root, base, config);
+  read_dds(root, base, config);
+  read_gate(root, config);
+  read_evemu(root, config);
+  read_control(root, base, config);
+  root.close();
+  return config;
+}
+
+std::string reading_text(const EncoderConfig& encoder) {
+  std::string text = encoder.axes_compensated ? "|compensated" : "|raw";
+  for (const auto& node : encoder.nodes)
+    text += fmt::format("|{} {} {:.17g} {:.17g}", node.axis, node.node, node.step, node.offset);
+  return text;
+}
+
+std::string reading_text(const CmmConfig& cmm) {
+  return cmm.axes_compensated ? "|cmm|compensated" : "|cmm|raw";
+}
+
+std::string reading_text(const CounterCardConfig& card) {
+  std::string text = card.axes_compensated ? "|compensated" : "|raw";
+  for (const auto& axis : card.wiring.axes)
+    text += fmt::format("|{} {} {:.17g} {:.17g}", axis.name, axis.channel, axis.scale, axis.offset);
+  return text;
+}
+
+std::string reading_text(const ReferenceConfig& reference) {
+  std::string text;
+  for (const auto& axis : reference.axes)
+    text += fmt::format("|marks {} {:.17g} {:.17g} {} {}", axis.axis, axis.zero_mark, axis.signal_period,
+                        axis.code.increment, axis.reversed ? "reversed" : "along");
+  return text;
+}
+
+}  // namespace
+
+Result<Config> parse_config(std::string_view text, const std::filesystem::path& file) {
+  const auto table = parse_toml(text, file.string());
+  if (!table) return tl::make_unexpected(table.error());
+  Faults faults(file.string());
+  Section root(&*table, "", {1, 1}, faults);
+  auto config = read_all(root, file.parent_path());
+  if (faults.any()) return tl::make_unexpected(faults.to_error());
+  return config;
+}
+
+Result<Config> load_config(const std::filesystem::path& file) {
+  std::ifstream in(file, std::ios::binary);
+  std::ostringstream text;
+  if (in && in.peek() != std::ifstream::traits_type::eof()) text << in.rdbuf();
+  if (in.bad() || !in.is_open())
+    return fail(ErrorCode::Io, fmt::format("read {}: {}", file.string(), std::strerror(errno)));
+  return parse_config(text.str(), file);
+}
+
+std::vector<std::string> Config::connected_axes() const {
+  std::vector<std::string> names;
+  if (encoder)
+    for (const auto& node : encoder->nodes) names.push_back(node.axis);
+  if (counter_card)
+    for (const auto& axis : counter_card->wiring.axes) names.push_back(axis.name);
+  return names;
+}
+
+std::string machine_hash(const Config& config) {
+  const MachineConfig& machine = config.machine;
+  std::string text = fmt::format("{}|{}|{}", machine.name, machine.chain, static_cast<int>(machine.basis));
+  for (const auto& axis : machine.axes)
+    text += fmt::format("|{} {} {:.17g} {:.17g} {:.17g}", axis.name, static_cast<int>(axis.kind), axis.min,
+                        axis.max, axis.reference);
+  for (const double t : machine.target_offset_m) text += fmt::format("|{:.17g}", t);
+  for (const auto& [axis, nodes_m] : machine.nodes_m) {
+    text += "|" + axis;
+    for (const double node_m : nodes_m) text += fmt::format(" {:.17g}", node_m);
+  }
+  if (config.encoder) text += reading_text(*config.encoder);
+  if (config.counter_card) text += reading_text(*config.counter_card);
+  if (config.reference) text += reading_text(*config.reference);
+  if (config.cmm_reads_axes()) text += reading_text(*config.cmm);
+  for (const auto& thermal : config.thermal)
+    text += fmt::format("|thermal {} {:.17g} {:.17g} {}", thermal.axis, thermal.alpha_per_K, thermal.fixed_m,
+                        config.temperatures[thermal.temperature]);
+  return sha256_hex(text);
+}
+
+}  // namespace abbe::daemon

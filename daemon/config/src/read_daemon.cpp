@@ -1,0 +1,131 @@
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "abbe/calib/evemu/judge.hpp"
+#include "abbe/calib/otf/orientation.hpp"
+#include "readers.hpp"
+
+namespace abbe::daemon {
+
+namespace {
+
+void read_cpu(Section& section, std::string_view key, std::optional<int>& out) {
+  int cpu = 0;
+  if (section.get_integer(key, cpu, 0, 1023)) out = cpu;
+}
+
+void read_scheduling(Section& section, DaemonConfig& out) {
+  section.get_word<RealTimeMode>("realtime", out.realtime,
+                                 {{"enforce", RealTimeMode::Enforce}, {"ignore", RealTimeMode::Ignore}});
+  section.get_integer("tracker_priority", out.tracker_priority, 1, 99);
+  section.get_integer("encoder_priority", out.encoder_priority, 1, 99);
+  section.get_integer("hub_priority", out.hub_priority, 1, 99);
+  if (out.hub_priority >= std::min(out.tracker_priority, out.encoder_priority))
+    section.fault("hub_priority",
+                  fmt::format("{} must be below tracker_priority {} and encoder_priority {}: a busy hub must "
+                              "not keep the devices from their bytes",
+                              out.hub_priority, out.tracker_priority, out.encoder_priority));
+  read_cpu(section, "tracker_cpu", out.tracker_cpu);
+  read_cpu(section, "encoder_cpu", out.encoder_cpu);
+  read_cpu(section, "hub_cpu", out.hub_cpu);
+  if (int us = 0; section.get_integer("cpu_latency_us", us, 0, 10'000))
+    out.cpu_latency = std::chrono::microseconds{us};
+}
+
+}  // namespace
+
+void read_daemon(Section& root, const std::filesystem::path& base, Config& out) {
+  Section section = root.child("daemon");
+  auto& daemon = out.daemon;
+  section.get("data_dir", daemon.data_dir, base);
+  section.get("runtime_dir", daemon.runtime_dir, base);
+  // The hub says "alive" to abbe-dds every 100 ms, and is held for hung after a second without a turn.
+  section.get("hub_period_us", daemon.hub_period, kMicro, {50.0, 50e3});
+  section.get("watermark_ms", daemon.watermark, kMilli, {1.0, 5e3});  // half of what the assembler remembers
+  section.get("simulated", daemon.simulated);
+  section.get("speed", daemon.speed, kPlain, {1e-3, 1e4});
+  if (daemon.speed != 1.0 && !daemon.simulated)
+    section.fault("speed", "may differ from 1 only with simulated = true: real devices keep real time");
+  read_scheduling(section, daemon);
+  section.close();
+}
+
+void read_recording(Section& root, const std::filesystem::path& base, Config& out) {
+  Section section = root.child("recording");
+  auto& recording = out.recording;
+  recording.dir = out.daemon.data_dir / "recordings";
+  section.get("dir", recording.dir, base);
+  std::uint32_t chunk_kB = 256;
+  if (section.get_integer("chunk_kB", chunk_kB, 4, 65536)) recording.chunk_bytes = chunk_kB * 1024;
+  section.get("chunk_period_ms", recording.chunk_period, kMilli, {10.0, 60e3});
+  section.get("raw", recording.raw);
+  std::uint64_t min_free_MB = 256;
+  if (section.get_integer("min_free_MB", min_free_MB, 0, 1'000'000'000))
+    recording.min_free_bytes = min_free_MB << 20;
+  std::uint64_t max_file_MB = 0;
+  if (section.get_integer("max_file_MB", max_file_MB, 0, 1'000'000'000))
+    recording.max_file_bytes = max_file_MB << 20;
+  int keep_days = 0;
+  if (section.get_integer("keep_days", keep_days, 0, 36'500)) recording.keep = std::chrono::days{keep_days};
+  section.close();
+}
+
+void read_dds(Section& root, const std::filesystem::path& base, Config& out) {
+  Section section = root.child("dds");
+  auto& dds = out.dds;
+  dds.socket = out.daemon.runtime_dir / "dds.sock";
+  section.get_integer("domain", dds.domain, 0, 232);  // RTPS 2.2, 9.6.1.1: port numbers end at domain 232
+  // 0: every turn of the hub in which something new came. Its period and the devices' rates are the bound
+  // then.
+  section.get("snapshot_hz", dds.snapshot_hz, kPlain, {0.0, 1000.0});
+  section.get("compensation_hz", dds.compensation_hz, kPlain, {0.0, 1000.0});
+  section.get_integer("priority", dds.priority, 0, 99);
+  if (dds.priority >= out.daemon.hub_priority)
+    section.fault("priority",
+                  fmt::format("must be below [daemon] hub_priority {}: a busy participant must not "
+                              "keep the hub from its beat",
+                              out.daemon.hub_priority));
+  section.get("validity_s", dds.validity, kPlain, {0.01, 3600.0});
+  section.get_word<Supervise>(
+      "supervise", dds.supervise,
+      {{"child", Supervise::Child}, {"systemd", Supervise::Systemd}, {"off", Supervise::Off}});
+  section.get("profile", dds.profile, base);
+  section.get("security", dds.security, base);
+  section.get("socket", dds.socket, base);
+  section.close();
+}
+
+void read_gate(Section& root, Config& out) {
+  Section section = root.child("gate");
+  auto& gate = out.gate;
+  section.get("max_error_mm", gate.max_error_m, kMilli, kPositive);
+  section.get("max_gradient", gate.max_gradient, kPlain, kPositive);
+  section.get("path_tolerance_mm", gate.path_tolerance_m, kMilli, kPositive);
+  section.get("holdout_fraction", gate.holdout_fraction, kPlain, {0.05, 0.5});
+  if (section.get("accept", gate.accept)) {
+    for (const auto& name : gate.accept)
+      if (name != calib::evemu::kShapeOnly && name != calib::kSmallerVolume && name != calib::kScaleChange &&
+          name != calib::otf::kPathOrientation)
+        section.fault("accept", fmt::format("\"{}\": must be \"{}\", \"{}\", \"{}\" or \"{}\"", name,
+                                            calib::evemu::kShapeOnly, calib::kSmallerVolume,
+                                            calib::kScaleChange, calib::otf::kPathOrientation));
+  }
+  section.close();
+}
+
+void read_control(Section& root, const std::filesystem::path& base, Config& out) {
+  Section section = root.child("control");
+  out.control.socket = out.daemon.runtime_dir / "control.sock";
+  section.get("socket", out.control.socket, base);
+  section.get_maybe_empty("look_group", out.control.look_group);
+  section.get_maybe_empty("change_group", out.control.change_group);
+  section.get_maybe_empty("move_group", out.control.move_group);
+  section.close();
+}
+
+bool GateConfig::accepts(std::string_view name) const {
+  return std::find(accept.begin(), accept.end(), name) != accept.end();
+}
+
+}  // namespace abbe::daemon

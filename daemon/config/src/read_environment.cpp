@@ -1,0 +1,338 @@
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <set>
+
+#include "abbe/base/units.hpp"
+#include "abbe/drivers/environment/known_maps.hpp"
+#include "abbe/drivers/environment/link.hpp"
+#include "message_bounds.hpp"
+#include "readers.hpp"
+
+namespace abbe::daemon {
+
+namespace {
+
+using drivers::Quantity;
+using drivers::modbus::Function;
+using drivers::modbus::RegisterType;
+using drivers::modbus::WordOrder;
+
+constexpr std::string_view kCustom = "custom";
+
+/// The channel of a named temperature; a new name takes the next one.
+std::uint8_t channel_of(const std::string& name, Section& section, std::string_view key,
+                        std::vector<std::string>& names) {
+  const auto found = std::find(names.begin(), names.end(), name);
+  if (found != names.end()) {
+    section.fault(key, fmt::format("temperature \"{}\" is measured twice", name));
+    return static_cast<std::uint8_t>(found - names.begin());
+  }
+  if (names.size() == protocol::kMaxTemperatures) {
+    section.fault(key, fmt::format("more than {} temperatures", protocol::kMaxTemperatures));
+    return 0;
+  }
+  names.push_back(name);
+  return static_cast<std::uint8_t>(names.size() - 1);
+}
+
+void read_address(Section& device, drivers::ModbusAddress& out) {
+  const bool serial = device.has("serial");
+  if (serial == device.has("host")) {
+    device.fault(serial ? "serial" : "", "needs one of host (Modbus TCP) and serial (Modbus RTU)");
+  }
+  if (!serial) {
+    drivers::ModbusTcp tcp;
+    device.get("host", tcp.host);
+    device.get_integer("port", tcp.port, 1, 65535);
+    for (const auto key : {"baud", "parity", "stop_bits"})
+      if (device.has(key)) device.fault(key, "has no meaning without serial");
+    out = tcp;
+    return;
+  }
+  drivers::ModbusSerial line;
+  device.get("serial", line.path);
+  device.get_integer("baud", line.baud, 300, 4'000'000);
+  device.get_word<drivers::Parity>(
+      "parity", line.parity,
+      {{"none", drivers::Parity::None}, {"even", drivers::Parity::Even}, {"odd", drivers::Parity::Odd}});
+  device.get_integer("stop_bits", line.stop_bits, 1, 2);
+  if (device.has("port")) device.fault("port", "has no meaning with serial");
+  out = line;
+}
+
+drivers::RegisterPlace read_place(Section& section, std::uint8_t unit) {
+  drivers::RegisterPlace place;
+  place.unit = unit;
+  section.get_integer("unit", place.unit, 0, 255);
+  section.get_word<Function>(
+      "registers", place.function,
+      {{"holding", Function::ReadHoldingRegisters}, {"input", Function::ReadInputRegisters}});
+  section.get_integer("address", place.address, 0, 65535, Need::Required);
+  section.get_word<RegisterType>("type", place.type,
+                                 {{"int16", RegisterType::Int16},
+                                  {"uint16", RegisterType::Uint16},
+                                  {"int32", RegisterType::Int32},
+                                  {"uint32", RegisterType::Uint32},
+                                  {"float32", RegisterType::Float32},
+                                  {"bcd16", RegisterType::Bcd16},
+                                  {"bcd32", RegisterType::Bcd32}},
+                                 Need::Required);
+  section.get_word<WordOrder>("word_order", place.order,
+                              {{"high_first", WordOrder::HighFirst}, {"low_first", WordOrder::LowFirst}});
+  return place;
+}
+
+/// What one of the unit is in SI, and where its zero lies.
+struct RegisterUnit {
+  Quantity quantity;  // any temperature for a temperature
+  double scale;
+  double offset;
+};
+
+/// The unit must fit the quantity: a pressure in C is a map that cannot be meant.
+void read_unit(Section& section, drivers::MeasuredRegister& out) {
+  static const std::vector<std::pair<std::string_view, RegisterUnit>> kUnits{
+      {"C", {Quantity::Temperature, 1.0, kZeroCelsius_K}}, {"K", {Quantity::Temperature, 1.0, 0.0}},
+      {"Pa", {Quantity::AirPressure, 1.0, 0.0}},           {"hPa", {Quantity::AirPressure, 100.0, 0.0}},
+      {"mbar", {Quantity::AirPressure, 100.0, 0.0}},       {"kPa", {Quantity::AirPressure, 1e3, 0.0}},
+      {"%", {Quantity::RelativeHumidity, 0.01, 0.0}},      {"1", {Quantity::RelativeHumidity, 1.0, 0.0}}};
+  std::vector<std::pair<std::string_view, std::size_t>> words;
+  for (std::size_t i = 0; i < kUnits.size(); ++i) words.emplace_back(kUnits[i].first, i);
+  std::size_t index = 0;
+  double scale = 1.0;
+  double offset = 0.0;
+  section.get("scale", scale, kPlain, kAny);
+  section.get("offset", offset, kPlain, kAny);
+  if (scale == 0.0) section.fault("scale", "must not be 0");
+  if (!section.get_word<std::size_t>("quantity_unit", index, words, Need::Required)) return;
+  const RegisterUnit& unit = kUnits[index].second;
+  const auto wanted = out.quantity == Quantity::AirTemperature ? Quantity::Temperature : out.quantity;
+  if (unit.quantity != wanted) section.fault("quantity_unit", "is not a unit of the quantity");
+  out.scale = scale * unit.scale;
+  out.offset = offset * unit.scale + unit.offset;
+}
+
+drivers::MeasuredRegister read_measured(Section& section, std::uint8_t unit,
+                                        std::vector<std::string>& names) {
+  drivers::MeasuredRegister out;
+  section.get_word<Quantity>("quantity", out.quantity,
+                             {{"air_temperature", Quantity::AirTemperature},
+                              {"air_pressure", Quantity::AirPressure},
+                              {"relative_humidity", Quantity::RelativeHumidity},
+                              {"temperature", Quantity::Temperature}},
+                             Need::Required);
+  const bool named =
+      section.get("name", out.name, out.quantity == Quantity::Temperature ? Need::Required : Need::Optional);
+  if (out.quantity == Quantity::Temperature && named)
+    out.channel = channel_of(out.name, section, "name", names);
+  if (!named)
+    out.name = out.quantity == Quantity::AirPressure      ? "air pressure"
+               : out.quantity == Quantity::AirTemperature ? "air temperature"
+                                                          : "relative humidity";
+  out.place = read_place(section, unit);
+  read_unit(section, out);
+  section.get("unavailable", out.unavailable, kPlain);
+  section.close();
+  return out;
+}
+
+void read_custom_map(Section& device, std::uint8_t unit, std::vector<std::string>& names,
+                     drivers::RegisterMap& map) {
+  map.name = kCustom;
+  for (auto& section : device.children("measured"))
+    map.measured.push_back(read_measured(section, unit, names));
+  for (auto& section : device.children("proving")) {
+    drivers::ProvingRegister proving;
+    section.get("name", proving.name, Need::Required);
+    proving.place = read_place(section, unit);
+    section.get("expected", proving.expected, kPlain, kAny, Need::Required);
+    section.close();
+    map.proving.push_back(std::move(proving));
+  }
+}
+
+/// False: a fault was said.
+bool read_known_map(Section& device, const std::string& name, std::uint8_t unit,
+                    std::vector<std::string>& names, drivers::RegisterMap& map) {
+  drivers::KnownMapOptions options;
+  options.unit = unit;
+  std::uint32_t serial = 0;
+  if (device.get_integer("serial_number", serial, 0, 99'999'999)) options.serial_number = serial;
+  device.get("inputs", options.input_names);
+  for (const auto& input : options.input_names) {
+    if (input.empty()) {
+      options.inputs.emplace_back();
+    } else {
+      options.inputs.emplace_back(channel_of(input, device, "inputs", names));
+    }
+  }
+  auto known = drivers::known_map(name, options);
+  if (!known) {
+    device.fault("map", known.error().text);
+    return false;
+  }
+  map = std::move(*known);
+  return true;
+}
+
+void read_map(Section& device, std::vector<std::string>& names, drivers::RegisterMap& map) {
+  std::vector<std::pair<std::string_view, std::string>> words{{kCustom, std::string{kCustom}}};
+  for (const auto name : drivers::known_map_names()) words.emplace_back(name, std::string{name});
+  std::string name;
+  std::uint8_t unit = 1;
+  device.get_integer("unit", unit, 0, 255);
+  if (!device.get_word<std::string>("map", name, words, Need::Required)) {
+    for (const auto key : {"measured", "proving", "inputs", "serial_number", "base_offset"})
+      static_cast<void>(device.has(key));
+    return;
+  }
+  bool good = true;
+  if (name == kCustom) {
+    read_custom_map(device, unit, names, map);
+  } else {
+    good = read_known_map(device, name, unit, names, map);
+  }
+  device.get_integer("base_offset", map.base_offset, -1, 1);
+  if (!good) return;
+  if (const auto fine = drivers::check(map); !fine) device.fault("map", fine.error().text);
+}
+
+EnvironmentConfig read_device(Section& device, Config& out) {
+  EnvironmentConfig config;
+  get_bounded(device, "name", config.name, bound_of<v1::EnvironmentSample>("device"), Need::Required);
+  read_address(device, config.address);
+  read_map(device, out.temperatures, config.map);
+  device.get("period_s", config.period, kPlain, {0.05, 3600.0});
+  device.get("answer_timeout_ms", config.answer_timeout, kMilli, {10.0, 60'000.0});
+  device.close();
+  return config;
+}
+
+/// Devices on one line are asked one after the other; a line has one baud rate.
+void check_line(const EnvironmentConfig& config, const Config& out, Section& section) {
+  for (const auto& other : out.environment) {
+    if (!drivers::same_line(config.address, other.address) ||
+        drivers::same_settings(config.address, other.address))
+      continue;
+    section.fault(
+        "serial",
+        fmt::format("[[environment]] \"{}\" and [[environment]] \"{}\" are on one serial line "
+                    "with different settings ({}; {}): give both the same baud, parity and stop_bits",
+                    config.name, other.name, drivers::text_of(config.address),
+                    drivers::text_of(other.address)));
+    return;
+  }
+}
+
+/// The names of Health's streams must differ: those of the devices, and the daemon's own.
+void take_name(const std::string& name, std::set<std::string>& names, Section& section) {
+  static const std::set<std::string> kOwn{"recorder", "models", "dds", "dds_security"};
+  if (name.empty()) return;
+  if (kOwn.contains(name))
+    section.fault("name", fmt::format("\"{}\" is what the daemon calls a part of its own", name));
+  else if (!names.insert(name).second)
+    section.fault("name", fmt::format("two devices are called \"{}\"", name));
+}
+
+}  // namespace
+
+void read_environment(Section& root, Config& out) {
+  std::set<std::string> names;
+  const auto take = [&](const char* table, const auto& device, const auto& name) {
+    if (!device) return;
+    Section section = root.child(table);
+    take_name(name(*device), names, section);
+  };
+  const auto own_name = [](const auto& device) { return device.name; };
+  take("tracker", out.tracker, own_name);
+  take("encoder", out.encoder, own_name);
+  take("counter_card", out.counter_card, own_name);
+  take("reference", out.reference, [](const auto& reference) { return reference.card.name; });
+  take("probe", out.probe, own_name);
+  take("cmm", out.cmm, own_name);
+  protocol::EnvironmentMask seen = 0;
+  for (auto& section : root.children("environment")) {
+    auto config = read_device(section, out);
+    take_name(config.name, names, section);
+    check_line(config, out, section);
+    for (const auto& measured : config.map.measured) {
+      const auto bit = drivers::mask_of(measured);
+      if ((seen & bit) != 0 && measured.quantity != Quantity::Temperature)
+        section.fault("map", fmt::format("{} is measured by two devices", measured.name));
+      seen = static_cast<protocol::EnvironmentMask>(seen | bit);
+    }
+    out.environment.push_back(std::move(config));
+  }
+}
+
+void read_thermal(Section& root, Config& out) {
+  std::set<std::string> axes;
+  const auto connected = out.connected_axes();
+  for (auto& section : root.children("thermal")) {
+    ThermalConfig config;
+    std::string temperature;
+    if (section.get("axis", config.axis, Need::Required)) {
+      const AxisConfig* axis = out.machine.find_axis(config.axis);
+      if (axis == nullptr || axis->kind != AxisKind::Linear)
+        section.fault("axis", "no such linear axis in [axes]");
+      if (!axes.insert(config.axis).second) section.fault("axis", "is corrected twice");
+      if (!connected.empty() && std::find(connected.begin(), connected.end(), config.axis) == connected.end())
+        section.fault("axis", "is read by no [encoder] and no [counter_card]");
+    }
+    if (section.get("temperature", temperature, Need::Required)) {
+      const auto found = std::find(out.temperatures.begin(), out.temperatures.end(), temperature);
+      if (found == out.temperatures.end()) section.fault("temperature", "no [[environment]] measures it");
+      config.temperature = static_cast<std::uint8_t>(found - out.temperatures.begin());
+    }
+    section.get("alpha_um_per_m_K", config.alpha_per_K, kMicro, {-50.0, 50.0}, Need::Required);
+    section.get("u_alpha_um_per_m_K", config.u_alpha_per_K, kMicro, {0.0, 50.0}, Need::Required);
+    section.get("u_temperature_K", config.u_temperature_K, kPlain, {0.0, 50.0}, Need::Required);
+    section.get("fixed_mm", config.fixed_m, kMilli, kAny, Need::Required);
+    if (out.axes_compensated())
+      section.fault("", "the control corrects these readings already (axes_compensated)");
+    section.close();
+    out.thermal.push_back(std::move(config));
+  }
+}
+
+namespace {
+
+bool all_of_the_air_is_measured(const Config& config) {
+  protocol::EnvironmentMask seen = 0;
+  for (const auto& device : config.environment)
+    for (const auto& measured : device.map.measured) seen |= drivers::mask_of(measured);
+  return (seen & protocol::kAllOfTheAir) == protocol::kAllOfTheAir;
+}
+
+}  // namespace
+
+void read_air(Section& root, Config& out) {
+  Section air = root.child("air");
+  AirConfig& config = out.air;
+  air.get_word<calib::IndexEquation>("equation", config.equation,
+                                     {{"ciddor", calib::IndexEquation::Ciddor},
+                                      {"edlen", calib::IndexEquation::Edlen},
+                                      {"shop_floor", calib::IndexEquation::ShopFloor}});
+  air.get("wavelength_nm", config.wavelength_m, kNano, {350.0, 1200.0});
+  air.get("co2_ppm", config.co2_ppm, kPlain, {0.0, 2000.0});
+  air.get("u_temperature_K", config.u_temperature_K, kPlain, {0.0, 10.0});
+  air.get("u_pressure_Pa", config.u_pressure_Pa, kPlain, {0.0, 1e4});
+  air.get("u_humidity_percent", config.u_relative_humidity, {100.0}, {0.0, 100.0});
+  air.get("u_co2_ppm", config.u_co2_ppm, kPlain, {0.0, 2000.0});
+  air.get("max_age_s", config.max_age, kPlain, kPositive);
+  double assumed = 1.0;
+  if (air.get("assumed_index", assumed, kPlain, {1.0, 1.001})) {
+    config.assumed_index = assumed;
+    if (out.tracker && out.tracker->weather == WeatherConfig::Compute)
+      air.fault("assumed_index", "the controller computes the index already (tracker.weather = \"compute\")");
+    if (out.tracker && out.tracker->weather == WeatherConfig::None && !all_of_the_air_is_measured(out))
+      air.fault("assumed_index",
+                "with tracker.weather = \"none\" an [[environment]] must measure temperature, pressure and "
+                "humidity "
+                "of the air");
+  }
+  air.close();
+}
+
+}  // namespace abbe::daemon

@@ -1,0 +1,154 @@
+#include <fmt/format.h>
+
+#include <abbe/calib/axis_table.hpp>
+#include <abbe/calib/kinematic_chain.hpp>
+#include <abbe/calib/parameter_layout.hpp>
+#include <algorithm>
+#include <cmath>
+#include <tuple>
+
+#include "message_bounds.hpp"
+#include "readers.hpp"
+
+#include "abbe/config/calibration_machine.hpp"
+
+namespace abbe::daemon {
+
+namespace {
+
+constexpr double kDefaultNodeSpacing_m = 0.05;  // the spacing of [Sanders 2023]
+constexpr double kNodeTolerance_m = 1e-9;       // node and end of travel are meant to be equal
+
+void read_axis(Section axis, const std::string& name, std::vector<AxisConfig>& out) {
+  AxisConfig config;
+  config.name = name;
+  axis.get_word<AxisKind>("kind", config.kind, {{"linear", AxisKind::Linear}, {"rotary", AxisKind::Rotary}});
+  const bool linear = config.kind == AxisKind::Linear;
+  const char* const min_key = linear ? "min_mm" : "min_rad";
+  const char* const max_key = linear ? "max_mm" : "max_rad";
+  const char* const reference_key = linear ? "reference_mm" : "reference_rad";
+  const Unit unit = linear ? kMilli : kPlain;
+  const bool has_min = axis.get(min_key, config.min, unit, kAny, Need::Required);
+  const bool has_max = axis.get(max_key, config.max, unit, kAny, Need::Required);
+  const bool has_range = has_min && has_max;
+  if (has_range && config.min >= config.max) axis.fault(max_key, fmt::format("must exceed {}", min_key));
+  config.reference = config.min <= 0.0 && config.max >= 0.0 ? 0.0 : config.min;
+  const bool has_reference = axis.get(reference_key, config.reference, unit, kAny);
+  if (has_reference && has_range && (config.reference < config.min || config.reference > config.max))
+    axis.fault(reference_key, "must lie within the range of the axis");
+  axis.close();
+  out.push_back(std::move(config));
+}
+
+void sort_axes(std::vector<AxisConfig>& axes) {
+  const auto further = [](const AxisConfig& a) { return a.name != "X" && a.name != "Y" && a.name != "Z"; };
+  std::stable_sort(axes.begin(), axes.end(), [&further](const AxisConfig& a, const AxisConfig& b) {
+    return std::tuple{further(a), a.kind, a.name} < std::tuple{further(b), b.kind, b.name};
+  });
+}
+
+void read_axes(Section axes, MachineConfig& out) {
+  for (const auto& name : axes.keys()) read_axis(axes.child(name), name, out.axes);
+  if (axes.present())
+    for (const std::string_view needed : {"X", "Y", "Z"})
+      if (!axes.has(needed)) axes.fault("", fmt::format("axis {} is missing", needed));
+  sort_axes(out.axes);
+}
+
+/// [model] node_spacing_mm: one number, or a table with one per axis.
+double read_spacing(Section& model, Section* per_axis, const std::string& axis) {
+  double spacing_m = kDefaultNodeSpacing_m;
+  if (per_axis != nullptr)
+    per_axis->get(axis, spacing_m, kMilli, kPositive);
+  else
+    model.get("node_spacing_mm", spacing_m, kMilli, kPositive);
+  return spacing_m;
+}
+
+void check_nodes(Section& nodes, const AxisConfig& axis, const std::vector<double>& nodes_m) {
+  const bool ascending =
+      std::adjacent_find(nodes_m.begin(), nodes_m.end(), std::greater_equal<>{}) == nodes_m.end();
+  if (nodes_m.size() < 2 || !ascending)
+    nodes.fault(axis.name, "needs at least two nodes, strictly ascending");
+  else if (std::abs(nodes_m.front() - axis.min) > kNodeTolerance_m ||
+           std::abs(nodes_m.back() - axis.max) > kNodeTolerance_m)
+    nodes.fault(axis.name, fmt::format("first and last node must be the ends of the travel, {} and {} mm",
+                                       axis.min * kMilli.per_si, axis.max * kMilli.per_si));
+}
+
+void read_axis_nodes(Section& model, Section& nodes, Section* spacing, const AxisConfig& axis,
+                     MachineConfig& out) {
+  const double spacing_m = read_spacing(model, spacing, axis.name);
+  auto& nodes_m = out.nodes_m[axis.name];
+  if (nodes.get(axis.name, nodes_m, kMilli)) {
+    check_nodes(nodes, axis, nodes_m);
+    return;
+  }
+  constexpr double kMaxNodes =
+      2000.0;  // a table nobody can identify; keeps a misprint from asking for gigabytes
+  if ((axis.max - axis.min) / spacing_m > kMaxNodes)
+    model.fault("node_spacing_mm", fmt::format("more than {} nodes on axis {}", kMaxNodes, axis.name));
+  else if (const auto equidistant = calib::equidistant_nodes(axis.min, axis.max, spacing_m))
+    nodes_m = equidistant->nodes_m;
+}
+
+void read_model(Section model, const toml::node* spacing_node, MachineConfig& out) {
+  model.get_word<BasisConfig>("basis", out.basis, {{"linear", BasisConfig::Linear}});
+  Section nodes = model.child("nodes_mm");
+  std::optional<Section> spacing;
+  if (spacing_node != nullptr && spacing_node->is_table()) spacing = model.child("node_spacing_mm");
+  for (const auto& axis : out.axes)
+    if (axis.kind == AxisKind::Linear && axis.min < axis.max)
+      read_axis_nodes(model, nodes, spacing ? &*spacing : nullptr, axis, out);
+  nodes.close();
+  if (spacing) spacing->close();
+  model.close();
+}
+
+/// A machine that is faulty anyway has no model to count.
+void check_model_size(Section& model, const MachineConfig& config) {
+  const auto machine = otf_machine(config);
+  if (!machine) return;
+  const auto layout = calib::ParameterLayout::observable_with_one_target(machine->chain, machine->nodes);
+  const std::size_t most = bound_of<v1::ErrorModel>("parameters");
+  if (layout && layout->model_size() > most)
+    model.fault("node_spacing_mm", fmt::format("makes a model of {} parameters; at most {} can be published",
+                                               layout->model_size(), most));
+}
+
+}  // namespace
+
+const AxisConfig* MachineConfig::find_axis(std::string_view axis_name) const noexcept {
+  const auto found =
+      std::find_if(axes.begin(), axes.end(), [&](const auto& a) { return a.name == axis_name; });
+  return found == axes.end() ? nullptr : &*found;
+}
+
+void read_machine(Section& root, MachineConfig& out) {
+  Section machine = root.child("machine", Need::Required);
+  if (machine.present()) {
+    get_bounded(machine, "name", out.name, bound_of<v1::Snapshot>("machine"), Need::Required);
+    if (get_bounded(machine, "chain", out.chain, bound_of<v1::ErrorModel>("chain"), Need::Required))
+      if (const auto chain = calib::KinematicChain::parse(out.chain); !chain)
+        machine.fault("chain", chain.error().text);
+    machine.close();
+  }
+  read_axes(root.child("axes", Need::Required), out);
+
+  Section target = root.child("target");
+  std::vector<double> offset_m;
+  if (target.get("offset_mm", offset_m, kMilli)) {
+    out.target_given = offset_m.size() == 3;
+    if (out.target_given)
+      std::copy(offset_m.begin(), offset_m.end(), out.target_offset_m.begin());
+    else
+      target.fault("offset_mm", "must be three numbers, x, y, z");
+  }
+  target.close();
+
+  Section model = root.child("model");
+  read_model(model, model.node("node_spacing_mm"), out);
+  check_model_size(model, out);
+}
+
+}  // namespace abbe::daemon

@@ -1,0 +1,27 @@
+#pragma once
+/// One reader per group of tables. Each fills what it can, adds a fault for what it cannot, and closes its
+/// sections.
+
+#include "abbe/config/config.hpp"
+#include "abbe/config/section.hpp"
+
+namespace abbe::daemon {
+
+void read_machine(Section& root, MachineConfig& out);
+void read_tracker(Section& root, Config& out);
+void read_encoder(Section& root, Config& out);
+void read_counter_card(Section& root, Config& out);
+void read_environment(Section& root, Config& out);
+void read_thermal(Section& root, Config& out);
+void read_air(Section& root, Config& out);
+void read_reference(Section& root, Config& out);
+void read_probe(Section& root, Config& out);
+void read_cmm(Section& root, Config& out);
+void read_daemon(Section& root, const std::filesystem::path& base, Config& out);
+void read_recording(Section& root, const std::filesystem::path& base, Config& out);
+void read_dds(Section& root, const std::filesystem::path& base, Config& out);
+void read_gate(Section& root, Config& out);
+void read_evemu(Section& root, Config& out);
+void read_control(Section& root, const std::filesystem::path& base, Config& out);
+
+}  // namespace abbe::daemon

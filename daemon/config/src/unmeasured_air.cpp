@@ -1,0 +1,41 @@
+#include "abbe/config/unmeasured_air.hpp"
+
+#include <fmt/format.h>
+
+#include "abbe/base/units.hpp"
+
+namespace abbe::daemon {
+
+calib::Air assumed_air() noexcept {
+  return {.temperature_K = 293.15, .pressure_Pa = 101'325.0, .relative_humidity = 0.5};
+}
+
+double u_of_unmeasured_air() noexcept {
+  // Constant air within the range of the equation: always a value.
+  static const double u =
+      *calib::u_of_assumed_air(assumed_air(), calib::kHeliumNeon_m, calib::IndexEquation::Ciddor);
+  return u;
+}
+
+bool air_is_unmeasured(const Config& config) noexcept {
+  return config.tracker && config.tracker->weather != WeatherConfig::Compute && !config.air.assumed_index;
+}
+
+std::optional<std::string> unmeasured_air_text(const Config& config, double u_scale) {
+  if (!air_is_unmeasured(config)) return std::nullopt;
+  const bool none = config.tracker->weather == WeatherConfig::None;
+  const calib::Air air = assumed_air();
+  const std::string corrected_for =
+      none ? fmt::format("air not measured: the ranges are corrected for {:g} C, {:g} hPa, {:g} %",
+                         air.temperature_K - kZeroCelsius_K, air.pressure_Pa * 1e-2,
+                         air.relative_humidity * 1e2)
+           : std::string{
+                 "air measured, but the ranges are corrected with the index set in the controller last"};
+  return fmt::format(
+      "{} (tracker.weather = \"{}\"); their common scale counts as uncertain by {:.3g} um/m, a shop floor "
+      "has {:.3g}; "
+      "weather = \"compute\" corrects for measured air",
+      corrected_for, none ? "none" : "read", u_scale * 1e6, u_of_unmeasured_air() * 1e6);
+}
+
+}  // namespace abbe::daemon

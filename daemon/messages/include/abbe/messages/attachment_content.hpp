@@ -1,0 +1,13 @@
+#pragma once
+/// The JSON that an attachment of a recording holds. A request's path of 10^5 vertices is 7 MB.
+
+#include "abbe/base/bounded_json.hpp"
+#include "abbe/messages/recording_info.hpp"
+
+namespace abbe::daemon {
+
+[[nodiscard]] inline Result<nlohmann::json> content_of(const RecordingAttachment& attachment) {
+  return parse_json(attachment.content, "attachment " + attachment.name, {.bytes = 64u << 20});
+}
+
+}  // namespace abbe::daemon

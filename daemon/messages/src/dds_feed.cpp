@@ -1,0 +1,89 @@
+#include <poll.h>
+#include <sys/socket.h>
+
+#include <cerrno>
+#include <utility>
+
+#include "abbe/base/unix_socket.hpp"
+#include "abbe/messages/dds_bridge.hpp"
+#include "dds_frames.hpp"
+
+namespace abbe::daemon {
+
+struct DdsFeed::State {
+  State(std::filesystem::path s, DdsBridge& b) : socket(std::move(s)), bridge(b) {}
+
+  std::filesystem::path socket;
+  DdsBridge& bridge;
+  FileDescriptor peer;
+  FrameReader frames;
+
+  void connect() {
+    auto fd = connect_unix(socket);
+    if (!fd) return;
+    peer = std::move(*fd);
+    frames = FrameReader();
+    bridge.connected();
+  }
+
+  void disconnect() {
+    peer = FileDescriptor();
+    bridge.lost();
+  }
+
+  /// All that waits: what abbed said last stands at the end of it.
+  void read() {
+    constexpr int kMostReads = 64;  // more than the kernel keeps for a socket
+    for (int i = 0; i < kMostReads && read_once(); ++i) {
+    }
+  }
+
+  /// Whether there may be more.
+  bool read_once() {
+    const auto room = frames.room();
+    const ssize_t n = ::recv(peer.get(), room.data(), room.size(), MSG_DONTWAIT);
+    if (n < 0 && (errno == EAGAIN || errno == EINTR)) return false;
+    if (n > 0) frames.filled(static_cast<std::size_t>(n));
+    feed();
+    if (n > 0 && !frames.broken()) return static_cast<std::size_t>(n) == room.size();
+    disconnect();
+    return false;
+  }
+
+  /// Shows abbed that this loop runs. An answer that does not fit is not needed: abbed does not read.
+  void answer() const {
+    const std::byte alive{};
+    static_cast<void>(::send(peer.get(), &alive, 1, MSG_DONTWAIT | MSG_NOSIGNAL));
+  }
+
+  void feed() {
+    while (const auto frame = frames.next()) {
+      const auto now = std::chrono::steady_clock::now();
+      if (frame->kind == FrameKind::Beat) {
+        bridge.beat(frame->at, now);
+        answer();
+      } else {
+        bridge.publish(frame->topic, frame->payload, frame->at, now);
+      }
+    }
+  }
+};
+
+DdsFeed::DdsFeed(std::filesystem::path socket, DdsBridge& bridge)
+    : state_(std::make_unique<State>(std::move(socket), bridge)) {}
+DdsFeed::~DdsFeed() = default;
+
+void DdsFeed::turn() {
+  State& s = *state_;
+  if (!s.peer) s.connect();
+  // Without a connection this only waits; -1 is a descriptor poll() ignores.
+  pollfd ready{s.peer.get(), POLLIN, 0};
+  if (::poll(&ready, 1, static_cast<int>(kRetryPeriod.count())) > 0) s.read();
+  s.bridge.turn(std::chrono::steady_clock::now());
+}
+
+bool DdsFeed::connected() const noexcept {
+  return static_cast<bool>(state_->peer);
+}
+
+}  // namespace abbe::daemon

@@ -1,0 +1,245 @@
+#include "abbe/messages/dds_link.hpp"
+
+#include <sys/socket.h>
+#include <unistd.h>
+
+#include <array>
+#include <cerrno>
+#include <optional>
+#include <utility>
+
+#include "abbe/base/unix_socket.hpp"
+#include "dds_frames.hpp"
+#include "retained_payloads.hpp"
+
+namespace abbe::daemon {
+namespace {
+
+/// The hub's cycle must not last as long as somebody connects.
+constexpr int kNewcomersInACycle = 4;
+
+struct Pending {
+  bool to_send = true;
+};
+
+/// By the kernel: what the other end says of itself proves nothing.
+bool may_connect(int fd, const DdsProcess* process) {
+  ucred credentials{};
+  socklen_t size = sizeof credentials;
+  if (::getsockopt(fd, SOL_SOCKET, SO_PEERCRED, &credentials, &size) != 0) return false;
+  if (process == nullptr) return credentials.uid == ::geteuid();
+  // 0: a process of another PID namespace, as which DdsProcess knows none.
+  return credentials.pid != 0 && credentials.pid == process->pid();
+}
+
+/// The beats of one connection that abbe-dds has not answered yet.
+class Beats {
+ public:
+  void ask(DdsLink::WallTime now) {
+    // After a pause of the hub, or of all of abbed, the silence begins anew.
+    if (!unanswered_since_ || now - asked_ > DdsProcess::kPause) unanswered_since_ = now;
+    asked_ = now;
+  }
+  void answered() { unanswered_since_.reset(); }
+  [[nodiscard]] std::chrono::nanoseconds silence() const {
+    return unanswered_since_ ? asked_ - *unanswered_since_ : std::chrono::nanoseconds{0};
+  }
+
+ private:
+  std::optional<DdsLink::WallTime> unanswered_since_;
+  DdsLink::WallTime asked_{};
+};
+
+}  // namespace
+
+struct DdsLink::State {
+  std::filesystem::path path;
+  FileDescriptor listener;
+  DdsProcess* process = nullptr;
+  FileDescriptor peer;
+  std::vector<std::byte> out;  ///< what the kernel has not taken yet: at most the rest of one frame
+  std::size_t out_begin = 0;
+  RetainedPayloads<Pending> durable;
+  RetainedPayloads<WallTime>
+      live;  ///< empty unless the socket is full; with the instants their ages count to
+  WallTime last_beat{};
+  Beats beats;
+  DdsLinkCounters counters;
+
+  void accept_newest();
+  void read_answers();
+  void disconnect();
+  bool send_waiting();
+  bool send_now(const Frame& frame);
+  bool send_durable();
+  void send_live();
+  void send_or_keep(const Frame& frame, const PayloadKey& key);
+};
+
+/// A newer abbe-dds replaces the older one: the older one is hung or already replaced by whoever supervises
+/// it.
+void DdsLink::State::accept_newest() {
+  for (int i = 0; i < kNewcomersInACycle; ++i) {
+    FileDescriptor accepted(::accept4(listener.get(), nullptr, nullptr, SOCK_NONBLOCK | SOCK_CLOEXEC));
+    if (!accepted) return;
+    if (!may_connect(accepted.get(), process)) {
+      ++counters.strangers;
+      continue;
+    }
+    disconnect();
+    peer = std::move(accepted);
+    ++counters.connections;
+    beats = {};
+    last_beat = {};  // the newcomer is owed a beat at once
+    for (auto& entry : durable.entries()) entry.extra.to_send = true;
+  }
+}
+
+/// abbe-dds sends one byte for each beat it has read, and nothing else.
+void DdsLink::State::read_answers() {
+  std::array<std::byte, 64> bytes{};
+  const ssize_t n = ::recv(peer.get(), bytes.data(), bytes.size(), MSG_DONTWAIT);
+  if (n > 0) beats.answered();
+  if (n > 0 && process != nullptr) process->answered(WallTime::clock::now());
+  if (n == 0 || (n < 0 && errno != EAGAIN && errno != EINTR)) disconnect();
+}
+
+void DdsLink::State::disconnect() {
+  peer = FileDescriptor{};
+  out.clear();
+  out_begin = 0;
+  counters.dropped_live += live.entries().size();
+  live.entries().clear();
+}
+
+/// Whether the socket is free for the next frame.
+bool DdsLink::State::send_waiting() {
+  while (peer && out_begin < out.size()) {
+    const ssize_t n =
+        ::send(peer.get(), out.data() + out_begin, out.size() - out_begin, MSG_DONTWAIT | MSG_NOSIGNAL);
+    if (n >= 0) {
+      out_begin += static_cast<std::size_t>(n);
+    } else if (errno == EAGAIN || errno == EWOULDBLOCK) {
+      return false;
+    } else if (errno != EINTR) {
+      disconnect();
+    }
+  }
+  if (!out.empty()) ++counters.sent;
+  out.clear();
+  out_begin = 0;
+  return static_cast<bool>(peer);
+}
+
+/// Whether it is on its way; never after a disconnection.
+bool DdsLink::State::send_now(const Frame& frame) {
+  if (!send_waiting()) return false;
+  append_frame(out, frame);
+  send_waiting();
+  return static_cast<bool>(peer);
+}
+
+/// Whether none waits any more.
+bool DdsLink::State::send_durable() {
+  for (auto& entry : durable.entries()) {
+    if (!entry.extra.to_send) continue;
+    if (!send_now({FrameKind::Publish, entry.topic, WallTime::clock::now(), entry.payload})) return false;
+    entry.extra.to_send = false;
+  }
+  return true;
+}
+
+void DdsLink::State::send_live() {
+  auto& waiting = live.entries();
+  auto next = waiting.begin();
+  while (next != waiting.end() && send_now({FrameKind::Publish, next->topic, next->extra, next->payload}))
+    ++next;
+  if (peer) waiting.erase(waiting.begin(), next);  // else disconnect() has dropped them
+}
+
+/// Of a live topic: what waits gives way to what is newer.
+void DdsLink::State::send_or_keep(const Frame& frame, const PayloadKey& key) {
+  if (live.entries().empty() && send_now(frame)) return;
+  if (!peer) {
+    ++counters.dropped_live;
+    return;
+  }
+  const std::size_t waiting = live.entries().size();
+  live.keep(frame.topic, key.bytes, frame.payload).extra = frame.at;
+  if (live.entries().size() == waiting) ++counters.dropped_live;
+  send_live();
+}
+
+Result<DdsLink> DdsLink::listen(const std::filesystem::path& socket, DdsLinkPeer peer) {
+  auto listener = listen_unix(socket);
+  if (!listener) return tl::make_unexpected(listener.error());
+  auto state = std::make_unique<State>();
+  state->path = socket;
+  state->listener = std::move(*listener);
+  state->process = peer.process;
+  return DdsLink(std::move(state));
+}
+
+DdsLink::DdsLink(std::unique_ptr<State> state) : state_(std::move(state)) {}
+DdsLink::DdsLink(DdsLink&&) noexcept = default;
+DdsLink& DdsLink::operator=(DdsLink&& other) noexcept {
+  std::swap(state_, other.state_);
+  return *this;
+}
+DdsLink::~DdsLink() {
+  if (state_) ::unlink(state_->path.c_str());
+}
+
+void DdsLink::publish(Topic topic, std::span<const std::byte> payload, WallTime at) {
+  const auto key = payload_key(topic, payload);
+  if (!key || payload.size() > kMaxPayloadBytes) {
+    ++state_->counters.refused;
+    return;
+  }
+  if (traits(topic).kind == TopicTraits::Kind::Durable) {
+    state_->durable.keep(topic, key->bytes, payload);
+    state_->send_durable();
+  } else {
+    state_->send_or_keep({FrameKind::Publish, topic, at, payload}, *key);
+  }
+}
+
+void DdsLink::beat(WallTime now) {
+  if (now - state_->last_beat < kBeatPeriod) return;
+  state_->beats.ask(now);
+  if (state_->process != nullptr) state_->process->asked(now);
+  // A beat that does not fit is not queued: abbe-dds has not read for a while and will judge for itself. Nor
+  // does it overtake a state: abbe-dds would repeat the one before.
+  if (state_->send_durable() && state_->send_now({FrameKind::Beat, {}, now, {}})) state_->last_beat = now;
+}
+
+void DdsLink::poll() {
+  state_->accept_newest();
+  if (state_->peer) state_->read_answers();
+  state_->send_durable();
+  state_->send_live();
+  state_->send_waiting();
+}
+
+bool DdsLink::connected() const noexcept {
+  return static_cast<bool>(state_->peer);
+}
+
+bool DdsLink::answers() const noexcept {
+  return connected() && state_->beats.silence() <= kUnanswered;
+}
+
+const char* DdsLink::state() const noexcept {
+  if (!connected()) return "waiting";
+  return answers() ? "connected" : "does not answer";
+}
+
+const DdsProcess* DdsLink::process() const noexcept {
+  return state_->process;
+}
+
+const DdsLinkCounters& DdsLink::counters() const noexcept {
+  return state_->counters;
+}
+
+}  // namespace abbe::daemon

@@ -1,0 +1,61 @@
+#pragma once
+/// The newest payload per topic and key, oldest publication first: what a durable topic owes to whoever comes
+/// late. A model published before its state is therefore also sent again before it. Single-threaded;
+/// allocates.
+
+#include <algorithm>
+#include <cstddef>
+#include <span>
+#include <vector>
+
+#include "abbe/messages/topics.hpp"
+
+namespace abbe::daemon {
+
+/// Extra is what the owner needs to know per entry: still to send, or when last written.
+template <class Extra>
+class RetainedPayloads {
+ public:
+  struct Entry {
+    Topic topic;
+    std::vector<std::byte> key;
+    std::vector<std::byte> payload;
+    Extra extra{};
+  };
+
+  /// The entry now at the end, holding this payload and a fresh Extra.
+  Entry& keep(Topic topic, std::span<const std::byte> key, std::span<const std::byte> payload) {
+    const auto same = std::find_if(entries_.begin(), entries_.end(), [&](const Entry& e) {
+      return e.topic == topic && std::ranges::equal(e.key, key);
+    });
+    if (same == entries_.end()) {
+      entries_.push_back({topic, {key.begin(), key.end()}, {}, {}});
+    } else {
+      std::rotate(same, same + 1, entries_.end());
+    }
+    Entry& entry = entries_.back();
+    entry.payload.assign(payload.begin(), payload.end());
+    entry.extra = {};
+    if (topic == Topic::ErrorGrid) drop_surplus_slices(payload);
+    return entries_.back();
+  }
+
+  [[nodiscard]] std::vector<Entry>& entries() noexcept { return entries_; }
+
+ private:
+  /// A grid of fewer slices than the one before: what lies beyond belongs to the model before.
+  void drop_surplus_slices(std::span<const std::byte> newest) {
+    const auto machine = payload_key(Topic::ErrorGrid, newest);
+    const auto slices = grid_slices(newest);
+    if (!machine || !slices) return;
+    std::erase_if(entries_, [&](const Entry& e) {
+      if (e.topic != Topic::ErrorGrid) return false;
+      const auto key = payload_key(e.topic, e.payload);
+      return key && key->machine == machine->machine && key->number >= slices;
+    });
+  }
+
+  std::vector<Entry> entries_;
+};
+
+}  // namespace abbe::daemon

@@ -1,0 +1,44 @@
+#pragma once
+/// What a calibration was asked for, as it comes over the control socket and lies in the recording beside the
+/// samples, so that a replay is asked the same.
+
+#include <nlohmann/json_fwd.hpp>
+#include <string>
+#include <string_view>
+#include <variant>
+#include <vector>
+
+#include "abbe/base/error.hpp"
+#include "abbe/messages/recording_info.hpp"
+#include "abbe/methods/evemu_acquisition.hpp"
+#include "abbe/methods/otf_acquisition.hpp"
+
+namespace abbe::daemon {
+
+struct OtfRequest {
+  std::vector<AxisPosition> path_m;
+};
+
+/// One for every method.
+using CalibrationTask = std::variant<OtfRequest, EvemuRequest>;
+[[nodiscard]] std::string_view method_of(const CalibrationTask& task) noexcept;  ///< "otf", "evemu"
+
+struct CalibrationRequest {
+  CalibrationTask task;
+  protocol::HostTime from{};  ///< snapshots before this instant do not belong to it
+};
+
+/// {"method": ..., what it needs}; keeps every bit of the numbers.
+[[nodiscard]] nlohmann::json to_json(const CalibrationTask& task);
+/// BadInput naming what is missing or of the wrong type; Usage for a method nobody knows. `plan`: for what of
+/// it an evemu task does not say.
+[[nodiscard]] Result<CalibrationTask> task_from_json(const nlohmann::json& object,
+                                                     const calib::evemu::TouchPlan& plan = {});
+
+[[nodiscard]] RecordingAttachment to_attachment(const CalibrationRequest& request);
+/// The same in two steps, of which only the first grows with the task.
+[[nodiscard]] RecordingAttachment to_attachment(const CalibrationTask& task);
+void set_from(RecordingAttachment& attachment, protocol::HostTime from) noexcept;
+[[nodiscard]] Result<CalibrationRequest> from_attachment(const RecordingAttachment& attachment);
+
+}  // namespace abbe::daemon

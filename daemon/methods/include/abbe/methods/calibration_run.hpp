@@ -1,0 +1,35 @@
+#pragma once
+/// An acquired run and the judged model it gives, whatever the method. Pure functions.
+
+#include <functional>
+#include <string>
+#include <string_view>
+#include <variant>
+#include <vector>
+
+#include "abbe/methods/evemu_acquisition.hpp"
+#include "abbe/methods/evemu_identification.hpp"
+#include "abbe/methods/otf_identification.hpp"
+#include "abbe/model/model_document.hpp"
+
+namespace abbe::daemon {
+
+using CalibrationRun = std::variant<OtfRun, EvemuRun>;
+using Candidate = std::variant<OtfCandidate, EvemuCandidate>;
+
+/// `active` may be null.
+[[nodiscard]] Result<Candidate> identify(const CalibrationRun& run, const Config& config,
+                                         const calib::VolumetricModel* active,
+                                         const IdentificationWatch& watch = {});
+
+/// What the run consists of, for the model's document: the files that were given, and "points" or "touches"
+/// with the SHA-256 of what entered the identification.
+[[nodiscard]] std::vector<InputFile> inputs_of(const CalibrationRun& run);
+
+[[nodiscard]] std::string_view method_of(const Candidate& candidate) noexcept;  ///< "otf", "evemu"
+[[nodiscard]] const calib::VolumetricModel& model_of(const Candidate& candidate);
+[[nodiscard]] const calib::Verdict& verdict_of(const Candidate& candidate);
+[[nodiscard]] ModelDocument document_of(const Candidate& candidate, const Config& config,
+                                        std::vector<InputFile> inputs, protocol::UtcTime created);
+
+}  // namespace abbe::daemon

@@ -1,0 +1,129 @@
+#include "abbe/methods/evemu_identification.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <utility>
+
+#include "abbe/methods/otf_inputs.hpp"
+#include "abbe/pipeline/datum.hpp"
+#include "abbe/tables/evemu_files.hpp"
+
+namespace abbe::daemon {
+namespace {
+
+namespace evemu = calib::evemu;
+
+evemu::JudgeOptions judge_options(const Config& config) {
+  evemu::JudgeOptions options;
+  options.limits = gate_limits(config.gate);
+  options.accept_shape_only = config.gate.accepts(evemu::kShapeOnly);
+  // Both words were checked when the configuration was read.
+  options.solve.estimator = evemu::estimator(config.evemu.estimator).value_or(evemu::Estimator::BayesPose);
+  options.solve.sparse.folds = evemu::folds_by(config.evemu.folds).value_or(evemu::FoldsBy::Position);
+  return options;
+}
+
+}  // namespace
+
+std::string warmth_fault(const evemu::Calibrator& calibrator, std::string_view named,
+                         std::string_view thermometer, std::string_view remedy) {
+  if (calibrator.expansivity && thermometer.empty())
+    return fmt::format("{} has alpha_um_per_m_K, but nothing says how warm the array is: {}", named, remedy);
+  if (!calibrator.expansivity && !thermometer.empty())
+    return fmt::format(
+        "{} says how warm the array is, but {} does not say how it grows: add alpha_um_per_m_K and "
+        "u_alpha_um_per_m_K to its file",
+        thermometer, named);
+  return {};
+}
+
+evemu::TouchPlan touch_plan(const EvemuConfig& config) {
+  return {config.positions, config.points_per_ball, config.points_per_block};
+}
+
+EvemuAcquisitionOptions evemu_acquisition_options(const Config& config) {
+  EvemuAcquisitionOptions options{.longest_pause = config.evemu.longest_pause};
+  if (const auto machine = otf_machine(config.machine)) options.travel = machine->nodes;
+  if (config.probe) options.device = config.probe->name;
+  if (config.cmm) options.device = config.cmm->name;
+  options.artefact = config.evemu.artefact;
+  if (options.artefact && options.artefact->sensor)
+    options.artefact_sensor = config.temperatures[*options.artefact->sensor];
+  // Marks find the same zero again, people only about.
+  options.zero_is_lost_by_restart =
+      config.probe && config.counter_card &&
+      std::ranges::any_of(config.counter_card->wiring.axes,
+                          [&config](const auto& axis) { return !has_marks(config, axis.name); });
+  return options;
+}
+
+/// Every touch is held against every ball, in the daemon's cycle: real arrays have ten balls, eight
+/// positions.
+Result<void> check_size(const EvemuRequest& request) {
+  constexpr std::size_t kMostBalls = 100, kMostPositions = 100, kMostPoints = 1000;
+  const auto& plan = request.plan;
+  const std::size_t balls = request.calibrator.balls.size(), blocks = request.calibrator.blocks.size();
+  if (balls <= kMostBalls && blocks <= kMostBalls && plan.positions.size() <= kMostPositions &&
+      plan.points_per_ball <= kMostPoints && plan.points_per_block <= kMostPoints)
+    return {};
+  return fail(
+      ErrorCode::BadInput,
+      fmt::format("calibrate evemu: an array has at most {} balls and blocks, a plan at most {} positions "
+                  "with {} points a ball or block",
+                  kMostBalls, kMostPositions, kMostPoints));
+}
+
+Result<void> check_evemu(const EvemuRequest& request, const Config& config) {
+  if (auto fits = check_size(request); !fits) return fits;
+  if (!config.probe && !config.cmm) {
+    return fail(ErrorCode::Refused,
+                "calibrate evemu: neither [probe] nor [cmm] is in the configuration: no touches would come");
+  }
+  if (config.cmm && config.cmm->axes_compensated) {
+    return fail(ErrorCode::Refused,
+                "calibrate evemu: the measuring machine corrects what it reports ([cmm] axes_compensated = "
+                "true): switch that off first, and say so in the configuration");
+  }
+  if (const auto given = require_target(config.machine); !given) return given;
+  if (const auto machine = evemu_machine(config.machine); !machine) return tl::unexpected(machine.error());
+  const auto& artefact = config.evemu.artefact;
+  const auto fault =
+      warmth_fault(request.calibrator, fmt::format("calibrator \"{}\"", request.calibrator.name),
+                   !artefact          ? ""
+                   : artefact->sensor ? "[evemu] artefact_sensor"
+                                      : "[evemu] artefact_C",
+                   "add artefact_sensor or artefact_C, and u_artefact_K, to [evemu]");
+  if (!fault.empty()) return fail(ErrorCode::Refused, "calibrate evemu: " + fault);
+  const auto guide = evemu::TouchGuide::create(request.calibrator, request.plan);
+  if (!guide) return fail(ErrorCode::BadInput, "calibrate evemu: " + guide.error().text);
+  return {};
+}
+
+Result<EvemuCandidate> identify_touches(const EvemuRun& run, const Config& config,
+                                        const calib::VolumetricModel* active,
+                                        const std::function<bool()>& stopped) {
+  const auto machine = evemu_machine(config.machine);
+  if (!machine) return tl::unexpected(machine.error());
+  evemu::ObserveOptions observing;
+  observing.order = config.evemu.order;
+  observing.positions = static_cast<int>(run.asked.plan.positions.size());
+  observing.artefact_temperature = run.artefact;
+  auto observations = evemu::observe(run.touches, run.asked.calibrator, *machine, observing);
+  if (!observations) return tl::unexpected(error_of(observations.error()));
+  evemu::JudgeOptions judging = judge_options(config);
+  judging.watch.stopped = stopped;
+  auto solution = evemu::solve(*observations, judging.solve);
+  if (solution && run.asked.reference) {
+    const auto& [points, sigma_m] = *run.asked.reference;
+    solution = evemu::with_rotation_reference(std::move(*solution), {points, sigma_m});
+  }
+  if (!solution) return tl::unexpected(error_of(solution.error()));
+  if (stopped && stopped())
+    return fail(ErrorCode::DataInsufficient, "identification: stopped before its end");
+  auto verdict = evemu::judge(*observations, *solution, active, judging);
+  if (!verdict) return tl::unexpected(error_of(verdict.error()));
+  return EvemuCandidate{std::move(*observations), std::move(*solution), std::move(*verdict)};
+}
+
+}  // namespace abbe::daemon

@@ -1,0 +1,250 @@
+#include "abbe/methods/otf_acquisition.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <utility>
+
+#include "abbe/base/units.hpp"
+#include "abbe/calib/otf/polyline.hpp"
+#include "abbe/config/linear_axes.hpp"
+#include "abbe/methods/otf_inputs.hpp"
+
+namespace abbe::daemon {
+namespace {
+
+using calib::Vector3;
+using protocol::HostTime;
+using protocol::SampleFlag;
+using protocol::Snapshot;
+
+// Off its leg for longer than this, the machine is on a later one: the beam was away while it turned a
+// corner. Shorter than that, only the mapping of the tracker's clock moved.
+constexpr auto kCornerMissed = std::chrono::milliseconds{500};
+constexpr std::size_t kPointsInBlock = 1024;  // 56 KiB: a second of a fast tracker
+
+std::string text(const Vector3& q) {
+  return fmt::format("({:.3f}, {:.3f}, {:.3f}) mm", q[0] * 1e3, q[1] * 1e3, q[2] * 1e3);
+}
+
+RunPoint run_point(const Snapshot& s) {
+  const auto flags = s.tracker_point.head.flags;
+  return {.time = s.head.time,
+          .device_time = s.tracker_point.device_time,
+          .p_tracker_m = s.tracker_point.p_tracker_m,
+          .usable = !has(flags, SampleFlag::SpeedExceeded) && !has(flags, SampleFlag::PointInvalid)};
+}
+
+}  // namespace
+
+void RunPoints::push_back(const RunPoint& point) {
+  if (blocks_.empty() || blocks_.back().size() == kPointsInBlock)
+    blocks_.emplace_back().reserve(kPointsInBlock);
+  blocks_.back().push_back(point);
+  ++size_;
+}
+
+void RunPoints::pop_back() noexcept {
+  blocks_.back().pop_back();
+  if (blocks_.back().empty()) blocks_.pop_back();
+  --size_;
+}
+
+std::vector<RunPoint> RunPoints::joined() const {
+  std::vector<RunPoint> all;
+  all.reserve(size_);
+  for (const auto& block : blocks_) all.insert(all.end(), block.begin(), block.end());
+  return all;
+}
+
+OtfAcquisition::OtfAcquisition(const std::vector<AxisPosition>& path, AcquisitionOptions options)
+    : path_(otf_path(path)),
+      driven_at_m_(calib::otf::lengths_to_vertices_m(path_.path())),
+      options_(std::move(options)) {
+  reason_ = fmt::format("waiting for the machine to stand at {} with the tracker streaming",
+                        text(path_.path().vertices_m.front()));
+}
+
+double OtfAcquisition::progress() const noexcept {
+  if (phase_ == Phase::Complete) return 1.0;
+  return driven_at_m_.back() > 0.0 ? std::min(driven_m_ / driven_at_m_.back(), 1.0) : 0.0;
+}
+
+void OtfAcquisition::take(const Snapshot& snapshot) {
+  if (!snapshot.has_tracker_point || snapshot.head.time < from_) return;
+  const RunPoint point = run_point(snapshot);
+  if (!in_order(point)) return;
+  if (phase_ == Phase::Running && point.time - last_time_ > options_.silence) {
+    fail(fmt::format("no tracker point for {:.1f} s in the middle of the run",
+                     in_seconds(point.time - last_time_)));
+  }
+  last_time_ = point.time;
+  if (has_linear_axes(snapshot)) axes_known_at_ = point.time;
+  give_up_if_stuck(point.time);
+  // Without axis positions the point keeps its place in the sequence, but decides nothing.
+  if (!has_linear_axes(snapshot)) {
+    if (phase_ == Phase::Running) keep(point);
+    return;
+  }
+  const Vector3 q{snapshot.position[0], snapshot.position[1], snapshot.position[2]};
+  track_standstill(point, q);
+  if (phase_ == Phase::WaitingAtStart) {
+    compare_with_path(snapshot, q);
+    wait_at_start(point, q);
+    if (stand_since_ == point.time && phase_ == Phase::WaitingAtStart) readings_.forget();
+  } else if (phase_ == Phase::Running) {
+    if (const auto effect = effect_of(snapshot, options_.environment)) environment_.take(*effect);
+    run(point, q);
+    if (phase_ != Phase::Failed) compare_with_path(snapshot, q);
+    if (phase_ == Phase::Complete)
+      if (auto contradiction = readings_.contradiction()) fail(*std::move(contradiction));
+  }
+}
+
+void OtfAcquisition::compare_with_path(const Snapshot& s, const Vector3& q) {
+  const auto before = std::exchange(before_q_, std::pair{s.head.time, q});
+  if (!before || s.head.time <= before->first) return;
+  const double speed_m_per_s = (q - before->second).norm() / in_seconds(s.head.time - before->first);
+  const auto& vertices = path_.path().vertices_m;
+  const auto near = [&](std::size_t i) { return (q - vertices[i]).norm() <= options_.vertex_tolerance_m; };
+  const std::size_t vertex = near(leg_) ? leg_ : leg_ + 1;
+  // Where vertices are that close to each other, nothing says at which the machine stands.
+  if (!near(vertex) || (vertex == leg_ && near(leg_ + 1)) || (leg_ > 0 && near(leg_ - 1))) return;
+  const Vector3& nominal = vertices[vertex];
+  const auto effect = effect_of(s, options_.environment);
+  if (!effect) return;
+  const AxisPosition path_m = grown({nominal[0], nominal[1], nominal[2]}, *effect, options_.environment);
+  auto contradiction = readings_.take({.vertex = vertex,
+                                       .reading_m = q,
+                                       .path_m = {path_m[0], path_m[1], path_m[2]},
+                                       .u_m = {s.u_position[0], s.u_position[1], s.u_position[2]},
+                                       .speed_m_per_s = speed_m_per_s});
+  if (contradiction && phase_ != Phase::WaitingAtStart) fail(*std::move(contradiction));
+}
+
+void OtfAcquisition::tick(HostTime now) {
+  if (phase_ == Phase::Running && now - last_time_ > options_.arrival_patience) {
+    fail(fmt::format("no tracker point for {:.0f} s in the middle of the run", in_seconds(now - last_time_)));
+  } else if (phase_ == Phase::WaitingAtStart) {
+    give_up_if_stuck(now - options_.arrival_patience);
+  }
+}
+
+/// The identification needs time that ascends.
+bool OtfAcquisition::in_order(const RunPoint& point) {
+  const auto last = std::exchange(last_device_time_, point.device_time);
+  if (!last || point.device_time > *last) return true;
+  if (*last - point.device_time > options_.clock_began_anew) {
+    before_.clear();
+    if (phase_ == Phase::Running) fail("the tracker's clock began anew in the middle of the run");
+    return true;
+  }
+  last_device_time_ = last;
+  ++disordered_;
+  return false;
+}
+
+void OtfAcquisition::give_up_if_stuck(HostTime point_time) {
+  if (phase_ == Phase::WaitingAtStart && point_time - from_ > options_.wait_for_start) {
+    fail(fmt::format("the machine did not stand at {} and drive off within {:.0f} min",
+                     text(path_.path().vertices_m.front()), in_seconds(options_.wait_for_start) / 60.0));
+  } else if (phase_ == Phase::Running && point_time - axes_known_at_ > options_.silence) {
+    fail(fmt::format("no axis positions for {:.1f} s in the middle of the run",
+                     in_seconds(point_time - axes_known_at_)));
+  } else if (phase_ == Phase::Running && point_time - stand_since_ > options_.longest_stop) {
+    fail(fmt::format("the machine has stood still on its path for {:.0f} min",
+                     in_seconds(options_.longest_stop) / 60.0));
+  }
+}
+
+void OtfAcquisition::track_standstill(const RunPoint& point, const Vector3& q) {
+  if (stand_known_ && (q - stand_at_).norm() <= options_.stand_tolerance_m) return;
+  stand_known_ = true;
+  stand_at_ = q;
+  stand_since_ = point.time;
+}
+
+void OtfAcquisition::wait_at_start(const RunPoint& point, const Vector3& q) {
+  const bool left_standstill = stand_since_ == point.time;
+  const bool stood_long_enough =
+      !before_.empty() && before_.back().time - before_.front().time >= options_.stand_before;
+  if (left_standstill && stood_long_enough) {
+    points_ = {};
+    for (const RunPoint& p : before_) points_.push_back(p);
+    before_.clear();
+    phase_ = Phase::Running;
+    reason_ = "driving the path";
+    on_leg_at_ = point.time;
+    points_.push_back(point);
+    return;
+  }
+  if (left_standstill) before_.clear();
+  if ((q - path_.path().vertices_m.front()).norm() > options_.vertex_tolerance_m || !point.usable) return;
+  before_.push_back(point);
+  while (before_.back().time - before_.front().time > options_.keep_before) before_.pop_front();
+}
+
+void OtfAcquisition::keep(const RunPoint& point) {
+  points_.push_back(point);
+  if (points_.size() < options_.most_points) return;
+  fail(fmt::format(
+      "the run has {} tracker points and does not end: the machine cycles on its path, or the path is "
+      "too long for this rate",
+      points_.size()));
+}
+
+void OtfAcquisition::run(const RunPoint& point, const Vector3& q) {
+  keep(point);
+  if (phase_ == Phase::Failed) return;
+  if (!path_.first_within(q, options_.path_tolerance_m)) {
+    const double off_m = path_.distance_m(q);
+    fail(fmt::format(
+        "machine at {} is {:.1f} mm away from every leg of the path: another path is being driven", text(q),
+        off_m * 1e3));
+    return;
+  }
+  follow_path(point, q);
+  if (!complete(point.time, q)) return;
+  trim_end();
+  phase_ = Phase::Complete;
+  reason_ = fmt::format("path driven, {} tracker points", points_.size());
+  if (disordered_ > 0) reason_ += fmt::format(", {} left out that came out of order", disordered_);
+}
+
+void OtfAcquisition::follow_path(const RunPoint& point, const Vector3& q) {
+  const std::size_t last = path_.path().vertices_m.size() - 2;
+  while (leg_ < last && (q - path_.path().vertices_m[leg_ + 1]).norm() <= options_.vertex_tolerance_m) ++leg_;
+  const auto on_leg = [&](std::size_t leg) {
+    return calib::otf::nearest_on_leg(path_.path().vertices_m[leg], path_.path().vertices_m[leg + 1], q);
+  };
+  calib::otf::OnLeg here = on_leg(leg_);
+  if (here.off_m > options_.path_tolerance_m) {
+    if (point.time - on_leg_at_ < kCornerMissed) return;
+    const auto later = path_.first_within(q, options_.path_tolerance_m, leg_ + 1);
+    if (!later) return;
+    leg_ = *later;
+    here = on_leg(leg_);
+  }
+  on_leg_at_ = point.time;
+  driven_m_ = driven_at_m_[leg_] + here.along_m;
+}
+
+/// Of short legs the last ones may have been passed between two points: what is left of the path lies within
+/// its tolerance.
+bool OtfAcquisition::complete(HostTime now, const Vector3& q) const {
+  return driven_at_m_.back() - driven_at_m_[leg_ + 1] <= options_.path_tolerance_m &&
+         (q - path_.path().vertices_m.back()).norm() <= options_.vertex_tolerance_m &&
+         now - stand_since_ >= options_.stand_after;
+}
+
+void OtfAcquisition::trim_end() {
+  const HostTime last = stand_since_ + options_.keep_after;
+  while (!points_.empty() && points_.back().time > last) points_.pop_back();
+}
+
+void OtfAcquisition::fail(std::string reason) {
+  phase_ = Phase::Failed;
+  reason_ = std::move(reason);
+}
+
+}  // namespace abbe::daemon

@@ -1,0 +1,70 @@
+#include "abbe/methods/otf_identification.hpp"
+
+#include <cstddef>
+#include <cstdint>
+#include <utility>
+
+#include "abbe/base/sha256.hpp"
+#include "abbe/calib/otf/judge.hpp"
+#include "abbe/calib/otf/observe.hpp"
+#include "abbe/methods/otf_inputs.hpp"
+
+namespace abbe::daemon {
+namespace {
+
+/// The stages share one bar: the alignment takes most of the time.
+double overall(calib::otf::Stage stage, double fraction) {
+  switch (stage) {
+    case calib::otf::Stage::Observe:
+      return 0.1 * fraction;
+    case calib::otf::Stage::Align:
+      return 0.1 + 0.5 * fraction;
+    case calib::otf::Stage::Solve:
+      return 0.6 + 0.2 * fraction;
+    case calib::otf::Stage::Judge:
+      return 0.8 + 0.2 * fraction;
+  }
+  return fraction;
+}
+
+}  // namespace
+
+Result<OtfCandidate> identify_run(const OtfRun& run, const MachineConfig& machine_config,
+                                  const GateConfig& gate, const calib::VolumetricModel* active,
+                                  const IdentificationWatch& watch) {
+  const auto machine = otf_machine(machine_config);
+  if (!machine) return tl::unexpected(machine.error());
+  const auto points = otf_observations(run.points);
+  calib::otf::Options options = otf_options(points, machine_config, gate);
+  options.orientation.scales_agree =
+      true;  // without them no run begins, and they are compared at the vertices
+  if (watch.progress) {
+    options.progress = [&watch](calib::otf::Stage stage, double fraction) {
+      watch.progress(overall(stage, fraction));
+    };
+  }
+  options.stopped = watch.stopped;
+  calib::otf::Noise noise = otf_noise(machine_config);
+  noise.u_scale = run.u_scale;
+  noise.u_axis_scale = run.u_axis_scale;
+  auto observations = calib::otf::observe(points, *machine, otf_path(run.path_m), noise, options);
+  if (!observations) return tl::unexpected(error_of(observations.error()));
+  auto solution = calib::otf::solve(*observations, options);
+  if (!solution) return tl::unexpected(error_of(solution.error()));
+  auto verdict = calib::otf::judge(*observations, *solution, active, gate_limits(gate), options);
+  if (!verdict) return tl::unexpected(error_of(verdict.error()));
+  if (run.unmeasured_air) verdict->notes.push_back(*run.unmeasured_air);
+  return OtfCandidate{std::move(*solution), std::move(*verdict)};
+}
+
+std::string points_sha256(std::span<const RunPoint> points) {
+  Sha256 hash;
+  for (const RunPoint& p : points) {
+    hash.update_bytes_of(p.device_time.time_since_epoch().count());
+    hash.update_bytes_of(p.p_tracker_m);
+    hash.update_bytes_of(static_cast<std::uint8_t>(p.usable));
+  }
+  return hash.hex();
+}
+
+}  // namespace abbe::daemon

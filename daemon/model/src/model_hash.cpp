@@ -1,0 +1,106 @@
+#include <fmt/format.h>
+
+#include <array>
+#include <bit>
+#include <cstdint>
+
+#include "abbe/base/sha256.hpp"
+#include "abbe/model/model_document.hpp"
+#include "model_format.hpp"
+
+namespace abbe::daemon {
+
+namespace {
+
+/// Feeds labelled numbers to the hash as the little-endian bytes of IEEE 754 doubles, each list with its
+/// length in front, so that no two models share a stream. Minus zero counts as zero.
+class Canonical {
+ public:
+  void text(std::string_view value) {
+    count(value.size());
+    hash_.update(value);
+  }
+  void count(std::size_t value) { word(static_cast<std::uint64_t>(value)); }
+  void number(double value) { word(std::bit_cast<std::uint64_t>(value + 0.0)); }
+  void vector(const calib::Vector3& v) {
+    for (int i = 0; i < 3; ++i) number(v[i]);
+  }
+  void vectors(std::span<const calib::Vector3> list) {
+    count(list.size());
+    for (const auto& v : list) vector(v);
+  }
+  [[nodiscard]] std::string hex() { return hash_.hex(); }
+
+ private:
+  void word(std::uint64_t value) {
+    std::array<std::byte, 8> bytes{};
+    for (std::size_t i = 0; i < bytes.size(); ++i) bytes[i] = static_cast<std::byte>(value >> (8 * i));
+    hash_.update(bytes);
+  }
+  Sha256 hash_;
+};
+
+void add_frame(Canonical& out, const calib::VolumetricModel& model) {
+  const auto& layout = model.layout();
+  out.text(layout.chain().text());
+  for (const auto& axis : layout.nodes()) {
+    out.count(axis.nodes_m.size());
+    for (const double node_m : axis.nodes_m) out.number(node_m);
+    out.number(axis.reference_m);
+  }
+  if (const auto* polynomials = model.polynomials()) {
+    out.text(kLegendre);
+    out.count(static_cast<std::size_t>(polynomials->design().equivalent().order()));
+    out.vector(polynomials->design().box().centre_m);
+    out.vector(polynomials->design().box().half_width_m);
+    out.vector(polynomials->ball1_m());
+  } else {
+    out.text(name(calib::Basis::Linear));
+  }
+  out.text(name(model.gauge()));
+  out.vectors(model.tool_offsets_m());
+}
+
+void add_values(Canonical& out, const calib::VolumetricModel& model) {
+  out.count(model.layout().tables().size());
+  for (const auto& table : model.layout().tables()) out.text(name(table.motion));
+  const auto& U = model.U();
+  const auto& covariance = model.covariance();
+  out.count(static_cast<std::size_t>(U.size()));
+  for (Eigen::Index i = 0; i < U.size(); ++i) out.number(U[i]);
+  for (Eigen::Index i = 0; i < covariance.rows(); ++i)
+    for (Eigen::Index j = i; j < covariance.cols(); ++j) out.number(covariance(i, j));
+}
+
+/// Last, and only where there is one: a model without has the hash it had before there were any.
+void add_artefact(Canonical& out, const calib::Expansion& artefact) {
+  out.text("artefact");
+  for (const double value :
+       {artefact.alpha_per_K, artefact.u_alpha_per_K, artefact.temperature_K, artefact.u_temperature_K})
+    out.number(value);
+}
+
+}  // namespace
+
+std::string model_hash(const ModelDocument& document) {
+  const auto& model = document.model;
+  Canonical out;
+  out.text("abbe/model/1");
+  out.text(document.method);
+  add_frame(out, model);
+  add_values(out, model);
+  out.vectors(model.validity().vertices_m());
+  if (document.artefact) add_artefact(out, *document.artefact);
+  return out.hex();
+}
+
+std::string model_id(const ModelDocument& document) {
+  Canonical out;
+  out.text("abbe/model-id/1");
+  out.text(model_hash(document));
+  out.text(document.machine_hash);
+  constexpr std::size_t kDigits = 16;
+  return out.hex().substr(0, kDigits);
+}
+
+}  // namespace abbe::daemon

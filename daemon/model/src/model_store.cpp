@@ -1,0 +1,227 @@
+#include "abbe/model/model_store.hpp"
+
+#include <fmt/format.h>
+#include <sys/stat.h>
+
+#include <algorithm>
+#include <utility>
+
+#include "abbe/base/text_file.hpp"
+#include "store_lock.hpp"
+#include "store_state.hpp"
+
+namespace abbe::daemon {
+
+namespace {
+
+namespace fs = std::filesystem;
+
+fs::path state_path(const fs::path& folder) {
+  return folder / "state.json";
+}
+
+/// A store nobody wrote to yet has no events.
+Result<StoreState> read_state(const fs::path& folder) {
+  const auto file = state_path(folder);
+  std::error_code seen;
+  if (fs::status(file, seen).type() == fs::file_type::not_found) return StoreState{};
+  const auto text = read_regular_file(file);
+  if (!text) return tl::make_unexpected(text.error());
+  return store_state_from_text(*text, file.string());
+}
+
+Result<void> append(const fs::path& folder, StoreState state, StoreEvent event) {
+  state.events.push_back(std::move(event));
+  return replace_file(state_path(folder), to_text(state));
+}
+
+bool is_id(const std::string& text) {
+  return text.size() == 16 && text.find_first_not_of("0123456789abcdef") == std::string::npos;
+}
+
+/// The ids of the files in models/, in order of name.
+Result<std::vector<std::string>> ids_on_disk(const fs::path& folder) {
+  std::vector<std::string> ids;
+  std::error_code error;
+  for (fs::directory_iterator entry(folder / "models", error), end; !error && entry != end;
+       entry.increment(error))
+    if (entry->path().extension() == ".json" && is_id(entry->path().stem().string()))
+      ids.push_back(entry->path().stem().string());
+  if (error)
+    return fail(ErrorCode::Io, fmt::format("list {}: {}", (folder / "models").string(), error.message()));
+  std::sort(ids.begin(), ids.end());
+  return ids;
+}
+
+/// Nothing takes a model out of the store: one that was added and has no file is lost, and is to be seen.
+Result<std::vector<std::string>> ids_in_store(const fs::path& folder, const StoreState& state) {
+  auto ids = ids_on_disk(folder);
+  if (!ids) return ids;
+  for (const auto& event : state.events)
+    if (event.action == StoreAction::Added) ids->push_back(event.id);
+  std::sort(ids->begin(), ids->end());
+  ids->erase(std::unique(ids->begin(), ids->end()), ids->end());
+  return ids;
+}
+
+}  // namespace
+
+Result<ModelStore> ModelStore::open(const fs::path& folder) {
+  ModelStore store{folder};
+  if (const auto made = store.create(); !made) return tl::make_unexpected(made.error());
+  if (const auto state = read_state(folder); !state) return tl::make_unexpected(state.error());
+  return store;
+}
+
+Result<void> ModelStore::create() const {
+  return create_folder(folder_ / "models");
+}
+
+ModelStore::ModelStore(fs::path folder) : folder_(std::move(folder)), state_file_(state_path(folder_)) {}
+
+fs::path ModelStore::model_path(const std::string& id) const {
+  return folder_ / "models" / (id + ".json");
+}
+
+Result<std::string> ModelStore::add(const ModelDocument& document, bool accepted,
+                                    std::vector<std::string> reasons, const StoreActor& actor) {
+  const auto id = model_id(document);
+  // First, and without the lock: the file of an id has one content, whoever writes it, and must not wait for
+  // whoever holds the lock. A damaged file of the same id is written again: what it should have held is in
+  // our hands.
+  if (!load(id))
+    if (const auto written = replace_file(model_path(id), to_json(document)); !written)
+      return tl::make_unexpected(written.error());
+  const auto lock = lock_store(folder_, lock_patience_);
+  if (!lock) return tl::make_unexpected(lock.error());
+  auto state = read_state(folder_);
+  if (!state) return tl::make_unexpected(state.error());
+  StoreEvent event{StoreAction::Added, id, actor, accepted, std::move(reasons)};
+  // A change whose last step failed (fsync of the folder, or what follows it) is asked for again.
+  if (const auto* last = state->last_added(id); last != nullptr && *last == event) return id;
+  if (const auto done = append(folder_, std::move(*state), std::move(event)); !done)
+    return tl::make_unexpected(done.error());
+  return id;
+}
+
+Result<void> ModelStore::activate(const std::string& id, const StoreActor& actor, bool force) {
+  const auto lock = lock_store(folder_, lock_patience_);
+  if (!lock) return tl::make_unexpected(lock.error());
+  auto state = read_state(folder_);
+  if (!state) return tl::make_unexpected(state.error());
+  if (const auto document = load(id); !document) return tl::make_unexpected(document.error());
+  const StoreEvent* added = state->last_added(id);
+  const bool accepted = added != nullptr && added->accepted;
+  if (!accepted && !force)
+    return fail(
+        ErrorCode::Refused,
+        added == nullptr
+            ? fmt::format("activate {}: the gate never judged it (force it to take it anyway)", id)
+            : fmt::format("activate {}: the gate refused it: {}", id, fmt::join(added->reasons, "; ")));
+  const auto action = accepted ? StoreAction::Activated : StoreAction::Forced;
+  return append(folder_, std::move(*state), StoreEvent{action, id, actor, accepted, {}});
+}
+
+Result<std::string> ModelStore::rollback(const StoreActor& actor) {
+  const auto lock = lock_store(folder_, lock_patience_);
+  if (!lock) return tl::make_unexpected(lock.error());
+  auto state = read_state(folder_);
+  if (!state) return tl::make_unexpected(state.error());
+  const auto stack = state->activations();
+  if (stack.size() < 2)
+    return fail(ErrorCode::Refused, "roll back: no model was active before the present one");
+  const auto& id = stack[stack.size() - 2];
+  if (const auto document = load(id); !document) return tl::make_unexpected(document.error());
+  if (const auto done =
+          append(folder_, std::move(*state), StoreEvent{StoreAction::RolledBack, id, actor, false, {}});
+      !done)
+    return tl::make_unexpected(done.error());
+  return id;
+}
+
+Result<std::vector<StoreEntry>> ModelStore::list() const {
+  const auto state = read_state(folder_);
+  if (!state) return tl::make_unexpected(state.error());
+  const auto active = state->active();
+  const auto ids = ids_in_store(folder_, *state);
+  if (!ids) return tl::make_unexpected(ids.error());
+  std::vector<StoreEntry> entries;
+  for (const auto& id : *ids) {
+    StoreEntry entry;
+    entry.id = id;
+    entry.active = active == id;
+    if (const StoreEvent* added = state->last_added(id); added != nullptr) {
+      entry.accepted = added->accepted;
+      entry.reasons = added->reasons;
+      entry.added = added->actor.when;
+    }
+    if (const auto document = load(id)) {
+      entry.method = document->method;
+      entry.machine = document->machine;
+    } else {
+      entry.fault = document.error().text;
+    }
+    entries.push_back(std::move(entry));
+  }
+  std::stable_sort(entries.begin(), entries.end(),
+                   [](const auto& a, const auto& b) { return a.added > b.added; });
+  return entries;
+}
+
+Result<std::vector<StoreEvent>> ModelStore::history() const {
+  auto state = read_state(folder_);
+  if (!state) return tl::make_unexpected(state.error());
+  return std::move(state->events);
+}
+
+Result<std::optional<std::string>> ModelStore::active_id() const {
+  const auto state = read_state(folder_);
+  if (!state) return tl::make_unexpected(state.error());
+  return state->active();
+}
+
+Result<std::optional<StoreEvent>> ModelStore::activation() const {
+  const auto state = read_state(folder_);
+  if (!state) return tl::make_unexpected(state.error());
+  return state->activation();
+}
+
+StoreStamp ModelStore::stamp() const noexcept {
+  struct stat status {};
+  if (::stat(state_file_.c_str(), &status) != 0) return {};
+  constexpr std::int64_t kSecond_ns = 1'000'000'000;
+  return {status.st_ino, status.st_mtim.tv_sec * kSecond_ns + status.st_mtim.tv_nsec, status.st_size};
+}
+
+Result<ModelDocument> ModelStore::load(const std::string& id) const {
+  const auto file = model_path(id);
+  const auto text = read_regular_file(file);
+  if (!text) return tl::make_unexpected(text.error());
+  auto document = parse_model(*text, file.string());
+  if (document && model_id(*document) != id)
+    return fail(ErrorCode::BadInput,
+                fmt::format("{}: holds another model than its name says", model_path(id).string()));
+  return document;
+}
+
+Result<std::string> ModelStore::find(const std::string& prefix) const {
+  if (prefix == "active") {
+    const auto active = active_id();
+    if (!active) return tl::make_unexpected(active.error());
+    return *active ? Result<std::string>{**active} : fail(ErrorCode::Usage, "no model is active");
+  }
+  constexpr std::size_t kShortest = 4;
+  std::vector<std::string> found;
+  if (prefix.size() >= kShortest) {
+    const auto ids = ids_on_disk(folder_);
+    if (!ids) return tl::make_unexpected(ids.error());
+    for (const auto& id : *ids)
+      if (id.starts_with(prefix)) found.push_back(id);
+  }
+  if (found.size() == 1) return found.front();
+  return fail(ErrorCode::Usage,
+              fmt::format("model \"{}\": {} in {} begin with that", prefix,
+                          found.empty() ? "none" : std::to_string(found.size()), folder_.string()));
+}
+
+}  // namespace abbe::daemon

@@ -1,0 +1,42 @@
+#include <cmath>
+
+#include "abbe/model/model_document.hpp"
+
+namespace abbe::daemon {
+
+namespace {
+
+ResidualFigures figures(const calib::otf::ResidualStatistics& s) {
+  return {s.mean_abs_m, s.rms_m, s.max_abs_m};
+}
+
+/// Without a degree of freedom the ratio does not exist; a file of numbers says 0.
+double or_zero(double value) {
+  return std::isfinite(value) ? value : 0.0;
+}
+
+}  // namespace
+
+ModelStatistics model_statistics(const calib::otf::Statistics& s) {
+  return {.samples = s.samples,
+          .lost_samples = s.lost_samples,
+          .observations = s.observations,
+          .unknowns = s.unknowns,
+          .rank = s.rank,
+          .condition = or_zero(s.condition),
+          .sigma0 = or_zero(s.sigma0),
+          .chi2_per_dof = or_zero(s.chi2_per_dof),
+          .covariance_factor = s.covariance_factor,
+          .before = figures(s.before),
+          .after = figures(s.after),
+          .iterations = s.iterations,
+          .stop_reason = std::string{name(s.stop)}};
+}
+
+ModelDocument otf_document(const calib::otf::Solution& solution, const Config& config,
+                           std::vector<InputFile> inputs, protocol::UtcTime created) {
+  return {solution.model,       "otf",   std::string{name(solution.estimator)}, config.machine.name,
+          machine_hash(config), created, model_statistics(solution.statistics), std::move(inputs)};
+}
+
+}  // namespace abbe::daemon

@@ -1,0 +1,91 @@
+#include "store_lock.hpp"
+
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <sys/file.h>
+#include <sys/stat.h>
+#include <sys/sysmacros.h>
+
+#include <cerrno>
+#include <chrono>
+#include <cstring>
+#include <fstream>
+#include <sstream>
+#include <string>
+#include <thread>
+
+#include "abbe/base/text_file.hpp"
+
+namespace abbe::daemon {
+
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr auto kLockLook = std::chrono::milliseconds{10};
+constexpr int kLockFlags = O_RDONLY | O_CLOEXEC | O_NOFOLLOW | O_NONBLOCK;
+
+/// 0600; 0660 where the group may write to the folder anyway. Also a file of before, when it was readable.
+void keep_from_strangers(int lock, const fs::path& folder) noexcept {
+  struct stat file {
+  }, of_folder{};
+  if (::fstat(lock, &file) != 0 || ::stat(folder.c_str(), &of_folder) != 0) return;
+  const mode_t mode = (of_folder.st_mode & S_IWGRP) != 0 ? 0660 : 0600;
+  if ((file.st_mode & 0777U) != mode) (void)::fchmod(lock, mode);
+}
+
+FileDescriptor open_lock(const fs::path& file) {
+  const auto folder = file.parent_path();
+  FileDescriptor lock{::open(file.c_str(), kLockFlags)};
+  if (!lock && errno == ENOENT) {
+    lock = FileDescriptor{::open(file.c_str(), kLockFlags | O_CREAT | O_EXCL, 0600)};
+    // To its owner, so that whoever uses the store after root can lock it, too.
+    if (lock) take_after_folder(lock.get(), folder);
+    // Lost against another process: it is there now.
+    else if (errno == EEXIST)
+      lock = FileDescriptor{::open(file.c_str(), kLockFlags)};
+  }
+  if (lock) keep_from_strangers(lock.get(), folder);
+  return lock;
+}
+
+/// As /proc/locks names a file: "fe:01:4711".
+std::string name_in_proc(const struct stat& file) {
+  return fmt::format("{:02x}:{:02x}:{}", major(file.st_dev), minor(file.st_dev), file.st_ino);
+}
+
+/// " (process 4711)"; empty where /proc/locks is not shown, or not for this file system.
+std::string holder_of(int lock) {
+  struct stat file {};
+  if (::fstat(lock, &file) != 0) return {};
+  const std::string wanted = name_in_proc(file);
+  std::ifstream locks{"/proc/locks"};
+  for (std::string line; std::getline(locks, line);) {
+    std::istringstream fields{line};
+    std::string number, kind, advisory, access, process, where;
+    fields >> number >> kind >> advisory >> access >> process >> where;
+    if (kind == "FLOCK" && where == wanted) return fmt::format(" (process {})", process);
+  }
+  return {};
+}
+
+}  // namespace
+
+Result<FileDescriptor> lock_store(const fs::path& folder, std::chrono::nanoseconds patience) {
+  const auto failure = [&folder](std::string_view seen) {
+    return fail(ErrorCode::Io, fmt::format("lock the model store {}: {}", folder.string(), seen));
+  };
+  FileDescriptor lock = open_lock(folder / "lock");
+  if (!lock) return failure(std::strerror(errno));
+  const auto until = std::chrono::steady_clock::now() + patience;
+  while (::flock(lock.get(), LOCK_EX | LOCK_NB) != 0) {
+    if (errno != EWOULDBLOCK && errno != EINTR) return failure(std::strerror(errno));
+    if (std::chrono::steady_clock::now() > until)
+      return failure(fmt::format("another process{} has held it for {:.0f} s", holder_of(lock.get()),
+                                 std::chrono::duration<double>(patience).count()));
+    std::this_thread::sleep_for(kLockLook);
+  }
+  return lock;
+}
+
+}  // namespace abbe::daemon

@@ -1,0 +1,27 @@
+#pragma once
+/// state.json: the events of a store in order, and what follows from them.
+
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "abbe/model/model_store.hpp"
+
+namespace abbe::daemon {
+
+struct StoreState {
+  std::vector<StoreEvent> events;
+
+  /// Every activation that a rollback has not taken back, oldest first; the last one is active.
+  [[nodiscard]] std::vector<std::string> activations() const;
+  [[nodiscard]] std::optional<std::string> active() const;
+  /// The event that made it so, `accepted` as the gate said of the model when it was added.
+  [[nodiscard]] std::optional<StoreEvent> activation() const;
+  [[nodiscard]] const StoreEvent* last_added(std::string_view id) const;  ///< null if the gate never saw it
+};
+
+[[nodiscard]] std::string to_text(const StoreState& state);
+[[nodiscard]] Result<StoreState> store_state_from_text(std::string_view text, const std::string& file);
+
+}  // namespace abbe::daemon

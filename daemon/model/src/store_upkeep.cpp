@@ -1,0 +1,98 @@
+/// What killed processes and damaged disks leave in a store.
+
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <signal.h>
+#include <stdio.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <charconv>
+#include <cstring>
+#include <optional>
+
+#include "abbe/base/text_file.hpp"
+#include "abbe/base/utc_text.hpp"
+#include "abbe/model/model_store.hpp"
+#include "store_lock.hpp"
+#include "store_state.hpp"
+
+namespace abbe::daemon {
+
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr std::string_view kDamaged = "state.json.damaged-";
+constexpr std::string_view kFresh = ".new";
+
+/// The process that wrote NAME.PID.new; nothing: that is no such name.
+std::optional<pid_t> writer_of(std::string name) {
+  if (!name.ends_with(kFresh)) return std::nullopt;
+  name.resize(name.size() - kFresh.size());
+  const auto dot = name.rfind('.');
+  pid_t process = 0;
+  if (dot == std::string::npos) return std::nullopt;
+  const char* const end = name.data() + name.size();
+  const auto read = std::from_chars(name.data() + dot + 1, end, process);
+  return read.ec == std::errc{} && read.ptr == end && process > 0 ? std::optional{process} : std::nullopt;
+}
+
+/// Numbers are given again after a restart of the computer.
+bool is_gone(pid_t process) noexcept {
+  return process == ::getpid() || (::kill(process, 0) != 0 && errno == ESRCH);
+}
+
+/// "2024-05-17T08-30-00Z": a name that every file system takes.
+std::string date_for_name(protocol::UtcTime now) {
+  constexpr std::size_t kSeconds = 19;
+  std::string date = to_text(now).substr(0, kSeconds) + "Z";
+  std::replace(date.begin(), date.end(), ':', '-');
+  return date;
+}
+
+bool is_damaged(const fs::path& state) {
+  std::error_code unknown;
+  if (fs::symlink_status(state, unknown).type() == fs::file_type::not_found) return false;
+  const auto text = read_regular_file(state);
+  if (!text) return text.error().code == ErrorCode::BadInput;
+  return !store_state_from_text(*text, state.string());
+}
+
+}  // namespace
+
+void ModelStore::remove_leftovers() const {
+  for (const auto& folder : {folder_, folder_ / "models"}) {
+    std::error_code error;
+    for (fs::directory_iterator entry(folder, error), end; !error && entry != end; entry.increment(error)) {
+      const auto writer = writer_of(entry->path().filename().string());
+      std::error_code ignored;
+      if (writer && is_gone(*writer) && entry->is_regular_file(ignored)) fs::remove(entry->path(), ignored);
+    }
+  }
+}
+
+Result<void> ModelStore::set_aside_damaged_state(protocol::UtcTime now) {
+  if (!is_damaged(state_file_)) return {};
+  const auto lock = lock_store(folder_, lock_patience_);
+  if (!lock) return tl::make_unexpected(lock.error());
+  if (!is_damaged(state_file_)) return {};  // repaired meanwhile
+  const auto aside = folder_ / (std::string{kDamaged} + date_for_name(now));
+  if (::renameat2(AT_FDCWD, state_file_.c_str(), AT_FDCWD, aside.c_str(), RENAME_NOREPLACE) == 0) return {};
+  return fail(ErrorCode::Io,
+              fmt::format("rename {} to {}: {}", state_file_.string(), aside.string(), std::strerror(errno)));
+}
+
+std::string ModelStore::damaged_state() const {
+  std::string newest;
+  std::error_code error;
+  for (fs::directory_iterator entry(folder_, error), end; !error && entry != end; entry.increment(error)) {
+    auto name = entry->path().filename().string();
+    if (name.starts_with(kDamaged)) newest = std::max(newest, std::move(name));
+  }
+  return newest;
+}
+
+}  // namespace abbe::daemon

@@ -1,0 +1,189 @@
+#include <fmt/format.h>
+
+#include <nlohmann/json.hpp>
+
+#include "abbe/base/sha256.hpp"
+#include "abbe/base/utc_text.hpp"
+#include "abbe/model/model_document.hpp"
+#include "decimal.hpp"
+#include "model_format.hpp"
+
+namespace abbe::daemon {
+
+namespace {
+
+/// JSON by hand: numbers keep the digits to_decimal() chose, one parameter stands on one line, and the same
+/// document gives the same bytes.
+class JsonText {
+ public:
+  void raw(std::string_view text) { text_ += text; }
+  void key(std::string_view name) {
+    text_ += fmt::format("{}\n  \"{}\": ", text_.size() > 1 ? "," : "", name);
+  }
+  void member(std::string_view name, std::string_view text) {
+    key(name);
+    text_ += quoted(text);
+  }
+  [[nodiscard]] static std::string quoted(std::string_view text) {
+    return nlohmann::json(text).dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
+  }
+  [[nodiscard]] std::string finish() { return text_ + "\n}\n"; }
+
+ private:
+  std::string text_ = "{";
+};
+
+std::string vector_mm(const calib::Vector3& v) {
+  return fmt::format("[{}, {}, {}]", to_decimal(v[0], kMm), to_decimal(v[1], kMm), to_decimal(v[2], kMm));
+}
+
+std::string vectors_mm(std::span<const calib::Vector3> list) {
+  std::string text = "[";
+  for (const auto& v : list) text.append(text.size() > 1 ? ", " : "").append(vector_mm(v));
+  return text + "]";
+}
+
+std::string numbers(std::span<const double> list, int shift) {
+  std::string text = "[";
+  for (const double v : list) text.append(text.size() > 1 ? ", " : "").append(to_decimal(v, shift));
+  return text + "]";
+}
+
+void write_polynomials(JsonText& out, const calib::evemu::EvemuModel& model) {
+  const auto& design = model.design();
+  out.key("basis");
+  out.raw(fmt::format(
+      "{{\"kind\": \"{}\", \"order\": {},\n    \"centre_mm\": {}, \"half_width_mm\": {}, \"zero_mm\": {}}}",
+      kLegendre, design.equivalent().order(), vector_mm(design.box().centre_m),
+      vector_mm(design.box().half_width_m), vector_mm(model.ball1_m())));
+}
+
+void write_axes(JsonText& out, const calib::ParameterLayout& layout) {
+  out.key("basis");
+  out.raw(fmt::format("{{\"kind\": \"{}\", \"axes\": {{", name(calib::Basis::Linear)));
+  for (const auto axis : calib::kAllAxes) {
+    const auto& nodes = layout.nodes()[index(axis)];
+    out.raw(fmt::format("{}\n    \"{}\": {{\"nodes_mm\": {}, \"reference_mm\": {}}}",
+                        index(axis) > 0 ? "," : "", letter(axis), numbers(nodes.nodes_m, kMm),
+                        to_decimal(nodes.reference_m, kMm)));
+  }
+  out.raw("}}");
+}
+
+void write_parameters(JsonText& out, const calib::VolumetricModel& model) {
+  out.key("parameters");
+  out.raw("[");
+  bool first = true;
+  for (const auto& p : model.parameters()) {
+    out.raw(fmt::format("{}\n    {{\"name\": \"{}\", ", first ? "" : ",", p.name));
+    if (p.position_m) out.raw(fmt::format("\"position_mm\": {}, ", to_decimal(*p.position_m, kMm)));
+    out.raw(fmt::format("\"value\": {}, \"u\": {}, \"unit\": \"{}\"}}", to_decimal(p.value, kMicroUnit),
+                        to_decimal(p.u, kMicroUnit), unit_of(p)));
+    first = false;
+  }
+  out.raw("\n  ]");
+}
+
+void write_covariance(JsonText& out, const Eigen::MatrixXd& covariance) {
+  out.key("covariance");
+  out.raw("[");
+  for (Eigen::Index i = 0; i < covariance.rows(); ++i) {
+    out.raw(i > 0 ? ",\n    " : "\n    ");
+    for (Eigen::Index j = i; j < covariance.cols(); ++j) {
+      if (j > i) out.raw(",");
+      out.raw(to_decimal(covariance(i, j), kMicroUnitSquared));
+    }
+  }
+  out.raw("\n  ]");
+}
+
+std::string residuals(const ResidualFigures& figures) {
+  return fmt::format("{{\"mae_um\": {}, \"rms_um\": {}, \"max_um\": {}}}",
+                     to_decimal(figures.mean_abs_m, kMicroUnit), to_decimal(figures.rms_m, kMicroUnit),
+                     to_decimal(figures.max_abs_m, kMicroUnit));
+}
+
+void write_statistics(JsonText& out, const ModelStatistics& s) {
+  out.key("statistics");
+  out.raw(fmt::format(
+      "{{\"samples\": {}, \"lost_samples\": {}, \"observations\": {}, \"unknowns\": {}, \"rank\": {},\n"
+      "    \"condition\": {}, \"sigma0\": {}, \"chi2_per_dof\": {}, \"covariance_factor\": {},\n"
+      "    \"before\": {},\n    \"after\": {},\n    \"iterations\": {}, \"stop_reason\": {}}}",
+      s.samples, s.lost_samples, s.observations, s.unknowns, s.rank, to_decimal(s.condition, 0),
+      to_decimal(s.sigma0, 0), to_decimal(s.chi2_per_dof, 0), to_decimal(s.covariance_factor, 0),
+      residuals(s.before), residuals(s.after), s.iterations, JsonText::quoted(s.stop_reason)));
+}
+
+void write_artefact(JsonText& out, const calib::Expansion& artefact) {
+  out.key("artefact");
+  out.raw(fmt::format(
+      "{{\"temperature_K\": {}, \"u_temperature_K\": {}, \"alpha_um_per_m_K\": {}, \"u_alpha_um_per_m_K\": "
+      "{},\n"
+      "    \"growth\": {}, \"u_growth\": {}}}",
+      to_decimal(artefact.temperature_K, 0), to_decimal(artefact.u_temperature_K, 0),
+      to_decimal(artefact.alpha_per_K, kMicroUnit), to_decimal(artefact.u_alpha_per_K, kMicroUnit),
+      to_decimal(calib::growth(artefact), 0), to_decimal(calib::u_growth(artefact), 0)));
+}
+
+void write_inputs(JsonText& out, const std::vector<InputFile>& inputs) {
+  out.key("inputs");
+  out.raw("[");
+  for (std::size_t i = 0; i < inputs.size(); ++i)
+    out.raw(fmt::format("{}\n    {{\"file\": {}, \"sha256\": {}}}", i > 0 ? "," : "",
+                        JsonText::quoted(inputs[i].name), JsonText::quoted(inputs[i].sha256)));
+  out.raw(inputs.empty() ? "]" : "\n  ]");
+}
+
+}  // namespace
+
+std::string cannot_be_checked(std::string_view recording_gap) {
+  return fmt::format("no replay can check this model: {}", recording_gap);
+}
+
+std::string to_json(const ModelDocument& document) {
+  const auto& model = document.model;
+  JsonText out;
+  out.member("schema", kModelSchema);
+  out.member("abbe_version", kVersion);
+  out.member("hash", model_hash(document));
+  out.member("created", to_text(document.created));
+  out.member("method", document.method);
+  out.member("estimator", document.estimator);
+  out.member("machine", document.machine);
+  out.member("machine_hash", document.machine_hash);
+  out.member("chain", model.layout().chain().text());
+  out.member("gauge", name(model.gauge()));
+  out.member("squareness", "travel");
+  out.key("tool_offsets_mm");
+  out.raw(vectors_mm(model.tool_offsets_m()));
+  if (const auto* polynomials = model.polynomials())
+    write_polynomials(out, *polynomials);
+  else
+    write_axes(out, model.layout());
+  write_statistics(out, document.statistics);
+  if (document.artefact) write_artefact(out, *document.artefact);
+  write_inputs(out, document.inputs);
+  if (!document.recording_gap.empty()) out.member("recording_gap", document.recording_gap);
+  out.key("validity");
+  out.raw(fmt::format("{{\"hull_mm\": {}}}", vectors_mm(model.validity().vertices_m())));
+  write_parameters(out, model);
+  write_covariance(out, model.covariance());
+  return out.finish();
+}
+
+std::string to_coefficients_csv(const calib::evemu::EvemuModel& model) {
+  std::string text = "name,value,u,unit\n";
+  for (const auto& c : model.named_coefficients())
+    text += fmt::format("{},{:.17g},{:.17g},{}\n", c.name, c.value, c.u, c.unit);
+  return text;
+}
+
+std::string to_tables_csv(const calib::VolumetricModel& model) {
+  std::string text = "name,position_mm,value,u,unit\n";
+  for (const auto& p : model.parameters())
+    text += fmt::format("{},{},{},{},{}\n", p.name, p.position_m ? to_decimal(*p.position_m, kMm) : "",
+                        to_decimal(p.value, kMicroUnit), to_decimal(p.u, kMicroUnit), unit_of(p));
+  return text;
+}
+
+}  // namespace abbe::daemon

@@ -1,0 +1,157 @@
+#include "abbe/pipeline/assembler.hpp"
+
+#include <algorithm>
+#include <array>
+#include <bit>
+#include <cstddef>
+#include <iterator>
+#include <span>
+#include <utility>
+
+namespace abbe::daemon {
+namespace {
+
+using protocol::AxisSample;
+using protocol::HostTime;
+using protocol::SampleFlag;
+using protocol::Snapshot;
+
+// Axis samples older than this are forgotten. A tracker that stalls delivers its backlog later; ten seconds
+// of 1 kHz are 2 MB.
+constexpr auto kAxisMemory = std::chrono::seconds{10};
+
+bool earlier(const AxisSample& sample, HostTime t) {
+  return sample.head.time < t;
+}
+
+void set_axes(Snapshot& s, const drivers::AxesAt& axes) {
+  s.axis_count = axes.axis_count;
+  s.missing_mask = axes.missing_mask;
+  s.head.flags = s.head.flags | axes.flags;
+  s.position = axes.position;
+  s.velocity = axes.velocity;
+  s.u_position = axes.u_position;
+}
+
+}  // namespace
+
+Assembler::Assembler(AssemblerOptions options)
+    : options_(std::move(options)), environment_(options_.environment, options_.watermark) {}
+
+void Assembler::take(const Batch& batch) {
+  points_.insert(points_.end(), batch.points.begin(), batch.points.end());
+  for (const auto& point : batch.points) newest_ = std::max(newest_, point.head.time);
+  for (const AxisSample& sample : batch.axes) {
+    newest_ = std::max(newest_, sample.head.time);
+    take(sample);
+  }
+  environment_.take(batch);
+  touches_.insert(touches_.end(), batch.touches.begin(), batch.touches.end());
+  for (const auto& touch : batch.touches) newest_ = std::max(newest_, touch.head.time);
+}
+
+/// A bus that went off or began anew may report an instant before that of the last sample, and a second
+/// answer takes one back. Interpolation needs one sample an instant: the one that knows less stays, whichever
+/// came first.
+void Assembler::take(const AxisSample& sample) {
+  const auto same = std::lower_bound(axes_.begin(), axes_.end(), sample.head.time, earlier);
+  if (same == axes_.end() || same->head.time != sample.head.time) {
+    axes_.insert(same, sample);
+  } else if (std::popcount(sample.missing_mask) > std::popcount(same->missing_mask)) {
+    const auto gap = same->head;
+    *same = sample;
+    same->head.lost_before = std::max(gap.lost_before, sample.head.lost_before);
+    if (has(gap.flags, SampleFlag::GapBefore)) same->head.flags |= SampleFlag::GapBefore;
+  }
+}
+
+bool Assembler::ready(HostTime t) const {
+  if (newest_ - t > options_.watermark) return true;
+  return axes_.size() >= 3 && t <= axes_[axes_.size() - 3].head.time;
+}
+
+void Assembler::emit(std::vector<Snapshot>& out) {
+  while (!points_.empty() && ready(points_.front().head.time)) emit_first_point(out);
+  while (!touches_.empty() && ready(touches_.front().head.time)) emit_first_touch(out);
+  forget();
+}
+
+void Assembler::finish(std::vector<Snapshot>& out) {
+  while (!points_.empty()) emit_first_point(out);
+  while (!touches_.empty()) emit_first_touch(out);
+}
+
+void Assembler::emit_first_point(std::vector<Snapshot>& out) {
+  out.push_back(assemble(points_.front()));
+  points_.pop_front();
+}
+
+void Assembler::emit_first_touch(std::vector<Snapshot>& out) {
+  out.push_back(assemble(touches_.front()));
+  touches_.pop_front();
+}
+
+Snapshot Assembler::assemble(const protocol::TrackerPoint& point) const {
+  Snapshot s = begin(point.head);
+  s.has_tracker_point = true;
+  s.tracker_point = point;
+  interpolate(s);
+  correct_for_temperature(s, options_.environment);
+  correct_for_air(s, options_.environment);
+  return s;
+}
+
+Snapshot Assembler::assemble(const protocol::ProbeTrigger& touch) const {
+  Snapshot s = begin(touch.head);
+  s.has_trigger = true;
+  s.trigger = touch;
+  if (touch.axis_count == 0) {
+    interpolate(s);
+  } else {
+    s.axis_count = touch.axis_count;
+    s.missing_mask = touch.missing_mask;
+    s.position = touch.position;
+    s.velocity = touch.velocity;
+    s.u_position = touch.u_position;
+  }
+  // What a measuring machine reports is its own affair: no scale of ours was read.
+  if (touch.latch != protocol::TouchLatch::Reported) correct_for_temperature(s, options_.environment);
+  return s;
+}
+
+/// With the environment in force at that time.
+Snapshot Assembler::begin(const protocol::SampleHead& head) const {
+  Snapshot s;
+  s.head = head;
+  s.axes_compensated = options_.axes_compensated;
+  if (const auto environment = environment_.at(head.time)) {
+    s.has_environment = true;
+    s.environment = *environment;
+  }
+  return s;
+}
+
+void Assembler::interpolate(Snapshot& s) const {
+  // Two samples on either side are all that the interpolation looks at; handing over exactly these keeps a
+  // result independent of what else has arrived.
+  const auto after = std::lower_bound(axes_.begin(), axes_.end(), s.head.time, earlier);
+  const auto first = after - std::min<std::ptrdiff_t>(2, after - axes_.begin());
+  const auto end = after + std::min<std::ptrdiff_t>(2, axes_.end() - after);
+  std::array<AxisSample, 4> around;
+  std::copy(first, end, around.begin());
+  const auto axes = drivers::interpolate_axes(std::span{around}.first(static_cast<std::size_t>(end - first)),
+                                              s.head.time, s.head.u_time, options_.interpolation);
+  if (axes) {
+    set_axes(s, *axes);
+  } else {
+    s.head.flags |= SampleFlag::AxisMissing;
+  }
+}
+
+void Assembler::forget() {
+  const HostTime oldest = newest_ - kAxisMemory;
+  while (axes_.size() > 4 && axes_.front().head.time < oldest) axes_.pop_front();
+  environment_.forget(oldest);
+}
+
+}  // namespace abbe::daemon

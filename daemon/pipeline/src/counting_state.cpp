@@ -1,0 +1,211 @@
+#include "abbe/pipeline/counting_state.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdlib>
+#include <fstream>
+#include <system_error>
+
+#include "abbe/base/bounded_json.hpp"
+#include "abbe/base/sha256.hpp"
+#include "abbe/base/text_file.hpp"
+
+namespace abbe::daemon {
+namespace {
+
+using nlohmann::json;
+
+constexpr int kCountingSchema = 1;
+constexpr std::size_t kMostBytes = 65536;
+
+json json_of(const drivers::quad08::Debounce& debounce) {
+  return {debounce.enabled, debounce.time_code, debounce.falling, debounce.trigger_before_stable};
+}
+
+json json_of(const drivers::CounterAxis& axis) {
+  return {{"name", axis.name},     {"channel", axis.channel},        {"scale", axis.scale},
+          {"offset", axis.offset}, {"latched", axis.latch_on_index}, {"debounce", json_of(axis.debounce)}};
+}
+
+json json_of(const ReferenceAxisConfig& marks) {
+  return {
+      {"axis", marks.axis},          {"increment", marks.code.increment},    {"length", marks.code.length},
+      {"rotary", marks.code.rotary}, {"signal_period", marks.signal_period}, {"zero_mark", marks.zero_mark},
+      {"reversed", marks.reversed}};
+}
+
+json json_of(const FoundDatum& datum) {
+  return {{"axis", datum.axis},
+          {"reading_at_zero", datum.reading_at_zero},
+          {"u", datum.u},
+          {"stated", datum.stated}};
+}
+
+FoundDatum datum_from(const json& content) {
+  return FoundDatum{.axis = content.at("axis").get<std::size_t>(),
+                    .reading_at_zero = content.at("reading_at_zero").get<double>(),
+                    .u = content.at("u").get<double>(),
+                    .stated = content.at("stated").get<bool>()};
+}
+
+/// Nothing: more axes than a sample has, or a datum that is none. Throws json::exception.
+std::optional<CountingState> state_from(const json& content) {
+  CountingState state;
+  state.boot_id = content.at("boot_id").get<std::string>();
+  state.set_up = content.at("set_up").get<std::string>();
+  auto& progress = state.counting.progress;
+  progress.set_serial_number(content.at("serial_number").get<std::string>());
+  progress.head.time =
+      protocol::HostTime{std::chrono::nanoseconds{content.at("host_time_ns").get<std::int64_t>()}};
+  progress.clock_count = content.at("clock_count").get<std::int64_t>();
+  const auto counts = content.at("counts").get<std::vector<std::int64_t>>();
+  if (counts.size() > progress.count.size()) return std::nullopt;
+  progress.axis_count = static_cast<std::uint8_t>(counts.size());
+  std::ranges::copy(counts, progress.count.begin());
+  for (const auto& found : content.at("datum")) {
+    const auto& datum = state.counting.datum.emplace_back(datum_from(found));
+    if (datum.axis >= counts.size() || !std::isfinite(datum.reading_at_zero) || !std::isfinite(datum.u))
+      return std::nullopt;
+  }
+  return state;
+}
+
+json json_of(const CountingState& state) {
+  const auto& progress = state.counting.progress;
+  json datum = json::array();
+  for (const auto& found : state.counting.datum) datum.push_back(json_of(found));
+  return {{"boot_id", state.boot_id},
+          {"set_up", state.set_up},
+          {"serial_number", progress.serial_number()},
+          {"host_time_ns", progress.head.time.time_since_epoch().count()},
+          {"clock_count", progress.clock_count},
+          {"counts",
+           std::vector<std::int64_t>(progress.count.begin(), progress.count.begin() + progress.axis_count)},
+          {"datum", std::move(datum)}};
+}
+
+/// Names of the members in which two set-ups differ.
+std::string differences(const std::string& before, const std::string& now) {
+  const auto was = parse_json(before, "set-up"), is = parse_json(now, "set-up");
+  if (!was || !is || !was->is_object() || !is->is_object()) return "it cannot be read";
+  std::string names;
+  for (const auto& [name, value] : is->items())
+    if (!was->contains(name) || was->at(name) != value) names += (names.empty() ? "" : ", ") + name;
+  return names.empty() ? "another version of abbed wrote it" : names;
+}
+
+/// In its place the next run writes its own.
+std::string renamed_aside(const std::filesystem::path& file) {
+  const std::filesystem::path aside = file.string() + ".damaged";
+  std::error_code failed;
+  std::filesystem::rename(file, aside, failed);
+  return failed ? fmt::format("it stays there: {}", failed.message())
+                : fmt::format("it is kept as {}", aside.string());
+}
+
+/// Of runs that were killed while they wrote.
+void remove_half_written(const std::filesystem::path& file) {
+  std::error_code failed;
+  const std::string begins = file.filename().string() + ".";
+  for (std::filesystem::directory_iterator entry{file.parent_path(), failed}, end; !failed && entry != end;
+       entry.increment(failed)) {
+    const auto name = entry->path().filename().string();
+    std::error_code ignored;
+    if (name.starts_with(begins) && name.ends_with(".new")) std::filesystem::remove(entry->path(), ignored);
+  }
+}
+
+constexpr std::string_view kNotReferenced = "the axes of the counter card are not referenced";
+
+}  // namespace
+
+std::string counting_set_up(const Config& config) {
+  const auto& wiring = config.counter_card->wiring;
+  json axes = json::array();
+  for (const auto& axis : wiring.axes) axes.push_back(json_of(axis));
+  json marks = json::array();
+  if (config.reference)
+    for (const auto& axis : config.reference->axes) marks.push_back(json_of(axis));
+  const json set_up{
+      {"axes", std::move(axes)},
+      {"clock", {wiring.clock_channel, static_cast<int>(wiring.clock_source), wiring.clock_hz}},
+      {"probe",
+       {wiring.latch_channel ? *wiring.latch_channel : -1, wiring.edge_channel ? *wiring.edge_channel : -1,
+        json_of(wiring.latch_debounce), json_of(wiring.edge_debounce)}},
+      {"width", static_cast<int>(wiring.width)},
+      {"reference", std::move(marks)},
+      {"speed", config.daemon.speed}};
+  return set_up.dump();
+}
+
+std::string boot_id() {
+  std::string id;
+  if (std::ifstream file{"/proc/sys/kernel/random/boot_id"}; file >> id) return id;
+  const char* const given = std::getenv("ABBE_BOOT_ID");  // NOLINT(concurrency-mt-unsafe): never set here
+  return given != nullptr ? given : "";
+}
+
+std::filesystem::path counting_state_file(const std::filesystem::path& data_dir) {
+  return data_dir / kCountingStateName;
+}
+
+std::string to_text(const CountingState& state) {
+  const json content = json_of(state);
+  return json{{"schema", kCountingSchema}, {"sha256", sha256_hex(content.dump())}, {"state", content}}.dump(
+             1) +
+         "\n";
+}
+
+Result<CountingState> counting_state_from_text(std::string_view text, std::string_view what) {
+  const auto parsed = parse_json(text, what, {.bytes = kMostBytes, .depth = 8, .values = 1000});
+  if (!parsed) return tl::unexpected(parsed.error());
+  try {
+    if (const auto schema = parsed->at("schema").get<int>(); schema != kCountingSchema)
+      return fail(ErrorCode::BadInput,
+                  fmt::format("{}: schema {}, known is {}", what, schema, kCountingSchema));
+    const json& content = parsed->at("state");
+    if (parsed->at("sha256").get<std::string>() != sha256_hex(content.dump()))
+      return fail(ErrorCode::BadInput, fmt::format("{}: its checksum is wrong", what));
+    auto state = state_from(content);
+    if (!state) return fail(ErrorCode::BadInput, fmt::format("{}: a number is out of range", what));
+    return std::move(*state);
+  } catch (const json::exception& e) {
+    return fail(ErrorCode::BadInput, fmt::format("{}: {}", what, e.what()));
+  }
+}
+
+LeftCounting left_counting(const Config& config, const std::string& boot_id) {
+  if (!config.counter_card) return {};
+  const auto file = counting_state_file(config.daemon.data_dir);
+  remove_half_written(file);
+  std::error_code failed;
+  if (std::filesystem::status(file, failed).type() == std::filesystem::file_type::not_found) return {};
+  const auto refused = [&](const std::string& why) {
+    return LeftCounting{.state = {}, .warning = fmt::format("{}: {}", why, kNotReferenced)};
+  };
+
+  const auto text = read_regular_file(file);
+  auto state = text ? counting_state_from_text(*text, file.string()) : tl::unexpected(text.error());
+  if (!state) return refused(fmt::format("{} ({})", state.error().text, renamed_aside(file)));
+  const auto because = [&](const std::string& why) {
+    return refused(fmt::format("{}: {}", file.string(), why));
+  };
+  if (boot_id.empty()) return because("the boot id of this computer cannot be read");
+  if (state->boot_id != boot_id) return because("this computer was restarted since");
+  const auto set_up = counting_set_up(config);
+  if (state->set_up != set_up)
+    return because(
+        fmt::format("the set-up of the card was changed ({})", differences(state->set_up, set_up)));
+  if (state->counting.progress.axis_count != config.counter_card->wiring.axes.size())
+    return because("it has another number of axes");
+  return {.state = std::move(*state), .warning = {}};
+}
+
+RecordingAttachment to_attachment(const CountingState& state) {
+  return {
+      .name = std::string{kCountingStateName}, .media_type = "application/json", .content = to_text(state)};
+}
+
+}  // namespace abbe::daemon

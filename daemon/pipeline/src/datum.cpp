@@ -1,0 +1,177 @@
+#include "abbe/pipeline/datum.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <nlohmann/json.hpp>
+
+#include "abbe/messages/attachment_content.hpp"
+
+namespace abbe::daemon {
+namespace {
+
+using nlohmann::json;
+using protocol::SampleFlag;
+
+template <class Sample>
+void set_missing(Sample& sample, std::size_t axis) {
+  sample.missing_mask = static_cast<std::uint8_t>(sample.missing_mask | 1u << axis);
+  sample.head.flags |= SampleFlag::AxisMissing;
+}
+
+}  // namespace
+
+bool has_marks(const Config& config, const std::string& axis) {
+  return config.reference && std::ranges::any_of(config.reference->axes,
+                                                 [&axis](const auto& marks) { return marks.axis == axis; });
+}
+
+Datum::Datum(const Config& config, WithoutMarks without_marks) {
+  if (!config.counter_card) return;
+  const auto& live = config.counter_card->wiring.axes;
+  for (std::size_t i = 0; i < live.size(); ++i) {
+    const bool marks = has_marks(config, live[i].name);
+    if (!marks && without_marks == WithoutMarks::Untouched) continue;
+    Axis& axis = axes_.emplace_back();
+    axis.place = i;
+    axis.step = live[i].scale;
+    axis.offset = live[i].offset;
+    axis.zero_is_here = !marks && config.counter_card->zero_is_here;
+    if (axis.zero_is_here) axis.in_force = FoundDatum{.axis = i, .reading_at_zero = axis.offset};
+  }
+}
+
+void Datum::go_on(const DatumState& state) {
+  begun_ = true;
+  for (Axis& axis : axes_) {
+    if ((state.unknown >> axis.place & 1u) == 0) continue;
+    axis.in_force.reset();
+    std::erase_if(axis.coming, [&state](const FoundDatum& found) { return found.from < state.at; });
+  }
+}
+
+void Datum::found(const FoundDatum& datum) {
+  for (Axis& axis : axes_)
+    if (axis.place == datum.axis) axis.coming.push_back(datum);
+}
+
+bool Datum::known(std::size_t place) const {
+  const auto axis = std::ranges::find(axes_, place, &Axis::place);
+  return axis == axes_.end() || axis->in_force || !axis->coming.empty();
+}
+
+std::vector<FoundDatum> Datum::in_force() const {
+  std::vector<FoundDatum> all;
+  for (const Axis& axis : axes_)
+    if (axis.in_force) all.push_back(*axis.in_force);
+  return all;
+}
+
+void Datum::move_on(const protocol::SampleHead& head) {
+  for (Axis& axis : axes_) {
+    while (!axis.coming.empty() && axis.coming.front().from < head.time) {
+      axis.in_force = axis.coming.front();
+      axis.coming.pop_front();
+    }
+    const bool first_set_up = !begun_ && axis.zero_is_here;
+    if (has(head.flags, SampleFlag::Restarted) && !first_set_up) axis.in_force.reset();
+  }
+  begun_ = true;
+}
+
+template <class Counted>
+void Datum::apply_to_counts(Counted& sample) const {
+  for (const Axis& axis : axes_) {
+    if (axis.in_force) {
+      sample.position[axis.place] =
+          axis.in_force->reading_at_zero + axis.step * static_cast<double>(sample.count[axis.place]);
+    } else {
+      set_missing(sample, axis.place);
+    }
+  }
+}
+
+void Datum::apply(protocol::AxisSample& sample) {
+  move_on(sample.head);
+  apply_to_counts(sample);
+}
+
+void Datum::apply(protocol::ProbeTrigger& touch) const {
+  for (const Axis& axis : axes_) {
+    if (axis.in_force) {
+      touch.position[axis.place] += axis.in_force->reading_at_zero - axis.offset;
+    } else {
+      set_missing(touch, axis.place);
+    }
+  }
+}
+
+void Datum::apply(Batch& batch) {
+  if (axes_.empty()) return;
+  for (auto& sample : batch.axes) apply(sample);
+  for (auto& touch : batch.touches) apply(touch);
+  for (auto& scan : batch.touch_scans) apply_to_counts(scan);
+}
+
+RecordingAttachment to_attachment(const FoundDatum& datum) {
+  const json content{{"axis", datum.axis},
+                     {"reading_at_zero", datum.reading_at_zero},
+                     {"u", datum.u},
+                     {"stated", datum.stated},
+                     {"from_ns", datum.from.time_since_epoch().count()}};
+  return {.name = std::string{kDatumName}, .media_type = "application/json", .content = content.dump()};
+}
+
+RecordingAttachment to_attachment(const DatumState& state) {
+  return {.name = std::string{kDatumStateName},
+          .media_type = "application/json",
+          .content = json{{"at_ns", state.at.time_since_epoch().count()}, {"unknown", state.unknown}}.dump()};
+}
+
+Result<DatumState> datum_state_from_attachment(const RecordingAttachment& attachment) {
+  try {
+    const auto parsed = content_of(attachment);
+    if (!parsed) return tl::unexpected(parsed.error());
+    const json& content = *parsed;
+    return DatumState{
+        .at = protocol::HostTime{std::chrono::nanoseconds{content.at("at_ns").get<std::int64_t>()}},
+        .unknown = content.at("unknown").get<std::uint8_t>()};
+  } catch (const json::exception& e) {
+    return fail(ErrorCode::BadInput, fmt::format("attachment {}: {}", attachment.name, e.what()));
+  }
+}
+
+RecordingAttachment reference_request(protocol::HostTime from) {
+  return {.name = std::string{kReferenceRequestName},
+          .media_type = "application/json",
+          .content = json{{"from_ns", from.time_since_epoch().count()}}.dump()};
+}
+
+Result<protocol::HostTime> reference_request_from(const RecordingAttachment& attachment) {
+  try {
+    const auto content = content_of(attachment);
+    if (!content) return tl::unexpected(content.error());
+    const auto ns = content->at("from_ns").get<std::int64_t>();
+    return protocol::HostTime{std::chrono::nanoseconds{ns}};
+  } catch (const json::exception& e) {
+    return fail(ErrorCode::BadInput, fmt::format("attachment {}: {}", attachment.name, e.what()));
+  }
+}
+
+Result<FoundDatum> datum_from_attachment(const RecordingAttachment& attachment) {
+  try {
+    const auto parsed = content_of(attachment);
+    if (!parsed) return tl::unexpected(parsed.error());
+    const json& content = *parsed;
+    return FoundDatum{
+        .axis = content.at("axis").get<std::size_t>(),
+        .reading_at_zero = content.at("reading_at_zero").get<double>(),
+        .u = content.at("u").get<double>(),
+        .from = protocol::HostTime{std::chrono::nanoseconds{content.at("from_ns").get<std::int64_t>()}},
+        .stated = content.value("stated", false)};
+  } catch (const json::exception& e) {
+    return fail(ErrorCode::BadInput, fmt::format("attachment {}: {}", attachment.name, e.what()));
+  }
+}
+
+}  // namespace abbe::daemon

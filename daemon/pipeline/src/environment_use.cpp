@@ -1,0 +1,222 @@
+#include "abbe/pipeline/environment_use.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <iterator>
+#include <limits>
+
+#include "abbe/calib/environment/thermal_expansion.hpp"
+#include "abbe/calib/root_sum_of_squares.hpp"
+#include "abbe/config/unmeasured_air.hpp"
+
+namespace abbe::daemon {
+namespace {
+
+using protocol::EnvironmentMask;
+using protocol::EnvironmentSample;
+using protocol::HostTime;
+using protocol::SampleFlag;
+using std::chrono::nanoseconds;
+
+constexpr double kNotAvailable = std::numeric_limits<double>::quiet_NaN();
+
+void copy_if(EnvironmentMask mask, EnvironmentMask bit, double from, double& to) {
+  if ((mask & bit) != 0) to = from;
+}
+
+/// The quantities of `mask` from `from`, or NaN if it is too old.
+void merge(const EnvironmentSample& from, EnvironmentMask mask, bool too_old, EnvironmentSample& to) {
+  const auto value = [too_old](double v) { return too_old ? kNotAvailable : v; };
+  copy_if(mask, protocol::kAirTemperature, value(from.air_temperature_K), to.air_temperature_K);
+  copy_if(mask, protocol::kAirPressure, value(from.air_pressure_Pa), to.air_pressure_Pa);
+  copy_if(mask, protocol::kRelativeHumidity, value(from.relative_humidity), to.relative_humidity);
+  for (std::size_t i = 0; i < protocol::kMaxTemperatures; ++i)
+    copy_if(mask, protocol::temperature_bit(i), value(from.temperature_K[i]), to.temperature_K[i]);
+  to.measured = static_cast<EnvironmentMask>(to.measured | mask);
+  if (from.head.time > to.head.time) to.head = from.head;
+}
+
+/// A device whose clock began anew may report an instant before that of its last sample.
+void insert_by_time(std::deque<EnvironmentSample>& in_order, const EnvironmentSample& sample) {
+  const auto later = [](HostTime t, const EnvironmentSample& other) { return t < other.head.time; };
+  in_order.insert(std::upper_bound(in_order.begin(), in_order.end(), sample.head.time, later), sample);
+}
+
+/// The last one not after `t`.
+const EnvironmentSample* in_force(const std::deque<EnvironmentSample>& samples, HostTime t) {
+  const auto later = [](HostTime at, const EnvironmentSample& sample) { return at < sample.head.time; };
+  const auto after = std::upper_bound(samples.begin(), samples.end(), t, later);
+  return after == samples.begin() ? nullptr : &*std::prev(after);
+}
+
+void forget_before(std::deque<EnvironmentSample>& samples, HostTime t) {
+  while (samples.size() > 1 && samples[1].head.time <= t) samples.pop_front();
+}
+
+}  // namespace
+
+EnvironmentUseOptions environment_use(const Config& config) {
+  EnvironmentUseOptions use;
+  use.max_age = config.air.max_age;
+  for (const auto& device : config.environment) {
+    for (const auto& measured : device.map.measured) use.measured |= drivers::mask_of(measured);
+  }
+  use.air = config.air;
+  if (config.tracker) {
+    use.tracker_u_scale = config.tracker->u_scale;
+    use.unmeasured_air = unmeasured_air_text(config, config.tracker->u_scale);
+  }
+  const auto axes = config.connected_axes();
+  for (const ThermalConfig& thermal : config.thermal) {
+    const auto axis = std::find(axes.begin(), axes.end(), thermal.axis);
+    if (axis != axes.end()) use.thermal.push_back({static_cast<std::size_t>(axis - axes.begin()), thermal});
+  }
+  return use;
+}
+
+EnvironmentMerge::EnvironmentMerge(const EnvironmentUseOptions& options, nanoseconds lag)
+    : measured_(options.measured), max_age_(options.max_age), lag_(lag) {}
+
+void EnvironmentMerge::take(const Batch& batch) {
+  for (const auto& sample : batch.environment) {
+    insert_by_time(weather_, sample);
+    newest_ = std::max(newest_, sample.head.time);
+  }
+  for (const auto& [device, sample] : batch.measured_environment) {
+    if (device >= devices_.size()) devices_.resize(device + 1);
+    insert_by_time(devices_[device], sample);
+    newest_ = std::max(newest_, sample.head.time);
+  }
+  for (const auto& sample : batch.axes) newest_ = std::max(newest_, sample.head.time);
+}
+
+std::optional<EnvironmentSample> EnvironmentMerge::at(HostTime t) const {
+  EnvironmentSample merged;
+  merged.measured = 0;
+  merged.air_temperature_K = merged.air_pressure_Pa = merged.relative_humidity = kNotAvailable;
+  bool any = false;
+  if (const auto* weather = in_force(weather_, t); weather != nullptr && weather->measured != 0) {
+    // The controller says its weather when it changes: how old it is says nothing.
+    merge(*weather, static_cast<EnvironmentMask>(weather->measured & ~measured_), false, merged);
+    any = true;
+  }
+  for (const auto& samples : devices_) {
+    const auto* sample = in_force(samples, t - lag_);
+    if (sample == nullptr) continue;
+    merge(*sample, sample->measured, t - sample->head.time > max_age_ + lag_, merged);
+    any = true;
+  }
+  if (!any) return std::nullopt;
+  return merged;
+}
+
+void EnvironmentMerge::forget(HostTime oldest) {
+  forget_before(weather_, oldest);
+  for (auto& samples : devices_) forget_before(samples, oldest - lag_);
+}
+
+namespace {
+
+calib::Expansion expansion(const ThermalConfig& config, double temperature_K) {
+  return {config.alpha_per_K, config.u_alpha_per_K, temperature_K, config.u_temperature_K};
+}
+
+}  // namespace
+
+std::optional<EnvironmentEffect> effect_of(const protocol::Snapshot& s,
+                                           const EnvironmentUseOptions& options) {
+  EnvironmentEffect effect;
+  effect.u_scale = options.tracker_u_scale;
+  for (const ThermalAxis& thermal : options.thermal) {
+    if (thermal.axis >= effect.growth.size()) continue;
+    const double t_K =
+        s.has_environment ? s.environment.temperature_K[thermal.config.temperature] : kNotAvailable;
+    if (std::isnan(t_K)) return std::nullopt;
+    effect.growth[thermal.axis] = calib::growth(expansion(thermal.config, t_K));
+    effect.u_growth[thermal.axis] = calib::u_growth(expansion(thermal.config, t_K));
+  }
+  if (options.air.assumed_index) {
+    const auto index =
+        s.has_environment ? index_of_air(s.environment, options.air) : Result<calib::RefractiveIndex>{};
+    if (!s.has_environment || !index) return std::nullopt;
+    effect.u_scale = calib::root_sum_of_squares(options.tracker_u_scale, index->u_n / index->n);
+  }
+  return effect;
+}
+
+std::array<double, 3> grown(std::array<double, 3> reading_m, const EnvironmentEffect& effect,
+                            const EnvironmentUseOptions& options) {
+  for (const ThermalAxis& thermal : options.thermal) {
+    const std::size_t a = thermal.axis;
+    if (a >= reading_m.size()) continue;
+    const double fixed_m = thermal.config.fixed_m;
+    reading_m[a] = fixed_m + (reading_m[a] - fixed_m) * effect.growth[a];
+  }
+  return reading_m;
+}
+
+void MeanEffect::take(const EnvironmentEffect& effect) {
+  for (std::size_t a = 0; a < effect.growth.size(); ++a) {
+    sum_.growth[a] += effect.growth[a];
+    sum_.u_growth[a] += effect.u_growth[a];
+  }
+  sum_.u_scale += effect.u_scale;
+  ++count_;
+}
+
+EnvironmentEffect MeanEffect::mean() const {
+  if (count_ == 0) return {};
+  EnvironmentEffect mean = sum_;
+  for (double& growth : mean.growth) growth /= static_cast<double>(count_);
+  for (double& u : mean.u_growth) u /= static_cast<double>(count_);
+  mean.u_scale /= static_cast<double>(count_);
+  return mean;
+}
+
+void correct_for_temperature(protocol::Snapshot& s, const EnvironmentUseOptions& options) {
+  for (const ThermalAxis& thermal : options.thermal) {
+    const std::size_t a = thermal.axis;
+    if (a >= s.axis_count) continue;
+    const double t_K =
+        s.has_environment ? s.environment.temperature_K[thermal.config.temperature] : kNotAvailable;
+    if (std::isnan(t_K)) {
+      s.missing_mask = static_cast<std::uint8_t>(s.missing_mask | 1u << a);
+      s.head.flags |= SampleFlag::AxisMissing;
+      continue;
+    }
+    const calib::Expansion scale = expansion(thermal.config, t_K);
+    const auto position = calib::true_position(s.position[a], thermal.config.fixed_m, scale);
+    s.position[a] = position.value_m;
+    s.velocity[a] *= calib::growth(scale);
+    s.u_position[a] = calib::root_sum_of_squares(s.u_position[a], position.u_m);
+  }
+}
+
+Result<calib::RefractiveIndex> index_of_air(const EnvironmentSample& environment, const AirConfig& config) {
+  const calib::Air air{.temperature_K = environment.air_temperature_K,
+                       .pressure_Pa = environment.air_pressure_Pa,
+                       .relative_humidity = environment.relative_humidity,
+                       .co2_ppm = config.co2_ppm,
+                       .u_temperature_K = config.u_temperature_K,
+                       .u_pressure_Pa = config.u_pressure_Pa,
+                       .u_relative_humidity = config.u_relative_humidity,
+                       .u_co2_ppm = config.u_co2_ppm};
+  auto index = calib::refractive_index(air, config.wavelength_m, config.equation);
+  if (!index) return fail(ErrorCode::DataInsufficient, index.error().text);
+  return *index;
+}
+
+void correct_for_air(protocol::Snapshot& s, const EnvironmentUseOptions& options) {
+  if (!options.air.assumed_index || !s.has_tracker_point) return;
+  if (s.has_environment) {
+    if (const auto index = index_of_air(s.environment, options.air)) {
+      const double factor = calib::distance_factor(*options.air.assumed_index, index->n);
+      for (double& coordinate : s.tracker_point.p_tracker_m) coordinate *= factor;
+      return;
+    }
+  }
+  s.head.flags |= SampleFlag::PointInvalid;
+  s.tracker_point.head.flags |= SampleFlag::PointInvalid;
+}
+
+}  // namespace abbe::daemon

@@ -1,0 +1,110 @@
+#include "abbe/pipeline/live_view.hpp"
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+
+#include "abbe/config/linear_axes.hpp"
+
+namespace abbe::daemon {
+
+namespace {
+
+using protocol::SampleFlag;
+
+/// Three bursts of a tracker, in wall time.
+constexpr std::chrono::seconds kCurrentFor{1};
+}  // namespace
+
+bool axes_known(const protocol::Snapshot& view) noexcept {
+  const auto flags = view.head.flags;
+  return has_linear_axes(view) && !has(flags, SampleFlag::BusOff) && !has(flags, SampleFlag::DeviceError) &&
+         std::all_of(view.position.begin(), view.position.begin() + kLinearAxes,
+                     [](double q) { return std::isfinite(q); });
+}
+
+LiveView::LiveView(const AssemblerOptions& options, const drivers::TimeSource& time)
+    : interpolation_(options.interpolation),
+      use_(options.environment),
+      environment_(use_, {}),
+      current_for_(time.host(kCurrentFor)),
+      axes_patience_(time.host(kAxesPatience)) {
+  view_.axes_compensated = options.axes_compensated;
+}
+
+bool LiveView::take(const Batch& batch) {
+  environment_.take(batch);
+  environment_.forget(environment_.newest());
+  if (const auto environment = environment_.at(environment_.newest())) {
+    view_.has_environment = true;
+    view_.environment = *environment;
+  }
+  for (const auto& sample : batch.axes) take(sample);
+  if (!batch.points.empty()) {
+    view_.has_tracker_point = true;
+    view_.tracker_point = batch.points.back();
+    correct_for_air(view_, use_);
+    if (!axes_known_at_) view_.head.time = batch.points.back().head.time;
+  }
+  if (!batch.touches.empty()) {
+    view_.has_trigger = true;
+    view_.trigger = batch.touches.back();
+  }
+  const bool forgotten = forget_what_is_not_current(batch.taken);
+  return forgotten || !batch.axes.empty() || !batch.points.empty() || !batch.touches.empty() ||
+         !batch.environment.empty() || !batch.measured_environment.empty();
+}
+
+void LiveView::take(const protocol::AxisSample& sample) {
+  if (previous_ && previous_->head.time == sample.head.time) return take_back(sample);
+  view_.head = sample.head;
+  const auto axes = drivers::latest_axes(previous_ ? &*previous_ : nullptr, sample, interpolation_);
+  view_.axis_count = axes.axis_count;
+  view_.missing_mask = axes.missing_mask;
+  view_.position = axes.position;
+  view_.velocity = axes.velocity;
+  view_.u_position = axes.u_position;
+  correct_for_temperature(view_, use_);
+  previous_ = sample;
+  if (axes_known(view_)) axes_known_at_ = sample.head.time;
+}
+
+/// Of two samples of one time the later knows less: the other axes stay as they were.
+void LiveView::take_back(const protocol::AxisSample& sample) {
+  view_.head.flags |= sample.head.flags;
+  view_.missing_mask |= sample.missing_mask;
+  for (std::size_t axis = 0; axis < view_.axis_count; ++axis) {
+    if ((sample.missing_mask >> axis & 1u) != 0) view_.velocity[axis] = view_.u_position[axis] = 0.0;
+  }
+  previous_ = sample;
+}
+
+/// The message has one instant, that of the axes, and none for the point: of a tracker that lost its beam or
+/// its connection the last point would look as fresh as the axes.
+bool LiveView::forget_what_is_not_current(protocol::HostTime now) {
+  bool forgotten = false;
+  const auto forget = [&](bool& has, auto& sample) {
+    if (!has || now - sample.head.time <= current_for_) return;
+    has = false;
+    sample = {};
+    forgotten = true;
+  };
+  forget(view_.has_tracker_point, view_.tracker_point);
+  forget(view_.has_trigger, view_.trigger);
+  return mark_axes_missing(now) || forgotten;
+}
+
+/// The last positions stay in the view; the mask says that they are not where the axes are now.
+bool LiveView::mark_axes_missing(protocol::HostTime now) {
+  if (!previous_ || now - previous_->head.time <= axes_patience_) return false;
+  const auto all = static_cast<std::uint8_t>((1u << view_.axis_count) - 1u);
+  if (view_.missing_mask == all) return false;
+  view_.missing_mask = all;
+  view_.head.flags |= SampleFlag::AxisMissing;
+  view_.velocity = view_.u_position = {};
+  return true;
+}
+
+}  // namespace abbe::daemon

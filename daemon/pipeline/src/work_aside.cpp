@@ -1,0 +1,155 @@
+#include "abbe/pipeline/work_aside.hpp"
+
+#include <pthread.h>
+#include <sched.h>
+#include <unistd.h>
+
+#include <atomic>
+#include <condition_variable>
+#include <deque>
+#include <mutex>
+#include <system_error>
+#include <thread>
+#include <vector>
+
+#include "abbe/base/wake_up.hpp"
+#include "abbe/drivers/mailbox.hpp"
+
+namespace abbe::daemon {
+namespace {
+
+std::atomic<int> running_work = 0;
+
+}  // namespace
+
+detail::RunningWork::RunningWork() noexcept {
+  ++running_work;
+}
+detail::RunningWork::~RunningWork() {
+  --running_work;
+}
+
+bool work_left_running() noexcept {
+  return running_work > 0;
+}
+
+void become_ordinary_thread() noexcept {
+  const sched_param none{};
+  (void)::pthread_setschedparam(::pthread_self(), SCHED_OTHER, &none);
+  cpu_set_t cpus;
+  if (::sched_getaffinity(::getpid(), sizeof cpus, &cpus) == 0)  // of the main thread
+    (void)::pthread_setaffinity_np(::pthread_self(), sizeof cpus, &cpus);
+}
+
+namespace {
+
+using AsideWork = std::function<void()>;
+
+/// The mutex is between the dispatcher and the threads that work, ordinary ones all of them.
+class AsideThreads {
+ public:
+  AsideThreads() : dispatcher_([this] { dispatch(); }) {}
+  AsideThreads(const AsideThreads&) = delete;
+  AsideThreads& operator=(const AsideThreads&) = delete;
+  ~AsideThreads() {
+    if (::getpid() != process_) {  // in a forked child there are no such threads
+      dispatcher_.detach();
+      return;
+    }
+    stopping_.store(true, std::memory_order_release);  // release: pairs with the acquire in dispatch()
+    come_.signal();
+    dispatcher_.join();
+  }
+
+  /// Any thread; takes no lock.
+  void run(AsideWork work) {
+    mail_.put(std::move(work));
+    come_.signal();
+  }
+
+ private:
+  void dispatch() {
+    become_ordinary_thread();
+    for (bool last = false; !last;) {
+      come_.wait();
+      last = stopping_.load(std::memory_order_acquire);
+      for (auto& work : mail_.take()) give_to_a_thread(std::move(work));
+    }
+    {
+      const std::lock_guard lock{mutex_};
+      ending_ = true;
+    }
+    work_waits_.notify_all();
+    for (auto& thread : threads_) thread.join();
+  }
+
+  void give_to_a_thread(AsideWork work) {
+    std::unique_lock lock{mutex_};
+    waiting_.push_back(std::move(work));
+    if (idle_ >= waiting_.size()) {
+      lock.unlock();
+      work_waits_.notify_one();
+      return;
+    }
+    lock.unlock();
+    try {
+      threads_.emplace_back([this] { serve(); });
+    } catch (const std::system_error&) {  // the system has none left: one that is there takes it
+      if (threads_.empty()) work_here();
+    }
+  }
+
+  /// On the dispatcher: later than wanted, not never.
+  void work_here() {
+    std::unique_lock lock{mutex_};
+    AsideWork work = std::move(waiting_.front());
+    waiting_.pop_front();
+    lock.unlock();
+    work();
+  }
+
+  void serve() {
+    for (;;) {
+      AsideWork work;
+      {
+        std::unique_lock lock{mutex_};
+        ++idle_;
+        work_waits_.wait(lock, [this] { return ending_ || !waiting_.empty(); });
+        --idle_;
+        if (waiting_.empty()) return;
+        work = std::move(waiting_.front());
+        waiting_.pop_front();
+      }
+      work();
+    }
+  }
+
+  drivers::Mailbox<AsideWork> mail_;
+  WakeUp come_;
+  std::atomic<bool> stopping_{false};
+  std::mutex mutex_;
+  std::condition_variable work_waits_;
+  std::deque<AsideWork> waiting_;     // under mutex_
+  std::size_t idle_ = 0;              // under mutex_: threads that wait
+  bool ending_ = false;               // under mutex_
+  std::vector<std::thread> threads_;  // the dispatcher's
+  const pid_t process_ = ::getpid();
+  std::thread dispatcher_;
+};
+
+AsideThreads& aside_threads() {
+  static AsideThreads threads;
+  return threads;
+}
+
+}  // namespace
+
+void prepare_work_aside() {
+  (void)aside_threads();
+}
+
+void run_aside(std::function<void()> work) {
+  aside_threads().run(std::move(work));
+}
+
+}  // namespace abbe::daemon

@@ -1,0 +1,35 @@
+#include "abbe/publishing/model_publication.hpp"
+
+#include <fmt/format.h>
+
+#include "abbe/messages/cdr.hpp"
+
+namespace abbe::daemon {
+namespace {
+
+template <class T>
+Result<std::vector<std::byte>> encoded(const T& message, const ModelInForce& model) {
+  std::vector<std::byte> payload;
+  if (const auto done = encode(message, payload); !done)
+    return fail(ErrorCode::Refused,
+                fmt::format("model {} cannot be published: {}", model.id, done.error().text));
+  return payload;
+}
+
+}  // namespace
+
+Result<ModelPublication> encode_model(const ModelInForce& model, std::string_view machine) {
+  const Stamp stamp{.machine = machine};
+  ModelPublication out;
+  auto payload = encoded(model_message(model, stamp), model);
+  if (!payload) return tl::unexpected(payload.error());
+  out.model = std::move(*payload);
+  for (const auto& slice : grid_messages(model, stamp)) {
+    payload = encoded(slice, model);
+    if (!payload) return tl::unexpected(payload.error());
+    out.slices.push_back(std::move(*payload));
+  }
+  return out;
+}
+
+}  // namespace abbe::daemon

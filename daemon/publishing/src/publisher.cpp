@@ -1,0 +1,92 @@
+#include "abbe/publishing/publisher.hpp"
+
+#include <fmt/format.h>
+
+#include <utility>
+
+namespace abbe::daemon {
+namespace {
+
+using namespace std::chrono_literals;
+
+constexpr auto kStatePeriod = 1s;  // the IDL promises the state at least this often
+
+std::chrono::nanoseconds period(double rate_hz) {
+  return rate_hz > 0.0 ? std::chrono::nanoseconds{static_cast<std::int64_t>(1e9 / rate_hz)} : 0ns;
+}
+
+}  // namespace
+
+/// The next time is a period after this one, not after the one that was due.
+bool Publisher::due(Pace& pace, const protocol::Snapshot& view, WallTime now, double rate_hz) {
+  const bool takes_back = view.head.time == pace.time && view.missing_mask != pace.missing_mask;
+  if (now < pace.next && !takes_back) return false;
+  pace = {now + period(rate_hz), view.head.time, view.missing_mask};
+  return true;
+}
+
+Publisher::Publisher(DdsLink link, PublisherOptions options, protocol::UtcOffset utc)
+    : link_(std::move(link)), options_(std::move(options)), utc_(utc) {}
+
+template <class T>
+void Publisher::send(Topic topic, const T& message, WallTime at) {
+  // Outside the IDL's bounds: the configuration should have refused what led here. The link counts the empty
+  // payload.
+  if (auto encoded = encode(message, payload_); !encoded) {
+    refusal_ = fmt::format("{} not sent: {}", traits(topic).name, encoded.error().text);
+  }
+  link_.publish(topic, payload_, at);
+}
+
+void Publisher::send_encoded(Topic topic, std::span<const std::byte> payload) {
+  payload_.assign(payload.begin(), payload.end());
+  (void)set_sequence_number(topic, payload_, ++sequence_number_);
+  link_.publish(topic, payload_);
+}
+
+void Publisher::beat(WallTime wall) {
+  link_.poll();
+  link_.beat(wall);
+}
+
+void Publisher::snapshot(const protocol::Snapshot& view, protocol::HostTime now, WallTime wall) {
+  if (due(snapshots_, view, wall, options_.snapshot_hz))
+    send(Topic::Snapshot, snapshot_message(view, utc_, stamp(now)), wall);
+}
+
+void Publisher::compensation(const protocol::Snapshot& view, const ModelStanding& standing,
+                             protocol::HostTime now, WallTime wall) {
+  if (view.axis_count < 3 || !due(compensations_, view, wall, options_.compensation_hz)) return;
+  send(Topic::Compensation,
+       compensation_message(standing.status, standing.model, view, options_.tool_offset_m, options_.validity,
+                            stamp(now)),
+       wall);
+}
+
+void Publisher::model(const ModelStanding& standing, protocol::HostTime now, WallTime wall) {
+  if (standing.publication != nullptr && standing.revision != sent_revision_) {
+    send_encoded(Topic::ErrorModel, standing.publication->model);
+    for (const auto& slice : standing.publication->slices) send_encoded(Topic::ErrorGrid, slice);
+    sent_revision_ = standing.revision;
+    next_state_ = wall;
+  }
+  const bool changed = standing.status != sent_status_ || standing.reason != sent_reason_;
+  if (!changed && wall < next_state_) return;
+  send(Topic::ModelState,
+       state_message(standing.status, standing.reason, standing.model, options_.validity, stamp(now)));
+  sent_status_ = standing.status;
+  sent_reason_ = standing.reason;
+  next_state_ = wall + kStatePeriod;
+}
+
+void Publisher::health(std::span<const StreamHealth> streams, protocol::HostTime now) {
+  for (const StreamHealth& s : streams) {
+    send(Topic::Health, health_message(s.status, s.rate_hz, s.latency_p50_s, s.latency_p99_s, stamp(now)));
+  }
+}
+
+void Publisher::event(const SessionEvent& event) {
+  send(Topic::CalibrationEvent, event_message(event, options_.machine));
+}
+
+}  // namespace abbe::daemon

@@ -1,0 +1,118 @@
+#pragma once
+/// What a Recorder is made of. recorder.cpp makes messages of samples and collects them in chunks;
+/// recorder_files.cpp keeps the files: begun, written, synced, ended, and begun anew after a fault.
+
+#include <algorithm>
+#include <array>
+#include <cstdint>
+#include <filesystem>
+#include <functional>
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "abbe/pipeline/datum.hpp"
+#include "abbe/protocol/mcap/writer.hpp"
+#include "abbe/protocol/raw_bytes_cdr.hpp"
+#include "abbe/recording/recorder.hpp"
+#include "carried_datum.hpp"
+#include "file_front.hpp"
+#include "loss_ledger.hpp"
+#include "recording_file.hpp"
+#include "sample_messages.hpp"
+#include "streams.hpp"
+
+namespace abbe::daemon {
+
+struct Recorder::State {
+  using IoFault = recording::IoFault;
+  using IoResult = tl::expected<void, IoFault>;
+  using RecordingFile = recording::RecordingFile;
+  using Stream = recording::Stream;
+  struct Dates {
+    protocol::HostTime taken;      ///< log_time
+    protocol::HostTime described;  ///< publish_time
+  };
+  [[nodiscard]] static Dates dates_of(protocol::HostTime described, Taken taken) {
+    return {taken.value_or(described), described};
+  }
+
+  State(RecorderOptions o, RecordingInfo i)
+      : options(std::move(o)), info(std::move(i)), chunk(options.chunk_bytes) {}
+
+  [[nodiscard]] std::uint64_t utc_ns(protocol::HostTime time) const {
+    return static_cast<std::uint64_t>(
+        std::max<std::int64_t>(0, info.utc_offset.to_utc(time).time_since_epoch().count()));
+  }
+  [[nodiscard]] std::filesystem::path path(std::uint32_t part, std::string_view extension) const;
+  [[nodiscard]] IoResult begin_file();
+  [[nodiscard]] IoResult write_front(RecordingFile& fresh,
+                                     protocol::mcap::SummaryBuilder& fresh_summary) const;
+  [[nodiscard]] IoResult end_file();
+  void forget_finished_requests();
+  [[nodiscard]] std::string gap_of_run() const;
+  [[nodiscard]] bool add(Stream stream, Dates dates, std::span<const std::byte> payload);
+  void put(Stream stream, Dates dates, std::span<const std::byte> payload);
+  /// Marks `message` with what is missing before it, and adds it.
+  template <class Message>
+  void add_marked(Stream stream, Dates dates, std::string_view device, Message& message);
+  void add_carried_environment(protocol::HostTime begin);
+  void keep_environment(const protocol::EnvironmentSample& sample, std::string_view device);
+  void account(Stream stream, std::string_view device, std::uint32_t lost_before, bool added);
+  void write_chunk();
+  void end_turn();
+  [[nodiscard]] bool is_full() const;
+  void lose_chunk();
+  void sync_if_due();
+  void enter_fault(const IoFault& fault);
+  void say_fault(const IoFault& fault);
+  void note_fault(const IoFault& fault);
+  void go_on_in_next_file();
+  void retry();
+  [[nodiscard]] bool has_room_again() const;
+
+  RecorderOptions options;
+  RecordingInfo info;
+  std::vector<recording::TimedAttachment> attachments;
+  std::optional<RecordingFile> file;
+  std::uint32_t part = 0;  ///< of the present file
+  std::uint64_t messages_in_file = 0;
+  bool end_written = false;
+  std::string previous_file;
+  bool calibrating = false;  ///< the run that was asked for belongs into one file
+  /// As it was when the last calibration was asked for.
+  struct AtRequest {
+    std::uint32_t part = 0;
+    std::uint64_t not_recorded = 0;
+  };
+  std::optional<AtRequest> asked;
+  protocol::mcap::ChunkBuilder chunk;
+  protocol::mcap::SummaryBuilder summary;
+  std::array<std::uint32_t, recording::kStreamCount> sequences{};
+  std::map<std::string, protocol::EnvironmentSample, std::less<>> latest_environment;  ///< by device
+  bool environment_carried = true;       ///< the present file begins with it
+  std::uint64_t carried_in_chunk = 0;    ///< messages of it: they are in a former file, too
+  std::optional<DatumState> axes_known;  ///< as the last axis sample said
+  RecorderStatus status;
+  recording::LossLedger lost;  ///< not yet said by a later message
+  recording::LossLedger
+      in_chunk;  ///< with what they say was lost before them: gone if the chunk cannot be written
+
+  WallTime now{};
+  WallTime chunk_since{};  ///< no message of the open chunk was recorded before this
+  WallTime synced{};
+  bool unsynced = false;
+  WallTime retry_at{};
+
+  // Reused, so that recording a sample allocates nothing once they have grown.
+  std::vector<std::byte> payload;
+  std::array<std::byte, protocol::kMaxRawBytesCdrSize> raw_payload{};
+  v1::TrackerPoint tracker_point;
+  v1::AxisSample axis_sample;
+  v1::EnvironmentSample environment;
+  v1::ProbeTrigger touch;
+  v1::TouchScan touch_scan;
+};
+
+}  // namespace abbe::daemon

@@ -1,0 +1,277 @@
+#include "abbe/recording/recording_reader.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <charconv>
+#include <utility>
+
+#include "abbe/base/sha256.hpp"
+#include "abbe/protocol/raw_bytes_cdr.hpp"
+#include "mapped_file.hpp"
+#include "metadata_checksum.hpp"
+#include "recording_contents.hpp"
+#include "sample_messages.hpp"
+#include "streams.hpp"
+
+namespace abbe::daemon {
+
+namespace mcap = protocol::mcap;
+using recording::Contents;
+using recording::ReadableChunk;
+
+namespace {
+
+template <class T>
+bool parse(std::string_view text, T& value) {
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+  return error == std::errc{} && end == text.data() + text.size();
+}
+
+/// Nothing if these are not the metadata of a recording of ours.
+std::optional<RecordingInfo> info_of(const Contents& contents) {
+  const auto text = [&](std::string_view record, std::string_view key) -> std::string {
+    const auto entries = contents.metadata.find(std::string(record));
+    if (entries == contents.metadata.end()) return {};
+    const auto value = entries->second.find(std::string(key));
+    return value == entries->second.end() ? std::string{} : value->second;
+  };
+  RecordingInfo info;
+  std::int64_t utc_offset_ns = 0;
+  if (!parse(text(recording::kRecordingMetadata, "utc_offset_ns"), utc_offset_ns)) return std::nullopt;
+  if (!parse(text(recording::kRecordingMetadata, "speed"), info.speed)) return std::nullopt;
+  info.utc_offset.value = std::chrono::nanoseconds{utc_offset_ns};
+  info.machine = text(recording::kRecordingMetadata, "machine");
+  info.configuration = text(recording::kConfigurationMetadata, "text");
+  const auto versions = contents.metadata.find(std::string(recording::kVersionsMetadata));
+  if (versions != contents.metadata.end())
+    info.versions.assign(versions->second.begin(), versions->second.end());
+  std::erase_if(info.versions, [](const auto& entry) { return entry.first == recording::kChecksum; });
+  return info;
+}
+
+/// Wraps around for dates no clock shows, so that damaged bytes stay harmless.
+protocol::HostTime host_time(std::uint64_t utc_ns, protocol::UtcOffset offset) {
+  const std::uint64_t host_ns = utc_ns - static_cast<std::uint64_t>(offset.value.count());
+  return protocol::HostTime{std::chrono::nanoseconds{static_cast<std::int64_t>(host_ns)}};
+}
+
+template <class Message, class Take>
+bool deliver_as(const RecordedMessage& message, const Take& take) {
+  if (!take) return true;
+  const auto decoded = decode<Message>(message.payload);
+  if (!decoded) return false;
+  take(recording::sample_of(*decoded), decoded->device());
+  return true;
+}
+
+bool deliver_raw(const RecordedMessage& message, const RecordingSink& sink) {
+  if (!sink.raw_block) return true;
+  const auto decoded = protocol::decode_raw_bytes_cdr(message.payload);
+  if (!decoded) return false;
+  protocol::RawBlock block;
+  protocol::to_raw_block(*decoded, block);
+  sink.raw_block(block, decoded->device);
+  return true;
+}
+
+bool deliver_event(const RecordedMessage& message, const RecordingSink& sink) {
+  if (!sink.calibration_event) return true;
+  const auto decoded = decode<v1::CalibrationEvent>(message.payload);
+  if (!decoded) return false;
+  sink.calibration_event(*decoded);
+  return true;
+}
+
+}  // namespace
+
+bool deliver(const RecordedMessage& message, const RecordingSink& sink) {
+  const std::string_view topic = message.topic;
+  if (topic == topic_name<v1::AxisSample>()) return deliver_as<v1::AxisSample>(message, sink.axis_sample);
+  if (topic == topic_name<v1::TrackerPoint>())
+    return deliver_as<v1::TrackerPoint>(message, sink.tracker_point);
+  if (topic == topic_name<v1::RawBytes>()) return deliver_raw(message, sink);
+  if (topic == topic_name<v1::EnvironmentSample>()) {
+    return deliver_as<v1::EnvironmentSample>(message, sink.environment);
+  }
+  if (topic == topic_name<v1::ProbeTrigger>())
+    return deliver_as<v1::ProbeTrigger>(message, sink.probe_trigger);
+  if (topic == topic_name<v1::TouchScan>()) return deliver_as<v1::TouchScan>(message, sink.touch_scan);
+  if (topic == topic_name<v1::CalibrationEvent>()) return deliver_event(message, sink);
+  return true;
+}
+
+// --- the file
+// ------------------------------------------------------------------------------------------------------
+
+struct RecordingReader::State {
+  recording::MappedFile file;
+  Contents contents;
+  RecordingInfo info;
+  MetadataCheck configuration;
+  bool says_turns;  ///< else log_time is when it was published
+};
+
+namespace {
+
+bool says_turns(const Contents& contents) {
+  const auto entries = contents.metadata.find(std::string(recording::kRecordingMetadata));
+  return entries != contents.metadata.end() && entries->second.contains(recording::kLogTime);
+}
+
+}  // namespace
+
+Result<RecordingReader> RecordingReader::open(const std::filesystem::path& path) {
+  auto file = recording::MappedFile::open(path);
+  if (!file) return tl::unexpected(file.error());
+  if (!mcap::starts_with_magic(file->bytes())) {
+    return fail(ErrorCode::BadInput, fmt::format("read {}: does not begin like an MCAP file", path.string()));
+  }
+  Contents contents = recording::contents_of(file->bytes());
+  const auto info = info_of(contents);
+  if (!info) {
+    return fail(ErrorCode::BadInput,
+                fmt::format("read {}: no metadata \"{}\": not recorded by abbe, or cut at its front",
+                            path.string(), recording::kRecordingMetadata));
+  }
+  const bool turns = says_turns(contents);
+  const auto metadata = recording::judge_metadata(contents.metadata);
+  if (!metadata.damage.empty()) contents.losses.push_back({0, 0, metadata.damage});
+  return RecordingReader{std::make_unique<State>(
+      State{std::move(*file), std::move(contents), *info, metadata.configuration, turns})};
+}
+
+RecordingReader::RecordingReader(std::unique_ptr<State> state) : state_(std::move(state)) {}
+RecordingReader::~RecordingReader() = default;
+RecordingReader::RecordingReader(RecordingReader&&) noexcept = default;
+RecordingReader& RecordingReader::operator=(RecordingReader&&) noexcept = default;
+
+const RecordingInfo& RecordingReader::info() const noexcept {
+  return state_->info;
+}
+const std::vector<RecordingAttachment>& RecordingReader::attachments() const noexcept {
+  return state_->contents.attachments;
+}
+const std::map<std::string, std::map<std::string, std::string>>& RecordingReader::metadata() const noexcept {
+  return state_->contents.metadata;
+}
+bool RecordingReader::closed_cleanly() const noexcept {
+  return state_->contents.closed_cleanly;
+}
+std::span<const RecordingLoss> RecordingReader::losses() const noexcept {
+  return state_->contents.losses;
+}
+MetadataCheck RecordingReader::configuration_check() const noexcept {
+  return state_->configuration;
+}
+std::string RecordingReader::damage() const {
+  const auto inside = [](const RecordingLoss& loss) { return loss.inside; };
+  const auto first = std::ranges::find_if(losses(), inside);
+  if (first == losses().end()) return {};
+  const auto more = std::ranges::count_if(losses(), inside) - 1;
+  return fmt::format("the recording is damaged: {}{}", first->what,
+                     more > 0 ? fmt::format(" (and {} more places)", more) : "");
+}
+std::uint64_t RecordingReader::message_count() const noexcept {
+  return state_->contents.messages;
+}
+std::uint64_t RecordingReader::size_bytes() const noexcept {
+  return state_->file.bytes().size();
+}
+
+std::optional<std::pair<protocol::HostTime, protocol::HostTime>> RecordingReader::time_range()
+    const noexcept {
+  const auto& chunks = state_->contents.chunks;
+  if (chunks.empty()) return std::nullopt;
+  const auto last = std::ranges::max_element(chunks, {}, &ReadableChunk::last_time_ns);
+  const auto offset = state_->info.utc_offset;
+  return std::pair{host_time(chunks.front().earliest_ns, offset), host_time(last->last_time_ns, offset)};
+}
+
+std::string RecordingReader::sha256() const {
+  Sha256 hash;
+  hash.update(state_->file.bytes());
+  return hash.hex();
+}
+
+std::uint64_t RecordingReader::read(const RecordingSink& sink) const {
+  std::uint64_t undecodable = 0;
+  Cursor cursor = messages();
+  while (const auto message = cursor.next()) {
+    if (!deliver(*message, sink)) ++undecodable;
+  }
+  return undecodable;
+}
+
+// --- messages by time
+// ----------------------------------------------------------------------------------------------
+
+/// Chunks overlap in time, because the recorder empties one stream after the other. They are opened in file
+/// order; a message is given once no chunk still closed can hold an earlier one.
+struct RecordingReader::Cursor::State {
+  const RecordingReader::State* recording = nullptr;
+  std::size_t next_chunk = 0;
+  std::vector<mcap::Message>
+      open;  ///< messages of opened chunks, by time; those before `given` are done with
+  std::size_t given = 0;
+  std::uint64_t given_in_all = 0;
+  std::map<std::uint16_t, std::uint64_t> latest_ns;  ///< by channel
+
+  [[nodiscard]] bool must_open_chunk() const {
+    const auto& chunks = recording->contents.chunks;
+    if (next_chunk == chunks.size()) return false;
+    return given == open.size() || open[given].log_time_ns >= chunks[next_chunk].earliest_ns;
+  }
+  void open_chunk();
+};
+
+void RecordingReader::Cursor::State::open_chunk() {
+  // Of equal times, the one recorded first, which is the one that lies in front.
+  const auto earlier = [](const mcap::Message& a, const mcap::Message& b) {
+    return a.log_time_ns != b.log_time_ns ? a.log_time_ns < b.log_time_ns
+                                          : std::less<>{}(a.data.data(), b.data.data());
+  };
+  open.erase(open.begin(), open.begin() + static_cast<std::ptrdiff_t>(given));
+  given = 0;
+  const auto before = static_cast<std::ptrdiff_t>(open.size());
+  mcap::MessageReader messages{recording->contents.chunks[next_chunk++].records};
+  while (auto message = messages.next()) {
+    if (!recording->says_turns) message->publish_time_ns = message->log_time_ns;
+    std::uint64_t& latest = latest_ns[message->channel_id];
+    latest = message->log_time_ns = std::max(message->log_time_ns, latest);
+    open.push_back(*message);
+  }
+  const auto fresh = open.begin() + before;
+  if (!std::is_sorted(fresh, open.end(), earlier)) std::sort(fresh, open.end(), earlier);
+  std::inplace_merge(open.begin(), fresh, open.end(), earlier);
+}
+
+RecordingReader::Cursor RecordingReader::messages() const {
+  auto state = std::make_unique<Cursor::State>();
+  state->recording = state_.get();
+  return Cursor{std::move(state)};
+}
+
+RecordingReader::Cursor::Cursor(std::unique_ptr<State> state) : state_(std::move(state)) {}
+RecordingReader::Cursor::~Cursor() = default;
+RecordingReader::Cursor::Cursor(Cursor&&) noexcept = default;
+RecordingReader::Cursor& RecordingReader::Cursor::operator=(Cursor&&) noexcept = default;
+
+std::optional<RecordedMessage> RecordingReader::Cursor::next() {
+  State& s = *state_;
+  while (s.must_open_chunk()) s.open_chunk();
+  if (s.given == s.open.size()) return std::nullopt;
+  const mcap::Message& message = s.open[s.given++];
+  ++s.given_in_all;
+  const auto topic = s.recording->contents.topics.find(message.channel_id);
+  return RecordedMessage{topic == s.recording->contents.topics.end() ? std::string_view{} : topic->second,
+                         host_time(message.log_time_ns, s.recording->info.utc_offset),
+                         host_time(message.publish_time_ns, s.recording->info.utc_offset), message.data};
+}
+
+double RecordingReader::Cursor::progress() const noexcept {
+  const std::uint64_t all = state_->recording->contents.messages;
+  return all == 0 ? 1.0 : static_cast<double>(state_->given_in_all) / static_cast<double>(all);
+}
+
+}  // namespace abbe::daemon

@@ -1,0 +1,401 @@
+#include "abbe/replay/replay.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <chrono>
+#include <thread>
+#include <utility>
+
+#include "abbe/devices/device_options.hpp"
+#include "abbe/methods/calibration_request.hpp"
+#include "abbe/methods/calibration_session.hpp"
+#include "abbe/methods/otf_inputs.hpp"
+#include "abbe/model/model_document.hpp"
+#include "abbe/pipeline/assembler.hpp"
+#include "abbe/pipeline/counting_state.hpp"
+#include "abbe/pipeline/datum.hpp"
+#include "live_turns.hpp"
+#include "mark_search.hpp"
+#include "raw_decoder.hpp"
+
+namespace abbe::daemon {
+namespace {
+
+using protocol::HostTime;
+
+constexpr std::uint64_t kMessagesPerProgress = 256;
+// So far bytes may be ahead of what was made of them: a busy computer's threads at many times real time.
+constexpr auto kLongestAhead = std::chrono::seconds{10};
+
+/// The calibrations the recording asks for, one after the other.
+class Calibrations {
+ public:
+  Calibrations(const RecordingReader& recording, std::vector<CalibrationRequest> requests,
+               const Config& config, const ReplayOptions& options)
+      : recording_(recording),
+        requests_(std::move(requests)),
+        config_(config),
+        options_(options),
+        session_(acquisition_options(config), evemu_acquisition_options(config)) {}
+
+  /// Requests came between two turns. One that came later ends the one before, as it did live (by a
+  /// cancellation).
+  void begin_turn(HostTime taken) {
+    while (next_ < requests_.size() && requests_[next_].from < taken) begin_next();
+  }
+  void take(const protocol::Snapshot& snapshot) {
+    session_.take(snapshot);
+    auto acquired = session_.take_run();
+    if (!acquired) return;
+    CalibrationRun run = run_of(std::move(*acquired));
+    options_.runs ? hand_over(std::move(run)) : identify_again(run);
+  }
+
+  [[nodiscard]] std::vector<ReplayedCalibration> finish() {
+    while (next_ < requests_.size()) begin_next();
+    end();
+    return std::move(done_);
+  }
+
+ private:
+  void begin_next() {
+    end();
+    session_ = CalibrationSession{acquisition_options(config_), evemu_acquisition_options(config_)};
+    (void)session_.start(requests_[next_]);
+    identified_ = false;
+    ++next_;
+  }
+  void end() {
+    if (next_ > 0 && !identified_) done_.push_back({.ended = session_.status()});
+    identified_ = true;
+  }
+  void hand_over(CalibrationRun run) {
+    done_.push_back({.ended = session_.status(), .points_sha256 = inputs_of(run).back().sha256});
+    identified_ = true;
+    options_.runs(std::move(run));
+  }
+  void identify_again(const CalibrationRun& run) {
+    ReplayedCalibration c{.ended = session_.status(), .points_sha256 = inputs_of(run).back().sha256};
+    c.outcome = identify(run, config_, options_.active);
+    if (*c.outcome) {
+      std::visit([this](auto& candidate) { judge_recording(recording_, candidate.verdict); }, **c.outcome);
+      const ModelDocument document = document_of(**c.outcome, config_, {}, {});
+      c.model_hash = model_hash(document);
+      c.model_id = model_id(document);
+    }
+    done_.push_back(std::move(c));
+    identified_ = true;
+  }
+
+  const RecordingReader& recording_;
+  std::vector<CalibrationRequest> requests_;
+  const Config& config_;
+  const ReplayOptions& options_;
+  CalibrationSession session_;
+  std::size_t next_ = 0;
+  bool identified_ = true;
+  std::vector<ReplayedCalibration> done_;
+};
+
+/// Which of Config::environment it is; none: the tracker's weather.
+std::optional<std::size_t> environment_place(const Config& config, std::string_view device) {
+  for (std::size_t i = 0; i < config.environment.size(); ++i) {
+    if (config.environment[i].name == device) return i;
+  }
+  return std::nullopt;
+}
+
+/// What the marks gave in the live run: since when a datum was known is not in the bytes.
+Result<Datum> datum_of(const RecordingReader& recording, const Config& config) {
+  const auto versions = recording.metadata().find("abbe.versions");
+  const bool asked = versions != recording.metadata().end() && versions->second.contains(kDatumRule);
+  Datum datum{config, asked ? Datum::WithoutMarks::NeedAZero : Datum::WithoutMarks::Untouched};
+  for (const auto& attachment : recording.attachments()) {
+    if (attachment.name != kDatumStateName) continue;
+    const auto state = datum_state_from_attachment(attachment);
+    if (!state) return tl::unexpected(state.error());
+    datum.go_on(*state);
+  }
+  for (const auto& attachment : recording.attachments()) {
+    if (attachment.name != kDatumName) continue;
+    const auto found = datum_from_attachment(attachment);
+    if (!found) return tl::unexpected(found.error());
+    datum.found(*found);
+  }
+  return datum;
+}
+
+/// A card that was set up while one file was written and spoke in the next: what a replay from the bytes of
+/// this next file cannot see, but the samples of the live run say.
+class SetUpBefore {
+ public:
+  explicit SetUpBefore(const RecordingReader& recording)
+      : possible_(std::ranges::any_of(recording.attachments(),
+                                      [](const auto& a) { return a.name == kDatumStateName; })) {}
+
+  [[nodiscard]] bool possible() const { return possible_; }
+  void take_live(const protocol::SampleHead& head) {
+    if (has(head.flags, protocol::SampleFlag::Restarted)) at_ = head.time;
+  }
+  /// Before `datum` is applied to the samples from the bytes.
+  void apply(const Batch& batch, Datum& datum) {
+    const bool seen = std::ranges::any_of(
+        batch.axes, [](const auto& s) { return has(s.head.flags, protocol::SampleFlag::Restarted); });
+    if (at_ && !seen) datum.go_on({.at = *at_, .unknown = 0xff});
+    at_.reset();
+  }
+
+ private:
+  bool possible_;
+  std::optional<HostTime> at_;
+};
+
+Result<std::vector<CalibrationRequest>> requests_of(const RecordingReader& recording) {
+  std::vector<CalibrationRequest> requests;
+  for (const auto& attachment : recording.attachments()) {
+    if (!is_calibration_request(attachment.name)) continue;
+    auto request = from_attachment(attachment);
+    if (!request) return tl::unexpected(request.error());
+    requests.push_back(std::move(*request));
+  }
+  return requests;
+}
+
+/// Holds the replay back to `speed` times the recorded time, which began at `first`.
+class Pace {
+ public:
+  Pace(double speed, HostTime first) : speed_(speed), first_(first) {}
+  void wait_for(HostTime recorded) const {
+    if (!(speed_ > 0.0)) return;
+    const std::chrono::duration<double> wall = std::chrono::duration<double>(recorded - first_) / speed_;
+    std::this_thread::sleep_until(start_ + std::chrono::duration_cast<std::chrono::nanoseconds>(wall));
+  }
+
+ private:
+  double speed_;
+  HostTime first_;
+  std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
+};
+
+/// What the recording was asked to do and told, besides its messages.
+struct Attached {
+  std::vector<CalibrationRequest> requests;
+  Datum datum;
+  MarkSearch marks;
+};
+
+Result<Attached> attached_to(const RecordingReader& recording, const Config& config) {
+  auto requests = requests_of(recording);
+  if (!requests) return tl::unexpected(requests.error());
+  auto datum = datum_of(recording, config);
+  if (!datum) return tl::unexpected(datum.error());
+  auto marks = MarkSearch::of(recording, config);
+  if (!marks) return tl::unexpected(marks.error());
+  return Attached{std::move(*requests), std::move(*datum), std::move(*marks)};
+}
+
+/// How far an earlier run had left the counters, where this one was told; one that cannot be read is as good
+/// as none: the counters read the same but for whole rounds.
+std::optional<drivers::CounterCardProgress> left_progress(const RecordingReader& recording) {
+  for (const auto& attachment : recording.attachments()) {
+    if (attachment.name != kCountingStateName) continue;
+    if (const auto state = counting_state_from_text(attachment.content, attachment.name))
+      return state->counting.progress;
+  }
+  return std::nullopt;
+}
+
+/// Samples from raw bytes, in the turns in which the live run had them.
+class FromBytes {
+ public:
+  FromBytes(const RecordingReader& recording, const Config& config)
+      : decoder_(config, left_progress(recording)), ahead_(recording.messages()), next_(ahead_.next()) {
+    sink_.tracker_point = [this](const auto& p, std::string_view) { expect(points_, p); };
+    sink_.axis_sample = [this](const auto& s, std::string_view) { expect(axes_, s); };
+    sink_.probe_trigger = [this](const auto& t, std::string_view) { expect(touches_, t); };
+    // What [[environment]] measures counts only after the watermark: there a turn more or less is nothing.
+    sink_.environment = [this, &config](const auto& e, std::string_view device) {
+      if (!environment_place(config, device)) expect(weather_, e);
+    };
+  }
+  FromBytes(const FromBytes&) = delete;
+  FromBytes& operator=(const FromBytes&) = delete;
+
+  void take(const protocol::RawBlock& block, std::string_view device, Batch& batch) {
+    decoder_.take(block, device, batch);
+  }
+  void end_turn(Batch& batch) {
+    for (; next_ && next_->taken <= batch.taken + kLongestAhead; next_ = ahead_.next())
+      (void)deliver(*next_, sink_);
+    points_.hold(batch.taken, batch.points);
+    axes_.hold(batch.taken, batch.axes);
+    touches_.hold(batch.taken, batch.touches);
+    weather_.hold(batch.taken, batch.environment);
+  }
+
+ private:
+  template <class Sample>
+  void expect(LiveTurns<Sample>& turns, const Sample& sample) {
+    turns.expect(sample.head.time, next_->taken);
+  }
+
+  RawDecoder decoder_;
+  RecordingReader::Cursor ahead_;
+  std::optional<RecordedMessage> next_;
+  RecordingSink sink_;
+  LiveTurns<protocol::TrackerPoint> points_;
+  LiveTurns<protocol::AxisSample> axes_;
+  LiveTurns<protocol::ProbeTrigger> touches_;
+  LiveTurns<protocol::EnvironmentSample> weather_;
+};
+
+/// The hub once more, turn by turn.
+class Replay {
+ public:
+  Replay(const RecordingReader& recording, const Config& config, const ReplayOptions& options,
+         Attached attached)
+      : recording_(recording),
+        config_(config),
+        options_(options),
+        datum_(std::move(attached.datum)),
+        marks_(std::move(attached.marks)),
+        calibrations_(recording, std::move(attached.requests), config, options),
+        assembler_(assembler_options(config)),
+        set_up_(recording) {
+    if (options.source == ReplaySource::Samples) {
+      take_samples();
+    } else {
+      take_bytes();
+    }
+    sink_.calibration_event = [this](const v1::CalibrationEvent& e) { take(e); };
+  }
+  Replay(const Replay&) = delete;
+  Replay& operator=(const Replay&) = delete;
+
+  [[nodiscard]] ReplayReport run() {
+    const auto range = recording_.time_range();
+    if (!range) return {};
+    begin_ = batch_.taken = range->first;
+    report_.recorded = range->second - range->first;
+    take_messages(Pace{options_.speed, begin_});
+    assembler_.finish(snapshots_);
+    hand_on();
+    report_.calibrations = calibrations_.finish();
+    if (bytes_) report_.datums = marks_.compared(recording_);
+    return std::move(report_);
+  }
+
+ private:
+  void take_samples() {
+    sink_.tracker_point = [this](const auto& p, std::string_view) { batch_.points.push_back(p); };
+    sink_.axis_sample = [this](const auto& s, std::string_view) { batch_.axes.push_back(s); };
+    sink_.probe_trigger = [this](const auto& t, std::string_view) { batch_.touches.push_back(t); };
+    sink_.environment = [this](const auto& e, std::string_view device) { take(e, device); };
+  }
+  void take_bytes() {
+    bytes_.emplace(recording_, config_);
+    sink_.raw_block = [this](const auto& b, std::string_view device) { bytes_->take(b, device, batch_); };
+    if (set_up_.possible())
+      sink_.axis_sample = [this](const auto& s, std::string_view) { set_up_.take_live(s.head); };
+    // The bytes of what a former file handed on are in that file.
+    sink_.environment = [this](const auto& e, std::string_view device) {
+      if (e.head.time != published_) take(e, device);
+    };
+  }
+  void take(const protocol::EnvironmentSample& sample, std::string_view device) {
+    if (const auto measuring = environment_place(config_, device)) {
+      batch_.measured_environment.push_back({*measuring, sample});
+    } else {
+      batch_.environment.push_back(sample);
+    }
+  }
+  void take(const v1::CalibrationEvent& event) {
+    auto& ids = report_.live_model_ids;
+    if (event.model_id().empty() || (!ids.empty() && ids.back() == event.model_id())) return;
+    ids.push_back(event.model_id());
+  }
+
+  void take_messages(const Pace& pace) {
+    std::uint64_t messages = 0;
+    auto cursor = recording_.messages();
+    while (const auto message = cursor.next()) {
+      if (message->taken != batch_.taken) end_turn();
+      batch_.taken = message->taken;
+      published_ = message->published;
+      pace.wait_for(message->taken);
+      if (!deliver(*message, sink_)) ++report_.undecodable;
+      if (++messages % kMessagesPerProgress == 0 && options_.progress) options_.progress(cursor.progress());
+    }
+    end_turn();
+  }
+  void end_turn() {
+    calibrations_.begin_turn(batch_.taken);
+    if (bytes_) bytes_->end_turn(batch_);
+    marks_.take(batch_);
+    if (bytes_) {  // recorded samples have their datum
+      set_up_.apply(batch_, datum_);
+      datum_.apply(batch_);
+    }
+    if (options_.samples) options_.samples(batch_, begin_);
+    assembler_.take(batch_);
+    batch_.clear();
+    assembler_.emit(snapshots_);
+    hand_on();
+  }
+  void hand_on() {
+    for (const auto& s : snapshots_) {
+      calibrations_.take(s);
+      if (options_.snapshots) options_.snapshots(s);
+    }
+    report_.snapshots += snapshots_.size();
+    snapshots_.clear();
+  }
+
+  const RecordingReader& recording_;
+  const Config& config_;
+  const ReplayOptions& options_;
+  Datum datum_;
+  MarkSearch marks_;
+  Calibrations calibrations_;
+  Assembler assembler_;
+  SetUpBefore set_up_;
+  std::optional<FromBytes> bytes_;
+  RecordingSink sink_;
+  HostTime begin_{};
+  HostTime published_{};  ///< of the message being delivered
+  Batch batch_;
+  std::vector<protocol::Snapshot> snapshots_;
+  ReplayReport report_;
+};
+
+}  // namespace
+
+void judge_recording(const RecordingReader& recording, calib::Verdict& verdict) {
+  if (auto damage = recording.damage(); !damage.empty()) {
+    verdict.accepted = false;
+    verdict.refuse("damage", std::move(damage));
+  }
+  if (recording.configuration_check() == MetadataCheck::Unchecked)
+    verdict.notes.emplace_back(
+        "the recorded configuration has no checksum: a damaged bit in it would not show");
+}
+
+Result<Config> recorded_config(const RecordingReader& recording, const std::string& file) {
+  if (recording.configuration_check() == MetadataCheck::Damaged)
+    return fail(
+        ErrorCode::BadInput,
+        fmt::format("{}: the recorded configuration is damaged (its checksum is wrong): give the file it was "
+                    "recorded with",
+                    file));
+  return parse_config(recording.info().configuration, file + " (recorded configuration)");
+}
+
+Result<ReplayReport> replay(const RecordingReader& recording, const Config& config,
+                            const ReplayOptions& options) {
+  auto attached = attached_to(recording, config);
+  if (!attached) return tl::unexpected(attached.error());
+  return Replay{recording, config, options, std::move(*attached)}.run();
+}
+
+}  // namespace abbe::daemon

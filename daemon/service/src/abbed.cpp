@@ -1,0 +1,477 @@
+#include "abbe/service/abbed.hpp"
+
+#include <fmt/format.h>
+#include <pthread.h>
+#include <sched.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <atomic>
+#include <chrono>
+#include <cstdio>
+#include <cstring>
+#include <ctime>
+#include <exception>
+#include <future>
+#include <mutex>
+#include <optional>
+#include <thread>
+#include <utility>
+
+#include "abbe/base/clock_steps.hpp"
+#include "abbe/base/control_protocol.hpp"
+#include "abbe/base/control_server.hpp"
+#include "abbe/base/exit_deadline.hpp"
+#include "abbe/base/unix_socket.hpp"
+#include "abbe/devices/device_options.hpp"
+#include "abbe/devices/device_set.hpp"
+#include "abbe/drivers/cpu_latency.hpp"
+#include "abbe/drivers/real_time_memory.hpp"
+#include "abbe/messages/dds_security.hpp"
+#include "abbe/pipeline/work_aside.hpp"
+#include "abbe/publishing/dds_supervisor.hpp"
+#include "abbe/recording/left_recordings.hpp"
+#include "abbe/recording/old_recordings.hpp"
+#include "abbe/service/control_api.hpp"
+#include "abbe/service/counting_state_thread.hpp"
+#include "abbe/service/hub.hpp"
+#include "abbe/service/journal_thread.hpp"
+#include "model_status_name.hpp"
+#include "outcome.hpp"
+
+namespace abbe::daemon {
+namespace {
+
+using namespace std::chrono_literals;
+using WallTime = std::chrono::steady_clock::time_point;
+
+constexpr auto kTidyPeriod = 1h;    // old recordings are looked for this often
+constexpr auto kTidyFirst = 10min;  // until then a time server has set a clock that started wrong
+constexpr auto kHubPatience = 1s;   // thousands of turns; a hub silent for this long hangs
+constexpr auto kEndPatience = 5s;   // for the control socket (3 s at most), the journal and the hub to end
+constexpr int kHubHangs = 70;       // exit code
+
+/// UTC less host time, both read now; the one constant that ever mentions the wall clock.
+protocol::UtcOffset utc_offset(const drivers::TimeSource& time) {
+  const auto utc = std::chrono::system_clock::now().time_since_epoch();
+  return {std::chrono::duration_cast<std::chrono::nanoseconds>(utc) - time.now().time_since_epoch()};
+}
+
+Result<void> make_directory(const std::filesystem::path& directory) {
+  std::error_code error;
+  std::filesystem::create_directories(directory, error);
+  if (error) return fail(ErrorCode::Io, fmt::format("create {}: {}", directory.string(), error.message()));
+  return {};
+}
+
+/// "abbe-2026-11-21T03-40-12Z-4711": readable, sorts by time, and two daemons never meet.
+std::string recording_name() {
+  const std::time_t now = std::chrono::system_clock::to_time_t(std::chrono::system_clock::now());
+  std::tm utc{};
+  ::gmtime_r(&now, &utc);
+  return fmt::format("abbe-{:04}-{:02}-{:02}T{:02}-{:02}-{:02}Z-{}", utc.tm_year + 1900, utc.tm_mon + 1,
+                     utc.tm_mday, utc.tm_hour, utc.tm_min, utc.tm_sec, ::getpid());
+}
+
+RecorderThreadOptions recorder_options(const Config& config, const std::string& name) {
+  RecorderThreadOptions options;
+  options.recorder.directory = config.recording.dir;
+  options.recorder.name = name;
+  options.recorder.chunk_bytes = config.recording.chunk_bytes;
+  options.recorder.chunk_period = config.recording.chunk_period;
+  options.recorder.min_free_bytes = config.recording.min_free_bytes;
+  options.recorder.max_file_bytes = config.recording.max_file_bytes;
+  options.raw = config.recording.raw;
+  if (config.tracker) options.tracker = config.tracker->name;
+  if (config.encoder) options.encoder = config.encoder->name;
+  if (config.counter_card) options.encoder = config.counter_card->name;
+  if (config.reference) options.reference = config.reference->card.name;
+  for (const auto& device : config.environment) options.environment.push_back(device.name);
+  if (config.probe) options.probe = config.probe->name;
+  if (config.cmm) options.probe = config.cmm->name;
+  if (config.cmm_reads_axes()) options.encoder = config.cmm->name;
+  return options;
+}
+
+PublisherOptions publisher_options(const Config& config) {
+  return {.machine = config.machine.name,
+          .tool_offset_m = config.machine.target_offset_m,
+          .snapshot_hz = config.dds.snapshot_hz,
+          .compensation_hz = config.dds.compensation_hz,
+          .validity = config.dds.validity,
+          .security_warning = dds_is_secured(config.dds.security, config.dds.profile)
+                                  ? std::string{}
+                                  : dds_security_is_off(config.dds.domain)};
+}
+
+/// The hub is soft real time: above the ordinary programs, below the devices. A refusal is a warning in mode
+/// `ignore`.
+Result<void> set_priority(std::thread& thread, const DaemonConfig& config) {
+  sched_param parameters{};
+  parameters.sched_priority = config.hub_priority;
+  int error = ::pthread_setschedparam(thread.native_handle(), SCHED_FIFO, &parameters);
+  if (error == 0 && config.hub_cpu) {
+    cpu_set_t cpus;
+    CPU_ZERO(&cpus);
+    CPU_SET(*config.hub_cpu, &cpus);
+    error = ::pthread_setaffinity_np(thread.native_handle(), sizeof cpus, &cpus);
+  }
+  if (error == 0) return {};
+  return fail(ErrorCode::Io,
+              fmt::format("hub thread: SCHED_FIFO {}: {}", config.hub_priority, std::strerror(error)));
+}
+
+}  // namespace
+
+// In the order of starting; destroyed in reverse.
+struct Abbed::State {
+  Config config;
+  AbbedOptions options;
+  drivers::MonotonicTime time;
+  protocol::UtcOffset utc;
+  std::vector<std::string> warnings;
+  std::optional<drivers::CpuLatencyBound> cpu_latency;
+  std::optional<ModelAuthority> authority;
+  std::unique_ptr<RecorderThread> recorder;
+  std::optional<CalibrationService> calibration;
+  std::optional<ReferenceService> reference;
+  std::optional<VerificationService> verification;
+  DdsProcess dds_process;
+  std::optional<Publisher> publisher;
+  std::optional<DdsSupervisor> supervisor;
+  std::optional<DeviceSet> devices;
+  std::optional<TouchService> touching;
+  std::optional<TrackerService> tracker;
+  std::optional<Hub> hub;
+  WallTime running_since;
+  std::promise<void> hub_may_run;  // or it is broken: abbed was refused
+  std::thread hub_thread;
+  std::atomic<bool> hub_has_ended{false};
+  FileDescriptor control_listener;
+  std::unique_ptr<ControlServer> control;
+  std::mutex participant_mutex;
+  std::optional<ObservedParticipant> participant;  // under participant_mutex
+  std::optional<JournalThread> journal;
+  const std::string boot = boot_id();
+  LeftCounting left_counting;
+  std::optional<CountingStateThread> counting_state;
+  std::future<Result<std::vector<std::filesystem::path>>> tidying;
+  // The work's own: nothing waits for it at the end.
+  const std::shared_ptr<std::atomic<bool>> stop_closing = std::make_shared<std::atomic<bool>>(false);
+  std::future<Result<std::vector<LeftRecording>>> closing_left;
+  const std::string recording = recording_name();
+  ClockSteps clock_steps{read_clocks()};
+  bool tidies = true;  // until the clock was set
+  WallTime next_tidying = WallTime::clock::now() + kTidyFirst;
+
+  State(Config c, AbbedOptions o)
+      : config(std::move(c)), options(std::move(o)), time(config.daemon.speed), utc(utc_offset(time)) {}
+  State(const State&) = delete;
+  State& operator=(const State&) = delete;
+  ~State() {
+    if (devices) devices->end_machine();  // first of all: whatever hangs, nothing goes on moving
+    *stop_closing = true;
+    end_hub();
+    counting_state.reset();  // waits for the disk
+  }
+
+  void end_hub() {
+    const ExitDeadline deadline{
+        kEndPatience, kHubHangs,
+        fmt::format("abbed: the hub does not end within {} s: exit code {}; what was "
+                    "recorded stays readable in {}.mcap.part\n",
+                    std::chrono::seconds{kEndPatience}.count(), kHubHangs, recording)};
+    control.reset();
+    journal.reset();  // these ask the hub once more
+    if (control_listener) ::unlink(config.control.socket.c_str());
+    if (hub) hub->stop();
+    hub_may_run = {};
+    if (hub_thread.joinable()) hub_thread.join();
+    hub_has_ended.store(true, std::memory_order_release);  // pairs with the acquire in look_at_counting()
+  }
+
+  /// Asked before anything is opened: a second abbed that got as far as the socket for abbe-dds would, merely
+  /// by trying it, cut the first one off from its abbe-dds.
+  Result<void> refuse_second_daemon() {
+    if (!is_listened_at(config.control.socket)) return {};
+    return fail(ErrorCode::Io, fmt::format("listen {}: another daemon already answers there",
+                                           config.control.socket.string()));
+  }
+
+  Result<void> open_recorder() {
+    RecordingInfo info{.machine = config.machine.name,
+                       .utc_offset = utc,
+                       .speed = config.daemon.speed,
+                       .configuration = options.configuration_text,
+                       .versions = {{"abbe", ABBE_VERSION}, {kDatumRule, "2"}}};
+    auto opened = RecorderThread::start(recorder_options(config, recording), std::move(info));
+    if (!opened) return tl::unexpected(opened.error());
+    recorder = std::move(*opened);
+    if (const auto status = recorder->status(); !status.fault.empty())
+      warnings.push_back(fmt::format("nothing is recorded: {}", status.fault));
+    return {};
+  }
+
+  Result<void> open_models() {
+    authority.emplace(ModelAuthority::open(config.daemon.models_dir(), config, utc, time.now()));
+    if (!authority->fault().empty()) warnings.push_back(authority->fault());
+    return {};
+  }
+
+  Result<void> open_dds() {
+    if (config.dds.supervise == Supervise::Off) return {};
+    const bool supervised = config.dds.supervise == Supervise::Child;
+    auto link = DdsLink::listen(config.dds.socket, {.process = supervised ? &dds_process : nullptr});
+    if (!link) return tl::unexpected(link.error());
+    publisher.emplace(std::move(*link), publisher_options(config), utc);
+    check_dds_security();
+    if (!supervised) return {};
+    DdsSupervisor::Options child{
+        .program = options.dds_program,
+        .arguments = {"--socket", config.dds.socket.string(), "--domain", std::to_string(config.dds.domain)},
+        .priority = config.dds.priority,
+        .process = &dds_process};
+    if (!config.dds.profile.empty()) {
+      child.arguments.insert(child.arguments.end(), {"--profile", config.dds.profile.string()});
+    }
+    if (!config.dds.security.empty()) {
+      child.arguments.insert(child.arguments.end(), {"--security", config.dds.security.string()});
+    }
+    auto started = DdsSupervisor::start(std::move(child), WallTime::clock::now());
+    if (!started) return tl::unexpected(started.error());
+    supervisor.emplace(std::move(*started));
+    return {};
+  }
+
+  /// A warning only: acquisition and recording go on where abbe-dds cannot, and it refuses unusable keys
+  /// itself.
+  void check_dds_security() {
+    if (!dds_is_secured(config.dds.security, config.dds.profile)) {
+      warnings.push_back(dds_security_is_off(config.dds.domain));
+    } else if (!config.dds.security.empty()) {
+      const auto identity =
+          find_dds_identity(config.dds.security, DdsRole::Daemon, std::chrono::system_clock::now());
+      if (!identity) warnings.push_back(identity.error().text + "; nothing is published over DDS until then");
+    }
+  }
+
+  /// Before the devices are: a processor that sleeps deeply delays their first stamps, too.
+  Result<void> bound_cpu_latency() {
+    if (!config.daemon.cpu_latency) return {};
+    auto bound = drivers::CpuLatencyBound::request(*config.daemon.cpu_latency);
+    if (!bound) return refused_by_system({ErrorCode::Io, "cpu_latency_us: " + bound.error().text});
+    cpu_latency.emplace(std::move(*bound));
+    return {};
+  }
+
+  /// An error where real time is enforced, else a warning.
+  Result<void> refused_by_system(const Error& error) {
+    if (config.daemon.realtime == RealTimeMode::Enforce) return tl::unexpected(error);
+    warnings.push_back(error.text);
+    return {};
+  }
+
+  Result<void> start_devices() {
+    left_counting = daemon::left_counting(config, boot);
+    if (!left_counting.warning.empty()) warnings.push_back(left_counting.warning);
+    std::optional<drivers::CounterCardProgress> left;
+    if (left_counting.state) left = left_counting.state->counting.progress;
+    auto started = DeviceSet::start(config, time, left);
+    if (!started) return tl::unexpected(started.error());
+    devices.emplace(std::move(*started));
+    const auto refused = devices->warnings();
+    warnings.insert(warnings.end(), refused.begin(), refused.end());
+    return {};
+  }
+
+  /// The thread waits until there is a hub to run; whether it may have its priority is known before.
+  Result<void> start_hub_thread() {
+    hub_thread = std::thread([this, may_run = hub_may_run.get_future()]() mutable { run_hub(may_run); });
+    const auto set = set_priority(hub_thread, config.daemon);
+    return set ? set : refused_by_system(set.error());
+  }
+
+  Result<void> listen_control() {
+    auto listener = listen_unix(config.control.socket);
+    if (!listener) return tl::unexpected(listener.error());
+    control_listener = std::move(*listener);
+    return {};
+  }
+
+  Result<void> run() {
+    calibration.emplace(config, *authority, recorder.get(), utc);
+    std::optional<Counting> left;
+    if (left_counting.state) {
+      recorder->attach(to_attachment(*left_counting.state), time.now());
+      left = left_counting.state->counting;
+    }
+    reference.emplace(config, recorder.get(), std::move(left));
+    verification.emplace(config);
+    touching.emplace(*devices, config.cmm.has_value());
+    tracker.emplace(*devices, longest_tracker_order(config));
+    hub.emplace(HubParts{.config = config,
+                         .time = time,
+                         .devices = *devices,
+                         .authority = *authority,
+                         .calibration = *calibration,
+                         .publisher = publisher ? &*publisher : nullptr,
+                         .recorder = recorder.get(),
+                         .reference = &*reference,
+                         .touching = &*touching,
+                         .verification = &*verification,
+                         .tracker = &*tracker});
+    running_since = WallTime::clock::now();
+    hub_may_run.set_value();
+    closing_left = start_aside([dir = config.recording.dir, running = recording, stop = stop_closing] {
+      return close_left_recordings(dir, running, *stop);
+    });
+    control = serve_control(std::move(control_listener), config.control.socket,
+                            [this](const nlohmann::json& request, const ControlPeer& peer) {
+                              return answer_request(*hub, request, peer);
+                            });
+    journal.emplace(config.machine.name, open_journal(), [this] { return observe(); });
+    if (config.counter_card) {
+      counting_state.emplace(
+          counting_state_file(config.daemon.data_dir),
+          [this, set_up = counting_set_up(config)] { return look_at_counting(set_up); },
+          [](const std::string& fault) { fmt::print(stderr, "abbed: {}\n", fault); });
+    }
+    return {};
+  }
+
+  /// For a later run; nothing for a card that another could be taken for. Any thread but the hub's.
+  std::optional<CountingState> look_at_counting(const std::string& set_up) {
+    if (boot.empty()) return std::nullopt;
+    const auto look = [this] { return std::pair{reference->counting(), reference->carried_on()}; };
+    // acquire: pairs with the release in end_hub(); nothing else uses what the hub had any more
+    auto seen =
+        hub_has_ended.load(std::memory_order_acquire) ? std::optional{look()} : hub->call(look, kHubPatience);
+    if (!seen || !seen->first || seen->first->progress.serial_number().empty()) return std::nullopt;
+    if (left_counting.state) {
+      left_counting.state.reset();
+      if (!seen->second.empty())
+        fmt::print(stderr, "abbed: the counter card counted on: {} stay referenced\n",
+                   fmt::join(seen->second, ", "));
+    }
+    return CountingState{.boot_id = boot, .set_up = set_up, .counting = std::move(*seen->first)};
+  }
+
+  /// What the journal follows; any thread but the hub's.
+  Observed observe() {
+    auto seen = hub->call(
+        [this] {
+          const ModelStanding standing = hub->standing();
+          return Observed{.streams = hub->health(),
+                          .session = calibration->status(),
+                          .model = {.state = std::string{status_name(standing.status)},
+                                    .id = standing.model != nullptr ? standing.model->id : "",
+                                    .reason = standing.reason}};
+        },
+        kHubPatience);
+    Observed now = seen ? std::move(*seen) : Observed{.hub_answers = false};
+    const std::lock_guard lock{participant_mutex};
+    now.participant = participant;
+    return now;
+  }
+
+  void supervise(WallTime now) {
+    if (!supervisor) return;
+    supervisor->poll(now);
+    const std::lock_guard lock{participant_mutex};
+    const auto& end = supervisor->last_end();
+    participant = {.restarts = supervisor->restarts(),
+                   .last_end = end ? end->text() : std::string{},
+                   .start_fault = supervisor->start_fault()};
+  }
+
+  void tidy_recordings(WallTime now) {
+    if (config.recording.keep <= 0h) return;
+    if (tidying.valid() && tidying.wait_for(0s) == std::future_status::ready) {
+      const auto removed = outcome_of(tidying);
+      if (!removed) fmt::print(stderr, "abbed: {}\n", removed.error().text);
+      if (removed && !removed->empty())
+        fmt::print(stderr, "abbed: removed {} recordings older than {} h\n", removed->size(),
+                   config.recording.keep.count());
+    }
+    if (clock_steps.look(read_clocks()) && std::exchange(tidies, false))
+      fmt::print(stderr, "abbed: the clock was set: no old recordings are removed until the next start\n");
+    if (!tidies || tidying.valid() || now < next_tidying) return;
+    next_tidying = now + kTidyPeriod;
+    tidying = start_aside([dir = config.recording.dir, models = config.daemon.models_dir(),
+                           rule = KeepRule{.now = std::filesystem::file_time_type::clock::now(),
+                                           .keep = config.recording.keep,
+                                           .running = recording,
+                                           .lasted = now - running_since}] {
+      return remove_old_recordings(dir, models, rule);
+    });
+  }
+
+  void report_left_recordings() {
+    if (!closing_left.valid() || closing_left.wait_for(0s) != std::future_status::ready) return;
+    const auto closed = outcome_of(closing_left);
+    if (!closed) return fmt::print(stderr, "abbed: {}\n", closed.error().text);
+    for (const auto& left : *closed) {
+      if (!left.fault.empty())
+        fmt::print(stderr, "abbed: left as it is by a killed abbed: {}\n", left.fault);
+      else
+        fmt::print(stderr, "abbed: {} {}, left open by a killed abbed\n",
+                   left.messages > 0 ? fmt::format("closed, with {} messages,", left.messages)
+                                     : std::string{"removed, without messages,"},
+                   left.file.string());
+    }
+  }
+
+  void run_hub(std::future<void>& may_run) noexcept {
+    (void)::pthread_setname_np(::pthread_self(), "abbe-hub");
+    drivers::prepare_heap_of_this_thread();
+    try {
+      may_run.get();
+    } catch (const std::future_error&) {
+      return;
+    }
+    try {
+      hub->run();
+    } catch (const std::exception& defect) {  // it turns no more, which alive() sees
+      fmt::print(stderr, "abbed: the hub ended by a defect: {}\n", defect.what());
+    }
+  }
+};
+
+Result<std::unique_ptr<Abbed>> Abbed::start(Config config, AbbedOptions options) {
+  drivers::keep_heap();
+  auto state = std::make_unique<State>(std::move(config), std::move(options));
+  prepare_work_aside();
+  for (const auto& directory : {state->config.daemon.runtime_dir, state->config.control.socket.parent_path(),
+                                state->config.dds.socket.parent_path()}) {
+    if (auto made = make_directory(directory); !made) return tl::unexpected(made.error());
+  }
+  using Step = Result<void> (State::*)();
+  // The recorder last of all that may refuse: a start that fails again and again leaves no files behind.
+  for (const Step step : {&State::refuse_second_daemon, &State::open_models, &State::open_dds,
+                          &State::bound_cpu_latency, &State::start_devices, &State::start_hub_thread,
+                          &State::listen_control, &State::open_recorder, &State::run}) {
+    if (auto done = ((*state).*step)(); !done) return tl::unexpected(done.error());
+  }
+  return std::unique_ptr<Abbed>{new Abbed{std::move(state)}};
+}
+
+Abbed::Abbed(std::unique_ptr<State> state) : state_(std::move(state)) {}
+Abbed::~Abbed() = default;
+
+void Abbed::turn() {
+  const auto now = WallTime::clock::now();
+  state_->supervise(now);
+  state_->tidy_recordings(now);
+  state_->report_left_recordings();
+}
+
+bool Abbed::alive() const {
+  return WallTime::clock::now() - std::max(state_->hub->last_turn(), state_->running_since) < kHubPatience;
+}
+
+std::vector<std::string> Abbed::warnings() const {
+  return state_->warnings;
+}
+
+}  // namespace abbe::daemon

@@ -1,0 +1,285 @@
+#include "abbe/service/control_api.hpp"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+#include <array>
+#include <functional>
+#include <memory>
+#include <span>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "abbe/base/control_protocol.hpp"
+#include "abbe/config/linear_axes.hpp"
+#include "motion_requests.hpp"
+#include "status_reply.hpp"
+#include "tracker_requests.hpp"
+
+namespace abbe::daemon {
+namespace {
+
+using nlohmann::json;
+
+Result<OnHub> status(const HubParts&, const json&) {
+  return status_reply;
+}
+
+/// Shown on terminals, written to the journal and kept in the store.
+std::string remark_of(std::string who) {
+  constexpr std::size_t kMost = 64;
+  if (who.size() > kMost) {
+    std::size_t end = kMost;  // between two characters of UTF-8
+    while (end > 0 && (static_cast<unsigned char>(who[end]) & 0xc0) == 0x80) --end;
+    who.replace(end, std::string::npos, "...");
+  }
+  std::ranges::replace_if(
+      who, [](char c) { return static_cast<unsigned char>(c) < 0x20 || c == 0x7f; }, '?');
+  return who;
+}
+
+/// Who asks, as the kernel says; a name the client gives itself is a remark (a person behind a service).
+std::string who(const json& request) {
+  const auto user = request.value("user", std::string{"somebody"});
+  const auto said = remark_of(request.value("who", std::string{}));
+  return said.empty() || said == user ? user : fmt::format("{} (as {})", user, said);
+}
+
+/// No method uses readings of X, Y or Z without a datum: a run would never get them.
+Result<void> check_zeros(const HubParts& parts, const PreparedSession& task) {
+  const bool by_cmm =
+      std::holds_alternative<EvemuAcquisition>(task.acquisition) && parts.config.cmm.has_value();
+  if (parts.reference == nullptr || by_cmm) return {};
+  auto unknown = parts.reference->unknown();
+  const auto linear =
+      std::span{parts.config.machine.axes}.first(std::min(kLinearAxes, parts.config.machine.axes.size()));
+  std::erase_if(unknown, [&linear](const std::string& name) {
+    return std::ranges::find(linear, name, &AxisConfig::name) == linear.end();
+  });
+  if (unknown.empty()) return {};
+  return fail(ErrorCode::Refused,
+              fmt::format("calibrate: nobody knows the zero of {}: `abbe reference` finds the marks, `abbe "
+                          "reference --here` says that the axes read their offset",
+                          fmt::join(unknown, ", ")));
+}
+
+/// Points of before an order do not belong to those after it.
+Result<void> check_tracker_is_free(const HubParts& parts, const PreparedSession& task) {
+  const auto* order = parts.tracker != nullptr ? parts.tracker->running() : nullptr;
+  if (order == nullptr || std::holds_alternative<EvemuAcquisition>(task.acquisition)) return {};
+  return fail(ErrorCode::Refused,
+              fmt::format("calibrate: the tracker carries out \"{}\" of {}: wait for its end (`abbe tracker "
+                          "status`)",
+                          drivers::name_of(order->asked.what), order->by));
+}
+
+Result<OnHub> calibrate(const HubParts& parts, const json& request) {
+  auto task = task_from_json(request, touch_plan(parts.config.evemu));
+  if (!task) return tl::unexpected(task.error());
+  auto prepared = parts.calibration.prepare(std::move(*task));
+  if (!prepared) return tl::unexpected(prepared.error());
+  auto shared = std::make_shared<PreparedCalibration>(std::move(*prepared));
+  return [shared, by = who(request)](const Hub& hub) {
+    const HubParts& on = hub.parts();
+    if (const auto known = check_zeros(on, shared->session); !known) return reply(known.error());
+    if (const auto free = check_tracker_is_free(on, shared->session); !free) return reply(free.error());
+    const auto started = on.calibration.start(std::move(*shared), by, on.time.now());
+    return started ? reply(json{{"ok", true}, {"session", *started}}) : reply(started.error());
+  };
+}
+
+Result<OnHub> cancel(const HubParts&, const json& request) {
+  return [by = who(request)](const Hub& hub) {
+    return reply_done(hub.parts().calibration.cancel(by, hub.parts().time.now()));
+  };
+}
+
+StandHere stand_here(const HubParts& parts, const std::vector<std::string>& axes, double u) {
+  StandHere here{.axes = axes, .u = u, .now = parts.time.now()};
+  here.patience = parts.time.host(here.patience);
+  here.acquiring = takes_readings(parts.calibration.status().state);
+  return here;
+}
+
+OnHub with_reference(std::function<Result<void>(ReferenceService&, const HubParts&)> task) {
+  return [task = std::move(task)](const Hub& hub) {
+    ReferenceService* const service = hub.parts().reference;
+    return service == nullptr ? reply(Error{ErrorCode::Refused, "reference: not in this daemon"})
+                              : reply_done(task(*service, hub.parts()));
+  };
+}
+
+Result<OnHub> reference_here(const HubParts&, const json& request) {
+  return with_reference(
+      [axes = request.value("axes", std::vector<std::string>{}), u = request.value("u", StandHere::kByEye)](
+          ReferenceService& service, const HubParts& parts) {
+        return service.stand_at_offset(stand_here(parts, axes, u));
+      });
+}
+
+Result<OnHub> cancel_reference(const HubParts&, const json&) {
+  return with_reference([](ReferenceService& service, const HubParts&) { return service.cancel(); });
+}
+
+Result<OnHub> reference(const HubParts&, const json&) {
+  return with_reference([](ReferenceService& service, const HubParts&) { return service.start(); });
+}
+
+json point_json(const StandstillPoint& p) {
+  const auto list = [](const calib::Vector3& v) { return json{v.x(), v.y(), v.z()}; };
+  return {{"reading_m", list(p.mean.reading_m)},
+          {"tracker_m", list(p.mean.measured_m)},
+          {"tracker_points", p.tracker_points},
+          {"scatter_m", p.scatter_m}};
+}
+
+/// Standstills from the one on that was asked for.
+struct SeenPoints {
+  std::size_t standing = 0;
+  std::vector<StandstillPoint> points;
+  std::string stopped;
+};
+
+json verification_json(const SeenPoints& seen) {
+  json list = json::array();
+  for (const StandstillPoint& p : seen.points) list.push_back(point_json(p));
+  json out{{"ok", true}, {"standing", seen.standing}, {"points", std::move(list)}};
+  if (!seen.stopped.empty()) out["stopped"] = seen.stopped;
+  return out;
+}
+
+Reply begin_verification(VerificationService& service) {
+  const auto number = service.begin();
+  return number ? reply(json{{"ok", true}, {"number", *number}}) : reply(number.error());
+}
+
+Reply look_at_verification(VerificationService& service, std::uint64_t number, std::size_t from, bool end) {
+  if (end)
+    if (const auto ended = service.end(number); !ended) return reply(ended.error());
+  const auto found = service.points(number);
+  if (!found) return reply(found.error());
+  const auto& all = (*found)->points();
+  const auto first = all.begin() + static_cast<std::ptrdiff_t>(std::min(from, all.size()));
+  return [seen = SeenPoints{
+              .standing = (*found)->standing(), .points = {first, all.end()}, .stopped = service.stopped()}] {
+    return verification_json(seen);
+  };
+}
+
+/// {"step": "begin"} gives a number; {"step": "look" | "end", "number": .., "from": k} the points from the
+/// k-th on, "end" after the standstill that goes on was closed.
+Result<OnHub> verification(const HubParts& parts, const json& request) {
+  if (parts.verification == nullptr) return fail(ErrorCode::Refused, "verify: not in this daemon");
+  const auto step = request.at("step").get<std::string>();
+  if (step == "begin") return [](const Hub& hub) { return begin_verification(*hub.parts().verification); };
+  if (step != "end" && step != "look")
+    return fail(ErrorCode::Usage, fmt::format("verification: unknown step {}", step));
+  return [number = request.at("number").get<std::uint64_t>(), from = request.value("from", std::size_t{0}),
+          end = step == "end"](const Hub& hub) {
+    return look_at_verification(*hub.parts().verification, number, from, end);
+  };
+}
+
+OnHub give_tracker(drivers::TrackerOrder order, std::string by) {
+  return [order = std::move(order), by = std::move(by)](const Hub& hub) {
+    const auto number = order_tracker(hub.parts(), order, by);
+    return number ? reply(json{{"ok", true}, {"order", *number}}) : reply(number.error());
+  };
+}
+
+Result<OnHub> tracker_order(const HubParts&, const json& request) {
+  auto order = tracker_order_from_json(request);
+  if (!order) return tl::unexpected(order.error());
+  return give_tracker(std::move(*order), who(request));
+}
+
+Result<OnHub> tracker_reflectors(const HubParts&, const json& request) {
+  return give_tracker({.what = drivers::TrackerOrder::What::ListReflectors}, who(request));
+}
+
+/// One thing that may be asked. Without a role it does not compile.
+struct Verb {
+  using Task = Result<OnHub> (*)(const HubParts&, const json&);
+  constexpr Verb(std::string_view does, std::string_view with, Role needs, Task runs)
+      : name(does), member(with), role(needs), task(runs) {}
+
+  std::string_view name;
+  std::string_view member;  ///< only where the request says true for it; empty: in every other case
+  Role role;
+  Task task;
+};
+
+// Nothing is run that is not found here: what a request needs and what it does cannot differ.
+constexpr std::array kVerbs{
+    Verb{"status", "", Role::Look, status},
+    Verb{"calibrate", "", Role::Change, calibrate},
+    Verb{"cancel", "", Role::Change, cancel},
+    Verb{"reference", "here", Role::Change, reference_here},
+    Verb{"reference", "cancel", Role::Change, cancel_reference},
+    Verb{"reference", "", Role::Change, reference},
+    Verb{"verification", "", Role::Look, verification},
+    Verb{"touch", "cancel", Role::Look, cancel_touching},  // whoever sees a machine move may stop it
+    Verb{"touch", "where", Role::Look, where_it_stands},
+    Verb{"touch", "", Role::Move, begin_touching},
+    Verb{"touches", "", Role::Move, look_at_touches},  // without it a movement ends
+    Verb{"machine", "release", Role::Move, release_machine},
+    Verb{"machine", "stop", Role::Look, stop_machine},
+    Verb{"machine", "", Role::Look, machine_state},
+    Verb{"tracker", "", Role::Move, tracker_order},
+    Verb{"tracker_reflectors", "", Role::Look, tracker_reflectors},
+};
+
+std::string known_verbs() {
+  std::vector<std::string_view> names;
+  for (const Verb& verb : kVerbs)
+    if (verb.member.empty()) names.push_back(verb.name);
+  return fmt::format("{}", fmt::join(names, ", "));
+}
+
+Result<const Verb*> verb_of(const json& request) {
+  const auto what = request.at("do").get<std::string>();
+  for (const Verb& verb : kVerbs)
+    if (verb.name == what && (verb.member.empty() || request.value(std::string{verb.member}, false)))
+      return &verb;
+  return fail(ErrorCode::Usage, fmt::format("unknown request \"{}\": known are {}", what, known_verbs()));
+}
+
+/// What to run for it, if `peer` may.
+Result<Verb::Task> task_of(const json& request, const ControlPeer& peer, const ControlConfig& control) {
+  const auto verb = verb_of(request);
+  if (!verb) return tl::unexpected(verb.error());
+  if (const auto may = check_role(peer, (*verb)->role, (*verb)->name, control); !may)
+    return tl::unexpected(may.error());
+  return (*verb)->task;
+}
+
+}  // namespace
+
+std::vector<ControlVerb> control_verbs() {
+  std::vector<ControlVerb> all;
+  for (const Verb& verb : kVerbs)
+    all.push_back({std::string{verb.name}, std::string{verb.member}, verb.role});
+  return all;
+}
+
+json answer_on_hub(const Hub& hub, const json& request, const ControlPeer& peer) {
+  const auto task = task_of(request, peer, hub.parts().config.control);
+  if (!task) return refusal(task.error());
+  const auto on_hub = (*task)(hub.parts(), request);
+  return on_hub ? (*on_hub)(hub)() : refusal(on_hub.error());
+}
+
+json answer_request(Hub& hub, const json& request, const ControlPeer& peer,
+                    std::chrono::milliseconds time_out) {
+  const auto task = task_of(request, peer, hub.parts().config.control);
+  if (!task) return refusal(task.error());
+  auto on_hub = (*task)(hub.parts(), request);
+  if (!on_hub) return refusal(on_hub.error());
+  const auto answer = hub.call([&hub, run = std::move(*on_hub)] { return run(hub); }, time_out);
+  return answer ? (*answer)()
+                : refusal({ErrorCode::Io, fmt::format("the hub did not answer in {} ms", time_out.count())});
+}
+
+}  // namespace abbe::daemon

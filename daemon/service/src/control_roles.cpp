@@ -1,0 +1,85 @@
+#include "abbe/service/control_roles.hpp"
+
+#include <fmt/format.h>
+#include <grp.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <optional>
+#include <string>
+#include <vector>
+
+namespace abbe::daemon {
+namespace {
+
+constexpr std::size_t kLargestGroupEntry = 1u << 20;  // with all its members
+
+std::optional<gid_t> gid_of(const std::string& name) {
+  std::vector<char> strings(16384);
+  group entry{};
+  group* found = nullptr;
+  while (::getgrnam_r(name.c_str(), &entry, strings.data(), strings.size(), &found) == ERANGE &&
+         strings.size() < kLargestGroupEntry)
+    strings.resize(2 * strings.size());
+  return found != nullptr ? std::optional{found->gr_gid} : std::nullopt;
+}
+
+bool is_in(const ControlPeer& peer, const std::string& group) {
+  const auto gid = group.empty() ? std::nullopt : gid_of(group);
+  return gid && std::ranges::find(peer.groups, *gid) != peer.groups.end();
+}
+
+bool has(const ControlPeer& peer, Role role, const ControlConfig& control) {
+  if (peer.uid == 0 || peer.uid == ::geteuid()) return true;
+  switch (role) {
+    case Role::Look:
+      return control.look_group.empty() || is_in(peer, control.look_group) ||
+             is_in(peer, control.change_group) || is_in(peer, control.move_group);
+    case Role::Change:
+      return is_in(peer, control.change_group);
+    case Role::Move:
+      return is_in(peer, control.move_group);
+  }
+  return false;
+}
+
+struct RoleWords {
+  std::string_view does, key;
+  const std::string& group;
+};
+
+RoleWords words_of(Role role, const ControlConfig& control) {
+  switch (role) {
+    case Role::Look:
+      return {"looks at the daemon", "look_group", control.look_group};
+    case Role::Change:
+      return {"changes what is in force", "change_group", control.change_group};
+    case Role::Move:
+      break;
+  }
+  return {"moves a machine or tracker", "move_group", control.move_group};
+}
+
+std::string remedy(const ControlPeer& peer, const RoleWords& words) {
+  if (words.group.empty())
+    return fmt::format("[control] {} names no group: only root and the daemon's own user may", words.key);
+  if (!gid_of(words.group))
+    return fmt::format(
+        "the group \"{}\" ([control] {}) does not exist on this computer: groupadd --system {}", words.group,
+        words.key, words.group);
+  return fmt::format("that takes the group \"{}\" ([control] {}): gpasswd -a {} {}, then log in anew",
+                     words.group, words.key, peer.user, words.group);
+}
+
+}  // namespace
+
+Result<void> check_role(const ControlPeer& peer, Role role, std::string_view request,
+                        const ControlConfig& control) {
+  if (has(peer, role, control)) return {};
+  const RoleWords words = words_of(role, control);
+  return fail(ErrorCode::Refused, fmt::format("{}: {}, which {} may not: {}", request, words.does, peer.user,
+                                              remedy(peer, words)));
+}
+
+}  // namespace abbe::daemon

@@ -1,0 +1,225 @@
+#include "abbe/service/hub.hpp"
+
+#include <fmt/format.h>
+#include <sys/prctl.h>
+
+#include <ctime>
+#include <utility>
+
+#include "abbe/base/wake_up.hpp"
+#include "abbe/devices/device_options.hpp"
+
+namespace abbe::daemon {
+namespace {
+
+using namespace std::chrono_literals;
+using protocol::HostTime;
+
+constexpr auto kHealthPeriod = 1s;
+
+void sleep_until(std::chrono::steady_clock::time_point t) {
+  const auto ns = t.time_since_epoch().count();  // steady_clock is CLOCK_MONOTONIC
+  const timespec at{.tv_sec = ns / 1'000'000'000, .tv_nsec = ns % 1'000'000'000};
+  (void)clock_nanosleep(CLOCK_MONOTONIC, TIMER_ABSTIME, &at, nullptr);
+}
+
+StreamHealth health_of(const RecorderThread& recorder) {
+  const RecorderStatus& r = recorder.status();
+  StreamHealth h;
+  h.status.name = "recorder";
+  h.status.state = name(r.state);
+  h.status.connected = r.state == RecorderStatus::State::Recording;
+  h.status.samples = r.messages;
+  h.status.dropped = r.lost + r.refused + recorder.dropped();
+  h.status.faults = r.faults;
+  h.status.last_fault = r.last_fault;
+  if (r.last_fault.empty() && r.refused > 0) {
+    h.status.last_fault =
+        fmt::format("{} messages outside the bounds of the IDL are not recorded", r.refused);
+  }
+  return h;
+}
+
+/// The model store, as far as it can be followed and written.
+StreamHealth health_of(const ModelAuthority& authority, const CalibrationService& calibration) {
+  const std::string& unstored = calibration.not_stored();
+  StreamHealth h;
+  h.status.name = "models";
+  h.status.connected = authority.fault().empty() && unstored.empty();
+  h.status.state = !unstored.empty() ? "not stored" : h.status.connected ? "followed" : "unreadable";
+  h.status.last_fault = unstored.empty() ? authority.fault() : unstored;
+  return h;
+}
+
+/// How abbe-dds fared; nothing while it has never ended.
+std::string report_of(const DdsProcess& process) {
+  const auto end = process.last_end();
+  if (!end) return {};
+  return fmt::format("abbe-dds was restarted {} times; last end: {}", process.restarts(), end->text());
+}
+
+StreamHealth health_of(const Publisher& publisher) {
+  const DdsLink& link = publisher.link();
+  StreamHealth h;
+  h.status.name = "dds";
+  h.status.state = link.state();
+  h.status.connected = link.answers();
+  h.status.samples = link.counters().sent;
+  h.status.dropped = link.counters().dropped_live;
+  h.status.faults = link.counters().refused;
+  h.status.last_fault = publisher.refusal();
+  if (h.status.last_fault.empty() && link.process() != nullptr)
+    h.status.last_fault = report_of(*link.process());
+  return h;
+}
+
+/// Strangers on the domain: kept out by keys, or not.
+StreamHealth health_of_security(const Publisher& publisher) {
+  StreamHealth h;
+  h.status.name = "dds_security";
+  h.status.last_fault = publisher.security_warning();
+  h.status.connected = h.status.last_fault.empty();
+  h.status.state = h.status.connected ? "on" : "off";
+  return h;
+}
+
+}  // namespace
+
+struct Hub::Call {
+  std::function<void()> task;
+  std::exception_ptr thrown;
+  std::atomic<bool> claimed{false};  // by the hub, which runs it then, or by the caller, who has given up
+  WakeUp done;
+};
+
+Hub::Hub(HubParts parts)
+    : parts_(parts),
+      assembler_(assembler_options(parts.config)),
+      live_(assembler_options(parts.config), parts.time) {}
+
+Hub::~Hub() {
+  run_calls();
+  for (Call* const call : given_up_.take()) delete call;
+}
+
+Hub::WallTime Hub::last_turn() const noexcept {
+  return WallTime{std::chrono::nanoseconds{last_turn_ns_.load(std::memory_order_relaxed)}};
+}
+
+ModelStanding Hub::standing() const {
+  return parts_.authority.standing(parts_.time.now(), live_.axes_known_at(), parts_.time.host(kAxesPatience));
+}
+
+void Hub::turn(WallTime wall) {
+  last_turn_ns_.store(wall.time_since_epoch().count(), std::memory_order_relaxed);
+  batch_.clear();
+  const std::size_t points_left = parts_.devices.points_left();
+  parts_.devices.drain(batch_);
+  const HostTime now = parts_.time.now();
+  batch_.taken = now;
+  touch(points_left, wall);
+  if (parts_.tracker != nullptr) parts_.tracker->turn(now);
+  if (parts_.reference != nullptr) {
+    parts_.reference->turn(batch_);
+    parts_.reference->take(parts_.devices.card_progress());
+  }
+  const bool fresh = live_.take(batch_);
+  // Live first: subscribers wait for it; abbe-dds's socket, the recorder and the assembler have time.
+  publish(fresh, now, wall);
+  if (parts_.publisher != nullptr) parts_.publisher->beat(wall);
+
+  if (parts_.recorder != nullptr && !batch_.empty()) parts_.recorder->hand_over(batch_);
+  assembler_.take(batch_);
+  snapshots_.clear();
+  assembler_.emit(snapshots_);
+  for (const auto& event : parts_.calibration.turn(snapshots_, now)) {
+    if (parts_.publisher != nullptr) parts_.publisher->event(event);
+  }
+  if (parts_.verification != nullptr) parts_.verification->turn(snapshots_);
+  run_calls();
+}
+
+/// What the machine said last is asked for only when that matters: its health is not for every turn.
+void Hub::touch(std::size_t points_left, WallTime wall) {
+  if (parts_.touching == nullptr || !parts_.touching->status().running) return;
+  std::string seen;
+  if (points_left == 0 && batch_.touches.empty()) {
+    collect_health(parts_.time.now());
+    for (const auto& h : health_)
+      if (parts_.config.cmm && h.status.name == parts_.config.cmm->name) seen = h.status.last_fault;
+  }
+  parts_.touching->turn(batch_, points_left, seen, wall);
+}
+
+void Hub::publish(bool fresh, HostTime now, WallTime wall) {
+  Publisher* const publisher = parts_.publisher;
+  if (fresh && publisher != nullptr) {
+    publisher->snapshot(live_.view(), now, wall);
+    publisher->compensation(live_.view(), standing(), now, wall);
+  }
+  if (wall >= next_health_) {
+    next_health_ = wall + kHealthPeriod;
+    (void)parts_.authority.follow_store(now);
+    collect_health(now);
+    if (publisher != nullptr) publisher->health(health_, now);
+  }
+  if (publisher != nullptr) publisher->model(standing(), now, wall);
+}
+
+void Hub::collect_health(HostTime now) {
+  health_ = parts_.devices.health(now);
+  health_.push_back(health_of(parts_.authority, parts_.calibration));
+  if (parts_.recorder != nullptr) health_.push_back(health_of(*parts_.recorder));
+  if (parts_.publisher == nullptr) return;
+  health_.push_back(health_of(*parts_.publisher));
+  health_.push_back(health_of_security(*parts_.publisher));
+}
+
+void Hub::run() {
+  // Without SCHED_FIFO the kernel may wake a thread 50 us late to spare a processor a wake-up: a fifth of the
+  // usual period, in every turn.
+  ::prctl(PR_SET_TIMERSLACK, 1UL);
+  const auto period = parts_.config.daemon.hub_period;
+  auto next = std::chrono::steady_clock::now();
+  while (!stopping_.load(std::memory_order_relaxed)) {
+    turn(std::chrono::steady_clock::now());
+    next += period;
+    if (const auto now = std::chrono::steady_clock::now(); next < now)
+      next = now;  // late: do not catch up in a rush
+    sleep_until(next);
+  }
+}
+
+bool Hub::run_in_turn(std::function<void()> task, std::chrono::milliseconds time_out) {
+  for (Call* const old : given_up_.take()) delete old;
+  auto call = std::make_unique<Call>();
+  call->task = std::move(task);
+  calls_.put(call.get());
+  if (!call->done.wait_for(time_out)) {
+    // The hub still has it among its calls.
+    if (!call->claimed.exchange(true)) {
+      (void)call.release();
+      return false;
+    }
+    call->done.wait();  // a task that has begun is as good as done
+  }
+  if (call->thrown) std::rethrow_exception(call->thrown);
+  return true;
+}
+
+void Hub::run_calls() {
+  for (Call* const call : calls_.take()) {
+    if (call->claimed.exchange(true)) {
+      given_up_.put(call);
+      continue;
+    }
+    try {
+      call->task();
+    } catch (...) {  // a member of the wrong type in the request: the caller gets it
+      call->thrown = std::current_exception();
+    }
+    call->done.signal();  // the caller frees it now
+  }
+}
+
+}  // namespace abbe::daemon

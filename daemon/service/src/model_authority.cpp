@@ -1,0 +1,166 @@
+#include "abbe/service/model_authority.hpp"
+
+#include <fmt/format.h>
+
+#include <utility>
+
+#include "abbe/pipeline/work_aside.hpp"
+#include "outcome.hpp"
+
+namespace abbe::daemon {
+namespace {
+
+using protocol::HostTime;
+
+// A model file that cannot be used may be made readable or put back from a backup; the store does not change
+// by that.
+constexpr auto kRepairPeriod = std::chrono::seconds{10};
+
+/// Why the model may be used: a person who forced it answers for it by name.
+std::string reason_of(const StoreEvent& activation) {
+  const auto said_by = [&activation](std::string_view what) {
+    const auto& [who, why, when] = activation.actor;
+    return fmt::format("{} by {}{}{}", what, who, why.empty() ? "" : ": ", why);
+  };
+  switch (activation.action) {
+    case StoreAction::Forced:
+      return said_by("forced");
+    case StoreAction::RolledBack:
+      return said_by(activation.accepted ? "rolled back" : "rolled back to a model the gate did not accept,");
+    case StoreAction::Added:
+    case StoreAction::Activated:
+      break;
+  }
+  return "accepted by the gate";
+}
+
+bool same(const StoreEvent& a, const StoreEvent& b) {
+  return a.id == b.id && a.actor.when == b.actor.when && a.action == b.action;
+}
+
+}  // namespace
+
+ModelAuthority::ModelAuthority(ModelKeeper keeper, bool axes_compensated)
+    : keeper_(std::move(keeper)), axes_compensated_(axes_compensated), seen_(keeper_.stamp()) {}
+
+ModelAuthority ModelAuthority::open(const std::filesystem::path& store_folder, const Config& config,
+                                    protocol::UtcOffset utc, HostTime now) {
+  ModelKeeper keeper{store_folder, config, utc};
+  keeper.tidy_store(now);
+  ModelAuthority authority{std::move(keeper), config.axes_compensated()};
+  if (auto active = authority.keeper_.read_active(now)) {
+    authority.take_up(std::move(*active));
+  } else {
+    authority.active_.fault = active.error().text;
+    authority.read_again_ = true;
+  }
+  return authority;
+}
+
+void ModelAuthority::take_up(ActiveModel active) {
+  destroy_aside(std::exchange(active_, std::move(active)));
+  ++revision_;
+}
+
+void ModelAuthority::take_up(ActiveModel active, std::uint64_t since) {
+  if (since == revision_) {
+    take_up(std::move(active));
+  } else {
+    read_again_ = true;
+    destroy_aside(std::move(active));
+  }
+}
+
+ModelAuthority::Following ModelAuthority::follow_store(HostTime now) {
+  if (!looking_.valid()) begin_to_look(now);
+  if (looking_.wait_for(std::chrono::seconds{0}) == std::future_status::ready)
+    return conclude_look(outcome_of(looking_), now);
+  if (now - looking_from_ > kStorePatience)
+    fault_ = fmt::format("the model store has not answered for {} s", kStorePatience.count());
+  return Following::Reading;
+}
+
+void ModelAuthority::begin_to_look(HostTime now) {
+  const bool to_repair = !active_.fault.empty() && now >= next_repair_;
+  const bool read_anyway = std::exchange(read_again_, false) || to_repair;
+  looking_from_ = now;
+  looking_since_ = revision_;
+  looking_ = start_abandonable(
+      [keeper = keeper_, seen = seen_, failed = failed_, read_anyway, now]() mutable -> Result<Look> {
+        Look look{.stamp = keeper.stamp()};
+        if (look.stamp == seen && !read_anyway) return look;
+        // Not at the first sight: somebody may be writing it in place.
+        auto active = look.stamp == failed ? keeper.read_active_or_set_aside(now) : keeper.read_active(now);
+        if (active)
+          look.active = std::move(*active);
+        else
+          look.fault = std::move(active.error().text);
+        return look;
+      });
+}
+
+/// What is in force stays; reported in standing() and in health(), and read again by the next look.
+ModelAuthority::Following ModelAuthority::report_look(std::string fault) {
+  fault_ = std::move(fault);
+  read_again_ = true;
+  return Following::Unchanged;
+}
+
+ModelAuthority::Following ModelAuthority::conclude_look(Result<Look> look, HostTime now) {
+  if (!look) return report_look(look.error().text);
+  failed_.reset();
+  if (!look->fault.empty()) {
+    failed_ = look->stamp;
+    return report_look(std::move(look->fault));
+  }
+  seen_ = look->stamp;
+  fault_.clear();
+  if (!look->active) return Following::Unchanged;
+  const bool unknown = look->active->activation.id.empty() && !look->active->fault.empty();
+  if (unknown && active_.model != nullptr) return report_look(std::move(look->active->fault));
+  next_repair_ = now + kRepairPeriod;
+  if (same(look->active->activation, active_.activation) && look->active->fault == active_.fault) {
+    destroy_aside(std::move(*look->active));
+    return Following::Unchanged;
+  }
+  const auto before = revision_;
+  take_up(std::move(*look->active), looking_since_);
+  return revision_ == before ? Following::Unchanged : Following::TakenUp;
+}
+
+ModelStanding ModelAuthority::standing(HostTime now, std::optional<HostTime> axes_known_at,
+                                       std::chrono::nanoseconds patience) const {
+  ModelStanding s = standing_by_store(now, axes_known_at, patience);
+  if (!fault_.empty() && fault_ != s.reason)
+    s.reason += fmt::format("; not known what was activated since: {}", fault_);
+  return s;
+}
+
+ModelStanding ModelAuthority::standing_by_store(HostTime now, std::optional<HostTime> axes_known_at,
+                                                std::chrono::nanoseconds patience) const {
+  ModelStanding s{.model = in_force(), .revision = revision_};
+  if (s.model != nullptr) s.publication = &active_.publication;
+  if (!active_.model) {
+    s.status = active_.fault.empty() ? v1::ModelStatus::MODEL_NONE : v1::ModelStatus::MODEL_INVALID;
+    s.reason = active_.fault.empty() ? "no model has been activated" : active_.fault;
+    return s;
+  }
+  s.status = v1::ModelStatus::MODEL_STALE;
+  if (axes_compensated_) {
+    s.status = v1::ModelStatus::MODEL_INVALID;
+    s.reason = "the control already corrects these axes: axes_compensated = true";
+  } else if (!active_.made_for_this_machine) {
+    s.reason = "the model was made for another machine configuration";
+  } else if (!axes_known_at) {
+    s.reason = "no axis positions yet";
+  } else if (now - *axes_known_at > patience) {
+    s.reason = "no recent axis positions";
+  } else {
+    s.status = v1::ModelStatus::MODEL_ACTIVE;
+    s.reason = reason_of(active_.activation);
+    if (!active_.recording_gap.empty()) s.reason += "; " + cannot_be_checked(active_.recording_gap);
+  }
+  return s;
+}
+
+}  // namespace abbe::daemon

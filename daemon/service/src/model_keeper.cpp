@@ -1,0 +1,104 @@
+#include "abbe/service/model_keeper.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <utility>
+
+namespace abbe::daemon {
+namespace {
+
+/// The hash of what the model was identified from, as its document names it; empty if it names nothing.
+std::string provenance(const ModelDocument& document) {
+  return document.inputs.empty() ? std::string{} : document.inputs.front().sha256;
+}
+
+std::string not_known_since(const std::string& damaged_state) {
+  return fmt::format(
+      "which model was active is not known: the store's state was damaged and is kept as {}; "
+      "activate one with `abbe model activate ID --force --why ...`, or calibrate",
+      damaged_state);
+}
+
+}  // namespace
+
+ModelKeeper::ModelKeeper(const std::filesystem::path& store_folder, const Config& config,
+                         protocol::UtcOffset utc)
+    : store_(store_folder), machine_(config.machine.name), machine_hash_(machine_hash(config)), utc_(utc) {}
+
+void ModelKeeper::tidy_store(protocol::HostTime now) {
+  store_.remove_leftovers();
+  (void)store_.set_aside_damaged_state(utc_.to_utc(now));
+}
+
+Result<KeptModel> ModelKeeper::keep(const ModelDocument& document, const calib::Verdict& verdict,
+                                    const StoreActor& actor, protocol::HostTime now,
+                                    const std::atomic<bool>* discarded) {
+  const auto is_discarded = [discarded] { return discarded != nullptr && *discarded; };
+  if (const auto made = store_.create(); !made) return tl::unexpected(made.error());
+  if (is_discarded()) return fail(ErrorCode::Refused, "the model was discarded");
+  const auto id = store_.add(document, verdict.accepted, verdict.reasons, actor);
+  if (!id) return tl::unexpected(id.error());
+  if (is_discarded()) return fail(ErrorCode::Refused, "the model was discarded");
+  if (!verdict.accepted) return KeptModel{*id, std::nullopt};
+  if (auto done = activate_once(*id, actor); !done) return tl::unexpected(done.error());
+  auto active = read_active(now);
+  if (!active) return tl::unexpected(active.error());
+  return KeptModel{*id, std::move(*active)};
+}
+
+Result<void> ModelKeeper::activate_once(const std::string& id, const StoreActor& actor) {
+  const auto history = store_.history();
+  if (!history) return tl::unexpected(history.error());
+  const bool done = std::ranges::any_of(*history, [&](const StoreEvent& event) {
+    return event.action == StoreAction::Activated && event.id == id && event.actor == actor;
+  });
+  return done ? Result<void>{} : store_.activate(id, actor);
+}
+
+Result<ActiveModel> ModelKeeper::read_active_or_set_aside(protocol::HostTime now) {
+  auto active = read_active(now);
+  if (active) return active;
+  store_.set_lock_patience(kAsidePatience);
+  if (const auto aside = store_.set_aside_damaged_state(utc_.to_utc(now)); !aside)
+    return fail(active.error().code, fmt::format("{}; {}", active.error().text, aside.error().text));
+  return read_active(now);
+}
+
+Result<ActiveModel> ModelKeeper::read_active(protocol::HostTime now) const {
+  if (const auto made = store_.create(); !made) return tl::unexpected(made.error());
+  const auto activation = store_.activation();
+  if (!activation) return tl::unexpected(activation.error());
+  ActiveModel active;
+  if (!*activation) {
+    if (const auto damaged = store_.damaged_state(); !damaged.empty())
+      active.fault = not_known_since(damaged);
+    return active;
+  }
+  active.activation = **activation;
+  auto document = store_.load(active.activation.id);
+  if (!document) {
+    active.fault = document.error().text;
+    return active;
+  }
+  active.made_for_this_machine = document->machine_hash == machine_hash_;
+  active.recording_gap = document->recording_gap;
+  auto model = std::make_shared<const ModelInForce>(
+      ModelInForce{.id = active.activation.id,
+                   .method = document->method,
+                   .estimator = document->estimator,
+                   .recording_sha256 = provenance(*document),
+                   .created = document->created,
+                   .active_since = std::min(now, utc_.to_host(active.activation.actor.when)),
+                   .model = std::move(document->model)});
+  auto publication = encode_model(*model, machine_);
+  if (!publication) {
+    active.fault = publication.error().text;
+    return active;
+  }
+  active.model = std::move(model);
+  active.publication = std::move(*publication);
+  return active;
+}
+
+}  // namespace abbe::daemon

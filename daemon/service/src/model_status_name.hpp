@@ -1,0 +1,26 @@
+#pragma once
+
+#include <string_view>
+
+#include "abbe/publishing/publisher.hpp"
+
+namespace abbe::daemon {
+
+/// As people and programs read it.
+inline std::string_view status_name(v1::ModelStatus status) {
+  switch (status) {
+    case v1::ModelStatus::MODEL_NONE:
+      return "NONE";
+    case v1::ModelStatus::MODEL_ACTIVE:
+      return "ACTIVE";
+    case v1::ModelStatus::MODEL_STALE:
+      return "STALE";
+    case v1::ModelStatus::MODEL_DRIFT:
+      return "DRIFT";
+    case v1::ModelStatus::MODEL_INVALID:
+      return "INVALID";
+  }
+  return "INVALID";
+}
+
+}  // namespace abbe::daemon

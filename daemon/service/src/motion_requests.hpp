@@ -1,0 +1,24 @@
+#pragma once
+/// Requests that move a measuring machine, stop it or ask where it stands: what `abbe calibrate artefact` and
+/// `abbe machine` send. All run on the thread that asks; what they return runs on the hub's.
+
+#include "on_hub.hpp"
+
+namespace abbe::daemon {
+
+/// {"do": "touch", "points": [...], "leave": [...]}; a plan that is too long is Usage.
+[[nodiscard]] Result<OnHub> begin_touching(const HubParts& parts, const nlohmann::json& request);
+/// {"do": "touch", "cancel": true}
+[[nodiscard]] Result<OnHub> cancel_touching(const HubParts& parts, const nlohmann::json& request);
+/// {"do": "touch", "where": true}
+[[nodiscard]] Result<OnHub> where_it_stands(const HubParts& parts, const nlohmann::json& request);
+/// {"do": "touches"}
+[[nodiscard]] Result<OnHub> look_at_touches(const HubParts& parts, const nlohmann::json& request);
+/// {"do": "machine", "release": true}: for a person who has looked at the machine.
+[[nodiscard]] Result<OnHub> release_machine(const HubParts& parts, const nlohmann::json& request);
+/// {"do": "machine", "stop": true}: every motion.
+[[nodiscard]] Result<OnHub> stop_machine(const HubParts& parts, const nlohmann::json& request);
+/// {"do": "machine"}
+[[nodiscard]] Result<OnHub> machine_state(const HubParts& parts, const nlohmann::json& request);
+
+}  // namespace abbe::daemon

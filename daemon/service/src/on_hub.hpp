@@ -1,0 +1,29 @@
+#pragma once
+/// The three steps of a control request: the thread that asks reads it, however large it is; what the hub's
+/// thread does or copies for it is short; the thread that asks writes the answer.
+
+#include <functional>
+#include <nlohmann/json.hpp>
+#include <utility>
+
+#include "abbe/base/refusal.hpp"
+#include "abbe/service/hub.hpp"
+
+namespace abbe::daemon {
+
+/// Writes the answer; any thread.
+using Reply = std::function<nlohmann::json()>;
+/// The hub's thread.
+using OnHub = std::function<Reply(const Hub&)>;
+
+inline Reply reply(nlohmann::json answer) {
+  return [answer = std::move(answer)] { return answer; };
+}
+inline Reply reply(const Error& error) {
+  return [error] { return refusal(error); };
+}
+inline Reply reply_done(const Result<void>& done) {
+  return done ? reply(nlohmann::json{{"ok", true}}) : reply(done.error());
+}
+
+}  // namespace abbe::daemon

@@ -1,0 +1,210 @@
+#include "abbe/service/reference_service.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+namespace abbe::daemon {
+namespace {
+
+using namespace std::chrono_literals;
+
+constexpr auto kStandsFor = 500ms;
+constexpr double kStill = 2e-6;       // m or rad: drives in control hold their place within this
+constexpr double kStillCounts = 2.0;  // and no count says more than this
+
+}  // namespace
+
+ReferenceService::ReferenceService(const Config& config, RecorderThread* recorder,
+                                   std::optional<Counting> left)
+    : config_(config), recorder_(recorder), datum_(config), left_(std::move(left)) {}
+
+Result<void> ReferenceService::start() {
+  if (!configured())
+    return fail(ErrorCode::Refused, "reference: there is no [reference] in the configuration");
+  if (running_) return fail(ErrorCode::Refused, "reference: a search for the marks is running already");
+  session_.emplace(reference_options(*config_.reference, *config_.counter_card));
+  taken_up_.assign(config_.reference->axes.size(), false);
+  running_ = true;
+  from_ = newest_;
+  if (recorder_ != nullptr) recorder_->attach(reference_request(newest_), newest_);
+  return {};
+}
+
+Result<void> ReferenceService::cancel() {
+  if (!running_) return fail(ErrorCode::Refused, "reference: no search for the marks is running");
+  running_ = false;
+  return {};
+}
+
+void ReferenceService::turn(Batch& batch) {
+  if (left_ && !batch.axes.empty()) take_up_left(batch.axes.front());
+  for (const auto& sample : batch.axes) {
+    if (has(sample.head.flags, protocol::SampleFlag::Restarted)) {
+      began_anew_ = sample.head.time;
+      progress_.reset();
+    }
+    newest_ = std::max(newest_, sample.head.time);
+    watch_standing(sample);
+  }
+  if (!batch.axes.empty()) latest_ = batch.axes.back();
+  if (running_) look_for_marks(batch);
+  datum_.apply(batch);
+}
+
+/// A run that goes on is recorded as a further file is.
+void ReferenceService::take_up_left(const protocol::AxisSample& first) {
+  const Counting left = *std::exchange(left_, std::nullopt);
+  if (has(first.head.flags, protocol::SampleFlag::Restarted)) return;
+  const DatumState nothing_known{.at = first.head.time - 1ns, .unknown = 0xff};
+  newest_ = first.head.time;
+  datum_.go_on(nothing_known);
+  if (recorder_ != nullptr) recorder_->attach(to_attachment(nothing_known), newest_);
+  for (FoundDatum datum : left.datum) {
+    datum.from = nothing_known.at;
+    take_up(datum);
+    carried_on_.push_back(config_.counter_card->wiring.axes[datum.axis].name);
+  }
+}
+
+/// Samples come first: one that shows that the counters began anew must be known before what came after it.
+void ReferenceService::take(const std::optional<drivers::CounterCardProgress>& progress) {
+  if (progress) coming_ = progress;
+  if (!coming_ || coming_->head.time > newest_) return;
+  if (coming_->head.time >= began_anew_) progress_ = coming_;
+  coming_.reset();
+}
+
+std::optional<Counting> ReferenceService::counting() const {
+  if (!progress_) return std::nullopt;
+  return Counting{.progress = *progress_, .datum = datum_.in_force()};
+}
+
+void ReferenceService::look_for_marks(const Batch& batch) {
+  for (const auto& crossing : batch.marks)
+    if (crossing.head.time > from_) session_->take(crossing);
+  for (const auto& sample : batch.axes) session_->take(sample);
+  for (std::size_t i = 0; i < taken_up_.size(); ++i) {
+    const bool found = session_->axis(i).state == AxisReference::State::Found;
+    if (found && !taken_up_[i]) take_up(i);
+    taken_up_[i] = found;  // not any more if the card began anew
+  }
+  if (session_->finished()) running_ = false;
+}
+
+void ReferenceService::take_up(std::size_t axis) {
+  const FoundDatum datum{.axis = session_->options().axes[axis].live_axis,
+                         .reading_at_zero = reading_at_zero(axis),
+                         .u = session_->axis(axis).u_offset,
+                         .from = newest_};
+  take_up(datum);
+}
+
+void ReferenceService::take_up(const FoundDatum& datum) {
+  datum_.found(datum);
+  if (recorder_ != nullptr) recorder_->attach(to_attachment(datum), newest_);
+}
+
+std::vector<std::string> ReferenceService::without_marks() const {
+  std::vector<std::string> names;
+  if (!config_.counter_card) return names;
+  for (const auto& axis : config_.counter_card->wiring.axes)
+    if (!has_marks(config_, axis.name)) names.push_back(axis.name);
+  return names;
+}
+
+std::vector<std::string> ReferenceService::unknown() const {
+  std::vector<std::string> names;
+  if (!config_.counter_card) return names;
+  const auto& axes = config_.counter_card->wiring.axes;
+  for (std::size_t i = 0; i < axes.size(); ++i)
+    if (!datum_.known(i)) names.push_back(axes[i].name);
+  return names;
+}
+
+std::vector<std::string> ReferenceService::without_zero() const {
+  auto names = unknown();
+  std::erase_if(names, [this](const std::string& name) { return has_marks(config_, name); });
+  return names;
+}
+
+void ReferenceService::watch_standing(const protocol::AxisSample& sample) {
+  if (!config_.counter_card) return;
+  const auto& live = config_.counter_card->wiring.axes;
+  const bool anew = standing_.empty() || has(sample.head.flags, protocol::SampleFlag::Restarted);
+  standing_.resize(live.size());
+  for (std::size_t i = 0; i < live.size(); ++i) {
+    const double most = std::max(kStillCounts, kStill / std::abs(live[i].scale));
+    const double moved = std::abs(static_cast<double>(sample.count[i] - standing_[i].count));
+    if (anew || moved > most) standing_[i] = {sample.count[i], sample.head.time};
+  }
+}
+
+Result<void> ReferenceService::check_standing(std::size_t axis) const {
+  const auto& name = config_.counter_card->wiring.axes[axis].name;
+  if ((latest_->missing_mask >> axis & 1u) != 0)
+    return fail(ErrorCode::Refused, fmt::format("reference: {} is not counted now", name));
+  if (newest_ - standing_[axis].since < kStandsFor)
+    return fail(ErrorCode::Refused,
+                fmt::format("reference: {} moves, or has stood for less than {} ms: where it is is not known",
+                            name, kStandsFor.count()));
+  return {};
+}
+
+Result<void> ReferenceService::stand_at_offset(const StandHere& here) {
+  const auto possible = without_marks();
+  for (const auto& name : here.axes)
+    if (std::ranges::find(possible, name) == possible.end())
+      return fail(ErrorCode::Usage,
+                  fmt::format("reference: {} has marks, or is not counted by a card", name));
+  if (possible.empty())
+    return fail(ErrorCode::Usage, "reference: there is no axis whose zero somebody could know");
+  if (!(here.u > 0.0) || !std::isfinite(here.u))
+    return fail(ErrorCode::Usage, "reference: nobody knows a zero exactly: the uncertainty must be positive");
+  if (here.acquiring)
+    return fail(ErrorCode::Refused,
+                "reference: a calibration takes readings: another zero in the middle would tear them");
+  if (!latest_) return fail(ErrorCode::Refused, "reference: the counter card has not said anything yet");
+  if (here.now - newest_ > here.patience)
+    return fail(ErrorCode::Refused, fmt::format("reference: the counter card has been silent for {:.1f} s",
+                                                std::chrono::duration<double>(here.now - newest_).count()));
+  const auto& live = config_.counter_card->wiring.axes;
+  std::vector<std::size_t> places;
+  for (const auto& name : here.axes.empty() ? possible : here.axes) {
+    places.push_back(
+        static_cast<std::size_t>(std::ranges::find(live, name, &drivers::CounterAxis::name) - live.begin()));
+    if (auto stands = check_standing(places.back()); !stands) return stands;
+  }
+  for (const std::size_t place : places) {
+    const double counted = live[place].scale * static_cast<double>(latest_->count[place]);
+    take_up(FoundDatum{.axis = place,
+                       .reading_at_zero = live[place].offset - counted,
+                       .u = here.u,
+                       .from = newest_,
+                       .stated = true});
+  }
+  return {};
+}
+
+double ReferenceService::reading_at_zero(std::size_t axis) const {
+  return daemon::reading_at_zero(config_.reference->axes[axis], session_->axis(axis));
+}
+
+std::vector<ReferenceService::AxisStatus> ReferenceService::status() const {
+  std::vector<AxisStatus> all;
+  if (!configured()) return all;
+  const auto options = reference_options(*config_.reference, *config_.counter_card);
+  for (std::size_t i = 0; i < options.axes.size(); ++i) {
+    AxisStatus& axis = all.emplace_back();
+    axis.name = options.axes[i].name;
+    axis.known = datum_.known(options.axes[i].live_axis);
+    if (!session_) continue;
+    axis.found = session_->axis(i);
+    if (axis.found.state == AxisReference::State::Found) axis.reading_at_zero = reading_at_zero(i);
+  }
+  return all;
+}
+
+}  // namespace abbe::daemon

@@ -1,0 +1,265 @@
+#include "status_reply.hpp"
+
+#include <unistd.h>
+
+#include <chrono>
+#include <cmath>
+#include <deque>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include "abbe/base/units.hpp"
+#include "abbe/config/unmeasured_air.hpp"
+#include "model_status_name.hpp"
+#include "tracker_requests.hpp"
+
+namespace abbe::daemon {
+namespace {
+
+using nlohmann::json;
+
+json device_json(const StreamHealth& h) {
+  const auto& d = h.status;
+  return {{"name", d.name},
+          {"state", d.state},
+          {"connected", d.connected},
+          {"rate_hz", h.rate_hz},
+          {"samples", d.samples},
+          {"dropped", d.dropped + d.raw_dropped},
+          {"gaps", d.gaps},
+          {"faults", d.faults},
+          {"condition", d.condition},
+          {"last_fault", d.last_fault},
+          {"clock",
+           {{"settled", d.clock.settled},
+            {"skew_ppm", d.clock.skew * 1e6},
+            {"residual_s", in_seconds(d.clock.residual)},
+            {"u_time_s", in_seconds(d.clock.u_time)}}},
+          {"latency_p50_s", h.latency_p50_s},
+          {"latency_p99_s", h.latency_p99_s}};
+}
+
+json next_json(const calib::evemu::NextTouch& next) {
+  return {{"position", next.position},
+          {"place", next.place + 1},
+          {"on", calib::evemu::name(next.on)},
+          {"touched", next.touched},
+          {"points", next.points}};
+}
+
+json session_json(const SessionStatus& s, const std::optional<calib::HeldOutFigures>& held_out) {
+  json out{{"id", s.id},
+           {"state", name(s.state)},
+           {"method", s.method},
+           {"reason", s.reason},
+           {"progress", s.progress},
+           {"points", s.points},
+           {"model_id", s.model_id},
+           {"notes", s.notes},
+           {"noted", s.noted}};
+  if (s.state == SessionState::Refused) out["code"] = word_of(s.refused_as);
+  if (s.next) out["next"] = next_json(*s.next);
+  if (held_out) {
+    out["held_out_rms_um"] = {{"candidate", held_out->candidate_rms_m * 1e6},
+                              {"no_compensation", held_out->no_compensation_rms_m * 1e6}};
+  }
+  return out;
+}
+
+/// The model in force as the hub saw it.
+struct SeenModel {
+  explicit SeenModel(const ModelStanding& standing)
+      : status(standing.status), reason(standing.reason), known(standing.model != nullptr) {
+    if (!known) return;
+    id = standing.model->id;
+    method = standing.model->method;
+    recording_sha256 = standing.model->recording_sha256;
+  }
+  v1::ModelStatus status;
+  std::string reason;
+  bool known;
+  std::string id, method, recording_sha256;
+};
+
+json model_json(const SeenModel& model) {
+  json out{{"state", status_name(model.status)}, {"reason", model.reason}};
+  if (model.known) {
+    out["id"] = model.id;
+    out["method"] = model.method;
+    out["recording_sha256"] = model.recording_sha256;
+  }
+  return out;
+}
+
+/// NaN has no place in JSON.
+json number_or_null(double value) {
+  return std::isnan(value) ? json{} : json(value);
+}
+
+json environment_json(const protocol::Snapshot& live, const Config& config) {
+  const auto& e = live.environment;
+  json out{{"air_temperature_C", number_or_null(e.air_temperature_K - kZeroCelsius_K)},
+           {"air_pressure_hPa", number_or_null(e.air_pressure_Pa * 1e-2)},
+           {"relative_humidity_percent", number_or_null(e.relative_humidity * 1e2)}};
+  json temperatures = json::object();
+  for (std::size_t i = 0; i < config.temperatures.size(); ++i)
+    temperatures[config.temperatures[i]] = number_or_null(e.temperature_K[i] - kZeroCelsius_K);
+  out["temperatures_C"] = std::move(temperatures);
+  if (const auto index = index_of_air(e, config.air))
+    out["refractive_index"] = {{"n", index->n}, {"u_n", index->u_n}};
+  return out;
+}
+
+std::string_view name(AxisReference::State state) {
+  switch (state) {
+    case AxisReference::State::Searching:
+      return "searching";
+    case AxisReference::State::Found:
+      return "found";
+    case AxisReference::State::Failed:
+      return "failed";
+  }
+  return "failed";
+}
+
+struct SeenReference {
+  bool running = false;
+  std::vector<ReferenceService::AxisStatus> axes;
+};
+
+json reference_json(const SeenReference& reference, const MachineConfig& machine) {
+  json axes = json::array();
+  for (const auto& axis : reference.axes) {
+    const AxisConfig* known = machine.find_axis(axis.name);
+    const bool rotary = known != nullptr && known->kind == AxisKind::Rotary;
+    json& out = axes.emplace_back(json{{"axis", axis.name},
+                                       {"kind", rotary ? "rotary" : "linear"},
+                                       {"known", axis.known},
+                                       {"state", name(axis.found.state)},
+                                       {"marks", axis.found.marks},
+                                       {"reason", axis.found.reason}});
+    if (axis.found.state != AxisReference::State::Found) continue;
+    out["reading_at_zero"] = axis.reading_at_zero;
+    out["u"] = axis.found.u_offset;
+  }
+  return {{"running", reference.running}, {"axes", std::move(axes)}};
+}
+
+/// A position that is not current is null: the last one would pass for where the axis is.
+json positions_json(const protocol::Snapshot& live, bool old) {
+  json positions = json::array();
+  for (std::size_t axis = 0; axis < live.axis_count; ++axis) {
+    const bool missing =
+        old || (live.missing_mask >> axis & 1u) != 0 || has(live.head.flags, protocol::SampleFlag::BusOff);
+    positions.push_back(missing ? json{} : number_or_null(live.position[axis]));
+  }
+  return positions;
+}
+
+struct SeenLink {
+  explicit SeenLink(const Publisher& publisher)
+      : state(publisher.link().state()),
+        connected(publisher.link().answers()),
+        counters(publisher.link().counters()),
+        security(publisher.security_warning().empty() ? "on" : publisher.security_warning()),
+        process(publisher.link().process()) {}
+  std::string_view state;
+  bool connected;
+  DdsLinkCounters counters;
+  std::string security;
+  const DdsProcess* process;  ///< for any thread
+};
+
+json dds_json(const SeenLink& link) {
+  json out{{"state", link.state},
+           {"connected", link.connected},
+           {"sent", link.counters.sent},
+           {"dropped_live", link.counters.dropped_live},
+           {"connections", link.counters.connections},
+           {"refused_connections", link.counters.strangers},
+           {"security", link.security}};
+  if (link.process != nullptr) {
+    out["process"] = link.process->pid();
+    out["restarts"] = link.process->restarts();
+    if (const auto end = link.process->last_end()) out["last_end"] = end->text();
+  }
+  return out;
+}
+
+/// What `status` reports, copied on the hub's thread.
+struct SeenStatus {
+  std::vector<StreamHealth> streams;
+  SeenModel model;
+  SessionStatus session;
+  std::optional<calib::HeldOutFigures> held_out;
+  std::deque<SessionStatus> ended;
+  protocol::Snapshot live;
+  bool positions_are_old = true;
+  std::optional<SeenReference> reference;
+  std::optional<std::vector<std::string>> without_zero;
+  std::optional<std::string> release_awaited, recording;
+  std::optional<SeenTracker> tracker;
+  std::optional<SeenLink> dds;
+};
+
+SeenStatus look_at_status(const Hub& hub) {
+  const HubParts& parts = hub.parts();
+  const auto axes_at = hub.live().axes_at();
+  SeenStatus seen{
+      .streams = hub.health(),
+      .model = SeenModel{hub.standing()},
+      .session = parts.calibration.status(),
+      .held_out = parts.calibration.held_out(),
+      .ended = parts.calibration.ended(),
+      .live = hub.live().view(),
+      .positions_are_old = !axes_at || parts.time.now() - *axes_at > parts.time.host(kAxesPatience),
+      .reference = {},
+      .without_zero = {},
+      .release_awaited = parts.devices.release_awaited(),
+      .recording = {},
+      .tracker = look_at_tracker(parts),
+      .dds = {}};
+  if (const auto* reference = parts.reference; reference != nullptr) {
+    if (reference->configured())
+      seen.reference = SeenReference{.running = reference->running(), .axes = reference->status()};
+    seen.without_zero = reference->without_zero();
+  }
+  if (parts.recorder != nullptr) seen.recording = parts.recorder->status().file.string();
+  if (parts.publisher != nullptr) seen.dds.emplace(*parts.publisher);
+  return seen;
+}
+
+json status_json(const SeenStatus& seen, const Config& config) {
+  json devices = json::array();
+  for (const auto& h : seen.streams) devices.push_back(device_json(h));
+  json out{{"ok", true},
+           {"process", ::getpid()},
+           {"machine", config.machine.name},
+           {"model", model_json(seen.model)},
+           {"session", session_json(seen.session, seen.held_out)},
+           {"streams", std::move(devices)}};
+  json& ended = out["ended_sessions"] = json::array();
+  for (const auto& session : seen.ended) ended.push_back(session_json(session, {}));
+  out["position_m"] = positions_json(seen.live, seen.positions_are_old);
+  if (seen.live.has_environment) out["environment"] = environment_json(seen.live, config);
+  if (const auto air = config.tracker ? unmeasured_air_text(config, config.tracker->u_scale) : std::nullopt)
+    out["unmeasured_air"] = *air;
+  if (seen.reference) out["reference"] = reference_json(*seen.reference, config.machine);
+  if (seen.without_zero) out["axes_without_zero"] = *seen.without_zero;
+  if (seen.release_awaited)
+    out["release_awaited"] = {{"reason", *seen.release_awaited}, {"command", "abbe machine release"}};
+  if (seen.tracker) out["tracker"] = tracker_json(*seen.tracker);
+  if (seen.recording) out["recording"] = *seen.recording;
+  if (seen.dds) out["dds"] = dds_json(*seen.dds);
+  return out;
+}
+}  // namespace
+
+Reply status_reply(const Hub& hub) {
+  return [seen = look_at_status(hub), &config = hub.parts().config] { return status_json(seen, config); };
+}
+
+}  // namespace abbe::daemon

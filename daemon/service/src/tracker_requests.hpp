@@ -1,0 +1,30 @@
+#pragma once
+/// The tracker on the control socket: what `abbe tracker` asks for.
+
+#include <cstdint>
+#include <deque>
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <string>
+
+#include "abbe/service/hub.hpp"
+
+namespace abbe::daemon {
+
+/// Copied on the hub's thread.
+struct SeenTracker {
+  drivers::DeviceStatus status;
+  std::deque<TrackerService::Order> orders;
+};
+/// None without a tracker. The hub's thread.
+[[nodiscard]] std::optional<SeenTracker> look_at_tracker(const HubParts& parts);
+/// Member "tracker" of "status": state, cause and the latest orders. Any thread.
+[[nodiscard]] nlohmann::json tracker_json(const SeenTracker& seen);
+
+/// Of {"do": "tracker", "order": WORD, ...}. Any thread.
+[[nodiscard]] Result<drivers::TrackerOrder> tracker_order_from_json(const nlohmann::json& request);
+/// The number of the order of `by`. The hub's thread.
+[[nodiscard]] Result<std::uint64_t> order_tracker(const HubParts& parts, const drivers::TrackerOrder& order,
+                                                  const std::string& by);
+
+}  // namespace abbe::daemon

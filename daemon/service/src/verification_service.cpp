@@ -1,0 +1,46 @@
+#include "abbe/service/verification_service.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <utility>
+
+#include "abbe/pipeline/work_aside.hpp"
+
+namespace abbe::daemon {
+
+Result<std::uint64_t> VerificationService::begin() {
+  if (auto possible = check_verification(config_); !possible) return tl::make_unexpected(possible.error());
+  destroy_aside(std::exchange(points_, StandstillPoints{standstill_options(config_)}));
+  running_ = true;
+  return ++number_;
+}
+
+Result<void> VerificationService::end(std::uint64_t number) {
+  if (const auto own = points(number); !own) return tl::make_unexpected(own.error());
+  if (running_) points_.finish();
+  running_ = false;
+  return {};
+}
+
+Result<const StandstillPoints*> VerificationService::points(std::uint64_t number) const {
+  if (number == 0 || number != number_)
+    return fail(ErrorCode::Refused, "verify: somebody else has begun another verification");
+  return &points_;
+}
+
+void VerificationService::turn(std::span<const protocol::Snapshot> snapshots) {
+  for (const auto& snapshot : snapshots) {
+    if (!running_) return;
+    points_.take(snapshot);
+    running_ = points_.points().size() < kMostPoints;
+  }
+}
+
+std::string VerificationService::stopped() const {
+  if (points_.points().size() < kMostPoints) return {};
+  return fmt::format("verify: {} standstills are the most one verification holds: later ones are not taken",
+                     kMostPoints);
+}
+
+}  // namespace abbe::daemon

@@ -1,0 +1,168 @@
+#include "abbe/tables/input_files.hpp"
+
+#include <fmt/format.h>
+
+#include <cmath>
+#include <numbers>
+
+#include "abbe/base/parsed_table.hpp"
+#include "abbe/base/units.hpp"
+#include "abbe/calib/geometry.hpp"
+
+namespace abbe::daemon {
+
+namespace {
+
+constexpr double kSecondsPerMinute = 60.0;
+
+AxisPosition position_m(const NumberTable& table, std::size_t row, std::size_t first) {
+  return {table.at(row, first) / kMmPerM, table.at(row, first + 1) / kMmPerM,
+          table.at(row, first + 2) / kMmPerM};
+}
+
+// Rows with a fault are left out of the checks below: they would only repeat it.
+
+void check_time_ascends(ParsedTable& parsed) {
+  const auto& table = parsed.table;
+  std::optional<double> before_s;
+  for (std::size_t row = 0; row < table.rows(); ++row) {
+    if (!table.sound(row)) continue;
+    const double time_s = table.at(row, 0);
+    if (before_s && time_s <= *before_s)
+      parsed.faults.add(table.line(row), 1, "time_s",
+                        fmt::format("{} after {}: time must ascend", time_s, *before_s));
+    before_s = time_s;
+  }
+}
+
+void check_path(ParsedTable& parsed) {
+  const auto& table = parsed.table;
+  for (std::size_t row = 0; row < table.rows(); ++row) {
+    if (!table.sound(row)) continue;
+    if (row > 0 && table.sound(row - 1) && position_m(table, row, 0) == position_m(table, row - 1, 0))
+      parsed.faults.add(table.line(row), 1, "", "the same vertex as before");
+    if (table.has(3) && table.at(row, 3) <= 0.0)
+      parsed.faults.add(table.line(row), 1, "feed_mm_per_min", "must be positive");
+  }
+}
+
+constexpr std::size_t kSpherical = 0;  // index of the form
+
+void check_spherical(ParsedTable& parsed) {
+  const auto& table = parsed.table;
+  if (table.form() != kSpherical) return;
+  for (std::size_t row = 0; row < table.rows(); ++row) {
+    if (!table.sound(row)) continue;
+    if (table.at(row, 1) <= 0.0) parsed.faults.add(table.line(row), 1, "range_mm", "must be positive");
+    if (std::abs(table.at(row, 2)) > 2.0 * std::numbers::pi)
+      parsed.faults.add(table.line(row), 1, "azimuth_rad", "beyond a full turn (degrees?)");
+    if (std::abs(table.at(row, 3)) > std::numbers::pi / 2.0)
+      parsed.faults.add(table.line(row), 1, "elevation_rad", "beyond the vertical (degrees?)");
+  }
+}
+
+calib::otf::TrackerObservation observation(const NumberTable& table, std::size_t row) {
+  constexpr double kSpeedWarning =
+      1.0;  // the highest status that still is a good point: emScon, point status
+  calib::otf::TrackerObservation point;
+  point.time_s = table.at(row, 0);
+  point.valid = table.at(row, 4) >= 0.0 && table.at(row, 4) <= kSpeedWarning;
+  if (table.form() == kSpherical) {
+    point.p_tracker_m = calib::from_spherical(table.at(row, 1) / kMmPerM, table.at(row, 2), table.at(row, 3));
+  } else {
+    const auto p_m = position_m(table, row, 1);
+    point.p_tracker_m = calib::Vector3(p_m[0], p_m[1], p_m[2]);
+  }
+  return point;
+}
+
+}  // namespace
+
+Result<PathFile> read_path_csv(const std::filesystem::path& file) {
+  auto parsed = parse_table(file, {{{"x_mm"}, {"y_mm"}, {"z_mm"}, {"feed_mm_per_min", false}}});
+  if (!parsed) return tl::make_unexpected(parsed.error());
+  check_rows(*parsed, 2, "vertices");
+  check_path(*parsed);
+  if (parsed->faults.any()) return tl::make_unexpected(parsed->faults.to_error());
+  const auto& table = parsed->table;
+  PathFile path{parsed->source, {}, {}, {}};
+  for (std::size_t row = 0; row < table.rows(); ++row) {
+    path.vertices_m.push_back(position_m(table, row, 0));
+    path.lines.push_back(table.line(row));
+    if (table.has(3)) path.feed_m_per_s.push_back(table.at(row, 3) / kMmPerM / kSecondsPerMinute);
+  }
+  return path;
+}
+
+Result<TrackerFile> read_tracker_csv(const std::filesystem::path& file, const ReadProgress& progress) {
+  auto parsed =
+      parse_table(file,
+                  {{{"time_s"}, {"range_mm"}, {"azimuth_rad"}, {"elevation_rad"}, {"status", false}},
+                   {{"time_s"}, {"x_mm"}, {"y_mm"}, {"z_mm"}, {"status", false}}},
+                  progress);
+  if (!parsed) return tl::make_unexpected(parsed.error());
+  check_rows(*parsed, 1, "points");
+  check_time_ascends(*parsed);
+  check_spherical(*parsed);
+  if (parsed->faults.any()) return tl::make_unexpected(parsed->faults.to_error());
+  TrackerFile tracker{parsed->source, {}};
+  tracker.points.reserve(parsed->table.rows());
+  for (std::size_t row = 0; row < parsed->table.rows(); ++row)
+    tracker.points.push_back(observation(parsed->table, row));
+  return tracker;
+}
+
+Result<EncoderFile> read_encoder_csv(const std::filesystem::path& file, const ReadProgress& progress) {
+  auto parsed = parse_table(file, {{{"time_s"}, {"x_mm"}, {"y_mm"}, {"z_mm"}}}, progress);
+  if (!parsed) return tl::make_unexpected(parsed.error());
+  check_rows(*parsed, 1, "readings");
+  check_time_ascends(*parsed);
+  if (parsed->faults.any()) return tl::make_unexpected(parsed->faults.to_error());
+  EncoderFile encoder{parsed->source, {}};
+  encoder.rows.reserve(parsed->table.rows());
+  for (std::size_t row = 0; row < parsed->table.rows(); ++row)
+    encoder.rows.push_back({parsed->table.at(row, 0), position_m(parsed->table, row, 1)});
+  return encoder;
+}
+
+Result<PointsFile> read_points_csv(const std::filesystem::path& file) {
+  auto parsed = parse_table(file, {{{"x_mm"}, {"y_mm"}, {"z_mm"}}});
+  if (!parsed) return tl::make_unexpected(parsed.error());
+  check_rows(*parsed, 1, "points");
+  if (parsed->faults.any()) return tl::make_unexpected(parsed->faults.to_error());
+  PointsFile points{parsed->source, {}};
+  for (std::size_t row = 0; row < parsed->table.rows(); ++row)
+    points.points_m.push_back(position_m(parsed->table, row, 0));
+  return points;
+}
+
+Result<VerificationFile> read_verification_csv(const std::filesystem::path& file) {
+  auto parsed = parse_table(
+      file, {{{"x_mm"}, {"y_mm"}, {"z_mm"}, {"tracker_x_mm"}, {"tracker_y_mm"}, {"tracker_z_mm"}}});
+  if (!parsed) return tl::make_unexpected(parsed.error());
+  check_rows(*parsed, 1, "points");
+  if (parsed->faults.any()) return tl::make_unexpected(parsed->faults.to_error());
+  const auto& table = parsed->table;
+  VerificationFile out{parsed->source, {}, {}};
+  const auto vector_m = [&](std::size_t row, std::size_t first) {
+    const auto p = position_m(table, row, first);
+    return calib::Vector3(p[0], p[1], p[2]);
+  };
+  for (std::size_t row = 0; row < table.rows(); ++row) {
+    out.points.push_back({vector_m(row, 0), vector_m(row, 3)});
+    out.lines.push_back(table.line(row));
+  }
+  return out;
+}
+
+std::string to_verification_csv(std::span<const calib::verify::MeasuredPoint> points) {
+  std::string text = "x_mm,y_mm,z_mm,tracker_x_mm,tracker_y_mm,tracker_z_mm\n";
+  for (const auto& p : points) {
+    const calib::Vector3 reading_mm = kMmPerM * p.reading_m, measured_mm = kMmPerM * p.measured_m;
+    text += fmt::format("{:.17g},{:.17g},{:.17g},{:.17g},{:.17g},{:.17g}\n", reading_mm.x(), reading_mm.y(),
+                        reading_mm.z(), measured_mm.x(), measured_mm.y(), measured_mm.z());
+  }
+  return text;
+}
+
+}  // namespace abbe::daemon

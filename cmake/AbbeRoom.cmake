@@ -39,6 +39,12 @@ function(abbe_compile_fast target)
   endif()
 endfunction()
 
+# For code that runs once, at start or for one command: at -O3 the templates of CLI11, fmt, toml++ and JSON are most of a
+# release build.
+function(abbe_compile_brief target)
+  target_compile_options(${target} PRIVATE $<$<CONFIG:Release>:-O1>)
+endfunction()
+
 # For Eigen's code: these two checks of every access are half of its compile time under UBSan, and what they find
 # ends the program anyway (ASan's report of a null access; SSE's trap on an unaligned one).
 function(abbe_compile_mathematics target)

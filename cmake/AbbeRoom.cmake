@@ -39,8 +39,8 @@ function(abbe_compile_fast target)
   endif()
 endfunction()
 
-# For code that runs once, at start or for one command: at -O3 the templates of CLI11, fmt, toml++ and JSON are most of a
-# release build.
+# For code that reads a configuration, writes a report or runs a command: at -O3 the templates of CLI11, fmt, toml++ and
+# JSON are most of a release build.
 function(abbe_compile_brief target)
   target_compile_options(${target} PRIVATE $<$<CONFIG:Release>:-O1>)
 endfunction()

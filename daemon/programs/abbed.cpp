@@ -15,8 +15,8 @@
 #include "abbe/base/service_manager.hpp"
 #include "abbe/config/config.hpp"
 #include "abbe/messages/dds_security.hpp"
-#include "abbe/pipeline/work_aside.hpp"
 #include "abbe/service/abbed.hpp"
+#include "abbe/service/work_aside.hpp"
 
 namespace {
 

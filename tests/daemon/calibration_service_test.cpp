@@ -7,7 +7,7 @@
 #include <thread>
 
 #include "abbe/config/config.hpp"
-#include "abbe/pipeline/work_aside.hpp"
+#include "abbe/service/work_aside.hpp"
 #include "recording_fixture.hpp"
 #include "synthetic_otf_run.hpp"
 

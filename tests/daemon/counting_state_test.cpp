@@ -8,9 +8,9 @@
 #include <fstream>
 #include <thread>
 
-#include "abbe/pipeline/work_aside.hpp"
 #include "abbe/service/counting_state_thread.hpp"
 #include "abbe/service/reference_service.hpp"
+#include "abbe/service/work_aside.hpp"
 #include "config_tables.hpp"
 #include "failing_disk.hpp"
 #include "recording_fixture.hpp"

@@ -7,7 +7,7 @@
 #include <thread>
 
 #include "abbe/drivers/status_board.hpp"
-#include "abbe/pipeline/work_aside.hpp"
+#include "abbe/service/work_aside.hpp"
 #include "allocation_count.hpp"
 #include "config_tables.hpp"
 #include "hub_bench.hpp"

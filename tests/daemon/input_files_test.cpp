@@ -1,4 +1,5 @@
 #include "abbe/tables/input_files.hpp"
+#include "abbe/base/known_errors.hpp"
 
 #include <gmock/gmock.h>
 

@@ -11,7 +11,7 @@
 #include <thread>
 
 #include "abbe/messages/cdr.hpp"
-#include "abbe/pipeline/work_aside.hpp"
+#include "abbe/service/work_aside.hpp"
 #include "synthetic_model.hpp"
 #include "text_files.hpp"
 

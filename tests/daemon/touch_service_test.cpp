@@ -6,7 +6,7 @@
 #include <optional>
 #include <string>
 
-#include "abbe/pipeline/touch_service.hpp"
+#include "abbe/service/touch_service.hpp"
 
 namespace abbe::daemon {
 namespace {

@@ -12,7 +12,7 @@
 #include <thread>
 
 #include "abbe/base/exit_deadline.hpp"
-#include "abbe/pipeline/work_aside.hpp"
+#include "abbe/service/work_aside.hpp"
 #include "synthetic_otf_run.hpp"
 
 namespace abbe::daemon {

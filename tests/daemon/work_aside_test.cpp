@@ -1,4 +1,4 @@
-#include "abbe/pipeline/work_aside.hpp"
+#include "abbe/service/work_aside.hpp"
 
 #include <gtest/gtest.h>
 #include <sys/resource.h>

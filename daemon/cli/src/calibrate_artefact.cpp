@@ -14,7 +14,7 @@
 
 #include "abbe/base/text_file.hpp"
 #include "abbe/calib/evemu/artefact_touches.hpp"
-#include "abbe/methods/otf_inputs.hpp"
+#include "abbe/config/calib_error.hpp"
 #include "abbe/tables/evemu_files.hpp"
 #include "artefact_touching.hpp"
 #include "commands.hpp"

@@ -9,7 +9,7 @@
 
 #include "abbe/base/text_file.hpp"
 #include "abbe/base/units.hpp"
-#include "abbe/methods/otf_inputs.hpp"
+#include "abbe/config/calib_error.hpp"
 #include "abbe/tables/evemu_files.hpp"
 #include "commands.hpp"
 #include "terminal.hpp"

@@ -14,6 +14,8 @@
 #include "abbe/base/text_file.hpp"
 #include "abbe/base/units.hpp"
 #include "abbe/calib/evemu/judge.hpp"
+#include "abbe/config/calib_error.hpp"
+#include "abbe/config/calibration_machine.hpp"
 #include "abbe/methods/evemu_identification.hpp"
 #include "abbe/methods/evemu_report.hpp"
 #include "abbe/methods/otf_inputs.hpp"

@@ -10,6 +10,8 @@
 #include "abbe/base/text_file.hpp"
 #include "abbe/base/units.hpp"
 #include "abbe/calib/otf/identify.hpp"
+#include "abbe/config/calib_error.hpp"
+#include "abbe/config/calibration_machine.hpp"
 #include "abbe/config/unmeasured_air.hpp"
 #include "abbe/methods/otf_identification.hpp"
 #include "abbe/methods/otf_inputs.hpp"

@@ -7,7 +7,6 @@
 
 #include "abbe/base/units.hpp"
 #include "abbe/calib/model_comparison.hpp"
-#include "abbe/methods/otf_inputs.hpp"
 #include "commands.hpp"
 #include "figures.hpp"
 #include "store_option.hpp"

@@ -5,7 +5,7 @@
 #include <memory>
 
 #include "abbe/base/units.hpp"
-#include "abbe/methods/otf_inputs.hpp"
+#include "abbe/config/calib_error.hpp"
 #include "abbe/model/model_document.hpp"
 #include "abbe/tables/input_files.hpp"
 #include "commands.hpp"

@@ -4,6 +4,7 @@
 #include <string>
 
 #include "abbe/base/error.hpp"
+#include "abbe/base/input_file.hpp"
 #include "abbe/config/config.hpp"
 #include "abbe/recording/recording_reader.hpp"
 #include "abbe/tables/input_files.hpp"

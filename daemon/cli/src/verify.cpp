@@ -11,7 +11,7 @@
 #include "abbe/base/text_file.hpp"
 #include "abbe/base/units.hpp"
 #include "abbe/cli/verification_report.hpp"
-#include "abbe/methods/otf_inputs.hpp"
+#include "abbe/config/calib_error.hpp"
 #include "abbe/tables/input_files.hpp"
 #include "commands.hpp"
 #include "daemon_socket.hpp"

@@ -1,5 +1,7 @@
 #include "abbe/config/calibration_machine.hpp"
 
+#include "abbe/config/calib_error.hpp"
+
 #include <fmt/format.h>
 
 #include <string>
@@ -33,11 +35,6 @@ Result<void> require_target(const MachineConfig& machine) {
                   "reflector's or stylus tip's centre as seen from the tool reference point, in mm along the "
                   "machine's axes; [0, 0, 0] where both are one point",
                   machine.name));
-}
-
-Error error_of(const calib::Error& error) {
-  const bool input = error.code == calib::ErrorCode::BadInput || error.code == calib::ErrorCode::NotFinite;
-  return {input ? ErrorCode::BadInput : ErrorCode::DataInsufficient, error.text};
 }
 
 }  // namespace abbe::daemon

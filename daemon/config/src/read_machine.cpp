@@ -1,16 +1,15 @@
 #include <fmt/format.h>
 
-#include <abbe/calib/axis_table.hpp>
-#include <abbe/calib/kinematic_chain.hpp>
-#include <abbe/calib/parameter_layout.hpp>
 #include <algorithm>
 #include <cmath>
 #include <tuple>
 
+#include "abbe/calib/axis_table.hpp"
+#include "abbe/calib/kinematic_chain.hpp"
+#include "abbe/calib/parameter_layout.hpp"
+#include "abbe/config/calibration_machine.hpp"
 #include "message_bounds.hpp"
 #include "readers.hpp"
-
-#include "abbe/config/calibration_machine.hpp"
 
 namespace abbe::daemon {
 

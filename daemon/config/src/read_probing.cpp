@@ -1,7 +1,6 @@
+#include "abbe/config/touch_options.hpp"
 #include "message_bounds.hpp"
 #include "readers.hpp"
-
-#include "abbe/config/touch_options.hpp"
 
 namespace abbe::daemon {
 

@@ -14,9 +14,6 @@ namespace {
 
 using protocol::emscon::WeatherMonitor;
 
-// Two and a half SYNC periods: one cycle may be lost and the axes are still known.
-constexpr double kMostLostCycles = 2.5;
-
 WeatherMonitor weather_monitor(WeatherConfig weather) {
   switch (weather) {
     case WeatherConfig::None:
@@ -149,24 +146,6 @@ drivers::IppDeviceOptions device_options(const CmmConfig& config, double speed) 
   options.session.motion_timeout = stretched(config.motion_timeout, speed);
   options.receiver.probe = config.probe;
   options.receiver.u_position_m = config.u_position_m;
-  return options;
-}
-
-AssemblerOptions assembler_options(const Config& config) {
-  AssemblerOptions options;
-  options.watermark = config.daemon.watermark;
-  options.environment = environment_use(config);
-  options.axes_compensated = config.axes_compensated();
-  if (config.encoder) {
-    const std::chrono::duration<double, std::nano> span = kMostLostCycles * config.encoder->sync_period;
-    options.interpolation.max_span = std::chrono::duration_cast<std::chrono::nanoseconds>(span);
-  }
-  if (config.counter_card) {
-    const double sample_rate_hz =
-        drivers::scan_rate_hz(config.counter_card->wiring) / config.counter_card->sample_every;
-    const std::chrono::duration<double> span{kMostLostCycles / sample_rate_hz};
-    options.interpolation.max_span = std::chrono::duration_cast<std::chrono::nanoseconds>(span);
-  }
   return options;
 }
 

@@ -10,6 +10,7 @@
 #include <string_view>
 #include <utility>
 
+#include "abbe/config/calib_error.hpp"
 #include "abbe/config/touch_options.hpp"
 #include "abbe/devices/device_options.hpp"
 #include "abbe/drivers/can/socket_can_bus.hpp"

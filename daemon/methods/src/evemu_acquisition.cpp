@@ -8,8 +8,8 @@
 
 #include "abbe/base/units.hpp"
 #include "abbe/calib/axis_mistakes.hpp"
+#include "abbe/config/calib_error.hpp"
 #include "abbe/config/linear_axes.hpp"
-#include "abbe/methods/otf_inputs.hpp"
 
 namespace abbe::daemon {
 namespace {

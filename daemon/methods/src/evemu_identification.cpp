@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <utility>
 
+#include "abbe/config/calib_error.hpp"
+#include "abbe/config/calibration_machine.hpp"
 #include "abbe/methods/otf_inputs.hpp"
 #include "abbe/pipeline/datum.hpp"
 #include "abbe/tables/evemu_files.hpp"

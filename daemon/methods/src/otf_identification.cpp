@@ -7,6 +7,8 @@
 #include "abbe/base/sha256.hpp"
 #include "abbe/calib/otf/judge.hpp"
 #include "abbe/calib/otf/observe.hpp"
+#include "abbe/config/calib_error.hpp"
+#include "abbe/config/calibration_machine.hpp"
 #include "abbe/methods/otf_inputs.hpp"
 
 namespace abbe::daemon {

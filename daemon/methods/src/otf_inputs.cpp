@@ -10,7 +10,9 @@
 #include "abbe/calib/otf/blocks.hpp"
 #include "abbe/calib/otf/orientation.hpp"
 #include "abbe/calib/otf/polyline.hpp"
+#include "abbe/config/calibration_machine.hpp"
 #include "abbe/config/stretched.hpp"
+#include "abbe/pipeline/environment_use.hpp"
 
 namespace abbe::daemon {
 namespace {

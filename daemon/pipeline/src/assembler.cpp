@@ -1,5 +1,8 @@
 #include "abbe/pipeline/assembler.hpp"
 
+#include "abbe/drivers/counter_card/wiring.hpp"
+#include "abbe/pipeline/environment_use.hpp"
+
 #include <algorithm>
 #include <array>
 #include <bit>
@@ -10,6 +13,9 @@
 
 namespace abbe::daemon {
 namespace {
+
+// Two and a half SYNC periods: one cycle may be lost and the axes are still known.
+constexpr double kMostLostCycles = 2.5;
 
 using protocol::AxisSample;
 using protocol::HostTime;
@@ -34,6 +40,24 @@ void set_axes(Snapshot& s, const drivers::AxesAt& axes) {
 }
 
 }  // namespace
+
+AssemblerOptions assembler_options(const Config& config) {
+  AssemblerOptions options;
+  options.watermark = config.daemon.watermark;
+  options.environment = environment_use(config);
+  options.axes_compensated = config.axes_compensated();
+  if (config.encoder) {
+    const std::chrono::duration<double, std::nano> span = kMostLostCycles * config.encoder->sync_period;
+    options.interpolation.max_span = std::chrono::duration_cast<std::chrono::nanoseconds>(span);
+  }
+  if (config.counter_card) {
+    const double sample_rate_hz =
+        drivers::scan_rate_hz(config.counter_card->wiring) / config.counter_card->sample_every;
+    const std::chrono::duration<double> span{kMostLostCycles / sample_rate_hz};
+    options.interpolation.max_span = std::chrono::duration_cast<std::chrono::nanoseconds>(span);
+  }
+  return options;
+}
 
 Assembler::Assembler(AssemblerOptions options)
     : options_(std::move(options)), environment_(options_.environment, options_.watermark) {}

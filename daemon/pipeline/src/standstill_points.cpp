@@ -1,5 +1,6 @@
 #include "abbe/pipeline/standstill_points.hpp"
 
+#include <algorithm>
 #include <cmath>
 
 #include "abbe/config/linear_axes.hpp"

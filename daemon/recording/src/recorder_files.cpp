@@ -3,9 +3,8 @@
 #include <cerrno>
 #include <utility>
 
-#include "recorder_state.hpp"
-
 #include "abbe/messages/recording_info.hpp"
+#include "recorder_state.hpp"
 
 namespace abbe::daemon {
 

@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "abbe/devices/device_options.hpp"
+#include "abbe/messages/recording_info.hpp"
 #include "abbe/methods/calibration_request.hpp"
 #include "abbe/methods/calibration_session.hpp"
 #include "abbe/methods/otf_inputs.hpp"

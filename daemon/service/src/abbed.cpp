@@ -29,7 +29,6 @@
 #include "abbe/drivers/cpu_latency.hpp"
 #include "abbe/drivers/real_time_memory.hpp"
 #include "abbe/messages/dds_security.hpp"
-#include "abbe/pipeline/work_aside.hpp"
 #include "abbe/publishing/dds_supervisor.hpp"
 #include "abbe/recording/left_recordings.hpp"
 #include "abbe/recording/old_recordings.hpp"
@@ -37,6 +36,7 @@
 #include "abbe/service/counting_state_thread.hpp"
 #include "abbe/service/hub.hpp"
 #include "abbe/service/journal_thread.hpp"
+#include "abbe/service/work_aside.hpp"
 #include "model_status_name.hpp"
 #include "outcome.hpp"
 

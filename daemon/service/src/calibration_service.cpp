@@ -9,7 +9,8 @@
 #include "abbe/devices/device_options.hpp"
 #include "abbe/methods/calibration_run.hpp"
 #include "abbe/methods/otf_inputs.hpp"
-#include "abbe/pipeline/work_aside.hpp"
+#include "abbe/model/model_document.hpp"
+#include "abbe/service/work_aside.hpp"
 #include "outcome.hpp"
 
 namespace abbe::daemon {

@@ -10,7 +10,7 @@
 
 #include "abbe/base/text_file.hpp"
 #include "abbe/base/wake_up.hpp"
-#include "abbe/pipeline/work_aside.hpp"
+#include "abbe/service/work_aside.hpp"
 
 namespace abbe::daemon {
 namespace {

@@ -3,7 +3,7 @@
 #include <exception>
 #include <utility>
 
-#include "abbe/pipeline/work_aside.hpp"
+#include "abbe/service/work_aside.hpp"
 
 namespace abbe::daemon {
 

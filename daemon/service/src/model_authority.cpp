@@ -4,7 +4,7 @@
 
 #include <utility>
 
-#include "abbe/pipeline/work_aside.hpp"
+#include "abbe/service/work_aside.hpp"
 #include "outcome.hpp"
 
 namespace abbe::daemon {

@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <utility>
 
-#include "abbe/pipeline/work_aside.hpp"
+#include "abbe/service/work_aside.hpp"
 
 namespace abbe::daemon {
 

@@ -11,6 +11,7 @@
 #include "abbe/base/text_file.hpp"
 #include "abbe/base/units.hpp"
 #include "abbe/config/bounded_toml.hpp"
+#include "abbe/config/calib_error.hpp"
 #include "abbe/config/calibration_machine.hpp"
 #include "abbe/config/section.hpp"
 

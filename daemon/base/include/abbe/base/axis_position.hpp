@@ -1,4 +1,5 @@
 #pragma once
+/// Where a machine of three axes stands. Pure data.
 
 #include <array>
 

@@ -1,4 +1,6 @@
 #pragma once
+/// errors.csv, as `abbe model eval` writes it and `abbe-watch` compares with it. A function, safe from any
+/// thread.
 
 #include <array>
 #include <filesystem>

@@ -12,7 +12,6 @@
 #include <vector>
 
 #include "abbe/base/faults.hpp"
-
 #include "abbe/base/input_file.hpp"
 
 namespace abbe::daemon {

@@ -1,5 +1,5 @@
 #pragma once
-/// The command line for people: `abbe`. One file per subcommand in src/cli, joined in src/cli/run_cli.cpp.
+/// The command line for people: `abbe`. One file per subcommand in cli/src, joined in cli/src/run_cli.cpp.
 /// Results go to stdout, everything else to stderr; progress and colour only to a terminal (NO_COLOR switches
 /// colour off). Exit codes: 0 done, 1 the data do not allow an answer, 2 usage, 3 bad input file, 4 input or
 /// output failed, 5 refused by the gate.

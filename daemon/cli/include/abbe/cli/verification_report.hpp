@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "abbe/base/input_file.hpp"
 #include "abbe/calib/verify/compare.hpp"
 #include "abbe/model/model_document.hpp"
 

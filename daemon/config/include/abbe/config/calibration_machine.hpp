@@ -2,7 +2,6 @@
 /// The configured machine as the input type of the mathematics. Pure.
 
 #include "abbe/base/error.hpp"
-#include "abbe/calib/error.hpp"
 #include "abbe/calib/otf/run.hpp"
 #include "abbe/config/config.hpp"
 
@@ -13,8 +12,5 @@ namespace abbe::daemon {
 
 /// BadInput where [target] offset_mm is missing: every calibration needs it, and zeros would pass for it.
 [[nodiscard]] Result<void> require_target(const MachineConfig& machine);
-
-/// An error of the mathematics in the daemon's words and exit codes.
-[[nodiscard]] Error error_of(const calib::Error& error);
 
 }  // namespace abbe::daemon

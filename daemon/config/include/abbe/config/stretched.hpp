@@ -1,4 +1,5 @@
 #pragma once
+/// Time-outs with simulated devices. Pure.
 
 #include <algorithm>
 #include <chrono>

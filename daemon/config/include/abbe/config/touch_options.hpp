@@ -1,4 +1,5 @@
 #pragma once
+/// [probe] and [counter_card] as the options of the drivers' touch detector. Pure.
 
 #include "abbe/config/config.hpp"
 #include "abbe/drivers/sampling/probe_options.hpp"

@@ -9,7 +9,6 @@
 #include "abbe/drivers/environment/device.hpp"
 #include "abbe/drivers/ippdme/device.hpp"
 #include "abbe/drivers/tracker/device.hpp"
-#include "abbe/pipeline/assembler.hpp"
 
 namespace abbe::daemon {
 
@@ -20,6 +19,5 @@ namespace abbe::daemon {
 [[nodiscard]] drivers::CounterCardOptions device_options(const CounterCardConfig& config, double speed);
 [[nodiscard]] drivers::EnvironmentDeviceOptions device_options(const EnvironmentConfig& config, double speed);
 [[nodiscard]] drivers::IppDeviceOptions device_options(const CmmConfig& config, double speed);
-[[nodiscard]] AssemblerOptions assembler_options(const Config& config);
 
 }  // namespace abbe::daemon

@@ -15,6 +15,7 @@
 #include "abbe/drivers/ippdme/session.hpp"
 #include "abbe/drivers/time_source.hpp"
 #include "abbe/pipeline/sample_source.hpp"
+#include "abbe/pipeline/stream_health.hpp"
 
 namespace abbe::daemon {
 

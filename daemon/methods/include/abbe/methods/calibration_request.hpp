@@ -8,6 +8,7 @@
 #include <variant>
 #include <vector>
 
+#include "abbe/base/axis_position.hpp"
 #include "abbe/base/error.hpp"
 #include "abbe/messages/recording_info.hpp"
 #include "abbe/methods/evemu_acquisition.hpp"

@@ -7,6 +7,7 @@
 #include <variant>
 #include <vector>
 
+#include "abbe/base/input_file.hpp"
 #include "abbe/methods/evemu_acquisition.hpp"
 #include "abbe/methods/evemu_identification.hpp"
 #include "abbe/methods/otf_identification.hpp"

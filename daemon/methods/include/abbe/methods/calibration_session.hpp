@@ -20,6 +20,7 @@
 #include <variant>
 #include <vector>
 
+#include "abbe/base/axis_position.hpp"
 #include "abbe/base/error.hpp"
 #include "abbe/methods/calibration_request.hpp"
 #include "abbe/methods/calibration_run.hpp"

@@ -10,6 +10,7 @@
 #include <string>
 #include <vector>
 
+#include "abbe/base/axis_position.hpp"
 #include "abbe/base/error.hpp"
 #include "abbe/calib/gate.hpp"
 #include "abbe/calib/otf/solve.hpp"

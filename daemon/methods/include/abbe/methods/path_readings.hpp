@@ -6,6 +6,7 @@
 #include <span>
 #include <string>
 
+#include "abbe/base/axis_position.hpp"
 #include "abbe/base/error.hpp"
 #include "abbe/tables/input_files.hpp"
 

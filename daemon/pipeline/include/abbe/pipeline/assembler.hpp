@@ -16,6 +16,7 @@
 #include <deque>
 #include <vector>
 
+#include "abbe/config/config.hpp"
 #include "abbe/drivers/interpolation.hpp"
 #include "abbe/pipeline/batch.hpp"
 #include "abbe/pipeline/environment_use.hpp"
@@ -30,6 +31,8 @@ struct AssemblerOptions {
   bool axes_compensated = false;  ///< the readings are already corrected by the control
   EnvironmentUseOptions environment;
 };
+
+[[nodiscard]] AssemblerOptions assembler_options(const Config& config);
 
 class Assembler {
  public:

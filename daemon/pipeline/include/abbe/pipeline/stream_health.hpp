@@ -1,4 +1,5 @@
 #pragma once
+/// What a stream is in, for status, journal and Health. Pure data.
 
 #include "abbe/drivers/device.hpp"
 

@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "abbe/messages/dds_link.hpp"
+#include "abbe/pipeline/session_status.hpp"
 #include "abbe/pipeline/stream_health.hpp"
 #include "abbe/publishing/idl_messages.hpp"
 #include "abbe/publishing/model_publication.hpp"

@@ -14,6 +14,7 @@
 #include "abbe/methods/calibration_run.hpp"
 #include "abbe/methods/calibration_session.hpp"
 #include "abbe/pipeline/batch.hpp"
+#include "abbe/pipeline/session_status.hpp"
 #include "abbe/recording/recording_reader.hpp"
 
 namespace abbe::daemon {

@@ -13,7 +13,8 @@
 #include <vector>
 
 #include "abbe/base/journal.hpp"
-#include "abbe/methods/calibration_session.hpp"
+#include "abbe/pipeline/session_status.hpp"
+#include "abbe/pipeline/stream_health.hpp"
 #include "abbe/publishing/publisher.hpp"
 
 namespace abbe::daemon {

@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "abbe/base/error.hpp"
+#include "abbe/base/input_file.hpp"
 #include "abbe/calib/evemu/observe.hpp"
 #include "abbe/config/config.hpp"
 #include "abbe/tables/input_files.hpp"

@@ -16,7 +16,6 @@
 #include "abbe/base/axis_position.hpp"
 #include "abbe/base/error.hpp"
 #include "abbe/base/input_file.hpp"
-#include "abbe/base/known_errors.hpp"
 #include "abbe/calib/otf/run.hpp"
 #include "abbe/calib/verify/observe.hpp"
 

@@ -1,4 +1,4 @@
-#include "abbe/pipeline/touch_service.hpp"
+#include "abbe/service/touch_service.hpp"
 
 #include <fmt/format.h>
 

@@ -1,4 +1,4 @@
-#include "abbe/pipeline/work_aside.hpp"
+#include "abbe/service/work_aside.hpp"
 
 #include <pthread.h>
 #include <sched.h>

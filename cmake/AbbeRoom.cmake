@@ -23,6 +23,7 @@ endif()
 # Identification gives the same bits on every processor. Eigen without vectors sums in one order, whatever the width of the
 # registers, where the data lie in memory and how large the caches are; nothing is fused into one rounding.
 add_compile_options(-ffp-contract=off)
+# OFF in the preset campaign, which also turns warnings off: GCC 12 has false ones in its own AVX-512 headers.
 option(ABBE_SAME_BITS "Eigen without vectors: the same bits on every processor" ON)
 function(abbe_same_bits target)
   if(NOT ABBE_SAME_BITS)

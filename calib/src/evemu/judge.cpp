@@ -110,42 +110,56 @@ bool only_follows(std::string_view cause) {
   return cause == name(Cause::Scatter) || cause == name(Cause::Form) || cause == kUncertain;
 }
 
-/// Whether the reasons so far may follow from an alternative that the uncertainty covers.
-bool may_be_behind(const Alternative& a, const CorrectionSize& size, bool only_form) {
-  constexpr double kMatters = 0.1, kMuchSurer = 0.7;
-  const bool in_time = a.cause == Cause::Touch || a.cause == Cause::Moved || a.cause == Cause::Creep ||
-                       a.cause == Cause::Drift || a.cause == Cause::SlowNoise;
-  const bool matters = a.bias_m > kMatters * size.u_m || a.u_m < kMuchSurer * size.u_m;
-  return matters && (in_time || !only_form);
+bool is_cause(const Alternative& a) {
+  return a.comparison == Comparison::Made && !only_follows(name(a.cause));
 }
 
-/// Reasons before those that only follow from them. Where no cause refuses, a likely alternative comes first
-/// although the uncertainty covers it: it made that uncertainty, or the scatter, large.
-void add_alternatives(Verdict& verdict, std::vector<Alternative> others, const CorrectionSize& size) {
-  const auto refuses = [&](const Alternative& a) {
-    return a.comparison != Comparison::Impossible && !is_covered(a, size);
-  };
-  const auto is_cause = [](const Alternative& a) {
-    return a.comparison == Comparison::Made && !only_follows(name(a.cause));
-  };
-  const auto any = [&](const auto& condition) {
-    return std::any_of(others.begin(), others.end(),
-                       [&](const Alternative& a) { return refuses(a) && condition(a); });
-  };
-  const bool cause_is_known = any(is_cause);
-  const bool form = any([](const Alternative& a) { return a.cause == Cause::Form; });
-  const bool scatter =
-      any([](const Alternative& a) { return a.cause == Cause::Scatter; }) ||
-      std::find(verdict.causes.begin(), verdict.causes.end(), kUncertain) != verdict.causes.end();
-  std::stable_partition(others.begin(), others.end(), is_cause);
+bool refuses(const Alternative& a, const CorrectionSize& size) {
+  return a.comparison != Comparison::Impossible && !is_covered(a, size);
+}
 
+/// What a run is refused for.
+struct RefusedFor {
+  bool cause = false, form = false, scatter_or_uncertainty = false;
+};
+
+RefusedFor refused_for(const Verdict& verdict, const std::vector<Alternative>& others,
+                       const CorrectionSize& size) {
+  RefusedFor refused;
+  refused.scatter_or_uncertainty =
+      std::find(verdict.causes.begin(), verdict.causes.end(), kUncertain) != verdict.causes.end();
+  for (const Alternative& a : others) {
+    if (refuses(a, size)) {
+      refused.cause |= is_cause(a);
+      refused.form |= a.cause == Cause::Form;
+      refused.scatter_or_uncertainty |= a.cause == Cause::Scatter;
+    }
+  }
+  return refused;
+}
+
+/// Whether a cause that the uncertainty covers may be behind what refuses: it made that uncertainty, or the
+/// scatter, large. The form of a ball follows from what happens while it is touched.
+bool may_be_behind(const RefusedFor& refused, const Alternative& a, const CorrectionSize& size) {
+  if (refused.cause || !is_cause(a)) {
+    return false;
+  }
+  constexpr double kMuchSurer = 0.7;  // with the cause half of the variance is gone
+  const bool matters = a.bias_m > kMatters * size.u_m || a.u_m < kMuchSurer * size.u_m;
+  const bool in_time = a.cause == Cause::Touch || a.cause == Cause::Moved || a.cause == Cause::Creep ||
+                       a.cause == Cause::Drift || a.cause == Cause::SlowNoise;
+  return matters && (refused.scatter_or_uncertainty || (refused.form && in_time));
+}
+
+/// Reasons before those that only follow from them.
+void add_alternatives(Verdict& verdict, std::vector<Alternative> others, const CorrectionSize& size) {
+  const RefusedFor refused = refused_for(verdict, others, size);
+  std::stable_partition(others.begin(), others.end(), is_cause);
   std::size_t reasons = 0;
   for (const Alternative& other : others) {
     const std::string text =
         other.cause == Cause::Scatter ? other.text : with_effect(other.text, other.bias_m, size.u_m);
-    const bool is_behind =
-        !cause_is_known && (form || scatter) && is_cause(other) && may_be_behind(other, size, !scatter);
-    if (refuses(other) || is_behind) {
+    if (refuses(other, size) || may_be_behind(refused, other, size)) {
       verdict.refuse(name(other.cause), text, reasons++);
     } else {
       verdict.notes.push_back(text);

@@ -330,7 +330,8 @@ Result<void> compare_slow_noise(Comparisons& all, const Solution& solution) {
 /// Without what the finding does to the errors seen, whose size the touches know: the more, the more likely
 /// it is. What only scatters has no known effect: NaN, and refuses.
 Alternative compared_touch(const Rows& rows, const Refit& base, const TouchFinding& f) {
-  constexpr double kNaN = std::numeric_limits<double>::quiet_NaN(), kKnownTo = 0.3;
+  constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
+  constexpr double kKnownTo = 0.3;  // at best: the surface under a touch is not the fitted one
   Alternative found{f.cause, f.text, f.log_likelihood, kNaN, rows.norm.rms_u_m(base.covariance_m2)};
   if (f.rows_m.size() == 0) {
     return found;
@@ -473,7 +474,6 @@ Result<std::vector<Alternative>> alternatives(const Observations& observations, 
   // First what moves the model: backlash is highly significant and leaves the centres where they are. Of that
   // one touch off its surface first: its ball is off its place, or the array seems to have moved, because of
   // it.
-  constexpr double kMatters = 0.1;
   const auto key = [](const Alternative& a) {
     return std::tuple(!(a.bias_m > kMatters * a.u_m), a.cause != Cause::Touch, -a.log_likelihood);
   };

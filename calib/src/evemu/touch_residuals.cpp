@@ -359,8 +359,8 @@ struct Backlash {
   bool across = false;  ///< any of them across the axes
 };
 
-/// Unknowns of some columns only. A priori of 100 um: what the touches hardly tell from radius and place
-/// stays near zero.
+/// Unknowns of some columns only. A priori 0 with a standard deviation of 100 um, more than axes in order
+/// have: what the touches hardly tell from radius and place stays near zero.
 Backlash backlash_of(const std::vector<Eigen::Index>& columns, const Eigen::MatrixXd& N,
                      const Eigen::VectorXd& g, double sigma_m) {
   constexpr double kPrior_m = 100e-6;

@@ -115,7 +115,7 @@ std::string radii_fit_with(std::span<const fit::Sphere> balls, const Calibrator&
 /// this one.
 std::optional<std::size_t> touch_off_radius(std::span<const Vector3> points_m, double radius_m) {
   constexpr std::size_t kUnknowns = 4, kRedundant = 2;
-  constexpr double kClear = 3.0;
+  constexpr double kClear = 3.0;  // rms; machines with errors of some mm bend the sphere
   const Result<fit::Sphere> all = fit::fit_sphere(points_m);
   if (!all || points_m.size() <= kUnknowns + kRedundant) {
     return std::nullopt;

@@ -36,11 +36,15 @@ enum class Cause {
 };
 [[nodiscard]] std::string_view name(Cause);
 
+/// Of its uncertainty: an alternative that moves the model by less hardly matters.
+inline constexpr double kMatters = 0.1;
+
 /// Of touches or ball centres, as a length in space (root of the trace). No touch tells a probe's noise,
 /// which averages out in the model, from short waves of the machine, which the model does not follow and
 /// which are left beside its u: u and 1.5 u together are 1.8 u.
 inline constexpr double kScatterBesideU = 1.5;
-/// Standard deviation of one touch along the normal that may be a probe's, whatever u is.
+/// Standard deviation of one touch along the normal, or of a ball centre per coordinate, that may be a
+/// probe's, whatever u is: a touch trigger probe with its lobes.
 inline constexpr double kScatterOfProbes_m = 3e-6;
 
 /// Failed: the data cannot be compared with the alternative, which may hold. Impossible: the alternative does

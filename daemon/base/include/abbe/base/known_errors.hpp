@@ -1,6 +1,5 @@
 #pragma once
-/// errors.csv, as `abbe model eval` writes it and `abbe-watch` compares with it. A function, safe from any
-/// thread.
+/// Errors known at points, to compare a received model with. A function, safe from any thread.
 
 #include <array>
 #include <filesystem>

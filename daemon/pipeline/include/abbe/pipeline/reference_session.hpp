@@ -87,7 +87,7 @@ class ReferenceSession {
 /// What a found axis says of count 0. m or rad.
 [[nodiscard]] double reading_at_zero(const ReferenceAxisConfig& marks, const AxisReference& found);
 
-/// Somebody says that axes stand where they read their offset.
+/// The request to take the present place of axes without marks as the one where they read their offset.
 struct StandHere {
   static constexpr double kByEye = 100e-6;
 

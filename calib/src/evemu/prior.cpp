@@ -212,11 +212,13 @@ Eigen::VectorXd with_added(const Eigen::VectorXd& variances, std::size_t design_
 Result<HyperParameters> most_likely(PriorKind kind, const ScaledDesign& design, std::size_t positions,
                                     const LinearGaussian& problem, std::span<const double> added) {
   Objective f{kind, design, positions, problem, added};
-  // The likelihood can have one maximum that calls the scatter noise and one that calls it pose rotation.
-  const std::array<HyperParameters, 3> starts{
+  // The likelihood can have one maximum that calls the scatter noise and one that calls it pose rotation; and
+  // one where a flat array's noise is the scale across it (large s_d, small rho) beside that of a good machine.
+  const std::array<HyperParameters, 4> starts{
       HyperParameters{.s_d_m = 5e-4, .rho = 0.6, .s_a_m = 5e-4, .s_m = 1e-5, .w_rad = 1e-4},
       HyperParameters{.s_d_m = 5e-4, .rho = 0.6, .s_a_m = 5e-4, .s_m = 5e-6, .w_rad = 2e-6},
-      HyperParameters{.s_d_m = 3e-4, .rho = 0.45, .s_a_m = 2e-4, .s_m = 8e-6, .w_rad = 3e-4}};
+      HyperParameters{.s_d_m = 3e-4, .rho = 0.45, .s_a_m = 2e-4, .s_m = 8e-6, .w_rad = 3e-4},
+      HyperParameters{.s_d_m = 1e-5, .rho = 0.45, .s_a_m = 1e-5, .s_m = 3e-6, .w_rad = 1e-5}};
   Minimum best{logarithms(starts.front())};
   const std::size_t used = kind == PriorKind::Ridge ? 1 : starts.size();
   for (std::size_t i = 0; i < used; ++i) {

@@ -57,7 +57,7 @@ Result<SlowNoise> likely_slow_noise(const Observations& o, const ScaledDesign& d
       }
     });
   };
-  for (const double per_s : {0.5, 1.0, 2.0, 4.0, 8.0}) {
+  for (const double per_s : {0.5, 1.0, 2.0, 4.0, 8.0, 16.0, 32.0}) {
     if (const Result<void> compared = consider(per_s); !compared) {
       return tl::unexpected(compared.error());
     }

@@ -38,17 +38,19 @@ bool all_inside(std::span<const Vector3> points_m, const Matrix3& M, const Machi
 }  // namespace
 
 const std::vector<AxisMistake>& axis_mistakes() {
-  static const std::vector<AxisMistake> all{{"X reversed", reversed(std::array<Eigen::Index, 1>{0})},
-                                            {"Y reversed", reversed(std::array<Eigen::Index, 1>{1})},
-                                            {"Z reversed", reversed(std::array<Eigen::Index, 1>{2})},
-                                            {"X and Y swapped", reordered({1, 0, 2})},
-                                            {"X and Z swapped", reordered({2, 1, 0})},
-                                            {"Y and Z swapped", reordered({0, 2, 1})},
-                                            {"X and Y reversed", reversed(std::array<Eigen::Index, 2>{0, 1})},
-                                            {"X and Z reversed", reversed(std::array<Eigen::Index, 2>{0, 2})},
-                                            {"Y and Z reversed", reversed(std::array<Eigen::Index, 2>{1, 2})},
-                                            {"the axes in the order Y, Z, X", reordered({2, 0, 1})},
-                                            {"the axes in the order Z, X, Y", reordered({1, 2, 0})}};
+  static const std::vector<AxisMistake> all{
+      {"X reversed", reversed(std::array<Eigen::Index, 1>{0})},
+      {"Y reversed", reversed(std::array<Eigen::Index, 1>{1})},
+      {"Z reversed", reversed(std::array<Eigen::Index, 1>{2})},
+      {"X and Y swapped", reordered({1, 0, 2})},
+      {"X and Z swapped", reordered({2, 1, 0})},
+      {"Y and Z swapped", reordered({0, 2, 1})},
+      {"X and Y reversed", reversed(std::array<Eigen::Index, 2>{0, 1})},
+      {"X and Z reversed", reversed(std::array<Eigen::Index, 2>{0, 2})},
+      {"Y and Z reversed", reversed(std::array<Eigen::Index, 2>{1, 2})},
+      {"the axes in the order Y, Z, X", reordered({2, 0, 1})},
+      {"the axes in the order Z, X, Y", reordered({1, 2, 0})}};
+
   return all;
 }
 
@@ -59,8 +61,8 @@ const std::vector<UnitMistake>& unit_mistakes() {
   return all;
 }
 
-std::vector<OutsideTravel> outside_travel(std::span<const Vector3> points_m, const MachineNodes& travel,
-                                          double tolerance_m) {
+std::vector<OutsideTravel> outside_travel(std::span<const Vector3> points_m,
+                                          const MachineNodes& travel, double tolerance_m) {
   std::vector<OutsideTravel> found;
   for (std::size_t i = 0; i < points_m.size(); ++i) {
     for (std::size_t a = 0; a < 3; ++a) {
@@ -79,6 +81,7 @@ std::string inside_travel_with(std::span<const Vector3> points_m, const MachineN
       texts.push_back(mistake.text);
     }
   }
+
   // What becomes smaller fits most machines: a unit is named where no axis explains it.
   const bool explained = !texts.empty();
   for (const UnitMistake& mistake : unit_mistakes()) {
@@ -86,6 +89,7 @@ std::string inside_travel_with(std::span<const Vector3> points_m, const MachineN
       texts.push_back(mistake.text);
     }
   }
+
   return texts.empty() ? "" : "; all are inside with " + joined_with_or(texts);
 }
 

@@ -9,23 +9,28 @@ namespace abbe::calib {
 
 Result<void> check_nodes(std::span<const double> nodes_m) {
   if (nodes_m.size() < 2) {
-    return failure(ErrorCode::BadInput, message("nodes of an axis: ", nodes_m.size(), ", needs at least 2"));
+    return failure(ErrorCode::BadInput,
+                   message("nodes of an axis: ", nodes_m.size(), ", needs at least 2"));
   }
+
   for (std::size_t i = 0; i < nodes_m.size(); ++i) {
     if (!std::isfinite(nodes_m[i])) {
-      return failure(ErrorCode::NotFinite, message("nodes of an axis: node ", i, " is not a number"));
+      return failure(ErrorCode::NotFinite,
+                     message("nodes of an axis: node ", i, " is not a number"));
     }
     if (i > 0 && !(nodes_m[i] > nodes_m[i - 1])) {
       return failure(ErrorCode::BadInput, message("nodes of an axis: ", nodes_m[i], " m after ",
                                                   nodes_m[i - 1], " m, must ascend"));
     }
   }
+
   return {};
 }
 
 BasisRow basis_row(std::span<const double> nodes_m, double position_m) {
   const auto above = std::upper_bound(nodes_m.begin(), nodes_m.end(), position_m);
-  const auto right = std::clamp<std::ptrdiff_t>(above - nodes_m.begin(), 1, std::ssize(nodes_m) - 1);
+  const auto right =
+      std::clamp<std::ptrdiff_t>(above - nodes_m.begin(), 1, std::ssize(nodes_m) - 1);
   const std::size_t k = static_cast<std::size_t>(right) - 1;
   const double u = (position_m - nodes_m[k]) / (nodes_m[k + 1] - nodes_m[k]);
   return {k, {1.0 - u, u}};
@@ -36,18 +41,22 @@ Result<AxisNodes> equidistant_nodes(double min_m, double max_m, double spacing_m
     return failure(ErrorCode::BadInput, message("nodes from ", min_m, " to ", max_m, " m, spacing ",
                                                 spacing_m, " m: not a range"));
   }
+
   // A whole number of cells; rounding must not add one when the spacing divides the range.
   const double cells = std::max(1.0, std::ceil((max_m - min_m) / spacing_m - 1e-9));
   constexpr double kMostCells = 1e5;
   if (cells > kMostCells) {
-    return failure(ErrorCode::BadInput, message("nodes from ", min_m, " to ", max_m, " m every ", spacing_m,
-                                                " m: ", cells, " cells"));
+    return failure(ErrorCode::BadInput, message("nodes from ", min_m, " to ", max_m, " m every ",
+                                                spacing_m, " m: ", cells, " cells"));
   }
+
   AxisNodes axis;
   const auto n = static_cast<std::size_t>(cells);
   for (std::size_t i = 0; i <= n; ++i) {
-    axis.nodes_m.push_back(i == n ? max_m : min_m + (max_m - min_m) * static_cast<double>(i) / cells);
+    axis.nodes_m.push_back(i == n ? max_m
+                                  : min_m + (max_m - min_m) * static_cast<double>(i) / cells);
   }
+
   axis.reference_m = (min_m <= 0 && 0 <= max_m) ? 0.0 : min_m;
   return axis;
 }

@@ -10,7 +10,8 @@
 
 namespace abbe::calib {
 
-/// Half: what is left by a correction whose error is twice its uncertainty is not larger than the correction.
+/// Half: what is left by a correction whose error is twice its uncertainty is not larger than the
+/// correction.
 inline constexpr double kMostUncertainty = 0.5;
 
 /// Of Verdict::causes.
@@ -19,8 +20,9 @@ inline constexpr std::string_view kUncertain = "uncertainty";
 /// Root mean squares of V and its standard uncertainty, without rigid motion. NaN is refused.
 inline void require_certainty(Verdict& verdict, double V_m, double u_m) {
   if (!(u_m <= kMostUncertainty * V_m)) {
-    verdict.refuse(kUncertain, message("the correction is ", 1e6 * V_m, " um rms, its standard uncertainty ",
-                                       1e6 * u_m, " um: more than half of it"));
+    verdict.refuse(kUncertain,
+                   message("the correction is ", 1e6 * V_m, " um rms, its standard uncertainty ",
+                           1e6 * u_m, " um: more than half of it"));
   }
 }
 
@@ -29,8 +31,8 @@ inline std::string with_effect(const std::string& cause, double bias_m, double u
   if (std::isnan(bias_m)) {
     return cause;  // its effect is not known
   }
-  return message(cause, ": it moves the model by ", 1e6 * bias_m, " um rms, beside an uncertainty of ",
-                 1e6 * u_m, " um");
+  return message(cause, ": it moves the model by ", 1e6 * bias_m,
+                 " um rms, beside an uncertainty of ", 1e6 * u_m, " um");
 }
 
 }  // namespace abbe::calib

@@ -16,8 +16,8 @@ using WideVector = std::array<Wide, 3>;
 using LatticePoint = std::array<std::int64_t, 3>;
 using Index = std::size_t;
 
-/// Cells of the lattice along the longest side: 2^39. Differences are below 2^39, components of a cross
-/// product below 2^79, heights below 2^121: they fit in 128 bits.
+/// Cells of the lattice along the longest side: 2^39. Differences are below 2^39, components of a
+/// cross product below 2^79, heights below 2^121: they fit in 128 bits.
 constexpr int kCellBits = 39;
 
 LatticePoint minus(const LatticePoint& a, const LatticePoint& b) {
@@ -61,7 +61,8 @@ class Quickhull {
  private:
   [[nodiscard]] bool round_to_lattice(std::span<const Vector3> points_m);
   [[nodiscard]] Vector3 position_cells(Index p) const {
-    return {static_cast<double>(at_[p][0]), static_cast<double>(at_[p][1]), static_cast<double>(at_[p][2])};
+    return {static_cast<double>(at_[p][0]), static_cast<double>(at_[p][1]),
+            static_cast<double>(at_[p][2])};
   }
   [[nodiscard]] bool start_with_four();
   void add_triangle(Index a, Index b, Index c);
@@ -111,24 +112,28 @@ bool Quickhull::round_to_lattice(std::span<const Vector3> points_m) {
     low_m_ = low_m_.cwiseMin(p);
     high_m = high_m.cwiseMax(p);
   }
+
   const double extent_m = (high_m - low_m_).maxCoeff();
   if (!(extent_m > 0.0) || !std::isfinite(extent_m)) {
     return false;
   }
+
   cell_m_ = std::ldexp(1.0, std::ilogb(extent_m) + 1 - kCellBits);
   if (!std::isnormal(cell_m_)) {
     return false;
   }
+
   for (const Vector3& p : points_m) {
     const Vector3 cells = (p - low_m_) / cell_m_;
     at_.push_back({std::llround(cells.x()), std::llround(cells.y()), std::llround(cells.z())});
   }
+
   return true;
 }
 
-/// The highest point. Of several (a face parallel to the plane, an edge), the one with least x, then y, then
-/// z: a corner, not a point between two. Half the tolerance: what is chosen is above the plane where the
-/// highest is outside of it.
+/// The highest point. Of several (a face parallel to the plane, an edge), the one with least x,
+/// then y, then z: a corner, not a point between two. Half the tolerance: what is chosen is above
+/// the plane where the highest is outside of it.
 template <class Height>
 Index Quickhull::extreme(const std::vector<Index>& among, const Height& height) const {
   std::vector<Index> left = among;
@@ -144,10 +149,12 @@ Index Quickhull::extreme(const std::vector<Index>& among, const Height& height) 
     }
     left = std::move(kept);
   };
+
   keep_highest(height);
   for (Index axis = 0; axis < 3 && left.size() > 1; ++axis) {
     keep_highest([&](Index p) { return -static_cast<double>(at_[p][axis]); });
   }
+
   return left.front();
 }
 
@@ -156,34 +163,44 @@ bool Quickhull::start_with_four() {
   std::vector<Index> all(at_.size());
   std::iota(all.begin(), all.end(), Index{0});
   const auto position = [&](Index p) { return position_cells(p); };
+
   const auto farthest = [&](const auto& distance) {
     return *std::max_element(all.begin(), all.end(),
                              [&](Index a, Index b) { return distance(a) < distance(b); });
   };
+
   const Index a = extreme(all, [&](Index p) { return -static_cast<double>(at_[p][0]); });
   const Index b = farthest([&](Index p) { return (position(p) - position(a)).norm(); });
   const Vector3 along = (position(b) - position(a)).normalized();
+
   const auto across = [&](Index p) {
     const Vector3 d = position(p) - position(a);
     return Vector3(d - along * along.dot(d));
   };
+
   const Vector3 side = across(farthest([&](Index p) { return across(p).norm(); }));
   if (!(side.norm() > tolerance_cells_)) {
     return false;
   }
-  const Index c = extreme(all, [&](Index p) { return side.normalized().dot(position(p) - position(a)); });
+
+  const Index c =
+      extreme(all, [&](Index p) { return side.normalized().dot(position(p) - position(a)); });
   add_triangle(a, b, c);
   const Triangle base = triangles_.front();
   triangles_.clear();
+
   if (!(base.length > 0.0)) {
     return false;
   }
+
   const Index far = farthest([&](Index p) { return std::abs(height_cells(base, p)); });
   if (height(base, far) == 0 || !(std::abs(height_cells(base, far)) > tolerance_cells_)) {
     return false;
   }
+
   const bool is_above = height(base, far) > 0;
-  const Index d = extreme(all, [&](Index p) { return (is_above ? 1.0 : -1.0) * height_cells(base, p); });
+  const Index d =
+      extreme(all, [&](Index p) { return (is_above ? 1.0 : -1.0) * height_cells(base, p); });
   const auto [first, second] = is_above ? std::pair{b, a} : std::pair{a, b};
   add_triangle(first, second, c);  // d is below
   add_triangle(second, first, d);
@@ -194,6 +211,7 @@ bool Quickhull::start_with_four() {
   triangles_[2].beyond = {0, 1, 3};
   triangles_[3].beyond = {0, 2, 1};
   assign(all, 0);
+
   return true;
 }
 
@@ -243,7 +261,8 @@ Index Quickhull::apex_above(Index triangle) const {
                                            : extreme(t.outside, above);
 }
 
-/// Removes the triangles the apex is strictly above. They are connected; their boundary is one closed line.
+/// Removes the triangles the apex is strictly above. They are connected; their boundary is one
+/// closed line.
 std::vector<Index> Quickhull::remove_visible(Index apex, Index from) {
   std::vector<Index> visible{from};
   triangles_[from].removed = true;
@@ -282,11 +301,13 @@ void Quickhull::add_apex(Index apex, Index from) {
       }
     }
   }
+
   for (Index t = first_new; t < triangles_.size(); ++t) {
     const Index next = begins_at_[triangles_[t].corner[1]];
     triangles_[t].beyond[1] = next;
     triangles_[next].beyond[2] = t;
   }
+
   for (const Index v : visible) {
     const std::vector<Index> points = std::exchange(triangles_[v].outside, {});
     assign(points, first_new);
@@ -317,8 +338,9 @@ std::vector<Index> Quickhull::corners() const {
   return found;
 }
 
-/// By more than the tolerance, along the mean of the normals around it, beyond all corners beside it: such a
-/// corner is outside of the hull of all others. No need to look closer at which points were chosen.
+/// By more than the tolerance, along the mean of the normals around it, beyond all corners beside
+/// it: such a corner is outside of the hull of all others. No need to look closer at which points
+/// were chosen.
 bool Quickhull::every_corner_stands_out() const {
   std::vector<Vector3> along(at_.size(), Vector3::Zero());
   const auto each_corner = [&](const auto& act) {
@@ -328,7 +350,11 @@ bool Quickhull::every_corner_stands_out() const {
       }
     }
   };
-  each_corner([&](const Triangle& t, Index at, Index, Index) { along[at] += rounded(t.normal) / t.length; });
+
+  each_corner([&](const Triangle& t, Index at, Index, Index) {
+    along[at] += rounded(t.normal) / t.length;
+  });
+
   bool all = true;
   each_corner([&](const Triangle&, Index at, Index next, Index last) {
     const Vector3 d = along[at].normalized();
@@ -336,6 +362,7 @@ bool Quickhull::every_corner_stands_out() const {
       all = all && d.dot(position_cells(at) - position_cells(beside)) > tolerance_cells_;
     }
   });
+
   return all;
 }
 
@@ -368,6 +395,7 @@ std::vector<std::size_t> hull_corners(std::span<const Vector3> points_m, double 
   const Quickhull hull(points_m, tolerance_m, ApexFrom::OwnPoints);
   std::vector<std::size_t> found = hull.corners();
   bool settled = hull.every_corner_stands_out();
+
   // Some may lie between others: again with what was found, until nothing is left out any more.
   while (!settled) {
     std::vector<Vector3> some;
@@ -380,6 +408,7 @@ std::vector<std::size_t> hull_corners(std::span<const Vector3> points_m, double 
     std::transform(kept.begin(), kept.end(), kept.begin(), [&](std::size_t i) { return found[i]; });
     found = std::move(kept);
   }
+
   return found;
 }
 

@@ -11,8 +11,10 @@ namespace {
 
 constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 
-// pi/2 and ln 2 as sums; the first parts end in so many zero bits that a multiple of 20 bits is exact.
-constexpr double kHalfPi_1 = 0x1.921fb544p+0, kHalfPi_2 = 0x1.0b4611a6p-34, kHalfPi_3 = 0x1.3198a2e037073p-69;
+// pi/2 and ln 2 as sums; the first parts end in so many zero bits that a multiple of 20 bits is
+// exact.
+constexpr double kHalfPi_1 = 0x1.921fb544p+0, kHalfPi_2 = 0x1.0b4611a6p-34,
+                 kHalfPi_3 = 0x1.3198a2e037073p-69;
 constexpr double kLn2_1 = 0x1.62e42feep-1, kLn2_2 = 0x1.a39ef35793c76p-33;
 
 /// c[0] + c[1] z + c[2] z^2 ...
@@ -36,8 +38,8 @@ constexpr std::array<double, n> inverse_factorials(int first, int step, double a
   return c;
 }
 
-// sin r = r - r^3 (1/3! - r^2/5! ...), cos r = 1 - r^2/2 + r^4 (1/4! - r^2/6! ...): the next term is below
-// 1e-18.
+// sin r = r - r^3 (1/3! - r^2/5! ...), cos r = 1 - r^2/2 + r^4 (1/4! - r^2/6! ...): the next term
+// is below 1e-18.
 constexpr auto kSine = inverse_factorials<8>(3, 2, -1.0);
 constexpr auto kCosine = inverse_factorials<8>(4, 2, -1.0);
 // e^r = 1 + r + r^2 (1/2! + r/3! ...)
@@ -72,6 +74,7 @@ SinCos sin_cos(double angle_rad) noexcept {
   const double lost = (first - difference) - second - quarters * kHalfPi_3;
   const double r = difference + lost;
   const SinCos of_rest = of_reduced(r, (difference - r) + lost);
+
   switch (static_cast<std::int64_t>(quarters) & 3) {
     case 0:
       return of_rest;
@@ -101,14 +104,17 @@ double natural_logarithm(double x) noexcept {
   if (!std::isnormal(x) || x < 0.0) return kNaN;
   int twos = 0;
   double fraction = std::frexp(x, &twos);
+
   if (fraction < 0.5 * std::numbers::sqrt2) {
     fraction *= 2.0;
     --twos;
   }
+
   const double f = fraction - 1.0;  // exact
   const double s = f / (2.0 + f);
   const double z = s * s;
   const double half_square = 0.5 * f * f;
+
   // 2 s = f - f^2/2 + s f^2/2: f itself carries no rounding.
   const double tail = s * (half_square + z * polynomial(kLogarithm, z));
   return twos * kLn2_1 - ((half_square - (tail + twos * kLn2_2)) - f);

@@ -1,9 +1,9 @@
 #pragma once
-/// Elementary functions with the same bits on every processor and with every C library: basic operations and
-/// square roots of IEEE 754 only, in a written order. The C library's differ between processors with and
-/// without fused multiply-add, and between libraries. Error below one unit in the last place, of sine and
-/// cosine at most 2^-53 more. Arguments are reduced in parts of constants that multiply without rounding
-/// ([Cody 1980]); the series are Taylor's.
+/// Elementary functions with the same bits on every processor and with every C library: basic
+/// operations and square roots of IEEE 754 only, in a written order. The C library's differ between
+/// processors with and without fused multiply-add, and between libraries. Error below one unit in
+/// the last place, of sine and cosine at most 2^-53 more. Arguments are reduced in parts of
+/// constants that multiply without rounding ([Cody 1980]); the series are Taylor's.
 
 #include <cstdint>
 #include <random>
@@ -27,8 +27,8 @@ struct SinCos {
 /// x^n by repeated multiplication.
 [[nodiscard]] double power(double x, int n) noexcept;
 
-/// Independent standard normal deviates ([Box 1958]); the same sequence for a seed everywhere, where that of
-/// std::normal_distribution is the library's choice.
+/// Independent standard normal deviates ([Box 1958]); the same sequence for a seed everywhere,
+/// where that of std::normal_distribution is the library's choice.
 class NormalDeviates {
  public:
   explicit NormalDeviates(std::uint64_t seed) : random_(seed) {}

@@ -36,35 +36,43 @@ Result<ErrorLattice> ErrorLattice::create(std::span<const LatticeNode> nodes) {
       return failure(ErrorCode::NotFinite, "lattice: a node is not a number");
     }
   }
+
   ErrorLattice lattice;
   for (std::size_t axis = 0; axis < 3; ++axis) {
     lattice.coordinates_m_[axis] = coordinates_of(nodes, static_cast<Eigen::Index>(axis));
   }
+
   const auto& [x, y, z] = lattice.coordinates_m_;
   if (nodes.empty() || x.size() * y.size() * z.size() != nodes.size()) {
     return failure(ErrorCode::DegenerateGeometry,
-                   message("lattice: ", nodes.size(), " nodes are not ", x.size(), " x ", y.size(), " x ",
-                           z.size(), " combinations"));
+                   message("lattice: ", nodes.size(), " nodes are not ", x.size(), " x ", y.size(),
+                           " x ", z.size(), " combinations"));
   }
+
   lattice.V_m_.resize(nodes.size());
   lattice.inside_.resize(nodes.size());
   std::vector<bool> seen(nodes.size(), false);
+
   for (const LatticeNode& node : nodes) {
     std::size_t index = 0;
     for (std::size_t axis = 0; axis < 3; ++axis) {
       const auto& values = lattice.coordinates_m_[axis];
-      const auto at =
-          std::lower_bound(values.begin(), values.end(), node.position_m[static_cast<Eigen::Index>(axis)]);
+      const auto at = std::lower_bound(values.begin(), values.end(),
+                                       node.position_m[static_cast<Eigen::Index>(axis)]);
       index = index * values.size() + static_cast<std::size_t>(at - values.begin());
     }
+
     if (seen[index]) {
-      return failure(ErrorCode::DegenerateGeometry,
-                     message("lattice: the node at (", node.position_m.transpose(), ") m stands twice"));
+      return failure(
+          ErrorCode::DegenerateGeometry,
+          message("lattice: the node at (", node.position_m.transpose(), ") m stands twice"));
     }
+
     seen[index] = true;
     lattice.V_m_[index] = node.V_m;
     lattice.inside_[index] = node.inside;
   }
+
   return lattice;
 }
 
@@ -77,6 +85,7 @@ bool ErrorLattice::at(const Vector3& position_m, Vector3& V_m) const {
       return false;
     }
   }
+
   Vector3 sum = Vector3::Zero();
   for (std::size_t corner = 0; corner < 8; ++corner) {
     double weight = 1.0;
@@ -91,12 +100,13 @@ bool ErrorLattice::at(const Vector3& position_m, Vector3& V_m) const {
     }
     sum += weight * V_m_[index];
   }
+
   V_m = sum;
   return true;
 }
 
-Result<FieldComparison> compare(std::span<const Vector3> positions_m, std::span<const Vector3> known_V_m,
-                                const ErrorLattice& field) {
+Result<FieldComparison> compare(std::span<const Vector3> positions_m,
+                                std::span<const Vector3> known_V_m, const ErrorLattice& field) {
   FieldComparison comparison;
   std::vector<Vector3> points, before, after;
   for (std::size_t i = 0; i < positions_m.size(); ++i) {
@@ -109,15 +119,19 @@ Result<FieldComparison> compare(std::span<const Vector3> positions_m, std::span<
     before.push_back(known_V_m[i]);
     after.push_back(known_V_m[i] - V);
   }
+
   comparison.points = points.size();
   const auto difference = rigid_free(points, after);
   if (!difference) {
-    return failure(difference.error().code, message("compare: ", points.size(),
-                                                    " points inside the lattice: ", difference.error().text));
+    return failure(difference.error().code,
+                   message("compare: ", points.size(),
+                           " points inside the lattice: ", difference.error().text));
   }
+
   comparison.before = vector_statistics(before);
   comparison.after = difference->as_stated;
   comparison.after_rigid_free = difference->rigid_free;
+
   return comparison;
 }
 

@@ -11,8 +11,8 @@
 namespace abbe::calib {
 namespace {
 
-/// Tables are defined on their whole grid; polynomials are judged where their data were. The nodes alone will
-/// not do: a thin or tilted hull passes between them.
+/// Tables are defined on their whole grid; polynomials are judged where their data were. The nodes
+/// alone will not do: a thin or tilted hull passes between them.
 std::vector<Vector3> places(const VolumetricModel& model) {
   std::vector<Vector3> found = tensor_grid(model.layout().nodes());
   if (model.polynomials() == nullptr) {
@@ -43,14 +43,15 @@ double max_slope(const VolumetricModel& model, const std::vector<Vector3>& at, c
   for (const Vector3& q : at) {
     for (int a = 0; a < 3; ++a) {
       const Vector3 step = kStep_m * Vector3::Unit(a);
-      most = std::max(most, (model.V_at(q + step, t) - model.V_at(q - step, t)).norm() / (2 * kStep_m));
+      most = std::max(most,
+                      (model.V_at(q + step, t) - model.V_at(q - step, t)).norm() / (2 * kStep_m));
     }
   }
   return most;
 }
 
-/// Along an axis V of tables is linear between nodes and multilinear in the other two: its derivative is
-/// largest on the grid lines.
+/// Along an axis V of tables is linear between nodes and multilinear in the other two: its
+/// derivative is largest on the grid lines.
 double max_step_of_tables(const VolumetricModel& model, const Vector3& t) {
   double most = 0.0;
   const MachineNodes& nodes = model.layout().nodes();
@@ -67,6 +68,7 @@ double max_step_of_tables(const VolumetricModel& model, const Vector3& t) {
       most = std::max(most, (model.V_at(beside, t) - model.V_at(q, t)).norm() / (*next - q(k)));
     }
   }
+
   return most;
 }
 
@@ -78,19 +80,21 @@ Vector3 mean(std::span<const Vector3> points) {
   return points.empty() ? sum : Vector3(sum / static_cast<double>(points.size()));
 }
 
-/// On a lattice of 32 cells a side over its box; of a volume thinner than a cell and tilted, halfway between
-/// centre and vertices.
+/// On a lattice of 32 cells a side over its box; of a volume thinner than a cell and tilted,
+/// halfway between centre and vertices.
 std::vector<Vector3> points_inside(const ValidityVolume& volume) {
   constexpr int kCells = 32;
   const std::span<const Vector3> vertices = volume.vertices_m();
   if (vertices.empty()) {
     return {};
   }
+
   Vector3 low = vertices.front(), high = low;
   for (const Vector3& v : vertices) {
     low = low.cwiseMin(v);
     high = high.cwiseMax(v);
   }
+
   std::vector<Vector3> found;
   for (int x = 0; x < kCells; ++x) {
     for (int y = 0; y < kCells; ++y) {
@@ -103,31 +107,36 @@ std::vector<Vector3> points_inside(const ValidityVolume& volume) {
       }
     }
   }
+
   if (found.empty()) {
     const Vector3 centre = mean(vertices);
     for (const Vector3& v : vertices) {
       found.push_back(0.5 * (v + centre));
     }
   }
+
   return found;
 }
 
 /// Below this share the volume has shrunk: what readings and lattice scatter by is less.
 constexpr double kSameVolume = 0.98;
 
-/// Of the width of a volume, at each of its sides: what two recalibrations of one machine differ by. An array
-/// set up by hand, to 3 degrees, loses 2.4 to 4.1 % of the volume there.
+/// Of the width of a volume, at each of its sides: what two recalibrations of one machine differ
+/// by. An array set up by hand, to 3 degrees, loses 2.4 to 4.1 % of the volume there.
 constexpr double kRim = 0.02;
 
-void compare_volumes(Verdict& verdict, const VolumetricModel& candidate, const VolumetricModel& active,
-                     const GateLimits& limits) {
+void compare_volumes(Verdict& verdict, const VolumetricModel& candidate,
+                     const VolumetricModel& active, const GateLimits& limits) {
   const double kept = kept_share(active.validity(), candidate.validity());
   if (kept >= kSameVolume) {
     return;
   }
-  const std::string seen = message("holds in ", 100 * kept, " % of the volume the active model holds in");
+
+  const std::string seen =
+      message("holds in ", 100 * kept, " % of the volume the active model holds in");
   if (kept_share(active.validity(), candidate.validity(), kRim) >= kSameVolume) {
-    verdict.notes.push_back(message(seen, "; the rest lies within ", 100 * kRim, " % of its size beside it"));
+    verdict.notes.push_back(
+        message(seen, "; the rest lies within ", 100 * kRim, " % of its size beside it"));
   } else if (limits.accept_smaller_volume) {
     verdict.notes.push_back(message(seen, ", accepted by name"));
   } else {
@@ -141,15 +150,18 @@ struct Growth {
 };
 
 /// Of the candidate against the active model, where both hold.
-Growth growth_against(const VolumetricModel& candidate, const VolumetricModel& active, const Vector3& t) {
+Growth growth_against(const VolumetricModel& candidate, const VolumetricModel& active,
+                      const Vector3& t) {
   constexpr std::size_t kEnough = 1000;
   const std::vector<Vector3> all = points_inside(active.validity());
   std::vector<Vector3> at, difference_m;
+
   for (std::size_t i = 0; i < all.size(); i += 1 + all.size() / kEnough) {
     if (candidate.validity().contains(all[i])) {
       at.push_back(all[i]);
     }
   }
+
   const Vector3 centre = mean(at);
   double u_along = 0.0, squares = 0.0;
   for (const Vector3& q : at) {
@@ -159,36 +171,42 @@ Growth growth_against(const VolumetricModel& candidate, const VolumetricModel& a
     u_along += std::sqrt(std::max(0.0, way.dot((a.cov_V_m2 + b.cov_V_m2) * way)));
     squares += way.squaredNorm();
   }
-  return {growth(at, difference_m), squares > 0.0 ? u_along / squares : 0.0};
+
+  return {common_scale(at, difference_m), squares > 0.0 ? u_along / squares : 0.0};
 }
 
 /// No residual shows a wrong scale of path, ranges or temperature; the active model does.
-void compare_scales(Verdict& verdict, const VolumetricModel& candidate, const VolumetricModel& active,
-                    const GateLimits& limits) {
+void compare_scales(Verdict& verdict, const VolumetricModel& candidate,
+                    const VolumetricModel& active, const GateLimits& limits) {
   const Growth g = growth_against(candidate, active, candidate.tool_offsets_m().front());
   constexpr double kCoverage = 2.0;
+
   // Written so that a NaN figure is refused.
-  if (std::abs(g.value) <= limits.max_growth_change + kCoverage * g.u) {
+  if (std::abs(g.value) <= limits.max_scale_change + kCoverage * g.u) {
     return;
   }
+
   const std::string seen =
       message("the machine is larger by ", 1e6 * g.value,
-              " um/m in all directions than in the active model (standard uncertainty at most ", 1e6 * g.u,
-              " um/m): wrong scale of the path, of the ranges or of a temperature");
+              " um/m in all directions than in the active model (standard uncertainty at most ",
+              1e6 * g.u, " um/m): wrong scale of the path, of the ranges or of a temperature");
+
   if (limits.accept_scale_change) {
     verdict.notes.push_back(message(seen, ", accepted by name"));
   } else {
-    verdict.refuse("scale-change", message(seen, "; if the machine was changed, accept ", kScaleChange));
+    verdict.refuse("scale-change",
+                   message(seen, "; if the machine was changed, accept ", kScaleChange));
   }
 }
 
 void say_what_was_compared(Verdict& verdict, bool holds_for_tool) {
   const HeldOutFigures& h = verdict.held_out;
   if (!holds_for_tool) {
-    verdict.notes.emplace_back("not compared with the active model: that one holds for another tool offset");
+    verdict.notes.emplace_back(
+        "not compared with the active model: that one holds for another tool offset");
   } else if (h.observations_beside_active < h.observations) {
-    verdict.notes.push_back(message("compared with the active model on ", h.observations_beside_active,
-                                    " of ", h.observations,
+    verdict.notes.push_back(message("compared with the active model on ",
+                                    h.observations_beside_active, " of ", h.observations,
                                     " held-out observations: the others lie outside its volume"));
   }
 }
@@ -197,9 +215,10 @@ void require_better(Verdict& verdict, double candidate, double other, double min
                     const char* than) {
   // Written so that a NaN figure is refused.
   if (!(candidate < other * (1.0 - min_improvement))) {
-    verdict.refuse("held-out",
-                   message("held-out residual ", candidate, " sigma is not better than ", other, " sigma ",
-                           than, min_improvement > 0 ? message(" by ", 100 * min_improvement, " %") : ""));
+    verdict.refuse(
+        "held-out",
+        message("held-out residual ", candidate, " sigma is not better than ", other, " sigma ",
+                than, min_improvement > 0 ? message(" by ", 100 * min_improvement, " %") : ""));
   }
 }
 
@@ -228,42 +247,50 @@ double kept_share(const ValidityVolume& before, const ValidityVolume& after, dou
   return static_cast<double>(kept) / static_cast<double>(asked.size());
 }
 
-Verdict decide(const VolumetricModel& candidate, const HeldOutFigures& held_out, const GateLimits& limits,
-               const VolumetricModel* active) {
+Verdict decide(const VolumetricModel& candidate, const HeldOutFigures& held_out,
+               const GateLimits& limits, const VolumetricModel* active) {
   Verdict verdict;
   verdict.held_out = held_out;
   const Vector3 t = candidate.tool_offsets_m().front();
   const std::vector<Vector3> at = places(candidate);
   verdict.max_error_m = max_error_m(candidate, at, t);
-  verdict.max_gradient =
-      candidate.polynomials() == nullptr ? max_step_of_tables(candidate, t) : max_slope(candidate, at, t);
+  verdict.max_gradient = candidate.polynomials() == nullptr ? max_step_of_tables(candidate, t)
+                                                            : max_slope(candidate, at, t);
+
   if (at.empty()) {
     verdict.refuse("nowhere", "the model holds nowhere: its size and gradient cannot be tested");
   }
+
   if (held_out.observations == 0) {
     verdict.refuse("held-out", "nothing was held out to test the model with");
   }
+
   if (held_out.not_held_out > 0) {
-    verdict.notes.push_back(message(held_out.not_held_out, " of ",
-                                    held_out.observations + held_out.not_held_out,
-                                    " observations were not held out: nothing else was measured there"));
+    verdict.notes.push_back(
+        message(held_out.not_held_out, " of ", held_out.observations + held_out.not_held_out,
+                " observations were not held out: nothing else was measured there"));
   }
+
   require_better(verdict, held_out.candidate, held_out.no_compensation, limits.min_improvement,
                  "without compensation");
   if (held_out.active) {
-    // The candidate's figure comes from fits to a part of the run, the active model from all of its own: on
-    // an unchanged machine the active model stays.
-    require_better(verdict, held_out.candidate_beside_active.value_or(held_out.candidate), *held_out.active,
-                   limits.min_improvement, "of the active model, so the active model still holds");
+    // The candidate's figure comes from fits to a part of the run, the active model from all of its
+    // own: on an unchanged machine the active model stays.
+    require_better(verdict, held_out.candidate_beside_active.value_or(held_out.candidate),
+                   *held_out.active, limits.min_improvement,
+                   "of the active model, so the active model still holds");
   }
+
   if (!(verdict.max_error_m <= limits.max_error_m)) {
     verdict.refuse("size", message("largest error ", 1e6 * verdict.max_error_m, " um exceeds ",
                                    1e6 * limits.max_error_m, " um"));
   }
+
   if (!(verdict.max_gradient <= limits.max_gradient)) {
-    verdict.refuse("slope", message("steepest change ", 1e6 * verdict.max_gradient, " um/m exceeds ",
-                                    1e6 * limits.max_gradient, " um/m"));
+    verdict.refuse("slope", message("steepest change ", 1e6 * verdict.max_gradient,
+                                    " um/m exceeds ", 1e6 * limits.max_gradient, " um/m"));
   }
+
   if (active != nullptr) {
     const bool holds_for_tool = active->holds_for_tool(t);
     say_what_was_compared(verdict, holds_for_tool);
@@ -272,6 +299,7 @@ Verdict decide(const VolumetricModel& candidate, const HeldOutFigures& held_out,
       compare_scales(verdict, candidate, *active, limits);
     }
   }
+
   verdict.accepted = verdict.reasons.empty();
   return verdict;
 }

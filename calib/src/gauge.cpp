@@ -15,10 +15,11 @@ namespace {
 
 using Condition = Eigen::RowVectorXd;
 
-/// A node within this share of a cell is the place asked for: nodes computed from a range are off by rounding
-/// (1e-16). The condition then fixes this node alone, and its zero is exact. With its neighbour weighted by
-/// less than 1e-6, the variance of the node is below 1e-12 of the neighbour's, where rounding decides its
-/// sign. V moves by the gradient times 1e-6 cells: 0.25 nm at the steepest 5 mm/m and 50 mm.
+/// A node within this share of a cell is the place asked for: nodes computed from a range are off
+/// by rounding (1e-16). The condition then fixes this node alone, and its zero is exact. With its
+/// neighbour weighted by less than 1e-6, the variance of the node is below 1e-12 of the
+/// neighbour's, where rounding decides its sign. V moves by the gradient times 1e-6 cells: 0.25 nm
+/// at the steepest 5 mm/m and 50 mm.
 constexpr double kAtNode = 1e-6;
 
 Condition zero_at(const ParameterLayout& layout, const Table& table, double position_m) {
@@ -49,25 +50,29 @@ Eigen::MatrixXd gauge_conditions(Gauge, const ParameterLayout& layout) {
       conditions.push_back(zero_at(layout, table, axis.reference_m));
     }
   }
+
   Eigen::MatrixXd K(static_cast<Eigen::Index>(conditions.size()),
                     static_cast<Eigen::Index>(layout.fit_size()));
   for (std::size_t i = 0; i < conditions.size(); ++i) {
     K.row(static_cast<Eigen::Index>(i)) = conditions[i];
   }
+
   return K;
 }
 
-Eigen::MatrixXd unobservable_combinations(const ParameterLayout& layout, std::span<const Vector3> targets_m) {
+Eigen::MatrixXd unobservable_combinations(const ParameterLayout& layout,
+                                          std::span<const Vector3> targets_m) {
   const auto parameters = static_cast<Eigen::Index>(layout.fit_size());
   const Eigen::Index n = parameters + 3 * std::max<Eigen::Index>(0, std::ssize(targets_m) - 1);
   Eigen::MatrixXd H = Eigen::MatrixXd::Zero(n, n);
+
   for (std::size_t target = 0; target < targets_m.size(); ++target) {
     for (const Vector3& q : tensor_grid(layout.nodes())) {
       const DesignColumns columns = design_columns_with_rigid(layout, q, targets_m[target]);
       std::vector<Column> row(columns.span().begin(), columns.span().end());
       for (std::size_t k = 0; k < 3 && target > 0; ++k) {
-        row.push_back(
-            {layout.fit_size() + 3 * (target - 1) + k, Vector3::Unit(static_cast<Eigen::Index>(k))});
+        row.push_back({layout.fit_size() + 3 * (target - 1) + k,
+                       Vector3::Unit(static_cast<Eigen::Index>(k))});
       }
       for (const Column& i : row) {
         for (const Column& j : row) {
@@ -77,16 +82,20 @@ Eigen::MatrixXd unobservable_combinations(const ParameterLayout& layout, std::sp
       }
     }
   }
+
   const Eigen::VectorXd scale =
       H.diagonal().unaryExpr([](double d) { return d > 0 ? 1 / std::sqrt(d) : 1.0; });
-  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(scale.asDiagonal() * H * scale.asDiagonal());
-  // Scaled eigenvalues of complete data fall into two groups, above 5e-3 and at rounding level (1e-15),
-  // whatever the order of the axes; anything between separates them.
+  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(scale.asDiagonal() * H *
+                                                             scale.asDiagonal());
+
+  // Scaled eigenvalues of complete data fall into two groups, above 5e-3 and at rounding level
+  // (1e-15), whatever the order of the axes; anything between separates them.
   constexpr double kZero = 1e-11;
   Eigen::Index nullity = 0;
   while (nullity < n && eigen.eigenvalues()(nullity) < kZero * eigen.eigenvalues()(n - 1)) {
     ++nullity;
   }
+
   return (scale.asDiagonal() * eigen.eigenvectors().leftCols(nullity)).topRows(parameters);
 }
 
@@ -95,10 +104,11 @@ Result<Eigen::VectorXd> to_gauge(Gauge gauge, const ParameterLayout& layout,
   const Eigen::MatrixXd N = unobservable_combinations(layout, targets_m);
   const Eigen::MatrixXd K = gauge_conditions(gauge, layout);
   if (N.cols() > K.rows()) {
-    return failure(ErrorCode::DegenerateGeometry,
-                   message("gauge: ", targets_m.size(), " tool offsets leave ", N.cols(), " combinations of ",
-                           layout.tables().size(), " tables undetermined, the gauge fixes ", K.rows(),
-                           "; 18 tables need three offsets that are not on a line"));
+    return failure(
+        ErrorCode::DegenerateGeometry,
+        message("gauge: ", targets_m.size(), " tool offsets leave ", N.cols(), " combinations of ",
+                layout.tables().size(), " tables undetermined, the gauge fixes ", K.rows(),
+                "; 18 tables need three offsets that are not on a line"));
   }
   const Eigen::VectorXd z = (K * N).colPivHouseholderQr().solve(-(K * U));
   return U + N * z;

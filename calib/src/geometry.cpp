@@ -16,12 +16,13 @@ Vector3 from_spherical(double range_m, double azimuth_rad, double elevation_rad)
 Result<Matrix3> rotation_from_cross_covariance(const Matrix3& cross) {
   const Eigen::JacobiSVD<Matrix3> svd(cross, Eigen::ComputeFullU | Eigen::ComputeFullV);
   const Vector3& s = svd.singularValues();
-  // Points on a line leave the second singular value at rounding level: the rotation about the line is free.
+  // Points on a line leave the second singular value at rounding level: the rotation about the line
+  // is free.
   constexpr double kFlat = 1e-9;
   if (!(s(1) > kFlat * s(0))) {
-    return failure(
-        ErrorCode::DegenerateGeometry,
-        message("best-fit rotation: the points lie on a line (singular values ", s(0), ", ", s(1), ")"));
+    return failure(ErrorCode::DegenerateGeometry,
+                   message("best-fit rotation: the points lie on a line (singular values ", s(0),
+                           ", ", s(1), ")"));
   }
   const double sign = svd.matrixU().determinant() * svd.matrixV().determinant() < 0 ? -1.0 : 1.0;
   return Matrix3(svd.matrixU() * Vector3(1, 1, sign).asDiagonal() * svd.matrixV().transpose());
@@ -29,20 +30,24 @@ Result<Matrix3> rotation_from_cross_covariance(const Matrix3& cross) {
 
 Result<RigidTransform> fit_rigid(std::span<const Vector3> from_m, std::span<const Vector3> to_m) {
   if (from_m.size() != to_m.size() || from_m.size() < 3) {
-    return failure(ErrorCode::TooFewObservations,
-                   message("rigid fit of ", from_m.size(), " to ", to_m.size(), " points: needs 3 pairs"));
+    return failure(ErrorCode::TooFewObservations, message("rigid fit of ", from_m.size(), " to ",
+                                                          to_m.size(), " points: needs 3 pairs"));
   }
+
   Vector3 from_mean = Vector3::Zero(), to_mean = Vector3::Zero();
   for (std::size_t i = 0; i < from_m.size(); ++i) {
     from_mean += from_m[i];
     to_mean += to_m[i];
   }
+
   from_mean /= static_cast<double>(from_m.size());
   to_mean /= static_cast<double>(to_m.size());
   Matrix3 cross = Matrix3::Zero();
+
   for (std::size_t i = 0; i < from_m.size(); ++i) {
     cross.noalias() += (to_m[i] - to_mean) * (from_m[i] - from_mean).transpose();
   }
+
   return rotation_from_cross_covariance(cross).map([&](const Matrix3& R) {
     return RigidTransform{R, to_mean - R * from_mean};
   });

@@ -8,7 +8,7 @@ namespace abbe::calib {
 namespace {
 
 /// `count` >= 2 of them, evenly by number, the ends always.
-std::vector<double> thinned(const std::vector<double>& nodes_m, std::size_t count) {
+std::vector<double> decimated(const std::vector<double>& nodes_m, std::size_t count) {
   std::vector<double> out;
   for (std::size_t i = 0; i < count; ++i) {
     out.push_back(nodes_m[i * (nodes_m.size() - 1) / (count - 1)]);
@@ -21,24 +21,28 @@ InterpolationGrid of_tables(const MachineNodes& nodes, std::size_t most_nodes) {
   for (std::size_t a = 0; a < 3; ++a) {
     count[a] = nodes[a].nodes_m.size();
   }
+
   InterpolationGrid grid{{}, true};
   while (count[0] * count[1] * count[2] > most_nodes) {
     --*std::max_element(count.begin(), count.end());
     grid.every_node = false;
   }
+
   for (std::size_t a = 0; a < 3; ++a) {
-    grid.axes_m[a] = thinned(nodes[a].nodes_m, count[a]);
+    grid.axes_m[a] = decimated(nodes[a].nodes_m, count[a]);
   }
+
   return grid;
 }
 
-/// How much a line through the whole box along each axis misses halfway, at most, by the second differences
-/// on a lattice.
+/// How much a line through the whole box along each axis misses halfway, at most, by the second
+/// differences on a lattice.
 std::array<double, 3> bend_m(const VolumetricModel& model, const evemu::ReadingBox& box) {
   constexpr std::array kAt{-0.8, -0.4, 0.0, 0.4, 0.8};
   constexpr double kStep = 0.2;  // of the half width: beside the lattice, within the box
   const Vector3& t = model.tool_offsets_m().front();
   std::array<double, 3> most{};
+
   for (const double x : kAt) {
     for (const double y : kAt) {
       for (const double z : kAt) {
@@ -53,10 +57,12 @@ std::array<double, 3> bend_m(const VolumetricModel& model, const evemu::ReadingB
       }
     }
   }
+
   return most;
 }
 
-/// The axis that misses most gets one node more, until they are used up: the misses go with 1 / cells^2.
+/// The axis that misses most gets one node more, until they are used up: the misses go with
+/// 1 / cells^2.
 std::array<std::size_t, 3> counts_for(const std::array<double, 3>& bend_m, std::size_t most_nodes) {
   std::array<std::size_t, 3> count{2, 2, 2};
   std::array<bool, 3> full{};
@@ -76,6 +82,7 @@ std::array<std::size_t, 3> counts_for(const std::array<double, 3>& bend_m, std::
       full[worst] = true;
     }
   }
+
   return count;
 }
 
@@ -95,7 +102,8 @@ InterpolationGrid of_polynomials(const VolumetricModel& model, std::size_t most_
 }
 
 /// What interpolation misses halfway from `q` to its neighbour at `beside_m` along axis `a`.
-Vector3 miss_halfway(const VolumetricModel& model, const Vector3& q, Eigen::Index a, double beside_m) {
+Vector3 miss_halfway(const VolumetricModel& model, const Vector3& q, Eigen::Index a,
+                     double beside_m) {
   const Vector3& t = model.tool_offsets_m().front();
   Vector3 beside = q;
   beside(a) = beside_m;
@@ -114,10 +122,12 @@ Matrix3 interpolation_moment(const VolumetricModel& model, const InterpolationGr
   if (grid.every_node) {
     return Matrix3::Zero();
   }
+
   const GridAxes& axes = grid.axes_m;
   const Vector3 q(axes[0][node[0]], axes[1][node[1]], axes[2][node[2]]);
   Matrix3 squares = Matrix3::Zero();
   Vector3 sum = Vector3::Zero();
+
   for (std::size_t a = 0; a < 3; ++a) {
     const auto k = static_cast<Eigen::Index>(a);
     Vector3 miss = Vector3::Zero();
@@ -131,6 +141,7 @@ Matrix3 interpolation_moment(const VolumetricModel& model, const InterpolationGr
     squares += miss * miss.transpose();
     sum += miss;
   }
+
   constexpr double kSquare = 8.0 / 15.0, kProduct = 4.0 / 9.0;
   return (kSquare - kProduct) * squares + kProduct * sum * sum.transpose();
 }

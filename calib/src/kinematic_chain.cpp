@@ -47,6 +47,7 @@ Result<std::vector<Token>> tokens(std::string_view chain) {
   if (open == std::string_view::npos || chain[open] != '[' || chain[close] != ']') {
     return broken(chain, "must be in brackets, for example [w X' b Y Z (C1) t]");
   }
+
   std::vector<Token> found;
   std::istringstream words{std::string(chain.substr(open + 1, close - open - 1))};
   for (std::string word; words >> word;) {
@@ -66,6 +67,7 @@ Result<std::vector<Token>> tokens(std::string_view chain) {
     token.name = name;
     found.push_back(token);
   }
+
   return found;
 }
 
@@ -73,19 +75,23 @@ Result<void> check_ends(std::string_view chain, const std::vector<Token>& found)
   if (found.size() < 2 || found.front().name != "w" || found.back().name != "t") {
     return broken(chain, "must begin with w (workpiece) and end with t (tool)");
   }
+
   std::size_t beds = 0, workpieces = 0, tools = 0;
   for (const Token& token : found) {
     beds += token.name == "b" ? 1 : 0;
     workpieces += token.name == "w" ? 1 : 0;
     tools += token.name == "t" ? 1 : 0;
-    if ((token.name == "w" || token.name == "b" || token.name == "t") && (token.primed || token.still)) {
+    if ((token.name == "w" || token.name == "b" || token.name == "t") &&
+        (token.primed || token.still)) {
       return broken(chain, message(token.name, " is not an axis: no prime, no parentheses"));
     }
   }
+
   if (beds != 1 || workpieces != 1 || tools != 1) {
-    return broken(chain,
-                  message("w, b and t once each; there are ", workpieces, " w, ", beds, " b, ", tools, " t"));
+    return broken(chain, message("w, b and t once each; there are ", workpieces, " w, ", beds,
+                                 " b, ", tools, " t"));
   }
+
   return {};
 }
 
@@ -104,13 +110,16 @@ Result<KinematicChain> KinematicChain::parse(std::string_view chain) {
   if (!found) {
     return tl::unexpected(found.error());
   }
+
   if (Result<void> ends = check_ends(chain, *found); !ends) {
     return tl::unexpected(ends.error());
   }
+
   KinematicChain result;
   result.text_ = std::string(chain);
   std::vector<Axis> order;
   bool after_bed = false;
+
   for (const Token& token : *found) {
     after_bed = after_bed || token.name == "b";
     if (token.name == "w" || token.name == "b" || token.name == "t") {
@@ -135,9 +144,11 @@ Result<KinematicChain> KinematicChain::parse(std::string_view chain) {
     order.push_back(*axis);
     result.primed_[index(*axis)] = token.primed;
   }
+
   if (order.size() != 3) {
     return broken(chain, message("needs X, Y and Z; ", order.size(), " of them are there"));
   }
+
   result.order_ = {order[0], order[1], order[2]};
   return result;
 }

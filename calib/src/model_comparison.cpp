@@ -23,45 +23,54 @@ VectorStatistics vector_statistics(std::span<const Vector3> v_m) {
   return s;
 }
 
-Result<ModelDifference> rigid_free(std::span<const Vector3> points_m, std::span<const Vector3> difference_m) {
+Result<ModelDifference> rigid_free(std::span<const Vector3> points_m,
+                                   std::span<const Vector3> difference_m) {
   if (points_m.size() != difference_m.size() || points_m.size() < 3) {
     return failure(ErrorCode::TooFewObservations,
-                   message("rigid motion from ", difference_m.size(), " vectors at ", points_m.size(),
-                           " points: needs 3"));
+                   message("rigid motion from ", difference_m.size(), " vectors at ",
+                           points_m.size(), " points: needs 3"));
   }
+
   Vector3 centre = Vector3::Zero();
   for (const Vector3& p : points_m) {
     centre += p;
   }
+
   centre /= static_cast<double>(points_m.size());
   // About the centroid translation and rotation separate: N = diag(n I, sum |p|^2 I - p p^T).
   Matrix3 inertia = Matrix3::Zero();
   Vector3 translation = Vector3::Zero(), moment = Vector3::Zero();
+
   for (std::size_t i = 0; i < points_m.size(); ++i) {
     const Matrix3 E = rotation_effect(points_m[i] - centre);
     inertia.noalias() += E.transpose() * E;
     moment.noalias() += E.transpose() * difference_m[i];
     translation += difference_m[i];
   }
+
   translation /= static_cast<double>(points_m.size());
   const Eigen::SelfAdjointEigenSolver<Matrix3> eigen(inertia, Eigen::EigenvaluesOnly);
   constexpr double kLine = 1e-12;
+
   if (!(eigen.eigenvalues()(0) > kLine * eigen.eigenvalues()(2))) {
     return failure(ErrorCode::DegenerateGeometry, "rigid motion: the points lie on a line");
   }
+
   const Vector3 rotation = inertia.ldlt().solve(moment);
   std::vector<Vector3> rest(difference_m.size());
   for (std::size_t i = 0; i < rest.size(); ++i) {
     rest[i] = difference_m[i] - translation - rotation_effect(points_m[i] - centre) * rotation;
   }
+
   ModelDifference result;
   result.as_stated = vector_statistics(difference_m);
   result.rigid_free = vector_statistics(rest);
   result.rigid << translation - rotation_effect(centre) * rotation, rotation;
+
   return result;
 }
 
-double growth(std::span<const Vector3> points_m, std::span<const Vector3> V_m) {
+double common_scale(std::span<const Vector3> points_m, std::span<const Vector3> V_m) {
   Vector3 centre = Vector3::Zero();
   for (const Vector3& p : points_m) {
     centre += p / static_cast<double>(points_m.size());

@@ -53,33 +53,41 @@ std::vector<ErrorMotion> motions(Predicate keep) {
 
 Result<ParameterLayout> ParameterLayout::observable_with_one_target(const KinematicChain& chain,
                                                                     MachineNodes nodes) {
-  return with_tables(chain, std::move(nodes),
-                     motions([&](ErrorMotion e) { return !inseparable_from_translation(chain, e); }));
+  return with_tables(chain, std::move(nodes), motions([&](ErrorMotion e) {
+                       return !inseparable_from_translation(chain, e);
+                     }));
 }
 
-Result<ParameterLayout> ParameterLayout::all_tables(const KinematicChain& chain, MachineNodes nodes) {
+Result<ParameterLayout> ParameterLayout::all_tables(const KinematicChain& chain,
+                                                    MachineNodes nodes) {
   return with_tables(chain, std::move(nodes), motions([](ErrorMotion) { return true; }));
 }
 
-Result<ParameterLayout> ParameterLayout::with_tables(const KinematicChain& chain, MachineNodes nodes,
+Result<ParameterLayout> ParameterLayout::with_tables(const KinematicChain& chain,
+                                                     MachineNodes nodes,
                                                      std::span<const ErrorMotion> wanted) {
   if (Result<void> fine = check(nodes); !fine) {
     return tl::unexpected(fine.error());
   }
+
   ParameterLayout layout;
   layout.chain_ = chain;
   layout.nodes_ = std::move(nodes);
+
   const auto is_wanted = [&](ErrorMotion e) {
     return std::find(wanted.begin(), wanted.end(), e) != wanted.end();
   };
+
   for (const ErrorMotion e : motions(is_wanted)) {
     layout.tables_.push_back({e, layout.squareness_offset_});
     layout.squareness_offset_ += layout.node_count(e.axis);
   }
+
   if (layout.tables_.size() != wanted.size()) {
     return failure(ErrorCode::BadInput, message("error tables: ", wanted.size(), " named, ",
                                                 layout.tables_.size(), " different ones"));
   }
+
   return layout;
 }
 
@@ -96,16 +104,20 @@ std::string ParameterLayout::label(std::size_t parameter) const {
   if (parameter >= rigid_offset()) {
     return std::string(kRigidNames.at(parameter - rigid_offset()));
   }
+
   if (parameter >= squareness_offset_) {
     return std::string(kSquarenessNames.at(parameter - squareness_offset_));
   }
+
   std::size_t i = tables_.size() - 1;
   while (tables_[i].offset > parameter) {
     --i;
   }
+
   const std::vector<double>& nodes = nodes_[index(tables_[i].motion.axis)].nodes_m;
   char position[32];
   std::snprintf(position, sizeof position, "%+.3f", nodes[parameter - tables_[i].offset]);
+
   return message(name(tables_[i].motion), " at ", position, " m");
 }
 

@@ -61,14 +61,17 @@ DesignColumns design_columns(const ParameterLayout& layout, const Vector3& axis_
     push(columns, table.offset + b.first, b.weight[0] * c);
     push(columns, table.offset + b.first + 1, b.weight[1] * c);
   }
+
   std::size_t parameter = layout.squareness_offset();
   for (const Vector3& c : squareness_effects(axis_position_m)) {
     push(columns, parameter++, c);
   }
+
   return columns;
 }
 
-DesignColumns design_columns_with_rigid(const ParameterLayout& layout, const Vector3& axis_position_m,
+DesignColumns design_columns_with_rigid(const ParameterLayout& layout,
+                                        const Vector3& axis_position_m,
                                         const Vector3& target_offset_m) {
   DesignColumns columns = design_columns(layout, axis_position_m, target_offset_m);
   const Matrix3 rotation = rotation_effect(axis_position_m + target_offset_m);
@@ -91,10 +94,12 @@ Vector3 volumetric_error(const ParameterLayout& layout, std::span<const double> 
     const double* node = &U[table.offset + b.first];
     V += effect(table.motion, at.lever_m[a]) * (b.weight[0] * node[0] + b.weight[1] * node[1]);
   }
+
   std::size_t parameter = layout.squareness_offset();
   for (const Vector3& c : squareness_effects(axis_position_m)) {
     V += c * U[parameter++];
   }
+
   return V;
 }
 

@@ -8,8 +8,8 @@
 
 namespace abbe::calib {
 
-/// V at the places is D c; without the best-fit rigid motion it is P D c. Holds D^T P D: the mean square of
-/// what any c and any covariance bring there.
+/// V at the places is D c; without the best-fit rigid motion it is P D c. Holds D^T P D: the mean
+/// square of what any c and any covariance bring there.
 class RigidFreeNorm {
  public:
   /// `points_m`: where the rigid motion acts (axis position and tool offset); D: 3 rows each.

@@ -5,8 +5,8 @@
 
 namespace abbe::calib {
 
-/// Descending; by QR, then Jacobi rotations of R: small values keep their accuracy relative to the columns'
-/// scale.
+/// Descending; by QR, then Jacobi rotations of R: small values keep their accuracy relative to the
+/// columns' scale.
 [[nodiscard]] Eigen::VectorXd singular_values(const Eigen::MatrixXd& A);
 
 }  // namespace abbe::calib

@@ -10,8 +10,8 @@
 namespace abbe::calib {
 namespace {
 
-/// Points closer than this to a plane lie in it: far below the micrometre a position means, far above
-/// rounding.
+/// Points closer than this to a plane lie in it: far below the micrometre a position means, far
+/// above rounding.
 constexpr double kFlat_m = 1e-9;
 
 bool by_coordinates(const Vector3& a, const Vector3& b) {
@@ -73,39 +73,45 @@ bool ValidityVolume::contains(const Vector3& p) const {
   if (faces_.empty()) {
     return false;
   }
-  return std::all_of(faces_.begin(), faces_.end(),
-                     [&](const HalfSpace& f) { return f.outward.dot(p) <= f.offset_m + kTolerance_m; });
+  return std::all_of(faces_.begin(), faces_.end(), [&](const HalfSpace& f) {
+    return f.outward.dot(p) <= f.offset_m + kTolerance_m;
+  });
 }
 
 std::vector<Vector3> spread_subset(std::span<const Vector3> points_m, std::size_t most) {
   if (points_m.size() <= most) {
     return {points_m.begin(), points_m.end()};
   }
+
   Vector3 mean = Vector3::Zero();
   for (const Vector3& p : points_m) {
     mean += p / static_cast<double>(points_m.size());
   }
+
   // Distance to the nearest one chosen; at first to the mean, which is none of them.
   std::vector<double> distance_m;
   for (const Vector3& p : points_m) {
     distance_m.push_back((p - mean).norm());
   }
+
   std::vector<bool> chosen(points_m.size(), false);
   for (std::size_t n = 0; n < most; ++n) {
-    const auto farthest =
-        static_cast<std::size_t>(std::max_element(distance_m.begin(), distance_m.end()) - distance_m.begin());
+    const auto farthest = static_cast<std::size_t>(
+        std::max_element(distance_m.begin(), distance_m.end()) - distance_m.begin());
     chosen[farthest] = true;
     for (std::size_t i = 0; i < points_m.size(); ++i) {
       const double to_it_m = (points_m[i] - points_m[farthest]).norm();
       distance_m[i] = n == 0 ? to_it_m : std::min(distance_m[i], to_it_m);
     }
   }
+
   std::vector<Vector3> subset;
   for (std::size_t i = 0; i < points_m.size(); ++i) {
     if (chosen[i]) {
       subset.push_back(points_m[i]);
     }
   }
+
   return subset;
 }
 

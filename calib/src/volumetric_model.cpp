@@ -18,6 +18,7 @@ Matrix3 propagate(const DesignColumns& columns, const Eigen::MatrixXd& covarianc
   const double* data = covariance.data();
   const auto stride = static_cast<std::size_t>(covariance.rows());
   Matrix3 half = Matrix3::Zero();  // half + half^T is the result
+
   for (std::size_t j = 0; j < columns.count; ++j) {
     const Column& cj = columns.column[j];
     const double* row = data + cj.parameter * stride;
@@ -27,6 +28,7 @@ Matrix3 propagate(const DesignColumns& columns, const Eigen::MatrixXd& covarianc
     }
     half.noalias() += sum * cj.dV_dU.transpose();
   }
+
   return half + half.transpose();
 }
 
@@ -36,15 +38,19 @@ Result<void> check_shape(const Eigen::MatrixXd& C, std::size_t parameters) {
     return failure(ErrorCode::BadInput, message("model: covariance is ", C.rows(), " x ", C.cols(),
                                                 ", parameters are ", parameters));
   }
+
   if (!C.allFinite()) {
     return failure(ErrorCode::NotFinite, "model: covariance contains a value that is not a number");
   }
+
   if (!C.isApprox(C.transpose(), 1e-12)) {
     return failure(ErrorCode::BadInput, "model: covariance is not symmetric");
   }
+
   if (n > 0 && C.diagonal().minCoeff() < 0) {
     return failure(ErrorCode::BadInput, "model: covariance has a negative variance");
   }
+
   return {};
 }
 
@@ -54,20 +60,24 @@ struct ToolSpan {
   Vector3 line = Vector3::Zero();
 };
 
-/// Offsets that differ by less than the tolerance count as one, and as on a line when so close to it.
+/// Offsets that differ by less than the tolerance count as one, and as on a line when so close to
+/// it.
 ToolSpan tool_span(std::span<const Vector3> offsets_m) {
   const Vector3& first = offsets_m.front();
   Vector3 along = Vector3::Zero();
   for (const Vector3& t : offsets_m) {
     along = (t - first).norm() > along.norm() ? Vector3(t - first) : along;
   }
+
   if (!(along.norm() > VolumetricModel::kToolTolerance_m)) {
     return {};
   }
+
   const Vector3 line = along.normalized();
   const bool beside = std::any_of(offsets_m.begin(), offsets_m.end(), [&](const Vector3& t) {
     return (t - first - line * line.dot(t - first)).norm() > VolumetricModel::kToolTolerance_m;
   });
+
   return {beside, line};
 }
 
@@ -86,25 +96,31 @@ std::vector<ErrorMotion> tables_named(std::span<const Parameter> parameters) {
 /// Stored nodes may have been through a decimal in mm.
 constexpr double kSameNode_m = 1e-9;
 
-Result<void> check_parameters(const std::vector<Parameter>& stored, const std::vector<Parameter>& expected) {
+Result<void> check_parameters(const std::vector<Parameter>& stored,
+                              const std::vector<Parameter>& expected) {
   if (stored.size() != expected.size()) {
-    return failure(ErrorCode::BadInput, message("model: ", stored.size(),
-                                                " parameters, its tables and nodes need ", expected.size()));
+    return failure(ErrorCode::BadInput,
+                   message("model: ", stored.size(), " parameters, its tables and nodes need ",
+                           expected.size()));
   }
+
   for (std::size_t i = 0; i < stored.size(); ++i) {
     const Parameter &is = stored[i], &should = expected[i];
-    const bool same_node = is.position_m.has_value() == should.position_m.has_value() &&
-                           (!is.position_m || std::abs(*is.position_m - *should.position_m) < kSameNode_m);
+    const bool same_node =
+        is.position_m.has_value() == should.position_m.has_value() &&
+        (!is.position_m || std::abs(*is.position_m - *should.position_m) < kSameNode_m);
     if (is.name != should.name || !same_node) {
-      return failure(ErrorCode::BadInput,
-                     message("model: parameter ", i, " is ", is.name, " at ", is.position_m.value_or(kNaN),
-                             " m, should be ", should.name, " at ", should.position_m.value_or(kNaN), " m"));
+      return failure(
+          ErrorCode::BadInput,
+          message("model: parameter ", i, " is ", is.name, " at ", is.position_m.value_or(kNaN),
+                  " m, should be ", should.name, " at ", should.position_m.value_or(kNaN), " m"));
     }
     if (!std::isfinite(is.value)) {
       return failure(ErrorCode::NotFinite,
                      message("model: parameter ", i, " (", is.name, ") is not a number"));
     }
   }
+
   return {};
 }
 
@@ -118,15 +134,17 @@ std::vector<Parameter> named(const evemu::EvemuModel& model) {
   return parameters;
 }
 
-Result<void> check_names(const std::vector<Parameter>& stored, std::span<const std::string> expected) {
+Result<void> check_names(const std::vector<Parameter>& stored,
+                         std::span<const std::string> expected) {
   if (stored.size() != expected.size()) {
-    return failure(ErrorCode::BadInput,
-                   message("model: ", stored.size(), " coefficients, its order needs ", expected.size()));
+    return failure(
+        ErrorCode::BadInput,
+        message("model: ", stored.size(), " coefficients, its order needs ", expected.size()));
   }
   for (std::size_t i = 0; i < stored.size(); ++i) {
     if (stored[i].name != expected[i]) {
-      return failure(ErrorCode::BadInput,
-                     message("model: coefficient ", i, " is ", stored[i].name, ", should be ", expected[i]));
+      return failure(ErrorCode::BadInput, message("model: coefficient ", i, " is ", stored[i].name,
+                                                  ", should be ", expected[i]));
     }
   }
   return {};
@@ -155,14 +173,17 @@ std::vector<Parameter> named(const ParameterLayout& layout, const Eigen::VectorX
     const auto i = static_cast<Eigen::Index>(parameters.size());
     parameters.push_back({std::move(parameter_name), position_m, U(i), std::sqrt(C(i, i))});
   };
+
   for (const Table& table : layout.tables()) {
     for (const double node_m : layout.nodes()[index(table.motion.axis)].nodes_m) {
       add(name(table.motion), node_m);
     }
   }
+
   for (const std::string_view squareness : kSquarenessNames) {
     add(std::string(squareness), std::nullopt);
   }
+
   return parameters;
 }
 
@@ -172,19 +193,24 @@ Result<void> check_covariance(const Eigen::MatrixXd& C) {
   if (Result<void> fine = check_shape(C, static_cast<std::size_t>(C.rows())); !fine) {
     return fine;
   }
+
   // Correlations; a variance below 1e-12 of the largest is rounding of what the gauge fixes.
   const double least = 1e-12 * (C.size() > 0 ? C.diagonal().maxCoeff() : 0.0);
   const Eigen::VectorXd scale = C.diagonal().unaryExpr(
       [&](double variance) { return least > 0 ? 1 / std::sqrt(std::max(variance, least)) : 1.0; });
   Eigen::MatrixXd correlation = scale.asDiagonal() * C * scale.asDiagonal();
-  // A covariance in a gauge is singular; that of ill-conditioned data (1e5) has eigenvalues wrong by 1e-6.
+
+  // A covariance in a gauge is singular; that of ill-conditioned data (1e5) has eigenvalues wrong
+  // by 1e-6.
   constexpr double kRounding = 1e-6;
   correlation.diagonal().array() += kRounding;
   if (Eigen::LLT<Eigen::Ref<Eigen::MatrixXd>>(correlation).info() != Eigen::Success) {
-    return failure(ErrorCode::BadInput,
-                   "model: covariance is not positive semidefinite: some combination of parameters has a "
-                   "negative variance");
+    return failure(
+        ErrorCode::BadInput,
+        "model: covariance is not positive semidefinite: some combination of parameters has a "
+        "negative variance");
   }
+
   return {};
 }
 
@@ -194,27 +220,33 @@ Result<VolumetricModel> VolumetricModel::from_vector(const ParameterLayout& layo
                                                      const Eigen::MatrixXd& covariance,
                                                      ValidityVolume validity) {
   if (U.size() != static_cast<Eigen::Index>(layout.model_size())) {
-    return failure(ErrorCode::BadInput,
-                   message("model: ", U.size(), " values for ", layout.model_size(), " parameters"));
+    return failure(ErrorCode::BadInput, message("model: ", U.size(), " values for ",
+                                                layout.model_size(), " parameters"));
   }
+
   if (!U.allFinite()) {
     return failure(ErrorCode::NotFinite, "model: a parameter is not a number");
   }
+
   if (Result<void> fine = check_shape(covariance, layout.model_size()); !fine) {
     return tl::unexpected(fine.error());
   }
+
   if (tool_offsets_m.empty()) {
     return failure(ErrorCode::BadInput, "model: no tool offset given");
   }
+
   if (tool_offsets_m.size() > 1 && layout.tables().size() != kAllAxes.size() * kAllMotions.size()) {
     return failure(ErrorCode::BadInput, message("model: several tool offsets, but only ",
                                                 layout.tables().size(), " of 18 tables"));
   }
+
   for (const Vector3& t : tool_offsets_m) {
     if (!t.allFinite()) {
       return failure(ErrorCode::NotFinite, "model: a tool offset is not a number");
     }
   }
+
   VolumetricModel model(layout);
   model.gauge_ = gauge;
   model.tool_offsets_m_.assign(tool_offsets_m.begin(), tool_offsets_m.end());
@@ -224,6 +256,7 @@ Result<VolumetricModel> VolumetricModel::from_vector(const ParameterLayout& layo
   model.U_ = U;
   model.covariance_ = covariance;
   model.validity_ = std::move(validity);
+
   return model;
 }
 
@@ -233,14 +266,17 @@ Result<VolumetricModel> VolumetricModel::from_polynomials(evemu::EvemuModel mode
   if (!tool_offset_m.allFinite()) {
     return failure(ErrorCode::NotFinite, "model: the tool offset is not a number");
   }
+
   if (gauge == Gauge::G1) {
     return failure(ErrorCode::BadInput, "model: gauge G1 is for tables, polynomials have Ball1");
   }
+
   Result<ParameterLayout> layout =
       ParameterLayout::with_tables(model.design().equivalent().chain(), grid_over(validity), {});
   if (!layout) {
     return failure(layout.error().code, message("model: ", layout.error().text));
   }
+
   VolumetricModel result(*std::move(layout));
   result.gauge_ = gauge;
   result.tool_offsets_m_ = {tool_offset_m};
@@ -248,6 +284,7 @@ Result<VolumetricModel> VolumetricModel::from_polynomials(evemu::EvemuModel mode
   result.covariance_ = model.covariance_m2();
   result.validity_ = std::move(validity);
   result.polynomials_ = std::move(model);
+
   return result;
 }
 
@@ -259,25 +296,31 @@ Result<VolumetricModel> polynomials_from(const ModelDescription& d) {
   if (!design) {
     return failure(design.error().code, message("model: ", design.error().text));
   }
+
   if (Result<void> fine = check_names(d.parameters, design->equivalent().names()); !fine) {
     return tl::unexpected(fine.error());
   }
+
   if (d.tool_offsets_m.size() != 1) {
-    return failure(ErrorCode::BadInput,
-                   message("model: ", d.tool_offsets_m.size(), " tool offsets, polynomials hold for one"));
+    return failure(ErrorCode::BadInput, message("model: ", d.tool_offsets_m.size(),
+                                                " tool offsets, polynomials hold for one"));
   }
+
   Eigen::VectorXd c_m(static_cast<Eigen::Index>(d.parameters.size()));
   for (std::size_t i = 0; i < d.parameters.size(); ++i) {
     c_m(static_cast<Eigen::Index>(i)) = d.parameters[i].value;
   }
+
   Result<ValidityVolume> validity = ValidityVolume::of_vertices(d.validity_hull_m);
   if (!validity) {
     return tl::unexpected(validity.error());
   }
-  return evemu::EvemuModel::of(*std::move(design), d.polynomials->ball1_m, std::move(c_m), d.covariance)
+
+  return evemu::EvemuModel::of(*std::move(design), d.polynomials->ball1_m, std::move(c_m),
+                               d.covariance)
       .and_then([&](evemu::EvemuModel model) {
-        return VolumetricModel::from_polynomials(std::move(model), d.gauge, d.tool_offsets_m.front(),
-                                                 *std::move(validity));
+        return VolumetricModel::from_polynomials(std::move(model), d.gauge,
+                                                 d.tool_offsets_m.front(), *std::move(validity));
       });
 }
 
@@ -287,27 +330,35 @@ Result<VolumetricModel> VolumetricModel::from_description(ModelDescription d) {
   if (Result<void> fine = check_covariance(d.covariance); !fine) {
     return tl::unexpected(fine.error());
   }
+
   if (d.polynomials) {
     return polynomials_from(d);
   }
-  Result<ParameterLayout> layout = ParameterLayout::with_tables(d.chain, d.nodes, tables_named(d.parameters));
+
+  Result<ParameterLayout> layout =
+      ParameterLayout::with_tables(d.chain, d.nodes, tables_named(d.parameters));
   if (!layout) {
     return failure(layout.error().code, message("model: ", layout.error().text));
   }
+
   const auto n = static_cast<Eigen::Index>(layout->model_size());
   const Eigen::VectorXd zeros = Eigen::VectorXd::Zero(n);
   const std::vector<Parameter> expected = named(*layout, zeros, Eigen::MatrixXd::Zero(n, n));
+
   if (Result<void> fine = check_parameters(d.parameters, expected); !fine) {
     return tl::unexpected(fine.error());
   }
+
   Eigen::VectorXd U(n);
   for (std::size_t i = 0; i < d.parameters.size(); ++i) {
     U(static_cast<Eigen::Index>(i)) = d.parameters[i].value;
   }
+
   Result<ValidityVolume> validity = ValidityVolume::of_vertices(d.validity_hull_m);
   if (!validity) {
     return tl::unexpected(validity.error());
   }
+
   return from_vector(*layout, d.gauge, d.tool_offsets_m, U, d.covariance, *std::move(validity));
 }
 
@@ -315,14 +366,16 @@ bool VolumetricModel::holds_for_tool(const Vector3& tool_offset_m) const {
   if (!tool_offset_m.allFinite()) {
     return false;
   }
-  return holds_for_any_tool_ || (tool_offset_m - lever_offset_m(tool_offset_m)).norm() <= kToolTolerance_m;
+  return holds_for_any_tool_ ||
+         (tool_offset_m - lever_offset_m(tool_offset_m)).norm() <= kToolTolerance_m;
 }
 
 Vector3 VolumetricModel::lever_offset_m(const Vector3& asked_m) const {
-  // Tables contain the lever across the line of their tools; using a slightly different one here would count
-  // the change for some of the rotations only.
+  // Tables contain the lever across the line of their tools; using a slightly different one here
+  // would count the change for some of the rotations only.
   const Vector3& first = tool_offsets_m_.front();
-  return holds_for_any_tool_ ? asked_m : Vector3(first + tool_line_ * tool_line_.dot(asked_m - first));
+  return holds_for_any_tool_ ? asked_m
+                             : Vector3(first + tool_line_ * tool_line_.dot(asked_m - first));
 }
 
 VolumetricError VolumetricModel::error_at(const Vector3& axis_position_m,
@@ -330,19 +383,24 @@ VolumetricError VolumetricModel::error_at(const Vector3& axis_position_m,
   VolumetricError e;
   e.inside = validity_.contains(axis_position_m);
   e.tool_ok = holds_for_tool(tool_offset_m);
+
   if (!e.tool_ok) {
     e.V_m.setConstant(kNaN);
     e.cov_V_m2.setConstant(kNaN);
     return e;
   }
+
   if (polynomials_) {
     polynomials_->V_and_cov_at(axis_position_m, e.V_m, e.cov_V_m2);
     return e;
   }
-  const DesignColumns columns = design_columns(layout_, axis_position_m, lever_offset_m(tool_offset_m));
+
+  const DesignColumns columns =
+      design_columns(layout_, axis_position_m, lever_offset_m(tool_offset_m));
   for (const Column& c : columns.span()) {
     e.V_m += c.dV_dU * U_(static_cast<Eigen::Index>(c.parameter));
   }
+
   e.cov_V_m2 = propagate(columns, covariance_);
   return e;
 }
@@ -361,17 +419,21 @@ Vector3 VolumetricModel::V_at(const Vector3& axis_position_m, const Vector3& too
 Result<Correction> VolumetricModel::command_correction(const Vector3& nominal_m,
                                                        const Vector3& tool_offset_m) const {
   if (!holds_for_tool(tool_offset_m)) {
-    return failure(ErrorCode::NotApplicable,
-                   message("correction for tool offset (", tool_offset_m.transpose(),
-                           ") m: the model holds for (", tool_offsets_m_.front().transpose(), ") m"));
+    return failure(
+        ErrorCode::NotApplicable,
+        message("correction for tool offset (", tool_offset_m.transpose(),
+                ") m: the model holds for (", tool_offsets_m_.front().transpose(), ") m"));
   }
+
   if (!nominal_m.allFinite()) {
     return failure(ErrorCode::NotFinite, "correction: the position is not a number");
   }
+
   constexpr double kSettled_m = 1e-9;
   constexpr int kMostEvaluations = 50;
   Correction correction;
   correction.inside = validity_.contains(nominal_m);
+
   while (correction.evaluations < kMostEvaluations) {
     const Vector3 next = -V_at(nominal_m + correction.c_m, tool_offset_m);
     const double step_m = (next - correction.c_m).norm();
@@ -381,6 +443,7 @@ Result<Correction> VolumetricModel::command_correction(const Vector3& nominal_m,
       return correction;
     }
   }
+
   return failure(ErrorCode::NotConverged,
                  message("correction at (", nominal_m.transpose(), ") m: still moving after ",
                          kMostEvaluations, " evaluations"));
@@ -399,10 +462,12 @@ ModelDescription VolumetricModel::description() const {
   d.parameters = parameters();
   d.covariance = covariance_;
   d.validity_hull_m.assign(validity_.vertices_m().begin(), validity_.vertices_m().end());
+
   if (polynomials_) {
-    d.polynomials = PolynomialForm{polynomials_->design().equivalent().order(), polynomials_->design().box(),
-                                   polynomials_->ball1_m()};
+    d.polynomials = PolynomialForm{polynomials_->design().equivalent().order(),
+                                   polynomials_->design().box(), polynomials_->ball1_m()};
   }
+
   return d;
 }
 

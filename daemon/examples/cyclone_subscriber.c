@@ -26,7 +26,7 @@ struct publisher {
   dds_guid_t participant;
   int64_t first_ns, last_ns; /* of its samples; last_ns 0: free */
   int64_t alone_ns;          /* it sent since the last sample of the pinned publisher */
-  bool rival;
+  bool foreign;
   abbe_v1_ModelState state;
   dds_instance_handle_t state_from; /* its writer; 0: no state counts */
   int64_t state_heard_ns;
@@ -120,7 +120,7 @@ static struct publisher* find_publisher(struct machine* m, const dds_guid_t* par
 }
 
 /* The publisher a sample came from counts for the machine: it is the one heard first, or the one before has
-   been silent for 300 ms (10 s for a rival, which sent beside it) while this one sent for 30 ms. Reasons and
+   been silent for 300 ms (10 s for a foreign, which sent beside it) while this one sent for 30 ms. Reasons and
    limits are in publisher_pin.hpp and dds.md. */
 static bool is_pinned(struct machine* m, struct publisher* p) {
   const int64_t now_ns = now_in_ns(), pause_ns = now_ns - p->last_ns;
@@ -128,25 +128,25 @@ static bool is_pinned(struct machine* m, struct publisher* p) {
   if (m->pinned != p) {
     const int64_t silence_ns = m->pinned == NULL ? INT64_MAX : now_ns - m->pinned->last_ns;
     p->alone_ns += pause_ns < 10 * millisecond_ns ? pause_ns : 10 * millisecond_ns;
-    const bool next = silence_ns >= (p->rival ? 10 * second_ns : 300 * millisecond_ns) &&
+    const bool next = silence_ns >= (p->foreign ? 10 * second_ns : 300 * millisecond_ns) &&
                       p->alone_ns >= 30 * millisecond_ns;
     if (!next && m->pinned != NULL) return false;
     if (m->pinned != NULL) m->pinned->last_ns = 0; /* forgotten */
     m->pinned = p;
-    p->rival = false;
+    p->foreign = false;
     print_participant("%s: publisher is %s\n", m->name, &p->participant);
   }
   for (struct publisher* other = m->publishers; other < m->publishers + MOST_PUBLISHERS; ++other) {
     if (other == p || other->last_ns == 0) continue;
-    other->rival |= now_ns - other->first_ns >= 100 * millisecond_ns;
+    other->foreign |= now_ns - other->first_ns >= 100 * millisecond_ns;
     other->alone_ns = 0;
   }
   return true;
 }
 
-static void report_rival(struct machine* m, const struct publisher* p) {
+static void report_foreign_sync(struct machine* m, const struct publisher* p) {
   const int64_t now_ns = now_in_ns();
-  if (!p->rival || (m->rival_reported_ns != 0 && now_ns - m->rival_reported_ns < 10 * second_ns)) return;
+  if (!p->foreign || (m->rival_reported_ns != 0 && now_ns - m->rival_reported_ns < 10 * second_ns)) return;
   m->rival_reported_ns = now_ns;
   print_participant("%s: rival publisher %s is ignored\n", m->name, &p->participant);
 }
@@ -215,7 +215,7 @@ static void keep(const abbe_v1_ModelState* state, dds_entity_t reader, dds_insta
   p->state_from = writer;
   p->state_heard_ns = now_in_ns();
   if (!is_pinned(m, p)) {
-    report_rival(m, p);
+    report_foreign_sync(m, p);
     return;
   }
   printf("%s: state %d %s\n", state->machine, (int)state->state, state->reason);
@@ -227,7 +227,7 @@ static void decide(const abbe_v1_Compensation* c, dds_entity_t reader, dds_insta
   if (p == NULL) return;
   const int64_t age_ns = c->age_ns + delay_of(c, p);
   if (!is_pinned(m, p)) {
-    report_rival(m, p);
+    report_foreign_sync(m, p);
     return;
   }
   const char* reason = why_not(c, age_ns, p);

@@ -43,16 +43,17 @@ using SteadyClock = std::chrono::steady_clock;
 /// ModelState is repeated every second, also if nothing changes.
 constexpr std::chrono::milliseconds kLongestSilence{1500};
 
-/// How much longer a vector was on its way than the quickest one of its publisher: in the network, in a
-/// socket while this process stood still, waiting for the lock. The two clocks need not agree; they may drift
-/// apart by 200 ppm.
+/// How much longer a vector was on its way than the quickest one of its publisher: in the network,
+/// in a socket while this process stood still, waiting for the lock. The two clocks need not agree;
+/// they may drift apart by 200 ppm.
 class Delay {
  public:
   std::int64_t of_ns(const Compensation& c) {
     constexpr std::int64_t kSecond_ns = 1'000'000'000;
     const std::int64_t now_ns = SteadyClock::now().time_since_epoch().count();
     const std::int64_t offset_ns = now_ns - (c.host_time_ns() + c.age_ns());
-    // Another clock than the publisher's before, unless the first vector shows the same within 20 ms.
+    // Another clock than the publisher's before, unless the first vector shows the same within
+    // 20 ms.
     if (inherited_ && std::abs(offset_ns - least_ns_) > kSecond_ns / 50) first_ns_ = 0;
     inherited_ = false;
     if (first_ns_ == 0) first_ns_ = last_ns_ = now_ns, least_ns_ = offset_ns;
@@ -87,12 +88,13 @@ struct Publisher {
 struct Machine {
   PublisherPin pin;
   std::map<ParticipantId, Publisher> publishers;
-  std::optional<SteadyClock::time_point> rival_reported;
+  std::optional<SteadyClock::time_point> foreign_sync_reported;
 };
 
-/// The rule of abbe_v1.idl. `alive`: the writer of the state keeps its lease. `age_ns`: with what the vector
-/// waited since it was published.
-const char* why_not(const Compensation& c, std::int64_t age_ns, const Publisher& publisher, bool alive) {
+/// The rule of abbe_v1.idl. `alive`: the writer of the state keeps its lease. `age_ns`: with what
+/// the vector waited since it was published.
+const char* why_not(const Compensation& c, std::int64_t age_ns, const Publisher& publisher,
+                    bool alive) {
   const ModelState& state = publisher.state;
   if (!alive) return "the ModelState publisher is not alive";
   if (state.state() != abbe::v1::MODEL_ACTIVE || c.state() != abbe::v1::MODEL_ACTIVE)
@@ -106,8 +108,8 @@ const char* why_not(const Compensation& c, std::int64_t age_ns, const Publisher&
 }
 
 class Listener : public DataReaderListener {
-  /// Called for every change of one writer. What a lost writer said counts no longer, also when it comes
-  /// back: it repeats its state within a second.
+  /// Called for every change of one writer. What a lost writer said counts no longer, also when it
+  /// comes back: it repeats its state within a second.
   void on_liveliness_changed(DataReader*, const LivelinessChangedStatus& status) override {
     const std::lock_guard lock(mutex_);
     const Writer writer = status.last_publication_handle;
@@ -150,20 +152,25 @@ class Listener : public DataReaderListener {
     const auto former = machine.pin.pinned();
     const Verdict verdict = machine.pin.heard(id, SteadyClock::now());
     const auto [found, is_new] = machine.publishers.try_emplace(id);
-    if (is_new && former) found->second.delay = machine.publishers[*former].delay.for_next_publisher();
+    if (is_new && former)
+      found->second.delay = machine.publishers[*former].delay.for_next_publisher();
     if (verdict == Verdict::NewlyPinned)
       std::printf("%s: publisher is %s\n", name.c_str(), text_of(id).c_str());
-    if (verdict == Verdict::Rival) report_rival(name, machine, id);
-    std::erase_if(machine.publishers, [&](const auto& p) { return !machine.pin.remembers(p.first); });
+    if (verdict == Verdict::Foreign) report_foreign_sync(name, machine, id);
+    std::erase_if(machine.publishers,
+                  [&](const auto& p) { return !machine.pin.remembers(p.first); });
+
     return {found->second, machine.pin.pinned() == id};
   }
 
   /// Its address is for instance in the output of `abbe watch`.
-  static void report_rival(const std::string& name, Machine& machine, const ParticipantId& id) {
+  static void report_foreign_sync(const std::string& name, Machine& machine,
+                                  const ParticipantId& id) {
     constexpr std::chrono::seconds kReportPeriod{10};
     const auto now = SteadyClock::now();
-    if (machine.rival_reported && now - *machine.rival_reported < kReportPeriod) return;
-    machine.rival_reported = now;
+    if (machine.foreign_sync_reported && now - *machine.foreign_sync_reported < kReportPeriod)
+      return;
+    machine.foreign_sync_reported = now;
     std::printf("%s: rival publisher %s is ignored\n", name.c_str(), text_of(id).c_str());
   }
 
@@ -183,8 +190,8 @@ class Listener : public DataReaderListener {
     const auto [publisher, pinned] = heard(c.machine(), writer);
     const std::int64_t age_ns = c.age_ns() + publisher.delay.of_ns(c);
     if (!pinned) return;
-    const bool alive =
-        alive_.contains(publisher.state_from) && SteadyClock::now() - publisher.heard < kLongestSilence;
+    const bool alive = alive_.contains(publisher.state_from) &&
+                       SteadyClock::now() - publisher.heard < kLongestSilence;
     if (const char* reason = why_not(c, age_ns, publisher, alive)) {
       std::printf("%s: do not apply: %s\n", c.machine().c_str(), reason);
     } else {
@@ -216,7 +223,8 @@ void use_keys(const std::string& folder, DomainParticipantQos& qos) {
   properties.emplace_back("dds.sec.crypto.plugin", "builtin.AES-GCM-GMAC");
 }
 
-/// What anyone on the domain can announce ends a process with Fast DDS 2.9 (abbe/dds/message_filter.hpp).
+/// What anyone on the domain can announce ends a process with Fast DDS 2.9
+/// (abbe/dds/message_filter.hpp).
 void filter_messages(DomainParticipantQos& qos) {
   auto& transports = qos.transport();
   if (transports.user_transports.empty()) {
@@ -224,11 +232,12 @@ void filter_messages(DomainParticipantQos& qos) {
     transports.user_transports.push_back(
         std::make_shared<eprosima::fastdds::rtps::UDPv4TransportDescriptor>());
   }
-  for (auto& transport : transports.user_transports) transport = abbe::dds::with_message_filter(transport);
+  for (auto& transport : transports.user_transports)
+    transport = abbe::dds::with_message_filter(transport);
 }
 
-/// Without these two calls Fast DDS announces a TypeObject, which Cyclone DDS does not take and older Fast
-/// DDS may not survive.
+/// Without these two calls Fast DDS announces a TypeObject, which Cyclone DDS does not take and
+/// older Fast DDS may not survive.
 TypeSupport quiet(TopicDataType* type) {
   type->auto_fill_type_information(false);
   type->auto_fill_type_object(false);
@@ -252,15 +261,15 @@ int main(int argc, char** argv) {
   // participant, which would not announce its readers again.
   participant_qos.wire_protocol().builtin.discovery_config.leaseDuration =
       eprosima::fastrtps::Duration_t(40, 0);
-  if (argc > 2 &&
-      (factory->load_XML_profiles_file(argv[2]) != ReturnCode_t::RETCODE_OK ||
-       factory->get_participant_qos_from_profile("abbe", participant_qos) != ReturnCode_t::RETCODE_OK)) {
+  if (argc > 2 && (factory->load_XML_profiles_file(argv[2]) != ReturnCode_t::RETCODE_OK ||
+                   factory->get_participant_qos_from_profile("abbe", participant_qos) !=
+                       ReturnCode_t::RETCODE_OK)) {
     return 3;
   }
   if (argc > 3) use_keys(argv[3], participant_qos);
   filter_messages(participant_qos);
-  auto* participant =
-      factory->create_participant(argc > 1 ? static_cast<unsigned>(std::atoi(argv[1])) : 0, participant_qos);
+  auto* participant = factory->create_participant(
+      argc > 1 ? static_cast<unsigned>(std::atoi(argv[1])) : 0, participant_qos);
   if (participant == nullptr) return 4;
   static Listener listener;
   auto* subscriber = participant->create_subscriber(SUBSCRIBER_QOS_DEFAULT);
@@ -269,8 +278,8 @@ int main(int argc, char** argv) {
   DataReaderQos durable;
   durable.reliability().kind = RELIABLE_RELIABILITY_QOS;
   durable.durability().kind = TRANSIENT_LOCAL_DURABILITY_QOS;
-  durable.liveliness().kind =
-      MANUAL_BY_TOPIC_LIVELINESS_QOS;  // abbe-dds asserts it only while abbed is alive
+  // abbe-dds asserts it only while abbed is alive
+  durable.liveliness().kind = MANUAL_BY_TOPIC_LIVELINESS_QOS;
   durable.liveliness().lease_duration = eprosima::fastrtps::Duration_t(1, 0);
 
   const bool ok = read_topic(participant, subscriber, quiet(new abbe::v1::ModelStatePubSubType),

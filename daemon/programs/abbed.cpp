@@ -1,5 +1,5 @@
-// abbed: the daemon. Runs in the foreground, logs to stderr, tells systemd when it is ready and that it is
-// alive.
+// abbed: the daemon. Runs in the foreground, logs to stderr, tells systemd when it is ready and
+// that it is alive.
 #include <fmt/format.h>
 #include <signal.h>
 #include <unistd.h>
@@ -16,7 +16,7 @@
 #include "abbe/config/config.hpp"
 #include "abbe/messages/dds_security.hpp"
 #include "abbe/service/abbed.hpp"
-#include "abbe/service/work_aside.hpp"
+#include "abbe/service/background_tasks.hpp"
 
 namespace {
 
@@ -26,12 +26,14 @@ using namespace std::chrono_literals;
 constexpr int kDone = 0, kUsage = 2, kBadInput = 3, kIo = 4, kDefect = 70;
 
 constexpr const char* kExitCodes =
-    "Exit codes: 0 stopped by SIGTERM or SIGINT (or the configuration is good), 2 usage, 3 the configuration "
+    "Exit codes: 0 stopped by SIGTERM or SIGINT (or the configuration is good), 2 usage, 3 the "
+    "configuration "
     "is bad or cannot be read,\n"
-    "4 the system refused something (socket, directory, port, priority), 70 the hub hangs (also when it "
+    "4 the system refused something (socket, directory, port, priority), 70 the hub hangs (also "
+    "when it "
     "does not end\nwithin 5 s after a signal) or a defect ended abbed: systemd starts it anew.";
 
-constexpr auto kTurn = 20ms;  // how often abbe-dds is looked after
+constexpr auto kCycle = 20ms;  // how often abbe-dds is looked after
 
 int refuse(const Error& error) {
   fmt::print(stderr, "abbed: {}\n", error.text);
@@ -47,13 +49,15 @@ std::string text_of(const std::filesystem::path& file) {
 /// abbe-dds stands beside abbed; else the PATH is asked.
 std::string dds_program() {
   std::error_code error;
-  const auto beside = std::filesystem::read_symlink("/proc/self/exe", error).parent_path() / "abbe-dds";
+  const auto beside =
+      std::filesystem::read_symlink("/proc/self/exe", error).parent_path() / "abbe-dds";
   return !error && std::filesystem::exists(beside, error) ? beside.string() : "abbe-dds";
 }
 
 Result<void> check_dds_keys(const std::filesystem::path& security) {
   if (security.empty()) return {};
-  const auto identity = find_dds_identity(security, DdsRole::Daemon, std::chrono::system_clock::now());
+  const auto identity =
+      find_dds_identity(security, DdsRole::Daemon, std::chrono::system_clock::now());
   if (!identity) return tl::unexpected(identity.error());
   return {};
 }
@@ -72,10 +76,11 @@ int run(Abbed& abbed, const sigset_t& stop) {
   const auto feed_period = watchdog_period();
   auto next_feed = std::chrono::steady_clock::now();
   bool hangs = false;
-  const timespec turn{.tv_sec = 0, .tv_nsec = std::chrono::nanoseconds{kTurn}.count()};
+  const timespec turn{.tv_sec = 0, .tv_nsec = std::chrono::nanoseconds{kCycle}.count()};
+
   for (;;) {
     if (sigtimedwait(&stop, nullptr, &turn) > 0) return kDone;
-    abbed.turn();
+    abbed.cycle();
     if (const bool hung = !abbed.alive(); hung != hangs) {
       hangs = hung;
       fmt::print(stderr, "abbed: {}\n",
@@ -94,7 +99,8 @@ int run(Abbed& abbed, const sigset_t& stop) {
 
 int abbed_main(int argc, char** argv) {
   CLI::App app{
-      "Watches a machine tool or measuring machine, identifies its geometric errors and publishes their "
+      "Watches a machine tool or measuring machine, identifies its geometric errors and publishes "
+      "their "
       "compensation."};
   app.footer(kExitCodes);
   app.set_version_flag("--version", ABBE_VERSION);
@@ -110,7 +116,8 @@ int abbed_main(int argc, char** argv) {
   }
 
   auto config = load_config(file);
-  // Also where it cannot be read: it does not come back by itself, and systemd would start abbed for ever.
+  // Also where it cannot be read: it does not come back by itself, and systemd would start abbed
+  // for ever.
   if (!config) return refuse({ErrorCode::BadInput, config.error().text, config.error().details});
   if (check_only) {
     if (auto usable = check_dds_keys(config->dds.security); !usable) return refuse(usable.error());
@@ -118,23 +125,26 @@ int abbed_main(int argc, char** argv) {
     return kDone;
   }
   const sigset_t stop = block_stop_signals();
-  // A file that may not grow (RLIMIT_FSIZE, LimitFSIZE=) is for the recorder to report like a full disk, by
-  // the EFBIG of its write; the signal's default would end acquisition with it.
+  // A file that may not grow (RLIMIT_FSIZE, LimitFSIZE=) is for the recorder to report like a full
+  // disk, by the EFBIG of its write; the signal's default would end acquisition with it.
   ::signal(SIGXFSZ, SIG_IGN);
-  auto abbed =
-      Abbed::start(std::move(*config), {.configuration_text = text_of(file), .dds_program = dds_program()});
+  auto abbed = Abbed::start(std::move(*config),
+                            {.configuration_text = text_of(file), .dds_program = dds_program()});
   if (!abbed) return refuse(abbed.error());
-  for (const auto& warning : (*abbed)->warnings()) fmt::print(stderr, "abbed: warning: {}\n", warning);
+  for (const auto& warning : (*abbed)->warnings())
+    fmt::print(stderr, "abbed: warning: {}\n", warning);
   fmt::print(stderr, "abbed: running, configuration {}\n", file);
   tell_ready("running");
   const int code = run(**abbed, stop);
   tell_stopping();
   abbed->reset();
   fmt::print(stderr, "abbed: stopped\n");
-  if (work_left_running()) {  // an identification between two looks at its stop
+
+  if (background_tasks_running()) {  // an identification between two looks at its stop
     std::fflush(nullptr);
     ::_exit(code);
   }
+
   return code;
 }
 

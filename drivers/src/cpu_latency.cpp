@@ -16,9 +16,9 @@ Result<CpuLatencyBound> CpuLatencyBound::request(std::chrono::microseconds at_mo
   const bool asked = held != nullptr && std::setvbuf(held.get(), nullptr, _IONBF, 0) == 0 &&
                      std::fwrite(&microseconds, sizeof microseconds, 1, held.get()) == 1;
   if (asked) return CpuLatencyBound(std::move(held));
-  return tl::unexpected(
-      Error{ErrorCode::SystemRefused, fmt::format("a bound of {} us on the processors' waking: {}: {}",
-                                                  at_most.count(), file.string(), std::strerror(errno))});
+  return tl::unexpected(Error{ErrorCode::SystemRefused,
+                              fmt::format("a bound of {} us on the processors' waking: {}: {}",
+                                          at_most.count(), file.string(), std::strerror(errno))});
 }
 
 }  // namespace abbe::drivers

@@ -76,7 +76,8 @@ struct DeviceThread::State {
   State(Device& d, DeviceThreadOptions o) : device(d), options(std::move(o)) {}
 
   [[nodiscard]] bool stopping() const noexcept {
-    return stop.load(std::memory_order_acquire);  // acquire: pairs with the release in DeviceThread::stop()
+    // acquire: pairs with the release in DeviceThread::stop()
+    return stop.load(std::memory_order_acquire);
   }
 
   void loop() {
@@ -93,7 +94,8 @@ struct DeviceThread::State {
   void fail(const std::exception_ptr& cause) {
     failure.set({}, in_words(cause));
     ended.store(true, std::memory_order_release);  // pairs with the acquire in failure()
-    // release: pairs with the acquire in failures(); who sees the count sees that the loop has ended
+    // release: pairs with the acquire in failures(); who sees the count sees that the loop has
+    // ended
     failures.fetch_add(1, std::memory_order_release);
   }
 
@@ -107,12 +109,14 @@ struct DeviceThread::State {
     }
   }
 
-  /// The thread's top function: what the loop throws ends here and is kept, and the loop begins again.
+  /// The thread's top function: what the loop throws ends here and is kept, and the loop begins
+  /// again.
   void run(std::promise<Refusals> ready) noexcept {
     Refusals refusals = prepare_this_thread(options);
     const bool go = refusals.empty() || options.mode == RealTimeMode::Ignore;
     ready.set_value(std::move(refusals));
     if (!go) return;
+
     for (auto back_off = options.first_back_off; !stopping();) {
       const auto begun = std::chrono::steady_clock::now();
       try {
@@ -128,12 +132,14 @@ struct DeviceThread::State {
   }
 };
 
-Result<std::unique_ptr<DeviceThread>> DeviceThread::start(Device& device, DeviceThreadOptions options) {
+Result<std::unique_ptr<DeviceThread>> DeviceThread::start(Device& device,
+                                                          DeviceThreadOptions options) {
   auto state = std::make_unique<State>(device, std::move(options));
   const auto refused = [&state](const std::string& seen) {
     return tl::unexpected(
         Error{ErrorCode::SystemRefused, fmt::format("thread {}: {}", state->options.name, seen)});
   };
+
   std::promise<Refusals> ready;
   auto refusals = ready.get_future();
   try {
@@ -141,11 +147,13 @@ Result<std::unique_ptr<DeviceThread>> DeviceThread::start(Device& device, Device
   } catch (const std::system_error& e) {
     return refused(e.what());
   }
+
   state->warnings = refusals.get();
   if (!state->warnings.empty() && state->options.mode == RealTimeMode::Enforce) {
     state->thread.join();
     return refused(fmt::format("{}", fmt::join(state->warnings, "; ")));
   }
+
   return std::unique_ptr<DeviceThread>(new DeviceThread(std::move(state)));
 }
 
@@ -155,7 +163,8 @@ DeviceThread::~DeviceThread() {
 }
 
 void DeviceThread::stop() {
-  state_->stop.store(true, std::memory_order_release);  // release: pairs with the acquire in State::loop()
+  // release: pairs with the acquire in State::loop()
+  state_->stop.store(true, std::memory_order_release);
   if (state_->thread.joinable()) state_->thread.join();
 }
 
@@ -178,14 +187,15 @@ DeviceStatus DeviceThread::status() const {
   if (const auto cause = failure()) {
     status.state = "internal error";
     status.connected = false;
-    status.last_fault =
-        fmt::format("{}: internal error, its thread starts again: {}", state_->options.name, *cause);
+    status.last_fault = fmt::format("{}: internal error, its thread starts again: {}",
+                                    state_->options.name, *cause);
   }
   return status;
 }
 
 std::uint64_t DeviceThread::failures() const noexcept {
-  return state_->failures.load(std::memory_order_acquire);  // pairs with the release in State::fail()
+  // pairs with the release in State::fail()
+  return state_->failures.load(std::memory_order_acquire);
 }
 
 }  // namespace abbe::drivers

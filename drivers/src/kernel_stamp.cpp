@@ -18,6 +18,7 @@ ClockPair read_clock_pair() noexcept {
   constexpr int kMostTries = 5;
   ClockPair best;
   auto apart = std::chrono::nanoseconds::max();
+
   for (int i = 0; i < kMostTries && apart > kUndisturbed; ++i) {
     const auto before = read(CLOCK_MONOTONIC);
     const auto realtime = read(CLOCK_REALTIME);
@@ -26,6 +27,7 @@ ClockPair read_clock_pair() noexcept {
     apart = after - before;
     best = {before + apart / 2, realtime};
   }
+
   return best;
 }
 

@@ -2,6 +2,7 @@
 
 namespace abbe::drivers {
 
-RawRing::RawRing(std::size_t capacity_blocks) : indices_(capacity_blocks), blocks_(indices_.capacity()) {}
+RawRing::RawRing(std::size_t capacity_blocks)
+    : indices_(capacity_blocks), blocks_(indices_.capacity()) {}
 
 }  // namespace abbe::drivers

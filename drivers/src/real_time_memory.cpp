@@ -45,8 +45,8 @@ void keep_heap() noexcept {
   (void)mallopt(M_MMAP_THRESHOLD, 32 * kMB);  // the most that glibc accepts
   (void)mallopt(M_TRIM_THRESHOLD, 64 * kMB);
   (void)mallopt(M_TOP_PAD, kMB);
-  // Threads beyond this number share heaps, and their locks. glibc's default, 8 per processor, is fewer than
-  // the threads of abbed on a small computer.
+  // Threads beyond this number share heaps, and their locks. glibc's default, 8 per processor, is
+  // fewer than the threads of abbed on a small computer.
   (void)mallopt(M_ARENA_MAX, 64);
 }
 

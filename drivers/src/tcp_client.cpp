@@ -39,7 +39,8 @@ Result<Addresses> resolve(const std::string& host, std::uint16_t port) {
   hints.ai_flags = AI_NUMERICSERV;
   addrinfo* found = nullptr;
   const int error = ::getaddrinfo(host.c_str(), std::to_string(port).c_str(), &hints, &found);
-  if (error != 0) return failed(ErrorCode::Unreachable, fmt::format("no address: {}", ::gai_strerror(error)));
+  if (error != 0)
+    return failed(ErrorCode::Unreachable, fmt::format("no address: {}", ::gai_strerror(error)));
   return Addresses{found, &::freeaddrinfo};
 }
 
@@ -63,14 +64,17 @@ Result<void> TcpClient::open(const std::string& host, std::uint16_t port) {
   if (!addresses) return tl::unexpected{addresses.error()};
   const addrinfo& address = nth(*addresses, tries_++);
   fd_ = ::socket(address.ai_family, SOCK_STREAM | SOCK_NONBLOCK | SOCK_CLOEXEC, 0);
-  if (fd_ < 0) return failed(ErrorCode::SystemRefused, fmt::format("no socket: {}", words_for(errno)));
+  if (fd_ < 0)
+    return failed(ErrorCode::SystemRefused, fmt::format("no socket: {}", words_for(errno)));
   const int yes = 1;
   ::setsockopt(fd_, IPPROTO_TCP, TCP_NODELAY, &yes, sizeof yes);
+
   if (::connect(fd_, address.ai_addr, address.ai_addrlen) != 0 && errno != EINPROGRESS) {
     const int error = errno;
     close();
     return failed(ErrorCode::Unreachable, fmt::format("no connection: {}", words_for(error)));
   }
+
   opening_ = true;  // also when it is there already: wait() tells
   return {};
 }
@@ -84,9 +88,11 @@ void TcpClient::close() noexcept {
 void TcpClient::finish() noexcept {
   if (!established()) return;
   ::shutdown(fd_, SHUT_WR);
-  // Closing a socket with unread bytes resets the connection and may overtake what was just written.
+  // Closing a socket with unread bytes resets the connection and may overtake what was just
+  // written.
   std::array<std::byte, 4096> thrown_away;  // NOLINT(cppcoreguidelines-pro-type-member-init)
-  for (int i = 0; i < 1000 && ::recv(fd_, thrown_away.data(), thrown_away.size(), MSG_DONTWAIT) > 0; ++i) {
+  for (int i = 0; i < 1000 && ::recv(fd_, thrown_away.data(), thrown_away.size(), MSG_DONTWAIT) > 0;
+       ++i) {
   }
 }
 
@@ -100,9 +106,11 @@ Result<TcpClient::Ready> TcpClient::wait(std::chrono::nanoseconds wall) {
   const int ready = ::ppoll(&descriptor, closed() ? 0 : 1, &timeout, nullptr);
   if (ready <= 0) return Ready::Nothing;
   if (opening_) return end_of_opening();
+
   if ((descriptor.revents & POLLOUT) != 0) {
     if (const auto sent = flush(); !sent) return tl::unexpected{sent.error()};
   }
+
   const bool something = (descriptor.revents & (POLLIN | POLLERR | POLLHUP)) != 0;
   return something ? Ready::Readable : Ready::Nothing;
 }
@@ -136,7 +144,8 @@ Result<void> TcpClient::flush() {
   while (!unsent_.empty()) {
     const ssize_t n = ::send(fd_, unsent_.data(), unsent_.size(), MSG_NOSIGNAL | MSG_DONTWAIT);
     if (n < 0 && later(errno)) return {};
-    if (n < 0) return failed(ErrorCode::Unreachable, fmt::format("connection lost: {}", words_for(errno)));
+    if (n < 0)
+      return failed(ErrorCode::Unreachable, fmt::format("connection lost: {}", words_for(errno)));
     unsent_.erase(unsent_.begin(), unsent_.begin() + n);
   }
   return {};

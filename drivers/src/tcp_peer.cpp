@@ -10,7 +10,8 @@ TcpPeer tcp_peer(const std::string& device, const std::string& host, std::uint16
 
 Result<void> check(const TcpPeer& peer) {
   if (!peer.host.empty() && peer.port != 0) return {};
-  return tl::unexpected{Error{ErrorCode::BadConfiguration, peer.name + ": host or port is missing"}};
+  return tl::unexpected{
+      Error{ErrorCode::BadConfiguration, peer.name + ": host or port is missing"}};
 }
 
 }  // namespace abbe::drivers

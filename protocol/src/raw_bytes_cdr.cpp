@@ -10,14 +10,17 @@ namespace {
 
 using tl::unexpected;
 
-constexpr std::array<std::byte, 4> kPlainCdrLe{std::byte{0}, std::byte{1}, std::byte{0}, std::byte{0}};
-static_assert(std::endian::native == std::endian::little, "integers are copied as they lie in memory");
+constexpr std::array<std::byte, 4> kPlainCdrLe{std::byte{0}, std::byte{1}, std::byte{0},
+                                               std::byte{0}};
+static_assert(std::endian::native == std::endian::little,
+              "integers are copied as they lie in memory");
 
 constexpr std::size_t padding(std::size_t position, std::size_t alignment) noexcept {
   return (alignment - position % alignment) % alignment;
 }
 
-/// Fields of the CDR body, aligned from its first byte. After the first failure all reads are zero or empty.
+/// Fields of the CDR body, aligned from its first byte. After the first failure all reads are zero
+/// or empty.
 class BodyReader {
  public:
   explicit BodyReader(std::span<const std::byte> body) noexcept : body_(body) {}
@@ -116,10 +119,12 @@ std::size_t encoded_size(const RawBytes& value) noexcept {
 
 }  // namespace
 
-tl::expected<std::size_t, CdrError> encode_cdr(const RawBytes& value, std::span<std::byte> out) noexcept {
+tl::expected<std::size_t, CdrError> encode_cdr(const RawBytes& value,
+                                               std::span<std::byte> out) noexcept {
   if (value.device.size() > kMaxDeviceNameLength || value.bytes.size() > RawBlock::kCapacity) {
     return unexpected(CdrError::OutOfBounds);
   }
+
   if (value.device.find('\0') != std::string_view::npos) return unexpected(CdrError::BadString);
   if (out.size() < encoded_size(value)) return unexpected(CdrError::BufferTooSmall);
   std::ranges::copy(kPlainCdrLe, out.begin());
@@ -130,6 +135,7 @@ tl::expected<std::size_t, CdrError> encode_cdr(const RawBytes& value, std::span<
   body.number(static_cast<std::uint8_t>(value.direction == RawBlock::Direction::ToDevice));
   body.number(static_cast<std::uint8_t>(value.continued));
   body.octets(value.bytes);
+
   return kPlainCdrLe.size() + body.position();
 }
 
@@ -142,10 +148,12 @@ tl::expected<RawBytes, CdrError> decode_raw_bytes_cdr(std::span<const std::byte>
   value.device = body.string(kMaxDeviceNameLength);
   value.time = HostTime{std::chrono::nanoseconds{body.number<std::int64_t>()}};
   value.lost_before = body.number<std::uint32_t>();
-  value.direction = body.boolean() ? RawBlock::Direction::ToDevice : RawBlock::Direction::FromDevice;
+  value.direction =
+      body.boolean() ? RawBlock::Direction::ToDevice : RawBlock::Direction::FromDevice;
   value.continued = body.boolean();
   value.bytes = body.octets(RawBlock::kCapacity);
   if (body.failed()) return unexpected(body.error());
+
   return value;
 }
 

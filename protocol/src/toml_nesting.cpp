@@ -6,7 +6,8 @@
 namespace abbe::protocol {
 namespace {
 
-/// Follows the nesting of a TOML text. A number's point counts as a dot of a key: one too many at most.
+/// Follows the nesting of a TOML text. A number's point counts as a dot of a key: one too many at
+/// most.
 class TomlNesting {
  public:
   explicit TomlNesting(std::string_view text) : text_(text) {}
@@ -30,6 +31,7 @@ class TomlNesting {
     if (c == '"' || c == '\'') return skip_string(c);
     if (c == '#') return skip_comment();
     ++at_;
+
     if (line_begins && c == '[') {
       begin_header();
     } else if (c == '\n') {
@@ -76,15 +78,18 @@ class TomlNesting {
     const std::string_view rest = text_.substr(at_);
     const bool multi_line = rest.size() >= 3 && rest[1] == quote && rest[2] == quote;
     at_ += multi_line ? 3 : 1;
+
     for (; at_ < text_.size(); ++at_) {
       if (text_[at_] == '\\' && quote == '"') {
         ++at_;
       } else if (!multi_line && text_[at_] == '\n') {
         return;  // not closed: an error, for the parser to report
       } else if (text_[at_] == quote && (!multi_line || closes(quote))) {
-        return pass_quotes(quote, multi_line ? 5 : 1);  // up to two quotes may stand before the closing three
+        // up to two quotes may stand before the closing three
+        return pass_quotes(quote, multi_line ? 5 : 1);
       }
     }
+
     at_ = text_.size();
   }
 
@@ -101,8 +106,9 @@ class TomlNesting {
   std::size_t at_ = 0;
   bool line_begins_ = true;
   bool in_header_ = false;
-  std::size_t header_ = 0;               // levels the table's name opens
-  std::vector<std::size_t> open_ = {0};  // dots of the key under way, for each open array or inline table
+  std::size_t header_ = 0;  // levels the table's name opens
+  std::vector<std::size_t> open_ = {
+      0};  // dots of the key under way, for each open array or inline table
   std::size_t dots_in_all_ = 0;
 };
 

@@ -26,25 +26,31 @@ namespace {
 
 constexpr const char* kFooter =
     "Exit codes: 0 done, 2 usage, 3 bad input file, 4 input/output (file, port in use).\n"
-    "A machine file is any TOML file with the tables [machine], [axes.X|Y|Z] and [target], so the daemon's "
+    "A machine file is any TOML file with the tables [machine], [axes.X|Y|Z] and [target], so the "
+    "daemon's "
     "own\n"
-    "abbed.toml will do; its [tracker] port, [encoder] peer_port and nodes, and [daemon] speed are taken "
+    "abbed.toml will do; its [tracker] port, [encoder] peer_port and nodes, and [daemon] speed are "
+    "taken "
     "too.";
 
 int run(int argc, char** argv) {
-  CLI::App app{"Simulated machine tool, laser tracker and encoders with errors that are known", "abbe-sim"};
+  CLI::App app{"Simulated machine tool, laser tracker and encoders with errors that are known",
+               "abbe-sim"};
   app.require_subcommand(1);
   app.footer(kFooter);
-  const std::vector<Subcommand> commands{add_run(app), add_truth(app), add_machine(app), add_replay(app),
-                                         add_evemu(app)};
+  const std::vector<Subcommand> commands{add_run(app), add_truth(app), add_machine(app),
+                                         add_replay(app), add_evemu(app)};
+
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& e) {
     return app.exit(e) == 0 ? kDone : kUsage;
   }
+
   for (const Subcommand& command : commands) {
     if (command.app->parsed()) return command.run();
   }
+
   return kUsage;
 }
 
@@ -54,7 +60,8 @@ int run(int argc, char** argv) {
 int main(int argc, char** argv) {
   try {
     return abbe::sim::run(argc, argv);
-  } catch (const std::exception& e) {  // out of memory and the like: nothing this program can go on from
+  } catch (
+      const std::exception& e) {  // out of memory and the like: nothing this program can go on from
     std::fprintf(stderr, "abbe-sim: %s\n", e.what());
     return abbe::sim::kIoFailed;
   }

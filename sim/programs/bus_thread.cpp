@@ -28,7 +28,8 @@ Socket made_event() {
 }  // namespace
 
 BusThread::BusThread(Simulation& simulation, SimClock clock)
-    : stop_(made_event()), turning_(std::async(std::launch::async, [&simulation, clock, fd = stop_.get()] {
+    : stop_(made_event()),
+      turning_(std::async(std::launch::async, [&simulation, clock, fd = stop_.get()] {
         turn(simulation, clock, fd);
       })) {}
 

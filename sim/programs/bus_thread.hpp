@@ -1,7 +1,7 @@
 #pragma once
-/// The encoders on a thread of their own. Real ones answer a SYNC whatever else the shop floor does; a
-/// simulator that makes a tracker's burst first answers SYNC periods late when it is built with sanitizers or
-/// the computer is busy.
+/// The encoders on a thread of their own. Real ones answer a SYNC whatever else the shop floor
+/// does; a simulator that makes a tracker's burst first answers SYNC periods late when it is built
+/// with sanitizers or the computer is busy.
 
 #include <future>
 

@@ -1,6 +1,6 @@
 #pragma once
-/// The subcommands of abbe-sim. Each adds itself to the command line and returns what runs it; the result is
-/// an exit code.
+/// The subcommands of abbe-sim. Each adds itself to the command line and returns what runs it; the
+/// result is an exit code.
 
 #include <functional>
 #include <string_view>

@@ -1,5 +1,5 @@
-/// abbe-sim evemu: the weak-stiffness machine touches a ball array at eight positions; a daemon reads scales
-/// and probe from the simulated counter card.
+/// abbe-sim evemu: the weak-stiffness machine touches a ball array at eight positions; a daemon
+/// reads scales and probe from the simulated counter card.
 
 #include <fmt/format.h>
 
@@ -44,7 +44,8 @@ Result<LoadedSetup> load(const EvemuOptions& options) {
   if (!setup) return setup;
   SimulationSetup& simulation = setup->simulation;
   if (simulation.truth.order != std::array{Axis::Z, Axis::X, Axis::Y})
-    return bad_input("the weak-stiffness machine is base, Z, X, Y: [machine] chain = \"[w b Z X Y t]\"");
+    return bad_input(
+        "the weak-stiffness machine is base, Z, X, Y: [machine] chain = \"[w b Z X Y t]\"");
   if (simulation.counter_cards.empty())
     return bad_input("no [counter_card] in the machine file: nobody could read axes and probe");
   simulation.truth = weak_stiffness_machine(setup->weak_stiffness);
@@ -58,15 +59,17 @@ Result<LoadedSetup> load(const EvemuOptions& options) {
   touching.missed.insert(options.missed.begin(), options.missed.end());
   touching.doubled.insert(options.doubled.begin(), options.doubled.end());
   touching.stray.insert(options.stray.begin(), options.stray.end());
+
   return setup;
 }
 
-std::string error_row(const TruthMachine& truth, const Eigen::Vector3d& q_m, const Eigen::Vector3d& V_ball1_m,
+std::string error_row(const TruthMachine& truth, const Eigen::Vector3d& q_m,
+                      const Eigen::Vector3d& V_ball1_m,
                       const Eigen::Vector3d& noise_m = Eigen::Vector3d::Zero()) {
   const Eigen::Vector3d q_mm = kMmPerM * q_m;
   const Eigen::Vector3d V_um = kUmPerM * (error_m(truth, q_m) - V_ball1_m + noise_m);
-  return fmt::format("{:.17g},{:.17g},{:.17g},{:.17g},{:.17g},{:.17g}\n", q_mm.x(), q_mm.y(), q_mm.z(),
-                     V_um.x(), V_um.y(), V_um.z());
+  return fmt::format("{:.17g},{:.17g},{:.17g},{:.17g},{:.17g},{:.17g}\n", q_mm.x(), q_mm.y(),
+                     q_mm.z(), V_um.x(), V_um.y(), V_um.z());
 }
 
 /// Readings at the balls of all positions.
@@ -84,31 +87,38 @@ std::string truth_csv(const TruthMachine& truth, const BallArray& array) {
   const Eigen::Vector3d step_m = Eigen::Vector3d(0.1, 0.05, 0.01) / 3.0;
   const auto readings = ball_readings_m(truth, array);
   Eigen::Vector3d low = readings.front(), high = readings.front();
+
   for (const auto& q_m : readings) {
     low = low.cwiseMin(q_m);
     high = high.cwiseMax(q_m);
   }
+
   using Steps = Eigen::Matrix<Eigen::Index, 3, 1>;
   const Steps first = low.cwiseQuotient(step_m).array().ceil().cast<Eigen::Index>();
   const Steps last = high.cwiseQuotient(step_m).array().floor().cast<Eigen::Index>();
   const Eigen::Vector3d V_ball1_m = error_m(truth, readings.front());
   std::string text = "x_mm,y_mm,z_mm,ex_um,ey_um,ez_um\n";
+
   for (Eigen::Index x = first.x(); x <= last.x(); ++x) {
     for (Eigen::Index y = first.y(); y <= last.y(); ++y) {
       for (Eigen::Index z = first.z(); z <= last.z(); ++z)
         text += error_row(truth, step_m.cwiseProduct(Steps(x, y, z).cast<double>()), V_ball1_m);
     }
   }
+
   return text;
 }
 
 /// V at the balls of all positions as an independent instrument sees it, in the form of errors.csv.
-std::string reference_csv(const TruthMachine& truth, const BallArray& array, double u_m, std::uint64_t seed) {
+std::string reference_csv(const TruthMachine& truth, const BallArray& array, double u_m,
+                          std::uint64_t seed) {
   const auto readings = ball_readings_m(truth, array);
   const Eigen::Vector3d V_ball1_m = error_m(truth, readings.front());
   std::string text = "position,ball,x_mm,y_mm,z_mm,ex_um,ey_um,ez_um\n";
   for (std::size_t i = 0; i < readings.size(); ++i) {
-    const auto draw = [&](std::size_t k) { return u_m * gaussian(seed, NoiseStream::Range, 3 * i + k); };
+    const auto draw = [&](std::size_t k) {
+      return u_m * gaussian(seed, NoiseStream::Range, 3 * i + k);
+    };
     const std::size_t balls = array.balls.size();
     text += fmt::format("{},{},", i / balls + 1, i % balls + 1) +
             error_row(truth, readings[i], V_ball1_m, {draw(0), draw(1), draw(2)});
@@ -116,7 +126,8 @@ std::string reference_csv(const TruthMachine& truth, const BallArray& array, dou
   return text;
 }
 
-Result<void> write_files(const EvemuOptions& options, const LoadedSetup& setup, const BallArray& array) {
+Result<void> write_files(const EvemuOptions& options, const LoadedSetup& setup,
+                         const BallArray& array) {
   const TruthMachine& truth = setup.simulation.truth;
   const auto write = [](const std::string& file, const auto& text) -> Result<void> {
     return file.empty() ? Result<void>{} : write_file(file, text());
@@ -135,8 +146,8 @@ void narrate(const Simulation& simulation, HostTime now, double speed, int& said
   const VirtualMachine& machine = simulation.machine();
   if (machine.started() && said == 0) {
     said = 1;
-    fmt::print(stderr, "machine: touches, {:.0f} s ({:.0f} s on the wall)\n", machine.path().duration_s(),
-               machine.path().duration_s() / speed);
+    fmt::print(stderr, "machine: touches, {:.0f} s ({:.0f} s on the wall)\n",
+               machine.path().duration_s(), machine.path().duration_s() / speed);
   }
   if (machine.finished() && now >= *machine.finished() && said == 1) {
     said = 2;
@@ -148,13 +159,15 @@ int run(const EvemuOptions& options) {
   auto setup = load(options);
   if (!setup) return report(setup.error());
   const BallArray array = as_it_is(reference_ball_array(), setup->array);
-  if (const auto written = write_files(options, *setup, array); !written) return report(written.error());
+  if (const auto written = write_files(options, *setup, array); !written)
+    return report(written.error());
   const TruthMachine& truth = setup->simulation.truth;
   const TouchingProgram program = plan_touching(truth, array, setup->touching);
   setup->simulation.path = program.path;
   const auto motion = PathMotion::plan(program.path);
   if (!motion) return report(motion.error());
-  setup->simulation.edges_s = edge_times_s(program, truth, *motion, array.tip_radius_m, setup->touching);
+  setup->simulation.edges_s =
+      edge_times_s(program, truth, *motion, array.tip_radius_m, setup->touching);
   let_go_on_signal();
   const EventLoop loop(setup->speed);
   auto simulation = Simulation::open(setup->simulation, loop.clock().now());
@@ -164,6 +177,7 @@ int run(const EvemuOptions& options) {
   fmt::print(stderr, "{} touches{}\n", program.moves.size(),
              options.start_on_signal ? ", begin on SIGUSR1" : ", begin once the card is read");
   int said = 0;
+
   while (!loop.stopped()) {
     std::vector<pollfd> fds;
     (*simulation)->add_poll_fds(fds);
@@ -173,6 +187,7 @@ int run(const EvemuOptions& options) {
     (*simulation)->poll(now);
     narrate(**simulation, now, setup->speed, said);
   }
+
   return kDone;
 }
 
@@ -181,37 +196,49 @@ int run(const EvemuOptions& options) {
 Subcommand add_evemu(CLI::App& app) {
   auto options = std::make_shared<EvemuOptions>();  // lives as long as the command line's callbacks
   options->choices.needs_path = false;
-  CLI::App* sub = app.add_subcommand(
-      "evemu",
-      "the weak-stiffness machine touches a ball array at eight positions: scales and probe on the counter\n"
-      "card, on 127.0.0.1 until SIGINT or SIGTERM; then `abbe calibrate evemu`");
+  CLI::App* sub =
+      app.add_subcommand("evemu",
+                         "the weak-stiffness machine touches a ball array at eight positions: "
+                         "scales and probe on the counter\n"
+                         "card, on 127.0.0.1 until SIGINT or SIGTERM; then `abbe calibrate evemu`");
   SetupChoices& choices = options->choices;
-  sub->add_option("--config", choices.config_file, "TOML file with a [sim] table")->type_name("FILE");
-  sub->add_option("--machine", choices.machine_file, "machine with [counter_card]: abbed.toml will do")
+  sub->add_option("--config", choices.config_file, "TOML file with a [sim] table")
+      ->type_name("FILE");
+  sub->add_option("--machine", choices.machine_file,
+                  "machine with [counter_card]: abbed.toml will do")
       ->type_name("FILE");
   sub->add_option("--seed", choices.seed, "of all noise (default 1)");
-  sub->add_option("--speed", choices.speed, "simulated seconds per second; the daemon must be given the same")
+  sub->add_option("--speed", choices.speed,
+                  "simulated seconds per second; the daemon must be given the same")
       ->check(CLI::Range(1e-3, 1e4));
   sub->add_option("--usbip-port", choices.usbip_port, "TCP, of the counter card; 0 = any free one");
-  sub->add_option("--points-per-ball", options->points_per_ball, "default 25")->check(CLI::Range(1, 1000));
-  sub->add_option("--points-per-block", options->points_per_block, "default 25")->check(CLI::Range(1, 1000));
+  sub->add_option("--points-per-ball", options->points_per_ball, "default 25")
+      ->check(CLI::Range(1, 1000));
+  sub->add_option("--points-per-block", options->points_per_block, "default 25")
+      ->check(CLI::Range(1, 1000));
   sub->add_option("--miss", options->missed, "touches the probe does not tell, by number from 0");
   sub->add_option("--double", options->doubled, "touches made twice");
   sub->add_option("--stray", options->stray, "before these, a touch far from any ball");
-  sub->add_flag("--start-on-signal", options->start_on_signal,
-                "begin on SIGUSR1; else once somebody reads the card, after [sim.path] standstill_s");
-  sub->add_option("--ports-file", options->ports_file, "written when the card listens: usbip_port=N")
+  sub->add_flag(
+      "--start-on-signal", options->start_on_signal,
+      "begin on SIGUSR1; else once somebody reads the card, after [sim.path] standstill_s");
+  sub->add_option("--ports-file", options->ports_file,
+                  "written when the card listens: usbip_port=N")
       ->type_name("FILE");
   sub->add_option("--calibrator-out", options->calibrator_out, "write calibrator.toml of the array")
       ->type_name("FILE");
-  sub->add_option("--truth-out", options->truth_out, "write V relative to ball 1 over its volume as CSV")
+  sub->add_option("--truth-out", options->truth_out,
+                  "write V relative to ball 1 over its volume as CSV")
       ->type_name("FILE");
   CLI::Option* reference =
-      sub->add_option("--reference-out", options->reference_out,
-                      "write V at the balls as an independent instrument sees it, for --rotation-reference")
+      sub->add_option(
+             "--reference-out", options->reference_out,
+             "write V at the balls as an independent instrument sees it, for --rotation-reference")
           ->type_name("FILE");
-  sub->add_option("--u-reference-um", options->u_reference_um, "that instrument's noise (default 5)")
+  sub->add_option("--u-reference-um", options->u_reference_um,
+                  "that instrument's noise (default 5)")
       ->needs(reference);
+
   return {sub, [options] { return run(*options); }};
 }
 

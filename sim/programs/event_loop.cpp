@@ -34,7 +34,8 @@ bool EventLoop::stopped() const {
   return stop_requested != 0;
 }
 
-void wait(std::vector<pollfd>& fds, const SimClock& clock, HostTime due, const sigset_t* held_back) {
+void wait(std::vector<pollfd>& fds, const SimClock& clock, HostTime due,
+          const sigset_t* held_back) {
   std::chrono::nanoseconds wall = kLongestWait;
   if (due != HostTime::max()) {
     wall = std::clamp(clock.wall(due - clock.now()), std::chrono::nanoseconds{0}, kLongestWait);

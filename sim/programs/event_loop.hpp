@@ -1,6 +1,6 @@
 #pragma once
-/// Turns something steppable with real time: waits for its sockets or its next due time, then polls it, until
-/// SIGINT or SIGTERM.
+/// Turns something steppable with real time: waits for its sockets or its next due time, then polls
+/// it, until SIGINT or SIGTERM.
 
 #include <poll.h>
 
@@ -12,9 +12,10 @@
 
 namespace abbe::sim {
 
-/// Until a socket is ready, `due` is there, 200 ms of the wall are over, or a signal comes that is not held
-/// back. `held_back`: those, while waiting; null: those of this thread.
-void wait(std::vector<pollfd>& fds, const SimClock& clock, HostTime due, const sigset_t* held_back = nullptr);
+/// Until a socket is ready, `due` is there, 200 ms of the wall are over, or a signal comes that is
+/// not held back. `held_back`: those, while waiting; null: those of this thread.
+void wait(std::vector<pollfd>& fds, const SimClock& clock, HostTime due,
+          const sigset_t* held_back = nullptr);
 
 class EventLoop {
  public:

@@ -25,20 +25,24 @@ std::string beside_file(const std::string& file, const std::string& path) {
 
 Result<void> write_file(const std::string& path, std::string_view text) {
   if (path == "-") {
-    if (std::fwrite(text.data(), 1, text.size(), stdout) != text.size() || std::fflush(stdout) != 0) {
+    if (std::fwrite(text.data(), 1, text.size(), stdout) != text.size() ||
+        std::fflush(stdout) != 0) {
       return io_error(std::string("standard output: ") + std::strerror(errno));
     }
     return {};
   }
+
   const std::string beside = path + ".part";
   {
     std::ofstream out(beside, std::ios::binary | std::ios::trunc);
     out << text << std::flush;
     if (!out) return io_error(path + ": cannot be written: " + std::strerror(errno));
   }
+
   if (std::rename(beside.c_str(), path.c_str()) != 0) {
     return io_error(path + ": cannot be written: " + std::strerror(errno));
   }
+
   return {};
 }
 

@@ -7,8 +7,10 @@
 namespace abbe::sim {
 
 void add_machine_options(CLI::App& app, SetupChoices& choices) {
-  app.add_option("--config", choices.config_file, "TOML file with a [sim] table")->type_name("FILE");
-  app.add_option("--machine", choices.machine_file, "machine description: machine.toml or abbed.toml")
+  app.add_option("--config", choices.config_file, "TOML file with a [sim] table")
+      ->type_name("FILE");
+  app.add_option("--machine", choices.machine_file,
+                 "machine description: machine.toml or abbed.toml")
       ->type_name("FILE");
   app.add_option("--seed", choices.seed, "of the errors and of all noise (default 1)");
   app.add_option("--truth", choices.truth_file, "the errors as CSV instead of random ones")

@@ -25,24 +25,31 @@ Result<void> announce_ports(const Ports& ports, const std::string& path) {
   if (ports.tracker) lines += fmt::format("tracker_port={}\n", *ports.tracker);
   if (!ports.can_interface.empty()) lines += fmt::format("can_interface={}\n", ports.can_interface);
   if (ports.can) lines += fmt::format("can_port={}\n", *ports.can);
+
   for (const NamedPlace& place : ports.environment) {
     lines += place.port != 0 ? fmt::format("{}_port={}\n", place.name, place.port)
                              : fmt::format("{}_path=\"{}\"\n", place.name, place.path);
   }
+
   // The first card has the bare name, further ones are numbered: usbip_port_2.
   for (std::size_t i = 0; i < ports.usbip.size(); ++i)
-    lines += fmt::format("usbip_port{}={}\n", i == 0 ? "" : fmt::format("_{}", i + 1), ports.usbip[i]);
+    lines +=
+        fmt::format("usbip_port{}={}\n", i == 0 ? "" : fmt::format("_{}", i + 1), ports.usbip[i]);
   if (ports.cmm) lines += fmt::format("cmm_port={}\n", *ports.cmm);
+
   if (!path.empty()) {
     if (auto written = write_file(path, lines); !written) return written;
   }
+
   if (ports.tracker) fmt::print("tracker: emScon on 127.0.0.1:{}\n", *ports.tracker);
   if (ports.can) fmt::print("encoders: CAN over UDP on 127.0.0.1:{}\n", *ports.can);
   if (!ports.can_interface.empty()) fmt::print("encoders: CAN on {}\n", ports.can_interface);
   for (const NamedPlace& place : ports.environment) fmt::print("{}: {}\n", place.name, place.where);
-  for (const auto port : ports.usbip) fmt::print("counter card: USB/IP on 127.0.0.1:{}, bus id 1-1\n", port);
+  for (const auto port : ports.usbip)
+    fmt::print("counter card: USB/IP on 127.0.0.1:{}, bus id 1-1\n", port);
   if (ports.cmm) fmt::print("measuring machine: I++ DME on 127.0.0.1:{}\n", *ports.cmm);
   std::fflush(stdout);
+
   return {};
 }
 

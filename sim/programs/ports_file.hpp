@@ -1,7 +1,8 @@
 #pragma once
-/// Where the devices listen, for people (standard output) and for scripts (a file written when everything
-/// listens, whose lines `tracker_port=N`, `can_port=N` or `can_interface=NAME`, `usbip_port=N` and
-/// `cmm_port=N` a shell and a TOML reader both understand; a device that is not there has no line).
+/// Where the devices listen, for people (standard output) and for scripts (a file written when
+/// everything listens, whose lines `tracker_port=N`, `can_port=N` or `can_interface=NAME`,
+/// `usbip_port=N` and `cmm_port=N` a shell and a TOML reader both understand; a device that is not
+/// there has no line).
 
 #include <cstdint>
 #include <optional>

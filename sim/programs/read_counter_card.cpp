@@ -46,10 +46,12 @@ CardAxis read_marked_axis(TomlSection& section, const CounterCardSetup& live) {
   std::string name;
   section.text("axis", name);
   const auto counted = std::ranges::find(live.axes, name, &CardAxis::name);
+
   if (counted == live.axes.end()) {
     section.fault("axis", "is not counted by [counter_card]");
     return axis;
   }
+
   axis = *counted;
   axis.channel = read_channel(section, "channel").value_or(0);
   std::int64_t increment = axis.nominal_increment;
@@ -60,7 +62,9 @@ CardAxis read_marked_axis(TomlSection& section, const CounterCardSetup& live) {
   section.integer("increment", increment, 2, 1'000'000);
   axis.nominal_increment = static_cast<int>(increment);
   if (axis.signal_period > 0.0)
-    axis.mark_pairs = static_cast<int>(length / (axis.signal_period * static_cast<double>(increment)));
+    axis.mark_pairs =
+        static_cast<int>(length / (axis.signal_period * static_cast<double>(increment)));
+
   return axis;
 }
 
@@ -78,7 +82,8 @@ void read_reference(TomlSection section, SimulationSetup& simulation) {
   if (simulation.counter_cards.empty()) return section.fault("", "there is no [counter_card]");
   CounterCardSetup card = read_card(section);
   const CounterCardSetup& live = simulation.counter_cards.front();
-  for (TomlSection& axis : section.children("axes")) card.axes.push_back(read_marked_axis(axis, live));
+  for (TomlSection& axis : section.children("axes"))
+    card.axes.push_back(read_marked_axis(axis, live));
   simulation.counter_cards.push_back(card);
 }
 
@@ -95,6 +100,7 @@ void read_sim_counter_card(TomlSection section, SimulationSetup& simulation) {
   section.number("clock_deviation_ppm", card.clock_deviation_ppm, 1.0, {-1000.0, 1000.0});
   section.number("fifo_kB", fifo_bytes, 1e3, {1.0, 1e6});
   card.fifo_bytes = static_cast<std::size_t>(fifo_bytes);
+
   for (CardAxis& axis : card.axes) axis.noise = noise_m;
   section.refuse_unknown_keys();
 }

@@ -1,5 +1,6 @@
 #pragma once
-/// Simulated counter cards: wired as the daemon's tables say, and what the daemon cannot know of them.
+/// Simulated counter cards: wired as the daemon's tables say, and what the daemon cannot know of
+/// them.
 
 #include "abbe/sim/simulation.hpp"
 #include "toml_section.hpp"

@@ -9,11 +9,13 @@ namespace abbe::sim {
 namespace {
 
 /// NAME_C and so on: its mean; NAME_drift_per_hour, NAME_swing, NAME_swing_period_s.
-void read_course(TomlSection& section, std::string_view name, std::string_view unit, Course& course) {
+void read_course(TomlSection& section, std::string_view name, std::string_view unit,
+                 Course& course) {
   section.number(fmt::format("{}_{}", name, unit), course.mean);
   section.number(fmt::format("{}_drift_per_hour", name), course.drift_per_hour);
   section.number(fmt::format("{}_swing", name), course.swing);
-  section.number(fmt::format("{}_swing_period_s", name), course.swing_period_s, 1.0, kPositiveNumber);
+  section.number(fmt::format("{}_swing_period_s", name), course.swing_period_s, 1.0,
+                 kPositiveNumber);
 }
 
 void read_model(TomlSection& section, EnvironmentModel& model) {
@@ -41,19 +43,23 @@ ModbusServerOptions read_device(TomlSection& section) {
   if (!section.text("name", options.name)) section.fault("name", "missing");
   std::string model;
   section.text("model", model);
+
   if (const auto known = modbus_model(model)) {
     options.identity.model = *known;
   } else {
     section.fault("model", "must be \"indigo520_hmp\", \"comet_t7510\" or \"zt2005_c8\"");
   }
+
   std::int64_t serial_number = options.identity.serial_number;
   std::int64_t unit = options.identity.unit;
   if (section.integer("serial_number", serial_number, 0, 99'999'999))
     options.identity.serial_number = static_cast<std::uint32_t>(serial_number);
-  if (section.integer("unit", unit, 1, 247)) options.identity.unit = static_cast<std::uint8_t>(unit);
+  if (section.integer("unit", unit, 1, 247))
+    options.identity.unit = static_cast<std::uint8_t>(unit);
   read_endpoint(section, options);
   read_model(section, options.environment);
   section.refuse_unknown_keys();
+
   return options;
 }
 

@@ -28,11 +28,14 @@ ScheduledFault read_fault(TomlSection& section) {
   std::int64_t node = 0;
   section.text("device", device);
   section.text("kind", kind);
+
   if (const auto target = target_of(device)) {
     scheduled.target = *target;
   } else {
-    section.fault("device", "must be \"tracker\", \"encoder\", \"environment\", \"counter_card\" or \"cmm\"");
+    section.fault("device",
+                  "must be \"tracker\", \"encoder\", \"environment\", \"counter_card\" or \"cmm\"");
   }
+
   const auto known = fault_kind(scheduled.target, kind);
   if (!known) section.fault("kind", fmt::format("\"{}\" is no fault of this device", kind));
   scheduled.fault.kind = known.value_or(FaultKind::Mute);
@@ -43,6 +46,7 @@ ScheduledFault read_fault(TomlSection& section) {
   if (section.integer("node", node, 0, can::kMaxNodeId))
     scheduled.fault.node = static_cast<std::uint8_t>(node);
   section.refuse_unknown_keys();
+
   return scheduled;
 }
 

@@ -36,10 +36,12 @@ std::optional<EncoderNodeOptions> read_encoder_node(TomlSection& section) {
   double step_nm = 10.0;
   section.text("axis", name);
   const auto axis = axis_named(name);
+
   if (!axis) {
     section.fault("axis", "must be X, Y or Z");
     return std::nullopt;
   }
+
   if (!section.integer("node", id, 1, can::kMaxNodeId)) section.fault("node", "missing");
   section.number("step_nm", step_nm, 1.0, {1.0, 1e9});
   section.number("offset_mm", node.offset_m, kMilli);
@@ -47,6 +49,7 @@ std::optional<EncoderNodeOptions> read_encoder_node(TomlSection& section) {
   node.axis = *axis;
   node.node = static_cast<can::NodeId>(id);
   node.step_nm = static_cast<std::uint32_t>(step_nm);
+
   return node;
 }
 
@@ -85,8 +88,10 @@ void read_machine_tables(TomlSection root, SetupDraft& draft) {
   read_axes(root, simulation.truth);
   root.child("target").vector("offset_mm", simulation.truth.target_offset_m, kMilli);
   TomlSection tracker = root.child("tracker");
-  tracker.number("sigma_range_um", simulation.tracker->model.sigma_range_m, kMicro, kNotNegativeNumber);
-  tracker.number("sigma_angle_urad", simulation.tracker->model.sigma_angle_rad, kMicro, kNotNegativeNumber);
+  tracker.number("sigma_range_um", simulation.tracker->model.sigma_range_m, kMicro,
+                 kNotNegativeNumber);
+  tracker.number("sigma_angle_urad", simulation.tracker->model.sigma_angle_rad, kMicro,
+                 kNotNegativeNumber);
   tracker.port("port", simulation.tracker_port);
   TomlSection encoder = root.child("encoder");
   encoder.port("peer_port", simulation.bus->port);

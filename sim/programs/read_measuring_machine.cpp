@@ -17,6 +17,7 @@ void read_features(TomlSection root, MeasuringMachine& machine) {
     section.number("radius_mm", ball.radius_m, kMilli, kPositiveNumber);
     machine.spheres.push_back(ball);
   }
+
   for (TomlSection& section : root.children("block")) {
     Face face;
     read_place(section, face.centre_m);
@@ -42,7 +43,8 @@ void read_cmm(TomlSection section, SimulationSetup& simulation) {
 
 void read_sim_cmm(TomlSection section, SimulationSetup& simulation, std::string& artefact_file) {
   if (!section.present()) return;
-  if (!simulation.measuring_machine) return section.fault("", "there is no [cmm] in the machine file");
+  if (!simulation.measuring_machine)
+    return section.fault("", "there is no [cmm] in the machine file");
   IppDmeOptions& machine = *simulation.measuring_machine;
   section.port("port", simulation.measuring_machine_port);
   section.text("artefact", artefact_file);

@@ -25,7 +25,8 @@ void read_truth(TomlSection section, const std::string& file, SetupDraft& draft)
   section.number("node_spacing_mm", draft.random.node_spacing_m, kMilli, {0.1, 1e6});
   section.number("backlash_um", draft.random.backlash_m, kMicro, kNotNegativeNumber);
   section.text("shape", shape);
-  if (shape != "linear" && shape != "cubic") section.fault("shape", "must be \"linear\" or \"cubic\"");
+  if (shape != "linear" && shape != "cubic")
+    section.fault("shape", "must be \"linear\" or \"cubic\"");
   draft.random.shape = shape == "cubic" ? Shape::Cubic : Shape::Linear;
   std::string path;
   if (section.text("file", path)) draft.truth_file = beside_file(file, path);
@@ -33,7 +34,7 @@ void read_truth(TomlSection section, const std::string& file, SetupDraft& draft)
 }
 
 void read_thermal(TomlSection section, ThermalDrift& thermal) {
-  section.vector("growth_um_per_m", thermal.growth_per_m, kMicro);
+  section.vector("growth_um_per_m", thermal.expansion_per_m, kMicro);
   section.vector("shift_um", thermal.shift_m, kMicro);
   section.number("time_constant_s", thermal.time_constant_s, 1.0, kPositiveNumber);
   section.refuse_unknown_keys();
@@ -44,7 +45,8 @@ void read_path(TomlSection section, const std::string& file, SetupDraft& draft) 
   std::string path;
   if (section.text("file", path)) draft.path_file = beside_file(file, path);
   section.number("feed_mm_per_min", simulation.path.feed_m_per_s, kMmPerMin, kPositiveNumber);
-  section.number("acceleration_mm_per_s2", simulation.path.acceleration_m_per_s2, kMilli, kPositiveNumber);
+  section.number("acceleration_mm_per_s2", simulation.path.acceleration_m_per_s2, kMilli,
+                 kPositiveNumber);
   section.number("dwell_s", simulation.path.dwell_s, 1.0, kNotNegativeNumber);
   read_duration(section, "standstill_s", simulation.standstill, 1.0);
   section.flag("start_when_streaming", simulation.start_when_streaming);
@@ -59,8 +61,10 @@ void read_tracker(TomlSection section, SimulationSetup& simulation) {
   section.vector("rotation_rad", model.rotation_rad);
   section.number("sigma_range_um", model.sigma_range_m, kMicro, kNotNegativeNumber);
   section.number("sigma_angle_urad", model.sigma_angle_rad, kMicro, kNotNegativeNumber);
-  section.number("max_radial_speed_mm_per_s", model.max_radial_speed_m_per_s, kMilli, kPositiveNumber);
-  section.number("max_lateral_speed_mm_per_s", model.max_lateral_speed_m_per_s, kMilli, kPositiveNumber);
+  section.number("max_radial_speed_mm_per_s", model.max_radial_speed_m_per_s, kMilli,
+                 kPositiveNumber);
+  section.number("max_lateral_speed_mm_per_s", model.max_lateral_speed_m_per_s, kMilli,
+                 kPositiveNumber);
   section.number("clock_offset_s", model.clock_offset_s, 1.0, {0.0, 2e9});
   section.number("clock_drift_ppm", model.clock_drift_ppm, 1.0, {-1000.0, 1000.0});
   read_duration(section, "delay_ms", tracker.delay, kMilli);
@@ -81,9 +85,11 @@ void read_probe(TomlSection section, SimulationSetup& simulation) {
   std::string name = "Z";
   section.text("axis", name);
   const auto axis = axis_named(name);
+
   if (!axis) section.fault("axis", "must be X, Y or Z");
   surface.axis = static_cast<int>(axis.value_or(Axis::Z));
-  if (!section.number("surface_mm", surface.surface_m, kMilli)) section.fault("surface_mm", "missing");
+  if (!section.number("surface_mm", surface.surface_m, kMilli))
+    section.fault("surface_mm", "missing");
   section.number("delay_us", surface.delay_s, kMicro, kNotNegativeNumber);
   section.number("jitter_us", surface.jitter_s, kMicro, kNotNegativeNumber);
   section.refuse_unknown_keys();
@@ -95,6 +101,7 @@ void read_probe(TomlSection section, SimulationSetup& simulation) {
 void read_sim(TomlSection sim, const std::string& file, SetupDraft& draft) {
   SimulationSetup& simulation = draft.setup.simulation;
   std::string machine;
+
   if (sim.text("machine", machine)) draft.machine_file = beside_file(file, machine);
   sim.integer("seed", draft.seed, 0, INT64_MAX);
   sim.number("speed", draft.setup.speed, 1.0, {1e-3, 1e4});

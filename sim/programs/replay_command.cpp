@@ -43,6 +43,7 @@ Result<void> read_places(const ReplayOptions& options, ReplaySetup& setup) {
       setup.links[name] = where;
     }
   }
+
   return {};
 }
 
@@ -85,6 +86,7 @@ Ports ports_of(const std::vector<ReplayedPlace>& places) {
         break;
     }
   }
+
   return ports;
 }
 
@@ -106,9 +108,11 @@ int replay(const ReplayOptions& options) {
   const auto opened = open(options, loop.clock().now());
   if (!opened) return report(opened.error());
   Replay& replay = **opened;
-  if (const auto announced = announce_ports(ports_of(replay.places()), options.ports_file); !announced)
+  if (const auto announced = announce_ports(ports_of(replay.places()), options.ports_file);
+      !announced)
     return report(announced.error());
   bool was_finished = false;
+
   while (!loop.stopped() && !(options.exit_at_end && was_finished)) {
     std::vector<pollfd> fds;
     replay.add_poll_fds(fds);
@@ -117,16 +121,20 @@ int replay(const ReplayOptions& options) {
     if (replay.finished() && !was_finished) fmt::print(stderr, "replay: everything served\n");
     was_finished = replay.finished();
   }
+
   return kDone;
 }
 
 }  // namespace
 
 Subcommand add_replay(CLI::App& app) {
-  auto options = std::make_shared<ReplayOptions>();  // lives as long as the command line's callbacks
-  CLI::App* sub =
-      app.add_subcommand("replay", "the raw bytes of a recording on the wire again, with their timing");
-  sub->add_option("file", options->file, "MCAP recording with raw bytes")->required()->type_name("FILE");
+  // lives as long as the command line's callbacks
+  auto options = std::make_shared<ReplayOptions>();
+  CLI::App* sub = app.add_subcommand(
+      "replay", "the raw bytes of a recording on the wire again, with their timing");
+  sub->add_option("file", options->file, "MCAP recording with raw bytes")
+      ->required()
+      ->type_name("FILE");
   sub->add_option("--speed", options->speed,
                   "simulated seconds per second; the daemon must be given the same")
       ->check(CLI::Range(1e-3, 1e4));
@@ -134,13 +142,16 @@ Subcommand add_replay(CLI::App& app) {
   sub->add_option("--can-port", options->setup.bus.port, "UDP; 0 = any free one");
   sub->add_option("--can-peer-port", options->setup.bus.peer_port,
                   "UDP port of the daemon; 0 = whoever speaks first");
-  sub->add_option("--can-interface", options->setup.bus.interface, "SocketCAN interface instead of UDP");
-  sub->add_option("--at", options->places,
-                  "NAME=PORT or, for a serial line, NAME=PATH: where the device of that name is served "
-                  "(default: any free port; repeatable)")
+  sub->add_option("--can-interface", options->setup.bus.interface,
+                  "SocketCAN interface instead of UDP");
+  sub->add_option(
+         "--at", options->places,
+         "NAME=PORT or, for a serial line, NAME=PATH: where the device of that name is served "
+         "(default: any free port; repeatable)")
       ->type_name("PLACE");
   sub->add_option("--ports-file", options->ports_file, "as of run")->type_name("FILE");
   sub->add_flag("--exit-at-end", options->exit_at_end, "leave when everything has been served");
+
   return {sub, [options] { return replay(*options); }};
 }
 

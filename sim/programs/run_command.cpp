@@ -25,7 +25,8 @@ struct RunOptions {
   std::string truth_out;
 };
 
-/// Says on stderr what a person in front of the machine would see; a bar only where somebody watches.
+/// Says on stderr what a person in front of the machine would see; a bar only where somebody
+/// watches.
 class Narrator {
  public:
   explicit Narrator(double speed) : speed_(speed) {}
@@ -36,15 +37,19 @@ class Narrator {
       fmt::print(stderr, "{}tracker: client {}\n", bar_end(), client ? "connected" : "gone");
     client_ = client;
     const VirtualMachine& machine = simulation.machine();
+
     if (machine.started() && !announced_start_) {
       announced_start_ = true;
       fmt::print(stderr, "{}machine: {} legs, {:.0f} s ({:.0f} s on the wall)\n", bar_end(),
-                 machine.path().legs(), machine.path().duration_s(), machine.path().duration_s() / speed_);
+                 machine.path().legs(), machine.path().duration_s(),
+                 machine.path().duration_s() / speed_);
     }
+
     if (machine.finished() && now >= *machine.finished() && !announced_end_) {
       announced_end_ = true;
       fmt::print(stderr, "{}machine: path driven, standing\n", bar_end());
     }
+
     if (announced_start_ && !announced_end_) draw(machine, now);
   }
 
@@ -76,10 +81,12 @@ int run(const RunOptions& options) {
   auto setup = load_setup(options.choices);
   if (!setup) return report(setup.error());
   setup->simulation.bus_apart = true;
+
   if (!options.truth_out.empty()) {
     const auto written = write_file(options.truth_out, format_truth_csv(setup->simulation.truth));
     if (!written) return report(written.error());
   }
+
   const EventLoop loop(setup->speed);
   auto simulation = Simulation::open(setup->simulation, loop.clock().now());
   if (!simulation) return report(simulation.error());
@@ -88,6 +95,7 @@ int run(const RunOptions& options) {
     return report(announced.error());
   BusThread encoders(**simulation, loop.clock());
   Narrator narrator(setup->speed);
+
   while (!loop.stopped()) {
     std::vector<pollfd> fds;
     (*simulation)->add_poll_fds(fds);
@@ -97,6 +105,7 @@ int run(const RunOptions& options) {
     encoders.check();
     narrator.look(**simulation, now);
   }
+
   return kDone;
 }
 
@@ -108,15 +117,19 @@ Subcommand add_run(CLI::App& app) {
   CLI::App* sub = app.add_subcommand(
       "run", "machine, tracker, encoders and counter card on 127.0.0.1 until SIGINT or SIGTERM");
   add_machine_options(*sub, choices);
-  sub->add_option("--path", choices.path_file, "CSV x_mm,y_mm,z_mm[,feed_mm_per_min]")->type_name("FILE");
-  sub->add_option("--feed", choices.feed_mm_per_min, "mm/min (default 2500)")->check(CLI::PositiveNumber);
-  sub->add_option("--speed", choices.speed, "simulated seconds per second; the daemon must be given the same")
+  sub->add_option("--path", choices.path_file, "CSV x_mm,y_mm,z_mm[,feed_mm_per_min]")
+      ->type_name("FILE");
+  sub->add_option("--feed", choices.feed_mm_per_min, "mm/min (default 2500)")
+      ->check(CLI::PositiveNumber);
+  sub->add_option("--speed", choices.speed,
+                  "simulated seconds per second; the daemon must be given the same")
       ->check(CLI::Range(1e-3, 1e4));
   sub->add_option("--tracker-port", choices.tracker_port, "TCP; 0 = any free one");
   sub->add_option("--can-port", choices.can_port, "UDP; 0 = any free one");
   sub->add_option("--can-peer-port", choices.can_peer_port,
                   "UDP port of the daemon; 0 = whoever speaks first");
-  sub->add_option("--can-interface", choices.can_interface, "SocketCAN interface instead of UDP: vcan0");
+  sub->add_option("--can-interface", choices.can_interface,
+                  "SocketCAN interface instead of UDP: vcan0");
   sub->add_option("--usbip-port", choices.usbip_port, "TCP, of the counter card; 0 = any free one");
   sub->add_option("--ports-file", options->ports_file,
                   "written when all ports listen: lines tracker_port=N, can_port=N, usbip_port=N")
@@ -126,8 +139,10 @@ Subcommand add_run(CLI::App& app) {
   CLI::Option* streaming =
       sub->add_flag("--start-when-streaming", choices.start_when_streaming,
                     "move when the tracker has streamed through the standstill (default)");
-  sub->add_flag("--start-at-once", choices.start_at_once, "move after the standstill, watched or not")
+  sub->add_flag("--start-at-once", choices.start_at_once,
+                "move after the standstill, watched or not")
       ->excludes(streaming);
+
   return {sub, [options] { return run(*options); }};
 }
 

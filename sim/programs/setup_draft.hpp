@@ -1,6 +1,6 @@
 #pragma once
-/// Everything the files say, before the truth is made of it. Each group of tables has a reader of its own
-/// that fills its part.
+/// Everything the files say, before the truth is made of it. Each group of tables has a reader of
+/// its own that fills its part.
 
 #include <cstdint>
 #include <string>

@@ -24,7 +24,8 @@ void add_usual_devices(SimulationSetup& simulation) {
 }
 
 Result<void> read_files(const SetupChoices& choices, SetupDraft& draft) {
-  // The machine file comes first although [sim] may name it: what [sim] says about a port or a speed wins.
+  // The machine file comes first although [sim] may name it: what [sim] says about a port or a
+  // speed wins.
   if (!choices.config_file.empty()) {
     auto named = read_toml_file(choices.config_file, [&](TomlSection root) {
       std::string machine;
@@ -33,14 +34,17 @@ Result<void> read_files(const SetupChoices& choices, SetupDraft& draft) {
     });
     if (!named) return named;
   }
+
   if (!choices.machine_file.empty()) draft.machine_file = choices.machine_file;
   if (draft.machine_file.empty()) draft.machine_file = choices.config_file;
-  if (draft.machine_file.empty()) return usage_error("no machine: give --machine FILE or --config FILE");
+  if (draft.machine_file.empty())
+    return usage_error("no machine: give --machine FILE or --config FILE");
   const std::string machine_file = draft.machine_file;
-  auto machine =
-      read_toml_file(machine_file, [&](TomlSection root) { read_machine_tables(std::move(root), draft); });
+  auto machine = read_toml_file(
+      machine_file, [&](TomlSection root) { read_machine_tables(std::move(root), draft); });
   if (!machine) return machine;
   if (choices.config_file.empty()) return {};
+
   return read_toml_file(choices.config_file, [&](TomlSection root) {
     TomlSection sim = root.child("sim");
     if (!sim.present()) return root.fault("sim", "missing");
@@ -86,7 +90,8 @@ Result<void> make_path(const SetupDraft& draft, PathPlan& path) {
   if (!text) return tl::unexpected(text.error());
   auto vertices = parse_path_csv(*text, draft.path_file);
   if (!vertices) return tl::unexpected(vertices.error());
-  if (vertices->size() < 2) return bad_input(draft.path_file + ": a path needs at least two vertices");
+  if (vertices->size() < 2)
+    return bad_input(draft.path_file + ": a path needs at least two vertices");
   path.vertices = *vertices;
   return {};
 }
@@ -96,14 +101,17 @@ void share_seed_and_speed(SetupDraft& draft) {
   simulation.tracker->model.seed = static_cast<std::uint64_t>(draft.seed);
   draft.setup.array.seed = static_cast<std::uint64_t>(draft.seed);
   simulation.bus->speed = draft.setup.speed;
+
   for (EncoderNodeOptions& node : simulation.nodes) {
     node.seed = static_cast<std::uint64_t>(draft.seed);
     node.noise_m = draft.encoder_noise_m;
   }
+
   if (simulation.measuring_machine)
     simulation.measuring_machine->machine.seed = static_cast<std::uint64_t>(draft.seed);
   if (simulation.surface) simulation.surface->seed = static_cast<std::uint64_t>(draft.seed);
-  for (CounterCardSetup& card : simulation.counter_cards) card.seed = static_cast<std::uint64_t>(draft.seed);
+  for (CounterCardSetup& card : simulation.counter_cards)
+    card.seed = static_cast<std::uint64_t>(draft.seed);
 }
 
 }  // namespace
@@ -115,13 +123,17 @@ Result<LoadedSetup> load_setup(const SetupChoices& choices) {
   if (const auto read = read_files(choices, draft); !read) return tl::unexpected(read.error());
   apply_choices(choices, draft);
   if (const auto made = make_truth(draft); !made) return tl::unexpected(made.error());
+
   if (choices.needs_path) {
-    if (const auto made = make_path(draft, simulation.path); !made) return tl::unexpected(made.error());
+    if (const auto made = make_path(draft, simulation.path); !made)
+      return tl::unexpected(made.error());
   }
+
   if (!draft.artefact_file.empty()) {
     const auto read = read_artefact(draft.artefact_file, simulation.measuring_machine->machine);
     if (!read) return tl::unexpected(read.error());
   }
+
   share_seed_and_speed(draft);
   return draft.setup;
 }

@@ -1,7 +1,7 @@
 #pragma once
-/// What to simulate, from files: the machine description the daemon uses too, and the simulator's own [sim]
-/// table, in the same file or in one of its own. In files lengths are mm, small errors um and urad; here
-/// everything is SI.
+/// What to simulate, from files: the machine description the daemon uses too, and the simulator's
+/// own [sim] table, in the same file or in one of its own. In files lengths are mm, small errors um
+/// and urad; here everything is SI.
 
 #include <cstdint>
 #include <optional>

@@ -48,10 +48,12 @@ std::vector<TomlSection> TomlSection::children(std::string_view key) {
   const toml::node* node = find(key);
   if (node == nullptr) return sections;
   const toml::array* array = node->as_array();
+
   if (array == nullptr) {
     fault(key, "must be an array of tables");
     return sections;
   }
+
   for (const toml::node& element : *array) {
     if (element.is_table()) {
       sections.emplace_back(element.as_table(), path_of(key), faults_);
@@ -59,6 +61,7 @@ std::vector<TomlSection> TomlSection::children(std::string_view key) {
       fault(key, "must be an array of tables");
     }
   }
+
   return sections;
 }
 
@@ -66,19 +69,23 @@ bool TomlSection::number(std::string_view key, double& value, double scale, Numb
   const toml::node* node = find(key);
   if (node == nullptr) return false;
   const std::optional<double> seen = node->value<double>();
+
   if (!node->is_number() || !seen || !std::isfinite(*seen)) {
     fault(key, "must be a number");
     return false;
   }
+
   if (*seen < range.least || *seen > range.most) {
     fault(key, fmt::format("{} is out of range", *seen));
     return false;
   }
+
   value = *seen * scale;
   return true;
 }
 
-bool TomlSection::integer(std::string_view key, std::int64_t& value, std::int64_t least, std::int64_t most) {
+bool TomlSection::integer(std::string_view key, std::int64_t& value, std::int64_t least,
+                          std::int64_t most) {
   const toml::node* node = find(key);
   if (node == nullptr) return false;
   const auto* seen = node->as_integer();
@@ -125,15 +132,18 @@ bool TomlSection::vector(std::string_view key, Eigen::Vector3d& value, double sc
   const toml::array* array = node->as_array();
   Eigen::Vector3d seen = Eigen::Vector3d::Zero();
   bool good = array != nullptr && array->size() == 3;
+
   for (std::size_t i = 0; good && i < 3; ++i) {
     const std::optional<double> number = array->get(i)->value<double>();
     good = array->get(i)->is_number() && number && std::isfinite(*number);
     if (good) seen[static_cast<Eigen::Index>(i)] = *number;
   }
+
   if (!good) {
     fault(key, "must be three numbers, x, y, z");
     return false;
   }
+
   value = scale * seen;
   return true;
 }
@@ -141,18 +151,22 @@ bool TomlSection::vector(std::string_view key, Eigen::Vector3d& value, double sc
 void TomlSection::refuse_unknown_keys() {
   if (table_ == nullptr) return;
   for (const auto& [key, node] : *table_) {
-    if (known_.find(key.str()) == known_.end()) faults_.add(&node, path_of(key.str()), "unknown key");
+    if (known_.find(key.str()) == known_.end())
+      faults_.add(&node, path_of(key.str()), "unknown key");
   }
 }
 
 Result<toml::table> parse_toml(std::string_view text, const std::string& file) {
   constexpr protocol::TomlBounds kBounds;
   if (text.size() > kBounds.bytes)
-    return bad_input(fmt::format("{}: {} bytes, at most {} are read", file, text.size(), kBounds.bytes));
+    return bad_input(
+        fmt::format("{}: {} bytes, at most {} are read", file, text.size(), kBounds.bytes));
+
   if (const auto at = protocol::toml_deeper_than(text, kBounds.depth)) {
     const auto line = 1 + std::ranges::count(text.substr(0, *at), '\n');
     return bad_input(fmt::format("{}:{}: nested deeper than {}", file, line, kBounds.depth));
   }
+
   try {
     return toml::parse(text, file);
   } catch (const toml::parse_error& e) {
@@ -160,7 +174,8 @@ Result<toml::table> parse_toml(std::string_view text, const std::string& file) {
   }
 }
 
-Result<void> read_toml_file(const std::string& file, const std::function<void(TomlSection)>& reader) {
+Result<void> read_toml_file(const std::string& file,
+                            const std::function<void(TomlSection)>& reader) {
   const auto text = read_file(file);
   if (!text) return tl::unexpected(text.error());
   const auto table = parse_toml(*text, file);

@@ -1,6 +1,7 @@
 #pragma once
-/// One table of a TOML file, read key by key. Every fault goes into one list ("file:line: table.key: what is
-/// wrong", at most 20), and keys that nobody asked for are faults of a strict table.
+/// One table of a TOML file, read key by key. Every fault goes into one list ("file:line:
+/// table.key: what is wrong", at most 20), and keys that nobody asked for are faults of a strict
+/// table.
 
 #include <toml++/toml.h>
 #include <Eigen/Core>
@@ -49,8 +50,10 @@ class TomlSection {
   [[nodiscard]] TomlSection child(std::string_view key);
   [[nodiscard]] std::vector<TomlSection> children(std::string_view key);  ///< of an array of tables
 
-  /// Each sets `value` and says true if the key is there and good. `scale` turns the file's unit into SI.
-  bool number(std::string_view key, double& value, double scale = 1.0, NumberRange range = kAnyNumber);
+  /// Each sets `value` and says true if the key is there and good. `scale` turns the file's unit
+  /// into SI.
+  bool number(std::string_view key, double& value, double scale = 1.0,
+              NumberRange range = kAnyNumber);
   bool integer(std::string_view key, std::int64_t& value, std::int64_t least, std::int64_t most);
   bool port(std::string_view key, std::uint16_t& value);
   bool text(std::string_view key, std::string& value);
@@ -71,7 +74,8 @@ class TomlSection {
   std::set<std::string, std::less<>> known_;
 };
 
-/// BadInput ("FILE:LINE: ...") also for a text beyond protocol::TomlBounds, which no parser sees then.
+/// BadInput ("FILE:LINE: ...") also for a text beyond protocol::TomlBounds, which no parser sees
+/// then.
 [[nodiscard]] Result<toml::table> parse_toml(std::string_view text, const std::string& file);
 
 /// Reads the parts of one file that `reader` knows. Io, or BadInput with every fault at once.

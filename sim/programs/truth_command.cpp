@@ -23,19 +23,22 @@ struct TruthOptions {
   std::string out = "-";
 };
 
-std::vector<Eigen::Vector3d> grid_points(const TruthMachine& truth, const std::vector<std::size_t>& n) {
+std::vector<Eigen::Vector3d> grid_points(const TruthMachine& truth,
+                                         const std::vector<std::size_t>& n) {
   const auto at = [&](std::size_t axis, std::size_t i) {
     const AxisRange& r = truth.axes[axis].range;
-    return n[axis] == 1
-               ? 0.5 * (r.min_m + r.max_m)
-               : r.min_m + (r.max_m - r.min_m) * static_cast<double>(i) / static_cast<double>(n[axis] - 1);
+    return n[axis] == 1 ? 0.5 * (r.min_m + r.max_m)
+                        : r.min_m + (r.max_m - r.min_m) * static_cast<double>(i) /
+                                        static_cast<double>(n[axis] - 1);
   };
+
   std::vector<Eigen::Vector3d> points;
   for (std::size_t i = 0; i < n[0]; ++i) {
     for (std::size_t j = 0; j < n[1]; ++j) {
       for (std::size_t k = 0; k < n[2]; ++k) points.emplace_back(at(0, i), at(1, j), at(2, k));
     }
   }
+
   return points;
 }
 
@@ -54,8 +57,8 @@ std::string as_csv(const TruthMachine& truth, const std::vector<Eigen::Vector3d>
   for (const Eigen::Vector3d& q : points) {
     const Eigen::Vector3d q_mm = 1e3 * q;
     const Eigen::Vector3d v_um = 1e6 * error_m(truth, q);
-    fmt::format_to(std::back_inserter(out), "{:.17g},{:.17g},{:.17g},{:.17g},{:.17g},{:.17g}\n", q_mm.x(),
-                   q_mm.y(), q_mm.z(), v_um.x(), v_um.y(), v_um.z());
+    fmt::format_to(std::back_inserter(out), "{:.17g},{:.17g},{:.17g},{:.17g},{:.17g},{:.17g}\n",
+                   q_mm.x(), q_mm.y(), q_mm.z(), v_um.x(), v_um.y(), v_um.z());
   }
   return out;
 }
@@ -92,8 +95,8 @@ std::shared_ptr<TruthOptions> add_common(CLI::App& sub) {
 }  // namespace
 
 Subcommand add_truth(CLI::App& app) {
-  CLI::App* sub =
-      app.add_subcommand("truth", "V = actual - nominal of the cold machine without backlash, as CSV");
+  CLI::App* sub = app.add_subcommand(
+      "truth", "V = actual - nominal of the cold machine without backlash, as CSV");
   auto options = add_common(*sub);
   options->grid = {13, 11, 9};
   CLI::Option* points =
@@ -104,6 +107,7 @@ Subcommand add_truth(CLI::App& app) {
       ->expected(3)
       ->check(CLI::Range(1, 1000))
       ->excludes(points);
+
   return {sub, [options] { return truth_at_points(*options); }};
 }
 

@@ -48,6 +48,7 @@ BallArray reference_ball_array() {
                     .normal = Vector3d::UnitY(),
                     .half_1_m = Vector3d(10, 0, 0) / kMmPerM,
                     .half_2_m = Vector3d(0, 0, 15) / kMmPerM};
+
   return array;
 }
 
@@ -55,6 +56,7 @@ std::vector<Eigen::Isometry3d> reference_positions() {
   struct Turn {
     double fan_deg, tilt_deg, roll_deg;
   };
+
   constexpr std::array<Turn, 8> kTurns{{{16.0, 2.1, -4.0},
                                         {11.5, 3.1, 3.0},
                                         {6.5, 1.8, -3.0},
@@ -65,6 +67,7 @@ std::vector<Eigen::Isometry3d> reference_positions() {
                                         {1.5, -2.2, -4.5}}};
   constexpr double kRadPerDeg = std::numbers::pi / 180.0;
   std::vector<Eigen::Isometry3d> positions;
+
   for (const Turn& turn : kTurns) {
     Eigen::Isometry3d& T = positions.emplace_back(Eigen::Isometry3d::Identity());
     T.translate(Vector3d(-90, 140, 30) / kMmPerM);
@@ -72,6 +75,7 @@ std::vector<Eigen::Isometry3d> reference_positions() {
     T.rotate(Eigen::AngleAxisd(-turn.tilt_deg * kRadPerDeg, Vector3d::UnitY()));
     T.rotate(Eigen::AngleAxisd(turn.roll_deg * kRadPerDeg, Vector3d::UnitX()));
   }
+
   return positions;
 }
 
@@ -79,29 +83,33 @@ BallArray as_it_is(const BallArray& stated, const ArrayState& state) {
   ArrayErrors errors(state.seed);
   BallArray array = stated;
   for (ArrayBall& ball : array.balls) ball.centre_m += errors.vector(state.u_ball_m);
+
   for (ArrayFace& face : array.faces) {
     // What turns it about its own normal changes nothing.
     const Vector3d turn = errors.vector(state.u_block_rad);
     for (Vector3d* direction : {&face.normal, &face.half_1_m, &face.half_2_m})
       *direction = Eigen::AngleAxisd(turn.norm(), turn.stableNormalized()) * *direction;
   }
+
   const double alpha_per_K = state.alpha_per_K + errors.number(state.u_alpha_per_K);
-  const double growth = 1.0 + alpha_per_K * (state.temperature_C - kReference_C);
+  const double factor = 1.0 + alpha_per_K * (state.temperature_C - kReference_C);
   for (ArrayBall& ball : array.balls) {
-    ball.centre_m *= growth;
-    ball.radius_m *= growth;
+    ball.centre_m *= factor;
+    ball.radius_m *= factor;
   }
-  for (ArrayFace& face : array.faces) face.centre_m *= growth;
+
+  for (ArrayFace& face : array.faces) face.centre_m *= factor;
   return array;
 }
 
 std::string format_calibrator_toml(const BallArray& array, const ArrayState& state) {
-  std::string text = fmt::format("[calibrator]\nname = \"{}\"\ntip_radius_mm = {:.17g}\n", array.name,
-                                 kMmPerM * array.tip_radius_m);
+  std::string text = fmt::format("[calibrator]\nname = \"{}\"\ntip_radius_mm = {:.17g}\n",
+                                 array.name, kMmPerM * array.tip_radius_m);
   const auto out = std::back_inserter(text);
   if (state.alpha_per_K != 0.0)
     fmt::format_to(out, "alpha_um_per_m_K = {:.17g}\nu_alpha_um_per_m_K = {:.17g}\n",
                    kUmPerM * state.alpha_per_K, kUmPerM * state.u_alpha_per_K);
+
   for (std::size_t i = 0; i < array.balls.size(); ++i) {
     const Vector3d mm = kMmPerM * array.balls[i].centre_m;
     fmt::format_to(out,
@@ -110,11 +118,14 @@ std::string format_calibrator_toml(const BallArray& array, const ArrayState& sta
                    i + 1, mm.x(), mm.y(), mm.z(), kMmPerM * array.balls[i].radius_m,
                    kUmPerM * state.u_ball_m);
   }
+
   for (std::size_t i = 0; i < array.faces.size(); ++i) {
     const Vector3d& n = array.faces[i].normal;
-    fmt::format_to(out, "\n[[block]]\nnumber = {}\nnormal = [{:.17g}, {:.17g}, {:.17g}]\nu_urad = {:.17g}\n",
-                   i + 1, n.x(), n.y(), n.z(), kUmPerM * state.u_block_rad);
+    fmt::format_to(
+        out, "\n[[block]]\nnumber = {}\nnormal = [{:.17g}, {:.17g}, {:.17g}]\nu_urad = {:.17g}\n",
+        i + 1, n.x(), n.y(), n.z(), kUmPerM * state.u_block_rad);
   }
+
   return text;
 }
 

@@ -26,8 +26,10 @@ std::chrono::nanoseconds MessageAge::of(const msghdr& message) const {
     clock_gettime(CLOCK_REALTIME, &now);
     const std::chrono::nanoseconds age{(now.tv_sec - stamp.tv_sec) * 1'000'000'000 + now.tv_nsec -
                                        stamp.tv_nsec};
-    if (age.count() >= 0 && age < std::chrono::seconds{1}) return seconds_to_ns(speed_ * ns_to_seconds(age));
+    if (age.count() >= 0 && age < std::chrono::seconds{1})
+      return seconds_to_ns(speed_ * ns_to_seconds(age));
   }
+
   return {};
 }
 

@@ -22,12 +22,13 @@ constexpr std::size_t kMostUnsent = 32u << 20;  // a client this far behind does
 /// A tracker controller tells it why; I++ DME and Modbus have no word for it.
 template <class Controller>
 void turn_away(const Socket& stranger) {
-  if constexpr (std::is_same_v<Controller, IppDmeDevice> || std::is_same_v<Controller, RecordedDialogue>)
+  if constexpr (std::is_same_v<Controller, IppDmeDevice> ||
+                std::is_same_v<Controller, RecordedDialogue>)
     return;
   std::array<std::byte, 64> packet{};
-  const std::size_t size =
-      emscon::encode(emscon::ErrorResponse{emscon::Command{}, emscon::Status::MultipleConnectionsNotAllowed},
-                     std::span(packet));
+  const std::size_t size = emscon::encode(
+      emscon::ErrorResponse{emscon::Command{}, emscon::Status::MultipleConnectionsNotAllowed},
+      std::span(packet));
   ::send(stranger.get(), packet.data(), size, MSG_DONTWAIT | MSG_NOSIGNAL);
 }
 

@@ -31,7 +31,8 @@ CounterCard::CounterCard(const CounterCardOptions& options) : options_(options) 
 HostTime CounterCard::scan_time(std::uint64_t scan) const {
   const double period_ns =
       1e9 / quad08::pacer_rate_hz(divisor_) * (1.0 - 1e-6 * options_.pacer_deviation_ppm);
-  return pacer_began_ + std::chrono::nanoseconds{std::llround(static_cast<double>(scan) * period_ns)};
+  return pacer_began_ +
+         std::chrono::nanoseconds{std::llround(static_cast<double>(scan) * period_ns)};
 }
 
 void CounterCard::advance(HostTime now, std::size_t wanted) {
@@ -71,6 +72,7 @@ void CounterCard::make_scan(HostTime at) {
       out.little(value);
     }
   }
+
   const auto whole = out.written();
   const auto scan = whole.subspan(std::min(std::exchange(torn_, 0), whole.size()));
   fifo_.insert(fifo_.end(), scan.begin(), scan.end());
@@ -91,19 +93,25 @@ std::uint64_t CounterCard::latched_value(std::size_t channel, HostTime at) {
     counter.latched = static_cast<std::uint64_t>(count - counter.zero) &
                       (quad08::modulus_of(quad08::CountWidth::Bits48) - 1);
   };
+
   if (options_.channels[channel].probe_on_index) {
     const auto edge = latest_edge(at);
     if (edge && *edge > counter.set_up_at) keep(signal_count(channel, *edge));
     return counter.latched;
   }
+
   const auto* scale = std::get_if<ScaleSignal>(&options_.channels[channel].phases);
   if (scale == nullptr) return counter.latched;
   const double now = scale_reading(channel, *scale, at);
   const double before = std::exchange(counter.last_reading, now).value_or(now);
+
   // The latest mark passed is the one nearest to where it is now.
-  const auto first = std::upper_bound(scale->marks.begin(), scale->marks.end(), std::min(before, now));
-  const auto last = std::upper_bound(scale->marks.begin(), scale->marks.end(), std::max(before, now));
+  const auto first =
+      std::upper_bound(scale->marks.begin(), scale->marks.end(), std::min(before, now));
+  const auto last =
+      std::upper_bound(scale->marks.begin(), scale->marks.end(), std::max(before, now));
   if (first != last) keep(scale_count(*scale, now > before ? *std::prev(last) : *first));
+
   return counter.latched;
 }
 
@@ -111,7 +119,8 @@ std::int64_t CounterCard::signal_count(std::size_t channel, HostTime at) {
   const PhaseSignal& signal = options_.channels[channel].phases;
   if (const auto* scale = std::get_if<ScaleSignal>(&signal))
     return scale_count(*scale, scale_reading(channel, *scale, at));
-  if (const auto* clock = std::get_if<ClockSignal>(&signal)) return clock_count(*clock, at) + clock_jump_;
+  if (const auto* clock = std::get_if<ClockSignal>(&signal))
+    return clock_count(*clock, at) + clock_jump_;
   if (std::holds_alternative<TimerSignal>(signal)) return timer_count(at) + clock_jump_;
   if (std::holds_alternative<ProbeSignal>(signal)) return probe_count(at);
   return 0;

@@ -37,7 +37,8 @@ std::vector<std::byte> configuration() {
   constexpr unsigned kLength = 25;
   return data_of(9, 2, kLength, 0, 1, quad08::kConfiguration, 0, 0x80, 250,  // bus powered, 500 mA
                  9, 4, 0, 0, 1, 0xFF, 0, 0, 0,                               // one vendor interface
-                 7, 5, quad08::kScanEndpoint, 2, quad08::kPacketSize & 0xFFu, quad08::kPacketSize >> 8, 0);
+                 7, 5, quad08::kScanEndpoint, 2, quad08::kPacketSize & 0xFFu,
+                 quad08::kPacketSize >> 8, 0);
 }
 
 std::vector<std::byte> string(std::string_view text) {
@@ -52,6 +53,7 @@ Answer CounterCard::control(const usb::Setup& setup, HostTime now) {
   Answer answer;
   const auto request = static_cast<quad08::Request>(setup.request);
   const bool vendor = (setup.request_type & 0x60u) == 0x40u;
+
   if (!vendor) {
     answer = standard(setup);
   } else if (request == quad08::Request::FirmwareVersion && setup.device_to_host()) {
@@ -64,6 +66,7 @@ Answer CounterCard::control(const usb::Setup& setup, HostTime now) {
   } else if (request == quad08::Request::EndpointReset) {
     answer.emplace();
   }
+
   if (answer && answer->size() > setup.length) answer->resize(setup.length);
   return answer;
 }
@@ -95,6 +98,7 @@ Answer CounterCard::standard(const usb::Setup& setup) {
     case usb::StandardRequest::SetInterface:
       return std::vector<std::byte>{};
   }
+
   return std::nullopt;
 }
 
@@ -127,6 +131,7 @@ Answer CounterCard::descriptor(const usb::Setup& setup) const {
     case usb::DescriptorType::Endpoint:
       break;
   }
+
   return std::nullopt;
 }
 
@@ -135,7 +140,8 @@ std::uint16_t CounterCard::read_register(std::uint16_t where, HostTime now) {
   if (where == number(Register::Mark)) return corrupted_mark_.value_or(mark_);
   const auto first = number(Register::CounterWord0);
   if (where >= first && where < first + 4) {
-    return static_cast<std::uint16_t>(value_of(bank_ & kCounterBits, now) >> 16 * (where - first) & 0xFFFFu);
+    return static_cast<std::uint16_t>(value_of(bank_ & kCounterBits, now) >> 16 * (where - first) &
+                                      0xFFFFu);
   }
   return 0;
 }
@@ -153,6 +159,7 @@ void CounterCard::write_register(std::uint16_t where, std::uint16_t value, HostT
   const auto divisor_part = [&](unsigned shift) {
     divisor_ = (divisor_ & ~(std::uint64_t{0xFFFF} << shift)) | std::uint64_t{value} << shift;
   };
+
   switch (static_cast<Register>(where)) {
     case Register::Acquisition:
       return control_acquisition(value, now);

@@ -12,8 +12,9 @@ constexpr std::string_view kPathAxes = "XYZ";
 std::function<double(HostTime)> reading_of(const CardAxis& axis, const VirtualMachine& machine) {
   const auto index = axis.name.size() == 1 ? kPathAxes.find(axis.name[0]) : std::string_view::npos;
   if (index != std::string_view::npos) {
-    return
-        [&machine, i = static_cast<Eigen::Index>(index)](HostTime at) { return machine.motion(at).q_m[i]; };
+    return [&machine, i = static_cast<Eigen::Index>(index)](HostTime at) {
+      return machine.motion(at).q_m[i];
+    };
   }
   const double rate = 2.0 * std::numbers::pi / axis.swing_period_s;
   return [&machine, rate, amplitude = axis.swing_rad](HostTime at) {
@@ -47,18 +48,21 @@ CounterCardOptions wire(const CounterCardSetup& setup, const VirtualMachine& mac
   card.serial = setup.serial;
   card.fifo_bytes = setup.fifo_bytes;
   card.seed = setup.seed;
+
   for (const CardAxis& axis : setup.axes) {
     ScaleSignal scale{
         .reading = reading_of(axis, machine), .step = axis.step, .noise = axis.noise, .marks = {}};
     if (axis.signal_period > 0.0) {
-      scale.marks =
-          distance_coded_marks(axis.marks_zero, axis.signal_period, axis.nominal_increment, axis.mark_pairs);
+      scale.marks = distance_coded_marks(axis.marks_zero, axis.signal_period,
+                                         axis.nominal_increment, axis.mark_pairs);
     }
     card.channels.at(axis.channel).phases = std::move(scale);
   }
+
   card.channels.at(setup.clock_channel).phases = clock_of(setup);
   if (setup.latch_channel) card.channels.at(*setup.latch_channel) = {clock_of(setup), true};
   if (setup.edge_channel) card.channels.at(*setup.edge_channel).phases = ProbeSignal{};
+
   return card;
 }
 

@@ -47,11 +47,13 @@ CsvTable split_csv(std::string_view text, CsvErrors& errors) {
     if (table.header.empty()) {
       table.header = std::move(cells);
     } else if (cells.size() != table.header.size()) {
-      errors.add(number, fmt::format("{} columns, but the header has {}", cells.size(), table.header.size()));
+      errors.add(number, fmt::format("{} columns, but the header has {}", cells.size(),
+                                     table.header.size()));
     } else {
       table.rows.push_back({number, std::move(cells)});
     }
   }
+
   if (table.header.empty()) errors.add(1, "no header row");
   return table;
 }
@@ -62,7 +64,8 @@ std::optional<double> csv_number(const CsvTable& table, const CsvRow& row, std::
   double value = 0.0;
   const auto [end, code] = std::from_chars(cell.data(), cell.data() + cell.size(), value);
   if (code == std::errc{} && end == cell.data() + cell.size() && std::isfinite(value)) return value;
-  errors.add(row.line, fmt::format("column {}: \"{}\" is not a number", table.header[column], cell));
+  errors.add(row.line,
+             fmt::format("column {}: \"{}\" is not a number", table.header[column], cell));
   return std::nullopt;
 }
 

@@ -1,6 +1,6 @@
 #pragma once
-/// Just enough CSV for the simulator's own inputs: a header row, `#` comments, no quotes. Errors name file,
-/// line and column, all of a file at once (at most 20).
+/// Just enough CSV for the simulator's own inputs: a header row, `#` comments, no quotes. Errors
+/// name file, line and column, all of a file at once (at most 20).
 
 #include <optional>
 #include <string>
@@ -34,12 +34,12 @@ class CsvErrors {
   std::size_t count_ = 0;
 };
 
-/// Splits `text`; a row with another number of cells than the header is an error. An empty header means no
-/// header was found.
+/// Splits `text`; a row with another number of cells than the header is an error. An empty header
+/// means no header was found.
 [[nodiscard]] CsvTable split_csv(std::string_view text, CsvErrors& errors);
 
 /// The finite number in a cell, or an entry in `errors`.
-[[nodiscard]] std::optional<double> csv_number(const CsvTable& table, const CsvRow& row, std::size_t column,
-                                               CsvErrors& errors);
+[[nodiscard]] std::optional<double> csv_number(const CsvTable& table, const CsvRow& row,
+                                               std::size_t column, CsvErrors& errors);
 
 }  // namespace abbe::sim

@@ -34,7 +34,8 @@ constexpr std::byte kIllegalFunction{1};
 
 std::size_t tcp_request_size(Bytes bytes) {
   if (bytes.size() < kUnit) return 0;
-  const std::size_t size = kUnit + protocol::ByteReader{bytes.subspan(kBeforeLength)}.big<std::uint16_t>();
+  const std::size_t size =
+      kUnit + protocol::ByteReader{bytes.subspan(kBeforeLength)}.big<std::uint16_t>();
   return bytes.size() < size ? 0 : size;
 }
 Bytes tcp_meaning(Bytes request) {
@@ -42,9 +43,11 @@ Bytes tcp_meaning(Bytes request) {
 }
 void tcp_renumber(std::span<std::byte> answer, Bytes, Bytes request) {
   // Bytes that are no Modbus have no number.
-  const bool numbered = answer.size() < kBeforeLength || (answer[kTransactionSize] == std::byte{0} &&
-                                                          answer[kTransactionSize + 1] == std::byte{0});
-  if (numbered) std::copy_n(request.begin(), std::min(kTransactionSize, answer.size()), answer.begin());
+  const bool numbered =
+      answer.size() < kBeforeLength ||
+      (answer[kTransactionSize] == std::byte{0} && answer[kTransactionSize + 1] == std::byte{0});
+  if (numbered)
+    std::copy_n(request.begin(), std::min(kTransactionSize, answer.size()), answer.begin());
 }
 std::vector<std::byte> tcp_refusal(Bytes request) {
   if (request.size() < kUnit + 2) return {};
@@ -54,7 +57,8 @@ std::vector<std::byte> tcp_refusal(Bytes request) {
           kIllegalFunction};
 }
 
-// --- Modbus RTU: unit, function, address (2), count (2), CRC (2, low byte first). Only reads are asked.
+// --- Modbus RTU: unit, function, address (2), count (2), CRC (2, low byte first). Only reads are
+// asked.
 
 constexpr std::size_t kRtuReadSize = 8;
 
@@ -91,8 +95,9 @@ void line_renumber(std::span<std::byte> answer, Bytes recorded, Bytes request) {
 }
 std::vector<std::byte> line_refusal(Bytes request) {
   const std::string tag{text_of(request.first(std::min(kTagSize, request.size())))};
-  return bytes_of(tag + " &\r\n" + tag + " ! Error(2,0501,\"replay\",\"Not asked in the recording\")\r\n" +
-                  tag + " %\r\n");
+  return bytes_of(tag + " &\r\n" + tag +
+                  " ! Error(2,0501,\"replay\",\"Not asked in the recording\")\r\n" + tag +
+                  " %\r\n");
 }
 
 constexpr DialogueWire kModbusTcp{tcp_request_size, tcp_meaning, tcp_renumber, tcp_refusal};

@@ -16,8 +16,8 @@ bool concerns(const Fault& fault, const EncoderNode& node) {
 }  // namespace
 
 Result<EncoderBus> EncoderBus::open(const EncoderBusOptions& options,
-                                    std::span<const EncoderNodeOptions> nodes, const VirtualMachine& machine,
-                                    HostTime now) {
+                                    std::span<const EncoderNodeOptions> nodes,
+                                    const VirtualMachine& machine, HostTime now) {
   auto port = CanPort::open(options);
   if (!port) return tl::unexpected(port.error());
   EncoderBus bus(std::move(*port));
@@ -47,6 +47,7 @@ void EncoderBus::poll(HostTime now) {
   receive(now);
   send_sync(now);
   for (EncoderNode& node : nodes_) node.advance(now);
+
   std::erase_if(all_clears_, [&](const AllClear& clear) {
     if (now < clear.due) return false;
     for (EncoderNode& node : nodes_) {
@@ -54,6 +55,7 @@ void EncoderBus::poll(HostTime now) {
     }
     return true;
   });
+
   collect();
   send_due(now);
 }
@@ -80,8 +82,9 @@ void EncoderBus::receive(HostTime now) {
 void EncoderBus::collect() {
   for (EncoderNode& node : nodes_) {
     for (const TimedFrame& timed : node.take_frames()) {
-      const auto place = std::upper_bound(waiting_.begin(), waiting_.end(), timed.due,
-                                          [](HostTime due, const TimedFrame& t) { return due < t.due; });
+      const auto place =
+          std::upper_bound(waiting_.begin(), waiting_.end(), timed.due,
+                           [](HostTime due, const TimedFrame& t) { return due < t.due; });
       waiting_.insert(place, timed);
     }
   }
@@ -122,14 +125,18 @@ void EncoderBus::inject(const Fault& fault, HostTime now) {
     bus_off_until_ = until;
     return;
   }
+
   if (fault.kind == FaultKind::BusGarbage) return port_->send_garbage();
-  if (fault.kind == FaultKind::Overflow) return send_error_frame(can::BusCondition::ReceiveOverflow);
+  if (fault.kind == FaultKind::Overflow)
+    return send_error_frame(can::BusCondition::ReceiveOverflow);
+
   if (fault.kind == FaultKind::Bundled) {
     bundle_until_ = until;
     bundle_every_ = seconds_to_ns(fault.value > 0.0 ? fault.value : kTunnelTimeout_s);
     next_bundle_ = now + bundle_every_;
     return;
   }
+
   for (EncoderNode& node : nodes_) {
     if (!concerns(fault, node)) continue;
     switch (fault.kind) {
@@ -143,14 +150,16 @@ void EncoderBus::inject(const Fault& fault, HostTime now) {
         node.restart(now);
         break;
       case FaultKind::Emergency:
-        node.emergency(fault.value > 0.0 ? static_cast<std::uint16_t>(fault.value) : kGenericEmergency, 1,
-                       now);
+        node.emergency(
+            fault.value > 0.0 ? static_cast<std::uint16_t>(fault.value) : kGenericEmergency, 1,
+            now);
         all_clears_.push_back({until, node.node()});
         break;
       default:
         break;  // a tracker's fault
     }
   }
+
   collect();
   send_due(now);
 }

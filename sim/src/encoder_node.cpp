@@ -27,7 +27,8 @@ can::EncoderIdentity identity_of(const EncoderNodeOptions& options) {
 
 }  // namespace
 
-EncoderNode::EncoderNode(const EncoderNodeOptions& options, const VirtualMachine& machine, HostTime now)
+EncoderNode::EncoderNode(const EncoderNodeOptions& options, const VirtualMachine& machine,
+                         HostTime now)
     : options_(options),
       machine_(machine),
       objects_(identity_of(options)),
@@ -142,16 +143,19 @@ void EncoderNode::advance(HostTime now) {
     send(can::encode_heartbeat(options_.node, can::NodeState::BootUp), boot_at_);
     if (options_.configured) configure();
   }
+
   if (const auto abort = sdo_.on_time(now)) send(*abort, now);
   const auto period = heartbeat_period();
   if (period.count() > 0 && now - last_heartbeat_ >= period) {
     last_heartbeat_ = now;
     send(can::encode_heartbeat(options_.node, state_), now);
   }
+
   if (state_ != can::NodeState::Operational) return;
   for (unsigned n = 1; n <= 2; ++n) {
     const can::TpdoSettings tpdo = objects_.tpdo(n);
-    if (!tpdo.enabled || tpdo.transmission_type < kFirstEventType || tpdo.event_timer_ms == 0) continue;
+    if (!tpdo.enabled || tpdo.transmission_type < kFirstEventType || tpdo.event_timer_ms == 0)
+      continue;
     if (now - last_event_[n - 1] < std::chrono::milliseconds{tpdo.event_timer_ms}) continue;
     last_event_[n - 1] = now;
     sample(now);
@@ -166,7 +170,8 @@ HostTime EncoderNode::next_due() const {
   if (state_ != can::NodeState::Operational) return due;
   for (unsigned n = 1; n <= 2; ++n) {
     const can::TpdoSettings tpdo = objects_.tpdo(n);
-    if (!tpdo.enabled || tpdo.transmission_type < kFirstEventType || tpdo.event_timer_ms == 0) continue;
+    if (!tpdo.enabled || tpdo.transmission_type < kFirstEventType || tpdo.event_timer_ms == 0)
+      continue;
     due = std::min(due, last_event_[n - 1] + std::chrono::milliseconds{tpdo.event_timer_ms});
   }
   return due;

@@ -10,12 +10,13 @@
 namespace abbe::sim {
 namespace {
 
-/// Second derivatives of the natural cubic spline: the tridiagonal system of its continuity conditions, by
-/// elimination.
+/// Second derivatives of the natural cubic spline: the tridiagonal system of its continuity
+/// conditions, by elimination.
 std::vector<double> natural_curvature(std::span<const double> x, std::span<const double> y) {
   const std::size_t n = x.size();
   std::vector<double> curvature(n, 0.0);
   std::vector<double> upper(n, 0.0);
+
   for (std::size_t i = 1; i + 1 < n; ++i) {
     const double h0 = x[i] - x[i - 1];
     const double h1 = x[i + 1] - x[i];
@@ -24,6 +25,7 @@ std::vector<double> natural_curvature(std::span<const double> x, std::span<const
     upper[i] = h1 / pivot;
     curvature[i] = (rhs - h0 * curvature[i - 1]) / pivot;
   }
+
   for (std::size_t i = n - 1; i-- > 1;) curvature[i] -= upper[i] * curvature[i + 1];
   return curvature;
 }
@@ -70,7 +72,8 @@ double ErrorFunction::between_nodes(double position_m) const {
   const double a = 1.0 - b;
   const double line = a * values_[k] + b * values_[k + 1];
   if (curvature_.empty()) return line;
-  return line + ((a * a * a - a) * curvature_[k] + (b * b * b - b) * curvature_[k + 1]) * h * h / 6.0;
+  return line +
+         ((a * a * a - a) * curvature_[k] + (b * b * b - b) * curvature_[k + 1]) * h * h / 6.0;
 }
 
 ErrorFunction ErrorFunction::with_values(std::vector<double> values) const {

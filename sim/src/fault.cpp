@@ -78,6 +78,7 @@ std::span<const Name> names_for(FaultTarget target) {
     case FaultTarget::MeasuringMachine:
       return kMeasuringMachineFaults;
   }
+
   return {};
 }
 

@@ -5,8 +5,9 @@
 namespace abbe::sim {
 
 void FaultTimetable::add(const ScheduledFault& fault) {
-  const auto later = std::upper_bound(faults_.begin(), faults_.end(), fault.fault.at_s,
-                                      [](double at_s, const auto& f) { return at_s < f.fault.at_s; });
+  const auto later =
+      std::upper_bound(faults_.begin(), faults_.end(), fault.fault.at_s,
+                       [](double at_s, const auto& f) { return at_s < f.fault.at_s; });
   faults_.insert(later, fault);
 }
 

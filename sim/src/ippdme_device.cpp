@@ -9,8 +9,8 @@ namespace abbe::sim {
 namespace {
 
 constexpr double kMillimetresPerMetre = 1e3;
-constexpr auto kFastestReport =
-    std::chrono::milliseconds{100};  // at most 10 a second, says the specification
+// at most 10 a second, says the specification
+constexpr auto kFastestReport = std::chrono::milliseconds{100};
 
 using ippdme::Argument;
 
@@ -80,12 +80,13 @@ void IppDmeDevice::say(std::string_view line) {
 void IppDmeDevice::fault(const Command& command, int severity, int code, std::string_view text) {
   const std::string number = std::to_string(code);
   say(ippdme::to_string(command.tag) + " ! Error(" + std::to_string(severity) + "," +
-      std::string(4 - std::min<std::size_t>(4, number.size()), '0') + number + "," + command.method + ",\"" +
-      std::string(text) + "\")");
+      std::string(4 - std::min<std::size_t>(4, number.size()), '0') + number + "," +
+      command.method + ",\"" + std::string(text) + "\")");
   failed_ = failed_ || severity >= 2;
 }
 
-std::string IppDmeDevice::place(const std::vector<std::string>& names, const Eigen::Vector3d& p_m) const {
+std::string IppDmeDevice::place(const std::vector<std::string>& names,
+                                const Eigen::Vector3d& p_m) const {
   std::string text;
   for (const std::string& name : names) {
     if (!text.empty()) text += ',';
@@ -113,6 +114,7 @@ void IppDmeDevice::inject(const Fault& fault, HostTime now) {
     motion_.reset();
     mute_until_ = now + seconds_to_ns(fault.duration_s);
   }
+
   if (fault.kind == FaultKind::Disconnect) wants_close_ = true;
   if (fault.kind == FaultKind::EmergencyStop)
     press_emergency_stop(now, now + seconds_to_ns(fault.duration_s));
@@ -147,8 +149,10 @@ void IppDmeDevice::receive(std::span<const std::byte> bytes, HostTime now) {
       }
       on_line(**line, now);
     }
+
     if (taken == 0) return;
   }
+
   begin_next(now);
 }
 
@@ -160,11 +164,13 @@ void IppDmeDevice::on_line(std::string_view line, HostTime now) {
             : "E0000 ! Error(3,0008,Server,\"Protocol error\")");
     return;
   }
+
   const Command command{parsed->tag, std::string(parsed->method), std::string(parsed->arguments)};
   heard_.push_back(command.method + "(" + command.arguments + ")");
   if (heard_.size() > kMostHeard) heard_.pop_front();
   if (command.method == "AbortE" && !options_.answers_aborts) return;
   acknowledge(command.tag);
+
   if (command.tag.event) {
     on_event(command, now);
   } else {
@@ -189,6 +195,7 @@ void IppDmeDevice::on_event(const Command& command, HostTime now) {
   } else {
     fault(command, 2, 501, "Unsupported command");
   }
+
   complete(command.tag);
 }
 
@@ -258,7 +265,8 @@ void IppDmeDevice::begin_next(HostTime now) {
 void IppDmeDevice::carry_out(const Command& command, HostTime now) {
   const bool always = command.method == "StartSession" || command.method == "EndSession";
   if (!session_ && !always) return fault(command, 3, 8, "Protocol error");
-  const bool mends = command.method == "ClearAllErrors" || command.method == "GetXtdErrStatus" || always;
+  const bool mends =
+      command.method == "ClearAllErrors" || command.method == "GetXtdErrStatus" || always;
   if (failed_ && !mends) return fault(command, 2, 514, "Use ClearAllErrors to continue");
   if (now < emergency_until_ && command.method == "ClearAllErrors")
     return fault(command, 3, 500, "Emergency stop");
@@ -293,6 +301,7 @@ bool IppDmeDevice::carry_out_session(const Command& command) {
   } else {
     return command.method == "EnableUser" || command.method == "DisableUser";
   }
+
   return true;
 }
 
@@ -301,9 +310,11 @@ bool IppDmeDevice::carry_out_tools(const Command& command) {
     for (const std::string& tool : options_.tools) data(command.tag, "\"" + tool + "\"");
     return true;
   }
+
   if (command.method != "SetTool" && command.method != "ChangeTool" && command.method != "FindTool")
     return false;
   const auto arguments = arguments_of(command.arguments);
+
   if (arguments.size() != 1 || arguments[0].kind != Argument::Kind::String) {
     fault(command, 1, 502, "Incorrect arguments");
   } else if (std::ranges::find(options_.tools, arguments[0].text) == options_.tools.end()) {
@@ -311,6 +322,7 @@ bool IppDmeDevice::carry_out_tools(const Command& command) {
   } else {
     tool_ = arguments[0].text;
   }
+
   return true;
 }
 
@@ -327,21 +339,26 @@ bool IppDmeDevice::carry_out_reports(const Command& command, HostTime now) {
     }
     return true;
   }
+
   if (command.method != "OnMoveReportE" || !options_.speaks_move_reports) {
     if (command.tag.event) fault(command, 1, 501, "Unsupported command");
     return false;
   }
+
   MoveReport report{command.tag, {}, kFastestReport, now};
   std::erase_if(arguments, [&](const Argument& a) {
     if (a.text == "Time" && a.count == 1 && a.numbers[0] < 1e6)
-      report.period = std::max<std::chrono::nanoseconds>(kFastestReport, seconds_to_ns(a.numbers[0]));
+      report.period =
+          std::max<std::chrono::nanoseconds>(kFastestReport, seconds_to_ns(a.numbers[0]));
     return a.text == "Time" || a.text == "Dis";
   });
+
   const auto names = place_names(arguments);
   if (!names) {
     fault(command, 1, 502, "Incorrect arguments");
     return true;
   }
+
   report.names = *names;
   move_report_ = report;
   return true;
@@ -354,11 +371,13 @@ bool IppDmeDevice::carry_out_motion(const Command& command, HostTime now) {
     data(command.tag, homed_ ? "IsHomed(1)" : "IsHomed(0)");
     return true;
   }
+
   if (command.method == "Home") {
     begin_motion(command, Eigen::Vector3d::Zero(), ns_to_seconds(options_.home_time), now);
     motion_->homing = true;
     return true;
   }
+
   if (command.method != "GoTo" && command.method != "PtMeas") return false;
   if (!finite_place(command.arguments)) {
     fault(command, 1, 502, "Incorrect arguments");
@@ -369,13 +388,15 @@ bool IppDmeDevice::carry_out_motion(const Command& command, HostTime now) {
   } else {
     begin_touch(command, now);
   }
+
   return true;
 }
 
 void IppDmeDevice::begin_motion(const Command& command, const Eigen::Vector3d& to_m, double extra_s,
                                 HostTime now) {
   const double way_s = (to_m - position_m_).norm() / options_.travel_speed_m_s;
-  motion_ = Motion{command, position_m_, to_m, now, now + seconds_to_ns(way_s + extra_s), std::nullopt};
+  motion_ =
+      Motion{command, position_m_, to_m, now, now + seconds_to_ns(way_s + extra_s), std::nullopt};
   if (move_report_) move_report_->next = std::max(move_report_->next, now);
 }
 
@@ -399,6 +420,7 @@ void IppDmeDevice::end_motion() {
   position_m_ = motion.to_m;
   homed_ = homed_ || motion.homing;
   if (motion.unheard) return;
+
   if (motion.probing && refuse_touch_ != 0) {
     fault(motion.command, 2, std::exchange(refuse_touch_, 0), "Refused by the simulation");
   } else if (motion.command.method == "GoTo" && refuse_way_ != 0) {
@@ -410,6 +432,7 @@ void IppDmeDevice::end_motion() {
   } else if (motion.probing) {
     data(motion.command.tag, place(touch_report_, motion.probing->reading_m));
   }
+
   complete(motion.command.tag);
 }
 

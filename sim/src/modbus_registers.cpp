@@ -47,7 +47,8 @@ Registers indigo(const Air& air, bool sensors_gone) {
 
 std::uint16_t bcd(std::uint32_t four_digits) {
   std::uint32_t out = 0;
-  for (unsigned shift = 0; shift < 16; shift += 4, four_digits /= 10) out |= (four_digits % 10) << shift;
+  for (unsigned shift = 0; shift < 16; shift += 4, four_digits /= 10)
+    out |= (four_digits % 10) << shift;
   return static_cast<std::uint16_t>(out);
 }
 
@@ -65,7 +66,8 @@ Registers comet(const Air& air, std::uint32_t serial) {
   return r;
 }
 
-Registers zt2005(const EnvironmentModel& environment, nanoseconds t, std::uint8_t unit, bool sensors_gone) {
+Registers zt2005(const EnvironmentModel& environment, nanoseconds t, std::uint8_t unit,
+                 bool sensors_gone) {
   Registers r;
   for (std::uint16_t i = 0; i < kSimulatedInputs; ++i) {
     const std::uint16_t value = sensors_gone ? 0x8000u : tenths(environment.temperature_C[i].at(t));
@@ -85,9 +87,10 @@ std::optional<ModbusModel> modbus_model(std::string_view name) {
 }
 
 std::vector<SimulatedRegister> registers_of(const ModbusIdentity& identity,
-                                            const EnvironmentModel& environment, nanoseconds since_start,
-                                            bool sensors_gone) {
-  const Air air{environment.air_temperature_C.at(since_start), environment.air_pressure_hPa.at(since_start),
+                                            const EnvironmentModel& environment,
+                                            nanoseconds since_start, bool sensors_gone) {
+  const Air air{environment.air_temperature_C.at(since_start),
+                environment.air_pressure_hPa.at(since_start),
                 environment.relative_humidity_percent.at(since_start)};
   switch (identity.model) {
     case ModbusModel::Indigo520Hmp:

@@ -25,7 +25,9 @@ constexpr std::uint8_t kGatewayTargetSilent = 11;
 constexpr std::string_view kGarbage = "no answer of any Modbus device";
 
 struct FreeContext {
-  void operator()(modbus_t* context) const { modbus_free(context); }  // the sockets have owners of their own
+  void operator()(modbus_t* context) const {
+    modbus_free(context);
+  }  // the sockets have owners of their own
 };
 using Context = std::unique_ptr<modbus_t, FreeContext>;
 struct FreeMapping {
@@ -57,8 +59,12 @@ struct ModbusServer::State {
   std::vector<Query> waiting;
   std::vector<std::pair<Fault, HostTime>> faults;  ///< with their ends
 
-  [[nodiscard]] bool serial() const { return std::holds_alternative<ModbusPtyEndpoint>(options.endpoint); }
-  [[nodiscard]] const std::string& link() const { return std::get<ModbusPtyEndpoint>(options.endpoint).link; }
+  [[nodiscard]] bool serial() const {
+    return std::holds_alternative<ModbusPtyEndpoint>(options.endpoint);
+  }
+  [[nodiscard]] const std::string& link() const {
+    return std::get<ModbusPtyEndpoint>(options.endpoint).link;
+  }
   [[nodiscard]] const Fault* active(FaultKind kind) const {
     for (const auto& [fault, end] : faults) {
       if (fault.kind == kind) return &fault;
@@ -110,7 +116,8 @@ void ModbusServer::State::accept_clients() {
   while (listener) {
     Socket client{::accept4(listener.get(), nullptr, nullptr, SOCK_NONBLOCK | SOCK_CLOEXEC)};
     if (!client) return;
-    if (clients.size() == kMostClients) clients.erase(clients.begin());  // the eldest may be long dead
+    if (clients.size() == kMostClients)
+      clients.erase(clients.begin());  // the eldest may be long dead
     clients.push_back(std::move(client));
   }
 }
@@ -151,19 +158,24 @@ void ModbusServer::State::answer(const Query& query, HostTime now) {
     (void)!::write(query.fd, kGarbage.data(), kGarbage.size());
     return;
   }
+
   modbus_set_socket(context.get(), query.fd);
   const auto exception = [&](unsigned code) {
     modbus_reply_exception(context.get(), query.bytes.data(), code);
   };
+
   if (const Fault* fault = active(FaultKind::ModbusException))
     return exception(fault->value > 0.0 ? static_cast<unsigned>(fault->value) : kBusy);
   const auto header = static_cast<std::size_t>(modbus_get_header_length(context.get()));
   const auto mapping = mapping_for(query.bytes[header - 1], now);
+
   if (!mapping) {
     if (!serial()) exception(kGatewayTargetSilent);
     return;
   }
-  modbus_reply(context.get(), query.bytes.data(), static_cast<int>(query.bytes.size()), mapping.get());
+
+  modbus_reply(context.get(), query.bytes.data(), static_cast<int>(query.bytes.size()),
+               mapping.get());
 }
 
 Mapping ModbusServer::State::mapping_for(std::uint8_t unit, HostTime now) const {
@@ -172,15 +184,19 @@ Mapping ModbusServer::State::mapping_for(std::uint8_t unit, HostTime now) const 
   std::erase_if(registers, [unit](const auto& r) { return r.unit != 0 && r.unit != unit; });
   if (registers.empty()) return nullptr;
   unsigned end = 0;
+
   for (auto& r : registers) {
     if (active(FaultKind::WrongMap) != nullptr) ++r.address;
     end = std::max(end, r.address + 1u);
   }
+
   Mapping mapping{modbus_mapping_new_start_address(0, 0, 0, 0, 0, end, 0, end)};
   for (const auto& r : registers) {
-    auto* table = r.space == RegisterSpace::Holding ? mapping->tab_registers : mapping->tab_input_registers;
+    auto* table =
+        r.space == RegisterSpace::Holding ? mapping->tab_registers : mapping->tab_input_registers;
     table[r.address] = r.value;
   }
+
   return mapping;
 }
 
@@ -188,7 +204,8 @@ Result<ModbusServer> ModbusServer::open(const ModbusServerOptions& options, Host
   auto state = std::make_unique<State>();
   state->options = options;
   state->start = now;
-  if (const auto* tcp = std::get_if<ModbusTcpEndpoint>(&options.endpoint)) state->port_number = tcp->port;
+  if (const auto* tcp = std::get_if<ModbusTcpEndpoint>(&options.endpoint))
+    state->port_number = tcp->port;
   if (auto plugged = state->plug_in(); !plugged) return tl::unexpected(plugged.error());
   state->context.reset(state->serial() ? modbus_new_rtu(state->link().c_str(), 19200, 'E', 8, 1)
                                        : modbus_new_tcp("127.0.0.1", state->port_number));

@@ -12,7 +12,8 @@ constexpr std::array<std::string_view, 4> kPathColumns{"x_mm", "y_mm", "z_mm", "
 
 bool header_is_right(const CsvTable& table) {
   const std::size_t n = table.header.size();
-  return (n == 3 || n == 4) && std::equal(table.header.begin(), table.header.end(), kPathColumns.begin());
+  return (n == 3 || n == 4) &&
+         std::equal(table.header.begin(), table.header.end(), kPathColumns.begin());
 }
 
 void read_feed(const CsvTable& table, const CsvRow& row, PathVertex& vertex, CsvErrors& errors) {
@@ -32,6 +33,7 @@ Result<std::vector<PathVertex>> parse_path_csv(std::string_view text, std::strin
     errors.add(1, "the header must be x_mm,y_mm,z_mm[,feed_mm_per_min]");
     return tl::unexpected(errors.error());
   }
+
   std::vector<PathVertex> vertices;
   for (const CsvRow& row : table.rows) {
     PathVertex vertex;
@@ -42,6 +44,7 @@ Result<std::vector<PathVertex>> parse_path_csv(std::string_view text, std::strin
     read_feed(table, row, vertex, errors);
     vertices.push_back(vertex);
   }
+
   if (vertices.empty()) errors.add(1, "no points");
   if (errors.any()) return tl::unexpected(errors.error());
   return vertices;

@@ -24,6 +24,7 @@ Result<PathMotion> PathMotion::plan(const PathPlan& plan) {
   motion.first_m_ = motion.last_m_ = plan.vertices.front().q_m;
   motion.acceleration_m_per_s2_ = plan.acceleration_m_per_s2;
   std::array<int, 3> direction{};
+
   for (std::size_t i = 1; i < plan.vertices.size(); ++i) {
     const PathVertex& to = plan.vertices[i];
     const double feed = to.feed_m_per_s > 0.0 ? to.feed_m_per_s : plan.feed_m_per_s;
@@ -45,6 +46,7 @@ Result<PathMotion> PathMotion::plan(const PathPlan& plan) {
     motion.last_m_ = to.q_m;
     motion.legs_.push_back(leg);
   }
+
   return motion;
 }
 
@@ -57,9 +59,11 @@ AxisMotion PathMotion::on_leg(const Leg& leg, double time_s) const {
   const double t = time_s - leg.begin_s;
   if (t <= 0.0) return {leg.from_m, Eigen::Vector3d::Zero(), leg.direction_before};
   const double left = 2.0 * leg.ramp_s + leg.cruise_s - t;
-  if (left <= 0.0) return {leg.from_m + leg.length_m * leg.unit, Eigen::Vector3d::Zero(), leg.direction};
+  if (left <= 0.0)
+    return {leg.from_m + leg.length_m * leg.unit, Eigen::Vector3d::Zero(), leg.direction};
   double s = leg.speed_m_per_s * (t - 0.5 * leg.ramp_s);
   double v = leg.speed_m_per_s;
+
   if (t < leg.ramp_s) {
     s = 0.5 * a * t * t;
     v = a * t;
@@ -67,6 +71,7 @@ AxisMotion PathMotion::on_leg(const Leg& leg, double time_s) const {
     s = leg.length_m - 0.5 * a * left * left;
     v = a * left;
   }
+
   return {leg.from_m + s * leg.unit, v * leg.unit, leg.direction};
 }
 

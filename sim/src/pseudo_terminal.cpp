@@ -30,6 +30,7 @@ Result<PseudoTerminal> PseudoTerminal::open(const std::string& link) {
   std::filesystem::create_symlink(path.data(), link, failed);
   if (failed) return io_error(fmt::format("{}: {}", link, failed.message()));
   t.link_ = link;
+
   return t;
 }
 

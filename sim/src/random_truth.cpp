@@ -12,15 +12,16 @@ namespace abbe::sim {
 namespace {
 
 constexpr std::uint64_t kHarmonics = 4;
-// Typical proportions of a medium machining centre: rotations of a tenth of a translation per 10 mm, before
-// scaling.
+// Typical proportions of a medium machining centre: rotations of a tenth of a translation per
+// 10 mm, before scaling.
 constexpr double kTranslation_m = 30e-6;
 constexpr double kRotation_rad = 60e-6;
 constexpr double kSquareness_rad = 60e-6;
 
 std::vector<double> nodes_over(const AxisRange& range, double spacing_m) {
   const double length = range.max_m - range.min_m;
-  const auto cells = std::max<std::size_t>(1, static_cast<std::size_t>(std::lround(length / spacing_m)));
+  const auto cells =
+      std::max<std::size_t>(1, static_cast<std::size_t>(std::lround(length / spacing_m)));
   std::vector<double> nodes(cells + 1);
   for (std::size_t i = 0; i <= cells; ++i) {
     nodes[i] = range.min_m + length * static_cast<double>(i) / static_cast<double>(cells);
@@ -28,10 +29,10 @@ std::vector<double> nodes_over(const AxisRange& range, double spacing_m) {
   return nodes;
 }
 
-/// A few harmonics of falling amplitude and random phase: smooth, neither periodic over the axis nor
-/// symmetric about it.
-ErrorFunction smooth_random(const std::vector<double>& nodes, double amplitude, std::uint64_t sequence,
-                            const RandomTruthOptions& options) {
+/// A few harmonics of falling amplitude and random phase: smooth, neither periodic over the axis
+/// nor symmetric about it.
+ErrorFunction smooth_random(const std::vector<double>& nodes, double amplitude,
+                            std::uint64_t sequence, const RandomTruthOptions& options) {
   std::vector<double> values(nodes.size(), 0.0);
   const double length = nodes.back() - nodes.front();
   for (std::uint64_t k = 1; k <= kHarmonics; ++k) {
@@ -44,6 +45,7 @@ ErrorFunction smooth_random(const std::vector<double>& nodes, double amplitude, 
       values[i] += a * std::sin(std::numbers::pi * order * u + phase);
     }
   }
+
   return {nodes, std::move(values), options.shape};
 }
 
@@ -61,8 +63,8 @@ ErrorFunction zero_at(const ErrorFunction& f, double reference_m) {
   return minus_line(f, f.at(reference_m), f.at(reference_m));
 }
 
-/// What the target feels of the rotations of `axis` that no data with one target can tell from translations:
-/// all of the last axis, and of the middle one that about the direction of the last.
+/// What the target feels of the rotations of `axis` that no data with one target can tell from
+/// translations: all of the last axis, and of the middle one that about the direction of the last.
 Eigen::Vector3d felt_at_target(const TruthMachine& machine, Axis axis, double at_m) {
   const auto& error = machine.axis(axis).error;
   const Eigen::Vector3d rotation(error[3].at(at_m), error[4].at(at_m), error[5].at(at_m));
@@ -117,14 +119,17 @@ TruthMachine random_truth(TruthMachine machine, const RandomTruthOptions& option
     const std::vector<double> nodes = nodes_over(a.range, options.node_spacing_m);
     for (std::size_t m = 0; m < kMotions; ++m) {
       const double amplitude = m < 3 ? kTranslation_m : kRotation_rad;
-      a.error[m] = smooth_random(nodes, amplitude, static_cast<std::uint64_t>(axis) * kMotions + m, options);
+      a.error[m] =
+          smooth_random(nodes, amplitude, static_cast<std::uint64_t>(axis) * kMotions + m, options);
     }
     a.backlash = {};
     remove_rigid_part(machine, axis);
   }
+
   machine.squareness.A0Z_rad = kSquareness_rad * gaussian(options.seed, NoiseStream::Squareness, 0);
   machine.squareness.B0Z_rad = kSquareness_rad * gaussian(options.seed, NoiseStream::Squareness, 1);
   machine.squareness.C0Y_rad = kSquareness_rad * gaussian(options.seed, NoiseStream::Squareness, 2);
+
   // V is linear in the errors but for the second order, which the second pass takes up.
   for (int pass = 0; pass < 2; ++pass) scale(machine, options.mean_error_m / mean_error_m(machine));
   add_backlash(machine, options);
@@ -135,6 +140,7 @@ double mean_error_m(const TruthMachine& truth, std::size_t n) {
   const auto at = [n](const AxisRange& r, std::size_t i) {
     return r.min_m + (r.max_m - r.min_m) * static_cast<double>(i) / static_cast<double>(n - 1);
   };
+
   double sum = 0.0;
   for (std::size_t i = 0; i < n; ++i) {
     for (std::size_t j = 0; j < n; ++j) {
@@ -145,6 +151,7 @@ double mean_error_m(const TruthMachine& truth, std::size_t n) {
       }
     }
   }
+
   return sum / static_cast<double>(n * n * n);
 }
 

@@ -25,8 +25,9 @@ std::array<std::byte, 8> first_eight(const can::CanFrame& frame) {
 
 }  // namespace
 
-Result<RecordedBus> RecordedBus::open(const EncoderBusOptions& options, const RecordedDevice& device,
-                                      ReplayTimeline& timeline, bool leads) {
+Result<RecordedBus> RecordedBus::open(const EncoderBusOptions& options,
+                                      const RecordedDevice& device, ReplayTimeline& timeline,
+                                      bool leads) {
   auto port = CanPort::open(options);
   if (!port) return tl::unexpected(port.error());
   return RecordedBus(std::move(*port), device, timeline, leads);
@@ -57,6 +58,7 @@ void RecordedBus::take(const can::CanFrame& frame, bool to_device, HostTime time
     }
     return;
   }
+
   if (can::decode_sync(frame)) {
     ++foreign_syncs_;
     foreign_sync_ = true;
@@ -82,7 +84,8 @@ void RecordedBus::poll(HostTime now) {
   if (leads_ && external() && port_->has_listener()) timeline_.start(spoken_.front().time, now);
   keep_alive(now);
   if (!timeline_.running()) next_spoken_ = 0;
-  for (; next_spoken_ < spoken_.size() && timeline_.due(spoken_[next_spoken_].time) <= now; ++next_spoken_) {
+  for (; next_spoken_ < spoken_.size() && timeline_.due(spoken_[next_spoken_].time) <= now;
+       ++next_spoken_) {
     // What was said before the start has been said by keep_alive.
     if (now - timeline_.due(spoken_[next_spoken_].time) < kOutOfStep)
       port_->send(std::span(&spoken_[next_spoken_].frame, 1));
@@ -91,9 +94,10 @@ void RecordedBus::poll(HostTime now) {
 
 HostTime RecordedBus::next_due() const {
   const HostTime late = late_.empty() ? HostTime::max() : late_.front().time;
-  if (!timeline_.running()) return std::min(late, port_->has_listener() ? next_beat_ : HostTime::max());
-  return std::min(late,
-                  next_spoken_ < spoken_.size() ? timeline_.due(spoken_[next_spoken_].time) : next_beat_);
+  if (!timeline_.running())
+    return std::min(late, port_->has_listener() ? next_beat_ : HostTime::max());
+  return std::min(
+      late, next_spoken_ < spoken_.size() ? timeline_.due(spoken_[next_spoken_].time) : next_beat_);
 }
 
 void RecordedBus::keep_alive(HostTime now) {
@@ -113,10 +117,13 @@ void RecordedBus::on_frame(const can::CanFrame& frame, HostTime now) {
   if (nmt->command == can::NmtCommand::Start) state_ = can::NodeState::Operational;
   if (nmt->command == can::NmtCommand::Stop) state_ = can::NodeState::Stopped;
   if (nmt->command == can::NmtCommand::PreOperational) state_ = can::NodeState::PreOperational;
-  if (nmt->command != can::NmtCommand::ResetNode && nmt->command != can::NmtCommand::ResetCommunication)
+  if (nmt->command != can::NmtCommand::ResetNode &&
+      nmt->command != can::NmtCommand::ResetCommunication)
     return;
   state_ = can::NodeState::PreOperational;
-  if (timeline_.running() && next_spoken_ < spoken_.size()) return;  // they boot when they did, if they did
+  if (timeline_.running() && next_spoken_ < spoken_.size())
+    return;  // they boot when they did, if they did
+
   for (const can::NodeId node : nodes_) {
     if (nmt->node != can::kAllNodes && nmt->node != node) continue;
     const can::CanFrame boot = can::encode_heartbeat(node, can::NodeState::BootUp);
@@ -125,13 +132,14 @@ void RecordedBus::on_frame(const can::CanFrame& frame, HostTime now) {
 }
 
 std::size_t RecordedBus::cycle_at(HostTime recorded) const {
-  const auto after = std::lower_bound(cycles_.begin(), cycles_.end(), recorded,
-                                      [](const Cycle& cycle, HostTime t) { return cycle.sync < t; });
+  const auto after =
+      std::lower_bound(cycles_.begin(), cycles_.end(), recorded,
+                       [](const Cycle& cycle, HostTime t) { return cycle.sync < t; });
   if (after == cycles_.begin()) return 0;
   if (after == cycles_.end()) return cycles_.size() - 1;
   const auto before = after - 1;
-  return static_cast<std::size_t>((recorded - before->sync < after->sync - recorded ? before : after) -
-                                  cycles_.begin());
+  return static_cast<std::size_t>(
+      (recorded - before->sync < after->sync - recorded ? before : after) - cycles_.begin());
 }
 
 void RecordedBus::on_sync(HostTime now) {
@@ -175,8 +183,8 @@ void RecordedBus::on_sdo(const can::CanFrame& frame) {
   if (known == sdo_.end()) {
     // Nobody asked this when the recording was made: general error, for the same object.
     const std::uint32_t id = can::cob::kSdoResponse + (frame.id & kNode);
-    const can::CanFrame abort =
-        can::standard_frame(id, {0x80, frame.byte(1), frame.byte(2), frame.byte(3), 0x00, 0x00, 0x00, 0x08});
+    const can::CanFrame abort = can::standard_frame(
+        id, {0x80, frame.byte(1), frame.byte(2), frame.byte(3), 0x00, 0x00, 0x00, 0x08});
     return port_->send(std::span(&abort, 1));
   }
   SdoResponses& responses = known->second;

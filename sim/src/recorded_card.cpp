@@ -21,8 +21,8 @@ bool is_vendor(const usb::Setup& setup) {
 
 }  // namespace
 
-RecordedCard::RecordedCard(const RecordedDevice& device, const std::string& serial, ReplayTimeline& timeline,
-                           bool leads)
+RecordedCard::RecordedCard(const RecordedDevice& device, const std::string& serial,
+                           ReplayTimeline& timeline, bool leads)
     : timeline_(timeline), leads_(leads), descriptors_({.serial = serial, .channels = {}}) {
   for (const RecordedBlock& block : device.blocks) read(block);
   if (connections_.empty()) connections_.emplace_back();
@@ -47,6 +47,7 @@ void RecordedCard::read_message(std::span<const std::byte> message, HostTime tim
   if (to_device && request != nullptr) read_request(usb::decode_setup(request->setup), time);
   if (to_device || reply == nullptr) return;
   const auto data = message.subspan(kHead);
+
   if (reply->head.endpoint != 0) {
     if (!scans_.empty()) scans_.back().transfers.push_back({time, {data.begin(), data.end()}});
   } else if (!exchanges_.empty() && !exchanges_.back().answer) {
@@ -60,9 +61,11 @@ void RecordedCard::read_request(const usb::Setup& setup, HostTime time) {
   // A host asks for the version first thing, twice.
   const bool version = setup == quad08::read_firmware_version();
   const bool opens = version && (versions_ == 0 || versions_ == 2);
-  if (opens || connections_.empty()) connections_.push_back({.begins = exchanges_.size(), .lost = {}});
+  if (opens || connections_.empty())
+    connections_.push_back({.begins = exchanges_.size(), .lost = {}});
   if (version) versions_ = opens ? 1 : versions_ + 1;
-  if (setup == quad08::start_pacer()) scans_.push_back({.begins = exchanges_.size(), .transfers = {}});
+  if (setup == quad08::start_pacer())
+    scans_.push_back({.begins = exchanges_.size(), .transfers = {}});
   exchanges_.push_back({setup, time, {}});
 }
 
@@ -149,14 +152,17 @@ ControlAnswer RecordedCard::unrecorded(const usb::Setup& setup, HostTime now) {
   const bool last = end == exchanges_.end();
   const bool silent = !last && std::any_of(from, end, [](const Exchange& e) { return !e.answer; });
   if (!resuming_ && silent) return {Outcome::Silent, {}};
+
   if (resuming_ && setup == quad08::start_pacer()) {
     resuming_ = false;
     running_ = true;
     shift_ = now - scans_[*scan_].transfers[next_transfer_].time;
   }
+
   ControlAnswer answer;
   if (setup == kStatus) answer.data = {std::byte{quad08::Status::kPipeFull}, std::byte{0}};
   if (setup != kStatus && setup.device_to_host()) answer.data.resize(setup.length);
+
   return answer;
 }
 
@@ -197,7 +203,8 @@ bool RecordedCard::scanning() const {
 void RecordedCard::advance(HostTime now, std::size_t) {
   if (!scanning()) return;
   const auto& transfers = scans_[*scan_].transfers;
-  for (; has_rest() && (flushing_ || due(transfers[next_transfer_].time) <= now); ++next_transfer_) {
+  for (; has_rest() && (flushing_ || due(transfers[next_transfer_].time) <= now);
+       ++next_transfer_) {
     const auto& bytes = transfers[next_transfer_].bytes;
     fifo_.insert(fifo_.end(), bytes.begin(), bytes.end());
   }

@@ -23,7 +23,8 @@ void RecordedDialogue::take(const RecordedBlock& block) {
   if (block.to_device && !block.lost()) {
     exchanges.push_back({block.bytes, block.time, {}});
   } else if (!block.connects()) {
-    exchanges.back().answer.push_back({block.time - exchanges.back().time, block.bytes, block.lost()});
+    exchanges.back().answer.push_back(
+        {block.time - exchanges.back().time, block.bytes, block.lost()});
   }
 }
 
@@ -49,7 +50,8 @@ std::size_t RecordedDialogue::requests() const {
 }
 
 void RecordedDialogue::connected(HostTime now) {
-  if (std::exchange(played_, true) && !serial_) connection_ = (connection_ + 1) % connections_.size();
+  if (std::exchange(played_, true) && !serial_)
+    connection_ = (connection_ + 1) % connections_.size();
   const auto& exchanges = connections_[connection_].exchanges;
   if (!exchanges.empty() && exchanges.front().request.empty()) schedule(exchanges.front(), {}, now);
 }
@@ -81,23 +83,27 @@ void RecordedDialogue::answer(std::span<const std::byte> request, HostTime now) 
     return;
   }
   const std::size_t turn = answered_[meaning]++;
-  schedule(connection.exchanges[known->second[std::min(turn, known->second.size() - 1)]], request, now);
+  schedule(connection.exchanges[known->second[std::min(turn, known->second.size() - 1)]], request,
+           now);
 }
 
 /// The pieces of an answer are renumbered as a whole: a number may be torn in two.
-void RecordedDialogue::schedule(const Exchange& exchange, std::span<const std::byte> request, HostTime now) {
+void RecordedDialogue::schedule(const Exchange& exchange, std::span<const std::byte> request,
+                                HostTime now) {
   std::vector<std::byte> whole;
   for (const Piece& piece : exchange.answer)
     whole.insert(whole.end(), piece.bytes.begin(), piece.bytes.end());
   if (!request.empty()) wire_.renumber(whole, exchange.request, request);
   auto rest = whole.begin();
+
   for (const Piece& piece : exchange.answer) {
     const auto end = rest + static_cast<std::ptrdiff_t>(piece.bytes.size());
     due_.push_back({now + piece.delay, {rest, end}, piece.breaks});
     rest = end;
   }
-  const bool last =
-      connection_ + 1 == connections_.size() && &exchange == &connections_[connection_].exchanges.back();
+
+  const bool last = connection_ + 1 == connections_.size() &&
+                    &exchange == &connections_[connection_].exchanges.back();
   if (last && !exchange.answer.empty()) due_.back().last = true;
 }
 

@@ -57,19 +57,23 @@ void RecordedTracker::read(const RecordedBlock& block) {
     connection.spoken.push_back({block.time, {}, true});
     return;
   }
+
   if (block.to_device) {
     connection.exchanges[head_of(block.bytes).command].push_back({.asked = block.time});
     return;
   }
+
   if (block.hole_before) framer_.resync();
   if (connection.garbled) {
     connection.spoken.push_back({block.time, block.bytes});
     return;
   }
+
   for (auto rest = std::span<const std::byte>(block.bytes); !rest.empty() && !framer_.broken();) {
     rest = rest.subspan(framer_.push(rest));
     while (const auto packet = framer_.next()) take(*packet, block.time);
   }
+
   if (!framer_.broken()) return;
   const auto refused = framer_.refused();
   connection.spoken.push_back({block.time, {refused.begin(), refused.end()}});
@@ -82,21 +86,26 @@ void RecordedTracker::take(std::span<const std::byte> packet, HostTime time) {
   connections_.back().spoken.push_back({time, {packet.begin(), packet.end()}});
 }
 
-void RecordedTracker::take_answer(std::int32_t command, std::span<const std::byte> packet, HostTime time) {
+void RecordedTracker::take_answer(std::int32_t command, std::span<const std::byte> packet,
+                                  HostTime time) {
   Connection& connection = connections_.back();
   auto& exchanges = connection.exchanges[command];
-  auto exchange =
-      std::ranges::find_if(exchanges, [](const Exchange& e) { return e.answers.size() < e.wanted; });
+  auto exchange = std::ranges::find_if(
+      exchanges, [](const Exchange& e) { return e.answers.size() < e.wanted; });
+
   // A recording that began in the middle has answers without questions.
   if (exchange == exchanges.end()) exchange = exchanges.insert(exchange, {.asked = time});
   if (command == kReflectors) {  // the one command with an answer per reflector
     const auto first = emscon::decode_answer(packet);
     const auto* reflectors = first ? std::get_if<emscon::ReflectorsAnswer>(&*first) : nullptr;
-    if (reflectors != nullptr) exchange->wanted = static_cast<std::size_t>(std::max(reflectors->total, 1));
+    if (reflectors != nullptr)
+      exchange->wanted = static_cast<std::size_t>(std::max(reflectors->total, 1));
   }
+
   exchange->answered = time;
   exchange->answers.emplace_back(packet.begin(), packet.end());
-  if (command == kStart && !connection.first_start && accepted(packet)) connection.first_start = time;
+  if (command == kStart && !connection.first_start && accepted(packet))
+    connection.first_start = time;
 }
 
 std::size_t RecordedTracker::packets() const {
@@ -135,9 +144,11 @@ void RecordedTracker::answer(std::span<const std::byte> request, HostTime now) {
   const auto known = connection().exchanges.find(command);
   if (known == connection().exchanges.end()) {
     std::array<std::byte, emscon::kMaxAnswerSize> refusal{};
-    const emscon::Acknowledge no{static_cast<emscon::Command>(command), emscon::Status::NotImplemented};
+    const emscon::Acknowledge no{static_cast<emscon::Command>(command),
+                                 emscon::Status::NotImplemented};
     return say(std::span(refusal).first(emscon::encode(emscon::Answer{no}, refusal)));
   }
+
   const std::size_t turn = answered_[command]++;
   const Exchange& exchange = known->second[std::min(turn, known->second.size() - 1)];
   if (exchange.answers.empty()) return;
@@ -179,6 +190,7 @@ void RecordedTracker::advance(HostTime now) {
       wants_close_ = wants_close_ || spoken.breaks;
     }
   }
+
   const bool last = connection_ + 1 == connections_.size();
   const bool begun = anchored_ || (played_ && !connection().first_start);
   finished_ = finished_ || (last && begun && next_ >= connection().spoken.size());

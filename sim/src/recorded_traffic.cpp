@@ -35,7 +35,8 @@ class TrafficReader {
     std::vector<RecordedDevice> devices;
     for (auto& [name, device] : devices_) devices.push_back(std::move(device));
     for (RecordedDevice& device : devices) {
-      // The recorder empties one ring after the other: what was sent may stand before what came earlier.
+      // The recorder empties one ring after the other: what was sent may stand before what came
+      // earlier.
       std::ranges::stable_sort(device.blocks, {}, &RecordedBlock::time);
       device.kind = kind_of(device.blocks);
     }
@@ -44,9 +45,11 @@ class TrafficReader {
 
  private:
   void on_message(const mcap::Message& message) {
-    if (std::find(raw_channels_.begin(), raw_channels_.end(), message.channel_id) == raw_channels_.end())
+    if (std::find(raw_channels_.begin(), raw_channels_.end(), message.channel_id) ==
+        raw_channels_.end())
       return;
     const auto raw = protocol::decode_raw_bytes_cdr(message.data);
+
     if (!raw) return;
     RecordedDevice& device = devices_[std::string(raw->device)];
     device.name = raw->device;
@@ -134,13 +137,16 @@ std::string recorded_configuration(std::span<const std::byte> file) {
   return text;
 }
 
-Result<std::vector<RecordedDevice>> read_traffic(std::span<const std::byte> file, std::string_view name) {
+Result<std::vector<RecordedDevice>> read_traffic(std::span<const std::byte> file,
+                                                 std::string_view name) {
   if (!mcap::starts_with_magic(file)) return bad_input(fmt::format("{}: not an MCAP file", name));
   TrafficReader reader;
-  for_each_record(file, [&](mcap::Opcode opcode, mcap::Bytes content) { reader.on_record(opcode, content); });
+  for_each_record(
+      file, [&](mcap::Opcode opcode, mcap::Bytes content) { reader.on_record(opcode, content); });
   auto devices = reader.finish();
   if (devices.empty())
-    return bad_input(fmt::format("{}: holds no raw bytes of a device ([recording] raw = true)", name));
+    return bad_input(
+        fmt::format("{}: holds no raw bytes of a device ([recording] raw = true)", name));
   return devices;
 }
 

@@ -61,7 +61,9 @@ class ReplayedBus final : public ReplayedDevice {
       : name_(std::move(name)), interface_(std::move(interface)), bus_(std::move(bus)) {}
   void poll(HostTime now) override { bus_.poll(now); }
   [[nodiscard]] HostTime next_due() const override { return bus_.next_due(); }
-  void add_poll_fds(std::vector<pollfd>& fds) const override { fds.push_back({bus_.fd(), POLLIN, 0}); }
+  void add_poll_fds(std::vector<pollfd>& fds) const override {
+    fds.push_back({bus_.fd(), POLLIN, 0});
+  }
   [[nodiscard]] bool finished() const override { return bus_.finished(); }
   [[nodiscard]] ReplayedPlace place() const override {
     return {name_, RecordedKind::Encoders, fmt::format("{} cycles", bus_.syncs()),
@@ -81,10 +83,15 @@ class ReplayedCard final : public ReplayedDevice {
   void poll(HostTime now) override { server_.poll(now); }
   [[nodiscard]] HostTime next_due() const override { return server_.next_due(); }
   void add_poll_fds(std::vector<pollfd>& fds) const override { server_.add_poll_fds(fds); }
-  [[nodiscard]] bool finished() const override { return card_.finished() && !server_.wants_write(); }
+  [[nodiscard]] bool finished() const override {
+    return card_.finished() && !server_.wants_write();
+  }
   [[nodiscard]] ReplayedPlace place() const override {
-    return {
-        name_, RecordedKind::CounterCard, fmt::format("{} transfers", card_.transfers()), server_.port(), {}};
+    return {name_,
+            RecordedKind::CounterCard,
+            fmt::format("{} transfers", card_.transfers()),
+            server_.port(),
+            {}};
   }
 
  private:
@@ -133,6 +140,7 @@ class Maker {
       case RecordedKind::MeasuringMachine:
         break;
     }
+
     return dialogue(device);
   }
 
@@ -142,7 +150,8 @@ class Maker {
                                 std::unique_ptr<Controller> recorded) const {
     auto server = ControllerServer<Controller>::open(port, std::move(recorded));
     if (!server) return tl::unexpected(server.error());
-    return std::make_unique<ReplayedController<Controller>>(device.name, device.kind, std::move(*server));
+    return std::make_unique<ReplayedController<Controller>>(device.name, device.kind,
+                                                            std::move(*server));
   }
   [[nodiscard]] Made tracker(const RecordedDevice& device) const {
     return controller(device, chosen(setup_.ports, device.name, setup_.tracker_port),
@@ -163,16 +172,17 @@ class Maker {
     const auto serial = chosen(setup_.serials, device.name, CounterCardOptions{}.serial);
     auto card = std::make_unique<RecordedCard>(device, serial, timeline_, !has_tracker_);
     const RecordedCard& recorded = *card;
-    auto server = UsbipServer::open(chosen(setup_.ports, device.name, std::uint16_t{0}), std::move(card));
+    auto server =
+        UsbipServer::open(chosen(setup_.ports, device.name, std::uint16_t{0}), std::move(card));
     if (!server) return tl::unexpected(server.error());
     return std::make_unique<ReplayedCard>(device.name, std::move(*server), recorded);
   }
   [[nodiscard]] Made terminal(const RecordedDevice& device) const {
-    const auto anywhere =
-        std::filesystem::temp_directory_path() / fmt::format("abbe-sim-{}-{}", ::getpid(), device.name);
-    auto server =
-        TerminalServer::open(chosen(setup_.links, device.name, anywhere.string()),
-                             std::make_unique<RecordedDialogue>(device, dialogue_wire(device.kind)), now_);
+    const auto anywhere = std::filesystem::temp_directory_path() /
+                          fmt::format("abbe-sim-{}-{}", ::getpid(), device.name);
+    auto server = TerminalServer::open(
+        chosen(setup_.links, device.name, anywhere.string()),
+        std::make_unique<RecordedDialogue>(device, dialogue_wire(device.kind)), now_);
     if (!server) return tl::unexpected(server.error());
     return std::make_unique<ReplayedTerminal>(device.name, std::move(*server));
   }

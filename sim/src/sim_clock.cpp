@@ -10,12 +10,13 @@ HostTime SimClock::now() const {
   const std::int64_t monotonic_ns = std::int64_t{t.tv_sec} * 1'000'000'000 + t.tv_nsec;
   // long double: months of uptime times the speed need more than the 53 bits of a double to hold a
   // nanosecond.
-  return HostTime{std::chrono::nanoseconds{
-      static_cast<std::int64_t>(static_cast<long double>(speed_) * static_cast<long double>(monotonic_ns))}};
+  return HostTime{std::chrono::nanoseconds{static_cast<std::int64_t>(
+      static_cast<long double>(speed_) * static_cast<long double>(monotonic_ns))}};
 }
 
 std::chrono::nanoseconds SimClock::wall(std::chrono::nanoseconds d) const {
-  return std::chrono::nanoseconds{static_cast<std::int64_t>(static_cast<double>(d.count()) / speed_)};
+  return std::chrono::nanoseconds{
+      static_cast<std::int64_t>(static_cast<double>(d.count()) / speed_)};
 }
 
 }  // namespace abbe::sim

@@ -19,12 +19,15 @@ Result<std::unique_ptr<Simulation>> Simulation::open(const SimulationSetup& setu
   auto path = PathMotion::plan(setup.path);
   if (!path) return tl::unexpected(path.error());
   std::unique_ptr<Simulation> simulation(new Simulation(setup.truth, std::move(*path), setup));
+
   if (setup.tracker) {
     auto tracker = TrackerServer::open(
-        setup.tracker_port, std::make_unique<TrackerDevice>(*setup.tracker, simulation->machine_, now));
+        setup.tracker_port,
+        std::make_unique<TrackerDevice>(*setup.tracker, simulation->machine_, now));
     if (!tracker) return tl::unexpected(tracker.error());
     simulation->tracker_.emplace(std::move(*tracker));
   }
+
   if (setup.bus) {
     auto nodes = setup.nodes;
     for (EncoderNodeOptions& node : nodes) node.configured = setup.sync_period.count() > 0;
@@ -34,28 +37,36 @@ Result<std::unique_ptr<Simulation>> Simulation::open(const SimulationSetup& setu
     if (setup.sync_period.count() > 0)
       simulation->bus_->produce_sync(setup.sync_period, now + setup.sync_period);
   }
+
   for (const ModbusServerOptions& options : setup.environment) {
     auto server = ModbusServer::open(options, now);
     if (!server) return tl::unexpected(server.error());
     simulation->environment_.push_back(std::move(*server));
   }
+
   for (const CounterCardSetup& card : setup.counter_cards) {
     auto server = UsbipServer::open(card.port, wire(card, simulation->machine_));
     if (!server) return tl::unexpected(server.error());
     simulation->counter_cards_.push_back(std::move(*server));
   }
+
   if (setup.measuring_machine) {
     auto server = IppDmeServer::open(setup.measuring_machine_port,
                                      std::make_unique<IppDmeDevice>(*setup.measuring_machine, now));
     if (!server) return tl::unexpected(server.error());
     simulation->measuring_machine_.emplace(std::move(*server));
   }
+
   if (setup.surface) {
     const auto edges = edge_times_s(*setup.surface, simulation->machine_.path());
     simulation->edges_s_.assign(edges.begin(), edges.end());
   }
-  simulation->edges_s_.insert(simulation->edges_s_.end(), setup.edges_s.begin(), setup.edges_s.end());
-  if (!setup.start_when_streaming && !setup.held) simulation->machine_.start(now + setup.standstill);
+
+  simulation->edges_s_.insert(simulation->edges_s_.end(), setup.edges_s.begin(),
+                              setup.edges_s.end());
+  if (!setup.start_when_streaming && !setup.held)
+    simulation->machine_.start(now + setup.standstill);
+
   return simulation;
 }
 
@@ -83,7 +94,8 @@ HostTime Simulation::next_bus_due() const {
 void Simulation::start_machine(HostTime now) {
   if (machine_.started() || !start_when_streaming_ || held_) return;
   if (tracker_) {
-    if (const auto streaming = tracker_->device().first_stream()) machine_.start(*streaming + standstill_);
+    if (const auto streaming = tracker_->device().first_stream())
+      machine_.start(*streaming + standstill_);
   } else if (!counter_cards_.empty() && counter_cards_.front().card().scanning()) {
     machine_.start(now + standstill_);
   }

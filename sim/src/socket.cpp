@@ -23,9 +23,11 @@ sockaddr_in loopback(std::uint16_t port) {
 
 tl::unexpected<Error> refused(const char* kind, std::uint16_t port) {
   const int cause = errno;
-  const char* hint =
-      cause == EADDRINUSE ? " (another program has the port; choose another, or 0 for a free one)" : "";
-  return io_error(fmt::format("{} port 127.0.0.1:{}: {}{}", kind, port, std::strerror(cause), hint));
+  const char* hint = cause == EADDRINUSE
+                         ? " (another program has the port; choose another, or 0 for a free one)"
+                         : "";
+  return io_error(
+      fmt::format("{} port 127.0.0.1:{}: {}{}", kind, port, std::strerror(cause), hint));
 }
 
 Result<Socket> bound(int type, const char* kind, std::uint16_t port) {
@@ -74,7 +76,8 @@ void send_what_fits(const Socket& client, std::vector<std::byte>& unsent, std::s
   most = std::min(most, unsent.size());
   std::size_t done = 0;
   while (done < most) {
-    const ssize_t size = ::send(client.get(), unsent.data() + done, most - done, MSG_DONTWAIT | MSG_NOSIGNAL);
+    const ssize_t size =
+        ::send(client.get(), unsent.data() + done, most - done, MSG_DONTWAIT | MSG_NOSIGNAL);
     if (size <= 0) break;
     done += static_cast<std::size_t>(size);
   }

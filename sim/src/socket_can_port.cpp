@@ -78,9 +78,12 @@ class SocketCanPort final : public CanPort {
     message.msg_control = control.data();
     message.msg_controllen = control.size();
     const ssize_t size = ::recvmsg(socket_.get(), &message, MSG_DONTWAIT);
+
     // An interface that went down says so once; the socket hears again when it is up.
     if (size < 0) return errno == ENETDOWN;
-    if (size == static_cast<ssize_t>(CAN_MTU)) arrived_.push_back({from_linux(frame), age_.of(message)});
+    if (size == static_cast<ssize_t>(CAN_MTU))
+      arrived_.push_back({from_linux(frame), age_.of(message)});
+
     return true;
   }
 
@@ -95,15 +98,18 @@ Result<std::unique_ptr<CanPort>> open_socket_can_port(const CanPortOptions& opti
   const auto refused = [&](const char* what) {
     return io_error(fmt::format("CAN {}: {}: {}", options.interface, what, std::strerror(errno)));
   };
+
   Socket socket(::socket(PF_CAN, SOCK_RAW | SOCK_NONBLOCK | SOCK_CLOEXEC, CAN_RAW));
   if (!socket) return refused("socket");
   sockaddr_can address{};
   address.can_family = AF_CAN;
   address.can_ifindex = static_cast<int>(if_nametoindex(options.interface.c_str()));
   if (address.can_ifindex == 0) return refused("find the interface");
+
   if (::bind(socket.get(), reinterpret_cast<const sockaddr*>(&address), sizeof address) != 0) {
     return refused("bind");
   }
+
   return std::make_unique<SocketCanPort>(std::move(socket), options.speed);
 }
 

@@ -7,7 +7,8 @@
 
 namespace abbe::sim {
 
-Result<TerminalServer> TerminalServer::open(const std::string& link, std::unique_ptr<RecordedDialogue> device,
+Result<TerminalServer> TerminalServer::open(const std::string& link,
+                                            std::unique_ptr<RecordedDialogue> device,
                                             HostTime now) {
   auto terminal = PseudoTerminal::open(link);
   if (!terminal) return tl::unexpected(terminal.error());

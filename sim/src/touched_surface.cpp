@@ -15,9 +15,11 @@ std::vector<double> edge_times_s(const TouchedSurface& surface, const PathMotion
     const double after = path.leg_end_s(leg);
     if (!above(before) || above(after)) continue;
     const double edge = crossing(before, after, [&](double t) { return !above(t); });
-    const double jitter_s = surface.jitter_s * gaussian(surface.seed, NoiseStream::Probe, edges.size());
+    const double jitter_s =
+        surface.jitter_s * gaussian(surface.seed, NoiseStream::Probe, edges.size());
     edges.push_back(edge + surface.delay_s + jitter_s);
   }
+
   std::ranges::sort(edges);
   return edges;
 }

@@ -35,7 +35,8 @@ Vector3d place_on_face(const ArrayFace& face, std::size_t point, std::size_t poi
     return n < 2 ? 0.0 : 2.0 * static_cast<double>(i) / static_cast<double>(n - 1) - 1.0;
   };
   const std::size_t column = row % 2 == 0 ? point % columns : in_row - 1 - point % columns;
-  return face.centre_m + from_middle(row, rows) * face.half_1_m + from_middle(column, in_row) * face.half_2_m;
+  return face.centre_m + from_middle(row, rows) * face.half_1_m +
+         from_middle(column, in_row) * face.half_2_m;
 }
 
 /// Collects the path and the probing moves in it.
@@ -53,23 +54,27 @@ class Planner {
     const Vector3d up = T_machine_array.linear() * Vector3d::UnitZ();
     const Vector3d above_m = centre_m + (ball.radius_m + array_.tip_radius_m + kAbove_m) * up;
     drive_to(above_m);
+
     for (std::size_t i = 0; i < options_.points_per_ball; ++i) {
-      const Vector3d normal = T_machine_array.linear() * direction_on_ball(i, options_.points_per_ball);
+      const Vector3d normal =
+          T_machine_array.linear() * direction_on_ball(i, options_.points_per_ball);
       touch({.place_m = centre_m + ball.radius_m * normal,
              .normal = normal,
              .centre_m = centre_m,
              .radius_m = ball.radius_m});
     }
+
     drive_to(above_m);
   }
 
   void face(const Isometry3d& T_machine_array, const ArrayFace& face) {
     const Vector3d normal = T_machine_array.linear() * face.normal;
-    const Vector3d away_m = T_machine_array * face.centre_m + (array_.tip_radius_m + kAbove_m) * normal;
+    const Vector3d away_m =
+        T_machine_array * face.centre_m + (array_.tip_radius_m + kAbove_m) * normal;
     drive_to(away_m);
     for (std::size_t i = 0; i < options_.points_per_block; ++i) {
-      touch(
-          {.place_m = T_machine_array * place_on_face(face, i, options_.points_per_block), .normal = normal});
+      touch({.place_m = T_machine_array * place_on_face(face, i, options_.points_per_block),
+             .normal = normal});
     }
     drive_to(away_m);
   }
@@ -134,8 +139,9 @@ double contact_s(const ProbingMove& move, const TruthMachine& truth, const PathM
 }  // namespace
 
 Vector3d reading_at_m(const TruthMachine& truth, const Vector3d& place_m) {
-  constexpr int kMostSteps = 200;       // slopes of V near 0.2 leave nothing after twenty
-  constexpr double kNothing_m = 1e-14;  // exactly equal is seldom reached: the last bit goes to and fro
+  constexpr int kMostSteps = 200;  // slopes of V near 0.2 leave nothing after twenty
+  // exactly equal is seldom reached: the last bit goes to and fro
+  constexpr double kNothing_m = 1e-14;
   Vector3d q_m = place_m;
   for (int i = 0; i < kMostSteps; ++i) {
     const Vector3d step_m = place_m - position_m(truth, q_m);
@@ -153,7 +159,8 @@ TouchingProgram plan_touching(const TruthMachine& truth, const BallArray& array,
     const Isometry3d& T_machine_array = positions.at(static_cast<std::size_t>(number) - 1);
     planner.ball(T_machine_array, array.balls.front());
     for (const ArrayFace& face : array.faces) planner.face(T_machine_array, face);
-    for (std::size_t i = 1; i < array.balls.size(); ++i) planner.ball(T_machine_array, array.balls[i]);
+    for (std::size_t i = 1; i < array.balls.size(); ++i)
+      planner.ball(T_machine_array, array.balls[i]);
   }
   return planner.take();
 }
@@ -165,9 +172,9 @@ std::vector<double> edge_times_s(const TouchingProgram& program, const TruthMach
   for (std::size_t i = 0; i < program.moves.size(); ++i) {
     const ProbingMove& move = program.moves[i];
     if (move.kind == ProbingMove::Kind::Silent) continue;
-    const double late_s =
-        options.noise_m / options.probing_m_per_s * gaussian(options.seed, NoiseStream::Probe, 2 * i) +
-        options.jitter_s * gaussian(options.seed, NoiseStream::Probe, 2 * i + 1);
+    const double late_s = options.noise_m / options.probing_m_per_s *
+                              gaussian(options.seed, NoiseStream::Probe, 2 * i) +
+                          options.jitter_s * gaussian(options.seed, NoiseStream::Probe, 2 * i + 1);
     edges.push_back(contact_s(move, truth, path, tip_radius_m) + late_s + options.delay_s);
   }
   return edges;

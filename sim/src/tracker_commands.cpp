@@ -56,6 +56,7 @@ emscon::Status TrackerDevice::outcome(const emscon::Request& request, HostTime a
     initialise(at);
     return Status::Ok;
   }
+
   if (as<emscon::StartMeasurement>(request)) return start_measurement(at);
   if (as<emscon::StopMeasurement>(request)) {
     if (stream_) emit_burst(at);
@@ -63,48 +64,61 @@ emscon::Status TrackerDevice::outcome(const emscon::Request& request, HostTime a
     single_due_.reset();
     return Status::Ok;
   }
+
   if (const auto* r = as<emscon::SetUnits>(request)) return units_ = r->units, Status::Ok;
-  if (const auto* r = as<emscon::SetSystemSettings>(request)) return settings_ = r->settings, Status::Ok;
+  if (const auto* r = as<emscon::SetSystemSettings>(request))
+    return settings_ = r->settings, Status::Ok;
   if (const auto* r = as<emscon::SetEnvironmentParams>(request))
     return set_environment_ = r->environment, Status::Ok;
   if (const auto* r = as<emscon::SetRefractionParams>(request))
     return refraction_ = r->refraction, Status::Ok;
-  if (const auto* r = as<emscon::SetStationaryModeParams>(request)) return stationary_ = *r, Status::Ok;
+  if (const auto* r = as<emscon::SetStationaryModeParams>(request))
+    return stationary_ = *r, Status::Ok;
   if (const auto* r = as<emscon::SetMeasurementMode>(request)) return set_mode(r->mode);
+
   if (const auto* r = as<emscon::SetContinuousTimeModeParams>(request)) {
     if (r->time_separation_ms < 1 || r->number_of_points < 0) return Status::WrongParameter1;
     return continuous_ = *r, Status::Ok;
   }
+
   if (const auto* r = as<emscon::SetCoordinateSystemType>(request)) {
     using enum emscon::CoordinateSystem;
     if (r->type != RightHanded && r->type != LeftHandedX) return Status::NotImplemented;
     return coordinates_ = r->type, Status::Ok;
   }
+
   if (const auto* r = as<emscon::SetReflector>(request)) {
-    const bool known = std::ranges::any_of(kKnownReflectors, [&](auto& k) { return k.id == r->internal_id; });
+    const bool known =
+        std::ranges::any_of(kKnownReflectors, [&](auto& k) { return k.id == r->internal_id; });
     if (!known) return Status::WrongParameter1;
     if (std::exchange(reflector_, r->internal_id) != r->internal_id)
       send_event(emscon::Event::ReflectorChanged);
     return Status::Ok;
   }
+
   if (const auto* r = as<emscon::SetStatisticMode>(request)) return statistics_ = *r, Status::Ok;
   if (as<emscon::SetContinuousDistanceModeParams>(request)) return Status::NotImplemented;
-  if (const auto* r = as<emscon::SetTransformation>(request)) return transformation_ = *r, Status::Ok;
-  if (const auto* r = as<emscon::SetStationOrientation>(request)) return orientation_ = *r, Status::Ok;
+  if (const auto* r = as<emscon::SetTransformation>(request))
+    return transformation_ = *r, Status::Ok;
+  if (const auto* r = as<emscon::SetStationOrientation>(request))
+    return orientation_ = *r, Status::Ok;
   if (const auto* r = as<emscon::SetSearchParams>(request)) return search_ = *r, Status::Ok;
   if (const auto* r = as<emscon::SetLongSystemParameter>(request))
     return long_parameters_[r->parameter] = r->value, Status::Ok;
+
   if (const auto* r = as<emscon::SetTriggerSource>(request)) {
     return r->source == emscon::TriggerSource::Internal ? Status::Ok : Status::NotImplemented;
   }
+
   if (const auto* r = as<emscon::FindReflector>(request); r && !(r->approximate_distance > 0.0))
     return Status::WrongParameter1;
   if (as<emscon::FindReflector>(request) || as<emscon::GoBirdBath>(request) ||
       as<emscon::GoPosition>(request)) {
     return initialised_ ? move_beam(at) : Status::TrackerNotInitialized;
   }
-  // Orientation, search and long parameters are remembered and change nothing: the packet rate of bursts, for
-  // example, is what real controllers do whatever they are asked.
+
+  // Orientation, search and long parameters are remembered and change nothing: the packet rate of
+  // bursts, for example, is what real controllers do whatever they are asked.
   return Status::Ok;
 }
 
@@ -135,7 +149,8 @@ emscon::Status TrackerDevice::move_beam(HostTime at) {
 }
 
 emscon::Status TrackerDevice::set_mode(emscon::MeasurementMode mode) {
-  if (mode != emscon::MeasurementMode::Stationary && mode != emscon::MeasurementMode::ContinuousTime) {
+  if (mode != emscon::MeasurementMode::Stationary &&
+      mode != emscon::MeasurementMode::ContinuousTime) {
     return emscon::Status::NotImplemented;
   }
   if (stream_) return emscon::Status::UsageConflict;
@@ -149,17 +164,22 @@ emscon::Status TrackerDevice::start_measurement(HostTime at) {
   if (!distance_set_) return emscon::Status::NoDistanceSet;
   if (beam_back_) return emscon::Status::MeasurementNotReady;
   if (stream_ || single_due_) return emscon::Status::InternalProcessActive;
+
   if (mode_ == emscon::MeasurementMode::Stationary) {
     single_due_ = at + std::chrono::milliseconds{stationary_.measurement_time_ms};
     return emscon::Status::Ok;
   }
-  const std::chrono::nanoseconds separation = std::chrono::milliseconds{continuous_.time_separation_ms};
+
+  const std::chrono::nanoseconds separation =
+      std::chrono::milliseconds{continuous_.time_separation_ms};
   const DeviceTime now = device_time(options_.model, power_on_, at);
+
   if (!grid_ || grid_->separation != separation) {
-    grid_ =
-        Grid{DeviceTime{std::chrono::ceil<std::chrono::microseconds>(now.time_since_epoch())}, separation};
+    grid_ = Grid{DeviceTime{std::chrono::ceil<std::chrono::microseconds>(now.time_since_epoch())},
+                 separation};
     noise_base_ = noise_next_;
   }
+
   const auto steps = (now - grid_->first + separation - std::chrono::nanoseconds{1}) / separation;
   Stream stream{grid_->first + steps * separation, separation,
                 at + burst_interval(options_.model.seed, bursts_++), 0};
@@ -168,6 +188,7 @@ emscon::Status TrackerDevice::start_measurement(HostTime at) {
                            : ~std::uint64_t{0};
   if (!first_stream_) first_stream_ = host_time(options_.model, power_on_, stream.next_point);
   stream_ = stream;
+
   return emscon::Status::Ok;
 }
 
@@ -186,9 +207,11 @@ bool TrackerDevice::answer_setting(const emscon::Request& request) {
     return tell(emscon::StationaryModeParamsAnswer{Status::Ok, stationary_});
   if (as<emscon::GetContinuousTimeModeParams>(request))
     return tell(emscon::ContinuousTimeModeParamsAnswer{Status::Ok, continuous_});
-  if (as<emscon::GetSearchParams>(request)) return tell(emscon::SearchParamsAnswer{Status::Ok, search_});
+  if (as<emscon::GetSearchParams>(request))
+    return tell(emscon::SearchParamsAnswer{Status::Ok, search_});
   if (as<emscon::GetStatisticMode>(request))
     return tell(emscon::StatisticModeAnswer{Status::Ok, statistics_});
+
   return false;
 }
 
@@ -204,6 +227,7 @@ bool TrackerDevice::answer_query(const emscon::Request& request, HostTime at) {
     a.serial_number = 1;
     return send(emscon::Answer{a}), true;
   }
+
   if (as<emscon::GetTrackerStatus>(request)) {
     emscon::TrackerStatusAnswer a;
     a.tracker = !initialised_ || beam_back_ ? emscon::TrackerStatus::NotReady
@@ -211,17 +235,22 @@ bool TrackerDevice::answer_query(const emscon::Request& request, HostTime at) {
                                             : emscon::TrackerStatus::Ready;
     return send(emscon::Answer{a}), true;
   }
+
   if (as<emscon::GetUnits>(request))
     return send(emscon::Answer{emscon::UnitsAnswer{emscon::Status::Ok, units_}}), true;
   if (as<emscon::GetEnvironmentParams>(request)) {
-    return send(emscon::Answer{emscon::EnvironmentAnswer{emscon::Status::Ok, environment(at)}}), true;
+    return send(emscon::Answer{emscon::EnvironmentAnswer{emscon::Status::Ok, environment(at)}}),
+           true;
   }
+
   if (as<emscon::GetRefractionParams>(request)) {
     return send(emscon::Answer{emscon::RefractionAnswer{emscon::Status::Ok, refraction_}}), true;
   }
+
   if (as<emscon::GetReflector>(request)) {
     return send(emscon::Answer{emscon::ReflectorAnswer{emscon::Status::Ok, reflector_}}), true;
   }
+
   if (as<emscon::GetReflectors>(request)) {
     for (const Reflector& known : kKnownReflectors) {
       emscon::ReflectorsAnswer a;
@@ -233,31 +262,37 @@ bool TrackerDevice::answer_query(const emscon::Request& request, HostTime at) {
     }
     return true;
   }
+
   if (as<emscon::GetSystemSettings>(request)) {
     return send(emscon::Answer{emscon::SystemSettingsAnswer{emscon::Status::Ok, settings_}}), true;
   }
+
   if (const auto* r = as<emscon::GetLongSystemParameter>(request)) {
     const auto set = long_parameters_.find(r->parameter);
     const std::int32_t value = set == long_parameters_.end() ? 3 : set->second;
-    return send(emscon::Answer{emscon::LongSystemParameterAnswer{emscon::Status::Ok, r->parameter, value}}),
+    return send(emscon::Answer{
+               emscon::LongSystemParameterAnswer{emscon::Status::Ok, r->parameter, value}}),
            true;
   }
+
   if (answer_setting(request)) return true;
   if (as<emscon::GetMeasurementStatusInfo>(request)) {
     using Bit = emscon::MeasurementStatusBit;
     emscon::MeasurementStatusInfoAnswer a;
     const auto bit = [](Bit b) { return static_cast<std::int32_t>(b); };
-    a.bits = bit(Bit::Tracker) | bit(Bit::Compensation) | bit(Bit::Adm) | bit(Bit::AdmCompensation) |
-             bit(Bit::Face1);
+    a.bits = bit(Bit::Tracker) | bit(Bit::Compensation) | bit(Bit::Adm) |
+             bit(Bit::AdmCompensation) | bit(Bit::Face1);
     if (!beam_back_) a.bits |= bit(Bit::ReflectorFound);
     if (initialised_) a.bits |= bit(Bit::Initialised);
     return send(emscon::Answer{a}), true;
   }
+
   if (as<emscon::GetObjectTemperature>(request)) {
     return send(emscon::Answer{
                emscon::ObjectTemperatureAnswer{emscon::Status::Ok, environment(at).temperature}}),
            true;
   }
+
   if (as<emscon::GetTriggerBoardInfo>(request))
     return send(emscon::Answer{emscon::TriggerBoardInfoAnswer{}}), true;
   if (as<emscon::GetTrackerInfo>(request)) {
@@ -267,6 +302,7 @@ bool TrackerDevice::answer_query(const emscon::Request& request, HostTime at) {
     a.serial_number = 1;
     return send(emscon::Answer{a}), true;
   }
+
   return false;
 }
 

@@ -9,8 +9,8 @@ namespace abbe::sim {
 namespace {
 
 constexpr double kWeatherThreshold_K = 0.2;  // a change worth an event
-constexpr std::size_t kPointsPerPacket =
-    1500;  // below the packet size for both kinds of burst, in whole kilobytes of points
+// below the packet size for both kinds of burst, in whole kilobytes of points
+constexpr std::size_t kPointsPerPacket = 1500;
 
 double length_per_metre(emscon::LengthUnit unit) {
   switch (unit) {
@@ -27,6 +27,7 @@ double length_per_metre(emscon::LengthUnit unit) {
     case emscon::LengthUnit::Inch:
       return 1.0 / 0.0254;
   }
+
   return 1e3;
 }
 
@@ -46,12 +47,14 @@ double pressure_per_mbar(emscon::PressureUnit unit) {
     case emscon::PressureUnit::InchOfMercury:
       return 100.0 / 3386.388640341;
   }
+
   return 1.0;
 }
 
 }  // namespace
 
-TrackerDevice::TrackerDevice(const TrackerOptions& options, const VirtualMachine& machine, HostTime now)
+TrackerDevice::TrackerDevice(const TrackerOptions& options, const VirtualMachine& machine,
+                             HostTime now)
     : options_(options),
       machine_(machine),
       power_on_(now),
@@ -75,7 +78,8 @@ void TrackerDevice::connected(HostTime now) {
   advance(now);
   reset_session();
   connected_ = true;
-  if (std::exchange(announce_start_, false)) send(emscon::StatusChange{emscon::Event::ServerStarted});
+  if (std::exchange(announce_start_, false))
+    send(emscon::StatusChange{emscon::Event::ServerStarted});
 }
 
 void TrackerDevice::disconnected() {
@@ -111,13 +115,17 @@ void TrackerDevice::on_packet(std::span<const std::byte> packet, HostTime now) {
       std::memcpy(&command, packet.data() + 8, sizeof command);
       refusal.command = static_cast<emscon::Command>(command);
     }
-    refusal.status = request.error() == emscon::DecodeError::UnknownCommand ? emscon::Status::NotImplemented
-                                                                            : emscon::Status::WrongParameter;
+    refusal.status = request.error() == emscon::DecodeError::UnknownCommand
+                         ? emscon::Status::NotImplemented
+                         : emscon::Status::WrongParameter;
     return send(emscon::Answer{refusal});
   }
+
   if (pending_ || now < busy_until_) {
-    return send(emscon::Answer{emscon::Acknowledge{command_of(*request), emscon::Status::ServerBusy}});
+    return send(
+        emscon::Answer{emscon::Acknowledge{command_of(*request), emscon::Status::ServerBusy}});
   }
+
   pending_ = Command{*request, now + latency(*request)};
 }
 
@@ -143,17 +151,20 @@ void TrackerDevice::step(HostTime at) {
     warm_announced_ = true;
     return send_event(emscon::Event::LaserWarmedUp);
   }
+
   if (stall_until_ && at >= *stall_until_) return stall_until_.reset();
   if (pending_ && at >= pending_->due) {
     const Command command = *std::exchange(pending_, std::nullopt);
     if (at >= mute_until_) carry_out(command.request, at);
     return;
   }
+
   if (stream_ && at >= stream_->next_burst) {
     stream_->next_burst = at + burst_interval(options_.model.seed, bursts_++);
     emit_burst(at);
     return check_weather(at);
   }
+
   if (single_due_ && at >= *single_due_) return emit_single(at);
   if (beam_back_ && at >= *beam_back_) return_beam();
 }
@@ -198,7 +209,8 @@ emscon::MultiPoint TrackerDevice::point_at(DeviceTime t) {
 
 emscon::PointStatus TrackerDevice::status_of(BeamSpeed speed, HostTime at) const {
   if (prism_fault_.holds(at)) return emscon::PointStatus::PrismError;
-  if (speed_fault_.holds(at) || speed == BeamSpeed::Exceeded) return emscon::PointStatus::SpeedExceeded;
+  if (speed_fault_.holds(at) || speed == BeamSpeed::Exceeded)
+    return emscon::PointStatus::SpeedExceeded;
   return speed == BeamSpeed::Warning ? emscon::PointStatus::SpeedWarning : emscon::PointStatus::Ok;
 }
 
@@ -212,6 +224,7 @@ void TrackerDevice::emit_burst(HostTime at) {
     points.push_back(point_at(stream_->next_point));
     --stream_->points_left;
   }
+
   if (at >= mute_until_) emit_points(points);
   if (stream_->points_left > 0) return;
   stream_.reset();
@@ -225,7 +238,8 @@ void TrackerDevice::emit_points(std::span<const emscon::MultiPoint> points) {
         extended ? std::min(kPointsPerPacket, emscon::kMaxExtendedMultiPoints) : kPointsPerPacket;
     const auto part = points.first(std::min(points.size(), most));
     emscon::MultiHead head;
-    head.environment = environment(host_time(options_.model, power_on_, part.back().time.to_device_time()));
+    head.environment =
+        environment(host_time(options_.model, power_on_, part.back().time.to_device_time()));
     if (extended) {
       std::vector<emscon::ExtendedMultiPoint> wide(part.size());
       std::transform(part.begin(), part.end(), wide.begin(), [](const emscon::MultiPoint& p) {
@@ -243,12 +257,15 @@ void TrackerDevice::emit_points(std::span<const emscon::MultiPoint> points) {
 void TrackerDevice::emit_single(HostTime at) {
   single_due_.reset();
   // The mean of as many points as the measuring time holds at 1 kHz.
-  const auto n = static_cast<std::uint64_t>(std::max<std::int32_t>(stationary_.measurement_time_ms, 1));
+  const auto n =
+      static_cast<std::uint64_t>(std::max<std::int32_t>(stationary_.measurement_time_ms, 1));
   Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+
   for (std::uint64_t i = 0; i < n; ++i) {
     const HostTime t = at - std::chrono::milliseconds{n - i};
     sum += observe(options_.model, machine_, t, noise_next_++).p_tracker_m;
   }
+
   const Eigen::Vector3d mean = length_per_metre(units_.length) / static_cast<double>(n) * sum;
   emscon::SingleResult result;
   result.value = {mean.x(), mean.y(), mean.z()};
@@ -269,7 +286,8 @@ emscon::Environment TrackerDevice::environment(HostTime at) const {
   const double celsius = air_temperature_C(at);
   const bool fahrenheit = units_.temperature == emscon::TemperatureUnit::Fahrenheit;
   return {fahrenheit ? celsius * 1.8 + 32.0 : celsius,
-          options_.air_pressure_mbar * pressure_per_mbar(units_.pressure), options_.air_humidity_percent};
+          options_.air_pressure_mbar * pressure_per_mbar(units_.pressure),
+          options_.air_humidity_percent};
 }
 
 void TrackerDevice::check_weather(HostTime at) {

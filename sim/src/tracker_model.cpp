@@ -11,7 +11,8 @@ namespace {
 
 constexpr double kWarningShare = 0.8;
 
-BeamSpeed judged(const TrackerModel& model, const Eigen::Vector3d& p, const Eigen::Vector3d& velocity) {
+BeamSpeed judged(const TrackerModel& model, const Eigen::Vector3d& p,
+                 const Eigen::Vector3d& velocity) {
   const Eigen::Vector3d beam = p.normalized();
   const double radial = std::abs(velocity.dot(beam));
   const double lateral = (velocity - velocity.dot(beam) * beam).norm();
@@ -21,14 +22,17 @@ BeamSpeed judged(const TrackerModel& model, const Eigen::Vector3d& p, const Eige
   return share > kWarningShare ? BeamSpeed::Warning : BeamSpeed::Fine;
 }
 
-Eigen::Vector3d with_noise(const TrackerModel& model, const Eigen::Vector3d& p, std::uint64_t index) {
+Eigen::Vector3d with_noise(const TrackerModel& model, const Eigen::Vector3d& p,
+                           std::uint64_t index) {
   const double across = std::hypot(p.x(), p.y());
   const double elevation0 = std::atan2(p.z(), across);
-  const double range = p.norm() + model.sigma_range_m * gaussian(model.seed, NoiseStream::Range, index);
+  const double range =
+      p.norm() + model.sigma_range_m * gaussian(model.seed, NoiseStream::Range, index);
   const double elevation =
       elevation0 + model.sigma_angle_rad * gaussian(model.seed, NoiseStream::Elevation, index);
-  const double azimuth = std::atan2(p.y(), p.x()) + model.sigma_angle_rad / std::cos(elevation0) *
-                                                        gaussian(model.seed, NoiseStream::Azimuth, index);
+  const double azimuth =
+      std::atan2(p.y(), p.x()) + model.sigma_angle_rad / std::cos(elevation0) *
+                                     gaussian(model.seed, NoiseStream::Azimuth, index);
   return range * Eigen::Vector3d(std::cos(elevation) * std::cos(azimuth),
                                  std::cos(elevation) * std::sin(azimuth), std::sin(elevation));
 }
@@ -58,7 +62,8 @@ DeviceTime device_time(const TrackerModel& model, HostTime power_on, HostTime at
 }
 
 HostTime host_time(const TrackerModel& model, HostTime power_on, DeviceTime at) {
-  const std::chrono::nanoseconds on_its_clock = at.time_since_epoch() - seconds_to_ns(model.clock_offset_s);
+  const std::chrono::nanoseconds on_its_clock =
+      at.time_since_epoch() - seconds_to_ns(model.clock_offset_s);
   const double ppm = model.clock_drift_ppm * 1e-6;
   return power_on + on_its_clock - seconds_to_ns(ns_to_seconds(on_its_clock) * ppm / (1.0 + ppm));
 }

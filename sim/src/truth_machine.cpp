@@ -25,17 +25,20 @@ Eigen::Isometry3d carriage(const TruthMachine& truth, Axis axis, double q_m,
   const auto a = static_cast<std::size_t>(axis);
   const AxisTruth& errors = truth.axes[a];
   std::array<double, kMotions> e{};
+
   for (std::size_t i = 0; i < kMotions; ++i) {
     e[i] = errors.error[i].at(q_m) + 0.5 * condition.direction[a] * errors.backlash[i];
   }
+
   const auto k = static_cast<Eigen::Index>(a);
-  e[a] += condition.heat * (truth.thermal.growth_per_m[k] * q_m + truth.thermal.shift_m[k]);
+  e[a] += condition.heat * (truth.thermal.expansion_per_m[k] * q_m + truth.thermal.shift_m[k]);
   Eigen::Isometry3d T = Eigen::Isometry3d::Identity();
   T.translate(q_m * travel_direction(truth.squareness, axis));
   T.translate(Eigen::Vector3d(e[0], e[1], e[2]));
   T.rotate(Eigen::AngleAxisd(e[5], Eigen::Vector3d::UnitZ()));
   T.rotate(Eigen::AngleAxisd(e[4], Eigen::Vector3d::UnitY()));
   T.rotate(Eigen::AngleAxisd(e[3], Eigen::Vector3d::UnitX()));
+
   return T;
 }
 

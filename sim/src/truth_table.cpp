@@ -59,15 +59,19 @@ class TruthReader {
       *square = value.value_or(0.0) * kMicro;
       return;
     }
+
     const bool backlash = name.ends_with(kBacklash);
     const auto place = place_of(backlash ? name.substr(0, name.size() - kBacklash.size()) : name);
     if (!place)
-      return errors_.add(row.line, fmt::format("column name: \"{}\" is no error of this machine", name));
+      return errors_.add(row.line,
+                         fmt::format("column name: \"{}\" is no error of this machine", name));
     expect_unit(row, unit_of(place->motion));
+
     if (backlash) {
       truth_.axis(place->axis).backlash[place->motion] = value.value_or(0.0) * kMicro;
       return;
     }
+
     const auto position = csv_number(table_, row, 1, errors_);
     if (position && value) add_node(row, *place, *position * kMPerMm, *value * kMicro);
   }
@@ -81,9 +85,11 @@ class TruthReader {
           errors_.add(nodes.line, motion_name(m, axis) + " needs at least two nodes");
           continue;
         }
-        truth_.axis(axis).error[m] = ErrorFunction(std::move(nodes.at_m), std::move(nodes.value), shape);
+        truth_.axis(axis).error[m] =
+            ErrorFunction(std::move(nodes.at_m), std::move(nodes.value), shape);
       }
     }
+
     return std::move(truth_);
   }
 
@@ -95,7 +101,8 @@ class TruthReader {
 
   void expect_unit(const CsvRow& row, std::string_view unit) {
     if (row.cells[3] != unit) {
-      errors_.add(row.line, fmt::format("column unit: \"{}\" instead of \"{}\"", row.cells[3], unit));
+      errors_.add(row.line,
+                  fmt::format("column unit: \"{}\" instead of \"{}\"", row.cells[3], unit));
     }
   }
   void add_node(const CsvRow& row, Place place, double at_m, double value) {
@@ -116,11 +123,12 @@ class TruthReader {
 
 }  // namespace
 
-Result<TruthMachine> parse_truth_csv(std::string_view text, std::string_view name, TruthMachine into,
-                                     Shape shape) {
+Result<TruthMachine> parse_truth_csv(std::string_view text, std::string_view name,
+                                     TruthMachine into, Shape shape) {
   CsvErrors errors(name);
   const CsvTable table = split_csv(text, errors);
-  if (!std::equal(table.header.begin(), table.header.end(), kTruthColumns.begin(), kTruthColumns.end())) {
+  if (!std::equal(table.header.begin(), table.header.end(), kTruthColumns.begin(),
+                  kTruthColumns.end())) {
     errors.add(1, "the header must be name,position_mm,value,unit");
     return tl::unexpected(errors.error());
   }
@@ -134,9 +142,10 @@ Result<TruthMachine> parse_truth_csv(std::string_view text, std::string_view nam
 std::string format_truth_csv(const TruthMachine& truth) {
   std::string out = "name,position_mm,value,unit\n";
   const auto row = [&](std::string_view name, double at_m, double value, std::string_view unit) {
-    fmt::format_to(std::back_inserter(out), "{},{:.17g},{:.17g},{}\n", name, at_m / kMPerMm, value / kMicro,
-                   unit);
+    fmt::format_to(std::back_inserter(out), "{},{:.17g},{:.17g},{}\n", name, at_m / kMPerMm,
+                   value / kMicro, unit);
   };
+
   for (const Axis axis : kAxes) {
     for (std::size_t m = 0; m < kMotions; ++m) {
       const ErrorFunction& f = truth.axis(axis).error[m];
@@ -144,12 +153,15 @@ std::string format_truth_csv(const TruthMachine& truth) {
         row(motion_name(m, axis), f.nodes_m()[i], f.values()[i], unit_of(m));
       }
       const double backlash = truth.axis(axis).backlash[m];
-      if (backlash != 0.0) row(motion_name(m, axis) + std::string(kBacklash), 0.0, backlash, unit_of(m));
+      if (backlash != 0.0)
+        row(motion_name(m, axis) + std::string(kBacklash), 0.0, backlash, unit_of(m));
     }
   }
+
   row("A0Z", 0.0, truth.squareness.A0Z_rad, "urad");
   row("B0Z", 0.0, truth.squareness.B0Z_rad, "urad");
   row("C0Y", 0.0, truth.squareness.C0Y_rad, "urad");
+
   return out;
 }
 

@@ -10,7 +10,8 @@ namespace abbe::sim {
 namespace {
 
 constexpr std::size_t kLargestDatagram = 65536;
-constexpr std::size_t kOutgoingDatagram = 1400;  // below every Ethernet MTU, as the tunnel does by default
+// below every Ethernet MTU, as the tunnel does by default
+constexpr std::size_t kOutgoingDatagram = 1400;
 constexpr int kMostDatagrams = 256;
 
 class UdpCanPort final : public CanPort {
@@ -42,9 +43,9 @@ class UdpCanPort final : public CanPort {
   }
 
   void send_garbage() override {
-    constexpr std::array<std::byte, 7> kNoDatagram{std::byte{0xff}, std::byte{0xff}, std::byte{0x00},
-                                                   std::byte{0x13}, std::byte{0x37}, std::byte{0x02},
-                                                   std::byte{0x00}};
+    constexpr std::array<std::byte, 7> kNoDatagram{
+        std::byte{0xff}, std::byte{0xff}, std::byte{0x00}, std::byte{0x13},
+        std::byte{0x37}, std::byte{0x02}, std::byte{0x00}};
     if (has_peer_) send_bytes(kNoDatagram);
   }
 
@@ -72,6 +73,7 @@ class UdpCanPort final : public CanPort {
     auto view = can::DatagramView::parse(std::span(buffer_).first(static_cast<std::size_t>(size)));
     if (!view) return true;  // what is not ours does not reach the bus
     for (can::CanFrame frame; view->next(frame);) arrived_.push_back({frame, age});
+
     return true;
   }
   void send_bytes(std::span<const std::byte> bytes) {

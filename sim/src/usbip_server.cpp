@@ -86,6 +86,7 @@ void UsbipServer::read(HostTime now) {
       disconnect();
     }
   }
+
   accept_clients();  // who waited behind the one that has gone
 }
 
@@ -113,6 +114,7 @@ bool UsbipServer::on_operation() {
   const auto head = usbip::decode_op_head(incoming_);
   if (!head && head.error() == usbip::OpError::Truncated) return false;
   std::array<std::byte, 512> out{};
+
   if (head && head->code == usbip::OpCode::DeviceListRequest) {
     usbip::DeviceListWriter list{out, 1};
     list.add(exported(), std::array{usbip::ExportedInterface{.interface_class = 0xFF}});
@@ -120,19 +122,23 @@ bool UsbipServer::on_operation() {
     closing_ = true;
     return false;
   }
+
   const auto bus_id = usbip::decode_import_request(incoming_);
   if (!bus_id && bus_id.error() == usbip::OpError::Truncated) return false;
   if (!bus_id) {
     disconnect();
     return false;
   }
+
   incoming_.erase(incoming_.begin(), incoming_.begin() + usbip::kImportRequestSize);
   imported_ = bus_id->view() == kBusId;
   const auto device = exported();
-  const auto size = usbip::encode_import_reply(imported_ ? usbip::OpStatus::Ok : usbip::OpStatus::NoDevice,
-                                               imported_ ? &device : nullptr, out);
+  const auto size =
+      usbip::encode_import_reply(imported_ ? usbip::OpStatus::Ok : usbip::OpStatus::NoDevice,
+                                 imported_ ? &device : nullptr, out);
   send_bytes(std::span{out}.first(size));
   closing_ = !imported_;
+
   return imported_;
 }
 
@@ -141,16 +147,20 @@ bool UsbipServer::on_urb(HostTime now) {
   const auto urb = usbip::decode_urb(std::span{incoming_}.first<usbip::kUrbHeaderSize>());
   const auto* submit = urb ? std::get_if<usbip::Submit>(&*urb) : nullptr;
   const auto* unlink = urb ? std::get_if<usbip::Unlink>(&*urb) : nullptr;
-  if ((submit == nullptr && unlink == nullptr) || (submit != nullptr && submit->length > kLargestRequest)) {
+
+  if ((submit == nullptr && unlink == nullptr) ||
+      (submit != nullptr && submit->length > kLargestRequest)) {
     disconnect();
     return false;
   }
+
   const bool data = submit != nullptr && submit->head.direction == usbip::Direction::Out;
   const std::size_t size = usbip::kUrbHeaderSize + (data ? submit->length : 0);
   if (incoming_.size() < size) return false;
   incoming_.erase(incoming_.begin(), incoming_.begin() + static_cast<std::ptrdiff_t>(size));
   if (submit != nullptr) on_submit(*submit, now);
   if (unlink != nullptr) on_unlink(*unlink);
+
   return true;
 }
 
@@ -160,7 +170,9 @@ void UsbipServer::on_submit(const usbip::Submit& submit, HostTime now) {
     requests_.push_back({submit.head.sequence, submit.length});
     return;
   }
-  if (submit.head.endpoint != 0) return reply(submit.head.sequence, usbip::UrbStatus::Stalled, 0, {});
+
+  if (submit.head.endpoint != 0)
+    return reply(submit.head.sequence, usbip::UrbStatus::Stalled, 0, {});
   fill_requests(now);  // what was measured before the request is gone before its answer
   const auto answer = card_->answer(usb::decode_setup(submit.setup), now);
   if (answer.outcome == ControlAnswer::Outcome::Silent) return;
@@ -173,8 +185,9 @@ void UsbipServer::on_submit(const usbip::Submit& submit, HostTime now) {
 void UsbipServer::on_unlink(const usbip::Unlink& unlink) {
   const auto removed =
       std::erase_if(requests_, [&](const Request& r) { return r.sequence == unlink.victim; });
-  const usbip::UnlinkReply answer{.head = {.sequence = unlink.head.sequence},
-                                  .status = removed != 0 ? usbip::UrbStatus::Unlinked : usbip::UrbStatus::Ok};
+  const usbip::UnlinkReply answer{
+      .head = {.sequence = unlink.head.sequence},
+      .status = removed != 0 ? usbip::UrbStatus::Unlinked : usbip::UrbStatus::Ok};
   send_bytes(usbip::encode(usbip::Urb{answer}));
 }
 
@@ -194,7 +207,8 @@ void UsbipServer::fill_requests(HostTime now) {
 
 void UsbipServer::reply(std::uint32_t sequence, usbip::UrbStatus status, std::uint32_t length,
                         std::span<const std::byte> data) {
-  const usbip::SubmitReply answer{.head = {.sequence = sequence}, .status = status, .length = length};
+  const usbip::SubmitReply answer{
+      .head = {.sequence = sequence}, .status = status, .length = length};
   send_bytes(usbip::encode(usbip::Urb{answer}));
   send_bytes(data);
 }
@@ -280,6 +294,7 @@ void UsbipServer::inject(const Fault& fault, HostTime now) {
     default:
       break;  // another device's fault
   }
+
   write();
 }
 

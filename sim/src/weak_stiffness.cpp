@@ -9,14 +9,16 @@ namespace {
 
 constexpr double kBall1_mm[3] = {-90.0, 140.0, 30.0};
 
-/// c0 + c1 p + c2 p^2 + c3 p^3, coefficients for p and value in mm (translations) or p in mm (rotations).
+/// c0 + c1 p + c2 p^2 + c3 p^3, coefficients for p and value in mm (translations) or p in mm
+/// (rotations).
 struct Cubic {
   double c0 = 0.0, c1 = 0.0, c2 = 0.0, c3 = 0.0;
   [[nodiscard]] double at(double p_mm) const { return c0 + p_mm * (c1 + p_mm * (c2 + p_mm * c3)); }
 };
 
 ErrorFunction translation(const Cubic& c) {
-  return ErrorFunction::polynomial({c.c0 / kMmPerM, c.c1, c.c2 * kMmPerM, c.c3 * kMmPerM * kMmPerM});
+  return ErrorFunction::polynomial(
+      {c.c0 / kMmPerM, c.c1, c.c2 * kMmPerM, c.c3 * kMmPerM * kMmPerM});
 }
 ErrorFunction rotation(const Cubic& c) {
   return ErrorFunction::polynomial(
@@ -54,7 +56,8 @@ TruthMachine weak_stiffness_machine(const WeakStiffnessOptions& options) {
   const Cubic eyz{0, -3.560507e-05, 0, 5.256019e-09};
   const Cubic ezz{0, -5.102954e-05, 1.537837e-07, -3.872882e-09};
 
-  motion(truth, Motion::EX, Axis::X) = translation(dxx).with_wave(options.periodic_m, options.period_m);
+  motion(truth, Motion::EX, Axis::X) =
+      translation(dxx).with_wave(options.periodic_m, options.period_m);
   motion(truth, Motion::EY, Axis::X) = translation(dyx);
   motion(truth, Motion::EZ, Axis::X) = translation(dzx);
   motion(truth, Motion::EA, Axis::X) = rotation(exx);
@@ -72,7 +75,8 @@ TruthMachine weak_stiffness_machine(const WeakStiffnessOptions& options) {
     motion(truth, Motion::EY, Axis::Z) = translation(dyz);
     motion(truth, Motion::EZ, Axis::Z) = translation(dzz);
   };
-  const Eigen::Vector3d ball1_m = Eigen::Vector3d(kBall1_mm[0], kBall1_mm[1], kBall1_mm[2]) / kMmPerM;
+  const Eigen::Vector3d ball1_m =
+      Eigen::Vector3d(kBall1_mm[0], kBall1_mm[1], kBall1_mm[2]) / kMmPerM;
   set_z();
   const Eigen::Vector3d off_mm = kMmPerM * error_m(truth, ball1_m);
   dxz.c0 -= off_mm.x();

@@ -1,6 +1,6 @@
-// The encoder path on the host: a simulated counter card in a process of its own, USB/IP over TCP, the
-// driver, its ring and a reader. Asked: 33,333 scans/s x 8 counters with nothing lost, at most 10 % of one
-// processor for driver and ring, and at least ten times the rate without loss.
+// The encoder path on the host: a simulated counter card in a process of its own, USB/IP over TCP,
+// the driver, its ring and a reader. Asked: 33,333 scans/s x 8 counters with nothing lost, at most
+// 10 % of one processor for driver and ring, and at least ten times the rate without loss.
 //   bench_counter_card [--seconds N] [--short]
 //   bench_counter_card --serve PORT        only the simulated card, until killed: for `usbip attach`
 //   bench_counter_card --libusb [...]      the card that is plugged in (or attached), by libusb
@@ -40,17 +40,21 @@ sim::CounterCardOptions simulated_card() {
   sim::CounterCardOptions card;
   for (std::size_t axis = 0; axis < 5; ++axis) {
     const double speed_m_per_s = 0.01 * static_cast<double>(axis + 1);
-    card.channels[axis].phases = sim::ScaleSignal{
-        .reading = [speed_m_per_s](
-                       sim::HostTime t) { return speed_m_per_s * sim::ns_to_seconds(t.time_since_epoch()); },
-        .step = 10e-9,
-        .noise = 0.0,
-        .marks = {}};
+    card.channels[axis].phases =
+        sim::ScaleSignal{.reading =
+                             [speed_m_per_s](sim::HostTime t) {
+                               return speed_m_per_s * sim::ns_to_seconds(t.time_since_epoch());
+                             },
+                         .step = 10e-9,
+                         .noise = 0.0,
+                         .marks = {}};
   }
+
   card.channels[5].phases = sim::ClockSignal{.hz = kClock_hz};
   card.channels[6] = {sim::ClockSignal{.hz = kClock_hz}, true};
   card.channels[7].phases = sim::ProbeSignal{};
   card.fifo_bytes = 4 << 20;  // this process may be stopped for a while: not what is asked here
+
   return card;
 }
 
@@ -58,10 +62,13 @@ sim::CounterCardOptions simulated_card() {
   const sim::SimClock clock{1.0};
   for (;;) {
     const short events = static_cast<short>(server.wants_write() ? POLLIN | POLLOUT : POLLIN);
-    std::array<pollfd, 2> fds{pollfd{server.listener_fd(), POLLIN, 0}, pollfd{server.client_fd(), events, 0}};
+    std::array<pollfd, 2> fds{pollfd{server.listener_fd(), POLLIN, 0},
+                              pollfd{server.client_fd(), events, 0}};
     const auto due = server.next_due();
-    const auto wait = due == sim::HostTime::max() ? std::chrono::nanoseconds{10ms} : due - clock.now();
-    const auto bounded = std::clamp(wait, std::chrono::nanoseconds{0}, std::chrono::nanoseconds{10ms});
+    const auto wait =
+        due == sim::HostTime::max() ? std::chrono::nanoseconds{10ms} : due - clock.now();
+    const auto bounded =
+        std::clamp(wait, std::chrono::nanoseconds{0}, std::chrono::nanoseconds{10ms});
     const timespec timeout{0, bounded.count()};
     ::ppoll(fds.data(), fds.size(), &timeout, nullptr);
     server.poll(clock.now());
@@ -97,7 +104,9 @@ struct Result {
   std::uint64_t dropped = 0;
   std::uint64_t faults = 0;
   std::string last_fault;
-  [[nodiscard]] bool clean() const { return scans != 0 && lost + gaps + unflagged + dropped + faults == 0; }
+  [[nodiscard]] bool clean() const {
+    return scans != 0 && lost + gaps + unflagged + dropped + faults == 0;
+  }
 };
 
 /// Reads the ring until `seconds` have passed since the first sample.
@@ -122,25 +131,29 @@ class Reader {
 };
 
 /// Port 0: by libusb.
-std::unique_ptr<drivers::UsbLink> make_link(std::uint16_t port, const drivers::CounterCardOptions& wanted,
+std::unique_ptr<drivers::UsbLink> make_link(std::uint16_t port,
+                                            const drivers::CounterCardOptions& wanted,
                                             const drivers::TimeSource& time) {
   const auto identity = drivers::identity_of(wanted);
   if (port == 0) return std::make_unique<drivers::LibusbLink>(identity, time);
-  return std::make_unique<drivers::UsbipLink>(drivers::UsbipOptions{.port = port, .identity = identity},
-                                              time);
+  return std::make_unique<drivers::UsbipLink>(
+      drivers::UsbipOptions{.port = port, .identity = identity}, time);
 }
 
 Result measure(std::uint16_t port, double rate_hz, std::chrono::duration<double> duration) {
   const drivers::MonotonicTime time;
   const auto wanted = options(rate_hz);
   auto made = drivers::CounterCardDevice::create(wanted, make_link(port, wanted, time), time);
+
   if (!made) {
     fmt::print(stderr, "{}\n", made.error().text);
     std::exit(2);
   }
+
   auto& device = **made;
   std::atomic<bool> streaming{false}, stop{false};
   double cpu_s = 0.0, wall_s = 0.0;
+
   std::thread acquisition([&] {
     std::chrono::steady_clock::time_point begin;
     double cpu_at_begin_s = 0.0;
@@ -155,25 +168,30 @@ Result measure(std::uint16_t port, double rate_hz, std::chrono::duration<double>
     cpu_s = thread_cpu_s() - cpu_at_begin_s;
     wall_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
   });
+
   Reader reader;
   std::array<protocol::RawBlock, 64> blocks;
   const auto patience = std::chrono::steady_clock::now() + 10s;
   auto end = patience;
+
   for (bool begun = false; std::chrono::steady_clock::now() < end;) {
     reader.take(device.samples());
     while (device.raw().pop(blocks) == blocks.size()) {
     }
     if (!begun && streaming) {
       begun = true;
-      end = std::chrono::steady_clock::now() + std::chrono::duration_cast<std::chrono::nanoseconds>(duration);
+      end = std::chrono::steady_clock::now() +
+            std::chrono::duration_cast<std::chrono::nanoseconds>(duration);
     }
     std::this_thread::sleep_for(250us);
   }
+
   stop = true;
   acquisition.join();
   reader.take(device.samples());
   const auto status = device.status();
   const auto& counters = device.receiver().counters();
+
   return {.rate_hz = static_cast<double>(reader.count()) / wall_s,
           .share = cpu_s / wall_s,
           .scans = reader.count(),
@@ -187,32 +205,38 @@ Result measure(std::uint16_t port, double rate_hz, std::chrono::duration<double>
 
 void print(const Result& r, double asked_hz) {
   fmt::print(
-      "{:>10.0f} scans/s asked, {:>10.0f} came; lost {}, gaps {}, unflagged {}, dropped {}, faults {}; "
+      "{:>10.0f} scans/s asked, {:>10.0f} came; lost {}, gaps {}, unflagged {}, dropped {}, faults "
+      "{}; "
       "{:.1f} % of one processor{}{}\n",
       asked_hz, r.rate_hz, r.lost, r.gaps, r.unflagged, r.dropped, r.faults, 100.0 * r.share,
       r.last_fault.empty() ? "" : "; ", r.last_fault);
   std::fflush(stdout);
 }
 
-int judge(std::uint16_t port, std::chrono::duration<double> duration, std::chrono::duration<double> trial) {
+int judge(std::uint16_t port, std::chrono::duration<double> duration,
+          std::chrono::duration<double> trial) {
   fmt::print("counter card, 8 counters of 32 bit, {:.0f} s:\n", duration.count());
   const auto usual = measure(port, kRate_hz, duration);
   print(usual, kRate_hz);
   double highest = usual.clean() ? 1.0 : 0.0;
+
   for (const double factor : kFactors) {
     const auto r = measure(port, factor * kRate_hz, trial);
     print(r, factor * kRate_hz);
     if (!r.clean()) break;
     highest = factor;
   }
+
   using tests::print_figure;
   print_figure("encoder path on this computer", "0 lost, 0 unflagged",
                "{} scans, {} lost, {} gaps, {} unflagged", usual.scans, usual.lost, usual.gaps,
                usual.unflagged);
   print_figure("encoder path, driver and ring", fmt::format("<= {:.0f} %", 100.0 * kAskedShare),
                "{:.1f} % of one processor", 100.0 * usual.share);
-  print_figure("encoder path, highest rate without loss", fmt::format(">= {:.0f} x 33,333", kAskedFactor),
-               "{:.0f} scans/s, {:.0f} x 33,333", highest * kRate_hz, highest);
+  print_figure("encoder path, highest rate without loss",
+               fmt::format(">= {:.0f} x 33,333", kAskedFactor), "{:.0f} scans/s, {:.0f} x 33,333",
+               highest * kRate_hz, highest);
+
   return usual.clean() && usual.share <= kAskedShare && highest >= kAskedFactor ? 0 : 1;
 }
 
@@ -223,6 +247,7 @@ int main(int argc, char** argv) {
   std::chrono::duration<double> trial{3.0};
   std::uint16_t serve_at = 0;
   bool by_libusb = false;
+
   for (int i = 1; i < argc; ++i) {
     const std::string_view word = argv[i];
     const bool more = i + 1 < argc;
@@ -235,17 +260,21 @@ int main(int argc, char** argv) {
     } else if (word == "--serve" && more) {
       serve_at = static_cast<std::uint16_t>(std::atoi(argv[++i]));
     } else {
-      fmt::print(stderr, "usage: bench_counter_card [--seconds N] [--short] [--libusb | --serve PORT]\n");
+      fmt::print(stderr,
+                 "usage: bench_counter_card [--seconds N] [--short] [--libusb | --serve PORT]\n");
       return 2;
     }
   }
+
   auto server = sim::UsbipServer::open(serve_at, simulated_card());
   if (!server) {
     fmt::print(stderr, "{}\n", server.error().text);
     return 2;
   }
+
   if (serve_at != 0) play(*server);
   bench::ForkedTask card([&] { play(*server); });
   card.begin();
+
   return judge(by_libusb ? std::uint16_t{0} : server->port(), duration, trial);
 }

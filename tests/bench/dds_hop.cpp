@@ -1,5 +1,5 @@
-// How long 200 bytes take from one process to another through bare Fast DDS, one way: the floor under
-// anything abbe publishes. Wire-to-DDS compares itself with this, measured in the same run.
+// How long 200 bytes take from one process to another through bare Fast DDS, one way: the floor
+// under anything abbe publishes. Wire-to-DDS compares itself with this, measured in the same run.
 #include "dds_hop.hpp"
 
 #include <fmt/format.h>
@@ -8,13 +8,16 @@ int main() {
   abbe::bench::HopOptions options;
   options.profile = ABBE_LOOPBACK_PROFILE;
   const auto hop = abbe::bench::measure_dds_hop(options);
+
   if (hop.received == 0) {
     fmt::print(stderr, "bench_dds_hop: the two processes did not find each other on domain {}\n",
                options.domain);
     return 1;
   }
+
   fmt::print(
-      "bare Fast DDS hop, {} B, best effort, UDP loopback, every {} us: p50 {:.1f} us, p99 {:.1f} us, {} of "
+      "bare Fast DDS hop, {} B, best effort, UDP loopback, every {} us: p50 {:.1f} us, p99 {:.1f} "
+      "us, {} of "
       "{} arrived\n",
       abbe::bench::hop::kMessageBytes, options.period.count(), hop.p50_us, hop.p99_us, hop.received,
       options.samples);

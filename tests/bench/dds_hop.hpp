@@ -1,8 +1,8 @@
 #pragma once
-/// The bare Fast DDS hop others are compared with: a fixed number of bytes from one process to another, no
-/// key, no CDR, best effort, keep last 1, UDP on loopback by the profile abbe itself uses. One way, by
-/// CLOCK_MONOTONIC, which both processes share. Forks: call it before the process has threads or a
-/// participant of its own.
+/// The bare Fast DDS hop others are compared with: a fixed number of bytes from one process to
+/// another, no key, no CDR, best effort, keep last 1, UDP on loopback by the profile abbe itself
+/// uses. One way, by CLOCK_MONOTONIC, which both processes share. Forks: call it before the process
+/// has threads or a participant of its own.
 
 #include <sys/mman.h>
 #include <sys/wait.h>
@@ -37,7 +37,8 @@ struct HopOptions {
   std::size_t samples = 3000;
   std::size_t warm_up = 200;  ///< sent first, not counted
   std::chrono::microseconds period{1000};
-  std::chrono::nanoseconds phase{};  ///< sent when CLOCK_MONOTONIC is a whole number of periods and this
+  std::chrono::nanoseconds
+      phase{};  ///< sent when CLOCK_MONOTONIC is a whole number of periods and this
   std::uint32_t domain = 96;
   std::filesystem::path profile;  ///< abbe-dds-loopback.xml
 };
@@ -102,7 +103,8 @@ class MessageType final : public fast::TopicDataType {
 inline fast::Topic* topic_in(dds::Participant& participant) {
   fast::TypeSupport type(new MessageType);
   type.register_type(&participant.get());
-  return participant.get().create_topic("abbe/bench/hop", type.get_type_name(), fast::TOPIC_QOS_DEFAULT);
+  return participant.get().create_topic("abbe/bench/hop", type.get_type_name(),
+                                        fast::TOPIC_QOS_DEFAULT);
 }
 
 class Receiver final : public fast::DataReaderListener {
@@ -133,13 +135,17 @@ inline void receive(Shared& shared, const HopOptions& options) {
   Receiver receiver(shared, static_cast<std::int64_t>(options.warm_up));
   auto participant = dds::Participant::create({options.domain, options.profile});
   auto* topic = participant ? topic_in(*participant) : nullptr;
-  auto* subscriber =
-      topic != nullptr ? participant->get().create_subscriber(fast::SUBSCRIBER_QOS_DEFAULT) : nullptr;
+  auto* subscriber = topic != nullptr
+                         ? participant->get().create_subscriber(fast::SUBSCRIBER_QOS_DEFAULT)
+                         : nullptr;
+
   if (subscriber == nullptr ||
-      subscriber->create_datareader(topic, dds::reader_qos(daemon::Topic::Snapshot), &receiver) == nullptr) {
+      subscriber->create_datareader(topic, dds::reader_qos(daemon::Topic::Snapshot), &receiver) ==
+          nullptr) {
     shared.failed = true;
     return;
   }
+
   while (!shared.stop) std::this_thread::sleep_for(std::chrono::milliseconds{5});
 }
 
@@ -166,12 +172,14 @@ inline bool send(const Shared& shared, const HopOptions& options) {
   const std::chrono::nanoseconds period = options.period;
   auto next = Clock::now();
   next += period - (next.time_since_epoch() - options.phase) % period;
+
   for (std::size_t i = 0; i < options.warm_up + options.samples; ++i) {
     std::this_thread::sleep_until(next += options.period);
     message.number = static_cast<std::int64_t>(i);
     message.sent = Clock::now().time_since_epoch().count();
     writer->write(&message);
   }
+
   std::this_thread::sleep_for(std::chrono::milliseconds{100});  // what is under way arrives
   return true;
 }
@@ -190,20 +198,23 @@ inline HopResult result_of(const Shared& shared) {
 
 /// received == 0: no participant, or the two processes did not find each other.
 [[nodiscard]] inline HopResult measure_dds_hop(const HopOptions& options) {
-  void* memory =
-      ::mmap(nullptr, sizeof(hop::Shared), PROT_READ | PROT_WRITE, MAP_SHARED | MAP_ANONYMOUS, -1, 0);
+  void* memory = ::mmap(nullptr, sizeof(hop::Shared), PROT_READ | PROT_WRITE,
+                        MAP_SHARED | MAP_ANONYMOUS, -1, 0);
   if (memory == MAP_FAILED) return {};
   auto* shared = new (memory) hop::Shared;
   const pid_t receiver = ::fork();
+
   if (receiver == 0) {
     hop::receive(*shared, options);
     ::_exit(0);
   }
+
   const bool sent = receiver > 0 && hop::send(*shared, options);
   shared->stop = true;
   if (receiver > 0) ::waitpid(receiver, nullptr, 0);
   const HopResult result = sent ? hop::result_of(*shared) : HopResult{};
   ::munmap(memory, sizeof(hop::Shared));
+
   return result;
 }
 

@@ -1,11 +1,12 @@
-// Question: how much of a machine's errors do the estimators of the ball-array method leave, and are their
-// stated uncertainties true? Machine: the weak-stiffness machine of [Li OMM] Table 3 (3.3 mm), layout of the
-// reference data, 2964 points, also where a flatter layout has no balls. Asked, as ratio of the mean R_resmag
-// of bayes-pose to that of ols, same seeds: 8 um white <= 0.80; with 0.15 mrad pose rotations <= 0.52;
-// near-planar layout with 0.32 mrad, where ols leaves points above 1: none above 1; full touch chain: rms
-// left after the best-fit rotation about Ball1 <= 0.07 mm (ols 0.23); coverage of 95 % intervals over 300
-// seeds 93 to 97 % per component, also with an array that is uncertain (2 um, 5 urad, 0.5 K);
-// hyper-parameters and solution <= 0.1 s on one core.
+// Question: how much of a machine's errors do the estimators of the ball-array method leave, and
+// are their stated uncertainties true? Machine: the weak-stiffness machine of [Li OMM] Table 3
+// (3.3 mm), layout of the reference data, 2964 points, also where a flatter layout has no balls.
+// Asked, as ratio of the mean R_resmag of bayes-pose to that of ols, same seeds: 8 um
+// white <= 0.80; with 0.15 mrad pose rotations <= 0.52; near-planar layout with 0.32 mrad, where
+// ols leaves points above 1: none above 1; full touch chain: rms left after the best-fit rotation
+// about Ball1 <= 0.07 mm (ols 0.23); coverage of 95 % intervals over 300 seeds 93 to 97 % per
+// component, also with an array that is uncertain (2 um, 5 urad, 0.5 K); hyper-parameters and
+// solution <= 0.1 s on one core.
 //
 //   bench_evemu_accuracy [seeds = 100] [coverage seeds = 300]
 
@@ -34,12 +35,13 @@ void ask(bool reached, const char* what) {
 
 enum class Grid { Reference, OwnHull };
 
-void compare(const char* what, const Layout& layout, const Noise& noise, unsigned seeds, double asked,
-             Grid where = Grid::Reference) {
+void compare(const char* what, const Layout& layout, const Noise& noise, unsigned seeds,
+             double asked, Grid where = Grid::Reference) {
   const Field V = table3_machine();
   const std::vector<Vector3> grid = where == Grid::Reference ? reference_grid() : hull_grid(layout);
   std::array<double, 3> mean{}, worst{}, rms{};
   double s_m = 0, w_rad = 0;
+
   for (unsigned seed = 1; seed <= seeds; ++seed) {
     const Observations o = simulated(layout, V, noise, seed);
     const Solution ols = *solve(o, {.estimator = Estimator::Ols});
@@ -55,17 +57,21 @@ void compare(const char* what, const Layout& layout, const Noise& noise, unsigne
     s_m += bayes.statistics.s_m / seeds;
     w_rad += bayes.statistics.w_rad / seeds;
   }
-  std::printf("%-28s %5zu points  mean R ols %.5f ridge %.5f bayes %.5f  ratio %.3f (asked %.2f)\n", what,
-              grid.size(), mean[0], mean[1], mean[2], mean[2] / mean[0], asked);
+
+  std::printf("%-28s %5zu points  mean R ols %.5f ridge %.5f bayes %.5f  ratio %.3f (asked %.2f)\n",
+              what, grid.size(), mean[0], mean[1], mean[2], mean[2] / mean[0], asked);
   std::printf(
-      "%28s rms um ols %.2f ridge %.2f bayes %.2f  max R ols %.3f ridge %.3f bayes %.3f  s %.2f um w %.3f "
+      "%28s rms um ols %.2f ridge %.2f bayes %.2f  max R ols %.3f ridge %.3f bayes %.3f  s %.2f um "
+      "w %.3f "
       "mrad\n",
-      "", 1e6 * rms[0], 1e6 * rms[1], 1e6 * rms[2], worst[0], worst[1], worst[2], 1e6 * s_m, 1e3 * w_rad);
+      "", 1e6 * rms[0], 1e6 * rms[1], 1e6 * rms[2], worst[0], worst[1], worst[2], 1e6 * s_m,
+      1e3 * w_rad);
   ask(mean[2] <= asked * mean[0], "ratio of bayes to ols");
   ask(worst[2] <= 1.0, "no point above 1");
 }
 
-/// SCAD with the grid of [Li OMM], folds by position; its fit before V(Ball1) = 0 is set, as for ols.
+/// SCAD with the grid of [Li OMM], folds by position; its fit before V(Ball1) = 0 is set, as for
+/// ols.
 void against_scad(unsigned seeds) {
   const Field V = table3_machine();
   for (const Noise noise : {Noise{8e-6, 0.0}, Noise{8e-6, 0.15e-3}}) {
@@ -76,7 +82,8 @@ void against_scad(unsigned seeds) {
       options.sparse.bootstrap_runs = 2;
       const auto start = std::chrono::steady_clock::now();
       const Solution scad = *solve(o, options), bayes = *solve(o);
-      scad_s += std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count() / seeds;
+      scad_s +=
+          std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count() / seeds;
       const auto grid = evaluation_grid(bayes.model.validity());
       scad_R += remaining(V, raw_field_of(scad), grid).mean_R / seeds;
       bayes_R += remaining(V, field_of(bayes), grid).mean_R / seeds;
@@ -90,14 +97,17 @@ void touch_chain(unsigned seeds) {
   const Field V = table3_machine();
   const Layout layout = reference_layout();
   const std::vector<Touch> exact = reference_touches("touched_noiseless.csv");
+
   struct Way {
     const char* name;
     SolveOptions options;
     double R = 0, rms_m = 0, free_rms_m = 0;
   };
+
   std::array<Way, 4> ways{Way{"ols", {Estimator::Ols}}, Way{"ridge", {Estimator::Ridge, false}},
                           Way{"bayes, centres", {Estimator::BayesPose, false}},
                           Way{"bayes, touches", {Estimator::BayesPose, true}}};
+
   for (unsigned seed = 1; seed <= seeds; ++seed) {
     std::mt19937_64 random(seed);
     std::normal_distribution<double> noise(0, 3e-6);
@@ -116,17 +126,21 @@ void touch_chain(unsigned seeds) {
       way.R += as_it_is.mean_R / seeds;
       way.rms_m += as_it_is.rms_m / seeds;
       way.free_rms_m += remaining(V, turned_to(V, model, grid), grid).rms_m / seeds;
+
       if (seed == 1) {
         std::printf("  %s: s %.2f um w %.3f mrad removed rotation %.3f %.3f %.3f mrad\n", way.name,
-                    1e6 * s.statistics.s_m, 1e3 * s.statistics.w_rad, 1e3 * s.rotation.removed_rad.x(),
-                    1e3 * s.rotation.removed_rad.y(), 1e3 * s.rotation.removed_rad.z());
+                    1e6 * s.statistics.s_m, 1e3 * s.statistics.w_rad,
+                    1e3 * s.rotation.removed_rad.x(), 1e3 * s.rotation.removed_rad.y(),
+                    1e3 * s.rotation.removed_rad.z());
       }
     }
   }
+
   ask(ways.back().free_rms_m <= 0.07e-3, "touch chain, 0.07 mm");
   for (const Way& way : ways) {
-    std::printf("touch chain, %-28s mean R %.3f, rms %.3f mm; without the best-fit rotation rms %.4f mm\n",
-                way.name, way.R, 1e3 * way.rms_m, 1e3 * way.free_rms_m);
+    std::printf(
+        "touch chain, %-28s mean R %.3f, rms %.3f mm; without the best-fit rotation rms %.4f mm\n",
+        way.name, way.R, 1e3 * way.rms_m, 1e3 * way.free_rms_m);
   }
 }
 
@@ -140,13 +154,14 @@ struct ExactArray {
   Observations operator()(Observations o, const Layout&, unsigned) const { return o; }
 };
 
-/// 2 um per ball coordinate, 5 urad per block, 0.5 K of steel, drawn anew for every seed; `stated`: the
-/// covariance is told.
+/// 2 um per ball coordinate, 5 urad per block, 0.5 K of steel, drawn anew for every seed; `stated`:
+/// the covariance is told.
 struct UncertainArray {
   bool stated_too = true;
   Observations operator()(Observations o, const Layout& layout, unsigned seed) const {
     const Calibrator c = stated(reference_calibrator(), 2e-6, 5e-6);
-    ArtefactUncertainty u = uncertainty_of(c, Expansion{.alpha_per_K = 11.5e-6, .u_temperature_K = 0.5});
+    ArtefactUncertainty u =
+        uncertainty_of(c, Expansion{.alpha_per_K = 11.5e-6, .u_temperature_K = 0.5});
     std::mt19937_64 random(seed + 5000);
     const Calibrator found = drawn(c, u.u_scale(), random);
     if (!stated_too) u = uncertainty_of(reference_calibrator(), std::nullopt);
@@ -155,11 +170,12 @@ struct UncertainArray {
 };
 
 template <class Machine, class Array = ExactArray>
-void coverage(const char* what, const Machine& machine_of, const Noise& noise, unsigned seeds, bool asked,
-              const Array& array = {}) {
+void coverage(const char* what, const Machine& machine_of, const Noise& noise, unsigned seeds,
+              bool asked, const Array& array = {}) {
   const Layout layout = reference_layout();
   std::array<Coverage, 3> found;
   const std::array<Estimator, 3> estimators{Estimator::Ols, Estimator::Ridge, Estimator::BayesPose};
+
   for (unsigned seed = 1; seed <= seeds; ++seed) {
     const Field V = machine_of(seed);
     const Observations o = array(simulated(layout, V, noise, seed + 1000), layout, seed);
@@ -177,6 +193,7 @@ void coverage(const char* what, const Machine& machine_of, const Noise& noise, u
       }
     }
   }
+
   bool covered = true;
   for (std::size_t e = 0; e < estimators.size(); ++e) {
     covered = true;  // of the last, bayes-pose
@@ -188,6 +205,7 @@ void coverage(const char* what, const Machine& machine_of, const Noise& noise, u
     }
     std::printf("\n");
   }
+
   constexpr unsigned kEnough = 300;  // with fewer, 2 % are chance
   ask(!asked || covered || seeds < kEnough, "bayes covers 93 to 97 %");
 }
@@ -201,15 +219,20 @@ Field drawn_machine(unsigned seed) {
   std::mt19937_64 random(seed);
   std::normal_distribution<double> normal;
   Eigen::VectorXd c = variance.cwiseSqrt();
+
   for (double& value : c) {
     value *= normal(random);
   }
+
   c = zero_at(design, {-0.09, 0.14, 0.03}) * c;
-  const EvemuModel model = *EvemuModel::of(design, {-0.09, 0.14, 0.03}, c, Eigen::MatrixXd::Zero(45, 45));
+  const EvemuModel model =
+      *EvemuModel::of(design, {-0.09, 0.14, 0.03}, c, Eigen::MatrixXd::Zero(45, 45));
+
   return [model](const Vector3& q) { return model.V_at(q); };
 }
 
-/// Table 3 with what polynomials of order 3 do not hold: sag under a travelling weight, and a screw's pitch.
+/// Table 3 with what polynomials of order 3 do not hold: sag under a travelling weight, and a
+/// screw's pitch.
 Field imperfect_machine(unsigned) {
   const Field V = table3_machine();
   return [V](const Vector3& q) -> Vector3 {
@@ -224,12 +247,14 @@ void speed() {
   const Observations o = simulated(reference_layout(), V, {8e-6, 0.15e-3}, 7);
   std::array<double, 21> seconds{};
   int evaluations = 0;
+
   for (double& s : seconds) {
     const std::clock_t start = std::clock();  // of one core, whoever else has turns on it
     const Solution solution = *solve(o);
     s = static_cast<double>(std::clock() - start) / CLOCKS_PER_SEC;
     evaluations = solution.hyper->evaluations;
   }
+
   std::nth_element(seconds.begin(), seconds.begin() + 10, seconds.end());
   ask(seconds[10] <= 0.1, "100 ms");
   std::printf("hyper-parameters and solution: %.1f ms, %d evaluations (limit 100 ms, ratio %.2f)\n",
@@ -246,22 +271,31 @@ int main(int argc, char** argv) {
   compare("8 um, 0.15 mrad", reference_layout(), {8e-6, 0.15e-3}, seeds, 0.52);
   compare("8 um, 0.32 mrad, tilt x 0.5", reference_layout(0.5), {8e-6, 0.32e-3}, seeds, 1.0);
   compare("8 um, 0.32 mrad, tilt x 0.4", reference_layout(0.4), {8e-6, 0.32e-3}, seeds, 1.0);
-  // Flatter still: where the model holds. Beyond its balls it says inside = false, and nothing is asked.
-  compare("the same x 0.3, inside", reference_layout(0.3), {8e-6, 0.32e-3}, seeds, 1.0, Grid::OwnHull);
-  compare("the same x 0.1, inside", reference_layout(0.1), {8e-6, 0.32e-3}, seeds, 1.0, Grid::OwnHull);
+
+  // Flatter still: where the model holds. Beyond its balls it says inside = false, and nothing is
+  // asked.
+  compare("the same x 0.3, inside", reference_layout(0.3), {8e-6, 0.32e-3}, seeds, 1.0,
+          Grid::OwnHull);
+  compare("the same x 0.1, inside", reference_layout(0.1), {8e-6, 0.32e-3}, seeds, 1.0,
+          Grid::OwnHull);
   against_scad(std::min(seeds, 5u));
   touch_chain(std::min(seeds, 20u));
   coverage("prior machine, 8 um", drawn_machine, {8e-6, 0.0}, coverage_seeds, true);
   coverage("prior machine, 8 um, 0.15 mrad", drawn_machine, {8e-6, 0.15e-3}, coverage_seeds, true);
   coverage(
-      "Table 3, 8 um", [](unsigned) { return table3_machine(); }, {8e-6, 0.0}, coverage_seeds, false);
-  coverage(
-      "Table 3, 8 um, 0.15 mrad", [](unsigned) { return table3_machine(); }, {8e-6, 0.15e-3}, coverage_seeds,
+      "Table 3, 8 um", [](unsigned) { return table3_machine(); }, {8e-6, 0.0}, coverage_seeds,
       false);
-  // What the array leaves in the residuals is in s and w, too, and counts twice: rather more than 95 %.
+  coverage(
+      "Table 3, 8 um, 0.15 mrad", [](unsigned) { return table3_machine(); }, {8e-6, 0.15e-3},
+      coverage_seeds, false);
+
+  // What the array leaves in the residuals is in s and w, too, and counts twice: rather more than
+  // 95 %.
   coverage("prior machine, uncertain array", drawn_machine, {3e-6, 0.0}, coverage_seeds, true,
            UncertainArray{});
-  coverage("the same, not stated", drawn_machine, {3e-6, 0.0}, coverage_seeds, false, UncertainArray{false});
+  coverage("the same, not stated", drawn_machine, {3e-6, 0.0}, coverage_seeds, false,
+           UncertainArray{false});
   coverage("Table 3 + sag + pitch, 8 um", imperfect_machine, {8e-6, 0.0}, coverage_seeds, false);
+
   return missed ? 1 : 0;
 }

@@ -1,6 +1,6 @@
 #pragma once
-/// Work in a process of its own: forked while this process has no thread yet, begun when told to. Fast DDS
-/// starts threads, and a process with threads must not fork.
+/// Work in a process of its own: forked while this process has no thread yet, begun when told to.
+/// Fast DDS starts threads, and a process with threads must not fork.
 
 #include <sys/mman.h>
 #include <sys/prctl.h>
@@ -18,7 +18,8 @@ namespace abbe::bench {
 /// Memory both sides see; `T` must not own anything.
 template <class T>
 [[nodiscard]] T& shared_memory() {
-  void* memory = ::mmap(nullptr, sizeof(T), PROT_READ | PROT_WRITE, MAP_SHARED | MAP_ANONYMOUS, -1, 0);
+  void* memory =
+      ::mmap(nullptr, sizeof(T), PROT_READ | PROT_WRITE, MAP_SHARED | MAP_ANONYMOUS, -1, 0);
   if (memory == MAP_FAILED) std::abort();
   return *new (memory) T;  // stays until the process ends
 }

@@ -1,10 +1,11 @@
-// How long the longest cycle of the hub lasts while what grows is as large as it may be: models of as many
-// parameters as can be published, with covariance, come into force (which is checked); a request of almost
-// 4 MB, a path of 1e5 vertices, comes over the control socket; the machine drives the whole path, seen by a
-// tracker in bursts of 332 points, and the run is identified; requests for the status come as fast as they
-// are answered. A thread of the highest priority on the hub's processor does nothing but wake every 100 us:
-// where it wakes late, no thread ran there, because the hypervisor gave the processor to somebody else. This
-// time is printed and taken off the hub's cycle. Beside that the processor time of the longest cycle.
+// How long the longest cycle of the hub lasts while what grows is as large as it may be: models of
+// as many parameters as can be published, with covariance, come into force (which is checked); a
+// request of almost 4 MB, a path of 1e5 vertices, comes over the control socket; the machine drives
+// the whole path, seen by a tracker in bursts of 332 points, and the run is identified; requests
+// for the status come as fast as they are answered. A thread of the highest priority on the hub's
+// processor does nothing but wake every 100 us: where it wakes late, no thread ran there, because
+// the hypervisor gave the processor to somebody else. This time is printed and taken off the hub's
+// cycle. Beside that the processor time of the longest cycle.
 //   bench_hub_cycle [--short]          as root, or with CAP_SYS_NICE, for real-time priority
 // Exit code 1: a cycle longer than 2 ms, or a model that did not come into force.
 #include <fmt/format.h>
@@ -28,9 +29,9 @@
 #include "abbe/calib/interpolation_grid.hpp"
 #include "abbe/drivers/real_time_memory.hpp"
 #include "abbe/drivers/status_board.hpp"
+#include "abbe/service/background_tasks.hpp"
 #include "abbe/service/control_api.hpp"
 #include "abbe/service/hub.hpp"
-#include "abbe/service/work_aside.hpp"
 #include "config_tables.hpp"
 #include "figure.hpp"
 #include "synthetic_model.hpp"
@@ -91,8 +92,8 @@ bool real_time(int priority) {
          ::pthread_setschedparam(::pthread_self(), SCHED_FIFO, &parameters) == 0;
 }
 
-/// When no thread could run on the hub's processor. look() and taken_away() run there, too, and look() above
-/// the hub: whoever asks after an interruption finds it written.
+/// When no thread could run on the hub's processor. look() and taken_away() run there, too, and
+/// look() above the hub: whoever asks after an interruption finds it written.
 class Interruptions {
  public:
   void look(const std::atomic<bool>& stop) {
@@ -129,8 +130,8 @@ class Interruptions {
 };
 
 template <class Cycle>
-void run_periodically(const std::atomic<bool>& stop, Longest& longest, const Interruptions& interruptions,
-                      Cycle&& cycle) {
+void run_periodically(const std::atomic<bool>& stop, Longest& longest,
+                      const Interruptions& interruptions, Cycle&& cycle) {
   (void)real_time(kPriority);
   for (auto next = Clock::now(); !stop;) {
     const auto begin = Clock::now();
@@ -138,44 +139,53 @@ void run_periodically(const std::atomic<bool>& stop, Longest& longest, const Int
     cycle(begin);
     const auto end = Clock::now();
     longest.take(nanoseconds{end - begin}.count(),
-                 nanoseconds{end - begin - interruptions.taken_away(begin, end)}.count(), cpu_ns() - cpu);
+                 nanoseconds{end - begin - interruptions.taken_away(begin, end)}.count(),
+                 cpu_ns() - cpu);
     next = std::max(next + kPeriod, Clock::now());
     std::this_thread::sleep_until(next);
   }
 }
 
-/// Rows along X, 25 mm beside each other, in layers; 0.6 mm from vertex to vertex. The digits behind make the
-/// request as long as it may be.
+/// Rows along X, 25 mm beside each other, in layers; 0.6 mm from vertex to vertex. The digits
+/// behind make the request as long as it may be.
 std::vector<std::array<double, 3>> long_path() {
   constexpr std::size_t kInRow = 668, kRows = 17;
   constexpr double kStep_m = 0.6e-3, kRow_m = 25e-3, kLayer_m = 30e-3, kDigit_m = 1e-8;
   std::mt19937 random{14};
   std::uniform_int_distribution<int> digits(0, 99);
-  const auto rounded = [&](double p_m) { return kDigit_m * (std::round(p_m / kDigit_m) + digits(random)); };
+
+  const auto rounded = [&](double p_m) {
+    return kDigit_m * (std::round(p_m / kDigit_m) + digits(random));
+  };
+
   std::vector<std::array<double, 3>> path;
   for (std::size_t row = 0; path.size() < kVertices; ++row) {
     for (std::size_t i = 0; i < kInRow && path.size() < kVertices; ++i) {
       const std::size_t along = row % 2 == 0 ? i : kInRow - 1 - i;
-      const std::size_t layer = row / kRows, beside = layer % 2 == 0 ? row % kRows : kRows - 1 - row % kRows;
+      const std::size_t layer = row / kRows,
+                        beside = layer % 2 == 0 ? row % kRows : kRows - 1 - row % kRows;
       path.push_back({rounded(-0.2 + kStep_m * static_cast<double>(along)),
                       rounded(-0.2 + kRow_m * static_cast<double>(beside)),
                       rounded(-0.38 + kLayer_m * static_cast<double>(layer))});
     }
   }
+
   return path;
 }
 
 /// The largest that can be published: the number of parameters is linear in how fine the nodes are.
 calib::VolumetricModel largest_model(unsigned seed) {
   static const std::size_t finer = [] {
-    const auto parameters = [](double f) { return daemon::test::synthetic_model(1, f).parameters().size(); };
+    const auto parameters = [](double f) {
+      return daemon::test::synthetic_model(1, f).parameters().size();
+    };
     return 1 + (kMostParameters - parameters(1.0)) / (parameters(2.0) - parameters(1.0));
   }();
   return daemon::test::synthetic_model(seed, static_cast<double>(finer));
 }
 
-/// The machine stands at the first vertex for a second, drives three vertices a millisecond, and stands at
-/// the last. Encoders 1 kHz.
+/// The machine stands at the first vertex for a second, drives three vertices a millisecond, and
+/// stands at the last. Encoders 1 kHz.
 class DrivenMachine final : public daemon::SampleSource {
  public:
   DrivenMachine(const drivers::TimeSource& time, std::vector<std::array<double, 3>> path)
@@ -197,6 +207,7 @@ class DrivenMachine final : public daemon::SampleSource {
       burst_.push_back(point);
       batch.encoder_raw.emplace_back().length = 32;
     }
+
     if (burst_.size() < kBurst) return;
     batch.points.insert(batch.points.end(), burst_.begin(), burst_.end());
     burst_.clear();
@@ -254,11 +265,12 @@ class Bench {
   explicit Bench(bool brief) : seconds_(brief ? 1 : 5) {
     std::string name = std::filesystem::temp_directory_path() / "abbe-hub-cycle-XXXXXX";
     folder_ = ::mkdtemp(name.data());
-    daemon::prepare_work_aside();
+    daemon::prepare_background_tasks();
     daemon::RecorderThreadOptions options;
     options.recorder.directory = folder_;
     options.recorder.name = "run";
-    recorder_ = daemon::RecorderThread::start(std::move(options), {"mill", {}, 1.0, "", {}}).value();
+    recorder_ =
+        daemon::RecorderThread::start(std::move(options), {"mill", {}, 1.0, "", {}}).value();
     authority_.emplace(open_models());
     calibration_.emplace(config_, *authority_, recorder_.get(), protocol::UtcOffset{});
     publisher_.emplace(
@@ -276,12 +288,14 @@ class Bench {
     dds_ = std::thread{[this] { swallow(folder_ / "dds.sock"); }};
     hub_thread_ = std::thread{[this] {
       drivers::prepare_heap_of_this_thread();
-      run_periodically(stop_, longest_, interruptions_, [this](auto wall) { hub_->turn(wall); });
+      run_periodically(stop_, longest_, interruptions_, [this](auto wall) { hub_->cycle(wall); });
     }};
-    control_ = daemon::ControlServer::open(folder_ / "control.sock", [this](const json& request,
-                                                                            const daemon::ControlPeer& peer) {
-                 return daemon::answer_request(*hub_, request, peer, 60s);
-               }).value();
+    control_ =
+        daemon::ControlServer::open(folder_ / "control.sock", [this](
+                                                                  const json& request,
+                                                                  const daemon::ControlPeer& peer) {
+          return daemon::answer_request(*hub_, request, peer, 60s);
+        }).value();
     interruptions_thread_ = std::thread{[this] { interruptions_.look(stop_); }};
   }
   Bench(const Bench&) = delete;
@@ -306,10 +320,11 @@ class Bench {
     interruptions_.reset();
     what();
     fmt::print(
-        "{:<24} cycles {:>6}, longest {:7.3f} ms, {:7.3f} ms in wall time, {:7.3f} ms of the processor; "
+        "{:<24} cycles {:>6}, longest {:7.3f} ms, {:7.3f} ms in wall time, {:7.3f} ms of the "
+        "processor; "
         "taken away at most {:7.3f} ms\n",
-        name, longest_.cycles.load(), ms(longest_.cycle_ns), ms(longest_.wall_ns), ms(longest_.cpu_ns),
-        ms(interruptions_.longest_ns()));
+        name, longest_.cycles.load(), ms(longest_.cycle_ns), ms(longest_.wall_ns),
+        ms(longest_.cpu_ns), ms(interruptions_.longest_ns()));
     std::fflush(stdout);
     worst_ns_ = std::max(worst_ns_, longest_.cycle_ns.load());
     worst_wall_ns_ = std::max(worst_wall_ns_, longest_.wall_ns.load());
@@ -334,7 +349,8 @@ class Bench {
   }
   [[nodiscard]] bool is_in_force(const std::string& id) {
     json model;
-    for (const auto end = Clock::now() + 20s; Clock::now() < end; std::this_thread::sleep_for(100ms)) {
+    for (const auto end = Clock::now() + 20s; Clock::now() < end;
+         std::this_thread::sleep_for(100ms)) {
       model = ask({{"do", "status"}})["model"];
       if (model["state"] == "ACTIVE" && model.value("id", "") == id) return true;
     }
@@ -350,7 +366,8 @@ class Bench {
   void drive() {
     machine_.drive();
     json session;
-    for (const auto end = Clock::now() + 60s; Clock::now() < end; std::this_thread::sleep_for(200ms)) {
+    for (const auto end = Clock::now() + 60s; Clock::now() < end;
+         std::this_thread::sleep_for(200ms)) {
       session = ask({{"do", "status"}})["session"];
       if (session["state"] == "acquiring") points_ = session["points"];
       if (session["state"] != "acquiring" && session["state"] != "warming") break;
@@ -360,7 +377,8 @@ class Bench {
       throw std::runtime_error(session.dump());
   }
   void ask_for_status() {
-    for (const auto end = Clock::now() + seconds_ * 1s; Clock::now() < end;) (void)ask({{"do", "status"}});
+    for (const auto end = Clock::now() + seconds_ * 1s; Clock::now() < end;)
+      (void)ask({{"do", "status"}});
   }
   /// Also where the identification has ended by itself.
   void cancel() {
@@ -370,13 +388,17 @@ class Bench {
   [[nodiscard]] bool conclude() const {
     const bool within = worst_ns_ <= nanoseconds{kAsked}.count();
     fmt::print(
-        "{} of 3 models of {} parameters and {} grid nodes came into force; path of {} vertices in {:.2f} "
+        "{} of 3 models of {} parameters and {} grid nodes came into force; path of {} vertices in "
+        "{:.2f} "
         "MB, "
         "{} points matched\n",
-        in_force_, parameters_, nodes_, path_.size(), 1e-6 * static_cast<double>(request_bytes_), points_);
-    tests::print_figure("hub cycle, longest", "2 ms",
-                        "{:.3f} ms; {:.3f} ms in wall time, the processor was taken away for up to {:.3f} ms",
-                        ms(worst_ns_), ms(worst_wall_ns_), ms(worst_interruption_ns_));
+        in_force_, parameters_, nodes_, path_.size(), 1e-6 * static_cast<double>(request_bytes_),
+        points_);
+    tests::print_figure(
+        "hub cycle, longest", "2 ms",
+        "{:.3f} ms; {:.3f} ms in wall time, the processor was taken away for up to {:.3f} ms",
+        ms(worst_ns_), ms(worst_wall_ns_), ms(worst_interruption_ns_));
+
     return within && in_force_ == 3;
   }
 
@@ -419,7 +441,8 @@ int main(int argc, char** argv) {
   const bool brief = argc > 1 && std::string_view{argv[1]} == "--short";
   try {
     drivers::keep_heap();
-    for (const auto& refusal : drivers::lock_memory()) fmt::print("memory is not locked: {}\n", refusal);
+    for (const auto& refusal : drivers::lock_memory())
+      fmt::print("memory is not locked: {}\n", refusal);
     std::thread{[] {
       if (!real_time(kPriority))
         fmt::print("no real-time priority: not allowed; the hub is an ordinary thread\n");

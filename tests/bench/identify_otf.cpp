@@ -1,7 +1,8 @@
-/// Asked: `abbe identify otf` on the 488,664 samples of reference case A from CSV in at most 3 s of wall
-/// time, parsing and process start included. Converts the reference stream (int32 triples range, azimuth,
-/// elevation) to tracker.csv once, runs the built program as a process, and holds the model against the true
-/// tables. Build type Release. ABBE_REF_DIR names the folder of the reference data, default beside the clone.
+/// Asked: `abbe identify otf` on the 488,664 samples of reference case A from CSV in at most 3 s of
+/// wall time, parsing and process start included. Converts the reference stream (int32 triples
+/// range, azimuth, elevation) to tracker.csv once, runs the built program as a process, and holds
+/// the model against the true tables. Build type Release. ABBE_REF_DIR names the folder of the
+/// reference data, default beside the clone.
 
 #include <fmt/format.h>
 
@@ -49,8 +50,8 @@ void convert_stream(const fs::path& stream, const fs::path& csv) {
   std::string text = "time_s,range_mm,azimuth_rad,elevation_rad\n";
   std::array<std::int32_t, 3> counts{};
   for (int i = 0; in.read(reinterpret_cast<char*>(counts.data()), sizeof counts); ++i)
-    fmt::format_to(std::back_inserter(text), "{:.3f},{:.5f},{:.9f},{:.9f}\n", i / 500.0, counts[0] * 1e-5,
-                   counts[1] * 2e-9, counts[2] * 2e-9);
+    fmt::format_to(std::back_inserter(text), "{:.3f},{:.5f},{:.9f},{:.9f}\n", i / 500.0,
+                   counts[0] * 1e-5, counts[1] * 2e-9, counts[2] * 2e-9);
   out << text;
 }
 
@@ -77,7 +78,8 @@ void write_machine(const fs::path& toml) {
 }
 
 /// The true tables as a parameter vector in gauge G1.
-Eigen::VectorXd true_parameters(const calib::ParameterLayout& layout, const calib::Vector3& tool_m) {
+Eigen::VectorXd true_parameters(const calib::ParameterLayout& layout,
+                                const calib::Vector3& tool_m) {
   std::map<std::string, std::vector<double>> tables;
   std::ifstream in(ABBE_TEST_DATA "/otf/caseA_tables.csv");
   for (std::string line; std::getline(in, line);) {
@@ -88,16 +90,19 @@ Eigen::VectorXd true_parameters(const calib::ParameterLayout& layout, const cali
     std::getline(cells, value, ',');
     if (name != "name") tables[name].push_back(std::stod(value));
   }
+
   Eigen::VectorXd U = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(layout.fit_size()));
   for (const auto& table : layout.tables()) {
     const auto& values = tables.at(name(table.motion));
     for (std::size_t i = 0; i < values.size(); ++i)
       U[static_cast<Eigen::Index>(table.offset + i)] = values[i];
   }
+
   const auto squareness = static_cast<Eigen::Index>(layout.squareness_offset());
   U[squareness] = tables.at("A0Z")[0];
   U[squareness + 1] = tables.at("B0Z")[0];
   U[squareness + 2] = tables.at("C0Y")[0];
+
   return calib::to_gauge(calib::Gauge::G1, layout, std::array{tool_m}, U).value();
 }
 
@@ -110,18 +115,22 @@ double print_errors(const fs::path& model_json) {
   const calib::Vector3 tool_m = model.tool_offsets_m().front();
   const auto U = true_parameters(model.layout(), tool_m);
   std::vector<calib::Vector3> points_m, difference_m, true_m;
+
   for (const auto& q_m : calib::tensor_grid(model.layout().nodes())) {
-    true_m.push_back(
-        calib::volumetric_error(model.layout(), {U.data(), model.layout().model_size()}, q_m, tool_m));
+    true_m.push_back(calib::volumetric_error(model.layout(),
+                                             {U.data(), model.layout().model_size()}, q_m, tool_m));
     difference_m.push_back(model.V_at(q_m, tool_m) - true_m.back());
     points_m.push_back(q_m + tool_m);
   }
+
   const auto difference = calib::rigid_free(points_m, difference_m);
   if (!difference) return kNone;
   fmt::print(
-      "  true error {:.1f} um mean; model wrong by {:.4f} um MAE in G1, {:.4f} um after a rigid motion\n",
+      "  true error {:.1f} um mean; model wrong by {:.4f} um MAE in G1, {:.4f} um after a rigid "
+      "motion\n",
       calib::vector_statistics(true_m).mean_m * 1e6, difference->as_stated.mean_m * 1e6,
       difference->rigid_free.mean_m * 1e6);
+
   return difference->as_stated.mean_m;
 }
 
@@ -147,6 +156,7 @@ bool measure(const std::string& kind, double asked_mae_m, const fs::path& folder
     fmt::print("{}: not there, nothing measured (set ABBE_REF_DIR)\n", stream.string());
     return false;
   }
+
   convert_stream(stream, folder / "tracker.csv");
   const auto command =
       fmt::format("'{}' identify otf --machine '{}' --path '{}' --tracker '{}' -o '{}' >/dev/null",
@@ -155,17 +165,21 @@ bool measure(const std::string& kind, double asked_mae_m, const fs::path& folder
   int failed = 0;
   const double whole_s = median_seconds([&] { failed |= std::system(command.c_str()); });
   std::size_t points = 0;
+
   const double parse_s = median_seconds([&] {
     if (const auto tracker = daemon::read_tracker_csv(folder / "tracker.csv"))
       points = tracker->points.size();
   });
+
   fmt::print(
-      "case A {}: {} samples, {:.1f} MB: {:.2f} s wall (asked {:.1f}), of it {:.2f} s reading the tracker\n",
-      kind, points, static_cast<double>(fs::file_size(folder / "tracker.csv")) / 1e6, whole_s, kAskedSeconds,
-      parse_s);
+      "case A {}: {} samples, {:.1f} MB: {:.2f} s wall (asked {:.1f}), of it {:.2f} s reading the "
+      "tracker\n",
+      kind, points, static_cast<double>(fs::file_size(folder / "tracker.csv")) / 1e6, whole_s,
+      kAskedSeconds, parse_s);
   const double mae_m = print_errors(folder / "out" / "model.json");
   fmt::print("  asked at most {:.3f} um MAE in G1: {}\n", asked_mae_m * 1e6,
              mae_m <= asked_mae_m ? "yes" : "no");
+
   return failed == 0 && whole_s <= kAskedSeconds && mae_m <= asked_mae_m;
 }
 

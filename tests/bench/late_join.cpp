@@ -1,5 +1,6 @@
-// How long a Cyclone DDS subscriber that joins late waits for ModelState: from the start of its process to
-// the first state its example prints. Discovery by unicast on loopback, which is the slower way.
+// How long a Cyclone DDS subscriber that joins late waits for ModelState: from the start of its
+// process to the first state its example prints. Discovery by unicast on loopback, which is the
+// slower way.
 //   bench_late_join [--short]
 #include <fcntl.h>
 #include <fmt/format.h>
@@ -39,7 +40,7 @@ class Publisher {
  public:
   explicit Publisher(daemon::DdsLink link) : link_(std::move(link)) {}
 
-  void turn() {
+  void cycle() {
     const auto now = Clock::now();
     link_.poll();
     if (now >= next_state_) {
@@ -50,12 +51,14 @@ class Publisher {
       send(daemon::Topic::ModelState, state);
       next_state_ = now + 1s;
     }
+
     if (now >= next_vector_) {
       v1::Compensation vector;
       vector.machine("bench");
       send(daemon::Topic::Compensation, vector);
       next_vector_ = now + 10ms;
     }
+
     link_.beat(now);
   }
 
@@ -82,7 +85,8 @@ class Subscriber {
     posix_spawn_file_actions_t actions;
     ::posix_spawn_file_actions_init(&actions);
     ::posix_spawn_file_actions_adddup2(&actions, ends[1], STDOUT_FILENO);
-    if (::posix_spawn(&pid_, program.c_str(), &actions, nullptr, argv.data(), environ) != 0) std::abort();
+    if (::posix_spawn(&pid_, program.c_str(), &actions, nullptr, argv.data(), environ) != 0)
+      std::abort();
     ::posix_spawn_file_actions_destroy(&actions);
     ::close(ends[1]);
     output_ = ends[0];
@@ -117,7 +121,7 @@ std::optional<double> join(Publisher& publisher, const std::string& domain) {
   const auto start = Clock::now();
   Subscriber subscriber(domain);
   while (!subscriber.printed("bench: state")) {
-    publisher.turn();
+    publisher.cycle();
     if (Clock::now() - start > kPatience) return std::nullopt;
   }
   return std::chrono::duration<double>(Clock::now() - start).count();
@@ -127,6 +131,7 @@ int measure(Publisher& publisher, const std::string& domain, std::size_t joins) 
   static_cast<void>(join(publisher, domain));  // abbe-dds itself starts meanwhile
   std::vector<double> joined_s;
   std::size_t missed = 0;
+
   for (std::size_t i = 0; i < joins; ++i) {
     if (const auto s = join(publisher, domain)) {
       joined_s.push_back(*s);
@@ -134,18 +139,22 @@ int measure(Publisher& publisher, const std::string& domain, std::size_t joins) 
       ++missed;
     }
   }
+
   if (joined_s.empty()) return 1;
   std::ranges::sort(joined_s);
   const double median_s = joined_s[joined_s.size() / 2], worst_s = joined_s.back();
+
   const auto row = [](const char* what, double asked, double measured) {
     fmt::print("  {:<20} {:>6.3f} s  asked <= {:.1f} s  {}\n", what, measured, asked,
                measured <= asked ? "held" : "MISSED");
   };
-  fmt::print("Cyclone DDS subscribers that join late: {}, of which {} got no state in {} s\n", joins, missed,
-             kPatience.count());
+
+  fmt::print("Cyclone DDS subscribers that join late: {}, of which {} got no state in {} s\n",
+             joins, missed, kPatience.count());
   row("median", kMedian_s, median_s);
   row("95 of 100", kWorst_s, joined_s[joined_s.size() * 95 / 100]);
   row("worst", kWorst_s, worst_s);
+
   return missed == 0 && median_s <= kMedian_s && worst_s <= kWorst_s ? 0 : 1;
 }
 
@@ -159,6 +168,7 @@ int main(int argc, char** argv) {
   const std::filesystem::path socket = std::filesystem::path(name) / "dds.sock";
   const std::string domain = std::to_string(::getpid() % 100 + 1);
   int result = 1;
+
   if (auto link = daemon::DdsLink::listen(socket)) {
     auto dds = daemon::DdsSupervisor::start(
         {.program = ABBE_DDS_PROGRAM,
@@ -167,6 +177,7 @@ int main(int argc, char** argv) {
     Publisher publisher(std::move(*link));
     if (dds) result = measure(publisher, domain, is_short ? 30 : 200);
   }
+
   std::filesystem::remove_all(name);
   return result;
 }

@@ -1,6 +1,6 @@
-// What recording costs per sample, against plain write() of the same bytes, and how many times faster than
-// real time a recording is read back. Ten minutes of a calibration: 2000 axis samples and 500 tracker points
-// a second, raw bytes beside them.
+// What recording costs per sample, against plain write() of the same bytes, and how many times
+// faster than real time a recording is read back. Ten minutes of a calibration: 2000 axis samples
+// and 500 tracker points a second, raw bytes beside them.
 
 #include <fcntl.h>
 #include <fmt/format.h>
@@ -75,15 +75,18 @@ void record_second(daemon::Recorder& recorder, std::uint32_t second, bool raw) {
     axes.position = {1e-6 * i, 0.1, 0.2};
     recorder.record(axes, "encoder");
   }
+
   protocol::TrackerPoint point;
   for (std::uint32_t i = 0; i < kTrackerRate_hz; ++i) {
     point.head.time = time_at(second * kTrackerRate_hz + i, kTrackerRate_hz);
     recorder.record(point, "tracker");
   }
+
   if (!raw) return;
   protocol::RawBlock block;
   block.length = 2048;
   block.bytes = {};
+
   for (std::uint32_t i = 0; i < 12; ++i) {  // a second of 500 points of 36 bytes, and of TPDOs
     block.time = time_at(second * 12 + i, 12);
     recorder.record(protocol::to_raw_bytes(block, "tracker"));
@@ -97,10 +100,12 @@ std::filesystem::path record_all(const std::filesystem::path& folder, bool raw) 
   options.name = "bench";
   auto recorder = daemon::Recorder::open(options, {"M1", {}, 1.0, "", {}}, {});
   if (!recorder) throw std::runtime_error(recorder.error().text);
+
   for (std::uint32_t s = 0; s < kSeconds; ++s) {
     record_second(*recorder, s, raw);
     recorder->tick(daemon::Recorder::WallTime{std::chrono::seconds{s}});
   }
+
   const auto closed = recorder->close();
   if (!closed) throw std::runtime_error(closed.error().text);
   return closed->file;
@@ -122,8 +127,8 @@ void report_reading(std::string_view what, const daemon::RecordingReader& reader
                     const daemon::RecordingSink& sink) {
   std::uint64_t undecodable = 0;
   const Cost cost = median_of_rounds([&] { undecodable += reader.read(sink); });
-  fmt::print("read {:<28} {:>9.3f} s  {:>7.1f} ns/message  {:>8.0f} x real time  {} undecodable\n", what,
-             cost.wall_s, 1e9 * cost.wall_s / static_cast<double>(reader.message_count()),
+  fmt::print("read {:<28} {:>9.3f} s  {:>7.1f} ns/message  {:>8.0f} x real time  {} undecodable\n",
+             what, cost.wall_s, 1e9 * cost.wall_s / static_cast<double>(reader.message_count()),
              kSeconds / cost.wall_s, undecodable);
 }
 
@@ -141,7 +146,8 @@ int main() {
   fmt::print("{} s of acquisition: {} samples, {:.1f} MB with raw bytes\n", kSeconds, kSamples,
              1e-6 * static_cast<double>(bytes));
   fmt::print(
-      "record               {:>8.3f} s CPU  {:>7.1f} ns/sample  {:>6.3f} % of a core at 1x  {:>5.2f} % at "
+      "record               {:>8.3f} s CPU  {:>7.1f} ns/sample  {:>6.3f} % of a core at 1x  "
+      "{:>5.2f} % at "
       "20x\n",
       record.cpu_s, 1e9 * record.cpu_s / kSamples, 100 * record.cpu_s / kSeconds,
       2000 * record.cpu_s / kSeconds);

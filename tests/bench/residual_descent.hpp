@@ -1,7 +1,8 @@
 #pragma once
-/// The peer of bench_sparse_grid: SCAD paths by coordinate descent that keeps the residual up to date, one
-/// path after the other, in plain loops. Same standardisation, warm starts, strong and active sets, stopping
-/// rule and budget as abbe::calib::sparse, so that every sweep count can be compared.
+/// The peer of bench_sparse_grid: SCAD paths by coordinate descent that keeps the residual up to
+/// date, one path after the other, in plain loops. Same standardisation, warm starts, strong and
+/// active sets, stopping rule and budget as abbe::calib::sparse, so that every sweep count can be
+/// compared.
 
 #include <Eigen/Core>
 #include <algorithm>
@@ -25,13 +26,16 @@ class ResidualDescent {
         x_(X.data(), X.data() + X.size()),
         y_(y.begin(), y.end()) {}
 
-  ResidualPath scad(double gamma, const std::vector<double>& lambda, double tolerance, long budget) {
+  ResidualPath scad(double gamma, const std::vector<double>& lambda, double tolerance,
+                    long budget) {
     start(gamma);
     ResidualPath path;
     double before = 0.0;
+
     for (const double z : z_) {
       before = std::max(before, std::abs(z));
     }
+
     long total = 0;
     for (const double l : lambda) {
       if (total == budget) break;
@@ -45,6 +49,7 @@ class ResidualDescent {
       path.b.push_back(b_);
       before = l;
     }
+
     return path;
   }
 

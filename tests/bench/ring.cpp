@@ -1,15 +1,15 @@
-// Question: does the sample ring carry as many samples a second from thread to thread as the better of
-// boost::lockfree::spsc_queue and moodycamel::ReaderWriterQueue? Asked: median ratio >= 0.95 over >= 21
-// rounds. Each round runs all three, in an order that turns round by round, and gives one ratio ours / better
-// peer; of five short runs of each the fastest counts, because a run in which a thread lost its processor
-// says nothing about a ring. Writer: one push per sample, as receive() does, trying again when full (nobody
-// drops, so all carry the same samples). Reader: in batches of 64 where the queue has them (ours, boost), one
-// by one where not (moodycamel). The other lines give each its best: ours and boost also push in batches
-// of 16.
+// Question: does the sample ring carry as many samples a second from thread to thread as the better
+// of boost::lockfree::spsc_queue and moodycamel::ReaderWriterQueue? Asked: median ratio >= 0.95
+// over >= 21 rounds. Each round runs all three, in an order that turns round by round, and gives
+// one ratio ours / better peer; of five short runs of each the fastest counts, because a run in
+// which a thread lost its processor says nothing about a ring. Writer: one push per sample, as
+// receive() does, trying again when full (nobody drops, so all carry the same samples). Reader: in
+// batches of 64 where the queue has them (ours, boost), one by one where not (moodycamel). The
+// other lines give each its best: ours and boost also push in batches of 16.
 //
-// The sample ring is boost's queue behind the rule of the house (drop, count, mark), so against boost the
-// question is what the rule costs: a look at what was lost, a marked copy after each full queue, which this
-// writer meets often.
+// The sample ring is boost's queue behind the rule of the house (drop, count, mark), so against
+// boost the question is what the rule costs: a look at what was lost, a marked copy after each full
+// queue, which this writer meets often.
 //
 //   bench_ring [rounds = 41] [samples per run = 200000]
 
@@ -57,10 +57,10 @@ std::uint32_t number_of(const AxisSample& s) {
   return s.cycle;
 }
 
-/// Which prepared sample is the i-th sent: blocks of kWriteBatch in a scattered order. In steps with the
-/// slots of a queue a source would lie at the same place modulo 4096 as its slot for a whole run, or never,
-/// as the heap happened to be; a load that seems to hit an earlier store waits for it, and the placement, not
-/// the queue, would decide the rate by two.
+/// Which prepared sample is the i-th sent: blocks of kWriteBatch in a scattered order. In steps
+/// with the slots of a queue a source would lie at the same place modulo 4096 as its slot for a
+/// whole run, or never, as the heap happened to be; a load that seems to hit an earlier store waits
+/// for it, and the placement, not the queue, would decide the rate by two.
 std::uint32_t source_of(std::uint32_t i) {
   constexpr std::uint32_t kScatter = 13;  // has no factor in common with the number of blocks
   return (i / kWriteBatch * kScatter * kWriteBatch + i % kWriteBatch) % kPrepared;
@@ -114,7 +114,8 @@ class Patience {
   unsigned turns_ = 0;
 };
 
-/// Numbered samples in memory, as a decoder leaves them: nothing the compiler knows the contents of.
+/// Numbered samples in memory, as a decoder leaves them: nothing the compiler knows the contents
+/// of.
 template <class T>
 const std::vector<T>& prepared() {
   static const std::vector<T> samples = [] {
@@ -147,24 +148,27 @@ void write_batches(Queue& queue, std::uint32_t samples) {
   }
 }
 
-/// Million samples a second, from the first push to the last pop. Ends the program if one is missing or out
-/// of order.
+/// Million samples a second, from the first push to the last pop. Ends the program if one is
+/// missing or out of order.
 template <class T, class Queue>
 double run(bool batches, std::uint32_t samples) {
   auto queue = std::make_unique<Queue>();
   std::atomic<bool> ready{false};
   std::atomic<bool> go{false};
+
   std::thread writer([&] {
     ready = true;
     while (!go) std::this_thread::yield();
     batches ? write_batches<T>(*queue, samples) : write_one_by_one<T>(*queue, samples);
   });
+
   while (!ready) std::this_thread::yield();
   Patience patience;
   const auto begin = std::chrono::steady_clock::now();
   go = true;
   std::array<T, kReadBatch> out{};
   std::uint32_t expected = 0;
+
   while (expected < samples) {
     const std::size_t n = queue->pop(out);
     if (n == 0) patience.wait();
@@ -175,6 +179,7 @@ double run(bool batches, std::uint32_t samples) {
       }
     }
   }
+
   const std::chrono::duration<double> took = std::chrono::steady_clock::now() - begin;
   writer.join();
   return 1e-6 * samples / took.count();
@@ -192,6 +197,7 @@ double compare(const char* what, bool batches, int rounds, std::uint32_t samples
       [&] { return run<T, Boost<T>>(batches, samples); },
       [&] { return run<T, Moodycamel<T>>(batches, samples); },
   };
+
   std::array<std::vector<double>, 3> rates;
   std::vector<double> ratios;
   for (int round = 0; round < rounds; ++round) {
@@ -203,9 +209,12 @@ double compare(const char* what, bool batches, int rounds, std::uint32_t samples
     }
     ratios.push_back(rate[0] / std::max(rate[1], rate[2]));
   }
+
   std::printf(
-      "%-32s %4zu B  ours %7.1f  boost %7.1f  moodycamel %7.1f  M/s  median ratio to the better %.2f\n", what,
-      sizeof(T), median(rates[0]), median(rates[1]), median(rates[2]), median(ratios));
+      "%-32s %4zu B  ours %7.1f  boost %7.1f  moodycamel %7.1f  M/s  median ratio to the better "
+      "%.2f\n",
+      what, sizeof(T), median(rates[0]), median(rates[1]), median(rates[2]), median(ratios));
+
   return median(ratios);
 }
 
@@ -223,12 +232,15 @@ int main(int argc, char** argv) {
   const std::uint32_t samples = wanted - wanted % kWriteBatch;
   const char* const scheduling =
       take_priority() ? "SCHED_FIFO" : "ordinary scheduling: no permission for SCHED_FIFO";
-  std::printf("%d rounds of %u samples, capacity %zu, medians, %s\n", rounds, samples, kCapacity, scheduling);
-  const double point = compare<TrackerPoint>("TrackerPoint, pushed one by one", false, rounds, samples);
+  std::printf("%d rounds of %u samples, capacity %zu, medians, %s\n", rounds, samples, kCapacity,
+              scheduling);
+  const double point =
+      compare<TrackerPoint>("TrackerPoint, pushed one by one", false, rounds, samples);
   const double axes = compare<AxisSample>("AxisSample, pushed one by one", false, rounds, samples);
   compare<TrackerPoint>("TrackerPoint, pushed by 16", true, rounds, samples);
   compare<AxisSample>("AxisSample, pushed by 16", true, rounds, samples);
   const bool good = std::min(point, axes) >= 0.95;
   std::printf("asked >= 0.95 pushed one by one: %s\n", good ? "yes" : "no");
+
   return good ? 0 : 1;
 }

@@ -1,8 +1,8 @@
 #pragma once
-/// A subscriber that notes when each Snapshot reached it, with the same kind of reader as the bare hop: the
-/// stamp is taken in the listener, once the sample is out of the reader. Compensation tells when the hub had
-/// the axes in hand (age_ns counts from host_time_ns to that instant), so no clock is added to what is
-/// measured.
+/// A subscriber that notes when each Snapshot reached it, with the same kind of reader as the bare
+/// hop: the stamp is taken in the listener, once the sample is out of the reader. Compensation
+/// tells when the hub had the axes in hand (age_ns counts from host_time_ns to that instant), so no
+/// clock is added to what is measured.
 
 #include <fastdds/dds/domain/DomainParticipant.hpp>
 #include <fastdds/dds/subscriber/DataReader.hpp>
@@ -56,7 +56,7 @@ struct Arrival {
 };
 
 /// A turn of the hub that published.
-struct HubTurn {
+struct HubCycle {
   std::int64_t host_time_ns = 0;
   std::int64_t hub_ns = 0;
 };
@@ -69,7 +69,7 @@ struct DeviceLatency {
 
 struct SnapshotLog {
   SharedLog<Arrival, 400'000> arrivals;
-  SharedLog<HubTurn, 400'000> turns;
+  SharedLog<HubCycle, 400'000> turns;
   DeviceLatency encoder, tracker;  ///< the latest; read it when the subscriber has ended
   std::atomic<bool> failed{false};
   std::atomic<bool> stop{false};
@@ -94,17 +94,20 @@ class PayloadListener final : public eprosima::fastdds::dds::DataReaderListener 
   dds::Payload payload_;
 };
 
-inline void note_snapshot(SnapshotLog& log, std::span<const std::byte> payload, std::int64_t arrived_ns) {
+inline void note_snapshot(SnapshotLog& log, std::span<const std::byte> payload,
+                          std::int64_t arrived_ns) {
   const auto snapshot = daemon::decode<v1::Snapshot>(payload);
   if (!snapshot) return;
   log.arrivals.add({snapshot->host_time_ns(),
-                    snapshot->has_tracker_point() ? snapshot->tracker_device_time_ns() : 0, arrived_ns});
+                    snapshot->has_tracker_point() ? snapshot->tracker_device_time_ns() : 0,
+                    arrived_ns});
 }
 
 inline void note_turn(SnapshotLog& log, std::span<const std::byte> payload) {
   const auto compensation = daemon::decode<v1::Compensation>(payload);
   if (!compensation) return;
-  log.turns.add({compensation->host_time_ns(), compensation->host_time_ns() + compensation->age_ns()});
+  log.turns.add(
+      {compensation->host_time_ns(), compensation->host_time_ns() + compensation->age_ns()});
 }
 
 inline void note_health(SnapshotLog& log, std::span<const std::byte> payload) {
@@ -118,17 +121,22 @@ inline void note_health(SnapshotLog& log, std::span<const std::byte> payload) {
 /// Until log.stop.
 inline void subscribe(SnapshotLog& log, const dds::ParticipantOptions& options) {
   using daemon::Topic;
-  PayloadListener on_snapshot([&](const auto& bytes, std::int64_t at) { note_snapshot(log, bytes, at); });
+  PayloadListener on_snapshot(
+      [&](const auto& bytes, std::int64_t at) { note_snapshot(log, bytes, at); });
   PayloadListener on_turn([&](const auto& bytes, std::int64_t) { note_turn(log, bytes); });
   PayloadListener on_health([&](const auto& bytes, std::int64_t) { note_health(log, bytes); });
   auto participant = dds::Participant::create(options);
   auto* subscriber =
-      participant ? participant->get().create_subscriber(eprosima::fastdds::dds::SUBSCRIBER_QOS_DEFAULT)
-                  : nullptr;
+      participant
+          ? participant->get().create_subscriber(eprosima::fastdds::dds::SUBSCRIBER_QOS_DEFAULT)
+          : nullptr;
+
   const auto listen = [&](Topic topic, eprosima::fastdds::dds::DataReaderListener& listener) {
     const auto created = participant->topic(topic);
-    return created && subscriber->create_datareader(*created, dds::reader_qos(topic), &listener) != nullptr;
+    return created &&
+           subscriber->create_datareader(*created, dds::reader_qos(topic), &listener) != nullptr;
   };
+
   log.failed = subscriber == nullptr || !listen(Topic::Snapshot, on_snapshot) ||
                !listen(Topic::Compensation, on_turn) || !listen(Topic::Health, on_health);
   while (!log.failed && !log.stop) std::this_thread::sleep_for(std::chrono::milliseconds{5});

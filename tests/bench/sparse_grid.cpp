@@ -1,8 +1,9 @@
-/// Asked: the grid of 50 gammas x 100 lambdas with 10-fold cross-validation on the 216 x 45 problem of a ball
-/// array (50,000 held-out fits and 5,000 of all rows), against coordinate descent in residual form with the
-/// same semantics in the same run, one thread each: >= 35 x; our two threads against its one: >= 65 x. The
-/// peer runs the whole grid once, or with --short both sides only every tenth gamma. Every sweep count of all
-/// rows' paths and every cell is compared with the peer's and with ncvreg's.
+/// Asked: the grid of 50 gammas x 100 lambdas with 10-fold cross-validation on the 216 x 45 problem
+/// of a ball array (50,000 held-out fits and 5,000 of all rows), against coordinate descent in
+/// residual form with the same semantics in the same run, one thread each: >= 35 x; our two threads
+/// against its one: >= 65 x. The peer runs the whole grid once, or with --short both sides only
+/// every tenth gamma. Every sweep count of all rows' paths and every cell is compared with the
+/// peer's and with ncvreg's.
 
 #include <fmt/format.h>
 
@@ -72,7 +73,8 @@ Case read_case(bool every_tenth_gamma) {
   const std::filesystem::path folder = ABBE_TEST_DATA "/evemu";
   const auto problem = tests::sparse::ball_array_problem(folder);
   const auto grid = tests::sparse::reference_grid(folder, "ncvreg_default");
-  Case c{problem.X, problem.y, tests::sparse::reference_folds(folder, "fold216.csv"), grid.options, {}, {}};
+  Case c{problem.X,    problem.y, tests::sparse::reference_folds(folder, "fold216.csv"),
+         grid.options, {},        {}};
   const Eigen::Index step = every_tenth_gamma ? 10 : 1;
   c.ncvreg = grid.error(Eigen::all, Eigen::seq(0, grid.error.cols() - 1, step));
   for (std::size_t g = 0; g < grid.gamma.size(); g += static_cast<std::size_t>(step)) {
@@ -92,14 +94,17 @@ void hold_out(const Case& c, const Standardised& all, int fold, Eigen::MatrixXd&
   for (std::size_t i = 0; i < c.folds.of_row.size(); ++i) {
     (c.folds.of_row[i] == fold ? test : train).push_back(static_cast<Eigen::Index>(i));
   }
+
   const Standardised design = standardise(all.X(train, Eigen::all)).value();
   const Eigen::VectorXd y = c.y(train);
   const Eigen::MatrixXd X_test = (all.X(test, design.kept).rowwise() - design.mean.transpose()) *
                                  design.scale.cwiseInverse().asDiagonal();
   const Eigen::VectorXd y_test = c.y(test).array() - y.mean();
   bench::ResidualDescent descent(design.X, y.array() - y.mean());
+
   for (std::size_t g = 0; g < c.gamma.size(); ++g) {
-    const auto path = descent.scad(c.gamma[g], c.options.lambda, c.options.tolerance, c.options.max_sweeps);
+    const auto path =
+        descent.scad(c.gamma[g], c.options.lambda, c.options.tolerance, c.options.max_sweeps);
     auto column = error.col(static_cast<Eigen::Index>(g));
     for (std::size_t l = 0; l < path.b.size(); ++l) {
       const auto b = Eigen::VectorXd::Map(path.b[l].data(), X_test.cols());
@@ -115,14 +120,17 @@ PeerResult run_peer(const Case& c) {
   for (int fold = 0; fold < c.folds.count; ++fold) {
     hold_out(c, all, fold, out.error);
   }
+
   out.error /= static_cast<double>(c.y.size());
   bench::ResidualDescent descent(all.X, c.y.array() - c.y.mean());
   for (std::size_t g = 0; g < c.gamma.size(); ++g) {
     out.sweeps.push_back(
-        descent.scad(c.gamma[g], c.options.lambda, c.options.tolerance, c.options.max_sweeps).sweeps);
+        descent.scad(c.gamma[g], c.options.lambda, c.options.tolerance, c.options.max_sweeps)
+            .sweeps);
     const auto missing = out.error.rows() - static_cast<Eigen::Index>(out.sweeps[g].size());
     out.error.col(static_cast<Eigen::Index>(g)).tail(missing).setConstant(std::nan(""));
   }
+
   return out;
 }
 
@@ -143,8 +151,9 @@ Agreement compare(const Eigen::MatrixXd& ours, const Eigen::MatrixXd& theirs) {
 }
 
 void print(std::string_view peer, const Agreement& a) {
-  fmt::print("  against {}: {} cells, largest difference of a CV error {:.1e}, missing in one only {}\n",
-             peer, a.cells, a.largest, a.missing_differs);
+  fmt::print(
+      "  against {}: {} cells, largest difference of a CV error {:.1e}, missing in one only {}\n",
+      peer, a.cells, a.largest, a.missing_differs);
 }
 
 std::size_t differing_paths(const GridSearch& ours, const PeerResult& peer) {
@@ -161,7 +170,8 @@ int main(int argc, char** argv) {
   const bool few = argc > 1 && std::string_view(argv[1]) == "--short";
   const Case c = read_case(few);
   const auto run = [&](const ParallelFor& parallel_for) {
-    return grid_search(c.X, c.y, PenaltyKind::Scad, c.gamma, c.folds, c.options, parallel_for).value();
+    return grid_search(c.X, c.y, PenaltyKind::Scad, c.gamma, c.folds, c.options, parallel_for)
+        .value();
   };
   const GridSearch ours = run(serial_for);
   const double one_s = median_seconds([&] { run(serial_for); });
@@ -169,23 +179,27 @@ int main(int argc, char** argv) {
   PeerResult peer;
   const double peer_s = seconds_of([&] { peer = run_peer(c); });
 
-  fmt::print("SCAD, {} gammas x {} lambdas, {} folds, 216 x 45, {:.1f} million sweeps, {} registers{}\n",
-             c.gamma.size(), c.options.lambda.size(), c.folds.count, static_cast<double>(ours.sweeps) * 1e-6,
-             sweep_variants().front().instructions,
-             few ? " (--short: both sides every tenth gamma only)" : "");
+  fmt::print(
+      "SCAD, {} gammas x {} lambdas, {} folds, 216 x 45, {:.1f} million sweeps, {} registers{}\n",
+      c.gamma.size(), c.options.lambda.size(), c.folds.count,
+      static_cast<double>(ours.sweeps) * 1e-6, sweep_variants().front().instructions,
+      few ? " (--short: both sides every tenth gamma only)" : "");
   fmt::print("  residual form, one thread    {:8.3f} s\n", peer_s);
-  fmt::print("  abbe, one thread             {:8.3f} s  {:6.1f} x  (asked {:.0f})\n", one_s, peer_s / one_s,
-             kAskedOneThread);
-  fmt::print("  abbe, two threads            {:8.3f} s  {:6.1f} x  (asked {:.0f}, whole grid)\n", two_s,
-             peer_s / two_s, kAskedTwoThreads);
-  const Agreement with_peer = compare(ours.error, peer.error), with_ncvreg = compare(ours.error, c.ncvreg);
+  fmt::print("  abbe, one thread             {:8.3f} s  {:6.1f} x  (asked {:.0f})\n", one_s,
+             peer_s / one_s, kAskedOneThread);
+  fmt::print("  abbe, two threads            {:8.3f} s  {:6.1f} x  (asked {:.0f}, whole grid)\n",
+             two_s, peer_s / two_s, kAskedTwoThreads);
+  const Agreement with_peer = compare(ours.error, peer.error),
+                  with_ncvreg = compare(ours.error, c.ncvreg);
   print("the residual form", with_peer);
   print("ncvreg 3.16", with_ncvreg);
   const std::size_t differing = differing_paths(ours, peer);
-  fmt::print("  paths of all rows whose sweep counts differ from the residual form: {} of {}\n", differing,
-             ours.paths.size());
-  const bool agrees = differing == 0 && with_peer.missing_differs + with_ncvreg.missing_differs == 0 &&
+  fmt::print("  paths of all rows whose sweep counts differ from the residual form: {} of {}\n",
+             differing, ours.paths.size());
+  const bool agrees = differing == 0 &&
+                      with_peer.missing_differs + with_ncvreg.missing_differs == 0 &&
                       with_peer.largest <= 1e-10 && with_ncvreg.largest <= 1e-10;
-  const bool fast = few || (peer_s / one_s >= kAskedOneThread && peer_s / two_s >= kAskedTwoThreads);
+  const bool fast =
+      few || (peer_s / one_s >= kAskedOneThread && peer_s / two_s >= kAskedTwoThreads);
   return agrees && fast ? 0 : 1;
 }

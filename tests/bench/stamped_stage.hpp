@@ -1,8 +1,9 @@
 #pragma once
-/// The simulated devices at real speed, which note when the last TPDO of a cycle and the last byte of a burst
-/// left. Both leave as their wires carry them: three TPDOs one after the other at 1 Mbit/s, a burst by
-/// Ethernet segments at 100 Mbit/s. What leaves is made before; the stamps are taken just before and after
-/// the last of it is sent, so that this system call itself counts against abbe.
+/// The simulated devices at real speed, which note when the last TPDO of a cycle and the last byte
+/// of a burst left. Both leave as their wires carry them: three TPDOs one after the other at 1
+/// Mbit/s, a burst by Ethernet segments at 100 Mbit/s. What leaves is made before; the stamps are
+/// taken just before and after the last of it is sent, so that this system call itself counts
+/// against abbe.
 
 #include <poll.h>
 
@@ -28,19 +29,23 @@ struct Departure {
 class StampedStage {
  public:
   [[nodiscard]] static sim::Result<std::unique_ptr<StampedStage>> open() {
-    auto path = sim::PathMotion::plan({.vertices = {{}}});  // the machine stands: nothing here depends on it
+    // the machine stands: nothing here depends on it
+    auto path = sim::PathMotion::plan({.vertices = {{}}});
     if (!path) return tl::unexpected(path.error());
     std::unique_ptr<StampedStage> stage(new StampedStage(std::move(*path)));
     const auto now = stage->clock_.now();
     auto tracker = sim::TrackerServer::open(
         0, std::make_unique<sim::TrackerDevice>(
-               sim::TrackerOptions{.initialize_time = std::chrono::milliseconds{100}}, stage->machine_, now));
+               sim::TrackerOptions{.initialize_time = std::chrono::milliseconds{100}},
+               stage->machine_, now));
     if (!tracker) return tl::unexpected(tracker.error());
     stage->tracker_ = std::make_unique<sim::TrackerServer>(std::move(*tracker));
     const std::array<sim::EncoderNodeOptions, kNodes> nodes{{{.node = 1, .axis = sim::Axis::X},
                                                              {.node = 2, .axis = sim::Axis::Y},
                                                              {.node = 3, .axis = sim::Axis::Z}}};
-    // Without .speed a SYNC is dated by when it is read, and its answers leave at the times said here.
+
+    // Without .speed a SYNC is dated by when it is read, and its answers leave at the times said
+    // here.
     auto bus = sim::EncoderBus::open({}, nodes, stage->machine_, now);
     if (!bus) return tl::unexpected(bus.error());
     stage->bus_ = std::make_unique<sim::EncoderBus>(std::move(*bus));
@@ -48,6 +53,7 @@ class StampedStage {
     for (auto& node : stage->bus_->nodes())
       node.delay_until(sim::HostTime::max(), on_the_bus += kTpdoOnTheBus);
     stage->tracker_->send_per_poll(kSegmentBytes);
+
     return stage;
   }
 
@@ -61,7 +67,7 @@ class StampedStage {
   }
 
   /// Waits until something is to do, and does it.
-  void turn() {
+  void cycle() {
     std::vector<pollfd> fds{{bus_->fd(), POLLIN, 0}, {tracker_->listener_fd(), POLLIN, 0}};
     if (tracker_->client_fd() >= 0) fds.push_back({tracker_->client_fd(), POLLIN, 0});
     const auto tracker_due = tracker_->wants_write() ? segment_due_ : tracker_->next_due();
@@ -70,25 +76,26 @@ class StampedStage {
         std::clamp<std::chrono::nanoseconds>(due - clock_.now(), {}, std::chrono::milliseconds{50});
     const timespec timeout{0, wait.count()};
     ::ppoll(fds.data(), fds.size(), &timeout, nullptr);
-    turn_bus((fds[0].revents & POLLIN) != 0);
-    turn_tracker();
+    cycle_bus((fds[0].revents & POLLIN) != 0);
+    cycle_tracker();
   }
 
  private:
   explicit StampedStage(sim::PathMotion path) : machine_({}, std::move(path)) {}
 
   static constexpr std::size_t kNodes = 3;
-  // At 1 Mbit/s: a frame without data takes 44 bits, one with a position of 4 bytes 76; 3 more until the
-  // next, and at most 8 and 16 of stuffing.
+  // At 1 Mbit/s: a frame without data takes 44 bits, one with a position of 4 bytes 76; 3 more
+  // until the next, and at most 8 and 16 of stuffing.
   static constexpr std::chrono::microseconds kSyncOnTheBus{55};
   static constexpr std::chrono::microseconds kTpdoOnTheBus{95};
   // At 100 Mbit/s a segment of an ordinary Ethernet takes, with its heads, 1538 bytes' time.
   static constexpr std::size_t kSegmentBytes = 1448;
   static constexpr std::chrono::microseconds kSegmentOnTheWire{123};
 
-  /// The poll that sends the last answer to a SYNC is stamped. It was a SYNC that came if then an answer is
-  /// due when the first TPDO is. So is node 1's answer to its configuration: forget() before measuring.
-  void turn_bus(bool asked) {
+  /// The poll that sends the last answer to a SYNC is stamped. It was a SYNC that came if then an
+  /// answer is due when the first TPDO is. So is node 1's answer to its configuration: forget()
+  /// before measuring.
+  void cycle_bus(bool asked) {
     const auto now = clock_.now();
     const std::int64_t before_ns = monotonic_ns();
     bus_->poll(now);
@@ -100,9 +107,9 @@ class StampedStage {
       last_answer_due_ = now + kSyncOnTheBus + kNodes * kTpdoOnTheBus;
   }
 
-  /// The points are made first: what leaves afterwards is only the sending. The poll after which nothing is
-  /// left of a burst is stamped.
-  void turn_tracker() {
+  /// The points are made first: what leaves afterwards is only the sending. The poll after which
+  /// nothing is left of a burst is stamped.
+  void cycle_tracker() {
     const auto now = clock_.now();
     if (tracker_->wants_write() && now < segment_due_) return;
     const auto sent = tracker_->device().points_sent();

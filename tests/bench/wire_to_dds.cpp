@@ -1,11 +1,11 @@
-// From the wire to DDS: how long after the last TPDO of a cycle, or the last byte of a burst, left the
-// simulated device a subscriber in another process has the sample, through abbed and abbe-dds as they are
-// installed, against a bare Fast DDS hop of the same rhythm that goes on beside it all the while, half a
-// cycle away, when abbe has nothing to do but to look every P: a shared machine wakes a sleeping process
-// within 30 us in one minute and within 200 us in the next. The hop alone, before, is told, too. The hub
-// looks every P, so a sample waits P/2 in the mean and P at most before anything can happen to it. What else
-// runs on the machine shows in the tails of both: `nice -n -20 bench_wire_to_dds` lets the whole chain and
-// the bare hop alike go before it.
+// From the wire to DDS: how long after the last TPDO of a cycle, or the last byte of a burst, left
+// the simulated device a subscriber in another process has the sample, through abbed and abbe-dds
+// as they are installed, against a bare Fast DDS hop of the same rhythm that goes on beside it all
+// the while, half a cycle away, when abbe has nothing to do but to look every P: a shared machine
+// wakes a sleeping process within 30 us in one minute and within 200 us in the next. The hop alone,
+// before, is told, too. The hub looks every P, so a sample waits P/2 in the mean and P at most
+// before anything can happen to it. What else runs on the machine shows in the tails of both:
+// `nice -n -20 bench_wire_to_dds` lets the whole chain and the bare hop alike go before it.
 //   bench_wire_to_dds [--short]
 #include <fcntl.h>
 #include <fmt/format.h>
@@ -44,8 +44,8 @@ namespace config_tables = abbe::config_tables;
 namespace fs = std::filesystem;
 
 constexpr auto kHubPeriod = 250us;
-// 100 Hz: the processors stay idle between two cycles. No multiple of P: both run on one clock, and a sample
-// would wait for the hub equally long in every cycle.
+// 100 Hz: the processors stay idle between two cycles. No multiple of P: both run on one clock, and
+// a sample would wait for the hub equally long in every cycle.
 constexpr auto kSyncPeriod = 10'007us;
 constexpr std::int64_t kHalfPeriod_ns = std::chrono::nanoseconds{kSyncPeriod}.count() / 2;
 constexpr double kHops = 3.0;  // the limits: P/2 + 3 hops in the middle, P + 3 hops in 99 of 100
@@ -85,10 +85,10 @@ struct Path {
 // matching departures and arrivals
 
 /// The publishing turn of the hub that an arrival belongs to: the last one before it.
-const HubTurn* turn_of(const SnapshotLog& log, std::int64_t arrived_ns, std::int64_t left_ns) {
-  const HubTurn* found = nullptr;
+const HubCycle* turn_of(const SnapshotLog& log, std::int64_t arrived_ns, std::int64_t left_ns) {
+  const HubCycle* found = nullptr;
   for (std::size_t i = 0; i < log.turns.size(); ++i) {
-    const HubTurn& turn = log.turns[i];
+    const HubCycle& turn = log.turns[i];
     if (turn.hub_ns <= arrived_ns && turn.hub_ns >= left_ns &&
         (found == nullptr || turn.hub_ns > found->hub_ns))
       found = &turn;
@@ -100,7 +100,7 @@ void note(Path& path, const SnapshotLog& log, const Departure& departure, std::i
   if (arrived_ns < departure.before_ns) ++path.impossible;
   path.sending.push_back(us(departure.after_ns - departure.before_ns));
   path.whole.push_back(us(arrived_ns - departure.before_ns));
-  if (const HubTurn* turn = turn_of(log, arrived_ns, departure.before_ns)) {
+  if (const HubCycle* turn = turn_of(log, arrived_ns, departure.before_ns)) {
     path.to_hub.push_back(us(turn->hub_ns - departure.before_ns));
     path.hub_to_subscriber.push_back(us(arrived_ns - turn->hub_ns));
   }
@@ -111,18 +111,21 @@ Path encoder_path(const SnapshotLog& log, const std::vector<Departure>& cycles) 
   Path path;
   std::size_t i = 0;
   for (const Departure& cycle : cycles) {
-    while (i < log.arrivals.size() && log.arrivals[i].host_time_ns < cycle.before_ns - kHalfPeriod_ns) ++i;
+    while (i < log.arrivals.size() &&
+           log.arrivals[i].host_time_ns < cycle.before_ns - kHalfPeriod_ns)
+      ++i;
     if (i == log.arrivals.size() || log.arrivals[i].host_time_ns > cycle.after_ns) {
       ++path.lost;
     } else {
       note(path, log, cycle, log.arrivals[i].arrived_ns);
     }
   }
+
   return path;
 }
 
-/// A burst has arrived with the first snapshot that shows its last point: the newest seen before the next
-/// burst left.
+/// A burst has arrived with the first snapshot that shows its last point: the newest seen before
+/// the next burst left.
 Path tracker_path(const SnapshotLog& log, const std::vector<Departure>& bursts) {
   Path path;
   std::size_t i = 0;
@@ -132,9 +135,11 @@ Path tracker_path(const SnapshotLog& log, const std::vector<Departure>& bursts) 
     for (; i < log.arrivals.size() && log.arrivals[i].arrived_ns < burst.before_ns; ++i)
       before = log.arrivals[i].tracker_device_time_ns;
     for (std::size_t k = i;
-         k < log.arrivals.size() && log.arrivals[k].arrived_ns < burst.before_ns + kLongest_ns; ++k) {
+         k < log.arrivals.size() && log.arrivals[k].arrived_ns < burst.before_ns + kLongest_ns;
+         ++k) {
       const Arrival& arrival = log.arrivals[k];
-      if (arrival.tracker_device_time_ns > (last != nullptr ? last->tracker_device_time_ns : before))
+      if (arrival.tracker_device_time_ns >
+          (last != nullptr ? last->tracker_device_time_ns : before))
         last = &arrival;
     }
     if (last == nullptr) {
@@ -143,6 +148,7 @@ Path tracker_path(const SnapshotLog& log, const std::vector<Departure>& bursts) 
       note(path, log, burst, last->arrived_ns);
     }
   }
+
   return path;
 }
 
@@ -178,10 +184,12 @@ std::string configuration(const StampedStage& stage, std::uint32_t domain) {
                                        .z = {-400, 0},
                                        .target_offset_mm = {{20, -15, -120}},
                                        .node_spacing_mm = 50};
+
   return to_toml(machine) + to_toml(config_tables::Tracker{.port = stage.tracker_port()}) +
-         to_toml(config_tables::Encoder{.peer_port = stage.can_port(),
-                                        .sync_period_us = std::chrono::microseconds{kSyncPeriod}.count(),
-                                        .step_nm = 10}) +
+         to_toml(config_tables::Encoder{
+             .peer_port = stage.can_port(),
+             .sync_period_us = std::chrono::microseconds{kSyncPeriod}.count(),
+             .step_nm = 10}) +
          std::string{config_tables::kDaemonInItsFolder} +
          fmt::format("hub_period_us = {}\n[recording]\nmin_free_MB = 16\n",
                      std::chrono::microseconds{kHubPeriod}.count()) +
@@ -206,7 +214,9 @@ class Daemon {
     ::posix_spawnattr_setschedpolicy(&ordinary, SCHED_OTHER);
     ::posix_spawnattr_setschedparam(&ordinary, &none);
     ::posix_spawnattr_setflags(&ordinary, POSIX_SPAWN_SETSCHEDULER);
-    if (::posix_spawn(&pid_, program.c_str(), &actions, &ordinary, argv.data(), environ) != 0) pid_ = 0;
+
+    if (::posix_spawn(&pid_, program.c_str(), &actions, &ordinary, argv.data(), environ) != 0)
+      pid_ = 0;
     ::posix_spawnattr_destroy(&ordinary);
     ::posix_spawn_file_actions_destroy(&actions);
   }
@@ -227,11 +237,12 @@ class Daemon {
 // ----------------------------------------------------------------------------------------------------
 // the run
 
-bool turn_until(StampedStage& stage, std::chrono::seconds patience, const std::function<bool()>& done) {
+bool cycle_until(StampedStage& stage, std::chrono::seconds patience,
+                 const std::function<bool()>& done) {
   const auto deadline = std::chrono::steady_clock::now() + patience;
   while (!done()) {
     if (std::chrono::steady_clock::now() > deadline) return false;
-    stage.turn();
+    stage.cycle();
   }
   return true;
 }
@@ -249,32 +260,35 @@ bool run_chain(StampedStage& stage, SnapshotLog& log, ForkedTask& subscriber,
   std::ofstream(folder.path() / "abbed.toml") << configuration(stage, domain);
   subscriber.begin();
   Daemon daemon(folder.path());
-  if (!turn_until(stage, 60s, [&] { return log.failed || both_flow(log); }) || log.failed) {
-    fmt::print(stderr, "bench_wire_to_dds: no samples from both devices; see {}\n", folder.path().string());
+  if (!cycle_until(stage, 60s, [&] { return log.failed || both_flow(log); }) || log.failed) {
+    fmt::print(stderr, "bench_wire_to_dds: no samples from both devices; see {}\n",
+               folder.path().string());
     folder.keep();
     return false;
   }
   stage.forget();
-  turn_until(stage, 5s, [&] { return !stage.cycles().empty(); });
+  cycle_until(stage, 5s, [&] { return !stage.cycles().empty(); });
   if (!stage.cycles().empty()) begin_hop(stage.cycles().back().before_ns + kHalfPeriod_ns);
   const auto settled = std::chrono::steady_clock::now() + 3s;  // the clock model, caches, discovery
-  turn_until(stage, 10s, [&] { return std::chrono::steady_clock::now() > settled; });
+  cycle_until(stage, 10s, [&] { return std::chrono::steady_clock::now() > settled; });
   stage.forget();
   const auto enough = [&] {
     return stage.cycles().size() >= plan.cycles && stage.bursts().size() >= plan.bursts;
   };
-  const bool complete = turn_until(stage, 120s, enough);
+  const bool complete = cycle_until(stage, 120s, enough);
   const Departure last = stage.cycles().empty() ? Departure{} : stage.cycles().back();
   const auto cycles = stage.cycles().size(), bursts = stage.bursts().size();
-  turn_until(stage, 2s, [&] { return monotonic_ns() > last.after_ns + kLongest_ns; });
-  if (!complete) fmt::print(stderr, "bench_wire_to_dds: only {} cycles and {} bursts\n", cycles, bursts);
+  cycle_until(stage, 2s, [&] { return monotonic_ns() > last.after_ns + kLongest_ns; });
+  if (!complete)
+    fmt::print(stderr, "bench_wire_to_dds: only {} cycles and {} bursts\n", cycles, bursts);
   daemon.stop();
   log.stop = true;
   subscriber.wait();
   return complete;
 }
 
-/// A device does not wait for a processor: its simulator goes before everything measured. False: refused.
+/// A device does not wait for a processor: its simulator goes before everything measured. False:
+/// refused.
 bool stand_for_hardware() {
   ::prctl(PR_SET_TIMERSLACK, 1UL);
   const sched_param first{.sched_priority = 80};
@@ -286,8 +300,8 @@ std::string load_average() {
   return ::getloadavg(load.data(), 1) == 1 ? fmt::format("{:.2f}", load[0]) : "unknown";
 }
 
-/// How much of the machine nobody uses, from one call to the next. With nothing left, the p99 is the slice
-/// some other program was given by the scheduler (about 3 ms), not abbe's.
+/// How much of the machine nobody uses, from one call to the next. With nothing left, the p99 is
+/// the slice some other program was given by the scheduler (about 3 ms), not abbe's.
 class IdleShare {
  public:
   IdleShare() { read(); }
@@ -314,22 +328,28 @@ class IdleShare {
 };
 
 /// True: both limits were held, those by the hop beside.
-bool print_verdict(std::string_view what, const Path& path, const HopResult& hop, const HopResult& alone) {
+bool print_verdict(std::string_view what, const Path& path, const HopResult& hop,
+                   const HopResult& alone) {
   const double P = us(std::chrono::nanoseconds{kHubPeriod}.count());
   const Quantiles q = quantiles(path.whole);
   const double asked50 = P / 2 + kHops * hop.p50_us;
   const double asked99 = P + kHops * hop.p99_us;
   const double strict99 = P + kHops * hop.p50_us;
+
   const auto row = [&](std::string_view name, double asked, double measured) {
     fmt::print("  {:<8} {:<30} {:>8.1f} {:>9.1f}   {:>5.2f}  {}\n", what, name, asked, measured,
                measured / asked, measured <= asked ? "held" : "MISSED");
   };
+
   row("p50 <= P/2 + 3 hop p50", asked50, q.p50);
   row("p99 <= P + 3 hop p99", asked99, q.p99);
   row("p99 <= P + 3 hop p50 (stricter)", strict99, q.p99);
   row("p50, by the hop alone before", P / 2 + kHops * alone.p50_us, q.p50);
-  if (path.lost > 0) fmt::print("  {:<8} {} of {} without an arrival\n", what, path.lost, path.lost + q.n);
-  if (path.impossible > 0) fmt::print("  {:<8} {} arrived before they left\n", what, path.impossible);
+  if (path.lost > 0)
+    fmt::print("  {:<8} {} of {} without an arrival\n", what, path.lost, path.lost + q.n);
+  if (path.impossible > 0)
+    fmt::print("  {:<8} {} arrived before they left\n", what, path.impossible);
+
   return path.impossible == 0 && q.n > 0 && q.p50 <= asked50 && q.p99 <= asked99;
 }
 
@@ -338,9 +358,12 @@ void print_shares(std::string_view what, const Path& path, const DeviceLatency& 
   const double P = us(std::chrono::nanoseconds{kHubPeriod}.count());
   const Quantiles sending = quantiles(path.sending), to_hub = quantiles(path.to_hub),
                   out = quantiles(path.hub_to_subscriber);
-  const auto row = [&](std::string_view share, std::string p50, std::string p99, std::string_view how) {
+
+  const auto row = [&](std::string_view share, std::string p50, std::string p99,
+                       std::string_view how) {
     fmt::print("  {:<8} {:<36} {:>7} {:>8}   {}\n", what, share, p50, p99, how);
   };
+
   const auto number = [](double v) { return fmt::format("{:.1f}", v); };
   row("leaving the simulator to the hub", number(to_hub.p50), number(to_hub.p99), "measured");
   row("  bytes to ring, real-time part", number(1e6 * device.p50_s), number(1e6 * device.p99_s),
@@ -405,16 +428,19 @@ int main(int argc, char** argv) {
   const Path encoder = encoder_path(log, (*stage)->cycles());
   const Path tracker = tracker_path(log, (*stage)->bursts());
   fmt::print(
-      "wire to DDS: hub period P {} us, SYNC every {} us, {} cycles, {} bursts of 166 points; load {} "
+      "wire to DDS: hub period P {} us, SYNC every {} us, {} cycles, {} bursts of 166 points; load "
+      "{} "
       "before, {} after, processors {:.0f} % idle meanwhile\n",
       kHubPeriod.count(), std::chrono::microseconds{kSyncPeriod}.count(), encoder.whole.size(),
       tracker.whole.size(), load_before, load_average(), idle_percent);
   fmt::print(
-      "bare Fast DDS hop, {} B every {} us, us: p50 {:.1f} p99 {:.1f} beside, p50 {:.1f} p99 {:.1f} alone "
+      "bare Fast DDS hop, {} B every {} us, us: p50 {:.1f} p99 {:.1f} beside, p50 {:.1f} p99 "
+      "{:.1f} alone "
       "before\n\n",
-      hop::kMessageBytes, std::chrono::microseconds{kSyncPeriod}.count(), beside.p50_us, beside.p99_us,
-      alone.p50_us, alone.p99_us);
-  fmt::print("  {:<8} {:<30} {:>8} {:>9}   {:>5}\n", "device", "limit, us", "asked", "measured", "ratio");
+      hop::kMessageBytes, std::chrono::microseconds{kSyncPeriod}.count(), beside.p50_us,
+      beside.p99_us, alone.p50_us, alone.p99_us);
+  fmt::print("  {:<8} {:<30} {:>8} {:>9}   {:>5}\n", "device", "limit, us", "asked", "measured",
+             "ratio");
   const bool encoder_held = print_verdict("encoder", encoder, beside, alone);
   const bool tracker_held = print_verdict("tracker", tracker, beside, alone);
   fmt::print("\n  {:<8} {:<36} {:>7} {:>8}\n", "device", "share, us", "p50", "p99");

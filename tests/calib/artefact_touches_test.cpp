@@ -46,7 +46,8 @@ double distance_to_way(const Vector3& p, const Vector3& a, const Vector3& b) {
 
 TEST(ArtefactTouches, TouchesEveryFeatureAsOftenAsAsked) {
   std::map<std::pair<Feature, int>, int> count;
-  for (const auto& t : plan({.points_per_ball = 9, .points_per_face = 5})) ++count[{t.feature, t.number}];
+  for (const auto& t : plan({.points_per_ball = 9, .points_per_face = 5}))
+    ++count[{t.feature, t.number}];
   for (int ball = 1; ball <= 5; ++ball) EXPECT_EQ((count[{Feature::Ball, ball}]), 9);
   for (int block = 1; block <= 2; ++block) EXPECT_EQ((count[{Feature::Block, block}]), 5);
 }
@@ -114,7 +115,8 @@ TEST(ArtefactTouches, EndsAboveEverything) {
 TEST(ArtefactTouches, RefusesATipWithABallAboveIt) {
   const auto under = plan_artefact_touches(array(), kFaces, {0.085, 0.0, -0.06}, {});
   ASSERT_FALSE(under);
-  EXPECT_NE(under.error().text.find("ball 2 is above the tip"), std::string::npos) << under.error().text;
+  EXPECT_NE(under.error().text.find("ball 2 is above the tip"), std::string::npos)
+      << under.error().text;
   // As after a touch on its upper half that was the last one.
   EXPECT_TRUE(plan_artefact_touches(array(), kFaces, {0.08 + 14.3e-3, 0.0, 2e-3}, {}));
 }
@@ -149,7 +151,8 @@ TEST(ArtefactTouches, TheMeasuredArtefactGrowsAsTheNominalOne) {
 }
 
 TEST(ArtefactTouches, MovedTouchesGiveTheArtefactThere) {
-  const RigidTransform T{Eigen::AngleAxisd(0.3, Vector3::UnitZ()).toRotationMatrix(), {0.5, 0.4, 0.1}};
+  const RigidTransform T{Eigen::AngleAxisd(0.3, Vector3::UnitZ()).toRotationMatrix(),
+                         {0.5, 0.4, 0.1}};
   const auto there = moved(array(), T);
   std::array<FaceToTouch, 2> faces = kFaces;
   for (auto& face : faces) face.centre_m = T * face.centre_m;
@@ -162,11 +165,13 @@ TEST(ArtefactTouches, MovedTouchesGiveTheArtefactThere) {
     touches.push_back({1, t.feature, t.number, t.at_m + noise(random) * t.normal});
   const auto found = calibrated_artefact(there, faces, touches, 0.3e-6);
   ASSERT_TRUE(found) << found.error().text;
+
   for (std::size_t i = 0; i < found->balls.size(); ++i) {
     EXPECT_LT((found->balls[i].centre_m - there.balls[i].centre_m).norm(), 4 * found->balls[i].u_m);
     EXPECT_GE(found->balls[i].u_m, 0.3e-6);
     EXPECT_LT(found->balls[i].u_m, 0.6e-6);
   }
+
   EXPECT_LT((found->blocks[1].normal - there.blocks[1].normal).norm(), 4 * found->blocks[1].u_rad);
 }
 

@@ -31,8 +31,12 @@ double most(double low, double high, const std::function<double(double)>& off) {
 }
 
 TEST(Elementary, SineAndCosineAreWithinAUnitOfTheLastPlace) {
-  EXPECT_LT(most(-0.78, 0.78, [](double x) { return units_off(sin_cos(x).sin, std::sin(1.0L * x)); }), 0.9);
-  EXPECT_LT(most(-0.78, 0.78, [](double x) { return units_off(sin_cos(x).cos, std::cos(1.0L * x)); }), 0.9);
+  EXPECT_LT(
+      most(-0.78, 0.78, [](double x) { return units_off(sin_cos(x).sin, std::sin(1.0L * x)); }),
+      0.9);
+  EXPECT_LT(
+      most(-0.78, 0.78, [](double x) { return units_off(sin_cos(x).cos, std::cos(1.0L * x)); }),
+      0.9);
 }
 
 /// Beyond one quarter the argument is reduced; near the zeros the error counts in units of 1.
@@ -64,8 +68,11 @@ TEST(Elementary, SineOfZeroKeepsItAndBeyondTheRangeThereIsNone) {
 }
 
 TEST(Elementary, TheExponentialIsWithinAUnitOfTheLastPlace) {
-  EXPECT_LT(most(-700.0, 700.0, [](double x) { return units_off(exponential(x), std::exp(1.0L * x)); }), 1.0);
-  EXPECT_LT(most(-1.0, 1.0, [](double x) { return units_off(exponential(x), std::exp(1.0L * x)); }), 1.0);
+  EXPECT_LT(
+      most(-700.0, 700.0, [](double x) { return units_off(exponential(x), std::exp(1.0L * x)); }),
+      1.0);
+  EXPECT_LT(most(-1.0, 1.0, [](double x) { return units_off(exponential(x), std::exp(1.0L * x)); }),
+            1.0);
 }
 
 TEST(Elementary, TheExponentialEndsInZeroAndInfinity) {
@@ -99,12 +106,14 @@ TEST(NormalDeviates, HaveTheMomentsOfTheNormalDistribution) {
   constexpr double n = 1e6;
   NormalDeviates normal(3);
   double sum[5] = {}, product = 0.0, before = 0.0;
+
   for (int i = 0; i < 1'000'000; ++i) {
     const double z = normal.next();
     for (int k = 1; k <= 4; ++k) sum[k] += power(z, k);
     product += z * before;
     before = z;
   }
+
   EXPECT_NEAR(sum[1] / n, 0.0, 5 * std::sqrt(1 / n));
   EXPECT_NEAR(sum[2] / n, 1.0, 5 * std::sqrt(2 / n));
   EXPECT_NEAR(sum[3] / n, 0.0, 5 * std::sqrt(15 / n));

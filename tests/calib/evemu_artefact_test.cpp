@@ -27,7 +27,8 @@ Observations seen_with(const Calibrator& c, const ObserveOptions& options = {}) 
 }
 
 /// V with another calibrator minus V with this one, through everything observe() does.
-Eigen::VectorXd change_m(const Calibrator& c, const Calibrator& other, const ObserveOptions& options) {
+Eigen::VectorXd change_m(const Calibrator& c, const Calibrator& other,
+                         const ObserveOptions& options) {
   return observed_m(seen_with(other, options)) - observed_m(seen_with(c, options));
 }
 
@@ -39,16 +40,21 @@ struct ArtefactRows : testing::Test {
     for (auto& ball : calibrator.balls) {
       ball.centre_m = turn * ball.centre_m + Vector3(0.1, 0.2, 0.3);
     }
+
     for (auto& block : calibrator.blocks) {
       block.normal = turn * block.normal;
     }
+
     options.max_block_tilt_rad = 0.5;
     o = seen_with(calibrator, options);
-    frame = uniform_frame(Vector3::Zero(), calibrator.blocks[0].normal, calibrator.blocks[1].normal)->R;
+    frame =
+        uniform_frame(Vector3::Zero(), calibrator.blocks[0].normal, calibrator.blocks[1].normal)->R;
   }
   void expect_column(Eigen::Index column, const Calibrator& disturbed) const {
     // First order: what it leaves out is below (5 urad)^2 over 0.7 m, 2e-11 m.
-    EXPECT_LT((artefact_rows(o).col(column) - change_m(calibrator, disturbed, options)).cwiseAbs().maxCoeff(),
+    EXPECT_LT((artefact_rows(o).col(column) - change_m(calibrator, disturbed, options))
+                  .cwiseAbs()
+                  .maxCoeff(),
               1e-10)
         << column;
     EXPECT_GT(artefact_rows(o).col(column).norm(), kBall_m) << column;
@@ -104,7 +110,8 @@ TEST_F(ArtefactRows, HaveNoColumnForWhatIsExact) {
 Eigen::VectorXd variances_m2(const ScaledDesign& design, const Eigen::MatrixXd& covariance_m2) {
   Eigen::VectorXd v(9);
   Eigen::Index i = 0;
-  for (const Vector3& q : {Vector3(0.1, 0.2, 0.04), Vector3(0.5, 0.1, 0.05), Vector3(0.3, 0.15, 0.04)}) {
+  for (const Vector3& q :
+       {Vector3(0.1, 0.2, 0.04), Vector3(0.5, 0.1, 0.05), Vector3(0.3, 0.15, 0.04)}) {
     const Eigen::Matrix3Xd B = design.B(q);
     v.segment<3>(i) = (B * covariance_m2 * B.transpose()).diagonal();
     i += 3;
@@ -117,7 +124,8 @@ constexpr int kDraws = 2000;
 constexpr double kBound = 0.13;
 
 /// Covariance of G y over calibrators drawn, G: estimator and gauge in one.
-Eigen::MatrixXd over_calibrators_m2(const Observations& o, const Calibrator& c, const Eigen::MatrixXd& G) {
+Eigen::MatrixXd over_calibrators_m2(const Observations& o, const Calibrator& c,
+                                    const Eigen::MatrixXd& G) {
   std::mt19937_64 random(5);
   const Eigen::VectorXd y = errors_with_m(o, c);
   Eigen::MatrixXd off(G.rows(), kDraws);
@@ -174,8 +182,12 @@ TEST(EvemuArtefact, AddsToBayesWhatDrawnCalibratorsScatter) {
   const Observations o = seen_with(c);
   const Solution with = *solve(o), without = *solve(without_artefact(o));
   const ScaledDesign design = *design_of(o);
+
   // b = V Z^T (Z V Z^T + s^2)^-1 y, in one piece.
-  const auto white = [&](const Eigen::MatrixXd& rows) { return observed_rows(o, whitened(o, rows)); };
+  const auto white = [&](const Eigen::MatrixXd& rows) {
+    return observed_rows(o, whitened(o, rows));
+  };
+
   const Eigen::MatrixXd X = white(relative_rows(o, design, RowsFrom::Touches)),
                         S = white(pose_rotation_rows(o));
   Eigen::MatrixXd Z(X.rows(), X.cols() + S.cols());
@@ -184,15 +196,19 @@ TEST(EvemuArtefact, AddsToBayesWhatDrawnCalibratorsScatter) {
   const Eigen::VectorXd prior = prior_variances(PriorKind::BayesPose, design, o.positions(), h);
   Eigen::MatrixXd C = Z * prior.asDiagonal() * Z.transpose();
   C.diagonal().array() += h.s_m * h.s_m;
-  const Eigen::MatrixXd rows = white(Eigen::MatrixXd::Identity(static_cast<Eigen::Index>(3 * o.rows.size()),
-                                                               static_cast<Eigen::Index>(3 * o.rows.size())));
-  const Eigen::MatrixXd K = (prior.asDiagonal() * Z.transpose() * C.ldlt().solve(rows)).topRows(X.cols());
+  const Eigen::MatrixXd rows = white(Eigen::MatrixXd::Identity(
+      static_cast<Eigen::Index>(3 * o.rows.size()), static_cast<Eigen::Index>(3 * o.rows.size())));
+  const Eigen::MatrixXd K =
+      (prior.asDiagonal() * Z.transpose() * C.ldlt().solve(rows)).topRows(X.cols());
   Eigen::Matrix3Xd mean = Eigen::Matrix3Xd::Zero(3, X.cols());
+
   for (const SeenArtefact& seen : o.seen) {
     mean += block_rotation(seen, design) / static_cast<double>(o.seen.size());
   }
-  const Eigen::MatrixXd T = zero_at(design, o.ball1_m) * (Eigen::MatrixXd::Identity(X.cols(), X.cols()) -
-                                                          design.rotation_about(o.ball1_m) * mean);
+
+  const Eigen::MatrixXd T =
+      zero_at(design, o.ball1_m) *
+      (Eigen::MatrixXd::Identity(X.cols(), X.cols()) - design.rotation_about(o.ball1_m) * mean);
   expect_the_same_variances(with, without, over_calibrators_m2(o, c, T * K));
 }
 
@@ -207,7 +223,8 @@ SolveOptions few_runs(Estimator estimator) {
 TEST(EvemuArtefact, ChangesNoBitOfTheCovarianceWhenItIsExact) {
   const Observations o = seen_with(reference_calibrator());
   ASSERT_TRUE(o.artefact);
-  for (const Estimator e : {Estimator::Ols, Estimator::Ridge, Estimator::BayesPose, Estimator::Scad}) {
+  for (const Estimator e :
+       {Estimator::Ols, Estimator::Ridge, Estimator::BayesPose, Estimator::Scad}) {
     EXPECT_EQ(solve(o, few_runs(e))->model.covariance(),
               solve(without_artefact(o), few_runs(e))->model.covariance())
         << name(e);
@@ -221,22 +238,28 @@ TEST(EvemuArtefact, IsInTheBootstrapOfSparseEstimators) {
   lasso.sparse.bootstrap_runs = 100;
   const SolveOptions ols{.estimator = Estimator::Ols};
   const Layout layout = reference_layout();
+
   // Far above the noise, which is drawn anew with it.
   const Calibrator c = stated(reference_calibrator(), 20 * kBall_m, kBlock_rad);
   const Observations o = with_array(simulated(layout, table3_machine(), {3e-6, 0.0}, 1), layout, c,
                                     uncertainty_of(c, std::nullopt));
   const Solution with = *solve(o, lasso), without = *solve(without_artefact(o), lasso);
   EXPECT_EQ(with.raw_c_m, without.raw_c_m);
+
   const auto added_m2 = [](const Solution& a, const Solution& b) {
     const auto &x = *a.model.polynomials(), &y = *b.model.polynomials();
     return variances_m2(x.design(), x.covariance_m2() - y.covariance_m2()).sum();
   };
-  // A variance of a hundred runs scatters by sqrt(2 / 99) = 14 %, a sum of nine by no more; three times that.
-  const double ratio = added_m2(with, without) / added_m2(*solve(o, ols), *solve(without_artefact(o), ols));
+
+  // A variance of a hundred runs scatters by sqrt(2 / 99) = 14 %, a sum of nine by no more; three
+  // times that.
+  const double ratio =
+      added_m2(with, without) / added_m2(*solve(o, ols), *solve(without_artefact(o), ols));
   EXPECT_NEAR(ratio, 1.0, 0.43);
 }
 
-/// 95 % intervals of V over seeds, with noise and an array drawn anew for each, after a rotation reference.
+/// 95 % intervals of V over seeds, with noise and an array drawn anew for each, after a rotation
+/// reference.
 double share_covered(bool stated_too) {
   const Field V = table3_machine();
   const Layout layout = reference_layout();
@@ -244,9 +267,11 @@ double share_covered(bool stated_too) {
   const Expansion half_a_kelvin{kSteel_per_K, 0.0, kReferenceTemperature_K, 0.5};
   ArtefactUncertainty u = uncertainty_of(c, half_a_kelvin);
   const double u_scale = u.u_scale();
+
   if (!stated_too) {
     u = uncertainty_of(reference_calibrator(), std::nullopt);
   }
+
   std::mt19937_64 random(9);
   std::size_t in = 0, asked = 0;
   for (unsigned seed = 1; seed <= 60; ++seed) {
@@ -255,18 +280,22 @@ double share_covered(bool stated_too) {
     const Solution s = *solve(o, {.estimator = Estimator::Ols});
     std::vector<BallError> points;
     std::normal_distribution<double> noise(0.0, 3e-6);
+
     for (const std::size_t i : {3u, 17u, 25u, 32u, 47u, 62u}) {
       const Vector3& q = o.rows[i].reading_m;
       const double x = noise(random), y = noise(random), z = noise(random);
       points.push_back({1, 1, q, V(q) + Vector3(x, y, z)});
     }
+
     const auto turned = with_rotation_reference(s, {points, 3e-6});
     if (!turned) {
       EXPECT_FALSE(stated_too) << turned.error().text;
       continue;
     }
+
     const Vector3 at_ball1 = V(o.ball1_m);
-    for (const Vector3& q : {Vector3(0.1, 0.2, 0.04), Vector3(0.5, 0.1, 0.05), Vector3(0.3, 0.15, 0.04)}) {
+    for (const Vector3& q :
+         {Vector3(0.1, 0.2, 0.04), Vector3(0.5, 0.1, 0.05), Vector3(0.3, 0.15, 0.04)}) {
       const VolumetricError e = turned->model.error_at(q, Vector3::Zero());
       const Vector3 off = V(q) - at_ball1 - e.V_m;
       for (Eigen::Index k = 0; k < 3; ++k, ++asked) {
@@ -274,13 +303,14 @@ double share_covered(bool stated_too) {
       }
     }
   }
+
   return static_cast<double>(in) / static_cast<double>(asked);
 }
 
 TEST(EvemuArtefact, IsCoveredByTheStatedUncertaintyThroughARotationReference) {
-  // 95 % of 540 answers scatter by 0.9 % if they are independent, by 2.8 % if the nine of a seed are one, and
-  // what the array leaves in the residuals counts twice. Below 85 %: the errors scatter by 1.36 times of
-  // what is stated, or more.
+  // 95 % of 540 answers scatter by 0.9 % if they are independent, by 2.8 % if the nine of a seed
+  // are one, and what the array leaves in the residuals counts twice. Below 85 %: the errors
+  // scatter by 1.36 times of what is stated, or more.
   const double with = share_covered(true), without = share_covered(false);
   EXPECT_GT(with, 0.91);
   EXPECT_LT(without, 0.85);
@@ -293,31 +323,37 @@ TEST(ArtefactTemperature, MakesAWarmArrayWhatItIsAtTheMachine) {
   const double factor = 1.0 + 4.0 * kSteel_per_K;
   Calibrator at_20_C = warm;
   at_20_C.expansivity = {{kSteel_per_K, 1e-6}};
+
   for (auto& ball : at_20_C.balls) {
     ball.centre_m = warm.balls[0].centre_m + (ball.centre_m - warm.balls[0].centre_m) / factor;
     ball.radius_m /= factor;
   }
+
   ObserveOptions options;
   options.artefact_temperature = {kReferenceTemperature_K + 4.0, 0.2};
   const Observations o = seen_with(at_20_C, options);
   EXPECT_LT((observed_m(o) - observed_m(seen_with(warm))).cwiseAbs().maxCoeff(), 1e-14);
-  EXPECT_NEAR(growth(*o.artefact->expansion), factor, 1e-12);
+  EXPECT_NEAR(expansion_factor(*o.artefact->expansion), factor, 1e-12);
   Calibrator unknown = at_20_C;
   unknown.expansivity.reset();
+
   // 12 um per metre and K over the 0.68 m to the last ball.
-  EXPECT_NEAR((observed_m(seen_with(unknown)) - observed_m(o)).tail<3>().norm(), 4 * kSteel_per_K * 0.6786,
-              1e-8);
+  EXPECT_NEAR((observed_m(seen_with(unknown)) - observed_m(o)).tail<3>().norm(),
+              4 * kSteel_per_K * 0.6786, 1e-8);
 }
 
 TEST(ArtefactTemperature, IsRefusedAloneAndAskedForWhereTheArrayGrows) {
   const auto refusal = [](const Calibrator& c, const ObserveOptions& options) {
-    const auto o = observe(reference_touches("touched_sig3um.csv"), c, reference_machine(), options);
+    const auto o =
+        observe(reference_touches("touched_sig3um.csv"), c, reference_machine(), options);
     return o ? Error{ErrorCode::NotApplicable, "accepted"} : o.error();
   };
+
   Calibrator grows = reference_calibrator();
   grows.expansivity = {{kSteel_per_K, 1e-6}};
   ObserveOptions warm;
   warm.artefact_temperature = {295.0, 0.2};
+
   EXPECT_THAT(refusal(grows, {}).text, HasSubstr("nothing says how warm it was"));
   EXPECT_THAT(refusal(reference_calibrator(), warm).text, HasSubstr("does not say how it grows"));
   EXPECT_EQ(refusal(grows, {}).code, ErrorCode::BadInput);
@@ -335,6 +371,7 @@ TEST(EvemuJudge, SaysWhatItTakesTheArrayFor) {
   EXPECT_THAT(notes_on(*observe_errors(reference_errors(), reference_machine())),
               Contains("the artefact's own uncertainty and temperature are not in the covariance"));
   const auto exact = notes_on(seen_with(reference_calibrator()));
+
   EXPECT_THAT(exact, Contains(HasSubstr("counts as exact")));
   EXPECT_THAT(exact, Contains("the array counts as at 20 C"));
   const auto cold = notes_on(seen_with(stated(reference_calibrator(), kBall_m, kBlock_rad)));

@@ -1,5 +1,5 @@
-/// The reference touches of the whole artefact, shown to the guide one by one in its order, and what it says
-/// when something goes wrong.
+/// The reference touches of the whole artefact, shown to the guide one by one in its order, and
+/// what it says when something goes wrong.
 #include "abbe/calib/evemu/touch_guide.hpp"
 
 #include <gmock/gmock.h>
@@ -29,7 +29,8 @@ class Toucher {
       points_[{t.position, t.feature, t.number}].push_back(t.p_m);
   }
 
-  [[nodiscard]] const std::vector<Vector3>& points(int position, Feature feature, int number) const {
+  [[nodiscard]] const std::vector<Vector3>& points(int position, Feature feature,
+                                                   int number) const {
     return points_.at({position, feature, number});
   }
   GuidedTouch touch(const Vector3& p_m) {
@@ -80,9 +81,11 @@ TEST(TouchGuide, HandsOverWhatTheTouchesWereMadeOn) {
   Toucher t = toucher();
   for (const int position : TouchPlan{}.positions) t.touch_position(position);
   const auto run = t.guide_.touches();
-  const auto guided = observe(run, tests::evemu::reference_calibrator(), tests::evemu::reference_machine());
-  const auto reference = observe(tests::evemu::reference_touches("touched_noiseless.csv"),
-                                 tests::evemu::reference_calibrator(), tests::evemu::reference_machine());
+  const auto guided =
+      observe(run, tests::evemu::reference_calibrator(), tests::evemu::reference_machine());
+  const auto reference =
+      observe(tests::evemu::reference_touches("touched_noiseless.csv"),
+              tests::evemu::reference_calibrator(), tests::evemu::reference_machine());
   ASSERT_TRUE(guided && reference);
   ASSERT_EQ(guided->rows.size(), reference->rows.size());
   for (std::size_t i = 0; i < guided->rows.size(); ++i)
@@ -92,7 +95,8 @@ TEST(TouchGuide, HandsOverWhatTheTouchesWereMadeOn) {
 TEST(TouchGuide, SaysBallOneThenTheBlocksThenTheOtherBalls) {
   Toucher t = toucher();
   std::vector<std::string> order{name(t.guide_.next().on)};
-  const std::vector<TouchedFeature> touched{{Feature::Ball, 1}, {Feature::Block, 1}, {Feature::Block, 2}};
+  const std::vector<TouchedFeature> touched{
+      {Feature::Ball, 1}, {Feature::Block, 1}, {Feature::Block, 2}};
   for (const auto& [feature, number] : touched) {
     t.touch_all(4, feature, number);
     order.push_back(name(t.guide_.next().on));
@@ -129,7 +133,8 @@ TEST(TouchGuide, AMissedTouchIsSaidWhenTheNextBallBeginsAndNothingIsLost) {
   t.touch_all(4, Feature::Block, 2);
   t.touch_all(4, Feature::Ball, 2, 24);
   t.touch_position(4, 3);
-  EXPECT_THAT(t.notes_, testing::ElementsAre(HasSubstr("ball 2 has 24 of 25 points, the rest was missed")));
+  EXPECT_THAT(t.notes_,
+              testing::ElementsAre(HasSubstr("ball 2 has 24 of 25 points, the rest was missed")));
   EXPECT_EQ(t.guide_.next().position, 8);
   EXPECT_EQ(t.guide_.taken(), 11u * 25u - 1u);
 }
@@ -140,7 +145,8 @@ TEST(TouchGuide, ABallLeftOutIsAskedForAtTheEndOfThePosition) {
   t.touch_all(4, Feature::Block, 1);
   t.touch_all(4, Feature::Block, 2);
   t.touch_position(4, 3);
-  EXPECT_THAT(t.notes_, testing::ElementsAre(HasSubstr("ball 2 was left out; it is asked for again")));
+  EXPECT_THAT(t.notes_,
+              testing::ElementsAre(HasSubstr("ball 2 was left out; it is asked for again")));
   EXPECT_EQ(t.guide_.next().position, 4);
   EXPECT_EQ(name(t.guide_.next().on), "ball 2");
   t.touch_all(4, Feature::Ball, 2);
@@ -170,11 +176,13 @@ TEST(TouchGuide, ATouchFarFromAnyBallIsSaidWithTheNearestAndTheExpected) {
   EXPECT_EQ(t.guide_.next().position, 8);
 }
 
-/// Where a ball would be if block 2 looked to its other side: touches cannot tell before a ball was touched.
+/// Where a ball would be if block 2 looked to its other side: touches cannot tell before a ball was
+/// touched.
 Vector3 mirrored_centre(const Toucher& t, int position, int ball) {
   const Vector3 ball1 = fit::fit_sphere(t.points(position, Feature::Ball, 1))->centre;
   const Vector3 centre = fit::fit_sphere(t.points(position, Feature::Ball, ball))->centre;
-  const Vector3 n1 = fit::fit_plane(t.points(position, Feature::Block, 1), Vector3::UnitZ())->normal;
+  const Vector3 n1 =
+      fit::fit_plane(t.points(position, Feature::Block, 1), Vector3::UnitZ())->normal;
   return ball1 + Eigen::AngleAxisd(std::numbers::pi, n1) * (centre - ball1);
 }
 
@@ -224,6 +232,7 @@ TEST(TouchGuide, FacesSetAsideWhenSomebodyWentOnAreTouchedAgain) {
   Toucher t = toucher();
   t.touch_all(4, Feature::Ball, 1);
   t.touch_all(4, Feature::Block, 1);
+
   // Leans towards block 1: Ball2 is where it was, the angle between the faces is not.
   const auto& face = t.points(4, Feature::Block, 2);
   const Vector3 n1 = fit::fit_plane(t.points(4, Feature::Block, 1), Vector3::UnitZ())->normal;
@@ -266,7 +275,8 @@ TEST(TouchGuide, ACalibratorWithOtherBallsIsRefusedAtTheFirst) {
   Toucher t = toucher(other);
   t.touch_all(4, Feature::Ball, 1);
   ASSERT_TRUE(t.guide_.failure());
-  EXPECT_THAT(t.guide_.failure()->text, HasSubstr("calibrator file of another artefact, or another tip"));
+  EXPECT_THAT(t.guide_.failure()->text,
+              HasSubstr("calibrator file of another artefact, or another tip"));
 }
 
 TEST(TouchGuide, ACalibratorWithBallsElsewhereIsRefusedWhenTouchesGoAstray) {
@@ -279,7 +289,8 @@ TEST(TouchGuide, ACalibratorWithBallsElsewhereIsRefusedWhenTouchesGoAstray) {
 }
 
 TEST(TouchGuide, RefusesAPlanWithAPositionTwice) {
-  const auto guide = TouchGuide::create(tests::evemu::reference_calibrator(), {.positions = {1, 2, 2}});
+  const auto guide =
+      TouchGuide::create(tests::evemu::reference_calibrator(), {.positions = {1, 2, 2}});
   ASSERT_FALSE(guide);
   EXPECT_THAT(guide.error().text, HasSubstr("each once"));
 }

@@ -64,6 +64,7 @@ TEST(EvemuInput, NamesABallTouchedUnderTwoNumbers) {
     });
     touches.insert(touches.end(), again.begin(), again.end());
   });
+
   EXPECT_EQ(e.code, ErrorCode::BadInput);
   EXPECT_THAT(e.text, HasSubstr("position 2: one ball was touched twice, as ball 4 and as ball 5"));
 }
@@ -110,10 +111,11 @@ TEST(EvemuInput, NamesAFalseTouchAmongFewByTheRadiusOfTheBall) {
       if (there && ++touch == 13) t.p_m.y() += 1.6e-3;
     }
   });
+
   EXPECT_EQ(e.code, ErrorCode::BadInput);
-  EXPECT_THAT(e.text,
-              AllOf(HasSubstr("position 2: ball 6 has radius"),
-                    HasSubstr("without touch 13 of 13 it comes nearer"), HasSubstr("a false trigger")));
+  EXPECT_THAT(e.text, AllOf(HasSubstr("position 2: ball 6 has radius"),
+                            HasSubstr("without touch 13 of 13 it comes nearer"),
+                            HasSubstr("a false trigger")));
 }
 
 TEST(EvemuInput, NamesTheCalibratorOfAnotherArtefact) {
@@ -153,6 +155,7 @@ TEST(EvemuInput, NamesAFalseTrigger) {
     Vector3& p_m = of_ball.at(6)->p_m;
     p_m += 0.5e-3 * (p_m - sum / 25.0).normalized();
   });
+
   EXPECT_EQ(on_ball.code, ErrorCode::BadInput);
   EXPECT_THAT(on_ball.text, HasSubstr("position 3: ball 4: touch 7 of 25 lies"));
   const Error on_block = refusal([](Touches& touches, Calibrator&) {
@@ -163,6 +166,7 @@ TEST(EvemuInput, NamesAFalseTrigger) {
       }
     }
   });
+
   EXPECT_THAT(on_block.text, HasSubstr("position 5: block 2: touch 3 of 25 lies"));
 }
 
@@ -172,6 +176,7 @@ TEST(EvemuInput, NamesMirroredAndSwappedAxes) {
       t.p_m.x() = -t.p_m.x();
     }
   });
+
   EXPECT_EQ(mirrored.code, ErrorCode::BadInput);
   EXPECT_THAT(mirrored.text, HasSubstr("an axis is mirrored"));
   const Error swapped = refusal([](Touches& touches, Calibrator&) {
@@ -179,6 +184,7 @@ TEST(EvemuInput, NamesMirroredAndSwappedAxes) {
       std::swap(t.p_m.x(), t.p_m.y());
     }
   });
+
   EXPECT_THAT(swapped.text, HasSubstr("two axes are swapped"));
 }
 
@@ -195,6 +201,7 @@ TEST(EvemuInput, NamesAPositionTouchedTwice) {
     std::erase_if(touches, [](const Touch& t) { return t.position == 7; });
     touches.insert(touches.end(), again.begin(), again.end());
   });
+
   EXPECT_EQ(e.code, ErrorCode::BadInput);
   EXPECT_THAT(e.text, HasSubstr("the artefact stands as at position 3"));
 }
@@ -210,9 +217,11 @@ TEST(EvemuInput, NamesCoplanarPositions) {
       // About the artefact's own normal: all balls stay in its plane.
       const Vector3 normal = Vector3(-0.05012844983, 0.05514618827, 0.99721915166).normalized();
       touches[i].position = position;
-      touches[i].p_m = ball1 + Eigen::AngleAxisd(0.03 * position, normal) * (touches[i].p_m - ball1);
+      touches[i].p_m =
+          ball1 + Eigen::AngleAxisd(0.03 * position, normal) * (touches[i].p_m - ball1);
     }
   });
+
   EXPECT_EQ(e.code, ErrorCode::DegenerateGeometry);
   EXPECT_THAT(e.text, HasSubstr("coplanar"));
 }
@@ -283,23 +292,26 @@ TEST(EvemuInput, TakesErrorsThatWereComputedElsewhere) {
               HasSubstr("position 2: Ball1 was left out"));
 }
 
-/// Five touches of every ball, four of every block, in the calibrator's own axes; ball 5 is out of the plane
-/// of the others: without it a mirror image is the array turned over.
+/// Five touches of every ball, four of every block, in the calibrator's own axes; ball 5 is out of
+/// the plane of the others: without it a mirror image is the array turned over.
 std::string seen_through(const Matrix3& M) {
   Calibrator c = reference_calibrator();
   c.balls[4].centre_m.z() += 0.020;
   std::vector<Touch> touches;
+
   for (const auto& ball : c.balls) {
-    for (const Vector3& d :
-         {Vector3(0, 0, 1), Vector3(1, 0, 0), Vector3(0, 1, 0), Vector3(-1, 0, 0), Vector3(0, -1, 0)})
-      touches.push_back(
-          {1, Feature::Ball, ball.number, M * (ball.centre_m + (ball.radius_m + c.tip_radius_m) * d)});
+    for (const Vector3& d : {Vector3(0, 0, 1), Vector3(1, 0, 0), Vector3(0, 1, 0),
+                             Vector3(-1, 0, 0), Vector3(0, -1, 0)})
+      touches.push_back({1, Feature::Ball, ball.number,
+                         M * (ball.centre_m + (ball.radius_m + c.tip_radius_m) * d)});
   }
+
   for (const auto& block : c.blocks) {
     const Vector3 a = block.normal.unitOrthogonal(), b = block.normal.cross(a);
     for (const auto& [i, j] : {std::pair(-1, -1), {1, -1}, {-1, 1}, {1, 1}})
       touches.push_back({1, Feature::Block, block.number, M * (0.02 * i * a + 0.02 * j * b)});
   }
+
   const auto seen = see_artefact(1, touches, c);
   return seen ? "accepted" : seen.error().text;
 }
@@ -323,9 +335,12 @@ std::string refusal_of_errors(const Matrix3& L) {
 TEST(EvemuInput, NamesWhatWasDoneToErrors) {
   EXPECT_EQ(refusal_of_errors(Matrix3::Identity()), "accepted");
   EXPECT_THAT(refusal_of_errors(-Matrix3::Identity()), HasSubstr("with all signs reversed"));
-  EXPECT_THAT(refusal_of_errors(1e-3 * Matrix3::Identity()), HasSubstr("with errors in mm where um belong"));
-  EXPECT_THAT(refusal_of_errors(Vector3(1, -1, 1).asDiagonal()), HasSubstr("with Y reversed in errors"));
-  EXPECT_THAT(refusal_of_errors(Matrix3{{0, 1, 0}, {1, 0, 0}, {0, 0, 1}}), HasSubstr("with X and Y swapped"));
+  EXPECT_THAT(refusal_of_errors(1e-3 * Matrix3::Identity()),
+              HasSubstr("with errors in mm where um belong"));
+  EXPECT_THAT(refusal_of_errors(Vector3(1, -1, 1).asDiagonal()),
+              HasSubstr("with Y reversed in errors"));
+  EXPECT_THAT(refusal_of_errors(Matrix3{{0, 1, 0}, {1, 0, 0}, {0, 0, 1}}),
+              HasSubstr("with X and Y swapped"));
 }
 
 }  // namespace

@@ -92,7 +92,8 @@ TEST_P(EvemuLackOfFit, StandsInTheVerdict) {
 
 void move(ArrayRun& run, int position, int from_ball, const Vector3& by_m) {
   for (Touch& t : run.touches) {
-    if (t.position == position && t.feature == Feature::Ball && t.number >= from_ball) t.p_m += by_m;
+    if (t.position == position && t.feature == Feature::Ball && t.number >= from_ball)
+      t.p_m += by_m;
   }
 }
 
@@ -112,15 +113,17 @@ INSTANTIATE_TEST_SUITE_P(
                                [](ArrayRun& r) {
                                  int number = 0;
                                  for (Touch& one : r.touches) {
-                                   const bool there =
-                                       one.position == 2 && one.feature == Feature::Block && one.number == 1;
+                                   const bool there = one.position == 2 &&
+                                                      one.feature == Feature::Block &&
+                                                      one.number == 1;
                                    if (there && ++number == 7) one.p_m.z() += 0.12e-3;
                                  }
                                }},
                     ArrayFault{Cause::Drift, "drifts", [](ArrayRun& r) {
                                  double at = 0.0;
                                  for (Touch& one : r.touches) {
-                                   const double share = ++at / static_cast<double>(r.touches.size());
+                                   const double share =
+                                       ++at / static_cast<double>(r.touches.size());
                                    one.p_m.x() -= 0.3e-3 * share * one.p_m.x();
                                  }
                                }}));
@@ -222,7 +225,8 @@ TEST(EvemuLackOfFit, FindsBallsThatMovedALittleWhileTheyWereTouched) {
       t.p_m += Vector3::Constant(8e-6);
     }
   }
-  EXPECT_THAT(found_in(run), Contains(testing::Field(&Alternative::text, HasSubstr(" balls scatter by"))));
+  EXPECT_THAT(found_in(run),
+              Contains(testing::Field(&Alternative::text, HasSubstr(" balls scatter by"))));
 }
 
 /// When axis a turns round, the tip shifts by column a of `b_m`.
@@ -252,7 +256,8 @@ Vector3 backlash_along_um(const ArrayRun& run) {
   const std::string text = backlash_found_in(run).text;
   const auto at = std::min(text.find("backlash of X"), text.size());
   Vector3 b = Vector3::Zero();
-  EXPECT_EQ(std::sscanf(text.c_str() + at, "backlash of X %lf, Y %lf, Z %lf", &b.x(), &b.y(), &b.z()), 3)
+  EXPECT_EQ(
+      std::sscanf(text.c_str() + at, "backlash of X %lf, Y %lf, Z %lf", &b.x(), &b.y(), &b.z()), 3)
       << text;
   return b;
 }
@@ -301,7 +306,8 @@ TEST(EvemuLackOfFit, FindsTheSizeOfSlowNoise) {
   const Solution slow = *solve(observed(with_slow_noise(20e-6)));
   // 64 balls and what is lost within them: to a third.
   EXPECT_NEAR(slow.statistics.slow_noise_m, 20e-6, 7e-6);
-  EXPECT_GT(correction_size(observed({}), slow).u_m, 1.5 * correction_size(observed({}), plain).u_m);
+  EXPECT_GT(correction_size(observed({}), slow).u_m,
+            1.5 * correction_size(observed({}), plain).u_m);
 }
 
 TEST(EvemuJudge, NotesSlowNoise) {

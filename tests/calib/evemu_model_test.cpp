@@ -67,10 +67,12 @@ TEST(EquivalentModel, HasTheRowsAndNamesOfTheReference) {
   const EquivalentModel model = model_of("ZXY");
   EXPECT_THAT(std::vector<std::string>(model.names().begin(), model.names().end()),
               testing::ElementsAreArray(reference["beta_names"].get<std::vector<std::string>>()));
-  EXPECT_THAT(std::vector<std::string>(model.coefficient_names().begin(), model.coefficient_names().end()),
-              testing::ElementsAreArray(reference["K_names"].get<std::vector<std::string>>()));
+  EXPECT_THAT(
+      std::vector<std::string>(model.coefficient_names().begin(), model.coefficient_names().end()),
+      testing::ElementsAreArray(reference["K_names"].get<std::vector<std::string>>()));
   for (std::size_t i = 0; i < model.size(); ++i) {
-    EXPECT_EQ(model.W().row(static_cast<Eigen::Index>(i)).transpose(), reference_vector(reference["W"][i]))
+    EXPECT_EQ(model.W().row(static_cast<Eigen::Index>(i)).transpose(),
+              reference_vector(reference["W"][i]))
         << model.names()[i];
   }
 }
@@ -88,7 +90,8 @@ TEST(EquivalentModel, CombinesLikeTermsOfEveryChainLikeTheReference) {
     for (const auto& row : reference[order]["rows"]) {
       Eigen::RowVectorXd w = Eigen::RowVectorXd::Zero(model.W().cols());
       for (const auto& [name, value] : row["coefs"].items()) {
-        const auto at = std::find(model.coefficient_names().begin(), model.coefficient_names().end(), name);
+        const auto at =
+            std::find(model.coefficient_names().begin(), model.coefficient_names().end(), name);
         w(at - model.coefficient_names().begin()) = value.get<double>();
       }
       const auto found = (model.W().rowwise() - w).rowwise().norm().minCoeff() == 0.0 ||
@@ -125,7 +128,8 @@ TEST(EquivalentModel, IsThePseudoInverseProduct) {
   const EquivalentModel model = model_of("ZXY");
   const Eigen::MatrixXd pinv = model.W().completeOrthogonalDecomposition().pseudoInverse();
   for (const Vector3& p : random_points_mm(10)) {
-    // Scaled to the sizes of the columns: rounding of the largest monomial must not hide in the smallest.
+    // Scaled to the sizes of the columns: rounding of the largest monomial must not hide in the
+    // smallest.
     const Eigen::Matrix3Xd X = model.X(p);
     EXPECT_LE((A.A(p) * pinv - X).norm(), 1e-12 * X.norm());
   }
@@ -151,12 +155,14 @@ TEST(EquivalentModel, GivesTheRegressorsOfTheReference) {
   const auto X = reference_cells("X216.csv");
   const auto points = reference_cells("points72.csv");
   ASSERT_EQ(X.size(), 3 * points.size());
+
   for (std::size_t i = 0; i < points.size(); ++i) {
     const Eigen::Matrix3Xd ours =
         model.X({std::stod(points[i][2]), std::stod(points[i][3]), std::stod(points[i][4])});
     for (Eigen::Index c = 0; c < 3; ++c) {
       for (Eigen::Index j = 0; j < 45; ++j) {
-        const double theirs = std::stod(X[3 * i + static_cast<std::size_t>(c)][static_cast<std::size_t>(j)]);
+        const double theirs =
+            std::stod(X[3 * i + static_cast<std::size_t>(c)][static_cast<std::size_t>(j)]);
         // The reference went through a numeric pseudo-inverse and has rounding where we have zeros.
         EXPECT_NEAR(ours(c, j), theirs, 1e-12 * ours.row(c).norm()) << i << " " << model.names()[j];
       }
@@ -219,7 +225,8 @@ TEST(ScaledDesign, HasFunctionsOfTheSizeOfOne) {
   for (const double sx : {-1.0, 1.0}) {
     for (const double sy : {-1.0, 1.0}) {
       const ReadingBox& box = design.box();
-      const Eigen::Matrix3Xd B = design.B(box.centre_m + Vector3(sx, sy, 1).cwiseProduct(box.half_width_m));
+      const Eigen::Matrix3Xd B =
+          design.B(box.centre_m + Vector3(sx, sy, 1).cwiseProduct(box.half_width_m));
       EXPECT_LE(B.cwiseAbs().maxCoeff(), 1.0 + 1e-12);
     }
   }

@@ -22,27 +22,34 @@ class EvemuChain : public testing::TestWithParam<Case> {};
 
 TEST_P(EvemuChain, AgreesWithTheReferenceAtEveryStep) {
   const auto reference = reference_json(GetParam().chain);
-  const auto o = observe(reference_touches(GetParam().touches), reference_calibrator(), reference_machine());
+  const auto o =
+      observe(reference_touches(GetParam().touches), reference_calibrator(), reference_machine());
   ASSERT_TRUE(o) << o.error().text;
   ASSERT_EQ(o->seen.size(), 8u);
+
   for (std::size_t p = 0; p < 8; ++p) {
     const auto& position = reference["positions"][p];
     const SeenArtefact& seen = o->seen[p];
     for (std::size_t b = 0; b < 9; ++b) {
-      EXPECT_LT((1000 * seen.balls[b].centre - vector3(position["centres"][b])).norm(), kNanometre_mm);
+      EXPECT_LT((1000 * seen.balls[b].centre - vector3(position["centres"][b])).norm(),
+                kNanometre_mm);
       EXPECT_NEAR(1000 * seen.balls[b].radius, position["radii"][b].get<double>(), kNanometre_mm);
-      EXPECT_LT((1000 * seen.ideal_m[b] - vector3(position["ideal_self"][b])).norm(), kNanometre_mm);
+      EXPECT_LT((1000 * seen.ideal_m[b] - vector3(position["ideal_self"][b])).norm(),
+                kNanometre_mm);
       EXPECT_LT((1000 * o->rows[9 * p + b].V_m - vector3(position["E"][b])).norm(), kNanometre_mm);
     }
+
     for (std::size_t b = 0; b < 2; ++b) {
       // 1e-9 mm at the far ball, 680 mm away.
       EXPECT_LT((seen.blocks[b].normal - vector3(position["normals"][b])).norm(), 1e-12);
     }
+
     for (Eigen::Index r = 0; r < 3; ++r) {
       for (Eigen::Index c = 0; c < 3; ++c) {
         EXPECT_NEAR(seen.T_self_uni.R(r, c), position["T_self_uni"][r][c].get<double>(), 1e-12);
       }
     }
+
     EXPECT_EQ(o->rows[9 * p].V_m, Vector3(Vector3::Zero()));
   }
 }
@@ -56,21 +63,26 @@ std::vector<Touch> fewest_touches() {
   const Calibrator truth = reference_calibrator();
   std::vector<Touch> touches;
   for (const auto& ball : truth.balls) {
-    for (const Vector3& d : {Vector3(0, 0, 1), Vector3(1, 0, 0), Vector3(0, 1, 0), Vector3(-1, 0, 0)}) {
-      touches.push_back({1, Feature::Ball, ball.number, ball.centre_m + (ball.radius_m + 2e-3) * d});
+    for (const Vector3& d :
+         {Vector3(0, 0, 1), Vector3(1, 0, 0), Vector3(0, 1, 0), Vector3(-1, 0, 0)}) {
+      touches.push_back(
+          {1, Feature::Ball, ball.number, ball.centre_m + (ball.radius_m + 2e-3) * d});
     }
   }
+
   for (const auto& block : truth.blocks) {
     const Vector3 a = block.normal.unitOrthogonal(), b = block.normal.cross(a);
     for (const auto& [i, j] : {std::pair(-1, -1), {1, -1}, {0, 1}}) {
       touches.push_back({1, Feature::Block, block.number, 0.02 * i * a + 0.02 * j * b});
     }
   }
+
   return touches;
 }
 
 TEST(Calibrator, OfTouchesWithoutRedundancyHasTheUncertaintyOfATouch) {
-  const auto c = precalibrated("few", fewest_touches(), 2e-3, {Vector3::UnitZ(), Vector3::UnitY()}, 1e-6);
+  const auto c =
+      precalibrated("few", fewest_touches(), 2e-3, {Vector3::UnitZ(), Vector3::UnitY()}, 1e-6);
   ASSERT_TRUE(c) << c.error().text;
   for (const auto& ball : c->balls) {
     EXPECT_GT(ball.u_m, 0.5e-6);
@@ -81,8 +93,8 @@ TEST(Calibrator, OfTouchesWithoutRedundancyHasTheUncertaintyOfATouch) {
 
 TEST(Calibrator, OfTouchesWithoutRedundancyIsNotExact) {
   for (const auto& u_touch_m : {std::optional<double>{}, std::optional{0.0}}) {
-    const auto c =
-        precalibrated("few", fewest_touches(), 2e-3, {Vector3::UnitZ(), Vector3::UnitY()}, u_touch_m);
+    const auto c = precalibrated("few", fewest_touches(), 2e-3,
+                                 {Vector3::UnitZ(), Vector3::UnitY()}, u_touch_m);
     ASSERT_FALSE(c);
     EXPECT_EQ(c.error().code, ErrorCode::TooFewObservations);
     EXPECT_THAT(c.error().text, HasSubstr("ball 1: 4 touches do not show"));
@@ -94,24 +106,28 @@ TEST(Calibrator, TakesTheTipOutOfItsPrecalibration) {
   const Calibrator truth = reference_calibrator();
   std::vector<Touch> touches;
   for (const auto& ball : truth.balls) {
-    for (const Vector3& d : {Vector3(0, 0, 1), Vector3(1, 0, 0.2), Vector3(0, 1, 0.2), Vector3(-1, 0, 0.2),
-                             Vector3(0, -1, 0.2), Vector3(1, 1, 1)}) {
+    for (const Vector3& d : {Vector3(0, 0, 1), Vector3(1, 0, 0.2), Vector3(0, 1, 0.2),
+                             Vector3(-1, 0, 0.2), Vector3(0, -1, 0.2), Vector3(1, 1, 1)}) {
       touches.push_back(
           {1, Feature::Ball, ball.number, ball.centre_m + (ball.radius_m + 2e-3) * d.normalized()});
     }
   }
+
   for (const auto& block : truth.blocks) {
     const Vector3 a = block.normal.unitOrthogonal(), b = block.normal.cross(a);
     for (const auto& [i, j] : {std::pair(-1, -1), {1, -1}, {1, 1}, {-1, 1}}) {
-      touches.push_back({1, Feature::Block, block.number, 2e-3 * block.normal + 0.02 * i * a + 0.01 * j * b});
+      touches.push_back(
+          {1, Feature::Block, block.number, 2e-3 * block.normal + 0.02 * i * a + 0.01 * j * b});
     }
   }
+
   const auto c = precalibrated("again", touches, 2e-3, {Vector3(0, 0.1, 1), Vector3(0, 1, 0.1)});
   ASSERT_TRUE(c) << c.error().text;
   for (std::size_t i = 0; i < truth.balls.size(); ++i) {
     EXPECT_LT((c->balls[i].centre_m - truth.balls[i].centre_m).norm(), 1e-12);
     EXPECT_NEAR(c->balls[i].radius_m, truth.balls[i].radius_m, 1e-12);
   }
+
   EXPECT_LT((c->blocks[1].normal - truth.blocks[1].normal).norm(), 1e-12);
 }
 
@@ -128,17 +144,20 @@ TEST(Calibrator, IsRefusedWhenItCannotDefineAFrame) {
 }
 
 TEST(BlockRotation, IsWhatRefittingTheMovedBlocksGives) {
-  const auto o =
-      observe(reference_touches("touched_noiseless.csv"), reference_calibrator(), reference_machine());
+  const auto o = observe(reference_touches("touched_noiseless.csv"), reference_calibrator(),
+                         reference_machine());
   ASSERT_TRUE(o);
   std::vector<Vector3> readings;
+
   for (const BallError& row : o->rows) {
     readings.push_back(row.reading_m);
   }
+
   const ScaledDesign design = *ScaledDesign::of(o->machine.chain, 3, bounding_box(readings));
   const SeenArtefact& seen = o->seen[4];
   const Eigen::Matrix3Xd theta = block_rotation(seen, design);
   constexpr double kSmall_m = 1e-8;
+
   for (std::size_t j = 0; j < design.size(); ++j) {
     std::array<fit::Plane, 2> moved;
     for (std::size_t b = 0; b < 2; ++b) {
@@ -148,11 +167,14 @@ TEST(BlockRotation, IsWhatRefittingTheMovedBlocksGives) {
       }
       moved[b] = *fit::fit_plane(points, seen.blocks[b].normal);
     }
-    const Matrix3 turned =
-        uniform_frame(Vector3::Zero(), moved[0].normal, moved[1].normal)->R * seen.T_self_uni.R.transpose();
+
+    const Matrix3 turned = uniform_frame(Vector3::Zero(), moved[0].normal, moved[1].normal)->R *
+                           seen.T_self_uni.R.transpose();
     const Vector3 exact(turned(2, 1) - turned(1, 2), turned(0, 2) - turned(2, 0),
                         turned(1, 0) - turned(0, 1));
-    // Second order: 1e-8 m over 0.02 m of block is 5e-7 rad; rounding 1e-16 m / 1e-8 m / 0.02 m as much.
+
+    // Second order: 1e-8 m over 0.02 m of block is 5e-7 rad; rounding 1e-16 m / 1e-8 m / 0.02 m as
+    // much.
     EXPECT_LT((0.5 * exact / kSmall_m - theta.col(static_cast<Eigen::Index>(j))).norm(),
               1e-4 * (1 + theta.col(static_cast<Eigen::Index>(j)).norm()))
         << design.equivalent().names()[j];
@@ -160,13 +182,15 @@ TEST(BlockRotation, IsWhatRefittingTheMovedBlocksGives) {
 }
 
 TEST(BallDisplacement, IsWhatRefittingTheMovedPointsGives) {
-  const auto o =
-      observe(reference_touches("touched_noiseless.csv"), reference_calibrator(), reference_machine());
+  const auto o = observe(reference_touches("touched_noiseless.csv"), reference_calibrator(),
+                         reference_machine());
   ASSERT_TRUE(o);
-  const ScaledDesign design = *ScaledDesign::of(o->machine.chain, 3, {{0.26, 0.14, 0.05}, {0.35, 0.2, 0.05}});
+  const ScaledDesign design =
+      *ScaledDesign::of(o->machine.chain, 3, {{0.26, 0.14, 0.05}, {0.35, 0.2, 0.05}});
   const SeenArtefact& seen = o->seen[2];
   const Eigen::Matrix3Xd D = ball_displacement(seen, 5, design);
   constexpr double kSmall_m = 1e-8;
+
   for (std::size_t j = 0; j < design.size(); ++j) {
     auto points = seen.ball_points_m[5];
     for (Vector3& p : points) {
@@ -179,18 +203,21 @@ TEST(BallDisplacement, IsWhatRefittingTheMovedPointsGives) {
 }
 
 TEST(BlockRotation, CancelsARotationOfTheWholeVolume) {
-  const auto o =
-      observe(reference_touches("touched_noiseless.csv"), reference_calibrator(), reference_machine());
+  const auto o = observe(reference_touches("touched_noiseless.csv"), reference_calibrator(),
+                         reference_machine());
   ASSERT_TRUE(o);
   std::vector<Vector3> readings;
+
   for (const BallError& row : o->rows) {
     readings.push_back(row.reading_m);
   }
+
   const ScaledDesign design = *ScaledDesign::of(o->machine.chain, 3, bounding_box(readings));
   const Eigen::MatrixX3d rotation = design.rotation_about(o->ball1_m);
   const Eigen::MatrixXd rows = design_rows(*o, design, RowsFrom::Touches);
-  // Per position a rotation leaves omega x (Ball1 of the position - mean Ball1), as read: below a micrometre
-  // of lever here, against 0.7 m in the plain design.
+
+  // Per position a rotation leaves omega x (Ball1 of the position - mean Ball1), as read: below a
+  // micrometre of lever here, against 0.7 m in the plain design.
   EXPECT_LT((rows * rotation).cwiseAbs().maxCoeff(), 1e-4);
   EXPECT_GT((design_rows(*o, design, RowsFrom::Centres) * rotation).cwiseAbs().maxCoeff(), 0.5);
 }

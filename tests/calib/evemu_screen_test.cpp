@@ -12,19 +12,16 @@
 namespace {
 using abbe::calib::evemu::Screen;
 
-Eigen::MatrixXd random_matrix(Eigen::Index rows, Eigen::Index columns,
-                              std::mt19937 &random) {
+Eigen::MatrixXd random_matrix(Eigen::Index rows, Eigen::Index columns, std::mt19937& random) {
   std::normal_distribution<double> normal;
-  return Eigen::MatrixXd::NullaryExpr(rows, columns,
-                                      [&] { return normal(random); });
+  return Eigen::MatrixXd::NullaryExpr(rows, columns, [&] { return normal(random); });
 }
 
 /// log N(y; 0, K) but for its constant.
-double log_density(const Eigen::VectorXd &y, const Eigen::MatrixXd &K) {
+double log_density(const Eigen::VectorXd& y, const Eigen::MatrixXd& K) {
   const Eigen::LLT<Eigen::MatrixXd> llt(K);
   double log_det = 0.0;
-  for (Eigen::Index i = 0; i < K.rows(); ++i)
-    log_det += 2.0 * std::log(llt.matrixLLT()(i, i));
+  for (Eigen::Index i = 0; i < K.rows(); ++i) log_det += 2.0 * std::log(llt.matrixLLT()(i, i));
   return -0.5 * (y.dot(llt.solve(y)) + log_det);
 }
 
@@ -32,25 +29,20 @@ TEST(EvemuScreen, GivesTheRatioOfTheDensities) {
   std::mt19937 random(5);
   constexpr double kS_m = 2e-6;
   const Eigen::Index n = 36;
-  const Eigen::MatrixXd X = random_matrix(n, 6, random),
-                        S = random_matrix(n, 3, random);
+  const Eigen::MatrixXd X = random_matrix(n, 6, random), S = random_matrix(n, 3, random);
   const Eigen::MatrixXd A = 1e-6 * random_matrix(n, 2, random);
   const Eigen::VectorXd prior = 1e-10 * random_matrix(9, 1, random).cwiseAbs2();
   const Eigen::VectorXd y = 2e-5 * random_matrix(n, 1, random);
-  Eigen::MatrixXd K =
-      kS_m * kS_m * Eigen::MatrixXd::Identity(n, n) + A * A.transpose();
+  Eigen::MatrixXd K = kS_m * kS_m * Eigen::MatrixXd::Identity(n, n) + A * A.transpose();
   K += X * prior.head(6).asDiagonal() * X.transpose() +
        S * prior.tail(3).asDiagonal() * S.transpose();
   Eigen::MatrixXd C = Eigen::MatrixXd::Zero(n, 3);
-  C.middleRows(6, 12) = random_matrix(12, 3, random); // of one position
+  C.middleRows(6, 12) = random_matrix(12, 3, random);  // of one position
 
   double best = -INFINITY, best_size_m = 0.0;
   for (const double size_m : Screen::kSizes_m) {
-    const double gain =
-        log_density(y, K + size_m * size_m * C * C.transpose()) -
-        log_density(y, K);
-    if (gain > best)
-      best = gain, best_size_m = size_m;
+    const double gain = log_density(y, K + size_m * size_m * C * C.transpose()) - log_density(y, K);
+    if (gain > best) best = gain, best_size_m = size_m;
   }
   const Screen::Gain gain = Screen(X, S, A, y, prior, kS_m).gain(C);
   EXPECT_NEAR(gain.log_likelihood, best, 1e-8 * std::abs(best));
@@ -63,4 +55,4 @@ TEST(EvemuScreen, HasNoLikelihoodForColumnsThatAreNoNumbers) {
   EXPECT_TRUE(std::isnan(screen.gain(NAN * one).log_likelihood));
 }
 
-} // namespace
+}  // namespace

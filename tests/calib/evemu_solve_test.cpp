@@ -31,24 +31,30 @@ TEST(EvemuLeastSquares, AgreesWithTheReferenceInStandardisedUnits) {
   const Eigen::VectorXd beta = 1000 * design.named_from_scaled() * solution->raw_c_m;
   const auto reference = reference_cells("lm_noint_beta.csv");
   Eigen::MatrixXd X(216, 45);
+
   for (std::size_t i = 0; i < o.rows.size(); ++i) {
-    X.middleRows<3>(static_cast<Eigen::Index>(3 * i)) = design.equivalent().X(1000 * o.rows[i].reading_m);
+    X.middleRows<3>(static_cast<Eigen::Index>(3 * i)) =
+        design.equivalent().X(1000 * o.rows[i].reading_m);
   }
+
   const Eigen::RowVectorXd mean = X.colwise().mean();
   const Eigen::VectorXd scale = ((X.rowwise() - mean).colwise().squaredNorm() / 216).cwiseSqrt();
   Eigen::VectorXd off(45), size(45);
+
   for (Eigen::Index j = 0; j < 45; ++j) {
     const auto& row = reference[static_cast<std::size_t>(j)];
     ASSERT_EQ(row[0], design.equivalent().names()[static_cast<std::size_t>(j)]);
     off(j) = (beta(j) - std::stod(row[1])) * scale(j);
     size(j) = std::stod(row[1]) * scale(j);
   }
+
   EXPECT_LT(off.norm(), 1e-8 * size.norm());
 }
 
 TEST(EvemuLeastSquares, FindsTheNoiseBallsShare) {
   // points72 has 5 um per ball; 216 residuals know it to 7 %.
-  EXPECT_NEAR(solve(reference_observations(), {.estimator = Estimator::Ols})->statistics.s_m, 5e-6, 0.7e-6);
+  EXPECT_NEAR(solve(reference_observations(), {.estimator = Estimator::Ols})->statistics.s_m, 5e-6,
+              0.7e-6);
 }
 
 TEST(EvemuLeastSquares, SaysWhenPositionsDoNotSuffice) {
@@ -56,10 +62,11 @@ TEST(EvemuLeastSquares, SaysWhenPositionsDoNotSuffice) {
   std::erase_if(errors, [](const BallError& e) { return e.position > 2; });
   ObserveOptions options;
   options.positions = 2;
-  const Observations o = *observe_errors(errors, reference_machine(), RotationOrigin::Independent, options);
+  const Observations o =
+      *observe_errors(errors, reference_machine(), RotationOrigin::Independent, options);
   EXPECT_EQ(solve(o, {.estimator = Estimator::Ols}).error().code, ErrorCode::RankDeficient);
-  EXPECT_TRUE(
-      solve(o, {.estimator = Estimator::BayesPose}));  // the prior fills in, and says how uncertain it is
+  // the prior fills in, and says how uncertain it is
+  EXPECT_TRUE(solve(o, {.estimator = Estimator::BayesPose}));
 }
 
 struct SmallProblem {
@@ -68,8 +75,10 @@ struct SmallProblem {
 };
 SmallProblem small_problem() {
   std::srand(4);
-  SmallProblem p{
-      Eigen::MatrixXd::Random(20, 4), Eigen::MatrixXd::Random(20, 3), Eigen::VectorXd::Random(20), {}};
+  SmallProblem p{Eigen::MatrixXd::Random(20, 4),
+                 Eigen::MatrixXd::Random(20, 3),
+                 Eigen::VectorXd::Random(20),
+                 {}};
   p.prior = Eigen::VectorXd::Random(7).cwiseAbs() * 3;
   return p;
 }
@@ -81,9 +90,10 @@ TEST(LinearGaussian, HasTheEvidenceOfTheFullCovariance) {
   Z << p.X, p.S;
   const Eigen::MatrixXd K =
       Z * p.prior.asDiagonal() * Z.transpose() + noise * Eigen::MatrixXd::Identity(20, 20);
-  const double expected =
-      -0.5 * (std::log(K.determinant()) + p.y.dot(K.ldlt().solve(p.y)) + 20 * std::log(2 * std::numbers::pi));
-  EXPECT_NEAR(LinearGaussian(p.X, p.S, p.y).evidence(p.prior, noise).log_likelihood, expected, 1e-10);
+  const double expected = -0.5 * (std::log(K.determinant()) + p.y.dot(K.ldlt().solve(p.y)) +
+                                  20 * std::log(2 * std::numbers::pi));
+  EXPECT_NEAR(LinearGaussian(p.X, p.S, p.y).evidence(p.prior, noise).log_likelihood, expected,
+              1e-10);
 }
 
 TEST(LinearGaussian, HasTheGradientOfItsEvidence) {
@@ -91,14 +101,17 @@ TEST(LinearGaussian, HasTheGradientOfItsEvidence) {
   const LinearGaussian problem(p.X, p.S, p.y);
   const double noise = 0.3, h = 1e-5;
   const auto e = problem.evidence(p.prior, noise);
+
   for (Eigen::Index j = 0; j < 7; ++j) {
     Eigen::VectorXd up = p.prior, down = p.prior;
     up(j) *= std::exp(h);
     down(j) *= std::exp(-h);
-    const double numeric =
-        (problem.evidence(up, noise).log_likelihood - problem.evidence(down, noise).log_likelihood) / (2 * h);
+    const double numeric = (problem.evidence(up, noise).log_likelihood -
+                            problem.evidence(down, noise).log_likelihood) /
+                           (2 * h);
     EXPECT_NEAR(e.by_log_prior(j), numeric, 1e-7) << j;
   }
+
   const double numeric = (problem.evidence(p.prior, noise * std::exp(h)).log_likelihood -
                           problem.evidence(p.prior, noise * std::exp(-h)).log_likelihood) /
                          (2 * h);
@@ -141,6 +154,7 @@ Ratio ratio_to_ols(const Layout& layout, const Noise& noise, unsigned seeds) {
   const std::vector<Vector3> grid = reference_grid();
   double ols_mean = 0, bayes_mean = 0;
   Ratio ratio;
+
   for (unsigned seed = 1; seed <= seeds; ++seed) {
     const Observations o = simulated(layout, V, noise, seed);
     const Solution ols = *solve(o, {.estimator = Estimator::Ols}), bayes = *solve(o);
@@ -151,6 +165,7 @@ Ratio ratio_to_ols(const Layout& layout, const Noise& noise, unsigned seeds) {
     bayes_mean += left.mean_R;
     ratio.worst_R = std::max(ratio.worst_R, left.max_R);
   }
+
   ratio.of_means = bayes_mean / ols_mean;
   return ratio;
 }
@@ -173,14 +188,15 @@ TEST(EvemuBayes, FindsNoiseAndPoseRotations) {
 }
 
 TEST(EvemuBayes, SeesTheShapeOfAMachineThatMeasuredItsOwnBlocks) {
-  const Observations o =
-      *observe(reference_touches("touched_sig3um.csv"), reference_calibrator(), reference_machine());
+  const Observations o = *observe(reference_touches("touched_sig3um.csv"), reference_calibrator(),
+                                  reference_machine());
   const Field V = table3_machine();
   const Solution s = *solve(o);
   const auto grid = evaluation_grid(s.model.validity());
   const Remaining as_it_is = remaining(V, field_of(s), grid);
   EXPECT_GT(as_it_is.mean_R, 0.5);  // the blocks' rotation is not V's: nothing in the touches tells
   EXPECT_LE(remaining(V, turned_to(V, field_of(s), grid), grid).rms_m, 0.07e-3);
+
   // ... and the stated uncertainty knows.
   std::size_t in = 0;
   for (const Vector3& p : grid) {
@@ -188,6 +204,7 @@ TEST(EvemuBayes, SeesTheShapeOfAMachineThatMeasuredItsOwnBlocks) {
     const Vector3 off = V(p) - e.V_m;
     in += off.cwiseAbs2().cwiseQuotient(e.cov_V_m2.diagonal()).maxCoeff() < 9.0;
   }
+
   EXPECT_GT(static_cast<double>(in), 0.95 * static_cast<double>(grid.size()));
 }
 
@@ -211,12 +228,14 @@ TEST(EvemuSolution, HoldsForItsToolOnly) {
 TEST(EvemuSolution, PropagatesItsFullCovariance) {
   const Solution s = *solve(reference_observations());
   const EvemuModel& m = *s.model.polynomials();
-  for (const Vector3& q : {Vector3(0.1, 0.2, 0.04), Vector3(0.5, 0.0, 0.07), Vector3(0.3, 0.15, 0.01)}) {
+  for (const Vector3& q :
+       {Vector3(0.1, 0.2, 0.04), Vector3(0.5, 0.0, 0.07), Vector3(0.3, 0.15, 0.01)}) {
     const Eigen::Matrix3Xd B = m.design().B(q);
     const VolumetricError e = s.model.error_at(q, Vector3::Zero());
     EXPECT_LT((e.V_m - B * m.c_m()).norm(), 1e-15);
     EXPECT_LT((e.V_m - s.model.V_at(q, Vector3::Zero())).norm(), 1e-15);
-    EXPECT_LT((e.cov_V_m2 - B * m.covariance_m2() * B.transpose()).norm(), 1e-12 * e.cov_V_m2.norm());
+    EXPECT_LT((e.cov_V_m2 - B * m.covariance_m2() * B.transpose()).norm(),
+              1e-12 * e.cov_V_m2.norm());
   }
 }
 
@@ -226,7 +245,8 @@ TEST(EvemuSolution, ComesBackFromItsDescriptionBitForBit) {
   ASSERT_TRUE(again) << again.error().text;
   const Vector3 q(0.31, 0.17, 0.05);
   EXPECT_EQ(again->V_at(q, Vector3::Zero()), s.model.V_at(q, Vector3::Zero()));
-  EXPECT_EQ(again->error_at(q, Vector3::Zero()).cov_V_m2, s.model.error_at(q, Vector3::Zero()).cov_V_m2);
+  EXPECT_EQ(again->error_at(q, Vector3::Zero()).cov_V_m2,
+            s.model.error_at(q, Vector3::Zero()).cov_V_m2);
   EXPECT_EQ(again->gauge(), Gauge::Ball1);
 }
 
@@ -247,20 +267,24 @@ JudgeOptions generous() {
 
 TEST(RotationReference, TurnsAShapeOntoWhatIsKnown) {
   const Field V = table3_machine();
-  const Observations o =
-      *observe(reference_touches("touched_sig3um.csv"), reference_calibrator(), reference_machine());
+  const Observations o = *observe(reference_touches("touched_sig3um.csv"), reference_calibrator(),
+                                  reference_machine());
   std::vector<BallError> known;
-  for (const Vector3& q : {Vector3(0.1, 0.15, 0.04), Vector3(0.5, 0.25, 0.05), Vector3(0.45, 0.1, 0.04),
-                           Vector3(0.3, 0.2, 0.06), Vector3(0.55, 0.15, 0.05)}) {
+
+  for (const Vector3& q :
+       {Vector3(0.1, 0.15, 0.04), Vector3(0.5, 0.25, 0.05), Vector3(0.45, 0.1, 0.04),
+        Vector3(0.3, 0.2, 0.06), Vector3(0.55, 0.15, 0.05)}) {
     known.push_back({1, 1, q, V(q)});
   }
+
   const auto turned = with_rotation_reference(*solve(o), {known, 5e-6});
   ASSERT_TRUE(turned) << turned.error().text;
   EXPECT_TRUE(turned->rotation.referenced);
   EXPECT_EQ(turned->model.gauge(), Gauge::Ball1);
   const auto grid = evaluation_grid(turned->model.validity());
   EXPECT_LT(remaining(V, field_of(*turned), grid).rms_m, 0.15e-3);  // 2.3 mm before
-  EXPECT_LT(turned->model.error_at({0.5, 0.2, 0.05}, Vector3::Zero()).cov_V_m2.trace(), 1e-2 * 1e-6);
+  EXPECT_LT(turned->model.error_at({0.5, 0.2, 0.05}, Vector3::Zero()).cov_V_m2.trace(),
+            1e-2 * 1e-6);
 }
 
 TEST(RotationReference, NeedsPointsOffALine) {
@@ -277,8 +301,9 @@ std::vector<Vector3> places_inside(const ValidityVolume& hull) {
   const std::span<const Vector3> vertices = hull.vertices_m();
   const Vector3 centre = bounding_box(vertices).centre_m;
   for (Eigen::Index a = 0; a < 3; ++a) {
-    const auto [low, high] = std::minmax_element(
-        vertices.begin(), vertices.end(), [a](const Vector3& p, const Vector3& q) { return p(a) < q(a); });
+    const auto [low, high] =
+        std::minmax_element(vertices.begin(), vertices.end(),
+                            [a](const Vector3& p, const Vector3& q) { return p(a) < q(a); });
     places.push_back(centre + 0.8 * (*low - centre));
     places.push_back(centre + 0.8 * (*high - centre));
   }
@@ -286,8 +311,8 @@ std::vector<Vector3> places_inside(const ValidityVolume& hull) {
 }
 
 /// V there, in the frame of something that stands turned and moved and has noise of its own.
-std::vector<BallError> reference_points(const ValidityVolume& hull, const Field& V, const Vector3& turned_rad,
-                                        double sigma_m, unsigned seed) {
+std::vector<BallError> reference_points(const ValidityVolume& hull, const Field& V,
+                                        const Vector3& turned_rad, double sigma_m, unsigned seed) {
   std::mt19937_64 random(seed);
   std::normal_distribution<double> normal(0.0, sigma_m);
   std::vector<BallError> points;
@@ -304,7 +329,9 @@ TEST(RotationReference, RefusesWhatIsNotOfThisMachine) {
   const Field of_other_place = [&](const Vector3& q) { return V(q + Vector3(-0.1, 0.05, 0.0)); };
   const Solution s = *solve(simulated(reference_layout(), V, {8e-6, 0.1e-3}, 1));
   const ValidityVolume& hull = s.model.validity();
-  EXPECT_TRUE(with_rotation_reference(s, {reference_points(hull, V, {1e-4, 0, -2e-4}, 5e-6, 1), 5e-6}));
+  EXPECT_TRUE(
+      with_rotation_reference(s, {reference_points(hull, V, {1e-4, 0, -2e-4}, 5e-6, 1), 5e-6}));
+
   for (const Field& wrong : {of_other_sign, of_other_place}) {
     const auto refused =
         with_rotation_reference(s, {reference_points(hull, wrong, Vector3::Zero(), 5e-6, 1), 5e-6});
@@ -317,15 +344,19 @@ TEST(RotationReference, RefusesWhatIsNotOfThisMachine) {
 TEST(RotationReference, IsLessCertainWhereItDoesNotFitWell) {
   constexpr double kStated_m = 18e-6, kNoise_m = 34e-6;
   const Field V = table3_machine();
-  const Solution s = *solve(simulated(reference_layout(), V, {8e-6, 0.0}, 1), {.estimator = Estimator::Ols});
+  const Solution s =
+      *solve(simulated(reference_layout(), V, {8e-6, 0.0}, 1), {.estimator = Estimator::Ols});
+
   const auto turned = [&](double noise_m, unsigned seed) {
     const auto points = reference_points(s.model.validity(), V, Vector3::Zero(), noise_m, seed);
     return with_rotation_reference(s, {points, kStated_m});
   };
+
   const auto exact = turned(1e-9, 1);
   ASSERT_TRUE(exact);
   EXPECT_EQ(exact->rotation.reference->widened, 1.0);
   std::size_t widened = 0;
+
   for (unsigned seed = 1; seed <= 20; ++seed) {
     const auto noisy = turned(kNoise_m, seed);
     if (!noisy || noisy->rotation.reference->widened == 1.0) {
@@ -335,27 +366,30 @@ TEST(RotationReference, IsLessCertainWhereItDoesNotFitWell) {
     EXPECT_NEAR(noisy->rotation.cov_rad2.trace() / exact->rotation.cov_rad2.trace(),
                 noisy->rotation.reference->widened, 1e-6);
   }
+
   EXPECT_GT(widened, 0u);
 }
 
 TEST(RotationReference, MayBeTheBallsThemselvesMeasuredByAnother) {
   const Field V = table3_machine();
-  const Observations o =
-      *observe(reference_touches("touched_sig3um.csv"), reference_calibrator(), reference_machine());
+  const Observations o = *observe(reference_touches("touched_sig3um.csv"), reference_calibrator(),
+                                  reference_machine());
   std::mt19937_64 random(3);
   std::normal_distribution<double> normal(0.0, 5e-6);
   std::vector<BallError> points;
+
   for (const auto& position : reference_layout().true_m) {
     for (const Vector3& truth : position) {
       const Vector3 q = reading_of(V, truth), noise(normal(random), normal(random), normal(random));
       points.push_back({1, 1, q, V(q) + noise});
     }
   }
+
   const auto turned = with_rotation_reference(*solve(o), {points, 5e-6});
   ASSERT_TRUE(turned) << turned.error().text;
   EXPECT_EQ(turned->rotation.reference->points, points.size());
-  RecordProperty("chi2_per_dof",
-                 std::to_string(turned->rotation.reference->chi2 / turned->rotation.reference->dof));
+  RecordProperty("chi2_per_dof", std::to_string(turned->rotation.reference->chi2 /
+                                                turned->rotation.reference->dof));
 }
 
 TEST(RotationReference, LeavesPointsOutsideTheBallsOutAndNamesThem) {
@@ -366,6 +400,7 @@ TEST(RotationReference, LeavesPointsOutsideTheBallsOutAndNamesThem) {
   points.resize(4);
   points[1].reading_m.z() = 0.5;
   const auto turned = with_rotation_reference(s, {points, 5e-6});
+
   ASSERT_TRUE(turned) << turned.error().text;
   EXPECT_THAT(turned->rotation.reference->outside, testing::ElementsAre(2u));
   EXPECT_THAT(judge(o, *turned, nullptr, generous())->notes, Contains(HasSubstr("1 of 4 points")));
@@ -380,6 +415,7 @@ TEST(RotationReference, StatesAnUncertaintyThatCovers) {
   const Field V = table3_machine();
   constexpr unsigned kSeeds = 60;
   std::size_t covered = 0, asked = 0;
+
   for (unsigned seed = 1; seed <= kSeeds; ++seed) {
     const Observations o = simulated(reference_layout(), V, {8e-6, 0.0}, seed);
     const Solution s = *solve(o, {.estimator = Estimator::Ols});
@@ -397,6 +433,7 @@ TEST(RotationReference, StatesAnUncertaintyThatCovers) {
       }
     }
   }
+
   // 1080 answers, 18 of a seed not independent: 95 % to 2 %. Of the reference's noise alone: 0.7.
   const double share = static_cast<double>(covered) / static_cast<double>(asked);
   EXPECT_GT(share, 0.91);
@@ -431,8 +468,8 @@ TEST(EvemuJudge, RefusesWhatDoesNotBeatNoCompensation) {
 }
 
 TEST(EvemuJudge, CallsAShapeAShapeUnlessToldOtherwise) {
-  const Observations o =
-      *observe(reference_touches("touched_sig3um.csv"), reference_calibrator(), reference_machine());
+  const Observations o = *observe(reference_touches("touched_sig3um.csv"), reference_calibrator(),
+                                  reference_machine());
   const Solution s = *solve(o);
   const auto verdict = judge(o, s, nullptr, generous());
   ASSERT_TRUE(verdict);
@@ -453,9 +490,11 @@ TEST(EvemuJudge, ComparesAtBallsInsideTheActiveModelsVolumeOnly) {
   const Observations o = reference_observations();
   const Solution s = *solve(o);
   std::vector<Vector3> near;
+
   for (const Vector3& v : s.model.validity().vertices_m()) {
     near.push_back(o.ball1_m + 0.6 * (v - o.ball1_m));
   }
+
   near.push_back(o.ball1_m - 0.01 * (near.back() - o.ball1_m));  // Ball1 is within, not at the tip
   near.push_back(o.ball1_m + Vector3(-0.01, 0.01, 0.01));
   near.push_back(o.ball1_m + Vector3(-0.01, -0.01, -0.01));
@@ -465,10 +504,12 @@ TEST(EvemuJudge, ComparesAtBallsInsideTheActiveModelsVolumeOnly) {
   ASSERT_TRUE(held) << held.error().text;
   EXPECT_GT(held->observations_beside_active, 0u);
   EXPECT_LT(held->observations_beside_active, held->observations);
+
   // A model of few balls in the place of one of the whole machine: only by name.
   Solution candidate = s;
   candidate.model = smaller;
-  EXPECT_THAT(judge(o, candidate, &s.model, generous())->reasons, Contains(HasSubstr(kSmallerVolume)));
+  EXPECT_THAT(judge(o, candidate, &s.model, generous())->reasons,
+              Contains(HasSubstr(kSmallerVolume)));
 }
 
 TEST(EvemuJudge, ComparesWithTheActiveModelWhateverItsRotation) {
@@ -477,9 +518,9 @@ TEST(EvemuJudge, ComparesWithTheActiveModelWhateverItsRotation) {
   const EvemuModel& m = *s.model.polynomials();
   const Eigen::VectorXd turned =
       m.c_m() + m.design().rotation_about(m.ball1_m()) * Vector3(1e-3, 2e-3, -1e-3);
-  const VolumetricModel other =
-      *VolumetricModel::from_polynomials(*EvemuModel::of(m.design(), m.ball1_m(), turned, m.covariance_m2()),
-                                         Gauge::Ball1, Vector3::Zero(), s.model.validity());
+  const VolumetricModel other = *VolumetricModel::from_polynomials(
+      *EvemuModel::of(m.design(), m.ball1_m(), turned, m.covariance_m2()), Gauge::Ball1,
+      Vector3::Zero(), s.model.validity());
   const auto as_it_is = held_out(o, s.statistics.s_m, &s.model),
              as_turned = held_out(o, s.statistics.s_m, &other);
   ASSERT_TRUE(as_it_is && as_turned);

@@ -1,4 +1,5 @@
-/// Lasso, MCP and SCAD as estimators of a ball array: what stands between the sparse solver and a model.
+/// Lasso, MCP and SCAD as estimators of a ball array: what stands between the sparse solver and a
+/// model.
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -38,15 +39,19 @@ TEST(EvemuSparse, PredictsWhatTheSolverPredicts) {
   const ScaledDesign& design = s.model.polynomials()->design();
   Eigen::MatrixXd X(216, 45);
   Eigen::VectorXd y(216);
+
   for (std::size_t i = 0; i < o.rows.size(); ++i) {
     const auto row = static_cast<Eigen::Index>(3 * i);
     X.middleRows<3>(row) = design.equivalent().X(1000 * o.rows[i].reading_m);
     y.segment<3>(row) = 1000 * o.rows[i].V_m;
   }
+
   sparse::PathOptions options;
   options.lambda = s.sparse->lambda;
-  const sparse::Path path = *sparse::fit_path(X, y, {sparse::PenaltyKind::Scad, s.sparse->gamma}, options);
+  const sparse::Path path =
+      *sparse::fit_path(X, y, {sparse::PenaltyKind::Scad, s.sparse->gamma}, options);
   const Eigen::VectorXd expected_mm = sparse::predict(path, X, path.reached() - 1);
+
   for (std::size_t i = 0; i < o.rows.size(); ++i) {
     const Vector3 V_mm = 1000 * design.B(o.rows[i].reading_m) * s.raw_c_m;
     // Monomials of mm span 1e9: nine digits go into telling them apart.
@@ -59,8 +64,9 @@ TEST(EvemuSparse, ChoosesTheSmallestHeldOutError) {
     const Solution s = *solve(observations(), quick(e));
     ASSERT_TRUE(s.sparse);
     const auto l = static_cast<Eigen::Index>(s.sparse->lambda.size()) - 1;
-    const auto g = std::find(s.sparse->all_gamma.begin(), s.sparse->all_gamma.end(), s.sparse->gamma) -
-                   s.sparse->all_gamma.begin();
+    const auto g =
+        std::find(s.sparse->all_gamma.begin(), s.sparse->all_gamma.end(), s.sparse->gamma) -
+        s.sparse->all_gamma.begin();
     const double chosen = s.sparse->error_mm2(l, g);
     for (const double other : s.sparse->error_mm2.reshaped()) {
       EXPECT_FALSE(other < chosen);
@@ -141,8 +147,9 @@ TEST(EvemuSparse, RefitsWithTheLambdaThatWasChosen) {
   options.sparse.max_sweeps = 5000;
   const auto refused = held_out(observations(), 1e-6, nullptr, options);
   ASSERT_FALSE(refused);
-  EXPECT_THAT(refused.error().text,
-              testing::ContainsRegex("without position [0-9]+: sparse fit \\(scad, gamma 2\\.5\\)"));
+  EXPECT_THAT(
+      refused.error().text,
+      testing::ContainsRegex("without position [0-9]+: sparse fit \\(scad, gamma 2\\.5\\)"));
 }
 
 TEST(EvemuSparse, PredictsPositionsItWasNotFittedTo) {

@@ -18,7 +18,8 @@ std::vector<Vector3> on_sphere(const Vector3& centre, double radius, double sigm
   std::normal_distribution<double> normal;
   std::vector<Vector3> points;
   for (int i = 0; i < count; ++i) {
-    const Vector3 away = Vector3(normal(random), normal(random), std::abs(normal(random))).normalized();
+    const Vector3 away =
+        Vector3(normal(random), normal(random), std::abs(normal(random))).normalized();
     points.push_back(centre + (radius + sigma * normal(random)) * away);
   }
   return points;
@@ -53,6 +54,7 @@ TEST(SphereFit, IsStationaryInTheDistances) {
   ASSERT_TRUE(sphere);
   Eigen::Vector4d gradient = Eigen::Vector4d::Zero();
   double squares = 0;
+
   for (const Vector3& p : points) {
     const Vector3 away = p - sphere->centre;
     const double r = away.norm() - sphere->radius;
@@ -60,6 +62,7 @@ TEST(SphereFit, IsStationaryInTheDistances) {
     gradient(3) -= r;
     squares += r * r;
   }
+
   EXPECT_LT(gradient.norm(), 1e-12 * 25 * sphere->radius);
   EXPECT_NEAR(sphere->residuals.rms, std::sqrt(squares / 25), 1e-15);
 }
@@ -68,11 +71,13 @@ TEST(SphereFit, StatesItsUncertainty) {
   const Vector3 centre(0.1, 0.2, 0.3);
   constexpr int kRuns = 2000;
   Eigen::Vector4d squares = Eigen::Vector4d::Zero();
+
   // The same places every time, another noise.
   const auto places = on_sphere(centre, 0.0127, 0.0, 5);
   std::mt19937 random(6);
   std::normal_distribution<double> noise(0, 3e-6);
   Eigen::Matrix4d stated = Eigen::Matrix4d::Zero();
+
   for (int run = 0; run < kRuns; ++run) {
     auto points = places;
     for (Vector3& p : points) {
@@ -85,6 +90,7 @@ TEST(SphereFit, StatesItsUncertainty) {
     squares += off.cwiseAbs2() / kRuns;
     stated += sphere->covariance / kRuns;
   }
+
   for (Eigen::Index i = 0; i < 4; ++i) {
     // 2000 runs know a variance to 3 %.
     EXPECT_NEAR(squares(i) / stated(i, i), 1.0, 0.12) << i;
@@ -99,9 +105,11 @@ TEST(SphereFit, RefusesWhatIsNoSphere) {
   repeated[2] = points[2];
   EXPECT_EQ(fit_sphere(repeated).error().code, ErrorCode::TooFewObservations);
   std::vector<Vector3> circle;
+
   for (int i = 0; i < 12; ++i) {
     circle.emplace_back(std::cos(i * 0.5), std::sin(i * 0.5), 2.0);
   }
+
   EXPECT_EQ(fit_sphere(circle).error().code, ErrorCode::DegenerateGeometry);
   auto broken = points;
   broken[4].x() = std::numeric_limits<double>::quiet_NaN();
@@ -121,7 +129,8 @@ TEST(SphereFit, TakesFourPointsWithoutRedundancy) {
 TEST(PlaneFit, FindsAnExactPlaneOnTheAskedSide) {
   const Vector3 n = Vector3(0.6, 0.8, 0).normalized();
   const auto points = on_plane({100, 200, 300}, n, 0.0, 1);
-  const auto there = fit_plane(points, Vector3(1, 1, 0)), back = fit_plane(points, Vector3(-1, -1, 0));
+  const auto there = fit_plane(points, Vector3(1, 1, 0)),
+             back = fit_plane(points, Vector3(-1, -1, 0));
   ASSERT_TRUE(there && back);
   EXPECT_LT((there->normal - n).norm(), 1e-11);  // 1e-13 of coordinates over 0.01 of extent
   EXPECT_LT((back->normal + n).norm(), 1e-11);

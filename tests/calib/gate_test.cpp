@@ -73,13 +73,16 @@ VolumetricModel grown_model(double growth, double u_m) {
   const otf::Machine machine = coarse_machine("[w X' b Y Z t]");
   const ParameterLayout layout = layout_of(machine);
   Eigen::VectorXd U = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(layout.model_size()));
+
   for (const Axis a : kAllAxes) {
     const auto table = layout.find({static_cast<Motion>(index(a)), a});
     const AxisNodes& nodes = machine.nodes[index(a)];
     for (std::size_t i = 0; i < nodes.nodes_m.size(); ++i) {
-      U(static_cast<Eigen::Index>(table->offset + i)) = growth * (nodes.nodes_m[i] - nodes.reference_m);
+      U(static_cast<Eigen::Index>(table->offset + i)) =
+          growth * (nodes.nodes_m[i] - nodes.reference_m);
     }
   }
+
   return *VolumetricModel::from_vector(layout, Gauge::G1, std::array{machine.target_offset_m}, U,
                                        u_m * u_m * Eigen::MatrixXd::Identity(U.size(), U.size()),
                                        *ValidityVolume::hull_of(tensor_grid(machine.nodes)));
@@ -87,10 +90,13 @@ VolumetricModel grown_model(double growth, double u_m) {
 
 TEST(Gate, RefusesAnotherScaleThanTheActiveModels) {
   const VolumetricModel active = grown_model(10e-6, 0.0), candidate = grown_model(110e-6, 0.0);
-  EXPECT_THAT(decide(candidate, figures(100, 1.0, 1.1), {}, &active).reasons,
-              ElementsAre(AllOf(HasSubstr("larger by 100 um/m"), HasSubstr("accept scale-change"))));
-  EXPECT_THAT(decide(candidate, figures(100, 1.0, 1.1), {}, &active).causes, ElementsAre("scale-change"));
-  const Verdict accepted = decide(candidate, figures(100, 1.0, 1.1), {.accept_scale_change = true}, &active);
+  EXPECT_THAT(
+      decide(candidate, figures(100, 1.0, 1.1), {}, &active).reasons,
+      ElementsAre(AllOf(HasSubstr("larger by 100 um/m"), HasSubstr("accept scale-change"))));
+  EXPECT_THAT(decide(candidate, figures(100, 1.0, 1.1), {}, &active).causes,
+              ElementsAre("scale-change"));
+  const Verdict accepted =
+      decide(candidate, figures(100, 1.0, 1.1), {.accept_scale_change = true}, &active);
   EXPECT_TRUE(accepted.accepted);
   EXPECT_THAT(accepted.notes, testing::Contains(HasSubstr("accepted by name")));
 }
@@ -113,12 +119,14 @@ TEST(Gate, ComparesWithTheActiveModelOnTheSameObservations) {
 
 /// EXX as above, but only of the lower part of the machine.
 VolumetricModel lower_part(const VolumetricModel& whole, double share) {
-  std::vector<Vector3> corners(whole.validity().vertices_m().begin(), whole.validity().vertices_m().end());
+  std::vector<Vector3> corners(whole.validity().vertices_m().begin(),
+                               whole.validity().vertices_m().end());
   for (Vector3& v : corners) {
     v.z() = share * v.z() + (1 - share) * whole.layout().nodes()[2].nodes_m.front();
   }
-  return *VolumetricModel::from_vector(whole.layout(), whole.gauge(), whole.tool_offsets_m(), whole.U(),
-                                       whole.covariance(), *ValidityVolume::hull_of(corners));
+  return *VolumetricModel::from_vector(whole.layout(), whole.gauge(), whole.tool_offsets_m(),
+                                       whole.U(), whole.covariance(),
+                                       *ValidityVolume::hull_of(corners));
 }
 
 TEST(Gate, LetsASmallerVolumeReplaceALargerOneOnlyByName) {
@@ -133,25 +141,28 @@ TEST(Gate, LetsASmallerVolumeReplaceALargerOneOnlyByName) {
   EXPECT_THAT(told.notes, ElementsAre(HasSubstr("accepted by name")));
 }
 
-/// The reference array in eight positions round a vertical axis and up and down, set up by hand: 3 degrees of
-/// scatter round the axis, 1 degree of tilt.
+/// The reference array in eight positions round a vertical axis and up and down, set up by hand: 3
+/// degrees of scatter round the axis, 1 degree of tilt.
 ValidityVolume set_up_by_hand(unsigned seed) {
   constexpr double kDeg = std::numbers::pi / 180.0;
   std::mt19937_64 random(seed);
   std::normal_distribution<double> normal;
   const std::vector<Vector3> array = abbe::tests::evemu::reference_layout(0.0).true_m.front();
   std::vector<Vector3> balls;
+
   for (int i = 0; i < 8; ++i) {
     const double fan = (45.0 * i + 3.0 * normal(random)) * kDeg,
                  tilt = ((i % 2 == 0 ? -30.0 : 30.0) + normal(random)) * kDeg,
                  roll = ((i % 4 < 2 ? 30.0 : -30.0) + normal(random)) * kDeg;
-    const Matrix3 R = (Eigen::AngleAxisd(fan, Vector3::UnitZ()) * Eigen::AngleAxisd(-tilt, Vector3::UnitY()) *
-                       Eigen::AngleAxisd(roll, Vector3::UnitX()))
-                          .toRotationMatrix();
+    const Matrix3 R =
+        (Eigen::AngleAxisd(fan, Vector3::UnitZ()) * Eigen::AngleAxisd(-tilt, Vector3::UnitY()) *
+         Eigen::AngleAxisd(roll, Vector3::UnitX()))
+            .toRotationMatrix();
     for (const Vector3& ball : array) {
       balls.emplace_back(R * (ball - array.front()));
     }
   }
+
   return *ValidityVolume::hull_of(balls);
 }
 
@@ -167,8 +178,8 @@ TEST(Gate, TakesTwoSetupsByHandForOneVolume) {
 }
 
 VolumetricModel with_volume(const VolumetricModel& model, ValidityVolume volume) {
-  return *VolumetricModel::from_vector(model.layout(), model.gauge(), model.tool_offsets_m(), model.U(),
-                                       model.covariance(), std::move(volume));
+  return *VolumetricModel::from_vector(model.layout(), model.gauge(), model.tool_offsets_m(),
+                                       model.U(), model.covariance(), std::move(volume));
 }
 
 TEST(Gate, NotesARimThatIsLostAndRefusesMore) {
@@ -179,12 +190,15 @@ TEST(Gate, NotesARimThatIsLostAndRefusesMore) {
   EXPECT_TRUE(rim.accepted);
   EXPECT_THAT(rim.notes, ElementsAre(HasSubstr("beside it")));
   EXPECT_FALSE(decide(lower_part(whole, 0.93), f, {}, &whole).accepted);
-  std::vector<Vector3> corners(whole.validity().vertices_m().begin(), whole.validity().vertices_m().end());
+  std::vector<Vector3> corners(whole.validity().vertices_m().begin(),
+                               whole.validity().vertices_m().end());
   corners.pop_back();  // one corner less: a sixth of the volume
-  EXPECT_FALSE(decide(with_volume(whole, *ValidityVolume::hull_of(corners)), f, {}, &whole).accepted);
+  EXPECT_FALSE(
+      decide(with_volume(whole, *ValidityVolume::hull_of(corners)), f, {}, &whole).accepted);
 }
 
-/// V_x = c3 P3(u) over a slab 2 mm thick, tilted so that no node of a grid over its box lies inside.
+/// V_x = c3 P3(u) over a slab 2 mm thick, tilted so that no node of a grid over its box lies
+/// inside.
 VolumetricModel thin_slab(double c3_m) {
   const evemu::ReadingBox box{Vector3::Zero(), Vector3(0.3, 0.3, 0.3)};
   const auto design = *evemu::ScaledDesign::of(*KinematicChain::parse("[w b X Y Z t]"), 3, box);
@@ -195,14 +209,16 @@ VolumetricModel thin_slab(double c3_m) {
   EXPECT_NE(cubic, names.end());
   c(cubic - names.begin()) = c3_m;
   std::vector<Vector3> corners;
-  for (const Vector3& v : {Vector3(-0.3, -0.3, -0.3), Vector3(0.3, -0.3, 0.25), Vector3(-0.3, 0.3, -0.2),
-                           Vector3(0.3, 0.3, 0.3)}) {
+
+  for (const Vector3& v : {Vector3(-0.3, -0.3, -0.3), Vector3(0.3, -0.3, 0.25),
+                           Vector3(-0.3, 0.3, -0.2), Vector3(0.3, 0.3, 0.3)}) {
     corners.push_back(v);
     corners.push_back(v + Vector3(0, 0, 0.002));
   }
+
   return *VolumetricModel::from_polynomials(
-      *evemu::EvemuModel::of(design, Vector3::Zero(), c, Eigen::MatrixXd::Zero(size, size)), Gauge::Ball1,
-      Vector3::Zero(), *ValidityVolume::hull_of(corners));
+      *evemu::EvemuModel::of(design, Vector3::Zero(), c, Eigen::MatrixXd::Zero(size, size)),
+      Gauge::Ball1, Vector3::Zero(), *ValidityVolume::hull_of(corners));
 }
 
 TEST(Gate, SeesTheSlopeOfPolynomialsInAThinVolume) {

@@ -18,14 +18,15 @@ using namespace abbe::tests::otf;
 const Vector3 kTarget(0.02, -0.015, -0.12);
 const std::vector<Vector3> kThreeTargets{kTarget, {0.1, 0.03, -0.05}, {-0.04, 0.09, -0.2}};
 
-/// Nullity of complete 3D data, by singular values: `extra_runs` adds three unknown offset corrections for
-/// every target but the first; `keep` chooses columns.
-std::size_t nullity(const ParameterLayout& layout, std::span<const Vector3> targets, bool unknown_offsets,
-                    const std::function<bool(std::size_t)>& keep) {
+/// Nullity of complete 3D data, by singular values: `extra_runs` adds three unknown offset
+/// corrections for every target but the first; `keep` chooses columns.
+std::size_t nullity(const ParameterLayout& layout, std::span<const Vector3> targets,
+                    bool unknown_offsets, const std::function<bool(std::size_t)>& keep) {
   const std::vector<Vector3> grid = tensor_grid(layout.nodes());
   const std::size_t columns = layout.fit_size() + (unknown_offsets ? 3 * (targets.size() - 1) : 0);
   const auto n = static_cast<Eigen::Index>(columns);
-  Eigen::MatrixXd A = Eigen::MatrixXd::Zero(static_cast<Eigen::Index>(3 * grid.size() * targets.size()), n);
+  Eigen::MatrixXd A =
+      Eigen::MatrixXd::Zero(static_cast<Eigen::Index>(3 * grid.size() * targets.size()), n);
   Eigen::Index row = 0;
   for (std::size_t run = 0; run < targets.size(); ++run) {
     for (const Vector3& q : grid) {
@@ -34,7 +35,8 @@ std::size_t nullity(const ParameterLayout& layout, std::span<const Vector3> targ
         A.block<3, 1>(row, static_cast<Eigen::Index>(c.parameter)) = c.dV_dU;
       }
       if (unknown_offsets && run > 0) {
-        A.block<3, 3>(row, static_cast<Eigen::Index>(layout.fit_size() + 3 * (run - 1))).setIdentity();
+        A.block<3, 3>(row, static_cast<Eigen::Index>(layout.fit_size() + 3 * (run - 1)))
+            .setIdentity();
       }
       row += 3;
     }
@@ -61,8 +63,8 @@ class Nullity : public testing::TestWithParam<const char*> {
   ParameterLayout all_ = *ParameterLayout::all_tables(machine_.chain, machine_.nodes);
 };
 INSTANTIATE_TEST_SUITE_P(Chains, Nullity,
-                         testing::Values("[w b X Y Z t]", "[w b X Z Y t]", "[w b Y X Z t]", "[w b Y Z X t]",
-                                         "[w b Z X Y t]", "[w b Z Y X t]"));
+                         testing::Values("[w b X Y Z t]", "[w b X Z Y t]", "[w b Y X Z t]",
+                                         "[w b Y Z X t]", "[w b Z X Y t]", "[w b Z Y X t]"));
 
 TEST_P(Nullity, Of14TablesSquarenessAndRigidIs20) {
   EXPECT_EQ(nullity(one_target_, std::array{kTarget}, false, everything), 20u);
@@ -97,7 +99,8 @@ TEST_P(Nullity, Of18TablesAndThreeTargetsOfUnknownOffsetIs24) {
 TEST_P(Nullity, IsSpannedByTheUnobservableCombinations) {
   const Eigen::MatrixXd N = unobservable_combinations(one_target_, std::array{kTarget});
   ASSERT_EQ(N.cols(), 20);
-  const DesignColumns design = design_columns_with_rigid(one_target_, Vector3(0.11, -0.13, -0.17), kTarget);
+  const DesignColumns design =
+      design_columns_with_rigid(one_target_, Vector3(0.11, -0.13, -0.17), kTarget);
   Eigen::MatrixXd seen = Eigen::MatrixXd::Zero(3, 20);
   for (const Column& c : design.span()) {
     seen += c.dV_dU * N.row(static_cast<Eigen::Index>(c.parameter));
@@ -114,7 +117,8 @@ TEST_P(Nullity, IsRemovedExactlyByGaugeG1) {
   EXPECT_EQ(factor.setThreshold(1e-9).rank(), 20);
 }
 
-/// Nodes are rounded on their way from range and spacing: 1e-17 m beside the reference is at the reference.
+/// Nodes are rounded on their way from range and spacing: 1e-17 m beside the reference is at the
+/// reference.
 TEST(GaugeG1, FixesTheNodeAtTheReferenceAloneForEveryRangeAndSpacing) {
   std::size_t beside = 0;
   for (int half_mm = 10; half_mm <= 1500; half_mm += 10) {
@@ -125,8 +129,8 @@ TEST(GaugeG1, FixesTheNodeAtTheReferenceAloneForEveryRangeAndSpacing) {
         const auto& nodes = machine.nodes[0].nodes_m;
         const bool at_node =
             std::any_of(nodes.begin(), nodes.end(), [](double x) { return std::abs(x) < 1e-12; });
-        beside +=
-            std::any_of(nodes.begin(), nodes.end(), [](double x) { return x != 0.0 && std::abs(x) < 1e-12; });
+        beside += std::any_of(nodes.begin(), nodes.end(),
+                              [](double x) { return x != 0.0 && std::abs(x) < 1e-12; });
         const ParameterLayout layout = *ParameterLayout::with_tables(
             machine.chain, machine.nodes, std::array{ErrorMotion{Motion::X, Axis::X}});
         const Eigen::MatrixXd K = gauge_conditions(Gauge::G1, layout);
@@ -135,12 +139,14 @@ TEST(GaugeG1, FixesTheNodeAtTheReferenceAloneForEveryRangeAndSpacing) {
       }
     }
   }
+
   EXPECT_GT(beside, 50u);  // the ranges this test is about
 }
 
 TEST(GaugeG1, Has24ConditionsFor18Tables) {
   const otf::Machine machine = case_a_machine();
-  EXPECT_EQ(gauge_conditions(Gauge::G1, *ParameterLayout::all_tables(machine.chain, machine.nodes)).rows(),
+  EXPECT_EQ(gauge_conditions(Gauge::G1, *ParameterLayout::all_tables(machine.chain, machine.nodes))
+                .rows(),
             24);
 }
 
@@ -154,9 +160,11 @@ TEST(GaugeG1, ConversionMeetsTheConditionsAndChangesNoMeasurement) {
   EXPECT_LT((gauge_conditions(Gauge::G1, layout) * G1).norm(), 1e-15);
   const DesignColumns design = design_columns_with_rigid(layout, Vector3(0.2, 0.1, -0.05), kTarget);
   Vector3 change = Vector3::Zero();
+
   for (const Column& c : design.span()) {
     change += c.dV_dU * (G1 - U)(static_cast<Eigen::Index>(c.parameter));
   }
+
   EXPECT_LT(change.norm(), 1e-15);
 }
 
@@ -172,6 +180,7 @@ TEST(GaugeG1, ConversionOf18TablesKeepsWhatEveryToolMeasures) {
   ASSERT_TRUE(G1) << G1.error().text;
   EXPECT_LT((gauge_conditions(Gauge::G1, layout) * *G1).norm(), 1e-15);
   const Eigen::VectorXd moved = *G1 - U;
+
   for (const Vector3& t : {kThreeTargets[1], Vector3(0.3, -0.2, 0.1)}) {
     std::vector<Vector3> points, change;
     for (const Vector3& q : tensor_grid(machine.nodes)) {
@@ -187,8 +196,9 @@ TEST(GaugeG1, Of18TablesNeedsThreeToolsThatAreNotOnALine) {
   const ParameterLayout layout = *ParameterLayout::all_tables(machine.chain, machine.nodes);
   const Eigen::VectorXd U = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(layout.fit_size()));
   const Vector3 step(0.1, 0.0, 0.05);
-  for (const auto& tools : {std::vector{kTarget}, std::vector{kTarget, Vector3(kTarget + step)},
-                            std::vector{kTarget, Vector3(kTarget + step), Vector3(kTarget - step)}}) {
+  for (const auto& tools :
+       {std::vector{kTarget}, std::vector{kTarget, Vector3(kTarget + step)},
+        std::vector{kTarget, Vector3(kTarget + step), Vector3(kTarget - step)}}) {
     const Result<Eigen::VectorXd> G1 = to_gauge(Gauge::G1, layout, tools, U);
     ASSERT_FALSE(G1) << tools.size();
     EXPECT_EQ(G1.error().code, ErrorCode::DegenerateGeometry);

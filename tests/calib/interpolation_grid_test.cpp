@@ -23,8 +23,8 @@ std::size_t nodes_of(const InterpolationGrid& grid) {
   return grid.axes_m[0].size() * grid.axes_m[1].size() * grid.axes_m[2].size();
 }
 
-/// Misses of linear interpolation over the moment stated for them, squared, in the middle of every cell and
-/// beside it.
+/// Misses of linear interpolation over the moment stated for them, squared, in the middle of every
+/// cell and beside it.
 struct Missed {
   double mean_m = 0.0, max_m = 0.0;
   double squares_m2 = 0.0, stated_m2 = 0.0;
@@ -35,9 +35,11 @@ Missed missed(const VolumetricModel& model, const InterpolationGrid& grid) {
   std::size_t count = 0;
   const auto& [x, y, z] = grid.axes_m;
   const Vector3 t = model.tool_offsets_m().front();
-  constexpr std::array kAt{0.113, 0.5, 0.887};  // Gauss points of three: exact for the squares of a parabola
+  constexpr std::array kAt{0.113, 0.5,
+                           0.887};  // Gauss points of three: exact for the squares of a parabola
   constexpr std::array kWeight{5.0 / 18, 8.0 / 18, 5.0 / 18};
   double weights = 0.0;
+
   for (std::size_t i = 0; i + 1 < x.size(); ++i) {
     for (std::size_t j = 0; j + 1 < y.size(); ++j) {
       for (std::size_t k = 0; k + 1 < z.size(); ++k) {
@@ -54,8 +56,9 @@ Missed missed(const VolumetricModel& model, const InterpolationGrid& grid) {
           const double weight = kWeight[g[0]] * kWeight[g[1]] * kWeight[g[2]];
           Vector3 between = Vector3::Zero();
           for (std::size_t c = 0; c < 8; ++c) {
-            between += ((c & 1) != 0 ? s.x() : 1 - s.x()) * ((c >> 1 & 1) != 0 ? s.y() : 1 - s.y()) *
-                       (c >> 2 != 0 ? s.z() : 1 - s.z()) * V[c];
+            between += ((c & 1) != 0 ? s.x() : 1 - s.x()) *
+                       ((c >> 1 & 1) != 0 ? s.y() : 1 - s.y()) * (c >> 2 != 0 ? s.z() : 1 - s.z()) *
+                       V[c];
           }
           const Vector3 q(x[i] + s.x() * (x[i + 1] - x[i]), y[j] + s.y() * (y[j + 1] - y[j]),
                           z[k] + s.z() * (z[k + 1] - z[k]));
@@ -70,9 +73,11 @@ Missed missed(const VolumetricModel& model, const InterpolationGrid& grid) {
       }
     }
   }
+
   m.mean_m /= weights;
   m.squares_m2 /= weights;
   m.stated_m2 /= static_cast<double>(count);
+
   return m;
 }
 

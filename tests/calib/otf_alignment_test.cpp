@@ -56,7 +56,8 @@ TEST(LegAssignment, GoesOnThroughLostBlocks) {
 }
 
 /// Squared distance from the leg, and (0.02 m)^2 (1 - cos) of the angle between travel and leg.
-double cost_on_leg(const std::vector<Vector3>& points, std::size_t i, const Path& path, std::size_t leg) {
+double cost_on_leg(const std::vector<Vector3>& points, std::size_t i, const Path& path,
+                   std::size_t leg) {
   const Vector3 from = path.vertices_m[leg], way = path.vertices_m[leg + 1] - from;
   const double share = std::clamp((points[i] - from).dot(way) / way.squaredNorm(), 0.0, 1.0);
   const Vector3 travel = points[std::min(i + 1, points.size() - 1)] - points[i == 0 ? 0 : i - 1];
@@ -78,6 +79,7 @@ std::vector<std::size_t> cheapest(const std::vector<Vector3>& points, const Path
     for (std::size_t i = 0; i < n; ++i) sum += cost_on_leg(points, i, path, leg[i]);
     if (sum < least) least = sum, best = leg;
   } while (std::next_permutation(advances.begin(), advances.end()));
+
   return best;
 }
 
@@ -100,8 +102,8 @@ TEST(LegAssignment, NeedsABlockForEveryLeg) {
   EXPECT_FALSE(assign_legs(std::vector<Vector3>{{0, 0, 0}}, path, 0.02));
 }
 
-/// Case A from its published block means; where the machine stood at the ends follows from the rough
-/// transform.
+/// Case A from its published block means; where the machine stood at the ends follows from the
+/// rough transform.
 BlockSeries case_a_series(const ReferenceBlocks& blocks) {
   const RigidTransform rough = case_a_rough_alignment_noisy(), fine = case_a_alignment(true);
   const Path path = case_a_path();
@@ -116,8 +118,8 @@ TEST(Alignment, OfTheReferenceBlocksIsThePrototypes) {
   const Result<Alignment> a = align(case_a_series(blocks), case_a_machine(), case_a_path(), {});
   ASSERT_TRUE(a) << a.error().text;
   const RigidTransform reference = case_a_alignment(true);
-  // The means are printed to 1e-9 m and the end is not the measured one; from samples it is 1e-8, see
-  // CaseAStream.
+  // The means are printed to 1e-9 m and the end is not the measured one; from samples it is 1e-8,
+  // see CaseAStream.
   EXPECT_LT((a->T_machine_tracker.R - reference.R).cwiseAbs().maxCoeff(), 3e-8);
   EXPECT_LT((a->T_machine_tracker.t_m - reference.t_m).cwiseAbs().maxCoeff(), 3e-8);
   EXPECT_EQ(a->leg, blocks.leg);
@@ -174,7 +176,8 @@ TEST(Alignment, NamesAPathInMetres) {
   const MadeRun run = make_run({});
   Path other = run.path;
   for (Vector3& v : other.vertices_m) v *= 1e-3;
-  EXPECT_THAT(refusal(run, other).text, HasSubstr("they fit with lengths in m where mm belong (path)"));
+  EXPECT_THAT(refusal(run, other).text,
+              HasSubstr("they fit with lengths in m where mm belong (path)"));
 }
 
 TEST(Alignment, RefusesARunThatEndsEarly) {

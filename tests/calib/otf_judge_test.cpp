@@ -45,7 +45,8 @@ TEST(Judge, FindsTheActiveModelOfTheSameMachineAsGood) {
   const MadeRun first = make_run({.seed = 1});
   const Identification before = identified(first);
   const MadeRun second = make_run({.seed = 1, .noise_seed = 2});
-  const auto held = held_out(identified(second).observations, &before.solution.model, second.options);
+  const auto held =
+      held_out(identified(second).observations, &before.solution.model, second.options);
   ASSERT_TRUE(held);
   ASSERT_TRUE(held->active);
   EXPECT_NEAR(*held->active, 1.0, 0.05);
@@ -79,22 +80,27 @@ TEST(Judge, ComparesWhereTheActiveModelHoldsOnly) {
   const auto z_of = [](const Vector3& a, const Vector3& b) { return a.z() < b.z(); };
   const auto [low, high] = std::minmax_element(lower.begin(), lower.end(), z_of);
   const double bottom = low->z(), middle = 0.5 * (bottom + high->z());
+
   for (Vector3& v : lower) {
     v.z() = v.z() > middle ? middle : bottom;
   }
+
   // Right where it holds; nonsense above, where nobody may ask it.
   Eigen::VectorXd U = m.U();
   const ParameterLayout& layout = m.layout();
   const auto& z_nodes = layout.nodes()[2].nodes_m;
   const std::vector<Parameter> parameters = m.parameters();
+
   for (std::size_t i = 0; i < parameters.size(); ++i) {
     const auto motion = error_motion(parameters[i].name);
     const double node_m = parameters[i].position_m.value_or(bottom);
     const auto above = std::upper_bound(z_nodes.begin(), z_nodes.end(), middle);
-    if (motion && motion->axis == Axis::Z && node_m > middle && above != z_nodes.end() && node_m > *above) {
+    if (motion && motion->axis == Axis::Z && node_m > middle && above != z_nodes.end() &&
+        node_m > *above) {
       U(static_cast<Eigen::Index>(i)) += 1e-3;
     }
   }
+
   const VolumetricModel active = *VolumetricModel::from_vector(
       layout, Gauge::G1, m.tool_offsets_m(), U, m.covariance(), *ValidityVolume::hull_of(lower));
   const auto held = held_out(id.observations, &active, run.options);
@@ -102,6 +108,7 @@ TEST(Judge, ComparesWhereTheActiveModelHoldsOnly) {
   EXPECT_GT(held->observations_beside_active, 0u);
   EXPECT_LT(held->observations_beside_active, held->observations);
   EXPECT_LT(held->active.value(), 2.0);
+
   // As good where the smaller one holds, and it holds in more.
   EXPECT_THAT(judge(id.observations, id.solution, &active, {}, run.options)->notes,
               Contains(HasSubstr("lie outside its volume")));
@@ -111,14 +118,15 @@ TEST(Judge, DoesNotDependOnTheGaugeOfTheActiveModel) {
   const MadeRun run = make_run({.seed = 1});
   const Identification id = identified(run);
   const VolumetricModel& model = id.solution.model;
+
   // The same machine, written down in another gauge: any combination nothing can see is added.
   const Eigen::MatrixXd N =
       unobservable_combinations(model.layout(), std::array{run.machine.target_offset_m});
   const auto n = static_cast<Eigen::Index>(model.layout().model_size());
   const Eigen::VectorXd shift = N.rowwise().sum() / N.cwiseAbs().maxCoeff() * 1e-4;
-  const VolumetricModel shifted =
-      *VolumetricModel::from_vector(model.layout(), Gauge::G1, model.tool_offsets_m(),
-                                    model.U() + shift.head(n), model.covariance(), model.validity());
+  const VolumetricModel shifted = *VolumetricModel::from_vector(
+      model.layout(), Gauge::G1, model.tool_offsets_m(), model.U() + shift.head(n),
+      model.covariance(), model.validity());
   const double as_stated = held_out(id.observations, &model, run.options)->active.value();
   const double in_other_gauge = held_out(id.observations, &shifted, run.options)->active.value();
   EXPECT_NEAR(in_other_gauge, as_stated, 1e-6);
@@ -145,14 +153,17 @@ std::size_t give_a_node_to_one_fold(Observations& o, std::size_t folds) {
       }
     }
   };
+
   each([&](const Observation&, std::size_t column) { ++rows_of[column]; });
   const auto rarest = std::min_element(rows_of.begin(), rows_of.end());
   const auto column = static_cast<std::size_t>(rarest - rows_of.begin());
+
   each([&](Observation& row, std::size_t c) {
     if (c == column) {
       row.leg = row.leg / folds * folds;  // fold 0
     }
   });
+
   return *rarest;
 }
 
@@ -169,8 +180,8 @@ TEST(Judge, HoldsOutNothingThatAloneTouchesANode) {
               Contains(HasSubstr("were not held out")));
 }
 
-/// A volume that holds a few observations of every fold only: a rigid motion fits six of them exactly, under
-/// any model.
+/// A volume that holds a few observations of every fold only: a rigid motion fits six of them
+/// exactly, under any model.
 TEST(Judge, ComparesNothingWhereARigidMotionFitsAnyModel) {
   const MadeRun run = make_run({.seed = 1});
   const Identification id = identified(run);
@@ -178,14 +189,19 @@ TEST(Judge, ComparesNothingWhereARigidMotionFitsAnyModel) {
   const Observation& row = id.observations.rows[id.observations.rows.size() / 2];
   const Vector3 at = id.observations.sub_points_m[row.first_sub_point + row.sub_points / 2];
   std::vector<Vector3> around;
+
   for (int corner = 0; corner < 8; ++corner) {
-    const Vector3 d((corner & 1) != 0 ? 1 : -1, (corner & 2) != 0 ? 1 : -1, (corner & 4) != 0 ? 1 : -1);
+    const Vector3 d((corner & 1) != 0 ? 1 : -1, (corner & 2) != 0 ? 1 : -1,
+                    (corner & 4) != 0 ? 1 : -1);
     around.emplace_back(at + 0.012 * d);  // a block is 16 mm long
   }
-  const VolumetricModel active = *VolumetricModel::from_vector(
-      m.layout(), Gauge::G1, m.tool_offsets_m(), m.U(), m.covariance(), *ValidityVolume::hull_of(around));
+
+  const VolumetricModel active =
+      *VolumetricModel::from_vector(m.layout(), Gauge::G1, m.tool_offsets_m(), m.U(),
+                                    m.covariance(), *ValidityVolume::hull_of(around));
   ASSERT_TRUE(active.validity().contains(at));
   const auto held = held_out(id.observations, &active, run.options);
+
   ASSERT_TRUE(held) << held.error().text;
   EXPECT_FALSE(held->active) << *held->active << " against " << *held->candidate_beside_active;
   EXPECT_EQ(held->observations_beside_active, 0u);
@@ -196,7 +212,8 @@ TEST(Judge, NeedsLegsForEveryFold) {
   MadeRun run = make_run({});
   const Identification id = identified(run);
   run.options.held_out_folds = 500;
-  EXPECT_EQ(held_out(id.observations, nullptr, run.options).error().code, ErrorCode::TooFewObservations);
+  EXPECT_EQ(held_out(id.observations, nullptr, run.options).error().code,
+            ErrorCode::TooFewObservations);
 }
 
 }  // namespace

@@ -35,7 +35,7 @@ TEST(LackOfFit, NothingIsFoundInASoundRun) {
 TEST(LackOfFit, WhiteNoiseWidensNoCovariance) {
   const Identification id = identification_of(make_run({}));
   EXPECT_EQ(id.solution.statistics.correlation, 1.0);
-  EXPECT_EQ(id.solution.statistics.covariance_factor, 1.0);
+  EXPECT_EQ(id.solution.statistics.variance_factor, 1.0);
 }
 
 // An autocorrelation of rho from block to block divides the information by (1 + rho) / (1 - rho).
@@ -43,16 +43,19 @@ TEST(LackOfFit, CorrelatedNoiseWidensTheCovariance) {
   MadeRun run = make_run({.noise_factor = 0.0});
   std::mt19937_64 random(7);
   std::normal_distribution<double> normal;
-  const double rho = 0.8, keep = std::pow(rho, 1.0 / static_cast<double>(run.options.block_samples));
+  const double rho = 0.8,
+               keep = std::pow(rho, 1.0 / static_cast<double>(run.options.block_samples));
   Vector3 noise_m = Vector3::Zero();
+
   for (TrackerObservation& sample : run.samples) {
     const Vector3 fresh(normal(random), normal(random), normal(random));
     noise_m = keep * noise_m + 3e-6 * std::sqrt(1.0 - keep * keep) * fresh;
     sample.p_tracker_m += noise_m;
   }
+
   const Statistics s = identification_of(run).solution.statistics;
   EXPECT_NEAR(s.correlation, (1.0 + rho) / (1.0 - rho), 2.5);
-  EXPECT_NEAR(s.covariance_factor, s.correlation * s.chi2_per_dof, 1e-9 * s.covariance_factor);
+  EXPECT_NEAR(s.variance_factor, s.correlation * s.chi2_per_dof, 1e-9 * s.variance_factor);
 }
 
 struct Case {
@@ -93,29 +96,29 @@ TEST_P(NamedCause, IsTheFirstReason) {
 
 INSTANTIATE_TEST_SUITE_P(
     LackOfFit, NamedCause,
-    testing::Values(Case{Cause::Moved, "moved by 37.",
-                         [](MadeRun& run) {
-                           move_samples(run, [](double share, const Vector3&) {
-                             return share < 0.6 ? Vector3(Vector3::Zero()) : kShift_m;
-                           });
-                         }},
-                    Case{Cause::Drift, "drifts: by 37.",
-                         [](MadeRun& run) {
-                           move_samples(
-                               run, [](double share, const Vector3&) { return Vector3(share * kShift_m); });
-                         }},
-                    Case{Cause::Vertex, "vertex 20 was driven at (",
-                         [](MadeRun& run) { run.path.vertices_m[20] += Vector3(0.1e-3, 0.1e-3, -0.1e-3); }},
-                    Case{Cause::RangeOffset, "all ranges of the tracker have an offset of ",
-                         [](MadeRun& run) {
-                           move_samples(run, [](double, const Vector3& p) {
-                             return Vector3(0.3e-3 * p.normalized());
-                           });
-                         }},
-                    Case{Cause::ChainOrder, "in the order XYZ from workpiece to tool, not ZYX",
-                         [](MadeRun& run) { run.machine.chain = *KinematicChain::parse("[w b Z Y X t]"); }},
-                    Case{Cause::NodeSpacing, "too far apart (600 mm)",
-                         [](MadeRun& run) { run.machine.nodes[0] = *equidistant_nodes(-0.3, 0.3, 0.6); }}));
+    testing::Values(
+        Case{Cause::Moved, "moved by 37.",
+             [](MadeRun& run) {
+               move_samples(run, [](double share, const Vector3&) {
+                 return share < 0.6 ? Vector3(Vector3::Zero()) : kShift_m;
+               });
+             }},
+        Case{Cause::Drift, "drifts: by 37.",
+             [](MadeRun& run) {
+               move_samples(run,
+                            [](double share, const Vector3&) { return Vector3(share * kShift_m); });
+             }},
+        Case{Cause::Vertex, "vertex 20 was driven at (",
+             [](MadeRun& run) { run.path.vertices_m[20] += Vector3(0.1e-3, 0.1e-3, -0.1e-3); }},
+        Case{Cause::RangeOffset, "all ranges of the tracker have an offset of ",
+             [](MadeRun& run) {
+               move_samples(
+                   run, [](double, const Vector3& p) { return Vector3(0.3e-3 * p.normalized()); });
+             }},
+        Case{Cause::ChainOrder, "in the order XYZ from workpiece to tool, not ZYX",
+             [](MadeRun& run) { run.machine.chain = *KinematicChain::parse("[w b Z Y X t]"); }},
+        Case{Cause::NodeSpacing, "too far apart (600 mm)",
+             [](MadeRun& run) { run.machine.nodes[0] = *equidistant_nodes(-0.3, 0.3, 0.6); }}));
 
 TEST(LackOfFit, RefusesACorrectionOfTheSizeOfItsUncertainty) {
   MadeRun run = make_run({.error_scale_m = 1e-6});

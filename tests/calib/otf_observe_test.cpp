@@ -42,12 +42,13 @@ TEST(PathFrame, AlongTheBeamIsAnyPerpendicularPair) {
 TEST(SampleCovariance, IsTheSphericalOneThroughItsJacobian) {
   const double r = 1.7, az = 0.6, el = 0.4;
   Matrix3 J;
-  J << std::cos(el) * std::cos(az), -r * std::cos(el) * std::sin(az), -r * std::sin(el) * std::cos(az),
-      std::cos(el) * std::sin(az), r * std::cos(el) * std::cos(az), -r * std::sin(el) * std::sin(az),
-      std::sin(el), 0, r * std::cos(el);
+  J << std::cos(el) * std::cos(az), -r * std::cos(el) * std::sin(az),
+      -r * std::sin(el) * std::cos(az), std::cos(el) * std::sin(az),
+      r * std::cos(el) * std::cos(az), -r * std::sin(el) * std::sin(az), std::sin(el), 0,
+      r * std::cos(el);
   const double sa = kNoise.sigma_angle_rad;
-  const Vector3 variance(kNoise.sigma_range_m * kNoise.sigma_range_m, std::pow(sa / std::cos(el), 2),
-                         sa * sa);
+  const Vector3 variance(kNoise.sigma_range_m * kNoise.sigma_range_m,
+                         std::pow(sa / std::cos(el), 2), sa * sa);
   EXPECT_TRUE(sample_covariance_m2(from_spherical(r, az, el), kNoise)
                   .isApprox(J * variance.asDiagonal() * J.transpose(), 1e-12));
 }
@@ -65,9 +66,13 @@ TEST(DesignRows, AreAveragedOverTheBlock) {
   ASSERT_EQ(o.rows.size(), 2u);
   Eigen::VectorXd U = case_a_tables(TableColumn::Truth);
   Vector3 mean = Vector3::Zero();
+
   for (const Vector3& q : sub) {
-    mean += volumetric_error(o.layout, {U.data(), o.layout.model_size()}, q, machine.target_offset_m) / 4.0;
+    mean +=
+        volumetric_error(o.layout, {U.data(), o.layout.model_size()}, q, machine.target_offset_m) /
+        4.0;
   }
+
   U.conservativeResizeLike(Eigen::VectorXd::Zero(169));
   for (std::size_t i = 0; i < 2; ++i) {
     double predicted = 0;
@@ -76,8 +81,9 @@ TEST(DesignRows, AreAveragedOverTheBlock) {
     }
     EXPECT_NEAR(predicted, o.rows[i].direction.dot(mean), 1e-18);
   }
-  const Vector3 at_mean = volumetric_error(o.layout, {U.data(), o.layout.model_size()}, point.axis_position_m,
-                                           machine.target_offset_m);
+
+  const Vector3 at_mean = volumetric_error(o.layout, {U.data(), o.layout.model_size()},
+                                           point.axis_position_m, machine.target_offset_m);
   EXPECT_GT((at_mean - mean).norm(), 0.1e-6);  // what would be lost
 }
 
@@ -89,7 +95,8 @@ TEST(Observe, DividesTheNoiseByTheSamplesOfABlock) {
   const Observation& across = o->rows[1];
   const RigidTransform& T = o->alignment.T_machine_tracker;
   const double range_m = (across.axis_position_m + run.machine.target_offset_m - T.t_m).norm();
-  EXPECT_NEAR(across.sigma_m, run.noise.sigma_angle_rad * range_m / std::sqrt(10.0), 1e-3 * across.sigma_m);
+  EXPECT_NEAR(across.sigma_m, run.noise.sigma_angle_rad * range_m / std::sqrt(10.0),
+              1e-3 * across.sigma_m);
 }
 
 TEST(Observe, RefusesBlocksThatStraddleCorners) {

@@ -33,7 +33,8 @@ Verdict verdict_with(const OrientationEvidence& evidence, const RigidTransform& 
   return verdict;
 }
 
-/// What the alignment gives with X and Y reversed in the path file: the target moves by turn q + offset.
+/// What the alignment gives with X and Y reversed in the path file: the target moves by turn
+/// q + offset.
 RigidTransform about_z(RigidTransform T) {
   const Matrix3 turn = Vector3(-1, -1, 1).asDiagonal();
   return {turn * T.R, turn * (T.t_m - kTarget_m) + kTarget_m};
@@ -75,19 +76,22 @@ TEST(PathOrientation, QuarterTurnsAreNamedByTheirColumns) {
   require_orientation(open, path, equal, kTarget_m, kTracker, {});
   EXPECT_THAT(open.reasons, ElementsAre(AllOf(HasSubstr("turned by 180 degrees about Z ("),
                                               HasSubstr("read as (-y, x, z) or (y, -x, z)"))));
+
   // Tracker found at the place turned by -90 degrees about Z.
   Matrix3 quarter = Matrix3::Zero();
   quarter(0, 1) = 1, quarter(1, 0) = -1, quarter(2, 2) = 1;
-  const RigidTransform found{quarter * kTracker.R, quarter * (kTracker.t_m - kTarget_m) + kTarget_m};
+  const RigidTransform found{quarter * kTracker.R,
+                             quarter * (kTracker.t_m - kTarget_m) + kTarget_m};
   require_orientation(contradicted, path, equal, kTarget_m, found, {.tracker_m = kTracker.t_m});
   EXPECT_THAT(contradicted.reasons,
               ElementsAre(HasSubstr("columns (x, y, z) of the path file read as (-y, x, z)")));
 }
 
 TEST(PathOrientation, WithoutEvidenceTheModelIsRefusedAndWhatHelpsIsNamed) {
-  EXPECT_THAT(verdict_with({}).reasons,
-              ElementsAre(AllOf(HasSubstr("turned by 180 degrees about X, Y or Z"),
-                                HasSubstr("tracker.vertical"), HasSubstr("accept path-orientation"))));
+  EXPECT_THAT(
+      verdict_with({}).reasons,
+      ElementsAre(AllOf(HasSubstr("turned by 180 degrees about X, Y or Z"),
+                        HasSubstr("tracker.vertical"), HasSubstr("accept path-orientation"))));
 }
 
 TEST(PathOrientation, AcceptedByNameItIsANote) {
@@ -109,11 +113,12 @@ TEST(PathOrientation, ALevelledTrackerLeavesTheTurnAboutTheVerticalOpen) {
 }
 
 TEST(PathOrientation, ThePlaceOfTheTrackerIsEnough) {
-  EXPECT_THAT(verdict_with({.tracker_m = kTracker.t_m + Vector3(0.2, -0.2, 0.1)}).reasons, IsEmpty());
+  EXPECT_THAT(verdict_with({.tracker_m = kTracker.t_m + Vector3(0.2, -0.2, 0.1)}).reasons,
+              IsEmpty());
 }
 
-/// 0.4 m from the line along X through the target offset, a half turn moves the tracker by 0.8 m: not more
-/// than twice what its place is known to.
+/// 0.4 m from the line along X through the target offset, a half turn moves the tracker by 0.8 m:
+/// not more than twice what its place is known to.
 TEST(PathOrientation, APlaceNearAnAxisLeavesTheTurnAboutItOpen) {
   const RigidTransform near_x{Matrix3::Identity(), {2.0, 0.7, -0.4}};
   EXPECT_THAT(verdict_with({.tracker_m = near_x.t_m}, near_x).reasons,
@@ -121,16 +126,17 @@ TEST(PathOrientation, APlaceNearAnAxisLeavesTheTurnAboutItOpen) {
 }
 
 TEST(PathOrientation, APlaceThatFitsAfterAHalfTurnNamesIt) {
-  EXPECT_THAT(
-      verdict_with({.tracker_m = kTracker.t_m}, about_z(kTracker)).reasons,
-      ElementsAre(AllOf(HasSubstr("from the place that is given"), HasSubstr("by 180 degrees about Z"),
-                        HasSubstr("signs of the other two axes are reversed"))));
+  EXPECT_THAT(verdict_with({.tracker_m = kTracker.t_m}, about_z(kTracker)).reasons,
+              ElementsAre(AllOf(HasSubstr("from the place that is given"),
+                                HasSubstr("by 180 degrees about Z"),
+                                HasSubstr("signs of the other two axes are reversed"))));
 }
 
 TEST(PathOrientation, ALevelledTrackerUpsideDownNamesTheFirstTurnThatHelps) {
   const Matrix3 turn = Vector3(1, -1, -1).asDiagonal();
-  EXPECT_THAT(verdict_with({.up = Vector3::UnitZ()}, {turn, turn * kTracker.t_m}).reasons,
-              ElementsAre(AllOf(HasSubstr("180 degrees off"), HasSubstr("by 180 degrees about X"))));
+  EXPECT_THAT(
+      verdict_with({.up = Vector3::UnitZ()}, {turn, turn * kTracker.t_m}).reasons,
+      ElementsAre(AllOf(HasSubstr("180 degrees off"), HasSubstr("by 180 degrees about X"))));
 }
 
 TEST(PathOrientation, EvidenceThatNoHalfTurnExplainsNamesWhatToCheck) {

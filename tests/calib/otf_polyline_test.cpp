@@ -66,7 +66,8 @@ TEST(PathCheck, NamesTheVertexTheAxisAndItsTravel) {
   const auto refused = check(outside, travel());
   ASSERT_FALSE(refused);
   EXPECT_EQ(refused.error().code, ErrorCode::BadInput);
-  EXPECT_THAT(refused.error().text, HasSubstr("vertex 2 at Y 501 mm, the axis travels -100 to 500 mm"));
+  EXPECT_THAT(refused.error().text,
+              HasSubstr("vertex 2 at Y 501 mm, the axis travels -100 to 500 mm"));
 }
 
 // X travels -100 to 500 mm, as do Y and Z: -500 lies inside once it is reversed.
@@ -91,7 +92,8 @@ TEST(BlockLength, IsTheTravelOfEightMillimetres) {
       samples.push_back(
           {.time_s = time_s, .p_tracker_m = {1.0 + speed_m_s * std::max(0.0, time_s - 2.0), 0, 0}});
     }
-    EXPECT_NEAR(static_cast<double>(suitable_block_samples(samples)), 8.33e-3 / (0.002 * speed_m_s), 1.0);
+    EXPECT_NEAR(static_cast<double>(suitable_block_samples(samples)), 8.33e-3 / (0.002 * speed_m_s),
+                1.0);
   }
 }
 
@@ -100,7 +102,8 @@ TEST(BlockLength, StaysBetweenTenAndAThousand) {
   EXPECT_EQ(suitable_block_samples(standing), 1000u);
   EXPECT_EQ(suitable_block_samples({}), 10u);
   std::vector<TrackerObservation> racing;
-  for (int i = 0; i < 1000; ++i) racing.push_back({.time_s = 0.01 * i, .p_tracker_m = {0.02 * i, 0, 0}});
+  for (int i = 0; i < 1000; ++i)
+    racing.push_back({.time_s = 0.01 * i, .p_tracker_m = {0.02 * i, 0, 0}});
   EXPECT_EQ(suitable_block_samples(racing), 10u);
 }
 

@@ -1,4 +1,5 @@
-/// The offset that all ranges have in common, estimated with its prior beside the errors of the machine.
+/// The offset that all ranges have in common, estimated with its prior beside the errors of the
+/// machine.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -39,29 +40,33 @@ struct Dense {
   Eigen::VectorXd fitted;  ///< of every row, divided by its standard uncertainty
 };
 
-/// Rows and prior in one dense least-squares problem; the rigid motion and the gauge by the shortest
-/// solution.
+/// Rows and prior in one dense least-squares problem; the rigid motion and the gauge by the
+/// shortest solution.
 Dense dense_solution(const Observations& o) {
   const auto rows = static_cast<Eigen::Index>(o.rows.size()),
              n = static_cast<Eigen::Index>(o.layout.fit_size());
   Eigen::MatrixXd A = Eigen::MatrixXd::Zero(rows + 1, n + 1);
   Eigen::VectorXd y = Eigen::VectorXd::Zero(rows + 1);
   constexpr double kUnit_m = 1e-6;  // of the offset
+
   for (Eigen::Index i = 0; i < rows; ++i) {
     const auto k = static_cast<std::size_t>(i);
     const double sigma_m = o.rows[k].sigma_m;
     for (const SparseRows::Entry& e : o.A.row(k))
       A(i, static_cast<Eigen::Index>(e.column)) += e.value / sigma_m;
-    const Vector3 beam = o.rows[k].axis_position_m + o.target_offset_m - o.alignment.T_machine_tracker.t_m;
+    const Vector3 beam =
+        o.rows[k].axis_position_m + o.target_offset_m - o.alignment.T_machine_tracker.t_m;
     A(i, n) = o.rows[k].direction.dot(beam) / beam.norm() * kUnit_m / sigma_m;
     y(i) = o.rows[k].y_m / sigma_m;
   }
+
   A(rows, n) = kUnit_m / o.u_range_offset_m;
   const Eigen::VectorXd length = A.colwise().norm();
   const Eigen::MatrixXd scaled = A * length.cwiseInverse().asDiagonal();
   Eigen::CompleteOrthogonalDecomposition<Eigen::MatrixXd> qr(scaled);
   const Eigen::VectorXd x = length.cwiseInverse().asDiagonal() * qr.solve(y);
   const Eigen::MatrixXd pseudo = qr.pseudoInverse();
+
   return {kUnit_m * x(n), kUnit_m * pseudo.row(n).norm() / length(n), (A * x).head(rows)};
 }
 
@@ -106,7 +111,8 @@ TEST(RangeOffset, BeyondItsStatedUncertaintyItIsNamed) {
   const Identification id = identification(run);
   const auto verdict = judge(id.observations, id.solution, nullptr, {}, run.options);
   ASSERT_TRUE(verdict) << verdict.error().text;
-  EXPECT_THAT(verdict->reasons, Contains(AllOf(HasSubstr("offset of"), HasSubstr("stated are 6 um"))));
+  EXPECT_THAT(verdict->reasons,
+              Contains(AllOf(HasSubstr("offset of"), HasSubstr("stated are 6 um"))));
 }
 
 TEST(RangeOffset, WithinItsStatedUncertaintyNothingIsSaid) {

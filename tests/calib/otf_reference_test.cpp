@@ -19,8 +19,9 @@ VectorStatistics grid_error(const VolumetricModel& model) {
   const Eigen::VectorXd truth = case_a_tables(TableColumn::Truth);
   std::vector<Vector3> left;
   for (const Vector3& q : tensor_grid(machine.nodes)) {
-    left.push_back(model.V_at(q, machine.target_offset_m) -
-                   volumetric_error(layout, {truth.data(), layout.model_size()}, q, machine.target_offset_m));
+    left.push_back(
+        model.V_at(q, machine.target_offset_m) -
+        volumetric_error(layout, {truth.data(), layout.model_size()}, q, machine.target_offset_m));
   }
   return vector_statistics(left);
 }
@@ -30,17 +31,21 @@ TEST(CaseA, FromItsBlockMeansIsWithinTheAskedError) {
   const RigidTransform T = case_a_alignment(true);
   const Path path = case_a_path();
   const Machine machine = case_a_machine();
+
   const auto seen_at = [&](const Vector3& vertex) {
     return Vector3(T.R.transpose() * (vertex + machine.target_offset_m - T.t_m));
   };
-  const auto series = blocks_from_means(case_a_blocks().means_tracker_m, seen_at(path.vertices_m.front()),
-                                        seen_at(path.vertices_m.back()), {});
+
+  const auto series =
+      blocks_from_means(case_a_blocks().means_tracker_m, seen_at(path.vertices_m.front()),
+                        seen_at(path.vertices_m.back()), {});
   const auto o = observe_blocks(*series, machine, path, {});
   ASSERT_TRUE(o) << o.error().text;
   const auto solution = solve(*o);
   ASSERT_TRUE(solution) << solution.error().text;
   EXPECT_EQ(solution->statistics.rank, 149u);
   EXPECT_LE(grid_error(solution->model).mean_m, 0.105e-6);
+
   // Sub-points are interpolated and the ends are not measured ones: 2e-9 where samples give 1e-9.
   const Eigen::VectorXd reference = case_a_tables(TableColumn::NoisyTwoStep);
   EXPECT_LT((solution->model.U() - reference).cwiseAbs().maxCoeff(), 2e-9);
@@ -66,10 +71,11 @@ class CaseAStream : public testing::TestWithParam<Stream> {
   }
   std::optional<Identification> id_;
 };
-INSTANTIATE_TEST_SUITE_P(
-    Noise, CaseAStream,
-    testing::Values(Stream{"caseA_stream_noisefree.i32", false, TableColumn::NoiseFreeTwoStep, 0.026e-6},
-                    Stream{"caseA_stream_noisy.i32", true, TableColumn::NoisyTwoStep, 0.105e-6}));
+INSTANTIATE_TEST_SUITE_P(Noise, CaseAStream,
+                         testing::Values(Stream{"caseA_stream_noisefree.i32", false,
+                                                TableColumn::NoiseFreeTwoStep, 0.026e-6},
+                                         Stream{"caseA_stream_noisy.i32", true,
+                                                TableColumn::NoisyTwoStep, 0.105e-6}));
 
 TEST_P(CaseAStream, AlignsAsThePrototype) {
   const RigidTransform reference = case_a_alignment(GetParam().noisy);
@@ -99,13 +105,15 @@ TEST_P(CaseAStream, IsWithinTheAskedError) {
   EXPECT_LE(grid_error(id_->solution.model).mean_m, GetParam().asked_mean_m);
 }
 
-/// Every sample a row, weights per sample, the prototype's own alignment: the normal equations to rounding.
+/// Every sample a row, weights per sample, the prototype's own alignment: the normal equations to
+/// rounding.
 TEST(CaseANormalEquations, OfAllSamplesAreThePrototypes) {
-  const auto stream = big_file("caseA_stream_noisy.i32"), H_file = big_file("caseA_H_all_noisy.f64"),
-             g_file = big_file("caseA_g_all_noisy.f64");
+  const auto stream = big_file("caseA_stream_noisy.i32"),
+             H_file = big_file("caseA_H_all_noisy.f64"), g_file = big_file("caseA_g_all_noisy.f64");
   if (!stream || !H_file || !g_file) {
     GTEST_SKIP() << "caseA_H_all_noisy.f64 is not there: set ABBE_REF_DIR";
   }
+
   const std::vector<TrackerObservation> samples = read_stream(*stream);
   const std::vector<std::size_t> leg = case_a_blocks().leg;
   const Machine machine = case_a_machine();
@@ -113,6 +121,7 @@ TEST(CaseANormalEquations, OfAllSamplesAreThePrototypes) {
   const RigidTransform T = case_a_alignment(true);
   const ParameterLayout layout = layout_of(machine);
   NormalEquations N(layout.fit_size());
+
   for (std::size_t block = 0; block < leg.size(); ++block) {
     const Vector3 &from = path.vertices_m[leg[block]], &to = path.vertices_m[leg[block] + 1];
     Observations o{.layout = layout, .target_offset_m = machine.target_offset_m};
@@ -124,20 +133,25 @@ TEST(CaseANormalEquations, OfAllSamplesAreThePrototypes) {
         append_rows(o, {0, 0, q - c.closest_m, c.closest_m, frame, 1.0}, std::array{c.closest_m});
       }
     }
+
     for (std::size_t row = 0; row < o.rows.size(); ++row) {
       N.add(o.A.row(row), o.rows[row]);
     }
   }
+
   EXPECT_EQ(N.rows, 2u * 466068u);
-  const std::vector<double> H_values = read_binary<double>(*H_file), g_values = read_binary<double>(*g_file);
+  const std::vector<double> H_values = read_binary<double>(*H_file),
+                            g_values = read_binary<double>(*g_file);
   const Eigen::Map<const Eigen::MatrixXd> H(H_values.data(), 169, 169);
   const Eigen::Map<const Eigen::VectorXd> g(g_values.data(), 169);
   double worst = 0.0;
+
   for (Eigen::Index j = 0; j < 169; ++j) {
     for (Eigen::Index i = j; i < 169; ++i) {
       worst = std::max(worst, std::abs(N.H(i, j) - H(i, j)) / std::sqrt(H(i, i) * H(j, j)));
     }
   }
+
   EXPECT_LT(worst, 1e-12);
   EXPECT_LT((N.g - g).cwiseAbs().maxCoeff() / g.cwiseAbs().maxCoeff(), 1e-9);
 }

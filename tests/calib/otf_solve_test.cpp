@@ -34,6 +34,7 @@ TEST(Identification, EndsWhenItIsStoppedWhereverItIs) {
   ASSERT_TRUE(solve(o, run.options));
   const int looks = asked;
   ASSERT_GT(looks, 7);  // once in an update of the alignment, of which there are 7 at least
+
   for (const int at : {0, looks / 2, looks - 1}) {
     asked = 0;
     stop_at = at;
@@ -41,6 +42,7 @@ TEST(Identification, EndsWhenItIsStoppedWhereverItIs) {
     const auto error = seen ? solve(*seen, run.options).error() : seen.error();
     EXPECT_THAT(error.text, HasSubstr("stopped before its end")) << stop_at;
   }
+
   stop_at = 0;
   asked = 0;
   EXPECT_FALSE(held_out(o, nullptr, run.options));
@@ -51,10 +53,12 @@ TEST(Adjustment, MeetsTheGaugeExactlyWhateverItsWeight) {
   const NormalEquations N = normal_equations(o);
   const Adjustment reference = *adjust(N, o.layout, 1.0);
   const Eigen::MatrixXd K = gauge_conditions(Gauge::G1, o.layout);
+
   for (const double weight : {1e-3, 1e-1, 10.0, 1e3}) {
     const Adjustment a = *adjust(N, o.layout, weight);
-    EXPECT_LT((K * a.U).cwiseAbs().maxCoeff(), 1e-15) << weight;            // rounding of 1e-4
-    EXPECT_LT((a.U - reference.U).cwiseAbs().maxCoeff(), 1e-12) << weight;  // of 1e-4: rounding x condition
+    EXPECT_LT((K * a.U).cwiseAbs().maxCoeff(), 1e-15) << weight;  // rounding of 1e-4
+    EXPECT_LT((a.U - reference.U).cwiseAbs().maxCoeff(), 1e-12)
+        << weight;  // of 1e-4: rounding x condition
     EXPECT_LT((a.covariance - reference.covariance).cwiseAbs().maxCoeff(),
               1e-6 * reference.covariance.cwiseAbs().maxCoeff())
         << weight;
@@ -64,7 +68,7 @@ TEST(Adjustment, MeetsTheGaugeExactlyWhateverItsWeight) {
 TEST(Adjustment, KnowsRankAndNullSpaceOfTheData) {
   const Observations o = observed(make_run({}));
   const Adjustment a = *adjust(normal_equations(o), o.layout);
-  EXPECT_EQ(a.null_combinations, 20u);
+  EXPECT_EQ(a.datum_defect, 20u);
   EXPECT_EQ(a.rank, o.layout.fit_size() - 20);
   EXPECT_GT(a.condition, 1.0);
   EXPECT_LT(a.condition, 1e3);
@@ -73,7 +77,8 @@ TEST(Adjustment, KnowsRankAndNullSpaceOfTheData) {
 TEST(Adjustment, HasNoUncertaintyWhereTheGaugeFixesAValue) {
   const Observations o = observed(make_run({}));
   const Adjustment a = *adjust(normal_equations(o), o.layout);
-  const auto first_straightness = static_cast<Eigen::Index>(o.layout.find({Motion::Y, Axis::X})->offset);
+  const auto first_straightness =
+      static_cast<Eigen::Index>(o.layout.find({Motion::Y, Axis::X})->offset);
   EXPECT_EQ(a.U(first_straightness), 0.0);
   EXPECT_EQ(a.covariance.row(first_straightness).norm(), 0.0);
   EXPECT_GT(a.covariance(first_straightness + 1, first_straightness + 1), 0.0);
@@ -94,39 +99,45 @@ TEST(Adjustment, HasNoNegativeVarianceWhereRoundingPutsANodeBesideTheReference) 
   }
 }
 
-/// Var of any weighted least-squares estimate, from its definition: the sandwich holds for weights that are
-/// wrong.
+/// Var of any weighted least-squares estimate, from its definition: the sandwich holds for weights
+/// that are wrong.
 TEST(Adjustment, StatesTheCovarianceOfWrongWeights) {
   Observations o = observed(make_run({}));
   const Adjustment right = *adjust(normal_equations(o), o.layout);
   for (Observation& r : o.rows) {
     r.weight *= r.leg % 2 == 0 ? 4.0 : 0.25;
   }
+
   const Adjustment wrong = *adjust(normal_equations(o), o.layout);
   // Gauss-Markov: no other weights do better, in any direction.
   const Eigen::MatrixXd excess = wrong.covariance - right.covariance;
   const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(excess, Eigen::EigenvaluesOnly);
   EXPECT_GT(eigen.eigenvalues().minCoeff(), -1e-9 * eigen.eigenvalues().maxCoeff());
   EXPECT_GT(eigen.eigenvalues().maxCoeff(), 0.0);
+
   // A common factor of all weights changes nothing.
   for (Observation& r : o.rows) {
     r.weight = 7.0 / (r.sigma_m * r.sigma_m);
   }
+
   EXPECT_TRUE(adjust(normal_equations(o), o.layout)->covariance.isApprox(right.covariance, 1e-9));
 }
 
-/// Same design, new white noise of the stated size, 40 times: k = 2 intervals must hold for 95.45 % of the
-/// values.
+/// Same design, new white noise of the stated size, 40 times: k = 2 intervals must hold for 95.45 %
+/// of the values.
 TEST(Adjustment, UncertaintyCoversTheTruth) {
   MadeRun run = make_run({});
   Observations o = observed(run);
-  Eigen::VectorXd with_rigid = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(o.layout.fit_size()));
+  Eigen::VectorXd with_rigid =
+      Eigen::VectorXd::Zero(static_cast<Eigen::Index>(o.layout.fit_size()));
   with_rigid.head(run.truth.size()) = run.truth;
-  const Eigen::VectorXd truth = *to_gauge(Gauge::G1, o.layout, std::array{o.target_offset_m}, with_rigid);
+  const Eigen::VectorXd truth =
+      *to_gauge(Gauge::G1, o.layout, std::array{o.target_offset_m}, with_rigid);
   std::mt19937_64 random(99);
   std::normal_distribution<double> normal;
   std::size_t inside = 0, all = 0;
   double chi2 = 0.0;
+
   for (int repeat = 0; repeat < 40; ++repeat) {
     for (std::size_t i = 0; i < o.rows.size(); ++i) {
       o.rows[i].y_m = o.rows[i].sigma_m * normal(random);
@@ -134,6 +145,7 @@ TEST(Adjustment, UncertaintyCoversTheTruth) {
         o.rows[i].y_m += e.value * truth(static_cast<Eigen::Index>(e.column));
       }
     }
+
     const Adjustment a = *adjust(normal_equations(o), o.layout);
     for (Eigen::Index i = 0; i < truth.size(); ++i) {
       if (const double u = std::sqrt(a.covariance(i, i)); u > 0) {
@@ -144,8 +156,9 @@ TEST(Adjustment, UncertaintyCoversTheTruth) {
       }
     }
   }
-  // 40 x about 45 values with strong correlations: a few hundred independent ones, so 3 standard deviations
-  // are 0.04 and 0.2.
+
+  // 40 x about 45 values with strong correlations: a few hundred independent ones, so 3 standard
+  // deviations are 0.04 and 0.2.
   EXPECT_NEAR(static_cast<double>(inside) / static_cast<double>(all), 0.9545, 0.04);
   EXPECT_NEAR(chi2 / static_cast<double>(all), 1.0, 0.2);
 }
@@ -205,16 +218,18 @@ TEST(WholeRun, BelievesTheStatedUncertaintyWhileTheResidualsAgree) {
   const MadeRun run = make_run({.seed = 4});
   const auto id = identify(run.samples, run.machine, run.path, run.noise, run.options);
   ASSERT_TRUE(id) << id.error().text;
-  EXPECT_EQ(id->solution.statistics.covariance_factor, 1.0);
+  EXPECT_EQ(id->solution.statistics.variance_factor, 1.0);
 }
 
 TEST(WholeRun, WidensTheUncertaintyWhenTheTrackerIsWorseThanStated) {
   const MadeRun stated = make_run({.seed = 4}), worse = make_run({.seed = 4, .noise_factor = 3.0});
-  const auto a = identify(stated.samples, stated.machine, stated.path, stated.noise, stated.options);
+  const auto a =
+      identify(stated.samples, stated.machine, stated.path, stated.noise, stated.options);
   const auto b = identify(worse.samples, worse.machine, worse.path, worse.noise, worse.options);
   ASSERT_TRUE(a && b);
-  EXPECT_NEAR(b->solution.statistics.covariance_factor, 9.0, 0.5);
-  EXPECT_NEAR(b->solution.model.covariance().trace() / a->solution.model.covariance().trace(), 9.0, 0.5);
+  EXPECT_NEAR(b->solution.statistics.variance_factor, 9.0, 0.5);
+  EXPECT_NEAR(b->solution.model.covariance().trace() / a->solution.model.covariance().trace(), 9.0,
+              0.5);
 }
 
 TEST(WholeRun, KnowsWhatAnErrorAllRangesShareDoesToTheModel) {
@@ -223,13 +238,17 @@ TEST(WholeRun, KnowsWhatAnErrorAllRangesShareDoesToTheModel) {
   const auto right = identify(run.samples, run.machine, run.path, run.noise, run.options);
   run.noise.u_scale = kScale;
   const auto unsure = identify(run.samples, run.machine, run.path, run.noise, run.options);
+
   for (TrackerObservation& s : run.samples) {
     s.p_tracker_m *= 1.0 + kScale;
   }
+
   const auto wrong = identify(run.samples, run.machine, run.path, run.noise, run.options);
   ASSERT_TRUE(right && unsure && wrong);
   const Eigen::VectorXd moved = wrong->solution.model.U() - right->solution.model.U();
-  const Eigen::MatrixXd added = unsure->solution.model.covariance() - right->solution.model.covariance();
+  const Eigen::MatrixXd added =
+      unsure->solution.model.covariance() - right->solution.model.covariance();
+
   // Table by table, in units of the largest: EXX grows by 1e-5 of its axis.
   const double largest_m = moved.cwiseAbs().maxCoeff();
   EXPECT_GT(largest_m, 0.3 * kScale);

@@ -13,13 +13,15 @@ Path random_path(std::size_t vertices, double step_m, std::mt19937& random) {
   Vector3 p = Vector3::Zero();
   for (std::size_t i = 0; i < vertices; ++i) {
     path.vertices_m.push_back(p);
-    if (i % 7 != 3) p += Vector3(step(random), step(random), step(random));  // else a leg that is a point
+    if (i % 7 != 3)
+      p += Vector3(step(random), step(random), step(random));  // else a leg that is a point
   }
   return path;
 }
 
 /// Every leg, one after the other.
-std::optional<std::size_t> first_of_all(const Path& path, const Vector3& p, double within, std::size_t from) {
+std::optional<std::size_t> first_of_all(const Path& path, const Vector3& p, double within,
+                                        std::size_t from) {
   for (std::size_t i = from; i + 1 < path.vertices_m.size(); ++i)
     if (nearest_on_leg(path.vertices_m[i], path.vertices_m[i + 1], p).off_m <= within) return i;
   return std::nullopt;
@@ -35,7 +37,8 @@ TEST(PathIndex, AnswersAsALookAtEveryLegDoes) {
       const double nearest = distance_to_path_m(index.path(), p);
       EXPECT_EQ(index.distance_m(p), nearest);
       const std::size_t from = random() % vertices;
-      EXPECT_EQ(index.first_within(p, nearest), first_of_all(index.path(), p, nearest, 0)) << "exactly there";
+      EXPECT_EQ(index.first_within(p, nearest), first_of_all(index.path(), p, nearest, 0))
+          << "exactly there";
       EXPECT_EQ(index.first_within(p, 0.1, from), first_of_all(index.path(), p, 0.1, from));
     }
   }

@@ -48,7 +48,8 @@ TEST(ProbeDelay, FindsAFallingPlaceAsANegativeDelay) {
   EXPECT_NEAR(fit->delay_s, -1e-3, 6 * fit->u_delay_s);
 }
 
-/// Of 2000 calibrations of a probe: the share in which the truth lies within 1.96 u, and the jitter found.
+/// Of 2000 calibrations of a probe: the share in which the truth lies within 1.96 u, and the jitter
+/// found.
 struct Coverage {
   double share = 0.0;
   double jitter_s = 0.0;
@@ -84,13 +85,14 @@ TEST(ProbeDelay, StatesAnUncertaintyThatHoldsForFewTouches) {
   EXPECT_GE(coverage({}, {1e-3, 2e-3, 3e-3, 4e-3, 6e-3, 8e-3}, 3).share, 0.93);
 }
 
-/// The same, and three feeds: their disagreement is one number, which is known to nobody better than
-/// Student's t with one degree of freedom says.
+/// The same, and three feeds: their disagreement is one number, which is known to nobody better
+/// than Student's t with one degree of freedom says.
 TEST(ProbeDelay, StatesAnUncertaintyThatHoldsWhereThreeFeedsDoNotAgree) {
   std::mt19937 random(8);
   std::normal_distribution<double> normal;
   int held = 0;
   constexpr int kRuns = 2000;
+
   for (int run = 0; run < kRuns; ++run) {
     auto some = touches({.jitter_s = 0.0}, kThreeFeeds, 10, random);
     for (int feed = 0; feed < 3; ++feed) {
@@ -100,17 +102,21 @@ TEST(ProbeDelay, StatesAnUncertaintyThatHoldsWhereThreeFeedsDoNotAgree) {
     const auto fit = fit_delay(some).value();
     held += std::abs(fit.delay_s - Truth{}.delay_s) <= 1.96 * fit.u_delay_s ? 1 : 0;
   }
-  EXPECT_NEAR(static_cast<double>(held) / kRuns, 0.95, 0.015);  // three standard deviations of the share
+
+  EXPECT_NEAR(static_cast<double>(held) / kRuns, 0.95,
+              0.015);  // three standard deviations of the share
 }
 
-/// Every feed has an error of its own (the surface was warmer, the control overshot): the touches at a feed
-/// know nothing of it, the misfit does.
+/// Every feed has an error of its own (the surface was warmer, the control overshot): the touches
+/// at a feed know nothing of it, the misfit does.
 TEST(ProbeDelay, WidensItsUncertaintyWhereTheFeedsDoNotAgree) {
   std::mt19937 random(7);
   auto some = touches({.jitter_s = 0.0}, {1e-3, 3e-3, 5e-3, 8e-3}, 20, random);
   const auto before = fit_delay(some).value();
-  for (std::size_t i = 0; i < some.size(); ++i) some[i].along_m += i / 20 % 2 == 0 ? 0.2e-6 : -0.2e-6;
+  for (std::size_t i = 0; i < some.size(); ++i)
+    some[i].along_m += i / 20 % 2 == 0 ? 0.2e-6 : -0.2e-6;
   const auto after = fit_delay(some).value();
+
   ASSERT_GT(after.misfit, 4.0);
   ASSERT_LT(before.misfit, 1.0);
   EXPECT_EQ(before.dof, 76.0);
@@ -133,8 +139,10 @@ TEST(ProbeDelay, ShowsPlacesThatLieOnNoLine) {
 
 TEST(ProbeDelay, WantsThreeFeedsFarEnoughApart) {
   std::mt19937 random(5);
-  EXPECT_EQ(fit_delay(touches({}, {1e-3, 8e-3}, 10, random)).error().code, ErrorCode::TooFewObservations);
-  EXPECT_EQ(fit_delay(touches({}, kThreeFeeds, 2, random)).error().code, ErrorCode::TooFewObservations);
+  EXPECT_EQ(fit_delay(touches({}, {1e-3, 8e-3}, 10, random)).error().code,
+            ErrorCode::TooFewObservations);
+  EXPECT_EQ(fit_delay(touches({}, kThreeFeeds, 2, random)).error().code,
+            ErrorCode::TooFewObservations);
   EXPECT_EQ(fit_delay(touches({}, {3e-3, 4e-3, 5e-3}, 10, random)).error().code,
             ErrorCode::DegenerateGeometry);
   EXPECT_EQ(fit_delay({}).error().code, ErrorCode::TooFewObservations);

@@ -13,21 +13,23 @@ namespace {
 constexpr double kSphere_m = 12.5e-3;
 const Vector3 kCentre_m{0.31, -0.12, 0.05};
 
-/// A kinematic seat: three lobes around z that vanish at the pole, and a stylus that bends sideways.
+/// A kinematic seat: three lobes around z that vanish at the pole, and a stylus that bends
+/// sideways.
 double true_radius_m(const Vector3& n) {
   const double lobes = n[0] * n[0] * n[0] - 3.0 * n[0] * n[1] * n[1];
   return 2e-3 - 4e-6 + 1.5e-6 * lobes - 2e-6 * (1.0 - n[2] * n[2]);
 }
 
-/// Pole and rings of 12, evenly from an elevation of `lowest_rad` up; -0.3 is as far as a stylus reaches below.
+/// Pole and rings of 12, evenly from an elevation of `lowest_rad` up; -0.3 is as far as a stylus
+/// reaches below.
 std::vector<Vector3> directions(double lowest_rad, int rings) {
   std::vector<Vector3> all = {Vector3::UnitZ()};
   for (int ring = 0; ring < rings; ++ring) {
     const double elevation = lowest_rad + (std::numbers::pi / 2.0 - lowest_rad) * ring / rings;
     for (int k = 0; k < 12; ++k) {
       const double azimuth = 2.0 * std::numbers::pi * (k + 0.5 * (ring % 2)) / 12.0;
-      all.emplace_back(std::cos(elevation) * std::cos(azimuth), std::cos(elevation) * std::sin(azimuth),
-                       std::sin(elevation));
+      all.emplace_back(std::cos(elevation) * std::cos(azimuth),
+                       std::cos(elevation) * std::sin(azimuth), std::sin(elevation));
     }
   }
   return all;
@@ -71,6 +73,7 @@ TEST(ProbeQualification, StatesItsUncertainty) {
   int intervals = 0;
   double sigma2 = 0.0;
   constexpr int kRuns = 300;
+
   for (int run = 0; run < kRuns; ++run) {
     const auto q = qualify(touches(normals, 0.25e-6, random));
     ASSERT_TRUE(q);
@@ -81,6 +84,7 @@ TEST(ProbeQualification, StatesItsUncertainty) {
       ++intervals;
     }
   }
+
   const double covered = static_cast<double>(held) / intervals;
   RecordProperty("covered", std::to_string(covered));
   EXPECT_GE(covered, 0.92);
@@ -104,7 +108,8 @@ TEST(ProbeQualification, RefusesACapThatCannotTellLobingFromTheCentre) {
 
 TEST(ProbeQualification, RefusesTooFewTouchesAndBadOnes) {
   std::mt19937 random(6);
-  EXPECT_EQ(qualify(touches(directions(-0.3, 1), 0.0, random)).error().code, ErrorCode::TooFewObservations);
+  EXPECT_EQ(qualify(touches(directions(-0.3, 1), 0.0, random)).error().code,
+            ErrorCode::TooFewObservations);
   auto some = touches(directions(-0.3, 5), 0.0, random);
   some[5].normal.setZero();
   EXPECT_EQ(qualify(some).error().code, ErrorCode::BadInput);

@@ -10,7 +10,8 @@ namespace abbe::calib {
 namespace {
 
 Air air(double t_C, double p_Pa, double rh_percent) {
-  return {.temperature_K = t_C + 273.15, .pressure_Pa = p_Pa, .relative_humidity = rh_percent / 100.0};
+  return {
+      .temperature_K = t_C + 273.15, .pressure_Pa = p_Pa, .relative_humidity = rh_percent / 100.0};
 }
 double index_of(const Air& a, IndexEquation equation) {
   return refractive_index(a, kHeliumNeon_m, equation).value().n;
@@ -20,7 +21,8 @@ struct Row {
   double t_C, p_Pa, rh_percent, ciddor, edlen, shop;
 };
 
-// 633 nm, 450 ppm CO2; computed by an independent program, agrees with the printed values of [Ciddor 1996].
+// 633 nm, 450 ppm CO2; computed by an independent program, agrees with the printed values of
+// [Ciddor 1996].
 constexpr Row kTable[]{{20, 101325, 0, 1.000271800, 1.000271799, 1.0002718},
                        {20, 101325, 50, 1.000271373, 1.000271374, 1.0002714},
                        {20, 60000, 0, 1.000160924, 1.000160920, 1.0001610},
@@ -37,7 +39,8 @@ TEST_P(IndexTable, IsReproducedToOnePartInABillion) {
   const Air a = air(row.t_C, row.p_Pa, row.rh_percent);
   EXPECT_NEAR(index_of(a, IndexEquation::Ciddor), row.ciddor, 1e-9);
   EXPECT_NEAR(index_of(a, IndexEquation::Edlen), row.edlen, 1e-9);
-  EXPECT_NEAR(index_of(a, IndexEquation::ShopFloor), row.shop, 0.51e-7);  // printed with seven digits
+  EXPECT_NEAR(index_of(a, IndexEquation::ShopFloor), row.shop,
+              0.51e-7);  // printed with seven digits
 }
 
 INSTANTIATE_TEST_SUITE_P(RefractiveIndex, IndexTable, testing::ValuesIn(kTable));
@@ -55,11 +58,12 @@ struct Co2Row {
   double t_C, p_Pa, rh_percent, co2_ppm, n;
 };
 
-// 633 nm; computed with M. Polyanskiy's program of [Ciddor 1996] (refractiveindex.info), of another vapour
-// pressure.
-constexpr Co2Row kCo2Table[]{{20, 101325, 50, 0, 1.0002713082},   {20, 101325, 50, 400, 1.0002713656},
-                             {20, 101325, 0, 1000, 1.0002718797}, {20, 101325, 50, 1000, 1.0002714516},
-                             {25, 98000, 40, 1000, 1.0002580765}, {18, 101325, 50, 2000, 1.0002735170}};
+// 633 nm; computed with M. Polyanskiy's program of [Ciddor 1996] (refractiveindex.info), of another
+// vapour pressure.
+constexpr Co2Row kCo2Table[]{
+    {20, 101325, 50, 0, 1.0002713082},   {20, 101325, 50, 400, 1.0002713656},
+    {20, 101325, 0, 1000, 1.0002718797}, {20, 101325, 50, 1000, 1.0002714516},
+    {25, 98000, 40, 1000, 1.0002580765}, {18, 101325, 50, 2000, 1.0002735170}};
 
 class Co2Table : public testing::TestWithParam<Co2Row> {};
 
@@ -67,7 +71,8 @@ TEST_P(Co2Table, IsReproducedByBothGreatEquations) {
   Air a = air(GetParam().t_C, GetParam().p_Pa, GetParam().rh_percent);
   a.co2_ppm = GetParam().co2_ppm;
   EXPECT_NEAR(index_of(a, IndexEquation::Ciddor), GetParam().n, 1e-9);
-  EXPECT_NEAR(index_of(a, IndexEquation::Edlen), GetParam().n, 5e-9);  // the equations agree to 4e-9
+  EXPECT_NEAR(index_of(a, IndexEquation::Edlen), GetParam().n,
+              5e-9);  // the equations agree to 4e-9
 }
 
 INSTANTIATE_TEST_SUITE_P(RefractiveIndex, Co2Table, testing::ValuesIn(kCo2Table));
@@ -76,7 +81,8 @@ INSTANTIATE_TEST_SUITE_P(RefractiveIndex, Co2Table, testing::ValuesIn(kCo2Table)
 TEST(RefractiveIndex, StatesTheUncertaintyOfCo2ForEveryEquation) {
   Air a = air(20, 101'325, 50);
   a.u_co2_ppm = 200.0;
-  for (const auto equation : {IndexEquation::Ciddor, IndexEquation::Edlen, IndexEquation::ShopFloor}) {
+  for (const auto equation :
+       {IndexEquation::Ciddor, IndexEquation::Edlen, IndexEquation::ShopFloor}) {
     const double expected = std::hypot(u_of_equation(equation), 200.0 * 1.45e-10);
     EXPECT_NEAR(refractive_index(a, kHeliumNeon_m, equation)->u_n, expected, 0.01 * expected);
   }
@@ -90,10 +96,11 @@ TEST(RefractiveIndex, CountsTheCo2ThatAFormulaLeavesOut) {
   EXPECT_DOUBLE_EQ(u_n(IndexEquation::Edlen), u_of_equation(IndexEquation::Edlen));
 }
 
-// Root mean square of n - n(20 C, 1013.25 hPa, 50 %) over the shop floor's box, by quadrature with the
-// program of Co2Table: 1.0443e-5. n is not linear over 15 K: 1 %.
+// Root mean square of n - n(20 C, 1013.25 hPa, 50 %) over the shop floor's box, by quadrature with
+// the program of Co2Table: 1.0443e-5. n is not linear over 15 K: 1 %.
 TEST(AssumedAir, IsUncertainByWhatAShopFloorCanBe) {
-  const double u = u_of_assumed_air(air(20, 101'325, 50), kHeliumNeon_m, IndexEquation::Ciddor).value();
+  const double u =
+      u_of_assumed_air(air(20, 101'325, 50), kHeliumNeon_m, IndexEquation::Ciddor).value();
   EXPECT_NEAR(u / 1.0443e-5, 1.0, 0.015);
   EXPECT_FALSE(u_of_assumed_air(air(-5, 101'325, 50), kHeliumNeon_m, IndexEquation::Ciddor));
 }
@@ -113,7 +120,8 @@ TEST(RefractiveIndex, TellsPartsPerMillionPerUnit) {
 }
 
 TEST(RefractiveIndex, HasTheEquationsUncertaintyInPerfectlyKnownAir) {
-  for (const auto equation : {IndexEquation::Ciddor, IndexEquation::Edlen, IndexEquation::ShopFloor}) {
+  for (const auto equation :
+       {IndexEquation::Ciddor, IndexEquation::Edlen, IndexEquation::ShopFloor}) {
     EXPECT_DOUBLE_EQ(refractive_index(air(20, 101'325, 50), kHeliumNeon_m, equation)->u_n,
                      u_of_equation(equation));
   }
@@ -130,6 +138,7 @@ TEST(RefractiveIndex, StatesTheScatterThatUncertainAirCauses) {
   std::normal_distribution<double> unit;
   constexpr int kDraws = 20'000;
   double sum2 = 0.0;
+
   for (int i = 0; i < kDraws; ++i) {
     Air drawn = a;
     drawn.temperature_K += a.u_temperature_K * unit(random);
@@ -139,6 +148,7 @@ TEST(RefractiveIndex, StatesTheScatterThatUncertainAirCauses) {
     const double d = index_of(drawn, IndexEquation::Ciddor) - stated.n;
     sum2 += d * d;
   }
+
   const double scatter = std::sqrt(sum2 / kDraws);
   const double u_air = std::sqrt(stated.u_n * stated.u_n - 1.5e-8 * 1.5e-8);
   EXPECT_NEAR(u_air / scatter, 1.0, 0.02);  // the scatter itself is known to 0.5 %

@@ -12,7 +12,8 @@ Vector3 three(const std::vector<double>& v, std::size_t from) {
   return {v.at(from), v.at(from + 1), v.at(from + 2)};
 }
 
-// The reference is printed with 13 significant digits of values of 1e-4 m: 1e-12 m is far above its rounding.
+// The reference is printed with 13 significant digits of values of 1e-4 m: 1e-12 m is far above its
+// rounding.
 TEST(RigidBodyModel, GivesTheReferenceErrorsAt50Points) {
   const otf::Machine machine = case_a_machine();
   const ParameterLayout layout = layout_of(machine);
@@ -20,8 +21,8 @@ TEST(RigidBodyModel, GivesTheReferenceErrorsAt50Points) {
   const std::vector<ReferenceRow> points = read_rows(small_file("caseA_V_true_at_points.csv"));
   ASSERT_EQ(points.size(), 50u);
   for (const ReferenceRow& row : points) {
-    const Vector3 V = volumetric_error(layout, {U.data(), layout.model_size()}, three(row.values, 0),
-                                       machine.target_offset_m);
+    const Vector3 V = volumetric_error(layout, {U.data(), layout.model_size()},
+                                       three(row.values, 0), machine.target_offset_m);
     EXPECT_LT((V - three(row.values, 3)).norm(), 1e-12);
   }
 }
@@ -32,16 +33,16 @@ TEST(RigidBodyModel, DiffersFromTheExactTransformsInSecondOrderOnly) {
   const ParameterLayout layout = layout_of(machine);
   const Eigen::VectorXd U = case_a_tables(TableColumn::Truth);
   for (const ReferenceRow& row : read_rows(small_file("caseA_V_true_at_points.csv"))) {
-    const Vector3 V = volumetric_error(layout, {U.data(), layout.model_size()}, three(row.values, 0),
-                                       machine.target_offset_m);
+    const Vector3 V = volumetric_error(layout, {U.data(), layout.model_size()},
+                                       three(row.values, 0), machine.target_offset_m);
     EXPECT_LT((V - three(row.values, 6)).norm(), 0.053e-6);
   }
 }
 
 class AnyOrder : public testing::TestWithParam<const char*> {};
 INSTANTIATE_TEST_SUITE_P(Chains, AnyOrder,
-                         testing::Values("[w b X Y Z t]", "[w b X Z Y t]", "[w b Y X Z t]", "[w b Y Z X t]",
-                                         "[w b Z X Y t]", "[w b Z Y X t]"));
+                         testing::Values("[w b X Y Z t]", "[w b X Z Y t]", "[w b Y X Z t]",
+                                         "[w b Y Z X t]", "[w b Z X Y t]", "[w b Z Y X t]"));
 
 TEST_P(AnyOrder, ColumnsTimesParametersAreTheError) {
   const otf::Machine machine = coarse_machine(GetParam());
@@ -57,8 +58,8 @@ TEST_P(AnyOrder, ColumnsTimesParametersAreTheError) {
   EXPECT_LT((sum - volumetric_error(layout, {U.data(), layout.model_size()}, q, t)).norm(), 1e-18);
 }
 
-/// A rotation of one axis, as an exact product of transforms would have it: it turns everything nearer to the
-/// tool.
+/// A rotation of one axis, as an exact product of transforms would have it: it turns everything
+/// nearer to the tool.
 TEST_P(AnyOrder, ARotationTurnsWhatIsNearerToTheTool) {
   const otf::Machine machine = coarse_machine(GetParam());
   const Vector3 q(0.1, -0.2, -0.3), t(0.01, 0.02, 0.03);

@@ -12,7 +12,8 @@
 namespace {
 using namespace abbe::calib;
 
-/// Two coefficients at four points: a rigid motion (all along X) and a stretch along X of 1 m per m.
+/// Two coefficients at four points: a rigid motion (all along X) and a stretch along X of 1 m per
+/// m.
 struct FourPoints {
   std::vector<Vector3> points_m{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1}};
   Eigen::MatrixXd D = Eigen::MatrixXd::Zero(12, 2);

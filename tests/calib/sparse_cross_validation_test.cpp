@@ -49,7 +49,9 @@ TEST(SparseCrossValidation, IsTheErrorOfFitsThatDidNotSeeTheRow) {
   ASSERT_TRUE(cv) << cv.error().text;
   for (const Eigen::Index k : {0, 10, 19}) {
     // standardised twice instead of once: rounding of 1e4-sized columns
-    EXPECT_NEAR(cv->error(k), error_by_hand(problem, five_folds(problem), penalty, options, k), 1e-10) << k;
+    EXPECT_NEAR(cv->error(k), error_by_hand(problem, five_folds(problem), penalty, options, k),
+                1e-10)
+        << k;
   }
 }
 
@@ -58,7 +60,8 @@ TEST(SparseCrossValidation, ChoosesTheSmallestErrorAndBeatsTheEmptyModel) {
   const auto cv = cross_validate(problem.X, problem.y, {}, five_folds(problem));
   ASSERT_TRUE(cv) << cv.error().text;
   EXPECT_EQ(cv->error(cv->best), cv->error.minCoeff());
-  EXPECT_LT(cv->error(cv->best), 0.2 * cv->null_error);  // 0.09 of noise in a variance of 1 and more
+  EXPECT_LT(cv->error(cv->best),
+            0.2 * cv->null_error);  // 0.09 of noise in a variance of 1 and more
   EXPECT_GT(cv->standard_error(cv->best), 0.0);
 }
 
@@ -80,11 +83,14 @@ TEST(SparseCrossValidation, OfAnEmptyModelIsTheSpreadOfTheRows) {
 TEST(SparseGridSearch, EveryColumnIsItsOwnCrossValidationBitForBit) {
   const Problem problem = random_problem(60, 20, 24);
   const auto gamma = equally_spaced(2.001, 30.0, 11);  // more than one register full
-  const auto grid = grid_search(problem.X, problem.y, PenaltyKind::Scad, gamma, five_folds(problem));
+  const auto grid =
+      grid_search(problem.X, problem.y, PenaltyKind::Scad, gamma, five_folds(problem));
   ASSERT_TRUE(grid) << grid.error().text;
+
   for (std::size_t g = 0; g < gamma.size(); ++g) {
     const auto cv =
-        cross_validate(problem.X, problem.y, {PenaltyKind::Scad, gamma[g]}, five_folds(problem)).value();
+        cross_validate(problem.X, problem.y, {PenaltyKind::Scad, gamma[g]}, five_folds(problem))
+            .value();
     EXPECT_TRUE(same_bits(grid->error.col(static_cast<Eigen::Index>(g)), cv.error)) << gamma[g];
     EXPECT_TRUE(same_bits(grid->paths[g].coefficients, cv.path.coefficients)) << gamma[g];
     EXPECT_EQ(grid->paths[g].sweeps, cv.path.sweeps);
@@ -107,8 +113,8 @@ TEST(SparseGridSearch, GivesTheSameBitsOnTwoThreads) {
   const Problem problem = random_problem(60, 20, 25);
   const auto gamma = equally_spaced(1.5, 10.0, 4);
   const auto one = grid_search(problem.X, problem.y, PenaltyKind::Mcp, gamma, five_folds(problem));
-  const auto two =
-      grid_search(problem.X, problem.y, PenaltyKind::Mcp, gamma, five_folds(problem), {}, on_two_threads);
+  const auto two = grid_search(problem.X, problem.y, PenaltyKind::Mcp, gamma, five_folds(problem),
+                               {}, on_two_threads);
   ASSERT_TRUE(one && two);
   EXPECT_TRUE(same_bits(one->error, two->error));
   EXPECT_TRUE(same_bits(one->best_coefficients(), two->best_coefficients()));
@@ -117,8 +123,8 @@ TEST(SparseGridSearch, GivesTheSameBitsOnTwoThreads) {
 TEST(SparseGridSearch, CellsBeyondSomeFoldsBudgetAreMissing) {
   const Problem problem = random_problem(60, 20, 26);
   const PathOptions options{.lambda = log_spaced(1.0, 1e-6, 40), .max_sweeps = 150};
-  const auto grid =
-      grid_search(problem.X, problem.y, PenaltyKind::Scad, {2.5, 20.0}, five_folds(problem), options);
+  const auto grid = grid_search(problem.X, problem.y, PenaltyKind::Scad, {2.5, 20.0},
+                                five_folds(problem), options);
   ASSERT_TRUE(grid) << grid.error().text;
   EXPECT_FALSE(std::isnan(grid->error(0, 0)));
   EXPECT_TRUE(std::isnan(grid->error(39, 0)));
@@ -127,7 +133,8 @@ TEST(SparseGridSearch, CellsBeyondSomeFoldsBudgetAreMissing) {
 
 TEST(SparseGridSearch, TakesTheFirstOfEqualCells) {
   const Problem problem = random_problem(60, 20, 27);
-  const auto grid = grid_search(problem.X, problem.y, PenaltyKind::Lasso, {1.0, 2.0}, five_folds(problem));
+  const auto grid =
+      grid_search(problem.X, problem.y, PenaltyKind::Lasso, {1.0, 2.0}, five_folds(problem));
   ASSERT_TRUE(grid);
   EXPECT_EQ(grid->best.gamma, 0);
 }

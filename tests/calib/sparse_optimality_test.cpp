@@ -26,9 +26,11 @@ TEST(SparseOptimality, ANudgedSolutionViolatesTheConditions) {
 TEST(SparseOptimality, SolutionsOfTheLassoAreBelowTheirNeighbours) {
   const Problem problem = random_problem(40, 8, 32);
   const Penalty lasso{PenaltyKind::Lasso};
-  const auto path = fit_path(problem.X, problem.y, lasso, {.lambda = {}, .tolerance = 1e-10}).value();
+  const auto path =
+      fit_path(problem.X, problem.y, lasso, {.lambda = {}, .tolerance = 1e-10}).value();
   const Eigen::VectorXd b = path.standardised.col(40);
   const double least = *objective(problem.X, problem.y, lasso, path.lambda[40], b);
+
   for (Eigen::Index j = 0; j < b.size(); ++j) {
     for (const double step : {-0.01, 0.01}) {
       Eigen::VectorXd other = b;
@@ -52,7 +54,8 @@ TEST(SparseConvexity, IsLostWhenTwoNearlyEqualColumnsAreIn) {
   problem.X.col(1) = problem.X.col(0) + 0.05 * problem.X.col(1) / 10.0;
   problem.y += problem.X.col(1);
   const auto path =
-      fit_path(problem.X, problem.y, {PenaltyKind::Mcp, 3.0}, {.lambda = {}, .max_sweeps = 1000000}).value();
+      fit_path(problem.X, problem.y, {PenaltyKind::Mcp, 3.0}, {.lambda = {}, .max_sweeps = 1000000})
+          .value();
   const auto diagnosis = convexity(problem.X, path).value();
   ASSERT_TRUE(diagnosis.first_nonconvex);
   const Eigen::Index k = *diagnosis.first_nonconvex;

@@ -42,12 +42,14 @@ TEST(SparsePath, OrthogonalColumnsHaveClosedFormSolutions) {
   const Eigen::MatrixXd X = orthogonal_design();
   const Eigen::VectorXd y = random_problem(16, 1, 11).y * 3.0;
   const Eigen::VectorXd z = X.transpose() * y / 16.0;
+
   for (const Penalty& penalty : kPenalties) {
     const auto path = fit_path(X, y, penalty);
     ASSERT_TRUE(path) << path.error().text;
     for (Eigen::Index k = 0; k < path->reached(); ++k) {
       for (Eigen::Index j = 0; j < z.size(); ++j) {
-        const double expected = closed_form(penalty, path->lambda[static_cast<std::size_t>(k)], z(j));
+        const double expected =
+            closed_form(penalty, path->lambda[static_cast<std::size_t>(k)], z(j));
         ASSERT_NEAR(path->coefficients(1 + j, k), expected, 1e-13)
             << name(penalty.kind) << ' ' << k << ' ' << j;
       }
@@ -64,9 +66,10 @@ TEST(SparsePath, EverySolutionIsAStationaryPoint) {
       ASSERT_EQ(path->reached(), 100);
       for (Eigen::Index k = 0; k < path->reached(); ++k) {
         const double lambda = path->lambda[static_cast<std::size_t>(k)];
-        // a change of 1e-12 rms(y) in the last sweep leaves gradients of that size times the number of
-        // columns
-        ASSERT_LE(*kkt_violation(problem.X, problem.y, penalty, lambda, path->standardised.col(k)), 1e-10)
+        // a change of 1e-12 rms(y) in the last sweep leaves gradients of that size times the number
+        // of columns
+        ASSERT_LE(*kkt_violation(problem.X, problem.y, penalty, lambda, path->standardised.col(k)),
+                  1e-10)
             << name(penalty.kind) << " seed " << seed << " lambda " << lambda;
       }
     }
@@ -110,7 +113,8 @@ TEST(SparsePath, DoesNotDependOnUnitsAndOriginsOfColumns) {
   const auto path = fit_path(problem.X, problem.y, {PenaltyKind::Mcp, 3.0});
   const auto other = fit_path(moved, problem.y, {PenaltyKind::Mcp, 3.0}, {.lambda = path->lambda});
   ASSERT_TRUE(other);
-  EXPECT_LE((predict(*path, problem.X, 60) - predict(*other, moved, 60)).cwiseAbs().maxCoeff(), 1e-10);
+  EXPECT_LE((predict(*path, problem.X, 60) - predict(*other, moved, 60)).cwiseAbs().maxCoeff(),
+            1e-10);
 }
 
 TEST(SparsePath, ColumnsThatDoNotVaryAreDropped) {
@@ -151,9 +155,9 @@ TEST(SparsePath, MoreColumnsThanRowsStillSolvesTheLasso) {
   const auto path = fit_path(problem.X, problem.y, {PenaltyKind::Lasso}, exact());
   ASSERT_TRUE(path);
   const Eigen::Index last = path->reached() - 1;
-  EXPECT_LE(
-      *kkt_violation(problem.X, problem.y, path->penalty, path->lambda.back(), path->standardised.col(last)),
-      1e-10);
+  EXPECT_LE(*kkt_violation(problem.X, problem.y, path->penalty, path->lambda.back(),
+                           path->standardised.col(last)),
+            1e-10);
   EXPECT_LE((path->standardised.col(last).array() != 0.0).count(), 29);
 }
 
@@ -170,7 +174,8 @@ struct BadCase {
 
 std::vector<BadCase> bad_cases() {
   const Problem good = random_problem(20, 4, 15);
-  Problem nan_in_X = good, nan_in_y = good, short_y = good, one_row = good, flat_y = good, flat_X = good;
+  Problem nan_in_X = good, nan_in_y = good, short_y = good, one_row = good, flat_y = good,
+          flat_X = good;
   nan_in_X.X(3, 2) = std::nan("");
   nan_in_y.y(3) = std::numeric_limits<double>::infinity();
   short_y.y.conservativeResize(19);
@@ -181,6 +186,7 @@ std::vector<BadCase> bad_cases() {
   huge_X.X(0, 0) = 1e200;
   huge_y.y(0) = 1e200;
   using enum ErrorCode;
+
   return {{"NanInDesign", nan_in_X, {}, {}, NotFinite, "design"},
           {"InfinityInY", nan_in_y, {}, {}, NotFinite, "in y"},
           {"HugeDesign", huge_X, {}, {}, NotFinite, "too large"},

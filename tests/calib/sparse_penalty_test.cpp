@@ -31,13 +31,14 @@ TEST(SparsePenalty, MinimiserIsBelowEveryOtherCoefficient) {
 }
 
 TEST(SparsePenalty, DerivativeIsTheSlopeOfTheValue) {
-  constexpr double kStep =
-      1e-6;  // the penalties are piecewise quadratic: central differences are exact to rounding
+  // the penalties are piecewise quadratic: central differences are exact to rounding
+  constexpr double kStep = 1e-6;
   for (const Penalty& penalty : kEveryPenalty) {
     for (double t = 0.005; t < 4.0; t += 0.01) {
       const double slope =
           (value(penalty, kLambda, t + kStep) - value(penalty, kLambda, t - kStep)) / (2 * kStep);
-      ASSERT_NEAR(derivative(penalty, kLambda, t), slope, 1e-6) << name(penalty.kind) << " at " << t;
+      ASSERT_NEAR(derivative(penalty, kLambda, t), slope, 1e-6)
+          << name(penalty.kind) << " at " << t;
     }
   }
 }
@@ -46,16 +47,19 @@ TEST(SparsePenalty, ConcavityIsTheSteepestFallOfTheDerivative) {
   for (const Penalty& penalty : kEveryPenalty) {
     double steepest = 0.0;
     for (double t = 0.0; t < 4.0; t += 0.01) {
-      steepest = std::max(steepest,
-                          (derivative(penalty, kLambda, t) - derivative(penalty, kLambda, t + 1e-4)) / 1e-4);
+      steepest = std::max(
+          steepest,
+          (derivative(penalty, kLambda, t) - derivative(penalty, kLambda, t + 1e-4)) / 1e-4);
     }
     EXPECT_NEAR(concavity(penalty), steepest, 1e-9) << name(penalty.kind);
   }
 }
 
 TEST(SparsePenalty, LargeCoefficientsAreLeftAloneByMcpAndScad) {
-  EXPECT_EQ(minimiser({PenaltyKind::Scad, 3.7}, kLambda, -3.7 * kLambda - 0.01), -3.7 * kLambda - 0.01);
-  EXPECT_EQ(minimiser({PenaltyKind::Mcp, 3.0}, kLambda, 3.0 * kLambda + 0.01), 3.0 * kLambda + 0.01);
+  EXPECT_EQ(minimiser({PenaltyKind::Scad, 3.7}, kLambda, -3.7 * kLambda - 0.01),
+            -3.7 * kLambda - 0.01);
+  EXPECT_EQ(minimiser({PenaltyKind::Mcp, 3.0}, kLambda, 3.0 * kLambda + 0.01),
+            3.0 * kLambda + 0.01);
 }
 
 TEST(SparsePenalty, RefusesGammaOutOfRange) {

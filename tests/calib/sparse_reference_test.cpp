@@ -1,6 +1,6 @@
-/// Against ncvreg 3.16.0.7, asked: 1e-10 in standardised units, with equal sweep counts and missing cells.
-/// Rounding alone (another order of summation, amplified by columns with a condition of 2e3) leaves up to
-/// 3e-11.
+/// Against ncvreg 3.16.0.7, asked: 1e-10 in standardised units, with equal sweep counts and missing
+/// cells. Rounding alone (another order of summation, amplified by columns with a condition of 2e3)
+/// leaves up to 3e-11.
 
 #include <gtest/gtest.h>
 
@@ -24,7 +24,8 @@ const BallArrayProblem& problem() {
 
 /// Largest difference of coefficients, in standardised units.
 double difference(const Eigen::MatrixXd& ours, const Eigen::MatrixXd& theirs) {
-  const Eigen::MatrixXd slopes = problem().scale.asDiagonal() * (ours - theirs).bottomRows(ours.rows() - 1);
+  const Eigen::MatrixXd slopes =
+      problem().scale.asDiagonal() * (ours - theirs).bottomRows(ours.rows() - 1);
   return std::max(slopes.cwiseAbs().maxCoeff(), (ours - theirs).row(0).cwiseAbs().maxCoeff());
 }
 
@@ -32,8 +33,9 @@ TEST(SparseReference, PathsOfAllPenaltiesAreThoseOfNcvreg) {
   const auto references = reference_paths(folder());
   ASSERT_EQ(references.size(), 14U);  // SCAD and MCP at three gammas, lasso; two tolerances
   for (const ReferencePath& reference : references) {
-    SCOPED_TRACE(testing::Message() << name(reference.penalty.kind) << " gamma " << reference.penalty.gamma
-                                    << " tolerance " << reference.options.tolerance);
+    SCOPED_TRACE(testing::Message()
+                 << name(reference.penalty.kind) << " gamma " << reference.penalty.gamma
+                 << " tolerance " << reference.options.tolerance);
     const auto path = fit_path(problem().X, problem().y, reference.penalty, reference.options);
     ASSERT_TRUE(path) << path.error().text;
     EXPECT_EQ(path->sweeps, reference.sweeps);
@@ -43,7 +45,7 @@ TEST(SparseReference, PathsOfAllPenaltiesAreThoseOfNcvreg) {
 }
 
 /// Every seventh gamma, from 2.0001 to 100: the whole grid is in the benchmark.
-ReferenceGrid thinned(const ReferenceGrid& grid) {
+ReferenceGrid decimated(const ReferenceGrid& grid) {
   ReferenceGrid out{.gamma = {}, .options = grid.options, .error = {}};
   const auto some = Eigen::seq(0, grid.error.cols() - 1, 7);
   out.error = grid.error(Eigen::all, some);
@@ -62,9 +64,9 @@ class SparseReferenceGrid : public testing::TestWithParam<const char*> {
 };
 
 TEST_P(SparseReferenceGrid, ErrorsAndMissingCellsAreThoseOfNcvreg) {
-  const ReferenceGrid reference = thinned(reference_grid(folder(), GetParam()));
-  const auto grid =
-      grid_search(problem().X, problem().y, PenaltyKind::Scad, reference.gamma, folds(), reference.options);
+  const ReferenceGrid reference = decimated(reference_grid(folder(), GetParam()));
+  const auto grid = grid_search(problem().X, problem().y, PenaltyKind::Scad, reference.gamma,
+                                folds(), reference.options);
   ASSERT_TRUE(grid) << grid.error().text;
   const auto missing = reference.error.array().isNaN();
   EXPECT_TRUE((grid->error.array().isNaN() == missing).all());
@@ -80,7 +82,8 @@ TEST_P(SparseReferenceGrid, PathAtTheBestGammaIsThatOfNcvreg) {
   ASSERT_TRUE(cv) << cv.error().text;
   EXPECT_EQ(cv->best, row);
 
-  const Eigen::MatrixXd expected = numbers(read_table(folder(), std::string(GetParam()) + "_path.csv"));
+  const Eigen::MatrixXd expected =
+      numbers(read_table(folder(), std::string(GetParam()) + "_path.csv"));
   ASSERT_EQ(cv->path.reached(), expected.rows());
   EXPECT_EQ(cv->path.sweeps, std::vector<long>(expected.col(1).begin(), expected.col(1).end()));
   EXPECT_LE(difference(cv->path.coefficients, expected.rightCols(46).transpose()), kAsked);

@@ -31,6 +31,7 @@ struct Eight {
         mask[i].of[lane] = uniform(random) > -0.5 ? -1 : 0;
       }
     }
+
     for (std::size_t lane = 0; lane < kLanes; ++lane) {
       parameters.lambda.of[lane] = 0.05 * static_cast<double>(lane);
       parameters.inner_end.of[lane] = parameters.outer_end.of[lane] = 1e9;

@@ -56,7 +56,8 @@ TEST(LinearBasis, ReproducesStraightLinesInsideAndOutside) {
 }
 
 MachineNodes three_axes() {
-  return {*equidistant_nodes(-0.3, 0.3), *equidistant_nodes(-0.25, 0.25), *equidistant_nodes(-0.4, 0.0)};
+  return {*equidistant_nodes(-0.3, 0.3), *equidistant_nodes(-0.25, 0.25),
+          *equidistant_nodes(-0.4, 0.0)};
 }
 
 TEST(ParameterLayout, KeepsThe14TablesOneTargetShows) {
@@ -66,8 +67,8 @@ TEST(ParameterLayout, KeepsThe14TablesOneTargetShows) {
   for (const Table& t : layout->tables()) {
     names.push_back(name(t.motion));
   }
-  EXPECT_THAT(names, ElementsAre("EXX", "EYX", "EZX", "EAX", "EBX", "ECX", "EXY", "EYY", "EZY", "EAY", "EBY",
-                                 "EXZ", "EYZ", "EZZ"));
+  EXPECT_THAT(names, ElementsAre("EXX", "EYX", "EZX", "EAX", "EBX", "ECX", "EXY", "EYY", "EZY",
+                                 "EAY", "EBY", "EXZ", "EYZ", "EZZ"));
   EXPECT_EQ(layout->model_size(), 163u);
 }
 

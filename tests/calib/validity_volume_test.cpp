@@ -96,7 +96,8 @@ TEST(ValidityVolume, OfALongPathAroundABoxIsThatBox) {
 /// A corner 2 um above the middle of a face of 0.3 m.
 TEST(ValidityVolume, KeepsAnApexJustAboveAFace) {
   for (const double height_m : {2e-6, 10e-6, 50e-6}) {
-    std::vector<Vector3> points{{0, 0, 0}, {0.3, 0, 0}, {0, 0.3, 0}, {0.3, 0.3, 0}, {0.15, 0.15, -0.2}};
+    std::vector<Vector3> points{
+        {0, 0, 0}, {0.3, 0, 0}, {0, 0.3, 0}, {0.3, 0.3, 0}, {0.15, 0.15, -0.2}};
     points.emplace_back(0.15, 0.15, height_m);
     const ValidityVolume live = *ValidityVolume::hull_of(points);
     const ValidityVolume stored = *ValidityVolume::of_vertices(live.vertices_m());
@@ -114,10 +115,12 @@ constexpr double kSide_m = 0.3;
 std::vector<Vector3> points_of(Shape shape, double flat, std::mt19937_64& random) {
   std::normal_distribution<double> normal;
   std::uniform_int_distribution<int> step(0, 4), axis(0, 2);
-  const Matrix3 R = Eigen::Quaterniond(normal(random), normal(random), normal(random), normal(random))
-                        .normalized()
-                        .toRotationMatrix();
+  const Matrix3 R =
+      Eigen::Quaterniond(normal(random), normal(random), normal(random), normal(random))
+          .normalized()
+          .toRotationMatrix();
   std::vector<Vector3> points;
+
   for (int i = 0; i < 150; ++i) {
     Vector3 p(normal(random), normal(random), normal(random));
     if (shape == Shape::Sphere) {
@@ -126,12 +129,14 @@ std::vector<Vector3> points_of(Shape shape, double flat, std::mt19937_64& random
       p(axis(random)) = step(random) < 2 ? -1.0 : 1.0;
       p = p.cwiseMax(-1.0).cwiseMin(1.0);
     } else {
-      p = Vector3(step(random), step(random), shape == Shape::Wavy ? 1e-2 * normal(random) : step(random)) /
+      p = Vector3(step(random), step(random),
+                  shape == Shape::Wavy ? 1e-2 * normal(random) : step(random)) /
           4;
     }
     p.z() *= flat;
     points.push_back(kSide_m * (R * p));
   }
+
   return points;
 }
 
@@ -139,6 +144,7 @@ TEST(ValidityVolume, ContainsTheSameAfterItWasStored) {
   std::mt19937_64 random(3);
   std::normal_distribution<double> normal;
   std::size_t differ = 0, inside = 0, tried = 0;
+
   for (const Shape shape : {Shape::Sphere, Shape::Lattice, Shape::OnCube, Shape::Wavy}) {
     for (const double flat : {1.0, 1.0, 1e-2, 1e-4, 1e-5}) {
       const std::vector<Vector3> points = points_of(shape, flat, random);
@@ -154,6 +160,7 @@ TEST(ValidityVolume, ContainsTheSameAfterItWasStored) {
       }
     }
   }
+
   EXPECT_EQ(differ, 0u);
   EXPECT_GT(inside, tried / 20);
   EXPECT_LT(inside, tried / 20 * 19);
@@ -171,12 +178,14 @@ bool in_brute_force_hull(const std::vector<Vector3>& points, const Vector3& q, d
           low = std::min(low, height(p));
           high = std::max(high, height(p));
         }
-        if ((high < 1e-12 && height(q) > tolerance_m) || (low > -1e-12 && height(q) < -tolerance_m)) {
+        if ((high < 1e-12 && height(q) > tolerance_m) ||
+            (low > -1e-12 && height(q) < -tolerance_m)) {
           return false;
         }
       }
     }
   }
+
   return true;
 }
 
@@ -202,15 +211,19 @@ TEST(ValidityVolume, OfPointsOnItsFacesHasTheCornersOfTheCubeOnly) {
   std::uniform_real_distribution<double> place(-1.0, 1.0);
   const Matrix3 R = Eigen::AngleAxisd(0.4, Vector3(1, 2, 3).normalized()).toRotationMatrix();
   std::vector<Vector3> points;
+
   for (int i = 0; i < 1000; ++i) {
     Vector3 p(place(random), place(random), place(random));
     p(i % 3) = i % 2 == 0 ? 1.0 : -1.0;
     points.emplace_back(kSide_m * (R * p));
   }
+
   for (int corner = 0; corner < 8; ++corner) {
-    const Vector3 p((corner & 1) != 0 ? 1 : -1, (corner & 2) != 0 ? 1 : -1, (corner & 4) != 0 ? 1 : -1);
+    const Vector3 p((corner & 1) != 0 ? 1 : -1, (corner & 2) != 0 ? 1 : -1,
+                    (corner & 4) != 0 ? 1 : -1);
     points.emplace_back(kSide_m * (R * p));
   }
+
   EXPECT_EQ(ValidityVolume::hull_of(points)->vertices_m().size(), 8u);
 }
 
@@ -218,14 +231,18 @@ TEST(ValidityVolume, OfFiveThousandVerticesTakesNoTime) {
   std::mt19937_64 random(6);
   std::normal_distribution<double> normal;
   std::vector<Vector3> points;
+
   for (int i = 0; i < 5000; ++i) {
-    points.push_back(kSide_m * Vector3(normal(random), normal(random), normal(random)).normalized());
+    points.push_back(kSide_m *
+                     Vector3(normal(random), normal(random), normal(random)).normalized());
   }
+
   const std::clock_t before = std::clock();
   const Result<ValidityVolume> volume = ValidityVolume::hull_of(points);
   const double cpu_s = static_cast<double>(std::clock() - before) / CLOCKS_PER_SEC;
   EXPECT_EQ(volume->vertices_m().size(), points.size());
-  EXPECT_LT(cpu_s, 5.0);  // 0.07 s were seen, ten times that under a sanitizer; n^3 takes half an hour
+  EXPECT_LT(cpu_s,
+            5.0);  // 0.07 s were seen, ten times that under a sanitizer; n^3 takes half an hour
 }
 
 TEST(ValidityVolume, RefusesAFlatOne) {
@@ -243,12 +260,16 @@ TEST(SpreadSubset, LosesNoSide) {
   std::vector<Vector3> sphere;
   constexpr int kPoints = 2000;
   for (int i = 0; i < kPoints; ++i) {  // a spiral, as even as points on a sphere get
-    const double z = 1.0 - (2.0 * i + 1.0) / kPoints, turn = 2.399963 * i, r = std::sqrt(1.0 - z * z);
+    const double z = 1.0 - (2.0 * i + 1.0) / kPoints, turn = 2.399963 * i,
+                 r = std::sqrt(1.0 - z * z);
     sphere.emplace_back(z, r * std::cos(turn), r * std::sin(turn));
   }
+
   const std::vector<Vector3> some = spread_subset(sphere, 512);
   ASSERT_EQ(some.size(), 512u);
-  // No place of the sphere is farther from the subset than a few times the distance of 512 even points.
+
+  // No place of the sphere is farther from the subset than a few times the distance of 512 even
+  // points.
   double farthest = 0.0;
   for (const Vector3& p : sphere) {
     double nearest = 2.0;
@@ -257,6 +278,7 @@ TEST(SpreadSubset, LosesNoSide) {
     }
     farthest = std::max(farthest, nearest);
   }
+
   EXPECT_LT(farthest, 0.2);
   EXPECT_EQ(spread_subset(sphere, 2000).size(), 2000u);
 }

@@ -31,7 +31,8 @@ Vector3 place_of(const LinearWeights& w, const std::vector<Vector3>& points) {
   return p;
 }
 
-void expect_weights_make_the_places(const std::vector<Vector3>& points, const std::vector<Vector3>& places) {
+void expect_weights_make_the_places(const std::vector<Vector3>& points,
+                                    const std::vector<Vector3>& places) {
   const auto hull = *ValidityVolume::hull_of(points);
   const auto weights = *linear_weights(points, places);
   for (std::size_t i = 0; i < places.size(); ++i) {
@@ -50,7 +51,8 @@ TEST(LinearWeights, TakeLatticesWithAllTheirTies) {
   auto places = scattered(300, 3);
   const auto points = lattice();
   places.insert(places.end(), points.begin(), points.end());
-  for (const Vector3& p : points) places.emplace_back(p + Vector3(0.05, 0.05, 0.01));  // middles of the cells
+  for (const Vector3& p : points)
+    places.emplace_back(p + Vector3(0.05, 0.05, 0.01));  // middles of the cells
   expect_weights_make_the_places(points, places);
 }
 
@@ -59,12 +61,14 @@ TEST(LinearWeights, AreThePointItselfAtAPoint) {
   const auto weights = *linear_weights(points, points);
   for (std::size_t i = 0; i < points.size(); ++i) {
     double own = 0.0;
-    for (std::size_t k = 0; k < 4; ++k) own += weights[i]->point[k] == i ? weights[i]->weight[k] : 0.0;
+    for (std::size_t k = 0; k < 4; ++k)
+      own += weights[i]->point[k] == i ? weights[i]->weight[k] : 0.0;
     EXPECT_NEAR(own, 1.0, 1e-9) << i;
   }
 }
 
-/// The definition: no other point lies in the sphere through the corners (coordinates scaled to the box).
+/// The definition: no other point lies in the sphere through the corners (coordinates scaled to the
+/// box).
 TEST(LinearWeights, ComeFromTheDelaunayTriangulation) {
   const auto points = scattered(60, 5), places = scattered(100, 6);
   Vector3 low = points[0], high = points[0];
@@ -72,7 +76,11 @@ TEST(LinearWeights, ComeFromTheDelaunayTriangulation) {
     low = low.cwiseMin(p);
     high = high.cwiseMax(p);
   }
-  const auto scaled = [&](const Vector3& p) -> Vector3 { return (p - low).cwiseQuotient(high - low); };
+
+  const auto scaled = [&](const Vector3& p) -> Vector3 {
+    return (p - low).cwiseQuotient(high - low);
+  };
+
   const auto weights = *linear_weights(points, places);
   for (const auto& w : weights) {
     if (!w) continue;
@@ -85,7 +93,8 @@ TEST(LinearWeights, ComeFromTheDelaunayTriangulation) {
       b(k) = p.squaredNorm() - p0.squaredNorm();
     }
     const Vector3 centre = A.fullPivLu().solve(b);
-    for (const Vector3& p : points) EXPECT_GE((scaled(p) - centre).norm(), (p0 - centre).norm() - 1e-7);
+    for (const Vector3& p : points)
+      EXPECT_GE((scaled(p) - centre).norm(), (p0 - centre).norm() - 1e-7);
   }
 }
 
@@ -93,7 +102,8 @@ TEST(LinearWeights, NeedAVolume) {
   std::vector<Vector3> flat = scattered(20, 7);
   for (Vector3& p : flat) p.z() = 0.5 * p.x() - p.y();
   EXPECT_EQ(linear_weights(flat, flat).error().code, ErrorCode::DegenerateGeometry);
-  EXPECT_EQ(linear_weights(std::span(flat).first(3), flat).error().code, ErrorCode::TooFewObservations);
+  EXPECT_EQ(linear_weights(std::span(flat).first(3), flat).error().code,
+            ErrorCode::TooFewObservations);
 }
 
 }  // namespace

@@ -1,5 +1,5 @@
-/// Verification against an independent instrument: the reference solutions of the ball array on their own
-/// grid, and tracker points of a machine whose errors are known.
+/// Verification against an independent instrument: the reference solutions of the ball array on
+/// their own grid, and tracker points of a machine whose errors are known.
 
 #include <gmock/gmock.h>
 
@@ -27,14 +27,16 @@ std::vector<MeasuredPoint> measured(const Field& V, const std::vector<Vector3>& 
   return points;
 }
 
-std::vector<Vector3> box_of(const Vector3& low, const Vector3& high, const std::array<int, 3>& count) {
+std::vector<Vector3> box_of(const Vector3& low, const Vector3& high,
+                            const std::array<int, 3>& count) {
   std::vector<Vector3> points;
   for (int i = 0; i < count[0]; ++i)
     for (int j = 0; j < count[1]; ++j)
       for (int k = 0; k < count[2]; ++k)
-        points.emplace_back(low + (high - low)
-                                      .cwiseProduct(Vector3(i / (count[0] - 1.0), j / (count[1] - 1.0),
-                                                            k / (count[2] - 1.0))));
+        points.emplace_back(low +
+                            (high - low)
+                                .cwiseProduct(Vector3(i / (count[0] - 1.0), j / (count[1] - 1.0),
+                                                      k / (count[2] - 1.0))));
   return points;
 }
 
@@ -75,22 +77,23 @@ VolumetricModel reference_model(const std::string& solution) {
   std::vector<Vector3> balls;
   for (const auto& position : tests::evemu::reference_layout().true_m)
     balls.insert(balls.end(), position.begin(), position.end());
-  const auto design =
-      *evemu::ScaledDesign::of(tests::evemu::reference_machine().chain, 3, evemu::bounding_box(balls));
+  const auto design = *evemu::ScaledDesign::of(tests::evemu::reference_machine().chain, 3,
+                                               evemu::bounding_box(balls));
   const Eigen::VectorXd named = tests::evemu::reference_coefficients(solution);
   const Eigen::VectorXd c = (1000.0 * design.named_from_scaled()).fullPivLu().solve(named);
   const auto n = static_cast<Eigen::Index>(design.size());
   return *VolumetricModel::from_polynomials(
-      *evemu::EvemuModel::of(design, balls[0], c, Eigen::MatrixXd::Zero(n, n)), Gauge::Ball1, Vector3::Zero(),
-      *ValidityVolume::hull_of(balls));
+      *evemu::EvemuModel::of(design, balls[0], c, Eigen::MatrixXd::Zero(n, n)), Gauge::Ball1,
+      Vector3::Zero(), *ValidityVolume::hull_of(balls));
 }
 
 Field field_of(const VolumetricModel& model) {
   return [model](const Vector3& q) { return model.V_at(q, Vector3::Zero()); };
 }
 
-Comparison verified(const Field& truth, const VolumetricModel& model, const std::vector<Vector3>& readings,
-                    Frame frame, const Options& options = {}) {
+Comparison verified(const Field& truth, const VolumetricModel& model,
+                    const std::vector<Vector3>& readings, Frame frame,
+                    const Options& options = {}) {
   const RigidTransform T = frame == Frame::Machine ? RigidTransform{} : tracker_station();
   return *compare(*observe(measured(truth, readings, T), frame), model, Vector3::Zero(), options);
 }
@@ -98,8 +101,8 @@ Comparison verified(const Field& truth, const VolumetricModel& model, const std:
 TEST(Verification, GivesTheStatisticsOfTheReferenceOnItsGrid) {
   const auto all = tests::evemu::reference_json("solutions.json");
   for (const std::string solution : {"ols", "ncvreg_maxit1e6"}) {
-    const auto c = verified(tests::evemu::table3_machine(), reference_model(solution), measured_grid(),
-                            Frame::Machine, paper_grid());
+    const auto c = verified(tests::evemu::table3_machine(), reference_model(solution),
+                            measured_grid(), Frame::Machine, paper_grid());
     const auto& R = all["solutions"][solution]["R_resmag"];
     EXPECT_EQ(c.R_stated.count, all["n_grid"].get<std::size_t>());
     constexpr double kShiftOfConstants = 2e-3;  // the reference keeps the estimate's own V at Ball1
@@ -131,19 +134,20 @@ TEST(Verification, SaysWhatInterpolationCosts) {
 
 VolumetricModel scaled_tables(double factor) {
   const auto nodes = *equidistant_nodes(0.0, 0.4, 0.05);
-  const auto layout = *ParameterLayout::observable_with_one_target(*KinematicChain::parse("[w b Z X Y t]"),
-                                                                   {nodes, nodes, nodes});
+  const auto layout = *ParameterLayout::observable_with_one_target(
+      *KinematicChain::parse("[w b Z X Y t]"), {nodes, nodes, nodes});
   const auto n = static_cast<Eigen::Index>(layout.model_size());
   Eigen::VectorXd U(n);
-  for (Eigen::Index i = 0; i < n; ++i) U(i) = factor * 50e-6 * std::sin(2.0 * static_cast<double>(i));
+  for (Eigen::Index i = 0; i < n; ++i)
+    U(i) = factor * 50e-6 * std::sin(2.0 * static_cast<double>(i));
   const auto hull = box_of({0, 0, 0}, {0.4, 0.4, 0.4}, {2, 2, 2});
   const std::vector<Vector3> tools{Vector3::Zero()};
   return *VolumetricModel::from_vector(layout, Gauge::G1, tools, U, Eigen::MatrixXd::Zero(n, n),
                                        *ValidityVolume::hull_of(hull));
 }
 
-// Nodes every 50 mm, points every 200 mm: between them the tables bend by tens of um, a good model leaves 0.1
-// um.
+// Nodes every 50 mm, points every 200 mm: between them the tables bend by tens of um, a good model
+// leaves 0.1 um.
 TEST(Verification, GivesNoRatioWhereInterpolationCostsMoreThanIsLeft) {
   std::mt19937 random(3);
   std::normal_distribution<double> normal(0.0, 0.05e-6);
@@ -151,7 +155,8 @@ TEST(Verification, GivesNoRatioWhereInterpolationCostsMoreThanIsLeft) {
   const Field truth = [&](const Vector3& q) -> Vector3 {
     return model.V_at(q, Vector3::Zero()) + Vector3(normal(random), normal(random), normal(random));
   };
-  const auto c = verified(truth, model, box_of({0, 0, 0}, {0.4, 0.4, 0.4}, {3, 3, 3}), Frame::BestFit);
+  const auto c =
+      verified(truth, model, box_of({0, 0, 0}, {0.4, 0.4, 0.4}, {3, 3, 3}), Frame::BestFit);
   EXPECT_GT(c.R_turned.above_1, 0u);  // what frightened
   EXPECT_FALSE(ratios_hold(c));
   EXPECT_EQ(effect_at_points(c), Effect::Better);
@@ -167,9 +172,11 @@ TEST(Verification, SeesThatAModelOfTheWrongSignIsWorse) {
 TEST(Verification, SeesNoEffectInNoise) {
   std::mt19937 random(5);
   std::normal_distribution<double> normal(0.0, 20e-6);
-  const Field noise = [&](const Vector3&) { return Vector3(normal(random), normal(random), normal(random)); };
-  const auto c =
-      verified(noise, scaled_tables(1e-4), box_of({0, 0, 0}, {0.4, 0.4, 0.4}, {5, 5, 5}), Frame::BestFit);
+  const Field noise = [&](const Vector3&) {
+    return Vector3(normal(random), normal(random), normal(random));
+  };
+  const auto c = verified(noise, scaled_tables(1e-4), box_of({0, 0, 0}, {0.4, 0.4, 0.4}, {5, 5, 5}),
+                          Frame::BestFit);
   EXPECT_EQ(effect_at_points(c), Effect::NotSeen);
 }
 
@@ -191,7 +198,8 @@ TEST(Verification, DoesNotMindWhereTheTrackerStands) {
   const auto model = reference_model("ols");
   const Field V = tests::evemu::table3_machine();
   const auto a = *compare(*observe(measured(V, measured_box())), model, Vector3::Zero());
-  const auto b = *compare(*observe(measured(V, measured_box(), RigidTransform{})), model, Vector3::Zero());
+  const auto b =
+      *compare(*observe(measured(V, measured_box(), RigidTransform{})), model, Vector3::Zero());
   EXPECT_NEAR(a.before.rms_m, b.before.rms_m, 1e-12);
   EXPECT_NEAR(a.R_turned.mean, b.R_turned.mean, 1e-9);
 }
@@ -199,7 +207,9 @@ TEST(Verification, DoesNotMindWhereTheTrackerStands) {
 TEST(Verification, SetsVToZeroAtBall1) {
   const auto model = reference_model("ols");
   const Field V = tests::evemu::table3_machine();
-  const Field shifted = [&](const Vector3& q) -> Vector3 { return V(q) + Vector3(1e-3, -2e-3, 5e-4); };
+  const Field shifted = [&](const Vector3& q) -> Vector3 {
+    return V(q) + Vector3(1e-3, -2e-3, 5e-4);
+  };
   const auto a = verified(V, model, measured_thinly(), Frame::Machine, thin_grid()),
              b = verified(shifted, model, measured_thinly(), Frame::Machine, thin_grid());
   EXPECT_LT((*a.origin_m - Vector3(-0.09, 0.14, 0.03)).norm(), 1e-12);
@@ -209,16 +219,18 @@ TEST(Verification, SetsVToZeroAtBall1) {
 
 TEST(Verification, TakesModelsOfTables) {
   const auto side = *equidistant_nodes(0.0, 0.3, 0.1), height = *equidistant_nodes(0.0, 0.1, 0.05);
-  const auto layout = *ParameterLayout::observable_with_one_target(*KinematicChain::parse("[w b Z X Y t]"),
-                                                                   {side, side, height});
-  Eigen::VectorXd U = Eigen::VectorXd::LinSpaced(static_cast<Eigen::Index>(layout.model_size()), -1e-4, 1e-4);
+  const auto layout = *ParameterLayout::observable_with_one_target(
+      *KinematicChain::parse("[w b Z X Y t]"), {side, side, height});
+  Eigen::VectorXd U =
+      Eigen::VectorXd::LinSpaced(static_cast<Eigen::Index>(layout.model_size()), -1e-4, 1e-4);
   const auto n = U.size();
   const auto hull = box_of({0, 0, 0}, {0.3, 0.3, 0.1}, {2, 2, 2});
   const std::vector<Vector3> tools{Vector3::Zero()};
-  const auto model = *VolumetricModel::from_vector(layout, Gauge::G1, tools, U, Eigen::MatrixXd::Zero(n, n),
-                                                   *ValidityVolume::hull_of(hull));
-  const auto c =
-      verified(field_of(model), model, box_of({0, 0, 0}, {0.3, 0.3, 0.1}, {7, 7, 5}), Frame::BestFit);
+  const auto model = *VolumetricModel::from_vector(
+      layout, Gauge::G1, tools, U, Eigen::MatrixXd::Zero(n, n), *ValidityVolume::hull_of(hull));
+  const auto c = verified(field_of(model), model, box_of({0, 0, 0}, {0.3, 0.3, 0.1}, {7, 7, 5}),
+                          Frame::BestFit);
+
   EXPECT_FALSE(c.origin_m);
   EXPECT_LT(c.after.rms_m, 1e-3 * c.before.rms_m);
   EXPECT_LT(c.R_turned.median, 0.02);
@@ -228,15 +240,18 @@ TEST(Verification, SaysWhatTheDataDoNotAllow) {
   const auto model = reference_model("ols");
   const Field large = tests::evemu::table3_machine();
   const Field V = [&](const Vector3& q) -> Vector3 { return 0.1 * large(q); };
+
   const auto code = [&](const std::vector<Vector3>& readings, const Options& options = {}) {
     const auto o = observe(measured(V, readings));
     if (!o) return o.error().code;
     return compare(*o, model, Vector3::Zero(), options).error().code;
   };
+
   EXPECT_EQ(code(box_of({0, 0, 0}, {0.8, 0.4, 0.0}, {5, 5, 2})), ErrorCode::DegenerateGeometry);
   EXPECT_EQ(code(box_of({0.1, 0, 0}, {0.5, 0.3, 0.1}, {9, 7, 5})),
             ErrorCode::DegenerateGeometry);  // no Ball1
-  EXPECT_EQ(code(box_of({-0.1, -0.1, -0.05}, {0.8, 0.4, 0.15}, {2, 2, 2})), ErrorCode::TooFewObservations);
+  EXPECT_EQ(code(box_of({-0.1, -0.1, -0.05}, {0.8, 0.4, 0.15}, {2, 2, 2})),
+            ErrorCode::TooFewObservations);
   EXPECT_EQ(code(measured_box(), {.step_m = Vector3::Constant(1e-6)}), ErrorCode::BadInput);
   EXPECT_EQ(compare(*observe(measured(V, measured_box())), model, Vector3(0, 0, 0.1)).error().code,
             ErrorCode::NotApplicable);
@@ -247,7 +262,8 @@ TEST(Verification, RefusesMixedUpRowsAndMirroredFrames) {
   auto mirrored = points;
   for (auto& p : mirrored) p.measured_m.y() = -p.measured_m.y();
   EXPECT_EQ(observe(mirrored).error().code, ErrorCode::AlignmentFailed);
-  EXPECT_THAT(observe(mirrored).error().text, testing::HasSubstr("they fit with one axis reversed"));
+  EXPECT_THAT(observe(mirrored).error().text,
+              testing::HasSubstr("they fit with one axis reversed"));
   std::mt19937 random(1);
   for (std::size_t i = 1; i < points.size(); ++i)
     std::swap(points[i].measured_m, points[random() % i].measured_m);

@@ -77,12 +77,15 @@ TEST(VolumetricModel, Of18TablesHoldsForAnyTool) {
   std::mt19937_64 random(2);
   const Eigen::VectorXd U = random_tables(layout, 1e-4, random);
   const std::vector<Vector3> tools{{0, 0, 0}, {0.1, 0, 0}, {0, 0.1, 0}};
-  const auto model = VolumetricModel::from_vector(
-      layout, Gauge::G1, tools, U, Eigen::MatrixXd::Identity(U.size(), U.size()), whole_volume(layout));
+  const auto model = VolumetricModel::from_vector(layout, Gauge::G1, tools, U,
+                                                  Eigen::MatrixXd::Identity(U.size(), U.size()),
+                                                  whole_volume(layout));
+
   ASSERT_TRUE(model) << model.error().text;
   const Vector3 q(0.1, 0.1, -0.1), t(0.3, 0.2, -0.5);
-  EXPECT_LT((model->V_at(q, t) - volumetric_error(layout, {U.data(), layout.model_size()}, q, t)).norm(),
-            1e-18);
+  EXPECT_LT(
+      (model->V_at(q, t) - volumetric_error(layout, {U.data(), layout.model_size()}, q, t)).norm(),
+      1e-18);
 }
 
 VolumetricModel of_18_tables(const std::vector<Vector3>& tools) {
@@ -91,17 +94,20 @@ VolumetricModel of_18_tables(const std::vector<Vector3>& tools) {
   std::mt19937_64 random(2);
   const Eigen::VectorXd U = random_tables(layout, 1e-4, random);
   return *VolumetricModel::from_vector(layout, Gauge::G1, tools, U,
-                                       Eigen::MatrixXd::Identity(U.size(), U.size()), whole_volume(layout));
+                                       Eigen::MatrixXd::Identity(U.size(), U.size()),
+                                       whole_volume(layout));
 }
 
 TEST(VolumetricModel, OfToolsOnALineHoldsForToolsOnThatLineOnly) {
-  const std::vector<Vector3> two{{0, 0, 0}, {0.1, 0, 0}}, three{{0, 0, 0}, {0.1, 0, 0}, {0.3, 1e-4, 0}};
+  const std::vector<Vector3> two{{0, 0, 0}, {0.1, 0, 0}},
+      three{{0, 0, 0}, {0.1, 0, 0}, {0.3, 1e-4, 0}};
   for (const VolumetricModel& model : {of_18_tables(two), of_18_tables(three)}) {
     EXPECT_TRUE(model.holds_for_tool({0.2, 0, 0}));
     EXPECT_FALSE(model.holds_for_tool({0.1, 0.05, 0}));
     EXPECT_TRUE(model.error_at(Vector3::Zero(), {0.2, 0, 0.05}).V_m.array().isNaN().all());
     // Close to the line: the rotation about it, which no tool has shown, must not count.
-    EXPECT_EQ(model.V_at({0.1, 0.1, -0.1}, {0.2, 0, 4e-4}), model.V_at({0.1, 0.1, -0.1}, {0.2, 0, 0}));
+    EXPECT_EQ(model.V_at({0.1, 0.1, -0.1}, {0.2, 0, 4e-4}),
+              model.V_at({0.1, 0.1, -0.1}, {0.2, 0, 0}));
   }
 }
 
@@ -154,8 +160,10 @@ TEST(VolumetricModel, RefusesADescriptionThatDoesNotAddUp) {
   const auto code_of = [](const ModelDescription& d) {
     return VolumetricModel::from_description(d).error().code;
   };
+
   ModelDescription d = good;
   d.parameters.pop_back();
+
   EXPECT_EQ(code_of(d), ErrorCode::BadInput);
   d = good;
   d.parameters[3].name = "EXQ";
@@ -175,7 +183,8 @@ TEST(VolumetricModel, RefusesADescriptionThatDoesNotAddUp) {
 TEST(VolumetricModel, RefusesACovarianceThatIsNotPositive) {
   ModelDescription d = model_of(random_model(1e-4)).description();
   EXPECT_TRUE(check_covariance(d.covariance));
-  d.covariance(4, 5) = d.covariance(5, 4) = 1.01 * std::sqrt(d.covariance(4, 4) * d.covariance(5, 5));
+  d.covariance(4, 5) = d.covariance(5, 4) =
+      1.01 * std::sqrt(d.covariance(4, 4) * d.covariance(5, 5));
   const auto refused = VolumetricModel::from_description(d);
   ASSERT_FALSE(refused);
   EXPECT_EQ(refused.error().code, ErrorCode::BadInput);

@@ -18,7 +18,8 @@ struct Ran {
 };
 
 /// `arguments` as a shell takes them; `folder` is where the program runs, and keeps its output.
-[[nodiscard]] inline Ran run_abbe(const std::filesystem::path& folder, const std::string& arguments) {
+[[nodiscard]] inline Ran run_abbe(const std::filesystem::path& folder,
+                                  const std::string& arguments) {
   const auto out = folder / "stdout", err = folder / "stderr";
   const auto command = fmt::format("cd '{}' && '{}' {} >'{}' 2>'{}'", folder.string(), ABBE_PROGRAM,
                                    arguments, out.string(), err.string());

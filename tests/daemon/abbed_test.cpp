@@ -88,7 +88,7 @@ TEST_F(AbbedTest, RemovesNoRecordingBeforeATimeServerCouldSetTheClock) {
   config_.recording.keep = std::chrono::days{2};
   auto abbed = Abbed::start(config_, {});
   ASSERT_TRUE(abbed) << abbed.error().text;
-  (*abbed)->turn();
+  (*abbed)->cycle();
   abbed->reset();  // waits for what was begun aside
   EXPECT_TRUE(fs::exists(old));
 }

@@ -99,12 +99,14 @@ TEST(Assembler, AnAxisSampleThatComesLateChangesNothing) {
   std::swap(out_of_order.axes[20], out_of_order.axes[21]);
   std::swap(out_of_order.axes[30], out_of_order.axes[31]);
   std::vector<std::vector<Snapshot>> results;
+
   for (const Batch& axes : {in_order, out_of_order}) {
     Assembler assembler{{}};
     assembler.take(axes);
     assembler.take(burst(kStart + 4ms, 20));
     assembler.emit(results.emplace_back());
   }
+
   ASSERT_EQ(results[0].size(), 20u);
   ASSERT_EQ(results[1].size(), 20u);
   for (std::size_t i = 0; i < 20; ++i) {
@@ -125,12 +127,14 @@ TEST(Assembler, ASampleThatIsTakenBackCountsForNoSnapshot) {
   first.emit(at_once);
   Assembler second{{}};
   second.take(burst(kStart + 4ms, 20));
+
   for (const AxisSample& sample : axes.axes) {
     Batch one;
     one.axes = {sample};
     second.take(one);
     second.emit(one_by_one);
   }
+
   ASSERT_EQ(at_once.size(), 20u);
   ASSERT_EQ(one_by_one.size(), 20u);
   for (std::size_t i = 0; i < 20; ++i) {
@@ -191,6 +195,7 @@ TEST(Assembler, ATouchThatKnowsTheAxesKeepsThem) {
   assembler.take(batch);
   std::vector<Snapshot> out;
   assembler.emit(out);
+
   ASSERT_EQ(out.size(), 1u);
   EXPECT_TRUE(out[0].has_trigger);
   EXPECT_FALSE(out[0].has_tracker_point);
@@ -220,12 +225,14 @@ TEST(Assembler, ATouchBeforeAPointDoesNotTakeItsEnvironmentAway) {
     e.air_temperature_K = 290.0 + std::chrono::duration<double>(at).count();
     batch.environment.push_back(e);
   }
+
   batch.touches.push_back(touch_at(kStart + 800ms));
   assembler.take(batch);
   std::vector<Snapshot> out;
   assembler.emit(out);
   assembler.take(burst(kStart + 100ms, 1));
   assembler.emit(out);
+
   ASSERT_EQ(out.size(), 2u);
   EXPECT_EQ(out[0].environment.air_temperature_K, 290.5);
   EXPECT_EQ(out[1].environment.air_temperature_K, 290.0);

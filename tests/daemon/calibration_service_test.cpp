@@ -7,7 +7,7 @@
 #include <thread>
 
 #include "abbe/config/config.hpp"
-#include "abbe/service/work_aside.hpp"
+#include "abbe/service/background_tasks.hpp"
 #include "recording_fixture.hpp"
 #include "synthetic_otf_run.hpp"
 
@@ -25,7 +25,8 @@ std::vector<AxisPosition> path_m() {
 
 class CalibrationServiceTest : public ::testing::Test {
  protected:
-  CalibrationServiceTest() : config_(parse_config(test::synthetic_machine_toml(), "machine.toml").value()) {
+  CalibrationServiceTest()
+      : config_(parse_config(test::synthetic_machine_toml(), "machine.toml").value()) {
     authority_.emplace(ModelAuthority::open(folder_.path() / "models", config_, {}, HostTime{1s}));
     service_.emplace(config_, *authority_, nullptr, protocol::UtcOffset{});
   }
@@ -43,10 +44,11 @@ class CalibrationServiceTest : public ::testing::Test {
         show(q);
       }
     }
+
     stand(path.back(), 2s);
   }
   [[nodiscard]] SessionState state() const { return service_->status().state; }
-  void turn() { (void)service_->turn({}, now_); }
+  void cycle() { (void)service_->cycle({}, now_); }
 
   TemporaryFolder folder_;
   Config config_;
@@ -66,7 +68,7 @@ class CalibrationServiceTest : public ::testing::Test {
     s.has_tracker_point = true;
     s.tracker_point.device_time = protocol::DeviceTime{now_.time_since_epoch()};
     s.tracker_point.p_tracker_m = q;
-    (void)service_->turn({&s, 1}, now_);
+    (void)service_->cycle({&s, 1}, now_);
     now_ += 5ms;
   }
 };
@@ -93,7 +95,7 @@ TEST_F(CalibrationServiceTest, AnIdentificationIsCancelledAndMakesPlaceForTheNex
   for (; !again; again = service_->start(OtfRequest{path_m()}, "anna", now_)) {
     EXPECT_NE(again.error().text.find("is still ending"), std::string::npos) << again.error().text;
     std::this_thread::yield();
-    turn();
+    cycle();
   }
   EXPECT_EQ(*again, 2u);
 }
@@ -103,7 +105,7 @@ TEST_F(CalibrationServiceTest, EndsWhileAnIdentificationRuns) {
   drive();
   ASSERT_EQ(state(), SessionState::Identifying);
   service_.reset();
-  while (work_left_running()) std::this_thread::yield();
+  while (background_tasks_running()) std::this_thread::yield();
 }
 
 }  // namespace

@@ -104,8 +104,9 @@ TEST(CalibrationSession, ScalesThatContradictAVertexEndTheRun) {
   auto file = kPath;
   file[2][1] += 0.4e-3;
   const std::string reason = reason_of_a_run_along(file);
-  EXPECT_NE(reason.find("at vertex 2 Y reads 100.000 mm, the path says 100.400 mm, 0.020 mm allowed"),
-            std::string::npos)
+  EXPECT_NE(
+      reason.find("at vertex 2 Y reads 100.000 mm, the path says 100.400 mm, 0.020 mm allowed"),
+      std::string::npos)
       << reason;
 }
 
@@ -131,14 +132,16 @@ TEST(CalibrationSession, TheRunBeginsAndEndsInStandstill) {
   for (std::size_t i = 1; i < kPath.size(); ++i) drive.move(kPath[i]);
   drive.stand(kPath.back(), 2s);
   auto acquired = session.take_run();
+
   ASSERT_TRUE(acquired);
   const CalibrationRun taken = run_of(std::move(*acquired));
   const std::vector<RunPoint>* run = &std::get<OtfRun>(taken).points;
   ASSERT_GT(run->size(), 1000u);
   EXPECT_EQ((*run)[19].p_tracker_m, kPath[0]);
   EXPECT_EQ((*run)[run->size() - 20].p_tracker_m, kPath.back());
-  EXPECT_LT(run->size(),
-            3000u + 2u * 200u + 10u);  // 300 mm at 0.1 mm each, and 0.4 s of standstill at either end
+  EXPECT_LT(
+      run->size(),
+      3000u + 2u * 200u + 10u);  // 300 mm at 0.1 mm each, and 0.4 s of standstill at either end
 }
 
 TEST(CalibrationSession, EverySessionHasANumberOfItsOwn) {
@@ -188,10 +191,12 @@ TEST(CalibrationSession, TheRunKnowsItsScalesAndItsAir) {
   ASSERT_TRUE(acquired);
   const CalibrationRun taken = run_of(std::move(*acquired));
   const auto& run = std::get<OtfRun>(taken);
+
   for (std::size_t i = 0; i < kPath.size(); ++i) {
     EXPECT_NEAR(run.path_m[i][0] - kPath[i][0], 5.0 * kAlpha * (kPath[i][0] - kFixed_m), 1e-12);
     EXPECT_EQ(run.path_m[i][1], kPath[i][1]);
   }
+
   EXPECT_NEAR(run.u_scale, 2e-7, 0.3e-7);  // 0.2 K: 1.9e-7, 30 Pa: 0.8e-7
 }
 
@@ -201,6 +206,7 @@ TEST(CalibrationSession, TheRunKnowsWhatTheControllersAirLeaves) {
   AcquisitionOptions options;
   options.environment = environment_use(config);
   CalibrationSession session{options};
+
   ASSERT_TRUE(session.start({OtfRequest{kPath}, HostTime{10s}}));
   Drive drive{session};
   drive.stand(kPath[0], 1s);
@@ -218,6 +224,7 @@ TEST(CalibrationSession, TheRunNamesAirThatNobodyMeasured) {
   AcquisitionOptions options;
   options.environment = environment_use(config);
   CalibrationSession session{options};
+
   ASSERT_TRUE(session.start({OtfRequest{kPath}, HostTime{10s}}));
   Drive drive{session};
   drive.stand(kPath[0], 1s);
@@ -226,7 +233,8 @@ TEST(CalibrationSession, TheRunNamesAirThatNobodyMeasured) {
   auto acquired = session.take_run();
   ASSERT_TRUE(acquired);
   const CalibrationRun taken = run_of(std::move(*acquired));
-  EXPECT_THAT(std::get<OtfRun>(taken).unmeasured_air.value_or(""), testing::HasSubstr("air not measured"));
+  EXPECT_THAT(std::get<OtfRun>(taken).unmeasured_air.value_or(""),
+              testing::HasSubstr("air not measured"));
 }
 
 TEST(CalibrationSession, ASlowTrackerStandsLongEnoughForTwentyPoints) {
@@ -247,7 +255,8 @@ TEST(CalibrationSession, RefusesWhenAnotherPathIsDriven) {
   drive.stand(kPath[0], 1s);
   drive.move({0, 0.1, 0});
   EXPECT_EQ(session.status().state, SessionState::Refused);
-  EXPECT_NE(session.status().reason.find("another path"), std::string::npos) << session.status().reason;
+  EXPECT_NE(session.status().reason.find("another path"), std::string::npos)
+      << session.status().reason;
 }
 
 TEST(CalibrationSession, ABeamLostAroundACornerDoesNotLoseThePath) {
@@ -282,6 +291,7 @@ TEST(CalibrationSession, AClockMappingThatJumpsBackDoesNotAddWay) {
   ASSERT_TRUE(session.start({OtfRequest{kPath}, HostTime{10s}}));
   Drive drive{session};
   drive.stand(kPath[0], 1s);
+
   for (std::size_t i = 1; i < kPath.size(); ++i) {
     drive.move(kPath[i]);
     const AxisPosition corner = kPath[i];
@@ -293,6 +303,7 @@ TEST(CalibrationSession, AClockMappingThatJumpsBackDoesNotAddWay) {
       drive.move(corner);
     }
   }
+
   drive.stand(kPath.back(), 2s);
   EXPECT_EQ(session.status().state, SessionState::Identifying) << session.status().reason;
 }
@@ -313,7 +324,8 @@ TEST(CalibrationSession, RefusesWhenTheBeamStaysAway) {
 TEST(CalibrationSession, WaitsInWallTimeForASimulatorThatIsFasterThanTime) {
   Config config;
   config.daemon.speed = 20.0;
-  EXPECT_EQ(acquisition_options(config).arrival_patience, 20 * AcquisitionOptions{}.arrival_patience);
+  EXPECT_EQ(acquisition_options(config).arrival_patience,
+            20 * AcquisitionOptions{}.arrival_patience);
 }
 
 TEST(CalibrationSession, LeavesOutPointsThatCameOutOfOrder) {
@@ -327,12 +339,15 @@ TEST(CalibrationSession, LeavesOutPointsThatCameOutOfOrder) {
   drive.set_device_clock(500s);
   for (std::size_t i = 2; i < kPath.size(); ++i) drive.move(kPath[i]);
   drive.stand(kPath.back(), 2s);
-  EXPECT_NE(session.status().reason.find("25 left out"), std::string::npos) << session.status().reason;
+
+  EXPECT_NE(session.status().reason.find("25 left out"), std::string::npos)
+      << session.status().reason;
   auto acquired = session.take_run();
   ASSERT_TRUE(acquired);
   const CalibrationRun taken = run_of(std::move(*acquired));
   const std::vector<RunPoint>* run = &std::get<OtfRun>(taken).points;
-  for (std::size_t i = 1; i < run->size(); ++i) ASSERT_GT((*run)[i].device_time, (*run)[i - 1].device_time);
+  for (std::size_t i = 1; i < run->size(); ++i)
+    ASSERT_GT((*run)[i].device_time, (*run)[i - 1].device_time);
 }
 
 TEST(CalibrationSession, RefusesWhenTheTrackersClockBeginsAnew) {
@@ -344,7 +359,8 @@ TEST(CalibrationSession, RefusesWhenTheTrackersClockBeginsAnew) {
   drive.set_device_clock(0s);
   drive.move(kPath[2]);
   EXPECT_EQ(session.status().state, SessionState::Refused);
-  EXPECT_NE(session.status().reason.find("clock began anew"), std::string::npos) << session.status().reason;
+  EXPECT_NE(session.status().reason.find("clock began anew"), std::string::npos)
+      << session.status().reason;
 }
 
 TEST(CalibrationSession, WaitsOnWhenTheTrackersClockBeginsAnewBeforeTheRun) {
@@ -368,7 +384,8 @@ TEST(CalibrationSession, EndsWhenNoPointArrivesAnyMore) {
   EXPECT_EQ(session.status().state, SessionState::Acquiring);
   session.tick(drive.now() + 41s);
   EXPECT_EQ(session.status().state, SessionState::Refused);
-  EXPECT_NE(session.status().reason.find("no tracker point"), std::string::npos) << session.status().reason;
+  EXPECT_NE(session.status().reason.find("no tracker point"), std::string::npos)
+      << session.status().reason;
 }
 
 TEST(CalibrationSession, DoesNotWaitForEverForTheMachineToStandAtTheStart) {
@@ -400,7 +417,8 @@ TEST(CalibrationSession, RefusesWhenTheMachineStopsForGood) {
     drive.stand({0.05, 0, 0}, kPeriod);
   }
   EXPECT_EQ(session.status().state, SessionState::Refused);
-  EXPECT_NE(session.status().reason.find("stood still"), std::string::npos) << session.status().reason;
+  EXPECT_NE(session.status().reason.find("stood still"), std::string::npos)
+      << session.status().reason;
 }
 
 TEST(CalibrationSession, RefusesWhenTheAxesStayAway) {
@@ -412,7 +430,8 @@ TEST(CalibrationSession, RefusesWhenTheAxesStayAway) {
   drive.lose_axes();
   drive.stand(kPath[1], 31s);
   EXPECT_EQ(session.status().state, SessionState::Refused);
-  EXPECT_NE(session.status().reason.find("no axis positions"), std::string::npos) << session.status().reason;
+  EXPECT_NE(session.status().reason.find("no axis positions"), std::string::npos)
+      << session.status().reason;
 }
 
 TEST(CalibrationSession, LooksAtNothingFromBeforeItsStart) {
@@ -444,9 +463,9 @@ TEST(CalibrationSession, TheVerdictEndsItActiveOrRefusedAndLeavesItsTrack) {
     session.judged("model", passed, "verdict", drive.now());
     std::vector<SessionState> track;
     for (const auto& event : session.take_events()) track.push_back(event.status.state);
-    EXPECT_EQ(track,
-              (std::vector{SessionState::Warming, SessionState::Acquiring, SessionState::Identifying,
-                           SessionState::Judged, passed ? SessionState::Active : SessionState::Refused}));
+    EXPECT_EQ(track, (std::vector{SessionState::Warming, SessionState::Acquiring,
+                                  SessionState::Identifying, SessionState::Judged,
+                                  passed ? SessionState::Active : SessionState::Refused}));
   }
 }
 

@@ -44,6 +44,7 @@ v1::ErrorModel some_model() {
   r.axis("X");
   r.max_m(0.5);
   m.validity({r});
+
   return m;
 }
 
@@ -63,7 +64,8 @@ TEST(Cdr, PayloadBeginsWithLittleEndianCdrHeader) {
 TEST(Cdr, FirstMemberIsLaidOutAsXcdr1String) {
   const auto payload = encoded(some_snapshot());
   EXPECT_EQ(payload[4], std::byte{6});  // length of "vmc-3" with its NUL, little endian
-  EXPECT_EQ(std::string(reinterpret_cast<const char*>(payload.data()) + 8, 6), std::string("vmc-3\0", 6));
+  EXPECT_EQ(std::string(reinterpret_cast<const char*>(payload.data()) + 8, 6),
+            std::string("vmc-3\0", 6));
 }
 
 TEST(Cdr, SnapshotSurvivesTheRoundTripFieldByField) {
@@ -151,15 +153,18 @@ TEST(Cdr, DecodeIsTotalOnDamagedBytes) {
   std::mt19937 random(4711);
   const auto good = encoded(some_model());
   std::size_t refused = 0;
+
   for (int i = 0; i < 5000; ++i) {
     auto bad = good;
-    for (int k = 0; k < 4; ++k) bad[4 + random() % (bad.size() - 4)] = static_cast<std::byte>(random());
+    for (int k = 0; k < 4; ++k)
+      bad[4 + random() % (bad.size() - 4)] = static_cast<std::byte>(random());
     const auto value = decode<v1::ErrorModel>(bad);
     if (!value) {
       ++refused;
       EXPECT_FALSE(value.error().text.empty());
     }
   }
+
   EXPECT_GT(refused, 0u);
 }
 
@@ -176,12 +181,14 @@ std::map<std::string, std::size_t> bounds_in_idl(const std::string& type) {
   text = text.substr(begin, text.find("};", begin) - begin);
   std::map<std::string, std::size_t> bounds;
   std::istringstream lines(text);
+
   for (std::string line; std::getline(lines, line);) {
     // Lines such as `  @key string<64> machine;` and `  sequence<double, 8> position;  // m or rad`.
     const auto close = line.find("> "), open = line.find_last_of("<,", close), end = line.find(';');
     if (close == std::string::npos || end == std::string::npos || close > end) continue;
     bounds[line.substr(close + 2, end - close - 2)] = std::stoul(line.substr(open + 1));
   }
+
   return bounds;
 }
 

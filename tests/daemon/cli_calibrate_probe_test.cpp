@@ -37,8 +37,9 @@ class CliCalibrateProbe : public ::testing::Test {
   /// Exit code and standard output.
   [[nodiscard]] std::pair<int, std::string> calibrate(const std::string& more) const {
     const auto out = (folder_ / "stdout").string();
-    const std::string command = "'" + std::string(ABBE_PROGRAM) + "' calibrate probe --recording '" +
-                                (folder_ / "run.mcap").string() + "' " + more + " >'" + out + "' 2>&1";
+    const std::string command =
+        "'" + std::string(ABBE_PROGRAM) + "' calibrate probe --recording '" +
+        (folder_ / "run.mcap").string() + "' " + more + " >'" + out + "' 2>&1";
     const int status = std::system(command.c_str());
     std::ostringstream text;
     text << std::ifstream(out).rdbuf();
@@ -62,6 +63,7 @@ std::vector<protocol::ProbeTrigger> touches_at(const std::vector<double>& feeds_
       touches.push_back(touch);
     }
   }
+
   return touches;
 }
 

@@ -20,7 +20,8 @@ using ::testing::AllOf;
 using ::testing::HasSubstr;
 using ::testing::StartsWith;
 
-/// A daemon that goes through the given states, one a question; `at_question` is told how many there were.
+/// A daemon that goes through the given states, one a question; `at_question` is told how many
+/// there were.
 struct ScriptedDaemon {
   std::vector<nlohmann::json> sessions;
   std::function<void(std::size_t)> at_question = [](std::size_t) {};
@@ -35,8 +36,10 @@ struct ScriptedDaemon {
 };
 
 nlohmann::json session(const std::string& state, const std::string& reason) {
-  return {
-      {"state", state}, {"reason", reason}, {"progress", 0.5}, {"model_id", state == "active" ? "abcd" : ""}};
+  return {{"state", state},
+          {"reason", reason},
+          {"progress", 0.5},
+          {"model_id", state == "active" ? "abcd" : ""}};
 }
 
 class CliOfADaemon : public ::testing::Test {
@@ -55,8 +58,9 @@ TEST_F(CliOfADaemon, CalibrateSaysWhatIsWaitedForAtEveryStep) {
   const auto socket = folder_.path() / "told.sock";
   const auto daemon = ControlServer::open(
       socket,
-      ScriptedDaemon{{session("warming", "waiting for the machine to stand at (1.000, 2.000, 3.000) mm"),
-                      session("acquiring", "driving the path"), session("active", "accepted")}});
+      ScriptedDaemon{
+          {session("warming", "waiting for the machine to stand at (1.000, 2.000, 3.000) mm"),
+           session("acquiring", "driving the path"), session("active", "accepted")}});
   ASSERT_TRUE(daemon);
   const auto ran = calibrate(socket);
   EXPECT_EQ(ran.exit, 0) << ran.err;
@@ -86,8 +90,8 @@ TEST_F(CliOfADaemon, CalibrateExitsAsTheSessionWasRefused) {
 
 TEST_F(CliOfADaemon, ADaemonStartedAnewMeanwhileHasLostTheSession) {
   const auto socket = folder_.path() / "lost.sock";
-  const auto daemon =
-      ControlServer::open(socket, ScriptedDaemon{{session("acquiring", "driving"), session("idle", "")}});
+  const auto daemon = ControlServer::open(
+      socket, ScriptedDaemon{{session("acquiring", "driving"), session("idle", "")}});
   ASSERT_TRUE(daemon);
   const auto ran = calibrate(socket);
   EXPECT_EQ(ran.exit, 4);
@@ -102,16 +106,19 @@ TEST_F(CliOfADaemon, CalibrateReportsTheVerdictOfItsOwnSessionOnly) {
     if (state == "refused") one["code"] = "data_insufficient";
     return one;
   };
+
   std::atomic<bool> kept = true;
-  const auto daemon =
-      ControlServer::open(socket, [&](const nlohmann::json& request, const ControlPeer&) -> nlohmann::json {
+  const auto daemon = ControlServer::open(
+      socket, [&](const nlohmann::json& request, const ControlPeer&) -> nlohmann::json {
         if (request["do"] == "calibrate") return {{"ok", true}, {"session", 7}};
         return {{"ok", true},
                 {"session", numbered(8, "active")},
                 {"ended_sessions", {numbered(kept ? 7 : 6, "refused")}}};
       });
+
   ASSERT_TRUE(daemon);
   const auto refused = calibrate(socket);
+
   EXPECT_EQ(refused.exit, 1);
   EXPECT_THAT(refused.out, HasSubstr("of session 7"));
   kept = false;
@@ -123,16 +130,21 @@ TEST_F(CliOfADaemon, CalibrateReportsTheVerdictOfItsOwnSessionOnly) {
 TEST_F(CliOfADaemon, ReferencePrintsEachAxisInItsUnits) {
   const auto socket = folder_.path() / "reference.sock";
   const auto axis = [](const char* name, const char* kind) {
-    return nlohmann::json{{"axis", name},  {"kind", kind}, {"state", "found"},          {"marks", 4},
-                          {"known", true}, {"u", 2e-6},    {"reading_at_zero", 0.0125}, {"reason", ""}};
+    return nlohmann::json{
+        {"axis", name},  {"kind", kind}, {"state", "found"},          {"marks", 4},
+        {"known", true}, {"u", 2e-6},    {"reading_at_zero", 0.0125}, {"reason", ""}};
   };
+
   const auto daemon =
       ControlServer::open(socket, [&](const nlohmann::json&, const ControlPeer&) -> nlohmann::json {
         return {{"ok", true},
-                {"reference", {{"running", false}, {"axes", {axis("X", "linear"), axis("C", "rotary")}}}}};
+                {"reference",
+                 {{"running", false}, {"axes", {axis("X", "linear"), axis("C", "rotary")}}}}};
       });
+
   ASSERT_TRUE(daemon);
-  const auto ran = test::run_abbe(folder_.path(), fmt::format("reference --socket '{}'", socket.string()));
+  const auto ran =
+      test::run_abbe(folder_.path(), fmt::format("reference --socket '{}'", socket.string()));
   EXPECT_EQ(ran.exit, 0) << ran.err;
   EXPECT_THAT(ran.out, AllOf(HasSubstr("at 12.500000 mm, u = 2.000 um"),
                              HasSubstr("at 0.012500000 rad, u = 2.000 urad")));
@@ -147,8 +159,10 @@ TEST_F(CliOfADaemon, ASearchOfADaemonStartedAnewIsLost) {
                 {"process", asked++ < 2 ? 1 : 2},
                 {"reference", {{"running", true}, {"axes", nlohmann::json::array()}}}};
       });
+
   ASSERT_TRUE(daemon);
-  const auto ran = test::run_abbe(folder_.path(), fmt::format("reference --socket '{}'", socket.string()));
+  const auto ran =
+      test::run_abbe(folder_.path(), fmt::format("reference --socket '{}'", socket.string()));
   EXPECT_EQ(ran.exit, 4);
   EXPECT_THAT(ran.err, HasSubstr("search for the marks is lost"));
 }
@@ -159,15 +173,17 @@ TEST_F(CliOfADaemon, CalibrateInterruptedSaysHowToCancel) {
   script.at_question = [&pid_file](std::size_t n) {
     if (n == 1) ::kill(std::stoi(text_of(pid_file)), SIGINT);
   };
+
   const auto daemon = ControlServer::open(socket, script);
   ASSERT_TRUE(daemon);
-  const auto command =
-      fmt::format("sh -c 'echo $$ >{}; exec {} calibrate otf --path {} --socket {}' 2>{}", pid_file.string(),
-                  ABBE_PROGRAM, path_.string(), socket.string(), (folder_.path() / "left.err").string());
+  const auto command = fmt::format(
+      "sh -c 'echo $$ >{}; exec {} calibrate otf --path {} --socket {}' 2>{}", pid_file.string(),
+      ABBE_PROGRAM, path_.string(), socket.string(), (folder_.path() / "left.err").string());
   const int status = std::system(command.c_str());
   ASSERT_TRUE(WIFEXITED(status));
   EXPECT_EQ(WEXITSTATUS(status), 130);
-  EXPECT_THAT(text_of(folder_.path() / "left.err"), HasSubstr("--cancel --socket " + socket.string()));
+  EXPECT_THAT(text_of(folder_.path() / "left.err"),
+              HasSubstr("--cancel --socket " + socket.string()));
 }
 
 }  // namespace

@@ -45,7 +45,8 @@ class Cli : public ::testing::Test {
   static Ran identify(const fs::path& path, const fs::path& tracker, const fs::path& out,
                       const std::string& more = "") {
     return abbe(fmt::format("identify otf --machine '{}' --path '{}' --tracker '{}' -o '{}' {}",
-                            files_.machine.string(), path.string(), tracker.string(), out.string(), more));
+                            files_.machine.string(), path.string(), tracker.string(), out.string(),
+                            more));
   }
   static fs::path write(const std::string& name, const std::string& text) {
     test::write_text(folder_ / name, text);
@@ -78,10 +79,12 @@ TEST_F(Cli, IdentifiesTheTruthOfASimulatedMachine) {
   for (const double x : {-30.0, -20.0, 10.0, 30.0})
     for (const double y : {-30.0, 5.0, 30.0})
       for (const double z : {-30.0, 0.0, 30.0}) points += fmt::format("{},{},{}\n", x, y, z);
-  const auto ran = abbe(fmt::format("model eval '{}' --points '{}'", (folder_ / "out/model.json").string(),
-                                    write("points.csv", points).string()));
+  const auto ran =
+      abbe(fmt::format("model eval '{}' --points '{}'", (folder_ / "out/model.json").string(),
+                       write("points.csv", points).string()));
   ASSERT_EQ(ran.exit, 0) << ran.err;
   const auto truth = test::synthetic_truth();
+
   for (const auto& row : rows_of(ran.out)) {
     ASSERT_EQ(row.size(), 10u);
     const calib::Vector3 q_m(row[0] / 1e3, row[1] / 1e3, row[2] / 1e3);
@@ -89,14 +92,18 @@ TEST_F(Cli, IdentifiesTheTruthOfASimulatedMachine) {
     difference_m.push_back(calib::Vector3(row[3], row[4], row[5]) / 1e6 - sim::error_m(truth, q_m));
     EXPECT_EQ(row[9], 1.0);
   }
+
   const auto difference = calib::rigid_free(grid_m, difference_m);
   ASSERT_TRUE(difference);
-  // Errors of 10 to 30 um; the two-step estimator leaves second-order terms of some 10 nm without noise.
+
+  // Errors of 10 to 30 um; the two-step estimator leaves second-order terms of some 10 nm without
+  // noise.
   EXPECT_LT(difference->rigid_free.max_m, 0.1e-6);
 }
 
 TEST_F(Cli, WritesTablesBesideTheModel) {
-  EXPECT_THAT(text_of(folder_ / "out/tables.csv"), StartsWith("name,position_mm,value,u,unit\nEXX,-60,"));
+  EXPECT_THAT(text_of(folder_ / "out/tables.csv"),
+              StartsWith("name,position_mm,value,u,unit\nEXX,-60,"));
   const auto document = read_model(folder_ / "out/model.json");
   ASSERT_TRUE(document);
   EXPECT_EQ(document->machine, "small mill");
@@ -128,22 +135,26 @@ TEST_F(Cli, KeepsAModelWithTheVerdictAgainstTheActiveOne) {
   EXPECT_TRUE(fs::exists(folder_ / "k2/report.html"));
   const auto gate = nlohmann::json::parse(again.out).at("gate");
   EXPECT_FALSE(gate.at("accepted"));
-  EXPECT_THAT(gate.at("reasons").at(0).get<std::string>(), HasSubstr("the active model still holds"));
+  EXPECT_THAT(gate.at("reasons").at(0).get<std::string>(),
+              HasSubstr("the active model still holds"));
 }
 
 TEST_F(Cli, AModelOfAnotherConfigurationDoesNotLockOutItsReplacement) {
   const auto store = folder_ / "replaced";
   const auto keep = fmt::format("--keep '{}' --json", store.string());
-  const auto before = nlohmann::json::parse(identify(files_.path, files_.tracker, folder_ / "r1", keep).out);
-  ASSERT_EQ(
-      abbe(fmt::format("model activate {} --store '{}'", before.at("id").get<std::string>(), store.string()))
-          .exit,
-      0);
+  const auto before =
+      nlohmann::json::parse(identify(files_.path, files_.tracker, folder_ / "r1", keep).out);
+
+  ASSERT_EQ(abbe(fmt::format("model activate {} --store '{}'", before.at("id").get<std::string>(),
+                             store.string()))
+                .exit,
+            0);
   auto machine = text_of(files_.machine);
   machine.replace(machine.find("small mill"), 10, "moved mill");
-  const auto ran = abbe(fmt::format("identify otf --machine '{}' --path '{}' --tracker '{}' -o '{}' {}",
-                                    write("moved.toml", machine).string(), files_.path.string(),
-                                    files_.tracker.string(), (folder_ / "r2").string(), keep));
+  const auto ran =
+      abbe(fmt::format("identify otf --machine '{}' --path '{}' --tracker '{}' -o '{}' {}",
+                       write("moved.toml", machine).string(), files_.path.string(),
+                       files_.tracker.string(), (folder_ / "r2").string(), keep));
   ASSERT_EQ(ran.exit, 0) << ran.err;
   const auto after = nlohmann::json::parse(ran.out);
   EXPECT_TRUE(after.at("gate").at("accepted")) << ran.out;
@@ -175,16 +186,16 @@ TEST_F(Cli, WithoutEvidenceOfThePathsOrientationTheGateRefuses) {
   };
   const auto refused = command("");
   EXPECT_EQ(refused.exit, 5);
-  EXPECT_THAT(refused.out,
-              AllOf(HasSubstr("turned by 180 degrees about X, Y or Z"), HasSubstr("tracker.position_mm")));
+  EXPECT_THAT(refused.out, AllOf(HasSubstr("turned by 180 degrees about X, Y or Z"),
+                                 HasSubstr("tracker.position_mm")));
   EXPECT_EQ(command("--accept-path-orientation").exit, 0);
 }
 
 /// `identify otf` with another machine.toml.
 std::string with_machine(const test::OtfFiles& files, const fs::path& machine, const fs::path& path,
                          const fs::path& out) {
-  return fmt::format("identify otf --machine '{}' --path '{}' --tracker '{}' -o '{}'", machine.string(),
-                     path.string(), files.tracker.string(), out.string());
+  return fmt::format("identify otf --machine '{}' --path '{}' --tracker '{}' -o '{}'",
+                     machine.string(), path.string(), files.tracker.string(), out.string());
 }
 
 /// Readings at 100 Hz: 0.5 s at every vertex, 0.1 s from one to the next.
@@ -206,8 +217,9 @@ std::string scales_csv(double factor) {
 TEST_F(Cli, ScalesThatAgreeWithThePathAreEvidenceOfItsOrientation) {
   auto machine = text_of(files_.machine);
   machine.erase(machine.find(test::kTrackerPlacement));
-  const auto ran = abbe(with_machine(files_, write("bare.toml", machine), files_.path, folder_ / "scales") +
-                        fmt::format(" --encoder '{}'", write("encoder.csv", scales_csv(1.0)).string()));
+  const auto ran =
+      abbe(with_machine(files_, write("bare.toml", machine), files_.path, folder_ / "scales") +
+           fmt::format(" --encoder '{}'", write("encoder.csv", scales_csv(1.0)).string()));
   EXPECT_EQ(ran.exit, 0) << ran.out << ran.err;
   const auto document = read_model(folder_ / "scales/model.json");
   ASSERT_TRUE(document);
@@ -215,12 +227,14 @@ TEST_F(Cli, ScalesThatAgreeWithThePathAreEvidenceOfItsOrientation) {
 }
 
 TEST_F(Cli, ScalesThatContradictThePathAreNamedByVertexAndAxis) {
-  const auto ran = identify(files_.path, files_.tracker, folder_ / "scaled",
-                            fmt::format("--encoder '{}'", write("scaled.csv", scales_csv(0.999)).string()));
+  const auto ran =
+      identify(files_.path, files_.tracker, folder_ / "scaled",
+               fmt::format("--encoder '{}'", write("scaled.csv", scales_csv(0.999)).string()));
   EXPECT_EQ(ran.exit, 3);
-  EXPECT_THAT(ran.err,
-              AllOf(HasSubstr("scaled.csv: the scales contradict the path: at vertex 0 X reads -59.940"),
-                    HasSubstr("the path says -60.000 mm")));
+  EXPECT_THAT(
+      ran.err,
+      AllOf(HasSubstr("scaled.csv: the scales contradict the path: at vertex 0 X reads -59.940"),
+            HasSubstr("the path says -60.000 mm")));
   EXPECT_FALSE(fs::exists(folder_ / "scaled"));
 }
 
@@ -239,13 +253,15 @@ TEST_F(Cli, NamesTheSignsThatAreReversedInThePath) {
     turned += fmt::format("{},{},{}\n", -q[0] * 1e3, -q[1] * 1e3, q[2] * 1e3);
   const auto ran = identify(write("turned.csv", turned), files_.tracker, folder_ / "turned");
   EXPECT_EQ(ran.exit, 5) << ran.err;
-  EXPECT_THAT(ran.out, AllOf(HasSubstr("180 degrees about Z"), HasSubstr("signs of the other two axes")));
+  EXPECT_THAT(ran.out,
+              AllOf(HasSubstr("180 degrees about Z"), HasSubstr("signs of the other two axes")));
 }
 
 TEST_F(Cli, AnUncertainIndexOfTheAirWidensTheModel) {
   const auto ran = identify(files_.path, files_.tracker, folder_ / "air", "--u-scale-ppm 10");
   ASSERT_EQ(ran.exit, 0) << ran.err;
-  const auto plain = read_model(folder_ / "out/model.json"), wide = read_model(folder_ / "air/model.json");
+  const auto plain = read_model(folder_ / "out/model.json"),
+             wide = read_model(folder_ / "air/model.json");
   ASSERT_TRUE(plain && wide);
   EXPECT_EQ(plain->model.U(), wide->model.U());
   EXPECT_GT(wide->model.covariance().trace(), 1.01 * plain->model.covariance().trace());
@@ -253,7 +269,8 @@ TEST_F(Cli, AnUncertainIndexOfTheAirWidensTheModel) {
 
 TEST_F(Cli, TheSummaryHasTheOffsetOfTheRanges) {
   const auto command = [&](const std::string& more) {
-    const auto machine = write("offset.toml", test::synthetic_machine_toml() + more /* of [tracker] */);
+    const auto machine =
+        write("offset.toml", test::synthetic_machine_toml() + more /* of [tracker] */);
     return nlohmann::json::parse(
         abbe(with_machine(files_, machine, files_.path, folder_ / "offset") + " --json").out);
   };
@@ -265,11 +282,12 @@ TEST_F(Cli, TheSummaryHasTheOffsetOfTheRanges) {
 }
 
 TEST_F(Cli, TheVerdictNamesAirThatNobodyMeasured) {
-  const auto machine =
-      write("no_air.toml", test::synthetic_machine_toml() +
-                               "host = \"t\"\nweather = \"none\"\nu_scale_ppm = 1\n" /* of [tracker] */);
+  const auto machine = write(
+      "no_air.toml", test::synthetic_machine_toml() +
+                         "host = \"t\"\nweather = \"none\"\nu_scale_ppm = 1\n" /* of [tracker] */);
   const auto ran = abbe(with_machine(files_, machine, files_.path, folder_ / "no_air"));
-  EXPECT_THAT(ran.out, AllOf(HasSubstr("air not measured"), HasSubstr("20 C, 1013.25 hPa, 50 %"))) << ran.err;
+  EXPECT_THAT(ran.out, AllOf(HasSubstr("air not measured"), HasSubstr("20 C, 1013.25 hPa, 50 %")))
+      << ran.err;
 }
 
 TEST_F(Cli, NamesLineAndColumnOfAVertexOutsideTheTravel) {
@@ -277,8 +295,8 @@ TEST_F(Cli, NamesLineAndColumnOfAVertexOutsideTheTravel) {
   text += "10,60.5,0\n";
   const auto ran = identify(write("outside.csv", text), files_.tracker, folder_ / "outside");
   EXPECT_EQ(ran.exit, 3);
-  EXPECT_THAT(ran.err,
-              AllOf(HasSubstr("outside.csv:63:1: y_mm: 60.5"), HasSubstr("axis Y travels -60 to 60 mm")));
+  EXPECT_THAT(ran.err, AllOf(HasSubstr("outside.csv:63:1: y_mm: 60.5"),
+                             HasSubstr("axis Y travels -60 to 60 mm")));
   EXPECT_FALSE(fs::exists(folder_ / "outside"));
 }
 
@@ -308,7 +326,9 @@ TEST_F(Cli, ComparesTwoModels) {
   const auto figures = nlohmann::json::parse(same.out);
   EXPECT_GT(figures.at("points").get<int>(), 8);
   EXPECT_EQ(figures.at("as_stated").at("max_um"), 0.0);
-  EXPECT_EQ(abbe(fmt::format("model compare '{}' '{}'", model, (folder_ / "none.json").string())).exit, 4);
+  EXPECT_EQ(
+      abbe(fmt::format("model compare '{}' '{}'", model, (folder_ / "none.json").string())).exit,
+      4);
 }
 
 TEST_F(Cli, SaysNothingOnStderrWhenItIsNotATerminal) {
@@ -330,16 +350,21 @@ TEST_F(Cli, GivesTheSummaryAsJson) {
 TEST_F(Cli, CorrectsCommandsByTheErrorAtTheCorrectedPlace) {
   const auto points = write("one.csv", "x_mm,y_mm,z_mm\n10,20,-30\n");
   const auto model = (folder_ / "out/model.json").string();
-  const auto c = abbe(fmt::format("model eval '{}' --points '{}' --correction", model, points.string()));
+  const auto c =
+      abbe(fmt::format("model eval '{}' --points '{}' --correction", model, points.string()));
+
   ASSERT_EQ(c.exit, 0) << c.err;
   EXPECT_THAT(c.out, StartsWith("# quantity = command_correction\nx_mm,y_mm,z_mm,cx_um,"));
   const auto correction = rows_of(c.out).at(0);
-  const auto corrected = write(
-      "corrected.csv", fmt::format("x_mm,y_mm,z_mm\n{:.17g},{:.17g},{:.17g}\n", 10 + correction[3] / 1e3,
-                                   20 + correction[4] / 1e3, -30 + correction[5] / 1e3));
+  const auto corrected =
+      write("corrected.csv",
+            fmt::format("x_mm,y_mm,z_mm\n{:.17g},{:.17g},{:.17g}\n", 10 + correction[3] / 1e3,
+                        20 + correction[4] / 1e3, -30 + correction[5] / 1e3));
   const auto error =
-      rows_of(abbe(fmt::format("model eval '{}' --points '{}'", model, corrected.string())).out).at(0);
-  for (std::size_t i = 3; i < 6; ++i) EXPECT_NEAR(correction[i], -error[i], 1e-3);  // um: solved to 1 nm
+      rows_of(abbe(fmt::format("model eval '{}' --points '{}'", model, corrected.string())).out)
+          .at(0);
+  for (std::size_t i = 3; i < 6; ++i)
+    EXPECT_NEAR(correction[i], -error[i], 1e-3);  // um: solved to 1 nm
 }
 
 TEST_F(Cli, RefusesAToolTheModelDoesNotHoldFor) {
@@ -386,15 +411,18 @@ TEST_F(Cli, ExitsWith4WhenAFileIsNotThereOrNotWritable) {
 TEST_F(Cli, HelpNamesTheExitCodesAndEnds0) {
   const auto ran = abbe("identify otf --help");
   EXPECT_EQ(ran.exit, 0);
-  EXPECT_THAT(ran.out, AllOf(HasSubstr("--tracker"), HasSubstr("Exit codes"), HasSubstr("range_mm")));
+  EXPECT_THAT(ran.out,
+              AllOf(HasSubstr("--tracker"), HasSubstr("Exit codes"), HasSubstr("range_mm")));
 }
 
 TEST_F(Cli, LooksAfterAStore) {
   const auto folder = folder_ / "store";
   auto store = ModelStore::open(folder).value();
   const auto a = store.add(test::synthetic_document(1), true, {}, {"test", "", {}}).value();
-  const auto b = store.add(test::synthetic_document(2), false, {"no better"}, {"test", "", {}}).value();
+  const auto b =
+      store.add(test::synthetic_document(2), false, {"no better"}, {"test", "", {}}).value();
   const auto at = fmt::format(" --store '{}'", folder.string());
+
   EXPECT_EQ(abbe("model activate " + a + at).exit, 0);
   EXPECT_EQ(abbe("model activate " + b + at).exit, 5);
   EXPECT_EQ(abbe("model activate " + b + at + " --force").exit, 2);
@@ -413,8 +441,8 @@ TEST_F(Cli, SaysWhenAProgramOfItsOwnIsNotThere) {
   fs::create_directories(copy.parent_path());
   fs::copy_file(ABBE_PROGRAM, copy, fs::copy_options::overwrite_existing);
   const auto err = folder_ / "alone" / "err";
-  const int status =
-      std::system(fmt::format("PATH=/nonexistent '{}' sim 2>'{}'", copy.string(), err.string()).c_str());
+  const int status = std::system(
+      fmt::format("PATH=/nonexistent '{}' sim 2>'{}'", copy.string(), err.string()).c_str());
   EXPECT_EQ(WEXITSTATUS(status), 4);
   EXPECT_THAT(text_of(err), HasSubstr("abbe-sim"));
 }
@@ -426,19 +454,21 @@ TEST_F(Cli, RunsAProgramBesideItself) {
   const auto out = folder_ / "beside" / "out";
   test::write_text(copy.parent_path() / "abbe-sim", "#!/bin/sh\necho \"sim got $*\"\nexit 7\n");
   fs::permissions(copy.parent_path() / "abbe-sim", fs::perms::owner_all);
-  const int status = std::system(fmt::format("'{}' sim --seed 3 >'{}'", copy.string(), out.string()).c_str());
+  const int status =
+      std::system(fmt::format("'{}' sim --seed 3 >'{}'", copy.string(), out.string()).c_str());
   EXPECT_EQ(WEXITSTATUS(status), 7);
   EXPECT_EQ(text_of(out), "sim got --seed 3\n");
 }
 
-/// A recording in which the daemon said it had identified a model, and which holds no run that gives one.
+/// A recording in which the daemon said it had identified a model, and which holds no run that
+/// gives one.
 fs::path recording_of_a_lost_model(const fs::path& directory) {
   fs::create_directories(directory);
   RecorderOptions options;
   options.directory = directory;
   options.name = "run";
-  auto recorder =
-      Recorder::open(options, {.machine = "mill", .configuration = test::synthetic_machine_toml()}, {});
+  auto recorder = Recorder::open(
+      options, {.machine = "mill", .configuration = test::synthetic_machine_toml()}, {});
   EXPECT_TRUE(recorder);
   v1::CalibrationEvent event;
   event.machine("mill");
@@ -446,6 +476,7 @@ fs::path recording_of_a_lost_model(const fs::path& directory) {
   event.state("active");
   event.model_id("0123456789abcdef");
   recorder->record(event);
+
   return recorder->close().value().file;
 }
 
@@ -454,7 +485,8 @@ TEST_F(Cli, AReplayThatDoesNotGiveTheLiveModelFails) {
   const auto ran = abbe(fmt::format("replay '{}'", recording.string()));
   EXPECT_EQ(ran.exit, 1) << ran.err;
   EXPECT_THAT(ran.out, HasSubstr("NOT the same as live"));
-  const auto other = abbe(fmt::format("replay '{}' -c '{}'", recording.string(), files_.machine.string()));
+  const auto other =
+      abbe(fmt::format("replay '{}' -c '{}'", recording.string(), files_.machine.string()));
   EXPECT_EQ(other.exit, 0) << other.err;
 }
 
@@ -477,10 +509,12 @@ TEST_F(Cli, EvaluatesAModelOfTheStoreByItsNameThere) {
   const auto id = store.add(test::synthetic_document(2), true, {}, actor).value();
   ASSERT_TRUE(store.activate(id, actor));
   const auto points = write("one_point.csv", "x_mm,y_mm,z_mm\n10,-20,-250\n");
+
   const auto eval = [&](const std::string& model) {
-    return abbe(
-        fmt::format("model eval '{}' --points '{}' --store '{}'", model, points.string(), folder.string()));
+    return abbe(fmt::format("model eval '{}' --points '{}' --store '{}'", model, points.string(),
+                            folder.string()));
   };
+
   const auto by_file = eval(store.model_path(id).string());
   ASSERT_EQ(by_file.exit, 0) << by_file.err;
   EXPECT_EQ(eval("active").out, by_file.out);

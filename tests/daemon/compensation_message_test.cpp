@@ -11,7 +11,8 @@ using protocol::HostTime;
 using protocol::SampleFlag;
 using v1::ModelStatus;
 
-constexpr std::array<double, 3> kTool_m{0.02, -0.015, -0.12};  // the one tool of the synthetic model
+constexpr std::array<double, 3> kTool_m{0.02, -0.015,
+                                        -0.12};  // the one tool of the synthetic model
 constexpr std::array<double, 3> kNoVector{};
 
 const ModelInForce kModel{.id = "m", .model = test::synthetic_model(1)};
@@ -24,7 +25,8 @@ protocol::Snapshot view_inside() {
   return view;
 }
 
-v1::Compensation message(const protocol::Snapshot& view, const std::array<double, 3>& tool_m = kTool_m,
+v1::Compensation message(const protocol::Snapshot& view,
+                         const std::array<double, 3>& tool_m = kTool_m,
                          ModelStatus status = ModelStatus::MODEL_ACTIVE) {
   return compensation_message(status, &kModel, view, tool_m, 500ms,
                               {.machine = "mill", .now = HostTime{100s + 3ms}});
@@ -39,7 +41,8 @@ void expect_not_to_be_applied(const v1::Compensation& m) {
 
 TEST(CompensationMessage, IsTheModelsErrorWhereTheMachineStands) {
   const auto m = message(view_inside());
-  const auto expected = kModel.model.V_at({0.01, -0.02, -0.25}, {kTool_m[0], kTool_m[1], kTool_m[2]});
+  const auto expected =
+      kModel.model.V_at({0.01, -0.02, -0.25}, {kTool_m[0], kTool_m[1], kTool_m[2]});
   EXPECT_EQ(m.state(), ModelStatus::MODEL_ACTIVE);
   EXPECT_TRUE(m.inside() && m.tool_ok());
   for (std::size_t i = 0; i < 3; ++i) {

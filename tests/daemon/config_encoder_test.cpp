@@ -33,15 +33,17 @@ max_mm = 100
 }
 
 TEST(ConfigEncoder, RefusesAnEncoderWithoutXyz) {
-  EXPECT_THAT(faults_of(kMachine + kCanBus + R"(nodes = [{axis = "X", node = 5}, {axis = "Z", node = 6}])"),
-              ElementsAre(HasSubstr("encoder.nodes: axis Y has no node")));
+  EXPECT_THAT(
+      faults_of(kMachine + kCanBus + R"(nodes = [{axis = "X", node = 5}, {axis = "Z", node = 6}])"),
+      ElementsAre(HasSubstr("encoder.nodes: axis Y has no node")));
 }
 
 TEST(ConfigEncoder, RefusesTwoNodesOnOneId) {
-  EXPECT_THAT(faults_of(kMachine + kCanBus +
-                        R"(nodes = [{axis = "X", node = 5}, {axis = "Y", node = 5}, {axis = "Z", node = 6}]
+  EXPECT_THAT(
+      faults_of(kMachine + kCanBus +
+                R"(nodes = [{axis = "X", node = 5}, {axis = "Y", node = 5}, {axis = "Z", node = 6}]
 )"),
-              ElementsAre(HasSubstr("encoder.nodes[1].node: node id 5 is used twice")));
+      ElementsAre(HasSubstr("encoder.nodes[1].node: node id 5 is used twice")));
 }
 
 TEST(ConfigEncoder, LetsTheKernelSendTheSyncOnSocketCanOnly) {
@@ -49,7 +51,8 @@ TEST(ConfigEncoder, LetsTheKernelSendTheSyncOnSocketCanOnly) {
   const auto config = parse_config(kMachine + kCanBus + by_kernel, "abbed.toml");
   ASSERT_TRUE(config) << config.error().details.front();
   EXPECT_EQ(config->encoder->sync, SyncConfig::Kernel);
-  const std::string udp = "[encoder]\ntransport = \"udp\"\npeer_host = \"10.0.0.8\"\npeer_port = 20000\n";
+  const std::string udp =
+      "[encoder]\ntransport = \"udp\"\npeer_host = \"10.0.0.8\"\npeer_port = 20000\n";
   EXPECT_THAT(faults_of(kMachine + udp + by_kernel), ElementsAre(HasSubstr("encoder.sync")));
 }
 
@@ -64,7 +67,8 @@ TEST(ConfigEncoder, TakesTheMachinesOwnSyncOnEitherTransport) {
   EXPECT_EQ(config->encoder->sync, SyncConfig::External);
   EXPECT_EQ(config->encoder->nodes[0].tpdo, 2);
   EXPECT_EQ(config->encoder->nodes[0].position_byte, 2);
-  const std::string udp = "[encoder]\ntransport = \"udp\"\npeer_host = \"10.0.0.8\"\npeer_port = 20000\n";
+  const std::string udp =
+      "[encoder]\ntransport = \"udp\"\npeer_host = \"10.0.0.8\"\npeer_port = 20000\n";
   EXPECT_THAT(faults_of(kMachine + udp + external + kNodes),
               ElementsAre(AllOf(HasSubstr("encoder.local_port"), HasSubstr("sends nothing"))));
   EXPECT_THAT(faults_of(kMachine + udp + "local_port = 20000\n" + external + kNodes), SizeIs(0));

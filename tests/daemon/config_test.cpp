@@ -46,11 +46,14 @@ TEST(Config, NestingIsBoundedBeforeParsing) {
   for (int i = 0; i < 200; ++i) numbers += ", 0.5";
   EXPECT_THAT(faults_of(numbers + "]\n"), Not(Contains(HasSubstr("nested deeper"))));
   const auto deep = StartsWith("abbed.toml:2:");
-  for (const auto& text : {dotted(40'000) + " = 1\n", "[" + dotted(40'000) + "]\n",
-                           "[[" + dotted(40'000) + "]]\n", "x = {" + dotted(40'000) + " = 1}\n",
-                           "x = " + std::string(40'000, '['), "\"\".'b' . " + dotted(40'000) + " = 1\n",
-                           "x = [\"\"\"\\\"\"\"\"\"\", " + std::string(40'000, '[')}) {
-    EXPECT_THAT(faults_of("\n" + text), ElementsAre(AllOf(deep, HasSubstr("nested deeper than 64"))))
+
+  for (const auto& text :
+       {dotted(40'000) + " = 1\n", "[" + dotted(40'000) + "]\n", "[[" + dotted(40'000) + "]]\n",
+        "x = {" + dotted(40'000) + " = 1}\n", "x = " + std::string(40'000, '['),
+        "\"\".'b' . " + dotted(40'000) + " = 1\n",
+        "x = [\"\"\"\\\"\"\"\"\"\", " + std::string(40'000, '[')}) {
+    EXPECT_THAT(faults_of("\n" + text),
+                ElementsAre(AllOf(deep, HasSubstr("nested deeper than 64"))))
         << text.substr(0, 30);
   }
 }
@@ -91,12 +94,12 @@ TEST(Config, ReadsWhereTheTrackerStandsAndItsVertical) {
 }
 
 TEST(Config, RefusesAVerticalThatIsNoAxisAndAPlaceOfTwoNumbers) {
-  const auto config =
-      parse_config(kMachine + "[tracker]\nvertical = \"up\"\nposition_mm = [2100, 900]\n", "machine.toml");
+  const auto config = parse_config(
+      kMachine + "[tracker]\nvertical = \"up\"\nposition_mm = [2100, 900]\n", "machine.toml");
   ASSERT_FALSE(config);
-  EXPECT_THAT(config.error().details,
-              UnorderedElementsAre(HasSubstr("tracker.vertical"),
-                                   AllOf(HasSubstr("tracker.position_mm"), HasSubstr("three numbers"))));
+  EXPECT_THAT(config.error().details, UnorderedElementsAre(HasSubstr("tracker.vertical"),
+                                                           AllOf(HasSubstr("tracker.position_mm"),
+                                                                 HasSubstr("three numbers"))));
 }
 
 TEST(Config, ReadsDevicesOfTheDaemon) {
@@ -145,12 +148,15 @@ search_timeout_s = 7.5
 
 TEST(Config, RefusesASearchWithoutBothBoundsAndNamesNoControllerHas) {
   const std::string tracker = kMachine + "[tracker]\nhost = \"h\"\n";
-  EXPECT_THAT(faults_of(tracker + "search_radius_mm = 30\n"),
-              ElementsAre(AllOf(HasSubstr("tracker.search_timeout_s"), HasSubstr("takes both or none"))));
-  EXPECT_THAT(faults_of(tracker + "search_timeout_s = 30\n"),
-              ElementsAre(AllOf(HasSubstr("tracker.search_radius_mm"), HasSubstr("takes both or none"))));
-  EXPECT_THAT(faults_of(tracker + "search_radius_mm = 0\nsearch_timeout_s = 1e9\n"),
-              ElementsAre(HasSubstr("tracker.search_radius_mm"), HasSubstr("tracker.search_timeout_s")));
+  EXPECT_THAT(
+      faults_of(tracker + "search_radius_mm = 30\n"),
+      ElementsAre(AllOf(HasSubstr("tracker.search_timeout_s"), HasSubstr("takes both or none"))));
+  EXPECT_THAT(
+      faults_of(tracker + "search_timeout_s = 30\n"),
+      ElementsAre(AllOf(HasSubstr("tracker.search_radius_mm"), HasSubstr("takes both or none"))));
+  EXPECT_THAT(
+      faults_of(tracker + "search_radius_mm = 0\nsearch_timeout_s = 1e9\n"),
+      ElementsAre(HasSubstr("tracker.search_radius_mm"), HasSubstr("tracker.search_timeout_s")));
   EXPECT_THAT(faults_of(tracker + "home_after_initialize = 1\n"),
               ElementsAre(HasSubstr("tracker.home_after_initialize: must be true or false")));
   EXPECT_THAT(faults_of(tracker + "reflector = \"" + std::string(97, 'x') + "\"\n"),
@@ -159,7 +165,8 @@ TEST(Config, RefusesASearchWithoutBothBoundsAndNamesNoControllerHas) {
 
 TEST(Config, TheControllersAirIsUncertainIfItCorrectsForIt) {
   const auto u_scale = [](const std::string& more) {
-    return parse_config(kMachine + "[tracker]\nhost = \"t\"\n" + more, "abbed.toml")->tracker->u_scale;
+    return parse_config(kMachine + "[tracker]\nhost = \"t\"\n" + more, "abbed.toml")
+        ->tracker->u_scale;
   };
   EXPECT_DOUBLE_EQ(u_scale(""), 0.2e-6);
   EXPECT_EQ(u_scale("weather = \"read\"\n[air]\nassumed_index = 1.00027\n"), 0.0);
@@ -171,16 +178,18 @@ TEST(Config, TheControllersAirIsUncertainIfItCorrectsForIt) {
 // tests/calib/refractive_index_test.cpp.
 TEST(Config, AirNobodyCorrectsForIsUncertainAsThatOfAShopFloor) {
   for (const char* weather : {"none", "read"}) {
-    const auto config =
-        parse_config(kMachine + "[tracker]\nhost = \"t\"\nweather = \"" + weather + "\"\n", "abbed.toml");
+    const auto config = parse_config(
+        kMachine + "[tracker]\nhost = \"t\"\nweather = \"" + weather + "\"\n", "abbed.toml");
     ASSERT_TRUE(config);
     EXPECT_NEAR(config->tracker->u_scale, 1.044e-5, 2e-7);
-    EXPECT_THAT(unmeasured_air_text(*config, config->tracker->u_scale).value_or(""), HasSubstr(weather));
+    EXPECT_THAT(unmeasured_air_text(*config, config->tracker->u_scale).value_or(""),
+                HasSubstr(weather));
   }
 }
 
 TEST(Config, TheControllerIsSetToTheAirThatIsStated) {
-  const auto config = parse_config(kMachine + "[tracker]\nhost = \"t\"\nweather = \"none\"\n", "abbed.toml");
+  const auto config =
+      parse_config(kMachine + "[tracker]\nhost = \"t\"\nweather = \"none\"\n", "abbed.toml");
   ASSERT_TRUE(config);
   const auto set = device_options(*config->tracker, 1.0).session.environment;
   EXPECT_NEAR(set.temperature, 20.0, 1e-9);
@@ -190,26 +199,29 @@ TEST(Config, TheControllerIsSetToTheAirThatIsStated) {
 }
 
 TEST(Config, TakesARateOfZeroForWheneverSomethingNewCame) {
-  const auto config = parse_config(kMachine + "[dds]\nsnapshot_hz = 0\ncompensation_hz = 0\n", "abbed.toml");
+  const auto config =
+      parse_config(kMachine + "[dds]\nsnapshot_hz = 0\ncompensation_hz = 0\n", "abbed.toml");
   ASSERT_TRUE(config) << config.error().details.front();
   EXPECT_EQ(config->dds.snapshot_hz, 0.0);
   EXPECT_EQ(config->dds.compensation_hz, 0.0);
 }
 
 TEST(Config, KeysOfDdsSecurityAreMeantFromTheFilesFolder) {
-  const auto config = parse_config(kMachine + "[dds]\nsecurity = \"keys/daemon\"\n", "/etc/abbe/abbed.toml");
+  const auto config =
+      parse_config(kMachine + "[dds]\nsecurity = \"keys/daemon\"\n", "/etc/abbe/abbed.toml");
   ASSERT_TRUE(config) << config.error().details.front();
   EXPECT_EQ(config->dds.security, "/etc/abbe/keys/daemon");
   EXPECT_EQ(parse_config(kMachine, "abbed.toml")->dds.security, "");
 }
 
 TEST(Config, RefusesANegativeRate) {
-  EXPECT_THAT(faults_of(kMachine + "[dds]\nsnapshot_hz = -1\n"), ElementsAre(HasSubstr("snapshot_hz")));
+  EXPECT_THAT(faults_of(kMachine + "[dds]\nsnapshot_hz = -1\n"),
+              ElementsAre(HasSubstr("snapshot_hz")));
 }
 
 TEST(Config, AnchorsRelativePathsAtTheFile) {
-  const auto config =
-      parse_config(kMachine + "[daemon]\ndata_dir = \"data\"\nruntime_dir = \"/run/x\"\n", "/etc/a/b.toml");
+  const auto config = parse_config(
+      kMachine + "[daemon]\ndata_dir = \"data\"\nruntime_dir = \"/run/x\"\n", "/etc/a/b.toml");
   ASSERT_TRUE(config);
   EXPECT_EQ(config->recording.dir, "/etc/a/data/recordings");
   EXPECT_EQ(config->control.socket, "/run/x/control.sock");
@@ -217,12 +229,14 @@ TEST(Config, AnchorsRelativePathsAtTheFile) {
 
 TEST(Config, ReportsThreeFaultsWithTheirLines) {
   const auto faults = faults_of(
-      kMachine + "[daemon]\nhub_period_us = \"fast\"\n[dds]\ndomian = 3\n[gate]\nmax_error_mm = -1\n");
+      kMachine +
+      "[daemon]\nhub_period_us = \"fast\"\n[dds]\ndomian = 3\n[gate]\nmax_error_mm = -1\n");
   EXPECT_THAT(
       faults,
-      ElementsAre(AllOf(StartsWith("abbed.toml:19:17: daemon.hub_period_us:"), HasSubstr("a number")),
-                  AllOf(StartsWith("abbed.toml:21:1: dds.domian:"), HasSubstr("did you mean \"domain\"")),
-                  AllOf(StartsWith("abbed.toml:23:16: gate.max_error_mm:"), HasSubstr("positive"))));
+      ElementsAre(
+          AllOf(StartsWith("abbed.toml:19:17: daemon.hub_period_us:"), HasSubstr("a number")),
+          AllOf(StartsWith("abbed.toml:21:1: dds.domian:"), HasSubstr("did you mean \"domain\"")),
+          AllOf(StartsWith("abbed.toml:23:16: gate.max_error_mm:"), HasSubstr("positive"))));
 }
 
 TEST(Config, SuggestsTheKeyWithItsUnit) {
@@ -247,7 +261,8 @@ TEST(Config, NamesThePlaceOfASyntaxFault) {
 }
 
 TEST(Config, RefusesAnotherSpeedForRealDevices) {
-  EXPECT_THAT(faults_of(kMachine + "[daemon]\nspeed = 10\n"), ElementsAre(HasSubstr("simulated = true")));
+  EXPECT_THAT(faults_of(kMachine + "[daemon]\nspeed = 10\n"),
+              ElementsAre(HasSubstr("simulated = true")));
   EXPECT_THAT(faults_of(kMachine + "[daemon]\nspeed = 10\nsimulated = true\n"), SizeIs(0));
 }
 
@@ -262,7 +277,8 @@ TEST(Config, TheSamplingInstantOfARealNodeIsNeverPerfectlyKnown) {
   ASSERT_TRUE(silent);
   EXPECT_GT(silent->encoder->u_sampling_delay.count(), 0);
   const std::string zero = kMachine + kCanBus + "u_sampling_delay_us = 0\n" + kNodes;
-  EXPECT_THAT(faults_of(zero), ElementsAre(HasSubstr("encoder.u_sampling_delay_us: must be positive")));
+  EXPECT_THAT(faults_of(zero),
+              ElementsAre(HasSubstr("encoder.u_sampling_delay_us: must be positive")));
   EXPECT_THAT(faults_of(zero + "[daemon]\nsimulated = true\n"), SizeIs(0));
 }
 
@@ -270,11 +286,12 @@ TEST(Config, RefusesNamesThatNoMessageCanCarry) {
   const auto with = [](std::string text, const std::string& what, std::size_t length) {
     return text.replace(text.find(what), what.size(), std::string(length, 'm'));
   };
+
   EXPECT_THAT(faults_of(with(kMachine, "mill", 64)), SizeIs(0));
   EXPECT_THAT(faults_of(with(kMachine, "mill", 65)),
               ElementsAre(HasSubstr("machine.name: must be at most 64")));
-  const std::string devices =
-      kMachine + "[tracker]\nhost = \"h\"\nname = \"TTT\"\n" + kCanBus + "name = \"EEE\"\n" + kNodes;
+  const std::string devices = kMachine + "[tracker]\nhost = \"h\"\nname = \"TTT\"\n" + kCanBus +
+                              "name = \"EEE\"\n" + kNodes;
   EXPECT_THAT(faults_of(with(devices, "TTT", 32)), SizeIs(0));
   EXPECT_THAT(faults_of(with(devices, "TTT", 33)),
               ElementsAre(HasSubstr("tracker.name: must be at most 32")));
@@ -285,14 +302,14 @@ TEST(Config, RefusesNamesThatNoMessageCanCarry) {
 TEST(Config, RefusesAModelOfMoreParametersThanCanBePublished) {
   auto text = kMachine;
   text.replace(text.find("node_spacing_mm = 50"), 20, "node_spacing_mm = 5");
-  EXPECT_THAT(faults_of(text),
-              ElementsAre(AllOf(HasSubstr("model.node_spacing_mm"), HasSubstr("can be published"))));
+  EXPECT_THAT(faults_of(text), ElementsAre(AllOf(HasSubstr("model.node_spacing_mm"),
+                                                 HasSubstr("can be published"))));
 }
 
 TEST(Config, TakesThePointRatesATrackerHas) {
   const auto rate = [](const std::string& hz) {
-    const auto config =
-        parse_config(kMachine + "[tracker]\nhost = \"h\"\npoint_rate_hz = " + hz + "\n", "abbed.toml");
+    const auto config = parse_config(
+        kMachine + "[tracker]\nhost = \"h\"\npoint_rate_hz = " + hz + "\n", "abbed.toml");
     return config ? config->tracker->point_rate_hz : 0.0;
   };
   EXPECT_EQ(rate("1000"), 1000.0);
@@ -347,7 +364,8 @@ TEST(Config, SaysWhichFileCannotBeRead) {
   const auto config = load_config("/nonexistent/abbed.toml");
   ASSERT_FALSE(config);
   EXPECT_EQ(config.error().code, ErrorCode::Io);
-  EXPECT_THAT(config.error().text, AllOf(HasSubstr("/nonexistent/abbed.toml"), HasSubstr("No such file")));
+  EXPECT_THAT(config.error().text,
+              AllOf(HasSubstr("/nonexistent/abbed.toml"), HasSubstr("No such file")));
 }
 
 TEST(Config, MachineHashFollowsGeometryNotNoise) {
@@ -362,7 +380,8 @@ TEST(Config, MachineHashFollowsGeometryNotNoise) {
 }
 
 TEST(Config, MachineHashFollowsWhatAReadingIs) {
-  const std::string axes = R"({axis = "X", node = 1, step_nm = 10, offset_mm = 1}, {axis = "Y", node = 2},)";
+  const std::string axes =
+      R"({axis = "X", node = 1, step_nm = 10, offset_mm = 1}, {axis = "Y", node = 2},)";
   const std::string head = kMachine + kCanBus;
   const auto hash = [](const std::string& text) {
     return machine_hash(parse_config(text, "a.toml").value());
@@ -385,7 +404,8 @@ TEST(Config, MachineHashFollowsWhatAReadingIs) {
 TEST(Config, MachineHashDoesNotDependOnTheWayTheBytesTake) {
   const auto can = parse_config(kMachine + kCanBus + kNodes, "a.toml");
   const auto udp = parse_config(
-      kMachine + "[encoder]\ntransport = \"udp\"\npeer_host = \"10.0.0.8\"\npeer_port = 9\n" + kNodes,
+      kMachine + "[encoder]\ntransport = \"udp\"\npeer_host = \"10.0.0.8\"\npeer_port = 9\n" +
+          kNodes,
       "a.toml");
   ASSERT_TRUE(can && udp);
   EXPECT_EQ(machine_hash(*can), machine_hash(*udp));
@@ -400,10 +420,10 @@ axes = [{axis = "X", channel = 0, step_nm = 10}, {axis = "Y", channel = 1, step_
 )";
 
 TEST(ConfigProbe, IsReadInSi) {
-  const auto config =
-      parse_config(kMachine + kCardWithProbe + "[probe]\nid = 4\ndelay_us = 2000\njitter_us = 20\n" +
-                       "max_speed_mm_s = 8\nconfirm_ms = 4\n",
-                   "abbed.toml");
+  const auto config = parse_config(kMachine + kCardWithProbe +
+                                       "[probe]\nid = 4\ndelay_us = 2000\njitter_us = 20\n" +
+                                       "max_speed_mm_s = 8\nconfirm_ms = 4\n",
+                                   "abbed.toml");
   ASSERT_TRUE(config) << config.error().details.front();
   ASSERT_TRUE(config->probe);
   EXPECT_EQ(config->probe->delay.id, 4u);
@@ -413,7 +433,8 @@ TEST(ConfigProbe, IsReadInSi) {
 }
 
 TEST(ConfigProbe, NeedsChannelsOfACounterCard) {
-  EXPECT_THAT(faults_of(kMachine + "[probe]\nid = 4\n"), ElementsAre(HasSubstr("needs [counter_card]")));
+  EXPECT_THAT(faults_of(kMachine + "[probe]\nid = 4\n"),
+              ElementsAre(HasSubstr("needs [counter_card]")));
 }
 
 TEST(ConfigProbe, RefusesWhatNoProbeCanDo) {
@@ -423,7 +444,8 @@ TEST(ConfigProbe, RefusesWhatNoProbeCanDo) {
 
 TEST(ConfigCmm, IsReadInSi) {
   const auto config = parse_config(
-      kMachine + "[cmm]\nhost = \"10.0.0.9\"\ntool = \"ruby 4\"\nu_position_um = 0.9\n", "abbed.toml");
+      kMachine + "[cmm]\nhost = \"10.0.0.9\"\ntool = \"ruby 4\"\nu_position_um = 0.9\n",
+      "abbed.toml");
   ASSERT_TRUE(config && config->cmm);
   EXPECT_EQ(config->cmm->host, "10.0.0.9");
   EXPECT_EQ(config->cmm->port, 1294);
@@ -436,20 +458,24 @@ TEST(ConfigCmm, NeedsAHost) {
 }
 
 TEST(Config, KeepsTheParticipantBehindTheHub) {
-  EXPECT_THAT(faults_of(kMachine + "[daemon]\nhub_priority = 15\n"),
-              ElementsAre(AllOf(HasSubstr("priority"), HasSubstr("below [daemon] hub_priority 15"))));
-  EXPECT_THAT(faults_of(kMachine + "[daemon]\nhub_priority = 15\n[dds]\npriority = 14\n"), SizeIs(0));
+  EXPECT_THAT(
+      faults_of(kMachine + "[daemon]\nhub_priority = 15\n"),
+      ElementsAre(AllOf(HasSubstr("priority"), HasSubstr("below [daemon] hub_priority 15"))));
+  EXPECT_THAT(faults_of(kMachine + "[daemon]\nhub_priority = 15\n[dds]\npriority = 14\n"),
+              SizeIs(0));
 }
 
 TEST(Config, NoTwoDevicesShareANameAndNoneTakesThatOfAPartOfTheDaemon) {
   const auto with = [](const std::string& tracker) {
-    return faults_of(kMachine + "[tracker]\nhost = \"10.0.0.7\"\nname = \"" + tracker + "\"\n" + kCanBus +
-                     kNodes);
+    return faults_of(kMachine + "[tracker]\nhost = \"10.0.0.7\"\nname = \"" + tracker + "\"\n" +
+                     kCanBus + kNodes);
   };
   EXPECT_THAT(with("laser"), SizeIs(0));
-  EXPECT_THAT(with("encoder"), ElementsAre(HasSubstr("encoder.name: two devices are called \"encoder\"")));
+  EXPECT_THAT(with("encoder"),
+              ElementsAre(HasSubstr("encoder.name: two devices are called \"encoder\"")));
   for (const char* own : {"recorder", "models", "dds"})
-    EXPECT_THAT(with(own), ElementsAre(AllOf(HasSubstr("tracker.name"), HasSubstr("the daemon calls"))));
+    EXPECT_THAT(with(own),
+                ElementsAre(AllOf(HasSubstr("tracker.name"), HasSubstr("the daemon calls"))));
 }
 
 TEST(Config, RecordingsAreCutAndKeptForEverUnlessToldOtherwise) {
@@ -457,15 +483,17 @@ TEST(Config, RecordingsAreCutAndKeptForEverUnlessToldOtherwise) {
   ASSERT_TRUE(silent);
   EXPECT_EQ(silent->recording.max_file_bytes, 4096ull << 20);
   EXPECT_EQ(silent->recording.keep.count(), 0);
-  const auto told = parse_config(kMachine + "[recording]\nmax_file_MB = 10\nkeep_days = 30\n", "abbed.toml");
+  const auto told =
+      parse_config(kMachine + "[recording]\nmax_file_MB = 10\nkeep_days = 30\n", "abbed.toml");
   ASSERT_TRUE(told) << told.error().details.front();
   EXPECT_EQ(told->recording.max_file_bytes, 10ull << 20);
   EXPECT_EQ(told->recording.keep, std::chrono::days{30});
 }
 
 TEST(Config, TheHubStaysBelowTheDevices) {
-  EXPECT_THAT(faults_of(kMachine + "[daemon]\nhub_priority = 40\n"),
-              ElementsAre(AllOf(HasSubstr("daemon.hub_priority"), HasSubstr("below tracker_priority 40"))));
+  EXPECT_THAT(
+      faults_of(kMachine + "[daemon]\nhub_priority = 40\n"),
+      ElementsAre(AllOf(HasSubstr("daemon.hub_priority"), HasSubstr("below tracker_priority 40"))));
   EXPECT_THAT(faults_of(kMachine + "[daemon]\nencoder_priority = 30\n"),
               ElementsAre(HasSubstr("encoder_priority 30")));
   EXPECT_THAT(faults_of(kMachine + "[daemon]\nhub_priority = 39\n"), SizeIs(0));

@@ -40,10 +40,10 @@ TEST(ControlRoles, AreGivenByGroup) {
 }
 
 TEST(ControlRoles, ARefusalNamesRoleUserGroupAndRemedy) {
-  EXPECT_EQ(
-      refused(anna({}), Role::Move),
-      "touch: moves a machine or tracker, which anna may not: that takes the group \"plugdev\" ([control] "
-      "move_group): gpasswd -a anna plugdev, then log in anew");
+  EXPECT_EQ(refused(anna({}), Role::Move),
+            "touch: moves a machine or tracker, which anna may not: that takes the group "
+            "\"plugdev\" ([control] "
+            "move_group): gpasswd -a anna plugdev, then log in anew");
   EXPECT_THAT(refused(anna({}), Role::Change, {.change_group = "abbe-none", .move_group = ""}),
               AllOf(HasSubstr("changes what is in force"), HasSubstr("\"abbe-none\""),
                     HasSubstr("does not exist on this computer")));
@@ -51,7 +51,8 @@ TEST(ControlRoles, ARefusalNamesRoleUserGroupAndRemedy) {
 }
 
 TEST(ControlRoles, ALookGroupShutsOutWhoeverHasNoRole) {
-  const ControlConfig control{.look_group = "audio", .change_group = "dialout", .move_group = "plugdev"};
+  const ControlConfig control{
+      .look_group = "audio", .change_group = "dialout", .move_group = "plugdev"};
   EXPECT_NE(refused(anna({kNobodysGroup}), Role::Look, control), "");
   for (const char* group : {"audio", "dialout", "plugdev"})
     EXPECT_EQ(refused(anna({gid_of_group(group)}), Role::Look, control), "") << group;

@@ -27,7 +27,8 @@ using nlohmann::json;
 class Control : public testing::Test {
  protected:
   Control()
-      : directory_(std::filesystem::temp_directory_path() / ("abbe-control-" + std::to_string(::getpid()))) {
+      : directory_(std::filesystem::temp_directory_path() /
+                   ("abbe-control-" + std::to_string(::getpid()))) {
     std::filesystem::create_directories(directory_);
   }
   ~Control() override { std::filesystem::remove_all(directory_); }
@@ -59,8 +60,8 @@ TEST_F(Control, ARequestLargerThanAnyBufferArrivesWhole) {
 }
 
 TEST_F(Control, ARefusalArrivesAsTheErrorItWas) {
-  for (const auto code : {ErrorCode::DataInsufficient, ErrorCode::Usage, ErrorCode::BadInput, ErrorCode::Io,
-                          ErrorCode::Refused}) {
+  for (const auto code : {ErrorCode::DataInsufficient, ErrorCode::Usage, ErrorCode::BadInput,
+                          ErrorCode::Io, ErrorCode::Refused}) {
     const auto server = ControlServer::open(socket(), [code](const json&, const ControlPeer&) {
       return refusal({code, "a session is running"});
     });
@@ -109,10 +110,12 @@ TEST_F(Control, BytesThatAreNoTextAreReplacedAndTheSocketLivesOn) {
 TEST_F(Control, WhoAsksIsWhatTheKernelSays) {
   const auto server = ControlServer::open(socket(), echo);
   ASSERT_TRUE(server);
-  const auto answer = ask_daemon(socket(), {{"do", "cancel"}, {"user", "mallory"}, {"who", "anna"}});
+  const auto answer =
+      ask_daemon(socket(), {{"do", "cancel"}, {"user", "mallory"}, {"who", "anna"}});
   ASSERT_TRUE(answer);
   const passwd* me = ::getpwuid(::getuid());
-  EXPECT_EQ((*answer)["heard"]["user"], me != nullptr ? me->pw_name : "uid " + std::to_string(::getuid()));
+  EXPECT_EQ((*answer)["heard"]["user"],
+            me != nullptr ? me->pw_name : "uid " + std::to_string(::getuid()));
   EXPECT_EQ((*answer)["heard"]["who"], "anna");
 }
 
@@ -181,11 +184,13 @@ TEST_F(Control, AClientThatNeverReadsGetsNoMoreAnswersThanFitAndKeepsNobodyWaiti
     if (request["do"] == "much") ++answered;
     return json{{"ok", true}, {"text", std::string(request["do"] == "much" ? 1u << 19 : 1u, 'x')}};
   });
+
   ASSERT_TRUE(server);
   const RawClient greedy;
   greedy.connect(socket());
   std::string requests;
   for (int i = 0; i < kAsked; ++i) requests += "{\"do\": \"much\"}\n";
+
   ASSERT_TRUE(greedy.send(requests));
   ASSERT_TRUE(greedy.readable(60s));
   for (int i = 0; i < 20; ++i) ASSERT_TRUE(ask_daemon(socket(), {{"do", "little"}}));
@@ -234,8 +239,11 @@ TEST_F(Control, AListenerThatAcceptsNobodyIsGivenUp) {
   first.connect(socket());
   const auto answer = ask_daemon(socket(), {{"do", "status"}}, 20ms);
   ASSERT_FALSE(answer);
-  EXPECT_NE(answer.error().text.find("accepted nobody in 20 ms"), std::string::npos) << answer.error().text;
-  const auto second = ControlServer::open(socket(), echo);  // alive, though deaf: its socket is left to it
+  EXPECT_NE(answer.error().text.find("accepted nobody in 20 ms"), std::string::npos)
+      << answer.error().text;
+
+  // alive, though deaf: its socket is left to it
+  const auto second = ControlServer::open(socket(), echo);
   ASSERT_FALSE(second);
   EXPECT_NE(second.error().text.find("another daemon"), std::string::npos) << second.error().text;
   ::close(deaf);

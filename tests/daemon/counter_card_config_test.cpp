@@ -17,8 +17,9 @@ const std::string kMachine = to_toml(config_tables::mill());
 
 std::string card(const std::string& axes, const std::string& more = {}) {
   return kMachine +
-         "[counter_card]\ntransport = \"usbip\"\nhost = \"127.0.0.1\"\nport = 3241\nclock_MHz = 12\n" + more +
-         "axes = [" + axes + "]\n";
+         "[counter_card]\ntransport = \"usbip\"\nhost = \"127.0.0.1\"\nport = 3241\nclock_MHz = "
+         "12\n" +
+         more + "axes = [" + axes + "]\n";
 }
 
 std::vector<std::string> faults_of(const std::string& text) {
@@ -26,14 +27,17 @@ std::vector<std::string> faults_of(const std::string& text) {
   return config ? std::vector<std::string>{} : config.error().details;
 }
 
-const std::string kAxes = R"({axis = "X", channel = 0, step_nm = 10}, {axis = "Y", channel = 1, step_nm = 10},
+const std::string kAxes =
+    R"({axis = "X", channel = 0, step_nm = 10}, {axis = "Y", channel = 1, step_nm = 10},
                              {axis = "Z", channel = 2, step_nm = 10})";
 
 TEST(CounterCardConfig, ReadsItsWiringInSi) {
   const auto config = parse_config(
-      card(R"({axis = "Z", channel = 2, step_nm = 20, invert = true}, {axis = "Y", channel = 1, step_nm = 10},
+      card(
+          R"({axis = "Z", channel = 2, step_nm = 20, invert = true}, {axis = "Y", channel = 1, step_nm = 10},
               {axis = "X", channel = 0, step_nm = 10, offset_mm = -300})",
-           "serial_number = \"01ABBE08\"\nlatch_channel = 6\nclock_source = \"timer0\"\nwidth_bits = 48\n"),
+          "serial_number = \"01ABBE08\"\nlatch_channel = 6\nclock_source = \"timer0\"\nwidth_bits "
+          "= 48\n"),
       "abbed.toml");
   ASSERT_TRUE(config) << config.error().details.front();
   const auto& found = *config->counter_card;
@@ -42,7 +46,8 @@ TEST(CounterCardConfig, ReadsItsWiringInSi) {
   EXPECT_DOUBLE_EQ(found.wiring.axes.at(0).scale, 10e-9);
   EXPECT_DOUBLE_EQ(found.wiring.axes.at(0).offset, -0.3);
   EXPECT_DOUBLE_EQ(found.wiring.axes.at(2).scale, -20e-9);
-  EXPECT_THAT(config->connected_axes(), ElementsAre("X", "Y", "Z")) << "whatever their order in the file";
+  EXPECT_THAT(config->connected_axes(), ElementsAre("X", "Y", "Z"))
+      << "whatever their order in the file";
   EXPECT_DOUBLE_EQ(found.wiring.clock_hz, 12e6);
   EXPECT_EQ(found.wiring.clock_source, drivers::ClockSource::Timer0);
   EXPECT_EQ(found.wiring.latch_channel, 6);
@@ -64,13 +69,15 @@ TEST(CounterCardConfig, RefusesAnAxisScaleOfZero) {
 
 TEST(CounterCardConfig, RefusesTwoChannelsForOneAxis) {
   EXPECT_THAT(
-      faults_of(card(R"({axis = "X", channel = 0, step_nm = 10}, {axis = "X", channel = 1, step_nm = 10})")),
+      faults_of(card(
+          R"({axis = "X", channel = 0, step_nm = 10}, {axis = "X", channel = 1, step_nm = 10})")),
       Contains(HasSubstr("two channels claim axis X")));
 }
 
 TEST(CounterCardConfig, NeedsEveryLinearAxis) {
   EXPECT_THAT(
-      faults_of(card(R"({axis = "X", channel = 0, step_nm = 10}, {axis = "Z", channel = 2, step_nm = 10})")),
+      faults_of(card(
+          R"({axis = "X", channel = 0, step_nm = 10}, {axis = "Z", channel = 2, step_nm = 10})")),
       Contains(HasSubstr("axis Y has no channel")));
 }
 
@@ -101,16 +108,18 @@ TEST(CounterCardConfig, RefusesAnAxisTheMachineDoesNotHave) {
 }
 
 TEST(CounterCardConfig, RefusesAxesFromTwoDevices) {
-  const auto text =
-      card(kAxes) +
-      "[encoder]\ntransport = \"socketcan\"\ninterface = \"can0\"\nnodes = [{axis = \"X\", node = 1}]\n";
-  EXPECT_THAT(faults_of(text), Contains(HasSubstr("axis X is claimed by [encoder] and [counter_card]")));
+  const auto text = card(kAxes) +
+                    "[encoder]\ntransport = \"socketcan\"\ninterface = \"can0\"\nnodes = [{axis = "
+                    "\"X\", node = 1}]\n";
+  EXPECT_THAT(faults_of(text),
+              Contains(HasSubstr("axis X is claimed by [encoder] and [counter_card]")));
 }
 
 TEST(CounterCardConfig, RefusesKeysOfTheOtherTransport) {
-  const auto text = kMachine +
-                    "[counter_card]\ntransport = \"usb\"\nport = 3240\naxes = [{axis = \"X\", channel = 0, "
-                    "step_nm = 10}]\n";
+  const auto text =
+      kMachine +
+      "[counter_card]\ntransport = \"usb\"\nport = 3240\naxes = [{axis = \"X\", channel = 0, "
+      "step_nm = 10}]\n";
   EXPECT_THAT(faults_of(text), Contains(HasSubstr("has no meaning with transport = \"usb\"")));
 }
 

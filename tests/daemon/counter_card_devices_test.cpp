@@ -1,5 +1,5 @@
-// A counter card in the daemon's set of devices, over the wire: configured as a person would, played by the
-// simulator in a thread of its own, in real time.
+// A counter card in the daemon's set of devices, over the wire: configured as a person would,
+// played by the simulator in a thread of its own, in real time.
 
 #include <gmock/gmock.h>
 #include <poll.h>
@@ -22,7 +22,8 @@ using testing::HasSubstr;
 
 class CardInAThread {
  public:
-  CardInAThread() : server_(std::move(*sim::UsbipServer::open(0, card()))), thread_([this] { run(); }) {}
+  CardInAThread()
+      : server_(std::move(*sim::UsbipServer::open(0, card()))), thread_([this] { run(); }) {}
   CardInAThread(const CardInAThread&) = delete;
   CardInAThread& operator=(const CardInAThread&) = delete;
   ~CardInAThread() {
@@ -81,17 +82,20 @@ TEST(CounterCardDevices, GiveTheAxesOfTheConfiguration) {
   ASSERT_TRUE(devices) << devices.error().text;
   Batch batch;
   const auto patience = time.now() + 20s;
+
   while (batch.axes.size() < 500 && time.now() < patience) {
     devices->drain(batch);
     std::this_thread::sleep_for(1ms);
   }
+
   ASSERT_GE(batch.axes.size(), 500u) << devices->health(time.now()).front().status.last_fault;
   const auto& first = batch.axes.front();
   const auto& last = batch.axes.back();
   EXPECT_NEAR(first.position[0], -0.12, 5e-3) << "count 0 is where it stood when it was set up";
   EXPECT_DOUBLE_EQ(last.position[1], 0.003);
   const double seconds = (last.cycle - first.cycle) / 2000.0;  // by the card's own pacer
-  EXPECT_NEAR(last.position[0] - first.position[0], 0.01 * seconds, 2e-8) << "rounded to a count of 10 nm";
+  EXPECT_NEAR(last.position[0] - first.position[0], 0.01 * seconds, 2e-8)
+      << "rounded to a count of 10 nm";
   EXPECT_FALSE(batch.encoder_raw.empty());
   EXPECT_EQ(devices->health(time.now()).front().status.name, "counter_card");
   EXPECT_THAT(devices->warnings(), Contains(HasSubstr("not yet seen on hardware")));
@@ -104,10 +108,12 @@ TEST(CounterCardDevices, NameTheCardThatIsNotTheConfiguredOne) {
   ASSERT_TRUE(devices) << devices.error().text;
   std::string fault;
   const auto patience = time.now() + 20s;
+
   while (fault.empty() && time.now() < patience) {
     fault = devices->health(time.now()).front().status.last_fault;
     std::this_thread::sleep_for(1ms);
   }
+
   EXPECT_THAT(fault, HasSubstr("its serial number is \"01ABBE08\", configured is \"01C0FFEE\""));
   Batch batch;
   devices->drain(batch);

@@ -8,9 +8,9 @@
 #include <fstream>
 #include <thread>
 
+#include "abbe/service/background_tasks.hpp"
 #include "abbe/service/counting_state_thread.hpp"
 #include "abbe/service/reference_service.hpp"
-#include "abbe/service/work_aside.hpp"
 #include "config_tables.hpp"
 #include "failing_disk.hpp"
 #include "recording_fixture.hpp"
@@ -30,13 +30,14 @@ using ::testing::IsEmpty;
 constexpr const char* kBoot = "7d2b";
 
 Config card_config(const std::string& x_step_nm = "250") {
-  auto config = parse_config(to_toml(config_tables::half_metre_mill()) +
-                                 "[counter_card]\ntransport = \"usbip\"\nport = 3240\nzero = \"here\"\n"
-                                 "axes = [{axis = \"X\", channel = 0, step_nm = " +
-                                 x_step_nm +
-                                 "}, {axis = \"Y\", channel = 1, step_nm = 250},\n"
-                                 "        {axis = \"Z\", channel = 2, step_nm = 250}]\n",
-                             "abbed.toml");
+  auto config =
+      parse_config(to_toml(config_tables::half_metre_mill()) +
+                       "[counter_card]\ntransport = \"usbip\"\nport = 3240\nzero = \"here\"\n"
+                       "axes = [{axis = \"X\", channel = 0, step_nm = " +
+                       x_step_nm +
+                       "}, {axis = \"Y\", channel = 1, step_nm = 250},\n"
+                       "        {axis = \"Z\", channel = 2, step_nm = 250}]\n",
+                   "abbed.toml");
   EXPECT_TRUE(config) << config.error().details.front();
   return *config;
 }
@@ -97,8 +98,10 @@ TEST_F(LeftCountingTest, RemovesWhatAKilledRunHadHalfWritten) {
 
 TEST_F(LeftCountingTest, HoldsForTheSameBootOnly) {
   leave(to_text(state()));
-  EXPECT_THAT(left_counting(config_, "9c01").warning, HasSubstr("this computer was restarted since"));
-  EXPECT_THAT(left_counting(config_, "").warning, HasSubstr("boot id of this computer cannot be read"));
+  EXPECT_THAT(left_counting(config_, "9c01").warning,
+              HasSubstr("this computer was restarted since"));
+  EXPECT_THAT(left_counting(config_, "").warning,
+              HasSubstr("boot id of this computer cannot be read"));
   EXPECT_FALSE(left_counting(config_, "").state);
 }
 
@@ -143,8 +146,9 @@ TEST(ReferenceAfterARestart, TakesUpTheDatumOfACardThatWentOn) {
   ReferenceService service{config, nullptr, some_counting()};
   Batch batch;
   batch.axes.push_back(counted_sample(HostTime{110s}));
-  service.turn(batch);
-  EXPECT_EQ(batch.axes[0].missing_mask, 0b010) << "Y was not referenced, and zero = \"here\" is over";
+  service.cycle(batch);
+  EXPECT_EQ(batch.axes[0].missing_mask, 0b010)
+      << "Y was not referenced, and zero = \"here\" is over";
   EXPECT_DOUBLE_EQ(batch.axes[0].position[0], 0.1 + 250e-9);
   EXPECT_THAT(service.carried_on(), ElementsAre("X", "Z"));
 }
@@ -154,7 +158,7 @@ TEST(ReferenceAfterARestart, DropsTheDatumOfACardThatBeganAnew) {
   ReferenceService service{config, nullptr, some_counting()};
   Batch batch;
   batch.axes.push_back(counted_sample(HostTime{110s}, true));
-  service.turn(batch);
+  service.cycle(batch);
   EXPECT_EQ(batch.axes[0].missing_mask, 0) << "zero = \"here\" holds for the first set-up";
   EXPECT_DOUBLE_EQ(batch.axes[0].position[0], 250e-9);
   EXPECT_THAT(service.carried_on(), IsEmpty());
@@ -166,17 +170,19 @@ TEST(ReferenceAfterARestart, KeepsNoProgressFromBeforeTheCountersBeganAnew) {
   const auto turn = [&service](const protocol::AxisSample& sample, HostTime progress) {
     Batch batch;
     batch.axes.push_back(sample);
-    service.turn(batch);
+    service.cycle(batch);
     auto counting = some_counting().progress;
     counting.head.time = progress;
     service.take(counting);
   };
-  turn(counted_sample(HostTime{1s}, true), HostTime{1s});
+
+  cycle(counted_sample(HostTime{1s}, true), HostTime{1s});
   ASSERT_TRUE(service.counting());
   EXPECT_EQ(service.counting()->datum.size(), 3u);
-  turn(counted_sample(HostTime{5s}), HostTime{6s});  // of a scan that is not among the samples yet
+  cycle(counted_sample(HostTime{5s}), HostTime{6s});  // of a scan that is not among the samples yet
+
   EXPECT_EQ(service.counting()->progress.head.time, HostTime{1s});
-  turn(counted_sample(HostTime{7s}, true), HostTime{6s});
+  cycle(counted_sample(HostTime{7s}, true), HostTime{6s});
   EXPECT_FALSE(service.counting());
 }
 
@@ -184,11 +190,14 @@ TEST(CountingStateThread, WritesAtTheLatestWhenItEnds) {
   const TemporaryFolder folder;
   const auto file = counting_state_file(folder.path() / "data");
   std::vector<std::string> faults;
+
   {
     const CountingStateThread thread{
-        file, [] { return CountingState{.boot_id = kBoot, .set_up = "{}", .counting = some_counting()}; },
+        file,
+        [] { return CountingState{.boot_id = kBoot, .set_up = "{}", .counting = some_counting()}; },
         [&faults](const std::string& fault) { faults.push_back(fault); }, 1h};
   }
+
   const auto state = counting_state_from_text(test::text_of(file), "kept");
   ASSERT_TRUE(state) << state.error().text;
   EXPECT_EQ(state->counting.datum.size(), 2u);
@@ -214,21 +223,23 @@ TEST(CountingStateThread, ADiskThatDoesNotAnswerDoesNotHoldUpTheEnd) {
   std::vector<std::string> faults;
   std::atomic<int> disk{-1};
   const auto begun = std::chrono::steady_clock::now();
+
   {
-    const CountingStateThread thread{counting_state_file(folder.path() / "data"),
-                                     [&disk] {
-                                       disk = test::make_stall(SYS_fsync);
-                                       return CountingState{
-                                           .boot_id = kBoot, .set_up = "{}", .counting = some_counting()};
-                                     },
-                                     [&faults](const std::string& fault) { faults.push_back(fault); }, 1h};
+    const CountingStateThread thread{
+        counting_state_file(folder.path() / "data"),
+        [&disk] {
+          disk = test::make_stall(SYS_fsync);
+          return CountingState{.boot_id = kBoot, .set_up = "{}", .counting = some_counting()};
+        },
+        [&faults](const std::string& fault) { faults.push_back(fault); }, 1h};
   }
+
   EXPECT_LT(std::chrono::steady_clock::now() - begun, CountingStateThread::kEndPatience + 1s);
   if (disk < 0) GTEST_SKIP() << "no seccomp listener";
   EXPECT_THAT(faults, testing::ElementsAre(HasSubstr("its disk has not answered for 3 s")));
-  EXPECT_TRUE(work_left_running());
+  EXPECT_TRUE(background_tasks_running());
   ::close(disk);
-  while (work_left_running()) std::this_thread::yield();
+  while (background_tasks_running()) std::this_thread::yield();
   EXPECT_EQ(faults.size(), 1u);
 }
 

@@ -70,12 +70,14 @@ Names names_in(const fs::path& file) {
   if (extension == ".cpp" || extension == ".hpp") {
     return found(text_of(file), R"(#\s*include\s*["<]abbe/([a-z_]+)/)");
   }
-  if (file.filename() == "CMakeLists.txt") return found(text_of(file), R"(\b(?:abbe::)?([a-z_]+)\b)");
+  if (file.filename() == "CMakeLists.txt")
+    return found(text_of(file), R"(\b(?:abbe::)?([a-z_]+)\b)");
   return {};
 }
 
 /// "service/src/hub.cpp uses cli": of modules and libraries of which `allowed` are allowed.
-std::vector<std::string> forbidden_in(const fs::path& folder, const Names& known, const Names& allowed) {
+std::vector<std::string> forbidden_in(const fs::path& folder, const Names& known,
+                                      const Names& allowed) {
   std::vector<std::string> forbidden;
   for (const auto& entry : fs::recursive_directory_iterator(folder)) {
     for (const std::string& used : names_in(entry.path())) {
@@ -134,14 +136,16 @@ TEST(DaemonModules, AreAllFoldersWithSources) {
 }
 
 TEST(DaemonModules, EveryKindOfForbiddenUseIsFound) {
-  const fs::path folder = fs::path(testing::TempDir()) / ("daemon_modules_" + std::to_string(::getpid()));
+  const fs::path folder =
+      fs::path(testing::TempDir()) / ("daemon_modules_" + std::to_string(::getpid()));
   fs::remove_all(folder);
   fs::create_directories(folder);
   std::ofstream(folder / "quoted.cpp") << "#include \"abbe/service/hub.hpp\"\n";
   std::ofstream(folder / "angle.hpp") << "#  include <abbe/sim/truth_machine.hpp>\n";
   std::ofstream(folder / "CMakeLists.txt")
       << "target_link_libraries(abbe_base PUBLIC abbe::drivers fastrtps)\n";
-  EXPECT_THAT(forbidden_in(folder, {"base", "service", "sim", "drivers", "fastrtps"}, {"base"}), SizeIs(4));
+  EXPECT_THAT(forbidden_in(folder, {"base", "service", "sim", "drivers", "fastrtps"}, {"base"}),
+              SizeIs(4));
   fs::remove_all(folder);
 }
 

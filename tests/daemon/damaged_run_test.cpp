@@ -1,5 +1,5 @@
-// A recording of a whole run with one damaged bit: no model comes of it that looks as sure as that of the
-// whole one.
+// A recording of a whole run with one damaged bit: no model comes of it that looks as sure as that
+// of the whole one.
 
 #include <gmock/gmock.h>
 #include <unistd.h>
@@ -96,11 +96,13 @@ TEST_F(DamagedRun, EveryFlippedBitOfTheMetadataShows) {
   auto bytes = bytes_of_file(example_recording(folder.path(), 1, 5));
   protocol::mcap::LinearScan scan{std::as_bytes(std::span{bytes})};
   std::size_t begin = 0, end = 0;
+
   while (const auto item = scan.next()) {
     if (item->record.opcode != protocol::mcap::Opcode::Metadata) continue;
     if (begin == 0) begin = item->record.offset;
     end = item->record.end();
   }
+
   ASSERT_LT(begin, end);
   for (std::size_t at = begin; at < end; ++at)
     for (int bit = at % 7 == 0 ? 1 : 16; bit < 256; bit *= at % 7 == 0 ? 2 : 16) {
@@ -109,9 +111,10 @@ TEST_F(DamagedRun, EveryFlippedBitOfTheMetadataShows) {
       bytes[at] = static_cast<char>(bytes[at] ^ bit);
       const auto reader = RecordingReader::open(folder.path() / "flipped.mcap");
       if (!reader) continue;
-      const bool shows = !reader->damage().empty() || reader->configuration_check() == MetadataCheck::Damaged;
-      ASSERT_TRUE(shows) << "bit " << bit << " of byte " << at << ", metadata from " << begin << " to "
-                         << end;
+      const bool shows =
+          !reader->damage().empty() || reader->configuration_check() == MetadataCheck::Damaged;
+      ASSERT_TRUE(shows) << "bit " << bit << " of byte " << at << ", metadata from " << begin
+                         << " to " << end;
     }
 }
 
@@ -123,9 +126,11 @@ TEST_F(DamagedRun, ARecordingOfBeforeIsReadAndItsConfigurationNotedAsUnchecked) 
       if (at == bytes.end()) break;
       *at = 'x';
     }
+
   const auto file = folder_ / "before.mcap";
   write_file(file, bytes, bytes.size());
   const auto reader = RecordingReader::open(file);
+
   ASSERT_TRUE(reader) << reader.error().text;
   EXPECT_EQ(reader->configuration_check(), MetadataCheck::Unchecked);
   EXPECT_THAT(reader->damage(), IsEmpty());

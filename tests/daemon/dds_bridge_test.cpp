@@ -85,7 +85,8 @@ struct Recorded final : DdsOutlet {
     return n;
   }
   [[nodiscard]] std::chrono::nanoseconds last_age() const {
-    return std::chrono::nanoseconds{decode<v1::Compensation>(writes.back().payload).value().age_ns()};
+    return std::chrono::nanoseconds{
+        decode<v1::Compensation>(writes.back().payload).value().age_ns()};
   }
   [[nodiscard]] v1::ModelState last_state() const {
     for (auto w = writes.rbegin(); w != writes.rend(); ++w) {
@@ -104,13 +105,14 @@ struct DdsBridgeTest : testing::Test {
   void live(std::chrono::milliseconds duration) {
     for (const WallTime end = t + duration; t < end; t += 50ms) {
       bridge.beat(t, t);
-      bridge.turn(t);
+      bridge.cycle(t);
     }
   }
   void silent(std::chrono::milliseconds duration) {
-    for (const WallTime end = t + duration; t < end; t += 50ms) bridge.turn(t);
+    for (const WallTime end = t + duration; t < end; t += 50ms) bridge.cycle(t);
   }
-  void publish(Topic topic, std::vector<std::byte> payload, std::chrono::milliseconds waited = 0ms) {
+  void publish(Topic topic, std::vector<std::byte> payload,
+               std::chrono::milliseconds waited = 0ms) {
     bridge.publish(topic, payload, t - waited, t);
   }
 };
@@ -139,7 +141,7 @@ TEST_F(DdsBridgeTest, SlicesOfAnAbbedBeforeAreDisposedToo) {
   publish(Topic::ErrorGrid, slice(0, 2));
   EXPECT_TRUE(outlet.disposed.empty());
   bridge.beat(t, t);
-  bridge.turn(t);
+  bridge.cycle(t);
   EXPECT_EQ(outlet.disposed, (std::vector<std::uint32_t>{2}));
 }
 
@@ -253,7 +255,7 @@ TEST_F(DdsBridgeTest, WhatWasSentBeforeAStallKeepsNothingAlive) {
   bridge.beat(t - 2900ms, t);
   publish(Topic::ModelState, active("m", 3), 2800ms);
   EXPECT_EQ(outlet.count(Topic::ModelState), 1);
-  bridge.turn(t);
+  bridge.cycle(t);
   EXPECT_EQ(outlet.last_state().reason(), "SOURCE_LOST");
   EXPECT_EQ(outlet.assertions, assertions);
 }
@@ -263,7 +265,7 @@ TEST_F(DdsBridgeTest, AStallOfItsOwnIsNoSilenceOfAbbed) {
   publish(Topic::ModelState, active("m", 1));
   t += 800ms;
   for (auto ago = 700ms; ago > 0ms; ago -= 100ms) bridge.beat(t - ago, t);
-  bridge.turn(t);
+  bridge.cycle(t);
   EXPECT_TRUE(bridge.source_alive());
   EXPECT_EQ(outlet.last_state().state(), v1::MODEL_ACTIVE);
 }
@@ -277,7 +279,7 @@ struct DdsFeedTest : DdsBridgeTest {
   ~DdsFeedTest() override { std::filesystem::remove_all(directory); }
   void run_until(const auto& done) {
     while (!done()) {
-      feed->turn();
+      feed->cycle();
       link->poll();
       link->beat(std::chrono::steady_clock::now());
     }
@@ -295,7 +297,7 @@ TEST_F(DdsFeedTest, CarriesWhatTheLinkSends) {
   run_until([this] { return !outlet.writes.empty(); });
   EXPECT_EQ(outlet.last_state().state(), v1::MODEL_ACTIVE);
   link.reset();
-  while (feed->connected()) feed->turn();
+  while (feed->connected()) feed->cycle();
   EXPECT_EQ(outlet.last_state().reason(), "SOURCE_LOST");
 }
 

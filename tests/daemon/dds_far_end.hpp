@@ -43,6 +43,7 @@ struct FarEnd {
     for (ssize_t n = 0; (n = ::recv(fd, chunk, sizeof(chunk), MSG_DONTWAIT)) > 0;) {
       bytes.insert(bytes.end(), chunk, chunk + n);
     }
+
     std::vector<Seen> seen;
     for (;;) {
       if (bytes.size() < 16) return seen;

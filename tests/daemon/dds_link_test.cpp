@@ -44,7 +44,8 @@ std::vector<std::byte> snapshot_payload(std::uint64_t sequence) {
   return payload;
 }
 
-std::vector<std::byte> slice_payload(const std::string& machine, std::uint32_t number, std::uint32_t slices) {
+std::vector<std::byte> slice_payload(const std::string& machine, std::uint32_t number,
+                                     std::uint32_t slices) {
   v1::ErrorGrid grid;
   grid.machine(machine);
   grid.slice(number);
@@ -76,9 +77,11 @@ TEST_F(DdsLinkTest, AnAbbeDdsThatDoesNotAnswerIsNotReportedAsConnected) {
   const FarEnd hung(path_);
   link_->poll();
   DdsLink::WallTime now{100s};
+
   const auto beats_for = [&](std::chrono::nanoseconds duration) {
     for (const auto end = now + duration; now < end;) link_->beat(now += 100ms);
   };
+
   beats_for(1100ms);
   EXPECT_TRUE(link_->answers());
   beats_for(100ms);
@@ -165,7 +168,8 @@ TEST_F(DdsLinkTest, NeverBlocksOnAPeerThatDoesNotReadAndKeepsWhatIsDurable) {
   FarEnd far(path_);
   link_->poll();
   std::uint64_t n = 0;
-  while (link_->counters().dropped_live == 0) link_->publish(Topic::Snapshot, snapshot_payload(++n));
+  while (link_->counters().dropped_live == 0)
+    link_->publish(Topic::Snapshot, snapshot_payload(++n));
   link_->publish(Topic::ModelState, state_payload("a", 7));
   bool state_came = false;
   for (int turn = 0; turn < 3; ++turn) {
@@ -178,7 +182,8 @@ TEST_F(DdsLinkTest, NeverBlocksOnAPeerThatDoesNotReadAndKeepsWhatIsDurable) {
 /// Live samples are sent until the socket takes no more and `surplus` of them had to go.
 std::uint64_t fill(DdsLink& link, std::uint64_t surplus) {
   std::uint64_t n = 0;
-  while (link.counters().dropped_live < surplus) link.publish(Topic::Snapshot, snapshot_payload(++n));
+  while (link.counters().dropped_live < surplus)
+    link.publish(Topic::Snapshot, snapshot_payload(++n));
   return n;
 }
 
@@ -270,6 +275,7 @@ TEST_F(DdsLinkTest, OnlyTheSupervisedProcessMayConnect) {
   process.started(::getpid(), DdsLink::WallTime{1s});
   const auto socket = directory_ / "supervised.sock";
   auto link = DdsLink::listen(socket, {.process = &process});
+
   ASSERT_TRUE(link.has_value());
   FarEnd far(socket);
   link->poll();
@@ -286,6 +292,7 @@ TEST_F(DdsLinkTest, AnAnswerShowsThatThePeerReads) {
   process.started(::getpid(), DdsLink::WallTime{1ns});
   const auto socket = directory_ / "supervised.sock";
   auto link = DdsLink::listen(socket, {.process = &process});
+
   ASSERT_TRUE(link.has_value());
   const FarEnd far(socket);
   link->poll();

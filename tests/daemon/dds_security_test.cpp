@@ -96,7 +96,8 @@ std::string profile_text(const std::string& inside, const std::string& name = "a
 
 std::string properties(const std::vector<std::string>& names) {
   std::string text = "<propertiesPolicy><properties>";
-  for (const auto& name : names) text += "<property><name>" + name + "</name><value>x</value></property>";
+  for (const auto& name : names)
+    text += "<property><name>" + name + "</name><value>x</value></property>";
   return text + "</properties></propertiesPolicy>";
 }
 
@@ -119,11 +120,11 @@ TEST_F(DdsSecurity, AProfileOfTheSiteMayHaveItsOwn) {
 TEST_F(DdsSecurity, OnlyTheParticipantProfileThatIsUsedCounts) {
   const fs::path profile = root_ / "dds.xml";
   for (const std::string& text : {
-           profile_text("<!-- " + kOwn + " -->"),                              // a comment
-           profile_text(kOwn, "robot"),                                        // another participant
-           profile_text("<name>dds.sec.access.plugin</name>"),                 // no property
-           profile_text(properties({"dds.sec.access.plugin"})),                // no authentication
-           profile_text(properties({"dds.sec.auth.plugin"})),                  // no access
+           profile_text("<!-- " + kOwn + " -->"),                // a comment
+           profile_text(kOwn, "robot"),                          // another participant
+           profile_text("<name>dds.sec.access.plugin</name>"),   // no property
+           profile_text(properties({"dds.sec.access.plugin"})),  // no authentication
+           profile_text(properties({"dds.sec.auth.plugin"})),    // no access
            std::string{"<dds><profiles><participant profile_name=\"abbe\">"},  // cut off
            "<!-- dds.sec.auth.plugin dds.sec.access.plugin -->" + profile_text(""),
            std::string{"<!-- nothing else -->"},

@@ -66,6 +66,7 @@ TEST(DdsSupervisor, BacksOffWhenTheChildDiesAtStart) {
   ASSERT_TRUE(supervisor.has_value());
   wait_for_end(supervisor->pid());
   supervisor->poll(WallTime{1ms});
+
   EXPECT_EQ(supervisor->pid(), 0);
   EXPECT_EQ(end_of(*supervisor), "exit code 3");
   supervisor->poll(WallTime{100ms});
@@ -99,6 +100,7 @@ TEST(DdsSupervisor, EndsAndReplacesAChildThatDoesNotAnswer) {
   auto options = shell("exec sleep 60");
   options.process = &process;
   auto supervisor = DdsSupervisor::start(options, WallTime{1s});
+
   ASSERT_TRUE(supervisor.has_value());
   const pid_t hung = supervisor->pid();
   EXPECT_EQ(process.pid(), hung);
@@ -127,6 +129,7 @@ TEST(DdsSupervisor, AProgramThatIsGoneIsReportedAndTriedAgain) {
   options.program = program;
   options.process = &process;
   auto supervisor = DdsSupervisor::start(options, WallTime{});
+
   ASSERT_TRUE(supervisor.has_value());
   std::filesystem::remove(program);
   const pid_t first = supervisor->pid();
@@ -135,7 +138,8 @@ TEST(DdsSupervisor, AProgramThatIsGoneIsReportedAndTriedAgain) {
   supervisor->poll(WallTime{10s});
   EXPECT_EQ(supervisor->pid(), 0);
   EXPECT_EQ(supervisor->restarts(), 0u);
-  EXPECT_NE(supervisor->start_fault().find("No such file"), std::string::npos) << supervisor->start_fault();
+  EXPECT_NE(supervisor->start_fault().find("No such file"), std::string::npos)
+      << supervisor->start_fault();
   EXPECT_EQ(end_of(*supervisor), "signal 9 (Killed)");
   std::filesystem::create_symlink("/bin/sh", program);
   supervisor->poll(WallTime{15s});
@@ -182,8 +186,8 @@ TEST(DdsSupervisor, TellsTheChildWhoItsParentIs) {
   EXPECT_EQ(end_of(*supervisor), "exit code 7");
 }
 
-/// CAP_IPC_LOCK in the calling thread's ambient set, as systemd gives it to abbed. False where the system
-/// does not allow it.
+/// CAP_IPC_LOCK in the calling thread's ambient set, as systemd gives it to abbed. False where the
+/// system does not allow it.
 bool take_an_ambient_capability() {
   __user_cap_header_struct header{_LINUX_CAPABILITY_VERSION_3, 0};
   std::array<__user_cap_data_struct, 2> sets{};
@@ -197,10 +201,11 @@ TEST(DdsSupervisor, TheChildInheritsNoCapability) {
   std::optional<std::string> ended;
   std::thread([&ended] {  // a thread of its own: capabilities are a thread's
     if (!take_an_ambient_capability()) return;
-    auto supervisor = DdsSupervisor::start(shell("while read name set; do [ \"$name\" = CapAmb: ] && [ "
-                                                 "\"$set\" = 0000000000000000 ] && exit 7; done "
-                                                 "</proc/self/status; exit 8"),
-                                           WallTime{});
+    auto supervisor =
+        DdsSupervisor::start(shell("while read name set; do [ \"$name\" = CapAmb: ] && [ "
+                                   "\"$set\" = 0000000000000000 ] && exit 7; done "
+                                   "</proc/self/status; exit 8"),
+                             WallTime{});
     ASSERT_TRUE(supervisor.has_value());
     wait_for_end(supervisor->pid());
     supervisor->poll(WallTime{1ms});
@@ -208,6 +213,7 @@ TEST(DdsSupervisor, TheChildInheritsNoCapability) {
   })
       .join();
   if (!ended) GTEST_SKIP() << "this user may not raise an ambient capability";
+
   EXPECT_EQ(*ended, "exit code 7");
 }
 

@@ -99,12 +99,14 @@ expected = 4711
 TEST(EnvironmentConfiguration, RefusesMapsThatCannotBeMeant) {
   const std::string custom = "[[environment]]\nname = \"a\"\nmap = \"custom\"\nhost = \"h\"\n";
   EXPECT_THAT(faults_of(custom), HasSubstr("no register is measured"));
-  EXPECT_THAT(faults_of(custom + "[[environment.measured]]\nquantity = \"air_pressure\"\naddress = 1\n"
-                                 "type = \"int16\"\nquantity_unit = \"C\"\n"),
-              HasSubstr("is not a unit of the quantity"));
-  EXPECT_THAT(faults_of(custom + "[[environment.measured]]\nquantity = \"air_pressure\"\naddress = 1\n"
-                                 "type = \"int16\"\nquantity_unit = \"Pa\"\nscale = 0\n"),
-              HasSubstr("must not be 0"));
+  EXPECT_THAT(
+      faults_of(custom + "[[environment.measured]]\nquantity = \"air_pressure\"\naddress = 1\n"
+                         "type = \"int16\"\nquantity_unit = \"C\"\n"),
+      HasSubstr("is not a unit of the quantity"));
+  EXPECT_THAT(
+      faults_of(custom + "[[environment.measured]]\nquantity = \"air_pressure\"\naddress = 1\n"
+                         "type = \"int16\"\nquantity_unit = \"Pa\"\nscale = 0\n"),
+      HasSubstr("must not be 0"));
 }
 
 TEST(EnvironmentConfiguration, RefusesAMapNobodyKnows) {
@@ -119,7 +121,8 @@ TEST(EnvironmentConfiguration, NeedsTheSerialNumberOfAComet) {
 
 TEST(EnvironmentConfiguration, RefusesTwoDevicesThatMeasureTheSame) {
   EXPECT_THAT(
-      faults_of(kAir + "[[environment]]\nname = \"b\"\nmap = \"vaisala-indigo520-hmp\"\nhost = \"h\"\n"),
+      faults_of(kAir +
+                "[[environment]]\nname = \"b\"\nmap = \"vaisala-indigo520-hmp\"\nhost = \"h\"\n"),
       HasSubstr("air temperature is measured by two devices"));
 }
 
@@ -127,8 +130,9 @@ TEST(EnvironmentConfiguration, RefusesADeviceWithoutAnAddressOrWithTwo) {
   EXPECT_THAT(faults_of("[[environment]]\nname = \"a\"\nmap = \"vaisala-indigo520-hmp\"\n"),
               HasSubstr("needs one of host"));
   EXPECT_THAT(
-      faults_of("[[environment]]\nname = \"a\"\nmap = \"vaisala-indigo520-hmp\"\nhost = \"h\"\nserial = "
-                "\"/dev/ttyS0\"\n"),
+      faults_of(
+          "[[environment]]\nname = \"a\"\nmap = \"vaisala-indigo520-hmp\"\nhost = \"h\"\nserial = "
+          "\"/dev/ttyS0\"\n"),
       HasSubstr("needs one of host"));
 }
 
@@ -138,11 +142,15 @@ TEST(EnvironmentConfiguration, DevicesOnOneSerialLineHaveTheSameSettings) {
            "\"/dev/serial/by-id/rs485\"\n" +
            settings + "unit = 4\ninputs = [\"table\"]\n";
   };
-  EXPECT_THAT(faults_of(kScales + second("baud = 9600\nparity = \"none\"\nstop_bits = 2\n")), IsEmpty());
-  for (const std::string settings : {"baud = 19200\nparity = \"none\"\nstop_bits = 2\n", "baud = 9600\n"})
-    EXPECT_THAT(faults_of(kScales + second(settings)),
-                AllOf(HasSubstr("\"table\""), HasSubstr("\"rtd\""), HasSubstr("9600 8N2"),
-                      HasSubstr("/dev/serial/by-id/rs485"), HasSubstr("same baud, parity and stop_bits")));
+
+  EXPECT_THAT(faults_of(kScales + second("baud = 9600\nparity = \"none\"\nstop_bits = 2\n")),
+              IsEmpty());
+  for (const std::string settings :
+       {"baud = 19200\nparity = \"none\"\nstop_bits = 2\n", "baud = 9600\n"})
+    EXPECT_THAT(
+        faults_of(kScales + second(settings)),
+        AllOf(HasSubstr("\"table\""), HasSubstr("\"rtd\""), HasSubstr("9600 8N2"),
+              HasSubstr("/dev/serial/by-id/rs485"), HasSubstr("same baud, parity and stop_bits")));
 }
 
 TEST(ThermalConfiguration, FindsTheAxisAmongTheEncodersAndTheTemperatureByName) {
@@ -163,9 +171,11 @@ fixed_mm = -200
 }
 
 TEST(ThermalConfiguration, IsPartOfWhatAReadingIs) {
-  const auto hash = [](const std::string& temperature, const std::string& alpha, const std::string& u) {
-    return machine_hash(config_of(kScales + "[[thermal]]\naxis = \"X\"\ntemperature = \"" + temperature +
-                                  "\"\nalpha_um_per_m_K = " + alpha + "\nu_alpha_um_per_m_K = " + u +
+  const auto hash = [](const std::string& temperature, const std::string& alpha,
+                       const std::string& u) {
+    return machine_hash(config_of(kScales + "[[thermal]]\naxis = \"X\"\ntemperature = \"" +
+                                  temperature + "\"\nalpha_um_per_m_K = " + alpha +
+                                  "\nu_alpha_um_per_m_K = " + u +
                                   "\nu_temperature_K = 0.2\nfixed_mm = 0\n"));
   };
   const auto plain = hash("scale_x", "8", "0.5");
@@ -177,8 +187,9 @@ TEST(ThermalConfiguration, IsPartOfWhatAReadingIs) {
 
 TEST(ThermalConfiguration, RefusesATemperatureNobodyMeasures) {
   EXPECT_THAT(
-      faults_of(kScales + "[[thermal]]\naxis = \"X\"\ntemperature = \"scale_y\"\nalpha_um_per_m_K = 8\n"
-                          "u_alpha_um_per_m_K = 1\nu_temperature_K = 1\nfixed_mm = 0\n"),
+      faults_of(kScales +
+                "[[thermal]]\naxis = \"X\"\ntemperature = \"scale_y\"\nalpha_um_per_m_K = 8\n"
+                "u_alpha_um_per_m_K = 1\nu_temperature_K = 1\nfixed_mm = 0\n"),
       HasSubstr("no [[environment]] measures it"));
 }
 
@@ -188,15 +199,17 @@ TEST(AirConfiguration, TakesTheUncertaintyOfCo2) {
 }
 
 TEST(AirConfiguration, RefusesToCorrectForAirThatNobodyMeasures) {
-  EXPECT_THAT(faults_of("[tracker]\nhost = \"t\"\nweather = \"none\"\n[air]\nassumed_index = 1.00027\n"),
-              HasSubstr("an [[environment]] must measure"));
+  EXPECT_THAT(
+      faults_of("[tracker]\nhost = \"t\"\nweather = \"none\"\n[air]\nassumed_index = 1.00027\n"),
+      HasSubstr("an [[environment]] must measure"));
 }
 
 TEST(AirConfiguration, RefusesToCorrectDistancesTwice) {
   EXPECT_THAT(faults_of("[tracker]\nhost = \"t\"\n[air]\nassumed_index = 1.00027\n"),
               HasSubstr("the controller computes the index already"));
-  EXPECT_THAT(faults_of("[tracker]\nhost = \"t\"\nweather = \"read\"\n[air]\nassumed_index = 1.00027\n"),
-              IsEmpty());
+  EXPECT_THAT(
+      faults_of("[tracker]\nhost = \"t\"\nweather = \"read\"\n[air]\nassumed_index = 1.00027\n"),
+      IsEmpty());
 }
 
 }  // namespace

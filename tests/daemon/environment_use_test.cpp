@@ -183,7 +183,8 @@ TEST(RawDistances, AreCorrectedToTheAirThatIsThere) {
   EXPECT_DOUBLE_EQ(assumed.tracker_point.p_tracker_m[0], 10.0);
   auto warm = with_point(298.15);
   correct_for_air(warm, use);
-  EXPECT_NEAR(warm.tracker_point.p_tracker_m[0] - 10.0, 10.0 * 5 * 0.94e-6, 1e-6);  // thinner: farther
+  EXPECT_NEAR(warm.tracker_point.p_tracker_m[0] - 10.0, 10.0 * 5 * 0.94e-6,
+              1e-6);  // thinner: farther
 }
 
 TEST(RawDistances, AreNotUsedWithoutTheAir) {

@@ -11,13 +11,17 @@ namespace {
 using calib::Vector3;
 
 ModelInForce in_force(calib::VolumetricModel model) {
-  return {
-      .id = "m", .method = "otf", .estimator = "two-step", .recording_sha256 = {}, .model = std::move(model)};
+  return {.id = "m",
+          .method = "otf",
+          .estimator = "two-step",
+          .recording_sha256 = {},
+          .model = std::move(model)};
 }
 
 std::vector<v1::GridNode> nodes_of(const std::vector<v1::ErrorGrid>& slices) {
   std::vector<v1::GridNode> nodes;
-  for (const auto& slice : slices) nodes.insert(nodes.end(), slice.nodes().begin(), slice.nodes().end());
+  for (const auto& slice : slices)
+    nodes.insert(nodes.end(), slice.nodes().begin(), slice.nodes().end());
   return nodes;
 }
 
@@ -30,10 +34,11 @@ calib::VolumetricModel of_half_the_volume() {
   const auto whole = test::synthetic_model(1);
   std::vector<Vector3> corners;
   for (int i = 0; i < 8; ++i) {
-    corners.emplace_back((i & 1) != 0 ? 0.0 : -0.3, (i & 2) != 0 ? 0.3 : -0.3, (i & 4) != 0 ? -0.1 : -0.4);
+    corners.emplace_back((i & 1) != 0 ? 0.0 : -0.3, (i & 2) != 0 ? 0.3 : -0.3,
+                         (i & 4) != 0 ? -0.1 : -0.4);
   }
-  return calib::VolumetricModel::from_vector(whole.layout(), whole.gauge(), whole.tool_offsets_m(), whole.U(),
-                                             whole.covariance(),
+  return calib::VolumetricModel::from_vector(whole.layout(), whole.gauge(), whole.tool_offsets_m(),
+                                             whole.U(), whole.covariance(),
                                              calib::ValidityVolume::hull_of(corners).value())
       .value();
 }

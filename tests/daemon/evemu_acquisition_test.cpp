@@ -1,4 +1,5 @@
-/// Touches as the hub brings them: usable or not, with device and reason; the session that is made of them.
+/// Touches as the hub brings them: usable or not, with device and reason; the session that is made
+/// of them.
 #include "abbe/methods/evemu_acquisition.hpp"
 
 #include <gmock/gmock.h>
@@ -44,7 +45,9 @@ protocol::Snapshot touch_at(const Vector3& p_m, HostTime time, std::uint32_t num
 
 struct EvemuAcquisitionTest : testing::Test {
   EvemuAcquisitionTest() { acquisition.begin(kFrom); }
-  void touch(std::size_t i) { acquisition.take(touch_at(points_m.at(i), kFrom + 1s * (i + 1), number++)); }
+  void touch(std::size_t i) {
+    acquisition.take(touch_at(points_m.at(i), kFrom + 1s * (i + 1), number++));
+  }
 
   EvemuAcquisition acquisition = *EvemuAcquisition::create(request(), {.device = "probe 1"});
   std::vector<Vector3> points_m = touched_points_m();
@@ -65,8 +68,9 @@ TEST_F(EvemuAcquisitionTest, ATouchTheProbeIsNotQualifiedForIsNamedAndNotUsed) {
   acquisition.take(slow);
   EXPECT_EQ(acquisition.points(), 0u);
   EXPECT_THAT(acquisition.take_notes(),
-              testing::ElementsAre("probe 1 touch 7: not used: the speed of the approach changed; expected: "
-                                   "ball 1"));
+              testing::ElementsAre(
+                  "probe 1 touch 7: not used: the speed of the approach changed; expected: "
+                  "ball 1"));
 }
 
 TEST_F(EvemuAcquisitionTest, ATouchOutsideTheTravelIsNamedAndNotUsed) {
@@ -77,10 +81,11 @@ TEST_F(EvemuAcquisitionTest, ATouchOutsideTheTravelIsNamedAndNotUsed) {
   auto narrow = *EvemuAcquisition::create(request(), {.device = "probe 1", .travel = travel});
   narrow.begin(kFrom);
   narrow.take(touch_at(points_m[0], kFrom + 1s, 7));
+
   EXPECT_EQ(narrow.points(), 0u);
-  EXPECT_THAT(narrow.take_notes(),
-              testing::ElementsAre(testing::AllOf(testing::StartsWith("probe 1 touch 7: not used: X "),
-                                                  HasSubstr("outside its travel"), HasSubstr("[axes.X]"))));
+  EXPECT_THAT(narrow.take_notes(), testing::ElementsAre(testing::AllOf(
+                                       testing::StartsWith("probe 1 touch 7: not used: X "),
+                                       HasSubstr("outside its travel"), HasSubstr("[axes.X]"))));
   travel[0].nodes_m = {x_m - 0.3, x_m + 0.1};
   auto wide = *EvemuAcquisition::create(request(), {.device = "probe 1", .travel = travel});
   wide.begin(kFrom);
@@ -142,7 +147,8 @@ TEST_F(EvemuAcquisitionTest, EndsWhenNobodyTouchesAnyMore) {
   EXPECT_EQ(acquisition.phase(), AcquisitionPhase::Running);
   acquisition.tick(kFrom + 1h + 2s);
   EXPECT_EQ(acquisition.phase(), AcquisitionPhase::Failed);
-  EXPECT_THAT(acquisition.reason(), HasSubstr("no touch for 3601 s; position 4 (1 of 8): touch ball 1"));
+  EXPECT_THAT(acquisition.reason(),
+              HasSubstr("no touch for 3601 s; position 4 (1 of 8): touch ball 1"));
 }
 
 TEST_F(EvemuAcquisitionTest, TheSessionSaysEveryNewFeatureAndEveryNoteAsAnEvent) {
@@ -154,11 +160,13 @@ TEST_F(EvemuAcquisitionTest, TheSessionSaysEveryNewFeatureAndEveryNoteAsAnEvent)
   std::vector<std::string> said;
   for (const auto& event : session.take_events())
     said.push_back(std::string{name(event.status.state)} + ": " + event.status.reason);
-  EXPECT_THAT(said, testing::ElementsAre("warming: position 4 (1 of 8): touch ball 1, 25 points",
-                                         "acquiring: position 4 (1 of 8): touch ball 1, 25 points",
-                                         "acquiring: position 4 (1 of 8): touch block 1, 25 points",
-                                         HasSubstr("the same place on ball 1 was touched twice"),
-                                         "acquiring: position 4 (1 of 8): touch block 1, 25 points"));
+
+  EXPECT_THAT(said,
+              testing::ElementsAre("warming: position 4 (1 of 8): touch ball 1, 25 points",
+                                   "acquiring: position 4 (1 of 8): touch ball 1, 25 points",
+                                   "acquiring: position 4 (1 of 8): touch block 1, 25 points",
+                                   HasSubstr("the same place on ball 1 was touched twice"),
+                                   "acquiring: position 4 (1 of 8): touch block 1, 25 points"));
   EXPECT_EQ(session.status().noted, 1u);
   EXPECT_EQ(session.status().method, "evemu");
 }
@@ -171,6 +179,7 @@ TEST(CalibrationRequest, KeepsEveryBitOfATaskWithABallArray) {
   evemu.reference = RotationPoints{{{.reading_m = {1.0 / 3, 0, 0}, .V_m = {0, 1e-7 / 3, 0}}}, 2e-6};
   evemu.sources = {{"calibrator.toml", "abc"}};
   const auto attachment = to_attachment(asked);
+
   EXPECT_TRUE(is_calibration_request(attachment.name));
   const auto read = from_attachment(attachment);
   ASSERT_TRUE(read) << read.error().text;

@@ -1,5 +1,5 @@
-/// A ball array that is warm where it is touched, and not exactly what its file says: files, configuration,
-/// live runs and their recordings.
+/// A ball array that is warm where it is touched, and not exactly what its file says: files,
+/// configuration, live runs and their recordings.
 #include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <unistd.h>
@@ -48,19 +48,23 @@ std::string touches_of_a_perfect_machine(const sim::BallArray& array) {
   const auto edges_s = sim::edge_times_s(program, perfect, path, array.tip_radius_m, options);
   std::string text = "position,kind,index,x_mm,y_mm,z_mm\n";
   std::size_t touch = 0;
+
   const auto add = [&](int position, const char* kind, std::size_t index, std::size_t points) {
     for (std::size_t i = 0; i < points; ++i, ++touch) {
       const Eigen::Vector3d q_m = path.at(edges_s[touch]).q_m;
-      text += fmt::format("{},{},{},{:.17g},{:.17g},{:.17g}\n", position, kind, index, 1e3 * q_m.x(),
-                          1e3 * q_m.y(), 1e3 * q_m.z());
+      text += fmt::format("{},{},{},{:.17g},{:.17g},{:.17g}\n", position, kind, index,
+                          1e3 * q_m.x(), 1e3 * q_m.y(), 1e3 * q_m.z());
     }
   };
+
   for (const int position : options.positions) {
     add(position, "ball", 1, options.points_per_ball);
-    for (const std::size_t block : {1u, 2u}) add(position, "block", block, options.points_per_block);
+    for (const std::size_t block : {1u, 2u})
+      add(position, "block", block, options.points_per_block);
     for (std::size_t ball = 2; ball <= array.balls.size(); ++ball)
       add(position, "ball", ball, options.points_per_ball);
   }
+
   return text;
 }
 
@@ -85,10 +89,11 @@ class WarmArray : public ::testing::Test {
                                                 std::regex{"(u_)?alpha_um_per_m_K[^\n]*\n"}, ""));
   }
   Ran identify(const std::string& more = {}) const {
-    return test::run_abbe(folder_,
-                          "identify evemu --machine machine.toml --touches touches.csv --calibrator "
-                          "calibrator.toml --estimator ols --json -o out " +
-                              more);
+    return test::run_abbe(
+        folder_,
+        "identify evemu --machine machine.toml --touches touches.csv --calibrator "
+        "calibrator.toml --estimator ols --json -o out " +
+            more);
   }
   [[nodiscard]] calib::VolumetricError error_near_the_far_end() const {
     const auto document = read_model(folder_ / "out/model.json");
@@ -133,8 +138,8 @@ std::string nothing_at_the_balls() {
 TEST_F(WarmArray, IsAsUncertainAsItsTemperatureAndItsFile) {
   write_array({.temperature_C = 24.0, .alpha_per_K = kAlpha_per_K, .u_alpha_per_K = 1e-6});
   write("reference.csv", nothing_at_the_balls());
-  const auto ran =
-      identify("--artefact-C 24 --u-artefact-K 0.5 --rotation-reference reference.csv --u-reference-um 0.1");
+  const auto ran = identify(
+      "--artefact-C 24 --u-artefact-K 0.5 --rotation-reference reference.csv --u-reference-um 0.1");
   ASSERT_TRUE(ran.exit == 0 || ran.exit == kRefusedByTheGate) << ran.err;
   const double along_m = kFar_m.x() - kBall1_m.x();
   const double of_temperature_m = along_m * std::hypot(0.5 * kAlpha_per_K, 4.0 * 1e-6);
@@ -151,6 +156,7 @@ TEST_F(WarmArray, StandsInEveryResult) {
                .u_ball_m = 0.5e-6,
                .u_block_rad = 4e-6});
   const auto ran = identify("--artefact-C 24 --u-artefact-K 0.5");
+
   ASSERT_EQ(ran.exit, kRefusedByTheGate) << ran.err;
   const auto artefact = nlohmann::json::parse(ran.out)["artefact"];
   EXPECT_NEAR(artefact["temperature_C"].get<double>(), 24.0, 1e-9);
@@ -171,14 +177,16 @@ TEST_F(WarmArray, StandsInEveryResult) {
 TEST_F(WarmArray, NeedsBothTemperatureAndExpansion) {
   write_array({.alpha_per_K = kAlpha_per_K});
   const auto no_temperature = identify();
+
   EXPECT_EQ(no_temperature.exit, 3);
   EXPECT_THAT(no_temperature.err, AllOf(HasSubstr("calibrator.toml has alpha_um_per_m_K"),
                                         HasSubstr("give --artefact-C and --u-artefact-K")));
   forget_expansion();
   const auto no_expansion = identify("--artefact-C 24 --u-artefact-K 0.5");
   EXPECT_EQ(no_expansion.exit, 3);
-  EXPECT_THAT(no_expansion.err, AllOf(HasSubstr("--artefact-C says how warm"),
-                                      HasSubstr("add alpha_um_per_m_K and u_alpha_um_per_m_K to its file")));
+  EXPECT_THAT(no_expansion.err,
+              AllOf(HasSubstr("--artefact-C says how warm"),
+                    HasSubstr("add alpha_um_per_m_K and u_alpha_um_per_m_K to its file")));
   EXPECT_EQ(identify("--artefact-C 24").exit, 2);
   EXPECT_EQ(identify("--artefact-C 24 --u-artefact-K -1").exit, 2);
   EXPECT_FALSE(fs::exists(folder_ / "out"));
@@ -200,10 +208,11 @@ TEST_F(WarmArray, HasFaultsOfItsFileNamedWithTheLine) {
                "calibrator.toml:4:20: calibrator.alpha_um_per_m_K: needs u_alpha_um_per_m_K, too");
   expect_fault(std::regex_replace(whole, std::regex{"\nalpha_um_per_m_K[^\n]*"}, ""),
                "calibrator.u_alpha_um_per_m_K: needs alpha_um_per_m_K, too");
-  expect_fault(
-      std::regex_replace(whole, std::regex{"\nu_alpha_um_per_m_K = "}, "\nu_alpha_um_per_m_K = -1 #"),
-      "calibrator.u_alpha_um_per_m_K");
-  expect_fault(std::regex_replace(whole, std::regex{"u_urad = 0"}, "u_urad = -1"), "block[0].u_urad");
+  expect_fault(std::regex_replace(whole, std::regex{"\nu_alpha_um_per_m_K = "},
+                                  "\nu_alpha_um_per_m_K = -1 #"),
+               "calibrator.u_alpha_um_per_m_K");
+  expect_fault(std::regex_replace(whole, std::regex{"u_urad = 0"}, "u_urad = -1"),
+               "block[0].u_urad");
 }
 
 TEST_F(WarmArray, KeepsItsExpansionInItsFile) {
@@ -229,7 +238,8 @@ axes_compensated = false
 )";
 
 std::string config_text(const std::string& evemu) {
-  return to_toml(config_tables::weak_portal()) + to_toml(config_tables::Encoder{}) + kWithASensor + evemu;
+  return to_toml(config_tables::weak_portal()) + to_toml(config_tables::Encoder{}) + kWithASensor +
+         evemu;
 }
 
 TEST_F(WarmArray, HasItSaidThatItsSensorIsInNoFile) {
@@ -237,13 +247,16 @@ TEST_F(WarmArray, HasItSaidThatItsSensorIsInNoFile) {
   write("machine.toml", config_text("artefact_sensor = \"plate\"\nu_artefact_K = 0.3\n"));
   const auto refused = identify();
   EXPECT_EQ(refused.exit, 3);
-  EXPECT_THAT(refused.err, AllOf(HasSubstr("calibrator.toml has alpha_um_per_m_K"),
-                                 HasSubstr("artefact_sensor \"plate\" stands in no file of touches"),
-                                 HasSubstr("give --artefact-C and --u-artefact-K")));
+  EXPECT_THAT(refused.err,
+              AllOf(HasSubstr("calibrator.toml has alpha_um_per_m_K"),
+                    HasSubstr("artefact_sensor \"plate\" stands in no file of touches"),
+                    HasSubstr("give --artefact-C and --u-artefact-K")));
+
   const auto notes_of = [](const Ran& ran) {
     EXPECT_EQ(ran.exit, kRefusedByTheGate) << ran.err;
     return nlohmann::json::parse(ran.out)["gate"]["notes"].dump();
   };
+
   const std::string unknown = "how warm the array was is not known";
   EXPECT_THAT(notes_of(identify("--artefact-C 24 --u-artefact-K 0.5")), Not(HasSubstr(unknown)));
   forget_expansion();
@@ -262,16 +275,18 @@ std::string faults_with(const std::string& evemu) {
 TEST(ArtefactConfiguration, NamesWhatCannotBeMeant) {
   EXPECT_EQ(faults_with("artefact_sensor = \"plate\"\nu_artefact_K = 0.2\n"), "");
   EXPECT_EQ(faults_with("artefact_C = 21.5\nu_artefact_K = 0.2\n"), "");
-  EXPECT_THAT(faults_with("artefact_sensor = \"oven\"\nu_artefact_K = 0.2\n"),
-              HasSubstr("evemu.artefact_sensor: no [[environment]] measures a temperature \"oven\""));
-  EXPECT_THAT(faults_with("artefact_sensor = \"plate\"\n"), HasSubstr("evemu.u_artefact_K: missing"));
+  EXPECT_THAT(
+      faults_with("artefact_sensor = \"oven\"\nu_artefact_K = 0.2\n"),
+      HasSubstr("evemu.artefact_sensor: no [[environment]] measures a temperature \"oven\""));
+  EXPECT_THAT(faults_with("artefact_sensor = \"plate\"\n"),
+              HasSubstr("evemu.u_artefact_K: missing"));
   EXPECT_THAT(faults_with("artefact_sensor = \"plate\"\nartefact_C = 20\nu_artefact_K = 0.2\n"),
               HasSubstr("evemu.artefact_C: has no meaning with artefact_sensor"));
   EXPECT_THAT(faults_with("u_artefact_K = 0.2\n"),
               HasSubstr("evemu.u_artefact_K: needs artefact_sensor or artefact_C"));
-  EXPECT_THAT(
-      faults_with("artefact_C = 400\n"),
-      AllOf(HasSubstr("evemu.artefact_C: must be -50 to 100, not 400"), HasSubstr("u_artefact_K: missing")));
+  EXPECT_THAT(faults_with("artefact_C = 400\n"),
+              AllOf(HasSubstr("evemu.artefact_C: must be -50 to 100, not 400"),
+                    HasSubstr("u_artefact_K: missing")));
   EXPECT_THAT(faults_with("artefact_sensor = 7\nu_artefact_K = 0.2\n"),
               AllOf(HasSubstr("evemu.artefact_sensor: must be"), Not(HasSubstr("u_artefact_K"))));
 }
@@ -293,8 +308,10 @@ TEST(ArtefactConfiguration, IsHeldAgainstTheCalibratorBeforeARunBegins) {
     EXPECT_EQ(fine.error().code, ErrorCode::Refused);
     return fine.error().text;
   };
+
   EXPECT_EQ(refusal(kSensor, growing()), "");
-  EXPECT_THAT(refusal("", growing()), HasSubstr("add artefact_sensor or artefact_C, and u_artefact_K"));
+  EXPECT_THAT(refusal("", growing()),
+              HasSubstr("add artefact_sensor or artefact_C, and u_artefact_K"));
   EXPECT_THAT(refusal(kSensor, tests::evemu::reference_calibrator()),
               AllOf(HasSubstr("[evemu] artefact_sensor"), HasSubstr("add alpha_um_per_m_K")));
   EXPECT_EQ(refusal("", tests::evemu::reference_calibrator()), "");
@@ -331,7 +348,8 @@ TEST(ArtefactThermometer, KnowsWhenItsSensorIsSilent) {
 
 TEST(ArtefactThermometer, NoTouchIsUsedWhileItsSensorIsSilent) {
   const auto config = *parse_config(config_text(kSensor), "abbed.toml");
-  auto acquisition = *EvemuAcquisition::create({.calibrator = growing()}, evemu_acquisition_options(config));
+  auto acquisition =
+      *EvemuAcquisition::create({.calibrator = growing()}, evemu_acquisition_options(config));
   acquisition.begin(protocol::HostTime{10s});
   auto touch = at_temperature(std::nan(""));
   touch.head.time = protocol::HostTime{11s};
@@ -339,17 +357,20 @@ TEST(ArtefactThermometer, NoTouchIsUsedWhileItsSensorIsSilent) {
   touch.trigger.touch = 7;
   touch.axis_count = 3;
   acquisition.take(touch);
+
   EXPECT_EQ(acquisition.points(), 0u);
   EXPECT_THAT(acquisition.take_notes(),
-              testing::ElementsAre(
-                  HasSubstr("touch 7: not used: the temperature \"plate\" of the array was not known")));
+              testing::ElementsAre(HasSubstr(
+                  "touch 7: not used: the temperature \"plate\" of the array was not known")));
 }
 
-/// Touches of the reference data in the order of the plan, one a second, and the sensor twice a second.
+/// Touches of the reference data in the order of the plan, one a second, and the sensor twice a
+/// second.
 Batch warm_run(const CalibrationRequest& request) {
   Batch batch;
   const auto all = tests::evemu::reference_touches("touched_sig3um.csv");
   std::uint32_t number = 0;
+
   const auto measure = [&](std::chrono::milliseconds after) {
     protocol::EnvironmentSample sample;
     sample.head.time = request.from + number * 1s + after;
@@ -358,6 +379,7 @@ Batch warm_run(const CalibrationRequest& request) {
     sample.temperature_K[0] = 296.0 + 1e-3 * number;
     batch.measured_environment.push_back({0, sample});
   };
+
   const auto& positions = std::get<EvemuRequest>(request.task).plan.positions;
   for (const auto& t : tests::evemu::touches_in_order(all, positions)) {
     protocol::ProbeTrigger trigger;
@@ -369,6 +391,7 @@ Batch warm_run(const CalibrationRequest& request) {
     std::copy_n(t.p_m.data(), 3, trigger.position.begin());
     batch.touches.push_back(trigger);
   }
+
   return batch;
 }
 
@@ -386,8 +409,8 @@ EvemuRun live_run(const CalibrationRequest& request, const Batch& batch, const C
   return acquired ? std::get<EvemuRun>(run_of(std::move(*acquired))) : EvemuRun{};
 }
 
-void record_run(const fs::path& folder, const std::string& configuration, const CalibrationRequest& request,
-                const Batch& batch) {
+void record_run(const fs::path& folder, const std::string& configuration,
+                const CalibrationRequest& request, const Batch& batch) {
   RecordingInfo info = example_info();
   info.configuration = configuration;
   auto recorder = Recorder::open(example_options(folder), info, Recorder::WallTime{});
@@ -403,7 +426,8 @@ void record_run(const fs::path& folder, const std::string& configuration, const 
 
 TEST(WarmRun, GivesTheSameModelLiveFromItsRecordingAndFromACommand) {
   const TemporaryFolder folder;
-  const CalibrationRequest request{EvemuRequest{.calibrator = growing()}, protocol::HostTime{1000s}};
+  const CalibrationRequest request{EvemuRequest{.calibrator = growing()},
+                                   protocol::HostTime{1000s}};
   const auto config = *parse_config(config_text(kSensor), "abbed.toml");
   const Batch batch = warm_run(request);
   const EvemuRun run = live_run(request, batch, config);
@@ -424,11 +448,13 @@ TEST(WarmRun, GivesTheSameModelLiveFromItsRecordingAndFromACommand) {
   ASSERT_EQ(again->calibrations.size(), 1u);
   EXPECT_EQ(again->calibrations[0].model_hash, hash) << again->calibrations[0].ended.reason;
 
-  const auto ran = test::run_abbe(folder.path(), "identify evemu --recording run.mcap --json -o out");
+  const auto ran =
+      test::run_abbe(folder.path(), "identify evemu --recording run.mcap --json -o out");
   ASSERT_EQ(ran.exit, kRefusedByTheGate) << ran.err;
   const auto said = nlohmann::json::parse(ran.out);
   EXPECT_EQ(said["hash"], hash);
-  EXPECT_NEAR(said["artefact"]["temperature_C"].get<double>() + 273.15, run.artefact->temperature_K, 1e-9);
+  EXPECT_NEAR(said["artefact"]["temperature_C"].get<double>() + 273.15, run.artefact->temperature_K,
+              1e-9);
 }
 
 TEST(CalibrationRequestOfAWarmArray, KeepsItsExpansion) {

@@ -1,4 +1,5 @@
-/// `abbe identify evemu` and `abbe model eval` on its model: the built program, its files and exit codes.
+/// `abbe identify evemu` and `abbe model eval` on its model: the built program, its files and exit
+/// codes.
 
 #include <fmt/format.h>
 #include <gmock/gmock.h>
@@ -35,12 +36,12 @@ std::string calibrator_toml() {
   const auto c = tests::evemu::reference_calibrator();
   std::string text = "[calibrator]\nname = \"L array\"\ntip_radius_mm = 0\n";
   for (const auto& b : c.balls)
-    text +=
-        fmt::format("[[ball]]\nnumber = {}\nx_mm = {}\ny_mm = {}\nz_mm = {}\nradius_mm = 12.7\nu_um = 0.5\n",
-                    b.number, 1e3 * b.centre_m.x(), 1e3 * b.centre_m.y(), 1e3 * b.centre_m.z());
+    text += fmt::format(
+        "[[ball]]\nnumber = {}\nx_mm = {}\ny_mm = {}\nz_mm = {}\nradius_mm = 12.7\nu_um = 0.5\n",
+        b.number, 1e3 * b.centre_m.x(), 1e3 * b.centre_m.y(), 1e3 * b.centre_m.z());
   for (const auto& b : c.blocks)
-    text += fmt::format("[[block]]\nnumber = {}\nnormal = [{}, {}, {}]\nu_urad = 5\n", b.number, b.normal.x(),
-                        b.normal.y(), b.normal.z());
+    text += fmt::format("[[block]]\nnumber = {}\nnormal = [{}, {}, {}]\nu_urad = 5\n", b.number,
+                        b.normal.x(), b.normal.y(), b.normal.z());
   return text;
 }
 
@@ -63,14 +64,14 @@ std::string touches_csv(const Touches& all = touches()) {
 std::string errors_csv() {
   std::string text = "position,ball,x_mm,y_mm,z_mm,ex_um,ey_um,ez_um\n";
   for (const auto& e : tests::evemu::reference_errors())
-    text += fmt::format("{},{},{:.17g},{:.17g},{:.17g},{:.17g},{:.17g},{:.17g}\n", e.position, e.ball,
-                        1e3 * e.reading_m.x(), 1e3 * e.reading_m.y(), 1e3 * e.reading_m.z(), 1e6 * e.V_m.x(),
-                        1e6 * e.V_m.y(), 1e6 * e.V_m.z());
+    text += fmt::format("{},{},{:.17g},{:.17g},{:.17g},{:.17g},{:.17g},{:.17g}\n", e.position,
+                        e.ball, 1e3 * e.reading_m.x(), 1e3 * e.reading_m.y(), 1e3 * e.reading_m.z(),
+                        1e6 * e.V_m.x(), 1e6 * e.V_m.y(), 1e6 * e.V_m.z());
   return text;
 }
 
-// The machine is worse than the gate's limits, and its shape has no rotation: everything is written all the
-// same.
+// The machine is worse than the gate's limits, and its shape has no rotation: everything is written
+// all the same.
 constexpr int kRefused = 5;
 
 class EvemuCli : public ::testing::Test {
@@ -93,7 +94,8 @@ class EvemuCli : public ::testing::Test {
   Ran identify(const Touches& all) const {
     write("touches.csv", touches_csv(all));
     return abbe(
-        "identify evemu --machine machine.toml --touches touches.csv --calibrator calibrator.toml -o out");
+        "identify evemu --machine machine.toml --touches touches.csv --calibrator calibrator.toml "
+        "-o out");
   }
   /// Nothing is written when the input is refused.
   void expect_refused(const Ran& ran, int exit, const std::string& why) const {
@@ -107,18 +109,20 @@ class EvemuCli : public ::testing::Test {
 
 TEST_F(EvemuCli, IdentifiesFromTouchesAndCallsItAShape) {
   const auto ran = abbe(
-      "identify evemu --machine machine.toml --touches touches.csv --calibrator calibrator.toml --json -o "
+      "identify evemu --machine machine.toml --touches touches.csv --calibrator calibrator.toml "
+      "--json -o "
       "out");
   ASSERT_EQ(ran.exit, kRefused) << ran.err;
   const auto summary = nlohmann::json::parse(ran.out);
+
   EXPECT_EQ(summary["balls"], 72);
   EXPECT_EQ(summary["shape_only"], true);
   EXPECT_EQ(summary["gate"]["accepted"], false);
   EXPECT_LT(summary["held_out_rms_after_um"].get<double>(),
             0.1 * summary["held_out_rms_before_um"].get<double>());
-  EXPECT_THAT(
-      text_of(folder_ / "out/coefficients.csv"),
-      AllOf(StartsWith("name,value,u,unit\nk_dxx1,"), HasSubstr("\nk_ezz3,"), HasSubstr(",rad/mm^3\n")));
+  EXPECT_THAT(text_of(folder_ / "out/coefficients.csv"),
+              AllOf(StartsWith("name,value,u,unit\nk_dxx1,"), HasSubstr("\nk_ezz3,"),
+                    HasSubstr(",rad/mm^3\n")));
 }
 
 TEST_F(EvemuCli, EvaluatesWhatItIdentified) {
@@ -128,6 +132,7 @@ TEST_F(EvemuCli, EvaluatesWhatItIdentified) {
   EXPECT_THAT(identified.out, HasSubstr("referenced"));
   write("points.csv", "x_mm,y_mm,z_mm\n500,200,50\n500,200,500\n");
   const auto ran = abbe("model eval out/model.json --points points.csv");
+
   ASSERT_EQ(ran.exit, 0) << ran.err;
   const auto document = read_model(folder_ / "out/model.json");
   ASSERT_TRUE(document);
@@ -138,15 +143,17 @@ TEST_F(EvemuCli, EvaluatesWhatItIdentified) {
   std::getline(lines, line);
   std::getline(lines, line);
   std::getline(lines, line);
-  EXPECT_EQ(line, fmt::format("500,200,50,{:.17g},{:.17g},{:.17g},{:.17g},{:.17g},{:.17g},1", 1e6 * e.V_m.x(),
-                              1e6 * e.V_m.y(), 1e6 * e.V_m.z(), 1e6 * std::sqrt(e.cov_V_m2(0, 0)),
-                              1e6 * std::sqrt(e.cov_V_m2(1, 1)), 1e6 * std::sqrt(e.cov_V_m2(2, 2))));
+  EXPECT_EQ(line, fmt::format("500,200,50,{:.17g},{:.17g},{:.17g},{:.17g},{:.17g},{:.17g},1",
+                              1e6 * e.V_m.x(), 1e6 * e.V_m.y(), 1e6 * e.V_m.z(),
+                              1e6 * std::sqrt(e.cov_V_m2(0, 0)), 1e6 * std::sqrt(e.cov_V_m2(1, 1)),
+                              1e6 * std::sqrt(e.cov_V_m2(2, 2))));
   std::getline(lines, line);
   EXPECT_THAT(line, ::testing::EndsWith(",0"));
 }
 
 TEST_F(EvemuCli, WritesModelsThatReadBackToTheSameBits) {
-  ASSERT_EQ(abbe("identify evemu --machine machine.toml --errors errors.csv -o out").exit, kRefused);
+  ASSERT_EQ(abbe("identify evemu --machine machine.toml --errors errors.csv -o out").exit,
+            kRefused);
   const auto text = text_of(folder_ / "out/model.json");
   const auto document = parse_model(text, "model.json");
   ASSERT_TRUE(document) << document.error().details.front();
@@ -160,17 +167,19 @@ TEST_F(EvemuCli, SaysThatFilesHoldNoTemperaturesOfScales) {
   };
   expect_refused(from_errors(""), 3, "give errors corrected for the temperature of the scales");
   expect_refused(
-      abbe("identify evemu --machine warm.toml --touches touches.csv --calibrator calibrator.toml -o out"), 3,
-      "give touches corrected for the temperature of the scales and say --scales-corrected");
+      abbe("identify evemu --machine warm.toml --touches touches.csv --calibrator calibrator.toml "
+           "-o out"),
+      3, "give touches corrected for the temperature of the scales and say --scales-corrected");
   EXPECT_EQ(from_errors("--scales-corrected").exit, kRefused);  // by the gate: the model is written
   EXPECT_TRUE(read_model(folder_ / "out/model.json"));
 }
 
 /// [evemu] asks for less than the options' defaults do.
-const std::string kWatched =
-    to_toml(config_tables::weak_portal()) + to_toml(config_tables::Encoder{}) + "[evemu]\norder = 2\n";
+const std::string kWatched = to_toml(config_tables::weak_portal()) +
+                             to_toml(config_tables::Encoder{}) + "[evemu]\norder = 2\n";
 
-/// What the daemon records of a calibration: what was asked for, and one touch a second in the plan's order.
+/// What the daemon records of a calibration: what was asked for, and one touch a second in the
+/// plan's order.
 void record_touches(const fs::path& folder, const Touches& all) {
   using namespace std::chrono_literals;
   RecordingInfo info = example_info();
@@ -184,6 +193,7 @@ void record_touches(const fs::path& folder, const Touches& all) {
   recorder->flush();  // a chunk that holds nothing of the run
   recorder->attach(to_attachment({request, kBegin}), kBegin);
   std::uint32_t number = 0;
+
   for (const auto& t : tests::evemu::touches_in_order(all, request.plan.positions)) {
     protocol::ProbeTrigger touch;
     touch.head.time = kBegin + ++number * 1s;
@@ -192,6 +202,7 @@ void record_touches(const fs::path& folder, const Touches& all) {
     std::copy_n(t.p_m.data(), 3, touch.position.begin());
     recorder->record(touch, "probe");
   }
+
   ASSERT_TRUE(recorder->close());
 }
 
@@ -203,18 +214,23 @@ TEST_F(EvemuCli, IdentifiesFromARecordingAsFromTheTouchesInIt) {
   const auto ran = abbe("identify evemu --recording run.mcap --json -o out");
   ASSERT_EQ(ran.exit, kRefused) << ran.err;
   const auto again = abbe(
-      "identify evemu --machine machine.toml --touches touches.csv --calibrator calibrator.toml --order 2 "
+      "identify evemu --machine machine.toml --touches touches.csv --calibrator calibrator.toml "
+      "--order 2 "
       "--json -o again");
   ASSERT_EQ(again.exit, kRefused) << again.err;
   const auto recorded = nlohmann::json::parse(ran.out), read = nlohmann::json::parse(again.out);
   EXPECT_EQ(recorded["unknowns"], 31);
   EXPECT_EQ(recorded["observations"], read["observations"]);
-  // The calibrator file states uncertainties, the reference calibrator none: that is in the covariance alone.
-  EXPECT_NEAR(recorded["residual_rms_after_um"].get<double>(), read["residual_rms_after_um"].get<double>(),
-              1e-3);
+
+  // The calibrator file states uncertainties, the reference calibrator none: that is in the
+  // covariance alone.
+  EXPECT_NEAR(recorded["residual_rms_after_um"].get<double>(),
+              read["residual_rms_after_um"].get<double>(), 1e-3);
   const auto inputs = nlohmann::json::parse(text_of(folder_ / "out/model.json"))["inputs"].dump();
-  EXPECT_THAT(inputs, AllOf(HasSubstr("run.mcap"), HasSubstr("calibrator.toml"), HasSubstr("touches")));
-  const auto other = abbe("identify evemu --recording run.mcap --order 3 --estimator ols --json -o other");
+  EXPECT_THAT(inputs,
+              AllOf(HasSubstr("run.mcap"), HasSubstr("calibrator.toml"), HasSubstr("touches")));
+  const auto other =
+      abbe("identify evemu --recording run.mcap --order 3 --estimator ols --json -o other");
   ASSERT_EQ(other.exit, kRefused) << other.err;
   EXPECT_EQ(nlohmann::json::parse(other.out)["unknowns"], 45);
 }
@@ -251,23 +267,28 @@ TEST_F(EvemuCli, MakesTheCalibratorFileOfAnArtefact) {
   ASSERT_EQ(ran.exit, 0) << ran.err;
   const auto read = read_calibrator_toml(folder_ / "pre.toml");
   ASSERT_TRUE(read) << read.error().text;
-  const auto expected = *calib::evemu::precalibrated("L \"array\"", one, 2e-3,
-                                                     {calib::Vector3::UnitZ(), calib::Vector3::UnitY()});
+  const auto expected = *calib::evemu::precalibrated(
+      "L \"array\"", one, 2e-3, {calib::Vector3::UnitZ(), calib::Vector3::UnitY()});
   EXPECT_EQ(read->calibrator.name, "L \"array\"");
   EXPECT_DOUBLE_EQ(read->calibrator.tip_radius_m, 1.5e-3);
   ASSERT_EQ(read->calibrator.balls.size(), expected.balls.size());
+
   for (std::size_t i = 0; i < expected.balls.size(); ++i) {
     EXPECT_LT((read->calibrator.balls[i].centre_m - expected.balls[i].centre_m).norm(), 1e-14);
     EXPECT_NEAR(read->calibrator.balls[i].radius_m, expected.balls[i].radius_m, 1e-15);
   }
-  EXPECT_EQ(abbe("identify artefact --touches touches.csv --name L --tip-radius-mm 2 -o pre.toml").exit, 3);
+
+  EXPECT_EQ(
+      abbe("identify artefact --touches touches.csv --name L --tip-radius-mm 2 -o pre.toml").exit,
+      3);
 }
 
 TEST_F(EvemuCli, NamesWhatIsWrongWithTouches) {
   auto touches = touches_csv();
   write("touches.csv", touches.replace(touches.find("1,ball"), 6, "1,bell"));
-  const auto ran =
-      abbe("identify evemu --machine machine.toml --touches touches.csv --calibrator calibrator.toml -o out");
+  const auto ran = abbe(
+      "identify evemu --machine machine.toml --touches touches.csv --calibrator calibrator.toml -o "
+      "out");
   EXPECT_EQ(ran.exit, 3);
   EXPECT_THAT(ran.err, HasSubstr("touches.csv:2:3: kind: \"bell\": must be ball or block"));
   EXPECT_FALSE(fs::exists(folder_ / "out/model.json"));
@@ -284,14 +305,16 @@ TEST_F(EvemuCli, NamesABallWithTooFewPoints) {
 
 TEST_F(EvemuCli, NamesABallTouchedUnderTwoNumbers) {
   auto all = touches();
-  std::erase_if(all,
-                [](const auto& t) { return t.position == 2 && t.feature == Feature::Ball && t.number == 5; });
+  std::erase_if(all, [](const auto& t) {
+    return t.position == 2 && t.feature == Feature::Ball && t.number == 5;
+  });
   for (const auto& t : touches())
     if (t.position == 2 && t.feature == Feature::Ball && t.number == 4) {
       all.push_back(t);
       all.back().number = 5;
     }
-  expect_refused(identify(all), 3, "position 2: one ball was touched twice, as ball 4 and as ball 5");
+  expect_refused(identify(all), 3,
+                 "position 2: one ball was touched twice, as ball 4 and as ball 5");
 }
 
 TEST_F(EvemuCli, NamesSwappedBlocks) {
@@ -326,17 +349,21 @@ TEST_F(EvemuCli, NamesCoplanarPositions) {
 
 TEST_F(EvemuCli, ChoosesSparseModelsByFolds) {
   const auto ran = abbe(
-      "identify evemu --machine machine.toml --errors errors.csv --estimator lasso --folds ball --json -o "
+      "identify evemu --machine machine.toml --errors errors.csv --estimator lasso --folds ball "
+      "--json -o "
       "out");
   ASSERT_EQ(ran.exit, kRefused) << ran.err;
   const auto summary = nlohmann::json::parse(ran.out);
+
   EXPECT_EQ(summary["covariance"], "bootstrap by position");
   EXPECT_GT(summary["chosen"]["lambda"].get<double>(), 0.0);
-  EXPECT_THAT(text_of(folder_ / "out/cross_validation.csv"), StartsWith("gamma,lambda,error_um2\n"));
+  EXPECT_THAT(text_of(folder_ / "out/cross_validation.csv"),
+              StartsWith("gamma,lambda,error_um2\n"));
   EXPECT_THAT(text_of(folder_ / "out/report.html"), HasSubstr("Choice of lambda and gamma"));
   write("folds.txt", "1\n2\n");
   const auto refused = abbe(
-      "identify evemu --machine machine.toml --errors errors.csv --estimator lasso --folds folds.txt -o no");
+      "identify evemu --machine machine.toml --errors errors.csv --estimator lasso --folds "
+      "folds.txt -o no");
   EXPECT_EQ(refused.exit, 3);
 }
 
@@ -345,17 +372,21 @@ TEST_F(EvemuCli, AcceptsAShapeWhenTheConfigurationSaysSoByName) {
   const auto accepted = [&](const std::string& gate) {
     write("machine.toml", to_toml(config_tables::weak_portal()) + gate);
     const auto ran = abbe(
-        "identify evemu --machine machine.toml --touches touches.csv --calibrator calibrator.toml --json -o "
+        "identify evemu --machine machine.toml --touches touches.csv --calibrator calibrator.toml "
+        "--json -o "
         "out");
     const auto verdict = nlohmann::json::parse(ran.out)["gate"];
     EXPECT_EQ(ran.exit, verdict["accepted"] == true ? 0 : kRefused) << ran.err;
     return verdict;
   };
+
   const auto refused = accepted(limits);
   EXPECT_EQ(refused["accepted"], false);
   EXPECT_THAT(refused["reasons"][0].get<std::string>(), StartsWith("shape only"));
   EXPECT_EQ(accepted(limits + "accept = [\"evemu-shape-only\"]\n")["accepted"], true);
-  write("machine.toml", to_toml(config_tables::weak_portal()) + "[gate]\naccept = [\"everything\"]\n");
+  write("machine.toml",
+        to_toml(config_tables::weak_portal()) + "[gate]\naccept = [\"everything\"]\n");
+
   EXPECT_EQ(abbe("identify evemu --machine machine.toml --errors errors.csv -o out").exit, 3);
 }
 
@@ -391,7 +422,8 @@ TEST_F(EvemuCli, NamesLineAndColumnOfWhatLiesOutsideTheTravel) {
 TEST_F(EvemuCli, NamesTheLineWhereTheTouchesOfAPositionDoNotFit) {
   auto all = touches();
   for (auto& t : all)
-    if (t.position == 2 && t.feature == calib::evemu::Feature::Ball && (t.number == 2 || t.number == 6))
+    if (t.position == 2 && t.feature == calib::evemu::Feature::Ball &&
+        (t.number == 2 || t.number == 6))
       t.number = 8 - t.number;
   const auto ran = identify(all);
   const auto first = std::ranges::find(all, 2, &calib::evemu::Touch::position) - all.begin();
@@ -403,9 +435,9 @@ TEST_F(EvemuCli, NamesErrorsOfTheOppositeSign) {
   auto all = tests::evemu::reference_errors();
   std::string text = "position,ball,x_mm,y_mm,z_mm,ex_um,ey_um,ez_um\n";
   for (const auto& e : all)
-    text += fmt::format("{},{},{:.17g},{:.17g},{:.17g},{:.17g},{:.17g},{:.17g}\n", e.position, e.ball,
-                        1e3 * e.reading_m.x(), 1e3 * e.reading_m.y(), 1e3 * e.reading_m.z(), -1e6 * e.V_m.x(),
-                        -1e6 * e.V_m.y(), -1e6 * e.V_m.z());
+    text += fmt::format("{},{},{:.17g},{:.17g},{:.17g},{:.17g},{:.17g},{:.17g}\n", e.position,
+                        e.ball, 1e3 * e.reading_m.x(), 1e3 * e.reading_m.y(), 1e3 * e.reading_m.z(),
+                        -1e6 * e.V_m.x(), -1e6 * e.V_m.y(), -1e6 * e.V_m.z());
   write("errors.csv", text);
   const auto ran = abbe("identify evemu --machine machine.toml --errors errors.csv -o out");
   expect_refused(ran, 3, "errors.csv: errors: distances between the balls");
@@ -431,7 +463,8 @@ TEST_F(EvemuCli, RefusesACalibratorWithEveryFaultNamed) {
   ASSERT_FALSE(calibrator);
   std::string all;
   for (const auto& fault : calibrator.error().details) all += fault + "\n";
-  EXPECT_THAT(all, AllOf(HasSubstr("tip_radius_mm"), HasSubstr("radius_mm"), HasSubstr(": ball[0].r")));
+  EXPECT_THAT(all,
+              AllOf(HasSubstr("tip_radius_mm"), HasSubstr("radius_mm"), HasSubstr(": ball[0].r")));
 }
 
 }  // namespace

@@ -33,7 +33,8 @@ std::string uncommented() {
   return std::regex_replace(example(), std::regex{"\n#([a-z_A-Z]+ = )"}, "\n$1");
 }
 
-/// With the tables of these names that are there by example only: blocks that begin with "# [NAME]".
+/// With the tables of these names that are there by example only: blocks that begin with "#
+/// [NAME]".
 std::string with_tables(std::string text, const std::vector<std::string>& names) {
   for (const auto& name : names) {
     std::istringstream lines{text};
@@ -80,6 +81,7 @@ TEST(ExampleConfig, ItsExampleTablesAreGoodToo) {
 TEST(ExampleConfig, ItsCounterCardShowsTheDefaults) {
   ASSERT_EQ(faults(with_counter_card_and_probe()), "");
   const auto config = parse_config(with_counter_card_and_probe(), "/etc/abbe/abbed.toml").value();
+
   ASSERT_TRUE(config.counter_card && config.probe && config.reference);
   EXPECT_EQ(config.reference->axes.size(), 3u);
   EXPECT_EQ(config.reference->u_alignment, ReferenceConfig{}.u_alignment);
@@ -99,8 +101,10 @@ TEST(ExampleConfig, ItsCounterCardShowsTheDefaults) {
 
 TEST(ExampleConfig, ItsProbeShowsTheDefaults) {
   ASSERT_EQ(faults(with_counter_card_and_probe()), "");
-  const auto probe = *parse_config(with_counter_card_and_probe(), "/etc/abbe/abbed.toml").value().probe;
+  const auto probe =
+      *parse_config(with_counter_card_and_probe(), "/etc/abbe/abbed.toml").value().probe;
   const ProbeConfig plain;
+
   EXPECT_EQ(probe.name, plain.name);
   EXPECT_EQ(probe.delay.id, plain.delay.id);
   EXPECT_EQ(probe.delay.delay, plain.delay.delay);
@@ -120,6 +124,7 @@ TEST(ExampleConfig, ItsProbeShowsTheDefaults) {
 TEST(ExampleConfig, ItsCommentedKeysAreTheDefaults) {
   const auto plain = parse_config(example(), "/etc/abbe/abbed.toml").value();
   const auto full = parse_config(uncommented(), "/etc/abbe/abbed.toml").value();
+
   EXPECT_EQ(machine_hash(full), machine_hash(plain));
   EXPECT_EQ(full.machine, plain.machine);
   EXPECT_EQ(full.tracker->silence_timeout, plain.tracker->silence_timeout);

@@ -1,7 +1,7 @@
 #pragma once
-/// A disk that reports an error of write-back: for the threads that ask for it, fdatasync() or fsync() fails
-/// with EIO. On Linux such an error is reported once, and the next call succeeds: as on any other thread
-/// here.
+/// A disk that reports an error of write-back: for the threads that ask for it, fdatasync() or
+/// fsync() fails with EIO. On Linux such an error is reported once, and the next call succeeds: as
+/// on any other thread here.
 
 #include <gtest/gtest.h>
 #include <linux/filter.h>
@@ -39,8 +39,8 @@ void while_failing(unsigned call, Work work) {
   }}.join();
 }
 
-/// A disk that does not answer: system call number `call` of the thread that asks for it does not return
-/// before the result is closed (then ENOSYS). -1: not permitted here.
+/// A disk that does not answer: system call number `call` of the thread that asks for it does not
+/// return before the result is closed (then ENOSYS). -1: not permitted here.
 inline int make_stall(unsigned call) {
   std::array<sock_filter, 4> filter{
       sock_filter BPF_STMT(BPF_LD | BPF_W | BPF_ABS, offsetof(seccomp_data, nr)),

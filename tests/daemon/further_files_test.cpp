@@ -92,13 +92,18 @@ TEST_F(FurtherFiles, BeginWithTheLastWeatherOfEveryDevice) {
   const auto reader = second();
   std::vector<std::string> seen;
   RecordingSink sink;
+
   sink.environment = [&](const protocol::EnvironmentSample& e, std::string_view device) {
     seen.emplace_back(device);
     EXPECT_EQ(e.head.time, device == "hall" ? example_time(2) : example_time(3));
     EXPECT_EQ(e.head.lost_before, 0u) << "said where they were lost";
     EXPECT_FALSE(has(e.head.flags, protocol::SampleFlag::GapBefore));
   };
-  sink.tracker_point = [&](const protocol::TrackerPoint&, std::string_view) { seen.emplace_back("point"); };
+
+  sink.tracker_point = [&](const protocol::TrackerPoint&, std::string_view) {
+    seen.emplace_back("point");
+  };
+
   EXPECT_EQ(reader.read(sink), 0u);
   EXPECT_THAT(seen, ElementsAre("hall", "tracker", "point"));
   EXPECT_EQ(reader.time_range()->first, example_time(9)) << "the file is not as old as its weather";
@@ -111,17 +116,20 @@ TEST_F(FurtherFiles, GiveTheirWeatherToAReplayAlsoFromRawBytes) {
   recorder_->record(protocol::to_raw_bytes(example_block(9), "somebody"));
   recorder_->record(example_environment(10), "tracker", example_time(12));
   const auto reader = second();
-  EXPECT_THAT(weather_of(reader, ReplaySource::Samples), ElementsAre(example_time(1), example_time(10)));
+  EXPECT_THAT(weather_of(reader, ReplaySource::Samples),
+              ElementsAre(example_time(1), example_time(10)));
   EXPECT_THAT(weather_of(reader, ReplaySource::RawBytes), ElementsAre(example_time(1)))
       << "the other from its bytes";
 }
 
-/// Of before: log_time was when a message was published, and that of 10 was published after it was measured.
+/// Of before: log_time was when a message was published, and that of 10 was published after it was
+/// measured.
 TEST_F(FurtherFiles, GiveTheirWeatherAlsoFromBeforeTurnsWereRecorded) {
   recorder_->record(example_environment(1), "tracker");
   recorder_->flush();
   recorder_->record(example_environment(10), "tracker", example_time(12));
   recorder_->record(example_environment(13), "tracker");
+
   ASSERT_TRUE(recorder_->close());
   EXPECT_THAT(weather_of(read("run-2.mcap"), ReplaySource::RawBytes), ElementsAre(example_time(1)));
   const auto file = folder_.path() / "run-2.mcap";
@@ -145,6 +153,7 @@ TEST_F(FurtherFiles, BeginWithAWholeTurn) {
     }
     recorder_->tick({});
   }
+
   ASSERT_TRUE(recorder_->close());
   std::set<HostTime> turns;
   for (const std::string name : {"run.mcap", "run-2.mcap", "run-3.mcap"}) {
@@ -153,6 +162,7 @@ TEST_F(FurtherFiles, BeginWithAWholeTurn) {
     turns.insert(reader.time_range()->first);
     EXPECT_EQ(reader.time_range()->first, reader.time_range()->second) << name;
   }
+
   EXPECT_EQ(turns.size(), 3u);
 }
 
@@ -165,6 +175,7 @@ TEST_F(FurtherFiles, HandOnTheDatumsInForceOnly) {
   recorder_->flush();
   record_axes(6, 0b110);
   const auto reader = second();
+
   EXPECT_THAT(datums_of(reader), ElementsAre(0.2));
   std::vector<std::string> names;
   for (const auto& a : reader.attachments()) names.push_back(a.name);
@@ -201,18 +212,22 @@ class CutRecording : public ::testing::Test {
     options.max_file_bytes = 1;
     auto recorder = std::move(*Recorder::open(options, card.info(), {}));
     int messages = 0;
+
     const auto count = [&] {
       if (++messages % kMessagesPerFile == 0) recorder.flush();
     };
+
     RecordingSink sink;
     sink.axis_sample = [&](const protocol::AxisSample& s, std::string_view device) {
       recorder.record(s, device);
       count();
     };
+
     sink.raw_block = [&](const protocol::RawBlock& block, std::string_view device) {
       recorder.record(protocol::to_raw_bytes(block, device));
       count();
     };
+
     EXPECT_EQ(card.read(sink), 0u);
     EXPECT_TRUE(recorder.close());
   }
@@ -231,18 +246,21 @@ class CutRecording : public ::testing::Test {
     return folder_.path() / ("run-" + std::to_string(number) + ".mcap");
   }
   bool exists(std::uint32_t number) { return std::filesystem::exists(path(number)); }
-  RecordingReader file(std::uint32_t number) { return std::move(*RecordingReader::open(path(number))); }
+  RecordingReader file(std::uint32_t number) {
+    return std::move(*RecordingReader::open(path(number)));
+  }
   static HostTime time_of(const protocol::AxisSample& sample) { return sample.head.time; }
 
   TemporaryFolder folder_;
 };
 
-// A card is read far more often than it is recorded, and every file begins that choice anew: what is read
-// again lies between samples of the live run.
+// A card is read far more often than it is recorded, and every file begins that choice anew: what
+// is read again lies between samples of the live run.
 TEST_F(CutRecording, RawBytesOfEveryFileGiveTheAxesAsTheyWereKnownLive) {
   constexpr double kBetween_m = 1e-3;  // 50 ms at some 20 mm/s
   std::set<std::uint8_t> begun_with;
   std::size_t compared = 0;
+
   for (std::uint32_t n = 2; exists(n); ++n) {
     const auto reader = file(n);
     if (reader.attachments().empty()) continue;  // the card had not said anything yet
@@ -258,12 +276,15 @@ TEST_F(CutRecording, RawBytesOfEveryFileGiveTheAxesAsTheyWereKnownLive) {
       ++compared;
     }
   }
-  EXPECT_THAT(begun_with, ElementsAre(0b000, 0b111)) << "files from before and after the card began anew";
+
+  EXPECT_THAT(begun_with, ElementsAre(0b000, 0b111))
+      << "files from before and after the card began anew";
   EXPECT_GT(compared, 50u);
 }
 
 /// Whether the axes are missing in a sample at `t` after the file began.
-std::uint8_t missing_after(const DatumState& state, const std::vector<FoundDatum>& found, bool restarted) {
+std::uint8_t missing_after(const DatumState& state, const std::vector<FoundDatum>& found,
+                           bool restarted) {
   const auto config = parse_config(kWatched, "abbed.toml");
   EXPECT_TRUE(config);
   Datum datum{*config};
@@ -288,7 +309,8 @@ TEST(DatumState, NoSetUpIsTheFirstInAFurtherFile) {
 }
 
 TEST(DatumState, WhatIsFoundLaterHolds) {
-  EXPECT_EQ(missing_after({HostTime{10s}, 0b110}, {{.axis = 1, .from = HostTime{10s}}}, false), 0b100);
+  EXPECT_EQ(missing_after({HostTime{10s}, 0b110}, {{.axis = 1, .from = HostTime{10s}}}, false),
+            0b100);
 }
 
 }  // namespace

@@ -1,7 +1,6 @@
-/// Golden recordings: what devices sent, one recording per device and fault class, and what `abbe replay
-/// --raw
-/// --samples` makes of it. A line that changes here changes what is recorded on a shop floor: its cause
-/// stands in the same commit. tests/golden/record makes them anew.
+/// Golden recordings: what devices sent, one recording per device and fault class, and what
+/// `abbe replay --raw --samples` makes of it. A line that changes here changes what is recorded on
+/// a shop floor: its cause stands in the same commit. tests/golden/record makes them anew.
 
 #include <gtest/gtest.h>
 #include <sys/wait.h>
@@ -66,13 +65,15 @@ TEST_P(Golden, RawBytesGiveTheCheckedSamples) {
   ASSERT_FALSE(wanted.empty());
   const auto [w, f] = std::mismatch(wanted.begin(), wanted.end(), found.begin(), found.end());
   if (w == wanted.end() && f == found.end()) return;
-  ADD_FAILURE() << "line " << w - wanted.begin() + 1 << "\n  checked: " << (w == wanted.end() ? "(end)" : *w)
+  ADD_FAILURE() << "line " << w - wanted.begin() + 1
+                << "\n  checked: " << (w == wanted.end() ? "(end)" : *w)
                 << "\n  now:     " << (f == found.end() ? "(end)" : *f);
 }
 
 /// These recordings are from before the turns of the hub were recorded.
 TEST_P(Golden, RawBytesGiveTheSamplesOfTheLiveRun) {
-  const std::string replay = "'" + std::string(ABBE_PROGRAM) + "' replay --samples '" + unpacked() + "'";
+  const std::string replay =
+      "'" + std::string(ABBE_PROGRAM) + "' replay --samples '" + unpacked() + "'";
   auto live = output_of(replay);
   auto again = output_of(replay + " --raw");
   std::sort(live.begin(), live.end());
@@ -80,11 +81,12 @@ TEST_P(Golden, RawBytesGiveTheSamplesOfTheLiveRun) {
   EXPECT_EQ(live, again);
 }
 
-INSTANTIATE_TEST_SUITE_P(Recordings, Golden, ::testing::ValuesIn(names()), [](const auto& recording) {
-  std::string name = recording.param;
-  std::replace(name.begin(), name.end(), '-', '_');
-  return name;
-});
+INSTANTIATE_TEST_SUITE_P(Recordings, Golden, ::testing::ValuesIn(names()),
+                         [](const auto& recording) {
+                           std::string name = recording.param;
+                           std::replace(name.begin(), name.end(), '-', '_');
+                           return name;
+                         });
 
 }  // namespace
 }  // namespace abbe::daemon

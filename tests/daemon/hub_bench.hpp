@@ -1,6 +1,6 @@
 #pragma once
-/// A hub of the daemon's own parts, the far end of its link, and a clock that the test moves. Devices: what
-/// the test puts in the devices' place.
+/// A hub of the daemon's own parts, the far end of its link, and a clock that the test moves.
+/// Devices: what the test puts in the devices' place.
 
 #include <gtest/gtest.h>
 #include <unistd.h>
@@ -24,13 +24,17 @@ class OneClock final : public drivers::TimeSource {
   [[nodiscard]] protocol::HostTime now() const noexcept override {
     return protocol::HostTime{std::chrono::seconds{100}} + passed;
   }
-  [[nodiscard]] std::chrono::nanoseconds wall(std::chrono::nanoseconds host) const noexcept override {
+  [[nodiscard]] std::chrono::nanoseconds wall(
+      std::chrono::nanoseconds host) const noexcept override {
     return host;
   }
-  [[nodiscard]] std::chrono::nanoseconds host(std::chrono::nanoseconds wall) const noexcept override {
+  [[nodiscard]] std::chrono::nanoseconds host(
+      std::chrono::nanoseconds wall) const noexcept override {
     return wall;
   }
-  [[nodiscard]] Hub::WallTime wall_now() const { return Hub::WallTime{std::chrono::seconds{100}} + passed; }
+  [[nodiscard]] Hub::WallTime wall_now() const {
+    return Hub::WallTime{std::chrono::seconds{100}} + passed;
+  }
   std::chrono::nanoseconds passed{};
 };
 
@@ -52,11 +56,11 @@ class HubBench : public ::testing::Test {
   void make_hub() {
     authority_.emplace(ModelAuthority::open(folder_.path() / "models", config_, {}, time_.now()));
     calibration_.emplace(config_, *authority_, recorder_.get(), protocol::UtcOffset{});
-    publisher_.emplace(
-        DdsLink::listen(folder_.path() / "dds.sock").value(),
-        PublisherOptions{
-            .machine = "mill", .tool_offset_m = config_.machine.target_offset_m, .compensation_hz = 0.0},
-        protocol::UtcOffset{});
+    publisher_.emplace(DdsLink::listen(folder_.path() / "dds.sock").value(),
+                       PublisherOptions{.machine = "mill",
+                                        .tool_offset_m = config_.machine.target_offset_m,
+                                        .compensation_hz = 0.0},
+                       protocol::UtcOffset{});
     far_.emplace(folder_.path() / "dds.sock");
     hub_.emplace(HubParts{.config = config_,
                           .time = time_,
@@ -68,9 +72,9 @@ class HubBench : public ::testing::Test {
                           .verification = verification_ ? &*verification_ : nullptr});
   }
 
-  virtual void turn(std::chrono::nanoseconds later = std::chrono::milliseconds{1}) {
+  virtual void cycle(std::chrono::nanoseconds later = std::chrono::milliseconds{1}) {
     time_.passed += later;
-    hub_->turn(time_.wall_now());
+    hub_->cycle(time_.wall_now());
   }
   /// From a thread of its own, while the hub turns.
   nlohmann::json ask(const nlohmann::json& request) {
@@ -78,14 +82,15 @@ class HubBench : public ::testing::Test {
       return answer_request(*hub_, request, myself(), std::chrono::seconds{60});
     });
     while (answer.wait_for(std::chrono::seconds{0}) != std::future_status::ready)
-      turn(std::chrono::nanoseconds{0});
+      cycle(std::chrono::nanoseconds{0});
     return answer.get();
   }
   /// As the store has it; in force once the hub has followed.
   [[nodiscard]] Result<KeptModel> keep_a_model() {
     auto document = synthetic_document(1);
     document.machine_hash = machine_hash(config_);
-    return authority_->keeper().keep(document, {.accepted = true}, {"anna", "test", {}}, time_.now());
+    return authority_->keeper().keep(document, {.accepted = true}, {"anna", "test", {}},
+                                     time_.now());
   }
 
   TemporaryFolder folder_;

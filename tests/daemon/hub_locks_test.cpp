@@ -1,5 +1,5 @@
-// The hub runs at FIFO priority 30 and abbe-dds at 20: a mutex that an ordinary thread holds would let
-// abbe-dds hold up the hub for as long as it likes. So the hub takes none.
+// The hub runs at FIFO priority 30 and abbe-dds at 20: a mutex that an ordinary thread holds would
+// let abbe-dds hold up the hub for as long as it likes. So the hub takes none.
 #include <gmock/gmock.h>
 
 #include <algorithm>
@@ -7,7 +7,7 @@
 #include <thread>
 
 #include "abbe/drivers/status_board.hpp"
-#include "abbe/service/work_aside.hpp"
+#include "abbe/service/background_tasks.hpp"
 #include "allocation_count.hpp"
 #include "config_tables.hpp"
 #include "hub_bench.hpp"
@@ -50,7 +50,7 @@ struct BusyDevices final : SampleSource {
 class HubLocks : public test::HubBench<BusyDevices> {
  protected:
   HubLocks() {
-    prepare_work_aside();
+    prepare_background_tasks();
     devices_.clock = &time_;
     config_.tracker.emplace().host = "127.0.0.1";
     RecorderThreadOptions options;
@@ -60,11 +60,11 @@ class HubLocks : public test::HubBench<BusyDevices> {
     make_hub();
   }
 
-  void turn(std::chrono::nanoseconds = {}) override {
+  void cycle(std::chrono::nanoseconds = {}) override {
     time_.passed += 1ms;
     const LockCount locks;
     const tests::AllocationCount allocations;
-    hub_->turn(time_.wall_now());
+    hub_->cycle(time_.wall_now());
     most_allocations_ = std::max(most_allocations_, allocations.value());
     locks_ += locks.value();
     (void)far_->take();
@@ -76,7 +76,7 @@ class HubLocks : public test::HubBench<BusyDevices> {
 
 TEST_F(HubLocks, NoneIsTakenInATurn) {
   if (!tests::kLocksAreCounted) GTEST_SKIP() << "the sanitizer has mutexes of its own";
-  for (int i = 0; i < 3000; ++i) turn();  // three seconds: health, recorder, store
+  for (int i = 0; i < 3000; ++i) cycle();  // three seconds: health, recorder, store
   EXPECT_EQ(locks_, 0u);
 }
 
@@ -90,20 +90,24 @@ TEST_F(HubLocks, NoneIsTakenForARequest) {
   EXPECT_EQ(locks_, 0u);
 }
 
-/// A request that is parsed or written into the recording by the hub takes memory for each of its parts.
+/// A request that is parsed or written into the recording by the hub takes memory for each of its
+/// parts.
 TEST_F(HubLocks, WorkForARequestDoesNotGrowWithIt) {
   const auto machine = parse_config(to_toml(config_tables::mill()), "machine.toml");
   ASSERT_TRUE(machine) << machine.error().text;
   config_.machine = machine->machine;
+
   const auto most_for = [this](std::size_t vertices) {
     json path = json::array({{0.0, 0.0, -0.2}, {0.1, 0.0, -0.2}, {0.1, 0.1, -0.3}});
-    while (path.size() < vertices) path.push_back({0.0, 1e-6 * static_cast<double>(path.size()), -0.25});
+    while (path.size() < vertices)
+      path.push_back({0.0, 1e-6 * static_cast<double>(path.size()), -0.25});
     most_allocations_ = 0;
     const json begun = ask({{"do", "calibrate"}, {"method", "otf"}, {"path_m", path}});
     EXPECT_EQ(begun["ok"], true) << begun.dump();
     EXPECT_EQ(ask({{"do", "cancel"}})["ok"], true);
     return most_allocations_;
   };
+
   (void)most_for(3);  // buffers grow
   const auto for_three = most_for(3);
   EXPECT_LT(most_for(20'000), 2 * for_three + 100);
@@ -113,8 +117,8 @@ TEST_F(HubLocks, NoneIsTakenForAModelThatSomebodyActivates) {
   if (!tests::kLocksAreCounted) GTEST_SKIP() << "the sanitizer has mutexes of its own";
   const auto kept = keep_a_model();
   ASSERT_TRUE(kept) << kept.error().text;
-  while (hub_->standing().model == nullptr) turn();
-  turn();
+  while (hub_->standing().model == nullptr) cycle();
+  cycle();
   EXPECT_EQ(locks_, 0u);
 }
 

@@ -44,17 +44,18 @@ class HubTest : public test::HubBench<FakeDevices> {
     ASSERT_TRUE(kept) << kept.error().text;
     authority_->take_up(std::move(kept->active).value());
   }
-  void turn_with_axes(std::chrono::nanoseconds later = 1ms) {
+  void cycle_with_axes(std::chrono::nanoseconds later = 1ms) {
     protocol::AxisSample sample;
     sample.head.time = time_.now() + later;
     sample.axis_count = 3;
     sample.position = {0.01, -0.02, -0.25};
     devices_.next.axes.push_back(sample);
-    turn(later);
+    cycle(later);
   }
   [[nodiscard]] std::vector<ModelStatus> states() {
     std::vector<ModelStatus> out;
-    for (const auto& m : messages<v1::ModelState>(far_->take(), Topic::ModelState)) out.push_back(m.state());
+    for (const auto& m : messages<v1::ModelState>(far_->take(), Topic::ModelState))
+      out.push_back(m.state());
     return out;
   }
 };
@@ -62,17 +63,17 @@ class HubTest : public test::HubBench<FakeDevices> {
 TEST_F(HubTest, SaysThatItIsAliveWhetherOrNotAnythingComes) {
   std::size_t beats = 0;
   for (int i = 0; i < 10; ++i) {
-    turn(100ms);
+    cycle(100ms);
     for (const auto& frame : far_->take()) beats += frame.kind == 0 ? 1 : 0;
   }
   EXPECT_EQ(beats, 10u);
-  EXPECT_EQ(hub_->last_turn(), time_.wall_now());
+  EXPECT_EQ(hub_->last_cycle(), time_.wall_now());
 }
 
 TEST_F(HubTest, WhatTheDevicesBringGoesOutInTheSameTurn) {
   activate_a_model();
-  turn();  // lets abbe-dds in
-  turn_with_axes();
+  cycle();  // lets abbe-dds in
+  cycle_with_axes();
   const auto sent = messages<v1::Compensation>(far_->take(), Topic::Compensation);
   ASSERT_THAT(sent, SizeIs(1));
   EXPECT_EQ(sent[0].state(), ModelStatus::MODEL_ACTIVE);
@@ -82,24 +83,24 @@ TEST_F(HubTest, WhatTheDevicesBringGoesOutInTheSameTurn) {
 
 TEST_F(HubTest, AnEncoderThatFallsSilentMakesTheModelStaleAndItsReturnActiveAgain) {
   activate_a_model();
-  turn_with_axes();
+  cycle_with_axes();
   EXPECT_THAT(states(), testing::ElementsAre(ModelStatus::MODEL_ACTIVE));
-  turn(500ms);
+  cycle(500ms);
   EXPECT_THAT(states(), SizeIs(0));
-  turn(1ms);
+  cycle(1ms);
   EXPECT_THAT(states(), testing::ElementsAre(ModelStatus::MODEL_STALE));
-  turn_with_axes();
+  cycle_with_axes();
   EXPECT_THAT(states(), testing::ElementsAre(ModelStatus::MODEL_ACTIVE));
 }
 
 TEST_F(HubTest, ATrackerAloneDoesNotKeepTheModelActive) {
   activate_a_model();
-  turn_with_axes();
+  cycle_with_axes();
   for (int i = 0; i < 60; ++i) {
     protocol::TrackerPoint point;
     point.head.time = time_.now();
     devices_.next.points.push_back(point);
-    turn(10ms);
+    cycle(10ms);
   }
   EXPECT_EQ(hub_->standing().status, ModelStatus::MODEL_STALE);
 }
@@ -107,7 +108,7 @@ TEST_F(HubTest, ATrackerAloneDoesNotKeepTheModelActive) {
 TEST_F(HubTest, SaysHowTheStreamsAreOnceASecond) {
   std::vector<v1::Health> sent;
   for (int i = 0; i < 25; ++i) {
-    turn(100ms);
+    cycle(100ms);
     const auto more = messages<v1::Health>(far_->take(), Topic::Health);
     sent.insert(sent.end(), more.begin(), more.end());
   }
@@ -138,7 +139,8 @@ TEST_F(HubTest, RefusesToCalibrateOnTheFlyWithAStationaryTracker) {
 
 TEST_F(HubTest, StatusShowsNoPositionThatIsNotCurrent) {
   const auto positions = [this] { return ask({{"do", "status"}})["position_m"]; };
-  turn_with_axes();
+  cycle_with_axes();
+
   EXPECT_EQ(positions(), json({0.01, -0.02, -0.25}));
   protocol::AxisSample without_x;
   without_x.head.time = time_.now() + 1ms;
@@ -147,17 +149,18 @@ TEST_F(HubTest, StatusShowsNoPositionThatIsNotCurrent) {
   without_x.missing_mask = 0b001;
   without_x.position = {0.01, -0.02, -0.25};
   devices_.next.axes.push_back(without_x);
-  turn();
+  cycle();
   EXPECT_EQ(positions(), json({nullptr, -0.02, -0.25}));
-  turn(600ms);
-  EXPECT_EQ(positions(), json({nullptr, nullptr, nullptr})) << "no sample for longer than the axes are known";
+  cycle(600ms);
+  EXPECT_EQ(positions(), json({nullptr, nullptr, nullptr}))
+      << "no sample for longer than the axes are known";
 }
 
 TEST_F(HubTest, RunsATaskOfAnotherThreadAtItsNextTurn) {
   auto answer = std::async(std::launch::async, [this] {
     return hub_->call([] { return json{{"n", 3}}; }, 60s);
   });
-  while (answer.wait_for(0s) != std::future_status::ready) hub_->turn(time_.wall_now());
+  while (answer.wait_for(0s) != std::future_status::ready) hub_->cycle(time_.wall_now());
   EXPECT_EQ(answer.get(), (json{{"n", 3}}));
 }
 
@@ -170,7 +173,7 @@ TEST_F(HubTest, ATaskNobodyWaitsForAnyMoreDoesNotRun) {
       },
       1ms);
   EXPECT_FALSE(answer);
-  turn();
+  cycle();
   EXPECT_FALSE(ran);
 }
 
@@ -178,9 +181,9 @@ TEST_F(HubTest, ATaskThatThrowsThrowsInTheThreadThatAsked) {
   auto answer = std::async(std::launch::async, [this] {
     return hub_->call([]() -> json { throw std::runtime_error{"no"}; }, 60s);
   });
-  while (answer.wait_for(0s) != std::future_status::ready) hub_->turn(time_.wall_now());
+  while (answer.wait_for(0s) != std::future_status::ready) hub_->cycle(time_.wall_now());
   EXPECT_THROW((void)answer.get(), std::runtime_error);
-  turn();
+  cycle();
 }
 
 TEST_F(HubTest, ARequestIsRefusedWithoutTheRoleItTakes) {
@@ -188,14 +191,18 @@ TEST_F(HubTest, ARequestIsRefusedWithoutTheRoleItTakes) {
                      .change_group = "abbe-no-such-change",
                      .move_group = "abbe-no-such-move"};
   const ControlPeer stranger{.user = "anna", .uid = ::geteuid() + 1};
+
   for (const ControlVerb& verb : control_verbs()) {
     json request{{"do", verb.name}};
     if (!verb.member.empty()) request[verb.member] = true;
     const json answer = answer_request(*hub_, request, stranger, 0ms);
     EXPECT_EQ(answer["code"], "refused") << request;
-    const std::string role = verb.role == Role::Move ? "move" : verb.role == Role::Change ? "change" : "look";
-    EXPECT_THAT(answer["error"].get<std::string>(),
-                AllOf(StartsWith(verb.name + ": "), HasSubstr("anna"), HasSubstr("abbe-no-such-" + role)));
+    const std::string role = verb.role == Role::Move     ? "move"
+                             : verb.role == Role::Change ? "change"
+                                                         : "look";
+    EXPECT_THAT(
+        answer["error"].get<std::string>(),
+        AllOf(StartsWith(verb.name + ": "), HasSubstr("anna"), HasSubstr("abbe-no-such-" + role)));
   }
 }
 
@@ -206,6 +213,7 @@ TEST_F(HubTest, WhatMovesAMachineOrChangesWhatIsInForceIsNotOpenToWhoeverLooks) 
         verbs, [&](const ControlVerb& v) { return v.name == name && v.member == member; });
     return found == verbs.end() ? Role::Look : found->role;
   };
+
   EXPECT_EQ(role_of("touch", ""), Role::Move);
   EXPECT_EQ(role_of("touches", ""), Role::Move);
   EXPECT_EQ(role_of("touch", "cancel"), Role::Look);
@@ -223,8 +231,9 @@ TEST_F(HubTest, WhoeverOnlyLooksGivesTheTrackerNoOrderThatMovesIt) {
     EXPECT_THAT(answer["error"].get<std::string>(),
                 HasSubstr("moves a machine or tracker, which anna may not"));
   }
-  EXPECT_THAT(answer_on_hub(*hub_, {{"do", "tracker_reflectors"}}, looks)["error"].get<std::string>(),
-              HasSubstr("not in this daemon"));
+  EXPECT_THAT(
+      answer_on_hub(*hub_, {{"do", "tracker_reflectors"}}, looks)["error"].get<std::string>(),
+      HasSubstr("not in this daemon"));
 }
 
 TEST_F(HubTest, CollectsStandstillsForWhoeverAsksOverTheSocket) {
@@ -236,11 +245,14 @@ TEST_F(HubTest, CollectsStandstillsForWhoeverAsksOverTheSocket) {
                    .authority = *authority_,
                    .calibration = *calibration_,
                    .verification = &verification}};
+
   const auto ask = [&](const json& request) {
-    auto answer = std::async(std::launch::async, [&] { return answer_request(hub, request, myself(), 60s); });
-    while (answer.wait_for(0s) != std::future_status::ready) hub.turn(time_.wall_now());
+    auto answer =
+        std::async(std::launch::async, [&] { return answer_request(hub, request, myself(), 60s); });
+    while (answer.wait_for(0s) != std::future_status::ready) hub.cycle(time_.wall_now());
     return answer.get();
   };
+
   const auto stand = [&](double x) {
     for (int i = 0; i < 1500; ++i) {
       protocol::AxisSample axes;
@@ -254,19 +266,22 @@ TEST_F(HubTest, CollectsStandstillsForWhoeverAsksOverTheSocket) {
         point.p_tracker_m = {1.0, x, 0.0};
       }
       time_.passed += 2ms;
-      hub.turn(time_.wall_now());
+      hub.cycle(time_.wall_now());
     }
   };
+
   const auto begun = ask({{"do", "verification"}, {"step", "begin"}});
   ASSERT_EQ(begun["ok"], true) << begun.dump();
   stand(0.1);
   stand(0.2);
-  const auto look = ask({{"do", "verification"}, {"step", "look"}, {"number", begun["number"]}, {"from", 0}});
+  const auto look =
+      ask({{"do", "verification"}, {"step", "look"}, {"number", begun["number"]}, {"from", 0}});
   ASSERT_EQ(look["points"].size(), 1u) << look.dump();
   EXPECT_EQ(look["points"][0]["reading_m"], (json{0.1, 0.0, 0.0}));
   EXPECT_EQ(look["points"][0]["tracker_m"], (json{1.0, 0.1, 0.0}));
   EXPECT_GT(look["standing"].get<int>(), 50);
-  const auto end = ask({{"do", "verification"}, {"step", "end"}, {"number", begun["number"]}, {"from", 1}});
+  const auto end =
+      ask({{"do", "verification"}, {"step", "end"}, {"number", begun["number"]}, {"from", 1}});
   ASSERT_EQ(end["points"].size(), 1u) << end.dump();
   EXPECT_EQ(end["points"][0]["reading_m"], (json{0.2, 0.0, 0.0}));
   EXPECT_EQ(ask({{"do", "verification"}, {"step", "look"}, {"number", 99}})["code"], "refused");

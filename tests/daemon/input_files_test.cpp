@@ -43,7 +43,8 @@ TEST_F(InputFiles, ReadTheCartesianTrackerForm) {
 
 TEST_F(InputFiles, ReadTheSphericalTrackerForm) {
   const auto tracker = read_tracker_csv(
-      write("t.csv", "time_s,range_mm,azimuth_rad,elevation_rad,status\n0,2000,1.5707963267948966,0,0\n"));
+      write("t.csv",
+            "time_s,range_mm,azimuth_rad,elevation_rad,status\n0,2000,1.5707963267948966,0,0\n"));
   ASSERT_TRUE(tracker) << tracker.error().details.front();
   // 2 m along y; the rounding of pi/2 leaves 1e-16 of it on x.
   EXPECT_LT((tracker->points[0].p_tracker_m - calib::Vector3(0, 2, 0)).norm(), 1e-15);
@@ -66,21 +67,24 @@ TEST_F(InputFiles, MayHaveCommentsBlankLinesAndColumnsInAnyOrder) {
 }
 
 TEST_F(InputFiles, ReportEveryBadCellWithLineColumnAndName) {
-  EXPECT_THAT(tracker_faults("time_s,x_mm,y_mm,z_mm\n0,1,2,3\n# note\n1,nan,2,3\n2,1,two,3\n3,1,2,\n"),
-              ElementsAre(AllOf(HasSubstr("tracker.csv:4:3: x_mm:"), HasSubstr("finite")),
-                          AllOf(HasSubstr("tracker.csv:5:5: y_mm:"), HasSubstr("\"two\": not a number")),
-                          AllOf(HasSubstr("tracker.csv:6:7: z_mm:"), HasSubstr("empty"))));
+  EXPECT_THAT(
+      tracker_faults("time_s,x_mm,y_mm,z_mm\n0,1,2,3\n# note\n1,nan,2,3\n2,1,two,3\n3,1,2,\n"),
+      ElementsAre(AllOf(HasSubstr("tracker.csv:4:3: x_mm:"), HasSubstr("finite")),
+                  AllOf(HasSubstr("tracker.csv:5:5: y_mm:"), HasSubstr("\"two\": not a number")),
+                  AllOf(HasSubstr("tracker.csv:6:7: z_mm:"), HasSubstr("empty"))));
 }
 
 TEST_F(InputFiles, RefuseTimeThatDoesNotAscendBesideOtherFaults) {
-  EXPECT_THAT(tracker_faults("time_s,x_mm,y_mm,z_mm\n1,1,2,3\n1,1,2,3\n2,1,2,3x\n3,1,2,3\n2.5,1,2,3\n"),
-              ElementsAre(AllOf(HasSubstr(":3:1: time_s: 1 after 1")), HasSubstr(":4:7: z_mm:"),
-                          HasSubstr(":6:1: time_s: 2.5 after 3")));
+  EXPECT_THAT(
+      tracker_faults("time_s,x_mm,y_mm,z_mm\n1,1,2,3\n1,1,2,3\n2,1,2,3x\n3,1,2,3\n2.5,1,2,3\n"),
+      ElementsAre(AllOf(HasSubstr(":3:1: time_s: 1 after 1")), HasSubstr(":4:7: z_mm:"),
+                  HasSubstr(":6:1: time_s: 2.5 after 3")));
 }
 
 TEST_F(InputFiles, RefuseAMissingAndAnUnknownColumn) {
   EXPECT_THAT(tracker_faults("time_s,x_mm,y_mm,zmm\n0,1,2,3\n"),
-              ElementsAre(AllOf(HasSubstr(":1:18: zmm: unknown column"), HasSubstr("did you mean \"z_mm\"")),
+              ElementsAre(AllOf(HasSubstr(":1:18: zmm: unknown column"),
+                                HasSubstr("did you mean \"z_mm\"")),
                           HasSubstr(":1:1: z_mm: missing column")));
 }
 
@@ -93,7 +97,8 @@ TEST_F(InputFiles, RefuseALineThatWasCutOff) {
 
 TEST_F(InputFiles, RefuseAnEmptyFileAndAHeaderAlone) {
   EXPECT_THAT(tracker_faults(""), ElementsAre(HasSubstr("empty")));
-  EXPECT_THAT(tracker_faults("time_s,x_mm,y_mm,z_mm\n"), ElementsAre(HasSubstr("at least 1 points")));
+  EXPECT_THAT(tracker_faults("time_s,x_mm,y_mm,z_mm\n"),
+              ElementsAre(HasSubstr("at least 1 points")));
 }
 
 TEST_F(InputFiles, ShowAtMostTwentyFaults) {
@@ -125,7 +130,8 @@ TEST_F(InputFiles, RefuseAPathThatDoesNotMove) {
 }
 
 TEST_F(InputFiles, ReadAnEncoderLog) {
-  const auto encoder = read_encoder_csv(write("e.csv", "time_s,x_mm,y_mm,z_mm\n0,1,2,3\n0.004,4,5,6\n"));
+  const auto encoder =
+      read_encoder_csv(write("e.csv", "time_s,x_mm,y_mm,z_mm\n0,1,2,3\n0.004,4,5,6\n"));
   ASSERT_TRUE(encoder);
   EXPECT_EQ(encoder->rows[1].time_s, 0.004);
   EXPECT_EQ(encoder->rows[1].reading_m, (AxisPosition{0.004, 0.005, 0.006}));
@@ -157,11 +163,13 @@ TEST_F(InputFiles, ReadKnownErrorsInMicrometres) {
   ASSERT_TRUE(errors) << errors.error().details.front();
   ASSERT_THAT(errors->errors_m, SizeIs(1));
   EXPECT_EQ(errors->points_m[0], (AxisPosition{0.01, 0.02, 0.03}));
-  EXPECT_LT((calib::Vector3(errors->errors_m[0].data()) - calib::Vector3(1e-6, 2e-6, 3e-6)).norm(), 1e-20);
+  EXPECT_LT((calib::Vector3(errors->errors_m[0].data()) - calib::Vector3(1e-6, 2e-6, 3e-6)).norm(),
+            1e-20);
 }
 
 TEST_F(InputFiles, RefuseKnownErrorsWithoutAComponentOrARow) {
-  const auto without = read_known_errors_csv(write("a.csv", "x_mm,y_mm,z_mm,ex_um,ey_um\n1,2,3,4,5\n"));
+  const auto without =
+      read_known_errors_csv(write("a.csv", "x_mm,y_mm,z_mm,ex_um,ey_um\n1,2,3,4,5\n"));
   ASSERT_FALSE(without);
   EXPECT_THAT(without.error().details, ElementsAre(HasSubstr(":1:1: ez_um: missing column")));
   const auto empty = read_known_errors_csv(write("b.csv", "x_mm,y_mm,z_mm,ex_um,ey_um,ez_um\n"));

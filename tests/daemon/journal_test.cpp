@@ -76,6 +76,7 @@ TEST(Journal, AJournalThatTakesNothingDoesNotHoldItUpAndLearnsHowManyItMissed) {
   const TemporaryFolder folder;
   const FakeJournal journal{folder.path() / "socket"};
   const auto sink = native_journal(folder.path() / "socket");
+
   ASSERT_TRUE(sink) << sink.error().text;
   JournalEntry large = kEntry;
   large.message.assign(60'000, 'x');
@@ -103,9 +104,9 @@ TEST(Journal, AsTextIsOneLineWithTheSameContent) {
   std::array<char, 1024> buffer{};
   const ssize_t n = ::read(ends[0], buffer.data(), buffer.size());
   ::close(ends[0]);
-  EXPECT_EQ(
-      (std::string{buffer.data(), static_cast<std::size_t>(std::max<ssize_t>(n, 0))}),
-      "abbed: device tracker: connecting; last fault: a?b [ABBE_DEVICE=tracker ABBE_STATE=connecting]\n");
+  EXPECT_EQ((std::string{buffer.data(), static_cast<std::size_t>(std::max<ssize_t>(n, 0))}),
+            "abbed: device tracker: connecting; last fault: a?b [ABBE_DEVICE=tracker "
+            "ABBE_STATE=connecting]\n");
 }
 
 class StateObserverTest : public ::testing::Test {
@@ -190,7 +191,9 @@ TEST_F(StateObserverTest, SessionModelRecorderLinkParticipantAndHubAreFollowed) 
   now_.session.id = 3;
   now_.session.state = SessionState::Refused;
   now_.session.reason = "worse than no compensation";
-  EXPECT_THAT(lines(), ElementsAre(HasSubstr("calibration 3 (otf): refused: worse than no compensation")));
+
+  EXPECT_THAT(lines(),
+              ElementsAre(HasSubstr("calibration 3 (otf): refused: worse than no compensation")));
   now_.model = {.state = "ACTIVE", .id = "abcd", .reason = "forced by anna: trial"};
   EXPECT_THAT(lines(), ElementsAre("model abcd: ACTIVE: forced by anna: trial"));
   auto& recorder = now_.streams.emplace_back().status;
@@ -200,21 +203,24 @@ TEST_F(StateObserverTest, SessionModelRecorderLinkParticipantAndHubAreFollowed) 
   const auto full = look();
   ASSERT_THAT(full, SizeIs(1));
   EXPECT_EQ(full[0].urgency, Urgency::Error);
-  EXPECT_THAT(full[0].message, AllOf(HasSubstr("recorder: disk full"), HasSubstr("[recording] dir")));
+  EXPECT_THAT(full[0].message,
+              AllOf(HasSubstr("recorder: disk full"), HasSubstr("[recording] dir")));
   now_.participant = ObservedParticipant{};
   EXPECT_THAT(lines(), ElementsAre("abbe-dds: started"));
   now_.participant->start_fault = "start abbe-dds: No such file or directory";
   now_.participant->last_end = "signal 9 (Killed) at 2026-11-22T16:58:22Z";
   EXPECT_THAT(
       lines(),
-      ElementsAre(AllOf(HasSubstr("abbe-dds: ended: signal 9 (Killed) at 2026-11-22T16:58:22Z; cannot be "),
-                        HasSubstr("started again: start abbe-dds: No such file"))));
-  now_.participant =
-      ObservedParticipant{.restarts = 1,
-                          .last_end = "it did not answer and was ended by abbed at 2026-11-22T16:58:22Z",
-                          .start_fault = {}};
-  EXPECT_THAT(lines(), ElementsAre(HasSubstr("abbe-dds: ended: it did not answer and was ended by abbed at "
-                                             "2026-11-22T16:58:22Z; started again, 1 times")));
+      ElementsAre(
+          AllOf(HasSubstr("abbe-dds: ended: signal 9 (Killed) at 2026-11-22T16:58:22Z; cannot be "),
+                HasSubstr("started again: start abbe-dds: No such file"))));
+  now_.participant = ObservedParticipant{
+      .restarts = 1,
+      .last_end = "it did not answer and was ended by abbed at 2026-11-22T16:58:22Z",
+      .start_fault = {}};
+  EXPECT_THAT(lines(),
+              ElementsAre(HasSubstr("abbe-dds: ended: it did not answer and was ended by abbed at "
+                                    "2026-11-22T16:58:22Z; started again, 1 times")));
   now_.hub_answers = false;
   now_.streams.clear();
   EXPECT_THAT(lines(), ElementsAre(HasSubstr("hub: has not answered")));
@@ -229,8 +235,8 @@ TEST_F(StateObserverTest, DdsSecurityThatIsOffIsNoFaultOfADevice) {
   const auto entries = look();
   ASSERT_THAT(entries, SizeIs(1));
   EXPECT_EQ(entries[0].urgency, Urgency::Warning);
-  EXPECT_THAT(entries[0].message,
-              AllOf(HasSubstr("dds_security: off"), Not(HasSubstr("device")), Not(HasSubstr("cable"))));
+  EXPECT_THAT(entries[0].message, AllOf(HasSubstr("dds_security: off"), Not(HasSubstr("device")),
+                                        Not(HasSubstr("cable"))));
 }
 
 struct KeptEntries final : JournalSink {

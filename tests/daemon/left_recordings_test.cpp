@@ -27,7 +27,8 @@ constexpr std::uint32_t kPerChunk = 10;
 
 class LeftRecordings : public ::testing::Test {
  protected:
-  /// As a recorder of another process leaves it that is killed now: three chunks, an attachment, no end.
+  /// As a recorder of another process leaves it that is killed now: three chunks, an attachment, no
+  /// end.
   void leave(const std::string& name) {
     const auto process = ::fork();
     if (process == 0) {
@@ -41,6 +42,7 @@ class LeftRecordings : public ::testing::Test {
       }
       (void)::kill(::getpid(), SIGKILL);
     }
+
     ASSERT_EQ(::waitpid(process, nullptr, 0), process);
   }
   std::vector<LeftRecording> close(const std::string& running = "abbe-now") {
@@ -65,6 +67,7 @@ TEST_F(LeftRecordings, AreClosedWithIndexAndSummaryAndKeepTheirDate) {
   fs::last_write_time(file("abbe-1.mcap.part"), written);
   const auto before = bytes_of_file(file("abbe-1.mcap.part"));
   const auto closed = close();
+
   ASSERT_THAT(closed, SizeIs(1));
   EXPECT_THAT(closed[0].fault, IsEmpty());
   EXPECT_EQ(closed[0].messages, kChunks * kPerChunk);
@@ -75,7 +78,8 @@ TEST_F(LeftRecordings, AreClosedWithIndexAndSummaryAndKeepTheirDate) {
   EXPECT_THAT(reader.attachments(), SizeIs(1));
   EXPECT_EQ(fs::last_write_time(file("abbe-1.mcap")), written);
   const auto after = bytes_of_file(file("abbe-1.mcap"));
-  EXPECT_TRUE(std::equal(before.begin(), before.end(), after.begin())) << "hashes in models still hold";
+  EXPECT_TRUE(std::equal(before.begin(), before.end(), after.begin()))
+      << "hashes in models still hold";
 }
 
 TEST_F(LeftRecordings, AreTheSameAsClosedByTheirRecorder) {
@@ -95,6 +99,7 @@ TEST_F(LeftRecordings, CutAtAnyByteKeepEveryWholeMessage) {
   leave("abbe-1");
   const auto whole = bytes_of_file(file("abbe-1.mcap.part"));
   const std::size_t last_chunks = whole.size() - 4'000;
+
   for (std::size_t cut = whole.size(); cut > last_chunks; cut -= 7) {
     write_file(file("abbe-cut.mcap.part"), whole, cut);
     const auto messages = read(file("abbe-cut.mcap.part")).message_count();
@@ -130,7 +135,8 @@ TEST_F(LeftRecordings, WithADamagedMiddleStayAndAreReported) {
   EXPECT_TRUE(fs::exists(file("abbe-1.mcap.part")));
 }
 
-/// A flipped bit makes a record of the middle longer than the rest of the file: that is no torn end.
+/// A flipped bit makes a record of the middle longer than the rest of the file: that is no torn
+/// end.
 TEST_F(LeftRecordings, WithADamagedLengthInTheMiddleLoseNothing) {
   leave("abbe-1");
   const auto whole = bytes_of_file(file("abbe-1.mcap.part"));
@@ -138,10 +144,12 @@ TEST_F(LeftRecordings, WithADamagedLengthInTheMiddleLoseNothing) {
   std::vector<std::size_t> heads;  // of all records but those of the last chunk
   std::size_t last_chunk = 0;
   protocol::mcap::LinearScan scan{std::as_bytes(std::span{whole})};
+
   while (const auto item = scan.next()) {
     heads.push_back(item->record.offset);
     if (item->chunk) last_chunk = item->record.offset;
   }
+
   ASSERT_GT(heads.size(), kChunks);
   for (const std::size_t head : heads) {
     if (head >= last_chunk) break;
@@ -156,7 +164,8 @@ TEST_F(LeftRecordings, WithADamagedLengthInTheMiddleLoseNothing) {
   }
 }
 
-/// What does not move the records behind it is found by the reader: the file is closed, nothing is cut off.
+/// What does not move the records behind it is found by the reader: the file is closed, nothing is
+/// cut off.
 TEST_F(LeftRecordings, WithADamagedChunkAreClosedAndTheReaderReportsIt) {
   leave("abbe-1");
   damage_chunk(file("abbe-1.mcap.part"), 0);

@@ -57,6 +57,7 @@ TEST(LiveView, AnAxisThatIsTakenBackLeavesTheOthersAsTheyWere) {
   live.take(of(sample));
   sample.missing_mask = 0b010;
   sample.head.flags = static_cast<protocol::SampleFlags>(SampleFlag::AxisMissing);
+
   EXPECT_TRUE(live.take(of(sample)));
   EXPECT_EQ(live.view().missing_mask, 0b010);
   EXPECT_TRUE(has(live.view().head.flags, SampleFlag::AxisMissing));
@@ -72,6 +73,7 @@ TEST(LiveView, DoesNotShowThePointOfATrackerThatDied) {
   point.p_tracker_m = {1.0, 2.0, 3.0};
   live.take(of(point));
   live.take(of(axes_at(kStart + 1s, 0.1)));
+
   EXPECT_TRUE(live.view().has_tracker_point);
   live.take(of(axes_at(kStart + 1s + 1ms, 0.1)));
   EXPECT_FALSE(live.view().has_tracker_point);
@@ -108,6 +110,7 @@ TEST(LiveView, JudgesByTheClockWhatIsCurrentWhileOnlyTheEnvironmentReports) {
   point.head.time = kStart;
   live.take(of(point));
   live.take(weather_at(kStart + 500ms));
+
   EXPECT_EQ(live.view().missing_mask, 0);
   live.take(weather_at(kStart + 501ms));
   EXPECT_EQ(live.view().missing_mask, 0b1111);
@@ -162,7 +165,11 @@ TEST(LiveView, KnowsTheAxesOnlyWhileEachOfXyzAnswersWithoutAFault) {
   const auto missing = [](AxisSample& a) { a.missing_mask = 0b100; };
   const auto bus_off = [](AxisSample& a) { a.head.flags |= SampleFlag::BusOff; };
   const auto alarm = [](AxisSample& a) { a.head.flags |= SampleFlag::DeviceError; };
-  const auto nonsense = [](AxisSample& a) { a.position[1] = std::numeric_limits<double>::quiet_NaN(); };
+
+  const auto nonsense = [](AxisSample& a) {
+    a.position[1] = std::numeric_limits<double>::quiet_NaN();
+  };
+
   const auto too_few = [](AxisSample& a) { a.axis_count = 2; };
   for (void (*break_it)(AxisSample&) : {+missing, +bus_off, +alarm, +nonsense, +too_few}) {
     LiveView live{AssemblerOptions{}, kTime};

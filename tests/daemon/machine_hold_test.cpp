@@ -1,4 +1,5 @@
-/// DATA_DIR/machine-hold as a start finds it: what it cannot read it must not take for "nothing is held".
+/// DATA_DIR/machine-hold as a start finds it: what it cannot read it must not take for "nothing is
+/// held".
 
 #include <arpa/inet.h>
 #include <gmock/gmock.h>
@@ -29,7 +30,8 @@ class MachineHold : public ::testing::Test {
   MachineHold() {
     // Nobody listens at port 1: nothing but the file says whether a release is awaited.
     auto config = parse_config(
-        to_toml(config_tables::half_metre_mill()) + "[cmm]\nhost = \"127.0.0.1\"\nport = 1\n", "abbed.toml");
+        to_toml(config_tables::half_metre_mill()) + "[cmm]\nhost = \"127.0.0.1\"\nport = 1\n",
+        "abbed.toml");
     EXPECT_TRUE(config) << config.error().details.front();
     config_ = *config;
     config_.daemon.data_dir = folder_.path();
@@ -53,14 +55,15 @@ TEST_F(MachineHold, WithoutAFileNothingIsHeld) {
 
 TEST_F(MachineHold, KeepsTheReason) {
   test::write_text(file(), "emergency stop (error 0512)");
-  EXPECT_THAT(awaited(),
-              AllOf(HasSubstr("since before the restart"), HasSubstr("emergency stop (error 0512)")));
+  EXPECT_THAT(awaited(), AllOf(HasSubstr("since before the restart"),
+                               HasSubstr("emergency stop (error 0512)")));
 }
 
 TEST_F(MachineHold, AFileThatCannotBeReadHoldsTheMachine) {
   test::write_text(file(), "emergency stop");
   ASSERT_EQ(::chmod(file().c_str(), 0), 0);
-  if (::geteuid() == 0) {  // root may read it all the same: a link to itself cannot be read by anybody
+  if (::geteuid() ==
+      0) {  // root may read it all the same: a link to itself cannot be read by anybody
     fs::remove(file());
     fs::create_symlink(file(), file());
   }
@@ -109,7 +112,8 @@ class SilentPeer {
 
  private:
   static int make() { return ::socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0); }
-  std::array<int, 4> sockets_{make(), make(), make(), make()};  ///< the listener and who fills its queue
+  std::array<int, 4> sockets_{make(), make(), make(),
+                              make()};  ///< the listener and who fills its queue
   std::uint16_t port_ = 0;
 };
 
@@ -118,12 +122,14 @@ TEST_F(MachineHold, IsReportedAndReleasedWhileTheServerIsAway) {
   config_.cmm->port = peer.port();
   test::write_text(file(), "a motion is under way\n");
   auto devices = DeviceSet::start(config_, time_);
+
   ASSERT_TRUE(devices) << devices.error().text;
   const auto state = [&] { return devices->health(time_.now()).front().status.state; };
   for (int i = 0; i < 1000 && state() != "connecting"; ++i)
     std::this_thread::sleep_for(std::chrono::milliseconds{5});
   ASSERT_EQ(state(), "connecting");
-  EXPECT_THAT(devices->release_awaited().value_or(""), HasSubstr("ended while the machine was moving"));
+  EXPECT_THAT(devices->release_awaited().value_or(""),
+              HasSubstr("ended while the machine was moving"));
   const auto released = devices->release_machine();
   EXPECT_TRUE(released) << released.error().text;
   for (int i = 0; i < 1000 && devices->release_awaited(); ++i)

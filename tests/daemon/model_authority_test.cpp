@@ -11,7 +11,7 @@
 #include <thread>
 
 #include "abbe/messages/cdr.hpp"
-#include "abbe/service/work_aside.hpp"
+#include "abbe/service/background_tasks.hpp"
 #include "synthetic_model.hpp"
 #include "text_files.hpp"
 
@@ -51,11 +51,13 @@ class ModelAuthorityTest : public ::testing::Test {
   }
   /// As the daemon does it on two threads.
   static Result<std::string> add(ModelAuthority&& authority, const ModelDocument& d,
-                                 const calib::Verdict& verdict, const StoreActor& who, HostTime now) {
+                                 const calib::Verdict& verdict, const StoreActor& who,
+                                 HostTime now) {
     return add(authority, d, verdict, who, now);
   }
   static Result<std::string> add(ModelAuthority& authority, const ModelDocument& d,
-                                 const calib::Verdict& verdict, const StoreActor& who, HostTime now) {
+                                 const calib::Verdict& verdict, const StoreActor& who,
+                                 HostTime now) {
     auto kept = authority.keeper().keep(d, verdict, who, now);
     if (!kept) return tl::unexpected(kept.error());
     if (kept->active) authority.take_up(std::move(*kept->active));
@@ -68,7 +70,9 @@ class ModelAuthorityTest : public ::testing::Test {
     while (following == Following::Reading) following = authority.follow_store(kNow);
     return following == Following::TakenUp;
   }
-  static ModelStanding fresh_standing(const ModelAuthority& a) { return a.standing(kNow, kNow, kPatience); }
+  static ModelStanding fresh_standing(const ModelAuthority& a) {
+    return a.standing(kNow, kNow, kPatience);
+  }
 
   Config config_;
   fs::path folder_ =
@@ -79,7 +83,8 @@ class ModelAuthorityTest : public ::testing::Test {
 /// As the service does every five seconds, where the last step failed.
 TEST_F(ModelAuthorityTest, AModelThatIsKeptAgainIsEnteredOnce) {
   auto authority = open();
-  for (int i = 0; i < 3; ++i) ASSERT_TRUE(add(authority, document(1), {.accepted = true}, actor("t"), kNow));
+  for (int i = 0; i < 3; ++i)
+    ASSERT_TRUE(add(authority, document(1), {.accepted = true}, actor("t"), kNow));
   const auto history = store().history().value();
   ASSERT_EQ(history.size(), 2u);
   EXPECT_EQ(history[0].action, StoreAction::Added);
@@ -106,7 +111,8 @@ TEST_F(ModelAuthorityTest, AnAcceptedModelIsActiveAtOnce) {
 
 TEST_F(ModelAuthorityTest, ARefusedModelIsKeptAndChangesNothing) {
   auto authority = open();
-  const auto first = add(authority, document(1), {.accepted = true}, actor("calibrate otf"), kNow).value();
+  const auto first =
+      add(authority, document(1), {.accepted = true}, actor("calibrate otf"), kNow).value();
   const auto revision = fresh_standing(authority).revision;
   const auto second =
       add(authority, document(2), {.reasons = {"worse"}}, actor("calibrate otf"), kNow).value();
@@ -158,7 +164,8 @@ TEST_F(ModelAuthorityTest, WhereTheControlCorrectsAlreadyNoModelIsActive) {
 
 TEST_F(ModelAuthorityTest, AForcedModelNamesWhoForcedItAndWhyAlsoAfterARestart) {
   auto authority = open();
-  const auto id = add(authority, document(1), {.reasons = {"3 mm"}}, actor("calibrate otf"), kNow).value();
+  const auto id =
+      add(authority, document(1), {.reasons = {"3 mm"}}, actor("calibrate otf"), kNow).value();
   ASSERT_TRUE(store().activate(id, actor("crane test"), true));
   ASSERT_TRUE(follow(authority));
   EXPECT_EQ(fresh_standing(authority).reason, "forced by anna: crane test");
@@ -169,6 +176,7 @@ TEST_F(ModelAuthorityTest, ARollbackIsSaidAndWhetherTheGateEverAcceptedTheModel)
   auto authority = open();
   const auto forced =
       add(authority, document(1), {.reasons = {"3 mm"}}, actor("calibrate otf"), kNow).value();
+
   ASSERT_TRUE(store().activate(forced, actor("crane test"), true));
   ASSERT_TRUE(add(authority, document(2), {.accepted = true}, actor("calibrate otf"), kNow));
   ASSERT_TRUE(add(authority, document(3), {.accepted = true}, actor("calibrate otf"), kNow));
@@ -197,7 +205,8 @@ TEST_F(ModelAuthorityTest, FollowsTheStoreOnceForEachChange) {
 
 TEST_F(ModelAuthorityTest, AStoreThatIsBeingDamagedChangesNothing) {
   auto authority = open();
-  const auto id = add(authority, document(1), {.accepted = true}, actor("calibrate otf"), kNow).value();
+  const auto id =
+      add(authority, document(1), {.accepted = true}, actor("calibrate otf"), kNow).value();
   fs::resize_file(folder_ / "state.json", 10);
   EXPECT_FALSE(follow(authority));
   EXPECT_EQ(fresh_standing(authority).model->id, id);
@@ -207,6 +216,7 @@ TEST_F(ModelAuthorityTest, AStoreThatIsBeingDamagedChangesNothing) {
 TEST_F(ModelAuthorityTest, AStoreThatCannotBeReadIsSaidAndReadAgainUntilItCan) {
   auto authority = open();
   const auto first = add(authority, document(1), {.accepted = true}, actor("first"), kNow).value();
+
   ASSERT_TRUE(add(authority, document(2), {.accepted = true}, actor("second"), kNow));
   ASSERT_TRUE(store().rollback(actor("drifts")));
   const fs::path state = folder_ / "state.json";
@@ -228,7 +238,8 @@ TEST_F(ModelAuthorityTest, AStoreThatCannotBeReadIsSaidAndReadAgainUntilItCan) {
 }
 
 TEST_F(ModelAuthorityTest, AModelFileThatWasRepairedComesIntoForce) {
-  const auto id = add(open(), document(1), {.accepted = true}, actor("calibrate otf"), kNow).value();
+  const auto id =
+      add(open(), document(1), {.accepted = true}, actor("calibrate otf"), kNow).value();
   const fs::path file = store().model_path(id);
   fs::rename(file, folder_ / "elsewhere");
   auto authority = open();
@@ -241,9 +252,12 @@ TEST_F(ModelAuthorityTest, AModelFileThatWasRepairedComesIntoForce) {
 TEST_F(ModelAuthorityTest, WhatWasReadBeforeAnotherModelWasTakenUpIsNotTakenUp) {
   auto authority = open();
   ASSERT_TRUE(add(authority, document(1), {.accepted = true}, actor("first"), kNow));
-  ASSERT_TRUE(store().activate(store().add(document(3), true, {}, actor("third")).value(), actor("by hand")));
+  ASSERT_TRUE(store().activate(store().add(document(3), true, {}, actor("third")).value(),
+                               actor("by hand")));
   const std::string before = text_of(folder_ / "state.json");
-  auto kept = authority.keeper().keep(document(2), {.accepted = true}, actor("second", kNow + 1s), kNow);
+  auto kept =
+      authority.keeper().keep(document(2), {.accepted = true}, actor("second", kNow + 1s), kNow);
+
   ASSERT_TRUE(kept);
   const std::string after = text_of(folder_ / "state.json");
   std::ofstream{folder_ / "state.json"} << before;
@@ -278,7 +292,8 @@ TEST_F(ModelAuthorityTest, AModelIsEncodedWhereItIsRead) {
   const auto model = decode<v1::ErrorModel>(standing.publication->model);
   ASSERT_TRUE(model);
   EXPECT_EQ(*model, model_message(*standing.model, {.machine = "mill"}));
-  EXPECT_EQ(standing.publication->slices.size(), grid_messages(*standing.model, {.machine = "mill"}).size());
+  EXPECT_EQ(standing.publication->slices.size(),
+            grid_messages(*standing.model, {.machine = "mill"}).size());
 }
 
 TEST_F(ModelAuthorityTest, TheModelOfBeforeIsDestroyedOnAnotherThread) {
@@ -286,22 +301,26 @@ TEST_F(ModelAuthorityTest, TheModelOfBeforeIsDestroyedOnAnotherThread) {
   const auto destroyed = std::make_shared<std::promise<std::thread::id>>();
   ActiveModel first;
   first.model = std::shared_ptr<const ModelInForce>{
-      new ModelInForce{.id = "first", .model = document(1).model}, [destroyed](const ModelInForce* m) {
+      new ModelInForce{.id = "first", .model = document(1).model},
+      [destroyed](const ModelInForce* m) {
         delete m;
         destroyed->set_value(std::this_thread::get_id());
       }};
   authority.take_up(std::move(first));
+
   ASSERT_EQ(authority.in_force()->id, "first");
   authority.take_up(ActiveModel{});
   EXPECT_NE(destroyed->get_future().get(), std::this_thread::get_id());
 }
 
-// The hub is pinned and has a real-time priority; here a batch thread on one processor stands for it.
-TEST(WorkAside, RunsOnAnOrdinaryThreadHoweverTheHubRuns) {
+// The hub is pinned and has a real-time priority; here a batch thread on one processor stands for
+// it.
+TEST(BackgroundTasks, RunsOnAnOrdinaryThreadHoweverTheHubRuns) {
   struct Seen {
     int policy = -1;
     cpu_set_t cpus{};
   };
+
   Seen seen;
   std::thread hub{[&] {
     const sched_param none{};
@@ -310,7 +329,7 @@ TEST(WorkAside, RunsOnAnOrdinaryThreadHoweverTheHubRuns) {
     CPU_ZERO(&one);
     CPU_SET(::sched_getcpu(), &one);
     ASSERT_EQ(::sched_setaffinity(0, sizeof one, &one), 0);
-    seen = start_aside([] {
+    seen = run_in_background([] {
              Seen of_worker{.policy = ::sched_getscheduler(0)};
              (void)::sched_getaffinity(0, sizeof of_worker.cpus, &of_worker.cpus);
              return of_worker;
@@ -324,7 +343,8 @@ TEST(WorkAside, RunsOnAnOrdinaryThreadHoweverTheHubRuns) {
 }
 
 TEST_F(ModelAuthorityTest, ADamagedActiveModelIsInvalidAndNotUsed) {
-  const auto id = add(open(), document(1), {.accepted = true}, actor("calibrate otf"), kNow).value();
+  const auto id =
+      add(open(), document(1), {.accepted = true}, actor("calibrate otf"), kNow).value();
   fs::resize_file(store().model_path(id), 1000);
   auto authority = open();
   const auto standing = fresh_standing(authority);
@@ -335,10 +355,12 @@ TEST_F(ModelAuthorityTest, ADamagedActiveModelIsInvalidAndNotUsed) {
 }
 
 TEST_F(ModelAuthorityTest, ADamagedStateIsSetAsideAtTheStartAndReportedUntilAModelIsActivated) {
-  const auto id = add(open(), document(1), {.accepted = true}, actor("calibrate otf"), kNow).value();
+  const auto id =
+      add(open(), document(1), {.accepted = true}, actor("calibrate otf"), kNow).value();
   fs::resize_file(folder_ / "state.json", 30);
   auto authority = open();
   const std::string aside = "state.json.damaged-2023-11-14T22-30-00Z";
+
   EXPECT_TRUE(fs::exists(folder_ / aside));
   EXPECT_EQ(fresh_standing(authority).status, ModelStatus::MODEL_INVALID);
   EXPECT_THAT(fresh_standing(authority).reason, HasSubstr(aside));
@@ -358,8 +380,10 @@ TEST_F(ModelAuthorityTest, ADamagedStateThatCouldNotBeSetAsideAtTheStartIsLater)
   std::ofstream{aside} << "of before";
   auto authority = open();
   for (int look = 0; look < 3; ++look) EXPECT_FALSE(follow(authority));
+
   EXPECT_THAT(authority.fault(), HasSubstr("rename"));
-  EXPECT_FALSE(authority.keeper().keep(document(2), {.accepted = true}, actor("calibrate otf"), kNow));
+  EXPECT_FALSE(
+      authority.keeper().keep(document(2), {.accepted = true}, actor("calibrate otf"), kNow));
   fs::remove(aside);
   EXPECT_TRUE(follow(authority));
   EXPECT_EQ(fs::file_size(aside), 30u);
@@ -371,8 +395,10 @@ TEST_F(ModelAuthorityTest, ADamagedStateThatCouldNotBeSetAsideAtTheStartIsLater)
 
 TEST_F(ModelAuthorityTest, AStateThatIsDamagedLaterIsSetAsideAndTheModelStaysInForce) {
   auto authority = open();
-  const auto id = add(authority, document(1), {.accepted = true}, actor("calibrate otf"), kNow).value();
+  const auto id =
+      add(authority, document(1), {.accepted = true}, actor("calibrate otf"), kNow).value();
   fs::resize_file(folder_ / "state.json", 30);
+
   EXPECT_FALSE(follow(authority));
   EXPECT_TRUE(fs::exists(folder_ / "state.json")) << "somebody may be writing it";
   for (int look = 0; look < 3; ++look) EXPECT_FALSE(follow(authority));
@@ -400,8 +426,10 @@ TEST_F(ModelAuthorityTest, AStoreThatCannotBeMadeIsReportedAndTriedAgain) {
 }
 
 TEST_F(ModelAuthorityTest, TheStartRemovesWhatKilledProcessesLeftInTheStore) {
-  const auto id = add(open(), document(1), {.accepted = true}, actor("calibrate otf"), kNow).value();
-  const auto left = {folder_ / "state.json.999999999.new", folder_ / "models" / (id + ".json.999999999.new")};
+  const auto id =
+      add(open(), document(1), {.accepted = true}, actor("calibrate otf"), kNow).value();
+  const auto left = {folder_ / "state.json.999999999.new",
+                     folder_ / "models" / (id + ".json.999999999.new")};
   const auto living = folder_ / ("state.json." + std::to_string(::getppid()) + ".new");
   for (const auto& file : left) std::ofstream{file} << "half";
   std::ofstream{living} << "half";
@@ -416,8 +444,9 @@ TEST_F(ModelAuthorityTest, AModelThatNoReplayCanCheckSaysSo) {
   auto authority = open();
   ASSERT_TRUE(add(authority, unchecked, {.accepted = true}, actor("calibrate otf"), kNow));
   EXPECT_EQ(fresh_standing(authority).status, ModelStatus::MODEL_ACTIVE);
-  EXPECT_EQ(fresh_standing(authority).reason,
-            "accepted by the gate; no replay can check this model: 12 messages of the run are missing");
+  EXPECT_EQ(
+      fresh_standing(authority).reason,
+      "accepted by the gate; no replay can check this model: 12 messages of the run are missing");
 }
 
 TEST_F(ModelAuthorityTest, AModelThatCannotBePublishedIsNotTakenUp) {
@@ -427,16 +456,19 @@ TEST_F(ModelAuthorityTest, AModelThatCannotBePublishedIsNotTakenUp) {
   ASSERT_TRUE(store().activate(id, actor("by hand")));
   const auto standing = fresh_standing(open());
   EXPECT_EQ(standing.status, ModelStatus::MODEL_INVALID);
-  EXPECT_THAT(standing.reason, testing::AllOf(HasSubstr("cannot be published"), HasSubstr("estimator")));
+  EXPECT_THAT(standing.reason,
+              testing::AllOf(HasSubstr("cannot be published"), HasSubstr("estimator")));
 }
 
 TEST_F(ModelAuthorityTest, ARestartDoesNotMakeTheModelYounger) {
-  ASSERT_TRUE(add(open(), document(1), {.accepted = true}, actor("calibrate otf", kNow - 24h), kNow));
+  ASSERT_TRUE(
+      add(open(), document(1), {.accepted = true}, actor("calibrate otf", kNow - 24h), kNow));
   EXPECT_EQ(fresh_standing(open()).model->active_since, kNow - 24h);
 }
 
 TEST_F(ModelAuthorityTest, AWallClockThatWasSetBackDoesNotMakeAnAgeNegative) {
-  ASSERT_TRUE(add(open(), document(1), {.accepted = true}, actor("calibrate otf", kNow + 1h), kNow));
+  ASSERT_TRUE(
+      add(open(), document(1), {.accepted = true}, actor("calibrate otf", kNow + 1h), kNow));
   EXPECT_EQ(fresh_standing(open()).model->active_since, kNow);
 }
 

@@ -38,7 +38,8 @@ TEST(ModelDocument, ReadsBackToTheSameBits) {
   const auto& a = written.model.covariance();
   const auto& b = read->model.covariance();
   for (Eigen::Index i = 0; i < a.rows(); ++i)
-    for (Eigen::Index j = 0; j < a.cols(); ++j) EXPECT_TRUE(same_bits(a(i, j), b(i, j))) << i << "," << j;
+    for (Eigen::Index j = 0; j < a.cols(); ++j)
+      EXPECT_TRUE(same_bits(a(i, j), b(i, j))) << i << "," << j;
 }
 
 TEST(ModelDocument, ReadsBackWithItsOrigin) {
@@ -90,8 +91,8 @@ TEST(ModelDocument, HashFollowsEveryNumberOfTheArtefact) {
   const auto document = with_artefact(11);
   std::set<std::string> hashes{model_hash(document), model_hash(synthetic_document(11))};
   for (double calib::Expansion::*number :
-       {&calib::Expansion::alpha_per_K, &calib::Expansion::u_alpha_per_K, &calib::Expansion::temperature_K,
-        &calib::Expansion::u_temperature_K}) {
+       {&calib::Expansion::alpha_per_K, &calib::Expansion::u_alpha_per_K,
+        &calib::Expansion::temperature_K, &calib::Expansion::u_temperature_K}) {
     auto other = document;
     other.artefact.value().*number *= 1.001;
     hashes.insert(model_hash(other));
@@ -110,8 +111,8 @@ TEST(ModelDocument, ReadsBackWithItsArtefact) {
 }
 
 TEST(ModelDocument, IsRefusedWhenItsArtefactWasChanged) {
-  const auto text =
-      replaced(to_json(with_artefact(13)), "\"temperature_K\": 296.15", "\"temperature_K\": 297.15");
+  const auto text = replaced(to_json(with_artefact(13)), "\"temperature_K\": 296.15",
+                             "\"temperature_K\": 297.15");
   const auto read = parse_model(text, "model.json");
   ASSERT_FALSE(read);
   EXPECT_THAT(read.error().details, ElementsAre(HasSubstr("hash: is not the hash of the content")));
@@ -125,6 +126,7 @@ TEST(ModelDocument, NamesWhatCannotBeOfItsArtefact) {
     const auto read = parse_model(replaced(to_json(with_artefact(14)), what, with), "model.json");
     return read ? std::string{} : read.error().details.front();
   };
+
   EXPECT_THAT(fault("\"temperature_K\": 296.15", "\"temperature_K\": -3"),
               HasSubstr("model.json: artefact.temperature_K: is not plausible: -3"));
   EXPECT_THAT(fault("\"u_temperature_K\": 0.2", "\"u_temperature_K\": -0.2"),
@@ -137,7 +139,8 @@ TEST(ModelDocument, NamesWhatCannotBeOfItsArtefact) {
               HasSubstr("artefact.temperature_K: out of range"));
   EXPECT_THAT(fault("\"temperature_K\": 296.15", "\"temperature_K\": \"warm\""),
               HasSubstr("artefact.temperature_K: must be a number"));
-  EXPECT_THAT(fault("\"u_alpha_um_per_m_K\": 1,", ""), HasSubstr("artefact.u_alpha_um_per_m_K: missing"));
+  EXPECT_THAT(fault("\"u_alpha_um_per_m_K\": 1,", ""),
+              HasSubstr("artefact.u_alpha_um_per_m_K: missing"));
 }
 
 TEST(ModelDocument, WritesLengthsInMmAndErrorsInMicrometres) {
@@ -158,22 +161,26 @@ TEST(ModelDocument, IsRefusedWhenANumberWasChanged) {
   EXPECT_THAT(read.error().details, ElementsAre(HasSubstr("hash: is not the hash of the content")));
 }
 
-/// Its own hash is right: no single variance is negative, that of a difference of two parameters is.
+/// Its own hash is right: no single variance is negative, that of a difference of two parameters
+/// is.
 TEST(ModelDocument, IsRefusedWithACovarianceThatIsNotPositive) {
   const auto document = synthetic_document(11);
   Eigen::MatrixXd covariance = document.model.covariance();
   Eigen::Index i = 0;
   while (!(covariance(i, i) > 0.0 && covariance(i + 1, i + 1) > 0.0)) ++i;
-  covariance(i, i + 1) = covariance(i + 1, i) = 2.0 * std::sqrt(covariance(i, i) * covariance(i + 1, i + 1));
+  covariance(i, i + 1) = covariance(i + 1, i) =
+      2.0 * std::sqrt(covariance(i, i) * covariance(i + 1, i + 1));
   auto changed = document;
-  changed.model = calib::VolumetricModel::from_vector(document.model.layout(), document.model.gauge(),
-                                                      document.model.tool_offsets_m(), document.model.U(),
-                                                      covariance, document.model.validity())
-                      .value();
+  changed.model =
+      calib::VolumetricModel::from_vector(document.model.layout(), document.model.gauge(),
+                                          document.model.tool_offsets_m(), document.model.U(),
+                                          covariance, document.model.validity())
+          .value();
   const auto read = parse_model(to_json(changed), "model.json");
+
   ASSERT_FALSE(read);
-  EXPECT_THAT(read.error().details,
-              ElementsAre(AllOf(HasSubstr("model.json: covariance: "), HasSubstr("positive semidefinite"))));
+  EXPECT_THAT(read.error().details, ElementsAre(AllOf(HasSubstr("model.json: covariance: "),
+                                                      HasSubstr("positive semidefinite"))));
 }
 
 TEST(ModelDocument, ReportsEveryFaultAtOnce) {
@@ -183,9 +190,10 @@ TEST(ModelDocument, ReportsEveryFaultAtOnce) {
   text = replaced(text, "\"sigma0\"", "\"sigma1\"");
   const auto read = parse_model(text, "model.json");
   ASSERT_FALSE(read);
-  EXPECT_THAT(read.error().details, ::testing::IsSupersetOf({HasSubstr("model.json: gauge: must be \"G1\""),
-                                                             HasSubstr("squareness: must be a string"),
-                                                             HasSubstr("statistics.sigma0: missing")}));
+  EXPECT_THAT(read.error().details,
+              ::testing::IsSupersetOf({HasSubstr("model.json: gauge: must be \"G1\""),
+                                       HasSubstr("squareness: must be a string"),
+                                       HasSubstr("statistics.sigma0: missing")}));
 }
 
 TEST(ModelDocument, IsRefusedBeforeItIsParsedWhenItNestsTooDeep) {

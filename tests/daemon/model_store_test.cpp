@@ -41,7 +41,9 @@ class ModelStoreTest : public ::testing::Test {
   ~ModelStoreTest() override { fs::remove_all(folder_); }
   ModelStore open() { return ModelStore::open(folder_).value(); }
   std::string add(unsigned seed, bool accepted = true, std::vector<std::string> reasons = {}) {
-    return open().add(synthetic_document(seed), accepted, std::move(reasons), actor("daemon")).value();
+    return open()
+        .add(synthetic_document(seed), accepted, std::move(reasons), actor("daemon"))
+        .value();
   }
   StoreActor actor(std::string why) {
     now_ += std::chrono::seconds{1};
@@ -128,7 +130,8 @@ TEST_F(ModelStoreTest, AFreshStoreOfRootBelongsToTheFolderItIsIn) {
   constexpr uid_t kDaemon = 4711;
   ASSERT_EQ(::chown((fs::create_directory(folder_), folder_.c_str()), kDaemon, kDaemon), 0);
   const mode_t before = ::umask(077);
-  const auto id = ModelStore::open(folder_ / "store")->add(synthetic_document(1), true, {}, actor("root"));
+  const auto id =
+      ModelStore::open(folder_ / "store")->add(synthetic_document(1), true, {}, actor("root"));
   ::umask(before);
   for (const char* file : {"store", "store/models", "store/lock", "store/state.json"})
     EXPECT_EQ(owner_of(folder_ / file), kDaemon) << file;
@@ -242,9 +245,11 @@ TEST_F(ModelStoreTest, AModelIsOnTheDiskAlsoWhenTheLockIsHeldAndTheHolderIsNamed
   const auto added = open().add(document, true, {}, actor("daemon"));
   ASSERT_FALSE(added);
   EXPECT_THAT(added.error().text, HasSubstr("held it for 5 s"));
+
   if (std::ifstream{"/proc/locks"}.peek() != std::ifstream::traits_type::eof()) {
     EXPECT_THAT(added.error().text, HasSubstr(fmt::format("(process {})", ::getpid())));
   }
+
   EXPECT_TRUE(open().load(model_id(document)));
   ::close(lock);
   EXPECT_TRUE(open().add(document, true, {}, actor("daemon")));
@@ -259,8 +264,8 @@ TEST_F(ModelStoreTest, SaysThatTheStateIsDamaged) {
   EXPECT_THAT(store.error().text, HasSubstr("state.json"));
 }
 
-// A process that does nothing but activate is killed at ever later moments; whatever it was doing, the store
-// opens and one of the two models is active.
+// A process that does nothing but activate is killed at ever later moments; whatever it was doing,
+// the store opens and one of the two models is active.
 TEST_F(ModelStoreTest, SurvivesAKillAtAnyMoment) {
   const auto a = add(1), b = add(2);
   ASSERT_TRUE(open().activate(a, actor("start")));
@@ -274,6 +279,7 @@ TEST_F(ModelStoreTest, SurvivesAKillAtAnyMoment) {
     ::usleep(static_cast<useconds_t>(1000 + 1700 * round));
     ::kill(child, SIGKILL);
     int status = 0;
+
     ASSERT_EQ(::waitpid(child, &status, 0), child);
     const auto store = ModelStore::open(folder_);
     ASSERT_TRUE(store) << store.error().text;

@@ -29,7 +29,8 @@ class OldRecordings : public ::testing::Test {
     return ModelStore::open(store_)->add(document, true, {}, {"test", "test", {}}).value();
   }
   [[nodiscard]] Result<std::vector<fs::path>> remove(std::chrono::hours clock_ahead = 0h) {
-    return remove_old_recordings(folder_.path(), store_, {now_ + clock_ahead, 24h, "abbe-47", lasted_});
+    return remove_old_recordings(folder_.path(), store_,
+                                 {now_ + clock_ahead, 24h, "abbe-47", lasted_});
   }
   [[nodiscard]] std::vector<std::string> removed(std::chrono::hours clock_ahead = 0h) {
     std::vector<std::string> names;

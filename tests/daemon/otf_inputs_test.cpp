@@ -15,9 +15,11 @@ MachineConfig machine() {
 }
 
 TEST(OtfPath, IsRefusedBeforeTheMachineDrivesIt) {
-  const std::vector<AxisPosition> outside{{0, 0, 0}, {0.05, 0, 0}, {0.05, 0.07, 0}};  // travel: 60 mm
+  const std::vector<AxisPosition> outside{
+      {0, 0, 0}, {0.05, 0, 0}, {0.05, 0.07, 0}};  // travel: 60 mm
   const std::vector<AxisPosition> on_a_line{{0, 0, 0}, {0.01, 0, 0}, {0.05, 0, 0}};
-  for (const auto& [path, what] : {std::pair{outside, "axis travels"}, std::pair{on_a_line, "on a line"}}) {
+  for (const auto& [path, what] :
+       {std::pair{outside, "axis travels"}, std::pair{on_a_line, "on a line"}}) {
     const auto refused = check_otf_path(path, machine());
     ASSERT_FALSE(refused);
     EXPECT_EQ(refused.error().code, ErrorCode::BadInput);
@@ -26,7 +28,8 @@ TEST(OtfPath, IsRefusedBeforeTheMachineDrivesIt) {
 }
 
 TEST(OtfPath, ThatCanBeIdentifiedIsTaken) {
-  EXPECT_TRUE(check_otf_path(std::vector<AxisPosition>{{0, 0, 0}, {0.05, 0, 0}, {0.05, 0.06, 0}}, machine()));
+  EXPECT_TRUE(check_otf_path(std::vector<AxisPosition>{{0, 0, 0}, {0.05, 0, 0}, {0.05, 0.06, 0}},
+                             machine()));
 }
 
 TEST(OtfInputs, TheGateOfTheConfigurationDecidesHowARunIsJudged) {

@@ -64,7 +64,8 @@ TEST(PathReadings, AVertexOutOfReachIsNamedWithTheClosestReading) {
   other[1][0] = 0.08;
   const auto stood = compare_with_path("e.csv", driven(other), kPath_m, kTolerance_m);
   ASSERT_FALSE(stood);
-  EXPECT_THAT(stood.error().text, HasSubstr("do not reach vertex 1 of the path, (100.000, 0.000, 0.000) mm"));
+  EXPECT_THAT(stood.error().text,
+              HasSubstr("do not reach vertex 1 of the path, (100.000, 0.000, 0.000) mm"));
 }
 
 /// The readings do not show at which of two vertices 3 mm apart the machine stands.
@@ -76,7 +77,8 @@ TEST(PathReadings, VerticesCloseToEachOtherAreNotCompared) {
 }
 
 TEST(PathReadings, FewerThanTwoReadingsAreRefused) {
-  EXPECT_FALSE(compare_with_path("e.csv", std::vector<EncoderRow>{{0.0, {}}}, kPath_m, kTolerance_m));
+  EXPECT_FALSE(
+      compare_with_path("e.csv", std::vector<EncoderRow>{{0.0, {}}}, kPath_m, kTolerance_m));
 }
 
 }  // namespace

@@ -1,5 +1,5 @@
-/// A ball array's model goes out by the rules of any other: vector and uncertainty only where it may be
-/// applied.
+/// A ball array's model goes out by the rules of any other: vector and uncertainty only where it
+/// may be applied.
 
 #include <gmock/gmock.h>
 
@@ -15,8 +15,8 @@ using calib::Vector3;
 
 struct PolynomialPublication : testing::Test {
   static ModelInForce in_force() {
-    const auto observations =
-        calib::evemu::observe_errors(tests::evemu::reference_errors(), tests::evemu::reference_machine());
+    const auto observations = calib::evemu::observe_errors(tests::evemu::reference_errors(),
+                                                           tests::evemu::reference_machine());
     return {.id = "m",
             .method = "evemu",
             .estimator = "bayes-pose",
@@ -31,8 +31,8 @@ struct PolynomialPublication : testing::Test {
   }
   [[nodiscard]] v1::Compensation compensation(const protocol::Snapshot& s,
                                               const std::array<double, 3>& tool_m = {}) const {
-    return compensation_message(v1::ModelStatus::MODEL_ACTIVE, &model, s, tool_m, std::chrono::seconds{1},
-                                {});
+    return compensation_message(v1::ModelStatus::MODEL_ACTIVE, &model, s, tool_m,
+                                std::chrono::seconds{1}, {});
   }
 
   ModelInForce model = in_force();
@@ -84,11 +84,13 @@ TEST_F(PolynomialPublication, TheGridIsFineAndItsUncertaintyHoldsBetweenNodesToo
   std::size_t nodes = 0;
   const v1::GridNode* inside = nullptr;
   const auto slices = grid_messages(model, {});
+
   for (const auto& slice : slices) {
     nodes += slice.nodes().size();
     for (const auto& node : slice.nodes())
       if (node.inside()) inside = &node;
   }
+
   EXPECT_GT(nodes, 3000u);
   ASSERT_NE(inside, nullptr);
   const Vector3 q(inside->position_m()[0], inside->position_m()[1], inside->position_m()[2]);

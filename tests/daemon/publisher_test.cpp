@@ -58,8 +58,8 @@ class PublisherTest : public ::testing::Test {
     far_.emplace(directory_ / "dds.sock");
     publisher_->beat(kWall);
   }
-  void publish_live(const protocol::Snapshot& view, const ModelStanding& standing, protocol::HostTime now,
-                    Publisher::WallTime wall) {
+  void publish_live(const protocol::Snapshot& view, const ModelStanding& standing,
+                    protocol::HostTime now, Publisher::WallTime wall) {
     publisher_->snapshot(view, now, wall);
     publisher_->compensation(view, standing, now, wall);
   }
@@ -161,6 +161,7 @@ TEST_F(PublisherTest, TheStateGoesOutEverySecondAndAtOnceWhenItChanges) {
     publisher_->model({}, kNow + t, kWall + t);
     sent += taken<v1::ModelState>(Topic::ModelState).size();
   }
+
   EXPECT_EQ(sent, 3u);
   auto standing = active();
   standing.reason = "forced by anna: crane test";

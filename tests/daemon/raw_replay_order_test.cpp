@@ -1,5 +1,5 @@
-/// A driver may read bytes late: what it then had sent before counts for its samples, whatever the stamps
-/// say. And the hub may take bytes a turn before it takes what the driver makes of them.
+/// A driver may read bytes late: what it then had sent before counts for its samples, whatever the
+/// stamps say. And the hub may take bytes a turn before it takes what the driver makes of them.
 
 #include <gmock/gmock.h>
 
@@ -24,10 +24,12 @@ using protocol::HostTime;
 using protocol::RawBlock;
 
 std::string encoders_alone() {
-  return to_toml(config_tables::weak_portal()) + to_toml(config_tables::Encoder{.sync_period_us = 1000});
+  return to_toml(config_tables::weak_portal()) +
+         to_toml(config_tables::Encoder{.sync_period_us = 1000});
 }
 
-/// A live run by hand: what the driver would read, in its order, goes into its receiver and into a recording.
+/// A live run by hand: what the driver would read, in its order, goes into its receiver and into a
+/// recording.
 class LiveEncoders {
  public:
   explicit LiveEncoders(const std::filesystem::path& folder)
@@ -44,12 +46,14 @@ class LiveEncoders {
     for (const auto& axis : config_.encoder->nodes) answer(axis.node, count, t);
   }
   /// The hub takes the bytes from now on at `bytes`, the samples made of them at `samples`.
-  void turn(HostTime bytes, HostTime samples) {
+  void cycle(HostTime bytes, HostTime samples) {
     bytes_taken_ = bytes;
     samples_taken_ = samples;
   }
   void lose_samples() { samples_are_lost_ = true; }  ///< by the recorder, all of them
-  [[nodiscard]] RecordingReader recording() { return *RecordingReader::open(recorder_.close()->file); }
+  [[nodiscard]] RecordingReader recording() {
+    return *RecordingReader::open(recorder_.close()->file);
+  }
   [[nodiscard]] const Config& config() const { return config_; }
   [[nodiscard]] const std::vector<AxisSample>& samples() const { return samples_; }
   [[nodiscard]] const std::vector<HostTime>& turns() const { return turns_; }  ///< of samples()
@@ -83,10 +87,10 @@ class LiveEncoders {
 std::vector<AxisSample> replayed(const RecordingReader& recording, const Config& config,
                                  ReplaySource source) {
   std::vector<AxisSample> samples;
-  const auto report =
-      replay(recording, config, {.source = source, .samples = [&](const Batch& batch, HostTime) {
-                                   samples.insert(samples.end(), batch.axes.begin(), batch.axes.end());
-                                 }});
+  const auto report = replay(recording, config,
+                             {.source = source, .samples = [&](const Batch& batch, HostTime) {
+                                samples.insert(samples.end(), batch.axes.begin(), batch.axes.end());
+                              }});
   EXPECT_TRUE(report.has_value());
   return samples;
 }
@@ -111,15 +115,17 @@ TEST(RawReplay, DecodesBytesInTheOrderInWhichTheDriverReadThem) {
   const TemporaryFolder folder;
   LiveEncoders live{folder.path()};
   const HostTime start = example_time(0);
+
   for (std::int64_t i = 0; i < 6; ++i) {
     const HostTime sync = start + 1ms * i;
     live.sync(sync);
-    // Each SYNC is sent before the answer is read that came just before it: as early as two clocks may
-    // differ.
+    // Each SYNC is sent before the answer is read that came just before it: as early as two clocks
+    // may differ.
     if (i > 0) live.answer(3, 10 * (i - 1) + 2, sync - 10us);
     live.answer(1, 10 * i, sync + 200us);
     live.answer(2, 10 * i + 1, sync + 300us);
   }
+
   live.sync(start + 6ms);
   ASSERT_GE(live.samples().size(), 6u);
   const auto recording = live.recording();
@@ -127,7 +133,7 @@ TEST(RawReplay, DecodesBytesInTheOrderInWhichTheDriverReadThem) {
   expect_same(replayed(recording, live.config(), ReplaySource::RawBytes), live.samples());
 }
 
-std::vector<HostTime> turns_from_bytes(const RecordingReader& recording, const Config& config) {
+std::vector<HostTime> cycles_from_bytes(const RecordingReader& recording, const Config& config) {
   std::vector<HostTime> turns;
   ReplayOptions options{.source = ReplaySource::RawBytes};
   options.samples = [&](const Batch& batch, HostTime) {
@@ -143,12 +149,12 @@ TEST(RawReplay, GivesSamplesInTheTurnsOfTheLiveRunNotInThoseOfTheirBytes) {
   const HostTime start = example_time(0);
   for (std::int64_t i = 0; i < 20; ++i) {
     const HostTime sync = start + 1ms * i;
-    live.turn(sync + 250us, i % 3 == 0 ? sync + 500us : sync + 250us);
+    live.cycle(sync + 250us, i % 3 == 0 ? sync + 500us : sync + 250us);
     live.sync(sync);
     live.all_answer(i, sync + 100us);
   }
   ASSERT_GE(live.turns().size(), 19u);
-  EXPECT_EQ(turns_from_bytes(live.recording(), live.config()), live.turns());
+  EXPECT_EQ(cycles_from_bytes(live.recording(), live.config()), live.turns());
 }
 
 TEST(RawReplay, ASampleThatIsTakenBackComesInATurnOfItsOwn) {
@@ -156,34 +162,36 @@ TEST(RawReplay, ASampleThatIsTakenBackComesInATurnOfItsOwn) {
   LiveEncoders live{folder.path()};
   for (std::int64_t i = 0; i < 20; ++i) {
     const HostTime sync = example_time(0) + 1ms * i;
-    live.turn(sync + 250us, sync + 500us);
+    live.cycle(sync + 250us, sync + 500us);
     live.sync(sync);
     live.all_answer(i, sync + 100us);
-    live.turn(sync + 500us, sync + 750us);
+    live.cycle(sync + 500us, sync + 750us);
     if (i % 4 == 2) live.answer(1, i, sync + 400us);  // twice in one cycle: neither counts
   }
+
   const auto& samples = live.samples();
   const auto same_instant = [](const AxisSample& a, const AxisSample& b) {
     return a.head.time == b.head.time;
   };
+
   ASSERT_NE(std::adjacent_find(samples.begin(), samples.end(), same_instant), samples.end());
   const auto turns = live.turns();
-  EXPECT_EQ(turns_from_bytes(live.recording(), live.config()), turns);
+  EXPECT_EQ(cycles_from_bytes(live.recording(), live.config()), turns);
 }
 
 TEST(RawReplay, WhatTheLiveRunDidNotHaveComesWithItsBytes) {
   const TemporaryFolder folder;
   LiveEncoders live{folder.path()};
   live.lose_samples();
-  std::vector<HostTime> turns_of_bytes;
+  std::vector<HostTime> cycles_of_bytes;
   for (std::int64_t i = 0; i < 20; ++i) {
     const HostTime sync = example_time(0) + 1ms * i;
-    turns_of_bytes.push_back(sync + 250us);
-    live.turn(turns_of_bytes.back(), turns_of_bytes.back());
+    cycles_of_bytes.push_back(sync + 250us);
+    live.cycle(cycles_of_bytes.back(), cycles_of_bytes.back());
     live.sync(sync);
     live.all_answer(i, sync + 100us);
   }
-  EXPECT_EQ(turns_from_bytes(live.recording(), live.config()), turns_of_bytes);
+  EXPECT_EQ(cycles_from_bytes(live.recording(), live.config()), cycles_of_bytes);
 }
 
 }  // namespace

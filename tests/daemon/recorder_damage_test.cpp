@@ -18,8 +18,8 @@ constexpr std::uint32_t kDamagedChunks = 3;
 constexpr std::uint32_t kPerDamagedChunk = 10;
 
 #ifdef __SANITIZE_THREAD__
-constexpr std::size_t kSummaryStep =
-    16;  // one thread and 40 kB of schema texts: nothing to find there, and slow
+// one thread and 40 kB of schema texts: nothing to find there, and slow
+constexpr std::size_t kSummaryStep = 16;
 #else
 constexpr std::size_t kSummaryStep = 1;
 #endif
@@ -61,8 +61,11 @@ TEST_F(DamagedRecording, CutAtAnyByteKeepsEveryFinishedChunk) {
   ASSERT_EQ(chunk_ends_.size(), kDamagedChunks);
   const auto file = folder_.path() / "cut.mcap";
   write_file(file, whole_, whole_.size());
-  const std::size_t data_end = chunk_ends_.back() + 1024;  // indexes and DataEnd lie behind the last chunk
-  for (std::size_t cut = whole_.size(); cut >= chunk_starts_[0]; cut -= cut > data_end ? kSummaryStep : 1) {
+
+  // indexes and DataEnd lie behind the last chunk
+  const std::size_t data_end = chunk_ends_.back() + 1024;
+  for (std::size_t cut = whole_.size(); cut >= chunk_starts_[0];
+       cut -= cut > data_end ? kSummaryStep : 1) {
     std::filesystem::resize_file(file, cut);
     const auto finished = static_cast<std::uint32_t>(
         std::ranges::count_if(chunk_ends_, [cut](std::size_t end) { return end <= cut; }));
@@ -72,9 +75,11 @@ TEST_F(DamagedRecording, CutAtAnyByteKeepsEveryFinishedChunk) {
     ASSERT_LE(reader->message_count(), std::min(finished + 1, kDamagedChunks) * kPerDamagedChunk)
         << "cut at " << cut;
     std::uint32_t i = 0;
+
     for (auto cursor = reader->messages(); const auto message = cursor.next(); ++i) {
       ASSERT_EQ(message->taken, example_time(i)) << "cut at " << cut;
     }
+
     ASSERT_EQ(i, reader->message_count());
   }
 }
@@ -168,8 +173,8 @@ TEST(RecordingReader, RefusesWhatIsNoRecording) {
   }
 }
 
-/// Lets a recorder finish `chunks` chunks and kills it while it goes on. How many messages it had in finished
-/// chunks.
+/// Lets a recorder finish `chunks` chunks and kills it while it goes on. How many messages it had
+/// in finished chunks.
 std::uint64_t killed_recorder(const std::filesystem::path& directory, unsigned chunks) {
   int pipe_ends[2];
   if (::pipe(pipe_ends) != 0) return 0;
@@ -180,14 +185,15 @@ std::uint64_t killed_recorder(const std::filesystem::path& directory, unsigned c
   }
   ::close(pipe_ends[1]);
   std::uint64_t finished = 0;
-  for (unsigned k = 0; k < chunks && ::read(pipe_ends[0], &finished, sizeof finished) == sizeof finished;
-       ++k) {
+  for (unsigned k = 0;
+       k < chunks && ::read(pipe_ends[0], &finished, sizeof finished) == sizeof finished; ++k) {
   }
   ::kill(child, SIGKILL);
   ::waitpid(child, nullptr, 0);
   while (::read(pipe_ends[0], &finished, sizeof finished) == sizeof finished) {
   }
   ::close(pipe_ends[0]);
+
   return finished;
 }
 

@@ -1,5 +1,5 @@
-// A disk that is full. The limit of the process's file size (RLIMIT_FSIZE) stands for it: the kernel writes
-// up to the limit, then refuses with EFBIG, as it does with ENOSPC on a full disk.
+// A disk that is full. The limit of the process's file size (RLIMIT_FSIZE) stands for it: the
+// kernel writes up to the limit, then refuses with EFBIG, as it does with ENOSPC on a full disk.
 
 #include <gtest/gtest.h>
 #include <sys/resource.h>
@@ -88,7 +88,8 @@ TEST_F(DiskFull, WhatWasFinishedIsWholeAndNothingIsCorrupt) {
   Recorder recorder = open();
   record(recorder, 1000);
   const bool closed = std::filesystem::exists(folder_.path() / "run.mcap");
-  EXPECT_EQ(sound_messages(closed ? "run.mcap" : "run.mcap.part", closed), recorder.status().messages);
+  EXPECT_EQ(sound_messages(closed ? "run.mcap" : "run.mcap.part", closed),
+            recorder.status().messages);
 }
 
 TEST_F(DiskFull, EveryLimitWithinAChunkLeavesASoundFile) {
@@ -113,6 +114,7 @@ TEST_F(DiskFull, RecordingGoesOnInANewFileWhenThereIsRoomAgain) {
   Recorder recorder = open(WallTime{100s});
   recorder.attach({"path.csv", "text/csv", "x_mm\n"}, example_time(0));
   record(recorder, 1000);
+
   ASSERT_EQ(recorder.status().state, State::DiskFull);
   const auto before = recorder.status();
   limit.set(RLIM_INFINITY);
@@ -149,9 +151,11 @@ TEST_F(DiskFull, TheNextFileSaysHowManyMessagesAreMissing) {
   ASSERT_TRUE(recorder.close());
   std::vector<std::uint32_t> lost_before;
   RecordingSink sink;
+
   sink.axis_sample = [&](const protocol::AxisSample& a, std::string_view) {
     lost_before.push_back(a.head.lost_before);
   };
+
   EXPECT_EQ(RecordingReader::open(folder_.path() / "run-2.mcap")->read(sink), 0u);
   EXPECT_EQ(lost_before, (std::vector<std::uint32_t>{static_cast<std::uint32_t>(before.lost), 0}));
 }

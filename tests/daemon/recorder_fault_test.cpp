@@ -142,6 +142,7 @@ TEST(RecorderThreadFault, MessagesThatWereDroppedDuringTheRunAreInItsDigest) {
   options.recorder = example_options(folder.path());
   options.most_waiting_bytes = 1000;
   auto thread = RecorderThread::start(std::move(options), example_info());
+
   ASSERT_TRUE(thread);
   Batch batch;
   for (std::uint32_t i = 0; i < 100; ++i) batch.axes.push_back(example_axes(i));

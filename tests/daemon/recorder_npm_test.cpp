@@ -55,7 +55,8 @@ json expected_value(std::uint32_t i) {
     case 2: {
       const auto block = example_block(i);
       json bytes = json::array();
-      for (std::size_t b = 0; b < block.length; ++b) bytes.push_back(static_cast<int>(block.bytes[b]));
+      for (std::size_t b = 0; b < block.length; ++b)
+        bytes.push_back(static_cast<int>(block.bytes[b]));
       return {{"device", "tracker"},
               {"host_time_ns", host_ns(i)},
               {"lost_before", block.lost_before},
@@ -94,12 +95,14 @@ TEST_F(RecordingInPublicLibraries, EveryFieldOfEveryMessageIsDecodedBySchemaAtTh
   const json seen = PublicLibraries::verify("whole '" + file.string() + "'");
   const json& messages = seen["indexed"]["messages"];
   ASSERT_EQ(messages.size(), 100u);
+
   for (std::uint32_t i = 0; i < 100; ++i) {
     ASSERT_EQ(messages[i]["value"], expected_value(i)) << i;
     ASSERT_EQ(messages[i]["sequence"], i / 5);
     ASSERT_EQ(messages[i]["encoding"], "cdr");
     ASSERT_EQ(messages[i]["schemaEncoding"], "omgidl");
   }
+
   EXPECT_EQ(messages[0]["topic"], "abbe/v1/TrackerPoint");
   EXPECT_EQ(messages[0]["schema"], "abbe::v1::TrackerPoint");
   EXPECT_EQ(messages[0]["date"], "2026-03-01T12:00:00.000Z");
@@ -119,8 +122,10 @@ TEST_F(RecordingInPublicLibraries, MetadataAndAttachmentsAreSeen) {
   ASSERT_TRUE(recorder);
   recorder->attach({"path.csv", "text/csv", "x_mm,y_mm,z_mm\n"}, example_time(0));
   record_example(*recorder, 0);
+
   ASSERT_TRUE(recorder->close());
-  const json seen = PublicLibraries::verify("whole '" + (folder_.path() / "run.mcap").string() + "'");
+  const json seen =
+      PublicLibraries::verify("whole '" + (folder_.path() / "run.mcap").string() + "'");
   const json& metadata = seen["indexed"]["metadata"];
   ASSERT_EQ(metadata.size(), 3u);
   EXPECT_EQ(metadata[0]["name"], "abbe.recording");
@@ -128,7 +133,8 @@ TEST_F(RecordingInPublicLibraries, MetadataAndAttachmentsAreSeen) {
   EXPECT_EQ(metadata[1]["entries"]["text"], example_info().configuration);
   EXPECT_EQ(
       seen["indexed"]["attachments"],
-      (json::array({{{"name", "path.csv"}, {"mediaType", "text/csv"}, {"content", "x_mm,y_mm,z_mm\n"}}})));
+      (json::array(
+          {{{"name", "path.csv"}, {"mediaType", "text/csv"}, {"content", "x_mm,y_mm,z_mm\n"}}})));
 }
 
 TEST_F(RecordingInPublicLibraries, AFileCutAtAnyByteStillGivesEveryFinishedChunk) {
@@ -139,18 +145,23 @@ TEST_F(RecordingInPublicLibraries, AFileCutAtAnyByteStillGivesEveryFinishedChunk
   std::vector<std::size_t> starts;
   std::vector<std::size_t> ends;
   protocol::mcap::LinearScan scan{std::as_bytes(std::span{bytes})};
+
   while (const auto item = scan.next()) {
     if (!item->chunk) continue;
     starts.push_back(item->record.offset);
     ends.push_back(item->record.end());
   }
+
   ASSERT_EQ(ends.size(), kChunks);
   write_file(folder_.path() / "data.mcap", bytes, scan.whole_until());
   const auto data = (folder_.path() / "data.mcap").string();
-  const json seen = PublicLibraries::verify("cuts '" + data + "' " + std::to_string(starts[0]) + " 1");
+  const json seen =
+      PublicLibraries::verify("cuts '" + data + "' " + std::to_string(starts[0]) + " 1");
   ASSERT_EQ(seen.size(), scan.whole_until() - starts[0] + 1);
+
   for (const json& at : seen) {
-    const auto finished = std::ranges::count_if(ends, [&](std::size_t end) { return end <= at[0]; });
+    const auto finished =
+        std::ranges::count_if(ends, [&](std::size_t end) { return end <= at[0]; });
     ASSERT_EQ(at[1], finished * kPerChunk) << "cut at " << at[0];
   }
 }

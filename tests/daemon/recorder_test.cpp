@@ -38,10 +38,12 @@ TEST_F(RecorderTest, ATrackerPointComesBackAsItWas) {
   std::vector<protocol::TrackerPoint> points;
   const auto reader = read("run.mcap");
   RecordingSink sink;
+
   sink.tracker_point = [&](const protocol::TrackerPoint& point, std::string_view device) {
     EXPECT_EQ(device, "tracker");
     points.push_back(point);
   };
+
   EXPECT_EQ(reader.read(sink), 0u);
   ASSERT_EQ(points.size(), 1u);
   const auto wanted = example_point(7);
@@ -60,7 +62,11 @@ TEST_F(RecorderTest, AnAxisSampleComesBackAsItWas) {
   ASSERT_TRUE(recorder.close());
   std::vector<protocol::AxisSample> samples;
   RecordingSink sink;
-  sink.axis_sample = [&](const protocol::AxisSample& sample, std::string_view) { samples.push_back(sample); };
+
+  sink.axis_sample = [&](const protocol::AxisSample& sample, std::string_view) {
+    samples.push_back(sample);
+  };
+
   EXPECT_EQ(read("run.mcap").read(sink), 0u);
   ASSERT_EQ(samples.size(), 1u);
   const auto wanted = example_axes(7);
@@ -80,6 +86,7 @@ TEST_F(RecorderTest, TouchesAndTheScansAroundThemComeBackAsTheyWere) {
   ASSERT_TRUE(recorder.close());
   std::size_t given = 0;
   RecordingSink sink;
+
   sink.probe_trigger = [&](const protocol::ProbeTrigger& touch, std::string_view device) {
     const auto wanted = example_touch(9);
     EXPECT_EQ(device, "probe");
@@ -99,6 +106,7 @@ TEST_F(RecorderTest, TouchesAndTheScansAroundThemComeBackAsTheyWere) {
     EXPECT_EQ(touch.U95_position, wanted.U95_position);
     ++given;
   };
+
   sink.touch_scan = [&](const protocol::TouchScan& scan, std::string_view) {
     const auto wanted = example_touch_scan(10);
     EXPECT_EQ(scan.touch, wanted.touch);
@@ -109,6 +117,7 @@ TEST_F(RecorderTest, TouchesAndTheScansAroundThemComeBackAsTheyWere) {
     EXPECT_EQ(scan.position, wanted.position);
     ++given;
   };
+
   EXPECT_EQ(read("run.mcap").read(sink), 0u);
   EXPECT_EQ(given, 2u);
 }
@@ -121,6 +130,7 @@ TEST_F(RecorderTest, RawBytesWeatherAndEventsComeBackAsTheyWere) {
   ASSERT_TRUE(recorder.close());
   std::size_t given = 0;
   RecordingSink sink;
+
   sink.raw_block = [&](const protocol::RawBlock& block, std::string_view device) {
     const auto wanted = example_block(3);
     EXPECT_EQ(device, "tracker");
@@ -128,9 +138,11 @@ TEST_F(RecorderTest, RawBytesWeatherAndEventsComeBackAsTheyWere) {
     EXPECT_EQ(block.direction, wanted.direction);
     EXPECT_EQ(block.continued, wanted.continued);
     ASSERT_EQ(block.length, wanted.length);
-    EXPECT_TRUE(std::equal(wanted.bytes.begin(), wanted.bytes.begin() + wanted.length, block.bytes.begin()));
+    EXPECT_TRUE(std::equal(wanted.bytes.begin(), wanted.bytes.begin() + wanted.length,
+                           block.bytes.begin()));
     ++given;
   };
+
   sink.environment = [&](const protocol::EnvironmentSample& sample, std::string_view) {
     EXPECT_EQ(sample.head.time, example_time(4));
     EXPECT_EQ(sample.air_temperature_K, example_environment(4).air_temperature_K);
@@ -139,10 +151,12 @@ TEST_F(RecorderTest, RawBytesWeatherAndEventsComeBackAsTheyWere) {
     EXPECT_TRUE(std::isnan(sample.temperature_K[0]));
     ++given;
   };
+
   sink.calibration_event = [&](const v1::CalibrationEvent& event) {
     EXPECT_TRUE(event == example_event(5));
     ++given;
   };
+
   EXPECT_EQ(read("run.mcap").read(sink), 0u);
   EXPECT_EQ(given, 3u);
 }
@@ -168,7 +182,8 @@ TEST_F(RecorderTest, AnExistingRecordingIsNeverOverwritten) {
   const auto second = Recorder::open(example_options(folder_.path()), example_info(), WallTime{});
   ASSERT_FALSE(second);
   EXPECT_EQ(second.error().code, ErrorCode::Io);
-  EXPECT_NE(second.error().text.find("run.mcap: File exists"), std::string::npos) << second.error().text;
+  EXPECT_NE(second.error().text.find("run.mcap: File exists"), std::string::npos)
+      << second.error().text;
 }
 
 TEST_F(RecorderTest, AFolderThatCannotBeMadeIsSaidAndTriedAgain) {
@@ -177,7 +192,8 @@ TEST_F(RecorderTest, AFolderThatCannotBeMadeIsSaidAndTriedAgain) {
   auto recorder = Recorder::open(example_options(nowhere), example_info(), WallTime{100s});
   ASSERT_TRUE(recorder) << "acquisition does not wait for a disk";
   EXPECT_EQ(recorder->status().state, State::Failed);
-  EXPECT_NE(recorder->status().fault.find("nowhere"), std::string::npos) << recorder->status().fault;
+  EXPECT_NE(recorder->status().fault.find("nowhere"), std::string::npos)
+      << recorder->status().fault;
   std::filesystem::remove(nowhere);
   recorder->tick(WallTime{105s});
   EXPECT_EQ(recorder->status().state, State::Recording);
@@ -237,6 +253,7 @@ TEST_F(RecorderTest, ADeviceNameBeyondTheIdlIsCountedNotWritten) {
 TEST_F(RecorderTest, TheFileExplainsItself) {
   Recorder recorder = open();
   recorder.attach({"path.csv", "text/csv", "x_mm,y_mm,z_mm\n"}, example_time(0));
+
   ASSERT_TRUE(recorder.close());
   const auto reader = read("run.mcap");
   EXPECT_EQ(reader.info().machine, "M1");
@@ -257,6 +274,7 @@ TEST_F(RecorderTest, TheDigestIsThatOfTheFile) {
   recorder.flush();
   const auto so_far = recorder.digest();
   const auto prefix = bytes_of_file(so_far.file);
+
   EXPECT_EQ(so_far.bytes, prefix.size());
   EXPECT_EQ(so_far.sha256, sha256_hex({prefix.data(), prefix.size()}));
   recorder.record(example_point(2), "tracker");
@@ -271,18 +289,21 @@ TEST_F(RecorderTest, LateSamplesAreGivenInOrderOfTimeAndEqualOnesAsRecorded) {
   auto options = example_options(folder_.path());
   options.chunk_bytes = 2048;  // about 15 messages: a burst reaches back over several chunks
   Recorder recorder = open(options);
+
   for (std::uint32_t i = 0; i < 300; ++i) {
     recorder.record(example_axes(i), "encoder");
     if (i % 100 == 99) {
       for (std::uint32_t k = i - 99; k <= i; k += 2) recorder.record(example_point(k), "tracker");
     }
   }
+
   ASSERT_TRUE(recorder.close());
   const auto reader = read("run.mcap");
   auto cursor = reader.messages();
   protocol::HostTime before{};
   std::string_view topic_before;
   std::size_t messages = 0;
+
   for (; const auto message = cursor.next(); ++messages) {
     ASSERT_GE(message->taken, before);
     const bool recorded_later = message->taken == before && topic_before == "abbe/v1/TrackerPoint";
@@ -290,6 +311,7 @@ TEST_F(RecorderTest, LateSamplesAreGivenInOrderOfTimeAndEqualOnesAsRecorded) {
     before = message->taken;
     topic_before = message->topic;
   }
+
   EXPECT_EQ(messages, 450u);
   EXPECT_EQ(cursor.progress(), 1.0);
   ASSERT_TRUE(reader.time_range());
@@ -338,10 +360,12 @@ TEST_F(RecorderTest, AFullFileIsClosedAndTheNextGoesOnWithoutAHole) {
   Recorder recorder = open(small_files(folder_.path()));
   auto point = example_point(1);
   point.head.lost_before = 0;
+
   for (int i = 0; i < 3; ++i) {
     recorder.record(point, "tracker");
     recorder.flush();
   }
+
   ASSERT_TRUE(recorder.close());
   for (const char* file : {"run.mcap", "run-2.mcap", "run-3.mcap"}) {
     int points = 0;
@@ -353,6 +377,7 @@ TEST_F(RecorderTest, AFullFileIsClosedAndTheNextGoesOnWithoutAHole) {
     EXPECT_EQ(read(file).read(sink), 0u);
     EXPECT_EQ(points, 1) << file;
   }
+
   EXPECT_FALSE(exists("run-4.mcap"));
   EXPECT_FALSE(exists("run-4.mcap.part"));
   EXPECT_EQ(recorder.status().lost, 0u);
@@ -362,17 +387,20 @@ TEST_F(RecorderTest, TheRunOfACalibrationLiesInOneFile) {
   Recorder recorder = open(small_files(folder_.path()));
   recorder.attach({"calibration-otf.json", "application/json", "{}"}, example_time(1));
   recorder.record(event_of("warming"));
+
   for (std::uint32_t i = 0; i < 3; ++i) {
     recorder.record(example_point(i), "tracker");
     recorder.flush();
     EXPECT_FALSE(exists("run-2.mcap.part")) << i;
   }
+
   recorder.record(event_of("active"));
   recorder.flush();
   recorder.record(example_point(4), "tracker");
   ASSERT_TRUE(recorder.close());
   EXPECT_EQ(read("run.mcap").attachments().size(), 1u);
-  EXPECT_EQ(read("run-2.mcap").attachments().size(), 0u) << "asked for again where its points are not";
+  EXPECT_EQ(read("run-2.mcap").attachments().size(), 0u)
+      << "asked for again where its points are not";
 }
 
 }  // namespace

@@ -75,14 +75,17 @@ TEST_F(RecorderThreadTest, EveryMessageSaysInWhichTurnItWasTaken) {
     b.reference_raw.push_back(example_block(first));
     thread_->hand_over(b);
   }
+
   const auto reader = finish();
   auto cursor = reader.messages();
-  std::map<protocol::HostTime, int> messages_of_turn;
+  std::map<protocol::HostTime, int> messages_of_cycle;
+
   while (const auto message = cursor.next()) {
-    ++messages_of_turn[message->taken];
+    ++messages_of_cycle[message->taken];
     EXPECT_LT(message->published, message->taken) << "what was measured before";
   }
-  EXPECT_THAT(messages_of_turn,
+
+  EXPECT_THAT(messages_of_cycle,
               testing::ElementsAre(std::pair{taken_at(0), 18}, std::pair{taken_at(10), 18}));
 }
 
@@ -120,9 +123,11 @@ TEST_F(RecorderThreadTest, RecordsEnvironmentDevicesUnderTheirNames) {
   thread_->hand_over(measured(0, 2, 1));
   std::map<std::string, int, std::less<>> samples, blocks;
   RecordingSink sink;
+
   sink.environment = [&](const protocol::EnvironmentSample&, std::string_view d) {
     ++samples[std::string{d}];
   };
+
   sink.raw_block = [&](const protocol::RawBlock&, std::string_view d) { ++blocks[std::string{d}]; };
   EXPECT_EQ(finish().read(sink), 0u);
   const std::map<std::string, int, std::less<>> expected{{"air", 1}, {"scales", 2}};
@@ -140,15 +145,20 @@ TEST_F(RecorderThreadTest, EveryEnvironmentDeviceSaysItsOwnLosses) {
   std::vector<std::pair<std::string, bool>> samples;
   std::vector<std::pair<std::string, std::uint32_t>> blocks;
   RecordingSink sink;
+
   sink.environment = [&](const protocol::EnvironmentSample& e, std::string_view d) {
     samples.emplace_back(d, has(e.head.flags, SampleFlag::GapBefore));
   };
+
   sink.raw_block = [&](const protocol::RawBlock& b, std::string_view d) {
     blocks.emplace_back(d, b.lost_before);
   };
+
   EXPECT_EQ(finish().read(sink), 0u);
-  EXPECT_THAT(samples, UnorderedElementsAre(Pair("air", false), Pair("scales", true), Pair("scales", false)));
-  EXPECT_THAT(blocks, UnorderedElementsAre(Pair("air", 0u), Pair("scales", 100u), Pair("scales", 0u)));
+  EXPECT_THAT(samples, UnorderedElementsAre(Pair("air", false), Pair("scales", true),
+                                            Pair("scales", false)));
+  EXPECT_THAT(blocks,
+              UnorderedElementsAre(Pair("air", 0u), Pair("scales", 100u), Pair("scales", 0u)));
 }
 
 TEST_F(RecorderThreadTest, TheNextMessageOfEveryStreamSaysHowManyAreMissing) {
@@ -160,19 +170,24 @@ TEST_F(RecorderThreadTest, TheNextMessageOfEveryStreamSaysHowManyAreMissing) {
   std::vector<std::uint32_t> points, axes, tracker_raw, encoder_raw;
   std::vector<bool> environment;
   RecordingSink sink;
+
   sink.tracker_point = [&](const protocol::TrackerPoint& p, std::string_view) {
     points.push_back(p.head.lost_before);
   };
+
   sink.axis_sample = [&](const protocol::AxisSample& a, std::string_view) {
     axes.push_back(a.head.lost_before);
     EXPECT_EQ(has(a.head.flags, SampleFlag::GapBefore), a.head.lost_before > 0);
   };
+
   sink.environment = [&](const protocol::EnvironmentSample& e, std::string_view) {
     environment.push_back(has(e.head.flags, SampleFlag::GapBefore));
   };
+
   sink.raw_block = [&](const protocol::RawBlock& b, std::string_view device) {
     (device == "tracker" ? tracker_raw : encoder_raw).push_back(b.lost_before);
   };
+
   EXPECT_EQ(finish().read(sink), 0u);
   const std::vector<std::uint32_t> expected{0, 0, 100, 0};
   EXPECT_EQ(points, expected);

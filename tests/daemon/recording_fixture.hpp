@@ -1,6 +1,6 @@
 #pragma once
-/// A folder of its own for every test, samples whose content says which number they have, and recordings of
-/// them.
+/// A folder of its own for every test, samples whose content says which number they have, and
+/// recordings of them.
 
 #include <gtest/gtest.h>
 #include <stdlib.h>
@@ -23,7 +23,8 @@ namespace abbe::daemon {
 class TemporaryFolder {
  public:
   TemporaryFolder() {
-    std::string pattern = (std::filesystem::temp_directory_path() / "abbe-recording-XXXXXX").string();
+    std::string pattern =
+        (std::filesystem::temp_directory_path() / "abbe-recording-XXXXXX").string();
     if (::mkdtemp(pattern.data()) == nullptr) ADD_FAILURE() << "no temporary folder: " << pattern;
     path_ = pattern;
   }
@@ -46,7 +47,8 @@ inline FileBytes bytes_of_file(const std::filesystem::path& file) {
   return {std::istreambuf_iterator<char>(in), std::istreambuf_iterator<char>()};
 }
 
-inline void write_file(const std::filesystem::path& file, const FileBytes& bytes, std::size_t size) {
+inline void write_file(const std::filesystem::path& file, const FileBytes& bytes,
+                       std::size_t size) {
   std::ofstream out(file, std::ios::binary | std::ios::trunc);
   out.write(bytes.data(), static_cast<std::streamsize>(size));
 }
@@ -72,7 +74,11 @@ inline void damage_chunk(const std::filesystem::path& file, std::size_t number) 
 inline constexpr protocol::UtcOffset kOffset{std::chrono::seconds{1772366400 - 1000}};
 
 inline RecordingInfo example_info() {
-  return {"M1", kOffset, 20.0, "[machine]\nname = \"M1\"\n", {{"abbe", "0.1.0"}, {"tracker", "emScon 3.6"}}};
+  return {"M1",
+          kOffset,
+          20.0,
+          "[machine]\nname = \"M1\"\n",
+          {{"abbe", "0.1.0"}, {"tracker", "emScon 3.6"}}};
 }
 
 inline RecorderOptions example_options(const std::filesystem::path& directory) {
@@ -133,6 +139,7 @@ inline protocol::ProbeTrigger example_touch(std::uint32_t i) {
   touch.velocity = {0.0, 0.0, -0.004};
   touch.u_position = {1e-9, 2e-9, 3e-9};
   touch.U95_position = {2e-9, 4e-9, 6e-9};
+
   return touch;
 }
 
@@ -155,8 +162,8 @@ inline protocol::RawBlock example_block(std::uint32_t i) {
   block.lost_before = i;
   block.length = static_cast<std::uint16_t>(10 + i % 100);
   block.continued = i % 2 == 1;
-  block.direction =
-      i % 3 == 0 ? protocol::RawBlock::Direction::ToDevice : protocol::RawBlock::Direction::FromDevice;
+  block.direction = i % 3 == 0 ? protocol::RawBlock::Direction::ToDevice
+                               : protocol::RawBlock::Direction::FromDevice;
   for (std::size_t b = 0; b < block.length; ++b) block.bytes[b] = static_cast<std::byte>(i + b);
   return block;
 }
@@ -189,8 +196,8 @@ inline void record_example(Recorder& recorder, std::uint32_t i) {
 }
 
 /// Each chunk holds `per_chunk` examples; closed cleanly.
-inline std::filesystem::path example_recording(const std::filesystem::path& directory, std::uint32_t chunks,
-                                               std::uint32_t per_chunk) {
+inline std::filesystem::path example_recording(const std::filesystem::path& directory,
+                                               std::uint32_t chunks, std::uint32_t per_chunk) {
   auto recorder = Recorder::open(example_options(directory), example_info(), {});
   if (!recorder) {
     ADD_FAILURE() << recorder.error().text;

@@ -1,5 +1,6 @@
 #pragma once
-/// Runs mcap_npm/verify.mjs, which reads recordings with @mcap/core and the OMG IDL libraries of npm.
+/// Runs mcap_npm/verify.mjs, which reads recordings with @mcap/core and the OMG IDL libraries of
+/// npm.
 
 #include <gtest/gtest.h>
 #include <sys/file.h>
@@ -25,19 +26,22 @@ class PublicLibraries {
   static constexpr const char* kSkipped =
       "node and npm are not installed: the public MCAP libraries were not asked";
 
-  /// Installs the libraries beside the test program (once, as package-lock.json says), then asks them.
+  /// Installs the libraries beside the test program (once, as package-lock.json says), then asks
+  /// them.
   [[nodiscard]] static nlohmann::json verify(const std::string& arguments) {
     const auto folder = std::filesystem::read_symlink("/proc/self/exe").parent_path() / "mcap_npm";
     install(folder);
     const std::string output = run("cd '" + folder.string() + "' && node verify.mjs " + arguments);
     auto json = nlohmann::json::parse(output, nullptr, false);
-    EXPECT_FALSE(json.is_discarded()) << "verify.mjs " << arguments << " printed: " << output.substr(0, 500);
+    EXPECT_FALSE(json.is_discarded())
+        << "verify.mjs " << arguments << " printed: " << output.substr(0, 500);
     return json;
   }
 
  private:
   static void install(const std::filesystem::path& folder) {
-    const std::filesystem::path source = std::filesystem::path(ABBE_TEST_DATA) / "../daemon/mcap_npm";
+    const std::filesystem::path source =
+        std::filesystem::path(ABBE_TEST_DATA) / "../daemon/mcap_npm";
     std::filesystem::create_directories(folder);
     std::FILE* lock = std::fopen((folder / "lock").c_str(), "w");
     if (lock == nullptr) throw std::runtime_error("no lock file in " + folder.string());
@@ -45,11 +49,14 @@ class PublicLibraries {
     const bool installed =
         std::filesystem::exists(folder / "node_modules/.package-lock.json") &&
         bytes_of_file(folder / "package-lock.json") == bytes_of_file(source / "package-lock.json");
+
     for (const char* name : {"package.json", "package-lock.json", "verify.mjs"}) {
       std::filesystem::copy_file(source / name, folder / name,
                                  std::filesystem::copy_options::overwrite_existing);
     }
-    if (!installed) run("cd '" + folder.string() + "' && npm ci --ignore-scripts --no-audit --no-fund 2>&1");
+
+    if (!installed)
+      run("cd '" + folder.string() + "' && npm ci --ignore-scripts --no-audit --no-fund 2>&1");
     std::fclose(lock);
   }
 

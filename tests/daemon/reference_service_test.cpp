@@ -25,9 +25,10 @@ axes = [{axis = "X", channel = 0, step_nm = 250}, {axis = "Y", channel = 1, step
         {axis = "Z", channel = 2, step_nm = 250, invert = true}]
 )";
 
-std::string reference(const std::string& more, const std::string& axis = R"(axis = "Z", channel = 2)") {
-  return "[reference]\ntransport = \"usbip\"\nport = 3241\nu_alignment_us = 1000\n" + more + "axes = [{" +
-         axis + ", signal_period_um = 20, length_mm = 500, zero_mark_mm = 10}]\n";
+std::string reference(const std::string& more,
+                      const std::string& axis = R"(axis = "Z", channel = 2)") {
+  return "[reference]\ntransport = \"usbip\"\nport = 3241\nu_alignment_us = 1000\n" + more +
+         "axes = [{" + axis + ", signal_period_um = 20, length_mm = 500, zero_mark_mm = 10}]\n";
 }
 
 Config config_of(const std::string& text) {
@@ -73,7 +74,8 @@ TEST(ReferenceConfig, IsPartOfWhatAReadingIs) {
             machine_hash(config_of(kCard + reference(""))));
 }
 
-/// Z of the machine, read by both cards at 1 kHz; counts fall as it rises. The scale's zero mark is at 10 mm.
+/// Z of the machine, read by both cards at 1 kHz; counts fall as it rises. The scale's zero mark is
+/// at 10 mm.
 class Traverse {
  public:
   static constexpr double kStep_m = -250e-9;
@@ -95,10 +97,13 @@ class Traverse {
     live.axis_count = 3;
     live.count[2] = std::llround((z_m - kLiveBegan_m) / kStep_m);
     live.position[2] = kStep_m * static_cast<double>(live.count[2]);
+
     for (const double mark : marks_m_) {
       if ((before_m_ < mark) == (z_m < mark)) continue;
-      batch.marks.push_back({{.time = now_}, now_ - 1ms, 0, std::llround((mark - kLatchBegan_m) / kStep_m)});
+      batch.marks.push_back(
+          {{.time = now_}, now_ - 1ms, 0, std::llround((mark - kLatchBegan_m) / kStep_m)});
     }
+
     before_m_ = z_m;
     return batch;
   }
@@ -114,7 +119,7 @@ Batch drive(ReferenceService& service, Traverse& traverse) {
   Batch batch;
   for (int i = 0; i < 50'000; ++i) {
     batch = traverse.step(0.1 + 1e-6 * i);
-    service.turn(batch);
+    service.cycle(batch);
   }
   return batch;
 }
@@ -124,7 +129,7 @@ TEST(ReferenceService, AnAxisIsMissingUntilItsMarksWereFound) {
   ReferenceService service{config, nullptr};
   Traverse traverse;
   Batch batch = traverse.step(0.1);
-  service.turn(batch);
+  service.cycle(batch);
   EXPECT_EQ(batch.axes[0].missing_mask & 0b100, 0b100);
   EXPECT_TRUE(has(batch.axes[0].head.flags, SampleFlag::AxisMissing));
   EXPECT_FALSE(service.status().at(0).known);
@@ -150,7 +155,7 @@ TEST(ReferenceService, ACardThatBeganAnewHasNoDatumAnyMore) {
   drive(service, traverse);
   Batch batch = traverse.step(0.2);
   batch.axes[0].head.flags |= SampleFlag::Restarted;
-  service.turn(batch);
+  service.cycle(batch);
   EXPECT_EQ(batch.axes[0].missing_mask & 0b100, 0b100);
   EXPECT_FALSE(service.status().at(0).known);
 }
@@ -185,7 +190,7 @@ Batch counts(HostTime t, std::int64_t count, bool restarted = false) {
 void stand(ReferenceService& service, std::int64_t count) {
   for (int k = 0; k <= 10; ++k) {
     Batch batch = counts(HostTime{1s + k * 100ms}, count, k == 0);
-    service.turn(batch);
+    service.cycle(batch);
   }
 }
 
@@ -196,15 +201,16 @@ StandHere z_at(HostTime now) {
 TEST(ReferenceService, AxesWithoutMarksAreNotKnownUntilSomebodySaysWhereTheyStand) {
   const auto config = config_of(kCard);
   ReferenceService service{config, nullptr};
+
   EXPECT_EQ(service.stand_at_offset({}).error().code, ErrorCode::Refused);
   stand(service, 400);
   EXPECT_THAT(service.without_zero(), ::testing::ElementsAre("X", "Y", "Z"));
   Batch batch = counts(HostTime{2s}, 400);
-  service.turn(batch);
+  service.cycle(batch);
   EXPECT_EQ(batch.axes[0].missing_mask, 0b111);
   ASSERT_TRUE(service.stand_at_offset(z_at(HostTime{2s})));
   batch = counts(HostTime{3s}, 404);
-  service.turn(batch);
+  service.cycle(batch);
   EXPECT_EQ(batch.axes[0].missing_mask, 0b011);
   EXPECT_NEAR(batch.axes[0].position[2], -1e-6, 1e-15);  // two readings of 0.1 mm apart
   EXPECT_THAT(service.without_zero(), ::testing::ElementsAre("X", "Y"));
@@ -216,15 +222,16 @@ TEST(ReferenceService, NobodyCanSayWhereAMovingAxisStands) {
   ReferenceService service{config, nullptr};
   stand(service, 400);
   Batch batch = counts(HostTime{2s}, 440);
-  service.turn(batch);
+  service.cycle(batch);
   const auto moving = service.stand_at_offset(z_at(HostTime{2s}));
+
   ASSERT_FALSE(moving);
   EXPECT_EQ(moving.error().code, ErrorCode::Refused);
   EXPECT_THAT(moving.error().text, HasSubstr("Z moves"));
   EXPECT_THAT(service.without_zero(), Contains("Z"));
   EXPECT_TRUE(service.stand_at_offset({.axes = {"X"}, .now = HostTime{2s}}));
   batch = counts(HostTime{2500ms}, 441);  // a count to and fro is no motion
-  service.turn(batch);
+  service.cycle(batch);
   EXPECT_TRUE(service.stand_at_offset(z_at(HostTime{2500ms})));
 }
 
@@ -264,15 +271,16 @@ TEST(ReferenceService, ZeroHereHoldsForTheFirstSetUpOnly) {
       config_of(kCard.substr(0, kCard.find("axes")) + kHere + kCard.substr(kCard.find("axes")));
   ReferenceService service{config, nullptr};
   Batch batch = counts(HostTime{1s}, 400, true);
-  service.turn(batch);
+  service.cycle(batch);
   EXPECT_EQ(batch.axes[0].missing_mask, 0);
   EXPECT_EQ(batch.axes[0].position[2], -250e-9 * 400.0);
+
   // The bus failed for a moment: the counters begin at 0 where the machine stands now.
   batch = counts(HostTime{2s}, 0, true);
-  service.turn(batch);
+  service.cycle(batch);
   EXPECT_EQ(batch.axes[0].missing_mask, 0b111);
   batch = counts(HostTime{3s}, 0);
-  service.turn(batch);
+  service.cycle(batch);
   EXPECT_EQ(batch.axes[0].missing_mask, 0b111);
 }
 
@@ -281,14 +289,17 @@ TEST(ReferenceService, ItIsDecidedForEachAxis) {
                                 kCard.substr(kCard.find("axes")) + reference(""));
   ReferenceService service{config, nullptr};
   Batch batch = counts(HostTime{1s}, 0, true);
-  service.turn(batch);
+  service.cycle(batch);
   EXPECT_EQ(batch.axes[0].missing_mask, 0b100);
   EXPECT_EQ(service.stand_at_offset(z_at(HostTime{1s})).error().code, ErrorCode::Usage);
 }
 
 TEST(Datum, IsTheSameFromTheRecording) {
-  const FoundDatum datum{
-      .axis = 2, .reading_at_zero = 0.1 + 1e-17, .u = 1e-7, .from = HostTime{123456789ns}, .stated = true};
+  const FoundDatum datum{.axis = 2,
+                         .reading_at_zero = 0.1 + 1e-17,
+                         .u = 1e-7,
+                         .from = HostTime{123456789ns},
+                         .stated = true};
   const auto back = datum_from_attachment(to_attachment(datum));
   ASSERT_TRUE(back) << back.error().text;
   EXPECT_EQ(back->axis, datum.axis);
@@ -302,12 +313,14 @@ TEST(Datum, HoldsForWhatIsLaterThanItWasFound) {
   Datum datum{config_of(kCard + reference(""))};
   datum.found({.axis = 2, .reading_at_zero = 0.3, .from = HostTime{10s}});
   Batch batch;
+
   for (const auto t : {9s, 10s, 11s}) {
     auto& sample = batch.axes.emplace_back();
     sample.head.time = HostTime{t};
     sample.axis_count = 3;
     sample.count[2] = 4;
   }
+
   datum.apply(batch);
   EXPECT_EQ(batch.axes[1].missing_mask & 0b100, 0b100);
   EXPECT_EQ(batch.axes[2].missing_mask & 0b100, 0);

@@ -36,7 +36,8 @@ struct TwoCards {
   std::chrono::nanoseconds latch_late = 300us;  ///< error of the latching card's host time
   std::int64_t latched = 0;
 
-  void drive(ReferenceSession& session, const std::function<double(double)>& place_m, double seconds) {
+  void drive(ReferenceSession& session, const std::function<double(double)>& place_m,
+             double seconds) {
     const auto marks = marks_m();
     double before = place_m(0.0);
     for (double t = 0.0; t < seconds;
@@ -51,7 +52,8 @@ struct TwoCards {
       for (const double mark : marks) {
         if ((before < mark) == (here < mark)) continue;
         latched = std::llround(mark / kPeriod_m * kCountsPerPeriod) - latch_zero;
-        session.take(MarkCrossing{{.time = now + latch_late}, now + latch_late - kScan, 0, latched});
+        session.take(
+            MarkCrossing{{.time = now + latch_late}, now + latch_late - kScan, 0, latched});
       }
       before = here;
     }
@@ -60,8 +62,9 @@ struct TwoCards {
 
 ReferenceOptions options() {
   ReferenceOptions o;
-  o.axes = {
-      {.name = "X", .marks = {.code = kCode, .counts_per_period = kCountsPerPeriod}, .period = kPeriod_m}};
+  o.axes = {{.name = "X",
+             .marks = {.code = kCode, .counts_per_period = kCountsPerPeriod},
+             .period = kPeriod_m}};
   o.axes[0].max_half_width_counts = 10.0;  // 2.5 um
   return o;
 }
@@ -87,8 +90,8 @@ TEST(ReferenceSession, DrivenSlowlyAlignsTheCardsToACount) {
   cards.drive(
       session, [](double t) { return 0.1095 + 0.12e-3 * t; }, 260.0);
   ASSERT_EQ(session.axis(0).state, State::Found) << session.axis(0).reason;
-  EXPECT_NEAR(session.axis(0).offset, kPeriod_m / kCountsPerPeriod * static_cast<double>(cards.live_zero),
-              0.25e-6);
+  EXPECT_NEAR(session.axis(0).offset,
+              kPeriod_m / kCountsPerPeriod * static_cast<double>(cards.live_zero), 0.25e-6);
 }
 
 TEST(ReferenceSession, SaysThatTheCardsMustBeAlignedBetter) {
@@ -120,6 +123,7 @@ TEST(ReferenceSession, NamesACardThatMiscounts) {
   cards.latch_zero += 400;  // five periods were lost; the axis stands on a mark
   const std::int64_t count = std::llround(0.13 / kPeriod_m * kCountsPerPeriod);
   HostTime now{120s};
+
   for (int i = 0; i < 20; ++i) {
     AxisSample live;
     live.head.time = now += kScan;
@@ -128,6 +132,7 @@ TEST(ReferenceSession, NamesACardThatMiscounts) {
     session.take(live);
     if (i == 5) session.take(MarkCrossing{{.time = now}, now - kScan, 0, count - cards.latch_zero});
   }
+
   EXPECT_EQ(session.axis(0).state, State::Failed);
   EXPECT_NE(session.axis(0).reason.find("miscounts"), std::string::npos);
 }

@@ -9,8 +9,8 @@ using namespace std::chrono_literals;
 using protocol::SampleFlag;
 using protocol::Snapshot;
 
-/// A machine that stands at X = 0, 0.1, 0.2 ... m for `stand`, and drives for 2 s in between; the tracker
-/// sees the reflector 1 m further in x, 10 um to and fro.
+/// A machine that stands at X = 0, 0.1, 0.2 ... m for `stand`, and drives for 2 s in between; the
+/// tracker sees the reflector 1 m further in x, 10 um to and fro.
 Snapshot at(std::chrono::nanoseconds t, std::chrono::nanoseconds stand) {
   Snapshot s;
   const auto place = t / (stand + 2s);

@@ -31,7 +31,9 @@ inline std::filesystem::path record_synthetic_run(const std::filesystem::path& f
   EXPECT_TRUE(recorder) << recorder.error().text;
   OtfRequest request;
   for (const auto& q : synthetic_path_m()) request.path_m.push_back({q[0], q[1], q[2]});
-  recorder->attach(to_attachment(CalibrationRequest{.task = std::move(request), .from = kBegin}), kBegin);
+  recorder->attach(to_attachment(CalibrationRequest{.task = std::move(request), .from = kBegin}),
+                   kBegin);
+
   for (const auto& point : synthetic_points(0.4, 2.0)) {
     const HostTime time = kBegin + std::chrono::duration_cast<std::chrono::nanoseconds>(
                                        std::chrono::duration<double>(point.time_s));
@@ -41,13 +43,16 @@ inline std::filesystem::path record_synthetic_run(const std::filesystem::path& f
     protocol::TrackerPoint tracker;
     tracker.head.time = time;
     tracker.device_time = protocol::DeviceTime{time.time_since_epoch()};
+
     for (std::size_t a = 0; a < 3; ++a) {
       axes.position[a] = point.q_m[static_cast<Eigen::Index>(a)];
       tracker.p_tracker_m[a] = point.p_tracker_m[static_cast<Eigen::Index>(a)];
     }
+
     recorder->record(axes, "encoder");
     recorder->record(tracker, "tracker");
   }
+
   const auto closed = recorder->close();
   EXPECT_TRUE(closed) << closed.error().text;
   return closed->file;

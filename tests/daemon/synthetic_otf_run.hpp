@@ -1,6 +1,7 @@
 #pragma once
-/// A small on-the-fly run as files: a machine of 120 mm cubed with known errors (the simulator's exact
-/// transforms), a random walk over a 3 x 3 x 3 lattice, and what a noise-free tracker sees of it.
+/// A small on-the-fly run as files: a machine of 120 mm cubed with known errors (the simulator's
+/// exact transforms), a random walk over a 3 x 3 x 3 lattice, and what a noise-free tracker sees of
+/// it.
 
 #include <fmt/format.h>
 
@@ -24,15 +25,18 @@ inline sim::TruthMachine synthetic_truth() {
   std::uniform_real_distribution<double> value(-1.0, 1.0);
   sim::TruthMachine truth;
   truth.target_offset_m = {0.02, -0.015, -0.12};
+
   for (const auto axis : sim::kAxes) {
     truth.axis(axis).range = {-kHalfTravel_m, kHalfTravel_m, 0.0};
     for (std::size_t m = 0; m < sim::kMotions; ++m) {
       const double size = m < 3 ? 10e-6 : 30e-6;  // m, rad
-      const double first = size * value(random), middle = size * value(random), last = size * value(random);
+      const double first = size * value(random), middle = size * value(random),
+                   last = size * value(random);
       truth.axis(axis).error[m] =
           sim::ErrorFunction({-kHalfTravel_m, 0.0, kHalfTravel_m}, {first, middle, last});
     }
   }
+
   truth.squareness = {20e-6, -15e-6, 30e-6};
   return truth;
 }
@@ -43,7 +47,8 @@ inline std::vector<Eigen::Vector3d> synthetic_path_m() {
   std::uniform_int_distribution<int> place(-1, 1);
   std::vector<Eigen::Vector3d> path{{-kHalfTravel_m, -kHalfTravel_m, -kHalfTravel_m}};
   while (path.size() < 61) {
-    const Eigen::Vector3d next = kHalfTravel_m * Eigen::Vector3d(place(random), place(random), place(random));
+    const Eigen::Vector3d next =
+        kHalfTravel_m * Eigen::Vector3d(place(random), place(random), place(random));
     if (next != path.back()) path.push_back(next);
   }
   return path;
@@ -61,7 +66,8 @@ inline std::string synthetic_machine_toml() {
   std::string text = "[machine]\nname = \"small mill\"\nchain = \"[w b X Y Z t]\"\n";
   for (const char axis : sim::kAxisLetters)
     text += fmt::format("[axes.{}]\nmin_mm = -60\nmax_mm = 60\n", axis);
-  return text + "[target]\noffset_mm = [20, -15, -120]\n[model]\nnode_spacing_mm = 60\n" + kTrackerPlacement;
+  return text + "[target]\noffset_mm = [20, -15, -120]\n[model]\nnode_spacing_mm = 60\n" +
+         kTrackerPlacement;
 }
 
 inline std::string synthetic_path_csv() {
@@ -88,12 +94,15 @@ inline std::vector<SyntheticPoint> synthetic_points(double dwell_s = 0.2, double
   const Eigen::Vector3d tracker_m(-0.9, -0.7, -0.3);
   std::vector<SyntheticPoint> points;
   const auto count = static_cast<int>((motion.duration_s() + stand_s) * kPointRate_Hz);
+
   for (int i = 0; i < count; ++i) {
     const double time_s = i / kPointRate_Hz;
     const auto state = motion.at(time_s);
     points.push_back(
-        {time_s, state.q_m, R_machine_tracker.transpose() * (sim::position_m(truth, state.q_m) - tracker_m)});
+        {time_s, state.q_m,
+         R_machine_tracker.transpose() * (sim::position_m(truth, state.q_m) - tracker_m)});
   }
+
   return points;
 }
 
@@ -101,8 +110,8 @@ inline std::vector<SyntheticPoint> synthetic_points(double dwell_s = 0.2, double
 inline std::string synthetic_tracker_csv() {
   std::string text = "time_s,range_mm,azimuth_rad,elevation_rad\n";
   for (const auto& [time_s, q_m, p_m] : synthetic_points())
-    text += fmt::format("{},{:.17g},{:.17g},{:.17g}\n", time_s, p_m.norm() * 1e3, std::atan2(p_m[1], p_m[0]),
-                        std::asin(p_m[2] / p_m.norm()));
+    text += fmt::format("{},{:.17g},{:.17g},{:.17g}\n", time_s, p_m.norm() * 1e3,
+                        std::atan2(p_m[1], p_m[0]), std::asin(p_m[2] / p_m.norm()));
   return text;
 }
 

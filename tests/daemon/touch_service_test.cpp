@@ -14,7 +14,7 @@ namespace {
 using namespace std::chrono_literals;
 using testing::HasSubstr;
 
-constexpr TouchService::WallTime kFirstTurn{100s};
+constexpr TouchService::WallTime kFirstCycle{100s};
 
 struct Machine final : SampleSource {
   void drain(Batch&) override {}
@@ -64,16 +64,17 @@ Batch refused() {
 TEST(TouchService, AsksForOneTouchAndItsWayAtATime) {
   Machine machine;
   TouchService service{machine, true};
+
   ASSERT_TRUE(service.start(two_touches()));
   ASSERT_EQ(machine.asked.size(), 2u);
   EXPECT_FALSE(machine.asked[0].touch);
   EXPECT_TRUE(machine.asked[1].touch);
-  service.turn({}, 1, "", kFirstTurn);
+  service.cycle({}, 1, "", kFirstCycle);
   EXPECT_EQ(machine.asked.size(), 2u);
-  service.turn(touched(0.1), 1, "", kFirstTurn);
+  service.cycle(touched(0.1), 1, "", kFirstCycle);
   EXPECT_EQ(machine.asked.size(), 3u);
   EXPECT_TRUE(service.status().running);
-  service.turn(touched(0.2), 0, "", kFirstTurn);
+  service.cycle(touched(0.2), 0, "", kFirstCycle);
   EXPECT_FALSE(service.status().running);
   EXPECT_TRUE(service.status().reason.empty());
   ASSERT_EQ(service.status().touches.size(), 2u);
@@ -94,9 +95,9 @@ TEST(TouchService, EndsAtARefusedTouchWithWhatTheMachineSaid) {
   Machine machine;
   TouchService service{machine, true};
   ASSERT_TRUE(service.start(two_touches()));
-  service.turn(refused(), 0, "", kFirstTurn);
+  service.cycle(refused(), 0, "", kFirstCycle);
   EXPECT_TRUE(service.status().running);  // why was not asked for in that turn
-  service.turn({}, 0, "PtMeas was refused: 1006 Surface not found", kFirstTurn);
+  service.cycle({}, 0, "PtMeas was refused: 1006 Surface not found", kFirstCycle);
   EXPECT_FALSE(service.status().running);
   EXPECT_THAT(service.status().reason, HasSubstr("touch 1 of 2 was refused"));
   EXPECT_THAT(service.status().reason, HasSubstr("1006"));
@@ -107,8 +108,8 @@ TEST(TouchService, KeepsTheTouchesUntilTheMachineWentAway) {
   Machine machine;
   TouchService service{machine, true};
   ASSERT_TRUE(service.start(two_touches()));
-  service.turn(touched(0.1), 1, "", kFirstTurn);
-  service.turn({}, 0, "connection closed by the peer", kFirstTurn);
+  service.cycle(touched(0.1), 1, "", kFirstCycle);
+  service.cycle({}, 0, "connection closed by the peer", kFirstCycle);
   EXPECT_THAT(service.status().reason, HasSubstr("touch 2 of 2 was not made: connection closed"));
   EXPECT_EQ(service.status().touches.size(), 1u);
 }
@@ -117,7 +118,7 @@ TEST(TouchService, ATouchThatReportsNothingIsSaidToHaveReportedNothing) {
   Machine machine;
   TouchService service{machine, true};
   ASSERT_TRUE(service.start(two_touches()));
-  service.turn({}, 0, "", kFirstTurn);
+  service.cycle({}, 0, "", kFirstCycle);
   EXPECT_THAT(service.status().reason, HasSubstr("the machine reported nothing"));
 }
 
@@ -135,17 +136,19 @@ TEST(TouchService, RefusesWhatCannotBe) {
 TEST(TouchService, StopsTheMotionWhenCancelledAndSaysWhereTheTipStands) {
   Machine machine;
   TouchService service{machine, true};
+
   ASSERT_TRUE(service.start(two_touches()));
   ASSERT_TRUE(service.cancel());
   EXPECT_EQ(machine.stopped, 1);
   EXPECT_TRUE(service.status().running);
   EXPECT_FALSE(service.start(two_touches()));  // the machine does not stand yet
-  service.turn(refused(), 1, "", kFirstTurn);
+  service.cycle(refused(), 1, "", kFirstCycle);
   EXPECT_TRUE(service.status().running);
-  service.turn({}, 0, "", kFirstTurn);
+  service.cycle({}, 0, "", kFirstCycle);
   EXPECT_FALSE(service.status().running);
   EXPECT_EQ(service.status().reason,
-            "cancelled; the tip was reported at X 100.000, Y 200.000, Z 7.500 mm 0.1 s before; look at the "
+            "cancelled; the tip was reported at X 100.000, Y 200.000, Z 7.500 mm 0.1 s before; "
+            "look at the "
             "machine, then `abbe machine release`");
   EXPECT_EQ(machine.asked.size(), 2u);
 }
@@ -155,7 +158,7 @@ TEST(TouchService, KeepsTheTouchThatWasMadeBeforeTheMachineStopped) {
   TouchService service{machine, true};
   ASSERT_TRUE(service.start(two_touches()));
   ASSERT_TRUE(service.cancel());
-  service.turn(touched(0.1), 0, "", kFirstTurn);
+  service.cycle(touched(0.1), 0, "", kFirstCycle);
   EXPECT_FALSE(service.status().running);
   EXPECT_EQ(service.status().touches.size(), 1u);
   EXPECT_EQ(machine.asked.size(), 2u);
@@ -165,11 +168,11 @@ TEST(TouchService, StopsTheMachineAlsoOnItsWayOut) {
   Machine machine;
   TouchService service{machine, true};
   ASSERT_TRUE(service.start(two_touches({{.position_m = {0, 0, 0.5}, .touch = false}})));
-  service.turn(touched(0.1), 1, "", kFirstTurn);
-  service.turn(touched(0.2), 0, "", kFirstTurn);
+  service.cycle(touched(0.1), 1, "", kFirstCycle);
+  service.cycle(touched(0.2), 0, "", kFirstCycle);
   ASSERT_TRUE(service.cancel());
   EXPECT_EQ(machine.stopped, 1);
-  service.turn({}, 0, "", kFirstTurn);
+  service.cycle({}, 0, "", kFirstCycle);
   EXPECT_FALSE(service.status().running);
   EXPECT_THAT(service.status().reason, HasSubstr("the tip was reported at"));
 }
@@ -177,21 +180,22 @@ TEST(TouchService, StopsTheMachineAlsoOnItsWayOut) {
 TEST(TouchService, EndsWhenNobodyLooksOnAnyMore) {
   Machine machine;
   TouchService service{machine, true};
+
   ASSERT_TRUE(service.start(two_touches()));
-  service.turn({}, 2, "", kFirstTurn);
-  service.turn({}, 1, "", kFirstTurn + 1900ms);
+  service.cycle({}, 2, "", kFirstCycle);
+  service.cycle({}, 1, "", kFirstCycle + 1900ms);
   (void)service.look();
-  service.turn({}, 1, "", kFirstTurn + 2100ms);
-  service.turn({}, 1, "", kFirstTurn + 4000ms);
+  service.cycle({}, 1, "", kFirstCycle + 2100ms);
+  service.cycle({}, 1, "", kFirstCycle + 4000ms);
   EXPECT_TRUE(service.status().reason.empty()) << service.status().reason;
   (void)service.status();  // the daemon's own looking is nobody's
-  service.turn({}, 1, "", kFirstTurn + 4200ms);
+  service.cycle({}, 1, "", kFirstCycle + 4200ms);
   EXPECT_THAT(service.status().reason, HasSubstr("nobody looked on"));
   EXPECT_TRUE(service.status().running);  // until the machine stands
   EXPECT_EQ(machine.stopped, 1);
-  service.turn({}, 1, "", kFirstTurn + 4300ms);
+  service.cycle({}, 1, "", kFirstCycle + 4300ms);
   EXPECT_EQ(machine.stopped, 1);
-  service.turn({}, 0, "", kFirstTurn + 4400ms);
+  service.cycle({}, 0, "", kFirstCycle + 4400ms);
   EXPECT_FALSE(service.status().running);
   EXPECT_EQ(machine.asked.size(), 2u);  // the second touch was never begun
 }
@@ -200,26 +204,27 @@ TEST(TouchService, CountsTheTimeAnewForEveryStart) {
   Machine machine;
   TouchService service{machine, true};
   ASSERT_TRUE(service.start(two_touches()));
-  service.turn({}, 0, "", kFirstTurn);
+  service.cycle({}, 0, "", kFirstCycle);
   ASSERT_FALSE(service.status().running);
   ASSERT_TRUE(service.start(two_touches()));
-  service.turn({}, 2, "", kFirstTurn + 1h);
+  service.cycle({}, 2, "", kFirstCycle + 1h);
   EXPECT_TRUE(service.status().reason.empty()) << service.status().reason;
 }
 
 TEST(TouchService, LeavesWhenAllWasTouchedAndRunsUntilItHas) {
   Machine machine;
   TouchService service{machine, true};
+
   ASSERT_TRUE(service.start(two_touches({{.position_m = {0, 0, 0.5}, .touch = false}})));
-  service.turn(touched(0.1), 1, "", kFirstTurn);
-  service.turn(touched(0.2), 0, "", kFirstTurn);
+  service.cycle(touched(0.1), 1, "", kFirstCycle);
+  service.cycle(touched(0.2), 0, "", kFirstCycle);
   EXPECT_TRUE(service.status().running);
   ASSERT_EQ(machine.asked.size(), 4u);
   EXPECT_EQ(machine.asked[3].position_m[2], 0.5);
   EXPECT_FALSE(machine.asked[3].touch);
-  service.turn({}, 1, "", kFirstTurn);
+  service.cycle({}, 1, "", kFirstCycle);
   EXPECT_TRUE(service.status().running);
-  service.turn({}, 0, "", kFirstTurn);
+  service.cycle({}, 0, "", kFirstCycle);
   EXPECT_FALSE(service.status().running);
   EXPECT_TRUE(service.status().reason.empty());
 }
@@ -229,7 +234,7 @@ TEST(TouchService, DoesNotLeaveFromWhereItWasCancelled) {
   TouchService service{machine, true};
   ASSERT_TRUE(service.start(two_touches({{.position_m = {0, 0, 0.5}, .touch = false}})));
   ASSERT_TRUE(service.cancel());
-  service.turn(touched(0.1), 0, "", kFirstTurn);
+  service.cycle(touched(0.1), 0, "", kFirstCycle);
   EXPECT_FALSE(service.status().running);
   EXPECT_EQ(machine.asked.size(), 2u);
 }

@@ -1,4 +1,5 @@
-/// `abbe tracker`: the daemon, a simulated tracker on its TCP port, and whoever asks over the control socket.
+/// `abbe tracker`: the daemon, a simulated tracker on its TCP port, and whoever asks over the
+/// control socket.
 
 #include <gmock/gmock.h>
 
@@ -37,9 +38,9 @@ sim::VirtualMachine machine_at_rest() {
 class ServedTracker {
  public:
   explicit ServedTracker(const sim::TrackerOptions& options)
-      : server_(
-            sim::TrackerServer::open(0, std::make_unique<sim::TrackerDevice>(options, machine_, time_.now()))
-                .value()),
+      : server_(sim::TrackerServer::open(
+                    0, std::make_unique<sim::TrackerDevice>(options, machine_, time_.now()))
+                    .value()),
         thread_([this] { serve(); }) {}
   ServedTracker(const ServedTracker&) = delete;
   ServedTracker& operator=(const ServedTracker&) = delete;
@@ -86,9 +87,12 @@ class TrackerControl : public ::testing::Test {
     return options;
   }
 
-  [[nodiscard]] std::string config_text(std::optional<std::uint16_t> port, const std::string& more) const {
-    const std::string tracker =
-        port ? to_toml(config_tables::Tracker{.port = *port, .more = "silence_timeout_s = 60\n" + more}) : "";
+  [[nodiscard]] std::string config_text(std::optional<std::uint16_t> port,
+                                        const std::string& more) const {
+    const std::string tracker = port
+                                    ? to_toml(config_tables::Tracker{
+                                          .port = *port, .more = "silence_timeout_s = 60\n" + more})
+                                    : "";
     return to_toml(config_tables::half_metre_mill()) + tracker + to_toml(config_tables::Encoder{}) +
            std::string{config_tables::kDaemonInItsFolder} +
            "[dds]\nsupervise = \"off\"\n[recording]\nmin_free_MB = 0\n";
@@ -140,7 +144,8 @@ class TrackerControl : public ::testing::Test {
     return {};
   }
   [[nodiscard]] test::Ran abbe(const std::string& command) const {
-    return test::run_abbe(folder_.path(), fmt::format("tracker {} --socket '{}'", command, socket_.string()));
+    return test::run_abbe(folder_.path(),
+                          fmt::format("tracker {} --socket '{}'", command, socket_.string()));
   }
 
   static inline const json kHome{{"do", "tracker"}, {"order", "home"}};
@@ -150,9 +155,10 @@ class TrackerControl : public ::testing::Test {
   static json set_reflector(const std::string& name) {
     return {{"do", "tracker"}, {"order", "reflector set"}, {"reflector", name}};
   }
-  static inline const json kCalibrate{{"do", "calibrate"},
-                                      {"method", "otf"},
-                                      {"path_m", {{0.1, 0.1, 0.1}, {0.2, 0.1, 0.1}, {0.2, 0.2, 0.2}}}};
+  static inline const json kCalibrate{
+      {"do", "calibrate"},
+      {"method", "otf"},
+      {"path_m", {{0.1, 0.1, 0.1}, {0.2, 0.1, 0.1}, {0.2, 0.2, 0.2}}}};
 
   TemporaryFolder folder_;
   std::filesystem::path socket_;
@@ -170,7 +176,8 @@ TEST_F(TrackerControl, AirThatTheControllerWasSetToIsNotShownAsMeasured) {
 
 TEST_F(TrackerControl, AnOrderIsCarriedOutAndTheMeasurementGoesOn) {
   ASSERT_NO_FATAL_FAILURE(start_measuring());
-  EXPECT_EQ(carried_out({{"do", "tracker"}, {"order", "initialize"}})["text"], "the tracker is initialised");
+  EXPECT_EQ(carried_out({{"do", "tracker"}, {"order", "initialize"}})["text"],
+            "the tracker is initialised");
   ASSERT_TRUE(reaches("streaming"));
   EXPECT_EQ(tracker_->initializations(), 2u);
   EXPECT_EQ(carried_out(kHome)["outcome"], "done");
@@ -224,7 +231,8 @@ TEST_F(TrackerControl, WhatCannotBeIsRefusedBeforeItIsSent) {
     const auto answer = ask(find(distance));
     ASSERT_FALSE(answer) << distance;
     EXPECT_EQ(answer.error().code, ErrorCode::Usage);
-    EXPECT_THAT(answer.error().text, HasSubstr("find: the distance must be above 0 and at most 200 m"));
+    EXPECT_THAT(answer.error().text,
+                HasSubstr("find: the distance must be above 0 and at most 200 m"));
   }
   EXPECT_THAT(refusal_of(set_reflector("")), HasSubstr("1 to 96 bytes"));
   EXPECT_THAT(refusal_of(set_reflector(std::string(97, 'x'))), HasSubstr("1 to 96 bytes"));
@@ -238,7 +246,8 @@ TEST_F(TrackerControl, WhatCannotBeIsRefusedBeforeItIsSent) {
 TEST_F(TrackerControl, OrdersAreRefusedWhileACalibrationTakesReadings) {
   ASSERT_NO_FATAL_FAILURE(start_measuring());
   ASSERT_TRUE(ask(kCalibrate));
-  for (const json& request : {kHome, find(1.0), set_reflector("1"), json{{"do", "tracker_reflectors"}}}) {
+  for (const json& request :
+       {kHome, find(1.0), set_reflector("1"), json{{"do", "tracker_reflectors"}}}) {
     const auto answer = ask(request);
     ASSERT_FALSE(answer) << request;
     EXPECT_EQ(answer.error().code, ErrorCode::Refused);
@@ -264,16 +273,17 @@ TEST_F(TrackerControl, OrdersToATrackerThatIsNotConnectedAreRefused) {
 
 TEST_F(TrackerControl, OrdersWithoutATrackerAreRefused) {
   ASSERT_NO_FATAL_FAILURE(start_daemon(std::nullopt));
-  EXPECT_THAT(refusal_of(kHome), HasSubstr("there is no tracker, [tracker] host, in the configuration"));
+  EXPECT_THAT(refusal_of(kHome),
+              HasSubstr("there is no tracker, [tracker] host, in the configuration"));
   const auto shown = abbe("status");
   EXPECT_EQ(shown.exit, 5);
   EXPECT_THAT(shown.err, HasSubstr("there is no tracker"));
 }
 
 TEST_F(TrackerControl, TheConfiguredReflectorIsSetAndTheBeamSentHomeAfterInitialize) {
-  ASSERT_NO_FATAL_FAILURE(start_measuring(kPatient +
-                                          "reflector = \"Cat eye 75 mm\"\nhome_after_initialize = true\n"
-                                          "search_radius_mm = 30\nsearch_timeout_s = 5\n"));
+  ASSERT_NO_FATAL_FAILURE(
+      start_measuring(kPatient + "reflector = \"Cat eye 75 mm\"\nhome_after_initialize = true\n"
+                                 "search_radius_mm = 30\nsearch_timeout_s = 5\n"));
   EXPECT_EQ(tracker_->beam_moves(), 1u);
   EXPECT_EQ(carried_out({{"do", "tracker_reflectors"}})["reflectors"][2]["in_use"], true);
 }
@@ -281,6 +291,7 @@ TEST_F(TrackerControl, TheConfiguredReflectorIsSetAndTheBeamSentHomeAfterInitial
 TEST_F(TrackerControl, TheCommandGivesOrdersAndPrintsWhatCameOfThem) {
   ASSERT_NO_FATAL_FAILURE(start_measuring());
   const auto list = abbe("reflector list");
+
   EXPECT_EQ(list.exit, 0) << list.err;
   EXPECT_THAT(list.out, AllOf(HasSubstr("the controller knows 3 reflectors"),
                               HasSubstr("   0  SMR 1.5 inch                      in use")));

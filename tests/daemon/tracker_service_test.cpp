@@ -42,26 +42,28 @@ class TrackerOrders : public ::testing::Test {
 
 TEST_F(TrackerOrders, AreUnderWayUntilTheyAreReported) {
   ASSERT_TRUE(home());
-  service_.turn(kBegin + 1s);
+  service_.cycle(kBegin + 1s);
   ASSERT_NE(service_.running(), nullptr);
   EXPECT_EQ(service_.running()->by, "anna");
   EXPECT_THAT(home().error().text, HasSubstr("\"home\" of anna is under way"));
-  thread_.reports = {{.number = thread_.ordered[0].number, .outcome = Outcome::Done, .text = "there"}};
-  service_.turn(kBegin + 2s);
+  thread_.reports = {
+      {.number = thread_.ordered[0].number, .outcome = Outcome::Done, .text = "there"}};
+  service_.cycle(kBegin + 2s);
   EXPECT_EQ(service_.running(), nullptr);
   EXPECT_EQ(service_.orders().back().report->text, "there");
 }
 
 TEST_F(TrackerOrders, ThatNobodyReportsFailAndALateReportCounts) {
   ASSERT_TRUE(home());
-  service_.turn(kBegin + 10s);
+  service_.cycle(kBegin + 10s);
   EXPECT_NE(service_.running(), nullptr);
-  service_.turn(kBegin + 10s + 1ms);
+  service_.cycle(kBegin + 10s + 1ms);
   ASSERT_EQ(service_.running(), nullptr);
   EXPECT_EQ(service_.orders().back().report->outcome, Outcome::Failed);
   EXPECT_THAT(service_.orders().back().report->text, HasSubstr("no report in 10 s"));
-  thread_.reports = {{.number = thread_.ordered[0].number, .outcome = Outcome::Done, .text = "there"}};
-  service_.turn(kBegin + 20s);
+  thread_.reports = {
+      {.number = thread_.ordered[0].number, .outcome = Outcome::Done, .text = "there"}};
+  service_.cycle(kBegin + 20s);
   EXPECT_EQ(service_.orders().back().report->outcome, Outcome::Done);
 }
 
@@ -69,12 +71,12 @@ TEST_F(TrackerOrders, TheLatestAreKept) {
   for (std::size_t i = 0; i < TrackerService::kKept + 2; ++i) {
     ASSERT_TRUE(home());
     thread_.reports = {{.number = thread_.ordered.back().number, .outcome = Outcome::Done}};
-    service_.turn(kBegin);
+    service_.cycle(kBegin);
   }
   EXPECT_EQ(service_.orders().size(), TrackerService::kKept);
   EXPECT_EQ(service_.orders().front().asked.number, 3u);
   thread_.reports = {{.number = 1, .outcome = Outcome::Refused}};  // of an order that is not kept
-  service_.turn(kBegin);
+  service_.cycle(kBegin);
   EXPECT_EQ(service_.orders().back().report->outcome, Outcome::Done);
 }
 

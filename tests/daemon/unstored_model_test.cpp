@@ -12,7 +12,7 @@
 #include <thread>
 
 #include "abbe/base/exit_deadline.hpp"
-#include "abbe/service/work_aside.hpp"
+#include "abbe/service/background_tasks.hpp"
 #include "synthetic_otf_run.hpp"
 
 namespace abbe::daemon {
@@ -53,14 +53,14 @@ class UnstoredModel : public ::testing::Test {
         s.position[a] = point.q_m[static_cast<Eigen::Index>(a)];
         s.tracker_point.p_tracker_m[a] = point.p_tracker_m[static_cast<Eigen::Index>(a)];
       }
-      (void)service_->turn({&s, 1}, now_);
+      (void)service_->cycle({&s, 1}, now_);
     }
   }
   /// Until what runs on the other threads has come to `done`.
   template <class Done>
-  void turn_until(Done done) {
+  void cycle_until(Done done) {
     while (!done()) {
-      (void)service_->turn({}, now_);
+      (void)service_->cycle({}, now_);
       std::this_thread::yield();
     }
   }
@@ -75,17 +75,19 @@ class UnstoredModel : public ::testing::Test {
     start();
     block_store();
     drive();
-    turn_until([this] { return !service_->not_stored().empty(); });
+    cycle_until([this] { return !service_->not_stored().empty(); });
     free_store();
-    const int lock = ::open((folder_ / "models" / "lock").c_str(), O_RDONLY | O_CREAT | O_CLOEXEC, 0600);
+    const int lock =
+        ::open((folder_ / "models" / "lock").c_str(), O_RDONLY | O_CREAT | O_CLOEXEC, 0600);
     const bool held = ::flock(lock, LOCK_EX) == 0;
     const ExitDeadline deadline{5s, 70, "the end was held up\n"};
     service_.reset();
     ::_exit(held ? 0 : 1);
   }
   [[nodiscard]] SessionState state() const { return service_->status().state; }
-  void turn_until_over() {
-    turn_until([this] { return state() == SessionState::Active || state() == SessionState::Refused; });
+  void cycle_until_over() {
+    cycle_until(
+        [this] { return state() == SessionState::Active || state() == SessionState::Refused; });
   }
   [[nodiscard]] ModelDocument stored() const {
     const auto store = ModelStore::open(folder_ / "models").value();
@@ -105,16 +107,17 @@ TEST_F(UnstoredModel, AModelTheStoreDoesNotTakeIsKeptTriedAgainAndReported) {
   start();
   block_store();
   drive();
-  turn_until([this] { return !service_->not_stored().empty(); });
+  cycle_until([this] { return !service_->not_stored().empty(); });
+
   EXPECT_EQ(state(), SessionState::Identifying);
   EXPECT_THAT(service_->not_stored(), HasSubstr("is not stored"));
   EXPECT_THAT(service_->status().reason, HasSubstr("tried again every 5 s"));
   free_store();
   now_ += 4s;
-  for (int i = 0; i < 3; ++i) (void)service_->turn({}, now_);
+  for (int i = 0; i < 3; ++i) (void)service_->cycle({}, now_);
   EXPECT_THAT(service_->not_stored(), Not(IsEmpty())) << "not before its time";
   now_ += 1s;
-  turn_until_over();
+  cycle_until_over();
   EXPECT_EQ(state(), SessionState::Active) << service_->status().reason;
   EXPECT_THAT(service_->not_stored(), IsEmpty());
   EXPECT_EQ(authority_->in_force()->id, model_id(stored()));
@@ -124,28 +127,29 @@ TEST_F(UnstoredModel, CancelDiscardsAModelTheStoreDoesNotTake) {
   start();
   block_store();
   drive();
-  turn_until([this] { return !service_->not_stored().empty(); });
+  cycle_until([this] { return !service_->not_stored().empty(); });
   ASSERT_TRUE(service_->cancel("anna", now_));
   EXPECT_EQ(state(), SessionState::Refused);
   EXPECT_THAT(service_->not_stored(), IsEmpty());
   free_store();
   now_ += 10s;
-  (void)service_->turn({}, now_);
+  (void)service_->cycle({}, now_);
   EXPECT_THAT(ModelStore::open(folder_ / "models").value().list().value(), IsEmpty());
 }
 
 /// Whoever waits for the store's lock waits as for a disk that stalls, at most 5 s of real time.
 TEST_F(UnstoredModel, CancelDiscardsAModelForWhichTheStoreDoesNotAnswer) {
   start();
-  const int lock = ::open((folder_ / "models" / "lock").c_str(), O_RDONLY | O_CREAT | O_CLOEXEC, 0600);
+  const int lock =
+      ::open((folder_ / "models" / "lock").c_str(), O_RDONLY | O_CREAT | O_CLOEXEC, 0600);
   ASSERT_EQ(::flock(lock, LOCK_EX), 0);
   drive();
-  turn_until([this] { return service_->held_out().has_value(); });
+  cycle_until([this] { return service_->held_out().has_value(); });
   const auto early = service_->cancel("anna", now_);
   ASSERT_FALSE(early);
   EXPECT_THAT(early.error().text, HasSubstr("being put into the store"));
   now_ += 6s;
-  (void)service_->turn({}, now_);
+  (void)service_->cycle({}, now_);
   EXPECT_THAT(service_->not_stored(), HasSubstr("the store has not answered for 5 s"));
   EXPECT_THAT(service_->status().reason, HasSubstr("cancel discards it"));
   const auto cancelled = service_->cancel("anna", now_);
@@ -159,8 +163,8 @@ TEST_F(UnstoredModel, CancelDiscardsAModelForWhichTheStoreDoesNotAnswer) {
   EXPECT_TRUE(service_->start(std::move(next), "anna", now_)) << "the next calibration";
 
   ::close(lock);
-  while (work_left_running()) std::this_thread::yield();
-  (void)service_->turn({}, now_);
+  while (background_tasks_running()) std::this_thread::yield();
+  (void)service_->cycle({}, now_);
   EXPECT_NE(state(), SessionState::Active);
   EXPECT_FALSE(ModelStore::open(folder_ / "models").value().activation().value());
 }
@@ -169,7 +173,7 @@ TEST_F(UnstoredModel, TheEndOfTheDaemonTriesOnceMoreToStoreTheModel) {
   start();
   block_store();
   drive();
-  turn_until([this] { return !service_->not_stored().empty(); });
+  cycle_until([this] { return !service_->not_stored().empty(); });
   free_store();
   service_.reset();
   EXPECT_THAT(ModelStore::open(folder_ / "models").value().list().value(), SizeIs(1));
@@ -184,7 +188,8 @@ TEST_F(UnstoredModel, TheEndOfTheDaemonIsNotHeldUpByWhoHoldsTheStoresLock) {
 TEST_F(UnstoredModel, AModelWhoseIdentificationHasJustEndedIsStoredAtTheEndOfTheDaemon) {
   start();
   drive();
-  while (service_->status().progress < 1.0) std::this_thread::yield();  // nothing looks at its outcome
+  while (service_->status().progress < 1.0)
+    std::this_thread::yield();  // nothing looks at its outcome
   service_.reset();
   EXPECT_THAT(ModelStore::open(folder_ / "models").value().list().value(), SizeIs(1));
 }
@@ -195,12 +200,14 @@ TEST_F(UnstoredModel, AModelWhoseRunIsNotRecordedIsActiveAndSaysThatNoReplayCanC
   options.recorder.name = "abbe-full";
   options.recorder.min_free_bytes = std::numeric_limits<std::uint64_t>::max() / 2;
   auto recorder = RecorderThread::start(std::move(options), {.machine = "mill"});
+
   ASSERT_TRUE(recorder);
   start(recorder->get());
   drive();
-  turn_until_over();
+  cycle_until_over();
   ASSERT_EQ(state(), SessionState::Active) << service_->status().reason;
-  EXPECT_THAT(service_->status().reason, HasSubstr("no replay can check this model: nothing is recorded"));
+  EXPECT_THAT(service_->status().reason,
+              HasSubstr("no replay can check this model: nothing is recorded"));
   const auto document = stored();
   EXPECT_THAT(document.recording_gap, HasSubstr("nothing is recorded"));
   EXPECT_THAT(document.inputs, SizeIs(1)) << "no recording of 0 bytes is cited";
@@ -215,7 +222,7 @@ TEST_F(UnstoredModel, AWholeRecordingIsWhatTheModelIsIdentifiedFrom) {
   ASSERT_TRUE(recorder);
   start(recorder->get());
   drive();
-  turn_until_over();
+  cycle_until_over();
   ASSERT_EQ(state(), SessionState::Active) << service_->status().reason;
   EXPECT_THAT(stored().recording_gap, IsEmpty());
   EXPECT_THAT(stored().inputs.front().name, HasSubstr("abbe-whole.mcap.part"));

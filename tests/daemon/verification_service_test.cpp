@@ -30,14 +30,14 @@ std::vector<Snapshot> standstill(std::chrono::nanoseconds from, double x) {
 TEST(VerificationService, CollectsBetweenBeginAndEnd) {
   const Config config = watched();
   VerificationService service(config);
-  service.turn(standstill(0s, 0.5));
+  service.cycle(standstill(0s, 0.5));
   const auto number = service.begin();
   ASSERT_TRUE(number);
-  service.turn(standstill(10s, 0.1));
-  service.turn(standstill(20s, 0.2));
+  service.cycle(standstill(10s, 0.1));
+  service.cycle(standstill(20s, 0.2));
   EXPECT_EQ((*service.points(*number))->points().size(), 1u);
   ASSERT_TRUE(service.end(*number));
-  service.turn(standstill(30s, 0.3));
+  service.cycle(standstill(30s, 0.3));
   ASSERT_EQ((*service.points(*number))->points().size(), 2u);
   EXPECT_DOUBLE_EQ((*service.points(*number))->points()[1].mean.reading_m.x(), 0.2);
 }
@@ -49,13 +49,15 @@ TEST(VerificationService, OneThatNobodyEndsStopsAtItsBound) {
   ASSERT_TRUE(number);
   EXPECT_EQ(service.stopped(), "");
   std::vector<Snapshot> points(3, standstill(0s, 0.0).front());  // of one standstill
+
   for (std::size_t i = 0; i < VerificationService::kMostPoints + 10; ++i) {
     for (std::size_t k = 0; k < points.size(); ++k) {
       points[k].head.time = protocol::HostTime{2s * i + 600ms * k};
       points[k].position[0] = 0.001 * static_cast<double>(i % 2);
     }
-    service.turn(points);
+    service.cycle(points);
   }
+
   EXPECT_EQ((*service.points(*number))->points().size(), VerificationService::kMostPoints);
   EXPECT_THAT(service.stopped(), testing::HasSubstr("10000 standstills are the most"));
   ASSERT_TRUE(service.end(*number));
@@ -79,7 +81,8 @@ TEST(VerificationService, RefusesReadingsThatSayNothing) {
   EXPECT_EQ(VerificationService(without).begin().error().code, ErrorCode::Refused);
   Config compensated = watched();
   compensated.encoder.emplace().axes_compensated = true;
-  EXPECT_THAT(VerificationService(compensated).begin().error().text, testing::HasSubstr("axes_compensated"));
+  EXPECT_THAT(VerificationService(compensated).begin().error().text,
+              testing::HasSubstr("axes_compensated"));
 }
 
 TEST(VerificationService, WaitsForTheMeansOfASlowTracker) {

@@ -79,15 +79,18 @@ TEST_F(VerifyCli, SaysHowMuchAModelLeaves) {
   ASSERT_EQ(ran.exit, 0) << ran.err;
   const auto summary = nlohmann::json::parse(ran.out);
   EXPECT_EQ(summary["points"], 8 * 6 * 6);
-  EXPECT_LT(summary["after"]["rms_um"].get<double>(), 0.1 * summary["before"]["rms_um"].get<double>());
+  EXPECT_LT(summary["after"]["rms_um"].get<double>(),
+            0.1 * summary["before"]["rms_um"].get<double>());
   EXPECT_EQ(summary["effect"], "better");
   EXPECT_NE(summary.contains("R_turned"), summary.contains("R_not_given"));
 }
 
 TEST_F(VerifyCli, WritesAReportThatNeedsNoNetwork) {
-  const auto ran = abbe("verify model.json --points verification.csv --planes-mm 366.667,50,33.333 -o out");
+  const auto ran =
+      abbe("verify model.json --points verification.csv --planes-mm 366.667,50,33.333 -o out");
   ASSERT_EQ(ran.exit, 0) << ran.err;
-  EXPECT_THAT(ran.out, AllOf(StartsWith("verdict     better with the model"), HasSubstr("R_resmag")));
+  EXPECT_THAT(ran.out,
+              AllOf(StartsWith("verdict     better with the model"), HasSubstr("R_resmag")));
   const auto page = text_of(folder_ / "out/report.html");
   EXPECT_THAT(page, AllOf(HasSubstr("Vectors in three planes"), HasSubstr("rigid motion"),
                           HasSubstr("weak portal"), Not(HasSubstr("src=\"http"))));
@@ -99,10 +102,12 @@ TEST_F(VerifyCli, TakesAModelOfTables) {
   write("tables.json", to_json(document));
   std::vector<calib::verify::MeasuredPoint> points;
   const auto tool = document.model.tool_offsets_m().front();
+
   for (int i = 0; i < 343; ++i) {
     const calib::Vector3 q(-0.3 + 0.1 * (i % 7), -0.3 + 0.1 * (i / 7 % 7), -0.4 + 0.05 * (i / 49));
     points.push_back({q, q + tool + document.model.V_at(q, tool)});
   }
+
   write("points.csv", to_verification_csv(points));
   const auto ran = abbe("verify tables.json --points points.csv --json");
   ASSERT_EQ(ran.exit, 0) << ran.err;
@@ -111,7 +116,8 @@ TEST_F(VerifyCli, TakesAModelOfTables) {
   EXPECT_GT(summary["before"]["max_um"].get<double>(), 1.0);
 }
 
-/// Nodes every 50 mm, points farther apart: what interpolating between them costs is far above 0.09 um.
+/// Nodes every 50 mm, points farther apart: what interpolating between them costs is far above
+/// 0.09 um.
 std::string points_of_tables(const ModelDocument& document, double factor) {
   std::vector<calib::verify::MeasuredPoint> points;
   const auto tool = document.model.tool_offsets_m().front();
@@ -131,7 +137,8 @@ TEST_F(VerifyCli, GivesNoRatioForAGoodModelOnACoarseGrid) {
   const auto ran = abbe("verify tables.json --points points.csv");
   ASSERT_EQ(ran.exit, 0) << ran.err;
   EXPECT_THAT(ran.out, AllOf(StartsWith("verdict     better with the model: 0.0"),
-                             HasSubstr("\nR_resmag    not given: interpolating"), Not(HasSubstr("above 1"))));
+                             HasSubstr("\nR_resmag    not given: interpolating"),
+                             Not(HasSubstr("above 1"))));
 }
 
 TEST_F(VerifyCli, SaysFirstThatABadModelMakesItWorse) {
@@ -152,19 +159,22 @@ std::string watched_portal() {
 }
 
 /// Three seconds at every point, the next one reached at once.
-void record_standstills(const fs::path& folder, const std::vector<calib::verify::MeasuredPoint>& points) {
+void record_standstills(const fs::path& folder,
+                        const std::vector<calib::verify::MeasuredPoint>& points) {
   using namespace std::chrono_literals;
   RecordingInfo info = example_info();
   info.configuration = watched_portal();
   auto recorder = Recorder::open(example_options(folder), info, Recorder::WallTime{});
   ASSERT_TRUE(recorder) << recorder.error().text;
   constexpr int kSteps = 30;  // of 100 ms
+
   for (std::size_t i = 0; i < kSteps * points.size(); ++i) {
     const auto& p = points[i / kSteps];
     protocol::AxisSample axes;
     axes.head.time = protocol::HostTime{1000s + static_cast<std::int64_t>(i) * 100ms};
     axes.axis_count = 3;
     std::copy_n(p.reading_m.data(), 3, axes.position.begin());
+
     if (i % (kSteps * 20) == 0) recorder->flush();  // twenty points a chunk
     recorder->record(axes, "encoder");
     if (i % 5 != 2) continue;
@@ -174,6 +184,7 @@ void record_standstills(const fs::path& folder, const std::vector<calib::verify:
     std::copy_n(p.measured_m.data(), 3, seen.p_tracker_m.begin());
     recorder->record(seen, "tracker");
   }
+
   ASSERT_TRUE(recorder->close());
 }
 
@@ -183,9 +194,11 @@ TEST_F(VerifyCli, TakesTheStandstillsOfARecording) {
   const auto ran = abbe("verify model.json --recording run.mcap --json -o out");
   ASSERT_EQ(ran.exit, 0) << ran.err;
   EXPECT_EQ(nlohmann::json::parse(ran.out)["points"], points.size());
+
   const auto left_um = [&](const Ran& r) {
     return nlohmann::json::parse(r.out)["after"]["rms_um"].get<double>();
   };
+
   constexpr double kRounding = 1e-6;  // um: m to mm and back, through a rotation of metres
   for (const auto* file : {"verification.csv", "out/verification.csv"}) {
     const auto again = abbe(fmt::format("verify model.json --points {} --json", file));
@@ -203,14 +216,16 @@ TEST_F(VerifyCli, ADamagedRecordingShowsItsResultAndEndsWithOne) {
   EXPECT_THAT(ran.err, HasSubstr("the recording is damaged: chunk 6"));
   const auto summary = nlohmann::json::parse(ran.out);
   EXPECT_LT(summary["points"], points.size());
-  EXPECT_THAT(summary["cut_short"].get<std::string>(), HasSubstr("the recording is damaged: chunk 6"));
+  EXPECT_THAT(summary["cut_short"].get<std::string>(),
+              HasSubstr("the recording is damaged: chunk 6"));
   EXPECT_THAT(text_of(folder_ / "out/report.html"), HasSubstr("the recording is damaged: chunk 6"));
 }
 
 /// A daemon that has found `points`.
-std::unique_ptr<ControlServer> daemon_with(const fs::path& socket,
-                                           const std::vector<calib::verify::MeasuredPoint>& points) {
-  return std::move(*ControlServer::open(socket, [points](const nlohmann::json& request, const ControlPeer&) {
+std::unique_ptr<ControlServer> daemon_with(
+    const fs::path& socket, const std::vector<calib::verify::MeasuredPoint>& points) {
+  return std::move(*ControlServer::open(socket, [points](const nlohmann::json& request,
+                                                         const ControlPeer&) {
     const auto list = [](const calib::Vector3& v) { return nlohmann::json{v.x(), v.y(), v.z()}; };
     if (request.at("step") == "begin") return nlohmann::json{{"ok", true}, {"number", 7}};
     EXPECT_EQ(request.at("number"), 7);
@@ -228,8 +243,8 @@ std::unique_ptr<ControlServer> daemon_with(const fs::path& socket,
 TEST_F(VerifyCli, CollectsThePointsOfTheRunningDaemon) {
   const auto points = tracker_points(study::table3_machine());
   const auto server = daemon_with(folder_ / "control.sock", points);
-  const auto ran = abbe(
-      fmt::format("verify model.json --live --socket control.sock --count {} --json -o out", points.size()));
+  const auto ran = abbe(fmt::format(
+      "verify model.json --live --socket control.sock --count {} --json -o out", points.size()));
   ASSERT_EQ(ran.exit, 0) << ran.err;
   EXPECT_THAT(ran.err, HasSubstr(fmt::format("{}: ", points.size())));
   EXPECT_EQ(nlohmann::json::parse(ran.out)["points"], points.size());
@@ -242,15 +257,18 @@ TEST_F(VerifyCli, KeepsCollectedPointsThatAllowNoAnswer) {
   const auto server = daemon_with(folder_ / "control.sock", points);
   EXPECT_EQ(abbe("verify model.json --live --socket control.sock --count 3 -o out").exit, 1);
   EXPECT_TRUE(fs::exists(folder_ / "out/verification.csv"));
-  EXPECT_EQ(abbe("verify model.json --live --socket control.sock").exit, 2);  // nowhere to keep them
+  EXPECT_EQ(abbe("verify model.json --live --socket control.sock").exit,
+            2);  // nowhere to keep them
 }
 
 TEST_F(VerifyCli, SaysThatTheDaemonWentAwayAndReportsWhatThereIs) {
   const auto points = tracker_points(study::table3_machine());
   const auto live = daemon_with(folder_ / "live.sock", points);
+
   // Gives all it has, then knows nothing of a collection, as a daemon that was started anew.
   const auto server = std::move(*ControlServer::open(
-      folder_ / "control.sock", [&](const nlohmann::json& request, const ControlPeer&) -> nlohmann::json {
+      folder_ / "control.sock",
+      [&](const nlohmann::json& request, const ControlPeer&) -> nlohmann::json {
         if (request.at("step") != "begin" && request.at("from") == points.size())
           return {{"ok", false}, {"code", "refused"}, {"error", "no points are being collected"}};
         return ask_daemon(folder_ / "live.sock", request).value();
@@ -268,15 +286,18 @@ TEST_F(VerifyCli, KeepsPointsAsTheyComeWhateverEndsIt) {
   const auto exit_after = [&](const char* signal) {
     fs::remove_all(folder_ / "out");
     write("ended.sh",
-          fmt::format("'{}' verify model.json --live --socket control.sock -o out & p=$!\n"
-                      "for i in $(seq 1000); do test -e out/verification.csv && break; sleep 0.02; done\n"
-                      "kill -{} $p; wait $p\n",
-                      ABBE_PROGRAM, signal));
-    const int status =
-        std::system(fmt::format("cd '{}' && bash ended.sh >stdout 2>stderr", folder_.string()).c_str());
-    EXPECT_EQ(text_of(folder_ / "out/verification.csv"), text_of(folder_ / "verification.csv")) << signal;
+          fmt::format(
+              "'{}' verify model.json --live --socket control.sock -o out & p=$!\n"
+              "for i in $(seq 1000); do test -e out/verification.csv && break; sleep 0.02; done\n"
+              "kill -{} $p; wait $p\n",
+              ABBE_PROGRAM, signal));
+    const int status = std::system(
+        fmt::format("cd '{}' && bash ended.sh >stdout 2>stderr", folder_.string()).c_str());
+    EXPECT_EQ(text_of(folder_ / "out/verification.csv"), text_of(folder_ / "verification.csv"))
+        << signal;
     return WIFEXITED(status) ? WEXITSTATUS(status) : -1;
   };
+
   EXPECT_EQ(exit_after("KILL"), 128 + SIGKILL);
   EXPECT_EQ(exit_after("TERM"), 0);
   EXPECT_EQ(exit_after("HUP"), 0);
@@ -284,7 +305,8 @@ TEST_F(VerifyCli, KeepsPointsAsTheyComeWhateverEndsIt) {
 }
 
 TEST_F(VerifyCli, NamesFileAndLineOfBadPoints) {
-  write("verification.csv", "x_mm,y_mm,z_mm,tracker_x_mm,tracker_y_mm,tracker_z_mm\n0,0,0,1,2,nan\n1,2,3\n");
+  write("verification.csv",
+        "x_mm,y_mm,z_mm,tracker_x_mm,tracker_y_mm,tracker_z_mm\n0,0,0,1,2,nan\n1,2,3\n");
   const auto ran = abbe("verify model.json --points verification.csv");
   EXPECT_EQ(ran.exit, 3);
   EXPECT_THAT(ran.err, AllOf(HasSubstr("verification.csv:2:"), HasSubstr("tracker_z_mm"),

@@ -1,7 +1,7 @@
 #pragma once
-/// Arrivals of a laser tracker as measured: one packet every 332 ms (5-95 %: 324 to 344 ms), points at 500
-/// Hz, so 166 a packet. A packet is delayed by a constant nobody knows, and by more: mostly a few ms, now and
-/// then tens of ms.
+/// Arrivals of a laser tracker as measured: one packet every 332 ms (5-95 %: 324 to 344 ms), points
+/// at 500 Hz, so 166 a packet. A packet is delayed by a constant nobody knows, and by more: mostly
+/// a few ms, now and then tens of ms.
 
 #include <chrono>
 #include <cmath>
@@ -31,8 +31,8 @@ class BurstProfile {
   Packet next() {
     closing_s_ += std::normal_distribution(0.332, 0.006)(random_);
     last_point_s_ = std::floor(closing_s_ / kPointPeriod_s) * kPointPeriod_s;
-    double delay_s =
-        truth_.constant_delay_s + std::exponential_distribution(1.0 / truth_.mean_jitter_s)(random_);
+    double delay_s = truth_.constant_delay_s +
+                     std::exponential_distribution(1.0 / truth_.mean_jitter_s)(random_);
     if (uniform() < 0.05) delay_s += truth_.rare_jitter_s * uniform();
     return {device_at(last_point_s_), host_at(closing_s_ + delay_s)};
   }

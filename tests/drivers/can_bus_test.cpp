@@ -47,10 +47,11 @@ TEST(UdpCanBus, DeliversOnlyTheIdentifiersAskedForAndErrorFrames) {
   error.id = 0x40;
   auto extended = can::standard_frame(0x181, {1});
   extended.set(FrameFlag::Extended);
-  const std::array sent{can::standard_frame(0x180, {1}), can::standard_frame(0x181, {2}), extended, error,
-                        can::standard_frame(0x701, {5})};
+  const std::array sent{can::standard_frame(0x180, {1}), can::standard_frame(0x181, {2}), extended,
+                        error, can::standard_frame(0x701, {5})};
   line.peer.send(sent);
   const auto n = line.bus.read(line.frames, 1s);
+
   ASSERT_TRUE(n.has_value());
   ASSERT_EQ(n->frames, 3u);
   EXPECT_EQ(line.frames[0].frame, sent[1]);
@@ -67,8 +68,8 @@ TEST(UdpCanBus, DatesFramesBetweenSendingAndReading) {
   EXPECT_GE(line.frames[0].time, before - 200us);  // two clocks are read one after the other
 }
 
-/// The kernel begins to stamp when one of its workers has got round to it: on a busy computer milliseconds
-/// after the first socket asked for stamps. What comes before has none.
+/// The kernel begins to stamp when one of its workers has got round to it: on a busy computer
+/// milliseconds after the first socket asked for stamps. What comes before has none.
 void wait_for_stamps(UdpLine& line) {
   constexpr int kMostDatagrams = 1'000'000;
   for (int i = 0; i < kMostDatagrams; ++i) {
@@ -85,12 +86,14 @@ TEST(UdpCanBus, BelievesTheStampOfEveryDatagramThatWaited) {
   const auto widened = line.bus.counters().time_widened;
   for (std::uint8_t i = 0; i < 3; ++i) line.peer.send(std::array{can::standard_frame(0x181, {i})});
   std::size_t total = 0;
+
   while (total < 3) {
     const auto n = line.bus.read(std::span{line.frames}.subspan(total), 1s);
     ASSERT_TRUE(n.has_value());
     ASSERT_GT(n->frames, 0u);
     total += n->frames;
   }
+
   EXPECT_EQ(line.bus.counters().time_widened, widened);
   for (std::size_t i = 0; i < 3; ++i) EXPECT_FALSE(line.frames[i].time_widened);
 }
@@ -116,12 +119,14 @@ TEST(UdpCanBus, CountsGarbageAndLostDatagrams) {
   line.peer.send_bytes(std::as_bytes(std::span{"no CAN at all"}));
   line.peer.send(std::array{can::standard_frame(0x181, {2})});
   std::size_t total = 0;
+
   while (total < 2) {
     const auto n = line.bus.read(line.frames, 1s);
     ASSERT_TRUE(n.has_value());
     ASSERT_GT(n->frames, 0u);
     total += n->frames;
   }
+
   EXPECT_EQ(line.bus.counters().refused, 1u);
   EXPECT_EQ(line.bus.counters().lost, 3u);
 }
@@ -129,6 +134,7 @@ TEST(UdpCanBus, CountsGarbageAndLostDatagrams) {
 TEST(UdpCanBus, SaysWhetherAllThatCameWasRead) {
   UdpLine line;
   line.peer.send(std::array{can::standard_frame(0x182, {1})});  // not asked for
+
   EXPECT_TRUE(line.bus.read(line.frames, 1s).value_or(CanRead{}).all);
   for (int i = 0; i < 64; ++i) line.peer.send_bytes(std::as_bytes(std::span{"no CAN at all"}));
   line.peer.send(std::array{can::standard_frame(0x181, {2})});
@@ -144,7 +150,8 @@ TEST(UdpCanBus, SaysWhetherAllThatCameWasRead) {
 
 TEST(UdpCanBus, ARoomThatIsFullIsNotTheEnd) {
   UdpLine line;
-  line.peer.send(std::vector<can::CanFrame>(line.frames.size() + 1, can::standard_frame(0x181, {1})));
+  line.peer.send(
+      std::vector<can::CanFrame>(line.frames.size() + 1, can::standard_frame(0x181, {1})));
   const auto full = line.bus.read(line.frames, 1s);
   ASSERT_TRUE(full.has_value());
   EXPECT_EQ(full->frames, line.frames.size());
@@ -185,7 +192,8 @@ TEST(UdpCanBus, LooksUpTheNameOfItsPeer) {
 
 TEST(UdpCanBus, ReachesAPeerOnAnotherComputer) {
   MonotonicTime time;
-  UdpCanBus bus{{.peer_address = "192.0.2.1", .peer_port = 20000}, time};  // reserved for examples [RFC 5737]
+  UdpCanBus bus{{.peer_address = "192.0.2.1", .peer_port = 20000},
+                time};  // reserved for examples [RFC 5737]
   const auto opened = bus.open(kIds);
   if (!opened && opened.error().text.find(std::strerror(ENETUNREACH)) != std::string::npos)
     GTEST_SKIP() << "no network here";
@@ -255,6 +263,7 @@ TEST(LinuxFrame, RoundTripsEveryKindOfFrame) {
   error.set(FrameFlag::Error);
   error.id = 0x1FF;
   error.length = 8;
+
   for (const auto& frame :
        {can::standard_frame(0x605, {0x40, 4, 0x60, 0, 0, 0, 0, 0}), fd, extended, remote, error}) {
     const auto out = to_linux(frame);
@@ -291,7 +300,8 @@ TEST(SocketCanBus, SaysWhatTheSystemRefused) {
   EXPECT_THAT(opened.error().text, testing::HasSubstr("nocan99"));
 }
 
-/// On a machine with a virtual CAN interface: ip link add dev vcan0 type vcan; ip link set vcan0 up.
+/// On a machine with a virtual CAN interface: ip link add dev vcan0 type vcan; ip link set vcan0
+/// up.
 TEST(SocketCanBus, CarriesFramesOverVcan) {
   MonotonicTime time;
   SocketCanBus receiver{{.interface = "vcan0"}, time};
@@ -306,12 +316,14 @@ TEST(SocketCanBus, CarriesFramesOverVcan) {
   ASSERT_TRUE(sender.send(sent).has_value());
   std::array<ReceivedFrame, 8> frames{};
   std::size_t total = 0;
+
   while (total < 2) {
     const auto n = receiver.read(std::span{frames}.subspan(total), 1s);
     ASSERT_TRUE(n.has_value());
     ASSERT_GT(n->frames, 0u);
     total += n->frames;
   }
+
   EXPECT_EQ(frames[0].frame, sent[0]);
   EXPECT_EQ(frames[1].frame, fd);
   EXPECT_GE(frames[0].time, before - 200us);

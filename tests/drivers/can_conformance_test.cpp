@@ -13,9 +13,10 @@ using namespace std::chrono_literals;
 
 class EncoderConformancePeer {
  public:
-  static constexpr std::chrono::nanoseconds kTurn = 1ms;
+  static constexpr std::chrono::nanoseconds kCycle = 1ms;
   static constexpr std::chrono::nanoseconds kSilenceLimit = 400ms;
-  static constexpr std::chrono::nanoseconds kRecoveryLimit = 4s;  // SDO retries 1.5 s, then a pause of 1 s
+  // SDO retries 1.5 s, then a pause of 1 s
+  static constexpr std::chrono::nanoseconds kRecoveryLimit = 4s;
   static constexpr bool kTornCanBeFinished = false;
 
   static std::set<std::string_view> shown(Fault fault) {
@@ -31,6 +32,7 @@ class EncoderConformancePeer {
       case Fault::Restart:
         return {"degraded", "configuring"};
     }
+
     return {};
   }
 
@@ -53,7 +55,7 @@ class EncoderConformancePeer {
     for (std::size_t i = 0; i < n; ++i) heads.push_back(out[i].head);
   }
   void serve() { peer_.serve(time_.now()); }
-  void say_valid() {
+  void send_valid() {
     const auto frames = peer_.take_answer();
     if (frames.empty()) return;
     if (!holding_) return peer_.send(frames);
@@ -77,13 +79,14 @@ class EncoderConformancePeer {
   /// The cable, not the peer: what the device sends gets lost.
   void unplug() {}
   void plug_in() { peer_.drain(); }
-  /// A cycle makes one sample whatever the nodes say; only the bus can make many at once, by going off and
-  /// on.
+  /// A cycle makes one sample whatever the nodes say; only the bus can make many at once, by going
+  /// off and on.
   void flood() {
     std::vector<can::CanFrame> frames;
     for (int i = 0; i < 200; ++i) {
       for (const auto c : {can::BusCondition::BusOff, can::BusCondition::Active}) {
-        frames.push_back(can::encode_error_frame({.conditions = static_cast<can::BusConditions>(c)}));
+        frames.push_back(
+            can::encode_error_frame({.conditions = static_cast<can::BusConditions>(c)}));
       }
     }
     peer_.send(frames);

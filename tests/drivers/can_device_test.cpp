@@ -49,8 +49,9 @@ TEST_F(EncoderDeviceOnUdp, LeavesOutSyncsItCannotServeAndStaysOnTheGrid) {
   const auto before = samples.back().head.time;
   time.advance(13ms);  // the thread was not scheduled
   turns(12);
-  const auto gap = std::find_if(samples.begin(), samples.end(),
-                                [](const auto& s) { return has(s.head.flags, SampleFlag::GapBefore); });
+  const auto gap = std::find_if(samples.begin(), samples.end(), [](const auto& s) {
+    return has(s.head.flags, SampleFlag::GapBefore);
+  });
   ASSERT_NE(gap, samples.end());
   EXPECT_GT(gap->head.lost_before, 0u);
   EXPECT_GT(device->status().gaps, 0u);
@@ -60,8 +61,9 @@ TEST_F(EncoderDeviceOnUdp, LeavesOutSyncsItCannotServeAndStaysOnTheGrid) {
 TEST_F(EncoderDeviceOnUdp, GoesOnWithTheOtherAxisWhenOneIsMute) {
   begin_streaming();
   peer.node(1).mute = true;
+
   ASSERT_TRUE(state_becomes("degraded"));
-  ASSERT_TRUE(turns_until([&] { return device->status().faults > 0; }));
+  ASSERT_TRUE(cycles_until([&] { return device->status().faults > 0; }));
   EXPECT_THAT(device->status().last_fault, testing::HasSubstr("encoder Y (node 2)"));
   samples.clear();
   turns(20);
@@ -77,7 +79,7 @@ TEST_F(EncoderDeviceOnUdp, ReconfiguresANodeThatBootedAnew) {
   begin_streaming();
   peer.restart();
   EXPECT_NE(peer.node(0).objects.tpdo(1).transmission_type, 1);
-  ASSERT_TRUE(turns_until([&] {
+  ASSERT_TRUE(cycles_until([&] {
     return std::any_of(samples.begin(), samples.end(),
                        [](const auto& s) { return has(s.head.flags, SampleFlag::Restarted); });
   }));
@@ -88,7 +90,7 @@ TEST_F(EncoderDeviceOnUdp, ReconfiguresANodeThatBootedAnew) {
 TEST_F(EncoderDeviceOnUdp, ReconfiguresANodeThatStandsIdle) {
   begin_streaming();
   peer.node(0).state = can::NodeState::PreOperational;
-  ASSERT_TRUE(turns_until([&] { return peer.node(0).state == can::NodeState::Operational; }));
+  ASSERT_TRUE(cycles_until([&] { return peer.node(0).state == can::NodeState::Operational; }));
   ASSERT_TRUE(state_becomes("streaming"));
 }
 
@@ -96,8 +98,8 @@ TEST_F(EncoderDeviceOnUdp, RefusesADeviceOfAnotherTypeByName) {
   peer.node(1).objects.set_number(can::object::kDeviceType, 0x00020192);
   ASSERT_TRUE(state_becomes("degraded"));
   EXPECT_THAT(device->status().last_fault,
-              testing::AllOf(testing::HasSubstr("encoder Y (node 2)"), testing::HasSubstr("no encoder"),
-                             testing::HasSubstr("00020192")));
+              testing::AllOf(testing::HasSubstr("encoder Y (node 2)"),
+                             testing::HasSubstr("no encoder"), testing::HasSubstr("00020192")));
 }
 
 TEST_F(EncoderDeviceOnUdp, RefusesAnEncoderWhoseStepIsZero) {
@@ -117,8 +119,8 @@ TEST_F(EncoderDeviceOnUdp, ReportsAMuteNodeOnceNotEveryRetry) {
 
 TEST_F(EncoderDeviceOnUdp, SaysBusOffAndStopsTheSync) {
   begin_streaming();
-  const std::array off{
-      can::encode_error_frame({.conditions = static_cast<can::BusConditions>(can::BusCondition::BusOff)})};
+  const std::array off{can::encode_error_frame(
+      {.conditions = static_cast<can::BusConditions>(can::BusCondition::BusOff)})};
   peer.send(off);
   ASSERT_TRUE(state_becomes("bus off"));
   EXPECT_FALSE(device->status().connected);
@@ -132,12 +134,13 @@ TEST_F(EncoderDeviceOnUdp, ResetsAndReconfiguresTheNodesAfterBusOff) {
   send_condition(can::BusCondition::BusOff);
   send_condition(can::BusCondition::Restarted);
   turns(3);
-  const auto resets =
-      std::ranges::count(peer.nmt(), can::NmtCommand::ResetCommunication, &can::NmtMessage::command);
+  const auto resets = std::ranges::count(peer.nmt(), can::NmtCommand::ResetCommunication,
+                                         &can::NmtMessage::command);
+
   EXPECT_EQ(resets, 2);
   samples.clear();
   ASSERT_TRUE(state_becomes("streaming"));
-  ASSERT_TRUE(turns_until([&] { return !samples.empty() && samples.back().missing_mask == 0; }));
+  ASSERT_TRUE(cycles_until([&] { return !samples.empty() && samples.back().missing_mask == 0; }));
   for (const auto& message : std::span{peer.nmt()}.subspan(before))
     EXPECT_THAT(message.node, testing::AnyOf(1, 2)) << "the drives on this bus are not ours";
 }
@@ -152,7 +155,7 @@ TEST_F(EncoderDeviceOnUdp, ListensAgainAfterALongBusOff) {
   EXPECT_EQ(peer.nmt().size(), before) << "a master that came meanwhile has configured the nodes";
   samples.clear();
   ASSERT_TRUE(state_becomes("streaming"));
-  ASSERT_TRUE(turns_until([&] { return !samples.empty() && samples.back().missing_mask == 0; }));
+  ASSERT_TRUE(cycles_until([&] { return !samples.empty() && samples.back().missing_mask == 0; }));
 }
 
 TEST_F(EncoderDeviceOnUdp, SendsNothingWhereAMasterCameWhileTheBusWasOff) {
@@ -186,12 +189,12 @@ TEST_F(EncoderDeviceOnUdp, ConfiguresNodesThatLostPowerWhileTheBusWasOffAndClose
   ASSERT_TRUE(state_becomes("bus off"));
   bus->fail_next_read();
   peer.restart();
-  device->wait(kTurn);  // fails: closed
+  device->wait(kCycle);  // fails: closed
   device->receive();
   EXPECT_EQ(device->status().state, "closed");
   samples.clear();
   ASSERT_TRUE(state_becomes("streaming")) << device->status().state;
-  ASSERT_TRUE(turns_until([&] { return !samples.empty() && samples.back().missing_mask == 0; }));
+  ASSERT_TRUE(cycles_until([&] { return !samples.empty() && samples.back().missing_mask == 0; }));
 }
 
 TEST_F(EncoderDeviceOnUdp, AThreadThatWasHeldUpReconfiguresNobody) {
@@ -200,12 +203,14 @@ TEST_F(EncoderDeviceOnUdp, AThreadThatWasHeldUpReconfiguresNobody) {
   const auto nmt = peer.nmt().size();
   const auto faults = device->status().faults;
   samples.clear();
+
   for (int i = 0; i < 5; ++i) {
     peer.serve(time.now());
     peer.answer_sync();
     time.advance(500ms);
-    turns(kTurnsPerSync + i);
+    turns(kCyclesPerSync + i);
   }
+
   turns(40);
   EXPECT_EQ(peer.nmt().size(), nmt);
   EXPECT_EQ(device->status().faults, faults) << device->status().last_fault;
@@ -218,19 +223,22 @@ TEST_F(EncoderDeviceOnUdp, ReportsANodeThatSendsEmcyAndDropsOut) {
   const auto nmt = peer.nmt().size();
   for (int i = 0; i < 10'000; ++i) {
     if (i % 100 == 0)
-      peer.send(std::array{can::encode_emergency({.node = 1, .code = 0x8130, .error_register = 0x11})});
+      peer.send(
+          std::array{can::encode_emergency({.node = 1, .code = 0x8130, .error_register = 0x11})});
     peer.serve(time.now());
     peer.node(0).state = can::NodeState::PreOperational;
-    turn();
+    cycle();
     if (i < 1000) continue;
     ASSERT_EQ(device->status().state, "degraded");
   }
+
   EXPECT_EQ(samples.back().missing_mask, 0b01);
-  EXPECT_THAT(device->status().condition,
-              testing::AllOf(testing::HasSubstr("X missing (node 1)"), testing::HasSubstr("EMCY 8130h"),
-                             testing::HasSubstr("heartbeat"), testing::Not(testing::HasSubstr("node 2"))));
-  EXPECT_THAT(device->status().last_fault,
-              testing::AllOf(testing::HasSubstr("encoder X (node 1)"), testing::HasSubstr("EMCY 8130h")));
+  EXPECT_THAT(
+      device->status().condition,
+      testing::AllOf(testing::HasSubstr("X missing (node 1)"), testing::HasSubstr("EMCY 8130h"),
+                     testing::HasSubstr("heartbeat"), testing::Not(testing::HasSubstr("node 2"))));
+  EXPECT_THAT(device->status().last_fault, testing::AllOf(testing::HasSubstr("encoder X (node 1)"),
+                                                          testing::HasSubstr("EMCY 8130h")));
   EXPECT_LT(peer.nmt().size() - nmt, 30u) << "configured again once a second, not without a pause";
 }
 
@@ -238,11 +246,11 @@ TEST_F(EncoderDeviceOnUdp, ReportsANodeThatLeavesOperationalByItself) {
   begin_streaming();
   turns(1500);
   peer.node(0).state = can::NodeState::PreOperational;
-  ASSERT_TRUE(turns_until([&] { return device->status().faults > 0; }));
+  ASSERT_TRUE(cycles_until([&] { return device->status().faults > 0; }));
   EXPECT_THAT(device->status().last_fault, testing::AllOf(testing::HasSubstr("encoder X (node 1)"),
                                                           testing::HasSubstr("pre-operational")));
-  ASSERT_TRUE(
-      turns_until([&] { return device->status().condition.empty() && samples.back().missing_mask == 0; }));
+  ASSERT_TRUE(cycles_until(
+      [&] { return device->status().condition.empty() && samples.back().missing_mask == 0; }));
 }
 
 TEST_F(EncoderDeviceOnUdp, UsesTheMappingOfAnEncoderThatCannotBeMapped) {
@@ -256,6 +264,7 @@ TEST_F(EncoderDeviceOnUdp, UsesTheMappingOfAnEncoderThatCannotBeMapped) {
   peer.move_to(123456);
   begin_streaming();
   turns(20);
+
   EXPECT_EQ(samples.back().count[0], 123456);
   EXPECT_EQ(samples.back().count[1], 123456);
   expect_the_same_from_raw_bytes();
@@ -270,9 +279,10 @@ TEST_F(EncoderDeviceOnUdp, AsksAgainWhereTheMappingIsRefusedForTheMoment) {
       peer.node(0).objects.set_number({0x1A00, 1}, kSpeed);
       peer.node(0).refuses = {{0x1A00, sub}, code};
       device = std::move(*EncoderDevice::create({.receiver = two_axes()}, make_bus(), time));
-      ASSERT_TRUE(turns_until([&] { return device->status().faults > 0; }));
-      EXPECT_THAT(device->status().last_fault,
-                  testing::AllOf(testing::HasSubstr("encoder X (node 1)"), testing::HasSubstr("refuses")));
+      ASSERT_TRUE(cycles_until([&] { return device->status().faults > 0; }));
+      EXPECT_THAT(
+          device->status().last_fault,
+          testing::AllOf(testing::HasSubstr("encoder X (node 1)"), testing::HasSubstr("refuses")));
       turns(3000);
       EXPECT_EQ(device->status().faults, 1u) << "however often it is asked";
       peer.node(0).refuses.reset();
@@ -284,10 +294,11 @@ TEST_F(EncoderDeviceOnUdp, AsksAgainWhereTheMappingIsRefusedForTheMoment) {
 TEST_F(EncoderDeviceOnUdp, ALastingRefusalOfTheMappingIsFinal) {
   peer.node(0).objects.set_number({0x1A00, 1}, 0x60300110);
   peer.node(0).refuses = {{0x1A00, 1}, can::AbortCode::NotMappable};
-  ASSERT_TRUE(turns_until([&] { return device->status().faults > 0; }));
+  ASSERT_TRUE(cycles_until([&] { return device->status().faults > 0; }));
   peer.node(0).refuses.reset();
   turns(5000);
-  EXPECT_EQ(device->status().state, "degraded") << "not asked again before it was switched off and on";
+  EXPECT_EQ(device->status().state, "degraded")
+      << "not asked again before it was switched off and on";
 }
 
 TEST_F(EncoderDeviceOnUdp, RefusesAnEncoderOfAnotherStepOnceWithBothValues) {
@@ -296,7 +307,8 @@ TEST_F(EncoderDeviceOnUdp, RefusesAnEncoderOfAnotherStepOnceWithBothValues) {
   options.receiver.axes[0].scale = 10e-9;
   device = std::move(*EncoderDevice::create(options, make_bus(), time));
   peer.node(0).objects.set_number(can::object::kPositionStep, 20);
-  ASSERT_TRUE(turns_until([&] { return device->status().faults > 0; }));
+
+  ASSERT_TRUE(cycles_until([&] { return device->status().faults > 0; }));
   EXPECT_THAT(device->status().last_fault,
               testing::AllOf(testing::HasSubstr("encoder X (node 1)"), testing::HasSubstr("20 nm"),
                              testing::HasSubstr("step_nm = 10")));
@@ -317,10 +329,11 @@ TEST_F(EncoderDeviceOnUdp, NamesATunnelThatHoldsFramesBack) {
       peer.send(held);
       held.clear();
     }
-    device->wait(kTurn);
+    device->wait(kCycle);
     device->receive();
-    time.advance(kTurn);
+    time.advance(kCycle);
   }
+
   EXPECT_EQ(device->status().state, "degraded");
   EXPECT_THAT(device->status().last_fault,
               testing::AllOf(testing::HasSubstr("bundles"), testing::HasSubstr("cannelloni")));
@@ -334,10 +347,11 @@ TEST_F(EncoderDeviceOnUdp, NamesAnswersThatComeAfterTheirCycle) {
       time.advance(3ms);  // 3.5 ms after the SYNC, 0.3 ms after the end of the cycle
       peer.send(late);
     }
-    device->wait(kTurn);
+    device->wait(kCycle);
     device->receive();
     time.advance(500us);
   }
+
   EXPECT_EQ(device->status().state, "degraded");
   EXPECT_THAT(device->status().last_fault, testing::HasSubstr("after the end of their cycle"));
 }
@@ -351,11 +365,13 @@ TEST_F(EncoderDeviceOnUdp, ReportsStrangersOnItsPort) {
   to.sin_port = htons(bus->local_port());
   std::array<std::byte, 64> buffer{};
   can::DatagramWriter writer{buffer, 0};
+
   ASSERT_TRUE(writer.add(can::encode_position(0x181, can::PositionType::Signed32, 99'999'999)));
   const auto fake = writer.finish();
   for (int i = 0; i < 200; ++i) {
-    ::sendto(stranger, fake.data(), fake.size(), 0, reinterpret_cast<const sockaddr*>(&to), sizeof to);
-    turn();
+    ::sendto(stranger, fake.data(), fake.size(), 0, reinterpret_cast<const sockaddr*>(&to),
+             sizeof to);
+    cycle();
   }
   ::close(stranger);
   for (const auto& sample : samples) EXPECT_LT(sample.count[0], 1000);
@@ -406,7 +422,8 @@ TEST_F(EncoderDeviceOnUdp, RefusesASyncThatOnlyTheKernelCouldSend) {
 
 TEST_F(EncoderDeviceOnUdp, SurvivesAFloodOfPositions) {
   begin_streaming();
-  const std::vector<can::CanFrame> flood(4000, can::encode_position(0x181, can::PositionType::Signed32, 5));
+  const std::vector<can::CanFrame> flood(
+      4000, can::encode_position(0x181, can::PositionType::Signed32, 5));
   peer.send(flood);
   turns(40);
   EXPECT_EQ(samples.back().missing_mask, 0);
@@ -438,16 +455,19 @@ TEST(EncoderDevice, StreamsInItsOwnThreadOnTheRealClock) {
   ASSERT_TRUE(thread.has_value());
   std::vector<AxisSample> complete;
   const auto give_up = time.now() + 60s;
+
   while (complete.size() < 50 && time.now() < give_up) {
     peer.wait(1);
     peer.serve(time.now());
     peer.answer_sync();
     std::array<AxisSample, 16> out{};
     const auto n = (*device)->samples().pop(out);
-    std::copy_if(out.begin(), out.begin() + static_cast<std::ptrdiff_t>(n), std::back_inserter(complete),
+    std::copy_if(out.begin(), out.begin() + static_cast<std::ptrdiff_t>(n),
+                 std::back_inserter(complete),
                  [](const AxisSample& s) { return s.missing_mask == 0; });
     EXPECT_EQ((*device)->status().name, "encoders");
   }
+
   (*thread)->stop();
   EXPECT_FALSE((*thread)->failure());
   ASSERT_GE(complete.size(), 50u) << (*device)->status().last_fault;
@@ -463,17 +483,22 @@ TEST(EncoderDevice, RefusesABadConfiguration) {
 TEST(EncoderDevice, SaysThatNobodyListensAndGoesOnTrying) {
   SteppedTime time;
   std::uint16_t port = 0;
-  { port = EncoderPeer{std::span<const EncoderIdentity>{}}.port(); }  // closed again: nobody is there
+  {
+    port = EncoderPeer{std::span<const EncoderIdentity>{}}.port();
+  }  // closed again: nobody is there
   EncoderDeviceOptions options;
   options.receiver.axes = {{.name = "X", .node = 1}};
   auto device = EncoderDevice::create(
-      options, std::make_unique<UdpCanBus>(UdpCanOptions{.peer_port = port, .speed = 0.0}, time), time);
+      options, std::make_unique<UdpCanBus>(UdpCanOptions{.peer_port = port, .speed = 0.0}, time),
+      time);
   ASSERT_TRUE(device.has_value());
+
   for (int i = 0; i < 3000; ++i) {
     (*device)->wait(1ms);
     (*device)->receive();
     time.advance(1ms);
   }
+
   const auto status = (*device)->status();
   EXPECT_FALSE(status.connected);
   EXPECT_EQ(status.samples, 0u);

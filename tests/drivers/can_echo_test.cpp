@@ -1,5 +1,5 @@
-// The encoder device on a bus that echoes its SYNC, as SocketCAN does; the kernel's own is tested in the
-// guest.
+// The encoder device on a bus that echoes its SYNC, as SocketCAN does; the kernel's own is tested
+// in the guest.
 
 #include <gmock/gmock.h>
 
@@ -22,7 +22,8 @@ constexpr auto kOnTheWire = 55us;  // a frame without data at 1 Mbit/s
 /// UDP with an echo for every SYNC that leaves, and a transmit queue that can be stopped.
 class EchoingBus final : public CanBus {
  public:
-  EchoingBus(const UdpCanOptions& options, const TimeSource& time) : udp_(options, time), time_(time) {}
+  EchoingBus(const UdpCanOptions& options, const TimeSource& time)
+      : udp_(options, time), time_(time) {}
 
   void stop() { stopped_ = true; }
   void go_on() {
@@ -83,7 +84,7 @@ TEST_F(EncoderDeviceWithEcho, DatesASampleByTheEcho) {
   ASSERT_GE(samples.size() + 1, peer.syncs() - syncs);
   EXPECT_THAT(samples, Each(Field(&AxisSample::missing_mask, 0)));
   for (const auto& sample : samples)
-    EXPECT_EQ(sample.head.time.time_since_epoch() % kTurn, kOnTheWire) << "sent at whole turns";
+    EXPECT_EQ(sample.head.time.time_since_epoch() % kCycle, kOnTheWire) << "sent at whole turns";
   EXPECT_EQ(device->status().faults, 0u);
 }
 
@@ -101,7 +102,8 @@ TEST_F(EncoderDeviceWithEcho, MarksWhatDoesNotLeaveAndKeepsTheNextBack) {
   echoing->go_on();
   turns(40);
   ASSERT_GT(samples.size(), 5u);
-  EXPECT_THAT(samples, Each(Field(&AxisSample::missing_mask, 0))) << "the late answers went to nobody";
+  EXPECT_THAT(samples, Each(Field(&AxisSample::missing_mask, 0)))
+      << "the late answers went to nobody";
   EXPECT_GT(samples.front().head.lost_before, 5u);
 }
 
@@ -109,8 +111,9 @@ TEST_F(EncoderDeviceWithEcho, StreamsAgainAfterABusOffWithASyncUnderWay) {
   begin_streaming();
   echoing->stop();
   turns(8);
-  peer.send(std::array{
-      can::encode_error_frame({.conditions = static_cast<can::BusConditions>(can::BusCondition::BusOff)})});
+  peer.send(std::array{can::encode_error_frame(
+      {.conditions = static_cast<can::BusConditions>(can::BusCondition::BusOff)})});
+
   ASSERT_TRUE(state_becomes("bus off"));
   echoing->drop_queue();
   echoing->go_on();
@@ -128,7 +131,8 @@ TEST_F(EncoderDeviceWithEcho, ReplaysItsRawBytesToTheSameSamples) {
   turns(30);
   echoing->go_on();
   turns(50);
-  expect_the_same_from_raw_bytes(static_cast<protocol::SampleFlags>(protocol::SampleFlag::TimeWidened));
+  expect_the_same_from_raw_bytes(
+      static_cast<protocol::SampleFlags>(protocol::SampleFlag::TimeWidened));
 }
 
 }  // namespace

@@ -18,7 +18,8 @@ using testing::Not;
 
 struct Reports {
   void emcy(std::uint16_t code, HostTime at, can::NodeId node = 1) {
-    reports.on_frame(can::encode_emergency({.node = node, .code = code, .error_register = 0x11}), at);
+    reports.on_frame(can::encode_emergency({.node = node, .code = code, .error_register = 0x11}),
+                     at);
   }
   std::vector<EncoderAxis> axes = three_axes().axes;
   EmergencyReports reports{axes};
@@ -56,9 +57,11 @@ TEST(EmergencyReports, ForgetTheEmergencyOfAnAxisThatIsWellAgain) {
   r.emcy(0, kStart + 1s);
   EXPECT_THAT(r.reports.condition(0b001, kStart + 2s), HasSubstr("EMCY 5000h"));
   EXPECT_EQ(r.reports.condition(0, kStart + 3s), "");
-  EXPECT_THAT(r.reports.condition(0b001, kStart + 11s), HasSubstr("EMCY 5000h")) << "not well for long";
+  EXPECT_THAT(r.reports.condition(0b001, kStart + 11s), HasSubstr("EMCY 5000h"))
+      << "not well for long";
   EXPECT_EQ(r.reports.condition(0, kStart + 11s + EmergencyReports::kSettledAfter), "");
-  EXPECT_THAT(r.reports.condition(0b001, kStart + 1h), AllOf(HasSubstr("missing"), Not(HasSubstr("EMCY"))));
+  EXPECT_THAT(r.reports.condition(0b001, kStart + 1h),
+              AllOf(HasSubstr("missing"), Not(HasSubstr("EMCY"))));
 }
 
 }  // namespace

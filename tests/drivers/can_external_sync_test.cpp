@@ -31,7 +31,8 @@ std::uint16_t free_port() {
   return tests::EncoderPeer{std::span<const can::EncoderIdentity>{}}.port();
 }
 
-/// A machine with two encoders that its control has configured, and the device, on one stepped clock.
+/// A machine with two encoders that its control has configured, and the device, on one stepped
+/// clock.
 class ExternalSync : public testing::Test {
  protected:
   void SetUp() override {
@@ -52,17 +53,20 @@ class ExternalSync : public testing::Test {
     options.receiver.external_sync = true;
     options.sync = SyncSource::External;
     const UdpCanOptions udp{.local_port = port_, .peer_port = bus_.port(), .speed = 0.0};
-    device_ = std::move(*EncoderDevice::create(options, std::make_unique<UdpCanBus>(udp, time_), time_));
+    device_ =
+        std::move(*EncoderDevice::create(options, std::make_unique<UdpCanBus>(udp, time_), time_));
     device_->wait(0ms);
     device_->receive();
   }
   sim::EncoderBus open_bus() {
     const std::array<sim::EncoderNodeOptions, 2> nodes{
-        sim::EncoderNodeOptions{.node = 1, .axis = sim::Axis::X, .noise_m = 0.0, .configured = true},
-        sim::EncoderNodeOptions{.node = 2, .axis = sim::Axis::Y, .noise_m = 0.0, .configured = true}};
+        sim::EncoderNodeOptions{
+            .node = 1, .axis = sim::Axis::X, .noise_m = 0.0, .configured = true},
+        sim::EncoderNodeOptions{
+            .node = 2, .axis = sim::Axis::Y, .noise_m = 0.0, .configured = true}};
     return sim::EncoderBus::open({.peer_port = port_}, nodes, machine_, time_.now()).value();
   }
-  void turn() {
+  void cycle() {
     bus_.poll(time_.now());
     device_->wait(1ms);
     device_->receive();
@@ -72,7 +76,7 @@ class ExternalSync : public testing::Test {
     samples_.insert(samples_.end(), out.begin(), out.begin() + static_cast<std::ptrdiff_t>(n));
   }
   void turns(std::chrono::milliseconds duration) {
-    for (auto n = duration.count(); n > 0; --n) turn();
+    for (auto n = duration.count(); n > 0; --n) cycle();
   }
   void run_until_streaming() {
     bus_.produce_sync(kPeriod, time_.now() + kPeriod);
@@ -104,8 +108,9 @@ TEST_F(ExternalSync, GivesASampleForEverySyncOfTheMachineAndSendsNothing) {
 
 TEST_F(ExternalSync, SendsNothingWhateverHappensOnTheBus) {
   run_until_streaming();
-  for (const auto kind : {sim::FaultKind::Mute, sim::FaultKind::Restart, sim::FaultKind::Emergency,
-                          sim::FaultKind::BusOff, sim::FaultKind::BusGarbage, sim::FaultKind::Late}) {
+  for (const auto kind :
+       {sim::FaultKind::Mute, sim::FaultKind::Restart, sim::FaultKind::Emergency,
+        sim::FaultKind::BusOff, sim::FaultKind::BusGarbage, sim::FaultKind::Late}) {
     bus_.inject({kind, 0.0, 1.0, 0.01, 0}, time_.now());
     turns(3s);
   }
@@ -141,16 +146,19 @@ TEST_F(ExternalSync, ReplaysItsRawBytesToTheSameSamples) {
   run_until_streaming();
   turns(100ms);
   EncoderReceiverOptions options;
-  options.axes = {{.name = "X", .node = 1, .scale = 10e-9}, {.name = "Y", .node = 2, .scale = 10e-9}};
+  options.axes = {{.name = "X", .node = 1, .scale = 10e-9},
+                  {.name = "Y", .node = 2, .scale = 10e-9}};
   options.sync_period = kPeriod;
   options.external_sync = true;
   EncoderReceiver replay{options};
   std::vector<AxisSample> again;
   std::array<protocol::RawBlock, 64> blocks;  // NOLINT: filled by pop
+
   while (const auto n = device_->raw().pop(blocks)) {
     for (std::size_t i = 0; i < n; ++i)
       replay.on_raw(blocks[i], [&](const AxisSample& s) { again.push_back(s); });
   }
+
   ASSERT_GE(again.size(), samples_.size());
   EXPECT_EQ(again.back().head.time, samples_.back().head.time);
   EXPECT_EQ(again.back().count, samples_.back().count);

@@ -94,59 +94,59 @@ class BesideAnotherProducer : public EncoderDeviceOnUdp {
   }
   /// Opens the bus.
   void listen() {
-    device->wait(kTurn);
+    device->wait(kCycle);
     device->receive();
     peer.talk_to(bus->local_port());
   }
   void lose_the_interface_for(std::chrono::nanoseconds duration) {
     bus->fail_next_read();
-    device->wait(kTurn);
+    device->wait(kCycle);
     device->receive();
     ASSERT_EQ(device->status().state, "closed");
     time.advance(duration);
     listen();
     ASSERT_NE(device->status().state, "closed");
   }
-  void turns_with_foreign_syncs(int n) {
+  void cycles_with_foreign_syncs(int n) {
     for (int i = 0; i < n; ++i) {
       if (i % 10 == 0) peer.send(std::array{can::encode_sync()});
-      turn();
+      cycle();
     }
   }
 };
 
 TEST_F(BesideAnotherProducer, SendsNothingWhereItHearsASyncBeforeItsFirst) {
-  turns_with_foreign_syncs(5000);
+  cycles_with_foreign_syncs(5000);
   EXPECT_EQ(peer.frames_received(), 0u);
   EXPECT_EQ(device->status().state, "foreign SYNC");
   EXPECT_FALSE(device->status().connected);
   EXPECT_EQ(device->status().faults, 1u);
-  EXPECT_THAT(device->status().last_fault,
-              AllOf(HasSubstr("another SYNC producer"), HasSubstr("10.000 ms"), HasSubstr("external")));
+  EXPECT_THAT(device->status().last_fault, AllOf(HasSubstr("another SYNC producer"),
+                                                 HasSubstr("10.000 ms"), HasSubstr("external")));
 }
 
 TEST_F(BesideAnotherProducer, StopsWhenItHearsASyncLater) {
   begin_streaming();
-  turns_with_foreign_syncs(100);
+  cycles_with_foreign_syncs(100);
   peer.serve(time.now());
   const auto sent = peer.frames_received();
-  turns_with_foreign_syncs(2000);
+  cycles_with_foreign_syncs(2000);
   EXPECT_EQ(peer.frames_received(), sent);
   EXPECT_EQ(device->status().state, "foreign SYNC");
 }
 
 TEST_F(BesideAnotherProducer, StreamsAgainOnceTheOtherIsGoneForGood) {
-  turns_with_foreign_syncs(100);
+  cycles_with_foreign_syncs(100);
   turns(1000);
   time.advance(ForeignSync::kQuietFor);
   begin_streaming();
 }
 
 TEST_F(BesideAnotherProducer, SendsNothingAfterAnInterfaceWasDownForLong) {
-  turns_with_foreign_syncs(2000);
+  cycles_with_foreign_syncs(2000);
   lose_the_interface_for(10min);
   EXPECT_EQ(device->status().state, "foreign SYNC");
-  turns_with_foreign_syncs(2000);
+  cycles_with_foreign_syncs(2000);
   EXPECT_EQ(peer.frames_received(), 0u);
   EXPECT_EQ(device->status().state, "foreign SYNC");
 }
@@ -157,8 +157,8 @@ TEST_F(BesideAnotherProducer, HearsAProducerThatWasStartedWhileTheInterfaceWasDo
   const auto sent = peer.frames_received();
   lose_the_interface_for(10min);
   EXPECT_EQ(device->status().state, "listening");
-  for (int i = 0; i < 900; ++i) turn();  // a slow one
-  turns_with_foreign_syncs(3000);
+  for (int i = 0; i < 900; ++i) cycle();  // a slow one
+  cycles_with_foreign_syncs(3000);
   EXPECT_EQ(peer.frames_received(), sent);
   EXPECT_EQ(device->status().state, "foreign SYNC");
   EXPECT_THAT(device->status().last_fault, HasSubstr("another SYNC producer"));
@@ -169,15 +169,16 @@ TEST_F(BesideAnotherProducer, ListensShortlyAfterAShortBreakAndStreams) {
   peer.serve(time.now());
   const auto sent = peer.frames_received();
   lose_the_interface_for(500ms);
-  turns(static_cast<int>(ForeignSync::kListenAgainFor / kTurn) - 2);
+  turns(static_cast<int>(ForeignSync::kListenAgainFor / kCycle) - 2);
   EXPECT_EQ(peer.frames_received(), sent);
   EXPECT_EQ(device->status().state, "listening");
   samples.clear();
-  EXPECT_TRUE(turns_until([&] { return !samples.empty() && samples.back().missing_mask == 0; }, 400));
+  EXPECT_TRUE(
+      cycles_until([&] { return !samples.empty() && samples.back().missing_mask == 0; }, 400));
 }
 
 TEST_F(BesideAnotherProducer, ListensBeforeTheFirstFrame) {
-  for (auto n = ForeignSync::kListenFor / kTurn - 2; n > 0; --n) turn();
+  for (auto n = ForeignSync::kListenFor / kCycle - 2; n > 0; --n) cycle();
   EXPECT_EQ(peer.frames_received(), 0u);
   EXPECT_EQ(device->status().state, "listening");
   begin_streaming();

@@ -48,6 +48,7 @@ TEST(EncoderReceiver, ALateAnswerDoesNotPassForThatOfTheNextCycle) {
   line.frame(position(3, 3002), kStart + 2300us);
   line.frame(position(1, 2000), kStart + 2400us);  // to the SYNC before
   line.frame(position(1, 3000), kStart + 2500us);
+
   ASSERT_EQ(line.samples.size(), 3u);
   EXPECT_EQ(line.samples[1].missing_mask, 0b001);
   EXPECT_EQ(line.samples[2].missing_mask, 0b001);
@@ -62,6 +63,7 @@ TEST(EncoderReceiver, ASampleThatHasLeftIsTakenBackByASecondAnswer) {
   line.cycle(kStart, 1000);
   line.cycle(kStart + 3ms, 2000);
   line.frame(position(2, 3001), kStart + 3900us);
+
   ASSERT_EQ(line.samples.size(), 3u);
   const auto& as_it_left = line.samples[1];
   const auto& taken_back = line.samples[2];
@@ -120,7 +122,8 @@ TEST(EncoderReceiver, AnAnswerThatIsKnownToBeLateLeavesNoDoubt) {
     line.frame(position(3, 2002), kStart + 1100us);
     if (before_the_sync) line.frame(position(1, 2000), kStart + 1900us);
     line.sync(kStart + 2ms);
-    if (!before_the_sync) line.frame(position(1, 2000), kStart + 1900us);  // read late, stamped before
+    if (!before_the_sync)
+      line.frame(position(1, 2000), kStart + 1900us);  // read late, stamped before
     for (const can::NodeId node : kNodes) line.frame(position(node, 3000), kStart + 2100us);
     EXPECT_EQ(line.samples.back().missing_mask, 0);
     EXPECT_EQ(line.samples.back().count[0], 3000);
@@ -154,14 +157,17 @@ TEST(EncoderReceiver, JitterWithinThePeriodCastsNoDoubt) {
   Line line;
   std::mt19937 random{7};
   std::uniform_int_distribution<int> sync_us{-80, 80}, answer_us{20, 690};
+
   for (int i = 0; i < 2000; ++i) {
     const HostTime sync = kStart + 1ms * i + 1us * sync_us(random);
     std::vector<Answer> answers;
-    for (const can::NodeId node : kNodes) answers.push_back({sync + 1us * answer_us(random), node, i});
+    for (const can::NodeId node : kNodes)
+      answers.push_back({sync + 1us * answer_us(random), node, i});
     std::ranges::sort(answers, {}, &Answer::at);
     line.sync(sync);
     for (const auto& a : answers) line.frame(position(a.node, a.count), a.at);
   }
+
   ASSERT_EQ(line.samples.size(), 2000u);
   for (const auto& sample : line.samples) ASSERT_EQ(sample.head.flags, 0u);
 }
@@ -173,15 +179,18 @@ TEST(EncoderReceiver, BelievesNoOldAnswerOfANodeThatIsLateNowAndThen) {
   std::uniform_int_distribution<int> prompt_us{100, 700}, late_us{750, 1900}, chance{0, 9};
   std::vector<Answer> answers;
   HostTime latest{};
+
   for (int i = 0, late_in_a_row = 0; i < kCycles; ++i) {
     // Three late ones in a row would be a node that is always late: that cannot be seen.
     late_in_a_row = chance(random) == 0 && late_in_a_row < 2 ? late_in_a_row + 1 : 0;
     const HostTime sync = kStart + 1ms * i;
-    latest = std::max(latest + 1us, sync + 1us * (late_in_a_row > 0 ? late_us(random) : prompt_us(random)));
+    latest = std::max(latest + 1us,
+                      sync + 1us * (late_in_a_row > 0 ? late_us(random) : prompt_us(random)));
     answers.push_back({latest, 1, i});
     for (const can::NodeId node : {can::NodeId{2}, can::NodeId{3}})
       answers.push_back({sync + 1us * prompt_us(random), node, i});
   }
+
   std::ranges::stable_sort(answers, {}, &Answer::at);
   std::size_t next = 0;
   for (int i = 0; i < kCycles; ++i) {
@@ -191,14 +200,17 @@ TEST(EncoderReceiver, BelievesNoOldAnswerOfANodeThatIsLateNowAndThen) {
       line.frame(position(answers[next].node, answers[next].count), answers[next].at);
     }
   }
+
   std::map<std::uint32_t, AxisSample> last_word;
   for (const auto& sample : line.samples) last_word[sample.cycle] = sample;
   std::size_t believed = 0;
+
   for (const auto& [cycle, sample] : last_word) {
     if (sample.missing_mask != 0) continue;
     ++believed;
     ASSERT_EQ(sample.count[0], static_cast<std::int64_t>(cycle));
   }
+
   EXPECT_GT(believed, std::size_t{kCycles} / 2);
 }
 

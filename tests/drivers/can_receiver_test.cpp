@@ -71,6 +71,7 @@ TEST(EncoderReceiver, FlagsAMissingAxisAtTheDeadlineAndKeepsItsValue) {
   line.frame(position(1, 2000), kStart + 1100us);
   line.frame(position(3, 2002), kStart + 1200us);
   line.time(kStart + 1799us);
+
   EXPECT_EQ(line.samples.size(), 1u);
   line.time(kStart + 1800us);
   ASSERT_EQ(line.samples.size(), 2u);
@@ -137,11 +138,14 @@ TEST(EncoderReceiver, UnwrapsARotaryEncoderAtItsOwnRange) {
                    .wrap_counts = 36000}};
   Line line{options};
   std::int64_t ms = 0;
+
   for (const std::int64_t count : {35990, 10, 17990, 35970, 5}) {
     line.sync(kStart + 1ms * ms);
-    line.frame(can::encode_position(0x181, can::PositionType::Unsigned32, count), kStart + 1ms * ms + 10us);
+    line.frame(can::encode_position(0x181, can::PositionType::Unsigned32, count),
+               kStart + 1ms * ms + 10us);
     ++ms;
   }
+
   ASSERT_EQ(line.samples.size(), 5u);
   EXPECT_EQ(line.samples[1].count[0], 36010);
   EXPECT_EQ(line.samples[4].count[0], 72005);
@@ -205,7 +209,9 @@ TEST(EncoderReceiver, MissesAHeartbeatThatStopped) {
   Line line;
   line.frame(can::encode_heartbeat(1, can::NodeState::Operational), kStart);
   line.cycle(kStart + 350ms, 1);
-  EXPECT_EQ(line.samples.at(0).head.flags & static_cast<protocol::SampleFlags>(SampleFlag::DeviceError), 0u);
+  EXPECT_EQ(
+      line.samples.at(0).head.flags & static_cast<protocol::SampleFlags>(SampleFlag::DeviceError),
+      0u);
   line.cycle(kStart + 351ms, 2);
   EXPECT_TRUE(has(line.samples.at(1).head.flags, SampleFlag::DeviceError));
   EXPECT_EQ(line.receiver.counters().heartbeat_losses, 1u);
@@ -241,9 +247,12 @@ TEST(EncoderReceiver, ReadsWhereAFixedMappingHasThePosition) {
   Line line;
   for (const can::NodeId node : kNodes) {
     line.frame(can::standard_frame(0x580u + node, {0x4F, 0x00, 0x1A, 0, 2, 0, 0, 0}), kStart);
-    line.frame(can::standard_frame(0x580u + node, {0x43, 0x00, 0x1A, 1, 0x10, 1, 0x30, 0x60}), kStart);
-    line.frame(can::standard_frame(0x580u + node, {0x43, 0x00, 0x1A, 2, 0x20, 0, 0x04, 0x60}), kStart);
+    line.frame(can::standard_frame(0x580u + node, {0x43, 0x00, 0x1A, 1, 0x10, 1, 0x30, 0x60}),
+               kStart);
+    line.frame(can::standard_frame(0x580u + node, {0x43, 0x00, 0x1A, 2, 0x20, 0, 0x04, 0x60}),
+               kStart);
   }
+
   line.sync(kStart);
   for (const can::NodeId node : kNodes)
     line.frame(can::standard_frame(0x180u + node, {9, 9, 0xE8, 3, 0, 0}), kStart + 100us);
@@ -263,18 +272,24 @@ TEST(EncoderReceiver, WaitsForAHeartbeatAsLongAsItsNodeSays) {
 
 TEST(EncoderReceiver, TurnsARotaryEncoderWithoutScalingAtItsOwnRevolutions) {
   EncoderReceiverOptions options;
-  options.axes = {
-      {.name = "C", .node = 1, .kind = AxisKind::Rotary, .position = can::PositionType::Unsigned32}};
+  options.axes = {{.name = "C",
+                   .node = 1,
+                   .kind = AxisKind::Rotary,
+                   .position = can::PositionType::Unsigned32}};
   Line line{options};
   line.frame(can::standard_frame(0x581, {0x43, 0x01, 0x65, 0, 100, 0, 0, 0}),
              kStart);  // 100 counts a revolution
-  line.frame(can::standard_frame(0x581, {0x4B, 0x02, 0x65, 0, 2, 0, 0, 0}), kStart);  // 2 revolutions
+  line.frame(can::standard_frame(0x581, {0x4B, 0x02, 0x65, 0, 2, 0, 0, 0}),
+             kStart);  // 2 revolutions
   std::int64_t ms = 0;
+
   for (const std::int64_t count : {190, 5}) {
     line.sync(kStart + 1ms * ms);
-    line.frame(can::encode_position(0x181, can::PositionType::Unsigned32, count), kStart + 1ms * ms + 10us);
+    line.frame(can::encode_position(0x181, can::PositionType::Unsigned32, count),
+               kStart + 1ms * ms + 10us);
     ++ms;
   }
+
   ASSERT_EQ(line.samples.size(), 2u);
   EXPECT_EQ(line.samples[1].count[0], 205);
   EXPECT_NEAR(line.samples[1].position[0], 2 * std::numbers::pi * 2.05, 1e-12);
@@ -322,6 +337,7 @@ TEST(EncoderReceiver, ALossEndsTheOpenCycleAndTheNextSampleSaysSo) {
   line.cycle(kStart, 1000);
   line.sync(kStart + 1ms);
   line.frame(position(kNodes[0], 2000), kStart + 1100us);
+
   // Lost here: the other answers, a SYNC, and the first answer to it.
   line.keep(line.receiver.on_loss());
   ASSERT_EQ(line.samples.size(), 2u);
@@ -342,6 +358,7 @@ TEST(EncoderReceiver, TakesTheLossARawBlockTellsOf) {
   block.time = kStart;
   block.direction = RawBlock::Direction::ToDevice;
   can::DatagramWriter sync{block.bytes, 0};
+
   ASSERT_TRUE(sync.add(can::encode_sync()));
   block.length = static_cast<std::uint16_t>(sync.finish().size());
   receiver.on_raw(block, keep);
@@ -362,10 +379,12 @@ TEST(EncoderReceiver, FlagsAndWidensACycleWithAnAnswerNobodyKnowsTheTimeOf) {
   line.keep(line.receiver.on_frame(position(kNodes[1], 2), kStart + 200us, true));
   line.frame(position(kNodes[2], 3), kStart + 300us);
   line.cycle(kStart + 1ms, 10);
+
   ASSERT_EQ(line.samples.size(), 2u);
   EXPECT_TRUE(has(line.samples[0].head.flags, SampleFlag::TimeWidened));
   EXPECT_NEAR(static_cast<double>(line.samples[0].head.u_time.count()),
-              std::hypot(static_cast<double>(line.samples[1].head.u_time.count()), 1e6 / std::numbers::sqrt3),
+              std::hypot(static_cast<double>(line.samples[1].head.u_time.count()),
+                         1e6 / std::numbers::sqrt3),
               1.0);
   EXPECT_FALSE(has(line.samples[1].head.flags, SampleFlag::TimeWidened));
 }
@@ -430,6 +449,7 @@ TEST(EncoderOptions, AreRefusedWithTheNameOfTheAxis) {
     const auto result = check(options);
     return result ? std::string{} : result.error().text;
   };
+
   EXPECT_TRUE(check(three_axes()));
   EXPECT_THAT(refused([](auto& o) { o.axes[1].scale = 0.0; }), testing::HasSubstr("XYZ2"));
   EXPECT_THAT(refused([](auto& o) { o.axes[2].node = 1; }), testing::HasSubstr("both are node 1"));

@@ -46,7 +46,8 @@ Seen frame(std::chrono::nanoseconds at) {
 
 class SyncUnderWayTest : public testing::Test {
  protected:
-  std::vector<Seen> settle(const std::vector<ReceivedFrame>& came, HostTime now, bool all_read = true) {
+  std::vector<Seen> settle(const std::vector<ReceivedFrame>& came, HostTime now,
+                           bool all_read = true) {
     out.assign(came.size() + 1, {});
     out.resize(under_way.settle(came, out, now, all_read));
     std::vector<Seen> seen;
@@ -61,7 +62,8 @@ class SyncUnderWayTest : public testing::Test {
   /// A whole cycle of node 1 before kStart.
   void SetUp() override {
     under_way.sent(kStart - kSyncPeriod);
-    (void)settle({echo(kStart - kSyncPeriod), answer(kStart - kSyncPeriod + 200us)}, kStart - 100us);
+    (void)settle({echo(kStart - kSyncPeriod), answer(kStart - kSyncPeriod + 200us)},
+                 kStart - 100us);
   }
 
   SyncUnderWay under_way{[] {
@@ -86,7 +88,8 @@ TEST_F(SyncUnderWayTest, LeavesWhenItsEchoSays) {
 TEST_F(SyncUnderWayTest, WithoutAnEchoCountsFromSendingWhenTheAnswersShouldHaveCome) {
   under_way.sent(kStart);
   EXPECT_THAT(settle({}, kStart + kAnswerWithin - 1ns), IsEmpty());
-  EXPECT_THAT(settle({}, kStart + kAnswerWithin, false), IsEmpty()) << "it may be behind what was read";
+  EXPECT_THAT(settle({}, kStart + kAnswerWithin, false), IsEmpty())
+      << "it may be behind what was read";
   EXPECT_THAT(settle({}, kStart + kAnswerWithin), ElementsAre(sync(0us)));
   EXPECT_THAT(settle({}, kStart + 2ms), IsEmpty()) << "once";
 }
@@ -108,14 +111,15 @@ TEST_F(SyncUnderWayTest, IsGivenUpInTheEnd) {
 
 TEST_F(SyncUnderWayTest, CountsFromSendingWhereItsAnswerIsToldFirst) {
   under_way.sent(kStart);
-  EXPECT_THAT(settle({answer(kStart + 200us)}, kStart + 205us), ElementsAre(sync(0us), frame(200us)));
+  EXPECT_THAT(settle({answer(kStart + 200us)}, kStart + 205us),
+              ElementsAre(sync(0us), frame(200us)));
   EXPECT_TRUE(out[0].time_widened);
   EXPECT_FALSE(under_way.waits(kStart + 205us)) << "it has left";
   under_way.sent(kStart + kSyncPeriod);
-  EXPECT_THAT(
-      settle({echo(kStart + 60us), answer(kStart + 1200us), echo(kStart + 1060us), answer(kStart + 1300us)},
-             kStart + 1310us),
-      ElementsAre(sync(1ms), frame(1200us), frame(1300us)))
+  EXPECT_THAT(settle({echo(kStart + 60us), answer(kStart + 1200us), echo(kStart + 1060us),
+                      answer(kStart + 1300us)},
+                     kStart + 1310us),
+              ElementsAre(sync(1ms), frame(1200us), frame(1300us)))
       << "the echo of the one before is none of this one";
 }
 
@@ -140,7 +144,8 @@ TEST_F(SyncUnderWayTest, CountsFromSendingWhereTheStampOfItsEchoIsNotBelieved) {
 }
 
 TEST_F(SyncUnderWayTest, AnEchoOfNoneIsNone) {
-  EXPECT_THAT(settle({echo(kStart), heartbeat(kStart + 1us)}, kStart + 1ms), ElementsAre(frame(1us)));
+  EXPECT_THAT(settle({echo(kStart), heartbeat(kStart + 1us)}, kStart + 1ms),
+              ElementsAre(frame(1us)));
   under_way.sent(kStart);
   under_way.forget();
   EXPECT_THAT(settle({echo(kStart)}, kStart + 1ms), IsEmpty());

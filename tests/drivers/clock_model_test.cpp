@@ -39,11 +39,14 @@ void run(BurstProfile& profile, ClockModel& model, double until_s) {
 }
 
 constexpr std::uint64_t kSeeds = 50;
-constexpr std::uint64_t kFirstSeed = 900'000;  // the model's coefficients were chosen on seeds 0 to 399
+// the model's coefficients were chosen on seeds 0 to 399
+constexpr std::uint64_t kFirstSeed = 900'000;
 
 /// The measured profile with 15 ppm and a constant delay nobody knows, of 0 to 2 ms.
 BurstProfile measured(std::uint64_t seed) {
-  return {seed, {.skew = 15e-6, .constant_delay_s = 0.002 * BurstProfile(5'000'000 + seed, {}).uniform()}};
+  return {
+      seed,
+      {.skew = 15e-6, .constant_delay_s = 0.002 * BurstProfile(5'000'000 + seed, {}).uniform()}};
 }
 
 TEST(ClockModel, ErrsByLessThan2msAfterAMinute) {
@@ -52,7 +55,8 @@ TEST(ClockModel, ErrsByLessThan2msAfterAMinute) {
     ClockModel model;
     for (run(profile, model, 60.0); profile.last_point_s() < 120.0;) {
       run(profile, model, profile.last_point_s() + 0.1);  // one more packet
-      EXPECT_LE(judge(model, profile, profile.last_point_s() - 0.330).error_s, 0.002) << "seed " << seed;
+      EXPECT_LE(judge(model, profile, profile.last_point_s() - 0.330).error_s, 0.002)
+          << "seed " << seed;
       EXPECT_LE(judge(model, profile, profile.last_point_s()).error_s, 0.002) << "seed " << seed;
     }
   }
@@ -71,7 +75,8 @@ TEST(ClockModel, StatesAnUncertaintyThatCoversTheTruth) {
   EXPECT_GE(covered, 45u);
 }
 
-// Without the constant delay only the fit is left, and its own share of the uncertainty has to cover it.
+// Without the constant delay only the fit is left, and its own share of the uncertainty has to
+// cover it.
 TEST(ClockModel, KnowsHowWellTheEnvelopeIsFollowed) {
   std::uint64_t covered = 0;
   double sum_of_u_s = 0.0;
@@ -176,7 +181,8 @@ TEST(ClockModel, BeginsAnewWhenTheDeviceClockLostTimeForGood) {
                  ClockModel::Observed::Restarted;
   }
   EXPECT_TRUE(restarted);
-  EXPECT_LT(std::chrono::abs(model.to_host(DeviceTime{i * 332ms - 100ms}).time - HostTime{100s + i * 332ms}),
+  EXPECT_LT(std::chrono::abs(model.to_host(DeviceTime{i * 332ms - 100ms}).time -
+                             HostTime{100s + i * 332ms}),
             2ms);
 }
 
@@ -187,7 +193,9 @@ TEST(ClockModel, GoesOnAfterTenMinutesOfSilence) {
   const double later_s = 720.0;
   EXPECT_EQ(model.observe(profile.device_at(later_s), profile.host_at(later_s)),
             ClockModel::Observed::Followed);
-  EXPECT_LT(std::chrono::abs(model.to_host(profile.device_at(later_s)).time - profile.host_at(later_s)), 2ms);
+  EXPECT_LT(
+      std::chrono::abs(model.to_host(profile.device_at(later_s)).time - profile.host_at(later_s)),
+      2ms);
 }
 
 TEST(ClockModel, SaysTheSameForTheSameArrivals) {

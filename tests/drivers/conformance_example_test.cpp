@@ -1,5 +1,5 @@
-// The conformance suite on the smallest driver there is: 16-byte records over TCP. Shows how a driver's test
-// is written, and that the suite can be passed.
+// The conformance suite on the smallest driver there is: 16-byte records over TCP. Shows how a
+// driver's test is written, and that the suite can be passed.
 
 #include <arpa/inet.h>
 #include <netinet/in.h>
@@ -74,29 +74,33 @@ class RecordDevice final : public drivers::Device {
   void wait(std::chrono::nanoseconds) override {
     if (!socket_) connect_to_peer();
     if (!socket_) return;
-    const ssize_t n = ::recv(socket_.get(), buffer_.data() + filled_, buffer_.size() - filled_, MSG_DONTWAIT);
+    const ssize_t n =
+        ::recv(socket_.get(), buffer_.data() + filled_, buffer_.size() - filled_, MSG_DONTWAIT);
+
     if (n > 0) {
       last_heard_ = time_.now();
       board_.set_connected(true);
       board_.set_state("streaming");
-      raw_.push_bytes(last_heard_, protocol::RawBlock::Direction::FromDevice,
-                      std::as_bytes(std::span(buffer_)).subspan(filled_, static_cast<std::size_t>(n)));
+      raw_.push_bytes(
+          last_heard_, protocol::RawBlock::Direction::FromDevice,
+          std::as_bytes(std::span(buffer_)).subspan(filled_, static_cast<std::size_t>(n)));
       filled_ += static_cast<std::size_t>(n);
     } else if (n == 0) {
       lose("record device: connection closed by the peer");
     } else if (time_.now() - last_heard_ > kSilence) {
       lose("record device: silent for 500 ms");
     }
-    if (nonsense_) lose("record device: bytes that are no record");
+
+    if (malformed_) lose("record device: bytes that are no record");
   }
 
   void receive() ABBE_RT override {
     std::size_t used = 0;
-    for (; filled_ - used >= sizeof(Record) && !nonsense_; used += sizeof(Record)) {
+    for (; filled_ - used >= sizeof(Record) && !malformed_; used += sizeof(Record)) {
       Record r;
       std::memcpy(&r, buffer_.data() + used, sizeof r);
-      nonsense_ = r.magic != Record{}.magic;
-      if (!nonsense_) push(r);
+      malformed_ = r.magic != Record{}.magic;
+      if (!malformed_) push(r);
     }
     std::memmove(buffer_.data(), buffer_.data() + used, filled_ - used);
     filled_ -= used;
@@ -121,7 +125,7 @@ class RecordDevice final : public drivers::Device {
     board_.set_state("closed");
     socket_.reset();
     filled_ = 0;
-    nonsense_ = false;
+    malformed_ = false;
     interrupted_ = true;
   }
   void push(const Record& r) ABBE_RT {
@@ -141,14 +145,14 @@ class RecordDevice final : public drivers::Device {
   drivers::RawRing raw_{64};
   std::array<char, 8192> buffer_{};
   std::size_t filled_ = 0;
-  bool nonsense_ = false;
+  bool malformed_ = false;
   bool interrupted_ = false;
   HostTime last_heard_{};
 };
 
 class RecordPeer {
  public:
-  static constexpr std::chrono::nanoseconds kTurn = 10ms;
+  static constexpr std::chrono::nanoseconds kCycle = 10ms;
   static constexpr std::chrono::nanoseconds kSilenceLimit = RecordDevice::kSilence;
   static constexpr std::chrono::nanoseconds kRecoveryLimit = 1s;
   static constexpr bool kTornCanBeFinished = true;
@@ -158,7 +162,8 @@ class RecordPeer {
     return {"closed"};
   }
 
-  RecordPeer() : port_holder_(bound_socket(0)), port_(port_of(port_holder_.get())), device_(time_, port_) {
+  RecordPeer()
+      : port_holder_(bound_socket(0)), port_(port_of(port_holder_.get())), device_(time_, port_) {
     plug_in();
   }
 
@@ -174,7 +179,7 @@ class RecordPeer {
       connection_ = std::move(accepted);
     }
   }
-  void say_valid() { say(1); }
+  void send_valid() { say(1); }
   void hold_back() { holding_ = true; }
   void send_held() {
     holding_ = false;

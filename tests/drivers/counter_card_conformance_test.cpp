@@ -8,9 +8,10 @@ namespace {
 
 class FaultyCard {
  public:
-  static constexpr std::chrono::nanoseconds kTurn = 1ms;
+  static constexpr std::chrono::nanoseconds kCycle = 1ms;
   static constexpr std::chrono::nanoseconds kSilenceLimit = 100ms;
-  static constexpr std::chrono::nanoseconds kRecoveryLimit = 3s;  // 300 requests, one in two turns; pauses
+  // 300 requests, one in two turns; pauses
+  static constexpr std::chrono::nanoseconds kRecoveryLimit = 3s;
   static constexpr bool kTornCanBeFinished = true;
 
   static std::set<std::string_view> shown(Fault fault) {
@@ -28,7 +29,7 @@ class FaultyCard {
     server().mute(true);
     server().poll(time().now());
   }
-  void say_valid() {
+  void send_valid() {
     if (holding_ || torn_ || flood_after_ > time().now()) return;
     server().mute(false);
     server().poll(time().now());

@@ -11,9 +11,10 @@ using protocol::quad08::CountWidth;
 constexpr std::int64_t kScan = 300;  // clock counts
 constexpr std::uint64_t k32 = 0xFFFFFFFF;
 
-/// Feeds scans up to `end`, with one edge at clock count `edge`; the latch channel was zeroed `offset` later.
-void run(LatchTracker& tracker, std::int64_t begin, std::int64_t end, std::int64_t edge, std::int64_t offset,
-         std::uint64_t& latch_raw) {
+/// Feeds scans up to `end`, with one edge at clock count `edge`; the latch channel was zeroed
+/// `offset` later.
+void run(LatchTracker& tracker, std::int64_t begin, std::int64_t end, std::int64_t edge,
+         std::int64_t offset, std::uint64_t& latch_raw) {
   for (std::int64_t clock = begin + kScan; clock <= end; clock += kScan) {
     if (clock >= edge) latch_raw = static_cast<std::uint64_t>(edge + offset) & k32;
     (void)tracker.on_scan(latch_raw, static_cast<std::uint64_t>(clock) & k32, clock, clock - kScan);
@@ -43,6 +44,7 @@ TEST(LatchTracker, NarrowsWithEachEdgeAndKeepsTheTruthInside) {
   LatchTracker tracker{CountWidth::Bits32, false};
   std::uint64_t raw = 0;
   std::int64_t half_width = kScan;
+
   for (int touch = 0; touch < 40; ++touch) {
     const std::int64_t begin = 30'000 * touch;
     const std::int64_t edge = begin + 1000 + static_cast<std::int64_t>(random() % 20'000);
@@ -51,6 +53,7 @@ TEST(LatchTracker, NarrowsWithEachEdgeAndKeepsTheTruthInside) {
     EXPECT_LE(tracker.latest()->half_width, half_width);
     half_width = tracker.latest()->half_width;
   }
+
   EXPECT_LT(half_width, 20);
   EXPECT_EQ(tracker.disagreements(), 0u);
 }

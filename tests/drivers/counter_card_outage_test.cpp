@@ -1,5 +1,5 @@
-// Faults, outages and hosts that are held up: what the counter card driver keeps, and what it says of the
-// rest. Against the simulated card, over a real USB/IP connection in stepped time.
+// Faults, outages and hosts that are held up: what the counter card driver keeps, and what it says
+// of the rest. Against the simulated card, over a real USB/IP connection in stepped time.
 
 #include <gtest/gtest.h>
 
@@ -17,15 +17,16 @@ using testing::HasSubstr;
 TEST(CounterCardOutage, RecoversFromAnOverrunKeepsPositionsAndMarksTheGap) {
   CardBench bench;
   ASSERT_TRUE(bench.streams());
-  bench.turns_for(50ms);
+  bench.cycles_for(50ms);
   bench.take_samples();
   bench.server.card().overrun();
+
   ASSERT_TRUE(bench.until([&] { return bench.device->status().gaps != 0; }));
   EXPECT_THAT(bench.device->status().last_fault, HasSubstr("overrun"));
-  bench.turns_for(50ms);
+  bench.cycles_for(50ms);
   const auto samples = bench.take_samples();
-  const auto gap =
-      std::ranges::find_if(samples, [](const auto& s) { return has(s.head.flags, SampleFlag::GapBefore); });
+  const auto gap = std::ranges::find_if(
+      samples, [](const auto& s) { return has(s.head.flags, SampleFlag::GapBefore); });
   ASSERT_NE(gap, samples.end());
   ASSERT_NE(gap, samples.begin());
   const auto& before = *std::prev(gap);
@@ -42,18 +43,20 @@ void expect_the_same_zero(const protocol::AxisSample& before, const protocol::Ax
 }
 
 bool any_restarted(const std::vector<protocol::AxisSample>& samples) {
-  return std::ranges::any_of(samples, [](const auto& s) { return has(s.head.flags, SampleFlag::Restarted); });
+  return std::ranges::any_of(
+      samples, [](const auto& s) { return has(s.head.flags, SampleFlag::Restarted); });
 }
 
 TEST(CounterCardOutage, OneFailedRequestIsSentAgainAndCostsNothing) {
   CardBench bench;
   ASSERT_TRUE(bench.streams());
-  bench.turns_for(50ms);
+  bench.cycles_for(50ms);
   bench.take_samples();
   bench.server.inject({.kind = sim::FaultKind::FailRequest}, bench.time.now());
-  bench.turns_for(500ms);
+  bench.cycles_for(500ms);
   const auto samples = bench.take_samples();
-  for (std::size_t i = 1; i < samples.size(); ++i) ASSERT_EQ(samples[i].cycle, samples[i - 1].cycle + 1);
+  for (std::size_t i = 1; i < samples.size(); ++i)
+    ASSERT_EQ(samples[i].cycle, samples[i - 1].cycle + 1);
   EXPECT_FALSE(any_restarted(samples));
   EXPECT_EQ(bench.device->status().faults, 0u);
 }
@@ -61,13 +64,13 @@ TEST(CounterCardOutage, OneFailedRequestIsSentAgainAndCostsNothing) {
 TEST(CounterCardOutage, RequestsThatFailAgainAndAgainZeroNoCounter) {
   CardBench bench;
   ASSERT_TRUE(bench.streams());
-  bench.turns_for(50ms);
+  bench.cycles_for(50ms);
   const auto before = bench.take_samples().back();
   bench.server.inject({.kind = sim::FaultKind::FailRequest, .value = 3}, bench.time.now());
   ASSERT_TRUE(bench.until([&] { return bench.device->status().state == "closed"; }));
   EXPECT_THAT(bench.device->status().last_fault, HasSubstr("status: it cannot be read"));
   ASSERT_TRUE(bench.until([&] { return bench.device->status().gaps != 0; }));
-  bench.turns_for(50ms);
+  bench.cycles_for(50ms);
   const auto samples = bench.take_samples();
   EXPECT_FALSE(any_restarted(samples));
   expect_the_same_zero(before, samples.back());
@@ -76,11 +79,11 @@ TEST(CounterCardOutage, RequestsThatFailAgainAndAgainZeroNoCounter) {
 TEST(CounterCardOutage, CountsGoOnAfterALostConnectionAndTheGapIsMarked) {
   CardBench bench;
   ASSERT_TRUE(bench.streams());
-  bench.turns_for(50ms);
+  bench.cycles_for(50ms);
   const auto before = bench.take_samples().back();
   bench.server.inject({.kind = sim::FaultKind::Disconnect}, bench.time.now());
   ASSERT_TRUE(bench.until([&] { return bench.device->status().gaps != 0; }));
-  bench.turns_for(50ms);
+  bench.cycles_for(50ms);
   const auto samples = bench.take_samples();
   EXPECT_FALSE(any_restarted(samples));
   EXPECT_GT(samples.front().head.lost_before, 100u);
@@ -90,12 +93,13 @@ TEST(CounterCardOutage, CountsGoOnAfterALostConnectionAndTheGapIsMarked) {
 TEST(CounterCardOutage, AClockThatWentRoundMeanwhileWentOnAllTheSame) {
   CardBench bench;
   ASSERT_TRUE(bench.streams());
-  bench.turns_for(50ms);
+  bench.cycles_for(50ms);
   bench.take_samples();
   const auto before = bench.keeper.scans.back();
   bench.server.disconnect();  // the card keeps its power
-  bench.turns_for(10ms);
+  bench.cycles_for(10ms);
   bench.time.advance(2h);  // 7.2e9 counts of the clock
+
   ASSERT_TRUE(bench.until([&] { return bench.device->status().gaps != 0; }))
       << bench.device->status().state << ": " << bench.device->status().last_fault;
   const auto& after = bench.keeper.scans.back();
@@ -107,15 +111,16 @@ TEST(CounterCardOutage, AClockThatWentRoundMeanwhileWentOnAllTheSame) {
 TEST(CounterCardOutage, CountsBeginAnewAfterTheCardWasWithoutPower) {
   CardBench bench;
   ASSERT_TRUE(bench.streams());
-  bench.turns_for(50ms);
+  bench.cycles_for(50ms);
   bench.take_samples();
   bench.server.inject({.kind = sim::FaultKind::CardRestart}, bench.time.now());
   const auto counted = bench.device->status().samples;
+
   ASSERT_TRUE(bench.until([&] { return bench.device->status().samples > counted; }));
-  bench.turns_for(50ms);
+  bench.cycles_for(50ms);
   const auto samples = bench.take_samples();
-  const auto first =
-      std::ranges::find_if(samples, [](const auto& s) { return has(s.head.flags, SampleFlag::Restarted); });
+  const auto first = std::ranges::find_if(
+      samples, [](const auto& s) { return has(s.head.flags, SampleFlag::Restarted); });
   ASSERT_NE(first, samples.end());
   EXPECT_LT(first->position[0], 2e-3) << "from where it was set up, 50 ms before the first scan";
   EXPECT_THAT(bench.device->status().last_fault, HasSubstr("did not go on"));
@@ -124,7 +129,7 @@ TEST(CounterCardOutage, CountsBeginAnewAfterTheCardWasWithoutPower) {
 TEST(CounterCardOutage, AClockThatStandsElsewhereThanItMustIsAnotherSessionOfTheCard) {
   CardBench bench;
   ASSERT_TRUE(bench.streams());
-  bench.turns_for(50ms);
+  bench.cycles_for(50ms);
   bench.take_samples();
   bench.server.card().jump_clock(static_cast<std::int64_t>(10 * kClock_hz));
   bench.server.inject({.kind = sim::FaultKind::Disconnect}, bench.time.now());
@@ -137,11 +142,11 @@ TEST(CounterCardOutage, NoticesADeafCardWithinItsSilenceAlsoWhileItsStatusIsAwai
   CardBench bench;
   ASSERT_TRUE(bench.streams());
   for (const auto phase : {0ms, 30ms, 60ms, 90ms}) {  // of the status question
-    bench.turns_for(500ms + phase);
+    bench.cycles_for(500ms + phase);
     const auto before = bench.device->status().faults;
     bench.server.inject({.kind = sim::FaultKind::Mute, .duration_s = 0.2}, bench.time.now());
     EXPECT_TRUE(bench.until([&] { return bench.device->status().faults > before; },
-                            drivers::CounterCardSessionOptions{}.silence + 4 * CardBench::kTurn));
+                            drivers::CounterCardSessionOptions{}.silence + 4 * CardBench::kCycle));
     EXPECT_THAT(bench.device->status().last_fault, HasSubstr("no scans for 90 ms"));
     ASSERT_TRUE(bench.until([&] { return bench.device->status().state == "streaming"; }));
   }
@@ -151,16 +156,16 @@ TEST(CounterCardOutage, AHostHeldUpForLongerThanTheSilenceMissesNoScan) {
   CardBench bench;
   ASSERT_TRUE(bench.streams());
   for (const auto phase : {0ms, 30ms, 60ms, 90ms}) {  // of the status question
-    bench.turns_for(200ms + phase);
+    bench.cycles_for(200ms + phase);
     bench.time.advance(110ms);
-    bench.turns_for(50ms);
+    bench.cycles_for(50ms);
   }
   EXPECT_EQ(bench.device->status().faults, 0u) << bench.device->status().last_fault;
   EXPECT_EQ(bench.device->status().gaps, 0u);
 }
 
 /// Turns until a request has left whose answer was not yet read.
-void turn_until_asked(CardBench& bench) {
+void cycle_until_asked(CardBench& bench) {
   std::array<protocol::RawBlock, 64> blocks;
   const auto asked = [&] {
     bool any = false;
@@ -170,9 +175,10 @@ void turn_until_asked(CardBench& bench) {
     }
     return any;
   };
+
   (void)asked();
   ASSERT_TRUE(bench.until([&] {
-    bench.turn();
+    bench.cycle();
     return asked();
   }));
 }
@@ -182,10 +188,10 @@ TEST(CounterCardOutage, AHostHeldUpWhileTheStatusIsAwaitedReadsTheAnswerFirst) {
   card.fifo_bytes = std::size_t{1024} * 1024;  // no overrun in 0.6 s
   CardBench bench{CardBench::default_options(), card};
   ASSERT_TRUE(bench.streams());
-  bench.turns_for(50ms);
-  turn_until_asked(bench);
+  bench.cycles_for(50ms);
+  cycle_until_asked(bench);
   bench.time.advance(600ms);
-  bench.turns_for(200ms);
+  bench.cycles_for(200ms);
   EXPECT_EQ(bench.device->status().faults, 0u) << bench.device->status().last_fault;
   EXPECT_EQ(bench.device->status().gaps, 0u);
 }
@@ -193,29 +199,30 @@ TEST(CounterCardOutage, AHostHeldUpWhileTheStatusIsAwaitedReadsTheAnswerFirst) {
 TEST(CounterCardOutage, AHostHeldUpUntilTheCardOverranKeepsTheZero) {
   CardBench bench;
   ASSERT_TRUE(bench.streams());
-  bench.turns_for(50ms);
+  bench.cycles_for(50ms);
   const auto before = bench.take_samples().back();
   bench.time.advance(1500ms);
   ASSERT_TRUE(bench.until([&] { return bench.device->status().gaps != 0; }));
   EXPECT_THAT(bench.device->status().last_fault, HasSubstr("overrun"));
-  bench.turns_for(50ms);
+  bench.cycles_for(50ms);
   const auto samples = bench.take_samples();
   EXPECT_FALSE(any_restarted(samples));
   expect_the_same_zero(before, samples.back());
-  EXPECT_EQ(bench.device->receiver().counters().began_anew, 0u);
+  EXPECT_EQ(bench.device->receiver().counters().restarted, 0u);
 }
 
 TEST(CounterCardOutage, BytesTornOnceAfterTheCardWasOpenedAgainZeroNothing) {
   CardBench bench;
   ASSERT_TRUE(bench.streams());
-  bench.turns_for(50ms);
+  bench.cycles_for(50ms);
   const auto before = bench.take_samples().back();
   bench.server.inject({.kind = sim::FaultKind::Disconnect}, bench.time.now());
+
   ASSERT_TRUE(bench.until([&] { return bench.device->status().state == "arming"; }));
   bench.server.card().tear(4);  // the latch, which stands, where the clock should be
   ASSERT_TRUE(bench.until([&] { return bench.device->status().gaps != 0; }));
   EXPECT_THAT(bench.device->status().last_fault, HasSubstr("out of step"));
-  bench.turns_for(50ms);
+  bench.cycles_for(50ms);
   const auto samples = bench.take_samples();
   EXPECT_FALSE(any_restarted(samples));
   expect_the_same_zero(before, samples.back());
@@ -224,9 +231,9 @@ TEST(CounterCardOutage, BytesTornOnceAfterTheCardWasOpenedAgainZeroNothing) {
 TEST(CounterCardOutage, MarksScansThatTheCardLost) {
   CardBench bench;
   ASSERT_TRUE(bench.streams());
-  bench.turns_for(20ms);
+  bench.cycles_for(20ms);
   bench.server.card().lose_scans(13);
-  bench.turns_for(20ms);
+  bench.cycles_for(20ms);
   EXPECT_EQ(bench.device->receiver().counters().lost_scans, 13u);
   EXPECT_EQ(bench.device->status().gaps, 1u);
 }

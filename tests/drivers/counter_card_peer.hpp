@@ -1,6 +1,6 @@
 #pragma once
-/// A counter card driver and the simulated card behind a real TCP connection, in one thread and one stepped
-/// time. X runs at 20 mm/s, Y stands; the clock counts 1 MHz.
+/// A counter card driver and the simulated card behind a real TCP connection, in one thread and one
+/// stepped time. X runs at 20 mm/s, Y stands; the clock counts 1 MHz.
 
 #include <gtest/gtest.h>
 
@@ -33,15 +33,19 @@ inline drivers::CounterCardWiring card_wiring() {
 
 inline sim::CounterCardOptions simulated_card() {
   sim::CounterCardOptions card;
-  card.channels[0].phases = sim::ScaleSignal{
-      .reading = [](sim::HostTime t) { return kSpeed_m_per_s * sim::ns_to_seconds(t - sim::HostTime{1h}); },
-      .step = kStep_m,
-      .noise = 0.0,
-      .marks = {}};
+  card.channels[0].phases =
+      sim::ScaleSignal{.reading =
+                           [](sim::HostTime t) {
+                             return kSpeed_m_per_s * sim::ns_to_seconds(t - sim::HostTime{1h});
+                           },
+                       .step = kStep_m,
+                       .noise = 0.0,
+                       .marks = {}};
   card.channels[1].phases = sim::ScaleSignal{.step = kStep_m};
   card.channels[5].phases = sim::ClockSignal{.hz = kClock_hz};
   card.channels[6] = {sim::ClockSignal{.hz = kClock_hz}, true};
   card.channels[7].phases = sim::ProbeSignal{};
+
   return card;
 }
 
@@ -61,7 +65,8 @@ class CardBench {
                      sim::CounterCardOptions card = simulated_card())
       : server(std::move(*sim::UsbipServer::open(0, card))) {
     auto link = std::make_unique<drivers::UsbipLink>(
-        drivers::UsbipOptions{.port = server.port(), .identity = drivers::identity_of(options)}, time);
+        drivers::UsbipOptions{.port = server.port(), .identity = drivers::identity_of(options)},
+        time);
     auto made = drivers::CounterCardDevice::create(options, std::move(link), time, &keeper);
     EXPECT_TRUE(made.has_value()) << made.error().text;
     device = std::move(*made);
@@ -74,23 +79,23 @@ class CardBench {
     return options;
   }
 
-  void turn() {
+  void cycle() {
     server.poll(time.now());
-    device->wait(kTurn);
+    device->wait(kCycle);
     device->receive();
-    time.advance(kTurn);
+    time.advance(kCycle);
   }
   /// Turns until `done()`; false after `limit` of host time.
   template <class Done>
   bool until(Done done, std::chrono::nanoseconds limit = 3s) {
     for (const auto end = time.now() + limit; !done();) {
       if (time.now() >= end) return false;
-      turn();
+      cycle();
     }
     return true;
   }
-  void turns_for(std::chrono::nanoseconds duration) {
-    for (const auto end = time.now() + duration; time.now() < end;) turn();
+  void cycles_for(std::chrono::nanoseconds duration) {
+    for (const auto end = time.now() + duration; time.now() < end;) cycle();
   }
   bool streams() {
     return until([this] { return device->status().samples != 0; });
@@ -98,11 +103,12 @@ class CardBench {
   std::vector<protocol::AxisSample> take_samples() {
     std::vector<protocol::AxisSample> all;
     std::array<protocol::AxisSample, 256> out{};
-    while (const auto n = device->samples().pop(out)) all.insert(all.end(), out.begin(), out.begin() + n);
+    while (const auto n = device->samples().pop(out))
+      all.insert(all.end(), out.begin(), out.begin() + n);
     return all;
   }
 
-  static constexpr std::chrono::nanoseconds kTurn = 250us;
+  static constexpr std::chrono::nanoseconds kCycle = 250us;
   drivers::SteppedTime time;
   sim::UsbipServer server;
   ScanKeeper keeper;

@@ -33,7 +33,8 @@ class Card {
 
  private:
   static void put(std::vector<std::byte>& bytes, std::uint32_t value) {
-    for (int shift = 0; shift < 32; shift += 8) bytes.push_back(static_cast<std::byte>(value >> shift));
+    for (int shift = 0; shift < 32; shift += 8)
+      bytes.push_back(static_cast<std::byte>(value >> shift));
   }
   std::uint32_t clock_ = 1000;
 };
@@ -120,7 +121,8 @@ TEST_F(CounterCardReceiverTest, MakesNothingOfBytesThatAreNoScans) {
   start();
   push(card_.scans(10));
   std::vector<std::byte> garbage(16 * 20);
-  for (std::size_t i = 0; i < garbage.size(); ++i) garbage[i] = static_cast<std::byte>(i * 37 % 251);
+  for (std::size_t i = 0; i < garbage.size(); ++i)
+    garbage[i] = static_cast<std::byte>(i * 37 % 251);
   EXPECT_TRUE(push(garbage).empty());
   EXPECT_TRUE(receiver_.out_of_step());
   EXPECT_GE(receiver_.counters().refused_scans, CounterCardReceiver::kMostRefused);
@@ -172,7 +174,7 @@ TEST_F(CounterCardReceiverTest, AnOverrunInAHostThatWasHeldUpZeroesNothing) {
     begin_stream();
     const auto scans = push(card_.scans(40));
     ASSERT_FALSE(scans.empty());
-    EXPECT_EQ(receiver_.counters().began_anew, 0u);
+    EXPECT_EQ(receiver_.counters().restarted, 0u);
     EXPECT_EQ(scans[0].axes.count[0], 4000);
     EXPECT_TRUE(has(scans[0].axes.head.flags, SampleFlag::GapBefore));
     EXPECT_FALSE(has(scans[0].axes.head.flags, SampleFlag::Restarted));
@@ -191,7 +193,7 @@ TEST_F(CounterCardReceiverTest, ALateBatchBeforeOrAfterTheCardWasOpenedAgainZero
     reopen();
     now_ += after;
     ASSERT_FALSE(push(card_.scans(40)).empty());
-    EXPECT_EQ(receiver_.counters().began_anew, 0u);
+    EXPECT_EQ(receiver_.counters().restarted, 0u);
     now_ -= after;
   }
 }
@@ -203,7 +205,7 @@ TEST_F(CounterCardReceiverTest, AClockAheadOfTheHostsIsThatOfOtherCounters) {
   now_ += 10s;
   reopen();
   push(card_.scans(40));
-  EXPECT_EQ(receiver_.counters().began_anew, 1u);
+  EXPECT_EQ(receiver_.counters().restarted, 1u);
 }
 
 /// 32 bits go round in 72 minutes at 1 MHz: after a day the clock may have stood anywhere.
@@ -217,7 +219,7 @@ TEST_F(CounterCardReceiverTest, AfterTooLongTheClockNoLongerTellsThatItIsTheSame
     reopen();
     ASSERT_FALSE(push(card_.scans(40)).empty());
     anew += foreign ? 1 : 0;
-    EXPECT_EQ(receiver_.counters().began_anew, anew);
+    EXPECT_EQ(receiver_.counters().restarted, anew);
   }
 }
 
@@ -272,6 +274,7 @@ TEST_F(CounterCardReceiverTest, FindsTheRestartAlsoWhereALateBatchHidTheJump) {
   now_ += 60ms;
   const auto late = push(card_.scans(40));
   now_ -= 60ms;
+
   ASSERT_FALSE(late.empty());
   EXPECT_EQ(receiver_.counters().clock_jumps, 0u);
   EXPECT_FALSE(has(late[0].axes.head.flags, SampleFlag::Restarted));
@@ -291,6 +294,7 @@ TEST_F(CounterCardReceiverTest, AShorterGapAfterTheRestartDoesNotHideIt) {
   card_.lose(1'200);  // 30 ms, which pass
   now_ += 30ms;
   push(card_.scans(40));
+
   ASSERT_EQ(receiver_.counters().clock_jumps, 0u);
   now_ -= 100ms;
   const auto scans = push(card_.scans(40));

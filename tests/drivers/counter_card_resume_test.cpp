@@ -24,13 +24,13 @@ class CardThatStays : public ::testing::Test {
     options.transfer_time = 4ms;
     return options;
   }
-  void turns_for(std::chrono::nanoseconds duration) {
-    constexpr auto kTurn = 2ms;
+  void cycles_for(std::chrono::nanoseconds duration) {
+    constexpr auto kCycle = 2ms;
     for (const auto end = bench_.time.now() + duration; bench_.time.now() < end;) {
       bench_.server.poll(bench_.time.now());
-      bench_.device->wait(kTurn);
+      bench_.device->wait(kCycle);
       bench_.device->receive();
-      bench_.time.advance(kTurn);
+      bench_.time.advance(kCycle);
     }
   }
 
@@ -38,9 +38,11 @@ class CardThatStays : public ::testing::Test {
     bench_.device.reset();
     bench_.keeper.scans.clear();
     auto link = std::make_unique<drivers::UsbipLink>(
-        drivers::UsbipOptions{.port = bench_.server.port(), .identity = drivers::identity_of(options)},
+        drivers::UsbipOptions{.port = bench_.server.port(),
+                              .identity = drivers::identity_of(options)},
         bench_.time);
-    auto made = drivers::CounterCardDevice::create(options, std::move(link), bench_.time, &bench_.keeper);
+    auto made =
+        drivers::CounterCardDevice::create(options, std::move(link), bench_.time, &bench_.keeper);
     ASSERT_TRUE(made) << made.error().text;
     bench_.device = std::move(*made);
   }
@@ -54,7 +56,7 @@ class CardThatStays : public ::testing::Test {
   /// The latest of a run that streams until its clock model is settled.
   CounterCardProgress progress() {
     EXPECT_TRUE(bench_.streams());
-    turns_for(8s);
+    cycles_for(8s);
     CounterCardProgress latest;
     EXPECT_GT(bench_.device->progress().pop({&latest, 1}), 0u);
     while (bench_.device->progress().pop({&latest, 1}) != 0) {
@@ -90,9 +92,10 @@ TEST_F(CardThatStays, CountsGoOnWhereTheCardDid) {
   EXPECT_FALSE(has(first.head.flags, SampleFlag::Restarted));
   EXPECT_TRUE(has(first.head.flags, SampleFlag::GapBefore));
   const double moved = counts_of_x(first.head.time - before.head.time);
+
   // Two clock models, each with 1 ms of unknown constant delay.
   EXPECT_NEAR(static_cast<double>(first.count[0] - before.count[0]), moved, counts_of_x(2ms));
-  EXPECT_EQ(bench_.device->receiver().counters().began_anew, 0u);
+  EXPECT_EQ(bench_.device->receiver().counters().restarted, 0u);
   EXPECT_GT(bench_.device->receiver().counters().withheld_scans, 0u);
 }
 
@@ -118,7 +121,8 @@ TEST_F(CardThatStays, ACardThatWasWithoutPowerBeginsAnew) {
   EXPECT_THAT(bench_.device->status().last_fault, HasSubstr("did not go on"));
 }
 
-// Its clock runs like before, from another zero: not one scan of it may look like the counters of before.
+// Its clock runs like before, from another zero: not one scan of it may look like the counters of
+// before.
 TEST_F(CardThatStays, ACardThatAnotherProgramSetUpBeginsAnew) {
   const auto before = progress();
   away(500ms);
@@ -145,7 +149,8 @@ TEST_F(CardThatStays, AnotherCardBeginsAnew) {
 
 TEST_F(CardThatStays, TooLongIsTooLongToTell) {
   const auto before = progress();
-  away(std::chrono::hours{16});  // 50 ms and 200 ppm of it, both ways, are more than 0.5 % of 4295 s
+  // 50 ms and 200 ppm of it, both ways, are more than 0.5 % of 4295 s
+  away(std::chrono::hours{16});
   run_on(before);
   const auto samples = first_samples();
   ASSERT_THAT(samples, ::testing::Not(IsEmpty()));
@@ -158,7 +163,7 @@ TEST_F(CardThatStays, TheBytesGiveTheSameScans) {
   away(20s);
   run_on(before);
   ASSERT_TRUE(bench_.streams());
-  turns_for(100ms);
+  cycles_for(100ms);
   auto options = slow_options().receiver;
   options.goes_on_from = before;
   const auto replayed = std::make_unique<drivers::CounterCardReceiver>(options);
@@ -169,6 +174,7 @@ TEST_F(CardThatStays, TheBytesGiveTheSameScans) {
       replayed->on_raw(blocks[i], [&](const drivers::CounterScan& s) { scans.push_back(s); });
   ASSERT_EQ(scans.size(), bench_.keeper.scans.size());
   ASSERT_FALSE(scans.empty());
+
   for (std::size_t i = 0; i < scans.size(); ++i) {
     ASSERT_EQ(scans[i].axes.head.time, bench_.keeper.scans[i].axes.head.time) << i;
     ASSERT_EQ(scans[i].axes.count, bench_.keeper.scans[i].axes.count) << i;

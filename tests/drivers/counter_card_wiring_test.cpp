@@ -52,7 +52,8 @@ TEST(CounterCardWiring, RefusesATimerThatCannotMakeTheClock) {
 
 TEST(CounterCardWiring, ReadsTheUsedChannelsInAscendingOrder) {
   const auto layout = layout_of(tests::card_wiring());
-  EXPECT_THAT(std::vector(layout.used().begin(), layout.used().end()), testing::ElementsAre(0, 1, 5, 6));
+  EXPECT_THAT(std::vector(layout.used().begin(), layout.used().end()),
+              testing::ElementsAre(0, 1, 5, 6));
 }
 
 TEST(CounterCardWiring, SaysWhatIsAnAssumption) {

@@ -30,8 +30,10 @@ TEST(Expanded95, CoversWhatItSaysForEveryMixture) {
     std::normal_distribution<double> normal;
     constexpr int kDraws = 100'000;
     int held = 0;
-    for (int i = 0; i < kDraws; ++i) held += std::abs(rectangle(random) + normal(random)) <= U ? 1 : 0;
-    EXPECT_NEAR(static_cast<double>(held) / kDraws, 0.95, 4 * std::sqrt(0.95 * 0.05 / kDraws)) << half_width;
+    for (int i = 0; i < kDraws; ++i)
+      held += std::abs(rectangle(random) + normal(random)) <= U ? 1 : 0;
+    EXPECT_NEAR(static_cast<double>(held) / kDraws, 0.95, 4 * std::sqrt(0.95 * 0.05 / kDraws))
+        << half_width;
   }
 }
 

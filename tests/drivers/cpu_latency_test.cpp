@@ -38,8 +38,8 @@ TEST(CpuLatencyBound, HoldsUntilItIsGone) {
 TEST(CpuLatencyBound, SaysWhatRefusedIt) {
   const auto bound = CpuLatencyBound::request(5us, "/nowhere/cpu_dma_latency");
   ASSERT_FALSE(bound);
-  EXPECT_THAT(bound.error().text,
-              AllOf(HasSubstr("5 us"), HasSubstr("/nowhere/cpu_dma_latency"), HasSubstr("No such file")));
+  EXPECT_THAT(bound.error().text, AllOf(HasSubstr("5 us"), HasSubstr("/nowhere/cpu_dma_latency"),
+                                        HasSubstr("No such file")));
 }
 
 }  // namespace

@@ -19,12 +19,12 @@ using drivers::DeviceThreadOptions;
 using drivers::RealTimeMode;
 
 /// Counts its turns and, if told to, throws in one of them.
-class TurnCounter final : public drivers::Device {
+class CycleCounter final : public drivers::Device {
  public:
-  explicit TurnCounter(int throw_in_turn = -1) : throw_in_turn_(throw_in_turn) {}
+  explicit CycleCounter(int throw_in_cycle = -1) : throw_in_cycle_(throw_in_cycle) {}
   void wait(std::chrono::nanoseconds at_most) override {
     waited_at_most = at_most;
-    if (turns == throw_in_turn_ && throws) throw std::runtime_error("no such register");
+    if (turns == throw_in_cycle_ && throws) throw std::runtime_error("no such register");
     std::this_thread::yield();
   }
   void receive() ABBE_RT override { ++turns; }
@@ -40,7 +40,7 @@ class TurnCounter final : public drivers::Device {
   std::atomic<std::chrono::nanoseconds> waited_at_most{};
 
  private:
-  int throw_in_turn_;
+  int throw_in_cycle_;
 };
 
 void wait_for(const std::function<bool()>& done) {
@@ -48,7 +48,7 @@ void wait_for(const std::function<bool()>& done) {
 }
 
 TEST(DeviceThread, TurnsUntilStopped) {
-  TurnCounter device;
+  CycleCounter device;
   auto thread = DeviceThread::start(device, {.wait_at_most = 7ms});
   ASSERT_TRUE(thread);
   wait_for([&] { return device.turns > 10; });
@@ -61,7 +61,7 @@ TEST(DeviceThread, TurnsUntilStopped) {
 }
 
 TEST(DeviceThread, FillsALatencyHistogramWithEveryTurn) {
-  TurnCounter device;
+  CycleCounter device;
   auto thread = DeviceThread::start(device, {});
   ASSERT_TRUE(thread);
   wait_for([&] { return device.turns > 10; });
@@ -70,7 +70,7 @@ TEST(DeviceThread, FillsALatencyHistogramWithEveryTurn) {
 }
 
 TEST(DeviceThread, HandsOverTheExceptionThatEndedIt) {
-  TurnCounter device(3);
+  CycleCounter device(3);
   auto thread = DeviceThread::start(device, {});
   ASSERT_TRUE(thread);
   wait_for([&] { return (*thread)->failure().has_value(); });
@@ -79,7 +79,7 @@ TEST(DeviceThread, HandsOverTheExceptionThatEndedIt) {
 }
 
 TEST(DeviceThread, NeverSaysThatADeviceStreamsWhoseLoopHasEnded) {
-  TurnCounter device(3);
+  CycleCounter device(3);
   const auto thread = DeviceThread::start(device, {.name = "tracker", .first_back_off = 1h});
   ASSERT_TRUE(thread);
   wait_for([&] { return (*thread)->failure().has_value(); });
@@ -94,7 +94,7 @@ TEST(DeviceThread, NeverSaysThatADeviceStreamsWhoseLoopHasEnded) {
 
 TEST(DeviceThread, WhoSeesThatItFailedSeesThatItHasEnded) {
   for (int i = 0; i < 200; ++i) {
-    TurnCounter device(0);
+    CycleCounter device(0);
     const auto thread = DeviceThread::start(device, {.wait_at_most = 1us, .first_back_off = 1h});
     ASSERT_TRUE(thread);
     while ((*thread)->failures() == 0) {
@@ -104,9 +104,9 @@ TEST(DeviceThread, WhoSeesThatItFailedSeesThatItHasEnded) {
 }
 
 TEST(DeviceThread, BeginsAgainAfterAnException) {
-  TurnCounter device(3);
-  const auto thread =
-      DeviceThread::start(device, {.wait_at_most = 1ms, .first_back_off = 100us, .longest_back_off = 400us});
+  CycleCounter device(3);
+  const auto thread = DeviceThread::start(
+      device, {.wait_at_most = 1ms, .first_back_off = 100us, .longest_back_off = 400us});
   ASSERT_TRUE(thread);
   wait_for([&] { return (*thread)->failures() > 4; });
   EXPECT_FALSE((*thread)->status().connected);
@@ -121,18 +121,20 @@ TEST(DeviceThread, BeginsAgainAfterAnException) {
 constexpr int kNoSuchProcessor = 1023;
 
 TEST(DeviceThread, RefusesToStartInEnforceMode) {
-  TurnCounter device;
+  CycleCounter device;
   const auto thread = DeviceThread::start(
       device, {.name = "tracker", .mode = RealTimeMode::Enforce, .cpu = kNoSuchProcessor});
   ASSERT_FALSE(thread);
   EXPECT_EQ(thread.error().code, drivers::ErrorCode::SystemRefused);
-  EXPECT_THAT(thread.error().text, testing::HasSubstr("thread tracker: affinity to processor 1023"));
+  EXPECT_THAT(thread.error().text,
+              testing::HasSubstr("thread tracker: affinity to processor 1023"));
   EXPECT_EQ(device.turns, 0);
 }
 
 TEST(DeviceThread, WarnsAndRunsInIgnoreMode) {
-  TurnCounter device;
-  const auto thread = DeviceThread::start(device, {.mode = RealTimeMode::Ignore, .cpu = kNoSuchProcessor});
+  CycleCounter device;
+  const auto thread =
+      DeviceThread::start(device, {.mode = RealTimeMode::Ignore, .cpu = kNoSuchProcessor});
   ASSERT_TRUE(thread);
   ASSERT_EQ((*thread)->warnings().size(), 1u);
   EXPECT_THAT((*thread)->warnings()[0], testing::HasSubstr("affinity"));
@@ -140,12 +142,12 @@ TEST(DeviceThread, WarnsAndRunsInIgnoreMode) {
 }
 
 TEST(DeviceThread, SaysEverythingTheSystemRefusedAtOnce) {
-  TurnCounter device;
-  const auto thread =
-      DeviceThread::start(device, {.mode = RealTimeMode::Enforce, .priority = 1000, .cpu = kNoSuchProcessor});
+  CycleCounter device;
+  const auto thread = DeviceThread::start(
+      device, {.mode = RealTimeMode::Enforce, .priority = 1000, .cpu = kNoSuchProcessor});
   ASSERT_FALSE(thread);
-  EXPECT_THAT(thread.error().text,
-              testing::AllOf(testing::HasSubstr("affinity"), testing::HasSubstr("SCHED_FIFO priority 1000")));
+  EXPECT_THAT(thread.error().text, testing::AllOf(testing::HasSubstr("affinity"),
+                                                  testing::HasSubstr("SCHED_FIFO priority 1000")));
 }
 
 TEST(DeviceThread, RunsWhereItIsPut) {
@@ -164,7 +166,7 @@ TEST(DeviceThread, RunsWhereItIsPut) {
 }
 
 TEST(DeviceThread, LocksMemoryWithoutHugePages) {
-  TurnCounter device;
+  CycleCounter device;
   const auto thread = DeviceThread::start(device, {.lock_memory = true});
   ASSERT_TRUE(thread) << thread.error().text;
   EXPECT_EQ(::prctl(PR_GET_THP_DISABLE, 0, 0, 0, 0), 1);

@@ -78,7 +78,8 @@ TEST(DistanceCode, RefusesEveryOnePeriodErrorAtAnyOfFourMarks) {
           Four wrong = four;
           wrong[mark] += error;
           ++tried;
-          EXPECT_FALSE(datum_of(code, wrong)) << code.increment << " at " << four[0] << ", mark " << mark;
+          EXPECT_FALSE(datum_of(code, wrong))
+              << code.increment << " at " << four[0] << ", mark " << mark;
         }
       }
     });
@@ -94,7 +95,8 @@ TEST(DistanceCode, RefusesEverySlipOfOnePeriodBetweenMarks) {
         for (const double error : {-1.0, 1.0}) {
           Four wrong = four;
           for (std::size_t mark = from; mark < 4; ++mark) wrong[mark] += error;
-          EXPECT_FALSE(datum_of(code, wrong)) << code.increment << " at " << four[0] << ", from " << from;
+          EXPECT_FALSE(datum_of(code, wrong))
+              << code.increment << " at " << four[0] << ", from " << from;
         }
       }
     });
@@ -120,7 +122,8 @@ TEST(DistanceCode, RefusesEveryOtherScale) {
     for (const DistanceCode& actual : kCodes) {
       if (actual.increment == configured.increment) continue;
       for_every_four(actual, [&](const Four& four) {
-        EXPECT_FALSE(datum_of(configured, four)) << configured.increment << " for " << actual.increment;
+        EXPECT_FALSE(datum_of(configured, four))
+            << configured.increment << " for " << actual.increment;
       });
     }
   }
@@ -156,8 +159,8 @@ TEST(DistanceCode, ChecksItsConfiguration) {
   EXPECT_TRUE(drivers::check({.increment = 1000, .length = 36'000, .rotary = true}));
 }
 
-/// An axis that is driven here and there over its scale, its marks read with noise. What can happen to it is
-/// drawn; what it says in the end is compared with where it is.
+/// An axis that is driven here and there over its scale, its marks read with noise. What can happen
+/// to it is drawn; what it says in the end is compared with where it is.
 class Traverse {
  public:
   Traverse(const DistanceCode& code, std::mt19937& random)
@@ -205,6 +208,7 @@ class Traverse {
     traverse.on_position(count(mark - 3.0 * direction_));
     const double noise = std::normal_distribution<double>{0.0, 0.04}(random_);
     const auto outcome = traverse.on_mark(count(mark + noise));
+
     if (!outcome || !*outcome) return;
     found_ = true;
     const double counter = static_cast<double>(count(mark)) / options_.counts_per_period;
@@ -272,7 +276,8 @@ TEST(MarkTraverse, KnowsAScaleThatCountsBackwards) {
   options.counts_per_period = -4.0;
   MarkTraverse traverse{options};
   std::optional<tl::expected<drivers::MarkDatum, MarkFault>> outcome;
-  for (const std::int64_t mark : {2000, 2503, 3000, 3504}) outcome = traverse.on_mark(-4 * mark + 40);
+  for (const std::int64_t mark : {2000, 2503, 3000, 3504})
+    outcome = traverse.on_mark(-4 * mark + 40);
   ASSERT_TRUE(outcome && *outcome);
   EXPECT_NEAR((*outcome)->offset_periods, 10.0, 1e-12);
 }

@@ -39,6 +39,7 @@ TEST(DoubleTouch, RefusesTouchesThatDisagree) {
   DoubleTouchRules rules;
   rules.agree_sigmas = 3.0;
   const double limit_m = 3.0 * std::sqrt(2.0) * std::hypot(0.25e-6, 5e-9);
+
   for (const double apart : {0.99, 1.01}) {
     DoubleTouch both{rules};
     (void)both.on_touch(touch_at(0.3, 0.005));
@@ -95,11 +96,13 @@ TEST(DoubleTouch, DoesNotAverageAwayTheErrorOfTheDelay) {
   DoubleTouch many{rules};
   (void)many.on_touch(touch_at(0.3, 0.005));
   std::optional<tl::expected<drivers::MeasuredTouch, TouchRejection>> point;
+
   for (int i = 0; i < 8; ++i) {
     ProbeTrigger t = touch_at(0.3, 0.001);
     t.u_position[2] = std::hypot(0.001 * 100e-6, 20e-9);
     point = many.on_touch(t);
   }
+
   ASSERT_TRUE(point && *point);
   EXPECT_NEAR((*point)->u_position[2], std::hypot(0.001 * 100e-6, 20e-9 / std::sqrt(8.0)), 1e-12);
 }

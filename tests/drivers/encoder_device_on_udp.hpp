@@ -43,10 +43,11 @@ class FailingBus final : public CanBus {
 /// Two nodes and the device on one stepped clock. A turn is 1 ms, a SYNC period 4 ms.
 class EncoderDeviceOnUdp : public testing::Test {
  protected:
-  static constexpr std::chrono::milliseconds kTurn{1};
-  static constexpr int kTurnsPerSync = 4;
+  static constexpr std::chrono::milliseconds kCycle{1};
+  static constexpr int kCyclesPerSync = 4;
 
-  explicit EncoderDeviceOnUdp(std::vector<can::EncoderIdentity> identities = {{.node = 1}, {.node = 2}})
+  explicit EncoderDeviceOnUdp(std::vector<can::EncoderIdentity> identities = {{.node = 1},
+                                                                              {.node = 2}})
       : peer(identities) {}
   [[nodiscard]] UdpCanOptions udp() const { return {.peer_port = peer.port(), .speed = 0.0}; }
   virtual std::unique_ptr<CanBus> make_bus() {
@@ -57,7 +58,7 @@ class EncoderDeviceOnUdp : public testing::Test {
   static EncoderReceiverOptions two_axes() {
     EncoderReceiverOptions options;
     options.axes = {{.name = "X", .node = 1}, {.name = "Y", .node = 2}};
-    options.sync_period = kTurnsPerSync * kTurn;
+    options.sync_period = kCyclesPerSync * kCycle;
     return options;
   }
   void SetUp() override {
@@ -68,12 +69,12 @@ class EncoderDeviceOnUdp : public testing::Test {
     device = std::move(*made);
   }
 
-  void turn() {
+  void cycle() {
     peer.serve(time.now());
     peer.answer_sync();
-    device->wait(kTurn);
+    device->wait(kCycle);
     device->receive();
-    time.advance(kTurn);
+    time.advance(kCycle);
     std::array<protocol::AxisSample, 64> out{};
     const auto n = device->samples().pop(out);
     samples.insert(samples.end(), out.begin(), out.begin() + static_cast<std::ptrdiff_t>(n));
@@ -83,35 +84,35 @@ class EncoderDeviceOnUdp : public testing::Test {
   }
   /// The controller of the device reports this.
   void send_condition(can::BusCondition condition) {
-    peer.send(
-        std::array{can::encode_error_frame({.conditions = static_cast<can::BusConditions>(condition)})});
-    device->wait(kTurn);
+    peer.send(std::array{
+        can::encode_error_frame({.conditions = static_cast<can::BusConditions>(condition)})});
+    device->wait(kCycle);
     device->receive();
   }
   /// Turns in which nothing is heard: a frame would show that the bus is back.
   void bus_is_off_for(int turns) {
     send_condition(can::BusCondition::BusOff);
     for (int i = 0; i < turns; ++i) {
-      device->wait(kTurn);
+      device->wait(kCycle);
       device->receive();
-      time.advance(kTurn);
+      time.advance(kCycle);
     }
     EXPECT_EQ(device->status().state, "bus off");
   }
   void turns(int n) {
-    for (int i = 0; i < n; ++i) turn();
+    for (int i = 0; i < n; ++i) cycle();
   }
   template <class Done>
-  bool turns_until(Done done, int limit = 5000) {
-    for (int i = 0; i < limit && !done(); ++i) turn();
+  bool cycles_until(Done done, int limit = 5000) {
+    for (int i = 0; i < limit && !done(); ++i) cycle();
     return done();
   }
   bool state_becomes(std::string_view state) {
-    return turns_until([&] { return device->status().state == state; });
+    return cycles_until([&] { return device->status().state == state; });
   }
   void begin_streaming() {
     ASSERT_TRUE(state_becomes("streaming")) << device->status().last_fault;
-    ASSERT_TRUE(turns_until([&] { return !samples.empty() && samples.back().missing_mask == 0; }));
+    ASSERT_TRUE(cycles_until([&] { return !samples.empty() && samples.back().missing_mask == 0; }));
     samples.clear();
   }
   /// `untold`: flags that raw bytes do not carry.
@@ -122,12 +123,14 @@ class EncoderDeviceOnUdp : public testing::Test {
       replay.on_raw(block, [&](const protocol::AxisSample& s) { replayed.push_back(s); });
     ASSERT_GT(replayed.size(), samples.size());  // begin_streaming() forgot the first ones
     const auto* tail = &replayed[replayed.size() - samples.size()];
+
     for (std::size_t i = 0; i < samples.size(); ++i) {
       EXPECT_EQ(tail[i].head.time, samples[i].head.time);
       EXPECT_EQ(tail[i].head.flags, samples[i].head.flags & ~untold);
       EXPECT_EQ(tail[i].missing_mask, samples[i].missing_mask);
       EXPECT_EQ(tail[i].count, samples[i].count);
-      EXPECT_EQ(std::memcmp(&tail[i].position, &samples[i].position, sizeof samples[i].position), 0);
+      EXPECT_EQ(std::memcmp(&tail[i].position, &samples[i].position, sizeof samples[i].position),
+                0);
     }
   }
 

@@ -1,5 +1,6 @@
 #pragma once
-/// Encoder nodes on a UDP socket of 127.0.0.1, in the test's own thread: what the device under test talks to.
+/// Encoder nodes on a UDP socket of 127.0.0.1, in the test's own thread: what the device under test
+/// talks to.
 
 #include <arpa/inet.h>
 #include <gtest/gtest.h>
@@ -19,7 +20,8 @@ namespace abbe::tests {
 
 class EncoderPeer : public EncoderNodes {
  public:
-  explicit EncoderPeer(std::span<const can::EncoderIdentity> identities) : EncoderNodes(identities) {
+  explicit EncoderPeer(std::span<const can::EncoderIdentity> identities)
+      : EncoderNodes(identities) {
     fd_ = ::socket(AF_INET, SOCK_DGRAM | SOCK_NONBLOCK | SOCK_CLOEXEC, 0);
     sockaddr_in address{};
     address.sin_family = AF_INET;
@@ -47,8 +49,8 @@ class EncoderPeer : public EncoderNodes {
     std::array<std::byte, 65536> buffer{};
     while (true) {
       socklen_t size = sizeof to_;
-      const auto n =
-          ::recvfrom(fd_, buffer.data(), buffer.size(), 0, reinterpret_cast<sockaddr*>(&to_), &size);
+      const auto n = ::recvfrom(fd_, buffer.data(), buffer.size(), 0,
+                                reinterpret_cast<sockaddr*>(&to_), &size);
       if (n < 0) break;
       auto view = can::DatagramView::parse(std::span{buffer}.first(static_cast<std::size_t>(n)));
       ASSERT_TRUE(view.has_value()) << "the device sent no CAN datagram";
@@ -82,7 +84,8 @@ class EncoderPeer : public EncoderNodes {
   }
   void send_bytes(std::span<const std::byte> bytes) {
     if (to_.sin_port == 0) return;
-    ::sendto(fd_, bytes.data(), bytes.size(), 0, reinterpret_cast<const sockaddr*>(&to_), sizeof to_);
+    ::sendto(fd_, bytes.data(), bytes.size(), 0, reinterpret_cast<const sockaddr*>(&to_),
+             sizeof to_);
   }
   void skip_sequence(unsigned n) { sequence_ = static_cast<std::uint8_t>(sequence_ + n); }
 

@@ -12,9 +12,10 @@ using namespace std::chrono_literals;
 template <modbus::Transport kTransport>
 class FaultyModbus {
  public:
-  static constexpr std::chrono::nanoseconds kTurn = 50ms;
-  static constexpr std::chrono::nanoseconds kSilenceLimit = 500ms;  // 50 ms to the next round, then 400 ms
-  static constexpr std::chrono::nanoseconds kRecoveryLimit = 1s;    // asked of it
+  static constexpr std::chrono::nanoseconds kCycle = 50ms;
+  // 50 ms to the next round, then 400 ms
+  static constexpr std::chrono::nanoseconds kSilenceLimit = 500ms;
+  static constexpr std::chrono::nanoseconds kRecoveryLimit = 1s;  // asked of it
   static constexpr bool kTornCanBeFinished = true;
 
   static std::set<std::string_view> shown(Fault fault) {
@@ -33,7 +34,7 @@ class FaultyModbus {
     for (std::size_t i = 0; i < n; ++i) heads.push_back(out[i].head);
   }
   void serve() { peer_.serve(); }
-  void say_valid() {
+  void send_valid() {
     if (!holding_) peer_.answer();
   }
   void hold_back() { holding_ = true; }
@@ -61,7 +62,7 @@ class FaultyModbus {
     o.address = peer_.address();
     o.map = small_map();
     o.map.measured.pop_back();  // one read is one sample
-    o.period = kTurn;
+    o.period = kCycle;
     o.answer_timeout = 400ms;
     o.sample_capacity = 4;
     o.raw_capacity_blocks = 4;

@@ -29,19 +29,24 @@ class EnvironmentAgainstTheSimulator : public testing::Test {
     options.environment.relative_humidity_percent = {30.5};
     for (std::size_t i = 0; i < options.environment.temperature_C.size(); ++i)
       options.environment.temperature_C[i] = {20.0 + static_cast<double>(i)};
+
     if (link_.empty()) {
       options.endpoint = sim::ModbusTcpEndpoint{};
     } else {
       options.endpoint = sim::ModbusPtyEndpoint{link_};
     }
-    server_ = std::make_unique<sim::ModbusServer>(sim::ModbusServer::open(options, time_.now()).value());
+
+    server_ =
+        std::make_unique<sim::ModbusServer>(sim::ModbusServer::open(options, time_.now()).value());
     EnvironmentDeviceOptions device;
     device.name = "air";
+
     if (link_.empty()) {
       device.address = drivers::ModbusTcp{"127.0.0.1", server_->port()};
     } else {
       device.address = drivers::ModbusSerial{.path = link_};
     }
+
     device.map = map;
     device.period = 100ms;
     device.answer_timeout = 300ms;
@@ -69,7 +74,8 @@ class EnvironmentAgainstTheSimulator : public testing::Test {
 };
 
 TEST_F(EnvironmentAgainstTheSimulator, ReadsTheVaisala) {
-  start({.model = sim::ModbusModel::Indigo520Hmp}, drivers::known_map("vaisala-indigo520-hmp", {}).value());
+  start({.model = sim::ModbusModel::Indigo520Hmp},
+        drivers::known_map("vaisala-indigo520-hmp", {}).value());
   turns(40);
   const auto got = samples();
   ASSERT_FALSE(got.empty()) << device_->status().last_fault;
@@ -94,12 +100,14 @@ TEST_F(EnvironmentAgainstTheSimulator, ReadsResistanceThermometersOnASerialLine)
   std::string folder = (std::filesystem::temp_directory_path() / "abbe-rtd-XXXXXX").string();
   ASSERT_NE(mkdtemp(folder.data()), nullptr);
   link_ = folder + "/rtd";
-  start({.model = sim::ModbusModel::Zt2005C8, .unit = 3},
-        drivers::known_map("icpdas-zt2005-c8", {.inputs = {0, std::nullopt, 5}, .unit = 3}).value());
+  start(
+      {.model = sim::ModbusModel::Zt2005C8, .unit = 3},
+      drivers::known_map("icpdas-zt2005-c8", {.inputs = {0, std::nullopt, 5}, .unit = 3}).value());
   turns(20);
   const auto got = samples();
   server_.reset();
   std::filesystem::remove_all(folder);
+
   ASSERT_FALSE(got.empty()) << device_->status().last_fault;
   EXPECT_EQ(got[0].measured, protocol::temperature_bit(0) | protocol::temperature_bit(5));
   EXPECT_NEAR(got[0].temperature_K[0], 293.15, 1e-9);
@@ -127,7 +135,8 @@ TEST_F(EnvironmentAgainstTheSimulator, RefusesAnAddressBaseThatIsOffByOne) {
 }
 
 TEST_F(EnvironmentAgainstTheSimulator, RefusesTheMapOfAnotherDevice) {
-  start({.model = sim::ModbusModel::CometT7510}, drivers::known_map("vaisala-indigo520-hmp", {}).value());
+  start({.model = sim::ModbusModel::CometT7510},
+        drivers::known_map("vaisala-indigo520-hmp", {}).value());
   turns(20);
   EXPECT_TRUE(samples().empty());
   EXPECT_EQ(device_->status().state, "refused");
@@ -144,7 +153,8 @@ TEST_F(EnvironmentAgainstTheSimulator, RefusesSwappedWordsBecauseTheyAreImplausi
 }
 
 TEST_F(EnvironmentAgainstTheSimulator, SaysNotAvailableWhenTheSensorIsGone) {
-  start({.model = sim::ModbusModel::Indigo520Hmp}, drivers::known_map("vaisala-indigo520-hmp", {}).value());
+  start({.model = sim::ModbusModel::Indigo520Hmp},
+        drivers::known_map("vaisala-indigo520-hmp", {}).value());
   turns(40);
   (void)samples();
   server_->inject({.kind = sim::FaultKind::SensorsGone, .duration_s = 10.0}, time_.now());
@@ -172,7 +182,9 @@ TEST_F(EnvironmentAgainstTheSimulator, ReadsAgainAfterEveryFault) {
   start({.model = sim::ModbusModel::CometT7510},
         drivers::known_map("comet-t7510", {.serial_number = 20969999}).value());
   turns(20);
-  for (const auto kind : {sim::FaultKind::Mute, sim::FaultKind::ModbusGarbage, sim::FaultKind::Disconnect}) {
+
+  for (const auto kind :
+       {sim::FaultKind::Mute, sim::FaultKind::ModbusGarbage, sim::FaultKind::Disconnect}) {
     const auto faults = device_->status().faults;
     server_->inject({.kind = kind, .duration_s = 0.5}, time_.now());
     turns(50);
@@ -194,7 +206,8 @@ TEST_F(EnvironmentAgainstTheSimulator, ToleratesLateAnswersWithinTheTimeOut) {
 }
 
 TEST_F(EnvironmentAgainstTheSimulator, MakesTheSameSamplesOfTheRawBytes) {
-  start({.model = sim::ModbusModel::Indigo520Hmp}, drivers::known_map("vaisala-indigo520-hmp", {}).value());
+  start({.model = sim::ModbusModel::Indigo520Hmp},
+        drivers::known_map("vaisala-indigo520-hmp", {}).value());
   turns(60);
   server_->inject({.kind = sim::FaultKind::ModbusGarbage, .duration_s = 0.1}, time_.now());
   turns(60);
@@ -205,9 +218,11 @@ TEST_F(EnvironmentAgainstTheSimulator, MakesTheSameSamplesOfTheRawBytes) {
   std::vector<EnvironmentSample> replayed;
   std::array<protocol::RawBlock, 256> blocks;
   const auto n = device_->raw().pop(blocks);
+
   for (std::size_t i = 0; i < n; ++i) {
     if (replay.on_raw(blocks[i])) replayed.push_back(replay.sample());
   }
+
   ASSERT_EQ(replayed.size(), live.size());
   for (std::size_t i = 0; i < live.size(); ++i) {
     EXPECT_EQ(replayed[i].head.time, live[i].head.time);

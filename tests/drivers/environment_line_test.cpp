@@ -1,5 +1,5 @@
-/// Several Modbus devices on one line: a real pseudo terminal with simulated slaves on it, and a gateway that
-/// takes one connection.
+/// Several Modbus devices on one line: a real pseudo terminal with simulated slaves on it, and a
+/// gateway that takes one connection.
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -36,7 +36,7 @@ class OneLine : public testing::TestWithParam<modbus::Transport> {
     bus_.slaves[2] = {};
     line_ = EnvironmentLine::create({slave(bus_, 1), slave(bus_, 2)}, time_).value();
   }
-  void turns_for(std::chrono::nanoseconds duration) {
+  void cycles_for(std::chrono::nanoseconds duration) {
     for (const auto end = time_.now() + duration; time_.now() < end; time_.advance(5ms)) {
       bus_.serve(time_.now());
       line_->wait(5ms);
@@ -55,21 +55,23 @@ class OneLine : public testing::TestWithParam<modbus::Transport> {
 };
 
 TEST_P(OneLine, AsksOneAfterTheOtherOverOneConnection) {
-  turns_for(4s);
+  cycles_for(4s);
   for (const std::size_t i : {0u, 1u}) {
     EXPECT_GE(samples_of(i), 15u) << status(i).last_fault;
     EXPECT_EQ(status(i).faults, 0u) << status(i).last_fault;
     EXPECT_EQ(status(i).state, "reading");
   }
   EXPECT_EQ(bus_.collisions, 0u);
-  EXPECT_EQ(bus_.connections(), GetParam() == modbus::Transport::Tcp ? 1u : 0u);  // a terminal has none
+  EXPECT_EQ(bus_.connections(),
+            GetParam() == modbus::Transport::Tcp ? 1u : 0u);  // a terminal has none
 }
 
 TEST_P(OneLine, ADeviceThatIsMuteLeavesTheOtherItsRounds) {
-  turns_for(2s);
+  cycles_for(2s);
   bus_.slaves[1].mute = true;
   (void)samples_of(1);
-  turns_for(4s);
+  cycles_for(4s);
+
   EXPECT_GE(samples_of(1), 8u) << status(1).last_fault;
   EXPECT_EQ(status(1).faults, 0u) << status(1).last_fault;
   EXPECT_EQ(status(1).state, "reading");
@@ -77,48 +79,55 @@ TEST_P(OneLine, ADeviceThatIsMuteLeavesTheOtherItsRounds) {
   EXPECT_THAT(status(0).last_fault, HasSubstr("no answer in 100 ms"));
   EXPECT_FALSE(status(0).connected);
   bus_.slaves[1].mute = false;
-  turns_for(2s);
+  cycles_for(2s);
   EXPECT_EQ(status(0).state, "reading");
   EXPECT_EQ(bus_.collisions, 0u);
 }
 
 TEST_P(OneLine, AnAnswerThatComesTooLateIsNotTheOthers) {
-  turns_for(2s);
+  cycles_for(2s);
   bus_.slaves[1].late = 150ms;  // after its time-out
-  turns_for(4s);
+  cycles_for(4s);
   EXPECT_GT(status(0).faults, 3u);
   EXPECT_EQ(status(1).faults, 0u) << status(1).last_fault;
   EXPECT_EQ(bus_.collisions, 0u);
 }
 
 TEST_P(OneLine, BothAreBackWhenTheLineIsBack) {
-  turns_for(2s);
+  cycles_for(2s);
   bus_.unplug();
-  turns_for(2s);
+  cycles_for(2s);
   EXPECT_NE(status(0).state, "reading");
   EXPECT_NE(status(1).state, "reading");
   bus_.plug_in();
   (void)samples_of(0);
   (void)samples_of(1);
-  turns_for(3s);
+  cycles_for(3s);
+
   for (const std::size_t i : {0u, 1u}) {
     EXPECT_EQ(status(i).state, "reading") << status(i).last_fault;
     EXPECT_GE(samples_of(i), 5u);
   }
 }
 
-INSTANTIATE_TEST_SUITE_P(Modbus, OneLine, testing::Values(modbus::Transport::Rtu, modbus::Transport::Tcp),
-                         [](const auto& i) { return i.param == modbus::Transport::Rtu ? "Rtu" : "Tcp"; });
+INSTANTIATE_TEST_SUITE_P(Modbus, OneLine,
+                         testing::Values(modbus::Transport::Rtu, modbus::Transport::Tcp),
+                         [](const auto& i) {
+                           return i.param == modbus::Transport::Rtu ? "Rtu" : "Tcp";
+                         });
 
 /// Moves by as much as somebody waits, without waiting.
 class WaitedTime final : public drivers::TimeSource {
  public:
   [[nodiscard]] protocol::HostTime now() const noexcept override { return now_; }
-  [[nodiscard]] std::chrono::nanoseconds wall(std::chrono::nanoseconds host) const noexcept override {
+  [[nodiscard]] std::chrono::nanoseconds wall(
+      std::chrono::nanoseconds host) const noexcept override {
     now_ += host;
     return {};
   }
-  [[nodiscard]] std::chrono::nanoseconds host(std::chrono::nanoseconds) const noexcept override { return {}; }
+  [[nodiscard]] std::chrono::nanoseconds host(std::chrono::nanoseconds) const noexcept override {
+    return {};
+  }
 
  private:
   mutable protocol::HostTime now_{1h};
@@ -163,11 +172,13 @@ TEST(EnvironmentLine, TwoNamesOfALineThatWasAbsentDoNotShareItSilently) {
   std::vector<std::unique_ptr<EnvironmentLine>> lines;
   for (const std::uint8_t unit : {std::uint8_t{1}, std::uint8_t{2}}) {
     auto options = slave(bus, unit);
-    std::get<drivers::ModbusSerial>(options.address).path = names / ("name-" + std::to_string(unit));
+    std::get<drivers::ModbusSerial>(options.address).path =
+        names / ("name-" + std::to_string(unit));
     lines.push_back(EnvironmentLine::create({options}, time).value());
   }
   for (const char* name : {"name-1", "name-2"})
-    std::filesystem::create_symlink(std::get<drivers::ModbusSerial>(bus.address()).path, names / name);
+    std::filesystem::create_symlink(std::get<drivers::ModbusSerial>(bus.address()).path,
+                                    names / name);
 
   for (int i = 0; i < 800; ++i, time.advance(5ms)) {
     bus.serve(time.now());
@@ -176,7 +187,8 @@ TEST(EnvironmentLine, TwoNamesOfALineThatWasAbsentDoNotShareItSilently) {
       line->receive();
     }
   }
-  EXPECT_EQ(lines[0]->device(0).status().state, "reading") << lines[0]->device(0).status().last_fault;
+  EXPECT_EQ(lines[0]->device(0).status().state, "reading")
+      << lines[0]->device(0).status().last_fault;
   EXPECT_FALSE(lines[1]->device(0).status().connected);
   EXPECT_THAT(lines[1]->device(0).status().last_fault, HasSubstr("name-2"));
   EXPECT_THAT(lines[1]->device(0).status().last_fault, HasSubstr("this serial line is in use"));
@@ -190,7 +202,8 @@ TEST(EnvironmentLine, KnowsALineByAnyOfItsNames) {
   const drivers::ModbusSerial real{.path = std::filesystem::canonical(link).string()};
   EXPECT_TRUE(drivers::same_line(bus.address(), real));
   EXPECT_FALSE(drivers::same_line(bus.address(), drivers::ModbusSerial{.path = "/dev/null"}));
-  EXPECT_FALSE(drivers::same_line(drivers::ModbusTcp{"10.0.0.9", 502}, drivers::ModbusTcp{"10.0.0.9", 503}));
+  EXPECT_FALSE(
+      drivers::same_line(drivers::ModbusTcp{"10.0.0.9", 502}, drivers::ModbusTcp{"10.0.0.9", 503}));
 }
 
 }  // namespace

@@ -49,13 +49,15 @@ TEST_P(Receiver, ProvesTheDeviceThenMeasures) {
   EXPECT_NEAR(s.air_pressure_Pa, 101310.0, 1e-9);
   EXPECT_NEAR(s.temperature_K[3], 293.55, 1e-9);
   EXPECT_TRUE(std::isnan(s.relative_humidity));
-  EXPECT_EQ(s.measured, protocol::kAirTemperature | protocol::kAirPressure | protocol::temperature_bit(3));
+  EXPECT_EQ(s.measured,
+            protocol::kAirTemperature | protocol::kAirPressure | protocol::temperature_bit(3));
 }
 
 TEST_P(Receiver, DatesASampleInTheMiddleOfItsRound) {
   to_first_sample();
   EXPECT_EQ(receiver_.sample().head.time, kStart + 40ms);  // round from 20 ms to 60 ms
-  EXPECT_NEAR(static_cast<double>(receiver_.sample().head.u_time.count()), 40e6 / std::sqrt(12.0), 1.0);
+  EXPECT_NEAR(static_cast<double>(receiver_.sample().head.u_time.count()), 40e6 / std::sqrt(12.0),
+              1.0);
 }
 
 TEST_P(Receiver, MarksTheFirstSampleOfAConnectionOnly) {
@@ -78,15 +80,17 @@ TEST_P(Receiver, RefusesAnotherSerialNumber) {
   registers_[101] = 0x5679;
   to_first_sample();
   EXPECT_TRUE(is_refusal(receiver_.failure()));
-  EXPECT_THAT(text_of(receiver_.failure(), receiver_.map()),
-              HasSubstr("serial number is 12345679, not 12345678: wrong device or register map small"));
+  EXPECT_THAT(
+      text_of(receiver_.failure(), receiver_.map()),
+      HasSubstr("serial number is 12345679, not 12345678: wrong device or register map small"));
 }
 
 TEST_P(Receiver, RefusesAMapWhoseFirstRoundIsImplausible) {
   registers_[11] = 215;
   to_first_sample();
   EXPECT_TRUE(is_refusal(receiver_.failure()));
-  EXPECT_THAT(text_of(receiver_.failure(), receiver_.map()), HasSubstr("air pressure reads 2150 Pa"));
+  EXPECT_THAT(text_of(receiver_.failure(), receiver_.map()),
+              HasSubstr("air pressure reads 2150 Pa"));
 }
 
 TEST_P(Receiver, GivesAnImplausibleValueLaterOnAsNotAvailable) {

@@ -26,8 +26,9 @@ void libusb_exit(libusb_context*) {}
 const char* libusb_strerror(int) {
   return "fake";
 }
-int libusb_hotplug_register_callback(libusb_context*, int, int, int, int, int, libusb_hotplug_callback_fn,
-                                     void*, libusb_hotplug_callback_handle*) {
+int libusb_hotplug_register_callback(libusb_context*, int, int, int, int, int,
+                                     libusb_hotplug_callback_fn, void*,
+                                     libusb_hotplug_callback_handle*) {
   return 0;
 }
 libusb_transfer* libusb_alloc_transfer(int) {
@@ -70,7 +71,8 @@ void libusb_close(libusb_device_handle* handle) {
 libusb_device* libusb_get_device(libusb_device_handle* handle) {
   return handle->device;
 }
-int libusb_get_string_descriptor_ascii(libusb_device_handle* handle, std::uint8_t, unsigned char* data, int) {
+int libusb_get_string_descriptor_ascii(libusb_device_handle* handle, std::uint8_t,
+                                       unsigned char* data, int) {
   std::memcpy(data, handle->device->serial.data(), handle->device->serial.size());
   return static_cast<int>(handle->device->serial.size());
 }

@@ -1,6 +1,7 @@
 #pragma once
-/// Stands in for libusb in this test program (the linker prefers the program's own functions): cards on a bus
-/// that count how often they are opened, and a host controller that keeps cancelled transfers.
+/// Stands in for libusb in this test program (the linker prefers the program's own functions):
+/// cards on a bus that count how often they are opened, and a host controller that keeps cancelled
+/// transfers.
 
 #include <libusb-1.0/libusb.h>
 

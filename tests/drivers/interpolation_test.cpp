@@ -92,12 +92,13 @@ TEST(InterpolateAxes, AddsSpeedTimesTimeUncertainty) {
   EXPECT_NEAR(at->u_position[0], 0.2 * 50e-6, 1e-12);
 }
 
-// Any motion within the acceleration bound stays within the bound stated: acceleration drawn anew every 0.1
-// ms, at its worst (plus or minus the bound), which is harder than any machine.
+// Any motion within the acceleration bound stays within the bound stated: acceleration drawn anew
+// every 0.1 ms, at its worst (plus or minus the bound), which is harder than any machine.
 TEST(InterpolateAxes, KeepsItsErrorWithinTheStatedBound) {
   constexpr double kBound = 5.0;
   constexpr double kStep_s = 1e-4;
   std::mt19937 random(20);
+
   for (int run = 0; run < 2000; ++run) {
     std::vector<double> x{0.0};
     double v = 0.1;
@@ -106,8 +107,11 @@ TEST(InterpolateAxes, KeepsItsErrorWithinTheStatedBound) {
       x.push_back(x.back() + v * kStep_s + 0.5 * a * kStep_s * kStep_s);
       v += a * kStep_s;
     }
-    const auto samples = sampled(
-        {0, 1, 2, 3}, [&](double t) { return x[static_cast<std::size_t>(std::lround(t / kStep_s))]; });
+
+    const auto samples = sampled({0, 1, 2, 3}, [&](double t) {
+      return x[static_cast<std::size_t>(std::lround(t / kStep_s))];
+    });
+
     for (std::size_t k = 11; k < 20; ++k) {
       const auto at = interpolate_axes(samples, HostTime{k * 100us}, 0ns);
       ASSERT_TRUE(at);

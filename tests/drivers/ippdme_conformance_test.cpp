@@ -9,7 +9,7 @@ using namespace std::chrono_literals;
 
 class FaultyMeasuringMachine {
  public:
-  static constexpr std::chrono::nanoseconds kTurn = 100ms;  // no server reports more often
+  static constexpr std::chrono::nanoseconds kCycle = 100ms;  // no server reports more often
   static constexpr std::chrono::nanoseconds kSilenceLimit = 3s;
   static constexpr std::chrono::nanoseconds kRecoveryLimit = 30s;  // two turns a command
   static constexpr bool kTornCanBeFinished = true;
@@ -27,13 +27,13 @@ class FaultyMeasuringMachine {
       for (std::size_t i = 0; i < n; ++i) heads.push_back(touches[i].head);
   }
   void serve() { peer_.serve(time_.now()); }
-  void say_valid() {
-    if (!holding_) peer_.say_gathered();
+  void send_valid() {
+    if (!holding_) peer_.send_gathered();
   }
   void hold_back() { holding_ = true; }
   void send_held() {
     holding_ = false;
-    peer_.say_gathered();
+    peer_.send_gathered();
   }
   void send_torn() { peer_.send("E0001 # X(1.5),Y("); }
   void finish_torn() { peer_.send("2.5),Z(3.5)\r\n"); }
@@ -58,7 +58,8 @@ class FaultyMeasuringMachine {
   drivers::SteppedTime time_;
   IppDmePeer peer_{time_.now()};
   bool holding_ = false;
-  std::unique_ptr<drivers::IppDevice> device_ = drivers::IppDevice::create(options(), time_).value();
+  std::unique_ptr<drivers::IppDevice> device_ =
+      drivers::IppDevice::create(options(), time_).value();
 };
 
 INSTANTIATE_TYPED_TEST_SUITE_P(MeasuringMachine, DriverConformance, FaultyMeasuringMachine);

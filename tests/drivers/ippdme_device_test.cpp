@@ -22,11 +22,13 @@ TEST(IppDevice, MeasuresWhatIsAsked) {
   IppStage stage;
   ASSERT_TRUE(stage.state_becomes("ready")) << stage.last_fault();
   stage.device->measure(on_top());
-  ASSERT_TRUE(stage.turns_until(30s, [&] { return !stage.touches.empty(); })) << stage.last_fault();
+  ASSERT_TRUE(stage.cycles_until(30s, [&] { return !stage.touches.empty(); }))
+      << stage.last_fault();
   const ProbeTrigger& t = stage.touches[0];
   EXPECT_EQ(t.latch, protocol::TouchLatch::Reported);
   EXPECT_EQ(t.touch_flags, 0u);
-  // The centre of a tip of 2 mm on top of the sphere; 1 nm: nine decimals of a millimetre on the wire.
+  // The centre of a tip of 2 mm on top of the sphere; 1 nm: nine decimals of a millimetre on the
+  // wire.
   EXPECT_NEAR(t.position[2], -0.1 + 12.5e-3 + 2e-3, 1e-9);
   EXPECT_GT(t.head.u_time, 10ms);
 }
@@ -37,13 +39,16 @@ TEST(IppDevice, ReadsAtTheTouchWhatAMachineWithErrorsReads) {
   IppStage stage{options};
   ASSERT_TRUE(stage.state_becomes("ready")) << stage.last_fault();
   const Eigen::Vector3d centre{0.1, 0.2, -0.1};
-  const std::vector<Eigen::Vector3d> normals = {
-      Eigen::Vector3d{0.0, 0.0, 1.0}, Eigen::Vector3d{1.0, 0.0, 0.0}, Eigen::Vector3d{0.0, -0.6, 0.8}};
+  const std::vector<Eigen::Vector3d> normals = {Eigen::Vector3d{0.0, 0.0, 1.0},
+                                                Eigen::Vector3d{1.0, 0.0, 0.0},
+                                                Eigen::Vector3d{0.0, -0.6, 0.8}};
+
   for (const auto& n : normals) {
     const Eigen::Vector3d p = centre + (12.5e-3 + 2e-3) * n;
     stage.device->measure({{p[0], p[1], p[2]}, {n[0], n[1], n[2]}});
   }
-  ASSERT_TRUE(stage.turns_until(60s, [&] { return stage.touches.size() == normals.size(); }))
+
+  ASSERT_TRUE(stage.cycles_until(60s, [&] { return stage.touches.size() == normals.size(); }))
       << stage.last_fault();
   for (std::size_t i = 0; i < normals.size(); ++i) {
     EXPECT_EQ(stage.touches[i].touch, i + 1);
@@ -60,7 +65,7 @@ TEST(IppDevice, GoesTheWayToATouchWithoutTouching) {
   stage.device->measure({.position_m = {0.1, 0.2, 0.0}, .touch = false});
   stage.device->measure(on_top());
   EXPECT_EQ(stage.device->points_left(), 2u);
-  ASSERT_TRUE(stage.turns_until(30s, [&] { return stage.device->points_left() == 0; }));
+  ASSERT_TRUE(stage.cycles_until(30s, [&] { return stage.device->points_left() == 0; }));
   ASSERT_EQ(stage.touches.size(), 1u);
   EXPECT_EQ(stage.touches[0].touch, 1u);
   EXPECT_EQ(stage.touches[0].touch_flags, 0u);
@@ -73,9 +78,10 @@ TEST(IppDevice, ForgetsWhatIsBehindAWayThatWasRefused) {
   stage.peer.machine().inject({.kind = sim::FaultKind::RefuseWay}, stage.time.now());
   stage.device->measure({.position_m = {0.1, 0.2, 0.1}, .touch = false});
   stage.device->measure(on_top());
-  ASSERT_TRUE(stage.turns_until(30s, [&] { return stage.device->points_left() == 0; }));
+  ASSERT_TRUE(stage.cycles_until(30s, [&] { return stage.device->points_left() == 0; }));
   EXPECT_TRUE(stage.touches.empty());
-  EXPECT_NE(stage.last_fault().find("GoTo was refused: 2500"), std::string::npos) << stage.last_fault();
+  EXPECT_NE(stage.last_fault().find("GoTo was refused: 2500"), std::string::npos)
+      << stage.last_fault();
 }
 
 TEST(IppDevice, ForgetsTheTouchWhenTheConnectionIsLostOnTheWay) {
@@ -87,24 +93,26 @@ TEST(IppDevice, ForgetsTheTouchWhenTheConnectionIsLostOnTheWay) {
   stage.device->wait(0ns);
   EXPECT_EQ(stage.device->points_left(), 0u);
   ASSERT_TRUE(stage.state_becomes("ready"));
-  for (int i = 0; i < 100; ++i) stage.turn();
+  for (int i = 0; i < 100; ++i) stage.cycle();
   EXPECT_TRUE(stage.touches.empty());
 }
 
 TEST(IppDevice, ForgetsWhatIsAskedOfAMachineThatIsAway) {
   IppStage stage;
   stage.device->measure(on_top());
-  stage.turn();
+  stage.cycle();
+
   EXPECT_EQ(stage.device->points_left(), 0u);
-  EXPECT_NE(stage.last_fault().find("asked to move while"), std::string::npos) << stage.last_fault();
+  EXPECT_NE(stage.last_fault().find("asked to move while"), std::string::npos)
+      << stage.last_fault();
   ASSERT_TRUE(stage.state_becomes("ready"));
   stage.peer.unplug();
-  ASSERT_TRUE(stage.turns_until(30s, [&] { return !stage.device->status().connected; }));
+  ASSERT_TRUE(stage.cycles_until(30s, [&] { return !stage.device->status().connected; }));
   stage.device->measure(on_top());
-  stage.turn();
+  stage.cycle();
   stage.peer.listen();
   ASSERT_TRUE(stage.state_becomes("ready"));
-  for (int i = 0; i < 100; ++i) stage.turn();
+  for (int i = 0; i < 100; ++i) stage.cycle();
   EXPECT_TRUE(stage.touches.empty());
   EXPECT_EQ(stage.device->status().state, "ready");
 }
@@ -113,7 +121,7 @@ TEST(IppDevice, TakesTouchesMadeByHand) {
   IppStage stage;
   ASSERT_TRUE(stage.state_becomes("ready"));
   stage.peer.machine().touch_by_hand({0.01, 0.02, 0.03});
-  ASSERT_TRUE(stage.turns_until(1s, [&] { return !stage.touches.empty(); }));
+  ASSERT_TRUE(stage.cycles_until(1s, [&] { return !stage.touches.empty(); }));
   EXPECT_NEAR(stage.touches[0].position[1], 0.02, 1e-12);
 }
 
@@ -122,7 +130,7 @@ TEST(IppDevice, FollowsThePositionAtMostTenTimesASecond) {
   ASSERT_TRUE(stage.state_becomes("ready"));
   std::array<protocol::AxisSample, 64> out{};
   (void)stage.device->positions().pop(out);
-  (void)stage.turns_until(2s, [] { return false; });
+  (void)stage.cycles_until(2s, [] { return false; });
   const std::size_t n = stage.device->positions().pop(out);
   EXPECT_GE(n, 10u);
   EXPECT_LE(n, 21u);
@@ -135,12 +143,13 @@ TEST(IppDevice, AnAnswerThatWaitsForTheThreadIsNoTimeOut) {
     stage.peer.serve(stage.time.now());
     return stage.times_heard("Get(X(),Y(),Z())") > asked;
   };
-  while (!answered()) stage.turn();
+
+  while (!answered()) stage.cycle();
   stage.time.advance(100ms);
   stage.peer.serve(stage.time.now());
-  stage.peer.say_gathered();
+  stage.peer.send_gathered();
   stage.time.advance(4s);  // more than command_timeout: the process was stopped
-  stage.turns_for(1s);
+  stage.cycles_for(1s);
   EXPECT_EQ(stage.device->status().faults, 0u) << stage.last_fault();
   EXPECT_EQ(stage.state(), "ready");
   EXPECT_EQ(stage.times_heard("StartSession()"), 1);
@@ -179,7 +188,7 @@ TEST(IppDevice, NamesAnAnswerThatNobodyAskedFor) {
   IppStage stage;
   ASSERT_TRUE(stage.state_becomes("ready"));
   stage.peer.send("09999 %\r\n");
-  ASSERT_TRUE(stage.turns_until(1s, [&] { return stage.device->status().faults > 0; }));
+  ASSERT_TRUE(stage.cycles_until(1s, [&] { return stage.device->status().faults > 0; }));
   EXPECT_NE(stage.last_fault().find("09999"), std::string::npos);
 }
 

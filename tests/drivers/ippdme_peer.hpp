@@ -1,6 +1,7 @@
 #pragma once
-/// The simulated measuring machine's server on a listening socket of 127.0.0.1, in the test's own thread,
-/// with what it says in the test's hands: lines are gathered, and sent when the test says so.
+/// The simulated measuring machine's server on a listening socket of 127.0.0.1, in the test's own
+/// thread, with what it says in the test's hands: lines are gathered, and sent when the test says
+/// so.
 
 #include <arpa/inet.h>
 #include <gtest/gtest.h>
@@ -25,7 +26,9 @@ namespace abbe::tests {
 class IppDmePeer {
  public:
   explicit IppDmePeer(protocol::HostTime now, sim::IppDmeOptions options = {})
-      : options_(std::move(options)), port_holder_(bound_socket(0)), port_(sim::port_of(port_holder_)) {
+      : options_(std::move(options)),
+        port_holder_(bound_socket(0)),
+        port_(sim::port_of(port_holder_)) {
     power_on(now);
     listen();
   }
@@ -41,7 +44,7 @@ class IppDmePeer {
     const auto bytes = machine_->take_output();
     gathered_.append(reinterpret_cast<const char*>(bytes.data()), bytes.size());
   }
-  void say_gathered() {
+  void send_gathered() {
     if (!holding_) send(std::exchange(gathered_, {}));
   }
   /// What the machine says reaches nobody.
@@ -78,9 +81,12 @@ class IppDmePeer {
   }
 
  private:
-  void power_on(protocol::HostTime now) { machine_ = std::make_unique<sim::IppDmeDevice>(options_, now); }
+  void power_on(protocol::HostTime now) {
+    machine_ = std::make_unique<sim::IppDmeDevice>(options_, now);
+  }
   void accept_client(protocol::HostTime now) {
-    sim::Socket accepted(::accept4(listener_.get(), nullptr, nullptr, SOCK_NONBLOCK | SOCK_CLOEXEC));
+    sim::Socket accepted(
+        ::accept4(listener_.get(), nullptr, nullptr, SOCK_NONBLOCK | SOCK_CLOEXEC));
     if (!accepted) return;
     if (client_) hang_up();
     client_ = std::move(accepted);

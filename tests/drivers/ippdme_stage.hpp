@@ -1,5 +1,6 @@
 #pragma once
-/// A driver of a measuring machine, the simulated machine's server and their common time, for tests.
+/// A driver of a measuring machine, the simulated machine's server and their common time, for
+/// tests.
 
 #include <algorithm>
 #include <array>
@@ -27,9 +28,9 @@ struct IppStage {
     options.port = peer.port();
     device = drivers::IppDevice::create(options, time).value();
   }
-  void turn() {
+  void cycle() {
     peer.serve(time.now());
-    peer.say_gathered();
+    peer.send_gathered();
     device->wait(std::chrono::milliseconds{20});
     device->receive();
     time.advance(std::chrono::milliseconds{20});
@@ -38,13 +39,13 @@ struct IppStage {
     touches.insert(touches.end(), out.begin(), out.begin() + static_cast<std::ptrdiff_t>(n));
   }
   template <class Done>
-  bool turns_until(std::chrono::nanoseconds limit, Done done) {
-    for (const auto end = time.now() + limit; !done(); turn())
+  bool cycles_until(std::chrono::nanoseconds limit, Done done) {
+    for (const auto end = time.now() + limit; !done(); cycle())
       if (time.now() >= end) return false;
     return true;
   }
-  void turns_for(std::chrono::nanoseconds duration) {
-    (void)turns_until(duration, [] { return false; });
+  void cycles_for(std::chrono::nanoseconds duration) {
+    (void)cycles_until(duration, [] { return false; });
   }
   [[nodiscard]] std::string state() const { return std::string{device->status().state}; }
   [[nodiscard]] std::string last_fault() const { return device->status().last_fault; }
@@ -53,7 +54,7 @@ struct IppStage {
     return std::ranges::count(heard, command);
   }
   bool state_becomes(std::string_view state) {
-    return turns_until(std::chrono::seconds{30}, [&] { return device->status().state == state; });
+    return cycles_until(std::chrono::seconds{30}, [&] { return device->status().state == state; });
   }
 
   drivers::SteppedTime time;
@@ -62,7 +63,8 @@ struct IppStage {
   std::vector<protocol::ProbeTrigger> touches;
 };
 
-inline sim::IppDmeOptions not_homed(std::chrono::nanoseconds home_time = sim::IppDmeOptions{}.home_time) {
+inline sim::IppDmeOptions not_homed(
+    std::chrono::nanoseconds home_time = sim::IppDmeOptions{}.home_time) {
   sim::IppDmeOptions machine = machine_with_a_sphere();
   machine.homed = false;
   machine.home_time = home_time;

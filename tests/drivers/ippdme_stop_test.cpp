@@ -1,5 +1,5 @@
-/// What stops a measuring machine, and what happens after it: AbortE before any connection with a motion is
-/// closed, and nothing that moves or clears before a person has released the machine.
+/// What stops a measuring machine, and what happens after it: AbortE before any connection with a
+/// motion is closed, and nothing that moves or clears before a person has released the machine.
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -29,16 +29,17 @@ struct MovingStage : IppStage {
       : IppStage(machine, std::move(options)) {
     EXPECT_TRUE(state_becomes("ready")) << last_fault();
     device->measure({.position_m = {0.3, 0.4, 0.0}, .touch = false});
-    EXPECT_TRUE(turns_until(1s, [this] { return peer.machine().moving(); }));
+    EXPECT_TRUE(cycles_until(1s, [this] { return peer.machine().moving(); }));
   }
   /// Stopped by one AbortE and held; nothing clears or moves for a minute.
   void expect_stopped_and_held() {
-    EXPECT_TRUE(turns_until(10s, [this] { return state() == kHeld; })) << state() << ": " << last_fault();
+    EXPECT_TRUE(cycles_until(10s, [this] { return state() == kHeld; }))
+        << state() << ": " << last_fault();
     EXPECT_FALSE(peer.machine().moving());
     EXPECT_EQ(times_heard("AbortE()"), 1);
     const auto commands = times_heard("ClearAllErrors()") + times_heard("StartSession()");
     device->measure(on_top());
-    turns_for(60s);
+    cycles_for(60s);
     EXPECT_EQ(state(), kHeld);
     EXPECT_EQ(times_heard("ClearAllErrors()") + times_heard("StartSession()"), commands);
     EXPECT_FALSE(peer.machine().moving());
@@ -66,17 +67,17 @@ TEST(IppStop, ATimeOutWhileMovingIsAbortedFirst) {
   IppDeviceOptions options;
   options.session.motion_timeout = 500ms;
   MovingStage stage{options};
-  ASSERT_TRUE(stage.turns_until(2s, [&] { return stage.device->status().faults > 0; }));
+  ASSERT_TRUE(stage.cycles_until(2s, [&] { return stage.device->status().faults > 0; }));
   EXPECT_THAT(stage.last_fault(), HasSubstr("no answer to GoTo in 0.5 s"));
   stage.expect_stopped_and_held();
 }
 
 TEST(IppStop, GarbageWhileMovingIsAbortedFirst) {
-  for (const std::string garbage :
-       {"220 mail.example.com ESMTP\r\n", "\x01\x02 garbage\r\n", "\xE4\r\n", "00007 ! Error(2,\r\n"}) {
+  for (const std::string garbage : {"220 mail.example.com ESMTP\r\n", "\x01\x02 garbage\r\n",
+                                    "\xE4\r\n", "00007 ! Error(2,\r\n"}) {
     MovingStage stage;
     stage.peer.send(garbage);
-    ASSERT_TRUE(stage.turns_until(1s, [&] { return stage.device->status().faults > 0; }));
+    ASSERT_TRUE(stage.cycles_until(1s, [&] { return stage.device->status().faults > 0; }));
     EXPECT_THAT(stage.last_fault(), HasSubstr("this is no I++ DME server"));
     stage.expect_stopped_and_held();
     EXPECT_FALSE(stage.device->status().connected);
@@ -93,9 +94,9 @@ TEST(IppStop, ARequestStopsTheMotionAndForgetsThePoints) {
 TEST(IppStop, ARequestWithoutAMotionHoldsWithoutAnAbort) {
   for (const auto before : {0s, 1s, 5s}) {  // not connected, connected, ready
     IppStage stage;
-    stage.turns_for(before);
+    stage.cycles_for(before);
     stage.device->abort();
-    stage.turns_for(10s);
+    stage.cycles_for(10s);
     EXPECT_EQ(stage.state(), kHeld);
     EXPECT_EQ(stage.times_heard("AbortE()"), 0);
     stage.device->release();
@@ -110,14 +111,16 @@ TEST(IppStop, AnEndByRequestStopsTheMotionAndHoldsNothing) {
   MovingStage stage{options};
   stage.device->measure(on_top());
   stage.device->end();
-  ASSERT_TRUE(stage.turns_until(10s, [&] { return stage.state() == "disconnected"; })) << stage.state();
+
+  ASSERT_TRUE(stage.cycles_until(10s, [&] { return stage.state() == "disconnected"; }))
+      << stage.state();
   EXPECT_FALSE(stage.peer.machine().moving());
   EXPECT_EQ(stage.times_heard("AbortE()"), 1);
   EXPECT_EQ(stage.peer.machine().heard().back(), "EndSession()");
   EXPECT_FALSE(stage.device->held());
   EXPECT_EQ(kept, drivers::IppMachine{});
   stage.device->measure(on_top());
-  stage.turns_for(10s);
+  stage.cycles_for(10s);
   EXPECT_EQ(stage.state(), "disconnected") << "nothing is begun any more";
   EXPECT_EQ(stage.device->points_left(), 0u);
 }
@@ -126,28 +129,30 @@ TEST(IppRelease, AMotionThatIsBeingStoppedCannotBeReleased) {
   MovingStage stage;
   stage.peer.hold_answers(true);
   stage.peer.send("E0000 ! Error(2,1001,Machine,\"Air pressure\")\r\n");
-  ASSERT_TRUE(stage.turns_until(1s, [&] { return stage.state() == "aborting"; })) << stage.state();
+  ASSERT_TRUE(stage.cycles_until(1s, [&] { return stage.state() == "aborting"; })) << stage.state();
   EXPECT_TRUE(stage.device->held());
   EXPECT_FALSE(stage.device->releasable());
   stage.peer.hold_answers(false);
-  ASSERT_TRUE(stage.turns_until(10s, [&] { return stage.device->releasable(); })) << stage.state();
+  ASSERT_TRUE(stage.cycles_until(10s, [&] { return stage.device->releasable(); })) << stage.state();
   stage.device->release();
-  ASSERT_TRUE(stage.turns_until(10s, [&] { return !stage.device->held(); })) << stage.state();
+  ASSERT_TRUE(stage.cycles_until(10s, [&] { return !stage.device->held(); })) << stage.state();
 }
 
 TEST(IppRelease, TheHoldOutlivesTheDevice) {
   std::string kept;
   IppDeviceOptions options;
   options.machine_changed = [&](const drivers::IppMachine& machine) { kept = machine.held; };
+
   {
     MovingStage stage{options};
     stage.inject(sim::FaultKind::EmergencyStop);
     ASSERT_TRUE(stage.state_becomes(kHeld));
   }
+
   EXPECT_THAT(kept, HasSubstr("0500 Emergency stop"));
   options.session.held = kept;
   IppStage stage{machine_with_a_sphere(), options};
-  stage.turns_for(60s);
+  stage.cycles_for(60s);
   EXPECT_EQ(stage.state(), kHeld);
   EXPECT_THAT(stage.last_fault(), HasSubstr("0500 Emergency stop"));
   EXPECT_THAT(stage.peer.machine().heard(), testing::IsEmpty());
@@ -159,7 +164,7 @@ TEST(IppRelease, TheHoldOutlivesTheDevice) {
 TEST(IppStop, AMotionOnALostConnectionIsAbortedOnTheNextOne) {
   MovingStage stage;
   stage.peer.hang_up();
-  ASSERT_TRUE(stage.turns_until(1s, [&] { return !stage.device->status().connected; }));
+  ASSERT_TRUE(stage.cycles_until(1s, [&] { return !stage.device->status().connected; }));
   EXPECT_TRUE(stage.peer.machine().moving());
   stage.expect_stopped_and_held();
 }
@@ -171,7 +176,8 @@ TEST(IppStop, AMotionOnALostConnectionIsAbortedBeforeASessionIsStarted) {
   ASSERT_TRUE(stage.state_becomes(kHeld));
   EXPECT_FALSE(stage.peer.machine().moving());
   EXPECT_THAT(stage.commands_after(before), testing::ElementsAre("AbortE()"));
-  EXPECT_THAT(stage.last_fault(), HasSubstr("the connection was lost while the machine was moving"));
+  EXPECT_THAT(stage.last_fault(),
+              HasSubstr("the connection was lost while the machine was moving"));
   stage.device->release();
   ASSERT_TRUE(stage.state_becomes("ready")) << stage.last_fault();
   EXPECT_EQ(stage.commands_after(before).at(1), "StartSession()");
@@ -183,7 +189,8 @@ TEST(IppStop, AServerThatAbortsOnlyInASessionGetsOneFirst) {
   MovingStage stage{{}, machine};
   const auto before = stage.commands();
   stage.peer.hang_up();
-  ASSERT_TRUE(stage.turns_until(30s, [&] { return stage.state() == kHeld; })) << stage.last_fault();
+  ASSERT_TRUE(stage.cycles_until(30s, [&] { return stage.state() == kHeld; }))
+      << stage.last_fault();
   EXPECT_FALSE(stage.peer.machine().moving());
   const auto heard = stage.commands_after(before);
   ASSERT_GE(heard.size(), 3u);
@@ -197,12 +204,12 @@ TEST(IppStop, AHeldMachineThatMayStillMoveIsAbortedOnTheNextConnection) {
   MovingStage stage;
   stage.peer.hold_answers(true);
   stage.peer.send("E0000 ! Error(2,1001,Machine,\"Air pressure\")\r\n");
-  ASSERT_TRUE(stage.turns_until(1s, [&] { return stage.times_heard("AbortE()") == 1; }));
+  ASSERT_TRUE(stage.cycles_until(1s, [&] { return stage.times_heard("AbortE()") == 1; }));
   const auto before = stage.commands();
   stage.peer.hang_up();
   stage.peer.hold_answers(false);
-  ASSERT_TRUE(stage.turns_until(10s, [&] { return stage.commands() > before; }));
-  stage.turns_for(10s);
+  ASSERT_TRUE(stage.cycles_until(10s, [&] { return stage.commands() > before; }));
+  stage.cycles_for(10s);
   EXPECT_THAT(stage.commands_after(before), testing::ElementsAre("AbortE()"));
   EXPECT_EQ(stage.state(), kHeld);
   EXPECT_THAT(stage.last_fault(), HasSubstr("1001 Air pressure"));
@@ -217,7 +224,8 @@ TEST(IppStop, ARefusedAbortIsNoStandstill) {
   MovingStage stage{options, machine};
   const auto before = stage.commands();
   stage.device->abort();
-  stage.turns_for(30s);
+  stage.cycles_for(30s);
+
   EXPECT_EQ(stage.state(), kHeld);
   EXPECT_THAT(stage.last_fault(), HasSubstr("AbortE was refused: 0500"));
   EXPECT_THAT(stage.last_fault(), HasSubstr("the machine may still be moving"));
@@ -232,9 +240,9 @@ TEST(IppStop, GarbageBehindAnAbortDoesNotHideItsAnswer) {
     MovingStage stage;
     stage.peer.hold_answers(true);
     stage.device->abort();
-    ASSERT_TRUE(stage.turns_until(1s, [&] { return stage.times_heard("AbortE()") == 1; }));
+    ASSERT_TRUE(stage.cycles_until(1s, [&] { return stage.times_heard("AbortE()") == 1; }));
     stage.peer.send(garbage + "E0002 %\r\n");  // in one read
-    ASSERT_TRUE(stage.turns_until(1s, [&] { return stage.state() == kHeld; })) << stage.state();
+    ASSERT_TRUE(stage.cycles_until(1s, [&] { return stage.state() == kHeld; })) << stage.state();
     EXPECT_THAT(stage.last_fault(), Not(HasSubstr("no answer to AbortE")));
   }
 }
@@ -248,7 +256,7 @@ TEST(IppRelease, TheReasonOfAHoldStaysWhateverIsRefusedMeanwhile) {
   stage.device->measure(on_top());
   ASSERT_TRUE(stage.state_becomes(kHeld));
   stage.device->measure(on_top());
-  stage.turns_for(1s);
+  stage.cycles_for(1s);
   EXPECT_THAT(stage.last_fault(), HasSubstr("0500 Emergency stop"));
   EXPECT_THAT(stage.last_fault(), HasSubstr("asked to move while awaiting release"));
   EXPECT_EQ(kept, "reports 0500 Emergency stop (severity 3)");
@@ -270,7 +278,7 @@ TEST(IppStop, AMotionOnALostConnectionOutlivesTheDevice) {
   options.machine_changed = [&](const drivers::IppMachine& m) { kept = m; };
   MovingStage stage{options};
   stage.peer.hang_up();
-  ASSERT_TRUE(stage.turns_until(1s, [&] { return !stage.device->status().connected; }));
+  ASSERT_TRUE(stage.cycles_until(1s, [&] { return !stage.device->status().connected; }));
   stage.device.reset();
   EXPECT_TRUE(kept.moving);
 
@@ -279,8 +287,8 @@ TEST(IppStop, AMotionOnALostConnectionOutlivesTheDevice) {
   options.session.held = "abbed ended while the machine was moving";
   options.session.moving = true;
   stage.device = IppDevice::create(options, stage.time).value();
-  ASSERT_TRUE(stage.turns_until(5s, [&] { return stage.commands() > before; }));
-  stage.turns_for(10s);
+  ASSERT_TRUE(stage.cycles_until(5s, [&] { return stage.commands() > before; }));
+  stage.cycles_for(10s);
   EXPECT_EQ(stage.state(), kHeld);
   EXPECT_FALSE(stage.peer.machine().moving());
   EXPECT_THAT(stage.commands_after(before), testing::ElementsAre("AbortE()"));
@@ -295,8 +303,9 @@ TEST(IppStop, AnUnansweredAbortIsRepeatedOnTheNextConnection) {
   MovingStage stage;
   stage.peer.hold_answers(true);
   stage.device->abort();
-  ASSERT_TRUE(stage.turns_until(10s, [&] { return !stage.device->status().connected; }));
-  EXPECT_THAT(stage.last_fault(), HasSubstr("no answer to AbortE in 3 s: the machine may still be moving"));
+  ASSERT_TRUE(stage.cycles_until(10s, [&] { return !stage.device->status().connected; }));
+  EXPECT_THAT(stage.last_fault(),
+              HasSubstr("no answer to AbortE in 3 s: the machine may still be moving"));
   stage.peer.hold_answers(false);
   ASSERT_TRUE(stage.state_becomes(kHeld)) << stage.state();
   EXPECT_EQ(stage.times_heard("AbortE()"), 2);
@@ -304,7 +313,7 @@ TEST(IppStop, AnUnansweredAbortIsRepeatedOnTheNextConnection) {
 
 TEST(IppStop, HomingIsAbortedWhenTheDeviceEnds) {
   IppStage stage{not_homed(20s), that_may_home()};
-  ASSERT_TRUE(stage.turns_until(5s, [&] { return stage.peer.machine().moving(); }));
+  ASSERT_TRUE(stage.cycles_until(5s, [&] { return stage.peer.machine().moving(); }));
   stage.device.reset();
   stage.peer.serve(stage.time.now());
   EXPECT_FALSE(stage.peer.machine().moving());
@@ -319,22 +328,25 @@ TEST(IppStop, TheEndOfTheDeviceWaitsForTheAnswerToItsAbort) {
   options.port = peer.port();
   auto device = IppDevice::create(options, time).value();
   std::atomic<bool> over{false};
+
   std::thread server([&] {
     while (!over) {
       peer.serve(time.now());
-      peer.say_gathered();
+      peer.send_gathered();
     }
   });
-  const auto turns_until = [&](std::string_view state) {
+
+  const auto cycles_until = [&](std::string_view state) {
     for (int i = 0; i < 10'000 && device->status().state != state; ++i) {
       device->wait(1ms);
       device->receive();
     }
     return device->status().state == state;
   };
-  EXPECT_TRUE(turns_until("ready"));
+
+  EXPECT_TRUE(cycles_until("ready"));
   device->measure({.position_m = {3.0, 4.0, 0.0}, .touch = false});
-  EXPECT_TRUE(turns_until("measuring"));
+  EXPECT_TRUE(cycles_until("measuring"));
   device.reset();
   over = true;
   server.join();
@@ -346,7 +358,7 @@ TEST(IppRelease, AnErrorOfSeverityTwoOrMoreHoldsTheMachine) {
   for (const int severity : {2, 3, 9}) {
     MovingStage stage;
     stage.inject(sim::FaultKind::ErrorReport, severity);
-    ASSERT_TRUE(stage.turns_until(1s, [&] { return stage.device->status().faults > 0; }));
+    ASSERT_TRUE(stage.cycles_until(1s, [&] { return stage.device->status().faults > 0; }));
     EXPECT_THAT(stage.last_fault(), HasSubstr("(severity " + std::to_string(severity) + ")"));
     stage.expect_stopped_and_held();
     EXPECT_TRUE(stage.device->status().connected);
@@ -357,7 +369,7 @@ TEST(IppRelease, AWarningHoldsNothing) {
   for (const int severity : {0, 1}) {
     MovingStage stage;
     stage.inject(sim::FaultKind::ErrorReport, severity);
-    ASSERT_TRUE(stage.turns_until(10s, [&] { return stage.state() == "ready"; }));
+    ASSERT_TRUE(stage.cycles_until(10s, [&] { return stage.state() == "ready"; }));
     EXPECT_EQ(stage.device->status().faults, 0u);
     EXPECT_EQ(stage.times_heard("AbortE()"), 0);
   }
@@ -366,7 +378,7 @@ TEST(IppRelease, AWarningHoldsNothing) {
 TEST(IppRelease, NothingMovesOrClearsAfterAnEmergencyStop) {
   MovingStage stage;
   stage.inject(sim::FaultKind::EmergencyStop);
-  ASSERT_TRUE(stage.turns_until(1s, [&] { return stage.device->status().faults > 0; }));
+  ASSERT_TRUE(stage.cycles_until(1s, [&] { return stage.device->status().faults > 0; }));
   EXPECT_THAT(stage.last_fault(), HasSubstr("0500 Emergency stop"));
   stage.expect_stopped_and_held();
 }
@@ -375,6 +387,7 @@ TEST(IppRelease, ARefusedTouchHoldsTheMachineUntilAPersonReleasesIt) {
   IppStage stage;
   ASSERT_TRUE(stage.state_becomes("ready")) << stage.last_fault();
   stage.device->measure({.position_m = {0.3, 0.3, 0.0}});
+
   ASSERT_TRUE(stage.state_becomes(kHeld));
   ASSERT_EQ(stage.touches.size(), 1u);
   EXPECT_TRUE(has(stage.touches[0].touch_flags, TouchFlag::NoPosition));
@@ -385,7 +398,8 @@ TEST(IppRelease, ARefusedTouchHoldsTheMachineUntilAPersonReleasesIt) {
   ASSERT_TRUE(stage.state_becomes("ready")) << stage.last_fault();
   EXPECT_EQ(stage.times_heard("ClearAllErrors()"), 1);
   stage.device->measure(on_top());
-  ASSERT_TRUE(stage.turns_until(60s, [&] { return stage.touches.size() == 2; })) << stage.last_fault();
+  ASSERT_TRUE(stage.cycles_until(60s, [&] { return stage.touches.size() == 2; }))
+      << stage.last_fault();
   EXPECT_EQ(stage.touches[1].touch_flags, 0u);
 }
 
@@ -394,7 +408,7 @@ TEST(IppRelease, TheHoldOutlivesTheConnectionAndThePowerOfTheServer) {
   stage.inject(sim::FaultKind::EmergencyStop);
   ASSERT_TRUE(stage.state_becomes(kHeld));
   stage.peer.restart(stage.time.now());
-  stage.turns_for(60s);
+  stage.cycles_for(60s);
   EXPECT_EQ(stage.state(), kHeld);
   EXPECT_FALSE(stage.device->status().connected);
   EXPECT_THAT(stage.peer.machine().heard(), testing::IsEmpty());
@@ -407,10 +421,10 @@ TEST(IppRelease, AReleaseWhileTheEmergencyStopIsPressedHoldsAgain) {
   stage.peer.machine().press_emergency_stop(stage.time.now(), stage.time.now() + 20s);
   ASSERT_TRUE(stage.state_becomes(kHeld));
   stage.device->release();
-  stage.turns_for(1s);
+  stage.cycles_for(1s);
   ASSERT_EQ(stage.state(), kHeld);
   EXPECT_THAT(stage.last_fault(), HasSubstr("ClearAllErrors was refused: 0500 Emergency stop"));
-  stage.turns_for(20s);
+  stage.cycles_for(20s);
   stage.device->release();
   EXPECT_TRUE(stage.state_becomes("ready")) << stage.last_fault();
 }
@@ -418,7 +432,7 @@ TEST(IppRelease, AReleaseWhileTheEmergencyStopIsPressedHoldsAgain) {
 TEST(IppRelease, AReleaseWithoutAHoldDoesNothing) {
   MovingStage stage;
   stage.device->release();
-  ASSERT_TRUE(stage.turns_until(10s, [&] { return stage.state() == "ready"; }));
+  ASSERT_TRUE(stage.cycles_until(10s, [&] { return stage.state() == "ready"; }));
   EXPECT_EQ(stage.times_heard("ClearAllErrors()"), 0);
   EXPECT_EQ(stage.times_heard("AbortE()"), 0);
 }
@@ -438,7 +452,7 @@ TEST(IppRelease, AMachineThatLostItsHomeIsNotSentHomeWithoutARelease) {
 TEST(IppDevice, AnErrorTextInAnyCharacterSetIsReadAndShownEscaped) {
   MovingStage stage;
   stage.inject(sim::FaultKind::NotAscii);
-  ASSERT_TRUE(stage.turns_until(10s, [&] { return stage.state() == "ready"; }));
+  ASSERT_TRUE(stage.cycles_until(10s, [&] { return stage.state() == "ready"; }));
   EXPECT_EQ(stage.device->status().faults, 0u);
   stage.peer.send("E0000 ! Error(2,1001,Maschine,\"Ber\xFChrung\")\r\n");
   ASSERT_TRUE(stage.state_becomes(kHeld));

@@ -94,7 +94,8 @@ TEST(KernelStampMap, CountsWhatItDidNotBelieve) {
 
 TEST(KernelStampMap, NoticesAStepTooSmallForTheAgeToShow) {
   KernelStampMap map = begun();
-  // stamped, then the wall clock was put forward by 100 ms: the age would be 101 ms of 300 possible ones
+  // stamped, then the wall clock was put forward by 100 ms: the age would be 101 ms of 300 possible
+  // ones
   const Arrival a = map.arrival(kWall + 10299ms, at(10300ms, 100ms), HostTime{10300ms});
   EXPECT_TRUE(a.widened);
   EXPECT_EQ(a.time, HostTime{10300ms});
@@ -109,8 +110,8 @@ TEST(KernelStampMap, BelievesStampsAgainAfterAStep) {
   EXPECT_EQ(a.time, HostTime{10599ms});
 }
 
-/// Two minutes of bursts, stamped by the kernel 0.2 ms before user space reads both clocks; the wall clock is
-/// stepped by `step` after one minute. Where the model then puts an instant.
+/// Two minutes of bursts, stamped by the kernel 0.2 ms before user space reads both clocks; the
+/// wall clock is stepped by `step` after one minute. Where the model then puts an instant.
 HostTime mapped_with_step(nanoseconds step) {
   BurstProfile profile(5, {});
   KernelStampMap map;

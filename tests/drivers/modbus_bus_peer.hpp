@@ -1,6 +1,7 @@
 #pragma once
-/// Several simulated Modbus slaves on one pseudo terminal, or behind one gateway's port: the same registers
-/// in each; every one may be mute or late. A gateway and a line carry one request at a time.
+/// Several simulated Modbus slaves on one pseudo terminal, or behind one gateway's port: the same
+/// registers in each; every one may be mute or late. A gateway and a line carry one request at a
+/// time.
 
 #include <chrono>
 #include <cstdint>
@@ -20,7 +21,9 @@ class ModbusBusPeer {
     std::chrono::nanoseconds late{};
   };
 
-  explicit ModbusBusPeer(modbus::Transport transport) : wire_(transport) { wire_.proving_from = 0xFFFF; }
+  explicit ModbusBusPeer(modbus::Transport transport) : wire_(transport) {
+    wire_.proving_from = 0xFFFF;
+  }
 
   [[nodiscard]] drivers::ModbusAddress address() const { return wire_.address(); }
   [[nodiscard]] std::size_t connections() const { return wire_.connections; }
@@ -37,7 +40,8 @@ class ModbusBusPeer {
       const auto slave = slaves.find(wire_.asked()->unit);
       const auto bytes = wire_.take_answer();
       answer_.reset();
-      if (slave != slaves.end() && !slave->second.mute) answer_.emplace(now + slave->second.late, bytes);
+      if (slave != slaves.end() && !slave->second.mute)
+        answer_.emplace(now + slave->second.late, bytes);
     }
     if (!answer_ || now < answer_->first) return;
     wire_.send(answer_->second);

@@ -1,7 +1,7 @@
 #pragma once
-/// A Modbus device in the test's own thread, on a listening socket of 127.0.0.1 or on a pseudo terminal, with
-/// its answers in the test's hands: proving registers are answered at once, measured ones when the test says
-/// so. Nothing happens but in the functions a test calls.
+/// A Modbus device in the test's own thread, on a listening socket of 127.0.0.1 or on a pseudo
+/// terminal, with its answers in the test's hands: proving registers are answered at once, measured
+/// ones when the test says so. Nothing happens but in the functions a test calls.
 
 #include <arpa/inet.h>
 #include <fcntl.h>
@@ -62,21 +62,25 @@ class ModbusPeer {
   /// Lets a client in, hears it.
   void serve() {
     if (listener_) {
-      sim::Socket accepted(::accept4(listener_.get(), nullptr, nullptr, SOCK_NONBLOCK | SOCK_CLOEXEC));
+      sim::Socket accepted(
+          ::accept4(listener_.get(), nullptr, nullptr, SOCK_NONBLOCK | SOCK_CLOEXEC));
       if (accepted) {
         wire_ = std::move(accepted);
         ++connections;
         asked_.reset();
         const int yes =
-            1;  // else bytes after an answer wait for a delayed ACK, in a time the test does not have
+            // else bytes after an answer wait for a delayed ACK, in a time the test does not have
+            1;
         ::setsockopt(wire_.get(), IPPROTO_TCP, TCP_NODELAY, &yes, sizeof yes);
       }
     }
+
     std::array<std::byte, 256> bytes{};
     const auto n = wire_ ? ::read(wire_.get(), bytes.data(), bytes.size()) : 0;
     if (n <= 0) return;
     const auto request =
         modbus::decode_request(std::span{bytes}.first(static_cast<std::size_t>(n)), transport_);
+
     ASSERT_TRUE(request) << modbus::name_of(request.error());
     ++requests;
     asked_ = *request;
@@ -111,11 +115,13 @@ class ModbusPeer {
       ASSERT_EQ(::listen(listener_.get(), 4), 0);
       return;
     }
+
     wire_ = sim::Socket(posix_openpt(O_RDWR | O_NOCTTY | O_NONBLOCK | O_CLOEXEC));
     ASSERT_TRUE(wire_);
     ASSERT_EQ(grantpt(wire_.get()), 0);
     ASSERT_EQ(unlockpt(wire_.get()), 0);
     std::array<char, 64> path{};
+
     ASSERT_EQ(ptsname_r(wire_.get(), path.data(), path.size()), 0);
     client_end_ = sim::Socket(::open(path.data(), O_RDWR | O_NOCTTY | O_CLOEXEC));
     termios raw{};

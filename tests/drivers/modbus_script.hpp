@@ -25,11 +25,14 @@ inline ModbusBytes modbus_frame(modbus::Transport transport, const modbus::ReadR
     writer.zeros(4);
     writer.big(static_cast<std::uint16_t>(2 + rest.size()));
   }
+
   writer.big(to.unit);
-  writer.big(static_cast<std::uint8_t>(static_cast<std::uint8_t>(to.function) | (exception ? 0x80u : 0u)));
+  writer.big(
+      static_cast<std::uint8_t>(static_cast<std::uint8_t>(to.function) | (exception ? 0x80u : 0u)));
   writer.put(rest);
   if (transport == modbus::Transport::Rtu) writer.little(modbus::crc16(writer.written()));
   bytes.resize(writer.size());
+
   return bytes;
 }
 
@@ -51,19 +54,23 @@ inline ModbusBytes modbus_exception(modbus::Transport transport, const modbus::R
   return modbus_frame(transport, to, rest, true);
 }
 
-/// Air temperature at 10 and pressure at 11 in tenths, temperature 3 at 30; serial number in BCD at 100.
+/// Air temperature at 10 and pressure at 11 in tenths, temperature 3 at 30; serial number in BCD at
+/// 100.
 inline drivers::RegisterMap small_map(std::uint8_t unit = 7) {
   using drivers::Quantity;
-  const auto at = [unit](std::uint16_t address, modbus::RegisterType type = modbus::RegisterType::Int16) {
+  const auto at = [unit](std::uint16_t address,
+                         modbus::RegisterType type = modbus::RegisterType::Int16) {
     return drivers::RegisterPlace{unit, modbus::Function::ReadHoldingRegisters, address, type,
                                   modbus::WordOrder::HighFirst};
   };
+
   drivers::RegisterMap map;
   map.name = "small";
   map.measured = {{"air temperature", Quantity::AirTemperature, 0, at(10), 0.1, 273.15, {}},
                   {"air pressure", Quantity::AirPressure, 0, at(11), 10.0, 0.0, {}},
                   {"part", Quantity::Temperature, 3, at(30), 0.1, 273.15, {-32768.0}}};
   map.proving = {{"serial number", at(100, modbus::RegisterType::Bcd32), 12345678.0}};
+
   return map;
 }
 inline std::map<std::uint16_t, std::uint16_t> small_registers() {

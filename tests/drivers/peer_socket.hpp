@@ -12,8 +12,8 @@
 
 namespace abbe::tests {
 
-/// A TCP socket on `port` of 127.0.0.1; 0: the kernel chooses. Two may hold one port: a peer keeps it with a
-/// second socket, so that the port stays its own while it is unplugged.
+/// A TCP socket on `port` of 127.0.0.1; 0: the kernel chooses. Two may hold one port: a peer keeps
+/// it with a second socket, so that the port stays its own while it is unplugged.
 inline sim::Socket bound_socket(std::uint16_t port) {
   sim::Socket s(::socket(AF_INET, SOCK_STREAM | SOCK_NONBLOCK | SOCK_CLOEXEC, 0));
   const int yes = 1;

@@ -112,18 +112,20 @@ TEST(SampleRing, KeepsTheBeginningOfABatchThatDoesNotFit) {
   EXPECT_EQ(pop_all(ring)[0].head.lost_before, 8u);
 }
 
-// Writer and reader in two threads, the ring too small on purpose: what arrives plus what is marked as lost
-// is all.
+// Writer and reader in two threads, the ring too small on purpose: what arrives plus what is marked
+// as lost is all.
 TEST(SampleRing, LosesNothingUncountedBetweenTwoThreads) {
   constexpr std::uint32_t kSamples = 200'000;
   SampleRing<ProbeTrigger> ring(64);
   std::thread writer([&] {
     for (std::uint32_t i = 0; i < kSamples; ++i) ring.try_push(touch(i));
   });
+
   std::uint64_t taken = 0;
   std::uint64_t wrong = 0;
   std::array<ProbeTrigger, 16> out{};
   std::uint32_t expected = 0;
+
   const auto take = [&] {
     const std::size_t n = ring.pop(out);
     for (std::size_t i = 0; i < n; ++i) {
@@ -133,9 +135,11 @@ TEST(SampleRing, LosesNothingUncountedBetweenTwoThreads) {
     taken += n;
     return n;
   };
+
   while (taken + ring.dropped() < kSamples) {
     if (take() == 0) std::this_thread::yield();
   }
+
   writer.join();
   while (take() != 0) {
   }
@@ -158,14 +162,15 @@ std::vector<RawBlock> pop_all(RawRing& ring) {
 TEST(RawRing, KeepsAShortReadInOneBlock) {
   RawRing ring(4);
   const auto bytes = numbered_bytes(100);
-  ASSERT_TRUE(ring.push_bytes(HostTime{std::chrono::seconds{7}}, RawBlock::Direction::ToDevice, bytes));
+  ASSERT_TRUE(
+      ring.push_bytes(HostTime{std::chrono::seconds{7}}, RawBlock::Direction::ToDevice, bytes));
   const auto out = pop_all(ring);
   ASSERT_EQ(out.size(), 1u);
   EXPECT_EQ(out[0].time, HostTime{std::chrono::seconds{7}});
   EXPECT_EQ(out[0].direction, RawBlock::Direction::ToDevice);
   EXPECT_FALSE(out[0].continued);
-  EXPECT_TRUE(
-      std::equal(bytes.begin(), bytes.end(), out[0].bytes.begin(), out[0].bytes.begin() + out[0].length));
+  EXPECT_TRUE(std::equal(bytes.begin(), bytes.end(), out[0].bytes.begin(),
+                         out[0].bytes.begin() + out[0].length));
 }
 
 TEST(RawRing, CutsALongReadIntoContinuedBlocks) {
@@ -184,8 +189,8 @@ TEST(RawRing, CutsALongReadIntoContinuedBlocks) {
 
 TEST(RawRing, EndsAReadOfExactlyOneBlock) {
   RawRing ring(2);
-  ASSERT_TRUE(
-      ring.push_bytes(HostTime{}, RawBlock::Direction::FromDevice, numbered_bytes(RawBlock::kCapacity)));
+  ASSERT_TRUE(ring.push_bytes(HostTime{}, RawBlock::Direction::FromDevice,
+                              numbered_bytes(RawBlock::kCapacity)));
   const auto out = pop_all(ring);
   ASSERT_EQ(out.size(), 1u);
   EXPECT_FALSE(out[0].continued);

@@ -1,6 +1,6 @@
 #pragma once
-/// A scale with distance-coded marks, made from its drawing: fixed marks every N, the k-th coded mark k + 1
-/// beyond the middle. Knows nothing of how they are decoded.
+/// A scale with distance-coded marks, made from its drawing: fixed marks every N, the k-th coded
+/// mark k + 1 beyond the middle. Knows nothing of how they are decoded.
 
 #include <algorithm>
 #include <cstdint>
@@ -10,8 +10,8 @@
 
 namespace abbe::tests {
 
-/// Positions of all marks in periods, in order. Rotary: of `turns` revolutions, the zero mark again each
-/// time.
+/// Positions of all marks in periods, in order. Rotary: of `turns` revolutions, the zero mark again
+/// each time.
 inline std::vector<std::int64_t> marks_of(const drivers::DistanceCode& code, int turns = 1) {
   std::vector<std::int64_t> marks;
   for (int turn = 0; turn < (code.rotary ? turns : 1); ++turn) {
@@ -21,9 +21,11 @@ inline std::vector<std::int64_t> marks_of(const drivers::DistanceCode& code, int
       marks.push_back(zero + k * code.increment + code.increment / 2 + k + 1);
     }
   }
+
   if (!code.rotary) {
     while (marks.back() > code.length) marks.pop_back();
   }
+
   std::sort(marks.begin(), marks.end());
   return marks;
 }

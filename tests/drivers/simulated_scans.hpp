@@ -1,7 +1,7 @@
 #pragma once
-/// Scans of a counter card that watches a probe touch again and again, computed from the truth: constant
-/// speed through each contact, scales that count, a clock that counts, a latch, an edge counter. Knows
-/// nothing of how touches are found.
+/// Scans of a counter card that watches a probe touch again and again, computed from the truth:
+/// constant speed through each contact, scales that count, a clock that counts, a latch, an edge
+/// counter. Knows nothing of how touches are found.
 
 #include <array>
 #include <cmath>
@@ -28,20 +28,23 @@ struct SimulatedProbe {
   std::int64_t latch_wrong_by = 0;  ///< counts added to every latch
 };
 
-/// One approach of 4 ms, retract at twice the speed, again after 6 ms; contact in its middle, where exactly
-/// is drawn.
+/// One approach of 4 ms, retract at twice the speed, again after 6 ms; contact in its middle, where
+/// exactly is drawn.
 class SimulatedScans {
  public:
   static constexpr double kPeriod_s = 6e-3;
   static constexpr double kForward_s = 4e-3;
 
-  SimulatedScans(const SimulatedProbe& probe, unsigned seed) : probe_(probe), random_(seed) { draw(); }
+  SimulatedScans(const SimulatedProbe& probe, unsigned seed) : probe_(probe), random_(seed) {
+    draw();
+  }
 
   drivers::CounterScan next() {
     if (t_ >= 6e-3 * static_cast<double>(touch_ + 1)) {
       ++touch_;
       draw();
     }
+
     drivers::CounterScan s;
     while (!edges_.empty() && edges_.front() <= t_) {
       ++edge_count_;
@@ -49,18 +52,22 @@ class SimulatedScans {
       latch_ = count(edges_.front()) + probe_.latch_wrong_by;
       edges_.erase(edges_.begin());
     }
+
     s.axes.head.time = protocol::HostTime{std::chrono::hours{1} + ns(t_)};
     s.axes.cycle = cycle_++;
     s.axes.axis_count = 3;
+
     for (std::size_t i = 0; i < 3; ++i) {
       s.axes.count[i] = std::llround(position(i, t_) / probe_.count_m);
       s.axes.position[i] = static_cast<double>(s.axes.count[i]) * probe_.count_m;
     }
+
     s.clock_count = count(t_);
     s.latched = latched_ && probe_.latch_wired;
     s.latch_count = s.latched ? latch_ : 0;
     s.edge_count = edge_count_;
     t_ += probe_.scan_period_s;
+
     return s;
   }
 
@@ -69,7 +76,9 @@ class SimulatedScans {
   [[nodiscard]] double contact_m(std::size_t axis) const { return position(axis, contact_); }
   [[nodiscard]] std::uint32_t touch() const { return touch_; }
   [[nodiscard]] double now_s() const { return t_; }
-  static std::chrono::nanoseconds ns(double s) { return std::chrono::nanoseconds{std::llround(1e9 * s)}; }
+  static std::chrono::nanoseconds ns(double s) {
+    return std::chrono::nanoseconds{std::llround(1e9 * s)};
+  }
 
  private:
   void draw() {

@@ -31,6 +31,7 @@ TEST(StatusBoard, ReadsBackWhatWasWritten) {
   board.set_last_sample(HostTime{8s});
   board.set_clock({.settled = true, .skew = 1e-6, .restarts = 2});
   const auto s = board.read("tracker", 4, 5);
+
   EXPECT_EQ(s.name, "tracker");
   EXPECT_EQ(s.state, "streaming");
   EXPECT_TRUE(s.connected);
@@ -66,11 +67,13 @@ TEST(FaultText, NeverShowsPartsOfTwo) {
     for (char c = 'a'; !stop; c = c == 'z' ? 'a' : static_cast<char>(c + 1))
       text.set(HostTime{}, std::string(150, c));
   });
+
   int torn = 0;
   for (int i = 0; i < 2000; ++i) {
     const std::string seen = text.read().text;
     if (!seen.empty() && seen != std::string(150, seen[0])) ++torn;
   }
+
   stop = true;
   writer.join();
   EXPECT_EQ(torn, 0);

@@ -34,7 +34,8 @@ TouchOptions options_for(const SimulatedProbe& probe) {
   return o;
 }
 
-/// Runs `touches` approaches; on_touch(trigger, scans) is called while the approach is still going on.
+/// Runs `touches` approaches; on_touch(trigger, scans) is called while the approach is still going
+/// on.
 template <class OnTouch>
 void run(SimulatedScans& scans, TouchDetector& detector, std::uint32_t touches, OnTouch on_touch) {
   while (scans.touch() < touches) {
@@ -53,7 +54,8 @@ std::vector<ProbeTrigger> touches_of(const SimulatedProbe& probe, const TouchOpt
   return out;
 }
 
-/// Errors of 10,000 touches at 4 mm/s, along the approach, and how often an axis lies in its 95 % interval.
+/// Errors of 10,000 touches at 4 mm/s, along the approach, and how often an axis lies in its 95 %
+/// interval.
 struct Figure {
   std::size_t touches = 0;
   double max_m = 0.0;
@@ -68,6 +70,7 @@ Figure measured(const SimulatedProbe& probe, const TouchOptions& options, unsign
   std::size_t intervals = 0;
   std::size_t held = 0;
   double sum = 0.0;
+
   run(scans, detector, 10'000, [&](const ProbeTrigger& t) {
     double error = 0.0;
     for (std::size_t i = 0; i < 3; ++i) {
@@ -81,11 +84,13 @@ Figure measured(const SimulatedProbe& probe, const TouchOptions& options, unsign
     sum += error * error;
     f.max_m = std::max(f.max_m, std::abs(error));
   });
+
   f.rms_m = std::sqrt(sum / static_cast<double>(f.touches));
   f.covered = static_cast<double>(held) / static_cast<double>(intervals);
   ::testing::Test::RecordProperty("max_nm", std::to_string(1e9 * f.max_m));
   ::testing::Test::RecordProperty("rms_nm", std::to_string(1e9 * f.rms_m));
   ::testing::Test::RecordProperty("covered", std::to_string(f.covered));
+
   return f;
 }
 
@@ -112,7 +117,8 @@ TEST(TouchDetectorFigure, ACoarseClockWidensTheStatedInterval) {
   const SimulatedProbe probe{.jitter_s = 0.2e-6, .clock_hz = 1e6, .count_m = 1e-9};
   const Figure f = measured(probe, options_for(probe), 13);
   EXPECT_GE(f.covered, 0.93);
-  EXPECT_LE(f.covered, 0.98);  // the clock's triangle is a little lighter in its tails than a normal
+  EXPECT_LE(f.covered,
+            0.98);  // the clock's triangle is a little lighter in its tails than a normal
 }
 
 TEST(TouchDetector, SubtractsTheDelayOfARadioProbe) {
@@ -122,8 +128,8 @@ TEST(TouchDetector, SubtractsTheDelayOfARadioProbe) {
   run(scans, detector, 20, [&](const ProbeTrigger& t) {
     // 20 nm: the counts of two axes, the clock; without the delay it would be 2 um.
     EXPECT_NEAR(t.position[0], scans.contact_m(0), 20e-9);
-    EXPECT_NEAR(1e-9 * static_cast<double>((t.head.time.time_since_epoch() - 1h).count()), scans.contact_s(),
-                1e-6);
+    EXPECT_NEAR(1e-9 * static_cast<double>((t.head.time.time_since_epoch() - 1h).count()),
+                scans.contact_s(), 1e-6);
   });
   EXPECT_EQ(detector.counters().touches.value(), 20u);
 }
@@ -142,9 +148,11 @@ TEST(TouchDetector, FlagsASpeedThatTheProbeWasNotQualifiedFor) {
   const SimulatedProbe probe;
   TouchOptions options = options_for(probe);
   options.approach.max_speed_m_s = 3e-3;
-  for (const auto& t : touches_of(probe, options, 3)) EXPECT_EQ(t.touch_flags, 0u | TouchFlag::SpeedTooHigh);
+  for (const auto& t : touches_of(probe, options, 3))
+    EXPECT_EQ(t.touch_flags, 0u | TouchFlag::SpeedTooHigh);
   options.approach = {.min_speed_m_s = 5e-3, .max_speed_m_s = 1.0, .speed_window = 1ms};
-  for (const auto& t : touches_of(probe, options, 3)) EXPECT_EQ(t.touch_flags, 0u | TouchFlag::SpeedTooLow);
+  for (const auto& t : touches_of(probe, options, 3))
+    EXPECT_EQ(t.touch_flags, 0u | TouchFlag::SpeedTooLow);
 }
 
 TEST(TouchDetector, FlagsAnApproachThatIsNotSteady) {
@@ -172,6 +180,7 @@ TEST(TouchDetector, WidensTheIntervalWhenTheFirstEdgeWasOverwritten) {
   TouchDetector detector{options_for(probe)};
   std::size_t widened = 0;
   double widest = 0.0;
+
   run(scans, detector, 20, [&](const ProbeTrigger& t) {
     if (t.latch == TouchLatch::Clock) return;
     ++widened;
@@ -179,6 +188,7 @@ TEST(TouchDetector, WidensTheIntervalWhenTheFirstEdgeWasOverwritten) {
     EXPECT_NEAR(t.position[2], scans.contact_m(2), 1.5 * t.U95_position[2]);
     widest = std::max(widest, t.U95_position[2]);
   });
+
   EXPECT_GT(widened, 10u);
   EXPECT_GT(widest, 2e-8);  // of a latched touch: 1e-8
 }
@@ -215,6 +225,7 @@ TEST(TouchDetector, KeepsTheScansAroundEveryTouch) {
   SimulatedScans scans{probe, 5};
   TouchDetector detector{options_for(probe)};
   std::vector<TouchScan> window;
+
   while (scans.touch() < 3) {
     detector.on_scan(scans.next());
     std::array<TouchScan, 8> out;
@@ -222,8 +233,10 @@ TEST(TouchDetector, KeepsTheScansAroundEveryTouch) {
     for (std::size_t i = 0; i < n; ++i)
       if (out[i].touch == 2) window.push_back(out[i]);
   }
+
   ASSERT_NEAR(static_cast<double>(window.size()), 1.5e-3 * 33'333.0, 2.0);
-  for (std::size_t i = 1; i < window.size(); ++i) EXPECT_LT(window[i - 1].clock_count, window[i].clock_count);
+  for (std::size_t i = 1; i < window.size(); ++i)
+    EXPECT_LT(window[i - 1].clock_count, window[i].clock_count);
   EXPECT_LT(window.front().edge_count, window.back().edge_count);
 }
 
@@ -232,13 +245,16 @@ TEST(TouchDetector, SaysThatThereIsNoPositionWhereScansWereLost) {
   SimulatedScans scans{probe, 6};
   TouchDetector detector{options_for(probe)};
   std::vector<ProbeTrigger> out;
+
   while (scans.touch() < 2) {
     const auto scan = scans.next();
-    if (std::abs(scans.now_s() - scans.contact_s()) < 200e-6 && scans.touch() == 0) continue;  // lost
+    if (std::abs(scans.now_s() - scans.contact_s()) < 200e-6 && scans.touch() == 0)
+      continue;  // lost
     detector.on_scan(scan);
     std::array<ProbeTrigger, 1> one;
     if (detector.touches().pop(one) == 1) out.push_back(one[0]);
   }
+
   ASSERT_EQ(out.size(), 2u);
   EXPECT_TRUE(has(out[0].touch_flags, TouchFlag::NoPosition));
   EXPECT_TRUE(has(out[0].head.flags, SampleFlag::AxisMissing));
@@ -251,13 +267,16 @@ TEST(TouchDetector, MarksTheFirstTouchAfterARestartOfTheCard) {
   TouchDetector detector{options_for(probe)};
   std::vector<ProbeTrigger> out;
   bool restarted = false;
+
   while (scans.touch() < 4) {
     auto scan = scans.next();
-    if (scans.touch() == 2 && !std::exchange(restarted, true)) scan.axes.head.flags |= SampleFlag::Restarted;
+    if (scans.touch() == 2 && !std::exchange(restarted, true))
+      scan.axes.head.flags |= SampleFlag::Restarted;
     detector.on_scan(scan);
     std::array<ProbeTrigger, 1> one;
     if (detector.touches().pop(one) == 1) out.push_back(one[0]);
   }
+
   ASSERT_EQ(out.size(), 4u);
   EXPECT_FALSE(has(out[1].head.flags, SampleFlag::Restarted));
   EXPECT_TRUE(has(out[2].head.flags, SampleFlag::Restarted));
@@ -273,12 +292,13 @@ TEST(TouchDetector, UsesTheLatchedFirstEdgeOfADebouncedCounter) {
   TouchDetector detector{options};
   std::vector<drivers::CounterScan> late;  // the counter as it was 700 us ago
   std::size_t touches = 0;
+
   while (scans.touch() < 5) {
     auto scan = scans.next();
     late.push_back(scan);
-    const auto counted = std::find_if(late.rbegin(), late.rend(), [&](const drivers::CounterScan& s) {
-      return scan.clock_count - s.clock_count >= 7'000;
-    });
+    const auto counted = std::find_if(
+        late.rbegin(), late.rend(),
+        [&](const drivers::CounterScan& s) { return scan.clock_count - s.clock_count >= 7'000; });
     scan.edge_count = counted == late.rend() ? 0 : counted->edge_count;
     detector.on_scan(scan);
     std::array<ProbeTrigger, 1> one;
@@ -287,6 +307,7 @@ TEST(TouchDetector, UsesTheLatchedFirstEdgeOfADebouncedCounter) {
     EXPECT_EQ(one[0].latch, TouchLatch::Clock);
     EXPECT_NEAR(one[0].position[2], scans.contact_m(2), 20e-9);
   }
+
   EXPECT_EQ(touches, 5u);
 }
 

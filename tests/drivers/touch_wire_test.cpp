@@ -1,7 +1,7 @@
-// Touches through the simulated card's wire: a probe on the index of a latch channel, USB/IP, driver,
-// detector, against the time and place of the contact that the simulation knows. The long figure (10,000
-// touches) runs on computed scans in touch_detector_test.cpp; here are enough for the wire to show what it
-// does.
+// Touches through the simulated card's wire: a probe on the index of a latch channel, USB/IP,
+// driver, detector, against the time and place of the contact that the simulation knows. The long
+// figure (10,000 touches) runs on computed scans in touch_detector_test.cpp; here are enough for
+// the wire to show what it does.
 
 #include <gtest/gtest.h>
 
@@ -23,7 +23,8 @@ constexpr double kProbing_m_s = 4e-3;
 constexpr double kCount_m = 2e-9;
 constexpr double kPeriod_s = 6e-3;
 constexpr double kForward_s = 4e-3;
-constexpr HostTime kBegin = HostTime{1h} + 500ms;  // the card is set up by then, the axis standing at zero
+// the card is set up by then, the axis standing at zero
+constexpr HostTime kBegin = HostTime{1h} + 500ms;
 constexpr std::uint32_t kTouches = 600;
 
 /// Forward at the probing speed, back at twice of it, again and again.
@@ -36,7 +37,8 @@ double place_m(HostTime t) {
 
 sim::CounterCardOptions card_with_a_probe(double clock_hz) {
   sim::CounterCardOptions card = simulated_card();
-  card.channels[0].phases = sim::ScaleSignal{.reading = place_m, .step = kCount_m, .noise = 0.0, .marks = {}};
+  card.channels[0].phases =
+      sim::ScaleSignal{.reading = place_m, .step = kCount_m, .noise = 0.0, .marks = {}};
   card.channels[5].phases = sim::ClockSignal{.hz = clock_hz};
   card.channels[6] = {sim::ClockSignal{.hz = clock_hz}, true};
   return card;
@@ -82,7 +84,7 @@ TEST(TouchOverTheWire, LatchedTouchesLieWithinTheirIntervals) {
       contacts.push_back(kBegin + sim::seconds_to_ns(next_s + where(random)));
       bench.server.card().add_probe_edge(contacts.back() + sim::seconds_to_ns(jitter(random)));
     }
-    bench.turn();
+    bench.cycle();
     for (; scans_taken < bench.keeper.scans.size(); ++scans_taken)
       detector.on_scan(bench.keeper.scans[scans_taken]);
     bench.keeper.scans.clear();

@@ -9,12 +9,15 @@ using namespace std::chrono_literals;
 
 class FaultyTracker {
  public:
-  static constexpr std::chrono::nanoseconds kTurn = 200ms;  // bursts come every 324 to 344 ms
+  static constexpr std::chrono::nanoseconds kCycle = 200ms;  // bursts come every 324 to 344 ms
   static constexpr std::chrono::nanoseconds kSilenceLimit = 1500ms;
-  static constexpr std::chrono::nanoseconds kRecoveryLimit = 40s;  // a pause, set-up 6 s, Initialize 2 s
+  // a pause, set-up 6 s, Initialize 2 s
+  static constexpr std::chrono::nanoseconds kRecoveryLimit = 40s;
   static constexpr bool kTornCanBeFinished = true;
 
-  static std::set<std::string_view> shown(Fault fault) { return shown_over_tcp(fault, "streaming"); }
+  static std::set<std::string_view> shown(Fault fault) {
+    return shown_over_tcp(fault, "streaming");
+  }
 
   drivers::Device& device() { return *device_; }
   drivers::SteppedTime& time() { return time_; }
@@ -25,14 +28,14 @@ class FaultyTracker {
     }
   }
   void serve() { peer_.serve(time_.now()); }
-  void say_valid() {
-    if (!holding_) peer_.say_points();
+  void send_valid() {
+    if (!holding_) peer_.send_points();
   }
   void hold_back() { holding_ = true; }
   void send_held() {
     holding_ = false;
     peer_.forget_all_but_the_latest();
-    peer_.say_points();
+    peer_.send_points();
   }
   void send_torn() { peer_.send_torn(); }
   void finish_torn() { peer_.finish_torn(); }
@@ -55,7 +58,8 @@ class FaultyTracker {
   drivers::SteppedTime time_;
   tracker::TrackerPeer peer_{time_.now()};
   bool holding_ = false;
-  std::unique_ptr<drivers::TrackerDevice> device_ = drivers::TrackerDevice::create(options(), time_).value();
+  std::unique_ptr<drivers::TrackerDevice> device_ =
+      drivers::TrackerDevice::create(options(), time_).value();
 };
 
 INSTANTIATE_TYPED_TEST_SUITE_P(Tracker, DriverConformance, FaultyTracker);

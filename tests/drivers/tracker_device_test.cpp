@@ -17,7 +17,8 @@ using testing::HasSubstr;
 
 class TrackerDeviceTest : public testing::Test {
  protected:
-  explicit TrackerDeviceTest(const sim::TrackerOptions& options = {}) : peer_(time_.now(), options) {}
+  explicit TrackerDeviceTest(const sim::TrackerOptions& options = {})
+      : peer_(time_.now(), options) {}
 
   TrackerDeviceOptions options() const {
     TrackerDeviceOptions o;
@@ -27,10 +28,10 @@ class TrackerDeviceTest : public testing::Test {
   }
   void make_device() { device_ = TrackerDevice::create(options(), time_).value(); }
 
-  void turn() {
+  void cycle() {
     if (served_) {
       peer_.serve(time_.now());
-      peer_.say_points();
+      peer_.send_points();
     }
     device_->wait(20ms);
     device_->receive();
@@ -38,13 +39,13 @@ class TrackerDeviceTest : public testing::Test {
     collect();
   }
   void run(std::chrono::nanoseconds duration) {
-    for (const auto end = time_.now() + duration; time_.now() < end;) turn();
+    for (const auto end = time_.now() + duration; time_.now() < end;) cycle();
   }
   /// False if 60 s pass without it.
   bool run_until_state(std::string_view state) {
     for (const auto end = time_.now() + 60s; device_->status().state != state;) {
       if (time_.now() >= end) return false;
-      turn();
+      cycle();
     }
     return true;
   }
@@ -52,7 +53,7 @@ class TrackerDeviceTest : public testing::Test {
   void hold_up(std::chrono::nanoseconds duration) {
     for (const auto end = time_.now() + duration; time_.now() < end; time_.advance(20ms)) {
       peer_.serve(time_.now());
-      peer_.say_points();
+      peer_.send_points();
     }
   }
   void collect() {
@@ -113,12 +114,13 @@ TEST_F(TrackerDeviceTest, ComesBackAfterALostBeamOnTheSameConnection) {
   run(5s);
   const auto before = points_.size();
   peer_.controller().inject({sim::FaultKind::BeamBreak, 0.0, 3.0, 0.0, 0}, time_.now());
+
   ASSERT_TRUE(run_until_state("beam lost"));
   ASSERT_TRUE(run_until_state("streaming"));
   run(2s);
-  const auto returned = std::find_if(points_.begin() + before, points_.end(), [](const TrackerPoint& p) {
-    return has(p.head.flags, SampleFlag::BeamReturned);
-  });
+  const auto returned = std::find_if(
+      points_.begin() + before, points_.end(),
+      [](const TrackerPoint& p) { return has(p.head.flags, SampleFlag::BeamReturned); });
   ASSERT_NE(returned, points_.end());
   EXPECT_GT(points_.end() - returned, 500);
   EXPECT_EQ(device_->status().faults, 0u);
@@ -133,6 +135,7 @@ TEST_F(TrackerDeviceTest, RawBytesGiveTheSamePointsAgain) {
   run(15s);
   TrackerReceiver receiver{receiver_options(options())};
   std::vector<TrackerPoint> again;
+
   for (const RawBlock& block : raw_) {
     if (block.direction != RawBlock::Direction::FromDevice) continue;
     receiver.push(std::span{block.bytes}.first(block.length), block.time);
@@ -141,6 +144,7 @@ TEST_F(TrackerDeviceTest, RawBytesGiveTheSamePointsAgain) {
         again.insert(again.end(), b->points.begin(), b->points.end());
     }
   }
+
   ASSERT_GT(points_.size(), 3'000u);
   ASSERT_EQ(again.size(), points_.size());
   for (std::size_t k = 0; k < again.size(); ++k) {
@@ -167,8 +171,8 @@ TEST_F(TrackerDeviceTest, RecordsWhatItAsked) {
 
 TEST_F(TrackerDeviceTest, SaysWhatAnsweredInsteadOfATracker) {
   make_device();
-  turn();
-  turn();
+  cycle();
+  cycle();
   ASSERT_TRUE(peer_.connected());
   peer_.send("HTTP/1.1 400 Bad Request\r\n\r\n");
   run(60ms);
@@ -267,7 +271,8 @@ TEST_F(FastClock, IsReportedByNameAndItsPointsAreMarked) {
   EXPECT_THAT(status.last_fault, HasSubstr("ppm fast, a sound one at most 200 ppm"));
   EXPECT_EQ(status.faults, 1u);
   EXPECT_TRUE(has(points_.back().head.flags, SampleFlag::ClockUnsettled));
-  EXPECT_GT(points_.back().head.u_time, 4ms);  // 100 ppm over a minute are 6 ms, less what the scatter hides
+  EXPECT_GT(points_.back().head.u_time,
+            4ms);  // 100 ppm over a minute are 6 ms, less what the scatter hides
 }
 
 class ColdTracker : public TrackerDeviceTest {

@@ -1,7 +1,8 @@
 #pragma once
-/// The simulated tracker controller on a listening socket of 127.0.0.1, in the test's own thread, with its
-/// point packets in the test's hands: they are gathered, and sent, held back or torn as the test says;
-/// answers and events go out at once. Nothing happens but in the functions a test calls.
+/// The simulated tracker controller on a listening socket of 127.0.0.1, in the test's own thread,
+/// with its point packets in the test's hands: they are gathered, and sent, held back or torn as
+/// the test says; answers and events go out at once. Nothing happens but in the functions a test
+/// calls.
 
 #include <arpa/inet.h>
 #include <gtest/gtest.h>
@@ -59,7 +60,7 @@ class TrackerPeer {
   }
 
   /// Sends all points gathered so far.
-  void say_points() {
+  void send_points() {
     for (; !points_.empty(); points_.pop_front()) say(points_.front());
   }
   void forget_all_but_the_latest() {
@@ -91,7 +92,9 @@ class TrackerPeer {
   }
 
   /// From now on the controller's clock shows so much more.
-  void jump_clock(std::chrono::seconds by) { clock_ahead_ += static_cast<std::int32_t>(by.count()); }
+  void jump_clock(std::chrono::seconds by) {
+    clock_ahead_ += static_cast<std::int32_t>(by.count());
+  }
 
   void hang_up() {
     client_.close();
@@ -113,15 +116,19 @@ class TrackerPeer {
   }
 
  private:
-  void power_on(HostTime now) { controller_ = std::make_unique<sim::TrackerDevice>(options_, machine_, now); }
+  void power_on(HostTime now) {
+    controller_ = std::make_unique<sim::TrackerDevice>(options_, machine_, now);
+  }
 
   void accept_client(HostTime now) {
-    sim::Socket accepted(::accept4(listener_.get(), nullptr, nullptr, SOCK_NONBLOCK | SOCK_CLOEXEC));
+    sim::Socket accepted(
+        ::accept4(listener_.get(), nullptr, nullptr, SOCK_NONBLOCK | SOCK_CLOEXEC));
     if (!accepted) return;
     if (client_) hang_up();
     client_ = std::move(accepted);
     const int yes =
-        1;  // else an event after an answer waits for a delayed ACK, in a time the test does not have
+        // else an event after an answer waits for a delayed ACK, in a time the test does not have
+        1;
     ::setsockopt(client_.get(), IPPROTO_TCP, TCP_NODELAY, &yes, sizeof yes);
     controller_->connected(now);
   }
@@ -151,7 +158,8 @@ class TrackerPeer {
     send(packet);
     remember(packet);
   }
-  /// [emScon TPI 3.6] MultiMeasResultT: points of 36 bytes from byte 48 on, seconds in their bytes 4 to 7.
+  /// [emScon TPI 3.6] MultiMeasResultT: points of 36 bytes from byte 48 on, seconds in their bytes
+  /// 4 to 7.
   void set_clock_ahead(Bytes& packet) const {
     for (std::size_t at = 48 + 4; clock_ahead_ != 0 && at + 4 <= packet.size(); at += 36) {
       std::int32_t seconds = 0;

@@ -30,8 +30,8 @@ class TrackerReceiverTest : public testing::Test {
         points_.insert(points_.end(), b->points.begin(), b->points.end());
       } else if (const auto* e = std::get_if<EnvironmentSample>(&*message)) {
         weather_.push_back(*e);
-      } else if (const auto* n = std::get_if<TrackerNonsense>(&*message)) {
-        nonsense_.push_back(*n);
+      } else if (const auto* n = std::get_if<TrackerProtocolError>(&*message)) {
+        malformed_.push_back(*n);
       } else {
         ++others_;
       }
@@ -49,7 +49,9 @@ class TrackerReceiverTest : public testing::Test {
     push({}, now_);
     push(tests::tracker::ok(emscon::Command::StartMeasurement), now_);
   }
-  static bool has_flag(const TrackerPoint& p, SampleFlag f) { return protocol::has(p.head.flags, f); }
+  static bool has_flag(const TrackerPoint& p, SampleFlag f) {
+    return protocol::has(p.head.flags, f);
+  }
 
   static constexpr auto kOffset = 1000s;
   static constexpr auto kDelay = 1ms;
@@ -57,7 +59,7 @@ class TrackerReceiverTest : public testing::Test {
   std::unique_ptr<TrackerReceiver> receiver_ = std::make_unique<TrackerReceiver>();
   std::vector<TrackerPoint> points_;
   std::vector<EnvironmentSample> weather_;
-  std::vector<TrackerNonsense> nonsense_;
+  std::vector<TrackerProtocolError> malformed_;
   int others_ = 0;
 };
 
@@ -65,7 +67,8 @@ TEST_F(TrackerReceiverTest, ConvertsMillimetresToMetres) {
   push(burst(std::array{point(DeviceTime{1s}, {1000, 2000, -300})}), now_);
   ASSERT_EQ(points_.size(), 1u);
   EXPECT_THAT(points_[0].p_tracker_m,
-              testing::ElementsAre(testing::DoubleEq(1.0), testing::DoubleEq(2.0), testing::DoubleEq(-0.3)));
+              testing::ElementsAre(testing::DoubleEq(1.0), testing::DoubleEq(2.0),
+                                   testing::DoubleEq(-0.3)));
   EXPECT_EQ(points_[0].device_time, DeviceTime{1s});
 }
 
@@ -90,12 +93,13 @@ struct StatusFlag {
   emscon::PointStatus status;
   SampleFlag flag;
 };
-class TrackerReceiverStatus : public TrackerReceiverTest, public testing::WithParamInterface<StatusFlag> {};
+class TrackerReceiverStatus : public TrackerReceiverTest,
+                              public testing::WithParamInterface<StatusFlag> {};
 TEST_P(TrackerReceiverStatus, BecomesAFlagAndStaysBesideIt) {
   push(burst(std::array{point(DeviceTime{1s}, {1, 2, 3}, GetParam().status)}), now_);
   ASSERT_EQ(points_.size(), 1u);
-  const auto quality = SampleFlag::SpeedWarning | SampleFlag::SpeedExceeded | SampleFlag::PointInvalid |
-                       SampleFlag::DeviceError;
+  const auto quality = SampleFlag::SpeedWarning | SampleFlag::SpeedExceeded |
+                       SampleFlag::PointInvalid | SampleFlag::DeviceError;
   EXPECT_EQ(points_[0].head.flags & quality, static_cast<protocol::SampleFlags>(GetParam().flag));
   EXPECT_EQ(points_[0].device_status, static_cast<std::int32_t>(GetParam().status));
 }
@@ -121,7 +125,8 @@ TEST_F(TrackerReceiverTest, ABadStatusOfThePacketSpoilsItsPoints) {
 }
 
 TEST_F(TrackerReceiverTest, ACoordinateThatIsNoNumberIsInvalid) {
-  push(burst(std::array{point(DeviceTime{1s}, {1, std::numeric_limits<double>::quiet_NaN(), 3})}), now_);
+  push(burst(std::array{point(DeviceTime{1s}, {1, std::numeric_limits<double>::quiet_NaN(), 3})}),
+       now_);
   EXPECT_TRUE(has_flag(points_.at(0), SampleFlag::PointInvalid));
 }
 
@@ -150,7 +155,9 @@ TEST_F(TrackerReceiverTest, GivesTheSamePointsForAnySplitOfTheBytes) {
 // ----------------------------------------------------------------------------------------------------------
 
 TEST_F(TrackerReceiverTest, AHoleIsMarkedWithHowManyPointsItSwallowed) {
-  push(burst(std::array{point(DeviceTime{1s}), point(DeviceTime{1002ms}), point(DeviceTime{1010ms})}), now_);
+  push(burst(
+           std::array{point(DeviceTime{1s}), point(DeviceTime{1002ms}), point(DeviceTime{1010ms})}),
+       now_);
   ASSERT_EQ(points_.size(), 3u);
   EXPECT_FALSE(has_flag(points_[1], SampleFlag::GapBefore));
   EXPECT_TRUE(has_flag(points_[2], SampleFlag::GapBefore));
@@ -228,8 +235,8 @@ TEST_F(TrackerReceiverTest, PointsOfAnEarlierClientAreNotTaken) {
 
 TEST_F(TrackerReceiverTest, ARefusedStartOpensNothing) {
   push({}, now_);
-  push(tests::tracker::packet(emscon::Answer{
-           emscon::Acknowledge{emscon::Command::StartMeasurement, emscon::Status::MeasurementNotReady}}),
+  push(tests::tracker::packet(emscon::Answer{emscon::Acknowledge{
+           emscon::Command::StartMeasurement, emscon::Status::MeasurementNotReady}}),
        now_);
   packet_at(now_, 3);
   EXPECT_TRUE(points_.empty());
@@ -250,7 +257,7 @@ TEST_F(TrackerReceiverTest, ARecordingMayBeginInTheMiddleOfAPacket) {
   push(bytes, now_);
   packet_at(now_ + 332ms, 4);
   EXPECT_EQ(points_.size(), 4u);
-  EXPECT_TRUE(nonsense_.empty());
+  EXPECT_TRUE(malformed_.empty());
 }
 
 TEST_F(TrackerReceiverTest, AHoleInARecordingIsMarkedAndGotOver) {
@@ -270,10 +277,10 @@ TEST_F(TrackerReceiverTest, NonsenseIsToldOnceWithItsFirstBytes) {
   const std::string page = "HTTP/1.1 400 Bad Request\r\n\r\n";
   push(std::as_bytes(std::span{page}), now_);
   push(std::as_bytes(std::span{page}), now_);
-  ASSERT_EQ(nonsense_.size(), 1u);
-  EXPECT_EQ(nonsense_[0].length, 24u);
-  EXPECT_EQ(nonsense_[0].first_bytes[0], std::byte{'H'});
-  EXPECT_FALSE(nonsense_[0].error);
+  ASSERT_EQ(malformed_.size(), 1u);
+  EXPECT_EQ(malformed_[0].length, 24u);
+  EXPECT_EQ(malformed_[0].first_bytes[0], std::byte{'H'});
+  EXPECT_FALSE(malformed_[0].error);
 }
 
 TEST_F(TrackerReceiverTest, AnUndecodablePacketIsNonsenseWithItsReason) {
@@ -281,8 +288,8 @@ TEST_F(TrackerReceiverTest, AnUndecodablePacketIsNonsenseWithItsReason) {
   Bytes bytes = burst(points_until(device(now_), 2, 2ms));
   bytes[12] = std::byte{7};
   push(bytes, now_);
-  ASSERT_EQ(nonsense_.size(), 1u);
-  EXPECT_EQ(nonsense_[0].error, emscon::DecodeError::CountMismatch);
+  ASSERT_EQ(malformed_.size(), 1u);
+  EXPECT_EQ(malformed_[0].error, emscon::DecodeError::CountMismatch);
 }
 
 // --- weather and stationary
@@ -309,8 +316,9 @@ TEST_F(TrackerReceiverTest, AStationaryResultIsTimedByItsMiddle) {
   push(tests::tracker::packet(single), now_);
   ASSERT_EQ(points_.size(), 1u);
   EXPECT_DOUBLE_EQ(points_[0].p_tracker_m[2], 0.3);
-  EXPECT_EQ(points_[0].head.time, now_ - 251ms);  // half of 500 ms, and half of the delay's bound of 2 ms
-  EXPECT_GT(points_[0].head.u_time, 144ms);       // 500 ms / sqrt(12)
+  EXPECT_EQ(points_[0].head.time,
+            now_ - 251ms);  // half of 500 ms, and half of the delay's bound of 2 ms
+  EXPECT_GT(points_[0].head.u_time, 144ms);  // 500 ms / sqrt(12)
   EXPECT_LT(points_[0].head.u_time, 145ms);
   EXPECT_EQ(weather_.size(), 1u);
 }

@@ -1,5 +1,6 @@
 #pragma once
-/// A controller's side of a tracker test: packets as bytes, and a stream of points with a clock of its own.
+/// A controller's side of a tracker test: packets as bytes, and a stream of points with a clock of
+/// its own.
 
 #include <array>
 #include <cstddef>
@@ -21,7 +22,8 @@ Bytes packet(const Arguments&... arguments) {
   return bytes;
 }
 
-inline emscon::MultiPoint point(protocol::DeviceTime t, std::array<double, 3> p_mm = {1000, 2000, -300},
+inline emscon::MultiPoint point(protocol::DeviceTime t,
+                                std::array<double, 3> p_mm = {1000, 2000, -300},
                                 emscon::PointStatus status = emscon::PointStatus::Ok) {
   return {status, emscon::TrackerClockReading::from(t), p_mm};
 }

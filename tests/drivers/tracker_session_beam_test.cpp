@@ -1,5 +1,5 @@
-/// The beam belongs to who carries the reflector: what a session must not do to it, and what it does on
-/// order.
+/// The beam belongs to who carries the reflector: what a session must not do to it, and what it
+/// does on order.
 
 #include <limits>
 
@@ -41,10 +41,12 @@ TEST_P(RefusedStart, WaitsForTheBeamAndDisturbsNobody) {
   EXPECT_EQ(session_.state(), TrackerState::WaitBeam);
   EXPECT_THAT(session_.cause(), HasSubstr("StartMeasurement was refused"));
   EXPECT_THAT(session_.cause(), HasSubstr("bring the reflector to the beam"));
+
   for (int i = 0; i < 60; ++i) {  // five minutes
     let_pass(options_.keep_alive);
     on(emscon::Answer{emscon::TrackerStatusAnswer{Status::Ok, emscon::TrackerStatus::NotReady}});
   }
+
   EXPECT_EQ(session_.state(), TrackerState::WaitBeam);
   EXPECT_THAT(sent_, testing::Each(Command::GetTrackerStatus));
   EXPECT_EQ(session_.fault().count, 0u);
@@ -71,10 +73,12 @@ TEST_F(TrackerSessionTest, ALostBeamNamesItsCause) {
 TEST_F(TrackerSessionTest, AnOrderStopsTheMeasurementAndStartsItAgain) {
   reach_streaming();
   on(TrackerOrder{TrackerOrder::What::GoHome, 7, "", 0.0});
+
   EXPECT_EQ(session_.state(), TrackerState::Moving);
   EXPECT_THAT(session_.cause(), HasSubstr("\"home\" was asked for"));
   answer_until(Command::StartMeasurement);
-  EXPECT_THAT(sent_, ElementsAre(Command::StopMeasurement, Command::GoBirdBath, Command::StartMeasurement));
+  EXPECT_THAT(
+      sent_, ElementsAre(Command::StopMeasurement, Command::GoBirdBath, Command::StartMeasurement));
   const auto report = session_.take_report();
   ASSERT_TRUE(report);
   EXPECT_EQ(report->number, 7u);
@@ -107,8 +111,8 @@ TEST_F(TrackerSessionTest, AnOrderWaitsForTheAnswerThatIsUnderWay) {
   on(emscon::Answer{emscon::TrackerStatusAnswer{Status::Ok, emscon::TrackerStatus::NotReady}});
   on(TrackerTick{});
   answer_until(Command::StartMeasurement);
-  EXPECT_THAT(sent_, ElementsAre(Command::GetTrackerStatus, Command::StopMeasurement, Command::Initialize,
-                                 Command::StartMeasurement));
+  EXPECT_THAT(sent_, ElementsAre(Command::GetTrackerStatus, Command::StopMeasurement,
+                                 Command::Initialize, Command::StartMeasurement));
   EXPECT_TRUE(session_.take_report()->done());
 }
 

@@ -44,7 +44,8 @@ struct DeadLaser {
   const char* name;
   emscon::LaserStatus status;
 };
-class TrackerSessionLaser : public TrackerSessionTest, public testing::WithParamInterface<DeadLaser> {};
+class TrackerSessionLaser : public TrackerSessionTest,
+                            public testing::WithParamInterface<DeadLaser> {};
 TEST_P(TrackerSessionLaser, ThatCannotMeasureIsAFault) {
   connect();
   emscon::SystemStatusAnswer status;
@@ -55,7 +56,8 @@ TEST_P(TrackerSessionLaser, ThatCannotMeasureIsAFault) {
   EXPECT_THAT(session_.fault().text, HasSubstr("laser"));
 }
 INSTANTIATE_TEST_SUITE_P(Dead, TrackerSessionLaser,
-                         testing::Values(DeadLaser{"Mute", emscon::LaserStatus::CommunicationFailed},
+                         testing::Values(DeadLaser{"Mute",
+                                                   emscon::LaserStatus::CommunicationFailed},
                                          DeadLaser{"Unable", emscon::LaserStatus::Unable},
                                          DeadLaser{"Off", emscon::LaserStatus::Off}),
                          [](const auto& laser) { return laser.param.name; });
@@ -75,8 +77,8 @@ TEST_F(TrackerSessionTest, AsksAControllerThatWasAwayUntilItHears) {
   connect();
   tick_after(options_.ask_again);
   tick_after(options_.ask_again);
-  EXPECT_THAT(sent_,
-              ElementsAre(Command::GetSystemStatus, Command::GetSystemStatus, Command::GetSystemStatus));
+  EXPECT_THAT(sent_, ElementsAre(Command::GetSystemStatus, Command::GetSystemStatus,
+                                 Command::GetSystemStatus));
   pass_query();
   EXPECT_EQ(session_.state(), TrackerState::Configuring);
   EXPECT_EQ(session_.fault().count, 0u);
@@ -127,8 +129,9 @@ TEST_F(TrackerSessionTest, ARefusalSaysWhatWasRefusedAndWhy) {
   answer_until(Command::SetCoordinateSystemType);
   answer(Status::TrackerNotInitialized);
   EXPECT_TRUE(closed());
-  EXPECT_EQ(session_.fault().text,
-            "tracker 10.0.0.7:700: SetCoordinateSystemType was refused: tracker not initialised (39)");
+  EXPECT_EQ(
+      session_.fault().text,
+      "tracker 10.0.0.7:700: SetCoordinateSystemType was refused: tracker not initialised (39)");
 }
 
 TEST_F(TrackerSessionTest, AParameterOutOfRangeButAcceptedIsNoFault) {
@@ -150,15 +153,14 @@ TEST_F(TrackerSessionTest, WhatAnOlderControllerDoesNotKnowIsLeftOut) {
 
 TEST_F(TrackerSessionTest, NonsenseSaysWhatCameInstead) {
   connect();
-  TrackerNonsense nonsense;
+  TrackerProtocolError nonsense;
   nonsense.length = 8;
   std::memcpy(nonsense.first_bytes.data(), "HTTP/1.1", 8);
   on(nonsense);
   EXPECT_TRUE(closed());
   EXPECT_EQ(session_.state(), TrackerState::Faulted);
-  EXPECT_THAT(
-      session_.fault().text,
-      HasSubstr("tracker 10.0.0.7:700: expected emScon answer, got 48 54 54 50 2f 31 2e 31 \"HTTP/1.1\""));
+  EXPECT_THAT(session_.fault().text, HasSubstr("tracker 10.0.0.7:700: expected emScon answer, got "
+                                               "48 54 54 50 2f 31 2e 31 \"HTTP/1.1\""));
 }
 
 TEST_F(TrackerSessionTest, ASecondClientIsToldSo) {

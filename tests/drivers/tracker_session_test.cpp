@@ -16,14 +16,14 @@ TEST_F(TrackerSessionTest, AsksInTheOrderOfTheManual) {
   connect();
   pass_query();
   answer_until(Command::StartMeasurement);
-  EXPECT_THAT(sent_,
-              ElementsAre(Command::GetSystemStatus, Command::GetUnits, Command::GetCoordinateSystemType,
-                          Command::GetStatisticMode, Command::GetMeasurementMode,
-                          Command::GetContinuousTimeModeParams, Command::GetLongSystemParameter,
-                          Command::GetSystemSettings, Command::SetUnits, Command::SetSystemSettings,
-                          Command::Initialize, Command::SetCoordinateSystemType, Command::SetStatisticMode,
-                          Command::SetMeasurementMode, Command::SetContinuousTimeModeParams,
-                          Command::SetLongSystemParameter, Command::StartMeasurement));
+  EXPECT_THAT(sent_, ElementsAre(Command::GetSystemStatus, Command::GetUnits,
+                                 Command::GetCoordinateSystemType, Command::GetStatisticMode,
+                                 Command::GetMeasurementMode, Command::GetContinuousTimeModeParams,
+                                 Command::GetLongSystemParameter, Command::GetSystemSettings,
+                                 Command::SetUnits, Command::SetSystemSettings, Command::Initialize,
+                                 Command::SetCoordinateSystemType, Command::SetStatisticMode,
+                                 Command::SetMeasurementMode, Command::SetContinuousTimeModeParams,
+                                 Command::SetLongSystemParameter, Command::StartMeasurement));
 }
 
 TEST_F(TrackerSessionTest, ShowsEachStateOnTheWay) {
@@ -49,7 +49,8 @@ TEST_F(TrackerSessionTest, AsksForMillimetresAndUnsolicitedMessages) {
   EXPECT_EQ(units->units.length, emscon::LengthUnit::Millimetre);
   EXPECT_EQ(units->units.temperature, emscon::TemperatureUnit::Celsius);
   answer();
-  const auto* settings = std::get_if<emscon::SetSystemSettings>(&std::get<TrackerSend>(action_).request);
+  const auto* settings =
+      std::get_if<emscon::SetSystemSettings>(&std::get<TrackerSend>(action_).request);
   ASSERT_NE(settings, nullptr);
   EXPECT_TRUE(settings->settings.send_unsolicited_messages);
   EXPECT_TRUE(settings->settings.keep_last_position);
@@ -117,11 +118,13 @@ TEST_F(StationarySession, TellsEnvironmentReflectorAndMode) {
   pass_query();
   answer_until(Command::StartMeasurement);
   sent_.erase(sent_.begin(), std::find(sent_.begin(), sent_.end(), Command::SetUnits));
-  EXPECT_THAT(sent_, ElementsAre(Command::SetUnits, Command::SetSystemSettings, Command::SetEnvironmentParams,
-                                 Command::Initialize, Command::GetReflector, Command::GetReflectors,
-                                 Command::SetReflector, Command::GoBirdBath, Command::SetCoordinateSystemType,
-                                 Command::SetStatisticMode, Command::SetMeasurementMode,
-                                 Command::SetStationaryModeParams, Command::StartMeasurement));
+  EXPECT_THAT(
+      sent_,
+      ElementsAre(Command::SetUnits, Command::SetSystemSettings, Command::SetEnvironmentParams,
+                  Command::Initialize, Command::GetReflector, Command::GetReflectors,
+                  Command::SetReflector, Command::GoBirdBath, Command::SetCoordinateSystemType,
+                  Command::SetStatisticMode, Command::SetMeasurementMode,
+                  Command::SetStationaryModeParams, Command::StartMeasurement));
 }
 
 TEST_F(StationarySession, MeasuresOnePointAfterTheOther) {

@@ -17,7 +17,8 @@ using testing::HasSubstr;
 
 class TrackerSettingsTest : public testing::Test {
  protected:
-  explicit TrackerSettingsTest(const sim::TrackerOptions& options = {}) : peer_(time_.now(), options) {
+  explicit TrackerSettingsTest(const sim::TrackerOptions& options = {})
+      : peer_(time_.now(), options) {
     options_.host = "127.0.0.1";
     options_.port = peer_.port();
   }
@@ -25,7 +26,7 @@ class TrackerSettingsTest : public testing::Test {
   void make_device() { device_ = TrackerDevice::create(options_, time_).value(); }
   void cycle() {
     peer_.serve(time_.now());
-    peer_.say_points();
+    peer_.send_points();
     device_->wait(20ms);
     device_->receive();
     time_.advance(20ms);
@@ -64,6 +65,7 @@ class TrackerSettingsTest : public testing::Test {
     framer.push(out);
     while (const auto packet = framer.next())
       if (const auto answer = emscon::decode_answer(*packet)) return *answer;
+
     return emscon::Acknowledge{emscon::command_of(request), Status::Unknown};
   }
 
@@ -84,24 +86,30 @@ TEST_F(TrackerSettingsTest, AreAsBeforeWhenAbbeHasLeft) {
   ask(emscon::SetStatisticMode{emscon::StatisticMode::Extended, emscon::StatisticMode::Extended});
   ask(emscon::SetContinuousTimeModeParams{10, 500, false, {}});
   make_device();
+
   ASSERT_TRUE(reaches("streaming"));
   leave();
   EXPECT_FALSE(peer_.controller().streaming());
-  EXPECT_EQ(std::get<emscon::UnitsAnswer>(ask(emscon::GetUnits{})).units.length, emscon::LengthUnit::Inch);
-  const auto after = std::get<emscon::SystemSettingsAnswer>(ask(emscon::GetSystemSettings{})).settings;
+  EXPECT_EQ(std::get<emscon::UnitsAnswer>(ask(emscon::GetUnits{})).units.length,
+            emscon::LengthUnit::Inch);
+  const auto after =
+      std::get<emscon::SystemSettingsAnswer>(ask(emscon::GetSystemSettings{})).settings;
   EXPECT_TRUE(after.apply_transformation && after.has_nivel && after.has_video_camera);
   EXPECT_FALSE(after.keep_last_position || after.send_unsolicited_messages);
-  EXPECT_EQ(std::get<emscon::TransformationAnswer>(ask(emscon::GetTransformation{})).set.translation[2],
-            300.0);
-  EXPECT_EQ(std::get<emscon::CoordinateSystemTypeAnswer>(ask(emscon::GetCoordinateSystemType{})).set.type,
-            emscon::CoordinateSystem::LeftHandedX);
+  EXPECT_EQ(
+      std::get<emscon::TransformationAnswer>(ask(emscon::GetTransformation{})).set.translation[2],
+      300.0);
+  EXPECT_EQ(
+      std::get<emscon::CoordinateSystemTypeAnswer>(ask(emscon::GetCoordinateSystemType{})).set.type,
+      emscon::CoordinateSystem::LeftHandedX);
   EXPECT_EQ(std::get<emscon::StatisticModeAnswer>(ask(emscon::GetStatisticMode{})).set.continuous,
             emscon::StatisticMode::Extended);
   EXPECT_EQ(std::get<emscon::MeasurementModeAnswer>(ask(emscon::GetMeasurementMode{})).set.mode,
             emscon::MeasurementMode::Stationary);
-  EXPECT_EQ(std::get<emscon::ContinuousTimeModeParamsAnswer>(ask(emscon::GetContinuousTimeModeParams{}))
-                .set.number_of_points,
-            500);
+  EXPECT_EQ(
+      std::get<emscon::ContinuousTimeModeParamsAnswer>(ask(emscon::GetContinuousTimeModeParams{}))
+          .set.number_of_points,
+      500);
 }
 
 TEST_F(TrackerSettingsTest, OfAnotherProgramDoNotReachThePoints) {
@@ -110,11 +118,13 @@ TEST_F(TrackerSettingsTest, OfAnotherProgramDoNotReachThePoints) {
   settings.apply_transformation = true;
   ask(emscon::SetSystemSettings{settings});
   make_device();
+
   ASSERT_TRUE(reaches("streaming"));
   for (int i = 0; i < 100; ++i) cycle();
   protocol::TrackerPoint point;
   ASSERT_EQ(device_->points().pop({&point, 1}), 1u);
-  const auto seen = sim::observe(sim::TrackerModel{}, tests::tracker::standing_machine(), time_.now(), 0);
+  const auto seen =
+      sim::observe(sim::TrackerModel{}, tests::tracker::standing_machine(), time_.now(), 0);
   for (std::size_t k = 0; k < 3; ++k)
     EXPECT_NEAR(point.p_tracker_m[k], seen.p_tracker_m[static_cast<Eigen::Index>(k)], 1e-3);
 }
@@ -127,7 +137,8 @@ TEST_F(TrackerSettingsTest, OfBeforeSurviveALostConnection) {
   ASSERT_TRUE(reaches("disconnected"));
   ASSERT_TRUE(reaches("streaming"));
   leave();
-  EXPECT_EQ(std::get<emscon::UnitsAnswer>(ask(emscon::GetUnits{})).units.length, emscon::LengthUnit::Inch);
+  EXPECT_EQ(std::get<emscon::UnitsAnswer>(ask(emscon::GetUnits{})).units.length,
+            emscon::LengthUnit::Inch);
 }
 
 TEST_F(TrackerSettingsTest, ArePutBackBeforeARefusedConnectionIsGivenUp) {
@@ -137,7 +148,8 @@ TEST_F(TrackerSettingsTest, ArePutBackBeforeARefusedConnectionIsGivenUp) {
   ASSERT_TRUE(reaches("faulted"));
   EXPECT_THAT(device_->status().last_fault, HasSubstr("\"SMR 1.5 inch\" (0)"));
   peer_.hang_up();
-  EXPECT_EQ(std::get<emscon::UnitsAnswer>(ask(emscon::GetUnits{})).units.length, emscon::LengthUnit::Inch);
+  EXPECT_EQ(std::get<emscon::UnitsAnswer>(ask(emscon::GetUnits{})).units.length,
+            emscon::LengthUnit::Inch);
 }
 
 TEST_F(TrackerSettingsTest, AMuteControllerIsLeftAllTheSame) {
@@ -196,14 +208,17 @@ TEST_F(TrackerSettingsTest, EveryOrderIsReportedWhateverIsOrderedMeanwhile) {
   make_device();
   ASSERT_TRUE(reaches("streaming"));
   std::set<std::uint64_t> reported;
+
   const auto take = [&] {
     for (const auto& report : device_->reports()) reported.insert(report.number);
   };
+
   for (std::uint64_t number = 1; number <= 200; ++number) {
     device_->order({TrackerOrder::What::GoHome, number, "", 0.0});
     cycle();
     take();
   }
+
   ASSERT_TRUE(reaches("streaming"));
   take();
   EXPECT_EQ(reported.size(), 200u);
@@ -213,6 +228,7 @@ TEST_F(TrackerSettingsTest, AReflectorSetOnOrderStays) {
   make_device();
   ASSERT_TRUE(reaches("streaming"));
   const auto list = order({TrackerOrder::What::ListReflectors, 1, "", 0.0});
+
   ASSERT_EQ(list.reflectors.size(), 3u);
   EXPECT_TRUE(list.reflectors[0].in_use);
   EXPECT_TRUE(order({TrackerOrder::What::SetReflector, 2, list.reflectors[2].name, 0.0}).done());

@@ -1,5 +1,5 @@
-/// How often the device thread of a tracker wakes up: it runs at real-time priority, so a loop without a wait
-/// takes a processor from everybody else.
+/// How often the device thread of a tracker wakes up: it runs at real-time priority, so a loop
+/// without a wait takes a processor from everybody else.
 
 #include <gtest/gtest.h>
 
@@ -15,11 +15,14 @@ using namespace std::chrono_literals;
 class WaitingTime final : public TimeSource {
  public:
   [[nodiscard]] protocol::HostTime now() const noexcept override { return now_; }
-  [[nodiscard]] std::chrono::nanoseconds wall(std::chrono::nanoseconds host) const noexcept override {
+  [[nodiscard]] std::chrono::nanoseconds wall(
+      std::chrono::nanoseconds host) const noexcept override {
     asked_ = host;
     return {};
   }
-  [[nodiscard]] std::chrono::nanoseconds host(std::chrono::nanoseconds) const noexcept override { return {}; }
+  [[nodiscard]] std::chrono::nanoseconds host(std::chrono::nanoseconds) const noexcept override {
+    return {};
+  }
   /// Until the wait ends, or until something comes within it.
   void pass() { now_ += std::min<std::chrono::nanoseconds>(asked_, kAnswerWithin); }
 
@@ -40,7 +43,7 @@ class TrackerWaits : public testing::Test {
 
   void cycle() {
     peer_.serve(time_.now());
-    peer_.say_points();
+    peer_.send_points();
     device_->wait(50ms);
     device_->receive();
     time_.pass();
@@ -48,7 +51,8 @@ class TrackerWaits : public testing::Test {
   /// No more than 100,000.
   int cycles_in(std::chrono::nanoseconds duration) {
     int count = 0;
-    for (const auto end = time_.now() + duration; time_.now() < end && count < 100'000; ++count) cycle();
+    for (const auto end = time_.now() + duration; time_.now() < end && count < 100'000; ++count)
+      cycle();
     return count;
   }
   bool reaches(std::string_view state) {
@@ -77,7 +81,8 @@ TEST_F(TrackerWaits, AreAsLongWithoutABeamAsWithIt) {
 TEST_F(TrackerWaits, AreAsLongWhenTheKeepAliveFallsDueWhileAnAnswerIsAwaited) {
   ASSERT_TRUE(reaches("streaming"));
   cycles_in(2s);
-  inject(sim::FaultKind::BeamBreak, 3.9);  // StartMeasurement follows 1 s after, the keep-alive is due at 5 s
+  inject(sim::FaultKind::BeamBreak,
+         3.9);  // StartMeasurement follows 1 s after, the keep-alive is due at 5 s
   cycles_in(4s);
   inject(sim::FaultKind::Mute, 3.5);
   EXPECT_LT(cycles_in(3500ms), 4 * kMostPerSecond);

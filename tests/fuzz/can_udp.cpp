@@ -1,5 +1,6 @@
-// Any bytes as a CAN-over-UDP datagram: refused, or read to the end and written again to the same bytes, but
-// for the FD flag byte's meaning, which nobody checks. Also as a raw block to the replaying receiver.
+// Any bytes as a CAN-over-UDP datagram: refused, or read to the end and written again to the same
+// bytes, but for the FD flag byte's meaning, which nobody checks. Also as a raw block to the
+// replaying receiver.
 
 #include <algorithm>
 #include <array>
@@ -26,14 +27,17 @@ void round_trip(std::span<const std::byte> bytes) {
     require(*to_text(view.error()) != '\0');
     return;
   }
+
   std::vector<std::byte> buffer(bytes.size());
   DatagramWriter writer{buffer, view->sequence()};
   CanFrame frame;
   std::size_t count = 0;
+
   while (view->next(frame)) {
     require(writer.add(frame));
     ++count;
   }
+
   require(count == view->count());
   require(std::ranges::equal(writer.finish(), bytes));
 }
@@ -46,12 +50,14 @@ void replay(std::span<const std::byte> bytes) {
   block.length = static_cast<std::uint16_t>(std::min(bytes.size(), block.bytes.size()));
   std::copy_n(bytes.begin(), block.length, block.bytes.begin());
   std::size_t samples = 0;
-  for (const auto direction :
-       {abbe::protocol::RawBlock::Direction::ToDevice, abbe::protocol::RawBlock::Direction::FromDevice}) {
+
+  for (const auto direction : {abbe::protocol::RawBlock::Direction::ToDevice,
+                               abbe::protocol::RawBlock::Direction::FromDevice}) {
     block.direction = direction;
     block.time += std::chrono::microseconds{100};
     receiver.on_raw(block, [&](const auto&) { ++samples; });
   }
+
   require(samples == receiver.counters().samples);
 }
 

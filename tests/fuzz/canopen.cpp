@@ -1,6 +1,6 @@
-// Any frames, in any order, at any times, to everything that reads them: the decoders, SDO client and server,
-// configurator and object dictionary, and the receiver. Input: records of 13 bytes: what to do, time step,
-// length and flags, identifier (2), data (8).
+// Any frames, in any order, at any times, to everything that reads them: the decoders, SDO client
+// and server, configurator and object dictionary, and the receiver. Input: records of 13 bytes:
+// what to do, time step, length and flags, identifier (2), data (8).
 // libFuzzer: -max_len=520
 
 #include <cstddef>
@@ -35,12 +35,14 @@ CanFrame frame_of(std::span<const std::uint8_t> record) {
 }
 
 void decode(const CanFrame& frame) {
-  if (const auto m = decode_nmt(frame)) require(decode_nmt(encode_nmt(m->command, m->node)).has_value());
+  if (const auto m = decode_nmt(frame))
+    require(decode_nmt(encode_nmt(m->command, m->node)).has_value());
   if (const auto h = decode_heartbeat(frame)) require(is_node_id(h->node));
   if (const auto e = decode_emergency(frame)) require(is_node_id(e->node));
   (void)decode_sync(frame);
   (void)decode_error_frame(frame);
-  for (const auto type : {PositionType::Signed32, PositionType::Unsigned32, PositionType::Signed64}) {
+  for (const auto type :
+       {PositionType::Signed32, PositionType::Unsigned32, PositionType::Signed64}) {
     (void)decode_position(frame.payload(), type, frame.byte(0));
   }
 }
@@ -102,9 +104,11 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     }
     const auto samples = world.receiver.on_frame(frame, world.now);
     require(samples.size() <= 2);
-    for (const auto& sample : samples) require(sample.axis_count == 2 && (sample.missing_mask & ~3) == 0);
+    for (const auto& sample : samples)
+      require(sample.axis_count == 2 && (sample.missing_mask & ~3) == 0);
     rest = rest.subspan(kRecord);
   }
+
   require(world.objects.tpdo_frame(1).length <= 8);
   return 0;
 }

@@ -1,5 +1,5 @@
-// Any bytes as a payload of any type: refused with a reason, or a value that encodes and decodes to itself.
-// A key is found in whatever we encode. The first byte chooses the type.
+// Any bytes as a payload of any type: refused with a reason, or a value that encodes and decodes to
+// itself. A key is found in whatever we encode. The first byte chooses the type.
 
 #include <cstddef>
 #include <cstdint>
@@ -34,8 +34,8 @@ std::vector<std::byte> round_trip(std::span<const std::byte> payload) {
   return again;
 }
 
-/// A type that is published: what we encode has a key. A stranger's bytes may decode without (text that goes
-/// on after its NUL), and nobody takes them then.
+/// A type that is published: what we encode has a key. A stranger's bytes may decode without (text
+/// that goes on after its NUL), and nobody takes them then.
 template <class T>
 void published(daemon::Topic topic, std::span<const std::byte> payload) {
   (void)daemon::payload_key(topic, payload);
@@ -89,5 +89,6 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
       round_trip<v1::RawBytes>(payload);
       break;
   }
+
   return 0;
 }

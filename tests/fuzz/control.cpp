@@ -1,9 +1,9 @@
-// Any lines as requests of the control socket, answered by a hub with tracker, counter card, marks and
-// measuring machine that no device is behind: every answer is an object with "ok", and one line. The first
-// byte chooses who asks.
+// Any lines as requests of the control socket, answered by a hub with tracker, counter card, marks
+// and measuring machine that no device is behind: every answer is an object with "ok", and one
+// line. The first byte chooses who asks.
 //
-// No look for leaks after each input that leaves memory behind (a session's notes): it takes half of the
-// time, and the tests of the control socket run with it.
+// No look for leaks after each input that leaves memory behind (a session's notes): it takes half
+// of the time, and the tests of the control socket run with it.
 //
 // libFuzzer: -max_len=4096 -dict=tests/fuzz/control.dict -detect_leaks=0
 
@@ -113,11 +113,11 @@ struct Daemon {
   /// What one input began does not outlive it.
   void end_all() {
     (void)calibration.cancel("fuzz", time.now());
-    (void)calibration.turn({}, time.now());
+    (void)calibration.cycle({}, time.now());
     (void)reference.cancel();
     (void)touching.cancel();
-    touching.turn({}, 0, "", std::chrono::steady_clock::now());
-    tracker.turn(time.now() + std::chrono::nanoseconds{1});
+    touching.cycle({}, 0, "", std::chrono::steady_clock::now());
+    tracker.cycle(time.now() + std::chrono::nanoseconds{1});
   }
 };
 
@@ -140,6 +140,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   const bool stranger = data[0] % 8 == 0;
   const ControlPeer peer{.user = "fuzz", .uid = stranger ? ::geteuid() + 1 : ::geteuid()};
   std::string_view rest{reinterpret_cast<const char*>(data) + 1, size - 1};
+
   while (!rest.empty()) {
     const std::size_t end = std::min(rest.find('\n'), rest.size());
     const std::string answer = line_of(answer_to(daemon, rest.substr(0, end), peer));
@@ -147,6 +148,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     require(json::parse(answer).at("ok").is_boolean());
     rest.remove_prefix(std::min(end + 1, rest.size()));
   }
+
   daemon.end_all();
   return 0;
 }

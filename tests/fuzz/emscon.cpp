@@ -1,6 +1,6 @@
-// Any bytes, read as a controller's stream, as a client's, and as one packet: nothing may read past an end,
-// and what decodes must encode to bytes that decode and encode to themselves.
-// libFuzzer: -max_len=1024
+// Any bytes, read as a controller's stream, as a client's, and as one packet: nothing may read past
+// an end, and what decodes must encode to bytes that decode and encode to themselves. libFuzzer:
+// -max_len=1024
 #include <cstdint>
 #include <cstdlib>
 #include <cstring>
@@ -60,6 +60,7 @@ void try_stream(Bytes stream, bool resync) {
   static const auto framer = std::make_unique<PacketFramer>();
   framer->reset();
   if (resync) framer->resync();
+
   while (!stream.empty()) {
     const auto taken = framer->push(stream.first(std::min<std::size_t>(stream.size(), 77)));
     check(taken != 0);

@@ -1,5 +1,5 @@
-// Any bytes as a server's stream, as a client's, as one response, one command, one list of arguments: nothing
-// may read past an end, and views must lie within the line.
+// Any bytes as a server's stream, as a client's, as one response, one command, one list of
+// arguments: nothing may read past an end, and views must lie within the line.
 #include <algorithm>
 #include <cstdint>
 #include <cstdlib>
@@ -41,12 +41,14 @@ void try_line(std::string_view line) {
     (void)parse_point(response->data);
     check(to_string(response->tag) == line.substr(0, 5));
   }
+
   if (const auto command = parse_command(line)) {
     inside(command->method, line);
     inside(command->arguments, line);
     walk(command->arguments);
     (void)parse_point(command->arguments);
   }
+
   walk(line);
 }
 

@@ -1,6 +1,6 @@
-// Any bytes as an MCAP file: the summary, the linear scan, every record it yields and every message of every
-// chunk. Any bytes as a RawBytes payload: what decodes encodes to bytes that decode to the same.
-// libFuzzer: -max_len=2048
+// Any bytes as an MCAP file: the summary, the linear scan, every record it yields and every message
+// of every chunk. Any bytes as a RawBytes payload: what decodes encodes to bytes that decode to the
+// same. libFuzzer: -max_len=2048
 
 #include <cstdint>
 #include <cstdlib>
@@ -70,6 +70,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
       if (const auto chunk = mcap::chunk_at(file, index.chunk_start)) walk(chunk->chunk.records);
     }
   }
+
   mcap::LinearScan scan{file};
   while (const auto item = scan.next()) {
     if (item->chunk)
@@ -77,8 +78,11 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     else
       round_trip_as_every_kind(item->record.content);
   }
+
   require(scan.whole_until() <= size);
   walk(file);
-  if (const auto raw = decode_raw_bytes_cdr(file)) require(raw->bytes.size() <= RawBlock::kCapacity);
+  if (const auto raw = decode_raw_bytes_cdr(file))
+    require(raw->bytes.size() <= RawBlock::kCapacity);
+
   return 0;
 }

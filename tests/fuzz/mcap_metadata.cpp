@@ -1,5 +1,6 @@
-// Any bytes as what stands before the chunks of a recording: the whole file, and the packed entries of the
-// three metadata records. Records with right checksums pass; with any entry changed they do not.
+// Any bytes as what stands before the chunks of a recording: the whole file, and the packed entries
+// of the three metadata records. Records with right checksums pass; with any entry changed they do
+// not.
 //
 // libFuzzer: -max_len=2048
 
@@ -24,7 +25,8 @@ void require(bool promise) {
   if (!promise) std::abort();
 }
 
-constexpr std::array kNames{daemon::recording::kRecordingMetadata, daemon::recording::kConfigurationMetadata,
+constexpr std::array kNames{daemon::recording::kRecordingMetadata,
+                            daemon::recording::kConfigurationMetadata,
                             daemon::recording::kVersionsMetadata};
 
 mcap::Buffer file_of(const std::map<std::string, MetadataEntries>& metadata) {

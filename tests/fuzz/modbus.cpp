@@ -1,5 +1,5 @@
-// Any bytes as the answers of a Modbus device, over TCP and RTU, cut into pieces by the first byte: samples
-// hold what is plausible or NaN, and every request that decodes encodes to the same bytes.
+// Any bytes as the answers of a Modbus device, over TCP and RTU, cut into pieces by the first byte:
+// samples hold what is plausible or NaN, and every request that decodes encodes to the same bytes.
 // libFuzzer: -max_len=600
 
 #include <array>
@@ -28,10 +28,12 @@ void round_trip(std::span<const std::byte> bytes, modbus::Transport transport) {
   require(n == bytes.size() && std::equal(bytes.begin(), bytes.end(), out.begin()));
 }
 
-void answers(std::span<const std::byte> bytes, modbus::Transport transport, const RegisterMap& map) {
+void answers(std::span<const std::byte> bytes, modbus::Transport transport,
+             const RegisterMap& map) {
   EnvironmentReceiver receiver{map, transport};
   receiver.begin();
   auto told = EnvironmentFailure::Kind::None;
+
   while (!bytes.empty()) {
     if (const auto request = receiver.next_request()) receiver.sent(*request, {});
     const std::size_t piece =

@@ -1,5 +1,5 @@
-// Any bytes as model.json: a model or an error, and what is taken as a model has the hash it states.
-// libFuzzer: -max_len=4096
+// Any bytes as model.json: a model or an error, and what is taken as a model has the hash it
+// states. libFuzzer: -max_len=4096
 
 #include <cstdint>
 #include <cstdlib>

@@ -1,5 +1,5 @@
-// Any bytes as the stream of a counter card, cut anywhere: the same scans as in one piece; as a scan list and
-// as set-up words: refused, or read and written again to the same.
+// Any bytes as the stream of a counter card, cut anywhere: the same scans as in one piece; as a
+// scan list and as set-up words: refused, or read and written again to the same.
 
 #include <algorithm>
 #include <cstddef>
@@ -39,10 +39,12 @@ void stream(std::span<const std::byte> bytes) {
   std::vector<RawScan> expected, got;
   whole.push(rest);
   take_all(whole, expected);
+
   for (const auto piece : {rest.first(cut), rest.subspan(cut)}) {
     pieces.push(piece);
     take_all(pieces, got);
   }
+
   require(got == expected && got.size() == rest.size() / layout.scan_bytes());
   if (const auto at = seek_scan(rest, layout, Metronome{.place = 0, .step = 300.0}))
     require(*at < layout.scan_bytes());
@@ -54,7 +56,8 @@ void words(std::span<const std::byte> bytes) {
     entries.push_back(
         {std::to_integer<std::uint16_t>(bytes[i]), std::to_integer<std::uint16_t>(bytes[i + 1])});
     const auto word = static_cast<std::uint16_t>(entries.back().word1 << 8 | entries.back().word2);
-    if (const auto setup = decode_counter_setup(word)) require(decode_counter_setup(encode(*setup)) == setup);
+    if (const auto setup = decode_counter_setup(word))
+      require(decode_counter_setup(encode(*setup)) == setup);
   }
   if (const auto layout = decode_scan_list(entries)) {
     const auto again = encode(*layout);

@@ -9,7 +9,8 @@
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   using namespace abbe::daemon;  // NOLINT(google-build-using-namespace): a program, not a header
-  const auto state = store_state_from_text({reinterpret_cast<const char*>(data), size}, "state.json");
+  const auto state =
+      store_state_from_text({reinterpret_cast<const char*>(data), size}, "state.json");
   if (!state) return 0;
   (void)state->activation();
   const std::string once = to_text(*state);

@@ -1,5 +1,5 @@
-// Any bytes as a configuration and as a calibrator: faults that name the file, or values. What the parser
-// accepts never nests deeper than what was counted before it ran.
+// Any bytes as a configuration and as a calibrator: faults that name the file, or values. What the
+// parser accepts never nests deeper than what was counted before it ran.
 //
 // libFuzzer: -max_len=4096 -dict=tests/fuzz/toml.dict
 

@@ -21,16 +21,22 @@ void require(bool holds) {
 
 void operations(std::span<const std::byte> bytes) {
   std::array<std::byte, usbip::kImportReplySize> out{};
-  if (const auto head = usbip::decode_op_head(bytes); !head) require(*to_text(head.error()) != '\0');
+  if (const auto head = usbip::decode_op_head(bytes); !head)
+    require(*to_text(head.error()) != '\0');
+
   if (const auto bus_id = usbip::decode_import_request(bytes)) {
     const auto size = usbip::encode_import_request(usbip::BusId{bus_id->view()}, out);
-    require(usbip::decode_import_request(std::span{out}.first(size))->view() == bus_id->view().substr(0, 31));
+    require(usbip::decode_import_request(std::span{out}.first(size))->view() ==
+            bus_id->view().substr(0, 31));
   }
+
   if (const auto reply = usbip::decode_import_reply(bytes)) {
     const bool granted = reply->status == usbip::OpStatus::Ok;
-    const auto size = usbip::encode_import_reply(reply->status, granted ? &reply->device : nullptr, out);
+    const auto size =
+        usbip::encode_import_reply(reply->status, granted ? &reply->device : nullptr, out);
     require(usbip::decode_import_reply(std::span{out}.first(size)) == reply);
   }
+
   if (auto list = usbip::DeviceListView::parse(bytes)) {
     std::uint32_t devices = 0;
     while (list->next()) ++devices;
@@ -49,11 +55,13 @@ void descriptors(std::span<const std::byte> bytes) {
   if (const auto device = usb::decode_device_descriptor(bytes)) {
     require(usb::decode_device_descriptor(usb::encode(*device)) == *device);
   }
+
   if (const auto text = usb::decode_string(bytes)) {
     std::array<std::byte, usb::kMaxDescriptor> out{};
     const auto size = usb::encode_string(text->view(), out);
     require(usb::decode_string(std::span{out}.first(size))->view() == text->view());
   }
+
   if (const auto packet = usb::find_endpoint(bytes, 0x82)) require(*packet <= 0x07FF);
   if (bytes.size() >= usb::kSetupSize) {
     const auto setup = bytes.first<usb::kSetupSize>();

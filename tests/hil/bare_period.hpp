@@ -1,6 +1,6 @@
 #pragma once
-/// A thread that does nothing but wake every millisecond, before everything measured: how often the computer
-/// itself is late. What such a thread loses no driver can keep.
+/// A thread that does nothing but wake every millisecond, before everything measured: how often the
+/// computer itself is late. What such a thread loses no driver can keep.
 
 #include <pthread.h>
 #include <sys/prctl.h>
@@ -29,7 +29,8 @@ class BarePeriod {
     stop_ = true;
     if (thread_.joinable()) thread_.join();
   }
-  /// After stop(): periods, and those of them that began more than kLate late or were slept through.
+  /// After stop(): periods, and those of them that began more than kLate late or were slept
+  /// through.
   [[nodiscard]] std::size_t periods() const { return periods_; }
   [[nodiscard]] std::size_t late() const { return late_; }
 

@@ -21,7 +21,8 @@ using testing::HasSubstr;
 constexpr std::array<std::uint32_t, 2> kIds{0x181, 0x701};
 
 can::CanFrame numbered(std::uint32_t n) {
-  return can::standard_frame(0x181, {static_cast<std::uint8_t>(n), static_cast<std::uint8_t>(n >> 8)});
+  return can::standard_frame(0x181,
+                             {static_cast<std::uint8_t>(n), static_cast<std::uint8_t>(n >> 8)});
 }
 
 struct SocketCan : testing::Test {
@@ -54,8 +55,10 @@ TEST_F(SocketCan, DeliversOnlyTheIdentifiersAskedFor) {
   extended.set(FrameFlag::Extended);
   auto remote = can::standard_frame(0x181, {});
   remote.set(FrameFlag::Remote);
-  const std::array sent{can::standard_frame(0x180, {1}), can::standard_frame(0x701, {5}), extended, remote,
-                        can::standard_frame(0x182, {1}), can::standard_frame(0x181, {2})};
+  const std::array sent{
+      can::standard_frame(0x180, {1}), can::standard_frame(0x701, {5}), extended, remote,
+      can::standard_frame(0x182, {1}), can::standard_frame(0x181, {2})};
+
   ASSERT_TRUE(other.send(sent));
   const auto got = read(bus, 2);
   ASSERT_EQ(got.size(), 2u);
@@ -88,12 +91,14 @@ TEST_F(SocketCan, DatesEveryFrameOfABatchByTheKernel) {
   ASSERT_EQ(got.size(), 50u);
   EXPECT_EQ(bus.counters().time_widened, widened);
   std::set<protocol::HostTime> times;
+
   for (std::size_t i = 0; i < got.size(); ++i) {
     times.insert(got[i].time);
     if (i != 0) {
       EXPECT_GE(got[i].time, got[i - 1].time);
     }
   }
+
   EXPECT_GT(times.size(), 25u);  // one time for all would be that of the read
 }
 
@@ -104,6 +109,7 @@ TEST_F(SocketCan, CountsWhatDidNotFitIntoTheKernelsQueue) {
   for (std::uint32_t n = 0; n < kSent; ++n) ASSERT_TRUE(other.send(numbered(n)));
   const auto got = read(narrow, kSent).size();
   ASSERT_LT(got, kSent);
+
   // The kernel tells with the next frame.
   ASSERT_TRUE(other.send(numbered(kSent)));
   const auto after = read(narrow, 2);
@@ -166,7 +172,9 @@ TEST_F(SocketCan, ReportsWhatTheControllerSaysOfTheBus) {
 TEST_F(SocketCan, AFullReadWithAFrameOfItsOwnAmongItIsNotTheEnd) {
   constexpr std::array<std::uint32_t, 1> kOwn{0x181};
   ASSERT_TRUE(bus.open(kOwn).has_value());
-  ASSERT_TRUE(bus.send(std::array{numbered(0)}).has_value());  // its echo comes back and is not handed on
+
+  // its echo comes back and is not handed on
+  ASSERT_TRUE(bus.send(std::array{numbered(0)}).has_value());
   for (std::uint32_t i = 1; i <= 8; ++i) ASSERT_TRUE(other.send(numbered(i)));
   std::array<ReceivedFrame, 8> some{};
   const auto first = bus.read(some, 1s);
@@ -183,6 +191,7 @@ TEST_F(SocketCan, SaysThatTheInterfaceWentDownAndOpensAgainWhenItIsUp) {
   std::array<ReceivedFrame, 4> frames{};
   vcan.down();
   const auto failed = bus.read(frames, 1s);
+
   ASSERT_FALSE(failed);
   EXPECT_EQ(failed.error().code, ErrorCode::SystemRefused);
   EXPECT_THAT(failed.error().text, HasSubstr("Network is down"));

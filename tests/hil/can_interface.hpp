@@ -1,6 +1,6 @@
 #pragma once
-/// What the tests do to a CAN interface from outside the driver: make it, take it down, put frames on it that
-/// nobody asked for. Needs root, as in the guest.
+/// What the tests do to a CAN interface from outside the driver: make it, take it down, put frames
+/// on it that nobody asked for. Needs root, as in the guest.
 
 #include <fmt/format.h>
 #include <gtest/gtest.h>
@@ -61,7 +61,8 @@ class CanInterface {
 class VirtualCan : public CanInterface {
  public:
   explicit VirtualCan(int mtu = CANFD_MTU, const std::string& name = "vcan7") : CanInterface(name) {
-    EXPECT_TRUE(run(fmt::format("ip link add {0} type vcan && ip link set {0} mtu {1} up", name, mtu)));
+    EXPECT_TRUE(
+        run(fmt::format("ip link add {0} type vcan && ip link set {0} mtu {1} up", name, mtu)));
   }
   VirtualCan(const VirtualCan&) = delete;
   VirtualCan& operator=(const VirtualCan&) = delete;
@@ -103,7 +104,8 @@ class CanSocket {
   bool send(const can::CanFrame& frame) const { return send({&frame, 1}); }
   /// As a controller would say it; vcan hands on what is written to it.
   bool send_condition(can::BusCondition condition) const {
-    return send(can::encode_error_frame({.conditions = static_cast<can::BusConditions>(condition)}));
+    return send(
+        can::encode_error_frame({.conditions = static_cast<can::BusConditions>(condition)}));
   }
   [[nodiscard]] std::optional<can::CanFrame> receive(std::chrono::milliseconds at_most = {}) const {
     pollfd ready{fd_, POLLIN, 0};
@@ -118,7 +120,8 @@ class CanSocket {
   int fd_;
 };
 
-/// Until the kernel stamps what comes: its worker switches that on some time after it was asked for.
+/// Until the kernel stamps what comes: its worker switches that on some time after it was asked
+/// for.
 template <class Bus>
 void wait_for_stamps(Bus& bus, const CanSocket& other, const can::CanFrame& frame) {
   std::array<drivers::ReceivedFrame, 4> some{};

@@ -12,9 +12,10 @@ using namespace std::chrono_literals;
 
 class VcanConformancePeer {
  public:
-  static constexpr std::chrono::nanoseconds kTurn = 1ms;
+  static constexpr std::chrono::nanoseconds kCycle = 1ms;
   static constexpr std::chrono::nanoseconds kSilenceLimit = 400ms;
-  static constexpr std::chrono::nanoseconds kRecoveryLimit = 4s;  // SDO retries 1.5 s, then a pause of 1 s
+  // SDO retries 1.5 s, then a pause of 1 s
+  static constexpr std::chrono::nanoseconds kRecoveryLimit = 4s;
   static constexpr bool kTornCanBeFinished = false;
 
   VcanConformancePeer() {
@@ -36,7 +37,7 @@ class VcanConformancePeer {
     for (std::size_t i = 0; i < n; ++i) heads.push_back(out[i].head);
   }
   void serve() { nodes_.serve(time_.now()); }
-  void say_valid() {
+  void send_valid() {
     const auto frames = nodes_.take_answer();
     if (frames.empty()) return;
     if (!holding_) return nodes_.send(frames);
@@ -48,13 +49,15 @@ class VcanConformancePeer {
     if (!held_.empty()) nodes_.send(held_);
     held_.clear();
   }
-  /// A frame is never torn on a bus; what a confused node sends is a position without its last bytes.
+  /// A frame is never torn on a bus; what a confused node sends is a position without its last
+  /// bytes.
   void send_torn() { (void)nodes_.socket().send(can::standard_frame(0x181, {1, 2})); }
   void finish_torn() {}
   void send_garbage() {
     auto extended = can::standard_frame(0x181, {1, 2, 3, 4});
     extended.set(can::FrameFlag::Extended);
-    const std::array frames{extended, can::standard_frame(0x7FF, {9}), can::standard_frame(0x182, {})};
+    const std::array frames{extended, can::standard_frame(0x7FF, {9}),
+                            can::standard_frame(0x182, {})};
     (void)nodes_.socket().send(frames);
   }
   void unplug() { vcan_.down(); }
@@ -62,8 +65,8 @@ class VcanConformancePeer {
     vcan_.up();
     nodes_.drain();
   }
-  /// A cycle makes one sample whatever the nodes say; only the bus can make many at once, by going off and
-  /// on.
+  /// A cycle makes one sample whatever the nodes say; only the bus can make many at once, by going
+  /// off and on.
   void flood() {
     for (int i = 0; i < 100; ++i) {
       (void)nodes_.socket().send_condition(can::BusCondition::BusOff);
@@ -75,7 +78,8 @@ class VcanConformancePeer {
  private:
   VirtualCan vcan_;
   drivers::SteppedTime time_;
-  VcanNodes nodes_{vcan_, std::array{can::EncoderIdentity{.node = 1}, can::EncoderIdentity{.node = 2}}};
+  VcanNodes nodes_{vcan_,
+                   std::array{can::EncoderIdentity{.node = 1}, can::EncoderIdentity{.node = 2}}};
   std::unique_ptr<drivers::EncoderDevice> device_;
   bool holding_ = false;
   std::vector<can::CanFrame> held_;

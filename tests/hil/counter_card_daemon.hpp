@@ -1,6 +1,7 @@
 #pragma once
-/// The whole daemon with all that can be had at once with counter cards: axes, probe and reference marks of
-/// two cards over USB/IP, tracker, air. In the guest or, by scripts/soak, on this computer.
+/// The whole daemon with all that can be had at once with counter cards: axes, probe and reference
+/// marks of two cards over USB/IP, tracker, air. In the guest or, by scripts/soak, on this
+/// computer.
 
 #include "whole_daemon.hpp"
 
@@ -15,9 +16,11 @@ class CounterCardDaemon : public WholeDaemon {
     if (!records_raw()) return;
     const std::string lines = replay(recording_of_stopped(), "--samples");
     int touches = 0;
-    for (auto at = lines.find("\ntouch "); at != std::string::npos; at = lines.find("\ntouch ", at + 1))
+    for (auto at = lines.find("\ntouch "); at != std::string::npos;
+         at = lines.find("\ntouch ", at + 1))
       ++touches;
-    print_figure("whole daemon, probe", fmt::format("one each {} s", kTouches_s), "{} touches", touches);
+    print_figure("whole daemon, probe", fmt::format("one each {} s", kTouches_s), "{} touches",
+                 touches);
     EXPECT_GE(touches, run_seconds() / kTouches_s);
   }
 

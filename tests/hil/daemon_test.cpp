@@ -1,5 +1,6 @@
-// The whole daemon in the guest, all devices at once: with encoders on a virtual CAN bus and a measuring
-// machine, with two counter cards and a probe. In virtual time, so that nothing may be lost.
+// The whole daemon in the guest, all devices at once: with encoders on a virtual CAN bus and a
+// measuring machine, with two counter cards and a probe. In virtual time, so that nothing may be
+// lost.
 
 #include "abbe/drivers/time_source.hpp"
 #include "can_interface.hpp"
@@ -28,15 +29,17 @@ nodes = [
   { axis = "Z", node = 3, step_nm = 10 },
 ]
 )";
-    start_all("", "",
-              kBus + fmt::format("[cmm]\nhost = \"127.0.0.1\"\nport = {}\n", measuring_machine_.port()));
+    start_all(
+        "", "",
+        kBus + fmt::format("[cmm]\nhost = \"127.0.0.1\"\nport = {}\n", measuring_machine_.port()));
   }
 
   static constexpr double kEncoder_hz = 980.0;  // CAN_BCM makes each period a few us too long
   static constexpr double kMachine_hz = 9.0;    // reports at most 10 a second
 
   VirtualCan vcan_;
-  /// Not those of abbe-sim: while it makes a burst of the tracker, its nodes would answer periods late.
+  /// Not those of abbe-sim: while it makes a burst of the tracker, its nodes would answer periods
+  /// late.
   SimulatedEncoders encoders_{vcan_, 3, 91};
   sim::IppDmeServer measuring_machine_ = open_measuring_machine(drivers::MonotonicTime{}.now());
   ServedDevices served_{peer_of(measuring_machine_), 90};

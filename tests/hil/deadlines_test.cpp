@@ -1,7 +1,8 @@
-// Deadlines of the encoder path in virtual time: the guest's clock counts instructions of a processor of some
-// 500 MIPS, so what is late here is late by its own logic, queues and scheduling and not by anybody's load.
-// It says nothing about the latency of real hardware. Every peer lives in the guest; the simulated nodes run
-// above the device thread, because hardware would take no processor time at all.
+// Deadlines of the encoder path in virtual time: the guest's clock counts instructions of a
+// processor of some 500 MIPS, so what is late here is late by its own logic, queues and scheduling
+// and not by anybody's load. It says nothing about the latency of real hardware. Every peer lives
+// in the guest; the simulated nodes run above the device thread, because hardware would take no
+// processor time at all.
 //
 // ABBE_HIL_SECONDS: virtual seconds of each run (default 5).
 
@@ -40,8 +41,9 @@ double us(nanoseconds t) {
 /// What the device thread saw of its own turns. Filled by that thread, read when it has ended.
 struct Seen {
   std::vector<AxisSample> samples;
-  std::vector<nanoseconds> ready_to_ring;  ///< oldest frame of a turn in the kernel until its samples are out
-  std::vector<nanoseconds> sync_to_flag;   ///< SYNC to the sample that marks an axis as missing
+  std::vector<nanoseconds>
+      ready_to_ring;  ///< oldest frame of a turn in the kernel until its samples are out
+  std::vector<nanoseconds> sync_to_flag;  ///< SYNC to the sample that marks an axis as missing
 };
 
 /// The device thread's loop with a look at the clock after each turn.
@@ -52,11 +54,11 @@ class MeasuredDevice {
     options.receiver.axes = SimulatedEncoders::axes(kAxes);
     options.receiver.sync_period = kPeriod;
     options.sync = sync;
-    device_ = std::move(
-        *drivers::EncoderDevice::create(options,
-                                        std::make_unique<drivers::SocketCanBus>(
-                                            drivers::SocketCanOptions{.interface = interface.name()}, time_),
-                                        time_));
+    device_ = std::move(*drivers::EncoderDevice::create(
+        options,
+        std::make_unique<drivers::SocketCanBus>(
+            drivers::SocketCanOptions{.interface = interface.name()}, time_),
+        time_));
     const auto room = static_cast<std::size_t>(run_time(5s) / kPeriod) * 2 + 10'000;
     seen_.samples.reserve(room);
     seen_.ready_to_ring.reserve(2 * room);
@@ -95,14 +97,17 @@ class MeasuredDevice {
     for (std::size_t n = blocks.size(); n == blocks.size();) {
       n = device_->raw().pop(blocks);
       for (std::size_t i = 0; i < n; ++i) {
-        const bool came = blocks[i].direction == RawBlock::Direction::FromDevice && blocks[i].length != 0;
+        const bool came =
+            blocks[i].direction == RawBlock::Direction::FromDevice && blocks[i].length != 0;
         if (came && !oldest) oldest = blocks[i].time;
       }
     }
+
     std::array<AxisSample, 64> some{};
     const auto n = device_->samples().pop(some);
     if (!measuring_) return;
     if (oldest) seen_.ready_to_ring.push_back(now - *oldest);
+
     for (std::size_t i = 0; i < n; ++i) {
       seen_.samples.push_back(some[i]);
       if (some[i].missing_mask != 0) seen_.sync_to_flag.push_back(now - some[i].head.time);
@@ -158,6 +163,7 @@ TEST_P(DeadlinesInVirtualTime, FiveAxesAtOneKilohertzLoseNothingAndAreInTime) {
   std::uint64_t lost = 0;
   std::vector<nanoseconds> jitter;
   std::vector<nanoseconds> time_error;
+
   for (std::size_t i = 0; i < seen.samples.size(); ++i) {
     const auto& s = seen.samples[i];
     incomplete += s.missing_mask != 0 ? 1 : 0;
@@ -165,13 +171,16 @@ TEST_P(DeadlinesInVirtualTime, FiveAxesAtOneKilohertzLoseNothingAndAreInTime) {
     if (i == 0 || s.missing_mask != 0 || s.head.lost_before != 0) continue;
     jitter.push_back(std::chrono::abs(s.head.time - seen.samples[i - 1].head.time - kPeriod));
     for (std::size_t axis = 0; axis < kAxes; ++axis) {
-      const double off_m = std::abs(s.position[axis] - encoders.reading_m(axis, s.head.time)) - 5e-9;
+      const double off_m =
+          std::abs(s.position[axis] - encoders.reading_m(axis, s.head.time)) - 5e-9;
       time_error.push_back(
           nanoseconds{static_cast<std::int64_t>(std::max(off_m, 0.0) / kFeed_m_per_s * 1e9)});
     }
   }
-  print_figure("5 axes + SYNC at 1 kHz on vcan", "0 lost, 0 incomplete", "{} samples, {} lost, {} incomplete",
-               seen.samples.size(), lost, incomplete);
+
+  print_figure("5 axes + SYNC at 1 kHz on vcan", "0 lost, 0 incomplete",
+               "{} samples, {} lost, {} incomplete", seen.samples.size(), lost, incomplete);
+
   // CAN_BCM counts each period from when it served the last: by some 8 us too long here.
   const auto slowest = GetParam().sync == SyncSource::Kernel ? kPeriod * 102 / 100 : kPeriod;
   EXPECT_GE(seen.samples.size() + 2, static_cast<std::size_t>(run_time(5s) / slowest));
@@ -180,9 +189,11 @@ TEST_P(DeadlinesInVirtualTime, FiveAxesAtOneKilohertzLoseNothingAndAreInTime) {
   const bool kernel = GetParam().sync == SyncSource::Kernel;
   EXPECT_LT(report("SYNC period off", kernel ? "200 us" : "500 us", jitter),
             kernel ? kPeriod / 5 : kPeriod / 2);
+
   // All five axes carry the time of the SYNC: what the sample says is where the machine was then.
   EXPECT_LT(report("time of the sample off", "50 us", time_error), 50us);
-  EXPECT_LT(report("data ready to sample in ring", "1 period, 1000 us", seen.ready_to_ring), kPeriod);
+  EXPECT_LT(report("data ready to sample in ring", "1 period, 1000 us", seen.ready_to_ring),
+            kPeriod);
   EXPECT_EQ(device.status().gaps, before.gaps);
   EXPECT_EQ(device.status().dropped, 0u);
 }
@@ -211,14 +222,14 @@ TEST_P(DeadlinesInVirtualTime, AnInterfaceThatWasDownStreamsAgainWithinASecond) 
   EXPECT_LT(took, 1s);
 }
 
-INSTANTIATE_TEST_SUITE_P(Encoders, DeadlinesInVirtualTime,
-                         testing::Values(Case{SyncSource::Kernel, false}, Case{SyncSource::Kernel, true},
-                                         Case{SyncSource::Thread, false}, Case{SyncSource::Thread, true}),
-                         [](const auto& instance) {
-                           return std::string{instance.param.sync == SyncSource::Kernel ? "KernelSync"
-                                                                                        : "ThreadSync"} +
-                                  (instance.param.busy ? "Busy" : "Idle");
-                         });
+INSTANTIATE_TEST_SUITE_P(
+    Encoders, DeadlinesInVirtualTime,
+    testing::Values(Case{SyncSource::Kernel, false}, Case{SyncSource::Kernel, true},
+                    Case{SyncSource::Thread, false}, Case{SyncSource::Thread, true}),
+    [](const auto& instance) {
+      return std::string{instance.param.sync == SyncSource::Kernel ? "KernelSync" : "ThreadSync"} +
+             (instance.param.busy ? "Busy" : "Idle");
+    });
 
 }  // namespace
 }  // namespace abbe::tests

@@ -1,5 +1,5 @@
-// Deadlines of the drivers behind TCP in virtual time, as deadlines_test.cpp has them for the encoders: from
-// when the simulated device wrote its bytes until their samples are in the ring.
+// Deadlines of the drivers behind TCP in virtual time, as deadlines_test.cpp has them for the
+// encoders: from when the simulated device wrote its bytes until their samples are in the ring.
 //
 // ABBE_HIL_SECONDS: virtual seconds of each run (default 5).
 
@@ -61,11 +61,14 @@ class MeasuredDriver {
     for (std::size_t n = blocks.size(); n == blocks.size();) {
       n = driver_.device->raw().pop(blocks);
       for (std::size_t i = 0; i < n; ++i)
-        came |= blocks[i].direction == protocol::RawBlock::Direction::FromDevice && blocks[i].length != 0;
+        came |= blocks[i].direction == protocol::RawBlock::Direction::FromDevice &&
+                blocks[i].length != 0;
     }
+
     const auto n = driver_.pop();
     samples_ = samples_ + n;
     if (!came) return;
+
     // More bytes of one write may come in a later turn: they are as old.
     if (const auto written = peer_.take_written()) written_ = *written;
     if (n != 0 && measuring_ && written_ != HostTime{}) times_.push_back(now - written_);
@@ -93,6 +96,7 @@ class DriverDeadlines : public testing::Test {
   void expect_samples_within_a_period(bool busy) {
     const BusyWorld world{busy};
     MeasuredDriver<Driver> driver;
+
     ASSERT_TRUE(driver.streams()) << driver.status().last_fault;
     ::usleep(500'000);  // the kernel cleans up after whoever ran before
     const auto before = driver.status();
@@ -102,12 +106,12 @@ class DriverDeadlines : public testing::Test {
     auto times = driver.stop();
     ASSERT_FALSE(times.empty());
     std::sort(times.begin(), times.end());
-    print_figure(
-        fmt::format("{}, {}: data written to samples in ring", Driver::kName, busy ? "busy" : "idle"),
-        fmt::format("1 period, {:.0f} us", us(Driver::kPeriod)),
-        "n {}, median {:.0f} us, p99.9 {:.0f} us, max {:.0f} us, {} gaps", times.size(),
-        us(times[times.size() / 2]), us(times[times.size() * 999 / 1000]), us(times.back()),
-        after.gaps - before.gaps);
+    print_figure(fmt::format("{}, {}: data written to samples in ring", Driver::kName,
+                             busy ? "busy" : "idle"),
+                 fmt::format("1 period, {:.0f} us", us(Driver::kPeriod)),
+                 "n {}, median {:.0f} us, p99.9 {:.0f} us, max {:.0f} us, {} gaps", times.size(),
+                 us(times[times.size() / 2]), us(times[times.size() * 999 / 1000]),
+                 us(times.back()), after.gaps - before.gaps);
     EXPECT_LT(times.back(), Driver::kPeriod);
     EXPECT_EQ(after.gaps, before.gaps);
     EXPECT_EQ(after.faults, before.faults) << after.last_fault;

@@ -1,6 +1,6 @@
-// The encoder driver with its own thread against the simulated nodes on a virtual CAN bus: SYNC by the device
-// thread and by the kernel. Real time on an emulated processor: what must hold however late anybody is. The
-// deadlines are in deadlines_test.cpp.
+// The encoder driver with its own thread against the simulated nodes on a virtual CAN bus: SYNC by
+// the device thread and by the kernel. Real time on an emulated processor: what must hold however
+// late anybody is. The deadlines are in deadlines_test.cpp.
 
 #include <gmock/gmock.h>
 #include <algorithm>
@@ -20,8 +20,8 @@ using sim::FaultKind;
 using testing::HasSubstr;
 
 constexpr std::size_t kAxes = 5;
-// An answer that is late by a whole period casts doubt on the next: long enough for an emulated, loaded
-// processor.
+// An answer that is late by a whole period casts doubt on the next: long enough for an emulated,
+// loaded processor.
 constexpr auto kPeriod = 10ms;
 
 class EncodersOnVcan : public testing::TestWithParam<SyncSource> {
@@ -33,9 +33,11 @@ class EncodersOnVcan : public testing::TestWithParam<SyncSource> {
     options.sync = GetParam();
     device = std::move(*drivers::EncoderDevice::create(
         options,
-        std::make_unique<drivers::SocketCanBus>(drivers::SocketCanOptions{.interface = vcan.name()}, time),
+        std::make_unique<drivers::SocketCanBus>(drivers::SocketCanOptions{.interface = vcan.name()},
+                                                time),
         time));
-    thread = std::move(*drivers::DeviceThread::start(*device, {.name = "encoders", .priority = 50}));
+    thread =
+        std::move(*drivers::DeviceThread::start(*device, {.name = "encoders", .priority = 50}));
   }
   void collect() {
     std::array<AxisSample, 1024> some{};
@@ -89,7 +91,8 @@ TEST_P(EncodersOnVcan, GiveOneSampleForEverySyncAndAccountForTheOthers) {
   for (std::size_t i = 1; i < samples.size(); ++i) {
     const auto& s = samples[i];
     ASSERT_EQ(complete(s), !has(s.head.flags, SampleFlag::AxisMissing));
-    const bool takes_back = s.head.time == samples[i - 1].head.time && !complete(s);  // a second answer came
+    // a second answer came
+    const bool takes_back = s.head.time == samples[i - 1].head.time && !complete(s);
     ASSERT_EQ(s.cycle, samples[i - 1].cycle + (takes_back ? 0 : 1));
     ASSERT_EQ(s.head.lost_before != 0, has(s.head.flags, SampleFlag::GapBefore));
   }
@@ -101,10 +104,12 @@ TEST_P(EncodersOnVcan, StampAllAxesWithTheOneTimeOfTheSync) {
   begin_streaming();
   ASSERT_TRUE(until([&] { return samples.size() >= 100; }));
   std::erase_if(samples, [](const auto& s) { return !complete(s); });
-  // Nodes on one axis of the machine took their positions at one time, and that time is the sample's. Anybody
-  // may still lose an emulated processor between two readings of the clocks.
-  EXPECT_GT(share_of([](const auto& s) { return s.count[0] == s.count[3] && s.count[1] == s.count[4]; }),
-            0.9);
+
+  // Nodes on one axis of the machine took their positions at one time, and that time is the
+  // sample's. Anybody may still lose an emulated processor between two readings of the clocks.
+  EXPECT_GT(
+      share_of([](const auto& s) { return s.count[0] == s.count[3] && s.count[1] == s.count[4]; }),
+      0.9);
   EXPECT_GT(share_of([&](const auto& s) {
               const double off_m = std::abs(s.position[0] - encoders.reading_m(0, s.head.time));
               return off_m <= kFeed_m_per_s * 200e-6 + 10e-9;
@@ -116,7 +121,8 @@ TEST_P(EncodersOnVcan, MarkAnAxisThatIsMissing) {
   begin_streaming();
   encoders.inject({.kind = FaultKind::Mute, .duration_s = 0.2, .node = 3});
   ASSERT_TRUE(until([&] {
-    return std::any_of(samples.begin(), samples.end(), [](const auto& s) { return s.missing_mask == 0b100; });
+    return std::any_of(samples.begin(), samples.end(),
+                       [](const auto& s) { return s.missing_mask == 0b100; });
   }));
   ASSERT_TRUE(until([&] { return complete(samples.back()); }));
 }
@@ -141,12 +147,14 @@ TEST_P(EncodersOnVcan, SayBusOffAtOnceAndComeBack) {
 TEST_P(EncodersOnVcan, SayThatTheInterfaceIsDownAndComeBackWhenItIsUp) {
   begin_streaming();
   vcan.down();
+
   ASSERT_TRUE(state_becomes("closed"));
   EXPECT_FALSE(device->status().connected);
   EXPECT_THAT(device->status().last_fault, HasSubstr("Network is down"));
   const auto faults = device->status().faults;
   ::usleep(1'200'000);
-  EXPECT_LE(device->status().faults, faults + 1) << "one refusal is one fault, however often it is tried";
+  EXPECT_LE(device->status().faults, faults + 1)
+      << "one refusal is one fault, however often it is tried";
   vcan.up();
   samples.clear();
   const auto up = time.now();
@@ -162,9 +170,11 @@ TEST_P(EncodersOnVcan, ReplayFromTheRawBytesToTheSameSamples) {
   collect();
   drivers::EncoderReceiver replay{{.axes = SimulatedEncoders::axes(kAxes), .sync_period = kPeriod}};
   std::vector<AxisSample> again;
-  for (const auto& block : raw) replay.on_raw(block, [&](const AxisSample& s) { again.push_back(s); });
+  for (const auto& block : raw)
+    replay.on_raw(block, [&](const AxisSample& s) { again.push_back(s); });
   ASSERT_GE(again.size(), samples.size());
   again.erase(again.begin(), again.end() - static_cast<std::ptrdiff_t>(samples.size()));
+
   for (std::size_t i = 0; i < samples.size(); ++i) {
     EXPECT_EQ(again[i].head.time, samples[i].head.time);
     EXPECT_EQ(again[i].count, samples[i].count);
@@ -172,44 +182,49 @@ TEST_P(EncodersOnVcan, ReplayFromTheRawBytesToTheSameSamples) {
   }
 }
 
-INSTANTIATE_TEST_SUITE_P(Sync, EncodersOnVcan, testing::Values(SyncSource::Thread, SyncSource::Kernel),
-                         sync_name);
+INSTANTIATE_TEST_SUITE_P(Sync, EncodersOnVcan,
+                         testing::Values(SyncSource::Thread, SyncSource::Kernel), sync_name);
 
 class SyncOfTheDevice : public testing::TestWithParam<SyncSource> {};
 
 TEST_P(SyncOfTheDevice, SeesAnotherSyncProducer) {
-  // Frames of this computer cannot be told from the kernel's own SYNC; but before that has run, none is ours.
+  // Frames of this computer cannot be told from the kernel's own SYNC; but before that has run,
+  // none is ours.
   drivers::MonotonicTime time;
   const VirtualCan vcan;
   drivers::EncoderDeviceOptions options;
   options.receiver.axes = SimulatedEncoders::axes(1);
   options.sync = GetParam();
-  auto bus =
-      std::make_unique<drivers::SocketCanBus>(drivers::SocketCanOptions{.interface = vcan.name()}, time);
+  auto bus = std::make_unique<drivers::SocketCanBus>(
+      drivers::SocketCanOptions{.interface = vcan.name()}, time);
   auto device = std::move(*drivers::EncoderDevice::create(options, std::move(bus), time));
   device->wait(1ms);
-  const CanSocket rival{vcan};
+  const CanSocket foreign{vcan};
+
   for (int i = 0; i < 2; ++i) {
-    ASSERT_TRUE(rival.send(can::encode_sync()));
+    ASSERT_TRUE(foreign.send(can::encode_sync()));
     device->wait(100ms);
   }
+
   EXPECT_EQ(device->status().state, "foreign SYNC");
   EXPECT_THAT(device->status().last_fault, HasSubstr("another SYNC producer"));
 }
 
-INSTANTIATE_TEST_SUITE_P(Sync, SyncOfTheDevice, testing::Values(SyncSource::Thread, SyncSource::Kernel),
-                         sync_name);
+INSTANTIATE_TEST_SUITE_P(Sync, SyncOfTheDevice,
+                         testing::Values(SyncSource::Thread, SyncSource::Kernel), sync_name);
 
 TEST(EncodersWithoutAnInterface, SayWhichIsMissingOnce) {
   drivers::MonotonicTime time;
   drivers::EncoderDeviceOptions options;
   options.receiver.axes = SimulatedEncoders::axes(1);
   options.reopen_after = 10ms;
-  auto bus = std::make_unique<drivers::SocketCanBus>(drivers::SocketCanOptions{.interface = "can99"}, time);
+  auto bus = std::make_unique<drivers::SocketCanBus>(
+      drivers::SocketCanOptions{.interface = "can99"}, time);
   auto device = std::move(*drivers::EncoderDevice::create(options, std::move(bus), time));
   for (int turn = 0; turn < 20; ++turn) device->wait(10ms);
   EXPECT_EQ(device->status().faults, 1u);
-  EXPECT_THAT(device->status().last_fault, testing::AllOf(HasSubstr("can99"), HasSubstr("No such device")));
+  EXPECT_THAT(device->status().last_fault,
+              testing::AllOf(HasSubstr("can99"), HasSubstr("No such device")));
 }
 
 }  // namespace

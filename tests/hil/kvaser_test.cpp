@@ -1,7 +1,7 @@
-// The SocketCAN transport and the encoder driver on two emulated Kvaser PCI cards (SJA1000 controllers with
-// the kernel's own driver) on one bus: can0 is ours, can1 the rest of the world. Not paced by the bit rate,
-// and the emulator knows no bus errors: no missing acknowledge, no bus-off; see vcan for those, and a real
-// controller for restart-ms.
+// The SocketCAN transport and the encoder driver on two emulated Kvaser PCI cards (SJA1000
+// controllers with the kernel's own driver) on one bus: can0 is ours, can1 the rest of the world.
+// Not paced by the bit rate, and the emulator knows no bus errors: no missing acknowledge, no
+// bus-off; see vcan for those, and a real controller for restart-ms.
 
 #include <gmock/gmock.h>
 #include <fstream>
@@ -24,7 +24,8 @@ std::string said_by(const std::string& command) {
   std::string text;
   FILE* pipe = ::popen(command.c_str(), "r");
   std::array<char, 4096> some{};
-  while (pipe != nullptr && std::fgets(some.data(), some.size(), pipe) != nullptr) text += some.data();
+  while (pipe != nullptr && std::fgets(some.data(), some.size(), pipe) != nullptr)
+    text += some.data();
   if (pipe != nullptr) ::pclose(pipe);
   return text;
 }
@@ -75,12 +76,14 @@ TEST_F(Kvaser, CarriesFramesBothWaysWithKernelStamps) {
   const CanSocket other{theirs};
   wait_for_stamps(bus, other, can::standard_frame(0x181, {0}));
   const auto widened = bus.counters().time_widened;
+
   for (std::uint8_t n = 0; n < 100; ++n) {
     ASSERT_TRUE(other.send(can::standard_frame(0x181, {n})));
     const auto got = read(bus, 1);
     ASSERT_EQ(got.size(), 1u);
     EXPECT_EQ(got[0].frame, can::standard_frame(0x181, {n}));
   }
+
   EXPECT_EQ(bus.counters().time_widened, widened);
   ASSERT_TRUE(bus.send(std::array{can::standard_frame(0x601, {1})}).has_value());
   EXPECT_EQ(other.receive(1000ms), can::standard_frame(0x601, {1}));
@@ -100,10 +103,12 @@ TEST_F(Kvaser, AccountsForEveryFrameOfABurst) {
   const CanSocket other{theirs};
   const auto overruns_before = statistic("can0", "rx_over_errors");
   std::size_t sent = 0;
+
   for (std::size_t n = 0; n < kBurst; ++n) {
     while (!other.send(can::standard_frame(0x181, {1, 2, 3, 4}))) ::usleep(200);
     ++sent;
   }
+
   std::size_t data = 0;
   std::size_t overflows = 0;
   for (const auto& received : read(bus, 2 * kBurst)) {
@@ -111,7 +116,9 @@ TEST_F(Kvaser, AccountsForEveryFrameOfABurst) {
     data += report ? 0 : 1;
     overflows += report && has(report->conditions, can::BusCondition::ReceiveOverflow) ? 1 : 0;
   }
-  // The controller's own FIFO may overflow, which it says; the kernel's queue must not, or it is counted.
+
+  // The controller's own FIFO may overflow, which it says; the kernel's queue must not, or it is
+  // counted.
   const bool all = data + bus.counters().lost == sent;
   EXPECT_TRUE(all || overflows != 0) << data << " of " << sent << ", no overflow told";
   EXPECT_EQ(overflows, statistic("can0", "rx_over_errors") - overruns_before);
@@ -158,8 +165,8 @@ TEST_F(Kvaser, TellsOurOwnSyncWhenItHasLeftTheController) {
 TEST_F(Kvaser, HearsARivalOfTheKernelsSync) {
   SocketCanBus bus{{.interface = "can0"}, time};
   ASSERT_TRUE(bus.open(std::array<std::uint32_t, 1>{can::cob::kSync}).has_value());
-  const CanSocket rival{theirs};
-  ASSERT_TRUE(rival.send(can::encode_sync()));
+  const CanSocket foreign{theirs};
+  ASSERT_TRUE(foreign.send(can::encode_sync()));
   const auto got = read(bus, 1);
   ASSERT_EQ(got.size(), 1u);
   EXPECT_FALSE(got[0].echo);
@@ -174,14 +181,18 @@ TEST_P(KvaserStream, GivesFiveAxesThroughTheRealDriver) {
   options.receiver.sync_period = 5ms;  // an emulated controller on an emulated processor
   options.sync = GetParam();
   auto device = std::move(*drivers::EncoderDevice::create(
-      options, std::make_unique<SocketCanBus>(drivers::SocketCanOptions{.interface = "can0"}, time), time));
-  const auto thread = std::move(*drivers::DeviceThread::start(*device, {.name = "encoders", .priority = 50}));
+      options, std::make_unique<SocketCanBus>(drivers::SocketCanOptions{.interface = "can0"}, time),
+      time));
+  const auto thread =
+      std::move(*drivers::DeviceThread::start(*device, {.name = "encoders", .priority = 50}));
   std::size_t complete = 0;
+
   for (const auto end = time.now() + 10s; complete < 200 && time.now() < end; ::usleep(5'000)) {
     std::array<protocol::AxisSample, 256> some{};
     const auto n = device->samples().pop(some);
     for (std::size_t i = 0; i < n; ++i) complete += some[i].missing_mask == 0 ? 1 : 0;
   }
+
   EXPECT_GE(complete, 200u) << device->status().last_fault;
   EXPECT_EQ(device->status().state, "streaming");
 }

@@ -1,5 +1,6 @@
-// The whole daemon with all devices at once for as long as wanted, on this computer and in its own time:
-// needs root, no guest. scripts/soak runs it; a computer that is busy with other things may fail it.
+// The whole daemon with all devices at once for as long as wanted, on this computer and in its own
+// time: needs root, no guest. scripts/soak runs it; a computer that is busy with other things may
+// fail it.
 //
 // ABBE_HIL_SECONDS: default 20.
 

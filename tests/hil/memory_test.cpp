@@ -20,7 +20,9 @@ constexpr std::size_t kPage = 4096;
 /// Anonymous memory as a large vector would get it.
 class Mapping {
  public:
-  Mapping() : bytes_(static_cast<char*>(::mmap(nullptr, kBytes, PROT_READ | PROT_WRITE, kFlags, -1, 0))) {}
+  Mapping()
+      : bytes_(static_cast<char*>(::mmap(nullptr, kBytes, PROT_READ | PROT_WRITE, kFlags, -1, 0))) {
+  }
   Mapping(const Mapping&) = delete;
   Mapping& operator=(const Mapping&) = delete;
   ~Mapping() { ::munmap(bytes_, kBytes); }
@@ -29,8 +31,8 @@ class Mapping {
   [[nodiscard]] std::size_t resident_pages() const {
     std::vector<unsigned char> resident(kBytes / kPage);
     EXPECT_EQ(::mincore(bytes_, kBytes, resident.data()), 0);
-    return static_cast<std::size_t>(
-        std::count_if(resident.begin(), resident.end(), [](auto page) { return (page & 1U) != 0; }));
+    return static_cast<std::size_t>(std::count_if(resident.begin(), resident.end(),
+                                                  [](auto page) { return (page & 1U) != 0; }));
   }
 
  private:

@@ -34,8 +34,8 @@ class ProcessUse {
   /// Resident memory at the end less that in the middle: without what the first half fills once.
   [[nodiscard]] long late_growth_kB() const { return resident_kB_.back() - at_half(); }
   [[nodiscard]] std::string memory() const {
-    return fmt::format("{} kB at first, {} kB at half, {} kB at the end", resident_kB_.front(), at_half(),
-                       resident_kB_.back());
+    return fmt::format("{} kB at first, {} kB at half, {} kB at the end", resident_kB_.front(),
+                       at_half(), resident_kB_.back());
   }
 
  private:

@@ -1,5 +1,6 @@
-// How soon each driver shows that its device misbehaves, and how soon it streams again when the device is
-// well: every fault the simulated devices know, in virtual time, against what is asked of it.
+// How soon each driver shows that its device misbehaves, and how soon it streams again when the
+// device is well: every fault the simulated devices know, in virtual time, against what is asked of
+// it.
 
 #include <gtest/gtest.h>
 
@@ -38,37 +39,41 @@ class Recovery {
  public:
   Recovery(FaultTarget target, const Row& row)
       : row_(row),
-        driver_(
-            {{target, {.kind = row.kind, .at_s = kAt_s, .duration_s = row.duration_s, .value = row.value}}}),
+        driver_({{target,
+                  {.kind = row.kind,
+                   .at_s = kAt_s,
+                   .duration_s = row.duration_s,
+                   .value = row.value}}}),
         begin_(*driver_.simulation->machine().started() + sim::seconds_to_ns(kAt_s)),
         end_(begin_ + sim::seconds_to_ns(row.duration_s)) {}
 
   void measure() {
     drivers::DeviceStatus before;
     // On a busy computer one turn may outlast the time just before the fault.
-    (void)turns_until(begin_ - kJustBefore, [&] {
+    (void)cycles_until(begin_ - kJustBefore, [&] {
       if (monotonic().now() < begin_) before = driver_.device->status();
       return false;
     });
+
     ASSERT_TRUE(usable_since(HostTime{})) << driver_.device->status().last_fault;
     std::erase_if(heads_, [this](const auto& head) { return head.time < begin_ - kJustBefore; });
-    ASSERT_TRUE(turns_until(begin_ + 10s, [&] { return shows(before); })) << "never visible";
+    ASSERT_TRUE(cycles_until(begin_ + 10s, [&] { return shows(before); })) << "never visible";
     const auto visible = std::max(seen_at_, begin_) - begin_;
     const auto well = end_ + row_.start_up;
-    ASSERT_TRUE(turns_until(well + 30s, [&] { return usable_since(end_); }))
+    ASSERT_TRUE(cycles_until(well + 30s, [&] { return usable_since(end_); }))
         << "never again; " << driver_.device->status().last_fault;
     const auto again = std::max(monotonic().now(), well) - well;
     print_figure(fmt::format("recovery, {}, {}", Driver::kName, row_.name),
                  fmt::format("visible {:.0f} ms, again {:.0f} ms", ms(row_.visible), ms(kAgain)),
-                 "visible after {:.1f} ms, data again {:.1f} ms after the device is well", ms(visible),
-                 ms(again));
+                 "visible after {:.1f} ms, data again {:.1f} ms after the device is well",
+                 ms(visible), ms(again));
     EXPECT_LE(visible, row_.visible) << row_.name;
     EXPECT_LE(again, kAgain) << row_.name;
   }
 
  private:
   template <class Done>
-  bool turns_until(HostTime limit, Done done) {
+  bool cycles_until(HostTime limit, Done done) {
     while (!done()) {
       if (monotonic().now() > limit) return false;
       driver_.device->wait(1ms);
@@ -119,11 +124,12 @@ void measure_all(FaultTarget target, const std::vector<Row>& rows) {
 }
 
 TEST(Recovery, OfEncoders) {
-  measure_all<Encoders>(FaultTarget::Encoder, {{"mute", FaultKind::Mute, 2ms},
-                                               {"bus-off", FaultKind::BusOff, 100ms},
-                                               {"emergency", FaultKind::Emergency, 100ms, 0.5, 0x5000},
-                                               {"garbage", FaultKind::BusGarbage, 100ms, 0.0},
-                                               {"restart", FaultKind::Restart, 2ms, 0.02}});
+  measure_all<Encoders>(FaultTarget::Encoder,
+                        {{"mute", FaultKind::Mute, 2ms},
+                         {"bus-off", FaultKind::BusOff, 100ms},
+                         {"emergency", FaultKind::Emergency, 100ms, 0.5, 0x5000},
+                         {"garbage", FaultKind::BusGarbage, 100ms, 0.0},
+                         {"restart", FaultKind::Restart, 2ms, 0.02}});
 }
 
 TEST(Recovery, OfTheCounterCard) {

@@ -1,6 +1,6 @@
 #pragma once
-/// Simulated devices behind TCP in a thread of their own, above everything that is measured, which keeps when
-/// they wrote what their client has not taken yet.
+/// Simulated devices behind TCP in a thread of their own, above everything that is measured, which
+/// keeps when they wrote what their client has not taken yet.
 
 #include <gtest/gtest.h>
 #include <linux/tcp.h>
@@ -57,12 +57,14 @@ class ServedDevices {
     constexpr std::chrono::nanoseconds kLongest = std::chrono::milliseconds{20};
     std::vector<pollfd> fds;
     peer_.add_poll_fds(fds);
-    const auto wait = std::clamp(peer_.next_due() - clock_.now(), std::chrono::nanoseconds{0}, kLongest);
+    const auto wait =
+        std::clamp(peer_.next_due() - clock_.now(), std::chrono::nanoseconds{0}, kLongest);
     const timespec timeout{0, static_cast<long>(wait.count())};
     ::ppoll(fds.data(), fds.size(), &timeout, nullptr);
     const auto before = sent(fds);
     peer_.poll(clock_.now());
     if (sent(fds) == before) return;
+
     // On the one processor of the guest nobody of lower priority has run since the write.
     std::int64_t none = 0;
     written_.compare_exchange_strong(none, clock_.now().time_since_epoch().count(),
@@ -73,7 +75,8 @@ class ServedDevices {
     for (const auto& fd : fds) {
       tcp_info info{};
       socklen_t size = sizeof info;
-      if (::getsockopt(fd.fd, IPPROTO_TCP, TCP_INFO, &info, &size) == 0) bytes += info.tcpi_bytes_sent;
+      if (::getsockopt(fd.fd, IPPROTO_TCP, TCP_INFO, &info, &size) == 0)
+        bytes += info.tcpi_bytes_sent;
     }
     return bytes;
   }
@@ -97,7 +100,8 @@ inline ServedDevices::Peer peer_of(sim::IppDmeServer& server) {
           [&] { return server.next_due(); }, [&](protocol::HostTime now) { server.poll(now); }};
 }
 inline sim::IppDmeServer open_measuring_machine(protocol::HostTime now) {
-  return sim::IppDmeServer::open(0, std::make_unique<sim::IppDmeDevice>(sim::IppDmeOptions{}, now)).value();
+  return sim::IppDmeServer::open(0, std::make_unique<sim::IppDmeDevice>(sim::IppDmeOptions{}, now))
+      .value();
 }
 
 }  // namespace abbe::tests

@@ -1,6 +1,6 @@
 #pragma once
-/// Each driver with its simulated device, for whoever gives the device a thread (ServedDevices) and the
-/// driver its turns.
+/// Each driver with its simulated device, for whoever gives the device a thread (ServedDevices) and
+/// the driver its turns.
 
 #include <fmt/format.h>
 #include <unistd.h>
@@ -39,7 +39,8 @@ std::size_t pop_all(Ring& ring, Heads* heads) {
   return all;
 }
 
-inline std::unique_ptr<sim::Simulation> open_simulation(sim::SimulationSetup setup, const Faults& faults) {
+inline std::unique_ptr<sim::Simulation> open_simulation(sim::SimulationSetup setup,
+                                                        const Faults& faults) {
   setup.path.vertices = {{{0, 0, 0}}, {{0.2, 0.1, 0}}, {{0, 0, 0}}};
   setup.start_when_streaming = false;
   setup.standstill = {};
@@ -63,11 +64,14 @@ struct Encoders : Simulated<drivers::EncoderDevice> {
     sim::SimulationSetup setup;
     setup.bus.emplace();
     drivers::EncoderDeviceOptions options;
+
     for (std::uint8_t i = 0; i < 5; ++i) {
       const auto node = static_cast<protocol::can::NodeId>(i + 1);
-      setup.nodes.push_back({.node = node, .axis = sim::kAxes[i % sim::kAxes.size()], .boot_time = 20ms});
+      setup.nodes.push_back(
+          {.node = node, .axis = sim::kAxes[i % sim::kAxes.size()], .boot_time = 20ms});
       options.receiver.axes.push_back({.name = std::string(1, "XYZAC"[i]), .node = node});
     }
+
     simulation = open_simulation(setup, faults);
     device = drivers::EncoderDevice::create(
                  options,
@@ -76,7 +80,9 @@ struct Encoders : Simulated<drivers::EncoderDevice> {
                  monotonic())
                  .value();
   }
-  std::size_t pop(Heads* heads = nullptr) { return pop_all<protocol::AxisSample>(device->samples(), heads); }
+  std::size_t pop(Heads* heads = nullptr) {
+    return pop_all<protocol::AxisSample>(device->samples(), heads);
+  }
 };
 
 struct Tracker : Simulated<drivers::TrackerDevice> {
@@ -94,11 +100,14 @@ struct Tracker : Simulated<drivers::TrackerDevice> {
     options.port = simulation->tracker()->port();
     device = drivers::TrackerDevice::create(options, monotonic()).value();
   }
-  std::size_t pop(Heads* heads = nullptr) { return pop_all<protocol::TrackerPoint>(device->points(), heads); }
+  std::size_t pop(Heads* heads = nullptr) {
+    return pop_all<protocol::TrackerPoint>(device->points(), heads);
+  }
 };
 
 struct CounterCard : Simulated<drivers::CounterCardDevice> {
-  static constexpr const char* kName = "counter card, USB/IP in the process, a transfer each 1.5 ms";
+  static constexpr const char* kName =
+      "counter card, USB/IP in the process, a transfer each 1.5 ms";
   static constexpr nanoseconds kPeriod = 1500us;
   static constexpr std::size_t kFirst = 2000;
 
@@ -107,11 +116,13 @@ struct CounterCard : Simulated<drivers::CounterCardDevice> {
     auto& card = setup.counter_cards.emplace_back();
     drivers::CounterCardOptions options;
     auto& wiring = options.receiver.wiring;
+
     for (std::uint8_t i = 0; i < 5; ++i) {
       const std::string name(1, "XYZAC"[i]);
       card.axes.push_back({.name = name, .channel = i});
       wiring.axes.push_back({.name = name, .channel = i, .scale = 1e-8});
     }
+
     wiring.clock_channel = card.clock_channel;
     wiring.clock_hz = card.clock_hz;
     wiring.latch_channel = card.latch_channel;
@@ -123,7 +134,9 @@ struct CounterCard : Simulated<drivers::CounterCardDevice> {
         monotonic());
     device = drivers::CounterCardDevice::create(options, std::move(link), monotonic()).value();
   }
-  std::size_t pop(Heads* heads = nullptr) { return pop_all<protocol::AxisSample>(device->samples(), heads); }
+  std::size_t pop(Heads* heads = nullptr) {
+    return pop_all<protocol::AxisSample>(device->samples(), heads);
+  }
 };
 
 struct Environment : Simulated<drivers::EnvironmentDevice> {
@@ -138,7 +151,8 @@ struct Environment : Simulated<drivers::EnvironmentDevice> {
     drivers::EnvironmentDeviceOptions options;
     options.address = drivers::ModbusTcp{"127.0.0.1", simulation->environment().front().port()};
     options.map =
-        drivers::known_map("comet-t7510", {.serial_number = sim::ModbusIdentity{}.serial_number}).value();
+        drivers::known_map("comet-t7510", {.serial_number = sim::ModbusIdentity{}.serial_number})
+            .value();
     options.period = kPeriod;
     device = drivers::EnvironmentDevice::create(options, monotonic()).value();
   }
@@ -158,7 +172,8 @@ struct SerialEnvironment : Simulated<drivers::EnvironmentDevice> {
     drivers::EnvironmentDeviceOptions options;
     options.address = drivers::ModbusSerial{.path = link};
     options.map =
-        drivers::known_map("comet-t7510", {.serial_number = sim::ModbusIdentity{}.serial_number}).value();
+        drivers::known_map("comet-t7510", {.serial_number = sim::ModbusIdentity{}.serial_number})
+            .value();
     options.period = 100ms;
     device = drivers::EnvironmentDevice::create(options, monotonic()).value();
   }

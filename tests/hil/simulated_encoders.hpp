@@ -1,6 +1,6 @@
 #pragma once
-/// The simulator's encoder bus with a thread of its own: nodes 1 to n, measuring the axes of a machine that
-/// moves along X, Y and Z at once at constant speed.
+/// The simulator's encoder bus with a thread of its own: nodes 1 to n, measuring the axes of a
+/// machine that moves along X, Y and Z at once at constant speed.
 
 #include <poll.h>
 #include <pthread.h>
@@ -33,15 +33,18 @@ class SimulatedEncoders {
     const auto now = clock_.now();
     machine_.start(now);
     std::vector<sim::EncoderNodeOptions> nodes;
+
     for (std::size_t i = 0; i < axes; ++i) {
       nodes.push_back({.node = static_cast<can::NodeId>(i + 1),
                        .axis = sim::kAxes[i % sim::kAxes.size()],
                        .noise_m = 0.0,
                        .boot_time = std::chrono::milliseconds{20}});
     }
+
     auto bus = sim::EncoderBus::open(options, nodes, machine_, now);
     EXPECT_TRUE(bus.has_value()) << bus.error().text;
     bus_.emplace(std::move(*bus));
+
     thread_ = std::thread([this, priority] {
       const sched_param param{.sched_priority = priority};
       if (priority != 0) {
@@ -91,9 +94,11 @@ class SimulatedEncoders {
     return plan;
   }
   void serve() {
-    constexpr std::chrono::nanoseconds kLongest = std::chrono::milliseconds{5};  // so soon faults are heard
+    // so soon faults are heard
+    constexpr std::chrono::nanoseconds kLongest = std::chrono::milliseconds{5};
     while (!stop_) {
-      const auto wait = std::clamp(bus_->next_due() - clock_.now(), std::chrono::nanoseconds{0}, kLongest);
+      const auto wait =
+          std::clamp(bus_->next_due() - clock_.now(), std::chrono::nanoseconds{0}, kLongest);
       const timespec timeout{0, static_cast<long>(wait.count())};
       pollfd ready{bus_->fd(), POLLIN, 0};
       ::ppoll(&ready, 1, &timeout, nullptr);

@@ -1,6 +1,6 @@
-// Five axes and their SYNC at 1 kHz over UDP, for as long as wanted: in the guest, in virtual time, and by
-// scripts/soak also on this computer and in its own time, where other work, or a hypervisor that takes the
-// processor away for more than a period, may fail it.
+// Five axes and their SYNC at 1 kHz over UDP, for as long as wanted: in the guest, in virtual time,
+// and by scripts/soak also on this computer and in its own time, where other work, or a hypervisor
+// that takes the processor away for more than a period, may fail it.
 //
 // ABBE_HIL_SECONDS: default 5.
 
@@ -28,9 +28,11 @@ TEST(FiveAxesOverUdp, AreNeverMissing) {
   options.receiver.axes = SimulatedEncoders::axes(kAxes);
   auto device = std::move(*drivers::EncoderDevice::create(
       options,
-      std::make_unique<drivers::UdpCanBus>(drivers::UdpCanOptions{.peer_port = encoders.port()}, time),
+      std::make_unique<drivers::UdpCanBus>(drivers::UdpCanOptions{.peer_port = encoders.port()},
+                                           time),
       time));
-  const auto thread = std::move(*drivers::DeviceThread::start(*device, {.name = "encoders", .priority = 50}));
+  const auto thread =
+      std::move(*drivers::DeviceThread::start(*device, {.name = "encoders", .priority = 50}));
 
   std::vector<protocol::AxisSample> some(4096);
   std::vector<protocol::RawBlock> blocks(4096);  // too much for a stack
@@ -46,7 +48,8 @@ TEST(FiveAxesOverUdp, AreNeverMissing) {
       lost += some[i].head.lost_before;
     }
   };
-  for (int i = 0; i < 500 && device->status().state != "streaming"; ++i, ::usleep(10'000)) take(false);
+  for (int i = 0; i < 500 && device->status().state != "streaming"; ++i, ::usleep(10'000))
+    take(false);
   ASSERT_EQ(device->status().state, "streaming") << device->status().last_fault;
   ::usleep(100'000);
   take(false);
@@ -56,8 +59,8 @@ TEST(FiveAxesOverUdp, AreNeverMissing) {
   computer.stop();
   print_figure("5 axes + SYNC at 1 kHz over UDP", "0 lost, 0 incomplete",
                "{} samples, {} lost, {} incomplete", samples, lost, incomplete);
-  print_figure("  a bare thread beside it", "-", "{} of {} periods more than 0.8 ms late", computer.late(),
-               computer.periods());
+  print_figure("  a bare thread beside it", "-", "{} of {} periods more than 0.8 ms late",
+               computer.late(), computer.periods());
   EXPECT_GE(samples + 50, static_cast<std::size_t>(asked / 1ms));
   EXPECT_EQ(incomplete, 0u);
   EXPECT_EQ(lost, 0u);

@@ -1,6 +1,6 @@
-// The counter card driver through libusb and the kernel's USB stack: the simulated card's USB/IP server
-// attached by vhci_hcd, and an unplug as dummy_hcd shows it. In virtual time where a rate is asserted. Needs
-// udev for hot-plug.
+// The counter card driver through libusb and the kernel's USB stack: the simulated card's USB/IP
+// server attached by vhci_hcd, and an unplug as dummy_hcd shows it. In virtual time where a rate is
+// asserted. Needs udev for hot-plug.
 //
 // ABBE_HIL_SECONDS: of the streaming run (default 3).
 
@@ -33,7 +33,8 @@ namespace usbip = protocol::usbip;
 using testing::HasSubstr;
 
 constexpr const char* kAttach = "/sys/devices/platform/vhci_hcd.0/attach";
-constexpr const char* kGadget = "/sys/kernel/config/usb_gadget/abbe/UDC";  // nothing in it: unplugged
+constexpr const char* kGadget =
+    "/sys/kernel/config/usb_gadget/abbe/UDC";  // nothing in it: unplugged
 constexpr const char* kDetach = "/sys/devices/platform/vhci_hcd.0/detach";
 constexpr double kScans_hz = 100e3 / 3.0;
 constexpr double kClock_hz = 1e6;
@@ -57,14 +58,18 @@ drivers::CounterCardOptions eight_counters() {
 sim::CounterCardOptions card_of_a_moving_machine(double speed_m_per_s) {
   sim::CounterCardOptions card;
   for (std::size_t i = 0; i < 5; ++i) {
-    card.channels[i].phases = sim::ScaleSignal{
-        .reading = [speed_m_per_s](
-                       sim::HostTime t) { return speed_m_per_s * sim::ns_to_seconds(t.time_since_epoch()); },
-        .step = kStep_m};
+    card.channels[i].phases =
+        sim::ScaleSignal{.reading =
+                             [speed_m_per_s](sim::HostTime t) {
+                               return speed_m_per_s * sim::ns_to_seconds(t.time_since_epoch());
+                             },
+                         .step = kStep_m};
   }
+
   card.channels[5].phases = sim::ClockSignal{.hz = kClock_hz};
   card.channels[6] = {sim::ClockSignal{.hz = kClock_hz}, true};
   card.channels[7].phases = sim::ProbeSignal{};
+
   return card;
 }
 
@@ -95,10 +100,11 @@ class SimulatedCard {
     while (!stop_) {
       std::vector<pollfd> fds{{server_.listener_fd(), POLLIN, 0}};
       if (server_.client_fd() >= 0) {
-        fds.push_back(
-            {server_.client_fd(), static_cast<short>(server_.wants_write() ? POLLIN | POLLOUT : POLLIN), 0});
+        fds.push_back({server_.client_fd(),
+                       static_cast<short>(server_.wants_write() ? POLLIN | POLLOUT : POLLIN), 0});
       }
-      const auto wait = std::clamp(server_.next_due() - clock_.now(), 0ns, std::chrono::nanoseconds{5ms});
+      const auto wait =
+          std::clamp(server_.next_due() - clock_.now(), 0ns, std::chrono::nanoseconds{5ms});
       const timespec timeout{0, static_cast<long>(wait.count())};
       ::ppoll(fds.data(), fds.size(), &timeout, nullptr);
       if (pulled_ != out) {
@@ -142,6 +148,7 @@ double ms(std::chrono::nanoseconds t) {
                       static_cast<unsigned>(reply->device.speed));
   file.close();
   ::close(fd);  // the kernel holds it now
+
   return file ? ::testing::AssertionSuccess()
               : ::testing::AssertionFailure() << "vhci_hcd refuses the connection";
 }
@@ -210,9 +217,12 @@ TEST_F(CardThroughLibusb, GivesEveryScanOfEightCountersAt33kHz) {
   const double rate_hz =
       static_cast<double>(samples) / std::chrono::duration<double>(time.now() - begin).count();
   const auto after = device->status();
-  print_figure("encoder path, 8 counters through libusb and vhci_hcd", "33333/s, 0 lost, 0 unflagged gaps",
-               "{} scans, {:.0f}/s, {} lost, {} gaps", samples, rate_hz, lost, after.gaps - before.gaps);
-  EXPECT_NEAR(rate_hz, kScans_hz, 0.02 * kScans_hz);  // the last transfer under way, and when we looked
+  print_figure("encoder path, 8 counters through libusb and vhci_hcd",
+               "33333/s, 0 lost, 0 unflagged gaps", "{} scans, {:.0f}/s, {} lost, {} gaps", samples,
+               rate_hz, lost, after.gaps - before.gaps);
+
+  EXPECT_NEAR(rate_hz, kScans_hz,
+              0.02 * kScans_hz);  // the last transfer under way, and when we looked
   EXPECT_EQ(lost, 0u);
   EXPECT_EQ(after.gaps, before.gaps);
   EXPECT_EQ(after.dropped, 0u);
@@ -224,6 +234,7 @@ TEST_F(CardThroughLibusb, IsLostWhenItsConnectionBreaksAndStreamsWhenItIsBack) {
   ASSERT_TRUE(streams()) << device->status().last_fault;
   card.pull();
   const auto pulled = time.now();
+
   ASSERT_TRUE(until([&] { return !device->status().connected; }));
   print_figure("USB connection broken to fault", "100 ms", "{:.0f} ms", ms(time.now() - pulled));
   EXPECT_NE(device->status().last_fault, "");
@@ -239,15 +250,17 @@ TEST_F(CardThroughLibusb, IsLostWhenItsConnectionBreaksAndStreamsWhenItIsBack) {
   EXPECT_NE(flags & (protocol::SampleFlag::Restarted | protocol::SampleFlag::GapBefore), 0u);
 }
 
-/// A gadget of the kernel itself, unplugged by taking it off its controller: transfers fail first, the notice
-/// comes after.
+/// A gadget of the kernel itself, unplugged by taking it off its controller: transfers fail first,
+/// the notice comes after.
 TEST(LibusbLinkOnDummyHcd, TellsAnUnplug) {
   ASSERT_TRUE(run("tests/hil/guest/plug-gadget"));
   drivers::MonotonicTime time;
-  drivers::LibusbLink link{{.vendor = 0x1209, .product = 0x0002, .serial = "", .bulk_endpoint = 0x81}, time};
+  drivers::LibusbLink link{
+      {.vendor = 0x1209, .product = 0x0002, .serial = "", .bulk_endpoint = 0x81}, time};
   std::size_t bytes = 0;
   bool opened = false;
   std::optional<std::string> lost;
+
   const auto serve = [&](auto done) {
     for (const auto end = time.now() + 10s; !done() && time.now() < end;) {
       for (const auto& event : link.wait(50ms)) {
@@ -262,6 +275,7 @@ TEST(LibusbLinkOnDummyHcd, TellsAnUnplug) {
     }
     return done();
   };
+
   link.open();
   ASSERT_TRUE(serve([&] { return opened; }));
   link.start_bulk_in({.transfer_bytes = 4096, .in_flight = 8});
@@ -269,8 +283,8 @@ TEST(LibusbLinkOnDummyHcd, TellsAnUnplug) {
   const auto unplugged = time.now();
   std::ofstream{kGadget} << "\n" << std::flush;
   ASSERT_TRUE(serve([&] { return lost.has_value(); }));
-  print_figure("USB unplug on dummy_hcd to loss", "100 ms", "{:.0f} ms: {}", ms(time.now() - unplugged),
-               *lost);
+  print_figure("USB unplug on dummy_hcd to loss", "100 ms", "{:.0f} ms: {}",
+               ms(time.now() - unplugged), *lost);
   EXPECT_NE(*lost, "");
 }
 

@@ -1,6 +1,6 @@
 #pragma once
-/// abbed and abbe-sim as processes, asked by `abbe status --json` as a person would, in a folder that goes
-/// with the test. Real-time threads: needs root.
+/// abbed and abbe-sim as processes, asked by `abbe status --json` as a person would, in a folder
+/// that goes with the test. Real-time threads: needs root.
 ///
 /// ABBE_HIL_SECONDS: of the measured run (default 20).
 
@@ -28,7 +28,8 @@ inline int run_seconds() {
 class WholeDaemon : public testing::Test {
  protected:
   using json = nlohmann::json;
-  /// A stream of the status and how many samples a second it must bring at least; 0: comes when it likes.
+  /// A stream of the status and how many samples a second it must bring at least; 0: comes when it
+  /// likes.
   struct Stream {
     std::string name;
     double rate_hz = 0.0;
@@ -53,15 +54,15 @@ class WholeDaemon : public testing::Test {
     std::filesystem::remove_all(directory_);
   }
 
-  /// `simulated`: further tables of the simulator; `wired`: of both, `read`: of the daemon. PORT_OF(name) in
-  /// them is the simulator's port of that name, 0 in its own file.
+  /// `simulated`: further tables of the simulator; `wired`: of both, `read`: of the daemon.
+  /// PORT_OF(name) in them is the simulator's port of that name, 0 in its own file.
   void start_all(const std::string& simulated, const std::string& wired, const std::string& read) {
     write("machine.toml", to_toml(config_tables::mill()) + with_ports(wired));
     write("sim.toml", kSimulator + simulated);
     write("path.csv", path());
     // Above everything of abbed: what it stands for takes no processor time at all.
-    simulator_ = start({"/usr/bin/chrt", "-f", "90", ABBE_SIM_PROGRAM, "run", "--config", file("sim.toml"),
-                        "--ports-file", file("ports")},
+    simulator_ = start({"/usr/bin/chrt", "-f", "90", ABBE_SIM_PROGRAM, "run", "--config",
+                        file("sim.toml"), "--ports-file", file("ports")},
                        "sim");
     ASSERT_TRUE(test::eventually(
         [this] { return std::filesystem::exists(file("ports")) || !simulator_->running(); }));
@@ -80,6 +81,7 @@ class WholeDaemon : public testing::Test {
       const json now = stream(s.name);
       return s.rate_hz > 0.0 ? now.value("samples", 0) > 0 : now.value("state", "") == "streaming";
     };
+
     for (const auto& s : streams) ASSERT_TRUE(test::eventually([&] { return comes(s); })) << s.name;
     ::sleep(2);
     std::vector<json> before;
@@ -89,6 +91,7 @@ class WholeDaemon : public testing::Test {
     for (std::size_t i = 0; i < streams.size(); ++i) expect_nothing_lost(streams[i], before[i]);
     print_figure("whole daemon, use", fmt::format("second half grows < {} kB", kFlat_kB),
                  "{:.1f} % of one processor, resident {}", use.percent(), use.memory());
+
     EXPECT_LT(use.late_growth_kB(), kFlat_kB);
   }
 
@@ -105,7 +108,8 @@ class WholeDaemon : public testing::Test {
   /// Stops the daemon; its recording.
   [[nodiscard]] std::string recording_of_stopped() {
     EXPECT_EQ(abbed_->stop(), 0) << abbed_->err();
-    for (const auto& entry : std::filesystem::directory_iterator(directory_ / "data" / "recordings"))
+    for (const auto& entry :
+         std::filesystem::directory_iterator(directory_ / "data" / "recordings"))
       return entry.path();
     return {};
   }
@@ -114,15 +118,17 @@ class WholeDaemon : public testing::Test {
     EXPECT_LE(tool.wait_for_end(), 1) << tool.err();  // 1: no calibration in it
     return tool.out();
   }
-  [[nodiscard]] std::string file(const std::string& name) const { return (directory_ / name).string(); }
+  [[nodiscard]] std::string file(const std::string& name) const {
+    return (directory_ / name).string();
+  }
 
   std::filesystem::path directory_;
   std::unique_ptr<test::Program> simulator_;
   std::unique_ptr<test::Program> abbed_;
 
  private:
-  /// Memory is locked, so what it holds is resident. A recording's index grows with it, some 100 bytes a
-  /// chunk; a leak of 16 bytes a sample would be 5 MB in half of ten minutes.
+  /// Memory is locked, so what it holds is resident. A recording's index grows with it, some 100
+  /// bytes a chunk; a leak of 16 bytes a sample would be 5 MB in half of ten minutes.
   static constexpr long kFlat_kB = 1024;
   static constexpr const char* kSimulator = R"(
 [sim]
@@ -177,9 +183,10 @@ supervise = "off"
       const auto end = text.find(')', at);
       const auto name = text.substr(at + kCall.size(), end - at - kCall.size()) + "=";
       const auto port = ports.find(name);
-      text.replace(
-          at, end + 1 - at,
-          port == std::string::npos ? "0" : std::to_string(std::stoi(ports.substr(port + name.size()))));
+      text.replace(at, end + 1 - at,
+                   port == std::string::npos
+                       ? "0"
+                       : std::to_string(std::stoi(ports.substr(port + name.size()))));
     }
     return text;
   }
@@ -191,7 +198,8 @@ supervise = "off"
     return std::make_unique<test::Program>(std::move(command), directory_ / log);
   }
   [[nodiscard]] json status() const {
-    test::Program tool({ABBE_PROGRAM, "status", "--json", "-c", file("abbed.toml")}, directory_ / "status");
+    test::Program tool({ABBE_PROGRAM, "status", "--json", "-c", file("abbed.toml")},
+                       directory_ / "status");
     if (tool.wait_for_end() != 0) return {};
     return json::parse(tool.out(), nullptr, false);
   }

@@ -1,6 +1,7 @@
 #pragma once
-/// Runs the faults of a method over many random machines, two at a time, and prints what the gate accepts and
-/// what that is worth. Arguments of the programs: [MACHINES [FIRST_SEED [PART OF A FAULT'S NAME...]]].
+/// Runs the faults of a method over many random machines, two at a time, and prints what the gate
+/// accepts and what that is worth. Arguments of the programs: [MACHINES [FIRST_SEED
+/// [PART OF A FAULT'S NAME...]]].
 
 #include <fmt/format.h>
 
@@ -21,16 +22,17 @@ namespace abbe::tests::never_worse {
 
 struct Outcome {
   bool accepted = false;
-  std::string first_reason, first_cause;  ///< cause: of Verdict::causes; empty where an error came first
-  double before_m = 0.0;                  ///< mean |V| of the truth, without rigid motion
-  double left_m = 0.0;                    ///< mean |V of the model - V|, without rigid motion
-  double u_m = 0.0;                       ///< mean stated standard uncertainty: root of the trace
+  std::string first_reason,
+      first_cause;        ///< cause: of Verdict::causes; empty where an error came first
+  double before_m = 0.0;  ///< mean |V| of the truth, without rigid motion
+  double left_m = 0.0;    ///< mean |V of the model - V|, without rigid motion
+  double u_m = 0.0;       ///< mean stated standard uncertainty: root of the trace
   double sigma0 = 0.0;
   std::size_t covered = 0, intervals = 0;  ///< components of V inside their 95 % interval
 };
 
-/// What names a fault: the cause of the first reason of a verdict, or words in the text of an error that
-/// comes before any verdict. Nothing: it need not be named.
+/// What names a fault: the cause of the first reason of a verdict, or words in the text of an error
+/// that comes before any verdict. Nothing: it need not be named.
 struct Names {
   std::vector<std::string> causes{}, words{};
 
@@ -74,6 +76,7 @@ struct Tally {
       by_name ? void(++named) : void(other_reason = o.first_cause + ": " + o.first_reason);
       return;
     }
+
     ++accepted;
     worse += o.left_m > o.before_m;
     too_sure += o.left_m > 3.0 * o.u_m;
@@ -85,12 +88,14 @@ struct Tally {
 };
 
 template <class Run>
-std::vector<Tally> tallies_of(const Campaign<Run>& campaign, int machines, std::uint64_t first_seed) {
+std::vector<Tally> tallies_of(const Campaign<Run>& campaign, int machines,
+                              std::uint64_t first_seed) {
   const std::size_t faults = campaign.faults.size();
   const bool verbose = std::getenv("ABBE_NEVER_WORSE_VERBOSE") != nullptr;
   std::vector<Tally> tallies(faults);
   std::atomic<std::size_t> next{0};
   std::mutex mutex;
+
   const auto work = [&] {
     for (std::size_t i; (i = next++) < static_cast<std::size_t>(machines) * faults;) {
       const Fault<Run>& fault = campaign.faults[i % faults];
@@ -101,24 +106,26 @@ std::vector<Tally> tallies_of(const Campaign<Run>& campaign, int machines, std::
       const std::lock_guard lock{mutex};
       tallies[i % faults].count(o, fault.names);
       if (verbose)
-        fmt::print("{} seed {}: {} before {:.2f} left {:.3f} u {:.3f} um sigma0 {:.2f} {}: {}\n", fault.name,
-                   seed, o.accepted ? "accepted" : "refused", 1e6 * o.before_m, 1e6 * o.left_m, 1e6 * o.u_m,
-                   o.sigma0, o.first_cause, o.first_reason);
+        fmt::print("{} seed {}: {} before {:.2f} left {:.3f} u {:.3f} um sigma0 {:.2f} {}: {}\n",
+                   fault.name, seed, o.accepted ? "accepted" : "refused", 1e6 * o.before_m,
+                   1e6 * o.left_m, 1e6 * o.u_m, o.sigma0, o.first_cause, o.first_reason);
     }
   };
+
   { std::jthread one{work}, two{work}; }
   return tallies;
 }
 
 template <class Run>
 void print_table(const Campaign<Run>& campaign, const std::vector<Tally>& tallies) {
-  fmt::print("{:<40} {:>5} {:>8} {:>6} {:>6} {:>10} {:>8} {:>7}\n", "fault", "runs", "accepted", "worse",
-             "> 3 u", "left/u", "largest", "named");
+  fmt::print("{:<40} {:>5} {:>8} {:>6} {:>6} {:>10} {:>8} {:>7}\n", "fault", "runs", "accepted",
+             "worse", "> 3 u", "left/u", "largest", "named");
   for (std::size_t i = 0; i < tallies.size(); ++i) {
     const Tally& t = tallies[i];
-    fmt::print("{:<40} {:>5} {:>8} {:>6} {:>6} {:>10.2f} {:>8.2f} {:>3}/{:<3} {}\n", campaign.faults[i].name,
-               t.runs, t.accepted, t.worse, t.too_sure, t.accepted > 0 ? t.left_over_u / t.accepted : 0.0,
-               t.largest_left_over_u, t.named, t.runs - t.accepted, t.other_reason.substr(0, 110));
+    fmt::print("{:<40} {:>5} {:>8} {:>6} {:>6} {:>10.2f} {:>8.2f} {:>3}/{:<3} {}\n",
+               campaign.faults[i].name, t.runs, t.accepted, t.worse, t.too_sure,
+               t.accepted > 0 ? t.left_over_u / t.accepted : 0.0, t.largest_left_over_u, t.named,
+               t.runs - t.accepted, t.other_reason.substr(0, 110));
   }
 }
 
@@ -131,14 +138,17 @@ bool print_figures(const Campaign<Run>& campaign, const std::vector<Tally>& tall
     const Fault<Run>& fault = campaign.faults[i];
     if (fault.name == "none") none = t;
     if (!fault.visible) continue;
-    all.runs += t.runs, all.accepted += t.accepted, all.worse += t.worse, all.too_sure += t.too_sure;
+    all.runs += t.runs, all.accepted += t.accepted, all.worse += t.worse,
+        all.too_sure += t.too_sure;
     if (!fault.names.empty()) seen.runs += t.runs - t.accepted, seen.named += t.named;
   }
+
   const auto figure = [&](std::string_view what) {
     return fmt::format("never worse, {}: {}", campaign.method, what);
   };
-  print_figure(figure("accepted models that make the machine worse"), "0", "{} of {} accepted of {} runs",
-               all.worse, all.accepted, all.runs);
+
+  print_figure(figure("accepted models that make the machine worse"), "0",
+               "{} of {} accepted of {} runs", all.worse, all.accepted, all.runs);
   print_figure(figure("accepted models wrong by more than 3 u"), "0", "{}", all.too_sure);
   print_figure(figure("faultless runs accepted"), ">= 97 %", "{} of {}", none.accepted, none.runs);
   print_figure(figure("95 % intervals of faultless runs cover"), "94 to 97 %", "{:.1f} %",
@@ -146,6 +156,7 @@ bool print_figures(const Campaign<Run>& campaign, const std::vector<Tally>& tall
                    ? 100.0 * static_cast<double>(none.covered) / static_cast<double>(none.intervals)
                    : 0.0);
   print_figure(figure("cause named first"), ">= 90 %", "{} of {} refused", seen.named, seen.runs);
+
   return all.worse + all.too_sure == 0 && none.accepted * 100 >= 97 * none.runs &&
          seen.named * 10 >= 9 * seen.runs;
 }

@@ -90,7 +90,8 @@ void spoil_touch(EvemuRun& run, double by_m) {
 void bend(EvemuRun& run, double at_the_end_m) {
   std::map<int, Vector3> by;
   for (std::size_t i = 0; i < run.T_machine_array.size(); ++i) {
-    by[static_cast<int>(i) + 1] = at_the_end_m * Vector3(0.0, 0.3 * normal(run.random), normal(run.random));
+    by[static_cast<int>(i) + 1] =
+        at_the_end_m * Vector3(0.0, 0.3 * normal(run.random), normal(run.random));
   }
   const double end_m = run.array.balls.back().centre_m.x();
   run.bent = [by, end_m](const TouchTime& t, const Vector3& place) -> Vector3 {
@@ -138,7 +139,8 @@ void other_chain(EvemuRun& run) {
     for (std::size_t i = 2; i > 0; --i) std::swap(other[i], other[run.random() % (i + 1)]);
   }
   std::string text = "[w b";
-  for (const sim::Axis a : other) text += std::string(" ") + sim::kAxisLetters[static_cast<std::size_t>(a)];
+  for (const sim::Axis a : other)
+    text += std::string(" ") + sim::kAxisLetters[static_cast<std::size_t>(a)];
   run.machine.chain = *calib::KinematicChain::parse(text + " t]");
 }
 
@@ -183,32 +185,42 @@ std::vector<Fault<EvemuRun>> evemu_faults() {
   const Names moved{{"moved", "form"}}, touch{{"touch"}, {"touch ", "false trigger"}},
       file{{"array-file"}, {"calibrator file"}}, clamping{{"bent", "creep", "moved"}},
       handed{{}, {"mirror", "swapped"}}, position{{}, {"position"}};
+
   return {
       {"none", [](EvemuRun&) {}, {}},
-      {"array shifted by 50..200 um within", [](EvemuRun& r) { move_within(r, over(r, 50e-6, 200e-6), 0.0); },
-       moved},
-      {"array shifted by 5..50 um within", [](EvemuRun& r) { move_within(r, over(r, 5e-6, 50e-6), 0.0); },
-       moved},
+      {"array shifted by 50..200 um within",
+       [](EvemuRun& r) { move_within(r, over(r, 50e-6, 200e-6), 0.0); }, moved},
+      {"array shifted by 5..50 um within",
+       [](EvemuRun& r) { move_within(r, over(r, 5e-6, 50e-6), 0.0); }, moved},
       {"array turned by 20..500 urad within",
        [](EvemuRun& r) { move_within(r, 0.0, over(r, 20e-6, 500e-6)); }, moved},
       {"array shifted between positions", move_between, {}},
       {"balls swapped in the table", swap_balls, {{}, {"numbered"}}},
-      {"ball coordinate wrong by 100..500 um", [](EvemuRun& r) { spoil_the_file(r, 100e-6, 500e-6); }, file},
-      {"ball coordinate wrong by 20..100 um", [](EvemuRun& r) { spoil_the_file(r, 20e-6, 100e-6); }, file},
+      {"ball coordinate wrong by 100..500 um",
+       [](EvemuRun& r) { spoil_the_file(r, 100e-6, 500e-6); }, file},
+      {"ball coordinate wrong by 20..100 um", [](EvemuRun& r) { spoil_the_file(r, 20e-6, 100e-6); },
+       file},
       {"ball elsewhere in one position", displace_ball_once, {{"ball"}}},
-      {"dirt of 20..100 um under one touch", [](EvemuRun& r) { spoil_touch(r, over(r, 20e-6, 100e-6)); },
+      {"dirt of 20..100 um under one touch",
+       [](EvemuRun& r) { spoil_touch(r, over(r, 20e-6, 100e-6)); }, touch},
+      {"false trigger of 0.5..5 mm", [](EvemuRun& r) { spoil_touch(r, over(r, 0.5e-3, 5e-3)); },
        touch},
-      {"false trigger of 0.5..5 mm", [](EvemuRun& r) { spoil_touch(r, over(r, 0.5e-3, 5e-3)); }, touch},
       {"array's temperature wrong by 2..10 K",
-       [](EvemuRun& r) { r.observe.artefact_temperature->temperature_K += signed_over(r, 2.0, 10.0); },
+       [](EvemuRun& r) {
+         r.observe.artefact_temperature->temperature_K += signed_over(r, 2.0, 10.0);
+       },
        {},
        false},
       {"expansion of another material",
-       [](EvemuRun& r) { r.calibrator.expansivity->alpha_per_K = r.random() % 2 == 0 ? 23e-6 : 0.5e-6; },
+       [](EvemuRun& r) {
+         r.calibrator.expansivity->alpha_per_K = r.random() % 2 == 0 ? 23e-6 : 0.5e-6;
+       },
        {},
        false},
-      {"array bent by 10..50 um per position", [](EvemuRun& r) { bend(r, over(r, 10e-6, 50e-6)); }, clamping},
-      {"array creeps by 10..100 um", [](EvemuRun& r) { creep(r, over(r, 10e-6, 100e-6)); }, clamping},
+      {"array bent by 10..50 um per position", [](EvemuRun& r) { bend(r, over(r, 10e-6, 50e-6)); },
+       clamping},
+      {"array creeps by 10..100 um", [](EvemuRun& r) { creep(r, over(r, 10e-6, 100e-6)); },
+       clamping},
       {"tip offset wrong by 2..20 mm",
        [](EvemuRun& r) {
          const double by_m = over(r, 2e-3, 20e-3);
@@ -224,7 +236,9 @@ std::vector<Fault<EvemuRun>> evemu_faults() {
       {"tip diameter wrong by 0.5..2 mm",
        [](EvemuRun& r) { r.calibrator.tip_radius_m += 0.5 * signed_over(r, 0.5e-3, 2e-3); },
        {{}, {"tip"}}},
-      {"machine drifts by 20..100 um", [](EvemuRun& r) { drift(r, over(r, 20e-6, 100e-6)); }, {{"drift"}}},
+      {"machine drifts by 20..100 um",
+       [](EvemuRun& r) { drift(r, over(r, 20e-6, 100e-6)); },
+       {{"drift"}}},
       {"axis mirrored",
        [](EvemuRun& r) {
          const auto a = static_cast<Eigen::Index>(r.random() % 3);
@@ -255,9 +269,10 @@ std::vector<Fault<EvemuRun>> evemu_faults() {
        {{"slow-noise"}}},
       {"five times the noise", [](EvemuRun& r) { r.sigma_touch_m *= 5.0; }, {}},
       {"another axis order", other_chain, {{"chain-order"}}},
-      {"screw pitch of 5..30 um", [](EvemuRun& r) { waves(r, over(r, 5e-6, 30e-6), 0.01); }, waves_named},
-      {"waves of 5..30 um over the volume", [](EvemuRun& r) { waves(r, over(r, 5e-6, 30e-6), 0.25); },
+      {"screw pitch of 5..30 um", [](EvemuRun& r) { waves(r, over(r, 5e-6, 30e-6), 0.01); },
        waves_named},
+      {"waves of 5..30 um over the volume",
+       [](EvemuRun& r) { waves(r, over(r, 5e-6, 30e-6), 0.25); }, waves_named},
   };
 }
 

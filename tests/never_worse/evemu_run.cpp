@@ -25,25 +25,32 @@ sim::BallArray random_array(std::mt19937_64& random) {
   const double step_m = uniform(random, 0.07, 0.11), radius_m = uniform(random, 8e-3, 13e-3);
   const double across_m = uniform(random, 0.05, 0.08);
   const double gap_m = random() % 2 == 0 ? step_m : 0.0;  // room for the blocks beside Ball1
+
   for (std::size_t i = 0; i < long_leg; ++i) {
-    array.balls.push_back({Vector3(static_cast<double>(i) * step_m + (i > 0 ? gap_m : 0.0), 0, 0), radius_m});
+    array.balls.push_back(
+        {Vector3(static_cast<double>(i) * step_m + (i > 0 ? gap_m : 0.0), 0, 0), radius_m});
   }
+
   const double end_m = array.balls.back().centre_m.x();
   for (std::size_t i = 1; i <= short_leg; ++i) {
     array.balls.push_back({Vector3(end_m, -static_cast<double>(i) * across_m, 0), radius_m});
   }
+
   array.faces[0] = {.centre_m = Vector3(0.5 * step_m, 0, 0.025), .normal = Vector3::UnitZ()};
   array.faces[1] = {.centre_m = Vector3(0.5 * step_m, 0.025, 0), .normal = Vector3::UnitY()};
   array.tip_radius_m = uniform(random, 0.5e-3, 3e-3);
+
   return array;
 }
 
-/// Fanned about Ball1 as in [Li OMM], tilted and rolled as there by 2 to 5 degrees, where little shows the
-/// scale of the axis across the array, or up to four times as far.
-std::vector<Isometry3d> random_positions(std::mt19937_64& random, const Vector3& ball1_m, std::size_t count) {
+/// Fanned about Ball1 as in [Li OMM], tilted and rolled as there by 2 to 5 degrees, where little
+/// shows the scale of the axis across the array, or up to four times as far.
+std::vector<Isometry3d> random_positions(std::mt19937_64& random, const Vector3& ball1_m,
+                                         std::size_t count) {
   constexpr double kRadPerDeg = M_PI / 180.0;
   const double farther = uniform(random, 1.0, 4.0);
   std::vector<Isometry3d> positions;
+
   for (std::size_t i = 0; i < count; ++i) {
     const double fan = 16.0 - 14.0 * static_cast<double>(i % 4) / 3.0 + uniform(random, -1.0, 1.0);
     const double tilt = (i % 8 < 4 ? 1.0 : -1.0) * farther * uniform(random, 1.8, 3.2);
@@ -55,6 +62,7 @@ std::vector<Isometry3d> random_positions(std::mt19937_64& random, const Vector3&
     T.rotate(Eigen::AngleAxisd(roll * kRadPerDeg, Vector3::UnitX()));
     positions.push_back(T);
   }
+
   return positions;
 }
 
@@ -74,14 +82,15 @@ sim::ErrorFunction cubic(const std::array<double, 3>& c, double centre_m, double
   return sim::ErrorFunction::polynomial(std::move(in_q));
 }
 
-/// Errors of order 3 in the readings, about `size` large; the linear error of an axis along itself is a
-/// scale, relative to its travel.
+/// Errors of order 3 in the readings, about `size` large; the linear error of an axis along itself
+/// is a scale, relative to its travel.
 void draw_errors(EvemuRun& run, double size) {
   std::mt19937_64& random = run.random;
   double longest_m = 0.0;
   for (const sim::AxisTruth& axis : run.truth.axes) {
     longest_m = std::max(longest_m, 0.5 * (axis.range.max_m - axis.range.min_m));
   }
+
   for (const sim::Axis a : sim::kAxes) {
     sim::AxisTruth& axis = run.truth.axis(a);
     const double centre_m = 0.5 * (axis.range.min_m + axis.range.max_m);
@@ -93,12 +102,14 @@ void draw_errors(EvemuRun& run, double size) {
         c[k] = amplitude * normal(random) / std::pow(2.0, static_cast<double>(k));
       }
       if (m == static_cast<std::size_t>(a)) {
-        constexpr double kOfScales = 0.1;  // the best part of a machine: 100 um/m where others are 250 um
+        // the best part of a machine: 100 um/m where others are 250 um
+        constexpr double kOfScales = 0.1;
         for (double& order : c) order *= kOfScales * half_m / longest_m;
       }
       axis.error[m] = cubic(c, centre_m, half_m);
     }
   }
+
   const Vector3 squareness = 2.0 * size * normal3(random);
   run.truth.squareness = {squareness.x(), squareness.y(), squareness.z()};
 }
@@ -106,7 +117,8 @@ void draw_errors(EvemuRun& run, double size) {
 std::vector<int> shuffled(std::mt19937_64& random, std::size_t count) {
   std::vector<int> order;
   for (std::size_t i = 0; i < count; ++i) {
-    order.insert(order.begin() + static_cast<std::ptrdiff_t>(random() % (i + 1)), static_cast<int>(i) + 1);
+    order.insert(order.begin() + static_cast<std::ptrdiff_t>(random() % (i + 1)),
+                 static_cast<int>(i) + 1);
   }
   return order;
 }
@@ -137,8 +149,8 @@ evemu::Calibrator as_stated(const sim::BallArray& array, const sim::ArrayState& 
   c.name = array.name;
   c.tip_radius_m = array.tip_radius_m;
   for (std::size_t i = 0; i < array.balls.size(); ++i) {
-    c.balls.push_back(
-        {static_cast<int>(i) + 1, array.balls[i].centre_m, array.balls[i].radius_m, state.u_ball_m});
+    c.balls.push_back({static_cast<int>(i) + 1, array.balls[i].centre_m, array.balls[i].radius_m,
+                       state.u_ball_m});
   }
   for (std::size_t i = 0; i < array.faces.size(); ++i) {
     c.blocks.push_back({static_cast<int>(i) + 1, array.faces[i].normal, state.u_block_rad});
@@ -176,27 +188,32 @@ std::vector<Aim> aims_of(const EvemuRun& run) {
                       b.centre_m + (b.radius_m + run.array.tip_radius_m) * n, n});
     }
   };
+
   ball(0);
   for (std::size_t f = 0; f < 2; ++f) {
     const sim::ArrayFace& face = run.array.faces[f];
     const Vector3 n = face.normal.normalized(), x = n.unitOrthogonal(), y = n.cross(x);
     for (std::size_t i = 0; i < run.points_per_face; ++i) {
-      const double around = 2.0 * M_PI * static_cast<double>(i) / static_cast<double>(run.points_per_face);
+      const double around =
+          2.0 * M_PI * static_cast<double>(i) / static_cast<double>(run.points_per_face);
       const double out_m = i % 3 == 2 ? 6e-3 : 12e-3;
-      aims.push_back(
-          {evemu::Feature::Block, static_cast<int>(f) + 1,
-           face.centre_m + run.array.tip_radius_m * n + out_m * (std::cos(around) * x + std::sin(around) * y),
-           n});
+      aims.push_back({evemu::Feature::Block, static_cast<int>(f) + 1,
+                      face.centre_m + run.array.tip_radius_m * n +
+                          out_m * (std::cos(around) * x + std::sin(around) * y),
+                      n});
     }
   }
+
   for (std::size_t i = 1; i < run.array.balls.size(); ++i) {
     ball(i);
   }
+
   return aims;
 }
 
 /// The reading at which the tip's centre is at p.
-Vector3 reading_at(const EvemuRun& run, const Vector3& p_m, const Vector3& normal, const TouchTime& when) {
+Vector3 reading_at(const EvemuRun& run, const Vector3& p_m, const Vector3& normal,
+                   const TouchTime& when) {
   const Vector3 at_m = p_m - run.truth.target_offset_m;
   sim::MachineCondition condition;
   for (Eigen::Index a = 0; a < 3; ++a) {
@@ -287,6 +304,7 @@ std::vector<Vector3> places_in(const calib::ValidityVolume& volume) {
   const evemu::ReadingBox box = evemu::bounding_box(volume.vertices_m());
   constexpr int kSteps = 10;
   std::vector<Vector3> found;
+
   for (int x = 0; x <= kSteps; ++x) {
     for (int y = 0; y <= kSteps; ++y) {
       for (int z = 0; z <= kSteps; ++z) {
@@ -296,6 +314,7 @@ std::vector<Vector3> places_in(const calib::ValidityVolume& volume) {
       }
     }
   }
+
   return found;
 }
 
@@ -308,24 +327,27 @@ void compare(Outcome& outcome, const EvemuRun& run, const calib::VolumetricModel
   const evemu::EvemuModel& polynomials = *model.polynomials();
   Eigen::VectorXd truth(rows), left(rows);
   Eigen::MatrixXd B(rows, static_cast<Eigen::Index>(polynomials.design().size()));
+
   for (Eigen::Index i = 0; i < std::ssize(points); ++i) {
     const Vector3& q = points[static_cast<std::size_t>(i)];
     truth.segment<3>(3 * i) = sim::error_m(truth_machine, q);
     left.segment<3>(3 * i) = model.V_at(q, run.machine.tool_offset_m) - truth.segment<3>(3 * i);
     B.middleRows<3>(3 * i) = polynomials.design().B(q);
   }
+
   const Eigen::MatrixXd rigid = rigid_basis(points);
   const auto without_rigid = [&](auto m) { return (m - rigid * (rigid.transpose() * m)).eval(); };
   left = without_rigid(left);
   B = without_rigid(B);
-  const Eigen::VectorXd variance = (B * polynomials.covariance_m2()).cwiseProduct(B).rowwise().sum();
+  const Eigen::VectorXd variance =
+      (B * polynomials.covariance_m2()).cwiseProduct(B).rowwise().sum();
   outcome.before_m = mean_length(without_rigid(truth));
   outcome.left_m = mean_length(left);
   outcome.u_m = mean_length(variance.cwiseMax(0.0).cwiseSqrt());
   constexpr double kNormal975 = 1.95996;
   outcome.intervals = static_cast<std::size_t>(rows);
-  outcome.covered =
-      static_cast<std::size_t>((left.array().abs() <= kNormal975 * variance.array().max(0.0).sqrt()).count());
+  outcome.covered = static_cast<std::size_t>(
+      (left.array().abs() <= kNormal975 * variance.array().max(0.0).sqrt()).count());
 }
 
 }  // namespace
@@ -345,12 +367,14 @@ EvemuRun random_evemu_run(std::uint64_t seed) {
   run.T_machine_array = random_positions(random, ball1_m, positions);
   run.order = shuffled(random, positions);
   set_ranges(run);
+
   // Three in four machines of 10 to 200 um, the others up to 0.4 mm: 1 to 2 mm at a corner.
-  scale_errors(run,
-               random() % 4 == 0 ? log_uniform(random, 0.2e-3, 0.4e-3) : log_uniform(random, 10e-6, 200e-6));
+  scale_errors(run, random() % 4 == 0 ? log_uniform(random, 0.2e-3, 0.4e-3)
+                                      : log_uniform(random, 10e-6, 200e-6));
   run.points_per_ball = 9 + random() % 17;
   run.points_per_face = 6 + random() % 15;
   run.sigma_touch_m = log_uniform(random, 0.3e-6, 1.5e-6);
+
   // Within their stated uncertainties.
   sim::ArrayState state{.temperature_C = uniform(random, 17.0, 26.0),
                         .alpha_per_K = 11.5e-6,
@@ -360,8 +384,9 @@ EvemuRun random_evemu_run(std::uint64_t seed) {
                         .seed = random()};
   const double u_temperature_K = uniform(random, 0.1, 0.3);
   run.calibrator = as_stated(stated, state);
-  run.observe.artefact_temperature = {.temperature_K = calib::kReferenceTemperature_K + state.temperature_C -
-                                                       20.0 + u_temperature_K * normal(random),
+  run.observe.artefact_temperature = {.temperature_K = calib::kReferenceTemperature_K +
+                                                       state.temperature_C - 20.0 +
+                                                       u_temperature_K * normal(random),
                                       .u_temperature_K = u_temperature_K};
   run.array = sim::as_it_is(stated, state);
   run.observe.positions = static_cast<int>(positions);
@@ -369,6 +394,7 @@ EvemuRun random_evemu_run(std::uint64_t seed) {
   run.judge.accept_shape_only = true;
   run.judge.limits.max_error_m = 0.02;  // as a configuration for weak machines has it
   run.judge.limits.max_gradient = 0.5;
+
   return run;
 }
 
@@ -379,11 +405,13 @@ std::vector<evemu::Touch> touches_of(EvemuRun& run) {
     SlowNoise slow(run, aims.size());
     for (std::size_t k = 0; k < aims.size(); ++k) {
       const double share = static_cast<double>(k) / static_cast<double>(aims.size());
-      const TouchTime when{run.order[i], share,
-                           (static_cast<double>(i) + share) / static_cast<double>(run.order.size())};
+      const TouchTime when{
+          run.order[i], share,
+          (static_cast<double>(i) + share) / static_cast<double>(run.order.size())};
       touches.push_back(touch(run, aims[k], when, slow.next(run)));
     }
   }
+
   if (run.spoil) run.spoil(touches);
   return touches;
 }
@@ -402,6 +430,7 @@ Outcome identify_and_compare_evemu(EvemuRun run) {
   outcome.first_cause = verdict->accepted ? "" : verdict->causes.front();
   outcome.sigma0 = 1e6 * solution->statistics.s_m;
   compare(outcome, run, solution->model);
+
   return outcome;
 }
 

@@ -1,6 +1,7 @@
 #pragma once
-/// A random machine, a ball array touched on it, and the faults that happen there on a shop floor; then what
-/// the gate says of it and what the model is worth against the truth. Deterministic from the seed.
+/// A random machine, a ball array touched on it, and the faults that happen there on a shop floor;
+/// then what the gate says of it and what the model is worth against the truth. Deterministic from
+/// the seed.
 
 #include <Eigen/Geometry>
 #include <functional>
@@ -31,15 +32,17 @@ struct EvemuRun {
   std::vector<int> order;                          ///< in which the positions are touched
   std::size_t points_per_ball = 13, points_per_face = 9;
   double sigma_touch_m = 1e-6;
-  double slow_noise_m = 0.0;  ///< standard deviation of a shift of all touches that changes over a quarter of
-                              ///< a position
+  double slow_noise_m =
+      0.0;  ///< standard deviation of a shift of all touches that changes over a quarter of
+            ///< a position
   /// Beside T_machine_array, about Ball1 of the position; may be empty.
   std::function<Eigen::Isometry3d(const TouchTime&)> moved;
   /// Displacement of a place of the array, in its own frame; may be empty.
   std::function<Vector3(const TouchTime&, const Vector3& place_m)> bent;
   /// Beside V, in machine coordinates; may be empty.
   std::function<Vector3(const TouchTime&, const Vector3& q_m)> drift;
-  std::function<void(std::vector<calib::evemu::Touch>&)> spoil;  ///< the list of touches; may be empty
+  std::function<void(std::vector<calib::evemu::Touch>&)>
+      spoil;                                       ///< the list of touches; may be empty
   Vector3 stated_tool_offset_m = Vector3::Zero();  ///< from the tip that touched to the stated one
   // what is configured
   calib::evemu::Calibrator calibrator;

@@ -1,5 +1,5 @@
-// The campaign of scripts/soak never-worse, short: a few machines, and of every kind of fault the ones that
-// were accepted once.
+// The campaign of scripts/soak never-worse, short: a few machines, and of every kind of fault the
+// ones that were accepted once.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -11,10 +11,12 @@ namespace {
 using namespace abbe::tests::never_worse;
 
 Campaign<EvemuRun> ball_array(const std::vector<std::string>& parts) {
-  Campaign<EvemuRun> campaign{"ball array", evemu_faults(), random_evemu_run, identify_and_compare_evemu};
+  Campaign<EvemuRun> campaign{"ball array", evemu_faults(), random_evemu_run,
+                              identify_and_compare_evemu};
   std::erase_if(campaign.faults, [&](const Fault<EvemuRun>& f) {
-    return std::none_of(parts.begin(), parts.end(),
-                        [&](const std::string& part) { return f.name.find(part) != std::string::npos; });
+    return std::none_of(parts.begin(), parts.end(), [&](const std::string& part) {
+      return f.name.find(part) != std::string::npos;
+    });
   });
   return campaign;
 }
@@ -22,7 +24,8 @@ Campaign<EvemuRun> ball_array(const std::vector<std::string>& parts) {
 constexpr std::uint64_t kFirstSeed = 1;
 
 TEST(NeverWorseBallArray, NoAcceptedModelIsWorseThanNone) {
-  const auto campaign = ball_array({"within", "wrong by 20..100", "mirrored", "swapped", "order", "creeps"});
+  const auto campaign =
+      ball_array({"within", "wrong by 20..100", "mirrored", "swapped", "order", "creeps"});
   ASSERT_EQ(campaign.faults.size(), 9u);
   const auto tallies = tallies_of(campaign, 1, kFirstSeed);
   for (std::size_t i = 0; i < tallies.size(); ++i) {
@@ -45,8 +48,8 @@ TEST(NeverWorseBallArray, AFalseTouchIsNamedBeforeTheScatterThatFollows) {
   EXPECT_EQ(tally.named, 1) << tally.other_reason;
 }
 
-// Accepted, it was wrong by 3.3 u: the errors within a ball were compared with the uncertainty of another
-// estimate.
+// Accepted, it was wrong by 3.3 u: the errors within a ball were compared with the uncertainty of
+// another estimate.
 TEST(NeverWorseBallArray, ErrorsWithinABallAreNotLargeBesideTheUncertainty) {
   const auto screw = tallies_of(ball_array({"screw pitch"}), 1, 8092).front();
   EXPECT_EQ(screw.accepted, 0) << screw.largest_left_over_u;

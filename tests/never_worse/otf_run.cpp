@@ -25,6 +25,7 @@ std::vector<Vector3> stretched_path(const sim::TruthMachine& truth) {
     low = low.cwiseMin(q);
     high = high.cwiseMax(q);
   }
+
   for (Vector3& q : path) {
     for (const sim::Axis a : sim::kAxes) {
       const auto k = static_cast<Eigen::Index>(a);
@@ -32,6 +33,7 @@ std::vector<Vector3> stretched_path(const sim::TruthMachine& truth) {
       q(k) = range.min_m + (q(k) - low(k)) / (high(k) - low(k)) * (range.max_m - range.min_m);
     }
   }
+
   return path;
 }
 
@@ -62,30 +64,37 @@ std::vector<calib::otf::TrackerObservation> measure(OtfRun& run) {
   for (const Vector3& q : run.driven_m) {
     plan.vertices.push_back({q, 0.0});
   }
+
   const sim::PathMotion motion = *sim::PathMotion::plan(plan);
   constexpr double kStand_s = 0.4;
   const double dt = 1.0 / run.rate_hz, end_s = motion.duration_s() + kStand_s;
   std::vector<calib::otf::TrackerObservation> samples;
   Vector3 held(normal(run.random), normal(run.random), normal(run.random));
   const calib::Matrix3 R = run.T_machine_tracker.R.transpose();
+
   for (double t = -kStand_s; t < end_s; t += dt) {
     const double share = std::clamp(t / motion.duration_s(), 0.0, 1.0);
     const sim::AxisMotion m = motion.at(t);
     const sim::MachineCondition condition{m.direction, run.truth.thermal.heat_after(t)};
-    Vector3 p =
-        sim::position_m(run.truth, m.q_m, condition) + (run.scale - Vector3::Ones()).cwiseProduct(m.q_m);
+    Vector3 p = sim::position_m(run.truth, m.q_m, condition) +
+                (run.scale - Vector3::Ones()).cwiseProduct(m.q_m);
+
     if (run.moved) {
       p = run.moved(share) * p;
     }
+
     Vector3 seen = R * (p - run.T_machine_tracker.t_m);
     seen = with_noise(run, seen, held, dt);
     seen *= run.range_scale + run.range_offset_m / seen.norm();
+
     if (run.spikes > 0.0 && uniform(run.random, 0.0, 1.0) < run.spikes) {
       seen += 2e-4 * Vector3(normal(run.random), normal(run.random), normal(run.random));
     }
+
     const bool lost = share > run.lost_from && share < run.lost_to;
     samples.push_back({t + kStand_s, seen, !lost});
   }
+
   return samples;
 }
 
@@ -100,6 +109,7 @@ void compare(Outcome& outcome, const OtfRun& run, const calib::VolumetricModel& 
   std::vector<Vector3> points, truth, difference;
   std::vector<calib::Matrix3> cov;
   const Vector3& t = run.truth.target_offset_m;
+
   for (int i = 0; i <= kSteps; ++i) {
     for (int j = 0; j <= kSteps; ++j) {
       for (int k = 0; k <= kSteps; ++k) {
@@ -108,9 +118,11 @@ void compare(Outcome& outcome, const OtfRun& run, const calib::VolumetricModel& 
         for (const sim::Axis a : sim::kAxes) {
           const auto n = static_cast<std::size_t>(a);
           const auto& range = run.truth.axis(a).range;
-          q(static_cast<Eigen::Index>(n)) = range.min_m + (range.max_m - range.min_m) * at[n] / kSteps;
+          q(static_cast<Eigen::Index>(n)) =
+              range.min_m + (range.max_m - range.min_m) * at[n] / kSteps;
         }
-        const Vector3 V = sim::error_m(run.truth, q, {{}, 0.5 * run.truth.thermal.heat_after(900.0)});
+        const Vector3 V =
+            sim::error_m(run.truth, q, {{}, 0.5 * run.truth.thermal.heat_after(900.0)});
         const calib::VolumetricError e = model.error_at(q, run.machine.target_offset_m);
         points.push_back(q + t);
         truth.push_back(V);
@@ -119,10 +131,13 @@ void compare(Outcome& outcome, const OtfRun& run, const calib::VolumetricModel& 
       }
     }
   }
-  const auto before = calib::rigid_free(points, truth), left = calib::rigid_free(points, difference);
+
+  const auto before = calib::rigid_free(points, truth),
+             left = calib::rigid_free(points, difference);
   outcome.before_m = before->rigid_free.mean_m;
   outcome.left_m = left->rigid_free.mean_m;
   constexpr double kNormal975 = 1.95996, kFixed_m = 1e-9;  // by the gauge: no interval
+
   for (std::size_t i = 0; i < points.size(); ++i) {
     for (Eigen::Index k = 0; k < 3; ++k) {
       const double u_m = std::sqrt(std::max(0.0, cov[i](k, k)));
@@ -135,7 +150,8 @@ void compare(Outcome& outcome, const OtfRun& run, const calib::VolumetricModel& 
   }
 }
 
-calib::RigidTransform about(const Vector3& centre, const Vector3& rotation_rad, const Vector3& shift_m) {
+calib::RigidTransform about(const Vector3& centre, const Vector3& rotation_rad,
+                            const Vector3& shift_m) {
   calib::RigidTransform T;
   const double angle = rotation_rad.norm();
   T.R = angle > 0.0 ? Eigen::AngleAxisd(angle, rotation_rad / angle).toRotationMatrix()
@@ -146,8 +162,8 @@ calib::RigidTransform about(const Vector3& centre, const Vector3& rotation_rad, 
 
 /// The tracker stands elsewhere from `share` of the run on: turned about its own place and shifted.
 void move_tracker(OtfRun& run, double share, double angle_rad, double shift_m) {
-  const auto T =
-      about(run.T_machine_tracker.t_m, angle_rad * direction(run.random), shift_m * direction(run.random));
+  const auto T = about(run.T_machine_tracker.t_m, angle_rad * direction(run.random),
+                       shift_m * direction(run.random));
   run.moved = [T, share](double time) { return time > share ? T : calib::RigidTransform{}; };
 }
 
@@ -176,13 +192,15 @@ OtfRun random_otf_run(std::uint64_t seed) {
   const std::string chain = kChains[random() % kChains.size()];
   run.truth.order = *sim::parse_chain(chain);
   run.machine.chain = *calib::KinematicChain::parse(chain);
+
   for (sim::AxisTruth& axis : run.truth.axes) {
     const double half_m = kNode_m * std::round(uniform(random, 4.0, 8.0));
     const double centre_m = kNode_m * std::round(uniform(random, -4.0, 4.0));
     axis.range = {centre_m - half_m, centre_m + half_m, centre_m};
   }
-  run.truth.target_offset_m =
-      Vector3(uniform(random, -0.05, 0.05), uniform(random, -0.05, 0.05), uniform(random, -0.2, -0.05));
+
+  run.truth.target_offset_m = Vector3(uniform(random, -0.05, 0.05), uniform(random, -0.05, 0.05),
+                                      uniform(random, -0.2, -0.05));
   run.machine.target_offset_m = run.truth.target_offset_m;
   const double mean_error_m = 10e-6 * std::pow(20.0, uniform(random, 0.0, 1.0));
   run.truth = sim::random_truth(run.truth, {.seed = random(), .mean_error_m = mean_error_m});
@@ -196,15 +214,18 @@ OtfRun random_otf_run(std::uint64_t seed) {
                                 .toRotationMatrix();
   run.evidence.up = Vector3::UnitZ();
   run.evidence.tracker_m = run.T_machine_tracker.t_m + 0.15 * direction(random);
+
   // Within their stated uncertainties.
   run.noise.u_scale = 0.45e-6;  // 0.3 ppm of the instrument, 0.33 ppm of the air
   run.range_scale = 1.0 + 0.45e-6 * normal(random);
   run.noise.u_range_offset_m = 6e-6;
   run.range_offset_m = 6e-6 * normal(random);
+
   for (Eigen::Index a = 0; a < 3; ++a) {
     run.noise.u_axis_scale[static_cast<std::size_t>(a)] = 2.3e-6;  // 0.2 K of steel
     run.scale(a) = 1.0 + 2.3e-6 * normal(random);
   }
+
   return run;
 }
 
@@ -213,12 +234,17 @@ std::vector<Fault<OtfRun>> otf_faults() {
       drift{{"drift", "moved"}}, backlash{{"backlash"}}, noise{{"correlated-noise", "uncertainty"}},
       align{{"orientation"}, {"alignment", "path", "travel", "adjustment"}},
       turned{{"orientation"}, {"orientation", "travel"}};
+
   return {
       {"none", [](OtfRun&) {}, {}},
-      {"tracker turned by 200 urad at half", [](OtfRun& r) { move_tracker(r, 0.5, 200e-6, 0.0); }, moved},
-      {"tracker turned by 20 urad at 0.7", [](OtfRun& r) { move_tracker(r, 0.7, 20e-6, 0.0); }, moved},
-      {"tracker shifted by 50 um at 0.6", [](OtfRun& r) { move_tracker(r, 0.6, 0.0, 50e-6); }, moved},
-      {"tracker shifted by 10 um at 0.3", [](OtfRun& r) { move_tracker(r, 0.3, 0.0, 10e-6); }, moved},
+      {"tracker turned by 200 urad at half", [](OtfRun& r) { move_tracker(r, 0.5, 200e-6, 0.0); },
+       moved},
+      {"tracker turned by 20 urad at 0.7", [](OtfRun& r) { move_tracker(r, 0.7, 20e-6, 0.0); },
+       moved},
+      {"tracker shifted by 50 um at 0.6", [](OtfRun& r) { move_tracker(r, 0.6, 0.0, 50e-6); },
+       moved},
+      {"tracker shifted by 10 um at 0.3", [](OtfRun& r) { move_tracker(r, 0.3, 0.0, 10e-6); },
+       moved},
       {"vertex off by 0.4 mm", [](OtfRun& r) { displace_vertex(r, 0.4e-3); }, vertex},
       {"vertex off by 0.05 mm", [](OtfRun& r) { displace_vertex(r, 0.05e-3); }, vertex},
       {"another axis order",
@@ -226,7 +252,8 @@ std::vector<Fault<OtfRun>> otf_faults() {
          std::string other;
          do {
            other = kChains[r.random() % kChains.size()];
-         } while (calib::KinematicChain::parse(other)->order_w_to_t() == r.machine.chain.order_w_to_t());
+         } while (calib::KinematicChain::parse(other)->order_w_to_t() ==
+                  r.machine.chain.order_w_to_t());
          r.machine.chain = *calib::KinematicChain::parse(other);
        },
        chain},
@@ -234,13 +261,16 @@ std::vector<Fault<OtfRun>> otf_faults() {
       {"drift of 15 um",
        [](OtfRun& r) {
          const Vector3 by = 15e-6 * direction(r.random);
-         r.moved = [by](double time) { return calib::RigidTransform{calib::Matrix3::Identity(), time * by}; };
+         r.moved = [by](double time) {
+           return calib::RigidTransform{calib::Matrix3::Identity(), time * by};
+         };
        },
        drift},
       {"growth by 20 um/m",
        [](OtfRun& r) {
-         r.truth.thermal = {
-             .growth_per_m = Vector3::Constant(20e-6), .shift_m = Vector3::Zero(), .time_constant_s = 900.0};
+         r.truth.thermal = {.expansion_per_m = Vector3::Constant(20e-6),
+                            .shift_m = Vector3::Zero(),
+                            .time_constant_s = 900.0};
        },
        drift},
       {"backlash of 20 um",
@@ -249,13 +279,17 @@ std::vector<Fault<OtfRun>> otf_faults() {
        },
        backlash},
       {"backlash of 4 um in one axis",
-       [](OtfRun& r) { r.truth.axes[r.random() % 3].backlash = {4e-6, 4e-6, 4e-6, 0, 0, 0}; }, backlash},
+       [](OtfRun& r) { r.truth.axes[r.random() % 3].backlash = {4e-6, 4e-6, 4e-6, 0, 0, 0}; },
+       backlash},
       {"noise correlated over 1 s", [](OtfRun& r) { r.correlation_s = 1.0; }, noise},
       {"noise of 10 um over 1 s",
-       [](OtfRun& r) { r.correlation_s = 1.0, r.sigma_range_m = 1e-6, r.sigma_angle_rad = 8e-6; }, noise},
+       [](OtfRun& r) { r.correlation_s = 1.0, r.sigma_range_m = 1e-6, r.sigma_angle_rad = 8e-6; },
+       noise},
       {"noise of 8 um over 20 s",
-       [](OtfRun& r) { r.correlation_s = 20.0, r.sigma_range_m = 1e-6, r.sigma_angle_rad = 6e-6; }, noise},
-      {"five times the noise", [](OtfRun& r) { r.sigma_range_m *= 5.0, r.sigma_angle_rad *= 5.0; }, noise},
+       [](OtfRun& r) { r.correlation_s = 20.0, r.sigma_range_m = 1e-6, r.sigma_angle_rad = 6e-6; },
+       noise},
+      {"five times the noise", [](OtfRun& r) { r.sigma_range_m *= 5.0, r.sigma_angle_rad *= 5.0; },
+       noise},
       {"one of 1000 samples off by 0.2 mm", [](OtfRun& r) { r.spikes = 1e-3; }, {}},
       {"beam lost for 5 %", [](OtfRun& r) { r.lost_from = 0.4, r.lost_to = 0.45; }, align},
       {"last third missing",
@@ -267,19 +301,25 @@ std::vector<Fault<OtfRun>> otf_faults() {
          make_machine(r, kNode_m);
        },
        align},
-      {"path turned by 180 degrees about X", [](OtfRun& r) { turn_path(r, Vector3(1, -1, -1)); }, turned},
-      {"path turned by 180 degrees about Y", [](OtfRun& r) { turn_path(r, Vector3(-1, 1, -1)); }, turned},
-      {"path turned by 180 degrees about Z", [](OtfRun& r) { turn_path(r, Vector3(-1, -1, 1)); }, turned},
+      {"path turned by 180 degrees about X", [](OtfRun& r) { turn_path(r, Vector3(1, -1, -1)); },
+       turned},
+      {"path turned by 180 degrees about Y", [](OtfRun& r) { turn_path(r, Vector3(-1, 1, -1)); },
+       turned},
+      {"path turned by 180 degrees about Z", [](OtfRun& r) { turn_path(r, Vector3(-1, -1, 1)); },
+       turned},
       {"two vertices swapped", [](OtfRun& r) { std::swap(r.path_m[10], r.path_m[13]); }, align},
       {"travel entered a fifth too small",
        [](OtfRun& r) {
          for (std::size_t a = 0; a < 3; ++a) {
            const auto& range = r.truth.axes[a].range;
-           r.machine.nodes[a] = *calib::equidistant_nodes(0.8 * range.min_m, 0.8 * range.max_m, kNode_m);
+           r.machine.nodes[a] =
+               *calib::equidistant_nodes(0.8 * range.min_m, 0.8 * range.max_m, kNode_m);
          }
        },
        {{}, {"travel"}}},
-      {"range offset of twice its stated uncertainty", [](OtfRun& r) { r.range_offset_m = 12e-6; }, {}},
+      {"range offset of twice its stated uncertainty",
+       [](OtfRun& r) { r.range_offset_m = 12e-6; },
+       {}},
       {"range offset of 50 um", [](OtfRun& r) { r.range_offset_m = 50e-6; }, {{"range-offset"}}},
       {"ranges wrong by 100 ppm", [](OtfRun& r) { r.range_scale *= 1.0001; }, {}, false},
       {"path wrong by 0.1 %",
@@ -297,23 +337,29 @@ Outcome identify_and_compare(OtfRun run) {
   if (const auto fine = calib::otf::check(path, run.machine.nodes); !fine) {
     return refused(fine.error().text);
   }
+
   calib::otf::Options options;
   options.block_samples = calib::otf::suitable_block_samples(samples);
   options.orientation = run.evidence;
   const auto found = calib::otf::identify(samples, run.machine, path, run.noise, options);
+
   if (!found) {
     return refused(found.error().text);
   }
-  const auto verdict = calib::otf::judge(found->observations, found->solution, nullptr, {}, options);
+
+  const auto verdict =
+      calib::otf::judge(found->observations, found->solution, nullptr, {}, options);
   if (!verdict) {
     return refused(verdict.error().text);
   }
+
   Outcome outcome;
   outcome.accepted = verdict->accepted;
   outcome.first_reason = verdict->accepted ? "" : verdict->reasons.front();
   outcome.first_cause = verdict->accepted ? "" : verdict->causes.front();
   outcome.sigma0 = found->solution.statistics.sigma0;
   compare(outcome, run, found->solution.model);
+
   return outcome;
 }
 

@@ -1,7 +1,7 @@
 #pragma once
-/// A random machine, its on-the-fly run, and the faults that happen to one on a shop floor; then what the
-/// gate says of it and what the model is worth against the truth. Deterministic from the seed. One thread
-/// each.
+/// A random machine, its on-the-fly run, and the faults that happen to one on a shop floor; then
+/// what the gate says of it and what the model is worth against the truth. Deterministic from the
+/// seed. One thread each.
 
 #include <functional>
 #include <random>

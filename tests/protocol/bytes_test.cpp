@@ -43,6 +43,7 @@ TEST(ByteReader, ReadsBackWhatWasWritten) {
   writer.big(1.25f);
   writer.zeros(2);
   ByteReader reader{writer.written()};
+
   EXPECT_EQ(reader.little<double>(), -2.5);
   EXPECT_EQ(reader.big<std::int64_t>(), -3);
   EXPECT_EQ(reader.big<float>(), 1.25f);

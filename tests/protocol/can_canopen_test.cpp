@@ -108,8 +108,10 @@ TEST(Pdo, ReadsOneBitPatternAsTheTypeSays) {
 }
 
 TEST(Pdo, WritesThePositionLowByteFirst) {
-  EXPECT_EQ(encode_position(0x185, PositionType::Signed32, 0x01020304), standard_frame(0x185, {4, 3, 2, 1}));
-  EXPECT_EQ(encode_position(0x185, PositionType::Signed32, -1), standard_frame(0x185, {255, 255, 255, 255}));
+  EXPECT_EQ(encode_position(0x185, PositionType::Signed32, 0x01020304),
+            standard_frame(0x185, {4, 3, 2, 1}));
+  EXPECT_EQ(encode_position(0x185, PositionType::Signed32, -1),
+            standard_frame(0x185, {255, 255, 255, 255}));
 }
 
 TEST(Pdo, RefusesPayloadsTooShortForTheType) {
@@ -128,10 +130,12 @@ TEST(ErrorFrame, NamesBusOffNoAckAndControllerDetail) {
   frame.data[1] = std::byte{0x01 | 0x20};
   const auto report = decode_error_frame(frame);
   ASSERT_TRUE(report);
+
   for (const auto condition : {BusCondition::BusOff, BusCondition::NoAcknowledge,
                                BusCondition::ReceiveOverflow, BusCondition::Passive}) {
     EXPECT_TRUE(has(report->conditions, condition));
   }
+
   EXPECT_FALSE(has(report->conditions, BusCondition::Restarted));
   EXPECT_FALSE(report->has_counters);
 }

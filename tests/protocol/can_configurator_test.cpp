@@ -22,7 +22,8 @@ struct Bench {
     configurator.start(HostTime{});
     while (const auto frame = configurator.take_frame()) {
       sent.push_back(*frame);
-      if (const auto answer = server.on_frame(*frame, HostTime{})) configurator.on_frame(*answer, HostTime{});
+      if (const auto answer = server.on_frame(*frame, HostTime{}))
+        configurator.on_frame(*answer, HostTime{});
     }
   }
   ObjectDictionary objects;
@@ -132,7 +133,8 @@ TEST(EncoderConfigurator, TakesTheMeasuringStepWhereThePositionStepIsZero) {
 }
 
 TEST(EncoderConfigurator, NamesTheObjectAndTheReasonOfARefusal) {
-  Bench bench{{.node = 5, .has_position64 = false}, {.node = 5, .position = PositionType::Signed64}};
+  Bench bench{{.node = 5, .has_position64 = false},
+              {.node = 5, .position = PositionType::Signed64}};
   bench.run();
   EXPECT_EQ(bench.configurator.error().fault, ConfigurationFault::Refused);
   EXPECT_EQ(bench.configurator.error().object, (ObjectId{0x1A00, 1}));

@@ -118,6 +118,7 @@ TEST(SdoClient, AbortsAndTriesAgainTwiceWhenTheServerIsMute) {
   HostTime now{};
   client.start_upload(object::kDeviceType, now);
   const auto request = client.take_frame();
+
   for (int attempt = 0; attempt < 2; ++attempt) {
     client.on_time(now + 499ms);
     EXPECT_FALSE(client.take_frame());
@@ -126,6 +127,7 @@ TEST(SdoClient, AbortsAndTriesAgainTwiceWhenTheServerIsMute) {
     EXPECT_EQ(client.take_frame(), standard_frame(0x605, {0x80, 0x00, 0x10, 0, 0, 0, 0x04, 0x05}));
     EXPECT_EQ(client.take_frame(), request);
   }
+
   client.on_time(now + 500ms);
   EXPECT_EQ(client.state(), SdoClient::State::Failed);
   EXPECT_EQ(client.abort_code(), AbortCode::Timeout);
@@ -193,8 +195,9 @@ TEST(SdoClient, StopsAnEndlessUploadOfUnknownSize) {
   client.start_upload(kScratch, HostTime{});
   client.on_frame(answer({0x40, 0x00, 0x20, 0, 0, 0, 0, 0}), HostTime{});
   for (int i = 0; i < 100; ++i) {
-    client.on_frame(answer({static_cast<std::uint8_t>(i % 2 == 0 ? 0x00 : 0x10), 1, 2, 3, 4, 5, 6, 7}),
-                    HostTime{});
+    client.on_frame(
+        answer({static_cast<std::uint8_t>(i % 2 == 0 ? 0x00 : 0x10), 1, 2, 3, 4, 5, 6, 7}),
+        HostTime{});
   }
   EXPECT_EQ(client.abort_code(), AbortCode::OutOfMemory);
 }
@@ -202,10 +205,11 @@ TEST(SdoClient, StopsAnEndlessUploadOfUnknownSize) {
 TEST(SdoClient, IgnoresAnswersToOtherQuestions) {
   SdoClient client{5};
   client.start_upload({0x6004, 0}, HostTime{});
-  client.on_frame(answer({0x43, 0x05, 0x60, 1, 1, 0, 0, 0}), HostTime{});                 // another object
-  client.on_frame(answer({0x80, 0x05, 0x60, 1, 0, 0, 2, 6}), HostTime{});                 // another abort
-  client.on_frame(standard_frame(0x586, {0x43, 0x04, 0x60, 0, 1, 0, 0, 0}), HostTime{});  // another node
-  client.on_frame(answer({0x43, 0x04, 0x60, 0, 1}), HostTime{});                          // a torn frame
+  client.on_frame(answer({0x43, 0x05, 0x60, 1, 1, 0, 0, 0}), HostTime{});  // another object
+  client.on_frame(answer({0x80, 0x05, 0x60, 1, 0, 0, 2, 6}), HostTime{});  // another abort
+  client.on_frame(standard_frame(0x586, {0x43, 0x04, 0x60, 0, 1, 0, 0, 0}),
+                  HostTime{});                                    // another node
+  client.on_frame(answer({0x43, 0x04, 0x60, 0, 1}), HostTime{});  // a torn frame
   EXPECT_EQ(client.state(), SdoClient::State::Busy);
 }
 
@@ -219,7 +223,8 @@ TEST(SdoServer, AnswersWithTheExampleBytes) {
 TEST(SdoServer, AbortsSegmentsWithoutATransfer) {
   Link link;
   for (const std::uint8_t command : {std::uint8_t{0x60}, std::uint8_t{0x00}}) {
-    const auto reply = link.server.on_frame(standard_frame(0x605, {command, 0, 0, 0, 0, 0, 0, 0}), link.now);
+    const auto reply =
+        link.server.on_frame(standard_frame(0x605, {command, 0, 0, 0, 0, 0, 0, 0}), link.now);
     ASSERT_TRUE(reply);
     EXPECT_EQ(reply->byte(0), 0x80);
     EXPECT_EQ(reply->byte(7), 0x05);
@@ -232,7 +237,8 @@ TEST(SdoServer, AbortsARepeatedToggle) {
   (void)link.server.on_frame(standard_frame(0x605, {0x40, 0x08, 0x10, 0, 0, 0, 0, 0}), link.now);
   const auto segment = standard_frame(0x605, {0x60, 0, 0, 0, 0, 0, 0, 0});
   EXPECT_EQ(link.server.on_frame(segment, link.now)->byte(0) & 0xE0, 0x00);
-  EXPECT_EQ(link.server.on_frame(segment, link.now), answer({0x80, 0x08, 0x10, 0, 0, 0, 0x03, 0x05}));
+  EXPECT_EQ(link.server.on_frame(segment, link.now),
+            answer({0x80, 0x08, 0x10, 0, 0, 0, 0x03, 0x05}));
 }
 
 TEST(SdoServer, AbortsATransferTheClientLeft) {

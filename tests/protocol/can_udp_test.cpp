@@ -40,16 +40,20 @@ CanFrame random_frame(std::mt19937& random) {
   CanFrame frame;
   if (draw(2) != 0) frame.set(FrameFlag::Extended);
   const bool fd = draw(2) != 0;
+
   if (fd) {
     frame.set(FrameFlag::Fd);
     frame.fd_flags = static_cast<std::uint8_t>(draw(4));
   } else if (draw(4) == 0) {
     frame.set(FrameFlag::Remote);
   }
+
   frame.id = static_cast<std::uint32_t>(random()) &
              (frame.is(FrameFlag::Extended) ? CanFrame::kExtendedMask : CanFrame::kStandardMask);
   frame.length = static_cast<std::uint8_t>(draw(fd ? 65 : 9));
-  for (std::size_t i = 0; i < frame.payload().size(); ++i) frame.data[i] = static_cast<std::byte>(draw(256));
+  for (std::size_t i = 0; i < frame.payload().size(); ++i)
+    frame.data[i] = static_cast<std::byte>(draw(256));
+
   return frame;
 }
 
@@ -74,6 +78,7 @@ TEST(CanUdp, MarksExtendedRemoteErrorAndFdFrames) {
   fd.length = 1;
   fd.data[0] = std::byte{0xAA};
   const auto datagram = encode({extended, remote, error, fd});
+
   EXPECT_EQ(datagram, bytes({2,    0, 0, 0,    4,  //
                              0x81, 2, 3, 4,    0,  //
                              0x40, 0, 1, 0x23, 2,  //
@@ -111,7 +116,8 @@ TEST(CanUdp, RefusesADatagramCutAtAnyByte) {
   const auto whole = encode(frames);
   for (std::size_t n = 0; n < whole.size(); ++n) {
     const auto expected = n < kDatagramHeader ? DatagramError::TooShort : DatagramError::Truncated;
-    EXPECT_EQ(error_of({whole.begin(), whole.begin() + static_cast<std::ptrdiff_t>(n)}), expected) << n;
+    EXPECT_EQ(error_of({whole.begin(), whole.begin() + static_cast<std::ptrdiff_t>(n)}), expected)
+        << n;
   }
 }
 

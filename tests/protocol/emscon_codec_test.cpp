@@ -13,7 +13,8 @@ using samples::encoded;
 
 /// A heap copy of exactly these bytes, so that AddressSanitizer sees a read of one byte too many.
 struct Exact {
-  explicit Exact(std::span<const std::byte> bytes) : size(bytes.size()), data(new std::byte[bytes.size()]) {
+  explicit Exact(std::span<const std::byte> bytes)
+      : size(bytes.size()), data(new std::byte[bytes.size()]) {
     std::copy(bytes.begin(), bytes.end(), data.get());
   }
   [[nodiscard]] std::span<const std::byte> view() const { return {data.get(), size}; }
@@ -57,7 +58,8 @@ TEST(EmsconController, EveryPacketSurvivesTheRoundTrip) {
 TEST(EmsconController, EveryTruncatedPrefixIsRefused) {
   for (const Bytes& bytes : samples::controller_packets()) {
     for (std::size_t length = 0; length < bytes.size(); ++length) {
-      EXPECT_FALSE(decode(Exact{std::span{bytes}.first(length)}.view())) << length << " of " << bytes.size();
+      EXPECT_FALSE(decode(Exact{std::span{bytes}.first(length)}.view()))
+          << length << " of " << bytes.size();
     }
   }
 }
@@ -88,6 +90,7 @@ TEST(EmsconController, APacketCutAndRelabelledIsNeverReadPastItsEnd) {
       }
     }
   }
+
   EXPECT_GT(refused, 500u);
 }
 
@@ -110,6 +113,7 @@ TEST(EmsconController, AnyFlippedByteIsRefusedOrDecodesCleanly) {
       byte ^= std::byte{0xff};
     }
   }
+
   EXPECT_GT(refused, 100u);
   EXPECT_GT(decoded_still, 100u);
 }
@@ -145,11 +149,13 @@ TEST(EmsconEncode, RefusesMorePointsThanOnePacketHolds) {
   const std::vector<MultiPoint> points(kMaxMultiPoints + 1);
   Bytes room(2 * kMaxPacketSize);
   EXPECT_EQ(encode(MultiHead{}, std::span<const MultiPoint>{points}, room), 0u);
-  EXPECT_NE(encode(MultiHead{}, std::span<const MultiPoint>{points}.first(kMaxMultiPoints), room), 0u);
+  EXPECT_NE(encode(MultiHead{}, std::span<const MultiPoint>{points}.first(kMaxMultiPoints), room),
+            0u);
 }
 
 TEST(EmsconAnswer, AQueryMayBeRefusedWithSixteenBytes) {
-  const auto answer = decode_answer(encoded(Answer{Acknowledge{Command::GetUnits, Status::ServerBusy}}));
+  const auto answer =
+      decode_answer(encoded(Answer{Acknowledge{Command::GetUnits, Status::ServerBusy}}));
   ASSERT_TRUE(answer);
   EXPECT_TRUE(std::holds_alternative<Acknowledge>(*answer));
   EXPECT_EQ(command_of(*answer), Command::GetUnits);

@@ -24,7 +24,8 @@ class EmsconFramer : public testing::Test {
  protected:
   std::vector<Bytes> drain() {
     std::vector<Bytes> packets;
-    while (const auto packet = framer_->next()) packets.emplace_back(packet->begin(), packet->end());
+    while (const auto packet = framer_->next())
+      packets.emplace_back(packet->begin(), packet->end());
     return packets;
   }
   std::vector<Bytes> feed(std::span<const std::byte> bytes) {
@@ -70,14 +71,17 @@ TEST_F(EmsconFramer, TakesTheLargestPacketsOneAfterAnother) {
   std::mt19937 random{1};
   std::size_t whole = 0;
   Bytes stream = joined({largest, largest, largest, largest});
+
   for (std::span<const std::byte> rest{stream}; !rest.empty();) {
-    const auto piece = rest.first(std::min<std::size_t>(rest.size(), 1 + random() % kMaxPacketSize));
+    const auto piece =
+        rest.first(std::min<std::size_t>(rest.size(), 1 + random() % kMaxPacketSize));
     for (const Bytes& packet : feed(piece)) {
       EXPECT_EQ(packet.size(), kMaxPacketSize);
       ++whole;
     }
     rest = rest.subspan(piece.size());
   }
+
   EXPECT_EQ(whole, 4u);
 }
 
@@ -106,7 +110,8 @@ TEST_F(EmsconFramer, ShowsWhatItRefused) {
 }
 
 TEST_F(EmsconFramer, ResyncFindsTheNextPacketAfterAHole) {
-  const Bytes multi = samples::encoded(samples::head(), std::span<const MultiPoint>{samples::points()});
+  const Bytes multi =
+      samples::encoded(samples::head(), std::span<const MultiPoint>{samples::points()});
   const Bytes stream = joined({multi, multi, multi});
   framer_->resync();
   EXPECT_EQ(feed(std::span{stream}.subspan(70)), (std::vector<Bytes>{multi, multi}));

@@ -38,8 +38,8 @@ inline std::vector<Request> requests() {
   return {
       GetSystemStatus{},
       GetTrackerStatus{},
-      SetUnits{{LengthUnit::Inch, AngleUnit::Gon, TemperatureUnit::Fahrenheit, PressureUnit::Kilopascal,
-                HumidityUnit::RelativePercent}},
+      SetUnits{{LengthUnit::Inch, AngleUnit::Gon, TemperatureUnit::Fahrenheit,
+                PressureUnit::Kilopascal, HumidityUnit::RelativePercent}},
       GetUnits{},
       Initialize{},
       SetStationOrientation{{1, 2, 3}, {4, 5, 6}},
@@ -57,7 +57,8 @@ inline std::vector<Request> requests() {
       GetReflector{},
       GetReflectors{},
       SetSearchParams{25.5, 9000},
-      SetSystemSettings{{WeatherMonitor::ReadAndCompute, true, false, true, false, true, false, true, true}},
+      SetSystemSettings{
+          {WeatherMonitor::ReadAndCompute, true, false, true, false, true, false, true, true}},
       GetSystemSettings{},
       StartMeasurement{},
       StopMeasurement{},
@@ -66,8 +67,8 @@ inline std::vector<Request> requests() {
       FindReflector{1234.5},
       SetStatisticMode{StatisticMode::Standard, StatisticMode::Extended},
       SetTriggerSource{TriggerSource::External},
-      SetExternTriggerParams{ClockTransition::Negative, ExternTriggerMode::InternalClock, StartSignal::High,
-                             12},
+      SetExternTriggerParams{ClockTransition::Negative, ExternTriggerMode::InternalClock,
+                             StartSignal::High, 12},
       SetLongSystemParameter{LongParameter::TcpDataPacketRate, 10},
       GetLongSystemParameter{LongParameter::BeamCatch},
       GetMeasurementStatusInfo{},
@@ -90,18 +91,21 @@ inline std::vector<Answer> answers() {
   TrackerInfoAnswer info{Status::Ok, 5, name(u"AT901-MR"), 4711, {}, 3000, {}};
   info.other[3] = std::byte{0x5a};
   info.more[31] = std::byte{0xa5};
+
   return {
       Acknowledge{Command::Initialize, Status::Ok},
       Acknowledge{Command::GetSystemStatus, Status::NoTrackerConnected},
       SystemStatusAnswer{Status::Ok, Status::NotWarmedUp, TrackerProcessorStatus::Booted,
-                         LaserStatus::Heating, AdmStatus::Busy, 3, 6, 428, WeatherMonitor::Read, 17, 2042},
+                         LaserStatus::Heating, AdmStatus::Busy, 3, 6, 428, WeatherMonitor::Read, 17,
+                         2042},
       TrackerStatusAnswer{Status::Ok, TrackerStatus::Ready},
       UnitsAnswer{Status::Ok, {LengthUnit::Metre, AngleUnit::Degree}},
       EnvironmentAnswer{Status::Ok, {19.5, 1001.5, 33.25}},
       RefractionAnswer{Status::Ok, {1.000271, 1.000281}},
       ReflectorAnswer{Status::Ok, 3},
       ReflectorsAnswer{Status::Ok, 2, 1, TargetType::CatEye, 0.125, name(u"RRR 1.5\"")},
-      SystemSettingsAnswer{Status::Ok, {WeatherMonitor::None, true, true, false, true, false, true}},
+      SystemSettingsAnswer{Status::Ok,
+                           {WeatherMonitor::None, true, true, false, true, false, true}},
       LongSystemParameterAnswer{Status::Ok, LongParameter::Max6DRate, 100},
       MeasurementStatusInfoAnswer{Status::Ok, Status::NoDistanceSet, 2048 + 4096},
       ObjectTemperatureAnswer{Status::Ok, 20.25},
@@ -135,9 +139,11 @@ inline MultiHead head() {
 }
 
 inline SingleResult single() {
-  return {
-      Status::Ok,  MeasurementMode::Stationary, true, {1, 2, 3}, {4, 5, 6}, 7, {8, 9, 10}, {11, 12, 13}, 14,
-      {15, 16, 17}};
+  return {Status::Ok, MeasurementMode::Stationary,
+          true,       {1, 2, 3},
+          {4, 5, 6},  7,
+          {8, 9, 10}, {11, 12, 13},
+          14,         {15, 16, 17}};
 }
 
 /// Every packet of a controller, encoded.

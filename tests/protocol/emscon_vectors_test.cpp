@@ -41,12 +41,14 @@ INSTANTIATE_TEST_SUITE_P(
         RequestVector{"Initialize", Initialize{}, "0c000000 00000000 07000000"},
         RequestVector{"ContinuousTime", SetMeasurementMode{MeasurementMode::ContinuousTime},
                       "10000000 00000000 18000000 01000000"},
-        RequestVector{"EveryMillisecond", SetContinuousTimeModeParams{1, 0, false, RegionType::Sphere},
+        RequestVector{"EveryMillisecond",
+                      SetContinuousTimeModeParams{1, 0, false, RegionType::Sphere},
                       "1c000000 00000000 1e000000 01000000 00000000 00000000 00000000"},
         RequestVector{"Start", StartMeasurement{}, "0c000000 00000000 31000000"},
         RequestVector{"Stop", StopMeasurement{}, "0c000000 00000000 34000000"},
-        RequestVector{"Environment", SetEnvironmentParams{{20.0, 1013.25, 50.0}},
-                      "24000000 00000000 14000000 0000000000003440 0000000000aa8f40 0000000000004940"}),
+        RequestVector{
+            "Environment", SetEnvironmentParams{{20.0, 1013.25, 50.0}},
+            "24000000 00000000 14000000 0000000000003440 0000000000aa8f40 0000000000004940"}),
     [](const auto& vector) { return vector.param.name; });
 
 TEST(EmsconAnswer, OkToInitializeIsSixteenBytes) {
@@ -76,7 +78,8 @@ TEST(EmsconMultiResult, DecodesTimeAndPlace) {
   ASSERT_EQ(result->size(), 1u);
   EXPECT_EQ(result->head().environment.pressure, 1013.25);
   EXPECT_THAT(result->point(0).value, testing::ElementsAre(1000.0, 2000.0, -300.0));
-  EXPECT_EQ(result->point(0).time.to_device_time().time_since_epoch(), std::chrono::milliseconds{12'345'678});
+  EXPECT_EQ(result->point(0).time.to_device_time().time_since_epoch(),
+            std::chrono::milliseconds{12'345'678});
 }
 
 /// Whole sizes of the packets, from the documented table.
@@ -105,9 +108,11 @@ TEST(EmsconLayout, PutsFieldsWhereTheyAreDocumented) {
     std::memcpy(&value, bytes.data() + offset, sizeof value);  // the test hosts are little-endian
     return value;
   };
+
   SystemStatusAnswer status;
   status.laser = LaserStatus::Heating;
   status.serial_number = 2042;
+
   EXPECT_EQ(at(encoded(Answer{status}), 24), 2);
   EXPECT_EQ(at(encoded(Answer{status}), 52), 2042);
   TrackerInfoAnswer info;

@@ -23,10 +23,12 @@ TEST(McapWriter, TheSummaryNamesEveryChunkAndCountsEveryMessage) {
   const auto summary = read_summary(file.bytes);
   ASSERT_TRUE(summary);
   ASSERT_EQ(summary->chunks.size(), SmallFile::kChunks);
+
   for (std::size_t k = 0; k < SmallFile::kChunks; ++k) {
     EXPECT_EQ(summary->chunks[k].chunk_start, file.chunk_starts[k]);
     EXPECT_EQ(summary->chunks[k].chunk_start + summary->chunks[k].chunk_length, file.chunk_ends[k]);
   }
+
   EXPECT_EQ(summary->channels.size(), 2u);
   ASSERT_TRUE(summary->statistics);
   EXPECT_EQ(summary->statistics->message_count, SmallFile::kChunks * SmallFile::kMessagesPerChunk);
@@ -42,6 +44,7 @@ TEST(McapWriter, MessageIndexesPointAtTheirMessagesInOrderOfTime) {
   const auto chunk = chunk_at(file.bytes, index.chunk_start);
   ASSERT_TRUE(chunk);
   std::size_t found = 0;
+
   for (std::size_t c = 0; c < index.index_offsets.size(); ++c) {
     const auto [channel, offset] = index.index_offsets[c];
     const auto record = record_at(file.bytes, offset, Opcode::MessageIndex);
@@ -49,6 +52,7 @@ TEST(McapWriter, MessageIndexesPointAtTheirMessagesInOrderOfTime) {
     const auto messages = decode<MessageIndex>(record->content);
     ASSERT_TRUE(messages);
     std::uint64_t before = 0;
+
     for (std::size_t i = 0; i < messages->entries.size(); ++i, ++found) {
       const auto [time, at] = messages->entries[i];
       const auto message = record_at(chunk->chunk.records, at, Opcode::Message);
@@ -59,6 +63,7 @@ TEST(McapWriter, MessageIndexesPointAtTheirMessagesInOrderOfTime) {
       before = time;
     }
   }
+
   EXPECT_EQ(found, SmallFile::kMessagesPerChunk);
 }
 
@@ -70,12 +75,14 @@ TEST(McapWriter, SummaryOffsetsPointAtTheFirstRecordOfEachGroup) {
   RecordReader offsets{Bytes{file.bytes}.first(footer_at),
                        static_cast<std::size_t>(footer->summary_offset_start)};
   std::size_t groups = 0;
+
   while (const auto record = offsets.next()) {
     const auto group = decode<SummaryOffset>(record->content);
     ASSERT_TRUE(group);
     EXPECT_TRUE(record_at(file.bytes, group->start, group->group));
     ++groups;
   }
+
   EXPECT_EQ(groups, 4u);  // schema, channels, statistics, chunk indexes
 }
 
@@ -117,14 +124,17 @@ TEST(McapSummary, ThatPointsOutsideTheDataIsRefused) {
 
 TEST(McapScan, OfAFileCutAnywhereGivesEveryFinishedChunkAndTheWholeMessagesOfTheLast) {
   const SmallFile file;
-  const std::size_t message_size = kRecordHeadSize + 22 + std::string_view("message 0 of chunk 0").size();
+  const std::size_t message_size =
+      kRecordHeadSize + 22 + std::string_view("message 0 of chunk 0").size();
   const std::size_t records_at =
       file.chunk_ends[0] - file.chunk_starts[0] - SmallFile::kMessagesPerChunk * message_size;
+
   for (std::size_t cut = 0; cut <= file.data_end; ++cut) {
     std::size_t expected = 0;
     for (std::size_t k = 0; k < SmallFile::kChunks; ++k) {
       const std::size_t first = file.chunk_starts[k] + records_at;
-      if (cut >= first) expected += std::min(SmallFile::kMessagesPerChunk, (cut - first) / message_size);
+      if (cut >= first)
+        expected += std::min(SmallFile::kMessagesPerChunk, (cut - first) / message_size);
     }
     std::size_t messages = 0;
     LinearScan scan{Bytes{file.bytes}.first(cut)};
@@ -152,7 +162,8 @@ TEST(McapScan, SaysWhichChunkIsDamagedAndGoesOnBehindIt) {
 
 TEST(McapScan, StopsWhereAPowerCutLeftZeros) {
   const SmallFile file;
-  Buffer bytes{file.bytes.begin(), file.bytes.begin() + static_cast<std::ptrdiff_t>(file.chunk_ends[0])};
+  Buffer bytes{file.bytes.begin(),
+               file.bytes.begin() + static_cast<std::ptrdiff_t>(file.chunk_ends[0])};
   bytes.resize(bytes.size() + 4096);
   LinearScan scan{bytes};
   std::size_t chunks = 0;

@@ -59,13 +59,17 @@ TEST(McapRecords, EveryKindSurvivesARoundTrip) {
   expect_round_trip(Channel{1, 3, "topic", "cdr", StringMap{map}}, Opcode::Channel);
   expect_round_trip(Message{1, 2, 3, 4, bytes_of("data")}, Opcode::Message);
   expect_round_trip(Chunk{{1, 2, 4, 5, "", 4}, bytes_of("recs")}, Opcode::Chunk);
-  expect_round_trip(MessageIndex{1, decltype(MessageIndex::entries){entries}}, Opcode::MessageIndex);
-  expect_round_trip(ChunkIndex{1, 2, 3, 4, decltype(ChunkIndex::index_offsets){pairs}, 5, "lz4", 6, 7},
-                    Opcode::ChunkIndex);
+  expect_round_trip(MessageIndex{1, decltype(MessageIndex::entries){entries}},
+                    Opcode::MessageIndex);
+  expect_round_trip(
+      ChunkIndex{1, 2, 3, 4, decltype(ChunkIndex::index_offsets){pairs}, 5, "lz4", 6, 7},
+      Opcode::ChunkIndex);
   expect_round_trip(Attachment{1, 2, "path.csv", "text/csv", bytes_of("x_mm")}, Opcode::Attachment);
-  expect_round_trip(AttachmentIndex{1, 2, 3, 4, 5, "path.csv", "text/csv"}, Opcode::AttachmentIndex);
-  expect_round_trip(Statistics{1, 2, 3, 4, 5, 6, 7, 8, decltype(Statistics::channel_message_counts){pairs}},
-                    Opcode::Statistics);
+  expect_round_trip(AttachmentIndex{1, 2, 3, 4, 5, "path.csv", "text/csv"},
+                    Opcode::AttachmentIndex);
+  expect_round_trip(
+      Statistics{1, 2, 3, 4, 5, 6, 7, 8, decltype(Statistics::channel_message_counts){pairs}},
+      Opcode::Statistics);
   expect_round_trip(Metadata{"name", StringMap{map}}, Opcode::Metadata);
   expect_round_trip(MetadataIndex{1, 2, "name"}, Opcode::MetadataIndex);
   expect_round_trip(SummaryOffset{Opcode::Schema, 1, 2}, Opcode::SummaryOffset);

@@ -31,7 +31,9 @@ struct SmallFile {
   }
 
   /// Log time of message `i` of chunk `k`: chunks overlap, and within one they run backwards.
-  [[nodiscard]] static std::uint64_t time_of(std::size_t k, std::size_t i) { return 1000 + 100 * k - 40 * i; }
+  [[nodiscard]] static std::uint64_t time_of(std::size_t k, std::size_t i) {
+    return 1000 + 100 * k - 40 * i;
+  }
 
  private:
   void add_streams(SummaryBuilder& summary) {

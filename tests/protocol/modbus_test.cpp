@@ -26,8 +26,10 @@ TEST(Modbus, ComputesTheChecksumOfTheStandard) {
 TEST(Modbus, AsksOverTcpAsTheStandardShows) {
   std::array<std::byte, 32> out{};
   const auto n = encode(kRequest, Transport::Tcp, out);
-  const auto wanted = bytes({0, 0, 0, 0, 0, 6, 17, 3, 0x00, 0x6B, 0x00, 0x03});  // [Modbus V1.1b3] 6.3
-  EXPECT_EQ(std::vector<std::byte>(out.begin(), out.begin() + static_cast<std::ptrdiff_t>(n)), wanted);
+  // [Modbus V1.1b3] 6.3
+  const auto wanted = bytes({0, 0, 0, 0, 0, 6, 17, 3, 0x00, 0x6B, 0x00, 0x03});
+  EXPECT_EQ(std::vector<std::byte>(out.begin(), out.begin() + static_cast<std::ptrdiff_t>(n)),
+            wanted);
 }
 
 TEST(Modbus, ReadsItsOwnRequestsBack) {
@@ -50,19 +52,24 @@ TEST(Modbus, UnderstandsTheAnswerOfTheStandard) {
   const auto frame = bytes({0, 0, 0, 0, 0, 9, 17, 3, 6, 0x02, 0x2B, 0x00, 0x00, 0x00, 0x64});
   const auto answer = decode_answer(frame, Transport::Tcp, kRequest);
   ASSERT_TRUE(answer && *answer);
-  EXPECT_EQ(decode_register((*answer)->registers.first(2), RegisterType::Uint16, WordOrder::HighFirst),
-            555.0);
-  EXPECT_EQ(decode_register((*answer)->registers.last(2), RegisterType::Uint16, WordOrder::HighFirst), 100.0);
+  EXPECT_EQ(
+      decode_register((*answer)->registers.first(2), RegisterType::Uint16, WordOrder::HighFirst),
+      555.0);
+  EXPECT_EQ(
+      decode_register((*answer)->registers.last(2), RegisterType::Uint16, WordOrder::HighFirst),
+      100.0);
 }
 
 TEST(Modbus, WaitsForTheWholeAnswer) {
   const auto frame = bytes({0, 0, 0, 0, 0, 9, 17, 3, 6, 0x02, 0x2B, 0x00, 0x00, 0x00, 0x64});
   for (std::size_t n = 0; n < frame.size(); ++n)
-    EXPECT_FALSE(decode_answer(std::span{frame}.first(n), Transport::Tcp, kRequest)) << n << " bytes";
+    EXPECT_FALSE(decode_answer(std::span{frame}.first(n), Transport::Tcp, kRequest))
+        << n << " bytes";
 }
 
 TEST(Modbus, SaysWhichExceptionItIs) {
-  const auto answer = decode_answer(bytes({0, 0, 0, 0, 0, 3, 17, 0x83, 2}), Transport::Tcp, kRequest);
+  const auto answer =
+      decode_answer(bytes({0, 0, 0, 0, 0, 3, 17, 0x83, 2}), Transport::Tcp, kRequest);
   ASSERT_TRUE(answer && *answer);
   EXPECT_EQ((*answer)->exception, 2);
   EXPECT_EQ(name_of_exception(2), "illegal data address");
@@ -83,25 +90,30 @@ TEST(Modbus, RefusesTheAnswerToAnotherQuestion) {
 TEST(ModbusRegisters, TakeTheLowWordFirstAsVaisalaDoes) {
   // 30.56 %RH = 41F47AE1h is on the wire as 7AE1 41F4 (Vaisala M212287EN).
   const auto words = bytes({0x7A, 0xE1, 0x41, 0xF4});
-  EXPECT_FLOAT_EQ(static_cast<float>(decode_register(words, RegisterType::Float32, WordOrder::LowFirst)),
-                  30.56F);
+  EXPECT_FLOAT_EQ(
+      static_cast<float>(decode_register(words, RegisterType::Float32, WordOrder::LowFirst)),
+      30.56F);
 }
 
 TEST(ModbusRegisters, GiveNotANumberForWhatIsNone) {
+  EXPECT_TRUE(std::isnan(
+      decode_register(bytes({0x7F, 0xC0, 0, 0}), RegisterType::Float32, WordOrder::HighFirst)));
+  EXPECT_TRUE(std::isnan(
+      decode_register(bytes({0x7F, 0x80, 0, 0}), RegisterType::Float32, WordOrder::HighFirst)));
   EXPECT_TRUE(
-      std::isnan(decode_register(bytes({0x7F, 0xC0, 0, 0}), RegisterType::Float32, WordOrder::HighFirst)));
-  EXPECT_TRUE(
-      std::isnan(decode_register(bytes({0x7F, 0x80, 0, 0}), RegisterType::Float32, WordOrder::HighFirst)));
-  EXPECT_TRUE(std::isnan(decode_register(bytes({0x12, 0x3A}), RegisterType::Bcd16, WordOrder::HighFirst)));
+      std::isnan(decode_register(bytes({0x12, 0x3A}), RegisterType::Bcd16, WordOrder::HighFirst)));
 }
 
 TEST(ModbusRegisters, HaveSignsWhereTheirTypeHas) {
   EXPECT_EQ(decode_register(bytes({0xFF, 0xFE}), RegisterType::Int16, WordOrder::HighFirst), -2.0);
-  EXPECT_EQ(decode_register(bytes({0xFF, 0xFE}), RegisterType::Uint16, WordOrder::HighFirst), 65534.0);
-  EXPECT_EQ(decode_register(bytes({0xFF, 0xFF, 0xFF, 0xFE}), RegisterType::Int32, WordOrder::HighFirst),
-            -2.0);
-  EXPECT_EQ(decode_register(bytes({0x20, 0x96, 0x12, 0x34}), RegisterType::Bcd32, WordOrder::HighFirst),
-            20961234.0);
+  EXPECT_EQ(decode_register(bytes({0xFF, 0xFE}), RegisterType::Uint16, WordOrder::HighFirst),
+            65534.0);
+  EXPECT_EQ(
+      decode_register(bytes({0xFF, 0xFF, 0xFF, 0xFE}), RegisterType::Int32, WordOrder::HighFirst),
+      -2.0);
+  EXPECT_EQ(
+      decode_register(bytes({0x20, 0x96, 0x12, 0x34}), RegisterType::Bcd32, WordOrder::HighFirst),
+      20961234.0);
 }
 
 }  // namespace

@@ -10,7 +10,8 @@
 namespace abbe::protocol::quad08 {
 namespace {
 
-ScanLayout layout_of(std::initializer_list<std::uint8_t> channels, CountWidth width = CountWidth::Bits32) {
+ScanLayout layout_of(std::initializer_list<std::uint8_t> channels,
+                     CountWidth width = CountWidth::Bits32) {
   ScanLayout layout{.width = width};
   for (const auto c : channels) layout.channels[layout.count++] = c;
   return layout;
@@ -36,7 +37,8 @@ TEST(Quad08Channel, SetupWordsAreReadBack) {
 
 TEST(Quad08Channel, DebounceOffIsChannelOnAlone) {
   EXPECT_EQ(encode(Debounce{}), 0x80);
-  const Debounce filtered{.enabled = true, .time_code = 8, .falling = true, .trigger_before_stable = true};
+  const Debounce filtered{
+      .enabled = true, .time_code = 8, .falling = true, .trigger_before_stable = true};
   EXPECT_EQ(encode(filtered), 0xF8);
   EXPECT_EQ(decode_debounce(0xF8), filtered);
 }
@@ -86,8 +88,8 @@ TEST(Quad08ScanList, DivisorsAreThoseOfTheMakersLibrary) {
 
 TEST(Quad08Sequences, SelfTestReadsBackEightPatterns) {
   const auto sequence = open_sequence();
-  const auto reads =
-      std::ranges::count_if(sequence.steps(), [](const Step& s) { return s.expect == Expect::LowByte; });
+  const auto reads = std::ranges::count_if(
+      sequence.steps(), [](const Step& s) { return s.expect == Expect::LowByte; });
   EXPECT_EQ(reads, 16);  // done twice
   EXPECT_EQ(sequence.steps().front().setup, read_firmware_version());
   EXPECT_FALSE(fulfilled(sequence.steps().front(), 0x00FF));
@@ -95,7 +97,8 @@ TEST(Quad08Sequences, SelfTestReadsBackEightPatterns) {
 }
 
 TEST(Quad08Sequences, LongestListFits) {
-  const auto sequence = load_sequence(layout_of({0, 1, 2, 3, 4, 5, 6, 7}, CountWidth::Bits48), 1439);
+  const auto sequence =
+      load_sequence(layout_of({0, 1, 2, 3, 4, 5, 6, 7}, CountWidth::Bits48), 1439);
   EXPECT_LT(sequence.steps().size(), Sequence::kCapacity);
   EXPECT_EQ(sequence.steps().back().setup, usb::clear_halt(kScanEndpoint));
 }
@@ -112,7 +115,8 @@ std::vector<std::byte> stream_of(const ScanLayout& layout, std::size_t scans) {
   std::vector<std::byte> bytes;
   for (std::size_t s = 0; s < scans; ++s) {
     for (std::size_t c = 0; c < layout.count; ++c) {
-      const std::uint64_t value = 1'000'000 * c + (300 - 10 * c) * s;  // only one channel steps by 280
+      // only one channel steps by 280
+      const std::uint64_t value = 1'000'000 * c + (300 - 10 * c) * s;
       for (std::size_t b = 0; b < bytes_of(layout.width); ++b)
         bytes.push_back(static_cast<std::byte>(value >> 8 * b));
     }

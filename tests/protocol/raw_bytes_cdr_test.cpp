@@ -12,8 +12,8 @@ namespace {
 using namespace std::chrono_literals;
 
 constexpr std::array<std::byte, 3> kBytes{std::byte{0xAA}, std::byte{0xBB}, std::byte{0xCC}};
-const RawBytes kValue{"laser", HostTime{0x0102030405060708ns}, 9, RawBlock::Direction::ToDevice, true,
-                      kBytes};
+const RawBytes kValue{
+    "laser", HostTime{0x0102030405060708ns}, 9, RawBlock::Direction::ToDevice, true, kBytes};
 
 std::vector<std::byte> encoded(const RawBytes& value) {
   std::vector<std::byte> out(kMaxRawBytesCdrSize);
@@ -112,6 +112,7 @@ TEST(RawBytesCdr, ABlockBecomesAValueAndABlockAgain) {
   std::ranges::copy(kBytes, block.bytes.begin());
   RawBlock back;
   to_raw_block(to_raw_bytes(block, "laser"), back);
+
   EXPECT_EQ(back.time, block.time);
   EXPECT_EQ(back.lost_before, block.lost_before);
   EXPECT_EQ(back.length, block.length);

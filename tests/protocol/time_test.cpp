@@ -8,7 +8,9 @@ namespace abbe::protocol {
 namespace {
 
 template <class A, class B>
-concept Subtractable = requires(A a, B b) { a - b; };
+concept Subtractable = requires(A a, B b) {
+  a - b;
+};
 
 TEST(Time, InstantsOfTwoClocksCannotBeSubtracted) {
   static_assert(Subtractable<HostTime, HostTime>);

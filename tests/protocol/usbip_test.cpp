@@ -22,7 +22,8 @@ ExportedDevice card(std::string_view bus_id) {
 
 std::uint32_t word_at(std::span<const std::byte> bytes, std::size_t at) {
   std::uint32_t value = 0;
-  for (std::size_t i = 0; i < 4; ++i) value = value << 8 | std::to_integer<std::uint32_t>(bytes[at + i]);
+  for (std::size_t i = 0; i < 4; ++i)
+    value = value << 8 | std::to_integer<std::uint32_t>(bytes[at + i]);
   return value;
 }
 
@@ -83,9 +84,10 @@ TEST(UsbipOperations, ADeviceListIsNotReadBeforeAllOfItCame) {
 }
 
 TEST(UsbipUrb, SubmitPutsItsSetupAtTheEnd) {
-  const Submit submit{.head = {.sequence = 7, .device = 0x10002, .direction = Direction::In, .endpoint = 0},
-                      .length = 2,
-                      .setup = usb::encode(usb::Setup{0xC0, 0xB4, 0, 0, 2})};
+  const Submit submit{
+      .head = {.sequence = 7, .device = 0x10002, .direction = Direction::In, .endpoint = 0},
+      .length = 2,
+      .setup = usb::encode(usb::Setup{0xC0, 0xB4, 0, 0, 2})};
   const auto bytes = encode(Urb{submit});
   EXPECT_EQ(word_at(bytes, 0), 1u);
   EXPECT_EQ(word_at(bytes, 4), 7u);
@@ -96,7 +98,8 @@ TEST(UsbipUrb, SubmitPutsItsSetupAtTheEnd) {
 }
 
 TEST(UsbipUrb, RepliesSurviveTheWire) {
-  const SubmitReply reply{.head = {.sequence = 9}, .status = UrbStatus::Stalled, .length = 512, .errors = 1};
+  const SubmitReply reply{
+      .head = {.sequence = 9}, .status = UrbStatus::Stalled, .length = 512, .errors = 1};
   EXPECT_EQ(std::get<SubmitReply>(*decode_urb(encode(Urb{reply}))), reply);
   const UnlinkReply unlinked{.head = {.sequence = 10}, .status = UrbStatus::Unlinked};
   EXPECT_EQ(word_at(encode(Urb{unlinked}), 20), 0xFFFFFF98u);  // -104

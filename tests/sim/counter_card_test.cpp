@@ -19,10 +19,11 @@ const HostTime kStart{1h};
 
 CounterCardOptions options() {
   CounterCardOptions card;
-  card.channels[0].phases = ScaleSignal{.reading = [](HostTime t) { return 0.5 * ns_to_seconds(t - kStart); },
-                                        .step = 1e-6,
-                                        .noise = 0.0,
-                                        .marks = {}};
+  card.channels[0].phases =
+      ScaleSignal{.reading = [](HostTime t) { return 0.5 * ns_to_seconds(t - kStart); },
+                  .step = 1e-6,
+                  .noise = 0.0,
+                  .marks = {}};
   card.channels[5].phases = ClockSignal{.hz = kClock_hz};
   card.channels[6] = {ClockSignal{.hz = kClock_hz}, true};
   card.channels[7].phases = ProbeSignal{};
@@ -40,10 +41,12 @@ quad08::ScanLayout layout() {
 class CounterCardTest : public testing::Test {
  protected:
   void run(const quad08::Sequence& sequence, HostTime at) {
-    for (const auto& step : sequence.steps()) EXPECT_TRUE(card_.control(step.setup, at).has_value());
+    for (const auto& step : sequence.steps())
+      EXPECT_TRUE(card_.control(step.setup, at).has_value());
   }
   void set_up(std::uint8_t channel, const quad08::CounterSetup& setup, HostTime at) {
-    for (const auto& write : quad08::channel_writes(channel, setup, {}, {})) (void)card_.control(write, at);
+    for (const auto& write : quad08::channel_writes(channel, setup, {}, {}))
+      (void)card_.control(write, at);
   }
   /// 1000 scans per second of scale, clock, latch and edges, set up and started at kStart.
   void start() {
@@ -122,7 +125,8 @@ TEST_F(CounterCardTest, ReadsItselfByRegistersToo) {
 
 TEST_F(CounterCardTest, StallsWhatItDoesNotKnow) {
   EXPECT_FALSE(card_.control({0xC0, 0x77, 0, 0, 2}, kStart).has_value());
-  EXPECT_FALSE(card_.control(usb::get_descriptor(usb::DescriptorType::String, 9, 255), kStart).has_value());
+  EXPECT_FALSE(
+      card_.control(usb::get_descriptor(usb::DescriptorType::String, 9, 255), kStart).has_value());
 }
 
 TEST(DistanceCodedMarks, StandWhereTheFormulaFindsThem) {
@@ -139,6 +143,7 @@ TEST(UsbipServer, ListsTheCardForUsbipAttach) {
   ASSERT_TRUE(server);
   const Socket client = test::connected(SOCK_STREAM, server->port());
   std::array<std::byte, 8> request{};
+
   ASSERT_EQ(usbip::encode_device_list_request(request), request.size());
   test::send_bytes(client, request);
   for (int i = 0; i < 50; ++i) server->poll(kStart);

@@ -30,14 +30,19 @@ HostTime configure(EncoderNode& node, HostTime now) {
   node.advance(now);
   frames_of(node);
   master.start(now);
-  for (int turn = 0; turn < 1000 && master.state() == can::EncoderConfigurator::State::Working; ++turn) {
+
+  for (int turn = 0; turn < 1000 && master.state() == can::EncoderConfigurator::State::Working;
+       ++turn) {
     now += 1ms;
     while (const auto frame = master.take_frame()) node.on_frame(*frame, now);
     for (const can::CanFrame& frame : frames_of(node)) master.on_frame(frame, now);
   }
+
   while (const auto frame = master.take_frame()) node.on_frame(*frame, now);
   frames_of(node);
-  EXPECT_EQ(master.state(), can::EncoderConfigurator::State::Ready) << can::to_text(master.error().fault);
+  EXPECT_EQ(master.state(), can::EncoderConfigurator::State::Ready)
+      << can::to_text(master.error().fault);
+
   return now;
 }
 
@@ -46,6 +51,7 @@ TEST(EncoderNode, BootsThenIsConfiguredThenAnswersSync) {
   EncoderNode node({.node = 5, .axis = Axis::Y, .noise_m = 0.0}, machine, kPowerOn);
   node.advance(kPowerOn);
   const auto boot = can::decode_heartbeat(frames_of(node).at(0));
+
   ASSERT_TRUE(boot);
   EXPECT_EQ(boot->state, can::NodeState::BootUp);
   const HostTime now = configure(node, kPowerOn + 1s);
@@ -62,38 +68,43 @@ TEST(EncoderNode, ReadsTheScaleAtTheSyncAndNotTheTruePosition) {
   plan.vertices = {{{0, 0, 0}}, {{0.5, 0, 0}}};
   plan.feed_m_per_s = 0.1;
   TruthMachine truth;
-  truth.axis(Axis::X).error[0] = ErrorFunction({-1.0, 1.0}, {1e-3, 1e-3});  // EXX of 1 mm everywhere
+
+  // EXX of 1 mm everywhere
+  truth.axis(Axis::X).error[0] = ErrorFunction({-1.0, 1.0}, {1e-3, 1e-3});
   VirtualMachine machine(truth, PathMotion::plan(plan).value());
   EncoderNode node({.node = 1, .axis = Axis::X, .noise_m = 0.0}, machine, kPowerOn);
   const HostTime now = configure(node, kPowerOn + 1s);
   machine.start(now);
   const HostTime sync = now + 2s;
   node.on_frame(can::encode_sync(), sync);
-  const auto count = can::decode_position(frames_of(node).back().payload(), can::PositionType::Signed32);
+  const auto count =
+      can::decode_position(frames_of(node).back().payload(), can::PositionType::Signed32);
   EXPECT_EQ(count, std::llround(machine.motion(sync).q_m.x() / 10e-9));
 }
 
 TEST(EncoderNode, HasNoiseOfItsOwnThatIsTheSameEveryRun) {
   const VirtualMachine machine = test::standing_machine();
   const auto counts = [&](std::uint64_t seed) {
-    EncoderNode node({.node = 1, .axis = Axis::X, .step_nm = 1, .noise_m = 50e-9, .seed = seed}, machine,
-                     kPowerOn);
+    EncoderNode node({.node = 1, .axis = Axis::X, .step_nm = 1, .noise_m = 50e-9, .seed = seed},
+                     machine, kPowerOn);
     HostTime now = configure(node, kPowerOn + 1s);
     std::vector<double> values;
     for (int i = 0; i < 2000; ++i) {
       node.on_frame(can::encode_sync(), now += 1ms);
       for (const can::CanFrame& frame : frames_of(node)) {
         if (frame.id != can::cob::tpdo(1, 1)) continue;
-        values.push_back(
-            static_cast<double>(*can::decode_position(frame.payload(), can::PositionType::Signed32)));
+        values.push_back(static_cast<double>(
+            *can::decode_position(frame.payload(), can::PositionType::Signed32)));
       }
     }
     return values;
   };
+
   const std::vector<double> values = counts(1);
   ASSERT_EQ(values.size(), 2000u);
   double square = 0.0;
   for (const double v : values) square += (v - 1e8) * (v - 1e8);  // 0.1 m of 1 nm
+
   EXPECT_NEAR(std::sqrt(square / 2000.0), 50.0, 3.0);
   EXPECT_EQ(values, counts(1));
   EXPECT_NE(values, counts(2));
@@ -129,6 +140,7 @@ TEST(EncoderNode, RestartedNodeBootsAndHasForgottenItsConfiguration) {
   const HostTime now = configure(node, kPowerOn + 1s);
   node.restart(now);
   node.on_frame(can::encode_sync(), now + 100ms);
+
   EXPECT_TRUE(frames_of(node).empty());
   node.advance(now + 300ms);
   EXPECT_EQ(can::decode_heartbeat(frames_of(node).at(0))->state, can::NodeState::BootUp);
@@ -200,8 +212,8 @@ TEST_F(EncoderBusTest, OverflowIsAnErrorFrame) {
   send(can::encode_sync());
   receive();
   bus_.inject({FaultKind::Overflow, 0.0, 0.0, 0.0, 0}, now_);
-  EXPECT_TRUE(
-      can::has(can::decode_error_frame(receive().at(0))->conditions, can::BusCondition::ReceiveOverflow));
+  EXPECT_TRUE(can::has(can::decode_error_frame(receive().at(0))->conditions,
+                       can::BusCondition::ReceiveOverflow));
 }
 
 TEST_F(EncoderBusTest, ProducesTheSyncItselfWhenTold) {
@@ -245,11 +257,13 @@ TEST_F(EncoderBusTest, BusOffIsAnErrorFrameThenSilenceThenRestarted) {
   send(can::encode_sync());
   receive();
   bus_.inject({FaultKind::BusOff, 0.0, 1.0, 0.0, 0}, now_);
-  EXPECT_TRUE(can::has(can::decode_error_frame(receive().at(0))->conditions, can::BusCondition::BusOff));
+  EXPECT_TRUE(
+      can::has(can::decode_error_frame(receive().at(0))->conditions, can::BusCondition::BusOff));
   send(can::encode_sync());
   EXPECT_FALSE(test::readable(peer_.get(), 0));
   bus_.poll(now_ += 1s);
-  EXPECT_TRUE(can::has(can::decode_error_frame(receive().at(0))->conditions, can::BusCondition::Restarted));
+  EXPECT_TRUE(
+      can::has(can::decode_error_frame(receive().at(0))->conditions, can::BusCondition::Restarted));
 }
 
 TEST_F(EncoderBusTest, EmergencyIsFollowedByTheAllClear) {
@@ -271,8 +285,8 @@ TEST_F(EncoderBusTest, SendsGarbageWhenTold) {
 }
 
 TEST_F(EncoderBusTest, SurvivesDatagramsThatAreNoFrames) {
-  constexpr std::array<std::byte, 3> kNonsense{std::byte{9}, std::byte{9}, std::byte{9}};
-  test::send_bytes(peer_, kNonsense);
+  constexpr std::array<std::byte, 3> kMalformed{std::byte{9}, std::byte{9}, std::byte{9}};
+  test::send_bytes(peer_, kMalformed);
   test::readable(bus_.fd());
   bus_.poll(now_);
   send(can::encode_sync());

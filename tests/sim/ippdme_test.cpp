@@ -62,15 +62,17 @@ TEST(IppDmeDevice, ReportsWhileMovingTenTimesASecondAtMost) {
   (void)ask(machine, "00001 StartSession()");
   EXPECT_EQ(ask(machine, "E0001 OnMoveReportE(Time(0.01),Dis(1),X())"), "E0001 &|");
   const std::string said = ask(machine, "00002 GoTo(X(200))", kStart, kStart + 2s);  // 1 s
-  EXPECT_EQ(said,
-            "00002 &|E0001 # X(0)|E0001 # X(20)|E0001 # X(40)|E0001 # X(60)|E0001 # X(80)|E0001 # X(100)|"
-            "E0001 # X(120)|E0001 # X(140)|E0001 # X(160)|E0001 # X(180)|00002 %|");
+  EXPECT_EQ(
+      said,
+      "00002 &|E0001 # X(0)|E0001 # X(20)|E0001 # X(40)|E0001 # X(60)|E0001 # X(80)|E0001 # X(100)|"
+      "E0001 # X(120)|E0001 # X(140)|E0001 # X(160)|E0001 # X(180)|00002 %|");
 }
 
 TEST(IppDmeDevice, SaysWhereTheSurfaceIsNot) {
   IppDmeDevice machine{with_a_sphere(), kStart};
   (void)ask(machine, "00001 StartSession()");
-  const std::string missed = ask(machine, "00002 PtMeas(X(0),Y(0),Z(0),IJK(0,0,1))", kStart, kStart + 60s);
+  const std::string missed =
+      ask(machine, "00002 PtMeas(X(0),Y(0),Z(0),IJK(0,0,1))", kStart, kStart + 60s);
   EXPECT_NE(missed.find("Error(2,1006"), std::string::npos) << missed;
   (void)ask(machine, "00003 ClearAllErrors()");
   const std::string inside =
@@ -93,7 +95,8 @@ TEST(IppDmeDevice, MeetsTheFaceOfABlockWithinItsSquareOnly) {
   const auto on = probe(machine, {0.105, 0.1, 2e-3}, Eigen::Vector3d::UnitZ(), 0);
   ASSERT_FALSE(on.fault);
   EXPECT_NEAR(on.reading_m.z(), 2e-3, 1e-12);
-  EXPECT_EQ(probe(machine, {0.13, 0.1, 2e-3}, Eigen::Vector3d::UnitZ(), 1).fault, ProbingFault::NothingThere);
+  EXPECT_EQ(probe(machine, {0.13, 0.1, 2e-3}, Eigen::Vector3d::UnitZ(), 1).fault,
+            ProbingFault::NothingThere);
 }
 
 TEST(IppDmeDevice, IsMuteForAWhileAndForgetsItsSession) {
@@ -112,10 +115,13 @@ TEST(IppDmeDevice, KeepsMovingWhenTheConnectionClosesAndRemembersWhatItHeard) {
   (void)ask(machine, "00001 StartSession()");
   (void)ask(machine, "00002 GoTo(X(200))");
   machine.disconnected();
+
   EXPECT_TRUE(machine.moving());
   machine.connected(kStart);
-  EXPECT_EQ(ask(machine, "00001 StartSession()", kStart + 500ms, kStart + 500ms), "00001 &|");  // waits
-  EXPECT_NE(ask(machine, "E0002 AbortE()", kStart + 500ms, kStart + 2s).find("E0002 %"), std::string::npos);
+  EXPECT_EQ(ask(machine, "00001 StartSession()", kStart + 500ms, kStart + 500ms),
+            "00001 &|");  // waits
+  EXPECT_NE(ask(machine, "E0002 AbortE()", kStart + 500ms, kStart + 2s).find("E0002 %"),
+            std::string::npos);
   EXPECT_NEAR(machine.reading_m(kStart + 2s)[0], 0.1, 1e-9);
   EXPECT_EQ(machine.heard().back(), "AbortE()");
   EXPECT_EQ(machine.heard().size(), 4u);
@@ -128,8 +134,9 @@ TEST(IppDmeDevice, AnEmergencyStopIsNotClearedWhileItIsPressed) {
   (void)ask(machine, "00002 GoTo(X(200))");
   machine.inject({.kind = FaultKind::EmergencyStop, .duration_s = 1.0}, kStart + 500ms);
   EXPECT_NEAR(machine.reading_m(kStart + 2s)[0], 0.1, 1e-9);
-  EXPECT_NE(ask(machine, "00003 ClearAllErrors()", kStart + 600ms, kStart + 600ms).find("Error(3,0500"),
-            std::string::npos);
+  EXPECT_NE(
+      ask(machine, "00003 ClearAllErrors()", kStart + 600ms, kStart + 600ms).find("Error(3,0500"),
+      std::string::npos);
   EXPECT_EQ(ask(machine, "00004 ClearAllErrors()", kStart + 2s, kStart + 2s), "00004 &|00004 %|");
 }
 
@@ -151,7 +158,8 @@ TEST(IppDmeDevice, RefusesTheNextTouchWithTheErrorThatIsWanted) {
   machine.connected(kStart);
   (void)ask(machine, "00001 StartSession()");
   machine.inject({.kind = FaultKind::RefuseTouch, .value = 1009}, kStart);
-  const auto said = ask(machine, "00002 PtMeas(X(100),Y(200),Z(-85.5),IJK(0,0,1))", kStart, kStart + 60s);
+  const auto said =
+      ask(machine, "00002 PtMeas(X(100),Y(200),Z(-85.5),IJK(0,0,1))", kStart, kStart + 60s);
   EXPECT_NE(said.find("00002 ! Error(2,1009,PtMeas"), std::string::npos) << said;
 }
 

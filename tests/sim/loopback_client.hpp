@@ -1,6 +1,6 @@
 #pragma once
-/// Sockets of a test that talks to the simulator over 127.0.0.1. Waiting is poll(2) on the socket, never a
-/// sleep.
+/// Sockets of a test that talks to the simulator over 127.0.0.1. Waiting is poll(2) on the socket,
+/// never a sleep.
 
 #include <arpa/inet.h>
 #include <netinet/in.h>
@@ -43,7 +43,8 @@ inline void send_bytes(const Socket& socket, std::span<const std::byte> bytes) {
 /// One read; empty at the end of the stream.
 inline std::vector<std::byte> receive_bytes(const Socket& socket) {
   std::vector<std::byte> bytes(65536);
-  const ssize_t size = readable(socket.get()) ? ::recv(socket.get(), bytes.data(), bytes.size(), 0) : 0;
+  const ssize_t size =
+      readable(socket.get()) ? ::recv(socket.get(), bytes.data(), bytes.size(), 0) : 0;
   bytes.resize(size > 0 ? static_cast<std::size_t>(size) : 0);
   return bytes;
 }

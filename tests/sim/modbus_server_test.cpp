@@ -32,7 +32,8 @@ TEST(ModbusRegisters, LieAsVaisalaShowsThem) {
 }
 
 TEST(ModbusRegisters, HoldTheSerialNumberOfACometInDecimalDigits) {
-  const auto r = registers_of({.model = ModbusModel::CometT7510, .serial_number = 20961234}, {}, 0s, false);
+  const auto r =
+      registers_of({.model = ModbusModel::CometT7510, .serial_number = 20961234}, {}, 0s, false);
   EXPECT_EQ(value_at(r, 0, 4149), 0x2096);
   EXPECT_EQ(value_at(r, 0, 4150), 0x1234);
 }
@@ -64,6 +65,7 @@ TEST(ModbusServer, TakesItsTerminalAwayAndBringsItBack) {
   std::string folder = (std::filesystem::temp_directory_path() / "abbe-sim-XXXXXX").string();
   ASSERT_NE(mkdtemp(folder.data()), nullptr);
   const std::string link = folder + "/line";
+
   {
     auto server = ModbusServer::open({.endpoint = ModbusPtyEndpoint{link}}, kStart);
     ASSERT_TRUE(server);
@@ -74,6 +76,7 @@ TEST(ModbusServer, TakesItsTerminalAwayAndBringsItBack) {
     server->poll(kStart + 1s);
     EXPECT_TRUE(std::filesystem::is_symlink(link));
   }
+
   EXPECT_FALSE(std::filesystem::is_symlink(link));
   std::filesystem::remove_all(folder);
 }

@@ -74,7 +74,8 @@ TEST(PathMotion, WithoutAVertexIsRefused) {
 
 TEST(PathCsv, ReadsMillimetresAndFeed) {
   const auto path =
-      parse_path_csv("# c\nx_mm,y_mm,z_mm,feed_mm_per_min\n1,2,3,\n-4.5,0,1e2,600\n", "p.csv").value();
+      parse_path_csv("# c\nx_mm,y_mm,z_mm,feed_mm_per_min\n1,2,3,\n-4.5,0,1e2,600\n", "p.csv")
+          .value();
   ASSERT_EQ(path.size(), 2u);
   EXPECT_LT((path[1].q_m - Eigen::Vector3d(-4.5e-3, 0, 0.1)).norm(), 1e-16);
   EXPECT_EQ(path[0].feed_m_per_s, 0.0);

@@ -25,13 +25,16 @@ class Program : public testing::Test {
     std::string output;  ///< both streams
   };
 
-  Program() : folder_(std::filesystem::temp_directory_path() / ("abbe_sim_" + std::to_string(::getpid()))) {
+  Program()
+      : folder_(std::filesystem::temp_directory_path() /
+                ("abbe_sim_" + std::to_string(::getpid()))) {
     std::filesystem::create_directories(folder_);
   }
   ~Program() override { std::filesystem::remove_all(folder_); }
 
   static Outcome run(const std::string& arguments) {
-    std::FILE* pipe = ::popen((std::string(ABBE_SIM_PROGRAM " ") + arguments + " 2>&1").c_str(), "r");
+    std::FILE* pipe =
+        ::popen((std::string(ABBE_SIM_PROGRAM " ") + arguments + " 2>&1").c_str(), "r");
     std::string output;
     for (int c = std::fgetc(pipe); c != EOF; c = std::fgetc(pipe)) output += static_cast<char>(c);
     const int status = ::pclose(pipe);
@@ -64,15 +67,18 @@ TEST_F(Program, RefusesATomlFileThatNestsTooDeepOrIsTooLarge) {
   for (int i = 0; i < 40'000; ++i) key += ".a";
   const std::string brackets = "x = " + std::string(40'000, '[');
   const std::string machine = " --machine " + demo_ + "/machine.toml";
+
   for (const auto& text : {key + " = 1\n", "\n\n" + brackets + "\n", "[" + key + "]\n"}) {
     const std::string file = write("deep.toml", text);
     for (const auto& arguments : {"run --machine " + file, "run --config " + file + machine}) {
       const Outcome outcome = run(arguments);
       EXPECT_EQ(outcome.code, 3) << outcome.output;
       EXPECT_THAT(outcome.output, HasSubstr("nested deeper than 64"));
-      EXPECT_THAT(outcome.output, HasSubstr(text.front() == '\n' ? "deep.toml:3: " : "deep.toml:1: "));
+      EXPECT_THAT(outcome.output,
+                  HasSubstr(text.front() == '\n' ? "deep.toml:3: " : "deep.toml:1: "));
     }
   }
+
   const Outcome large = run("run --machine " + write("large.toml", std::string(2 << 20, '#')));
   EXPECT_EQ(large.code, 3);
   EXPECT_THAT(large.output, HasSubstr("at most 1048576 are read"));
@@ -92,9 +98,10 @@ TEST_F(Program, FileThatIsNotThereIsInputOutput) {
 }
 
 TEST_F(Program, NamesEveryFaultOfAConfigurationAtOnce) {
-  const std::string config = write("bad.toml",
-                                   "[sim]\nspeed = \"fast\"\nfoo = 1\n[sim.path]\nfeed_mm_per_min = -3\n"
-                                   "[[sim.fault]]\ndevice = \"tracker\"\nkind = \"flood\"\nat_s = 1\n");
+  const std::string config =
+      write("bad.toml",
+            "[sim]\nspeed = \"fast\"\nfoo = 1\n[sim.path]\nfeed_mm_per_min = -3\n"
+            "[[sim.fault]]\ndevice = \"tracker\"\nkind = \"flood\"\nat_s = 1\n");
   const Outcome outcome = run("run --config " + config + " --machine " + demo_ + "/machine.toml");
   EXPECT_EQ(outcome.code, 3);
   EXPECT_THAT(outcome.output, HasSubstr("bad.toml:2: sim.speed: must be a number"));
@@ -121,14 +128,15 @@ TEST_F(Program, PortInUseIsOneClearMessage) {
 }
 
 TEST_F(Program, ReadsADaemonsWholeConfiguration) {
-  const std::string config = write("abbed.toml",
-                                   "[machine]\nname = \"m\"\nchain = \"[w X' b Y Z t]\"\n[axes.X]\nmin_mm = "
-                                   "0\nmax_mm = 100\n[axes.Y]\nmin_mm = 0\n"
-                                   "max_mm = 100\n[axes.Z]\nmin_mm = 0\nmax_mm = 100\n[daemon]\nspeed = "
-                                   "5\nsimulated = true\n[gate]\nmax_error_mm = 1\n"
-                                   "[encoder]\ntransport = \"udp\"\npeer_host = \"127.0.0.1\"\npeer_port = "
-                                   "20000\n[[encoder.nodes]]\naxis = \"X\"\n"
-                                   "node = 5\nstep_nm = 10\n");
+  const std::string config =
+      write("abbed.toml",
+            "[machine]\nname = \"m\"\nchain = \"[w X' b Y Z t]\"\n[axes.X]\nmin_mm = "
+            "0\nmax_mm = 100\n[axes.Y]\nmin_mm = 0\n"
+            "max_mm = 100\n[axes.Z]\nmin_mm = 0\nmax_mm = 100\n[daemon]\nspeed = "
+            "5\nsimulated = true\n[gate]\nmax_error_mm = 1\n"
+            "[encoder]\ntransport = \"udp\"\npeer_host = \"127.0.0.1\"\npeer_port = "
+            "20000\n[[encoder.nodes]]\naxis = \"X\"\n"
+            "node = 5\nstep_nm = 10\n");
   EXPECT_EQ(run("truth --machine " + config + " --grid 2 2 2").code, 0);
 }
 
@@ -140,13 +148,16 @@ TEST_F(Program, TruthIsThatOfTheMachineWrittenAsTables) {
   ASSERT_EQ(run("machine --seed 9" + machine + "-o " + tables).code, 0);
   ASSERT_EQ(run("truth --seed 9" + machine + "--grid 4 3 2 -o " + from_seed).code, 0);
   ASSERT_EQ(
-      run("truth --truth " + tables + machine + "--points " + demo_ + "/path.csv -o " + from_tables).code, 0);
+      run("truth --truth " + tables + machine + "--points " + demo_ + "/path.csv -o " + from_tables)
+          .code,
+      0);
   ASSERT_EQ(run("truth --truth " + tables + machine + "--grid 4 3 2 -o " + from_tables).code, 0);
   const auto a = test::read_rows(from_seed);
   const auto b = test::read_rows(from_tables);
   ASSERT_EQ(a.size(), 25u);
   ASSERT_EQ(a.size(), b.size());
   EXPECT_THAT(a[0], testing::ElementsAre("x_mm", "y_mm", "z_mm", "ex_um", "ey_um", "ez_um"));
+
   for (std::size_t i = 1; i < a.size(); ++i) {
     for (std::size_t k = 3; k < 6; ++k) EXPECT_NEAR(std::stod(a[i][k]), std::stod(b[i][k]), 1e-9);
   }
@@ -156,12 +167,13 @@ TEST_F(Program, WritesItsPortsWhenItListensAndStopsWhenTold) {
   const std::string ports = (folder_ / "ports").string();
   const std::string config = demo_ + "/sim.toml";
   std::array<int, 2> output{};
+
   ASSERT_EQ(::pipe(output.data()), 0);
   const pid_t child = ::fork();
   if (child == 0) {
     ::dup2(output[1], STDOUT_FILENO);
-    ::execl(ABBE_SIM_PROGRAM, "abbe-sim", "run", "--config", config.c_str(), "--ports-file", ports.c_str(),
-            nullptr);
+    ::execl(ABBE_SIM_PROGRAM, "abbe-sim", "run", "--config", config.c_str(), "--ports-file",
+            ports.c_str(), nullptr);
     ::_exit(127);
   }
   ::close(output[1]);

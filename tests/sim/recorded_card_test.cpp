@@ -151,6 +151,7 @@ TEST(RecordedCard, ASilentCardIsSilent) {
   Replayed r{t};
   r.open();
   (void)r.card.answer(kStart, kNow);
+
   EXPECT_EQ(r.card.answer(kStatus, kNow + 150ms).outcome, Outcome::Done);
   EXPECT_EQ(r.card.answer(kStatus, kNow + 250ms).outcome, Outcome::Silent);
   r.card.host_gone();

@@ -98,8 +98,9 @@ TEST(RecordedDialogue, WaitsForAWholeRequest) {
 TEST(RecordedDialogue, RefusesWhatNobodyAskedThen) {
   auto p = player(talk());
   p.connected(kNow);
-  EXPECT_EQ(reply(p, "00001 Home()\r\n"),
-            "00001 &\r\n00001 ! Error(2,0501,\"replay\",\"Not asked in the recording\")\r\n00001 %\r\n");
+  EXPECT_EQ(
+      reply(p, "00001 Home()\r\n"),
+      "00001 &\r\n00001 ! Error(2,0501,\"replay\",\"Not asked in the recording\")\r\n00001 %\r\n");
 }
 
 TEST(RecordedDialogue, BreaksWhereItBrokeAndGoesOnOnTheNextConnection) {
@@ -108,6 +109,7 @@ TEST(RecordedDialogue, BreaksWhereItBrokeAndGoesOnOnTheNextConnection) {
   s.after(1s).connect().ask(bytes("00001 Get(X())\r\n")).say(bytes("00001 # X(3)\r\n"));
   auto p = player(s);
   p.connected(kNow);
+
   EXPECT_EQ(reply(p, "00001 Get(X())\r\n"), "");
   EXPECT_FALSE(p.wants_close());
   p.advance(kNow + 20ms);
@@ -153,6 +155,7 @@ TEST(RecordedDialogue, GivesAModbusAnswerTheNumberOfItsQuestion) {
   auto wanted = told;
   wanted[0] = std::byte{0x12};
   wanted[1] = std::byte{0x34};
+
   EXPECT_EQ(p.take_output(), wanted);
 }
 
@@ -162,8 +165,8 @@ TEST(RecordedDialogue, DeclinesAnUnknownReadAsModbusDoes) {
   p.connected(kNow);
   p.receive(asked, kNow);
   p.advance(kNow);
-  const auto answer =
-      modbus::decode_answer(p.take_output(), modbus::Transport::Rtu, {.unit = 1, .address = 49, .count = 1});
+  const auto answer = modbus::decode_answer(p.take_output(), modbus::Transport::Rtu,
+                                            {.unit = 1, .address = 49, .count = 1});
   ASSERT_TRUE(answer && *answer);
   EXPECT_EQ((*answer)->exception, 1);
 }
@@ -179,6 +182,7 @@ TEST(RecordedDialogue, ASerialLineIsOneConnection) {
                       .say(bytes("second")));
   p.connected(kNow);
   p.receive(asked, kNow);
+
   EXPECT_EQ(said(p, kNow), "first");
   p.receive(asked, kNow);
   EXPECT_EQ(said(p, kNow), "second");
@@ -187,8 +191,10 @@ TEST(RecordedDialogue, ASerialLineIsOneConnection) {
 TEST(RecordedKinds, AreKnownByWhatWasSaid) {
   const auto kind = [](Script s) { return kind_of(s.device.blocks); };
   Script s{RecordedKind::Tracker};
-  EXPECT_EQ(kind(Script{s}.connect().ask(request(modbus::Transport::Tcp))), RecordedKind::ModbusTcp);
-  EXPECT_EQ(kind(Script{s}.connect().ask(request(modbus::Transport::Rtu))), RecordedKind::ModbusRtu);
+  EXPECT_EQ(kind(Script{s}.connect().ask(request(modbus::Transport::Tcp))),
+            RecordedKind::ModbusTcp);
+  EXPECT_EQ(kind(Script{s}.connect().ask(request(modbus::Transport::Rtu))),
+            RecordedKind::ModbusRtu);
   EXPECT_EQ(kind(Script{s}.say(bytes("rubbish")).ask(bytes("00001 StartSession()\r\n"))),
             RecordedKind::MeasuringMachine);
   EXPECT_EQ(kind(Script{s}.ask(bytes({"\x0c\0\0\0\0\0\0\0\1\0\0\0", 12}))), RecordedKind::Tracker);

@@ -1,5 +1,5 @@
-/// A recording back on the wire: what was answered then is answered now, and what came then comes with its
-/// timing.
+/// A recording back on the wire: what was answered then is answered now, and what came then comes
+/// with its timing.
 
 #include <gmock/gmock.h>
 
@@ -41,6 +41,7 @@ RecordedDevice recorded_tracker() {
   const auto ok = [](emscon::Command c) {
     return packed(emscon::Answer{emscon::Acknowledge{c, emscon::Status::Ok}});
   };
+
   RecordedDevice device{"tracker", RecordedKind::Tracker, {}};
   emscon::SystemStatusAnswer status;
   status.serial_number = 4711;
@@ -51,6 +52,7 @@ RecordedDevice recorded_tracker() {
       {kThen + 2s, false, false, ok(emscon::Command::StartMeasurement)},
       {kThen + 3s, false, false, packed(emscon::StatusChange{emscon::Event::MeasurementNotReady})},
       {kThen + 4s, false, false, packed(emscon::StatusChange{emscon::Event::MeasurementReady})}};
+
   return device;
 }
 
@@ -60,17 +62,21 @@ RecordedDevice recorded_encoders() {
   const can::CanFrame sync = can::encode_sync();
   const can::CanFrame ask = can::standard_frame(0x601, {0x40, 0, 0x10, 0, 0, 0, 0, 0});
   const can::CanFrame told = can::standard_frame(0x581, {0x43, 0, 0x10, 0, 0x96, 0x01, 8, 0});
+
   const auto add = [&](HostTime t, bool to_device, const can::CanFrame& frame) {
     device.blocks.push_back({t, to_device, false, datagram(std::span(&frame, 1))});
   };
+
   add(kThen, true, ask);
   add(kThen + 1ms, false, told);
   add(kThen + 2ms, false, beat);
+
   for (int n = 0; n < 100; ++n) {
     add(kThen + 2s + n * 1ms, true, sync);
     add(kThen + 2s + n * 1ms + 100us, false,
         can::encode_position(0x181, can::PositionType::Signed32, 1000 + n));
   }
+
   add(kThen + 2s + 50ms, false, can::encode_emergency({1, 0x5000, 1, {}}));
   return device;
 }
@@ -80,6 +86,7 @@ std::vector<std::byte> mcap_file(const std::vector<RecordedDevice>& devices) {
   chunk.add(mcap::Channel{7, 0, "abbe/v1/RawBytes", "cdr", {}});
   std::uint32_t sequence = 0;
   std::vector<std::byte> payload(protocol::kMaxRawBytesCdrSize);
+
   for (const RecordedDevice& device : devices) {
     for (const RecordedBlock& block : device.blocks) {
       protocol::RawBytes raw;
@@ -92,11 +99,13 @@ std::vector<std::byte> mcap_file(const std::vector<RecordedDevice>& devices) {
       chunk.add(mcap::Message{7, sequence++, 0, 0, std::span(payload).first(size)});
     }
   }
+
   mcap::Buffer file;
   mcap::append_magic(file);
   mcap::append(file, mcap::Header{});
   const auto bytes = chunk.close().bytes;
   file.insert(file.end(), bytes.begin(), bytes.end());
+
   return file;
 }
 
@@ -134,7 +143,8 @@ TEST(RecordedTraffic, ReadsWhatIsThereOfAFileCutAnywhere) {
   }
 }
 
-std::vector<std::byte> reply(RecordedTracker& tracker, const emscon::Request& request, HostTime now) {
+std::vector<std::byte> reply(RecordedTracker& tracker, const emscon::Request& request,
+                             HostTime now) {
   tracker.receive(packed(request), now);
   return tracker.take_output();
 }
@@ -161,13 +171,15 @@ TEST(RecordedTracker, SpeaksWithTheTimingOfThenFromTheStartOfMeasuring) {
   ReplayTimeline timeline;
   RecordedTracker tracker(recorded_tracker(), timeline);
   tracker.connected(kNow);
+
   EXPECT_EQ(tracker.next_due(), HostTime::max());
   reply(tracker, emscon::StartMeasurement{}, kNow);
   EXPECT_EQ(tracker.next_due(), kNow + 1s);
   tracker.advance(kNow + 999ms);
   EXPECT_TRUE(tracker.take_output().empty());
   tracker.advance(kNow + 1s);
-  EXPECT_EQ(tracker.take_output(), packed(emscon::StatusChange{emscon::Event::MeasurementNotReady}));
+  EXPECT_EQ(tracker.take_output(),
+            packed(emscon::StatusChange{emscon::Event::MeasurementNotReady}));
   EXPECT_FALSE(tracker.finished());
   tracker.advance(kNow + 2s);
   EXPECT_TRUE(tracker.finished());
@@ -219,6 +231,7 @@ TEST(RecordedTracker, BreaksTheConnectionThatBrokeAndGoesOnOnTheNext) {
   tracker.connected(kNow);
   reply(tracker, emscon::StartMeasurement{}, kNow);
   tracker.advance(kNow + 1900ms);
+
   EXPECT_FALSE(tracker.wants_close());
   tracker.advance(kNow + 2s);
   EXPECT_TRUE(tracker.wants_close());
@@ -231,19 +244,22 @@ TEST(RecordedTracker, BreaksTheConnectionThatBrokeAndGoesOnOnTheNext) {
 TEST(RecordedTracker, KeepsWhatComesOfItselfUntilSomebodyIsThere) {
   ReplayTimeline timeline;
   RecordedDevice device = recorded_tracker();
-  device.blocks.insert(device.blocks.begin(), {{kThen, false, false, {}},
-                                               {kThen + 1ms, false, false,
-                                                packed(emscon::StatusChange{emscon::Event::ServerStarted})},
-                                               {kThen + 2ms, false, false, {}}});
+  device.blocks.insert(
+      device.blocks.begin(),
+      {{kThen, false, false, {}},
+       {kThen + 1ms, false, false, packed(emscon::StatusChange{emscon::Event::ServerStarted})},
+       {kThen + 2ms, false, false, {}}});
   RecordedTracker tracker(device, timeline);
   tracker.connected(kNow);
   tracker.disconnected();
   tracker.advance(kNow + 1s);
+
   EXPECT_TRUE(tracker.take_output().empty());
   tracker.connected(kNow + 2s);
   reply(tracker, emscon::StartMeasurement{}, kNow + 2s);
   tracker.advance(kNow + 3s);
-  EXPECT_EQ(tracker.take_output(), packed(emscon::StatusChange{emscon::Event::MeasurementNotReady}));
+  EXPECT_EQ(tracker.take_output(),
+            packed(emscon::StatusChange{emscon::Event::MeasurementNotReady}));
 }
 
 TEST(RecordedTracker, SaysWhatIsNoPacketAsItCame) {
@@ -275,7 +291,8 @@ class RecordedBusTest : public testing::Test {
 
   std::optional<std::int64_t> position(HostTime now) {
     for (const can::CanFrame& frame : tell(can::encode_sync(), now)) {
-      if (frame.id == 0x181) return can::decode_position(frame.payload(), can::PositionType::Signed32);
+      if (frame.id == 0x181)
+        return can::decode_position(frame.payload(), can::PositionType::Signed32);
     }
     return std::nullopt;
   }
@@ -318,8 +335,9 @@ TEST_F(RecordedBusTest, EmergencyComesAtItsTime) {
   const auto before = tell(can::encode_sync(), kNow + 49ms);
   const auto after = tell(can::encode_sync(), kNow + 50ms);
   const auto emergencies = [](const std::vector<can::CanFrame>& frames) {
-    return std::count_if(frames.begin(), frames.end(),
-                         [](const can::CanFrame& f) { return can::decode_emergency(f).has_value(); });
+    return std::count_if(frames.begin(), frames.end(), [](const can::CanFrame& f) {
+      return can::decode_emergency(f).has_value();
+    });
   };
   EXPECT_EQ(emergencies(before), 0);
   EXPECT_EQ(emergencies(after), 1);
@@ -332,12 +350,14 @@ TEST_F(RecordedBusTest, AnswersAsLateAsThen) {
   ReplayTimeline timeline;
   RecordedBus late = RecordedBus::open({}, device, timeline, true).value();
   const Socket peer = test::connected(SOCK_DGRAM, late.port());
+
   const auto sync_at = [&](HostTime now) {
     const can::CanFrame sync = can::encode_sync();
     test::send_bytes(peer, datagram(std::span(&sync, 1)));
     test::readable(late.fd());
     late.poll(now);
   };
+
   sync_at(kNow);
   sync_at(kNow + 60ms);
   late.poll(kNow + 60ms);  // heartbeats are due, too
@@ -353,6 +373,7 @@ TEST_F(RecordedBusTest, IsSilentWhereTheNodeWas) {
   RecordedBus bus = RecordedBus::open({}, device, timeline, true).value();
   const Socket peer = test::connected(SOCK_DGRAM, bus.port());
   std::vector<bool> answered;
+
   for (int i = 0; i < 2; ++i) {
     test::send_bytes(peer, datagram(std::span(&ask, 1)));
     test::readable(bus.fd());
@@ -365,6 +386,7 @@ TEST_F(RecordedBusTest, IsSilentWhereTheNodeWas) {
     }
     answered.push_back(told);
   }
+
   EXPECT_EQ(answered, (std::vector<bool>{true, false}));
 }
 
@@ -372,12 +394,16 @@ TEST_F(RecordedBusTest, IsSilentWhereTheNodeWas) {
 TEST_F(RecordedBusTest, AnotherProducersSyncAndItsAnswersComeByThemselves) {
   RecordedDevice device;
   const auto came = [&device](HostTime time, const can::CanFrame& frame) {
-    device.blocks.push_back({.time = time, .to_device = false, .bytes = datagram(std::span(&frame, 1))});
+    device.blocks.push_back(
+        {.time = time, .to_device = false, .bytes = datagram(std::span(&frame, 1))});
   };
+
   for (int cycle = 0; cycle < 3; ++cycle) {
     came(kThen + 4ms * cycle, can::encode_sync());
-    came(kThen + 4ms * cycle + 1ms, can::encode_position(0x181, can::PositionType::Signed32, 500 + cycle));
+    came(kThen + 4ms * cycle + 1ms,
+         can::encode_position(0x181, can::PositionType::Signed32, 500 + cycle));
   }
+
   ReplayTimeline timeline;
   RecordedBus bus = RecordedBus::open({}, device, timeline, true).value();
   EXPECT_EQ(bus.syncs(), 3u);
@@ -387,6 +413,7 @@ TEST_F(RecordedBusTest, AnotherProducersSyncAndItsAnswersComeByThemselves) {
   test::readable(bus.fd());
   std::vector<std::int64_t> positions;
   std::size_t syncs = 0;
+
   for (auto now = kNow; now < kNow + 20ms; now += 1ms) {
     bus.poll(now);
     while (test::readable(peer.get(), 0)) {
@@ -399,6 +426,7 @@ TEST_F(RecordedBusTest, AnotherProducersSyncAndItsAnswersComeByThemselves) {
       }
     }
   }
+
   EXPECT_EQ(syncs, 3u);
   EXPECT_EQ(positions, (std::vector<std::int64_t>{500, 501, 502}));
   EXPECT_TRUE(bus.finished());

@@ -108,6 +108,7 @@ TEST_F(SimulationTest, BusApartIsTurnedByPollBusAlone) {
   setup.faults = {{FaultTarget::Encoder, {FaultKind::BusOff, 1.0, 5.0, 0.0, 0}}};
   open(setup);
   const HostTime boot_due = simulation_->bus()->next_due();
+
   EXPECT_EQ(simulation_->next_bus_due(), boot_due);
   EXPECT_NE(simulation_->next_due(), boot_due);
   std::vector<pollfd> fds;

@@ -8,7 +8,8 @@ namespace {
 /// Down through z = 0, up again and down once more, at 10 mm/s and 20 mm/s.
 PathMotion down_up_down() {
   PathPlan plan;
-  plan.vertices = {{{0, 0, 0.01}}, {{0, 0, -0.01}, 0.01}, {{0, 0, 0.01}, 0.05}, {{0, 0, -0.01}, 0.02}};
+  plan.vertices = {
+      {{0, 0, 0.01}}, {{0, 0, -0.01}, 0.01}, {{0, 0, 0.01}, 0.05}, {{0, 0, -0.01}, 0.02}};
   return *PathMotion::plan(plan);
 }
 

@@ -20,7 +20,8 @@ struct Touching : testing::Test {
 
   TruthMachine truth = weak_stiffness_machine();
   BallArray array = reference_ball_array();
-  TouchingOptions options{.positions = {4}, .points_per_ball = 6, .points_per_block = 5, .noise_m = 0.0};
+  TouchingOptions options{
+      .positions = {4}, .points_per_ball = 6, .points_per_block = 5, .noise_m = 0.0};
   TouchingProgram program;
   PathMotion path = *PathMotion::plan({.vertices = {PathVertex{}}});
   std::vector<double> edges_s;
@@ -58,6 +59,7 @@ TEST_F(Touching, ASilentProbeHasNoEdgeADoubledTouchTwoAndAStrayOneMore) {
   const std::size_t all = edges_s.size();
   options.missed = {3, 7};
   plan();
+
   EXPECT_EQ(edges_s.size(), all - 2);
   options.missed.clear();
   options.doubled = {3};
@@ -84,10 +86,10 @@ TEST_F(Touching, TheSameSeedGivesTheSameEdges) {
 
 TEST(BallArray, StandsOnItsFirstBallAtEveryPosition) {
   for (const auto& T_machine_array : reference_positions())
-    EXPECT_LT(
-        (T_machine_array * reference_ball_array().balls.front().centre_m - Eigen::Vector3d(-0.09, 0.14, 0.03))
-            .norm(),
-        1e-15);
+    EXPECT_LT((T_machine_array * reference_ball_array().balls.front().centre_m -
+               Eigen::Vector3d(-0.09, 0.14, 0.03))
+                  .norm(),
+              1e-15);
 }
 
 TEST(BallArray, IsAsStatedUnlessToldOtherwise) {
@@ -116,13 +118,18 @@ TEST(BallArray, IsOffByWhatItsFileSays) {
   constexpr double kBall_m = 2e-6, kBlock_rad = 5e-6;
   constexpr std::uint64_t kSeeds = 200;
   double ball_m2 = 0.0, block_rad2 = 0.0;
+
   for (std::uint64_t seed = 1; seed <= kSeeds; ++seed) {
-    const BallArray is = as_it_is(stated, {.u_ball_m = kBall_m, .u_block_rad = kBlock_rad, .seed = seed});
+    const BallArray is =
+        as_it_is(stated, {.u_ball_m = kBall_m, .u_block_rad = kBlock_rad, .seed = seed});
     for (std::size_t i = 0; i < stated.balls.size(); ++i)
-      ball_m2 += (is.balls[i].centre_m - stated.balls[i].centre_m).squaredNorm() / (3.0 * 9.0 * kSeeds);
+      ball_m2 +=
+          (is.balls[i].centre_m - stated.balls[i].centre_m).squaredNorm() / (3.0 * 9.0 * kSeeds);
     for (std::size_t i = 0; i < 2; ++i)
-      block_rad2 += (is.faces[i].normal - stated.faces[i].normal).squaredNorm() / (2.0 * 2.0 * kSeeds);
+      block_rad2 +=
+          (is.faces[i].normal - stated.faces[i].normal).squaredNorm() / (2.0 * 2.0 * kSeeds);
   }
+
   // 5400 and 800 numbers know a standard deviation to 1 and 2.5 %; four times that.
   EXPECT_NEAR(std::sqrt(ball_m2) / kBall_m, 1.0, 0.04);
   EXPECT_NEAR(std::sqrt(block_rad2) / kBlock_rad, 1.0, 0.1);
@@ -132,8 +139,8 @@ TEST(BallArray, StatesItsUncertaintyAndExpansionInItsFile) {
   const auto text = format_calibrator_toml(
       reference_ball_array(),
       {.alpha_per_K = 12e-6, .u_alpha_per_K = 1e-6, .u_ball_m = 2e-6, .u_block_rad = 5e-6});
-  for (const char* line :
-       {"\nalpha_um_per_m_K = 12\n", "\nu_alpha_um_per_m_K = 1\n", "\nu_um = 2\n", "\nu_urad = 5\n"})
+  for (const char* line : {"\nalpha_um_per_m_K = 12\n", "\nu_alpha_um_per_m_K = 1\n",
+                           "\nu_um = 2\n", "\nu_urad = 5\n"})
     EXPECT_NE(text.find(line), std::string::npos) << line << text;
   EXPECT_EQ(format_calibrator_toml(reference_ball_array()).find("alpha"), std::string::npos);
 }

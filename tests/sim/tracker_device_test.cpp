@@ -58,10 +58,12 @@ TEST(TrackerDevice, AnswersEveryCommandOfADriversWayToStreaming) {
       emscon::SetContinuousTimeModeParams{2, 0, false, {}},
       emscon::SetLongSystemParameter{emscon::LongParameter::TcpDataPacketRate, 10},
       emscon::StartMeasurement{}};
+
   for (const emscon::Request& request : way) {
     EXPECT_EQ(script.ask(request), Status::Ok) << emscon::name_of(command_of(request));
     EXPECT_EQ(command_of(script.answers.back()), command_of(request));
   }
+
   script.run(1s);
   EXPECT_FALSE(script.bursts.empty());
   EXPECT_EQ(script.ask(emscon::StopMeasurement{}), Status::Ok);
@@ -71,6 +73,7 @@ TEST(TrackerDevice, AnswersEveryCommandOfADriversWayToStreaming) {
 TEST(TrackerDevice, SearchesForAReflectorAndSaysWhenThereIsNone) {
   const VirtualMachine machine = test::standing_machine();
   TrackerScript script(machine);
+
   EXPECT_EQ(script.ask(emscon::FindReflector{2500.0}), Status::TrackerNotInitialized);
   ASSERT_EQ(script.ask(emscon::Initialize{}), Status::Ok);
   EXPECT_EQ(script.ask(emscon::FindReflector{2500.0}), Status::Ok);
@@ -106,7 +109,8 @@ TEST(TrackerDevice, HeatsItsLaserBeforeItCanBeInitialised) {
   options.warm_up = 20s;
   TrackerScript script(machine, options);
   script.ask(emscon::GetSystemStatus{});
-  EXPECT_EQ(std::get<emscon::SystemStatusAnswer>(script.answers.back()).laser, emscon::LaserStatus::Heating);
+  EXPECT_EQ(std::get<emscon::SystemStatusAnswer>(script.answers.back()).laser,
+            emscon::LaserStatus::Heating);
   EXPECT_EQ(script.ask(emscon::Initialize{}), Status::NotWarmedUp);
   script.run(20s);
   EXPECT_THAT(script.events, Contains(emscon::Event::LaserWarmedUp));
@@ -177,11 +181,13 @@ TEST(TrackerDevice, NeverSendsAPointBeforeItsDelay) {
   script.start_streaming();
   script.run(30s);
   std::chrono::nanoseconds least = 1s;
+
   for (const test::Burst& burst : script.bursts) {
     const HostTime last =
         host_time(options.model, HostTime{1000s}, burst.points.back().time.to_device_time());
     least = std::min(least, burst.arrival - last);
   }
+
   EXPECT_GE(least, 1500us);
   EXPECT_LE(least, 1500us + 1ms);  // the script looks every millisecond
 }
@@ -224,12 +230,14 @@ TEST(TrackerDevice, NoiseIsThatOfRangeAndAngles) {
   const Eigen::Vector3d side = beam.cross(Eigen::Vector3d::UnitZ()).normalized();
   const Eigen::Vector3d up = side.cross(beam);
   std::vector<double> range, azimuth, elevation;
+
   for (const auto& p : script.points()) {
     const Eigen::Vector3d e = position_m(p) - truth;
     range.push_back(e.dot(beam));
     azimuth.push_back(e.dot(side));
     elevation.push_back(e.dot(up));
   }
+
   // 20 000 points: standard error of a standard deviation 0.5 %.
   EXPECT_NEAR(rms(range), 2e-6, 0.05e-6);
   EXPECT_NEAR(rms(azimuth), 3e-6 * truth.norm(), 0.08e-6);
@@ -255,6 +263,7 @@ TEST(TrackerDevice, SameSeedGivesTheSamePointsHoweverOftenItIsAsked) {
     for (const auto& p : script.points()) values.push_back(p.value);
     return values;
   };
+
   EXPECT_GT(points(1, 1ms).size(), 2000u);
   EXPECT_EQ(points(1, 1ms), points(1, 250ms));
   EXPECT_NE(points(1, 1ms), points(2, 1ms));
@@ -274,9 +283,12 @@ TEST(TrackerDevice, BrokenBeamIsAnErrorAndAGapAndComesBack) {
   EXPECT_THAT(script.events, Contains(emscon::Event::MeasurementReady));
   std::chrono::nanoseconds widest{};
   const auto points = script.points();
+
   for (std::size_t i = 1; i < points.size(); ++i) {
-    widest = std::max(widest, points[i].time.to_device_time() - points[i - 1].time.to_device_time());
+    widest =
+        std::max(widest, points[i].time.to_device_time() - points[i - 1].time.to_device_time());
   }
+
   EXPECT_NEAR(ns_to_seconds(widest), 3.0, 0.005);
 }
 
@@ -301,8 +313,11 @@ TEST(TrackerDevice, FlagsPointsOfATargetTooFast) {
   script.start_streaming();
   script.run(10s);
   const auto points = script.points();
-  EXPECT_THAT(points, Contains(Field(&emscon::MultiPoint::status, emscon::PointStatus::SpeedExceeded)));
-  EXPECT_THAT(points, Contains(Field(&emscon::MultiPoint::status, emscon::PointStatus::SpeedWarning)));
+
+  EXPECT_THAT(points,
+              Contains(Field(&emscon::MultiPoint::status, emscon::PointStatus::SpeedExceeded)));
+  EXPECT_THAT(points,
+              Contains(Field(&emscon::MultiPoint::status, emscon::PointStatus::SpeedWarning)));
   EXPECT_EQ(points.back().status, emscon::PointStatus::Ok);  // it stands again
 }
 
@@ -331,6 +346,7 @@ TEST(TrackerDevice, StalledSocketLosesNothing) {
   EXPECT_EQ(script.bursts.size(), before);
   script.run(1s);
   const auto points = script.points();
+
   for (std::size_t i = 1; i < points.size(); ++i) {
     ASSERT_EQ(points[i].time.to_device_time() - points[i - 1].time.to_device_time(), 2ms);
   }
@@ -353,7 +369,8 @@ TEST(TrackerDevice, AnnouncesWeatherThatChanged) {
   script.run(1s);
   EXPECT_THAT(script.events, Contains(emscon::Event::EnvironmentParamsChanged));
   script.ask(emscon::GetEnvironmentParams{});
-  EXPECT_NEAR(std::get<emscon::EnvironmentAnswer>(script.answers.back()).environment.temperature, 21.5, 0.01);
+  EXPECT_NEAR(std::get<emscon::EnvironmentAnswer>(script.answers.back()).environment.temperature,
+              21.5, 0.01);
 }
 
 TEST(TrackerDevice, RebootForgetsEverythingAndRestartsItsClock) {
@@ -362,6 +379,7 @@ TEST(TrackerDevice, RebootForgetsEverythingAndRestartsItsClock) {
   script.start_streaming();
   script.run(1s);
   script.device.inject({FaultKind::Reboot, 0.0, 5.0, 0.0, 0}, script.now);
+
   EXPECT_TRUE(script.device.wants_close());
   EXPECT_FALSE(script.device.accepts());
   script.run(5s);
@@ -386,12 +404,14 @@ TEST(TrackerDevice, MeasuresAStandingTargetOnce) {
   script.ask(emscon::SetStationaryModeParams{500, false});
   script.ask(emscon::StartMeasurement{});
   script.run(1s);
+
   ASSERT_EQ(script.singles.size(), 1u);
   const TrackerModel model;
   const Eigen::Vector3d truth =
       R_machine_tracker(model).transpose() * (machine.target_m(script.now) - model.position_m);
   const auto& v = script.singles[0].value;
-  EXPECT_LT((1e-3 * Eigen::Vector3d(v[0], v[1], v[2]) - truth).norm(), 1e-6);  // 500 points: sigma 0.2 um
+  EXPECT_LT((1e-3 * Eigen::Vector3d(v[0], v[1], v[2]) - truth).norm(),
+            1e-6);  // 500 points: sigma 0.2 um
 }
 
 TEST(TrackerDevice, StopsAfterTheNumberOfPointsItWasAsked) {

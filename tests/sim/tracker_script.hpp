@@ -20,7 +20,8 @@ inline VirtualMachine standing_machine() {
 
 inline VirtualMachine moving_machine(double feed_m_per_s) {
   PathPlan plan;
-  plan.vertices = {{{-0.3, -0.25, -0.4}}, {{0.3, 0.25, 0.0}}, {{-0.3, 0.25, 0.0}}, {{-0.3, -0.25, -0.4}}};
+  plan.vertices = {
+      {{-0.3, -0.25, -0.4}}, {{0.3, 0.25, 0.0}}, {{-0.3, 0.25, 0.0}}, {{-0.3, -0.25, -0.4}}};
   plan.feed_m_per_s = feed_m_per_s;
   return {TruthMachine{}, PathMotion::plan(plan).value()};
 }
@@ -71,7 +72,8 @@ class TrackerScript {
 
   [[nodiscard]] std::vector<emscon::MultiPoint> points() const {
     std::vector<emscon::MultiPoint> all;
-    for (const Burst& burst : bursts) all.insert(all.end(), burst.points.begin(), burst.points.end());
+    for (const Burst& burst : bursts)
+      all.insert(all.end(), burst.points.begin(), burst.points.end());
     return all;
   }
 

@@ -13,7 +13,8 @@ using namespace std::chrono_literals;
 class TrackerServerTest : public testing::Test {
  protected:
   static TrackerServer open(const VirtualMachine& machine, HostTime now) {
-    return TrackerServer::open(0, std::make_unique<TrackerDevice>(TrackerOptions{}, machine, now)).value();
+    return TrackerServer::open(0, std::make_unique<TrackerDevice>(TrackerOptions{}, machine, now))
+        .value();
   }
 
   Socket connect() {
@@ -58,6 +59,7 @@ TEST_F(TrackerServerTest, StreamsBurstsOverARealSocket) {
   server_.poll(now_ += 400ms);
   const std::vector<std::byte> burst = test::receive_bytes(client);
   const auto result = emscon::MultiResult::from(burst);
+
   ASSERT_TRUE(result);
   EXPECT_GT(result->size(), 140u);
 }
@@ -67,7 +69,8 @@ TEST_F(TrackerServerTest, TurnsASecondClientAwayAndKeepsTheFirst) {
   const Socket second = connect();
   const auto refusal = emscon::decode(test::receive_bytes(second));
   ASSERT_TRUE(refusal);
-  EXPECT_EQ(std::get<emscon::ErrorResponse>(*refusal).status, emscon::Status::MultipleConnectionsNotAllowed);
+  EXPECT_EQ(std::get<emscon::ErrorResponse>(*refusal).status,
+            emscon::Status::MultipleConnectionsNotAllowed);
   EXPECT_TRUE(test::receive_bytes(second).empty());
   EXPECT_EQ(ask(first, emscon::SetUnits{}).size(), 16u);
 }
@@ -94,8 +97,8 @@ TEST_F(TrackerServerTest, RebootClosesTheConnectionAndLetsNobodyInUntilItIsOver)
 }
 
 TEST_F(TrackerServerTest, PortInUseIsAClearError) {
-  const auto second =
-      TrackerServer::open(server_.port(), std::make_unique<TrackerDevice>(TrackerOptions{}, machine_, now_));
+  const auto second = TrackerServer::open(
+      server_.port(), std::make_unique<TrackerDevice>(TrackerOptions{}, machine_, now_));
   ASSERT_FALSE(second);
   EXPECT_EQ(second.error().code, ErrorCode::Io);
   EXPECT_THAT(second.error().text, testing::HasSubstr(std::to_string(server_.port())));

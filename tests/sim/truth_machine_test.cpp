@@ -24,7 +24,8 @@ TruthMachine small_machine() {
 
 TEST(TruthMachine, AgreesWithTheExactTransformsOfTheReferenceCase) {
   const TruthMachine machine = test::reference_machine(Shape::Linear);
-  const auto rows = test::read_rows(std::string(ABBE_TEST_DATA) + "/otf/caseA_V_true_at_points.csv");
+  const auto rows =
+      test::read_rows(std::string(ABBE_TEST_DATA) + "/otf/caseA_V_true_at_points.csv");
   ASSERT_EQ(rows.size(), 50u);
   for (const auto& row : rows) {
     const Eigen::Vector3d q(std::stod(row[0]), std::stod(row[1]), std::stod(row[2]));
@@ -79,7 +80,7 @@ TEST(TruthMachine, BacklashIsTheDifferenceBetweenTheDirections) {
 
 TEST(TruthMachine, GrowsAsItWarmsUp) {
   TruthMachine machine = small_machine();
-  machine.thermal.growth_per_m.x() = 20e-6;
+  machine.thermal.expansion_per_m.x() = 20e-6;
   machine.thermal.time_constant_s = 100.0;
   EXPECT_EQ(machine.thermal.heat_after(-1.0), 0.0);
   const double heat = machine.thermal.heat_after(100.0);
@@ -87,8 +88,10 @@ TEST(TruthMachine, GrowsAsItWarmsUp) {
 }
 
 TEST(Chain, IsReadFromWorkpieceToTool) {
-  EXPECT_THAT(parse_chain("[w X' b Y Z (C1) t]").value(), testing::ElementsAre(Axis::X, Axis::Y, Axis::Z));
-  EXPECT_THAT(parse_chain("[w b Z X Y t]").value(), testing::ElementsAre(Axis::Z, Axis::X, Axis::Y));
+  EXPECT_THAT(parse_chain("[w X' b Y Z (C1) t]").value(),
+              testing::ElementsAre(Axis::X, Axis::Y, Axis::Z));
+  EXPECT_THAT(parse_chain("[w b Z X Y t]").value(),
+              testing::ElementsAre(Axis::Z, Axis::X, Axis::Y));
 }
 
 TEST(Chain, WithoutEveryLinearAxisIsRefused) {
@@ -110,10 +113,12 @@ TEST(ErrorFunction, CubicPassesThroughItsNodesWithoutCurvatureAtItsEnds) {
 
 TEST(ErrorFunction, CubicAgreesWithTheReferenceCase) {
   const TruthMachine machine = test::reference_machine(Shape::Cubic);
-  for (const auto& row : test::read_rows(std::string(ABBE_TEST_DATA) + "/otf/caseA_V_cubic_at_points.csv")) {
+  for (const auto& row :
+       test::read_rows(std::string(ABBE_TEST_DATA) + "/otf/caseA_V_cubic_at_points.csv")) {
     const Eigen::Vector3d q(std::stod(row[0]), std::stod(row[1]), std::stod(row[2]));
     const Eigen::Vector3d linear(std::stod(row[3]), std::stod(row[4]), std::stod(row[5]));
-    // The file holds the linear model; the exact transforms differ by at most 0.052 um in this case.
+    // The file holds the linear model; the exact transforms differ by at most 0.052 um in this
+    // case.
     EXPECT_LT((error_m(machine, q) - linear).norm(), 0.06e-6);
   }
 }
@@ -136,16 +141,18 @@ TEST(RandomTruth, GivesEveryOneOfTheTwentyOneErrors) {
   for (const Axis axis : kAxes) {
     for (std::size_t m = 0; m < kMotions; ++m) {
       const auto values = machine.axis(axis).error[m].values();
-      EXPECT_TRUE(std::any_of(values.begin(), values.end(), [](double v) { return std::abs(v) > 1e-7; }));
+      EXPECT_TRUE(
+          std::any_of(values.begin(), values.end(), [](double v) { return std::abs(v) > 1e-7; }));
     }
   }
-  EXPECT_NE(machine.squareness.A0Z_rad * machine.squareness.B0Z_rad * machine.squareness.C0Y_rad, 0.0);
+  EXPECT_NE(machine.squareness.A0Z_rad * machine.squareness.B0Z_rad * machine.squareness.C0Y_rad,
+            0.0);
 }
 
 TEST(RandomTruth, LeavesTheReferencePositionInPlace) {
   const TruthMachine machine = random_truth(small_machine(), {});
-  // Z's range ends at its reference, so all three straightnesses of Z vanish there; those of X and Y need
-  // not.
+  // Z's range ends at its reference, so all three straightnesses of Z vanish there; those of X and
+  // Y need not.
   EXPECT_EQ(machine.axis(Axis::X).error[0].at(0.0), 0.0);
   EXPECT_EQ(machine.axis(Axis::X).error[4].at(0.0), 0.0);
   EXPECT_NEAR(machine.axis(Axis::X).error[1].at(-0.3), 0.0, 1e-18);
@@ -153,7 +160,8 @@ TEST(RandomTruth, LeavesTheReferencePositionInPlace) {
 
 TEST(TruthCsv, ComesBackAsItWasWritten) {
   const TruthMachine truth = random_truth(small_machine(), {.backlash_m = 1e-6});
-  const auto again = parse_truth_csv(format_truth_csv(truth), "truth.csv", small_machine(), Shape::Linear);
+  const auto again =
+      parse_truth_csv(format_truth_csv(truth), "truth.csv", small_machine(), Shape::Linear);
   ASSERT_TRUE(again) << again.error().text;
   const Eigen::Vector3d q(0.123, -0.2, -0.31);
   const MachineCondition condition{{1, -1, 1}, 0.0};

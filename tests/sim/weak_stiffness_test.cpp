@@ -15,8 +15,8 @@ TEST(WeakStiffnessMachine, HasNoErrorAtBallOne) {
   EXPECT_LT(error_m(weak_stiffness_machine(), kBall1_m).norm(), 1e-12);
 }
 
-/// The polynomials of [Li OMM] eq. (5) by hand, at one reading; what is left is the second order of the exact
-/// transforms: rotations near 1 mrad times displacements near 3 mm.
+/// The polynomials of [Li OMM] eq. (5) by hand, at one reading; what is left is the second order of
+/// the exact transforms: rotations near 1 mrad times displacements near 3 mm.
 TEST(WeakStiffnessMachine, IsThatOfTableThree) {
   const double x = 400, y = 200, z = 40;
   const auto E_mm = [](double X, double Y, double Z) -> Vector3d {
@@ -26,17 +26,19 @@ TEST(WeakStiffnessMachine, IsThatOfTableThree) {
     const double exz = -2.410024e-05 * Z + 4.178833e-10 * Z * Z + 8.430376e-09 * Z * Z * Z;
     const double eyz = -3.560507e-05 * Z + 5.256019e-09 * Z * Z * Z;
     return {0.00295049 * X + 3.813183e-06 * X * X - 2.775042e-09 * X * X * X + 0.0004290736 * Y -
-                1.785525e-05 * Y * Y + 5.11703e-08 * Y * Y * Y + 0.0166986 * Z - 0.0003462166 * Z * Z +
-                2.035311e-06 * Z * Z * Z - Y * ezx - Y * ezz,
+                1.785525e-05 * Y * Y + 5.11703e-08 * Y * Y * Y + 0.0166986 * Z -
+                0.0003462166 * Z * Z + 2.035311e-06 * Z * Z * Z - Y * ezx - Y * ezz,
             0.002007601 * X + 1.167908e-06 * X * X + 1.848295e-10 * X * X * X + 0.0002017827 * Y -
-                1.832424e-08 * Y * Y * Y + 0.05660915 * Z - 0.001673767 * Z * Z + 1.599664e-05 * Z * Z * Z +
-                X * ezz,
+                1.832424e-08 * Y * Y * Y + 0.05660915 * Z - 0.001673767 * Z * Z +
+                1.599664e-05 * Z * Z * Z + X * ezz,
             0.00251692 * X - 1.747859e-06 * X * X - 9.975762e-10 * X * X * X - 0.001512266 * Y +
                 1.548582e-05 * Y * Y - 7.038459e-08 * Y * Y * Y - 0.0001328144 * Z * Z -
                 3.380137e-10 * Z * Z * Z + Y * exx + Y * exz - X * eyz};
   };
+
   const Vector3d expected_mm = E_mm(x, y, z) - E_mm(-90, 140, 30);
   const Vector3d V_mm = 1e3 * error_m(weak_stiffness_machine(), Vector3d(x, y, z) / 1e3);
+
   EXPECT_GT(V_mm.norm(), 1.0);
   EXPECT_LT((V_mm - expected_mm).norm(), 0.02);
 }

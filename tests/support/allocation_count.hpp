@@ -1,8 +1,8 @@
 #pragma once
-/// Counts what the calling thread takes from the heap, malloc and operator new alike. Include it anywhere in
-/// a test binary: plain builds interpose glibc's malloc family, sanitizer builds use the sanitizer's own
-/// hook, so both kinds keep their allocator. Deallocation is not counted: what was never taken need not be
-/// given back.
+/// Counts what the calling thread takes from the heap, malloc and operator new alike. Include it
+/// anywhere in a test binary: plain builds interpose glibc's malloc family, sanitizer builds use
+/// the sanitizer's own hook, so both kinds keep their allocator. Deallocation is not counted: what
+/// was never taken need not be given back.
 
 #include <cerrno>
 #include <cstddef>
@@ -35,14 +35,17 @@ class AllocationCount {
 
 #ifdef ABBE_SANITIZER_ALLOCATOR
 
-// Declared here because <sanitizer/allocator_interface.h> does not come with every compiler package.
-extern "C" int __sanitizer_install_malloc_and_free_hooks(void (*on_malloc)(const volatile void*, std::size_t),
+// Declared here because <sanitizer/allocator_interface.h> does not come with every compiler
+// package.
+extern "C" int __sanitizer_install_malloc_and_free_hooks(void (*on_malloc)(const volatile void*,
+                                                                           std::size_t),
                                                          void (*on_free)(const volatile void*));
 
 namespace abbe::tests {
 inline AllocationCount::AllocationCount() : begin_(0) {
   static const int installed = __sanitizer_install_malloc_and_free_hooks(
-      [](const volatile void*, std::size_t) { ++allocations_of_this_thread; }, [](const volatile void*) {});
+      [](const volatile void*, std::size_t) { ++allocations_of_this_thread; },
+      [](const volatile void*) {});
   if (installed == 0) std::abort();  // a count that stays zero would prove nothing
   begin_ = allocations_of_this_thread;
 }
@@ -50,8 +53,8 @@ inline AllocationCount::AllocationCount() : begin_(0) {
 
 #else
 
-// The dynamic linker prefers the program's own malloc to glibc's; glibc's stays reachable under its internal
-// names.
+// The dynamic linker prefers the program's own malloc to glibc's; glibc's stays reachable under its
+// internal names.
 extern "C" {
 void* __libc_malloc(std::size_t);
 void* __libc_calloc(std::size_t, std::size_t);

@@ -1,7 +1,7 @@
 #pragma once
-/// Tables of machine.toml and abbed.toml as the tests of several programs write them: `to_toml()` of each is
-/// its text, and texts are put one behind the other. What only one test needs stands there, as text: `more`
-/// is further keys of a table.
+/// Tables of machine.toml and abbed.toml as the tests of several programs write them: `to_toml()`
+/// of each is its text, and texts are put one behind the other. What only one test needs stands
+/// there, as text: `more` is further keys of a table.
 
 #include <fmt/format.h>
 
@@ -86,14 +86,16 @@ simulated = true
 )";
 
 [[nodiscard]] inline std::string to_toml(std::string_view axis, const Travel& travel) {
-  std::string text = fmt::format("[axes.{}]\nmin_mm = {}\nmax_mm = {}\n", axis, travel.min_mm, travel.max_mm);
+  std::string text =
+      fmt::format("[axes.{}]\nmin_mm = {}\nmax_mm = {}\n", axis, travel.min_mm, travel.max_mm);
   if (travel.reference_mm) text += fmt::format("reference_mm = {}\n", *travel.reference_mm);
   return text;
 }
 
 [[nodiscard]] inline std::string to_toml(const Machine& machine) {
-  std::string text = fmt::format("[machine]\nname = \"{}\"\nchain = \"{}\"\n", machine.name, machine.chain) +
-                     to_toml("X", machine.x) + to_toml("Y", machine.y) + to_toml("Z", machine.z);
+  std::string text =
+      fmt::format("[machine]\nname = \"{}\"\nchain = \"{}\"\n", machine.name, machine.chain) +
+      to_toml("X", machine.x) + to_toml("Y", machine.y) + to_toml("Z", machine.z);
   if (const auto& t = machine.target_offset_mm)
     text += fmt::format("[target]\noffset_mm = [{}, {}, {}]\n", (*t)[0], (*t)[1], (*t)[2]);
   if (machine.node_spacing_mm)
@@ -102,8 +104,8 @@ simulated = true
 }
 
 [[nodiscard]] inline std::string to_toml(const Tracker& tracker) {
-  return fmt::format("[tracker]\nhost = \"127.0.0.1\"\nport = {}\npoint_rate_hz = 500\n{}", tracker.port,
-                     tracker.more);
+  return fmt::format("[tracker]\nhost = \"127.0.0.1\"\nport = {}\npoint_rate_hz = 500\n{}",
+                     tracker.port, tracker.more);
 }
 
 [[nodiscard]] inline std::string to_toml(const Encoder& encoder) {
@@ -118,7 +120,8 @@ nodes = [
   {{ axis = "Z", node = 3, step_nm = {step_nm} }},
 ]
 )",
-                     encoder.peer_port, encoder.sync_period_us, fmt::arg("step_nm", encoder.step_nm));
+                     encoder.peer_port, encoder.sync_period_us,
+                     fmt::arg("step_nm", encoder.step_nm));
 }
 
 [[nodiscard]] inline std::string to_toml(const CounterCard& card) {

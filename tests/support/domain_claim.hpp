@@ -10,8 +10,8 @@
 
 namespace abbe::test {
 
-/// Domains 1 to 100, whose ports are below those the kernel gives away; claimed by a lock that ends with this
-/// process.
+/// Domains 1 to 100, whose ports are below those the kernel gives away; claimed by a lock that ends
+/// with this process.
 class DomainClaim {
  public:
   DomainClaim() {

@@ -1,7 +1,7 @@
 #pragma once
-/// Encoder nodes in the test's own thread, built from the server side of the protocol room: what an encoder
-/// device under test talks to. Nothing happens but in the functions a test calls. How frames travel is the
-/// deriving class's matter.
+/// Encoder nodes in the test's own thread, built from the server side of the protocol room: what an
+/// encoder device under test talks to. Nothing happens but in the functions a test calls. How
+/// frames travel is the deriving class's matter.
 
 #include <cstdint>
 #include <deque>
@@ -32,8 +32,8 @@ struct PeerNode {
   std::optional<std::pair<can::ObjectId, can::AbortCode>> refuses;
 
   [[nodiscard]] std::optional<can::CanFrame> answer(const can::CanFrame& frame, HostTime now) {
-    const bool download =
-        frame.is_standard_data() && frame.id == can::cob::kSdoRequest + id && frame.byte(0) >> 5 == 1;
+    const bool download = frame.is_standard_data() && frame.id == can::cob::kSdoRequest + id &&
+                          frame.byte(0) >> 5 == 1;
     const auto low = frame.byte(1), high = frame.byte(2), sub = frame.byte(3);
     const can::ObjectId object{static_cast<std::uint16_t>(low | high << 8), sub};
     if (!download || !refuses || refuses->first != object) return server.on_frame(frame, now);
@@ -68,7 +68,8 @@ class EncoderNodes {
       if (node.state != can::NodeState::Operational || node.mute || node.no_position) continue;
       for (const unsigned number : {1u, 2u}) {
         const auto pdo = node.objects.tpdo(number);
-        if (pdo.enabled && pdo.transmission_type == 1) frames.push_back(node.objects.tpdo_frame(number));
+        if (pdo.enabled && pdo.transmission_type == 1)
+          frames.push_back(node.objects.tpdo_frame(number));
       }
     }
     return frames;
@@ -98,6 +99,7 @@ class EncoderNodes {
       sync_waiting_ = true;
       ++syncs_;
     }
+
     if (const auto message = can::decode_nmt(frame)) {
       nmt_.push_back(*message);
       for (auto& node : nodes_) {
@@ -105,15 +107,18 @@ class EncoderNodes {
           on_nmt(node, message->command, answers);
       }
     }
+
     for (auto& node : nodes_) {
       if (node.mute) continue;
       if (const auto answer = node.answer(frame, now)) answers.push_back(*answer);
     }
+
     if (!answers.empty()) send(answers);
   }
   void beat(HostTime now) {
     for (auto& node : nodes_) {
-      const std::chrono::milliseconds period{node.objects.number(can::object::kHeartbeatTime).value_or(0)};
+      const std::chrono::milliseconds period{
+          node.objects.number(can::object::kHeartbeatTime).value_or(0)};
       if (node.mute || period.count() == 0) continue;
       if (node.last_heartbeat && now - *node.last_heartbeat < period) continue;
       node.last_heartbeat = now;

@@ -1,6 +1,6 @@
 #pragma once
-/// Studies of what the ball array itself may be off: calibrators somebody might have got, and observations as
-/// they come of one.
+/// Studies of what the ball array itself may be off: calibrators somebody might have got, and
+/// observations as they come of one.
 
 #include <optional>
 #include <random>
@@ -10,7 +10,8 @@
 namespace abbe::tests::evemu {
 
 /// The same array with uncertainties stated.
-inline calib::evemu::Calibrator stated(calib::evemu::Calibrator c, double u_ball_m, double u_block_rad) {
+inline calib::evemu::Calibrator stated(calib::evemu::Calibrator c, double u_ball_m,
+                                       double u_block_rad) {
   for (auto& ball : c.balls) {
     ball.u_m = u_ball_m;
   }
@@ -26,23 +27,28 @@ inline calib::evemu::Calibrator drawn(const calib::evemu::Calibrator& c, double 
   std::normal_distribution<double> normal;
   calib::evemu::Calibrator out = c;
   const double scale = 1.0 + u_scale * normal(random);
+
   for (std::size_t i = 0; i < c.balls.size(); ++i) {
     const Vector3 from_ball1_m = c.balls[i].centre_m - c.balls[0].centre_m;
     const double x = normal(random), y = normal(random), z = normal(random);
-    out.balls[i].centre_m = c.balls[0].centre_m + scale * from_ball1_m + c.balls[i].u_m * Vector3(x, y, z);
+    out.balls[i].centre_m =
+        c.balls[0].centre_m + scale * from_ball1_m + c.balls[i].u_m * Vector3(x, y, z);
   }
+
   for (auto& block : out.blocks) {
     const Vector3 n = block.normal.normalized(), a = n.unitOrthogonal(), b = n.cross(a);
     const double along_a = normal(random), along_b = normal(random);
     block.normal = (n + block.u_rad * (along_a * a + along_b * b)).normalized();
   }
+
   return out;
 }
 
 /// Places in the uniform frame of a calibrator: [Li OMM] eq. (11).
 inline std::vector<Vector3> in_uniform_frame_m(const calib::evemu::Calibrator& c) {
   const Vector3& ball1_m = c.balls[0].centre_m;
-  const calib::Matrix3 R = calib::evemu::uniform_frame(ball1_m, c.blocks[0].normal, c.blocks[1].normal)->R;
+  const calib::Matrix3 R =
+      calib::evemu::uniform_frame(ball1_m, c.blocks[0].normal, c.blocks[1].normal)->R;
   std::vector<Vector3> places;
   for (const auto& ball : c.balls) {
     places.emplace_back(R.transpose() * (ball.centre_m - ball1_m));
@@ -51,7 +57,8 @@ inline std::vector<Vector3> in_uniform_frame_m(const calib::evemu::Calibrator& c
 }
 
 /// V at the balls as they come of another calibrator and the same touches: [Li OMM] eq. (12).
-inline Eigen::VectorXd errors_with_m(const calib::evemu::Observations& o, const calib::evemu::Calibrator& c) {
+inline Eigen::VectorXd errors_with_m(const calib::evemu::Observations& o,
+                                     const calib::evemu::Calibrator& c) {
   const std::vector<Vector3> places_m = in_uniform_frame_m(c);
   Eigen::VectorXd V(static_cast<Eigen::Index>(3 * o.rows.size()));
   Eigen::Index row = 0;
@@ -63,15 +70,16 @@ inline Eigen::VectorXd errors_with_m(const calib::evemu::Observations& o, const 
   return V;
 }
 
-/// simulated() errors as they come of a calibrator `found` with the uncertainties of `u`, where the truth is
-/// that of the layout. No touched points: rows from centres only.
+/// simulated() errors as they come of a calibrator `found` with the uncertainties of `u`, where the
+/// truth is that of the layout. No touched points: rows from centres only.
 inline calib::evemu::Observations with_array(calib::evemu::Observations o, const Layout& layout,
                                              const calib::evemu::Calibrator& found,
                                              const calib::evemu::ArtefactUncertainty& u) {
   const std::vector<Vector3> places_m = in_uniform_frame_m(found);
   std::size_t row = 0;
   for (const auto& true_m : layout.true_m) {
-    const Vector3 x = (true_m[5] - true_m[0]).normalized(), y = (true_m[5] - true_m[8]).normalized();
+    const Vector3 x = (true_m[5] - true_m[0]).normalized(),
+                  y = (true_m[5] - true_m[8]).normalized();
     calib::evemu::SeenArtefact seen;
     seen.position = o.rows[row].position;
     seen.T_self_uni.R << x, y, x.cross(y);
@@ -83,6 +91,7 @@ inline calib::evemu::Observations with_array(calib::evemu::Observations o, const
     }
     o.seen.push_back(std::move(seen));
   }
+
   o.artefact = u;
   return o;
 }

@@ -1,6 +1,6 @@
 #pragma once
-/// The reference data of local calibration with a ball array, as the prototype that made them wrote them
-/// (tests/data/evemu, mm).
+/// The reference data of local calibration with a ball array, as the prototype that made them wrote
+/// them (tests/data/evemu, mm).
 
 #include <Eigen/Core>
 #include <filesystem>
@@ -32,6 +32,7 @@ inline std::vector<std::vector<std::string>> reference_cells(const std::string& 
   std::vector<std::vector<std::string>> rows;
   std::string line;
   std::getline(in, line);
+
   while (std::getline(in, line)) {
     std::erase(line, '"');
     std::istringstream cells(line);
@@ -40,6 +41,7 @@ inline std::vector<std::vector<std::string>> reference_cells(const std::string& 
       rows.back().push_back(cell);
     }
   }
+
   return rows;
 }
 

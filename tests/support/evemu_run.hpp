@@ -36,22 +36,25 @@ inline std::vector<calib::evemu::Touch> reference_touches(const std::string& fil
   std::vector<calib::evemu::Touch> touches;
   for (const auto& row : reference_cells(file)) {
     touches.push_back(
-        {std::stoi(row[0]), row[1] == "ball" ? calib::evemu::Feature::Ball : calib::evemu::Feature::Block,
-         std::stoi(row[2]), Vector3(std::stod(row[3]), std::stod(row[4]), std::stod(row[5])) / 1000});
+        {std::stoi(row[0]),
+         row[1] == "ball" ? calib::evemu::Feature::Ball : calib::evemu::Feature::Block,
+         std::stoi(row[2]),
+         Vector3(std::stod(row[3]), std::stod(row[4]), std::stod(row[5])) / 1000});
   }
   return touches;
 }
 
-/// In the order of [Li OMM] section 3: at every position of `positions`, in their order, Ball1, the blocks,
-/// the other balls.
-inline std::vector<calib::evemu::Touch> touches_in_order(const std::vector<calib::evemu::Touch>& all,
-                                                         const std::vector<int>& positions = {1, 2, 3, 4, 5,
-                                                                                              6, 7, 8}) {
+/// In the order of [Li OMM] section 3: at every position of `positions`, in their order, Ball1, the
+/// blocks, the other balls.
+inline std::vector<calib::evemu::Touch> touches_in_order(
+    const std::vector<calib::evemu::Touch>& all,
+    const std::vector<int>& positions = {1, 2, 3, 4, 5, 6, 7, 8}) {
   using calib::evemu::Feature;
   std::vector<calib::evemu::Touch> touches;
   const auto rank = [](const calib::evemu::Touch& t) {
     return t.feature == Feature::Block ? t.number : (t.number == 1 ? 0 : 10 * t.number);
   };
+
   for (const int position : positions) {
     const auto first = std::ssize(touches);
     std::copy_if(all.begin(), all.end(), std::back_inserter(touches),
@@ -59,6 +62,7 @@ inline std::vector<calib::evemu::Touch> touches_in_order(const std::vector<calib
     std::stable_sort(touches.begin() + first, touches.end(),
                      [&](const auto& a, const auto& b) { return rank(a) < rank(b); });
   }
+
   return touches;
 }
 
@@ -80,7 +84,8 @@ inline Eigen::VectorXd reference_coefficients(const std::string& solution) {
   const auto& beta = all["solutions"][solution]["beta"];
   Eigen::VectorXd b(static_cast<Eigen::Index>(beta.size()));
   Eigen::Index i = 0;
-  for (const auto& [name, value] : beta.items()) {  // nlohmann keeps names sorted, as the model does
+  for (const auto& [name, value] :
+       beta.items()) {  // nlohmann keeps names sorted, as the model does
     b(i++) = value.template get<double>();
   }
   return b;

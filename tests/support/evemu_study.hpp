@@ -1,6 +1,7 @@
 #pragma once
-/// Simulated studies of the ball array: the reference layout, a machine whose true errors are known, errors
-/// made from truth with noise, and how much of V a model leaves. Readings solve true = reading + V(reading).
+/// Simulated studies of the ball array: the reference layout, a machine whose true errors are
+/// known, errors made from truth with noise, and how much of V a model leaves. Readings solve
+/// true = reading + V(reading).
 
 #include <cmath>
 #include <functional>
@@ -21,7 +22,8 @@ inline Field table3_machine() {
   const Eigen::VectorXd beta = reference_coefficients("true");
   const Vector3 ball1_mm(-90, 140, 30);
   const Vector3 at_ball1 = model.X(ball1_mm) * beta;
-  return [=](const Vector3& q_m) -> Vector3 { return (model.X(1000 * q_m) * beta - at_ball1) / 1000; };
+  return
+      [=](const Vector3& q_m) -> Vector3 { return (model.X(1000 * q_m) * beta - at_ball1) / 1000; };
 }
 
 struct Layout {
@@ -32,6 +34,7 @@ inline Layout reference_layout(double tilt_scale = 1.0) {
   const auto all = reference_json("solutions.json");
   const double deg = std::numbers::pi / 180;
   Layout layout;
+
   for (const auto& p : all["pos_fan_tilt_roll_deg"]) {
     const double fan = p[0].get<double>() * deg, tilt = tilt_scale * p[1].get<double>() * deg,
                  roll = tilt_scale * p[2].get<double>() * deg;
@@ -44,6 +47,7 @@ inline Layout reference_layout(double tilt_scale = 1.0) {
       layout.true_m.back().emplace_back((vector3(all["ball1"]) + R * vector3(ball)) / 1000);
     }
   }
+
   return layout;
 }
 
@@ -60,14 +64,15 @@ inline Vector3 reading_of(const Field& V, const Vector3& true_m) {
   return reading;
 }
 
-inline calib::evemu::Observations simulated(const Layout& layout, const Field& V, const Noise& noise,
-                                            unsigned seed) {
+inline calib::evemu::Observations simulated(const Layout& layout, const Field& V,
+                                            const Noise& noise, unsigned seed) {
   std::mt19937_64 random(seed);
   std::normal_distribution<double> normal;
   const auto draw = [&](double sigma) {
     const double x = sigma * normal(random), y = sigma * normal(random), z = sigma * normal(random);
     return Vector3(x, y, z);
   };
+
   std::vector<calib::evemu::BallError> errors;
   for (std::size_t p = 0; p < layout.true_m.size(); ++p) {
     const Vector3 omega = draw(noise.w_rad);
@@ -81,10 +86,11 @@ inline calib::evemu::Observations simulated(const Layout& layout, const Field& V
                         off - first + omega.cross(truth - layout.true_m[p][0])});
     }
   }
+
   calib::evemu::ObserveOptions options;
   options.least_thickness = 0.0;
-  return *calib::evemu::observe_errors(errors, reference_machine(), calib::evemu::RotationOrigin::Independent,
-                                       options);
+  return *calib::evemu::observe_errors(errors, reference_machine(),
+                                       calib::evemu::RotationOrigin::Independent, options);
 }
 
 /// Multiples of (100/3, 50/3, 10/3) mm inside the hull of the balls, at least as far from Ball1
@@ -98,6 +104,7 @@ inline std::vector<Vector3> evaluation_grid(const calib::ValidityVolume& hull,
   const Vector3& ball1_m = layout.true_m[0][0];
   const double nearest_m = (layout.true_m[0][1] - ball1_m).norm();
   std::vector<Vector3> grid;
+
   for (int i = static_cast<int>(std::ceil(low.x())); i <= high.x(); ++i) {
     for (int j = static_cast<int>(std::ceil(low.y())); j <= high.y(); ++j) {
       for (int k = static_cast<int>(std::ceil(low.z())); k <= high.z(); ++k) {
@@ -108,6 +115,7 @@ inline std::vector<Vector3> evaluation_grid(const calib::ValidityVolume& hull,
       }
     }
   }
+
   return grid;
 }
 
@@ -149,7 +157,8 @@ inline Field field_of(const calib::evemu::Solution& s) {
 }
 inline Field raw_field_of(const calib::evemu::Solution& s) {
   const auto& m = *s.model.polynomials();
-  const auto raw = *calib::evemu::EvemuModel::of(m.design(), m.ball1_m(), s.raw_c_m, m.covariance_m2());
+  const auto raw =
+      *calib::evemu::EvemuModel::of(m.design(), m.ball1_m(), s.raw_c_m, m.covariance_m2());
   return [raw](const Vector3& q) { return raw.V_at(q); };
 }
 

@@ -1,8 +1,9 @@
 #pragma once
-/// Counts what could make the calling thread wait for another thread: mutexes, condition variables and
-/// read-write locks that it takes, threads that it starts. Include it in one source file of a test binary:
-/// the dynamic linker prefers the program's own functions to those of the C library. Locks inside the C
-/// library (malloc, stdio) are not seen. With a sanitizer nothing is counted: it has functions of its own.
+/// Counts what could make the calling thread wait for another thread: mutexes, condition variables
+/// and read-write locks that it takes, threads that it starts. Include it in one source file of a
+/// test binary: the dynamic linker prefers the program's own functions to those of the C library.
+/// Locks inside the C library (malloc, stdio) are not seen. With a sanitizer nothing is counted: it
+/// has functions of its own.
 
 #include <dlfcn.h>
 #include <pthread.h>
@@ -12,7 +13,8 @@
 #if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
 #define ABBE_SANITIZER_LOCKS 1
 #elif defined(__has_feature)
-#if __has_feature(address_sanitizer) || __has_feature(thread_sanitizer) || __has_feature(memory_sanitizer)
+#if __has_feature(address_sanitizer) || __has_feature(thread_sanitizer) || \
+    __has_feature(memory_sanitizer)
 #define ABBE_SANITIZER_LOCKS 1
 #endif
 #endif
@@ -58,7 +60,8 @@ ABBE_COUNTED(pthread_mutex_trylock, (pthread_mutex_t * mutex), (mutex))
 ABBE_COUNTED(pthread_rwlock_rdlock, (pthread_rwlock_t * lock), (lock))
 ABBE_COUNTED(pthread_rwlock_wrlock, (pthread_rwlock_t * lock), (lock))
 ABBE_COUNTED(pthread_create,
-             (pthread_t * thread, const pthread_attr_t* attributes, void* (*begin)(void*), void* argument),
+             (pthread_t * thread, const pthread_attr_t* attributes, void* (*begin)(void*),
+              void* argument),
              (thread, attributes, begin, argument))
 }
 #undef ABBE_COUNTED

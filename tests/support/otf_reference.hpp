@@ -1,8 +1,8 @@
 #pragma once
-/// The reference data of on-the-fly calibration, as the prototype that made them wrote them (own columns,
-/// SI). Small files are in tests/data/otf; the two tracker streams and the normal equations are read from
-/// ABBE_REF_DIR, by default
-/// ../shared/ref beside the repository, and tests that need them are skipped where they are not.
+/// The reference data of on-the-fly calibration, as the prototype that made them wrote them (own
+/// columns, SI). Small files are in tests/data/otf; the two tracker streams and the normal
+/// equations are read from ABBE_REF_DIR, by default ../shared/ref beside the repository, and tests
+/// that need them are skipped where they are not.
 
 #include <Eigen/Core>
 #include <cstdint>
@@ -29,14 +29,15 @@ inline std::filesystem::path small_file(const std::string& name) {
 inline std::optional<std::filesystem::path> big_file(const std::string& name) {
   const char* configured = std::getenv("ABBE_REF_DIR");
   const std::filesystem::path root =
-      configured != nullptr ? std::filesystem::path(configured)
-                            : std::filesystem::path(ABBE_TEST_DATA) / ".." / ".." / ".." / "shared" / "ref";
+      configured != nullptr
+          ? std::filesystem::path(configured)
+          : std::filesystem::path(ABBE_TEST_DATA) / ".." / ".." / ".." / "shared" / "ref";
   std::filesystem::path file = root / "otf" / name;
   return std::filesystem::exists(file) ? std::optional(file) : std::nullopt;
 }
 
-/// Rows of numbers; a first cell that is not a number becomes `label`. Lines that begin with # and the header
-/// are skipped.
+/// Rows of numbers; a first cell that is not a number becomes `label`. Lines that begin with # and
+/// the header are skipped.
 struct ReferenceRow {
   std::string label;
   std::vector<double> values;
@@ -46,6 +47,7 @@ inline std::vector<ReferenceRow> read_rows(const std::filesystem::path& file) {
   if (!in) {
     throw std::runtime_error("cannot read " + file.string());
   }
+
   std::vector<ReferenceRow> rows;
   for (std::string line; std::getline(in, line);) {
     if (line.empty() || line[0] == '#' || line.rfind("name,", 0) == 0) {
@@ -54,7 +56,8 @@ inline std::vector<ReferenceRow> read_rows(const std::filesystem::path& file) {
     ReferenceRow row;
     std::istringstream cells(line);
     for (std::string cell; std::getline(cells, cell, ',');) {
-      if (row.values.empty() && row.label.empty() && std::isalpha(static_cast<unsigned char>(cell[0])) != 0) {
+      if (row.values.empty() && row.label.empty() &&
+          std::isalpha(static_cast<unsigned char>(cell[0])) != 0) {
         row.label = cell;
       } else {
         row.values.push_back(std::stod(cell));
@@ -62,6 +65,7 @@ inline std::vector<ReferenceRow> read_rows(const std::filesystem::path& file) {
     }
     rows.push_back(row);
   }
+
   return rows;
 }
 
@@ -103,7 +107,8 @@ inline calib::otf::Path case_a_path() {
   return path;
 }
 
-/// What the prototype's alignment ended in (ref.json, cases.A.*.icp_R, icp_T; noisy rough_R, rough_T).
+/// What the prototype's alignment ended in (ref.json, cases.A.*.icp_R, icp_T; noisy rough_R,
+/// rough_T).
 inline calib::RigidTransform case_a_alignment(bool noisy) {
   calib::RigidTransform T;
   if (noisy) {
@@ -117,6 +122,7 @@ inline calib::RigidTransform case_a_alignment(bool noisy) {
         0.999411576058997;
     T.t_m = {-0.7501221778816931, -0.6198881341848641, -0.3500589101159056};
   }
+
   return T;
 }
 inline calib::RigidTransform case_a_rough_alignment_noisy() {
@@ -147,7 +153,8 @@ template <class T>
 std::vector<T> read_binary(const std::filesystem::path& file) {
   std::vector<T> values(std::filesystem::file_size(file) / sizeof(T));
   std::ifstream in(file, std::ios::binary);
-  in.read(reinterpret_cast<char*>(values.data()), static_cast<std::streamsize>(values.size() * sizeof(T)));
+  in.read(reinterpret_cast<char*>(values.data()),
+          static_cast<std::streamsize>(values.size() * sizeof(T)));
   return values;
 }
 
@@ -157,8 +164,8 @@ inline std::vector<calib::otf::TrackerObservation> read_stream(const std::filesy
   std::vector<calib::otf::TrackerObservation> samples(counts.size() / 3);
   for (std::size_t i = 0; i < samples.size(); ++i) {
     samples[i].time_s = static_cast<double>(i) / 500.0;
-    samples[i].p_tracker_m =
-        calib::from_spherical(counts[3 * i] * 1e-8, counts[3 * i + 1] * 2e-9, counts[3 * i + 2] * 2e-9);
+    samples[i].p_tracker_m = calib::from_spherical(counts[3 * i] * 1e-8, counts[3 * i + 1] * 2e-9,
+                                                   counts[3 * i + 2] * 2e-9);
   }
   return samples;
 }

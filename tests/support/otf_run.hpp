@@ -1,6 +1,6 @@
 #pragma once
-/// A small made-up run of on-the-fly calibration: a machine with random tables, a path, a tracker, samples.
-/// Deterministic from its seed. Constant speed on every leg, a stop at every vertex.
+/// A small made-up run of on-the-fly calibration: a machine with random tables, a path, a tracker,
+/// samples. Deterministic from its seed. Constant speed on every leg, a stop at every vertex.
 
 #include <cmath>
 #include <random>
@@ -36,7 +36,8 @@ struct MadeRunOptions {
 inline calib::otf::Machine coarse_machine(const std::string& chain) {
   calib::otf::Machine machine = case_a_machine();
   machine.chain = *calib::KinematicChain::parse(chain);
-  machine.nodes = {*calib::equidistant_nodes(-0.3, 0.3, 0.2), *calib::equidistant_nodes(-0.25, 0.25, 0.25),
+  machine.nodes = {*calib::equidistant_nodes(-0.3, 0.3, 0.2),
+                   *calib::equidistant_nodes(-0.25, 0.25, 0.25),
                    *calib::equidistant_nodes(-0.4, 0.0, 0.2)};
   return machine;
 }
@@ -61,14 +62,17 @@ inline std::vector<Vector3> drive(const calib::otf::Path& path, double speed_m_s
   std::vector<Vector3> q;
   const auto stand = [&](const Vector3& at) { q.insert(q.end(), 25, at); };
   stand(path.vertices_m.front());
+
   for (std::size_t i = 0; i + 1 < path.vertices_m.size(); ++i) {
     const Vector3 &from = path.vertices_m[i], &to = path.vertices_m[i + 1];
-    const auto steps = static_cast<std::size_t>(std::ceil((to - from).norm() / speed_m_s * rate_hz));
+    const auto steps =
+        static_cast<std::size_t>(std::ceil((to - from).norm() / speed_m_s * rate_hz));
     for (std::size_t k = 1; k <= steps; ++k) {
       q.emplace_back(from + (to - from) * (static_cast<double>(k) / static_cast<double>(steps)));
     }
     stand(to);
   }
+
   return q;
 }
 
@@ -80,7 +84,8 @@ inline Vector3 with_noise(const Vector3& p, const calib::otf::Noise& noise, doub
   const Vector3 any(normal(random), normal(random), normal(random));
   const Vector3 er = p.normalized();
   const Vector3 across = any - any.dot(er) * er;
-  return p + factor * (noise.sigma_range_m * along * er + noise.sigma_angle_rad * p.norm() * across);
+  return p +
+         factor * (noise.sigma_range_m * along * er + noise.sigma_angle_rad * p.norm() * across);
 }
 
 inline MadeRun make_run(const MadeRunOptions& wanted) {
@@ -94,12 +99,15 @@ inline MadeRun make_run(const MadeRunOptions& wanted) {
   run.truth = random_tables(layout, wanted.error_scale_m, random);
   run.T_machine_tracker = case_a_alignment(true);
   const Vector3& t = run.machine.target_offset_m;
+
   for (const Vector3& q : drive(run.path, wanted.speed_m_s, wanted.rate_hz)) {
-    const Vector3 V = calib::volumetric_error(layout, {run.truth.data(), layout.model_size()}, q, t);
+    const Vector3 V =
+        calib::volumetric_error(layout, {run.truth.data(), layout.model_size()}, q, t);
     const Vector3 p = run.T_machine_tracker.R.transpose() * (q + t + V - run.T_machine_tracker.t_m);
     run.samples.push_back({static_cast<double>(run.samples.size()) / wanted.rate_hz,
                            with_noise(p, run.noise, wanted.noise_factor, noise), true});
   }
+
   return run;
 }
 
@@ -118,6 +126,7 @@ std::vector<Vector3> errors_left(const MadeRun& run, const Model& model) {
       }
     }
   }
+
   return left;
 }
 

@@ -1,1 +1,2 @@
-// Nothing of its own: the target that carries the precompiled headers of all test programs needs one source.
+// Nothing of its own: the target that carries the precompiled headers of all test programs needs
+// one source.

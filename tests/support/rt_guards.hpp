@@ -42,14 +42,14 @@ inline void allow_only_exit() {
 }
 
 #if defined(__SANITIZE_THREAD__)
-inline constexpr bool kSystemCallsAreOurs =
-    false;  // ThreadSanitizer maps its shadow on demand and takes futexes
+// ThreadSanitizer maps its shadow on demand and takes futexes
+inline constexpr bool kSystemCallsAreOurs = false;
 #else
 inline constexpr bool kSystemCallsAreOurs = true;
 #endif
 
-/// Runs `path` in a child where any system call is deadly. Skips (does not fail) under ThreadSanitizer, whose
-/// own system calls cannot be told from ours.
+/// Runs `path` in a child where any system call is deadly. Skips (does not fail) under
+/// ThreadSanitizer, whose own system calls cannot be told from ours.
 template <class Path>
 void expect_no_system_call(Path&& path) {
   if constexpr (kSystemCallsAreOurs) {

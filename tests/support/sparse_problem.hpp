@@ -13,11 +13,13 @@ struct Problem {
   Eigen::VectorXd y;
 };
 
-/// Neighbouring columns are correlated by 0.5, have different scales and means; every fourth one acts on y.
+/// Neighbouring columns are correlated by 0.5, have different scales and means; every fourth one
+/// acts on y.
 inline Problem random_problem(Eigen::Index rows, Eigen::Index columns, std::uint64_t seed) {
   std::mt19937_64 random(seed);
   std::normal_distribution<double> normal;
   Problem problem{Eigen::MatrixXd(rows, columns), Eigen::VectorXd(rows)};
+
   for (Eigen::Index i = 0; i < rows; ++i) {
     double shared = normal(random);
     problem.y(i) = 3.0 + 0.3 * normal(random);
@@ -27,6 +29,7 @@ inline Problem random_problem(Eigen::Index rows, Eigen::Index columns, std::uint
       if (j % 4 == 0) problem.y(i) += (j % 8 == 0 ? 1.0 : -0.6) * shared;
     }
   }
+
   return problem;
 }
 

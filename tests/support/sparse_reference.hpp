@@ -68,7 +68,8 @@ inline Eigen::MatrixXd numbers(const Table& table) {
   return values;
 }
 
-/// Root mean square of the columns about their means: standardised coefficient = coefficient * scale.
+/// Root mean square of the columns about their means: standardised
+/// coefficient = coefficient * scale.
 inline Eigen::VectorXd column_scales(const Eigen::MatrixXd& X) {
   const Eigen::MatrixXd centred = X.rowwise() - X.colwise().mean();
   return (centred.colwise().squaredNorm() / static_cast<double>(X.rows())).cwiseSqrt().transpose();
@@ -85,7 +86,8 @@ inline BallArrayProblem ball_array_problem(const std::filesystem::path& folder) 
   return problem;
 }
 
-inline calib::sparse::Folds reference_folds(const std::filesystem::path& folder, const std::string& name) {
+inline calib::sparse::Folds reference_folds(const std::filesystem::path& folder,
+                                            const std::string& name) {
   std::ifstream in = open_reference(folder, name);
   std::ostringstream text;
   text << in.rdbuf();
@@ -100,13 +102,14 @@ struct ReferencePath {
   Eigen::MatrixXd coefficients;  ///< 46 x lambda, intercept first
 };
 
-/// Rows of equal penalty, gamma and tolerance follow each other. 1e6 sweeps: enough that none of the paths
-/// ends early.
+/// Rows of equal penalty, gamma and tolerance follow each other. 1e6 sweeps: enough that none of
+/// the paths ends early.
 inline std::vector<ReferencePath> reference_paths(const std::filesystem::path& folder) {
   using calib::sparse::PenaltyKind;
   const Table table = read_table(folder, "ncvreg_paths.csv");
   std::vector<ReferencePath> paths;
   const std::vector<std::string>* before = nullptr;
+
   for (const std::vector<std::string>& row : table.rows) {
     if (before == nullptr || !std::equal(row.begin(), row.begin() + 3, before->begin())) {
       ReferencePath& path = paths.emplace_back();
@@ -124,9 +127,11 @@ inline std::vector<ReferencePath> reference_paths(const std::filesystem::path& f
     path.sweeps.push_back(std::strtol(row[4].c_str(), nullptr, 10));
     path.coefficients.conservativeResize(Eigen::NoChange, path.coefficients.cols() + 1);
     for (std::size_t j = 5; j < row.size(); ++j) {
-      path.coefficients(static_cast<Eigen::Index>(j) - 5, path.coefficients.cols() - 1) = number(row[j]);
+      path.coefficients(static_cast<Eigen::Index>(j) - 5, path.coefficients.cols() - 1) =
+          number(row[j]);
     }
   }
+
   return paths;
 }
 

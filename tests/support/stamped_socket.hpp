@@ -10,9 +10,9 @@
 
 namespace abbe::test {
 
-/// Asks for receive stamps for as long as the program runs. A worker of the kernel switches stamping off some
-/// time after the last socket that asked was closed: a test that opened its own in between had a stamp for
-/// its first arrival and none for the arrivals after it.
+/// Asks for receive stamps for as long as the program runs. A worker of the kernel switches
+/// stamping off some time after the last socket that asked was closed: a test that opened its own
+/// in between had a stamp for its first arrival and none for the arrivals after it.
 class StampedSocket {
  public:
   StampedSocket() : fd_(::socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC, 0)) {

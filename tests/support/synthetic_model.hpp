@@ -21,15 +21,19 @@ inline calib::VolumetricModel synthetic_model(unsigned seed, double finer = 1.0)
   const auto n = static_cast<Eigen::Index>(layout.model_size());
   Eigen::VectorXd U(n);
   Eigen::MatrixXd root(n, n);
+
   for (Eigen::Index i = 0; i < n; ++i) {
     U[i] = 1e-5 * normal(random);
     for (Eigen::Index j = 0; j < n; ++j) root(i, j) = 1e-8 * normal(random);
   }
+
   const Eigen::MatrixXd covariance = root * root.transpose();
   std::vector<calib::Vector3> corners;
   for (int i = 0; i < 8; ++i)
-    corners.emplace_back((i & 1) != 0 ? 0.3 : -0.3, (i & 2) != 0 ? 0.3 : -0.3, (i & 4) != 0 ? -0.1 : -0.4);
+    corners.emplace_back((i & 1) != 0 ? 0.3 : -0.3, (i & 2) != 0 ? 0.3 : -0.3,
+                         (i & 4) != 0 ? -0.1 : -0.4);
   const std::vector<calib::Vector3> tools{{0.02, -0.015, -0.12}};
+
   return calib::VolumetricModel::from_vector(layout, calib::Gauge::G1, tools, U,
                                              0.5 * (covariance + covariance.transpose()),
                                              calib::ValidityVolume::hull_of(corners).value())
@@ -45,11 +49,12 @@ inline ModelDocument synthetic_document(unsigned seed) {
                              .condition = 1.0 / 3.0,
                              .sigma0 = 0.1,
                              .chi2_per_dof = 0.01,
-                             .covariance_factor = 4.0 / 3.0,
+                             .variance_factor = 4.0 / 3.0,
                              .before = {1e-5 / 3, 2e-5 / 3, 3e-5},
                              .after = {1e-7 / 3, 2e-7 / 3, 3e-7},
                              .iterations = 1,
                              .stop_reason = "direct"};
+
   return {synthetic_model(seed),
           "otf",
           "two-step",

@@ -93,9 +93,10 @@ double index_of(const Air& air, double wavelength_m, IndexEquation equation) {
   return 1.0;
 }
 
-/// Change of n when a quantity is one uncertainty up and one down, halved: the sensitivity times u, exact
-/// where n is linear (over any sensible uncertainty it is, to 1e-3 of the share).
-double share(Air air, double Air::*quantity, double u, double wavelength_m, IndexEquation equation) {
+/// Change of n when a quantity is one uncertainty up and one down, halved: the sensitivity times u,
+/// exact where n is linear (over any sensible uncertainty it is, to 1e-3 of the share).
+double share(Air air, double Air::*quantity, double u, double wavelength_m,
+             IndexEquation equation) {
   const double value = air.*quantity;
   air.*quantity = value + u;
   const double up = index_of(air, wavelength_m, equation);
@@ -103,7 +104,8 @@ double share(Air air, double Air::*quantity, double u, double wavelength_m, Inde
   return 0.5 * (up - index_of(air, wavelength_m, equation));
 }
 
-/// The shop-floor formula has no CO2 in it: its distance from 450 ppm is not corrected, and counts in full.
+/// The shop-floor formula has no CO2 in it: its distance from 450 ppm is not corrected, and counts
+/// in full.
 double share_of_co2(const Air& air, double wavelength_m, IndexEquation equation) {
   if (equation != IndexEquation::ShopFloor)
     return share(air, &Air::co2_ppm, air.u_co2_ppm, wavelength_m, equation);
@@ -124,8 +126,9 @@ bool within(double value, double min, double max) {
 }  // namespace
 
 double saturation_vapour_pressure_Pa(double temperature_K) noexcept {
-  constexpr std::array K{1167.05214528, -724213.167032, -17.0738469401, 12020.8247025,   -3232555.03223,
-                         14.9151086135, -4823.26573616, 405113.405421,  -0.238555575678, 650.175348448};
+  constexpr std::array K{1167.05214528,   -724213.167032, -17.0738469401, 12020.8247025,
+                         -3232555.03223,  14.9151086135,  -4823.26573616, 405113.405421,
+                         -0.238555575678, 650.175348448};
   const double O = temperature_K + K[8] / (temperature_K - K[9]);
   const double A = O * O + K[0] * O + K[1];
   const double B = K[2] * O * O + K[3] * O + K[4];
@@ -139,36 +142,42 @@ double u_of_equation(IndexEquation equation) noexcept {
   return equation == IndexEquation::ShopFloor ? 1.5e-7 : 1.5e-8;
 }
 
-Result<RefractiveIndex> refractive_index(const Air& air, double vacuum_wavelength_m, IndexEquation equation) {
+Result<RefractiveIndex> refractive_index(const Air& air, double vacuum_wavelength_m,
+                                         IndexEquation equation) {
   const double t = air.temperature_K - kZeroCelsius_K;
   if (!within(t, 0.0, 50.0))
-    return failure(ErrorCode::BadInput, message("refractive index: air of ", t, " C; valid for 0 to 50"));
+    return failure(ErrorCode::BadInput,
+                   message("refractive index: air of ", t, " C; valid for 0 to 50"));
   if (!within(air.pressure_Pa, 50'000.0, 120'000.0))
-    return failure(ErrorCode::BadInput,
-                   message("refractive index: air of ", air.pressure_Pa, " Pa; valid for 50000 to 120000"));
+    return failure(ErrorCode::BadInput, message("refractive index: air of ", air.pressure_Pa,
+                                                " Pa; valid for 50000 to 120000"));
   if (!within(air.relative_humidity, 0.0, 1.05))
-    return failure(ErrorCode::BadInput,
-                   message("refractive index: humidity of ", air.relative_humidity, "; valid for 0 to 1.05"));
+    return failure(ErrorCode::BadInput, message("refractive index: humidity of ",
+                                                air.relative_humidity, "; valid for 0 to 1.05"));
   if (!within(air.co2_ppm, 0.0, 2000.0))
     return failure(ErrorCode::BadInput,
                    message("refractive index: ", air.co2_ppm, " ppm CO2; valid for 0 to 2000"));
   if (!within(vacuum_wavelength_m, 0.35e-6, 1.2e-6))
-    return failure(ErrorCode::BadInput, message("refractive index: wavelength of ", vacuum_wavelength_m,
-                                                " m; valid for 0.35e-6 to 1.2e-6"));
+    return failure(ErrorCode::BadInput,
+                   message("refractive index: wavelength of ", vacuum_wavelength_m,
+                           " m; valid for 0.35e-6 to 1.2e-6"));
   const bool sure = within(air.u_temperature_K, 0.0, 50.0) && within(air.u_pressure_Pa, 0.0, 1e5) &&
                     within(air.u_relative_humidity, 0.0, 1.0) && within(air.u_co2_ppm, 0.0, 2000.0);
   if (!sure)
-    return failure(ErrorCode::BadInput, "refractive index: an uncertainty of the air is negative or none");
+    return failure(ErrorCode::BadInput,
+                   "refractive index: an uncertainty of the air is negative or none");
 
   const auto part = [&](double Air::*quantity, double u) {
     return share(air, quantity, u, vacuum_wavelength_m, equation);
   };
-  const double u_air = root_sum_of_squares(root_sum_of_squares(part(&Air::temperature_K, air.u_temperature_K),
-                                                               part(&Air::pressure_Pa, air.u_pressure_Pa)),
-                                           part(&Air::relative_humidity, air.u_relative_humidity));
+  const double u_air =
+      root_sum_of_squares(root_sum_of_squares(part(&Air::temperature_K, air.u_temperature_K),
+                                              part(&Air::pressure_Pa, air.u_pressure_Pa)),
+                          part(&Air::relative_humidity, air.u_relative_humidity));
   const double u_co2 = share_of_co2(air, vacuum_wavelength_m, equation);
-  return RefractiveIndex{index_of(air, vacuum_wavelength_m, equation),
-                         root_sum_of_squares(root_sum_of_squares(u_air, u_co2), u_of_equation(equation))};
+  return RefractiveIndex{
+      index_of(air, vacuum_wavelength_m, equation),
+      root_sum_of_squares(root_sum_of_squares(u_air, u_co2), u_of_equation(equation))};
 }
 
 Air shop_floor_air() noexcept {
@@ -184,7 +193,8 @@ Air shop_floor_air() noexcept {
           .u_co2_ppm = kCo2_ppm.u()};
 }
 
-Result<double> u_of_assumed_air(const Air& assumed, double vacuum_wavelength_m, IndexEquation equation) {
+Result<double> u_of_assumed_air(const Air& assumed, double vacuum_wavelength_m,
+                                IndexEquation equation) {
   const auto n_assumed = refractive_index(assumed, vacuum_wavelength_m, equation);
   const auto there = refractive_index(shop_floor_air(), vacuum_wavelength_m, equation);
   if (!n_assumed || !there) return tl::unexpected(n_assumed ? there.error() : n_assumed.error());

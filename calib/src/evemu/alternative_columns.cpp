@@ -22,7 +22,8 @@ Vector3 from_ball1_m(const SeenArtefact& s, std::size_t b) {
 
 /// First and last index of what was touched.
 std::pair<double, double> touched_between(std::span<const SeenArtefact> seen) {
-  std::pair<double, double> between{seen.front().ball_index.front(), seen.front().ball_index.front()};
+  std::pair<double, double> between{seen.front().ball_index.front(),
+                                    seen.front().ball_index.front()};
   const auto widen = [&](double index) {
     between = {std::min(between.first, index), std::max(between.second, index)};
   };
@@ -47,7 +48,8 @@ Rows3 bow(const SeenArtefact& s, std::size_t ball, double arm_m) {
 }
 
 /// By what G (p - p1) turns the frame of the blocks, times share[b] when block b is touched.
-Vector3 turn_of_blocks(const SeenArtefact& s, const Matrix3& G, const std::array<double, 2>& share) {
+Vector3 turn_of_blocks(const SeenArtefact& s, const Matrix3& G,
+                       const std::array<double, 2>& share) {
   const Vector3 &n1 = s.blocks[0].normal, &n2 = s.blocks[1].normal;
   const Vector3 z = s.T_self_uni.R.col(2), y = s.T_self_uni.R.col(1);
   const auto changed = [&](const Vector3& n, double by) -> Vector3 {
@@ -75,7 +77,8 @@ Matrix3 seen_shift(const SeenArtefact& s, std::size_t ball, const DoneShare& sha
 }
 
 /// An array that shifts, and turns about Ball1 by one arm.
-Rows3 shifted_and_turned(const SeenArtefact& s, std::size_t ball, double arm_m, const DoneShare& share) {
+Rows3 shifted_and_turned(const SeenArtefact& s, std::size_t ball, double arm_m,
+                         const DoneShare& share) {
   Rows3 rows(3, 6);
   rows.leftCols<3>() = seen_shift(s, ball, share);
   for (Eigen::Index k = 0; k < 3; ++k) {
@@ -95,7 +98,8 @@ std::string um(double m) {
   return message(m * kUmPerM, " um");
 }
 std::string vector_um(const Vector3& v_m) {
-  return message("x ", v_m.x() * kUmPerM, ", y ", v_m.y() * kUmPerM, ", z ", v_m.z() * kUmPerM, " um");
+  return message("x ", v_m.x() * kUmPerM, ", y ", v_m.y() * kUmPerM, ", z ", v_m.z() * kUmPerM,
+                 " um");
 }
 
 Eigen::Index columns_by_position(Cause cause) {
@@ -124,6 +128,7 @@ std::vector<std::vector<Added>> AlternativeColumns::families() const {
   if (o_.seen.empty()) {
     return {};
   }
+
   std::vector<Added> balls, of_the_file, steps;
   const std::size_t count = o_.seen.front().balls.size();
   for (std::size_t b = 0; b < count; ++b) {
@@ -135,13 +140,16 @@ std::vector<std::vector<Added>> AlternativeColumns::families() const {
       }
     }
   }
+
   std::vector<std::vector<Added>> all{balls, of_the_file};
   if (!steps.empty()) {
     all.push_back(steps);
   }
+
   for (const Cause cause : {Cause::Creep, Cause::Bent, Cause::Drift}) {
     all.push_back({Added{cause, 0, 0}});
   }
+
   return all;
 }
 
@@ -175,8 +183,8 @@ Eigen::MatrixXd AlternativeColumns::of_step(const Added& a) const {
   const double at = o_.seen[a.seen].ball_index[a.feature];
   return filled(6, [&](auto rows, std::size_t p, std::size_t i) {
     if (p == a.seen) {
-      rows =
-          -shifted_and_turned(o_.seen[p], i, arm_m_, [&](double index) { return index >= at ? 1.0 : 0.0; });
+      rows = -shifted_and_turned(o_.seen[p], i, arm_m_,
+                                 [&](double index) { return index >= at ? 1.0 : 0.0; });
     }
   });
 }
@@ -191,16 +199,19 @@ Eigen::MatrixXd AlternativeColumns::by_position(Cause cause) const {
       here = -bow(s, i, arm_m_);
     } else {
       const auto between = touched_between({&s, 1});
-      here = -shifted_and_turned(s, i, arm_m_, [&](double index) { return share_of(between, index); });
+      here =
+          -shifted_and_turned(s, i, arm_m_, [&](double index) { return share_of(between, index); });
     }
   });
 }
 
 /// The machine expands, shears and shifts at constant rates: V changes by t (G (p - p1) + v).
 Eigen::MatrixXd AlternativeColumns::of_drift() const {
-  const std::array<std::pair<int, int>, 6> strains{{{0, 0}, {1, 1}, {2, 2}, {0, 1}, {0, 2}, {1, 2}}};
+  const std::array<std::pair<int, int>, 6> strains{
+      {{0, 0}, {1, 1}, {2, 2}, {0, 1}, {0, 2}, {1, 2}}};
   const auto between = touched_between(o_.seen);
   const auto share = [&](double index) { return share_of(between, index) - 0.5; };
+
   return filled(9, [&](auto rows, std::size_t p, std::size_t i) {
     Eigen::Index k = 0;
     for (const auto& strain : strains) {
@@ -232,7 +243,8 @@ std::string where(const Added& a, const Observations& o) {
     return message(", ball ", a.feature + 1);
   }
   const bool placed = a.cause == Cause::Ball || a.cause == Cause::Moved;
-  return placed ? message(", position ", o.seen[a.seen].position, ", ball ", a.feature + 1) : std::string();
+  return placed ? message(", position ", o.seen[a.seen].position, ", ball ", a.feature + 1)
+                : std::string();
 }
 
 std::string text_of(const Added& a, const Eigen::VectorXd& d, const Observations& o) {
@@ -241,17 +253,17 @@ std::string text_of(const Added& a, const Eigen::VectorXd& d, const Observations
   switch (a.cause) {
     case Cause::Ball:
       return message(
-          "position ", position, ", ball ", ball, ": ", um(d.norm()), " off its place in the array (",
-          vector_um(d),
+          "position ", position, ", ball ", ball, ": ", um(d.norm()),
+          " off its place in the array (", vector_um(d),
           "): dirt, a loose seat, or the array moved there; clean it and touch the position again");
     case Cause::ArrayFile:
-      return message("the calibrator file's place of ball ", ball, " is off by ", um(d.norm()), " (",
-                     vector_um(d),
+      return message("the calibrator file's place of ball ", ball, " is off by ", um(d.norm()),
+                     " (", vector_um(d),
                      " along its axes), alike at all positions: wrong file or entry, or the ball "
                      "was displaced since; calibrate the array again");
     case Cause::Moved:
-      return message("position ", position, ": the array moved before ball ", ball, " was touched, by ",
-                     um(d.head<3>().norm()), " and ", um(d.tail<3>().norm()),
+      return message("position ", position, ": the array moved before ball ", ball,
+                     " was touched, by ", um(d.head<3>().norm()), " and ", um(d.tail<3>().norm()),
                      " of turn at its end; clamp it and touch the position again");
     case Cause::Creep:
       return message("the array creeps after clamping: it moves by up to ",
@@ -259,11 +271,12 @@ std::string text_of(const Added& a, const Eigen::VectorXd& d, const Observations
                      " (rms) in a position; wait after clamping, or clamp it better");
     case Cause::Bent:
       return message("every position bends the array differently, by ",
-                     um(largest_rms(d, columns_by_position(a.cause))), " (rms): clamping, or its supports");
+                     um(largest_rms(d, columns_by_position(a.cause))),
+                     " (rms): clamping, or its supports");
     case Cause::Drift:
       return message("the machine drifts: within the session it expands or shears by ",
-                     um(d.head<6>().norm()), " over the array and shifts by ", um(d.tail<3>().norm()),
-                     "; let it warm up");
+                     um(d.head<6>().norm()), " over the array and shifts by ",
+                     um(d.tail<3>().norm()), "; let it warm up");
     default:
       return {};
   }

@@ -15,7 +15,8 @@ struct Added {
   std::size_t feature = 0;  ///< index of the ball
 };
 
-/// Built when they are asked for, one alternative at a time: a run of N balls has N single ones of 3 N x 3.
+/// Built when they are asked for, one alternative at a time: a run of N balls has N single ones of
+/// 3 N x 3.
 class AlternativeColumns {
  public:
   explicit AlternativeColumns(const Observations&);

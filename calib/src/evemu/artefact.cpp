@@ -19,6 +19,7 @@ Result<void> check_balls(const Calibrator& c) {
   if (c.balls.size() < kLeastBalls) {
     return broken(c, ErrorCode::BadInput, message(c.balls.size(), " balls, needs ", kLeastBalls));
   }
+
   for (std::size_t i = 0; i < c.balls.size(); ++i) {
     const Calibrator::Ball& ball = c.balls[i];
     if (ball.number != static_cast<int>(i) + 1) {
@@ -38,6 +39,7 @@ Result<void> check_balls(const Calibrator& c) {
       }
     }
   }
+
   return {};
 }
 
@@ -45,6 +47,7 @@ Result<void> check_blocks(const Calibrator& c) {
   if (c.blocks.size() != 2 || c.blocks[0].number != 1 || c.blocks[1].number != 2) {
     return broken(c, ErrorCode::BadInput, message("needs blocks 1 and 2, has ", c.blocks.size()));
   }
+
   for (const Calibrator::Block& block : c.blocks) {
     if (!block.normal.allFinite() || !(block.normal.norm() > 0.0)) {
       return broken(c, ErrorCode::NotFinite, message("block ", block.number, " has no direction"));
@@ -54,6 +57,7 @@ Result<void> check_blocks(const Calibrator& c) {
                     message("block ", block.number, " has u = ", block.u_rad, " rad"));
     }
   }
+
   return uniform_frame(Vector3::Zero(), c.blocks[0].normal, c.blocks[1].normal)
       .map([](const RigidTransform&) {});
 }
@@ -87,8 +91,8 @@ Result<std::optional<double>> noise_of(std::size_t touches, std::size_t unknowns
 
 }  // namespace
 
-Calibrator grown(const Calibrator& c, const Expansion& expansion) {
-  const double factor = growth(expansion);
+Calibrator at_temperature(const Calibrator& c, const Expansion& expansion) {
+  const double factor = expansion_factor(expansion);
   Calibrator out = c;
   for (Calibrator::Ball& ball : out.balls) {
     ball.centre_m = c.balls.front().centre_m + factor * (ball.centre_m - c.balls.front().centre_m);
@@ -98,7 +102,7 @@ Calibrator grown(const Calibrator& c, const Expansion& expansion) {
 }
 
 double ArtefactUncertainty::u_scale() const {
-  return expansion ? u_growth(*expansion) / growth(*expansion) : 0.0;
+  return expansion ? u_expansion_factor(*expansion) / expansion_factor(*expansion) : 0.0;
 }
 
 bool ArtefactUncertainty::none() const {
@@ -120,16 +124,19 @@ ArtefactUncertainty uncertainty_of(const Calibrator& c, const std::optional<Expa
 
 Result<RigidTransform> uniform_frame(const Vector3& ball1_m, const Vector3& n1, const Vector3& n2) {
   const Vector3 z = n1.normalized(), across = n2.normalized().cross(z);
-  // Faces meet near a right angle; below this the plate's direction about z is a matter of rounding.
+  // Faces meet near a right angle; below this the plate's direction about z is a matter of
+  // rounding.
   constexpr double kParallel = 1e-3;
   if (!(across.norm() > kParallel)) {
     return failure(ErrorCode::DegenerateGeometry,
                    "uniform coordinate system: the normals of the two blocks are parallel");
   }
+
   const Vector3 x = across.normalized();
   RigidTransform T;
   T.R << x, z.cross(x), z;
   T.t_m = ball1_m;
+
   return T;
 }
 
@@ -137,58 +144,70 @@ Result<void> check(const Calibrator& c) {
   if (!std::isfinite(c.tip_radius_m) || c.tip_radius_m < 0.0) {
     return broken(c, ErrorCode::BadInput, message("tip radius ", c.tip_radius_m, " m"));
   }
+
   if (Result<void> balls = check_balls(c); !balls) {
     return balls;
   }
+
   if (Result<void> expansivity = check_expansivity(c); !expansivity) {
     return expansivity;
   }
+
   std::vector<Vector3> centres;
   for (const Calibrator::Ball& ball : c.balls) {
     centres.push_back(ball.centre_m);
   }
+
   const Result<fit::PointSet> set = fit::point_set(centres, 3, "calibrator");
   if (!set || set->on_a_line()) {
     return broken(c, ErrorCode::DegenerateGeometry, "its balls lie on a line");
   }
+
   return check_blocks(c);
 }
 
-Result<Calibrator> precalibrated(std::string name, std::span<const Touch> touches, double tip_radius_m,
-                                 const std::array<Vector3, 2>& outward, std::optional<double> u_touch_m) {
+Result<Calibrator> precalibrated(std::string name, std::span<const Touch> touches,
+                                 double tip_radius_m, const std::array<Vector3, 2>& outward,
+                                 std::optional<double> u_touch_m) {
   constexpr std::size_t kBallUnknowns = 4, kBlockUnknowns = 3;
   std::map<int, std::vector<Vector3>> balls, blocks;
   for (const Touch& t : touches) {
     (t.feature == Feature::Ball ? balls : blocks)[t.number].push_back(t.p_m);
   }
+
   Calibrator c;
   c.name = std::move(name);
   c.tip_radius_m = tip_radius_m;
+
   for (const auto& [number, points] : balls) {
-    const Result<fit::Sphere> sphere = noise_of(points.size(), kBallUnknowns, u_touch_m)
-                                           .and_then([&, &seen = points](std::optional<double> known) {
-                                             return fit::fit_sphere(seen, known);
-                                           });
+    const Result<fit::Sphere> sphere =
+        noise_of(points.size(), kBallUnknowns, u_touch_m)
+            .and_then([&, &seen = points](std::optional<double> known) {
+              return fit::fit_sphere(seen, known);
+            });
     if (!sphere) {
       return broken(c, sphere.error().code, message("ball ", number, ": ", sphere.error().text));
     }
     const double u_centre_m = std::sqrt(sphere->covariance.topLeftCorner<3, 3>().trace() / 3.0);
     c.balls.push_back({number, sphere->centre, sphere->radius - tip_radius_m, u_centre_m});
   }
+
   for (const auto& [number, points] : blocks) {
     if (number != 1 && number != 2) {
       return broken(c, ErrorCode::BadInput, message("there is no block ", number));
     }
     const Vector3& towards = outward[static_cast<std::size_t>(number) - 1];
-    const Result<fit::Plane> plane = noise_of(points.size(), kBlockUnknowns, u_touch_m)
-                                         .and_then([&, &seen = points](std::optional<double> known) {
-                                           return fit::fit_plane(seen, towards, known);
-                                         });
+    const Result<fit::Plane> plane =
+        noise_of(points.size(), kBlockUnknowns, u_touch_m)
+            .and_then([&, &seen = points](std::optional<double> known) {
+              return fit::fit_plane(seen, towards, known);
+            });
     if (!plane) {
       return broken(c, plane.error().code, message("block ", number, ": ", plane.error().text));
     }
     c.blocks.push_back({number, plane->normal, std::sqrt(plane->cov_normal.trace() / 2.0)});
   }
+
   return check(c).map([&] { return c; });
 }
 

@@ -31,8 +31,8 @@ void add_balls(const ArtefactUncertainty& u, std::vector<Effect>& effects) {
   }
 }
 
-/// uniform_frame(): z = n1, x = n2 x z / sine, so n2 = sine y + cosine z. A change of n1 by e turns z by
-/// z x e, and x by what it does to n2 x n1.
+/// uniform_frame(): z = n1, x = n2 x z / sine, so n2 = sine y + cosine z. A change of n1 by e turns
+/// z by z x e, and x by what it does to n2 x n1.
 void add_blocks(const ArtefactUncertainty& u, std::vector<Effect>& effects) {
   const double cosine = u.cosine_between_blocks, sine = std::sqrt(1.0 - cosine * cosine);
   const auto& [u1_rad, u2_rad] = u.u_block_rad;
@@ -50,7 +50,8 @@ std::vector<Effect> effects_of(const ArtefactUncertainty& u) {
   add_balls(u, effects);
   add_blocks(u, effects);
   if (const double u_scale = u.u_scale(); u_scale > 0.0) {
-    effects.push_back([u_scale](std::size_t, const Vector3& a_m) -> Vector3 { return u_scale * a_m; });
+    effects.push_back(
+        [u_scale](std::size_t, const Vector3& a_m) -> Vector3 { return u_scale * a_m; });
   }
   return effects;
 }
@@ -62,6 +63,7 @@ Eigen::MatrixXd artefact_rows(const Observations& o) {
   const auto columns = static_cast<Eigen::Index>(effects.size());
   Eigen::MatrixXd A = Eigen::MatrixXd::Zero(static_cast<Eigen::Index>(3 * o.rows.size()), columns);
   Eigen::Index row = 0;
+
   for (const SeenArtefact& seen : o.seen) {
     const Matrix3& R = seen.T_self_uni.R;
     for (std::size_t b = 0; b < seen.balls.size(); ++b, row += 3) {
@@ -71,6 +73,7 @@ Eigen::MatrixXd artefact_rows(const Observations& o) {
       }
     }
   }
+
   return A;
 }
 

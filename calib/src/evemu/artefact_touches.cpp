@@ -24,32 +24,36 @@ Vector3 across(const Vector3& up) {
   return up.unitOrthogonal();
 }
 
-/// The pole, then two rings; neighbours lie beside each other. The rings are turned against each other: two
-/// points each would lie in one plane with the pole, which no sphere follows from.
+/// The pole, then two rings; neighbours lie beside each other. The rings are turned against each
+/// other: two points each would lie in one plane with the pole, which no sphere follows from.
 std::vector<Vector3> normals_on_a_ball(const Vector3& up, std::size_t points) {
   const Vector3 x = across(up), y = up.cross(x);
   std::vector<Vector3> normals{up};
   const std::size_t lower = points / 2;
   const std::size_t upper = points - 1 - lower;
+
   struct Ring {
     double polar_rad;
     std::size_t points;
     double first_step;
   };
+
   for (const auto& [polar_rad, n, first] :
        {Ring{kRingUpper_rad, upper, 0.0}, Ring{kRingLower_rad, lower, 0.5}}) {
     const SinCos polar = sin_cos(polar_rad);
     for (std::size_t i = 0; i < n; ++i) {
-      const SinCos around =
-          sin_cos(2.0 * std::numbers::pi * (first + static_cast<double>(i)) / static_cast<double>(n));
+      const SinCos around = sin_cos(2.0 * std::numbers::pi * (first + static_cast<double>(i)) /
+                                    static_cast<double>(n));
       normals.push_back(polar.cos * up + polar.sin * (around.cos * x + around.sin * y));
     }
   }
+
   return normals;
 }
 
 /// Around a square, and its middle last.
-std::vector<Vector3> places_on_a_face(const FaceToTouch& face, const Vector3& normal, std::size_t points) {
+std::vector<Vector3> places_on_a_face(const FaceToTouch& face, const Vector3& normal,
+                                      std::size_t points) {
   const Vector3 x = across(normal), y = normal.cross(x);
   std::vector<Vector3> places;
   for (std::size_t i = 0; i + 1 < points; ++i) {
@@ -65,7 +69,10 @@ class Planner {
  public:
   Planner(const Calibrator& nominal, const std::array<FaceToTouch, 2>& faces, const Vector3& from_m,
           const ArtefactTouchOptions& options)
-      : nominal_(nominal), options_(options), up_(nominal.blocks[0].normal.normalized()), here_(from_m) {
+      : nominal_(nominal),
+        options_(options),
+        up_(nominal.blocks[0].normal.normalized()),
+        here_(from_m) {
     for (const auto& ball : nominal.balls)
       top_m_ = std::max(top_m_, up_.dot(ball.centre_m) + kOuter * reach(ball));
     for (const auto& face : faces)
@@ -78,7 +85,8 @@ class Planner {
     const auto above = [this](const Calibrator::Ball& ball) {
       const Vector3 from_centre = here_ - ball.centre_m;
       const double height = up_.dot(from_centre);
-      return height < 0.0 && (from_centre - height * up_).norm() < reach(ball) + options_.clearance_m;
+      return height < 0.0 &&
+             (from_centre - height * up_).norm() < reach(ball) + options_.clearance_m;
     };
     const auto found = std::ranges::find_if(nominal_.balls, above);
     return found == nominal_.balls.end() ? nullptr : &*found;
@@ -98,7 +106,8 @@ class Planner {
         if (before.dot(n) < kCosOfFarthestAround) go_over(ball, way, n);
         way.push_back(outer);
       }
-      planned_.push_back({Feature::Ball, ball.number, std::move(way), ball.centre_m + reach(ball) * n, n});
+      planned_.push_back(
+          {Feature::Ball, ball.number, std::move(way), ball.centre_m + reach(ball) * n, n});
       before = n;
       here_ = outer;
     }
@@ -123,7 +132,9 @@ class Planner {
     return ball.radius_m + nominal_.tip_radius_m;
   }
   [[nodiscard]] bool high(const Vector3& p_m) const { return up_.dot(p_m) >= top_m_; }
-  [[nodiscard]] Vector3 raised(const Vector3& p_m) const { return p_m + (top_m_ - up_.dot(p_m)) * up_; }
+  [[nodiscard]] Vector3 raised(const Vector3& p_m) const {
+    return p_m + (top_m_ - up_.dot(p_m)) * up_;
+  }
   /// Up, across, down; from higher than everything straight to above the place.
   [[nodiscard]] std::vector<Vector3> over_to(const Vector3& place_m) const {
     std::vector<Vector3> way;
@@ -152,18 +163,25 @@ class Planner {
 
 }  // namespace
 
-Result<ArtefactPlan> plan_artefact_touches(const Calibrator& nominal, const std::array<FaceToTouch, 2>& faces,
-                                           const Vector3& from_m, const ArtefactTouchOptions& options) {
-  if (const auto sound = check(nominal); !sound) return failure(sound.error().code, sound.error().text);
+Result<ArtefactPlan> plan_artefact_touches(const Calibrator& nominal,
+                                           const std::array<FaceToTouch, 2>& faces,
+                                           const Vector3& from_m,
+                                           const ArtefactTouchOptions& options) {
+  if (const auto sound = check(nominal); !sound)
+    return failure(sound.error().code, sound.error().text);
   if (options.points_per_ball < kLeastBallPoints || options.points_per_face < kLeastFacePoints) {
-    return failure(ErrorCode::BadInput, message("touches of an artefact: at least ", kLeastBallPoints,
-                                                " on a ball and ", kLeastFacePoints, " on a face"));
+    return failure(ErrorCode::BadInput,
+                   message("touches of an artefact: at least ", kLeastBallPoints, " on a ball and ",
+                           kLeastFacePoints, " on a face"));
   }
+
   Planner planner(nominal, faces, from_m, options);
   if (const auto* ball = planner.ball_above()) {
-    return failure(ErrorCode::BadInput, message("touches of an artefact: ball ", ball->number,
-                                                " is above the tip: move the tip up beside it first"));
+    return failure(ErrorCode::BadInput,
+                   message("touches of an artefact: ball ", ball->number,
+                           " is above the tip: move the tip up beside it first"));
   }
+
   for (const auto& ball : nominal.balls) planner.touch(ball);
   for (std::size_t i = 0; i < faces.size(); ++i) planner.touch(nominal.blocks[i], faces[i]);
   return planner.planned();
@@ -171,12 +189,14 @@ Result<ArtefactPlan> plan_artefact_touches(const Calibrator& nominal, const std:
 
 Calibrator moved(const Calibrator& calibrator, const RigidTransform& T_machine_artefact) {
   Calibrator out = calibrator;
-  for (auto& ball : out.balls) ball.centre_m = T_machine_artefact.R * ball.centre_m + T_machine_artefact.t_m;
+  for (auto& ball : out.balls)
+    ball.centre_m = T_machine_artefact.R * ball.centre_m + T_machine_artefact.t_m;
   for (auto& block : out.blocks) block.normal = T_machine_artefact.R * block.normal;
   return out;
 }
 
-Result<Calibrator> calibrated_artefact(const Calibrator& nominal, const std::array<FaceToTouch, 2>& faces,
+Result<Calibrator> calibrated_artefact(const Calibrator& nominal,
+                                       const std::array<FaceToTouch, 2>& faces,
                                        std::span<const Touch> touches, double u_position_m) {
   auto found = precalibrated(nominal.name, touches, nominal.tip_radius_m,
                              {nominal.blocks[0].normal, nominal.blocks[1].normal}, u_position_m);
@@ -184,7 +204,8 @@ Result<Calibrator> calibrated_artefact(const Calibrator& nominal, const std::arr
   found->expansivity = nominal.expansivity;
   for (auto& ball : found->balls) ball.u_m = root_sum_of_squares(ball.u_m, u_position_m);
   for (std::size_t i = 0; i < found->blocks.size(); ++i)
-    found->blocks[i].u_rad = root_sum_of_squares(found->blocks[i].u_rad, u_position_m / faces[i].half_size_m);
+    found->blocks[i].u_rad =
+        root_sum_of_squares(found->blocks[i].u_rad, u_position_m / faces[i].half_size_m);
   return found;
 }
 

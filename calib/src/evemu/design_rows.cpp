@@ -7,13 +7,14 @@
 namespace abbe::calib::evemu {
 namespace {
 
-/// Change of a face's normal when its points move: the slope of the movement along the normal, and what a
-/// movement along the face does to points that do not lie in it (a curved V bends the face).
+/// Change of a face's normal when its points move: the slope of the movement along the normal, and
+/// what a movement along the face does to points that do not lie in it (a curved V bends the face).
 Eigen::Matrix3Xd normal_change(const fit::Plane& plane, std::span<const Vector3> points_m,
                                const ScaledDesign& design) {
   Matrix3 spread = Matrix3::Zero();
   Eigen::Matrix3Xd moment = Eigen::Matrix3Xd::Zero(3, static_cast<Eigen::Index>(design.size()));
   const Matrix3 in_plane = Matrix3::Identity() - plane.normal * plane.normal.transpose();
+
   for (const Vector3& p : points_m) {
     const Vector3 r = in_plane * (p - plane.point);
     const double out_of_plane_m = plane.normal.dot(p - plane.point);
@@ -21,6 +22,7 @@ Eigen::Matrix3Xd normal_change(const fit::Plane& plane, std::span<const Vector3>
     spread += r * r.transpose() - out_of_plane_m * out_of_plane_m * in_plane;
     moment.noalias() += r * (plane.normal.transpose() * B) + out_of_plane_m * (in_plane * B);
   }
+
   // n n^T fills the one direction in which the points have no extent; moment has nothing there.
   spread += spread.trace() * plane.normal * plane.normal.transpose();
   return -spread.ldlt().solve(moment);
@@ -33,6 +35,7 @@ Eigen::Matrix3Xd block_rotation(const SeenArtefact& seen, const ScaledDesign& de
   const Vector3 &n1 = seen.blocks[0].normal, &n2 = seen.blocks[1].normal;
   const Eigen::Matrix3Xd dn1 = normal_change(seen.blocks[0], seen.block_points_m[0], design);
   const Eigen::Matrix3Xd dn2 = normal_change(seen.blocks[1], seen.block_points_m[1], design);
+
   // theta turns z = n1 with n1, and x = n2 x z with both: theta = z x dn1 + z (y . dx).
   const double sine = n2.cross(n1).norm();
   Eigen::Matrix3Xd theta(3, dn1.cols());
@@ -41,13 +44,17 @@ Eigen::Matrix3Xd block_rotation(const SeenArtefact& seen, const ScaledDesign& de
     const Vector3 dx = (dn2_j.cross(z) + n2.cross(dz)) / sine;
     theta.col(j) = z.cross(dz) + z * y.dot(dx);
   }
+
   return theta;
 }
 
-Eigen::Matrix3Xd ball_displacement(const SeenArtefact& seen, std::size_t ball, const ScaledDesign& design) {
+Eigen::Matrix3Xd ball_displacement(const SeenArtefact& seen, std::size_t ball,
+                                   const ScaledDesign& design) {
   const Vector3& centre = seen.balls[ball].centre;
   const std::vector<Vector3>& points_m = seen.ball_points_m[ball];
-  // Points moved by delta change |p - c| - r by n.delta; the fit answers with the dc, dr that undo it best.
+
+  // Points moved by delta change |p - c| - r by n.delta; the fit answers with the dc, dr that undo
+  // it best.
   Eigen::MatrixX4d N(static_cast<Eigen::Index>(points_m.size()), 4);
   Eigen::MatrixXd along(N.rows(), static_cast<Eigen::Index>(design.size()));
   for (std::size_t k = 0; k < points_m.size(); ++k) {
@@ -56,26 +63,30 @@ Eigen::Matrix3Xd ball_displacement(const SeenArtefact& seen, std::size_t ball, c
     N.row(row) << n.transpose(), 1.0;
     along.row(row) = n.transpose() * design.B(points_m[k]);
   }
+
   return N.colPivHouseholderQr().solve(along).topRows<3>();
 }
 
 Eigen::MatrixXd design_rows(const Observations& o, const ScaledDesign& design, RowsFrom from) {
-  Eigen::MatrixXd X(static_cast<Eigen::Index>(3 * o.rows.size()), static_cast<Eigen::Index>(design.size()));
+  Eigen::MatrixXd X(static_cast<Eigen::Index>(3 * o.rows.size()),
+                    static_cast<Eigen::Index>(design.size()));
   if (from == RowsFrom::Centres) {
     for (std::size_t i = 0; i < o.rows.size(); ++i) {
       X.middleRows<3>(static_cast<Eigen::Index>(3 * i)) = design.B(o.rows[i].reading_m);
     }
     return X;
   }
+
   Eigen::Index row = 0;
   for (const SeenArtefact& seen : o.seen) {
     const Eigen::Matrix3Xd theta = block_rotation(seen, design);
     const Vector3& ball1_m = seen.balls.front().centre;
     for (std::size_t b = 0; b < seen.balls.size(); ++b, row += 3) {
-      X.middleRows<3>(row) =
-          ball_displacement(seen, b, design) - rotation_effect(seen.balls[b].centre - ball1_m) * theta;
+      X.middleRows<3>(row) = ball_displacement(seen, b, design) -
+                             rotation_effect(seen.balls[b].centre - ball1_m) * theta;
     }
   }
+
   return X;
 }
 
@@ -86,7 +97,8 @@ Eigen::MatrixXd relative_rows(const Observations& o, const ScaledDesign& design,
     const Eigen::Matrix3Xd first = X.middleRows<3>(static_cast<Eigen::Index>(3 * p.ball1));
     for (std::size_t i = p.first; i < p.first + p.count; ++i) {
       const auto row = static_cast<Eigen::Index>(3 * i);
-      X.middleRows<3>(row) = i == p.ball1 ? at_ball1 : Eigen::Matrix3Xd(X.middleRows<3>(row) - first);
+      X.middleRows<3>(row) =
+          i == p.ball1 ? at_ball1 : Eigen::Matrix3Xd(X.middleRows<3>(row) - first);
     }
   }
   return X;

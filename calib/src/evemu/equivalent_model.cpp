@@ -22,7 +22,8 @@ LikeTerms like_terms(const ErrorPolynomials& A) {
   LikeTerms found;
   const auto h = static_cast<Eigen::Index>(A.names().size());
   for (const Term& t : A.terms()) {
-    Eigen::RowVectorXd& w = found.try_emplace({t.row, t.monomial}, Eigen::RowVectorXd::Zero(h)).first->second;
+    Eigen::RowVectorXd& w =
+        found.try_emplace({t.row, t.monomial}, Eigen::RowVectorXd::Zero(h)).first->second;
     w(static_cast<Eigen::Index>(t.coefficient)) += t.factor;
   }
   return found;
@@ -52,8 +53,8 @@ bool is_translation(const std::string& coefficient) {
   return coefficient.rfind("k_d", 0) == 0;
 }
 
-/// Single: +1; merged: + on a translation (there is one in every merged row: all their monomials are of the
-/// first order or constant, and some d function has them).
+/// Single: +1; merged: + on a translation (there is one in every merged row: all their monomials
+/// are of the first order or constant, and some d function has them).
 void normalise_sign(CombinedRow& row, std::span<const std::string> names) {
   Eigen::Index leading = -1;
   for (Eigen::Index j = 0; j < row.w.size(); ++j) {
@@ -70,7 +71,8 @@ void normalise_sign(CombinedRow& row, std::span<const std::string> names) {
 }
 
 /// Names at tool offset zero, where the rows are as few coefficients as they can be.
-std::vector<std::string> row_names(const std::vector<CombinedRow>& rows, std::span<const std::string> K) {
+std::vector<std::string> row_names(const std::vector<CombinedRow>& rows,
+                                   std::span<const std::string> K) {
   std::vector<std::string> names(rows.size());
   std::map<std::size_t, std::vector<std::size_t>> merged;  // component -> rows
   for (std::size_t i = 0; i < rows.size(); ++i) {
@@ -82,6 +84,7 @@ std::vector<std::string> row_names(const std::vector<CombinedRow>& rows, std::sp
     rows[i].w.cwiseAbs().maxCoeff(&only);
     names[i] = K[static_cast<std::size_t>(only)];
   }
+
   for (auto& [component, members] : merged) {
     std::sort(members.begin(), members.end(), [&](std::size_t a, std::size_t b) {
       return rows[a].shares.front().monomial > rows[b].shares.front().monomial;
@@ -90,6 +93,7 @@ std::vector<std::string> row_names(const std::vector<CombinedRow>& rows, std::sp
       names[members[n]] = message("k_eq", "xyz"[component], n + 1);
     }
   }
+
   return names;
 }
 
@@ -110,17 +114,21 @@ Result<EquivalentModel> EquivalentModel::of(const KinematicChain& chain, int ord
   if (!at_zero) {
     return tl::unexpected(at_zero.error());
   }
+
   const Result<ErrorPolynomials> A = ErrorPolynomials::of(chain, order, std::array{tool_offset_mm});
   if (!A) {
     return tl::unexpected(A.error());
   }
+
   std::vector<CombinedRow> plain = combined_rows(*at_zero), rows = combined_rows(*A);
   for (CombinedRow& row : plain) {
     normalise_sign(row, A->names());
   }
+
   for (CombinedRow& row : rows) {
     normalise_sign(row, A->names());
   }
+
   const std::vector<std::string> names = row_names(plain, A->names());
   std::vector<std::size_t> alphabetical(plain.size());
   std::iota(alphabetical.begin(), alphabetical.end(), std::size_t{0});
@@ -130,13 +138,16 @@ Result<EquivalentModel> EquivalentModel::of(const KinematicChain& chain, int ord
   model.chain_ = chain;
   model.order_ = order;
   model.coefficient_names_.assign(A->names().begin(), A->names().end());
-  model.W_.resize(static_cast<Eigen::Index>(plain.size()), static_cast<Eigen::Index>(A->names().size()));
+  model.W_.resize(static_cast<Eigen::Index>(plain.size()),
+                  static_cast<Eigen::Index>(A->names().size()));
+
   for (const std::size_t i : alphabetical) {
     const CombinedRow& row = with_share(rows, plain[i].shares.front());
     model.W_.row(static_cast<Eigen::Index>(model.names_.size())) = row.w;
     model.names_.push_back(names[i]);
     model.shares_.push_back(row.shares);
   }
+
   return model;
 }
 
@@ -157,25 +168,32 @@ Result<std::size_t> observable_combinations(const KinematicChain& chain, int ord
   for (const Vector3& t : tool_offsets_mm) {
     longest_mm = std::max(longest_mm, t.norm());
   }
+
   // Offsets near 1 keep the rows of W of one size; the unit of length does not change their rank.
   std::vector<Vector3> scaled(tool_offsets_mm.begin(), tool_offsets_mm.end());
   for (Vector3& t : scaled) {
     t /= longest_mm;
   }
+
   const Result<ErrorPolynomials> A = ErrorPolynomials::of(chain, order, scaled);
   if (!A) {
     return tl::unexpected(A.error());
   }
+
   const std::vector<CombinedRow> rows = combined_rows(*A);
-  Eigen::MatrixXd W(static_cast<Eigen::Index>(rows.size()), static_cast<Eigen::Index>(A->names().size()));
+  Eigen::MatrixXd W(static_cast<Eigen::Index>(rows.size()),
+                    static_cast<Eigen::Index>(A->names().size()));
+
   for (std::size_t i = 0; i < rows.size(); ++i) {
     W.row(static_cast<Eigen::Index>(i)) = rows[i].w;
   }
+
   Eigen::ColPivHouseholderQR<Eigen::MatrixXd> qr(W);
-  // Pivots are of the size of the offsets' differences or at rounding level (1e-15). Styli whose directions
-  // differ by less than a part in 1e9 count as parallel.
+  // Pivots are of the size of the offsets' differences or at rounding level (1e-15). Styli whose
+  // directions differ by less than a part in 1e9 count as parallel.
   constexpr double kZero = 1e-9;
   qr.setThreshold(kZero);
+
   return static_cast<std::size_t>(qr.rank());
 }
 

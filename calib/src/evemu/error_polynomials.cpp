@@ -27,7 +27,8 @@ struct Builder {
     }
   }
 
-  /// e_direction x (sum of q_b e_b over the axes at `first_place` and nearer to the tool, + tool), times `m`.
+  /// e_direction x (sum of q_b e_b over the axes at `first_place` and nearer to the tool, + tool),
+  /// times `m`.
   void add_rotation(std::size_t direction, std::size_t first_place, const Monomial& m) {
     for (std::size_t tool = 0; tool < tools_mm.size(); ++tool) {
       for (std::size_t b = 0; b < 3; ++b) {
@@ -48,8 +49,8 @@ struct Builder {
 
   void add_error_function(Axis axis, bool rotation, std::size_t direction, int order) {
     for (int k = order; k >= 0; --k) {
-      names.push_back(
-          message("k_", rotation ? 'e' : 'd', small_letter(direction), small_letter(index(axis)), k));
+      names.push_back(message("k_", rotation ? 'e' : 'd', small_letter(direction),
+                              small_letter(index(axis)), k));
       Monomial m;
       m.exponent[index(axis)] = k;
       if (rotation) {
@@ -62,7 +63,8 @@ struct Builder {
     }
   }
 
-  /// Between the axes at two places: the rotation about the third axis, before the travel of the second.
+  /// Between the axes at two places: the rotation about the third axis, before the travel of the
+  /// second.
   void add_squareness(std::size_t first_place, std::size_t second_place) {
     const std::size_t a = index(chain.order_w_to_t()[first_place]);
     const std::size_t b = index(chain.order_w_to_t()[second_place]);
@@ -90,17 +92,20 @@ Result<ErrorPolynomials> ErrorPolynomials::of(const KinematicChain& chain, int o
 Result<ErrorPolynomials> ErrorPolynomials::of(const KinematicChain& chain, int order,
                                               std::span<const Vector3> tool_offsets_mm) {
   if (order < kLeastOrder || order > kMostOrder) {
-    return failure(ErrorCode::BadInput, message("error polynomials: order ", order, ", must be ", kLeastOrder,
-                                                " to ", kMostOrder));
+    return failure(ErrorCode::BadInput, message("error polynomials: order ", order, ", must be ",
+                                                kLeastOrder, " to ", kMostOrder));
   }
+
   if (tool_offsets_mm.empty()) {
     return failure(ErrorCode::BadInput, "error polynomials: no tool offset");
   }
+
   for (const Vector3& t : tool_offsets_mm) {
     if (!t.allFinite()) {
       return failure(ErrorCode::NotFinite, "error polynomials: a tool offset is not a number");
     }
   }
+
   Builder build{chain, tool_offsets_mm};
   for (const Axis axis : kAllAxes) {
     for (const bool rotation : {false, true}) {
@@ -109,6 +114,7 @@ Result<ErrorPolynomials> ErrorPolynomials::of(const KinematicChain& chain, int o
       }
     }
   }
+
   build.add_squareness(0, 1);
   build.add_squareness(1, 2);
   build.add_squareness(0, 2);
@@ -116,12 +122,13 @@ Result<ErrorPolynomials> ErrorPolynomials::of(const KinematicChain& chain, int o
   result.names_ = std::move(build.names);
   result.terms_ = std::move(build.terms);
   result.rows_ = 3 * tool_offsets_mm.size();
+
   return result;
 }
 
 Eigen::MatrixXd ErrorPolynomials::A(const Vector3& p_mm) const {
-  Eigen::MatrixXd A =
-      Eigen::MatrixXd::Zero(static_cast<Eigen::Index>(rows_), static_cast<Eigen::Index>(names_.size()));
+  Eigen::MatrixXd A = Eigen::MatrixXd::Zero(static_cast<Eigen::Index>(rows_),
+                                            static_cast<Eigen::Index>(names_.size()));
   for (const Term& t : terms_) {
     A(static_cast<Eigen::Index>(t.row), static_cast<Eigen::Index>(t.coefficient)) +=
         t.factor * t.monomial.at(p_mm);

@@ -15,16 +15,19 @@
 namespace abbe::calib::evemu {
 namespace {
 
-/// Scatter, over the positions, of the distances between balls at reading + L V: 0 for the true places of one
-/// artefact, whatever V has of a rotation.
+/// Scatter, over the positions, of the distances between balls at reading + L V: 0 for the true
+/// places of one artefact, whatever V has of a rotation.
 double shape_scatter_m(const Observations& o, const Matrix3& L) {
   std::map<std::pair<int, int>, std::vector<double>> distances_m;
   for (std::size_t i = 0; i < o.rows.size(); ++i) {
-    for (std::size_t j = i + 1; j < o.rows.size() && o.rows[j].position == o.rows[i].position; ++j) {
-      const Vector3 a = o.rows[i].reading_m + L * o.rows[i].V_m, b = o.rows[j].reading_m + L * o.rows[j].V_m;
+    for (std::size_t j = i + 1; j < o.rows.size() && o.rows[j].position == o.rows[i].position;
+         ++j) {
+      const Vector3 a = o.rows[i].reading_m + L * o.rows[i].V_m,
+                    b = o.rows[j].reading_m + L * o.rows[j].V_m;
       distances_m[{o.rows[i].ball, o.rows[j].ball}].push_back((b - a).norm());
     }
   }
+
   double squares = 0.0, free = 0.0;
   for (const auto& [balls, d] : distances_m) {
     const double mean = std::accumulate(d.begin(), d.end(), 0.0) / static_cast<double>(d.size());
@@ -33,6 +36,7 @@ double shape_scatter_m(const Observations& o, const Matrix3& L) {
     }
     free += static_cast<double>(d.size()) - 1.0;
   }
+
   return free > 0.0 ? std::sqrt(squares / free) : 0.0;
 }
 
@@ -55,19 +59,22 @@ Result<void> check_one_shape(const Observations& o) {
   const double given_m = shape_scatter_m(o, Matrix3::Identity());
   double best_m = std::max(kClearly * given_m, kLeast_m / 10.0);
   std::string text;
+
   for (const AxisMistake& mistake : mistakes_of_errors()) {
     if (const double scatter_m = shape_scatter_m(o, mistake.M); scatter_m < best_m) {
       best_m = scatter_m;
       text = mistake.text;
     }
   }
+
   if (given_m < kLeast_m || text.empty()) {
     return {};
   }
-  return failure(
-      ErrorCode::BadInput,
-      message("errors: distances between the balls differ by ", kUmPerM * given_m,
-              " um rms from position to position; they fit (", kUmPerM * best_m, " um) with ", text));
+
+  return failure(ErrorCode::BadInput,
+                 message("errors: distances between the balls differ by ", kUmPerM * given_m,
+                         " um rms from position to position; they fit (", kUmPerM * best_m,
+                         " um) with ", text));
 }
 
 }  // namespace abbe::calib::evemu

@@ -9,7 +9,8 @@
 namespace abbe::calib::evemu {
 namespace {
 
-/// Ball1's error is zero by definition: among the rows it would pass for an observation without noise.
+/// Ball1's error is zero by definition: among the rows it would pass for an observation without
+/// noise.
 Eigen::MatrixXd without_ball1(const Observations& o, const Eigen::MatrixXd& rows) {
   std::vector<Eigen::Index> kept;
   for (std::size_t i = 0; i < o.rows.size(); ++i) {
@@ -32,22 +33,28 @@ Result<Fit> fit_ols(const FitProblem& problem) {
   const Eigen::Index n = problem.X.cols();
   const Eigen::VectorXd scale = problem.X.colwise().norm().cwiseMax(1e-300).cwiseInverse();
   Eigen::ColPivHouseholderQR<Eigen::MatrixXd> qr(problem.X * scale.asDiagonal());
-  // Columns of unit length: what is determined has pivots above 1e-4 even for a flat array, rounding 1e-15.
+
+  // Columns of unit length: what is determined has pivots above 1e-4 even for a flat array,
+  // rounding 1e-15.
   constexpr double kZero = 1e-10;
   qr.setThreshold(kZero);
   if (qr.rank() < n) {
-    return failure(ErrorCode::RankDeficient, message("least squares: rank ", qr.rank(), " of ", n,
-                                                     " coefficients; the positions do not tell them apart"));
+    return failure(ErrorCode::RankDeficient,
+                   message("least squares: rank ", qr.rank(), " of ", n,
+                           " coefficients; the positions do not tell them apart"));
   }
+
   Fit fit;
   fit.c_m = scale.cwiseProduct(qr.solve(problem.y));
   const Eigen::MatrixXd Q = qr.householderQ() * Eigen::MatrixXd::Identity(problem.X.rows(), n);
+
   // Residuals are (I - Q Q^T) noise; their mean square gives s^2 for noise of the shape C0.
   const Eigen::MatrixXd C0_Q = times_ball_covariance(problem.observations, Q);
   double trace_C0 = 0.0;
   for (const PositionRows& p : position_rows(problem.observations)) {
     trace_C0 += 3.0 * ball_covariance(problem.observations, p).trace();
   }
+
   const Eigen::MatrixXd Qt_C0_Q = Q.transpose() * C0_Q;
   const double left = trace_C0 - Qt_C0_Q.trace();
   if (!(left > kZero * trace_C0)) {
@@ -55,19 +62,24 @@ Result<Fit> fit_ols(const FitProblem& problem) {
                    message("least squares: ", problem.X.rows(), " components for ", n,
                            " coefficients leave nothing to judge the noise by"));
   }
+
   const double s2 = (problem.y - problem.X * fit.c_m).squaredNorm() / left;
   // (X D P) = Q R: c = D P R^-1 Q^T y.
   const Eigen::MatrixXd R = qr.matrixR().topLeftCorner(n, n).triangularView<Eigen::Upper>();
-  const Eigen::MatrixXd R_inv = R.triangularView<Eigen::Upper>().solve(Eigen::MatrixXd::Identity(n, n));
+  const Eigen::MatrixXd R_inv =
+      R.triangularView<Eigen::Upper>().solve(Eigen::MatrixXd::Identity(n, n));
   const Eigen::MatrixXd G = scale.asDiagonal() * (qr.colsPermutation() * R_inv);
   fit.covariance_m2 = s2 * G * Qt_C0_Q * G.transpose();
   fit.covariance_m2 = 0.5 * (fit.covariance_m2 + fit.covariance_m2.transpose()).eval();
+
   if (problem.A.cols() > 0) {
     fit.artefact_m = scale.asDiagonal() * qr.solve(problem.A);
   }
+
   fit.s_m = std::sqrt(s2);
   fit.effective_parameters = static_cast<double>(n);
   fit.iterations = 1;
+
   return fit;
 }
 
@@ -77,29 +89,36 @@ Result<Fit> fit_prior(PriorKind kind, const FitProblem& problem) {
   const auto white = [&](const Eigen::MatrixXd& rows) { return white_rows(o, rows); };
   const LinearGaussian gaussian(white(problem.X), white(pose_rotation_rows(o)), white(problem.y));
   const Result<HyperParameters> hyper = most_likely(kind, problem.design, positions, gaussian);
+
   if (!hyper) {
     return tl::unexpected(hyper.error());
   }
+
   Fit fit;
   fit.hyper = *hyper;
   const HyperParameters& h = *fit.hyper;
   const Eigen::VectorXd prior = prior_variances(kind, problem.design, positions, h);
   const LinearGaussian::Posterior p = gaussian.posterior(prior, h.s_m * h.s_m);
+
   if (!p.mean.allFinite() || !p.covariance.allFinite()) {
     return failure(ErrorCode::NotConverged,
                    message("bayes: no solution at s = ", h.s_m, " m, w = ", h.w_rad, " rad"));
   }
+
   const auto n = static_cast<Eigen::Index>(problem.design.size());
   fit.c_m = p.mean.head(n);
   fit.covariance_m2 = p.covariance.topLeftCorner(n, n);
+
   if (problem.A.cols() > 0) {
     fit.artefact_m = gaussian.response(prior, h.s_m * h.s_m, white(problem.A)).topRows(n);
   }
+
   fit.s_m = h.s_m;
   fit.w_rad = h.w_rad;
   fit.effective_parameters = p.effective_parameters;
   fit.pose_parameters = p.effective_pose_parameters;
   fit.iterations = h.evaluations;
+
   if (kind == PriorKind::BayesPose) {
     Eigen::MatrixXd mean_of = Eigen::MatrixXd::Zero(3, p.mean.size());
     for (std::size_t i = 0; i < positions; ++i) {
@@ -109,15 +128,19 @@ Result<Fit> fit_prior(PriorKind kind, const FitProblem& problem) {
     }
     fit.cov_mean_pose_rotation_rad2 = mean_of * p.covariance * mean_of.transpose();
   }
+
   return fit;
 }
 
-FitProblem problem_of(const Observations& o, const ScaledDesign& design, const SolveOptions& options) {
-  // Without a prior, rows that are blind to a rotation cannot be solved, and the others are those of [Li
-  // OMM].
+FitProblem problem_of(const Observations& o, const ScaledDesign& design,
+                      const SolveOptions& options) {
+  // Without a prior, rows that are blind to a rotation cannot be solved, and the others are those
+  // of [Li OMM].
   if (options.estimator != Estimator::BayesPose && options.estimator != Estimator::Ridge) {
-    return {o, design, design_rows(o, design, RowsFrom::Centres), observed_m(o), false, artefact_rows(o)};
+    return {o,     design,          design_rows(o, design, RowsFrom::Centres), observed_m(o),
+            false, artefact_rows(o)};
   }
+
   const bool from_touches = options.use_touches && !o.seen.empty();
   return {o,
           design,
@@ -140,7 +163,9 @@ Result<Fit> fit_with(const FitProblem& problem, const SolveOptions& options) {
     case Estimator::Scad:
       return fit_sparse(problem, options);
   }
-  return failure(ErrorCode::BadInput, message("estimator ", name(options.estimator), " is not known here"));
+
+  return failure(ErrorCode::BadInput,
+                 message("estimator ", name(options.estimator), " is not known here"));
 }
 
 }  // namespace abbe::calib::evemu

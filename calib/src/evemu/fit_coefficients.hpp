@@ -21,8 +21,9 @@ struct FitProblem {
 struct Fit {
   Eigen::VectorXd c_m;
   Eigen::MatrixXd covariance_m2;
-  /// K A of estimates c = K y: what one standard uncertainty each of the array's errors does to c. Beside
-  /// covariance_m2; no columns where nothing is uncertain, or where it is in covariance_m2 (the bootstrap).
+  /// K A of estimates c = K y: what one standard uncertainty each of the array's errors does to c.
+  /// Beside covariance_m2; no columns where nothing is uncertain, or where it is in covariance_m2
+  /// (the bootstrap).
   Eigen::MatrixXd artefact_m{};
   CovarianceKind kind = CovarianceKind::Analytic;
   std::optional<HyperParameters> hyper;

@@ -11,7 +11,8 @@
 namespace abbe::calib::evemu {
 namespace {
 
-/// The regression of [Li OMM]: plain monomials in mm, because a penalty speaks of the columns it is given.
+/// The regression of [Li OMM]: plain monomials in mm, because a penalty speaks of the columns it is
+/// given.
 struct Regression {
   Eigen::MatrixXd X;
   Eigen::VectorXd y;
@@ -19,7 +20,8 @@ struct Regression {
 
 Regression regression_of(const FitProblem& problem) {
   const Observations& o = problem.observations;
-  Regression r{{problem.y.size(), static_cast<Eigen::Index>(problem.design.size())}, kMmPerM * problem.y};
+  Regression r{{problem.y.size(), static_cast<Eigen::Index>(problem.design.size())},
+               kMmPerM * problem.y};
   for (std::size_t i = 0; i < o.rows.size(); ++i) {
     r.X.middleRows<3>(static_cast<Eigen::Index>(3 * i)) =
         problem.design.equivalent().X(kMmPerM * o.rows[i].reading_m);
@@ -28,8 +30,9 @@ Regression regression_of(const FitProblem& problem) {
 }
 
 sparse::PenaltyKind kind_of(Estimator e) {
-  return e == Estimator::Lasso ? sparse::PenaltyKind::Lasso
-                               : (e == Estimator::Mcp ? sparse::PenaltyKind::Mcp : sparse::PenaltyKind::Scad);
+  return e == Estimator::Lasso
+             ? sparse::PenaltyKind::Lasso
+             : (e == Estimator::Mcp ? sparse::PenaltyKind::Mcp : sparse::PenaltyKind::Scad);
 }
 
 /// 50 gammas as in [Li OMM] (its optima lie on this list); the lasso has none.
@@ -41,7 +44,8 @@ std::vector<double> gammas(const SolveOptions& options) {
     return options.sparse.gamma;
   }
   constexpr double kMost = 100.0, kMcpLeast = 1.001, kScadLeast = 2.001;
-  return sparse::equally_spaced(options.estimator == Estimator::Mcp ? kMcpLeast : kScadLeast, kMost, 50);
+  return sparse::equally_spaced(options.estimator == Estimator::Mcp ? kMcpLeast : kScadLeast, kMost,
+                                50);
 }
 
 Result<sparse::Folds> folds_of(const Observations& o, const SparseOptions& options) {
@@ -65,11 +69,13 @@ sparse::PathOptions path_along(std::vector<double> lambda) {
   return options;
 }
 
-Result<SparseChoice> choose(const Regression& r, const FitProblem& problem, const SolveOptions& options) {
+Result<SparseChoice> choose(const Regression& r, const FitProblem& problem,
+                            const SolveOptions& options) {
   const Result<sparse::Folds> folds = folds_of(problem.observations, options.sparse);
   if (!folds) {
     return tl::unexpected(folds.error());
   }
+
   const auto path = path_along(options.sparse.lambda.empty() ? sparse::log_spaced(1e-1, 1e-10, 100)
                                                              : options.sparse.lambda);
   return sparse::grid_search(r.X, r.y, kind_of(options.estimator), gammas(options), *folds, path)
@@ -84,8 +90,8 @@ Result<SparseChoice> choose(const Regression& r, const FitProblem& problem, cons
       });
 }
 
-/// Named coefficients, intercept first, on the scaled design [m]. The intercept belongs to all three
-/// components.
+/// Named coefficients, intercept first, on the scaled design [m]. The intercept belongs to all
+/// three components.
 Eigen::VectorXd scaled_from_named(const ScaledDesign& design, Eigen::VectorXd with_intercept) {
   Eigen::VectorXd beta = with_intercept.tail(with_intercept.size() - 1);
   for (std::size_t j = 0; j < design.size(); ++j) {
@@ -100,7 +106,8 @@ Eigen::VectorXd scaled_from_named(const ScaledDesign& design, Eigen::VectorXd wi
 }
 
 /// Down to the chosen lambda: the coefficients of a larger one are those of another estimator.
-Result<sparse::Path> path_to(const Regression& r, const SolveOptions& asked, const SparseChoice& choice) {
+Result<sparse::Path> path_to(const Regression& r, const SolveOptions& asked,
+                             const SparseChoice& choice) {
   sparse::PathOptions options = path_along(choice.lambda);
   options.max_sweeps = asked.sparse.max_sweeps;
   return sparse::fit_path(r.X, r.y, {kind_of(asked.estimator), choice.gamma}, options)
@@ -112,8 +119,8 @@ Result<sparse::Path> path_to(const Regression& r, const SolveOptions& asked, con
         return failure(ErrorCode::NotConverged,
                        message("sparse fit (", name(asked.estimator), ", gamma ", choice.gamma,
                                "): max_sweeps = ", options.max_sweeps, " end at lambda ",
-                               path.lambda[std::max<std::size_t>(reached, 1) - 1], ", number ", reached,
-                               " of ", choice.lambda.size(), "; choose a larger lambda"));
+                               path.lambda[std::max<std::size_t>(reached, 1) - 1], ", number ",
+                               reached, " of ", choice.lambda.size(), "; choose a larger lambda"));
       });
 }
 
@@ -133,12 +140,15 @@ Result<Eigen::MatrixXd> bootstrap(const FitProblem& problem, const Regression& r
     }
     return z;
   };
+
   const Observations& o = problem.observations;
   const Eigen::MatrixXd S = pose_rotation_rows(o);
   const auto runs = static_cast<Eigen::Index>(options.sparse.bootstrap_runs);
   Eigen::MatrixXd c(static_cast<Eigen::Index>(problem.design.size()), runs);
+
   for (Eigen::Index run = 0; run < runs; ++run) {
-    const Eigen::VectorXd of_rows = draw(r.y.size()), of_poses = draw(S.cols());  // in this order everywhere
+    const Eigen::VectorXd of_rows = draw(r.y.size()),
+                          of_poses = draw(S.cols());  // in this order everywhere
     Eigen::VectorXd scatter = coloured(o, noise.s_m * of_rows) + S * (noise.w_rad * of_poses);
     if (problem.A.cols() > 0) {
       scatter += problem.A * draw(problem.A.cols());  // one array for all positions of a run
@@ -149,29 +159,37 @@ Result<Eigen::MatrixXd> bootstrap(const FitProblem& problem, const Regression& r
     }
     c.col(run) = scaled_from_named(problem.design, at_end(*refit));
   }
+
   c.colwise() -= Eigen::VectorXd(c.rowwise().mean());
-  return Eigen::MatrixXd(c * c.transpose() / static_cast<double>(std::max<Eigen::Index>(1, runs - 1)));
+  return Eigen::MatrixXd(c * c.transpose() /
+                         static_cast<double>(std::max<Eigen::Index>(1, runs - 1)));
 }
 
-/// Noise and pose rotations are those the Bayesian estimator finds: the residuals of a fit that selects are
-/// too small.
-Result<void> add_covariance(const FitProblem& problem, const Regression& r, const Eigen::VectorXd& beta,
-                            const SolveOptions& options, Fit& fit) {
+/// Noise and pose rotations are those the Bayesian estimator finds: the residuals of a fit that
+/// selects are too small.
+Result<void> add_covariance(const FitProblem& problem, const Regression& r,
+                            const Eigen::VectorXd& beta, const SolveOptions& options, Fit& fit) {
   SolveOptions bayes;
   bayes.use_touches = false;
   const Result<Fit> noise =
       fit_prior(PriorKind::BayesPose, problem_of(problem.observations, problem.design, bayes));
+
   if (!noise) {
     return tl::unexpected(noise.error());
   }
+
   const Eigen::VectorXd fitted_mm = (r.X * beta.tail(beta.size() - 1)).array() + beta(0);
-  Result<Eigen::MatrixXd> covariance = bootstrap(problem, r, fitted_mm, options, *fit.sparse, *noise->hyper);
+  Result<Eigen::MatrixXd> covariance =
+      bootstrap(problem, r, fitted_mm, options, *fit.sparse, *noise->hyper);
+
   if (!covariance) {
     return tl::unexpected(covariance.error());
   }
+
   fit.covariance_m2 = *std::move(covariance);
   fit.s_m = noise->s_m;
   fit.w_rad = noise->w_rad;
+
   return {};
 }
 
@@ -179,19 +197,23 @@ Result<void> add_covariance(const FitProblem& problem, const Regression& r, cons
 
 Result<Fit> fit_sparse(const FitProblem& problem, const SolveOptions& options) {
   const Regression r = regression_of(problem);
-  Result<SparseChoice> choice =
-      options.sparse.chosen ? Result<SparseChoice>(*options.sparse.chosen) : choose(r, problem, options);
+  Result<SparseChoice> choice = options.sparse.chosen ? Result<SparseChoice>(*options.sparse.chosen)
+                                                      : choose(r, problem, options);
+
   if (!choice) {
     return tl::unexpected(choice.error());
   }
+
   const Result<sparse::Path> path = path_to(r, options, *choice);
   if (!path) {
     return tl::unexpected(path.error());
   }
+
   const Result<sparse::Convexity> convexity = sparse::convexity(r.X, *path);
   if (!convexity) {
     return tl::unexpected(convexity.error());
   }
+
   choice->curvature = convexity->smallest_eigenvalue(path->reached() - 1);
   const Eigen::VectorXd beta = at_end(*path);
   const auto n = static_cast<Eigen::Index>(problem.design.size());
@@ -202,11 +224,13 @@ Result<Fit> fit_sparse(const FitProblem& problem, const SolveOptions& options) {
   fit.covariance_m2 = Eigen::MatrixXd::Zero(n, n);
   fit.sparse = *std::move(choice);
   fit.iterations = static_cast<int>(path->reached());
+
   if (options.sparse.bootstrap_runs > 1) {
     if (Result<void> added = add_covariance(problem, r, beta, options, fit); !added) {
       return tl::unexpected(added.error());
     }
   }
+
   return fit;
 }
 

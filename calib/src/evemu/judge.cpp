@@ -24,7 +24,8 @@ namespace {
 Observations part_of(const Observations& o, int position, bool others) {
   Observations part = o;
   std::erase_if(part.rows, [&](const BallError& r) { return (r.position == position) == others; });
-  std::erase_if(part.seen, [&](const SeenArtefact& s) { return (s.position == position) == others; });
+  std::erase_if(part.seen,
+                [&](const SeenArtefact& s) { return (s.position == position) == others; });
   return part;
 }
 
@@ -64,11 +65,16 @@ struct Remainder {
     squares_m2 += (r - S * omega).squaredNorm();
     components += 3 * (position.rows.size() - 1);
   }
-  [[nodiscard]] double rms() const { return std::sqrt(whitened_squares / static_cast<double>(components)); }
-  [[nodiscard]] double rms_m() const { return std::sqrt(squares_m2 / static_cast<double>(components)); }
+  [[nodiscard]] double rms() const {
+    return std::sqrt(whitened_squares / static_cast<double>(components));
+  }
+  [[nodiscard]] double rms_m() const {
+    return std::sqrt(squares_m2 / static_cast<double>(components));
+  }
 };
 
-/// The balls of a position a model speaks of. Without Ball1 inside there are none: V is relative to it.
+/// The balls of a position a model speaks of. Without Ball1 inside there are none: V is relative to
+/// it.
 std::optional<Observations> inside(const Observations& position, const ValidityVolume& volume) {
   if (!volume.contains(position.rows[position_rows(position).front().ball1].reading_m)) {
     return std::nullopt;
@@ -81,7 +87,8 @@ std::optional<Observations> inside(const Observations& position, const ValidityV
 
 void note_artefact(const Observations& o, Verdict& verdict) {
   if (!o.artefact) {
-    verdict.notes.emplace_back("the artefact's own uncertainty and temperature are not in the covariance");
+    verdict.notes.emplace_back(
+        "the artefact's own uncertainty and temperature are not in the covariance");
     return;
   }
   if (o.artefact->none()) {
@@ -92,7 +99,8 @@ void note_artefact(const Observations& o, Verdict& verdict) {
   }
 }
 
-/// A model may be wrong by its stated uncertainty and half of it: beyond, an alternative refuses it.
+/// A model may be wrong by its stated uncertainty and half of it: beyond, an alternative refuses
+/// it.
 constexpr double kCoveredByU = 1.5;
 
 /// Written so that a NaN figure is refused.
@@ -102,7 +110,8 @@ bool is_covered(const Alternative& other, const CorrectionSize& size) {
     return other.bias_m <= kMostUncertainty * size.V_m &&
            (of_a_probe || other.bias_m <= kScatterBesideU * size.u_m);
   }
-  return other.bias_m <= other.u_m && root_sum_of_squares(other.bias_m, other.u_m) <= kCoveredByU * size.u_m;
+  return other.bias_m <= other.u_m &&
+         root_sum_of_squares(other.bias_m, other.u_m) <= kCoveredByU * size.u_m;
 }
 
 /// What any of the other causes does to the touches and to the uncertainty.
@@ -138,27 +147,32 @@ RefusedFor refused_for(const Verdict& verdict, const std::vector<Alternative>& o
   return refused;
 }
 
-/// Whether a cause that the uncertainty covers may be behind what refuses: it made that uncertainty, or the
-/// scatter, large. The form of a ball follows from what happens while it is touched.
+/// Whether a cause that the uncertainty covers may be behind what refuses: it made that
+/// uncertainty, or the scatter, large. The form of a ball follows from what happens while it is
+/// touched.
 bool may_be_behind(const RefusedFor& refused, const Alternative& a, const CorrectionSize& size) {
   if (refused.cause || !is_cause(a)) {
     return false;
   }
   constexpr double kMuchSurer = 0.7;  // with the cause half of the variance is gone
   const bool matters = a.bias_m > kMatters * size.u_m || a.u_m < kMuchSurer * size.u_m;
-  const bool in_time = a.cause == Cause::Touch || a.cause == Cause::Moved || a.cause == Cause::Creep ||
-                       a.cause == Cause::Drift || a.cause == Cause::SlowNoise;
+  const bool in_time = a.cause == Cause::Touch || a.cause == Cause::Moved ||
+                       a.cause == Cause::Creep || a.cause == Cause::Drift ||
+                       a.cause == Cause::SlowNoise;
   return matters && (refused.scatter_or_uncertainty || (refused.form && in_time));
 }
 
 /// Reasons before those that only follow from them.
-void add_alternatives(Verdict& verdict, std::vector<Alternative> others, const CorrectionSize& size) {
+void add_alternatives(Verdict& verdict, std::vector<Alternative> others,
+                      const CorrectionSize& size) {
   const RefusedFor refused = refused_for(verdict, others, size);
   std::stable_partition(others.begin(), others.end(), is_cause);
   std::size_t reasons = 0;
+
   for (const Alternative& other : others) {
-    const std::string text =
-        other.cause == Cause::Scatter ? other.text : with_effect(other.text, other.bias_m, size.u_m);
+    const std::string text = other.cause == Cause::Scatter
+                                 ? other.text
+                                 : with_effect(other.text, other.bias_m, size.u_m);
     if (refuses(other, size) || may_be_behind(refused, other, size)) {
       verdict.refuse(name(other.cause), text, reasons++);
     } else {
@@ -167,17 +181,20 @@ void add_alternatives(Verdict& verdict, std::vector<Alternative> others, const C
   }
 }
 
-/// Slow noise that the estimate has in its covariance comes before the first reason that only follows.
+/// Slow noise that the estimate has in its covariance comes before the first reason that only
+/// follows.
 void add_slow_noise(Verdict& verdict, const Solution& solution) {
   if (!(solution.slow_noise > 0.0)) {
     return;
   }
-  const std::string text = slow_noise_text(solution.statistics.slow_noise_m) + "; it is in the uncertainty";
+  const std::string text =
+      slow_noise_text(solution.statistics.slow_noise_m) + "; it is in the uncertainty";
   const auto first = std::find_if(verdict.causes.begin(), verdict.causes.end(), only_follows);
   if (first == verdict.causes.end()) {
     verdict.notes.push_back(text);
   } else {
-    verdict.refuse(name(Cause::SlowNoise), text, static_cast<std::size_t>(first - verdict.causes.begin()));
+    verdict.refuse(name(Cause::SlowNoise), text,
+                   static_cast<std::size_t>(first - verdict.causes.begin()));
   }
 }
 
@@ -193,10 +210,11 @@ double extent_m(const Observations& o) {
 /// What no touch shows.
 void note_what_touches_do_not_show(Verdict& verdict, const Observations& o, double extent_m) {
   constexpr double kSteel_per_K = 11.5e-6;
-  verdict.notes.push_back(
-      message("all lengths come from the array: 1 K of wrong temperature of a steel array would be ",
-              1e6 * kSteel_per_K * extent_m, " um over ", extent_m, " m; no touch shows it"));
-  verdict.notes.push_back(message("holds for the tool offset (", o.machine.tool_offset_m.transpose(),
+  verdict.notes.push_back(message(
+      "all lengths come from the array: 1 K of wrong temperature of a steel array would be ",
+      1e6 * kSteel_per_K * extent_m, " um over ", extent_m, " m; no touch shows it"));
+  verdict.notes.push_back(message("holds for the tool offset (",
+                                  o.machine.tool_offset_m.transpose(),
                                   ") m as configured; no touch shows it"));
 }
 
@@ -207,31 +225,35 @@ Result<HeldOutFigures> held_out(const Observations& o, double s_m, const Volumet
   const std::vector<PositionRows> positions = position_rows(o);
   constexpr std::size_t kLeastPositions = 3;
   if (positions.size() < kLeastPositions) {
-    return failure(ErrorCode::TooFewObservations,
-                   message("held-out test: ", positions.size(), " positions, needs ", kLeastPositions));
+    return failure(ErrorCode::TooFewObservations, message("held-out test: ", positions.size(),
+                                                          " positions, needs ", kLeastPositions));
   }
+
   const Result<ScaledDesign> design = design_of(o);
   if (!design) {
     return tl::unexpected(design.error());
   }
+
   const bool with_active = active != nullptr && active->holds_for_tool(o.machine.tool_offset_m);
   Remainder none, candidate, other, candidate_beside;
   for (const PositionRows& p : positions) {
     if (Result<void> goes_on = check_stopped(watch.stopped); !goes_on) {
       return tl::unexpected(goes_on.error());
     }
-    const Observations rest = part_of(o, p.position, true), left_out = part_of(o, p.position, false);
+    const Observations rest = part_of(o, p.position, true),
+                       left_out = part_of(o, p.position, false);
     const Result<Fit> fit = fit_with(problem_of(rest, *design, options), options);
     if (!fit) {
-      return failure(fit.error().code,
-                     message("held-out test without position ", p.position, ": ", fit.error().text));
+      return failure(fit.error().code, message("held-out test without position ", p.position, ": ",
+                                               fit.error().text));
     }
     const Eigen::VectorXd y = observed_m(left_out);
     none.add(left_out, y);
     const auto by_fit = [&](const Vector3& q) -> Vector3 { return design->B(q) * fit->c_m; };
     candidate.add(left_out, y - relative_to_ball1(left_out, by_fit));
     if (watch.progress) {
-      watch.progress(static_cast<double>(&p - positions.data() + 1) / static_cast<double>(positions.size()));
+      watch.progress(static_cast<double>(&p - positions.data() + 1) /
+                     static_cast<double>(positions.size()));
     }
     if (!with_active) {
       continue;
@@ -244,17 +266,20 @@ Result<HeldOutFigures> held_out(const Observations& o, double s_m, const Volumet
                        }));
     }
   }
+
   HeldOutFigures figures{.no_compensation = none.rms() / s_m,
                          .candidate = candidate.rms() / s_m,
                          .observations = none.components,
                          .no_compensation_rms_m = none.rms_m(),
                          .candidate_rms_m = candidate.rms_m()};
+
   if (other.components > 0) {
     figures.active = other.rms() / s_m;
     figures.active_rms_m = other.rms_m();
     figures.candidate_beside_active = candidate_beside.rms() / s_m;
     figures.observations_beside_active = other.components;
   }
+
   return figures;
 }
 
@@ -265,10 +290,13 @@ Result<Verdict> judge(const Observations& observations, const Solution& solution
   solve.estimator = solution.estimator;
   solve.sparse.chosen = solution.sparse;
   solve.sparse.bootstrap_runs = 0;
-  const Result<std::vector<Alternative>> others = alternatives(o, solution, part_of(options.watch, 0.0, 0.5));
+  const Result<std::vector<Alternative>> others =
+      alternatives(o, solution, part_of(options.watch, 0.0, 0.5));
+
   if (!others) {
     return tl::unexpected(others.error());
   }
+
   const Watch second_half = part_of(options.watch, 0.5, 1.0);
   return held_out(o, solution.statistics.s_m, active, solve, second_half)
       .map([&](const HeldOutFigures& figures) {
@@ -278,7 +306,8 @@ Result<Verdict> judge(const Observations& observations, const Solution& solution
           verdict.refuse(
               kShapeOnly,
               message("shape only: the machine measured the blocks itself, so a rotation of about ",
-                      1e6 * u_rad, " urad about Ball1 is unknown; give a rotation reference or accept ",
+                      1e6 * u_rad,
+                      " urad about Ball1 is unknown; give a rotation reference or accept ",
                       kShapeOnly));
         }
         const CorrectionSize size = correction_size(o, solution);
@@ -288,9 +317,10 @@ Result<Verdict> judge(const Observations& observations, const Solution& solution
         note_artefact(o, verdict);
         note_what_touches_do_not_show(verdict, o, extent_m(o));
         if (const auto& fit = solution.rotation.reference; fit && !fit->outside.empty()) {
-          verdict.notes.push_back(message("rotation reference: ", fit->outside.size(), " of ",
-                                          fit->outside.size() + fit->points,
-                                          " points lie outside the volume the balls span and were not used"));
+          verdict.notes.push_back(
+              message("rotation reference: ", fit->outside.size(), " of ",
+                      fit->outside.size() + fit->points,
+                      " points lie outside the volume the balls span and were not used"));
         }
         if (const auto& fit = solution.rotation.reference; fit && fit->widened > 1.0) {
           verdict.notes.push_back(message("rotation reference: chi-square ", fit->widened,

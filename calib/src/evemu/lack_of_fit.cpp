@@ -33,7 +33,8 @@ constexpr double kFalseAlarm = 1e-4;
 constexpr double kCauses = 13.0;
 
 RigidFreeNorm norm_over_balls(const Observations& o, const ScaledDesign& design) {
-  Eigen::MatrixXd B(static_cast<Eigen::Index>(3 * o.rows.size()), static_cast<Eigen::Index>(design.size()));
+  Eigen::MatrixXd B(static_cast<Eigen::Index>(3 * o.rows.size()),
+                    static_cast<Eigen::Index>(design.size()));
   std::vector<Vector3> points;
   for (Eigen::Index i = 0; i < std::ssize(o.rows); ++i) {
     points.push_back(o.rows[static_cast<std::size_t>(i)].reading_m);
@@ -64,15 +65,18 @@ Result<Rows> rows_of(const Observations& o, const ScaledDesign& design, const So
             .y = white_rows(o, problem.y),
             .hyper = {},
             .norm = norm_over_balls(o, design)};
+
   if (solution.estimator == Estimator::BayesPose && solution.hyper && solution.slow_noise == 0.0) {
     rows.hyper = *solution.hyper;
     return rows;
   }
-  const auto hyper =
-      most_likely(PriorKind::BayesPose, design, rows.positions, LinearGaussian(rows.X, rows.S, rows.y));
+
+  const auto hyper = most_likely(PriorKind::BayesPose, design, rows.positions,
+                                 LinearGaussian(rows.X, rows.S, rows.y));
   if (!hyper) {
     return tl::unexpected(hyper.error());
   }
+
   rows.hyper = *hyper;
   return rows;
 }
@@ -92,16 +96,20 @@ Result<Refit> refit_to(const Eigen::VectorXd& y, const Rows& rows, const ScaledD
   added.resize(added.size() + static_cast<std::size_t>(C.cols()), size_m * size_m);
   const LinearGaussian gaussian(all, rows.S, y);
   const auto hyper = most_likely_near(rows.hyper, design, rows.positions, gaussian, added);
+
   if (!hyper) {
     return tl::unexpected(hyper.error());
   }
-  const Eigen::VectorXd prior =
-      with_added(prior_variances(PriorKind::BayesPose, design, rows.positions, *hyper), design.size(), added);
+
+  const Eigen::VectorXd prior = with_added(
+      prior_variances(PriorKind::BayesPose, design, rows.positions, *hyper), design.size(), added);
   const auto p = gaussian.posterior(prior, hyper->s_m * hyper->s_m);
+
   if (!p.mean.allFinite() || !p.covariance.allFinite()) {
-    return failure(ErrorCode::NotConverged,
-                   message("bayes: no solution at s = ", hyper->s_m, " m, w = ", hyper->w_rad, " rad"));
+    return failure(ErrorCode::NotConverged, message("bayes: no solution at s = ", hyper->s_m,
+                                                    " m, w = ", hyper->w_rad, " rad"));
   }
+
   const Eigen::Index n = X.cols();
   return Refit{*hyper, p.mean.head(n), p.mean.segment(n + rows.A.cols(), C.cols()),
                p.covariance.topLeftCorner(n, n)};
@@ -112,7 +120,8 @@ Result<Refit> refit(const Rows& rows, const ScaledDesign& design, const Eigen::M
   return refit_to(rows.y, rows, design, X, C, size_m);
 }
 
-/// The estimate itself, with the array's uncertainty among the columns: what alternatives are compared with.
+/// The estimate itself, with the array's uncertainty among the columns: what alternatives are
+/// compared with.
 Result<Refit> base_of(const Rows& rows) {
   return refit(rows, rows.design, rows.X, Eigen::MatrixXd(rows.X.rows(), 0), 1.0);
 }
@@ -125,8 +134,8 @@ double threshold(double family) {
 Alternative not_compared(Cause cause, const std::string& place, const std::string& why) {
   constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
   return {.cause = cause,
-          .text = message("the comparison with cause \"", name(cause), "\"", place, " failed: ", why,
-                          "; look at the touches there and calibrate again"),
+          .text = message("the comparison with cause \"", name(cause), "\"", place,
+                          " failed: ", why, "; look at the touches there and calibrate again"),
           .bias_m = kNaN,
           .u_m = kNaN,
           .comparison = Comparison::Failed};
@@ -149,7 +158,8 @@ struct Comparisons {
   std::vector<Alternative> found{}, not_made{};
 
   void add(Alternative alternative) {
-    (alternative.comparison == Comparison::Made ? found : not_made).push_back(std::move(alternative));
+    (alternative.comparison == Comparison::Made ? found : not_made)
+        .push_back(std::move(alternative));
   }
 };
 
@@ -168,13 +178,15 @@ Result<Screened> screened(Comparisons& all, const AlternativeColumns& columns, c
     }
     const Screen::Gain gain = screen.gain(white_rows(all.rows.o, columns.of(added)));
     if (!std::isfinite(gain.log_likelihood)) {
-      all.add(not_compared(added.cause, where(added, all.rows.o), "the data have no likelihood with it"));
+      all.add(not_compared(added.cause, where(added, all.rows.o),
+                           "the data have no likelihood with it"));
       return Screened{};
     }
     if (gain.log_likelihood > most.gain.log_likelihood) {
       most = {&added, gain};
     }
   }
+
   return most;
 }
 
@@ -185,17 +197,21 @@ Result<void> compare_with(Comparisons& all, const AlternativeColumns& columns, c
   if (!best) {
     return tl::unexpected(best.error());
   }
+
   if (best->best == nullptr) {
     return {};
   }
+
   const Rows& rows = all.rows;
   const Added& added = *best->best;
   const auto with =
       refit(rows, rows.design, rows.X, white_rows(rows.o, columns.of(added)), best->gain.size_m);
+
   if (!with) {
     all.add(not_compared(added.cause, where(added, rows.o), with.error().text));
     return {};
   }
+
   const double gain = with->hyper.log_likelihood - all.base.hyper.log_likelihood;
   if (gain > threshold(static_cast<double>(family.size() * Screen::kSizes_m.size()))) {
     all.add({.cause = added.cause,
@@ -204,6 +220,7 @@ Result<void> compare_with(Comparisons& all, const AlternativeColumns& columns, c
              .bias_m = rows.norm.rms_m(with->c_m - all.base.c_m),
              .u_m = rows.norm.rms_u_m(with->covariance_m2)});
   }
+
   return {};
 }
 
@@ -214,19 +231,23 @@ void compare_with_design(Comparisons& all, const Result<ScaledDesign>& design, C
     all.add(impossible(cause, message("not compared with ", what, ": ", design.error().text)));
     return;
   }
+
   const Rows& rows = all.rows;
   const FitProblem problem = problem_of(rows.o, *design, {});
   const auto with =
       refit(rows, *design, white_rows(rows.o, problem.X), Eigen::MatrixXd(rows.X.rows(), 0), 1.0);
+
   if (!with) {
     all.add(not_compared(cause, ", " + what + ",", with.error().text));
     return;
   }
+
   const double gain = with->hyper.log_likelihood - all.base.hyper.log_likelihood;
   constexpr double kDesigns = 6.0;
   if (!(gain > threshold(kDesigns))) {
     return;
   }
+
   std::vector<Vector3> points;
   Eigen::MatrixXd difference(static_cast<Eigen::Index>(3 * rows.o.rows.size()), 1);
   for (Eigen::Index i = 0; i < std::ssize(rows.o.rows); ++i) {
@@ -234,6 +255,7 @@ void compare_with_design(Comparisons& all, const Result<ScaledDesign>& design, C
     points.push_back(q);
     difference.middleRows<3>(3 * i) = design->B(q) * with->c_m - rows.design.B(q) * all.base.c_m;
   }
+
   all.add({.cause = cause,
            .text = std::move(text),
            .log_likelihood = gain,
@@ -273,15 +295,18 @@ Result<void> compare_orders_of_axes(Comparisons& all) {
     if (Result<void> goes_on = check_stopped(all.watch.stopped); !goes_on) {
       return goes_on;
     }
-    const auto design = KinematicChain::parse(message("[w b ", order[0], " ", order[1], " ", order[2], " t]"))
-                            .and_then([&](const KinematicChain& chain) {
-                              return ScaledDesign::of(chain, rows.o.order, rows.design.box());
-                            });
-    compare_with_design(all, design, Cause::ChainOrder, message("the order of axes ", order),
-                        message("the axes carry each other in the order ", order,
-                                " from workpiece to tool, not ", used, " as the machine's chain says"));
+    const auto design =
+        KinematicChain::parse(message("[w b ", order[0], " ", order[1], " ", order[2], " t]"))
+            .and_then([&](const KinematicChain& chain) {
+              return ScaledDesign::of(chain, rows.o.order, rows.design.box());
+            });
+    compare_with_design(
+        all, design, Cause::ChainOrder, message("the order of axes ", order),
+        message("the axes carry each other in the order ", order, " from workpiece to tool, not ",
+                used, " as the machine's chain says"));
   } while (std::next_permutation(order.begin(), order.end()));
   keep_the_most_likely(all.found, before);
+
   return {};
 }
 
@@ -290,10 +315,11 @@ Result<void> compare_higher_order(Comparisons& all) {
   if (Result<void> goes_on = check_stopped(all.watch.stopped); !goes_on) {
     return goes_on;
   }
-  compare_with_design(all, ScaledDesign::of(rows.o.machine.chain, rows.o.order + 1, rows.design.box()),
-                      Cause::Order, message("polynomials of order ", rows.o.order + 1),
-                      message("the errors of this machine are no polynomials of order ", rows.o.order,
-                              ": order ", rows.o.order + 1, " fits better; set it as order"));
+  compare_with_design(
+      all, ScaledDesign::of(rows.o.machine.chain, rows.o.order + 1, rows.design.box()),
+      Cause::Order, message("polynomials of order ", rows.o.order + 1),
+      message("the errors of this machine are no polynomials of order ", rows.o.order, ": order ",
+              rows.o.order + 1, " fits better; set it as order"));
   return {};
 }
 
@@ -303,46 +329,56 @@ Result<void> compare_slow_noise(Comparisons& all, const Solution& solution) {
   if (solution.estimator == Estimator::BayesPose || rows.o.seen.empty()) {
     return {};
   }
+
   const auto slow = likely_slow_noise(rows.o, rows.design, rows.hyper);
   if (!slow) {
     all.add(not_compared(Cause::SlowNoise, "", slow.error().text));
     return {};
   }
+
   constexpr double kSizes = 7.0;
   if (!(slow->log_likelihood > threshold(kSizes))) {
     return {};
   }
+
   const Observations o = with_slow_noise(rows.o, slow->per_s);
   const auto with = rows_of(o, rows.design, solution);
   const auto fit = with.and_then([](const Rows& r) { return base_of(r); });
+
   if (!fit) {
     all.add(not_compared(Cause::SlowNoise, "", fit.error().text));
     return {};
   }
+
   all.add({.cause = Cause::SlowNoise,
            .text = slow_noise_text(slow->per_s * fit->hyper.s_m),
            .log_likelihood = slow->log_likelihood,
            .bias_m = rows.norm.rms_m(fit->c_m - all.base.c_m),
            .u_m = rows.norm.rms_u_m(fit->covariance_m2)});
+
   return {};
 }
 
-/// Without what the finding does to the errors seen, whose size the touches know: the more, the more likely
-/// it is. What only scatters has no known effect: NaN, and refuses.
+/// Without what the finding does to the errors seen, whose size the touches know: the more, the
+/// more likely it is. What only scatters has no known effect: NaN, and refuses.
 Alternative compared_touch(const Rows& rows, const Refit& base, const TouchFinding& f) {
   constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
   constexpr double kKnownTo = 0.3;  // at best: the surface under a touch is not the fitted one
   Alternative found{f.cause, f.text, f.log_likelihood, kNaN, rows.norm.rms_u_m(base.covariance_m2)};
+
   if (f.rows_m.size() == 0) {
     return found;
   }
+
   const Eigen::VectorXd effect = white_rows(rows.o, f.rows_m);
   const double known_to = std::max(kKnownTo, 1.0 / std::sqrt(2.0 * f.log_likelihood));
   const auto with = refit_to(rows.y - effect, rows, rows.design, rows.X, effect, known_to);
+
   if (!with) {
     found.text += message("; its effect could not be computed: ", with.error().text);
     return found;
   }
+
   found.bias_m = rows.norm.rms_m(with->c_m - base.c_m);
   found.u_m = rows.norm.rms_u_m(with->covariance_m2);
   return found;
@@ -355,42 +391,51 @@ Result<void> compare_touches(Comparisons& all, const TouchResiduals& touches) {
     }
     all.add(compared_touch(all.rows, all.base, f));
   }
+
   for (const std::string& place : touches.failed) {
-    all.add(not_compared(Cause::Touch, ", " + place,
-                         "no sphere or plane fits its touches once the model's V is taken out of them"));
+    all.add(not_compared(
+        Cause::Touch, ", " + place,
+        "no sphere or plane fits its touches once the model's V is taken out of them"));
   }
+
   if (!touches.not_compared.empty()) {
     all.add(impossible(Cause::Touch, touches.not_compared));
   }
+
   return {};
 }
 
 Result<void> compare_all(Comparisons& all, const Solution& solution) {
   const AlternativeColumns columns(all.rows.o);
   const Rows& rows = all.rows;
-  const Screen screen(rows.X, rows.S, rows.A, rows.y,
-                      prior_variances(PriorKind::BayesPose, rows.design, rows.positions, rows.hyper),
-                      rows.hyper.s_m);
+  const Screen screen(
+      rows.X, rows.S, rows.A, rows.y,
+      prior_variances(PriorKind::BayesPose, rows.design, rows.positions, rows.hyper),
+      rows.hyper.s_m);
   const std::vector<std::vector<Added>> families = columns.families();
   const double steps = static_cast<double>(families.size()) + 3.0;
   double done = 0.0;
+
   const auto report = [&] {
     if (all.watch.progress) {
       all.watch.progress(++done / steps);
     }
   };
+
   for (const std::vector<Added>& family : families) {
     if (Result<void> compared = compare_with(all, columns, screen, family); !compared) {
       return compared;
     }
     report();
   }
+
   for (const auto& compare : {compare_orders_of_axes, compare_higher_order}) {
     if (Result<void> compared = compare(all); !compared) {
       return compared;
     }
     report();
   }
+
   Result<void> compared = compare_slow_noise(all, solution);
   report();
   return compared;
@@ -404,40 +449,45 @@ std::optional<Alternative> unexplained_scatter(const Rows& rows, const Refit& ba
   if (!(touches.sigma_m > 0.0) || !(s_m > kSuspicious * touches.s_centre_m)) {
     return std::nullopt;
   }
+
   const double excess_m = std::sqrt(3.0 * (s_m * s_m - touches.s_centre_m * touches.s_centre_m));
   return Alternative{
       .cause = Cause::Scatter,
-      .text = message("ball centres scatter by ", s_m * kUmPerM,
-                      " um about the model, their touches let them scatter by ", touches.s_centre_m * kUmPerM,
-                      " um: the errors of this machine are no polynomials of order ", rows.o.order,
-                      " (pitch of a screw, a travelling weight), or the array is not rigid, or slow noise"),
+      .text = message(
+          "ball centres scatter by ", s_m * kUmPerM,
+          " um about the model, their touches let them scatter by ", touches.s_centre_m * kUmPerM,
+          " um: the errors of this machine are no polynomials of order ", rows.o.order,
+          " (pitch of a screw, a travelling weight), or the array is not rigid, or slow noise"),
       .log_likelihood = 0.0,
       .bias_m = excess_m,
       .u_m = rows.norm.rms_u_m(base.covariance_m2)};
 }
 
-/// A noise of the probe averages out in the model, what the machine has within a ball does not: no touch
-/// tells them apart. Backlash that was found is not in it: the model is the mean of both sides.
-std::optional<Alternative> scatter_of_touches(const CorrectionSize& size, const TouchResiduals& touches) {
+/// A noise of the probe averages out in the model, what the machine has within a ball does not: no
+/// touch tells them apart. Backlash that was found is not in it: the model is the mean of both
+/// sides.
+std::optional<Alternative> scatter_of_touches(const CorrectionSize& size,
+                                              const TouchResiduals& touches) {
   const double within_m = std::sqrt(3.0) * touches.sigma_of_no_cause_m;
   if (!(within_m > kScatterBesideU * size.u_m)) {
     return std::nullopt;
   }
-  return Alternative{.cause = Cause::Scatter,
-                     .text = message("touches scatter by ", touches.sigma_of_no_cause_m * kUmPerM,
-                                     " um about their balls and blocks: backlash or the pitch of a screw, "
-                                     "which the model does not follow, or a probe that does not repeat"),
-                     .log_likelihood = 0.0,
-                     .bias_m = within_m,
-                     .u_m = size.u_m};
+  return Alternative{
+      .cause = Cause::Scatter,
+      .text = message("touches scatter by ", touches.sigma_of_no_cause_m * kUmPerM,
+                      " um about their balls and blocks: backlash or the pitch of a screw, "
+                      "which the model does not follow, or a probe that does not repeat"),
+      .log_likelihood = 0.0,
+      .bias_m = within_m,
+      .u_m = size.u_m};
 }
 
 }  // namespace
 
 std::string_view name(Cause cause) {
-  constexpr std::array<std::string_view, 13> kNames{"touch", "form",       "backlash", "ball",  "array-file",
-                                                    "moved", "creep",      "bent",     "drift", "chain-order",
-                                                    "order", "slow-noise", "scatter"};
+  constexpr std::array<std::string_view, 13> kNames{
+      "touch", "form",  "backlash",    "ball",  "array-file", "moved",  "creep",
+      "bent",  "drift", "chain-order", "order", "slow-noise", "scatter"};
   return kNames[static_cast<std::size_t>(cause)];
 }
 
@@ -447,41 +497,49 @@ CorrectionSize correction_size(const Observations& o, const Solution& solution) 
   return {norm.rms_m(model.c_m()), norm.rms_u_m(model.covariance_m2())};
 }
 
-Result<std::vector<Alternative>> alternatives(const Observations& observations, const Solution& solution,
-                                              const Watch& watch) {
+Result<std::vector<Alternative>> alternatives(const Observations& observations,
+                                              const Solution& solution, const Watch& watch) {
   // Slow noise of any size would follow an array that moved once, too.
   const Observations o = with_slow_noise(observations, 0.0);
   const Result<ScaledDesign> design = design_of(o);
   if (!design) {
     return tl::unexpected(design.error());
   }
+
   const auto rows = rows_of(o, *design, solution);
   const auto base = rows.and_then([](const Rows& r) { return base_of(r); });
   if (!base) {
-    return failure(base.error().code, message("lack of fit, the estimate itself: ", base.error().text));
+    return failure(base.error().code,
+                   message("lack of fit, the estimate itself: ", base.error().text));
   }
+
   Comparisons all{*rows, *base, watch};
   const TouchResiduals touches = touch_residuals(o, solution.model, kFalseAlarm / kCauses);
   const Result<void> compared =
       compare_touches(all, touches).and_then([&] { return compare_all(all, solution); });
+
   if (!compared) {
     return tl::unexpected(compared.error());
   }
+
   if (auto scatter = scatter_of_touches(correction_size(observations, solution), touches)) {
     all.add(*std::move(scatter));
   }
-  // Touches that scatter everywhere come before the features that scatter most.
-  // First what moves the model: backlash is highly significant and leaves the centres where they are. Of that
-  // one touch off its surface first: its ball is off its place, or the array seems to have moved, because of
-  // it.
+
+  // Touches that scatter everywhere come before the features that scatter most. First what moves
+  // the model: backlash is highly significant and leaves the centres where they are. Of that one
+  // touch off its surface first: its ball is off its place, or the array seems to have moved,
+  // because of it.
   const auto key = [](const Alternative& a) {
     return std::tuple(!(a.bias_m > kMatters * a.u_m), a.cause != Cause::Touch, -a.log_likelihood);
   };
+
   std::stable_sort(all.found.begin(), all.found.end(),
                    [&](const Alternative& a, const Alternative& b) { return key(a) < key(b); });
   if (auto scatter = unexplained_scatter(*rows, *base, touches)) {
     all.add(*std::move(scatter));
   }
+
   std::move(all.not_made.begin(), all.not_made.end(), std::back_inserter(all.found));
   return std::move(all.found);
 }

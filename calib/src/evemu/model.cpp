@@ -24,16 +24,21 @@ Result<EvemuModel> EvemuModel::of(ScaledDesign design, const Vector3& ball1_m, E
                                   const Eigen::MatrixXd& covariance_m2) {
   const auto n = static_cast<Eigen::Index>(design.size());
   if (c_m.size() != n || covariance_m2.rows() != n || covariance_m2.cols() != n) {
-    return failure(ErrorCode::BadInput,
-                   message("evemu model: ", c_m.size(), " coefficients and a covariance of ",
-                           covariance_m2.rows(), " x ", covariance_m2.cols(), " for ", n, " functions"));
+    return failure(
+        ErrorCode::BadInput,
+        message("evemu model: ", c_m.size(), " coefficients and a covariance of ",
+                covariance_m2.rows(), " x ", covariance_m2.cols(), " for ", n, " functions"));
   }
+
   if (!c_m.allFinite() || !covariance_m2.allFinite() || !ball1_m.allFinite()) {
     return failure(ErrorCode::NotFinite, "evemu model: a coefficient is not a number");
   }
-  if (!covariance_m2.isApprox(covariance_m2.transpose(), 1e-12) || covariance_m2.diagonal().minCoeff() < 0) {
+
+  if (!covariance_m2.isApprox(covariance_m2.transpose(), 1e-12) ||
+      covariance_m2.diagonal().minCoeff() < 0) {
     return failure(ErrorCode::BadInput, "evemu model: the covariance is not one");
   }
+
   EvemuModel model(std::move(design));
   std::vector<Eigen::Index> column;
   for (std::size_t component = 0; component < 3; ++component) {
@@ -49,14 +54,17 @@ Result<EvemuModel> EvemuModel::of(ScaledDesign design, const Vector3& ball1_m, E
       }
     }
   }
+
   model.first_[3] = model.entries_.size();
   if (model.entries_.size() > kMostEntries) {
     return failure(ErrorCode::BadInput, "evemu model: more functions than any order has");
   }
+
   model.entry_covariance_ = covariance_m2(column, column);
   model.ball1_m_ = ball1_m;
   model.c_m_ = std::move(c_m);
   model.covariance_m2_ = covariance_m2;
+
   return model;
 }
 
@@ -74,15 +82,18 @@ void EvemuModel::V_and_cov_at(const Vector3& reading_m, Vector3& V_m, Matrix3& c
   const ScaledDesign::Factors at = design_.factors(reading_m);
   alignas(32) std::array<double, kMostEntries> b;
   V_m.setZero();
+
   for (std::size_t i = 0; i < entries_.size(); ++i) {
     const Entry& e = entries_[i];
     b[i] = e.part.sign * at.P[e.axis][e.order] * at.arm[e.part.arm];
     V_m(static_cast<Eigen::Index>(e.part.component)) += b[i] * e.c_m;
   }
+
   // cov_cd = b_c^T C_cd b_d: for every column of C once, from its component downwards.
   using Column = Eigen::Map<Eigen::VectorXd>;
   alignas(32) std::array<double, kMostEntries> sum;
   const std::size_t total = entries_.size();
+
   for (std::size_t d = 0; d < 3; ++d) {
     const std::size_t from = first_[d];
     const auto length = static_cast<Eigen::Index>(total - from);
@@ -90,13 +101,16 @@ void EvemuModel::V_and_cov_at(const Vector3& reading_m, Vector3& V_m, Matrix3& c
     sums.setZero();
     const double* column = entry_covariance_.data() + from * total + from;
     std::size_t j = from;
+
     for (; j + 1 < first_[d + 1]; j += 2, column += 2 * total) {
       sums += b[j] * Eigen::Map<const Eigen::VectorXd>(column, length) +
               b[j + 1] * Eigen::Map<const Eigen::VectorXd>(column + total, length);
     }
+
     if (j < first_[d + 1]) {
       sums += b[j] * Eigen::Map<const Eigen::VectorXd>(column, length);
     }
+
     for (std::size_t c = d; c < 3; ++c) {
       const auto count = static_cast<Eigen::Index>(first_[c + 1] - first_[c]);
       const double value = Eigen::Map<const Eigen::VectorXd>(sum.data() + (first_[c] - from), count)

@@ -34,12 +34,14 @@ Eigen::MatrixXd slow_covariance(const SeenArtefact& seen) {
     return exponential(-kPerPosition *
                        std::abs(t[static_cast<std::size_t>(i)] - t[static_cast<std::size_t>(j)]));
   };
+
   Eigen::MatrixXd C(std::ssize(t), std::ssize(t));
   for (Eigen::Index i = 0; i < C.rows(); ++i) {
     for (Eigen::Index j = 0; j < C.cols(); ++j) {
       C(i, j) = k(i, j) - k(i, 0) - k(0, j) + 1.0;
     }
   }
+
   return C;
 }
 
@@ -63,7 +65,8 @@ double log_det_of_noise(const Observations& o) {
   for (const PositionRows& p : position_rows(o)) {
     const Eigen::MatrixXd L = ball_covariance(o, p).llt().matrixL();
     const auto ball1 = static_cast<Eigen::Index>(p.ball1 - p.first);
-    sum += 3.0 * (L.diagonal().unaryExpr(&natural_logarithm).sum() - natural_logarithm(L(ball1, ball1)));
+    sum += 3.0 *
+           (L.diagonal().unaryExpr(&natural_logarithm).sum() - natural_logarithm(L(ball1, ball1)));
   }
   return sum;
 }
@@ -83,7 +86,8 @@ std::vector<PositionRows> position_rows(const Observations& o) {
 }
 
 Eigen::MatrixXd ball_covariance(const Observations& o, const PositionRows& p) {
-  const auto n = static_cast<Eigen::Index>(p.count), first = static_cast<Eigen::Index>(p.ball1 - p.first);
+  const auto n = static_cast<Eigen::Index>(p.count),
+             first = static_cast<Eigen::Index>(p.ball1 - p.first);
   Eigen::MatrixXd C = Eigen::MatrixXd::Ones(n, n) + Eigen::MatrixXd::Identity(n, n);
   const auto seen = std::find_if(o.seen.begin(), o.seen.end(),
                                  [&](const SeenArtefact& s) { return s.position == p.position; });

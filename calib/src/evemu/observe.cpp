@@ -34,20 +34,24 @@ Result<void> check_temperature(const Calibrator& c, const ObserveOptions& option
     return failure(ErrorCode::BadInput, message("temperature of the array: ", given->temperature_K,
                                                 " K, u = ", given->u_temperature_K, " K"));
   }
+
   if (c.expansivity && !given) {
-    return failure(
-        ErrorCode::BadInput,
-        message("calibrator \"", c.name, "\" says how the array grows, but nothing says how warm it was"));
+    return failure(ErrorCode::BadInput,
+                   message("calibrator \"", c.name,
+                           "\" says how the array grows, but nothing says how warm it was"));
   }
+
   if (given && !c.expansivity) {
-    return failure(ErrorCode::BadInput, message("the temperature of the array is given, but calibrator \"",
-                                                c.name, "\" does not say how it grows"));
+    return failure(ErrorCode::BadInput,
+                   message("the temperature of the array is given, but calibrator \"", c.name,
+                           "\" does not say how it grows"));
   }
+
   return {};
 }
 
 Calibrator at_the_machine(const Calibrator& c, const std::optional<Expansion>& expansion) {
-  return expansion ? grown(c, *expansion) : c;
+  return expansion ? at_temperature(c, *expansion) : c;
 }
 
 /// Of a calibrator that has passed check().
@@ -60,17 +64,21 @@ Result<void> check_volume(const Observations& o, const ObserveOptions& options) 
   for (const BallError& row : o.rows) {
     readings.push_back(row.reading_m);
   }
+
   const Result<fit::PointSet> set = fit::point_set(readings, 4, "ball array");
   if (!set) {
     return tl::unexpected(set.error());
   }
+
   const double thickness = set->singular_values(2) / set->singular_values(0);
   if (!(thickness >= options.least_thickness)) {
     return failure(
         ErrorCode::DegenerateGeometry,
-        message("ball array: the positions are coplanar, all balls lie in one plane (thickness ", thickness,
-                " of the extent, needs ", options.least_thickness, "): tilt and roll the artefact more"));
+        message("ball array: the positions are coplanar, all balls lie in one plane (thickness ",
+                thickness, " of the extent, needs ", options.least_thickness,
+                "): tilt and roll the artefact more"));
   }
+
   return {};
 }
 
@@ -83,6 +91,7 @@ Result<void> place_ball1(Observations& o, const ObserveOptions& options) {
       o.ball1_m += row.reading_m;
     }
   }
+
   o.ball1_m /= static_cast<double>(std::max<std::size_t>(1, first.size()));
   for (const BallError* row : first) {
     const double shift_m = (row->reading_m - o.ball1_m).norm();
@@ -98,6 +107,7 @@ Result<void> place_ball1(Observations& o, const ObserveOptions& options) {
                                  " um: errors are relative to Ball1, it must be 0"));
     }
   }
+
   return {};
 }
 
@@ -131,8 +141,8 @@ std::optional<std::size_t> stands_as_at(const Matrix3& R_self_uni, std::span<con
   return std::nullopt;
 }
 
-Result<SeenArtefact> see_artefact(int position, std::span<const Touch> touches, const Calibrator& at_20_C,
-                                  const ObserveOptions& options) {
+Result<SeenArtefact> see_artefact(int position, std::span<const Touch> touches,
+                                  const Calibrator& at_20_C, const ObserveOptions& options) {
   if (Result<void> sound = check(at_20_C); !sound) {
     return tl::unexpected(sound.error());
   }
@@ -149,20 +159,25 @@ Result<Observations> observe(std::span<const Touch> touches, const Calibrator& a
   if (Result<void> sound = check(at_20_C); !sound) {
     return tl::unexpected(sound.error());
   }
+
   if (Result<void> known = check_temperature(at_20_C, options); !known) {
     return tl::unexpected(known.error());
   }
+
   const std::optional<Expansion> expansion = expansion_of(at_20_C, options);
   const Calibrator c = at_the_machine(at_20_C, expansion);
   const Result<std::map<int, Touched>> positions = by_position(touches, options);
+
   if (!positions) {
     return tl::unexpected(positions.error());
   }
+
   Observations o;
   o.machine = machine;
   o.order = options.order;
   o.artefact = uncertainty_of(c, expansion);
   std::vector<Matrix3> turned;
+
   for (const auto& [position, touched] : *positions) {
     Result<SeenArtefact> seen = see(position, touched, c, pre_to_uniform(c), options);
     if (!seen) {
@@ -182,6 +197,7 @@ Result<Observations> observe(std::span<const Touch> touches, const Calibrator& a
     turned.push_back(seen->T_self_uni.R);
     o.seen.push_back(*std::move(seen));
   }
+
   return finish(std::move(o), options);
 }
 
@@ -192,14 +208,17 @@ Result<Observations> observe_errors(std::span<const BallError> errors, const Mac
   o.order = options.order;
   o.rotation = rotation;
   o.rows.assign(errors.begin(), errors.end());
+
   std::sort(o.rows.begin(), o.rows.end(), [](const BallError& a, const BallError& b) {
     return std::pair(a.position, a.ball) < std::pair(b.position, b.ball);
   });
+
   std::map<int, bool> has_ball1;
   for (std::size_t i = 0; i < o.rows.size(); ++i) {
     const BallError& row = o.rows[i];
     if (!row.reading_m.allFinite() || !row.V_m.allFinite()) {
-      return at_position(row.position, ErrorCode::NotFinite, message("ball ", row.ball, " is not a number"));
+      return at_position(row.position, ErrorCode::NotFinite,
+                         message("ball ", row.ball, " is not a number"));
     }
     if (i > 0 && row.position == o.rows[i - 1].position && row.ball == o.rows[i - 1].ball) {
       return at_position(row.position, ErrorCode::BadInput,
@@ -207,12 +226,14 @@ Result<Observations> observe_errors(std::span<const BallError> errors, const Mac
     }
     has_ball1[row.position] = has_ball1[row.position] || row.ball == 1;
   }
+
   for (int p = 1; p <= options.positions; ++p) {
     if (!has_ball1.contains(p)) {
       return at_position(p, ErrorCode::TooFewObservations,
                          message("left out, of ", options.positions, " positions"));
     }
   }
+
   for (const auto& [position, has] : has_ball1) {
     if (!has) {
       return at_position(position, ErrorCode::TooFewObservations, "Ball1 was left out");
@@ -222,9 +243,11 @@ Result<Observations> observe_errors(std::span<const BallError> errors, const Mac
                          message("positions are numbered 1 to ", options.positions));
     }
   }
+
   if (Result<void> one = check_one_shape(o); !one) {
     return tl::unexpected(one.error());
   }
+
   return finish(std::move(o), options);
 }
 

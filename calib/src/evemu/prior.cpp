@@ -36,7 +36,8 @@ struct Bounds {
   Theta low, high;
 };
 const Bounds& bounds() {
-  static const Bounds b{logarithms({1e-7, 1e-3, 1e-7, 1e-9, 1e-8}), logarithms({1.0, 3.0, 1.0, 1e-3, 1e-2})};
+  static const Bounds b{logarithms({1e-7, 1e-3, 1e-7, 1e-9, 1e-8}),
+                        logarithms({1.0, 3.0, 1.0, 1e-3, 1e-2})};
   return b;
 }
 
@@ -78,6 +79,7 @@ Theta sensitivity(PriorKind kind, const DesignFunction* f, const ScaledDesign& d
     d(kSd) = 2.0;
     d(kRho) = 2.0 * (f->order - 1);
   }
+
   return d;
 }
 
@@ -97,6 +99,7 @@ struct Objective {
         with_added(prior_variances(kind, design, positions, h), design.size(), added);
     const LinearGaussian::Evidence e = problem.evidence(prior, h.s_m * h.s_m);
     gradient.setZero();
+
     for (Eigen::Index j = 0; j < e.by_log_prior.size(); ++j) {
       const auto column = static_cast<std::size_t>(j);
       if (column >= design.size() && column < design.size() + added.size()) {
@@ -105,6 +108,7 @@ struct Objective {
       const DesignFunction* f = column < design.size() ? &design.functions()[column] : nullptr;
       gradient -= e.by_log_prior(j) * sensitivity(kind, f, design, h);
     }
+
     gradient(kS) -= 2.0 * e.by_log_noise;
     return -e.log_likelihood;
   }
@@ -129,11 +133,13 @@ struct Minimum {
 /// BFGS with backtracking, steps of at most a factor e^2 in any parameter.
 Minimum descend(Objective& f, const Theta& start) {
   constexpr int kMostIterations = 60;
-  constexpr double kFlat = 1e-4;  // of the log likelihood per unit of log theta: far below what it can tell
+  // of the log likelihood per unit of log theta: far below what it can tell
+  constexpr double kFlat = 1e-4;
   Minimum at{start};
   Theta gradient;
   at.value = f(at.theta, gradient);
   Theta5x5 inverse_hessian = 0.05 * Theta5x5::Identity();
+
   for (int iteration = 0; iteration < kMostIterations; ++iteration) {
     Theta free = gradient;
     keep_inside(at.theta, gradient, free);
@@ -173,6 +179,7 @@ Minimum descend(Objective& f, const Theta& start) {
       break;
     }
   }
+
   return at;
 }
 
@@ -190,30 +197,36 @@ Eigen::VectorXd prior_variances(PriorKind kind, const ScaledDesign& design, std:
     } else if (kind == PriorKind::BayesPose) {
       sd_m = (f.kind == FunctionKind::Rotation ? h.s_a_m : h.s_d_m) * power(h.rho, f.order - 1);
       if (f.kind == FunctionKind::Translation && f.order == 1) {
-        sd_m = is_scale(f) ? std::sqrt(own_scale_variance_m2(f, design, h.s_d_m) + h.s_a_m * h.s_a_m)
-                           : std::max(sd_m, least_s_d_m(f, design));
+        sd_m = is_scale(f)
+                   ? std::sqrt(own_scale_variance_m2(f, design, h.s_d_m) + h.s_a_m * h.s_a_m)
+                   : std::max(sd_m, least_s_d_m(f, design));
       }
     }
+
     v(static_cast<Eigen::Index>(j)) = sd_m * sd_m;
   }
+
   v.tail(v.size() - n).setConstant(kind == PriorKind::BayesPose ? h.w_rad * h.w_rad : 0.0);
   return v;
 }
 
 Eigen::VectorXd with_added(const Eigen::VectorXd& variances, std::size_t design_size,
                            std::span<const double> added) {
-  const auto n = static_cast<Eigen::Index>(design_size), k = static_cast<Eigen::Index>(added.size());
+  const auto n = static_cast<Eigen::Index>(design_size),
+             k = static_cast<Eigen::Index>(added.size());
   Eigen::VectorXd all(variances.size() + k);
   all << variances.head(n), Eigen::Map<const Eigen::VectorXd>(added.data(), k),
       variances.tail(variances.size() - n);
   return all;
 }
 
-Result<HyperParameters> most_likely(PriorKind kind, const ScaledDesign& design, std::size_t positions,
-                                    const LinearGaussian& problem, std::span<const double> added) {
+Result<HyperParameters> most_likely(PriorKind kind, const ScaledDesign& design,
+                                    std::size_t positions, const LinearGaussian& problem,
+                                    std::span<const double> added) {
   Objective f{kind, design, positions, problem, added};
-  // The likelihood can have one maximum that calls the scatter noise and one that calls it pose rotation; and
-  // one where a flat array's noise is the scale across it (large s_d, small rho) beside that of a good machine.
+  // The likelihood can have one maximum that calls the scatter noise and one that calls it pose
+  // rotation; and one where a flat array's noise is the scale across it (large s_d, small rho)
+  // beside that of a good machine.
   const std::array<HyperParameters, 4> starts{
       HyperParameters{.s_d_m = 5e-4, .rho = 0.6, .s_a_m = 5e-4, .s_m = 1e-5, .w_rad = 1e-4},
       HyperParameters{.s_d_m = 5e-4, .rho = 0.6, .s_a_m = 5e-4, .s_m = 5e-6, .w_rad = 2e-6},
@@ -221,21 +234,26 @@ Result<HyperParameters> most_likely(PriorKind kind, const ScaledDesign& design, 
       HyperParameters{.s_d_m = 1e-5, .rho = 0.45, .s_a_m = 1e-5, .s_m = 3e-6, .w_rad = 1e-5}};
   Minimum best{logarithms(starts.front())};
   const std::size_t used = kind == PriorKind::Ridge ? 1 : starts.size();
+
   for (std::size_t i = 0; i < used; ++i) {
     const Minimum found = descend(f, logarithms(starts[i]));
     if (found.value < best.value) {
       best = found;
     }
   }
+
   if (!std::isfinite(best.value)) {
-    return failure(ErrorCode::NotConverged, message("bayes: none of ", used, " starts has a likelihood"));
+    return failure(ErrorCode::NotConverged,
+                   message("bayes: none of ", used, " starts has a likelihood"));
   }
+
   HyperParameters h = parameters(best.theta);
   if (kind == PriorKind::Ridge) {
     h.rho = 1.0;
     h.s_a_m = h.s_d_m;
     h.w_rad = 0.0;
   }
+
   h.log_likelihood = -best.value;
   h.evaluations = f.evaluations;
   return h;

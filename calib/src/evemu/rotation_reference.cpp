@@ -17,8 +17,8 @@ struct Used {
   std::vector<std::size_t> outside;
 };
 
-/// Inside, or beyond the hull by no more than 2 % of the way from its middle: the balls themselves are its
-/// vertices, and whoever measures them again reads some micrometres farther out.
+/// Inside, or beyond the hull by no more than 2 % of the way from its middle: the balls themselves
+/// are its vertices, and whoever measures them again reads some micrometres farther out.
 Used inside_of(const ValidityVolume& volume, std::span<const BallError> points) {
   constexpr double kPulledIn = 0.98;
   const Vector3 centre = bounding_box(volume.vertices_m()).centre_m;
@@ -42,8 +42,8 @@ std::string listed(const std::vector<std::size_t>& numbers) {
   return text;
 }
 
-/// Rows of the reference: r = J x + B dc + noise, x = translation and rotation, dc what the model's shape is
-/// off.
+/// Rows of the reference: r = J x + B dc + noise, x = translation and rotation, dc what the model's
+/// shape is off.
 struct Rows {
   Eigen::MatrixXd J, B;
   Eigen::VectorXd r;
@@ -79,8 +79,8 @@ struct Turn {
   double worst_m = 0.0;
 };
 
-/// Generalised least squares over S = sigma^2 1 + B C B^T: where the model's shape is uncertain, or uncertain
-/// together, the reference is not asked to agree with it.
+/// Generalised least squares over S = sigma^2 1 + B C B^T: where the model's shape is uncertain, or
+/// uncertain together, the reference is not asked to agree with it.
 Turn turn_onto(const Rows& rows, const Eigen::MatrixXd& C_shape, double sigma_m) {
   Eigen::MatrixXd S = rows.B * C_shape * rows.B.transpose();
   S.diagonal().array() += sigma_m * sigma_m;
@@ -91,24 +91,27 @@ Turn turn_onto(const Rows& rows, const Eigen::MatrixXd& C_shape, double sigma_m)
   const Eigen::MatrixXd J_scaled = J * scale.asDiagonal();
   const Eigen::ColPivHouseholderQR<Eigen::MatrixXd> qr(J_scaled);
   const Eigen::VectorXd x = scale.asDiagonal() * qr.solve(r);
-  const Eigen::MatrixXd whitening = llt.matrixL().solve(Eigen::MatrixXd::Identity(S.rows(), S.cols()));
+  const Eigen::MatrixXd whitening =
+      llt.matrixL().solve(Eigen::MatrixXd::Identity(S.rows(), S.cols()));
   Turn turn;
   turn.omega_rad = x.tail<3>();
   turn.K = (scale.asDiagonal() * qr.solve(whitening)).bottomRows<3>();
   turn.chi2 = (r - J * x).squaredNorm();
   turn.dof = static_cast<double>(r.size() - x.size());
   const Eigen::VectorXd left_m = rows.r - rows.J * x;
+
   for (Eigen::Index i = 0; i < left_m.size(); i += 3) {
     if (const double off_m = left_m.segment<3>(i).norm(); off_m > turn.worst_m) {
       turn.worst_m = off_m;
       turn.worst = static_cast<std::size_t>(i / 3);
     }
   }
+
   return turn;
 }
 
-/// chi-square that one right reference in 1000 exceeds. Wilson and Hilferty's cube, 2 % high at 3 degrees of
-/// freedom, better above.
+/// chi-square that one right reference in 1000 exceeds. Wilson and Hilferty's cube, 2 % high at 3
+/// degrees of freedom, better above.
 double chi2_of_one_in_1000(double dof) {
   constexpr double kNormal = 3.0902;  // one-sided 99.9 %
   const double s = 2.0 / (9.0 * dof);
@@ -119,8 +122,9 @@ double chi2_of_one_in_1000(double dof) {
 /// The covariance of the shape alone: without the rotation set_gauge() put in.
 Eigen::MatrixXd shape_covariance(const EvemuModel& model, const MeanRotation& rotation) {
   const Eigen::MatrixX3d G = model.design().rotation_about(model.ball1_m());
-  return rotation.referenced ? model.covariance_m2()
-                             : Eigen::MatrixXd(model.covariance_m2() - G * rotation.cov_rad2 * G.transpose());
+  return rotation.referenced
+             ? model.covariance_m2()
+             : Eigen::MatrixXd(model.covariance_m2() - G * rotation.cov_rad2 * G.transpose());
 }
 
 Result<void> check_size(const Used& used, std::size_t given) {
@@ -140,33 +144,41 @@ Result<Solution> with_rotation_reference(Solution solution, const RotationRefere
     return failure(ErrorCode::BadInput, message("rotation reference: standard uncertainty ",
                                                 reference.sigma_m, " m, must be greater than 0"));
   }
+
   const EvemuModel& evemu = *solution.model.polynomials();
   const Used used = inside_of(solution.model.validity(), reference.points);
   if (Result<void> fine = check_size(used, reference.points.size()); !fine) {
     return tl::unexpected(fine.error());
   }
+
   const Rows rows = rows_of(evemu, used.points);
   if (!rows.r.allFinite()) {
     return failure(ErrorCode::NotFinite, "rotation reference: a point is not a number");
   }
+
   if (on_a_line(rows.J)) {
     return failure(ErrorCode::DegenerateGeometry, "rotation reference: its points lie on a line");
   }
+
   const Eigen::MatrixXd C_shape = shape_covariance(evemu, solution.rotation);
   const Turn turn = turn_onto(rows, C_shape, reference.sigma_m);
   const double unsuspicious = chi2_of_one_in_1000(turn.dof);
-  // A machine is no polynomial, and many points see that long before they are wrong: up to twice the stated
-  // uncertainties widen the rotation's, as [Birge 1932]. Written so that a NaN is refused.
+
+  // A machine is no polynomial, and many points see that long before they are wrong: up to twice
+  // the stated uncertainties widen the rotation's, as [Birge 1932]. Written so that a NaN is
+  // refused.
   constexpr double kMostPerDof = 4.0;
   const double widened = turn.chi2 > unsuspicious ? turn.chi2 / turn.dof : 1.0;
   if (!(turn.chi2 <= std::max(unsuspicious, kMostPerDof * turn.dof))) {
     return failure(
         ErrorCode::BadInput,
-        message("rotation reference: does not fit the model after any rotation and translation: chi-square ",
-                turn.chi2, " with ", turn.dof, " degrees of freedom, point ", used.numbers[turn.worst],
-                " is off by ", 1e6 * turn.worst_m,
+        message("rotation reference: does not fit the model after any rotation and translation: "
+                "chi-square ",
+                turn.chi2, " with ", turn.dof, " degrees of freedom, point ",
+                used.numbers[turn.worst], " is off by ", 1e6 * turn.worst_m,
                 " um (another frame, sign or artefact, or a smaller uncertainty than it has)"));
   }
+
   const Eigen::MatrixX3d G = evemu.design().rotation_about(evemu.ball1_m());
   // Off after the turn: G (K (B dc + noise)) - dc.
   const Eigen::MatrixXd kept =
@@ -180,11 +192,14 @@ Result<Solution> with_rotation_reference(Solution solution, const RotationRefere
   C.diagonal() = C.diagonal().cwiseMax(0.0);  // what was added came off again, but for rounding
   Result<EvemuModel> turned =
       EvemuModel::of(evemu.design(), evemu.ball1_m(), evemu.c_m() + G * turn.omega_rad, C);
+
   if (!turned) {
     return tl::unexpected(turned.error());
   }
+
   return VolumetricModel::from_polynomials(*std::move(turned), Gauge::Ball1,
-                                           solution.model.tool_offsets_m().front(), solution.model.validity())
+                                           solution.model.tool_offsets_m().front(),
+                                           solution.model.validity())
       .map([&](VolumetricModel model) {
         solution.model = std::move(model);
         solution.rotation.removed_rad -= turn.omega_rad;

@@ -20,17 +20,20 @@ std::size_t axis_of(const EquivalentModel& model, std::size_t row) {
 DesignFunction function_of(const EquivalentModel& model, std::size_t row) {
   const std::span<const Share> shares = model.shares(row);
   const std::array<int, 3>& e = shares.front().monomial.exponent;
-  const auto axes = static_cast<std::size_t>(std::count_if(e.begin(), e.end(), [](int k) { return k > 0; }));
+  const auto axes =
+      static_cast<std::size_t>(std::count_if(e.begin(), e.end(), [](int k) { return k > 0; }));
   DesignFunction f;
   f.parts = shares.size();
+
   if (axes == 1) {
     f.kind = FunctionKind::Translation;
-    f.axis =
-        static_cast<std::size_t>(std::find_if(e.begin(), e.end(), [](int k) { return k > 0; }) - e.begin());
+    f.axis = static_cast<std::size_t>(
+        std::find_if(e.begin(), e.end(), [](int k) { return k > 0; }) - e.begin());
   } else if (axes == 2) {
     f.kind = FunctionKind::Rotation;
     f.axis = axis_of(model, row);
   }
+
   f.order = e[f.axis];
   for (std::size_t p = 0; p < f.parts; ++p) {
     f.part[p] = {shares[p].component, shares[p].factor, 3};
@@ -40,6 +43,7 @@ DesignFunction function_of(const EquivalentModel& model, std::size_t row) {
       }
     }
   }
+
   return f;
 }
 
@@ -55,6 +59,7 @@ Coefficients legendre_in(double centre, double half_width, int order) {
     }
     return r;
   };
+
   Coefficients before{}, current{};
   current[0] = 1.0;
   for (int n = 0; n < order; ++n) {
@@ -65,6 +70,7 @@ Coefficients legendre_in(double centre, double half_width, int order) {
     before = current;
     current = next;
   }
+
   return current;
 }
 
@@ -79,26 +85,31 @@ ReadingBox bounding_box(std::span<const Vector3> readings_m) {
   return {0.5 * (low + high), 0.5 * (high - low)};
 }
 
-Result<ScaledDesign> ScaledDesign::of(const KinematicChain& chain, int order, const ReadingBox& box) {
+Result<ScaledDesign> ScaledDesign::of(const KinematicChain& chain, int order,
+                                      const ReadingBox& box) {
   if (!box.centre_m.allFinite() || !box.half_width_m.allFinite()) {
     return failure(ErrorCode::NotFinite, "scaled design: the box of readings is not finite");
   }
+
   // A micrometre of travel in an axis says nothing about polynomials along it.
   constexpr double kLeastHalfWidth_m = 1e-6;
   if (box.half_width_m.minCoeff() < kLeastHalfWidth_m) {
     return failure(ErrorCode::DegenerateGeometry,
-                   message("scaled design: the readings have half widths ", box.half_width_m.transpose(),
-                           " m, an axis does not move"));
+                   message("scaled design: the readings have half widths ",
+                           box.half_width_m.transpose(), " m, an axis does not move"));
   }
+
   Result<EquivalentModel> equivalent = EquivalentModel::of(chain, order);
   if (!equivalent) {
     return tl::unexpected(equivalent.error());
   }
+
   ScaledDesign design;
   design.box_ = box;
   for (std::size_t j = 0; j < equivalent->size(); ++j) {
     design.functions_.push_back(function_of(*equivalent, j));
   }
+
   design.equivalent_ = *std::move(equivalent);
   return design;
 }
@@ -107,6 +118,7 @@ ScaledDesign::Factors ScaledDesign::factors(const Vector3& reading_m) const {
   Factors at;
   const Vector3 from_centre_m = reading_m - box_.centre_m;
   const double arm_unit = arm_unit_m();
+
   for (std::size_t a = 0; a < 3; ++a) {
     const auto i = static_cast<Eigen::Index>(a);
     const double u = from_centre_m(i) / box_.half_width_m(i);
@@ -119,6 +131,7 @@ ScaledDesign::Factors ScaledDesign::factors(const Vector3& reading_m) const {
     }
     at.arm[a] = from_centre_m(i) / arm_unit;
   }
+
   at.arm[3] = 1.0;
   return at;
 }
@@ -142,6 +155,7 @@ Eigen::MatrixXd ScaledDesign::named_from_scaled() const {
     Eigen::Index row;
     double per_factor;
   };
+
   std::map<std::pair<std::size_t, Monomial>, Target> targets;
   for (std::size_t j = 0; j < size(); ++j) {
     const auto shares = equivalent_.shares(j);
@@ -150,9 +164,11 @@ Eigen::MatrixXd ScaledDesign::named_from_scaled() const {
                                             1.0 / (s.factor * static_cast<double>(shares.size()))};
     }
   }
+
   const auto n = static_cast<Eigen::Index>(size());
   Eigen::MatrixXd M = Eigen::MatrixXd::Zero(n, n);
   const Vector3 centre_mm = kMmPerM * box_.centre_m, half_width_mm = kMmPerM * box_.half_width_m;
+
   for (std::size_t j = 0; j < size(); ++j) {
     const DesignFunction& f = functions_[j];
     const auto axis = static_cast<Eigen::Index>(f.axis);
@@ -178,11 +194,13 @@ Eigen::MatrixXd ScaledDesign::named_from_scaled() const {
       }
     }
   }
+
   return M;
 }
 
 Eigen::MatrixX3d ScaledDesign::rotation_about(const Vector3& about_m) const {
-  // omega x (q - about) = L omega, L affine in q: constant part at the centre, slope along each axis.
+  // omega x (q - about) = L omega, L affine in q: constant part at the centre, slope along each
+  // axis.
   const Matrix3 at_centre = rotation_effect(box_.centre_m - about_m);
   Eigen::MatrixX3d C = Eigen::MatrixX3d::Zero(static_cast<Eigen::Index>(size()), 3);
   for (std::size_t j = 0; j < size(); ++j) {
@@ -193,10 +211,11 @@ Eigen::MatrixX3d ScaledDesign::rotation_about(const Vector3& about_m) const {
     if (f.kind == FunctionKind::Constant) {
       C.row(row) = f.part[0].sign * at_centre.row(component);
     } else if (f.kind == FunctionKind::Translation && f.order == 1) {
-      C.row(row) =
-          f.part[0].sign * box_.half_width_m(axis) * rotation_effect(Vector3::Unit(axis)).row(component);
+      C.row(row) = f.part[0].sign * box_.half_width_m(axis) *
+                   rotation_effect(Vector3::Unit(axis)).row(component);
     }
   }
+
   return C;
 }
 

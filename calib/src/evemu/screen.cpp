@@ -43,8 +43,10 @@ Screen::Gain Screen::gain(const Eigen::MatrixXd& C) const {
   const auto used = C.middleRows(first, count);
   const Eigen::MatrixXd P = Q1_.middleRows(first, count).transpose() * used;
   const Eigen::MatrixXd GG = (used.transpose() * used - P.transpose() * P) / s2_;
-  const Eigen::VectorXd g = (used.transpose() * y_.segment(first, count) - P.transpose() * Q1_y_) / s2_;
+  const Eigen::VectorXd g =
+      (used.transpose() * y_.segment(first, count) - P.transpose() * Q1_y_) / s2_;
   Gain best{-std::numeric_limits<double>::infinity(), 0.0};
+
   for (const double size_m : kSizes_m) {
     // log N(y; K + t^2 C C^T) - log N(y; K) = g^T M^-1 g t^2 / 2 - log |M| / 2,  M = 1 + t^2 C^T K^-1 C
     const double t2 = size_m * size_m;
@@ -58,6 +60,7 @@ Screen::Gain Screen::gain(const Eigen::MatrixXd& C) const {
       best = {value, size_m};
     }
   }
+
   return best;
 }
 

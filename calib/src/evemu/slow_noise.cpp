@@ -11,9 +11,10 @@
 namespace abbe::calib::evemu {
 namespace {
 
-/// Marginal likelihood of the errors seen, with slow noise of that size and the array's uncertainty as
-/// columns.
-Result<double> log_likelihood_with(double per_s, const FitProblem& problem, const HyperParameters& start) {
+/// Marginal likelihood of the errors seen, with slow noise of that size and the array's uncertainty
+/// as columns.
+Result<double> log_likelihood_with(double per_s, const FitProblem& problem,
+                                   const HyperParameters& start) {
   const Observations o = with_slow_noise(problem.observations, per_s);
   Eigen::MatrixXd columns(problem.X.rows(), problem.X.cols() + problem.A.cols());
   columns << problem.X, problem.A;
@@ -30,10 +31,10 @@ Result<double> log_likelihood_with(double per_s, const FitProblem& problem, cons
 }  // namespace
 
 std::string slow_noise_text(double slow_noise_m) {
-  return message(
-      "slow noise: within positions all touches shift by ", slow_noise_m * kUmPerM,
-      " um (standard deviation): vibration, temperature, a probe that does not repeat, or errors of "
-      "the machine that are no polynomials of the order that is set");
+  return message("slow noise: within positions all touches shift by ", slow_noise_m * kUmPerM,
+                 " um (standard deviation): vibration, temperature, a probe that does not repeat, "
+                 "or errors of "
+                 "the machine that are no polynomials of the order that is set");
 }
 
 Observations with_slow_noise(const Observations& o, double per_s) {
@@ -49,6 +50,7 @@ Result<SlowNoise> likely_slow_noise(const Observations& o, const ScaledDesign& d
   if (!without) {
     return tl::unexpected(without.error());
   }
+
   SlowNoise best;
   const auto consider = [&](double per_s) -> Result<void> {
     return log_likelihood_with(per_s, problem, start).map([&](double value) {
@@ -57,20 +59,24 @@ Result<SlowNoise> likely_slow_noise(const Observations& o, const ScaledDesign& d
       }
     });
   };
+
   for (const double per_s : {0.5, 1.0, 2.0, 4.0, 8.0, 16.0, 32.0}) {
     if (const Result<void> compared = consider(per_s); !compared) {
       return tl::unexpected(compared.error());
     }
   }
+
   if (best.per_s == 0.0) {
     return best;
   }
+
   const double coarse = best.per_s;
   for (const double factor : {std::sqrt(0.5), std::sqrt(2.0)}) {
     if (const Result<void> compared = consider(coarse * factor); !compared) {
       return tl::unexpected(compared.error());
     }
   }
+
   return best;
 }
 

@@ -40,15 +40,15 @@ Eigen::Matrix3Xd mean_block_rotation(const Observations& o, const ScaledDesign& 
   return mean;
 }
 
-/// What squareness and slopes of a machine let the blocks be turned by, when nothing else is known: the prior
-/// of a linear translation across the volume, as an angle.
+/// What squareness and slopes of a machine let the blocks be turned by, when nothing else is known:
+/// the prior of a linear translation across the volume, as an angle.
 Matrix3 prior_rotation_rad2(const ScaledDesign& design) {
   const double u_rad = kLinearPrior_m / design.arm_unit_m();
   return u_rad * u_rad * Matrix3::Identity();
 }
 
-/// Sets V(Ball1) = 0 and the rotation to that of the blocks; puts the rotation's uncertainty into the
-/// covariance.
+/// Sets V(Ball1) = 0 and the rotation to that of the blocks; puts the rotation's uncertainty into
+/// the covariance.
 MeanRotation set_gauge(const FitProblem& problem, Fit& fit) {
   const Observations& o = problem.observations;
   const Eigen::MatrixX3d G = problem.design.rotation_about(o.ball1_m);
@@ -56,6 +56,7 @@ MeanRotation set_gauge(const FitProblem& problem, Fit& fit) {
   MeanRotation rotation;
   rotation.referenced = o.rotation == RotationOrigin::Independent;
   Eigen::MatrixXd T = Z;
+
   if (problem.from_touches) {
     const Eigen::Matrix3Xd mean = mean_block_rotation(o, problem.design);
     rotation.removed_rad = mean * fit.c_m;
@@ -68,15 +69,18 @@ MeanRotation set_gauge(const FitProblem& problem, Fit& fit) {
     rotation.cov_rad2 =
         rotation.referenced ? fit.cov_mean_pose_rotation_rad2 : prior_rotation_rad2(problem.design);
   }
+
   fit.c_m = T * fit.c_m;
   fit.covariance_m2 = T * fit.covariance_m2 * T.transpose();
   if (fit.artefact_m.cols() > 0) {
     const Eigen::MatrixXd off_m = T * fit.artefact_m;
     fit.covariance_m2 += off_m * off_m.transpose();
   }
+
   if (!rotation.referenced) {
     fit.covariance_m2 += G * rotation.cov_rad2 * G.transpose();
   }
+
   fit.covariance_m2 = 0.5 * (fit.covariance_m2 + fit.covariance_m2.transpose()).eval();
   return rotation;
 }
@@ -85,6 +89,7 @@ ResidualFigures residual_figures(const Observations& o, const Eigen::VectorXd& r
   ResidualFigures f;
   double squares = 0.0, sum = 0.0;
   std::size_t count = 0;
+
   for (std::size_t i = 0; i < o.rows.size(); ++i) {
     if (o.rows[i].ball == 1) {
       continue;
@@ -95,6 +100,7 @@ ResidualFigures residual_figures(const Observations& o, const Eigen::VectorXd& r
     f.max_abs_m = std::max(f.max_abs_m, at.lpNorm<Eigen::Infinity>());
     count += 3;
   }
+
   f.mean_abs_m = sum / static_cast<double>(std::max<std::size_t>(1, count));
   f.rms_m = std::sqrt(squares / static_cast<double>(std::max<std::size_t>(1, count)));
   return f;
@@ -111,9 +117,11 @@ Eigen::VectorXd residuals_of(const FitProblem& problem, const Fit& fit) {
     }
     r -= pose_rotation_rows(o) * omega;
   }
+
   for (const PositionRows& p : position_rows(o)) {
     r.segment<3>(static_cast<Eigen::Index>(3 * p.ball1)).setZero();
   }
+
   return r;
 }
 
@@ -126,27 +134,34 @@ Statistics statistics_of(const FitProblem& problem, const Fit& fit, const Eigen:
   s.unknowns = problem.design.size();
   const Eigen::VectorXd scale = problem.X.colwise().norm().cwiseMax(1e-300).cwiseInverse();
   const Eigen::VectorXd sv = singular_values(problem.X * scale.asDiagonal());
-  // Unobservable rotations leave 1e-7 (Ball1 does not come back to the same nanometre), data 1e-4 and more.
+
+  // Unobservable rotations leave 1e-7 (Ball1 does not come back to the same nanometre), data 1e-4
+  // and more.
   constexpr double kZero = 1e-6;
   s.rank = static_cast<std::size_t>((sv.array() > kZero * sv(0)).count());
   s.condition = sv(0) / sv(static_cast<Eigen::Index>(s.rank) - 1);
   s.effective_parameters = fit.effective_parameters;
-  s.degrees_of_freedom = static_cast<double>(s.observations) - fit.effective_parameters - fit.pose_parameters;
+  s.degrees_of_freedom =
+      static_cast<double>(s.observations) - fit.effective_parameters - fit.pose_parameters;
   s.s_m = fit.s_m;
   s.w_rad = fit.w_rad;
   s.slow_noise_m = o.slow_noise * fit.s_m;
   s.before = residual_figures(o, problem.y);
   s.after = residual_figures(o, r);
+
   if (fit.s_m > 0.0) {
-    s.chi2_per_dof = whitened(o, r).squaredNorm() / (fit.s_m * fit.s_m) / std::max(1.0, s.degrees_of_freedom);
+    s.chi2_per_dof =
+        whitened(o, r).squaredNorm() / (fit.s_m * fit.s_m) / std::max(1.0, s.degrees_of_freedom);
   }
+
   s.iterations = fit.iterations;
   return s;
 }
 
 /// Noise and covariance of the sparse estimators come from the bootstrap alone.
 Result<void> check(const SolveOptions& options) {
-  const bool is_sparse = options.estimator == Estimator::Lasso || options.estimator == Estimator::Mcp ||
+  const bool is_sparse = options.estimator == Estimator::Lasso ||
+                         options.estimator == Estimator::Mcp ||
                          options.estimator == Estimator::Scad;
   constexpr int kLeastRuns = 2;
   if (is_sparse && options.sparse.bootstrap_runs < kLeastRuns) {
@@ -205,20 +220,24 @@ Result<Solution> solve(const Observations& o, const SolveOptions& options) {
   if (Result<void> fine = check(options); !fine) {
     return tl::unexpected(fine.error());
   }
+
   constexpr std::size_t kLeastPositions = 2;
   if (o.positions() < kLeastPositions) {
     return failure(ErrorCode::TooFewObservations,
                    message("ball array: ", o.positions(), " positions, needs ", kLeastPositions));
   }
+
   Result<ScaledDesign> design = design_of(o);
   if (!design) {
     return tl::unexpected(design.error());
   }
+
   const FitProblem problem = problem_of(o, *design, options);
   Result<Fit> fit = fit_with(problem, options);
   if (!fit) {
     return tl::unexpected(fit.error());
   }
+
   if (options.estimator == Estimator::BayesPose && problem.from_touches && o.slow_noise == 0.0) {
     const Result<SlowNoise> slow = likely_slow_noise(o, *design, *fit->hyper);
     if (!slow) {
@@ -228,18 +247,22 @@ Result<Solution> solve(const Observations& o, const SolveOptions& options) {
       return solve(with_slow_noise(o, slow->per_s), options);
     }
   }
+
   const Eigen::VectorXd residuals = residuals_of(problem, *fit);
   const Statistics statistics = statistics_of(problem, *fit, residuals);
   const Eigen::VectorXd raw_c_m = fit->c_m;
   const MeanRotation rotation = set_gauge(problem, *fit);
   Result<ValidityVolume> validity = ValidityVolume::hull_of(readings_m(o));
+
   if (!validity) {
     return tl::unexpected(validity.error());
   }
+
   Result<EvemuModel> evemu = EvemuModel::of(*design, o.ball1_m, fit->c_m, fit->covariance_m2);
   if (!evemu) {
     return tl::unexpected(evemu.error());
   }
+
   return VolumetricModel::from_polynomials(*std::move(evemu),
                                            rotation.referenced ? Gauge::Ball1 : Gauge::Ball1Blocks,
                                            o.machine.tool_offset_m, *std::move(validity))

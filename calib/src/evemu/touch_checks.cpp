@@ -25,16 +25,18 @@ std::optional<Surface> sphere_through(std::span<const Vector3> points) {
   if (!s) {
     return std::nullopt;
   }
-  return Surface{s->residuals.rms, std::max(-s->residuals.min, s->residuals.max),
-                 [c = s->centre, r = s->radius](const Vector3& p) { return std::abs((p - c).norm() - r); }};
+  return Surface{
+      s->residuals.rms, std::max(-s->residuals.min, s->residuals.max),
+      [c = s->centre, r = s->radius](const Vector3& p) { return std::abs((p - c).norm() - r); }};
 }
 
 std::optional<Surface> plane_through(std::span<const Vector3> points) {
   // Which side is outward does not matter here; one of three directions does not lie in the plane.
   for (Eigen::Index axis = 0; axis < 3; ++axis) {
     if (const auto s = fit::fit_plane(points, Vector3(Vector3::Unit(axis)))) {
-      return Surface{s->residuals.rms, std::max(-s->residuals.min, s->residuals.max),
-                     [at = s->point, n = s->normal](const Vector3& p) { return std::abs(n.dot(p - at)); }};
+      return Surface{
+          s->residuals.rms, std::max(-s->residuals.min, s->residuals.max),
+          [at = s->point, n = s->normal](const Vector3& p) { return std::abs(n.dot(p - at)); }};
     }
   }
   return std::nullopt;
@@ -44,13 +46,15 @@ std::optional<std::string> wrong_touch(std::span<const Vector3> points, std::siz
                                        double most_off_m, const FitSurface& fit) {
   constexpr double kShare = 0.25;  // of its distance from the others is its residual at least
   constexpr double kClear = 10.0;  // the others lie that much better
-  // A machine with errors of some mm bends a sphere by 0.4 mm. Few touches lie well on another sphere by
-  // chance.
+
+  // A machine with errors of some mm bends a sphere by 0.4 mm. Few touches lie well on another
+  // sphere by chance.
   constexpr std::size_t kPerUnknown = 4;
   const std::optional<Surface> all = fit(points);
   if (!all || all->largest_m < kShare * most_off_m || points.size() < kPerUnknown * unknowns) {
     return std::nullopt;
   }
+
   std::size_t worst = 0;
   double worst_m = 0.0, rest_m = 0.0;
   for (std::size_t k = 0; k < points.size(); ++k) {
@@ -63,9 +67,11 @@ std::optional<std::string> wrong_touch(std::span<const Vector3> points, std::siz
       rest_m = rest->rms_m;
     }
   }
+
   if (!(worst_m > most_off_m && worst_m > kClear * rest_m)) {
     return std::nullopt;
   }
+
   return message("touch ", worst + 1, " of ", points.size(), " lies ", worst_m * kMmPerM,
                  " mm off the surface of the others: a false trigger, or dirt; touch there again");
 }
@@ -98,7 +104,8 @@ bool touched_from_below(const SeenArtefact& seen) {
   Vector3 mean = Vector3::Zero();
   for (std::size_t b = 0; b < seen.balls.size(); ++b) {
     for (const Vector3& p : seen.ball_points_m[b]) {
-      mean += (p - seen.balls[b].centre).normalized() / static_cast<double>(seen.ball_points_m[b].size());
+      mean += (p - seen.balls[b].centre).normalized() /
+              static_cast<double>(seen.ball_points_m[b].size());
     }
   }
   constexpr double kClearly = 0.2;  // touches all around a ball have 0, on its upper half about 0.5

@@ -20,16 +20,19 @@ Result<void> check_plan(const TouchPlan& plan, const ObserveOptions& observe) {
   std::vector<int> sorted = plan.positions, expected(plan.positions.size());
   std::ranges::sort(sorted);
   std::iota(expected.begin(), expected.end(), 1);
+
   if (sorted.empty() || sorted != expected) {
     return failure(ErrorCode::BadInput,
                    message("touch plan: positions must be 1 to ", sorted.size(), ", each once"));
   }
+
   if (plan.points_per_ball < observe.least_points_per_ball ||
       plan.points_per_block < observe.least_points_per_block) {
     return failure(ErrorCode::BadInput,
                    message("touch plan: needs at least ", observe.least_points_per_ball,
                            " points a ball and ", observe.least_points_per_block, " a block"));
   }
+
   return {};
 }
 
@@ -59,8 +62,10 @@ TouchGuide::~TouchGuide() = default;
 
 Result<TouchGuide> TouchGuide::create(Calibrator calibrator, TouchPlan plan, GuideOptions options) {
   if (Result<void> sound = check(calibrator); !sound) return tl::unexpected(sound.error());
-  if (Result<void> sound = check_plan(plan, options.observe); !sound) return tl::unexpected(sound.error());
-  return TouchGuide(std::make_unique<const Setup>(Setup{std::move(calibrator), std::move(plan), options}));
+  if (Result<void> sound = check_plan(plan, options.observe); !sound)
+    return tl::unexpected(sound.error());
+  return TouchGuide(
+      std::make_unique<const Setup>(Setup{std::move(calibrator), std::move(plan), options}));
 }
 
 const TouchPlan& TouchGuide::plan() const {
@@ -135,11 +140,13 @@ GuidedTouch TouchGuide::take(const Vector3& p_m) {
     out.fate = TouchFate::Astray;
     return out;
   }
+
   const auto feature = site_->feature_of(p_m, feature_);
   if (!feature) {
     astray(p_m, out);
     return out;
   }
+
   astray_in_a_row_ = 0;
   if (site_->has_point_near(*feature, p_m)) {
     out.fate = TouchFate::SamePlace;
@@ -150,6 +157,7 @@ GuidedTouch TouchGuide::take(const Vector3& p_m) {
   } else {
     put(*feature, p_m, out);
   }
+
   return out;
 }
 
@@ -165,16 +173,19 @@ void TouchGuide::astray(const Vector3& p_m, GuidedTouch& out) {
     text = where() + message("the touch at ", place_text(p_m),
                              " and the one before are not on one ball: both are set aside");
   }
+
   out.notes.push_back(text + "; expected: " + name(feature_at(feature_)));
   if (++astray_in_a_row_ < setup_->options.most_astray) return;
-  fail(
-      ErrorCode::BadInput,
-      message(astray_in_a_row_, " touches one after the other are on no ball or block of calibrator \"",
-              setup_->calibrator.name,
-              "\": calibrator file of another artefact, or another order; the last one: ", out.notes.back()));
+  fail(ErrorCode::BadInput,
+       message(astray_in_a_row_,
+               " touches one after the other are on no ball or block of calibrator \"",
+               setup_->calibrator.name,
+               "\": calibrator file of another artefact, or another order; the last one: ",
+               out.notes.back()));
 }
 
-/// All points of it are there already. Ball1 again, with nothing missing elsewhere: the next position began.
+/// All points of it are there already. Ball1 again, with nothing missing elsewhere: the next
+/// position began.
 void TouchGuide::on_complete_feature(std::size_t feature, const Vector3& p_m, GuidedTouch& out) {
   if (feature == kBall1 && feature_ != kBall1 && all_have_enough()) {
     if (pass_over_until(passed_.size(), out) && all_have_enough()) {
@@ -185,9 +196,9 @@ void TouchGuide::on_complete_feature(std::size_t feature, const Vector3& p_m, Gu
     return;
   }
   out.fate = TouchFate::Doubled;
-  out.notes.push_back(where() +
-                      message(name(feature_at(feature)), " has all its ", points_of(feature),
-                              " points: this one is not needed; expected: ", name(feature_at(feature_))));
+  out.notes.push_back(
+      where() + message(name(feature_at(feature)), " has all its ", points_of(feature),
+                        " points: this one is not needed; expected: ", name(feature_at(feature_))));
 }
 
 void TouchGuide::put(std::size_t feature, const Vector3& p_m, GuidedTouch& out) {
@@ -201,8 +212,8 @@ void TouchGuide::put(std::size_t feature, const Vector3& p_m, GuidedTouch& out) 
     go_on_from(feature, out);
 }
 
-/// Somebody went on: what is missing is said now, and asked for again at the end if it is too much. False: a
-/// whole feature was set aside, which is expected now.
+/// Somebody went on: what is missing is said now, and asked for again at the end if it is too much.
+/// False: a whole feature was set aside, which is expected now.
 bool TouchGuide::pass_over_until(std::size_t feature, GuidedTouch& out) {
   for (std::size_t f = feature_; f < feature; ++f) {
     const std::size_t points = site_->points(f).size();
@@ -211,13 +222,15 @@ bool TouchGuide::pass_over_until(std::size_t feature, GuidedTouch& out) {
     if (points == 0) {
       out.notes.push_back(where() + name(feature_at(f)) + " was left out; it is asked for again");
     } else {
-      out.notes.push_back(where() + tally(f) +
-                          (has_enough(f) ? ", the rest was missed" : ": too few, it is asked for again"));
+      out.notes.push_back(
+          where() + tally(f) +
+          (has_enough(f) ? ", the rest was missed" : ": too few, it is asked for again"));
     }
     if (points < least_of(f)) continue;
     (void)accept_feature(f, out);
     if (failure_ || site_->points(f).empty()) return false;
   }
+
   return true;
 }
 
@@ -227,10 +240,12 @@ bool TouchGuide::accept_feature(std::size_t feature, GuidedTouch& out) {
   if (seen.outlier) {
     const Vector3 p_m = site_->points(feature)[*seen.outlier];
     site_->drop(feature, *seen.outlier);
-    out.notes.push_back(where() + message("the touch at ", place_text(p_m), " is ", kMmPerM * seen.off_m,
-                                          " mm off the others of ", which, ": set aside, touch another"));
+    out.notes.push_back(where() + message("the touch at ", place_text(p_m), " is ",
+                                          kMmPerM * seen.off_m, " mm off the others of ", which,
+                                          ": set aside, touch another"));
     return false;
   }
+
   if (seen.other_radius_m && feature == kBall1 && place_ == 0) {
     const Calibrator& c = setup_->calibrator;
     fail(ErrorCode::BadInput,
@@ -239,21 +254,25 @@ bool TouchGuide::accept_feature(std::size_t feature, GuidedTouch& out) {
                  " mm: calibrator file of another artefact, or another tip"));
     return false;
   }
+
   if (!seen.fine) {
     set_feature_aside(feature, which + " is not what its points lie on", out);
     return false;
   }
+
   const bool both_faces = has_enough(kBlock1) && has_enough(kBlock2);
   if ((feature == kBlock1 || feature == kBlock2) && both_faces &&
       site_->faces_off_rad() > setup_->options.observe.max_block_tilt_rad) {
     const double off_mrad = kMmPerM * site_->faces_off_rad();
     site_->clear(kBlock1);
     passed_[kBlock1] = false;
-    set_feature_aside(kBlock2, message("the two faces stand ", off_mrad, " mrad off the calibrator's angle"),
+    set_feature_aside(kBlock2,
+                      message("the two faces stand ", off_mrad, " mrad off the calibrator's angle"),
                       out);
     feature_ = kBlock1;
     return false;
   }
+
   if (feature > kBlock2) accept_ball(feature, out);
   return true;
 }
@@ -287,11 +306,13 @@ void TouchGuide::end_position(GuidedTouch& out) {
   const int position = plan().positions[place_];
   const std::vector<Touch> touches = site_->touches(position);
   const auto seen = see_artefact(position, touches, setup_->calibrator, setup_->options.observe);
+
   if (!seen) return set_position_aside(seen.error().text, out);
-  if (const auto before = stands_as_at(seen->T_self_uni.R, seen_, setup_->options.observe.least_turn_rad))
-    return set_position_aside(
-        where() + message("the artefact stands as at position ", plan().positions[*before], ": turn it"),
-        out);
+  if (const auto before =
+          stands_as_at(seen->T_self_uni.R, seen_, setup_->options.observe.least_turn_rad))
+    return set_position_aside(where() + message("the artefact stands as at position ",
+                                                plan().positions[*before], ": turn it"),
+                              out);
   site_->keep_sides();
   finished_.insert(finished_.end(), touches.begin(), touches.end());
   seen_.push_back(seen->T_self_uni.R);

@@ -17,18 +17,21 @@ namespace {
 struct FeatureResiduals {
   std::size_t seen = 0;
   Feature feature = Feature::Ball;
-  std::size_t index = 0;     ///< of the ball or block, from 0
-  Eigen::MatrixXd normals;   ///< outward at each touch, 3 columns
-  Eigen::MatrixXd response;  ///< unknowns x touches: what a displacement along the normal does to the fit
-  Eigen::VectorXd r_m;       ///< residuals
-  Eigen::VectorXd free;      ///< share of a touch's displacement that its residual shows, 1 - leverage
+  std::size_t index = 0;    ///< of the ball or block, from 0
+  Eigen::MatrixXd normals;  ///< outward at each touch, 3 columns
+  Eigen::MatrixXd
+      response;  ///< unknowns x touches: what a displacement along the normal does to the fit
+  Eigen::VectorXd r_m;   ///< residuals
+  Eigen::VectorXd free;  ///< share of a touch's displacement that its residual shows, 1 - leverage
   [[nodiscard]] double dof() const { return static_cast<double>(r_m.size() - response.rows()); }
 };
 
 /// `design`: touches x unknowns.
 void finish(FeatureResiduals& f, const Eigen::MatrixXd& design) {
-  f.response = design.colPivHouseholderQr().solve(Eigen::MatrixXd::Identity(design.rows(), design.rows()));
-  f.free = (1.0 - (design.cwiseProduct(f.response.transpose())).rowwise().sum().array()).cwiseMax(1e-9);
+  f.response =
+      design.colPivHouseholderQr().solve(Eigen::MatrixXd::Identity(design.rows(), design.rows()));
+  f.free =
+      (1.0 - (design.cwiseProduct(f.response.transpose())).rowwise().sum().array()).cwiseMax(1e-9);
 }
 
 std::vector<Vector3> without_V(const std::vector<Vector3>& points_m, const VolumetricModel& model) {
@@ -46,17 +49,20 @@ std::optional<FeatureResiduals> of_ball(const SeenArtefact& s, std::size_t ball,
   if (!sphere) {
     return std::nullopt;
   }
+
   FeatureResiduals f{.feature = Feature::Ball, .index = ball};
   const auto n = std::ssize(points);
   Eigen::MatrixXd design(n, 4);
   f.normals.resize(n, 3);
   f.r_m.resize(n);
+
   for (Eigen::Index k = 0; k < n; ++k) {
     const Vector3 from = points[static_cast<std::size_t>(k)] - sphere->centre;
     f.normals.row(k) = from.normalized().transpose();
     design.row(k) << f.normals.row(k), 1.0;
     f.r_m(k) = from.norm() - sphere->radius;
   }
+
   finish(f, design);
   return f;
 }
@@ -69,30 +75,34 @@ std::optional<FeatureResiduals> of_block(const SeenArtefact& s, std::size_t bloc
   if (!plane) {
     return std::nullopt;
   }
+
   FeatureResiduals f{.feature = Feature::Block, .index = block};
   const auto n = std::ssize(points);
   const Vector3 x = plane->normal.unitOrthogonal(), y = plane->normal.cross(x);
   Eigen::MatrixXd design(n, 3);
   f.normals = plane->normal.transpose().replicate(n, 1);
   f.r_m.resize(n);
+
   for (Eigen::Index k = 0; k < n; ++k) {
     const Vector3 from = points[static_cast<std::size_t>(k)] - plane->point;
     design.row(k) << 1.0, x.dot(from), y.dot(from);
     f.r_m(k) = plane->normal.dot(from);
   }
+
   finish(f, design);
   // Slopes become a change of the normal: -(slope_x x + slope_y y).
   Eigen::MatrixXd normal_change(3, n);
   for (Eigen::Index k = 0; k < n; ++k) {
     normal_change.col(k) = -(f.response(1, k) * x + f.response(2, k) * y);
   }
+
   f.response = normal_change;
   return f;
 }
 
 std::string place_of(const Observations& o, std::size_t seen, Feature feature, std::size_t index) {
-  return message("position ", o.seen[seen].position, ", ", feature == Feature::Ball ? "ball " : "block ",
-                 index + 1);
+  return message("position ", o.seen[seen].position, ", ",
+                 feature == Feature::Ball ? "ball " : "block ", index + 1);
 }
 
 struct Features {
@@ -113,6 +123,7 @@ Features all_features(const Observations& o, const VolumetricModel& model) {
     f->seen = seen;
     all.compared.push_back(*std::move(f));
   };
+
   for (std::size_t p = 0; p < o.seen.size(); ++p) {
     const SeenArtefact& s = o.seen[p];
     for (std::size_t b = 0; b < s.balls.size(); ++b) {
@@ -126,6 +137,7 @@ Features all_features(const Observations& o, const VolumetricModel& model) {
       }
     }
   }
+
   return all;
 }
 
@@ -143,9 +155,11 @@ double pooled_sigma_m(const std::vector<FeatureResiduals>& all) {
       }
     }
   }
+
   if (values.empty()) {
     return 0.0;
   }
+
   const auto middle = values.begin() + std::ssize(values) / 2;
   std::nth_element(values.begin(), middle, values.end());
   return kMadToSigma * *middle;
@@ -164,12 +178,14 @@ double count_of_touches(const std::vector<FeatureResiduals>& all) {
 }
 
 /// What a displacement of the touches along their normals does to the errors seen.
-Eigen::VectorXd effect_m(const Observations& o, const FeatureResiduals& f, const Eigen::VectorXd& along_m) {
+Eigen::VectorXd effect_m(const Observations& o, const FeatureResiduals& f,
+                         const Eigen::VectorXd& along_m) {
   Eigen::VectorXd rows = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(3 * o.rows.size()));
   const SeenArtefact& s = o.seen[f.seen];
   const Vector3 change = (f.response * along_m).head<3>();  // of the centre, or of the normal
   const auto balls = s.balls.size();
   Vector3 turn = Vector3::Zero();
+
   if (f.feature == Feature::Block) {
     const Vector3 &n1 = s.blocks[0].normal, &n2 = s.blocks[1].normal;
     const Vector3 z = s.T_self_uni.R.col(2), y = s.T_self_uni.R.col(1);
@@ -177,6 +193,7 @@ Eigen::VectorXd effect_m(const Observations& o, const FeatureResiduals& f, const
     const Vector3 dn2 = f.index == 1 ? change : Vector3(Vector3::Zero());
     turn = z.cross(dn1) + z * y.dot((dn2.cross(z) + n2.cross(dn1)) / n2.cross(n1).norm());
   }
+
   for (std::size_t i = 1; i < balls; ++i) {
     auto row = rows.segment<3>(static_cast<Eigen::Index>(3 * (f.seen * balls + i)));
     if (f.feature == Feature::Block) {
@@ -185,15 +202,18 @@ Eigen::VectorXd effect_m(const Observations& o, const FeatureResiduals& f, const
       row = f.index == 0 ? change : Vector3(-change);
     }
   }
+
   return rows;
 }
 
 /// The most significant touch, and whether the others of its feature lie well without it.
-std::optional<TouchFinding> worst_touch(const Observations& o, const std::vector<FeatureResiduals>& all,
-                                        double sigma_m, double false_alarm) {
+std::optional<TouchFinding> worst_touch(const Observations& o,
+                                        const std::vector<FeatureResiduals>& all, double sigma_m,
+                                        double false_alarm) {
   const FeatureResiduals* worst = nullptr;
   Eigen::Index touch = 0;
   double w = 0.0;
+
   for (const FeatureResiduals& f : all) {
     for (Eigen::Index k = 0; k < f.r_m.size(); ++k) {
       if (f.free(k) < kLeastFree) {
@@ -205,29 +225,35 @@ std::optional<TouchFinding> worst_touch(const Observations& o, const std::vector
       }
     }
   }
+
   // Two-sided tail of the normal distribution: below exp(-w^2 / 2).
   if (worst == nullptr || !(0.5 * w * w > natural_logarithm(count_of_touches(all) / false_alarm))) {
     return std::nullopt;
   }
+
   const FeatureResiduals& f = *worst;
   const double size_m = f.r_m(touch) / f.free(touch);
   const double rest_m2 = f.r_m.squaredNorm() - f.r_m(touch) * size_m;
   const double x = natural_logarithm(static_cast<double>(all.size()) / false_alarm);
+
   if (rest_m2 > sigma_m * sigma_m * chi2_bound(std::max(0.0, f.dof() - 1.0), x)) {
     return std::nullopt;  // not one touch
   }
+
   const Eigen::VectorXd along = size_m * Eigen::VectorXd::Unit(f.r_m.size(), touch);
   return TouchFinding{
       .cause = Cause::Touch,
-      .text = message(place_of(o, f), ": touch ", touch + 1, " of ", f.r_m.size(), " lies ", size_m * kUmPerM,
-                      " um off the surface of the others (noise of a touch ", sigma_m * kUmPerM,
-                      " um): dirt or a false trigger; clean and touch there again"),
+      .text =
+          message(place_of(o, f), ": touch ", touch + 1, " of ", f.r_m.size(), " lies ",
+                  size_m * kUmPerM, " um off the surface of the others (noise of a touch ",
+                  sigma_m * kUmPerM, " um): dirt or a false trigger; clean and touch there again"),
       .log_likelihood = 0.5 * w * w,
       .rows_m = effect_m(o, f, along)};
 }
 
-std::optional<TouchFinding> worst_form(const Observations& o, const std::vector<FeatureResiduals>& all,
-                                       double sigma_m, double false_alarm) {
+std::optional<TouchFinding> worst_form(const Observations& o,
+                                       const std::vector<FeatureResiduals>& all, double sigma_m,
+                                       double false_alarm) {
   const FeatureResiduals* worst = nullptr;
   double excess = 0.0;
   for (const FeatureResiduals& f : all) {
@@ -236,27 +262,32 @@ std::optional<TouchFinding> worst_form(const Observations& o, const std::vector<
       worst = &f, excess = chi2 - f.dof();
     }
   }
+
   const double x = natural_logarithm(static_cast<double>(all.size()) / false_alarm);
   if (worst == nullptr || !(excess + worst->dof() > chi2_bound(worst->dof(), x))) {
     return std::nullopt;
   }
+
   const double rms_m = std::sqrt(worst->r_m.squaredNorm() / std::max(1.0, worst->dof()));
-  return TouchFinding{.cause = Cause::Form,
-                      .text = message(place_of(o, *worst), ": its touches scatter by ", rms_m * kUmPerM,
-                                      " um, those of other features by ", sigma_m * kUmPerM,
-                                      " um: the array moved while it was touched, or its surface is dirty"),
-                      .log_likelihood = 0.5 * excess,
-                      .rows_m = {}};
+  return TouchFinding{
+      .cause = Cause::Form,
+      .text = message(place_of(o, *worst), ": its touches scatter by ", rms_m * kUmPerM,
+                      " um, those of other features by ", sigma_m * kUmPerM,
+                      " um: the array moved while it was touched, or its surface is dirty"),
+      .log_likelihood = 0.5 * excess,
+      .rows_m = {}};
 }
 
-/// -ln of an upper bound of the probability that a share of the sum of squares of a + b degrees of freedom, a
-/// of them, exceeds `share` (Chernoff's bound of the beta distribution); 0 below the mean.
+/// -ln of an upper bound of the probability that a share of the sum of squares of a + b degrees of
+/// freedom, a of them, exceeds `share` (Chernoff's bound of the beta distribution); 0 below the
+/// mean.
 double surprise(double share, double a, double b) {
   const double mean = a / (a + b);
   if (!(share > mean && share < 1.0)) {
     return 0.0;
   }
-  return 0.5 * (a * natural_logarithm(mean / share) + b * natural_logarithm((1.0 - mean) / (1.0 - share)));
+  return 0.5 * (a * natural_logarithm(mean / share) +
+                b * natural_logarithm((1.0 - mean) / (1.0 - share)));
 }
 
 /// Squares of what is left of one ball or face, and their number that is free.
@@ -265,30 +296,37 @@ struct FormSquares {
   double m2, dof;
 };
 
-/// A wrong slope of the model's V makes an ellipsoid of a ball: that, too, is taken out. None where nothing
-/// is left.
+/// A wrong slope of the model's V makes an ellipsoid of a ball: that, too, is taken out. None where
+/// nothing is left.
 std::optional<FormSquares> form_squares(const FeatureResiduals& f) {
   if (f.feature == Feature::Block) {
-    return f.dof() > 0.0 ? std::optional(FormSquares{&f, f.r_m.squaredNorm(), f.dof()}) : std::nullopt;
+    return f.dof() > 0.0 ? std::optional(FormSquares{&f, f.r_m.squaredNorm(), f.dof()})
+                         : std::nullopt;
   }
+
   constexpr Eigen::Index kUnknowns = 9;  // radius and place, five strains
   if (f.r_m.size() <= kUnknowns) {
     return std::nullopt;
   }
-  const auto x = f.normals.col(0).array(), y = f.normals.col(1).array(), z = f.normals.col(2).array();
+
+  const auto x = f.normals.col(0).array(), y = f.normals.col(1).array(),
+             z = f.normals.col(2).array();
   Eigen::MatrixXd design(f.r_m.size(), kUnknowns);
   design << Eigen::VectorXd::Ones(f.r_m.size()), f.normals, (x * y).matrix(), (y * z).matrix(),
       (z * x).matrix(), (x * x - y * y).matrix(), (z * z).matrix();
   const Eigen::ColPivHouseholderQR<Eigen::MatrixXd> qr(design);
   const Eigen::VectorXd left = f.r_m - design * qr.solve(f.r_m);
+
   return FormSquares{&f, left.squaredNorm(), static_cast<double>(f.r_m.size() - qr.rank())};
 }
 
-/// The k features that scatter most against the others, for every k from 2: with white noise of any size they
-/// have a share of all squares that follows the beta distribution, whichever k of them are chosen. Balls and
-/// faces are compared among themselves: a backlash or a probe with lobes shows on balls alone.
-std::optional<TouchFinding> form_of_several(const Observations& o, const std::vector<FeatureResiduals>& all,
-                                            Feature kind, double false_alarm) {
+/// The k features that scatter most against the others, for every k from 2: with white noise of any
+/// size they have a share of all squares that follows the beta distribution, whichever k of them
+/// are chosen. Balls and faces are compared among themselves: a backlash or a probe with lobes
+/// shows on balls alone.
+std::optional<TouchFinding> form_of_several(const Observations& o,
+                                            const std::vector<FeatureResiduals>& all, Feature kind,
+                                            double false_alarm) {
   std::vector<FormSquares> sorted;
   double total_m2 = 0.0, total_dof = 0.0;
   for (const FeatureResiduals& f : all) {
@@ -298,11 +336,16 @@ std::optional<TouchFinding> form_of_several(const Observations& o, const std::ve
       total_dof += squares->dof;
     }
   }
-  std::stable_sort(sorted.begin(), sorted.end(),
-                   [](const FormSquares& a, const FormSquares& b) { return a.m2 * b.dof > b.m2 * a.dof; });
+
+  std::stable_sort(sorted.begin(), sorted.end(), [](const FormSquares& a, const FormSquares& b) {
+    return a.m2 * b.dof > b.m2 * a.dof;
+  });
+
   const auto count = static_cast<double>(sorted.size());
-  double m2 = 0.0, dof = 0.0, k = 0.0, log_choices = 0.0, most = natural_logarithm(count / false_alarm);
+  double m2 = 0.0, dof = 0.0, k = 0.0, log_choices = 0.0,
+         most = natural_logarithm(count / false_alarm);
   std::optional<TouchFinding> found;
+
   for (const FormSquares& f : sorted) {
     log_choices += natural_logarithm((count - k) / (k + 1.0));
     k += 1.0;
@@ -315,20 +358,22 @@ std::optional<TouchFinding> form_of_several(const Observations& o, const std::ve
     most = beyond_choice;
     found = TouchFinding{
         .cause = Cause::Form,
-        .text = message("touches of ", k, kind == Feature::Ball ? " balls" : " block faces", " scatter by ",
-                        std::sqrt(m2 / dof) * kUmPerM, " um, those of the others by ",
-                        std::sqrt((total_m2 - m2) / (total_dof - dof)) * kUmPerM, " um, most of all at ",
-                        place_of(o, *sorted.front().of),
-                        ": the array or balls moved while they were touched, or surfaces are dirty"),
+        .text =
+            message("touches of ", k, kind == Feature::Ball ? " balls" : " block faces",
+                    " scatter by ", std::sqrt(m2 / dof) * kUmPerM, " um, those of the others by ",
+                    std::sqrt((total_m2 - m2) / (total_dof - dof)) * kUmPerM,
+                    " um, most of all at ", place_of(o, *sorted.front().of),
+                    ": the array or balls moved while they were touched, or surfaces are dirty"),
         .log_likelihood = beyond_choice,
         .rows_m = {}};
   }
+
   return found;
 }
 
-/// When axis a turns round, the place differs by the vector b_a from what its reading says: a touch against n
-/// comes to lie by sum_a sign(n_a) b_a . n / 2 farther out. Column 3 a + m: component m of b_a. An axis that
-/// hardly moves on the way to the touch stands on either side.
+/// When axis a turns round, the place differs by the vector b_a from what its reading says: a touch
+/// against n comes to lie by sum_a sign(n_a) b_a . n / 2 farther out. Column 3 a + m: component m
+/// of b_a. An axis that hardly moves on the way to the touch stands on either side.
 constexpr Eigen::Index kBacklashes = 9;
 constexpr double kLeastMotion = 0.1;  // of the way to the touch
 
@@ -359,8 +404,8 @@ struct Backlash {
   bool across = false;  ///< any of them across the axes
 };
 
-/// Unknowns of some columns only. A priori 0 with a standard deviation of 100 um, more than axes in order
-/// have: what the touches hardly tell from radius and place stays near zero.
+/// Unknowns of some columns only. A priori 0 with a standard deviation of 100 um, more than axes in
+/// order have: what the touches hardly tell from radius and place stays near zero.
 Backlash backlash_of(const std::vector<Eigen::Index>& columns, const Eigen::MatrixXd& N,
                      const Eigen::VectorXd& g, double sigma_m) {
   constexpr double kPrior_m = 100e-6;
@@ -371,13 +416,15 @@ Backlash backlash_of(const std::vector<Eigen::Index>& columns, const Eigen::Matr
   const Eigen::ArrayXd shown = eigen.eigenvalues().array().max(0.0);
   const Eigen::ArrayXd along = (eigen.eigenvectors().transpose() * g_columns).array();
   const Eigen::VectorXd b = eigen.eigenvectors() * (along / (shown + least)).matrix();
-  Backlash found{.drop = g_columns.dot(b) / (sigma_m * sigma_m), .dof = (shown / (shown + least)).sum()};
+  Backlash found{.drop = g_columns.dot(b) / (sigma_m * sigma_m),
+                 .dof = (shown / (shown + least)).sum()};
   found.b_m(columns) = b;
   return found;
 }
 
 /// Along the axes; across them, too, where that explains significantly more.
-Backlash significant_backlash(const std::vector<FeatureResiduals>& all, double sigma_m, double false_alarm) {
+Backlash significant_backlash(const std::vector<FeatureResiduals>& all, double sigma_m,
+                              double false_alarm) {
   Eigen::MatrixXd N = Eigen::MatrixXd::Zero(kBacklashes, kBacklashes);
   Eigen::VectorXd g = Eigen::VectorXd::Zero(kBacklashes);
   for (const FeatureResiduals& f : all) {
@@ -387,11 +434,13 @@ Backlash significant_backlash(const std::vector<FeatureResiduals>& all, double s
       g += left.transpose() * f.r_m;
     }
   }
+
   const double x = natural_logarithm(2.0 / false_alarm);
   Backlash along = backlash_of({0, 4, 8}, N, g, sigma_m);
   if (!(along.drop > chi2_bound(along.dof, x))) {
     along = {};
   }
+
   Backlash across = backlash_of({0, 1, 2, 3, 4, 5, 6, 7, 8}, N, g, sigma_m);
   across.across = true;
   return across.drop - along.drop > chi2_bound(across.dof - along.dof, x) ? across : along;
@@ -414,19 +463,23 @@ TouchFinding finding_of(const Backlash& backlash, const Observations& o,
       rows += effect_m(o, f, along_of_backlash(f) * backlash.b_m);
     }
   }
-  const Matrix3 b_um = kUmPerM * Eigen::Map<const Matrix3>(backlash.b_m.data());  // column a: of axis a
+
+  // column a: of axis a
+  const Matrix3 b_um = kUmPerM * Eigen::Map<const Matrix3>(backlash.b_m.data());
   const Matrix3 aside_um = b_um - Matrix3(b_um.diagonal().asDiagonal());
-  return {.cause = Cause::Backlash,
-          .text = message("the touches depend on the side they come from: backlash of X ", b_um(0, 0), ", Y ",
-                          b_um(1, 1), ", Z ", b_um(2, 2), " um along the axes, up to ",
-                          aside_um.cwiseAbs().maxCoeff(), " um across them, or a probe with lobes"),
-          .log_likelihood = 0.5 * backlash.drop,
-          .rows_m = std::move(rows)};
+  return {
+      .cause = Cause::Backlash,
+      .text = message("the touches depend on the side they come from: backlash of X ", b_um(0, 0),
+                      ", Y ", b_um(1, 1), ", Z ", b_um(2, 2), " um along the axes, up to ",
+                      aside_um.cwiseAbs().maxCoeff(), " um across them, or a probe with lobes"),
+      .log_likelihood = 0.5 * backlash.drop,
+      .rows_m = std::move(rows)};
 }
 
 std::string why_not_compared(const Observations& o, const Features& features) {
   if (o.seen.empty()) {
-    return "errors were given without touches: not compared are single touches, balls off their places, an "
+    return "errors were given without touches: not compared are single touches, balls off their "
+           "places, an "
            "array "
            "that moved, creeps or is bent, a drift, and slow noise";
   }
@@ -437,16 +490,19 @@ std::string why_not_compared(const Observations& o, const Features& features) {
 
 }  // namespace
 
-TouchResiduals touch_residuals(const Observations& o, const VolumetricModel& model, double false_alarm) {
+TouchResiduals touch_residuals(const Observations& o, const VolumetricModel& model,
+                               double false_alarm) {
   Features features = all_features(o, model);
   const std::vector<FeatureResiduals>& all = features.compared;
   TouchResiduals found;
   found.not_compared = why_not_compared(o, features);
   found.failed = std::move(features.failed);
   found.sigma_m = pooled_sigma_m(all);
+
   if (!(found.sigma_m > 0.0)) {
     return found;
   }
+
   double squares = 0.0, count = 0.0;
   for (const FeatureResiduals& f : all) {
     if (f.feature == Feature::Ball) {
@@ -454,12 +510,14 @@ TouchResiduals touch_residuals(const Observations& o, const VolumetricModel& mod
       count += 1.0;
     }
   }
+
   found.s_centre_m = found.sigma_m * std::sqrt(squares / std::max(1.0, count));
   const Backlash backlash = significant_backlash(all, found.sigma_m, false_alarm);
   const std::vector<FeatureResiduals> left = without(backlash, all);
   found.sigma_of_no_cause_m = pooled_sigma_m(left);
   auto touch = worst_touch(o, all, found.sigma_m, false_alarm);
   std::optional<TouchFinding> form;
+
   if (!touch) {  // else its ball or block scatters because of it
     form = worst_form(o, left, found.sigma_m, 0.5 * false_alarm);
     // Where an axis hardly moves on the way to a touch, backlash across it is left in the touch.
@@ -470,14 +528,17 @@ TouchResiduals touch_residuals(const Observations& o, const VolumetricModel& mod
       form = form_of_several(o, left, Feature::Block, 0.25 * false_alarm);
     }
   }
+
   for (std::optional<TouchFinding>* finding : {&form, &touch}) {
     if (*finding) {
       found.findings.push_back(*std::move(*finding));
     }
   }
+
   if (backlash.drop > 0.0) {
     found.findings.push_back(finding_of(backlash, o, all));
   }
+
   return found;
 }
 

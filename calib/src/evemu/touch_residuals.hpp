@@ -1,6 +1,6 @@
 #pragma once
-/// Touches against the spheres and planes of the others of their feature, once V of a model is taken out of
-/// them: what is left is the probe's, or a fault.
+/// Touches against the spheres and planes of the others of their feature, once V of a model is
+/// taken out of them: what is left is the probe's, or a fault.
 
 #include <Eigen/Core>
 #include <string>
@@ -19,7 +19,8 @@ struct TouchFinding {
 };
 
 struct TouchResiduals {
-  double sigma_m = 0.0;     ///< of one touch along the normal; from the median, which faults do not move
+  /// of one touch along the normal; from the median, which faults do not move
+  double sigma_m = 0.0;
   double sigma_of_no_cause_m = 0.0;  ///< the same without the backlash that was found
   double s_centre_m = 0.0;  ///< of a ball's centre per coordinate that follows, root mean square
   std::vector<TouchFinding> findings;
@@ -27,6 +28,7 @@ struct TouchResiduals {
   std::string not_compared;         ///< why none was compared; else empty
 };
 /// `false_alarm`: family-wise probability. Needs touches (Observations::seen).
-[[nodiscard]] TouchResiduals touch_residuals(const Observations&, const VolumetricModel&, double false_alarm);
+[[nodiscard]] TouchResiduals touch_residuals(const Observations&, const VolumetricModel&,
+                                             double false_alarm);
 
 }  // namespace abbe::calib::evemu

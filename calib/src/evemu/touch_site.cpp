@@ -86,14 +86,15 @@ double Site::extent_m() const {
 }
 
 bool Site::has_point_near(std::size_t feature, const Vector3& p_m) const {
-  return std::ranges::any_of(points_[feature],
-                             [&](const Vector3& q) { return (p_m - q).norm() < options_.same_place_m; });
+  return std::ranges::any_of(
+      points_[feature], [&](const Vector3& q) { return (p_m - q).norm() < options_.same_place_m; });
 }
 
 std::optional<std::size_t> Site::feature_of(const Vector3& p_m, std::size_t expected) const {
   if (ball1_m_) {
     const double off_m = std::abs((p_m - *ball1_m_).norm() - radius_m(kBall1));
-    if (off_m <= options_.observe.max_ball1_shift_m + options_.observe.max_off_surface_m) return kBall1;
+    if (off_m <= options_.observe.max_ball1_shift_m + options_.observe.max_off_surface_m)
+      return kBall1;
   } else {
     if (!near_first_ball(p_m)) return std::nullopt;
     return kBall1;
@@ -102,8 +103,8 @@ std::optional<std::size_t> Site::feature_of(const Vector3& p_m, std::size_t expe
   return ball_of(p_m, expected);
 }
 
-/// Nothing is known yet: the touches of one ball are no farther apart than its diameter, or twice that of the
-/// calibrator if it is another artefact's.
+/// Nothing is known yet: the touches of one ball are no farther apart than its diameter, or twice
+/// that of the calibrator if it is another artefact's.
 bool Site::near_first_ball(const Vector3& p_m) const {
   constexpr double kMostDiameters = 2.0;
   return std::ranges::all_of(points_[kBall1], [&](const Vector3& q) {
@@ -119,20 +120,24 @@ bool Site::on_face(std::size_t block, const Vector3& p_m) const {
          (p_m - face->point).norm() <= 2.0 * spread_m(points_[block], face->point) + kBeyond_m;
 }
 
-/// The calibrator says where faces look to, not where they are: what is no ball and expected on a face lies
-/// on it until the face is known.
+/// The calibrator says where faces look to, not where they are: what is no ball and expected on a
+/// face lies on it until the face is known.
 std::optional<std::size_t> Site::face_of(const Vector3& p_m, std::size_t expected) const {
   for (const std::size_t block : {kBlock1, kBlock2}) {
     if (on_face(block, p_m)) return block;
   }
+
   const bool ball1_lacks = points_[kBall1].size() < options_.observe.least_points_per_ball;
   const bool balls_known = !candidates_.empty();
-  if ((expected > kBlock2 && balls_known) || (expected == kBall1 && ball1_lacks)) return std::nullopt;
+  if ((expected > kBlock2 && balls_known) || (expected == kBall1 && ball1_lacks))
+    return std::nullopt;
   if ((p_m - *ball1_m_).norm() > extent_m()) return std::nullopt;
   const std::size_t first = expected > kBlock2 ? kBlock1 : std::max(expected, kBlock1);
+
   for (std::size_t block = first; block <= kBlock2; ++block) {
     if (!sure_face(points_[block], options_.observe.max_off_surface_m)) return block;
   }
+
   return std::nullopt;
 }
 
@@ -244,16 +249,19 @@ void Site::place_balls() {
   const auto& c = calibrator_;
   const RigidTransform T_pre_uni =
       *uniform_frame(c.balls.front().centre_m, c.blocks[0].normal, c.blocks[1].normal);
+
   for (const double side_1 : possible_sides(kBlock1, *n1)) {
     for (const double side_2 : possible_sides(kBlock2, *n2)) {
       const auto T_self_uni = uniform_frame(*ball1_m_, side_1 * n1->normal, side_2 * n2->normal);
       if (!T_self_uni) return;
-      auto& candidate = candidates_.emplace_back(Candidate{.side = {side_1, side_2}, .centres_m = {}});
+      auto& candidate =
+          candidates_.emplace_back(Candidate{.side = {side_1, side_2}, .centres_m = {}});
       for (const auto& ball : c.balls)
         candidate.centres_m.push_back(*T_self_uni *
                                       (T_pre_uni.R.transpose() * (ball.centre_m - T_pre_uni.t_m)));
     }
   }
+
   for (std::size_t f = kBlock2 + 1; f < points_.size(); ++f) {
     if (accepted_[f]) rule_out_by(f);
   }
@@ -266,7 +274,8 @@ void Site::keep_sides() {
     const auto side_of = [block](const Candidate& candidate) { return candidate.side[block - 1]; };
     const double side = side_of(candidates_.front());
     const auto plane = face(block);
-    const bool agreed = std::ranges::all_of(candidates_, [&](const auto& c) { return side_of(c) == side; });
+    const bool agreed =
+        std::ranges::all_of(candidates_, [&](const auto& c) { return side_of(c) == side; });
     if (agreed && plane && is_sided(*plane)) sides_[block - 1] = side;
   }
 }
@@ -281,19 +290,23 @@ FeatureCheck Site::check_ball(std::size_t feature) const {
     return std::abs(s.radius - radius_m(feature)) <= options_.observe.max_radius_mismatch_m &&
            largest(s.residuals) <= options_.observe.max_off_surface_m;
   };
+
   const auto sphere = fit::fit_sphere(points);
   if (sphere && fits(*sphere)) return {.fine = true};
   FeatureCheck found;
+
   // One sphere, with more points than it needs, but of another size.
   if (sphere && points.size() > options_.observe.least_points_per_ball &&
       largest(sphere->residuals) <= options_.observe.max_off_surface_m)
     found.other_radius_m = sphere->radius;
+
   for (std::size_t i = 0; i < points.size() && !found.other_radius_m; ++i) {
     const auto rest = fit::fit_sphere(without(points, i));
     if (!rest || !fits(*rest)) continue;
     const double off_m = std::abs((points[i] - rest->centre).norm() - rest->radius);
     if (off_m > found.off_m) found = {.outlier = i, .off_m = off_m};
   }
+
   return found;
 }
 
@@ -302,6 +315,7 @@ FeatureCheck Site::check_face(std::size_t feature) const {
   const auto face_of_some = [this](const std::vector<Vector3>& some) {
     return likely_face(some, 3, options_.observe.max_off_surface_m);
   };
+
   if (face_of_some(points)) return {.fine = true};
   FeatureCheck found;
   for (std::size_t i = 0; i < points.size(); ++i) {
@@ -310,6 +324,7 @@ FeatureCheck Site::check_face(std::size_t feature) const {
     const double off_m = std::abs((points[i] - rest->point).dot(rest->normal));
     if (off_m > found.off_m) found = {.outlier = i, .off_m = off_m};
   }
+
   return found;
 }
 

@@ -1,6 +1,7 @@
 #pragma once
-/// One position of the ball array while it is being touched: the points of every feature, and where the
-/// features are as far as these tell. Features by measuring order: 0 Ball1, 1 and 2 the blocks, 3 Ball2, ...
+/// One position of the ball array while it is being touched: the points of every feature, and where
+/// the features are as far as these tell. Features by measuring order: 0 Ball1, 1 and 2 the blocks,
+/// 3 Ball2, ...
 
 #include <array>
 #include <cstddef>
@@ -26,22 +27,27 @@ struct FeatureCheck {
 
 class Site {
  public:
-  /// `before`: the position before, for what stays as it was; may be null. References must outlive the site.
+  /// `before`: the position before, for what stays as it was; may be null. References must outlive
+  /// the site.
   Site(const Calibrator&, const GuideOptions&, const Site* before);
 
-  /// The feature that p lies on; nothing: none known. `expected` decides where the features themselves
-  /// cannot.
-  [[nodiscard]] std::optional<std::size_t> feature_of(const Vector3& p_m, std::size_t expected) const;
-  /// Distance to the surface of the nearest ball known, which it is in `ball`; infinity before any is.
+  /// The feature that p lies on; nothing: none known. `expected` decides where the features
+  /// themselves cannot.
+  [[nodiscard]] std::optional<std::size_t> feature_of(const Vector3& p_m,
+                                                      std::size_t expected) const;
+  /// Distance to the surface of the nearest ball known, which it is in `ball`; infinity before any
+  /// is.
   [[nodiscard]] double nearest_ball_m(const Vector3& p_m, std::size_t& ball) const;
 
-  [[nodiscard]] const std::vector<Vector3>& points(std::size_t feature) const { return points_[feature]; }
+  [[nodiscard]] const std::vector<Vector3>& points(std::size_t feature) const {
+    return points_[feature];
+  }
   [[nodiscard]] bool has_point_near(std::size_t feature, const Vector3& p_m) const;
   void add(std::size_t feature, const Vector3& p_m);
   void drop(std::size_t feature, std::size_t point);
   void clear(std::size_t feature);
-  /// A ball, all of whose points are sound: it decides to which sides the faces look. Gives the number of
-  /// touches of other balls that lie on none with these sides; they are gone.
+  /// A ball, all of whose points are sound: it decides to which sides the faces look. Gives the
+  /// number of touches of other balls that lie on none with these sides; they are gone.
   std::size_t accept_ball(std::size_t feature);
   /// The position is finished: the next one may rely on what was decided.
   void keep_sides();
@@ -64,12 +70,14 @@ class Site {
   [[nodiscard]] std::vector<double> possible_sides(std::size_t block, const fit::Plane& face) const;
   void place_balls();
 
-  /// Places of all balls if the faces look to these sides: 1, a face looks away from Ball1; -1, towards it.
+  /// Places of all balls if the faces look to these sides: 1, a face looks away from Ball1; -1,
+  /// towards it.
   struct Candidate {
     std::array<double, 2> side{};
     std::vector<Vector3> centres_m;
   };
-  [[nodiscard]] double off_ball_m(const Candidate& candidate, std::size_t ball, const Vector3& p_m) const;
+  [[nodiscard]] double off_ball_m(const Candidate& candidate, std::size_t ball,
+                                  const Vector3& p_m) const;
   [[nodiscard]] std::size_t nearest_ball(const Candidate& candidate, const Vector3& p_m) const;
   void rule_out_by(std::size_t feature);
 

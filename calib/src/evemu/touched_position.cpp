@@ -24,10 +24,12 @@ Result<void> check_complete(int position, const Touched& touched, const Calibrat
   for (const auto& [feature, points] : touched) {
     const int most = feature.first == Feature::Ball ? static_cast<int>(c.balls.size()) : 2;
     if (feature.second < 1 || feature.second > most) {
-      return at_position(position, ErrorCode::BadInput,
-                         message("the calibrator has no ", name_of(feature.first), " ", feature.second));
+      return at_position(
+          position, ErrorCode::BadInput,
+          message("the calibrator has no ", name_of(feature.first), " ", feature.second));
     }
   }
+
   const auto require = [&](Feature feature, int number, std::size_t least) -> Result<void> {
     const auto at = touched.find({feature, number});
     const std::size_t points = at == touched.end() ? 0 : at->second.points_m.size();
@@ -36,27 +38,32 @@ Result<void> check_complete(int position, const Touched& touched, const Calibrat
                          message(name_of(feature), " ", number, " was left out"));
     }
     if (points < least) {
-      return at_position(
-          position, ErrorCode::TooFewObservations,
-          message(name_of(feature), " ", number, " has too few points: ", points, ", needs ", least));
+      return at_position(position, ErrorCode::TooFewObservations,
+                         message(name_of(feature), " ", number, " has too few points: ", points,
+                                 ", needs ", least));
     }
     return {};
   };
+
   for (const Calibrator::Ball& ball : c.balls) {
-    if (Result<void> enough = require(Feature::Ball, ball.number, options.least_points_per_ball); !enough) {
+    if (Result<void> enough = require(Feature::Ball, ball.number, options.least_points_per_ball);
+        !enough) {
       return enough;
     }
   }
+
   for (const Calibrator::Block& block : c.blocks) {
     if (Result<void> enough = require(Feature::Block, block.number, options.least_points_per_block);
         !enough) {
       return enough;
     }
   }
+
   return {};
 }
 
-Result<std::vector<fit::Sphere>> fit_balls(int position, const Touched& touched, const Calibrator& c) {
+Result<std::vector<fit::Sphere>> fit_balls(int position, const Touched& touched,
+                                           const Calibrator& c) {
   std::vector<fit::Sphere> spheres;
   for (const Calibrator::Ball& ball : c.balls) {
     Result<fit::Sphere> sphere = fit::fit_sphere(touched.at({Feature::Ball, ball.number}).points_m);
@@ -69,10 +76,12 @@ Result<std::vector<fit::Sphere>> fit_balls(int position, const Touched& touched,
   return spheres;
 }
 
-Result<void> check_single_touches(int position, const Touched& touched, const ObserveOptions& options) {
+Result<void> check_single_touches(int position, const Touched& touched,
+                                  const ObserveOptions& options) {
   for (const auto& [feature, points] : touched) {
-    const auto wrong = feature.first == Feature::Ball ? wrong_touch_on_ball(points.points_m, options)
-                                                      : wrong_touch_on_face(points.points_m, options);
+    const auto wrong = feature.first == Feature::Ball
+                           ? wrong_touch_on_ball(points.points_m, options)
+                           : wrong_touch_on_face(points.points_m, options);
     if (wrong) {
       return at_position(position, ErrorCode::BadInput,
                          message(name_of(feature.first), " ", feature.second, ": ", *wrong));
@@ -87,8 +96,8 @@ Result<void> check_twice(int position, std::span<const fit::Sphere> balls) {
       const double apart_m = (balls[i].centre - balls[j].centre).norm();
       if (apart_m < 0.5 * (balls[i].radius + balls[j].radius)) {
         return at_position(position, ErrorCode::BadInput,
-                           message("one ball was touched twice, as ball ", j + 1, " and as ball ", i + 1,
-                                   " (centres ", apart_m * kMmPerM, " mm apart)"));
+                           message("one ball was touched twice, as ball ", j + 1, " and as ball ",
+                                   i + 1, " (centres ", apart_m * kMmPerM, " mm apart)"));
       }
     }
   }
@@ -111,18 +120,21 @@ std::string radii_fit_with(std::span<const fit::Sphere> balls, const Calibrator&
   return "";
 }
 
-/// The touch without which the others lie much better on a sphere whose radius is at most half as far from
-/// this one.
+/// The touch without which the others lie much better on a sphere whose radius is at most half as
+/// far from this one.
 std::optional<std::size_t> touch_off_radius(std::span<const Vector3> points_m, double radius_m) {
   constexpr std::size_t kUnknowns = 4, kRedundant = 2;
   constexpr double kClear = 3.0;  // rms; machines with errors of some mm bend the sphere
   const Result<fit::Sphere> all = fit::fit_sphere(points_m);
+
   if (!all || points_m.size() <= kUnknowns + kRedundant) {
     return std::nullopt;
   }
+
   const double most_off_m = 0.5 * std::abs(all->radius - radius_m);
   double least_m = all->residuals.rms / kClear;
   std::optional<std::size_t> found;
+
   for (std::size_t k = 0; k < points_m.size(); ++k) {
     std::vector<Vector3> others(points_m.begin(), points_m.end());
     others.erase(others.begin() + static_cast<std::ptrdiff_t>(k));
@@ -132,11 +144,13 @@ std::optional<std::size_t> touch_off_radius(std::span<const Vector3> points_m, d
       found = k;
     }
   }
+
   return found;
 }
 
-std::string why_another_radius(std::span<const fit::Sphere> balls, std::span<const Vector3> points_m,
-                               double expected_m, const Calibrator& c) {
+std::string why_another_radius(std::span<const fit::Sphere> balls,
+                               std::span<const Vector3> points_m, double expected_m,
+                               const Calibrator& c) {
   if (const auto k = touch_off_radius(points_m, expected_m)) {
     return message("without touch ", *k + 1, " of ", points_m.size(),
                    " it comes nearer to that: a false trigger, or dirt; touch there again");
@@ -150,10 +164,11 @@ Result<void> check_radii(int position, const Touched& touched, std::span<const f
     const double expected_m = c.balls[i].radius_m + c.tip_radius_m;
     if (!(std::abs(balls[i].radius - expected_m) <= options.max_radius_mismatch_m)) {
       const auto& points_m = touched.at({Feature::Ball, c.balls[i].number}).points_m;
-      return at_position(position, ErrorCode::BadInput,
-                         message("ball ", i + 1, " has radius ", balls[i].radius * kMmPerM,
-                                 " mm, calibrator \"", c.name, "\" and tip make ", expected_m * kMmPerM,
-                                 " mm: ", why_another_radius(balls, points_m, expected_m, c)));
+      return at_position(
+          position, ErrorCode::BadInput,
+          message("ball ", i + 1, " has radius ", balls[i].radius * kMmPerM, " mm, calibrator \"",
+                  c.name, "\" and tip make ", expected_m * kMmPerM,
+                  " mm: ", why_another_radius(balls, points_m, expected_m, c)));
     }
   }
   return {};
@@ -178,17 +193,21 @@ std::string balls_fit_with(std::span<const Vector3> calibrated, std::span<const 
     }
     return T.has_value();
   };
+
   std::vector<std::string> texts;
   std::vector<Vector3> mirrored;
   for (const Vector3& p : calibrated) {
     mirrored.emplace_back(-p.x(), p.y(), p.z());
   }
+
   if (fits(mirrored)) {
     texts.emplace_back("one axis reversed or two axes swapped (a mirror image)");
   }
+
   if (fits({calibrated.rbegin(), calibrated.rend()})) {
     texts.emplace_back("the balls numbered backwards");
   }
+
   for (std::size_t i = 0; i < calibrated.size(); ++i) {
     for (std::size_t j = i + 1; j < calibrated.size(); ++j) {
       std::vector<Vector3> swapped(calibrated.begin(), calibrated.end());
@@ -198,21 +217,24 @@ std::string balls_fit_with(std::span<const Vector3> calibrated, std::span<const 
       }
     }
   }
+
   return texts.empty() ? "" : "; they fit with " + joined_with_or(texts);
 }
 
 /// Machine from calibration coordinates, by the balls alone.
-Result<RigidTransform> rough_pose(int position, std::span<const fit::Sphere> balls, const Calibrator& c,
-                                  const ObserveOptions& options) {
+Result<RigidTransform> rough_pose(int position, std::span<const fit::Sphere> balls,
+                                  const Calibrator& c, const ObserveOptions& options) {
   std::vector<Vector3> from, to;
   for (std::size_t i = 0; i < balls.size(); ++i) {
     from.push_back(c.balls[i].centre_m);
     to.push_back(balls[i].centre);
   }
+
   const Result<RigidTransform> T = fit_rigid(from, to);
   if (!T) {
     return at_position(position, T.error().code, T.error().text);
   }
+
   double worst_m = 0.0;
   std::size_t worst = 0;
   for (std::size_t i = 0; i < balls.size(); ++i) {
@@ -222,13 +244,16 @@ Result<RigidTransform> rough_pose(int position, std::span<const fit::Sphere> bal
       worst = i;
     }
   }
+
   if (worst_m > options.max_shape_mismatch_m) {
-    return at_position(position, ErrorCode::BadInput,
-                       message("the balls do not have the shape of calibrator \"", c.name, "\": ball ",
-                               worst + 1, " is ", worst_m * kMmPerM,
-                               " mm off: calibrator file of another artefact, or balls numbered differently",
-                               balls_fit_with(from, to, options)));
+    return at_position(
+        position, ErrorCode::BadInput,
+        message("the balls do not have the shape of calibrator \"", c.name, "\": ball ", worst + 1,
+                " is ", worst_m * kMmPerM,
+                " mm off: calibrator file of another artefact, or balls numbered differently",
+                balls_fit_with(from, to, options)));
   }
+
   return *T;
 }
 
@@ -247,9 +272,11 @@ Result<void> fit_blocks(SeenArtefact& seen, const Touched& touched, const Calibr
     }
     seen.blocks[b] = *plane;
   }
+
   const auto fits = [&](std::size_t plane, std::size_t block) {
     return line_angle_rad(seen.blocks[plane].normal, nominal[block]) <= options.max_block_tilt_rad;
   };
+
   if (!(fits(0, 0) && fits(1, 1))) {
     if (fits(0, 1) && fits(1, 0)) {
       return at_position(seen.position, ErrorCode::BadInput, "blocks 1 and 2 are swapped");
@@ -261,19 +288,23 @@ Result<void> fit_blocks(SeenArtefact& seen, const Touched& touched, const Calibr
                 line_angle_rad(seen.blocks[wrong].normal, nominal[wrong]) * kMmPerM,
                 " mrad against calibrator \"", c.name, "\": another face, or another artefact"));
   }
+
   return {};
 }
 
 }  // namespace
 
-Result<std::map<int, Touched>> by_position(std::span<const Touch> touches, const ObserveOptions& options) {
+Result<std::map<int, Touched>> by_position(std::span<const Touch> touches,
+                                           const ObserveOptions& options) {
   std::map<int, Touched> found;
   for (std::size_t i = 0; i < touches.size(); ++i) {
     if (!touches[i].p_m.allFinite()) {
-      return at_position(touches[i].position, ErrorCode::NotFinite, message("touch ", i, " is not a number"));
+      return at_position(touches[i].position, ErrorCode::NotFinite,
+                         message("touch ", i, " is not a number"));
     }
     found[touches[i].position][{touches[i].feature, touches[i].number}].add(touches[i].p_m, i);
   }
+
   for (int p = 1; p <= options.positions; ++p) {
     if (!found.contains(p)) {
       return at_position(
@@ -281,12 +312,14 @@ Result<std::map<int, Touched>> by_position(std::span<const Touch> touches, const
           message("left out: nothing was touched there, of ", options.positions, " positions"));
     }
   }
+
   for (const auto& [position, touched] : found) {
     if (position < 1 || position > options.positions) {
       return at_position(position, ErrorCode::BadInput,
                          message("positions are numbered 1 to ", options.positions));
     }
   }
+
   return found;
 }
 
@@ -295,52 +328,66 @@ Result<SeenArtefact> see(int position, const Touched& touched, const Calibrator&
   if (Result<void> complete = check_complete(position, touched, c, options); !complete) {
     return tl::unexpected(complete.error());
   }
+
   SeenArtefact seen;
   seen.position = position;
   Result<std::vector<fit::Sphere>> balls = fit_balls(position, touched, c);
+
   if (!balls) {
     return tl::unexpected(balls.error());
   }
+
   if (Result<void> unit = check_unit(position, touched, *balls, c, options); !unit) {
     return tl::unexpected(unit.error());
   }
+
   if (Result<void> single = check_single_touches(position, touched, options); !single) {
     return tl::unexpected(single.error());
   }
+
   seen.balls = *std::move(balls);
   for (const Calibrator::Ball& ball : c.balls) {
     const TouchedPoints& points = touched.at({Feature::Ball, ball.number});
     seen.ball_points_m.push_back(points.points_m);
     seen.ball_index.push_back(points.mean_index());
   }
+
   if (Result<void> twice = check_twice(position, seen.balls); !twice) {
     return tl::unexpected(twice.error());
   }
+
   if (Result<void> radii = check_radii(position, touched, seen.balls, c, options); !radii) {
     return tl::unexpected(radii.error());
   }
+
   const Result<RigidTransform> pose = rough_pose(position, seen.balls, c, options);
   if (!pose) {
     return tl::unexpected(pose.error());
   }
+
   if (Result<void> blocks = fit_blocks(seen, touched, c, *pose, options); !blocks) {
     return tl::unexpected(blocks.error());
   }
+
   Result<RigidTransform> frame =
       uniform_frame(seen.balls.front().centre, seen.blocks[0].normal, seen.blocks[1].normal);
   if (!frame) {
     return at_position(position, frame.error().code, frame.error().text);
   }
+
   seen.T_self_uni = *frame;
   if (touched_from_below(seen)) {
     return at_position(
         position, ErrorCode::BadInput,
-        message("the balls were touched from below, against the normal of block 1 of calibrator \"", c.name,
+        message("the balls were touched from below, against the normal of block 1 of calibrator \"",
+                c.name,
                 "\": an axis is mirrored, or two axes are swapped, or the normal points inward"));
   }
+
   for (const Calibrator::Ball& ball : c.balls) {
     seen.ideal_m.push_back(seen.T_self_uni * (T_uni_pre * ball.centre_m));
   }
+
   return seen;
 }
 

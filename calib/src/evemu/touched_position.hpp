@@ -21,7 +21,9 @@ struct TouchedPoints {
     points_m.push_back(p_m);
     index_sum += static_cast<double>(index);
   }
-  [[nodiscard]] double mean_index() const { return index_sum / static_cast<double>(points_m.size()); }
+  [[nodiscard]] double mean_index() const {
+    return index_sum / static_cast<double>(points_m.size());
+  }
 };
 /// Of one position, by feature and number.
 using Touched = std::map<std::pair<Feature, int>, TouchedPoints>;
@@ -31,12 +33,14 @@ using Touched = std::map<std::pair<Feature, int>, TouchedPoints>;
   return failure(code, message("position ", position, ": ", what));
 }
 
-/// TooFewObservations where a position of 1 to ObserveOptions::positions has no touch; BadInput, NotFinite.
-[[nodiscard]] Result<std::map<int, Touched>> by_position(std::span<const Touch>, const ObserveOptions&);
+/// TooFewObservations where a position of 1 to ObserveOptions::positions has no touch; BadInput,
+/// NotFinite.
+[[nodiscard]] Result<std::map<int, Touched>> by_position(std::span<const Touch>,
+                                                         const ObserveOptions&);
 
 /// Spheres, planes and pose of a position. `at_machine`: the calibrator at the array's temperature;
-/// `T_uni_pre`: from its coordinates into the uniform frame. BadInput that names what does not fit, and with
-/// which mistake it would.
+/// `T_uni_pre`: from its coordinates into the uniform frame. BadInput that names what does not fit,
+/// and with which mistake it would.
 [[nodiscard]] Result<SeenArtefact> see(int position, const Touched&, const Calibrator& at_machine,
                                        const RigidTransform& T_uni_pre, const ObserveOptions&);
 

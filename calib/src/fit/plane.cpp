@@ -14,22 +14,28 @@ Result<Plane> fit_plane(std::span<const Vector3> points, const Vector3& towards,
   if (!set) {
     return tl::unexpected(set.error());
   }
+
   if (set->on_a_line()) {
     return failure(ErrorCode::DegenerateGeometry,
                    message("plane: the ", points.size(), " points lie on a line (extents ",
                            set->singular_values.transpose(), ")"));
   }
+
   Plane plane;
   plane.point = set->centroid;
   plane.normal = set->directions.col(2);
   const double side = plane.normal.dot(towards);
+
   if (!(std::abs(side) > PointSet::kDegenerate * towards.norm())) {
-    return failure(ErrorCode::DegenerateGeometry,
-                   "plane: the given outward direction lies in the plane and does not tell its sides apart");
+    return failure(
+        ErrorCode::DegenerateGeometry,
+        "plane: the given outward direction lies in the plane and does not tell its sides apart");
   }
+
   if (side < 0) {
     plane.normal = -plane.normal;
   }
+
   plane.residuals = residual_statistics(set->centred.transpose() * plane.normal, kUnknowns);
   const double sigma = known_sigma.value_or(plane.residuals.sigma0);
   for (Eigen::Index i = 0; i < 2; ++i) {
@@ -37,6 +43,7 @@ Result<Plane> fit_plane(std::span<const Vector3> points, const Vector3& towards,
     plane.cov_normal.noalias() +=
         u_tilt * u_tilt * set->directions.col(i) * set->directions.col(i).transpose();
   }
+
   plane.u_offset = sigma / std::sqrt(static_cast<double>(points.size()));
   return plane;
 }

@@ -34,6 +34,7 @@ Result<PointSet> point_set(std::span<const Vector3> points, std::size_t needed, 
     }
     set.centred.col(static_cast<Eigen::Index>(i)) = points[i];
   }
+
   if (points.size() >= needed && !points.empty()) {
     // Relative to the first point before summing: the mean of large coordinates would lose digits.
     set.centred.colwise() -= points.front();
@@ -45,20 +46,25 @@ Result<PointSet> point_set(std::span<const Vector3> points, std::size_t needed, 
   } else {
     set.distinct = points.size();
   }
+
   if (set.distinct < needed) {
     return failure(ErrorCode::TooFewObservations,
                    message(what, ": ", set.distinct, " different points, needs ", needed));
   }
-  // R of the points' QR has their singular values and right vectors, and is 3 x 3 for any number of them.
+
+  // R of the points' QR has their singular values and right vectors, and is 3 x 3 for any number of
+  // them.
   const Eigen::HouseholderQR<Eigen::MatrixX3d> qr(set.centred.transpose());
   const Eigen::Index rank = std::min<Eigen::Index>(3, set.centred.cols());
   Matrix3 R = Matrix3::Zero();
   R.topRows(rank) = qr.matrixQR().topRows(rank);
   R.triangularView<Eigen::StrictlyLower>().setZero();
   const Eigen::JacobiSVD<Matrix3, Eigen::NoQRPreconditioner> svd(R, Eigen::ComputeFullV);
+
   if (svd.info() != Eigen::Success) {  // coordinates whose squares overflow
     return failure(ErrorCode::NotFinite, message(what, ": points too far apart"));
   }
+
   set.directions = svd.matrixV();
   set.singular_values = svd.singularValues();
   return set;

@@ -8,14 +8,18 @@ ResidualStatistics residual_statistics(const Eigen::VectorXd& r, std::size_t unk
   ResidualStatistics s;
   s.points = static_cast<std::size_t>(r.size());
   s.degrees_of_freedom = s.points > unknowns ? s.points - unknowns : 0;
+
   if (r.size() == 0) {
     return s;
   }
+
   s.rms = std::sqrt(r.squaredNorm() / static_cast<double>(s.points));
-  s.sigma0 =
-      s.degrees_of_freedom > 0 ? std::sqrt(r.squaredNorm() / static_cast<double>(s.degrees_of_freedom)) : 0.0;
+  s.sigma0 = s.degrees_of_freedom > 0
+                 ? std::sqrt(r.squaredNorm() / static_cast<double>(s.degrees_of_freedom))
+                 : 0.0;
   s.min = r.minCoeff();
   s.max = r.maxCoeff();
+
   return s;
 }
 

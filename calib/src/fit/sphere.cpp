@@ -45,19 +45,24 @@ Result<Sphere> fit_sphere(std::span<const Vector3> points, std::optional<double>
   if (!set) {
     return tl::unexpected(set.error());
   }
+
   if (set->in_a_plane()) {
     return failure(ErrorCode::DegenerateGeometry,
                    message("sphere: the ", points.size(), " points lie in a plane (extents ",
                            set->singular_values.transpose(), ")"));
   }
+
   const Eigen::Matrix3Xd p = set->centred / set->size;
   Normalised s = algebraic(p);
   Sphere sphere;
   Eigen::VectorXd r;
-  // Gauss-Newton ends at rounding level in 2 to 13 steps on sets with noise up to a fortieth of the radius.
+
+  // Gauss-Newton ends at rounding level in 2 to 13 steps on sets with noise up to a fortieth of the
+  // radius.
   constexpr int kMostIterations = 100;
   constexpr double kSettled = 1e-15;
   double step = 1.0, before = 2.0;
+
   while (step > kSettled * (1.0 + s.radius) && sphere.iterations < kMostIterations) {
     const Eigen::MatrixX4d J = jacobian(p, s, r);
     const Eigen::Vector4d change = -J.colPivHouseholderQr().solve(r);
@@ -71,11 +76,13 @@ Result<Sphere> fit_sphere(std::span<const Vector3> points, std::optional<double>
       break;  // rounding, not progress
     }
   }
+
   if (!std::isfinite(step) || sphere.iterations >= kMostIterations || !(s.radius > 0.0)) {
     return failure(ErrorCode::NotConverged,
-                   message("sphere: ", points.size(), " points do not determine one (last step ", step,
-                           " of the set's size after ", sphere.iterations, " iterations)"));
+                   message("sphere: ", points.size(), " points do not determine one (last step ",
+                           step, " of the set's size after ", sphere.iterations, " iterations)"));
   }
+
   const Eigen::HouseholderQR<Eigen::MatrixX4d> qr(jacobian(p, s, r));
   Eigen::Matrix4d R = qr.matrixQR().topRows<4>();
   R.triangularView<Eigen::StrictlyLower>().setZero();
@@ -87,6 +94,7 @@ Result<Sphere> fit_sphere(std::span<const Vector3> points, std::optional<double>
   const Eigen::Matrix4d root = svd.matrixV() * svd.singularValues().cwiseInverse().asDiagonal();
   const double sigma = known_sigma.value_or(sphere.residuals.sigma0);
   sphere.covariance = sigma * sigma * root * root.transpose();
+
   return sphere;
 }
 

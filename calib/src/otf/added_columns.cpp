@@ -12,9 +12,10 @@ AddedColumns::AddedColumns(std::size_t columns, std::size_t unknowns) {
   CWr_ = Eigen::VectorXd::Zero(k);
 }
 
-void AddedColumns::add(const Observation& o, std::span<const SparseRows::Entry> row, double residual_m,
-                       std::span<const double> values) {
-  const Eigen::Map<const Eigen::VectorXd> c(values.data(), static_cast<Eigen::Index>(values.size()));
+void AddedColumns::add(const Observation& o, std::span<const SparseRows::Entry> row,
+                       double residual_m, std::span<const double> values) {
+  const Eigen::Map<const Eigen::VectorXd> c(values.data(),
+                                            static_cast<Eigen::Index>(values.size()));
   const double weight = 1.0 / (o.sigma_m * o.sigma_m);
   CWC_.noalias() += weight * c * c.transpose();
   CWr_ += weight * residual_m * c;
@@ -33,19 +34,22 @@ AddedColumns& AddedColumns::operator-=(const AddedColumns& other) {
 AddedColumns::Estimate AddedColumns::estimate(const Eigen::MatrixXd& Q, double least_drop) const {
   const Eigen::MatrixXd QAWC = Q * CWA_.transpose();
   const Eigen::Index k = CWr_.size();
-  // Columns of unit length first. What the model follows itself up to 1e-6 of its squared length says
-  // nothing.
+
+  // Columns of unit length first. What the model follows itself up to 1e-6 of its squared length
+  // says nothing.
   constexpr double kFollowed = 1e-6;
   Eigen::VectorXd scale(k);
   for (Eigen::Index i = 0; i < k; ++i) {
     scale(i) = CWC_(i, i) > 0.0 ? 1.0 / std::sqrt(CWC_(i, i)) : 0.0;
   }
+
   const Eigen::MatrixXd S = scale.asDiagonal() * (CWC_ - CWA_ * QAWC) * scale.asDiagonal();
   const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(0.5 * (S + S.transpose()));
   const Eigen::VectorXd g = eigen.eigenvectors().transpose() * scale.asDiagonal() * CWr_;
   Estimate e;
   Eigen::VectorXd d = Eigen::VectorXd::Zero(k);
   Eigen::MatrixXd root = Eigen::MatrixXd::Zero(k, k);
+
   for (Eigen::Index i = 0; i < k; ++i) {
     const double value = eigen.eigenvalues()(i);
     if (value > kFollowed && g(i) * g(i) / value >= least_drop) {
@@ -55,10 +59,12 @@ AddedColumns::Estimate AddedColumns::estimate(const Eigen::MatrixXd& Q, double l
       ++e.columns;
     }
   }
+
   e.d = scale.asDiagonal() * d;
   e.u = (scale.asDiagonal() * root).rowwise().norm();
   e.root_cov_dU = QAWC * scale.asDiagonal() * root;
   e.dU = QAWC * e.d;
+
   return e;
 }
 
@@ -78,6 +84,7 @@ AddedColumns::Estimate AddedColumns::estimate_with_prior(const Eigen::MatrixXd& 
   e.u = root.rowwise().norm();
   e.root_cov_dU = QAWC * root;
   e.dU = QAWC * e.d;
+
   return e;
 }
 

@@ -28,11 +28,14 @@ class AddedColumns {
     Eigen::VectorXd dU;           ///< Q A^T W^2 C d: what U has of it without them
     Eigen::MatrixXd root_cov_dU;  ///< by that U is less certain with them: cov = root root^T
   };
-  /// A direction of d counts that lowers chi2 by `least_drop` or more. Weaker ones are noise, which columns
-  /// that the model almost follows would multiply. Weights of the rows are taken as 1/sigma^2.
+  /// A direction of d counts that lowers chi2 by `least_drop` or more. Weaker ones are noise, which
+  /// columns that the model almost follows would multiply. Weights of the rows are taken as
+  /// 1/sigma^2.
   [[nodiscard]] Estimate estimate(const Eigen::MatrixXd& Q, double least_drop) const;
-  /// With d ~ N(0, u^2) for every column, and variances of the rows that are `factor` times the stated ones.
-  [[nodiscard]] Estimate estimate_with_prior(const Eigen::MatrixXd& Q, double u, double factor) const;
+  /// With d ~ N(0, u^2) for every column, and variances of the rows that are `factor` times the
+  /// stated ones.
+  [[nodiscard]] Estimate estimate_with_prior(const Eigen::MatrixXd& Q, double u,
+                                             double factor) const;
 
  private:
   Eigen::MatrixXd CWC_, CWA_;

@@ -27,14 +27,15 @@ Result<void> check(const BlockSeries& series, const Path& path) {
   if (Result<void> fine = check(path); !fine) {
     return fine;
   }
-  if (std::count_if(series.blocks.begin(), series.blocks.end(), [](const Block& b) { return b.usable; }) <
-      4) {
+  if (std::count_if(series.blocks.begin(), series.blocks.end(),
+                    [](const Block& b) { return b.usable; }) < 4) {
     return failure(ErrorCode::TooFewObservations, "alignment: fewer than 4 usable blocks");
   }
   return {};
 }
 
-/// [Sanders 2023] section 1.2.3: start on start, then the rotation that brings end and centroid closest.
+/// [Sanders 2023] section 1.2.3: start on start, then the rotation that brings end and centroid
+/// closest.
 Result<RigidTransform> rough(const BlockSeries& series, const Centroid& measured, const Path& path,
                              const Centroid& nominal, const Vector3& t) {
   const Vector3& start = path.vertices_m.front();
@@ -48,12 +49,14 @@ Result<RigidTransform> rough(const BlockSeries& series, const Centroid& measured
 }
 
 /// Axis positions of all blocks under a transform; NaN where the beam was lost.
-std::vector<Vector3> axis_positions(const BlockSeries& series, const RigidTransform& T, const Vector3& t) {
+std::vector<Vector3> axis_positions(const BlockSeries& series, const RigidTransform& T,
+                                    const Vector3& t) {
   std::vector<Vector3> points;
   points.reserve(series.blocks.size());
   for (const Block& b : series.blocks) {
-    points.push_back(b.samples > 0 ? Vector3(T * b.mean_tracker_m - t)
-                                   : Vector3(Vector3::Constant(std::numeric_limits<double>::quiet_NaN())));
+    points.push_back(b.samples > 0
+                         ? Vector3(T * b.mean_tracker_m - t)
+                         : Vector3(Vector3::Constant(std::numeric_limits<double>::quiet_NaN())));
   }
   return points;
 }
@@ -67,11 +70,13 @@ struct Pairs {
   std::size_t farthest_block = 0;
 };
 
-Pairs pair_up(const BlockSeries& series, std::span<const Vector3> points, std::span<const std::size_t> leg,
-              const Path& path, const Vector3& t, double corner_m) {
+Pairs pair_up(const BlockSeries& series, std::span<const Vector3> points,
+              std::span<const std::size_t> leg, const Path& path, const Vector3& t,
+              double corner_m) {
   Pairs pairs;
   pairs.used.assign(points.size(), false);
   double squares = 0.0;
+
   for (std::size_t i = 0; i < points.size(); ++i) {
     if (!series.blocks[i].usable) {
       continue;
@@ -91,44 +96,53 @@ Pairs pair_up(const BlockSeries& series, std::span<const Vector3> points, std::s
       pairs.farthest_block = i;
     }
   }
-  pairs.rms_m = std::sqrt(squares / static_cast<double>(std::max<std::size_t>(1, pairs.measured_m.size())));
+
+  pairs.rms_m =
+      std::sqrt(squares / static_cast<double>(std::max<std::size_t>(1, pairs.measured_m.size())));
   return pairs;
 }
 
 Result<void> check_length(double measured_m, double nominal_m, double allowed) {
   if (std::abs(measured_m / nominal_m - 1.0) > allowed) {
     return failure(ErrorCode::AlignmentFailed,
-                   message("alignment: the tracker saw ", measured_m, " m of travel, the path is ", nominal_m,
-                           " m long: not the same run, or not all of it"));
+                   message("alignment: the tracker saw ", measured_m, " m of travel, the path is ",
+                           nominal_m, " m long: not the same run, or not all of it"));
   }
   return {};
 }
 
 tl::unexpected<Error> does_not_fit(const std::string& what, double is_m, double limit_m) {
   return failure(ErrorCode::AlignmentFailed,
-                 message("alignment: ", what, " is ", 1e3 * is_m, " mm, allowed are ", 1e3 * limit_m,
-                         " mm: the points do not fit this path"));
+                 message("alignment: ", what, " is ", 1e3 * is_m, " mm, allowed are ",
+                         1e3 * limit_m, " mm: the points do not fit this path"));
 }
 
-Result<void> check_fit(const Alignment& a, const Pairs& pairs, const BlockSeries& series, const Path& path,
-                       const Vector3& t, const Options& options) {
+Result<void> check_fit(const Alignment& a, const Pairs& pairs, const BlockSeries& series,
+                       const Path& path, const Vector3& t, const Options& options) {
   if (!(pairs.rms_m <= options.max_alignment_rms_m)) {
     return does_not_fit("rms distance to the path", pairs.rms_m, options.max_alignment_rms_m);
   }
+
   const double limit_m = options.max_alignment_distance_m;
   if (pairs.farthest_m > limit_m) {
-    return does_not_fit(
-        message("distance of block ", pairs.farthest_block, " to leg ", a.leg[pairs.farthest_block]),
-        pairs.farthest_m, limit_m);
+    return does_not_fit(message("distance of block ", pairs.farthest_block, " to leg ",
+                                a.leg[pairs.farthest_block]),
+                        pairs.farthest_m, limit_m);
   }
-  const double start_m = (a.T_machine_tracker * series.start_tracker_m - t - path.vertices_m.front()).norm();
-  const double end_m = (a.T_machine_tracker * series.end_tracker_m - t - path.vertices_m.back()).norm();
+
+  const double start_m =
+      (a.T_machine_tracker * series.start_tracker_m - t - path.vertices_m.front()).norm();
+  const double end_m =
+      (a.T_machine_tracker * series.end_tracker_m - t - path.vertices_m.back()).norm();
+
   if (start_m > limit_m) {
     return does_not_fit("distance of the first points to the first vertex", start_m, limit_m);
   }
+
   if (end_m > limit_m) {
     return does_not_fit("distance of the last points to the last vertex", end_m, limit_m);
   }
+
   return {};
 }
 
@@ -140,8 +154,8 @@ void report(const Options& options, int update) {
 }
 
 /// Iterated closest points: [Sanders 2023] section 1.2.3. Leaves the last pairs in `pairs`.
-Result<void> refine(Alignment& a, Pairs& pairs, const BlockSeries& series, const Path& path, const Vector3& t,
-                    const Options& options) {
+Result<void> refine(Alignment& a, Pairs& pairs, const BlockSeries& series, const Path& path,
+                    const Vector3& t, const Options& options) {
   double previous_rms_m = 0.0;
   for (int update = 0;; ++update) {
     const std::vector<Vector3> points = axis_positions(series, a.T_machine_tracker, t);
@@ -179,33 +193,41 @@ Result<void> refine(Alignment& a, Pairs& pairs, const BlockSeries& series, const
   }
 }
 
-Result<Alignment> align_as_given(const BlockSeries& series, const Machine& machine, const Path& path,
-                                 const Options& options) {
+Result<Alignment> align_as_given(const BlockSeries& series, const Machine& machine,
+                                 const Path& path, const Options& options) {
   if (Result<void> fine = check(series, path); !fine) {
     return tl::unexpected(fine.error());
   }
+
   const Vector3& t = machine.target_offset_m;
   const Centroid measured = centroid(seen(series)), nominal = centroid(path.vertices_m);
   const Result<RigidTransform> first = rough(series, measured, path, nominal, t);
+
   if (!first) {
     return tl::unexpected(first.error());
   }
-  if (Result<void> fine = check_length(measured.length_m, nominal.length_m, options.max_length_mismatch);
+
+  if (Result<void> fine =
+          check_length(measured.length_m, nominal.length_m, options.max_length_mismatch);
       !fine) {
     return tl::unexpected(fine.error());
   }
+
   Alignment a;
   a.rough_T_machine_tracker = a.T_machine_tracker = *first;
   a.measured_length_m = measured.length_m;
   a.path_length_m = nominal.length_m;
   Pairs pairs;
   Result<void> fine = refine(a, pairs, series, path, t, options);
+
   if (fine) {
     fine = check_fit(a, pairs, series, path, t, options);
   }
+
   if (!fine) {
     return tl::unexpected(fine.error());
   }
+
   a.used = std::move(pairs.used);
   return a;
 }
@@ -221,7 +243,8 @@ Path times(const Matrix3& M, Path path) {
 std::string reflections(const Path& path, const MachineNodes& travel) {
   std::vector<std::string> texts;
   for (const AxisMistake& mistake : axis_mistakes()) {
-    if (mistake.M.determinant() < 0.0 && outside_travel(times(mistake.M, path).vertices_m, travel).empty()) {
+    if (mistake.M.determinant() < 0.0 &&
+        outside_travel(times(mistake.M, path).vertices_m, travel).empty()) {
       texts.push_back(mistake.text);
     }
   }
@@ -230,7 +253,8 @@ std::string reflections(const Path& path, const MachineNodes& travel) {
 }
 
 /// "; they fit with the path driven backwards". Empty: with none of the mistakes that were tried.
-std::string fits_with(const BlockSeries& series, const Machine& machine, const Path& path, Options options) {
+std::string fits_with(const BlockSeries& series, const Machine& machine, const Path& path,
+                      Options options) {
   options.progress = {};
   const auto fits = [&](const Path& other) {
     if (options.stopped && options.stopped()) {
@@ -238,13 +262,16 @@ std::string fits_with(const BlockSeries& series, const Machine& machine, const P
     }
     return align_as_given(series, machine, other, options).has_value();
   };
+
   std::vector<std::string> texts;
   if (fits({{path.vertices_m.rbegin(), path.vertices_m.rend()}})) {
     texts.emplace_back("the path driven backwards");
   }
+
   if (fits(times(Vector3(-1.0, 1.0, 1.0).asDiagonal(), path))) {
     texts.push_back(reflections(path, machine.nodes));
   }
+
   for (const UnitMistake& mistake : unit_mistakes()) {
     for (const auto& [factor, file] :
          {std::pair{mistake.factor, "path"}, {1.0 / mistake.factor, "tracker"}}) {
@@ -253,6 +280,7 @@ std::string fits_with(const BlockSeries& series, const Machine& machine, const P
       }
     }
   }
+
   return texts.empty() ? "" : "; they fit with " + joined_with_or(texts);
 }
 

@@ -15,6 +15,7 @@ std::vector<std::array<int, 3>> directions_of(const std::vector<Vector3>& vertic
   constexpr double kRests_m = 1e-6;  // an axis that moves by less holds the side of its last motion
   std::vector<std::array<int, 3>> all;
   std::array<int, 3> now{};
+
   for (std::size_t leg = 0; leg + 1 < vertices_m.size(); ++leg) {
     const Vector3 way = vertices_m[leg + 1] - vertices_m[leg];
     for (Eigen::Index a = 0; a < 3; ++a) {
@@ -24,6 +25,7 @@ std::vector<std::array<int, 3>> directions_of(const std::vector<Vector3>& vertic
     }
     all.push_back(now);
   }
+
   return all;
 }
 
@@ -49,7 +51,8 @@ void AlternativeColumns::rigid(const Observation& row, Values& v) const {
   }
 }
 
-std::size_t AlternativeColumns::values(const Added& added, const Observation& row, Values& v) const {
+std::size_t AlternativeColumns::values(const Added& added, const Observation& row,
+                                       Values& v) const {
   switch (added.cause) {
     case Cause::Moved:
       rigid(row, v);
@@ -57,7 +60,8 @@ std::size_t AlternativeColumns::values(const Added& added, const Observation& ro
     case Cause::Drift: {
       rigid(row, v);
       for (Eigen::Index k = 0; k < 3; ++k) {
-        v[kRigid + static_cast<std::size_t>(k)] = row.direction(k) * (row.axis_position_m(k) - centre_m_(k));
+        v[kRigid + static_cast<std::size_t>(k)] =
+            row.direction(k) * (row.axis_position_m(k) - centre_m_(k));
       }
       const double time = static_cast<double>(row.block) / last_block_ - 0.5;  // of the run
       for (std::size_t k = 0; k < kDrift; ++k) {
@@ -101,33 +105,39 @@ std::size_t AlternativeColumns::values(const Added& added, const Observation& ro
   }
 }
 
-/// All places of a step in one pass: the sums behind a place are those of all rows less those before.
+/// All places of a step in one pass: the sums behind a place are those of all rows less those
+/// before.
 AlternativeColumns::Family AlternativeColumns::steps(std::span<const double> residual_m) const {
   constexpr std::size_t kPlaces = 100, kMargin = 2;
   const std::size_t rows = o_.rows.size(), stride = std::max<std::size_t>(2, rows / kPlaces);
   AddedColumns sum(kRigid, o_.layout.fit_size());
   Family before;
   Values v{};
+
   for (std::size_t i = 0; i < rows; ++i) {
     const bool new_block = i == 0 || o_.rows[i].block != o_.rows[i - 1].block;
-    if (new_block && i / stride > before.size() && i >= kMargin * stride && i + kMargin * stride <= rows) {
+    if (new_block && i / stride > before.size() && i >= kMargin * stride &&
+        i + kMargin * stride <= rows) {
       before.emplace_back(Added{Cause::Moved, o_.rows[i].block}, sum);
     }
     rigid(o_.rows[i], v);
     sum.add(o_.rows[i], o_.A.row(i), residual_m[i], std::span(v).first(kRigid));
   }
+
   for (auto& [added, sums] : before) {
     AddedColumns behind = sum;
     behind -= sums;
     sums = std::move(behind);
   }
+
   return before;
 }
 
-std::vector<AlternativeColumns::Family> AlternativeColumns::sums(std::span<const double> residual_m) const {
+std::vector<AlternativeColumns::Family> AlternativeColumns::sums(
+    std::span<const double> residual_m) const {
   std::vector<Family> all(5);
-  // A path may have 1e5 vertices; only those of legs that are used have columns. Rows come in the order of
-  // legs.
+  // A path may have 1e5 vertices; only those of legs that are used have columns. Rows come in the
+  // order of legs.
   const auto columns_of = [&](std::size_t family, Cause cause, std::size_t place,
                               std::size_t columns) -> auto& {
     const auto is_it = [&](const auto& one) { return one.first.place == place; };
@@ -136,8 +146,10 @@ std::vector<AlternativeColumns::Family> AlternativeColumns::sums(std::span<const
     if (const auto found = std::find_if(last, end, is_it); found != end) {
       return *found;
     }
-    return all[family].emplace_back(Added{cause, place}, AddedColumns(columns, o_.layout.fit_size()));
+    return all[family].emplace_back(Added{cause, place},
+                                    AddedColumns(columns, o_.layout.fit_size()));
   };
+
   Values v{};
   for (std::size_t i = 0; i < o_.rows.size(); ++i) {
     const Observation& row = o_.rows[i];
@@ -153,6 +165,7 @@ std::vector<AlternativeColumns::Family> AlternativeColumns::sums(std::span<const
     add(columns_of(3, Cause::Vertex, row.leg + 1, kShift));
     add(columns_of(4, Cause::Leg, row.leg, kShift));
   }
+
   all.push_back(steps(residual_m));
   return all;
 }
@@ -161,8 +174,9 @@ std::string AlternativeColumns::text(const Added& added, const Eigen::VectorXd& 
   const Vector3 shift = d.size() >= 3 ? Vector3(d.head<3>()) : Vector3::Zero();
   switch (added.cause) {
     case Cause::Moved: {
-      const auto at = std::find_if(o_.rows.begin(), o_.rows.end(),
-                                   [&](const Observation& row) { return row.block >= added.place; });
+      const auto at = std::find_if(o_.rows.begin(), o_.rows.end(), [&](const Observation& row) {
+        return row.block >= added.place;
+      });
       return message("the tracker or the machine moved by ", 1e6 * shift.norm(), " um and ",
                      1e6 * d.segment<3>(3).norm(), " urad (at the centre of the path) on leg ",
                      at == o_.rows.end() ? 0 : at->leg, " (block ", added.place, ")");
@@ -181,7 +195,8 @@ std::string AlternativeColumns::text(const Added& added, const Eigen::VectorXd& 
       return message("the axes have backlash: ", all);
     }
     case Cause::Vertex:
-      return message("vertex ", added.place, " was driven at ", um(shift), " from where the path says");
+      return message("vertex ", added.place, " was driven at ", um(shift),
+                     " from where the path says");
     case Cause::Leg:
       return message("leg ", added.place, " was driven or measured at ", um(shift),
                      " from where the path says");

@@ -12,19 +12,24 @@ constexpr std::size_t kFewestBlocks = 4;
 
 Result<void> check(std::span<const TrackerObservation> samples, const Options& options) {
   if (options.block_samples < 1 || options.row_points < 1 || options.standstill_samples < 1) {
-    return failure(ErrorCode::BadInput, message("tracker blocks: block_samples ", options.block_samples,
-                                                ", row_points ", options.row_points, ", standstill_samples ",
-                                                options.standstill_samples, ": each must be at least 1"));
+    return failure(ErrorCode::BadInput,
+                   message("tracker blocks: block_samples ", options.block_samples, ", row_points ",
+                           options.row_points, ", standstill_samples ", options.standstill_samples,
+                           ": each must be at least 1"));
   }
-  const std::size_t needed = std::max(kFewestBlocks * options.block_samples, 2 * options.standstill_samples);
+
+  const std::size_t needed =
+      std::max(kFewestBlocks * options.block_samples, 2 * options.standstill_samples);
   if (samples.size() < needed) {
-    return failure(ErrorCode::TooFewObservations,
-                   message("tracker blocks: ", samples.size(), " samples, needs at least ", needed));
+    return failure(ErrorCode::TooFewObservations, message("tracker blocks: ", samples.size(),
+                                                          " samples, needs at least ", needed));
   }
+
   for (std::size_t i = 0; i < samples.size(); ++i) {
     const TrackerObservation& s = samples[i];
     if (!std::isfinite(s.time_s) || (s.valid && !s.p_tracker_m.allFinite())) {
-      return failure(ErrorCode::NotFinite, message("tracker blocks: sample ", i, " is not a number"));
+      return failure(ErrorCode::NotFinite,
+                     message("tracker blocks: sample ", i, " is not a number"));
     }
     if (i > 0 && !(s.time_s > samples[i - 1].time_s)) {
       return failure(ErrorCode::BadInput,
@@ -32,6 +37,7 @@ Result<void> check(std::span<const TrackerObservation> samples, const Options& o
                              samples[i - 1].time_s, " s, time must ascend"));
     }
   }
+
   return {};
 }
 
@@ -85,23 +91,27 @@ class BlockCutter {
     for (const Vector3* p : in_block_) {
       block.mean_tracker_m += *p;
     }
+
     if (block.samples > 0) {
       block.mean_tracker_m /= static_cast<double>(block.samples);
     }
+
     block.usable = block.samples > 0 && 2 * block.samples >= options_.block_samples;
     block.first_sub_point = series_.sub_points_tracker_m.size();
     if (block.usable) {
       push_sub_points();
     }
+
     series_.blocks.push_back(block);
     in_block_.clear();
     ticks_ = 0;
   }
 
-  /// The middles of row_points equal parts: their mean is the mean of the block, unlike that of points with
-  /// both ends.
+  /// The middles of row_points equal parts: their mean is the mean of the block, unlike that of
+  /// points with both ends.
   void push_sub_points() {
-    const double step = static_cast<double>(in_block_.size()) / static_cast<double>(options_.row_points);
+    const double step =
+        static_cast<double>(in_block_.size()) / static_cast<double>(options_.row_points);
     for (std::size_t k = 0; k < options_.row_points; ++k) {
       const double place = (static_cast<double>(k) + 0.5) * step - 0.5;
       const auto i = static_cast<std::size_t>(std::max(0.0, std::floor(place)));
@@ -129,28 +139,37 @@ Result<Vector3> standstill(Iterator begin, Iterator end, std::size_t count) {
       ++found;
     }
   }
+
   if (found < count) {
     return failure(ErrorCode::TooFewObservations,
                    message("tracker blocks: ", found, " valid samples, standstill needs ", count));
   }
+
   return Vector3(sum / static_cast<double>(count));
 }
 
 }  // namespace
 
-Result<BlockSeries> make_blocks(std::span<const TrackerObservation> samples, const Options& options) {
+Result<BlockSeries> make_blocks(std::span<const TrackerObservation> samples,
+                                const Options& options) {
   if (Result<void> fine = check(samples, options); !fine) {
     return tl::unexpected(fine.error());
   }
-  const Result<Vector3> start = standstill(samples.begin(), samples.end(), options.standstill_samples);
-  const Result<Vector3> end = standstill(samples.rbegin(), samples.rend(), options.standstill_samples);
+
+  const Result<Vector3> start =
+      standstill(samples.begin(), samples.end(), options.standstill_samples);
+  const Result<Vector3> end =
+      standstill(samples.rbegin(), samples.rend(), options.standstill_samples);
+
   if (!start || !end) {
     return tl::unexpected(start ? end.error() : start.error());
   }
+
   const double tick_s = median_tick_s(samples);
   // A pause of an hour is not a run any more, and must not become millions of empty blocks.
   constexpr double kLongestHole_s = 3600.0;
   BlockCutter cutter(samples.size() / options.block_samples + 1, options);
+
   for (std::size_t i = 0; i < samples.size(); ++i) {
     if (i > 0) {
       const double step_s = samples[i].time_s - samples[i - 1].time_s;
@@ -164,10 +183,12 @@ Result<BlockSeries> make_blocks(std::span<const TrackerObservation> samples, con
     }
     cutter.add(samples[i]);
   }
+
   BlockSeries series = cutter.take();
   series.start_tracker_m = *start;
   series.end_tracker_m = *end;
   series.samples = samples.size();
+
   return series;
 }
 
@@ -179,11 +200,13 @@ Result<BlockSeries> blocks_from_means(std::span<const Vector3> means_tracker_m,
     return failure(ErrorCode::TooFewObservations,
                    message("tracker blocks: ", n, " means, needs ", kFewestBlocks));
   }
+
   BlockSeries series;
   series.sub_points = options.row_points;
   series.samples = n * options.block_samples;
   series.start_tracker_m = start_tracker_m;
   series.end_tracker_m = end_tracker_m;
+
   for (std::size_t i = 0; i < n; ++i) {
     const Vector3& mean = means_tracker_m[i];
     if (!mean.allFinite()) {
@@ -192,12 +215,15 @@ Result<BlockSeries> blocks_from_means(std::span<const Vector3> means_tracker_m,
     const Vector3& before = means_tracker_m[i == 0 ? 0 : i - 1];
     const Vector3& after = means_tracker_m[i + 1 == n ? i : i + 1];
     const Vector3 travel = (after - before) / (i == 0 || i + 1 == n ? 1.0 : 2.0);
-    series.blocks.push_back({mean, options.block_samples, true, series.sub_points_tracker_m.size()});
+    series.blocks.push_back(
+        {mean, options.block_samples, true, series.sub_points_tracker_m.size()});
     for (std::size_t k = 0; k < options.row_points; ++k) {
-      const double place = (static_cast<double>(k) + 0.5) / static_cast<double>(options.row_points) - 0.5;
+      const double place =
+          (static_cast<double>(k) + 0.5) / static_cast<double>(options.row_points) - 0.5;
       series.sub_points_tracker_m.emplace_back(mean + place * travel);
     }
   }
+
   return series;
 }
 

@@ -22,12 +22,14 @@ struct Remainder {
   double squares_m2 = 0.0;
   std::size_t rows = 0;
 
-  [[nodiscard]] double rms() const { return std::sqrt(whitened_squares / static_cast<double>(rows)); }
+  [[nodiscard]] double rms() const {
+    return std::sqrt(whitened_squares / static_cast<double>(rows));
+  }
   [[nodiscard]] double rms_m() const { return std::sqrt(squares_m2 / static_cast<double>(rows)); }
 };
 
-/// Of the best-fit rigid motion: so many rows or fewer it fits exactly, whatever the model. What is left of
-/// them is rounding, and compares nothing.
+/// Of the best-fit rigid motion: so many rows or fewer it fits exactly, whatever the model. What is
+/// left of them is rounding, and compares nothing.
 constexpr std::size_t kRigidUnknowns = 6;
 
 /// The last six entries of a row are the rigid ones.
@@ -39,7 +41,8 @@ Vector6 rigid_row(std::span<const SparseRows::Entry> row) {
   return r;
 }
 
-/// Takes the best-fit rigid motion out of the residuals of the held-out rows and adds up what remains.
+/// Takes the best-fit rigid motion out of the residuals of the held-out rows and adds up what
+/// remains.
 void add_without_rigid(Remainder& total, const Observations& o, std::span<const std::size_t> rows,
                        std::span<const double> residual_m) {
   Eigen::Matrix<double, 6, 6> H = Eigen::Matrix<double, 6, 6>::Zero();
@@ -50,8 +53,9 @@ void add_without_rigid(Remainder& total, const Observations& o, std::span<const 
     H.noalias() += weight * a * a.transpose();
     g += weight * residual_m[i] * a;
   }
-  // A complete orthogonal decomposition: a fold of few legs may leave part of the rigid motion free, which
-  // then is not used.
+
+  // A complete orthogonal decomposition: a fold of few legs may leave part of the rigid motion
+  // free, which then is not used.
   const Vector6 rigid = H.completeOrthogonalDecomposition().solve(g);
   for (std::size_t i = 0; i < rows.size(); ++i) {
     const double rest_m = residual_m[i] - rigid_row(o.A.row(rows[i])).dot(rigid);
@@ -59,6 +63,7 @@ void add_without_rigid(Remainder& total, const Observations& o, std::span<const 
     total.whitened_squares += whitened * whitened;
     total.squares_m2 += rest_m * rest_m;
   }
+
   total.rows += rows.size();
 }
 
@@ -114,8 +119,8 @@ std::vector<NormalEquations> equations_by_fold(const Observations& o, std::size_
 }
 
 /// Legs of the fold with an observation of a parameter that the other folds have none of.
-std::vector<bool> legs_needed(const Observations& o, const NormalEquations& others, std::size_t fold,
-                              std::size_t folds) {
+std::vector<bool> legs_needed(const Observations& o, const NormalEquations& others,
+                              std::size_t fold, std::size_t folds) {
   std::vector<bool> needed(o.rows.back().leg + 1, false);
   for (std::size_t i = 0; i < o.rows.size(); ++i) {
     if (o.rows[i].leg % folds != fold) {
@@ -128,6 +133,7 @@ std::vector<bool> legs_needed(const Observations& o, const NormalEquations& othe
       }
     }
   }
+
   return needed;
 }
 
@@ -136,8 +142,8 @@ struct HeldOutFold {
   std::vector<std::size_t> rows;  ///< that U was not fitted to
 };
 
-/// A leg that alone touches a node stays among what is fitted to. Where the rest does not determine the model
-/// even so, nothing is held out of this fold.
+/// A leg that alone touches a node stays among what is fitted to. Where the rest does not determine
+/// the model even so, nothing is held out of this fold.
 Result<HeldOutFold> hold_out(const std::vector<NormalEquations>& parts, std::size_t fold,
                              const Observations& o, const Options& options) {
   NormalEquations training(o.layout.fit_size());
@@ -146,24 +152,29 @@ Result<HeldOutFold> hold_out(const std::vector<NormalEquations>& parts, std::siz
       training += parts[f];
     }
   }
+
   const std::vector<bool> needed = legs_needed(o, training, fold, parts.size());
   if (std::find(needed.begin(), needed.end(), true) != needed.end()) {
     training += normal_equations(o, [&](const Observation& r) { return needed[r.leg]; });
   }
+
   const Result<Adjustment> a = adjust(training, o.layout, options.gauge_weight);
   if (!a && a.error().code == ErrorCode::RankDeficient) {
     return HeldOutFold{};
   }
+
   if (!a) {
-    return failure(a.error().code,
-                   message("held-out test without fold ", fold, " of ", parts.size(), ": ", a.error().text));
+    return failure(a.error().code, message("held-out test without fold ", fold, " of ",
+                                           parts.size(), ": ", a.error().text));
   }
+
   HeldOutFold held{a->U, {}};
   for (std::size_t i = 0; i < o.rows.size(); ++i) {
     if (o.rows[i].leg % parts.size() == fold && !needed[o.rows[i].leg]) {
       held.rows.push_back(i);
     }
   }
+
   return held;
 }
 
@@ -182,20 +193,21 @@ void add_alternatives(Verdict& verdict, const std::vector<Alternative>& others) 
   }
 }
 
-double common_growth(const VolumetricModel& model) {
+double common_scale_error(const VolumetricModel& model) {
   const std::vector<Vector3> at = tensor_grid(model.layout().nodes());
   std::vector<Vector3> V_m;
   for (const Vector3& q : at) {
     V_m.push_back(model.V_at(q, model.tool_offsets_m().front()));
   }
-  return growth(at, V_m);
+  return common_scale(at, V_m);
 }
 
-void require_plausible_growth(Verdict& verdict, double growth, double most) {
-  if (!(std::abs(growth) <= most)) {
-    verdict.refuse("growth",
-                   message("the machine is larger by ", 1e6 * growth, " um/m in all directions, allowed are ",
-                           1e6 * most, ": wrong scale of the path, of the ranges or of a temperature"));
+void require_plausible_scale(Verdict& verdict, double scale, double most) {
+  if (!(std::abs(scale) <= most)) {
+    verdict.refuse(
+        "growth",
+        message("the machine is larger by ", 1e6 * scale, " um/m in all directions, allowed are ",
+                1e6 * most, ": wrong scale of the path, of the ranges or of a temperature"));
   }
 }
 
@@ -206,16 +218,20 @@ void note_what_u_leaves_out(Verdict& verdict, const Observations& o) {
   for (const Vector3& q : at) {
     centre += q / static_cast<double>(at.size());
   }
+
   double squares = 0.0;
   for (const Vector3& q : at) {
     squares += (q - centre).squaredNorm();
   }
+
   const double lever_m = std::sqrt(squares / static_cast<double>(at.size()));
   constexpr double kSteel_per_K = 11.5e-6;
   if (!(o.u_scale > 0.0)) {
-    verdict.notes.push_back(message(
-        "not in the uncertainty: the scale of the tracker's ranges; 1 um/m would be ", lever_m, " um rms"));
+    verdict.notes.push_back(
+        message("not in the uncertainty: the scale of the tracker's ranges; 1 um/m would be ",
+                lever_m, " um rms"));
   }
+
   if (*std::max_element(o.u_axis_scale.begin(), o.u_axis_scale.end()) <= 0.0) {
     verdict.notes.push_back(
         message("not in the uncertainty: the temperature of the machine's scales; 1 K of steel "
@@ -224,7 +240,8 @@ void note_what_u_leaves_out(Verdict& verdict, const Observations& o) {
   }
 }
 
-/// An offset of the ranges that the model follows: its prior decides, and the data do not show more of it.
+/// An offset of the ranges that the model follows: its prior decides, and the data do not show more
+/// of it.
 void note_undetermined_offset(Verdict& verdict, const RangeOffset& offset, double prior_m) {
   const double share = offset.u_m / prior_m;  // 1: the data determine nothing
   constexpr double kOfEqualWeight = 0.7;      // data and prior: 1/sqrt(2)
@@ -233,10 +250,10 @@ void note_undetermined_offset(Verdict& verdict, const RangeOffset& offset, doubl
   }
   const double u_of_data_m = offset.u_m / std::sqrt(std::max(1e-12, 1.0 - share * share));
   constexpr double kNormal99 = 2.576;
-  verdict.notes.push_back(
-      message("the run hardly determines the offset of the tracker's ranges: ", 1e6 * prior_m,
-              " um are stated, and an offset below ",
-              1e6 * kNormal99 * root_sum_of_squares(u_of_data_m, prior_m), " um would not be noticed"));
+  verdict.notes.push_back(message(
+      "the run hardly determines the offset of the tracker's ranges: ", 1e6 * prior_m,
+      " um are stated, and an offset below ",
+      1e6 * kNormal99 * root_sum_of_squares(u_of_data_m, prior_m), " um would not be noticed"));
 }
 
 }  // namespace
@@ -246,12 +263,15 @@ Result<HeldOutFigures> held_out(const Observations& o, const VolumetricModel* ac
   const std::size_t folds = options.held_out_folds;
   const std::size_t legs = o.rows.empty() ? 0 : o.rows.back().leg + 1;
   if (folds < 2 || legs < folds) {
-    return failure(ErrorCode::TooFewObservations, message("held-out test: ", legs, " legs in ", folds,
-                                                          " folds, needs 2 folds and a leg in each"));
+    return failure(ErrorCode::TooFewObservations,
+                   message("held-out test: ", legs, " legs in ", folds,
+                           " folds, needs 2 folds and a leg in each"));
   }
+
   const bool with_active = active != nullptr && active->holds_for_tool(o.target_offset_m);
   const std::vector<NormalEquations> parts = equations_by_fold(o, folds);
   Remainder none, candidate, other, candidate_beside;
+
   for (std::size_t f = 0; f < folds; ++f) {
     if (Result<void> goes_on = check_stopped(options.stopped); !goes_on) {
       return tl::unexpected(goes_on.error());
@@ -271,45 +291,54 @@ Result<HeldOutFigures> held_out(const Observations& o, const VolumetricModel* ac
         with_active ? inside(o, rows, active->validity()) : std::vector<std::size_t>{};
     if (both.size() > kRigidUnknowns) {
       add_without_rigid(candidate_beside, o, both, residuals(o, both, by_fit));
-      add_without_rigid(other, o, both,
-                        residuals(o, both, [&](std::size_t i) { return predicted_by_model(o, i, *active); }));
+      add_without_rigid(other, o, both, residuals(o, both, [&](std::size_t i) {
+                          return predicted_by_model(o, i, *active);
+                        }));
     }
     if (options.progress) {
       options.progress(Stage::Judge, static_cast<double>(f + 1) / static_cast<double>(folds));
     }
   }
+
   if (none.rows == 0) {
-    return failure(ErrorCode::RankDeficient,
-                   message("held-out test: without any one of ", folds,
-                           " folds the other legs do not determine the model; drive every part of the volume "
-                           "on more legs"));
+    return failure(
+        ErrorCode::RankDeficient,
+        message("held-out test: without any one of ", folds,
+                " folds the other legs do not determine the model; drive every part of the volume "
+                "on more legs"));
   }
+
   HeldOutFigures figures{.no_compensation = none.rms(),
                          .candidate = candidate.rms(),
                          .observations = none.rows,
                          .not_held_out = o.rows.size() - none.rows,
                          .no_compensation_rms_m = none.rms_m(),
                          .candidate_rms_m = candidate.rms_m()};
+
   if (other.rows > 0) {
     figures.active = other.rms();
     figures.active_rms_m = other.rms_m();
     figures.candidate_beside_active = candidate_beside.rms();
     figures.observations_beside_active = other.rows;
   }
+
   return figures;
 }
 
-Result<Verdict> judge(const Observations& measured, const Solution& solution, const VolumetricModel* active,
-                      const GateLimits& limits, const Options& options) {
+Result<Verdict> judge(const Observations& measured, const Solution& solution,
+                      const VolumetricModel* active, const GateLimits& limits,
+                      const Options& options) {
   const Observations o = without_range_offset(measured, solution.range_offset.value_m);
   const Result<std::vector<Alternative>> others = alternatives(o, solution, options);
   const Result<HeldOutFigures> figures = held_out(o, active, options);
+
   if (!others || !figures) {
     return tl::unexpected(others ? figures.error() : others.error());
   }
+
   Verdict verdict = decide(solution.model, *figures, limits, active);
   add_alternatives(verdict, *others);
-  require_plausible_growth(verdict, common_growth(solution.model), limits.max_growth);
+  require_plausible_scale(verdict, common_scale_error(solution.model), limits.max_scale_error);
   require_orientation(verdict, {o.vertices_m}, o.layout.nodes(), o.target_offset_m,
                       o.alignment.T_machine_tracker, options.orientation);
   const CorrectionSize size = correction_size(solution.model);
@@ -317,6 +346,7 @@ Result<Verdict> judge(const Observations& measured, const Solution& solution, co
   note_what_u_leaves_out(verdict, o);
   note_undetermined_offset(verdict, solution.range_offset, o.u_range_offset_m);
   verdict.accepted = verdict.reasons.empty();
+
   return verdict;
 }
 

@@ -36,8 +36,8 @@ std::size_t series_end(const Observations& o, std::size_t begin) {
 }
 
 /// Whitened residuals of one leg along a2 or a3: every second row.
-std::vector<double> whitened(const Observations& o, std::span<const double> residual_m, std::size_t begin,
-                             std::size_t end) {
+std::vector<double> whitened(const Observations& o, std::span<const double> residual_m,
+                             std::size_t begin, std::size_t end) {
   std::vector<double> w;
   for (std::size_t i = begin; i < end; i += 2) {
     w.push_back(residual_m[i] / o.rows[i].sigma_m);
@@ -75,6 +75,7 @@ RigidFreeNorm rigid_free_norm(const ParameterLayout& layout, const Vector3& t) {
   Eigen::MatrixXd D =
       Eigen::MatrixXd::Zero(3 * std::ssize(at), static_cast<Eigen::Index>(layout.model_size()));
   std::vector<Vector3> points;
+
   for (Eigen::Index i = 0; i < std::ssize(at); ++i) {
     const Vector3& q = at[static_cast<std::size_t>(i)];
     const DesignColumns columns = design_columns(layout, q, t);
@@ -83,6 +84,7 @@ RigidFreeNorm rigid_free_norm(const ParameterLayout& layout, const Vector3& t) {
     }
     points.emplace_back(q + t);
   }
+
   return {D, points};
 }
 
@@ -108,6 +110,7 @@ Result<Fit> fit_of(const Observations& o, const Solution& solution, const Option
   if (!a) {
     return tl::unexpected(a.error());
   }
+
   const std::size_t dof = solution.statistics.degrees_of_freedom;
   Fit fit{.o = o,
           .residual_m = solution.residuals.after_m,
@@ -117,12 +120,13 @@ Result<Fit> fit_of(const Observations& o, const Solution& solution, const Option
           .chi2 = solution.statistics.chi2,
           .norm = rigid_free_norm(o.layout, o.target_offset_m)};
   fit.u_white_m = fit.norm.rms_u_m(fit.adjustment.covariance);
+
   return fit;
 }
 
 /// What is left of the residuals once the alternative is part of the model.
-std::vector<double> residuals_with(const Fit& fit, const AlternativeColumns& columns, const Added& added,
-                                   const AddedColumns::Estimate& e) {
+std::vector<double> residuals_with(const Fit& fit, const AlternativeColumns& columns,
+                                   const Added& added, const AddedColumns::Estimate& e) {
   std::vector<double> r = fit.residual_m;
   AlternativeColumns::Values values{};
   for (std::size_t i = 0; i < r.size(); ++i) {
@@ -145,105 +149,128 @@ Result<std::optional<Alternative>> best_of(const Fit& fit, const AlternativeColu
   AddedColumns::Estimate best_estimate;
   const double x = natural_logarithm(kCauses * static_cast<double>(family.size()) / kFalseAlarm);
   const double noise = std::max(1.0, fit.noise.local * fit.noise.local);
+
   for (const auto& [added, sums] : family) {
     if (Result<void> goes_on = check_stopped(options.stopped); !goes_on) {
       return tl::unexpected(goes_on.error());
     }
-    AddedColumns::Estimate e = sums.estimate(fit.adjustment.dU_dg, noise * chi2_bound(1.0, x));
+    AddedColumns::Estimate e = sums.estimate(fit.adjustment.cofactor_Q, noise * chi2_bound(1.0, x));
     const bool significant = e.drop > noise * chi2_bound(static_cast<double>(e.columns), x);
     if (significant && e.drop > best_estimate.drop) {
       best = &added;
       best_estimate = std::move(e);
     }
   }
+
   if (best == nullptr) {
     return std::nullopt;
   }
+
   const auto columns_added = static_cast<double>(best_estimate.columns);
   const std::vector<double> left = residuals_with(fit, columns, *best, best_estimate);
   const double factor =
-      residual_noise(fit.o, left, fit.degrees_of_freedom - best_estimate.columns).covariance_factor();
+      residual_noise(fit.o, left, fit.degrees_of_freedom - best_estimate.columns).variance_factor();
+
   // With the true cause only noise is left; slow noise lowers chi2 of every alternative a little.
   if (!(best_estimate.drop > std::max(noise, factor) * chi2_bound(columns_added, x))) {
     return std::nullopt;
   }
+
   const double added_u_m = fit.norm.rms_of_columns_m(best_estimate.root_cov_dU);
-  return Alternative{
-      .cause = best->cause,
-      .text = columns.text(*best, best_estimate.d),
-      .explained = std::clamp(best_estimate.drop / std::max(fit.excess(), best_estimate.drop), 0.0, 1.0),
-      .bias_m = fit.norm.rms_m(best_estimate.dU),
-      .u_m = root_sum_of_squares(fit.u_white_m, added_u_m) * std::sqrt(factor)};
+  return Alternative{.cause = best->cause,
+                     .text = columns.text(*best, best_estimate.d),
+                     .explained = std::clamp(
+                         best_estimate.drop / std::max(fit.excess(), best_estimate.drop), 0.0, 1.0),
+                     .bias_m = fit.norm.rms_m(best_estimate.dU),
+                     .u_m = root_sum_of_squares(fit.u_white_m, added_u_m) * std::sqrt(factor)};
 }
 
-/// What the data show of the offset of the ranges beyond its prior. `sums`: of residuals less `estimated`.
-Result<std::optional<Alternative>> offset_beyond_prior(const Fit& fit, const AlternativeColumns& columns,
+/// What the data show of the offset of the ranges beyond its prior. `sums`: of residuals less
+/// `estimated`.
+Result<std::optional<Alternative>> offset_beyond_prior(const Fit& fit,
+                                                       const AlternativeColumns& columns,
                                                        const AlternativeColumns::Family& family,
                                                        const RangeOffset& estimated) {
   const auto& [added, sums] = family.front();
-  AddedColumns::Estimate e = sums.estimate(fit.adjustment.dU_dg, 0.0);
+  AddedColumns::Estimate e = sums.estimate(fit.adjustment.cofactor_Q, 0.0);
   if (e.columns == 0) {
     return std::nullopt;  // the model follows the offset: the prior alone decides
   }
+
   constexpr double kNormal99 = 2.576;  // 99 % of a normal deviate lie within
-  const double factor = fit.noise.covariance_factor();
+  const double factor = fit.noise.variance_factor();
   const double beyond_m = e.d(0), of_data_m = estimated.value_m + beyond_m;
   const double u_of_data_m = e.u(0) * std::sqrt(factor);
-  if (!(std::abs(of_data_m) > kNormal99 * root_sum_of_squares(u_of_data_m, fit.o.u_range_offset_m))) {
+
+  if (!(std::abs(of_data_m) >
+        kNormal99 * root_sum_of_squares(u_of_data_m, fit.o.u_range_offset_m))) {
     return std::nullopt;
   }
+
   e.d(0) = of_data_m;
   return Alternative{
       .cause = Cause::RangeOffset,
-      .text = message(columns.text(added, e.d), "; stated are ", 1e6 * fit.o.u_range_offset_m, " um"),
+      .text =
+          message(columns.text(added, e.d), "; stated are ", 1e6 * fit.o.u_range_offset_m, " um"),
       .explained = std::clamp(e.drop / std::max(fit.excess(), e.drop), 0.0, 1.0),
       .bias_m = fit.norm.rms_m(e.dU),
-      .u_m =
-          root_sum_of_squares(fit.u_white_m, fit.norm.rms_of_columns_m(e.root_cov_dU)) * std::sqrt(factor)};
+      .u_m = root_sum_of_squares(fit.u_white_m, fit.norm.rms_of_columns_m(e.root_cov_dU)) *
+             std::sqrt(factor)};
 }
 
 /// The same observations adjusted with another design.
 Result<std::optional<Alternative>> other_design(const Fit& fit, const Solution& solution,
-                                                Result<ParameterLayout> layout, Cause cause, std::string text,
-                                                const Options& options) {
+                                                Result<ParameterLayout> layout, Cause cause,
+                                                std::string text, const Options& options) {
   constexpr std::size_t kMostUnknowns = 800;  // a second for the adjustment
   if (!layout || layout->fit_size() > kMostUnknowns) {
     return std::nullopt;
   }
+
   const Observations other = with_layout(fit.o, *std::move(layout));
   if (Result<void> goes_on = check_stopped(options.stopped); !goes_on) {
     return tl::unexpected(goes_on.error());
   }
+
   const Result<Adjustment> a = adjust(normal_equations(other), other.layout, options.gauge_weight);
   if (!a || other.rows.size() <= a->rank) {
     return std::nullopt;
   }
+
   const std::vector<double> left = residuals_m(other, a->U);
   const double drop = fit.chi2 - chi2(other, left);
-  const double factor = residual_noise(other, left, other.rows.size() - a->rank).covariance_factor();
-  const double more = std::max(1.0, static_cast<double>(a->rank) - static_cast<double>(fit.adjustment.rank));
+  const double factor = residual_noise(other, left, other.rows.size() - a->rank).variance_factor();
+  const double more =
+      std::max(1.0, static_cast<double>(a->rank) - static_cast<double>(fit.adjustment.rank));
   const double bound = std::max(fit.noise.local * fit.noise.local, factor) *
                        chi2_bound(more, natural_logarithm(kCauses / kFalseAlarm));
   constexpr double kClearlyBetter = 0.5;
+
   if (!(drop > kClearlyBetter * fit.excess() && drop > bound)) {
     return std::nullopt;
   }
+
   std::vector<Vector3> points, difference;
   const Vector3& t = fit.o.target_offset_m;
   for (const Vector3& q : places(other.layout.nodes())) {
     points.push_back(q + t);
-    difference.push_back(solution.model.V_at(q, t) -
-                         volumetric_error(other.layout, {a->U.data(), other.layout.model_size()}, q, t));
+    difference.push_back(
+        solution.model.V_at(q, t) -
+        volumetric_error(other.layout, {a->U.data(), other.layout.model_size()}, q, t));
   }
+
   const auto bias = rigid_free(points, difference);
   const double u_m = rigid_free_norm(other.layout, t).rms_u_m(a->covariance) * std::sqrt(factor);
-  // Tables that are too coarse are wrong everywhere: what their widened uncertainty covers refuses nothing.
-  const double stated_u_m = fit.u_white_m * std::sqrt(fit.noise.covariance_factor());
-  return Alternative{.cause = cause,
-                     .text = std::move(text),
-                     .explained = std::clamp(drop / fit.excess(), 0.0, 1.0),
-                     .bias_m = bias ? bias->rigid_free.rms_m : std::numeric_limits<double>::infinity(),
-                     .u_m = cause == Cause::NodeSpacing ? std::max(u_m, stated_u_m) : u_m};
+
+  // Tables that are too coarse are wrong everywhere: what their widened uncertainty covers refuses
+  // nothing.
+  const double stated_u_m = fit.u_white_m * std::sqrt(fit.noise.variance_factor());
+  return Alternative{
+      .cause = cause,
+      .text = std::move(text),
+      .explained = std::clamp(drop / fit.excess(), 0.0, 1.0),
+      .bias_m = bias ? bias->rigid_free.rms_m : std::numeric_limits<double>::infinity(),
+      .u_m = cause == Cause::NodeSpacing ? std::max(u_m, stated_u_m) : u_m};
 }
 
 Result<std::optional<Alternative>> other_order(const Fit& fit, const Solution& solution,
@@ -253,22 +280,24 @@ Result<std::optional<Alternative>> other_order(const Fit& fit, const Solution& s
   for (const Axis a : fit.o.layout.chain().order_w_to_t()) {
     used += letter(a);
   }
+
   std::optional<Alternative> best;
   do {
     const std::string letters(order.begin(), order.end());
     if (letters == used) {
       continue;
     }
-    const auto chain = KinematicChain::parse(message("[w b ", order[0], " ", order[1], " ", order[2], " t]"));
+    const auto chain =
+        KinematicChain::parse(message("[w b ", order[0], " ", order[1], " ", order[2], " t]"));
     if (!chain) {
       continue;
     }
-    auto found =
-        other_design(fit, solution, ParameterLayout::observable_with_one_target(*chain, fit.o.layout.nodes()),
-                     Cause::ChainOrder,
-                     message("the axes carry each other in the order ", letters, " from workpiece to tool, ",
-                             "not ", used, " as the machine's chain says"),
-                     options);
+    auto found = other_design(
+        fit, solution, ParameterLayout::observable_with_one_target(*chain, fit.o.layout.nodes()),
+        Cause::ChainOrder,
+        message("the axes carry each other in the order ", letters, " from workpiece to tool, ",
+                "not ", used, " as the machine's chain says"),
+        options);
     if (!found) {
       return found;
     }
@@ -276,6 +305,7 @@ Result<std::optional<Alternative>> other_order(const Fit& fit, const Solution& s
       best = *std::move(found);
     }
   } while (std::next_permutation(order.begin(), order.end()));
+
   return best;
 }
 
@@ -293,16 +323,17 @@ Result<std::optional<Alternative>> closer_nodes(const Fit& fit, const Solution& 
     nodes_m.push_back(axis.nodes_m.back());
     axis.nodes_m = std::move(nodes_m);
   }
+
   auto layout = ParameterLayout::observable_with_one_target(fit.o.layout.chain(), closer);
-  return other_design(
-      fit, solution, std::move(layout), Cause::NodeSpacing,
-      message("the nodes are too far apart (", 1e3 * widest_m, " mm) for the errors of this machine"),
-      options);
+  return other_design(fit, solution, std::move(layout), Cause::NodeSpacing,
+                      message("the nodes are too far apart (", 1e3 * widest_m,
+                              " mm) for the errors of this machine"),
+                      options);
 }
 
 }  // namespace
 
-double ResidualNoise::covariance_factor() const {
+double ResidualNoise::variance_factor() const {
   return std::max(1.0, sigma0 * sigma0 * correlation);
 }
 
@@ -311,6 +342,7 @@ ResidualNoise residual_noise(const Observations& o, std::span<const double> resi
   constexpr std::size_t kLags = 200;
   std::vector<double> products(kLags + 1, 0.0), second_differences;
   std::vector<std::size_t> pairs(kLags + 1, 0);
+
   for (std::size_t begin = 0; begin < o.rows.size();) {
     const std::size_t end = series_end(o, begin);
     for (const std::size_t first : {begin, begin + 1}) {
@@ -325,17 +357,22 @@ ResidualNoise residual_noise(const Observations& o, std::span<const double> resi
         }
       }
     }
+
     begin = end;
   }
+
   constexpr double kMadToSigma = 1.4826, kOfSecondDifference = 6.0;  // variances 1 + 4 + 1
   ResidualNoise noise;
-  noise.sigma0 = std::sqrt(products[0] / static_cast<double>(std::max<std::size_t>(1, degrees_of_freedom)));
+  noise.sigma0 =
+      std::sqrt(products[0] / static_cast<double>(std::max<std::size_t>(1, degrees_of_freedom)));
   constexpr std::size_t kEnough = 30;  // below, legs are too short to tell fast from slow
   const bool tells = second_differences.size() >= kEnough;
-  noise.local = !tells ? noise.sigma0
-                       : kMadToSigma * median(std::move(second_differences)) / std::sqrt(kOfSecondDifference);
-  constexpr double kNormal999 =
-      3.090;  // 99.9 % quantile; the coefficient of n pairs of noise scatters by 1/sqrt(n)
+  noise.local =
+      !tells ? noise.sigma0
+             : kMadToSigma * median(std::move(second_differences)) / std::sqrt(kOfSecondDifference);
+
+  // 99.9 % quantile; the coefficient of n pairs of noise scatters by 1/sqrt(n)
+  constexpr double kNormal999 = 3.090;
   for (std::size_t lag = 1; lag <= kLags && pairs[lag] > 0; ++lag) {
     const auto n = static_cast<double>(pairs[lag]);
     const double coefficient = products[lag] / n / (products[0] / static_cast<double>(pairs[0]));
@@ -344,6 +381,7 @@ ResidualNoise residual_noise(const Observations& o, std::span<const double> resi
     }
     noise.correlation += 2.0 * coefficient;
   }
+
   return noise;
 }
 
@@ -373,6 +411,7 @@ std::string_view name(Cause cause) {
     case Cause::CorrelatedNoise:
       return "correlated-noise";
   }
+
   return "";
 }
 
@@ -382,11 +421,12 @@ Result<std::vector<Alternative>> alternatives(const Observations& o, const Solut
   if (!fit) {
     return tl::unexpected(fit.error());
   }
+
   const AlternativeColumns columns(o);
   std::vector<Alternative> found;
   for (const auto& family : columns.sums(solution.residuals.after_m)) {
-    const bool has_prior =
-        o.u_range_offset_m > 0.0 && !family.empty() && family.front().first.cause == Cause::RangeOffset;
+    const bool has_prior = o.u_range_offset_m > 0.0 && !family.empty() &&
+                           family.front().first.cause == Cause::RangeOffset;
     Result<std::optional<Alternative>> best =
         has_prior ? offset_beyond_prior(*fit, columns, family, solution.range_offset)
                   : best_of(*fit, columns, family, options);
@@ -397,7 +437,8 @@ Result<std::vector<Alternative>> alternatives(const Observations& o, const Solut
       found.push_back(**std::move(best));
     }
   }
-  if (fit->noise.covariance_factor() > kSuspicious && fit->excess() > 0.0) {
+
+  if (fit->noise.variance_factor() > kSuspicious && fit->excess() > 0.0) {
     for (const auto design : {other_order, closer_nodes}) {
       Result<std::optional<Alternative>> better = design(*fit, solution, options);
       if (!better) {
@@ -408,19 +449,24 @@ Result<std::vector<Alternative>> alternatives(const Observations& o, const Solut
       }
     }
   }
-  std::stable_sort(found.begin(), found.end(),
-                   [](const Alternative& a, const Alternative& b) { return a.explained > b.explained; });
+
+  std::stable_sort(found.begin(), found.end(), [](const Alternative& a, const Alternative& b) {
+    return a.explained > b.explained;
+  });
+
   constexpr double kHalf = 0.5;
-  if (fit->noise.correlation > kSuspicious && fit->noise.covariance_factor() > kSuspicious &&
+  if (fit->noise.correlation > kSuspicious && fit->noise.variance_factor() > kSuspicious &&
       (found.empty() || found.front().explained < kHalf)) {
     found.insert(found.begin(),
                  {.cause = Cause::CorrelatedNoise,
-                  .text = message("the residuals are correlated over ", fit->noise.correlation,
-                                  " blocks: air turbulence, vibration, or an effect the model does not have"),
+                  .text = message(
+                      "the residuals are correlated over ", fit->noise.correlation,
+                      " blocks: air turbulence, vibration, or an effect the model does not have"),
                   .explained = 1.0,
                   .bias_m = 0.0,
-                  .u_m = fit->u_white_m * std::sqrt(fit->noise.covariance_factor())});
+                  .u_m = fit->u_white_m * std::sqrt(fit->noise.variance_factor())});
   }
+
   return found;
 }
 

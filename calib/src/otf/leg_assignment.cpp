@@ -52,35 +52,43 @@ Result<std::vector<std::size_t>> assign_legs(std::span<const Vector3> points_m, 
   const std::vector<Leg> legs = legs_of(path);
   const std::size_t n = points_m.size(), m = legs.size();
   if (m == 0 || n < m) {
-    return failure(ErrorCode::TooFewObservations,
-                   message("leg assignment: ", n, " blocks for ", m, " legs, needs one block a leg"));
+    return failure(ErrorCode::TooFewObservations, message("leg assignment: ", n, " blocks for ", m,
+                                                          " legs, needs one block a leg"));
   }
-  // Viterbi: best[j] = least cost of blocks 0..i with block i on leg j; it came from leg j or j - 1. Of the n
-  // blocks n - m stay on the leg of the block before, so that j <= i <= j + n - m: a bit for each such pair.
+
+  // Viterbi: best[j] = least cost of blocks 0..i with block i on leg j; it came from leg j or j -
+  // 1. Of the n blocks n - m stay on the leg of the block before, so that j <= i <= j + n - m: a
+  // bit for each such pair.
   std::vector<double> best(m, std::numeric_limits<double>::infinity());
   const std::size_t stays = n - m;
   std::vector<bool> advanced(m * (stays + 1), false);
   const auto pair = [&](std::size_t i, std::size_t j) { return j * (stays + 1) + (i - j); };
   best[0] = cost(legs[0], points_m[0], chord(points_m, 0), direction_m);
+
   for (std::size_t i = 1; i < n; ++i) {
     const Vector3 travel = chord(points_m, i);
-    // Legs that cannot be reached yet, or from which the last one cannot be reached any more, stay out.
+    // Legs that cannot be reached yet, or from which the last one cannot be reached any more, stay
+    // out.
     const std::size_t highest = std::min(m - 1, i), lowest = i > stays ? i - stays : 0;
     for (std::size_t j = highest + 1; j-- > lowest;) {
       const bool from_before = j > 0 && best[j - 1] < best[j];
       advanced[pair(i, j)] = from_before;
-      best[j] = (from_before ? best[j - 1] : best[j]) + cost(legs[j], points_m[i], travel, direction_m);
+      best[j] =
+          (from_before ? best[j - 1] : best[j]) + cost(legs[j], points_m[i], travel, direction_m);
     }
+
     if (lowest > 0) {
       best[lowest - 1] = std::numeric_limits<double>::infinity();
     }
   }
+
   std::vector<std::size_t> leg(n);
   std::size_t j = m - 1;
   for (std::size_t i = n; i-- > 0;) {
     leg[i] = j;
     j -= advanced[pair(i, j)] ? 1 : 0;
   }
+
   return leg;
 }
 

@@ -23,9 +23,11 @@ std::string named_parameters(const Eigen::VectorXd& shares, const ParameterLayou
   for (std::size_t i = 0; i < order.size(); ++i) {
     order[i] = i;
   }
+
   std::stable_sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) {
     return shares(static_cast<Eigen::Index>(a)) > shares(static_cast<Eigen::Index>(b));
   });
+
   constexpr std::size_t kMostNamed = 6;
   std::string list;
   for (std::size_t i = 0; i < std::min(kMostNamed, order.size()); ++i) {
@@ -33,12 +35,14 @@ std::string named_parameters(const Eigen::VectorXd& shares, const ParameterLayou
       list += (list.empty() ? "" : ", ") + layout.label(order[i]);
     }
   }
+
   return list;
 }
 
 /// Nodes no row touches.
 Result<void> check_touched(const Eigen::MatrixXd& H, const ParameterLayout& layout) {
-  const Eigen::VectorXd untouched = H.diagonal().unaryExpr([](double d) { return d > 0 ? 0.0 : 1.0; });
+  const Eigen::VectorXd untouched =
+      H.diagonal().unaryExpr([](double d) { return d > 0 ? 0.0 : 1.0; });
   if (untouched.sum() > 0) {
     return failure(ErrorCode::RankDeficient,
                    message("adjustment: ", untouched.sum(), " parameters have no data, among them ",
@@ -53,10 +57,10 @@ struct Spectrum {
   Eigen::VectorXd weakest_share;  ///< of each parameter in the directions below the threshold
 };
 
-/// Rank of the data alone. Columns are scaled to unit diagonal, so that every entry is at most 1. Each entry
-/// is a sum of `rows` rounded products: its error is below rows * eps, typically sqrt(rows) * eps, and the
-/// spectral norm of the n x n error matrix at most n times that. Eigenvalues below n * sqrt(rows) * eps * the
-/// largest are zero.
+/// Rank of the data alone. Columns are scaled to unit diagonal, so that every entry is at most 1.
+/// Each entry is a sum of `rows` rounded products: its error is below rows * eps, typically
+/// sqrt(rows) * eps, and the spectral norm of the n x n error matrix at most n times that.
+/// Eigenvalues below n * sqrt(rows) * eps * the largest are zero.
 Spectrum spectrum(const NormalEquations& N) {
   const Eigen::VectorXd scale = inverse_root(N.H.diagonal());
   const Eigen::MatrixXd scaled = scale.asDiagonal() * symmetric(N.H) * scale.asDiagonal();
@@ -66,17 +70,21 @@ Spectrum spectrum(const NormalEquations& N) {
   const double zero = static_cast<double>(n) * std::sqrt(static_cast<double>(N.rows)) *
                       std::numeric_limits<double>::epsilon() * values(n - 1);
   Eigen::Index null = 0;
+
   while (null < n && values(null) <= zero) {
     ++null;
   }
+
   Spectrum s;
   s.rank = static_cast<std::size_t>(n - null);
   s.condition = s.rank > 0 ? std::sqrt(values(n - 1) / values(null)) : 0.0;
   s.weakest_share = eigen.eigenvectors().leftCols(null).rowwise().squaredNorm();
+
   return s;
 }
 
-/// Parameters a gauge condition sets to zero by itself. Their zero is exact, in value and in covariance.
+/// Parameters a gauge condition sets to zero by itself. Their zero is exact, in value and in
+/// covariance.
 void clear_fixed(const Eigen::MatrixXd& K, Adjustment& a) {
   for (Eigen::Index i = 0; i < K.rows(); ++i) {
     if ((K.row(i).array() != 0).count() != 1) {
@@ -87,14 +95,15 @@ void clear_fixed(const Eigen::MatrixXd& K, Adjustment& a) {
     a.U(fixed) = 0.0;
     a.covariance.row(fixed).setZero();
     a.covariance.col(fixed).setZero();
-    a.dU_dg.row(fixed).setZero();
+    a.cofactor_Q.row(fixed).setZero();
   }
 }
 
 }  // namespace
 
 NormalEquations::NormalEquations(std::size_t unknowns)
-    : H(Eigen::MatrixXd::Zero(static_cast<Eigen::Index>(unknowns), static_cast<Eigen::Index>(unknowns))),
+    : H(Eigen::MatrixXd::Zero(static_cast<Eigen::Index>(unknowns),
+                              static_cast<Eigen::Index>(unknowns))),
       H_noise(H),
       g(Eigen::VectorXd::Zero(static_cast<Eigen::Index>(unknowns))) {}
 
@@ -111,6 +120,7 @@ void NormalEquations::add(std::span<const SparseRows::Entry> row, const Observat
     }
     g(static_cast<Eigen::Index>(row[j].column)) += o.weight * row[j].value * o.y_m;
   }
+
   ++rows;
 }
 
@@ -122,7 +132,8 @@ NormalEquations& NormalEquations::operator+=(const NormalEquations& other) {
   return *this;
 }
 
-NormalEquations normal_equations(const Observations& o, const std::function<bool(const Observation&)>& take) {
+NormalEquations normal_equations(const Observations& o,
+                                 const std::function<bool(const Observation&)>& take) {
   NormalEquations N(o.layout.fit_size());
   for (std::size_t i = 0; i < o.rows.size(); ++i) {
     if (!take || take(o.rows[i])) {
@@ -132,32 +143,40 @@ NormalEquations normal_equations(const Observations& o, const std::function<bool
   return N;
 }
 
-Result<Adjustment> adjust(const NormalEquations& N, const ParameterLayout& layout, double gauge_weight) {
+Result<Adjustment> adjust(const NormalEquations& N, const ParameterLayout& layout,
+                          double gauge_weight) {
   if (!(gauge_weight > 0)) {
     return failure(ErrorCode::BadInput,
                    message("adjustment: gauge weight ", gauge_weight, " must be positive"));
   }
+
   if (Result<void> fine = check_touched(N.H, layout); !fine) {
     return tl::unexpected(fine.error());
   }
+
   const Eigen::MatrixXd K = gauge_conditions(Gauge::G1, layout);
   const Spectrum s = spectrum(N);
   const auto free = static_cast<std::size_t>(K.rows());
   const std::size_t unknowns = layout.fit_size();
+
   if (s.rank + free < unknowns) {
     return failure(ErrorCode::RankDeficient,
-                   message("adjustment: rank ", s.rank, " of ", unknowns - free, " needed from ", N.rows,
-                           " observations; not determined are combinations of ",
+                   message("adjustment: rank ", s.rank, " of ", unknowns - free, " needed from ",
+                           N.rows, " observations; not determined are combinations of ",
                            named_parameters(s.weakest_share, layout)));
   }
+
   const double mu = gauge_weight * N.H.trace() / K.squaredNorm();
   const Eigen::MatrixXd bordered = symmetric(N.H) + mu * (K.transpose() * K);
   const Eigen::VectorXd scale = inverse_root(bordered.diagonal());
   const Eigen::LLT<Eigen::MatrixXd> factor(scale.asDiagonal() * bordered * scale.asDiagonal());
+
   if (factor.info() != Eigen::Success) {
-    return failure(ErrorCode::RankDeficient, message("adjustment: normal equations of ", unknowns,
-                                                     " unknowns are not positive definite in gauge G1"));
+    return failure(ErrorCode::RankDeficient,
+                   message("adjustment: normal equations of ", unknowns,
+                           " unknowns are not positive definite in gauge G1"));
   }
+
   Adjustment a;
   a.U = scale.asDiagonal() * factor.solve(scale.asDiagonal() * N.g);
   const auto n = static_cast<Eigen::Index>(unknowns);
@@ -166,10 +185,11 @@ Result<Adjustment> adjust(const NormalEquations& N, const ParameterLayout& layou
   const Eigen::MatrixXd QHQ = Q * symmetric(N.H_noise) * Q.transpose();
   a.covariance = 0.5 * (QHQ + QHQ.transpose());
   a.rank = s.rank;
-  a.null_combinations = unknowns - s.rank;
+  a.datum_defect = unknowns - s.rank;
   a.condition = s.condition;
-  a.dU_dg = Q;
+  a.cofactor_Q = Q;
   clear_fixed(K, a);
+
   return a;
 }
 

@@ -18,10 +18,12 @@ class MeanColumns {
       sum_.assign(columns.begin(), columns.end());
       return;
     }
+
     auto at = sum_.begin();
     for (const Column& c : columns) {
-      at = std::lower_bound(at, sum_.end(), c.parameter,
-                            [](const Column& s, std::size_t parameter) { return s.parameter < parameter; });
+      at = std::lower_bound(
+          at, sum_.end(), c.parameter,
+          [](const Column& s, std::size_t parameter) { return s.parameter < parameter; });
       if (at == sum_.end() || at->parameter != c.parameter) {
         at = sum_.insert(at, Column{c.parameter, Vector3::Zero()});
       }
@@ -53,50 +55,61 @@ MeanColumns mean_columns(const ParameterLayout& layout, const Vector3& t,
 }
 
 Result<void> check(const Noise& noise) {
-  if (!(noise.sigma_range_m > 0) || !(noise.sigma_angle_rad > 0) || !std::isfinite(noise.sigma_range_m) ||
-      !std::isfinite(noise.sigma_angle_rad)) {
+  if (!(noise.sigma_range_m > 0) || !(noise.sigma_angle_rad > 0) ||
+      !std::isfinite(noise.sigma_range_m) || !std::isfinite(noise.sigma_angle_rad)) {
     return failure(ErrorCode::BadInput,
                    message("tracker noise: sigma_range ", noise.sigma_range_m, " m, sigma_angle ",
                            noise.sigma_angle_rad, " rad: both must be positive"));
   }
+
   if (!(noise.u_scale >= 0) || !std::isfinite(noise.u_scale)) {
     return failure(ErrorCode::BadInput,
                    message("tracker noise: u_scale ", noise.u_scale, ": must not be negative"));
   }
+
   if (!(noise.u_range_offset_m >= 0) || !std::isfinite(noise.u_range_offset_m)) {
-    return failure(ErrorCode::BadInput, message("tracker noise: u_range_offset ", noise.u_range_offset_m,
-                                                " m: must not be negative"));
+    return failure(ErrorCode::BadInput,
+                   message("tracker noise: u_range_offset ", noise.u_range_offset_m,
+                           " m: must not be negative"));
   }
+
   for (const double u : noise.u_axis_scale) {
     if (!(u >= 0) || !std::isfinite(u)) {
       return failure(ErrorCode::BadInput,
                      message("scales: relative uncertainty ", u, ": must not be negative"));
     }
   }
+
   return {};
 }
 
-/// A block that travels farther than twice the corner exclusion can straddle a corner and still be used.
+/// A block that travels farther than twice the corner exclusion can straddle a corner and still be
+/// used.
 Result<void> check_travel(const BlockSeries& series, const Options& options) {
   std::vector<double> travel_m;
   for (std::size_t i = 0; i + 1 < series.blocks.size(); ++i) {
     if (series.blocks[i].usable && series.blocks[i + 1].usable) {
-      travel_m.push_back((series.blocks[i + 1].mean_tracker_m - series.blocks[i].mean_tracker_m).norm());
+      travel_m.push_back(
+          (series.blocks[i + 1].mean_tracker_m - series.blocks[i].mean_tracker_m).norm());
     }
   }
+
   if (travel_m.empty()) {
     return {};
   }
+
   const auto middle = travel_m.begin() + std::ssize(travel_m) / 2;
   std::nth_element(travel_m.begin(), middle, travel_m.end());
   if (0.5 * *middle <= options.corner_m) {
     return {};
   }
+
   const double most = 2.0 * options.corner_m / *middle * static_cast<double>(options.block_samples);
-  return failure(ErrorCode::BadInput,
-                 message("tracker blocks: ", options.block_samples, " samples travel ", 1e3 * *middle,
-                         " mm, more than twice the corner exclusion of ", 1e3 * options.corner_m,
-                         " mm: use at most ", std::floor(most), " samples a block, or exclude more"));
+  return failure(
+      ErrorCode::BadInput,
+      message("tracker blocks: ", options.block_samples, " samples travel ", 1e3 * *middle,
+              " mm, more than twice the corner exclusion of ", 1e3 * options.corner_m,
+              " mm: use at most ", std::floor(most), " samples a block, or exclude more"));
 }
 
 PointOnPath point_on_path(const Block& block, std::size_t i, const Alignment& a, const Path& path,
@@ -126,8 +139,9 @@ std::vector<Vector3> sub_points(const BlockSeries& series, std::size_t i, const 
   return points;
 }
 
-/// Ends of what was seen of every leg. Where data begin within three corner exclusions of a vertex, the
-/// vertex itself counts as covered: the model goes on there by less than the distance of two nodes.
+/// Ends of what was seen of every leg. Where data begin within three corner exclusions of a vertex,
+/// the vertex itself counts as covered: the model goes on there by less than the distance of two
+/// nodes.
 std::vector<Vector3> covered(const Observations& o, const Path& path, double corner_m) {
   std::vector<Vector3> points;
   for (std::size_t i = 0; i < o.rows.size();) {
@@ -136,11 +150,13 @@ std::vector<Vector3> covered(const Observations& o, const Path& path, double cor
       ++last;
     }
     const Vector3 &from = path.vertices_m[o.rows[i].leg], &to = path.vertices_m[o.rows[i].leg + 1];
-    const Vector3 &first_seen = o.rows[i].axis_position_m, &last_seen = o.rows[last].axis_position_m;
+    const Vector3 &first_seen = o.rows[i].axis_position_m,
+                  &last_seen = o.rows[last].axis_position_m;
     points.push_back((first_seen - from).norm() <= 3 * corner_m ? from : first_seen);
     points.push_back((last_seen - to).norm() <= 3 * corner_m ? to : last_seen);
     i = last + 1;
   }
+
   return points;
 }
 
@@ -162,15 +178,17 @@ void append_rows(Observations& o, const PointOnPath& point, std::span<const Vect
   const auto append = [&](const Vector3& a, double sigma_m) {
     const double mean_sigma_m = sigma_m / std::sqrt(point.samples);
     o.A.append(columns.along(a));
-    o.rows.push_back({a.dot(point.deviation_m), mean_sigma_m, 1.0 / (mean_sigma_m * mean_sigma_m), point.leg,
-                      point.block, a, point.axis_position_m, first, sub_points_m.size()});
+    o.rows.push_back({a.dot(point.deviation_m), mean_sigma_m, 1.0 / (mean_sigma_m * mean_sigma_m),
+                      point.leg, point.block, a, point.axis_position_m, first,
+                      sub_points_m.size()});
   };
   append(point.frame.a2, point.frame.sigma2_m);
   append(point.frame.a3, point.frame.sigma3_m);
 }
 
 double drow_drange_offset(const Observations& o, const Observation& row) {
-  const Vector3 beam_m = row.axis_position_m + o.target_offset_m - o.alignment.T_machine_tracker.t_m;
+  const Vector3 beam_m =
+      row.axis_position_m + o.target_offset_m - o.alignment.T_machine_tracker.t_m;
   return row.direction.dot(beam_m.normalized());
 }
 
@@ -188,14 +206,18 @@ Observations with_layout(const Observations& o, ParameterLayout layout) {
   other.layout = std::move(layout);
   other.A = {};
   MeanColumns columns;
+
   for (std::size_t i = 0; i < o.rows.size(); ++i) {
     const Observation& row = o.rows[i];
-    if (i == 0 || row.first_sub_point != o.rows[i - 1].first_sub_point) {  // the rows of a block share them
-      columns = mean_columns(other.layout, o.target_offset_m,
-                             std::span(o.sub_points_m).subspan(row.first_sub_point, row.sub_points));
+    if (i == 0 ||
+        row.first_sub_point != o.rows[i - 1].first_sub_point) {  // the rows of a block share them
+      columns =
+          mean_columns(other.layout, o.target_offset_m,
+                       std::span(o.sub_points_m).subspan(row.first_sub_point, row.sub_points));
     }
     other.A.append(columns.along(row.direction));
   }
+
   return other;
 }
 
@@ -208,20 +230,24 @@ Result<Observations> observe(std::span<const TrackerObservation> samples, const 
   return observe_blocks(*series, machine, path, noise, options);
 }
 
-Result<Observations> observe_blocks(const BlockSeries& series, const Machine& machine, const Path& path,
-                                    const Noise& noise, const Options& options) {
+Result<Observations> observe_blocks(const BlockSeries& series, const Machine& machine,
+                                    const Path& path, const Noise& noise, const Options& options) {
   Result<void> fine = check(noise);
   if (fine) {
     fine = check_travel(series, options);
   }
-  Result<ParameterLayout> layout = ParameterLayout::observable_with_one_target(machine.chain, machine.nodes);
+
+  Result<ParameterLayout> layout =
+      ParameterLayout::observable_with_one_target(machine.chain, machine.nodes);
   if (!fine || !layout) {
     return tl::unexpected(fine ? layout.error() : fine.error());
   }
+
   Result<Alignment> alignment = align(series, machine, path, options);
   if (!alignment) {
     return tl::unexpected(alignment.error());
   }
+
   Observations o{.layout = *std::move(layout),
                  .target_offset_m = machine.target_offset_m,
                  .alignment = *std::move(alignment),
@@ -232,9 +258,11 @@ Result<Observations> observe_blocks(const BlockSeries& series, const Machine& ma
   o.samples = series.samples;
   o.lost_samples = series.lost_samples;
   o.blocks = series.blocks.size();
+
   for (std::size_t i = 0; i < series.blocks.size(); ++i) {
     if (o.alignment.used[i]) {
-      append_rows(o, point_on_path(series.blocks[i], i, o.alignment, path, o.target_offset_m, noise),
+      append_rows(o,
+                  point_on_path(series.blocks[i], i, o.alignment, path, o.target_offset_m, noise),
                   sub_points(series, i, o.alignment, path, o.target_offset_m));
       ++o.blocks_used;
     }
@@ -248,6 +276,7 @@ Result<Observations> observe_blocks(const BlockSeries& series, const Machine& ma
       }
     }
   }
+
   o.covered_m = covered(o, path, options.corner_m);
   return o;
 }

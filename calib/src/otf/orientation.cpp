@@ -16,9 +16,9 @@ namespace {
 
 constexpr double kTravelTolerance_m = 1e-3;
 
-/// Rows and columns of R hold one 1 or -1 each, and its determinant is 1: all but the identity. Half turns
-/// about X, Y and Z come first.
-const std::vector<Matrix3>& turns_of_axes() {
+/// Rows and columns of R hold one 1 or -1 each, and its determinant is 1: all but the identity.
+/// Half turns about X, Y and Z come first.
+const std::vector<Matrix3>& cycles_of_axes() {
   static const std::vector<Matrix3> all = [] {
     std::vector<Matrix3> turns;
     std::array<Eigen::Index, 3> from{0, 1, 2};
@@ -35,11 +35,12 @@ const std::vector<Matrix3>& turns_of_axes() {
     } while (std::next_permutation(from.begin(), from.end()));
     return turns;
   }();
+
   return all;
 }
 
-/// Of a direction: its chord is the angle in rad for small angles. 10 degrees: axes of a machine are not that
-/// far off the plumb line.
+/// Of a direction: its chord is the angle in rad for small angles. 10 degrees: axes of a machine
+/// are not that far off the plumb line.
 constexpr double kUpTolerance = 0.17;
 /// Where the tracker stands, by a tape measure.
 constexpr double kPlaceTolerance_m = 0.5;
@@ -83,72 +84,83 @@ std::string list_of(std::vector<std::string> texts) {
   return list;
 }
 
-/// "turned by 180 degrees about X or Z (signs of the other two axes reversed), or with x, y, z read as ..."
+/// "turned by 180 degrees about X or Z (signs of the other two axes reversed), or with x, y, z read
+/// as ..."
 std::string list_of_turns(const std::vector<Matrix3>& turns) {
   std::vector<std::string> half, other;
   for (const Matrix3& R : turns) {
     const auto about = half_turn_about(R);
     about ? half.push_back(message(letter(*about))) : other.push_back(columns(R));
   }
+
   std::string text;
   if (!half.empty()) {
-    text = message("turned by 180 degrees about ", list_of(half), " (signs of the other two axes reversed)");
+    text = message("turned by 180 degrees about ", list_of(half),
+                   " (signs of the other two axes reversed)");
   }
+
   if (!other.empty()) {
-    text += message(half.empty() ? "" : ", or ", "with its columns (x, y, z) read as ", list_of(other));
+    text +=
+        message(half.empty() ? "" : ", or ", "with its columns (x, y, z) read as ", list_of(other));
   }
+
   return text;
 }
 
 /// The turn that brings `found` to `given`, as words.
 std::string cure(const Vector3& found, const Vector3& given, double at_most) {
-  for (const Matrix3& R : turns_of_axes()) {
+  for (const Matrix3& R : cycles_of_axes()) {
     if (!((R * found - given).norm() <= at_most)) {
       continue;
     }
     const auto about = half_turn_about(R);
     return about ? message("; it does after a turn by 180 degrees about ", letter(*about),
                            ": the signs of the other two axes are reversed in the path file")
-                 : message("; it does with the columns (x, y, z) of the path file read as ", columns(R));
+                 : message("; it does with the columns (x, y, z) of the path file read as ",
+                           columns(R));
   }
   return "; check the evidence and the axes of the path file";
 }
 
-/// False and a reason where `found` contradicts `given`; else keeps of `open` what the evidence does not
-/// exclude.
-bool agrees(Verdict& verdict, std::vector<Matrix3>& open, const Vector3& found, const Vector3& given,
-            double at_most, const std::string& what) {
+/// False and a reason where `found` contradicts `given`; else keeps of `open` what the evidence
+/// does not exclude.
+bool agrees(Verdict& verdict, std::vector<Matrix3>& open, const Vector3& found,
+            const Vector3& given, double at_most, const std::string& what) {
   if (!((found - given).norm() <= at_most)) {
     verdict.refuse("orientation", message("path orientation: ", what, cure(found, given, at_most)));
     return false;
   }
-  const auto excluded = [&](const Matrix3& R) { return (R * found - given).norm() > 2.0 * at_most; };
+  const auto excluded = [&](const Matrix3& R) {
+    return (R * found - given).norm() > 2.0 * at_most;
+  };
   open.erase(std::remove_if(open.begin(), open.end(), excluded), open.end());
   return true;
 }
 
-bool agrees_with_up(Verdict& verdict, std::vector<Matrix3>& open, const RigidTransform& T_machine_tracker,
-                    const Vector3& up) {
+bool agrees_with_up(Verdict& verdict, std::vector<Matrix3>& open,
+                    const RigidTransform& T_machine_tracker, const Vector3& up) {
   const Vector3 found = T_machine_tracker.R.col(2);
   const double off_rad = 2.0 * std::asin(std::min(1.0, 0.5 * (found - up).norm()));
-  return agrees(verdict, open, found, up, kUpTolerance,
-                message("the axis of the levelled tracker does not point along the machine's up but is ",
-                        180.0 / std::numbers::pi * off_rad, " degrees off"));
+  return agrees(
+      verdict, open, found, up, kUpTolerance,
+      message("the axis of the levelled tracker does not point along the machine's up but is ",
+              180.0 / std::numbers::pi * off_rad, " degrees off"));
 }
 
 /// The path turns about the machine's zero, what the tracker sees about the target offset.
 bool agrees_with_place(Verdict& verdict, std::vector<Matrix3>& open, const Vector3& found_m,
                        const Vector3& given_m, const Vector3& target_offset_m) {
-  return agrees(
-      verdict, open, found_m - target_offset_m, given_m - target_offset_m, kPlaceTolerance_m,
-      message("the tracker comes out ", (found_m - given_m).norm(), " m from the place that is given"));
+  return agrees(verdict, open, found_m - target_offset_m, given_m - target_offset_m,
+                kPlaceTolerance_m,
+                message("the tracker comes out ", (found_m - given_m).norm(),
+                        " m from the place that is given"));
 }
 
 }  // namespace
 
 std::vector<Matrix3> possible_turns(const Path& path, const MachineNodes& nodes) {
   std::vector<Matrix3> possible;
-  for (const Matrix3& R : turns_of_axes()) {
+  for (const Matrix3& R : cycles_of_axes()) {
     std::vector<Vector3> turned = path.vertices_m;
     for (Vector3& q : turned) q = R * q;
     if (outside_travel(turned, nodes, kTravelTolerance_m).empty()) possible.push_back(R);
@@ -162,12 +174,13 @@ void require_orientation(Verdict& verdict, const Path& path, const MachineNodes&
   std::vector<Matrix3> open = possible_turns(path, nodes);
   if (evidence.scales_agree) open.clear();
   if (evidence.up && !agrees_with_up(verdict, open, T_machine_tracker, *evidence.up)) return;
-  if (evidence.tracker_m &&
-      !agrees_with_place(verdict, open, T_machine_tracker.t_m, *evidence.tracker_m, target_offset_m))
+  if (evidence.tracker_m && !agrees_with_place(verdict, open, T_machine_tracker.t_m,
+                                               *evidence.tracker_m, target_offset_m))
     return;
   if (open.empty()) return;
-  const std::string text = message("path orientation: the path file would fit as well ", list_of_turns(open),
-                                   ", and nothing given excludes it");
+  const std::string text = message("path orientation: the path file would fit as well ",
+                                   list_of_turns(open), ", and nothing given excludes it");
+
   if (evidence.accepted) {
     verdict.notes.push_back(text);
   } else {

@@ -24,11 +24,13 @@ PathFrame path_frame(const Vector3& direction, const Vector3& beam_m, const Nois
   PathFrame frame;
   frame.a1 = direction.normalized();
   Vector3 across = perpendicular_part(b, frame.a1);
+
   // Driving along the beam, both perpendicular directions are equally uncertain and any will do.
   constexpr double kAlongBeam = 1e-6;
   if (across.norm() < kAlongBeam) {
     across = perpendicular_part(least_parallel_axis(frame.a1), frame.a1);
   }
+
   frame.a2 = across.normalized();
   frame.a3 = frame.a1.cross(frame.a2);
   const double across_beam_m = noise.sigma_angle_rad * range_m;
@@ -36,6 +38,7 @@ PathFrame path_frame(const Vector3& direction, const Vector3& beam_m, const Nois
   frame.sigma2_m = std::sqrt(noise.sigma_range_m * noise.sigma_range_m * cosine * cosine +
                              across_beam_m * across_beam_m * (1.0 - cosine * cosine));
   frame.sigma3_m = across_beam_m;
+
   return frame;
 }
 

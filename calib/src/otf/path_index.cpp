@@ -11,8 +11,8 @@ namespace {
 constexpr std::size_t kLegsInLeaf = 8;
 constexpr double kNowhere = std::numeric_limits<double>::infinity();
 
-/// A box is never farther away than the legs in it: not by rounding either, which is below 1e-12 of any
-/// travel.
+/// A box is never farther away than the legs in it: not by rounding either, which is below 1e-12 of
+/// any travel.
 double rounded_down(double off_m) {
   return off_m * (1.0 - 1e-9) - 1e-12;
 }
@@ -68,8 +68,10 @@ std::optional<std::size_t> PathIndex::first_within(const Vector3& p_m, double wi
     }
     const std::size_t end = std::min((first_leaf + 1) * kLegsInLeaf, legs());
     for (std::size_t leg = std::max(first_leaf * kLegsInLeaf, from); leg < end; ++leg)
-      if (nearest_on_leg(path_.vertices_m[leg], path_.vertices_m[leg + 1], p_m).off_m <= within_m) return leg;
+      if (nearest_on_leg(path_.vertices_m[leg], path_.vertices_m[leg + 1], p_m).off_m <= within_m)
+        return leg;
   }
+
   return std::nullopt;
 }
 
@@ -86,11 +88,13 @@ double PathIndex::distance_m(const Vector3& p_m) const {
       waiting.push_back(2 * node + (left_is_nearer ? 0 : 1));
       continue;
     }
-    const std::size_t first = (node - leaves_) * kLegsInLeaf, end = std::min(first + kLegsInLeaf, legs());
+    const std::size_t first = (node - leaves_) * kLegsInLeaf,
+                      end = std::min(first + kLegsInLeaf, legs());
     for (std::size_t leg = first; leg < end; ++leg)
-      nearest_m =
-          std::min(nearest_m, nearest_on_leg(path_.vertices_m[leg], path_.vertices_m[leg + 1], p_m).off_m);
+      nearest_m = std::min(
+          nearest_m, nearest_on_leg(path_.vertices_m[leg], path_.vertices_m[leg + 1], p_m).off_m);
   }
+
   return nearest_m;
 }
 

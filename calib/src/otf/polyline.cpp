@@ -28,7 +28,8 @@ OnLeg nearest_on_leg(const Vector3& from_m, const Vector3& to_m, const Vector3& 
 double distance_to_path_m(const Path& path, const Vector3& p_m) {
   double nearest = std::numeric_limits<double>::infinity();
   for (std::size_t i = 1; i < path.vertices_m.size(); ++i) {
-    nearest = std::min(nearest, nearest_on_leg(path.vertices_m[i - 1], path.vertices_m[i], p_m).off_m);
+    nearest =
+        std::min(nearest, nearest_on_leg(path.vertices_m[i - 1], path.vertices_m[i], p_m).off_m);
   }
   return nearest;
 }
@@ -58,25 +59,32 @@ Result<void> check(const Path& path) {
       return failure(ErrorCode::NotFinite, message("path: vertex ", i, " is not a number"));
     }
   }
+
   if (path.vertices_m.size() < 3) {
     return failure(ErrorCode::BadInput,
                    message("path: ", path.vertices_m.size(), " vertices, needs at least 3"));
   }
+
   for (std::size_t i = 0; i + 1 < path.vertices_m.size(); ++i) {
     if (path.vertices_m[i] == path.vertices_m[i + 1]) {
-      return failure(ErrorCode::BadInput, message("path: vertices ", i, " and ", i + 1, " coincide"));
+      return failure(ErrorCode::BadInput,
+                     message("path: vertices ", i, " and ", i + 1, " coincide"));
     }
   }
+
   const Vector3 &start = path.vertices_m.front(), &end = path.vertices_m.back();
   const Vector3 centre = centroid(path.vertices_m).centre_m;
   const Vector3 to_centre = centre - start, to_end = end - start;
-  // An angle below 1 degree at the start lets the roll about the line depend on the errors of the machine.
+
+  // An angle below 1 degree at the start lets the roll about the line depend on the errors of the
+  // machine.
   constexpr double kCollinear = 0.017;
   if (to_centre.cross(to_end).norm() <= kCollinear * to_centre.norm() * to_end.norm()) {
     return failure(ErrorCode::DegenerateGeometry,
                    message("path: start (", start.transpose(), "), end (", end.transpose(),
                            ") and centroid (", centre.transpose(), ") m lie on a line"));
   }
+
   return {};
 }
 
@@ -85,11 +93,12 @@ Result<void> check(const Path& path, const MachineNodes& travel) {
   if (!outside.empty()) {
     const auto [vertex, axis] = outside.front();
     const auto& nodes_m = travel[axis].nodes_m;
-    return failure(ErrorCode::BadInput,
-                   message("path: vertex ", vertex, " at ", "XYZ"[axis], " ",
-                           1e3 * path.vertices_m[vertex][static_cast<Eigen::Index>(axis)],
-                           " mm, the axis travels ", 1e3 * nodes_m.front(), " to ", 1e3 * nodes_m.back(),
-                           " mm", inside_travel_with(path.vertices_m, travel)));
+    return failure(
+        ErrorCode::BadInput,
+        message("path: vertex ", vertex, " at ", "XYZ"[axis], " ",
+                1e3 * path.vertices_m[vertex][static_cast<Eigen::Index>(axis)],
+                " mm, the axis travels ", 1e3 * nodes_m.front(), " to ", 1e3 * nodes_m.back(),
+                " mm", inside_travel_with(path.vertices_m, travel)));
   }
   return check(path);
 }

@@ -28,13 +28,14 @@ ResidualStatistics residual_statistics(const Observations& o, std::span<const do
   return s;
 }
 
-/// Turbulence, vibration, a tracker worse than its data sheet and effects the model does not have show here
-/// first; they must not leave as a small uncertainty. Smaller residuals than stated prove nothing and change
-/// nothing.
-double covariance_factor(const ResidualNoise& noise, std::size_t dof) {
-  constexpr double kNormal999 = 3.090;  // 99.9 % quantile; chi2/dof has standard deviation sqrt(2/dof)
+/// Turbulence, vibration, a tracker worse than its data sheet and effects the model does not have
+/// show here first; they must not leave as a small uncertainty. Smaller residuals than stated prove
+/// nothing and change nothing.
+double variance_factor(const ResidualNoise& noise, std::size_t dof) {
+  // 99.9 % quantile; chi2/dof has standard deviation sqrt(2/dof)
+  constexpr double kNormal999 = 3.090;
   const double unsuspicious = 1.0 + kNormal999 * std::sqrt(2.0 / static_cast<double>(dof));
-  const double factor = noise.covariance_factor();
+  const double factor = noise.variance_factor();
   return factor > unsuspicious ? factor : 1.0;
 }
 
@@ -47,7 +48,7 @@ Statistics statistics(const Observations& o, const Adjustment& a, const Residual
   s.observations = o.rows.size();
   s.unknowns = o.layout.fit_size();
   s.rank = a.rank;
-  s.gauge_conditions = a.null_combinations;
+  s.gauge_conditions = a.datum_defect;
   s.degrees_of_freedom = s.observations - s.rank;
   s.condition = a.condition;
   s.chi2 = chi2(o, residuals.after_m);
@@ -55,17 +56,18 @@ Statistics statistics(const Observations& o, const Adjustment& a, const Residual
   s.sigma0 = std::sqrt(s.chi2_per_dof);
   const ResidualNoise noise = residual_noise(o, residuals.after_m, s.degrees_of_freedom);
   s.correlation = noise.correlation;
-  s.covariance_factor = covariance_factor(noise, s.degrees_of_freedom);
+  s.variance_factor = variance_factor(noise, s.degrees_of_freedom);
   s.before = residual_statistics(o, residuals.before_m);
   s.after = residual_statistics(o, residuals.after_m);
   s.iterations = 1;
   s.alignment_iterations = o.alignment.iterations;
   s.alignment_rms_m = o.alignment.last_rms_m;
+
   return s;
 }
 
-/// How U moves per relative change of all ranges. The constant part of the lever only moves the rigid
-/// unknowns.
+/// How U moves per relative change of all ranges. The constant part of the lever only moves the
+/// rigid unknowns.
 Eigen::VectorXd dU_dscale(const Observations& o, const Adjustment& a) {
   const Vector3& tracker_m = o.alignment.T_machine_tracker.t_m;
   Eigen::VectorXd g = Eigen::VectorXd::Zero(a.U.size());
@@ -76,17 +78,18 @@ Eigen::VectorXd dU_dscale(const Observations& o, const Adjustment& a) {
       g(static_cast<Eigen::Index>(e.column)) += row.weight * e.value * s_m;
     }
   }
-  return a.dU_dg * g;
+  return a.cofactor_Q * g;
 }
 
-/// How U moves per relative change of the scale of an axis: its positioning table has the slope 1, and is
-/// zero at the reference.
+/// How U moves per relative change of the scale of an axis: its positioning table has the slope 1,
+/// and is zero at the reference.
 Eigen::VectorXd dU_daxis_scale(const ParameterLayout& layout, Axis axis) {
   Eigen::VectorXd slope = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(layout.fit_size()));
   const AxisNodes& nodes = layout.nodes()[index(axis)];
   const std::optional<Table> positioning = layout.find({static_cast<Motion>(index(axis)), axis});
   for (std::size_t i = 0; positioning && i < nodes.nodes_m.size(); ++i) {
-    slope(static_cast<Eigen::Index>(positioning->offset + i)) = nodes.nodes_m[i] - nodes.reference_m;
+    slope(static_cast<Eigen::Index>(positioning->offset + i)) =
+        nodes.nodes_m[i] - nodes.reference_m;
   }
   return slope;
 }
@@ -99,7 +102,7 @@ AddedColumns::Estimate range_offset(const Observations& o, const Adjustment& a,
     const double c = drow_drange_offset(o, o.rows[i]);
     sums.add(o.rows[i], o.A.row(i), residual_m[i], std::span(&c, 1));
   }
-  return sums.estimate_with_prior(a.dU_dg, o.u_range_offset_m, factor);
+  return sums.estimate_with_prior(a.cofactor_Q, o.u_range_offset_m, factor);
 }
 
 void report(const Options& options, double fraction) {
@@ -135,52 +138,64 @@ double chi2(const Observations& o, std::span<const double> r) {
 Result<Solution> solve(const Observations& o, const Options& options) {
   const std::size_t needed = o.layout.fit_size();
   if (o.rows.size() <= needed) {
-    return failure(ErrorCode::TooFewObservations,
-                   message("adjustment: ", o.rows.size(), " observations for ", needed, " unknowns"));
+    return failure(
+        ErrorCode::TooFewObservations,
+        message("adjustment: ", o.rows.size(), " observations for ", needed, " unknowns"));
   }
+
   report(options, 0.0);
   const NormalEquations N = normal_equations(o);
   report(options, 0.5);
+
   if (Result<void> goes_on = check_stopped(options.stopped); !goes_on) {
     return tl::unexpected(goes_on.error());
   }
+
   Result<Adjustment> a = adjust(N, o.layout, options.gauge_weight);
   if (!a) {
     return tl::unexpected(a.error());
   }
+
   Result<ValidityVolume> validity = ValidityVolume::hull_of(o.covered_m);
   if (!validity) {
     return tl::unexpected(validity.error());
   }
+
   Residuals residuals{residuals_m(o, {}), residuals_m(o, a->U)};
   Statistics figures = statistics(o, *a, residuals);
   RangeOffset offset;
   Eigen::MatrixXd root_of_offset = Eigen::MatrixXd::Zero(a->U.size(), 1);
+
   if (o.u_range_offset_m > 0.0) {
-    const auto e = range_offset(o, *a, residuals.after_m, figures.covariance_factor);
+    const auto e = range_offset(o, *a, residuals.after_m, figures.variance_factor);
     offset = {e.d(0), e.u(0)};
     root_of_offset = e.root_cov_dU;
     a->U -= e.dU;
     residuals.after_m = residuals_m(without_range_offset(o, offset.value_m), a->U);
     figures = statistics(o, *a, residuals);
   }
-  a->covariance *= figures.covariance_factor;
+
+  a->covariance *= figures.variance_factor;
   a->covariance += root_of_offset * root_of_offset.transpose();
   if (o.u_scale > 0.0) {
     const Eigen::VectorXd moved = o.u_scale * dU_dscale(o, *a);
     a->covariance += moved * moved.transpose();
   }
+
   for (const Axis axis : kAllAxes) {
     const Eigen::VectorXd moved = o.u_axis_scale[index(axis)] * dU_daxis_scale(o.layout, axis);
     a->covariance += moved * moved.transpose();
   }
+
   const auto n = static_cast<Eigen::Index>(o.layout.model_size());
   Result<VolumetricModel> model =
       VolumetricModel::from_vector(o.layout, Gauge::G1, std::array{o.target_offset_m}, a->U.head(n),
                                    a->covariance.topLeftCorner(n, n), *std::move(validity));
+
   if (!model) {
     return tl::unexpected(model.error());
   }
+
   report(options, 1.0);
   return Solution{.model = *std::move(model),
                   .estimator = Estimator::TwoStep,

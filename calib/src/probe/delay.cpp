@@ -50,16 +50,19 @@ Result<std::vector<Feed>> group(std::span<const FeedTouch> touches, const DelayO
   std::vector<FeedTouch> sorted(touches.begin(), touches.end());
   std::ranges::sort(sorted, {}, &FeedTouch::speed_m_s);
   std::vector<Feed> feeds;
+
   for (std::size_t begin = 0, end = 0; begin < sorted.size(); begin = end) {
     const double most = sorted[begin].speed_m_s / (1.0 - options.same_feed);
     while (end < sorted.size() && sorted[end].speed_m_s <= most) ++end;
     if (end - begin < kLeastTouchesPerFeed) {
-      return failure(ErrorCode::TooFewObservations,
-                     message("probe delay: ", end - begin, " touches at ", sorted[begin].speed_m_s * 1e3,
-                             " mm/s, at least ", kLeastTouchesPerFeed, " are needed at each feed"));
+      return failure(
+          ErrorCode::TooFewObservations,
+          message("probe delay: ", end - begin, " touches at ", sorted[begin].speed_m_s * 1e3,
+                  " mm/s, at least ", kLeastTouchesPerFeed, " are needed at each feed"));
     }
     feeds.push_back(feed_of(std::span{sorted}.subspan(begin, end - begin)));
   }
+
   return feeds;
 }
 
@@ -69,13 +72,14 @@ struct Scatter {
   double jitter_s2 = 0.0;
 };
 
-/// One weighted fit of the variances, weighted by what `guess` says of them: a variance estimated from n
-/// touches has a deviation in proportion to the true one.
+/// One weighted fit of the variances, weighted by what `guess` says of them: a variance estimated
+/// from n touches has a deviation in proportion to the true one.
 Scatter refined(const std::vector<Feed>& feeds, const Scatter& guess) {
   Eigen::Matrix2d normal = Eigen::Matrix2d::Zero();
   Eigen::Vector2d right = Eigen::Vector2d::Zero();
   double pooled = 0.0;
   double sum = 0.0;
+
   for (const Feed& f : feeds) {
     const double v2 = f.speed_m_s * f.speed_m_s;
     const double expected = std::max(guess.s0_m2 + v2 * guess.jitter_s2, 1e-30);
@@ -86,6 +90,7 @@ Scatter refined(const std::vector<Feed>& feeds, const Scatter& guess) {
     pooled += weight * f.variance_m2;
     sum += weight;
   }
+
   const Eigen::Vector2d scale = normal.diagonal().cwiseSqrt().cwiseInverse();
   const Eigen::Matrix2d scaled = scale.asDiagonal() * normal * scale.asDiagonal();
   const Eigen::Vector2d scaled_right = scale.cwiseProduct(right);
@@ -93,6 +98,7 @@ Scatter refined(const std::vector<Feed>& feeds, const Scatter& guess) {
   const Eigen::Vector2d both = scale.cwiseProduct(solved);
   if (both.allFinite() && both[0] >= 0.0 && both[1] >= 0.0) return {both[0], both[1]};
   if (!both.allFinite() || both[1] < 0.0) return {pooled / sum, 0.0};
+
   return {0.0, right[1] / normal(1, 1)};
 }
 
@@ -104,8 +110,8 @@ Scatter scatter_of(const std::vector<Feed>& feeds) {
   return scatter;
 }
 
-/// Student's t for 95 % over that of the normal distribution: [GUM] table G.2, and from 6 degrees of freedom
-/// on Cornish and Fisher's series, to 0.1 %.
+/// Student's t for 95 % over that of the normal distribution: [GUM] table G.2, and from 6 degrees
+/// of freedom on Cornish and Fisher's series, to 0.1 %.
 double student_over_normal(double dof) {
   constexpr double z = 1.959964;
   constexpr std::array kT95{12.706205, 4.302653, 3.182446, 2.776445, 2.570582};
@@ -124,14 +130,15 @@ Result<ProbeDelayFit> fit_delay(std::span<const FeedTouch> touches, const DelayO
   const auto feeds = group(touches, options);
   if (!feeds) return tl::unexpected(feeds.error());
   if (feeds->size() < kLeastFeeds) {
-    return failure(ErrorCode::TooFewObservations,
-                   message("probe delay: ", feeds->size(), " feeds, at least ", kLeastFeeds, " are needed"));
+    return failure(
+        ErrorCode::TooFewObservations,
+        message("probe delay: ", feeds->size(), " feeds, at least ", kLeastFeeds, " are needed"));
   }
   const double ratio = feeds->back().speed_m_s / feeds->front().speed_m_s;
   if (ratio < options.min_feed_ratio) {
     return failure(ErrorCode::DegenerateGeometry,
-                   message("probe delay: the fastest feed is ", ratio, " times the slowest, at least ",
-                           options.min_feed_ratio, " is needed"));
+                   message("probe delay: the fastest feed is ", ratio,
+                           " times the slowest, at least ", options.min_feed_ratio, " is needed"));
   }
 
   const Scatter scatter = scatter_of(*feeds);
@@ -142,39 +149,47 @@ Result<ProbeDelayFit> fit_delay(std::span<const FeedTouch> touches, const DelayO
   const double origin = feeds->front().along_m;
   const auto weight = [&](const Feed& f) {
     const double variance = scatter.s0_m2 + f.speed_m_s * f.speed_m_s * scatter.jitter_s2;
-    return f.count / std::max(variance, 1e-30);  // 1 fm: touches without any scatter, made by a computer
+    return f.count /
+           std::max(variance, 1e-30);  // 1 fm: touches without any scatter, made by a computer
   };
   for (const Feed& f : *feeds) {
     sum_w += weight(f);
     mean_v += weight(f) * f.speed_m_s;
     mean_p += weight(f) * (f.along_m - origin);
   }
+
   mean_v /= sum_w;
   mean_p /= sum_w;
   double vv = 0.0;
   double vp = 0.0;
+
   for (const Feed& f : *feeds) {
     vv += weight(f) * (f.speed_m_s - mean_v) * (f.speed_m_s - mean_v);
     vp += weight(f) * (f.speed_m_s - mean_v) * (f.along_m - origin - mean_p);
   }
+
   ProbeDelayFit fit{.delay_s = vp / vv, .u_delay_s = 1.0 / std::sqrt(vv)};
   fit.u_jitter_s = std::sqrt(scatter.jitter_s2);
   fit.u_scatter_m = std::sqrt(scatter.s0_m2);
   fit.origin_m = origin + mean_p - fit.delay_s * mean_v;
   fit.feeds = feeds->size();
   fit.touches = touches.size();
+
   for (const Feed& f : *feeds) {
     const double residual = f.along_m - fit.origin_m - fit.delay_s * f.speed_m_s;
     fit.misfit += weight(f) * residual * residual / static_cast<double>(feeds->size() - 2);
   }
+
   // Feeds that do not agree say how uncertain the line is, and there are few of them.
   fit.dof = static_cast<double>(fit.misfit > 1.0 ? fit.feeds - 2 : fit.touches - fit.feeds);
   fit.u_delay_s *= std::sqrt(std::max(1.0, fit.misfit)) * student_over_normal(fit.dof);
   double squares = 0.0;
+
   for (const FeedTouch& t : touches) {
     const double residual = t.along_m - fit.origin_m - fit.delay_s * t.speed_m_s;
     squares += residual * residual;
   }
+
   fit.residual_rms_m = std::sqrt(squares / static_cast<double>(touches.size()));
   return fit;
 }

@@ -20,8 +20,8 @@ using Unknowns = Eigen::Matrix<double, kUnknowns, 1>;
 Result<void> check(std::span<const QualifyingTouch> touches) {
   if (touches.size() < kLeastTouches) {
     return failure(ErrorCode::TooFewObservations,
-                   message("probe qualification: ", touches.size(), " touches, at least ", kLeastTouches,
-                           " are needed"));
+                   message("probe qualification: ", touches.size(), " touches, at least ",
+                           kLeastTouches, " are needed"));
   }
   for (const QualifyingTouch& t : touches) {
     if (!t.p_m.allFinite() || !t.normal.allFinite())
@@ -37,7 +37,8 @@ struct System {
   Eigen::VectorXd r;  ///< measured less model, m
 };
 
-System system_at(std::span<const QualifyingTouch> touches, const Unknowns& x, double sphere_radius_m) {
+System system_at(std::span<const QualifyingTouch> touches, const Unknowns& x,
+                 double sphere_radius_m) {
   const auto n = static_cast<Eigen::Index>(touches.size());
   System s{Eigen::MatrixXd(n, kUnknowns), Eigen::VectorXd(n)};
   for (Eigen::Index i = 0; i < n; ++i) {
@@ -45,11 +46,12 @@ System system_at(std::span<const QualifyingTouch> touches, const Unknowns& x, do
     const Vector3 unit = d.normalized();
     const LobingMap::Terms Y = LobingMap::basis(unit);
     s.r[i] = d.norm() - sphere_radius_m - Y.dot(x.tail<LobingMap::kTerms>());
-    // The direction turns with the centre, too: lobing over a radius, 1e-4 of this; Gauss-Newton needs no
-    // more.
+    // The direction turns with the centre, too: lobing over a radius, 1e-4 of this; Gauss-Newton
+    // needs no more.
     s.J.row(i).head<3>() = unit.transpose();
     s.J.row(i).tail<LobingMap::kTerms>() = Y.transpose();
   }
+
   return s;
 }
 
@@ -94,16 +96,18 @@ EffectiveRadius LobingMap::at(const Vector3& normal) const {
   return {Y.dot(terms_m_), std::sqrt(std::max(0.0, Y.dot(covariance_m2_ * Y)))};
 }
 
-Result<Qualification> qualify(std::span<const QualifyingTouch> touches, const QualificationOptions& options) {
+Result<Qualification> qualify(std::span<const QualifyingTouch> touches,
+                              const QualificationOptions& options) {
   if (auto fine = check(touches); !fine) return tl::unexpected(fine.error());
   Unknowns x = Unknowns::Zero();
   x.head<3>() = first_centre(touches, options.sphere_radius_m);
   Qualification q;
   q.condition = condition_of(system_at(touches, x, options.sphere_radius_m).J);
   if (!(q.condition <= options.max_condition)) {
-    return failure(ErrorCode::DegenerateGeometry,
-                   message("probe qualification: the touches cover too little of the sphere: condition ",
-                           q.condition, ", at most ", options.max_condition));
+    return failure(
+        ErrorCode::DegenerateGeometry,
+        message("probe qualification: the touches cover too little of the sphere: condition ",
+                q.condition, ", at most ", options.max_condition));
   }
   bool converged = false;
   for (int i = 0; i < kMostIterations && !converged; ++i) {
@@ -122,11 +126,14 @@ Result<Qualification> qualify(std::span<const QualifyingTouch> touches, const Qu
   q.residual_rms_m = std::sqrt(s.r.squaredNorm() / static_cast<double>(touches.size()));
   q.sigma_m = std::sqrt(s.r.squaredNorm() / q.freedom);
   const Eigen::Matrix<double, kUnknowns, kUnknowns> normal = s.J.transpose() * s.J;
-  const Eigen::Matrix<double, kUnknowns, kUnknowns> covariance = q.sigma_m * q.sigma_m * normal.inverse();
+  const Eigen::Matrix<double, kUnknowns, kUnknowns> covariance =
+      q.sigma_m * q.sigma_m * normal.inverse();
   q.centre_m = x.head<3>();
   q.cov_centre_m2 = covariance.topLeftCorner<3, 3>();
-  LobingMap::Covariance terms = covariance.bottomRightCorner<LobingMap::kTerms, LobingMap::kTerms>();
-  terms(0, 0) += options.u_sphere_radius_m * options.u_sphere_radius_m;  // what the sphere is not, the tip is
+  LobingMap::Covariance terms =
+      covariance.bottomRightCorner<LobingMap::kTerms, LobingMap::kTerms>();
+  terms(0, 0) +=
+      options.u_sphere_radius_m * options.u_sphere_radius_m;  // what the sphere is not, the tip is
   q.map = LobingMap{x.tail<LobingMap::kTerms>(), terms};
   q.lobing_m = lobing_over(touches, q.map);
   return q;

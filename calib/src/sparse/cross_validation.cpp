@@ -20,18 +20,22 @@ Result<void> check(const Folds& folds, Eigen::Index rows) {
     return failure(ErrorCode::BadInput, message("cross-validation: ", folds.count, " folds of ",
                                                 folds.of_row.size(), " rows for ", rows, " rows"));
   }
+
   std::vector<int> size(static_cast<std::size_t>(folds.count), 0);
   for (const int fold : folds.of_row) {
     if (fold < 0 || fold >= folds.count) {
-      return failure(ErrorCode::BadInput, message("cross-validation: fold ", fold, " of ", folds.count));
+      return failure(ErrorCode::BadInput,
+                     message("cross-validation: fold ", fold, " of ", folds.count));
     }
     ++size[static_cast<std::size_t>(fold)];
   }
+
   const auto empty = std::find(size.begin(), size.end(), 0);
   if (empty != size.end()) {
     return failure(ErrorCode::BadInput,
                    message("cross-validation: fold ", empty - size.begin(), " has no row"));
   }
+
   return {};
 }
 
@@ -75,6 +79,7 @@ void fill_surface(GridSearch& grid, const std::vector<HeldOut>& folds) {
              columns = static_cast<Eigen::Index>(grid.gamma.size());
   grid.error = Eigen::MatrixXd::Constant(rows, columns, kMissing);
   grid.standard_error = grid.error;
+
   for (std::size_t g = 0; g < grid.gamma.size(); ++g) {
     const std::size_t reach = common_reach(grid.paths[g], folds, g);
     for (std::size_t l = 0; l < reach; ++l) {
@@ -114,11 +119,13 @@ long count_sweeps(const std::vector<Path>& paths, const std::vector<HeldOut>& fo
 }
 
 Result<GridSearch> search(const GramProblem& problem, const std::vector<Penalty>& penalties,
-                          const Folds& folds, const PathOptions& options, const ParallelFor& parallel_for) {
+                          const Folds& folds, const PathOptions& options,
+                          const ParallelFor& parallel_for) {
   const LambdaList lambda = lambda_list(problem, options);
   const LambdaList given{lambda.values, false};
   GridSearch grid;
   std::vector<Result<HeldOut>> held_out(static_cast<std::size_t>(folds.count));
+
   parallel_for(held_out.size() + 1, [&](std::size_t i) {
     if (i == held_out.size()) {
       grid.paths = full_paths(problem, penalties, lambda, options);
@@ -126,23 +133,28 @@ Result<GridSearch> search(const GramProblem& problem, const std::vector<Penalty>
       held_out[i] = hold_out(problem, folds, static_cast<int>(i), penalties, given, options);
     }
   });
+
   std::vector<HeldOut> judged;
   for (Result<HeldOut>& fold : held_out) {
     if (!fold) return tl::unexpected(fold.error());
     judged.push_back(std::move(*fold));
   }
+
   for (const Penalty& penalty : penalties) {
     grid.gamma.push_back(penalty.gamma);
   }
+
   grid.lambda = lambda.values;
   grid.null_error = problem.y_rms * problem.y_rms;
   grid.sweeps = count_sweeps(grid.paths, judged);
   fill_surface(grid, judged);
+
   if (!choose_best(grid)) {
     return failure(ErrorCode::NotConverged,
                    message("cross-validation: no lambda was reached by every fold within ",
                            options.max_sweeps, " sweeps"));
   }
+
   return grid;
 }
 
@@ -161,12 +173,14 @@ Result<GridSearch> grid_search(const Eigen::MatrixXd& X, const Eigen::VectorXd& 
   if (!wanted) return tl::unexpected(wanted.error());
   if (auto checked = check(options); !checked) return tl::unexpected(checked.error());
   if (auto checked = check(folds, X.rows()); !checked) return tl::unexpected(checked.error());
-  return gram_problem(X, y).and_then(
-      [&](const GramProblem& problem) { return search(problem, *wanted, folds, options, parallel_for); });
+  return gram_problem(X, y).and_then([&](const GramProblem& problem) {
+    return search(problem, *wanted, folds, options, parallel_for);
+  });
 }
 
 Result<CrossValidation> cross_validate(const Eigen::MatrixXd& X, const Eigen::VectorXd& y,
-                                       const Penalty& penalty, const Folds& folds, const PathOptions& options,
+                                       const Penalty& penalty, const Folds& folds,
+                                       const PathOptions& options,
                                        const ParallelFor& parallel_for) {
   return grid_search(X, y, penalty.kind, {penalty.gamma}, folds, options, parallel_for)
       .map([](GridSearch&& grid) {
@@ -188,7 +202,8 @@ std::vector<double> equally_spaced(double first, double last, int count) {
 }
 
 std::vector<double> log_spaced(double first, double last, int count) {
-  std::vector<double> values = equally_spaced(natural_logarithm(first), natural_logarithm(last), count);
+  std::vector<double> values =
+      equally_spaced(natural_logarithm(first), natural_logarithm(last), count);
   for (double& v : values) {
     v = exponential(v);
   }

@@ -60,8 +60,9 @@ bool parse_integer(std::string_view cell, int& number) {
 Result<Folds> folds_from_labels(std::span<const int> label_of_row) {
   const std::vector<int> distinct = sorted_distinct(label_of_row);
   if (distinct.size() < 2) {
-    return failure(ErrorCode::TooFewObservations, message("folds from labels: ", distinct.size(),
-                                                          " label(s) on ", label_of_row.size(), " rows"));
+    return failure(ErrorCode::TooFewObservations,
+                   message("folds from labels: ", distinct.size(), " label(s) on ",
+                           label_of_row.size(), " rows"));
   }
   Folds folds{.of_row = {}, .count = static_cast<int>(distinct.size())};
   folds.of_row.reserve(label_of_row.size());
@@ -86,6 +87,7 @@ Result<Folds> parse_folds(std::string_view text) {
                      message("read folds: line ", line_number, " is no integer: ", line));
     }
   }
+
   return folds_from_labels(labels);
 }
 

@@ -1,6 +1,6 @@
 #pragma once
-/// One regression problem reduced to what coordinate descent needs: inner products of standardised columns
-/// and centred y.
+/// One regression problem reduced to what coordinate descent needs: inner products of standardised
+/// columns and centred y.
 
 #include <Eigen/Core>
 

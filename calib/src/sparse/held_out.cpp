@@ -20,7 +20,8 @@ Eigen::MatrixXd like(const Standardised& design, const Eigen::MatrixXd& X) {
          design.scale.cwiseInverse().asDiagonal();
 }
 
-std::vector<Moments> errors_of(const Eigen::MatrixXd& X, const Eigen::VectorXd& y, const Eigen::MatrixXd& b) {
+std::vector<Moments> errors_of(const Eigen::MatrixXd& X, const Eigen::VectorXd& y,
+                               const Eigen::MatrixXd& b) {
   const Eigen::MatrixXd squared = ((X * b).colwise() - y).array().square();
   std::vector<Moments> errors;
   for (Eigen::Index k = 0; k < b.cols(); ++k) {
@@ -46,22 +47,28 @@ Result<HeldOut> hold_out(const GramProblem& all, const Folds& folds, int fold,
   for (std::size_t i = 0; i < folds.of_row.size(); ++i) {
     (folds.of_row[i] == fold ? test : train).push_back(static_cast<Eigen::Index>(i));
   }
+
   const auto problem = gram_problem(all.design.X(train, Eigen::all), all.y(train));
   if (!problem) {
-    return failure(problem.error().code, message("without fold ", fold, ": ", problem.error().text));
+    return failure(problem.error().code,
+                   message("without fold ", fold, ": ", problem.error().text));
   }
+
   std::vector<PathTask> tasks;
   tasks.reserve(penalties.size());
   for (const Penalty& penalty : penalties) {
     tasks.push_back(path_task(*problem, penalty, lambda, options));
   }
+
   const Eigen::MatrixXd X_test = like(problem->design, all.design.X(test, Eigen::all));
   const Eigen::VectorXd y_test = all.y(test).array() - problem->y_mean;
   HeldOut out;
+
   for (const SolvedPath& path : solve_paths(*problem, tasks)) {
     out.error.push_back(errors_of(X_test, y_test, path.b));
     out.sweeps = std::accumulate(path.sweeps.begin(), path.sweeps.end(), out.sweeps);
   }
+
   return out;
 }
 

@@ -9,7 +9,8 @@
 
 namespace abbe::calib::sparse {
 
-/// Count, mean and sum of squared deviations from the mean: adds up over folds without cancellation.
+/// Count, mean and sum of squared deviations from the mean: adds up over folds without
+/// cancellation.
 struct Moments {
   double count = 0.0;
   double mean = 0.0;
@@ -23,9 +24,10 @@ struct HeldOut {
   long sweeps = 0;
 };
 
-/// Fits the rows of `all` (standardised by the whole, then anew) that are not in `fold`, judges by those that
-/// are.
+/// Fits the rows of `all` (standardised by the whole, then anew) that are not in `fold`, judges by
+/// those that are.
 [[nodiscard]] Result<HeldOut> hold_out(const GramProblem& all, const Folds&, int fold,
-                                       const std::vector<Penalty>&, const LambdaList&, const PathOptions&);
+                                       const std::vector<Penalty>&, const LambdaList&,
+                                       const PathOptions&);
 
 }  // namespace abbe::calib::sparse

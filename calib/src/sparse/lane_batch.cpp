@@ -27,7 +27,8 @@ class LaneBatch {
 
   std::vector<SolvedPath> run() {
     while (busy()) {
-      const SweepProblem sweeps{columns_.size(), gram_.data(), xty_.data(), mask_.data(), b_.data()};
+      const SweepProblem sweeps{columns_.size(), gram_.data(), xty_.data(), mask_.data(),
+                                b_.data()};
       const SweepOutcome outcome = sweep_(sweeps, parameters_, shortest_budget());
       for (std::size_t lane = 0; lane < kLanes; ++lane) {
         if (lanes_[lane].path) advance(lane, outcome.sweeps, (outcome.converged >> lane & 1U) != 0);
@@ -43,7 +44,8 @@ class LaneBatch {
   };
 
   [[nodiscard]] bool busy() const {
-    return std::any_of(lanes_.begin(), lanes_.end(), [](const Lane& lane) { return lane.path.has_value(); });
+    return std::any_of(lanes_.begin(), lanes_.end(),
+                       [](const Lane& lane) { return lane.path.has_value(); });
   }
 
   [[nodiscard]] long shortest_budget() const {
@@ -96,6 +98,7 @@ class LaneBatch {
       b_[k].of[lane] = 0.0;
       mask_[k].of[lane] = 0;
     }
+
     set_parameters(lane);
     if (!path) return;
     for (const Index j : path->active()) {
@@ -142,14 +145,17 @@ class LaneBatch {
     std::vector<Lanes> b(columns_.size());
     std::vector<LaneMask> mask(columns_.size());
     place_.assign(in_use_.size(), 0);
+
     for (std::size_t k = 0; k < columns_.size() && columns_[k] >= 0; ++k) {
       place_[static_cast<std::size_t>(columns_[k])] = k;
     }
+
     for (std::size_t k = 0; k < old.size() && old[k] >= 0; ++k) {
       const std::size_t place = place_[static_cast<std::size_t>(old[k])];
       b[place] = b_[k];
       mask[place] = mask_[k];
     }
+
     b_ = std::move(b);
     mask_ = std::move(mask);
   }

@@ -22,8 +22,8 @@ Result<Fitted> fitted(const Eigen::MatrixXd& X, const Eigen::VectorXd& y, const 
                       const Eigen::VectorXd& b) {
   if (auto checked = check(penalty); !checked) return tl::unexpected(checked.error());
   if (b.size() != X.cols()) {
-    return failure(ErrorCode::BadInput,
-                   message("judge a solution: ", b.size(), " coefficients, ", X.cols(), " columns"));
+    return failure(ErrorCode::BadInput, message("judge a solution: ", b.size(), " coefficients, ",
+                                                X.cols(), " columns"));
   }
   return gram_problem(X, y).map([&](GramProblem problem) {
     const Eigen::VectorXd kept = b(problem.design.kept);
@@ -38,7 +38,8 @@ Support union_support(const Eigen::MatrixXd& b, Eigen::Index k, const Support& k
   const Eigen::Index next = std::min(k + 1, b.cols() - 1);
   Support support;
   for (std::size_t i = 0; i < kept.size(); ++i) {
-    if (b(kept[i], k) != 0 || b(kept[i], next) != 0) support.push_back(static_cast<Eigen::Index>(i));
+    if (b(kept[i], k) != 0 || b(kept[i], next) != 0)
+      support.push_back(static_cast<Eigen::Index>(i));
   }
   return support;
 }
@@ -47,15 +48,17 @@ double smallest_eigenvalue(const Eigen::MatrixXd& Z, const Support& support) {
   if (support.empty()) return std::numeric_limits<double>::infinity();
   const Eigen::MatrixXd Z_support = Z(Eigen::all, support);
   const Eigen::MatrixXd gram = Z_support.transpose() * Z_support / static_cast<double>(Z.rows());
-  return Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd>(gram, Eigen::EigenvaluesOnly).eigenvalues()(0);
+  return Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd>(gram, Eigen::EigenvaluesOnly)
+      .eigenvalues()(0);
 }
 
 }  // namespace
 
-Result<double> kkt_violation(const Eigen::MatrixXd& X, const Eigen::VectorXd& y, const Penalty& penalty,
-                             double lambda, const Eigen::VectorXd& b) {
+Result<double> kkt_violation(const Eigen::MatrixXd& X, const Eigen::VectorXd& y,
+                             const Penalty& penalty, double lambda, const Eigen::VectorXd& b) {
   return fitted(X, y, penalty, b).map([&](const Fitted& fit) {
-    const Eigen::VectorXd g = fit.problem.design.X.transpose() * fit.residual / static_cast<double>(y.size());
+    const Eigen::VectorXd g =
+        fit.problem.design.X.transpose() * fit.residual / static_cast<double>(y.size());
     double worst = 0.0;
     for (Eigen::Index j = 0; j < g.size(); ++j) {
       const double slope = std::copysign(derivative(penalty, lambda, std::abs(fit.b(j))), fit.b(j));
@@ -79,9 +82,10 @@ Result<double> objective(const Eigen::MatrixXd& X, const Eigen::VectorXd& y, con
 
 Result<Convexity> convexity(const Eigen::MatrixXd& X, const Path& path) {
   if (X.cols() != path.standardised.rows()) {
-    return failure(ErrorCode::BadInput,
-                   message("convexity: ", X.cols(), " columns, the path has ", path.standardised.rows()));
+    return failure(ErrorCode::BadInput, message("convexity: ", X.cols(), " columns, the path has ",
+                                                path.standardised.rows()));
   }
+
   return standardise(X).map([&](const Standardised& design) {
     Convexity out{Eigen::VectorXd(path.reached()), {}};
     Support before;

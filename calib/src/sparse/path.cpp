@@ -15,7 +15,8 @@ namespace {
 
 constexpr int kDefaultCount = 100;
 
-/// n > p: a thousandth of lambda_max is close to least squares; else the dense end of the path means nothing.
+/// n > p: a thousandth of lambda_max is close to least squares; else the dense end of the path
+/// means nothing.
 double default_ratio(const GramProblem& problem) {
   return problem.y.size() > problem.columns() ? 0.001 : 0.05;
 }
@@ -41,22 +42,25 @@ Result<void> check(const PathOptions& options) {
     return failure(ErrorCode::BadInput,
                    message("tolerance of the path must be positive: ", options.tolerance));
   }
+
   if (options.max_sweeps < 1) {
     return failure(ErrorCode::BadInput,
                    message("budget of the path: ", options.max_sweeps, " sweeps, at least 1"));
   }
+
   if (options.max_nonzero && *options.max_nonzero < 0) {
     return failure(ErrorCode::BadInput,
                    message("largest number of coefficients is negative: ", *options.max_nonzero));
   }
+
   return check_lambda(options.lambda);
 }
 
 std::vector<double> default_lambda(const GramProblem& problem, int count, double ratio) {
   const double largest = problem.lambda_max();
   std::vector<double> lambda = log_spaced(largest, ratio * largest, count);
-  lambda.front() =
-      largest;  // exactly: exp(log(x)) may fall below it, and the first solution would not be empty
+  // exactly: exp(log(x)) may fall below it, and the first solution would not be empty
+  lambda.front() = largest;
   return lambda;
 }
 
@@ -87,15 +91,18 @@ Path to_path(const GramProblem& problem, const PathTask& task, SolvedPath solved
   path.standardised = Eigen::MatrixXd::Zero(design.original_columns, solved.b.cols());
   path.standardised(design.kept, Eigen::all) = solved.b;
   path.coefficients = to_original(design, solved.b, problem.y_mean);
-  path.residual_sum_squares = ((-design.X * solved.b).colwise() + problem.y).colwise().squaredNorm();
+  path.residual_sum_squares =
+      ((-design.X * solved.b).colwise() + problem.y).colwise().squaredNorm();
+
   for (Eigen::Index j = 0; j < design.original_columns; ++j) {
     if (!std::binary_search(design.kept.begin(), design.kept.end(), j)) path.dropped.push_back(j);
   }
+
   return path;
 }
 
-Result<std::vector<double>> default_lambda(const Eigen::MatrixXd& X, const Eigen::VectorXd& y, int count,
-                                           std::optional<double> ratio) {
+Result<std::vector<double>> default_lambda(const Eigen::MatrixXd& X, const Eigen::VectorXd& y,
+                                           int count, std::optional<double> ratio) {
   if (count < 2 || (ratio && !(*ratio > 0 && *ratio < 1))) {
     return failure(ErrorCode::BadInput,
                    message("default lambda: ", count, " values down to ", ratio.value_or(0.001),

@@ -1,6 +1,6 @@
 #pragma once
-/// One path on its way: everything but the sweeps. Tells which columns the next sweeps move, at which lambda,
-/// and takes over when they have converged or the budget is used up.
+/// One path on its way: everything but the sweeps. Tells which columns the next sweeps move, at
+/// which lambda, and takes over when they have converged or the budget is used up.
 
 #include <optional>
 #include <span>
@@ -35,11 +35,13 @@ class PathLane {
   [[nodiscard]] long sweeps_left() const { return task_.max_sweeps - total_; }
   [[nodiscard]] double tolerance() const { return task_.tolerance; }
   [[nodiscard]] const Shrinkage& shrinkage_now() const { return shrink_; }
-  [[nodiscard]] const std::vector<Eigen::Index>& active() const { return active_; }  ///< in order of entry
+  [[nodiscard]] const std::vector<Eigen::Index>& active() const {
+    return active_;
+  }  ///< in order of entry
   [[nodiscard]] double& coefficient(Eigen::Index j) { return b_(j); }
 
-  /// After `count` sweeps over active(), the last of which moved less than the tolerance if `converged`, with
-  /// coefficient() brought up to date if it did or if the budget is used up.
+  /// After `count` sweeps over active(), the last of which moved less than the tolerance if
+  /// `converged`, with coefficient() brought up to date if it did or if the budget is used up.
   void swept(long count, bool converged);
   [[nodiscard]] SolvedPath take() &&;
 

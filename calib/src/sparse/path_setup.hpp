@@ -1,5 +1,6 @@
 #pragma once
-/// From what the caller asks to tasks of the solver, and from its solutions to paths in the caller's units.
+/// From what the caller asks to tasks of the solver, and from its solutions to paths in the
+/// caller's units.
 
 #include <vector>
 

@@ -17,12 +17,14 @@ double smallest_gamma(PenaltyKind kind) {
 Result<void> check(const Penalty& penalty) {
   if (penalty.kind == PenaltyKind::Lasso) return {};
   if (!std::isfinite(penalty.gamma)) {
-    return failure(ErrorCode::NotFinite, message("gamma of ", name(penalty.kind), ": ", penalty.gamma));
+    return failure(ErrorCode::NotFinite,
+                   message("gamma of ", name(penalty.kind), ": ", penalty.gamma));
   }
   const double limit = smallest_gamma(penalty.kind);
   if (penalty.gamma <= limit) {
-    return failure(ErrorCode::BadInput, message("gamma of ", name(penalty.kind), " must be greater than ",
-                                                limit, ": ", penalty.gamma));
+    return failure(ErrorCode::BadInput,
+                   message("gamma of ", name(penalty.kind), " must be greater than ", limit, ": ",
+                           penalty.gamma));
   }
   return {};
 }

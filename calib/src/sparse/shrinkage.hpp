@@ -1,6 +1,6 @@
 #pragma once
-/// The one-coefficient solution of all three penalties as one piecewise linear function of |z|, so that
-/// scalar code and vector registers compute the same bits:
+/// The one-coefficient solution of all three penalties as one piecewise linear function of |z|, so
+/// that scalar code and vector registers compute the same bits:
 ///   |z| <= lambda: 0;  <= inner_end: |z| - lambda;  <= outer_end: (|z| - offset) * factor;  else |z|;  times
 ///   sgn(z).
 

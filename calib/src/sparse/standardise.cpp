@@ -8,7 +8,8 @@ namespace abbe::calib::sparse {
 namespace {
 
 Eigen::VectorXd root_mean_square(const Eigen::MatrixXd& centred) {
-  return (centred.colwise().squaredNorm().transpose() / static_cast<double>(centred.rows())).cwiseSqrt();
+  return (centred.colwise().squaredNorm().transpose() / static_cast<double>(centred.rows()))
+      .cwiseSqrt();
 }
 
 }  // namespace
@@ -20,22 +21,27 @@ Result<Standardised> standardise(const Eigen::MatrixXd& X) {
   const Eigen::VectorXd mean = X.colwise().mean();
   const Eigen::MatrixXd centred = X.rowwise() - mean.transpose();
   const Eigen::VectorXd scale = root_mean_square(centred);
+
   if (!scale.allFinite()) {
     return failure(ErrorCode::NotFinite,
                    "standardise columns: squares of the design are too large for a double");
   }
+
   Standardised out;
   out.original_columns = X.cols();
   for (Eigen::Index j = 0; j < X.cols(); ++j) {
     if (scale(j) > kConstantColumn) out.kept.push_back(j);
   }
+
   if (out.kept.empty()) {
     return failure(ErrorCode::BadInput, message("standardise columns: none of ", X.cols(),
                                                 " columns varies over ", X.rows(), " rows"));
   }
+
   out.mean = mean(out.kept);
   out.scale = scale(out.kept);
   out.X = centred(Eigen::all, out.kept) * out.scale.cwiseInverse().asDiagonal();
+
   return out;
 }
 

@@ -38,8 +38,8 @@ Result<std::vector<Vector3>> left_after_fit(std::span<const Vector3> measured_m,
 }
 
 /// What is left at the measured points themselves.
-Result<void> compare_at_points(const Observations& o, const VolumetricModel& model, const Vector3& tool_m,
-                               Comparison& out) {
+Result<void> compare_at_points(const Observations& o, const VolumetricModel& model,
+                               const Vector3& tool_m, Comparison& out) {
   std::vector<Vector3> measured, readings, corrected;
   for (std::size_t i = 0; i < o.readings_m.size(); ++i) {
     if (!model.validity().contains(o.readings_m[i])) {
@@ -50,19 +50,24 @@ Result<void> compare_at_points(const Observations& o, const VolumetricModel& mod
     readings.push_back(o.readings_m[i]);
     corrected.emplace_back(o.readings_m[i] + model.V_at(o.readings_m[i], tool_m));
   }
+
   if (out.inside.size() < kLeastPoints) {
-    return failure(ErrorCode::TooFewObservations,
-                   message("verification: ", out.inside.size(), " of ", o.readings_m.size(),
-                           " measured points lie inside the model's validity volume, needs ", kLeastPoints));
+    return failure(
+        ErrorCode::TooFewObservations,
+        message("verification: ", out.inside.size(), " of ", o.readings_m.size(),
+                " measured points lie inside the model's validity volume, needs ", kLeastPoints));
   }
+
   auto before = left_after_fit(measured, readings), after = left_after_fit(measured, corrected);
   if (!before || !after) {
     return tl::make_unexpected(before ? after.error() : before.error());
   }
+
   out.left_before_m = std::move(*before);
   out.left_after_m = std::move(*after);
   out.before = vector_statistics(out.left_before_m);
   out.after = vector_statistics(out.left_after_m);
+
   return {};
 }
 
@@ -72,13 +77,14 @@ Result<void> check_step(const evemu::ReadingBox& box, const Comparison& c) {
   const double places = (2.0 * box.half_width_m).cwiseQuotient(c.step_m).array().max(1.0).prod();
   if (!(places <= kMostPlaces)) {
     return failure(ErrorCode::BadInput,
-                   message("verification: steps of (", kMmPerM * c.step_m.transpose(), ") mm make ", places,
-                           " grid points, most are ", kMostPlaces));
+                   message("verification: steps of (", kMmPerM * c.step_m.transpose(), ") mm make ",
+                           places, " grid points, most are ", kMostPlaces));
   }
   return {};
 }
 
-/// Multiples of the step inside the validity volume, x slowest, at least `least_distance_m` from the origin.
+/// Multiples of the step inside the validity volume, x slowest, at least `least_distance_m` from
+/// the origin.
 std::vector<Vector3> grid_places(const VolumetricModel& model, const evemu::ReadingBox& box,
                                  const Comparison& c) {
   const Vector3 low = (box.centre_m - box.half_width_m).cwiseQuotient(c.step_m),
@@ -87,6 +93,7 @@ std::vector<Vector3> grid_places(const VolumetricModel& model, const evemu::Read
   const Steps first = low.array().ceil().cast<Eigen::Index>(),
               last = high.array().floor().cast<Eigen::Index>();
   std::vector<Vector3> places;
+
   for (Eigen::Index i = first.x(); i <= last.x(); ++i) {
     for (Eigen::Index j = first.y(); j <= last.y(); ++j) {
       for (Eigen::Index k = first.z(); k <= last.z(); ++k) {
@@ -98,6 +105,7 @@ std::vector<Vector3> grid_places(const VolumetricModel& model, const evemu::Read
       }
     }
   }
+
   return places;
 }
 
@@ -113,19 +121,23 @@ Result<WeightedPlaces> weighted_places(const Observations& o, const VolumetricMo
   if (auto fine = check_step(box, c); !fine) {
     return tl::make_unexpected(fine.error());
   }
+
   std::vector<Vector3> asked = grid_places(model, box, c);
   if (c.origin_m) {
     asked.push_back(*c.origin_m);
   }
+
   const auto weights = linear_weights(o.readings_m, asked);
   if (!weights) {
     return tl::make_unexpected(weights.error());
   }
+
   if (c.origin_m && !weights->back()) {
     return failure(ErrorCode::DegenerateGeometry,
                    message("verification: the origin (", kMmPerM * c.origin_m->transpose(),
                            ") mm, where V is set to zero, lies outside the measured points"));
   }
+
   WeightedPlaces places;
   for (std::size_t i = 0; i < asked.size(); ++i) {
     if ((*weights)[i]) {
@@ -133,18 +145,21 @@ Result<WeightedPlaces> weighted_places(const Observations& o, const VolumetricMo
       places.weights.push_back(*(*weights)[i]);
     }
   }
+
   const std::size_t grid = places.q_m.size() - (c.origin_m ? 1 : 0);
   if (grid < kLeastPoints) {
-    return failure(
-        ErrorCode::TooFewObservations,
-        message("verification: ", grid,
-                " grid points lie inside both the model's validity volume and the measured points, needs ",
-                kLeastPoints));
+    return failure(ErrorCode::TooFewObservations,
+                   message("verification: ", grid,
+                           " grid points lie inside both the model's validity volume and the "
+                           "measured points, needs ",
+                           kLeastPoints));
   }
+
   return places;
 }
 
-/// `values` at the places, relative to that at the origin or to their mean. One for every grid point.
+/// `values` at the places, relative to that at the origin or to their mean. One for every grid
+/// point.
 std::vector<Vector3> relative(std::vector<Vector3> values, bool has_origin) {
   const Vector3 zero = has_origin ? values.back() : mean_of(values);
   if (has_origin) {
@@ -183,11 +198,14 @@ Result<void> fill_grid(const Observations& o, const VolumetricModel& model, cons
   if (!places) {
     return tl::make_unexpected(places.error());
   }
+
   const bool has_origin = out.origin_m.has_value();
   const auto las = relative(interpolated(*places, o.V_m), has_origin);
   const auto stated = relative(modelled(model, tool_m, places->q_m), has_origin);
-  const auto coarse = relative(interpolated(*places, modelled(model, tool_m, o.readings_m)), has_origin);
+  const auto coarse =
+      relative(interpolated(*places, modelled(model, tool_m, o.readings_m)), has_origin);
   std::vector<Vector3> bent;
+
   for (std::size_t i = 0; i < las.size(); ++i) {
     GridPoint& g = out.grid.emplace_back();
     g.q_m = places->q_m[i];
@@ -195,17 +213,19 @@ Result<void> fill_grid(const Observations& o, const VolumetricModel& model, cons
     g.stated_m = stated[i];
     bent.emplace_back(coarse[i] - stated[i]);
   }
+
   out.interpolation_rms_m = vector_statistics(bent).rms_m;
   return {};
 }
 
 /// The rotation about the origin, or the rigid motion, that turns the model onto V_las.
-Result<void> turn_model(Comparison& c) {
+Result<void> cycle_model(Comparison& c) {
   std::vector<Vector3> places, difference;
   for (const GridPoint& g : c.grid) {
     places.push_back(g.q_m);
     difference.emplace_back(g.V_las_m - g.stated_m);
   }
+
   const Vector3 origin = c.origin_m.value_or(Vector3::Zero());
   if (c.origin_m) {
     Matrix3 N = Matrix3::Zero();
@@ -223,9 +243,12 @@ Result<void> turn_model(Comparison& c) {
     }
     c.turned = fitted->rigid;
   }
+
   for (GridPoint& g : c.grid) {
-    g.turned_m = g.stated_m + c.turned.head<3>() + rotation_effect(g.q_m - origin) * c.turned.tail<3>();
+    g.turned_m =
+        g.stated_m + c.turned.head<3>() + rotation_effect(g.q_m - origin) * c.turned.tail<3>();
   }
+
   return {};
 }
 
@@ -273,22 +296,26 @@ RatioStatistics ratio_statistics(std::vector<double> ratios) {
   if (ratios.empty()) {
     return s;
   }
+
   std::sort(ratios.begin(), ratios.end());
   const auto n = static_cast<double>(ratios.size());
   for (const double r : ratios) {
     s.mean += r / n;
     s.above_1 += r > 1.0 ? 1 : 0;
   }
+
   double squares = 0.0;
   for (const double r : ratios) {
     squares += (r - s.mean) * (r - s.mean);
   }
+
   s.standard_deviation = n > 1.0 ? std::sqrt(squares / (n - 1.0)) : 0.0;
   s.min = ratios.front();
   s.p25 = percentile(ratios, 0.25);
   s.median = percentile(ratios, 0.5);
   s.p75 = percentile(ratios, 0.75);
   s.max = ratios.back();
+
   return s;
 }
 
@@ -300,12 +327,15 @@ Effect effect_at_points(const Comparison& c) noexcept {
     sum += gained;
     squares += gained * gained;
   }
+
   const double mean = sum / n;
   constexpr double kClearly = 3.0;
   const double standard_error = std::sqrt(std::max(squares / n - mean * mean, 0.0) / (n - 1.0));
+
   if (!(std::abs(mean) > kClearly * standard_error)) {
     return Effect::NotSeen;
   }
+
   return mean > 0.0 ? Effect::Better : Effect::Worse;
 }
 
@@ -313,23 +343,27 @@ bool ratios_hold(const Comparison& c) noexcept {
   return c.interpolation_rms_m <= std::max(kMostInterpolation * c.after.rms_m, kNothing_m);
 }
 
-Result<Comparison> compare(const Observations& o, const VolumetricModel& model, const Vector3& tool_offset_m,
-                           const Options& options) {
+Result<Comparison> compare(const Observations& o, const VolumetricModel& model,
+                           const Vector3& tool_offset_m, const Options& options) {
   if (!model.holds_for_tool(tool_offset_m)) {
     return failure(ErrorCode::NotApplicable,
                    message("verification for tool offset (", kMmPerM * tool_offset_m.transpose(),
                            ") mm: the model does not hold for it"));
   }
+
   Comparison c = settled(model, options);
   if (auto done = compare_at_points(o, model, tool_offset_m, c); !done) {
     return tl::make_unexpected(done.error());
   }
+
   if (auto done = fill_grid(o, model, tool_offset_m, c); !done) {
     return tl::make_unexpected(done.error());
   }
-  if (auto done = turn_model(c); !done) {
+
+  if (auto done = cycle_model(c); !done) {
     return tl::make_unexpected(done.error());
   }
+
   rate(c);
   return c;
 }

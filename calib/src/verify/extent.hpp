@@ -16,8 +16,8 @@ struct Extent {
   [[nodiscard]] double diagonal_m() const { return 2.0 * half_width_m.norm(); }
 };
 
-/// DegenerateGeometry unless the points span a volume: their thinnest direction, in scaled coordinates, must
-/// be more than a thousandth of the widest.
+/// DegenerateGeometry unless the points span a volume: their thinnest direction, in scaled
+/// coordinates, must be more than a thousandth of the widest.
 [[nodiscard]] Result<Extent> extent_of(std::span<const Vector3> points_m);
 
 }  // namespace abbe::calib::verify

@@ -37,14 +37,17 @@ class Programme {
 
   /// Simplex method; nothing if the place is no convex combination of the points.
   [[nodiscard]] std::optional<Cell> around(const Vector4& place) const {
-    // Steepest price first; when that has gone on for long, ties may be running in a circle, and the rule of
-    // the least index ends them.
+    // Steepest price first; when that has gone on for long, ties may be running in a circle, and
+    // the rule of the least index ends them.
     constexpr int kSteepest = 60, kMost = 5000;
-    const Vector4 slack_sign = (place.array() < 0.0).select(Vector4::Constant(-1.0), Vector4::Ones());
+    const Vector4 slack_sign =
+        (place.array() < 0.0).select(Vector4::Constant(-1.0), Vector4::Ones());
     Cell cell;
+
     for (Eigen::Index row = 0; row < 4; ++row) {
       cell.point[static_cast<std::size_t>(row)] = columns_.cols() + row;
     }
+
     for (int step = 0; step < kMost; ++step) {
       cell.weights_from_place = basis(cell, slack_sign).inverse();
       const auto entering = next(cell, step >= kSteepest);
@@ -53,12 +56,14 @@ class Programme {
       }
       pivot(cell, *entering, place);
     }
+
     const Vector4 weight = cell.weights_from_place * place;
     for (std::size_t row = 0; row < 4; ++row) {
       if (is_slack(cell.point[row]) && weight(static_cast<Eigen::Index>(row)) > kRounding) {
         return std::nullopt;
       }
     }
+
     return cell;
   }
 
@@ -85,10 +90,12 @@ class Programme {
       slack(static_cast<Eigen::Index>(k)) = is_slack(i) ? 1.0 : 0.0;
       price(static_cast<Eigen::Index>(k)) = is_slack(i) ? 0.0 : price_(i);
     }
+
     const Eigen::RowVector4d slack_plane = slack.transpose() * cell.weights_from_place,
                              price_plane = price.transpose() * cell.weights_from_place;
     std::optional<Eigen::Index> best;
     double best_slack = -kRounding, best_price = -kRounding;
+
     for (Eigen::Index i = 0; i < columns_.cols(); ++i) {
       const double by_slack = -slack_plane * columns_.col(i);
       if (by_slack < best_slack) {
@@ -99,6 +106,7 @@ class Programme {
         }
       }
     }
+
     for (Eigen::Index i = 0; i < columns_.cols() && !(best && best_slack < -kRounding); ++i) {
       const double by_slack = -slack_plane * columns_.col(i),
                    by_price = price_(i) - price_plane * columns_.col(i);
@@ -110,15 +118,18 @@ class Programme {
         }
       }
     }
+
     return best;
   }
 
-  /// `entering` takes the place of the point whose weight is used up first; slack goes before points.
+  /// `entering` takes the place of the point whose weight is used up first; slack goes before
+  /// points.
   void pivot(Cell& cell, Eigen::Index entering, const Vector4& place) const {
     const Vector4 weight = cell.weights_from_place * place,
                   rate = cell.weights_from_place * columns_.col(entering);
     std::size_t leaving = 0;
     double least = std::numeric_limits<double>::infinity();
+
     for (std::size_t k = 0; k < 4; ++k) {
       const auto row = static_cast<Eigen::Index>(k);
       if (!(rate(row) > kRounding)) {
@@ -131,6 +142,7 @@ class Programme {
         leaving = k;
       }
     }
+
     cell.point[leaving] = entering;
   }
   [[nodiscard]] bool goes_first(Eigen::Index a, Eigen::Index b) const {
@@ -145,6 +157,7 @@ LinearWeights weights_in(const Cell& cell, const Vector4& place, const Programme
   LinearWeights w;
   double sum = 0.0;
   const Vector4 raw = cell.weights_from_place * place;
+
   for (std::size_t k = 0; k < 4; ++k) {
     if (programme.is_slack(cell.point[k])) {
       continue;  // the place lies on a face of the hull
@@ -153,9 +166,11 @@ LinearWeights weights_in(const Cell& cell, const Vector4& place, const Programme
     w.weight[k] = std::max(0.0, raw(static_cast<Eigen::Index>(k)));
     sum += w.weight[k];
   }
+
   for (double& weight : w.weight) {
     weight /= sum;
   }
+
   return w;
 }
 
@@ -167,17 +182,23 @@ Result<std::vector<std::optional<LinearWeights>>> linear_weights(std::span<const
   if (!extent) {
     return tl::make_unexpected(extent.error());
   }
+
   const Programme programme(points, *extent);
   std::vector<Cell> found;  // a cell does not depend on the place it was found for
   std::vector<std::optional<LinearWeights>> all;
+
   for (const Vector3& p : places) {
     const Vector4 place = extent->scaled(p).homogeneous();
-    const auto holds = [&](const Cell& c) { return (c.weights_from_place * place).minCoeff() >= -kRounding; };
+    const auto holds = [&](const Cell& c) {
+      return (c.weights_from_place * place).minCoeff() >= -kRounding;
+    };
+
     const auto known = std::find_if(found.rbegin(), found.rend(), holds);
     if (known != found.rend()) {
       all.emplace_back(weights_in(*known, place, programme));
       continue;
     }
+
     const auto cell = programme.around(place);
     all.push_back(cell ? std::optional(weights_in(*cell, place, programme)) : std::nullopt);
     if (cell && std::none_of(cell->point.begin(), cell->point.end(),
@@ -185,6 +206,7 @@ Result<std::vector<std::optional<LinearWeights>>> linear_weights(std::span<const
       found.push_back(*cell);
     }
   }
+
   return all;
 }
 

@@ -13,7 +13,8 @@ namespace {
 Result<void> check_finite(std::span<const MeasuredPoint> points) {
   for (std::size_t i = 0; i < points.size(); ++i) {
     if (!points[i].reading_m.allFinite() || !points[i].measured_m.allFinite()) {
-      return failure(ErrorCode::NotFinite, message("verification: point ", i + 1, " is not finite"));
+      return failure(ErrorCode::NotFinite,
+                     message("verification: point ", i + 1, " is not finite"));
     }
   }
   return {};
@@ -36,16 +37,20 @@ std::string fits_with(const Observations& o, double most_rms_m) {
     }
     return T && vector_statistics(left).rms_m <= most_rms_m;
   };
+
   std::vector<std::string> texts;
   if (fits(Matrix3::Identity(), false)) {
     texts.emplace_back("a frame that is fitted to the readings (--frame fit)");
   }
+
   if (fits(Vector3(-1.0, 1.0, 1.0).asDiagonal(), false)) {
     texts.emplace_back("one axis reversed or two axes swapped (a left-handed frame)");
   }
+
   if (fits(Matrix3::Identity(), true)) {
     texts.emplace_back("the measured points in the opposite order");
   }
+
   for (const UnitMistake& mistake : unit_mistakes()) {
     for (const auto& [factor, of] :
          {std::pair{mistake.factor, "measured points"}, {1.0 / mistake.factor, "readings"}}) {
@@ -54,6 +59,7 @@ std::string fits_with(const Observations& o, double most_rms_m) {
       }
     }
   }
+
   return texts.empty() ? "" : "; they fit with " + joined_with_or(texts);
 }
 
@@ -62,20 +68,23 @@ Result<void> check_misfit(const Observations& o, const Extent& extent) {
   for (const Vector3& v : o.V_m) {
     mean += v / static_cast<double>(o.V_m.size());
   }
+
   std::vector<Vector3> left;
   for (const Vector3& v : o.V_m) {
     left.push_back(v - mean);
   }
+
   const double rms_m = vector_statistics(left).rms_m;
-  if (rms_m > kMostMisfit * extent.diagonal_m()) {
-    return failure(
-        ErrorCode::AlignmentFailed,
-        message("verification: readings and measured points of ", extent.diagonal_m(), " m extent leave ",
-                rms_m, " m rms",
-                o.frame == Frame::BestFit ? " after the best rigid motion" : " in the machine's axes",
-                ": rows mixed up, another unit, or a left-handed frame",
-                fits_with(o, kMostMisfit * extent.diagonal_m())));
+  if (rms_m > kMostLackOfFit * extent.diagonal_m()) {
+    return failure(ErrorCode::AlignmentFailed,
+                   message("verification: readings and measured points of ", extent.diagonal_m(),
+                           " m extent leave ", rms_m, " m rms",
+                           o.frame == Frame::BestFit ? " after the best rigid motion"
+                                                     : " in the machine's axes",
+                           ": rows mixed up, another unit, or a left-handed frame",
+                           fits_with(o, kMostLackOfFit * extent.diagonal_m())));
   }
+
   return {};
 }
 
@@ -85,16 +94,19 @@ Result<Observations> observe(std::span<const MeasuredPoint> points, Frame frame)
   if (auto finite = check_finite(points); !finite) {
     return tl::make_unexpected(finite.error());
   }
+
   Observations o;
   o.frame = frame;
   for (const MeasuredPoint& p : points) {
     o.readings_m.push_back(p.reading_m);
     o.measured_m.push_back(p.measured_m);
   }
+
   const auto extent = extent_of(o.readings_m);
   if (!extent) {
     return tl::make_unexpected(extent.error());
   }
+
   if (frame == Frame::BestFit) {
     const auto T = fit_rigid(o.measured_m, o.readings_m);
     if (!T) {
@@ -102,12 +114,15 @@ Result<Observations> observe(std::span<const MeasuredPoint> points, Frame frame)
     }
     o.T_machine_tracker = *T;
   }
+
   for (const MeasuredPoint& p : points) {
     o.V_m.emplace_back(o.T_machine_tracker * p.measured_m - p.reading_m);
   }
+
   if (auto fits = check_misfit(o, *extent); !fits) {
     return tl::make_unexpected(fits.error());
   }
+
   return o;
 }
 

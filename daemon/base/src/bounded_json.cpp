@@ -21,7 +21,8 @@ std::size_t end_of_string(std::string_view text, std::size_t quote) {
 }
 
 /// Depth and values as any parser would count them up to its first error.
-Result<void> check_structure(std::string_view text, std::string_view what, const JsonBounds& bounds) {
+Result<void> check_structure(std::string_view text, std::string_view what,
+                             const JsonBounds& bounds) {
   std::size_t depth = 0;
   std::size_t values = 1;
   for (std::size_t i = 0; i < text.size();) {
@@ -39,10 +40,12 @@ Result<void> check_structure(std::string_view text, std::string_view what, const
       return fail(ErrorCode::BadInput, fmt::format("{}: more than {} values", what, bounds.values));
     ++i;
   }
+
   return {};
 }
 
-/// "[json.exception.parse_error.101] parse error at line 1, column 2: syntax error ...": from "syntax" on.
+/// "[json.exception.parse_error.101] parse error at line 1, column 2: syntax error ...": from
+/// "syntax" on.
 std::string_view cause_of(std::string_view text) {
   const std::size_t place = text.find("column ");
   const std::size_t colon = text.find(": ", place == std::string_view::npos ? 0 : place);
@@ -63,8 +66,8 @@ Result<json> parse_json(std::string_view text, std::string_view what, const Json
   try {
     return json::parse(text);
   } catch (const json::parse_error& error) {
-    return fail(ErrorCode::BadInput,
-                fmt::format("{}: not JSON at byte {}: {}", what, error.byte, cause_of(error.what())));
+    return fail(ErrorCode::BadInput, fmt::format("{}: not JSON at byte {}: {}", what, error.byte,
+                                                 cause_of(error.what())));
   } catch (const json::exception& error) {  // a number too large for a double
     return fail(ErrorCode::BadInput, fmt::format("{}: {}", what, error.what()));
   }

@@ -41,8 +41,8 @@ Result<void> send_line(int fd, const std::string& line, const std::filesystem::p
 
 /// Milliseconds until `end`, at least 0.
 int rest_until(Clock::time_point end) {
-  return static_cast<int>(
-      std::max<std::int64_t>(0, std::chrono::ceil<std::chrono::milliseconds>(end - Clock::now()).count()));
+  return static_cast<int>(std::max<std::int64_t>(
+      0, std::chrono::ceil<std::chrono::milliseconds>(end - Clock::now()).count()));
 }
 
 Result<std::string> receive_line(int fd, std::chrono::milliseconds time_out,
@@ -50,6 +50,7 @@ Result<std::string> receive_line(int fd, std::chrono::milliseconds time_out,
   const auto end = Clock::now() + time_out;
   std::string line;
   std::array<char, 65536> buffer;  // NOLINT: read() fills what is used
+
   for (;;) {
     pollfd wait{fd, POLLIN, 0};
     const int ready = ::poll(&wait, 1, rest_until(end));
@@ -61,7 +62,8 @@ Result<std::string> receive_line(int fd, std::chrono::milliseconds time_out,
     const std::string_view came{buffer.data(), static_cast<std::size_t>(n)};
     line += came.substr(0, came.find('\n'));
     if (came.find('\n') != std::string_view::npos) return line;
-    if (line.size() > kLongestAnswer) return tl::unexpected(no_answer(path, "answered without an end"));
+    if (line.size() > kLongestAnswer)
+      return tl::unexpected(no_answer(path, "answered without an end"));
   }
 }
 
@@ -83,6 +85,7 @@ Result<json> ask_daemon(const std::filesystem::path& socket_path, const json& re
     return tl::unexpected(no_answer(socket_path, "answered something that is not a JSON object"));
   const auto ok = answer.find("ok");
   if (ok == answer.end() || *ok != true) return tl::unexpected(error_of_refusal(answer));
+
   return answer;
 }
 

@@ -33,7 +33,7 @@ namespace {
 
 using nlohmann::json;
 
-constexpr std::size_t kMostUnread = 1u << 20;           // of answers; a client that reads none gets no more
+constexpr std::size_t kMostUnread = 1u << 20;  // of answers; a client that reads none gets no more
 constexpr auto kRest = std::chrono::milliseconds{200};  // without descriptors for a newcomer
 constexpr int kNewcomersAtOnce = 16;
 
@@ -58,7 +58,8 @@ std::string name_of(uid_t uid) {
   return found != nullptr ? found->pw_name : fmt::format("uid {}", uid);
 }
 
-/// socket(7): SO_PEERGROUPS says by ERANGE how many there are. A kernel that does not know it: none.
+/// socket(7): SO_PEERGROUPS says by ERANGE how many there are. A kernel that does not know it:
+/// none.
 std::vector<gid_t> supplementary_groups_at(int fd) {
   std::vector<gid_t> groups(64);
   for (;;) {
@@ -76,8 +77,9 @@ ControlPeer peer_at(int fd) {
   ucred credentials{};
   socklen_t size = sizeof credentials;
   if (::getsockopt(fd, SOL_SOCKET, SO_PEERCRED, &credentials, &size) != 0) return {};
-  ControlPeer peer{
-      .user = name_of(credentials.uid), .uid = credentials.uid, .groups = supplementary_groups_at(fd)};
+  ControlPeer peer{.user = name_of(credentials.uid),
+                   .uid = credentials.uid,
+                   .groups = supplementary_groups_at(fd)};
   peer.groups.push_back(credentials.gid);
   return peer;
 }
@@ -94,7 +96,8 @@ class Server final : public ControlServer {
     thread_ = std::thread([this] {
       try {
         serve();
-      } catch (const std::exception& defect) {  // nobody is answered any more; everything else goes on
+      } catch (
+          const std::exception& defect) {  // nobody is answered any more; everything else goes on
         fmt::print(stderr, "abbed: the control socket ended by a defect: {}\n", defect.what());
       }
     });
@@ -113,15 +116,17 @@ class Server final : public ControlServer {
   void serve() {
     for (;;) {
       const auto now = Clock::now();
-      // The listener stays readable while a newcomer cannot be taken: a descriptor of -1 is not looked at.
+      // The listener stays readable while a newcomer cannot be taken: a descriptor of -1 is not
+      // looked at.
       const bool rests = rest_until_ > now;
-      std::vector<pollfd> waits{{wake_.get(), POLLIN, 0}, {rests ? -1 : listener_.get(), POLLIN, 0}};
+      std::vector<pollfd> waits{{wake_.get(), POLLIN, 0},
+                                {rests ? -1 : listener_.get(), POLLIN, 0}};
       for (const Client& c : clients_) waits.push_back({c.fd.get(), events_of(c), 0});
       if (::poll(waits.data(), waits.size(), time_out_ms(now)) < 0 && errno != EINTR) return;
       if (waits[0].revents != 0) return;
       std::size_t i = 2;
       for (auto c = clients_.begin(); c != clients_.end(); ++i)
-        c = turn(*c, waits[i].revents) ? std::next(c) : clients_.erase(c);
+        c = cycle(*c, waits[i].revents) ? std::next(c) : clients_.erase(c);
       close_idle(Clock::now());
       if ((waits[1].revents & POLLIN) != 0) accept_some();
     }
@@ -135,8 +140,8 @@ class Server final : public ControlServer {
       until = std::min(until, c.active + limits_.idle);
     }
     if (until == Clock::time_point::max()) return -1;
-    return static_cast<int>(
-        std::max<std::int64_t>(0, std::chrono::ceil<std::chrono::milliseconds>(until - now).count()));
+    return static_cast<int>(std::max<std::int64_t>(
+        0, std::chrono::ceil<std::chrono::milliseconds>(until - now).count()));
   }
 
   /// What was asked is answered before more is read.
@@ -148,7 +153,8 @@ class Server final : public ControlServer {
     for (int i = 0; i < kNewcomersAtOnce; ++i) {
       FileDescriptor fd{::accept4(listener_.get(), nullptr, nullptr, SOCK_CLOEXEC | SOCK_NONBLOCK)};
       if (!fd) {
-        if (errno != EAGAIN && errno != EINTR && errno != ECONNABORTED) rest_until_ = Clock::now() + kRest;
+        if (errno != EAGAIN && errno != EINTR && errno != ECONNABORTED)
+          rest_until_ = Clock::now() + kRest;
         return;
       }
       ControlPeer peer = peer_at(fd.get());
@@ -175,10 +181,12 @@ class Server final : public ControlServer {
   void close_oldest_of(uid_t uid) {
     auto oldest = clients_.end();
     for (auto c = clients_.begin(); c != clients_.end(); ++c)
-      if (c->peer.uid == uid && (oldest == clients_.end() || c->active < oldest->active)) oldest = c;
+      if (c->peer.uid == uid && (oldest == clients_.end() || c->active < oldest->active))
+        oldest = c;
     if (oldest == clients_.end()) return;
-    say_goodbye(*oldest, fmt::format("closed for a newer connection: at most {} are open, {} of one user",
-                                     limits_.connections, limits_.of_one_user));
+    say_goodbye(*oldest,
+                fmt::format("closed for a newer connection: at most {} are open, {} of one user",
+                            limits_.connections, limits_.of_one_user));
     clients_.erase(oldest);
   }
 
@@ -193,13 +201,14 @@ class Server final : public ControlServer {
   /// A whole line or nothing: answers that were not read are not torn.
   static void say_goodbye(const Client& c, std::string why) {
     if (!c.outbox.empty()) return;
-    const std::string line = line_of(refusal({ErrorCode::Refused, "control socket: " + std::move(why)}));
+    const std::string line =
+        line_of(refusal({ErrorCode::Refused, "control socket: " + std::move(why)}));
     (void)!::send(c.fd.get(), line.data(), line.size(), MSG_NOSIGNAL | MSG_DONTWAIT);
   }
 
-  /// One answer a turn, so that nobody waits for a client that asks much. False when the client is gone or
-  /// misbehaves.
-  bool turn(Client& c, short revents) {
+  /// One answer a turn, so that nobody waits for a client that asks much. False when the client is
+  /// gone or misbehaves.
+  bool cycle(Client& c, short revents) {
     if (!c.asks() && revents != 0 && !read(c)) return false;
     if (c.asks() && c.may_be_answered()) {
       const std::size_t end = c.inbox.find('\n');
@@ -234,14 +243,15 @@ class Server final : public ControlServer {
     if (!parsed) return refusal({ErrorCode::Usage, parsed.error().text});
     json& request = *parsed;
     if (!request.is_object() || !request.contains("do") || !request["do"].is_string()) {
-      return refusal({ErrorCode::Usage, R"(expected one JSON object a line with a string member "do")"});
+      return refusal(
+          {ErrorCode::Usage, R"(expected one JSON object a line with a string member "do")"});
     }
     request["user"] = peer.user;  // whatever the client said there
     try {
       return handler_(request, peer);
     } catch (const std::exception& e) {  // a member of the wrong type, as nlohmann::json says it
-      return refusal(
-          {ErrorCode::Usage, fmt::format("request \"{}\": {}", request["do"].get<std::string>(), e.what())});
+      return refusal({ErrorCode::Usage, fmt::format("request \"{}\": {}",
+                                                    request["do"].get<std::string>(), e.what())});
     }
   }
 
@@ -257,14 +267,18 @@ class Server final : public ControlServer {
 
 }  // namespace
 
-std::unique_ptr<ControlServer> serve_control(FileDescriptor listener, const std::filesystem::path& path,
-                                             ControlServer::Handler handler, const ControlLimits& limits) {
+std::unique_ptr<ControlServer> serve_control(FileDescriptor listener,
+                                             const std::filesystem::path& path,
+                                             ControlServer::Handler handler,
+                                             const ControlLimits& limits) {
   FileDescriptor wake{::eventfd(0, EFD_CLOEXEC)};
-  return std::make_unique<Server>(std::move(listener), std::move(wake), path, std::move(handler), limits);
+  return std::make_unique<Server>(std::move(listener), std::move(wake), path, std::move(handler),
+                                  limits);
 }
 
 Result<std::unique_ptr<ControlServer>> ControlServer::open(const std::filesystem::path& socket_path,
-                                                           Handler handler, const ControlLimits& limits) {
+                                                           Handler handler,
+                                                           const ControlLimits& limits) {
   auto listener = listen_unix(socket_path);
   if (!listener) return tl::unexpected(listener.error());
   return serve_control(std::move(*listener), socket_path, std::move(handler), limits);

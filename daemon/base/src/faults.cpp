@@ -6,9 +6,11 @@
 
 namespace abbe::daemon {
 
-void Faults::add(std::size_t line, std::size_t column, std::string_view key, std::string_view what) {
+void Faults::add(std::size_t line, std::size_t column, std::string_view key,
+                 std::string_view what) {
   ++count_;
-  auto text = fmt::format("{}:{}:{}: {}{}{}", file_, line, column, key, key.empty() ? "" : ": ", what);
+  auto text =
+      fmt::format("{}:{}:{}: {}{}{}", file_, line, column, key, key.empty() ? "" : ": ", what);
   const auto later = [](std::size_t l, const Fault& f) { return l < f.line; };
   faults_.insert(std::upper_bound(faults_.begin(), faults_.end(), line, later),
                  Fault{line, column, std::move(text)});
@@ -16,7 +18,8 @@ void Faults::add(std::size_t line, std::size_t column, std::string_view key, std
 }
 
 Error Faults::to_error() const {
-  Error error{ErrorCode::BadInput, fmt::format("{}: {} fault{}", file_, count_, count_ == 1 ? "" : "s")};
+  Error error{ErrorCode::BadInput,
+              fmt::format("{}: {} fault{}", file_, count_, count_ == 1 ? "" : "s")};
   for (const auto& fault : faults_) error.details.push_back(fault.text);
   if (count_ > faults_.size())
     error.details.push_back(fmt::format("{}: and {} more", file_, count_ - faults_.size()));
@@ -52,7 +55,8 @@ std::string_view nearest(std::string_view word, const std::vector<std::string_vi
   std::string_view best;
   std::size_t best_distance = 1 + std::max<std::size_t>(1, word.size() / 3);
   for (const auto candidate : known) {
-    const std::size_t distance = differs_in_unit(word, candidate) ? 1 : edit_distance(word, candidate);
+    const std::size_t distance =
+        differs_in_unit(word, candidate) ? 1 : edit_distance(word, candidate);
     if (distance >= best_distance) continue;
     best = candidate;
     best_distance = distance;

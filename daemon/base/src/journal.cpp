@@ -41,9 +41,10 @@ class NativeJournal final : public JournalSink {
   void write(const JournalEntry& entry) override {
     std::string datagram;
     append_field(datagram, "MESSAGE",
-                 refused_ == 0 ? entry.message
-                               : fmt::format("{}; {} lines before this were not taken by the journal",
-                                             entry.message, refused_));
+                 refused_ == 0
+                     ? entry.message
+                     : fmt::format("{}; {} lines before this were not taken by the journal",
+                                   entry.message, refused_));
     append_field(datagram, "PRIORITY", std::to_string(static_cast<int>(entry.urgency)));
     append_field(datagram, "SYSLOG_IDENTIFIER", "abbed");
     append_field(datagram, "MESSAGE_ID", entry.message_id);
@@ -64,7 +65,8 @@ class TextJournal final : public JournalSink {
   void write(const JournalEntry& entry) override {
     std::string line = fmt::format("abbed: {} [", entry.message);
     for (const auto& [name, value] : entry.fields)
-      if (name != "ABBE_FAULT") line += fmt::format("{}={} ", name, value);  // it stands in the message
+      if (name != "ABBE_FAULT")
+        line += fmt::format("{}={} ", name, value);  // it stands in the message
     line.back() = ']';
     std::ranges::replace_if(
         line, [](char c) { return static_cast<unsigned char>(c) < 0x20 || c == 0x7f; }, '?');

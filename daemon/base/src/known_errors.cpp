@@ -23,12 +23,14 @@ Result<KnownErrorsFile> read_known_errors_csv(const std::filesystem::path& file)
   if (parsed->faults.any()) return tl::make_unexpected(parsed->faults.to_error());
   KnownErrorsFile errors{parsed->source, {}, {}};
   const auto& table = parsed->table;
+
   for (std::size_t row = 0; row < table.rows(); ++row) {
     errors.points_m.push_back(
         {table.at(row, 0) / kMmPerM, table.at(row, 1) / kMmPerM, table.at(row, 2) / kMmPerM});
     errors.errors_m.push_back(
         {table.at(row, 3) / kUmPerM, table.at(row, 4) / kUmPerM, table.at(row, 5) / kUmPerM});
   }
+
   return errors;
 }
 

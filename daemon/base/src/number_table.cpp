@@ -71,7 +71,8 @@ class Cells {
     const auto comma = std::min(line_.find(',', at_), line_.size());
     const auto raw = line_.substr(at_, comma - at_);
     cell.text = trimmed(raw);
-    cell.column = 1 + static_cast<std::size_t>(cell.text.empty() ? at_ : cell.text.data() - line_.data());
+    cell.column =
+        1 + static_cast<std::size_t>(cell.text.empty() ? at_ : cell.text.data() - line_.data());
     at_ = comma + 1;
     return true;
   }
@@ -89,9 +90,11 @@ std::vector<Cell> all_cells(std::string_view line) {
 }
 
 std::size_t count_present(const TableForm& form, const std::vector<Cell>& header) {
-  return static_cast<std::size_t>(std::count_if(header.begin(), header.end(), [&](const Cell& cell) {
-    return std::any_of(form.begin(), form.end(), [&](const auto& rule) { return rule.name == cell.text; });
-  }));
+  return static_cast<std::size_t>(
+      std::count_if(header.begin(), header.end(), [&](const Cell& cell) {
+        return std::any_of(form.begin(), form.end(),
+                           [&](const auto& rule) { return rule.name == cell.text; });
+      }));
 }
 
 /// The form with most columns in the header: what the file was meant to be.
@@ -109,11 +112,12 @@ std::vector<std::string_view> names(const TableForm& form) {
 }
 
 /// For each cell of a row, the column of the form it belongs to.
-std::vector<std::size_t> map_header(const TableForm& form, const std::vector<Cell>& header, std::size_t line,
-                                    Faults& faults) {
+std::vector<std::size_t> map_header(const TableForm& form, const std::vector<Cell>& header,
+                                    std::size_t line, Faults& faults) {
   const auto known = names(form);
   std::vector<std::size_t> target(header.size(), kNoColumn);
   std::vector<bool> seen(form.size(), false);
+
   for (std::size_t i = 0; i < header.size(); ++i) {
     const auto found = std::find(known.begin(), known.end(), header[i].text);
     const auto column = static_cast<std::size_t>(found - known.begin());
@@ -125,17 +129,20 @@ std::vector<std::size_t> map_header(const TableForm& form, const std::vector<Cel
     else
       seen[column] = true, target[i] = column;
   }
+
   for (std::size_t column = 0; column < form.size(); ++column)
     if (form[column].required && !seen[column])
       faults.add(line, 1, form[column].name,
                  fmt::format("missing column; needed: {}", fmt::join(known, ",")));
+
   return target;
 }
 
 /// What is wrong with a cell, or nothing and its value.
 std::string_view parse_cell(std::string_view text, double& value) {
   if (text.empty()) return "empty";
-  if (text.front() == '+') text.remove_prefix(1);  // from_chars does not take it, spreadsheets write it
+  if (text.front() == '+')
+    text.remove_prefix(1);  // from_chars does not take it, spreadsheets write it
   const auto [end, fault] = std::from_chars(text.data(), text.data() + text.size(), value);
   if (fault == std::errc::result_out_of_range) return "out of range";
   if (fault != std::errc{} || end != text.data() + text.size()) return "not a number";
@@ -176,7 +183,8 @@ class RowReader {
     if (!form_[column].words.empty()) return read_word(cell, number, column, row);
     const auto fault = parse_cell(cell.text, row[column]);
     if (!fault.empty())
-      faults_.add(number, cell.column, form_[column].name, fmt::format("\"{}\": {}", cell.text, fault));
+      faults_.add(number, cell.column, form_[column].name,
+                  fmt::format("\"{}\": {}", cell.text, fault));
   }
 
   const TableForm& form_;
@@ -187,7 +195,8 @@ class RowReader {
 void check_end(const Lines& lines, std::string_view last, Faults& faults) {
   if (!lines.ended())
     faults.add(lines.number(), last.size() + 1, "",
-               "the last line does not end: the file may be cut off (end it with a newline if it is whole)");
+               "the last line does not end: the file may be cut off (end it with a newline if it "
+               "is whole)");
 }
 
 }  // namespace

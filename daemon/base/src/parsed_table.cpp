@@ -7,21 +7,23 @@
 
 namespace abbe::daemon {
 
-Result<ParsedTable> parse_table(const std::filesystem::path& file, const std::vector<TableForm>& forms,
-                                const ReadProgress& progress) {
+Result<ParsedTable> parse_table(const std::filesystem::path& file,
+                                const std::vector<TableForm>& forms, const ReadProgress& progress) {
   const auto text = read_text(file);
   if (!text) return tl::make_unexpected(text.error());
   Faults faults(file.string());
   auto table = parse_numbers(*text, forms, faults, progress);
   if (!table) return tl::make_unexpected(faults.to_error());
-  return ParsedTable{{file.filename().string(), sha256_hex(*text)}, std::move(*table), std::move(faults)};
+  return ParsedTable{
+      {file.filename().string(), sha256_hex(*text)}, std::move(*table), std::move(faults)};
 }
 
 void check_rows(ParsedTable& parsed, std::size_t least, std::string_view what) {
   const auto& table = parsed.table;
   if (table.rows() >= least) return;
   const auto line = table.rows() == 0 ? 1 : table.line(table.rows() - 1);
-  parsed.faults.add(line, 1, "", fmt::format("needs at least {} {}, has {}", least, what, table.rows()));
+  parsed.faults.add(line, 1, "",
+                    fmt::format("needs at least {} {}, has {}", least, what, table.rows()));
 }
 
 }  // namespace abbe::daemon

@@ -7,7 +7,8 @@
 namespace abbe::daemon {
 namespace {
 
-constexpr std::array<std::string_view, 5> kCodes{"data_insufficient", "usage", "bad_input", "io", "refused"};
+constexpr std::array<std::string_view, 5> kCodes{"data_insufficient", "usage", "bad_input", "io",
+                                                 "refused"};
 
 std::string text_of(const nlohmann::json& answer, const char* member) {
   const auto found = answer.find(member);
@@ -26,7 +27,8 @@ nlohmann::json refusal(const Error& error) {
 
 Error error_of_refusal(const nlohmann::json& answer) {
   const auto word = std::find(kCodes.begin(), kCodes.end(), text_of(answer, "code"));
-  const auto code = word == kCodes.end() ? ErrorCode::Refused : static_cast<ErrorCode>(word - kCodes.begin());
+  const auto code =
+      word == kCodes.end() ? ErrorCode::Refused : static_cast<ErrorCode>(word - kCodes.begin());
   const std::string text = text_of(answer, "error");
   return {code, text.empty() ? "refused without a reason" : text};
 }

@@ -74,12 +74,14 @@ std::string sha256_hex(std::string_view text) {
 
 Result<std::string> sha256_hex_of_file(const std::filesystem::path& file) {
   std::ifstream in(file, std::ios::binary);
-  if (!in) return fail(ErrorCode::Io, fmt::format("read {}: {}", file.string(), std::strerror(errno)));
+  if (!in)
+    return fail(ErrorCode::Io, fmt::format("read {}: {}", file.string(), std::strerror(errno)));
   Sha256 hash;
   std::array<char, 1 << 16> buffer{};
   while (in.read(buffer.data(), buffer.size()) || in.gcount() > 0)
     hash.update(std::string_view{buffer.data(), static_cast<std::size_t>(in.gcount())});
-  if (in.bad()) return fail(ErrorCode::Io, fmt::format("read {}: {}", file.string(), std::strerror(errno)));
+  if (in.bad())
+    return fail(ErrorCode::Io, fmt::format("read {}: {}", file.string(), std::strerror(errno)));
   return hash.hex();
 }
 

@@ -31,7 +31,8 @@ bool write_all(int fd, std::string_view text) {
 
 /// The name in the folder is on the disk only after the folder itself is.
 bool sync_folder(const std::filesystem::path& folder) {
-  const FileDescriptor fd(::open(folder.empty() ? "." : folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC));
+  const FileDescriptor fd(
+      ::open(folder.empty() ? "." : folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC));
   return fd.get() >= 0 && ::fsync(fd.get()) == 0;
 }
 
@@ -44,13 +45,15 @@ Result<std::string> read_all(const FileDescriptor& fd, const struct stat& status
   std::string text(static_cast<std::size_t>(status.st_size), '\0');
   std::size_t have = 0;
   for (;;) {
-    if (have == text.size()) text.resize(text.size() + 65536);  // a pipe, or a file that still grows
+    if (have == text.size())
+      text.resize(text.size() + 65536);  // a pipe, or a file that still grows
     const auto got = ::read(fd.get(), text.data() + have, text.size() - have);
     if (got < 0 && errno == EINTR) continue;
     if (got < 0) return io_failure("read", file);
     if (got == 0) break;
     have += static_cast<std::size_t>(got);
   }
+
   text.resize(have);
   return text;
 }
@@ -109,7 +112,8 @@ std::optional<Ownership> ownership_of(const std::filesystem::path& file) noexcep
   return Ownership{status.st_uid, status.st_gid, status.st_mode & 0777U};
 }
 
-/// The folder belongs to somebody else when root writes into it: a link laid there in wait is not followed.
+/// The folder belongs to somebody else when root writes into it: a link laid there in wait is not
+/// followed.
 FileDescriptor create_fresh(const std::filesystem::path& file) {
   constexpr int kFlags = O_WRONLY | O_CREAT | O_EXCL | O_NOFOLLOW | O_CLOEXEC;
   ::unlink(file.c_str());  // left by a process of the same number that was killed
@@ -131,10 +135,12 @@ Result<void> create_folder(const std::filesystem::path& folder) {
   struct stat above {};
   const auto parent = folder.parent_path();
   const FileDescriptor fd(::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_NOFOLLOW | O_CLOEXEC));
+
   // Only root makes folders in another's folder that the other must be able to use.
   if (fd && ::geteuid() == 0 && ::stat(parent.empty() ? "." : parent.c_str(), &above) == 0 &&
       above.st_uid != 0)
     give(fd.get(), {above.st_uid, above.st_gid, above.st_mode & 0777U});
+
   return {};
 }
 
@@ -150,11 +156,13 @@ Result<void> replace_file(const std::filesystem::path& file, std::string_view te
       return failure;
     }
   }
+
   if (::rename(fresh.c_str(), file.c_str()) != 0) {
     const auto failure = io_failure("replace", file);
     ::unlink(fresh.c_str());
     return failure;
   }
+
   if (!sync_folder(file.parent_path())) return io_failure("sync the folder of", file);
   return {};
 }

@@ -20,8 +20,8 @@ Result<sockaddr_un> address_of(const std::filesystem::path& path) {
   address.sun_family = AF_UNIX;
   if (path.native().size() >= sizeof address.sun_path) {
     return tl::unexpected(
-        Error{ErrorCode::Usage, fmt::format("socket {}: the path is longer than {} characters", path.string(),
-                                            sizeof address.sun_path - 1)});
+        Error{ErrorCode::Usage, fmt::format("socket {}: the path is longer than {} characters",
+                                            path.string(), sizeof address.sun_path - 1)});
   }
   std::memcpy(address.sun_path, path.c_str(), path.native().size() + 1);
   return address;
@@ -39,20 +39,24 @@ void set_send_time_out(int fd, std::chrono::milliseconds time_out) noexcept {
   (void)::setsockopt(fd, SOL_SOCKET, SO_SNDTIMEO, &most, sizeof most);
 }
 
-Result<FileDescriptor> connect_unix(const std::filesystem::path& path, std::chrono::milliseconds time_out) {
+Result<FileDescriptor> connect_unix(const std::filesystem::path& path,
+                                    std::chrono::milliseconds time_out) {
   auto address = address_of(path);
   if (!address) return tl::unexpected(address.error());
   FileDescriptor fd{::socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0)};
   if (!fd) return tl::unexpected(failed("connect", path));
-  set_send_time_out(fd.get(),
-                    time_out);  // unix(7): connect() waits for a place in the backlog at most so long
+  set_send_time_out(
+      fd.get(),
+      time_out);  // unix(7): connect() waits for a place in the backlog at most so long
   const auto* generic = reinterpret_cast<const sockaddr*>(&*address);  // the socket API's own idiom
+
   if (::connect(fd.get(), generic, sizeof *address) != 0) {
     if (errno != EAGAIN) return tl::unexpected(failed("connect", path));
     return fail(ErrorCode::Io,
                 fmt::format("connect {}: the process that listens there accepted nobody in {} ms",
                             path.string(), time_out.count()));
   }
+
   set_send_time_out(fd.get(), std::chrono::milliseconds{0});
   return fd;
 }
@@ -80,8 +84,10 @@ Result<FileDescriptor> listen_unix(const std::filesystem::path& path) {
   if (!address) return tl::unexpected(address.error());
   if (is_listened_at(path)) {
     return tl::unexpected(
-        Error{ErrorCode::Io, fmt::format("listen {}: another daemon already answers there", path.string())});
+        Error{ErrorCode::Io,
+              fmt::format("listen {}: another daemon already answers there", path.string())});
   }
+
   std::error_code error;
   const auto type = std::filesystem::symlink_status(path, error).type();
   if (type == std::filesystem::file_type::socket) {
@@ -90,12 +96,16 @@ Result<FileDescriptor> listen_unix(const std::filesystem::path& path) {
     return fail(ErrorCode::Io,
                 fmt::format("listen {}: there is something that is not a socket", path.string()));
   }
+
   FileDescriptor fd{::socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0)};
   const auto* generic = reinterpret_cast<const sockaddr*>(&*address);
-  if (!fd || ::bind(fd.get(), generic, sizeof *address) != 0) return tl::unexpected(failed("bind", path));
+  if (!fd || ::bind(fd.get(), generic, sizeof *address) != 0)
+    return tl::unexpected(failed("bind", path));
+
   if (::chmod(path.c_str(), kOwnerAndGroup) != 0 || ::listen(fd.get(), kBacklog) != 0) {
     return tl::unexpected(failed("listen", path));
   }
+
   return fd;
 }
 

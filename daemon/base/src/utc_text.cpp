@@ -28,13 +28,16 @@ std::optional<protocol::UtcTime> utc_from_text(std::string_view text) {
   unsigned mo = 0, d = 0, h = 0, mi = 0, s = 0, ns = 0;
   char zone = 0;
   const std::string owned{text};
-  if (text.size() != 30 ||
-      std::sscanf(owned.c_str(), "%4d-%2u-%2uT%2u:%2u:%2u.%9u%c", &y, &mo, &d, &h, &mi, &s, &ns, &zone) != 8)
+  if (text.size() != 30 || std::sscanf(owned.c_str(), "%4d-%2u-%2uT%2u:%2u:%2u.%9u%c", &y, &mo, &d,
+                                       &h, &mi, &s, &ns, &zone) != 8)
     return std::nullopt;
   const year_month_day date{year{y}, month{mo}, day{d}};
-  if (y < first_year || y > last_year || !date.ok() || h > 23 || mi > 59 || s > 59) return std::nullopt;
-  const protocol::UtcTime time = sys_days{date} + hours{h} + minutes{mi} + seconds{s} + nanoseconds{ns};
+  if (y < first_year || y > last_year || !date.ok() || h > 23 || mi > 59 || s > 59)
+    return std::nullopt;
+  const protocol::UtcTime time =
+      sys_days{date} + hours{h} + minutes{mi} + seconds{s} + nanoseconds{ns};
   if (to_text(time) != text) return std::nullopt;  // sscanf takes signs and spaces, too
+
   return time;
 }
 

@@ -43,8 +43,10 @@ Touched touched(const json& answer, const evemu::ArtefactPlan& plan) {
     if (out.touches.size() == plan.touches.size()) break;
     const auto& planned = plan.touches[out.touches.size()];
     const auto p = t["at_m"].get<std::array<double, 3>>();
-    out.touches.push_back(
-        {.position = 1, .feature = planned.feature, .number = planned.number, .p_m = {p[0], p[1], p[2]}});
+    out.touches.push_back({.position = 1,
+                           .feature = planned.feature,
+                           .number = planned.number,
+                           .p_m = {p[0], p[1], p[2]}});
     out.u_position_m = t["u_m"];
   }
   return out;
@@ -60,6 +62,7 @@ Touched look_on(const std::filesystem::path& socket, const evemu::ArtefactPlan& 
   ProgressBar bar;
   Touched so_far;
   bool told = false;
+
   for (auto answered = steady_clock::now();; std::this_thread::sleep_for(kLookAtTouches)) {
     if (interrupted() && !told) told = cancel(socket);
     const auto answer = ask_daemon(socket, {{"do", "touches"}});
@@ -72,11 +75,12 @@ Touched look_on(const std::filesystem::path& socket, const evemu::ArtefactPlan& 
     answered = steady_clock::now();
     Touched now = touched(*answer, plan);
     const bool running = (*answer)["running"].get<bool>();
-    const bool others = (*answer)["asked"] != plan.touches.size() ||
-                        now.touches.size() < so_far.touches.size() ||
-                        (!running && now.reason.empty() && now.touches.size() < plan.touches.size());
+    const bool others =
+        (*answer)["asked"] != plan.touches.size() || now.touches.size() < so_far.touches.size() ||
+        (!running && now.reason.empty() && now.touches.size() < plan.touches.size());
     if (others) {
-      so_far.reason = "the touches are lost: the daemon was started anew, or makes those of somebody else";
+      so_far.reason =
+          "the touches are lost: the daemon was started anew, or makes those of somebody else";
       return so_far;
     }
     so_far = std::move(now);
@@ -95,7 +99,8 @@ Result<calib::Vector3> machine_position(const std::filesystem::path& socket) {
   return calib::Vector3{p[0], p[1], p[2]};
 }
 
-Result<Touched> touch_artefact(const std::filesystem::path& socket, const evemu::ArtefactPlan& plan) {
+Result<Touched> touch_artefact(const std::filesystem::path& socket,
+                               const evemu::ArtefactPlan& plan) {
   mark_interruptions({SIGINT, SIGTERM, SIGHUP, SIGQUIT});
   const auto started = ask_daemon(socket, as_json(plan));
   if (!started) {

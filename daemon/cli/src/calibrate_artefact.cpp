@@ -1,5 +1,6 @@
-/// `abbe calibrate artefact`: a ball array measured by the measuring machine of the running daemon: touched
-/// where its nominal description says, fitted, and written as calibrator.toml with uncertainties.
+/// `abbe calibrate artefact`: a ball array measured by the measuring machine of the running daemon:
+/// touched where its nominal description says, fitted, and written as calibrator.toml with
+/// uncertainties.
 
 #include <fmt/format.h>
 
@@ -52,6 +53,7 @@ Result<Placed> placed(const CalibrateArtefactArguments& arguments) {
       Eigen::AngleAxisd(turn_rad, calib::Vector3::UnitZ()).toRotationMatrix(),
       1e-3 * calib::Vector3{at[0], at[1], at[2]}};
   Placed out{evemu::moved(file->calibrator, T_machine_artefact), {}};
+
   for (std::size_t i = 0; i < out.faces.size(); ++i) {
     if (!file->faces[i]) {
       return fail(ErrorCode::BadInput,
@@ -62,6 +64,7 @@ Result<Placed> placed(const CalibrateArtefactArguments& arguments) {
     out.faces[i] = {T_machine_artefact.R * file->faces[i]->centre_m + T_machine_artefact.t_m,
                     file->faces[i]->half_size_m};
   }
+
   return out;
 }
 
@@ -69,14 +72,14 @@ Result<void> keep(const Touched& touched, const std::string& file) {
   std::string text = "position,kind,index,x_mm,y_mm,z_mm\n";
   for (const auto& t : touched.touches) {
     text += fmt::format("{},{},{},{:.17g},{:.17g},{:.17g}\n", t.position,
-                        t.feature == evemu::Feature::Ball ? "ball" : "block", t.number, 1e3 * t.p_m.x(),
-                        1e3 * t.p_m.y(), 1e3 * t.p_m.z());
+                        t.feature == evemu::Feature::Ball ? "ball" : "block", t.number,
+                        1e3 * t.p_m.x(), 1e3 * t.p_m.y(), 1e3 * t.p_m.z());
   }
   return replace_file(file, text);
 }
 
-/// A calibrator.toml of an earlier run goes on naming the touches it is from: those that came to nothing go
-/// into a file of their own.
+/// A calibrator.toml of an earlier run goes on naming the touches it is from: those that came to
+/// nothing go into a file of their own.
 Error kept_aside(Error error, const Touched& touched, const std::filesystem::path& touches) {
   if (touched.touches.empty()) {
     error.details.push_back("no touch was made");
@@ -106,13 +109,16 @@ int print(const evemu::Calibrator& found, const evemu::Calibrator& nominal,
                  balls.back()["moved_um"].get<double>(), balls.back()["radius_um"].get<double>(),
                  1e6 * ball.u_m);
   }
-  if (arguments.json) fmt::print("{}\n", json{{"calibrator", arguments.out}, {"balls", balls}}.dump(1));
+
+  if (arguments.json)
+    fmt::print("{}\n", json{{"calibrator", arguments.out}, {"balls", balls}}.dump(1));
   return 0;
 }
 
 int calibrate(CalibrateArtefactArguments arguments) {
   if (arguments.touches.empty())
-    arguments.touches = std::filesystem::path(arguments.out).replace_extension(".touches.csv").string();
+    arguments.touches =
+        std::filesystem::path(arguments.out).replace_extension(".touches.csv").string();
   const auto artefact = placed(arguments);
   if (!artefact) return report(artefact.error());
   const auto socket = socket_path(arguments.where);
@@ -127,12 +133,13 @@ int calibrate(CalibrateArtefactArguments arguments) {
   const auto made = touch_artefact(*socket, *plan);
   if (!made) return report(made.error());
   if (!made->reason.empty())
-    return report(kept_aside({ErrorCode::DataInsufficient,
-                              made->reason,
-                              {"the tip may stand low: raise it above everything before another run"}},
-                             *made, arguments.touches));
-  const auto found =
-      evemu::calibrated_artefact(artefact->nominal, artefact->faces, made->touches, made->u_position_m);
+    return report(
+        kept_aside({ErrorCode::DataInsufficient,
+                    made->reason,
+                    {"the tip may stand low: raise it above everything before another run"}},
+                   *made, arguments.touches));
+  const auto found = evemu::calibrated_artefact(artefact->nominal, artefact->faces, made->touches,
+                                                made->u_position_m);
   if (!found) return report(kept_aside(error_of(found.error()), *made, arguments.touches));
   if (const auto kept = keep(*made, arguments.touches); !kept) return report(kept.error());
   std::array<std::optional<BlockFace>, 2> faces;
@@ -142,8 +149,11 @@ int calibrate(CalibrateArtefactArguments arguments) {
       *found, faces,
       fmt::format("# measured with {} touches: {}; in the coordinates of the measuring machine\n"
                   "# u: standard uncertainty (k = 1), of the fit and of the machine\n",
-                  made->touches.size(), std::filesystem::path(arguments.touches).filename().string()));
-  if (const auto written = replace_file(arguments.out, text); !written) return report(written.error());
+                  made->touches.size(),
+                  std::filesystem::path(arguments.touches).filename().string()));
+  if (const auto written = replace_file(arguments.out, text); !written)
+    return report(written.error());
+
   return print(*found, artefact->nominal, arguments);
 }
 
@@ -151,32 +161,41 @@ int calibrate(CalibrateArtefactArguments arguments) {
 
 void add_calibrate_artefact(CLI::App& parent, int& exit) {
   auto arguments = std::make_shared<CalibrateArtefactArguments>();
-  auto* command = parent.add_subcommand(
-      "artefact",
-      "A ball array on the measuring machine of the running daemon ([cmm]): touches its balls on their "
-      "upper\n"
-      "half and its blocks on the faces that the file names, and writes it as measured, with uncertainties.\n"
-      "The machine moves: first straight up from where it stands, in the end up again; the ways lead around "
-      "the\n"
-      "balls and above everything, around nothing else. Ctrl-C, a closed terminal or nobody asking for 2 s "
-      "end it\n"
-      "after the touch that is under way; the tip may stand low then. Exit code 1 then, and when a touch "
-      "was\n"
-      "refused or the machine or the daemon went away: the touches until then are kept (.partial.csv), and\n"
-      "what an earlier run has written stays.");
+  auto* command = parent.add_subcommand("artefact",
+                                        "A ball array on the measuring machine of the running "
+                                        "daemon ([cmm]): touches its balls on their "
+                                        "upper\n"
+                                        "half and its blocks on the faces that the file names, and "
+                                        "writes it as measured, with uncertainties.\n"
+                                        "The machine moves: first straight up from where it "
+                                        "stands, in the end up again; the ways lead around "
+                                        "the\n"
+                                        "balls and above everything, around nothing else. Ctrl-C, "
+                                        "a closed terminal or nobody asking for 2 s "
+                                        "end it\n"
+                                        "after the touch that is under way; the tip may stand low "
+                                        "then. Exit code 1 then, and when a touch "
+                                        "was\n"
+                                        "refused or the machine or the daemon went away: the "
+                                        "touches until then are kept (.partial.csv), and\n"
+                                        "what an earlier run has written stays.");
   command
-      ->add_option("--calibrator", arguments->calibrator,
-                   "nominal description: calibrator.toml, its blocks with x_mm, y_mm, z_mm, half_size_mm")
+      ->add_option(
+          "--calibrator", arguments->calibrator,
+          "nominal description: calibrator.toml, its blocks with x_mm, y_mm, z_mm, half_size_mm")
       ->required();
-  command->add_option("-o,--output", arguments->out, "the artefact as measured")->capture_default_str();
-  command->add_option("--touches", arguments->touches,
-                      "where the touches go (default: beside the output); .partial.csv if it fails");
+  command->add_option("-o,--output", arguments->out, "the artefact as measured")
+      ->capture_default_str();
+  command->add_option(
+      "--touches", arguments->touches,
+      "where the touches go (default: beside the output); .partial.csv if it fails");
   command->add_option("--at", arguments->at_mm, "where the artefact's origin stands, mm: x,y,z")
       ->delimiter(',')
       ->expected(3)
       ->required();
   command->add_option("--turn", arguments->turn_deg, "how far it is turned about z, degrees");
-  command->add_option("--points", arguments->points, "on a ball, at least 5")->capture_default_str();
+  command->add_option("--points", arguments->points, "on a ball, at least 5")
+      ->capture_default_str();
   command->add_option("--block-points", arguments->face_points, "on a block's face, at least 4")
       ->capture_default_str();
   command->add_option("--clearance", arguments->clearance_mm, "of the tip on its ways, mm")

@@ -1,4 +1,5 @@
-/// `abbe calibrate evemu`: the running daemon guides through the touching of a ball array and identifies.
+/// `abbe calibrate evemu`: the running daemon guides through the touching of a ball array and
+/// identifies.
 
 #include <CLI/App.hpp>
 #include <CLI/Config.hpp>
@@ -30,18 +31,21 @@ Result<nlohmann::json> task_of(const CalibrateEvemuArguments& arguments) {
   EvemuRequest request;
   request.calibrator = calibrator->calibrator;
   request.sources = {calibrator->source};
+
   if (!arguments.reference.empty()) {
     const auto points = read_errors_csv(arguments.reference);
     if (!points) return tl::make_unexpected(points.error());
     request.reference = {points->errors, arguments.u_reference_um / kUmPerM};
     request.sources.push_back(points->source);
   }
+
   nlohmann::json task = to_json(std::move(request));
   task.erase("positions");
   const auto keep = [&task](const char* key, std::size_t points) {
     task.erase(key);
     if (points > 0) task[key] = points;
   };
+
   keep("points_per_ball", arguments.points_per_ball);
   keep("points_per_block", arguments.points_per_block);
   return task;
@@ -65,16 +69,21 @@ void add_calibrate_evemu(CLI::App& parent, int& exit) {
       "block 1, block 2, ball 2 ...), notices missed, doubled and wrong touches, then identifies.\n"
       "Ctrl-C ends the looking on (exit code 130), --cancel the calibration.");
   auto* calibrator = command->add_option("--calibrator", arguments->calibrator, "calibrator.toml");
-  auto* reference =
-      command->add_option("--rotation-reference", arguments->reference,
-                          "errors.csv of points where V is known independently: turns the model onto them");
-  command->add_option("--u-reference-um", arguments->u_reference_um, "standard uncertainty of that V")
+  auto* reference = command->add_option(
+      "--rotation-reference", arguments->reference,
+      "errors.csv of points where V is known independently: turns the model onto them");
+  command
+      ->add_option("--u-reference-um", arguments->u_reference_um, "standard uncertainty of that V")
       ->needs(reference)
       ->check(CLI::PositiveNumber)
       ->capture_default_str();
-  command->add_option("--points-per-ball", arguments->points_per_ball, "default: [evemu] of the daemon")
+  command
+      ->add_option("--points-per-ball", arguments->points_per_ball,
+                   "default: [evemu] of the daemon")
       ->check(CLI::Range(1, 1000));
-  command->add_option("--points-per-block", arguments->points_per_block, "default: [evemu] of the daemon")
+  command
+      ->add_option("--points-per-block", arguments->points_per_block,
+                   "default: [evemu] of the daemon")
       ->check(CLI::Range(1, 1000));
   add_follow_options(*command, arguments->follow, calibrator);
   command->callback([arguments, &exit] { exit = calibrate(*arguments); });

@@ -1,6 +1,6 @@
-/// `abbe calibrate probe`: delay and lobing of a touch probe from the touches of a recording. The recording
-/// is made by the running daemon while somebody touches one place at three feeds (the delay), or a sphere
-/// from all sides at the measuring feed (the lobing).
+/// `abbe calibrate probe`: delay and lobing of a touch probe from the touches of a recording. The
+/// recording is made by the running daemon while somebody touches one place at three feeds (the
+/// delay), or a sphere from all sides at the measuring feed (the lobing).
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
@@ -54,24 +54,25 @@ Result<Touches> touches_of(const CalibrateProbeArguments& arguments) {
   RecordingSink sink;
   sink.probe_trigger = [&](const ProbeTrigger& t, std::string_view) {
     if (!usable(t) || (arguments.probe != 0 && t.probe != arguments.probe)) return;
-    touches.usable.push_back(
-        {{t.position[0], t.position[1], t.position[2]}, {t.velocity[0], t.velocity[1], t.velocity[2]}});
+    touches.usable.push_back({{t.position[0], t.position[1], t.position[2]},
+                              {t.velocity[0], t.velocity[1], t.velocity[2]}});
   };
   (void)recording->read(sink);
   return touches;
 }
 
-/// Chance alone exceeds this misfit once in a thousand times with three feeds; residuals smaller than any
-/// probe repeats are no reason to refuse.
+/// Chance alone exceeds this misfit once in a thousand times with three feeds; residuals smaller
+/// than any probe repeats are no reason to refuse.
 std::optional<Error> not_on_a_line(const calib::probe::ProbeDelayFit& fit) {
-  constexpr double kMostMisfit = 10.8;
+  constexpr double kMostLackOfFit = 10.8;
   constexpr double kRepeats_m = 0.1e-6;
-  if (fit.misfit <= kMostMisfit || fit.residual_rms_m <= kRepeats_m) return std::nullopt;
+  if (fit.misfit <= kMostLackOfFit || fit.residual_rms_m <= kRepeats_m) return std::nullopt;
   return Error{
       ErrorCode::DataInsufficient,
       fmt::format(
           "probe delay: the places do not lie on a line over the feed (misfit {:.1f}, residuals "
-          "{:.3f} um): more than one place, something moved, or a latch not yet in step with its clock",
+          "{:.3f} um): more than one place, something moved, or a latch not yet in step with its "
+          "clock",
           fit.misfit, 1e6 * fit.residual_rms_m),
       {}};
 }
@@ -93,13 +94,17 @@ int print_delay(const calib::probe::ProbeDelayFit& fit, bool as_json) {
                            .dump(1));
     return 0;
   }
+
   fmt::print(
-      "# {} touches at {} feeds; misfit {:.2f} (about 1: the places lie on a line), in u_delay_us with the "
+      "# {} touches at {} feeds; misfit {:.2f} (about 1: the places lie on a line), in u_delay_us "
+      "with the "
       "{:.0f} degrees of freedom\n",
       fit.touches, fit.feeds, fit.misfit, fit.dof);
-  fmt::print("# to be added to the delay_us they were made with; scatter {:.3f} um\n", 1e6 * fit.u_scatter_m);
+  fmt::print("# to be added to the delay_us they were made with; scatter {:.3f} um\n",
+             1e6 * fit.u_scatter_m);
   fmt::print("delay_us = {:.3f}\nu_delay_us = {:.3f}\njitter_us = {:.3f}\n", 1e6 * fit.delay_s,
              1e6 * fit.u_delay_s, 1e6 * fit.u_jitter_s);
+
   return 0;
 }
 
@@ -107,28 +112,34 @@ int print_qualification(const calib::probe::Qualification& q, bool as_json) {
   const auto& terms = q.map.terms_m();
   std::vector<double> terms_um;
   for (const double term : terms) terms_um.push_back(1e6 * term);
+
   if (as_json) {
-    fmt::print("{}\n", json{{"tip_radius_mm", 1e3 * terms[0]},
-                            {"u_tip_radius_um", 1e6 * std::sqrt(q.map.covariance_m2()(0, 0))},
-                            {"lobing_um", 1e6 * q.lobing_m},
-                            {"terms_um", terms_um},
-                            {"centre_mm", {1e3 * q.centre_m[0], 1e3 * q.centre_m[1], 1e3 * q.centre_m[2]}},
-                            {"sigma_um", 1e6 * q.sigma_m},
-                            {"condition", q.condition}}
-                           .dump(1));
+    fmt::print("{}\n",
+               json{{"tip_radius_mm", 1e3 * terms[0]},
+                    {"u_tip_radius_um", 1e6 * std::sqrt(q.map.covariance_m2()(0, 0))},
+                    {"lobing_um", 1e6 * q.lobing_m},
+                    {"terms_um", terms_um},
+                    {"centre_mm", {1e3 * q.centre_m[0], 1e3 * q.centre_m[1], 1e3 * q.centre_m[2]}},
+                    {"sigma_um", 1e6 * q.sigma_m},
+                    {"condition", q.condition}}
+                   .dump(1));
     return 0;
   }
+
   fmt::print("tip_radius_mm = {:.6f}\nlobing_um = {:.3f}\nsigma_um = {:.3f}\n", 1e3 * terms[0],
              1e6 * q.lobing_m, 1e6 * q.sigma_m);
   fmt::print("lobing_terms_um = [{:.4f}]\n", fmt::join(terms_um, ", "));
+
   return 0;
 }
 
-int fit(const CalibrateProbeArguments& arguments, const std::vector<calib::probe::RecordedTouch>& touches) {
+int fit(const CalibrateProbeArguments& arguments,
+        const std::vector<calib::probe::RecordedTouch>& touches) {
   if (arguments.sphere_radius_mm > 0.0) {
-    const auto q = calib::probe::qualify(calib::probe::around_sphere(touches),
-                                         {.sphere_radius_m = 1e-3 * arguments.sphere_radius_mm,
-                                          .u_sphere_radius_m = 1e-6 * arguments.u_sphere_radius_um});
+    const auto q =
+        calib::probe::qualify(calib::probe::around_sphere(touches),
+                              {.sphere_radius_m = 1e-3 * arguments.sphere_radius_mm,
+                               .u_sphere_radius_m = 1e-6 * arguments.u_sphere_radius_um});
     return q ? print_qualification(*q, arguments.json) : report(insufficient(q.error()));
   }
   const auto fit = calib::probe::fit_delay(calib::probe::same_place(touches));
@@ -137,15 +148,16 @@ int fit(const CalibrateProbeArguments& arguments, const std::vector<calib::probe
   return print_delay(*fit, arguments.json);
 }
 
-/// Touches that are missing or wrong may be those that would not have fitted: the result is shown, and
-/// refused.
+/// Touches that are missing or wrong may be those that would not have fitted: the result is shown,
+/// and refused.
 int calibrate(const CalibrateProbeArguments& arguments) {
   const auto touches = touches_of(arguments);
   if (!touches) return report(touches.error());
   const int exit = fit(arguments, touches->usable);
   if (exit != 0 || touches->damage.empty()) return exit;
-  return report(
-      {ErrorCode::DataInsufficient, fmt::format("{}: {}", arguments.recording, touches->damage), {}});
+  return report({ErrorCode::DataInsufficient,
+                 fmt::format("{}: {}", arguments.recording, touches->damage),
+                 {}});
 }
 
 }  // namespace
@@ -154,14 +166,16 @@ void add_calibrate_probe(CLI::App& parent, int& exit) {
   auto arguments = std::make_shared<CalibrateProbeArguments>();
   auto* command = parent.add_subcommand(
       "probe",
-      "A touch probe from recorded touches: its delay from one place touched at three feeds, or, with a "
+      "A touch probe from recorded touches: its delay from one place touched at three feeds, or, "
+      "with a "
       "sphere's radius, its effective tip radius and lobing.\n"
       "Exit code 1, with the result all the same, if the recording is damaged inside.");
   command->add_option("--recording", arguments->recording, "a recording with touches")->required();
   command->add_option("--probe", arguments->probe, "only touches of this probe; 0: all");
   command->add_option("--sphere-radius-mm", arguments->sphere_radius_mm,
                       "qualify on a sphere of this radius");
-  command->add_option("--u-sphere-radius-um", arguments->u_sphere_radius_um, "its standard uncertainty");
+  command->add_option("--u-sphere-radius-um", arguments->u_sphere_radius_um,
+                      "its standard uncertainty");
   command->add_flag("--json", arguments->json, "the result as JSON");
   command->callback([arguments, &exit] { exit = calibrate(*arguments); });
 }

@@ -1,6 +1,6 @@
 #pragma once
-/// One function per subcommand: it adds itself to `parent`; when it was called, its callback leaves the exit
-/// code in `exit`. Options that hold a value live as long as the callback does.
+/// One function per subcommand: it adds itself to `parent`; when it was called, its callback leaves
+/// the exit code in `exit`. Options that hold a value live as long as the callback does.
 
 #include <CLI/App.hpp>
 #include <CLI/Config.hpp>

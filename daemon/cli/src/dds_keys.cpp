@@ -20,9 +20,11 @@ struct KeyArguments {
 };
 
 void print_next_steps(const KeyArguments& arguments) {
-  const std::string folder = std::filesystem::absolute(arguments.folder).lexically_normal().string();
+  const std::string folder =
+      std::filesystem::absolute(arguments.folder).lexically_normal().string();
   fmt::print(
-      "made {}: a certificate authority, and identities for the daemon and {} subscriber{}, valid for {} "
+      "made {}: a certificate authority, and identities for the daemon and {} subscriber{}, valid "
+      "for {} "
       "days\n",
       folder, arguments.subscribers, arguments.subscribers == 1 ? "" : "s", arguments.days);
   fmt::print(
@@ -31,7 +33,8 @@ void print_next_steps(const KeyArguments& arguments) {
       "  2. in abbed.toml, under [dds]:  security = \"{0}/daemon\"     then restart abbed\n"
       "  3. copy {0}/subscriber-1 to the first subscriber's computer; there:\n"
       "       abbe watch --security subscriber-1\n"
-      "  4. move {0}/ca.key to a safe place away from this computer: whoever has it can make identities\n"
+      "  4. move {0}/ca.key to a safe place away from this computer: whoever has it can make "
+      "identities\n"
       "From then on nobody without such an identity can publish or read; `abbe status` shows it.\n",
       folder);
 }
@@ -50,10 +53,12 @@ int make_keys(const KeyArguments& arguments) {
 
 void add_dds_keys(CLI::App& parent, int& exit) {
   auto arguments = std::make_shared<KeyArguments>();
-  auto* command = parent.add_subcommand(
-      "keys",
-      "Make keys and permissions for DDS Security: without an identity from here nobody publishes or reads");
-  command->add_option("-o,--out", arguments->folder, "new folder; nothing that is there is overwritten")
+  auto* command = parent.add_subcommand("keys",
+                                        "Make keys and permissions for DDS Security: without an "
+                                        "identity from here nobody publishes or reads");
+  command
+      ->add_option("-o,--out", arguments->folder,
+                   "new folder; nothing that is there is overwritten")
       ->required();
   command
       ->add_option("--subscribers", arguments->subscribers,

@@ -9,7 +9,9 @@
 namespace abbe::daemon {
 
 [[nodiscard]] inline nlohmann::json vector_figures(const calib::VectorStatistics& s) {
-  return {{"mean_um", s.mean_m * kUmPerM}, {"rms_um", s.rms_m * kUmPerM}, {"max_um", s.max_m * kUmPerM}};
+  return {{"mean_um", s.mean_m * kUmPerM},
+          {"rms_um", s.rms_m * kUmPerM},
+          {"max_um", s.max_m * kUmPerM}};
 }
 
 }  // namespace abbe::daemon

@@ -23,8 +23,8 @@ int say_how_to_cancel(const Following& following) {
   if (following.cancel.empty()) {
     fmt::print(stderr, "abbe: {} goes on; no command ends it\n", following.what);
   } else {
-    fmt::print(stderr, "abbe: {} goes on; end it with: {} --socket {}\n", following.what, following.cancel,
-               following.socket.string());
+    fmt::print(stderr, "abbe: {} goes on; end it with: {} --socket {}\n", following.what,
+               following.cancel, following.socket.string());
   }
   return kInterrupted;
 }
@@ -48,20 +48,25 @@ int follow(const Following& following, ProgressBar& bar) {
   mark_interruptions({SIGINT});
   SameDaemon same;
   auto answered = std::chrono::steady_clock::now();
+
   for (;; std::this_thread::sleep_for(kLook)) {
     if (interrupted()) {
       bar.clear();
       return say_how_to_cancel(following);
     }
+
     const auto status = ask_daemon(following.socket, {{"do", "status"}});
     const auto now = std::chrono::steady_clock::now();
     if (!status && now - answered < kPatienceWithoutDaemon) continue;
+
     if (!status || !same.is(*status)) {
       bar.clear();
-      return report(status ? Error{ErrorCode::Io,
-                                   fmt::format("{} is lost: the daemon was started anew", following.what)}
-                           : status.error());
+      return report(
+          status ? Error{ErrorCode::Io,
+                         fmt::format("{} is lost: the daemon was started anew", following.what)}
+                 : status.error());
     }
+
     answered = now;
     if (const auto exit = following.look(*status)) return *exit;
   }

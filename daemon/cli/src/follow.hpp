@@ -1,6 +1,6 @@
 #pragma once
-/// Looking on while the daemon works, until it is done: the same for calibrations, the search for reference
-/// marks and orders to a tracker.
+/// Looking on while the daemon works, until it is done: the same for calibrations, the search for
+/// reference marks and orders to a tracker.
 
 #include <filesystem>
 #include <functional>
@@ -20,8 +20,9 @@ struct Following {
   std::function<std::optional<int>(const nlohmann::json& status)> look;
 };
 
-/// Asks for the status again and again. Ctrl-C ends the looking on, not the work (exit code 130). Io if the
-/// daemon does not answer for 5 s, or is another one than before: what it was doing is lost then.
+/// Asks for the status again and again. Ctrl-C ends the looking on, not the work (exit code 130).
+/// Io if the daemon does not answer for 5 s, or is another one than before: what it was doing is
+/// lost then.
 [[nodiscard]] int follow(const Following& following, ProgressBar& bar);
 
 }  // namespace abbe::daemon

@@ -33,8 +33,8 @@ int print_session_verdict(const json& session, bool as_json) {
   return state == "active" ? 0 : exit_code(error_of_refusal(session).code);
 }
 
-/// One line whenever the daemon is about something else: "warming: waiting for the machine to stand at ...",
-/// and one for everything it noticed meanwhile.
+/// One line whenever the daemon is about something else: "warming: waiting for the machine to stand
+/// at ...", and one for everything it noticed meanwhile.
 class Narrator {
  public:
   void tell_notes(ProgressBar& bar, const json& session) {
@@ -60,8 +60,8 @@ class Narrator {
   std::size_t noted_ = 0;
 };
 
-/// The session with this number, running or ended; another one's verdict is not ours. 0: of a daemon that
-/// does not number them.
+/// The session with this number, running or ended; another one's verdict is not ours. 0: of a
+/// daemon that does not number them.
 std::optional<json> session_in(const json& status, std::uint64_t id) {
   if (id == 0 || status["session"].value("id", std::uint64_t{0}) == id) return status["session"];
   for (const json& ended : status.value("ended_sessions", json::array()))
@@ -79,9 +79,10 @@ int follow_session(const std::filesystem::path& socket, const std::string& metho
       bar.clear();
       return report(
           {ErrorCode::Io,
-           fmt::format("calibration {} has ended, and its verdict is not kept after so many others: "
-                       "`abbe model list` shows what it may have left",
-                       id)});
+           fmt::format(
+               "calibration {} has ended, and its verdict is not kept after so many others: "
+               "`abbe model list` shows what it may have left",
+               id)});
     }
     const json& session = *found;
     const std::string state = session["state"];
@@ -94,6 +95,7 @@ int follow_session(const std::filesystem::path& socket, const std::string& metho
     bar.show(state, session["progress"].get<double>());
     return std::nullopt;
   };
+
   return follow({.socket = socket,
                  .what = "the calibration",
                  .cancel = fmt::format("abbe calibrate {} --cancel", method),
@@ -105,8 +107,10 @@ int follow_session(const std::filesystem::path& socket, const std::string& metho
 
 void add_follow_options(CLI::App& command, FollowOptions& options, CLI::Option* excluded) {
   add_socket_options(command, options.where);
-  command.add_flag("--detach", options.detach, "return as soon as the daemon waits for the machine");
-  command.add_flag("--cancel", options.cancel, "end the calibration that is running")->excludes(excluded);
+  command.add_flag("--detach", options.detach,
+                   "return as soon as the daemon waits for the machine");
+  command.add_flag("--cancel", options.cancel, "end the calibration that is running")
+      ->excludes(excluded);
   command.add_flag("--json", options.json, "the verdict as JSON");
 }
 

@@ -1,6 +1,6 @@
 #pragma once
-/// What every `abbe calibrate METHOD` that runs in the daemon does alike: options, asking, following to the
-/// verdict, cancelling.
+/// What every `abbe calibrate METHOD` that runs in the daemon does alike: options, asking,
+/// following to the verdict, cancelling.
 
 #include <CLI/App.hpp>
 #include <nlohmann/json.hpp>
@@ -22,8 +22,8 @@ void add_follow_options(CLI::App& command, FollowOptions& options, CLI::Option* 
 
 /// Ends the calibration that is running; returns the exit code.
 int cancel_calibration(const FollowOptions& options);
-/// Asks for `task` and, unless detached, follows it: what it waits for, what it noticed, its verdict. Returns
-/// the exit code.
+/// Asks for `task` and, unless detached, follows it: what it waits for, what it noticed, its
+/// verdict. Returns the exit code.
 int run_calibration(const FollowOptions& options, nlohmann::json task);
 
 }  // namespace abbe::daemon

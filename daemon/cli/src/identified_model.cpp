@@ -36,17 +36,18 @@ void ModelToBeat::say(calib::Verdict& verdict) const {
 
 ModelToBeat to_beat(const std::optional<ModelDocument>& active, const Config& config) {
   if (!active) return {};
-  if (active->machine_hash != machine_hash(config)) return {nullptr, std::string{kOfAnotherMachine}};
+  if (active->machine_hash != machine_hash(config))
+    return {nullptr, std::string{kOfAnotherMachine}};
   return {&active->model, {}};
 }
 
-Result<void> keep(const std::string& store, const ModelDocument& document, const calib::Verdict& verdict,
-                  const std::string& command) {
+Result<void> keep(const std::string& store, const ModelDocument& document,
+                  const calib::Verdict& verdict, const std::string& command) {
   if (store.empty()) return {};
   auto opened = ModelStore::open(store);
   if (!opened) return tl::make_unexpected(opened.error());
-  const auto id =
-      opened->add(document, verdict.accepted, verdict.reasons, {user_name(), command, document.created});
+  const auto id = opened->add(document, verdict.accepted, verdict.reasons,
+                              {user_name(), command, document.created});
   if (!id) return tl::make_unexpected(id.error());
   return {};
 }
@@ -55,7 +56,8 @@ Result<void> write_results(const std::filesystem::path& folder, const ModelDocum
                            const std::map<std::string, std::string>& more) {
   std::error_code failed;
   std::filesystem::create_directories(folder, failed);
-  if (failed) return fail(ErrorCode::Io, fmt::format("create {}: {}", folder.string(), failed.message()));
+  if (failed)
+    return fail(ErrorCode::Io, fmt::format("create {}: {}", folder.string(), failed.message()));
   if (auto done = replace_file(folder / "model.json", to_json(document)); !done) return done;
   for (const auto& [name, text] : more)
     if (auto done = replace_file(folder / name, text); !done) return done;
@@ -68,9 +70,11 @@ nlohmann::json verdict_json(const calib::Verdict& verdict) {
 
 void print_verdict(const calib::Verdict& verdict) {
   fmt::print("held out    {:.3f} um rms without compensation, {:.3f} um with the model\n",
-             verdict.held_out.no_compensation_rms_m * kUmPerM, verdict.held_out.candidate_rms_m * kUmPerM);
-  fmt::print("gate        {}\n", verdict.accepted ? coloured("would accept", kGreen, STDOUT_FILENO)
-                                                  : coloured("would refuse", kYellow, STDOUT_FILENO));
+             verdict.held_out.no_compensation_rms_m * kUmPerM,
+             verdict.held_out.candidate_rms_m * kUmPerM);
+  fmt::print("gate        {}\n", verdict.accepted
+                                     ? coloured("would accept", kGreen, STDOUT_FILENO)
+                                     : coloured("would refuse", kYellow, STDOUT_FILENO));
   for (const auto& reason : verdict.reasons) fmt::print("            {}\n", reason);
   for (const auto& note : verdict.notes) fmt::print("note        {}\n", note);
 }

@@ -19,13 +19,14 @@ namespace abbe::daemon {
 /// What a candidate must do better than.
 struct ModelToBeat {
   const calib::VolumetricModel* model = nullptr;
-  std::string left_out;  ///< why the active model is not asked; empty: there is none, or it is asked
+  std::string
+      left_out;  ///< why the active model is not asked; empty: there is none, or it is asked
 
   void say(calib::Verdict& verdict) const;  ///< adds `left_out` to its notes
 };
 
-/// The active model if it was made for the machine of `config`: another configuration's is STALE there, and
-/// must not lock out the one that replaces it.
+/// The active model if it was made for the machine of `config`: another configuration's is STALE
+/// there, and must not lock out the one that replaces it.
 [[nodiscard]] ModelToBeat to_beat(const std::optional<ModelDocument>& active, const Config& config);
 
 /// Adds the model to the store, by whom and by `command`; nothing if `store` is empty.
@@ -33,7 +34,8 @@ struct ModelToBeat {
                                 const calib::Verdict& verdict, const std::string& command);
 
 /// model.json and `more` (file name to text) into the folder, which is created if needed. Error Io.
-[[nodiscard]] Result<void> write_results(const std::filesystem::path& folder, const ModelDocument& document,
+[[nodiscard]] Result<void> write_results(const std::filesystem::path& folder,
+                                         const ModelDocument& document,
                                          const std::map<std::string, std::string>& more);
 
 /// Whether it is accepted, why not, and what else to know.

@@ -1,5 +1,5 @@
-/// `abbe identify artefact`: the calibrator file of a ball array, from touches of one position on a good
-/// machine.
+/// `abbe identify artefact`: the calibrator file of a ball array, from touches of one position on a
+/// good machine.
 
 #include <fmt/format.h>
 
@@ -34,26 +34,30 @@ struct Precalibrated {
 Result<Precalibrated> precalibrate(const IdentifyArtefactArguments& arguments) {
   const auto outward_1 = parse_mm("--outward-1", arguments.outward_1),
              outward_2 = parse_mm("--outward-2", arguments.outward_2);
-  if (!outward_1 || !outward_2) return tl::make_unexpected((outward_1 ? outward_2 : outward_1).error());
+  if (!outward_1 || !outward_2)
+    return tl::make_unexpected((outward_1 ? outward_2 : outward_1).error());
   const auto touches = read_touches_csv(arguments.touches);
   if (!touches) return tl::make_unexpected(touches.error());
   for (const auto& touch : touches->touches)
     if (touch.position != touches->touches.front().position)
-      return fail(ErrorCode::BadInput,
-                  fmt::format("{}: positions {} and {}: an artefact is calibrated in one", arguments.touches,
-                              touches->touches.front().position, touch.position));
+      return fail(
+          ErrorCode::BadInput,
+          fmt::format("{}: positions {} and {}: an artefact is calibrated in one",
+                      arguments.touches, touches->touches.front().position, touch.position));
   std::optional<double> u_touch_m;
   if (arguments.u_touch_um) u_touch_m = *arguments.u_touch_um / kUmPerM;
-  auto calibrator =
-      calib::evemu::precalibrated(arguments.name, touches->touches, arguments.tip_radius_mm / kMmPerM,
-                                  {*outward_1, *outward_2}, u_touch_m);
+  auto calibrator = calib::evemu::precalibrated(arguments.name, touches->touches,
+                                                arguments.tip_radius_mm / kMmPerM,
+                                                {*outward_1, *outward_2}, u_touch_m);
   if (!calibrator) return tl::make_unexpected(error_of(calibrator.error()));
   if (arguments.machine_tip_radius_mm >= 0.0)
     calibrator->tip_radius_m = arguments.machine_tip_radius_mm / kMmPerM;
+
   return Precalibrated{std::move(*calibrator), touches->source, touches->touches.size()};
 }
 
-/// Whoever calibrates with the file is to see where it came from, and what its uncertainties leave out.
+/// Whoever calibrates with the file is to see where it came from, and what its uncertainties leave
+/// out.
 std::string head_of(const Precalibrated& found) {
   return fmt::format(
       "# from {} touches of one position: {}, SHA-256 {}\n"
@@ -65,7 +69,8 @@ int run(const IdentifyArtefactArguments& arguments) {
   const auto found = precalibrate(arguments);
   if (!found) return report(found.error());
   const auto& calibrator = found->calibrator;
-  if (const auto written = replace_file(arguments.out, calibrator_toml(calibrator, {}, head_of(*found)));
+  if (const auto written =
+          replace_file(arguments.out, calibrator_toml(calibrator, {}, head_of(*found)));
       !written)
     return report(written.error());
   for (const auto& ball : calibrator.balls)
@@ -74,6 +79,7 @@ int run(const IdentifyArtefactArguments& arguments) {
   for (const auto& block : calibrator.blocks)
     fmt::print("block {} u = {:.1f} urad\n", block.number, kUmPerM * block.u_rad);
   fmt::print("written {}\n", arguments.out);
+
   return 0;
 }
 
@@ -82,25 +88,33 @@ int run(const IdentifyArtefactArguments& arguments) {
 void add_identify_artefact(CLI::App& parent, int& exit) {
   auto arguments = std::make_shared<IdentifyArtefactArguments>();
   auto* command = parent.add_subcommand(
-      "artefact", "The calibrator file of a ball array from touches of one position on a good machine");
-  command->add_option("--touches", arguments->touches, "touches.csv: position,kind,index,x_mm,y_mm,z_mm")
+      "artefact",
+      "The calibrator file of a ball array from touches of one position on a good machine");
+  command
+      ->add_option("--touches", arguments->touches,
+                   "touches.csv: position,kind,index,x_mm,y_mm,z_mm")
       ->required();
   command->add_option("--name", arguments->name, "of the artefact")->required();
   command->add_option("--tip-radius-mm", arguments->tip_radius_mm, "of these touches")
       ->check(CLI::NonNegativeNumber)
       ->required();
   command
-      ->add_option("--machine-tip-radius-mm", arguments->machine_tip_radius_mm,
-                   "of the probe that will touch it on the machine to be calibrated; default: the same")
+      ->add_option(
+          "--machine-tip-radius-mm", arguments->machine_tip_radius_mm,
+          "of the probe that will touch it on the machine to be calibrated; default: the same")
       ->check(CLI::NonNegativeNumber);
   command
-      ->add_option("--u-touch-um", arguments->u_touch_um,
-                   "standard uncertainty of a touch, for balls of 4 touches and blocks of 3; more of them "
-                   "show it themselves")
+      ->add_option(
+          "--u-touch-um", arguments->u_touch_um,
+          "standard uncertainty of a touch, for balls of 4 touches and blocks of 3; more of them "
+          "show it themselves")
       ->check(CLI::PositiveNumber);
-  command->add_option("--outward-1", arguments->outward_1, "x,y,z: roughly where the face of block 1 looks")
+  command
+      ->add_option("--outward-1", arguments->outward_1,
+                   "x,y,z: roughly where the face of block 1 looks")
       ->capture_default_str();
-  command->add_option("--outward-2", arguments->outward_2, "the same for block 2")->capture_default_str();
+  command->add_option("--outward-2", arguments->outward_2, "the same for block 2")
+      ->capture_default_str();
   command->add_option("-o,--out", arguments->out, "calibrator.toml")->required();
   command->callback([arguments, &exit] { exit = run(*arguments); });
 }

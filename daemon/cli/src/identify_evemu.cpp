@@ -52,7 +52,8 @@ struct Input {
   std::vector<InputFile> sources;
   evemu::Observations observations;
   std::optional<RotationPoints> reference;
-  std::function<void(calib::Verdict&)> judge_source = [](calib::Verdict&) {};  ///< a damaged recording
+  std::function<void(calib::Verdict&)> judge_source = [](calib::Verdict&) {
+  };  ///< a damaged recording
   std::string recording_gap{};
 };
 
@@ -66,32 +67,37 @@ struct Outcome {
 };
 
 /// Without an option, what [evemu] says; a sensor's values are in no file.
-std::optional<evemu::ArtefactTemperature> artefact_temperature(const IdentifyEvemuArguments& arguments,
-                                                               const EvemuConfig& config) {
+std::optional<evemu::ArtefactTemperature> artefact_temperature(
+    const IdentifyEvemuArguments& arguments, const EvemuConfig& config) {
   if (arguments.artefact_C)
-    return evemu::ArtefactTemperature{*arguments.artefact_C + kZeroCelsius_K, arguments.u_artefact_K};
+    return evemu::ArtefactTemperature{*arguments.artefact_C + kZeroCelsius_K,
+                                      arguments.u_artefact_K};
   if (config.artefact && !config.artefact->sensor)
     return evemu::ArtefactTemperature{config.artefact->fixed_K, config.artefact->u_temperature_K};
   return std::nullopt;
 }
 
-/// The sensor of the configuration, where it said nothing that could be read; empty: it was not asked.
+/// The sensor of the configuration, where it said nothing that could be read; empty: it was not
+/// asked.
 std::string silent_sensor(const IdentifyEvemuArguments& arguments, const Config& config) {
   const auto& artefact = config.evemu.artefact;
-  if (arguments.touches.empty() || arguments.artefact_C || !artefact || !artefact->sensor) return {};
+  if (arguments.touches.empty() || arguments.artefact_C || !artefact || !artefact->sensor)
+    return {};
   return fmt::format("[evemu] artefact_sensor \"{}\" stands in no file of touches",
                      config.temperatures[*artefact->sensor]);
 }
 
-Result<void> check_artefact(const IdentifyEvemuArguments& arguments, const evemu::Calibrator& calibrator,
-                            bool temperature_known, const std::string& silent) {
+Result<void> check_artefact(const IdentifyEvemuArguments& arguments,
+                            const evemu::Calibrator& calibrator, bool temperature_known,
+                            const std::string& silent) {
   const auto fault = warmth_fault(
       calibrator, arguments.calibrator,
       !temperature_known     ? ""
       : arguments.artefact_C ? "--artefact-C"
                              : "[evemu] artefact_C",
-      fmt::format("{}give --artefact-C and --u-artefact-K (or [evemu] artefact_C and u_artefact_K in {})",
-                  silent.empty() ? "" : silent + "; ", arguments.machine));
+      fmt::format(
+          "{}give --artefact-C and --u-artefact-K (or [evemu] artefact_C and u_artefact_K in {})",
+          silent.empty() ? "" : silent + "; ", arguments.machine));
   return fault.empty() ? Result<void>{} : fail(ErrorCode::BadInput, fault);
 }
 
@@ -117,7 +123,8 @@ Result<void> observe_touches(const IdentifyEvemuArguments& arguments, const evem
                              const evemu::ObserveOptions& options, Input& input) {
   const auto calibrator = read_calibrator_toml(arguments.calibrator);
   if (!calibrator) return tl::make_unexpected(calibrator.error());
-  if (auto fine = check_artefact(arguments, calibrator->calibrator, options.artefact_temperature.has_value(),
+  if (auto fine = check_artefact(arguments, calibrator->calibrator,
+                                 options.artefact_temperature.has_value(),
                                  silent_sensor(arguments, input.config));
       !fine)
     return fine;
@@ -133,6 +140,7 @@ Result<void> observe_touches(const IdentifyEvemuArguments& arguments, const evem
     return in_file(arguments.touches + line_not_seen(*touches, calibrator->calibrator, options),
                    observed.error());
   input.observations = std::move(*observed);
+
   return {};
 }
 
@@ -140,8 +148,8 @@ Result<void> observe_errors(const IdentifyEvemuArguments& arguments, const evemu
                             const evemu::ObserveOptions& options, Input& input) {
   const auto errors = read_errors_csv(arguments.errors);
   if (!errors) return tl::make_unexpected(errors.error());
-  if (auto inside =
-          check_travel(arguments.errors, positions_of(errors->errors), errors->lines, input.config.machine);
+  if (auto inside = check_travel(arguments.errors, positions_of(errors->errors), errors->lines,
+                                 input.config.machine);
       !inside)
     return inside;
   input.sources.push_back(errors->source);
@@ -150,11 +158,12 @@ Result<void> observe_errors(const IdentifyEvemuArguments& arguments, const evemu
   auto observed = evemu::observe_errors(errors->errors, machine, rotation, options);
   if (!observed) return in_file(arguments.errors, observed.error());
   input.observations = std::move(*observed);
+
   return {};
 }
 
-evemu::ObserveOptions observe_options(const IdentifyEvemuArguments& arguments, const EvemuConfig& config,
-                                      std::size_t positions) {
+evemu::ObserveOptions observe_options(const IdentifyEvemuArguments& arguments,
+                                      const EvemuConfig& config, std::size_t positions) {
   evemu::ObserveOptions options;
   options.order = arguments.order.value_or(config.order);
   options.positions = arguments.positions.value_or(static_cast<int>(positions));
@@ -169,7 +178,8 @@ Result<Input> from_files(const IdentifyEvemuArguments& arguments) {
   Input input;
   input.sources.push_back({std::filesystem::path(arguments.machine).filename().string(), *hash});
   const auto* what = arguments.touches.empty() ? "errors" : "touches";
-  if (const auto fine = check_scales("identify evemu", what, *config, arguments.scales_corrected); !fine)
+  if (const auto fine = check_scales("identify evemu", what, *config, arguments.scales_corrected);
+      !fine)
     return tl::make_unexpected(fine.error());
   if (const auto given = require_target(config->machine); !given)
     return fail(given.error().code, fmt::format("{}: {}", arguments.machine, given.error().text));
@@ -181,6 +191,7 @@ Result<Input> from_files(const IdentifyEvemuArguments& arguments) {
   const auto observe = arguments.touches.empty() ? observe_errors : observe_touches;
   if (const auto observed = observe(arguments, *machine, options, input); !observed)
     return tl::make_unexpected(observed.error());
+
   return input;
 }
 
@@ -200,9 +211,10 @@ Result<EvemuRun> last_complete_run(const OpenedRecording& recording) {
   std::string why = "none was asked for";
   for (const auto& c : replayed->calibrations)
     if (c.ended.method == "evemu") why = c.ended.reason;
-  return fail(
-      ErrorCode::DataInsufficient,
-      fmt::format("{}: holds no complete calibration with a ball array: {}", recording.source.name, why));
+
+  return fail(ErrorCode::DataInsufficient,
+              fmt::format("{}: holds no complete calibration with a ball array: {}",
+                          recording.source.name, why));
 }
 
 Result<Input> from_recording(const IdentifyEvemuArguments& arguments) {
@@ -214,16 +226,21 @@ Result<Input> from_recording(const IdentifyEvemuArguments& arguments) {
   if (!machine) return tl::make_unexpected(machine.error());
   const auto run = last_complete_run(*recording);
   if (!run) return tl::make_unexpected(run.error());
-  auto options = observe_options(arguments, recording->config.evemu, run->asked.plan.positions.size());
+  auto options =
+      observe_options(arguments, recording->config.evemu, run->asked.plan.positions.size());
   options.artefact_temperature = run->artefact;
   auto observed = evemu::observe(run->touches, run->asked.calibrator, *machine, options);
   if (!observed) return tl::make_unexpected(error_of(observed.error()));
-  Input input{std::move(recording->config), {recording->source}, std::move(*observed), run->asked.reference};
+  Input input{std::move(recording->config),
+              {recording->source},
+              std::move(*observed),
+              run->asked.reference};
   const auto entered = inputs_of(*run);
   input.sources.insert(input.sources.end(), entered.begin(), entered.end());
   input.recording_gap = recording->reader.damage();
   input.judge_source = [reader = std::make_shared<RecordingReader>(std::move(recording->reader))](
                            calib::Verdict& verdict) { judge_recording(*reader, verdict); };
+
   return input;
 }
 
@@ -240,8 +257,10 @@ Result<void> read_reference(const IdentifyEvemuArguments& arguments, Input& inpu
   return {};
 }
 
-/// A word, or a file with one fold number for each of the 3 rows of every ball, by position and ball.
-Result<evemu::SparseOptions> sparse_options(const std::string& given, std::vector<InputFile>& sources) {
+/// A word, or a file with one fold number for each of the 3 rows of every ball, by position and
+/// ball.
+Result<evemu::SparseOptions> sparse_options(const std::string& given,
+                                            std::vector<InputFile>& sources) {
   evemu::SparseOptions options;
   if (const auto by = evemu::folds_by(given)) {
     options.folds = *by;
@@ -275,11 +294,12 @@ Result<Outcome> identify(const IdentifyEvemuArguments& arguments) {
   if (!input) return tl::make_unexpected(input.error());
   const auto judging = judge_options(arguments, *input);
   if (!judging) return tl::make_unexpected(judging.error());
-  if (const auto read = read_reference(arguments, *input); !read) return tl::make_unexpected(read.error());
+  if (const auto read = read_reference(arguments, *input); !read)
+    return tl::make_unexpected(read.error());
   auto solution = evemu::solve(input->observations, judging->solve);
   if (solution && input->reference)
-    solution = evemu::with_rotation_reference(std::move(*solution),
-                                              {input->reference->points, input->reference->sigma_m});
+    solution = evemu::with_rotation_reference(
+        std::move(*solution), {input->reference->points, input->reference->sigma_m});
   if (!solution) return tl::make_unexpected(error_of(solution.error()));
   const auto other = to_beat(*active, input->config);
   auto verdict = evemu::judge(input->observations, *solution, other.model, *judging);
@@ -289,8 +309,10 @@ Result<Outcome> identify(const IdentifyEvemuArguments& arguments) {
   if (const auto silent = silent_sensor(arguments, input->config); !silent.empty())
     verdict->notes.push_back(
         fmt::format("how warm the array was is not known: {}; --artefact-C says it", silent));
-  return Outcome{std::move(input->config), std::move(input->sources), std::move(input->observations),
-                 std::move(*solution),     std::move(*verdict),       std::move(input->recording_gap)};
+
+  return Outcome{
+      std::move(input->config), std::move(input->sources), std::move(input->observations),
+      std::move(*solution),     std::move(*verdict),       std::move(input->recording_gap)};
 }
 
 /// The surface lambda and gamma were chosen from; cells no path reached are left out.
@@ -302,7 +324,8 @@ std::string to_surface_csv(const evemu::SparseChoice& choice) {
       const double error =
           choice.error_mm2(static_cast<Eigen::Index>(l), static_cast<Eigen::Index>(g)) * kUm2PerMm2;
       if (std::isfinite(error))
-        text += fmt::format("{:.17g},{:.17g},{:.17g}\n", choice.all_gamma[g], choice.all_lambda[l], error);
+        text += fmt::format("{:.17g},{:.17g},{:.17g}\n", choice.all_gamma[g], choice.all_lambda[l],
+                            error);
     }
   return text;
 }
@@ -311,8 +334,10 @@ Result<void> write_outputs(const std::filesystem::path& folder, const ModelDocum
                            const Outcome& outcome) {
   std::map<std::string, std::string> files{
       {"coefficients.csv", to_coefficients_csv(*document.model.polynomials())},
-      {"report.html", evemu_report(document, outcome.observations, *outcome.solution, outcome.verdict)}};
-  if (const auto& choice = outcome.solution->sparse) files["cross_validation.csv"] = to_surface_csv(*choice);
+      {"report.html",
+       evemu_report(document, outcome.observations, *outcome.solution, outcome.verdict)}};
+  if (const auto& choice = outcome.solution->sparse)
+    files["cross_validation.csv"] = to_surface_csv(*choice);
   return write_results(folder, document, files);
 }
 
@@ -327,8 +352,8 @@ nlohmann::json artefact_json(const evemu::ArtefactUncertainty& artefact) {
   if (const auto& e = artefact.expansion)
     object.update({{"temperature_C", e->temperature_K - kZeroCelsius_K},
                    {"u_temperature_K", e->u_temperature_K},
-                   {"growth", calib::growth(*e)},
-                   {"u_growth", calib::u_growth(*e)}});
+                   {"growth", calib::expansion_factor(*e)},
+                   {"u_growth", calib::u_expansion_factor(*e)}});
   return object;
 }
 
@@ -336,11 +361,13 @@ std::string artefact_text(const evemu::ArtefactUncertainty& artefact) {
   const auto& e = artefact.expansion;
   return e ? fmt::format(", at {:.3f} C (u = {:.3f} K) longer by {:.2f} um per metre (u = {:.2f})",
                          e->temperature_K - kZeroCelsius_K, e->u_temperature_K,
-                         kUmPerM * (calib::growth(*e) - 1.0), kUmPerM * calib::u_growth(*e))
+                         kUmPerM * (calib::expansion_factor(*e) - 1.0),
+                         kUmPerM * calib::u_expansion_factor(*e))
            : ", its temperature not known: counts as at 20 C";
 }
 
-void print_json(const Outcome& outcome, const ModelDocument& document, const std::filesystem::path& folder) {
+void print_json(const Outcome& outcome, const ModelDocument& document,
+                const std::filesystem::path& folder) {
   const auto& s = outcome.solution->statistics;
   const auto& held_out = outcome.verdict.held_out;
   nlohmann::json object{{"model", (folder / "model.json").string()},
@@ -364,7 +391,9 @@ void print_json(const Outcome& outcome, const ModelDocument& document, const std
                         {"held_out_rms_before_um", held_out.no_compensation_rms_m * kUmPerM},
                         {"held_out_rms_after_um", held_out.candidate_rms_m * kUmPerM},
                         {"gate", verdict_json(outcome.verdict)}};
-  if (const auto& artefact = outcome.solution->artefact) object["artefact"] = artefact_json(*artefact);
+
+  if (const auto& artefact = outcome.solution->artefact)
+    object["artefact"] = artefact_json(*artefact);
   if (const auto& choice = outcome.solution->sparse)
     object["chosen"] = {{"lambda", choice->lambda.back()}, {"gamma", choice->gamma}};
   fmt::print("{}\n", object.dump(1));
@@ -373,23 +402,26 @@ void print_json(const Outcome& outcome, const ModelDocument& document, const std
 void print_summary(const Outcome& outcome, const ModelDocument& document,
                    const std::filesystem::path& folder) {
   const auto& s = outcome.solution->statistics;
-  fmt::print("model       {}  ({} coefficients, tool and machine \"{}\")\n", model_id(document), s.unknowns,
-             document.machine);
+  fmt::print("model       {}  ({} coefficients, tool and machine \"{}\")\n", model_id(document),
+             s.unknowns, document.machine);
   fmt::print("artefact    {} positions, {} ball centres{}\n", s.positions, s.balls,
              outcome.solution->artefact ? artefact_text(*outcome.solution->artefact) : "");
   fmt::print(
-      "solution    {}: {} observations, rank {} of {}, condition {:.3g}, {:.1f} effective parameters\n",
+      "solution    {}: {} observations, rank {} of {}, condition {:.3g}, {:.1f} effective "
+      "parameters\n",
       document.estimator, s.observations, s.rank, s.unknowns, s.condition, s.effective_parameters);
-  fmt::print("noise       {:.2f} um per ball coordinate, {:.1f} urad per position\n", s.s_m * kUmPerM,
-             s.w_rad * kUradPerRad);
+  fmt::print("noise       {:.2f} um per ball coordinate, {:.1f} urad per position\n",
+             s.s_m * kUmPerM, s.w_rad * kUradPerRad);
+
   if (const auto& choice = outcome.solution->sparse)
     fmt::print("chosen      lambda {:.3g}, gamma {:.3g}{}\n", choice->lambda.back(), choice->gamma,
                choice->curvature < 0.0 ? "; not convex there: other solutions may be near" : "");
   fmt::print("residuals   {:.3f} um rms before, {:.3f} um after\n", s.before.rms_m * kUmPerM,
              s.after.rms_m * kUmPerM);
-  fmt::print("rotation    {}, u = {:.1f} urad about Ball1\n",
-             outcome.solution->rotation.referenced ? "referenced" : "that of the blocks: shape only",
-             u_rotation_urad(*outcome.solution));
+  fmt::print(
+      "rotation    {}, u = {:.1f} urad about Ball1\n",
+      outcome.solution->rotation.referenced ? "referenced" : "that of the blocks: shape only",
+      u_rotation_urad(*outcome.solution));
   print_verdict(outcome.verdict);
   fmt::print("written     {}, coefficients.csv, report.html\n", (folder / "model.json").string());
 }
@@ -397,30 +429,35 @@ void print_summary(const Outcome& outcome, const ModelDocument& document,
 int run(const IdentifyEvemuArguments& arguments) {
   const auto outcome = identify(arguments);
   if (!outcome) return report(outcome.error());
-  const auto now = std::chrono::time_point_cast<std::chrono::nanoseconds>(std::chrono::system_clock::now());
+  const auto now =
+      std::chrono::time_point_cast<std::chrono::nanoseconds>(std::chrono::system_clock::now());
   auto document = evemu_document(*outcome->solution, outcome->config, outcome->sources, now);
   document.recording_gap = outcome->recording_gap;
   if (const auto written = write_outputs(arguments.out, document, *outcome); !written)
     return report(written.error());
-  if (const auto kept = keep(arguments.keep, document, outcome->verdict, "abbe identify evemu"); !kept)
+  if (const auto kept = keep(arguments.keep, document, outcome->verdict, "abbe identify evemu");
+      !kept)
     return report(kept.error());
   arguments.json ? print_json(*outcome, document, arguments.out)
                  : print_summary(*outcome, document, arguments.out);
+
   return exit_code(outcome->verdict);
 }
 
 void add_options(CLI::App& command, IdentifyEvemuArguments& arguments) {
-  auto* machine =
-      command.add_option("--machine", arguments.machine, "machine.toml, or the daemon's abbed.toml");
-  auto* touches = command.add_option("--touches", arguments.touches,
-                                     "touches.csv: position,kind,index,x_mm,y_mm,z_mm; kind ball or block");
+  auto* machine = command.add_option("--machine", arguments.machine,
+                                     "machine.toml, or the daemon's abbed.toml");
+  auto* touches =
+      command.add_option("--touches", arguments.touches,
+                         "touches.csv: position,kind,index,x_mm,y_mm,z_mm; kind ball or block");
   auto* calibrator = command.add_option("--calibrator", arguments.calibrator, "calibrator.toml");
-  auto* errors = command.add_option("--errors", arguments.errors,
-                                    "errors.csv instead: position,ball,x_mm,y_mm,z_mm,ex_um,ey_um,ez_um");
-  auto* recording = command.add_option(
-      "--recording", arguments.recording,
-      "what the daemon recorded (.mcap) instead: its last complete run with a ball array, with the\n"
-      "recorded configuration unless --machine is given");
+  auto* errors =
+      command.add_option("--errors", arguments.errors,
+                         "errors.csv instead: position,ball,x_mm,y_mm,z_mm,ex_um,ey_um,ez_um");
+  auto* recording = command.add_option("--recording", arguments.recording,
+                                       "what the daemon recorded (.mcap) instead: its last "
+                                       "complete run with a ball array, with the\n"
+                                       "recorded configuration unless --machine is given");
   touches->needs(machine, calibrator);
   calibrator->needs(touches);
   auto* artefact_C =
@@ -448,40 +485,47 @@ void add_options(CLI::App& command, IdentifyEvemuArguments& arguments) {
   command.add_option("--order", arguments.order, "of the polynomials; default: that of [evemu]: 3")
       ->check(CLI::Range(evemu::kLeastOrder, evemu::kMostOrder));
   command
-      .add_option("--positions", arguments.positions,
-                  "positions of the artefact that must be there; default: those that were asked for: 8")
+      .add_option(
+          "--positions", arguments.positions,
+          "positions of the artefact that must be there; default: those that were asked for: 8")
       ->check(CLI::Range(2, 1000));
   command
       .add_flag("--rotation-known", arguments.rotation_known,
                 "the errors' directions do not come from the artefact's blocks")
       ->needs(errors);
-  command.add_option("--rotation-reference", arguments.reference,
-                     "errors.csv of points where V is known independently: turns the model onto them");
+  command.add_option(
+      "--rotation-reference", arguments.reference,
+      "errors.csv of points where V is known independently: turns the model onto them");
   command
-      .add_option("--u-reference-um", arguments.u_reference_um, "standard uncertainty of the reference's V")
+      .add_option("--u-reference-um", arguments.u_reference_um,
+                  "standard uncertainty of the reference's V")
       ->check(CLI::PositiveNumber)
       ->capture_default_str();
-  command.add_flag("--accept-shape-only", arguments.accept_shape_only,
-                   "judge the model although its rotation about Ball1 is unknown; as [gate] accept =\n"
-                   "[\"evemu-shape-only\"]");
+  command.add_flag(
+      "--accept-shape-only", arguments.accept_shape_only,
+      "judge the model although its rotation about Ball1 is unknown; as [gate] accept =\n"
+      "[\"evemu-shape-only\"]");
   command.add_option("--keep", arguments.keep,
                      "also keep the model in this store, judged against the model active there");
   command.add_flag("--json", arguments.json, "the summary as one JSON object");
-  command.add_option("-o,--out", arguments.out, "folder for the results; created if needed")->required();
+  command.add_option("-o,--out", arguments.out, "folder for the results; created if needed")
+      ->required();
 }
 
 }  // namespace
 
 void add_identify_evemu(CLI::App& parent, int& exit) {
   auto arguments = std::make_shared<IdentifyEvemuArguments>();
-  auto* command = parent.add_subcommand("evemu",
-                                        "From a ball array touched at several positions.\n"
-                                        "Writes model.json, coefficients.csv and report.html to OUT and says "
-                                        "how well the model predicts positions it was "
-                                        "not fitted to.\n"
-                                        "Exit code 5 if the gate would refuse it; everything is written all "
-                                        "the same.");
+  auto* command =
+      parent.add_subcommand("evemu",
+                            "From a ball array touched at several positions.\n"
+                            "Writes model.json, coefficients.csv and report.html to OUT and says "
+                            "how well the model predicts positions it was "
+                            "not fitted to.\n"
+                            "Exit code 5 if the gate would refuse it; everything is written all "
+                            "the same.");
   add_options(*command, *arguments);
+
   command->callback([arguments, &exit] {
     exit = arguments->touches.empty() && arguments->errors.empty() && arguments->recording.empty()
                ? report({ErrorCode::Usage,

@@ -67,19 +67,23 @@ Result<Files> read_files(const IdentifyOtfArguments& arguments, ProgressBar& bar
   if (!hash) return tl::make_unexpected(hash.error());
   auto path = read_path_csv(arguments.path);
   if (!path) return tl::make_unexpected(path.error());
-  auto tracker = read_tracker_csv(arguments.tracker,
-                                  [&](double fraction) { bar.show("reading the tracker", fraction); });
+  auto tracker = read_tracker_csv(
+      arguments.tracker, [&](double fraction) { bar.show("reading the tracker", fraction); });
   if (!tracker) return tl::make_unexpected(tracker.error());
   std::vector<InputFile> sources{
-      {std::filesystem::path(arguments.machine).filename().string(), *hash}, path->source, tracker->source};
+      {std::filesystem::path(arguments.machine).filename().string(), *hash},
+      path->source,
+      tracker->source};
   std::optional<EncoderFile> encoder;
+
   if (!arguments.encoder.empty()) {
-    auto read = read_encoder_csv(arguments.encoder,
-                                 [&](double fraction) { bar.show("reading the scales", fraction); });
+    auto read = read_encoder_csv(
+        arguments.encoder, [&](double fraction) { bar.show("reading the scales", fraction); });
     if (!read) return tl::make_unexpected(read.error());
     sources.push_back(read->source);
     encoder = std::move(*read);
   }
+
   return Files{std::move(*config), std::move(*path), std::move(*tracker), std::move(encoder),
                std::move(sources)};
 }
@@ -102,12 +106,16 @@ protocol::UtcTime now() {
   return std::chrono::time_point_cast<std::chrono::nanoseconds>(std::chrono::system_clock::now());
 }
 
-OtfOutcome outcome_of(OtfCandidate candidate, const Config& config, std::vector<InputFile> sources) {
+OtfOutcome outcome_of(OtfCandidate candidate, const Config& config,
+                      std::vector<InputFile> sources) {
   auto document = otf_document(candidate.solution, config, std::move(sources), now());
   const auto& s = candidate.solution.statistics;
-  return {
-      std::move(document), std::move(candidate.solution.residuals), std::move(candidate.verdict), s.blocks,
-      s.blocks_used,       candidate.solution.range_offset};
+  return {std::move(document),
+          std::move(candidate.solution.residuals),
+          std::move(candidate.verdict),
+          s.blocks,
+          s.blocks_used,
+          candidate.solution.range_offset};
 }
 
 double u_scale(const IdentifyOtfArguments& arguments, const Config& config) {
@@ -115,17 +123,20 @@ double u_scale(const IdentifyOtfArguments& arguments, const Config& config) {
   return config.tracker ? config.tracker->u_scale : 0.0;
 }
 
-/// As a session of the daemon does before the machine drives; outside the travel with line and column.
-Result<void> check_path(const std::string& file, const PathFile& path, const MachineConfig& machine) {
-  if (auto inside = check_travel(file, otf_path(path.vertices_m).vertices_m, path.lines, machine); !inside)
+/// As a session of the daemon does before the machine drives; outside the travel with line and
+/// column.
+Result<void> check_path(const std::string& file, const PathFile& path,
+                        const MachineConfig& machine) {
+  if (auto inside = check_travel(file, otf_path(path.vertices_m).vertices_m, path.lines, machine);
+      !inside)
     return inside;
   auto fine = check_otf_path(path.vertices_m, machine);
   if (!fine) fine.error().text = fmt::format("{}: {}", file, fine.error().text);
   return fine;
 }
 
-/// At how many vertices the scales were compared with the path where the machine stood; of a run without
-/// readings none. What contradicts the path is an error.
+/// At how many vertices the scales were compared with the path where the machine stood; of a run
+/// without readings none. What contradicts the path is an error.
 Result<std::size_t> vertices_compared(const IdentifyOtfArguments& arguments, const Files& files) {
   if (!files.encoder) return 0;
   return compare_with_path(arguments.encoder, files.encoder->rows, files.path.vertices_m,
@@ -136,7 +147,8 @@ Result<OtfOutcome> from_files(const IdentifyOtfArguments& arguments,
                               const std::optional<ModelDocument>& active, ProgressBar& bar) {
   auto files = read_files(arguments, bar);
   if (!files) return tl::make_unexpected(files.error());
-  if (const auto fine = check_scales("identify otf", "a path", files->config, arguments.scales_corrected);
+  if (const auto fine =
+          check_scales("identify otf", "a path", files->config, arguments.scales_corrected);
       !fine)
     return tl::make_unexpected(fine.error());
   if (const auto fine = check_path(arguments.path, files->path, files->config.machine); !fine)
@@ -145,25 +157,28 @@ Result<OtfOutcome> from_files(const IdentifyOtfArguments& arguments,
   if (!stood) return tl::make_unexpected(stood.error());
   const auto machine = otf_machine(files->config.machine);
   if (!machine) return tl::make_unexpected(machine.error());
-  otf::Options options = otf_options(files->tracker.points, files->config.machine, files->config.gate);
+  otf::Options options =
+      otf_options(files->tracker.points, files->config.machine, files->config.gate);
   if (arguments.accept_path_orientation) options.orientation.accepted = true;
   if (files->encoder) options.orientation.scales_agree = true;
   if (arguments.block_samples > 0) options.block_samples = arguments.block_samples;
   options.progress = [&](otf::Stage stage, double fraction) { bar.show(words(stage), fraction); };
   otf::Noise noise = otf_noise(files->config.machine);
   noise.u_scale = u_scale(arguments, files->config);
-  auto found =
-      otf::identify(files->tracker.points, *machine, otf_path(files->path.vertices_m), noise, options);
+  auto found = otf::identify(files->tracker.points, *machine, otf_path(files->path.vertices_m),
+                             noise, options);
   if (!found) return tl::make_unexpected(error_of(found.error()));
   const auto other = to_beat(active, files->config);
-  auto verdict =
-      otf::judge(found->observations, found->solution, other.model, gate_limits(files->config.gate), options);
+  auto verdict = otf::judge(found->observations, found->solution, other.model,
+                            gate_limits(files->config.gate), options);
   if (!verdict) return tl::make_unexpected(error_of(verdict.error()));
   other.say(*verdict);
   if (files->encoder && *stood == 0)
     verdict->notes.emplace_back(
         "the scales were compared with the path to 2 mm only: the machine stands at no vertex");
-  if (auto air = unmeasured_air_text(files->config, noise.u_scale)) verdict->notes.push_back(*std::move(air));
+  if (auto air = unmeasured_air_text(files->config, noise.u_scale))
+    verdict->notes.push_back(*std::move(air));
+
   return outcome_of({std::move(found->solution), std::move(*verdict)}, files->config,
                     std::move(files->sources));
 }
@@ -178,7 +193,8 @@ Result<OtfCandidate> last_complete_run(ReplayReport replayed, const std::string&
     }
     if (why.empty()) why = c->outcome ? c->outcome->error().text : c->ended.reason;
   }
-  return fail(ErrorCode::DataInsufficient, fmt::format("{}: holds no complete calibration: {}", file, why));
+  return fail(ErrorCode::DataInsufficient,
+              fmt::format("{}: holds no complete calibration: {}", file, why));
 }
 
 Result<OtfOutcome> from_recording(const IdentifyOtfArguments& arguments,
@@ -188,15 +204,16 @@ Result<OtfOutcome> from_recording(const IdentifyOtfArguments& arguments,
   if (const auto given = require_target(recording->config.machine); !given)
     return tl::make_unexpected(given.error());
   const auto other = to_beat(active, recording->config);
-  auto replayed =
-      replay(recording->reader, recording->config,
-             {.active = other.model, .progress = [&bar](double share) { bar.show("replaying", share); }});
+  auto replayed = replay(
+      recording->reader, recording->config,
+      {.active = other.model, .progress = [&bar](double share) { bar.show("replaying", share); }});
   if (!replayed) return tl::make_unexpected(replayed.error());
   auto candidate = last_complete_run(std::move(*replayed), arguments.recording);
   if (!candidate) return tl::make_unexpected(candidate.error());
   other.say(candidate->verdict);
   auto outcome = outcome_of(std::move(*candidate), recording->config, {recording->source});
   outcome.document.recording_gap = recording->reader.damage();
+
   return outcome;
 }
 
@@ -222,7 +239,7 @@ void print_json(const OtfOutcome& outcome, const std::filesystem::path& folder) 
       {"rank", s.rank},
       {"condition", s.condition},
       {"sigma0", s.sigma0},
-      {"covariance_factor", s.covariance_factor},
+      {"covariance_factor", s.variance_factor},
       {"range_offset_um", outcome.range_offset.value_m * kUmPerM},
       {"u_range_offset_um", outcome.range_offset.u_m * kUmPerM},
       {"residual_rms_before_um", s.before.rms_m * kUmPerM},
@@ -243,6 +260,7 @@ void print_summary(const OtfOutcome& outcome, const std::filesystem::path& folde
              s.observations, s.unknowns, s.rank, s.condition, s.sigma0);
   fmt::print("residuals   {:.3f} um rms before, {:.3f} um after\n", s.before.rms_m * kUmPerM,
              s.after.rms_m * kUmPerM);
+
   if (outcome.range_offset.u_m > 0.0)
     fmt::print("ranges      offset {:.3f} um, standard uncertainty {:.3f} um\n",
                outcome.range_offset.value_m * kUmPerM, outcome.range_offset.u_m * kUmPerM);
@@ -262,8 +280,11 @@ int run(const IdentifyOtfArguments& arguments) {
   const auto outcome = identify(arguments, bar);
   bar.clear();
   if (!outcome) return report(outcome.error());
-  if (const auto written = write_outputs(arguments.out, *outcome); !written) return report(written.error());
-  if (const auto kept = keep(arguments.keep, outcome->document, outcome->verdict, "abbe identify otf"); !kept)
+  if (const auto written = write_outputs(arguments.out, *outcome); !written)
+    return report(written.error());
+  if (const auto kept =
+          keep(arguments.keep, outcome->document, outcome->verdict, "abbe identify otf");
+      !kept)
     return report(kept.error());
   arguments.json ? print_json(*outcome, arguments.out) : print_summary(*outcome, arguments.out);
   return exit_code(outcome->verdict);
@@ -281,16 +302,18 @@ void add_identify_otf(CLI::App& parent, int& exit) {
       "Exit code 5 if the gate would refuse it, as it does where the recording is damaged inside; "
       "everything\n"
       "is written all the same.");
-  auto* machine =
-      command->add_option("--machine", arguments->machine, "machine.toml, or the daemon's abbed.toml");
+  auto* machine = command->add_option("--machine", arguments->machine,
+                                      "machine.toml, or the daemon's abbed.toml");
   auto* path = command->add_option("--path", arguments->path,
                                    "path.csv: x_mm,y_mm,z_mm, the vertices that were driven");
-  auto* tracker = command->add_option("--tracker", arguments->tracker,
-                                      "tracker.csv: time_s,range_mm,azimuth_rad,elevation_rad[,status]\n"
-                                      "or time_s,x_mm,y_mm,z_mm[,status]");
+  auto* tracker =
+      command->add_option("--tracker", arguments->tracker,
+                          "tracker.csv: time_s,range_mm,azimuth_rad,elevation_rad[,status]\n"
+                          "or time_s,x_mm,y_mm,z_mm[,status]");
   auto* encoder = command->add_option(
       "--encoder", arguments->encoder,
-      "encoder.csv: time_s,x_mm,y_mm,z_mm, what the scales read along the path, any clock; compared with\n"
+      "encoder.csv: time_s,x_mm,y_mm,z_mm, what the scales read along the path, any clock; "
+      "compared with\n"
       "the vertices of the path, to [gate] path_tolerance_mm where the machine stands");
   auto* recording = command->add_option(
       "--recording", arguments->recording,
@@ -303,10 +326,11 @@ void add_identify_otf(CLI::App& parent, int& exit) {
                        "0.2 K and 30 Pa; default: that of [tracker], else 0")
           ->check(CLI::NonNegativeNumber);
   auto* corrected = add_scales_corrected(*command, arguments->scales_corrected);
-  auto* orientation = command->add_flag("--accept-path-orientation", arguments->accept_path_orientation,
-                                        "judge the model although nothing excludes that the path is turned "
-                                        "by 180 degrees (two signs\nreversed); "
-                                        "as [gate] accept = [\"path-orientation\"]");
+  auto* orientation =
+      command->add_flag("--accept-path-orientation", arguments->accept_path_orientation,
+                        "judge the model although nothing excludes that the path is turned "
+                        "by 180 degrees (two signs\nreversed); "
+                        "as [gate] accept = [\"path-orientation\"]");
   recording->excludes(u_scale)->excludes(corrected)->excludes(orientation);
   path->needs(machine, tracker);
   tracker->needs(path);
@@ -324,12 +348,14 @@ void add_identify_otf(CLI::App& parent, int& exit) {
                    "samples per block mean; default: 8.3 mm of travel")
       ->check(CLI::Range(10, 1000));
   command->add_flag("--json", arguments->json, "the summary as one JSON object");
-  command->add_option("-o,--out", arguments->out, "folder for the results; created if needed")->required();
+  command->add_option("-o,--out", arguments->out, "folder for the results; created if needed")
+      ->required();
+
   command->callback([arguments, &exit] {
-    exit =
-        arguments->tracker.empty() && arguments->recording.empty()
-            ? report({ErrorCode::Usage, "identify otf needs --machine, --path and --tracker, or --recording"})
-            : run(*arguments);
+    exit = arguments->tracker.empty() && arguments->recording.empty()
+               ? report({ErrorCode::Usage,
+                         "identify otf needs --machine, --path and --tracker, or --recording"})
+               : run(*arguments);
   });
 }
 

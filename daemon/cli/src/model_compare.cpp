@@ -27,7 +27,8 @@ struct Comparison {
 };
 
 /// The nodes of both models that lie in the validity volume of both.
-std::vector<calib::Vector3> common_points(const calib::VolumetricModel& a, const calib::VolumetricModel& b) {
+std::vector<calib::Vector3> common_points(const calib::VolumetricModel& a,
+                                          const calib::VolumetricModel& b) {
   std::vector<calib::Vector3> points;
   for (const auto* nodes : {&a.layout().nodes(), &b.layout().nodes()}) {
     for (const calib::Vector3& q : calib::tensor_grid(*nodes)) {
@@ -60,6 +61,7 @@ int run(const ModelCompareArguments& arguments) {
   const auto found = compare(arguments);
   if (!found) return report(found.error());
   const auto& d = found->difference;
+
   if (arguments.json) {
     const nlohmann::json object{{"points", found->points},
                                 {"as_stated", vector_figures(d.as_stated)},
@@ -67,10 +69,12 @@ int run(const ModelCompareArguments& arguments) {
     fmt::print("{}\n", object.dump(1));
     return 0;
   }
+
   fmt::print("|V(A) - V(B)| at {} nodes where both hold, um\n", found->points);
   fmt::print("{:<24}  {:>9}  {:>9}  {:>9}\n", "", "mean", "rms", "largest");
   print("as stated", d.as_stated);
   print("without a rigid motion", d.rigid_free);
+
   return 0;
 }
 
@@ -80,10 +84,12 @@ void add_model_compare(CLI::App& parent, int& exit) {
   auto arguments = std::make_shared<ModelCompareArguments>();
   auto* command = parent.add_subcommand(
       "compare",
-      "How far two models are apart at the nodes where both hold, for the tool of A; as they stand, and\n"
+      "How far two models are apart at the nodes where both hold, for the tool of A; as they "
+      "stand, and\n"
       "without the rigid motion of the whole volume that no measurement can see.");
   command
-      ->add_option("A", arguments->a, "model.json; or, of the store, an id, the beginning of one, \"active\"")
+      ->add_option("A", arguments->a,
+                   "model.json; or, of the store, an id, the beginning of one, \"active\"")
       ->required();
   command->add_option("B", arguments->b, "the other one")->required();
   add_store_options(*command, arguments->store);

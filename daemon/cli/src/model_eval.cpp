@@ -23,24 +23,28 @@ struct ModelEvalArguments {
   bool correction = false;
 };
 
-/// One row: position, vector, standard uncertainty, inside. The correction moves with V, and so has its
-/// uncertainty.
+/// One row: position, vector, standard uncertainty, inside. The correction moves with V, and so has
+/// its uncertainty.
 Result<std::string> row(const calib::VolumetricModel& model, const AxisPosition& q,
                         const calib::Vector3& tool_m, bool correction) {
   const calib::Vector3 position_m(q[0], q[1], q[2]);
   const auto error = model.error_at(position_m, tool_m);
   calib::Vector3 vector_m = error.V_m;
   bool inside = error.inside;
+
   if (correction) {
     const auto found = model.command_correction(position_m, tool_m);
     if (!found) return tl::make_unexpected(error_of(found.error()));
     vector_m = found->c_m;
     inside = found->inside;
   }
+
   std::string text;
   for (int i = 0; i < 3; ++i) text += fmt::format("{:.17g},", position_m[i] * kMmPerM);
   for (int i = 0; i < 3; ++i) text += fmt::format("{:.17g},", vector_m[i] * kUmPerM);
-  for (int i = 0; i < 3; ++i) text += fmt::format("{:.17g},", std::sqrt(error.cov_V_m2(i, i)) * kUmPerM);
+  for (int i = 0; i < 3; ++i)
+    text += fmt::format("{:.17g},", std::sqrt(error.cov_V_m2(i, i)) * kUmPerM);
+
   return text + (inside ? "1\n" : "0\n");
 }
 
@@ -55,18 +59,21 @@ Result<std::string> evaluate(const ModelEvalArguments& arguments) {
                          ? "# quantity = command_correction\nx_mm,y_mm,z_mm,cx_um,cy_um,cz_um"
                          : "# quantity = error\nx_mm,y_mm,z_mm,ex_um,ey_um,ez_um";
   text += ",ux_um,uy_um,uz_um,inside\n";
+
   for (const auto& q : points->points_m) {
     const auto line = row(document->model, q, *tool_m, arguments.correction);
     if (!line) return tl::make_unexpected(line.error());
     text += *line;
   }
+
   return text;
 }
 
 int run(const ModelEvalArguments& arguments) {
   const auto text = evaluate(arguments);
   if (!text) return report(text.error());
-  if (std::fwrite(text->data(), 1, text->size(), stdout) != text->size() || std::fflush(stdout) != 0)
+  if (std::fwrite(text->data(), 1, text->size(), stdout) != text->size() ||
+      std::fflush(stdout) != 0)
     return report({ErrorCode::Io, "write the result to stdout: it is closed or full"});
   return 0;
 }
@@ -75,11 +82,12 @@ int run(const ModelEvalArguments& arguments) {
 
 void add_model_eval(CLI::App& parent, int& exit) {
   auto arguments = std::make_shared<ModelEvalArguments>();
-  auto* command = parent.add_subcommand(
-      "eval",
-      "The volumetric error at given axis positions, as CSV on stdout.\n"
-      "e = actual - nominal at the scale reading; u its standard uncertainty (k = 1) in the model's gauge;\n"
-      "inside: 1 where the model's data reach.");
+  auto* command =
+      parent.add_subcommand("eval",
+                            "The volumetric error at given axis positions, as CSV on stdout.\n"
+                            "e = actual - nominal at the scale reading; u its standard uncertainty "
+                            "(k = 1) in the model's gauge;\n"
+                            "inside: 1 where the model's data reach.");
   command
       ->add_option("MODEL", arguments->model,
                    "model.json; or, of the store, an id, the beginning of one, \"active\"")

@@ -45,13 +45,14 @@ nlohmann::json to_json(const StoreEntry& entry) {
 
 void print_table(const std::vector<StoreEntry>& entries) {
   constexpr std::size_t kSeconds = 19;  // "2024-05-17T08:30:00"
-  fmt::print("{:<16}  {:<19}  {:<6}  {:<20}  {}\n", "id", "added (UTC)", "method", "machine", "state");
+  fmt::print("{:<16}  {:<19}  {:<6}  {:<20}  {}\n", "id", "added (UTC)", "method", "machine",
+             "state");
   for (const auto& entry : entries) {
     auto state = state_of(entry);
     if (entry.active) state = coloured(state, kGreen, STDOUT_FILENO);
     if (!entry.fault.empty()) state = coloured(state, kRed, STDOUT_FILENO) + ": " + entry.fault;
-    fmt::print("{:<16}  {:<19}  {:<6}  {:<20}  {}\n", entry.id, to_text(entry.added).substr(0, kSeconds),
-               entry.method, entry.machine, state);
+    fmt::print("{:<16}  {:<19}  {:<6}  {:<20}  {}\n", entry.id,
+               to_text(entry.added).substr(0, kSeconds), entry.method, entry.machine, state);
     for (const auto& reason : entry.reasons) fmt::print("{:18}{}\n", "", reason);
   }
 }
@@ -75,6 +76,7 @@ void print_model(const ModelDocument& document, const StoreEntry& entry) {
   const auto& s = document.statistics;
   fmt::print("id          {}\nstate       {}\nadded       {}\n", entry.id, state_of(entry),
              to_text(entry.added));
+
   for (const auto& reason : entry.reasons) fmt::print("            {}\n", reason);
   fmt::print("created     {}\nmachine     {}, chain {}\nmethod      {}, {}, gauge {}\n",
              to_text(document.created), document.machine, document.model.layout().chain().text(),
@@ -105,13 +107,16 @@ int show(const ModelStoreArguments& arguments) {
   if (!id) return report(id.error());
   const auto document = store->load(*id);
   if (!document) return report(document.error());
+
   if (arguments.json) {
     fmt::print("{}", to_json(*document));
     return 0;
   }
+
   const auto entry = entry_of(*store, *id);
   if (!entry) return report(entry.error());
   print_model(*document, *entry);
+
   return 0;
 }
 
@@ -147,7 +152,8 @@ void add_model_list(CLI::App& parent, int& exit) {
 
 void add_model_show(CLI::App& parent, int& exit) {
   auto arguments = std::make_shared<ModelStoreArguments>();
-  auto* command = parent.add_subcommand("show", "One model: where it came from, how good it is, its tables");
+  auto* command =
+      parent.add_subcommand("show", "One model: where it came from, how good it is, its tables");
   command->add_option("ID", arguments->id, "id, the beginning of one, or \"active\"")->required();
   add_store_options(*command, arguments->store);
   command->add_flag("--json", arguments->json, "the whole model.json");
@@ -162,6 +168,7 @@ void add_model_activate(CLI::App& parent, int& exit) {
   add_store_options(*command, arguments->store);
   command->add_option("--why", arguments->why, "the reason, for the record; needed with --force");
   command->add_flag("--force", arguments->force, "also a model the gate refused");
+
   command->callback([arguments, &exit] {
     exit = arguments->force && arguments->why.empty()
                ? report({ErrorCode::Usage,

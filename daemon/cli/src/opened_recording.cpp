@@ -15,8 +15,9 @@ Result<OpenedRecording> open_recording(const std::string& file, const std::strin
   if (!read) return tl::make_unexpected(read.error());
   const auto hash = sha256_hex_of_file(file);
   if (!hash) return tl::make_unexpected(hash.error());
-  return OpenedRecording{
-      std::move(*reader), std::move(*read), {std::filesystem::path(file).filename().string(), *hash}};
+  return OpenedRecording{std::move(*reader),
+                         std::move(*read),
+                         {std::filesystem::path(file).filename().string(), *hash}};
 }
 
 }  // namespace abbe::daemon

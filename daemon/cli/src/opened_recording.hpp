@@ -18,6 +18,7 @@ struct OpenedRecording {
 };
 
 /// The configuration is that of the file `config`, or the recorded one if that is empty.
-[[nodiscard]] Result<OpenedRecording> open_recording(const std::string& file, const std::string& config = {});
+[[nodiscard]] Result<OpenedRecording> open_recording(const std::string& file,
+                                                     const std::string& config = {});
 
 }  // namespace abbe::daemon

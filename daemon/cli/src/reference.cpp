@@ -1,5 +1,5 @@
-/// `abbe reference`: the running daemon finds where the axes' counters began, from their distance-coded
-/// marks.
+/// `abbe reference`: the running daemon finds where the axes' counters began, from their
+/// distance-coded marks.
 
 #include <fmt/format.h>
 
@@ -40,10 +40,13 @@ std::string line_of(const json& axis) {
     return fmt::format("{:<4} found after {} marks: count 0 is at {:.{}f} {}, u = {:.3f} {}",
                        axis["axis"].get<std::string>(), axis["marks"].get<std::size_t>(),
                        (rotary ? 1.0 : 1e3) * axis["reading_at_zero"].get<double>(), rotary ? 9 : 6,
-                       rotary ? "rad" : "mm", 1e6 * axis["u"].get<double>(), rotary ? "urad" : "um");
+                       rotary ? "rad" : "mm", 1e6 * axis["u"].get<double>(),
+                       rotary ? "urad" : "um");
   }
+
   return fmt::format("{:<4} {}, {} marks{}{}", axis["axis"].get<std::string>(), state,
-                     axis["marks"].get<std::size_t>(), axis["reason"].get<std::string>().empty() ? "" : ": ",
+                     axis["marks"].get<std::size_t>(),
+                     axis["reason"].get<std::string>().empty() ? "" : ": ",
                      axis["reason"].get<std::string>());
 }
 
@@ -82,6 +85,7 @@ int follow_search(const std::filesystem::path& socket, bool as_json) {
     narrator.tell(found);
     return std::nullopt;
   };
+
   return follow({.socket = socket,
                  .what = "the search for the marks",
                  .cancel = "abbe reference --cancel",
@@ -105,12 +109,13 @@ int reference(const ReferenceArguments& arguments) {
 
 void add_reference(CLI::App& parent, int& exit) {
   auto arguments = std::make_shared<ReferenceArguments>();
-  auto* command = parent.add_subcommand(
-      "reference",
-      "Find where the axes' counters began, from distance-coded marks: then drive each axis slowly over at\n"
-      "least four marks in one direction. Ends when every axis of [reference] has its datum. Ctrl-C ends "
-      "the\n"
-      "looking on (exit code 130), --cancel the search.");
+  auto* command = parent.add_subcommand("reference",
+                                        "Find where the axes' counters began, from distance-coded "
+                                        "marks: then drive each axis slowly over at\n"
+                                        "least four marks in one direction. Ends when every axis "
+                                        "of [reference] has its datum. Ctrl-C ends "
+                                        "the\n"
+                                        "looking on (exit code 130), --cancel the search.");
   add_socket_options(*command, arguments->where);
   auto* cancel = command->add_flag("--cancel", arguments->cancel, "end the search that is running");
   auto* here = command->add_flag(

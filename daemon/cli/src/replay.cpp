@@ -1,4 +1,5 @@
-/// `abbe replay FILE`: a recording once more through receivers, assembler, session and identification.
+/// `abbe replay FILE`: a recording once more through receivers, assembler, session and
+/// identification.
 
 #include <fmt/format.h>
 
@@ -42,6 +43,7 @@ json calibration_json(const ReplayedCalibration& c) {
     out["error"] = c.outcome->error().text;
     return out;
   }
+
   const auto& verdict = verdict_of(**c.outcome);
   out["model_hash"] = c.model_hash;
   out["model_id"] = c.model_id;
@@ -49,6 +51,7 @@ json calibration_json(const ReplayedCalibration& c) {
   out["reasons"] = verdict.reasons;
   out["notes"] = verdict.notes;
   out["points_sha256"] = c.points_sha256;
+
   return out;
 }
 
@@ -62,8 +65,9 @@ bool same_as_live(const ReplayReport& report) {
 
 void print_report(const RecordingReader& recording, const ReplayReport& r, double wall_s) {
   const double recorded_s = std::chrono::duration<double>(r.recorded).count();
-  fmt::print("{} snapshots, {:.1f} s recorded, replayed in {:.2f} s: {:.0f} x real time\n", r.snapshots,
-             recorded_s, wall_s, recorded_s / wall_s);
+  fmt::print("{} snapshots, {:.1f} s recorded, replayed in {:.2f} s: {:.0f} x real time\n",
+             r.snapshots, recorded_s, wall_s, recorded_s / wall_s);
+
   for (const auto& c : r.calibrations) {
     if (!c.outcome) {
       fmt::print("calibration  {}: {}\n", name(c.ended.state), c.ended.reason);
@@ -71,14 +75,19 @@ void print_report(const RecordingReader& recording, const ReplayReport& r, doubl
       fmt::print("calibration  not identified: {}\n", c.outcome->error().text);
     } else {
       fmt::print("calibration  {} model {}\n             hash {}\n",
-                 verdict_of(**c.outcome).accepted ? "accepted" : "refused", c.model_id, c.model_hash);
+                 verdict_of(**c.outcome).accepted ? "accepted" : "refused", c.model_id,
+                 c.model_hash);
     }
   }
+
   for (const auto& d : r.datums) {
-    fmt::print("reference    {}: count 0 is at {:.6f} mm live, {} from the marks in the bytes\n", d.axis,
-               1e3 * d.live, d.again ? fmt::format("{:.6f} mm", 1e3 * *d.again) : "not found");
+    fmt::print("reference    {}: count 0 is at {:.6f} mm live, {} from the marks in the bytes\n",
+               d.axis, 1e3 * d.live,
+               d.again ? fmt::format("{:.6f} mm", 1e3 * *d.again) : "not found");
   }
-  if (const auto damage = recording.damage(); !damage.empty()) fmt::print("DAMAGED      {}\n", damage);
+
+  if (const auto damage = recording.damage(); !damage.empty())
+    fmt::print("DAMAGED      {}\n", damage);
   if (r.undecodable > 0) fmt::print("DAMAGED      {} messages cannot be decoded\n", r.undecodable);
   if (recording.configuration_check() == MetadataCheck::Unchecked)
     fmt::print("unchecked    the recorded configuration has no checksum\n");
@@ -100,6 +109,7 @@ void print_json(const RecordingReader& recording, const ReplayReport& r, double 
            {"losses", json::array()},
            {"calibrations", json::array()}};
   for (const auto& loss : recording.losses()) out["losses"].push_back(loss.what);
+
   for (const auto& d : r.datums)
     out["reference"].push_back(
         {{"axis", d.axis}, {"live", d.live}, {"again", d.again ? json(*d.again) : json{}}});
@@ -122,27 +132,33 @@ int run(const ReplayArguments& arguments) {
   const auto start = std::chrono::steady_clock::now();
   const auto recording = RecordingReader::open(arguments.file);
   if (!recording) return report(recording.error());
-  for (const auto& loss : recording->losses()) fmt::print(stderr, "{}: {}\n", arguments.file, loss.what);
+  for (const auto& loss : recording->losses())
+    fmt::print(stderr, "{}: {}\n", arguments.file, loss.what);
   const auto config = config_of(arguments, *recording);
   if (!config) return report(config.error());
   ProgressBar bar;
   ReplayOptions options{.source = arguments.raw ? ReplaySource::RawBytes : ReplaySource::Samples,
                         .speed = arguments.speed,
                         .progress = [&bar](double share) { bar.show("replaying", share); }};
+
   if (arguments.samples)
     options.samples = [](const Batch& batch, protocol::HostTime begin) {
       print_samples(stdout, batch, begin);
     };
+
   const auto result = replay(*recording, *config, options);
   bar.clear();
   if (!result) return report(result.error());
-  const double wall_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  const double wall_s =
+      std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   if (arguments.samples) return exit_code_of(*recording, *result, arguments);
+
   if (arguments.json) {
     print_json(*recording, *result, wall_s);
   } else {
     print_report(*recording, *result, wall_s);
   }
+
   return exit_code_of(*recording, *result, arguments);
 }
 
@@ -153,17 +169,24 @@ void add_replay(CLI::App& parent, int& exit) {
   auto* command = parent.add_subcommand(
       "replay",
       "A recording once more: the same snapshots, the same model.\n"
-      "Exit code 1 if a calibration gives no model, or (unless -c is given) another than live, or if the\n"
+      "Exit code 1 if a calibration gives no model, or (unless -c is given) another than live, or "
+      "if the\n"
       "recording is damaged inside; 3 if the recorded configuration is, and no -c is given.");
   command->add_option("FILE", arguments->file, "recording (.mcap, also an unfinished .mcap.part)")
       ->required();
-  command->add_flag("--raw", arguments->raw, "from the raw device bytes instead of the decoded samples");
-  command->add_option("--speed", arguments->speed, "recorded seconds per second; 0: as fast as possible")
+  command->add_flag("--raw", arguments->raw,
+                    "from the raw device bytes instead of the decoded samples");
+  command
+      ->add_option("--speed", arguments->speed,
+                   "recorded seconds per second; 0: as fast as possible")
       ->capture_default_str()
       ->check(CLI::NonNegativeNumber);
-  command->add_option("-c,--config", arguments->config, "another configuration than the recorded one");
+  command->add_option("-c,--config", arguments->config,
+                      "another configuration than the recorded one");
   auto* as_json = command->add_flag("--json", arguments->json, "as one JSON object");
-  command->add_flag("--samples", arguments->samples, "print every sample as a line instead of the report")
+  command
+      ->add_flag("--samples", arguments->samples,
+                 "print every sample as a line instead of the report")
       ->excludes(as_json);
   command->callback([arguments, &exit] { exit = run(*arguments); });
 }

@@ -23,13 +23,16 @@ namespace {
 
 constexpr std::string_view kFooter =
     "Programs of their own: `abbe sim ...` runs abbe-sim, `abbe watch ...` runs abbe-watch.\n"
-    "Exit codes: 0 done; 1 the data do not allow an answer (rank, alignment, too few points), or a replay "
+    "Exit codes: 0 done; 1 the data do not allow an answer (rank, alignment, too few points), or a "
+    "replay "
     "gave "
     "another model;\n"
-    "2 usage; 3 bad input file; 4 input or output failed; 5 refused, by the gate or by what the daemon is "
+    "2 usage; 3 bad input file; 4 input or output failed; 5 refused, by the gate or by what the "
+    "daemon is "
     "doing;\n"
     "130 interrupted while following a calibration, which goes on.\n"
-    "Lengths are mm, small errors um, angles rad or urad, times s: the unit stands in every column and key.";
+    "Lengths are mm, small errors um, angles rad or urad, times s: the unit stands in every column "
+    "and key.";
 
 /// Subcommands that are programs, as git has them.
 constexpr std::array<std::string_view, 2> kPrograms{"sim", "watch"};
@@ -51,13 +54,14 @@ Error exec_program(std::string_view name, int argc, const char* const* argv) {
   arguments.push_back(nullptr);
   ::execv(beside.c_str(), arguments.data());
   ::execvp(program.c_str(), arguments.data());
-  return {ErrorCode::Io,
-          fmt::format("run {}: neither beside abbe nor in PATH: {}", program, std::strerror(errno))};
+  return {ErrorCode::Io, fmt::format("run {}: neither beside abbe nor in PATH: {}", program,
+                                     std::strerror(errno))};
 }
 
 void add_commands(CLI::App& app, int& exit) {
   add_status(app, exit);
-  auto* calibrate = app.add_subcommand("calibrate", "Calibrate the machine that the running daemon watches");
+  auto* calibrate =
+      app.add_subcommand("calibrate", "Calibrate the machine that the running daemon watches");
   calibrate->require_subcommand(1);
   add_calibrate_otf(*calibrate, exit);
   add_calibrate_evemu(*calibrate, exit);
@@ -74,8 +78,8 @@ void add_commands(CLI::App& app, int& exit) {
   add_identify_evemu(*identify, exit);
   add_identify_artefact(*identify, exit);
   add_verify(app, exit);
-  auto* model =
-      app.add_subcommand("model", "Evaluate models, and look after the store of a machine's models");
+  auto* model = app.add_subcommand(
+      "model", "Evaluate models, and look after the store of a machine's models");
   model->require_subcommand(1);
   add_model_eval(*model, exit);
   add_model_compare(*model, exit);
@@ -91,19 +95,23 @@ void add_commands(CLI::App& app, int& exit) {
 int parse_and_run(int argc, const char* const* argv) {
   int exit = 0;
   CLI::App app{
-      "abbe identifies the geometric errors of machine tools and measuring machines, and keeps the models."};
+      "abbe identifies the geometric errors of machine tools and measuring machines, and keeps the "
+      "models."};
   app.name("abbe");
   app.set_version_flag("--version", "abbe " ABBE_VERSION);
   app.footer(std::string{kFooter});
   app.require_subcommand(1);
   add_commands(app, exit);
+
   try {
     app.parse(argc, argv);
   } catch (const CLI::Success& help) {
     return app.exit(help);
   } catch (const CLI::ParseError& error) {
-    return report({ErrorCode::Usage, error.what(), {"see `abbe --help`, or --help behind any command"}});
+    return report(
+        {ErrorCode::Usage, error.what(), {"see `abbe --help`, or --help behind any command"}});
   }
+
   return exit;
 }
 

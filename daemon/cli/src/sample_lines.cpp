@@ -14,10 +14,12 @@ namespace {
 using protocol::SampleHead;
 
 constexpr std::array<std::string_view, 12> kSampleFlags{
-    "gap",          "time-widened",  "clock-unsettled", "axis-missing",  "bus-error",     "bus-off",
-    "device-error", "speed-warning", "speed-exceeded",  "point-invalid", "beam-returned", "restarted"};
+    "gap",           "time-widened", "clock-unsettled", "axis-missing",   "bus-error",
+    "bus-off",       "device-error", "speed-warning",   "speed-exceeded", "point-invalid",
+    "beam-returned", "restarted"};
 constexpr std::array<std::string_view, 7> kTouchFlags{
-    "chattered", "speed-low", "speed-high", "speed-unsteady", "latch-refused", "no-position", "refused"};
+    "chattered",     "speed-low",   "speed-high", "speed-unsteady",
+    "latch-refused", "no-position", "refused"};
 
 template <std::size_t N>
 std::string names_of(std::uint32_t flags, const std::array<std::string_view, N>& names) {
@@ -30,7 +32,8 @@ std::string names_of(std::uint32_t flags, const std::array<std::string_view, N>&
 /// "axes      1234.567 gap lost=3 |"
 std::string head_of(std::string_view what, const SampleHead& head, protocol::HostTime begin) {
   const std::chrono::duration<double, std::milli> since = head.time - begin;
-  std::string out = fmt::format("{:<8}{:12.3f}{}", what, since.count(), names_of(head.flags, kSampleFlags));
+  std::string out =
+      fmt::format("{:<8}{:12.3f}{}", what, since.count(), names_of(head.flags, kSampleFlags));
   if (head.lost_before > 0) out += fmt::format(" lost={}", head.lost_before);
   return out + " |";
 }
@@ -46,8 +49,8 @@ std::string missing(std::uint8_t mask) {
 }
 
 std::string line_of(const protocol::TrackerPoint& p, protocol::HostTime begin) {
-  return fmt::format("{}{} status={}\n", head_of("point", p.head, begin), values(p.p_tracker_m, "{:.9f}"),
-                     p.device_status);
+  return fmt::format("{}{} status={}\n", head_of("point", p.head, begin),
+                     values(p.p_tracker_m, "{:.9f}"), p.device_status);
 }
 
 std::string line_of(const protocol::AxisSample& s, protocol::HostTime begin) {
@@ -55,7 +58,8 @@ std::string line_of(const protocol::AxisSample& s, protocol::HostTime begin) {
                      values(std::span{s.count}.first(s.axis_count), "{}"), missing(s.missing_mask));
 }
 
-std::string line_of(const protocol::EnvironmentSample& e, protocol::HostTime begin, std::string_view what) {
+std::string line_of(const protocol::EnvironmentSample& e, protocol::HostTime begin,
+                    std::string_view what) {
   const std::array air{e.air_temperature_K, e.air_pressure_Pa, e.relative_humidity};
   std::string out = head_of(what, e.head, begin) + values(air, "{:.6g}");
   if (e.measured == 0) out += " assumed";
@@ -68,7 +72,8 @@ std::string line_of(const protocol::EnvironmentSample& e, protocol::HostTime beg
 std::string line_of(const protocol::ProbeTrigger& t, protocol::HostTime begin) {
   return fmt::format("{} {}{}{}{}\n", head_of("touch", t.head, begin), t.touch,
                      names_of(t.touch_flags, kTouchFlags),
-                     values(std::span{t.position}.first(t.axis_count), "{:.9f}"), missing(t.missing_mask));
+                     values(std::span{t.position}.first(t.axis_count), "{:.9f}"),
+                     missing(t.missing_mask));
 }
 
 }  // namespace

@@ -8,9 +8,10 @@
 namespace abbe::daemon {
 
 CLI::Option* add_scales_corrected(CLI::App& command, bool& corrected) {
-  return command.add_flag("--scales-corrected,--path-corrected", corrected,
-                          "the readings of the files are corrected for the temperature of the scales\n"
-                          "([[thermal]])");
+  return command.add_flag(
+      "--scales-corrected,--path-corrected", corrected,
+      "the readings of the files are corrected for the temperature of the scales\n"
+      "([[thermal]])");
 }
 
 Result<void> check_scales(std::string_view command, std::string_view what, const Config& config,
@@ -18,10 +19,11 @@ Result<void> check_scales(std::string_view command, std::string_view what, const
   if (config.thermal.empty() || corrected) return {};
   return fail(
       ErrorCode::BadInput,
-      fmt::format("{}: [[thermal]] is configured, and the files hold no temperatures: use --recording, "
-                  "or give {} corrected for the temperature of the scales and say "
-                  "--scales-corrected",
-                  command, what));
+      fmt::format(
+          "{}: [[thermal]] is configured, and the files hold no temperatures: use --recording, "
+          "or give {} corrected for the temperature of the scales and say "
+          "--scales-corrected",
+          command, what));
 }
 
 }  // namespace abbe::daemon

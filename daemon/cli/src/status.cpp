@@ -26,11 +26,13 @@ int colour_of_model(const std::string& state) {
 
 void print_stream(const json& s) {
   const bool connected = s["connected"];
-  fmt::print("{:<10} {:<14} {:>8.1f}/s {:>10} {:>7} {:>5} {:>7}  {}\n", s["name"].get<std::string>(),
-             coloured(fmt::format("{:<14}", s["state"].get<std::string>()), connected ? kGreen : kYellow,
-                      STDOUT_FILENO),
-             s["rate_hz"].get<double>(), s["samples"].get<std::uint64_t>(), s["dropped"].get<std::uint64_t>(),
-             s["gaps"].get<std::uint64_t>(), s.contains("faults") ? s["faults"].get<std::uint64_t>() : 0,
+  fmt::print("{:<10} {:<14} {:>8.1f}/s {:>10} {:>7} {:>5} {:>7}  {}\n",
+             s["name"].get<std::string>(),
+             coloured(fmt::format("{:<14}", s["state"].get<std::string>()),
+                      connected ? kGreen : kYellow, STDOUT_FILENO),
+             s["rate_hz"].get<double>(), s["samples"].get<std::uint64_t>(),
+             s["dropped"].get<std::uint64_t>(), s["gaps"].get<std::uint64_t>(),
+             s.contains("faults") ? s["faults"].get<std::uint64_t>() : 0,
              s["last_fault"].get<std::string>());
   if (const auto condition = s.value("condition", std::string{}); !condition.empty())
     fmt::print("           {}\n", coloured(condition, kYellow, STDOUT_FILENO));
@@ -43,7 +45,8 @@ std::string value_text(const json& value, int digits, std::string_view unit) {
 
 void print_environment(const json& e) {
   fmt::print("air        {}, {}, {}", value_text(e["air_temperature_C"], 2, "C"),
-             value_text(e["air_pressure_hPa"], 2, "hPa"), value_text(e["relative_humidity_percent"], 1, "%"));
+             value_text(e["air_pressure_hPa"], 2, "hPa"),
+             value_text(e["relative_humidity_percent"], 1, "%"));
   if (e.contains("refractive_index")) {
     const json& index = e["refractive_index"];
     fmt::print(", n = {:.9f} (u = {:.1e})", index["n"].get<double>(), index["u_n"].get<double>());
@@ -56,20 +59,22 @@ void print_environment(const json& e) {
 void print_reference(const json& reference) {
   fmt::print("reference  {}", reference["running"].get<bool>() ? "looking for marks" : "");
   for (const json& axis : reference["axes"])
-    fmt::print("{} {}", axis["axis"].get<std::string>(), axis["known"].get<bool>() ? "known " : "not known ");
+    fmt::print("{} {}", axis["axis"].get<std::string>(),
+               axis["known"].get<bool>() ? "known " : "not known ");
   fmt::print("\n");
 }
 
 void print_next(const json& next) {
-  fmt::print("next       {} of position {}, {} of {} points touched\n", next["on"].get<std::string>(),
-             next["position"].get<int>(), next["touched"].get<std::size_t>(),
-             next["points"].get<std::size_t>());
+  fmt::print("next       {} of position {}, {} of {} points touched\n",
+             next["on"].get<std::string>(), next["position"].get<int>(),
+             next["touched"].get<std::size_t>(), next["points"].get<std::size_t>());
 }
 
 void print_release_awaited(const json& awaited) {
-  fmt::print("{}    {}\n           nothing moves before a person has looked at the machine; then: {}\n",
-             coloured("RELEASE", kRed, STDOUT_FILENO), awaited["reason"].get<std::string>(),
-             awaited["command"].get<std::string>());
+  fmt::print(
+      "{}    {}\n           nothing moves before a person has looked at the machine; then: {}\n",
+      coloured("RELEASE", kRed, STDOUT_FILENO), awaited["reason"].get<std::string>(),
+      awaited["command"].get<std::string>());
 }
 
 void print_dds(const json& dds) {
@@ -80,12 +85,15 @@ void print_dds(const json& dds) {
              : state == "does not answer" ? "abbe-dds does not answer"
                                           : "not connected",
              dds["sent"].get<std::uint64_t>());
+
   if (const auto restarts = dds.value("restarts", std::uint64_t{0}); restarts > 0)
     fmt::print(", abbe-dds restarted {} times", restarts);
   fmt::print("\n");
-  if (dds.contains("last_end")) fmt::print("           last end: {}\n", dds["last_end"].get<std::string>());
+  if (dds.contains("last_end"))
+    fmt::print("           last end: {}\n", dds["last_end"].get<std::string>());
   if (const auto refused = dds.value("refused_connections", std::uint64_t{0}); refused > 0)
-    fmt::print("           {} connections to its socket by other processes were refused\n", refused);
+    fmt::print("           {} connections to its socket by other processes were refused\n",
+               refused);
   const auto security = dds.value("security", std::string{"on"});
   fmt::print("           {}\n", security == "on" ? "DDS Security is on" : security);
 }
@@ -104,19 +112,22 @@ void print_status(const json& status) {
   if (session.contains("next")) print_next(session["next"]);
   for (const json& note : session["notes"]) fmt::print("           {}\n", note.get<std::string>());
   if (status.contains("reference")) print_reference(status["reference"]);
+
   if (const json axes = status.value("axes_without_zero", json::array()); !axes.empty()) {
     fmt::print("zero       of");
     for (const json& axis : axes) fmt::print(" {}", axis.get<std::string>());
     fmt::print(" not known: `abbe reference --here` where they read their offset\n");
   }
+
   if (status.contains("environment")) print_environment(status["environment"]);
   if (status.contains("unmeasured_air"))
     fmt::print("tracker    {}\n",
                coloured(status["unmeasured_air"].get<std::string>(), kYellow, STDOUT_FILENO));
-  if (status.contains("recording")) fmt::print("recording  {}\n", status["recording"].get<std::string>());
+  if (status.contains("recording"))
+    fmt::print("recording  {}\n", status["recording"].get<std::string>());
   if (status.contains("dds")) print_dds(status["dds"]);
-  fmt::print("\n{:<10} {:<14} {:>10} {:>10} {:>7} {:>5} {:>7}  {}\n", "stream", "state", "rate", "samples",
-             "dropped", "gaps", "faults", "last fault");
+  fmt::print("\n{:<10} {:<14} {:>10} {:>10} {:>7} {:>5} {:>7}  {}\n", "stream", "state", "rate",
+             "samples", "dropped", "gaps", "faults", "last fault");
   for (const json& stream : status["streams"]) print_stream(stream);
 }
 
@@ -138,7 +149,8 @@ int status(const DaemonSocket& where, bool as_json) {
 void add_status(CLI::App& parent, int& exit) {
   auto where = std::make_shared<DaemonSocket>();
   auto as_json = std::make_shared<bool>(false);
-  auto* command = parent.add_subcommand("status", "What the running daemon sees, does and publishes");
+  auto* command =
+      parent.add_subcommand("status", "What the running daemon sees, does and publishes");
   add_socket_options(*command, *where);
   command->add_flag("--json", *as_json, "as one JSON object");
   command->callback([where, as_json, &exit] { exit = status(*where, *as_json); });

@@ -1,5 +1,6 @@
 #pragma once
-/// How a command finds the store of models: --store, or the configuration of the daemon it belongs to.
+/// How a command finds the store of models: --store, or the configuration of the daemon it belongs
+/// to.
 
 #include <CLI/App.hpp>
 #include <string>
@@ -16,8 +17,8 @@ struct StoreOption {
 void add_store_options(CLI::App& command, StoreOption& where);
 [[nodiscard]] Result<ModelStore> open_store(const StoreOption& where);
 
-/// A file, or else a model of the store: its id, the beginning of one, "active". What looks like a path is
-/// never looked up there.
+/// A file, or else a model of the store: its id, the beginning of one, "active". What looks like a
+/// path is never looked up there.
 [[nodiscard]] Result<ModelDocument> model_named(const std::string& name, const StoreOption& where);
 
 }  // namespace abbe::daemon

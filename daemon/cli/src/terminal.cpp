@@ -41,7 +41,8 @@ void ProgressBar::show(std::string_view step, double fraction) {
   percent_ = percent;
   step_ = step;
   const auto filled = static_cast<std::size_t>(percent * kWidth / 100);
-  fmt::print(stderr, "\r\x1b[K{:<22} [{:-<{}}] {:3} %", step, std::string(filled, '#'), kWidth, percent);
+  fmt::print(stderr, "\r\x1b[K{:<22} [{:-<{}}] {:3} %", step, std::string(filled, '#'), kWidth,
+             percent);
   std::fflush(stderr);
 }
 

@@ -1,5 +1,6 @@
 #pragma once
-/// What may be written where: colour and progress are for people at a terminal, never for files and pipes.
+/// What may be written where: colour and progress are for people at a terminal, never for files and
+/// pipes.
 
 #include <chrono>
 #include <string>
@@ -20,7 +21,8 @@ inline constexpr int kRed = 1, kGreen = 2, kYellow = 3;  // as ANSI counts colou
 /// "abbe: error: ..." and the details, one a line, on stderr; returns the exit code.
 int report(const Error& error);
 
-/// A bar on stderr, redrawn when its percentage changes; silent unless stderr is a terminal. Erases itself.
+/// A bar on stderr, redrawn when its percentage changes; silent unless stderr is a terminal. Erases
+/// itself.
 class ProgressBar {
  public:
   explicit ProgressBar(bool wanted = true);

@@ -14,9 +14,11 @@ Result<calib::Vector3> parse_mm(const std::string& option, const std::string& te
   const auto nonsense = [&] {
     return fail(ErrorCode::Usage, fmt::format("{} \"{}\": must be x,y,z in mm", option, text));
   };
+
   calib::Vector3 vector_m = calib::Vector3::Zero();
   const char* at = text.data();
   const char* const end = at + text.size();
+
   for (int i = 0; i < 3; ++i) {
     double value_mm = 0.0;
     const auto [next, fault] = std::from_chars(at, end, value_mm);
@@ -25,6 +27,7 @@ Result<calib::Vector3> parse_mm(const std::string& option, const std::string& te
     at = next;
     if (i < 2 && (at == end || *at++ != ',')) return nonsense();
   }
+
   if (at != end) return nonsense();
   return vector_m;
 }
@@ -37,11 +40,10 @@ Result<calib::Vector3> tool_of(const std::string& text, const calib::VolumetricM
     tool_m = *given;
   }
   if (!model.holds_for_tool(tool_m))
-    return fail(
-        ErrorCode::DataInsufficient,
-        fmt::format(
-            "tool offset {}, {}, {} mm: the model was identified with another and does not hold for it",
-            tool_m[0] * kMmPerM, tool_m[1] * kMmPerM, tool_m[2] * kMmPerM));
+    return fail(ErrorCode::DataInsufficient,
+                fmt::format("tool offset {}, {}, {} mm: the model was identified with another and "
+                            "does not hold for it",
+                            tool_m[0] * kMmPerM, tool_m[1] * kMmPerM, tool_m[2] * kMmPerM));
   return tool_m;
 }
 

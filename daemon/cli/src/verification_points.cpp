@@ -27,8 +27,8 @@ constexpr auto kLookAtPoints = 200ms;
 
 void tell(std::size_t number, const json& point) {
   const calib::Vector3 q_mm = 1e3 * vector_of(point.at("reading_m"));
-  fmt::print(stderr, "{:>4}: {:.3f}, {:.3f}, {:.3f} mm, {} tracker points, scatter {:.1f} um\n", number,
-             q_mm.x(), q_mm.y(), q_mm.z(), point.at("tracker_points").get<std::size_t>(),
+  fmt::print(stderr, "{:>4}: {:.3f}, {:.3f}, {:.3f} mm, {} tracker points, scatter {:.1f} um\n",
+             number, q_mm.x(), q_mm.y(), q_mm.z(), point.at("tracker_points").get<std::size_t>(),
              1e6 * point.at("scatter_m").get<double>());
 }
 
@@ -36,7 +36,8 @@ void tell(std::size_t number, const json& point) {
 Result<std::string> look(const std::filesystem::path& socket, const json& number, const char* step,
                          VerificationFile& out, const Keep& keep) {
   const auto answer = ask_daemon(
-      socket, {{"do", "verification"}, {"step", step}, {"number", number}, {"from", out.points.size()}});
+      socket,
+      {{"do", "verification"}, {"step", step}, {"number", number}, {"from", out.points.size()}});
   if (!answer) return tl::make_unexpected(answer.error());
   for (const json& point : answer->at("points")) {
     out.points.push_back({vector_of(point.at("reading_m")), vector_of(point.at("tracker_m"))});
@@ -50,7 +51,8 @@ Result<std::string> look(const std::filesystem::path& socket, const json& number
 /// A daemon that went away takes no points with it.
 Result<LivePoints> what_there_is(VerificationFile& points, const Error& error) {
   if (points.points.empty()) return tl::make_unexpected(error);
-  Error cut_short{ErrorCode::Io, fmt::format("after {} points: {}", points.points.size(), error.text)};
+  Error cut_short{ErrorCode::Io,
+                  fmt::format("after {} points: {}", points.points.size(), error.text)};
   return LivePoints{std::move(points), std::move(cut_short)};
 }
 
@@ -74,6 +76,7 @@ Result<LivePoints> points_of_recording(const std::string& file) {
   for (const auto& p : standstills.points()) out.file.points.push_back(p.mean);
   if (const auto damage = recording->reader.damage(); !damage.empty())
     out.cut_short = Error{ErrorCode::DataInsufficient, fmt::format("{}: {}", file, damage), {}};
+
   return out;
 }
 
@@ -83,9 +86,11 @@ Result<LivePoints> points_of_daemon(const std::filesystem::path& socket, std::si
   if (!begun) return tl::make_unexpected(begun.error());
   const json number = begun->at("number");
   mark_interruptions({SIGINT, SIGTERM, SIGHUP});
-  fmt::print(stderr, "abbe: stand still for some seconds at every point; Ctrl-C after the last one\n");
+  fmt::print(stderr,
+             "abbe: stand still for some seconds at every point; Ctrl-C after the last one\n");
   VerificationFile out;
   const auto all = [&] { return interrupted() || (count != 0 && out.points.size() >= count); };
+
   for (; !all(); std::this_thread::sleep_for(kLookAtPoints)) {
     const auto looked = look(socket, number, "look", out, keep);
     if (!looked) return what_there_is(out, looked.error());
@@ -93,6 +98,7 @@ Result<LivePoints> points_of_daemon(const std::filesystem::path& socket, std::si
     fmt::print(stderr, "abbe: {}\n", *looked);
     break;
   }
+
   if (const auto ended = look(socket, number, "end", out, keep); !ended)
     return what_there_is(out, ended.error());
   return LivePoints{std::move(out), {}};

@@ -18,12 +18,13 @@ namespace verify = calib::verify;
 constexpr std::array<const char*, 3> kNames{"x", "y", "z"};
 
 std::string mm(const calib::Vector3& p_m) {
-  return fmt::format("{:.3f}, {:.3f}, {:.3f} mm", kMmPerM * p_m.x(), kMmPerM * p_m.y(), kMmPerM * p_m.z());
+  return fmt::format("{:.3f}, {:.3f}, {:.3f} mm", kMmPerM * p_m.x(), kMmPerM * p_m.y(),
+                     kMmPerM * p_m.z());
 }
 
 std::string urad(const calib::Vector3& r_rad) {
-  return fmt::format("{:.1f}, {:.1f}, {:.1f} urad", kUradPerRad * r_rad.x(), kUradPerRad * r_rad.y(),
-                     kUradPerRad * r_rad.z());
+  return fmt::format("{:.1f}, {:.1f}, {:.1f} urad", kUradPerRad * r_rad.x(),
+                     kUradPerRad * r_rad.y(), kUradPerRad * r_rad.z());
 }
 
 std::vector<double> lengths_um(const std::vector<calib::Vector3>& v_m) {
@@ -61,13 +62,15 @@ void add_left(HtmlReport& page, const Verification& v) {
   const auto& c = v.comparison;
   page.heading("What is left at the measured points");
   if (!v.cut_short.empty()) page.paragraph("Points are missing: " + v.cut_short + ".");
-  page.paragraph(
-      fmt::format("{} of {} measured points lie where the model holds. Without and with compensation, each "
-                  "after its own best rigid motion of the instrument: how well both could be set up.",
-                  c.inside.size(), v.observations.readings_m.size()));
+  page.paragraph(fmt::format(
+      "{} of {} measured points lie where the model holds. Without and with compensation, each "
+      "after its own best rigid motion of the instrument: how well both could be set up.",
+      c.inside.size(), v.observations.readings_m.size()));
+
   const auto row = [](const char* what, const calib::VectorStatistics& s) {
     return std::vector<std::string>{what, um_text(s.mean_m), um_text(s.rms_m), um_text(s.max_m)};
   };
+
   page.table({"", "mean", "rms", "largest"},
              {row("without compensation", c.before), row("with the model", c.after)});
   page.chart(Histogram{"left at the measured points",
@@ -83,16 +86,21 @@ void add_farthest(HtmlReport& page, const Verification& v) {
   std::vector<std::size_t> order(c.inside.size());
   std::iota(order.begin(), order.end(), std::size_t{0});
   const auto shown = static_cast<std::ptrdiff_t>(std::min(kShown, order.size()));
-  std::partial_sort(order.begin(), order.begin() + shown, order.end(), [&](std::size_t a, std::size_t b) {
-    return c.left_after_m[a].norm() > c.left_after_m[b].norm();
-  });
+
+  std::partial_sort(order.begin(), order.begin() + shown, order.end(),
+                    [&](std::size_t a, std::size_t b) {
+                      return c.left_after_m[a].norm() > c.left_after_m[b].norm();
+                    });
+
   std::vector<std::vector<std::string>> rows;
   for (std::size_t i = 0; i < static_cast<std::size_t>(shown); ++i) {
     const std::size_t point = c.inside[order[i]];
-    rows.push_back(
-        {v.lines.empty() ? fmt::format("point {}", point + 1) : fmt::format("line {}", v.lines[point]),
-         mm(v.observations.readings_m[point]), um_text(c.left_after_m[order[i]].norm())});
+    rows.push_back({v.lines.empty() ? fmt::format("point {}", point + 1)
+                                    : fmt::format("line {}", v.lines[point]),
+                    mm(v.observations.readings_m[point]),
+                    um_text(c.left_after_m[order[i]].norm())});
   }
+
   page.table({"farthest from the model", "reading", "left"}, rows);
 }
 
@@ -102,13 +110,17 @@ void add_frame(HtmlReport& page, const Verification& v) {
   page.heading("Frames");
   page.paragraph(
       o.frame == verify::Frame::BestFit
-          ? "Nobody knows where the instrument stood but through these points: its frame was fitted onto the "
-            "readings. That takes out of V_las the rigid motion that fits it best (six numbers): nothing can "
+          ? "Nobody knows where the instrument stood but through these points: its frame was "
+            "fitted onto the "
+            "readings. That takes out of V_las the rigid motion that fits it best (six numbers): "
+            "nothing can "
             "be said here of where the volume lies or how it is turned, only of its shape."
           : "The instrument's axes were given as those of the machine: V_las keeps its rotation.");
   page.paragraph(
-      "\"As stated\" compares with V as the model has it. \"Turned\" gives the model the small rigid motion "
-      "that fits V_las best, so that shapes are compared: a model from a ball array whose rotation nobody "
+      "\"As stated\" compares with V as the model has it. \"Turned\" gives the model the small "
+      "rigid motion "
+      "that fits V_las best, so that shapes are compared: a model from a ball array whose rotation "
+      "nobody "
       "referenced, and any model against a fitted frame, can only be judged like this.");
   const Eigen::Quaterniond q(o.T_machine_tracker.R);
   page.facts({{"instrument in the machine", mm(o.T_machine_tracker.t_m)},
@@ -118,7 +130,8 @@ void add_frame(HtmlReport& page, const Verification& v) {
                c.origin_m ? mm(*c.origin_m) : std::string{"none: means are taken out"}},
               {"model turned by (rotation about the origin)", urad(c.turned.tail<3>())},
               {"grid: multiples of", mm(c.step_m)},
-              {"left out nearer to the origin than", fmt::format("{:.1f} mm", kMmPerM * c.least_distance_m)},
+              {"left out nearer to the origin than",
+               fmt::format("{:.1f} mm", kMmPerM * c.least_distance_m)},
               {"what interpolating V_las linearly costs (seen on the model itself)",
                um_text(c.interpolation_rms_m) + " rms"}});
 }
@@ -142,16 +155,20 @@ void add_ratio(HtmlReport& page, const verify::Comparison& c) {
   page.heading("R_resmag: what is left of every vector");
   if (const auto why = why_no_ratio(c)) return page.paragraph("Not given: " + *why + ".");
   page.paragraph(
-      "|V_las - V_model| / |V_las| on a grid inside the model's volume; below 1 the model helps, above it "
-      "harms [Li OMM, eqs. 20, 21]. What \"turned\" and \"as stated\" mean, and why the second one may be "
+      "|V_las - V_model| / |V_las| on a grid inside the model's volume; below 1 the model helps, "
+      "above it "
+      "harms [Li OMM, eqs. 20, 21]. What \"turned\" and \"as stated\" mean, and why the second one "
+      "may be "
       "near 1 for a good model, is said under \"Frames\".");
   page.table({"", "points", "mean", "std", "min", "25 %", "median", "75 %", "max", "above 1"},
              {ratio_row("turned", c.R_turned), ratio_row("as stated", c.R_stated)});
   std::vector<double> stated, turned;
+
   for (const auto& g : c.grid) {
     stated.push_back(g.R_stated);
     turned.push_back(g.R_turned);
   }
+
   page.chart(Histogram{"R_resmag, turned", "R_resmag", {{"turned", turned}}});
   page.chart(Histogram{"R_resmag, as stated", "R_resmag", {{"as stated", stated}}});
 }
@@ -173,9 +190,10 @@ struct Plane {
 /// The layer of the grid nearest to `wanted`.
 Plane plane_of(const verify::Comparison& c, Eigen::Index across, double wanted_m) {
   Plane plane{.across = across, .right = across == 0 ? 1 : 0, .up = across == 2 ? 1 : 2};
-  const auto nearest = std::min_element(c.grid.begin(), c.grid.end(), [&](const auto& a, const auto& b) {
-    return std::abs(a.q_m(across) - wanted_m) < std::abs(b.q_m(across) - wanted_m);
-  });
+  const auto nearest =
+      std::min_element(c.grid.begin(), c.grid.end(), [&](const auto& a, const auto& b) {
+        return std::abs(a.q_m(across) - wanted_m) < std::abs(b.q_m(across) - wanted_m);
+      });
   plane.at_m = nearest->q_m(across);
   for (const auto& g : c.grid)
     if (std::abs(g.q_m(across) - plane.at_m) < 0.5 * c.step_m(across)) plane.points.push_back(&g);
@@ -184,20 +202,23 @@ Plane plane_of(const verify::Comparison& c, Eigen::Index across, double wanted_m
 
 using VectorAt = calib::Vector3 (*)(const verify::GridPoint&);
 
-void add_vectors(HtmlReport& page, const Plane& plane, const char* name, double magnification, VectorAt at) {
+void add_vectors(HtmlReport& page, const Plane& plane, const char* name, double magnification,
+                 VectorAt at) {
   VectorChart chart{.title = fmt::format("{}, {} = {:.3f} mm, arrows x {:g}", name,
-                                         kNames[static_cast<std::size_t>(plane.across)], kMmPerM * plane.at_m,
-                                         magnification),
+                                         kNames[static_cast<std::size_t>(plane.across)],
+                                         kMmPerM * plane.at_m, magnification),
                     .x_label = fmt::format("{}, mm", kNames[static_cast<std::size_t>(plane.right)]),
                     .y_label = fmt::format("{}, mm", kNames[static_cast<std::size_t>(plane.up)]),
                     .name = name,
                     .arrows = {},
                     .magnification = magnification};
+
   for (const auto* g : plane.points) {
     const calib::Vector3 v = kMmPerM * at(*g);
     chart.arrows.push_back(
         {kMmPerM * g->q_m(plane.right), kMmPerM * g->q_m(plane.up), v(plane.right), v(plane.up)});
   }
+
   page.chart(chart);
 }
 
@@ -206,18 +227,22 @@ void add_planes(HtmlReport& page, const Verification& v) {
   const auto& c = v.comparison;
   calib::Vector3 low = c.grid.front().q_m, high = low;
   double longest_m = 1e-9;
+
   for (const auto& g : c.grid) {
     low = low.cwiseMin(g.q_m);
     high = high.cwiseMax(g.q_m);
     longest_m = std::max(longest_m, g.V_las_m.norm());
   }
+
   const calib::Vector3 wanted = v.planes_m.value_or(0.5 * (low + high));
   constexpr double kOfTheVolume = 0.1;  // the longest arrow, against the diagonal
   const double magnification = round_number(kOfTheVolume * (high - low).norm() / longest_m);
   page.heading("Vectors in three planes");
   page.paragraph(
-      "From each reading (dot) towards the true place. Measured, as the turned model has it, and their "
+      "From each reading (dot) towards the true place. Measured, as the turned model has it, and "
+      "their "
       "difference, all drawn alike.");
+
   for (const Eigen::Index across : {2, 0, 1}) {
     const Plane plane = plane_of(c, across, wanted(across));
     add_vectors(page, plane, "measured", magnification, [](const auto& g) { return g.V_las_m; });
@@ -231,14 +256,15 @@ void add_planes(HtmlReport& page, const Verification& v) {
 
 std::string verdict_text(const verify::Comparison& c) {
   return fmt::format("{}: {:.3f} um rms left, {:.3f} um without it; {} of {} points gained",
-                     words(verify::effect_at_points(c)), kUmPerM * c.after.rms_m, kUmPerM * c.before.rms_m,
-                     points_that_gained(c), c.inside.size());
+                     words(verify::effect_at_points(c)), kUmPerM * c.after.rms_m,
+                     kUmPerM * c.before.rms_m, points_that_gained(c), c.inside.size());
 }
 
 std::optional<std::string> why_no_ratio(const verify::Comparison& c) {
   if (verify::ratios_hold(c)) return std::nullopt;
   return fmt::format(
-      "interpolating between the measured points costs {:.3f} um rms, not small against the {:.3f} um left; "
+      "interpolating between the measured points costs {:.3f} um rms, not small against the {:.3f} "
+      "um left; "
       "more points nearer to each other make it smaller",
       kUmPerM * c.interpolation_rms_m, kUmPerM * c.after.rms_m);
 }

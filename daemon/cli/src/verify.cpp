@@ -49,25 +49,31 @@ Result<verify::Options> options_of(const VerifyArguments& arguments) {
     if (!origin) return tl::make_unexpected(origin.error());
     options.origin_m = *origin;
   }
+
   if (!arguments.grid.empty()) {
     const auto step = parse_mm("--grid-mm", arguments.grid);
     if (!step) return tl::make_unexpected(step.error());
     if (!(step->minCoeff() > 0.0))
-      return fail(ErrorCode::Usage, fmt::format("--grid-mm \"{}\": must be positive", arguments.grid));
+      return fail(ErrorCode::Usage,
+                  fmt::format("--grid-mm \"{}\": must be positive", arguments.grid));
     options.step_m = *step;
   }
-  if (arguments.least_distance_mm) options.least_distance_m = *arguments.least_distance_mm / kMmPerM;
+
+  if (arguments.least_distance_mm)
+    options.least_distance_m = *arguments.least_distance_mm / kMmPerM;
   return options;
 }
 
 Result<void> create_folder(const std::filesystem::path& folder) {
   std::error_code failed;
   std::filesystem::create_directories(folder, failed);
-  if (failed) return fail(ErrorCode::Io, fmt::format("create {}: {}", folder.string(), failed.message()));
+  if (failed)
+    return fail(ErrorCode::Io, fmt::format("create {}: {}", folder.string(), failed.message()));
   return {};
 }
 
-/// Into OUT, where there is one, before anything can go wrong with them: nobody measures twice gladly.
+/// Into OUT, where there is one, before anything can go wrong with them: nobody measures twice
+/// gladly.
 Result<void> keep(const VerifyArguments& arguments, const VerificationFile& points) {
   if (arguments.out.empty()) return {};
   if (auto made = create_folder(arguments.out); !made) return made;
@@ -82,13 +88,17 @@ Result<LivePoints> from_file(Result<VerificationFile> points) {
 
 Result<LivePoints> points_of(const VerifyArguments& arguments) {
   if (!arguments.points.empty()) return from_file(read_verification_csv(arguments.points));
-  const auto keep_them = [&arguments](const VerificationFile& points) { return keep(arguments, points); };
+  const auto keep_them = [&arguments](const VerificationFile& points) {
+    return keep(arguments, points);
+  };
+
   if (!arguments.recording.empty()) {
     auto points = points_of_recording(arguments.recording);
     if (points)
       if (auto done = keep_them(points->file); !done) return tl::make_unexpected(done.error());
     return points;
   }
+
   const auto socket = socket_path({arguments.socket, arguments.store.config});
   if (!socket) return tl::make_unexpected(socket.error());
   return points_of_daemon(*socket, arguments.count, keep_them);
@@ -103,17 +113,19 @@ Result<VerifyOutcome> compare(const VerifyArguments& arguments, std::optional<Er
   const auto tool_m = tool_of(arguments.tool, document->model);
   if (!tool_m) return tl::make_unexpected(tool_m.error());
   Verification v;
+
   if (!arguments.planes.empty()) {
     const auto planes = parse_mm("--planes-mm", arguments.planes);
     if (!planes) return tl::make_unexpected(planes.error());
     v.planes_m = *planes;
   }
+
   auto points = points_of(arguments);
   if (!points) return tl::make_unexpected(points.error());
   cut_short = std::move(points->cut_short);
   VerificationFile& file = points->file;
-  auto observed = verify::observe(file.points,
-                                  arguments.frame == "fit" ? verify::Frame::BestFit : verify::Frame::Machine);
+  auto observed = verify::observe(
+      file.points, arguments.frame == "fit" ? verify::Frame::BestFit : verify::Frame::Machine);
   if (!observed) return tl::make_unexpected(error_of(observed.error()));
   auto compared = verify::compare(*observed, document->model, *tool_m, *options);
   if (!compared) return tl::make_unexpected(error_of(compared.error()));
@@ -122,6 +134,7 @@ Result<VerifyOutcome> compare(const VerifyArguments& arguments, std::optional<Er
   if (!file.source.name.empty()) v.inputs = {file.source};
   v.lines = std::move(file.lines);
   if (cut_short) v.cut_short = cut_short->text;
+
   return VerifyOutcome{std::move(*document), std::move(v)};
 }
 
@@ -163,55 +176,65 @@ void print_json(const VerifyOutcome& outcome) {
       {"turned_urad", {kUradPerRad * turned(3), kUradPerRad * turned(4), kUradPerRad * turned(5)}},
       {"interpolation_rms_um", kUmPerM * c.interpolation_rms_m},
       {"cut_short", outcome.verification.cut_short}};
+
   if (const auto why = why_no_ratio(c)) {
     object["R_not_given"] = *why;
   } else {
     object["R_turned"] = figures(c.R_turned);
     object["R_stated"] = figures(c.R_stated);
   }
+
   fmt::print("{}\n", object.dump(1));
 }
 
 void print_ratio(const char* what, const verify::RatioStatistics& s) {
-  fmt::print("{:<11} {:>7} {:>7.3f} {:>7.3f} {:>7.3f} {:>7.3f} {:>7.3f} {:>7.3f} {:>7.3f} {:>8}\n", what,
-             s.count, s.mean, s.standard_deviation, s.min, s.p25, s.median, s.p75, s.max, s.above_1);
+  fmt::print("{:<11} {:>7} {:>7.3f} {:>7.3f} {:>7.3f} {:>7.3f} {:>7.3f} {:>7.3f} {:>7.3f} {:>8}\n",
+             what, s.count, s.mean, s.standard_deviation, s.min, s.p25, s.median, s.p75, s.max,
+             s.above_1);
 }
 
 void print_ratios(const verify::Comparison& c) {
   if (const auto why = why_no_ratio(c)) return fmt::print("R_resmag    not given: {}\n", *why);
-  fmt::print("{:<11} {:>7} {:>7} {:>7} {:>7} {:>7} {:>7} {:>7} {:>7} {:>8}\n", "R_resmag", "points", "mean",
-             "std", "min", "25 %", "median", "75 %", "max", "above 1");
+  fmt::print("{:<11} {:>7} {:>7} {:>7} {:>7} {:>7} {:>7} {:>7} {:>7} {:>8}\n", "R_resmag", "points",
+             "mean", "std", "min", "25 %", "median", "75 %", "max", "above 1");
   print_ratio("  turned", c.R_turned);
   print_ratio("  as stated", c.R_stated);
-  fmt::print("grid        interpolation alone costs {:.3f} um rms\n", kUmPerM * c.interpolation_rms_m);
+  fmt::print("grid        interpolation alone costs {:.3f} um rms\n",
+             kUmPerM * c.interpolation_rms_m);
 }
 
 void print_summary(const VerifyOutcome& outcome, const VerifyArguments& arguments) {
   const auto& v = outcome.verification;
   const auto& c = v.comparison;
   fmt::print("verdict     {}\n", verdict_text(c));
-  fmt::print("model       {}  (machine \"{}\", {})\n", model_id(outcome.document), outcome.document.machine,
-             outcome.document.method);
+  fmt::print("model       {}  (machine \"{}\", {})\n", model_id(outcome.document),
+             outcome.document.machine, outcome.document.method);
   fmt::print("points      {}, {} of them where the model holds\n", v.observations.readings_m.size(),
              c.inside.size());
   fmt::print(
-      "left        {:.3f} um rms (largest {:.3f}) without compensation, {:.3f} um ({:.3f}) with the model\n",
-      kUmPerM * c.before.rms_m, kUmPerM * c.before.max_m, kUmPerM * c.after.rms_m, kUmPerM * c.after.max_m);
+      "left        {:.3f} um rms (largest {:.3f}) without compensation, {:.3f} um ({:.3f}) with "
+      "the model\n",
+      kUmPerM * c.before.rms_m, kUmPerM * c.before.max_m, kUmPerM * c.after.rms_m,
+      kUmPerM * c.after.max_m);
   fmt::print("frame       {}; model turned by {:.1f}, {:.1f}, {:.1f} urad\n",
              arguments.frame == "fit" ? "fitted to the readings: V's best rigid motion is not seen"
                                       : "the machine's axes",
              kUradPerRad * c.turned(3), kUradPerRad * c.turned(4), kUradPerRad * c.turned(5));
   print_ratios(c);
+
   if (!arguments.out.empty())
-    fmt::print("written     {}, grid.csv\n", (std::filesystem::path(arguments.out) / "report.html").string());
+    fmt::print("written     {}, grid.csv\n",
+               (std::filesystem::path(arguments.out) / "report.html").string());
 }
 
 Result<void> write_outputs(const std::filesystem::path& folder, const VerifyOutcome& outcome) {
   if (folder.empty()) return {};
   if (auto made = create_folder(folder); !made) return made;
-  if (auto done = replace_file(folder / "grid.csv", to_grid_csv(outcome.verification.comparison)); !done)
+  if (auto done = replace_file(folder / "grid.csv", to_grid_csv(outcome.verification.comparison));
+      !done)
     return done;
-  return replace_file(folder / "report.html", verification_report(outcome.document, outcome.verification));
+  return replace_file(folder / "report.html",
+                      verification_report(outcome.document, outcome.verification));
 }
 
 int run(const VerifyArguments& arguments) {
@@ -221,7 +244,8 @@ int run(const VerifyArguments& arguments) {
     const int code = report(outcome.error());
     return cut_short ? report(*cut_short) : code;
   }
-  if (const auto written = write_outputs(arguments.out, *outcome); !written) return report(written.error());
+  if (const auto written = write_outputs(arguments.out, *outcome); !written)
+    return report(written.error());
   arguments.json ? print_json(*outcome) : print_summary(*outcome, arguments);
   return cut_short ? report(*cut_short) : 0;
 }
@@ -235,38 +259,49 @@ void add_options(CLI::App& command, VerifyArguments& arguments) {
   auto* points = command.add_option(
       "--points", arguments.points,
       "verification.csv: x_mm,y_mm,z_mm,tracker_x_mm,tracker_y_mm,tracker_z_mm: scale reading and\n"
-      "independent measurement there, each in its own frame; with [[thermal]] the readings a model is\n"
+      "independent measurement there, each in its own frame; with [[thermal]] the readings a model "
+      "is\n"
       "applied to: corrected for the temperature of the scales");
-  auto* recording = command.add_option("--recording", arguments.recording,
-                                       "what the daemon recorded (.mcap): wherever the machine stood still");
-  auto* live =
-      command.add_flag("--live", arguments.live,
-                       "wherever the machine that the running daemon watches stands still, until Ctrl-C");
-  command.add_option("--count", arguments.count, "with --live: ends after so many points")->needs(live);
-  command.add_option("--socket", arguments.socket, "with --live: control socket of abbed; or from --config")
+  auto* recording =
+      command.add_option("--recording", arguments.recording,
+                         "what the daemon recorded (.mcap): wherever the machine stood still");
+  auto* live = command.add_flag(
+      "--live", arguments.live,
+      "wherever the machine that the running daemon watches stands still, until Ctrl-C");
+  command.add_option("--count", arguments.count, "with --live: ends after so many points")
+      ->needs(live);
+  command
+      .add_option("--socket", arguments.socket,
+                  "with --live: control socket of abbed; or from --config")
       ->needs(live)
       ->capture_default_str();
   points->excludes(recording)->excludes(live);
   recording->excludes(live);
   command
-      .add_option("--frame", arguments.frame,
-                  "fit: the tracker's frame is fitted to the readings; machine: its axes are the machine's")
+      .add_option(
+          "--frame", arguments.frame,
+          "fit: the tracker's frame is fitted to the readings; machine: its axes are the machine's")
       ->check(CLI::IsMember({"fit", "machine"}))
       ->capture_default_str();
-  command.add_option("--tool", arguments.tool, "x,y,z: tool offset in mm; default: that of the calibration");
-  command.add_option("--origin-mm", arguments.origin,
-                     "x,y,z where V is set to zero; default: Ball1, or, for other methods, nowhere");
-  command.add_option("--grid-mm", arguments.grid, "x,y,z: steps of the grid; default: 20 steps an axis");
+  command.add_option("--tool", arguments.tool,
+                     "x,y,z: tool offset in mm; default: that of the calibration");
+  command.add_option(
+      "--origin-mm", arguments.origin,
+      "x,y,z where V is set to zero; default: Ball1, or, for other methods, nowhere");
+  command.add_option("--grid-mm", arguments.grid,
+                     "x,y,z: steps of the grid; default: 20 steps an axis");
   command
-      .add_option("--least-distance-mm", arguments.least_distance_mm,
-                  "leave out what is nearer to the origin; default: a tenth of the volume's diagonal")
+      .add_option(
+          "--least-distance-mm", arguments.least_distance_mm,
+          "leave out what is nearer to the origin; default: a tenth of the volume's diagonal")
       ->check(CLI::NonNegativeNumber);
   command.add_option("--planes-mm", arguments.planes,
                      "x,y,z of the report's planes of vectors; default: the middle of the grid");
   command.add_flag("--json", arguments.json, "the summary as one JSON object");
-  command.add_option("-o,--out", arguments.out,
-                     "folder for report.html and grid.csv, and for the points of --recording and --live in\n"
-                     "verification.csv; created if needed");
+  command.add_option(
+      "-o,--out", arguments.out,
+      "folder for report.html and grid.csv, and for the points of --recording and --live in\n"
+      "verification.csv; created if needed");
 }
 
 }  // namespace
@@ -275,17 +310,23 @@ void add_verify(CLI::App& parent, int& exit) {
   auto arguments = std::make_shared<VerifyArguments>();
   auto* command = parent.add_subcommand(
       "verify",
-      "Compare a model with independent measurements, of a laser tracker for example: first the verdict,\n"
-      "better or worse with the model; then what is left with and without it; where interpolating between\n"
-      "the points costs little, R_resmag = |what is left| / |what was there| on a grid inside its volume.\n"
+      "Compare a model with independent measurements, of a laser tracker for example: first the "
+      "verdict,\n"
+      "better or worse with the model; then what is left with and without it; where interpolating "
+      "between\n"
+      "the points costs little, R_resmag = |what is left| / |what was there| on a grid inside its "
+      "volume.\n"
       "Exit code 1, with the result all the same, if the recording is damaged inside.");
   add_options(*command, *arguments);
+
   command->callback([arguments, &exit] {
-    const bool has_points = !arguments->points.empty() || !arguments->recording.empty() || arguments->live;
+    const bool has_points =
+        !arguments->points.empty() || !arguments->recording.empty() || arguments->live;
     if (!has_points)
       exit = report({ErrorCode::Usage, "verify: give --points, --recording or --live"});
     else if (arguments->live && arguments->out.empty())
-      exit = report({ErrorCode::Usage, "verify --live: -o is needed, for the points to be kept in"});
+      exit =
+          report({ErrorCode::Usage, "verify --live: -o is needed, for the points to be kept in"});
     else
       exit = run(*arguments);
   });

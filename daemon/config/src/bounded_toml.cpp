@@ -21,7 +21,8 @@ Error too_deep(std::string_view text, std::size_t at, const std::string& file, s
 
 }  // namespace
 
-Result<toml::table> parse_toml(std::string_view text, const std::string& file, const TomlBounds& bounds) {
+Result<toml::table> parse_toml(std::string_view text, const std::string& file,
+                               const TomlBounds& bounds) {
   if (text.size() > bounds.bytes)
     return fail(ErrorCode::BadInput,
                 fmt::format("{}: {} bytes, at most {} are read", file, text.size(), bounds.bytes));

@@ -3,7 +3,8 @@
 namespace abbe::daemon {
 
 Error error_of(const calib::Error& error) {
-  const bool input = error.code == calib::ErrorCode::BadInput || error.code == calib::ErrorCode::NotFinite;
+  const bool input =
+      error.code == calib::ErrorCode::BadInput || error.code == calib::ErrorCode::NotFinite;
   return {input ? ErrorCode::BadInput : ErrorCode::DataInsufficient, error.text};
 }
 

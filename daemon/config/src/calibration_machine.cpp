@@ -13,6 +13,7 @@ Result<calib::otf::Machine> otf_machine(const MachineConfig& machine) {
   if (!chain) return tl::unexpected(error_of(chain.error()));
   calib::otf::Machine out;
   out.chain = *chain;
+
   for (const calib::Axis a : calib::kAllAxes) {
     const std::string axis_name(1, calib::letter(a));
     const AxisConfig* axis = machine.find_axis(axis_name);
@@ -23,7 +24,9 @@ Result<calib::otf::Machine> otf_machine(const MachineConfig& machine) {
     }
     out.nodes[calib::index(a)] = {.nodes_m = nodes->second, .reference_m = axis->reference};
   }
-  out.target_offset_m = {machine.target_offset_m[0], machine.target_offset_m[1], machine.target_offset_m[2]};
+
+  out.target_offset_m = {machine.target_offset_m[0], machine.target_offset_m[1],
+                         machine.target_offset_m[2]};
   return out;
 }
 
@@ -31,10 +34,12 @@ Result<void> require_target(const MachineConfig& machine) {
   if (machine.target_given) return {};
   return fail(
       ErrorCode::BadInput,
-      fmt::format("machine {}: [target] offset_mm is missing: add [target] with offset_mm = [x, y, z], the "
-                  "reflector's or stylus tip's centre as seen from the tool reference point, in mm along the "
-                  "machine's axes; [0, 0, 0] where both are one point",
-                  machine.name));
+      fmt::format(
+          "machine {}: [target] offset_mm is missing: add [target] with offset_mm = [x, y, z], the "
+          "reflector's or stylus tip's centre as seen from the tool reference point, in mm along "
+          "the "
+          "machine's axes; [0, 0, 0] where both are one point",
+          machine.name));
 }
 
 }  // namespace abbe::daemon

@@ -16,8 +16,9 @@ namespace {
 Config read_all(Section& root, const std::filesystem::path& base) {
   Config config;
   read_machine(root, config.machine);
-  read_daemon(root, base,
-              config);  // before the devices: what may be said of them depends on [daemon] simulated
+  read_daemon(
+      root, base,
+      config);  // before the devices: what may be said of them depends on [daemon] simulated
   read_tracker(root, config);
   read_encoder(root, config);
   read_counter_card(root, config);
@@ -33,6 +34,7 @@ Config read_all(Section& root, const std::filesystem::path& base) {
   read_evemu(root, config);
   read_control(root, base, config);
   root.close();
+
   return config;
 }
 
@@ -57,8 +59,9 @@ std::string reading_text(const CounterCardConfig& card) {
 std::string reading_text(const ReferenceConfig& reference) {
   std::string text;
   for (const auto& axis : reference.axes)
-    text += fmt::format("|marks {} {:.17g} {:.17g} {} {}", axis.axis, axis.zero_mark, axis.signal_period,
-                        axis.code.increment, axis.reversed ? "reversed" : "along");
+    text +=
+        fmt::format("|marks {} {:.17g} {:.17g} {} {}", axis.axis, axis.zero_mark,
+                    axis.signal_period, axis.code.increment, axis.reversed ? "reversed" : "along");
   return text;
 }
 
@@ -94,22 +97,26 @@ std::vector<std::string> Config::connected_axes() const {
 
 std::string machine_hash(const Config& config) {
   const MachineConfig& machine = config.machine;
-  std::string text = fmt::format("{}|{}|{}", machine.name, machine.chain, static_cast<int>(machine.basis));
+  std::string text =
+      fmt::format("{}|{}|{}", machine.name, machine.chain, static_cast<int>(machine.basis));
   for (const auto& axis : machine.axes)
-    text += fmt::format("|{} {} {:.17g} {:.17g} {:.17g}", axis.name, static_cast<int>(axis.kind), axis.min,
-                        axis.max, axis.reference);
+    text += fmt::format("|{} {} {:.17g} {:.17g} {:.17g}", axis.name, static_cast<int>(axis.kind),
+                        axis.min, axis.max, axis.reference);
   for (const double t : machine.target_offset_m) text += fmt::format("|{:.17g}", t);
+
   for (const auto& [axis, nodes_m] : machine.nodes_m) {
     text += "|" + axis;
     for (const double node_m : nodes_m) text += fmt::format(" {:.17g}", node_m);
   }
+
   if (config.encoder) text += reading_text(*config.encoder);
   if (config.counter_card) text += reading_text(*config.counter_card);
   if (config.reference) text += reading_text(*config.reference);
   if (config.cmm_reads_axes()) text += reading_text(*config.cmm);
   for (const auto& thermal : config.thermal)
-    text += fmt::format("|thermal {} {:.17g} {:.17g} {}", thermal.axis, thermal.alpha_per_K, thermal.fixed_m,
-                        config.temperatures[thermal.temperature]);
+    text += fmt::format("|thermal {} {:.17g} {:.17g} {}", thermal.axis, thermal.alpha_per_K,
+                        thermal.fixed_m, config.temperatures[thermal.temperature]);
+
   return sha256_hex(text);
 }
 

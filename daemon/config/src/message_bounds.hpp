@@ -1,6 +1,7 @@
 #pragma once
-/// What goes out and is recorded in messages of bounded size (abbe_v1.idl) must fit from the start: a name
-/// too long would lose every message that carries it, a thousand times a second and for ever.
+/// What goes out and is recorded in messages of bounded size (abbe_v1.idl) must fit from the start:
+/// a name too long would lose every message that carries it, a thousand times a second and for
+/// ever.
 
 #include <cstddef>
 #include <string>
@@ -19,9 +20,10 @@ template <class T>
   return 0;
 }
 
-/// A text that travels in messages: faults one that is longer than `most_bytes` or has a NUL inside.
-inline bool get_bounded(Section& section, std::string_view key, std::string& out, std::size_t most_bytes,
-                        Need need = Need::Optional) {
+/// A text that travels in messages: faults one that is longer than `most_bytes` or has a NUL
+/// inside.
+inline bool get_bounded(Section& section, std::string_view key, std::string& out,
+                        std::size_t most_bytes, Need need = Need::Optional) {
   if (!section.get(key, out, need)) return false;
   if (out.size() > most_bytes)
     section.fault(key, "must be at most " + std::to_string(most_bytes) +

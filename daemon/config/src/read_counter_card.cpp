@@ -60,7 +60,8 @@ void read_scan(Section& card, CounterCardConfig& out) {
   card.get("scan_rate_hz", out.wiring.scan_rate_hz, kPlain, kPositive);
   if (card.get_integer("width_bits", bits, 32, 48) && bits != 32 && bits != 48)
     card.fault("width_bits", "must be 32 or 48");
-  out.wiring.width = bits == 48 ? drivers::quad08::CountWidth::Bits48 : drivers::quad08::CountWidth::Bits32;
+  out.wiring.width =
+      bits == 48 ? drivers::quad08::CountWidth::Bits48 : drivers::quad08::CountWidth::Bits32;
   card.get_integer("sample_every", out.sample_every, 1, 1'000'000);
   card.get("max_constant_delay_us", out.max_constant_delay, kMicro, kNotNegative);
   card.get("axes_compensated", out.axes_compensated);
@@ -70,7 +71,8 @@ drivers::CounterAxis read_axis(Section& section, const MachineConfig& machine) {
   drivers::CounterAxis axis;
   const bool named = section.get("axis", axis.name, Need::Required);
   const AxisConfig* known = machine.find_axis(axis.name);
-  if (named && known == nullptr && !machine.axes.empty()) section.fault("axis", "no such axis in [axes]");
+  if (named && known == nullptr && !machine.axes.empty())
+    section.fault("axis", "no such axis in [axes]");
   const bool linear = known == nullptr || known->kind == AxisKind::Linear;
   section.get_integer("channel", axis.channel, 0, kLastChannel, Need::Required);
   section.get(linear ? "step_nm" : "step_nrad", axis.scale, kNano, kNotNegative, Need::Required);
@@ -80,6 +82,7 @@ drivers::CounterAxis read_axis(Section& section, const MachineConfig& machine) {
   bool invert = false;
   if (section.get("invert", invert) && invert) axis.scale = -axis.scale;
   section.close();
+
   return axis;
 }
 
@@ -88,36 +91,45 @@ drivers::CounterAxis read_latched_axis(Section& section, const CounterCardConfig
   drivers::CounterAxis axis{.latch_on_index = true};
   const bool named = section.get("axis", axis.name, Need::Required);
   const auto counted = std::ranges::find(live.wiring.axes, axis.name, &drivers::CounterAxis::name);
-  if (named && counted == live.wiring.axes.end()) section.fault("axis", "is not counted by [counter_card]");
+  if (named && counted == live.wiring.axes.end())
+    section.fault("axis", "is not counted by [counter_card]");
+
   if (counted != live.wiring.axes.end()) {
     axis.scale = counted->scale;
     if (counted->offset != 0.0)
-      section.fault("axis", fmt::format("has an offset in [counter_card], which the marks of {} are to give",
-                                        axis.name));
+      section.fault(
+          "axis", fmt::format("has an offset in [counter_card], which the marks of {} are to give",
+                              axis.name));
   }
+
   section.get_integer("channel", axis.channel, 0, kLastChannel, Need::Required);
   read_debounce(section, "debounce_code", axis.debounce);
   marks.axis = axis.name;
+
   return axis;
 }
 
 void read_marks(Section& section, bool linear, double step, ReferenceAxisConfig& out) {
   double length = 0.0;
-  section.get(linear ? "signal_period_um" : "signal_period_urad", out.signal_period, kMicro, kPositive,
-              Need::Required);
+  section.get(linear ? "signal_period_um" : "signal_period_urad", out.signal_period, kMicro,
+              kPositive, Need::Required);
   section.get(linear ? "length_mm" : "length_rad", length, linear ? kMilli : kPlain, kPositive,
               Need::Required);
   section.get_integer("increment", out.code.increment, 2, 1'000'000);
-  section.get(linear ? "zero_mark_mm" : "zero_mark_rad", out.zero_mark, linear ? kMilli : kPlain, kAny);
+  section.get(linear ? "zero_mark_mm" : "zero_mark_rad", out.zero_mark, linear ? kMilli : kPlain,
+              kAny);
   section.get("reversed", out.reversed);
   out.code.rotary = !linear;
   out.code.length = std::llround(length / out.signal_period);
   const double counts = out.signal_period / std::abs(step);
+
   if (std::isfinite(counts) && std::abs(counts - std::round(counts)) > 1e-6 * counts)
     section.fault(
-        "", fmt::format("a signal period holds {:.6g} counts of [counter_card]: it must be a whole number",
-                        counts));
-  if (const auto possible = drivers::check(out.code); !possible) section.fault("", possible.error().text);
+        "", fmt::format(
+                "a signal period holds {:.6g} counts of [counter_card]: it must be a whole number",
+                counts));
+  if (const auto possible = drivers::check(out.code); !possible)
+    section.fault("", possible.error().text);
 }
 
 void read_latched_axes(Section& section, const Config& config, ReferenceConfig& out) {
@@ -135,7 +147,8 @@ void read_latched_axes(Section& section, const Config& config, ReferenceConfig& 
 /// The same card cannot count live and latch.
 bool same_card(const CounterCardConfig& a, const CounterCardConfig& b) {
   if (a.transport != b.transport) return false;
-  if (a.transport == CardTransport::Usb) return a.serial_number.empty() || a.serial_number == b.serial_number;
+  if (a.transport == CardTransport::Usb)
+    return a.serial_number.empty() || a.serial_number == b.serial_number;
   return a.host == b.host && a.port == b.port && a.bus_id == b.bus_id;
 }
 
@@ -157,17 +170,20 @@ void read_reference(Section& root, Config& out) {
   section.get("latch_verified", card.wiring.latch_verified);
   section.get("u_alignment_us", config.u_alignment, kMicro, kPositive);
   section.get("tolerance_um", config.tolerance_m, kMicro, kPositive);
+
   if (!out.counter_card) {
     section.fault("", "needs [counter_card]: the axes must be counted live, too");
     static_cast<void>(section.has("axes"));
   } else {
     if (same_card(*out.counter_card, card))
-      section.fault(
-          "", "is the card of [counter_card]: marks need a second one, told apart by its serial number");
+      section.fault("",
+                    "is the card of [counter_card]: marks need a second one, told apart by its "
+                    "serial number");
     read_latched_axes(section, out, config);
     if (const auto possible = drivers::check(card.wiring); !possible)
       section.fault("", possible.error().text);
   }
+
   section.close();
   out.reference = std::move(config);
 }
@@ -183,14 +199,19 @@ void read_counter_card(Section& root, Config& out) {
   read_probe(card, config.wiring);
   read_scan(card, config);
   card.get_word<bool>("zero", config.zero_is_here, {{"unknown", false}, {"here", true}});
-  for (auto& section : card.children("axes")) config.wiring.axes.push_back(read_axis(section, out.machine));
+  for (auto& section : card.children("axes"))
+    config.wiring.axes.push_back(read_axis(section, out.machine));
   put_in_order_of_the_machine(out.machine, &drivers::CounterAxis::name, card, "axes", "channel",
                               config.wiring.axes);
+
   // The driver knows what a wiring must be; its sentence names axis and channel.
-  if (const auto possible = drivers::check(config.wiring); !possible) card.fault("", possible.error().text);
+  if (const auto possible = drivers::check(config.wiring); !possible)
+    card.fault("", possible.error().text);
   for (const auto& axis : config.wiring.axes)
-    if (const auto claimed = out.connected_axes(); std::ranges::find(claimed, axis.name) != claimed.end())
-      card.fault("axes", fmt::format("axis {} is claimed by [encoder] and [counter_card]", axis.name));
+    if (const auto claimed = out.connected_axes();
+        std::ranges::find(claimed, axis.name) != claimed.end())
+      card.fault("axes",
+                 fmt::format("axis {} is claimed by [encoder] and [counter_card]", axis.name));
   card.close();
   out.counter_card = std::move(config);
 }

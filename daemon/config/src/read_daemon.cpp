@@ -16,16 +16,19 @@ void read_cpu(Section& section, std::string_view key, std::optional<int>& out) {
 }
 
 void read_scheduling(Section& section, DaemonConfig& out) {
-  section.get_word<RealTimeMode>("realtime", out.realtime,
-                                 {{"enforce", RealTimeMode::Enforce}, {"ignore", RealTimeMode::Ignore}});
+  section.get_word<RealTimeMode>(
+      "realtime", out.realtime,
+      {{"enforce", RealTimeMode::Enforce}, {"ignore", RealTimeMode::Ignore}});
   section.get_integer("tracker_priority", out.tracker_priority, 1, 99);
   section.get_integer("encoder_priority", out.encoder_priority, 1, 99);
   section.get_integer("hub_priority", out.hub_priority, 1, 99);
+
   if (out.hub_priority >= std::min(out.tracker_priority, out.encoder_priority))
-    section.fault("hub_priority",
-                  fmt::format("{} must be below tracker_priority {} and encoder_priority {}: a busy hub must "
-                              "not keep the devices from their bytes",
-                              out.hub_priority, out.tracker_priority, out.encoder_priority));
+    section.fault(
+        "hub_priority",
+        fmt::format("{} must be below tracker_priority {} and encoder_priority {}: a busy hub must "
+                    "not keep the devices from their bytes",
+                    out.hub_priority, out.tracker_priority, out.encoder_priority));
   read_cpu(section, "tracker_cpu", out.tracker_cpu);
   read_cpu(section, "encoder_cpu", out.encoder_cpu);
   read_cpu(section, "hub_cpu", out.hub_cpu);
@@ -40,13 +43,17 @@ void read_daemon(Section& root, const std::filesystem::path& base, Config& out) 
   auto& daemon = out.daemon;
   section.get("data_dir", daemon.data_dir, base);
   section.get("runtime_dir", daemon.runtime_dir, base);
-  // The hub says "alive" to abbe-dds every 100 ms, and is held for hung after a second without a turn.
+
+  // The hub says "alive" to abbe-dds every 100 ms, and is held for hung after a second without a
+  // turn.
   section.get("hub_period_us", daemon.hub_period, kMicro, {50.0, 50e3});
-  section.get("watermark_ms", daemon.watermark, kMilli, {1.0, 5e3});  // half of what the assembler remembers
+  section.get("watermark_ms", daemon.watermark, kMilli,
+              {1.0, 5e3});  // half of what the assembler remembers
   section.get("simulated", daemon.simulated);
   section.get("speed", daemon.speed, kPlain, {1e-3, 1e4});
   if (daemon.speed != 1.0 && !daemon.simulated)
-    section.fault("speed", "may differ from 1 only with simulated = true: real devices keep real time");
+    section.fault("speed",
+                  "may differ from 1 only with simulated = true: real devices keep real time");
   read_scheduling(section, daemon);
   section.close();
 }
@@ -57,6 +64,7 @@ void read_recording(Section& root, const std::filesystem::path& base, Config& ou
   recording.dir = out.daemon.data_dir / "recordings";
   section.get("dir", recording.dir, base);
   std::uint32_t chunk_kB = 256;
+
   if (section.get_integer("chunk_kB", chunk_kB, 4, 65536)) recording.chunk_bytes = chunk_kB * 1024;
   section.get("chunk_period_ms", recording.chunk_period, kMilli, {10.0, 60e3});
   section.get("raw", recording.raw);
@@ -67,7 +75,8 @@ void read_recording(Section& root, const std::filesystem::path& base, Config& ou
   if (section.get_integer("max_file_MB", max_file_MB, 0, 1'000'000'000))
     recording.max_file_bytes = max_file_MB << 20;
   int keep_days = 0;
-  if (section.get_integer("keep_days", keep_days, 0, 36'500)) recording.keep = std::chrono::days{keep_days};
+  if (section.get_integer("keep_days", keep_days, 0, 36'500))
+    recording.keep = std::chrono::days{keep_days};
   section.close();
 }
 
@@ -75,9 +84,11 @@ void read_dds(Section& root, const std::filesystem::path& base, Config& out) {
   Section section = root.child("dds");
   auto& dds = out.dds;
   dds.socket = out.daemon.runtime_dir / "dds.sock";
-  section.get_integer("domain", dds.domain, 0, 232);  // RTPS 2.2, 9.6.1.1: port numbers end at domain 232
-  // 0: every turn of the hub in which something new came. Its period and the devices' rates are the bound
-  // then.
+  section.get_integer("domain", dds.domain, 0,
+                      232);  // RTPS 2.2, 9.6.1.1: port numbers end at domain 232
+
+  // 0: every turn of the hub in which something new came. Its period and the devices' rates are the
+  // bound then.
   section.get("snapshot_hz", dds.snapshot_hz, kPlain, {0.0, 1000.0});
   section.get("compensation_hz", dds.compensation_hz, kPlain, {0.0, 1000.0});
   section.get_integer("priority", dds.priority, 0, 99);
@@ -103,14 +114,16 @@ void read_gate(Section& root, Config& out) {
   section.get("max_gradient", gate.max_gradient, kPlain, kPositive);
   section.get("path_tolerance_mm", gate.path_tolerance_m, kMilli, kPositive);
   section.get("holdout_fraction", gate.holdout_fraction, kPlain, {0.05, 0.5});
+
   if (section.get("accept", gate.accept)) {
     for (const auto& name : gate.accept)
-      if (name != calib::evemu::kShapeOnly && name != calib::kSmallerVolume && name != calib::kScaleChange &&
-          name != calib::otf::kPathOrientation)
-        section.fault("accept", fmt::format("\"{}\": must be \"{}\", \"{}\", \"{}\" or \"{}\"", name,
-                                            calib::evemu::kShapeOnly, calib::kSmallerVolume,
+      if (name != calib::evemu::kShapeOnly && name != calib::kSmallerVolume &&
+          name != calib::kScaleChange && name != calib::otf::kPathOrientation)
+        section.fault("accept", fmt::format("\"{}\": must be \"{}\", \"{}\", \"{}\" or \"{}\"",
+                                            name, calib::evemu::kShapeOnly, calib::kSmallerVolume,
                                             calib::kScaleChange, calib::otf::kPathOrientation));
   }
+
   section.close();
 }
 

@@ -30,6 +30,7 @@ void read_placement(Section& tracker, MachineConfig& machine) {
                                          {"-Z", TrackerVertical::MinusZ}}))
     machine.tracker_vertical = vertical;
   std::vector<double> position_m;
+
   if (!tracker.get("position_mm", position_m, kMilli)) return;
   if (position_m.size() == 3)
     machine.tracker_position_m = {position_m[0], position_m[1], position_m[2]};
@@ -37,7 +38,8 @@ void read_placement(Section& tracker, MachineConfig& machine) {
     tracker.fault("position_mm", "must be three numbers, x, y, z in machine coordinates");
 }
 
-/// emScon measures every whole number of milliseconds: a rate in between would silently become another.
+/// emScon measures every whole number of milliseconds: a rate in between would silently become
+/// another.
 void read_point_rate(Section& tracker, TrackerConfig& out) {
   constexpr double kRounded = 5e-3;  // 333 stands for 333.3
   if (!tracker.get("point_rate_hz", out.point_rate_hz, kPlain, {1.0, 1000.0})) return;
@@ -46,16 +48,18 @@ void read_point_rate(Section& tracker, TrackerConfig& out) {
     tracker.fault(
         "point_rate_hz",
         fmt::format("the tracker measures every whole ms: possible nearby are {:.4g} and {:.4g}",
-                    1e3 / std::ceil(1e3 / out.point_rate_hz), 1e3 / std::floor(1e3 / out.point_rate_hz)));
+                    1e3 / std::ceil(1e3 / out.point_rate_hz),
+                    1e3 / std::floor(1e3 / out.point_rate_hz)));
   out.point_rate_hz = 1e3 / period_ms;
 }
 
 /// What only the other mode knows is refused: it would be silently ignored.
 void read_mode(Section& tracker, TrackerConfig& out) {
   constexpr int kLongest_ms = 60'000;  // emScon
-  tracker.get_word<TrackerModeConfig>(
-      "mode", out.mode,
-      {{"continuous", TrackerModeConfig::Continuous}, {"stationary", TrackerModeConfig::Stationary}});
+  tracker.get_word<TrackerModeConfig>("mode", out.mode,
+                                      {{"continuous", TrackerModeConfig::Continuous},
+                                       {"stationary", TrackerModeConfig::Stationary}});
+
   if (out.mode == TrackerModeConfig::Stationary) {
     int time_ms = static_cast<int>(out.stationary_time / std::chrono::milliseconds{1});
     tracker.get_integer("stationary_time_ms", time_ms, 1, kLongest_ms);
@@ -83,11 +87,14 @@ void read_search(Section& tracker, TrackerConfig& out) {
   const bool radius = tracker.get("search_radius_mm", search.radius_m, kMilli, kRadius_mm);
   const bool timeout = tracker.get("search_timeout_s", search.timeout, kPlain, kTimeout_s);
   if (radius && timeout) out.search = search;
+
   const auto misses = [&](std::string_view given, std::string_view missing) {
     if (tracker.has(given) && !tracker.has(missing))
-      tracker.fault(missing,
-                    fmt::format("missing, but {} is given: the controller takes both or none", given));
+      tracker.fault(
+          missing,
+          fmt::format("missing, but {} is given: the controller takes both or none", given));
   };
+
   misses("search_radius_mm", "search_timeout_s");
   misses("search_timeout_s", "search_radius_mm");
 }
@@ -96,14 +103,16 @@ void read_search(Section& tracker, TrackerConfig& out) {
 void read_beam(Section& tracker, TrackerConfig& out) {
   tracker.get_maybe_empty("reflector", out.reflector);
   if (out.reflector.size() > drivers::kLongestReflectorName)
-    tracker.fault("reflector", fmt::format("must be at most {} bytes long: no controller has a longer name",
-                                           drivers::kLongestReflectorName));
+    tracker.fault("reflector",
+                  fmt::format("must be at most {} bytes long: no controller has a longer name",
+                              drivers::kLongestReflectorName));
   tracker.get("home_after_initialize", out.home_after_initialize);
   read_search(tracker, out);
 }
 
 /// Keys that only make sense on the other transport are refused: they would be silently ignored.
-void refuse(Section& encoder, std::initializer_list<std::string_view> keys, std::string_view transport) {
+void refuse(Section& encoder, std::initializer_list<std::string_view> keys,
+            std::string_view transport) {
   for (const auto key : keys)
     if (encoder.has(key))
       encoder.fault(key, fmt::format("has no meaning with transport = \"{}\"", transport));
@@ -113,24 +122,27 @@ void read_transport(Section& encoder, EncoderConfig& out) {
   const bool known = encoder.get_word<EncoderTransport>(
       "transport", out.transport,
       {{"udp", EncoderTransport::Udp}, {"socketcan", EncoderTransport::SocketCan}}, Need::Required);
+
   if (!known) {
     for (const auto key : {"interface", "sync", "local_port", "peer_host", "peer_port"})
       static_cast<void>(encoder.has(key));
   } else if (out.transport == EncoderTransport::SocketCan) {
     encoder.get("interface", out.interface, Need::Required);
-    encoder.get_word<SyncConfig>(
-        "sync", out.sync,
-        {{"daemon", SyncConfig::Daemon}, {"kernel", SyncConfig::Kernel}, {"external", SyncConfig::External}});
+    encoder.get_word<SyncConfig>("sync", out.sync,
+                                 {{"daemon", SyncConfig::Daemon},
+                                  {"kernel", SyncConfig::Kernel},
+                                  {"external", SyncConfig::External}});
     refuse(encoder, {"local_port", "peer_host", "peer_port"}, "socketcan");
   } else {
     encoder.get_integer("local_port", out.local_port, 0, 65535);
     encoder.get("peer_host", out.peer_host, Need::Required);
     encoder.get_integer("peer_port", out.peer_port, 1, 65535, Need::Required);
-    encoder.get_word<SyncConfig>("sync", out.sync,
-                                 {{"daemon", SyncConfig::Daemon}, {"external", SyncConfig::External}});
+    encoder.get_word<SyncConfig>(
+        "sync", out.sync, {{"daemon", SyncConfig::Daemon}, {"external", SyncConfig::External}});
     if (out.sync == SyncConfig::External && out.local_port == 0)
-      encoder.fault("local_port",
-                    "missing: with sync = \"external\" abbed sends nothing the peer could answer to");
+      encoder.fault(
+          "local_port",
+          "missing: with sync = \"external\" abbed sends nothing the peer could answer to");
     refuse(encoder, {"interface"}, "udp");
   }
 }
@@ -155,7 +167,8 @@ EncoderNodeConfig read_node(Section& section, const MachineConfig& machine, Sync
   EncoderNodeConfig node;
   const bool named = section.get("axis", node.axis, Need::Required);
   const AxisConfig* axis = machine.find_axis(node.axis);
-  if (named && axis == nullptr && !machine.axes.empty()) section.fault("axis", "no such axis in [axes]");
+  if (named && axis == nullptr && !machine.axes.empty())
+    section.fault("axis", "no such axis in [axes]");
   if (axis != nullptr) node.kind = axis->kind;
   section.get_integer("node", node.node, 1, 127, Need::Required);
   const bool linear = node.kind == AxisKind::Linear;
@@ -165,6 +178,7 @@ EncoderNodeConfig read_node(Section& section, const MachineConfig& machine, Sync
   if (section.get("invert", invert) && invert) node.step = -node.step;
   read_mapping(section, sync, node);
   section.close();
+
   return node;
 }
 
@@ -172,6 +186,7 @@ void read_nodes(Section& encoder, const MachineConfig& machine, EncoderConfig& o
   constexpr std::size_t kMostNodes = 8;  // as many axes as a sample carries
   std::set<std::string> axes;
   std::set<int> ids;
+
   for (auto& section : encoder.children("nodes")) {
     auto node = read_node(section, machine, out.sync);
     if (!node.axis.empty() && !axes.insert(node.axis).second)
@@ -180,9 +195,11 @@ void read_nodes(Section& encoder, const MachineConfig& machine, EncoderConfig& o
       section.fault("node", fmt::format("node id {} is used twice", node.node));
     out.nodes.push_back(std::move(node));
   }
+
   if (out.nodes.empty() || out.nodes.size() > kMostNodes)
     encoder.fault("nodes", fmt::format("needs 1 to {} nodes", kMostNodes));
-  put_in_order_of_the_machine(machine, &EncoderNodeConfig::axis, encoder, "nodes", "node", out.nodes);
+  put_in_order_of_the_machine(machine, &EncoderNodeConfig::axis, encoder, "nodes", "node",
+                              out.nodes);
 }
 
 }  // namespace
@@ -192,7 +209,8 @@ namespace {
 /// `air` is read after [tracker]; null: not there.
 double default_u_scale(WeatherConfig weather, const toml::node* air) {
   if (weather == WeatherConfig::Compute) return TrackerConfig::kControllersAir;
-  const bool corrected = air != nullptr && air->is_table() && air->as_table()->contains("assumed_index");
+  const bool corrected =
+      air != nullptr && air->is_table() && air->as_table()->contains("assumed_index");
   return corrected ? 0.0 : u_of_unmeasured_air();
 }
 
@@ -207,9 +225,11 @@ void read_tracker(Section& root, Config& out) {
   get_bounded(tracker, "name", config.name, bound_of<v1::TrackerPoint>("device"));
   tracker.get_integer("port", config.port, 1, 65535);
   read_mode(tracker, config);
-  tracker.get_word<WeatherConfig>(
-      "weather", config.weather,
-      {{"none", WeatherConfig::None}, {"read", WeatherConfig::Read}, {"compute", WeatherConfig::Compute}});
+  tracker.get_word<WeatherConfig>("weather", config.weather,
+                                  {{"none", WeatherConfig::None},
+                                   {"read", WeatherConfig::Read},
+                                   {"compute", WeatherConfig::Compute}});
+
   if (!tracker.get("u_scale_ppm", config.u_scale, kMicro, kNotNegative))
     config.u_scale = default_u_scale(config.weather, root.node("air"));
   read_tracker_timeouts(tracker, config);
@@ -226,6 +246,7 @@ void read_encoder(Section& root, Config& out) {
   EncoderConfig config;
   get_bounded(encoder, "name", config.name, bound_of<v1::AxisSample>("device"));
   read_transport(encoder, config);
+
   // Nodes count as silent after 350 ms, and the axes as unknown after 500 ms.
   encoder.get("sync_period_us", config.sync_period, kMicro, {100.0, 100e3});
   encoder.get("sampling_delay_us", config.sampling_delay, kMicro, kNotNegative);

@@ -41,6 +41,7 @@ void read_address(Section& device, drivers::ModbusAddress& out) {
   if (serial == device.has("host")) {
     device.fault(serial ? "serial" : "", "needs one of host (Modbus TCP) and serial (Modbus RTU)");
   }
+
   if (!serial) {
     drivers::ModbusTcp tcp;
     device.get("host", tcp.host);
@@ -50,13 +51,16 @@ void read_address(Section& device, drivers::ModbusAddress& out) {
     out = tcp;
     return;
   }
+
   drivers::ModbusSerial line;
   device.get("serial", line.path);
   device.get_integer("baud", line.baud, 300, 4'000'000);
-  device.get_word<drivers::Parity>(
-      "parity", line.parity,
-      {{"none", drivers::Parity::None}, {"even", drivers::Parity::Even}, {"odd", drivers::Parity::Odd}});
+  device.get_word<drivers::Parity>("parity", line.parity,
+                                   {{"none", drivers::Parity::None},
+                                    {"even", drivers::Parity::Even},
+                                    {"odd", drivers::Parity::Odd}});
   device.get_integer("stop_bits", line.stop_bits, 1, 2);
+
   if (device.has("port")) device.fault("port", "has no meaning with serial");
   out = line;
 }
@@ -78,8 +82,10 @@ drivers::RegisterPlace read_place(Section& section, std::uint8_t unit) {
                                   {"bcd16", RegisterType::Bcd16},
                                   {"bcd32", RegisterType::Bcd32}},
                                  Need::Required);
-  section.get_word<WordOrder>("word_order", place.order,
-                              {{"high_first", WordOrder::HighFirst}, {"low_first", WordOrder::LowFirst}});
+  section.get_word<WordOrder>(
+      "word_order", place.order,
+      {{"high_first", WordOrder::HighFirst}, {"low_first", WordOrder::LowFirst}});
+
   return place;
 }
 
@@ -93,11 +99,16 @@ struct RegisterUnit {
 /// The unit must fit the quantity: a pressure in C is a map that cannot be meant.
 void read_unit(Section& section, drivers::MeasuredRegister& out) {
   static const std::vector<std::pair<std::string_view, RegisterUnit>> kUnits{
-      {"C", {Quantity::Temperature, 1.0, kZeroCelsius_K}}, {"K", {Quantity::Temperature, 1.0, 0.0}},
-      {"Pa", {Quantity::AirPressure, 1.0, 0.0}},           {"hPa", {Quantity::AirPressure, 100.0, 0.0}},
-      {"mbar", {Quantity::AirPressure, 100.0, 0.0}},       {"kPa", {Quantity::AirPressure, 1e3, 0.0}},
-      {"%", {Quantity::RelativeHumidity, 0.01, 0.0}},      {"1", {Quantity::RelativeHumidity, 1.0, 0.0}}};
+      {"C", {Quantity::Temperature, 1.0, kZeroCelsius_K}},
+      {"K", {Quantity::Temperature, 1.0, 0.0}},
+      {"Pa", {Quantity::AirPressure, 1.0, 0.0}},
+      {"hPa", {Quantity::AirPressure, 100.0, 0.0}},
+      {"mbar", {Quantity::AirPressure, 100.0, 0.0}},
+      {"kPa", {Quantity::AirPressure, 1e3, 0.0}},
+      {"%", {Quantity::RelativeHumidity, 0.01, 0.0}},
+      {"1", {Quantity::RelativeHumidity, 1.0, 0.0}}};
   std::vector<std::pair<std::string_view, std::size_t>> words;
+
   for (std::size_t i = 0; i < kUnits.size(); ++i) words.emplace_back(kUnits[i].first, i);
   std::size_t index = 0;
   double scale = 1.0;
@@ -107,7 +118,8 @@ void read_unit(Section& section, drivers::MeasuredRegister& out) {
   if (scale == 0.0) section.fault("scale", "must not be 0");
   if (!section.get_word<std::size_t>("quantity_unit", index, words, Need::Required)) return;
   const RegisterUnit& unit = kUnits[index].second;
-  const auto wanted = out.quantity == Quantity::AirTemperature ? Quantity::Temperature : out.quantity;
+  const auto wanted =
+      out.quantity == Quantity::AirTemperature ? Quantity::Temperature : out.quantity;
   if (unit.quantity != wanted) section.fault("quantity_unit", "is not a unit of the quantity");
   out.scale = scale * unit.scale;
   out.offset = offset * unit.scale + unit.offset;
@@ -122,8 +134,8 @@ drivers::MeasuredRegister read_measured(Section& section, std::uint8_t unit,
                               {"relative_humidity", Quantity::RelativeHumidity},
                               {"temperature", Quantity::Temperature}},
                              Need::Required);
-  const bool named =
-      section.get("name", out.name, out.quantity == Quantity::Temperature ? Need::Required : Need::Optional);
+  const bool named = section.get(
+      "name", out.name, out.quantity == Quantity::Temperature ? Need::Required : Need::Optional);
   if (out.quantity == Quantity::Temperature && named)
     out.channel = channel_of(out.name, section, "name", names);
   if (!named)
@@ -134,6 +146,7 @@ drivers::MeasuredRegister read_measured(Section& section, std::uint8_t unit,
   read_unit(section, out);
   section.get("unavailable", out.unavailable, kPlain);
   section.close();
+
   return out;
 }
 
@@ -160,6 +173,7 @@ bool read_known_map(Section& device, const std::string& name, std::uint8_t unit,
   std::uint32_t serial = 0;
   if (device.get_integer("serial_number", serial, 0, 99'999'999)) options.serial_number = serial;
   device.get("inputs", options.input_names);
+
   for (const auto& input : options.input_names) {
     if (input.empty()) {
       options.inputs.emplace_back();
@@ -167,11 +181,13 @@ bool read_known_map(Section& device, const std::string& name, std::uint8_t unit,
       options.inputs.emplace_back(channel_of(input, device, "inputs", names));
     }
   }
+
   auto known = drivers::known_map(name, options);
   if (!known) {
     device.fault("map", known.error().text);
     return false;
   }
+
   map = std::move(*known);
   return true;
 }
@@ -182,17 +198,20 @@ void read_map(Section& device, std::vector<std::string>& names, drivers::Registe
   std::string name;
   std::uint8_t unit = 1;
   device.get_integer("unit", unit, 0, 255);
+
   if (!device.get_word<std::string>("map", name, words, Need::Required)) {
     for (const auto key : {"measured", "proving", "inputs", "serial_number", "base_offset"})
       static_cast<void>(device.has(key));
     return;
   }
+
   bool good = true;
   if (name == kCustom) {
     read_custom_map(device, unit, names, map);
   } else {
     good = read_known_map(device, name, unit, names, map);
   }
+
   device.get_integer("base_offset", map.base_offset, -1, 1);
   if (!good) return;
   if (const auto fine = drivers::check(map); !fine) device.fault("map", fine.error().text);
@@ -200,7 +219,8 @@ void read_map(Section& device, std::vector<std::string>& names, drivers::Registe
 
 EnvironmentConfig read_device(Section& device, Config& out) {
   EnvironmentConfig config;
-  get_bounded(device, "name", config.name, bound_of<v1::EnvironmentSample>("device"), Need::Required);
+  get_bounded(device, "name", config.name, bound_of<v1::EnvironmentSample>("device"),
+              Need::Required);
   read_address(device, config.address);
   read_map(device, out.temperatures, config.map);
   device.get("period_s", config.period, kPlain, {0.05, 3600.0});
@@ -217,10 +237,11 @@ void check_line(const EnvironmentConfig& config, const Config& out, Section& sec
       continue;
     section.fault(
         "serial",
-        fmt::format("[[environment]] \"{}\" and [[environment]] \"{}\" are on one serial line "
-                    "with different settings ({}; {}): give both the same baud, parity and stop_bits",
-                    config.name, other.name, drivers::text_of(config.address),
-                    drivers::text_of(other.address)));
+        fmt::format(
+            "[[environment]] \"{}\" and [[environment]] \"{}\" are on one serial line "
+            "with different settings ({}; {}): give both the same baud, parity and stop_bits",
+            config.name, other.name, drivers::text_of(config.address),
+            drivers::text_of(other.address)));
     return;
   }
 }
@@ -244,6 +265,7 @@ void read_environment(Section& root, Config& out) {
     Section section = root.child(table);
     take_name(name(*device), names, section);
   };
+
   const auto own_name = [](const auto& device) { return device.name; };
   take("tracker", out.tracker, own_name);
   take("encoder", out.encoder, own_name);
@@ -252,6 +274,7 @@ void read_environment(Section& root, Config& out) {
   take("probe", out.probe, own_name);
   take("cmm", out.cmm, own_name);
   protocol::EnvironmentMask seen = 0;
+
   for (auto& section : root.children("environment")) {
     auto config = read_device(section, out);
     take_name(config.name, names, section);
@@ -277,12 +300,14 @@ void read_thermal(Section& root, Config& out) {
       if (axis == nullptr || axis->kind != AxisKind::Linear)
         section.fault("axis", "no such linear axis in [axes]");
       if (!axes.insert(config.axis).second) section.fault("axis", "is corrected twice");
-      if (!connected.empty() && std::find(connected.begin(), connected.end(), config.axis) == connected.end())
+      if (!connected.empty() &&
+          std::find(connected.begin(), connected.end(), config.axis) == connected.end())
         section.fault("axis", "is read by no [encoder] and no [counter_card]");
     }
     if (section.get("temperature", temperature, Need::Required)) {
       const auto found = std::find(out.temperatures.begin(), out.temperatures.end(), temperature);
-      if (found == out.temperatures.end()) section.fault("temperature", "no [[environment]] measures it");
+      if (found == out.temperatures.end())
+        section.fault("temperature", "no [[environment]] measures it");
       config.temperature = static_cast<std::uint8_t>(found - out.temperatures.begin());
     }
     section.get("alpha_um_per_m_K", config.alpha_per_K, kMicro, {-50.0, 50.0}, Need::Required);
@@ -322,16 +347,21 @@ void read_air(Section& root, Config& out) {
   air.get("u_co2_ppm", config.u_co2_ppm, kPlain, {0.0, 2000.0});
   air.get("max_age_s", config.max_age, kPlain, kPositive);
   double assumed = 1.0;
+
   if (air.get("assumed_index", assumed, kPlain, {1.0, 1.001})) {
     config.assumed_index = assumed;
     if (out.tracker && out.tracker->weather == WeatherConfig::Compute)
-      air.fault("assumed_index", "the controller computes the index already (tracker.weather = \"compute\")");
-    if (out.tracker && out.tracker->weather == WeatherConfig::None && !all_of_the_air_is_measured(out))
       air.fault("assumed_index",
-                "with tracker.weather = \"none\" an [[environment]] must measure temperature, pressure and "
+                "the controller computes the index already (tracker.weather = \"compute\")");
+    if (out.tracker && out.tracker->weather == WeatherConfig::None &&
+        !all_of_the_air_is_measured(out))
+      air.fault("assumed_index",
+                "with tracker.weather = \"none\" an [[environment]] must measure temperature, "
+                "pressure and "
                 "humidity "
                 "of the air");
   }
+
   air.close();
 }
 

@@ -23,8 +23,8 @@ void read_positions(Section& section, std::vector<int>& out) {
   std::iota(expected.begin(), expected.end(), 1.0);
   if (given.empty() || sorted != expected)
     return section.fault(
-        "positions",
-        fmt::format("must be the numbers 1 to {}, each once, in the order of touching", given.size()));
+        "positions", fmt::format("must be the numbers 1 to {}, each once, in the order of touching",
+                                 given.size()));
   out.clear();
   for (const double position : given) out.push_back(static_cast<int>(position));
 }
@@ -39,6 +39,7 @@ void read_artefact_temperature(Section& section, const std::vector<std::string>&
   if (by_sensor && fixed) section.fault("artefact_C", "has no meaning with artefact_sensor");
   if (section.has("u_artefact_K") && !known)
     section.fault("u_artefact_K", "needs artefact_sensor or artefact_C");
+
   if (section.get("artefact_sensor", sensor)) {
     const auto found = std::ranges::find(temperatures, sensor);
     if (found == temperatures.end())
@@ -46,6 +47,7 @@ void read_artefact_temperature(Section& section, const std::vector<std::string>&
                     fmt::format("no [[environment]] measures a temperature \"{}\"", sensor));
     artefact.sensor = static_cast<std::uint8_t>(found - temperatures.begin());
   }
+
   section.get("artefact_C", fixed_C, kPlain, {-50.0, 100.0});
   section.get("u_artefact_K", artefact.u_temperature_K, kPlain, {0.0, 50.0},
               known ? Need::Required : Need::Optional);
@@ -58,9 +60,11 @@ void read_artefact_temperature(Section& section, const std::vector<std::string>&
 void read_evemu(Section& root, Config& out) {
   Section section = root.child("evemu");
   auto& evemu = out.evemu;
+
   if (section.get("estimator", evemu.estimator) && !calib::evemu::estimator(evemu.estimator))
-    section.fault("estimator",
-                  fmt::format("\"{}\": must be bayes-pose, ols, ridge, lasso, mcp or scad", evemu.estimator));
+    section.fault(
+        "estimator",
+        fmt::format("\"{}\": must be bayes-pose, ols, ridge, lasso, mcp or scad", evemu.estimator));
   if (section.get("folds", evemu.folds) && !calib::evemu::folds_by(evemu.folds))
     section.fault("folds", fmt::format("\"{}\": must be position, ball or row", evemu.folds));
   section.get_integer("order", evemu.order, calib::evemu::kLeastOrder, calib::evemu::kMostOrder);

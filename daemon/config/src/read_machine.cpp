@@ -21,7 +21,8 @@ constexpr double kNodeTolerance_m = 1e-9;       // node and end of travel are me
 void read_axis(Section axis, const std::string& name, std::vector<AxisConfig>& out) {
   AxisConfig config;
   config.name = name;
-  axis.get_word<AxisKind>("kind", config.kind, {{"linear", AxisKind::Linear}, {"rotary", AxisKind::Rotary}});
+  axis.get_word<AxisKind>("kind", config.kind,
+                          {{"linear", AxisKind::Linear}, {"rotary", AxisKind::Rotary}});
   const bool linear = config.kind == AxisKind::Linear;
   const char* const min_key = linear ? "min_mm" : "min_rad";
   const char* const max_key = linear ? "max_mm" : "max_rad";
@@ -30,17 +31,22 @@ void read_axis(Section axis, const std::string& name, std::vector<AxisConfig>& o
   const bool has_min = axis.get(min_key, config.min, unit, kAny, Need::Required);
   const bool has_max = axis.get(max_key, config.max, unit, kAny, Need::Required);
   const bool has_range = has_min && has_max;
-  if (has_range && config.min >= config.max) axis.fault(max_key, fmt::format("must exceed {}", min_key));
+
+  if (has_range && config.min >= config.max)
+    axis.fault(max_key, fmt::format("must exceed {}", min_key));
   config.reference = config.min <= 0.0 && config.max >= 0.0 ? 0.0 : config.min;
   const bool has_reference = axis.get(reference_key, config.reference, unit, kAny);
-  if (has_reference && has_range && (config.reference < config.min || config.reference > config.max))
+  if (has_reference && has_range &&
+      (config.reference < config.min || config.reference > config.max))
     axis.fault(reference_key, "must lie within the range of the axis");
   axis.close();
   out.push_back(std::move(config));
 }
 
 void sort_axes(std::vector<AxisConfig>& axes) {
-  const auto further = [](const AxisConfig& a) { return a.name != "X" && a.name != "Y" && a.name != "Z"; };
+  const auto further = [](const AxisConfig& a) {
+    return a.name != "X" && a.name != "Y" && a.name != "Z";
+  };
   std::stable_sort(axes.begin(), axes.end(), [&further](const AxisConfig& a, const AxisConfig& b) {
     return std::tuple{further(a), a.kind, a.name} < std::tuple{further(b), b.kind, b.name};
   });
@@ -71,8 +77,9 @@ void check_nodes(Section& nodes, const AxisConfig& axis, const std::vector<doubl
     nodes.fault(axis.name, "needs at least two nodes, strictly ascending");
   else if (std::abs(nodes_m.front() - axis.min) > kNodeTolerance_m ||
            std::abs(nodes_m.back() - axis.max) > kNodeTolerance_m)
-    nodes.fault(axis.name, fmt::format("first and last node must be the ends of the travel, {} and {} mm",
-                                       axis.min * kMilli.per_si, axis.max * kMilli.per_si));
+    nodes.fault(axis.name,
+                fmt::format("first and last node must be the ends of the travel, {} and {} mm",
+                            axis.min * kMilli.per_si, axis.max * kMilli.per_si));
 }
 
 void read_axis_nodes(Section& model, Section& nodes, Section* spacing, const AxisConfig& axis,
@@ -83,10 +90,12 @@ void read_axis_nodes(Section& model, Section& nodes, Section* spacing, const Axi
     check_nodes(nodes, axis, nodes_m);
     return;
   }
-  constexpr double kMaxNodes =
-      2000.0;  // a table nobody can identify; keeps a misprint from asking for gigabytes
+
+  // a table nobody can identify; keeps a misprint from asking for gigabytes
+  constexpr double kMaxNodes = 2000.0;
   if ((axis.max - axis.min) / spacing_m > kMaxNodes)
-    model.fault("node_spacing_mm", fmt::format("more than {} nodes on axis {}", kMaxNodes, axis.name));
+    model.fault("node_spacing_mm",
+                fmt::format("more than {} nodes on axis {}", kMaxNodes, axis.name));
   else if (const auto equidistant = calib::equidistant_nodes(axis.min, axis.max, spacing_m))
     nodes_m = equidistant->nodes_m;
 }
@@ -108,11 +117,13 @@ void read_model(Section model, const toml::node* spacing_node, MachineConfig& ou
 void check_model_size(Section& model, const MachineConfig& config) {
   const auto machine = otf_machine(config);
   if (!machine) return;
-  const auto layout = calib::ParameterLayout::observable_with_one_target(machine->chain, machine->nodes);
+  const auto layout =
+      calib::ParameterLayout::observable_with_one_target(machine->chain, machine->nodes);
   const std::size_t most = bound_of<v1::ErrorModel>("parameters");
   if (layout && layout->model_size() > most)
-    model.fault("node_spacing_mm", fmt::format("makes a model of {} parameters; at most {} can be published",
-                                               layout->model_size(), most));
+    model.fault("node_spacing_mm",
+                fmt::format("makes a model of {} parameters; at most {} can be published",
+                            layout->model_size(), most));
 }
 
 }  // namespace

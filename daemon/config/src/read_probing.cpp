@@ -39,14 +39,16 @@ void read_probe(Section& root, Config& out) {
   read_switching(probe, config.switching);
   probe.get("window_before_ms", config.window_before, kMilli, kNotNegative);
   probe.get("window_after_ms", config.window_after, kMilli, kNotNegative);
-  const bool wired =
-      out.counter_card && (out.counter_card->wiring.latch_channel || out.counter_card->wiring.edge_channel);
+  const bool wired = out.counter_card && (out.counter_card->wiring.latch_channel ||
+                                          out.counter_card->wiring.edge_channel);
+
   if (!wired) {
     probe.fault("", "needs [counter_card] with a latch_channel or an edge_channel");
   } else if (drivers::check(out.counter_card->wiring)) {  // else its own fault says enough
     const auto possible = drivers::check(touch_options(config, *out.counter_card, out.machine));
     if (!possible) probe.fault("", possible.error().text);
   }
+
   probe.close();
   out.probe = std::move(config);
 }
@@ -65,6 +67,7 @@ void read_cmm(Section& root, Config& out) {
   cmm.get("axes_compensated", config.axes_compensated);
   cmm.get("command_timeout_s", config.command_timeout, kPlain, kPositive);
   cmm.get("motion_timeout_s", config.motion_timeout, kPlain, kPositive);
+
   if (out.probe) cmm.fault("", "touches come from [probe] already: one of them must go");
   cmm.close();
   out.cmm = std::move(config);

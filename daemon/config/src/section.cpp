@@ -32,7 +32,8 @@ std::optional<double> number_in(const toml::node& node) {
 
 }  // namespace
 
-Section::Section(const toml::table* table, std::string path, toml::source_position where, Faults& faults)
+Section::Section(const toml::table* table, std::string path, toml::source_position where,
+                 Faults& faults)
     : table_(table), path_(std::move(path)), where_(where), faults_(&faults) {}
 
 std::string Section::full(std::string_view key) const {
@@ -85,18 +86,23 @@ std::vector<Section> Section::children(std::string_view key) {
   std::vector<Section> result;
   const toml::node* node = find(key, Need::Optional);
   if (node == nullptr) return result;
+
   if (!node->is_array()) {
-    fault_at(node->source().begin, key, fmt::format("must be an array of tables, not {}", type_text(*node)));
+    fault_at(node->source().begin, key,
+             fmt::format("must be an array of tables, not {}", type_text(*node)));
     return result;
   }
+
   std::size_t index = 0;
   for (const auto& element : *node->as_array()) {
     const auto name = fmt::format("{}[{}]", key, index++);
     if (element.is_table())
       result.emplace_back(element.as_table(), full(name), element.source().begin, *faults_);
     else
-      fault_at(element.source().begin, name, fmt::format("must be a table, not {}", type_text(element)));
+      fault_at(element.source().begin, name,
+               fmt::format("must be a table, not {}", type_text(element)));
   }
+
   return result;
 }
 
@@ -104,26 +110,31 @@ bool Section::get(std::string_view key, double& out, Unit unit, Bounds bounds, N
   const toml::node* node = find(key, need);
   if (node == nullptr) return false;
   const auto value = number_in(*node);
+
   if (!value) {
     fault_at(node->source().begin, key, fmt::format("must be a number, not {}", type_text(*node)));
     return false;
   }
+
   if (!std::isfinite(*value)) {
     fault_at(node->source().begin, key, "must be finite");
     return false;
   }
+
   if (*value < bounds.min || *value > bounds.max) {
     fault_at(node->source().begin, key, fmt::format("{}, not {}", bounds_text(bounds), *value));
     return false;
   }
+
   out = *value / unit.per_si;
   return true;
 }
 
-bool Section::get(std::string_view key, std::chrono::nanoseconds& out, Unit unit, Bounds bounds, Need need) {
+bool Section::get(std::string_view key, std::chrono::nanoseconds& out, Unit unit, Bounds bounds,
+                  Need need) {
   double seconds = 0.0;
-  // A century keeps the conversion to int64 nanoseconds far from overflow; nothing on a shop floor waits
-  // longer.
+  // A century keeps the conversion to int64 nanoseconds far from overflow; nothing on a shop floor
+  // waits longer.
   bounds.max = std::min(bounds.max, 3.15e9 * unit.per_si);
   if (!get(key, seconds, unit, bounds, need)) return false;
   out = std::chrono::nanoseconds{std::llround(seconds * kNano.per_si)};
@@ -135,8 +146,9 @@ bool Section::get(std::string_view key, std::string& out, Need need) {
   if (node == nullptr) return false;
   const auto value = node->value_exact<std::string>();
   if (!value || value->empty()) {
-    fault_at(node->source().begin, key,
-             value ? "must not be empty" : fmt::format("must be a string, not {}", type_text(*node)));
+    fault_at(
+        node->source().begin, key,
+        value ? "must not be empty" : fmt::format("must be a string, not {}", type_text(*node)));
     return false;
   }
   out = *value;
@@ -156,7 +168,8 @@ bool Section::get(std::string_view key, bool& out, Need need) {
   if (node == nullptr) return false;
   const auto value = node->value_exact<bool>();
   if (!value)
-    fault_at(node->source().begin, key, fmt::format("must be true or false, not {}", type_text(*node)));
+    fault_at(node->source().begin, key,
+             fmt::format("must be true or false, not {}", type_text(*node)));
   else
     out = *value;
   return value.has_value();
@@ -166,10 +179,13 @@ bool Section::get(std::string_view key, std::vector<double>& out, Unit unit, Nee
   const toml::node* node = find(key, need);
   if (node == nullptr) return false;
   const toml::array* array = node->as_array();
+
   if (array == nullptr) {
-    fault_at(node->source().begin, key, fmt::format("must be an array of numbers, not {}", type_text(*node)));
+    fault_at(node->source().begin, key,
+             fmt::format("must be an array of numbers, not {}", type_text(*node)));
     return false;
   }
+
   std::vector<double> values;
   for (const auto& element : *array) {
     const auto value = number_in(element);
@@ -178,6 +194,7 @@ bool Section::get(std::string_view key, std::vector<double>& out, Unit unit, Nee
     else
       fault_at(element.source().begin, key, "every element must be a finite number");
   }
+
   if (values.size() != array->size()) return false;
   out = std::move(values);
   return true;
@@ -191,23 +208,26 @@ bool Section::get(std::string_view key, std::vector<std::string>& out) {
   if (array != nullptr)
     for (const auto& element : *array)
       if (const auto value = element.value_exact<std::string>()) values.push_back(*value);
+
   if (array == nullptr || values.size() != array->size()) {
     fault_at(node->source().begin, key, "must be an array of strings");
     return false;
   }
+
   out = std::move(values);
   return true;
 }
 
-bool Section::get(std::string_view key, std::filesystem::path& out, const std::filesystem::path& base) {
+bool Section::get(std::string_view key, std::filesystem::path& out,
+                  const std::filesystem::path& base) {
   std::string text;
   if (!get(key, text)) return false;
   out = base / text;  // an absolute `text` replaces the base
   return true;
 }
 
-bool Section::take_integer(std::string_view key, std::int64_t& out, std::int64_t min, std::int64_t max,
-                           Need need) {
+bool Section::take_integer(std::string_view key, std::int64_t& out, std::int64_t min,
+                           std::int64_t max, Need need) {
   const toml::node* node = find(key, need);
   if (node == nullptr) return false;
   const auto value = node->value_exact<std::int64_t>();
@@ -219,8 +239,8 @@ bool Section::take_integer(std::string_view key, std::int64_t& out, std::int64_t
   return true;
 }
 
-bool Section::take_word(std::string_view key, std::size_t& out, const std::vector<std::string_view>& words,
-                        Need need) {
+bool Section::take_word(std::string_view key, std::size_t& out,
+                        const std::vector<std::string_view>& words, Need need) {
   const toml::node* node = find(key, need);
   if (node == nullptr) return false;
   const auto value = node->value_exact<std::string>();
@@ -240,7 +260,8 @@ void Section::close() {
   const std::vector<std::string_view> known(known_.begin(), known_.end());
   for (const auto& [key, node] : *table_)
     if (std::find(known.begin(), known.end(), key.str()) == known.end())
-      fault_at(key.source().begin, key.str(), fmt::format("unknown key{}", suggestion(key.str(), known)));
+      fault_at(key.source().begin, key.str(),
+               fmt::format("unknown key{}", suggestion(key.str(), known)));
 }
 
 }  // namespace abbe::daemon

@@ -24,18 +24,22 @@ drivers::TouchOptions touch_options(const ProbeConfig& probe, const CounterCardC
   wiring.clock_hz = card.wiring.clock_hz;
   wiring.use_latch = card.wiring.latch_channel.has_value();
   wiring.scan_period = nanoseconds_of(1.0 / drivers::scan_rate_hz(card.wiring));
+
   // A debounce of microseconds filters noise; one longer than chatter is the confirmation itself.
   const auto& debounce = card.wiring.edge_debounce;
   const auto stands = nanoseconds_of(drivers::quad08::kDebounce_s[debounce.time_code]);
-  const bool confirms = card.wiring.edge_channel && debounce.enabled && !debounce.trigger_before_stable;
+  const bool confirms =
+      card.wiring.edge_channel && debounce.enabled && !debounce.trigger_before_stable;
   if (confirms && stands > probe.switching.chatter) wiring.counter_debounce = stands;
   wiring.linear_axes = 0;
+
   for (std::size_t i = 0; i < card.wiring.axes.size(); ++i) {
     const AxisConfig* axis = machine.find_axis(card.wiring.axes[i].name);
     const bool linear = axis == nullptr || axis->kind == AxisKind::Linear;
     if (linear) wiring.linear_axes = static_cast<std::uint8_t>(wiring.linear_axes | (1u << i));
     wiring.resolution[i] = std::abs(card.wiring.axes[i].scale);
   }
+
   return options;
 }
 

@@ -18,7 +18,8 @@ double u_of_unmeasured_air() noexcept {
 }
 
 bool air_is_unmeasured(const Config& config) noexcept {
-  return config.tracker && config.tracker->weather != WeatherConfig::Compute && !config.air.assumed_index;
+  return config.tracker && config.tracker->weather != WeatherConfig::Compute &&
+         !config.air.assumed_index;
 }
 
 std::optional<std::string> unmeasured_air_text(const Config& config, double u_scale) {
@@ -30,9 +31,12 @@ std::optional<std::string> unmeasured_air_text(const Config& config, double u_sc
                          air.temperature_K - kZeroCelsius_K, air.pressure_Pa * 1e-2,
                          air.relative_humidity * 1e2)
            : std::string{
-                 "air measured, but the ranges are corrected with the index set in the controller last"};
+                 "air measured, but the ranges are corrected with the index set in the controller "
+                 "last"};
+
   return fmt::format(
-      "{} (tracker.weather = \"{}\"); their common scale counts as uncertain by {:.3g} um/m, a shop floor "
+      "{} (tracker.weather = \"{}\"); their common scale counts as uncertain by {:.3g} um/m, a "
+      "shop floor "
       "has {:.3g}; "
       "weather = \"compute\" corrects for measured air",
       corrected_for, none ? "none" : "read", u_scale * 1e6, u_of_unmeasured_air() * 1e6);

@@ -1,5 +1,5 @@
-// abbe-dds: the DDS participant of abbe, a process of its own so that nothing a stranger sends can stop
-// abbed.
+// abbe-dds: the DDS participant of abbe, a process of its own so that nothing a stranger sends can
+// stop abbed.
 #include <linux/close_range.h>
 #include <signal.h>
 #include <unistd.h>
@@ -29,7 +29,8 @@ using abbe::daemon::ErrorCode;
 constexpr int kDone = 0, kUsage = 2, kBadInput = 3, kIo = 4, kInternal = 70;
 
 constexpr const char* kExitCodes =
-    "Exit codes: 0 stopped by SIGTERM or SIGINT or because the parent is gone, 2 usage, 3 the configuration "
+    "Exit codes: 0 stopped by SIGTERM or SIGINT or because the parent is gone, 2 usage, 3 the "
+    "configuration "
     "or "
     "the profile cannot be used,\n"
     "4 no participant or writer can be created, 70 an unexpected exception.";
@@ -69,10 +70,12 @@ bool parent_is_gone(const Options& options) {
 void say_when_it_changes(const DdsBridge& bridge, bool& alive) {
   if (bridge.source_alive() == alive) return;
   alive = bridge.source_alive();
-  std::fprintf(stderr, alive ? "abbe-dds: abbed is alive\n" : "abbe-dds: abbed is lost, published INVALID\n");
+  std::fprintf(stderr, alive ? "abbe-dds: abbed is alive\n"
+                             : "abbe-dds: abbed is lost, published INVALID\n");
 }
 
-/// As a service of its own it must do what abbed.toml says, and must not run beside a child of abbed's.
+/// As a service of its own it must do what abbed.toml says, and must not run beside a child of
+/// abbed's.
 abbe::daemon::Result<void> take_from_config(Options& options) {
   auto config = abbe::daemon::load_config(options.config);
   if (!config) return tl::make_unexpected(config.error());
@@ -82,15 +85,17 @@ abbe::daemon::Result<void> take_from_config(Options& options) {
                                   ": [dds] supervise is not \"systemd\": abbed starts abbe-dds "
                                   "itself, or nobody is to");
   }
+
   options.socket = config->dds.socket;
   options.participant.domain = config->dds.domain;
   options.participant.profiles = config->dds.profile;
   options.participant.security = config->dds.security;
+
   return {};
 }
 
-/// As a service: systemd kills it when its loop stands still. The notification socket that a child has from
-/// abbed is abbed's.
+/// As a service: systemd kills it when its loop stands still. The notification socket that a child
+/// has from abbed is abbed's.
 class ServiceManager {
  public:
   using Instant = std::chrono::steady_clock::time_point;
@@ -100,7 +105,7 @@ class ServiceManager {
     period_ = abbe::daemon::watchdog_period();
     abbe::daemon::tell_ready("publishing");
   }
-  void turn(Instant now) {
+  void cycle(Instant now) {
     if (!period_ || now < next_) return;
     abbe::daemon::tell_alive();
     next_ = now + *period_;
@@ -127,12 +132,13 @@ std::optional<int> publish(const Options& options) {
   abbe::dds::Announcer announcer(*participant, *writers);
   bool alive = false;
   while (stop_requested == 0 && !parent_is_gone(options)) {
-    feed.turn();
-    announcer.turn(Clock::now());
-    manager.turn(Clock::now());
+    feed.cycle();
+    announcer.cycle(Clock::now());
+    manager.cycle(Clock::now());
     say_when_it_changes(bridge, alive);
-    if (const auto added = interfaces.turn(participant->allowed_addresses(), Clock::now())) {
-      std::fprintf(stderr, "abbe-dds: address %s came up: the participant is created again to use it\n",
+    if (const auto added = interfaces.cycle(participant->allowed_addresses(), Clock::now())) {
+      std::fprintf(stderr,
+                   "abbe-dds: address %s came up: the participant is created again to use it\n",
                    added->c_str());
       return std::nullopt;
     }
@@ -154,38 +160,43 @@ int start_again(char** argv) {
 
 int main(int argc, char** argv) {
   CLI::App app{
-      "Publishes over DDS what abbed hands over its local socket, and tells the subscribers when abbed is "
+      "Publishes over DDS what abbed hands over its local socket, and tells the subscribers when "
+      "abbed is "
       "lost."};
   app.footer(kExitCodes);
   Options options;
   options.participant.role = abbe::daemon::DdsRole::Daemon;
-  auto* const socket =
-      app.add_option("--socket", options.socket, "Unix socket of abbed; waits for it if it is not there");
+  auto* const socket = app.add_option("--socket", options.socket,
+                                      "Unix socket of abbed; waits for it if it is not there");
   auto* const domain =
-      app.add_option("--domain", options.participant.domain, "DDS domain, 0 to 232")->capture_default_str();
+      app.add_option("--domain", options.participant.domain, "DDS domain, 0 to 232")
+          ->capture_default_str();
   auto* const profile = app.add_option(
       "--profile", options.participant.profiles,
       "XML file with a participant profile \"abbe\" (default: built in, UDP on every interface)");
-  auto* const security =
-      app.add_option("--security", options.participant.security,
-                     "keys from `abbe dds keys` (default: DDS Security is off, unless the profile has it)");
-  app.add_option(
-         "-c,--config", options.config,
-         "socket, domain, profile and security from this abbed.toml, which says supervise = \"systemd\"")
+  auto* const security = app.add_option(
+      "--security", options.participant.security,
+      "keys from `abbe dds keys` (default: DDS Security is off, unless the profile has it)");
+  app.add_option("-c,--config", options.config,
+                 "socket, domain, profile and security from this abbed.toml, which says supervise "
+                 "= \"systemd\"")
       ->excludes(socket)
       ->excludes(domain)
       ->excludes(profile)
       ->excludes(security);
   app.add_option("--parent", options.parent,
                  "leave when this process is no longer the parent (given by abbed)");
+
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& e) {
     return app.exit(e) == 0 ? kDone : kUsage;
   }
+
   if (options.config.empty() && options.socket.empty()) {
     return refuse({ErrorCode::Usage, "--socket or --config is needed"});
   }
+
   try {
     if (!options.config.empty()) {
       if (auto taken = take_from_config(options); !taken) return refuse(taken.error());

@@ -35,7 +35,8 @@ using WallClock = std::chrono::steady_clock;
 constexpr int kDone = 0, kNoAnswer = 1, kUsage = 2, kBadInput = 3, kIo = 4, kInternal = 70;
 
 constexpr const char* kExitCodes =
-    "Exit codes: 0 done, 1 no model that may be applied arrived in time (said why), 2 usage, 3 a file or "
+    "Exit codes: 0 done, 1 no model that may be applied arrived in time (said why), 2 usage, 3 a "
+    "file or "
     "profile cannot be\n"
     "used, 4 no participant or output file can be created, 70 an unexpected exception.";
 
@@ -88,12 +89,14 @@ std::string millimetres(const std::vector<double>& position_m, unsigned missing_
 /// What is known of every machine, and what of it is worth a line.
 class Watch {
  public:
-  Watch(const Options& options, const dds::Readers& readers, const dds::ParticipantAddresses& addresses)
+  Watch(const Options& options, const dds::Readers& readers,
+        const dds::ParticipantAddresses& addresses)
       : options_(options), readers_(readers), addresses_(addresses) {}
 
   void take(const dds::Arrival& arrival) {
     using Verdict = dds::PublisherPin::Verdict;
     const auto key = daemon::payload_key(arrival.topic, arrival.payload);
+
     if (!key || (!options_.machine.empty() && key->machine != options_.machine)) return;
     const std::string name(key->machine);
     auto& machine = machines_[name];
@@ -103,13 +106,13 @@ class Watch {
     auto& publisher = machine.publisher(from);
     keep(arrival, publisher);
     if (verdict == Verdict::Waiting) return;
-    if (verdict == Verdict::Rival) return report_rival(name, machine, from);
+    if (verdict == Verdict::Foreign) return report_foreign_sync(name, machine, from);
     if (former && former != from) show_successor(name, from, *former);
     show(arrival, name, machine, publisher);
   }
 
-  /// Publishers that are no longer alive. What such a one said counts no longer, also when it comes back: it
-  /// repeats its state within a second.
+  /// Publishers that are no longer alive. What such a one said counts no longer, also when it comes
+  /// back: it repeats its state within a second.
   void notice_losses() {
     for (auto& [name, machine] : machines_) {
       for (auto& [id, publisher] : machine.publishers)
@@ -133,7 +136,8 @@ class Watch {
     std::string text;
     for (const auto& [name, machine] : machines_) {
       const auto decision = machine.pinned().model.decide(alive(machine.pinned()));
-      text += name + ": " + (decision.apply ? std::string("no ErrorModel received") : decision.reason) + "; ";
+      text += name + ": " +
+              (decision.apply ? std::string("no ErrorModel received") : decision.reason) + "; ";
     }
     return text.empty() ? "nothing received" : text;
   }
@@ -156,7 +160,7 @@ class Watch {
     bool shown_alive = false;
     std::string shown_state, shown_model;
     WallClock::time_point last_live{};
-    std::optional<WallClock::time_point> rival_reported;
+    std::optional<WallClock::time_point> foreign_sync_reported;
 
     /// Something was heard of the machine.
     [[nodiscard]] const Publisher& pinned() const { return publishers.at(*pin.pinned()); }
@@ -201,8 +205,9 @@ class Watch {
           publisher.position = millimetres(m.position(), m.missing_mask());
         });
       case Topic::Compensation:
-        return with<v1::Compensation>(
-            arrival.payload, [&](auto& m) { publisher.waited = publisher.delay.of(m, WallClock::now()); });
+        return with<v1::Compensation>(arrival.payload, [&](auto& m) {
+          publisher.waited = publisher.delay.of(m, WallClock::now());
+        });
       case Topic::Health:
       case Topic::CalibrationEvent:
         return;  // only shown
@@ -242,7 +247,8 @@ class Watch {
       fmt::print("{{\"machine\":\"{}\",\"publisher_alive\":{}}}\n", name, now);
       std::fflush(stdout);
     }
-    print(fmt::format("{}  {}", name, now ? "publisher is alive" : "publisher is not alive: do not apply"));
+    print(fmt::format("{}  {}", name,
+                      now ? "publisher is alive" : "publisher is not alive: do not apply"));
   }
 
   /// As its announcement has it, which is as true as the participant is honest.
@@ -254,21 +260,24 @@ class Watch {
   void show_successor(const std::string& name, const dds::ParticipantId& id,
                       const dds::ParticipantId& former) {
     if (options_.json) {
-      fmt::print("{{\"machine\":\"{}\",\"publisher\":\"{}\",\"former\":\"{}\"}}\n", name, dds::text_of(id),
-                 dds::text_of(former));
+      fmt::print("{{\"machine\":\"{}\",\"publisher\":\"{}\",\"former\":\"{}\"}}\n", name,
+                 dds::text_of(id), dds::text_of(former));
       std::fflush(stdout);
     }
-    print(fmt::format("{}  publisher is now {}: {} is silent", name, described(id), dds::text_of(former)));
+    print(fmt::format("{}  publisher is now {}: {} is silent", name, described(id),
+                      dds::text_of(former)));
   }
 
-  void report_rival(const std::string& name, Machine& machine, const dds::ParticipantId& id) {
+  void report_foreign_sync(const std::string& name, Machine& machine,
+                           const dds::ParticipantId& id) {
     constexpr std::chrono::seconds kReportPeriod{10};
     const auto now = WallClock::now();
-    if (machine.rival_reported && now - *machine.rival_reported < kReportPeriod) return;
-    machine.rival_reported = now;
+    if (machine.foreign_sync_reported && now - *machine.foreign_sync_reported < kReportPeriod)
+      return;
+    machine.foreign_sync_reported = now;
     if (options_.json) {
-      fmt::print("{{\"machine\":\"{}\",\"rival\":\"{}\",\"address\":\"{}\"}}\n", name, dds::text_of(id),
-                 addresses_.of(id));
+      fmt::print("{{\"machine\":\"{}\",\"rival\":\"{}\",\"address\":\"{}\"}}\n", name,
+                 dds::text_of(id), addresses_.of(id));
       std::fflush(stdout);
     }
     print(fmt::format("{}  rival publisher {}: ignored; stop it, or use keys (abbe dds keys)", name,
@@ -287,9 +296,9 @@ class Watch {
   void show_model(Machine& machine, const Publisher& publisher) {
     const auto& m = publisher.model.model();
     if (!m || std::exchange(machine.shown_model, m->model_id()) == m->model_id()) return;
-    print(fmt::format("{}  received model {}: {} {}, gauge {}, {} parameters, chain {}", m->machine(),
-                      m->model_id(), m->method(), m->estimator(), m->gauge(), m->parameters().size(),
-                      m->chain()));
+    print(fmt::format("{}  received model {}: {} {}, gauge {}, {} parameters, chain {}",
+                      m->machine(), m->model_id(), m->method(), m->estimator(), m->gauge(),
+                      m->parameters().size(), m->chain()));
   }
 
   void show_health(const v1::Health& h) {
@@ -299,19 +308,21 @@ class Watch {
   }
 
   void show_event(const v1::CalibrationEvent& e) {
-    const std::string line = fmt::format("{}  calibration {} {}{}{}", e.machine(), e.method(), e.state(),
-                                         e.reason().empty() ? "" : ": ", e.reason());
+    const std::string line = fmt::format("{}  calibration {} {}{}{}", e.machine(), e.method(),
+                                         e.state(), e.reason().empty() ? "" : ": ", e.reason());
     if (std::exchange(calibration_[e.machine()], line) != line) print(line);
   }
 
-  /// The one line that is always true; on a terminal it stands still, elsewhere it comes once a second.
+  /// The one line that is always true; on a terminal it stands still, elsewhere it comes once a
+  /// second.
   void show_vector(Machine& machine, const Publisher& publisher, const v1::Compensation& c) {
     const auto now = WallClock::now();
-    if (options_.json ||
-        now - machine.last_live < (on_terminal_ ? std::chrono::milliseconds{100} : std::chrono::seconds{1}))
+    if (options_.json || now - machine.last_live < (on_terminal_ ? std::chrono::milliseconds{100}
+                                                                 : std::chrono::seconds{1}))
       return;
     machine.last_live = now;
-    const auto decision = dds::decide(c, publisher.waited, publisher.model.state(), alive(publisher));
+    const auto decision =
+        dds::decide(c, publisher.waited, publisher.model.state(), alive(publisher));
     const std::string line =
         fmt::format("{}  {}  V {}  {}", c.machine(), publisher.position, micrometres(c.vector_m()),
                     decision.apply ? "apply" : "do not apply: " + decision.reason);
@@ -328,21 +339,26 @@ class Watch {
   std::map<std::string, std::string> calibration_;                     // by machine
 };
 
-void print_comparison(const Options& options, const calib::FieldComparison& c, const std::string& model_id) {
+void print_comparison(const Options& options, const calib::FieldComparison& c,
+                      const std::string& model_id) {
   if (options.json) {
     fmt::print(
-        "{{\"comparison\":{{\"model_id\":\"{}\",\"points\":{},\"outside\":{},\"before_mean_um\":{:.6g},"
+        "{{\"comparison\":{{\"model_id\":\"{}\",\"points\":{},\"outside\":{},\"before_mean_um\":{:."
+        "6g},"
         "\"before_max_um\":{:.6g},\"after_mean_um\":{:.6g},\"after_max_um\":{:.6g},"
         "\"after_rigid_free_mean_um\":{:.6g},\"after_rigid_free_max_um\":{:.6g}}}}}\n",
-        model_id, c.points, c.outside, c.before.mean_m * 1e6, c.before.max_m * 1e6, c.after.mean_m * 1e6,
-        c.after.max_m * 1e6, c.after_rigid_free.mean_m * 1e6, c.after_rigid_free.max_m * 1e6);
+        model_id, c.points, c.outside, c.before.mean_m * 1e6, c.before.max_m * 1e6,
+        c.after.mean_m * 1e6, c.after.max_m * 1e6, c.after_rigid_free.mean_m * 1e6,
+        c.after_rigid_free.max_m * 1e6);
     return;
   }
+
   const auto row = [](const char* what, const calib::VectorStatistics& s) {
     fmt::print("  {:<42} mean {:9.3f} um   max {:9.3f} um\n", what, s.mean_m * 1e6, s.max_m * 1e6);
   };
-  fmt::print("model {} against known errors at {} points ({} outside the grid)\n", model_id, c.points,
-             c.outside);
+
+  fmt::print("model {} against known errors at {} points ({} outside the grid)\n", model_id,
+             c.points, c.outside);
   row("before: |V_true|", c.before);
   row("after:  |V_true - V_received|, as received", c.after);
   row("after:  best-fit rigid motion removed", c.after_rigid_free);
@@ -363,7 +379,8 @@ Result<void> use_model(const Options& options, const dds::ReceivedModel& model,
   if (!known) return {};
   const auto lattice = dds::lattice_of(*nodes);
   if (!lattice) return tl::make_unexpected(lattice.error());
-  const auto comparison = calib::compare(vectors(known->points_m), vectors(known->errors_m), *lattice);
+  const auto comparison =
+      calib::compare(vectors(known->points_m), vectors(known->errors_m), *lattice);
   if (!comparison) return daemon::fail(ErrorCode::DataInsufficient, comparison.error().text);
   print_comparison(options, *comparison, model.state()->model_id());
   return {};
@@ -384,6 +401,7 @@ int watch(const Options& options, dds::Readers& readers, const dds::ParticipantA
       return used ? kDone : exit_code_of(used.error());
     }
   }
+
   if (!options.ends_with_model()) return kDone;
   std::fprintf(stderr, "abbe-watch: no model that may be applied: %s\n", watch.why_not().c_str());
   return kNoAnswer;
@@ -396,32 +414,39 @@ int run(const Options& options) {
     if (!read) return exit_code_of(read.error());
     known = std::move(*read);
   }
+
   auto participant = dds::Participant::create(options.participant);
   if (!participant) return exit_code_of(participant.error());
+
   // The state first, so that nothing is judged by an older one.
   constexpr std::array kTopics{Topic::ModelState,      Topic::ErrorModel, Topic::ErrorGrid,
                                Topic::Snapshot,        Topic::Health,     Topic::Compensation,
                                Topic::CalibrationEvent};
   if (!participant->is_secure())
-    std::fprintf(stderr, "abbe-watch: %s\n", daemon::dds_security_is_off(options.participant.domain).c_str());
+    std::fprintf(stderr, "abbe-watch: %s\n",
+                 daemon::dds_security_is_off(options.participant.domain).c_str());
   const dds::ParticipantAddresses addresses(*participant);
   auto readers = dds::Readers::create(*participant, kTopics);
   if (!readers) return exit_code_of(readers.error());
   struct sigaction action {};
   action.sa_handler = [](int) { stop_requested = 1; };
   for (const int signal : {SIGTERM, SIGINT}) ::sigaction(signal, &action, nullptr);
+
   return watch(options, *readers, addresses, known);
 }
 
 }  // namespace
 
 int main(int argc, char** argv) {
-  CLI::App app{"Shows what abbe publishes over DDS, and applies the rule of abbe_v1.idl: apply or not."};
+  CLI::App app{
+      "Shows what abbe publishes over DDS, and applies the rule of abbe_v1.idl: apply or not."};
   app.footer(kExitCodes);
   Options options;
-  app.add_option("--domain", options.participant.domain, "DDS domain, 0 to 232")->capture_default_str();
-  app.add_option("--profile", options.participant.profiles,
-                 "XML file with a participant profile \"abbe\" (default: built in, UDP on every interface)");
+  app.add_option("--domain", options.participant.domain, "DDS domain, 0 to 232")
+      ->capture_default_str();
+  app.add_option(
+      "--profile", options.participant.profiles,
+      "XML file with a participant profile \"abbe\" (default: built in, UDP on every interface)");
   app.add_option("--security", options.participant.security,
                  "keys from `abbe dds keys`, as the publisher's (default: DDS Security is off)");
   app.add_option("--machine", options.machine, "only this machine (default: all)");
@@ -432,14 +457,16 @@ int main(int argc, char** argv) {
                  "end after this many seconds, with 1 if a model was waited for");
   app.add_option("--grid-csv", options.grid_csv,
                  "wait for such a model and write its grid: x_mm,...,ex_um,...,ux_um,...");
-  app.add_option(
-      "--compare", options.known_errors,
-      "wait for such a model and compare its grid with a CSV x_mm,y_mm,z_mm,ex_um,ey_um,ez_um of known V");
+  app.add_option("--compare", options.known_errors,
+                 "wait for such a model and compare its grid with a CSV "
+                 "x_mm,y_mm,z_mm,ex_um,ey_um,ez_um of known V");
+
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& e) {
     return app.exit(e) == 0 ? kDone : kUsage;
   }
+
   try {
     return run(options);
   } catch (const std::exception& e) {

@@ -19,13 +19,14 @@ Announcer::~Announcer() {
   participant_.get().set_listener(nullptr, fast::StatusMask::none());
 }
 
-void Announcer::on_participant_discovery(fast::DomainParticipant* /*participant*/, DiscoveryInfo&& info) {
-  // release: pairs with the acquire in turn()
+void Announcer::on_participant_discovery(fast::DomainParticipant* /*participant*/,
+                                         DiscoveryInfo&& info) {
+  // release: pairs with the acquire in cycle()
   if (info.status == DiscoveryInfo::DISCOVERED_PARTICIPANT)
     discovered_.store(true, std::memory_order_release);
 }
 
-void Announcer::turn(WallTime now) {
+void Announcer::cycle(WallTime now) {
   // acquire: pairs with the release in on_participant_discovery()
   if (discovered_.exchange(false, std::memory_order_acquire)) {
     interval_ = kFirst;

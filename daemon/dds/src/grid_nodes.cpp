@@ -32,19 +32,24 @@ Result<calib::ErrorLattice> lattice_of(std::span<const v1::GridNode> nodes) {
   return std::move(*created);
 }
 
-Result<void> write_grid_csv(const std::filesystem::path& file, std::span<const v1::GridNode> nodes) {
+Result<void> write_grid_csv(const std::filesystem::path& file,
+                            std::span<const v1::GridNode> nodes) {
   std::string text = "x_mm,y_mm,z_mm,ex_um,ey_um,ez_um,ux_um,uy_um,uz_um\n";
   for (const v1::GridNode& node : nodes) {
     const auto& p = node.position_m();
     const auto& e = node.error_m();
     const auto& cov = node.cov_m2();  // xx xy xz yy yz zz
-    text += fmt::format("{:.17g},{:.17g},{:.17g},{:.17g},{:.17g},{:.17g},{:.17g},{:.17g},{:.17g}\n",
-                        p[0] / kMillimetre, p[1] / kMillimetre, p[2] / kMillimetre, e[0] / kMicrometre,
-                        e[1] / kMicrometre, e[2] / kMicrometre, std::sqrt(cov[0]) / kMicrometre,
-                        std::sqrt(cov[3]) / kMicrometre, std::sqrt(cov[5]) / kMicrometre);
+    text +=
+        fmt::format("{:.17g},{:.17g},{:.17g},{:.17g},{:.17g},{:.17g},{:.17g},{:.17g},{:.17g}\n",
+                    p[0] / kMillimetre, p[1] / kMillimetre, p[2] / kMillimetre, e[0] / kMicrometre,
+                    e[1] / kMicrometre, e[2] / kMicrometre, std::sqrt(cov[0]) / kMicrometre,
+                    std::sqrt(cov[3]) / kMicrometre, std::sqrt(cov[5]) / kMicrometre);
   }
+
   std::ofstream out(file, std::ios::trunc);
-  if (!(out << text).flush()) return daemon::fail(ErrorCode::Io, file.string() + ": cannot be written");
+  if (!(out << text).flush())
+    return daemon::fail(ErrorCode::Io, file.string() + ": cannot be written");
+
   return {};
 }
 

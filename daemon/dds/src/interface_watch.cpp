@@ -16,14 +16,16 @@
 namespace abbe::dds {
 namespace {
 
-/// Receives a message for every change of a link or of an IPv4 address; -1 where the system refuses it.
+/// Receives a message for every change of a link or of an IPv4 address; -1 where the system refuses
+/// it.
 int open_netlink() {
   const int fd = ::socket(AF_NETLINK, SOCK_RAW | SOCK_CLOEXEC | SOCK_NONBLOCK, NETLINK_ROUTE);
   if (fd < 0) return -1;
   sockaddr_nl address{};
   address.nl_family = AF_NETLINK;
   address.nl_groups = RTMGRP_LINK | RTMGRP_IPV4_IFADDR;
-  if (::bind(fd, reinterpret_cast<const sockaddr*>(&address), sizeof address) == 0) return fd;  // NOLINT
+  if (::bind(fd, reinterpret_cast<const sockaddr*>(&address), sizeof address) == 0)
+    return fd;  // NOLINT
   ::close(fd);
   return -1;
 }
@@ -35,7 +37,8 @@ bool has_messages(int netlink) {
   bool any = false;
   for (int i = 0; i < kMostReads; ++i) {
     const bool received = ::recv(netlink, message.data(), message.size(), 0) >= 0;
-    if (!received && errno != ENOBUFS && errno != EINTR) break;  // ENOBUFS: more than the socket holds
+    if (!received && errno != ENOBUFS && errno != EINTR)
+      break;  // ENOBUFS: more than the socket holds
     any = true;
   }
   return any;
@@ -50,8 +53,8 @@ InterfaceWatch::~InterfaceWatch() {
   if (netlink_ >= 0) ::close(netlink_);
 }
 
-std::optional<std::string> InterfaceWatch::turn(const std::vector<std::string>& allowed,
-                                                Clock::time_point now) {
+std::optional<std::string> InterfaceWatch::cycle(const std::vector<std::string>& allowed,
+                                                 Clock::time_point now) {
   if (netlink_ < 0) return std::nullopt;
   if (has_messages(netlink_)) {
     last_change_ = now;

@@ -22,7 +22,8 @@ std::vector<InterfaceAddress> running_addresses() {
   ifaddrs* all = nullptr;
   if (::getifaddrs(&all) != 0) return addresses;
   for (const ifaddrs* i = all; i != nullptr; i = i->ifa_next) {
-    if (i->ifa_addr == nullptr || i->ifa_addr->sa_family != AF_INET || (i->ifa_flags & kUsed) != kUsed)
+    if (i->ifa_addr == nullptr || i->ifa_addr->sa_family != AF_INET ||
+        (i->ifa_flags & kUsed) != kUsed)
       continue;
     std::array<char, INET_ADDRSTRLEN> text{};
     const auto* address = reinterpret_cast<const sockaddr_in*>(i->ifa_addr);
@@ -31,6 +32,7 @@ std::vector<InterfaceAddress> running_addresses() {
   }
   ::freeifaddrs(all);
   std::ranges::sort(addresses);
+
   return addresses;
 }
 
@@ -45,7 +47,8 @@ std::vector<std::string> white_list(const eprosima::fastdds::dds::DomainParticip
   return all;
 }
 
-daemon::Result<void> interface_of_profile_is_up(const eprosima::fastdds::dds::DomainParticipantQos& qos) {
+daemon::Result<void> interface_of_profile_is_up(
+    const eprosima::fastdds::dds::DomainParticipantQos& qos) {
   const auto named = white_list(qos);
   const auto up = running_addresses();
   const auto is_named = [&named](const std::string& address) {
@@ -54,9 +57,10 @@ daemon::Result<void> interface_of_profile_is_up(const eprosima::fastdds::dds::Do
   if (named.empty() || std::ranges::any_of(up, is_named, &InterfaceAddress::address)) return {};
   return daemon::fail(
       daemon::ErrorCode::Io,
-      fmt::format("no interface of the profile is up (addresses {}): bring the network up, or change "
-                  "interfaceWhiteList",
-                  fmt::join(named, ", ")));
+      fmt::format(
+          "no interface of the profile is up (addresses {}): bring the network up, or change "
+          "interfaceWhiteList",
+          fmt::join(named, ", ")));
 }
 
 }  // namespace abbe::dds

@@ -89,8 +89,9 @@ Json fields(const v1::ErrorGrid& m) {
 }
 
 Json fields(const v1::ModelState& m) {
-  return {FIELD(machine), FIELD(sequence_number), FIELD(host_time_ns), {"state", name_of(m.state())},
-          FIELD(reason),  FIELD(model_id),        FIELD(age_ns),       FIELD(validity_ns)};
+  return {
+      FIELD(machine), FIELD(sequence_number), FIELD(host_time_ns), {"state", name_of(m.state())},
+      FIELD(reason),  FIELD(model_id),        FIELD(age_ns),       FIELD(validity_ns)};
 }
 
 Json fields(const v1::Health& m) {
@@ -136,6 +137,7 @@ daemon::Result<std::string> json_line(Topic topic, std::span<const std::byte> pa
     case Topic::CalibrationEvent:
       return line<v1::CalibrationEvent>(payload);
   }
+
   return daemon::fail(daemon::ErrorCode::BadInput, "unknown topic");
 }
 

@@ -15,11 +15,12 @@ namespace rtps = eprosima::fastdds::rtps;
 using Bytes = std::span<std::uint8_t>;
 
 constexpr std::size_t kHeaderBytes = 20, kSubmessageHeaderBytes = 4;
-constexpr std::uint8_t kData = 0x15, kDataFrag = 0x16, kPad = 0x01, kInfoTimestamp = 0x09, kStatistics = 0x80;
+constexpr std::uint8_t kData = 0x15, kDataFrag = 0x16, kPad = 0x01, kInfoTimestamp = 0x09,
+                       kStatistics = 0x80;
 constexpr std::uint8_t kLittleEndian = 0x01, kInlineQos = 0x02, kWithData = 0x04, kWithKey = 0x08;
 constexpr std::size_t kToInlineQos = 4;  // octetsToInlineQos counts from behind its own field
-/// Both entities and the sequence number lie in between. Fast DDS reads a signed number, and takes what is
-/// smaller for this.
+/// Both entities and the sequence number lie in between. Fast DDS reads a signed number, and takes
+/// what is smaller for this.
 constexpr std::size_t kShortestToInlineQos = 16, kLongestToInlineQos = 0x7fff;
 
 /// Of the writers that announce writers and readers: entity kind c2, ids 0003 and 0004.
@@ -27,7 +28,8 @@ constexpr std::uint32_t kPublicationsWriter = 0x000003c2, kSubscriptionsWriter =
 /// What a type is announced with: TypeInformation, TypeObject, TypeIdentifier.
 constexpr std::array<std::uint16_t, 3> kTypeParameters{0x0075, 0x0072, 0x0069};
 constexpr std::uint16_t kSentinel = 0x0001;
-/// Vendor-specific and without the bit "must understand": a receiver that does not know it skips it.
+/// Vendor-specific and without the bit "must understand": a receiver that does not know it skips
+/// it.
 constexpr std::uint16_t kUnusedParameterId = 0xbfff;
 
 class Reader {
@@ -38,7 +40,8 @@ class Reader {
     return static_cast<std::uint16_t>(little_endian_ ? a | b << 8 : a << 8 | b);
   }
   void put_u16(std::size_t at, std::uint16_t value) {
-    const auto low = static_cast<std::uint8_t>(value & 0xff), high = static_cast<std::uint8_t>(value >> 8);
+    const auto low = static_cast<std::uint8_t>(value & 0xff),
+               high = static_cast<std::uint8_t>(value >> 8);
     bytes_[at] = little_endian_ ? low : high;
     bytes_[at + 1] = little_endian_ ? high : low;
   }
@@ -56,9 +59,10 @@ std::uint32_t entity_id(Bytes bytes, std::size_t at) {
   return id;
 }
 
-/// Calls use(id, place of the id) for every parameter of the list that begins at `at`. Where the list ends,
-/// behind its sentinel; nothing where a length is not a multiple of four, as the standard has it [DDSI-RTPS
-/// 2.5, 9.4.2.11], or runs out of the list: receivers read such a list each in its own way.
+/// Calls use(id, place of the id) for every parameter of the list that begins at `at`. Where the
+/// list ends, behind its sentinel; nothing where a length is not a multiple of four, as the
+/// standard has it [DDSI-RTPS 2.5, 9.4.2.11], or runs out of the list: receivers read such a list
+/// each in its own way.
 template <class Use>
 std::optional<std::size_t> walk_parameters(const Reader& list, std::size_t at, Use use) {
   for (; at + 4 <= list.size();) {
@@ -80,26 +84,30 @@ bool is_announcement(Bytes body) {
   return writer == kPublicationsWriter || writer == kSubscriptionsWriter;
 }
 
-/// False where it is not an announcement as the standard has it, of which receivers would take another part
-/// for the parameters: the message is not handed on then.
+/// False where it is not an announcement as the standard has it, of which receivers would take
+/// another part for the parameters: the message is not handed on then.
 bool blank_types(Bytes body, std::uint8_t flags) {
   const Reader header(body, (flags & kLittleEndian) != 0);
   const std::size_t to_inline_qos = header.u16(2);
   if (to_inline_qos < kShortestToInlineQos || to_inline_qos > kLongestToInlineQos) return false;
   std::size_t at = kToInlineQos + to_inline_qos;
+
   if ((flags & kInlineQos) != 0) {
     const auto end = walk_parameters(header, at, [](std::uint16_t, std::size_t) {});
     if (!end) return false;
     at = *end;
   }
+
   if ((flags & (kWithData | kWithKey)) == 0) return true;
   if (at + 4 > body.size()) return false;
   const bool little_endian = (body[at + 1] & 1) != 0;  // PL_CDR_LE is 00 03, PL_CDR_BE is 00 02
   Reader list(body, little_endian);
+
   const auto end = walk_parameters(list, at + 4, [&list](std::uint16_t id, std::size_t place) {
     if (std::ranges::find(kTypeParameters, id) != kTypeParameters.end())
       list.put_u16(place, kUnusedParameterId);
   });
+
   return end.has_value();
 }
 
@@ -111,8 +119,9 @@ class MessageFilter final : public rtps::ChainingTransport {
 
   rtps::TransportDescriptorInterface* get_configuration() override { return descriptor_.get(); }
 
-  bool send(eprosima::fastrtps::rtps::SenderResource* sender, const eprosima::fastrtps::rtps::octet* bytes,
-            uint32_t size, eprosima::fastrtps::rtps::LocatorsIterator* begin,
+  bool send(eprosima::fastrtps::rtps::SenderResource* sender,
+            const eprosima::fastrtps::rtps::octet* bytes, uint32_t size,
+            eprosima::fastrtps::rtps::LocatorsIterator* begin,
             eprosima::fastrtps::rtps::LocatorsIterator* end,
             const std::chrono::steady_clock::time_point& timeout) override {
     return sender->send(bytes, size, begin, end, timeout);
@@ -124,7 +133,8 @@ class MessageFilter final : public rtps::ChainingTransport {
     thread_local std::vector<std::uint8_t> message;
     message.assign(bytes, bytes + size);
     const std::size_t passed = filter_message(message);
-    if (passed > 0) next->OnDataReceived(message.data(), static_cast<std::uint32_t>(passed), local, remote);
+    if (passed > 0)
+      next->OnDataReceived(message.data(), static_cast<std::uint32_t>(passed), local, remote);
   }
 
  private:

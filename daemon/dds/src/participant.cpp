@@ -23,7 +23,8 @@ namespace {
 namespace fast = eprosima::fastdds::dds;
 const auto kOk = eprosima::fastrtps::types::ReturnCode_t::RETCODE_OK;
 
-/// Standard output belongs to what a program prints; Fast DDS writes its errors there unless told otherwise.
+/// Standard output belongs to what a program prints; Fast DDS writes its errors there unless told
+/// otherwise.
 void log_to_stderr() {
   auto consumer = std::make_unique<fast::StdoutErrConsumer>();
   consumer->stderr_threshold(fast::Log::Kind::Info);
@@ -32,26 +33,31 @@ void log_to_stderr() {
 }
 
 Result<fast::DomainParticipantQos> read_profile(const std::filesystem::path& file) {
-  // Else a DEFAULT_FASTRTPS_PROFILES.xml that happens to lie in the working directory would change what we
-  // are.
+  // Else a DEFAULT_FASTRTPS_PROFILES.xml that happens to lie in the working directory would change
+  // what we are.
   ::setenv("SKIP_DEFAULT_XML", "1", 1);
   auto* factory = fast::DomainParticipantFactory::get_instance();
   const std::string name = file.empty() ? std::string("built-in profile") : file.string();
-  if (!file.empty() && !std::ifstream(file)) return fail(ErrorCode::BadInput, name + ": cannot be read");
-  const auto loaded = file.empty()
-                          ? factory->load_XML_profiles_string(kBuiltinProfile, sizeof(kBuiltinProfile) - 1)
-                          : factory->load_XML_profiles_file(name);
-  if (loaded != kOk) return fail(ErrorCode::BadInput, name + ": is not a Fast DDS XML profile file");
+  if (!file.empty() && !std::ifstream(file))
+    return fail(ErrorCode::BadInput, name + ": cannot be read");
+  const auto loaded =
+      file.empty() ? factory->load_XML_profiles_string(kBuiltinProfile, sizeof(kBuiltinProfile) - 1)
+                   : factory->load_XML_profiles_file(name);
+  if (loaded != kOk)
+    return fail(ErrorCode::BadInput, name + ": is not a Fast DDS XML profile file");
   fast::DomainParticipantQos qos;
+
   if (factory->get_participant_qos_from_profile(daemon::kDdsProfileName, qos) != kOk) {
     return fail(ErrorCode::BadInput,
                 name + ": has no participant profile \"" + daemon::kDdsProfileName + "\"");
   }
+
   return qos;
 }
 
 bool has_property(const fast::DomainParticipantQos& qos, const char* name) {
-  return eprosima::fastrtps::rtps::PropertyPolicyHelper::find_property(qos.properties(), name) != nullptr;
+  return eprosima::fastrtps::rtps::PropertyPolicyHelper::find_property(qos.properties(), name) !=
+         nullptr;
 }
 
 /// Without authentication Fast DDS switches security off, whatever access says.
@@ -62,9 +68,9 @@ bool has_security(const fast::DomainParticipantQos& qos) {
 Result<void> add_security(const ParticipantOptions& options, fast::DomainParticipantQos& qos) {
   if (options.security.empty()) return {};
   if (has_property(qos, "dds.sec.auth.plugin") || has_property(qos, "dds.sec.access.plugin")) {
-    return fail(ErrorCode::BadInput, options.profiles.string() +
-                                         ": has dds.sec properties of its own, and security = " +
-                                         options.security.string() + " names keys, too: remove one");
+    return fail(ErrorCode::BadInput,
+                options.profiles.string() + ": has dds.sec properties of its own, and security = " +
+                    options.security.string() + " names keys, too: remove one");
   }
   const auto identity =
       daemon::find_dds_identity(options.security, options.role, std::chrono::system_clock::now());
@@ -91,35 +97,45 @@ Result<Participant> Participant::create(const ParticipantOptions& options) {
     return fail(ErrorCode::Usage, "domain " + std::to_string(options.domain) + ": the highest is " +
                                       std::to_string(kHighestDomain));
   }
+
   auto qos = read_profile(options.profiles);
   if (!qos) return tl::make_unexpected(qos.error());
+
   // Without one Fast DDS makes a participant that sends nothing and reports no error.
   if (auto up = interface_of_profile_is_up(*qos); !up) return tl::make_unexpected(up.error());
-  if (auto secured = add_security(options, *qos); !secured) return tl::make_unexpected(secured.error());
+  if (auto secured = add_security(options, *qos); !secured)
+    return tl::make_unexpected(secured.error());
   auto allowed = white_list(*qos);
-  for (auto& transport : qos->transport().user_transports) transport = with_message_filter(transport);
+  for (auto& transport : qos->transport().user_transports)
+    transport = with_message_filter(transport);
   auto* participant =
       fast::DomainParticipantFactory::get_instance()->create_participant(options.domain, *qos);
+
   if (participant == nullptr) {
-    return fail(ErrorCode::Io, "domain " + std::to_string(options.domain) +
-                                   ": no participant can be created (ports or interfaces of the profile" +
-                                   (has_security(*qos) ? ", or its keys and permissions)" : ")"));
+    return fail(ErrorCode::Io,
+                "domain " + std::to_string(options.domain) +
+                    ": no participant can be created (ports or interfaces of the profile" +
+                    (has_security(*qos) ? ", or its keys and permissions)" : ")"));
   }
+
   return Participant(participant, std::move(allowed));
 }
 
 Result<fast::Topic*> Participant::topic(daemon::Topic topic) {
   const auto& traits = daemon::traits(topic);
   fast::TypeSupport type(new PayloadType(topic));
-  // An announced TypeInformation keeps Cyclone DDS 0.10 from matching, an announced TypeObject crashes Fast
-  // DDS 2.9 participants that do not know the type.
+
+  // An announced TypeInformation keeps Cyclone DDS 0.10 from matching, an announced TypeObject
+  // crashes Fast DDS 2.9 participants that do not know the type.
   type->auto_fill_type_information(false);
   type->auto_fill_type_object(false);
   const std::string name(traits.name);
-  auto* created = type.register_type(participant_.get()) == kOk
-                      ? participant_->create_topic(name, type.get_type_name(), fast::TOPIC_QOS_DEFAULT)
-                      : nullptr;
+  auto* created =
+      type.register_type(participant_.get()) == kOk
+          ? participant_->create_topic(name, type.get_type_name(), fast::TOPIC_QOS_DEFAULT)
+          : nullptr;
   if (created == nullptr) return fail(ErrorCode::Io, "topic " + name + ": Fast DDS refuses it");
+
   return created;
 }
 

@@ -33,12 +33,14 @@ std::size_t largest_body_bytes(daemon::Topic topic) {
     case daemon::Topic::CalibrationEvent:
       return v1::CalibrationEvent::getMaxCdrSerializedSize();
   }
+
   return 0;
 }
 
 void append_big_endian(std::string& key, std::uint32_t value) {
   key.resize((key.size() + 3) / 4 * 4);  // CDR aligns a 4-byte number to 4, padding is zero
-  for (int shift = 24; shift >= 0; shift -= 8) key.push_back(static_cast<char>((value >> shift) & 0xffu));
+  for (int shift = 24; shift >= 0; shift -= 8)
+    key.push_back(static_cast<char>((value >> shift) & 0xffu));
 }
 
 void append_big_endian(std::string& key, std::string_view text) {
@@ -74,7 +76,8 @@ std::function<uint32_t()> PayloadType::getSerializedSizeProvider(void* data) {
   return [data] { return static_cast<uint32_t>(static_cast<const Payload*>(data)->bytes.size()); };
 }
 
-bool PayloadType::getKey(void* data, eprosima::fastrtps::rtps::InstanceHandle_t* handle, bool /*force_md5*/) {
+bool PayloadType::getKey(void* data, eprosima::fastrtps::rtps::InstanceHandle_t* handle,
+                         bool /*force_md5*/) {
   const auto key = daemon::payload_key(topic_, static_cast<const Payload*>(data)->bytes);
   if (!key) return false;
   std::string big_endian;

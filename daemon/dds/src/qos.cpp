@@ -11,7 +11,8 @@ const Duration_t kLivelinessLease(1, 0);
 /// A late joiner waits for the next heartbeat; the default of 3 s would be its delay.
 const Duration_t kHeartbeatPeriod(0, 100'000'000);
 
-/// Fast DDS allows 10 instances unless told otherwise; slices of a grid and streams of a machine are more.
+/// Fast DDS allows 10 instances unless told otherwise; slices of a grid and streams of a machine
+/// are more.
 constexpr int kMostInstances = 128;
 constexpr int kInstancesAtStart = 4;
 
@@ -22,8 +23,10 @@ bool is_durable(daemon::Topic topic) {
 /// Writer and reader agree on everything below; the rest differs only in where Fast DDS keeps it.
 template <class Qos>
 void set_common(daemon::Topic topic, Qos& qos) {
-  qos.reliability().kind = is_durable(topic) ? RELIABLE_RELIABILITY_QOS : BEST_EFFORT_RELIABILITY_QOS;
-  qos.durability().kind = is_durable(topic) ? TRANSIENT_LOCAL_DURABILITY_QOS : VOLATILE_DURABILITY_QOS;
+  qos.reliability().kind =
+      is_durable(topic) ? RELIABLE_RELIABILITY_QOS : BEST_EFFORT_RELIABILITY_QOS;
+  qos.durability().kind =
+      is_durable(topic) ? TRANSIENT_LOCAL_DURABILITY_QOS : VOLATILE_DURABILITY_QOS;
   qos.history().kind = KEEP_LAST_HISTORY_QOS;
   qos.history().depth = 1;
   qos.resource_limits().max_samples = kMostInstances;
@@ -32,6 +35,7 @@ void set_common(daemon::Topic topic, Qos& qos) {
   qos.resource_limits().allocated_samples = kInstancesAtStart;
   qos.endpoint().history_memory_policy = eprosima::fastrtps::rtps::PREALLOCATED_MEMORY_MODE;
   qos.data_sharing().off();
+
   if (topic == daemon::Topic::ModelState) {
     qos.liveliness().kind = MANUAL_BY_TOPIC_LIVELINESS_QOS;
     qos.liveliness().lease_duration = kLivelinessLease;

@@ -34,8 +34,8 @@ WriterId writer_id(const eprosima::fastrtps::rtps::InstanceHandle_t& publication
   return id;
 }
 
-/// Which writers keep their lease. Fast DDS calls it for every change of one of them, from threads of its
-/// own; a status that is asked for later would name the last one only.
+/// Which writers keep their lease. Fast DDS calls it for every change of one of them, from threads
+/// of its own; a status that is asked for later would name the last one only.
 class AliveWriters final : public fast::DataReaderListener {
  public:
   [[nodiscard]] bool contains(const WriterId& writer) const {
@@ -45,8 +45,8 @@ class AliveWriters final : public fast::DataReaderListener {
 
   fast::GuardCondition changed;  ///< reading a status resets its status condition
 
-  /// Fast DDS may report two changes at once in the wrong order. What arrived before its writer was lost, and
-  /// lay in the reader until now, is no sign of life.
+  /// Fast DDS may report two changes at once in the wrong order. What arrived before its writer was
+  /// lost, and lay in the reader until now, is no sign of life.
   void heard(const WriterId& writer, const Time& arrived) {
     const std::lock_guard lock(mutex_);
     const auto lost = lost_at_.find(writer);
@@ -119,18 +119,21 @@ Result<Readers> Readers::create(Participant& participant, std::span<const daemon
   auto* subscriber = participant.get().create_subscriber(fast::SUBSCRIBER_QOS_DEFAULT);
   if (subscriber == nullptr) return fail(ErrorCode::Io, "subscriber: Fast DDS refuses it");
   auto state = std::make_unique<State>();
+
   for (const daemon::Topic t : topics) {
     const auto topic = participant.topic(t);
     if (!topic) return tl::make_unexpected(topic.error());
     const bool is_state = t == daemon::Topic::ModelState;
-    auto* reader = subscriber->create_datareader(*topic, reader_qos(t), is_state ? &state->alive : nullptr,
-                                                 fast::StatusMask::liveliness_changed());
+    auto* reader =
+        subscriber->create_datareader(*topic, reader_qos(t), is_state ? &state->alive : nullptr,
+                                      fast::StatusMask::liveliness_changed());
     if (reader == nullptr) {
       return fail(ErrorCode::Io,
                   "reader of " + std::string(daemon::traits(t).name) + ": Fast DDS refuses it");
     }
     state->add(t, reader);
   }
+
   return Readers(std::move(state));
 }
 
@@ -146,7 +149,8 @@ void Readers::take(const OnArrival& on_arrival) {
     while (r.reader->take_next_sample(&state_->payload, &info) == kOk) {
       if (!info.valid_data) continue;
       const WriterId writer = writer_id(info.publication_handle);
-      if (r.topic == daemon::Topic::ModelState) state_->alive.heard(writer, info.reception_timestamp);
+      if (r.topic == daemon::Topic::ModelState)
+        state_->alive.heard(writer, info.reception_timestamp);
       on_arrival({r.topic, state_->payload.bytes, writer});
     }
   }

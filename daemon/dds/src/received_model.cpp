@@ -32,13 +32,15 @@ const char* name_of(v1::ModelStatus status) noexcept {
 void ReceivedModel::state(v1::ModelState state) {
   const bool another = !state_ || state_->model_id() != state.model_id();
   state_ = std::move(state);
-  if (another) std::erase_if(slices_, [this](const auto& of) { return of.first != state_->model_id(); });
+  if (another)
+    std::erase_if(slices_, [this](const auto& of) { return of.first != state_->model_id(); });
 }
 
 void ReceivedModel::slice(v1::ErrorGrid slice) {
   constexpr std::size_t kMostModels = 4;  // the state's, the next one, and what is left of others
   if (slices_.size() >= kMostModels && !slices_.contains(slice.model_id()))
-    std::erase_if(slices_, [this](const auto& of) { return !state_ || of.first != state_->model_id(); });
+    std::erase_if(slices_,
+                  [this](const auto& of) { return !state_ || of.first != state_->model_id(); });
   Slices& of_model = slices_[slice.model_id()];
   std::erase_if(of_model, [&](const auto& s) { return s.second.slices() != slice.slices(); });
   of_model[slice.slice()] = std::move(slice);
@@ -47,7 +49,8 @@ void ReceivedModel::slice(v1::ErrorGrid slice) {
 std::optional<std::vector<v1::GridNode>> ReceivedModel::grid() const {
   if (!state_) return std::nullopt;
   const auto of_model = slices_.find(state_->model_id());
-  if (of_model == slices_.end() || of_model->second.size() != of_model->second.begin()->second.slices())
+  if (of_model == slices_.end() ||
+      of_model->second.size() != of_model->second.begin()->second.slices())
     return std::nullopt;
   std::vector<v1::GridNode> nodes;
   for (const auto& [number, slice] : of_model->second)
@@ -72,7 +75,8 @@ Decision decide(const v1::Compensation& c, std::optional<std::chrono::nanosecond
   if (!c.tool_ok()) return refuse("the model does not hold for this tool");
   if (!waited) return refuse("how quick the way can be is not known yet");
   // A stranger may send any value: no sum of two of them.
-  if (c.age_ns() < 0 || c.validity_ns() < 0 || c.age_ns() > c.validity_ns() - waited->count()) return refuse("older than its validity");
+  if (c.age_ns() < 0 || c.validity_ns() < 0 || c.age_ns() > c.validity_ns() - waited->count())
+    return refuse("older than its validity");
   return decision;
 }
 
@@ -91,6 +95,7 @@ std::optional<std::chrono::nanoseconds> Delay::of(const v1::Compensation& vector
   last_ = now;
   if (!first_) first_ = now;
   if (now - *first_ <= kFirst) return std::nullopt;
+
   return offset - *least_;
 }
 

@@ -20,10 +20,11 @@ std::vector<eprosima::fastdds::dds::DataWriter*> announcement_writer(
     Participant& participant, eprosima::fastdds::dds::Publisher& publisher) {
   namespace fast = eprosima::fastdds::dds;
   const std::string type(daemon::traits(daemon::Topic::CalibrationEvent).type_name);
-  auto* topic = participant.get().create_topic("abbe/v1/Announcement", type, fast::TOPIC_QOS_DEFAULT);
-  auto* writer = topic == nullptr
-                     ? nullptr
-                     : publisher.create_datawriter(topic, writer_qos(daemon::Topic::CalibrationEvent));
+  auto* topic =
+      participant.get().create_topic("abbe/v1/Announcement", type, fast::TOPIC_QOS_DEFAULT);
+  auto* writer = topic == nullptr ? nullptr
+                                  : publisher.create_datawriter(
+                                        topic, writer_qos(daemon::Topic::CalibrationEvent));
   if (writer == nullptr) return {};
   return {writer};
 }
@@ -35,6 +36,7 @@ Result<Writers> Writers::create(Participant& participant) {
   Writers writers;
   auto* publisher = participant.get().create_publisher(fast::PUBLISHER_QOS_DEFAULT);
   if (publisher == nullptr) return fail(ErrorCode::Io, "publisher: Fast DDS refuses it");
+
   for (const auto& traits : daemon::all_topics()) {
     const auto topic = participant.topic(traits.topic);
     if (!topic) return tl::make_unexpected(topic.error());
@@ -45,10 +47,12 @@ Result<Writers> Writers::create(Participant& participant) {
     }
     writers.writers_[index_of(traits.topic)] = writer;
   }
+
   if (participant.is_secure())
     writers.announced_ = announcement_writer(participant, *publisher);
   else
     writers.announced_.assign(writers.writers_.begin(), writers.writers_.end());
+
   return writers;
 }
 
@@ -60,8 +64,8 @@ bool Writers::write(daemon::Topic topic, std::span<const std::byte> payload) {
 void Writers::dispose(daemon::Topic topic, std::span<const std::byte> payload) {
   buffer_.bytes.assign(payload.begin(), payload.end());
   // An instance that was never written is refused: then there is nothing to take back.
-  static_cast<void>(
-      writers_[index_of(topic)]->dispose(&buffer_, eprosima::fastrtps::rtps::c_InstanceHandle_Unknown));
+  static_cast<void>(writers_[index_of(topic)]->dispose(
+      &buffer_, eprosima::fastrtps::rtps::c_InstanceHandle_Unknown));
 }
 
 void Writers::assert_liveliness() {

@@ -51,8 +51,10 @@ drivers::TrackerDeviceOptions device_options(const TrackerConfig& config, double
   options.name = config.name;
   options.host = config.host;
   options.port = config.port;
-  options.session.time_separation_ms = static_cast<std::int32_t>(std::lround(1000.0 / config.point_rate_hz));
-  if (config.mode == TrackerModeConfig::Stationary) options.session.mode = drivers::TrackerMode::Stationary;
+  options.session.time_separation_ms =
+      static_cast<std::int32_t>(std::lround(1000.0 / config.point_rate_hz));
+  if (config.mode == TrackerModeConfig::Stationary)
+    options.session.mode = drivers::TrackerMode::Stationary;
   options.session.stationary_time_ms =
       static_cast<std::int32_t>(config.stationary_time / std::chrono::milliseconds{1});
   options.session.weather = weather_monitor(config.weather);
@@ -63,12 +65,15 @@ drivers::TrackerDeviceOptions device_options(const TrackerConfig& config, double
   options.session.silence_timeout = stretched(config.silence_timeout, speed);
   options.session.reflector = config.reflector;
   options.session.home_after_initialize = config.home_after_initialize;
+
   if (config.search) {
     constexpr double kUnitsPerMetre = 1e3;  // abbe sets mm
     options.session.search = protocol::emscon::SetSearchParams{
         .radius = kUnitsPerMetre * config.search->radius_m,
-        .timeout_ms = static_cast<std::int32_t>(config.search->timeout / std::chrono::milliseconds{1})};
+        .timeout_ms =
+            static_cast<std::int32_t>(config.search->timeout / std::chrono::milliseconds{1})};
   }
+
   options.clock.max_constant_delay = config.max_constant_delay;
   return options;
 }
@@ -90,11 +95,13 @@ drivers::EncoderDeviceOptions device_options(const EncoderConfig& config, double
   options.supervisor.silence = stretched(options.supervisor.silence, speed);
   options.supervisor.sdo.timeout = stretched(options.supervisor.sdo.timeout, speed);
   options.reopen_after = stretched(options.reopen_after, speed);
+
   for (const EncoderNodeConfig& node : config.nodes) {
     drivers::EncoderAxis axis;
     axis.name = node.axis;
     axis.node = node.node;
-    axis.kind = node.kind == AxisKind::Rotary ? drivers::AxisKind::Rotary : drivers::AxisKind::Linear;
+    axis.kind =
+        node.kind == AxisKind::Rotary ? drivers::AxisKind::Rotary : drivers::AxisKind::Linear;
     axis.scale = node.step;
     axis.offset = node.offset;
     axis.tpdo = static_cast<std::uint8_t>(node.tpdo);
@@ -102,6 +109,7 @@ drivers::EncoderDeviceOptions device_options(const EncoderConfig& config, double
     axis.wrap_counts = static_cast<std::uint64_t>(node.wrap_counts);
     options.receiver.axes.push_back(axis);
   }
+
   return options;
 }
 
@@ -114,10 +122,12 @@ drivers::CounterCardOptions device_options(const CounterCardConfig& config, doub
   options.sample_every = config.sample_every;
   options.transfer_time = stretched(options.transfer_time, speed);
   auto& session = options.session;
+
   for (auto* time_out : {&session.open_timeout, &session.control_timeout, &session.silence,
                          &session.status_period, &session.reopen_after, &session.retry_after}) {
     *time_out = stretched(*time_out, speed);
   }
+
   return options;
 }
 
@@ -146,6 +156,7 @@ drivers::IppDeviceOptions device_options(const CmmConfig& config, double speed) 
   options.session.motion_timeout = stretched(config.motion_timeout, speed);
   options.receiver.probe = config.probe;
   options.receiver.u_position_m = config.u_position_m;
+
   return options;
 }
 

@@ -32,8 +32,8 @@ using protocol::HostTime;
 // How much one call takes out of a ring: several bursts.
 constexpr std::size_t kMostSamples = 1024;
 constexpr std::size_t kMostBlocks = 128;
-constexpr auto kPositionIsOld =
-    std::chrono::seconds{1};  // wall time: a ready machine says it ten times in it
+// wall time: a ready machine says it ten times in it
+constexpr auto kPositionIsOld = std::chrono::seconds{1};
 
 // How long a request to stop the machine may wait for its thread: 2 mm at 200 mm/s.
 constexpr auto kStopIsHeard = std::chrono::milliseconds{10};
@@ -57,25 +57,27 @@ std::unique_ptr<drivers::CanBus> make_bus(const EncoderConfig& config, double sp
     return std::make_unique<drivers::SocketCanBus>(
         drivers::SocketCanOptions{.interface = config.interface, .speed = speed}, time);
   }
-  return std::make_unique<drivers::UdpCanBus>(drivers::UdpCanOptions{.local_port = config.local_port,
-                                                                     .peer_address = config.peer_host,
-                                                                     .peer_port = config.peer_port,
-                                                                     .speed = speed},
-                                              time);
+  return std::make_unique<drivers::UdpCanBus>(
+      drivers::UdpCanOptions{.local_port = config.local_port,
+                             .peer_address = config.peer_host,
+                             .peer_port = config.peer_port,
+                             .speed = speed},
+      time);
 }
 
 std::unique_ptr<drivers::UsbLink> make_link(const CounterCardConfig& config,
                                             const drivers::UsbIdentity& identity,
                                             const drivers::TimeSource& time) {
-  if (config.transport == CardTransport::Usb) return std::make_unique<drivers::LibusbLink>(identity, time);
+  if (config.transport == CardTransport::Usb)
+    return std::make_unique<drivers::LibusbLink>(identity, time);
   return std::make_unique<drivers::UsbipLink>(
       drivers::UsbipOptions{
           .host = config.host, .port = config.port, .bus_id = config.bus_id, .identity = identity},
       time);
 }
 
-drivers::DeviceThreadOptions thread_options(const DaemonConfig& config, std::string name, int priority,
-                                            std::optional<int> cpu) {
+drivers::DeviceThreadOptions thread_options(const DaemonConfig& config, std::string name,
+                                            int priority, std::optional<int> cpu) {
   const bool enforce = config.realtime == RealTimeMode::Enforce;
   return {.name = std::move(name),
           .mode = enforce ? drivers::RealTimeMode::Enforce : drivers::RealTimeMode::Ignore,
@@ -93,7 +95,8 @@ struct Running {
 
 template <class D>
 // NOLINTNEXTLINE(performance-unnecessary-value-param): moved, which clang-tidy 14 does not see in a template
-Result<Running<D>> run(drivers::Result<std::unique_ptr<D>> device, drivers::DeviceThreadOptions options) {
+Result<Running<D>> run(drivers::Result<std::unique_ptr<D>> device,
+                       drivers::DeviceThreadOptions options) {
   if (!device) return tl::unexpected(error_of(device.error()));
   auto thread = DeviceThread::start(**device, std::move(options));
   if (!thread) return tl::unexpected(error_of(thread.error()));
@@ -107,7 +110,8 @@ struct OnLine {
 };
 
 /// The devices of the configuration, those of one line together.
-std::vector<std::vector<std::size_t>> devices_of_lines(const std::vector<EnvironmentConfig>& devices) {
+std::vector<std::vector<std::size_t>> devices_of_lines(
+    const std::vector<EnvironmentConfig>& devices) {
   std::vector<std::vector<std::size_t>> lines;
   for (std::size_t i = 0; i < devices.size(); ++i) {
     const auto with_it = std::ranges::find_if(lines, [&](const auto& line) {
@@ -178,14 +182,15 @@ Result<DeviceSet> DeviceSet::start(const Config& config, const drivers::TimeSour
   auto state = std::make_unique<State>();
   state->time = &time;
   if (config.encoder) {
-    auto running =
-        run(drivers::EncoderDevice::create(device_options(*config.encoder, config.daemon.speed),
-                                           make_bus(*config.encoder, config.daemon.speed, time), time),
-            thread_options(config.daemon, "abbe-encoder", config.daemon.encoder_priority,
-                           config.daemon.encoder_cpu));
+    auto running = run(
+        drivers::EncoderDevice::create(device_options(*config.encoder, config.daemon.speed),
+                                       make_bus(*config.encoder, config.daemon.speed, time), time),
+        thread_options(config.daemon, "abbe-encoder", config.daemon.encoder_priority,
+                       config.daemon.encoder_cpu));
     if (!running) return tl::unexpected(running.error());
     state->encoder.emplace(std::move(*running));
   }
+
   if (config.counter_card) {
     auto options = device_options(*config.counter_card, config.daemon.speed);
     if (left) {
@@ -197,32 +202,35 @@ Result<DeviceSet> DeviceSet::start(const Config& config, const drivers::TimeSour
       state->touch_detector = std::make_unique<drivers::TouchDetector>(
           touch_options(*config.probe, *config.counter_card, config.machine));
     }
-    auto running =
-        run(drivers::CounterCardDevice::create(options, std::move(link), time, state->touch_detector.get()),
-            thread_options(config.daemon, "abbe-counters", config.daemon.encoder_priority,
-                           config.daemon.encoder_cpu));
+    auto running = run(drivers::CounterCardDevice::create(options, std::move(link), time,
+                                                          state->touch_detector.get()),
+                       thread_options(config.daemon, "abbe-counters",
+                                      config.daemon.encoder_priority, config.daemon.encoder_cpu));
     if (!running) return tl::unexpected(running.error());
     state->counter_card.emplace(std::move(*running));
   }
+
   if (config.reference) {
     const CounterCardConfig& card = config.reference->card;
     const auto options = device_options(card, config.daemon.speed);
-    auto running =
-        run(drivers::CounterCardDevice::create(options, make_link(card, drivers::identity_of(options), time),
-                                               time, &state->mark_watcher),
-            thread_options(config.daemon, "abbe-marks", config.daemon.encoder_priority,
-                           config.daemon.encoder_cpu));
+    auto running = run(drivers::CounterCardDevice::create(
+                           options, make_link(card, drivers::identity_of(options), time), time,
+                           &state->mark_watcher),
+                       thread_options(config.daemon, "abbe-marks", config.daemon.encoder_priority,
+                                      config.daemon.encoder_cpu));
     if (!running) return tl::unexpected(running.error());
     state->reference_card.emplace(std::move(*running));
   }
+
   if (config.tracker) {
-    auto running =
-        run(drivers::TrackerDevice::create(device_options(*config.tracker, config.daemon.speed), time),
-            thread_options(config.daemon, "abbe-tracker", config.daemon.tracker_priority,
-                           config.daemon.tracker_cpu));
+    auto running = run(
+        drivers::TrackerDevice::create(device_options(*config.tracker, config.daemon.speed), time),
+        thread_options(config.daemon, "abbe-tracker", config.daemon.tracker_priority,
+                       config.daemon.tracker_cpu));
     if (!running) return tl::unexpected(running.error());
     state->tracker.emplace(std::move(*running));
   }
+
   state->environments.resize(config.environment.size());
   for (const auto& devices : devices_of_lines(config.environment)) {
     std::vector<drivers::EnvironmentDeviceOptions> options;
@@ -236,6 +244,7 @@ Result<DeviceSet> DeviceSet::start(const Config& config, const drivers::TimeSour
       state->environments[devices[k]] = {&running->device->device(k), running->thread.get()};
     state->environment_lines.push_back(std::move(*running));
   }
+
   if (config.cmm) {
     auto options = device_options(*config.cmm, config.daemon.speed);
     keep_hold(config.daemon.data_dir, options);
@@ -246,6 +255,7 @@ Result<DeviceSet> DeviceSet::start(const Config& config, const drivers::TimeSour
     state->cmm.emplace(std::move(*running));
     state->cmm_is_the_axes = config.cmm_reads_axes();
   }
+
   return DeviceSet{std::move(state)};
 }
 
@@ -254,14 +264,15 @@ DeviceSet::~DeviceSet() = default;
 DeviceSet::DeviceSet(DeviceSet&&) noexcept = default;
 DeviceSet& DeviceSet::operator=(DeviceSet&&) noexcept = default;
 
-/// Of each device the samples before the bytes: a driver hands them over the other way round, so bytes are
-/// never taken in a later turn than what was made of them. A replay stands on that.
+/// Of each device the samples before the bytes: a driver hands them over the other way round, so
+/// bytes are never taken in a later turn than what was made of them. A replay stands on that.
 void DeviceSet::drain(Batch& batch) {
   State& s = *state_;
   if (s.encoder) {
     drain_ring(s.encoder->device->samples(), s.axes, batch.axes);
     drain_ring(s.encoder->device->raw(), s.blocks, batch.encoder_raw);
   }
+
   if (s.counter_card) {  // the configuration allows one source of axes
     drain_ring(s.counter_card->device->samples(), s.axes, batch.axes);
     for (drivers::CounterCardProgress p; s.counter_card->device->progress().pop({&p, 1}) != 0;)
@@ -272,17 +283,20 @@ void DeviceSet::drain(Batch& batch) {
     }
     drain_ring(s.counter_card->device->raw(), s.blocks, batch.encoder_raw);
   }
+
   if (s.reference_card) {
     while (const std::size_t n = s.mark_watcher.crossings().pop(s.marks))
       batch.marks.insert(batch.marks.end(), s.marks.begin(),
                          s.marks.begin() + static_cast<std::ptrdiff_t>(n));
     drain_ring(s.reference_card->device->raw(), s.blocks, batch.reference_raw);
   }
+
   if (s.tracker) {
     drain_ring(s.tracker->device->points(), s.points, batch.points);
     drain_ring(s.tracker->device->environment(), s.environment, batch.environment);
     drain_ring(s.tracker->device->raw(), s.blocks, batch.tracker_raw);
   }
+
   for (std::size_t i = 0; i < s.environments.size(); ++i) s.drain_environment(i, batch);
   if (s.cmm) drain_cmm(batch);
 }
@@ -298,7 +312,8 @@ void DeviceSet::drain_cmm(Batch& batch) {
   while (const std::size_t n = device.positions().pop(s.axes)) {
     s.cmm_stands_at = s.axes[n - 1];
     if (s.cmm_is_the_axes)
-      batch.axes.insert(batch.axes.end(), s.axes.begin(), s.axes.begin() + static_cast<std::ptrdiff_t>(n));
+      batch.axes.insert(batch.axes.end(), s.axes.begin(),
+                        s.axes.begin() + static_cast<std::ptrdiff_t>(n));
   }
   drain_ring(device.raw(), s.blocks, batch.probe_raw);
 }
@@ -327,7 +342,8 @@ Result<void> DeviceSet::release_machine() {
   auto& device = *state_->cmm->device;
   const auto status = device.status();
   const auto refused = [&](std::string_view why) {
-    return fail(ErrorCode::Refused, fmt::format("machine: {} {}: it is {}", status.name, why, status.state));
+    return fail(ErrorCode::Refused,
+                fmt::format("machine: {} {}: it is {}", status.name, why, status.state));
   };
   if (!device.held()) return refused("awaits no release");
   if (!device.releasable()) return refused("cannot be released before its motion was stopped");
@@ -338,7 +354,8 @@ Result<void> DeviceSet::release_machine() {
 std::optional<TipPlace> DeviceSet::tip_place() const {
   const auto& at = state_->cmm_stands_at;
   if (!at || at->missing_mask != 0) return std::nullopt;
-  return TipPlace{{at->position[0], at->position[1], at->position[2]}, state_->time->now() - at->head.time};
+  return TipPlace{{at->position[0], at->position[1], at->position[2]},
+                  state_->time->now() - at->head.time};
 }
 
 std::size_t DeviceSet::points_left() const {
@@ -349,10 +366,12 @@ Result<std::array<double, 3>> DeviceSet::machine_position() const {
   if (!state_->cmm) return SampleSource::machine_position();
   const auto status = state_->cmm->thread->status();
   const auto refused = [&](std::string_view why) {
-    return fail(ErrorCode::Refused,
-                fmt::format("measuring machine {} {}{}{}", status.name, why,
-                            status.last_fault.empty() ? "" : "; its last fault: ", status.last_fault));
+    return fail(
+        ErrorCode::Refused,
+        fmt::format("measuring machine {} {}{}{}", status.name, why,
+                    status.last_fault.empty() ? "" : "; its last fault: ", status.last_fault));
   };
+
   if (release_awaited()) return refused("awaits a release by a person (`abbe machine release`)");
   if (status.state != drivers::name_of(drivers::IppState::Ready))
     return refused(fmt::format("is not ready: {}", status.state));
@@ -362,6 +381,7 @@ Result<std::array<double, 3>> DeviceSet::machine_position() const {
   const std::array<double, 3> place{at->position[0], at->position[1], at->position[2]};
   if (!std::ranges::all_of(place, [](double p) { return std::isfinite(p); }))
     return refused("does not say where it stands");
+
   return place;
 }
 
@@ -375,7 +395,8 @@ void DeviceSet::order_tracker(drivers::TrackerOrder order) {
 }
 
 std::vector<drivers::TrackerOrderReport> DeviceSet::tracker_reports() {
-  return state_->tracker ? state_->tracker->device->reports() : std::vector<drivers::TrackerOrderReport>{};
+  return state_->tracker ? state_->tracker->device->reports()
+                         : std::vector<drivers::TrackerOrderReport>{};
 }
 
 std::vector<StreamHealth> DeviceSet::health(HostTime now) {
@@ -383,8 +404,10 @@ std::vector<StreamHealth> DeviceSet::health(HostTime now) {
   if (state_->tracker) out.push_back(state_->health_of(*state_->tracker->thread, now));
   if (state_->encoder) out.push_back(state_->health_of(*state_->encoder->thread, now));
   if (state_->counter_card) out.push_back(state_->health_of(*state_->counter_card->thread, now));
-  if (state_->reference_card) out.push_back(state_->health_of(*state_->reference_card->thread, now));
-  for (const auto& running : state_->environments) out.push_back(state_->health_of(*running.thread, now));
+  if (state_->reference_card)
+    out.push_back(state_->health_of(*state_->reference_card->thread, now));
+  for (const auto& running : state_->environments)
+    out.push_back(state_->health_of(*running.thread, now));
   if (state_->cmm) out.push_back(state_->health_of(*state_->cmm->thread, now));
   return out;
 }
@@ -394,13 +417,16 @@ std::vector<std::string> DeviceSet::warnings() const {
   const auto add = [&out](const auto& running) {
     out.insert(out.end(), running.thread->warnings().begin(), running.thread->warnings().end());
   };
+
   if (state_->tracker) add(*state_->tracker);
   if (state_->encoder) add(*state_->encoder);
   for (const auto* card : {&state_->counter_card, &state_->reference_card}) {
     if (!*card) continue;
     add(**card);
-    if (auto assumed = (*card)->device->assumption(); !assumed.empty()) out.push_back(std::move(assumed));
+    if (auto assumed = (*card)->device->assumption(); !assumed.empty())
+      out.push_back(std::move(assumed));
   }
+
   for (const auto& running : state_->environment_lines) add(running);
   if (state_->cmm) add(*state_->cmm);
   return out;

@@ -20,11 +20,14 @@ void write_hold(const std::filesystem::path& file, const drivers::IppMachine& ma
   std::error_code failed;
   if (machine == drivers::IppMachine{}) {
     std::filesystem::remove(file, failed);
-    if (failed) fmt::print(stderr, "abbed: {}: cannot be removed: {}\n", file.string(), failed.message());
+    if (failed)
+      fmt::print(stderr, "abbed: {}: cannot be removed: {}\n", file.string(), failed.message());
     return;
   }
+
   auto written = create_folder(file.parent_path());
-  if (written) written = replace_file(file, fmt::format("{}{}", machine.moving ? kMoving : "", machine.held));
+  if (written)
+    written = replace_file(file, fmt::format("{}{}", machine.moving ? kMoving : "", machine.held));
   if (!written)
     fmt::print(stderr, "abbed: {}: after a restart the measuring machine would await no release\n",
                written.error().text);
@@ -48,6 +51,7 @@ drivers::IppMachine read_hold(const std::filesystem::path& file) {
   if (moving) text.erase(0, kMoving.size());
   if (text.empty()) text = moving ? "abbed ended while the machine was moving" : "unknown reason";
   if (!text.starts_with(kSince)) text.insert(0, kSince);
+
   return {text, moving};
 }
 

@@ -27,7 +27,8 @@ std::string broken_bound(const T& value) {
 
 template <class T>
 tl::unexpected<Error> refuse(const char* what, const std::string& why) {
-  return fail(ErrorCode::BadInput, std::string(what) + " " + std::string(Names<T>::type) + ": " + why);
+  return fail(ErrorCode::BadInput,
+              std::string(what) + " " + std::string(Names<T>::type) + ": " + why);
 }
 
 eprosima::fastcdr::Cdr little_endian_cdr(eprosima::fastcdr::FastBuffer& buffer) {
@@ -39,8 +40,10 @@ eprosima::fastcdr::Cdr little_endian_cdr(eprosima::fastcdr::FastBuffer& buffer) 
 template <class T>
 Result<void> encode(const T& value, std::vector<std::byte>& payload) {
   payload.clear();
-  if (const std::string broken = broken_bound(value); !broken.empty()) return refuse<T>("encode", broken);
+  if (const std::string broken = broken_bound(value); !broken.empty())
+    return refuse<T>("encode", broken);
   payload.resize(kCdrHeaderBytes + T::getCdrSerializedSize(value));
+
   try {
     eprosima::fastcdr::FastBuffer buffer(reinterpret_cast<char*>(payload.data()), payload.size());
     auto cdr = little_endian_cdr(buffer);
@@ -51,6 +54,7 @@ Result<void> encode(const T& value, std::vector<std::byte>& payload) {
     payload.clear();
     return refuse<T>("encode", e.what());
   }
+
   return {};
 }
 
@@ -61,6 +65,7 @@ Result<T> decode(std::span<const std::byte> payload) {
   if (payload[0] != std::byte{0} || payload[1] != std::byte{1}) {
     return refuse<T>("decode", "encapsulation is not CDR_LE (00 01)");
   }
+
   T value;
   try {
     // Fast CDR only reads from a buffer it is to decode, but has no const interface.
@@ -69,13 +74,16 @@ Result<T> decode(std::span<const std::byte> payload) {
     auto cdr = little_endian_cdr(buffer);
     cdr.read_encapsulation();
     value.deserialize(cdr);
-    if (const std::size_t used = cdr.getSerializedDataLength(); payload.size() - used > kMaxPaddingBytes) {
+    if (const std::size_t used = cdr.getSerializedDataLength();
+        payload.size() - used > kMaxPaddingBytes) {
       return refuse<T>("decode", std::to_string(payload.size() - used) + " bytes left over");
     }
   } catch (const std::exception& e) {
     return refuse<T>("decode", e.what());
   }
-  if (const std::string broken = broken_bound(value); !broken.empty()) return refuse<T>("decode", broken);
+
+  if (const std::string broken = broken_bound(value); !broken.empty())
+    return refuse<T>("decode", broken);
   return value;
 }
 
@@ -94,7 +102,8 @@ std::span<const MemberBound> member_bounds() noexcept {
   static const std::vector<MemberBound> collected = [] {
     std::vector<MemberBound> bounds;
     const auto collect = [&]<class... Bound>(std::string_view member, const auto&, Bound... bound) {
-      if constexpr (sizeof...(bound) == 1) bounds.push_back({member, static_cast<std::size_t>(bound)...});
+      if constexpr (sizeof...(bound) == 1)
+        bounds.push_back({member, static_cast<std::size_t>(bound)...});
     };
     bounds::visit(T{}, collect);
     return bounds;

@@ -1,7 +1,7 @@
 #pragma once
-/// The bounds of abbe_v1.idl, checked. One overload of visit() per type names its bounded members in the
-/// order of the IDL; a test compares them with the text of the IDL. Fast CDR has neither reflection nor
-/// checks, hence by hand.
+/// The bounds of abbe_v1.idl, checked. One overload of visit() per type names its bounded members
+/// in the order of the IDL; a test compares them with the text of the IDL. Fast CDR has neither
+/// reflection nor checks, hence by hand.
 
 #include <algorithm>
 #include <array>
@@ -118,8 +118,9 @@ void visit(const v1::Health& m, V&& v) {
 
 /// A struct of ours inside a sequence, whose own members are bounded too.
 template <class E>
-inline constexpr bool kIsNested = std::is_same_v<E, v1::Parameter> || std::is_same_v<E, v1::AxisRange> ||
-                                  std::is_same_v<E, v1::HullVertex> || std::is_same_v<E, v1::GridNode>;
+inline constexpr bool kIsNested =
+    std::is_same_v<E, v1::Parameter> || std::is_same_v<E, v1::AxisRange> ||
+    std::is_same_v<E, v1::HullVertex> || std::is_same_v<E, v1::GridNode>;
 
 /// Visits one value; afterwards `broken` says what is wrong, empty if nothing.
 class Checker {
@@ -134,7 +135,8 @@ class Checker {
 
   template <class E>
   void operator()(std::string_view member, const std::vector<E>& elements, std::size_t bound) {
-    if (elements.size() > bound) report(member, std::to_string(elements.size()) + " elements", bound);
+    if (elements.size() > bound)
+      report(member, std::to_string(elements.size()) + " elements", bound);
     if constexpr (kIsNested<E>) {
       for (const E& e : elements) visit(e, *this);
     }

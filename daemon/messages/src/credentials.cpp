@@ -69,8 +69,8 @@ bool set_times(X509* certificate, ValidityPeriod period) {
 
 bool set_subject(X509* certificate, const std::string& common_name) {
   return X509_NAME_add_entry_by_txt(X509_get_subject_name(certificate), "CN", MBSTRING_UTF8,
-                                    reinterpret_cast<const unsigned char*>(common_name.c_str()), -1, -1,
-                                    0) == 1;
+                                    reinterpret_cast<const unsigned char*>(common_name.c_str()), -1,
+                                    -1, 0) == 1;
 }
 
 /// The authority signs certificates and, by digitalSignature, the documents.
@@ -107,8 +107,9 @@ Result<Credentials> make_credentials(const std::string& common_name, ValidityPer
   EVP_PKEY* const signing_key = issuer != nullptr ? issuer->key.get() : made.key.get();
 
   constexpr long kVersion3 = 2;
-  const bool signed_now = X509_set_version(certificate, kVersion3) == 1 && set_random_serial(certificate) &&
-                          set_times(certificate, period) && set_subject(certificate, common_name) &&
+  const bool signed_now = X509_set_version(certificate, kVersion3) == 1 &&
+                          set_random_serial(certificate) && set_times(certificate, period) &&
+                          set_subject(certificate, common_name) &&
                           X509_set_issuer_name(certificate, X509_get_subject_name(by)) == 1 &&
                           X509_set_pubkey(certificate, made.key.get()) == 1 &&
                           set_uses(certificate, by, issuer == nullptr) &&

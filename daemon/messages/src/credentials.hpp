@@ -32,11 +32,14 @@ struct ValidityPeriod {
   std::chrono::system_clock::time_point end;
 };
 
-/// Signed by `issuer`, or by itself if that is null: then it is a certificate authority. Error Io: OpenSSL.
-[[nodiscard]] Result<Credentials> make_credentials(const std::string& common_name, ValidityPeriod period,
+/// Signed by `issuer`, or by itself if that is null: then it is a certificate authority. Error Io:
+/// OpenSSL.
+[[nodiscard]] Result<Credentials> make_credentials(const std::string& common_name,
+                                                   ValidityPeriod period,
                                                    const Credentials* issuer);
 
-/// S/MIME with the text in clear, as DDS Security wants governance and permissions. Error Io: OpenSSL.
+/// S/MIME with the text in clear, as DDS Security wants governance and permissions. Error Io:
+/// OpenSSL.
 [[nodiscard]] Result<std::string> sign_document(std::string_view text, const Credentials& signer);
 
 /// Of the first certificate in a PEM text. Error BadInput: there is none.

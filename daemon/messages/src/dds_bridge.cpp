@@ -58,18 +58,20 @@ struct DdsBridge::State {
     if (topic == Topic::ErrorGrid) follow_slices(payload);
   }
 
-  /// What was written stays with DDS for late joiners, also what another abbed said: beyond the slices of
-  /// this grid it is of another model.
+  /// What was written stays with DDS for late joiners, also what another abbed said: beyond the
+  /// slices of this grid it is of another model.
   void follow_slices(std::span<const std::byte> payload) {
     const auto key = payload_key(Topic::ErrorGrid, payload);
     const auto slices = grid_slices(payload);
     if (!key || !slices) return;
     auto& known = slices_written[std::string{key->machine}];
-    for (auto beyond = known.lower_bound(*slices); beyond != known.end(); beyond = known.erase(beyond))
+    for (auto beyond = known.lower_bound(*slices); beyond != known.end();
+         beyond = known.erase(beyond))
       outlet.dispose(Topic::ErrorGrid, beyond->second);
     // The key is all that disposing takes.
     const std::size_t head = kCdrHeaderBytes + key->bytes.size();
-    known[*key->number].assign(payload.begin(), payload.begin() + static_cast<std::ptrdiff_t>(head));
+    known[*key->number].assign(payload.begin(),
+                               payload.begin() + static_cast<std::ptrdiff_t>(head));
   }
 
   void write_live(Topic topic, std::span<std::byte> payload, WallTime::duration waited) {
@@ -98,7 +100,8 @@ struct DdsBridge::State {
       if (const auto invalid = invalidated(entry.payload); !invalid.empty())
         write(Topic::ModelState, invalid);
     }
-    std::erase_if(durable.entries(), [](const auto& entry) { return entry.topic == Topic::ModelState; });
+    std::erase_if(durable.entries(),
+                  [](const auto& entry) { return entry.topic == Topic::ModelState; });
     for (auto& entry : durable.entries()) entry.extra.ever = false;
   }
 };
@@ -117,7 +120,7 @@ void DdsBridge::beat(WallTime at, WallTime now) {
 }
 
 void DdsBridge::publish(Topic topic, std::span<std::byte> payload, WallTime at, WallTime now) {
-  // Behind an old beat there may stand newer ones: turn() judges.
+  // Behind an old beat there may stand newer ones: cycle() judges.
   const bool alive = state_->alive && !state_->silent(now);
   const auto key = payload_key(topic, payload);
   if (!key) {
@@ -134,7 +137,7 @@ void DdsBridge::lost() {
   if (state_->alive) state_->tell_that_source_is_lost();
 }
 
-void DdsBridge::turn(WallTime now) {
+void DdsBridge::cycle(WallTime now) {
   State& s = *state_;
   if (s.alive && s.silent(now)) s.tell_that_source_is_lost();
   if (!s.alive) return;

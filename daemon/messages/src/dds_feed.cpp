@@ -50,7 +50,8 @@ struct DdsFeed::State {
     return false;
   }
 
-  /// Shows abbed that this loop runs. An answer that does not fit is not needed: abbed does not read.
+  /// Shows abbed that this loop runs. An answer that does not fit is not needed: abbed does not
+  /// read.
   void answer() const {
     const std::byte alive{};
     static_cast<void>(::send(peer.get(), &alive, 1, MSG_DONTWAIT | MSG_NOSIGNAL));
@@ -73,13 +74,13 @@ DdsFeed::DdsFeed(std::filesystem::path socket, DdsBridge& bridge)
     : state_(std::make_unique<State>(std::move(socket), bridge)) {}
 DdsFeed::~DdsFeed() = default;
 
-void DdsFeed::turn() {
+void DdsFeed::cycle() {
   State& s = *state_;
   if (!s.peer) s.connect();
   // Without a connection this only waits; -1 is a descriptor poll() ignores.
   pollfd ready{s.peer.get(), POLLIN, 0};
   if (::poll(&ready, 1, static_cast<int>(kRetryPeriod.count())) > 0) s.read();
-  s.bridge.turn(std::chrono::steady_clock::now());
+  s.bridge.cycle(std::chrono::steady_clock::now());
 }
 
 bool DdsFeed::connected() const noexcept {

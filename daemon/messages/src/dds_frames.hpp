@@ -1,6 +1,6 @@
 #pragma once
-/// The frames on the local socket from abbed to abbe-dds: 16 bytes of header, then a payload. Back goes one
-/// byte, of any value, for each beat.
+/// The frames on the local socket from abbed to abbe-dds: 16 bytes of header, then a payload. Back
+/// goes one byte, of any value, for each beat.
 ///   bytes 0..3  length of the payload, little endian
 ///   byte  4     kind
 ///   byte  5     topic (kind Publish, else 0)
@@ -59,6 +59,7 @@ inline void append_frame(std::vector<std::byte>& out, const Frame& frame) {
                                                   byte(kFrameVersion),
                                                   byte(0)};
   const auto at = static_cast<std::uint64_t>(frame.at.time_since_epoch().count());
+
   for (std::size_t i = 0; i < 8; ++i) header[8 + i] = byte(at >> (8 * i));
   out.insert(out.end(), header.begin(), header.end());
   out.insert(out.end(), frame.payload.begin(), frame.payload.end());
@@ -83,13 +84,15 @@ class FrameReader {
     const auto waiting = std::span<std::byte>(buffer_).subspan(begin_, end_ - begin_);
     if (broken_ || waiting.size() < kFrameHeaderBytes) return std::nullopt;
     std::size_t length = 0;
-    for (std::size_t i = 0; i < 4; ++i) length |= std::to_integer<std::size_t>(waiting[i]) << (8 * i);
+    for (std::size_t i = 0; i < 4; ++i)
+      length |= std::to_integer<std::size_t>(waiting[i]) << (8 * i);
     const auto kind = std::to_integer<std::uint8_t>(waiting[4]);
     const auto topic = topic_from(std::to_integer<std::uint8_t>(waiting[5]));
     const auto version = std::to_integer<std::uint8_t>(waiting[6]);
     broken_ = length > kMaxPayloadBytes || kind > 1 || !topic || version != kFrameVersion;
     if (broken_ || waiting.size() < kFrameHeaderBytes + length) return std::nullopt;
     begin_ += kFrameHeaderBytes + length;
+
     return ReceivedFrame{static_cast<FrameKind>(kind), *topic, instant(waiting),
                          waiting.subspan(kFrameHeaderBytes, length)};
   }
@@ -99,11 +102,13 @@ class FrameReader {
  private:
   static FrameInstant instant(std::span<const std::byte> header) {
     std::uint64_t ns = 0;
-    for (std::size_t i = 0; i < 8; ++i) ns |= std::to_integer<std::uint64_t>(header[8 + i]) << (8 * i);
+    for (std::size_t i = 0; i < 8; ++i)
+      ns |= std::to_integer<std::uint64_t>(header[8 + i]) << (8 * i);
     return FrameInstant{std::chrono::nanoseconds{static_cast<std::int64_t>(ns)}};
   }
 
-  std::vector<std::byte> buffer_ = std::vector<std::byte>(2 * (kFrameHeaderBytes + kMaxPayloadBytes));
+  std::vector<std::byte> buffer_ =
+      std::vector<std::byte>(2 * (kFrameHeaderBytes + kMaxPayloadBytes));
   std::size_t begin_ = 0;
   std::size_t end_ = 0;
   bool broken_ = false;

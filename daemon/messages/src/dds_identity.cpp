@@ -15,8 +15,12 @@ namespace fs = std::filesystem;
 
 constexpr const char* kKey = "identity.key";
 constexpr const char* kCertificate = "identity.crt";
-constexpr std::array kFiles{
-    kKey, kCertificate, "identity_ca.crt", "permissions_ca.crt", "governance.p7s", "permissions.p7s"};
+constexpr std::array kFiles{kKey,
+                            kCertificate,
+                            "identity_ca.crt",
+                            "permissions_ca.crt",
+                            "governance.p7s",
+                            "permissions.p7s"};
 
 fs::path identity_in(const fs::path& folder, DdsRole role) {
   std::error_code error;
@@ -31,30 +35,34 @@ Result<void> check_key_mode(const fs::path& key) {
   if (::stat(key.c_str(), &file) != 0 || (file.st_mode & S_IROTH) == 0) return {};
   return fail(
       ErrorCode::BadInput,
-      fmt::format("{}: everybody on this computer can read this key: chmod 600 it, or make new keys with "
-                  "`abbe dds keys` if others may have read it",
-                  key.string()));
+      fmt::format(
+          "{}: everybody on this computer can read this key: chmod 600 it, or make new keys with "
+          "`abbe dds keys` if others may have read it",
+          key.string()));
 }
 
 Result<void> check_validity(const fs::path& certificate, const std::string& pem,
                             std::chrono::system_clock::time_point now) {
   const auto period = validity_of(pem);
   if (!period)
-    return fail(ErrorCode::BadInput, fmt::format("{}: {}", certificate.string(), period.error().text));
+    return fail(ErrorCode::BadInput,
+                fmt::format("{}: {}", certificate.string(), period.error().text));
   if (now >= period->begin && now <= period->end) return {};
   const auto day = [](auto t) { return fmt::gmtime(std::chrono::system_clock::to_time_t(t)); };
   return fail(
       ErrorCode::BadInput,
-      fmt::format("{}: valid from {:%Y-%m-%d} to {:%Y-%m-%d}, but today is {:%Y-%m-%d}: set the clock, or "
-                  "make new keys with `abbe dds keys`",
-                  certificate.string(), day(period->begin), day(period->end), day(now)));
+      fmt::format(
+          "{}: valid from {:%Y-%m-%d} to {:%Y-%m-%d}, but today is {:%Y-%m-%d}: set the clock, or "
+          "make new keys with `abbe dds keys`",
+          certificate.string(), day(period->begin), day(period->end), day(now)));
 }
 
 }  // namespace
 
 std::string dds_security_is_off(std::uint32_t domain) {
   return fmt::format(
-      "DDS Security is off: anyone on domain {} can publish as this machine; `abbe dds keys` makes keys, "
+      "DDS Security is off: anyone on domain {} can publish as this machine; `abbe dds keys` makes "
+      "keys, "
       "[dds] "
       "security uses them",
       domain);
@@ -66,21 +74,24 @@ Result<DdsIdentity> find_dds_identity(const fs::path& folder, DdsRole role,
   for (const char* name : kFiles) {
     const auto text = read_text(identity / name);
     if (!text)
-      return fail(
-          ErrorCode::BadInput,
-          fmt::format(
-              "DDS Security: {}: is the folder one that `abbe dds keys` made, and may this user read it?",
-              text.error().text));
+      return fail(ErrorCode::BadInput, fmt::format("DDS Security: {}: is the folder one that `abbe "
+                                                   "dds keys` made, and may this user read it?",
+                                                   text.error().text));
     if (name != kCertificate) continue;
     if (auto valid = check_validity(identity / name, *text, now); !valid)
       return tl::unexpected(valid.error());
   }
+
   if (auto closed = check_key_mode(identity / kKey); !closed) return tl::unexpected(closed.error());
   return DdsIdentity{identity};
 }
 
-std::vector<std::pair<std::string, std::string>> dds_security_properties(const DdsIdentity& identity) {
-  const auto file = [&identity](const char* name) { return "file://" + (identity.folder / name).string(); };
+std::vector<std::pair<std::string, std::string>> dds_security_properties(
+    const DdsIdentity& identity) {
+  const auto file = [&identity](const char* name) {
+    return "file://" + (identity.folder / name).string();
+  };
+
   const std::string auth = "dds.sec.auth.builtin.PKI-DH.";
   const std::string access = "dds.sec.access.builtin.Access-Permissions.";
   return {{"dds.sec.auth.plugin", "builtin.PKI-DH"},

@@ -22,10 +22,10 @@ constexpr mode_t kEverybodyReads = 0644;
 /// A subscriber whose clock is behind accepts keys made today.
 constexpr auto kClockTolerance = std::chrono::hours{24};
 
-/// Of two participants the one whose subject has the smaller SHA-256 begins the handshake. Fast DDS 2.9
-/// begins with a Diffie-Hellman key in a form that Cyclone DDS 0.10 cannot read (Fast-DDS issue 3802), so the
-/// daemon's subject has a hash above that of every subscriber: it begins with 18 one bits, the largest of the
-/// first thousand subscribers with 11.
+/// Of two participants the one whose subject has the smaller SHA-256 begins the handshake. Fast DDS
+/// 2.9 begins with a Diffie-Hellman key in a form that Cyclone DDS 0.10 cannot read (Fast-DDS issue
+/// 3802), so the daemon's subject has a hash above that of every subscriber: it begins with 18 one
+/// bits, the largest of the first thousand subscribers with 11.
 constexpr const char* kDaemonSubject = "abbe-daemon-336310";
 
 Result<void> write_new(const fs::path& file, std::string_view text, mode_t mode) {
@@ -39,7 +39,8 @@ Result<void> write_new(const fs::path& file, std::string_view text, mode_t mode)
 Result<void> make_new_folder(const fs::path& folder) {
   std::error_code error;
   fs::create_directories(folder, error);
-  if (error) return fail(ErrorCode::Io, fmt::format("create {}: {}", folder.string(), error.message()));
+  if (error)
+    return fail(ErrorCode::Io, fmt::format("create {}: {}", folder.string(), error.message()));
   return {};
 }
 
@@ -64,26 +65,34 @@ Result<void> make_identity(const Issuer& issuer, const std::string& name, DdsRol
   const std::string common_name = role == DdsRole::Daemon ? kDaemonSubject : "abbe-" + name;
   auto identity = make_credentials(common_name, issuer.period, &issuer.authority);
   if (!identity) return tl::unexpected(identity.error());
-  auto permissions = sign_document(permissions_document(common_name, role, issuer.period), issuer.authority);
+  auto permissions =
+      sign_document(permissions_document(common_name, role, issuer.period), issuer.authority);
   if (!permissions) return tl::unexpected(permissions.error());
 
   const fs::path folder = issuer.folder / name;
   const std::string authority_pem = issuer.authority.certificate_pem();
   return make_new_folder(folder)
       .and_then([&] { return write_new(folder / "identity.key", identity->key_pem(), kOwnerOnly); })
+      .and_then([&] {
+        return write_new(folder / "identity.crt", identity->certificate_pem(), kEverybodyReads);
+      })
       .and_then(
-          [&] { return write_new(folder / "identity.crt", identity->certificate_pem(), kEverybodyReads); })
-      .and_then([&] { return write_new(folder / "identity_ca.crt", authority_pem, kEverybodyReads); })
-      .and_then([&] { return write_new(folder / "permissions_ca.crt", authority_pem, kEverybodyReads); })
-      .and_then([&] { return write_new(folder / "governance.p7s", issuer.governance, kEverybodyReads); })
-      .and_then([&] { return write_new(folder / "permissions.p7s", *permissions, kEverybodyReads); });
+          [&] { return write_new(folder / "identity_ca.crt", authority_pem, kEverybodyReads); })
+      .and_then(
+          [&] { return write_new(folder / "permissions_ca.crt", authority_pem, kEverybodyReads); })
+      .and_then(
+          [&] { return write_new(folder / "governance.p7s", issuer.governance, kEverybodyReads); })
+      .and_then(
+          [&] { return write_new(folder / "permissions.p7s", *permissions, kEverybodyReads); });
 }
 
-Result<Issuer> make_issuer(const DdsKeysOptions& options, std::chrono::system_clock::time_point now) {
+Result<Issuer> make_issuer(const DdsKeysOptions& options,
+                           std::chrono::system_clock::time_point now) {
   const ValidityPeriod period{now - kClockTolerance, now + options.validity};
-  auto authority = make_credentials(fmt::format("abbe DDS CA {:%Y-%m-%dT%H:%M:%SZ}",
-                                                fmt::gmtime(std::chrono::system_clock::to_time_t(now))),
-                                    period, nullptr);
+  auto authority =
+      make_credentials(fmt::format("abbe DDS CA {:%Y-%m-%dT%H:%M:%SZ}",
+                                   fmt::gmtime(std::chrono::system_clock::to_time_t(now))),
+                       period, nullptr);
   if (!authority) return tl::unexpected(authority.error());
   auto governance = sign_document(governance_document(), *authority);
   if (!governance) return tl::unexpected(governance.error());
@@ -91,11 +100,12 @@ Result<Issuer> make_issuer(const DdsKeysOptions& options, std::chrono::system_cl
 }
 
 Result<void> make_all(const Issuer& issuer, int subscribers) {
-  auto made = make_new_folder(issuer.folder)
-                  .and_then([&] {
-                    return write_new(issuer.folder / "ca.key", issuer.authority.key_pem(), kOwnerOnly);
-                  })
-                  .and_then([&] { return make_identity(issuer, "daemon", DdsRole::Daemon); });
+  auto made =
+      make_new_folder(issuer.folder)
+          .and_then([&] {
+            return write_new(issuer.folder / "ca.key", issuer.authority.key_pem(), kOwnerOnly);
+          })
+          .and_then([&] { return make_identity(issuer, "daemon", DdsRole::Daemon); });
   for (int i = 1; made && i <= subscribers; ++i)
     made = make_identity(issuer, fmt::format("subscriber-{}", i), DdsRole::Subscriber);
   return made;
@@ -103,7 +113,8 @@ Result<void> make_all(const Issuer& issuer, int subscribers) {
 
 }  // namespace
 
-Result<void> make_dds_keys(const DdsKeysOptions& options, std::chrono::system_clock::time_point now) {
+Result<void> make_dds_keys(const DdsKeysOptions& options,
+                           std::chrono::system_clock::time_point now) {
   if (auto free = refuse_what_is_there(options.folder); !free) return free;
   const auto issuer = make_issuer(options, now);
   if (!issuer) return tl::unexpected(issuer.error());

@@ -76,11 +76,12 @@ struct DdsLink::State {
   void send_or_keep(const Frame& frame, const PayloadKey& key);
 };
 
-/// A newer abbe-dds replaces the older one: the older one is hung or already replaced by whoever supervises
-/// it.
+/// A newer abbe-dds replaces the older one: the older one is hung or already replaced by whoever
+/// supervises it.
 void DdsLink::State::accept_newest() {
   for (int i = 0; i < kNewcomersInACycle; ++i) {
-    FileDescriptor accepted(::accept4(listener.get(), nullptr, nullptr, SOCK_NONBLOCK | SOCK_CLOEXEC));
+    FileDescriptor accepted(
+        ::accept4(listener.get(), nullptr, nullptr, SOCK_NONBLOCK | SOCK_CLOEXEC));
     if (!accepted) return;
     if (!may_connect(accepted.get(), process)) {
       ++counters.strangers;
@@ -115,8 +116,8 @@ void DdsLink::State::disconnect() {
 /// Whether the socket is free for the next frame.
 bool DdsLink::State::send_waiting() {
   while (peer && out_begin < out.size()) {
-    const ssize_t n =
-        ::send(peer.get(), out.data() + out_begin, out.size() - out_begin, MSG_DONTWAIT | MSG_NOSIGNAL);
+    const ssize_t n = ::send(peer.get(), out.data() + out_begin, out.size() - out_begin,
+                             MSG_DONTWAIT | MSG_NOSIGNAL);
     if (n >= 0) {
       out_begin += static_cast<std::size_t>(n);
     } else if (errno == EAGAIN || errno == EWOULDBLOCK) {
@@ -125,9 +126,11 @@ bool DdsLink::State::send_waiting() {
       disconnect();
     }
   }
+
   if (!out.empty()) ++counters.sent;
   out.clear();
   out_begin = 0;
+
   return static_cast<bool>(peer);
 }
 
@@ -143,7 +146,8 @@ bool DdsLink::State::send_now(const Frame& frame) {
 bool DdsLink::State::send_durable() {
   for (auto& entry : durable.entries()) {
     if (!entry.extra.to_send) continue;
-    if (!send_now({FrameKind::Publish, entry.topic, WallTime::clock::now(), entry.payload})) return false;
+    if (!send_now({FrameKind::Publish, entry.topic, WallTime::clock::now(), entry.payload}))
+      return false;
     entry.extra.to_send = false;
   }
   return true;
@@ -152,7 +156,8 @@ bool DdsLink::State::send_durable() {
 void DdsLink::State::send_live() {
   auto& waiting = live.entries();
   auto next = waiting.begin();
-  while (next != waiting.end() && send_now({FrameKind::Publish, next->topic, next->extra, next->payload}))
+  while (next != waiting.end() &&
+         send_now({FrameKind::Publish, next->topic, next->extra, next->payload}))
     ++next;
   if (peer) waiting.erase(waiting.begin(), next);  // else disconnect() has dropped them
 }
@@ -208,9 +213,10 @@ void DdsLink::beat(WallTime now) {
   if (now - state_->last_beat < kBeatPeriod) return;
   state_->beats.ask(now);
   if (state_->process != nullptr) state_->process->asked(now);
-  // A beat that does not fit is not queued: abbe-dds has not read for a while and will judge for itself. Nor
-  // does it overtake a state: abbe-dds would repeat the one before.
-  if (state_->send_durable() && state_->send_now({FrameKind::Beat, {}, now, {}})) state_->last_beat = now;
+  // A beat that does not fit is not queued: abbe-dds has not read for a while and will judge for
+  // itself. Nor does it overtake a state: abbe-dds would repeat the one before.
+  if (state_->send_durable() && state_->send_now({FrameKind::Beat, {}, now, {}}))
+    state_->last_beat = now;
 }
 
 void DdsLink::poll() {

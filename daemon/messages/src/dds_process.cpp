@@ -19,13 +19,13 @@ std::string DdsEnd::text() const {
   const auto day = std::chrono::floor<std::chrono::days>(when);
   const std::chrono::year_month_day date{day};
   const std::chrono::hh_mm_ss time{std::chrono::floor<std::chrono::seconds>(when - day)};
-  const auto at =
-      fmt::format("{:04}-{:02}-{:02}T{:02}:{:02}:{:02}Z", int{date.year()}, unsigned{date.month()},
-                  unsigned{date.day()}, time.hours().count(), time.minutes().count(), time.seconds().count());
+  const auto at = fmt::format("{:04}-{:02}-{:02}T{:02}:{:02}:{:02}Z", int{date.year()},
+                              unsigned{date.month()}, unsigned{date.day()}, time.hours().count(),
+                              time.minutes().count(), time.seconds().count());
   if (hung) return fmt::format("it did not answer and was ended by abbed at {}", at);
   if (WIFSIGNALED(wait_status))
-    return fmt::format("signal {} ({}) at {}", WTERMSIG(wait_status), ::sigdescr_np(WTERMSIG(wait_status)),
-                       at);
+    return fmt::format("signal {} ({}) at {}", WTERMSIG(wait_status),
+                       ::sigdescr_np(WTERMSIG(wait_status)), at);
   return fmt::format("exit code {} at {}", WEXITSTATUS(wait_status), at);
 }
 
@@ -37,9 +37,9 @@ void DdsProcess::started(pid_t pid, WallTime now) noexcept {
 void DdsProcess::ended(const DdsEnd& end) noexcept {
   const std::int64_t seconds = std::chrono::system_clock::to_time_t(end.when);
   pid_.store(0, std::memory_order_relaxed);
-  last_end_.store(
-      seconds << kSecondsShift | std::int64_t{end.hung} << kHungShift | (end.wait_status & kStatusMask),
-      std::memory_order_relaxed);
+  last_end_.store(seconds << kSecondsShift | std::int64_t{end.hung} << kHungShift |
+                      (end.wait_status & kStatusMask),
+                  std::memory_order_relaxed);
 }
 
 std::optional<DdsEnd> DdsProcess::last_end() const noexcept {
@@ -57,9 +57,9 @@ void DdsProcess::asked(WallTime now) noexcept {
 }
 
 std::chrono::nanoseconds DdsProcess::silent_for() const noexcept {
-  const std::int64_t heard =
-      std::max({started_ns_.load(std::memory_order_relaxed), answered_ns_.load(std::memory_order_relaxed),
-                asks_since_ns_.load(std::memory_order_relaxed)});
+  const std::int64_t heard = std::max({started_ns_.load(std::memory_order_relaxed),
+                                       answered_ns_.load(std::memory_order_relaxed),
+                                       asks_since_ns_.load(std::memory_order_relaxed)});
   return std::chrono::nanoseconds{
       std::max<std::int64_t>(0, asked_ns_.load(std::memory_order_relaxed) - heard)};
 }

@@ -13,7 +13,8 @@ namespace {
 using tinyxml2::XMLElement;
 
 /// The children of that name of all these elements.
-std::vector<const XMLElement*> children(const std::vector<const XMLElement*>& of, const char* name) {
+std::vector<const XMLElement*> children(const std::vector<const XMLElement*>& of,
+                                        const char* name) {
   std::vector<const XMLElement*> found;
   for (const XMLElement* parent : of)
     for (const auto* child = parent->FirstChildElement(name); child != nullptr;
@@ -30,8 +31,9 @@ bool has_property(const XMLElement* participant, std::string_view name) {
   std::vector<const XMLElement*> level{participant};
   for (const char* below : {"rtps", "propertiesPolicy", "properties", "property", "name"})
     level = children(level, below);
-  return std::ranges::any_of(
-      level, [name](const XMLElement* e) { return e->GetText() != nullptr && e->GetText() == name; });
+  return std::ranges::any_of(level, [name](const XMLElement* e) {
+    return e->GetText() != nullptr && e->GetText() == name;
+  });
 }
 
 }  // namespace
@@ -46,6 +48,7 @@ bool dds_is_secured(const std::filesystem::path& security, const std::filesystem
   const bool profiles_only = root.front()->Name() == std::string_view{"profiles"};
   auto participants = children(profiles_only ? root : children(root, "profiles"), "participant");
   std::erase_if(participants, [](const XMLElement* p) { return !is_abbe(p); });
+
   // Without authentication Fast DDS switches security off, whatever access says.
   return !participants.empty() && std::ranges::all_of(participants, [](const XMLElement* p) {
     return has_property(p, "dds.sec.auth.plugin") && has_property(p, "dds.sec.access.plugin");

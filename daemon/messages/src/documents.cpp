@@ -7,7 +7,8 @@ namespace abbe::daemon {
 namespace {
 
 // Cyclone DDS refuses a document that names a domain above 230.
-constexpr const char* kDomains = "<domains><id_range><min>0</min><max>230</max></id_range></domains>";
+constexpr const char* kDomains =
+    "<domains><id_range><min>0</min><max>230</max></id_range></domains>";
 
 std::string xml_time(std::chrono::system_clock::time_point t) {
   return fmt::format("{:%Y-%m-%dT%H:%M:%S}", fmt::gmtime(std::chrono::system_clock::to_time_t(t)));
@@ -44,7 +45,8 @@ std::string governance_document() {
                      kDomains);
 }
 
-std::string permissions_document(const std::string& common_name, DdsRole role, ValidityPeriod period) {
+std::string permissions_document(const std::string& common_name, DdsRole role,
+                                 ValidityPeriod period) {
   const char* const may = role == DdsRole::Daemon ? "publish" : "subscribe";
   return fmt::format(R"(<?xml version="1.0" encoding="UTF-8"?>
 <dds xmlns:xsi="http://www.w3.org/2001/XMLSchema-instance" xsi:noNamespaceSchemaLocation="omg_shared_ca_permissions.xsd">

@@ -8,8 +8,9 @@
 
 namespace abbe::daemon {
 
-/// Nobody joins without an identity; discovery, liveliness and whole submessages are encrypted, every message
-/// is signed. Submessages and not payloads, because Fast DDS 2.9 and Cyclone DDS 0.10 agree on these only.
+/// Nobody joins without an identity; discovery, liveliness and whole submessages are encrypted,
+/// every message is signed. Submessages and not payloads, because Fast DDS 2.9 and Cyclone DDS 0.10
+/// agree on these only.
 [[nodiscard]] std::string governance_document();
 
 /// The daemon may publish abbe's topics, a subscriber may read them; nothing else.

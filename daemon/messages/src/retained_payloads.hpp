@@ -1,7 +1,7 @@
 #pragma once
-/// The newest payload per topic and key, oldest publication first: what a durable topic owes to whoever comes
-/// late. A model published before its state is therefore also sent again before it. Single-threaded;
-/// allocates.
+/// The newest payload per topic and key, oldest publication first: what a durable topic reply_outstanding to
+/// whoever comes late. A model published before its state is therefore also sent again before it.
+/// Single-threaded; allocates.
 
 #include <algorithm>
 #include <cstddef>
@@ -28,15 +28,18 @@ class RetainedPayloads {
     const auto same = std::find_if(entries_.begin(), entries_.end(), [&](const Entry& e) {
       return e.topic == topic && std::ranges::equal(e.key, key);
     });
+
     if (same == entries_.end()) {
       entries_.push_back({topic, {key.begin(), key.end()}, {}, {}});
     } else {
       std::rotate(same, same + 1, entries_.end());
     }
+
     Entry& entry = entries_.back();
     entry.payload.assign(payload.begin(), payload.end());
     entry.extra = {};
     if (topic == Topic::ErrorGrid) drop_surplus_slices(payload);
+
     return entries_.back();
   }
 

@@ -11,13 +11,17 @@ using Key = TopicTraits::Key;
 
 constexpr std::array<TopicTraits, kTopicCount> kTopics{{
     {Topic::Snapshot, "abbe/v1/Snapshot", "abbe::v1::Snapshot", Kind::Live, Key::Machine, 0ms},
-    {Topic::Compensation, "abbe/v1/Compensation", "abbe::v1::Compensation", Kind::Live, Key::Machine, 0ms},
-    {Topic::ErrorModel, "abbe/v1/ErrorModel", "abbe::v1::ErrorModel", Kind::Durable, Key::Machine, 10s},
-    {Topic::ErrorGrid, "abbe/v1/ErrorGrid", "abbe::v1::ErrorGrid", Kind::Durable, Key::MachineAndNumber, 10s},
-    {Topic::ModelState, "abbe/v1/ModelState", "abbe::v1::ModelState", Kind::Durable, Key::Machine, 1s},
+    {Topic::Compensation, "abbe/v1/Compensation", "abbe::v1::Compensation", Kind::Live,
+     Key::Machine, 0ms},
+    {Topic::ErrorModel, "abbe/v1/ErrorModel", "abbe::v1::ErrorModel", Kind::Durable, Key::Machine,
+     10s},
+    {Topic::ErrorGrid, "abbe/v1/ErrorGrid", "abbe::v1::ErrorGrid", Kind::Durable,
+     Key::MachineAndNumber, 10s},
+    {Topic::ModelState, "abbe/v1/ModelState", "abbe::v1::ModelState", Kind::Durable, Key::Machine,
+     1s},
     {Topic::Health, "abbe/v1/Health", "abbe::v1::Health", Kind::Durable, Key::MachineAndText, 10s},
-    {Topic::CalibrationEvent, "abbe/v1/CalibrationEvent", "abbe::v1::CalibrationEvent", Kind::Durable,
-     Key::Machine, 10s},
+    {Topic::CalibrationEvent, "abbe/v1/CalibrationEvent", "abbe::v1::CalibrationEvent",
+     Kind::Durable, Key::Machine, 10s},
 }};
 
 /// Reads CDR_LE from the end of the encapsulation header on, where alignment counts from.
@@ -29,7 +33,8 @@ class KeyReader {
     const std::size_t at = (offset_ + 3) / 4 * 4;
     if (at + 4 > body_.size()) return std::nullopt;
     std::uint32_t value = 0;
-    for (std::size_t i = 0; i < 4; ++i) value |= std::to_integer<std::uint32_t>(body_[at + i]) << (8 * i);
+    for (std::size_t i = 0; i < 4; ++i)
+      value |= std::to_integer<std::uint32_t>(body_[at + i]) << (8 * i);
     offset_ = at + 4;
     return value;
   }
@@ -81,7 +86,8 @@ std::optional<PayloadKey> payload_key(Topic topic, std::span<const std::byte> pa
   const auto machine = reader.text();
   if (!machine) return std::nullopt;
   key.machine = *machine;
-  if (traits(topic).key == Key::MachineAndNumber && !(key.number = reader.number())) return std::nullopt;
+  if (traits(topic).key == Key::MachineAndNumber && !(key.number = reader.number()))
+    return std::nullopt;
   if (traits(topic).key == Key::MachineAndText && !(key.text = reader.text())) return std::nullopt;
   key.bytes = reader.read_so_far();
   return key;
@@ -96,7 +102,8 @@ std::optional<std::uint32_t> grid_slices(std::span<const std::byte> payload) noe
 }
 
 bool set_sequence_number(Topic topic, std::span<std::byte> payload, std::uint64_t number) noexcept {
-  if ((topic != Topic::ErrorModel && topic != Topic::ErrorGrid) || !payload_key(topic, payload)) return false;
+  if ((topic != Topic::ErrorModel && topic != Topic::ErrorGrid) || !payload_key(topic, payload))
+    return false;
   const auto body = payload.subspan(kCdrHeaderBytes);
   KeyReader reader(body);
   if (!reader.text()) return false;                                       // machine
@@ -125,6 +132,7 @@ bool add_to_age(std::span<std::byte> compensation, std::chrono::nanoseconds more
   for (std::size_t i = 0; i < 8; ++i) ns |= std::to_integer<std::uint64_t>(age[i]) << (8 * i);
   ns += static_cast<std::uint64_t>(more.count());
   for (std::size_t i = 0; i < 8; ++i) age[i] = static_cast<std::byte>(ns >> (8 * i) & 0xffu);
+
   return true;
 }
 

@@ -20,7 +20,8 @@ bool ArtefactThermometer::take(const protocol::Snapshot& touch) {
 
 std::optional<calib::evemu::ArtefactTemperature> ArtefactThermometer::over_the_run() const {
   if (!config_) return std::nullopt;
-  if (!config_->sensor) return calib::evemu::ArtefactTemperature{config_->fixed_K, config_->u_temperature_K};
+  if (!config_->sensor)
+    return calib::evemu::ArtefactTemperature{config_->fixed_K, config_->u_temperature_K};
   if (count_ == 0) return std::nullopt;
   const double u_drift_K = (highest_K_ - lowest_K_) / (2.0 * std::numbers::sqrt3);
   return calib::evemu::ArtefactTemperature{sum_K_ / static_cast<double>(count_),

@@ -27,15 +27,20 @@ json xyz(const Vector3& v) {
 json to_json(const evemu::Calibrator& c) {
   json balls = json::array(), blocks = json::array();
   for (const auto& b : c.balls)
-    balls.push_back(
-        {{"number", b.number}, {"centre_m", xyz(b.centre_m)}, {"radius_m", b.radius_m}, {"u_m", b.u_m}});
+    balls.push_back({{"number", b.number},
+                     {"centre_m", xyz(b.centre_m)},
+                     {"radius_m", b.radius_m},
+                     {"u_m", b.u_m}});
   for (const auto& b : c.blocks)
     blocks.push_back({{"number", b.number}, {"normal", xyz(b.normal)}, {"u_rad", b.u_rad}});
-  json out{{"name", c.name}, {"tip_radius_m", c.tip_radius_m}, {"balls", balls}, {"blocks", blocks}};
+  json out{
+      {"name", c.name}, {"tip_radius_m", c.tip_radius_m}, {"balls", balls}, {"blocks", blocks}};
+
   if (const auto& grows = c.expansivity) {
     out["alpha_per_K"] = grows->alpha_per_K;
     out["u_alpha_per_K"] = grows->u_alpha_per_K;
   }
+
   return out;
 }
 
@@ -44,12 +49,15 @@ evemu::Calibrator calibrator_of(const json& object) {
   c.name = object.at("name").get<std::string>();
   c.tip_radius_m = object.at("tip_radius_m").get<double>();
   for (const json& b : object.at("balls"))
-    c.balls.push_back({b.at("number").get<int>(), vector_of(b.at("centre_m")), b.at("radius_m").get<double>(),
-                       b.at("u_m").get<double>()});
+    c.balls.push_back({b.at("number").get<int>(), vector_of(b.at("centre_m")),
+                       b.at("radius_m").get<double>(), b.at("u_m").get<double>()});
   for (const json& b : object.at("blocks"))
-    c.blocks.push_back({b.at("number").get<int>(), vector_of(b.at("normal")), b.at("u_rad").get<double>()});
+    c.blocks.push_back(
+        {b.at("number").get<int>(), vector_of(b.at("normal")), b.at("u_rad").get<double>()});
   if (object.contains("alpha_per_K"))
-    c.expansivity = {{object.at("alpha_per_K").get<double>(), object.at("u_alpha_per_K").get<double>()}};
+    c.expansivity = {
+        {object.at("alpha_per_K").get<double>(), object.at("u_alpha_per_K").get<double>()}};
+
   return c;
 }
 
@@ -63,7 +71,8 @@ json to_json(const RotationPoints& reference) {
 RotationPoints reference_of(const json& object) {
   RotationPoints reference{.sigma_m = object.at("sigma_m").get<double>()};
   for (const json& p : object.at("points"))
-    reference.points.push_back({.reading_m = vector_of(p.at("reading_m")), .V_m = vector_of(p.at("V_m"))});
+    reference.points.push_back(
+        {.reading_m = vector_of(p.at("reading_m")), .V_m = vector_of(p.at("V_m"))});
   return reference;
 }
 
@@ -144,10 +153,12 @@ Result<CalibrationRequest> from_attachment(const RecordingAttachment& attachment
     const auto parsed = content_of(attachment);
     if (!parsed) return tl::unexpected(parsed.error());
     const json& content = *parsed;
-    const protocol::HostTime from{std::chrono::nanoseconds{content.at("from_ns").get<std::int64_t>()}};
+    const protocol::HostTime from{
+        std::chrono::nanoseconds{content.at("from_ns").get<std::int64_t>()}};
     auto task = task_from_json(content);
     if (!task)
-      return fail(ErrorCode::BadInput, fmt::format("attachment {}: {}", attachment.name, task.error().text));
+      return fail(ErrorCode::BadInput,
+                  fmt::format("attachment {}: {}", attachment.name, task.error().text));
     CalibrationRequest request;
     request.task = std::move(*task);
     request.from = from;

@@ -53,11 +53,12 @@ const calib::Verdict& verdict_of(const Candidate& candidate) {
   return std::visit([](const auto& c) -> const calib::Verdict& { return c.verdict; }, candidate);
 }
 
-ModelDocument document_of(const Candidate& candidate, const Config& config, std::vector<InputFile> inputs,
-                          protocol::UtcTime created) {
+ModelDocument document_of(const Candidate& candidate, const Config& config,
+                          std::vector<InputFile> inputs, protocol::UtcTime created) {
   if (const auto* otf = std::get_if<OtfCandidate>(&candidate))
     return otf_document(otf->solution, config, std::move(inputs), created);
-  return evemu_document(std::get<EvemuCandidate>(candidate).solution, config, std::move(inputs), created);
+  return evemu_document(std::get<EvemuCandidate>(candidate).solution, config, std::move(inputs),
+                        created);
 }
 
 }  // namespace abbe::daemon

@@ -30,22 +30,27 @@ Result<PreparedSession> CalibrationSession::prepare(CalibrationTask task) const 
   if (path_m.size() < 2)
     return fail(ErrorCode::BadInput, "calibrate otf: a path needs at least two vertices");
   OtfAcquisition made{path_m, otf_options_};
-  return PreparedSession{.method = method, .path_m = std::move(path_m), .acquisition = std::move(made)};
+  return PreparedSession{
+      .method = method, .path_m = std::move(path_m), .acquisition = std::move(made)};
 }
 
 Result<void> CalibrationSession::start(PreparedSession&& prepared, HostTime from) {
   if (running()) {
-    return fail(ErrorCode::Refused,
-                fmt::format("calibrate {}: a session is {} already", prepared.method, name(status_.state)));
+    return fail(ErrorCode::Refused, fmt::format("calibrate {}: a session is {} already",
+                                                prepared.method, name(status_.state)));
   }
+
   std::visit([from](auto& a) { a.begin(from); }, prepared.acquisition);
   acquisition_.emplace(std::move(prepared.acquisition));
   std::swap(path_m_, prepared.path_m);
   status_ = {};
   status_.id = ++started_;
   status_.method = prepared.method;
-  if (const auto* touching = std::get_if<EvemuAcquisition>(&*acquisition_)) status_.next = touching->next();
-  enter(SessionState::Warming, std::visit([](const auto& a) { return a.reason(); }, *acquisition_), from);
+  if (const auto* touching = std::get_if<EvemuAcquisition>(&*acquisition_))
+    status_.next = touching->next();
+  enter(SessionState::Warming, std::visit([](const auto& a) { return a.reason(); }, *acquisition_),
+        from);
+
   return {};
 }
 
@@ -81,7 +86,9 @@ void CalibrationSession::follow_acquisition(HostTime now) {
         return std::pair{a.phase(), a.reason()};
       },
       *acquisition_);
-  if (auto* touching = std::get_if<EvemuAcquisition>(&*acquisition_)) follow_guidance(*touching, now);
+  if (auto* touching = std::get_if<EvemuAcquisition>(&*acquisition_))
+    follow_guidance(*touching, now);
+
   switch (phase) {
     case AcquisitionPhase::WaitingAtStart:
       break;
@@ -97,7 +104,8 @@ void CalibrationSession::follow_acquisition(HostTime now) {
   }
 }
 
-/// A note is said, then what to do; both are events, so that whoever listens hears them in this order.
+/// A note is said, then what to do; both are events, so that whoever listens hears them in this
+/// order.
 void CalibrationSession::follow_guidance(EvemuAcquisition& touching, HostTime now) {
   const auto notes = touching.take_notes();
   for (const std::string& note : notes) {
@@ -105,15 +113,19 @@ void CalibrationSession::follow_guidance(EvemuAcquisition& touching, HostTime no
     ++status_.noted;
     enter(status_.state, note, now);
   }
+
   if (status_.notes.size() > SessionStatus::kMostNotes) {
     const auto surplus = status_.notes.size() - SessionStatus::kMostNotes;
-    status_.notes.erase(status_.notes.begin(), status_.notes.begin() + static_cast<std::ptrdiff_t>(surplus));
+    status_.notes.erase(status_.notes.begin(),
+                        status_.notes.begin() + static_cast<std::ptrdiff_t>(surplus));
   }
+
   status_.next = touching.next();
   const bool same_state =
-      touching.phase() ==
-      (status_.state == SessionState::Warming ? AcquisitionPhase::WaitingAtStart : AcquisitionPhase::Running);
-  if (same_state && touching.reason() != status_.reason) enter(status_.state, touching.reason(), now);
+      touching.phase() == (status_.state == SessionState::Warming ? AcquisitionPhase::WaitingAtStart
+                                                                  : AcquisitionPhase::Running);
+  if (same_state && touching.reason() != status_.reason)
+    enter(status_.state, touching.reason(), now);
 }
 
 std::optional<AcquiredRun> CalibrationSession::take_run() {
@@ -127,18 +139,20 @@ std::optional<AcquiredRun> CalibrationSession::take_run() {
 }
 
 CalibrationRun run_of(AcquiredRun acquired) {
-  if (auto* touching = std::get_if<EvemuAcquisition>(&acquired.acquisition)) return touching->release();
+  if (auto* touching = std::get_if<EvemuAcquisition>(&acquired.acquisition))
+    return touching->release();
   auto& otf = std::get<OtfAcquisition>(acquired.acquisition);
   const EnvironmentEffect effect = otf.environment();
-  for (AxisPosition& q_m : acquired.path_m) q_m = grown(q_m, effect, acquired.environment);
+  for (AxisPosition& q_m : acquired.path_m) q_m = at_temperature(q_m, effect, acquired.environment);
   return OtfRun{.path_m = std::move(acquired.path_m),
                 .points = otf.release(),
                 .u_scale = effect.u_scale,
-                .u_axis_scale = effect.u_growth,
+                .u_axis_scale = effect.u_expansion_factor,
                 .unmeasured_air = acquired.environment.unmeasured_air};
 }
 
-void CalibrationSession::judged(std::string model_id, bool passed, std::string reason, HostTime now) {
+void CalibrationSession::judged(std::string model_id, bool passed, std::string reason,
+                                HostTime now) {
   if (status_.state != SessionState::Identifying) return;  // cancelled meanwhile
   status_.model_id = std::move(model_id);
   enter(SessionState::Judged, reason, now);

@@ -28,15 +28,18 @@ std::string_view fault_of(const protocol::Snapshot& touch) {
        {TouchFlag::SpeedTooHigh, "the approach was faster than the probe is qualified for"},
        {TouchFlag::SpeedUnsteady, "the speed of the approach changed"},
        {TouchFlag::LatchRefused, "the latched clock contradicts the scans"}}};
+
   for (const auto& [flag, text] : kFaults) {
     if (has(flags, flag)) return text;
   }
+
   if (!has_linear_axes(touch)) return "an axis was not known";
   return {};
 }
 
 /// Empty: it is inside.
-std::string outside(const calib::Vector3& reading_m, const std::optional<calib::MachineNodes>& travel) {
+std::string outside(const calib::Vector3& reading_m,
+                    const std::optional<calib::MachineNodes>& travel) {
   constexpr double kTolerance_m = 1e-3;
   if (!travel) return {};
   const auto found = calib::outside_travel(std::span(&reading_m, 1), *travel, kTolerance_m);
@@ -51,7 +54,8 @@ std::string outside(const calib::Vector3& reading_m, const std::optional<calib::
 
 }  // namespace
 
-Result<EvemuAcquisition> EvemuAcquisition::create(EvemuRequest request, EvemuAcquisitionOptions options) {
+Result<EvemuAcquisition> EvemuAcquisition::create(EvemuRequest request,
+                                                  EvemuAcquisitionOptions options) {
   auto guide = evemu::TouchGuide::create(request.calibrator, request.plan);
   if (!guide) return tl::unexpected(error_of(guide.error()));
   return EvemuAcquisition{std::move(request), std::move(*guide), std::move(options)};
@@ -63,7 +67,7 @@ EvemuAcquisition::EvemuAcquisition(EvemuRequest request, evemu::TouchGuide guide
       guide_(std::move(guide)),
       thermometer_(options.artefact),
       options_(std::move(options)) {
-  say_what_comes_next();
+  report_next_step();
 }
 
 double EvemuAcquisition::progress() const noexcept {
@@ -81,6 +85,7 @@ void EvemuAcquisition::take(const protocol::Snapshot& snapshot) {
   if (!snapshot.has_trigger || snapshot.head.time < from_) return;
   if (phase_ == Phase::Complete || phase_ == Phase::Failed) return;
   last_touch_ = snapshot.head.time;
+
   if (phase_ == Phase::Running && options_.zero_is_lost_by_restart &&
       has(snapshot.head.flags, protocol::SampleFlag::Restarted)) {
     phase_ = Phase::Failed;
@@ -88,24 +93,30 @@ void EvemuAcquisition::take(const protocol::Snapshot& snapshot) {
                           options_.device, snapshot.trigger.touch);
     return;
   }
+
   if (const auto fault = fault_of(snapshot); !fault.empty()) return refuse(snapshot, fault);
   const calib::Vector3 reading_m{snapshot.position[0], snapshot.position[1], snapshot.position[2]};
-  if (const auto fault = outside(reading_m, options_.travel); !fault.empty()) return refuse(snapshot, fault);
+  if (const auto fault = outside(reading_m, options_.travel); !fault.empty())
+    return refuse(snapshot, fault);
+
   if (!thermometer_.take(snapshot)) {
-    return refuse(snapshot,
-                  fmt::format("the temperature \"{}\" of the array was not known", options_.artefact_sensor));
+    return refuse(snapshot, fmt::format("the temperature \"{}\" of the array was not known",
+                                        options_.artefact_sensor));
   }
+
   refused_in_a_row_ = 0;
   for (const std::string& text : guide_.take(reading_m).notes) note(snapshot, text);
   if (guide_.taken() > 0 && phase_ == Phase::WaitingAtStart) phase_ = Phase::Running;
+
   if (const auto& failure = guide_.failure()) {
     phase_ = Phase::Failed;
     reason_ = failure->text;
   } else if (guide_.complete()) {
     phase_ = Phase::Complete;
-    reason_ = fmt::format("{} touches at {} positions", guide_.taken(), request_.plan.positions.size());
+    reason_ =
+        fmt::format("{} touches at {} positions", guide_.taken(), request_.plan.positions.size());
   } else {
-    say_what_comes_next();
+    report_next_step();
   }
 }
 
@@ -122,18 +133,20 @@ void EvemuAcquisition::note(const protocol::Snapshot& touch, const std::string& 
   notes_.push_back(fmt::format("{} touch {}: {}", options_.device, touch.trigger.touch, what));
 }
 
-void EvemuAcquisition::say_what_comes_next() {
+void EvemuAcquisition::report_next_step() {
   const auto next = guide_.next();
-  reason_ = fmt::format("position {} ({} of {}): touch {}, {} points", next.position, next.place + 1,
-                        request_.plan.positions.size(), evemu::name(next.on), next.points);
+  reason_ =
+      fmt::format("position {} ({} of {}): touch {}, {} points", next.position, next.place + 1,
+                  request_.plan.positions.size(), evemu::name(next.on), next.points);
 }
 
 void EvemuAcquisition::tick(HostTime now) {
-  if (phase_ == Phase::Complete || phase_ == Phase::Failed || now - last_touch_ <= options_.longest_pause)
+  if (phase_ == Phase::Complete || phase_ == Phase::Failed ||
+      now - last_touch_ <= options_.longest_pause)
     return;
   phase_ = Phase::Failed;
-  reason_ = fmt::format("no touch for {:.0f} s; {}", std::chrono::duration<double>(now - last_touch_).count(),
-                        reason_);
+  reason_ = fmt::format("no touch for {:.0f} s; {}",
+                        std::chrono::duration<double>(now - last_touch_).count(), reason_);
 }
 
 std::vector<std::string> EvemuAcquisition::take_notes() {

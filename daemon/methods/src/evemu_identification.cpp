@@ -21,8 +21,10 @@ evemu::JudgeOptions judge_options(const Config& config) {
   options.limits = gate_limits(config.gate);
   options.accept_shape_only = config.gate.accepts(evemu::kShapeOnly);
   // Both words were checked when the configuration was read.
-  options.solve.estimator = evemu::estimator(config.evemu.estimator).value_or(evemu::Estimator::BayesPose);
-  options.solve.sparse.folds = evemu::folds_by(config.evemu.folds).value_or(evemu::FoldsBy::Position);
+  options.solve.estimator =
+      evemu::estimator(config.evemu.estimator).value_or(evemu::Estimator::BayesPose);
+  options.solve.sparse.folds =
+      evemu::folds_by(config.evemu.folds).value_or(evemu::FoldsBy::Position);
   return options;
 }
 
@@ -31,7 +33,8 @@ evemu::JudgeOptions judge_options(const Config& config) {
 std::string warmth_fault(const evemu::Calibrator& calibrator, std::string_view named,
                          std::string_view thermometer, std::string_view remedy) {
   if (calibrator.expansivity && thermometer.empty())
-    return fmt::format("{} has alpha_um_per_m_K, but nothing says how warm the array is: {}", named, remedy);
+    return fmt::format("{} has alpha_um_per_m_K, but nothing says how warm the array is: {}", named,
+                       remedy);
   if (!calibrator.expansivity && !thermometer.empty())
     return fmt::format(
         "{} says how warm the array is, but {} does not say how it grows: add alpha_um_per_m_K and "
@@ -52,11 +55,13 @@ EvemuAcquisitionOptions evemu_acquisition_options(const Config& config) {
   options.artefact = config.evemu.artefact;
   if (options.artefact && options.artefact->sensor)
     options.artefact_sensor = config.temperatures[*options.artefact->sensor];
+
   // Marks find the same zero again, people only about.
   options.zero_is_lost_by_restart =
       config.probe && config.counter_card &&
       std::ranges::any_of(config.counter_card->wiring.axes,
                           [&config](const auto& axis) { return !has_marks(config, axis.name); });
+
   return options;
 }
 
@@ -65,30 +70,38 @@ EvemuAcquisitionOptions evemu_acquisition_options(const Config& config) {
 Result<void> check_size(const EvemuRequest& request) {
   constexpr std::size_t kMostBalls = 100, kMostPositions = 100, kMostPoints = 1000;
   const auto& plan = request.plan;
-  const std::size_t balls = request.calibrator.balls.size(), blocks = request.calibrator.blocks.size();
+  const std::size_t balls = request.calibrator.balls.size(),
+                    blocks = request.calibrator.blocks.size();
   if (balls <= kMostBalls && blocks <= kMostBalls && plan.positions.size() <= kMostPositions &&
       plan.points_per_ball <= kMostPoints && plan.points_per_block <= kMostPoints)
     return {};
+
   return fail(
       ErrorCode::BadInput,
-      fmt::format("calibrate evemu: an array has at most {} balls and blocks, a plan at most {} positions "
-                  "with {} points a ball or block",
-                  kMostBalls, kMostPositions, kMostPoints));
+      fmt::format(
+          "calibrate evemu: an array has at most {} balls and blocks, a plan at most {} positions "
+          "with {} points a ball or block",
+          kMostBalls, kMostPositions, kMostPoints));
 }
 
 Result<void> check_evemu(const EvemuRequest& request, const Config& config) {
   if (auto fits = check_size(request); !fits) return fits;
   if (!config.probe && !config.cmm) {
     return fail(ErrorCode::Refused,
-                "calibrate evemu: neither [probe] nor [cmm] is in the configuration: no touches would come");
+                "calibrate evemu: neither [probe] nor [cmm] is in the configuration: no touches "
+                "would come");
   }
+
   if (config.cmm && config.cmm->axes_compensated) {
-    return fail(ErrorCode::Refused,
-                "calibrate evemu: the measuring machine corrects what it reports ([cmm] axes_compensated = "
-                "true): switch that off first, and say so in the configuration");
+    return fail(
+        ErrorCode::Refused,
+        "calibrate evemu: the measuring machine corrects what it reports ([cmm] axes_compensated = "
+        "true): switch that off first, and say so in the configuration");
   }
+
   if (const auto given = require_target(config.machine); !given) return given;
-  if (const auto machine = evemu_machine(config.machine); !machine) return tl::unexpected(machine.error());
+  if (const auto machine = evemu_machine(config.machine); !machine)
+    return tl::unexpected(machine.error());
   const auto& artefact = config.evemu.artefact;
   const auto fault =
       warmth_fault(request.calibrator, fmt::format("calibrator \"{}\"", request.calibrator.name),
@@ -99,6 +112,7 @@ Result<void> check_evemu(const EvemuRequest& request, const Config& config) {
   if (!fault.empty()) return fail(ErrorCode::Refused, "calibrate evemu: " + fault);
   const auto guide = evemu::TouchGuide::create(request.calibrator, request.plan);
   if (!guide) return fail(ErrorCode::BadInput, "calibrate evemu: " + guide.error().text);
+
   return {};
 }
 

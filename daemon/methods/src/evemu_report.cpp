@@ -20,7 +20,8 @@ namespace evemu = calib::evemu;
 void add_verdict(HtmlReport& page, const calib::Verdict& verdict) {
   add_verdict(page, verdict, "positions");
   page.paragraph(
-      "Every position was left out once. Each contender had its own best-fit rotation about Ball1 there, "
+      "Every position was left out once. Each contender had its own best-fit rotation about Ball1 "
+      "there, "
       "because the direction of a position is known through its blocks alone.");
 }
 
@@ -31,26 +32,36 @@ void add_rotation(HtmlReport& page, const evemu::Solution& solution) {
   page.paragraph(
       rotation.referenced
           ? "The rotation of the volume about Ball1 is referenced: it was known from elsewhere."
-          : "The machine measured the blocks of the artefact itself. Where its own errors turn them alike at "
-            "all positions, the touches contain nothing of it: the model is right up to one rotation about "
-            "Ball1. Compared with an independent measurement as it is, nearly all of the error may seem to "
+          : "The machine measured the blocks of the artefact itself. Where its own errors turn "
+            "them alike at "
+            "all positions, the touches contain nothing of it: the model is right up to one "
+            "rotation about "
+            "Ball1. Compared with an independent measurement as it is, nearly all of the error may "
+            "seem to "
             "be "
-            "left (for a machine of 3 mm R_resmag near 0.9, whatever the estimator); after the best-fit "
-            "rotation about Ball1 only the shape counts. Give a rotation reference, or accept the shape by "
+            "left (for a machine of 3 mm R_resmag near 0.9, whatever the estimator); after the "
+            "best-fit "
+            "rotation about Ball1 only the shape counts. Give a rotation reference, or accept the "
+            "shape by "
             "name.");
+
   if (rotation.reference) {
-    page.paragraph(fmt::format(
-        "Rotation reference: {} points, {} more outside the volume the balls span were not used; chi-square "
-        "of the residuals over the uncertainties of reference and model {:.1f} with {:.0f} degrees of "
-        "freedom.",
-        rotation.reference->points, rotation.reference->outside.size(), rotation.reference->chi2,
-        rotation.reference->dof));
+    page.paragraph(
+        fmt::format("Rotation reference: {} points, {} more outside the volume the balls span were "
+                    "not used; chi-square "
+                    "of the residuals over the uncertainties of reference and model {:.1f} with "
+                    "{:.0f} degrees of "
+                    "freedom.",
+                    rotation.reference->points, rotation.reference->outside.size(),
+                    rotation.reference->chi2, rotation.reference->dof));
   }
+
   page.facts({{"standard uncertainty of the rotation (in the model's covariance)",
                fmt::format("{:.1f} urad per axis", u_urad)},
               {"rotation taken out of the estimate",
                fmt::format("{:.1f}, {:.1f}, {:.1f} urad", kUradPerRad * rotation.removed_rad.x(),
-                           kUradPerRad * rotation.removed_rad.y(), kUradPerRad * rotation.removed_rad.z())}});
+                           kUradPerRad * rotation.removed_rad.y(),
+                           kUradPerRad * rotation.removed_rad.z())}});
 }
 
 std::string range_text(std::span<const double> values, double per_si, const char* unit) {
@@ -65,20 +76,25 @@ void add_array(HtmlReport& page, const evemu::ArtefactUncertainty& artefact) {
       "Its own errors are alike at all positions: no touch tells them from those of the machine. "
       "They are in the model's covariance.");
   std::vector<std::pair<std::string, std::string>> facts{
-      {"standard uncertainty of a ball centre, per coordinate", range_text(artefact.u_ball_m, kUmPerM, "um")},
+      {"standard uncertainty of a ball centre, per coordinate",
+       range_text(artefact.u_ball_m, kUmPerM, "um")},
       {"of the direction of a block, about each axis across it",
        range_text(artefact.u_block_rad, kUradPerRad, "urad")}};
+
   if (const auto& e = artefact.expansion) {
-    facts.insert(facts.end(),
-                 {{"temperature", fmt::format("{:.3f} C, u = {:.3f} K", e->temperature_K - kZeroCelsius_K,
-                                              e->u_temperature_K)},
-                  {"thermal expansion", fmt::format("{:.2f} um/(m K), u = {:.2f}", kUmPerM * e->alpha_per_K,
-                                                    kUmPerM * e->u_alpha_per_K)},
-                  {"longer than at 20 C by the factor",
-                   fmt::format("{:.9f}, u = {:.2g}", calib::growth(*e), calib::u_growth(*e))}});
+    facts.insert(
+        facts.end(),
+        {{"temperature", fmt::format("{:.3f} C, u = {:.3f} K", e->temperature_K - kZeroCelsius_K,
+                                     e->u_temperature_K)},
+         {"thermal expansion", fmt::format("{:.2f} um/(m K), u = {:.2f}", kUmPerM * e->alpha_per_K,
+                                           kUmPerM * e->u_alpha_per_K)},
+         {"longer than at 20 C by the factor",
+          fmt::format("{:.9f}, u = {:.2g}", calib::expansion_factor(*e),
+                      calib::u_expansion_factor(*e))}});
   } else {
     facts.emplace_back("temperature", "not known; counts as 20 C");
   }
+
   page.facts(facts);
 }
 
@@ -94,17 +110,22 @@ std::vector<double> components_um(const evemu::Observations& o, const evemu::Sol
   return out;
 }
 
-void add_residuals(HtmlReport& page, const evemu::Observations& o, const evemu::Solution& solution) {
+void add_residuals(HtmlReport& page, const evemu::Observations& o,
+                   const evemu::Solution& solution) {
   page.heading("What remains at the balls");
   const auto row = [](const char* what, const evemu::ResidualFigures& f) {
-    return std::vector<std::string>{what, um_text(f.mean_abs_m), um_text(f.rms_m), um_text(f.max_abs_m)};
+    return std::vector<std::string>{what, um_text(f.mean_abs_m), um_text(f.rms_m),
+                                    um_text(f.max_abs_m)};
   };
-  page.table({"", "mean", "rms", "largest"},
-             {row("errors", solution.statistics.before), row("residuals", solution.statistics.after)});
-  page.chart(Histogram{"before", "error of a component, um", {{"before", components_um(o, solution, true)}}});
-  page.chart(
-      Histogram{"after", "residual of a component, um", {{"after", components_um(o, solution, false)}}});
+
+  page.table({"", "mean", "rms", "largest"}, {row("errors", solution.statistics.before),
+                                              row("residuals", solution.statistics.after)});
+  page.chart(Histogram{
+      "before", "error of a component, um", {{"before", components_um(o, solution, true)}}});
+  page.chart(Histogram{
+      "after", "residual of a component, um", {{"after", components_um(o, solution, false)}}});
   constexpr std::array<const char*, 3> kNames{"x", "y", "z"};
+
   for (Eigen::Index c = 0; c < 3; ++c) {
     LineChart chart;
     chart.title = fmt::format("residuals in {}", kNames[static_cast<std::size_t>(c)]);
@@ -124,17 +145,20 @@ void add_residuals(HtmlReport& page, const evemu::Observations& o, const evemu::
 void add_poses(HtmlReport& page, const evemu::Solution& solution) {
   if (solution.pose_rotations_rad.empty()) return;
   page.heading("Rotations of the positions");
-  page.paragraph(
-      fmt::format("Each position may be turned about Ball1 by what its blocks were misread, {:.1f} urad per "
-                  "axis as the data "
-                  "have it.",
-                  kUradPerRad * solution.statistics.w_rad));
+  page.paragraph(fmt::format(
+      "Each position may be turned about Ball1 by what its blocks were misread, {:.1f} urad per "
+      "axis as the data "
+      "have it.",
+      kUradPerRad * solution.statistics.w_rad));
   std::vector<std::vector<std::string>> rows;
+
   for (std::size_t p = 0; p < solution.pose_rotations_rad.size(); ++p) {
     const auto& r = solution.pose_rotations_rad[p];
     rows.push_back({std::to_string(p + 1), fmt::format("{:.1f}", kUradPerRad * r.x()),
-                    fmt::format("{:.1f}", kUradPerRad * r.y()), fmt::format("{:.1f}", kUradPerRad * r.z())});
+                    fmt::format("{:.1f}", kUradPerRad * r.y()),
+                    fmt::format("{:.1f}", kUradPerRad * r.z())});
   }
+
   page.table({"position", "about x, urad", "about y, urad", "about z, urad"}, rows);
 }
 
@@ -144,10 +168,12 @@ void add_choice(HtmlReport& page, const evemu::SparseChoice& choice) {
               {"gamma", fmt::format("{:.6g}", choice.gamma)},
               {"smallest curvature along the last step (below 0: other solutions may be near)",
                fmt::format("{:.3g}", choice.curvature)}});
-  LineChart chart{"cross-validation", "log10 lambda", "log10 of the mean squared held-out error, mm^2", {}};
+  LineChart chart{
+      "cross-validation", "log10 lambda", "log10 of the mean squared held-out error, mm^2", {}};
   constexpr std::size_t kShown = 6;
   const std::size_t gammas = choice.all_gamma.size();
   const std::size_t step = std::max<std::size_t>(1, gammas / kShown);
+
   for (std::size_t g = 0; g < gammas; ++g) {
     if (g % step != 0 && choice.all_gamma[g] != choice.gamma) continue;
     Curve curve{fmt::format("gamma {:.4g}", choice.all_gamma[g]), {}, {}, {}};
@@ -159,10 +185,12 @@ void add_choice(HtmlReport& page, const evemu::SparseChoice& choice) {
     }
     chart.curves.push_back(std::move(curve));
   }
+
   page.chart(chart);
 }
 
-void add_coefficients(HtmlReport& page, const evemu::EvemuModel& model, const evemu::Solution& solution) {
+void add_coefficients(HtmlReport& page, const evemu::EvemuModel& model,
+                      const evemu::Solution& solution) {
   page.heading("Coefficients of the equivalent model");
   page.paragraph(
       fmt::format("Names of Li et al., Table 3; covariance {}.", evemu::name(solution.covariance)));
@@ -179,6 +207,7 @@ void add_sections(HtmlReport& page, const calib::VolumetricModel& model) {
   const calib::Vector3 tool = model.tool_offsets_m().front();
   constexpr std::array<const char*, 3> kNames{"x", "y", "z"};
   constexpr int kSteps = 40;
+
   for (Eigen::Index axis = 0; axis < 3; ++axis) {
     LineChart chart{fmt::format("along {}", kNames[static_cast<std::size_t>(axis)]),
                     fmt::format("{}, mm", kNames[static_cast<std::size_t>(axis)]),
@@ -205,9 +234,10 @@ void add_origin(HtmlReport& page, const ModelDocument& document, const evemu::So
   add_model_origin(
       page, document, document.inputs,
       {{"artefact", fmt::format("{} positions, {} ball centres", s.positions, s.balls)},
-       {"observations", fmt::format("{} for {} coefficients, rank {}, condition {:.3g}, {:.1f} effective "
-                                    "parameters",
-                                    s.observations, s.unknowns, s.rank, s.condition, s.effective_parameters)},
+       {"observations",
+        fmt::format("{} for {} coefficients, rank {}, condition {:.3g}, {:.1f} effective "
+                    "parameters",
+                    s.observations, s.unknowns, s.rank, s.condition, s.effective_parameters)},
        {"noise of a ball centre, per coordinate", um_text(s.s_m)},
        {"chi^2 per degree of freedom", fmt::format("{:.3f}", s.chi2_per_dof)},
        {"valid", "inside the hull of the ball centres, for one tool"}});

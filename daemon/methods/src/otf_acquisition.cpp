@@ -18,8 +18,8 @@ using protocol::HostTime;
 using protocol::SampleFlag;
 using protocol::Snapshot;
 
-// Off its leg for longer than this, the machine is on a later one: the beam was away while it turned a
-// corner. Shorter than that, only the mapping of the tracker's clock moved.
+// Off its leg for longer than this, the machine is on a later one: the beam was away while it
+// turned a corner. Shorter than that, only the mapping of the tracker's clock moved.
 constexpr auto kCornerMissed = std::chrono::milliseconds{500};
 constexpr std::size_t kPointsInBlock = 1024;  // 56 KiB: a second of a fast tracker
 
@@ -29,10 +29,11 @@ std::string text(const Vector3& q) {
 
 RunPoint run_point(const Snapshot& s) {
   const auto flags = s.tracker_point.head.flags;
-  return {.time = s.head.time,
-          .device_time = s.tracker_point.device_time,
-          .p_tracker_m = s.tracker_point.p_tracker_m,
-          .usable = !has(flags, SampleFlag::SpeedExceeded) && !has(flags, SampleFlag::PointInvalid)};
+  return {
+      .time = s.head.time,
+      .device_time = s.tracker_point.device_time,
+      .p_tracker_m = s.tracker_point.p_tracker_m,
+      .usable = !has(flags, SampleFlag::SpeedExceeded) && !has(flags, SampleFlag::PointInvalid)};
 }
 
 }  // namespace
@@ -74,18 +75,22 @@ void OtfAcquisition::take(const Snapshot& snapshot) {
   if (!snapshot.has_tracker_point || snapshot.head.time < from_) return;
   const RunPoint point = run_point(snapshot);
   if (!in_order(point)) return;
+
   if (phase_ == Phase::Running && point.time - last_time_ > options_.silence) {
     fail(fmt::format("no tracker point for {:.1f} s in the middle of the run",
                      in_seconds(point.time - last_time_)));
   }
+
   last_time_ = point.time;
   if (has_linear_axes(snapshot)) axes_known_at_ = point.time;
   give_up_if_stuck(point.time);
+
   // Without axis positions the point keeps its place in the sequence, but decides nothing.
   if (!has_linear_axes(snapshot)) {
     if (phase_ == Phase::Running) keep(point);
     return;
   }
+
   const Vector3 q{snapshot.position[0], snapshot.position[1], snapshot.position[2]};
   track_standstill(point, q);
   if (phase_ == Phase::WaitingAtStart) {
@@ -104,16 +109,23 @@ void OtfAcquisition::take(const Snapshot& snapshot) {
 void OtfAcquisition::compare_with_path(const Snapshot& s, const Vector3& q) {
   const auto before = std::exchange(before_q_, std::pair{s.head.time, q});
   if (!before || s.head.time <= before->first) return;
-  const double speed_m_per_s = (q - before->second).norm() / in_seconds(s.head.time - before->first);
+  const double speed_m_per_s =
+      (q - before->second).norm() / in_seconds(s.head.time - before->first);
   const auto& vertices = path_.path().vertices_m;
-  const auto near = [&](std::size_t i) { return (q - vertices[i]).norm() <= options_.vertex_tolerance_m; };
+
+  const auto near = [&](std::size_t i) {
+    return (q - vertices[i]).norm() <= options_.vertex_tolerance_m;
+  };
+
   const std::size_t vertex = near(leg_) ? leg_ : leg_ + 1;
   // Where vertices are that close to each other, nothing says at which the machine stands.
   if (!near(vertex) || (vertex == leg_ && near(leg_ + 1)) || (leg_ > 0 && near(leg_ - 1))) return;
   const Vector3& nominal = vertices[vertex];
   const auto effect = effect_of(s, options_.environment);
+
   if (!effect) return;
-  const AxisPosition path_m = grown({nominal[0], nominal[1], nominal[2]}, *effect, options_.environment);
+  const AxisPosition path_m =
+      at_temperature({nominal[0], nominal[1], nominal[2]}, *effect, options_.environment);
   auto contradiction = readings_.take({.vertex = vertex,
                                        .reading_m = q,
                                        .path_m = {path_m[0], path_m[1], path_m[2]},
@@ -124,7 +136,8 @@ void OtfAcquisition::compare_with_path(const Snapshot& s, const Vector3& q) {
 
 void OtfAcquisition::tick(HostTime now) {
   if (phase_ == Phase::Running && now - last_time_ > options_.arrival_patience) {
-    fail(fmt::format("no tracker point for {:.0f} s in the middle of the run", in_seconds(now - last_time_)));
+    fail(fmt::format("no tracker point for {:.0f} s in the middle of the run",
+                     in_seconds(now - last_time_)));
   } else if (phase_ == Phase::WaitingAtStart) {
     give_up_if_stuck(now - options_.arrival_patience);
   }
@@ -147,7 +160,8 @@ bool OtfAcquisition::in_order(const RunPoint& point) {
 void OtfAcquisition::give_up_if_stuck(HostTime point_time) {
   if (phase_ == Phase::WaitingAtStart && point_time - from_ > options_.wait_for_start) {
     fail(fmt::format("the machine did not stand at {} and drive off within {:.0f} min",
-                     text(path_.path().vertices_m.front()), in_seconds(options_.wait_for_start) / 60.0));
+                     text(path_.path().vertices_m.front()),
+                     in_seconds(options_.wait_for_start) / 60.0));
   } else if (phase_ == Phase::Running && point_time - axes_known_at_ > options_.silence) {
     fail(fmt::format("no axis positions for {:.1f} s in the middle of the run",
                      in_seconds(point_time - axes_known_at_)));
@@ -168,6 +182,7 @@ void OtfAcquisition::wait_at_start(const RunPoint& point, const Vector3& q) {
   const bool left_standstill = stand_since_ == point.time;
   const bool stood_long_enough =
       !before_.empty() && before_.back().time - before_.front().time >= options_.stand_before;
+
   if (left_standstill && stood_long_enough) {
     points_ = {};
     for (const RunPoint& p : before_) points_.push_back(p);
@@ -178,19 +193,23 @@ void OtfAcquisition::wait_at_start(const RunPoint& point, const Vector3& q) {
     points_.push_back(point);
     return;
   }
+
   if (left_standstill) before_.clear();
-  if ((q - path_.path().vertices_m.front()).norm() > options_.vertex_tolerance_m || !point.usable) return;
+  if ((q - path_.path().vertices_m.front()).norm() > options_.vertex_tolerance_m || !point.usable)
+    return;
   before_.push_back(point);
+
   while (before_.back().time - before_.front().time > options_.keep_before) before_.pop_front();
 }
 
 void OtfAcquisition::keep(const RunPoint& point) {
   points_.push_back(point);
   if (points_.size() < options_.most_points) return;
-  fail(fmt::format(
-      "the run has {} tracker points and does not end: the machine cycles on its path, or the path is "
-      "too long for this rate",
-      points_.size()));
+  fail(
+      fmt::format("the run has {} tracker points and does not end: the machine cycles on its path, "
+                  "or the path is "
+                  "too long for this rate",
+                  points_.size()));
 }
 
 void OtfAcquisition::run(const RunPoint& point, const Vector3& q) {
@@ -199,10 +218,11 @@ void OtfAcquisition::run(const RunPoint& point, const Vector3& q) {
   if (!path_.first_within(q, options_.path_tolerance_m)) {
     const double off_m = path_.distance_m(q);
     fail(fmt::format(
-        "machine at {} is {:.1f} mm away from every leg of the path: another path is being driven", text(q),
-        off_m * 1e3));
+        "machine at {} is {:.1f} mm away from every leg of the path: another path is being driven",
+        text(q), off_m * 1e3));
     return;
   }
+
   follow_path(point, q);
   if (!complete(point.time, q)) return;
   trim_end();
@@ -213,10 +233,15 @@ void OtfAcquisition::run(const RunPoint& point, const Vector3& q) {
 
 void OtfAcquisition::follow_path(const RunPoint& point, const Vector3& q) {
   const std::size_t last = path_.path().vertices_m.size() - 2;
-  while (leg_ < last && (q - path_.path().vertices_m[leg_ + 1]).norm() <= options_.vertex_tolerance_m) ++leg_;
+  while (leg_ < last &&
+         (q - path_.path().vertices_m[leg_ + 1]).norm() <= options_.vertex_tolerance_m)
+    ++leg_;
+
   const auto on_leg = [&](std::size_t leg) {
-    return calib::otf::nearest_on_leg(path_.path().vertices_m[leg], path_.path().vertices_m[leg + 1], q);
+    return calib::otf::nearest_on_leg(path_.path().vertices_m[leg],
+                                      path_.path().vertices_m[leg + 1], q);
   };
+
   calib::otf::OnLeg here = on_leg(leg_);
   if (here.off_m > options_.path_tolerance_m) {
     if (point.time - on_leg_at_ < kCornerMissed) return;
@@ -225,12 +250,13 @@ void OtfAcquisition::follow_path(const RunPoint& point, const Vector3& q) {
     leg_ = *later;
     here = on_leg(leg_);
   }
+
   on_leg_at_ = point.time;
   driven_m_ = driven_at_m_[leg_] + here.along_m;
 }
 
-/// Of short legs the last ones may have been passed between two points: what is left of the path lies within
-/// its tolerance.
+/// Of short legs the last ones may have been passed between two points: what is left of the path
+/// lies within its tolerance.
 bool OtfAcquisition::complete(HostTime now, const Vector3& q) const {
   return driven_at_m_.back() - driven_at_m_[leg_ + 1] <= options_.path_tolerance_m &&
          (q - path_.path().vertices_m.back()).norm() <= options_.vertex_tolerance_m &&

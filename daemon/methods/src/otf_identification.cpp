@@ -38,13 +38,15 @@ Result<OtfCandidate> identify_run(const OtfRun& run, const MachineConfig& machin
   if (!machine) return tl::unexpected(machine.error());
   const auto points = otf_observations(run.points);
   calib::otf::Options options = otf_options(points, machine_config, gate);
-  options.orientation.scales_agree =
-      true;  // without them no run begins, and they are compared at the vertices
+
+  // without them no run begins, and they are compared at the vertices
+  options.orientation.scales_agree = true;
   if (watch.progress) {
     options.progress = [&watch](calib::otf::Stage stage, double fraction) {
       watch.progress(overall(stage, fraction));
     };
   }
+
   options.stopped = watch.stopped;
   calib::otf::Noise noise = otf_noise(machine_config);
   noise.u_scale = run.u_scale;
@@ -56,6 +58,7 @@ Result<OtfCandidate> identify_run(const OtfRun& run, const MachineConfig& machin
   auto verdict = calib::otf::judge(*observations, *solution, active, gate_limits(gate), options);
   if (!verdict) return tl::unexpected(error_of(verdict.error()));
   if (run.unmeasured_air) verdict->notes.push_back(*run.unmeasured_air);
+
   return OtfCandidate{std::move(*solution), std::move(*verdict)};
 }
 

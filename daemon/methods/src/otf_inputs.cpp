@@ -26,7 +26,8 @@ calib::Vector3 direction_of(TrackerVertical vertical) {
   return (number % 2 == 0 ? 1.0 : -1.0) * calib::Vector3::Unit(number / 2);
 }
 
-calib::otf::OrientationEvidence orientation_evidence(const MachineConfig& machine, const GateConfig& gate) {
+calib::otf::OrientationEvidence orientation_evidence(const MachineConfig& machine,
+                                                     const GateConfig& gate) {
   calib::otf::OrientationEvidence evidence;
   if (machine.tracker_vertical) evidence.up = direction_of(*machine.tracker_vertical);
   if (const auto& p = machine.tracker_position_m) evidence.tracker_m = calib::Vector3(p->data());
@@ -63,7 +64,8 @@ std::vector<calib::otf::TrackerObservation> otf_observations(std::span<const Run
   out.reserve(points.size());
   for (const RunPoint& p : points) {
     out.push_back(
-        {.time_s = std::chrono::duration<double>(p.device_time - points.front().device_time).count(),
+        {.time_s =
+             std::chrono::duration<double>(p.device_time - points.front().device_time).count(),
          .p_tracker_m = {p.p_tracker_m[0], p.p_tracker_m[1], p.p_tracker_m[2]},
          .valid = p.usable});
   }
@@ -93,13 +95,17 @@ AcquisitionOptions acquisition_options(const Config& config) {
   options.reading_tolerance_m = config.gate.path_tolerance_m;
   if (!config.tracker) return options;
   const std::chrono::duration<double> period{1.0 / config.tracker->point_rate_hz};
+
   const auto holding = [&period](double points) {
     return std::chrono::duration_cast<std::chrono::nanoseconds>(points * period);
   };
+
   options.stand_before = std::max(options.stand_before, holding(kStandstillPoints));
   options.keep_before = std::max(options.keep_before, holding(2.0 * kStandstillPoints));
   options.keep_after = std::max(options.keep_after, holding(2.0 * kStandstillPoints));
-  options.stand_after = std::max(options.stand_after, options.keep_after + holding(kStandstillPoints));
+  options.stand_after =
+      std::max(options.stand_after, options.keep_after + holding(kStandstillPoints));
+
   return options;
 }
 

@@ -25,28 +25,33 @@ void add_origin(HtmlReport& page, const ModelDocument& document) {
       {{"samples", fmt::format("{}, {} lost", s.samples, s.lost_samples)},
        {"observations", fmt::format("{} for {} unknowns, rank {}, condition {:.3g}", s.observations,
                                     s.unknowns, s.rank, s.condition)},
-       {"sigma0",
-        fmt::format("{:.3f} (1: residuals as large as the stated uncertainties explain)", s.sigma0)},
-       {"covariance multiplied with", fmt::format("{:.3f}", s.covariance_factor)}});
+       {"sigma0", fmt::format("{:.3f} (1: residuals as large as the stated uncertainties explain)",
+                              s.sigma0)},
+       {"covariance multiplied with", fmt::format("{:.3f}", s.variance_factor)}});
 }
 
-void add_residuals(HtmlReport& page, const ModelStatistics& s, const calib::otf::Residuals& residuals) {
+void add_residuals(HtmlReport& page, const ModelStatistics& s,
+                   const calib::otf::Residuals& residuals) {
   page.heading("Residuals of the fit");
   const auto row = [](const char* what, const ResidualFigures& f) {
     return std::vector<std::string>{what, um(f.mean_abs_m), um(f.rms_m), um(f.max_abs_m)};
   };
   page.table({"", "mean", "rms", "largest"}, {row("before", s.before), row("after", s.after)});
-  page.chart(Histogram{"before", "deviation across the path, um", {{"before", in_um(residuals.before_m)}}});
-  page.chart(Histogram{"after", "deviation across the path, um", {{"after", in_um(residuals.after_m)}}});
+  page.chart(Histogram{
+      "before", "deviation across the path, um", {{"before", in_um(residuals.before_m)}}});
+  page.chart(
+      Histogram{"after", "deviation across the path, um", {{"after", in_um(residuals.after_m)}}});
 }
 
 /// Errors of one kind (displacements or rotations) along one axis: the last letter of their name.
 LineChart table_chart(const std::vector<calib::Parameter>& parameters, char axis, bool angles) {
   LineChart chart;
-  chart.title = fmt::format("{} along {}", angles ? "Angular errors" : "Positioning and straightness", axis);
+  chart.title =
+      fmt::format("{} along {}", angles ? "Angular errors" : "Positioning and straightness", axis);
   chart.x_label = fmt::format("{}, mm", axis);
   chart.y_label = angles ? "urad, band: 2 u" : "um, band: 2 u";
   std::map<std::string, Curve> curves;
+
   for (const auto& p : parameters) {
     if (!p.position_m || p.name.back() != axis || p.is_angle() != angles) continue;
     Curve& curve = curves[p.name];
@@ -55,6 +60,7 @@ LineChart table_chart(const std::vector<calib::Parameter>& parameters, char axis
     curve.y.push_back(p.value * kUmPerM);
     curve.u.push_back(p.u * kUmPerM);
   }
+
   for (auto& [name, curve] : curves) chart.curves.push_back(std::move(curve));
   return chart;
 }
@@ -62,22 +68,26 @@ LineChart table_chart(const std::vector<calib::Parameter>& parameters, char axis
 void add_tables(HtmlReport& page, const calib::VolumetricModel& model) {
   page.heading("Error motions (ISO 230-1)");
   page.paragraph(
-      "Each with twice its standard uncertainty in the stated gauge. A table that is missing cannot be told "
+      "Each with twice its standard uncertainty in the stated gauge. A table that is missing "
+      "cannot be told "
       "from the "
       "others with one target.");
   const auto parameters = model.parameters();
+
   for (const char axis : {'X', 'Y', 'Z'}) {
     for (const bool angles : {false, true}) {
       const LineChart chart = table_chart(parameters, axis, angles);
       if (!chart.curves.empty()) page.chart(chart);
     }
   }
+
   std::vector<std::vector<std::string>> rows;
   for (const auto& p : parameters) {
     if (!p.position_m)
       rows.push_back(
           {p.name, fmt::format("{:.3f}", p.value * kUmPerM), fmt::format("{:.3f}", p.u * kUmPerM)});
   }
+
   page.heading("Squareness");
   page.table({"", "urad", "u, urad"}, rows);
 }

@@ -40,7 +40,8 @@ double speed_m_per_s(std::span<const EncoderRow> readings, std::size_t i) {
   return way.norm() / (readings[after].time_s - readings[before].time_s);
 }
 
-/// False: a neighbour is so near that the readings do not show at which of the two the machine stands.
+/// False: a neighbour is so near that the readings do not show at which of the two the machine
+/// stands.
 bool stands_alone(std::span<const AxisPosition> path_m, std::size_t i) {
   const auto far = [&](std::size_t a, std::size_t b) {
     return (vector(path_m[a]) - vector(path_m[b])).norm() > 2.0 * kNear_m;
@@ -50,27 +51,31 @@ bool stands_alone(std::span<const AxisPosition> path_m, std::size_t i) {
 
 Error not_reached(const std::string& file, std::size_t vertex, const AxisPosition& q_m,
                   const Closest& closest) {
-  return {
-      ErrorCode::BadInput,
-      fmt::format("{}: the scales do not reach vertex {} of the path, ({:.3f}, {:.3f}, {:.3f}) mm: they come "
-                  "within {:.3f} mm, with ({:.3f}, {:.3f}, {:.3f}) mm at {:.3f} s",
-                  file, vertex, 1e3 * q_m[0], 1e3 * q_m[1], 1e3 * q_m[2], 1e3 * closest.distance_m,
-                  1e3 * closest.reading_m.x(), 1e3 * closest.reading_m.y(), 1e3 * closest.reading_m.z(),
-                  closest.time_s)};
+  return {ErrorCode::BadInput,
+          fmt::format("{}: the scales do not reach vertex {} of the path, ({:.3f}, {:.3f}, {:.3f}) "
+                      "mm: they come "
+                      "within {:.3f} mm, with ({:.3f}, {:.3f}, {:.3f}) mm at {:.3f} s",
+                      file, vertex, 1e3 * q_m[0], 1e3 * q_m[1], 1e3 * q_m[2],
+                      1e3 * closest.distance_m, 1e3 * closest.reading_m.x(),
+                      1e3 * closest.reading_m.y(), 1e3 * closest.reading_m.z(), closest.time_s)};
 }
 
 }  // namespace
 
 Result<std::size_t> compare_with_path(const std::string& file, std::span<const EncoderRow> readings,
                                       std::span<const AxisPosition> path_m, double tolerance_m) {
-  if (readings.size() < 2) return fail(ErrorCode::BadInput, fmt::format("{}: fewer than 2 readings", file));
+  if (readings.size() < 2)
+    return fail(ErrorCode::BadInput, fmt::format("{}: fewer than 2 readings", file));
   VertexReadings at_vertices(tolerance_m);
+
   const auto refuse = [&](const std::string& contradiction) {
     return fail(ErrorCode::BadInput, fmt::format("{}: {}", file, contradiction));
   };
+
   std::size_t next = 0;  // vertices before it were reached
   std::set<std::size_t> stood;
   Closest closest;
+
   for (std::size_t i = 0; i < readings.size(); ++i) {
     const Vector3 q_m = vector(readings[i].reading_m);
     if (next < path_m.size()) {
@@ -81,14 +86,18 @@ Result<std::size_t> compare_with_path(const std::string& file, std::span<const E
       }
     }
     const std::size_t vertex = next - 1;
-    if (next == 0 || (q_m - vector(path_m[vertex])).norm() > kNear_m || !stands_alone(path_m, vertex))
+    if (next == 0 || (q_m - vector(path_m[vertex])).norm() > kNear_m ||
+        !stands_alone(path_m, vertex))
       continue;
     const double speed = speed_m_per_s(readings, i);
     if (speed <= VertexReadings::kStands_m_per_s) stood.insert(vertex);
-    const VertexReading reading{
-        .vertex = vertex, .reading_m = q_m, .path_m = vector(path_m[vertex]), .speed_m_per_s = speed};
+    const VertexReading reading{.vertex = vertex,
+                                .reading_m = q_m,
+                                .path_m = vector(path_m[vertex]),
+                                .speed_m_per_s = speed};
     if (const auto contradiction = at_vertices.take(reading)) return refuse(*contradiction);
   }
+
   if (next < path_m.size()) return tl::unexpected(not_reached(file, next, path_m[next], closest));
   if (const auto contradiction = at_vertices.contradiction()) return refuse(*contradiction);
   return stood.size();

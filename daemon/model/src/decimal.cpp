@@ -11,8 +11,8 @@ namespace abbe::daemon {
 
 namespace {
 
-/// "d.ddde-05" with its point moved; plain where people can read it, with an exponent where it would be all
-/// zeros.
+/// "d.ddde-05" with its point moved; plain where people can read it, with an exponent where it
+/// would be all zeros.
 std::string move_point(const std::string& scientific, int shift) {
   const auto e = scientific.find('e');
   const bool negative = scientific.front() == '-';
@@ -23,6 +23,7 @@ std::string move_point(const std::string& scientific, int shift) {
   while (digits.size() > 1 && digits.back() == '0') digits.pop_back();
   const auto count = static_cast<int>(digits.size());
   std::string text = negative ? "-" : "";
+
   if (exponent < -5 || exponent > 16) {
     text += digits.front();
     if (count > 1) text.append(1, '.').append(digits, 1);
@@ -35,6 +36,7 @@ std::string move_point(const std::string& scientific, int shift) {
     const auto whole = static_cast<std::size_t>(exponent) + 1;
     text.append(digits, 0, whole).append(1, '.').append(digits, whole);
   }
+
   return text;
 }
 
@@ -43,8 +45,9 @@ std::string move_point(const std::string& scientific, int shift) {
 std::string to_decimal(double value, int shift) {
   if (value == 0.0) return "0";
   std::array<char, 32> buffer{};
-  const auto end =
-      std::to_chars(buffer.data(), buffer.data() + buffer.size(), value, std::chars_format::scientific).ptr;
+  const auto end = std::to_chars(buffer.data(), buffer.data() + buffer.size(), value,
+                                 std::chars_format::scientific)
+                       .ptr;
   auto shortest = move_point(std::string(buffer.data(), end), shift);
   if (from_decimal(std::strtold(shortest.c_str(), nullptr), shift) == value) return shortest;
   return move_point(fmt::format("{:.16e}", value), shift);  // 17 digits always name one double

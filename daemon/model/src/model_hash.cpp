@@ -12,8 +12,8 @@ namespace abbe::daemon {
 
 namespace {
 
-/// Feeds labelled numbers to the hash as the little-endian bytes of IEEE 754 doubles, each list with its
-/// length in front, so that no two models share a stream. Minus zero counts as zero.
+/// Feeds labelled numbers to the hash as the little-endian bytes of IEEE 754 doubles, each list
+/// with its length in front, so that no two models share a stream. Minus zero counts as zero.
 class Canonical {
  public:
   void text(std::string_view value) {
@@ -34,7 +34,8 @@ class Canonical {
  private:
   void word(std::uint64_t value) {
     std::array<std::byte, 8> bytes{};
-    for (std::size_t i = 0; i < bytes.size(); ++i) bytes[i] = static_cast<std::byte>(value >> (8 * i));
+    for (std::size_t i = 0; i < bytes.size(); ++i)
+      bytes[i] = static_cast<std::byte>(value >> (8 * i));
     hash_.update(bytes);
   }
   Sha256 hash_;
@@ -48,6 +49,7 @@ void add_frame(Canonical& out, const calib::VolumetricModel& model) {
     for (const double node_m : axis.nodes_m) out.number(node_m);
     out.number(axis.reference_m);
   }
+
   if (const auto* polynomials = model.polynomials()) {
     out.text(kLegendre);
     out.count(static_cast<std::size_t>(polynomials->design().equivalent().order()));
@@ -57,6 +59,7 @@ void add_frame(Canonical& out, const calib::VolumetricModel& model) {
   } else {
     out.text(name(calib::Basis::Linear));
   }
+
   out.text(name(model.gauge()));
   out.vectors(model.tool_offsets_m());
 }
@@ -75,8 +78,8 @@ void add_values(Canonical& out, const calib::VolumetricModel& model) {
 /// Last, and only where there is one: a model without has the hash it had before there were any.
 void add_artefact(Canonical& out, const calib::Expansion& artefact) {
   out.text("artefact");
-  for (const double value :
-       {artefact.alpha_per_K, artefact.u_alpha_per_K, artefact.temperature_K, artefact.u_temperature_K})
+  for (const double value : {artefact.alpha_per_K, artefact.u_alpha_per_K, artefact.temperature_K,
+                             artefact.u_temperature_K})
     out.number(value);
 }
 

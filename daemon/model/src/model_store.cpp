@@ -48,12 +48,14 @@ Result<std::vector<std::string>> ids_on_disk(const fs::path& folder) {
     if (entry->path().extension() == ".json" && is_id(entry->path().stem().string()))
       ids.push_back(entry->path().stem().string());
   if (error)
-    return fail(ErrorCode::Io, fmt::format("list {}: {}", (folder / "models").string(), error.message()));
+    return fail(ErrorCode::Io,
+                fmt::format("list {}: {}", (folder / "models").string(), error.message()));
   std::sort(ids.begin(), ids.end());
   return ids;
 }
 
-/// Nothing takes a model out of the store: one that was added and has no file is lost, and is to be seen.
+/// Nothing takes a model out of the store: one that was added and has no file is lost, and is to be
+/// seen.
 Result<std::vector<std::string>> ids_in_store(const fs::path& folder, const StoreState& state) {
   auto ids = ids_on_disk(folder);
   if (!ids) return ids;
@@ -77,7 +79,8 @@ Result<void> ModelStore::create() const {
   return create_folder(folder_ / "models");
 }
 
-ModelStore::ModelStore(fs::path folder) : folder_(std::move(folder)), state_file_(state_path(folder_)) {}
+ModelStore::ModelStore(fs::path folder)
+    : folder_(std::move(folder)), state_file_(state_path(folder_)) {}
 
 fs::path ModelStore::model_path(const std::string& id) const {
   return folder_ / "models" / (id + ".json");
@@ -86,9 +89,9 @@ fs::path ModelStore::model_path(const std::string& id) const {
 Result<std::string> ModelStore::add(const ModelDocument& document, bool accepted,
                                     std::vector<std::string> reasons, const StoreActor& actor) {
   const auto id = model_id(document);
-  // First, and without the lock: the file of an id has one content, whoever writes it, and must not wait for
-  // whoever holds the lock. A damaged file of the same id is written again: what it should have held is in
-  // our hands.
+  // First, and without the lock: the file of an id has one content, whoever writes it, and must not
+  // wait for whoever holds the lock. A damaged file of the same id is written again: what it should
+  // have held is in our hands.
   if (!load(id))
     if (const auto written = replace_file(model_path(id), to_json(document)); !written)
       return tl::make_unexpected(written.error());
@@ -97,10 +100,12 @@ Result<std::string> ModelStore::add(const ModelDocument& document, bool accepted
   auto state = read_state(folder_);
   if (!state) return tl::make_unexpected(state.error());
   StoreEvent event{StoreAction::Added, id, actor, accepted, std::move(reasons)};
+
   // A change whose last step failed (fsync of the folder, or what follows it) is asked for again.
   if (const auto* last = state->last_added(id); last != nullptr && *last == event) return id;
   if (const auto done = append(folder_, std::move(*state), std::move(event)); !done)
     return tl::make_unexpected(done.error());
+
   return id;
 }
 
@@ -117,8 +122,10 @@ Result<void> ModelStore::activate(const std::string& id, const StoreActor& actor
         ErrorCode::Refused,
         added == nullptr
             ? fmt::format("activate {}: the gate never judged it (force it to take it anyway)", id)
-            : fmt::format("activate {}: the gate refused it: {}", id, fmt::join(added->reasons, "; ")));
+            : fmt::format("activate {}: the gate refused it: {}", id,
+                          fmt::join(added->reasons, "; ")));
   const auto action = accepted ? StoreAction::Activated : StoreAction::Forced;
+
   return append(folder_, std::move(*state), StoreEvent{action, id, actor, accepted, {}});
 }
 
@@ -132,10 +139,11 @@ Result<std::string> ModelStore::rollback(const StoreActor& actor) {
     return fail(ErrorCode::Refused, "roll back: no model was active before the present one");
   const auto& id = stack[stack.size() - 2];
   if (const auto document = load(id); !document) return tl::make_unexpected(document.error());
-  if (const auto done =
-          append(folder_, std::move(*state), StoreEvent{StoreAction::RolledBack, id, actor, false, {}});
+  if (const auto done = append(folder_, std::move(*state),
+                               StoreEvent{StoreAction::RolledBack, id, actor, false, {}});
       !done)
     return tl::make_unexpected(done.error());
+
   return id;
 }
 
@@ -146,6 +154,7 @@ Result<std::vector<StoreEntry>> ModelStore::list() const {
   const auto ids = ids_in_store(folder_, *state);
   if (!ids) return tl::make_unexpected(ids.error());
   std::vector<StoreEntry> entries;
+
   for (const auto& id : *ids) {
     StoreEntry entry;
     entry.id = id;
@@ -163,6 +172,7 @@ Result<std::vector<StoreEntry>> ModelStore::list() const {
     }
     entries.push_back(std::move(entry));
   }
+
   std::stable_sort(entries.begin(), entries.end(),
                    [](const auto& a, const auto& b) { return a.added > b.added; });
   return entries;
@@ -190,7 +200,8 @@ StoreStamp ModelStore::stamp() const noexcept {
   struct stat status {};
   if (::stat(state_file_.c_str(), &status) != 0) return {};
   constexpr std::int64_t kSecond_ns = 1'000'000'000;
-  return {status.st_ino, status.st_mtim.tv_sec * kSecond_ns + status.st_mtim.tv_nsec, status.st_size};
+  return {status.st_ino, status.st_mtim.tv_sec * kSecond_ns + status.st_mtim.tv_nsec,
+          status.st_size};
 }
 
 Result<ModelDocument> ModelStore::load(const std::string& id) const {
@@ -210,6 +221,7 @@ Result<std::string> ModelStore::find(const std::string& prefix) const {
     if (!active) return tl::make_unexpected(active.error());
     return *active ? Result<std::string>{**active} : fail(ErrorCode::Usage, "no model is active");
   }
+
   constexpr std::size_t kShortest = 4;
   std::vector<std::string> found;
   if (prefix.size() >= kShortest) {
@@ -218,6 +230,7 @@ Result<std::string> ModelStore::find(const std::string& prefix) const {
     for (const auto& id : *ids)
       if (id.starts_with(prefix)) found.push_back(id);
   }
+
   if (found.size() == 1) return found.front();
   return fail(ErrorCode::Usage,
               fmt::format("model \"{}\": {} in {} begin with that", prefix,

@@ -26,7 +26,7 @@ ModelStatistics model_statistics(const calib::otf::Statistics& s) {
           .condition = or_zero(s.condition),
           .sigma0 = or_zero(s.sigma0),
           .chi2_per_dof = or_zero(s.chi2_per_dof),
-          .covariance_factor = s.covariance_factor,
+          .variance_factor = s.variance_factor,
           .before = figures(s.before),
           .after = figures(s.after),
           .iterations = s.iterations,

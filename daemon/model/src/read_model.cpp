@@ -15,15 +15,17 @@ namespace abbe::daemon {
 
 namespace {
 
-/// n (n + 1) / 2 numbers of the covariance of n parameters are the largest array: n = 20,000 fits. to_json()
-/// nests five deep.
-constexpr JsonBounds kModelBounds{.bytes = std::size_t{1} << 30, .depth = 16, .values = std::size_t{1} << 28};
+/// n (n + 1) / 2 numbers of the covariance of n parameters are the largest array: n = 20,000 fits.
+/// to_json() nests five deep.
+constexpr JsonBounds kModelBounds{
+    .bytes = std::size_t{1} << 30, .depth = 16, .values = std::size_t{1} << 28};
 
 /// long double: see decimal.hpp.
-using Json =
-    nlohmann::basic_json<std::map, std::vector, std::string, bool, std::int64_t, std::uint64_t, long double>;
+using Json = nlohmann::basic_json<std::map, std::vector, std::string, bool, std::int64_t,
+                                  std::uint64_t, long double>;
 
-/// Reads values by path; the first faults of every part are kept, what cannot be read becomes a default.
+/// Reads values by path; the first faults of every part are kept, what cannot be read becomes a
+/// default.
 class Reader {
  public:
   Reader(const Json& root, std::string file) : root_(root), file_(std::move(file)) {}
@@ -106,7 +108,8 @@ class Reader {
   std::vector<std::string> faults_;
 };
 
-calib::Vector3 read_vector(Reader& in, const Json& entry, const std::string& path, const std::string& key) {
+calib::Vector3 read_vector(Reader& in, const Json& entry, const std::string& path,
+                           const std::string& key) {
   const Json* value = in.find(entry, path, key);
   if (value == nullptr) return calib::Vector3::Zero();
   const auto v = in.numbers(*value, path + "." + key, kMm);
@@ -133,6 +136,7 @@ void read_basis(Reader& in, calib::ModelDescription& out) {
     in.fault("basis.kind", fmt::format("must be \"linear\" or \"{}\"", kLegendre));
   const Json* axes = in.find(*basis, "basis", "axes");
   if (axes == nullptr) return;
+
   for (const auto axis : calib::kAllAxes) {
     const auto path = fmt::format("basis.axes.{}", letter(axis));
     const Json* entry = in.find(*axes, "basis.axes", std::string(1, letter(axis)));
@@ -169,10 +173,13 @@ void read_covariance(Reader& in, calib::ModelDescription& out) {
   if (list == nullptr) return;
   const auto n = static_cast<Eigen::Index>(out.parameters.size());
   const auto values = in.numbers(*list, "covariance", kMicroUnitSquared);
+
   if (values.size() != static_cast<std::size_t>(n * (n + 1) / 2)) {
-    in.fault("covariance", fmt::format("{} values where {} belong", values.size(), n * (n + 1) / 2));
+    in.fault("covariance",
+             fmt::format("{} values where {} belong", values.size(), n * (n + 1) / 2));
     return;
   }
+
   out.covariance.resize(n, n);
   std::size_t k = 0;
   for (Eigen::Index i = 0; i < n; ++i)
@@ -204,6 +211,7 @@ calib::ModelDescription read_description(Reader& in) {
     out.validity_hull_m = in.vectors(in.find(*validity, "validity", "hull_mm"), "validity.hull_mm");
   read_parameters(in, out);
   read_covariance(in, out);
+
   return out;
 }
 
@@ -229,12 +237,13 @@ ModelStatistics read_statistics(Reader& in) {
   s.condition = in.number_of(*statistics, path, "condition", 0);
   s.sigma0 = in.number_of(*statistics, path, "sigma0", 0);
   s.chi2_per_dof = in.number_of(*statistics, path, "chi2_per_dof", 0);
-  s.covariance_factor = in.number_of(*statistics, path, "covariance_factor", 0);
+  s.variance_factor = in.number_of(*statistics, path, "covariance_factor", 0);
   s.before = read_residuals(in, *statistics, "before");
   s.after = read_residuals(in, *statistics, "after");
   s.iterations = static_cast<int>(in.count_of(*statistics, path, "iterations"));
   const Json* stop = in.find(*statistics, path, "stop_reason");
   if (stop != nullptr && stop->is_string()) s.stop_reason = stop->get<std::string>();
+
   return s;
 }
 
@@ -249,10 +258,11 @@ std::optional<calib::Expansion> read_artefact(Reader& in) {
   const auto within = [&](const char* key, int shift, double least, double most) {
     return in.number_within(artefact, path, key, shift, least, most);
   };
-  return calib::Expansion{within("alpha_um_per_m_K", kMicroUnit, -kMostAlpha_per_K, kMostAlpha_per_K),
-                          within("u_alpha_um_per_m_K", kMicroUnit, 0.0, kMostAlpha_per_K),
-                          within("temperature_K", 0, kColdest_K, kWarmest_K),
-                          within("u_temperature_K", 0, 0.0, kWarmest_K - kColdest_K)};
+  return calib::Expansion{
+      within("alpha_um_per_m_K", kMicroUnit, -kMostAlpha_per_K, kMostAlpha_per_K),
+      within("u_alpha_um_per_m_K", kMicroUnit, 0.0, kMostAlpha_per_K),
+      within("temperature_K", 0, kColdest_K, kWarmest_K),
+      within("u_temperature_K", 0, 0.0, kWarmest_K - kColdest_K)};
 }
 
 /// Missing in models whose recording is whole, and in those of before.
@@ -277,8 +287,10 @@ std::vector<InputFile> read_inputs(Reader& in) {
 Result<ModelDocument> read_document(Reader& in) {
   if (in.text("schema") != kModelSchema) {
     in.fault("schema", fmt::format("must be \"{}\"", kModelSchema));
-    return tl::make_unexpected(in.to_error());  // another schema would only give faults that mean nothing
+    // another schema would only give faults that mean nothing
+    return tl::make_unexpected(in.to_error());
   }
+
   const auto created = utc_from_text(in.text("created"));
   if (!created) in.fault("created", "must be a UTC time such as 2024-05-17T08:30:00.000000000Z");
   auto description = read_description(in);
@@ -290,20 +302,23 @@ Result<ModelDocument> read_document(Reader& in) {
   const auto inputs = read_inputs(in);
   const auto artefact = read_artefact(in);
   const auto recording_gap = read_recording_gap(in);
-  const auto method = in.text("method"), estimator = in.text("estimator"), machine = in.text("machine"),
-             machine_hash = in.text("machine_hash"), hash = in.text("hash");
+  const auto method = in.text("method"), estimator = in.text("estimator"),
+             machine = in.text("machine"), machine_hash = in.text("machine_hash"),
+             hash = in.text("hash");
   if (in.any()) return tl::make_unexpected(in.to_error());
   ModelDocument document{std::move(*model), method,     estimator, machine,  machine_hash,
                          *created,          statistics, inputs,    artefact, recording_gap};
   if (hash == model_hash(document)) return document;
   in.fault("hash", "is not the hash of the content: the file was changed or damaged");
+
   return tl::make_unexpected(in.to_error());
 }
 
 }  // namespace
 
 Result<ModelDocument> parse_model(std::string_view text, const std::string& file) {
-  if (auto within = check_json(text, file, kModelBounds); !within) return tl::make_unexpected(within.error());
+  if (auto within = check_json(text, file, kModelBounds); !within)
+    return tl::make_unexpected(within.error());
   try {
     const auto root = Json::parse(text);
     Reader reader(root, file);

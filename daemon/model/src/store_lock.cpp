@@ -25,7 +25,8 @@ namespace fs = std::filesystem;
 constexpr auto kLockLook = std::chrono::milliseconds{10};
 constexpr int kLockFlags = O_RDONLY | O_CLOEXEC | O_NOFOLLOW | O_NONBLOCK;
 
-/// 0600; 0660 where the group may write to the folder anyway. Also a file of before, when it was readable.
+/// 0600; 0660 where the group may write to the folder anyway. Also a file of before, when it was
+/// readable.
 void keep_from_strangers(int lock, const fs::path& folder) noexcept {
   struct stat file {
   }, of_folder{};
@@ -75,16 +76,20 @@ Result<FileDescriptor> lock_store(const fs::path& folder, std::chrono::nanosecon
   const auto failure = [&folder](std::string_view seen) {
     return fail(ErrorCode::Io, fmt::format("lock the model store {}: {}", folder.string(), seen));
   };
+
   FileDescriptor lock = open_lock(folder / "lock");
   if (!lock) return failure(std::strerror(errno));
   const auto until = std::chrono::steady_clock::now() + patience;
+
   while (::flock(lock.get(), LOCK_EX | LOCK_NB) != 0) {
     if (errno != EWOULDBLOCK && errno != EINTR) return failure(std::strerror(errno));
     if (std::chrono::steady_clock::now() > until)
-      return failure(fmt::format("another process{} has held it for {:.0f} s", holder_of(lock.get()),
+      return failure(fmt::format("another process{} has held it for {:.0f} s",
+                                 holder_of(lock.get()),
                                  std::chrono::duration<double>(patience).count()));
     std::this_thread::sleep_for(kLockLook);
   }
+
   return lock;
 }
 

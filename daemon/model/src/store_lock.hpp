@@ -9,9 +9,9 @@
 
 namespace abbe::daemon {
 
-/// Locks FOLDER/lock (flock) until the descriptor is closed or the process dies. The file can be opened only
-/// by who may write to the folder: anybody who can open it can hold it. Io after `patience`, naming the
-/// holder where the kernel shows it.
+/// Locks FOLDER/lock (flock) until the descriptor is closed or the process dies. The file can be
+/// opened only by who may write to the folder: anybody who can open it can hold it. Io after
+/// `patience`, naming the holder where the kernel shows it.
 [[nodiscard]] Result<FileDescriptor> lock_store(const std::filesystem::path& folder,
                                                 std::chrono::nanoseconds patience);
 

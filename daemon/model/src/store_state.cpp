@@ -33,17 +33,20 @@ json to_json(const StoreEvent& event) {
 
 /// Throws json::exception, or nothing and no value for a word that is not one of ours.
 std::optional<StoreEvent> event_from(const json& object) {
-  const auto action = std::find(kActions.begin(), kActions.end(), object.at("action").get<std::string>());
+  const auto action =
+      std::find(kActions.begin(), kActions.end(), object.at("action").get<std::string>());
   const auto when = utc_from_text(object.at("when").get<std::string>());
   if (action == kActions.end() || !when) return std::nullopt;
   StoreEvent event;
   event.action = static_cast<StoreAction>(action - kActions.begin());
   event.id = object.at("id").get<std::string>();
   event.actor = {object.at("who").get<std::string>(), object.at("why").get<std::string>(), *when};
+
   if (event.action == StoreAction::Added) {
     event.accepted = object.at("accepted").get<bool>();
     event.reasons = object.at("reasons").get<std::vector<std::string>>();
   }
+
   return event;
 }
 
@@ -69,8 +72,9 @@ std::optional<std::string> StoreState::active() const {
 std::optional<StoreEvent> StoreState::activation() const {
   const auto id = active();
   if (!id) return std::nullopt;
-  const auto last = std::find_if(events.rbegin(), events.rend(),
-                                 [](const StoreEvent& event) { return event.action != StoreAction::Added; });
+  const auto last = std::find_if(events.rbegin(), events.rend(), [](const StoreEvent& event) {
+    return event.action != StoreAction::Added;
+  });
   StoreEvent event = *last;
   const StoreEvent* added = last_added(*id);
   event.accepted = added != nullptr && added->accepted;
@@ -88,15 +92,19 @@ std::string to_text(const StoreState& state) {
   json events = json::array();
   for (const auto& event : state.events) events.push_back(to_json(event));
   const auto active = state.active();
-  json root{{"schema", kSchema}, {"active", active ? json(*active) : json()}, {"events", std::move(events)}};
+  json root{{"schema", kSchema},
+            {"active", active ? json(*active) : json()},
+            {"events", std::move(events)}};
   return root.dump(1, ' ', false, json::error_handler_t::replace) + "\n";
 }
 
 Result<StoreState> store_state_from_text(std::string_view text, const std::string& file) {
   // An event of an hour for ever, and no deeper than abbe writes.
-  const auto parsed = parse_json(text, file, {.bytes = 256u << 20, .depth = 8, .values = 20'000'000});
+  const auto parsed =
+      parse_json(text, file, {.bytes = 256u << 20, .depth = 8, .values = 20'000'000});
   if (!parsed) return tl::make_unexpected(parsed.error());
   const json& root = *parsed;
+
   try {
     if (root.at("schema").get<std::string>() != kSchema)
       return fail(ErrorCode::BadInput, fmt::format("{}: schema must be \"{}\"", file, kSchema));

@@ -18,10 +18,12 @@ struct StoreState {
   [[nodiscard]] std::optional<std::string> active() const;
   /// The event that made it so, `accepted` as the gate said of the model when it was added.
   [[nodiscard]] std::optional<StoreEvent> activation() const;
-  [[nodiscard]] const StoreEvent* last_added(std::string_view id) const;  ///< null if the gate never saw it
+  /// null if the gate never saw it
+  [[nodiscard]] const StoreEvent* last_added(std::string_view id) const;
 };
 
 [[nodiscard]] std::string to_text(const StoreState& state);
-[[nodiscard]] Result<StoreState> store_state_from_text(std::string_view text, const std::string& file);
+[[nodiscard]] Result<StoreState> store_state_from_text(std::string_view text,
+                                                       const std::string& file);
 
 }  // namespace abbe::daemon

@@ -37,7 +37,8 @@ std::optional<pid_t> writer_of(std::string name) {
   if (dot == std::string::npos) return std::nullopt;
   const char* const end = name.data() + name.size();
   const auto read = std::from_chars(name.data() + dot + 1, end, process);
-  return read.ec == std::errc{} && read.ptr == end && process > 0 ? std::optional{process} : std::nullopt;
+  return read.ec == std::errc{} && read.ptr == end && process > 0 ? std::optional{process}
+                                                                  : std::nullopt;
 }
 
 /// Numbers are given again after a restart of the computer.
@@ -66,10 +67,12 @@ bool is_damaged(const fs::path& state) {
 void ModelStore::remove_leftovers() const {
   for (const auto& folder : {folder_, folder_ / "models"}) {
     std::error_code error;
-    for (fs::directory_iterator entry(folder, error), end; !error && entry != end; entry.increment(error)) {
+    for (fs::directory_iterator entry(folder, error), end; !error && entry != end;
+         entry.increment(error)) {
       const auto writer = writer_of(entry->path().filename().string());
       std::error_code ignored;
-      if (writer && is_gone(*writer) && entry->is_regular_file(ignored)) fs::remove(entry->path(), ignored);
+      if (writer && is_gone(*writer) && entry->is_regular_file(ignored))
+        fs::remove(entry->path(), ignored);
     }
   }
 }
@@ -80,15 +83,17 @@ Result<void> ModelStore::set_aside_damaged_state(protocol::UtcTime now) {
   if (!lock) return tl::make_unexpected(lock.error());
   if (!is_damaged(state_file_)) return {};  // repaired meanwhile
   const auto aside = folder_ / (std::string{kDamaged} + date_for_name(now));
-  if (::renameat2(AT_FDCWD, state_file_.c_str(), AT_FDCWD, aside.c_str(), RENAME_NOREPLACE) == 0) return {};
-  return fail(ErrorCode::Io,
-              fmt::format("rename {} to {}: {}", state_file_.string(), aside.string(), std::strerror(errno)));
+  if (::renameat2(AT_FDCWD, state_file_.c_str(), AT_FDCWD, aside.c_str(), RENAME_NOREPLACE) == 0)
+    return {};
+  return fail(ErrorCode::Io, fmt::format("rename {} to {}: {}", state_file_.string(),
+                                         aside.string(), std::strerror(errno)));
 }
 
 std::string ModelStore::damaged_state() const {
   std::string newest;
   std::error_code error;
-  for (fs::directory_iterator entry(folder_, error), end; !error && entry != end; entry.increment(error)) {
+  for (fs::directory_iterator entry(folder_, error), end; !error && entry != end;
+       entry.increment(error)) {
     auto name = entry->path().filename().string();
     if (name.starts_with(kDamaged)) newest = std::max(newest, std::move(name));
   }

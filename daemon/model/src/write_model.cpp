@@ -12,8 +12,8 @@ namespace abbe::daemon {
 
 namespace {
 
-/// JSON by hand: numbers keep the digits to_decimal() chose, one parameter stands on one line, and the same
-/// document gives the same bytes.
+/// JSON by hand: numbers keep the digits to_decimal() chose, one parameter stands on one line, and
+/// the same document gives the same bytes.
 class JsonText {
  public:
   void raw(std::string_view text) { text_ += text; }
@@ -34,7 +34,8 @@ class JsonText {
 };
 
 std::string vector_mm(const calib::Vector3& v) {
-  return fmt::format("[{}, {}, {}]", to_decimal(v[0], kMm), to_decimal(v[1], kMm), to_decimal(v[2], kMm));
+  return fmt::format("[{}, {}, {}]", to_decimal(v[0], kMm), to_decimal(v[1], kMm),
+                     to_decimal(v[2], kMm));
 }
 
 std::string vectors_mm(std::span<const calib::Vector3> list) {
@@ -52,10 +53,11 @@ std::string numbers(std::span<const double> list, int shift) {
 void write_polynomials(JsonText& out, const calib::evemu::EvemuModel& model) {
   const auto& design = model.design();
   out.key("basis");
-  out.raw(fmt::format(
-      "{{\"kind\": \"{}\", \"order\": {},\n    \"centre_mm\": {}, \"half_width_mm\": {}, \"zero_mm\": {}}}",
-      kLegendre, design.equivalent().order(), vector_mm(design.box().centre_m),
-      vector_mm(design.box().half_width_m), vector_mm(model.ball1_m())));
+  out.raw(
+      fmt::format("{{\"kind\": \"{}\", \"order\": {},\n    \"centre_mm\": {}, \"half_width_mm\": "
+                  "{}, \"zero_mm\": {}}}",
+                  kLegendre, design.equivalent().order(), vector_mm(design.box().centre_m),
+                  vector_mm(design.box().half_width_m), vector_mm(model.ball1_m())));
 }
 
 void write_axes(JsonText& out, const calib::ParameterLayout& layout) {
@@ -77,8 +79,8 @@ void write_parameters(JsonText& out, const calib::VolumetricModel& model) {
   for (const auto& p : model.parameters()) {
     out.raw(fmt::format("{}\n    {{\"name\": \"{}\", ", first ? "" : ",", p.name));
     if (p.position_m) out.raw(fmt::format("\"position_mm\": {}, ", to_decimal(*p.position_m, kMm)));
-    out.raw(fmt::format("\"value\": {}, \"u\": {}, \"unit\": \"{}\"}}", to_decimal(p.value, kMicroUnit),
-                        to_decimal(p.u, kMicroUnit), unit_of(p)));
+    out.raw(fmt::format("\"value\": {}, \"u\": {}, \"unit\": \"{}\"}}",
+                        to_decimal(p.value, kMicroUnit), to_decimal(p.u, kMicroUnit), unit_of(p)));
     first = false;
   }
   out.raw("\n  ]");
@@ -99,30 +101,34 @@ void write_covariance(JsonText& out, const Eigen::MatrixXd& covariance) {
 
 std::string residuals(const ResidualFigures& figures) {
   return fmt::format("{{\"mae_um\": {}, \"rms_um\": {}, \"max_um\": {}}}",
-                     to_decimal(figures.mean_abs_m, kMicroUnit), to_decimal(figures.rms_m, kMicroUnit),
+                     to_decimal(figures.mean_abs_m, kMicroUnit),
+                     to_decimal(figures.rms_m, kMicroUnit),
                      to_decimal(figures.max_abs_m, kMicroUnit));
 }
 
 void write_statistics(JsonText& out, const ModelStatistics& s) {
   out.key("statistics");
   out.raw(fmt::format(
-      "{{\"samples\": {}, \"lost_samples\": {}, \"observations\": {}, \"unknowns\": {}, \"rank\": {},\n"
+      "{{\"samples\": {}, \"lost_samples\": {}, \"observations\": {}, \"unknowns\": {}, \"rank\": "
+      "{},\n"
       "    \"condition\": {}, \"sigma0\": {}, \"chi2_per_dof\": {}, \"covariance_factor\": {},\n"
       "    \"before\": {},\n    \"after\": {},\n    \"iterations\": {}, \"stop_reason\": {}}}",
       s.samples, s.lost_samples, s.observations, s.unknowns, s.rank, to_decimal(s.condition, 0),
-      to_decimal(s.sigma0, 0), to_decimal(s.chi2_per_dof, 0), to_decimal(s.covariance_factor, 0),
+      to_decimal(s.sigma0, 0), to_decimal(s.chi2_per_dof, 0), to_decimal(s.variance_factor, 0),
       residuals(s.before), residuals(s.after), s.iterations, JsonText::quoted(s.stop_reason)));
 }
 
 void write_artefact(JsonText& out, const calib::Expansion& artefact) {
   out.key("artefact");
   out.raw(fmt::format(
-      "{{\"temperature_K\": {}, \"u_temperature_K\": {}, \"alpha_um_per_m_K\": {}, \"u_alpha_um_per_m_K\": "
+      "{{\"temperature_K\": {}, \"u_temperature_K\": {}, \"alpha_um_per_m_K\": {}, "
+      "\"u_alpha_um_per_m_K\": "
       "{},\n"
       "    \"growth\": {}, \"u_growth\": {}}}",
       to_decimal(artefact.temperature_K, 0), to_decimal(artefact.u_temperature_K, 0),
       to_decimal(artefact.alpha_per_K, kMicroUnit), to_decimal(artefact.u_alpha_per_K, kMicroUnit),
-      to_decimal(calib::growth(artefact), 0), to_decimal(calib::u_growth(artefact), 0)));
+      to_decimal(calib::expansion_factor(artefact), 0),
+      to_decimal(calib::u_expansion_factor(artefact), 0)));
 }
 
 void write_inputs(JsonText& out, const std::vector<InputFile>& inputs) {
@@ -168,6 +174,7 @@ std::string to_json(const ModelDocument& document) {
   out.raw(fmt::format("{{\"hull_mm\": {}}}", vectors_mm(model.validity().vertices_m())));
   write_parameters(out, model);
   write_covariance(out, model.covariance());
+
   return out.finish();
 }
 
@@ -181,8 +188,9 @@ std::string to_coefficients_csv(const calib::evemu::EvemuModel& model) {
 std::string to_tables_csv(const calib::VolumetricModel& model) {
   std::string text = "name,position_mm,value,u,unit\n";
   for (const auto& p : model.parameters())
-    text += fmt::format("{},{},{},{},{}\n", p.name, p.position_m ? to_decimal(*p.position_m, kMm) : "",
-                        to_decimal(p.value, kMicroUnit), to_decimal(p.u, kMicroUnit), unit_of(p));
+    text +=
+        fmt::format("{},{},{},{},{}\n", p.name, p.position_m ? to_decimal(*p.position_m, kMm) : "",
+                    to_decimal(p.value, kMicroUnit), to_decimal(p.u, kMicroUnit), unit_of(p));
   return text;
 }
 

@@ -22,8 +22,8 @@ using protocol::HostTime;
 using protocol::SampleFlag;
 using protocol::Snapshot;
 
-// Axis samples older than this are forgotten. A tracker that stalls delivers its backlog later; ten seconds
-// of 1 kHz are 2 MB.
+// Axis samples older than this are forgotten. A tracker that stalls delivers its backlog later; ten
+// seconds of 1 kHz are 2 MB.
 constexpr auto kAxisMemory = std::chrono::seconds{10};
 
 bool earlier(const AxisSample& sample, HostTime t) {
@@ -46,16 +46,20 @@ AssemblerOptions assembler_options(const Config& config) {
   options.watermark = config.daemon.watermark;
   options.environment = environment_use(config);
   options.axes_compensated = config.axes_compensated();
+
   if (config.encoder) {
-    const std::chrono::duration<double, std::nano> span = kMostLostCycles * config.encoder->sync_period;
+    const std::chrono::duration<double, std::nano> span =
+        kMostLostCycles * config.encoder->sync_period;
     options.interpolation.max_span = std::chrono::duration_cast<std::chrono::nanoseconds>(span);
   }
+
   if (config.counter_card) {
     const double sample_rate_hz =
         drivers::scan_rate_hz(config.counter_card->wiring) / config.counter_card->sample_every;
     const std::chrono::duration<double> span{kMostLostCycles / sample_rate_hz};
     options.interpolation.max_span = std::chrono::duration_cast<std::chrono::nanoseconds>(span);
   }
+
   return options;
 }
 
@@ -74,9 +78,9 @@ void Assembler::take(const Batch& batch) {
   for (const auto& touch : batch.touches) newest_ = std::max(newest_, touch.head.time);
 }
 
-/// A bus that went off or began anew may report an instant before that of the last sample, and a second
-/// answer takes one back. Interpolation needs one sample an instant: the one that knows less stays, whichever
-/// came first.
+/// A bus that went off or began anew may report an instant before that of the last sample, and a
+/// second answer takes one back. Interpolation needs one sample an instant: the one that knows less
+/// stays, whichever came first.
 void Assembler::take(const AxisSample& sample) {
   const auto same = std::lower_bound(axes_.begin(), axes_.end(), sample.head.time, earlier);
   if (same == axes_.end() || same->head.time != sample.head.time) {
@@ -129,6 +133,7 @@ Snapshot Assembler::assemble(const protocol::ProbeTrigger& touch) const {
   Snapshot s = begin(touch.head);
   s.has_trigger = true;
   s.trigger = touch;
+
   if (touch.axis_count == 0) {
     interpolate(s);
   } else {
@@ -138,8 +143,10 @@ Snapshot Assembler::assemble(const protocol::ProbeTrigger& touch) const {
     s.velocity = touch.velocity;
     s.u_position = touch.u_position;
   }
+
   // What a measuring machine reports is its own affair: no scale of ours was read.
-  if (touch.latch != protocol::TouchLatch::Reported) correct_for_temperature(s, options_.environment);
+  if (touch.latch != protocol::TouchLatch::Reported)
+    correct_for_temperature(s, options_.environment);
   return s;
 }
 
@@ -156,15 +163,17 @@ Snapshot Assembler::begin(const protocol::SampleHead& head) const {
 }
 
 void Assembler::interpolate(Snapshot& s) const {
-  // Two samples on either side are all that the interpolation looks at; handing over exactly these keeps a
-  // result independent of what else has arrived.
+  // Two samples on either side are all that the interpolation looks at; handing over exactly these
+  // keeps a result independent of what else has arrived.
   const auto after = std::lower_bound(axes_.begin(), axes_.end(), s.head.time, earlier);
   const auto first = after - std::min<std::ptrdiff_t>(2, after - axes_.begin());
   const auto end = after + std::min<std::ptrdiff_t>(2, axes_.end() - after);
   std::array<AxisSample, 4> around;
   std::copy(first, end, around.begin());
-  const auto axes = drivers::interpolate_axes(std::span{around}.first(static_cast<std::size_t>(end - first)),
-                                              s.head.time, s.head.u_time, options_.interpolation);
+  const auto axes =
+      drivers::interpolate_axes(std::span{around}.first(static_cast<std::size_t>(end - first)),
+                                s.head.time, s.head.u_time, options_.interpolation);
+
   if (axes) {
     set_axes(s, *axes);
   } else {

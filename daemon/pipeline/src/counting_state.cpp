@@ -25,15 +25,22 @@ json json_of(const drivers::quad08::Debounce& debounce) {
 }
 
 json json_of(const drivers::CounterAxis& axis) {
-  return {{"name", axis.name},     {"channel", axis.channel},        {"scale", axis.scale},
-          {"offset", axis.offset}, {"latched", axis.latch_on_index}, {"debounce", json_of(axis.debounce)}};
+  return {{"name", axis.name},
+          {"channel", axis.channel},
+          {"scale", axis.scale},
+          {"offset", axis.offset},
+          {"latched", axis.latch_on_index},
+          {"debounce", json_of(axis.debounce)}};
 }
 
 json json_of(const ReferenceAxisConfig& marks) {
-  return {
-      {"axis", marks.axis},          {"increment", marks.code.increment},    {"length", marks.code.length},
-      {"rotary", marks.code.rotary}, {"signal_period", marks.signal_period}, {"zero_mark", marks.zero_mark},
-      {"reversed", marks.reversed}};
+  return {{"axis", marks.axis},
+          {"increment", marks.code.increment},
+          {"length", marks.code.length},
+          {"rotary", marks.code.rotary},
+          {"signal_period", marks.signal_period},
+          {"zero_mark", marks.zero_mark},
+          {"reversed", marks.reversed}};
 }
 
 json json_of(const FoundDatum& datum) {
@@ -64,11 +71,14 @@ std::optional<CountingState> state_from(const json& content) {
   if (counts.size() > progress.count.size()) return std::nullopt;
   progress.axis_count = static_cast<std::uint8_t>(counts.size());
   std::ranges::copy(counts, progress.count.begin());
+
   for (const auto& found : content.at("datum")) {
     const auto& datum = state.counting.datum.emplace_back(datum_from(found));
-    if (datum.axis >= counts.size() || !std::isfinite(datum.reading_at_zero) || !std::isfinite(datum.u))
+    if (datum.axis >= counts.size() || !std::isfinite(datum.reading_at_zero) ||
+        !std::isfinite(datum.u))
       return std::nullopt;
   }
+
   return state;
 }
 
@@ -81,8 +91,8 @@ json json_of(const CountingState& state) {
           {"serial_number", progress.serial_number()},
           {"host_time_ns", progress.head.time.time_since_epoch().count()},
           {"clock_count", progress.clock_count},
-          {"counts",
-           std::vector<std::int64_t>(progress.count.begin(), progress.count.begin() + progress.axis_count)},
+          {"counts", std::vector<std::int64_t>(progress.count.begin(),
+                                               progress.count.begin() + progress.axis_count)},
           {"datum", std::move(datum)}};
 }
 
@@ -109,11 +119,12 @@ std::string renamed_aside(const std::filesystem::path& file) {
 void remove_half_written(const std::filesystem::path& file) {
   std::error_code failed;
   const std::string begins = file.filename().string() + ".";
-  for (std::filesystem::directory_iterator entry{file.parent_path(), failed}, end; !failed && entry != end;
-       entry.increment(failed)) {
+  for (std::filesystem::directory_iterator entry{file.parent_path(), failed}, end;
+       !failed && entry != end; entry.increment(failed)) {
     const auto name = entry->path().filename().string();
     std::error_code ignored;
-    if (name.starts_with(begins) && name.ends_with(".new")) std::filesystem::remove(entry->path(), ignored);
+    if (name.starts_with(begins) && name.ends_with(".new"))
+      std::filesystem::remove(entry->path(), ignored);
   }
 }
 
@@ -132,18 +143,21 @@ std::string counting_set_up(const Config& config) {
       {"axes", std::move(axes)},
       {"clock", {wiring.clock_channel, static_cast<int>(wiring.clock_source), wiring.clock_hz}},
       {"probe",
-       {wiring.latch_channel ? *wiring.latch_channel : -1, wiring.edge_channel ? *wiring.edge_channel : -1,
-        json_of(wiring.latch_debounce), json_of(wiring.edge_debounce)}},
+       {wiring.latch_channel ? *wiring.latch_channel : -1,
+        wiring.edge_channel ? *wiring.edge_channel : -1, json_of(wiring.latch_debounce),
+        json_of(wiring.edge_debounce)}},
       {"width", static_cast<int>(wiring.width)},
       {"reference", std::move(marks)},
       {"speed", config.daemon.speed}};
+
   return set_up.dump();
 }
 
 std::string boot_id() {
   std::string id;
   if (std::ifstream file{"/proc/sys/kernel/random/boot_id"}; file >> id) return id;
-  const char* const given = std::getenv("ABBE_BOOT_ID");  // NOLINT(concurrency-mt-unsafe): never set here
+  // NOLINT(concurrency-mt-unsafe): never set here
+  const char* const given = std::getenv("ABBE_BOOT_ID");
   return given != nullptr ? given : "";
 }
 
@@ -153,8 +167,10 @@ std::filesystem::path counting_state_file(const std::filesystem::path& data_dir)
 
 std::string to_text(const CountingState& state) {
   const json content = json_of(state);
-  return json{{"schema", kCountingSchema}, {"sha256", sha256_hex(content.dump())}, {"state", content}}.dump(
-             1) +
+  return json{{"schema", kCountingSchema},
+              {"sha256", sha256_hex(content.dump())},
+              {"state", content}}
+             .dump(1) +
          "\n";
 }
 
@@ -181,7 +197,8 @@ LeftCounting left_counting(const Config& config, const std::string& boot_id) {
   const auto file = counting_state_file(config.daemon.data_dir);
   remove_half_written(file);
   std::error_code failed;
-  if (std::filesystem::status(file, failed).type() == std::filesystem::file_type::not_found) return {};
+  if (std::filesystem::status(file, failed).type() == std::filesystem::file_type::not_found)
+    return {};
   const auto refused = [&](const std::string& why) {
     return LeftCounting{.state = {}, .warning = fmt::format("{}: {}", why, kNotReferenced)};
   };
@@ -204,8 +221,9 @@ LeftCounting left_counting(const Config& config, const std::string& boot_id) {
 }
 
 RecordingAttachment to_attachment(const CountingState& state) {
-  return {
-      .name = std::string{kCountingStateName}, .media_type = "application/json", .content = to_text(state)};
+  return {.name = std::string{kCountingStateName},
+          .media_type = "application/json",
+          .content = to_text(state)};
 }
 
 }  // namespace abbe::daemon

@@ -22,8 +22,9 @@ void set_missing(Sample& sample, std::size_t axis) {
 }  // namespace
 
 bool has_marks(const Config& config, const std::string& axis) {
-  return config.reference && std::ranges::any_of(config.reference->axes,
-                                                 [&axis](const auto& marks) { return marks.axis == axis; });
+  return config.reference &&
+         std::ranges::any_of(config.reference->axes,
+                             [&axis](const auto& marks) { return marks.axis == axis; });
 }
 
 Datum::Datum(const Config& config, WithoutMarks without_marks) {
@@ -83,8 +84,8 @@ template <class Counted>
 void Datum::apply_to_counts(Counted& sample) const {
   for (const Axis& axis : axes_) {
     if (axis.in_force) {
-      sample.position[axis.place] =
-          axis.in_force->reading_at_zero + axis.step * static_cast<double>(sample.count[axis.place]);
+      sample.position[axis.place] = axis.in_force->reading_at_zero +
+                                    axis.step * static_cast<double>(sample.count[axis.place]);
     } else {
       set_missing(sample, axis.place);
     }
@@ -119,13 +120,16 @@ RecordingAttachment to_attachment(const FoundDatum& datum) {
                      {"u", datum.u},
                      {"stated", datum.stated},
                      {"from_ns", datum.from.time_since_epoch().count()}};
-  return {.name = std::string{kDatumName}, .media_type = "application/json", .content = content.dump()};
+  return {
+      .name = std::string{kDatumName}, .media_type = "application/json", .content = content.dump()};
 }
 
 RecordingAttachment to_attachment(const DatumState& state) {
-  return {.name = std::string{kDatumStateName},
-          .media_type = "application/json",
-          .content = json{{"at_ns", state.at.time_since_epoch().count()}, {"unknown", state.unknown}}.dump()};
+  return {
+      .name = std::string{kDatumStateName},
+      .media_type = "application/json",
+      .content =
+          json{{"at_ns", state.at.time_since_epoch().count()}, {"unknown", state.unknown}}.dump()};
 }
 
 Result<DatumState> datum_state_from_attachment(const RecordingAttachment& attachment) {
@@ -167,7 +171,8 @@ Result<FoundDatum> datum_from_attachment(const RecordingAttachment& attachment) 
         .axis = content.at("axis").get<std::size_t>(),
         .reading_at_zero = content.at("reading_at_zero").get<double>(),
         .u = content.at("u").get<double>(),
-        .from = protocol::HostTime{std::chrono::nanoseconds{content.at("from_ns").get<std::int64_t>()}},
+        .from =
+            protocol::HostTime{std::chrono::nanoseconds{content.at("from_ns").get<std::int64_t>()}},
         .stated = content.value("stated", false)};
   } catch (const json::exception& e) {
     return fail(ErrorCode::BadInput, fmt::format("attachment {}: {}", attachment.name, e.what()));

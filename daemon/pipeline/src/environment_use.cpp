@@ -25,7 +25,8 @@ void copy_if(EnvironmentMask mask, EnvironmentMask bit, double from, double& to)
 }
 
 /// The quantities of `mask` from `from`, or NaN if it is too old.
-void merge(const EnvironmentSample& from, EnvironmentMask mask, bool too_old, EnvironmentSample& to) {
+void merge(const EnvironmentSample& from, EnvironmentMask mask, bool too_old,
+           EnvironmentSample& to) {
   const auto value = [too_old](double v) { return too_old ? kNotAvailable : v; };
   copy_if(mask, protocol::kAirTemperature, value(from.air_temperature_K), to.air_temperature_K);
   copy_if(mask, protocol::kAirPressure, value(from.air_pressure_Pa), to.air_pressure_Pa);
@@ -39,12 +40,15 @@ void merge(const EnvironmentSample& from, EnvironmentMask mask, bool too_old, En
 /// A device whose clock began anew may report an instant before that of its last sample.
 void insert_by_time(std::deque<EnvironmentSample>& in_order, const EnvironmentSample& sample) {
   const auto later = [](HostTime t, const EnvironmentSample& other) { return t < other.head.time; };
-  in_order.insert(std::upper_bound(in_order.begin(), in_order.end(), sample.head.time, later), sample);
+  in_order.insert(std::upper_bound(in_order.begin(), in_order.end(), sample.head.time, later),
+                  sample);
 }
 
 /// The last one not after `t`.
 const EnvironmentSample* in_force(const std::deque<EnvironmentSample>& samples, HostTime t) {
-  const auto later = [](HostTime at, const EnvironmentSample& sample) { return at < sample.head.time; };
+  const auto later = [](HostTime at, const EnvironmentSample& sample) {
+    return at < sample.head.time;
+  };
   const auto after = std::upper_bound(samples.begin(), samples.end(), t, later);
   return after == samples.begin() ? nullptr : &*std::prev(after);
 }
@@ -61,16 +65,20 @@ EnvironmentUseOptions environment_use(const Config& config) {
   for (const auto& device : config.environment) {
     for (const auto& measured : device.map.measured) use.measured |= drivers::mask_of(measured);
   }
+
   use.air = config.air;
   if (config.tracker) {
     use.tracker_u_scale = config.tracker->u_scale;
     use.unmeasured_air = unmeasured_air_text(config, config.tracker->u_scale);
   }
+
   const auto axes = config.connected_axes();
   for (const ThermalConfig& thermal : config.thermal) {
     const auto axis = std::find(axes.begin(), axes.end(), thermal.axis);
-    if (axis != axes.end()) use.thermal.push_back({static_cast<std::size_t>(axis - axes.begin()), thermal});
+    if (axis != axes.end())
+      use.thermal.push_back({static_cast<std::size_t>(axis - axes.begin()), thermal});
   }
+
   return use;
 }
 
@@ -95,17 +103,20 @@ std::optional<EnvironmentSample> EnvironmentMerge::at(HostTime t) const {
   merged.measured = 0;
   merged.air_temperature_K = merged.air_pressure_Pa = merged.relative_humidity = kNotAvailable;
   bool any = false;
+
   if (const auto* weather = in_force(weather_, t); weather != nullptr && weather->measured != 0) {
     // The controller says its weather when it changes: how old it is says nothing.
     merge(*weather, static_cast<EnvironmentMask>(weather->measured & ~measured_), false, merged);
     any = true;
   }
+
   for (const auto& samples : devices_) {
     const auto* sample = in_force(samples, t - lag_);
     if (sample == nullptr) continue;
     merge(*sample, sample->measured, t - sample->head.time > max_age_ + lag_, merged);
     any = true;
   }
+
   if (!any) return std::nullopt;
   return merged;
 }
@@ -128,37 +139,41 @@ std::optional<EnvironmentEffect> effect_of(const protocol::Snapshot& s,
   EnvironmentEffect effect;
   effect.u_scale = options.tracker_u_scale;
   for (const ThermalAxis& thermal : options.thermal) {
-    if (thermal.axis >= effect.growth.size()) continue;
+    if (thermal.axis >= effect.expansion_factor.size()) continue;
     const double t_K =
         s.has_environment ? s.environment.temperature_K[thermal.config.temperature] : kNotAvailable;
     if (std::isnan(t_K)) return std::nullopt;
-    effect.growth[thermal.axis] = calib::growth(expansion(thermal.config, t_K));
-    effect.u_growth[thermal.axis] = calib::u_growth(expansion(thermal.config, t_K));
+    effect.expansion_factor[thermal.axis] = calib::expansion_factor(expansion(thermal.config, t_K));
+    effect.u_expansion_factor[thermal.axis] =
+        calib::u_expansion_factor(expansion(thermal.config, t_K));
   }
+
   if (options.air.assumed_index) {
-    const auto index =
-        s.has_environment ? index_of_air(s.environment, options.air) : Result<calib::RefractiveIndex>{};
+    const auto index = s.has_environment ? index_of_air(s.environment, options.air)
+                                         : Result<calib::RefractiveIndex>{};
     if (!s.has_environment || !index) return std::nullopt;
     effect.u_scale = calib::root_sum_of_squares(options.tracker_u_scale, index->u_n / index->n);
   }
+
   return effect;
 }
 
-std::array<double, 3> grown(std::array<double, 3> reading_m, const EnvironmentEffect& effect,
-                            const EnvironmentUseOptions& options) {
+std::array<double, 3> at_temperature(std::array<double, 3> reading_m,
+                                     const EnvironmentEffect& effect,
+                                     const EnvironmentUseOptions& options) {
   for (const ThermalAxis& thermal : options.thermal) {
     const std::size_t a = thermal.axis;
     if (a >= reading_m.size()) continue;
     const double fixed_m = thermal.config.fixed_m;
-    reading_m[a] = fixed_m + (reading_m[a] - fixed_m) * effect.growth[a];
+    reading_m[a] = fixed_m + (reading_m[a] - fixed_m) * effect.expansion_factor[a];
   }
   return reading_m;
 }
 
 void MeanEffect::take(const EnvironmentEffect& effect) {
-  for (std::size_t a = 0; a < effect.growth.size(); ++a) {
-    sum_.growth[a] += effect.growth[a];
-    sum_.u_growth[a] += effect.u_growth[a];
+  for (std::size_t a = 0; a < effect.expansion_factor.size(); ++a) {
+    sum_.expansion_factor[a] += effect.expansion_factor[a];
+    sum_.u_expansion_factor[a] += effect.u_expansion_factor[a];
   }
   sum_.u_scale += effect.u_scale;
   ++count_;
@@ -167,8 +182,8 @@ void MeanEffect::take(const EnvironmentEffect& effect) {
 EnvironmentEffect MeanEffect::mean() const {
   if (count_ == 0) return {};
   EnvironmentEffect mean = sum_;
-  for (double& growth : mean.growth) growth /= static_cast<double>(count_);
-  for (double& u : mean.u_growth) u /= static_cast<double>(count_);
+  for (double& factor : mean.expansion_factor) factor /= static_cast<double>(count_);
+  for (double& u : mean.u_expansion_factor) u /= static_cast<double>(count_);
   mean.u_scale /= static_cast<double>(count_);
   return mean;
 }
@@ -187,12 +202,13 @@ void correct_for_temperature(protocol::Snapshot& s, const EnvironmentUseOptions&
     const calib::Expansion scale = expansion(thermal.config, t_K);
     const auto position = calib::true_position(s.position[a], thermal.config.fixed_m, scale);
     s.position[a] = position.value_m;
-    s.velocity[a] *= calib::growth(scale);
+    s.velocity[a] *= calib::expansion_factor(scale);
     s.u_position[a] = calib::root_sum_of_squares(s.u_position[a], position.u_m);
   }
 }
 
-Result<calib::RefractiveIndex> index_of_air(const EnvironmentSample& environment, const AirConfig& config) {
+Result<calib::RefractiveIndex> index_of_air(const EnvironmentSample& environment,
+                                            const AirConfig& config) {
   const calib::Air air{.temperature_K = environment.air_temperature_K,
                        .pressure_Pa = environment.air_pressure_Pa,
                        .relative_humidity = environment.relative_humidity,

@@ -20,7 +20,8 @@ constexpr std::chrono::seconds kCurrentFor{1};
 
 bool axes_known(const protocol::Snapshot& view) noexcept {
   const auto flags = view.head.flags;
-  return has_linear_axes(view) && !has(flags, SampleFlag::BusOff) && !has(flags, SampleFlag::DeviceError) &&
+  return has_linear_axes(view) && !has(flags, SampleFlag::BusOff) &&
+         !has(flags, SampleFlag::DeviceError) &&
          std::all_of(view.position.begin(), view.position.begin() + kLinearAxes,
                      [](double q) { return std::isfinite(q); });
 }
@@ -41,6 +42,7 @@ bool LiveView::take(const Batch& batch) {
     view_.has_environment = true;
     view_.environment = *environment;
   }
+
   for (const auto& sample : batch.axes) take(sample);
   if (!batch.points.empty()) {
     view_.has_tracker_point = true;
@@ -48,10 +50,12 @@ bool LiveView::take(const Batch& batch) {
     correct_for_air(view_, use_);
     if (!axes_known_at_) view_.head.time = batch.points.back().head.time;
   }
+
   if (!batch.touches.empty()) {
     view_.has_trigger = true;
     view_.trigger = batch.touches.back();
   }
+
   const bool forgotten = forget_what_is_not_current(batch.taken);
   return forgotten || !batch.axes.empty() || !batch.points.empty() || !batch.touches.empty() ||
          !batch.environment.empty() || !batch.measured_environment.empty();
@@ -76,13 +80,14 @@ void LiveView::take_back(const protocol::AxisSample& sample) {
   view_.head.flags |= sample.head.flags;
   view_.missing_mask |= sample.missing_mask;
   for (std::size_t axis = 0; axis < view_.axis_count; ++axis) {
-    if ((sample.missing_mask >> axis & 1u) != 0) view_.velocity[axis] = view_.u_position[axis] = 0.0;
+    if ((sample.missing_mask >> axis & 1u) != 0)
+      view_.velocity[axis] = view_.u_position[axis] = 0.0;
   }
   previous_ = sample;
 }
 
-/// The message has one instant, that of the axes, and none for the point: of a tracker that lost its beam or
-/// its connection the last point would look as fresh as the axes.
+/// The message has one instant, that of the axes, and none for the point: of a tracker that lost
+/// its beam or its connection the last point would look as fresh as the axes.
 bool LiveView::forget_what_is_not_current(protocol::HostTime now) {
   bool forgotten = false;
   const auto forget = [&](bool& has, auto& sample) {

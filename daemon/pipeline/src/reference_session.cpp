@@ -17,8 +17,8 @@ constexpr auto kMemory = std::chrono::seconds{2};
 constexpr double kMostSpreadPeriods = 0.5;
 
 /// Least and largest live count of the samples around [from, to].
-std::pair<std::int64_t, std::int64_t> counts_around(const std::deque<AxisSample>& live, std::uint8_t axis,
-                                                    HostTime from, HostTime to) {
+std::pair<std::int64_t, std::int64_t> counts_around(const std::deque<AxisSample>& live,
+                                                    std::uint8_t axis, HostTime from, HostTime to) {
   const auto after = [](HostTime t, const AxisSample& s) { return t < s.head.time; };
   auto first = std::upper_bound(live.begin(), live.end(), from, after);
   if (first != live.begin()) --first;
@@ -41,11 +41,11 @@ ReferenceSession::ReferenceSession(ReferenceOptions options) : options_(std::mov
 }
 
 bool ReferenceSession::finished() const {
-  return std::ranges::all_of(axes_,
-                             [](const Axis& a) { return a.result.state != AxisReference::State::Searching; });
+  return std::ranges::all_of(
+      axes_, [](const Axis& a) { return a.result.state != AxisReference::State::Searching; });
 }
 
-void ReferenceSession::begin_anew(Axis& axis) {
+void ReferenceSession::restart(Axis& axis) {
   axis.traverse.reset();
   axis.alignment = {};
   axis.datum.reset();
@@ -56,7 +56,7 @@ void ReferenceSession::take(const AxisSample& live) {
   if (has(live.head.flags, SampleFlag::Restarted)) {
     live_.clear();
     waiting_.clear();
-    for (Axis& axis : axes_) begin_anew(axis);
+    for (Axis& axis : axes_) restart(axis);
   }
   if (!live_.empty() && live.head.time <= live_.back().head.time) return;
   live_.push_back(live);
@@ -67,7 +67,7 @@ void ReferenceSession::take(const AxisSample& live) {
 void ReferenceSession::take(const drivers::MarkCrossing& crossing) {
   if (has(crossing.head.flags, SampleFlag::Restarted)) {
     waiting_.clear();
-    for (Axis& axis : axes_) begin_anew(axis);
+    for (Axis& axis : axes_) restart(axis);
   }
   waiting_.push_back(crossing);
   work();
@@ -101,17 +101,22 @@ void ReferenceSession::cross(Axis& axis, const drivers::MarkCrossing& crossing) 
   follow(axis, from);
   const auto [low, high] = counts_around(live_, axis.options.live_axis, from, to);
   ++axis.result.marks;
+
   if (!axis.alignment.add(crossing.count, low, high)) {
     axis.result.state = AxisReference::State::Failed;
-    axis.result.reason = axis.options.name + ": the two cards contradict each other: one of them miscounts";
+    axis.result.reason =
+        axis.options.name + ": the two cards contradict each other: one of them miscounts";
     return;
   }
+
   const auto outcome = axis.traverse.on_mark(crossing.count);
   if (outcome && *outcome) axis.datum = **outcome;
   if (outcome && !*outcome) {
     axis.result.reason = axis.options.name + ": " + std::string(name(outcome->error()));
-    if (outcome->error() == drivers::MarkFault::WrongScale) axis.result.state = AxisReference::State::Failed;
+    if (outcome->error() == drivers::MarkFault::WrongScale)
+      axis.result.state = AxisReference::State::Failed;
   }
+
   axis.followed = to;
   conclude(axis);
 }
@@ -123,9 +128,11 @@ void ReferenceSession::conclude(Axis& axis) {
         axis.options.name + ": the marks agree; drive on, slowly, until the cards are aligned";
     return;
   }
+
   if (axis.datum->spread_periods > kMostSpreadPeriods) return;
   const double per_period = axis.options.marks.counts_per_period;
-  const double offset_periods = *axis.alignment.difference() / per_period + axis.datum->offset_periods;
+  const double offset_periods =
+      *axis.alignment.difference() / per_period + axis.datum->offset_periods;
   const double u_periods = std::hypot(axis.alignment.half_width() / per_period / std::sqrt(3.0),
                                       axis.datum->spread_periods / std::sqrt(12.0));
   axis.result.state = AxisReference::State::Found;
@@ -144,10 +151,12 @@ ReferenceOptions reference_options(const ReferenceConfig& config, const CounterC
         {.name = marks.axis,
          .live_axis = static_cast<std::uint8_t>(axis - live.wiring.axes.begin()),
          .latched_axis = static_cast<std::uint8_t>(i),
-         .marks = {.code = marks.code, .counts_per_period = along * marks.signal_period / axis->scale},
+         .marks = {.code = marks.code,
+                   .counts_per_period = along * marks.signal_period / axis->scale},
          .period = marks.signal_period,
          .max_half_width_counts = config.tolerance_m / std::abs(axis->scale)});
   }
+
   return options;
 }
 

@@ -29,17 +29,21 @@ void StandstillPoints::take(const Snapshot& snapshot) {
   const Sample sample{snapshot.head.time,
                       {snapshot.position[0], snapshot.position[1], snapshot.position[2]},
                       {p[0], p[1], p[2]}};
-  const bool stands =
-      running_ && (sample.reading_m - first_.reading_m).cwiseAbs().maxCoeff() <= options_.tolerance_m;
+  const bool stands = running_ && (sample.reading_m - first_.reading_m).cwiseAbs().maxCoeff() <=
+                                      options_.tolerance_m;
+
   if (!stands) {
     finish();
     begin(sample);
   }
+
   while (!pending_.empty() && pending_.front().time <= sample.time - options_.settle) {
     add(pending_.front());
     pending_.pop_front();
   }
-  if (good_point(snapshot) && sample.time >= first_.time + options_.settle) pending_.push_back(sample);
+
+  if (good_point(snapshot) && sample.time >= first_.time + options_.settle)
+    pending_.push_back(sample);
 }
 
 void StandstillPoints::begin(const Sample& sample) {
@@ -79,10 +83,10 @@ Result<void> check_verification(const Config& config) {
   if (!config.tracker)
     return fail(ErrorCode::Refused, "verify: there is no [tracker] with a host to measure with");
   if (config.axes_compensated())
-    return fail(
-        ErrorCode::Refused,
-        "verify: the control already corrects these axes (axes_compensated = true): a model speaks of "
-        "readings without its correction");
+    return fail(ErrorCode::Refused,
+                "verify: the control already corrects these axes (axes_compensated = true): a "
+                "model speaks of "
+                "readings without its correction");
   return {};
 }
 

@@ -23,13 +23,18 @@ std::optional<std::string> VertexReadings::contradiction() const {
   const VertexReading& seen = *slowest_;
   const calib::Vector3 allowed_m = tolerance_m_ + (kCoverage * seen.u_m).array();
   Eigen::Index axis = 0;
-  const double most = ((seen.reading_m - seen.path_m).array().abs() / allowed_m.array()).maxCoeff(&axis);
+  const double most =
+      ((seen.reading_m - seen.path_m).array().abs() / allowed_m.array()).maxCoeff(&axis);
   if (most <= 1.0) return std::nullopt;
+
   return fmt::format(
-      "the scales contradict the path: at vertex {} {} reads {:.3f} mm, the path says {:.3f} mm, {:.3f} mm "
+      "the scales contradict the path: at vertex {} {} reads {:.3f} mm, the path says {:.3f} mm, "
+      "{:.3f} mm "
       "allowed "
-      "([gate] path_tolerance_mm): the control drives another path than this one, or it compensates",
-      seen.vertex, "XYZ"[axis], 1e3 * seen.reading_m(axis), 1e3 * seen.path_m(axis), 1e3 * allowed_m(axis));
+      "([gate] path_tolerance_mm): the control drives another path than this one, or it "
+      "compensates",
+      seen.vertex, "XYZ"[axis], 1e3 * seen.reading_m(axis), 1e3 * seen.path_m(axis),
+      1e3 * allowed_m(axis));
 }
 
 }  // namespace abbe::daemon

@@ -20,8 +20,8 @@ namespace {
 
 using namespace std::chrono_literals;
 
-/// The child starts the same whatever thread of abbed starts it: no signal blocked or ignored, real-time only
-/// as asked. Its threads inherit that.
+/// The child starts the same whatever thread of abbed starts it: no signal blocked or ignored,
+/// real-time only as asked. Its threads inherit that.
 class SpawnAttributes {
  public:
   explicit SpawnAttributes(int priority) {
@@ -35,8 +35,8 @@ class SpawnAttributes {
     scheduling.sched_priority = priority;
     ::posix_spawnattr_setschedpolicy(&attributes_, priority > 0 ? SCHED_FIFO : SCHED_OTHER);
     ::posix_spawnattr_setschedparam(&attributes_, &scheduling);
-    ::posix_spawnattr_setflags(&attributes_,
-                               POSIX_SPAWN_SETSIGMASK | POSIX_SPAWN_SETSIGDEF | POSIX_SPAWN_SETSCHEDULER);
+    ::posix_spawnattr_setflags(
+        &attributes_, POSIX_SPAWN_SETSIGMASK | POSIX_SPAWN_SETSIGDEF | POSIX_SPAWN_SETSCHEDULER);
   }
   ~SpawnAttributes() { ::posix_spawnattr_destroy(&attributes_); }
   SpawnAttributes(const SpawnAttributes&) = delete;
@@ -47,9 +47,9 @@ class SpawnAttributes {
   posix_spawnattr_t attributes_{};
 };
 
-/// What abbed may do for real time (CAP_SYS_NICE, CAP_IPC_LOCK as ambient capabilities of its unit) is not
-/// for the process that strangers can talk to. Only what a program started from here inherits is cleared;
-/// this one keeps its own.
+/// What abbed may do for real time (CAP_SYS_NICE, CAP_IPC_LOCK as ambient capabilities of its unit)
+/// is not for the process that strangers can talk to. Only what a program started from here
+/// inherits is cleared; this one keeps its own.
 void keep_capabilities_from_children() {
   ::prctl(PR_CAP_AMBIENT, PR_CAP_AMBIENT_CLEAR_ALL, 0UL, 0UL, 0UL);
 }
@@ -101,10 +101,12 @@ Result<void> DdsSupervisor::spawn(WallTime now) {
   argv.push_back(nullptr);
   keep_capabilities_from_children();
   pid_t child = 0;
+
   const auto start = [&](int priority) {
     const SpawnAttributes attributes(priority);
     return ::posix_spawn(&child, program.c_str(), nullptr, attributes.get(), argv.data(), environ);
   };
+
   int error = start(options_.priority);
   if (error == EPERM && options_.priority > 0) error = start(0);
   if (error != 0) return fail(ErrorCode::Io, "start " + program + ": " + std::strerror(error));
@@ -112,6 +114,7 @@ Result<void> DdsSupervisor::spawn(WallTime now) {
   started_ = now;
   hung_ = false;
   if (options_.process != nullptr) options_.process->started(child, now);
+
   return {};
 }
 
@@ -143,6 +146,7 @@ void DdsSupervisor::poll(WallTime now) {
     kill_if_hung();
     if (!reap(now)) return;
   }
+
   if (now < next_start_) return;
   if (const auto started = spawn(now); !started) {
     start_fault_ = started.error().text;
@@ -150,6 +154,7 @@ void DdsSupervisor::poll(WallTime now) {
     next_start_ = now + delay_;
     return;
   }
+
   start_fault_.clear();
   ++restarts_;
   if (options_.process != nullptr) options_.process->restarted();

@@ -26,7 +26,8 @@ std::int64_t ns(protocol::HostTime t) {
 std::string cut(std::string_view text, std::size_t bound) {
   constexpr unsigned kContinuationMask = 0xC0, kContinuation = 0x80;
   if (text.size() > bound)
-    while (bound > 0 && (static_cast<unsigned char>(text[bound]) & kContinuationMask) == kContinuation)
+    while (bound > 0 &&
+           (static_cast<unsigned char>(text[bound]) & kContinuationMask) == kContinuation)
       --bound;
   return std::string{text.substr(0, bound)};
 }
@@ -61,7 +62,8 @@ v1::GridNode grid_node(const ModelInForce& m, const calib::InterpolationGrid& gr
 
 }  // namespace
 
-v1::Snapshot snapshot_message(const protocol::Snapshot& s, protocol::UtcOffset utc, const Stamp& stamp) {
+v1::Snapshot snapshot_message(const protocol::Snapshot& s, protocol::UtcOffset utc,
+                              const Stamp& stamp) {
   v1::Snapshot m;
   m.machine(std::string{stamp.machine});
   m.sequence_number(stamp.sequence_number);
@@ -84,6 +86,7 @@ v1::Snapshot snapshot_message(const protocol::Snapshot& s, protocol::UtcOffset u
   m.air_temperature_K(s.environment.air_temperature_K);
   m.air_pressure_Pa(s.environment.air_pressure_Pa);
   m.relative_humidity(s.environment.relative_humidity);
+
   return m;
 }
 
@@ -100,6 +103,7 @@ v1::ErrorModel model_message(const ModelInForce& in_force, const Stamp& stamp) {
   m.basis(in_force.model.polynomials() == nullptr ? "linear" : "legendre");
   m.squareness("travel");
   m.tool_offset_m(array(in_force.model.tool_offsets_m().front()));
+
   for (const auto& p : in_force.model.parameters()) {
     v1::Parameter q;
     q.name(p.name);
@@ -108,6 +112,7 @@ v1::ErrorModel model_message(const ModelInForce& in_force, const Stamp& stamp) {
     q.u(p.u);
     m.parameters().push_back(q);
   }
+
   for (const calib::Axis a : calib::kAllAxes) {
     const auto& nodes_m = layout.nodes()[calib::index(a)].nodes_m;
     v1::AxisRange range;
@@ -116,9 +121,11 @@ v1::ErrorModel model_message(const ModelInForce& in_force, const Stamp& stamp) {
     range.max_m(nodes_m.back());
     m.validity().push_back(range);
   }
+
   m.validity_hull(hull_of(in_force.model.validity()));
   m.recording_sha256(in_force.recording_sha256);
   m.created_utc_ns(in_force.created.time_since_epoch().count());
+
   return m;
 }
 
@@ -126,12 +133,14 @@ std::vector<v1::ErrorGrid> grid_messages(const ModelInForce& in_force, const Sta
   const auto grid = calib::interpolation_grid(in_force.model, kMostGridNodes);
   const calib::Vector3 tool_m = in_force.model.tool_offsets_m().front();
   std::vector<v1::GridNode> all;
+
   for (std::size_t x = 0; x < grid.axes_m[0].size(); ++x) {
     for (std::size_t y = 0; y < grid.axes_m[1].size(); ++y) {
       for (std::size_t z = 0; z < grid.axes_m[2].size(); ++z)
         all.push_back(grid_node(in_force, grid, {x, y, z}, tool_m));
     }
   }
+
   const std::size_t slices = (all.size() + kNodesPerSlice - 1) / kNodesPerSlice;
   std::vector<v1::ErrorGrid> messages;
   for (std::size_t slice = 0; slice < slices; ++slice) {
@@ -145,15 +154,17 @@ std::vector<v1::ErrorGrid> grid_messages(const ModelInForce& in_force, const Sta
     m.model_id(in_force.id);
     m.tool_offset_m(array(tool_m));
     m.every_node(grid.every_node);
-    m.nodes(std::vector<v1::GridNode>(begin,
-                                      begin + static_cast<std::ptrdiff_t>(std::min(left, kNodesPerSlice))));
+    m.nodes(std::vector<v1::GridNode>(
+        begin, begin + static_cast<std::ptrdiff_t>(std::min(left, kNodesPerSlice))));
     messages.push_back(std::move(m));
   }
+
   return messages;
 }
 
-v1::ModelState state_message(v1::ModelStatus status, std::string_view reason, const ModelInForce* in_force,
-                             nanoseconds validity, const Stamp& stamp) {
+v1::ModelState state_message(v1::ModelStatus status, std::string_view reason,
+                             const ModelInForce* in_force, nanoseconds validity,
+                             const Stamp& stamp) {
   v1::ModelState m;
   m.machine(std::string{stamp.machine});
   m.sequence_number(stamp.sequence_number);
@@ -169,7 +180,8 @@ v1::ModelState state_message(v1::ModelStatus status, std::string_view reason, co
 }
 
 v1::Compensation compensation_message(v1::ModelStatus status, const ModelInForce* in_force,
-                                      const protocol::Snapshot& s, const std::array<double, 3>& tool_offset_m,
+                                      const protocol::Snapshot& s,
+                                      const std::array<double, 3>& tool_offset_m,
                                       nanoseconds validity, const Stamp& stamp) {
   v1::Compensation m;
   m.machine(std::string{stamp.machine});
@@ -177,9 +189,11 @@ v1::Compensation compensation_message(v1::ModelStatus status, const ModelInForce
   m.host_time_ns(ns(s.head.time));
   m.kind(v1::Quantity::QUANTITY_ERROR);
   const bool known = axes_known(s);
-  m.state(status == v1::ModelStatus::MODEL_ACTIVE && !known ? v1::ModelStatus::MODEL_STALE : status);
+  m.state(status == v1::ModelStatus::MODEL_ACTIVE && !known ? v1::ModelStatus::MODEL_STALE
+                                                            : status);
   m.position_m({s.position[0], s.position[1], s.position[2]});
   m.tool_offset_m(tool_offset_m);
+
   // Age of the position the vector belongs to: what a subscriber compares with validity_ns.
   m.age_ns((stamp.now - s.head.time).count());
   m.validity_ns(validity.count());
@@ -193,6 +207,7 @@ v1::Compensation compensation_message(v1::ModelStatus status, const ModelInForce
   m.inside(e.inside);
   m.vector_m(array(e.V_m));
   m.cov_m2(upper_triangle(e.cov_V_m2));
+
   return m;
 }
 
@@ -212,6 +227,7 @@ v1::Health health_message(const drivers::DeviceStatus& d, double rate_hz, double
   m.latency_p50_s(latency_p50_s);
   m.latency_p99_s(latency_p99_s);
   m.fault(cut(d.last_fault, kReasonBound));
+
   return m;
 }
 

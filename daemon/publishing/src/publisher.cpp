@@ -30,8 +30,8 @@ Publisher::Publisher(DdsLink link, PublisherOptions options, protocol::UtcOffset
 
 template <class T>
 void Publisher::send(Topic topic, const T& message, WallTime at) {
-  // Outside the IDL's bounds: the configuration should have refused what led here. The link counts the empty
-  // payload.
+  // Outside the IDL's bounds: the configuration should have refused what led here. The link counts
+  // the empty payload.
   if (auto encoded = encode(message, payload_); !encoded) {
     refusal_ = fmt::format("{} not sent: {}", traits(topic).name, encoded.error().text);
   }
@@ -58,8 +58,8 @@ void Publisher::compensation(const protocol::Snapshot& view, const ModelStanding
                              protocol::HostTime now, WallTime wall) {
   if (view.axis_count < 3 || !due(compensations_, view, wall, options_.compensation_hz)) return;
   send(Topic::Compensation,
-       compensation_message(standing.status, standing.model, view, options_.tool_offset_m, options_.validity,
-                            stamp(now)),
+       compensation_message(standing.status, standing.model, view, options_.tool_offset_m,
+                            options_.validity, stamp(now)),
        wall);
 }
 
@@ -70,10 +70,11 @@ void Publisher::model(const ModelStanding& standing, protocol::HostTime now, Wal
     sent_revision_ = standing.revision;
     next_state_ = wall;
   }
+
   const bool changed = standing.status != sent_status_ || standing.reason != sent_reason_;
   if (!changed && wall < next_state_) return;
-  send(Topic::ModelState,
-       state_message(standing.status, standing.reason, standing.model, options_.validity, stamp(now)));
+  send(Topic::ModelState, state_message(standing.status, standing.reason, standing.model,
+                                        options_.validity, stamp(now)));
   sent_status_ = standing.status;
   sent_reason_ = standing.reason;
   next_state_ = wall + kStatePeriod;
@@ -81,7 +82,8 @@ void Publisher::model(const ModelStanding& standing, protocol::HostTime now, Wal
 
 void Publisher::health(std::span<const StreamHealth> streams, protocol::HostTime now) {
   for (const StreamHealth& s : streams) {
-    send(Topic::Health, health_message(s.status, s.rate_hz, s.latency_p50_s, s.latency_p99_s, stamp(now)));
+    send(Topic::Health,
+         health_message(s.status, s.rate_hz, s.latency_p50_s, s.latency_p99_s, stamp(now)));
   }
 }
 

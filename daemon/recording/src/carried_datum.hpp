@@ -17,8 +17,8 @@ struct TimedAttachment {
   std::uint64_t time_ns = 0;
 };
 
-/// Whether the next file needs it. `settled`: axes of which nothing found earlier is in force; walked from
-/// the newest back.
+/// Whether the next file needs it. `settled`: axes of which nothing found earlier is in force;
+/// walked from the newest back.
 inline bool is_carried_on(const RecordingAttachment& attachment, const DatumState& state,
                           std::uint32_t& settled) {
   if (attachment.name == kReferenceRequestName || attachment.name == kDatumStateName ||
@@ -33,7 +33,8 @@ inline bool is_carried_on(const RecordingAttachment& attachment, const DatumStat
   return in_force;
 }
 
-/// Leaves what is in force of every axis and what was found since, and adds which axes nobody knows.
+/// Leaves what is in force of every axis and what was found since, and adds which axes nobody
+/// knows.
 inline void carry_datum_on(std::vector<TimedAttachment>& attachments, const DatumState& state,
                            std::uint64_t state_time_ns) {
   std::uint32_t settled = state.unknown;
@@ -41,7 +42,8 @@ inline void carry_datum_on(std::vector<TimedAttachment>& attachments, const Datu
   for (auto kept = attachments.rbegin(); kept != attachments.rend(); ++kept)
     if (is_carried_on(kept->attachment, state, settled)) carried.push_back(std::move(*kept));
   carried.push_back({to_attachment(state), state_time_ns});
-  attachments.assign(std::make_move_iterator(carried.rbegin()), std::make_move_iterator(carried.rend()));
+  attachments.assign(std::make_move_iterator(carried.rbegin()),
+                     std::make_move_iterator(carried.rend()));
 }
 
 }  // namespace abbe::daemon::recording

@@ -53,13 +53,15 @@ void append_front(const RecordingInfo& info, const PartOf& part, mcap::SummaryBu
                           {kLogTime, "turn of the hub"}};
   append_metadata(kRecordingMetadata, recording, summary, out);
   append_metadata(kConfigurationMetadata,
-                  {{"text", info.configuration}, {"sha256", sha256_hex(info.configuration)}}, summary, out);
+                  {{"text", info.configuration}, {"sha256", sha256_hex(info.configuration)}},
+                  summary, out);
   append_metadata(kVersionsMetadata, info.versions, summary, out);
   append_streams(summary, out);
 }
 
-mcap::AttachmentIndex append_attachment(const RecordingAttachment& attachment, std::uint64_t time_ns,
-                                        std::uint64_t offset, mcap::Buffer& out) {
+mcap::AttachmentIndex append_attachment(const RecordingAttachment& attachment,
+                                        std::uint64_t time_ns, std::uint64_t offset,
+                                        mcap::Buffer& out) {
   const std::size_t before = out.size();
   append(out, mcap::Attachment{time_ns, time_ns, attachment.name, attachment.media_type,
                                std::as_bytes(std::span{attachment.content})});

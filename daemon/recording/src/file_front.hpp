@@ -1,7 +1,7 @@
 #pragma once
-/// What stands at the front of every recording, before the first chunk: who recorded what with which
-/// configuration, the schemas and channels of all streams (so that no chunk depends on another one), and
-/// attachments.
+/// What stands at the front of every recording, before the first chunk: who recorded what with
+/// which configuration, the schemas and channels of all streams (so that no chunk depends on
+/// another one), and attachments.
 
 #include <span>
 
@@ -15,14 +15,15 @@ struct PartOf {
   std::string follows;     ///< name of the previous one, empty for the first
 };
 
-/// Appends magic to channels, and tells `summary`. `out` must be empty: offsets count from its front.
-void append_front(const RecordingInfo& info, const PartOf& part, protocol::mcap::SummaryBuilder& summary,
-                  protocol::mcap::Buffer& out);
+/// Appends magic to channels, and tells `summary`. `out` must be empty: offsets count from its
+/// front.
+void append_front(const RecordingInfo& info, const PartOf& part,
+                  protocol::mcap::SummaryBuilder& summary, protocol::mcap::Buffer& out);
 
-/// Appends an attachment that will stand at `offset` of the file. The returned entry of the summary views
-/// `attachment`.
-[[nodiscard]] protocol::mcap::AttachmentIndex append_attachment(const RecordingAttachment& attachment,
-                                                                std::uint64_t time_ns, std::uint64_t offset,
-                                                                protocol::mcap::Buffer& out);
+/// Appends an attachment that will stand at `offset` of the file. The returned entry of the summary
+/// views `attachment`.
+[[nodiscard]] protocol::mcap::AttachmentIndex append_attachment(
+    const RecordingAttachment& attachment, std::uint64_t time_ns, std::uint64_t offset,
+    protocol::mcap::Buffer& out);
 
 }  // namespace abbe::daemon::recording

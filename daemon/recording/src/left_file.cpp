@@ -32,12 +32,13 @@ std::uint64_t length_at(mcap::Bytes bytes, std::size_t at) {
   return number;
 }
 
-/// What stands behind a torn record is its own rest. A whole chunk there: the record is no torn end, its
-/// length is damaged.
+/// What stands behind a torn record is its own rest. A whole chunk there: the record is no torn
+/// end, its length is damaged.
 bool holds_a_whole_chunk(mcap::Bytes tail) {
   constexpr std::byte kChunk{static_cast<std::uint8_t>(mcap::Opcode::Chunk)};
   constexpr std::size_t kRecordsSizeAt = mcap::kRecordHeadSize + kChunkHeadBytes - 8;
   constexpr std::size_t kLeast = mcap::kRecordHeadSize + kChunkHeadBytes;
+
   for (auto at = std::ranges::find(tail, kChunk); at != tail.end();
        at = std::find(at + 1, tail.end(), kChunk)) {
     const auto record = tail.subspan(static_cast<std::size_t>(at - tail.begin()));
@@ -49,6 +50,7 @@ bool holds_a_whole_chunk(mcap::Bytes tail) {
     const auto chunk = mcap::decode<mcap::Chunk>(record.subspan(mcap::kRecordHeadSize, length));
     if (chunk && chunk->head.uncompressed_crc == mcap::crc32(chunk->records)) return true;
   }
+
   return false;
 }
 
@@ -58,7 +60,8 @@ std::uint64_t LeftFile::Head::end() const {
   return offset + mcap::kRecordHeadSize + length;
 }
 
-LeftFile::LeftFile(FileDescriptor fd, std::filesystem::path part, std::uint64_t size, timespec written)
+LeftFile::LeftFile(FileDescriptor fd, std::filesystem::path part, std::uint64_t size,
+                   timespec written)
     : fd_(std::move(fd)), part_(std::move(part)), size_(size), written_(written) {}
 
 Error LeftFile::io_error(const char* verb) const {
@@ -85,7 +88,8 @@ Result<std::vector<std::byte>> LeftFile::bytes(std::uint64_t offset, std::uint64
         ::pread(fd_.get(), out.data() + have, out.size() - have, static_cast<off_t>(offset + have));
     if (got < 0 && errno == EINTR) continue;
     if (got < 0) return tl::unexpected(io_error("read"));
-    if (got == 0) return fail(ErrorCode::Io, fmt::format("read {}: it became shorter", part_.string()));
+    if (got == 0)
+      return fail(ErrorCode::Io, fmt::format("read {}: it became shorter", part_.string()));
     have += static_cast<std::size_t>(got);
   }
   return out;
@@ -107,10 +111,13 @@ Result<void> LeftFile::read(const std::atomic<bool>& stop) {
   const auto magic = bytes(0, std::min<std::uint64_t>(size_, mcap::kMagic.size()));
   if (!magic) return tl::unexpected(magic.error());
   if (!std::ranges::equal(*magic, Bytes{mcap::kMagic}.first(magic->size())))
-    return fail(ErrorCode::BadInput, fmt::format("{}: does not begin like a recording", part_.string()));
+    return fail(ErrorCode::BadInput,
+                fmt::format("{}: does not begin like a recording", part_.string()));
   whole_until_ = magic->size();
+
   while (!complete_ && whole_until_ < size_) {
-    if (stop) return fail(ErrorCode::Io, fmt::format("{}: stopped while it was read", part_.string()));
+    if (stop)
+      return fail(ErrorCode::Io, fmt::format("{}: stopped while it was read", part_.string()));
     const auto record = head_at(whole_until_);
     if (!record) return tl::unexpected(record.error());
     if (!*record) break;
@@ -123,6 +130,7 @@ Result<void> LeftFile::read(const std::atomic<bool>& stop) {
     if (auto taken = take(**record); !taken) return taken;
     whole_until_ = (*record)->end();
   }
+
   if (complete_) return end_chunk(), Result<void>{};
   if (auto judged = judge_tail(); !judged) return judged;
   return judge_last_chunk();
@@ -132,8 +140,8 @@ Result<void> LeftFile::take(const Head& record) {
   if (record.opcode == mcap::Opcode::Chunk) return take_chunk(record);
   if (record.opcode != mcap::Opcode::MessageIndex) end_chunk();
   if (record.length > kLargestPiece)
-    return fail(ErrorCode::BadInput, fmt::format("{}: a record of {} bytes at byte {}", part_.string(),
-                                                 record.length, record.offset));
+    return fail(ErrorCode::BadInput, fmt::format("{}: a record of {} bytes at byte {}",
+                                                 part_.string(), record.length, record.offset));
   const auto content = bytes(record.offset + mcap::kRecordHeadSize, record.length);
   if (!content) return tl::unexpected(content.error());
   if (record.opcode == mcap::Opcode::MessageIndex) take_index(record, *content);
@@ -143,12 +151,14 @@ Result<void> LeftFile::take(const Head& record) {
     if (const auto schema = mcap::decode<mcap::Schema>(*content)) summary_.add(*schema);
   if (record.opcode == mcap::Opcode::Channel)
     if (const auto channel = mcap::decode<mcap::Channel>(*content)) summary_.add(*channel);
+
   return {};
 }
 
 Result<void> LeftFile::take_chunk(const Head& record) {
   end_chunk();
-  const auto head = bytes(record.offset + mcap::kRecordHeadSize, std::min(record.length, kChunkHeadBytes));
+  const auto head =
+      bytes(record.offset + mcap::kRecordHeadSize, std::min(record.length, kChunkHeadBytes));
   if (!head) return tl::unexpected(head.error());
   const auto chunk = mcap::decode_cut_chunk(*head);
   chunk_ = OpenChunk{};
@@ -162,7 +172,8 @@ Result<void> LeftFile::take_chunk(const Head& record) {
 void LeftFile::take_index(const Head& record, Bytes content) {
   const auto index = mcap::decode<mcap::MessageIndex>(content);
   if (!chunk_ || !index) return;
-  chunk_->shares.push_back({index->channel_id, index->entries.size(), record.offset - chunk_->offset});
+  chunk_->shares.push_back(
+      {index->channel_id, index->entries.size(), record.offset - chunk_->offset});
   chunk_->indexed += index->entries.size();
 }
 
@@ -180,6 +191,7 @@ void LeftFile::take_attachment(const Head& record, Bytes content) {
   index.length = record.end() - record.offset;
   index.name = "damaged";
   const auto attachment = mcap::decode<mcap::Attachment>(content);
+
   if (attachment) {
     index.log_time_ns = attachment->log_time_ns;
     index.create_time_ns = attachment->create_time_ns;
@@ -187,6 +199,7 @@ void LeftFile::take_attachment(const Head& record, Bytes content) {
     index.name = attachment->name;
     index.media_type = attachment->media_type;
   }
+
   summary_.add(index);
 }
 
@@ -204,8 +217,8 @@ void LeftFile::end_chunk() {
   chunk_.reset();
 }
 
-/// What stands behind the last whole record: a torn chunk, of which the whole messages are kept; another torn
-/// piece; or what a power cut leaves of a file that had grown already, zeros.
+/// What stands behind the last whole record: a torn chunk, of which the whole messages are kept;
+/// another torn piece; or what a power cut leaves of a file that had grown already, zeros.
 Result<void> LeftFile::judge_tail() {
   if (whole_until_ == size_) return {};
   const auto damaged = [this] {
@@ -214,13 +227,15 @@ Result<void> LeftFile::judge_tail() {
                             "reads what stands before",
                             part_.string(), whole_until_, size_ - whole_until_));
   };
+
   const auto zeros = is_zero_from(whole_until_);
   if (!zeros) return tl::unexpected(zeros.error());
   if (*zeros) return {};
   if (size_ - whole_until_ > kLargestPiece) return damaged();
   const auto tail = bytes(whole_until_, size_ - whole_until_);
   if (!tail) return tl::unexpected(tail.error());
-  if (tail->front() == std::byte{0} || holds_a_whole_chunk(Bytes{*tail}.subspan(1))) return damaged();
+  if (tail->front() == std::byte{0} || holds_a_whole_chunk(Bytes{*tail}.subspan(1)))
+    return damaged();
   if (tail->front() != std::byte{static_cast<std::uint8_t>(mcap::Opcode::Chunk)} ||
       tail->size() <= mcap::kRecordHeadSize)
     return {};
@@ -228,6 +243,7 @@ Result<void> LeftFile::judge_tail() {
   if (!chunk || !chunk->head.compression.empty()) return {};
   end_chunk();
   rebuild(whole_until_, chunk->records);
+
   return {};
 }
 
@@ -246,17 +262,19 @@ Result<bool> LeftFile::is_zero_from(std::uint64_t offset) const {
 Result<void> LeftFile::judge_last_chunk() {
   if (!chunk_) return {};
   if (chunk_->length > kLargestPiece) return end_chunk(), Result<void>{};
-  const auto content = bytes(chunk_->offset + mcap::kRecordHeadSize, chunk_->length - mcap::kRecordHeadSize);
+  const auto content =
+      bytes(chunk_->offset + mcap::kRecordHeadSize, chunk_->length - mcap::kRecordHeadSize);
   if (!content) return tl::unexpected(content.error());
   const auto chunk = mcap::decode<mcap::Chunk>(*content);
-  const bool sound =
-      chunk && chunk->head.compression.empty() && chunk->head.uncompressed_crc == mcap::crc32(chunk->records);
+  const bool sound = chunk && chunk->head.compression.empty() &&
+                     chunk->head.uncompressed_crc == mcap::crc32(chunk->records);
   std::uint64_t messages = 0;
   if (sound)
     for (mcap::MessageReader all{chunk->records}; all.next();) ++messages;
   if (!sound || messages == chunk_->indexed) return end_chunk(), Result<void>{};
   const auto offset = std::exchange(chunk_, std::nullopt)->offset;
   rebuild(offset, chunk->records);
+
   return {};
 }
 
@@ -297,9 +315,11 @@ Result<void> LeftFile::write_end() {
       return done;
     }
   }
+
   if (::fsync(fd_.get()) != 0) return tl::unexpected(io_error("fsync"));
   const std::array<timespec, 2> dates{timespec{0, UTIME_OMIT}, written_};
   (void)::futimens(fd_.get(), dates.data());
+
   return {};
 }
 

@@ -1,6 +1,6 @@
 #pragma once
-/// One recording that a killed recorder left open: what is in it, and its end written. Read piece by piece,
-/// not mapped: the memory of abbed is locked, and a recording may be larger than it.
+/// One recording that a killed recorder left open: what is in it, and its end written. Read piece
+/// by piece, not mapped: the memory of abbed is locked, and a recording may be larger than it.
 
 #include <atomic>
 #include <cstdint>
@@ -23,7 +23,9 @@ class LeftFile {
   /// Finds all whole records. BadInput: damaged before its end, or stopped.
   [[nodiscard]] Result<void> read(const std::atomic<bool>& stop);
   /// Nothing of a run is in it.
-  [[nodiscard]] bool holds_nothing() const { return summary_.message_count() == 0 && !has_attachments_; }
+  [[nodiscard]] bool holds_nothing() const {
+    return summary_.message_count() == 0 && !has_attachments_;
+  }
   [[nodiscard]] std::uint64_t messages() const { return summary_.message_count(); }
 
   /// Writes what is missing, to the disk; the file keeps its date.
@@ -44,8 +46,10 @@ class LeftFile {
     std::vector<protocol::mcap::ChannelShare> shares;
   };
 
-  LeftFile(FileDescriptor fd, std::filesystem::path part, std::uint64_t size, struct timespec written);
-  [[nodiscard]] Result<std::vector<std::byte>> bytes(std::uint64_t offset, std::uint64_t length) const;
+  LeftFile(FileDescriptor fd, std::filesystem::path part, std::uint64_t size,
+           struct timespec written);
+  [[nodiscard]] Result<std::vector<std::byte>> bytes(std::uint64_t offset,
+                                                     std::uint64_t length) const;
   [[nodiscard]] Result<std::optional<Head>> head_at(std::uint64_t offset) const;
   [[nodiscard]] Result<void> take(const Head& record);
   [[nodiscard]] Result<void> take_chunk(const Head& record);

@@ -27,12 +27,14 @@ bool is_written_by(const std::string& file, const std::string& running) {
 Result<std::vector<fs::path>> parts_in(const fs::path& directory, const std::string& running) {
   std::vector<fs::path> parts;
   std::error_code error;
-  for (fs::directory_iterator entry(directory, error), end; !error && entry != end; entry.increment(error)) {
+  for (fs::directory_iterator entry(directory, error), end; !error && entry != end;
+       entry.increment(error)) {
     const std::string name = entry->path().filename();
     if (name.starts_with("abbe-") && name.ends_with(kPart) && !is_written_by(name, running))
       parts.push_back(entry->path());
   }
-  if (error) return fail(ErrorCode::Io, fmt::format("list {}: {}", directory.string(), error.message()));
+  if (error)
+    return fail(ErrorCode::Io, fmt::format("list {}: {}", directory.string(), error.message()));
   std::sort(parts.begin(), parts.end());
   return parts;
 }
@@ -42,27 +44,32 @@ Result<fs::path> take_finished_name(const fs::path& part) {
   auto finished = part;
   finished.replace_extension();
   if (::renameat2(AT_FDCWD, part.c_str(), AT_FDCWD, finished.c_str(), RENAME_NOREPLACE) != 0)
-    return fail(ErrorCode::Io, fmt::format("rename {} to {}: {}", part.string(), finished.filename().string(),
-                                           std::strerror(errno)));
-  const FileDescriptor directory{::open(part.parent_path().c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC)};
+    return fail(ErrorCode::Io, fmt::format("rename {} to {}: {}", part.string(),
+                                           finished.filename().string(), std::strerror(errno)));
+  const FileDescriptor directory{
+      ::open(part.parent_path().c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC)};
   if (directory) (void)::fsync(directory.get());
   return finished;
 }
 
 /// Nothing: another process writes it.
-Result<std::optional<LeftRecording>> close_one(const fs::path& part, const std::atomic<bool>& stop) {
+Result<std::optional<LeftRecording>> close_one(const fs::path& part,
+                                               const std::atomic<bool>& stop) {
   auto file = recording::LeftFile::open(part);
   if (!file) return tl::unexpected(file.error());
   if (!*file) return std::nullopt;
   if (const auto read = (*file)->read(stop); !read) return tl::unexpected(read.error());
+
   if ((*file)->holds_nothing()) {
     if (::unlink(part.c_str()) != 0)
       return fail(ErrorCode::Io, fmt::format("remove {}: {}", part.string(), std::strerror(errno)));
     return LeftRecording{.file = part};
   }
+
   if (const auto written = (*file)->write_end(); !written) return tl::unexpected(written.error());
   auto finished = take_finished_name(part);
   if (!finished) return tl::unexpected(finished.error());
+
   return LeftRecording{.file = std::move(*finished), .messages = (*file)->messages()};
 }
 

@@ -1,6 +1,6 @@
 #pragma once
-/// How many messages of each stream and device there were since the last one that lies in the recording. A
-/// handful of entries; one thread.
+/// How many messages of each stream and device there were since the last one that lies in the
+/// recording. A handful of entries; one thread.
 
 #include <algorithm>
 #include <string>

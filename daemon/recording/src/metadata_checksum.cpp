@@ -21,7 +21,8 @@ Checked check(const std::map<std::string, MetadataEntries>& metadata, std::strin
   if (entries == metadata.end()) return Checked::Missing;
   const auto checksum = entries->second.find(kChecksum);
   if (checksum == entries->second.end()) return Checked::Without;
-  return checksum->second == metadata_sha256(record, entries->second) ? Checked::Right : Checked::Wrong;
+  return checksum->second == metadata_sha256(record, entries->second) ? Checked::Right
+                                                                      : Checked::Wrong;
 }
 
 /// Recordings of before have the hash of the text alone.
@@ -54,19 +55,23 @@ MetadataJudgement judge_metadata(const std::map<std::string, MetadataEntries>& m
     const Checked found = check(metadata, record);
     return found == Checked::Right || found == Checked::Wrong;
   });
+
   MetadataJudgement judgement;
   for (const std::string_view record : kRecords) {
     const Checked found = check(metadata, record);
     const bool damaged = checked && found != Checked::Right;
     if (record == kConfigurationMetadata) {
-      if (checked) judgement.configuration = damaged ? MetadataCheck::Damaged : MetadataCheck::Right;
+      if (checked)
+        judgement.configuration = damaged ? MetadataCheck::Damaged : MetadataCheck::Right;
       if (found == Checked::Without && !checked)
         judgement.configuration = check_text(metadata.at(std::string{record}));
     } else if (damaged) {
-      judgement.damage = fmt::format("metadata {}: {}", record,
-                                     found == Checked::Missing ? "missing" : "its checksum is wrong");
+      judgement.damage =
+          fmt::format("metadata {}: {}", record,
+                      found == Checked::Missing ? "missing" : "its checksum is wrong");
     }
   }
+
   return judgement;
 }
 

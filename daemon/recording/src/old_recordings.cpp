@@ -13,7 +13,8 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// Models name "NAME.mcap", or "NAME.mcap.part (4711 bytes)" while it still grew: NAME, of all of them.
+/// Models name "NAME.mcap", or "NAME.mcap.part (4711 bytes)" while it still grew: NAME, of all of
+/// them.
 Result<std::set<std::string>> named_by_models(const fs::path& folder) {
   std::set<std::string> names;
   // Opening it would create it: what is not there (a disk that is not mounted) is no empty store.
@@ -24,11 +25,14 @@ Result<std::set<std::string>> named_by_models(const fs::path& folder) {
   if (!store) return tl::unexpected(store.error());
   const auto entries = store->list();
   if (!entries) return tl::unexpected(entries.error());
+
   for (const auto& entry : *entries) {
     const auto document = store->load(entry.id);
     if (!document) return tl::unexpected(document.error());
-    for (const auto& input : document->inputs) names.insert(input.name.substr(0, input.name.find('.')));
+    for (const auto& input : document->inputs)
+      names.insert(input.name.substr(0, input.name.find('.')));
   }
+
   return names;
 }
 
@@ -38,7 +42,8 @@ bool is_ours(const std::string& name) {
 
 /// NAME.mcap, NAME-2.mcap ...
 bool is_of_run(const std::string& file, const std::string& name) {
-  return !name.empty() && file.starts_with(name) && (file[name.size()] == '.' || file[name.size()] == '-');
+  return !name.empty() && file.starts_with(name) &&
+         (file[name.size()] == '.' || file[name.size()] == '-');
 }
 
 /// Nothing was recorded before: the real-time clock had lost its battery.
@@ -60,7 +65,8 @@ struct Recordings {
 Result<Recordings> recordings_in(const fs::path& directory, const std::string& running) {
   Recordings found;
   std::error_code error;
-  for (fs::directory_iterator entry(directory, error), end; !error && entry != end; entry.increment(error)) {
+  for (fs::directory_iterator entry(directory, error), end; !error && entry != end;
+       entry.increment(error)) {
     std::error_code unknown;
     const std::string name = entry->path().filename();
     const bool regular = entry->symlink_status(unknown).type() == fs::file_type::regular;
@@ -69,7 +75,9 @@ Result<Recordings> recordings_in(const fs::path& directory, const std::string& r
     const auto written = entry->last_write_time(unknown);
     if (!unknown) (own ? found.own : found.former).push_back({entry->path(), written});
   }
-  if (error) return fail(ErrorCode::Io, fmt::format("list {}: {}", directory.string(), error.message()));
+
+  if (error)
+    return fail(ErrorCode::Io, fmt::format("list {}: {}", directory.string(), error.message()));
   return found;
 }
 
@@ -80,6 +88,7 @@ std::vector<fs::path> outdated(const Recordings& recordings, const KeepRule& rul
     for (const auto& [file, written] : some)
       if (written < until && written >= earliest_date()) old.push_back(file);
   };
+
   add(recordings.own, rule.now - rule.keep);
   if (rule.lasted > rule.keep) {  // the clock has told the truth for as long as that
     add(recordings.former, rule.now - rule.keep);
@@ -87,28 +96,33 @@ std::vector<fs::path> outdated(const Recordings& recordings, const KeepRule& rul
     const auto newest = std::ranges::max(recordings.former, {}, &Dated::written).written;
     add(recordings.former, std::min(newest, rule.now) - rule.keep);
   }
+
   std::sort(old.begin(), old.end());
   return old;
 }
 
 }  // namespace
 
-Result<std::vector<fs::path>> remove_old_recordings(const fs::path& directory, const fs::path& store,
-                                                    const KeepRule& rule) {
+Result<std::vector<fs::path>> remove_old_recordings(const fs::path& directory,
+                                                    const fs::path& store, const KeepRule& rule) {
   const auto recordings = recordings_in(directory, rule.running);
   if (!recordings) return tl::unexpected(recordings.error());
   std::vector<fs::path> old = outdated(*recordings, rule);
   if (old.empty()) return old;
   const auto named = named_by_models(store);
-  if (!named) return fail(named.error().code, fmt::format("keep all recordings: {}", named.error().text));
+  if (!named)
+    return fail(named.error().code, fmt::format("keep all recordings: {}", named.error().text));
+
   std::erase_if(old, [&named](const fs::path& file) {
     const std::string name = file.filename();
     return named->contains(name.substr(0, name.find('.')));  // also NAME.damaged.mcap
   });
+
   std::error_code error;
   for (const fs::path& file : old)
     if (!fs::remove(file, error) && error)
       return fail(ErrorCode::Io, fmt::format("remove {}: {}", file.string(), error.message()));
+
   return old;
 }
 

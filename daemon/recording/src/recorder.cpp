@@ -34,6 +34,7 @@ bool Recorder::State::add(Stream stream, Dates dates, std::span<const std::byte>
     ++status.lost;
     return false;
   }
+
   constexpr std::size_t kMessageHead = mcap::kRecordHeadSize + 2 + 4 + 8 + 8;
   if (!chunk.empty() && chunk.records_size() + kMessageHead + data.size() > options.chunk_bytes) {
     write_chunk();
@@ -42,9 +43,11 @@ bool Recorder::State::add(Stream stream, Dates dates, std::span<const std::byte>
       return false;
     }
   }
+
   if (chunk.empty()) chunk_since = now;
   if (!std::exchange(environment_carried, true)) add_carried_environment(dates.taken);
   put(stream, dates, data);
+
   return true;
 }
 
@@ -53,8 +56,8 @@ void Recorder::State::put(Stream stream, Dates dates, std::span<const std::byte>
                           utc_ns(dates.taken), utc_ns(dates.described), data});
 }
 
-/// Some devices speak only when something changes. Published again when the file begins; measured when it
-/// was.
+/// Some devices speak only when something changes. Published again when the file begins; measured
+/// when it was.
 void Recorder::State::add_carried_environment(protocol::HostTime begin) {
   v1::EnvironmentSample message;
   std::vector<std::byte> bytes;
@@ -67,7 +70,8 @@ void Recorder::State::add_carried_environment(protocol::HostTime begin) {
 }
 
 template <class Message>
-void Recorder::State::add_marked(Stream stream, Dates dates, std::string_view device, Message& message) {
+void Recorder::State::add_marked(Stream stream, Dates dates, std::string_view device,
+                                 Message& message) {
   const std::uint32_t missing = lost.take(stream, device);
   if (missing > 0) recording::mark_gap(message, missing);
   const bool encoded = encode(message, payload).has_value();
@@ -75,7 +79,8 @@ void Recorder::State::add_marked(Stream stream, Dates dates, std::string_view de
   account(stream, device, missing, encoded && add(stream, dates, payload));
 }
 
-void Recorder::State::account(Stream stream, std::string_view device, std::uint32_t lost_before, bool added) {
+void Recorder::State::account(Stream stream, std::string_view device, std::uint32_t lost_before,
+                              bool added) {
   (added ? in_chunk : lost).add(stream, device, lost_before + 1);
 }
 
@@ -86,7 +91,7 @@ Result<Recorder> Recorder::open(RecorderOptions options, RecordingInfo info, Wal
   state->now = now;
   if (const auto begun = state->begin_file(); !begun) {
     if (begun.error().error == EEXIST) return daemon::fail(ErrorCode::Io, begun.error().what);
-    state->say_fault(begun.error());
+    state->report_fault(begun.error());
   }
   return Recorder{std::move(state)};
 }
@@ -116,22 +121,26 @@ void Recorder::record(const protocol::AxisSample& sample, std::string_view devic
 
 void Recorder::record(const protocol::ProbeTrigger& touch, std::string_view device, Taken taken) {
   recording::fill(state_->touch, touch, device);
-  state_->add_marked(Stream::ProbeTrigger, State::dates_of(touch.head.time, taken), device, state_->touch);
+  state_->add_marked(Stream::ProbeTrigger, State::dates_of(touch.head.time, taken), device,
+                     state_->touch);
 }
 
 void Recorder::record(const protocol::TouchScan& scan, std::string_view device, Taken taken) {
   recording::fill(state_->touch_scan, scan, device);
-  state_->add_marked(Stream::TouchScan, State::dates_of(scan.head.time, taken), device, state_->touch_scan);
+  state_->add_marked(Stream::TouchScan, State::dates_of(scan.head.time, taken), device,
+                     state_->touch_scan);
 }
 
-void Recorder::record(const protocol::EnvironmentSample& sample, std::string_view device, Taken taken) {
+void Recorder::record(const protocol::EnvironmentSample& sample, std::string_view device,
+                      Taken taken) {
   recording::fill(state_->environment, sample, device);
   state_->add_marked(Stream::Environment, State::dates_of(sample.head.time, taken), device,
                      state_->environment);
   state_->keep_environment(sample, device);
 }
 
-void Recorder::State::keep_environment(const protocol::EnvironmentSample& sample, std::string_view device) {
+void Recorder::State::keep_environment(const protocol::EnvironmentSample& sample,
+                                       std::string_view device) {
   auto latest = latest_environment.find(device);
   if (latest == latest_environment.end()) latest = latest_environment.emplace(device, sample).first;
   latest->second = sample;
@@ -167,12 +176,15 @@ void Recorder::attach(RecordingAttachment attachment, protocol::HostTime time) {
     s.calibrating = true;
     s.asked = State::AtRequest{s.part, s.status.lost + s.status.refused};
   }
-  if (s.status.state == RecorderStatus::State::Recording) s.end_turn();
+
+  if (s.status.state == RecorderStatus::State::Recording) s.end_cycle();
   s.attachments.push_back({std::move(attachment), s.utc_ns(time)});
+
   if (s.status.state != RecorderStatus::State::Recording) return;  // the next file begins with it
   mcap::Buffer bytes;
   const TimedAttachment& kept = s.attachments.back();
-  const auto index = recording::append_attachment(kept.attachment, kept.time_ns, s.file->size(), bytes);
+  const auto index =
+      recording::append_attachment(kept.attachment, kept.time_ns, s.file->size(), bytes);
   if (const auto written = s.file->append(bytes); !written) return s.enter_fault(written.error());
   s.summary.add(index);
   s.unsynced = true;
@@ -184,16 +196,18 @@ void Recorder::tick(WallTime now) {
   s.now = now;
   if (s.status.state == RecorderStatus::State::Closed) return;
   if (s.status.state != RecorderStatus::State::Recording) return s.retry();
-  if (s.is_full() || (!s.chunk.empty() && now - s.chunk_since >= s.options.chunk_period)) s.end_turn();
+  if (s.is_full() || (!s.chunk.empty() && now - s.chunk_since >= s.options.chunk_period))
+    s.end_cycle();
   if (s.status.state == RecorderStatus::State::Recording) s.sync_if_due();
 }
 
 void Recorder::flush() {
-  if (state_->status.state == RecorderStatus::State::Recording) state_->end_turn();
+  if (state_->status.state == RecorderStatus::State::Recording) state_->end_cycle();
 }
 
 void Recorder::fail(const std::string& what) {
-  if (state_->status.state == RecorderStatus::State::Recording) return state_->enter_fault({0, what});
+  if (state_->status.state == RecorderStatus::State::Recording)
+    return state_->enter_fault({0, what});
   if (state_->status.state != RecorderStatus::State::Closed) state_->note_fault({0, what});
 }
 
@@ -211,16 +225,19 @@ Result<RecordingDigest> Recorder::close() {
   const std::string fault = s.status.fault, gap = s.gap_of_run();
   s.status.state = RecorderStatus::State::Closed;
   if (!s.file) return daemon::fail(ErrorCode::Io, fault);
+
   if (s.messages_in_file == 0 && (s.part > 1 || s.attachments.empty())) {
     s.file->discard();
     s.file.reset();
     return RecordingDigest{};
   }
+
   const auto ended = s.end_file();
   const RecordingDigest finished{s.file->sha256(), s.file->size(), s.file->path(), gap};
   s.file.reset();
   if (!ended) return daemon::fail(ErrorCode::Io, ended.error().what);
   if (!was_recording) return daemon::fail(ErrorCode::Io, fault);
+
   return finished;
 }
 

@@ -16,22 +16,25 @@ using IoResult = tl::expected<void, IoFault>;
 
 namespace {
 
-/// Room that must have come back beyond min_free_bytes before a new file is begun: else a disk that hovers at
-/// the limit would fill a directory with stumps.
+/// Room that must have come back beyond min_free_bytes before a new file is begun: else a disk that
+/// hovers at the limit would fill a directory with stumps.
 constexpr std::uint64_t kResumeMarginChunks = 16;
 
 }  // namespace
 
-std::filesystem::path Recorder::State::path(std::uint32_t number, std::string_view extension) const {
+std::filesystem::path Recorder::State::path(std::uint32_t number,
+                                            std::string_view extension) const {
   const std::string suffix = number == 1 ? "" : fmt::format("-{}", number);
   return options.directory / fmt::format("{}{}{}", options.name, suffix, extension);
 }
 
-IoResult Recorder::State::write_front(RecordingFile& fresh, mcap::SummaryBuilder& fresh_summary) const {
+IoResult Recorder::State::write_front(RecordingFile& fresh,
+                                      mcap::SummaryBuilder& fresh_summary) const {
   mcap::Buffer front;
   recording::append_front(info, {part + 1, previous_file}, fresh_summary, front);
   for (const TimedAttachment& kept : attachments) {
-    fresh_summary.add(recording::append_attachment(kept.attachment, kept.time_ns, front.size(), front));
+    fresh_summary.add(
+        recording::append_attachment(kept.attachment, kept.time_ns, front.size(), front));
   }
   if (auto written = fresh.append(front); !written) return written;
   return fresh.sync();
@@ -51,23 +54,28 @@ IoResult Recorder::State::begin_file() {
   std::error_code made;  // the disk may have been read-only until now
   std::filesystem::create_directories(options.directory, made);
   if (made) return tl::unexpected(recording::io_fault("create", options.directory, made.value()));
+
   if (recording::free_bytes_of(options.directory) < options.min_free_bytes) {
     return tl::unexpected(recording::io_fault("begin", path(part + 1, ".mcap.part"), ENOSPC));
   }
+
   const auto finished = path(part + 1, ".mcap");
   std::error_code error;
   if (std::filesystem::exists(finished, error))
     return tl::unexpected(recording::io_fault("create", finished, EEXIST));
   if (error) return tl::unexpected(recording::io_fault("look for", finished, error.value()));
   forget_finished_requests();
-  if (part > 0 && axes_known) recording::carry_datum_on(attachments, *axes_known, utc_ns(axes_known->at));
+  if (part > 0 && axes_known)
+    recording::carry_datum_on(attachments, *axes_known, utc_ns(axes_known->at));
   auto fresh = RecordingFile::create(path(part + 1, ".mcap.part"));
   if (!fresh) return tl::unexpected(fresh.error());
   mcap::SummaryBuilder fresh_summary;
+
   if (auto written = write_front(*fresh, fresh_summary); !written) {
     fresh->discard();
     return written;
   }
+
   file = std::move(*fresh);
   summary = std::move(fresh_summary);
   sequences = {};
@@ -80,10 +88,12 @@ IoResult Recorder::State::begin_file() {
   status.state = RecorderStatus::State::Recording;
   status.file = file->path();
   if (!status.fault.empty())
-    status.last_fault = fmt::format("{}; over: recording goes on in {}", std::exchange(status.fault, {}),
-                                    status.file.filename().string());
+    status.last_fault =
+        fmt::format("{}; over: recording goes on in {}", std::exchange(status.fault, {}),
+                    status.file.filename().string());
   status.bytes = file->size();
   ++status.files;
+
   return {};
 }
 
@@ -123,9 +133,10 @@ void Recorder::State::write_chunk() {
   status.messages += messages;
   ++status.chunks;
   status.bytes = file->size();
+
   if (file->free_bytes() < options.min_free_bytes) {
-    enter_fault({ENOSPC, fmt::format("write {}: less than {} bytes would stay free", file->path().string(),
-                                     options.min_free_bytes)});
+    enter_fault({ENOSPC, fmt::format("write {}: less than {} bytes would stay free",
+                                     file->path().string(), options.min_free_bytes)});
   }
 }
 
@@ -135,7 +146,7 @@ bool Recorder::State::is_full() const {
 }
 
 /// Between two turns of the hub, so that a file begins with a whole one.
-void Recorder::State::end_turn() {
+void Recorder::State::end_cycle() {
   write_chunk();
   if (is_full()) go_on_in_next_file();
 }
@@ -144,7 +155,7 @@ void Recorder::State::go_on_in_next_file() {
   if (const auto ended = end_file(); !ended) return enter_fault(ended.error());
   previous_file = file->path().filename().string();
   file.reset();
-  if (const auto begun = begin_file(); !begun) say_fault(begun.error());
+  if (const auto begun = begin_file(); !begun) report_fault(begun.error());
 }
 
 void Recorder::State::sync_if_due() {
@@ -155,12 +166,12 @@ void Recorder::State::sync_if_due() {
 }
 
 void Recorder::State::note_fault(const IoFault& fault) {
-  status.state =
-      recording::is_disk_full(fault.error) ? RecorderStatus::State::DiskFull : RecorderStatus::State::Failed;
+  status.state = recording::is_disk_full(fault.error) ? RecorderStatus::State::DiskFull
+                                                      : RecorderStatus::State::Failed;
   status.fault = status.last_fault = fault.what;
 }
 
-void Recorder::State::say_fault(const IoFault& fault) {
+void Recorder::State::report_fault(const IoFault& fault) {
   note_fault(fault);
   ++status.faults;
   retry_at = now + options.retry_period;
@@ -168,8 +179,9 @@ void Recorder::State::say_fault(const IoFault& fault) {
 
 void Recorder::State::enter_fault(const IoFault& fault) {
   lose_chunk();
-  say_fault(fault);
+  report_fault(fault);
   if (!file) return;
+
   if (messages_in_file == 0 && part > 1) {
     file->discard();  // a stump: the next attempt takes its name
     --part;
@@ -177,8 +189,9 @@ void Recorder::State::enter_fault(const IoFault& fault) {
     file.reset();
     return;
   }
-  // The end is small and may still fit. If not, the whole chunks are readable without it, and retry() tries
-  // again.
+
+  // The end is small and may still fit. If not, the whole chunks are readable without it, and
+  // retry() tries again.
   const bool ended = end_file().has_value();
   previous_file = file->path().filename().string();
   if (ended || !file->is_open()) file.reset();

@@ -61,12 +61,12 @@ struct Recorder::State {
   void keep_environment(const protocol::EnvironmentSample& sample, std::string_view device);
   void account(Stream stream, std::string_view device, std::uint32_t lost_before, bool added);
   void write_chunk();
-  void end_turn();
+  void end_cycle();
   [[nodiscard]] bool is_full() const;
   void lose_chunk();
   void sync_if_due();
   void enter_fault(const IoFault& fault);
-  void say_fault(const IoFault& fault);
+  void report_fault(const IoFault& fault);
   void note_fault(const IoFault& fault);
   void go_on_in_next_file();
   void retry();
@@ -90,7 +90,8 @@ struct Recorder::State {
   protocol::mcap::ChunkBuilder chunk;
   protocol::mcap::SummaryBuilder summary;
   std::array<std::uint32_t, recording::kStreamCount> sequences{};
-  std::map<std::string, protocol::EnvironmentSample, std::less<>> latest_environment;  ///< by device
+  std::map<std::string, protocol::EnvironmentSample, std::less<>>
+      latest_environment;                ///< by device
   bool environment_carried = true;       ///< the present file begins with it
   std::uint64_t carried_in_chunk = 0;    ///< messages of it: they are in a former file, too
   std::optional<DatumState> axes_known;  ///< as the last axis sample said

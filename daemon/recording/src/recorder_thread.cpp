@@ -16,7 +16,7 @@ namespace abbe::daemon {
 namespace {
 
 // How long a sample may wait in memory before it is encoded; a tenth of the shortest chunk.
-constexpr std::chrono::milliseconds kTurn{20};
+constexpr std::chrono::milliseconds kCycle{20};
 // How long the recorder waits when the hub is just adding to what waits.
 constexpr std::chrono::microseconds kHubAdds{50};
 // What waits is kept in parts: a vector that grows is copied, and the hub does that.
@@ -24,7 +24,7 @@ constexpr std::size_t kMostInOnePart = 1 << 20;
 
 /// With the turn of the hub in which it came.
 template <class T>
-struct OfTurn {
+struct OfCycle {
   protocol::HostTime taken;
   T what;
 };
@@ -36,13 +36,13 @@ struct EnvironmentOf {
 };
 
 template <class T>
-std::size_t size_of(const std::vector<OfTurn<T>>& waiting) noexcept {
-  return waiting.size() * sizeof(OfTurn<T>);
+std::size_t size_of(const std::vector<OfCycle<T>>& waiting) noexcept {
+  return waiting.size() * sizeof(OfCycle<T>);
 }
 /// What append() will need for these.
 template <class As, class T>
 std::size_t size_as(const std::vector<T>& samples) noexcept {
-  return samples.size() * sizeof(OfTurn<As>);
+  return samples.size() * sizeof(OfCycle<As>);
 }
 template <class T>
 std::size_t size_of(const std::vector<T>& samples) noexcept {
@@ -54,7 +54,8 @@ std::size_t bytes_of(const Batch& batch) noexcept {
                       size_as<EnvironmentOf>(batch.environment) +
                       size_as<EnvironmentOf>(batch.measured_environment);
   bytes += size_of(batch.touches) + size_of(batch.touch_scans);
-  for (const auto* blocks : {&batch.tracker_raw, &batch.encoder_raw, &batch.probe_raw, &batch.reference_raw})
+  for (const auto* blocks :
+       {&batch.tracker_raw, &batch.encoder_raw, &batch.probe_raw, &batch.reference_raw})
     bytes += WaitingBlocks::bytes_of(*blocks);
   for (const auto& [device, block] : batch.environment_raw) bytes += WaitingBlocks::bytes_of(block);
   return bytes;
@@ -67,27 +68,30 @@ struct Attachment {
 
 struct WantedDigest {
   std::promise<RecordingDigest> promise;
-  std::uint64_t dropped = 0;  ///< messages that never came this far since a calibration was asked for
+  /// messages that never came this far since a calibration was asked for
+  std::uint64_t dropped = 0;
 };
 
-/// What waits for the recorder; of each topic in the order of the hub's turns, which its messages keep.
+/// What waits for the recorder; of each topic in the order of the hub's turns, which its messages
+/// keep.
 struct Waiting {
-  std::vector<OfTurn<protocol::TrackerPoint>> points;
-  std::vector<OfTurn<protocol::AxisSample>> axes;
-  std::vector<OfTurn<EnvironmentOf>> environment;
-  std::vector<OfTurn<protocol::ProbeTrigger>> touches;
-  std::vector<OfTurn<protocol::TouchScan>> touch_scans;
+  std::vector<OfCycle<protocol::TrackerPoint>> points;
+  std::vector<OfCycle<protocol::AxisSample>> axes;
+  std::vector<OfCycle<EnvironmentOf>> environment;
+  std::vector<OfCycle<protocol::ProbeTrigger>> touches;
+  std::vector<OfCycle<protocol::TouchScan>> touch_scans;
   WaitingBlocks raw;
-  std::vector<OfTurn<v1::CalibrationEvent>> events;
+  std::vector<OfCycle<v1::CalibrationEvent>> events;
   std::vector<Attachment> attachments;
   std::vector<WantedDigest> digests;
-  bool full = false;  ///< what comes until the recorder has taken this is dropped: one hole, not many
+  /// what comes until the recorder has taken this is dropped: one hole, not many
+  bool full = false;
   std::unique_ptr<Waiting> earlier;  ///< the parts before this one
   std::size_t bytes_earlier = 0;
 
   [[nodiscard]] std::size_t bytes_here() const noexcept {
-    return size_of(points) + size_of(axes) + size_of(environment) + size_of(touches) + size_of(touch_scans) +
-           raw.bytes();
+    return size_of(points) + size_of(axes) + size_of(environment) + size_of(touches) +
+           size_of(touch_scans) + raw.bytes();
   }
   [[nodiscard]] std::size_t bytes() const noexcept { return bytes_earlier + bytes_here(); }
   /// Keeps the room for an ordinary turn, gives that of a stalled disk back.
@@ -96,6 +100,7 @@ struct Waiting {
       *this = {};
       return;
     }
+
     points.clear();
     axes.clear();
     environment.clear();
@@ -125,31 +130,31 @@ T& place(std::vector<T>& of_devices, std::size_t device) {
   return of_devices[device];
 }
 
-void say_dropped(protocol::SampleHead& head, std::uint32_t& dropped) {
+void report_dropped(protocol::SampleHead& head, std::uint32_t& dropped) {
   if (dropped == 0) return;
   head.lost_before += std::exchange(dropped, 0);
   head.flags |= protocol::SampleFlag::GapBefore;
 }
 
 template <class T>
-void append(std::vector<OfTurn<T>>& to, protocol::HostTime taken, const std::vector<T>& from,
+void append(std::vector<OfCycle<T>>& to, protocol::HostTime taken, const std::vector<T>& from,
             std::uint32_t& dropped) {
   for (const T& sample : from) {
     to.push_back({taken, sample});
-    say_dropped(to.back().what.head, dropped);
+    report_dropped(to.back().what.head, dropped);
   }
 }
-void append(std::vector<OfTurn<EnvironmentOf>>& to, protocol::HostTime taken, const EnvironmentOf& from,
-            std::uint32_t& dropped) {
+void append(std::vector<OfCycle<EnvironmentOf>>& to, protocol::HostTime taken,
+            const EnvironmentOf& from, std::uint32_t& dropped) {
   to.push_back({taken, from});
-  say_dropped(to.back().what.sample.head, dropped);
+  report_dropped(to.back().what.sample.head, dropped);
 }
 
 }  // namespace
 
-/// The hub and the recorder share one pointer: to the Waiting that is being filled, null while the hub adds
-/// to it. The hub always finds it there, because the recorder leaves an empty one for the one it takes; the
-/// recorder tries again when the hub is adding.
+/// The hub and the recorder share one pointer: to the Waiting that is being filled, null while the
+/// hub adds to it. The hub always finds it there, because the recorder leaves an empty one for the
+/// one it takes; the recorder tries again when the hub is adding.
 struct RecorderThread::State {
   RecorderThreadOptions options;
   Recorder recorder;
@@ -174,7 +179,8 @@ struct RecorderThread::State {
 
   /// While the hub adds: the recorder finds nothing to take.
   struct Adding {
-    explicit Adding(State& s) : state(s), to(s.waiting.exchange(nullptr, std::memory_order_acquire)) {}
+    explicit Adding(State& s)
+        : state(s), to(s.waiting.exchange(nullptr, std::memory_order_acquire)) {}
     Adding(const Adding&) = delete;
     Adding& operator=(const Adding&) = delete;
     // release: pairs with the acquire in take_waiting()
@@ -188,7 +194,8 @@ struct RecorderThread::State {
   [[nodiscard]] std::unique_ptr<Waiting> take_waiting(std::unique_ptr<Waiting> empty) {
     for (;;) {
       Waiting* full = waiting.load(std::memory_order_relaxed);
-      if (full != nullptr && waiting.compare_exchange_strong(full, empty.get(), std::memory_order_acq_rel)) {
+      if (full != nullptr &&
+          waiting.compare_exchange_strong(full, empty.get(), std::memory_order_acq_rel)) {
         (void)empty.release();
         return std::unique_ptr<Waiting>{full};
       }
@@ -199,8 +206,9 @@ struct RecorderThread::State {
   void serve() {
     auto turn = std::make_unique<Waiting>();
     for (bool last = false; !last;) {
-      (void)wake_up.wait_for(kTurn);
-      last = stopping.load(std::memory_order_acquire);  // pairs with the release in ~RecorderThread()
+      (void)wake_up.wait_for(kCycle);
+      // pairs with the release in ~RecorderThread()
+      last = stopping.load(std::memory_order_acquire);
       turn = take_waiting(std::move(turn));
       write_all(*turn);
       turn->clear();  // whoever waits for a digest that was not made learns of it
@@ -214,7 +222,8 @@ struct RecorderThread::State {
     delete news.exchange(status.release(), std::memory_order_acq_rel);
   }
 
-  /// Only a defect or a lack of memory throws: the recorder begins a new file then, as after a disk fault.
+  /// Only a defect or a lack of memory throws: the recorder begins a new file then, as after a disk
+  /// fault.
   void write_all(Waiting& turn) {
     try {
       if (!defect.empty()) recorder.fail(std::exchange(defect, {}));
@@ -235,9 +244,11 @@ struct RecorderThread::State {
       unsaid_of += static_cast<std::uint32_t>(messages);
       dropped.fetch_add(messages, std::memory_order_relaxed);  // a count orders nothing
     };
+
     lose(unsaid.points, batch.points.size());
     lose(unsaid.axes, batch.axes.size());
     lose(unsaid.environment, batch.environment.size());
+
     for (const auto& sample : batch.measured_environment)
       lose(place(unsaid.measured, sample.device).samples, 1);
     lose(unsaid.touches, batch.touches.size());
@@ -264,14 +275,18 @@ struct RecorderThread::State {
 
   void write_part(Waiting& turn) {
     for (auto& a : turn.attachments) recorder.attach(std::move(a.what), a.time);
-    // First: a further file begins with the environment of before, which must not come after that of now.
+    // First: a further file begins with the environment of before, which must not come after that
+    // of now.
     for (const auto& [taken, e] : turn.environment) recorder.record(e.sample, e.device, taken);
     for (const auto& [taken, s] : turn.axes) recorder.record(s, options.encoder, taken);
     for (const auto& [taken, s] : turn.points) recorder.record(s, options.tracker, taken);
     for (const auto& [taken, t] : turn.touches) recorder.record(t, options.probe, taken);
     for (const auto& [taken, s] : turn.touch_scans) recorder.record(s, options.probe, taken);
-    turn.raw.for_each(
-        [this](const protocol::RawBytes& bytes, protocol::HostTime taken) { recorder.record(bytes, taken); });
+
+    turn.raw.for_each([this](const protocol::RawBytes& bytes, protocol::HostTime taken) {
+      recorder.record(bytes, taken);
+    });
+
     for (const auto& [taken, e] : turn.events) recorder.record(e, taken);
     if (!turn.digests.empty()) recorder.flush();
     for (auto& wanted : turn.digests) {
@@ -295,7 +310,8 @@ struct RecorderThread::State {
 
 Result<std::unique_ptr<RecorderThread>> RecorderThread::start(RecorderThreadOptions options,
                                                               RecordingInfo info) {
-  auto recorder = Recorder::open(options.recorder, std::move(info), Recorder::WallTime::clock::now());
+  auto recorder =
+      Recorder::open(options.recorder, std::move(info), Recorder::WallTime::clock::now());
   if (!recorder) return tl::unexpected(recorder.error());
   auto state = std::make_unique<State>(std::move(options), std::move(*recorder));
   state->known = state->recorder.status();
@@ -307,20 +323,24 @@ RecorderThread::RecorderThread(std::unique_ptr<State> state) : state_(std::move(
 }
 
 RecorderThread::~RecorderThread() {
-  state_->stopping.store(true, std::memory_order_release);  // release: pairs with the acquire in serve()
+  state_->stopping.store(true,
+                         std::memory_order_release);  // release: pairs with the acquire in serve()
   state_->wake_up.signal();
   state_->thread.join();
   try {
     (void)state_->recorder.close();  // what could not be finished stays readable as .part
   } catch (
-      const std::exception&) {  // NOLINT(bugprone-empty-catch): so does what a lack of memory left behind
+      const std::
+          exception&) {  // NOLINT(bugprone-empty-catch): so does what a lack of memory left behind
   }
 }
 
 void RecorderThread::hand_over(const Batch& batch) {
   State::Adding adding{*state_};
   Dropped& unsaid = state_->unsaid;
-  adding->full = adding->full || adding->bytes() + bytes_of(batch) > state_->options.most_waiting_bytes;
+  adding->full =
+      adding->full || adding->bytes() + bytes_of(batch) > state_->options.most_waiting_bytes;
+
   if (adding->full) return state_->drop(batch);
   State::make_room(adding);
   Waiting& waiting = *adding.to;
@@ -341,7 +361,8 @@ void RecorderThread::hand_over(const Batch& batch) {
   waiting.raw.append(taken, names.probe, batch.probe_raw, unsaid.probe_raw);
   waiting.raw.append(taken, names.reference, batch.reference_raw, unsaid.reference_raw);
   for (const auto& [device, block] : batch.environment_raw)
-    waiting.raw.append(taken, names.environment.at(device), block, place(unsaid.measured, device).raw);
+    waiting.raw.append(taken, names.environment.at(device), block,
+                       place(unsaid.measured, device).raw);
 }
 
 void RecorderThread::hand_over(v1::CalibrationEvent event, protocol::HostTime taken) {
@@ -368,7 +389,8 @@ std::future<RecordingDigest> RecorderThread::digest() {
 
 const RecorderStatus& RecorderThread::status() const {
   // acquire: pairs with the release in report()
-  const std::unique_ptr<RecorderStatus> news{state_->news.exchange(nullptr, std::memory_order_acq_rel)};
+  const std::unique_ptr<RecorderStatus> news{
+      state_->news.exchange(nullptr, std::memory_order_acq_rel)};
   if (news) state_->known = std::move(*news);
   return state_->known;
 }

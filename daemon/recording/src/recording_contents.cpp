@@ -44,20 +44,23 @@ class Collector {
   void add(const mcap::ScannedChunk& chunk, std::uint64_t bytes) {
     ++chunk_number_;
     const auto damaged = [&](std::string_view how) {
-      lost(chunk.offset, bytes, fmt::format("chunk {} at byte {}: {}", chunk_number_, chunk.offset, how),
+      lost(chunk.offset, bytes,
+           fmt::format("chunk {} at byte {}: {}", chunk_number_, chunk.offset, how),
            chunk.state != ChunkState::Cut || cut_is_damage);
     };
+
     switch (chunk.state) {
       case ChunkState::Whole:
         read(chunk.chunk.records);
         return;
       case ChunkState::Cut:
-        return damaged(
-            fmt::format("cut off by the end of the file after {} whole messages", read(chunk.chunk.records)));
+        return damaged(fmt::format("cut off by the end of the file after {} whole messages",
+                                   read(chunk.chunk.records)));
       case ChunkState::BadCrc:
         return damaged("its checksum is wrong, passed over");
       case ChunkState::Compressed:
-        return damaged(fmt::format("compressed ({}), which is not supported", chunk.chunk.head.compression));
+        return damaged(
+            fmt::format("compressed ({}), which is not supported", chunk.chunk.head.compression));
       case ChunkState::Malformed:
         return damaged("malformed, passed over");
     }
@@ -65,7 +68,8 @@ class Collector {
 
  private:
   void lost_record(const mcap::Record& record, std::string_view what) {
-    lost(record.offset, record.end() - record.offset, fmt::format("{} at byte {}", what, record.offset));
+    lost(record.offset, record.end() - record.offset,
+         fmt::format("{} at byte {}", what, record.offset));
   }
 
   std::uint64_t read(mcap::Bytes records) {
@@ -93,16 +97,20 @@ void collect_by_summary(mcap::Bytes file, const mcap::Summary& summary, Collecto
     else
       collector.lost(index.offset, index.length, fmt::format("metadata {} is damaged", index.name));
   }
+
   for (const auto& index : summary.attachments) {
     const auto record = mcap::record_at(file, index.offset, mcap::Opcode::Attachment);
     if (record && record->end() - record->offset == index.length)
       collector.add_attachment(*record);
     else
-      collector.lost(index.offset, index.length, fmt::format("attachment {} is damaged", index.name));
+      collector.lost(index.offset, index.length,
+                     fmt::format("attachment {} is damaged", index.name));
   }
+
   for (const auto& index : summary.chunks) {
     const auto chunk = mcap::chunk_at(file, index.chunk_start);
-    const mcap::ScannedChunk damaged{ChunkState::Malformed, static_cast<std::size_t>(index.chunk_start), {}};
+    const mcap::ScannedChunk damaged{
+        ChunkState::Malformed, static_cast<std::size_t>(index.chunk_start), {}};
     collector.add(chunk.value_or(damaged), index.chunk_length);
   }
 }
@@ -112,7 +120,8 @@ void collect(const mcap::LinearScan::Item& item, Collector& collector) {
   if (item.record.opcode == mcap::Opcode::Metadata) return collector.add_metadata(item.record);
   if (item.record.opcode == mcap::Opcode::Attachment) return collector.add_attachment(item.record);
   if (item.record.opcode != mcap::Opcode::Channel) return;
-  if (const auto channel = mcap::decode<mcap::Channel>(item.record.content)) collector.add(*channel);
+  if (const auto channel = mcap::decode<mcap::Channel>(item.record.content))
+    collector.add(*channel);
 }
 
 /// What a killed recorder or a power cut leaves behind the last whole record: a torn one, or zeros.
@@ -126,10 +135,12 @@ void collect_by_scan(mcap::Bytes file, Collector& collector) {
   collector.cut_is_damage = mcap::ends_with_magic(file);
   mcap::LinearScan scan{file};
   bool cut_chunk = false;
+
   while (const auto item = scan.next()) {
     collect(*item, collector);
     cut_chunk = item->chunk && item->chunk->state == ChunkState::Cut;
   }
+
   const std::size_t end = scan.whole_until();
   collector.contents.closed_cleanly = scan.complete();
   if (scan.complete()) {

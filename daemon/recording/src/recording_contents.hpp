@@ -1,5 +1,6 @@
 #pragma once
-/// What is in a recording's bytes, whole or broken: found by its summary, else by walking it from the front.
+/// What is in a recording's bytes, whole or broken: found by its summary, else by walking it from
+/// the front.
 
 #include <map>
 #include <optional>
@@ -11,7 +12,8 @@
 
 namespace abbe::daemon::recording {
 
-/// A chunk whose messages can be read; its times are those of its messages, not those its head claims.
+/// A chunk whose messages can be read; its times are those of its messages, not those its head
+/// claims.
 struct ReadableChunk {
   protocol::mcap::Bytes records;
   std::uint64_t earliest_ns = 0;  ///< of this chunk and all after it

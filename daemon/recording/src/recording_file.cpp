@@ -37,7 +37,8 @@ tl::expected<void, IoFault> sync_directory_of(const std::filesystem::path& file)
 int rename_to_new(const std::filesystem::path& from, const std::filesystem::path& to) noexcept {
   if (::renameat2(AT_FDCWD, from.c_str(), AT_FDCWD, to.c_str(), RENAME_NOREPLACE) == 0) return 0;
   if (errno != EINVAL && errno != ENOSYS) return errno;
-  // A file system without RENAME_NOREPLACE: that `to` did not exist was seen when the recording began.
+  // A file system without RENAME_NOREPLACE: that `to` did not exist was seen when the recording
+  // began.
   return ::rename(from.c_str(), to.c_str()) == 0 ? 0 : errno;
 }
 
@@ -104,7 +105,8 @@ void RecordingFile::close() noexcept {
 tl::expected<void, IoFault> RecordingFile::append(std::span<const std::byte> piece) {
   std::size_t done = 0;
   while (done < piece.size()) {
-    const auto n = ::pwrite(fd_, piece.data() + done, piece.size() - done, static_cast<off_t>(size_ + done));
+    const auto n =
+        ::pwrite(fd_, piece.data() + done, piece.size() - done, static_cast<off_t>(size_ + done));
     if (n > 0) {
       done += static_cast<std::size_t>(n);
     } else if (n == 0 || errno != EINTR) {
@@ -115,6 +117,7 @@ tl::expected<void, IoFault> RecordingFile::append(std::span<const std::byte> pie
       return unexpected(io_fault("write", path_, error));
     }
   }
+
   size_ += piece.size();
   hash_->update(piece);
   return {};
@@ -130,7 +133,8 @@ tl::expected<void, IoFault> RecordingFile::sync() {
 std::filesystem::path RecordingFile::finished_path() const {
   auto finished = path_;
   finished.replace_extension();  // .part
-  if (damaged_ && finished.stem().extension() != ".damaged") finished.replace_extension(".damaged.mcap");
+  if (damaged_ && finished.stem().extension() != ".damaged")
+    finished.replace_extension(".damaged.mcap");
   return finished;
 }
 
@@ -144,16 +148,21 @@ void RecordingFile::mark_damaged() {
 tl::expected<void, IoFault> RecordingFile::finish() {
   if (!is_open()) return {};
   // Nothing may stand behind the last magic, should cutting back a torn piece have failed earlier.
-  if (::ftruncate(fd_, static_cast<off_t>(size_)) != 0) return unexpected(io_fault("truncate", path_, errno));
+  if (::ftruncate(fd_, static_cast<off_t>(size_)) != 0)
+    return unexpected(io_fault("truncate", path_, errno));
   std::optional<IoFault> unproven;
-  if (::fsync(fd_) != 0 && !std::exchange(damaged_, true)) unproven = io_fault("fsync", path_, errno);
+  if (::fsync(fd_) != 0 && !std::exchange(damaged_, true))
+    unproven = io_fault("fsync", path_, errno);
   const auto finished = finished_path();
+
   if (const int error = rename_to_new(path_, finished); error != 0) {
     return unexpected(io_fault("rename", path_, error));
   }
+
   path_ = finished;
   close();
   if (unproven) return unexpected(*unproven);
+
   return sync_directory_of(path_);
 }
 
@@ -164,7 +173,8 @@ void RecordingFile::discard() noexcept {
 
 std::uint64_t RecordingFile::free_bytes() const noexcept {
   struct statvfs fs {};
-  return ::fstatvfs(fd_, &fs) == 0 ? free_bytes_from(fs) : std::numeric_limits<std::uint64_t>::max();
+  return ::fstatvfs(fd_, &fs) == 0 ? free_bytes_from(fs)
+                                   : std::numeric_limits<std::uint64_t>::max();
 }
 
 }  // namespace abbe::daemon::recording

@@ -23,25 +23,28 @@ struct IoFault {
 
 class RecordingFile {
  public:
-  /// Creates `part` (NAME.mcap.part, must not exist), locks it (flock) and makes its directory entry durable.
-  [[nodiscard]] static tl::expected<RecordingFile, IoFault> create(const std::filesystem::path& part);
+  /// Creates `part` (NAME.mcap.part, must not exist), locks it (flock) and makes its directory
+  /// entry durable.
+  [[nodiscard]] static tl::expected<RecordingFile, IoFault> create(
+      const std::filesystem::path& part);
   RecordingFile(RecordingFile&&) noexcept;
   RecordingFile& operator=(RecordingFile&&) noexcept;
   ~RecordingFile();
 
-  /// All of `piece` with one pwrite if the system takes it at once, or nothing: after a failure the file is
-  /// cut back to what it was.
+  /// All of `piece` with one pwrite if the system takes it at once, or nothing: after a failure the
+  /// file is cut back to what it was.
   [[nodiscard]] tl::expected<void, IoFault> append(std::span<const std::byte> piece);
-  /// After a failure the file is damaged() for good: Linux reports an error of write-back once, so a later
-  /// success proves nothing.
+  /// After a failure the file is damaged() for good: Linux reports an error of write-back once, so
+  /// a later success proves nothing.
   [[nodiscard]] tl::expected<void, IoFault> sync();
-  /// fsync, rename to NAME.mcap or NAME.damaged.mcap (which must not exist), fsync of the directory. The file
-  /// is closed, also where fsync failed and it became damaged().
+  /// fsync, rename to NAME.mcap or NAME.damaged.mcap (which must not exist), fsync of the
+  /// directory. The file is closed, also where fsync failed and it became damaged().
   [[nodiscard]] tl::expected<void, IoFault> finish();
   /// Removes it again: nothing worth keeping was written.
   void discard() noexcept;
 
-  /// The disk reported an error while it was written; its name says so, too: NAME.damaged.mcap(.part).
+  /// The disk reported an error while it was written; its name says so, too:
+  /// NAME.damaged.mcap(.part).
   [[nodiscard]] bool damaged() const noexcept { return damaged_; }
   [[nodiscard]] bool is_open() const noexcept { return fd_ >= 0; }
   [[nodiscard]] const std::filesystem::path& path() const noexcept { return path_; }

@@ -36,9 +36,11 @@ std::optional<RecordingInfo> info_of(const Contents& contents) {
     const auto value = entries->second.find(std::string(key));
     return value == entries->second.end() ? std::string{} : value->second;
   };
+
   RecordingInfo info;
   std::int64_t utc_offset_ns = 0;
-  if (!parse(text(recording::kRecordingMetadata, "utc_offset_ns"), utc_offset_ns)) return std::nullopt;
+  if (!parse(text(recording::kRecordingMetadata, "utc_offset_ns"), utc_offset_ns))
+    return std::nullopt;
   if (!parse(text(recording::kRecordingMetadata, "speed"), info.speed)) return std::nullopt;
   info.utc_offset.value = std::chrono::nanoseconds{utc_offset_ns};
   info.machine = text(recording::kRecordingMetadata, "machine");
@@ -46,7 +48,9 @@ std::optional<RecordingInfo> info_of(const Contents& contents) {
   const auto versions = contents.metadata.find(std::string(recording::kVersionsMetadata));
   if (versions != contents.metadata.end())
     info.versions.assign(versions->second.begin(), versions->second.end());
-  std::erase_if(info.versions, [](const auto& entry) { return entry.first == recording::kChecksum; });
+  std::erase_if(info.versions,
+                [](const auto& entry) { return entry.first == recording::kChecksum; });
+
   return info;
 }
 
@@ -87,17 +91,22 @@ bool deliver_event(const RecordedMessage& message, const RecordingSink& sink) {
 
 bool deliver(const RecordedMessage& message, const RecordingSink& sink) {
   const std::string_view topic = message.topic;
-  if (topic == topic_name<v1::AxisSample>()) return deliver_as<v1::AxisSample>(message, sink.axis_sample);
+  if (topic == topic_name<v1::AxisSample>())
+    return deliver_as<v1::AxisSample>(message, sink.axis_sample);
   if (topic == topic_name<v1::TrackerPoint>())
     return deliver_as<v1::TrackerPoint>(message, sink.tracker_point);
   if (topic == topic_name<v1::RawBytes>()) return deliver_raw(message, sink);
+
   if (topic == topic_name<v1::EnvironmentSample>()) {
     return deliver_as<v1::EnvironmentSample>(message, sink.environment);
   }
+
   if (topic == topic_name<v1::ProbeTrigger>())
     return deliver_as<v1::ProbeTrigger>(message, sink.probe_trigger);
-  if (topic == topic_name<v1::TouchScan>()) return deliver_as<v1::TouchScan>(message, sink.touch_scan);
+  if (topic == topic_name<v1::TouchScan>())
+    return deliver_as<v1::TouchScan>(message, sink.touch_scan);
   if (topic == topic_name<v1::CalibrationEvent>()) return deliver_event(message, sink);
+
   return true;
 }
 
@@ -125,18 +134,23 @@ Result<RecordingReader> RecordingReader::open(const std::filesystem::path& path)
   auto file = recording::MappedFile::open(path);
   if (!file) return tl::unexpected(file.error());
   if (!mcap::starts_with_magic(file->bytes())) {
-    return fail(ErrorCode::BadInput, fmt::format("read {}: does not begin like an MCAP file", path.string()));
+    return fail(ErrorCode::BadInput,
+                fmt::format("read {}: does not begin like an MCAP file", path.string()));
   }
+
   Contents contents = recording::contents_of(file->bytes());
   const auto info = info_of(contents);
   if (!info) {
-    return fail(ErrorCode::BadInput,
-                fmt::format("read {}: no metadata \"{}\": not recorded by abbe, or cut at its front",
-                            path.string(), recording::kRecordingMetadata));
+    return fail(
+        ErrorCode::BadInput,
+        fmt::format("read {}: no metadata \"{}\": not recorded by abbe, or cut at its front",
+                    path.string(), recording::kRecordingMetadata));
   }
+
   const bool turns = says_turns(contents);
   const auto metadata = recording::judge_metadata(contents.metadata);
   if (!metadata.damage.empty()) contents.losses.push_back({0, 0, metadata.damage});
+
   return RecordingReader{std::make_unique<State>(
       State{std::move(*file), std::move(contents), *info, metadata.configuration, turns})};
 }
@@ -152,7 +166,8 @@ const RecordingInfo& RecordingReader::info() const noexcept {
 const std::vector<RecordingAttachment>& RecordingReader::attachments() const noexcept {
   return state_->contents.attachments;
 }
-const std::map<std::string, std::map<std::string, std::string>>& RecordingReader::metadata() const noexcept {
+const std::map<std::string, std::map<std::string, std::string>>& RecordingReader::metadata()
+    const noexcept {
   return state_->contents.metadata;
 }
 bool RecordingReader::closed_cleanly() const noexcept {
@@ -185,7 +200,8 @@ std::optional<std::pair<protocol::HostTime, protocol::HostTime>> RecordingReader
   if (chunks.empty()) return std::nullopt;
   const auto last = std::ranges::max_element(chunks, {}, &ReadableChunk::last_time_ns);
   const auto offset = state_->info.utc_offset;
-  return std::pair{host_time(chunks.front().earliest_ns, offset), host_time(last->last_time_ns, offset)};
+  return std::pair{host_time(chunks.front().earliest_ns, offset),
+                   host_time(last->last_time_ns, offset)};
 }
 
 std::string RecordingReader::sha256() const {
@@ -206,8 +222,8 @@ std::uint64_t RecordingReader::read(const RecordingSink& sink) const {
 // --- messages by time
 // ----------------------------------------------------------------------------------------------
 
-/// Chunks overlap in time, because the recorder empties one stream after the other. They are opened in file
-/// order; a message is given once no chunk still closed can hold an earlier one.
+/// Chunks overlap in time, because the recorder empties one stream after the other. They are opened
+/// in file order; a message is given once no chunk still closed can hold an earlier one.
 struct RecordingReader::Cursor::State {
   const RecordingReader::State* recording = nullptr;
   std::size_t next_chunk = 0;
@@ -231,16 +247,19 @@ void RecordingReader::Cursor::State::open_chunk() {
     return a.log_time_ns != b.log_time_ns ? a.log_time_ns < b.log_time_ns
                                           : std::less<>{}(a.data.data(), b.data.data());
   };
+
   open.erase(open.begin(), open.begin() + static_cast<std::ptrdiff_t>(given));
   given = 0;
   const auto before = static_cast<std::ptrdiff_t>(open.size());
   mcap::MessageReader messages{recording->contents.chunks[next_chunk++].records};
+
   while (auto message = messages.next()) {
     if (!recording->says_turns) message->publish_time_ns = message->log_time_ns;
     std::uint64_t& latest = latest_ns[message->channel_id];
     latest = message->log_time_ns = std::max(message->log_time_ns, latest);
     open.push_back(*message);
   }
+
   const auto fresh = open.begin() + before;
   if (!std::is_sorted(fresh, open.end(), earlier)) std::sort(fresh, open.end(), earlier);
   std::inplace_merge(open.begin(), fresh, open.end(), earlier);
@@ -264,9 +283,10 @@ std::optional<RecordedMessage> RecordingReader::Cursor::next() {
   const mcap::Message& message = s.open[s.given++];
   ++s.given_in_all;
   const auto topic = s.recording->contents.topics.find(message.channel_id);
-  return RecordedMessage{topic == s.recording->contents.topics.end() ? std::string_view{} : topic->second,
-                         host_time(message.log_time_ns, s.recording->info.utc_offset),
-                         host_time(message.publish_time_ns, s.recording->info.utc_offset), message.data};
+  return RecordedMessage{
+      topic == s.recording->contents.topics.end() ? std::string_view{} : topic->second,
+      host_time(message.log_time_ns, s.recording->info.utc_offset),
+      host_time(message.publish_time_ns, s.recording->info.utc_offset), message.data};
 }
 
 double RecordingReader::Cursor::progress() const noexcept {

@@ -57,6 +57,7 @@ void fill(v1::ProbeTrigger& message, const protocol::ProbeTrigger& touch, std::s
   const auto assign = [axes](std::vector<double>& to, const Axes& from) {
     to.assign(from.begin(), from.begin() + axes);
   };
+
   message.device().assign(device);
   message.host_time_ns(ns_of(touch.head.time));
   message.u_time_ns(touch.head.u_time.count());
@@ -105,8 +106,8 @@ void fill(v1::EnvironmentSample& message, const protocol::EnvironmentSample& sam
 
 protocol::TrackerPoint sample_of(const v1::TrackerPoint& message) {
   protocol::TrackerPoint point;
-  point.head = {host_time(message.host_time_ns()), nanoseconds{message.u_time_ns()}, message.flags(),
-                message.lost_before()};
+  point.head = {host_time(message.host_time_ns()), nanoseconds{message.u_time_ns()},
+                message.flags(), message.lost_before()};
   point.device_time = protocol::DeviceTime{nanoseconds{message.device_time_ns()}};
   point.p_tracker_m = message.p_tracker_m();
   point.device_status = message.device_status();
@@ -115,11 +116,12 @@ protocol::TrackerPoint sample_of(const v1::TrackerPoint& message) {
 
 protocol::AxisSample sample_of(const v1::AxisSample& message) {
   protocol::AxisSample sample;
-  sample.head = {host_time(message.host_time_ns()), nanoseconds{message.u_time_ns()}, message.flags(),
-                 message.lost_before()};
+  sample.head = {host_time(message.host_time_ns()), nanoseconds{message.u_time_ns()},
+                 message.flags(), message.lost_before()};
   sample.cycle = message.cycle();
   sample.missing_mask = message.missing_mask();
-  const std::size_t axes = std::min({message.counts().size(), message.position().size(), protocol::kMaxAxes});
+  const std::size_t axes =
+      std::min({message.counts().size(), message.position().size(), protocol::kMaxAxes});
   sample.axis_count = static_cast<std::uint8_t>(axes);
   std::copy_n(message.counts().begin(), axes, sample.count.begin());
   std::copy_n(message.position().begin(), axes, sample.position.begin());
@@ -128,8 +130,8 @@ protocol::AxisSample sample_of(const v1::AxisSample& message) {
 
 protocol::ProbeTrigger sample_of(const v1::ProbeTrigger& message) {
   protocol::ProbeTrigger touch;
-  touch.head = {host_time(message.host_time_ns()), nanoseconds{message.u_time_ns()}, message.flags(),
-                message.lost_before()};
+  touch.head = {host_time(message.host_time_ns()), nanoseconds{message.u_time_ns()},
+                message.flags(), message.lost_before()};
   touch.touch = message.touch();
   touch.probe = message.probe();
   touch.latch = static_cast<protocol::TouchLatch>(std::min<std::uint8_t>(message.latch(), 2));
@@ -137,11 +139,13 @@ protocol::ProbeTrigger sample_of(const v1::ProbeTrigger& message) {
   touch.edge_clock_count = message.edge_clock_count();
   touch.missing_mask = message.missing_mask();
   touch.speed_m_s = message.speed_m_s();
-  touch.axis_count = static_cast<std::uint8_t>(std::min(message.position().size(), protocol::kMaxAxes));
+  touch.axis_count =
+      static_cast<std::uint8_t>(std::min(message.position().size(), protocol::kMaxAxes));
   copy(message.position(), touch.position);
   copy(message.velocity(), touch.velocity);
   copy(message.u_position(), touch.u_position);
   copy(message.U95_position(), touch.U95_position);
+
   return touch;
 }
 
@@ -154,10 +158,12 @@ protocol::TouchScan sample_of(const v1::TouchScan& message) {
   scan.clock_count = message.clock_count();
   scan.latch_count = message.latch_count();
   scan.edge_count = message.edge_count();
-  const std::size_t axes = std::min({message.counts().size(), message.position().size(), protocol::kMaxAxes});
+  const std::size_t axes =
+      std::min({message.counts().size(), message.position().size(), protocol::kMaxAxes});
   scan.axis_count = static_cast<std::uint8_t>(axes);
   std::copy_n(message.counts().begin(), axes, scan.count.begin());
   std::copy_n(message.position().begin(), axes, scan.position.begin());
+
   return scan;
 }
 

@@ -13,7 +13,8 @@ void fill(v1::TrackerPoint& message, const protocol::TrackerPoint& point, std::s
 void fill(v1::AxisSample& message, const protocol::AxisSample& sample, std::string_view device);
 void fill(v1::ProbeTrigger& message, const protocol::ProbeTrigger& touch, std::string_view device);
 void fill(v1::TouchScan& message, const protocol::TouchScan& scan, std::string_view device);
-void fill(v1::EnvironmentSample& message, const protocol::EnvironmentSample& sample, std::string_view device);
+void fill(v1::EnvironmentSample& message, const protocol::EnvironmentSample& sample,
+          std::string_view device);
 
 [[nodiscard]] protocol::TrackerPoint sample_of(const v1::TrackerPoint& message);
 [[nodiscard]] protocol::AxisSample sample_of(const v1::AxisSample& message);
@@ -25,7 +26,8 @@ void fill(v1::EnvironmentSample& message, const protocol::EnvironmentSample& sam
 template <class Message>
 void mark_gap(Message& message, std::uint32_t lost) {
   message.flags(message.flags() | protocol::SampleFlag::GapBefore);
-  if constexpr (requires { message.lost_before(); }) message.lost_before(message.lost_before() + lost);
+  if constexpr (requires { message.lost_before(); })
+    message.lost_before(message.lost_before() + lost);
 }
 
 }  // namespace abbe::daemon::recording

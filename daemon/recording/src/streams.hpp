@@ -44,7 +44,8 @@ struct StreamNames {
 }
 
 inline constexpr std::string_view kRecordingMetadata = "abbe.recording";
-/// Of kRecordingMetadata. Files without it were recorded when log_time still was the instant described.
+/// Of kRecordingMetadata. Files without it were recorded when log_time still was the instant
+/// described.
 inline constexpr const char* kLogTime = "log_time";
 inline constexpr std::string_view kConfigurationMetadata = "abbe.configuration";
 inline constexpr std::string_view kVersionsMetadata = "abbe.versions";

@@ -1,6 +1,6 @@
 #pragma once
-/// Raw blocks of all devices that wait for the recorder, each with its own length: most are a twentieth of
-/// the room a RawBlock has. The names of the devices outlive this.
+/// Raw blocks of all devices that wait for the recorder, each with its own length: most are a
+/// twentieth of the room a RawBlock has. The names of the devices outlive this.
 
 #include <span>
 #include <string_view>
@@ -14,7 +14,8 @@ namespace abbe::daemon {
 class WaitingBlocks {
  public:
   /// What append() will need for these.
-  [[nodiscard]] static std::size_t bytes_of(const std::vector<protocol::RawBlock>& blocks) noexcept {
+  [[nodiscard]] static std::size_t bytes_of(
+      const std::vector<protocol::RawBlock>& blocks) noexcept {
     std::size_t bytes = 0;
     for (const auto& block : blocks) bytes += bytes_of(block);
     return bytes;
@@ -34,7 +35,9 @@ class WaitingBlocks {
                       block.direction, block.continued, from.size()});
     bytes_.insert(bytes_.end(), from.begin(), from.end());
   }
-  [[nodiscard]] std::size_t bytes() const noexcept { return heads_.size() * sizeof(Head) + bytes_.size(); }
+  [[nodiscard]] std::size_t bytes() const noexcept {
+    return heads_.size() * sizeof(Head) + bytes_.size();
+  }
 
   /// sink(const protocol::RawBytes&, taken), in the order in which they came.
   template <class Sink>

@@ -66,6 +66,7 @@ std::vector<ReplayedDatum> MarkSearch::compared(const RecordingReader& recording
   std::vector<ReplayedDatum> all;
   std::vector<std::size_t> seen(axes_.size(), 0);
   const HostTime begun = began_after(recording);
+
   for (const auto& attachment : recording.attachments()) {
     if (attachment.name != kDatumName) continue;
     const auto live = datum_from_attachment(attachment);
@@ -78,6 +79,7 @@ std::vector<ReplayedDatum> MarkSearch::compared(const RecordingReader& recording
       if (seen[i] < axes_[i].readings.size()) datum.again = axes_[i].readings[seen[i]++];
     }
   }
+
   return all;
 }
 

@@ -1,7 +1,7 @@
 #pragma once
-/// The search for the reference marks once more, from the raw bytes of both cards in a recording: it begins
-/// when the live run was asked to (of a turn's bytes at once, which the live run may have had a turn later),
-/// and what it finds stands beside what the live run found. One thread.
+/// The search for the reference marks once more, from the raw bytes of both cards in a recording:
+/// it begins when the live run was asked to (of a turn's bytes at once, which the live run may have
+/// had a turn later), and what it finds stands beside what the live run found. One thread.
 
 #include <optional>
 #include <vector>
@@ -16,7 +16,8 @@ namespace abbe::daemon {
 class MarkSearch {
  public:
   /// BadInput: the recording's own requests cannot be read. Without [reference] it finds nothing.
-  [[nodiscard]] static Result<MarkSearch> of(const RecordingReader& recording, const Config& config);
+  [[nodiscard]] static Result<MarkSearch> of(const RecordingReader& recording,
+                                             const Config& config);
 
   /// Before anybody gives the samples their datum.
   void take(const Batch& batch);

@@ -1,5 +1,6 @@
 #pragma once
-/// Raw device bytes into the samples they were decoded to, by the same receivers as live. One thread.
+/// Raw device bytes into the samples they were decoded to, by the same receivers as live. One
+/// thread.
 
 #include <cstddef>
 #include <memory>
@@ -10,8 +11,8 @@
 
 #include "abbe/config/config.hpp"
 #include "abbe/drivers/can/encoder_receiver.hpp"
+#include "abbe/drivers/counter_card/decimation.hpp"
 #include "abbe/drivers/counter_card/receiver.hpp"
-#include "abbe/drivers/counter_card/thinning.hpp"
 #include "abbe/drivers/environment/receiver.hpp"
 #include "abbe/drivers/ippdme/receiver.hpp"
 #include "abbe/drivers/sampling/mark_watcher.hpp"
@@ -27,7 +28,8 @@ class RawDecoder {
   explicit RawDecoder(const Config& config,
                       const std::optional<drivers::CounterCardProgress>& left = std::nullopt);
 
-  /// Appends to `batch` what the bytes complete; those of a device that `config` does not have give nothing.
+  /// Appends to `batch` what the bytes complete; those of a device that `config` does not have give
+  /// nothing.
   void take(const protocol::RawBlock& block, std::string_view device, Batch& batch);
 
  private:
@@ -46,7 +48,7 @@ class RawDecoder {
   std::optional<drivers::EncoderReceiver> encoder_;
   std::string card_name_;
   std::unique_ptr<drivers::CounterCardReceiver> card_;
-  drivers::ScanThinning thinning_{1};
+  drivers::ScanDecimation decimation_{1};
   std::string reference_name_;
   std::unique_ptr<drivers::CounterCardReceiver> reference_card_;
   drivers::MarkWatcher mark_watcher_;

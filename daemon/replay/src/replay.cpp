@@ -16,7 +16,7 @@
 #include "abbe/pipeline/assembler.hpp"
 #include "abbe/pipeline/counting_state.hpp"
 #include "abbe/pipeline/datum.hpp"
-#include "live_turns.hpp"
+#include "live_cycles.hpp"
 #include "mark_search.hpp"
 #include "raw_decoder.hpp"
 
@@ -26,7 +26,8 @@ namespace {
 using protocol::HostTime;
 
 constexpr std::uint64_t kMessagesPerProgress = 256;
-// So far bytes may be ahead of what was made of them: a busy computer's threads at many times real time.
+// So far bytes may be ahead of what was made of them: a busy computer's threads at many times real
+// time.
 constexpr auto kLongestAhead = std::chrono::seconds{10};
 
 /// The calibrations the recording asks for, one after the other.
@@ -42,7 +43,7 @@ class Calibrations {
 
   /// Requests came between two turns. One that came later ends the one before, as it did live (by a
   /// cancellation).
-  void begin_turn(HostTime taken) {
+  void begin_cycle(HostTime taken) {
     while (next_ < requests_.size() && requests_[next_].from < taken) begin_next();
   }
   void take(const protocol::Snapshot& snapshot) {
@@ -77,10 +78,12 @@ class Calibrations {
     options_.runs(std::move(run));
   }
   void identify_again(const CalibrationRun& run) {
-    ReplayedCalibration c{.ended = session_.status(), .points_sha256 = inputs_of(run).back().sha256};
+    ReplayedCalibration c{.ended = session_.status(),
+                          .points_sha256 = inputs_of(run).back().sha256};
     c.outcome = identify(run, config_, options_.active);
     if (*c.outcome) {
-      std::visit([this](auto& candidate) { judge_recording(recording_, candidate.verdict); }, **c.outcome);
+      std::visit([this](auto& candidate) { judge_recording(recording_, candidate.verdict); },
+                 **c.outcome);
       const ModelDocument document = document_of(**c.outcome, config_, {}, {});
       c.model_hash = model_hash(document);
       c.model_id = model_id(document);
@@ -110,25 +113,29 @@ std::optional<std::size_t> environment_place(const Config& config, std::string_v
 /// What the marks gave in the live run: since when a datum was known is not in the bytes.
 Result<Datum> datum_of(const RecordingReader& recording, const Config& config) {
   const auto versions = recording.metadata().find("abbe.versions");
-  const bool asked = versions != recording.metadata().end() && versions->second.contains(kDatumRule);
+  const bool asked =
+      versions != recording.metadata().end() && versions->second.contains(kDatumRule);
   Datum datum{config, asked ? Datum::WithoutMarks::NeedAZero : Datum::WithoutMarks::Untouched};
+
   for (const auto& attachment : recording.attachments()) {
     if (attachment.name != kDatumStateName) continue;
     const auto state = datum_state_from_attachment(attachment);
     if (!state) return tl::unexpected(state.error());
     datum.go_on(*state);
   }
+
   for (const auto& attachment : recording.attachments()) {
     if (attachment.name != kDatumName) continue;
     const auto found = datum_from_attachment(attachment);
     if (!found) return tl::unexpected(found.error());
     datum.found(*found);
   }
+
   return datum;
 }
 
-/// A card that was set up while one file was written and spoke in the next: what a replay from the bytes of
-/// this next file cannot see, but the samples of the live run say.
+/// A card that was set up while one file was written and spoke in the next: what a replay from the
+/// bytes of this next file cannot see, but the samples of the live run say.
 class SetUpBefore {
  public:
   explicit SetUpBefore(const RecordingReader& recording)
@@ -141,8 +148,9 @@ class SetUpBefore {
   }
   /// Before `datum` is applied to the samples from the bytes.
   void apply(const Batch& batch, Datum& datum) {
-    const bool seen = std::ranges::any_of(
-        batch.axes, [](const auto& s) { return has(s.head.flags, protocol::SampleFlag::Restarted); });
+    const bool seen = std::ranges::any_of(batch.axes, [](const auto& s) {
+      return has(s.head.flags, protocol::SampleFlag::Restarted);
+    });
     if (at_ && !seen) datum.go_on({.at = *at_, .unknown = 0xff});
     at_.reset();
   }
@@ -169,8 +177,10 @@ class Pace {
   Pace(double speed, HostTime first) : speed_(speed), first_(first) {}
   void wait_for(HostTime recorded) const {
     if (!(speed_ > 0.0)) return;
-    const std::chrono::duration<double> wall = std::chrono::duration<double>(recorded - first_) / speed_;
-    std::this_thread::sleep_until(start_ + std::chrono::duration_cast<std::chrono::nanoseconds>(wall));
+    const std::chrono::duration<double> wall =
+        std::chrono::duration<double>(recorded - first_) / speed_;
+    std::this_thread::sleep_until(start_ +
+                                  std::chrono::duration_cast<std::chrono::nanoseconds>(wall));
   }
 
  private:
@@ -196,8 +206,8 @@ Result<Attached> attached_to(const RecordingReader& recording, const Config& con
   return Attached{std::move(*requests), std::move(*datum), std::move(*marks)};
 }
 
-/// How far an earlier run had left the counters, where this one was told; one that cannot be read is as good
-/// as none: the counters read the same but for whole rounds.
+/// How far an earlier run had left the counters, where this one was told; one that cannot be read
+/// is as good as none: the counters read the same but for whole rounds.
 std::optional<drivers::CounterCardProgress> left_progress(const RecordingReader& recording) {
   for (const auto& attachment : recording.attachments()) {
     if (attachment.name != kCountingStateName) continue;
@@ -211,11 +221,14 @@ std::optional<drivers::CounterCardProgress> left_progress(const RecordingReader&
 class FromBytes {
  public:
   FromBytes(const RecordingReader& recording, const Config& config)
-      : decoder_(config, left_progress(recording)), ahead_(recording.messages()), next_(ahead_.next()) {
+      : decoder_(config, left_progress(recording)),
+        ahead_(recording.messages()),
+        next_(ahead_.next()) {
     sink_.tracker_point = [this](const auto& p, std::string_view) { expect(points_, p); };
     sink_.axis_sample = [this](const auto& s, std::string_view) { expect(axes_, s); };
     sink_.probe_trigger = [this](const auto& t, std::string_view) { expect(touches_, t); };
-    // What [[environment]] measures counts only after the watermark: there a turn more or less is nothing.
+    // What [[environment]] measures counts only after the watermark: there a turn more or less is
+    // nothing.
     sink_.environment = [this, &config](const auto& e, std::string_view device) {
       if (!environment_place(config, device)) expect(weather_, e);
     };
@@ -226,7 +239,7 @@ class FromBytes {
   void take(const protocol::RawBlock& block, std::string_view device, Batch& batch) {
     decoder_.take(block, device, batch);
   }
-  void end_turn(Batch& batch) {
+  void end_cycle(Batch& batch) {
     for (; next_ && next_->taken <= batch.taken + kLongestAhead; next_ = ahead_.next())
       (void)deliver(*next_, sink_);
     points_.hold(batch.taken, batch.points);
@@ -237,7 +250,7 @@ class FromBytes {
 
  private:
   template <class Sample>
-  void expect(LiveTurns<Sample>& turns, const Sample& sample) {
+  void expect(LiveCycles<Sample>& turns, const Sample& sample) {
     turns.expect(sample.head.time, next_->taken);
   }
 
@@ -245,10 +258,10 @@ class FromBytes {
   RecordingReader::Cursor ahead_;
   std::optional<RecordedMessage> next_;
   RecordingSink sink_;
-  LiveTurns<protocol::TrackerPoint> points_;
-  LiveTurns<protocol::AxisSample> axes_;
-  LiveTurns<protocol::ProbeTrigger> touches_;
-  LiveTurns<protocol::EnvironmentSample> weather_;
+  LiveCycles<protocol::TrackerPoint> points_;
+  LiveCycles<protocol::AxisSample> axes_;
+  LiveCycles<protocol::ProbeTrigger> touches_;
+  LiveCycles<protocol::EnvironmentSample> weather_;
 };
 
 /// The hub once more, turn by turn.
@@ -296,7 +309,9 @@ class Replay {
   }
   void take_bytes() {
     bytes_.emplace(recording_, config_);
-    sink_.raw_block = [this](const auto& b, std::string_view device) { bytes_->take(b, device, batch_); };
+    sink_.raw_block = [this](const auto& b, std::string_view device) {
+      bytes_->take(b, device, batch_);
+    };
     if (set_up_.possible())
       sink_.axis_sample = [this](const auto& s, std::string_view) { set_up_.take_live(s.head); };
     // The bytes of what a former file handed on are in that file.
@@ -321,18 +336,19 @@ class Replay {
     std::uint64_t messages = 0;
     auto cursor = recording_.messages();
     while (const auto message = cursor.next()) {
-      if (message->taken != batch_.taken) end_turn();
+      if (message->taken != batch_.taken) end_cycle();
       batch_.taken = message->taken;
       published_ = message->published;
       pace.wait_for(message->taken);
       if (!deliver(*message, sink_)) ++report_.undecodable;
-      if (++messages % kMessagesPerProgress == 0 && options_.progress) options_.progress(cursor.progress());
+      if (++messages % kMessagesPerProgress == 0 && options_.progress)
+        options_.progress(cursor.progress());
     }
-    end_turn();
+    end_cycle();
   }
-  void end_turn() {
-    calibrations_.begin_turn(batch_.taken);
-    if (bytes_) bytes_->end_turn(batch_);
+  void end_cycle() {
+    calibrations_.begin_cycle(batch_.taken);
+    if (bytes_) bytes_->end_cycle(batch_);
     marks_.take(batch_);
     if (bytes_) {  // recorded samples have their datum
       set_up_.apply(batch_, datum_);
@@ -384,11 +400,10 @@ void judge_recording(const RecordingReader& recording, calib::Verdict& verdict) 
 
 Result<Config> recorded_config(const RecordingReader& recording, const std::string& file) {
   if (recording.configuration_check() == MetadataCheck::Damaged)
-    return fail(
-        ErrorCode::BadInput,
-        fmt::format("{}: the recorded configuration is damaged (its checksum is wrong): give the file it was "
-                    "recorded with",
-                    file));
+    return fail(ErrorCode::BadInput, fmt::format("{}: the recorded configuration is damaged (its "
+                                                 "checksum is wrong): give the file it was "
+                                                 "recorded with",
+                                                 file));
   return parse_config(recording.info().configuration, file + " (recorded configuration)");
 }
 

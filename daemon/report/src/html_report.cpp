@@ -15,9 +15,11 @@ namespace {
 using nlohmann::json;
 
 constexpr std::string_view kStyle =
-    "body{font:15px/1.45 system-ui,sans-serif;max-width:70rem;margin:2rem auto;padding:0 1rem;color:#1b1f24}"
+    "body{font:15px/1.45 system-ui,sans-serif;max-width:70rem;margin:2rem auto;padding:0 "
+    "1rem;color:#1b1f24}"
     "h1{font-size:1.5rem}h2{font-size:1.15rem;margin-top:2rem;border-bottom:1px solid #ccd3da}"
-    "table{border-collapse:collapse;margin:.6rem 0}th,td{padding:.15rem .9rem .15rem 0;text-align:left}"
+    "table{border-collapse:collapse;margin:.6rem 0}th,td{padding:.15rem .9rem .15rem "
+    "0;text-align:left}"
     "td{font-variant-numeric:tabular-nums}th{font-weight:600;color:#57606a}"
     ".charts{display:flex;flex-wrap:wrap;gap:1rem}.charts div{width:33rem;height:19rem}"
     "@media print{.charts div{break-inside:avoid}}";
@@ -43,6 +45,7 @@ std::string escaped(std::string_view text) {
         out += c;
     }
   }
+
   return out;
 }
 
@@ -159,6 +162,7 @@ void HtmlReport::chart(const LineChart& chart) {
                         {"borderColor", colour(i)},
                         {"backgroundColor", colour(i)}});
   }
+
   canvas(for_script({{"type", "scatter"},
                      {"data", {{"datasets", datasets}}},
                      {"options", options(chart.title, axis(chart.x_label), axis(chart.y_label))}}));
@@ -168,7 +172,9 @@ void HtmlReport::chart(const Histogram& histogram) {
   const Bins bins = bins_of(histogram);
   json labels = json::array(), datasets = json::array();
   for (std::size_t b = 0; b < bins.count; ++b)
-    labels.push_back(fmt::format("{:.3g}", bins.first + (static_cast<double>(b) + 0.5) * bins.width));
+    labels.push_back(
+        fmt::format("{:.3g}", bins.first + (static_cast<double>(b) + 0.5) * bins.width));
+
   for (std::size_t i = 0; i < histogram.series.size(); ++i) {
     std::vector<std::size_t> counts(bins.count, 0);
     for (const double v : histogram.series[i].values) ++counts[bins.of(v)];
@@ -179,11 +185,13 @@ void HtmlReport::chart(const Histogram& histogram) {
                         {"barPercentage", 1.0},
                         {"categoryPercentage", 1.0}});
   }
-  canvas(for_script(
-      {{"type", "bar"},
-       {"data", {{"labels", labels}, {"datasets", datasets}}},
-       {"options", options(histogram.title, {{"title", {{"display", true}, {"text", histogram.x_label}}}},
-                           axis("count"))}}));
+
+  canvas(
+      for_script({{"type", "bar"},
+                  {"data", {{"labels", labels}, {"datasets", datasets}}},
+                  {"options", options(histogram.title,
+                                      {{"title", {{"display", true}, {"text", histogram.x_label}}}},
+                                      axis("count"))}}));
 }
 
 void HtmlReport::chart(const VectorChart& chart) {
@@ -192,10 +200,12 @@ void HtmlReport::chart(const VectorChart& chart) {
   json line = json::array(), dots = json::array();
   for (const auto& a : chart.arrows) {
     line.push_back({{"x", a.x}, {"y", a.y}});
-    line.push_back({{"x", a.x + chart.magnification * a.dx}, {"y", a.y + chart.magnification * a.dy}});
+    line.push_back(
+        {{"x", a.x + chart.magnification * a.dx}, {"y", a.y + chart.magnification * a.dy}});
     line.push_back(gap);
     for (const double radius : {2.0, 0.0, 0.0}) dots.push_back(radius);
   }
+
   const json dataset{{"label", chart.name},      {"data", line},
                      {"showLine", true},         {"spanGaps", false},
                      {"borderWidth", 1.5},       {"pointRadius", dots},
@@ -214,8 +224,8 @@ void HtmlReport::canvas(std::string_view configuration) {
     body_ += "<div class=\"charts\">\n";
   }
   body_ += fmt::format(
-      "<div><canvas id=\"chart{0}\"></canvas></div>\n<script>show(\"chart{0}\",{1})</script>\n{2}", charts_,
-      configuration, kEnd);
+      "<div><canvas id=\"chart{0}\"></canvas></div>\n<script>show(\"chart{0}\",{1})</script>\n{2}",
+      charts_, configuration, kEnd);
   ++charts_;
 }
 
@@ -227,7 +237,8 @@ std::string HtmlReport::text() const {
   return fmt::format(
       "<!doctype html>\n<html lang=\"en\">\n<head>\n<meta "
       "charset=\"utf-8\">\n<title>{0}</title>\n<style>{1}</style>\n"
-      "<script>{2}</script>\n<script>{3}</script>\n</head>\n<body>\n<h1>{0}</h1>\n{4}</body>\n</html>\n",
+      "<script>{2}</script>\n<script>{3}</script>\n</head>\n<body>\n<h1>{0}</h1>\n{4}</body>\n</"
+      "html>\n",
       title_, kStyle, charts_ > 0 ? chart_js() : std::string_view{}, kShow, body_);
 }
 

@@ -30,9 +30,11 @@ std::vector<double> in_um(const std::vector<double>& lengths_m) {
   return out;
 }
 
-void add_verdict(HtmlReport& page, const calib::Verdict& verdict, std::string_view held_out, int decimals) {
+void add_verdict(HtmlReport& page, const calib::Verdict& verdict, std::string_view held_out,
+                 int decimals) {
   page.heading("Verdict");
   page.paragraph(verdict.accepted ? "The gate accepts the model." : "The gate refuses the model:");
+
   for (const auto& reason : verdict.reasons) page.paragraph(reason);
   for (const auto& note : verdict.notes) page.paragraph(note);
   const auto& figures = verdict.held_out;
@@ -41,7 +43,8 @@ void add_verdict(HtmlReport& page, const calib::Verdict& verdict, std::string_vi
        um_text(figures.no_compensation_rms_m, decimals) + " rms"},
       {"with the model", um_text(figures.candidate_rms_m, decimals) + " rms"},
       {"the same in standard deviations of the measurement (1: noise alone)",
-       fmt::format("{:.2f} without, {:.2f} with the model", figures.no_compensation, figures.candidate)}};
+       fmt::format("{:.2f} without, {:.2f} with the model", figures.no_compensation,
+                   figures.candidate)}};
   if (figures.active_rms_m)
     facts.emplace_back("with the model active until now, where it holds",
                        um_text(*figures.active_rms_m, decimals) + " rms");
@@ -49,7 +52,8 @@ void add_verdict(HtmlReport& page, const calib::Verdict& verdict, std::string_vi
   page.facts(facts);
 }
 
-void add_model_origin(HtmlReport& page, const ModelDocument& document, const std::vector<InputFile>& inputs,
+void add_model_origin(HtmlReport& page, const ModelDocument& document,
+                      const std::vector<InputFile>& inputs,
                       const std::vector<std::pair<std::string, std::string>>& more) {
   page.heading("Model");
   std::vector<std::pair<std::string, std::string>> facts{

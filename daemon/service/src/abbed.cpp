@@ -32,11 +32,11 @@
 #include "abbe/publishing/dds_supervisor.hpp"
 #include "abbe/recording/left_recordings.hpp"
 #include "abbe/recording/old_recordings.hpp"
+#include "abbe/service/background_tasks.hpp"
 #include "abbe/service/control_api.hpp"
 #include "abbe/service/counting_state_thread.hpp"
 #include "abbe/service/hub.hpp"
 #include "abbe/service/journal_thread.hpp"
-#include "abbe/service/work_aside.hpp"
 #include "model_status_name.hpp"
 #include "outcome.hpp"
 
@@ -49,19 +49,22 @@ using WallTime = std::chrono::steady_clock::time_point;
 constexpr auto kTidyPeriod = 1h;    // old recordings are looked for this often
 constexpr auto kTidyFirst = 10min;  // until then a time server has set a clock that started wrong
 constexpr auto kHubPatience = 1s;   // thousands of turns; a hub silent for this long hangs
-constexpr auto kEndPatience = 5s;   // for the control socket (3 s at most), the journal and the hub to end
-constexpr int kHubHangs = 70;       // exit code
+// for the control socket (3 s at most), the journal and the hub to end
+constexpr auto kEndPatience = 5s;
+constexpr int kHubHangs = 70;  // exit code
 
 /// UTC less host time, both read now; the one constant that ever mentions the wall clock.
 protocol::UtcOffset utc_offset(const drivers::TimeSource& time) {
   const auto utc = std::chrono::system_clock::now().time_since_epoch();
-  return {std::chrono::duration_cast<std::chrono::nanoseconds>(utc) - time.now().time_since_epoch()};
+  return {std::chrono::duration_cast<std::chrono::nanoseconds>(utc) -
+          time.now().time_since_epoch()};
 }
 
 Result<void> make_directory(const std::filesystem::path& directory) {
   std::error_code error;
   std::filesystem::create_directories(directory, error);
-  if (error) return fail(ErrorCode::Io, fmt::format("create {}: {}", directory.string(), error.message()));
+  if (error)
+    return fail(ErrorCode::Io, fmt::format("create {}: {}", directory.string(), error.message()));
   return {};
 }
 
@@ -70,8 +73,8 @@ std::string recording_name() {
   const std::time_t now = std::chrono::system_clock::to_time_t(std::chrono::system_clock::now());
   std::tm utc{};
   ::gmtime_r(&now, &utc);
-  return fmt::format("abbe-{:04}-{:02}-{:02}T{:02}-{:02}-{:02}Z-{}", utc.tm_year + 1900, utc.tm_mon + 1,
-                     utc.tm_mday, utc.tm_hour, utc.tm_min, utc.tm_sec, ::getpid());
+  return fmt::format("abbe-{:04}-{:02}-{:02}T{:02}-{:02}-{:02}Z-{}", utc.tm_year + 1900,
+                     utc.tm_mon + 1, utc.tm_mday, utc.tm_hour, utc.tm_min, utc.tm_sec, ::getpid());
 }
 
 RecorderThreadOptions recorder_options(const Config& config, const std::string& name) {
@@ -91,6 +94,7 @@ RecorderThreadOptions recorder_options(const Config& config, const std::string& 
   if (config.probe) options.probe = config.probe->name;
   if (config.cmm) options.probe = config.cmm->name;
   if (config.cmm_reads_axes()) options.encoder = config.cmm->name;
+
   return options;
 }
 
@@ -105,8 +109,8 @@ PublisherOptions publisher_options(const Config& config) {
                                   : dds_security_is_off(config.dds.domain)};
 }
 
-/// The hub is soft real time: above the ordinary programs, below the devices. A refusal is a warning in mode
-/// `ignore`.
+/// The hub is soft real time: above the ordinary programs, below the devices. A refusal is a
+/// warning in mode `ignore`.
 Result<void> set_priority(std::thread& thread, const DaemonConfig& config) {
   sched_param parameters{};
   parameters.sched_priority = config.hub_priority;
@@ -118,8 +122,8 @@ Result<void> set_priority(std::thread& thread, const DaemonConfig& config) {
     error = ::pthread_setaffinity_np(thread.native_handle(), sizeof cpus, &cpus);
   }
   if (error == 0) return {};
-  return fail(ErrorCode::Io,
-              fmt::format("hub thread: SCHED_FIFO {}: {}", config.hub_priority, std::strerror(error)));
+  return fail(ErrorCode::Io, fmt::format("hub thread: SCHED_FIFO {}: {}", config.hub_priority,
+                                         std::strerror(error)));
 }
 
 }  // namespace
@@ -158,7 +162,8 @@ struct Abbed::State {
   std::optional<CountingStateThread> counting_state;
   std::future<Result<std::vector<std::filesystem::path>>> tidying;
   // The work's own: nothing waits for it at the end.
-  const std::shared_ptr<std::atomic<bool>> stop_closing = std::make_shared<std::atomic<bool>>(false);
+  const std::shared_ptr<std::atomic<bool>> stop_closing =
+      std::make_shared<std::atomic<bool>>(false);
   std::future<Result<std::vector<LeftRecording>>> closing_left;
   const std::string recording = recording_name();
   ClockSteps clock_steps{read_clocks()};
@@ -166,7 +171,10 @@ struct Abbed::State {
   WallTime next_tidying = WallTime::clock::now() + kTidyFirst;
 
   State(Config c, AbbedOptions o)
-      : config(std::move(c)), options(std::move(o)), time(config.daemon.speed), utc(utc_offset(time)) {}
+      : config(std::move(c)),
+        options(std::move(o)),
+        time(config.daemon.speed),
+        utc(utc_offset(time)) {}
   State(const State&) = delete;
   State& operator=(const State&) = delete;
   ~State() {
@@ -184,15 +192,17 @@ struct Abbed::State {
                     std::chrono::seconds{kEndPatience}.count(), kHubHangs, recording)};
     control.reset();
     journal.reset();  // these ask the hub once more
+
     if (control_listener) ::unlink(config.control.socket.c_str());
     if (hub) hub->stop();
     hub_may_run = {};
     if (hub_thread.joinable()) hub_thread.join();
-    hub_has_ended.store(true, std::memory_order_release);  // pairs with the acquire in look_at_counting()
+    hub_has_ended.store(true,
+                        std::memory_order_release);  // pairs with the acquire in look_at_counting()
   }
 
-  /// Asked before anything is opened: a second abbed that got as far as the socket for abbe-dds would, merely
-  /// by trying it, cut the first one off from its abbe-dds.
+  /// Asked before anything is opened: a second abbed that got as far as the socket for abbe-dds
+  /// would, merely by trying it, cut the first one off from its abbe-dds.
   Result<void> refuse_second_daemon() {
     if (!is_listened_at(config.control.socket)) return {};
     return fail(ErrorCode::Io, fmt::format("listen {}: another daemon already answers there",
@@ -222,37 +232,43 @@ struct Abbed::State {
   Result<void> open_dds() {
     if (config.dds.supervise == Supervise::Off) return {};
     const bool supervised = config.dds.supervise == Supervise::Child;
-    auto link = DdsLink::listen(config.dds.socket, {.process = supervised ? &dds_process : nullptr});
+    auto link =
+        DdsLink::listen(config.dds.socket, {.process = supervised ? &dds_process : nullptr});
     if (!link) return tl::unexpected(link.error());
     publisher.emplace(std::move(*link), publisher_options(config), utc);
     check_dds_security();
     if (!supervised) return {};
-    DdsSupervisor::Options child{
-        .program = options.dds_program,
-        .arguments = {"--socket", config.dds.socket.string(), "--domain", std::to_string(config.dds.domain)},
-        .priority = config.dds.priority,
-        .process = &dds_process};
+    DdsSupervisor::Options child{.program = options.dds_program,
+                                 .arguments = {"--socket", config.dds.socket.string(), "--domain",
+                                               std::to_string(config.dds.domain)},
+                                 .priority = config.dds.priority,
+                                 .process = &dds_process};
+
     if (!config.dds.profile.empty()) {
       child.arguments.insert(child.arguments.end(), {"--profile", config.dds.profile.string()});
     }
+
     if (!config.dds.security.empty()) {
       child.arguments.insert(child.arguments.end(), {"--security", config.dds.security.string()});
     }
+
     auto started = DdsSupervisor::start(std::move(child), WallTime::clock::now());
     if (!started) return tl::unexpected(started.error());
     supervisor.emplace(std::move(*started));
+
     return {};
   }
 
-  /// A warning only: acquisition and recording go on where abbe-dds cannot, and it refuses unusable keys
-  /// itself.
+  /// A warning only: acquisition and recording go on where abbe-dds cannot, and it refuses unusable
+  /// keys itself.
   void check_dds_security() {
     if (!dds_is_secured(config.dds.security, config.dds.profile)) {
       warnings.push_back(dds_security_is_off(config.dds.domain));
     } else if (!config.dds.security.empty()) {
       const auto identity =
           find_dds_identity(config.dds.security, DdsRole::Daemon, std::chrono::system_clock::now());
-      if (!identity) warnings.push_back(identity.error().text + "; nothing is published over DDS until then");
+      if (!identity)
+        warnings.push_back(identity.error().text + "; nothing is published over DDS until then");
     }
   }
 
@@ -285,9 +301,11 @@ struct Abbed::State {
     return {};
   }
 
-  /// The thread waits until there is a hub to run; whether it may have its priority is known before.
+  /// The thread waits until there is a hub to run; whether it may have its priority is known
+  /// before.
   Result<void> start_hub_thread() {
-    hub_thread = std::thread([this, may_run = hub_may_run.get_future()]() mutable { run_hub(may_run); });
+    hub_thread =
+        std::thread([this, may_run = hub_may_run.get_future()]() mutable { run_hub(may_run); });
     const auto set = set_priority(hub_thread, config.daemon);
     return set ? set : refused_by_system(set.error());
   }
@@ -306,6 +324,7 @@ struct Abbed::State {
       recorder->attach(to_attachment(*left_counting.state), time.now());
       left = left_counting.state->counting;
     }
+
     reference.emplace(config, recorder.get(), std::move(left));
     verification.emplace(config);
     touching.emplace(*devices, config.cmm.has_value());
@@ -323,13 +342,17 @@ struct Abbed::State {
                          .tracker = &*tracker});
     running_since = WallTime::clock::now();
     hub_may_run.set_value();
-    closing_left = start_aside([dir = config.recording.dir, running = recording, stop = stop_closing] {
-      return close_left_recordings(dir, running, *stop);
-    });
+
+    closing_left =
+        run_in_background([dir = config.recording.dir, running = recording, stop = stop_closing] {
+          return close_left_recordings(dir, running, *stop);
+        });
+
     control = serve_control(std::move(control_listener), config.control.socket,
                             [this](const nlohmann::json& request, const ControlPeer& peer) {
                               return answer_request(*hub, request, peer);
                             });
+
     journal.emplace(config.machine.name, open_journal(), [this] { return observe(); });
     if (config.counter_card) {
       counting_state.emplace(
@@ -337,6 +360,7 @@ struct Abbed::State {
           [this, set_up = counting_set_up(config)] { return look_at_counting(set_up); },
           [](const std::string& fault) { fmt::print(stderr, "abbed: {}\n", fault); });
     }
+
     return {};
   }
 
@@ -344,16 +368,19 @@ struct Abbed::State {
   std::optional<CountingState> look_at_counting(const std::string& set_up) {
     if (boot.empty()) return std::nullopt;
     const auto look = [this] { return std::pair{reference->counting(), reference->carried_on()}; };
+
     // acquire: pairs with the release in end_hub(); nothing else uses what the hub had any more
-    auto seen =
-        hub_has_ended.load(std::memory_order_acquire) ? std::optional{look()} : hub->call(look, kHubPatience);
+    auto seen = hub_has_ended.load(std::memory_order_acquire) ? std::optional{look()}
+                                                              : hub->call(look, kHubPatience);
     if (!seen || !seen->first || seen->first->progress.serial_number().empty()) return std::nullopt;
+
     if (left_counting.state) {
       left_counting.state.reset();
       if (!seen->second.empty())
         fmt::print(stderr, "abbed: the counter card counted on: {} stay referenced\n",
                    fmt::join(seen->second, ", "));
     }
+
     return CountingState{.boot_id = boot, .set_up = set_up, .counting = std::move(*seen->first)};
   }
 
@@ -372,6 +399,7 @@ struct Abbed::State {
     Observed now = seen ? std::move(*seen) : Observed{.hub_answers = false};
     const std::lock_guard lock{participant_mutex};
     now.participant = participant;
+
     return now;
   }
 
@@ -394,17 +422,21 @@ struct Abbed::State {
         fmt::print(stderr, "abbed: removed {} recordings older than {} h\n", removed->size(),
                    config.recording.keep.count());
     }
+
     if (clock_steps.look(read_clocks()) && std::exchange(tidies, false))
-      fmt::print(stderr, "abbed: the clock was set: no old recordings are removed until the next start\n");
+      fmt::print(stderr,
+                 "abbed: the clock was set: no old recordings are removed until the next start\n");
     if (!tidies || tidying.valid() || now < next_tidying) return;
     next_tidying = now + kTidyPeriod;
-    tidying = start_aside([dir = config.recording.dir, models = config.daemon.models_dir(),
+
+    tidying =
+        run_in_background([dir = config.recording.dir, models = config.daemon.models_dir(),
                            rule = KeepRule{.now = std::filesystem::file_time_type::clock::now(),
                                            .keep = config.recording.keep,
                                            .running = recording,
                                            .lasted = now - running_since}] {
-      return remove_old_recordings(dir, models, rule);
-    });
+          return remove_old_recordings(dir, models, rule);
+        });
   }
 
   void report_left_recordings() {
@@ -441,25 +473,31 @@ struct Abbed::State {
 Result<std::unique_ptr<Abbed>> Abbed::start(Config config, AbbedOptions options) {
   drivers::keep_heap();
   auto state = std::make_unique<State>(std::move(config), std::move(options));
-  prepare_work_aside();
-  for (const auto& directory : {state->config.daemon.runtime_dir, state->config.control.socket.parent_path(),
-                                state->config.dds.socket.parent_path()}) {
+  prepare_background_tasks();
+
+  for (const auto& directory :
+       {state->config.daemon.runtime_dir, state->config.control.socket.parent_path(),
+        state->config.dds.socket.parent_path()}) {
     if (auto made = make_directory(directory); !made) return tl::unexpected(made.error());
   }
+
   using Step = Result<void> (State::*)();
-  // The recorder last of all that may refuse: a start that fails again and again leaves no files behind.
-  for (const Step step : {&State::refuse_second_daemon, &State::open_models, &State::open_dds,
-                          &State::bound_cpu_latency, &State::start_devices, &State::start_hub_thread,
-                          &State::listen_control, &State::open_recorder, &State::run}) {
+  // The recorder last of all that may refuse: a start that fails again and again leaves no files
+  // behind.
+  for (const Step step :
+       {&State::refuse_second_daemon, &State::open_models, &State::open_dds,
+        &State::bound_cpu_latency, &State::start_devices, &State::start_hub_thread,
+        &State::listen_control, &State::open_recorder, &State::run}) {
     if (auto done = ((*state).*step)(); !done) return tl::unexpected(done.error());
   }
+
   return std::unique_ptr<Abbed>{new Abbed{std::move(state)}};
 }
 
 Abbed::Abbed(std::unique_ptr<State> state) : state_(std::move(state)) {}
 Abbed::~Abbed() = default;
 
-void Abbed::turn() {
+void Abbed::cycle() {
   const auto now = WallTime::clock::now();
   state_->supervise(now);
   state_->tidy_recordings(now);
@@ -467,7 +505,8 @@ void Abbed::turn() {
 }
 
 bool Abbed::alive() const {
-  return WallTime::clock::now() - std::max(state_->hub->last_turn(), state_->running_since) < kHubPatience;
+  return WallTime::clock::now() - std::max(state_->hub->last_cycle(), state_->running_since) <
+         kHubPatience;
 }
 
 std::vector<std::string> Abbed::warnings() const {

@@ -10,7 +10,7 @@
 #include "abbe/methods/calibration_run.hpp"
 #include "abbe/methods/otf_inputs.hpp"
 #include "abbe/model/model_document.hpp"
-#include "abbe/service/work_aside.hpp"
+#include "abbe/service/background_tasks.hpp"
 #include "outcome.hpp"
 
 namespace abbe::daemon {
@@ -22,11 +22,12 @@ constexpr std::chrono::milliseconds kLookForStop{100};
 
 std::string verdict_text(const calib::Verdict& verdict) {
   const auto& h = verdict.held_out;
-  const std::string figures =
-      fmt::format("held-out residual rms {:.3f} um, without compensation {:.3f} um{}",
-                  h.candidate_rms_m * 1e6, h.no_compensation_rms_m * 1e6,
-                  h.active_rms_m ? fmt::format(", active model {:.3f} um", *h.active_rms_m * 1e6) : "");
-  const std::string notes = verdict.notes.empty() ? "" : fmt::format("; {}", fmt::join(verdict.notes, "; "));
+  const std::string figures = fmt::format(
+      "held-out residual rms {:.3f} um, without compensation {:.3f} um{}", h.candidate_rms_m * 1e6,
+      h.no_compensation_rms_m * 1e6,
+      h.active_rms_m ? fmt::format(", active model {:.3f} um", *h.active_rms_m * 1e6) : "");
+  const std::string notes =
+      verdict.notes.empty() ? "" : fmt::format("; {}", fmt::join(verdict.notes, "; "));
   if (verdict.accepted) return "accepted: " + figures + notes;
   return fmt::format("refused: {} ({}{})", fmt::join(verdict.reasons, "; "), figures, notes);
 }
@@ -47,12 +48,13 @@ RecordingDigest digest_of(std::future<RecordingDigest>& wanted, const std::atomi
   }
 }
 
-/// A recording with a gap is named, but not as what the model can be checked with: its hash stands behind
-/// that of the data.
+/// A recording with a gap is named, but not as what the model can be checked with: its hash stands
+/// behind that of the data.
 void cite(const RecordingDigest& recording, std::vector<InputFile>& inputs) {
   if (recording.bytes == 0) return;
   // The hash is that of the first `bytes` bytes: the recording goes on.
-  const auto name = fmt::format("{} ({} bytes)", recording.file.filename().string(), recording.bytes);
+  const auto name =
+      fmt::format("{} ({} bytes)", recording.file.filename().string(), recording.bytes);
   inputs.insert(recording.gap.empty() ? inputs.begin() : inputs.end(), {name, recording.sha256});
 }
 
@@ -78,14 +80,16 @@ CalibrationService::~CalibrationService() {
   stop_identification(until - kLastTry);
   if (!to_keep_) return;
   if (const auto kept = try_once_more(until); !kept)
-    fmt::print(stderr, "abbed: model {} is lost: {}; `abbe identify {} --recording` finds it again\n",
+    fmt::print(stderr,
+               "abbed: model {} is lost: {}; `abbe identify {} --recording` finds it again\n",
                to_keep_->id, kept.error().text, to_keep_->document.method);
 }
 
 /// One that had come to its end already is not lost.
 void CalibrationService::stop_identification(WallTime until) {
-  if (!identification_.valid() || identification_.wait_until(until) != std::future_status::ready) return;
-  (void)sign(outcome_of(identification_), latest_turn_);
+  if (!identification_.valid() || identification_.wait_until(until) != std::future_status::ready)
+    return;
+  (void)sign(outcome_of(identification_), latest_cycle_);
 }
 
 Result<void> CalibrationService::try_once_more(WallTime until) {
@@ -94,14 +98,17 @@ Result<void> CalibrationService::try_once_more(WallTime until) {
       return fail(ErrorCode::Io, "the store has not answered");
     if (outcome_of(keeping_)) return {};
   }
+
   ModelKeeper keeper = authority_.keeper();
   keeper.set_lock_patience(kLastTry);
-  keeping_ = start_abandonable([keeper = std::move(keeper), model = to_keep_]() mutable {
+  keeping_ = run_abandonable([keeper = std::move(keeper), model = to_keep_]() mutable {
     return keeper.keep(model->document, model->verdict, model->actor, {});
   });
+
   if (keeping_.wait_until(until) != std::future_status::ready)
     return fail(ErrorCode::Io, "the store has not answered");
   const auto kept = outcome_of(keeping_);
+
   return kept ? Result<void>{} : tl::unexpected(kept.error());
 }
 
@@ -109,16 +116,19 @@ Result<void> CalibrationService::check(const CalibrationTask& task) const {
   if (config_.axes_compensated()) {
     return fail(
         ErrorCode::Refused,
-        fmt::format("calibrate {}: the control already corrects these axes (axes_compensated = true): "
-                    "switch its compensation off first, and say so in the configuration",
-                    method_of(task)));
+        fmt::format(
+            "calibrate {}: the control already corrects these axes (axes_compensated = true): "
+            "switch its compensation off first, and say so in the configuration",
+            method_of(task)));
   }
+
   if (const auto* otf = std::get_if<OtfRequest>(&task)) {
     if (config_.tracker && config_.tracker->mode == TrackerModeConfig::Stationary)
       return fail(ErrorCode::Refused,
                   "calibrate otf: [tracker] mode = \"stationary\" gives no points on the fly");
     return check_otf_path(otf->path_m, config_.machine);
   }
+
   return check_evemu(std::get<EvemuRequest>(task), config_);
 }
 
@@ -130,8 +140,8 @@ Result<PreparedCalibration> CalibrationService::prepare(CalibrationTask task) co
   return PreparedCalibration{std::move(*session), std::move(attachment)};
 }
 
-Result<std::uint64_t> CalibrationService::start(PreparedCalibration&& prepared, const std::string& who,
-                                                HostTime now) {
+Result<std::uint64_t> CalibrationService::start(PreparedCalibration&& prepared,
+                                                const std::string& who, HostTime now) {
   if (identification_.valid() && !session_.running())
     return fail(ErrorCode::Refused,
                 fmt::format("calibrate {}: the identification of a cancelled run is still ending",
@@ -144,10 +154,12 @@ Result<std::uint64_t> CalibrationService::start(PreparedCalibration&& prepared, 
   who_ = who;
   set_from(prepared.attachment, now);
   if (recorder_ != nullptr) recorder_->attach(std::move(prepared.attachment), now);
+
   return session_.status().id;
 }
 
-Result<std::uint64_t> CalibrationService::start(CalibrationTask task, const std::string& who, HostTime now) {
+Result<std::uint64_t> CalibrationService::start(CalibrationTask task, const std::string& who,
+                                                HostTime now) {
   auto prepared = prepare(std::move(task));
   if (!prepared) return tl::unexpected(prepared.error());
   return start(std::move(*prepared), who, now);
@@ -159,7 +171,8 @@ Result<void> CalibrationService::cancel(const std::string& who, HostTime now) {
     return fail(ErrorCode::Refused, "cancel: the model is being put into the store already");
   watch_->stopped = true;
   const std::string late =
-      stalls ? fmt::format("; the store does not answer and may still take model {}", to_keep_->id) : "";
+      stalls ? fmt::format("; the store does not answer and may still take model {}", to_keep_->id)
+             : "";
   auto cancelled = session_.cancel(who + late, now);
   if (!cancelled) return cancelled;
   keeping_ = {};
@@ -173,26 +186,29 @@ bool CalibrationService::store_stalls(HostTime now) const {
 
 void CalibrationService::report_stalled_store(HostTime now) {
   if (!store_stalls(now) || !not_stored_.empty()) return;
-  not_stored_ = fmt::format("model {} is not stored: the store has not answered for {} s", to_keep_->id,
-                            ModelAuthority::kStorePatience.count());
+  not_stored_ = fmt::format("model {} is not stored: the store has not answered for {} s",
+                            to_keep_->id, ModelAuthority::kStorePatience.count());
   session_.not_stored(not_stored_ + "; cancel discards it", now);
 }
 
-std::vector<SessionEvent> CalibrationService::turn(std::span<const protocol::Snapshot> snapshots,
-                                                   HostTime now) {
-  latest_turn_ = now;
+std::vector<SessionEvent> CalibrationService::cycle(std::span<const protocol::Snapshot> snapshots,
+                                                    HostTime now) {
+  latest_cycle_ = now;
   for (const auto& snapshot : snapshots) session_.take(snapshot);
   session_.tick(now);
   if (auto run = session_.take_run()) begin_identification(std::move(*run));
-  if (auto in_vain = session_.take_discarded()) destroy_aside(std::move(*in_vain));
+  if (auto in_vain = session_.take_discarded()) destroy_in_background(std::move(*in_vain));
   if (ready(identification_)) keep(outcome_of(identification_), now);
   if (ready(keeping_)) conclude(outcome_of(keeping_), now);
   if (to_keep_ && !keeping_.valid() && now >= keep_again_at_) begin_keeping(now);
   report_stalled_store(now);
   auto events = session_.take_events();
+
   if (recorder_ != nullptr) {
-    for (const auto& event : events) recorder_->hand_over(event_message(event, config_.machine.name), now);
+    for (const auto& event : events)
+      recorder_->hand_over(event_message(event, config_.machine.name), now);
   }
+
   return events;
 }
 
@@ -202,40 +218,45 @@ void CalibrationService::begin_identification(AcquiredRun acquired) {
   std::future<RecordingDigest> digest;
   if (recorder_ != nullptr) digest = recorder_->digest();
   watch_ = std::make_shared<Watch>();
-  identification_ = start_abandonable([watch = watch_, config = shared_config_,
-                                       acquired = std::move(acquired), active = std::move(active),
-                                       digest = std::move(digest)]() mutable -> Result<Identified> {
+
+  identification_ = run_abandonable([watch = watch_, config = shared_config_,
+                                     acquired = std::move(acquired), active = std::move(active),
+                                     digest = std::move(digest)]() mutable -> Result<Identified> {
     const CalibrationRun run = run_of(std::move(acquired));
     std::vector<InputFile> inputs = inputs_of(run);
     auto candidate = identify(run, *config, active ? &active->model : nullptr,
                               {.progress = [&watch](double share) { watch->share = share; },
                                .stopped = [&watch] { return watch->stopped.load(); }});
     if (!candidate) return tl::unexpected(candidate.error());
-    RecordingDigest recording = digest.valid() ? digest_of(digest, watch->stopped) : RecordingDigest{};
+    RecordingDigest recording =
+        digest.valid() ? digest_of(digest, watch->stopped) : RecordingDigest{};
     cite(recording, inputs);
     auto document = document_of(*candidate, *config, std::move(inputs), {});
     document.recording_gap = recording.gap;
     auto id = model_id(document);
     auto why = fmt::format("calibrate {}", method_of(*candidate));
-    return Identified{
-        .model = std::shared_ptr<ToKeep>(new ToKeep{.id = std::move(id),
-                                                    .document = std::move(document),
-                                                    .verdict = verdict_of(*candidate),
-                                                    .actor = {.who = {}, .why = std::move(why), .when = {}}}),
-        .recording_gap = std::move(recording.gap)};
+    return Identified{.model = std::shared_ptr<ToKeep>(
+                          new ToKeep{.id = std::move(id),
+                                     .document = std::move(document),
+                                     .verdict = verdict_of(*candidate),
+                                     .actor = {.who = {}, .why = std::move(why), .when = {}}}),
+                      .recording_gap = std::move(recording.gap)};
   });
 }
 
-/// Whether there is a model to keep: the session was not cancelled meanwhile, and the data allowed one.
+/// Whether there is a model to keep: the session was not cancelled meanwhile, and the data allowed
+/// one.
 bool CalibrationService::sign(Result<Identified> identified, HostTime now) {
   if (session_.status().state != SessionState::Identifying) {
-    destroy_aside(std::move(identified));
+    destroy_in_background(std::move(identified));
     return false;
   }
+
   if (!identified) {
     session_.not_identified(identified.error(), now);
     return false;
   }
+
   to_keep_ = std::move(identified->model);
   calib::Verdict& verdict = to_keep_->verdict;
   if (active_left_out_) verdict.notes.emplace_back(kOfAnotherMachine);
@@ -244,6 +265,7 @@ bool CalibrationService::sign(Result<Identified> identified, HostTime now) {
   const auto created = utc_.to_utc(now);
   to_keep_->document.created = to_keep_->actor.when = created;
   to_keep_->actor.who = who_;
+
   return true;
 }
 
@@ -257,7 +279,7 @@ void CalibrationService::keep(Result<Identified> identified, HostTime now) {
 void CalibrationService::begin_keeping(HostTime now) {
   keeping_from_ = now;
   keeping_since_ = authority_.revision();
-  keeping_ = start_abandonable([keeper = authority_.keeper(), model = to_keep_, now]() mutable {
+  keeping_ = run_abandonable([keeper = authority_.keeper(), model = to_keep_, now]() mutable {
     return keeper.keep(model->document, model->verdict, model->actor, now, &model->discarded);
   });
 }
@@ -265,7 +287,7 @@ void CalibrationService::begin_keeping(HostTime now) {
 void CalibrationService::discard_unstored() {
   if (to_keep_) {
     to_keep_->discarded = true;
-    destroy_aside(std::exchange(to_keep_, nullptr));
+    destroy_in_background(std::exchange(to_keep_, nullptr));
   }
   not_stored_.clear();
 }
@@ -274,8 +296,9 @@ void CalibrationService::conclude(Result<KeptModel> kept, HostTime now) {
   if (!kept) {
     keep_again_at_ = now + kKeepAgain;
     not_stored_ = fmt::format("model {} is not stored: {}", to_keep_->id, kept.error().text);
-    session_.not_stored(
-        fmt::format("{}; tried again every {} s, cancel discards it", not_stored_, kKeepAgain.count()), now);
+    session_.not_stored(fmt::format("{}; tried again every {} s, cancel discards it", not_stored_,
+                                    kKeepAgain.count()),
+                        now);
     return;
   }
   discard_unstored();

@@ -40,7 +40,8 @@ std::string remark_of(std::string who) {
   return who;
 }
 
-/// Who asks, as the kernel says; a name the client gives itself is a remark (a person behind a service).
+/// Who asks, as the kernel says; a name the client gives itself is a remark (a person behind a
+/// service).
 std::string who(const json& request) {
   const auto user = request.value("user", std::string{"somebody"});
   const auto said = remark_of(request.value("who", std::string{}));
@@ -53,26 +54,31 @@ Result<void> check_zeros(const HubParts& parts, const PreparedSession& task) {
       std::holds_alternative<EvemuAcquisition>(task.acquisition) && parts.config.cmm.has_value();
   if (parts.reference == nullptr || by_cmm) return {};
   auto unknown = parts.reference->unknown();
-  const auto linear =
-      std::span{parts.config.machine.axes}.first(std::min(kLinearAxes, parts.config.machine.axes.size()));
+  const auto linear = std::span{parts.config.machine.axes}.first(
+      std::min(kLinearAxes, parts.config.machine.axes.size()));
+
   std::erase_if(unknown, [&linear](const std::string& name) {
     return std::ranges::find(linear, name, &AxisConfig::name) == linear.end();
   });
+
   if (unknown.empty()) return {};
-  return fail(ErrorCode::Refused,
-              fmt::format("calibrate: nobody knows the zero of {}: `abbe reference` finds the marks, `abbe "
-                          "reference --here` says that the axes read their offset",
-                          fmt::join(unknown, ", ")));
+  return fail(
+      ErrorCode::Refused,
+      fmt::format("calibrate: nobody knows the zero of {}: `abbe reference` finds the marks, `abbe "
+                  "reference --here` says that the axes read their offset",
+                  fmt::join(unknown, ", ")));
 }
 
 /// Points of before an order do not belong to those after it.
 Result<void> check_tracker_is_free(const HubParts& parts, const PreparedSession& task) {
   const auto* order = parts.tracker != nullptr ? parts.tracker->running() : nullptr;
   if (order == nullptr || std::holds_alternative<EvemuAcquisition>(task.acquisition)) return {};
-  return fail(ErrorCode::Refused,
-              fmt::format("calibrate: the tracker carries out \"{}\" of {}: wait for its end (`abbe tracker "
-                          "status`)",
-                          drivers::name_of(order->asked.what), order->by));
+  return fail(
+      ErrorCode::Refused,
+      fmt::format(
+          "calibrate: the tracker carries out \"{}\" of {}: wait for its end (`abbe tracker "
+          "status`)",
+          drivers::name_of(order->asked.what), order->by));
 }
 
 Result<OnHub> calibrate(const HubParts& parts, const json& request) {
@@ -81,10 +87,12 @@ Result<OnHub> calibrate(const HubParts& parts, const json& request) {
   auto prepared = parts.calibration.prepare(std::move(*task));
   if (!prepared) return tl::unexpected(prepared.error());
   auto shared = std::make_shared<PreparedCalibration>(std::move(*prepared));
+
   return [shared, by = who(request)](const Hub& hub) {
     const HubParts& on = hub.parts();
     if (const auto known = check_zeros(on, shared->session); !known) return reply(known.error());
-    if (const auto free = check_tracker_is_free(on, shared->session); !free) return reply(free.error());
+    if (const auto free = check_tracker_is_free(on, shared->session); !free)
+      return reply(free.error());
     const auto started = on.calibration.start(std::move(*shared), by, on.time.now());
     return started ? reply(json{{"ok", true}, {"session", *started}}) : reply(started.error());
   };
@@ -112,15 +120,16 @@ OnHub with_reference(std::function<Result<void>(ReferenceService&, const HubPart
 }
 
 Result<OnHub> reference_here(const HubParts&, const json& request) {
-  return with_reference(
-      [axes = request.value("axes", std::vector<std::string>{}), u = request.value("u", StandHere::kByEye)](
-          ReferenceService& service, const HubParts& parts) {
-        return service.stand_at_offset(stand_here(parts, axes, u));
-      });
+  return with_reference([axes = request.value("axes", std::vector<std::string>{}),
+                         u = request.value("u", StandHere::kByEye)](ReferenceService& service,
+                                                                    const HubParts& parts) {
+    return service.stand_at_offset(stand_here(parts, axes, u));
+  });
 }
 
 Result<OnHub> cancel_reference(const HubParts&, const json&) {
-  return with_reference([](ReferenceService& service, const HubParts&) { return service.cancel(); });
+  return with_reference(
+      [](ReferenceService& service, const HubParts&) { return service.cancel(); });
 }
 
 Result<OnHub> reference(const HubParts&, const json&) {
@@ -155,29 +164,30 @@ Reply begin_verification(VerificationService& service) {
   return number ? reply(json{{"ok", true}, {"number", *number}}) : reply(number.error());
 }
 
-Reply look_at_verification(VerificationService& service, std::uint64_t number, std::size_t from, bool end) {
+Reply look_at_verification(VerificationService& service, std::uint64_t number, std::size_t from,
+                           bool end) {
   if (end)
     if (const auto ended = service.end(number); !ended) return reply(ended.error());
   const auto found = service.points(number);
   if (!found) return reply(found.error());
   const auto& all = (*found)->points();
   const auto first = all.begin() + static_cast<std::ptrdiff_t>(std::min(from, all.size()));
-  return [seen = SeenPoints{
-              .standing = (*found)->standing(), .points = {first, all.end()}, .stopped = service.stopped()}] {
-    return verification_json(seen);
-  };
+  return [seen = SeenPoints{.standing = (*found)->standing(),
+                            .points = {first, all.end()},
+                            .stopped = service.stopped()}] { return verification_json(seen); };
 }
 
-/// {"step": "begin"} gives a number; {"step": "look" | "end", "number": .., "from": k} the points from the
-/// k-th on, "end" after the standstill that goes on was closed.
+/// {"step": "begin"} gives a number; {"step": "look" | "end", "number": .., "from": k} the points
+/// from the k-th on, "end" after the standstill that goes on was closed.
 Result<OnHub> verification(const HubParts& parts, const json& request) {
   if (parts.verification == nullptr) return fail(ErrorCode::Refused, "verify: not in this daemon");
   const auto step = request.at("step").get<std::string>();
-  if (step == "begin") return [](const Hub& hub) { return begin_verification(*hub.parts().verification); };
+  if (step == "begin")
+    return [](const Hub& hub) { return begin_verification(*hub.parts().verification); };
   if (step != "end" && step != "look")
     return fail(ErrorCode::Usage, fmt::format("verification: unknown step {}", step));
-  return [number = request.at("number").get<std::uint64_t>(), from = request.value("from", std::size_t{0}),
-          end = step == "end"](const Hub& hub) {
+  return [number = request.at("number").get<std::uint64_t>(),
+          from = request.value("from", std::size_t{0}), end = step == "end"](const Hub& hub) {
     return look_at_verification(*hub.parts().verification, number, from, end);
   };
 }
@@ -220,7 +230,8 @@ constexpr std::array kVerbs{
     Verb{"reference", "cancel", Role::Change, cancel_reference},
     Verb{"reference", "", Role::Change, reference},
     Verb{"verification", "", Role::Look, verification},
-    Verb{"touch", "cancel", Role::Look, cancel_touching},  // whoever sees a machine move may stop it
+    Verb{"touch", "cancel", Role::Look,
+         cancel_touching},  // whoever sees a machine move may stop it
     Verb{"touch", "where", Role::Look, where_it_stands},
     Verb{"touch", "", Role::Move, begin_touching},
     Verb{"touches", "", Role::Move, look_at_touches},  // without it a movement ends
@@ -241,13 +252,16 @@ std::string known_verbs() {
 Result<const Verb*> verb_of(const json& request) {
   const auto what = request.at("do").get<std::string>();
   for (const Verb& verb : kVerbs)
-    if (verb.name == what && (verb.member.empty() || request.value(std::string{verb.member}, false)))
+    if (verb.name == what &&
+        (verb.member.empty() || request.value(std::string{verb.member}, false)))
       return &verb;
-  return fail(ErrorCode::Usage, fmt::format("unknown request \"{}\": known are {}", what, known_verbs()));
+  return fail(ErrorCode::Usage,
+              fmt::format("unknown request \"{}\": known are {}", what, known_verbs()));
 }
 
 /// What to run for it, if `peer` may.
-Result<Verb::Task> task_of(const json& request, const ControlPeer& peer, const ControlConfig& control) {
+Result<Verb::Task> task_of(const json& request, const ControlPeer& peer,
+                           const ControlConfig& control) {
   const auto verb = verb_of(request);
   if (!verb) return tl::unexpected(verb.error());
   if (const auto may = check_role(peer, (*verb)->role, (*verb)->name, control); !may)
@@ -279,7 +293,8 @@ json answer_request(Hub& hub, const json& request, const ControlPeer& peer,
   if (!on_hub) return refusal(on_hub.error());
   const auto answer = hub.call([&hub, run = std::move(*on_hub)] { return run(hub); }, time_out);
   return answer ? (*answer)()
-                : refusal({ErrorCode::Io, fmt::format("the hub did not answer in {} ms", time_out.count())});
+                : refusal({ErrorCode::Io,
+                           fmt::format("the hub did not answer in {} ms", time_out.count())});
 }
 
 }  // namespace abbe::daemon

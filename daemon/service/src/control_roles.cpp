@@ -63,13 +63,15 @@ RoleWords words_of(Role role, const ControlConfig& control) {
 
 std::string remedy(const ControlPeer& peer, const RoleWords& words) {
   if (words.group.empty())
-    return fmt::format("[control] {} names no group: only root and the daemon's own user may", words.key);
+    return fmt::format("[control] {} names no group: only root and the daemon's own user may",
+                       words.key);
   if (!gid_of(words.group))
     return fmt::format(
-        "the group \"{}\" ([control] {}) does not exist on this computer: groupadd --system {}", words.group,
-        words.key, words.group);
-  return fmt::format("that takes the group \"{}\" ([control] {}): gpasswd -a {} {}, then log in anew",
-                     words.group, words.key, peer.user, words.group);
+        "the group \"{}\" ([control] {}) does not exist on this computer: groupadd --system {}",
+        words.group, words.key, words.group);
+  return fmt::format(
+      "that takes the group \"{}\" ([control] {}): gpasswd -a {} {}, then log in anew", words.group,
+      words.key, peer.user, words.group);
 }
 
 }  // namespace
@@ -78,8 +80,8 @@ Result<void> check_role(const ControlPeer& peer, Role role, std::string_view req
                         const ControlConfig& control) {
   if (has(peer, role, control)) return {};
   const RoleWords words = words_of(role, control);
-  return fail(ErrorCode::Refused, fmt::format("{}: {}, which {} may not: {}", request, words.does, peer.user,
-                                              remedy(peer, words)));
+  return fail(ErrorCode::Refused, fmt::format("{}: {}, which {} may not: {}", request, words.does,
+                                              peer.user, remedy(peer, words)));
 }
 
 }  // namespace abbe::daemon

@@ -10,7 +10,7 @@
 
 #include "abbe/base/text_file.hpp"
 #include "abbe/base/wake_up.hpp"
-#include "abbe/service/work_aside.hpp"
+#include "abbe/service/background_tasks.hpp"
 
 namespace abbe::daemon {
 namespace {
@@ -19,7 +19,8 @@ constexpr std::chrono::seconds kRewritten{5};
 
 bool same_datum(const std::vector<FoundDatum>& a, const std::vector<FoundDatum>& b) {
   return std::ranges::equal(a, b, [](const FoundDatum& x, const FoundDatum& y) {
-    return x.axis == y.axis && x.reading_at_zero == y.reading_at_zero && x.u == y.u && x.stated == y.stated;
+    return x.axis == y.axis && x.reading_at_zero == y.reading_at_zero && x.u == y.u &&
+           x.stated == y.stated;
   });
 }
 
@@ -64,11 +65,13 @@ CountingStateThread::~CountingStateThread() {
     const std::lock_guard lock{work_->mutex};
     work_->stopping = true;
   }
+
   work_->wake.notify_all();
   if (work_->ended.wait_for(kEndPatience)) {
     thread_.join();
     return;
   }
+
   const std::lock_guard lock{work_->outside};
   work_->left_running = true;
   work_->report(
@@ -92,6 +95,7 @@ void CountingStateThread::Work::run() {
     lock.lock();
     if (!last) wake.wait_for(lock, period, [this] { return stopping; });
   }
+
   lock.unlock();
   ended.signal();
 }
@@ -112,8 +116,8 @@ void CountingStateThread::Work::write(const CountingState& state) {
   if (done) done = replace_file(file, to_text(state));
   const std::string seen = done ? "" : done.error().text;
   if (std::exchange(fault, seen) != seen && !seen.empty())
-    report_here(
-        fmt::format("{}: after a restart the axes of the counter card would not be referenced", seen));
+    report_here(fmt::format(
+        "{}: after a restart the axes of the counter card would not be referenced", seen));
   written_at = Clock::now();
   if (done) written = state;
 }

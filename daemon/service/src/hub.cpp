@@ -33,10 +33,12 @@ StreamHealth health_of(const RecorderThread& recorder) {
   h.status.dropped = r.lost + r.refused + recorder.dropped();
   h.status.faults = r.faults;
   h.status.last_fault = r.last_fault;
+
   if (r.last_fault.empty() && r.refused > 0) {
     h.status.last_fault =
         fmt::format("{} messages outside the bounds of the IDL are not recorded", r.refused);
   }
+
   return h;
 }
 
@@ -46,7 +48,9 @@ StreamHealth health_of(const ModelAuthority& authority, const CalibrationService
   StreamHealth h;
   h.status.name = "models";
   h.status.connected = authority.fault().empty() && unstored.empty();
-  h.status.state = !unstored.empty() ? "not stored" : h.status.connected ? "followed" : "unreadable";
+  h.status.state = !unstored.empty()    ? "not stored"
+                   : h.status.connected ? "followed"
+                                        : "unreadable";
   h.status.last_fault = unstored.empty() ? authority.fault() : unstored;
   return h;
 }
@@ -55,7 +59,8 @@ StreamHealth health_of(const ModelAuthority& authority, const CalibrationService
 std::string report_of(const DdsProcess& process) {
   const auto end = process.last_end();
   if (!end) return {};
-  return fmt::format("abbe-dds was restarted {} times; last end: {}", process.restarts(), end->text());
+  return fmt::format("abbe-dds was restarted {} times; last end: {}", process.restarts(),
+                     end->text());
 }
 
 StreamHealth health_of(const Publisher& publisher) {
@@ -88,7 +93,8 @@ StreamHealth health_of_security(const Publisher& publisher) {
 struct Hub::Call {
   std::function<void()> task;
   std::exception_ptr thrown;
-  std::atomic<bool> claimed{false};  // by the hub, which runs it then, or by the caller, who has given up
+  std::atomic<bool> claimed{
+      false};  // by the hub, which runs it then, or by the caller, who has given up
   WakeUp done;
 };
 
@@ -102,29 +108,31 @@ Hub::~Hub() {
   for (Call* const call : given_up_.take()) delete call;
 }
 
-Hub::WallTime Hub::last_turn() const noexcept {
-  return WallTime{std::chrono::nanoseconds{last_turn_ns_.load(std::memory_order_relaxed)}};
+Hub::WallTime Hub::last_cycle() const noexcept {
+  return WallTime{std::chrono::nanoseconds{last_cycle_ns_.load(std::memory_order_relaxed)}};
 }
 
 ModelStanding Hub::standing() const {
-  return parts_.authority.standing(parts_.time.now(), live_.axes_known_at(), parts_.time.host(kAxesPatience));
+  return parts_.authority.standing(parts_.time.now(), live_.axes_known_at(),
+                                   parts_.time.host(kAxesPatience));
 }
 
-void Hub::turn(WallTime wall) {
-  last_turn_ns_.store(wall.time_since_epoch().count(), std::memory_order_relaxed);
+void Hub::cycle(WallTime wall) {
+  last_cycle_ns_.store(wall.time_since_epoch().count(), std::memory_order_relaxed);
   batch_.clear();
   const std::size_t points_left = parts_.devices.points_left();
   parts_.devices.drain(batch_);
   const HostTime now = parts_.time.now();
   batch_.taken = now;
   touch(points_left, wall);
-  if (parts_.tracker != nullptr) parts_.tracker->turn(now);
+  if (parts_.tracker != nullptr) parts_.tracker->cycle(now);
   if (parts_.reference != nullptr) {
-    parts_.reference->turn(batch_);
+    parts_.reference->cycle(batch_);
     parts_.reference->take(parts_.devices.card_progress());
   }
   const bool fresh = live_.take(batch_);
-  // Live first: subscribers wait for it; abbe-dds's socket, the recorder and the assembler have time.
+  // Live first: subscribers wait for it; abbe-dds's socket, the recorder and the assembler have
+  // time.
   publish(fresh, now, wall);
   if (parts_.publisher != nullptr) parts_.publisher->beat(wall);
 
@@ -132,14 +140,15 @@ void Hub::turn(WallTime wall) {
   assembler_.take(batch_);
   snapshots_.clear();
   assembler_.emit(snapshots_);
-  for (const auto& event : parts_.calibration.turn(snapshots_, now)) {
+  for (const auto& event : parts_.calibration.cycle(snapshots_, now)) {
     if (parts_.publisher != nullptr) parts_.publisher->event(event);
   }
-  if (parts_.verification != nullptr) parts_.verification->turn(snapshots_);
+  if (parts_.verification != nullptr) parts_.verification->cycle(snapshots_);
   run_calls();
 }
 
-/// What the machine said last is asked for only when that matters: its health is not for every turn.
+/// What the machine said last is asked for only when that matters: its health is not for every
+/// turn.
 void Hub::touch(std::size_t points_left, WallTime wall) {
   if (parts_.touching == nullptr || !parts_.touching->status().running) return;
   std::string seen;
@@ -148,7 +157,7 @@ void Hub::touch(std::size_t points_left, WallTime wall) {
     for (const auto& h : health_)
       if (parts_.config.cmm && h.status.name == parts_.config.cmm->name) seen = h.status.last_fault;
   }
-  parts_.touching->turn(batch_, points_left, seen, wall);
+  parts_.touching->cycle(batch_, points_left, seen, wall);
 }
 
 void Hub::publish(bool fresh, HostTime now, WallTime wall) {
@@ -176,13 +185,13 @@ void Hub::collect_health(HostTime now) {
 }
 
 void Hub::run() {
-  // Without SCHED_FIFO the kernel may wake a thread 50 us late to spare a processor a wake-up: a fifth of the
-  // usual period, in every turn.
+  // Without SCHED_FIFO the kernel may wake a thread 50 us late to spare a processor a wake-up: a
+  // fifth of the usual period, in every turn.
   ::prctl(PR_SET_TIMERSLACK, 1UL);
   const auto period = parts_.config.daemon.hub_period;
   auto next = std::chrono::steady_clock::now();
   while (!stopping_.load(std::memory_order_relaxed)) {
-    turn(std::chrono::steady_clock::now());
+    cycle(std::chrono::steady_clock::now());
     next += period;
     if (const auto now = std::chrono::steady_clock::now(); next < now)
       next = now;  // late: do not catch up in a rush
@@ -190,11 +199,12 @@ void Hub::run() {
   }
 }
 
-bool Hub::run_in_turn(std::function<void()> task, std::chrono::milliseconds time_out) {
+bool Hub::run_in_cycle(std::function<void()> task, std::chrono::milliseconds time_out) {
   for (Call* const old : given_up_.take()) delete old;
   auto call = std::make_unique<Call>();
   call->task = std::move(task);
   calls_.put(call.get());
+
   if (!call->done.wait_for(time_out)) {
     // The hub still has it among its calls.
     if (!call->claimed.exchange(true)) {
@@ -203,6 +213,7 @@ bool Hub::run_in_turn(std::function<void()> task, std::chrono::milliseconds time
     }
     call->done.wait();  // a task that has begun is as good as done
   }
+
   if (call->thrown) std::rethrow_exception(call->thrown);
   return true;
 }

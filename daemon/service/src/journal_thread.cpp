@@ -3,7 +3,7 @@
 #include <exception>
 #include <utility>
 
-#include "abbe/service/work_aside.hpp"
+#include "abbe/service/background_tasks.hpp"
 
 namespace abbe::daemon {
 
@@ -38,7 +38,8 @@ void JournalThread::run() {
 
 void JournalThread::look() {
   try {
-    for (const auto& entry : observer_.look(look_(), std::chrono::steady_clock::now())) sink_->write(entry);
+    for (const auto& entry : observer_.look(look_(), std::chrono::steady_clock::now()))
+      sink_->write(entry);
   } catch (const std::exception& defect) {
     sink_->write({.urgency = Urgency::Error,
                   .message = std::string{"journal: internal error: "} + defect.what(),

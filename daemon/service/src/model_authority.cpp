@@ -4,7 +4,7 @@
 
 #include <utility>
 
-#include "abbe/service/work_aside.hpp"
+#include "abbe/service/background_tasks.hpp"
 #include "outcome.hpp"
 
 namespace abbe::daemon {
@@ -12,8 +12,8 @@ namespace {
 
 using protocol::HostTime;
 
-// A model file that cannot be used may be made readable or put back from a backup; the store does not change
-// by that.
+// A model file that cannot be used may be made readable or put back from a backup; the store does
+// not change by that.
 constexpr auto kRepairPeriod = std::chrono::seconds{10};
 
 /// Why the model may be used: a person who forced it answers for it by name.
@@ -22,15 +22,18 @@ std::string reason_of(const StoreEvent& activation) {
     const auto& [who, why, when] = activation.actor;
     return fmt::format("{} by {}{}{}", what, who, why.empty() ? "" : ": ", why);
   };
+
   switch (activation.action) {
     case StoreAction::Forced:
       return said_by("forced");
     case StoreAction::RolledBack:
-      return said_by(activation.accepted ? "rolled back" : "rolled back to a model the gate did not accept,");
+      return said_by(activation.accepted ? "rolled back"
+                                         : "rolled back to a model the gate did not accept,");
     case StoreAction::Added:
     case StoreAction::Activated:
       break;
   }
+
   return "accepted by the gate";
 }
 
@@ -58,7 +61,7 @@ ModelAuthority ModelAuthority::open(const std::filesystem::path& store_folder, c
 }
 
 void ModelAuthority::take_up(ActiveModel active) {
-  destroy_aside(std::exchange(active_, std::move(active)));
+  destroy_in_background(std::exchange(active_, std::move(active)));
   ++revision_;
 }
 
@@ -67,7 +70,7 @@ void ModelAuthority::take_up(ActiveModel active, std::uint64_t since) {
     take_up(std::move(active));
   } else {
     read_again_ = true;
-    destroy_aside(std::move(active));
+    destroy_in_background(std::move(active));
   }
 }
 
@@ -85,18 +88,20 @@ void ModelAuthority::begin_to_look(HostTime now) {
   const bool read_anyway = std::exchange(read_again_, false) || to_repair;
   looking_from_ = now;
   looking_since_ = revision_;
-  looking_ = start_abandonable(
-      [keeper = keeper_, seen = seen_, failed = failed_, read_anyway, now]() mutable -> Result<Look> {
-        Look look{.stamp = keeper.stamp()};
-        if (look.stamp == seen && !read_anyway) return look;
-        // Not at the first sight: somebody may be writing it in place.
-        auto active = look.stamp == failed ? keeper.read_active_or_set_aside(now) : keeper.read_active(now);
-        if (active)
-          look.active = std::move(*active);
-        else
-          look.fault = std::move(active.error().text);
-        return look;
-      });
+
+  looking_ = run_abandonable([keeper = keeper_, seen = seen_, failed = failed_, read_anyway,
+                              now]() mutable -> Result<Look> {
+    Look look{.stamp = keeper.stamp()};
+    if (look.stamp == seen && !read_anyway) return look;
+    // Not at the first sight: somebody may be writing it in place.
+    auto active =
+        look.stamp == failed ? keeper.read_active_or_set_aside(now) : keeper.read_active(now);
+    if (active)
+      look.active = std::move(*active);
+    else
+      look.fault = std::move(active.error().text);
+    return look;
+  });
 }
 
 /// What is in force stays; reported in standing() and in health(), and read again by the next look.
@@ -113,16 +118,19 @@ ModelAuthority::Following ModelAuthority::conclude_look(Result<Look> look, HostT
     failed_ = look->stamp;
     return report_look(std::move(look->fault));
   }
+
   seen_ = look->stamp;
   fault_.clear();
   if (!look->active) return Following::Unchanged;
   const bool unknown = look->active->activation.id.empty() && !look->active->fault.empty();
   if (unknown && active_.model != nullptr) return report_look(std::move(look->active->fault));
   next_repair_ = now + kRepairPeriod;
+
   if (same(look->active->activation, active_.activation) && look->active->fault == active_.fault) {
-    destroy_aside(std::move(*look->active));
+    destroy_in_background(std::move(*look->active));
     return Following::Unchanged;
   }
+
   const auto before = revision_;
   take_up(std::move(*look->active), looking_since_);
   return revision_ == before ? Following::Unchanged : Following::TakenUp;
@@ -145,6 +153,7 @@ ModelStanding ModelAuthority::standing_by_store(HostTime now, std::optional<Host
     s.reason = active_.fault.empty() ? "no model has been activated" : active_.fault;
     return s;
   }
+
   s.status = v1::ModelStatus::MODEL_STALE;
   if (axes_compensated_) {
     s.status = v1::ModelStatus::MODEL_INVALID;
@@ -160,6 +169,7 @@ ModelStanding ModelAuthority::standing_by_store(HostTime now, std::optional<Host
     s.reason = reason_of(active_.activation);
     if (!active_.recording_gap.empty()) s.reason += "; " + cannot_be_checked(active_.recording_gap);
   }
+
   return s;
 }
 

@@ -8,7 +8,8 @@
 namespace abbe::daemon {
 namespace {
 
-/// The hash of what the model was identified from, as its document names it; empty if it names nothing.
+/// The hash of what the model was identified from, as its document names it; empty if it names
+/// nothing.
 std::string provenance(const ModelDocument& document) {
   return document.inputs.empty() ? std::string{} : document.inputs.front().sha256;
 }
@@ -24,7 +25,10 @@ std::string not_known_since(const std::string& damaged_state) {
 
 ModelKeeper::ModelKeeper(const std::filesystem::path& store_folder, const Config& config,
                          protocol::UtcOffset utc)
-    : store_(store_folder), machine_(config.machine.name), machine_hash_(machine_hash(config)), utc_(utc) {}
+    : store_(store_folder),
+      machine_(config.machine.name),
+      machine_hash_(machine_hash(config)),
+      utc_(utc) {}
 
 void ModelKeeper::tidy_store(protocol::HostTime now) {
   store_.remove_leftovers();
@@ -61,7 +65,8 @@ Result<ActiveModel> ModelKeeper::read_active_or_set_aside(protocol::HostTime now
   if (active) return active;
   store_.set_lock_patience(kAsidePatience);
   if (const auto aside = store_.set_aside_damaged_state(utc_.to_utc(now)); !aside)
-    return fail(active.error().code, fmt::format("{}; {}", active.error().text, aside.error().text));
+    return fail(active.error().code,
+                fmt::format("{}; {}", active.error().text, aside.error().text));
   return read_active(now);
 }
 
@@ -70,17 +75,20 @@ Result<ActiveModel> ModelKeeper::read_active(protocol::HostTime now) const {
   const auto activation = store_.activation();
   if (!activation) return tl::unexpected(activation.error());
   ActiveModel active;
+
   if (!*activation) {
     if (const auto damaged = store_.damaged_state(); !damaged.empty())
       active.fault = not_known_since(damaged);
     return active;
   }
+
   active.activation = **activation;
   auto document = store_.load(active.activation.id);
   if (!document) {
     active.fault = document.error().text;
     return active;
   }
+
   active.made_for_this_machine = document->machine_hash == machine_hash_;
   active.recording_gap = document->recording_gap;
   auto model = std::make_shared<const ModelInForce>(
@@ -92,10 +100,12 @@ Result<ActiveModel> ModelKeeper::read_active(protocol::HostTime now) const {
                    .active_since = std::min(now, utc_.to_host(active.activation.actor.when)),
                    .model = std::move(document->model)});
   auto publication = encode_model(*model, machine_);
+
   if (!publication) {
     active.fault = publication.error().text;
     return active;
   }
+
   active.model = std::move(model);
   active.publication = std::move(*publication);
   return active;

@@ -20,6 +20,7 @@ inline std::string_view status_name(v1::ModelStatus status) {
     case v1::ModelStatus::MODEL_INVALID:
       return "INVALID";
   }
+
   return "INVALID";
 }
 

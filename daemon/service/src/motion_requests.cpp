@@ -68,13 +68,17 @@ Result<OnHub> begin_touching(const HubParts&, const json& request) {
     one.point = place_from(point.at("at_m"), true);
     one.point.normal = point.at("normal").get<std::array<double, 3>>();
   }
+
   std::vector<drivers::ProbePoint> leave;
-  for (const json& place : request.value("leave", json::array())) leave.push_back(place_from(place, false));
+  for (const json& place : request.value("leave", json::array()))
+    leave.push_back(place_from(place, false));
   auto job = touch_job(std::move(wanted), std::move(leave));
   if (!job) return tl::unexpected(job.error());
-  return with_touching([shared = std::make_shared<TouchJob>(std::move(*job))](TouchService& service) {
-    return reply_done(service.start(std::move(*shared)));
-  });
+
+  return with_touching(
+      [shared = std::make_shared<TouchJob>(std::move(*job))](TouchService& service) {
+        return reply_done(service.start(std::move(*shared)));
+      });
 }
 
 Result<OnHub> look_at_touches(const HubParts&, const json&) {
@@ -94,7 +98,8 @@ Result<OnHub> release_machine(const HubParts&, const json&) {
     SampleSource& devices = hub.parts().devices;
     const auto awaited = devices.release_awaited();
     const auto released = devices.release_machine();
-    return released ? reply(json{{"ok", true}, {"released", awaited.value_or("")}}) : reply(released.error());
+    return released ? reply(json{{"ok", true}, {"released", awaited.value_or("")}})
+                    : reply(released.error());
   };
 }
 
@@ -111,7 +116,8 @@ Result<OnHub> machine_state(const HubParts&, const json&) {
   return [](const Hub& hub) {
     SampleSource& devices = hub.parts().devices;
     const auto awaited = devices.release_awaited();
-    json out{{"ok", true}, {"release_awaited", awaited.has_value()}, {"reason", awaited.value_or("")}};
+    json out{
+        {"ok", true}, {"release_awaited", awaited.has_value()}, {"reason", awaited.value_or("")}};
     if (const auto tip = devices.tip_place()) {
       out["tip_m"] = tip->at_m;
       out["tip_age_s"] = in_seconds(tip->age);

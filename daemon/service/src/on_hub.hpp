@@ -1,6 +1,6 @@
 #pragma once
-/// The three steps of a control request: the thread that asks reads it, however large it is; what the hub's
-/// thread does or copies for it is short; the thread that asks writes the answer.
+/// The three steps of a control request: the thread that asks reads it, however large it is; what
+/// the hub's thread does or copies for it is short; the thread that asks writes the answer.
 
 #include <functional>
 #include <nlohmann/json.hpp>

@@ -24,7 +24,8 @@ ReferenceService::ReferenceService(const Config& config, RecorderThread* recorde
 Result<void> ReferenceService::start() {
   if (!configured())
     return fail(ErrorCode::Refused, "reference: there is no [reference] in the configuration");
-  if (running_) return fail(ErrorCode::Refused, "reference: a search for the marks is running already");
+  if (running_)
+    return fail(ErrorCode::Refused, "reference: a search for the marks is running already");
   session_.emplace(reference_options(*config_.reference, *config_.counter_card));
   taken_up_.assign(config_.reference->axes.size(), false);
   running_ = true;
@@ -39,11 +40,11 @@ Result<void> ReferenceService::cancel() {
   return {};
 }
 
-void ReferenceService::turn(Batch& batch) {
+void ReferenceService::cycle(Batch& batch) {
   if (left_ && !batch.axes.empty()) take_up_left(batch.axes.front());
   for (const auto& sample : batch.axes) {
     if (has(sample.head.flags, protocol::SampleFlag::Restarted)) {
-      began_anew_ = sample.head.time;
+      restarted_at_ = sample.head.time;
       progress_.reset();
     }
     newest_ = std::max(newest_, sample.head.time);
@@ -69,11 +70,12 @@ void ReferenceService::take_up_left(const protocol::AxisSample& first) {
   }
 }
 
-/// Samples come first: one that shows that the counters began anew must be known before what came after it.
+/// Samples come first: one that shows that the counters began anew must be known before what came
+/// after it.
 void ReferenceService::take(const std::optional<drivers::CounterCardProgress>& progress) {
   if (progress) coming_ = progress;
   if (!coming_ || coming_->head.time > newest_) return;
-  if (coming_->head.time >= began_anew_) progress_ = coming_;
+  if (coming_->head.time >= restarted_at_) progress_ = coming_;
   coming_.reset();
 }
 
@@ -147,9 +149,11 @@ Result<void> ReferenceService::check_standing(std::size_t axis) const {
   if ((latest_->missing_mask >> axis & 1u) != 0)
     return fail(ErrorCode::Refused, fmt::format("reference: {} is not counted now", name));
   if (newest_ - standing_[axis].since < kStandsFor)
-    return fail(ErrorCode::Refused,
-                fmt::format("reference: {} moves, or has stood for less than {} ms: where it is is not known",
-                            name, kStandsFor.count()));
+    return fail(
+        ErrorCode::Refused,
+        fmt::format(
+            "reference: {} moves, or has stood for less than {} ms: where it is is not known", name,
+            kStandsFor.count()));
   return {};
 }
 
@@ -162,21 +166,27 @@ Result<void> ReferenceService::stand_at_offset(const StandHere& here) {
   if (possible.empty())
     return fail(ErrorCode::Usage, "reference: there is no axis whose zero somebody could know");
   if (!(here.u > 0.0) || !std::isfinite(here.u))
-    return fail(ErrorCode::Usage, "reference: nobody knows a zero exactly: the uncertainty must be positive");
+    return fail(ErrorCode::Usage,
+                "reference: nobody knows a zero exactly: the uncertainty must be positive");
   if (here.acquiring)
-    return fail(ErrorCode::Refused,
-                "reference: a calibration takes readings: another zero in the middle would tear them");
-  if (!latest_) return fail(ErrorCode::Refused, "reference: the counter card has not said anything yet");
+    return fail(
+        ErrorCode::Refused,
+        "reference: a calibration takes readings: another zero in the middle would tear them");
+  if (!latest_)
+    return fail(ErrorCode::Refused, "reference: the counter card has not said anything yet");
   if (here.now - newest_ > here.patience)
-    return fail(ErrorCode::Refused, fmt::format("reference: the counter card has been silent for {:.1f} s",
-                                                std::chrono::duration<double>(here.now - newest_).count()));
+    return fail(ErrorCode::Refused,
+                fmt::format("reference: the counter card has been silent for {:.1f} s",
+                            std::chrono::duration<double>(here.now - newest_).count()));
   const auto& live = config_.counter_card->wiring.axes;
   std::vector<std::size_t> places;
+
   for (const auto& name : here.axes.empty() ? possible : here.axes) {
-    places.push_back(
-        static_cast<std::size_t>(std::ranges::find(live, name, &drivers::CounterAxis::name) - live.begin()));
+    places.push_back(static_cast<std::size_t>(
+        std::ranges::find(live, name, &drivers::CounterAxis::name) - live.begin()));
     if (auto stands = check_standing(places.back()); !stands) return stands;
   }
+
   for (const std::size_t place : places) {
     const double counted = live[place].scale * static_cast<double>(latest_->count[place]);
     take_up(FoundDatum{.axis = place,
@@ -185,6 +195,7 @@ Result<void> ReferenceService::stand_at_offset(const StandHere& here) {
                        .from = newest_,
                        .stated = true});
   }
+
   return {};
 }
 

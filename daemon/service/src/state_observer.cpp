@@ -42,9 +42,11 @@ StreamKind kind_of(const std::string& stream) {
     return {"", kStoreId, "check the files in models below [daemon] data_dir", Urgency::Error};
   if (stream == "dds")
     return {"link to ", kLinkId,
-            "nothing is published until abbe-dds connects and answers: see its own lines", Urgency::Warning};
+            "nothing is published until abbe-dds connects and answers: see its own lines",
+            Urgency::Warning};
   if (stream == "dds_security")
     return {"", kSecurityId, "anyone on the domain can publish as this machine", Urgency::Warning};
+
   return {"device ", kDeviceId,
           "check its power, its cable and its table in the configuration; abbed tries again",
           Urgency::Warning};
@@ -65,10 +67,12 @@ ObservedPart part_of(const StreamHealth& stream) {
                                {"ABBE_LOST", std::to_string(lost)},
                                {"ABBE_GAPS", std::to_string(d.gaps)}},
                     .counted = d.faults + lost};
+
   if (!d.last_fault.empty()) {
     part.message += fmt::format("; last fault: {}", d.last_fault);
     part.fields.push_back({"ABBE_FAULT", d.last_fault});
   }
+
   if (!d.connected) part.message += fmt::format("; {}", kind.remedy);
   return part;
 }
@@ -88,9 +92,10 @@ ObservedPart part_of(const SessionStatus& session) {
                                {"ABBE_METHOD", session.method},
                                {"ABBE_STATE", state}}};
   part.message = session.id == 0 ? "no calibration yet"
-                                 : fmt::format("calibration {} ({}): {}: {}", session.id, session.method,
-                                               state, session.reason);
+                                 : fmt::format("calibration {} ({}): {}: {}", session.id,
+                                               session.method, state, session.reason);
   if (!session.model_id.empty()) part.fields.push_back({"ABBE_MODEL", session.model_id});
+
   return part;
 }
 
@@ -98,8 +103,8 @@ ObservedPart part_of(const ObservedModel& model) {
   const bool bad = model.state == "INVALID" || model.state == "STALE" || model.state == "DRIFT";
   return {.key = "model",
           .state = fmt::format("{}\n{}\n{}", model.state, model.id, model.reason),
-          .message = fmt::format("model {}: {}: {}", model.id.empty() ? "in force" : model.id, model.state,
-                                 model.reason),
+          .message = fmt::format("model {}: {}: {}", model.id.empty() ? "in force" : model.id,
+                                 model.state, model.reason),
           .message_id = kModelId,
           .urgency = bad ? Urgency::Warning : Urgency::Notice,
           .fields = {{"ABBE_MODEL", model.id}, {"ABBE_STATE", model.state}}};
@@ -111,28 +116,34 @@ ObservedPart part_of(const ObservedParticipant& participant) {
                     .message = "abbe-dds: started",
                     .message_id = kParticipantId,
                     .fields = {{"ABBE_RESTARTS", std::to_string(participant.restarts)}}};
+
   const auto ended = [&participant] {
-    return participant.last_end.empty() ? std::string{} : fmt::format("ended: {}; ", participant.last_end);
+    return participant.last_end.empty() ? std::string{}
+                                        : fmt::format("ended: {}; ", participant.last_end);
   };
+
   if (!participant.start_fault.empty()) {
     part.urgency = Urgency::Error;
-    part.message = fmt::format("abbe-dds: {}cannot be started again: {}; tried again every few seconds",
-                               ended(), participant.start_fault);
+    part.message =
+        fmt::format("abbe-dds: {}cannot be started again: {}; tried again every few seconds",
+                    ended(), participant.start_fault);
     part.fields.push_back({"ABBE_FAULT", participant.start_fault});
   } else if (participant.restarts > 0) {
     part.urgency = Urgency::Warning;
-    part.message =
-        fmt::format("abbe-dds: {}started again, {} times since abbed started; its own lines say more",
-                    ended(), participant.restarts);
+    part.message = fmt::format(
+        "abbe-dds: {}started again, {} times since abbed started; its own lines say more", ended(),
+        participant.restarts);
     part.fields.push_back({"ABBE_FAULT", participant.last_end});
   }
+
   return part;
 }
 
 ObservedPart part_of_hub(bool answers) {
   return {.key = "hub",
           .state = answers ? "answers" : "hangs",
-          .message = answers ? "hub: cycles" : "hub: has not answered for a second; systemd restarts abbed",
+          .message = answers ? "hub: cycles"
+                             : "hub: has not answered for a second; systemd restarts abbed",
           .message_id = kHubId,
           .urgency = answers ? Urgency::Info : Urgency::Error,
           .fields = {{"ABBE_STATE", answers ? "answers" : "hangs"}}};
@@ -173,8 +184,10 @@ std::optional<JournalEntry> StateObserver::compare(const ObservedPart& part, Wal
     return std::nullopt;
   }
 
-  JournalEntry entry{
-      .urgency = part.urgency, .message = part.message, .message_id = part.message_id, .fields = part.fields};
+  JournalEntry entry{.urgency = part.urgency,
+                     .message = part.message,
+                     .message_id = part.message_id,
+                     .fields = part.fields};
   if (part.counted > r.counted && !r.logged.empty())
     entry.message += fmt::format("; {} faults or lost samples more", part.counted - r.counted);
   // The change that is logged now is not one of those left out, unless it is the old state again.

@@ -62,10 +62,12 @@ json session_json(const SessionStatus& s, const std::optional<calib::HeldOutFigu
            {"noted", s.noted}};
   if (s.state == SessionState::Refused) out["code"] = word_of(s.refused_as);
   if (s.next) out["next"] = next_json(*s.next);
+
   if (held_out) {
     out["held_out_rms_um"] = {{"candidate", held_out->candidate_rms_m * 1e6},
                               {"no_compensation", held_out->no_compensation_rms_m * 1e6}};
   }
+
   return out;
 }
 
@@ -145,6 +147,7 @@ json reference_json(const SeenReference& reference, const MachineConfig& machine
     out["reading_at_zero"] = axis.reading_at_zero;
     out["u"] = axis.found.u_offset;
   }
+
   return {{"running", reference.running}, {"axes", std::move(axes)}};
 }
 
@@ -152,8 +155,8 @@ json reference_json(const SeenReference& reference, const MachineConfig& machine
 json positions_json(const protocol::Snapshot& live, bool old) {
   json positions = json::array();
   for (std::size_t axis = 0; axis < live.axis_count; ++axis) {
-    const bool missing =
-        old || (live.missing_mask >> axis & 1u) != 0 || has(live.head.flags, protocol::SampleFlag::BusOff);
+    const bool missing = old || (live.missing_mask >> axis & 1u) != 0 ||
+                         has(live.head.flags, protocol::SampleFlag::BusOff);
     positions.push_back(missing ? json{} : number_or_null(live.position[axis]));
   }
   return positions;
@@ -181,11 +184,13 @@ json dds_json(const SeenLink& link) {
            {"connections", link.counters.connections},
            {"refused_connections", link.counters.strangers},
            {"security", link.security}};
+
   if (link.process != nullptr) {
     out["process"] = link.process->pid();
     out["restarts"] = link.process->restarts();
     if (const auto end = link.process->last_end()) out["last_end"] = end->text();
   }
+
   return out;
 }
 
@@ -222,11 +227,13 @@ SeenStatus look_at_status(const Hub& hub) {
       .recording = {},
       .tracker = look_at_tracker(parts),
       .dds = {}};
+
   if (const auto* reference = parts.reference; reference != nullptr) {
     if (reference->configured())
       seen.reference = SeenReference{.running = reference->running(), .axes = reference->status()};
     seen.without_zero = reference->without_zero();
   }
+
   if (parts.recorder != nullptr) seen.recording = parts.recorder->status().file.string();
   if (parts.publisher != nullptr) seen.dds.emplace(*parts.publisher);
   return seen;
@@ -245,21 +252,26 @@ json status_json(const SeenStatus& seen, const Config& config) {
   for (const auto& session : seen.ended) ended.push_back(session_json(session, {}));
   out["position_m"] = positions_json(seen.live, seen.positions_are_old);
   if (seen.live.has_environment) out["environment"] = environment_json(seen.live, config);
-  if (const auto air = config.tracker ? unmeasured_air_text(config, config.tracker->u_scale) : std::nullopt)
+  if (const auto air =
+          config.tracker ? unmeasured_air_text(config, config.tracker->u_scale) : std::nullopt)
     out["unmeasured_air"] = *air;
   if (seen.reference) out["reference"] = reference_json(*seen.reference, config.machine);
   if (seen.without_zero) out["axes_without_zero"] = *seen.without_zero;
   if (seen.release_awaited)
-    out["release_awaited"] = {{"reason", *seen.release_awaited}, {"command", "abbe machine release"}};
+    out["release_awaited"] = {{"reason", *seen.release_awaited},
+                              {"command", "abbe machine release"}};
   if (seen.tracker) out["tracker"] = tracker_json(*seen.tracker);
   if (seen.recording) out["recording"] = *seen.recording;
   if (seen.dds) out["dds"] = dds_json(*seen.dds);
+
   return out;
 }
 }  // namespace
 
 Reply status_reply(const Hub& hub) {
-  return [seen = look_at_status(hub), &config = hub.parts().config] { return status_json(seen, config); };
+  return [seen = look_at_status(hub), &config = hub.parts().config] {
+    return status_json(seen, config);
+  };
 }
 
 }  // namespace abbe::daemon

@@ -10,22 +10,26 @@ using protocol::TouchFlag;
 
 Result<std::array<double, 3>> TouchService::where() const {
   if (!configured_)
-    return fail(ErrorCode::Refused, "touch: there is no measuring machine, [cmm], in the configuration");
+    return fail(ErrorCode::Refused,
+                "touch: there is no measuring machine, [cmm], in the configuration");
   return devices_.machine_position();
 }
 
-Result<TouchJob> touch_job(std::vector<TouchRequest> touches, std::vector<drivers::ProbePoint> leave) {
+Result<TouchJob> touch_job(std::vector<TouchRequest> touches,
+                           std::vector<drivers::ProbePoint> leave) {
   if (touches.empty()) return fail(ErrorCode::Usage, "touch: no point to touch");
   std::size_t places = leave.size();
   for (const TouchRequest& touch : touches) places += touch.way.size() + 1;
   if (touches.size() > TouchJob::kMostTouches || places > TouchJob::kMostPlaces)
     return fail(
         ErrorCode::Usage,
-        fmt::format("touch: {} touches with {} places are more than one request may hold ({} and {}): "
-                    "ask for them one part after the other",
-                    touches.size(), places, TouchJob::kMostTouches, TouchJob::kMostPlaces));
+        fmt::format(
+            "touch: {} touches with {} places are more than one request may hold ({} and {}): "
+            "ask for them one part after the other",
+            touches.size(), places, TouchJob::kMostTouches, TouchJob::kMostPlaces));
   TouchJob job{.touches = std::move(touches), .leave = std::move(leave), .made = {}};
   job.made.reserve(job.touches.size());
+
   return job;
 }
 
@@ -44,6 +48,7 @@ Result<void> TouchService::start(TouchJob&& job) {
   leaving_ = stopping_ = false;
   looked_.reset();
   ask_next();
+
   return {};
 }
 
@@ -68,9 +73,10 @@ void TouchService::stop(std::string reason) {
 
 void TouchService::stopping(const Batch& batch, std::size_t points_left) {
   for (const auto& touch : batch.touches) {
-    const bool made =
-        touch.latch == protocol::TouchLatch::Reported && !has(touch.touch_flags, TouchFlag::NoPosition);
-    if (made && !leaving_ && status_.touches.size() < status_.asked) status_.touches.push_back(touch);
+    const bool made = touch.latch == protocol::TouchLatch::Reported &&
+                      !has(touch.touch_flags, TouchFlag::NoPosition);
+    if (made && !leaving_ && status_.touches.size() < status_.asked)
+      status_.touches.push_back(touch);
   }
   if (points_left == 0) end(status_.reason + "; " + tip_text());
 }
@@ -80,8 +86,8 @@ std::string TouchService::tip_text() const {
   const auto tip = devices_.tip_place();
   if (!tip) return "the machine did not report where the tip stands";
   const auto mm = [&](std::size_t axis) { return kMillimetresPerMetre * tip->at_m[axis]; };
-  return fmt::format("the tip was reported at X {:.3f}, Y {:.3f}, Z {:.3f} mm {:.1f} s before", mm(0), mm(1),
-                     mm(2), std::chrono::duration<double>(tip->age).count());
+  return fmt::format("the tip was reported at X {:.3f}, Y {:.3f}, Z {:.3f} mm {:.1f} s before",
+                     mm(0), mm(1), mm(2), std::chrono::duration<double>(tip->age).count());
 }
 
 std::string TouchService::release_text() const {
@@ -109,16 +115,19 @@ void TouchService::end(std::string reason) {
   status_.reason = std::move(reason) + release_text();
 }
 
-void TouchService::turn(const Batch& batch, std::size_t points_left, const std::string& seen, WallTime now) {
+void TouchService::cycle(const Batch& batch, std::size_t points_left, const std::string& seen,
+                         WallTime now) {
   if (!status_.running) return;
   if (!looked_) looked_ = now;
   if (now - *looked_ > kLongestUnwatched)
     stop(fmt::format("cancelled: nobody looked on for {} s", kLongestUnwatched.count()));
   if (stopping_) return stopping(batch, points_left);
+
   if (leaving_) {
     status_.running = points_left != 0;
     return;
   }
+
   for (const auto& touch : batch.touches) {
     if (touch.latch != protocol::TouchLatch::Reported) continue;
     if (has(touch.touch_flags, TouchFlag::NoPosition)) {
@@ -128,6 +137,7 @@ void TouchService::turn(const Batch& batch, std::size_t points_left, const std::
     status_.touches.push_back(touch);
     return ask_next();  // one at a time is asked for: another one was made by hand
   }
+
   if (points_left != 0) return;
   end(fmt::format("touch {} of {} {}: {}", status_.touches.size() + 1, status_.asked,
                   refused_ ? "was refused" : "was not made",

@@ -19,7 +19,8 @@ using nlohmann::json;
 
 /// All but the list, which moves nothing and is a request of its own.
 constexpr std::array kMovingOrders{TrackerOrder::What::Initialize, TrackerOrder::What::GoHome,
-                                   TrackerOrder::What::FindReflector, TrackerOrder::What::SetReflector};
+                                   TrackerOrder::What::FindReflector,
+                                   TrackerOrder::What::SetReflector};
 
 const char* outcome_word(TrackerOrderReport::Outcome outcome) {
   switch (outcome) {
@@ -69,24 +70,30 @@ Result<TrackerOrder> tracker_order_from_json(const json& request) {
   const auto what = std::ranges::find(kMovingOrders, word, [](TrackerOrder::What order) {
     return std::string_view{drivers::name_of(order)};
   });
+
   if (what == kMovingOrders.end())
-    return fail(ErrorCode::Usage, "tracker: unknown order: known are initialize, home, find, reflector set");
+    return fail(ErrorCode::Usage,
+                "tracker: unknown order: known are initialize, home, find, reflector set");
   TrackerOrder order{.what = *what};
   if (order.what == TrackerOrder::What::SetReflector)
     order.reflector = request.at("reflector").get<std::string>();
+
   if (order.what == TrackerOrder::What::FindReflector) {
     const json distance = request.value("distance_m", json{});  // NaN has no place in JSON
     order.distance_m =
         distance.is_number() ? distance.get<double>() : std::numeric_limits<double>::quiet_NaN();
   }
+
   return order;
 }
 
-Result<std::uint64_t> order_tracker(const HubParts& parts, const TrackerOrder& order, const std::string& by) {
+Result<std::uint64_t> order_tracker(const HubParts& parts, const TrackerOrder& order,
+                                    const std::string& by) {
   if (parts.tracker == nullptr) return fail(ErrorCode::Refused, "tracker: not in this daemon");
-  return parts.tracker->start(order, {.by = by,
-                                      .takes_readings = takes_readings(parts.calibration.status().state),
-                                      .now = parts.time.now()});
+  return parts.tracker->start(order,
+                              {.by = by,
+                               .takes_readings = takes_readings(parts.calibration.status().state),
+                               .now = parts.time.now()});
 }
 
 }  // namespace abbe::daemon

@@ -24,7 +24,8 @@ struct SeenTracker {
 /// Of {"do": "tracker", "order": WORD, ...}. Any thread.
 [[nodiscard]] Result<drivers::TrackerOrder> tracker_order_from_json(const nlohmann::json& request);
 /// The number of the order of `by`. The hub's thread.
-[[nodiscard]] Result<std::uint64_t> order_tracker(const HubParts& parts, const drivers::TrackerOrder& order,
+[[nodiscard]] Result<std::uint64_t> order_tracker(const HubParts& parts,
+                                                  const drivers::TrackerOrder& order,
                                                   const std::string& by);
 
 }  // namespace abbe::daemon

@@ -16,10 +16,13 @@ using drivers::TrackerOrderReport;
 std::string order_fault(const TrackerOrder& order) {
   const bool reachable = order.distance_m > 0.0 && order.distance_m <= drivers::kLongestSearch_m;
   if (order.what == TrackerOrder::What::FindReflector && !reachable)
-    return fmt::format("the distance must be above 0 and at most {:g} m", drivers::kLongestSearch_m);
-  const bool named = !order.reflector.empty() && order.reflector.size() <= drivers::kLongestReflectorName;
+    return fmt::format("the distance must be above 0 and at most {:g} m",
+                       drivers::kLongestSearch_m);
+  const bool named =
+      !order.reflector.empty() && order.reflector.size() <= drivers::kLongestReflectorName;
   if (order.what == TrackerOrder::What::SetReflector && !named)
-    return fmt::format("the reflector's name or id must have 1 to {} bytes", drivers::kLongestReflectorName);
+    return fmt::format("the reflector's name or id must have 1 to {} bytes",
+                       drivers::kLongestReflectorName);
   return {};
 }
 
@@ -33,21 +36,25 @@ Result<void> TrackerService::check(const TrackerOrder& order, bool takes_reading
   const auto not_now = [&](ErrorCode code, const std::string& why) {
     return fail(code, fmt::format("tracker: {}: {}", drivers::name_of(order.what), why));
   };
-  if (const std::string fault = order_fault(order); !fault.empty()) return not_now(ErrorCode::Usage, fault);
+
+  if (const std::string fault = order_fault(order); !fault.empty())
+    return not_now(ErrorCode::Usage, fault);
   const auto status = devices_.tracker_status();
   if (!status)
     return not_now(ErrorCode::Refused, "there is no tracker, [tracker] host, in the configuration");
   if (takes_readings)
+    return not_now(ErrorCode::Refused,
+                   "a calibration takes readings: wait for its end, or cancel it (`abbe calibrate "
+                   "... --cancel`)");
+  if (const Order* other = running(); other != nullptr)
+    return not_now(ErrorCode::Refused, fmt::format("\"{}\" of {} is under way",
+                                                   drivers::name_of(other->asked.what), other->by));
+  if (!status->connected)
     return not_now(
         ErrorCode::Refused,
-        "a calibration takes readings: wait for its end, or cancel it (`abbe calibrate ... --cancel`)");
-  if (const Order* other = running(); other != nullptr)
-    return not_now(ErrorCode::Refused,
-                   fmt::format("\"{}\" of {} is under way", drivers::name_of(other->asked.what), other->by));
-  if (!status->connected)
-    return not_now(ErrorCode::Refused,
-                   fmt::format("the tracker is not connected: {}{}{}", status->state,
-                               status->last_fault.empty() ? "" : "; last fault: ", status->last_fault));
+        fmt::format("the tracker is not connected: {}{}{}", status->state,
+                    status->last_fault.empty() ? "" : "; last fault: ", status->last_fault));
+
   return {};
 }
 
@@ -60,7 +67,7 @@ Result<std::uint64_t> TrackerService::start(TrackerOrder order, Asked asked) {
   return number_;
 }
 
-void TrackerService::turn(protocol::HostTime now) {
+void TrackerService::cycle(protocol::HostTime now) {
   for (TrackerOrderReport& report : devices_.tracker_reports()) {
     const auto order =
         std::ranges::find(orders_, report.number, [](const Order& o) { return o.asked.number; });
@@ -69,18 +76,19 @@ void TrackerService::turn(protocol::HostTime now) {
   report_silence(now);
 }
 
-/// The tracker's thread reports every order, unless it ended or hangs. A report that comes later counts.
+/// The tracker's thread reports every order, unless it ended or hangs. A report that comes later
+/// counts.
 void TrackerService::report_silence(protocol::HostTime now) {
   const Order* const order = running();
   if (order == nullptr || now - order->since <= longest_order_) return;
   const double waited_s = std::chrono::duration<double>(longest_order_).count();
-  orders_.back().report =
-      TrackerOrderReport{.number = order->asked.number,
-                         .outcome = TrackerOrderReport::Outcome::Failed,
-                         .text = fmt::format("no report in {:g} s: what came of it is not known, look at the "
-                                             "tracker",
-                                             waited_s),
-                         .reflectors = {}};
+  orders_.back().report = TrackerOrderReport{
+      .number = order->asked.number,
+      .outcome = TrackerOrderReport::Outcome::Failed,
+      .text = fmt::format("no report in {:g} s: what came of it is not known, look at the "
+                          "tracker",
+                          waited_s),
+      .reflectors = {}};
 }
 
 }  // namespace abbe::daemon

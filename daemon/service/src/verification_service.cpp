@@ -5,13 +5,14 @@
 #include <algorithm>
 #include <utility>
 
-#include "abbe/service/work_aside.hpp"
+#include "abbe/service/background_tasks.hpp"
 
 namespace abbe::daemon {
 
 Result<std::uint64_t> VerificationService::begin() {
-  if (auto possible = check_verification(config_); !possible) return tl::make_unexpected(possible.error());
-  destroy_aside(std::exchange(points_, StandstillPoints{standstill_options(config_)}));
+  if (auto possible = check_verification(config_); !possible)
+    return tl::make_unexpected(possible.error());
+  destroy_in_background(std::exchange(points_, StandstillPoints{standstill_options(config_)}));
   running_ = true;
   return ++number_;
 }
@@ -29,7 +30,7 @@ Result<const StandstillPoints*> VerificationService::points(std::uint64_t number
   return &points_;
 }
 
-void VerificationService::turn(std::span<const protocol::Snapshot> snapshots) {
+void VerificationService::cycle(std::span<const protocol::Snapshot> snapshots) {
   for (const auto& snapshot : snapshots) {
     if (!running_) return;
     points_.take(snapshot);
@@ -39,8 +40,9 @@ void VerificationService::turn(std::span<const protocol::Snapshot> snapshots) {
 
 std::string VerificationService::stopped() const {
   if (points_.points().size() < kMostPoints) return {};
-  return fmt::format("verify: {} standstills are the most one verification holds: later ones are not taken",
-                     kMostPoints);
+  return fmt::format(
+      "verify: {} standstills are the most one verification holds: later ones are not taken",
+      kMostPoints);
 }
 
 }  // namespace abbe::daemon

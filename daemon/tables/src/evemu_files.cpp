@@ -19,7 +19,8 @@ namespace abbe::daemon {
 
 namespace {
 
-constexpr int kMostNumber = 1000;  // of positions and features: far above any procedure, far below overflow
+// of positions and features: far above any procedure, far below overflow
+constexpr int kMostNumber = 1000;
 
 /// A whole number from 1; a fault otherwise.
 int number_at(const NumberTable& table, std::size_t row, std::size_t column, std::string_view name,
@@ -31,8 +32,10 @@ int number_at(const NumberTable& table, std::size_t row, std::size_t column, std
   return fine ? static_cast<int>(value) : 1;
 }
 
-calib::Vector3 vector_at(const NumberTable& table, std::size_t row, std::size_t first, double per_m) {
-  return {table.at(row, first) / per_m, table.at(row, first + 1) / per_m, table.at(row, first + 2) / per_m};
+calib::Vector3 vector_at(const NumberTable& table, std::size_t row, std::size_t first,
+                         double per_m) {
+  return {table.at(row, first) / per_m, table.at(row, first + 1) / per_m,
+          table.at(row, first + 2) / per_m};
 }
 
 void read_balls(Section& root, calib::evemu::Calibrator& out) {
@@ -47,6 +50,7 @@ void read_balls(Section& root, calib::evemu::Calibrator& out) {
     ball.close();
     out.balls.push_back(b);
   }
+
   std::sort(out.balls.begin(), out.balls.end(),
             [](const auto& a, const auto& b) { return a.number < b.number; });
 }
@@ -79,6 +83,7 @@ void read_blocks(Section& root, calib::evemu::Calibrator& out,
     block.close();
     out.blocks.push_back(b);
   }
+
   std::sort(out.blocks.begin(), out.blocks.end(),
             [](const auto& a, const auto& b) { return a.number < b.number; });
 }
@@ -94,7 +99,8 @@ void read_expansivity(Section& head, std::optional<calib::evemu::Calibrator::Exp
     head.fault("u_alpha_um_per_m_K", "needs alpha_um_per_m_K, too");
 }
 
-calib::evemu::Calibrator read_calibrator(Section& root, std::array<std::optional<BlockFace>, 2>& faces) {
+calib::evemu::Calibrator read_calibrator(Section& root,
+                                         std::array<std::optional<BlockFace>, 2>& faces) {
   calib::evemu::Calibrator out;
   Section head = root.child("calibrator", Need::Required);
   head.get("name", out.name, Need::Required);
@@ -111,30 +117,35 @@ calib::evemu::Calibrator read_calibrator(Section& root, std::array<std::optional
 
 Result<TouchesFile> read_touches_csv(const std::filesystem::path& file) {
   auto parsed = parse_table(
-      file, {{{"position"}, {"kind", true, {"ball", "block"}}, {"index"}, {"x_mm"}, {"y_mm"}, {"z_mm"}}});
+      file,
+      {{{"position"}, {"kind", true, {"ball", "block"}}, {"index"}, {"x_mm"}, {"y_mm"}, {"z_mm"}}});
   if (!parsed) return tl::make_unexpected(parsed.error());
   check_rows(*parsed, 1, "touches");
   auto& [source, table, faults] = *parsed;
   TouchesFile out{source, {}, {}};
+
   for (std::size_t row = 0; row < table.rows(); ++row) {
     out.lines.push_back(table.line(row));
-    out.touches.push_back(
-        {.position = number_at(table, row, 0, "position", faults),
-         .feature = table.at(row, 1) < 0.5 ? calib::evemu::Feature::Ball : calib::evemu::Feature::Block,
-         .number = number_at(table, row, 2, "index", faults),
-         .p_m = vector_at(table, row, 3, kMmPerM)});
+    out.touches.push_back({.position = number_at(table, row, 0, "position", faults),
+                           .feature = table.at(row, 1) < 0.5 ? calib::evemu::Feature::Ball
+                                                             : calib::evemu::Feature::Block,
+                           .number = number_at(table, row, 2, "index", faults),
+                           .p_m = vector_at(table, row, 3, kMmPerM)});
   }
+
   if (faults.any()) return tl::make_unexpected(faults.to_error());
   return out;
 }
 
 Result<BallErrorsFile> read_errors_csv(const std::filesystem::path& file) {
   auto parsed = parse_table(
-      file, {{{"position"}, {"ball"}, {"x_mm"}, {"y_mm"}, {"z_mm"}, {"ex_um"}, {"ey_um"}, {"ez_um"}}});
+      file,
+      {{{"position"}, {"ball"}, {"x_mm"}, {"y_mm"}, {"z_mm"}, {"ex_um"}, {"ey_um"}, {"ez_um"}}});
   if (!parsed) return tl::make_unexpected(parsed.error());
   check_rows(*parsed, 1, "errors");
   auto& [source, table, faults] = *parsed;
   BallErrorsFile out{source, {}, {}};
+
   for (std::size_t row = 0; row < table.rows(); ++row) {
     out.lines.push_back(table.line(row));
     out.errors.push_back({.position = number_at(table, row, 0, "position", faults),
@@ -142,6 +153,7 @@ Result<BallErrorsFile> read_errors_csv(const std::filesystem::path& file) {
                           .reading_m = vector_at(table, row, 2, kMmPerM),
                           .V_m = vector_at(table, row, 5, kUmPerM)});
   }
+
   if (faults.any()) return tl::make_unexpected(faults.to_error());
   return out;
 }
@@ -158,32 +170,42 @@ Result<CalibratorFile> read_calibrator_toml(const std::filesystem::path& file) {
   if (faults.any()) return tl::make_unexpected(faults.to_error());
   if (const auto sound = calib::evemu::check(calibrator); !sound)
     return fail(ErrorCode::BadInput, fmt::format("{}: {}", file.string(), sound.error().text));
-  return CalibratorFile{{file.filename().string(), sha256_hex(*text)}, std::move(calibrator), faces};
+
+  return CalibratorFile{
+      {file.filename().string(), sha256_hex(*text)}, std::move(calibrator), faces};
 }
 
 std::string calibrator_toml(const calib::evemu::Calibrator& calibrator,
-                            const std::array<std::optional<BlockFace>, 2>& faces, std::string_view comment) {
+                            const std::array<std::optional<BlockFace>, 2>& faces,
+                            std::string_view comment) {
   const auto place = [](const calib::Vector3& p_m) {
     return fmt::format("x_mm = {:.17g}\ny_mm = {:.17g}\nz_mm = {:.17g}\n", kMmPerM * p_m.x(),
                        kMmPerM * p_m.y(), kMmPerM * p_m.z());
   };
+
   std::string out{comment};
   out += fmt::format("[calibrator]\nname = {}\ntip_radius_mm = {:.17g}\n",
                      nlohmann::json(calibrator.name).dump(), kMmPerM * calibrator.tip_radius_m);
   if (const auto& grows = calibrator.expansivity)
     out += fmt::format("alpha_um_per_m_K = {:.17g}\nu_alpha_um_per_m_K = {:.17g}\n",
                        kUmPerM * grows->alpha_per_K, kUmPerM * grows->u_alpha_per_K);
+
   for (const auto& ball : calibrator.balls) {
-    out += fmt::format("\n[[ball]]\nnumber = {}\n{}radius_mm = {:.17g}\nu_um = {:.3g}\n", ball.number,
-                       place(ball.centre_m), kMmPerM * ball.radius_m, kUmPerM * ball.u_m);
+    out +=
+        fmt::format("\n[[ball]]\nnumber = {}\n{}radius_mm = {:.17g}\nu_um = {:.3g}\n", ball.number,
+                    place(ball.centre_m), kMmPerM * ball.radius_m, kUmPerM * ball.u_m);
   }
+
   for (const auto& block : calibrator.blocks) {
     const auto& n = block.normal;
-    out += fmt::format("\n[[block]]\nnumber = {}\nnormal = [{:.17g}, {:.17g}, {:.17g}]\nu_urad = {:.3g}\n",
-                       block.number, n.x(), n.y(), n.z(), 1e6 * block.u_rad);
+    out += fmt::format(
+        "\n[[block]]\nnumber = {}\nnormal = [{:.17g}, {:.17g}, {:.17g}]\nu_urad = {:.3g}\n",
+        block.number, n.x(), n.y(), n.z(), 1e6 * block.u_rad);
     if (const auto& face = faces[block.number == 2 ? 1 : 0])
-      out += fmt::format("{}half_size_mm = {:.17g}\n", place(face->centre_m), kMmPerM * face->half_size_m);
+      out += fmt::format("{}half_size_mm = {:.17g}\n", place(face->centre_m),
+                         kMmPerM * face->half_size_m);
   }
+
   return out;
 }
 

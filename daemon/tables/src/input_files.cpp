@@ -39,7 +39,8 @@ void check_path(ParsedTable& parsed) {
   const auto& table = parsed.table;
   for (std::size_t row = 0; row < table.rows(); ++row) {
     if (!table.sound(row)) continue;
-    if (row > 0 && table.sound(row - 1) && position_m(table, row, 0) == position_m(table, row - 1, 0))
+    if (row > 0 && table.sound(row - 1) &&
+        position_m(table, row, 0) == position_m(table, row - 1, 0))
       parsed.faults.add(table.line(row), 1, "", "the same vertex as before");
     if (table.has(3) && table.at(row, 3) <= 0.0)
       parsed.faults.add(table.line(row), 1, "feed_mm_per_min", "must be positive");
@@ -53,7 +54,8 @@ void check_spherical(ParsedTable& parsed) {
   if (table.form() != kSpherical) return;
   for (std::size_t row = 0; row < table.rows(); ++row) {
     if (!table.sound(row)) continue;
-    if (table.at(row, 1) <= 0.0) parsed.faults.add(table.line(row), 1, "range_mm", "must be positive");
+    if (table.at(row, 1) <= 0.0)
+      parsed.faults.add(table.line(row), 1, "range_mm", "must be positive");
     if (std::abs(table.at(row, 2)) > 2.0 * std::numbers::pi)
       parsed.faults.add(table.line(row), 1, "azimuth_rad", "beyond a full turn (degrees?)");
     if (std::abs(table.at(row, 3)) > std::numbers::pi / 2.0)
@@ -62,17 +64,20 @@ void check_spherical(ParsedTable& parsed) {
 }
 
 calib::otf::TrackerObservation observation(const NumberTable& table, std::size_t row) {
-  constexpr double kSpeedWarning =
-      1.0;  // the highest status that still is a good point: emScon, point status
+  // the highest status that still is a good point: emScon, point status
+  constexpr double kSpeedWarning = 1.0;
   calib::otf::TrackerObservation point;
   point.time_s = table.at(row, 0);
   point.valid = table.at(row, 4) >= 0.0 && table.at(row, 4) <= kSpeedWarning;
+
   if (table.form() == kSpherical) {
-    point.p_tracker_m = calib::from_spherical(table.at(row, 1) / kMmPerM, table.at(row, 2), table.at(row, 3));
+    point.p_tracker_m =
+        calib::from_spherical(table.at(row, 1) / kMmPerM, table.at(row, 2), table.at(row, 3));
   } else {
     const auto p_m = position_m(table, row, 1);
     point.p_tracker_m = calib::Vector3(p_m[0], p_m[1], p_m[2]);
   }
+
   return point;
 }
 
@@ -86,20 +91,23 @@ Result<PathFile> read_path_csv(const std::filesystem::path& file) {
   if (parsed->faults.any()) return tl::make_unexpected(parsed->faults.to_error());
   const auto& table = parsed->table;
   PathFile path{parsed->source, {}, {}, {}};
+
   for (std::size_t row = 0; row < table.rows(); ++row) {
     path.vertices_m.push_back(position_m(table, row, 0));
     path.lines.push_back(table.line(row));
     if (table.has(3)) path.feed_m_per_s.push_back(table.at(row, 3) / kMmPerM / kSecondsPerMinute);
   }
+
   return path;
 }
 
-Result<TrackerFile> read_tracker_csv(const std::filesystem::path& file, const ReadProgress& progress) {
-  auto parsed =
-      parse_table(file,
-                  {{{"time_s"}, {"range_mm"}, {"azimuth_rad"}, {"elevation_rad"}, {"status", false}},
-                   {{"time_s"}, {"x_mm"}, {"y_mm"}, {"z_mm"}, {"status", false}}},
-                  progress);
+Result<TrackerFile> read_tracker_csv(const std::filesystem::path& file,
+                                     const ReadProgress& progress) {
+  auto parsed = parse_table(
+      file,
+      {{{"time_s"}, {"range_mm"}, {"azimuth_rad"}, {"elevation_rad"}, {"status", false}},
+       {{"time_s"}, {"x_mm"}, {"y_mm"}, {"z_mm"}, {"status", false}}},
+      progress);
   if (!parsed) return tl::make_unexpected(parsed.error());
   check_rows(*parsed, 1, "points");
   check_time_ascends(*parsed);
@@ -109,10 +117,12 @@ Result<TrackerFile> read_tracker_csv(const std::filesystem::path& file, const Re
   tracker.points.reserve(parsed->table.rows());
   for (std::size_t row = 0; row < parsed->table.rows(); ++row)
     tracker.points.push_back(observation(parsed->table, row));
+
   return tracker;
 }
 
-Result<EncoderFile> read_encoder_csv(const std::filesystem::path& file, const ReadProgress& progress) {
+Result<EncoderFile> read_encoder_csv(const std::filesystem::path& file,
+                                     const ReadProgress& progress) {
   auto parsed = parse_table(file, {{{"time_s"}, {"x_mm"}, {"y_mm"}, {"z_mm"}}}, progress);
   if (!parsed) return tl::make_unexpected(parsed.error());
   check_rows(*parsed, 1, "readings");
@@ -144,14 +154,17 @@ Result<VerificationFile> read_verification_csv(const std::filesystem::path& file
   if (parsed->faults.any()) return tl::make_unexpected(parsed->faults.to_error());
   const auto& table = parsed->table;
   VerificationFile out{parsed->source, {}, {}};
+
   const auto vector_m = [&](std::size_t row, std::size_t first) {
     const auto p = position_m(table, row, first);
     return calib::Vector3(p[0], p[1], p[2]);
   };
+
   for (std::size_t row = 0; row < table.rows(); ++row) {
     out.points.push_back({vector_m(row, 0), vector_m(row, 3)});
     out.lines.push_back(table.line(row));
   }
+
   return out;
 }
 
@@ -159,8 +172,9 @@ std::string to_verification_csv(std::span<const calib::verify::MeasuredPoint> po
   std::string text = "x_mm,y_mm,z_mm,tracker_x_mm,tracker_y_mm,tracker_z_mm\n";
   for (const auto& p : points) {
     const calib::Vector3 reading_mm = kMmPerM * p.reading_m, measured_mm = kMmPerM * p.measured_m;
-    text += fmt::format("{:.17g},{:.17g},{:.17g},{:.17g},{:.17g},{:.17g}\n", reading_mm.x(), reading_mm.y(),
-                        reading_mm.z(), measured_mm.x(), measured_mm.y(), measured_mm.z());
+    text += fmt::format("{:.17g},{:.17g},{:.17g},{:.17g},{:.17g},{:.17g}\n", reading_mm.x(),
+                        reading_mm.y(), reading_mm.z(), measured_mm.x(), measured_mm.y(),
+                        measured_mm.z());
   }
   return text;
 }

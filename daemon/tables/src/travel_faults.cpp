@@ -11,7 +11,8 @@
 
 namespace abbe::daemon {
 
-Result<void> check_travel(const std::filesystem::path& file, std::span<const calib::Vector3> positions_m,
+Result<void> check_travel(const std::filesystem::path& file,
+                          std::span<const calib::Vector3> positions_m,
                           std::span<const std::size_t> lines, const MachineConfig& config) {
   const auto machine = otf_machine(config);
   if (!machine) return tl::unexpected(machine.error());
@@ -21,13 +22,15 @@ Result<void> check_travel(const std::filesystem::path& file, std::span<const cal
   constexpr std::array kColumns{"x_mm", "y_mm", "z_mm"};
   const std::string fits = calib::inside_travel_with(positions_m, travel);
   Faults faults(file.string());
+
   for (const auto& [point, axis] : outside) {
     const auto& nodes_m = travel[axis].nodes_m;
     faults.add(lines[point], 1, kColumns[axis],
                fmt::format("{:g}: axis {} travels {:g} to {:g} mm{}",
-                           kMmPerM * positions_m[point][static_cast<Eigen::Index>(axis)], "XYZ"[axis],
-                           kMmPerM * nodes_m.front(), kMmPerM * nodes_m.back(), fits));
+                           kMmPerM * positions_m[point][static_cast<Eigen::Index>(axis)],
+                           "XYZ"[axis], kMmPerM * nodes_m.front(), kMmPerM * nodes_m.back(), fits));
   }
+
   return tl::unexpected(faults.to_error());
 }
 

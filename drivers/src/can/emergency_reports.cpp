@@ -46,7 +46,8 @@ void EmergencyReports::on_emergency(Node& node, const can::Emergency& emergency,
 
 std::optional<std::string> EmergencyReports::take_fault(HostTime now) {
   for (auto& node : nodes_) {
-    if (node.to_tell == 0 || !node.latest || (node.told && now - *node.told < kReportAgainAfter)) continue;
+    if (node.to_tell == 0 || !node.latest || (node.told && now - *node.told < kReportAgainAfter))
+      continue;
     node.told = now;
     const auto others = std::exchange(node.to_tell, 0u) - 1;
     auto text = fmt::format("encoder {} (node {}): {}", node.axis, node.id, text_of(*node.latest));
@@ -66,10 +67,11 @@ std::string EmergencyReports::condition(std::uint8_t absent_mask, HostTime now) 
       continue;
     }
     node.unwell = now;
-    text += fmt::format("{}{}{} (node {})", text.empty() ? "" : "; ", node.axis, absent ? " missing" : "",
-                        node.id);
+    text += fmt::format("{}{}{} (node {})", text.empty() ? "" : "; ", node.axis,
+                        absent ? " missing" : "", node.id);
     if (node.latest) text += ": " + text_of(*node.latest);
   }
+
   return text;
 }
 

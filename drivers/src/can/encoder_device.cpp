@@ -17,7 +17,8 @@ namespace {
 
 std::string every(const std::optional<std::chrono::nanoseconds>& period) {
   if (!period) return {};
-  return fmt::format(" every {:.3f} ms", std::chrono::duration<double, std::milli>(*period).count());
+  return fmt::format(" every {:.3f} ms",
+                     std::chrono::duration<double, std::milli>(*period).count());
 }
 
 }  // namespace
@@ -56,21 +57,21 @@ DeviceStatus EncoderDevice::status() const {
 void EncoderDevice::wait(std::chrono::nanoseconds at_most) {
   batch_count_ = 0;
   all_read_ = true;
-  turn_end_ = time_.now();
+  cycle_end_ = time_.now();
   if (!ensure_open(at_most)) return;
-  follow_bus_off(turn_end_);
+  follow_bus_off(cycle_end_);
 
-  // A thread that was held up reads what came meanwhile before it sends the next SYNC: the heartbeats among
-  // it are not late.
-  const bool behind = is_behind(turn_end_);
+  // A thread that was held up reads what came meanwhile before it sends the next SYNC: the
+  // heartbeats among it are not late.
+  const bool behind = is_behind(cycle_end_);
   if (sending_ && !behind) send_sync();
   if (sending_ && !bus_off()) send_configuration();
   if (open_) read_batch(time_.now(), behind ? std::chrono::nanoseconds{0} : at_most);
   if (behind) caught_up_ = all_read_;
 
-  if (open_) judge(turn_end_);
-  account(turn_end_);
-  show_state(turn_end_);
+  if (open_) judge(cycle_end_);
+  account(cycle_end_);
+  show_state(cycle_end_);
 }
 
 bool EncoderDevice::is_behind(HostTime now) const {
@@ -90,6 +91,7 @@ void EncoderDevice::follow_foreign_sync(HostTime now) {
   if (bus_off()) return;                // its quiet says nothing about other producers
   if (!all_read_ && !sending_) return;  // a SYNC may be among the rest
   const bool may_send = foreign_.may_send(now);
+
   if (may_send && !sending_) {
     foreign_told_ = false;
     sending_ = true;
@@ -97,29 +99,34 @@ void EncoderDevice::follow_foreign_sync(HostTime now) {
   } else if (!may_send && sending_) {
     stop_sending();
   }
+
   const bool measured = foreign_.period() || now - foreign_.last() >= ForeignSync::kListenFor;
   if (!foreign_.present() || !measured || std::exchange(foreign_told_, true)) return;
-  board_.fault(now,
-               fmt::format("CAN {}: another SYNC producer is on this bus{}: nothing is sent. To use its SYNC "
-                           "set sync = \"external\"; else switch that producer off",
-                           bus_->name(), every(foreign_.period())));
+  board_.fault(
+      now, fmt::format(
+               "CAN {}: another SYNC producer is on this bus{}: nothing is sent. To use its SYNC "
+               "set sync = \"external\"; else switch that producer off",
+               bus_->name(), every(foreign_.period())));
 }
 
 void EncoderDevice::follow_external_sync(HostTime now) {
   const auto period = options_.receiver.sync_period;
   const auto patience = std::max(ForeignSync::kListenFor, 3 * period);
   const bool missing = now - std::max(opened_at_, foreign_.last()) >= patience;
+
   if (missing && all_read_ && !std::exchange(no_sync_told_, true))
-    board_.fault(now,
-                 fmt::format("CAN {}: no SYNC (080h) for {} ms: sync = \"external\" needs the machine's own",
-                             bus_->name(), patience / std::chrono::milliseconds{1}));
+    board_.fault(
+        now,
+        fmt::format("CAN {}: no SYNC (080h) for {} ms: sync = \"external\" needs the machine's own",
+                    bus_->name(), patience / std::chrono::milliseconds{1}));
   if (!missing) no_sync_told_ = false;
   const auto heard = foreign_.period();
   if (!heard || now - opened_at_ < ForeignSync::kListenFor) return;
   const bool other = *heard < period * 9 / 10 || *heard > period * 11 / 10;
   if (other && !period_told_)
-    board_.fault(now, fmt::format("CAN {}: the machine's SYNC comes{}, configured is sync_period_us = {}",
-                                  bus_->name(), every(heard), period / std::chrono::microseconds{1}));
+    board_.fault(
+        now, fmt::format("CAN {}: the machine's SYNC comes{}, configured is sync_period_us = {}",
+                         bus_->name(), every(heard), period / std::chrono::microseconds{1}));
   period_told_ = other;
 }
 
@@ -136,9 +143,11 @@ bool EncoderDevice::ensure_open(std::chrono::nanoseconds at_most) {
   if (open_) return true;
   const auto now = time_.now();
   if (now < reopen_at_) {
-    std::this_thread::sleep_for(time_.wall(std::min(at_most, std::chrono::nanoseconds{reopen_at_ - now})));
+    std::this_thread::sleep_for(
+        time_.wall(std::min(at_most, std::chrono::nanoseconds{reopen_at_ - now})));
     return false;
   }
+
   auto ids = supervisor_.ids();
   ids.push_back(can::cob::kSync);
   if (const auto opened = bus_->open(ids); !opened) {
@@ -148,12 +157,14 @@ bool EncoderDevice::ensure_open(std::chrono::nanoseconds at_most) {
     reopen_at_ = now + options_.reopen_after;
     return false;
   }
+
   refusal_.clear();
   open_ = true;
   opened_at_ = now;
   reopened_ = receiver_.bus_off();
   bus_was_off_ = false;
   foreign_.opened(now);
+
   return true;
 }
 
@@ -176,6 +187,7 @@ void EncoderDevice::follow_bus_off(HostTime now) {
   bus_was_off_ = bus_off();
   next_sync_.reset();
   sync_under_way_.forget();
+
   if (bus_was_off_) {
     off_since_ = now;
     board_.fault(now, fmt::format("CAN {}: bus off", bus_->name()));
@@ -207,17 +219,21 @@ void EncoderDevice::send_sync() {
     next_sync_.reset();
     return;
   }
+
   const auto now = time_.now();
   if (!next_sync_) next_sync_ = now;
   if (now < *next_sync_) return;
   const auto period = options_.receiver.sync_period;
   const auto late = now - *next_sync_;
-  *next_sync_ += period * (late / period + 1);  // on the grid; the receiver counts what was left out
-  if (late >= period) return;                   // else two could follow each other closer than answers come
+  *next_sync_ +=
+      period * (late / period + 1);  // on the grid; the receiver counts what was left out
+  if (late >= period) return;        // else two could follow each other closer than answers come
+
   if (sync_under_way_.waits(now)) {
     ++kept_back_;
     return;
   }
+
   caught_up_ = false;
   if (send(can::encode_sync())) supervisor_.on_sync(now);
 }
@@ -240,10 +256,12 @@ bool EncoderDevice::send(const can::CanFrame& frame) {
     }
     return false;
   }
+
   if (bus_->echoes_sync() && can::decode_sync(frame)) {
     sync_under_way_.sent(at);
     return true;
   }
+
   record(at, RawBlock::Direction::ToDevice, {&frame, 1});
   push(receiver_.on_sent(frame, at));
   return true;
@@ -256,21 +274,24 @@ void EncoderDevice::read_batch(HostTime now, std::chrono::nanoseconds at_most) {
   if (sending_ && !bus_off()) until = std::min(until, supervisor_.deadline());
   const auto budget = std::max(until - now, std::chrono::nanoseconds{0});
   const auto read = bus_->read(came_, time_.wall(budget));
-  turn_end_ = read ? read->until : time_.now();
+  cycle_end_ = read ? read->until : time_.now();
+
   if (!read) {
     if (read.error().code != ErrorCode::Unreachable) return close_bus(read.error());
-    if (!unreachable_) board_.fault(turn_end_, read.error().text);
+    if (!unreachable_) board_.fault(cycle_end_, read.error().text);
     unreachable_ = true;
     return;
   }
+
   const auto came = std::span{came_}.first(read->frames);
   all_read_ = read->all;
   if (options_.sync == SyncSource::Thread) {
-    batch_count_ = sync_under_way_.settle(came, batch_, turn_end_, all_read_);
+    batch_count_ = sync_under_way_.settle(came, batch_, cycle_end_, all_read_);
   } else {
     std::ranges::copy(came, batch_.begin());
     batch_count_ = came.size();
   }
+
   for (const auto& received : std::span{batch_}.first(batch_count_)) look_at(received);
 }
 
@@ -284,10 +305,10 @@ void EncoderDevice::look_at(const ReceivedFrame& received) {
   if (can::decode_sync(received.frame))
     return foreign_.heard(received.time);  // no node of ours lives because of it
   unreachable_ = false;
-  last_heard_ = turn_end_;
+  last_heard_ = cycle_end_;
   together_.on_frame(received);
-  emergencies_.on_frame(received.frame, turn_end_);
-  if (sending_) supervisor_.on_frame(received.frame, turn_end_);
+  emergencies_.on_frame(received.frame, cycle_end_);
+  if (sending_) supervisor_.on_frame(received.frame, cycle_end_);
 }
 
 }  // namespace abbe::drivers

@@ -29,14 +29,18 @@ Result<void> check_axis(const EncoderAxis& axis) {
 
 Result<void> check(const EncoderReceiverOptions& options) {
   if (options.axes.empty() || options.axes.size() > protocol::kMaxAxes) {
-    return refuse(
-        fmt::format("encoder bus: {} axes, 1 to {} are possible", options.axes.size(), protocol::kMaxAxes));
+    return refuse(fmt::format("encoder bus: {} axes, 1 to {} are possible", options.axes.size(),
+                              protocol::kMaxAxes));
   }
-  if (options.sync_period.count() <= 0) return refuse("encoder bus: the SYNC period must be positive");
+
+  if (options.sync_period.count() <= 0)
+    return refuse("encoder bus: the SYNC period must be positive");
   if (options.answer_within > options.sync_period || options.answer_within.count() < 0) {
     return refuse("encoder bus: the time for answers must lie within the SYNC period");
   }
-  if (options.u_sampling_delay.count() < 0) return refuse("encoder bus: an uncertainty cannot be negative");
+
+  if (options.u_sampling_delay.count() < 0)
+    return refuse("encoder bus: an uncertainty cannot be negative");
   for (std::size_t i = 0; i < options.axes.size(); ++i) {
     if (auto ok = check_axis(options.axes[i]); !ok) return ok;
     for (std::size_t j = 0; j < i; ++j) {
@@ -45,6 +49,7 @@ Result<void> check(const EncoderReceiverOptions& options) {
                                 options.axes[i].name, options.axes[i].node));
     }
   }
+
   return {};
 }
 

@@ -15,7 +15,8 @@ using protocol::HostTime;
 
 namespace {
 
-/// A node that boots twice within this is not configured twice: it would answer a storm with a storm.
+/// A node that boots twice within this is not configured twice: it would answer a storm with a
+/// storm.
 constexpr std::chrono::milliseconds kBetweenStarts{50};
 /// A heartbeat from before the NMT start may still be on its way: believe the second one.
 constexpr unsigned kIdleBeats = 2;
@@ -24,7 +25,8 @@ constexpr std::chrono::seconds kSettledAfter{1};
 
 constexpr double kNanometresPerMetre = 1e9;
 
-/// What trying again does not change: it waits for another node, or for this one switched off and on.
+/// What trying again does not change: it waits for another node, or for this one switched off and
+/// on.
 bool is_final(const can::ConfigurationError& error) {
   switch (error.fault) {
     case ConfigurationFault::WrongStep:
@@ -44,8 +46,8 @@ std::string steps(const EncoderAxis& axis, std::uint32_t seen) {
   const double configured = std::abs(axis.scale.value_or(0.0)) * kNanometresPerMetre;
   if (axis.kind == AxisKind::Linear)
     return fmt::format("{} nm, configured is step_nm = {:.10g}", seen, configured);
-  return fmt::format("{} counts a revolution ({:.10g} nrad), configured is step_nrad = {:.10g}", seen,
-                     2.0 * std::numbers::pi * kNanometresPerMetre / seen, configured);
+  return fmt::format("{} counts a revolution ({:.10g} nrad), configured is step_nrad = {:.10g}",
+                     seen, 2.0 * std::numbers::pi * kNanometresPerMetre / seen, configured);
 }
 
 can::EncoderPlan plan_of(const EncoderAxis& axis, std::uint16_t heartbeat_ms) {
@@ -57,15 +59,17 @@ can::EncoderPlan plan_of(const EncoderAxis& axis, std::uint16_t heartbeat_ms) {
   plan.serial = axis.serial;
   plan.linear = axis.kind == AxisKind::Linear;
   plan.needs_scale = !axis.scale.has_value();
-  if (axis.scale && plan.linear.value_or(true)) plan.step_nm = std::abs(*axis.scale) * kNanometresPerMetre;
+  if (axis.scale && plan.linear.value_or(true))
+    plan.step_nm = std::abs(*axis.scale) * kNanometresPerMetre;
   if (axis.scale && !plan.linear.value_or(true))
     plan.units_per_revolution = 2.0 * std::numbers::pi / std::abs(*axis.scale);
+
   return plan;
 }
 
 std::string describe(const EncoderAxis& axis, const can::ConfigurationError& error) {
-  auto text = fmt::format("encoder {} (node {}): configure {:04X}h:{:02X}: {}", axis.name, axis.node,
-                          error.object.index, error.object.sub, to_text(error.fault));
+  auto text = fmt::format("encoder {} (node {}): configure {:04X}h:{:02X}: {}", axis.name,
+                          axis.node, error.object.index, error.object.sub, to_text(error.fault));
   if (error.fault == ConfigurationFault::Refused) {
     text += fmt::format(": {} ({:08X}h)", to_text(error.abort_code),
                         static_cast<std::uint32_t>(error.abort_code));
@@ -78,15 +82,18 @@ std::string describe(const EncoderAxis& axis, const can::ConfigurationError& err
   } else if (error.seen != 0) {
     text += fmt::format(": {:08X}h", error.seen);
   }
+
   return text;
 }
 
 }  // namespace
 
-EncoderSupervisor::EncoderSupervisor(std::span<const EncoderAxis> axes, const SupervisorOptions& options)
+EncoderSupervisor::EncoderSupervisor(std::span<const EncoderAxis> axes,
+                                     const SupervisorOptions& options)
     : options_(options) {
   for (const auto& axis : axes) {
-    nodes_.push_back({axis, can::EncoderConfigurator{plan_of(axis, options.heartbeat_ms), options.sdo}});
+    nodes_.push_back(
+        {axis, can::EncoderConfigurator{plan_of(axis, options.heartbeat_ms), options.sdo}});
   }
 }
 
@@ -165,7 +172,8 @@ void EncoderSupervisor::on_position(Node& node, HostTime now) {
 
 void EncoderSupervisor::on_heartbeat(Node& node, can::NodeState state, HostTime now) {
   if (state == can::NodeState::BootUp) {
-    if (node.state != State::Configuring || now - node.started >= kBetweenStarts) configure(node, now);
+    if (node.state != State::Configuring || now - node.started >= kBetweenStarts)
+      configure(node, now);
     return;
   }
   if (node.state == State::Waiting && node.told == ConfigurationFault::Silent) {
@@ -175,13 +183,14 @@ void EncoderSupervisor::on_heartbeat(Node& node, can::NodeState state, HostTime 
   if (node.state == State::Ready && node.idle_beats >= kIdleBeats) on_dropped(node, state, now);
 }
 
-/// It has left the state "operational" by itself. One that does so again and again is not configured without
-/// a pause.
+/// It has left the state "operational" by itself. One that does so again and again is not
+/// configured without a pause.
 void EncoderSupervisor::on_dropped(Node& node, can::NodeState state, HostTime now) {
   tell(node, ConfigurationFault::NotOperational,
-       fmt::format("encoder {} (node {}): left the state operational by itself ({}): is configured again",
-                   node.axis.name, node.axis.node,
-                   state == can::NodeState::Stopped ? "stopped" : "pre-operational"));
+       fmt::format(
+           "encoder {} (node {}): left the state operational by itself ({}): is configured again",
+           node.axis.name, node.axis.node,
+           state == can::NodeState::Stopped ? "stopped" : "pre-operational"));
   if (now - node.ready_at >= kSettledAfter) return configure(node, now);
   node.state = State::Waiting;
   node.retry_at = now + options_.retry_after;
@@ -199,10 +208,11 @@ void EncoderSupervisor::on_time(HostTime now) {
         break;
       case State::Ready:
         if (!node.asked || now - *node.asked < options_.silence) break;
-        tell(
-            node, ConfigurationFault::Silent,
-            fmt::format("encoder {} (node {}): listen: no position for {} ms", node.axis.name, node.axis.node,
-                        std::chrono::duration_cast<std::chrono::milliseconds>(options_.silence).count()));
+        tell(node, ConfigurationFault::Silent,
+             fmt::format(
+                 "encoder {} (node {}): listen: no position for {} ms", node.axis.name,
+                 node.axis.node,
+                 std::chrono::duration_cast<std::chrono::milliseconds>(options_.silence).count()));
         configure(node, now);
         break;
     }

@@ -18,13 +18,14 @@ void ForeignSync::opened(HostTime now) {
   listen_for_ = short_break ? std::clamp(3 * slowest_, kListenAgainFor, kListenFor) : kListenFor;
   may_send_ = false;
   quiet_since_ = now;
-  measures_anew_ = true;
+  restarts_measuring_ = true;
 }
 
 void ForeignSync::heard(HostTime at) {
   may_send_ = false;
   quiet_since_ = at;
-  const bool anew = std::exchange(measures_anew_, false);
+  const bool anew = std::exchange(restarts_measuring_, false);
+
   if (count_++ == 0 || anew) {
     first_ = at;
     intervals_ = 0;
@@ -34,10 +35,12 @@ void ForeignSync::heard(HostTime at) {
     longest_ = std::max(longest_, at - last_);
     slowest_ = std::max(slowest_, at - last_);
   }
+
   last_ = at;
   if (at - first_ < kMeasureFor || intervals_ == 0) return;
   const auto mean = (at - first_) / static_cast<std::int64_t>(intervals_);
   const bool complete = intervals_ > 1 && longest_ < mean * 3 / 2;  // else SYNCs may be missing
+
   if (!period_ || complete) period_ = mean;
   first_ = at;
   intervals_ = 0;

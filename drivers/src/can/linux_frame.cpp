@@ -15,10 +15,12 @@ std::optional<can::CanFrame> from_linux(const canfd_frame& frame, std::size_t si
   if ((frame.can_id & CAN_ERR_FLAG) != 0) out.set(can::FrameFlag::Error);
   const bool wide = out.is(can::FrameFlag::Extended) || out.is(can::FrameFlag::Error);
   out.id = frame.can_id & (wide ? CAN_EFF_MASK : CAN_SFF_MASK);
+
   if (fd) {
     out.set(can::FrameFlag::Fd);
     out.fd_flags = frame.flags & (CANFD_BRS | CANFD_ESI);
   }
+
   out.length = static_cast<std::uint8_t>(std::min<std::size_t>(frame.len, longest));
   std::memcpy(out.data.data(), frame.data, out.payload().size());
   return out;

@@ -53,7 +53,10 @@ struct SocketCanBus::Batch {
 };
 
 SocketCanBus::SocketCanBus(SocketCanOptions options, const TimeSource& time)
-    : options_(std::move(options)), time_(time), stamps_(options_.speed), batch_(std::make_unique<Batch>()) {}
+    : options_(std::move(options)),
+      time_(time),
+      stamps_(options_.speed),
+      batch_(std::make_unique<Batch>()) {}
 
 SocketCanBus::~SocketCanBus() {
   close();
@@ -90,20 +93,26 @@ Result<void> SocketCanBus::configure(std::span<const std::uint32_t> ids) {
   if (setsockopt(fd_, SOL_CAN_RAW, CAN_RAW_FILTER, filters.data(), bytes) != 0) {
     return socket_error(ErrorCode::SystemRefused, name(), "set the receive filter", errno);
   }
+
   const can_err_mask_t errors = CAN_ERR_MASK;
   if (setsockopt(fd_, SOL_CAN_RAW, CAN_RAW_ERR_FILTER, &errors, sizeof errors) != 0) {
     return socket_error(ErrorCode::SystemRefused, name(), "ask for error frames", errno);
   }
+
   const int on = 1;
   setsockopt(fd_, SOL_CAN_RAW, CAN_RAW_FD_FRAMES, &on,
              sizeof on);  // find_interface() asks whether it matters
+
   if (setsockopt(fd_, SOL_CAN_RAW, CAN_RAW_RECV_OWN_MSGS, &on, sizeof on) != 0) {
-    return socket_error(ErrorCode::SystemRefused, name(), "ask for the echo of what is sent", errno);
+    return socket_error(ErrorCode::SystemRefused, name(), "ask for the echo of what is sent",
+                        errno);
   }
+
   const int bytes_wanted = options_.receive_buffer_bytes;
   if (setsockopt(fd_, SOL_SOCKET, SO_RCVBUFFORCE, &bytes_wanted, sizeof bytes_wanted) != 0) {
     setsockopt(fd_, SOL_SOCKET, SO_RCVBUF, &bytes_wanted, sizeof bytes_wanted);
   }
+
   setsockopt(fd_, SOL_SOCKET, SO_RXQ_OVFL, &on, sizeof on);
   enable_stamps(fd_);
   return {};
@@ -114,19 +123,23 @@ Result<int> SocketCanBus::find_interface() const {
   ifreq request{};
   options_.interface.copy(request.ifr_name, IFNAMSIZ - 1);
   const auto ask = [&](unsigned long what) { return ioctl(fd_, what, &request) == 0; };
+
   const auto no = [&](std::string_view what, int error) {
     return socket_error(ErrorCode::SystemRefused, name(), what, error);
   };
+
   if (!ask(SIOCGIFINDEX)) return no("find the interface", errno);
   const int index = request.ifr_ifindex;
   if (!ask(SIOCGIFFLAGS)) return no("look at the interface", errno);
   if ((request.ifr_flags & IFF_UP) == 0) return no("open (ip link set up)", ENETDOWN);
   if (!ask(SIOCGIFMTU)) return no("look at the interface", errno);
+
   if (options_.require_fd && request.ifr_mtu < static_cast<int>(CANFD_MTU)) {
     return tl::unexpected(
         Error{ErrorCode::BadConfiguration,
               fmt::format("CAN {}: CAN FD is asked for: the interface is classic", name())});
   }
+
   return index;
 }
 
@@ -149,23 +162,29 @@ Result<CanRead> SocketCanBus::read(std::span<ReceivedFrame> out, std::chrono::na
   if (held_) out[count++] = *std::exchange(held_, std::nullopt);
   const auto slots = static_cast<unsigned>(std::min<std::size_t>(kSlots, out.size() - count));
   const int got = recvmmsg(fd_, batch_->messages.data(), slots, MSG_DONTWAIT, nullptr);
+
   if (got < 0) {
     if (errno != EAGAIN && errno != EWOULDBLOCK && errno != EINTR)
-      return socket_error(ErrorCode::SystemRefused, name(), "receive", errno);  // ENETDOWN: it went down
+      return socket_error(ErrorCode::SystemRefused, name(), "receive",
+                          errno);  // ENETDOWN: it went down
     if (errno == EINTR) return CanRead{.frames = count, .until = until};
     stamps_.nothing_older_than(begun);
     return CanRead{.frames = count, .all = true, .until = until};
   }
+
   batch_->used = static_cast<unsigned>(got);
   const auto clocks = read_clock_pair();
   const auto now = options_.speed > 0.0 ? HostTime{time_.host(clocks.monotonic)} : time_.now();
   bool marked = false;
+
   for (unsigned i = 0; i < static_cast<unsigned>(got); ++i) {
     auto& message = batch_->messages[i];
-    const auto arrival =
-        options_.speed > 0.0 ? stamps_.arrival(stamp_of(message.msg_hdr), clocks, now) : Arrival{.time = now};
+    const auto arrival = options_.speed > 0.0
+                             ? stamps_.arrival(stamp_of(message.msg_hdr), clocks, now)
+                             : Arrival{.time = now};
     ReceivedFrame received{.time = arrival.time, .time_widened = arrival.widened};
-    for (auto* c = CMSG_FIRSTHDR(&message.msg_hdr); c != nullptr; c = CMSG_NXTHDR(&message.msg_hdr, c)) {
+    for (auto* c = CMSG_FIRSTHDR(&message.msg_hdr); c != nullptr;
+         c = CMSG_NXTHDR(&message.msg_hdr, c)) {
       if (c->cmsg_level != SOL_SOCKET || c->cmsg_type != SO_RXQ_OVFL) continue;
       std::uint32_t overflow = 0;  // cumulative for this socket
       std::memcpy(&overflow, CMSG_DATA(c), sizeof overflow);
@@ -191,6 +210,7 @@ Result<CanRead> SocketCanBus::read(std::span<ReceivedFrame> out, std::chrono::na
       held_ = received;
     }
   }
+
   const bool at_end = static_cast<unsigned>(got) < slots;  // also of those that are not handed on
   if (at_end) stamps_.nothing_older_than(begun);
   return CanRead{.frames = count, .all = at_end && !held_, .until = until};
@@ -203,7 +223,8 @@ Result<void> SocketCanBus::send(std::span<const can::CanFrame> frames) {
     if (write(fd_, &out.frame, out.size) >= 0) continue;
     // A full transmit queue empties by itself, or the bus is off and an error frame says so.
     const bool passing = errno == ENOBUFS || errno == EAGAIN;
-    return socket_error(passing ? ErrorCode::Unreachable : ErrorCode::SystemRefused, name(), "send", errno);
+    return socket_error(passing ? ErrorCode::Unreachable : ErrorCode::SystemRefused, name(), "send",
+                        errno);
   }
   return {};
 }
@@ -234,7 +255,8 @@ Result<void> SocketCanBus::start_sync(std::chrono::nanoseconds period) {
   head.ival2 = {us / 1'000'000, us % 1'000'000};
   head.can_id = sync.frame.can_id;
   head.nframes = 1;
-  // The broadcast manager reads the frames right behind the head; a classic frame is the first CAN_MTU bytes.
+  // The broadcast manager reads the frames right behind the head; a classic frame is the first
+  // CAN_MTU bytes.
   std::array<std::byte, sizeof head + CAN_MTU> job{};
   std::memcpy(job.data(), &head, sizeof head);
   std::memcpy(job.data() + sizeof head, &sync.frame, CAN_MTU);

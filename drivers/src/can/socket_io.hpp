@@ -20,9 +20,10 @@
 
 namespace abbe::drivers {
 
-inline tl::unexpected<Error> socket_error(ErrorCode code, std::string_view bus, std::string_view what,
-                                          int error) {
-  return tl::unexpected(Error{code, fmt::format("CAN {}: {}: {}", bus, what, std::strerror(error))});
+inline tl::unexpected<Error> socket_error(ErrorCode code, std::string_view bus,
+                                          std::string_view what, int error) {
+  return tl::unexpected(
+      Error{code, fmt::format("CAN {}: {}: {}", bus, what, std::strerror(error))});
 }
 
 /// Waits until there is something to read or `wall` has passed.
@@ -34,10 +35,10 @@ inline void wait_readable(int fd, std::chrono::nanoseconds wall) {
   ppoll(&poll, 1, &timeout, nullptr);  // an interrupted wait is a short wait
 }
 
-/// Asks for receive stamps of the kernel and, where there are any, of the hardware. The hardware's clock is
-/// another one and is not used yet. The kernel begins to stamp a little later, when a worker of its own has
-/// switched it on; frames that come before have no stamp. A refusal is no error: the user-space time,
-/// widened, remains.
+/// Asks for receive stamps of the kernel and, where there are any, of the hardware. The hardware's
+/// clock is another one and is not used yet. The kernel begins to stamp a little later, when a
+/// worker of its own has switched it on; frames that come before have no stamp. A refusal is no
+/// error: the user-space time, widened, remains.
 inline void enable_stamps(int fd) {
   const int flags = SOF_TIMESTAMPING_RX_SOFTWARE | SOF_TIMESTAMPING_SOFTWARE;
   setsockopt(fd, SOL_SOCKET, SO_TIMESTAMPING, &flags, sizeof flags);
@@ -50,7 +51,8 @@ inline std::optional<std::chrono::nanoseconds> stamp_of(msghdr& message) {
     scm_timestamping stamps{};
     std::memcpy(&stamps, CMSG_DATA(c), sizeof stamps);
     if (stamps.ts[0].tv_sec == 0 && stamps.ts[0].tv_nsec == 0) return std::nullopt;
-    return std::chrono::seconds{stamps.ts[0].tv_sec} + std::chrono::nanoseconds{stamps.ts[0].tv_nsec};
+    return std::chrono::seconds{stamps.ts[0].tv_sec} +
+           std::chrono::nanoseconds{stamps.ts[0].tv_nsec};
   }
   return std::nullopt;
 }

@@ -15,7 +15,8 @@ using protocol::HostTime;
 
 namespace {
 
-/// Room in an Ethernet frame: a larger datagram would be cut into IP fragments, each of which can be lost.
+/// Room in an Ethernet frame: a larger datagram would be cut into IP fragments, each of which can
+/// be lost.
 constexpr std::size_t kDatagramBytes = 1472;
 
 /// A literal is taken as it is; a name is asked for, which may take its time.
@@ -25,14 +26,17 @@ Result<sockaddr_in> resolve(const std::string& host, std::uint16_t port) {
   hints.ai_socktype = SOCK_DGRAM;
   addrinfo* found = nullptr;
   const int error = ::getaddrinfo(host.c_str(), nullptr, &hints, &found);
+
   if (error != 0) {
-    return tl::unexpected(Error{ErrorCode::Unreachable,
-                                fmt::format("CAN udp {}: no address: {}", host, ::gai_strerror(error))});
+    return tl::unexpected(Error{ErrorCode::Unreachable, fmt::format("CAN udp {}: no address: {}",
+                                                                    host, ::gai_strerror(error))});
   }
+
   const std::unique_ptr<addrinfo, decltype(&::freeaddrinfo)> owner{found, &::freeaddrinfo};
   sockaddr_in address{};
   std::memcpy(&address, found->ai_addr, sizeof address);
   address.sin_port = htons(port);
+
   return address;
 }
 
@@ -67,32 +71,38 @@ Result<void> UdpCanBus::open(std::span<const std::uint32_t> ids) {
   gaps_.restart();
   wanted_.reset();
   for (const auto id : ids) wanted_.set(id & can::CanFrame::kStandardMask);
+
   if (options_.peer_address.empty() || options_.peer_port == 0) {
     return tl::unexpected(
         Error{ErrorCode::BadConfiguration, fmt::format("CAN {}: host or port is missing", name())});
   }
+
   const auto local = resolve(options_.local_address, options_.local_port);
   if (!local) return tl::unexpected(local.error());
   const auto peer = resolve(options_.peer_address, options_.peer_port);
   if (!peer) return tl::unexpected(peer.error());
   stamps_.nothing_older_than(read_clock_pair());
+
   return bind_and_connect(*local, *peer);
 }
 
-/// The port is bound alone, so that a taken one is refused; then shared with a second socket of ours. Once
-/// the first one is connected the kernel gives it the peer's datagrams, and the second one all others: a
-/// flood of those takes no room from the peer.
+/// The port is bound alone, so that a taken one is refused; then shared with a second socket of
+/// ours. Once the first one is connected the kernel gives it the peer's datagrams, and the second
+/// one all others: a flood of those takes no room from the peer.
 Result<void> UdpCanBus::bind_and_connect(const sockaddr_in& local, const sockaddr_in& peer) {
   const auto no = [this](std::string_view what) {
     const auto error = errno;
     close();
     return socket_error(ErrorCode::SystemRefused, name(), what, error);
   };
+
   peer_ = peer;
   fd_ = socket(AF_INET, SOCK_DGRAM | SOCK_NONBLOCK | SOCK_CLOEXEC, 0);
   if (fd_ < 0) return no("socket");
   enable_stamps(fd_);
-  const auto* local_any = reinterpret_cast<const sockaddr*>(&local);  // NOLINT: the sockets interface
+
+  // NOLINT: the sockets interface
+  const auto* local_any = reinterpret_cast<const sockaddr*>(&local);
   if (bind(fd_, local_any, sizeof local) != 0)
     return no(fmt::format("bind {}:{}", options_.local_address, options_.local_port));
   sockaddr_in bound{};
@@ -100,7 +110,9 @@ Result<void> UdpCanBus::bind_and_connect(const sockaddr_in& local, const sockadd
   getsockname(fd_, reinterpret_cast<sockaddr*>(&bound), &length);  // NOLINT: the sockets interface
   bound_port_ = ntohs(bound.sin_port);
   listen_for_strangers(bound);
-  const auto* peer_any = reinterpret_cast<const sockaddr*>(&peer_);  // NOLINT: the sockets interface
+
+  // NOLINT: the sockets interface
+  const auto* peer_any = reinterpret_cast<const sockaddr*>(&peer_);
   if (connect(fd_, peer_any, sizeof peer_) != 0) return no("connect");
   return {};
 }
@@ -148,6 +160,7 @@ Result<CanRead> UdpCanBus::read(std::span<ReceivedFrame> out, std::chrono::nanos
   count_strangers();
   read.until = time_.now();
   const auto begun = read_clock_pair();
+
   while (read.frames < out.size()) {
     const auto next = receive_datagram();
     if (!next && read.frames == 0) return tl::unexpected(next.error());
@@ -156,11 +169,12 @@ Result<CanRead> UdpCanBus::read(std::span<ReceivedFrame> out, std::chrono::nanos
     if (!next || *next != Next::Datagram) break;
     read.frames += take_frames(out.subspan(read.frames));
   }
+
   return read;
 }
 
-/// The next datagram into the buffer. One that is no CAN datagram is counted and skipped; Unknown: many were,
-/// and there may be more.
+/// The next datagram into the buffer. One that is no CAN datagram is counted and skipped; Unknown:
+/// many were, and there may be more.
 Result<UdpCanBus::Next> UdpCanBus::receive_datagram() {
   for (unsigned skipped = 0; skipped < 64; ++skipped) {  // a flood of garbage must not keep us here
     iovec io{buffer_.data(), buffer_.size()};
@@ -187,7 +201,8 @@ Result<UdpCanBus::Next> UdpCanBus::receive_datagram() {
     rest_arrival_ = {.time = time_.now()};
     if (options_.speed > 0.0) {
       const auto clocks = read_clock_pair();
-      rest_arrival_ = stamps_.arrival(stamp_of(message), clocks, HostTime{time_.host(clocks.monotonic)});
+      rest_arrival_ =
+          stamps_.arrival(stamp_of(message), clocks, HostTime{time_.host(clocks.monotonic)});
     }
     auto view = can::DatagramView::parse(std::span{buffer_}.first(static_cast<std::size_t>(size)));
     if (view) {
@@ -197,6 +212,7 @@ Result<UdpCanBus::Next> UdpCanBus::receive_datagram() {
     }
     ++refused_;
   }
+
   return Next::Unknown;
 }
 
@@ -215,6 +231,7 @@ std::size_t UdpCanBus::take_frames(std::span<ReceivedFrame> out) {
     const bool wanted = slot.frame.is_standard_data() && wanted_.test(slot.frame.id);
     if (wanted || slot.frame.is(can::FrameFlag::Error)) ++count;
   }
+
   return count;
 }
 
@@ -232,9 +249,10 @@ Result<void> UdpCanBus::send(std::span<const can::CanFrame> frames) {
 
 Result<void> UdpCanBus::send_datagram(std::span<const std::byte> datagram) {
   if (::send(fd_, datagram.data(), datagram.size(), MSG_DONTWAIT | MSG_NOSIGNAL) >= 0) return {};
-  const bool passing = errno == ECONNREFUSED || errno == EAGAIN || errno == ENOBUFS || errno == ENETUNREACH ||
-                       errno == EHOSTUNREACH;
-  return socket_error(passing ? ErrorCode::Unreachable : ErrorCode::SystemRefused, name(), "send", errno);
+  const bool passing = errno == ECONNREFUSED || errno == EAGAIN || errno == ENOBUFS ||
+                       errno == ENETUNREACH || errno == EHOSTUNREACH;
+  return socket_error(passing ? ErrorCode::Unreachable : ErrorCode::SystemRefused, name(), "send",
+                      errno);
 }
 
 }  // namespace abbe::drivers

@@ -30,7 +30,8 @@ std::string seconds_text(double behind_s) {
 
 Result<void> check(const CounterCardOptions& options) {
   const auto refuse = [&](const char* what) {
-    return tl::unexpected{Error{ErrorCode::BadConfiguration, fmt::format("{}: {}", options.name, what)}};
+    return tl::unexpected{
+        Error{ErrorCode::BadConfiguration, fmt::format("{}: {}", options.name, what)}};
   };
   if (auto fine = check(options.receiver.wiring); !fine) return fine;
   if (options.transfer_time.count() <= 0) return refuse("the time of a transfer must be positive");
@@ -51,31 +52,33 @@ UsbIdentity identity_of(const CounterCardOptions& options) {
 
 std::size_t transfer_bytes(const CounterCardOptions& options) {
   const auto& wiring = options.receiver.wiring;
-  const double bytes = std::chrono::duration<double>(options.transfer_time).count() * scan_rate_hz(wiring) *
-                       static_cast<double>(layout_of(wiring).scan_bytes());
+  const double bytes = std::chrono::duration<double>(options.transfer_time).count() *
+                       scan_rate_hz(wiring) * static_cast<double>(layout_of(wiring).scan_bytes());
   const double most = static_cast<double>(kMostTransferBytes);
-  const auto packets = (static_cast<std::size_t>(std::clamp(bytes, 1.0, most)) + quad08::kPacketSize - 1) /
-                       quad08::kPacketSize;
+  const auto packets =
+      (static_cast<std::size_t>(std::clamp(bytes, 1.0, most)) + quad08::kPacketSize - 1) /
+      quad08::kPacketSize;
   return packets * quad08::kPacketSize;
 }
 
-Result<std::unique_ptr<CounterCardDevice>> CounterCardDevice::create(const CounterCardOptions& options,
-                                                                     std::unique_ptr<UsbLink> link,
-                                                                     const TimeSource& time,
-                                                                     CounterScanSink* sink) {
+Result<std::unique_ptr<CounterCardDevice>> CounterCardDevice::create(
+    const CounterCardOptions& options, std::unique_ptr<UsbLink> link, const TimeSource& time,
+    CounterScanSink* sink) {
   if (const auto fine = check(options); !fine) return tl::unexpected{fine.error()};
   const auto all = completed(options, *link);
-  return std::unique_ptr<CounterCardDevice>{new CounterCardDevice{all, std::move(link), time, sink}};
+  return std::unique_ptr<CounterCardDevice>{
+      new CounterCardDevice{all, std::move(link), time, sink}};
 }
 
-CounterCardDevice::CounterCardDevice(const CounterCardOptions& options, std::unique_ptr<UsbLink> link,
-                                     const TimeSource& time, CounterScanSink* sink)
+CounterCardDevice::CounterCardDevice(const CounterCardOptions& options,
+                                     std::unique_ptr<UsbLink> link, const TimeSource& time,
+                                     CounterScanSink* sink)
     : options_(options),
       link_(std::move(link)),
       time_(time),
       sink_(sink),
       live_axes_(!std::ranges::all_of(options.receiver.wiring.axes, &CounterAxis::latch_on_index)),
-      thinning_(options.sample_every),
+      decimation_(options.sample_every),
       samples_(options.sample_capacity),
       raw_(options.raw_capacity_blocks),
       receiver_(options.receiver),
@@ -86,7 +89,8 @@ CounterCardDevice::CounterCardDevice(const CounterCardOptions& options, std::uni
 CounterCardDevice::~CounterCardDevice() {
   try {
     if (session_.state() == CardState::Streaming) stop_scan();
-  } catch (...) {  // NOLINT(bugprone-empty-catch): out of memory; the card is disarmed when it is opened next
+  } catch (
+      ...) {  // NOLINT(bugprone-empty-catch): out of memory; the card is disarmed when it is opened next
   }
 }
 
@@ -118,7 +122,8 @@ DeviceStatus CounterCardDevice::status() const {
 std::string CounterCardDevice::assumption() const {
   if (!rests_on_assumption(options_.receiver.wiring)) return {};
   return options_.name +
-         ": takes for granted that a latched counter gives, in a scan, its count at the latest index edge; "
+         ": takes for granted that a latched counter gives, in a scan, its count at the latest "
+         "index edge; "
          "not yet seen on hardware";
 }
 
@@ -129,22 +134,24 @@ void CounterCardDevice::wait(std::chrono::nanoseconds at_most) {
   read_until_ = time_.now();
   const auto until_due = session_.deadline() - read_until_;
   events_ = link_->wait(time_.wall(std::clamp(until_due, std::chrono::nanoseconds{0}, at_most)));
-  turn_end_ = time_.now();
+  cycle_end_ = time_.now();
   account();
   show();
 }
 
 /// What receive() made of the latest bytes.
 void CounterCardDevice::hand_over_scans() {
-  const auto anew = receiver_.counters().began_anew;
-  if (anew != std::exchange(began_anew_seen_, anew)) tell(CardBeganAnew{seconds_text(receiver_.behind_s())});
+  const auto anew = receiver_.counters().restarted;
+  if (anew != std::exchange(began_anew_seen_, anew))
+    tell(CardRestarted{seconds_text(receiver_.behind_s())});
   if (const auto count = std::exchange(scans_, 0); count != 0) tell(CardScans{count});
   if (!receiver_.out_of_step()) {
     out_of_step_told_ = false;
   } else if (!std::exchange(out_of_step_told_, true)) {
-    tell(CardOutOfStep{fmt::format(
-        "scans out of step: clock channel {} counted {} in one scan, {:.1f} expected",
-        options_.receiver.wiring.clock_channel, receiver_.refused_step(), receiver_.expected_step())});
+    tell(CardOutOfStep{
+        fmt::format("scans out of step: clock channel {} counted {} in one scan, {:.1f} expected",
+                    options_.receiver.wiring.clock_channel, receiver_.refused_step(),
+                    receiver_.expected_step())});
   }
 }
 
@@ -155,10 +162,10 @@ void CounterCardDevice::hand_over_events() {
     } else if (const auto* done = std::get_if<UsbControlDone>(&event)) {
       tell(*done);
     } else if (const auto* lost = std::get_if<UsbLost>(&event)) {
-      if (session_.connected()) raw_.push_bytes(turn_end_, RawBlock::Direction::ToDevice, {});
+      if (session_.connected()) raw_.push_bytes(cycle_end_, RawBlock::Direction::ToDevice, {});
       tell(*lost);
     } else if (const auto* opened = std::get_if<UsbOpened>(&event)) {
-      raw_.push_bytes(turn_end_, RawBlock::Direction::FromDevice, {});
+      raw_.push_bytes(cycle_end_, RawBlock::Direction::FromDevice, {});
       progress_.set_serial_number(opened->serial);
       tell(*opened);
     } else {
@@ -168,7 +175,8 @@ void CounterCardDevice::hand_over_events() {
 }
 
 void CounterCardDevice::tell(const CardInput& input) {
-  // An action that leaves nothing under way (starting the transfers) is followed by the next at once.
+  // An action that leaves nothing under way (starting the transfers) is followed by the next at
+  // once.
   for (bool again = act(session_.on(input, time_.now())); again;)
     again = act(session_.on(CardTick{read_until_}, time_.now()));
 }
@@ -201,25 +209,27 @@ void CounterCardDevice::report_clock() {
   if (std::exchange(clock_reported_, skew != 0.0) || skew == 0.0) return;
   constexpr double kPpm = 1e6;
   board_.fault(
-      turn_end_,
+      cycle_end_,
       fmt::format("{}: the clock of channel {} runs {:.0f} ppm {}, a sound one at most {:.0f} ppm: "
                   "scans are marked ClockUnsettled; check the clock and clock_MHz",
-                  options_.session.peer, options_.receiver.wiring.clock_channel, kPpm * std::abs(skew),
-                  skew > 0.0 ? "fast" : "slow", kPpm * options_.receiver.clock.max_skew));
+                  options_.session.peer, options_.receiver.wiring.clock_channel,
+                  kPpm * std::abs(skew), skew > 0.0 ? "fast" : "slow",
+                  kPpm * options_.receiver.clock.max_skew));
 }
 
 void CounterCardDevice::account() {
   report_clock();
   const auto disagreements = receiver_.counters().latch_disagreements;
   if (disagreements != std::exchange(disagreements_seen_, disagreements)) {
-    board_.fault(turn_end_,
-                 fmt::format("{}: latch channel {} does not count the clock of channel {}",
-                             options_.session.peer, options_.receiver.wiring.latch_channel.value_or(0),
-                             options_.receiver.wiring.clock_channel));
+    board_.fault(
+        cycle_end_,
+        fmt::format("{}: latch channel {} does not count the clock of channel {}",
+                    options_.session.peer, options_.receiver.wiring.latch_channel.value_or(0),
+                    options_.receiver.wiring.clock_channel));
   }
   if (faults_seen_ == session_.fault().count) return;
   faults_seen_ = session_.fault().count;
-  board_.fault(turn_end_, session_.fault().text);
+  board_.fault(cycle_end_, session_.fault().text);
 }
 
 void CounterCardDevice::show() {

@@ -4,9 +4,10 @@
 namespace abbe::drivers {
 namespace {
 
-// Clock against pacer: two quartzes, each as far off the host's clock as the clock model believes of any.
+// Clock against pacer: two quartzes, each as far off the host's clock as the clock model believes
+// of any.
 constexpr double kQuartzDeviation = 2.0 * ClockModelOptions{}.max_skew;
-constexpr double kReading_counts = 2.0;      // each reading is whole periods
+constexpr double kReading_counts = 2.0;  // each reading is whole periods
 
 }  // namespace
 

@@ -43,6 +43,7 @@ const char* name_of(CardState state) noexcept {
     case CardState::Halting:
       return "restarting";
   }
+
   return "?";
 }
 
@@ -79,7 +80,8 @@ CardAction CounterCardSession::take(const CardTick& tick, HostTime now) {
       return CardOpen{};
     case CardState::Opening:
       if (until - asked_at_ < options_.open_timeout) return CardNothing{};
-      return fail(now, fmt::format("open: no answer in {}", in_milliseconds(options_.open_timeout)));
+      return fail(now,
+                  fmt::format("open: no answer in {}", in_milliseconds(options_.open_timeout)));
     case CardState::Testing:
     case CardState::SettingUp:
     case CardState::Loading:
@@ -88,11 +90,14 @@ CardAction CounterCardSession::take(const CardTick& tick, HostTime now) {
     case CardState::Halting:
       break;
   }
+
   if (asked_ || stopping_bulk_) {
     if (until - asked_at_ < options_.control_timeout)
       return silent(until) ? trouble_of_silence(now) : CardAction{CardNothing{}};
-    return fail(now, fmt::format("request: no answer in {}", in_milliseconds(options_.control_timeout)));
+    return fail(now,
+                fmt::format("request: no answer in {}", in_milliseconds(options_.control_timeout)));
   }
+
   if (state_ != CardState::Streaming) return next_step(now);
   return !halt_ && silent(until) ? trouble_of_silence(now) : watch(now);
 }
@@ -130,9 +135,9 @@ CardAction CounterCardSession::take(const UsbOpened& opened, HostTime now) {
   if (state_ != CardState::Opening) return CardNothing{};
   if (set_up_ && opened.serial != serial_) {
     set_up_ = false;
-    report(
-        fmt::format("{}: its serial number is \"{}\", the counters of \"{}\" were set up: these begin anew",
-                    options_.peer, opened.serial, serial_));
+    report(fmt::format(
+        "{}: its serial number is \"{}\", the counters of \"{}\" were set up: these begin anew",
+        options_.peer, opened.serial, serial_));
   }
   serial_ = opened.serial;
   enter(CardState::Testing);
@@ -164,8 +169,8 @@ CardAction CounterCardSession::send(const usb::Setup& setup, HostTime now) {
   return CardControl{setup};
 }
 
-/// One transfer that failed says nothing about the card: every request may be sent twice. Not so a wrong
-/// answer.
+/// One transfer that failed says nothing about the card: every request may be sent twice. Not so a
+/// wrong answer.
 std::optional<CardAction> CounterCardSession::send_again(const UsbControlDone& done, HostTime now) {
   if (done.outcome == UsbOutcome::Done || tries_ >= options_.control_tries) return std::nullopt;
   const unsigned tries = tries_ + 1;
@@ -205,27 +210,34 @@ CardAction CounterCardSession::stage_done(HostTime now) {
     case CardState::Streaming:
       break;
   }
+
   return CardNothing{};
 }
 
-/// With its own timer as the clock the counters are set up while it stands: they begin with it, in step.
+/// With its own timer as the clock the counters are set up while it stands: they begin with it, in
+/// step.
 void CounterCardSession::enter_setting_up() {
   enter(CardState::SettingUp);
   const auto& wiring = options_.wiring;
   const auto timer =
       wiring.clock_source == ClockSource::Timer1 ? quad08::Timer::Timer1 : quad08::Timer::Timer0;
   const bool own_clock = wiring.clock_source != ClockSource::External;
+
   const auto set_up = [this](std::uint8_t channel, const quad08::CounterSetup& setup,
                              const quad08::Debounce& phases, const quad08::Debounce& index) {
     for (const auto& write : quad08::channel_writes(channel, setup, phases, index))
       steps_.push_back({write, quad08::Expect::Nothing, 0});
   };
+
   if (own_clock) load(quad08::timer_stop(timer));
-  for (const auto& axis : wiring.axes) set_up(axis.channel, setup_of(axis), axis.debounce, axis.debounce);
+  for (const auto& axis : wiring.axes)
+    set_up(axis.channel, setup_of(axis), axis.debounce, axis.debounce);
   if (wiring.edge_channel) set_up(*wiring.edge_channel, {}, wiring.edge_debounce, {});
+
   if (wiring.latch_channel) {
     set_up(*wiring.latch_channel, {.latch_on_index = true}, {}, wiring.latch_debounce);
   }
+
   set_up(wiring.clock_channel, {}, {}, {});
   if (own_clock) load(quad08::timer_start(timer, timer_divisor(wiring)));
 }
@@ -234,6 +246,7 @@ CardAction CounterCardSession::take(const UsbControlDone& done, HostTime now) {
   if (!asked_) return CardNothing{};
   asked_ = false;
   if (auto again = send_again(done, now)) return *again;
+
   if (step_ < steps_.size()) {
     const auto& step = steps_[step_];
     const auto word = quad08::decode_word(done.bytes());
@@ -243,6 +256,7 @@ CardAction CounterCardSession::take(const UsbControlDone& done, HostTime now) {
     ++step_;
     return next_step(now);
   }
+
   if (state_ == CardState::Arming && done.setup == quad08::start_pacer()) {
     enter(CardState::Streaming);
     last_scans_ = now;
@@ -250,6 +264,7 @@ CardAction CounterCardSession::take(const UsbControlDone& done, HostTime now) {
     if (troubled_) retry_at_ = now + options_.retry_after;
     return CardNothing{};
   }
+
   const auto word = quad08::decode_word(done.bytes());
   if (done.outcome != UsbOutcome::Done || !word) return fail(now, "status: it cannot be read");
   return on_status(quad08::Status{*word}, now);
@@ -263,7 +278,8 @@ CardAction CounterCardSession::refused_step(const quad08::Step& step, const UsbC
                         : fmt::format("register {:02X}h", step.setup.index);
   if (done.outcome != UsbOutcome::Done) return fail(now, what + ": refused by the device");
   if (!word) return fail(now, fmt::format("{}: {} bytes instead of 2", what, done.length));
-  return fail(now, fmt::format("self-test: {} reads {:04X}h, {:04X}h expected", what, *word, step.value));
+  return fail(
+      now, fmt::format("self-test: {} reads {:04X}h, {:04X}h expected", what, *word, step.value));
 }
 
 CardAction CounterCardSession::on_status(quad08::Status status, HostTime now) {
@@ -273,12 +289,14 @@ CardAction CounterCardSession::on_status(quad08::Status status, HostTime now) {
       return trouble(now, fmt::format("hardware error (status {:03X}h)", status.bits));
     return CardNothing{};
   }
+
   if (state_ != CardState::Arming) return CardNothing{};
   if (status.hardware_error())
     return fail(now, fmt::format("scan start: hardware error (status {:03X}h)", status.bits));
   if (status.ready()) return send(quad08::start_pacer(), now);
   if (++status_tries_ >= kMostStatusTries)
     return fail(now, fmt::format("scan start: not ready (status {:03X}h)", status.bits));
+
   return send(quad08::read(quad08::Register::Acquisition), now);
 }
 
@@ -309,21 +327,22 @@ CardAction CounterCardSession::take(const CardScans& scans, HostTime now) {
   return CardNothing{};
 }
 
-CardAction CounterCardSession::take(const CardBeganAnew& anew, HostTime now) {
-  return state_ == CardState::Streaming && !halt_ ? set_up_again(now, anew.seen) : CardAction{CardNothing{}};
+CardAction CounterCardSession::take(const CardRestarted& anew, HostTime now) {
+  return state_ == CardState::Streaming && !halt_ ? set_up_again(now, anew.seen)
+                                                  : CardAction{CardNothing{}};
 }
 
 /// The counters stand or are others: the card was without power, or somebody else used it.
 CardAction CounterCardSession::set_up_again(HostTime now, const std::string& seen) {
-  report(fmt::format("{}: its counters did not go on{}{}: they are set up and begin anew", options_.peer,
-                     seen.empty() ? "" : ", ", seen));
+  report(fmt::format("{}: its counters did not go on{}{}: they are set up and begin anew",
+                     options_.peer, seen.empty() ? "" : ", ", seen));
   set_up_ = resuming_ = troubled_ = false;
   halt_ = true;
   return asked_ ? CardAction{CardNothing{}} : watch(now);
 }
 
-/// Torn bytes look like a clock that stands, too (another counter's in its place): once the scan is started
-/// anew.
+/// Torn bytes look like a clock that stands, too (another counter's in its place): once the scan is
+/// started anew.
 CardAction CounterCardSession::take(const CardOutOfStep& out, HostTime now) {
   if (state_ != CardState::Streaming || halt_) return CardNothing{};
   if (resuming_ && std::exchange(resumed_again_, true)) return set_up_again(now);
@@ -336,7 +355,8 @@ CardAction CounterCardSession::take(const CardBulkFailed& failed, HostTime now) 
                                                             : "scan endpoint: transfer failed");
 }
 
-/// The scan is started anew; the counters go on. What follows before scans come again is the same trouble.
+/// The scan is started anew; the counters go on. What follows before scans come again is the same
+/// trouble.
 CardAction CounterCardSession::trouble(HostTime now, std::string text) {
   if (troubled_ && now < retry_at_) return CardNothing{};
   if (!troubled_) report(fmt::format("{}: {}", options_.peer, text));

@@ -32,12 +32,14 @@ Result<void> check_axis(const CounterAxis& axis) {
 
 Result<void> check_axes(const CounterCardWiring& wiring) {
   if (wiring.axes.empty() || wiring.axes.size() > protocol::kMaxAxes) {
-    return refuse(fmt::format("{} axes, 1 to {} are possible", wiring.axes.size(), protocol::kMaxAxes));
+    return refuse(
+        fmt::format("{} axes, 1 to {} are possible", wiring.axes.size(), protocol::kMaxAxes));
   }
   std::set<std::string> names;
   for (const auto& axis : wiring.axes) {
     if (auto ok = check_axis(axis); !ok) return ok;
-    if (!names.insert(axis.name).second) return refuse(fmt::format("two channels claim axis {}", axis.name));
+    if (!names.insert(axis.name).second)
+      return refuse(fmt::format("two channels claim axis {}", axis.name));
   }
   return {};
 }
@@ -48,10 +50,12 @@ Result<void> check_channels(const CounterCardWiring& wiring) {
     if (channel >= used.size())
       return refuse(fmt::format("{}: channel {}, 0 to {} exist", what, channel, used.size() - 1));
     if (!used[channel].empty())
-      return refuse(fmt::format("channel {} is claimed by {} and {}", channel, used[channel], what));
+      return refuse(
+          fmt::format("channel {} is claimed by {} and {}", channel, used[channel], what));
     used[channel] = what;
     return {};
   };
+
   for (const auto& axis : wiring.axes)
     if (auto ok = claim(axis.channel, "axis " + axis.name); !ok) return ok;
   if (auto ok = claim(wiring.clock_channel, "the clock"); !ok) return ok;
@@ -59,6 +63,7 @@ Result<void> check_channels(const CounterCardWiring& wiring) {
     if (auto ok = claim(*wiring.latch_channel, "the probe latch"); !ok) return ok;
   if (wiring.edge_channel)
     if (auto ok = claim(*wiring.edge_channel, "the probe edges"); !ok) return ok;
+
   return {};
 }
 
@@ -68,15 +73,19 @@ Result<void> check_clock(const CounterCardWiring& wiring) {
   if (!(wiring.clock_hz > 0.0 && wiring.clock_hz <= kFastestClock_hz))
     return refuse(fmt::format("a clock of {} Hz cannot be counted", wiring.clock_hz));
   const double counts = clock_counts_per_scan(wiring);
+
   if (counts < kFewestCountsPerScan || counts > kMostCountsPerScan) {
-    return refuse(fmt::format("{} clock periods per scan: {} to {} are needed to see lost scans", counts,
-                              kFewestCountsPerScan, kMostCountsPerScan));
+    return refuse(fmt::format("{} clock periods per scan: {} to {} are needed to see lost scans",
+                              counts, kFewestCountsPerScan, kMostCountsPerScan));
   }
+
   if (wiring.clock_source == ClockSource::External) return {};
   const double divisor = quad08::kPacerClock_hz / wiring.clock_hz;
   if (std::abs(divisor - std::round(divisor)) > 1e-9 * divisor || divisor < 2.0) {
-    return refuse(fmt::format("the card's timer cannot make {} Hz: 48 MHz / n is possible", wiring.clock_hz));
+    return refuse(
+        fmt::format("the card's timer cannot make {} Hz: 48 MHz / n is possible", wiring.clock_hz));
   }
+
   return {};
 }
 
@@ -115,8 +124,8 @@ std::uint32_t timer_divisor(const CounterCardWiring& wiring) {
 }
 
 bool rests_on_assumption(const CounterCardWiring& wiring) {
-  const bool latched =
-      wiring.latch_channel.has_value() || std::ranges::any_of(wiring.axes, &CounterAxis::latch_on_index);
+  const bool latched = wiring.latch_channel.has_value() ||
+                       std::ranges::any_of(wiring.axes, &CounterAxis::latch_on_index);
   return latched && !wiring.latch_verified;
 }
 

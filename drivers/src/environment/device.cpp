@@ -26,8 +26,8 @@ auto in_ms(nanoseconds t) {
 
 }  // namespace
 
-Result<std::unique_ptr<EnvironmentDevice>> EnvironmentDevice::create(const EnvironmentDeviceOptions& options,
-                                                                     const TimeSource& time) {
+Result<std::unique_ptr<EnvironmentDevice>> EnvironmentDevice::create(
+    const EnvironmentDeviceOptions& options, const TimeSource& time) {
   auto own = std::make_unique<EnvironmentLink>();
   EnvironmentLink& link = *own;
   auto device = create(options, time, link);
@@ -35,20 +35,20 @@ Result<std::unique_ptr<EnvironmentDevice>> EnvironmentDevice::create(const Envir
   return device;
 }
 
-Result<std::unique_ptr<EnvironmentDevice>> EnvironmentDevice::create(const EnvironmentDeviceOptions& options,
-                                                                     const TimeSource& time,
-                                                                     EnvironmentLink& link) {
+Result<std::unique_ptr<EnvironmentDevice>> EnvironmentDevice::create(
+    const EnvironmentDeviceOptions& options, const TimeSource& time, EnvironmentLink& link) {
   if (const auto fine = check(options.map); !fine) return tl::unexpected(fine.error());
   if (!has_address(options.address))
     return tl::unexpected(
         Error{ErrorCode::BadConfiguration, options.name + ": host, port or path is missing"});
   if (options.period <= nanoseconds{0})
-    return tl::unexpected(Error{ErrorCode::BadConfiguration, options.name + ": period must be above 0"});
+    return tl::unexpected(
+        Error{ErrorCode::BadConfiguration, options.name + ": period must be above 0"});
   return std::unique_ptr<EnvironmentDevice>{new EnvironmentDevice{options, time, link}};
 }
 
-EnvironmentDevice::EnvironmentDevice(const EnvironmentDeviceOptions& options, const TimeSource& time,
-                                     EnvironmentLink& link)
+EnvironmentDevice::EnvironmentDevice(const EnvironmentDeviceOptions& options,
+                                     const TimeSource& time, EnvironmentLink& link)
     : options_(options),
       time_(time),
       samples_(options.sample_capacity),
@@ -86,16 +86,18 @@ void EnvironmentDevice::heed_progress(HostTime now) {
     return fail(text_of(receiver_.failure(), receiver_.map()),
                 refused ? options_.refused_retry : options_.retry, refused ? "refused" : "closed");
   }
+
   if (progress == Progress::Waiting) return;
   ++answers_;
   ++link_.answers;
   board_.set_connected(true);
   board_.set_state(receiver_.proven() ? "reading" : "proving");
+
   if (progress == Progress::Sample) plan_next_round(now);
   const auto implausible = receiver_.counters().implausible;
   if (std::exchange(implausible_seen_, implausible) != implausible)
-    board_.fault(now, fmt::format("{} {}: a value beyond all sense, given as not available", options_.name,
-                                  text_of(options_.address)));
+    board_.fault(now, fmt::format("{} {}: a value beyond all sense, given as not available",
+                                  options_.name, text_of(options_.address)));
 }
 
 /// On the grid; rounds that were slept through are left out.
@@ -109,9 +111,11 @@ bool EnvironmentDevice::ensure_open(nanoseconds at_most) {
   const auto now = time_.now();
   if (const auto from = due(); now < from) {
     // Where others wait for the line it is theirs, now.
-    if (own_link_) std::this_thread::sleep_for(time_.wall(std::min(at_most, nanoseconds{from - now})));
+    if (own_link_)
+      std::this_thread::sleep_for(time_.wall(std::min(at_most, nanoseconds{from - now})));
     return false;
   }
+
   if (!link_.line.is_open() && !open_line()) return false;
   opening_ = link_.openings;
   receiver_.begin();
@@ -119,6 +123,7 @@ bool EnvironmentDevice::ensure_open(nanoseconds at_most) {
   next_round_ = now;
   arrival_ = now;
   board_.set_state("proving");
+
   return true;
 }
 
@@ -149,8 +154,8 @@ void EnvironmentDevice::listen(nanoseconds at_most) {
   if (!read) return lose(read.error().text);
   filled_ = *read;
   if (filled_ == 0 && receiver_.awaiting() && arrival_ >= answer_due_)
-    fail(fmt::format("no answer in {} ms", in_ms(options_.answer_timeout)), options_.retry, "closed",
-         options_.answer_timeout);
+    fail(fmt::format("no answer in {} ms", in_ms(options_.answer_timeout)), options_.retry,
+         "closed", options_.answer_timeout);
 }
 
 /// Recorded as nothing sent, into a line that was open.
@@ -172,8 +177,9 @@ bool EnvironmentDevice::others_answered() noexcept {
   return std::exchange(others_at_fault_, others) != others;
 }
 
-/// Of a connection that is closed by one all devices begin anew; one that stays open rests for as long as an
-/// answer may still come, and the others have their rounds before this device asks again.
+/// Of a connection that is closed by one all devices begin anew; one that stays open rests for as
+/// long as an answer may still come, and the others have their rounds before this device asks
+/// again.
 void EnvironmentDevice::leave_line(nanoseconds retry, nanoseconds quiet) {
   const auto now = time_.now();
   opening_ = 0;
@@ -187,7 +193,8 @@ void EnvironmentDevice::leave_line(nanoseconds retry, nanoseconds quiet) {
   link_.open_at = now + options_.retry;
 }
 
-void EnvironmentDevice::fail(std::string_view what, nanoseconds retry, const char* state, nanoseconds quiet) {
+void EnvironmentDevice::fail(std::string_view what, nanoseconds retry, const char* state,
+                             nanoseconds quiet) {
   const auto now = time_.now();
   board_.fault(now, fmt::format("{} {}: {}", options_.name, text_of(options_.address), what));
   leave_line(retry, quiet);

@@ -19,13 +19,15 @@ Error bad(std::string text) {
   return {ErrorCode::BadConfiguration, std::move(text)};
 }
 
-/// Vaisala M212287EN p. 73, 114 (Indigo520) and M212022EN p. 101 (HMP series): 32-bit floats, low word first;
-/// documented numbers are 1-based, these are not. Unit 240 is the transmitter, 241 the probe on port 1.
+/// Vaisala M212287EN p. 73, 114 (Indigo520) and M212022EN p. 101 (HMP series): 32-bit floats, low
+/// word first; documented numbers are 1-based, these are not. Unit 240 is the transmitter, 241 the
+/// probe on port 1.
 RegisterMap indigo520_hmp() {
   const auto at = [](std::uint8_t unit, std::uint16_t address) {
     return RegisterPlace{unit, Function::ReadHoldingRegisters, address, RegisterType::Float32,
                          WordOrder::LowFirst};
   };
+
   const RegisterPlace status{241, Function::ReadHoldingRegisters, 0x0200, RegisterType::Uint16,
                              WordOrder::HighFirst};
   RegisterMap map;
@@ -34,26 +36,43 @@ RegisterMap indigo520_hmp() {
       {"air temperature", Quantity::AirTemperature, 0, at(241, 0x0002), 1.0, kZeroCelsius_K, {}},
       {"air pressure", Quantity::AirPressure, 0, at(240, 0x002A), kPascalsPerHectopascal, 0.0, {}}};
   map.proving = {{"status of the probe", status, 1.0}};
+
   return map;
 }
 
 /// Comet Modbus description for Tx5xx/Tx6xx v3.2: int16, tenths; serial number in BCD.
 RegisterMap comet_t7510(const KnownMapOptions& options) {
   const auto at = [&](std::uint16_t address, RegisterType type) {
-    return RegisterPlace{options.unit, Function::ReadHoldingRegisters, address, type, WordOrder::HighFirst};
+    return RegisterPlace{options.unit, Function::ReadHoldingRegisters, address, type,
+                         WordOrder::HighFirst};
   };
+
   constexpr auto kType = RegisterType::Int16;
   RegisterMap map;
   map.measured = {
       {"air temperature", Quantity::AirTemperature, 0, at(49, kType), 0.1, kZeroCelsius_K, {}},
-      {"relative humidity", Quantity::RelativeHumidity, 0, at(50, kType), 0.1 * kPerPercent, 0.0, {}},
-      {"air pressure", Quantity::AirPressure, 0, at(52, kType), 0.1 * kPascalsPerHectopascal, 0.0, {}}};
+      {"relative humidity",
+       Quantity::RelativeHumidity,
+       0,
+       at(50, kType),
+       0.1 * kPerPercent,
+       0.0,
+       {}},
+      {"air pressure",
+       Quantity::AirPressure,
+       0,
+       at(52, kType),
+       0.1 * kPascalsPerHectopascal,
+       0.0,
+       {}}};
   map.proving = {{"serial number", at(4149, RegisterType::Bcd32),
                   static_cast<double>(options.serial_number.value_or(0))}};
+
   return map;
 }
 
-/// ICP DAS ZT-2005-C8 manual p. 42: inputs 30001 to 30008, int16, here in engineering units of 0.1 C.
+/// ICP DAS ZT-2005-C8 manual p. 42: inputs 30001 to 30008, int16, here in engineering units of
+/// 0.1 C.
 RegisterMap zt2005_c8(const KnownMapOptions& options) {
   RegisterMap map;
   for (std::size_t i = 0; i < options.inputs.size(); ++i) {
@@ -61,13 +80,15 @@ RegisterMap zt2005_c8(const KnownMapOptions& options) {
     MeasuredRegister m;
     m.name = i < options.input_names.size() ? options.input_names[i] : fmt::format("input {}", i);
     m.channel = *options.inputs[i];
-    m.place = {options.unit, Function::ReadInputRegisters, static_cast<std::uint16_t>(i), RegisterType::Int16,
-               WordOrder::HighFirst};
+    m.place = {options.unit, Function::ReadInputRegisters, static_cast<std::uint16_t>(i),
+               RegisterType::Int16, WordOrder::HighFirst};
     m.scale = 0.1;
     m.offset = kZeroCelsius_K;
-    m.unavailable = {-32768.0, 32767.0};  // ends of the scale: broken wire, short circuit; not confirmed
+    m.unavailable = {-32768.0,
+                     32767.0};  // ends of the scale: broken wire, short circuit; not confirmed
     map.measured.push_back(std::move(m));
   }
+
   return map;
 }
 
@@ -93,14 +114,18 @@ Result<RegisterMap> known_map(std::string_view name, const KnownMapOptions& opti
                         "base that is off by one is found",
                         name)));
   if (options.serial_number && name != kComet)
-    return tl::unexpected(bad(fmt::format("register map {}: has no register with the serial number", name)));
+    return tl::unexpected(
+        bad(fmt::format("register map {}: has no register with the serial number", name)));
   if (!options.inputs.empty() && name != kZt2005)
     return tl::unexpected(bad(fmt::format("register map {}: has no inputs to be named", name)));
   if (options.inputs.size() > kZt2005Inputs)
-    return tl::unexpected(bad(
-        fmt::format("register map {}: has {} inputs, not {}", name, kZt2005Inputs, options.inputs.size())));
-  auto map = name == kIndigo ? indigo520_hmp() : name == kComet ? comet_t7510(options) : zt2005_c8(options);
+    return tl::unexpected(bad(fmt::format("register map {}: has {} inputs, not {}", name,
+                                          kZt2005Inputs, options.inputs.size())));
+  auto map = name == kIndigo  ? indigo520_hmp()
+             : name == kComet ? comet_t7510(options)
+                              : zt2005_c8(options);
   map.name = name;
+
   return map;
 }
 

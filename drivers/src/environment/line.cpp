@@ -23,15 +23,18 @@ Result<std::unique_ptr<EnvironmentLine>> EnvironmentLine::create(
     return tl::unexpected(Error{ErrorCode::BadConfiguration, "a Modbus line without a device"});
   const ModbusAddress& address = options.front().address;
   std::unique_ptr<EnvironmentLine> line{new EnvironmentLine{silence_between(address), time}};
+
   for (const auto& o : options) {
     if (!same_line(o.address, address) || !same_settings(o.address, address))
-      return tl::unexpected(Error{ErrorCode::BadConfiguration,
-                                  fmt::format("{} {} and {} {} are not one line", options.front().name,
-                                              text_of(address), o.name, text_of(o.address))});
+      return tl::unexpected(
+          Error{ErrorCode::BadConfiguration,
+                fmt::format("{} {} and {} {} are not one line", options.front().name,
+                            text_of(address), o.name, text_of(o.address))});
     auto device = EnvironmentDevice::create(o, time, line->link_);
     if (!device) return tl::unexpected(device.error());
     line->devices_.push_back(std::move(*device));
   }
+
   return line;
 }
 
@@ -39,12 +42,15 @@ void EnvironmentLine::wait(nanoseconds at_most) {
   const bool alone = devices_.size() == 1;
   EnvironmentDevice& device = next();
   active_ = nullptr;
+
   if (!device.busy()) {
     if (!alone && must_be_quiet()) return throw_away(device, at_most);
     const auto now = time_.now();
     if (!device.on_line() && now < device.due())
-      return std::this_thread::sleep_for(time_.wall(std::min(at_most, nanoseconds{device.due() - now})));
+      return std::this_thread::sleep_for(
+          time_.wall(std::min(at_most, nanoseconds{device.due() - now})));
   }
+
   active_ = &device;
   device.wait(at_most);
   if (link_.line.is_open()) return;
@@ -52,8 +58,8 @@ void EnvironmentLine::wait(nanoseconds at_most) {
     if (other.get() != &device) other->line_closed();
 }
 
-/// Whoever awaits an answer, or has one that it did not look at yet; else who has waited longest, of several
-/// the one after the last.
+/// Whoever awaits an answer, or has one that it did not look at yet; else who has waited longest,
+/// of several the one after the last.
 EnvironmentDevice& EnvironmentLine::next() {
   for (const auto& device : devices_)
     if (device->busy()) return *device;
@@ -76,7 +82,8 @@ bool EnvironmentLine::must_be_quiet() {
 /// An answer that comes too late would look like the answer to the next question.
 void EnvironmentLine::throw_away(EnvironmentDevice& device, nanoseconds at_most) {
   std::array<std::byte, modbus::kMaxAduSize> bytes{};
-  const auto budget = std::clamp(nanoseconds{link_.quiet_until - time_.now()}, nanoseconds{0}, at_most);
+  const auto budget =
+      std::clamp(nanoseconds{link_.quiet_until - time_.now()}, nanoseconds{0}, at_most);
   const auto read = link_.line.read(bytes, time_.wall(budget));
   if (!read) device.lose(read.error().text);
   if (read && *read != 0) link_.quiet_until = time_.now() + kEndOfRemains;

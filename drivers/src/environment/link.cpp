@@ -31,7 +31,8 @@ bool same_settings(const ModbusAddress& a, const ModbusAddress& b) {
   const auto* one = std::get_if<ModbusSerial>(&a);
   const auto* other = std::get_if<ModbusSerial>(&b);
   if (one == nullptr || other == nullptr) return one == other;
-  return one->baud == other->baud && one->parity == other->parity && one->stop_bits == other->stop_bits;
+  return one->baud == other->baud && one->parity == other->parity &&
+         one->stop_bits == other->stop_bits;
 }
 
 std::chrono::nanoseconds silence_between(const ModbusAddress& address) {

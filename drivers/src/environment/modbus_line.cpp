@@ -29,8 +29,8 @@ modbus_t* make_context(const ModbusAddress& address) {
   if (const auto* tcp = std::get_if<ModbusTcp>(&address))
     return modbus_new_tcp_pi(tcp->host.c_str(), std::to_string(tcp->port).c_str());
   const auto& serial = std::get<ModbusSerial>(address);
-  return modbus_new_rtu(serial.path.c_str(), serial.baud, static_cast<char>(serial.parity), kDataBits,
-                        serial.stop_bits);
+  return modbus_new_rtu(serial.path.c_str(), serial.baud, static_cast<char>(serial.parity),
+                        kDataBits, serial.stop_bits);
 }
 
 bool wait_readable(int fd, nanoseconds wall) {
@@ -44,14 +44,16 @@ bool wait_readable(int fd, nanoseconds wall) {
 }  // namespace
 
 modbus::Transport transport_of(const ModbusAddress& address) noexcept {
-  return std::holds_alternative<ModbusTcp>(address) ? modbus::Transport::Tcp : modbus::Transport::Rtu;
+  return std::holds_alternative<ModbusTcp>(address) ? modbus::Transport::Tcp
+                                                    : modbus::Transport::Rtu;
 }
 
 std::string text_of(const ModbusAddress& address) {
-  if (const auto* tcp = std::get_if<ModbusTcp>(&address)) return fmt::format("{}:{}", tcp->host, tcp->port);
+  if (const auto* tcp = std::get_if<ModbusTcp>(&address))
+    return fmt::format("{}:{}", tcp->host, tcp->port);
   const auto& serial = std::get<ModbusSerial>(address);
-  return fmt::format("{} {} {}{}{}", serial.path, serial.baud, kDataBits, static_cast<char>(serial.parity),
-                     serial.stop_bits);
+  return fmt::format("{} {} {}{}{}", serial.path, serial.baud, kDataBits,
+                     static_cast<char>(serial.parity), serial.stop_bits);
 }
 
 void ModbusLine::Free::operator()(_modbus* context) const noexcept {
@@ -68,16 +70,19 @@ Result<void> ModbusLine::open(const ModbusAddress& address, nanoseconds wall) {
     if (auto locked = lock.take(serial->path); !locked) return locked;
   decltype(context_) fresh{make_context(address)};
   if (!fresh) return failed("set up", errno);
+
   // libmodbus takes it for the connection, too; less than a microsecond would be refused.
-  const auto us =
-      std::max<std::int64_t>(std::chrono::duration_cast<std::chrono::microseconds>(wall).count(), 1);
+  const auto us = std::max<std::int64_t>(
+      std::chrono::duration_cast<std::chrono::microseconds>(wall).count(), 1);
   constexpr std::int64_t kSecond = 1'000'000;
   modbus_set_response_timeout(fresh.get(), static_cast<std::uint32_t>(us / kSecond),
                               static_cast<std::uint32_t>(us % kSecond));
-  if (modbus_connect(fresh.get()) != 0) return failed("open", errno == EINPROGRESS ? ETIMEDOUT : errno);
+  if (modbus_connect(fresh.get()) != 0)
+    return failed("open", errno == EINPROGRESS ? ETIMEDOUT : errno);
   if (transport_of(address) == modbus::Transport::Rtu) modbus_flush(fresh.get());
   context_ = std::move(fresh);
   lock_ = std::move(lock);
+
   return {};
 }
 
@@ -109,9 +114,10 @@ Result<void> SerialLock::take(const std::string& path) {
 Result<void> ModbusLine::send(const modbus::ReadRequest& request) {
   const auto high = [](std::uint16_t v) { return static_cast<std::uint8_t>(v >> 8); };
   const auto low = [](std::uint16_t v) { return static_cast<std::uint8_t>(v & 0xFFu); };
-  const std::array<std::uint8_t, 6> raw{request.unit,          static_cast<std::uint8_t>(request.function),
-                                        high(request.address), low(request.address),
-                                        high(request.count),   low(request.count)};
+  const std::array<std::uint8_t, 6> raw{
+      request.unit,          static_cast<std::uint8_t>(request.function),
+      high(request.address), low(request.address),
+      high(request.count),   low(request.count)};
   if (modbus_send_raw_request(context_.get(), raw.data(), static_cast<int>(raw.size())) < 0)
     return failed("send", errno);
   return {};

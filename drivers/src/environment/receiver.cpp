@@ -34,6 +34,7 @@ std::vector<EnvironmentReceiver::Spot> EnvironmentReceiver::spots_in(
       break;
     }
   }
+
   return spots;
 }
 
@@ -45,8 +46,9 @@ bool is_refusal(const EnvironmentFailure& failure) noexcept {
 
 std::string text_of(const EnvironmentFailure& failure, const RegisterMap& map) {
   const auto& q = failure.request;
-  const auto asked =
-      fmt::format("unit {} function {} address {}", q.unit, static_cast<int>(q.function), q.address);
+  const auto asked = fmt::format("unit {} function {} address {}", q.unit,
+                                 static_cast<int>(q.function), q.address);
+
   switch (failure.kind) {
     case Kind::None:
       return {};
@@ -56,22 +58,24 @@ std::string text_of(const EnvironmentFailure& failure, const RegisterMap& map) {
       return fmt::format("{}: {}", asked, modbus::name_of(failure.error));
     case Kind::Exception:
       return fmt::format(
-          "{}: exception {}, {}{}", asked, failure.exception, modbus::name_of_exception(failure.exception),
+          "{}: exception {}, {}{}", asked, failure.exception,
+          modbus::name_of_exception(failure.exception),
           is_refusal(failure) ? fmt::format(": register map {} does not match", map.name) : "");
     case Kind::Unproven: {
       const auto& proving = map.proving[failure.index];
-      return fmt::format("{}: {} is {}, not {}: wrong device or register map {} does not match", asked,
-                         proving.name, failure.value, proving.expected, map.name);
+      return fmt::format("{}: {} is {}, not {}: wrong device or register map {} does not match",
+                         asked, proving.name, failure.value, proving.expected, map.name);
     }
     case Kind::Implausible: {
       const auto& measured = map.measured[failure.index];
-      const bool kelvin =
-          measured.quantity == Quantity::AirTemperature || measured.quantity == Quantity::Temperature;
+      const bool kelvin = measured.quantity == Quantity::AirTemperature ||
+                          measured.quantity == Quantity::Temperature;
       const auto unit = kelvin ? " K" : measured.quantity == Quantity::AirPressure ? " Pa" : "";
-      return fmt::format("{}: {} reads {:.6g}{}: register map {} does not match", asked, measured.name,
-                         failure.value, unit, map.name);
+      return fmt::format("{}: {} reads {:.6g}{}: register map {} does not match", asked,
+                         measured.name, failure.value, unit, map.name);
     }
   }
+
   return "?";
 }
 

@@ -32,11 +32,13 @@ IppDevice::~IppDevice() {
     tell(IppStopRequested{});
     await_standstill();
     leave(IppStopRequested{});
-  } catch (...) {  // NOLINT(bugprone-empty-catch): out of memory; a server ends the session of a lost client
+  } catch (
+      ...) {  // NOLINT(bugprone-empty-catch): out of memory; a server ends the session of a lost client
   }
 }
 
-/// Closing the connection before the answer has come would leave it to the server whether the machine stops.
+/// Closing the connection before the answer has come would leave it to the server whether the
+/// machine stops.
 void IppDevice::await_standstill() {
   constexpr auto kLook = std::chrono::milliseconds{20};
   const auto& time_out = options_.session.command_timeout;
@@ -61,8 +63,8 @@ void IppDevice::release() {
 
 void IppDevice::measure(std::span<const ProbePoint> points) {
   asked_.fetch_add(points.size(), std::memory_order_relaxed);
-  requests_.put(std::vector<ProbePoint>{points.begin(),
-                                        points.end()});  // orders what was asked before what is finished
+  requests_.put(std::vector<ProbePoint>{
+      points.begin(), points.end()});  // orders what was asked before what is finished
 }
 
 void IppDevice::wait(std::chrono::nanoseconds at_most) {
@@ -96,10 +98,14 @@ DeviceStatus IppDevice::status() const {
 
 void IppDevice::read_requests() {
   const auto requests = requests_.take();
-  const auto is_abort = [](const Request& r) { return std::holds_alternative<IppAbortRequested>(r); };
+  const auto is_abort = [](const Request& r) {
+    return std::holds_alternative<IppAbortRequested>(r);
+  };
+
   const auto is_end = [](const Request& r) { return std::holds_alternative<IppStopRequested>(r); };
   const auto stops = [&](const Request& r) { return is_abort(r) || is_end(r); };
   const auto asked_again = std::find_if(requests.rbegin(), requests.rend(), stops).base();
+
   for (auto request = requests.begin(); request != requests.end(); ++request) {
     if (const auto* points = std::get_if<std::vector<ProbePoint>>(&*request)) {
       taken_ += points->size();
@@ -121,7 +127,8 @@ void IppDevice::ask_for(const std::vector<ProbePoint>& points) {
 }
 
 void IppDevice::count_points() {
-  finished_.store(taken_ - session().points_left(), std::memory_order_release);  // pairs with points_left()
+  finished_.store(taken_ - session().points_left(),
+                  std::memory_order_release);  // pairs with points_left()
 }
 
 std::span<const std::byte> IppDevice::encode(const IppSend& command) {

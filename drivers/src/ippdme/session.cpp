@@ -17,7 +17,8 @@ constexpr ippdme::Tag kMoveReportTag{true, 1};
 constexpr ippdme::Tag kWatchTag{true, 3};
 
 tl::unexpected<Error> bad(const IppSessionOptions& options, std::string_view what) {
-  return tl::unexpected(Error{ErrorCode::BadConfiguration, fmt::format("{}: {}", options.peer, what)});
+  return tl::unexpected(
+      Error{ErrorCode::BadConfiguration, fmt::format("{}: {}", options.peer, what)});
 }
 
 }  // namespace
@@ -47,13 +48,15 @@ const char* name_of(IppState state) noexcept {
     case IppState::Faulted:
       return "faulted";
   }
+
   return "?";
 }
 
 Result<void> check(const IppSessionOptions& o) {
   const nanoseconds zero{};
   // The server gives at most 10 reports a second.
-  if (o.poll_period < std::chrono::milliseconds{100}) return bad(o, "polled more than 10 times a second");
+  if (o.poll_period < std::chrono::milliseconds{100})
+    return bad(o, "polled more than 10 times a second");
   if (o.connect_timeout <= zero || o.command_timeout <= zero || o.motion_timeout <= zero)
     return bad(o, "a time-out not above 0");
   if (o.first_pause <= zero || o.longest_pause < o.first_pause)
@@ -78,13 +81,16 @@ void IppSession::write_script() {
              {.state = Opening, .method = "GetDMEVersion()", .purpose = Purpose::Version},
              {.state = Configuring, .method = "IsHomed()", .purpose = Purpose::IsHomed}};
   if (!options_.tool.empty())
-    script_.push_back({.state = Configuring, .method = fmt::format("SetTool(\"{}\")", options_.tool)});
+    script_.push_back(
+        {.state = Configuring, .method = fmt::format("SetTool(\"{}\")", options_.tool)});
   script_.push_back({.state = Configuring, .method = "OnPtMeasReport(X(),Y(),Z())"});
+
   if (options_.move_reports) {
-    script_.push_back({.state = Configuring,
-                       .method = fmt::format("OnMoveReportE(Time({}),Dis(1),X(),Y(),Z())",
-                                             ippdme::number_text(ipp_text::seconds(options_.poll_period))),
-                       .event = kMoveReportTag});
+    script_.push_back(
+        {.state = Configuring,
+         .method = fmt::format("OnMoveReportE(Time({}),Dis(1),X(),Y(),Z())",
+                               ippdme::number_text(ipp_text::seconds(options_.poll_period))),
+         .event = kMoveReportTag});
   }
 }
 
@@ -105,8 +111,9 @@ IppAction IppSession::on(const IppInput& input, protocol::HostTime now) {
 }
 
 void IppSession::note(const std::string& what) {
-  fault_.text = held_ && what != hold_reason_ ? fmt::format("{}: {}; {}", options_.peer, hold_reason_, what)
-                                              : fmt::format("{}: {}", options_.peer, what);
+  fault_.text = held_ && what != hold_reason_
+                    ? fmt::format("{}: {}; {}", options_.peer, hold_reason_, what)
+                    : fmt::format("{}: {}", options_.peer, what);
   last_note_ = what;
   ++fault_.count;
 }
@@ -134,24 +141,28 @@ IppAction IppSession::close(IppState into) {
 // --- the connection
 
 IppAction IppSession::take(const IppTick&) {
-  if (state_ == IppState::Aborting) return now_ < due_ ? IppAction{IppNothing{}} : abort_unanswered();
+  if (state_ == IppState::Aborting)
+    return now_ < due_ ? IppAction{IppNothing{}} : abort_unanswered();
   if (pending_ && now_ >= pending_->due) {
     if (state_ == IppState::Stopping) return close(IppState::Disconnected);
     const auto patience = pending_->step.moves ? options_.motion_timeout : options_.command_timeout;
-    return give_up(IppState::Faulted,
-                   fmt::format("no answer to {} in {:g} s", ipp_text::method_name(pending_->step.method),
-                               ipp_text::seconds(patience)));
+    return give_up(IppState::Faulted, fmt::format("no answer to {} in {:g} s",
+                                                  ipp_text::method_name(pending_->step.method),
+                                                  ipp_text::seconds(patience)));
   }
+
   if (stopped_ || now_ < due_ || pending_) return IppNothing{};
   switch (state_) {
     case IppState::Disconnected:
     case IppState::Faulted:
       return connect();
     case IppState::Connecting:
-      return give_up(IppState::Disconnected,
-                     fmt::format("no connection in {:g} s", ipp_text::seconds(options_.connect_timeout)));
+      return give_up(
+          IppState::Disconnected,
+          fmt::format("no connection in {:g} s", ipp_text::seconds(options_.connect_timeout)));
     case IppState::Ready:
-      return send({.state = IppState::Ready, .method = "Get(X(),Y(),Z())", .purpose = Purpose::Get});
+      return send(
+          {.state = IppState::Ready, .method = "Get(X(),Y(),Z())", .purpose = Purpose::Get});
     case IppState::AwaitingRelease:  // whether the server is still there
       if (!open_) return connect();
       return send({.state = IppState::AwaitingRelease,
@@ -188,8 +199,8 @@ IppAction IppSession::take(const IppConnectionLost& lost) {
   return IppNothing{};  // there is nothing to close any more
 }
 
-/// Whoever asked saw the machine stand somewhere: what is asked of one that is away must not be driven when
-/// it returns.
+/// Whoever asked saw the machine stand somewhere: what is asked of one that is away must not be
+/// driven when it returns.
 IppAction IppSession::take(const ProbePoint& point) {
   if (stopped_) return IppNothing{};
   if (state_ != IppState::Ready && state_ != IppState::Measuring) {
@@ -241,10 +252,10 @@ IppAction IppSession::strange(std::string_view what, ippdme::Tag tag) {
   const bool late = state_ == IppState::Stopping || state_ == IppState::Aborting ||
                     state_ == IppState::AwaitingRelease || state_ == IppState::Clearing;
   if (late) return IppNothing{};  // of what was under way
-  return give_up(
-      IppState::Faulted,
-      fmt::format("{} for {}, which was not asked{}", what, ippdme::to_string(tag),
-                  pending_ ? " (pending: " + ippdme::to_string(pending_->tag) + ")" : std::string{}));
+  return give_up(IppState::Faulted,
+                 fmt::format("{} for {}, which was not asked{}", what, ippdme::to_string(tag),
+                             pending_ ? " (pending: " + ippdme::to_string(pending_->tag) + ")"
+                                      : std::string{}));
 }
 
 IppAction IppSession::take(const IppAck& ack) {
@@ -270,9 +281,12 @@ IppAction IppSession::take(const IppError& error) {
   if (failed && error.tag == kMoveReportTag) without_move_reports();
   const bool mine = pending_ && error.tag == pending_->tag;
   if (mine && failed && !pending_->error) pending_->error = error;
-  if (mine && pending_->step.event) return done();  // an event that is refused is never acknowledged
+  if (mine && pending_->step.event)
+    return done();  // an event that is refused is never acknowledged
   if (!failed) return IppNothing{};
-  if (mine && !(pending_->step.moves && error.severity >= ipp_text::kUserNeeded)) return IppNothing{};
+  if (mine && !(pending_->step.moves && error.severity >= ipp_text::kUserNeeded))
+    return IppNothing{};
+
   return take_foreign(error);
 }
 
@@ -297,11 +311,11 @@ IppAction IppSession::take(const IppComplete& complete) {
   return done();
 }
 
-IppAction IppSession::take(const IppNonsense& nonsense) {
+IppAction IppSession::take(const IppProtocolError& nonsense) {
   if (!open_) return IppNothing{};
-  return give_up(IppState::Faulted,
-                 fmt::format("this is no I++ DME server: {}: \"{}\"", ippdme::name_of(nonsense.error),
-                             ipp_text::escaped(nonsense.line.view())));
+  return give_up(IppState::Faulted, fmt::format("this is no I++ DME server: {}: \"{}\"",
+                                                ippdme::name_of(nonsense.error),
+                                                ipp_text::escaped(nonsense.line.view())));
 }
 
 IppAction IppSession::done() {
@@ -309,13 +323,15 @@ IppAction IppSession::done() {
   if (was.step.moves) moving_ = false;
   const bool tolerated = was.step.purpose == Purpose::End || was.step.purpose == Purpose::Watch;
   if (was.error && !tolerated) return failed(was);
+
   switch (was.step.purpose) {
     case Purpose::End:
       return close(IppState::Disconnected);
     case Purpose::Start:
       return began_session();
     case Purpose::Version:
-      if (was.data.empty()) return give_up(IppState::Faulted, "GetDMEVersion was answered without a version");
+      if (was.data.empty())
+        return give_up(IppState::Faulted, "GetDMEVersion was answered without a version");
       return next_step();
     case Purpose::IsHomed:
       return judge_home(was.data);
@@ -334,6 +350,7 @@ IppAction IppSession::done() {
     case Purpose::Other:
       break;
   }
+
   return next_step();
 }
 
@@ -349,7 +366,8 @@ IppAction IppSession::judge_home(const std::string& data) {
 IppAction IppSession::failed(const Pending& was) {
   const std::string what = fmt::format("{} was refused: {}", ipp_text::method_name(was.step.method),
                                        ipp_text::text_of(*was.error));
-  const bool busy = was.step.purpose == Purpose::Start && was.error->code == ipp_text::kProtocolError;
+  const bool busy =
+      was.step.purpose == Purpose::Start && was.error->code == ipp_text::kProtocolError;
   return busy && !moving_ ? give_up(IppState::Faulted, what) : hold(what);
 }
 

@@ -26,8 +26,9 @@ IppAction IppSession::stopped_moving() {
   return close_then_ ? close(IppState::AwaitingRelease) : await_release();
 }
 
-/// The next connection begins with another AbortE. Outside a session silence may mean that the server wants
-/// one first: the next connection tries it the other way. A machine that is held gets no session.
+/// The next connection begins with another AbortE. Outside a session silence may mean that the
+/// server wants one first: the next connection tries it the other way. A machine that is held gets
+/// no session.
 IppAction IppSession::abort_unanswered() {
   note(fmt::format("no answer to AbortE in {:g} s: the machine may still be moving",
                    ipp_text::seconds(options_.command_timeout)));
@@ -35,14 +36,16 @@ IppAction IppSession::abort_unanswered() {
   return stopped_ ? goodbye() : close(IppState::Faulted);
 }
 
-/// Outside a session the server may want one first. A machine that is held gets none: a person must look.
+/// Outside a session the server may want one first. A machine that is held gets none: a person must
+/// look.
 IppAction IppSession::abort_refused(const IppError& error) {
   if (!in_session_ && !held_ && !session_first_ && !stopped_) {
     session_first_ = true;
     return next_step();
   }
-  const std::string what =
-      fmt::format("AbortE was refused: {}: the machine may still be moving", ipp_text::text_of(error));
+
+  const std::string what = fmt::format("AbortE was refused: {}: the machine may still be moving",
+                                       ipp_text::text_of(error));
   note(what);
   if (stopped_) return goodbye();
   hold_for(what);
@@ -50,6 +53,7 @@ IppAction IppSession::abort_refused(const IppError& error) {
   const bool again = in_session_;  // outside of it
   (void)close(IppState::AwaitingRelease);
   if (!again) due_ = ipp_text::kNever;
+
   return IppClose{};
 }
 
@@ -74,7 +78,8 @@ IppAction IppSession::await_release() {
 
 IppAction IppSession::take(const IppAbortRequested&) {
   points_.clear();
-  const bool ended = state_ == IppState::Aborting || state_ == IppState::Stopping || held_ || stopped_;
+  const bool ended =
+      state_ == IppState::Aborting || state_ == IppState::Stopping || held_ || stopped_;
   if (ended || (moving_ && !open_)) return IppNothing{};  // the next connection begins with AbortE
   if (open_ && !moving_) return hold("stopped by request");
   note("stopped by request");
@@ -83,9 +88,11 @@ IppAction IppSession::take(const IppAbortRequested&) {
   return close(IppState::AwaitingRelease);
 }
 
-/// Also between the tries to send the AbortE of a motion that an earlier connection left unfinished.
+/// Also between the tries to send the AbortE of a motion that an earlier connection left
+/// unfinished.
 bool IppSession::releasable() const noexcept {
-  const bool trying = state_ == IppState::Connecting || (state_ == IppState::Aborting && !in_session_);
+  const bool trying =
+      state_ == IppState::Connecting || (state_ == IppState::Aborting && !in_session_);
   return !stopped_ && (state_ == IppState::AwaitingRelease || (held_ && trying));
 }
 
@@ -97,11 +104,13 @@ IppAction IppSession::take(const IppReleaseRequested&) {
   may_home_ = options_.home;
   pause_ = options_.first_pause;
   if (open_ && in_session_)
-    return send({.state = IppState::Clearing, .method = "ClearAllErrors()", .purpose = Purpose::Clear});
+    return send(
+        {.state = IppState::Clearing, .method = "ClearAllErrors()", .purpose = Purpose::Clear});
   if (open_) return close(IppState::Disconnected);
   if (state_ == IppState::Connecting) return IppNothing{};
   state_ = IppState::Disconnected;
   due_ = now_;
+
   return IppNothing{};
 }
 
@@ -116,7 +125,8 @@ IppAction IppSession::goodbye() {
   const bool connecting = state_ == IppState::Connecting;
   due_ = ipp_text::kNever;
   pending_.reset();
-  if (open_) return send({.state = IppState::Stopping, .method = "EndSession()", .purpose = Purpose::End});
+  if (open_)
+    return send({.state = IppState::Stopping, .method = "EndSession()", .purpose = Purpose::End});
   state_ = IppState::Disconnected;
   return connecting ? IppAction{IppClose{}} : IppAction{IppNothing{}};
 }

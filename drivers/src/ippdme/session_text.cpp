@@ -44,8 +44,9 @@ std::string go_to(const ProbePoint& p) {
 
 std::string pt_meas(const ProbePoint& p) {
   const auto number = [](double v) { return ippdme::number_text(v); };
-  return fmt::format("PtMeas(X({}),Y({}),Z({}),IJK({},{},{}))", mm(p.position_m[0]), mm(p.position_m[1]),
-                     mm(p.position_m[2]), number(p.normal[0]), number(p.normal[1]), number(p.normal[2]));
+  return fmt::format("PtMeas(X({}),Y({}),Z({}),IJK({},{},{}))", mm(p.position_m[0]),
+                     mm(p.position_m[1]), mm(p.position_m[2]), number(p.normal[0]),
+                     number(p.normal[1]), number(p.normal[2]));
 }
 
 }  // namespace abbe::drivers::ipp_text

@@ -1,5 +1,6 @@
 #pragma once
-/// What the session writes: commands for the server, and what the server reported in words for people.
+/// What the session writes: commands for the server, and what the server reported in words for
+/// people.
 
 #include <string>
 #include <string_view>
@@ -9,10 +10,11 @@
 namespace abbe::drivers::ipp_text {
 
 inline constexpr protocol::HostTime kNever = protocol::HostTime::max();
-inline constexpr int kRepairable = 2;     ///< severity: from here on the command has failed
-inline constexpr int kUserNeeded = 3;     ///< and from here on a motion is not waited for
-inline constexpr int kAborted = 6;        ///< code: the command ended because of our AbortE
-inline constexpr int kProtocolError = 8;  ///< code: for StartSession, another session has not ended yet
+inline constexpr int kRepairable = 2;  ///< severity: from here on the command has failed
+inline constexpr int kUserNeeded = 3;  ///< and from here on a motion is not waited for
+inline constexpr int kAborted = 6;     ///< code: the command ended because of our AbortE
+/// code: for StartSession, another session has not ended yet
+inline constexpr int kProtocolError = 8;
 
 [[nodiscard]] double seconds(std::chrono::nanoseconds d);
 /// Bytes outside of printable ASCII as \\xE4.

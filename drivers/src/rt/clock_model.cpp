@@ -9,8 +9,8 @@ namespace abbe::drivers {
 namespace {
 
 constexpr std::chrono::hours kNothingKnown{1};
-constexpr double kPriorLateness_s =
-    0.020;  ///< what an arrival may be late by before anything was seen; weighs one arrival
+/// what an arrival may be late by before anything was seen; weighs one arrival
+constexpr double kPriorLateness_s = 0.020;
 constexpr std::chrono::seconds kLateForTooLong{
     5};  ///< a stalled network drains in milliseconds, a jumped clock stays
 
@@ -31,16 +31,20 @@ ClockModel::Observed ClockModel::observe(protocol::DeviceTime last_point,
   }
   const double device_s = seconds(last_point - origin_device_);
   const Point p{device_s, seconds(arrival - origin_host_) - device_s};
-  if (device_s == last_device_s_) return Observed::Followed;  // the same instant again says nothing new
+  if (device_s == last_device_s_)
+    return Observed::Followed;  // the same instant again says nothing new
+
   if (device_s < last_device_s_ || jumped(p, arrival)) {
     reset();
     ++restarts_;
     begin_with(last_point, arrival);
     return Observed::Restarted;
   }
+
   last_device_s_ = device_s;
   keep(p);
   fit();
+
   return Observed::Followed;
 }
 
@@ -76,7 +80,8 @@ void ClockModel::reset() ABBE_RT {
 void ClockModel::keep(const Point& p) ABBE_RT {
   forget_before(p.device_s - seconds(options_.window));
   const double slice_s = seconds(options_.window) / static_cast<double>(kPoints - 1);
-  if (count_ != 0 && std::floor(points_[count_ - 1].device_s / slice_s) == std::floor(p.device_s / slice_s)) {
+  if (count_ != 0 &&
+      std::floor(points_[count_ - 1].device_s / slice_s) == std::floor(p.device_s / slice_s)) {
     Point& last = points_[count_ - 1];
     if (p.offset_s - slope_ * (p.device_s - last.device_s) < last.offset_s) last = p;
     return;
@@ -97,7 +102,8 @@ void ClockModel::fit() ABBE_RT {
   const auto begin = points_.begin();
   const auto end = begin + static_cast<std::ptrdiff_t>(count_);
   const auto height = [this](const Point& p) { return p.offset_s - slope_ * p.device_s; };
-  const auto lowest = std::min_element(begin, end, [&](auto& a, auto& b) { return height(a) < height(b); });
+  const auto lowest =
+      std::min_element(begin, end, [&](auto& a, auto& b) { return height(a) < height(b); });
   pivot_s_ = lowest->device_s;
   offset_s_ = lowest->offset_s;
   if (count_ == 1) quarter_s_ = three_quarters_s_ = pivot_s_;
@@ -105,10 +111,10 @@ void ClockModel::fit() ABBE_RT {
   judge_skew();
 }
 
-/// Lower convex hull by monotone chain ([Andrew 1979]); the slope is that of the chord between the hull's
-/// heights at a quarter and at three quarters of the observed time. The one edge over the middle is the
-/// better line for exponential delays only if it is long; the chord scatters less for every kind of delay
-/// that was tried (by 10 to 20 %).
+/// Lower convex hull by monotone chain ([Andrew 1979]); the slope is that of the chord between the
+/// hull's heights at a quarter and at three quarters of the observed time. The one edge over the
+/// middle is the better line for exponential delays only if it is long; the chord scatters less for
+/// every kind of delay that was tried (by 10 to 20 %).
 void ClockModel::fit_slope() ABBE_RT {
   const std::size_t size = find_hull();
   const double begin_s = points_[0].device_s;
@@ -127,7 +133,8 @@ std::size_t ClockModel::find_hull() ABBE_RT {
   };
   std::size_t size = 0;
   for (std::size_t i = 0; i < count_; ++i) {
-    while (size >= 2 && turns_down(points_[hull_[size - 2]], points_[hull_[size - 1]], points_[i])) --size;
+    while (size >= 2 && turns_down(points_[hull_[size - 2]], points_[hull_[size - 1]], points_[i]))
+      --size;
     hull_[size++] = static_cast<std::uint16_t>(i);
   }
   return size;
@@ -138,19 +145,21 @@ double ClockModel::hull_height(std::size_t hull_size, double device_s) const ABB
   while (edge + 2 < hull_size && points_[hull_[edge + 1]].device_s < device_s) ++edge;
   const Point& a = points_[hull_[edge]];
   const Point& b = points_[hull_[edge + 1]];
-  return a.offset_s + (device_s - a.device_s) * (b.offset_s - a.offset_s) / (b.device_s - a.device_s);
+  return a.offset_s +
+         (device_s - a.device_s) * (b.offset_s - a.offset_s) / (b.device_s - a.device_s);
 }
 
-/// How far the line lies above the true envelope, from how densely arrivals crowd above it: q, the lateness
-/// of the tenth. If delays crowd towards their smallest (exponential), the lowest of many is late by 0.1 q;
-/// if they thin out towards it (a point's age in its packet plus an exponential), by 0.3 q; the freedom of
-/// the slope adds to both.
-/// Lowered by q / 2 with u = q / 2, the error over its uncertainty has root mean square 0.8 to 1.1 for either
-/// kind and mean jitters of 0.5 to 8 ms (400 runs each). An order statistic, so that stalled packets shake
-/// nothing.
+/// How far the line lies above the true envelope, from how densely arrivals crowd above it: q, the
+/// lateness of the tenth. If delays crowd towards their smallest (exponential), the lowest of many
+/// is late by 0.1 q; if they thin out towards it (a point's age in its packet plus an exponential),
+/// by 0.3 q; the freedom of the slope adds to both.
+/// Lowered by q / 2 with u = q / 2, the error over its uncertainty has root mean square 0.8 to 1.1
+/// for either kind and mean jitters of 0.5 to 8 ms (400 runs each). An order statistic, so that
+/// stalled packets shake nothing.
 void ClockModel::judge_lateness() ABBE_RT {
   std::array<double, kPoints> lateness{};
-  for (std::size_t i = 0; i < count_; ++i) lateness[i] = points_[i].offset_s - line_at(points_[i].device_s);
+  for (std::size_t i = 0; i < count_; ++i)
+    lateness[i] = points_[i].offset_s - line_at(points_[i].device_s);
   const auto begin = lateness.begin();
   const auto end = begin + static_cast<std::ptrdiff_t>(count_);
   const auto middle = begin + static_cast<std::ptrdiff_t>(count_ / 2);
@@ -166,9 +175,9 @@ void ClockModel::judge_lateness() ABBE_RT {
   u_slope_ = lever_s > 0.0 ? std::min(u_limit, std::sqrt(2.0) * u_touch_s_ / lever_s) : u_limit;
 }
 
-/// By chance a slope is off by sqrt(2) u over the lever, u as in judge_lateness(), here over the line that is
-/// not held; twice that, beyond a bound that sound clocks keep well within, is no chance. The points lie off
-/// the line that is held by up to the excess times the window.
+/// By chance a slope is off by sqrt(2) u over the lever, u as in judge_lateness(), here over the
+/// line that is not held; twice that, beyond a bound that sound clocks keep well within, is no
+/// chance. The points lie off the line that is held by up to the excess times the window.
 void ClockModel::judge_skew() ABBE_RT {
   constexpr double kNoChance = 2.0;
   const double excess = std::abs(free_slope_) - options_.max_skew;
@@ -176,7 +185,8 @@ void ClockModel::judge_skew() ABBE_RT {
   if (excess <= 0.0 || lever_s <= 0.0) {
     beyond_ = false;
   } else if (count_ >= options_.settled_after) {
-    beyond_ = beyond_ || excess > kNoChance * std::numbers::sqrt2 * u_touch_of_free_line() / lever_s;
+    beyond_ =
+        beyond_ || excess > kNoChance * std::numbers::sqrt2 * u_touch_of_free_line() / lever_s;
   }
   u_beyond_s_ = beyond_ ? excess * (last_device_s_ - points_[0].device_s) : 0.0;
 }
@@ -190,7 +200,8 @@ double ClockModel::u_touch_of_free_line() const ABBE_RT {
   const auto tenth = begin + static_cast<std::ptrdiff_t>(std::min<std::size_t>(count_ - 1, 10));
   std::nth_element(begin, tenth, end);
   const double n = static_cast<double>(count_);
-  return std::hypot(0.5 * (*tenth - *std::min_element(begin, tenth + 1)), kPriorLateness_s / (n * n));
+  return std::hypot(0.5 * (*tenth - *std::min_element(begin, tenth + 1)),
+                    kPriorLateness_s / (n * n));
 }
 
 double ClockModel::line_at(double device_s) const ABBE_RT {
@@ -204,8 +215,10 @@ HostInstant ClockModel::to_host(protocol::DeviceTime t) const ABBE_RT {
   const double outside_s = std::max({0.0, quarter_s_ - device_s, device_s - three_quarters_s_});
   const double u_constant_s =
       bound_s / std::sqrt(12.0);  // rectangular over [0, bound], estimate in its middle
-  const double u_s = std::hypot(std::hypot(u_constant_s, u_touch_s_, u_slope_ * outside_s), u_beyond_s_);
-  return {origin_host_ + (t - origin_device_) + nanoseconds(line_at(device_s) - lowered_s_ - bound_s / 2.0),
+  const double u_s =
+      std::hypot(std::hypot(u_constant_s, u_touch_s_, u_slope_ * outside_s), u_beyond_s_);
+  return {origin_host_ + (t - origin_device_) +
+              nanoseconds(line_at(device_s) - lowered_s_ - bound_s / 2.0),
           nanoseconds(u_s), settled()};
 }
 

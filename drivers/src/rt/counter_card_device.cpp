@@ -50,10 +50,10 @@ void CounterCardDevice::note_progress(const CounterScan& scan) ABBE_RT {
 
 void CounterCardDevice::take(const UsbControlDone& done) ABBE_RT {
   SubmitReply reply;
-  reply.head.direction =
-      done.setup.device_to_host() ? protocol::usbip::Direction::In : protocol::usbip::Direction::Out;
+  reply.head.direction = done.setup.device_to_host() ? protocol::usbip::Direction::In
+                                                     : protocol::usbip::Direction::Out;
   if (done.outcome != UsbOutcome::Done) reply.status = protocol::usbip::UrbStatus::Stalled;
-  record(reply, done.bytes(), turn_end_);
+  record(reply, done.bytes(), cycle_end_);
 }
 
 void CounterCardDevice::record(const SubmitReply& reply, std::span<const std::byte> data,
@@ -65,13 +65,14 @@ void CounterCardDevice::record(const SubmitReply& reply, std::span<const std::by
   const auto header = protocol::usbip::encode(protocol::usbip::Urb{numbered});
   const auto body = std::copy(header.begin(), header.end(), message_.begin());
   std::copy_n(data.begin(), length, body);
-  raw_.push_bytes(time, RawBlock::Direction::FromDevice, std::span{message_}.first(header.size() + length));
+  raw_.push_bytes(time, RawBlock::Direction::FromDevice,
+                  std::span{message_}.first(header.size() + length));
 }
 
 void CounterCardDevice::push(const CounterScan& scan) ABBE_RT {
   if (sink_ != nullptr) sink_->on_scan(scan);
   if (!live_axes_) return;
-  const auto sample = thinning_.take(scan.axes);
+  const auto sample = decimation_.take(scan.axes);
   if (!sample) return;
   samples_.try_push(*sample);
   board_.samples.add();

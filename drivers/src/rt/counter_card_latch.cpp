@@ -18,17 +18,18 @@ void LatchTracker::reset() ABBE_RT {
   latest_.reset();
 }
 
-bool LatchTracker::on_scan(std::uint64_t latch_raw, std::uint64_t clock_raw, std::int64_t clock_count,
-                           std::int64_t previous_clock_count) ABBE_RT {
+bool LatchTracker::on_scan(std::uint64_t latch_raw, std::uint64_t clock_raw,
+                           std::int64_t clock_count, std::int64_t previous_clock_count) ABBE_RT {
   if (latch_raw == last_raw_) return false;
   last_raw_ = latch_raw;
-  // How far the latch reads ahead of the clock now; counted from the offset known so far, so that it wraps
-  // with it.
+  // How far the latch reads ahead of the clock now; counted from the offset known so far, so that
+  // it wraps with it.
   const std::uint64_t base = offset_ ? static_cast<std::uint64_t>(offset_->low) : 0;
   const std::int64_t ahead =
       static_cast<std::int64_t>(base) +
       protocol::quad08::signed_step(base & (protocol::quad08::modulus_of(width_) - 1),
-                                    protocol::quad08::upward_step(clock_raw, latch_raw, width_), width_);
+                                    protocol::quad08::upward_step(clock_raw, latch_raw, width_),
+                                    width_);
   const std::int64_t since_previous = clock_count - previous_clock_count;
   narrow({ahead - kRounding, ahead + since_previous + kRounding});
   const std::int64_t middle = offset_->low + (offset_->high - offset_->low) / 2;

@@ -13,17 +13,18 @@ using protocol::SampleFlag;
 /// How much later than a gap the clock's jump may be seen: no batch waits longer in a busy host.
 constexpr double kJumpSeenWithin_s = 1.0;
 
-/// How far a clock that went on may be from where it must be, by the host's: behind by what the newest batch
-/// is late (the host was busy), ahead by what the clock model is off, and twice what the two may differ by.
+/// How far a clock that went on may be from where it must be, by the host's: behind by what the
+/// newest batch is late (the host was busy), ahead by what the clock model is off, and twice what
+/// the two may differ by.
 constexpr double kLatest_s = 3.0;
 constexpr double kMostAhead_s = 1.0;
 constexpr double kLargestDrift = 1e-3;
 /// Of the clock's range: a wider interval would hold too many readings of other counters.
 constexpr double kWidestInterval = 0.02;
 
-/// The same of counters that an earlier run left. Both instants come from arrivals that are not late: the
-/// earlier from a settled clock model, this one from the least late of many. What is left is what the clock
-/// model calls a jump, and the rate beyond which it does not believe a clock.
+/// The same of counters that an earlier run left. Both instants come from arrivals that are not
+/// late: the earlier from a settled clock model, this one from the least late of many. What is left
+/// is what the clock model calls a jump, and the rate beyond which it does not believe a clock.
 constexpr double kResumedWithin_s = std::chrono::duration<double>(ClockModelOptions{}.jump).count();
 constexpr double kResumedDrift = ClockModelOptions{}.max_skew;
 constexpr double kResumedShown_s = 0.25;    // long enough for a host that was held up to catch up
@@ -32,12 +33,14 @@ constexpr double kResumedPatience_s = 3.0;  // as kLatest_s
 constexpr double kWidestResumed = 0.005;
 
 std::uint32_t saturated(std::uint64_t n) ABBE_RT {
-  return static_cast<std::uint32_t>(std::min<std::uint64_t>(n, std::numeric_limits<std::uint32_t>::max()));
+  return static_cast<std::uint32_t>(
+      std::min<std::uint64_t>(n, std::numeric_limits<std::uint32_t>::max()));
 }
 
 }  // namespace
 
-bool CounterCardReceiver::beats(const quad08::RawScan& from, const quad08::RawScan& to) const ABBE_RT {
+bool CounterCardReceiver::beats(const quad08::RawScan& from,
+                                const quad08::RawScan& to) const ABBE_RT {
   return metronome_.beats(from[metronome_.place], to[metronome_.place], width_);
 }
 
@@ -87,7 +90,8 @@ void CounterCardReceiver::bytes_lost() ABBE_RT {
   raw_filled_ = 0;
 }
 
-void CounterCardReceiver::push(std::span<const std::byte> bytes, protocol::HostTime arrival) ABBE_RT {
+void CounterCardReceiver::push(std::span<const std::byte> bytes,
+                               protocol::HostTime arrival) ABBE_RT {
   arrival_ = arrival;
   if (!out_of_step_) pending_ = bytes;
 }
@@ -120,7 +124,8 @@ void CounterCardReceiver::seek() ABBE_RT {
   const std::size_t needed = quad08::seek_window(decoder_.layout());
   while (!pending_.empty()) {
     const std::size_t more = std::min(needed - window_filled_, pending_.size());
-    std::copy_n(pending_.begin(), more, window_.begin() + static_cast<std::ptrdiff_t>(window_filled_));
+    std::copy_n(pending_.begin(), more,
+                window_.begin() + static_cast<std::ptrdiff_t>(window_filled_));
     pending_ = pending_.subspan(more);
     window_filled_ += more;
     if (window_filled_ < needed) return;
@@ -173,11 +178,13 @@ void CounterCardReceiver::accept(const quad08::RawScan& raw) ABBE_RT {
   current_.axes.head.lost_before = 0;
   if (current_.axes.missing_mask != 0) current_.axes.head.flags |= SampleFlag::AxisMissing;
   if (last_ && stream_restarted_ && !resuming) judge_first_scan(raw);
+
   if (last_) {
     const auto& from = (*last_)[metronome_.place];
     const auto wrapped = clock_wraps_ * quad08::modulus_of(width_);
     count_lost(quad08::upward_step(from, raw[metronome_.place], width_) + wrapped, current_);
   }
+
   unwrap(raw, current_);
   clock_wraps_ = 0;
   last_ = raw;
@@ -185,42 +192,45 @@ void CounterCardReceiver::accept(const quad08::RawScan& raw) ABBE_RT {
   scan = current_;
 }
 
-/// Only a card that was opened again may be another session of it. One that stayed open counts on, however
-/// long the host was held up.
+/// Only a card that was opened again may be another session of it. One that stayed open counts on,
+/// however long the host was held up.
 void CounterCardReceiver::judge_first_scan(const quad08::RawScan& raw) ABBE_RT {
   const bool same = goes_on(raw);
-  if (std::exchange(reopened_, false) && !same) begin_anew();
+  if (std::exchange(reopened_, false) && !same) restart();
 }
 
-/// Whether these counters were counting all the time since the last scan: the clock channel stands where it
-/// must by the host's clock. A counter of 32 bits may have gone round meanwhile. The instant of the last scan
-/// comes from the clock model: its batch may have arrived late. A model that is not settled may be late, too.
+/// Whether these counters were counting all the time since the last scan: the clock channel stands
+/// where it must by the host's clock. A counter of 32 bits may have gone round meanwhile. The
+/// instant of the last scan comes from the clock model: its batch may have arrived late. A model
+/// that is not settled may be late, too.
 bool CounterCardReceiver::goes_on(const quad08::RawScan& raw) ABBE_RT {
   const auto before = clock_.to_host(device_time(current_.clock_count));
   const double elapsed_s = std::chrono::duration<double>(arrival_ - before.time).count();
   const double behind_s = seconds_behind(raw, before.time);
   const double most_behind_s = kLatest_s + kLargestDrift * elapsed_s;
-  const double most_ahead_s = (before.settled ? kMostAhead_s : kLatest_s) + kLargestDrift * elapsed_s;
+  const double most_ahead_s =
+      (before.settled ? kMostAhead_s : kLatest_s) + kLargestDrift * elapsed_s;
   const double round_s = static_cast<double>(quad08::modulus_of(width_)) / clock_hz_;
   behind_s_ = std::remainder(behind_s, round_s);  // for people: which round it is in is not known
   if (most_behind_s + most_ahead_s > kWidestInterval * round_s) return false;
   return behind_s <= most_behind_s && -behind_s <= most_ahead_s;
 }
 
-/// How much less than the host's clock the clock channel counted since the last scan, at `since`. It may have
-/// gone round.
-double CounterCardReceiver::seconds_behind(const quad08::RawScan& raw, protocol::HostTime since) ABBE_RT {
+/// How much less than the host's clock the clock channel counted since the last scan, at `since`.
+/// It may have gone round.
+double CounterCardReceiver::seconds_behind(const quad08::RawScan& raw,
+                                           protocol::HostTime since) ABBE_RT {
   const double elapsed_s = std::chrono::duration<double>(arrival_ - since).count();
   const auto range = static_cast<double>(quad08::modulus_of(width_));
-  const auto step =
-      static_cast<double>(quad08::upward_step((*last_)[metronome_.place], raw[metronome_.place], width_));
+  const auto step = static_cast<double>(
+      quad08::upward_step((*last_)[metronome_.place], raw[metronome_.place], width_));
   const double wraps = std::max(0.0, std::round((elapsed_s * clock_hz_ - step) / range));
   clock_wraps_ = static_cast<std::uint64_t>(wraps);
   return elapsed_s - (wraps * range + step) / clock_hz_;
 }
 
-/// No arrival is early: the clock channel is behind by at most what the least late one shows, and one that
-/// shows it ahead by more than the clocks may differ refutes it at once.
+/// No arrival is early: the clock channel is behind by at most what the least late one shows, and
+/// one that shows it ahead by more than the clocks may differ refutes it at once.
 bool CounterCardReceiver::resumed(const quad08::RawScan& raw) ABBE_RT {
   Resumption& r = *resumption_;
   if (r.refused) return false;
@@ -238,7 +248,7 @@ bool CounterCardReceiver::resumed(const quad08::RawScan& raw) ABBE_RT {
               (behind && shown_s >= kResumedPatience_s);
   if (r.refused) {
     behind_s_ = std::remainder(r.least_behind_s, round_s);
-    ++counters_.began_anew;
+    ++counters_.restarted;
   }
   if (r.refused || behind || shown_s < kResumedShown_s) return false;
   take_over(raw);
@@ -254,8 +264,8 @@ void CounterCardReceiver::take_over(const quad08::RawScan& raw) ABBE_RT {
 }
 
 /// Other counters than before: as after a set-up, but for where they stand.
-void CounterCardReceiver::begin_anew() ABBE_RT {
-  ++counters_.began_anew;
+void CounterCardReceiver::restart() ABBE_RT {
+  ++counters_.restarted;
   counters_zeroed();
   zeroed_ = stream_restarted_ = false;
   clock_wraps_ = 0;
@@ -286,7 +296,8 @@ void CounterCardReceiver::keep_gap(const LongGap& gap) ABBE_RT {
   if (!longer_before) long_gap_ = gap;
 }
 
-double CounterCardReceiver::seconds_since(const LongGap& gap, std::int64_t clock_count) const ABBE_RT {
+double CounterCardReceiver::seconds_since(const LongGap& gap,
+                                          std::int64_t clock_count) const ABBE_RT {
   return static_cast<double>(clock_count - gap.clock_count) / clock_hz_;
 }
 
@@ -295,8 +306,9 @@ void CounterCardReceiver::unwrap(const quad08::RawScan& raw, CounterScan& scan) 
   const auto& from = last_ ? *last_ : zeros;
   const std::int64_t previous_clock = scan.clock_count;
   const std::size_t clock = metronome_.place;
-  scan.clock_count += static_cast<std::int64_t>(quad08::upward_step(from[clock], raw[clock], width_) +
-                                                clock_wraps_ * quad08::modulus_of(width_));
+  scan.clock_count +=
+      static_cast<std::int64_t>(quad08::upward_step(from[clock], raw[clock], width_) +
+                                clock_wraps_ * quad08::modulus_of(width_));
   for (std::size_t i = 0; i < scan.axes.axis_count; ++i) {
     const Axis& axis = axes_[i];
     const std::int64_t before = last_ ? scan.axes.count[i] : 0;
@@ -304,8 +316,8 @@ void CounterCardReceiver::unwrap(const quad08::RawScan& raw, CounterScan& scan) 
     scan.axes.position[i] = axis.offset + static_cast<double>(scan.axes.count[i]) * axis.scale;
   }
   if (edge_place_) {
-    scan.edge_count +=
-        static_cast<std::int64_t>(quad08::upward_step(from[*edge_place_], raw[*edge_place_], width_));
+    scan.edge_count += static_cast<std::int64_t>(
+        quad08::upward_step(from[*edge_place_], raw[*edge_place_], width_));
   }
   if (latch_place_) follow_latch(raw, previous_clock, scan);
 }
@@ -340,9 +352,9 @@ void CounterCardReceiver::stamp() ABBE_RT {
   }
 }
 
-/// Counts that went on in step, but for a gap too short for the jump, are those of the same card: only its
-/// relation to our clock began anew. A batch that came late may hide the jump: the gap was in one before, and
-/// is as long as the clock is ahead. A clock that is behind was late for long.
+/// Counts that went on in step, but for a gap too short for the jump, are those of the same card:
+/// only its relation to our clock began anew. A batch that came late may hide the jump: the gap was
+/// in one before, and is as long as the clock is ahead. A clock that is behind was late for long.
 void CounterCardReceiver::mark_restart(std::span<CounterScan> scans, double ahead_s) ABBE_RT {
   const auto gap = std::exchange(long_gap_, std::nullopt);
   if (!gap) return;
@@ -357,7 +369,8 @@ void CounterCardReceiver::mark_restart(std::span<CounterScan> scans, double ahea
 
 bool CounterCardReceiver::join(const protocol::RawBlock& block) ABBE_RT {
   if (block.lost_before != 0) bytes_lost();
-  const auto part = std::span{block.bytes}.first(std::min<std::size_t>(block.length, block.bytes.size()));
+  const auto part =
+      std::span{block.bytes}.first(std::min<std::size_t>(block.length, block.bytes.size()));
   if (part.size() > raw_.size() - raw_filled_) {
     bytes_lost();
     return false;

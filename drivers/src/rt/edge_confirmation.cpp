@@ -17,7 +17,8 @@ EdgeConfirmation::Event EdgeConfirmation::confirm() ABBE_RT {
 
 EdgeConfirmation::Event EdgeConfirmation::on_time(std::int64_t now) ABBE_RT {
   if (state_ != State::Pending) return Event::Nothing;
-  if (!rules_.counter_debounced) return now - last_edge_ >= rules_.confirm ? confirm() : Event::Nothing;
+  if (!rules_.counter_debounced)
+    return now - last_edge_ >= rules_.confirm ? confirm() : Event::Nothing;
   // Half as long again leaves room for the card's own coarse debounce times.
   if (now - last_edge_ <= rules_.confirm + rules_.confirm / 2) return Event::Nothing;
   state_ = State::Armed;

@@ -19,9 +19,9 @@ void EncoderDevice::receive() ABBE_RT {
   }
   batch_count_ = 0;
   // Behind a full read there may be more: only one that found the end says that nothing else came.
-  if (!all_read_ || turn_end_ < receiver_.deadline()) return;
-  (void)raw_.push_bytes(turn_end_, RawBlock::Direction::FromDevice, {});
-  push(receiver_.on_time(turn_end_));
+  if (!all_read_ || cycle_end_ < receiver_.deadline()) return;
+  (void)raw_.push_bytes(cycle_end_, RawBlock::Direction::FromDevice, {});
+  push(receiver_.on_time(cycle_end_));
 }
 
 /// One block for each run of frames with one time and direction.
@@ -30,11 +30,13 @@ void EncoderDevice::record_frames(std::span<const ReceivedFrame> frames) ABBE_RT
   while (i < frames.size()) {
     can::DatagramWriter writer{datagram_, raw_sequence_++};
     const auto& first = frames[i];
-    const auto belongs = [&](const ReceivedFrame& f) { return f.time == first.time && f.echo == first.echo; };
+    const auto belongs = [&](const ReceivedFrame& f) {
+      return f.time == first.time && f.echo == first.echo;
+    };
     while (i < frames.size() && belongs(frames[i]) && writer.add(frames[i].frame)) ++i;
-    (void)raw_.push_bytes(first.time,
-                          first.echo ? RawBlock::Direction::ToDevice : RawBlock::Direction::FromDevice,
-                          writer.finish());
+    (void)raw_.push_bytes(
+        first.time, first.echo ? RawBlock::Direction::ToDevice : RawBlock::Direction::FromDevice,
+        writer.finish());
   }
 }
 

@@ -19,9 +19,10 @@ constexpr std::uint64_t kModulus32 = std::uint64_t{1} << 32;
 constexpr double kMetresPerNanometre = 1e-9;
 
 /// [GUM] 4.3.7: the instant may be off by a period to either side.
-std::chrono::nanoseconds widened(std::chrono::nanoseconds u, std::chrono::nanoseconds period) ABBE_RT {
-  const double u_ns =
-      std::hypot(static_cast<double>(u.count()), static_cast<double>(period.count()) / std::numbers::sqrt3);
+std::chrono::nanoseconds widened(std::chrono::nanoseconds u,
+                                 std::chrono::nanoseconds period) ABBE_RT {
+  const double u_ns = std::hypot(static_cast<double>(u.count()),
+                                 static_cast<double>(period.count()) / std::numbers::sqrt3);
   return std::chrono::nanoseconds{std::llround(u_ns)};
 }
 
@@ -67,7 +68,8 @@ EncoderReceiver::EncoderReceiver(const EncoderReceiverOptions& options)
     axis.offset = from.offset;
     axis.wrap_configured = from.wrap_counts != 0;
     axis.modulus = from.wrap_counts;
-    if (!axis.wrap_configured && from.position != can::PositionType::Signed64) axis.modulus = kModulus32;
+    if (!axis.wrap_configured && from.position != can::PositionType::Signed64)
+      axis.modulus = kModulus32;
   }
   current_.axis_count = static_cast<std::uint8_t>(axis_count_);
   current_.position.fill(std::numeric_limits<double>::quiet_NaN());
@@ -104,7 +106,7 @@ EncoderReceiver::Samples EncoderReceiver::on_loss() ABBE_RT {
 
 void EncoderReceiver::lose() ABBE_RT {
   close_cycle();
-  look_for_debts(true);
+  look_for_outstanding_replies(true);
   received_mask_ = 0;
   gap_pending_ = true;
 }
@@ -141,7 +143,7 @@ void EncoderReceiver::begin_cycle(HostTime time, bool time_widened) ABBE_RT {
     }
     ++cycle_;
   }
-  look_for_debts(paused);
+  look_for_outstanding_replies(paused);
   sync_time_ = time;
   time_widened_ = time_widened;
   received_mask_ = doubtful_mask_ = 0;
@@ -150,11 +152,11 @@ void EncoderReceiver::begin_cycle(HostTime time, bool time_widened) ABBE_RT {
 }
 
 /// At the end of a cycle. `paused`: whatever was under way has come, or was lost.
-void EncoderReceiver::look_for_debts(bool paused) ABBE_RT {
+void EncoderReceiver::look_for_outstanding_replies(bool paused) ABBE_RT {
   for (std::size_t i = 0; i < axis_count_; ++i) {
     auto& axis = axes_[i];
     const bool unanswered = sync_time_ && ((received_mask_ >> i) & 1u) == 0;
-    axis.owes = !paused && (axis.owes || (axis.answers && unanswered));
+    axis.reply_outstanding = !paused && (axis.reply_outstanding || (axis.answers && unanswered));
     axis.answers = axis.answers && !paused;
   }
 }
@@ -170,8 +172,10 @@ void EncoderReceiver::emit(HostTime time) ABBE_RT {
     if (axes_[i].scale != 0.0) known = static_cast<std::uint8_t>(known | (1u << i));
   }
   const bool invalid = bus_off_;
-  const auto usable = invalid ? 0u : static_cast<unsigned>(received_mask_ & ~doubtful_mask_ & known);
+  const auto usable =
+      invalid ? 0u : static_cast<unsigned>(received_mask_ & ~doubtful_mask_ & known);
   const auto missing = static_cast<std::uint8_t>(all_mask_ & ~usable);
+
   for (std::size_t i = 0; i < axis_count_; ++i) counters_.missing_answers += (missing >> i) & 1u;
   current_.head.time = time;
   current_.head.u_time = time_widened_ ? u_widened_ : u_sampling_delay_;
@@ -214,15 +218,17 @@ void EncoderReceiver::on_position(std::size_t i, const can::CanFrame& frame, Hos
   hear();
   const auto bit = static_cast<std::uint8_t>(1u << i);
   axes_[i].answers = true;
+
   if (sync_time_ && time + stamp_slack(period_) < *sync_time_) {
     ++counters_.late_frames;
-    axes_[i].owes = false;
+    axes_[i].reply_outstanding = false;
     return;
   }
+
   const bool again = (received_mask_ & bit) != 0;
   if (again) ++counters_.duplicate_frames;
   if (!open_) return again ? take_back(i, time) : count_late(i);
-  if (again || std::exchange(axes_[i].owes, false))
+  if (again || std::exchange(axes_[i].reply_outstanding, false))
     doubtful_mask_ = static_cast<std::uint8_t>(doubtful_mask_ | bit);
   take_position(i, *count);
   time_widened_ = time_widened_ || time_widened;
@@ -233,12 +239,13 @@ void EncoderReceiver::on_position(std::size_t i, const can::CanFrame& frame, Hos
 /// After the deadline: not used, but a debt less.
 void EncoderReceiver::count_late(std::size_t i) ABBE_RT {
   ++counters_.late_frames;
-  if (!std::exchange(axes_[i].owes, false))
+  if (!std::exchange(axes_[i].reply_outstanding, false))
     received_mask_ = static_cast<std::uint8_t>(received_mask_ | (1u << i));
 }
 
-/// The sample of this cycle has left with an answer that may be an older one. An answer that comes more than
-/// a period after the SYNC is one to a SYNC we do not know of, and says nothing of that sample.
+/// The sample of this cycle has left with an answer that may be an older one. An answer that comes
+/// more than a period after the SYNC is one to a SYNC we do not know of, and says nothing of that
+/// sample.
 void EncoderReceiver::take_back(std::size_t i, HostTime time) ABBE_RT {
   const auto bit = static_cast<std::uint8_t>(1u << i);
   const bool has_left = sync_time_ && time <= *sync_time_ + period_;
@@ -261,11 +268,12 @@ void EncoderReceiver::hear() ABBE_RT {
 void EncoderReceiver::take_position(std::size_t i, std::int64_t count) ABBE_RT {
   auto& axis = axes_[i];
   const auto raw = on_circle(count, axis.modulus);
-  // The first count is taken as the encoder means it (an absolute scale may be negative), later ones as steps
-  // from it.
+  // The first count is taken as the encoder means it (an absolute scale may be negative), later
+  // ones as steps from it.
   if (axis.seen) {
     const auto step = static_cast<std::uint64_t>(wrapped_step(axis.raw, raw, axis.modulus));
-    current_.count[i] = static_cast<std::int64_t>(static_cast<std::uint64_t>(current_.count[i]) + step);
+    current_.count[i] =
+        static_cast<std::int64_t>(static_cast<std::uint64_t>(current_.count[i]) + step);
   } else {
     current_.count[i] = count;
   }
@@ -278,7 +286,8 @@ void EncoderReceiver::take_position(std::size_t i, std::int64_t count) ABBE_RT {
 void EncoderReceiver::on_node_frame(Axis& axis, const can::CanFrame& frame, HostTime time) ABBE_RT {
   if (frame.id == can::cob::kHeartbeat + axis.node) {
     hear();
-    if (const auto heartbeat = can::decode_heartbeat(frame)) on_heartbeat(axis, heartbeat->state, time);
+    if (const auto heartbeat = can::decode_heartbeat(frame))
+      on_heartbeat(axis, heartbeat->state, time);
   } else if (frame.id == can::cob::kEmergency + axis.node) {
     if (const auto emergency = can::decode_emergency(frame)) {
       axis.emergency = emergency->code;
@@ -294,7 +303,7 @@ void EncoderReceiver::on_heartbeat(Axis& axis, can::NodeState state, HostTime ti
   axis.heartbeat_lost = false;
   if (state != can::NodeState::BootUp) return;
   axis.emergency = 0;
-  axis.answers = axis.owes = false;
+  axis.answers = axis.reply_outstanding = false;
   axis.last_heartbeat.reset();  // it beats again only once it is configured
   if (axis.seen) restarted_pending_ = true;
 }
@@ -302,7 +311,8 @@ void EncoderReceiver::on_heartbeat(Axis& axis, can::NodeState state, HostTime ti
 void EncoderReceiver::check_heartbeats(HostTime time) ABBE_RT {
   for (std::size_t i = 0; i < axis_count_; ++i) {
     auto& axis = axes_[i];
-    if (!axis.last_heartbeat || axis.heartbeat_lost || time - *axis.last_heartbeat <= axis.heartbeat_timeout)
+    if (!axis.last_heartbeat || axis.heartbeat_lost ||
+        time - *axis.last_heartbeat <= axis.heartbeat_timeout)
       continue;
     axis.heartbeat_lost = true;
     ++counters_.heartbeat_losses;
@@ -314,10 +324,11 @@ void EncoderReceiver::on_bus_report(const can::CanFrame& frame, HostTime time) A
   if (!report) return;
   ++counters_.bus_reports;
   using can::BusCondition;
-  if (report->conditions != static_cast<can::BusConditions>(BusCondition::Active)) bus_error_pending_ = true;
+  if (report->conditions != static_cast<can::BusConditions>(BusCondition::Active))
+    bus_error_pending_ = true;
   if (has(report->conditions, BusCondition::ReceiveOverflow)) lose();
-  const bool back =
-      has(report->conditions, BusCondition::Restarted) || has(report->conditions, BusCondition::Active);
+  const bool back = has(report->conditions, BusCondition::Restarted) ||
+                    has(report->conditions, BusCondition::Active);
   if (has(report->conditions, BusCondition::BusOff) && !bus_off_) {
     bus_off_ = true;
     const auto last = open_ ? *sync_time_ + sampling_delay_ : time;
@@ -366,11 +377,12 @@ void EncoderReceiver::learn(Axis& axis, can::ObjectId object, std::uint32_t valu
   namespace obj = can::object;
   const bool linear = axis.kind == AxisKind::Linear;
   const bool step = linear && (object == obj::kPositionStep || object == obj::kMeasuringStep);
-  const bool turn = !linear && (object == obj::kUnitsPerRevolution || object == obj::kMeasuringStep);
+  const bool turn =
+      !linear && (object == obj::kUnitsPerRevolution || object == obj::kMeasuringStep);
   if (object == obj::kHeartbeatTime) {
     // What it beats by itself, where it could not be told: three beats may fail.
-    axis.heartbeat_timeout =
-        std::max(heartbeat_timeout_, std::chrono::nanoseconds{std::chrono::milliseconds{value}} * 7 / 2);
+    axis.heartbeat_timeout = std::max(
+        heartbeat_timeout_, std::chrono::nanoseconds{std::chrono::milliseconds{value}} * 7 / 2);
   } else if (step || turn) {
     axis.units = turn ? value : 0;
     if (axis.scale_configured) return;
@@ -383,7 +395,8 @@ void EncoderReceiver::learn(Axis& axis, can::ObjectId object, std::uint32_t valu
   } else if (!linear && object == obj::kTotalRange && !axis.wrap_configured && value > 1) {
     axis.modulus = value;
     axis.raw %= value;
-  } else if (!linear && object == obj::kRevolutions && !axis.wrap_configured && value > 0 && axis.units > 1) {
+  } else if (!linear && object == obj::kRevolutions && !axis.wrap_configured && value > 0 &&
+             axis.units > 1) {
     // Without scaling the position begins anew after the revolutions that can be told apart.
     const auto counts = std::uint64_t{axis.units} * value;
     axis.modulus = axis.type == can::PositionType::Signed64 ? counts : std::min(counts, kModulus32);

@@ -37,14 +37,19 @@ Progress EnvironmentReceiver::push(std::span<const std::byte> bytes, HostTime at
   if (!begun_ || failure_.kind != Kind::None || bytes.empty()) return Progress::Waiting;
   if (!pending_) return fail({.kind = Kind::Unasked});
   if (bytes.size() > bytes_.size() - filled_)
-    return fail({.kind = Kind::Malformed, .error = modbus::DecodeError::TrailingBytes, .request = *pending_});
+    return fail({.kind = Kind::Malformed,
+                 .error = modbus::DecodeError::TrailingBytes,
+                 .request = *pending_});
   std::copy(bytes.begin(), bytes.end(), bytes_.begin() + static_cast<std::ptrdiff_t>(filled_));
   filled_ += bytes.size();
-  const auto answer = modbus::decode_answer(std::span{bytes_}.first(filled_), transport_, *pending_);
+  const auto answer =
+      modbus::decode_answer(std::span{bytes_}.first(filled_), transport_, *pending_);
   if (!answer) return Progress::Waiting;
-  if (!*answer) return fail({.kind = Kind::Malformed, .error = answer->error(), .request = *pending_});
+  if (!*answer)
+    return fail({.kind = Kind::Malformed, .error = answer->error(), .request = *pending_});
   if ((*answer)->exception)
-    return fail({.kind = Kind::Exception, .exception = *(*answer)->exception, .request = *pending_});
+    return fail(
+        {.kind = Kind::Exception, .exception = *(*answer)->exception, .request = *pending_});
   answered_ = at;
   return accept((*answer)->registers);
 }
@@ -82,19 +87,23 @@ Progress EnvironmentReceiver::measure(std::span<const std::byte> registers) ABBE
   for (std::size_t i = 0; i < spots_.size(); ++i) {
     if (spots_[i].read != read_) continue;
     const auto& place = map_.measured[i].place;
-    const auto bytes = registers.subspan(spots_[i].byte, std::size_t{2} * modbus::register_count(place.type));
-    if (!take_value(i, modbus::decode_register(bytes, place.type, place.order))) return Progress::Failed;
+    const auto bytes =
+        registers.subspan(spots_[i].byte, std::size_t{2} * modbus::register_count(place.type));
+    if (!take_value(i, modbus::decode_register(bytes, place.type, place.order)))
+      return Progress::Failed;
   }
+
   pending_.reset();
   if (++read_ < reads_.size()) return Progress::Answered;
   finish_round();
+
   return Progress::Sample;
 }
 
 bool EnvironmentReceiver::take_value(std::size_t index, double raw) ABBE_RT {
   const MeasuredRegister& m = map_.measured[index];
-  const bool absent =
-      std::isnan(raw) || std::find(m.unavailable.begin(), m.unavailable.end(), raw) != m.unavailable.end();
+  const bool absent = std::isnan(raw) || std::find(m.unavailable.begin(), m.unavailable.end(),
+                                                   raw) != m.unavailable.end();
   double value = raw * m.scale + m.offset;
   const PlausibleRange range = plausible_range(m.quantity);
   if (absent) {
@@ -123,6 +132,7 @@ bool EnvironmentReceiver::take_value(std::size_t index, double raw) ABBE_RT {
       building_.temperature_K[m.channel] = value;
       break;
   }
+
   return true;
 }
 
@@ -152,7 +162,8 @@ bool EnvironmentReceiver::on_raw(const protocol::RawBlock& block) ABBE_RT {
   return push(bytes, block.time) == Progress::Sample;
 }
 
-/// A recording may begin anywhere, and go on after a hole: from the next round on it can be understood.
+/// A recording may begin anywhere, and go on after a hole: from the next round on it can be
+/// understood.
 void EnvironmentReceiver::join() ABBE_RT {
   begin();
   proven_ = true;

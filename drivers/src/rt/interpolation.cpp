@@ -12,8 +12,8 @@ double seconds(std::chrono::nanoseconds d) noexcept {
   return 1e-9 * static_cast<double>(d.count());
 }
 
-/// The two samples around an instant, their neighbours where they are close enough to be of use, and where
-/// between.
+/// The two samples around an instant, their neighbours where they are close enough to be of use,
+/// and where between.
 struct Around {
   const AxisSample* before = nullptr;
   const AxisSample* after = nullptr;
@@ -29,19 +29,22 @@ struct PositionVelocity {
 };
 
 bool answered(const AxisSample* sample, std::size_t axis) noexcept {
-  return sample != nullptr && axis < sample->axis_count && ((sample->missing_mask >> axis) & 1u) == 0;
+  return sample != nullptr && axis < sample->axis_count &&
+         ((sample->missing_mask >> axis) & 1u) == 0;
 }
 
 double slope(const AxisSample& a, const AxisSample& b, std::size_t axis) noexcept {
   return (b.position[axis] - a.position[axis]) / seconds(b.head.time - a.head.time);
 }
 
-/// The derivative at `middle` of the parabola through three samples, which need not be equally far apart.
+/// The derivative at `middle` of the parabola through three samples, which need not be equally far
+/// apart.
 double slope_at(const AxisSample& left, const AxisSample& middle, const AxisSample& right,
                 std::size_t axis) noexcept {
   const double before_s = seconds(middle.head.time - left.head.time);
   const double after_s = seconds(right.head.time - middle.head.time);
-  return (slope(left, middle, axis) * after_s + slope(middle, right, axis) * before_s) / (before_s + after_s);
+  return (slope(left, middle, axis) * after_s + slope(middle, right, axis) * before_s) /
+         (before_s + after_s);
 }
 
 PositionVelocity on_line(const Around& s, std::size_t axis) noexcept {
@@ -49,8 +52,8 @@ PositionVelocity on_line(const Around& s, std::size_t axis) noexcept {
   return {s.before->position[axis] + v * s.theta * s.span_s, v};
 }
 
-/// Cubic Hermite polynomial of theta in [0, 1] with end values p0, p1 and end slopes m0, m1 (per unit of
-/// theta).
+/// Cubic Hermite polynomial of theta in [0, 1] with end values p0, p1 and end slopes m0, m1 (per
+/// unit of theta).
 PositionVelocity on_cubic(const Around& s, std::size_t axis) noexcept {
   const double p0 = s.before->position[axis];
   const double rise = s.after->position[axis] - p0;
@@ -80,20 +83,24 @@ tl::expected<Around, InterpolationError> find_around(std::span<const AxisSample>
   if (span > max_span) return tl::unexpected(InterpolationError::Gap);
   Around s{.before = &*before, .after = &*after, .span_s = seconds(span)};
   s.theta = seconds(time - before->head.time) / s.span_s;
+
   const auto useful = [span](const AxisSample& left, const AxisSample& right) {
-    return 5 * (right.head.time - left.head.time) <= 6 * span;  // the bound of u_of_curve() holds up to 1.2
+    return 5 * (right.head.time - left.head.time) <=
+           6 * span;  // the bound of u_of_curve() holds up to 1.2
   };
-  if (before != samples.begin() && useful(*(before - 1), *before)) s.neighbour_before = &*(before - 1);
+
+  if (before != samples.begin() && useful(*(before - 1), *before))
+    s.neighbour_before = &*(before - 1);
   if (after + 1 != samples.end() && useful(*after, *(after + 1))) s.neighbour_after = &*(after + 1);
+
   return s;
 }
 
 }  // namespace
 
-tl::expected<AxesAt, InterpolationError> interpolate_axes(std::span<const AxisSample> samples,
-                                                          protocol::HostTime time,
-                                                          std::chrono::nanoseconds u_time,
-                                                          const InterpolationOptions& options) noexcept {
+tl::expected<AxesAt, InterpolationError> interpolate_axes(
+    std::span<const AxisSample> samples, protocol::HostTime time, std::chrono::nanoseconds u_time,
+    const InterpolationOptions& options) noexcept {
   const auto around = find_around(samples, time, options.max_span);
   if (!around) return tl::unexpected(around.error());
   AxesAt at;
@@ -101,16 +108,20 @@ tl::expected<AxesAt, InterpolationError> interpolate_axes(std::span<const AxisSa
   at.axis_count = std::min(around->before->axis_count, around->after->axis_count);
   at.missing_mask = around->before->missing_mask | around->after->missing_mask;
   at.flags = around->before->head.flags | around->after->head.flags;
-  const double u_sample_s = seconds(std::max(around->before->head.u_time, around->after->head.u_time));
+  const double u_sample_s =
+      seconds(std::max(around->before->head.u_time, around->after->head.u_time));
   const double u_time_s = std::hypot(u_sample_s, seconds(u_time));
+
   for (std::size_t axis = 0; axis < at.axis_count; ++axis) {
-    const bool cubic = answered(around->neighbour_before, axis) && answered(around->neighbour_after, axis);
+    const bool cubic =
+        answered(around->neighbour_before, axis) && answered(around->neighbour_after, axis);
     const auto [position, velocity] = cubic ? on_cubic(*around, axis) : on_line(*around, axis);
     at.position[axis] = position;
     at.velocity[axis] = velocity;
     at.u_position[axis] =
         std::hypot(u_of_curve(*around, cubic, options.max_acceleration[axis]), velocity * u_time_s);
   }
+
   return at;
 }
 
@@ -124,12 +135,14 @@ AxesAt latest_axes(const AxisSample* previous, const AxisSample& latest,
   const auto step =
       previous != nullptr ? latest.head.time - previous->head.time : std::chrono::nanoseconds{0};
   const bool usable = step.count() > 0 && step <= options.max_span;
+
   for (std::size_t axis = 0; axis < at.axis_count; ++axis) {
     at.position[axis] = latest.position[axis];
     if (!usable || !answered(previous, axis) || !answered(&latest, axis)) continue;
     at.velocity[axis] = slope(*previous, latest, axis);
     at.u_position[axis] = std::abs(at.velocity[axis]) * seconds(latest.head.u_time);
   }
+
   return at;
 }
 

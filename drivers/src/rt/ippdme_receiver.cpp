@@ -17,8 +17,9 @@ using protocol::TouchFlag;
 using std::chrono::nanoseconds;
 
 constexpr double kMetresPerMillimetre = 1e-3;
-constexpr double kCountsPerMillimetre = 1e6;  // the machine has counts, but does not show them: nanometres
-constexpr int kRepairable = 2;                // severity from which on the command has failed
+constexpr double kCountsPerMillimetre =
+    1e6;                        // the machine has counts, but does not show them: nanometres
+constexpr int kRepairable = 2;  // severity from which on the command has failed
 
 IppText text_of(std::string_view text) noexcept {
   IppText t;
@@ -35,7 +36,8 @@ std::string_view chars(std::span<const std::byte> bytes) noexcept {
 std::string_view picked(std::string_view data) noexcept {
   constexpr std::string_view kFront = "PtMeas(";
   // Not starts_with(): where nothing is inlined, the library's needs a function that throws.
-  if (data.size() <= kFront.size() || !std::equal(kFront.begin(), kFront.end(), data.begin())) return {};
+  if (data.size() <= kFront.size() || !std::equal(kFront.begin(), kFront.end(), data.begin()))
+    return {};
   if (data.back() != ')') return {};
   data.remove_prefix(kFront.size());
   data.remove_suffix(1);
@@ -46,7 +48,8 @@ std::string_view picked(std::string_view data) noexcept {
 
 void IppReceiver::sent(std::span<const std::byte> bytes, HostTime time) ABBE_RT {
   std::string_view line = chars(bytes);
-  if (line.size() >= 2 && line[line.size() - 2] == '\r' && line.back() == '\n') line.remove_suffix(2);
+  if (line.size() >= 2 && line[line.size() - 2] == '\r' && line.back() == '\n')
+    line.remove_suffix(2);
   const auto command = ippdme::parse_command(line);
   if (!command) return;
   Asked asked{.tag = command->tag, .time = time, .known = true};
@@ -60,11 +63,13 @@ void IppReceiver::sent(std::span<const std::byte> bytes, HostTime time) ABBE_RT 
     asked.purpose = Purpose::Touch;
     asked.touch = ++touches_;
   }
+
   // The report goes on for as long as the connection: its place is the first.
   if (asked.purpose == Purpose::MoveReport) {
     asked_[0] = asked;
     return;
   }
+
   next_asked_ = next_asked_ % (kMostAsked - 1) + 1;
   asked_[next_asked_] = asked;
 }
@@ -125,7 +130,7 @@ std::optional<IppMessage> IppReceiver::of_the_abort(std::string_view line) ABBE_
 IppMessage IppReceiver::nonsense(ippdme::LineError error, std::string_view line) ABBE_RT {
   silenced_ = true;
   if (aborting_) framer_.resume();  // its answer may be behind
-  return IppNonsense{error, text_of(line)};
+  return IppProtocolError{error, text_of(line)};
 }
 
 std::optional<IppMessage> IppReceiver::understand(std::string_view line) ABBE_RT {
@@ -153,7 +158,8 @@ SampleHead IppReceiver::between(HostTime from) ABBE_RT {
   return head;
 }
 
-std::optional<IppMessage> IppReceiver::data(const ippdme::Response& response, std::string_view line) ABBE_RT {
+std::optional<IppMessage> IppReceiver::data(const ippdme::Response& response,
+                                            std::string_view line) ABBE_RT {
   const Asked* asked = find(response.tag);
   const bool unsolicited = response.tag == ippdme::kUnsolicited;
   const std::string_view by_hand = unsolicited ? picked(response.data) : std::string_view{};
@@ -163,7 +169,9 @@ std::optional<IppMessage> IppReceiver::data(const ippdme::Response& response, st
   }
   const auto point = ippdme::parse_point(unsolicited ? by_hand : response.data);
   if (!point) return nonsense(point.error(), line);
-  if (unsolicited) return touch(*point, between(arrival_ - options_.max_report_delay), ++touches_, false);
+  if (unsolicited)
+    return touch(*point, between(arrival_ - options_.max_report_delay), ++touches_, false);
+
   switch (asked->purpose) {
     case Purpose::Position:
       return position(*point, between(asked->time));
@@ -174,6 +182,7 @@ std::optional<IppMessage> IppReceiver::data(const ippdme::Response& response, st
     case Purpose::Other:
       break;
   }
+
   return std::nullopt;
 }
 
@@ -187,14 +196,15 @@ AxisSample IppReceiver::position(const ippdme::PointReport& at, const SampleHead
   if (sample.missing_mask != 0) sample.head.flags |= SampleFlag::AxisMissing;
   for (std::size_t i = 0; i < 3; ++i) {
     const bool known = ((at.known >> i) & 1u) != 0 && std::abs(at.p_mm[i]) < 1e9;
-    sample.position[i] = known ? kMetresPerMillimetre * at.p_mm[i] : std::numeric_limits<double>::quiet_NaN();
+    sample.position[i] =
+        known ? kMetresPerMillimetre * at.p_mm[i] : std::numeric_limits<double>::quiet_NaN();
     sample.count[i] = known ? std::llround(kCountsPerMillimetre * at.p_mm[i]) : 0;
   }
   return sample;
 }
 
-ProbeTrigger IppReceiver::touch(const ippdme::PointReport& at, const SampleHead& head, std::uint32_t number,
-                                bool warned) ABBE_RT {
+ProbeTrigger IppReceiver::touch(const ippdme::PointReport& at, const SampleHead& head,
+                                std::uint32_t number, bool warned) ABBE_RT {
   ProbeTrigger t;
   t.head = head;
   if (std::exchange(touch_restarted_, false)) t.head.flags |= SampleFlag::Restarted;
@@ -210,7 +220,8 @@ ProbeTrigger IppReceiver::touch(const ippdme::PointReport& at, const SampleHead&
   }
   for (std::size_t i = 0; i < 3; ++i) {
     const bool known = ((at.known >> i) & 1u) != 0;
-    t.position[i] = known ? kMetresPerMillimetre * at.p_mm[i] : std::numeric_limits<double>::quiet_NaN();
+    t.position[i] =
+        known ? kMetresPerMillimetre * at.p_mm[i] : std::numeric_limits<double>::quiet_NaN();
     t.u_position[i] = options_.u_position_m;
     t.U95_position[i] = 1.96 * options_.u_position_m;
   }

@@ -9,19 +9,22 @@ Arrival KernelStampMap::arrival(std::optional<std::chrono::nanoseconds> stamp, c
                                 protocol::HostTime host_now) ABBE_RT {
   if (!stamp || !believable(now.realtime - *stamp, now)) {
     ++widened_;
-    // It came after the queue was empty: where that is less ago than the wake-up bound, it says more.
+    // It came after the queue was empty: where that is less ago than the wake-up bound, it says
+    // more.
     const auto possible = empty_at_ ? now.monotonic - empty_at_->monotonic : options_.u_user_space;
     return {host_now, std::min(options_.u_user_space, possible), true};
   }
   const auto age_ns = static_cast<double>((now.realtime - *stamp).count());
-  return {host_now - std::chrono::nanoseconds{std::llround(speed_ * age_ns)}, options_.u_kernel, false};
+  return {host_now - std::chrono::nanoseconds{std::llround(speed_ * age_ns)}, options_.u_kernel,
+          false};
 }
 
 bool KernelStampMap::believable(std::chrono::nanoseconds age, const ClockPair& now) const ABBE_RT {
   if (!empty_at_) return false;  // nothing to hold the age against yet
   const auto possible = now.monotonic - empty_at_->monotonic;
   const auto stepped = (now.realtime - empty_at_->realtime) - possible;
-  return age.count() >= 0 && age <= possible + options_.step && std::chrono::abs(stepped) <= options_.step;
+  return age.count() >= 0 && age <= possible + options_.step &&
+         std::chrono::abs(stepped) <= options_.step;
 }
 
 }  // namespace abbe::drivers

@@ -23,6 +23,7 @@ void MarkWatcher::on_scan(const CounterScan& scan) ABBE_RT {
     if (std::exchange(restarted_, false)) crossing.head.flags |= SampleFlag::Restarted;
     crossings_.try_push(crossing);
   }
+
   known_ = true;
   last_ = scan.axes.head.time;
   count_ = scan.axes.count;

@@ -37,21 +37,23 @@ bool RawRing::push_bytes(protocol::HostTime time, RawBlock::Direction direction,
     const std::size_t length = std::min(bytes.size(), RawBlock::kCapacity);
     block.time = time;
     block.direction = direction;
-    block.lost_before =
-        static_cast<std::uint32_t>(std::min<std::uint64_t>(lost_, std::numeric_limits<std::uint32_t>::max()));
+    block.lost_before = static_cast<std::uint32_t>(
+        std::min<std::uint64_t>(lost_, std::numeric_limits<std::uint32_t>::max()));
     block.length = static_cast<std::uint16_t>(length);
     block.continued = i + 1 < needed;
     std::copy_n(bytes.begin(), length, block.bytes.begin());
     bytes = bytes.subspan(length);
     lost_ = 0;
   }
+
   indices_.publish(needed);
   return true;
 }
 
 std::size_t RawRing::pop(std::span<RawBlock> out) ABBE_RT {
   const std::size_t n = indices_.filled_slots(out.size());
-  for (std::size_t i = 0; i < n; ++i) copy_used(blocks_[indices_.slot(indices_.read_counter() + i)], out[i]);
+  for (std::size_t i = 0; i < n; ++i)
+    copy_used(blocks_[indices_.slot(indices_.read_counter() + i)], out[i]);
   if (n != 0) indices_.consume(n);
   return n;
 }

@@ -1,5 +1,5 @@
-// The ring's real-time functions for every sample there is, so that the proof over this folder's object files
-// sees them. Members one by one: the constructor allocates and has no place here.
+// The ring's real-time functions for every sample there is, so that the proof over this folder's
+// object files sees them. Members one by one: the constructor allocates and has no place here.
 
 #include "abbe/drivers/sample_ring.hpp"
 
@@ -8,21 +8,26 @@ namespace abbe::drivers {
 template bool SampleRing<protocol::TrackerPoint>::try_push(const protocol::TrackerPoint&) ABBE_RT;
 template std::size_t SampleRing<protocol::TrackerPoint>::push(
     std::span<const protocol::TrackerPoint>) ABBE_RT;
-template std::size_t SampleRing<protocol::TrackerPoint>::pop(std::span<protocol::TrackerPoint>) ABBE_RT;
+template std::size_t SampleRing<protocol::TrackerPoint>::pop(
+    std::span<protocol::TrackerPoint>) ABBE_RT;
 template bool SampleRing<protocol::AxisSample>::try_push(const protocol::AxisSample&) ABBE_RT;
-template std::size_t SampleRing<protocol::AxisSample>::push(std::span<const protocol::AxisSample>) ABBE_RT;
+template std::size_t SampleRing<protocol::AxisSample>::push(
+    std::span<const protocol::AxisSample>) ABBE_RT;
 template std::size_t SampleRing<protocol::AxisSample>::pop(std::span<protocol::AxisSample>) ABBE_RT;
 template bool SampleRing<protocol::ProbeTrigger>::try_push(const protocol::ProbeTrigger&) ABBE_RT;
 template std::size_t SampleRing<protocol::ProbeTrigger>::push(
     std::span<const protocol::ProbeTrigger>) ABBE_RT;
-template std::size_t SampleRing<protocol::ProbeTrigger>::pop(std::span<protocol::ProbeTrigger>) ABBE_RT;
-template bool SampleRing<protocol::EnvironmentSample>::try_push(const protocol::EnvironmentSample&) ABBE_RT;
+template std::size_t SampleRing<protocol::ProbeTrigger>::pop(
+    std::span<protocol::ProbeTrigger>) ABBE_RT;
+template bool SampleRing<protocol::EnvironmentSample>::try_push(
+    const protocol::EnvironmentSample&) ABBE_RT;
 template std::size_t SampleRing<protocol::EnvironmentSample>::push(
     std::span<const protocol::EnvironmentSample>) ABBE_RT;
 template std::size_t SampleRing<protocol::EnvironmentSample>::pop(
     std::span<protocol::EnvironmentSample>) ABBE_RT;
 template bool SampleRing<protocol::TouchScan>::try_push(const protocol::TouchScan&) ABBE_RT;
-template std::size_t SampleRing<protocol::TouchScan>::push(std::span<const protocol::TouchScan>) ABBE_RT;
+template std::size_t SampleRing<protocol::TouchScan>::push(
+    std::span<const protocol::TouchScan>) ABBE_RT;
 template std::size_t SampleRing<protocol::TouchScan>::pop(std::span<protocol::TouchScan>) ABBE_RT;
 
 }  // namespace abbe::drivers

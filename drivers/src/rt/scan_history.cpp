@@ -23,9 +23,10 @@ void ScanHistory::clear() ABBE_RT {
 }
 
 DeviceTime ScanHistory::instant(std::int64_t clock_count) const ABBE_RT {
-  // In long double: a day of 10 MHz is 8.6e11 counts and 8.6e13 ns, whose product with a period has no place
-  // in a double.
-  const auto ns = (static_cast<long double>(clock_count) + 0.5L) * 1e9L * static_cast<long double>(period_s_);
+  // In long double: a day of 10 MHz is 8.6e11 counts and 8.6e13 ns, whose product with a period has
+  // no place in a double.
+  const auto ns =
+      (static_cast<long double>(clock_count) + 0.5L) * 1e9L * static_cast<long double>(period_s_);
   return DeviceTime{nanoseconds{std::llround(ns)}};
 }
 
@@ -63,7 +64,8 @@ tl::expected<ScanHistory::At, InterpolationError> ScanHistory::at(
                                      nanoseconds{}, options);
   if (!axes) return tl::unexpected(axes.error());
   const CounterScan& before = scan(after - 1);
-  return At{*axes, before.axes.head.time + (t - instant(before.clock_count)), before.axes.head.u_time};
+  return At{*axes, before.axes.head.time + (t - instant(before.clock_count)),
+            before.axes.head.u_time};
 }
 
 }  // namespace abbe::drivers

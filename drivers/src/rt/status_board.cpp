@@ -8,11 +8,13 @@ namespace abbe::drivers {
 
 namespace {
 
-/// How many bytes of a text longer than kCapacity are kept: it is cut between two characters of UTF-8.
+/// How many bytes of a text longer than kCapacity are kept: it is cut between two characters of
+/// UTF-8.
 std::size_t whole_code_points(std::string_view text) ABBE_RT {
   constexpr unsigned kContinuationMask = 0xC0, kContinuation = 0x80;
   std::size_t length = FaultText::kCapacity;
-  while (length > 0 && (static_cast<unsigned char>(text[length]) & kContinuationMask) == kContinuation)
+  while (length > 0 &&
+         (static_cast<unsigned char>(text[length]) & kContinuationMask) == kContinuation)
     --length;
   return length;
 }
@@ -33,7 +35,8 @@ void FaultText::set(protocol::HostTime at, std::string_view text) ABBE_RT {
   to.length.store(length, std::memory_order_release);
   to.at_ns.store(at.time_since_epoch().count(), std::memory_order_release);
   for (std::size_t i = 0; i < kWords; ++i) to.words[i].store(words[i], std::memory_order_release);
-  complete_.store(next, std::memory_order_release);  // release: pairs with the first acquire in read()
+  complete_.store(next,
+                  std::memory_order_release);  // release: pairs with the first acquire in read()
 }
 
 void StatusBoard::set_clock(const ClockStatus& clock) ABBE_RT {

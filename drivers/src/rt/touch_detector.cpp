@@ -63,11 +63,12 @@ bool TouchDetector::latch_moved(const CounterScan& before, const CounterScan& sc
          (!before.latched || scan.latch_count != before.latch_count);
 }
 
-EdgeInterval TouchDetector::latched_edge(const CounterScan& before, const CounterScan& scan) ABBE_RT {
+EdgeInterval TouchDetector::latched_edge(const CounterScan& before,
+                                         const CounterScan& scan) ABBE_RT {
   const std::int64_t h = scan.latch_half_width;
   // One count of room: edge and scan may fall into the same period of the clock.
-  const bool plausible =
-      scan.latch_count + h + 1 >= before.clock_count && scan.latch_count - h - 1 <= scan.clock_count;
+  const bool plausible = scan.latch_count + h + 1 >= before.clock_count &&
+                         scan.latch_count - h - 1 <= scan.clock_count;
   if (plausible) return {scan.latch_count - h, scan.latch_count + h, true};
   refused_latest_ = true;
   counters_.latch_refused.add();
@@ -128,7 +129,8 @@ void TouchDetector::touched() ABBE_RT {
 
 bool TouchDetector::retracted(const CounterScan& scan) const ABBE_RT {
   // Where the axes cannot tell, quiet alone has to do.
-  if (touch_.missing_mask != 0 || scan.axes.missing_mask != 0 || touch_.speed_m_s == 0.0) return true;
+  if (touch_.missing_mask != 0 || scan.axes.missing_mask != 0 || touch_.speed_m_s == 0.0)
+    return true;
   double back_m = 0.0;
   for (std::size_t i = 0; i < touch_.axis_count; ++i) {
     if (((options_.wiring.linear_axes >> i) & 1u) == 0) continue;
@@ -152,7 +154,8 @@ void TouchDetector::open_window() ABBE_RT {
 void TouchDetector::emit_window() ABBE_RT {
   if (!window_open_) return;
   window_next_ = std::max(window_next_, history_.begin_number());
-  for (int i = 0; i < kWindowScansPerScan && window_next_ < history_.end_number(); ++i, ++window_next_) {
+  for (int i = 0; i < kWindowScansPerScan && window_next_ < history_.end_number();
+       ++i, ++window_next_) {
     const CounterScan& scan = history_.scan(window_next_);
     if (scan.clock_count > window_end_) {
       window_open_ = false;

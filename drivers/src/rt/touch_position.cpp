@@ -25,8 +25,8 @@ double seconds(nanoseconds d) noexcept {
 InterpolationOptions interpolation_of(const TouchOptions& options) noexcept {
   InterpolationOptions o;
   o.max_acceleration = options.max_acceleration;
-  o.max_span =
-      nanoseconds{std::llround(kLostScans * static_cast<double>(options.wiring.scan_period.count()))};
+  o.max_span = nanoseconds{
+      std::llround(kLostScans * static_cast<double>(options.wiring.scan_period.count()))};
   return o;
 }
 
@@ -45,17 +45,21 @@ struct Approach {
 };
 
 Approach approach_to(DeviceTime contact, const ScanHistory::At& at, const ScanHistory& scans,
-                     const TouchOptions& options, const InterpolationOptions& interpolation) noexcept {
-  const std::uint8_t linear = options.wiring.linear_axes & static_cast<std::uint8_t>(~at.axes.missing_mask);
+                     const TouchOptions& options,
+                     const InterpolationOptions& interpolation) noexcept {
+  const std::uint8_t linear =
+      options.wiring.linear_axes & static_cast<std::uint8_t>(~at.axes.missing_mask);
   const nanoseconds half = options.approach.speed_window / 2;
   const auto middle = scans.at(contact - half, interpolation);
   const auto begin = scans.at(contact - 2 * half, interpolation);
   Approach a;
+
   if (!middle || !begin) {
     a.velocity = at.axes.velocity;
     a.speed = norm_of_linear(a.velocity, linear);
     return a;
   }
+
   Axes change{};
   for (std::size_t i = 0; i < at.axes.axis_count; ++i) {
     const double later = (at.axes.position[i] - middle->axes.position[i]) / seconds(half);
@@ -63,6 +67,7 @@ Approach approach_to(DeviceTime contact, const ScanHistory::At& at, const ScanHi
     a.velocity[i] = 0.5 * (later + earlier);
     change[i] = later - earlier;
   }
+
   a.speed = norm_of_linear(a.velocity, linear);
   a.steady = norm_of_linear(change, linear) <= options.approach.max_speed_change * a.speed;
   return a;
@@ -76,7 +81,8 @@ protocol::TouchFlags judge(const Approach& approach, const ProbeApproach& rules)
   return flags;
 }
 
-/// Of the instant of contact: half the width of what is only bounded, and the deviation of all the rest.
+/// Of the instant of contact: half the width of what is only bounded, and the deviation of all the
+/// rest.
 struct InstantUncertainty {
   double half_width_s = 0.0;
   double u_s = 0.0;
@@ -89,12 +95,13 @@ InstantUncertainty uncertainty_of(const EdgeInterval& edge, const ProbeDelay& de
           std::hypot(u_clock_s, seconds(delay.u_jitter), seconds(delay.u_delay))};
 }
 
-void state_uncertainty(const InstantUncertainty& instant, const AxesAt& axes, const Axes& resolution,
-                       ProbeTrigger& trigger) noexcept {
+void state_uncertainty(const InstantUncertainty& instant, const AxesAt& axes,
+                       const Axes& resolution, ProbeTrigger& trigger) noexcept {
   for (std::size_t i = 0; i < trigger.axis_count; ++i) {
     const double speed = std::abs(trigger.velocity[i]);
     const double half_width = speed * instant.half_width_s;
-    const double rest = std::hypot(speed * instant.u_s, axes.u_position[i], resolution[i] / std::sqrt(12.0));
+    const double rest =
+        std::hypot(speed * instant.u_s, axes.u_position[i], resolution[i] / std::sqrt(12.0));
     trigger.u_position[i] = std::hypot(half_width / std::sqrt(3.0), rest);
     trigger.U95_position[i] = expanded_95(half_width, rest);
   }
@@ -130,8 +137,8 @@ ProbeTrigger locate_touch(const EdgeInterval& edge, const ScanHistory& scans,
   const InstantUncertainty u = uncertainty_of(edge, options.delay, scans.clock_period_s());
   trigger.head.time = at->host_time;
   const auto u_contact = std::llround(1e9 * std::hypot(u.half_width_s / std::sqrt(3.0), u.u_s));
-  trigger.head.u_time = nanoseconds{
-      std::llround(std::hypot(static_cast<double>(at->u_host_time.count()), static_cast<double>(u_contact)))};
+  trigger.head.u_time = nanoseconds{std::llround(
+      std::hypot(static_cast<double>(at->u_host_time.count()), static_cast<double>(u_contact)))};
   // What was lost or restarted between scans is no gap between touches.
   trigger.head.flags = at->axes.flags & ~(SampleFlag::GapBefore | SampleFlag::Restarted);
   trigger.axis_count = at->axes.axis_count;

@@ -18,9 +18,11 @@ void TrackerDevice::receive() ABBE_RT {
   if (bytes.empty()) return;
   raw_.push_bytes(arrival_, Direction::FromDevice, bytes);
   receiver_.push(bytes, arrival_);
+
   while (const auto message = receiver_.next()) {
     protocol::visit_trivial([this](const auto& m) ABBE_RT { take(m); }, *message);
   }
+
   const TrackerCounters& counters = receiver_.counters();
   const std::uint64_t gaps = counters.gaps + counters.beam_losses;
   board_.gaps.add(gaps - std::exchange(gaps_seen_, gaps));

@@ -18,8 +18,8 @@ constexpr double kZeroCelsius_K = 273.15;
 constexpr double kPascalsPerMillibar = 100.0;
 constexpr double kPerPercent = 0.01;
 
-/// Points measured before a break may arrive after its report: the beam is back at the first point after a
-/// hole at least this long, or of three separations.
+/// Points measured before a break may arrive after its report: the beam is back at the first point
+/// after a hole at least this long, or of three separations.
 constexpr std::chrono::milliseconds kShortestBreak{20};
 
 SampleFlag flag_of(emscon::PointStatus status) ABBE_RT {
@@ -99,7 +99,8 @@ std::optional<TrackerMessage> TrackerReceiver::next() ABBE_RT {
   return std::nullopt;
 }
 
-std::optional<TrackerMessage> TrackerReceiver::understand(std::span<const std::byte> packet) ABBE_RT {
+std::optional<TrackerMessage> TrackerReceiver::understand(
+    std::span<const std::byte> packet) ABBE_RT {
   const auto decoded = emscon::decode(packet);
   if (!decoded) return nonsense(decoded.error(), packet);
   ++counters_.packets;
@@ -110,7 +111,7 @@ TrackerMessage TrackerReceiver::nonsense(std::optional<emscon::DecodeError> erro
                                          std::span<const std::byte> bytes) ABBE_RT {
   silenced_ = true;
   ++counters_.nonsense;
-  TrackerNonsense n;
+  TrackerProtocolError n;
   n.error = error;
   n.length = std::min(bytes.size(), n.first_bytes.size());
   std::copy_n(bytes.begin(), n.length, n.first_bytes.begin());
@@ -135,7 +136,8 @@ std::optional<TrackerMessage> TrackerReceiver::take(const emscon::StatusChange& 
   return change;
 }
 
-/// The number of a broken beam is not public, so any unsolicited error while points come counts as one.
+/// The number of a broken beam is not public, so any unsolicited error while points come counts as
+/// one.
 void TrackerReceiver::beam_lost() ABBE_RT {
   if (!last_.known || beam_lost_) return;
   beam_lost_ = true;
@@ -147,16 +149,17 @@ TrackerMessage TrackerReceiver::burst(std::size_t count) ABBE_RT {
   return TrackerBurst{std::span{points_}.first(count)};
 }
 
-/// A mean over [arrival - delay - T, arrival - delay]: the middle of it, rectangular ([GUM] 4.3.7) in both.
+/// A mean over [arrival - delay - T, arrival - delay]: the middle of it, rectangular ([GUM] 4.3.7)
+/// in both.
 std::optional<TrackerMessage> TrackerReceiver::take(const emscon::SingleResult& result) ABBE_RT {
   if (!accepting_) {
     ++counters_.points_refused;
     return std::nullopt;
   }
   const auto delay = options_.clock.max_constant_delay;
-  const double u_ns =
-      std::hypot(static_cast<double>(options_.stationary_time.count()), static_cast<double>(delay.count())) /
-      (2.0 * std::numbers::sqrt3);
+  const double u_ns = std::hypot(static_cast<double>(options_.stationary_time.count()),
+                                 static_cast<double>(delay.count())) /
+                      (2.0 * std::numbers::sqrt3);
   TrackerPoint& point = points_[0];
   point = {};
   point.head.time = arrival_ - (options_.stationary_time + delay) / 2;
@@ -171,6 +174,7 @@ std::optional<TrackerMessage> TrackerReceiver::take(const emscon::SingleResult& 
   mark_pending(point.head);
   last_.known = true;
   weather(result.environment, point.head);
+
   return burst(1);
 }
 
@@ -185,7 +189,8 @@ std::optional<TrackerMessage> TrackerReceiver::take(const emscon::MultiResult& r
     last_.known = false;
     pending_flags_ |= SampleFlag::Restarted;
   }
-  for (std::size_t k = 0; k < result.size(); ++k) convert(result.point(k), result.head().status, points_[k]);
+  for (std::size_t k = 0; k < result.size(); ++k)
+    convert(result.point(k), result.head().status, points_[k]);
   weather(result.head().environment, points_[0].head);
   return burst(result.size());
 }
@@ -202,13 +207,14 @@ void TrackerReceiver::convert(const emscon::MultiPoint& from, emscon::Status sta
   to.head.flags |= flag_of(from.status);
   if (!instant.settled) to.head.flags |= SampleFlag::ClockUnsettled;
   if (!finite(from.value)) to.head.flags |= SampleFlag::PointInvalid;
-  if (!emscon::accepted(status)) to.head.flags |= SampleFlag::DeviceError | SampleFlag::PointInvalid;
+  if (!emscon::accepted(status))
+    to.head.flags |= SampleFlag::DeviceError | SampleFlag::PointInvalid;
   follow(to);
   mark_pending(to.head);
 }
 
-/// Compares with the point before: the device's clock must go on, and holes in it are lost points or a lost
-/// beam.
+/// Compares with the point before: the device's clock must go on, and holes in it are lost points
+/// or a lost beam.
 void TrackerReceiver::follow(TrackerPoint& point) ABBE_RT {
   if (!last_.known) {
     last_ = {point.device_time, true};
@@ -226,7 +232,8 @@ void TrackerReceiver::follow(TrackerPoint& point) ABBE_RT {
 
 void TrackerReceiver::mark_hole(std::chrono::nanoseconds since_last, TrackerPoint& point) ABBE_RT {
   const auto separation = options_.time_separation;
-  if (beam_lost_ && since_last >= std::max<std::chrono::nanoseconds>(kShortestBreak, 3 * separation)) {
+  if (beam_lost_ &&
+      since_last >= std::max<std::chrono::nanoseconds>(kShortestBreak, 3 * separation)) {
     beam_lost_ = false;
     point.head.flags |= SampleFlag::BeamReturned;
     return;

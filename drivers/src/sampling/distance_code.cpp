@@ -12,7 +12,8 @@ namespace {
 constexpr double kMostFraction = 0.25;
 
 tl::unexpected<Error> bad(std::string what) {
-  return tl::unexpected(Error{ErrorCode::BadConfiguration, "distance-coded marks: " + std::move(what)});
+  return tl::unexpected(
+      Error{ErrorCode::BadConfiguration, "distance-coded marks: " + std::move(what)});
 }
 
 int sign(std::int64_t x) noexcept {
@@ -40,10 +41,12 @@ bool on_scale(const DistanceCode& code, std::int64_t position) noexcept {
 Result<void> check(const DistanceCode& code) {
   if (code.increment < 8 || code.increment % 2 != 0)
     return bad("the increment is not an even number above 7");
-  if (code.length < 2 * code.increment) return bad("a scale shorter than two increments has not four marks");
+  if (code.length < 2 * code.increment)
+    return bad("a scale shorter than two increments has not four marks");
   if (code.rotary && code.length % code.increment != 0)
     return bad("a revolution is not a whole number of increments");
-  // From here on the distance of a coded mark to its neighbours is no longer between 0 and the increment.
+  // From here on the distance of a coded mark to its neighbours is no longer between 0 and the
+  // increment.
   if (coded_marks(code) >= code.increment / 2) return bad("the scale is longer than the code");
   return {};
 }
@@ -61,6 +64,7 @@ std::string_view name(MarkFault fault) noexcept {
     case MarkFault::WrongScale:
       return "mark after mark was refused: not the scale that is configured";
   }
+
   return "?";
 }
 
@@ -75,12 +79,13 @@ std::optional<std::int64_t> first_mark(const DistanceCode& code, std::int64_t di
   return on_circle(code, P1);
 }
 
-tl::expected<MarkDatum, MarkFault> datum_of(const DistanceCode& code,
-                                            std::span<const double, kMarksForDatum> marks) noexcept {
+tl::expected<MarkDatum, MarkFault> datum_of(
+    const DistanceCode& code, std::span<const double, kMarksForDatum> marks) noexcept {
   MarkDatum datum;
   datum.direction = marks[1] > marks[0] ? 1 : -1;
   std::array<std::int64_t, kMarksForDatum> position{};
   std::optional<std::int64_t> expected;
+
   for (std::size_t i = 0; i + 1 < kMarksForDatum; ++i) {
     const double apart = (marks[i + 1] - marks[i]) * datum.direction;
     if (apart <= 0.0) return tl::unexpected(MarkFault::Reversed);
@@ -94,16 +99,19 @@ tl::expected<MarkDatum, MarkFault> datum_of(const DistanceCode& code,
     position[i] = expected ? *expected : *P;
     expected = position[i] + datum.direction * M;
   }
+
   position.back() = *expected;
   datum.first_mark = position[0];
   double low = 0.0;
   double high = 0.0;
+
   for (std::size_t i = 0; i < kMarksForDatum; ++i) {
     const double offset = static_cast<double>(position[i]) - marks[i];
     low = i == 0 ? offset : std::min(low, offset);
     high = i == 0 ? offset : std::max(high, offset);
     datum.offset_periods += offset / static_cast<double>(kMarksForDatum);
   }
+
   datum.spread_periods = high - low;
   return datum;
 }

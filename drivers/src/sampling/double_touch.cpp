@@ -38,6 +38,7 @@ std::string_view name(TouchRejection rejection) noexcept {
     case TouchRejection::Disagree:
       return "the slow touches do not agree";
   }
+
   return "?";
 }
 
@@ -74,14 +75,17 @@ DoubleTouch::Outcome DoubleTouch::on_touch(const ProbeTrigger& touch) noexcept {
     find_ = touch;
     return std::nullopt;
   }
+
   if (!found_) return reject(TouchRejection::NoFind);
   if (!usable(touch)) return reject(TouchRejection::NotUsable);
   if (!(distance_m(touch, find_) <= rules_.same_place_m)) return reject(TouchRejection::OtherPlace);
-  if (count_ > 0 && !(cosine(touch, slow_[0]) >= kSameSide)) return reject(TouchRejection::OtherSide);
+  if (count_ > 0 && !(cosine(touch, slow_[0]) >= kSameSide))
+    return reject(TouchRejection::OtherSide);
   slow_[count_++] = touch;
   if (count_ < std::clamp<std::size_t>(rules_.slow_touches, 2, kMostTouches)) return std::nullopt;
   const auto outcome = conclude();
   reset();
+
   return outcome;
 }
 
@@ -108,6 +112,7 @@ double DoubleTouch::u_of_mean(std::size_t axis, double mean) const noexcept {
   double shared = 0.0;
   const bool linear = ((rules_.linear_axes >> axis) & 1u) != 0;
   const double u_delay_s = 1e-9 * static_cast<double>(rules_.u_delay.count());
+
   for (std::size_t k = 0; k < count_; ++k) {
     const ProbeTrigger& t = slow_[k];
     const double u_shared = t.velocity[axis] * u_delay_s;
@@ -118,25 +123,30 @@ double DoubleTouch::u_of_mean(std::size_t axis, double mean) const noexcept {
               n;
     shared += square(u_shared) / n;
   }
+
   return std::sqrt(std::max(scatter, stated) / n + shared);
 }
 
 tl::expected<MeasuredTouch, TouchRejection> DoubleTouch::conclude() const noexcept {
   const ProbeTrigger& last = slow_[count_ - 1];
-  MeasuredTouch m{.touch = last.touch, .probe = last.probe, .touches = count_, .time = last.head.time};
+  MeasuredTouch m{
+      .touch = last.touch, .probe = last.probe, .touches = count_, .time = last.head.time};
   m.axis_count = last.axis_count;
   double low = along_m(slow_[0]);
   double high = low;
   double u_m = 0.0;
+
   for (std::size_t k = 0; k < count_; ++k) {
     low = std::min(low, along_m(slow_[k]));
     high = std::max(high, along_m(slow_[k]));
     u_m = std::max(u_m, u_along_m(slow_[k]));
     m.speed_m_s += slow_[k].speed_m_s / static_cast<double>(count_);
   }
+
   m.spread_m = high - low;
   if (!(m.spread_m <= rules_.agree_sigmas * std::sqrt(2.0) * u_m))
     return tl::unexpected(TouchRejection::Disagree);
+
   for (std::size_t i = 0; i < m.axis_count; ++i) {
     for (std::size_t k = 0; k < count_; ++k) {
       m.position[i] += slow_[k].position[i] / static_cast<double>(count_);
@@ -144,6 +154,7 @@ tl::expected<MeasuredTouch, TouchRejection> DoubleTouch::conclude() const noexce
     }
     m.u_position[i] = u_of_mean(i, m.position[i]);
   }
+
   return m;
 }
 

@@ -24,6 +24,7 @@ void MarkTraverse::follow(double position) noexcept {
     farthest_ = position;
     return;
   }
+
   const double way = position - farthest_;
   if (direction_ == 0) {
     if (std::abs(way) < options_.reversal_periods) return;
@@ -50,7 +51,8 @@ tl::unexpected<MarkFault> MarkTraverse::refuse(MarkFault fault) noexcept {
   return tl::unexpected(++refusals_ >= options_.most_refusals ? MarkFault::WrongScale : fault);
 }
 
-std::optional<tl::expected<MarkDatum, MarkFault>> MarkTraverse::on_mark(std::int64_t count) noexcept {
+std::optional<tl::expected<MarkDatum, MarkFault>> MarkTraverse::on_mark(
+    std::int64_t count) noexcept {
   const double position = static_cast<double>(count) / options_.counts_per_period;
   follow(position);
   if (reversed_) {
@@ -61,15 +63,19 @@ std::optional<tl::expected<MarkDatum, MarkFault>> MarkTraverse::on_mark(std::int
     if (!lost) return std::nullopt;
     return tl::expected<MarkDatum, MarkFault>{tl::unexpected(MarkFault::Reversed)};
   }
+
   keep(position);
   if (count_ < kMarksForDatum) return std::nullopt;
   auto datum = datum_of(options_.code, marks_);
+
   if (!datum) {
-    // One of the four is wrong, nobody knows which: none of them is used again but the latest, as a first.
+    // One of the four is wrong, nobody knows which: none of them is used again but the latest, as a
+    // first.
     count_ = 0;
     keep(position);
     return tl::expected<MarkDatum, MarkFault>{refuse(datum.error())};
   }
+
   refusals_ = 0;
   return datum;
 }

@@ -18,10 +18,12 @@ bool debounced(const TouchOptions& options) {
 EdgeRules rules_of(const TouchOptions& options) {
   const nanoseconds confirm =
       debounced(options) ? options.wiring.counter_debounce : options.switching.confirm;
-  return {counts_of(confirm, options), counts_of(options.switching.chatter, options), debounced(options)};
+  return {counts_of(confirm, options), counts_of(options.switching.chatter, options),
+          debounced(options)};
 }
 
-/// Scans from the earliest that can still be asked for to the confirmation, and as many again in reserve.
+/// Scans from the earliest that can still be asked for to the confirmation, and as many again in
+/// reserve.
 std::size_t past_of(const TouchOptions& o) {
   const nanoseconds past = o.delay.delay + 2 * (o.switching.confirm + o.wiring.counter_debounce) +
                            o.approach.speed_window + o.window_before;

@@ -12,7 +12,8 @@ TrackerReceiverOptions receiver_options(const TrackerDeviceOptions& options) {
   TrackerReceiverOptions receiver;
   receiver.clock = options.clock;
   const bool periodic = options.session.mode == TrackerMode::ContinuousTime;
-  receiver.time_separation = std::chrono::milliseconds{periodic ? options.session.time_separation_ms : 0};
+  receiver.time_separation =
+      std::chrono::milliseconds{periodic ? options.session.time_separation_ms : 0};
   receiver.stationary_time = std::chrono::milliseconds{options.session.stationary_time_ms};
   receiver.air_measured = options.session.weather != emscon::WeatherMonitor::None;
   return receiver;
@@ -28,7 +29,8 @@ Result<std::unique_ptr<TrackerDevice>> TrackerDevice::create(const TrackerDevice
   return std::unique_ptr<TrackerDevice>{new TrackerDevice{named, peer, time}};
 }
 
-TrackerDevice::TrackerDevice(const TrackerDeviceOptions& options, TcpPeer peer, const TimeSource& time)
+TrackerDevice::TrackerDevice(const TrackerDeviceOptions& options, TcpPeer peer,
+                             const TimeSource& time)
     : SessionOverTcp(std::move(peer), time, TrackerSession{options.session}),
       options_(options),
       points_(options.point_capacity),
@@ -86,11 +88,12 @@ void TrackerDevice::report_clock() {
   const double skew = receiver_.skew_beyond_limit();
   if (std::exchange(clock_reported_, skew != 0.0) || skew == 0.0) return;
   constexpr double kPpm = 1e6;
-  board_.fault(time_.now(),
-               fmt::format("{}: the tracker's clock runs {:.0f} ppm {}, a sound one at most {:.0f} ppm: its "
-                           "points are marked ClockUnsettled, have it checked",
-                           peer_.name, kPpm * std::abs(skew), skew > 0.0 ? "fast" : "slow",
-                           kPpm * options_.clock.max_skew));
+  board_.fault(
+      time_.now(),
+      fmt::format("{}: the tracker's clock runs {:.0f} ppm {}, a sound one at most {:.0f} ppm: its "
+                  "points are marked ClockUnsettled, have it checked",
+                  peer_.name, kPpm * std::abs(skew), skew > 0.0 ? "fast" : "slow",
+                  kPpm * options_.clock.max_skew));
 }
 
 /// A state that is no fault has a cause, too. Faults are in show().
@@ -113,7 +116,8 @@ DeviceStatus TrackerDevice::status() const {
 }
 
 std::span<const std::byte> TrackerDevice::encode(const TrackerSend& command) {
-  const auto packet = std::span<const std::byte>{command_}.first(emscon::encode(command.request, command_));
+  const auto packet =
+      std::span<const std::byte>{command_}.first(emscon::encode(command.request, command_));
   raw_.push_bytes(time_.now(), protocol::RawBlock::Direction::ToDevice, packet);
   return packet;
 }

@@ -43,10 +43,11 @@ const char* name_of(TrackerState state) noexcept {
     case TrackerState::Faulted:
       return "faulted";
   }
+
   return "unknown";
 }
 
-std::string describe(const TrackerNonsense& nonsense) {
+std::string describe(const TrackerProtocolError& nonsense) {
   std::string hex;
   std::string text;
   for (std::size_t i = 0; i < nonsense.length; ++i) {
@@ -54,14 +55,16 @@ std::string describe(const TrackerNonsense& nonsense) {
     hex += fmt::format("{}{:02x}", i == 0 ? "" : " ", value);
     text += value >= 0x20 && value < 0x7f ? static_cast<char>(value) : '.';
   }
-  return fmt::format("expected emScon answer, got {} \"{}\" ({})", hex, text,
-                     nonsense.error ? emscon::name_of(*nonsense.error) : "a packet size that cannot be");
+  return fmt::format(
+      "expected emScon answer, got {} \"{}\" ({})", hex, text,
+      nonsense.error ? emscon::name_of(*nonsense.error) : "a packet size that cannot be");
 }
 
 Result<void> check(const TrackerSessionOptions& o) {
   const auto bad = [&](const char* what) -> Result<void> {
     return tl::unexpected{Error{ErrorCode::BadConfiguration, fmt::format("{}: {}", o.peer, what)}};
   };
+
   if (o.time_separation_ms < 1 || o.time_separation_ms > 60'000)
     return bad("time separation not in 1 to 60000 ms");
   if (!(o.spatial_distance_mm > 0.0)) return bad("spatial distance not above 0 mm");
@@ -73,6 +76,7 @@ Result<void> check(const TrackerSessionOptions& o) {
     return bad("search radius and time-out not above 0");
   if (o.first_pause <= std::chrono::nanoseconds{0} || o.longest_pause < o.first_pause)
     return bad("pauses between tries not rising");
+
   return {};
 }
 
@@ -87,8 +91,8 @@ bool TrackerSession::online() const noexcept {
 protocol::HostTime TrackerSession::deadline() const noexcept {
   if (stopped_ && !online()) return kNever;
   if (order_ && !order_begun_ && !pending_) return now_;
-  // Without a beam the next question waits for the answer to this one: a due_ that passed meanwhile is no
-  // deadline, else the device thread would poll without pause.
+  // Without a beam the next question waits for the answer to this one: a due_ that passed meanwhile
+  // is no deadline, else the device thread would poll without pause.
   auto next = pending_ && without_beam() ? kNever : due_;
   if (pending_) next = std::min(next, pending_->due);
   if (restart_at_ && !pending_) next = std::min(next, *restart_at_);
@@ -101,10 +105,12 @@ TrackerAction TrackerSession::on(const TrackerInput& input, protocol::HostTime n
 }
 
 TrackerAction TrackerSession::take(const TrackerTick&) {
-  if (pending_ && now_ >= pending_->due) return pending_->waiting_to_resend ? send_again() : overdue();
+  if (pending_ && now_ >= pending_->due)
+    return pending_->waiting_to_resend ? send_again() : overdue();
   if (order_ && !order_begun_ && !pending_) return begin_order();
   if (restart_at_ && !pending_ && now_ >= *restart_at_) return start_again();
   if (now_ < due_) return TrackerNothing{};
+
   switch (state_) {
     case TrackerState::Disconnected:
     case TrackerState::Faulted:
@@ -147,7 +153,7 @@ TrackerAction TrackerSession::take(const TrackerConnectionLost& lost) {
   return TrackerNothing{};  // there is nothing to close any more
 }
 
-TrackerAction TrackerSession::take(const TrackerNonsense& nonsense) {
+TrackerAction TrackerSession::take(const TrackerProtocolError& nonsense) {
   if (!online()) return TrackerNothing{};
   return give_up(TrackerState::Faulted, describe(nonsense));
 }
@@ -157,20 +163,25 @@ TrackerAction TrackerSession::take(const TrackerStopRequested&) {
   end_order(Outcome::Failed, "abbed is stopping");
   const bool connected = online() || state_ == TrackerState::Connecting;
   const bool measuring = state_ == TrackerState::Streaming || state_ == TrackerState::BeamLost;
-  const bool speaks = online() && state_ != TrackerState::Querying && state_ != TrackerState::WaitWarm;
+  const bool speaks =
+      online() && state_ != TrackerState::Querying && state_ != TrackerState::WaitWarm;
   new_plan(Goal::Leave);
   if (measuring) plan(TrackerState::Stopping, emscon::StopMeasurement{}, true);
   if (speaks) plan_restoring(TrackerState::Stopping);
+
   if (plan_.empty() || !connected) {
     pending_.reset();
     due_ = kNever;
     state_ = TrackerState::Disconnected;
     return connected ? TrackerAction{TrackerClose{}} : TrackerAction{TrackerNothing{}};
   }
+
   state_ = TrackerState::Stopping;
   due_ = now_ + options_.leave_within;
   if (!pending_ || pending_->waiting_to_resend) return next_step();
-  pending_->step.optional = pending_->scripted = true;  // one command at a time: its answer comes first
+
+  // one command at a time: its answer comes first
+  pending_->step.optional = pending_->scripted = true;
   return TrackerNothing{};
 }
 
@@ -194,12 +205,14 @@ TrackerAction TrackerSession::give_up(TrackerState into, const std::string& what
 
 TrackerAction TrackerSession::take(const emscon::ErrorResponse& error) {
   if (state_ == TrackerState::Streaming || state_ == TrackerState::BeamLost) {
-    return beam_lost(fmt::format("the controller reports an error: {} ({})", emscon::name_of(error.status),
+    return beam_lost(fmt::format("the controller reports an error: {} ({})",
+                                 emscon::name_of(error.status),
                                  static_cast<std::int32_t>(error.status)));
   }
   if (error.status != Status::MultipleConnectionsNotAllowed || !online()) return TrackerNothing{};
-  return give_up(TrackerState::Faulted, fmt::format("refused: {} ({})", emscon::name_of(error.status),
-                                                    static_cast<std::int32_t>(error.status)));
+  return give_up(TrackerState::Faulted,
+                 fmt::format("refused: {} ({})", emscon::name_of(error.status),
+                             static_cast<std::int32_t>(error.status)));
 }
 
 TrackerAction TrackerSession::take(const emscon::StatusChange& change) {

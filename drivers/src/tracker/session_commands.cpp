@@ -35,16 +35,18 @@ void TrackerSession::new_plan(Goal goal) {
 
 void TrackerSession::plan_sets(std::initializer_list<Command> commands, bool optional) {
   for (const Command command : commands) {
-    if (const auto request = settings_.wanted(command)) plan(TrackerState::Configuring, *request, optional);
+    if (const auto request = settings_.wanted(command))
+      plan(TrackerState::Configuring, *request, optional);
   }
 }
 
-/// The order matters to a controller: units before everything that has one, parameters of a mode after the
-/// mode.
+/// The order matters to a controller: units before everything that has one, parameters of a mode
+/// after the mode.
 void TrackerSession::plan_set_up(bool initialised) {
   using enum TrackerState;
   new_plan(Goal::Stream);
   plan_sets({Command::SetUnits, Command::SetSystemSettings, Command::SetEnvironmentParams});
+
   if (!initialised) plan(Initialising, emscon::Initialize{});
   if (!options_.reflector.empty()) plan_reflector(Configuring, false);
   plan_sets({Command::SetSearchParams});
@@ -75,7 +77,8 @@ TrackerAction TrackerSession::plan_done() {
     case Goal::Stream:
       streaming();
       return TrackerNothing{};
-    case Goal::Stay:  // a result that came during the plan has not been followed by the next measurement
+    case Goal::
+        Stay:  // a result that came during the plan has not been followed by the next measurement
       return result_came_ && state_ == TrackerState::Streaming ? measure_again()
                                                                : TrackerAction{TrackerNothing{}};
     case Goal::SetUp:
@@ -90,6 +93,7 @@ TrackerAction TrackerSession::plan_done() {
       due_ = stopped_ ? kNever : now_ + options_.refused_pause;
       break;
   }
+
   pending_.reset();
   return TrackerClose{};
 }
@@ -99,17 +103,20 @@ TrackerAction TrackerSession::plan_done() {
 namespace {
 
 nanoseconds time_for_search(const TrackerSessionOptions& options) {
-  return options.search ? std::chrono::milliseconds{options.search->timeout_ms} + std::chrono::seconds{5}
-                        : options.initialize_timeout;
+  return options.search
+             ? std::chrono::milliseconds{options.search->timeout_ms} + std::chrono::seconds{5}
+             : options.initialize_timeout;
 }
 
 }  // namespace
 
 nanoseconds longest_order(const TrackerSessionOptions& options) noexcept {
-  constexpr int kShort = 4;  // what is under way, StopMeasurement, GetReflector, SetReflector or the list
-  constexpr int kLong = 2;   // Initialize and GoBirdBath
+  // what is under way, StopMeasurement, GetReflector, SetReflector or the list
+  constexpr int kShort = 4;
+  constexpr int kLong = 2;  // Initialize and GoBirdBath
   return kShort * options.command_timeout +
-         std::max(kLong * options.initialize_timeout, time_for_search(options)) + options.busy_patience;
+         std::max(kLong * options.initialize_timeout, time_for_search(options)) +
+         options.busy_patience;
 }
 
 nanoseconds TrackerSession::time_for(Command command) const noexcept {
@@ -135,7 +142,8 @@ TrackerAction TrackerSession::send(const Step& step, bool scripted) {
 void TrackerSession::await_answer() {
   pending_->overdue = now_ + time_for(emscon::command_of(pending_->step.request));
   const bool first = state_ == TrackerState::Querying;
-  pending_->due = first ? std::min(now_ + options_.ask_again, pending_->overdue) : pending_->overdue;
+  pending_->due =
+      first ? std::min(now_ + options_.ask_again, pending_->overdue) : pending_->overdue;
 }
 
 TrackerAction TrackerSession::send_again() {
@@ -182,7 +190,8 @@ TrackerAction TrackerSession::take(const emscon::Answer& answer) {
 void TrackerSession::keep(const emscon::Answer& answer) {
   if (pending_->scripted && state_ != TrackerState::Stopping && state_ != TrackerState::Restoring)
     settings_.found(answer);
-  if (const auto* r = std::get_if<emscon::ReflectorAnswer>(&answer)) reflector_in_use_ = r->internal_id;
+  if (const auto* r = std::get_if<emscon::ReflectorAnswer>(&answer))
+    reflector_in_use_ = r->internal_id;
   if (const auto* set = std::get_if<emscon::SetReflector>(&pending_->step.request)) {
     if (emscon::accepted(emscon::status_of(answer))) reflector_in_use_ = set->internal_id;
   }
@@ -197,6 +206,7 @@ TrackerAction TrackerSession::refused(Status status) {
     while (step_ < plan_.size() && plan_[step_].of_order) ++step_;
     return next_step();
   }
+
   if (command == Command::StartMeasurement && needs_beam(status)) return wait_for_beam(text);
   if (without_beam()) return start_refused();
   if (status == Status::NotWarmedUp) {
@@ -206,10 +216,12 @@ TrackerAction TrackerSession::refused(Status status) {
     due_ = now_ + options_.warm_poll;
     return TrackerNothing{};
   }
+
   if (passes(status) && now_ < pending_->patience) {
     cause_ = text + "; asked again";
     return send_later();
   }
+
   return refuse(text);
 }
 
@@ -238,6 +250,7 @@ TrackerAction TrackerSession::done(const emscon::Answer& answer) {
     if (was.step.of_order && last_of_order && order_) end_order(Outcome::Done, outcome_of(*order_));
     return next_step();
   }
+
   if (state_ == TrackerState::Ready) streaming();
   return without_beam() ? done_without_beam(answer) : TrackerAction{TrackerNothing{}};
 }
@@ -259,12 +272,14 @@ TrackerAction TrackerSession::judge(const emscon::SystemStatusAnswer& status) {
     case emscon::LaserStatus::Ready:
       break;
   }
+
   const bool initialised = status.tracker_processor == emscon::TrackerProcessorStatus::Initialised;
   if (!initialised) settings_.ask_again();  // a controller that began anew may have forgotten them
   initialised_ = initialised;
   new_plan(Goal::SetUp);
   for (const emscon::Request& question : settings_.questions())
     plan(TrackerState::Configuring, question, true);
+
   return next_step();
 }
 

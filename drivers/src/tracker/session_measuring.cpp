@@ -10,7 +10,8 @@
 namespace abbe::drivers {
 namespace {
 
-/// Points of before a break may still arrive one burst (at most a third of a second) after its report.
+/// Points of before a break may still arrive one burst (at most a third of a second) after its
+/// report.
 constexpr std::chrono::milliseconds kLastBurst{500};
 
 std::string no_beam(const std::string& why) {
@@ -19,13 +20,13 @@ std::string no_beam(const std::string& why) {
 
 }  // namespace
 
-/// Continuous distance has no period: a machine that stands still sends nothing, and only the controller can
-/// be asked.
+/// Continuous distance has no period: a machine that stands still sends nothing, and only the
+/// controller can be asked.
 std::chrono::nanoseconds TrackerSession::silence_allowed() const noexcept {
   switch (options_.mode) {
     case TrackerMode::ContinuousTime:
-      return std::max<std::chrono::nanoseconds>(options_.silence_timeout,
-                                                3 * std::chrono::milliseconds{options_.time_separation_ms});
+      return std::max<std::chrono::nanoseconds>(
+          options_.silence_timeout, 3 * std::chrono::milliseconds{options_.time_separation_ms});
     case TrackerMode::Stationary:
       return options_.silence_timeout + 3 * std::chrono::milliseconds{options_.stationary_time_ms};
     case TrackerMode::ContinuousDistance:
@@ -80,7 +81,8 @@ TrackerAction TrackerSession::measure_again() {
 }
 
 TrackerAction TrackerSession::beam_lost(const std::string& why) {
-  if (state_ != TrackerState::Streaming && state_ != TrackerState::BeamLost) return TrackerNothing{};
+  if (state_ != TrackerState::Streaming && state_ != TrackerState::BeamLost)
+    return TrackerNothing{};
   state_ = TrackerState::BeamLost;
   cause_ = no_beam(why);
   beam_lost_at_ = now_;
@@ -89,8 +91,9 @@ TrackerAction TrackerSession::beam_lost(const std::string& why) {
   return TrackerNothing{};
 }
 
-/// StartMeasurement was refused for want of a beam: the controller reports when it is there, and is asked in
-/// case the report is missed. Nothing is sent meanwhile that could disturb who brings the reflector.
+/// StartMeasurement was refused for want of a beam: the controller reports when it is there, and is
+/// asked in case the report is missed. Nothing is sent meanwhile that could disturb who brings the
+/// reflector.
 TrackerAction TrackerSession::wait_for_beam(const std::string& why) {
   pending_.reset();
   if (!without_beam()) {
@@ -103,9 +106,9 @@ TrackerAction TrackerSession::wait_for_beam(const std::string& why) {
   return TrackerNothing{};
 }
 
-/// After a lost beam StartMeasurement may be refused. If because the old measurement still runs, stopping it
-/// is what helps; if not, it does no harm. If points came meanwhile, the old measurement runs and all is
-/// well.
+/// After a lost beam StartMeasurement may be refused. If because the old measurement still runs,
+/// stopping it is what helps; if not, it does no harm. If points came meanwhile, the old
+/// measurement runs and all is well.
 TrackerAction TrackerSession::start_refused() {
   const TrackerState state = state_;
   pending_.reset();

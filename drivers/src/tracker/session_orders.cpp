@@ -14,14 +14,16 @@ namespace abbe::drivers {
 namespace {
 
 constexpr double kMillimetresPerMetre = 1000.0;
-constexpr std::int32_t kMostReflectors = 256;  // a controller that lists more is not listened to for ever
+// a controller that lists more is not listened to for ever
+constexpr std::int32_t kMostReflectors = 256;
 
 /// A terminal obeys control characters.
 bool is_control(char32_t c) {
   return c < 0x20 || (c >= 0x7F && c < 0xA0);
 }
 
-/// UTF-16 as the controller sends it; a lone surrogate or a control character becomes a question mark.
+/// UTF-16 as the controller sends it; a lone surrogate or a control character becomes a question
+/// mark.
 std::string utf8_of(const emscon::Name& name) {
   std::string out;
   const auto put = [&out](char32_t c) {
@@ -41,6 +43,7 @@ std::string utf8_of(const emscon::Name& name) {
       out += static_cast<char>(0x80 | (c & 0x3F));
     }
   };
+
   for (std::size_t i = 0; i < name.size() && name[i] != 0; ++i) {
     const char32_t unit = name[i];
     const bool high = unit >= 0xD800 && unit < 0xDC00;
@@ -51,6 +54,7 @@ std::string utf8_of(const emscon::Name& name) {
       put((unit >= 0xD800 && unit < 0xE000) || is_control(unit) ? U'?' : unit);
     }
   }
+
   return out;
 }
 
@@ -76,12 +80,14 @@ const char* name_of(TrackerOrder::What what) noexcept {
     case TrackerOrder::What::FindReflector:
       return "find";
   }
+
   return "order";
 }
 
 // --- reflectors
 
-/// Which one is in use, then the list, one answer each; SetReflector follows when the list is there.
+/// Which one is in use, then the list, one answer each; SetReflector follows when the list is
+/// there.
 void TrackerSession::plan_reflector(TrackerState state, bool of_order) {
   plan(state, emscon::GetReflector{}, true, of_order);
   plan(state, emscon::GetReflectors{}, as_id(wanted_reflector()).has_value(), of_order);
@@ -95,30 +101,36 @@ const std::string& TrackerSession::wanted_reflector() const {
 bool TrackerSession::list_complete(const emscon::Answer& answer) {
   const auto* one = std::get_if<emscon::ReflectorsAnswer>(&answer);
   if (one == nullptr) return true;
-  reflectors_.push_back({one->internal_id, utf8_of(one->name), reflector_in_use_ == one->internal_id});
+  reflectors_.push_back(
+      {one->internal_id, utf8_of(one->name), reflector_in_use_ == one->internal_id});
   return static_cast<std::int32_t>(reflectors_.size()) >= std::min(one->total, kMostReflectors);
 }
 
-/// The list is there: plans SetReflector unless the reflector is set already, which would cost the beam.
-/// Returns what is wrong with the name.
+/// The list is there: plans SetReflector unless the reflector is set already, which would cost the
+/// beam. Returns what is wrong with the name.
 std::string TrackerSession::choose_reflector() {
   if (order_begun_ && order_->what == TrackerOrder::What::ListReflectors) return {};
   const std::string& wanted = wanted_reflector();
   const auto id = as_id(wanted);
-  const auto known = std::find_if(reflectors_.begin(), reflectors_.end(),
-                                  [&](const TrackerReflector& r) { return r.name == wanted || r.id == id; });
+  const auto known =
+      std::find_if(reflectors_.begin(), reflectors_.end(),
+                   [&](const TrackerReflector& r) { return r.name == wanted || r.id == id; });
+
   if (known == reflectors_.end() && !reflectors_.empty()) {
     std::vector<std::string> names;
-    for (const TrackerReflector& r : reflectors_) names.push_back(fmt::format("\"{}\" ({})", r.name, r.id));
+    for (const TrackerReflector& r : reflectors_)
+      names.push_back(fmt::format("\"{}\" ({})", r.name, r.id));
     return fmt::format("reflector \"{}\" is not in the controller's list: known are {}", wanted,
                        fmt::join(names, ", "));
   }
+
   const std::int32_t chosen = known != reflectors_.end() ? known->id : id.value_or(0);
   if (reflector_in_use_ == chosen) return {};
   const Step list = plan_[step_ - 1];
   if (!list.of_order && !reflector_before_) reflector_before_ = reflector_in_use_;
   plan_.insert(plan_.begin() + static_cast<std::ptrdiff_t>(step_),
                Step{list.state, emscon::SetReflector{chosen}, false, list.of_order});
+
   return {};
 }
 
@@ -149,6 +161,7 @@ TrackerAction TrackerSession::begin_order() {
   order_begun_ = true;
   const TrackerOrder& order = *order_;
   const bool measuring = state_ == Streaming || state_ == BeamLost;
+
   if (order.what == TrackerOrder::What::ListReflectors) {
     const auto restart_at = restart_at_;  // a beam that is back is measured after the list, too
     new_plan(Goal::Stay);
@@ -157,10 +170,12 @@ TrackerAction TrackerSession::begin_order() {
     plan(state_, emscon::GetReflectors{}, false, true);
     return next_step();
   }
+
   new_plan(Goal::Stream);
   due_ = kNever;
   cause_ = fmt::format("\"{}\" was asked for", name_of(order.what));
   if (measuring) plan(Moving, emscon::StopMeasurement{}, true);
+
   switch (order.what) {
     case TrackerOrder::What::Initialize:
       plan(Initialising, emscon::Initialize{}, false, true);
@@ -178,6 +193,7 @@ TrackerAction TrackerSession::begin_order() {
     case TrackerOrder::What::ListReflectors:
       break;
   }
+
   plan(Ready, emscon::StartMeasurement{});
   return next_step();
 }
@@ -195,13 +211,15 @@ std::string TrackerSession::outcome_of(const TrackerOrder& order) const {
     case TrackerOrder::What::FindReflector:
       return "the reflector was found";
   }
+
   return {};
 }
 
 void TrackerSession::end_order(Outcome outcome, const std::string& text) {
   if (!order_) return;
   TrackerOrderReport report{order_->number, outcome, text, {}};
-  if (report.done() && order_->what == TrackerOrder::What::ListReflectors) report.reflectors = reflectors_;
+  if (report.done() && order_->what == TrackerOrder::What::ListReflectors)
+    report.reflectors = reflectors_;
   if (report.done() && order_->what == TrackerOrder::What::SetReflector) {
     options_.reflector = order_->reflector;  // also after the next connection
     reflector_before_.reset();               // a person's choice stays

@@ -15,7 +15,9 @@ using emscon::Request;
 
 /// The request that sets what an answer reports; none for an answer that reports no setting.
 struct SetterOf {
-  std::optional<Request> operator()(const emscon::UnitsAnswer& a) const { return emscon::SetUnits{a.units}; }
+  std::optional<Request> operator()(const emscon::UnitsAnswer& a) const {
+    return emscon::SetUnits{a.units};
+  }
   std::optional<Request> operator()(const emscon::SystemSettingsAnswer& a) const {
     return emscon::SetSystemSettings{a.settings};
   }
@@ -45,25 +47,30 @@ bool same(const Request& a, const Request& b) {
 
 }  // namespace
 
-/// In the order in which they are put back: a value is read and written in the units found, so units come
-/// first; the system settings come last, because they may end the messages the session relies on.
+/// In the order in which they are put back: a value is read and written in the units found, so
+/// units come first; the system settings come last, because they may end the messages the session
+/// relies on.
 TrackerSettings::TrackerSettings(const TrackerSessionOptions& options) {
   using emscon::MeasurementMode;
   const auto add = [this](const Request& question, const Request& wanted) {
     settings_.push_back({question, wanted});
   };
+
   add(emscon::GetUnits{}, emscon::SetUnits{});
   add(emscon::GetCoordinateSystemType{}, emscon::SetCoordinateSystemType{});
   add(emscon::GetStatisticMode{}, emscon::SetStatisticMode{});
   if (options.search) add(emscon::GetSearchParams{}, *options.search);
+
   switch (options.mode) {
     case TrackerMode::ContinuousTime:
-      add(emscon::GetMeasurementMode{}, emscon::SetMeasurementMode{MeasurementMode::ContinuousTime});
+      add(emscon::GetMeasurementMode{},
+          emscon::SetMeasurementMode{MeasurementMode::ContinuousTime});
       add(emscon::GetContinuousTimeModeParams{},
           emscon::SetContinuousTimeModeParams{options.time_separation_ms});
       break;
     case TrackerMode::ContinuousDistance:
-      add(emscon::GetMeasurementMode{}, emscon::SetMeasurementMode{MeasurementMode::ContinuousDistance});
+      add(emscon::GetMeasurementMode{},
+          emscon::SetMeasurementMode{MeasurementMode::ContinuousDistance});
       add(emscon::GetContinuousDistanceModeParams{},
           emscon::SetContinuousDistanceModeParams{options.spatial_distance_mm});
       break;
@@ -73,11 +80,13 @@ TrackerSettings::TrackerSettings(const TrackerSessionOptions& options) {
           emscon::SetStationaryModeParams{options.stationary_time_ms, true});
       break;
   }
+
   if (options.mode != TrackerMode::Stationary) {
     constexpr auto kRate = emscon::LongParameter::TcpDataPacketRate;
     add(emscon::GetLongSystemParameter{kRate},
         emscon::SetLongSystemParameter{kRate, options.packets_per_second});
   }
+
   if (options.weather == emscon::WeatherMonitor::None)
     add(emscon::GetEnvironmentParams{}, emscon::SetEnvironmentParams{options.environment});
   emscon::SystemSettings system;
@@ -110,7 +119,8 @@ void TrackerSettings::ask_again() noexcept {
 /// Keeps what abbe has no opinion of.
 Request TrackerSettings::adapted(const Setting& setting) {
   const auto* ours = std::get_if<emscon::SetSystemSettings>(&setting.wanted);
-  const auto* before = setting.before ? std::get_if<emscon::SetSystemSettings>(&*setting.before) : nullptr;
+  const auto* before =
+      setting.before ? std::get_if<emscon::SetSystemSettings>(&*setting.before) : nullptr;
   if (ours == nullptr || before == nullptr) return setting.wanted;
   emscon::SetSystemSettings adapted = *ours;
   adapted.settings.has_nivel = before->settings.has_nivel;

@@ -16,8 +16,8 @@ namespace {
 
 constexpr int kInterface = 0;
 constexpr std::size_t kLargestAnswer = usb::kMaxDescriptor;
-/// Cancelled transfers come back at once; those of a host controller that hangs do not. They are waited for
-/// so many turns, then for one turn each time the device is to be opened.
+/// Cancelled transfers come back at once; those of a host controller that hangs do not. They are
+/// waited for so many turns, then for one turn each time the device is to be opened.
 constexpr int kMostCloseTurns = 20;
 constexpr timeval kCloseTurn{0, 50'000};
 
@@ -33,7 +33,8 @@ UsbOutcome outcome_of(libusb_transfer_status status) {
 std::string serial_of(libusb_device_handle* handle, std::uint8_t index) {
   std::array<unsigned char, 256> text{};
   if (index == 0) return {};
-  const int n = libusb_get_string_descriptor_ascii(handle, index, text.data(), static_cast<int>(text.size()));
+  const int n =
+      libusb_get_string_descriptor_ascii(handle, index, text.data(), static_cast<int>(text.size()));
   return n > 0 ? std::string(text.begin(), text.begin() + n) : std::string{};
 }
 
@@ -72,9 +73,9 @@ struct LibusbLink::State {
     init_error = libusb_init(&context);
     if (init_error != 0) return;
     control_transfer = libusb_alloc_transfer(0);
-    libusb_hotplug_register_callback(context, LIBUSB_HOTPLUG_EVENT_DEVICE_LEFT, LIBUSB_HOTPLUG_NO_FLAGS,
-                                     wanted.vendor, wanted.product, LIBUSB_HOTPLUG_MATCH_ANY, &State::on_left,
-                                     this, nullptr);
+    libusb_hotplug_register_callback(context, LIBUSB_HOTPLUG_EVENT_DEVICE_LEFT,
+                                     LIBUSB_HOTPLUG_NO_FLAGS, wanted.vendor, wanted.product,
+                                     LIBUSB_HOTPLUG_MATCH_ANY, &State::on_left, this, nullptr);
   }
   State(const State&) = delete;
   State& operator=(const State&) = delete;
@@ -99,26 +100,30 @@ struct LibusbLink::State {
     close();
     events.clear();
     lost = false;
+
     if (handle != nullptr) {
       return lose(ErrorCode::Unreachable,
                   "its cancelled transfers have not come back: the USB host controller hangs");
     }
+
     if (init_error != 0) return lose(ErrorCode::SystemRefused, "libusb: " + words_for(init_error));
     if (!find()) return;
     if (!take_over()) {
       libusb_close(std::exchange(handle, nullptr));
       return;
     }
+
     events.emplace_back(UsbOpened{serial});
   }
 
-  /// Opens the one with the right serial number. Another one may be streaming to somebody else: it is opened
-  /// once, for its serial number, and not again as long as it stays plugged in.
+  /// Opens the one with the right serial number. Another one may be streaming to somebody else: it
+  /// is opened once, for its serial number, and not again as long as it stays plugged in.
   bool find() {
     const DeviceList list{context};
     std::vector<Seen> there;
     std::string refused;
     libusb_device* ours = nullptr;
+
     for (libusb_device* device : list.all()) {
       libusb_device_descriptor d{};
       if (libusb_get_device_descriptor(device, &d) != 0) continue;
@@ -131,10 +136,12 @@ struct LibusbLink::State {
       }
       there.push_back(std::move(*one));
     }
+
     cards = std::move(there);
     std::vector<std::string> serials;
     for (const Seen& one : cards) serials.push_back(one.serial);
     if (identity.serial.empty() && serials.size() > 1) ours = nullptr;
+
     if (ours != nullptr) {
       if (const int error = libusb_open(ours, &handle); error != 0) {
         handle = nullptr;
@@ -142,21 +149,25 @@ struct LibusbLink::State {
         refused = words_for(error);
       }
     }
+
     return judge(serials, refused);
   }
 
   /// A device that is plugged in again has another address.
-  std::optional<Seen> look_at(libusb_device* device, std::uint8_t serial_string, std::string& refused) const {
+  std::optional<Seen> look_at(libusb_device* device, std::uint8_t serial_string,
+                              std::string& refused) const {
     Seen one{libusb_get_bus_number(device), libusb_get_device_address(device), {}};
     const auto known = std::ranges::find_if(cards, [&](const Seen& s) {
       return s.bus == one.bus && s.address == one.address && !s.serial.empty();
     });
+
     if (known != cards.end()) return *known;
     libusb_device_handle* candidate = nullptr;
     if (const int error = libusb_open(device, &candidate); error != 0) {
       refused = words_for(error);
       return std::nullopt;
     }
+
     one.serial = serial_of(candidate, serial_string);
     libusb_close(candidate);
     return one;
@@ -164,8 +175,9 @@ struct LibusbLink::State {
 
   bool judge(const std::vector<std::string>& serials, const std::string& refused) {
     if (identity.serial.empty() && serials.size() > 1) {
-      lose(ErrorCode::BadConfiguration, fmt::format("{} are there ({}): the serial number must be configured",
-                                                    serials.size(), fmt::join(serials, ", ")));
+      lose(ErrorCode::BadConfiguration,
+           fmt::format("{} are there ({}): the serial number must be configured", serials.size(),
+                       fmt::join(serials, ", ")));
     } else if (handle == nullptr && !serials.empty()) {
       lose(ErrorCode::Protocol, fmt::format("its serial number is \"{}\", configured is \"{}\"",
                                             fmt::join(serials, "\", \""), identity.serial));
@@ -174,26 +186,31 @@ struct LibusbLink::State {
     } else if (handle == nullptr) {
       lose(ErrorCode::Unreachable, "no such device is plugged in");
     }
+
     return handle != nullptr;
   }
 
   bool take_over() {
     libusb_set_auto_detach_kernel_driver(handle, 1);
     int configuration = 0;
-    if (libusb_get_configuration(handle, &configuration) != 0 || configuration != identity.configuration) {
+    if (libusb_get_configuration(handle, &configuration) != 0 ||
+        configuration != identity.configuration) {
       if (const int error = libusb_set_configuration(handle, identity.configuration); error != 0) {
         lose(ErrorCode::SystemRefused, "configuration: " + words_for(error));
         return false;
       }
     }
+
     if (const int error = libusb_claim_interface(handle, kInterface); error != 0) {
       lose(ErrorCode::SystemRefused, "interface: " + words_for(error));
       return false;
     }
+
     if (libusb_get_max_packet_size(libusb_get_device(handle), identity.bulk_endpoint) <= 0) {
       lose(ErrorCode::Protocol, fmt::format("it has no endpoint {:02X}", identity.bulk_endpoint));
       return false;
     }
+
     return true;
   }
 
@@ -205,10 +222,12 @@ struct LibusbLink::State {
       for (auto& bulk : bulks) libusb_cancel_transfer(bulk.transfer);
       if (control_under_way) libusb_cancel_transfer(control_transfer);
     }
+
     for (int turn = first ? 0 : kMostCloseTurns - 1; busy() && turn < kMostCloseTurns; ++turn) {
       timeval patience = kCloseTurn;
       libusb_handle_events_timeout_completed(context, &patience, nullptr);
     }
+
     if (busy()) return;  // still closing: what the library has is neither freed nor used again
     libusb_release_interface(handle, kInterface);
     libusb_close(std::exchange(handle, nullptr));
@@ -228,8 +247,8 @@ struct LibusbLink::State {
     if (setup == usb::clear_halt(identity.bulk_endpoint)) return clear_halt();
     libusb_fill_control_setup(control_buffer.data(), setup.request_type, setup.request, setup.value,
                               setup.index, std::min<std::uint16_t>(setup.length, kLargestAnswer));
-    libusb_fill_control_transfer(control_transfer, handle, control_buffer.data(), &State::on_control, this,
-                                 0);
+    libusb_fill_control_transfer(control_transfer, handle, control_buffer.data(),
+                                 &State::on_control, this, 0);
     const int error = libusb_submit_transfer(control_transfer);
     if (error != 0) return lose(ErrorCode::Unreachable, "request: " + words_for(error));
     control_under_way = true;
@@ -255,6 +274,7 @@ struct LibusbLink::State {
         bulk.buffer.resize(stream.transfer_bytes);
       }
     }
+
     streaming = true;
     for (auto& bulk : bulks) {
       libusb_fill_bulk_transfer(bulk.transfer, handle, identity.bulk_endpoint, bulk.buffer.data(),
@@ -310,15 +330,17 @@ struct LibusbLink::State {
     auto& bulk = *static_cast<Bulk*>(transfer->user_data);
     State& s = *bulk.state;
     --s.in_flight;
+
     if (transfer->status == LIBUSB_TRANSFER_NO_DEVICE) {
       if (!s.closing) s.lose(ErrorCode::Unreachable, "unplugged");
     } else if (s.streaming && transfer->status != LIBUSB_TRANSFER_CANCELLED) {
       const auto outcome = outcome_of(transfer->status);
       bulk.lent = outcome == UsbOutcome::Done;
       const auto bytes = std::as_bytes(std::span{bulk.buffer});
-      s.events.emplace_back(
-          UsbBulkIn{bytes.first(static_cast<std::size_t>(transfer->actual_length)), s.time.now(), outcome});
+      s.events.emplace_back(UsbBulkIn{
+          bytes.first(static_cast<std::size_t>(transfer->actual_length)), s.time.now(), outcome});
     }
+
     s.tell_if_stopped();
   }
 
@@ -326,17 +348,22 @@ struct LibusbLink::State {
     State& s = *static_cast<State*>(transfer->user_data);
     s.control_under_way = false;
     if (s.closing) return;
-    if (transfer->status == LIBUSB_TRANSFER_NO_DEVICE) return s.lose(ErrorCode::Unreachable, "unplugged");
+    if (transfer->status == LIBUSB_TRANSFER_NO_DEVICE)
+      return s.lose(ErrorCode::Unreachable, "unplugged");
     UsbControlDone done{.setup = s.control_setup, .outcome = outcome_of(transfer->status)};
+
     if (s.control_setup.device_to_host()) {
-      const auto answer = std::as_bytes(std::span{s.control_buffer}.subspan(LIBUSB_CONTROL_SETUP_SIZE));
+      const auto answer =
+          std::as_bytes(std::span{s.control_buffer}.subspan(LIBUSB_CONTROL_SETUP_SIZE));
       done.length = std::min(static_cast<std::size_t>(transfer->actual_length), done.data.size());
       std::copy_n(answer.begin(), done.length, done.data.begin());
     }
+
     s.events.emplace_back(done);
   }
 
-  static int LIBUSB_CALL on_left(libusb_context*, libusb_device* device, libusb_hotplug_event, void* self) {
+  static int LIBUSB_CALL on_left(libusb_context*, libusb_device* device, libusb_hotplug_event,
+                                 void* self) {
     State& s = *static_cast<State*>(self);
     const bool ours = s.handle != nullptr && libusb_get_device(s.handle) == device;
     if (ours && !s.closing) s.lose(ErrorCode::Unreachable, "unplugged");

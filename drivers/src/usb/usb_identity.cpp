@@ -6,8 +6,8 @@ namespace abbe::drivers {
 
 std::string wrong_ids(const UsbIdentity& wanted, std::uint16_t vendor, std::uint16_t product) {
   if (vendor == wanted.vendor && product == wanted.product) return {};
-  return fmt::format("it is {:04X}:{:04X}, configured is {:04X}:{:04X}", vendor, product, wanted.vendor,
-                     wanted.product);
+  return fmt::format("it is {:04X}:{:04X}, configured is {:04X}:{:04X}", vendor, product,
+                     wanted.vendor, wanted.product);
 }
 
 std::string wrong_serial(const UsbIdentity& wanted, std::string_view serial) {

@@ -112,6 +112,7 @@ void UsbipLink::stop_bulk_in() {
   stopping_ = true;
   resubmit_ = 0;
   outgoing_.clear();
+
   for (auto& pending : pending_) {
     if (!pending.bulk) continue;
     pending.unlink = ++sequence_;
@@ -120,6 +121,7 @@ void UsbipLink::stop_bulk_in() {
     const auto header = usbip::encode(usbip::Urb{unlink});
     outgoing_.insert(outgoing_.end(), header.begin(), header.end());
   }
+
   send(outgoing_);
   tell_if_stopped();
 }
@@ -135,6 +137,7 @@ std::span<const UsbEvent> UsbipLink::wait(std::chrono::nanoseconds wall) {
   make_room();
   if (const auto again = std::exchange(resubmit_, 0); again != 0 && streaming_) submit_bulk(again);
   const auto ready = tcp_.wait(early_events_.empty() ? wall : std::chrono::nanoseconds{0});
+
   if (!ready) {
     lose(ready.error().code, ready.error().text);
   } else if (*ready == TcpClient::Ready::Established) {
@@ -146,6 +149,7 @@ std::span<const UsbEvent> UsbipLink::wait(std::chrono::nanoseconds wall) {
     read();
     parse();
   }
+
   // In the order in which they happened: what was early, then what came now.
   events_.insert(events_.end(), early_events_.begin(), early_events_.end());
   early_events_.clear();
@@ -180,21 +184,25 @@ bool UsbipLink::parse_import() {
     lose(ErrorCode::Protocol, fmt::format("import: {}", usbip::to_text(reply.error())));
     return false;
   }
+
   if (reply->status != usbip::OpStatus::Ok) {
     lose(ErrorCode::DeviceRefused,
          fmt::format("import: refused with status {}", static_cast<std::uint32_t>(reply->status)));
     return false;
   }
+
   begin_ += usbip::kImportReplySize;
   const auto wrong = wrong_ids(options_.identity, reply->device.vendor, reply->device.product);
   if (!wrong.empty()) {
     lose(ErrorCode::Protocol, wrong);
     return false;
   }
+
   device_id_ = usbip::device_id(reply->device);
   state_ = State::Inspecting;
   inspection_ = Inspection::Device;
   submit_control(usb::get_descriptor(usb::DescriptorType::Device, 0, usb::kDeviceDescriptorSize));
+
   return true;
 }
 
@@ -219,11 +227,14 @@ bool UsbipLink::take(const usbip::SubmitReply& reply) {
          fmt::format("an answer to request {}, which was not made", reply.head.sequence));
     return false;
   }
+
   const Pending pending = *found;
   if (reply.length > pending.length) {
-    lose(ErrorCode::Protocol, fmt::format("{} bytes where {} were asked for", reply.length, pending.length));
+    lose(ErrorCode::Protocol,
+         fmt::format("{} bytes where {} were asked for", reply.length, pending.length));
     return false;
   }
+
   const bool data = pending.bulk || control_setup_.device_to_host();
   const std::size_t body = data ? reply.length : 0;
   if (unread().size() < usbip::kUrbHeaderSize + body) return false;
@@ -231,13 +242,15 @@ bool UsbipLink::take(const usbip::SubmitReply& reply) {
   begin_ += usbip::kUrbHeaderSize + body;
   pending_.erase(found);
   finish(pending, reply.status, bytes);
+
   return true;
 }
 
 /// A request answered in the meantime is not pending any more.
 bool UsbipLink::take(const usbip::UnlinkReply& reply) {
   begin_ += usbip::kUrbHeaderSize;
-  std::erase_if(pending_, [&](const Pending& p) { return p.bulk && p.unlink == reply.head.sequence; });
+  std::erase_if(pending_,
+                [&](const Pending& p) { return p.bulk && p.unlink == reply.head.sequence; });
   tell_if_stopped();
   return true;
 }
@@ -290,6 +303,7 @@ void UsbipLink::inspect(std::span<const std::byte> bytes) {
       early_events_.emplace_back(UsbOpened{serial_});
       return;
   }
+
   inspection_ = static_cast<Inspection>(static_cast<unsigned>(inspection_) + 1);
   ask_next();
 }
@@ -311,11 +325,13 @@ void UsbipLink::ask_next() {
     if (!wrong.empty()) return lose(ErrorCode::Protocol, wrong);
     inspection_ = Inspection::Select;
   }
+
   switch (inspection_) {
     case Inspection::Device:
       break;  // asked on import
     case Inspection::Configuration:
-      return submit_control(usb::get_descriptor(usb::DescriptorType::Configuration, 0, usb::kMaxDescriptor));
+      return submit_control(
+          usb::get_descriptor(usb::DescriptorType::Configuration, 0, usb::kMaxDescriptor));
     case Inspection::Serial:
       return submit_control(
           usb::get_descriptor(usb::DescriptorType::String, serial_string_, usb::kMaxDescriptor));

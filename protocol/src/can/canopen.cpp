@@ -8,10 +8,11 @@ namespace abbe::protocol::can {
 
 namespace {
 
-/// The node of a frame base + node, nullopt when the identifier is outside base + 1..127 or the frame is no
-/// plain data.
+/// The node of a frame base + node, nullopt when the identifier is outside base + 1..127 or the
+/// frame is no plain data.
 std::optional<NodeId> node_of(const CanFrame& frame, std::uint32_t base) noexcept {
-  if (!frame.is_standard_data() || frame.id <= base || frame.id > base + kMaxNodeId) return std::nullopt;
+  if (!frame.is_standard_data() || frame.id <= base || frame.id > base + kMaxNodeId)
+    return std::nullopt;
   return static_cast<NodeId>(frame.id - base);
 }
 
@@ -90,7 +91,8 @@ std::optional<Emergency> decode_emergency(const CanFrame& frame) ABBE_RT {
   const auto node = node_of(frame, cob::kEmergency);
   if (!node || frame.length != 8) return std::nullopt;
   Emergency emergency{*node, load_le<std::uint16_t>(frame.data), frame.byte(2), {}};
-  std::copy_n(frame.data.begin() + 3, emergency.manufacturer.size(), emergency.manufacturer.begin());
+  std::copy_n(frame.data.begin() + 3, emergency.manufacturer.size(),
+              emergency.manufacturer.begin());
   return emergency;
 }
 

@@ -8,8 +8,8 @@ namespace abbe::protocol::can {
 namespace {
 
 /// Places in the list of pdo_configuration().
-constexpr std::size_t kDisable = 0, kClearMapping = 1, kMap = 2, kMapCount = 3, kType = 4, kEnable = 7,
-                      kBeat = 8;
+constexpr std::size_t kDisable = 0, kClearMapping = 1, kMap = 2, kMapCount = 3, kType = 4,
+                      kEnable = 7, kBeat = 8;
 
 constexpr std::uint8_t kMostMapped = 8;
 constexpr unsigned kPdoBits = 64;
@@ -21,12 +21,15 @@ PdoConfiguration pdo_configuration(const EncoderPlan& plan) noexcept {
   const auto parameter = [](unsigned number, std::uint8_t sub) {
     return ObjectId{static_cast<std::uint16_t>(object::kTpdoParameters + number - 1), sub};
   };
+
   const auto mapping = [&](std::uint8_t sub) {
     return ObjectId{static_cast<std::uint16_t>(object::kTpdoMapping + plan.tpdo - 1), sub};
   };
+
   const auto disabled = [&](unsigned number) {
     return cob::tpdo(number, plan.node) | object::kPdoDisabled | object::kPdoNoRemote;
   };
+
   return {{
       {parameter(plan.tpdo, 1), disabled(plan.tpdo), 4},
       {mapping(0), 0, 1},
@@ -72,6 +75,7 @@ const char* to_text(ConfigurationFault fault) noexcept {
     case ConfigurationFault::BadAnswer:
       return "answers nonsense";
   }
+
   return "unknown fault";
 }
 
@@ -171,17 +175,19 @@ void EncoderConfigurator::advance(HostTime now) noexcept {
     const bool silent = sdo_.abort_code() == AbortCode::Timeout;
     return fail(silent ? ConfigurationFault::Silent : ConfigurationFault::BadAnswer, 0);
   }
+
   if (sdo_.state() != SdoClient::State::Done) return;
   if (step_ != Step::Write) {
     const auto value = sdo_.number();
     if (!value || *value > 0xFFFFFFFF) return fail(ConfigurationFault::BadAnswer, 0);
     if (!take_number(static_cast<std::uint32_t>(*value))) return;
   }
+
   next_step(now);
 }
 
-/// A refusal that says "I have no such object" where the object is not essential. 1018h has only :01 for
-/// certain.
+/// A refusal that says "I have no such object" where the object is not essential. 1018h has only
+/// :01 for certain.
 bool EncoderConfigurator::tolerated() const noexcept {
   if (!sdo_.aborted_by_server()) return false;
   switch (step_) {
@@ -211,6 +217,7 @@ bool EncoderConfigurator::tolerated() const noexcept {
     case Step::CobId:
       return false;
   }
+
   return false;
 }
 
@@ -219,6 +226,7 @@ bool EncoderConfigurator::take_number(std::uint32_t value) noexcept {
     if (wanted && *wanted != value) fail(fault, value);
     return state_ == State::Working;
   };
+
   switch (step_) {
     case Step::DeviceType:
       check_device_type(value);
@@ -270,11 +278,12 @@ bool EncoderConfigurator::take_number(std::uint32_t value) noexcept {
     case Step::Write:
       return true;
   }
+
   return true;
 }
 
-/// A write was refused: true if what the node has instead is read. The refusal is kept for when that does not
-/// do.
+/// A write was refused: true if what the node has instead is read. The refusal is kept for when
+/// that does not do.
 bool EncoderConfigurator::read_instead() noexcept {
   if (step_ != Step::Write || !sdo_.aborted_by_server()) return false;
   refusal_ = {ConfigurationFault::Refused, sdo_.object(), sdo_.abort_code(), 0};
@@ -312,6 +321,7 @@ void EncoderConfigurator::take_mapping(std::uint32_t value) noexcept {
     if (!is_position(value)) fail_as_refused();
     return;
   }
+
   if (step_ == Step::MappingCount) {
     mapped_ = static_cast<std::uint8_t>(value <= kMostMapped ? value : 0);
     entry_ = 0;
@@ -323,6 +333,7 @@ void EncoderConfigurator::take_mapping(std::uint32_t value) noexcept {
   } else {
     bits_before_ += decode_mapping(value).bits;
   }
+
   if (++entry_ > mapped_ || bits_before_ >= kPdoBits) {
     if (!is_lasting(refusal_.abort_code)) return fail_as_refused();
     fail(ConfigurationFault::FixedMapping, 0);
@@ -347,7 +358,8 @@ void EncoderConfigurator::check_step() noexcept {
   const auto differs = [](double seen, double wanted, double tolerance) {
     return seen - wanted > tolerance || wanted - seen > tolerance;
   };
-  if (description_.step_nm && plan_.step_nm && differs(*description_.step_nm, *plan_.step_nm, kHalf_nm))
+  if (description_.step_nm && plan_.step_nm &&
+      differs(*description_.step_nm, *plan_.step_nm, kHalf_nm))
     return fail(ConfigurationFault::WrongStep, *description_.step_nm);
   const auto units = description_.units_per_revolution;
   const auto wanted = plan_.units_per_revolution;
@@ -358,11 +370,13 @@ void EncoderConfigurator::check_step() noexcept {
 void EncoderConfigurator::check_device_type(std::uint32_t value) noexcept {
   description_.device_type = value;
   if (!object::is_encoder(value)) return fail(ConfigurationFault::NotAnEncoder, value);
-  if (plan_.linear && *plan_.linear != object::is_linear(value)) fail(ConfigurationFault::WrongKind, value);
+  if (plan_.linear && *plan_.linear != object::is_linear(value))
+    fail(ConfigurationFault::WrongKind, value);
 }
 
 bool EncoderConfigurator::scale_known() const noexcept {
-  return description_.step_nm.value_or(0) != 0 || description_.units_per_revolution.value_or(0) != 0;
+  return description_.step_nm.value_or(0) != 0 ||
+         description_.units_per_revolution.value_or(0) != 0;
 }
 
 EncoderConfigurator::Step EncoderConfigurator::after_scale() const noexcept {
@@ -417,6 +431,7 @@ void EncoderConfigurator::next_step(HostTime now) noexcept {
     default:
       step_ = static_cast<Step>(static_cast<std::uint8_t>(step_) + 1);
   }
+
   if (state_ == State::Working) begin_step(now);
 }
 

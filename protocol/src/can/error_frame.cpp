@@ -6,7 +6,8 @@ namespace abbe::protocol::can {
 
 namespace {
 
-// linux/can/error.h: class bits in the identifier, controller detail in data[1], counters in data[6..7].
+// linux/can/error.h: class bits in the identifier, controller detail in data[1], counters in
+// data[6..7].
 struct Bit {
   std::uint32_t wire;
   BusCondition condition;
@@ -36,14 +37,17 @@ std::optional<BusReport> decode_error_frame(const CanFrame& frame) ABBE_RT {
   }
   if ((frame.id & kClassController) != 0 && frame.length >= 2) {
     for (const auto& bit : kControllerBits) {
-      if ((frame.byte(1) & bit.wire) != 0) report.conditions |= static_cast<BusConditions>(bit.condition);
+      if ((frame.byte(1) & bit.wire) != 0)
+        report.conditions |= static_cast<BusConditions>(bit.condition);
     }
   }
+
   if ((frame.id & kClassCounters) != 0 && frame.length >= 8) {
     report.has_counters = true;
     report.transmit_errors = frame.byte(6);
     report.receive_errors = frame.byte(7);
   }
+
   return report;
 }
 
@@ -58,6 +62,7 @@ CanFrame encode_error_frame(const BusReport& report) ABBE_RT {
   for (const auto& bit : kControllerBits) {
     if (has(report.conditions, bit.condition)) detail |= bit.wire;
   }
+
   if (detail != 0) frame.id |= kClassController;
   frame.data[1] = static_cast<std::byte>(detail);
   if (report.has_counters) {
@@ -65,6 +70,7 @@ CanFrame encode_error_frame(const BusReport& report) ABBE_RT {
     frame.data[6] = std::byte{report.transmit_errors};
     frame.data[7] = std::byte{report.receive_errors};
   }
+
   return frame;
 }
 

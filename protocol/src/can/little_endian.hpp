@@ -1,6 +1,6 @@
 #pragma once
-/// Little-endian numbers of any width inside frames (SDO carries 1 to 8 bytes, 3 too): CANopen's byte order
-/// [CiA 301]. The caller has checked the bounds.
+/// Little-endian numbers of any width inside frames (SDO carries 1 to 8 bytes, 3 too): CANopen's
+/// byte order [CiA 301]. The caller has checked the bounds.
 
 #include <concepts>
 #include <cstddef>
@@ -14,8 +14,8 @@ template <std::unsigned_integral T>
                                   std::size_t size = sizeof(T)) noexcept {
   T value = 0;
   for (std::size_t i = 0; i < size; ++i) {
-    value =
-        static_cast<T>(value | (static_cast<T>(std::to_integer<std::uint8_t>(bytes[offset + i])) << (8 * i)));
+    value = static_cast<T>(
+        value | (static_cast<T>(std::to_integer<std::uint8_t>(bytes[offset + i])) << (8 * i)));
   }
   return value;
 }

@@ -63,7 +63,9 @@ void ObjectDictionary::add_communication_objects() noexcept {
   add_number(object::kDeviceType, Access::ReadOnly, type, 4);
   add_number(object::kErrorRegister, Access::ReadOnly, 0, 1);
   add_number(object::kErrorHistory, Access::ReadWrite, 0, 1);
-  for (std::uint8_t sub = 1; sub <= kErrorsKept; ++sub) add_number({0x1003, sub}, Access::ReadOnly, 0, 4);
+
+  for (std::uint8_t sub = 1; sub <= kErrorsKept; ++sub)
+    add_number({0x1003, sub}, Access::ReadOnly, 0, 4);
   add_number(object::kSyncCobId, Access::ReadWrite, cob::kSync, 4);
   add(object::kDeviceName, Access::ReadOnly, std::span{name_}.first(name_size_));
   add_number(object::kHeartbeatTime, Access::ReadWrite, 0, 2);
@@ -97,6 +99,7 @@ void ObjectDictionary::add_profile_objects() noexcept {
   add_number(object::kTotalRange, Access::ReadWrite, identity_.total_range, 4);
   add_number(object::kPreset, Access::ReadWrite, 0, 4);
   add_number(object::kPosition, Access::ReadOnly, 0, 4);
+
   if (linear) {
     add_number({0x6005, 0}, Access::ReadOnly, 1, 1);
     add_number(object::kPositionStep, Access::ReadWrite, identity_.step_nm, 4);
@@ -107,10 +110,12 @@ void ObjectDictionary::add_profile_objects() noexcept {
   } else {
     add_number(object::kUnitsPerRevolution, Access::ReadWrite, identity_.units_per_revolution, 4);
   }
+
   if (identity_.has_position64) {
     add_number(object::kPosition64, Access::ReadOnly, 0, 8);
     add_number(object::kPreset64, Access::ReadWrite, 0, 8);
   }
+
   add_number(object::kCyclicTimer, Access::ReadWrite, kDefaultTimerMs, 2);
   add_number(object::kOperatingStatus, Access::ReadOnly, 0, 2);
   const auto step = linear ? identity_.step_nm : identity_.units_per_revolution;
@@ -125,12 +130,14 @@ void ObjectDictionary::add_profile_objects() noexcept {
 
 ObjectDictionary::Entry* ObjectDictionary::find(ObjectId object) noexcept {
   const auto end = entries_.begin() + static_cast<std::ptrdiff_t>(count_);
-  const auto it = std::find_if(entries_.begin(), end, [&](const Entry& e) { return e.id == object; });
+  const auto it =
+      std::find_if(entries_.begin(), end, [&](const Entry& e) { return e.id == object; });
   return it == end ? nullptr : &*it;
 }
 const ObjectDictionary::Entry* ObjectDictionary::find(ObjectId object) const noexcept {
   const auto end = entries_.begin() + static_cast<std::ptrdiff_t>(count_);
-  const auto it = std::find_if(entries_.begin(), end, [&](const Entry& e) { return e.id == object; });
+  const auto it =
+      std::find_if(entries_.begin(), end, [&](const Entry& e) { return e.id == object; });
   return it == end ? nullptr : &*it;
 }
 bool ObjectDictionary::has_index(std::uint16_t index) const noexcept {
@@ -163,7 +170,8 @@ void ObjectDictionary::add_number(ObjectId object, Access access, std::uint64_t 
 
 std::optional<std::uint64_t> ObjectDictionary::number(ObjectId object) const noexcept {
   const auto* entry = find(object);
-  if (entry == nullptr || entry->size == 0 || entry->size > sizeof(std::uint64_t)) return std::nullopt;
+  if (entry == nullptr || entry->size == 0 || entry->size > sizeof(std::uint64_t))
+    return std::nullopt;
   return load_le<std::uint64_t>(entry->value, 0, entry->size);
 }
 
@@ -176,13 +184,15 @@ bool ObjectDictionary::set_number(ObjectId object, std::uint64_t value) noexcept
 
 AbortCode ObjectDictionary::may_read(ObjectId object) const noexcept {
   const auto* entry = find(object);
-  if (entry == nullptr) return has_index(object.index) ? AbortCode::NoSubindex : AbortCode::NoObject;
+  if (entry == nullptr)
+    return has_index(object.index) ? AbortCode::NoSubindex : AbortCode::NoObject;
   return entry->access == Access::WriteOnly ? AbortCode::WriteOnly : AbortCode::None;
 }
 
 AbortCode ObjectDictionary::may_write(ObjectId object) const noexcept {
   const auto* entry = find(object);
-  if (entry == nullptr) return has_index(object.index) ? AbortCode::NoSubindex : AbortCode::NoObject;
+  if (entry == nullptr)
+    return has_index(object.index) ? AbortCode::NoSubindex : AbortCode::NoObject;
   return entry->access == Access::ReadOnly ? AbortCode::ReadOnly : AbortCode::None;
 }
 
@@ -211,11 +221,13 @@ AbortCode ObjectDictionary::write(ObjectId object, std::span<const std::byte> va
   entry->size = static_cast<std::uint8_t>(value.size());
   std::copy(value.begin(), value.end(), entry->value.begin());
   after_write(object, number);
+
   return AbortCode::None;
 }
 
 AbortCode ObjectDictionary::check_value(ObjectId object, std::uint64_t value) const noexcept {
-  if (object == object::kErrorHistory) return value == 0 ? AbortCode::None : AbortCode::InvalidValue;
+  if (object == object::kErrorHistory)
+    return value == 0 ? AbortCode::None : AbortCode::InvalidValue;
   if (object == object::kPositionStep || object == object::kUnitsPerRevolution) {
     return value == 0 ? AbortCode::ValueTooLow : AbortCode::None;
   }
@@ -224,7 +236,8 @@ AbortCode ObjectDictionary::check_value(ObjectId object, std::uint64_t value) co
   return AbortCode::None;
 }
 
-AbortCode ObjectDictionary::check_tpdo_parameter(ObjectId object, std::uint64_t value) const noexcept {
+AbortCode ObjectDictionary::check_tpdo_parameter(ObjectId object,
+                                                 std::uint64_t value) const noexcept {
   const auto pdo = tpdo(*pdo_of(object.index, object::kTpdoParameters));
   switch (object.sub) {
     case 1: {
@@ -248,13 +261,16 @@ AbortCode ObjectDictionary::check_mapping(ObjectId object, std::uint64_t value) 
   const auto number_of_pdo = *pdo_of(object.index, object::kTpdoMapping);
   const auto pdo = tpdo(number_of_pdo);
   if (pdo.enabled) return AbortCode::UnsupportedAccess;
+
   if (object.sub != 0) {
     if (pdo.mapped != 0) return AbortCode::UnsupportedAccess;
     const auto line = decode_mapping(static_cast<std::uint32_t>(value));
     const auto* target = find({line.index, line.sub});
     const bool fits = target != nullptr && line.bits == target->size * 8;
-    return value == 0 || (fits && may_be_mapped(line.index)) ? AbortCode::None : AbortCode::NotMappable;
+    return value == 0 || (fits && may_be_mapped(line.index)) ? AbortCode::None
+                                                             : AbortCode::NotMappable;
   }
+
   if (value > kMaxMapped) return AbortCode::ValueTooHigh;
   std::size_t bits = 0;
   for (std::uint8_t sub = 1; sub <= static_cast<std::uint8_t>(value); ++sub) {
@@ -262,6 +278,7 @@ AbortCode ObjectDictionary::check_mapping(ObjectId object, std::uint64_t value) 
     if (line == 0) return AbortCode::NotMappable;
     bits += line & 0xFF;
   }
+
   return bits > kMaxPdoBits ? AbortCode::PdoLength : AbortCode::None;
 }
 
@@ -302,6 +319,7 @@ TpdoSettings ObjectDictionary::tpdo(unsigned number_of_pdo) const noexcept {
   const auto parameter = [&](std::uint8_t sub) {
     return number(tpdo_parameter(number_of_pdo, sub)).value_or(0);
   };
+
   const auto cob_id = number(tpdo_parameter(number_of_pdo, 1)).value_or(object::kPdoDisabled);
   settings.enabled = (cob_id & object::kPdoDisabled) == 0;
   settings.cob_id = static_cast<std::uint32_t>(cob_id & CanFrame::kStandardMask);
@@ -310,10 +328,13 @@ TpdoSettings ObjectDictionary::tpdo(unsigned number_of_pdo) const noexcept {
   settings.event_timer_ms = static_cast<std::uint16_t>(parameter(5));
   const auto mapped = number(tpdo_mapping(number_of_pdo, 0)).value_or(0);
   settings.mapped = static_cast<std::uint8_t>(std::min<std::uint64_t>(mapped, kMaxMapped));
+
   for (std::uint8_t i = 0; i < settings.mapped; ++i) {
-    const auto line = number(tpdo_mapping(number_of_pdo, static_cast<std::uint8_t>(i + 1))).value_or(0);
+    const auto line =
+        number(tpdo_mapping(number_of_pdo, static_cast<std::uint8_t>(i + 1))).value_or(0);
     settings.mapping[i] = decode_mapping(static_cast<std::uint32_t>(line));
   }
+
   return settings;
 }
 
@@ -339,7 +360,8 @@ void ObjectDictionary::record_error(std::uint16_t code, std::uint8_t error_regis
     set_number({0x1003, sub}, number({0x1003, static_cast<std::uint8_t>(sub - 1)}).value_or(0));
   }
   set_number({0x1003, 1}, code);
-  const auto kept = std::min<std::uint64_t>(number(object::kErrorHistory).value_or(0) + 1, kErrorsKept);
+  const auto kept =
+      std::min<std::uint64_t>(number(object::kErrorHistory).value_or(0) + 1, kErrorsKept);
   set_number(object::kErrorHistory, kept);
 }
 

@@ -59,6 +59,7 @@ const char* to_text(AbortCode code) noexcept {
     case AbortCode::DeviceState:
       return "refused in the present device state";
   }
+
   return "unknown abort code";
 }
 

@@ -13,7 +13,8 @@ void SdoClient::start_upload(ObjectId object, HostTime now) noexcept {
   begin(now);
 }
 
-void SdoClient::start_download(ObjectId object, std::span<const std::byte> value, HostTime now) noexcept {
+void SdoClient::start_download(ObjectId object, std::span<const std::byte> value,
+                               HostTime now) noexcept {
   object_ = object;
   upload_ = false;
   attempts_left_ = options_.retries;
@@ -71,7 +72,8 @@ void SdoClient::fail(AbortCode code, bool by_server) noexcept {
 }
 
 void SdoClient::abort(AbortCode code) noexcept {
-  send(sdo::frame(cob::kSdoRequest + node_, sdo::kAbort, object_, static_cast<std::uint32_t>(code)));
+  send(
+      sdo::frame(cob::kSdoRequest + node_, sdo::kAbort, object_, static_cast<std::uint32_t>(code)));
   fail(code, false);
 }
 
@@ -91,6 +93,7 @@ void SdoClient::on_frame(const CanFrame& frame, HostTime now) noexcept {
     if (sdo::object_of(frame) == object_) fail(AbortCode{sdo::word_of(frame)}, true);
     return;
   }
+
   deadline_ = now + options_.timeout;
   if (phase_ == Phase::Initiate) {
     on_initiate_answer(frame);
@@ -103,7 +106,8 @@ void SdoClient::on_frame(const CanFrame& frame, HostTime now) noexcept {
 
 void SdoClient::on_initiate_answer(const CanFrame& frame) noexcept {
   const auto expected = upload_ ? sdo::kUploadInitiateAnswer : sdo::kDownloadInitiateAnswer;
-  // Anything else is a late answer to an attempt we gave up; a mute server is caught by the time-out.
+  // Anything else is a late answer to an attempt we gave up; a mute server is caught by the
+  // time-out.
   if (sdo::specifier(frame) != expected || sdo::object_of(frame) != object_) return;
   if (upload_) return on_upload_initiated(frame);
   if (size_ <= sdo::kExpeditedBytes) {
@@ -131,7 +135,8 @@ void SdoClient::request_segment() noexcept {
   CanFrame request;
   request.id = cob::kSdoRequest + node_;
   request.length = sdo::kFrameBytes;
-  request.data[0] = static_cast<std::byte>(sdo::kUploadSegmentRequest | (toggle_ ? sdo::kToggle : 0));
+  request.data[0] =
+      static_cast<std::byte>(sdo::kUploadSegmentRequest | (toggle_ ? sdo::kToggle : 0));
   send(request);
 }
 

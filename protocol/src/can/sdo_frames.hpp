@@ -69,7 +69,8 @@ inline constexpr std::uint8_t kLastSegment = 0x01;
 }
 /// Bytes of an expedited initiate; four when the sender left the size open.
 [[nodiscard]] inline std::size_t expedited_size(const CanFrame& f) noexcept {
-  return (f.byte(0) & kSizeGiven) != 0 ? kExpeditedBytes - ((f.byte(0) >> 2) & 3u) : kExpeditedBytes;
+  return (f.byte(0) & kSizeGiven) != 0 ? kExpeditedBytes - ((f.byte(0) >> 2) & 3u)
+                                       : kExpeditedBytes;
 }
 
 /// A segment out of `value` from `done` on: both directions share the low bits `tnnnc`.

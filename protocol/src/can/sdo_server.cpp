@@ -8,7 +8,8 @@ namespace abbe::protocol::can {
 
 CanFrame SdoServer::abort(ObjectId object, AbortCode code) noexcept {
   transfer_ = Transfer::None;
-  return sdo::frame(cob::kSdoResponse + node_, sdo::kAbort, object, static_cast<std::uint32_t>(code));
+  return sdo::frame(cob::kSdoResponse + node_, sdo::kAbort, object,
+                    static_cast<std::uint32_t>(code));
 }
 
 std::optional<CanFrame> SdoServer::on_time(HostTime now) noexcept {
@@ -20,6 +21,7 @@ std::optional<CanFrame> SdoServer::on_frame(const CanFrame& frame, HostTime now)
   if (!frame.is_standard_data() || frame.id != cob::kSdoRequest + node_) return std::nullopt;
   if (frame.length != sdo::kFrameBytes) return std::nullopt;
   deadline_ = now + timeout_;
+
   switch (sdo::specifier(frame)) {
     case sdo::kUploadInitiateRequest:
       return start_upload(sdo::object_of(frame));
@@ -45,9 +47,12 @@ CanFrame SdoServer::start_upload(ObjectId object) noexcept {
   const auto code = objects_.read(object, buffer_, size_);
   if (code != AbortCode::None) return abort(object, code);
   const auto cob_id = cob::kSdoResponse + node_;
+
   if (size_ >= 1 && size_ <= sdo::kExpeditedBytes) {
-    return sdo::expedited(cob_id, sdo::kUploadInitiateAnswer, object, std::span{buffer_}.first(size_));
+    return sdo::expedited(cob_id, sdo::kUploadInitiateAnswer, object,
+                          std::span{buffer_}.first(size_));
   }
+
   transfer_ = Transfer::Upload;
   const auto size = static_cast<std::uint32_t>(size_);
   return sdo::frame(cob_id, sdo::kUploadInitiateAnswer | sdo::kSizeGiven, object, size);
@@ -72,6 +77,7 @@ CanFrame SdoServer::start_download(const CanFrame& frame, ObjectId object) noexc
   announced_.reset();
   auto code = objects_.may_write(object);
   if (code != AbortCode::None) return abort(object, code);
+
   if ((frame.byte(0) & sdo::kExpedited) != 0) {
     code = objects_.write(object, std::span{frame.data}.subspan(4, sdo::expedited_size(frame)));
     if (code != AbortCode::None) return abort(object, code);
@@ -80,6 +86,7 @@ CanFrame SdoServer::start_download(const CanFrame& frame, ObjectId object) noexc
     if (announced_ && *announced_ > kMaxSdoBytes) return abort(object, AbortCode::OutOfMemory);
     transfer_ = Transfer::Download;
   }
+
   return sdo::frame(cob::kSdoResponse + node_, sdo::kDownloadInitiateAnswer, object);
 }
 
@@ -90,17 +97,21 @@ CanFrame SdoServer::download_segment(const CanFrame& frame) noexcept {
   if (data.size() > kMaxSdoBytes - done_) return abort(object_, AbortCode::OutOfMemory);
   std::copy(data.begin(), data.end(), buffer_.begin() + static_cast<std::ptrdiff_t>(done_));
   done_ += data.size();
+
   if (sdo::is_last_segment(frame)) {
     if (announced_ && *announced_ != done_) return abort(object_, AbortCode::LengthMismatch);
     const auto code = objects_.write(object_, std::span{buffer_}.first(done_));
     if (code != AbortCode::None) return abort(object_, code);
     transfer_ = Transfer::None;
   }
+
   CanFrame answer;
   answer.id = cob::kSdoResponse + node_;
   answer.length = sdo::kFrameBytes;
-  answer.data[0] = static_cast<std::byte>(sdo::kDownloadSegmentAnswer | (toggle_ ? sdo::kToggle : 0));
+  answer.data[0] =
+      static_cast<std::byte>(sdo::kDownloadSegmentAnswer | (toggle_ ? sdo::kToggle : 0));
   toggle_ = !toggle_;
+
   return answer;
 }
 

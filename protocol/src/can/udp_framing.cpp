@@ -25,7 +25,8 @@ std::uint8_t byte_at(std::span<const std::byte> bytes, std::size_t i) noexcept {
 std::optional<DatagramError> read_frame(std::span<const std::byte> bytes, CanFrame& frame,
                                         std::size_t& used) noexcept {
   if (bytes.size() < kIdAndLength) return DatagramError::Truncated;
-  const auto id = (std::uint32_t{byte_at(bytes, 0)} << 24) | (std::uint32_t{byte_at(bytes, 1)} << 16) |
+  const auto id = (std::uint32_t{byte_at(bytes, 0)} << 24) |
+                  (std::uint32_t{byte_at(bytes, 1)} << 16) |
                   (std::uint32_t{byte_at(bytes, 2)} << 8) | byte_at(bytes, 3);
   const auto length = byte_at(bytes, 4);
   const bool fd = (length & kFdBit) != 0;
@@ -37,8 +38,10 @@ std::optional<DatagramError> read_frame(std::span<const std::byte> bytes, CanFra
   if ((id & kErrorBit) != 0) frame.set(FrameFlag::Error);
   if (fd) frame.set(FrameFlag::Fd);
   used = kIdAndLength + (fd ? 1u : 0u);
+
   // CAN FD has no remote frames: whoever sends one means something we do not know.
-  if (frame.length > (fd ? CanFrame::kMaxData : CanFrame::kMaxClassicData)) return DatagramError::BadLength;
+  if (frame.length > (fd ? CanFrame::kMaxData : CanFrame::kMaxClassicData))
+    return DatagramError::BadLength;
   if (fd && frame.is(FrameFlag::Remote)) return DatagramError::BadLength;
   const bool long_id = frame.is(FrameFlag::Extended) || frame.is(FrameFlag::Error);
   if (!long_id && frame.id > CanFrame::kStandardMask) return DatagramError::BadId;
@@ -47,6 +50,7 @@ std::optional<DatagramError> read_frame(std::span<const std::byte> bytes, CanFra
   if (fd) frame.fd_flags = byte_at(bytes, kIdAndLength);
   std::copy_n(bytes.begin() + static_cast<std::ptrdiff_t>(used), data, frame.data.begin());
   used += data;
+
   return std::nullopt;
 }
 
@@ -71,7 +75,8 @@ std::size_t encoded_size(const CanFrame& frame) ABBE_RT {
   return kIdAndLength + (frame.is(FrameFlag::Fd) ? 1 : 0) + data;
 }
 
-DatagramWriter::DatagramWriter(std::span<std::byte> buffer, std::uint8_t sequence) ABBE_RT : buffer_(buffer) {
+DatagramWriter::DatagramWriter(std::span<std::byte> buffer, std::uint8_t sequence) ABBE_RT
+    : buffer_(buffer) {
   buffer_[0] = std::byte{kVersion};
   buffer_[1] = std::byte{kOpcodeData};
   buffer_[2] = std::byte{sequence};
@@ -79,7 +84,8 @@ DatagramWriter::DatagramWriter(std::span<std::byte> buffer, std::uint8_t sequenc
 
 bool DatagramWriter::add(const CanFrame& frame) ABBE_RT {
   const auto need = encoded_size(frame);
-  if (buffer_.size() - size_ < need || count_ == std::numeric_limits<std::uint16_t>::max()) return false;
+  if (buffer_.size() - size_ < need || count_ == std::numeric_limits<std::uint16_t>::max())
+    return false;
   const auto id = flagged_id(frame);
   auto* out = buffer_.data() + size_;
   for (const int shift : {24, 16, 8, 0}) *out++ = static_cast<std::byte>((id >> shift) & 0xFFu);
@@ -117,10 +123,12 @@ const char* to_text(DatagramError error) noexcept {
     case DatagramError::BadId:
       return "identifier longer than its format allows";
   }
+
   return "unknown error";
 }
 
-tl::expected<DatagramView, DatagramError> DatagramView::parse(std::span<const std::byte> bytes) ABBE_RT {
+tl::expected<DatagramView, DatagramError> DatagramView::parse(
+    std::span<const std::byte> bytes) ABBE_RT {
   if (bytes.size() < kDatagramHeader) return tl::unexpected(DatagramError::TooShort);
   if (byte_at(bytes, 0) != kVersion) return tl::unexpected(DatagramError::BadVersion);
   if (byte_at(bytes, 1) != kOpcodeData) return tl::unexpected(DatagramError::BadOpcode);

@@ -15,7 +15,8 @@ template <std::size_t... I>
 constexpr std::size_t largest_answer(std::index_sequence<I...>) {
   return kAnswerHeadSize + std::max({wire::size_of<std::variant_alternative_t<I, Answer>>()...});
 }
-static_assert(largest_answer(std::make_index_sequence<std::variant_size_v<Answer>>{}) == kMaxAnswerSize);
+static_assert(largest_answer(std::make_index_sequence<std::variant_size_v<Answer>>{}) ==
+              kMaxAnswerSize);
 
 // The first alternative, Acknowledge, stands for every command; the others name theirs.
 using OwnAnswers = std::make_index_sequence<std::variant_size_v<Answer> - 1>;
@@ -34,7 +35,8 @@ Decoded decode_as(ByteReader& in, Status status) ABBE_RT {
 }
 
 template <std::size_t... I>
-Decoded decode_body(Command command, Status status, ByteReader& in, std::index_sequence<I...>) ABBE_RT {
+Decoded decode_body(Command command, Status status, ByteReader& in,
+                    std::index_sequence<I...>) ABBE_RT {
   Decoded decoded = Answer{Acknowledge{command, status}};
   if (in.remaining() == 0) return decoded;
   const auto try_one = [&]<class P>(std::in_place_type_t<P>) ABBE_RT {

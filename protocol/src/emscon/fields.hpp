@@ -1,7 +1,7 @@
 #pragma once
-/// The layout of every packet, once, for reading, writing and counting alike: so both directions agree by
-/// construction. Offsets follow from the order, because the structures are packed to 4 bytes and have no
-/// padding.
+/// The layout of every packet, once, for reading, writing and counting alike: so both directions
+/// agree by construction. Offsets follow from the order, because the structures are packed to 4
+/// bytes and have no padding.
 
 #include <array>
 #include <cstddef>
@@ -35,7 +35,8 @@ constexpr void fields(P& p, Io&& io) ABBE_RT {
     io(p.n_interferometer, p.n_adm);
   } else if constexpr (kIs<P, SystemSettings>) {
     io(p.weather_monitor, p.apply_transformation, p.apply_station_orientation, p.keep_last_position,
-       p.send_unsolicited_messages, p.send_reflector_position, p.try_mode, p.has_nivel, p.has_video_camera);
+       p.send_unsolicited_messages, p.send_reflector_position, p.try_mode, p.has_nivel,
+       p.has_video_camera);
   } else if constexpr (kIs<P, TrackerClockReading>) {
     io(p.seconds, p.microseconds);
 
@@ -81,8 +82,8 @@ constexpr void fields(P& p, Io&& io) ABBE_RT {
     io(p.parameter);
 
   } else if constexpr (kIs<P, SystemStatusAnswer>) {
-    io(p.last_result, p.tracker_processor, p.laser, p.adm, p.version_major, p.version_minor, p.version_build,
-       p.weather_monitor, p.flags, p.serial_number);
+    io(p.last_result, p.tracker_processor, p.laser, p.adm, p.version_major, p.version_minor,
+       p.version_build, p.weather_monitor, p.flags, p.serial_number);
   } else if constexpr (kIs<P, TrackerStatusAnswer>) {
     io(p.tracker);
   } else if constexpr (kIs<P, UnitsAnswer>) {
@@ -116,8 +117,8 @@ constexpr void fields(P& p, Io&& io) ABBE_RT {
   } else if constexpr (kIs<P, StatusChange>) {
     io(p.event);
   } else if constexpr (kIs<P, SingleResult>) {
-    io(p.status, p.mode, p.try_mode, p.value, p.std_dev, p.std_total, p.pointing_error, p.apriori_std,
-       p.apriori_total, p.environment);
+    io(p.status, p.mode, p.try_mode, p.value, p.std_dev, p.std_total, p.pointing_error,
+       p.apriori_std, p.apriori_total, p.environment);
   } else if constexpr (kIs<P, ReflectorPosition>) {
     io(p.status, p.value);
   } else if constexpr (kIs<P, MultiPoint>) {

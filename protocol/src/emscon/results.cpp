@@ -47,12 +47,14 @@ tl::expected<ControllerPacket, DecodeError> decode_as(ByteReader in) ABBE_RT {
 
 }  // namespace
 
-tl::expected<MultiResult, DecodeError> MultiResult::from(std::span<const std::byte> packet) ABBE_RT {
+tl::expected<MultiResult, DecodeError> MultiResult::from(
+    std::span<const std::byte> packet) ABBE_RT {
   ByteReader in{packet};
   const auto header = wire::take_header(in);
   if (!header) return tl::unexpected{header.error()};
   const bool extended = header->type == PacketType::MultiResult2;
-  if (!extended && header->type != PacketType::MultiResult) return tl::unexpected{DecodeError::UnknownType};
+  if (!extended && header->type != PacketType::MultiResult)
+    return tl::unexpected{DecodeError::UnknownType};
   MultiHead head;
   head.status = in.little<Status>();
   const auto count = in.little<std::uint32_t>();
@@ -75,8 +77,8 @@ MultiPoint MultiResult::point(std::size_t k) const ABBE_RT {
 
 MultiPointStatistics MultiResult::statistics(std::size_t k) const ABBE_RT {
   assert(k < size() && extended());
-  ByteReader in{
-      points_.subspan(k * point_size_ + kMultiPointSize, kExtendedMultiPointSize - kMultiPointSize)};
+  ByteReader in{points_.subspan(k * point_size_ + kMultiPointSize,
+                                kExtendedMultiPointSize - kMultiPointSize)};
   MultiPointStatistics s;
   wire::fields(s, wire::Reader{in});
   return s;

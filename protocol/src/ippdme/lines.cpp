@@ -18,7 +18,8 @@ tl::expected<int, LineError> whole_number(Scanner& scan, int most) noexcept {
   return static_cast<int>(*value);
 }
 
-/// Error(F1,F2,F3,"text"); F3 is a name or a number, whatever the server calls the place of the fault.
+/// Error(F1,F2,F3,"text"); F3 is a name or a number, whatever the server calls the place of the
+/// fault.
 tl::expected<ErrorReport, LineError> error_report(Scanner& scan) noexcept {
   const auto bad = tl::unexpected(LineError::BadError);
   if (scan.name() != "Error" || !scan.separator('(')) return bad;
@@ -29,6 +30,7 @@ tl::expected<ErrorReport, LineError> error_report(Scanner& scan) noexcept {
   if (!code || !scan.separator(',')) return bad;
   report.severity = *severity;
   report.code = *code;
+
   if (const auto quoted = scan.string()) {
     report.origin = *quoted;
   } else {
@@ -36,10 +38,12 @@ tl::expected<ErrorReport, LineError> error_report(Scanner& scan) noexcept {
     while (!scan.at_end() && scan.peek() != ',' && scan.peek() != ')') (void)scan.take(scan.peek());
     report.origin = {from.data(), from.size() - scan.rest().size()};
   }
+
   if (!scan.separator(',')) return bad;
   const auto text = scan.string();
   if (!text || !scan.separator(')') || !scan.at_end()) return bad;
   report.text = *text;
+
   return report;
 }
 
@@ -57,7 +61,8 @@ tl::expected<Argument, LineError> property(Scanner& scan, std::string_view name)
 }
 
 tl::expected<Argument, LineError> argument(Scanner& scan) noexcept {
-  if (const auto text = scan.string()) return Argument{.kind = Argument::Kind::String, .text = *text};
+  if (const auto text = scan.string())
+    return Argument{.kind = Argument::Kind::String, .text = *text};
   const std::string_view name = scan.name();
   if (!name.empty()) {
     if (scan.separator('(')) return property(scan, name);
@@ -164,13 +169,16 @@ std::optional<tl::expected<Argument, LineError>> ArgumentReader::next() ABBE_RT 
     rest_ = {};
     return Arguments{tl::unexpected(LineError::BadArgument)};
   }
+
   first_ = false;
   auto read = argument(scan);
   scan.spaces();
+
   // A comma announces another one.
   if (read && !scan.at_end() && (scan.peek() != ',' || scan.rest().size() == 1))
     read = tl::unexpected(LineError::BadArgument);
   rest_ = read ? scan.rest() : std::string_view{};
+
   return read;
 }
 
@@ -241,6 +249,7 @@ std::optional<tl::expected<std::string_view, LineError>> LineFramer::next() ABBE
     if (!printable(c) && !quoted_) return Line{refuse(LineError::IllegalCharacter)};
     if (looked_ - begin_ >= kMaxLine) return Line{refuse(LineError::TooLong)};
   }
+
   return std::nullopt;
 }
 

@@ -29,11 +29,13 @@ std::optional<std::size_t> number_length(std::string_view text) noexcept {
   const std::size_t whole = digits_at(text, at);
   at += whole;
   std::size_t fraction = 0;
+
   if (at < text.size() && text[at] == '.') {
     fraction = digits_at(text, at + 1);
     if (fraction == 0) return std::nullopt;
     at += 1 + fraction;
   }
+
   if (whole + fraction == 0 || whole + fraction > kMostDigits) return std::nullopt;
   if (at < text.size() && (text[at] == 'e' || text[at] == 'E')) {
     ++at;
@@ -42,6 +44,7 @@ std::optional<std::size_t> number_length(std::string_view text) noexcept {
     if (exponent == 0 || exponent > kMostExponentDigits) return std::nullopt;
     at += exponent;
   }
+
   return at;
 }
 

@@ -1,4 +1,5 @@
-// What is written rather than read: allocates, so it stands apart from the decoders of the real-time path.
+// What is written rather than read: allocates, so it stands apart from the decoders of the
+// real-time path.
 #include <algorithm>
 #include <cstdio>
 

@@ -19,18 +19,21 @@ constexpr Tables make_tables() {
     for (int bit = 0; bit < 8; ++bit) r = (r >> 1) ^ ((r & 1u) != 0 ? kReflectedPolynomial : 0u);
     tables[0][byte] = r;
   }
+
   for (std::size_t k = 1; k < kSlices; ++k) {
     for (std::size_t byte = 0; byte < 256; ++byte) {
       const std::uint32_t r = tables[k - 1][byte];
       tables[k][byte] = (r >> 8) ^ tables[0][r & 0xFFu];
     }
   }
+
   return tables;
 }
 
 constexpr Tables kTables = make_tables();
 
-static_assert(std::endian::native == std::endian::little, "load() below reads little-endian words in place");
+static_assert(std::endian::native == std::endian::little,
+              "load() below reads little-endian words in place");
 
 std::uint32_t load(const std::byte* p) noexcept {
   std::uint32_t word = 0;

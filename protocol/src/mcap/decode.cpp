@@ -122,7 +122,8 @@ Decoded<Message> decode<Message>(Bytes content) noexcept {
 template <>
 Decoded<Chunk> decode<Chunk>(Bytes content) noexcept {
   const auto chunk = decode_cut_chunk(content);
-  if (chunk && chunk->records.size() < chunk->head.records_size) return unexpected(DecodeError::Truncated);
+  if (chunk && chunk->records.size() < chunk->head.records_size)
+    return unexpected(DecodeError::Truncated);
   return chunk;
 }
 
@@ -160,6 +161,7 @@ Decoded<ChunkIndex> decode<ChunkIndex>(Bytes content) noexcept {
   record.compression = fields.string();
   record.compressed_size = fields.integer<std::uint64_t>();
   record.uncompressed_size = fields.integer<std::uint64_t>();
+
   return whole(fields, record);
 }
 
@@ -207,6 +209,7 @@ Decoded<Statistics> decode<Statistics>(Bytes content) noexcept {
   const auto counts = pairs<decltype(record.channel_message_counts)>(fields.bytes());
   if (!counts) return unexpected(counts.error());
   record.channel_message_counts = *counts;
+
   return whole(fields, record);
 }
 

@@ -1,6 +1,6 @@
 #pragma once
-/// Reading and writing the fields of a record: little-endian integers, and strings, bytes and maps behind a
-/// u32 length.
+/// Reading and writing the fields of a record: little-endian integers, and strings, bytes and maps
+/// behind a u32 length.
 
 #include <algorithm>
 #include <bit>
@@ -11,9 +11,11 @@
 
 namespace abbe::protocol::mcap {
 
-static_assert(std::endian::native == std::endian::little, "integers are copied as they lie in memory");
+static_assert(std::endian::native == std::endian::little,
+              "integers are copied as they lie in memory");
 
-/// Takes fields off the front; once one is missing, every later one is zero or empty and ok() stays false.
+/// Takes fields off the front; once one is missing, every later one is zero or empty and ok() stays
+/// false.
 class FieldReader {
  public:
   explicit FieldReader(Bytes bytes) noexcept : rest_(bytes) {}
@@ -32,7 +34,8 @@ class FieldReader {
     return {reinterpret_cast<const char*>(field.data()), field.size()};
   }
   /// Whatever is left, at most `limit` bytes.
-  [[nodiscard]] Bytes remainder(std::uint64_t limit = std::numeric_limits<std::uint64_t>::max()) noexcept {
+  [[nodiscard]] Bytes remainder(
+      std::uint64_t limit = std::numeric_limits<std::uint64_t>::max()) noexcept {
     return take(std::min<std::uint64_t>(limit, rest_.size()));
   }
   [[nodiscard]] bool ok() const noexcept { return ok_; }

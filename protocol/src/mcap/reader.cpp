@@ -14,9 +14,11 @@ bool magic_at(Bytes file, std::size_t offset) noexcept {
 
 ScannedChunk::State judge(const Chunk& chunk) noexcept {
   if (!chunk.head.compression.empty()) return ScannedChunk::State::Compressed;
-  if (chunk.head.uncompressed_size != chunk.head.records_size) return ScannedChunk::State::Malformed;
+  if (chunk.head.uncompressed_size != chunk.head.records_size)
+    return ScannedChunk::State::Malformed;
   const std::uint32_t crc = chunk.head.uncompressed_crc;
-  return crc == 0 || crc == crc32(chunk.records) ? ScannedChunk::State::Whole : ScannedChunk::State::BadCrc;
+  return crc == 0 || crc == crc32(chunk.records) ? ScannedChunk::State::Whole
+                                                 : ScannedChunk::State::BadCrc;
 }
 
 ScannedChunk scanned(const Record& record) noexcept {
@@ -33,20 +35,24 @@ std::optional<Record> RecordReader::next() noexcept {
     state_ = State::End;
     return std::nullopt;
   }
+
   const Bytes rest = bytes_.subspan(position_);
   if (rest.front() == std::byte{0}) {
     state_ = State::Garbage;
     return std::nullopt;
   }
+
   FieldReader fields{rest};
   Record record;
   record.opcode = static_cast<Opcode>(fields.integer<std::uint8_t>());
   record.offset = position_;
   record.content = fields.long_bytes();
+
   if (!fields.ok()) {
     state_ = State::Truncated;
     return std::nullopt;
   }
+
   position_ = record.end();
   return record;
 }
@@ -68,7 +74,9 @@ bool ends_with_magic(Bytes file) noexcept {
 }
 
 LinearScan::LinearScan(Bytes file) noexcept
-    : file_(file), records_(file, std::min(file.size(), kMagic.size())), stopped_(!starts_with_magic(file)) {}
+    : file_(file),
+      records_(file, std::min(file.size(), kMagic.size())),
+      stopped_(!starts_with_magic(file)) {}
 
 std::optional<LinearScan::Item> LinearScan::next() noexcept {
   if (stopped_) return std::nullopt;
@@ -77,10 +85,12 @@ std::optional<LinearScan::Item> LinearScan::next() noexcept {
     stopped_ = true;
     return records_.state() == RecordReader::State::Truncated ? cut_chunk() : std::nullopt;
   }
+
   if (record->opcode == Opcode::DataEnd) {
     complete_ = stopped_ = true;
     return std::nullopt;
   }
+
   Item item{*record, std::nullopt};
   if (record->opcode == Opcode::Chunk) item.chunk = scanned(*record);
   return item;
@@ -89,7 +99,8 @@ std::optional<LinearScan::Item> LinearScan::next() noexcept {
 std::optional<LinearScan::Item> LinearScan::cut_chunk() noexcept {
   const std::size_t offset = records_.position();
   const Bytes rest = file_.subspan(offset);
-  if (rest.size() < kRecordHeadSize || rest.front() != std::byte{static_cast<std::uint8_t>(Opcode::Chunk)}) {
+  if (rest.size() < kRecordHeadSize ||
+      rest.front() != std::byte{static_cast<std::uint8_t>(Opcode::Chunk)}) {
     return std::nullopt;
   }
   const Record record{Opcode::Chunk, offset, rest.subspan(kRecordHeadSize)};

@@ -45,7 +45,8 @@ struct FooterAt {
 
 tl::expected<FooterAt, SummaryError> find_footer(Bytes file) noexcept {
   if (!starts_with_magic(file) || !ends_with_magic(file)) return unexpected(SummaryError::NoMagic);
-  if (file.size() < 2 * kMagic.size() + kFooterRecordSize) return unexpected(SummaryError::NoFooter);
+  if (file.size() < 2 * kMagic.size() + kFooterRecordSize)
+    return unexpected(SummaryError::NoFooter);
   const std::size_t offset = file.size() - kMagic.size() - kFooterRecordSize;
   const auto record = record_at(file, offset, Opcode::Footer);
   if (!record) return unexpected(SummaryError::NoFooter);
@@ -58,7 +59,8 @@ tl::expected<FooterAt, SummaryError> find_footer(Bytes file) noexcept {
 bool crc_is_right(Bytes file, const FooterAt& at) noexcept {
   const std::size_t start = static_cast<std::size_t>(at.footer.summary_start);
   const std::size_t end = at.offset + kFooterRecordSize - sizeof at.footer.summary_crc;
-  return at.footer.summary_crc == 0 || at.footer.summary_crc == crc32(file.subspan(start, end - start));
+  return at.footer.summary_crc == 0 ||
+         at.footer.summary_crc == crc32(file.subspan(start, end - start));
 }
 
 bool chunks_lie_in(const std::vector<ChunkIndex>& chunks, std::uint64_t data_end) noexcept {
@@ -75,13 +77,16 @@ tl::expected<Summary, SummaryError> read_summary(Bytes file) {
   if (!crc_is_right(file, *at)) return unexpected(SummaryError::BadCrc);
   Summary summary;
   RecordReader records{file.first(at->offset), static_cast<std::size_t>(at->footer.summary_start)};
+
   while (const auto record = records.next()) {
     if (!keep(summary, *record)) return unexpected(SummaryError::BadRecord);
   }
+
   if (records.state() != RecordReader::State::End ||
       !chunks_lie_in(summary.chunks, at->footer.summary_start)) {
     return unexpected(SummaryError::BadRecord);
   }
+
   std::ranges::sort(summary.chunks, {}, &ChunkIndex::chunk_start);
   return summary;
 }

@@ -9,8 +9,9 @@
 namespace abbe::protocol::mcap {
 namespace {
 
-/// Opcode to records_size of a Chunk record without compression: its size is always the same, so room for it
-/// is left in front of the records and the whole chunk can be written in one piece without copying it.
+/// Opcode to records_size of a Chunk record without compression: its size is always the same, so
+/// room for it is left in front of the records and the whole chunk can be written in one piece
+/// without copying it.
 constexpr std::size_t kChunkHeadSize = kRecordHeadSize + 8 + 8 + 8 + 4 + 4 + 8;
 
 static_assert(sizeof(IndexEntry) == 16, "index entries are written as they lie in memory");
@@ -18,8 +19,8 @@ static_assert(sizeof(IndexEntry) == 16, "index entries are written as they lie i
 }  // namespace
 
 ChunkBuilder::ChunkBuilder(std::size_t capacity_bytes) {
-  // A message of the smallest kind we record takes about 100 bytes, its index entry 16: a quarter more is
-  // ample.
+  // A message of the smallest kind we record takes about 100 bytes, its index entry 16: a quarter
+  // more is ample.
   buffer_.reserve(kChunkHeadSize + capacity_bytes + capacity_bytes / 4);
   clear();
 }
@@ -47,7 +48,8 @@ void ChunkBuilder::add(const Channel& channel) {
 void ChunkBuilder::add(const Message& message) {
   entries_of(message.channel_id).push_back({message.log_time_ns, records_size()});
   append(buffer_, message);
-  first_time_ns_ = message_count_ == 0 ? message.log_time_ns : std::min(first_time_ns_, message.log_time_ns);
+  first_time_ns_ =
+      message_count_ == 0 ? message.log_time_ns : std::min(first_time_ns_, message.log_time_ns);
   last_time_ns_ = std::max(last_time_ns_, message.log_time_ns);
   ++message_count_;
 }
@@ -93,8 +95,8 @@ void ChunkBuilder::append_indexes() {
     // Bursts of one device are in order, but nothing promises it: readers may search by time.
     std::ranges::stable_sort(channel.entries, {}, &IndexEntry::log_time_ns);
     shares_.push_back({channel.channel_id, channel.entries.size(), buffer_.size()});
-    append(buffer_, MessageIndex{channel.channel_id,
-                                 decltype(MessageIndex::entries){std::as_bytes(std::span{channel.entries})}});
+    append(buffer_, MessageIndex{channel.channel_id, decltype(MessageIndex::entries){std::as_bytes(
+                                                         std::span{channel.entries})}});
   }
 }
 
@@ -116,12 +118,14 @@ void SummaryBuilder::add(const ClosedChunk& chunk, std::uint64_t offset) {
         first ? chunk.first_time_ns : std::min(statistics_.first_time_ns, chunk.first_time_ns);
     statistics_.last_time_ns = std::max(statistics_.last_time_ns, chunk.last_time_ns);
   }
+
   for (const ChannelShare& share : chunk.shares) {
     append_integer(index_offsets, share.channel_id);
     append_integer(index_offsets, offset + share.index_offset);
     channel_message_counts_[share.channel_id] += share.messages;
     statistics_.message_count += share.messages;
   }
+
   ChunkIndex index;
   index.first_time_ns = chunk.first_time_ns;
   index.last_time_ns = chunk.last_time_ns;

@@ -7,7 +7,8 @@ namespace {
 
 using Outcome = std::optional<tl::expected<Answer, DecodeError>>;
 
-constexpr std::size_t kMbapSize = 6;  // transaction, protocol, length; the unit is counted by `length`
+// transaction, protocol, length; the unit is counted by `length`
+constexpr std::size_t kMbapSize = 6;
 constexpr std::size_t kCrcSize = 2;
 constexpr std::size_t kRequestSize = 6;     // unit, function, address, count
 constexpr std::size_t kAnswerHeadSize = 3;  // unit, function, byte count
@@ -88,7 +89,8 @@ std::uint16_t crc16(std::span<const std::byte> bytes) ABBE_RT {
   return crc;
 }
 
-std::size_t encode(const ReadRequest& request, Transport transport, std::span<std::byte> out) ABBE_RT {
+std::size_t encode(const ReadRequest& request, Transport transport,
+                   std::span<std::byte> out) ABBE_RT {
   ByteWriter writer{out};
   if (transport == Transport::Tcp) {
     writer.zeros(4);
@@ -110,7 +112,8 @@ tl::expected<ReadRequest, DecodeError> decode_request(std::span<const std::byte>
   if (!tcp && !crc_agrees(frame)) return tl::make_unexpected(DecodeError::Crc);
   ByteReader reader{frame};
   if (tcp && reader.big<std::uint32_t>() != 0) return tl::make_unexpected(DecodeError::Protocol);
-  if (tcp && reader.big<std::uint16_t>() != kRequestSize) return tl::make_unexpected(DecodeError::Length);
+  if (tcp && reader.big<std::uint16_t>() != kRequestSize)
+    return tl::make_unexpected(DecodeError::Length);
   ReadRequest request;
   request.unit = reader.big<std::uint8_t>();
   const auto function = reader.big<std::uint8_t>();
@@ -118,7 +121,8 @@ tl::expected<ReadRequest, DecodeError> decode_request(std::span<const std::byte>
   request.function = static_cast<Function>(function);
   request.address = reader.big<std::uint16_t>();
   request.count = reader.big<std::uint16_t>();
-  if (request.count == 0 || request.count > kMaxRegisters) return tl::make_unexpected(DecodeError::Length);
+  if (request.count == 0 || request.count > kMaxRegisters)
+    return tl::make_unexpected(DecodeError::Length);
   return request;
 }
 
@@ -143,6 +147,7 @@ std::string_view name_of(DecodeError error) noexcept {
     case DecodeError::TrailingBytes:
       return "bytes after the answer";
   }
+
   return "?";
 }
 

@@ -31,7 +31,8 @@ double from_bcd(std::uint32_t digits) ABBE_RT {
 
 }  // namespace
 
-double decode_register(std::span<const std::byte> bytes, RegisterType type, WordOrder order) ABBE_RT {
+double decode_register(std::span<const std::byte> bytes, RegisterType type,
+                       WordOrder order) ABBE_RT {
   const std::uint32_t bits = word(bytes, type, order);
   switch (type) {
     case RegisterType::Int16:

@@ -82,8 +82,10 @@ Debounce decode_debounce(std::uint8_t code) ABBE_RT {
   return debounce;
 }
 
-std::array<usb::Setup, kChannelWrites> channel_writes(std::uint8_t channel, const CounterSetup& setup,
-                                                      const Debounce& phases, const Debounce& index) ABBE_RT {
+std::array<usb::Setup, kChannelWrites> channel_writes(std::uint8_t channel,
+                                                      const CounterSetup& setup,
+                                                      const Debounce& phases,
+                                                      const Debounce& index) ABBE_RT {
   const unsigned phase = encode(phases);
   const auto both_phases = static_cast<std::uint16_t>(phase | phase << 8);
   const auto index_word = static_cast<std::uint16_t>(encode(index) | kIndexAlways);

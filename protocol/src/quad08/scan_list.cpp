@@ -7,7 +7,8 @@ namespace {
 
 constexpr std::uint16_t kCounterWord = 0x3;  // digital, internal
 constexpr std::uint16_t kLastOfScan = 0x4;
-constexpr std::uint16_t kNotFirstOfScan = 0x8;  // read at the instant of the first: "sample and hold"
+// read at the instant of the first: "sample and hold"
+constexpr std::uint16_t kNotFirstOfScan = 0x8;
 constexpr unsigned kChannelShift = 4;
 constexpr std::uint16_t kFirstWord = 2 * static_cast<std::uint16_t>(Register::CounterWord0);
 constexpr double kHighestRate_hz = 8e6;
@@ -26,7 +27,8 @@ std::optional<Place> place_of(const ScanListEntry& entry) ABBE_RT {
 }
 
 bool marked(const ScanListEntry& entry, bool first, bool last) ABBE_RT {
-  return ((entry.word1 & kNotFirstOfScan) == 0) == first && ((entry.word1 & kLastOfScan) != 0) == last;
+  return ((entry.word1 & kNotFirstOfScan) == 0) == first &&
+         ((entry.word1 & kLastOfScan) != 0) == last;
 }
 
 }  // namespace
@@ -36,7 +38,8 @@ ScanListEntries encode(const ScanLayout& layout) ABBE_RT {
   const std::size_t words = words_of(layout.width);
   const std::size_t total = std::min(layout.count, kChannels) * words;
   for (std::size_t i = 0; i < total; ++i) {
-    unsigned word1 = kCounterWord | static_cast<unsigned>(layout.channels[i / words]) << kChannelShift;
+    unsigned word1 = kCounterWord | static_cast<unsigned>(layout.channels[i / words])
+                                        << kChannelShift;
     if (i != 0) word1 |= kNotFirstOfScan;
     if (i + 1 == total) word1 |= kLastOfScan;
     out.entries[out.count++] = {static_cast<std::uint16_t>(word1),
@@ -53,7 +56,8 @@ std::optional<ScanLayout> decode_scan_list(std::span<const ScanListEntry> entrie
   // The width is how many words of the first counter follow one another.
   std::size_t words = 1;
   while (words < entries.size() && entries[words].word1 >> kChannelShift == first->channel) ++words;
-  if (words != words_of(CountWidth::Bits32) && words != words_of(CountWidth::Bits48)) return std::nullopt;
+  if (words != words_of(CountWidth::Bits32) && words != words_of(CountWidth::Bits48))
+    return std::nullopt;
   layout.width = words == words_of(CountWidth::Bits32) ? CountWidth::Bits32 : CountWidth::Bits48;
   if (entries.size() % words != 0 || entries.size() / words > kChannels) return std::nullopt;
   for (std::size_t i = 0; i < entries.size(); ++i) {

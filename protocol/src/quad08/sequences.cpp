@@ -11,7 +11,8 @@ constexpr int kMarkBits = 8;
 void disarm_dac(Sequence& out, bool first_pass) ABBE_RT {
   out.add(Register::DacControl, kDacPacerOff);
   out.add(Register::DmaControl, dma::kChannel0Off);
-  for (std::uint16_t output = 0x20; output <= 0x60; output = static_cast<std::uint16_t>(output + 0x10))
+  for (std::uint16_t output = 0x20; output <= 0x60;
+       output = static_cast<std::uint16_t>(output + 0x10))
     out.add(Register::DacControl, first_pass ? std::uint16_t{0} : output);
 }
 
@@ -110,6 +111,7 @@ Sequence load_sequence(const ScanLayout& layout, std::uint64_t divisor) ABBE_RT 
   out.add(Register::Acquisition, acquisition::kResetResults);
   out.add(reset_scan_endpoint());
   out.add(usb::clear_halt(kScanEndpoint));
+
   return out;
 }
 

@@ -13,7 +13,8 @@ constexpr std::uint64_t kLow48 = (std::uint64_t{1} << 48) - 1;
 
 std::uint64_t count_at(std::span<const std::byte> bytes, CountWidth width) ABBE_RT {
   ByteReader in{bytes};
-  return width == CountWidth::Bits32 ? in.little<std::uint32_t>() : in.little<std::uint64_t>() & kLow48;
+  return width == CountWidth::Bits32 ? in.little<std::uint32_t>()
+                                     : in.little<std::uint64_t>() & kLow48;
 }
 
 }  // namespace
@@ -59,7 +60,8 @@ std::optional<std::size_t> seek_scan(std::span<const std::byte> bytes, const Sca
     const auto first = at(offset);
     const auto second = at(offset + size);
     const auto third = at(offset + 2 * size);
-    if (metronome.beats(first, second, layout.width) && metronome.beats(second, third, layout.width))
+    if (metronome.beats(first, second, layout.width) &&
+        metronome.beats(second, third, layout.width))
       return offset;
   }
   return std::nullopt;

@@ -74,7 +74,8 @@ std::optional<DescriptorText> decode_string(std::span<const std::byte> bytes) AB
   return text;
 }
 
-std::size_t encode_string(std::string_view ascii, std::span<std::byte, kMaxDescriptor> out) ABBE_RT {
+std::size_t encode_string(std::string_view ascii,
+                          std::span<std::byte, kMaxDescriptor> out) ABBE_RT {
   const std::size_t characters = std::min(ascii.size(), DescriptorText::kCapacity);
   ByteWriter writer{out};
   writer.little(static_cast<std::uint8_t>(kHead + 2 * characters));
@@ -95,7 +96,8 @@ std::optional<std::uint16_t> find_endpoint(std::span<const std::byte> configurat
     const bool this_one = in.little<std::uint8_t>() == address;
     in.skip(1);  // kind of transfer
     const auto packet = in.little<std::uint16_t>();
-    if (endpoint && this_one && in.ok()) return static_cast<std::uint16_t>(packet & kPacketSizeBits);
+    if (endpoint && this_one && in.ok())
+      return static_cast<std::uint16_t>(packet & kPacketSizeBits);
     configuration = configuration.subspan(length);
   }
   return std::nullopt;

@@ -131,7 +131,8 @@ std::size_t encode_import_reply(OpStatus status, const ExportedDevice* device,
 }
 
 tl::expected<BusId, OpError> decode_import_request(std::span<const std::byte> bytes) ABBE_RT {
-  if (const auto head = expect_head(bytes, OpCode::ImportRequest); !head) return tl::unexpected{head.error()};
+  if (const auto head = expect_head(bytes, OpCode::ImportRequest); !head)
+    return tl::unexpected{head.error()};
   ByteReader in{bytes};
   in.skip(kOpHeadSize);
   const auto bus_id = take_text<32>(in);
@@ -151,7 +152,8 @@ tl::expected<ImportReply, OpError> decode_import_reply(std::span<const std::byte
   return reply;
 }
 
-DeviceListWriter::DeviceListWriter(std::span<std::byte> out, std::uint32_t devices) ABBE_RT : out_(out) {
+DeviceListWriter::DeviceListWriter(std::span<std::byte> out, std::uint32_t devices) ABBE_RT
+    : out_(out) {
   ByteWriter writer{out_};
   put(writer, OpHead{.code = OpCode::DeviceListReply});
   writer.big(devices);
@@ -173,7 +175,8 @@ bool DeviceListWriter::add(const ExportedDevice& device,
   return true;
 }
 
-tl::expected<DeviceListView, OpError> DeviceListView::parse(std::span<const std::byte> bytes) ABBE_RT {
+tl::expected<DeviceListView, OpError> DeviceListView::parse(
+    std::span<const std::byte> bytes) ABBE_RT {
   const auto head = expect_head(bytes, OpCode::DeviceListReply);
   if (!head) return tl::unexpected{head.error()};
   ByteReader in{bytes};

@@ -116,6 +116,7 @@ tl::expected<Urb, UrbError> decode_urb(std::span<const std::byte, kUrbHeaderSize
     case Command::UnlinkReply:
       return UnlinkReply{.head = head, .status = in.big<UrbStatus>()};
   }
+
   return tl::unexpected{UrbError::UnknownCommand};
 }
 

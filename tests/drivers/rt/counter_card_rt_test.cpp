@@ -14,7 +14,8 @@ using protocol::HostTime;
 
 CounterCardReceiverOptions options() {
   CounterCardReceiverOptions o;
-  o.wiring.axes = {{.name = "X", .channel = 0, .scale = 1e-8}, {.name = "A", .channel = 1, .scale = 1e-6}};
+  o.wiring.axes = {{.name = "X", .channel = 0, .scale = 1e-8},
+                   {.name = "A", .channel = 1, .scale = 1e-6}};
   o.wiring.clock_hz = 1e6;
   o.wiring.scan_rate_hz = 40e3;
   o.wiring.latch_channel = 6;
@@ -31,7 +32,8 @@ class Transfers {
     for (int scan = 0; scan < 40; ++scan) {
       clock_ += 25;
       for (const std::uint32_t value : {clock_ * 3, clock_ * 5, clock_, latch_})
-        for (int shift = 0; shift < 32; shift += 8) bytes_[at++] = static_cast<std::byte>(value >> shift);
+        for (int shift = 0; shift < 32; shift += 8)
+          bytes_[at++] = static_cast<std::byte>(value >> shift);
     }
     return i % 13 == 0 ? std::span{bytes_}.first(639) : std::span{bytes_};
   }
@@ -57,7 +59,8 @@ TEST(CounterCardReceiverRt, TakesNoMemory) {
   const auto receiver = std::make_unique<CounterCardReceiver>(options());
   Transfers transfers;
   std::size_t scans = 0;
-  tests::expect_no_allocation(10'000, [&](std::size_t i) { scans += receive(*receiver, transfers, i); });
+  tests::expect_no_allocation(10'000,
+                              [&](std::size_t i) { scans += receive(*receiver, transfers, i); });
   EXPECT_GT(scans, 100'000u);
 }
 

@@ -18,24 +18,28 @@ EncoderReceiverOptions two_axes() {
   return options;
 }
 
-/// Everything a bus can say, cycle after cycle, an axis missing in every third, a second answer in every
-/// fifth.
+/// Everything a bus can say, cycle after cycle, an axis missing in every third, a second answer in
+/// every fifth.
 void cycle(EncoderReceiver& receiver, std::size_t i) ABBE_RT {
   const HostTime t{1h + 1ms * i};
   const auto count = static_cast<std::int64_t>(i * 1000);
   (void)receiver.on_sent(can::encode_sync(), t);
-  (void)receiver.on_frame(can::encode_position(0x181, can::PositionType::Signed32, count), t + 100us);
+  (void)receiver.on_frame(can::encode_position(0x181, can::PositionType::Signed32, count),
+                          t + 100us);
   (void)receiver.on_frame(can::encode_heartbeat(1, can::NodeState::Operational), t + 110us);
-  (void)receiver.on_frame(can::standard_frame(0x582, {0x43, 0x05, 0x60, 1, 10, 0, 0, 0}), t + 120us);
+  (void)receiver.on_frame(can::standard_frame(0x582, {0x43, 0x05, 0x60, 1, 10, 0, 0, 0}),
+                          t + 120us);
   (void)receiver.on_frame(can::encode_emergency({.node = 2, .code = 0x5000}), t + 130us);
   if (i % 7 == 0) {
     const auto off = static_cast<can::BusConditions>(can::BusCondition::BusOff);
     (void)receiver.on_frame(can::encode_error_frame({.conditions = off}), t + 140us);
   }
   if (i % 3 != 0)
-    (void)receiver.on_frame(can::encode_position(0x182, can::PositionType::Signed32, -count), t + 200us);
+    (void)receiver.on_frame(can::encode_position(0x182, can::PositionType::Signed32, -count),
+                            t + 200us);
   if (i % 5 == 0)
-    (void)receiver.on_frame(can::encode_position(0x181, can::PositionType::Signed32, count), t + 300us);
+    (void)receiver.on_frame(can::encode_position(0x181, can::PositionType::Signed32, count),
+                            t + 300us);
   (void)receiver.on_time(t + 900us);
 }
 
@@ -55,14 +59,17 @@ TEST(EncoderReceiverRt, MakesNoSystemCall) {
 /// The whole of receive(): raw blocks, samples and status too. wait() stands outside the guards.
 TEST(EncoderDeviceRt, ReceiveTakesNoMemory) {
   SteppedTime time;
-  tests::EncoderPeer peer{std::array{can::EncoderIdentity{.node = 1}, can::EncoderIdentity{.node = 2}}};
+  tests::EncoderPeer peer{
+      std::array{can::EncoderIdentity{.node = 1}, can::EncoderIdentity{.node = 2}}};
   EncoderDeviceOptions options;
   options.receiver = two_axes();
   options.receiver.sync_period = 4ms;
-  auto bus = std::make_unique<UdpCanBus>(UdpCanOptions{.peer_port = peer.port(), .speed = 0.0}, time);
+  auto bus =
+      std::make_unique<UdpCanBus>(UdpCanOptions{.peer_port = peer.port(), .speed = 0.0}, time);
   auto device = EncoderDevice::create(options, std::move(bus), time);
   ASSERT_TRUE(device.has_value());
   std::uint64_t allocations = 0;
+
   for (int i = 0; i < 4000; ++i) {
     peer.serve(time.now());
     if (i % 50 != 0) peer.answer_sync();
@@ -72,6 +79,7 @@ TEST(EncoderDeviceRt, ReceiveTakesNoMemory) {
     allocations += count.value();
     time.advance(1ms);
   }
+
   EXPECT_EQ(allocations, 0u);
   EXPECT_GT((*device)->status().samples, 500u);
 }

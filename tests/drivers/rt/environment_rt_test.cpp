@@ -23,7 +23,7 @@ class EnvironmentRealTimePath : public testing::TestWithParam<Transport> {
     }
   }
   /// A connection: proving, a round, garbage.
-  void turn(std::size_t i) ABBE_RT {
+  void cycle(std::size_t i) ABBE_RT {
     const protocol::HostTime t{1h + 1ms * i};
     receiver_.begin();
     for (const auto& answer : answers_) {
@@ -39,18 +39,19 @@ class EnvironmentRealTimePath : public testing::TestWithParam<Transport> {
 };
 
 TEST_P(EnvironmentRealTimePath, TakesNoMemory) {
-  expect_no_allocation(10'000, [&](std::size_t i) { turn(i); });
+  expect_no_allocation(10'000, [&](std::size_t i) { cycle(i); });
   EXPECT_GE(receiver_.counters().samples, 10'000u);
 }
 
 TEST_P(EnvironmentRealTimePath, MakesNoSystemCall) {
-  turn(0);  // the first virtual call makes UBSan look at the object through the kernel
+  cycle(0);  // the first virtual call makes UBSan look at the object through the kernel
   expect_no_system_call([&] {
-    for (std::size_t i = 0; i < 100; ++i) turn(i);
+    for (std::size_t i = 0; i < 100; ++i) cycle(i);
   });
 }
 
-INSTANTIATE_TEST_SUITE_P(Transports, EnvironmentRealTimePath, testing::Values(Transport::Tcp, Transport::Rtu),
+INSTANTIATE_TEST_SUITE_P(Transports, EnvironmentRealTimePath,
+                         testing::Values(Transport::Tcp, Transport::Rtu),
                          [](const auto& i) { return i.param == Transport::Tcp ? "Tcp" : "Rtu"; });
 
 }  // namespace

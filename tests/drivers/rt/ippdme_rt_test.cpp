@@ -23,9 +23,10 @@ std::size_t transaction(IppReceiver& receiver, std::size_t i) ABBE_RT {
   receiver.sent(bytes_of("00001 Get(X(),Y(),Z())\r\n"), t);
   receiver.sent(bytes_of("00002 PtMeas(X(1),Y(2),Z(3))\r\n"), t);
   receiver.sent(bytes_of("00003 PtMeas(X(1),Y(2),Z(3))\r\n"), t);
-  receiver.push(bytes_of("00001 &\r\n00001 # X(1.5),Y(-2e1),Z(.25)\r\n00001 %\r\n00002 # X(1),Y(2),Z(3)\r\n"
-                         "00003 ! Error(2,1006,PtMeas,\"Surface not found\")\r\n00004 # \"1.4.3\"\r\n"),
-                t + 50ms);
+  receiver.push(
+      bytes_of("00001 &\r\n00001 # X(1.5),Y(-2e1),Z(.25)\r\n00001 %\r\n00002 # X(1),Y(2),Z(3)\r\n"
+               "00003 ! Error(2,1006,PtMeas,\"Surface not found\")\r\n00004 # \"1.4.3\"\r\n"),
+      t + 50ms);
   std::size_t messages = 0;
   while (receiver.next()) ++messages;
   return messages;
@@ -34,7 +35,8 @@ std::size_t transaction(IppReceiver& receiver, std::size_t i) ABBE_RT {
 TEST(IppReceiverRt, TakesNoMemory) {
   const auto receiver = std::make_unique<IppReceiver>();
   std::size_t messages = 0;
-  tests::expect_no_allocation(10'000, [&](std::size_t i) { messages += transaction(*receiver, i); });
+  tests::expect_no_allocation(10'000,
+                              [&](std::size_t i) { messages += transaction(*receiver, i); });
   EXPECT_EQ(messages, 7u * 10'000);
 }
 

@@ -49,7 +49,8 @@ TEST(RawRingRt, MakesNoSystemCall) {
   const std::array<std::byte, 5000> bytes{};
   std::array<RawBlock, 4> out;  // NOLINT
   expect_no_system_call([&] {
-    for (int i = 0; i < 10; ++i) ring.push_bytes(HostTime{}, RawBlock::Direction::FromDevice, bytes);
+    for (int i = 0; i < 10; ++i)
+      ring.push_bytes(HostTime{}, RawBlock::Direction::FromDevice, bytes);
     ring.pop(out);
   });
 }

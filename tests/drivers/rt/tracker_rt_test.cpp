@@ -14,7 +14,7 @@ using namespace tracker;
 class TrackerRealTimePath : public testing::Test {
  protected:
   /// Ten points as they come on the wire, and everything else a controller may send.
-  void turn(std::size_t i) ABBE_RT {
+  void cycle(std::size_t i) ABBE_RT {
     receiver_->push(bursts_[i % bursts_.size()], now_ += 20ms);
     receiver_->push(others_, now_);
     while (const auto message = receiver_->next()) {
@@ -34,8 +34,9 @@ class TrackerRealTimePath : public testing::Test {
   }
   static Bytes make_others() {
     Bytes bytes = ok(emscon::Command::SetUnits);
-    for (const Bytes& more : {packet(emscon::StatusChange{emscon::Event::MeasurementNotReady}),
-                              packet(emscon::ErrorResponse{}), packet(emscon::ReflectorPosition{})}) {
+    for (const Bytes& more :
+         {packet(emscon::StatusChange{emscon::Event::MeasurementNotReady}),
+          packet(emscon::ErrorResponse{}), packet(emscon::ReflectorPosition{})}) {
       bytes.insert(bytes.end(), more.begin(), more.end());
     }
     return bytes;
@@ -45,31 +46,32 @@ class TrackerRealTimePath : public testing::Test {
   Bytes others_ = make_others();
   protocol::HostTime now_{1h};
   drivers::SampleRing<protocol::TrackerPoint> ring_{16384};
-  std::unique_ptr<drivers::TrackerReceiver> receiver_ = std::make_unique<drivers::TrackerReceiver>();
+  std::unique_ptr<drivers::TrackerReceiver> receiver_ =
+      std::make_unique<drivers::TrackerReceiver>();
 };
 
 TEST_F(TrackerRealTimePath, AllocatesNothingOverTenThousandPoints) {
-  expect_no_allocation(1000, [this](std::size_t i) { turn(i); });
+  expect_no_allocation(1000, [this](std::size_t i) { cycle(i); });
   std::vector<protocol::TrackerPoint> out(ring_.capacity());
   EXPECT_EQ(ring_.pop(out), 10'000u);
 }
 
 TEST_F(TrackerRealTimePath, MakesNoSystemCall) {
-  turn(0);
+  cycle(0);
   expect_no_system_call([this] {
-    for (std::size_t i = 1; i < 100; ++i) turn(i);
+    for (std::size_t i = 1; i < 100; ++i) cycle(i);
   });
 }
 
 TEST_F(TrackerRealTimePath, StandsNonsenseAndNewConnections) {
   expect_no_allocation(100, [this](std::size_t i) {
-    static constexpr std::array<std::byte, 12> kNonsense{std::byte{'G'}, std::byte{'E'}, std::byte{'T'},
-                                                         std::byte{' '}};
+    static constexpr std::array<std::byte, 12> kMalformed{std::byte{'G'}, std::byte{'E'},
+                                                          std::byte{'T'}, std::byte{' '}};
     receiver_->push({}, now_);
-    receiver_->push(kNonsense, now_);
+    receiver_->push(kMalformed, now_);
     while (const auto message = receiver_->next()) {
     }
-    turn(i);
+    cycle(i);
   });
   EXPECT_EQ(receiver_->counters().nonsense, 100u);
 }

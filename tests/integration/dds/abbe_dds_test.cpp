@@ -29,8 +29,9 @@ struct AbbeDds : ShopFloor {
     std::string text = "[machine]\nname = \"mill\"\nchain = \"[w b X Y Z t]\"\n";
     for (const char axis : {'X', 'Y', 'Z'})
       text += fmt::format("[axes.{}]\nmin_mm = 0\nmax_mm = 100\n", axis);
-    text += fmt::format("[dds]\nsupervise = \"{}\"\ndomain = {}\nprofile = \"{}\"\nsocket = \"dds.sock\"\n",
-                        supervise, domain_.text(), ABBE_LOOPBACK_PROFILE);
+    text += fmt::format(
+        "[dds]\nsupervise = \"{}\"\ndomain = {}\nprofile = \"{}\"\nsocket = \"dds.sock\"\n",
+        supervise, domain_.text(), ABBE_LOOPBACK_PROFILE);
     std::ofstream(config) << text;
   }
   std::string socket = directory_ / "dds.sock";
@@ -59,8 +60,8 @@ TEST_F(AbbeDds, WithoutAnInterfaceOfItsProfileItEndsWithFour) {
   ASSERT_NE(profile.find(named), std::string::npos);
   profile.replace(profile.find(named), named.size(), "<interfaceWhiteList><address>203.0.113.1<");
   std::ofstream(directory_ / "absent.xml") << profile;
-  EXPECT_EQ(exit_code({"--socket", socket, "--domain", domain_.text(), "--profile", directory_ / "absent.xml",
-                       "--parent", "1"}),
+  EXPECT_EQ(exit_code({"--socket", socket, "--domain", domain_.text(), "--profile",
+                       directory_ / "absent.xml", "--parent", "1"}),
             4);
 }
 
@@ -87,8 +88,8 @@ TEST_F(AbbeDds, WithoutSocketAndConfigurationItIsUsage) {
 }
 
 TEST_F(AbbeDds, LeavesWhenItsParentIsSomebodyElse) {
-  EXPECT_EQ(exit_code({"--socket", socket, "--domain", domain_.text(), "--profile", ABBE_LOOPBACK_PROFILE,
-                       "--parent", "1"}),
+  EXPECT_EQ(exit_code({"--socket", socket, "--domain", domain_.text(), "--profile",
+                       ABBE_LOOPBACK_PROFILE, "--parent", "1"}),
             0);
 }
 
@@ -117,7 +118,8 @@ class NotifySocket {
     ::close(fd_);
   }
   /// The next message; empty: none within `at_most`.
-  [[nodiscard]] std::string next(std::chrono::milliseconds at_most = std::chrono::seconds{20}) const {
+  [[nodiscard]] std::string next(std::chrono::milliseconds at_most = std::chrono::seconds{
+                                     20}) const {
     pollfd ready{fd_, POLLIN, 0};
     if (::poll(&ready, 1, static_cast<int>(at_most.count())) <= 0) return {};
     std::array<char, 256> text{};
@@ -148,8 +150,8 @@ TEST_F(AbbeDds, AsAChildItTellsTheServiceManagerNothing) {
   auto link = daemon::DdsLink::listen(socket);
   ASSERT_TRUE(link) << link.error().text;
   const NotifySocket manager(directory_ / "notify");
-  const Process child({ABBE_DDS_PROGRAM, "--socket", socket, "--domain", domain_.text(), "--profile",
-                       ABBE_LOOPBACK_PROFILE, "--parent", std::to_string(::getpid())});
+  const Process child({ABBE_DDS_PROGRAM, "--socket", socket, "--domain", domain_.text(),
+                       "--profile", ABBE_LOOPBACK_PROFILE, "--parent", std::to_string(::getpid())});
   const auto deadline = Clock::now() + std::chrono::seconds{20};
   while (!link->connected() && Clock::now() < deadline) {
     link->poll();

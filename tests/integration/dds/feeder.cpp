@@ -1,4 +1,5 @@
-// Stands for abbed: publishes the sample messages over a DdsLink until it is killed, and supervises abbe-dds
+// Stands for abbed: publishes the sample messages over a DdsLink until it is killed, and supervises
+// abbe-dds
 // as abbed does.   dds_feeder SOCKET MACHINE [ABBE_DDS ARGUMENT...]
 // Prints "child PID" whenever abbe-dds was started. The first component of its vectors tells when they were
 // made: CLOCK_MONOTONIC modulo 1000 s, in units of 1e-6. With ABBE_FEEDER_STALE in its environment the state
@@ -37,7 +38,7 @@ class Feeder {
     for (const auto& slice : test::grid_slices()) send(Topic::ErrorGrid, slice);
   }
 
-  void turn(DdsLink::WallTime now) {
+  void cycle(DdsLink::WallTime now) {
     link_.poll();
     link_.beat(now);
     if (now >= next_state_) {
@@ -85,16 +86,19 @@ int main(int argc, char** argv) {
   stale = std::getenv("ABBE_FEEDER_STALE") != nullptr ? 1 : 0;
   ::signal(SIGUSR1, [](int) { stale = 0; });
   auto link = DdsLink::listen(argv[1]);
+
   if (!link) {
     std::fprintf(stderr, "%s\n", link.error().text.c_str());
     return 4;
   }
+
   Feeder feeder(std::move(*link), argv[2]);
   auto supervisor = supervisor_for(argc, argv);
   pid_t announced = 0;
+
   for (;;) {
     const auto now = std::chrono::steady_clock::now();
-    feeder.turn(now);
+    feeder.cycle(now);
     if (supervisor) supervisor->poll(now);
     if (supervisor && supervisor->pid() != announced) {
       announced = supervisor->pid();

@@ -38,8 +38,8 @@ struct Known {
 /// Four points that span the volume, with the errors of the sample grid plus `rest`.
 Known known_with(const auto& rest) {
   Known known;
-  for (const Vector3& p :
-       {Vector3(0.1, 0.2, 0.33), Vector3(0.7, 0.1, 0.2), Vector3(0.2, 0.75, 0.1), Vector3(0.4, 0.4, 0.8)}) {
+  for (const Vector3& p : {Vector3(0.1, 0.2, 0.33), Vector3(0.7, 0.1, 0.2), Vector3(0.2, 0.75, 0.1),
+                           Vector3(0.4, 0.4, 0.8)}) {
     known.add(p, sample_error(p) + rest(p));
   }
   return known;
@@ -48,11 +48,12 @@ Known known_with(const auto& rest) {
 TEST(ReceivedLattice, IsExactAtAndBetweenNodesForErrorsLinearInEachCoordinate) {
   const auto grid = lattice_of(sample_nodes());
   ASSERT_TRUE(grid.has_value());
-  for (const Vector3& p :
-       {Vector3(0, 0, 0), Vector3(0.8, 0.8, 0.8), Vector3(0.33, 0.41, 0.77), Vector3(0.1, 0.2, 0.3)}) {
+  for (const Vector3& p : {Vector3(0, 0, 0), Vector3(0.8, 0.8, 0.8), Vector3(0.33, 0.41, 0.77),
+                           Vector3(0.1, 0.2, 0.3)}) {
     Vector3 error;
     ASSERT_TRUE(grid->at(p, error));
-    EXPECT_LT((error - sample_error(p)).norm(), 1e-18) << p.transpose();  // rounding of errors of 1e-5 m
+    EXPECT_LT((error - sample_error(p)).norm(), 1e-18)
+        << p.transpose();  // rounding of errors of 1e-5 m
   }
 }
 
@@ -81,7 +82,7 @@ TEST(ReceivedLattice, RefusesAGridWithAHole) {
 }
 
 TEST(GridComparison, ARigidMotionIsWhatNoMeasurementSees) {
-  const Vector3 shift(3e-6, 0, -2e-6), turn(1e-6, 2e-6, -1e-6);
+  const Vector3 shift(3e-6, 0, -2e-6), cycle(1e-6, 2e-6, -1e-6);
   const auto known = known_with([&](const Vector3& p) -> Vector3 { return shift + turn.cross(p); });
   const auto comparison = known.compared();
   ASSERT_TRUE(comparison.has_value());

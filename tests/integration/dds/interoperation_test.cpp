@@ -21,32 +21,38 @@ std::string g17(double v) {
 std::vector<std::string> model_lines() {
   const auto m = error_model();
   std::vector<std::string> lines{fmt::format(
-      "model {} {} {} {} {} {} {} {} {} {} {} {} {} {}", m.machine(), m.sequence_number(), m.model_id(),
-      m.method(), m.estimator(), m.gauge(), m.chain(), m.basis(), m.squareness(), g17(m.tool_offset_m()[0]),
-      g17(m.tool_offset_m()[1]), g17(m.tool_offset_m()[2]), m.recording_sha256(), m.created_utc_ns())};
+      "model {} {} {} {} {} {} {} {} {} {} {} {} {} {}", m.machine(), m.sequence_number(),
+      m.model_id(), m.method(), m.estimator(), m.gauge(), m.chain(), m.basis(), m.squareness(),
+      g17(m.tool_offset_m()[0]), g17(m.tool_offset_m()[1]), g17(m.tool_offset_m()[2]),
+      m.recording_sha256(), m.created_utc_ns())};
+
   for (const auto& p : m.parameters()) {
-    lines.push_back(
-        fmt::format("parameter {} {} {} {}", p.name(), g17(p.position_m()), g17(p.value()), g17(p.u())));
+    lines.push_back(fmt::format("parameter {} {} {} {}", p.name(), g17(p.position_m()),
+                                g17(p.value()), g17(p.u())));
   }
+
   for (const auto& r : m.validity()) {
     lines.push_back(fmt::format("validity {} {} {}", r.axis(), g17(r.min_m()), g17(r.max_m())));
   }
+
   for (const auto& v : m.validity_hull()) {
     const auto& p = v.position_m();
     lines.push_back(fmt::format("hull {} {} {}", g17(p[0]), g17(p[1]), g17(p[2])));
   }
+
   return lines;
 }
 
 std::vector<std::string> slice_lines() {
   const auto g = grid_slices()[1];
-  std::vector<std::string> lines{fmt::format("grid {} {} {} {} {} {:d}", g.machine(), g.slice(), g.slices(),
-                                             g.sequence_number(), g.model_id(), g.every_node())};
+  std::vector<std::string> lines{fmt::format("grid {} {} {} {} {} {:d}", g.machine(), g.slice(),
+                                             g.slices(), g.sequence_number(), g.model_id(),
+                                             g.every_node())};
   for (const auto& n : g.nodes()) {
     const auto& p = n.position_m();
     const auto& e = n.error_m();
-    lines.push_back(fmt::format("node {} {} {} {} {} {} {} {:d}", g17(p[0]), g17(p[1]), g17(p[2]), g17(e[0]),
-                                g17(e[1]), g17(e[2]), g17(n.cov_m2()[5]), n.inside()));
+    lines.push_back(fmt::format("node {} {} {} {} {} {} {} {:d}", g17(p[0]), g17(p[1]), g17(p[2]),
+                                g17(e[0]), g17(e[1]), g17(e[2]), g17(n.cov_m2()[5]), n.inside()));
   }
   return lines;
 }
@@ -78,6 +84,7 @@ TEST_F(DdsInteroperation, CycloneThatJoinsLateDoesNotWaitForTheSecondHeartbeat) 
   Process early(cyclone_subscriber());
   ASSERT_TRUE(early.wait_for("vmc-3: apply V")) << early.transcript();
   std::vector<double> joined_s;
+
   for (int i = 0; i < 5; ++i) {
     const auto start = Clock::now();
     Process late(cyclone_subscriber());
@@ -85,6 +92,7 @@ TEST_F(DdsInteroperation, CycloneThatJoinsLateDoesNotWaitForTheSecondHeartbeat) 
     ASSERT_TRUE(state.has_value()) << late.transcript();
     joined_s.push_back(std::chrono::duration<double>(state->came - start).count());
   }
+
   std::ranges::sort(joined_s);
   std::printf("  joined within %.2f s (median), %.2f s (worst)\n", joined_s[2], joined_s[4]);
   EXPECT_LT(joined_s[2], 0.7);  // about 0.1 s, and 0.9 s if it waits
@@ -121,8 +129,8 @@ TEST_F(DdsInteroperation, WatchComparesTheReceivedGridWithKnownErrors) {
     for (const double at : {0.05, 0.21, 0.4, 0.77}) {
       const std::array<double, 3> p{at, 0.8 * at * at, 0.8 - at};  // not on a line
       const auto e = error_at(p);
-      csv << fmt::format("{},{},{},{},{},{}\n", p[0] * 1e3, p[1] * 1e3, p[2] * 1e3, e[0] * 1e6, e[1] * 1e6,
-                         e[2] * 1e6);
+      csv << fmt::format("{},{},{},{},{},{}\n", p[0] * 1e3, p[1] * 1e3, p[2] * 1e3, e[0] * 1e6,
+                         e[1] * 1e6, e[2] * 1e6);
     }
   }
   start_feeder();
@@ -134,7 +142,8 @@ TEST_F(DdsInteroperation, WatchComparesTheReceivedGridWithKnownErrors) {
   const auto comparison = nlohmann::json::parse(line->text)["comparison"];
   EXPECT_EQ(comparison["points"], 4);
   EXPECT_GT(comparison["before_mean_um"], 10.0);
-  // The sample errors are linear along every axis, so nothing but rounding is left between the nodes.
+  // The sample errors are linear along every axis, so nothing but rounding is left between the
+  // nodes.
   EXPECT_LT(comparison["after_max_um"], 1e-6);
   std::ifstream written(grid);
   std::size_t rows = 0;

@@ -1,4 +1,5 @@
-// A network that comes up after the start, on a link between two network namespaces. Needs root and ip(8).
+// A network that comes up after the start, on a link between two network namespaces. Needs root and
+// ip(8).
 
 #include <gtest/gtest.h>
 #include <unistd.h>
@@ -26,9 +27,11 @@ bool run(const std::string& command) {
 class TwoHosts {
  public:
   TwoHosts() {
-    made_ = run("ip netns add " + here) && run("ip netns add " + there) &&
-            run("ip link add name abbe0 netns " + here + " type veth peer name abbe0 netns " + there);
-    for (const auto& host : {here, there}) made_ = made_ && run("ip -n " + host + " link set lo up");
+    made_ =
+        run("ip netns add " + here) && run("ip netns add " + there) &&
+        run("ip link add name abbe0 netns " + here + " type veth peer name abbe0 netns " + there);
+    for (const auto& host : {here, there})
+      made_ = made_ && run("ip -n " + host + " link set lo up");
   }
   ~TwoHosts() {
     for (const auto& host : {here, there}) run("ip netns del " + host);
@@ -40,7 +43,8 @@ class TwoHosts {
   static bool give_address(const std::string& host, const std::string& address) {
     return run("ip -n " + host + " addr add " + address + "/24 dev abbe0");
   }
-  /// Both ends; waits until the kernel has noticed the carrier, as Fast DDS uses no interface before.
+  /// Both ends; waits until the kernel has noticed the carrier, as Fast DDS uses no interface
+  /// before.
   [[nodiscard]] bool plug_in() const {
     for (const auto& host : {here, there})
       if (!run("ip -n " + host + " link set abbe0 up")) return false;
@@ -93,7 +97,8 @@ struct LateNetwork : ShopFloor {
   }
   long starts() {
     const auto lines = feeder_->lines();
-    return std::ranges::count_if(lines, [](const Line& line) { return line.text.starts_with("child "); });
+    return std::ranges::count_if(lines,
+                                 [](const Line& line) { return line.text.starts_with("child "); });
   }
 
   /// Between two vectors that it applied, one after the other.
@@ -117,13 +122,15 @@ TEST_F(LateNetwork, AnAddressThatCameAfterTheStartIsUsed) {
   const auto beside = fast(hosts.here);
   const auto far_fast = fast(hosts.there);
   const auto far_cyclone = cyclone(hosts.there);
+
   ASSERT_TRUE(beside->wait_for("vmc-3: apply V")) << beside->transcript();
   ASSERT_TRUE(hosts.give_address(hosts.here, "10.213.7.1"));
   for (Process* far : {far_fast.get(), far_cyclone.get()})
     EXPECT_TRUE(far->wait_for("vmc-3: apply V", {}, std::chrono::seconds{30})) << far->transcript();
-  EXPECT_TRUE(beside->wait_for("vmc-3: apply V", Clock::now())) << "the first subscriber receives again";
-  tests::print_figure("abbe-dds uses a new address: gap of a subscriber that was there", "-", "{:.2f} s",
-                      longest_gap_s(*beside));
+  EXPECT_TRUE(beside->wait_for("vmc-3: apply V", Clock::now()))
+      << "the first subscriber receives again";
+  tests::print_figure("abbe-dds uses a new address: gap of a subscriber that was there", "-",
+                      "{:.2f} s", longest_gap_s(*beside));
   EXPECT_EQ(starts(), 1) << "abbe-dds executes itself in the same process";
 }
 

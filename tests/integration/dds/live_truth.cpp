@@ -51,10 +51,12 @@ void SubscriberRecord::take(const std::string& line) {
   long long stamp = 0;
   std::array<char, 65> name{};
   int begin = 0;
-  if (std::sscanf(line.c_str(), "%lld %64[^:]: %n", &stamp, name.data(), &begin) != 2 || begin == 0) return;
+  if (std::sscanf(line.c_str(), "%lld %64[^:]: %n", &stamp, name.data(), &begin) != 2 || begin == 0)
+    return;
   const char* const text = line.c_str() + begin;
   int state = 0;
   const std::lock_guard lock(mutex_);
+
   if (std::strncmp(text, "apply", 5) == 0) {
     note_apply(name.data(), stamp, text);
   } else if (std::strncmp(text, "not alive", 9) == 0 ||
@@ -119,7 +121,8 @@ struct LiveTruth::Subscriber {
 
   void start() {
     process.reset();
-    process = std::make_unique<Process>(command, [this](const Line& line) { record.take(line.text); });
+    process =
+        std::make_unique<Process>(command, [this](const Line& line) { record.take(line.text); });
   }
 };
 
@@ -152,8 +155,8 @@ bool LiveTruth::begin() {
 bool LiveTruth::all_apply(HostNs since, double patience_s) {
   const auto applies = [&] {
     return std::ranges::all_of(subscribers_, [&](const auto& s) {
-      return std::ranges::all_of(machines_,
-                                 [&](const auto& m) { return s->record.last_apply(m->name) > since; });
+      return std::ranges::all_of(
+          machines_, [&](const auto& m) { return s->record.last_apply(m->name) > since; });
     });
   };
   const HostNs deadline = now_ns() + static_cast<HostNs>(patience_s * 1e9);
@@ -161,7 +164,8 @@ bool LiveTruth::all_apply(HostNs since, double patience_s) {
   return applies();
 }
 
-void LiveTruth::expect_dead(const std::vector<Machine*>& dead, HostNs since, const std::string& what) {
+void LiveTruth::expect_dead(const std::vector<Machine*>& dead, HostNs since,
+                            const std::string& what) {
   for (const auto& s : subscribers_) {
     for (const Machine* m : dead) {
       const HostNs noticed = s->record.dead_since(m->name, since);
@@ -170,7 +174,8 @@ void LiveTruth::expect_dead(const std::vector<Machine*>& dead, HostNs since, con
       figures_.longest_hold_s = std::max(figures_.longest_hold_s, hold_s);
       if (hold_s <= kLongestHold_s) continue;
       ++figures_.held_too_long;
-      figures_.failures.push_back(fmt::format("{}: {} held {} for {:.2f} s", what, s->name, m->name, hold_s));
+      figures_.failures.push_back(
+          fmt::format("{}: {} held {} for {:.2f} s", what, s->name, m->name, hold_s));
     }
   }
 }
@@ -189,6 +194,7 @@ void LiveTruth::expect_all_apply(HostNs since, const std::string& what) {
     static_cast<void>(all_apply(now_ns(), 20.0));
     return;
   }
+
   figures_.longest_return_s = std::max(figures_.longest_return_s, seconds(now_ns() - begin));
 }
 
@@ -220,12 +226,13 @@ void LiveTruth::strike(Blow blow, double duration_s, const std::vector<Machine*>
       wait(duration_s);
       return;
   }
+
   static_cast<void>(dead);
 }
 
 void LiveTruth::round(Blow blow, double duration_s) {
-  constexpr std::array kNames{"kill", "stop of abbed", "stop of abbe-dds", "stop of the subscribers",
-                              "outage"};
+  constexpr std::array kNames{"kill", "stop of abbed", "stop of abbe-dds",
+                              "stop of the subscribers", "outage"};
   const std::string what = fmt::format("round {}, {} of {:.1f} s", ++figures_.rounds,
                                        kNames[static_cast<std::size_t>(blow)], duration_s);
   Machine& a = *machines_.front();
@@ -246,7 +253,8 @@ void LiveTruth::round(Blow blow, double duration_s) {
 }
 
 void LiveTruth::random_round(std::mt19937& random) {
-  std::vector<Blow> blows{Blow::KillMachine, Blow::StopAbbed, Blow::StopAbbeDds, Blow::StopSubscriber};
+  std::vector<Blow> blows{Blow::KillMachine, Blow::StopAbbed, Blow::StopAbbeDds,
+                          Blow::StopSubscriber};
   if (parts_.has_network_of_its_own) blows.push_back(Blow::Outage);
   const Blow blow = blows[static_cast<std::size_t>(figures_.rounds) % blows.size()];
   const double exponent = std::uniform_real_distribution<>(0.0, 1.0)(random);
@@ -260,7 +268,8 @@ LiveTruthFigures LiveTruth::figures() const {
   for (const auto& s : subscribers_) {
     all.applied += s->record.applied();
     all.understated += s->record.understated();
-    all.worst_understatement_ms = std::max(all.worst_understatement_ms, s->record.worst_understatement_ms());
+    all.worst_understatement_ms =
+        std::max(all.worst_understatement_ms, s->record.worst_understatement_ms());
   }
   return all;
 }

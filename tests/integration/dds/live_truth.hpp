@@ -1,6 +1,6 @@
 #pragma once
-/// What a subscriber did with the vectors of every machine, as its stamped lines tell, and the rounds of
-/// kills, stops and outages it is put through.
+/// What a subscriber did with the vectors of every machine, as its stamped lines tell, and the
+/// rounds of kills, stops and outages it is put through.
 
 #include <cstdint>
 #include <functional>
@@ -23,8 +23,8 @@ class SubscriberRecord {
   void take(const std::string& line);
   void forget();
 
-  /// First line since `from` after which the machine counts as dead: not alive, or a state that is not
-  /// ACTIVE.
+  /// First line since `from` after which the machine counts as dead: not alive, or a state that is
+  /// not ACTIVE.
   [[nodiscard]] HostNs dead_since(const std::string& machine, HostNs from) const;
   [[nodiscard]] HostNs last_apply(const std::string& machine) const;
   [[nodiscard]] double worst_understatement_ms() const;  ///< true age less the age it went by
@@ -90,8 +90,8 @@ class LiveTruth {
   LiveTruthFigures figures_;
 };
 
-/// This thread and the processes it starts from now on have a network of their own, with loopback up. False:
-/// not permitted.
+/// This thread and the processes it starts from now on have a network of their own, with loopback
+/// up. False: not permitted.
 [[nodiscard]] bool enter_own_network();
 void switch_loopback(bool on);
 

@@ -1,6 +1,6 @@
-// Two machines on one domain: no subscriber holds an ACTIVE of a dead machine for more than 1.5 s, none
-// applies a vector whose age is understated by more than 1 ms, none stays orphaned. A few rounds;
-// `scripts/soak live-truth` runs ABBE_LIVE_TRUTH_ROUNDS random ones.
+// Two machines on one domain: no subscriber holds an ACTIVE of a dead machine for more than 1.5 s,
+// none applies a vector whose age is understated by more than 1 ms, none stays orphaned. A few
+// rounds; `scripts/soak live-truth` runs ABBE_LIVE_TRUTH_ROUNDS random ones.
 #include "live_truth.hpp"
 
 #include <fmt/format.h>
@@ -18,18 +18,21 @@ class LiveTruthTest : public ShopFloor {
  protected:
   [[nodiscard]] LiveTruth::Parts parts() const {
     // Nothing but the blows is to hold a subscriber up: real-time priority where it is to be had.
-    std::vector<std::string> fast{ABBE_STAMPED_FAST_SUBSCRIBER, domain_.text(), ABBE_LOOPBACK_PROFILE};
+    std::vector<std::string> fast{ABBE_STAMPED_FAST_SUBSCRIBER, domain_.text(),
+                                  ABBE_LOOPBACK_PROFILE};
     std::vector<std::string> cyclone{ABBE_STAMPED_CYCLONE_SUBSCRIBER, domain_.text()};
     std::vector<std::string> of_abbe_dds;
+
     if (!keys_.empty()) {
       fast.push_back(keys_ / "subscriber-1");
       cyclone.push_back(keys_ / "subscriber-2");
       of_abbe_dds = {"--security", keys_};
     }
+
     for (auto* command : {&fast, &cyclone})
       if (real_time_) command->insert(command->begin(), {"/usr/bin/chrt", "-f", "10"});
-    return {[this, of_abbe_dds](const std::string& name) { return feeder_of(name, of_abbe_dds); }, fast,
-            cyclone, own_network_};
+    return {[this, of_abbe_dds](const std::string& name) { return feeder_of(name, of_abbe_dds); },
+            fast, cyclone, own_network_};
   }
   static bool real_time_permitted() {
     const sched_param ordinary{}, first{.sched_priority = 10};
@@ -40,14 +43,15 @@ class LiveTruthTest : public ShopFloor {
   void report(const LiveTruthFigures& f) const {
     const std::string keys = keys_.empty() ? "" : ", with keys";
     for (const auto& failure : f.failures) fmt::print("  {}\n", failure);
-    tests::print_figure("an ACTIVE of a dead machine, two machines, kills, stops and outages" + keys,
-                        "<= 1.5 s", "{:.2f} s at most, {} longer, {} rounds", f.longest_hold_s,
-                        f.held_too_long, f.rounds);
+    tests::print_figure(
+        "an ACTIVE of a dead machine, two machines, kills, stops and outages" + keys, "<= 1.5 s",
+        "{:.2f} s at most, {} longer, {} rounds", f.longest_hold_s, f.held_too_long, f.rounds);
     tests::print_figure("age of applied vectors understated" + keys, "<= 1 ms",
-                        "{:.3f} ms at most, {} more of {}", f.worst_understatement_ms, f.understated,
-                        f.applied);
-    tests::print_figure("subscribers orphaned" + keys, "0", "{}; all apply again after {:.2f} s at most",
-                        f.orphaned, f.longest_return_s);
+                        "{:.3f} ms at most, {} more of {}", f.worst_understatement_ms,
+                        f.understated, f.applied);
+    tests::print_figure("subscribers orphaned" + keys, "0",
+                        "{}; all apply again after {:.2f} s at most", f.orphaned,
+                        f.longest_return_s);
   }
   void expect_truth(const LiveTruthFigures& f) const {
     report(f);
@@ -69,8 +73,8 @@ class LiveTruthTest : public ShopFloor {
     if (own_network_) truth.round(LiveTruth::Blow::Outage, 4.0);
     expect_truth(truth.figures());
   }
-  /// With keys Fast DDS and Cyclone DDS do not authenticate again whom they have not forgotten themselves:
-  /// nobody may forget anybody within 30 s.
+  /// With keys Fast DDS and Cyclone DDS do not authenticate again whom they have not forgotten
+  /// themselves: nobody may forget anybody within 30 s.
   void hold_through_the_longest_stops_and_outage() {
     if (std::getenv("ABBE_LIVE_TRUTH_ROUNDS") == nullptr) GTEST_SKIP() << "scripts/soak live-truth";
     LiveTruth truth(parts());
@@ -88,13 +92,16 @@ class LiveTruthTest : public ShopFloor {
     std::mt19937 random(seed);
     LiveTruth truth(parts());
     ASSERT_TRUE(truth.begin());
+
     while (truth.figures().rounds < std::atoi(rounds)) {
       truth.random_round(random);
       const auto so_far = truth.figures();
-      fmt::print("  round {}: held {:.2f} s, understated {:.3f} ms ({}), orphaned {}\n", so_far.rounds,
-                 so_far.longest_hold_s, so_far.worst_understatement_ms, so_far.understated, so_far.orphaned);
+      fmt::print("  round {}: held {:.2f} s, understated {:.3f} ms ({}), orphaned {}\n",
+                 so_far.rounds, so_far.longest_hold_s, so_far.worst_understatement_ms,
+                 so_far.understated, so_far.orphaned);
       std::fflush(stdout);
     }
+
     fmt::print("seed {}\n", seed);
     expect_truth(truth.figures());
   }
@@ -108,8 +115,8 @@ TEST_F(LiveTruthTest, HoldsThroughKillsStopsAndAnOutage) {
   hold_through_kills_stops_and_an_outage();
 }
 
-/// Longer than the lease that Fast DDS gives a participant by default: abbe-dds would drop it, but not it
-/// abbe-dds.
+/// Longer than the lease that Fast DDS gives a participant by default: abbe-dds would drop it, but
+/// not it abbe-dds.
 TEST_F(LiveTruthTest, NoSubscriberIsOrphanedByALongPause) {
   LiveTruth truth(parts());
   ASSERT_TRUE(truth.begin());

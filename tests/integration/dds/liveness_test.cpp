@@ -1,5 +1,5 @@
-// Who dies or hangs is noticed, by both kinds of subscriber, in the times the contract states; each test
-// prints what it took. The decision "apply or not" comes from the two example subscribers.
+// Who dies or hangs is noticed, by both kinds of subscriber, in the times the contract states; each
+// test prints what it took. The decision "apply or not" comes from the two example subscribers.
 #include <signal.h>
 
 #include <cstdio>
@@ -59,7 +59,8 @@ TEST_F(DdsLiveness, BothSeeInvalidWithinASecondWhenAbbedHangs) {
 TEST_F(DdsLiveness, TheWriterOfTheStateIsNoLongerAliveWhenAbbedHangs) {
   const auto stopped = Clock::now();
   feeder_->signal(SIGSTOP);
-  // 500 ms of silence, at most 200 ms since the last assertion, 1 s of lease, and what a busy host adds.
+  // 500 ms of silence, at most 200 ms since the last assertion, 1 s of lease, and what a busy host
+  // adds.
   expect_both("vmc-3: not alive", stopped, 3s);
 }
 
@@ -94,8 +95,8 @@ TEST_F(DdsLiveness, AHungAbbeDdsIsNotTrusted) {
   ::kill(pid, SIGKILL);
 }
 
-/// The lease of a site's profile is shorter than what the subscriber takes for lost: Cyclone DDS forgets
-/// abbe-dds, but not the other way round.
+/// The lease of a site's profile is shorter than what the subscriber takes for lost: Cyclone DDS
+/// forgets abbe-dds, but not the other way round.
 TEST_F(ShopFloor, CycloneIsNotOrphanedByAParticipantItForgot) {
   std::stringstream text;
   text << std::ifstream(ABBE_LOOPBACK_PROFILE).rdbuf();
@@ -103,7 +104,8 @@ TEST_F(ShopFloor, CycloneIsNotOrphanedByAParticipantItForgot) {
   std::string profile = text.str();
   ASSERT_NE(profile.find(lease), std::string::npos);
   profile_ = directory_ / "short-lease.xml";
-  std::ofstream(profile_) << profile.replace(profile.find(lease), lease.size(), "<leaseDuration><sec>2<");
+  std::ofstream(profile_) << profile.replace(profile.find(lease), lease.size(),
+                                             "<leaseDuration><sec>2<");
 
   start_feeder();
   Process cyclone(cyclone_subscriber());

@@ -19,8 +19,8 @@ void append_u16(Bytes& out, std::uint16_t v, bool little_endian = true) {
 }
 
 /// A DATA submessage of `writer` with `rest` behind its sequence number.
-Bytes data_message(std::uint8_t writer, std::uint8_t flags, std::uint16_t to_inline_qos, const Bytes& rest,
-                   std::uint8_t kind = 0x15) {
+Bytes data_message(std::uint8_t writer, std::uint8_t flags, std::uint16_t to_inline_qos,
+                   const Bytes& rest, std::uint8_t kind = 0x15) {
   const bool little_endian = (flags & 1) != 0;
   Bytes body{0, 0};  // extra flags
   append_u16(body, to_inline_qos, little_endian);
@@ -75,8 +75,8 @@ TEST(MessageFilterInput, RefusesAnnouncementsInFragments) {
 
 Bytes with_statistics(std::uint16_t length, std::size_t bytes) {
   Bytes message = announcement(kSomebodys, {kTopicName});
-  message.insert(message.end(),
-                 {0x80, 1, static_cast<std::uint8_t>(length & 0xff), static_cast<std::uint8_t>(length >> 8)});
+  message.insert(message.end(), {0x80, 1, static_cast<std::uint8_t>(length & 0xff),
+                                 static_cast<std::uint8_t>(length >> 8)});
   message.resize(message.size() + bytes);
   return message;
 }
@@ -102,7 +102,8 @@ TEST(MessageFilterInput, DropsLengthsThatLie) {
 /// Fast DDS reads a signed number, and takes what is below 16 for 16.
 TEST(MessageFilterInput, DropsAnnouncementsWhoseParametersAreElsewhereForFastDds) {
   const Bytes list{0, 3, 0, 0, 0x72, 0, 4, 0, 1, 2, 3, 4, 1, 0, 0, 0};
-  for (const auto to_inline_qos : std::array<std::uint16_t, 5>{0x0000, 0x0008, 0x000f, 0x8000, 0xffff}) {
+  for (const auto to_inline_qos :
+       std::array<std::uint16_t, 5>{0x0000, 0x0008, 0x000f, 0x8000, 0xffff}) {
     Bytes message = data_message(kPublications, 5, to_inline_qos, list);
     EXPECT_EQ(filter_message(message), 0u) << to_inline_qos;
   }
@@ -135,7 +136,8 @@ TEST(MessageFilterInput, DropsAnnouncementsWhoseListDoesNotEnd) {
 }
 
 TEST(MessageFilterInput, BlanksTypesBehindInlineQos) {
-  const Bytes list{0x70, 0, 4, 0, 9, 9, 9, 9, 1, 0, 0, 0, 0, 3, 0, 0, 0x72, 0, 4, 0, 1, 2, 3, 4, 1, 0, 0, 0};
+  const Bytes list{0x70, 0, 4,    0, 9, 9, 9, 9, 1, 0, 0, 0, 0, 3,
+                   0,    0, 0x72, 0, 4, 0, 1, 2, 3, 4, 1, 0, 0, 0};
   Bytes blanked = list;
   blanked[16] = 0xff, blanked[17] = 0xbf;
   Bytes message = data_message(kPublications, 7, 16, list);
@@ -144,7 +146,8 @@ TEST(MessageFilterInput, BlanksTypesBehindInlineQos) {
 }
 
 TEST(MessageFilterInput, LeavesAWithdrawalWithoutAListAlone) {
-  const Bytes inline_qos{0x71, 0, 4, 0, 0, 0, 0, 3, 1, 0, 0, 0};  // status: disposed and unregistered
+  const Bytes inline_qos{0x71, 0, 4, 0, 0, 0,
+                         0,    3, 1, 0, 0, 0};  // status: disposed and unregistered
   const Bytes untouched = data_message(kPublications, 3, 16, inline_qos);
   Bytes message = untouched;
   EXPECT_EQ(filter_message(message), message.size());

@@ -82,11 +82,13 @@ std::string Process::transcript() {
 void Process::read(int fd) {
   std::string rest;
   char chunk[4096];
+
   for (ssize_t n = 0; (n = ::read(fd, chunk, sizeof(chunk))) > 0;) {
     const auto now = Clock::now();
     rest.append(chunk, static_cast<std::size_t>(n));
     const std::lock_guard lock(mutex_);
-    for (std::size_t end = 0; (end = rest.find('\n')) != std::string::npos; rest.erase(0, end + 1)) {
+    for (std::size_t end = 0; (end = rest.find('\n')) != std::string::npos;
+         rest.erase(0, end + 1)) {
       Line line{rest.substr(0, end), now};
       if (on_line_) {
         on_line_(line);

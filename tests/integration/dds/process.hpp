@@ -1,6 +1,6 @@
 #pragma once
-/// A program under test: started, its standard output read line by line with the time each line came, killed
-/// at the end.
+/// A program under test: started, its standard output read line by line with the time each line
+/// came, killed at the end.
 
 #include <sys/types.h>
 
@@ -36,7 +36,8 @@ class Process {
   /// The exit code, -1 if it ended by a signal or not within `at_most` (then it is killed).
   int wait_for_end(std::chrono::seconds at_most = std::chrono::seconds{20});
 
-  /// The first line not before `from` that begins with `prefix`; nothing if none came within `at_most`.
+  /// The first line not before `from` that begins with `prefix`; nothing if none came within
+  /// `at_most`.
   std::optional<Line> wait_for(const std::string& prefix, Clock::time_point from = {},
                                std::chrono::seconds at_most = std::chrono::seconds{20});
   std::vector<Line> lines();

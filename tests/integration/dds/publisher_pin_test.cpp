@@ -33,7 +33,7 @@ TEST_F(PublisherPinTest, TheFirstOneIsPinned) {
 TEST_F(PublisherPinTest, ASecondOneBesideItIsARival) {
   send({kFirst}, 500ms);
   EXPECT_EQ(send({kFirst, kSecond}, 90ms), Verdict::Waiting);
-  EXPECT_EQ(send({kFirst, kSecond}, 60s), Verdict::Rival);
+  EXPECT_EQ(send({kFirst, kSecond}, 60s), Verdict::Foreign);
   EXPECT_EQ(pin.pinned(), kFirst);
 }
 
@@ -51,15 +51,15 @@ TEST_F(PublisherPinTest, ASuccessorIsPinnedOnceTheFirstWasSilentFor300Ms) {
 TEST_F(PublisherPinTest, ARivalIsNotTheSuccessorOfAFirstThatRestarts) {
   send({kFirst}, 500ms);
   send({kFirst, kSecond}, 1s);
-  EXPECT_EQ(send({kSecond}, 400ms), Verdict::Rival);
+  EXPECT_EQ(send({kSecond}, 400ms), Verdict::Foreign);
   send({kSecond, kThird}, 50ms);
   EXPECT_EQ(pin.pinned(), kThird);
-  EXPECT_EQ(send({kThird, kSecond}, 20s), Verdict::Rival);
+  EXPECT_EQ(send({kThird, kSecond}, 20s), Verdict::Foreign);
 }
 
 TEST_F(PublisherPinTest, ARivalIsAcceptedAfterTenSecondsOfSilence) {
   send({kFirst, kSecond}, 1s);
-  EXPECT_EQ(send({kSecond}, 9900ms), Verdict::Rival);
+  EXPECT_EQ(send({kSecond}, 9900ms), Verdict::Foreign);
   send({kSecond}, 100ms);
   EXPECT_EQ(pin.pinned(), kSecond);
 }

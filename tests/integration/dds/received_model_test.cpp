@@ -64,6 +64,7 @@ TEST(ReceivedModel, SlicesLeftOfAnotherModelAreIgnored) {
   left.model_id("otf-before");
   left.slice(left.slices() + 1);
   left.slices(left.slices() + 2);
+
   for (const bool before : {true, false}) {
     ReceivedModel model;
     if (before) model.slice(left);
@@ -107,7 +108,8 @@ TEST(Decide, CountsWhatTheVectorWaited) {
   EXPECT_FALSE(decide(c, 500ms, test::active_state(1), true).apply);
 }
 
-/// A vector that was published at `host_time` of another clock, 2 ms after the instant it describes.
+/// A vector that was published at `host_time` of another clock, 2 ms after the instant it
+/// describes.
 v1::Compensation vector_of(std::chrono::nanoseconds host_time) {
   v1::Compensation c;
   c.host_time_ns((host_time - 2ms).count());
@@ -118,17 +120,21 @@ v1::Compensation vector_of(std::chrono::nanoseconds host_time) {
 TEST(Delay, IsWhatAVectorNeededMoreThanTheQuickest) {
   Delay delay;
   const Delay::Instant ours{5000s};
-  for (auto t = 0ms; t <= 200ms; t += 10ms) EXPECT_FALSE(delay.of(vector_of(70s + t), ours + t + 300us));
+  for (auto t = 0ms; t <= 200ms; t += 10ms)
+    EXPECT_FALSE(delay.of(vector_of(70s + t), ours + t + 300us));
   EXPECT_EQ(delay.of(vector_of(70s + 210ms), ours + 210ms + 200us), 0ns);
   const auto waited = delay.of(vector_of(70s + 220ms), ours + 420ms + 200us);
-  EXPECT_NEAR(static_cast<double>(waited.value().count()), 200e6, 50e3);  // less what clocks may drift apart
+  EXPECT_NEAR(static_cast<double>(waited.value().count()), 200e6,
+              50e3);  // less what clocks may drift apart
 }
 
 TEST(Delay, LearnsNothingFromTimesOutOfRange) {
   Delay delay;
   const Delay::Instant ours{5000s};
   for (auto t = 0ms; t <= 210ms; t += 10ms) (void)delay.of(vector_of(70s + t), ours + t);
-  for (const auto time : {std::numeric_limits<std::int64_t>::max(), std::numeric_limits<std::int64_t>::min()}) {
+
+  for (const auto time :
+       {std::numeric_limits<std::int64_t>::max(), std::numeric_limits<std::int64_t>::min()}) {
     v1::Compensation strange = vector_of(70s);
     strange.host_time_ns(time);
     EXPECT_FALSE(delay.of(strange, ours + 220ms));
@@ -138,6 +144,7 @@ TEST(Delay, LearnsNothingFromTimesOutOfRange) {
     aged.age_ns(time);
     EXPECT_FALSE(decide(aged, 1ms, test::active_state(1), true).apply);
   }
+
   EXPECT_EQ(delay.of(vector_of(70s + 230ms), ours + 230ms), 0ns);
 }
 
@@ -162,7 +169,8 @@ TEST(Delay, FollowsAClockThatRunsSlowerBy150Ppm) {
   Delay delay;
   const Delay::Instant ours{5000s};
   for (int i = 0; i < 100'000; i += 100)
-    EXPECT_LT(delay.of(vector_of(70s + i * 1ms), ours + i * 1ms + i * 150ns).value_or(0ns), 1ms) << i;
+    EXPECT_LT(delay.of(vector_of(70s + i * 1ms), ours + i * 1ms + i * 150ns).value_or(0ns), 1ms)
+        << i;
 }
 
 }  // namespace

@@ -1,6 +1,6 @@
 #pragma once
-/// The messages feeder and tests agree on: the feeder publishes them, the tests compare what a subscriber
-/// prints.
+/// The messages feeder and tests agree on: the feeder publishes them, the tests compare what a
+/// subscriber prints.
 
 #include <string>
 #include <vector>
@@ -37,6 +37,7 @@ inline v1::ErrorModel error_model() {
   m.basis("linear");
   m.squareness("travel");
   m.tool_offset_m({0.0, 0.0, -0.1});
+
   for (int i = 0; i < 300; ++i) {
     v1::Parameter p;
     p.name(i % 2 == 0 ? "EXX" : "EA0Z");
@@ -45,16 +46,19 @@ inline v1::ErrorModel error_model() {
     p.u(1e-7 + 1e-9 * i);
     m.parameters().push_back(p);
   }
+
   v1::AxisRange x;
   x.axis("X");
   x.min_m(-0.25);
   x.max_m(0.5);
   m.validity({x});
+
   for (const double z : {0.0, 0.25, 0.5}) {
     v1::HullVertex vertex;
     vertex.position_m({-0.25, 0.125, z});
     m.validity_hull().push_back(vertex);
   }
+
   m.recording_sha256(std::string(64, 'a'));
   m.created_utc_ns(1'717'200'000'000'000'000LL);
   return m;
@@ -80,6 +84,7 @@ inline std::vector<v1::ErrorGrid> grid_slices() {
     node.inside(i != 500);  // one in slice 1
     slices[i / 456].nodes().push_back(node);
   }
+
   for (std::uint32_t s = 0; s < 2; ++s) {
     slices[s].machine(kMachine);
     slices[s].slice(s);
@@ -88,6 +93,7 @@ inline std::vector<v1::ErrorGrid> grid_slices() {
     slices[s].model_id(kModelId);
     slices[s].every_node(true);
   }
+
   return slices;
 }
 

@@ -1,5 +1,6 @@
 #pragma once
-/// abbed's stand-in with its abbe-dds, and subscribers, on a DDS domain nobody else uses at the moment.
+/// abbed's stand-in with its abbe-dds, and subscribers, on a DDS domain nobody else uses at the
+/// moment.
 
 #include <gtest/gtest.h>
 
@@ -29,10 +30,12 @@ class ShopFloor : public testing::Test {
   }
 
   /// `more`: further arguments of abbe-dds.
-  void start_feeder(const std::vector<std::string>& more = {}) { feeder_ = feeder_of(kMachine, more); }
+  void start_feeder(const std::vector<std::string>& more = {}) {
+    feeder_ = feeder_of(kMachine, more);
+  }
 
-  [[nodiscard]] std::unique_ptr<Process> feeder_of(const std::string& machine,
-                                                   const std::vector<std::string>& more = {}) const {
+  [[nodiscard]] std::unique_ptr<Process> feeder_of(
+      const std::string& machine, const std::vector<std::string>& more = {}) const {
     const std::string socket = directory_ / (machine + ".sock");
     std::vector<std::string> command{ABBE_FEEDER_PROGRAM, socket,  machine,    ABBE_DDS_PROGRAM,
                                      "--socket",          socket,  "--domain", domain_.text(),
@@ -57,8 +60,8 @@ class ShopFloor : public testing::Test {
   /// Keys of a new authority, for abbe-dds and two subscribers.
   [[nodiscard]] std::filesystem::path make_keys(const char* name) const {
     const auto folder = directory_ / name;
-    const auto made =
-        daemon::make_dds_keys({.folder = folder, .subscribers = 2}, std::chrono::system_clock::now());
+    const auto made = daemon::make_dds_keys({.folder = folder, .subscribers = 2},
+                                            std::chrono::system_clock::now());
     EXPECT_TRUE(made) << made.error().text;
     return folder;
   }

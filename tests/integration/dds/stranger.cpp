@@ -59,6 +59,7 @@ int publish_fakes(abbe::dds::ParticipantOptions options) {
   auto writers = abbe::dds::Writers::create(*participant);
   if (!writers) return refused(writers.error());
   report_start();
+
   for (std::uint64_t n = 1'000'000;; ++n) {
     if (n % 10 == 0) {
       write(*writers, daemon::Topic::ModelState, test::active_state(n));
@@ -77,15 +78,18 @@ int publish_fakes(abbe::dds::ParticipantOptions options) {
 
 void announce_type(fast::DomainParticipant* participant, const std::string& topic_name) {
   fast::TypeSupport type(new strange::OuterPubSubType);
-  auto* topic = participant->create_topic(topic_name, type.get_type_name(), fast::TOPIC_QOS_DEFAULT);
+  auto* topic =
+      participant->create_topic(topic_name, type.get_type_name(), fast::TOPIC_QOS_DEFAULT);
   auto* publisher = participant->create_publisher(fast::PUBLISHER_QOS_DEFAULT);
-  if (topic == nullptr || publisher->create_datawriter(topic, fast::DATAWRITER_QOS_DEFAULT) == nullptr)
+  if (topic == nullptr ||
+      publisher->create_datawriter(topic, fast::DATAWRITER_QOS_DEFAULT) == nullptr)
     std::fprintf(stderr, "dds_stranger: no writer on %s\n", topic_name.c_str());
 }
 
 int publish_types(std::uint32_t domain) {
   auto* factory = fast::DomainParticipantFactory::get_instance();
   fast::DomainParticipantQos qos;
+
   if (factory->load_XML_profiles_file(ABBE_LOOPBACK_PROFILE) !=
           eprosima::fastrtps::types::ReturnCode_t::RETCODE_OK ||
       factory->get_participant_qos_from_profile("abbe", qos) !=
@@ -101,8 +105,8 @@ int publish_types(std::uint32_t domain) {
   for (;;) ::pause();
 }
 
-/// A message that begins like RTPS and goes on as it likes: submessage ids that exist, entities that exist,
-/// lengths that lie.
+/// A message that begins like RTPS and goes on as it likes: submessage ids that exist, entities
+/// that exist, lengths that lie.
 class Garbage {
  public:
   const std::vector<std::uint8_t>& next() {
@@ -123,18 +127,20 @@ class Garbage {
     constexpr std::array<std::uint8_t, 5> kWriters{1, 2, 3, 4, 0x20};
     const int length = pick(200);
     const int said = pick(4) == 0 ? pick(65536) : length;
-    message_.insert(
-        message_.end(),
-        {kKinds[static_cast<std::size_t>(pick(kKinds.size()))], static_cast<std::uint8_t>(random_()),
-         static_cast<std::uint8_t>(said & 0xff), static_cast<std::uint8_t>(said >> 8)});
+    message_.insert(message_.end(),
+                    {kKinds[static_cast<std::size_t>(pick(kKinds.size()))],
+                     static_cast<std::uint8_t>(random_()), static_cast<std::uint8_t>(said & 0xff),
+                     static_cast<std::uint8_t>(said >> 8)});
     const std::size_t body = message_.size();
     fill(length);
     if (length < 12) return;
     const std::uint8_t writer = kWriters[static_cast<std::size_t>(pick(kWriters.size()))];
+
     for (std::size_t i = 0; i < 4; ++i) {
       message_[body + 4 + i] = 0;  // any reader
-      message_[body + 8 + i] = std::array<std::uint8_t, 4>{0, writer == 1 ? std::uint8_t{1} : std::uint8_t{0},
-                                                           writer == 1 ? std::uint8_t{0} : writer, 0xc2}[i];
+      message_[body + 8 + i] =
+          std::array<std::uint8_t, 4>{0, writer == 1 ? std::uint8_t{1} : std::uint8_t{0},
+                                      writer == 1 ? std::uint8_t{0} : writer, 0xc2}[i];
     }
   }
 
@@ -148,14 +154,15 @@ int send_garbage(std::uint32_t domain) {
   if (fd < 0) return 4;
   report_start();
   Garbage garbage;
+
   for (std::uint64_t n = 0;; ++n) {
     const auto& message = garbage.next();
     sockaddr_in to{};
     to.sin_family = AF_INET;
     to.sin_addr.s_addr = ::htonl(INADDR_LOOPBACK);
     to.sin_port = ::htons(static_cast<std::uint16_t>(7400 + 250 * domain + 10 + n % 8));
-    static_cast<void>(
-        ::sendto(fd, message.data(), message.size(), 0, reinterpret_cast<const sockaddr*>(&to), sizeof to));
+    static_cast<void>(::sendto(fd, message.data(), message.size(), 0,
+                               reinterpret_cast<const sockaddr*>(&to), sizeof to));
     if (n % 10 == 0) std::this_thread::sleep_for(1ms);
   }
 }

@@ -1,5 +1,5 @@
-// Strangers on the domain: a publisher of fakes, one who announces types, one who sends garbage, a reader who
-// has no keys. Each is a process of its own.
+// Strangers on the domain: a publisher of fakes, one who announces types, one who sends garbage, a
+// reader who has no keys. Each is a process of its own.
 #include <signal.h>
 
 #include <algorithm>
@@ -36,8 +36,9 @@ class Strangers : public ShopFloor {
   /// How often abbe-dds was started so far.
   [[nodiscard]] long starts() {
     const auto lines = feeder_->lines();
-    return std::ranges::count_if(
-        lines, [](const Line& line) { return line.text.starts_with("child ") && line.text != "child 0"; });
+    return std::ranges::count_if(lines, [](const Line& line) {
+      return line.text.starts_with("child ") && line.text != "child 0";
+    });
   }
   static bool has_fake(Process& subscriber) {
     return subscriber.transcript().find(kFake) != std::string::npos;
@@ -112,11 +113,14 @@ TEST_F(StrangersWithSecurity, NothingIsBelievedNobodyDiesNothingIsLost) {
     Process types(stranger("types"));
     Process garbage(stranger("garbage"));
     Process reader(watch({"--until-model", "--timeout", seconds}));
-    Process rogue_reader(watch({"--until-model", "--timeout", seconds, "--security", directory_ / "rogue"}));
-    for (Process* stranger : {&fake, &rogue, &types, &garbage}) EXPECT_TRUE(stranger->wait_for("started"));
+    Process rogue_reader(
+        watch({"--until-model", "--timeout", seconds, "--security", directory_ / "rogue"}));
+    for (Process* stranger : {&fake, &rogue, &types, &garbage})
+      EXPECT_TRUE(stranger->wait_for("started"));
     const auto patience = std::chrono::seconds{20 + std::stoi(seconds)};
     EXPECT_EQ(reader.wait_for_end(patience), 1) << "a model was read without keys";
-    EXPECT_EQ(rogue_reader.wait_for_end(patience), 1) << "a model was read with keys of another authority";
+    EXPECT_EQ(rogue_reader.wait_for_end(patience), 1)
+        << "a model was read with keys of another authority";
   }
   for (Process* subscriber : {&fast, &cyclone}) {
     EXPECT_TRUE(subscriber->wait_for("vmc-3: apply V", Clock::now())) << subscriber->transcript();
@@ -128,13 +132,15 @@ TEST_F(StrangersWithSecurity, NothingIsBelievedNobodyDiesNothingIsLost) {
   const double gap_ms = milliseconds(vectors.longest_gap);
   const VectorCount counted = counted_by(counter);
   std::printf(
-      "figure: strangers with security: believed 0, deaths %ld, vectors lost %ld of %ld; a watcher that "
+      "figure: strangers with security: believed 0, deaths %ld, vectors lost %ld of %ld; a watcher "
+      "that "
       "keeps "
       "the last one missed %ld of %ld, longest gap %.0f ms\n",
       starts() - 1, counted.lost, counted.seen + counted.lost, vectors.overwritten,
       vectors.seen + vectors.overwritten, gap_ms);
   EXPECT_GT(counted.seen, 0);
-  // On a computer busy with other things abbe-dds discards vectors that waited, with and without strangers.
+  // On a computer busy with other things abbe-dds discards vectors that waited, with and without
+  // strangers.
   if (std::getenv("ABBE_STRANGERS_SECONDS") != nullptr) {
     EXPECT_EQ(counted.lost, 0);
   }
@@ -145,14 +151,16 @@ TEST_F(StrangersWithSecurity, NothingIsBelievedNobodyDiesNothingIsLost) {
 TEST_F(StrangersWithSecurity, BothSubscribersReturnAfterEveryKillOfAbbeDds) {
   for (int kill = 0; kill < 4; ++kill) {
     for (Process* subscriber : {&fast, &cyclone})
-      ASSERT_TRUE(subscriber->wait_for("vmc-3: apply V", Clock::now())) << kill << subscriber->transcript();
+      ASSERT_TRUE(subscriber->wait_for("vmc-3: apply V", Clock::now()))
+          << kill << subscriber->transcript();
     EXPECT_FALSE(cyclone.wait_for("nothing", Clock::now(), 2s));  // time for announcements
     const auto killed = Clock::now();
     ::kill(abbe_dds_pid(), SIGKILL);
-    // On a busy computer a handshake may lose a message; it is repeated when the participant's lease of 40 s
-    // ends.
+    // On a busy computer a handshake may lose a message; it is repeated when the participant's
+    // lease of 40 s ends.
     for (Process* subscriber : {&fast, &cyclone})
-      EXPECT_TRUE(subscriber->wait_for("vmc-3: publisher is ", killed)) << kill << subscriber->transcript();
+      EXPECT_TRUE(subscriber->wait_for("vmc-3: publisher is ", killed))
+          << kill << subscriber->transcript();
   }
 }
 
@@ -165,7 +173,7 @@ class StrangersWithoutSecurity : public Strangers {
       ASSERT_TRUE(subscriber->wait_for("vmc-3: apply V")) << subscriber->transcript();
     ASSERT_TRUE(watcher.wait_for("vmc-3  publisher is alive")) << watcher.transcript();
   }
-  void expect_rival_reported() {
+  void expect_foreign_sync_reported() {
     for (Process* subscriber : {&fast, &cyclone})
       EXPECT_TRUE(subscriber->wait_for("vmc-3: rival publisher ")) << subscriber->transcript();
     const auto line = watcher.wait_for("vmc-3  rival publisher ");
@@ -184,19 +192,20 @@ class StrangersWithoutSecurity : public Strangers {
 
 TEST_F(StrangersWithoutSecurity, FakesOfALaterPublisherAreIgnoredAndReported) {
   Process fake(stranger("fake"));
-  expect_rival_reported();
+  expect_foreign_sync_reported();
   const auto reported = Clock::now();
   for (Process* subscriber : {&fast, &cyclone})
     EXPECT_TRUE(subscriber->wait_for("vmc-3: apply V", reported)) << subscriber->transcript();
   expect_no_fake();
 }
 
-/// The successor never sent beside the one before; the rival did.
+/// The successor never sent beside the one before; the foreign did.
 TEST_F(StrangersWithoutSecurity, ARivalDoesNotTakeThePlaceOfARestartedPublisher) {
   Process fake(stranger("fake"));
-  expect_rival_reported();
+  expect_foreign_sync_reported();
   const auto killed = Clock::now();
   ::kill(abbe_dds_pid(), SIGKILL);
+
   for (Process* subscriber : {&fast, &cyclone}) {
     const auto next = subscriber->wait_for("vmc-3: publisher is ", killed);
     ASSERT_TRUE(next) << subscriber->transcript();
@@ -204,6 +213,7 @@ TEST_F(StrangersWithoutSecurity, ARivalDoesNotTakeThePlaceOfARestartedPublisher)
     std::printf("  next publisher after %.0f ms\n",
                 std::chrono::duration<double, std::milli>(next->came - killed).count());
   }
+
   EXPECT_TRUE(watcher.wait_for("vmc-3  publisher is now ", killed)) << watcher.transcript();
   expect_no_fake();
 }
@@ -248,8 +258,8 @@ TEST_F(UninvitedWithoutSecurity, GarbageEndsNothingAndMakesNoGap) {
   expect_nothing_ends_and_no_gap_of_half_a_second("garbage");
 }
 
-/// The watcher has model and grid of vmc-3 and waits for its state; the stranger's state is ACTIVE and its
-/// grid has the same model_id.
+/// The watcher has model and grid of vmc-3 and waits for its state; the stranger's state is ACTIVE
+/// and its grid has the same model_id.
 TEST_F(Strangers, AFakeGridBesideTheTrueOneIsNotBelieved) {
   ::setenv("ABBE_FEEDER_STALE", "1", 1);
   start_feeder();
@@ -269,7 +279,8 @@ TEST_F(Strangers, AFakeGridBesideTheTrueOneIsNotBelieved) {
   std::size_t nodes = 0;
   for (std::getline(written, line); std::getline(written, line); ++nodes) {
     std::array<double, 3> error_um{};
-    ASSERT_EQ(std::sscanf(line.c_str(), "%*f,%*f,%*f,%lf,%lf,%lf", &error_um[0], &error_um[1], &error_um[2]),
+    ASSERT_EQ(std::sscanf(line.c_str(), "%*f,%*f,%*f,%lf,%lf,%lf", &error_um[0], &error_um[1],
+                          &error_um[2]),
               3)
         << line;
     for (const double e : error_um) EXPECT_LT(std::abs(e), 100.0) << line;
@@ -279,16 +290,17 @@ TEST_F(Strangers, AFakeGridBesideTheTrueOneIsNotBelieved) {
 
 TEST_F(Strangers, WatchReportsThatSecurityIsOff) {
   const std::string log = directory_ / "log";
-  Process watcher({"/bin/sh", "-c", "exec \"$@\" 2>&1", "sh", ABBE_WATCH_PROGRAM, "--domain", domain_.text(),
-                   "--profile", ABBE_LOOPBACK_PROFILE, "--until-model", "--timeout", "0.1"});
+  Process watcher({"/bin/sh", "-c", "exec \"$@\" 2>&1", "sh", ABBE_WATCH_PROGRAM, "--domain",
+                   domain_.text(), "--profile", ABBE_LOOPBACK_PROFILE, "--until-model", "--timeout",
+                   "0.1"});
   EXPECT_EQ(watcher.wait_for_end(), 1);
   EXPECT_NE(watcher.transcript().find("DDS Security is off: anyone on domain " + domain_.text()),
             std::string::npos);
 }
 
 TEST_F(Strangers, MissingKeysEndWithThree) {
-  Process program(
-      {ABBE_DDS_PROGRAM, "--socket", directory_ / "dds.sock", "--security", directory_ / "nowhere"});
+  Process program({ABBE_DDS_PROGRAM, "--socket", directory_ / "dds.sock", "--security",
+                   directory_ / "nowhere"});
   EXPECT_EQ(program.wait_for_end(), 3);
 }
 

@@ -1,4 +1,5 @@
-// Counts the vectors of the feeder that arrive and those that are lost on the way, by their sequence numbers:
+// Counts the vectors of the feeder that arrive and those that are lost on the way, by their
+// sequence numbers:
 //   dds_vector_counter DOMAIN KEYS     prints "vectors SEEN LOST" five times a second until it is killed.
 // It takes each one on the thread that receives it and keeps 1000, so that none is overwritten by the next,
 // as with a reader that keeps the last one only.
@@ -68,8 +69,8 @@ class VectorCounter final : private eprosima::fastdds::dds::DataReaderListener {
       const auto vector = info.valid_data ? daemon::decode<v1::Compensation>(payload_.bytes)
                                           : tl::make_unexpected(daemon::Error{});
       if (!vector) continue;
-      // The feeder numbers every message: one Snapshot, and a ModelState each second, come between two
-      // vectors.
+      // The feeder numbers every message: one Snapshot, and a ModelState each second, come between
+      // two vectors.
       const auto now = static_cast<long>(vector->sequence_number());
       if (last_ != 0 && now > last_ + 3) count_.lost += (now - last_) / 2 - 1;
       last_ = now;

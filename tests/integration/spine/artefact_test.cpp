@@ -1,4 +1,5 @@
-/// `abbe calibrate artefact`: the command, the daemon and a simulated measuring machine over I++ DME.
+/// `abbe calibrate artefact`: the command, the daemon and a simulated measuring machine over I++
+/// DME.
 
 #include <gmock/gmock.h>
 
@@ -28,6 +29,7 @@ struct ArtefactRun : CounterCardRun {
     std::mt19937_64 random(11);
     std::normal_distribution<double> off(0.0, off_mm);
     std::string text = "[calibrator]\nname = \"L\"\ntip_radius_mm = 1.5\n";
+
     for (int i = 1; i <= kBalls; ++i) {
       const double along = 60.0 * (i <= 5 ? i - 1 : i - 5);
       const double x = i <= 5 ? along : 0.0, y = i <= 5 ? 0.0 : along;
@@ -37,6 +39,7 @@ struct ArtefactRun : CounterCardRun {
               "\nz_mm = " + std::to_string(60 + off(random)) +
               "\nradius_mm = " + std::to_string(12.7 + off(random)) + "\n";
     }
+
     const double c = std::cos(u_block_rad), s = std::sin(u_block_rad);
     text += "[[block]]\nnumber = 1\nnormal = [" + std::to_string(s) + ", 0, " + std::to_string(c) +
             "]\nx_mm = " + std::to_string(at_mm + 60) + "\ny_mm = " + std::to_string(at_mm + 60) +
@@ -44,6 +47,7 @@ struct ArtefactRun : CounterCardRun {
     text += "[[block]]\nnumber = 2\nnormal = [0, " + std::to_string(-c) + ", " + std::to_string(s) +
             "]\nx_mm = " + std::to_string(at_mm + 90) + "\ny_mm = " + std::to_string(at_mm + 80) +
             "\nz_mm = 45\nhalf_size_mm = 10\n";
+
     return text;
   }
   static std::string machine_table(int port) {
@@ -58,8 +62,8 @@ struct ArtefactRun : CounterCardRun {
     write("machine.toml", text_of(file("machine.toml")) + machine_table(0));
     write("sim.toml", replaced(text_of(file("sim.toml")), "standstill_s = [0-9]+",
                                "standstill_s = 1\nstart_when_streaming = false") +
-                          "[sim.cmm]\nartefact = \"true.toml\"\nnoise_um = " + std::to_string(kNoise_um) +
-                          "\n" + more);
+                          "[sim.cmm]\nartefact = \"true.toml\"\nnoise_um = " +
+                          std::to_string(kNoise_um) + "\n" + more);
     ASSERT_NO_FATAL_FAILURE(start_simulator());
     write_configuration_of(machine_table(port("cmm_port")));
     ASSERT_NO_FATAL_FAILURE(start_abbed());
@@ -85,8 +89,8 @@ struct ArtefactRun : CounterCardRun {
     const auto answer = daemon::ask_daemon(file("run/control.sock"), {{"do", "machine"}});
     return answer ? *answer : json{{"release_awaited", false}};
   }
-  /// The tip stays where it is while fifty positions would have been reported, and the status says what to
-  /// do.
+  /// The tip stays where it is while fifty positions would have been reported, and the status says
+  /// what to do.
   void expect_standing_until_released() const {
     const json tip = machine()["tip_m"];
     EXPECT_TRUE(machine()["release_awaited"]) << machine().dump();
@@ -101,17 +105,21 @@ struct ArtefactRun : CounterCardRun {
   void release() const {
     EXPECT_EQ(run({ABBE_PROGRAM, "machine", "release", "-c", file("abbed.toml")}).code, 0);
     EXPECT_TRUE(eventually([&] {
-      const auto at = daemon::ask_daemon(file("run/control.sock"), {{"do", "touch"}, {"where", true}});
+      const auto at =
+          daemon::ask_daemon(file("run/control.sock"), {{"do", "touch"}, {"where", true}});
       return at.has_value();
     })) << status().dump(1);
   }
   [[nodiscard]] bool has_touched() const { return !touches()["touches"].empty(); }
   [[nodiscard]] std::size_t lines_of(const std::string& name) const {
     const std::string text = text_of(file(name));
-    return text.empty() ? 0 : static_cast<std::size_t>(std::count(text.begin(), text.end(), '\n')) - 1;
+    return text.empty() ? 0
+                        : static_cast<std::size_t>(std::count(text.begin(), text.end(), '\n')) - 1;
   }
   [[nodiscard]] std::size_t kept_touches() const { return lines_of("calibrator.touches.csv"); }
-  [[nodiscard]] std::size_t touches_aside() const { return lines_of("calibrator.touches.partial.csv"); }
+  [[nodiscard]] std::size_t touches_aside() const {
+    return lines_of("calibrator.touches.partial.csv");
+  }
 };
 
 TEST_F(ArtefactRun, FindsTheBallsWithinTheStatedUncertainty) {
@@ -123,24 +131,29 @@ TEST_F(ArtefactRun, FindsTheBallsWithinTheStatedUncertainty) {
   const auto truth = daemon::read_calibrator_toml(file("true.toml"));
   ASSERT_TRUE(found) << found.error().text;
   ASSERT_TRUE(truth) << truth.error().text;
+
   for (std::size_t i = 0; i < kBalls; ++i) {
     const auto& ball = found->calibrator.balls[i];
     const auto& is = truth->calibrator.balls[i];
     // Four standard uncertainties per coordinate: once in 16,000.
-    EXPECT_LT((ball.centre_m - is.centre_m).cwiseAbs().maxCoeff(), 4.0 * ball.u_m) << "ball " << i + 1;
+    EXPECT_LT((ball.centre_m - is.centre_m).cwiseAbs().maxCoeff(), 4.0 * ball.u_m)
+        << "ball " << i + 1;
     EXPECT_GE(ball.u_m, 1e-6 * kMachine_um);
     EXPECT_LT(ball.u_m, 3e-6);  // not so large that anything would agree
     EXPECT_NEAR(ball.radius_m, is.radius_m, 4.0 * ball.u_m);
   }
+
   for (std::size_t i = 0; i < 2; ++i) {
     const auto& block = found->calibrator.blocks[i];
-    EXPECT_LT((block.normal - truth->calibrator.blocks[i].normal.normalized()).norm(), 4.0 * block.u_rad);
+    EXPECT_LT((block.normal - truth->calibrator.blocks[i].normal.normalized()).norm(),
+              4.0 * block.u_rad);
   }
 }
 
 TEST_F(ArtefactRun, SaysWhyTheMachineRefusedATouchAndKeepsTheOthers) {
   ASSERT_NO_FATAL_FAILURE(start());
-  write("nominal.toml", replaced(artefact(0.0, 0.0), "number = 3\nx_mm = 120", "number = 3\nx_mm = 150"));
+  write("nominal.toml",
+        replaced(artefact(0.0, 0.0), "number = 3\nx_mm = 120", "number = 3\nx_mm = 150"));
   write("calibrator.touches.csv", "of an earlier run\n");
   const auto refused = calibrate({"--points", "5"});
   EXPECT_EQ(refused.code, 1) << refused.out;
@@ -199,13 +212,15 @@ TEST_F(ArtefactRun, EndsTheTouchingWhenWhoeverAskedIsGone) {
 TEST_F(ArtefactRun, NeedsAMeasuringMachineAndKnownFaces) {
   write_path("path.csv", {{0, 0, -50}, {1, 0, -50}});
   write("nominal.toml", artefact(0.0, 0.0));
+
   ASSERT_NO_FATAL_FAILURE(start_simulator());
   write_configuration();
   ASSERT_NO_FATAL_FAILURE(start_abbed());
   const auto none = calibrate();
   EXPECT_EQ(none.code, 5);
   EXPECT_THAT(none.err, HasSubstr("[cmm]"));
-  write("nominal.toml", replaced(artefact(0.0, 0.0), "x_mm = 90[.0]*\ny_mm = 80[.0]*\nz_mm = 45\n", ""));
+  write("nominal.toml",
+        replaced(artefact(0.0, 0.0), "x_mm = 90[.0]*\ny_mm = 80[.0]*\nz_mm = 45\n", ""));
   const auto faceless = calibrate();
   EXPECT_EQ(faceless.code, 3);
   EXPECT_THAT(faceless.err, HasSubstr("block 2"));

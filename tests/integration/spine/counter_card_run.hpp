@@ -1,5 +1,6 @@
 #pragma once
-/// The axes come from a counter card instead of CAN encoders: abbe-sim plays it over USB/IP, abbed reads it.
+/// The axes come from a counter card instead of CAN encoders: abbe-sim plays it over USB/IP, abbed
+/// reads it.
 
 #include <regex>
 #include <string>
@@ -17,8 +18,8 @@ struct CounterCardRun : Spine {
   [[nodiscard]] std::string card_at_its_port() const {
     return wiring(wiring_ + "port = " + std::to_string(port("usbip_port")) + "\n");
   }
-  /// The simulator reads the same wiring as the daemon. `more`: further tables of both; PORT_2 stands for the
-  /// second card's port.
+  /// The simulator reads the same wiring as the daemon. `more`: further tables of both; PORT_2
+  /// stands for the second card's port.
   void start_both(std::string more = {}) {
     const std::string anywhere = std::regex_replace(more, std::regex{"PORT_2"}, "0");
     write("machine.toml", text_of(file("machine.toml")) + wiring(wiring_) + anywhere);

@@ -20,9 +20,10 @@ namespace fs = std::filesystem;
 struct CountingRun : CounterCardRun {
   void SetUp() override {
     speed_ = "1";
-    write("sim.toml",
-          at_speed(replaced(text_of(file("sim.toml")), "standstill_s = [0-9]+", "standstill_s = 600")));
+    write("sim.toml", at_speed(replaced(text_of(file("sim.toml")), "standstill_s = [0-9]+",
+                                        "standstill_s = 600")));
     write_path("path.csv", path());
+
     ASSERT_NO_FATAL_FAILURE(start_both());
     ASSERT_EQ(abbed_->stop(), 0) << abbed_->err();
     without_zero_here();
@@ -30,7 +31,8 @@ struct CountingRun : CounterCardRun {
     ASSERT_NO_FATAL_FAILURE(start_abbed());
     ASSERT_TRUE(eventually([&] { return here().code == 0; })) << here().err;
     ASSERT_TRUE(eventually([&] { return referenced() && fs::exists(kept()); })) << status().dump(1);
-    ASSERT_TRUE(eventually([&] { return text_of(kept()).find("reading_at_zero") != std::string::npos; }));
+    ASSERT_TRUE(
+        eventually([&] { return text_of(kept()).find("reading_at_zero") != std::string::npos; }));
   }
   /// Else whatever the counters begin at would count as referenced.
   void without_zero_here() const {

@@ -1,6 +1,6 @@
 #pragma once
-/// Stops one thread of a program, while its other threads go on: what a hub looks like that hangs. By ptrace,
-/// so the thread that stops it must be the one that waits for the program's end.
+/// Stops one thread of a program, while its other threads go on: what a hub looks like that hangs.
+/// By ptrace, so the thread that stops it must be the one that waits for the program's end.
 
 #include <sys/ptrace.h>
 #include <sys/wait.h>
@@ -14,8 +14,10 @@ namespace abbe::test {
 
 /// 0: there is none of that name.
 inline pid_t thread_of(pid_t process, const std::string& name) {
-  for (const auto& task : std::filesystem::directory_iterator{"/proc/" + std::to_string(process) + "/task"})
-    if (text_of(task.path() / "comm") == name + "\n") return std::stoi(task.path().filename().string());
+  for (const auto& task :
+       std::filesystem::directory_iterator{"/proc/" + std::to_string(process) + "/task"})
+    if (text_of(task.path() / "comm") == name + "\n")
+      return std::stoi(task.path().filename().string());
   return 0;
 }
 

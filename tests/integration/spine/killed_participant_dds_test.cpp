@@ -22,7 +22,9 @@ struct KilledDds : Spine {
   }
   [[nodiscard]] std::uint64_t connections() const {
     const auto now = status();
-    return now.is_object() && now["dds"]["connected"] ? now["dds"]["connections"].get<std::uint64_t>() : 0;
+    return now.is_object() && now["dds"]["connected"]
+               ? now["dds"]["connections"].get<std::uint64_t>()
+               : 0;
   }
 };
 
@@ -30,6 +32,7 @@ TEST_F(KilledDds, IsReplacedWhileAcquisitionGoesOn) {
   write_path("path.csv", path());
   ASSERT_NO_FATAL_FAILURE(start_simulator());
   write_configuration("child");
+
   ASSERT_NO_FATAL_FAILURE(start_abbed());
   ASSERT_TRUE(eventually([this] { return connections() == 1; }));
   const pid_t killed = abbe_dds();
@@ -47,6 +50,7 @@ TEST_F(KilledDds, IsKilledAndReplacedWhenItHangs) {
   write_path("path.csv", path());
   ASSERT_NO_FATAL_FAILURE(start_simulator());
   write_configuration("child");
+
   ASSERT_NO_FATAL_FAILURE(start_abbed());
   ASSERT_TRUE(eventually([this] { return connections() == 1; }));
   const pid_t hung = abbe_dds();
@@ -56,7 +60,8 @@ TEST_F(KilledDds, IsKilledAndReplacedWhenItHangs) {
   EXPECT_NE(dds["process"], hung);
   EXPECT_EQ(dds["restarts"], 1);
   EXPECT_THAT(dds["last_end"].get<std::string>(), testing::HasSubstr("did not answer"));
-  EXPECT_THAT(dds["security"].get<std::string>(), testing::HasSubstr("DDS Security is off: anyone on domain"));
+  EXPECT_THAT(dds["security"].get<std::string>(),
+              testing::HasSubstr("DDS Security is off: anyone on domain"));
 }
 
 }  // namespace

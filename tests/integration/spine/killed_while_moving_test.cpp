@@ -20,13 +20,14 @@ namespace {
 using nlohmann::json;
 using testing::HasSubstr;
 
-/// The simulated machine on its port, in real time, in a thread of its own. It goes on with its motion when
-/// the connection closes.
+/// The simulated machine on its port, in real time, in a thread of its own. It goes on with its
+/// motion when the connection closes.
 class MachineInAThread {
  public:
   explicit MachineInAThread(const sim::IppDmeOptions& options)
       : server_(
-            sim::IppDmeServer::open(0, std::make_unique<sim::IppDmeDevice>(options, clock_.now())).value()),
+            sim::IppDmeServer::open(0, std::make_unique<sim::IppDmeDevice>(options, clock_.now()))
+                .value()),
         thread_([this] { run(); }) {}
   MachineInAThread(const MachineInAThread&) = delete;
   MachineInAThread& operator=(const MachineInAThread&) = delete;
@@ -67,8 +68,9 @@ class MachineInAThread {
 };
 
 bool moves_or_clears(const std::string& command) {
-  return command.starts_with("GoTo") || command.starts_with("PtMeas") || command.starts_with("Home") ||
-         command.starts_with("StartSession") || command.starts_with("ClearAllErrors");
+  return command.starts_with("GoTo") || command.starts_with("PtMeas") ||
+         command.starts_with("Home") || command.starts_with("StartSession") ||
+         command.starts_with("ClearAllErrors");
 }
 
 struct KilledWhileMoving : Spine {
@@ -81,15 +83,16 @@ struct KilledWhileMoving : Spine {
     return machine;
   }
   void start_at(MachineInAThread& machine, const std::string& more = {}) {
-    write_configuration_of("[cmm]\nhost = \"127.0.0.1\"\nport = " + std::to_string(machine.port()) + "\n" +
-                           more);
+    write_configuration_of("[cmm]\nhost = \"127.0.0.1\"\nport = " + std::to_string(machine.port()) +
+                           "\n" + more);
     write("abbed.toml", replaced(text_of(file("abbed.toml")), "\nspeed = [0-9]+", "\nspeed = 1"));
     ASSERT_NO_FATAL_FAILURE(start_abbed());
   }
   [[nodiscard]] auto ask(const json& request) const {
     return daemon::ask_daemon(directory_ / "run" / "control.sock", request);
   }
-  /// Killed in `motion`, started again: the machine hears AbortE first, stands, and waits for a person.
+  /// Killed in `motion`, started again: the machine hears AbortE first, stands, and waits for a
+  /// person.
   void expect_stopped_by_the_next_start(MachineInAThread& machine, const std::string& motion) {
     ASSERT_TRUE(machine.moving());
     abbed_->signal(SIGKILL);
@@ -101,13 +104,16 @@ struct KilledWhileMoving : Spine {
     ASSERT_NO_FATAL_FAILURE(start_abbed());
     ASSERT_TRUE(eventually([&] { return machine.heard().size() > before; })) << abbed_->err();
     EXPECT_EQ(machine.heard()[before], "AbortE()");
-    ASSERT_TRUE(eventually([&] { return stream("cmm")["state"] == "awaiting release"; })) << status().dump(1);
+    ASSERT_TRUE(eventually([&] { return stream("cmm")["state"] == "awaiting release"; }))
+        << status().dump(1);
     EXPECT_FALSE(machine.moving());
     const Eigen::Vector3d stopped_m = machine.reading_m();
     EXPECT_FALSE(ask(touch_request())) << "nothing moves before a release";
-    EXPECT_THAT(status()["release_awaited"]["reason"].get<std::string>(), HasSubstr("before the restart"));
+    EXPECT_THAT(status()["release_awaited"]["reason"].get<std::string>(),
+                HasSubstr("before the restart"));
     const auto heard = machine.heard();
-    for (std::size_t i = before; i < heard.size(); ++i) EXPECT_FALSE(moves_or_clears(heard[i])) << heard[i];
+    for (std::size_t i = before; i < heard.size(); ++i)
+      EXPECT_FALSE(moves_or_clears(heard[i])) << heard[i];
     EXPECT_EQ(machine.reading_m(), stopped_m);
 
     const auto released = ask({{"do", "machine"}, {"release", true}});
@@ -118,7 +124,8 @@ struct KilledWhileMoving : Spine {
   static json touch_request() {
     return {
         {"do", "touch"},
-        {"points", {{{"way", json::array()}, {"at_m", {0.05, 0.05, -0.1355}}, {"normal", {0.0, 0.0, 1.0}}}}}};
+        {"points",
+         {{{"way", json::array()}, {"at_m", {0.05, 0.05, -0.1355}}, {"normal", {0.0, 0.0, 1.0}}}}}};
   }
 };
 
@@ -126,7 +133,8 @@ TEST_F(KilledWhileMoving, ATouchIsAbortedByTheNextStart) {
   MachineInAThread machine{slow_machine()};
   ASSERT_NO_FATAL_FAILURE(start_at(machine));
   ASSERT_TRUE(eventually([&] { return ask(touch_request()).has_value(); })) << status().dump(1);
-  ASSERT_TRUE(eventually([&] { return machine.moving() && machine.heard().back().starts_with("PtMeas"); }));
+  ASSERT_TRUE(
+      eventually([&] { return machine.moving() && machine.heard().back().starts_with("PtMeas"); }));
   expect_stopped_by_the_next_start(machine, "PtMeas");
 }
 
@@ -135,7 +143,8 @@ TEST_F(KilledWhileMoving, HomingIsAbortedByTheNextStart) {
   options.homed = false;
   MachineInAThread machine{options};
   ASSERT_NO_FATAL_FAILURE(start_at(machine, "home = true\n"));
-  ASSERT_TRUE(eventually([&] { return machine.moving() && machine.heard().back().starts_with("Home"); }));
+  ASSERT_TRUE(
+      eventually([&] { return machine.moving() && machine.heard().back().starts_with("Home"); }));
   expect_stopped_by_the_next_start(machine, "Home");
 }
 
@@ -143,7 +152,8 @@ TEST_F(KilledWhileMoving, AHubThatHangsDoesNotKeepTheEndFromStoppingTheMachine) 
   MachineInAThread machine{slow_machine()};
   ASSERT_NO_FATAL_FAILURE(start_at(machine));
   ASSERT_TRUE(eventually([&] { return ask(touch_request()).has_value(); })) << status().dump(1);
-  ASSERT_TRUE(eventually([&] { return machine.moving() && machine.heard().back().starts_with("PtMeas"); }));
+  ASSERT_TRUE(
+      eventually([&] { return machine.moving() && machine.heard().back().starts_with("PtMeas"); }));
   const pid_t hub = thread_of(abbed_->pid(), "abbe-hub");
   ASSERT_GT(hub, 0);
   if (!stop_thread(hub)) GTEST_SKIP() << "ptrace is not allowed here";

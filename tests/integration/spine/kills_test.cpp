@@ -1,5 +1,6 @@
-/// SIGKILL at random moments of whole runs: nothing that was finished is lost, and the next start closes what
-/// was left. ABBE_KILLS says how many (scripts/soak kills N); ABBE_KILLS_SEED repeats a run's moments.
+/// SIGKILL at random moments of whole runs: nothing that was finished is lost, and the next start
+/// closes what was left. ABBE_KILLS says how many (scripts/soak kills N); ABBE_KILLS_SEED repeats a
+/// run's moments.
 
 #include <fmt/format.h>
 #include <gmock/gmock.h>
@@ -30,7 +31,8 @@ unsigned number_from(const char* variable, unsigned otherwise) {
 
 class Kills : public Spine {
  protected:
-  // A start, a run of 55 s of host time, its identification and the store: the moments lie anywhere in it.
+  // A start, a run of 55 s of host time, its identification and the store: the moments lie anywhere
+  // in it.
   static constexpr std::chrono::milliseconds kWholeRun{2000 + 100'000 / ABBE_SPINE_SPEED};
 
   Kills() : seed_(number_from("ABBE_KILLS_SEED", std::random_device{}())), random_(seed_) {
@@ -39,7 +41,8 @@ class Kills : public Spine {
   }
 
   std::chrono::milliseconds some_moment(std::chrono::milliseconds at_most) {
-    return std::chrono::milliseconds{std::uniform_int_distribution<long>{0, at_most.count()}(random_)};
+    return std::chrono::milliseconds{
+        std::uniform_int_distribution<long>{0, at_most.count()}(random_)};
   }
   unsigned one_of(unsigned n) { return std::uniform_int_distribution<unsigned>{0, n - 1}(random_); }
 
@@ -53,9 +56,9 @@ class Kills : public Spine {
     write_configuration("off");
 #endif
     ASSERT_NO_FATAL_FAILURE(start_abbed());
-    calibration_ =
-        start({ABBE_PROGRAM, "calibrate", "otf", "-c", file("abbed.toml"), "--path", file("path.csv")},
-              "calibrate");
+    calibration_ = start(
+        {ABBE_PROGRAM, "calibrate", "otf", "-c", file("abbed.toml"), "--path", file("path.csv")},
+        "calibrate");
   }
   /// Looks on until the moment has come. The simulator goes on once the session waits for it.
   void look_on(std::chrono::milliseconds moment) {
@@ -102,9 +105,11 @@ class Kills : public Spine {
     const auto is_open = [this](const fs::path& part) {
       return part.filename() == fs::path{status().value("recording", "")}.filename();
     };
+
     for (const auto& left : left_) {
       const auto& finished = left.first;  // a structured binding cannot be captured with clang 14
-      ASSERT_TRUE(eventually([&] { return fs::exists(finished); })) << finished << "\n" << abbed_->err();
+      ASSERT_TRUE(eventually([&] { return fs::exists(finished); })) << finished << "\n"
+                                                                    << abbed_->err();
       const auto reader = daemon::RecordingReader::open(finished);
       ASSERT_TRUE(reader) << reader.error().text;
       EXPECT_TRUE(reader->closed_cleanly()) << finished;
@@ -112,6 +117,7 @@ class Kills : public Spine {
       EXPECT_EQ(reader->message_count(), left.second) << finished;
       fs::remove(finished);  // hundreds of them
     }
+
     left_.clear();
     EXPECT_TRUE(eventually([&] {
       for (const auto& one : recordings())
@@ -142,10 +148,11 @@ class Kills : public Spine {
   }
   void kill_abbe_model() {
     if (models_.empty()) return kill_abbed();
-    Program command({ABBE_PROGRAM, "model", "activate", *models_.begin(), "--force", "--why", "kills", "-c",
-                     file("abbed.toml")},
+    Program command({ABBE_PROGRAM, "model", "activate", *models_.begin(), "--force", "--why",
+                     "kills", "-c", file("abbed.toml")},
                     directory_ / "model");
-    (void)::usleep(static_cast<useconds_t>(1000 * some_moment(std::chrono::milliseconds{60}).count()));
+    (void)::usleep(
+        static_cast<useconds_t>(1000 * some_moment(std::chrono::milliseconds{60}).count()));
     command.signal(SIGKILL);
     (void)command.wait_for_end();
     note(status());
@@ -184,12 +191,15 @@ TEST_F(Kills, LoseNothingThatWasFinishedAndLeaveNothingBehind) {
     recorded_ = 0;
     calibration_.reset();
     simulator_.reset();
-    if (round % 10 == 9) fmt::print("kills: {} of {}, {} models\n", round + 1, rounds, models_.size());
+    if (round % 10 == 9)
+      fmt::print("kills: {} of {}, {} models\n", round + 1, rounds, models_.size());
   }
+
   ASSERT_NO_FATAL_FAILURE(begin_round());
   expect_no_leftovers();
   fmt::print(
-      "figure: kills: {} of abbed, abbe-dds and `abbe model`: 0 finished chunks, 0 of {} models lost, every "
+      "figure: kills: {} of abbed, abbe-dds and `abbe model`: 0 finished chunks, 0 of {} models "
+      "lost, every "
       "leftover closed (asked: 500, 0, 0)\n",
       rounds, models_.size());
 }

@@ -1,5 +1,5 @@
-/// The real abbed hangs, comes back and dies, while somebody subscribes: nobody may go on compensating
-/// without it.
+/// The real abbed hangs, comes back and dies, while somebody subscribes: nobody may go on
+/// compensating without it.
 
 #include <gmock/gmock.h>
 #include <signal.h>
@@ -53,8 +53,8 @@ TEST_F(LostDaemon, IsSaidToItsSubscribersWhetherItHangsOrDies) {
   write_configuration("child");
   ASSERT_NO_FATAL_FAILURE(put_a_model_in_force());
   ASSERT_NO_FATAL_FAILURE(start_abbed());
-  watch_ = start({ABBE_WATCH_PROGRAM, "--domain", domain_.text(), "--profile", ABBE_LOOPBACK_PROFILE,
-                  "--json", "--timeout", "100"},
+  watch_ = start({ABBE_WATCH_PROGRAM, "--domain", domain_.text(), "--profile",
+                  ABBE_LOOPBACK_PROFILE, "--json", "--timeout", "100"},
                  "watch");
   ASSERT_TRUE(hears("ACTIVE")) << last_state().dump();
 

@@ -41,15 +41,18 @@ std::string replaced(const std::string& text, const std::string& pattern, const 
   return std::regex_replace(text, what, by);
 }
 
-Program::Program(std::vector<std::string> command, std::filesystem::path log) : log_(std::move(log)) {
+Program::Program(std::vector<std::string> command, std::filesystem::path log)
+    : log_(std::move(log)) {
   std::vector<char*> argv;
   for (std::string& word : command) argv.push_back(word.data());
   argv.push_back(nullptr);
   constexpr int kFresh = O_WRONLY | O_CREAT | O_TRUNC;
   posix_spawn_file_actions_t actions;
   ::posix_spawn_file_actions_init(&actions);
-  ::posix_spawn_file_actions_addopen(&actions, STDOUT_FILENO, with(log_, ".out").c_str(), kFresh, kReadable);
-  ::posix_spawn_file_actions_addopen(&actions, STDERR_FILENO, with(log_, ".err").c_str(), kFresh, kReadable);
+  ::posix_spawn_file_actions_addopen(&actions, STDOUT_FILENO, with(log_, ".out").c_str(), kFresh,
+                                     kReadable);
+  ::posix_spawn_file_actions_addopen(&actions, STDERR_FILENO, with(log_, ".err").c_str(), kFresh,
+                                     kReadable);
   EXPECT_EQ(::posix_spawn(&pid_, argv[0], &actions, nullptr, argv.data(), environ), 0) << argv[0];
   ::posix_spawn_file_actions_destroy(&actions);
 }

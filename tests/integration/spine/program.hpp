@@ -1,6 +1,6 @@
 #pragma once
-/// A program under test: started with its output in files, asked whether it still runs, stopped by its
-/// process id.
+/// A program under test: started with its output in files, asked whether it still runs, stopped by
+/// its process id.
 
 #include <sys/types.h>
 
@@ -13,7 +13,8 @@ namespace abbe::test {
 
 constexpr std::chrono::seconds kPatience{
     60};  ///< for anything another process does; only a failure waits it out
-constexpr std::chrono::seconds kPatienceForARun{180};  ///< for a machine's whole run, on a slow computer too
+constexpr std::chrono::seconds kPatienceForARun{
+    180};  ///< for a machine's whole run, on a slow computer too
 
 /// Asks every few milliseconds until `seen` says yes; false when it never did.
 template <class Condition>

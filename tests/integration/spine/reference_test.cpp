@@ -1,4 +1,5 @@
-/// `abbe reference` and `abbe calibrate probe`: the commands, the daemon and the simulator, on the wire.
+/// `abbe reference` and `abbe calibrate probe`: the commands, the daemon and the simulator, on the
+/// wire.
 
 #include <gmock/gmock.h>
 
@@ -10,14 +11,15 @@ namespace {
 using nlohmann::json;
 using testing::HasSubstr;
 
-/// In real time: how well two cards lie beside each other is a matter of this machine's punctuality.
+/// In real time: how well two cards lie beside each other is a matter of this machine's
+/// punctuality.
 struct ReferenceRun : CounterCardRun {
   static constexpr double kStart_mm = -15.0;  // X and Y; Z 100 mm below
 
   void SetUp() override {
     speed_ = "1";
-    write("sim.toml",
-          at_speed(replaced(text_of(file("sim.toml")), "standstill_s = [0-9]+", "standstill_s = 5")));
+    write("sim.toml", at_speed(replaced(text_of(file("sim.toml")), "standstill_s = [0-9]+",
+                                        "standstill_s = 5")));
   }
   /// Over the first marks of every scale at 4 mm/s, again and again.
   void write_traverses() const {
@@ -31,7 +33,8 @@ struct ReferenceRun : CounterCardRun {
            std::to_string(zero_mm) + " },\n";
   }
   static std::string second_card() {
-    return "[reference]\ntransport = \"usbip\"\nport = PORT_2\nserial_number = \"01ABBE08\"\nclock_MHz = 1\n"
+    return "[reference]\ntransport = \"usbip\"\nport = PORT_2\nserial_number = "
+           "\"01ABBE08\"\nclock_MHz = 1\n"
            "scan_rate_hz = 1000\nu_alignment_us = 8000\ntolerance_um = 50\naxes = [\n" +
            marks("X", 0, -18) + marks("Y", 1, -18) + marks("Z", 2, -118) + "]\n";
   }
@@ -60,12 +63,14 @@ TEST_F(ReferenceRun, FindsWhereTheCountersBegan) {
 
   // Both cards' bytes are recorded: the marks in them give the same datum once more.
   ASSERT_EQ(abbed_->stop(), 0) << abbed_->err();
-  const auto again = run({ABBE_PROGRAM, "replay", "--raw", "--json", recordings().front().string()});
+  const auto again =
+      run({ABBE_PROGRAM, "replay", "--raw", "--json", recordings().front().string()});
   const json datums = json::parse(again.out)["reference"];
   ASSERT_EQ(datums.size(), 3u) << again.out << again.err;
   for (const auto& datum : datums) {
     ASSERT_TRUE(datum["again"].is_number()) << datum.dump();
-    EXPECT_EQ(datum["again"].get<double>(), datum["live"].get<double>()) << datum.dump();  // to the last bit
+    EXPECT_EQ(datum["again"].get<double>(), datum["live"].get<double>())
+        << datum.dump();  // to the last bit
   }
 }
 
@@ -78,21 +83,25 @@ struct ProbeRun : CounterCardRun {
     for (const int feed : {60, 240, 480})
       for (int i = 0; i < 4; ++i) text += "0,0,-50.5," + std::to_string(feed) + "\n0,0,-49.5,600\n";
     write("path.csv", text);
-    write("sim.toml", text_of(file("sim.toml")) + "[sim.probe]\naxis = \"Z\"\nsurface_mm = -50\ndelay_us = " +
+    write("sim.toml", text_of(file("sim.toml")) +
+                          "[sim.probe]\naxis = \"Z\"\nsurface_mm = -50\ndelay_us = " +
                           std::to_string(kDelay_us) + "\njitter_us = 1\n");
   }
 };
 
 TEST_F(ProbeRun, CalibrationFindsTheDelayTheSimulatorHas) {
   write_touches();
-  // Latch and clock begin in step: with an external clock the first touches are known to half a scan only.
+  // Latch and clock begin in step: with an external clock the first touches are known to half a
+  // scan only.
   wiring_ = "clock_source = \"timer0\"\n";
+
   ASSERT_NO_FATAL_FAILURE(start_both("[probe]\ndelay_us = 0\n"));
-  ASSERT_TRUE(eventually([&] { return simulator_->err().find("path driven") != std::string::npos; }));
+  ASSERT_TRUE(
+      eventually([&] { return simulator_->err().find("path driven") != std::string::npos; }));
   ASSERT_TRUE(goes_on("counter_card"));
   ASSERT_EQ(abbed_->stop(), 0) << abbed_->err();
-  const auto fit =
-      run({ABBE_PROGRAM, "calibrate", "probe", "--recording", recordings().front().string(), "--json"});
+  const auto fit = run(
+      {ABBE_PROGRAM, "calibrate", "probe", "--recording", recordings().front().string(), "--json"});
   ASSERT_EQ(fit.code, 0) << fit.out << fit.err;
   const json delay = json::parse(fit.out);
   EXPECT_EQ(delay["touches"], 12);

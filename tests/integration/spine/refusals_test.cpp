@@ -20,7 +20,8 @@ struct Refusals : Spine {
     const std::string text = text_of(file("abbed.toml"));
     const auto at = text.find(word);
     EXPECT_NE(at, std::string::npos);
-    return std::to_string(1 + std::count(text.begin(), text.begin() + static_cast<std::ptrdiff_t>(at), '\n'));
+    return std::to_string(
+        1 + std::count(text.begin(), text.begin() + static_cast<std::ptrdiff_t>(at), '\n'));
   }
   void replace(const std::string& what, const std::string& by) {
     write("abbed.toml", replaced(text_of(file("abbed.toml")), what, by));

@@ -1,5 +1,5 @@
-/// From the wire to the model and back: a calibration, what it is worth, and the same once more from its
-/// recording.
+/// From the wire to the model and back: a calibration, what it is worth, and the same once more
+/// from its recording.
 
 #include <gmock/gmock.h>
 
@@ -17,16 +17,18 @@ struct ShortRun : Spine {
   void start_everything() {
     write_path("path.csv", path());
     start_simulator();
-    const auto truth = run({ABBE_SIM_PROGRAM, "truth", "--config", file("sim.toml"), "--grid", "5", "5", "5",
-                            "-o", file("truth.csv")});
+    const auto truth = run({ABBE_SIM_PROGRAM, "truth", "--config", file("sim.toml"), "--grid", "5",
+                            "5", "5", "-o", file("truth.csv")});
+
     ASSERT_EQ(truth.code, 0) << truth.err;
     hold_simulator();
 #ifdef ABBE_WITH_DDS
     write_configuration("child");
     start_abbed();
-    watch_ = start({ABBE_WATCH_PROGRAM, "--domain", domain_.text(), "--profile", ABBE_LOOPBACK_PROFILE,
-                    "--json", "--compare", file("truth.csv"), "--timeout", "100"},
-                   "watch");
+    watch_ =
+        start({ABBE_WATCH_PROGRAM, "--domain", domain_.text(), "--profile", ABBE_LOOPBACK_PROFILE,
+               "--json", "--compare", file("truth.csv"), "--timeout", "100"},
+              "watch");
 #else
     write_configuration("off");
     start_abbed();
@@ -48,8 +50,8 @@ struct ShortRun : Spine {
     EXPECT_EQ(watch_->wait_for_end(), 0) << watch_->err();
     const json compared = comparison();
     ASSERT_TRUE(compared.is_object());
-    // The tracker's noise on the blocks of this run, amplified by the fit, stays below a micrometre; the
-    // error is 60.
+    // The tracker's noise on the blocks of this run, amplified by the fit, stays below a
+    // micrometre; the error is 60.
     EXPECT_GT(compared["before_mean_um"], 30.0);
     EXPECT_LT(compared["after_mean_um"], 0.05 * compared["before_mean_um"].get<double>());
 #endif
@@ -68,8 +70,8 @@ struct ShortRun : Spine {
   }
 
   void expect_the_recording_gives_the_model(const std::string& id) {
-    const auto identified = run({ABBE_PROGRAM, "identify", "otf", "--recording", recordings().front(), "-o",
-                                 file("again"), "--json"});
+    const auto identified = run({ABBE_PROGRAM, "identify", "otf", "--recording",
+                                 recordings().front(), "-o", file("again"), "--json"});
     EXPECT_EQ(identified.code, 0) << identified.err;
     const json said = json::parse(identified.out, nullptr, false);
     ASSERT_TRUE(said.is_object()) << identified.out;
@@ -84,9 +86,11 @@ TEST_F(ShortRun, IsCalibratedPublishedRecordedAndReplayedTheSame) {
   ASSERT_NO_FATAL_FAILURE(start_everything());
   const auto calibrated = calibrate("path.csv");
   ASSERT_EQ(calibrated.code, 0) << calibrated.out << calibrated.err;
-  // Where others keep the processors busy, answers may miss their cycles for half a second: STALE, as it
-  // should.
-  EXPECT_TRUE(eventually([&] { return status()["model"]["state"] == "ACTIVE"; })) << status().dump(1);
+
+  // Where others keep the processors busy, answers may miss their cycles for half a second: STALE,
+  // as it should.
+  EXPECT_TRUE(eventually([&] { return status()["model"]["state"] == "ACTIVE"; }))
+      << status().dump(1);
   const json model = status()["model"];
   ASSERT_NO_FATAL_FAILURE(expect_subscriber_sees_a_smaller_error());
   EXPECT_EQ(abbed_->stop(), 0) << abbed_->err();
@@ -121,6 +125,7 @@ TEST_F(WrongPath, IsRefusedAndTheDaemonGoesOn) {
   EXPECT_THAT(refused.out, HasSubstr("another path is being driven"));
   EXPECT_TRUE(goes_on("encoder"));
   EXPECT_EQ(abbed_->stop(), 0);
+
   // 1: the recording holds no run that could be identified; that much it must tell.
   const auto replayed = run({ABBE_PROGRAM, "replay", "--json", recordings().front()});
   EXPECT_EQ(replayed.code, 1) << replayed.err;

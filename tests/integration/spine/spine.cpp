@@ -44,7 +44,8 @@ position_mm = [-350, -320, -150]
 rotation_rad = [0.0013, -0.0342, 1.1003]
 )";
 
-// The demo's walk between the corners and centres of its volume, as long as the 3 x 3 x 3 nodes here need it.
+// The demo's walk between the corners and centres of its volume, as long as the 3 x 3 x 3 nodes
+// here need it.
 constexpr std::size_t kLegs = 40;
 // The demo's volume (600 x 500 x 400 mm) on this one (200 mm each).
 constexpr std::array<double, 3> kShrink{200.0 / 600.0, 200.0 / 500.0, 200.0 / 400.0};
@@ -67,7 +68,8 @@ Spine::Spine() {
 
 Spine::~Spine() {
   if (HasFailure()) {
-    for (const char* log : {"abbed.err", "sim.err"}) fmt::print("--- {}\n{}\n", log, text_of(file(log)));
+    for (const char* log : {"abbed.err", "sim.err"})
+      fmt::print("--- {}\n{}\n", log, text_of(file(log)));
     fmt::print("--- status\n{}\n", status().dump(1));
   }
   abbed_.reset();
@@ -98,8 +100,8 @@ Spine::Vertices Spine::path() {
 
 void Spine::write_configuration(const std::string& dds) const {
   write_configuration_of(
-      tracker_table() +
-          to_toml(config_tables::Encoder{.peer_port = can_port_, .sync_period_us = 10'000, .step_nm = 10}),
+      tracker_table() + to_toml(config_tables::Encoder{
+                            .peer_port = can_port_, .sync_period_us = 10'000, .step_nm = 10}),
       dds);
 }
 
@@ -130,15 +132,16 @@ void Spine::start_simulator() {
 
 void Spine::start_simulator_as(std::vector<std::string> command) {
   simulator_ = start(std::move(command), "sim");
-  ASSERT_TRUE(
-      eventually([this] { return std::filesystem::exists(file("ports")) || !simulator_->running(); }));
+  ASSERT_TRUE(eventually(
+      [this] { return std::filesystem::exists(file("ports")) || !simulator_->running(); }));
 }
 
 std::uint16_t Spine::port(const std::string& name) const {
   const std::string ports = text_of(file("ports"));
   const auto at = ports.find(name + "=");
-  return at == std::string::npos ? 0
-                                 : static_cast<std::uint16_t>(std::stoi(ports.substr(at + name.size() + 1)));
+  return at == std::string::npos
+             ? 0
+             : static_cast<std::uint16_t>(std::stoi(ports.substr(at + name.size() + 1)));
 }
 
 void Spine::start_abbed() {
@@ -147,7 +150,8 @@ void Spine::start_abbed() {
   ASSERT_TRUE(abbed_->running()) << abbed_->err();
 }
 
-std::unique_ptr<Program> Spine::start(std::vector<std::string> command, const std::string& log) const {
+std::unique_ptr<Program> Spine::start(std::vector<std::string> command,
+                                      const std::string& log) const {
   return std::make_unique<Program>(std::move(command), directory_ / log);
 }
 
@@ -162,8 +166,9 @@ void Spine::hold_simulator() const {
 }
 
 Outcome Spine::calibrate(const std::string& path) const {
-  Program calibration({ABBE_PROGRAM, "calibrate", "otf", "-c", file("abbed.toml"), "--path", file(path)},
-                      directory_ / "calibrate");
+  Program calibration(
+      {ABBE_PROGRAM, "calibrate", "otf", "-c", file("abbed.toml"), "--path", file(path)},
+      directory_ / "calibrate");
   EXPECT_TRUE(eventually([&] {
     const json now = status();
     return !calibration.running() || (now.is_object() && now["session"]["state"] == "warming");

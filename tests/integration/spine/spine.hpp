@@ -1,6 +1,6 @@
 #pragma once
-/// A small simulated machine, abbed and the tools, each a process of its own, in a folder that goes with the
-/// test.
+/// A small simulated machine, abbed and the tools, each a process of its own, in a folder that goes
+/// with the test.
 
 #include <gtest/gtest.h>
 
@@ -34,7 +34,8 @@ class Spine : public testing::Test {
   // Files of the run.
   void write(const std::string& name, const std::string& text) const;
   void write_path(const std::string& name, const Vertices& vertices_mm) const;
-  /// Edges and diagonals between the corners, edge and face centres of the volume: all its errors show.
+  /// Edges and diagonals between the corners, edge and face centres of the volume: all its errors
+  /// show.
   static Vertices path();
   /// abbed.toml for the simulator's ports. `dds`: [dds] supervise.
   void write_configuration(const std::string& dds = "off") const;
@@ -43,25 +44,30 @@ class Spine : public testing::Test {
   [[nodiscard]] std::string tracker_table() const;
   /// [daemon], [recording] and [dds].
   [[nodiscard]] std::string daemon_tables(const std::string& dds) const;
-  [[nodiscard]] std::string file(const std::string& name) const { return (directory_ / name).string(); }
+  [[nodiscard]] std::string file(const std::string& name) const {
+    return (directory_ / name).string();
+  }
 
   // Programs.
-  void start_simulator();  ///< drives path.csv once the tracker streams; its ports are known afterwards
-  void start_simulator_as(std::vector<std::string> command);  ///< that writes the file "ports" when it is up
+  void
+  start_simulator();  ///< drives path.csv once the tracker streams; its ports are known afterwards
+  void start_simulator_as(
+      std::vector<std::string> command);  ///< that writes the file "ports" when it is up
   /// The simulator's port of that name; 0: it has none.
   [[nodiscard]] std::uint16_t port(const std::string& name) const;
   void start_abbed();  ///< returns when it answers
-  /// Before start_abbed(), when it is to calibrate: at many times real time the standstill at the first
-  /// vertex would be over before anybody could ask for a calibration.
+  /// Before start_abbed(), when it is to calibrate: at many times real time the standstill at the
+  /// first vertex would be over before anybody could ask for a calibration.
   void hold_simulator() const;
-  /// `abbe calibrate otf` to its end; lets the simulator go on once the session waits for the machine.
+  /// `abbe calibrate otf` to its end; lets the simulator go on once the session waits for the
+  /// machine.
   [[nodiscard]] Outcome calibrate(const std::string& path) const;
   Outcome run(std::vector<std::string> command) const;
   [[nodiscard]] std::unique_ptr<Program> start(std::vector<std::string> command,
                                                const std::string& log) const;
 
   // What abbed says.
-  [[nodiscard]] nlohmann::json status() const;                         ///< null while it does not answer
+  [[nodiscard]] nlohmann::json status() const;  ///< null while it does not answer
   [[nodiscard]] nlohmann::json stream(const std::string& name) const;  ///< of the status
   [[nodiscard]] std::uint64_t samples(const std::string& name) const;
   /// True when the stream brings more samples from now on.

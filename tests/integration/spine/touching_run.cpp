@@ -90,13 +90,15 @@ void TouchingRun::start_touching_simulator(const std::vector<std::string>& more)
 
 void TouchingRun::write_touching_configuration(const std::string& gate, const std::string& dds,
                                                const std::string& probe) const {
-  write("abbed.toml", machine_tables(fmt::format("port = {}\n", usbip_port_)) + probe + "[gate]\n" + gate +
-                          kEvemu + (warm_ ? fmt::format(kSensor, fmt::arg("port", sensor_port_)) : "") +
+  write("abbed.toml", machine_tables(fmt::format("port = {}\n", usbip_port_)) + probe + "[gate]\n" +
+                          gate + kEvemu +
+                          (warm_ ? fmt::format(kSensor, fmt::arg("port", sensor_port_)) : "") +
                           daemon_tables(dds));
 }
 
 std::vector<std::string> TouchingRun::calibrate_command(const std::string& calibrator) const {
-  return {ABBE_PROGRAM, "calibrate", "evemu", "-c", file("abbed.toml"), "--calibrator", file(calibrator)};
+  return {ABBE_PROGRAM,       "calibrate",    "evemu",         "-c",
+          file("abbed.toml"), "--calibrator", file(calibrator)};
 }
 
 Outcome TouchingRun::calibrate_touching(const std::string& calibrator) const {

@@ -1,6 +1,6 @@
 #pragma once
-/// A ball array touched on the weak-stiffness machine: abbe-sim drives, abbed reads scales and probe from the
-/// counter card and guides.
+/// A ball array touched on the weak-stiffness machine: abbe-sim drives, abbed reads scales and
+/// probe from the counter card and guides.
 
 #include <signal.h>
 
@@ -14,12 +14,15 @@ namespace abbe::test {
 struct TouchingRun : Spine {
   TouchingRun();
 
-  /// Before the simulator starts: the array is warm and off what its file says, a sensor stands on it.
+  /// Before the simulator starts: the array is warm and off what its file says, a sensor stands on
+  /// it.
   void warm_the_array();
-  /// Few points: six a ball (two more than a sphere needs), five a block. `more`: options of abbe-sim evemu.
+  /// Few points: six a ball (two more than a sphere needs), five a block. `more`: options of
+  /// abbe-sim evemu.
   void start_touching_simulator(const std::vector<std::string>& more = {});
   /// `gate`: lines of [gate]; `dds`: [dds] supervise.
-  void write_touching_configuration(const std::string& gate = kAccepting, const std::string& dds = "off",
+  void write_touching_configuration(const std::string& gate = kAccepting,
+                                    const std::string& dds = "off",
                                     const std::string& probe = kProbe) const;
   [[nodiscard]] std::vector<std::string> calibrate_command(const std::string& calibrator) const;
   /// `abbe calibrate evemu` to its end; the machine begins once the session waits for it.
@@ -30,7 +33,8 @@ struct TouchingRun : Spine {
   /// This machine has errors of 3.3 mm, and nobody references the array's rotation.
   static constexpr const char* kAccepting =
       "max_error_mm = 10\nmax_gradient = 0.5\naccept = [\"evemu-shape-only\"]\n";
-  static constexpr const char* kProbe = "[probe]\ndelay_us = 5\njitter_us = 1\nmax_speed_mm_s = 25\n";
+  static constexpr const char* kProbe =
+      "[probe]\ndelay_us = 5\njitter_us = 1\nmax_speed_mm_s = 25\n";
 
  private:
   bool warm_ = false;

@@ -1,5 +1,5 @@
-/// A ball array from the first touch on the wire to the compensation a subscriber receives, and what is said
-/// when touches go wrong.
+/// A ball array from the first touch on the wire to the compensation a subscriber receives, and
+/// what is said when touches go wrong.
 
 #include <gmock/gmock.h>
 
@@ -20,10 +20,12 @@ struct WholeArray : TouchingRun {
     ASSERT_NO_FATAL_FAILURE(start_touching_simulator());
 #ifdef ABBE_WITH_DDS
     write_touching_configuration(kAccepting, "child");
+
     ASSERT_NO_FATAL_FAILURE(start_abbed());
-    watch_ = start({ABBE_WATCH_PROGRAM, "--domain", domain_.text(), "--profile", ABBE_LOOPBACK_PROFILE,
-                    "--json", "--compare", file("truth.csv"), "--timeout", "100"},
-                   "watch");
+    watch_ =
+        start({ABBE_WATCH_PROGRAM, "--domain", domain_.text(), "--profile", ABBE_LOOPBACK_PROFILE,
+               "--json", "--compare", file("truth.csv"), "--timeout", "100"},
+              "watch");
 #else
     write_touching_configuration();
     ASSERT_NO_FATAL_FAILURE(start_abbed());
@@ -50,8 +52,9 @@ struct WholeArray : TouchingRun {
     ASSERT_EQ(compared.size(), 1u);
     const json c = compared.front()["comparison"];
     EXPECT_GT(c["before_mean_um"], 1000.0);
-    // Six touches of 3 um a ball leave some micrometres, the linear interpolation between the grid's nodes
-    // tens; the blocks' direction, which the machine measured itself, is a rigid motion.
+    // Six touches of 3 um a ball leave some micrometres, the linear interpolation between the
+    // grid's nodes tens; the blocks' direction, which the machine measured itself, is a rigid
+    // motion.
     EXPECT_LT(c["after_rigid_free_mean_um"], 0.1 * c["before_mean_um"].get<double>());
 #endif
   }
@@ -76,8 +79,8 @@ struct WholeArray : TouchingRun {
   }
 
   void expect_the_live_model_from(const std::string& recording, const std::string& live_id) const {
-    const auto identified = run(
-        {ABBE_PROGRAM, "identify", "evemu", "--recording", recording, "--json", "-o", file("identified")});
+    const auto identified = run({ABBE_PROGRAM, "identify", "evemu", "--recording", recording,
+                                 "--json", "-o", file("identified")});
     EXPECT_EQ(identified.code, 0) << identified.err;
     const json said = json::parse(identified.out, nullptr, false);
     ASSERT_TRUE(said.is_object()) << identified.out;
@@ -103,6 +106,7 @@ TEST_F(WholeArray, IsGuidedIdentifiedPublishedAndReplayedTheSame) {
   ASSERT_NO_FATAL_FAILURE(start_everything());
   ASSERT_TRUE(eventually([this] { return samples("rtd") > 2; })) << status().dump(1);
   const auto calibrated = calibrate_touching();
+
   ASSERT_EQ(calibrated.code, 0) << calibrated.out << calibrated.err;
   EXPECT_EQ(session()["noted"], 0) << session().dump(1);
   EXPECT_EQ(session()["points"], 8 * (9 * 6 + 2 * 5));
@@ -118,9 +122,12 @@ TEST_F(WholeArray, IsGuidedIdentifiedPublishedAndReplayedTheSame) {
 }
 
 TEST_F(TouchingRun, SaysWhatIsMissedDoubledAndAstrayAndGoesOn) {
-  // Ball 1 is touched by 0 to 5, block 1 by 6 to 10, block 2 by 11 to 15, ball 2 by 16 to 21, ball 3 from 22.
-  ASSERT_NO_FATAL_FAILURE(start_touching_simulator({"--double", "3", "--miss", "20", "--stray", "24"}));
+  // Ball 1 is touched by 0 to 5, block 1 by 6 to 10, block 2 by 11 to 15, ball 2 by 16 to 21, ball
+  // 3 from 22.
+  ASSERT_NO_FATAL_FAILURE(
+      start_touching_simulator({"--double", "3", "--miss", "20", "--stray", "24"}));
   write_touching_configuration();
+
   ASSERT_NO_FATAL_FAILURE(start_abbed());
   auto command = calibrate_command("calibrator.toml");
   command.emplace_back("--detach");
@@ -136,7 +143,8 @@ TEST_F(TouchingRun, SaysWhatIsMissedDoubledAndAstrayAndGoesOn) {
                                  HasSubstr("ball 2 has 5 of 6 points, the rest was missed"),
                                  HasSubstr("is on no ball or block; nearest is ball 3")));
   EXPECT_THAT(notes.front(), HasSubstr("probe touch "));
-  EXPECT_EQ(run({ABBE_PROGRAM, "calibrate", "evemu", "-c", file("abbed.toml"), "--cancel"}).code, 0);
+  EXPECT_EQ(run({ABBE_PROGRAM, "calibrate", "evemu", "-c", file("abbed.toml"), "--cancel"}).code,
+            0);
   EXPECT_EQ(session()["state"], "refused");
 }
 
@@ -148,12 +156,14 @@ TEST_F(TouchingRun, RefusesAnArrayThatGrowsWithoutAThermometer) {
   ASSERT_NO_FATAL_FAILURE(start_abbed());
   const auto refused = run(calibrate_command("grows.toml"));
   EXPECT_EQ(refused.code, 5) << refused.out << refused.err;
-  EXPECT_THAT(refused.err, HasSubstr("add artefact_sensor or artefact_C, and u_artefact_K, to [evemu]"));
+  EXPECT_THAT(refused.err,
+              HasSubstr("add artefact_sensor or artefact_C, and u_artefact_K, to [evemu]"));
 }
 
 TEST_F(TouchingRun, RefusesTheCalibratorOfAnotherArtefactAtItsFirstBall) {
   ASSERT_NO_FATAL_FAILURE(start_touching_simulator());
-  write("other.toml", replaced(text_of(file("calibrator.toml")), "radius_mm = 12[.0-9]*", "radius_mm = 10"));
+  write("other.toml",
+        replaced(text_of(file("calibrator.toml")), "radius_mm = 12[.0-9]*", "radius_mm = 10"));
   write_touching_configuration();
   ASSERT_NO_FATAL_FAILURE(start_abbed());
   const auto refused = calibrate_touching("other.toml");

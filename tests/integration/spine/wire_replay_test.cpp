@@ -1,10 +1,11 @@
-/// The golden recordings on the wire: abbe-sim serves what a device sent to an unmodified daemon on real
-/// sockets, and the daemon must make the checked samples of it once more.
+/// The golden recordings on the wire: abbe-sim serves what a device sent to an unmodified daemon on
+/// real sockets, and the daemon must make the checked samples of it once more.
 ///
-/// What a daemon of now cannot make the same as the one of then is when things happened: host times, and how
-/// settled the clock was. Whatever else stands in a line must be the same, and no line may be missing. There
-/// may be more: a device that only answers (encoders a SYNC, Modbus a question) is asked once more here and
-/// there, and when a recording is over a replay stands still or begins anew.
+/// What a daemon of now cannot make the same as the one of then is when things happened: host
+/// times, and how settled the clock was. Whatever else stands in a line must be the same, and no
+/// line may be missing. There may be more: a device that only answers (encoders a SYNC, Modbus a
+/// question) is asked once more here and there, and when a recording is over a replay stands still
+/// or begins anew.
 
 #include <fmt/format.h>
 #include <gmock/gmock.h>
@@ -32,7 +33,8 @@ namespace fs = std::filesystem;
 using Lines = std::vector<std::string>;
 
 const fs::path kGolden = ABBE_GOLDEN_RECORDINGS;
-constexpr std::size_t kMoreThanEnough = 4;  // lines of a device that goes on when its recording is over
+// lines of a device that goes on when its recording is over
+constexpr std::size_t kMoreThanEnough = 4;
 constexpr std::chrono::seconds kRecordedAndRead{40};
 
 Lines lines_of(const std::string& text) {
@@ -82,18 +84,18 @@ class WireRun {
     wanted_ = lines_of(text_of(kGolden / (name_ + ".chk")));
     const auto packed = (kGolden / (name_ + ".mcap.gz")).string();
     EXPECT_EQ(std::system(("gzip -dc '" + packed + "' >'" + file("golden.mcap") + "'").c_str()), 0);
-    simulator_ =
-        std::make_unique<Program>(std::vector<std::string>{ABBE_SIM_PROGRAM, "replay", file("golden.mcap"),
-                                                           "--ports-file", file("ports")},
-                                  folder_ / "sim");
+    simulator_ = std::make_unique<Program>(
+        std::vector<std::string>{ABBE_SIM_PROGRAM, "replay", file("golden.mcap"), "--ports-file",
+                                 file("ports")},
+        folder_ / "sim");
   }
   void start_abbed() {
     ASSERT_TRUE(eventually([&] { return fs::exists(file("ports")); })) << simulator_->err();
     auto recording = daemon::RecordingReader::open(file("golden.mcap"));
     ASSERT_TRUE(recording) << recording.error().text;
     std::ofstream(file("abbed.toml")) << at_its_place(recording->info().configuration);
-    abbed_ = std::make_unique<Program>(std::vector<std::string>{ABBED_PROGRAM, "-c", file("abbed.toml")},
-                                       folder_ / "abbed");
+    abbed_ = std::make_unique<Program>(
+        std::vector<std::string>{ABBED_PROGRAM, "-c", file("abbed.toml")}, folder_ / "abbed");
     // A program that starts takes time from those that run.
     EXPECT_TRUE(eventually([&] { return status().is_object(); })) << abbed_->err();
   }
@@ -103,30 +105,36 @@ class WireRun {
     EXPECT_TRUE(eventually([&] { return ready_to_touch(); })) << status().dump(1);
     artefact_ = std::make_unique<Program>(
         std::vector<std::string>{ABBE_PROGRAM, "calibrate", "artefact", "--calibrator",
-                                 (kGolden / "artefact.toml").string(), "-c", file("abbed.toml"), "-o",
-                                 file("calibrator.toml"), "--at", "0,0,0", "--points", "5", "--block-points",
-                                 "4"},
+                                 (kGolden / "artefact.toml").string(), "-c", file("abbed.toml"),
+                                 "-o", file("calibrator.toml"), "--at", "0,0,0", "--points", "5",
+                                 "--block-points", "4"},
         folder_ / "artefact");
   }
-  /// Until the daemon has as many samples as were checked, then no longer. What differs, for people; empty:
-  /// nothing.
+  /// Until the daemon has as many samples as were checked, then no longer. What differs, for
+  /// people; empty: nothing.
   std::string finish() {
     if (artefact_) artefact_->wait_for_end();  // with a fault it does not get to its end
     std::string differs;
     if (!artefact_ && !eventually([&] { return enough(); }, kRecordedAndRead))
-      differs = "not enough samples: " + simulator_->err() + abbed_->err() + status().dump(1) + '\n';
+      differs =
+          "not enough samples: " + simulator_->err() + abbed_->err() + status().dump(1) + '\n';
     EXPECT_EQ(abbed_->stop(), 0) << abbed_->err();
     const Lines found = recorded();
-    // How often a measuring machine is asked where it is depends on when somebody wants it to touch.
-    const Lines kinds = artefact_ ? Lines{"touch"} : Lines{"point", "weather", "axes", "air", "touch"};
+
+    // How often a measuring machine is asked where it is depends on when somebody wants it to
+    // touch.
+    const Lines kinds =
+        artefact_ ? Lines{"touch"} : Lines{"point", "weather", "axes", "air", "touch"};
     for (const std::string& kind : kinds) {
       const Lines wanted = of_kind(wanted_, kind);
       const Lines seen = of_kind(found, kind);
       if (const std::size_t missing = missing_from(wanted, seen))
         differs += fmt::format("{} of {} lines {} missing\n", missing, wanted.size(), kind);
     }
+
     if (differs.empty()) fs::remove_all(folder_);
-    return differs.empty() ? differs : fmt::format("{} in {}: {}", name_, folder_.string(), differs);
+    return differs.empty() ? differs
+                           : fmt::format("{} in {}: {}", name_, folder_.string(), differs);
   }
 
  private:
@@ -138,14 +146,17 @@ class WireRun {
     EXPECT_EQ(replay.wait_for_end(), 0) << replay.err();
     return lines_of(replay.out());
   }
-  [[nodiscard]] std::string file(const std::string& name) const { return (folder_ / name).string(); }
+  [[nodiscard]] std::string file(const std::string& name) const {
+    return (folder_ / name).string();
+  }
 
   /// The recorded configuration, its device where the simulator has it now.
   [[nodiscard]] std::string at_its_place(std::string configuration) const {
     const std::string ports = text_of(file("ports"));
     std::smatch seen;
     if (std::regex_search(ports, seen, std::regex{"_path=\"(.*)\""})) {
-      configuration = replaced(configuration, "serial = \"[^\"]*\"", "serial = \"" + seen[1].str() + "\"");
+      configuration =
+          replaced(configuration, "serial = \"[^\"]*\"", "serial = \"" + seen[1].str() + "\"");
     } else if (std::regex_search(ports, seen, std::regex{"_port=([0-9]+)"})) {
       configuration = replaced(configuration, "port = [0-9]+", "port = " + seen[1].str());
     }
@@ -166,7 +177,8 @@ class WireRun {
     const bool goes_on = !name_.starts_with("tracker") && !name_.starts_with("counter_card");
     std::size_t wanted = goes_on ? kMoreThanEnough : 0;
     for (const std::string& line : wanted_)
-      wanted += line.starts_with("point") || line.starts_with("axes") || line.starts_with("air") ? 1 : 0;
+      wanted +=
+          line.starts_with("point") || line.starts_with("axes") || line.starts_with("air") ? 1 : 0;
     std::size_t samples = 0;
     for (const auto& stream : now["streams"])
       if (stream["name"] != "recorder") samples += stream["samples"].get<std::size_t>();
@@ -192,8 +204,8 @@ Lines differences(std::span<const std::string> names) {
   return all;
 }
 
-/// Time is real here: a machine that gives a daemon none for a tenth of a second makes silence of it. What is
-/// wrong is wrong every time.
+/// Time is real here: a machine that gives a daemon none for a tenth of a second makes silence of
+/// it. What is wrong is wrong every time.
 Lines lasting_differences(std::span<const std::string> names) {
   constexpr int kAttempts = 3;
   Lines left{names.begin(), names.end()};
@@ -215,8 +227,8 @@ Lines chosen() {
               "environment-disconnect", "serial-disconnect", "cmm-plain"};
   // Sanitized programs need the machine's time for themselves.
   if (!ABBE_SANITIZED)
-    names.insert(names.end(), {"tracker-garbage", "tracker-mute", "counter_card-overrun", "environment-late",
-                               "serial-garbage", "cmm-refuse_touch"});
+    names.insert(names.end(), {"tracker-garbage", "tracker-mute", "counter_card-overrun",
+                               "environment-late", "serial-garbage", "cmm-refuse_touch"});
   return names;
 }
 Lines all() {

@@ -1,5 +1,6 @@
-/// Identifies from the reference data and prints a hash of every result: the same lines on every processor.
-/// Part of the test suite natively, under another processor's instructions and for another architecture.
+/// Identifies from the reference data and prints a hash of every result: the same lines on every
+/// processor. Part of the test suite natively, under another processor's instructions and for
+/// another architecture.
 #include <Eigen/Core>
 #include <array>
 #include <bit>
@@ -77,11 +78,14 @@ void print_on_the_fly_from_blocks() {
   const RigidTransform T = case_a_alignment(true);
   const otf::Path path = case_a_path();
   const otf::Machine machine = case_a_machine();
+
   const auto seen_at = [&](const Vector3& vertex) {
     return Vector3(T.R.transpose() * (vertex + machine.target_offset_m - T.t_m));
   };
-  const auto series = otf::blocks_from_means(
-      case_a_blocks().means_tracker_m, seen_at(path.vertices_m.front()), seen_at(path.vertices_m.back()), {});
+
+  const auto series =
+      otf::blocks_from_means(case_a_blocks().means_tracker_m, seen_at(path.vertices_m.front()),
+                             seen_at(path.vertices_m.back()), {});
   const auto observations = otf::observe_blocks(must(series, "blocks"), machine, path, {});
   const auto solution = otf::solve(must(observations, "observe"));
   print_model("on-the-fly, blocks", must(solution, "solve").model);
@@ -97,6 +101,7 @@ void print_on_the_fly_from_samples() {
   Eigen::VectorXd U(static_cast<Eigen::Index>(layout.model_size()));
   for (double& u : U) u = 30e-6 * normal.next();
   std::vector<otf::TrackerObservation> samples;
+
   for (const Vector3& q : drive(path, 0.4, 250.0)) {
     const Vector3& t = machine.target_offset_m;
     const Vector3 p = q + t + volumetric_error(layout, {U.data(), layout.model_size()}, q, t);
@@ -104,6 +109,7 @@ void print_on_the_fly_from_samples() {
     samples.push_back({static_cast<double>(samples.size()) / 250.0,
                        p - Vector3(2.0, 1.0, -1.2) + 6e-6 * Vector3(noise.data()), true});
   }
+
   const otf::Options options{.block_samples = 10, .orientation = {.scales_agree = true}};
   const auto run = otf::identify(samples, machine, path, {}, options);
   print_model("on-the-fly, samples", must(run, "identify").solution.model);
@@ -116,15 +122,16 @@ void print_on_the_fly_from_samples() {
 void print_spherical() {
   Hash hash;
   for (int i = 0; i < 10000; ++i) {
-    hash.add(Eigen::MatrixXd(from_spherical(1.0 + 1e-3 * i, -std::numbers::pi + 6e-4 * i, -1.5 + 3e-4 * i)));
+    hash.add(Eigen::MatrixXd(
+        from_spherical(1.0 + 1e-3 * i, -std::numbers::pi + 6e-4 * i, -1.5 + 3e-4 * i)));
   }
   hash.print("spherical");
 }
 
 void print_ball_array(const char* name, evemu::Estimator estimator) {
   using namespace abbe::tests::evemu;
-  const auto observations =
-      evemu::observe_errors(reference_errors(), reference_machine(), evemu::RotationOrigin::Independent);
+  const auto observations = evemu::observe_errors(reference_errors(), reference_machine(),
+                                                  evemu::RotationOrigin::Independent);
   evemu::SolveOptions options{.estimator = estimator};
   options.sparse.lambda = sparse::log_spaced(1e-1, 1e-6, 16);
   options.sparse.gamma = {2.5, 20.0};

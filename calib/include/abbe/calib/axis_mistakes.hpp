@@ -1,6 +1,7 @@
 #pragma once
-/// Mistakes in a list of coordinates that keep its numbers: axes reversed or exchanged, or another unit of
-/// length. Where data do not fit as given, each is tried, and the error names those that fit. Pure.
+/// Mistakes in a list of coordinates that keep its numbers: axes reversed or exchanged, or another
+/// unit of length. Where data do not fit as given, each is tried, and the error names those that
+/// fit. Pure.
 
 #include <span>
 #include <string>
@@ -36,7 +37,8 @@ struct OutsideTravel {
                                                         double tolerance_m = 1e-9);
 
 /// "; all are inside with Y reversed, or with X and Y swapped". Empty: with none of the mistakes.
-[[nodiscard]] std::string inside_travel_with(std::span<const Vector3> points_m, const MachineNodes& travel);
+[[nodiscard]] std::string inside_travel_with(std::span<const Vector3> points_m,
+                                             const MachineNodes& travel);
 
 /// "A", "A, or with B", "A, or with B, or with C"
 [[nodiscard]] std::string joined_with_or(std::span<const std::string> texts);

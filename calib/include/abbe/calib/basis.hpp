@@ -1,7 +1,7 @@
 #pragma once
-/// How a table is read between its nodes. Linear now; another basis (natural cubic) is a further enumerator
-/// here and a further case in basis_row(): every basis must contain constants and straight lines exactly, the
-/// gauge relies on it.
+/// How a table is read between its nodes. Linear now; another basis (natural cubic) is a further
+/// enumerator here and a further case in basis_row(): every basis must contain constants and
+/// straight lines exactly, the gauge relies on it.
 
 #include <cstddef>
 #include <span>

@@ -1,6 +1,6 @@
 #pragma once
-/// V known at the nodes of a lattice, as a subscriber receives it, and what such a field is worth against
-/// known errors. SI inside (m).
+/// V known at the nodes of a lattice, as a subscriber receives it, and what such a field is worth
+/// against known errors. SI inside (m).
 
 #include <array>
 #include <cstddef>
@@ -17,11 +17,12 @@ struct LatticeNode {
   bool inside = true;  ///< within the volume the data covered
 };
 
-/// V between the nodes, linear in x, y and z; only in cells of which every corner is inside. Immutable value.
+/// V between the nodes, linear in x, y and z; only in cells of which every corner is inside.
+/// Immutable value.
 class ErrorLattice {
  public:
-  /// Nodes in any order. DegenerateGeometry if they are not all combinations of the coordinates that occur,
-  /// each once; NotFinite.
+  /// Nodes in any order. DegenerateGeometry if they are not all combinations of the coordinates
+  /// that occur, each once; NotFinite.
   [[nodiscard]] static Result<ErrorLattice> create(std::span<const LatticeNode> nodes);
   /// False: outside of the lattice or of what the data covered, `V_m` untouched.
   [[nodiscard]] bool at(const Vector3& position_m, Vector3& V_m) const;
@@ -41,6 +42,7 @@ struct FieldComparison {
 };
 /// `known_V_m` at `positions_m`. Error as rigid_free(): fewer than 3 points inside, or on a line.
 [[nodiscard]] Result<FieldComparison> compare(std::span<const Vector3> positions_m,
-                                              std::span<const Vector3> known_V_m, const ErrorLattice& field);
+                                              std::span<const Vector3> known_V_m,
+                                              const ErrorLattice& field);
 
 }  // namespace abbe::calib

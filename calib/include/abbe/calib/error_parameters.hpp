@@ -1,9 +1,9 @@
 #pragma once
-/// Names of geometric errors, as in ISO 230-1: `E`, the direction of the deviation (X Y Z translation, A B C
-/// rotation about x y z), the moving axis: EXX positioning of X, EYX and EZX its straightness, EAX roll, EBX
-/// and ECX pitch and yaw. Squareness: EA0Z and EB0Z tilt the direction in which Z travels, EC0Y the direction
-/// of Y; X is the primary direction, XY the secondary plane. V = actual - nominal, tool relative to
-/// workpiece.
+/// Names of geometric errors, as in ISO 230-1: `E`, the direction of the deviation (X Y Z
+/// translation, A B C rotation about x y z), the moving axis: EXX positioning of X, EYX and EZX its
+/// straightness, EAX roll, EBX and ECX pitch and yaw. Squareness: EA0Z and EB0Z tilt the direction
+/// in which Z travels, EC0Y the direction of Y; X is the primary direction, XY the secondary plane.
+/// V = actual - nominal, tool relative to workpiece.
 
 #include <array>
 #include <cstddef>
@@ -43,8 +43,8 @@ struct ErrorMotion {
 /// Squareness in the order in which it stands in every parameter vector.
 inline constexpr std::array<std::string_view, 3> kSquarenessNames{"EA0Z", "EB0Z", "EC0Y"};
 
-/// One identified number with its name, as it is stored and reported. Rotations and squareness in rad, others
-/// in m.
+/// One identified number with its name, as it is stored and reported. Rotations and squareness in
+/// rad, others in m.
 struct Parameter {
   /// "EXX", "EC0Y", or "k_exz2": a function of the scaled design of [Li OMM], always a length
   std::string name;

@@ -1,9 +1,9 @@
 #pragma once
-/// A gauge picks one of the many parameter sets that describe the same machine. Measurements of one target
-/// leave 20 combinations of the 14 tables, 3 squareness and 6 rigid unknowns undetermined (24 for all 18
-/// tables and three or more targets), and every choice predicts the same up to a rigid motion. Gauge G1
-/// ([Sanders 2023] sections 2.3.1 and 2.3.2), K U = 0 with exactly as many rows as there are free
-/// combinations:
+/// A gauge picks one of the many parameter sets that describe the same machine. Measurements of one
+/// target leave 20 combinations of the 14 tables, 3 squareness and 6 rigid unknowns undetermined
+/// (24 for all 18 tables and three or more targets), and every choice predicts the same up to a
+/// rigid motion. Gauge G1 ([Sanders 2023] sections 2.3.1 and 2.3.2), K U = 0 with exactly as many
+/// rows as there are free combinations:
 /// - positioning EXX, EYY, EZZ: 0 at the reference position of the axis,
 /// - straightness: 0 at the first and at the last node,
 /// - rotations: 0 at the reference position;
@@ -37,17 +37,18 @@ enum class Gauge { G1, Ball1Blocks, Ball1 };
 /// For G1. K: one row per condition, fit_size() columns (the six rigid ones last, zero in G1).
 [[nodiscard]] Eigen::MatrixXd gauge_conditions(Gauge, const ParameterLayout&);
 
-/// Basis of the combinations (columns, fit_size() rows) that no measurement of `targets_m` anywhere in the
-/// volume can see: the null space of complete 3D data on all node positions. The offset of every target but
-/// the first is known up to a constant only.
+/// Basis of the combinations (columns, fit_size() rows) that no measurement of `targets_m` anywhere
+/// in the volume can see: the null space of complete 3D data on all node positions. The offset of
+/// every target but the first is known up to a constant only.
 [[nodiscard]] Eigen::MatrixXd unobservable_combinations(const ParameterLayout&,
                                                         std::span<const Vector3> targets_m);
 
-/// U + N z with K (U + N z) = 0. Both vectors have fit_size() entries. The result predicts for the tools of
-/// `targets_m` what U does, up to a rigid motion and, for each, a constant. DegenerateGeometry where the
-/// targets leave more undetermined than the gauge has conditions: 18 tables need three that are not on a
-/// line, and then the same holds for every tool.
+/// U + N z with K (U + N z) = 0. Both vectors have fit_size() entries. The result predicts for the
+/// tools of `targets_m` what U does, up to a rigid motion and, for each, a constant.
+/// DegenerateGeometry where the targets leave more undetermined than the gauge has conditions: 18
+/// tables need three that are not on a line, and then the same holds for every tool.
 [[nodiscard]] Result<Eigen::VectorXd> to_gauge(Gauge, const ParameterLayout&,
-                                               std::span<const Vector3> targets_m, const Eigen::VectorXd& U);
+                                               std::span<const Vector3> targets_m,
+                                               const Eigen::VectorXd& U);
 
 }  // namespace abbe::calib

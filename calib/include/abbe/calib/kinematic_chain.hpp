@@ -1,8 +1,9 @@
 #pragma once
-/// The order in which a machine's axes carry each other, from a chain string in the style of ISO 10791-6:
-/// `[w X' b Y Z (C1) t]`: w workpiece, b bed, t tool; a prime marks an axis that carries the workpiece;
-/// parentheses mean present, but not moving. For the volumetric error only the order of X, Y, Z read from w
-/// to t matters, because all error tables describe tool relative to workpiece, primed axis or not.
+/// The order in which a machine's axes carry each other, from a chain string in the style of ISO
+/// 10791-6: `[w X' b Y Z (C1) t]`: w workpiece, b bed, t tool; a prime marks an axis that carries
+/// the workpiece; parentheses mean present, but not moving. For the volumetric error only the order
+/// of X, Y, Z read from w to t matters, because all error tables describe tool relative to
+/// workpiece, primed axis or not.
 
 #include <array>
 #include <cstddef>
@@ -22,15 +23,15 @@ inline constexpr std::array<Axis, 3> kAllAxes{Axis::X, Axis::Y, Axis::Z};
   return static_cast<char>('X' + static_cast<char>(index(a)));
 }
 
-/// A machine of three linear axes. Immutable value; default: X, Y, Z from workpiece to tool, all on the tool
-/// side.
+/// A machine of three linear axes. Immutable value; default: X, Y, Z from workpiece to tool, all on
+/// the tool side.
 class KinematicChain {
  public:
   KinematicChain() = default;
 
-  /// Needs w first, t last, b once, each of X, Y, Z once and moving; axes before b primed, axes after b not.
-  /// Other axes and spindles (A1, (C1), S ...) are allowed and ignored. BadInput says which of these is
-  /// broken, and where.
+  /// Needs w first, t last, b once, each of X, Y, Z once and moving; axes before b primed, axes
+  /// after b not. Other axes and spindles (A1, (C1), S ...) are allowed and ignored. BadInput says
+  /// which of these is broken, and where.
   [[nodiscard]] static Result<KinematicChain> parse(std::string_view text);
 
   [[nodiscard]] const std::string& text() const { return text_; }

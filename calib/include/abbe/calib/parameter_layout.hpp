@@ -1,7 +1,7 @@
 #pragma once
-/// Which number of the parameter vector U is what: the tables in the order EXX EYX EZX EAX EBX ECX | EXY ..
-/// ECY | EXZ .. ECZ (those in use), nodes ascending; EA0Z EB0Z EC0Y; then, in fits only, the six rigid
-/// unknowns tx ty tz [m] rx ry rz [rad] of the tracker's place.
+/// Which number of the parameter vector U is what: the tables in the order EXX EYX EZX EAX EBX ECX
+/// | EXY .. ECY | EXZ .. ECZ (those in use), nodes ascending; EA0Z EB0Z EC0Y; then, in fits only,
+/// the six rigid unknowns tx ty tz [m] rx ry rz [rad] of the tracker's place.
 
 #include <cstddef>
 #include <optional>
@@ -22,10 +22,10 @@ struct Table {
 /// Immutable value.
 class ParameterLayout {
  public:
-  /// The 14 tables that one constant target offset can show: without the rotations of the axis nearest to the
-  /// tool and without the rotation of the middle axis about that axis' direction, which a constant lever
-  /// makes inseparable from translations ([Sanders 2023] section 4 counts "14 additional unknowns"). For the
-  /// order X, Y, Z: no ECY EAZ EBZ ECZ.
+  /// The 14 tables that one constant target offset can show: without the rotations of the axis
+  /// nearest to the tool and without the rotation of the middle axis about that axis' direction,
+  /// which a constant lever makes inseparable from translations ([Sanders 2023] section 4 counts
+  /// "14 additional unknowns"). For the order X, Y, Z: no ECY EAZ EBZ ECZ.
   [[nodiscard]] static Result<ParameterLayout> observable_with_one_target(const KinematicChain&,
                                                                           MachineNodes);
   /// All 18 tables; identifiable only from three or more non-collinear target offsets.
@@ -41,7 +41,9 @@ class ParameterLayout {
   [[nodiscard]] std::size_t node_count(Axis a) const { return nodes_[index(a)].nodes_m.size(); }
 
   [[nodiscard]] std::size_t squareness_offset() const { return squareness_offset_; }
-  [[nodiscard]] std::size_t model_size() const { return squareness_offset_ + 3; }  ///< without rigid
+  [[nodiscard]] std::size_t model_size() const {
+    return squareness_offset_ + 3;
+  }  ///< without rigid
   [[nodiscard]] std::size_t rigid_offset() const { return model_size(); }
   [[nodiscard]] std::size_t fit_size() const { return model_size() + 6; }  ///< with rigid
 

@@ -1,7 +1,7 @@
 #pragma once
-/// A bound on how long an idle processor may take to wake, kept by the kernel for all processors while a file
-/// is open (Linux PM QoS). Deep sleep saves power and costs hundreds of microseconds, by which a device's
-/// interrupt, and so its kernel time stamp, is late. Ordinary world.
+/// A bound on how long an idle processor may take to wake, kept by the kernel for all processors
+/// while a file is open (Linux PM QoS). Deep sleep saves power and costs hundreds of microseconds,
+/// by which a device's interrupt, and so its kernel time stamp, is late. Ordinary world.
 
 #include <chrono>
 #include <cstdio>
@@ -18,8 +18,8 @@ inline constexpr const char* kCpuLatencyFile = "/dev/cpu_dma_latency";
 class CpuLatencyBound {
  public:
   /// 0: processors without work spin instead of sleeping. Error: the file and what refused it.
-  [[nodiscard]] static Result<CpuLatencyBound> request(std::chrono::microseconds at_most,
-                                                       const std::filesystem::path& file = kCpuLatencyFile);
+  [[nodiscard]] static Result<CpuLatencyBound> request(
+      std::chrono::microseconds at_most, const std::filesystem::path& file = kCpuLatencyFile);
 
  private:
   struct Close {

@@ -1,7 +1,8 @@
 #pragma once
-/// The seam: what the rest of the house knows of a device. The one place with inheritance.
-/// One turn of a device is wait(), in the ordinary world, then receive(), in real time; both are called by
-/// the one device thread. Samples leave through the device's own SampleRing, raw bytes through its RawRing.
+/// The seam: what the rest of the house knows of a device. The one place with inheritance. One turn
+/// of a device is wait(), in the ordinary world, then receive(), in real time; both are called by
+/// the one device thread. Samples leave through the device's own SampleRing, raw bytes through its
+/// RawRing.
 
 #include <chrono>
 #include <cstdint>
@@ -25,18 +26,19 @@ struct ClockStatus {
 /// A copy, taken at one moment; counters are since construction and never go back.
 struct DeviceStatus {
   std::string name;
-  std::string_view state;          ///< a literal of the driver: "connecting", "streaming", "beam lost", ...
-  bool connected = false;          ///< the transport is up and the device has answered
-  std::uint64_t samples = 0;       ///< decoded, whether or not they found room
-  std::uint64_t dropped = 0;       ///< samples lost because the sample ring was full
-  std::uint64_t raw_dropped = 0;   ///< blocks lost because the raw ring was full
-  std::uint64_t gaps = 0;          ///< places in the stream where the device or the transport lost something
-  std::uint64_t faults = 0;        ///< torn, garbage, refused, timed out, disconnected: each counts once
+  std::string_view state;  ///< a literal of the driver: "connecting", "streaming", "beam lost", ...
+  bool connected = false;  ///< the transport is up and the device has answered
+  std::uint64_t samples = 0;      ///< decoded, whether or not they found room
+  std::uint64_t dropped = 0;      ///< samples lost because the sample ring was full
+  std::uint64_t raw_dropped = 0;  ///< blocks lost because the raw ring was full
+  /// places in the stream where the device or the transport lost something
+  std::uint64_t gaps = 0;
+  std::uint64_t faults = 0;  ///< torn, garbage, refused, timed out, disconnected: each counts once
   std::uint64_t time_widened = 0;  ///< receives whose kernel stamp could not be used
   ClockStatus clock;
   protocol::HostTime last_sample{};  ///< the instant the latest sample describes; epoch if none yet
-  std::string condition;             ///< what is wrong at this moment: "X missing (node 1)"; empty: nothing
-  std::string last_fault;            ///< "what was tried: what was seen"; empty if none yet
+  std::string condition;   ///< what is wrong at this moment: "X missing (node 1)"; empty: nothing
+  std::string last_fault;  ///< "what was tried: what was seen"; empty if none yet
   protocol::HostTime last_fault_at{};
 };
 
@@ -47,13 +49,13 @@ class Device {
   Device& operator=(const Device&) = delete;
   virtual ~Device() = default;
 
-  /// Device thread, ordinary world: connect, send what is due, block until bytes come or `at_most` (host
-  /// time) has passed, read them into the device's own buffer. Faults are status, not exceptions; a defect
-  /// may throw and ends the thread with the cause kept.
+  /// Device thread, ordinary world: connect, send what is due, block until bytes come or `at_most`
+  /// (host time) has passed, read them into the device's own buffer. Faults are status, not
+  /// exceptions; a defect may throw and ends the thread with the cause kept.
   virtual void wait(std::chrono::nanoseconds at_most) = 0;
 
-  /// Device thread, real time: everything wait() read becomes samples in the ring. Nothing read: nothing
-  /// happens.
+  /// Device thread, real time: everything wait() read becomes samples in the ring. Nothing read:
+  /// nothing happens.
   virtual void receive() ABBE_RT = 0;
 
   /// Any thread, ordinary world.

@@ -1,6 +1,6 @@
 #pragma once
-/// What a shop floor does to a driver (cable out, port taken, no permission), as a value. Ordinary world
-/// only: the real-time path has counters and flags instead.
+/// What a shop floor does to a driver (cable out, port taken, no permission), as a value. Ordinary
+/// world only: the real-time path has counters and flags instead.
 
 #include <string>
 #include <tl/expected.hpp>
@@ -16,7 +16,8 @@ enum class ErrorCode {
   DeviceRefused,     ///< the device understood and declined
 };
 
-/// `text` is "what was tried: what was seen", e.g. "tracker 10.0.0.7:700: no reply in 3 s (3 tries)".
+/// `text` is "what was tried: what was seen", e.g. "tracker 10.0.0.7:700: no reply in 3 s (3
+/// tries)".
 struct Error {
   ErrorCode code = ErrorCode::SystemRefused;
   std::string text;

@@ -1,6 +1,7 @@
 #pragma once
-/// From the kernel's receive stamp to host time. SO_TIMESTAMPING stamps are wall-clock time, which people and
-/// NTP may step, so a stamp serves only as an age, taken against the wall clock of the same moment:
+/// From the kernel's receive stamp to host time. SO_TIMESTAMPING stamps are wall-clock time, which
+/// people and NTP may step, so a stamp serves only as an age, taken against the wall clock of the
+/// same moment:
 ///   age = realtime now - stamp,  arrival = host now - age.
 /// Accepted when 0 <= age <= time since the queue was last known to be empty, and when the wall clock went on
 /// since then as the monotonic clock did (else one of them was stepped, and the age may be wrong by that
@@ -31,7 +32,8 @@ struct ClockPair {
   std::chrono::nanoseconds realtime{};   ///< CLOCK_REALTIME
 };
 
-/// Reads both clocks at one instant, again if the thread was interrupted in between; ordinary world (vDSO).
+/// Reads both clocks at one instant, again if the thread was interrupted in between; ordinary world
+/// (vDSO).
 [[nodiscard]] ClockPair read_clock_pair() noexcept;
 
 struct KernelStampOptions {
@@ -39,8 +41,8 @@ struct KernelStampOptions {
       std::chrono::microseconds{10};  ///< interrupt to stamp on an idle shop-floor PC
   /// Waking up the device thread: what an arrival may be late by when only user space saw it.
   std::chrono::nanoseconds u_user_space = std::chrono::milliseconds{1};
-  /// Two readings of two clocks with a preemption between them, or a stamp on its way into the queue; below
-  /// it a step is not seen and does no harm.
+  /// Two readings of two clocks with a preemption between them, or a stamp on its way into the
+  /// queue; below it a step is not seen and does no harm.
   std::chrono::nanoseconds step = std::chrono::microseconds{200};
 };
 
@@ -50,13 +52,14 @@ class KernelStampMap {
   explicit KernelStampMap(double speed = 1.0, const KernelStampOptions& options = {}) noexcept
       : speed_(speed), options_(options) {}
 
-  /// `stamp`: the kernel's, wall-clock; none if the socket gave none. `now`: both clocks after the receive;
-  /// `host_now`: host time of that moment.
+  /// `stamp`: the kernel's, wall-clock; none if the socket gave none. `now`: both clocks after the
+  /// receive; `host_now`: host time of that moment.
   Arrival arrival(std::optional<std::chrono::nanoseconds> stamp, const ClockPair& now,
                   protocol::HostTime host_now) ABBE_RT;
 
-  /// Both clocks just before a read that left nothing in the queue, or before the socket began to listen:
-  /// what is read from now on has not come earlier. Until the first call no stamp is believed.
+  /// Both clocks just before a read that left nothing in the queue, or before the socket began to
+  /// listen: what is read from now on has not come earlier. Until the first call no stamp is
+  /// believed.
   void nothing_older_than(const ClockPair& begun) ABBE_RT { empty_at_ = begun; }
 
   /// Arrivals whose stamp was missing or not believed; the caller's own thread.

@@ -1,6 +1,6 @@
 #pragma once
-/// Durations in four equal buckets per octave (so each is known to 12-25 %), 1 ns to 17 s. Filled by the
-/// real-time loop itself, read by any thread at any time: a report, never a lock.
+/// Durations in four equal buckets per octave (so each is known to 12-25 %), 1 ns to 17 s. Filled
+/// by the real-time loop itself, read by any thread at any time: a report, never a lock.
 
 #include <array>
 #include <atomic>
@@ -22,7 +22,8 @@ class LatencyHistogram {
     std::array<std::uint64_t, kBuckets> of_bucket{};
     std::uint64_t total = 0;
     std::chrono::nanoseconds largest{};
-    /// Upper bound of the bucket that holds the given share (0 to 1) of all durations, never above `largest`.
+    /// Upper bound of the bucket that holds the given share (0 to 1) of all durations, never above
+    /// `largest`.
     [[nodiscard]] std::chrono::nanoseconds quantile(double share) const noexcept;
   };
 

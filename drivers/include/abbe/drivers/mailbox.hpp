@@ -1,6 +1,7 @@
 #pragma once
-/// Hand-over of values between threads without a lock: a thread that is preempted in it delays no other.
-/// Allocates; for the ordinary world. Values come out in the order in which they were put in.
+/// Hand-over of values between threads without a lock: a thread that is preempted in it delays no
+/// other. Allocates; for the ordinary world. Values come out in the order in which they were put
+/// in.
 
 #include <algorithm>
 #include <atomic>

@@ -1,8 +1,9 @@
 #pragma once
-/// The two counters every ring of the house turns on: one writer, one reader, wait-free. [Lamport 1983], with
-/// each side keeping a private copy of the other's counter so that the shared cache line moves only when it
-/// must. Counters never wrap in practice (64 bit); slot = counter & mask. Writer-side functions belong to the
-/// one writer thread, reader-side functions to the one reader thread, `published()` to anyone.
+/// The two counters every ring of the house turns on: one writer, one reader, wait-free.
+/// [Lamport 1983], with each side keeping a private copy of the other's counter so that the shared
+/// cache line moves only when it must. Counters never wrap in practice (64 bit); slot = counter &
+/// mask. Writer-side functions belong to the one writer thread, reader-side functions to the one
+/// reader thread, `published()` to anyone.
 
 #include <algorithm>
 #include <atomic>
@@ -30,7 +31,8 @@ class RingIndices {
   [[nodiscard]] std::size_t free_slots(std::size_t wanted) ABBE_RT {
     const std::uint64_t written = written_.load(std::memory_order_relaxed);  // own counter
     if (capacity() - (written - read_seen_) < wanted) {
-      read_seen_ = read_.load(std::memory_order_acquire);  // acquire: pairs with the release in consume()
+      // acquire: pairs with the release in consume()
+      read_seen_ = read_.load(std::memory_order_acquire);
     }
     return std::min<std::size_t>(wanted, capacity() - (written - read_seen_));
   }
@@ -39,7 +41,8 @@ class RingIndices {
   }
   /// Writer: makes `n` filled slots visible to the reader.
   void publish(std::size_t n) ABBE_RT {
-    // release: pairs with the acquire in filled_slots(); the slots' contents are visible before the counter.
+    // release: pairs with the acquire in filled_slots(); the slots' contents are visible before the
+    // counter.
     written_.store(written_.load(std::memory_order_relaxed) + n, std::memory_order_release);
   }
 
@@ -47,15 +50,18 @@ class RingIndices {
   [[nodiscard]] std::size_t filled_slots(std::size_t wanted) ABBE_RT {
     const std::uint64_t read = read_.load(std::memory_order_relaxed);  // own counter
     if (written_seen_ - read < wanted) {
-      written_seen_ =
-          written_.load(std::memory_order_acquire);  // acquire: pairs with the release in publish()
+      // acquire: pairs with the release in publish()
+      written_seen_ = written_.load(std::memory_order_acquire);
     }
     return std::min<std::size_t>(wanted, written_seen_ - read);
   }
-  [[nodiscard]] std::uint64_t read_counter() const ABBE_RT { return read_.load(std::memory_order_relaxed); }
+  [[nodiscard]] std::uint64_t read_counter() const ABBE_RT {
+    return read_.load(std::memory_order_relaxed);
+  }
   /// Reader: gives `n` read slots back to the writer.
   void consume(std::size_t n) ABBE_RT {
-    // release: pairs with the acquire in free_slots(); the slots are read before they may be overwritten.
+    // release: pairs with the acquire in free_slots(); the slots are read before they may be
+    // overwritten.
     read_.store(read_.load(std::memory_order_relaxed) + n, std::memory_order_release);
   }
 

@@ -1,8 +1,8 @@
 #pragma once
-/// The border between the two worlds: decoded samples from the real-time side to the ordinary side. One
-/// writer, one reader, wait-free on both sides: boost::lockfree::spsc_queue behind the rule of the house.
-/// Full means: drop, count, and mark the next sample that fits with GapBefore and `lost_before`. All memory
-/// is taken and touched by the constructor.
+/// The border between the two worlds: decoded samples from the real-time side to the ordinary side.
+/// One writer, one reader, wait-free on both sides: boost::lockfree::spsc_queue behind the rule of
+/// the house. Full means: drop, count, and mark the next sample that fits with GapBefore and
+/// `lost_before`. All memory is taken and touched by the constructor.
 
 #include <algorithm>
 #include <atomic>
@@ -44,8 +44,8 @@ class SampleRing {
     return true;
   }
 
-  /// Writer thread. Pushes the first ones that fit, drops the rest; returns how many were pushed. One
-  /// publication for all: cheaper than try_push in a loop when a device delivers bursts.
+  /// Writer thread. Pushes the first ones that fit, drops the rest; returns how many were pushed.
+  /// One publication for all: cheaper than try_push in a loop when a device delivers bursts.
   std::size_t push(std::span<const T> samples) ABBE_RT {
     std::size_t n = 0;
     if (lost_ != 0 && !samples.empty()) [[unlikely]] {
@@ -78,8 +78,8 @@ class SampleRing {
   /// The first sample after a loss says so.
   [[gnu::cold, gnu::noinline]] bool push_marked(T sample) ABBE_RT {
     const std::uint64_t lost = lost_ + sample.head.lost_before;
-    sample.head.lost_before =
-        static_cast<std::uint32_t>(std::min<std::uint64_t>(lost, std::numeric_limits<std::uint32_t>::max()));
+    sample.head.lost_before = static_cast<std::uint32_t>(
+        std::min<std::uint64_t>(lost, std::numeric_limits<std::uint32_t>::max()));
     sample.head.flags |= protocol::SampleFlag::GapBefore;
     if (!queue_.push(sample)) {
       drop(1);
@@ -89,12 +89,14 @@ class SampleRing {
     return true;
   }
 
-  /// Aligned because a sample of 64 bytes that lies across two cache lines halves what the ring carries.
+  /// Aligned because a sample of 64 bytes that lies across two cache lines halves what the ring
+  /// carries.
   using Memory = boost::lockfree::allocator<boost::alignment::aligned_allocator<T, kNoSharing>>;
 
   std::size_t capacity_;
   boost::lockfree::spsc_queue<T, Memory> queue_;
-  /// Writer only: dropped since the last sample that fitted. Apart from the queue, which the reader reads.
+  /// Writer only: dropped since the last sample that fitted. Apart from the queue, which the reader
+  /// reads.
   alignas(kNoSharing) std::uint64_t lost_ = 0;
   std::atomic<std::uint64_t> dropped_{0};
 };

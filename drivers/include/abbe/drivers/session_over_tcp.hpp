@@ -1,13 +1,13 @@
 #pragma once
-/// What every device does alike that is a session over one TCP connection: the actions of the sans-I/O
-/// session carried out, its ticks kept, bytes read for receive(), and what receive() understood told to the
-/// session in the next turn. One device thread.
+/// What every device does alike that is a session over one TCP connection: the actions of the
+/// sans-I/O session carried out, its ticks kept, bytes read for receive(), and what receive()
+/// understood told to the session in the next turn. One device thread.
 ///
 /// `Words` names the session's vocabulary: Session, Input, Action, Open, Send, Close, Connected,
-/// ConnectionLost; Message, the variant that receive() posts; kInbox messages and kMostRead bytes of
-/// room for one turn. `Driver` derives from this and gives: std::span<const std::byte> encode(const Send&),
-/// valid until its next call and already recorded; void connected(), before the session hears of it; void
-/// disconnected(); RawRing& raw().
+/// ConnectionLost; Message, the variant that receive() posts; kInbox messages and kMostRead bytes
+/// of room for one turn. `Driver` derives from this and gives: std::span<const std::byte>
+/// encode(const Send&), valid until its next call and already recorded; void connected(), before
+/// the session hears of it; void disconnected(); RawRing& raw().
 
 #include <algorithm>
 #include <array>
@@ -30,7 +30,8 @@ struct TcpPeer {
   std::string host;
   std::uint16_t port = 0;
 };
-[[nodiscard]] TcpPeer tcp_peer(const std::string& device, const std::string& host, std::uint16_t port);
+[[nodiscard]] TcpPeer tcp_peer(const std::string& device, const std::string& host,
+                               std::uint16_t port);
 /// BadConfiguration.
 [[nodiscard]] Result<void> check(const TcpPeer& peer);
 
@@ -63,9 +64,10 @@ class SessionOverTcp {
     }
   }
 
-  /// A time-out is judged only when nothing is left to read of what came before it: a thread that was held up
-  /// finds its deadlines passed and the answers in the socket. True: something was read (or connected), which
-  /// receive() takes first. A peer that sends without end is judged after kMostLateReads.
+  /// A time-out is judged only when nothing is left to read of what came before it: a thread that
+  /// was held up finds its deadlines passed and the answers in the socket. True: something was read
+  /// (or connected), which receive() takes first. A peer that sends without end is judged after
+  /// kMostLateReads.
   [[nodiscard]] bool reads_before_due() {
     const bool overdue = !tcp_.closed() && session_.deadline() <= time_.now();
     late_reads_ = overdue && late_reads_ < kMostLateReads && take_ready(std::chrono::nanoseconds{0})
@@ -77,7 +79,8 @@ class SessionOverTcp {
   /// Waits, and reads what came into received().
   void poll(std::chrono::nanoseconds at_most) {
     const auto until_due = session_.deadline() - time_.now();
-    static_cast<void>(take_ready(time_.wall(std::clamp(until_due, std::chrono::nanoseconds{0}, at_most))));
+    static_cast<void>(
+        take_ready(time_.wall(std::clamp(until_due, std::chrono::nanoseconds{0}, at_most))));
   }
 
   [[nodiscard]] const typename Words::Session& session() const { return session_; }
@@ -136,6 +139,7 @@ class SessionOverTcp {
     } else {
       return false;
     }
+
     return true;
   }
 
@@ -147,6 +151,7 @@ class SessionOverTcp {
       if (!opened) next = typename Words::ConnectionLost{opened.error().text};
       return !opened;
     }
+
     if (const auto* command = std::get_if<typename Words::Send>(&action)) {
       const auto sent = tcp_.write(driver().encode(*command));
       if (sent) return false;
@@ -155,6 +160,7 @@ class SessionOverTcp {
       next = typename Words::ConnectionLost{sent.error().text};
       return true;
     }
+
     if (std::holds_alternative<typename Words::Close>(action)) close();
     return false;
   }

@@ -1,7 +1,7 @@
 #pragma once
-/// A TCP connection that never blocks but in wait(): opened, read and written by one thread, in the ordinary
-/// world. Errors are sentences without the peer's name; the driver knows it. TCP_NODELAY: commands are small
-/// and due at once.
+/// A TCP connection that never blocks but in wait(): opened, read and written by one thread, in the
+/// ordinary world. Errors are sentences without the peer's name; the driver knows it. TCP_NODELAY:
+/// commands are small and due at once.
 
 #include <chrono>
 #include <cstddef>
@@ -21,8 +21,8 @@ class TcpClient {
   TcpClient& operator=(const TcpClient&) = delete;
   ~TcpClient() { close(); }
 
-  /// Begins to connect; wait() says when it is done. A name is resolved here and may take its time; of
-  /// several addresses the next call tries the next. Unreachable, SystemRefused.
+  /// Begins to connect; wait() says when it is done. A name is resolved here and may take its time;
+  /// of several addresses the next call tries the next. Unreachable, SystemRefused.
   [[nodiscard]] Result<void> open(const std::string& host, std::uint16_t port);
   void close() noexcept;
 
@@ -30,8 +30,8 @@ class TcpClient {
   [[nodiscard]] bool established() const noexcept { return fd_ >= 0 && !opening_; }
 
   enum class Ready { Nothing, Established, Readable };
-  /// Waits for at most `wall` of the operating system's time, also when closed; sends on what is still
-  /// unsent. Unreachable: refused, no route, reset.
+  /// Waits for at most `wall` of the operating system's time, also when closed; sends on what is
+  /// still unsent. Unreachable: refused, no route, reset.
   [[nodiscard]] Result<Ready> wait(std::chrono::nanoseconds wall);
 
   /// Bytes read, 0 if there are none yet. Unreachable: closed by the peer, reset.

@@ -1,7 +1,7 @@
 #pragma once
-/// Where drivers get their time: nothing reads a clock directly. Host time is speed x CLOCK_MONOTONIC, so
-/// that processes that were given the same `speed` share it without sharing an origin. Thread-safe, every
-/// function.
+/// Where drivers get their time: nothing reads a clock directly. Host time is speed x
+/// CLOCK_MONOTONIC, so that processes that were given the same `speed` share it without sharing an
+/// origin. Thread-safe, every function.
 
 #include <atomic>
 #include <chrono>
@@ -19,9 +19,11 @@ class TimeSource {
 
   [[nodiscard]] virtual protocol::HostTime now() const noexcept = 0;
   /// How long to let the operating system wait (poll, nanosleep) for `host` to pass.
-  [[nodiscard]] virtual std::chrono::nanoseconds wall(std::chrono::nanoseconds host) const noexcept = 0;
+  [[nodiscard]] virtual std::chrono::nanoseconds wall(
+      std::chrono::nanoseconds host) const noexcept = 0;
   /// Host duration that passes in `wall` of the operating system's time.
-  [[nodiscard]] virtual std::chrono::nanoseconds host(std::chrono::nanoseconds wall) const noexcept = 0;
+  [[nodiscard]] virtual std::chrono::nanoseconds host(
+      std::chrono::nanoseconds wall) const noexcept = 0;
 };
 
 /// speed x CLOCK_MONOTONIC. Real devices: speed 1.
@@ -29,16 +31,19 @@ class MonotonicTime final : public TimeSource {
  public:
   explicit MonotonicTime(double speed = 1.0) noexcept : speed_(speed) {}
   [[nodiscard]] protocol::HostTime now() const noexcept override;
-  [[nodiscard]] std::chrono::nanoseconds wall(std::chrono::nanoseconds host) const noexcept override;
-  [[nodiscard]] std::chrono::nanoseconds host(std::chrono::nanoseconds wall) const noexcept override;
+  [[nodiscard]] std::chrono::nanoseconds wall(
+      std::chrono::nanoseconds host) const noexcept override;
+  [[nodiscard]] std::chrono::nanoseconds host(
+      std::chrono::nanoseconds wall) const noexcept override;
   [[nodiscard]] double speed() const noexcept { return speed_; }
 
  private:
   double speed_;
 };
 
-/// Moves only when told to. The operating system's time is nothing to it: host() is zero, and wall() is
-/// `poll_wait`, zero unless the peer runs in another thread and must be given the processor.
+/// Moves only when told to. The operating system's time is nothing to it: host() is zero, and
+/// wall() is `poll_wait`, zero unless the peer runs in another thread and must be given the
+/// processor.
 class SteppedTime final : public TimeSource {
  public:
   explicit SteppedTime(protocol::HostTime start = protocol::HostTime{std::chrono::hours{1}},
@@ -51,10 +56,13 @@ class SteppedTime final : public TimeSource {
   [[nodiscard]] std::chrono::nanoseconds wall(std::chrono::nanoseconds) const noexcept override {
     return poll_wait_;
   }
-  [[nodiscard]] std::chrono::nanoseconds host(std::chrono::nanoseconds) const noexcept override { return {}; }
+  [[nodiscard]] std::chrono::nanoseconds host(std::chrono::nanoseconds) const noexcept override {
+    return {};
+  }
 
   void advance(std::chrono::nanoseconds by) noexcept {
-    now_ns_.fetch_add(by.count(), std::memory_order_acq_rel);  // acq_rel: pairs with the acquire in now()
+    now_ns_.fetch_add(by.count(),
+                      std::memory_order_acq_rel);  // acq_rel: pairs with the acquire in now()
   }
 
  private:

@@ -1,8 +1,8 @@
 #pragma once
-/// Bounds-checked cursors over bytes: what every wire format here reads and writes with. Total and sticky:
-/// past the end a reader gives zeros and a writer writes nothing, and ok() stays false, so that a decoder may
-/// read all its fields and ask once. No alignment needed. Not thread-safe; allocation-free, usable on the
-/// real-time path.
+/// Bounds-checked cursors over bytes: what every wire format here reads and writes with. Total and
+/// sticky: past the end a reader gives zeros and a writer writes nothing, and ok() stays false, so
+/// that a decoder may read all its fields and ask once. No alignment needed. Not thread-safe;
+/// allocation-free, usable on the real-time path.
 
 #include <algorithm>
 #include <array>
@@ -96,7 +96,8 @@ class ByteWriter {
     if (claim(sizeof(T))) detail::store<T, std::endian::big>(value, end() - sizeof(T));
   }
   void put(std::span<const std::byte> bytes) ABBE_RT {
-    if (claim(bytes.size()) && !bytes.empty()) std::memcpy(end() - bytes.size(), bytes.data(), bytes.size());
+    if (claim(bytes.size()) && !bytes.empty())
+      std::memcpy(end() - bytes.size(), bytes.data(), bytes.size());
   }
   void zeros(std::size_t count) ABBE_RT {
     if (claim(count) && count != 0) std::memset(end() - count, 0, count);
@@ -105,7 +106,9 @@ class ByteWriter {
   /// False once anything did not fit; what did fit before is written.
   [[nodiscard]] bool ok() const ABBE_RT { return ok_; }
   [[nodiscard]] std::size_t size() const ABBE_RT { return position_; }
-  [[nodiscard]] std::span<const std::byte> written() const ABBE_RT { return bytes_.first(position_); }
+  [[nodiscard]] std::span<const std::byte> written() const ABBE_RT {
+    return bytes_.first(position_);
+  }
 
  private:
   bool claim(std::size_t count) ABBE_RT {

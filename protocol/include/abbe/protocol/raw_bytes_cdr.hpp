@@ -1,7 +1,8 @@
 #pragma once
-/// The IDL type abbe::v1::RawBytes (idl/abbe_v1.idl) as XCDR1 plain CDR, little endian, behind the four bytes
-/// 00 01 00 00 [OMG DDS-XTypes 1.3, 7.4.1; OMG DDSI-RTPS 2.5, 10.2]. By hand, so that a simulator can play
-/// recorded bytes back without a CDR library; tested to be the same bytes Fast CDR writes.
+/// The IDL type abbe::v1::RawBytes (idl/abbe_v1.idl) as XCDR1 plain CDR, little endian, behind the
+/// four bytes 00 01 00 00 [OMG DDS-XTypes 1.3, 7.4.1; OMG DDSI-RTPS 2.5, 10.2]. By hand, so that a
+/// simulator can play recorded bytes back without a CDR library; tested to be the same bytes Fast
+/// CDR writes.
 ///   string device | align 8, int64 host_time_ns | uint32 lost_before | bool to_device | bool continued
 ///   | align 4, uint32 length | bytes                                    (alignment counts from behind the
 ///   four bytes)
@@ -29,7 +30,8 @@ struct RawBytes {
 };
 
 inline constexpr std::size_t kMaxDeviceNameLength = 32;
-/// Encapsulation, device with its length and NUL, time, lost_before, flags, length, bytes; paddings included.
+/// Encapsulation, device with its length and NUL, time, lost_before, flags, length, bytes; paddings
+/// included.
 inline constexpr std::size_t kMaxRawBytesCdrSize = 4 + 40 + 8 + 4 + 4 + 4 + RawBlock::kCapacity;
 
 enum class CdrError : std::uint8_t {
@@ -45,12 +47,14 @@ enum class CdrError : std::uint8_t {
 [[nodiscard]] tl::expected<std::size_t, CdrError> encode_cdr(const RawBytes& value,
                                                              std::span<std::byte> out) noexcept;
 /// Bytes behind the last field are not looked at (CDR pads payloads to four).
-[[nodiscard]] tl::expected<RawBytes, CdrError> decode_raw_bytes_cdr(std::span<const std::byte> cdr) noexcept;
+[[nodiscard]] tl::expected<RawBytes, CdrError> decode_raw_bytes_cdr(
+    std::span<const std::byte> cdr) noexcept;
 
 /// A block of a raw ring as the recordable value; views into `block` and `device`.
 [[nodiscard]] RawBytes to_raw_bytes(const RawBlock& block, std::string_view device) noexcept;
-/// Copies the bytes into `block` (the device's name has no place in it). Precondition: value.bytes fits,
-/// which decode_raw_bytes_cdr() guarantees; of longer ones only the first RawBlock::kCapacity are kept.
+/// Copies the bytes into `block` (the device's name has no place in it). Precondition: value.bytes
+/// fits, which decode_raw_bytes_cdr() guarantees; of longer ones only the first RawBlock::kCapacity
+/// are kept.
 void to_raw_block(const RawBytes& value, RawBlock& block) noexcept;
 
 }  // namespace abbe::protocol

@@ -1,7 +1,7 @@
 #pragma once
-/// The plain vocabulary: what devices say, once decoded. SI (m, rad, s, K, Pa); trivially copyable, fixed
-/// size, so that a sample can live in a ring. `time` is the host time of the instant the sample describes,
-/// never of its arrival. Pure data; safe to copy between threads.
+/// The plain vocabulary: what devices say, once decoded. SI (m, rad, s, K, Pa); trivially copyable,
+/// fixed size, so that a sample can live in a ring. `time` is the host time of the instant the
+/// sample describes, never of its arrival. Pure data; safe to copy between threads.
 
 #include <array>
 #include <cstddef>
@@ -28,9 +28,10 @@ enum class SampleFlag : std::uint32_t {
   DeviceError = 1u << 6,     ///< the device itself reports an error (EMCY, alarm, bad status)
   SpeedWarning = 1u << 7,    ///< tracker: target nearly too fast
   SpeedExceeded = 1u << 8,   ///< tracker: target too fast, the point is not to be used
-  PointInvalid = 1u << 9,    ///< tracker: prism error or trigger violation, the point is not to be used
-  BeamReturned = 1u << 10,   ///< first point after the beam was lost
-  Restarted = 1u << 11,      ///< first sample after a reconnection or a restart of the device
+  /// tracker: prism error or trigger violation, the point is not to be used
+  PointInvalid = 1u << 9,
+  BeamReturned = 1u << 10,  ///< first point after the beam was lost
+  Restarted = 1u << 11,     ///< first sample after a reconnection or a restart of the device
 };
 using SampleFlags = std::uint32_t;
 
@@ -52,7 +53,8 @@ struct SampleHead {
   HostTime time{};
   std::chrono::nanoseconds u_time{};
   SampleFlags flags = 0;
-  std::uint32_t lost_before = 0;  ///< samples dropped between the previous one in the ring and this one
+  /// samples dropped between the previous one in the ring and this one
+  std::uint32_t lost_before = 0;
 };
 
 /// One point of a laser tracker, in the tracker's own frame (right-handed, z up).
@@ -68,7 +70,7 @@ struct AxisSample {
   SampleHead head;
   std::uint32_t cycle = 0;  ///< SYNC or scan number since start, wraps
   std::uint8_t axis_count = 0;
-  std::uint8_t missing_mask = 0;  ///< bit i: axis i did not answer, or not believably
+  std::uint8_t missing_mask = 0;               ///< bit i: axis i did not answer, or not believably
   std::array<std::int64_t, kMaxAxes> count{};  ///< raw device counts
   std::array<double, kMaxAxes> position{};     ///< scale reading, m (linear) or rad (rotary)
 };
@@ -83,28 +85,33 @@ enum class TouchLatch : std::uint8_t {
 /// What is to be known about one touch; a bit set. None: a touch as it should be.
 enum class TouchFlag : std::uint32_t {
   None = 0,
-  Chattered = 1u << 0,      ///< more edges followed within the chatter limit; the first one counts
-  SpeedTooLow = 1u << 1,    ///< approach slower than the probe was qualified for
-  SpeedTooHigh = 1u << 2,   ///< approach faster than that
-  SpeedUnsteady = 1u << 3,  ///< the approach was speeding up or slowing down: pre-travel is not as qualified
-  LatchRefused = 1u << 4,   ///< the latched clock contradicts the scans; the scans were used
-  NoPosition = 1u << 5,     ///< scans around the touch were lost: there is no position
-  Refused = 1u << 6,        ///< the measuring machine reported a warning with it
+  Chattered = 1u << 0,     ///< more edges followed within the chatter limit; the first one counts
+  SpeedTooLow = 1u << 1,   ///< approach slower than the probe was qualified for
+  SpeedTooHigh = 1u << 2,  ///< approach faster than that
+  /// the approach was speeding up or slowing down: pre-travel is not as qualified
+  SpeedUnsteady = 1u << 3,
+  LatchRefused = 1u << 4,  ///< the latched clock contradicts the scans; the scans were used
+  NoPosition = 1u << 5,    ///< scans around the touch were lost: there is no position
+  Refused = 1u << 6,       ///< the measuring machine reported a warning with it
 };
 using TouchFlags = std::uint32_t;
 
 constexpr TouchFlags operator|(TouchFlag a, TouchFlag b) noexcept {
   return static_cast<TouchFlags>(a) | static_cast<TouchFlags>(b);
 }
-constexpr TouchFlags operator|(TouchFlags a, TouchFlag b) noexcept { return a | static_cast<TouchFlags>(b); }
-constexpr TouchFlags& operator|=(TouchFlags& a, TouchFlag b) noexcept { return a = a | b; }
+constexpr TouchFlags operator|(TouchFlags a, TouchFlag b) noexcept {
+  return a | static_cast<TouchFlags>(b);
+}
+constexpr TouchFlags& operator|=(TouchFlags& a, TouchFlag b) noexcept {
+  return a = a | b;
+}
 [[nodiscard]] constexpr bool has(TouchFlags flags, TouchFlag f) noexcept {
   return (flags & static_cast<TouchFlags>(f)) != 0;
 }
 
-/// One touch of a probe. `head.time` is the instant of contact: that of the first edge less the probe's delay.
-/// The position is that of the scales, not of the stylus tip; with `axis_count` 0 whoever has axis samples
-/// finds it at `head.time`.
+/// One touch of a probe. `head.time` is the instant of contact: that of the first edge less the
+/// probe's delay. The position is that of the scales, not of the stylus tip; with `axis_count` 0
+/// whoever has axis samples finds it at `head.time`.
 struct ProbeTrigger {
   SampleHead head;
   std::uint32_t touch = 0;  ///< number of the touch since start
@@ -113,12 +120,13 @@ struct ProbeTrigger {
   TouchFlags touch_flags = 0;
   std::int64_t edge_clock_count = 0;  ///< the card's time base at the first edge; Reported: 0
   std::uint8_t axis_count = 0;
-  std::uint8_t missing_mask = 0;  ///< bit i: axis i is not known
-  double speed_m_s = 0.0;         ///< of the approach, over the linear axes
-  std::array<double, kMaxAxes> position{};      ///< at contact, m or rad
-  std::array<double, kMaxAxes> velocity{};      ///< of the approach, m/s or rad/s
-  std::array<double, kMaxAxes> u_position{};    ///< standard uncertainty
-  std::array<double, kMaxAxes> U95_position{};  ///< half-width of the 95 % interval; not 2 u for Scan
+  std::uint8_t missing_mask = 0;              ///< bit i: axis i is not known
+  double speed_m_s = 0.0;                     ///< of the approach, over the linear axes
+  std::array<double, kMaxAxes> position{};    ///< at contact, m or rad
+  std::array<double, kMaxAxes> velocity{};    ///< of the approach, m/s or rad/s
+  std::array<double, kMaxAxes> u_position{};  ///< standard uncertainty
+  std::array<double, kMaxAxes>
+      U95_position{};  ///< half-width of the 95 % interval; not 2 u for Scan
 };
 
 /// One scan out of the window around a touch, at the full rate of the card.
@@ -134,8 +142,8 @@ struct TouchScan {
   std::array<double, kMaxAxes> position{};  ///< m or rad
 };
 
-/// What an EnvironmentSample measures: a bit set. A NaN whose bit is set is measured here but not available
-/// now. A number whose bit is not set is assumed: the device was set to it.
+/// What an EnvironmentSample measures: a bit set. A NaN whose bit is set is measured here but not
+/// available now. A number whose bit is not set is assumed: the device was set to it.
 using EnvironmentMask = std::uint16_t;
 inline constexpr EnvironmentMask kAirTemperature = 1u << 0;
 inline constexpr EnvironmentMask kAirPressure = 1u << 1;
@@ -151,8 +159,9 @@ inline constexpr auto kNoTemperatures = [] {
   return none;
 }();
 
-/// What it is like where the measurement happens: the air, and named temperatures (scales, parts) by channel;
-/// the configuration says which channel is what. NaN where the device does not measure a quantity.
+/// What it is like where the measurement happens: the air, and named temperatures (scales, parts)
+/// by channel; the configuration says which channel is what. NaN where the device does not measure
+/// a quantity.
 struct EnvironmentSample {
   SampleHead head;
   double air_temperature_K = 0.0;
@@ -167,7 +176,8 @@ struct Snapshot {
   SampleHead head;
   std::uint8_t axis_count = 0;
   std::uint8_t missing_mask = 0;
-  bool axes_compensated = false;  ///< false: raw scale readings; true: already corrected by the control
+  /// false: raw scale readings; true: already corrected by the control
+  bool axes_compensated = false;
   bool has_tracker_point = false;
   bool has_trigger = false;
   bool has_environment = false;
@@ -180,18 +190,20 @@ struct Snapshot {
   EnvironmentSample environment;
 };
 
-/// Bytes exactly as they crossed the boundary of a device, cut into blocks of fixed size. A message longer
-/// than one block goes on in the next ones, each but the last with `continued` set.
+/// Bytes exactly as they crossed the boundary of a device, cut into blocks of fixed size. A message
+/// longer than one block goes on in the next ones, each but the last with `continued` set.
 struct RawBlock {
   static constexpr std::size_t kCapacity = 2048;
   enum class Direction : std::uint8_t { FromDevice = 0, ToDevice = 1 };
 
-  HostTime time{};                ///< arrival (FromDevice) or departure (ToDevice)
-  std::uint32_t lost_before = 0;  ///< blocks dropped between the previous one in the ring and this one
+  HostTime time{};  ///< arrival (FromDevice) or departure (ToDevice)
+  /// blocks dropped between the previous one in the ring and this one
+  std::uint32_t lost_before = 0;
   std::uint16_t length = 0;
   bool continued = false;  ///< the next block belongs to the same read
   Direction direction = Direction::FromDevice;
-  std::array<std::byte, kCapacity> bytes;  // NOLINT: left uninitialised on purpose, `length` says what counts
+  std::array<std::byte, kCapacity>
+      bytes;  // NOLINT: left uninitialised on purpose, `length` says what counts
 };
 
 static_assert(std::is_trivially_copyable_v<TrackerPoint>);

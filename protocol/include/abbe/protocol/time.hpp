@@ -1,13 +1,15 @@
 #pragma once
-/// The clocks of the house, as types: subtracting instants of two clocks does not compile, only a ClockModel converts.
-/// None has a now(): reading a clock is for drivers and daemon; everything here is handed its time.
+/// The clocks of the house, as types: subtracting instants of two clocks does not compile, only a
+/// ClockModel converts. None has a now(): reading a clock is for drivers and daemon; everything
+/// here is handed its time.
 
 #include <chrono>
 #include <cstdint>
 
 namespace abbe::protocol {
 
-/// Host time: CLOCK_MONOTONIC, or speed x CLOCK_MONOTONIC with simulated devices. Never the wall clock.
+/// Host time: CLOCK_MONOTONIC, or speed x CLOCK_MONOTONIC with simulated devices. Never the wall
+/// clock.
 struct HostClock {
   using duration = std::chrono::nanoseconds;
   using rep = duration::rep;
@@ -17,7 +19,8 @@ struct HostClock {
 };
 using HostTime = HostClock::time_point;
 
-/// A device's own free-running clock of arbitrary epoch (tracker seconds and microseconds, encoder ticks).
+/// A device's own free-running clock of arbitrary epoch (tracker seconds and microseconds, encoder
+/// ticks).
 struct DeviceClock {
   using duration = std::chrono::nanoseconds;
   using rep = duration::rep;
@@ -27,7 +30,8 @@ struct DeviceClock {
 };
 using DeviceTime = DeviceClock::time_point;
 
-/// Wall-clock time; appears only in the one constant that maps HostTime to UTC for people and file dates.
+/// Wall-clock time; appears only in the one constant that maps HostTime to UTC for people and file
+/// dates.
 using UtcTime = std::chrono::sys_time<std::chrono::nanoseconds>;
 
 /// UTC = host + offset. Taken once at start, recorded and published, never baked into samples.

@@ -1,7 +1,7 @@
 #pragma once
-/// A ball array as it stands on a machine's table: nine balls in an L, two blocks whose faces give it a
-/// direction; and the eight positions to which it is turned about its first ball. m, machine coordinates, the
-/// true ones. Pure.
+/// A ball array as it stands on a machine's table: nine balls in an L, two blocks whose faces give
+/// it a direction; and the eight positions to which it is turned about its first ball. m, machine
+/// coordinates, the true ones. Pure.
 
 #include <Eigen/Geometry>
 #include <array>
@@ -42,11 +42,12 @@ struct ArrayState {
   double u_block_rad = 0.0;  ///< of the direction of a face, about each axis across it
   std::uint64_t seed = 1;
 };
-/// The array as it stands there: off what is stated by errors drawn with these uncertainties, and as long as
-/// its temperature makes it.
+/// The array as it stands there: off what is stated by errors drawn with these uncertainties, and
+/// as long as its temperature makes it.
 [[nodiscard]] BallArray as_it_is(const BallArray& stated, const ArrayState& state);
 
 /// calibrator.toml of the array as stated.
-[[nodiscard]] std::string format_calibrator_toml(const BallArray& stated, const ArrayState& state = {});
+[[nodiscard]] std::string format_calibrator_toml(const BallArray& stated,
+                                                 const ArrayState& state = {});
 
 }  // namespace abbe::sim

@@ -1,13 +1,13 @@
 #pragma once
-/// A USB-QUAD08 counter card: the registers behind endpoint 0 and the stream of scans behind endpoint 82h,
-/// its counters following scales, a clock and a probe. Sans-I/O and without a clock: requests and a time in,
-/// answers out. Scans are made when somebody asks, for the instants at which the pacer ticked. Not
-/// thread-safe.
+/// A USB-QUAD08 counter card: the registers behind endpoint 0 and the stream of scans behind
+/// endpoint 82h, its counters following scales, a clock and a probe. Sans-I/O and without a clock:
+/// requests and a time in, answers out. Scans are made when somebody asks, for the instants at
+/// which the pacer ticked. Not thread-safe.
 ///
-/// Takes for granted what nobody has seen on hardware yet: a counter with latch-on-index gives, in a scan,
-/// its count at the latest index edge since it was set up, and 0 before; the FIFO's depth (`fifo_bytes`);
-/// that a FIFO that is full ends the scan with status bit 4; that a counter stands at 0 until it is set up,
-/// and goes on whatever happens on the bus as long as the card has power.
+/// Takes for granted what nobody has seen on hardware yet: a counter with latch-on-index gives, in
+/// a scan, its count at the latest index edge since it was set up, and 0 before; the FIFO's depth
+/// (`fifo_bytes`); that a FIFO that is full ends the scan with status bit 4; that a counter stands
+/// at 0 until it is set up, and goes on whatever happens on the bus as long as the card has power.
 
 #include <array>
 #include <cstddef>
@@ -46,7 +46,8 @@ struct ClockSignal {
 struct TimerSignal {};
 /// Each trigger of the probe is one edge.
 struct ProbeSignal {};
-using PhaseSignal = std::variant<std::monostate, ScaleSignal, ClockSignal, TimerSignal, ProbeSignal>;
+using PhaseSignal =
+    std::variant<std::monostate, ScaleSignal, ClockSignal, TimerSignal, ProbeSignal>;
 
 struct CardChannel {
   PhaseSignal phases;
@@ -69,11 +70,12 @@ class CounterCard final : public ExportedCard {
   explicit CounterCard(const CounterCardOptions& options);
 
   /// A control transfer; nothing: the card stalls it.
-  [[nodiscard]] std::optional<std::vector<std::byte>> control(const usb::Setup& setup, HostTime now);
+  [[nodiscard]] std::optional<std::vector<std::byte>> control(const usb::Setup& setup,
+                                                              HostTime now);
   [[nodiscard]] ControlAnswer answer(const usb::Setup& setup, HostTime now) override;
   [[nodiscard]] UsbIds ids() const override { return {options_.vendor, options_.product}; }
-  /// Makes the scans due until `now`. More than the FIFO and `wanted` bytes on their way to the host hold:
-  /// overrun.
+  /// Makes the scans due until `now`. More than the FIFO and `wanted` bytes on their way to the
+  /// host hold: overrun.
   void advance(HostTime now, std::size_t wanted) override;
   [[nodiscard]] std::vector<std::byte> take(std::size_t most) override;
   [[nodiscard]] std::size_t available() const override { return fifo_.size(); }
@@ -87,12 +89,15 @@ class CounterCard final : public ExportedCard {
 
   // Misbehaviour.
   void overrun() { overrun_ = true; }
-  /// The next scan lacks its first bytes: those that follow stand elsewhere until the scan starts anew.
+  /// The next scan lacks its first bytes: those that follow stand elsewhere until the scan starts
+  /// anew.
   void tear(std::size_t bytes) { torn_ = bytes; }
   void lose_scans(std::size_t count);          ///< the next ones are never seen
   void jump_clock(std::int64_t counts);        ///< all clock counters, at once
   void corrupt_register(std::uint16_t value);  ///< the self-test register reads this from now on
-  void fail_controls(std::size_t count) { failing_controls_ = count; }  ///< the next ones are stalled
+  void fail_controls(std::size_t count) {
+    failing_controls_ = count;
+  }  ///< the next ones are stalled
 
   [[nodiscard]] const CounterCardOptions& options() const { return options_; }
   [[nodiscard]] std::uint64_t scans_made() const { return scans_made_; }

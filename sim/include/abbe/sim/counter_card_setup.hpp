@@ -14,9 +14,10 @@ namespace abbe::sim {
 struct CardAxis {
   std::string name = "X";  ///< X, Y, Z follow the path; any other is a rotary axis that swings
   std::uint8_t channel = 0;
-  double step = 10e-9;     ///< m or rad per count; negative: counts fall as the reading rises
-  double noise = 0.0;      ///< standard deviation of one reading, m or rad
-  double swing_rad = 0.1;  ///< rotary: amplitude of its sinusoidal motion from the machine's start on
+  double step = 10e-9;  ///< m or rad per count; negative: counts fall as the reading rises
+  double noise = 0.0;   ///< standard deviation of one reading, m or rad
+  /// rotary: amplitude of its sinusoidal motion from the machine's start on
+  double swing_rad = 0.1;
   double swing_period_s = 10.0;
   double signal_period = 0.0;    ///< of the distance-coded marks, m or rad; 0: no marks
   int nominal_increment = 1000;  ///< signal periods between two fixed marks
@@ -41,8 +42,8 @@ struct CounterCardSetup {
 /// `machine` must outlive the card.
 [[nodiscard]] CounterCardOptions wire(const CounterCardSetup& setup, const VirtualMachine& machine);
 
-/// Scale readings of distance-coded marks: fixed ones every `nominal_increment` signal periods, and half-way
-/// to the next a coded one that stands one signal period further away each time.
+/// Scale readings of distance-coded marks: fixed ones every `nominal_increment` signal periods, and
+/// half-way to the next a coded one that stands one signal period further away each time.
 [[nodiscard]] std::vector<double> distance_coded_marks(double zero, double signal_period,
                                                        int nominal_increment, int pairs);
 

@@ -1,6 +1,6 @@
 #pragma once
-/// All encoders of one CAN bus behind one CanPort. Steppable: poll(now) does what is due and never blocks.
-/// Not thread-safe.
+/// All encoders of one CAN bus behind one CanPort. Steppable: poll(now) does what is due and never
+/// blocks. Not thread-safe.
 
 #include <cstdint>
 #include <deque>

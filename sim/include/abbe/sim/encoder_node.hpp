@@ -1,7 +1,8 @@
 #pragma once
-/// One CANopen encoder: the server side of CiA 301 and CiA 406 around an object dictionary, measuring one
-/// axis of the virtual machine. Sans-I/O: frames and a time in, frames with their departure time out. Its
-/// position is the *scale reading* at the instant a SYNC arrives. Can be told to misbehave. Not thread-safe.
+/// One CANopen encoder: the server side of CiA 301 and CiA 406 around an object dictionary,
+/// measuring one axis of the virtual machine. Sans-I/O: frames and a time in, frames with their
+/// departure time out. Its position is the *scale reading* at the instant a SYNC arrives. Can be
+/// told to misbehave. Not thread-safe.
 
 #include <cstdint>
 #include <optional>
@@ -24,8 +25,10 @@ struct EncoderNodeOptions {
   bool invert = false;    ///< counts fall as the reading rises
   double noise_m = 5e-9;  ///< standard deviation of one reading before it is rounded to counts
   std::uint64_t seed = 1;
-  std::chrono::nanoseconds boot_time = std::chrono::milliseconds{200};  ///< from reset to boot-up message
-  /// The machine's control has configured it: after its boot-up message it beats, and answers every SYNC.
+  std::chrono::nanoseconds boot_time =
+      std::chrono::milliseconds{200};  ///< from reset to boot-up message
+  /// The machine's control has configured it: after its boot-up message it beats, and answers every
+  /// SYNC.
   bool configured = false;
 };
 
@@ -50,8 +53,9 @@ class EncoderNode {
 
   // Misbehaviour.
   void mute_until(HostTime until) { mute_until_ = until; }
-  void delay_until(HostTime until, std::chrono::nanoseconds delay);  ///< every frame leaves `delay` late
-  void restart(HostTime now);                                        ///< as after a power cut
+  void delay_until(HostTime until,
+                   std::chrono::nanoseconds delay);  ///< every frame leaves `delay` late
+  void restart(HostTime now);                        ///< as after a power cut
   void emergency(std::uint16_t code, std::uint8_t error_register, HostTime now);
 
   [[nodiscard]] can::NodeId node() const { return options_.node; }

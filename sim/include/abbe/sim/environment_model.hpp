@@ -1,6 +1,6 @@
 #pragma once
-/// How warm, heavy and damp a shop floor is, and how warm its scales and parts are: each quantity a mean, a
-/// drift and a swing. Pure; values are looked up by time, nothing is stepped.
+/// How warm, heavy and damp a shop floor is, and how warm its scales and parts are: each quantity a
+/// mean, a drift and a swing. Pure; values are looked up by time, nothing is stepped.
 
 #include <array>
 #include <cstddef>
@@ -24,8 +24,9 @@ struct EnvironmentModel {
   Course air_temperature_C{20.0};
   Course air_pressure_hPa{1013.25};
   Course relative_humidity_percent{45.0};
-  std::array<Course, kSimulatedInputs> temperature_C{Course{20.0}, Course{20.0}, Course{20.0}, Course{20.0},
-                                                     Course{20.0}, Course{20.0}, Course{20.0}, Course{20.0}};
+  std::array<Course, kSimulatedInputs> temperature_C{Course{20.0}, Course{20.0}, Course{20.0},
+                                                     Course{20.0}, Course{20.0}, Course{20.0},
+                                                     Course{20.0}, Course{20.0}};
 };
 
 }  // namespace abbe::sim

@@ -1,7 +1,7 @@
 #pragma once
-/// One true error motion as a function of the position of its axis: values on nodes, joined by straight lines
-/// or by a natural cubic spline; or a polynomial; and a wave on top of either. Outside the nodes the formula
-/// of the last cell goes on. Pure; safe to share between threads.
+/// One true error motion as a function of the position of its axis: values on nodes, joined by
+/// straight lines or by a natural cubic spline; or a polynomial; and a wave on top of either.
+/// Outside the nodes the formula of the last cell goes on. Pure; safe to share between threads.
 
 #include <span>
 #include <vector>
@@ -14,8 +14,10 @@ class ErrorFunction {
  public:
   /// The function that is 0 everywhere.
   ErrorFunction() = default;
-  /// `nodes_m` ascending, at least two, one value each (m for translations, rad for rotations); asserted.
-  ErrorFunction(std::vector<double> nodes_m, std::vector<double> values, Shape shape = Shape::Linear);
+  /// `nodes_m` ascending, at least two, one value each (m for translations, rad for rotations);
+  /// asserted.
+  ErrorFunction(std::vector<double> nodes_m, std::vector<double> values,
+                Shape shape = Shape::Linear);
 
   /// sum of coefficient[k] position^k, SI. Has no nodes.
   [[nodiscard]] static ErrorFunction polynomial(std::vector<double> coefficients);

@@ -1,6 +1,6 @@
 #pragma once
-/// What a USB/IP server needs of the counter card that it exports: the simulated one or the one of a
-/// recording.
+/// What a USB/IP server needs of the counter card that it exports: the simulated one or the one of
+/// a recording.
 
 #include <cstddef>
 #include <cstdint>

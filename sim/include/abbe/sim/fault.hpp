@@ -1,6 +1,6 @@
 #pragma once
-/// Misbehaviour on a timetable: what goes wrong, when (simulated seconds after the machine begins to move),
-/// how long.
+/// Misbehaviour on a timetable: what goes wrong, when (simulated seconds after the machine begins
+/// to move), how long.
 
 #include <cstdint>
 #include <optional>
@@ -57,7 +57,8 @@ struct Fault {
   double at_s = 0.0;
   double duration_s = 1.0;
   double value = 0.0;
-  std::uint8_t node = 0;  ///< encoder faults: CANopen node; environment faults: number of the device; 0 = all
+  /// encoder faults: CANopen node; environment faults: number of the device; 0 = all
+  std::uint8_t node = 0;
 };
 
 enum class FaultTarget { Tracker, Encoder, Environment, CounterCard, MeasuringMachine };

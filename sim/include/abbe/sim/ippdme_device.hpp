@@ -1,13 +1,13 @@
 #pragma once
-/// An I++ DME server in front of a simulated measuring machine, without its socket: bytes and a time in,
-/// bytes out. It wants what a real one wants (a session, a homed machine, a tool that exists) and answers
-/// with the error numbers of the specification. Commands are carried out one after the other, events at once.
-/// Not thread-safe. [I++ DME 1.4.3]
+/// An I++ DME server in front of a simulated measuring machine, without its socket: bytes and a
+/// time in, bytes out. It wants what a real one wants (a session, a homed machine, a tool that
+/// exists) and answers with the error numbers of the specification. Commands are carried out one
+/// after the other, events at once. Not thread-safe. [I++ DME 1.4.3]
 ///
-/// Chosen here, because the specification leaves it open: a touch reports the centre of the tip, and its data
-/// line comes when the machine has retracted; a machine that moves when its connection closes goes on to
-/// where it was sent (`keeps_moving`), and commands of the next connection, StartSession too, wait until it
-/// stands: what a client must reckon with.
+/// Chosen here, because the specification leaves it open: a touch reports the centre of the tip,
+/// and its data line comes when the machine has retracted; a machine that moves when its connection
+/// closes goes on to where it was sent (`keeps_moving`), and commands of the next connection,
+/// StartSession too, wait until it stands: what a client must reckon with.
 
 #include <array>
 #include <cstddef>
@@ -62,8 +62,8 @@ class IppDmeDevice {
 
   void inject(const Fault& fault, HostTime now);
 
-  /// The emergency stop is pressed: an unsolicited error, motion ends. Errors cannot be cleared before it is
-  /// pulled out again.
+  /// The emergency stop is pressed: an unsolicited error, motion ends. Errors cannot be cleared
+  /// before it is pulled out again.
   void press_emergency_stop(HostTime now, HostTime pulled_out_at);
   /// Somebody touches by hand.
   void touch_by_hand(const Eigen::Vector3d& reading_m);
@@ -109,7 +109,8 @@ class IppDmeDevice {
   [[nodiscard]] bool carry_out_tools(const Command& command);
   [[nodiscard]] bool carry_out_motion(const Command& command, HostTime now);
   [[nodiscard]] bool carry_out_reports(const Command& command, HostTime now);
-  void begin_motion(const Command& command, const Eigen::Vector3d& to_m, double extra_s, HostTime now);
+  void begin_motion(const Command& command, const Eigen::Vector3d& to_m, double extra_s,
+                    HostTime now);
   void begin_touch(const Command& command, HostTime now);
   void end_motion();
   void abort(HostTime now);
@@ -122,7 +123,8 @@ class IppDmeDevice {
     say(ippdme::to_string(tag) + " # " + std::string(text));
   }
   void fault(const Command& command, int severity, int code, std::string_view text);
-  [[nodiscard]] std::string place(const std::vector<std::string>& names, const Eigen::Vector3d& p_m) const;
+  [[nodiscard]] std::string place(const std::vector<std::string>& names,
+                                  const Eigen::Vector3d& p_m) const;
 
   IppDmeOptions options_;
   std::unique_ptr<ippdme::LineFramer> framer_ = std::make_unique<ippdme::LineFramer>();

@@ -1,7 +1,7 @@
 #pragma once
-/// A measuring machine with known geometric errors, spheres and faces of blocks on its table: what it reads
-/// when it probes. The tip meets the true surface; the machine reports what its scales say there. SI, machine
-/// coordinates. Pure functions over plain options; safe to call from any thread.
+/// A measuring machine with known geometric errors, spheres and faces of blocks on its table: what
+/// it reads when it probes. The tip meets the true surface; the machine reports what its scales say
+/// there. SI, machine coordinates. Pure functions over plain options; safe to call from any thread.
 
 #include <Eigen/Core>
 #include <cstdint>
@@ -38,8 +38,8 @@ struct MeasuringMachine {
 enum class ProbingFault { AlreadyTouching, NothingThere };
 struct Probing {
   std::optional<ProbingFault> fault;
-  Eigen::Vector3d reading_m =
-      Eigen::Vector3d::Zero();  ///< scales at contact: the centre of the tip, not of the surface
+  /// scales at contact: the centre of the tip, not of the surface
+  Eigen::Vector3d reading_m = Eigen::Vector3d::Zero();
 };
 
 /// Moves from place + approach x normal against the (unit) normal. `number` draws the noise.

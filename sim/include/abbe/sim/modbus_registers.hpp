@@ -1,6 +1,6 @@
 #pragma once
-/// What the registers of the simulated Modbus devices hold. Written from the manufacturers' descriptions and
-/// not from the driver's maps, so that a wrong map is found. Pure.
+/// What the registers of the simulated Modbus devices hold. Written from the manufacturers'
+/// descriptions and not from the driver's maps, so that a wrong map is found. Pure.
 
 #include <cstdint>
 #include <optional>

@@ -1,7 +1,7 @@
 #pragma once
-/// A simulated Modbus device behind a TCP port or a pseudo terminal, on libmodbus' server functions; up to
-/// two TCP clients, as the Comet has it. Steppable: poll(now) does what is due and blocks for a torn request
-/// only (20 ms at most). Not thread-safe.
+/// A simulated Modbus device behind a TCP port or a pseudo terminal, on libmodbus' server
+/// functions; up to two TCP clients, as the Comet has it. Steppable: poll(now) does what is due and
+/// blocks for a torn request only (20 ms at most). Not thread-safe.
 
 #include <poll.h>
 
@@ -20,8 +20,8 @@ namespace abbe::sim {
 struct ModbusTcpEndpoint {
   std::uint16_t port = 0;  ///< on 127.0.0.1; 0: the kernel chooses
 };
-/// The client's end of a pseudo terminal appears under this path, a symbolic link that is replaced if it is
-/// there already.
+/// The client's end of a pseudo terminal appears under this path, a symbolic link that is replaced
+/// if it is there already.
 struct ModbusPtyEndpoint {
   std::string link;
 };

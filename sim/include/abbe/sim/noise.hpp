@@ -1,7 +1,7 @@
 #pragma once
-/// Random numbers by index, not by turn: the same (seed, stream, index) gives the same number whoever asks
-/// first, so that the wall clock, thread order or a lost connection never change what the simulated
-/// instruments measure. Pure.
+/// Random numbers by index, not by turn: the same (seed, stream, index) gives the same number
+/// whoever asks first, so that the wall clock, thread order or a lost connection never change what
+/// the simulated instruments measure. Pure.
 
 #include <cstdint>
 

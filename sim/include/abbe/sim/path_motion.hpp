@@ -1,8 +1,8 @@
 #pragma once
-/// What the control does with the axes: a polyline of axis positions, trapezoidal speed along each leg, an
-/// exact stop at every vertex and a dwell before every leg. Position at any time is a pure function; before
-/// the start the machine stands at the first vertex, after the end at the last. Times in s from the start of
-/// the motion, lengths in m.
+/// What the control does with the axes: a polyline of axis positions, trapezoidal speed along each
+/// leg, an exact stop at every vertex and a dwell before every leg. Position at any time is a pure
+/// function; before the start the machine stands at the first vertex, after the end at the last.
+/// Times in s from the start of the motion, lengths in m.
 
 #include <Eigen/Core>
 #include <array>
@@ -58,8 +58,9 @@ class PathMotion {
   std::vector<Leg> legs_;
 };
 
-/// The text of path.csv: header `x_mm,y_mm,z_mm[,feed_mm_per_min]`, `#` comments. `name` stands in the error,
-/// which lists every bad line (at most 20). Blank feed cells mean the plan's feed.
-[[nodiscard]] Result<std::vector<PathVertex>> parse_path_csv(std::string_view text, std::string_view name);
+/// The text of path.csv: header `x_mm,y_mm,z_mm[,feed_mm_per_min]`, `#` comments. `name` stands in
+/// the error, which lists every bad line (at most 20). Blank feed cells mean the plan's feed.
+[[nodiscard]] Result<std::vector<PathVertex>> parse_path_csv(std::string_view text,
+                                                             std::string_view name);
 
 }  // namespace abbe::sim

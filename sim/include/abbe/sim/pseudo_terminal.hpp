@@ -1,6 +1,7 @@
 #pragma once
-/// A serial line without wires: a client opens the link as it would open /dev/ttyUSB0. Both ends are held
-/// open, so that the line stays usable while no client is there. Non-blocking. Not thread-safe.
+/// A serial line without wires: a client opens the link as it would open /dev/ttyUSB0. Both ends
+/// are held open, so that the line stays usable while no client is there. Non-blocking. Not
+/// thread-safe.
 
 #include <string>
 
@@ -12,8 +13,8 @@ namespace abbe::sim {
 class PseudoTerminal {
  public:
   PseudoTerminal() = default;  ///< closed
-  /// The client's end appears as the symbolic link `link`, which is replaced if it is there already. Io: no
-  /// pseudo terminal, link not to be made.
+  /// The client's end appears as the symbolic link `link`, which is replaced if it is there
+  /// already. Io: no pseudo terminal, link not to be made.
   [[nodiscard]] static Result<PseudoTerminal> open(const std::string& link);
   PseudoTerminal(PseudoTerminal&& other) noexcept = default;
   PseudoTerminal& operator=(PseudoTerminal&& other) noexcept = default;

@@ -1,11 +1,12 @@
 #pragma once
-/// The encoders of a recording on their port again. The n-th SYNC from the start is answered with the
-/// frames that answered the n-th SYNC then, as late as then, SDO requests with the recorded responses to the
-/// same request or with silence where that was the answer, everything else (heartbeats, EMCY, error frames,
-/// the SYNC of another producer and the positions that answered it) comes with its original timing. Until the
-/// recording starts nodes are kept alive with heartbeats and the first positions. Without a tracker in the
-/// recording it starts with the first SYNC, or, where none was sent to the nodes, as soon as somebody
-/// listens. Steppable, not thread-safe.
+/// The encoders of a recording on their port again. The n-th SYNC from the start is answered with
+/// the frames that answered the n-th SYNC then, as late as then, SDO requests with the recorded
+/// responses to the same request or with silence where that was the answer, everything else
+/// (heartbeats, EMCY, error frames, the SYNC of another producer and the positions that answered
+/// it) comes with its original timing. Until the recording starts nodes are kept alive with
+/// heartbeats and the first positions. Without a tracker in the recording it starts with the first
+/// SYNC, or, where none was sent to the nodes, as soon as somebody listens. Steppable, not
+/// thread-safe.
 
 #include <map>
 #include <memory>
@@ -24,14 +25,16 @@ class RecordedBus {
  public:
   /// `timeline` must outlive it. `leads`: it starts the timeline, because no tracker does.
   [[nodiscard]] static Result<RecordedBus> open(const EncoderBusOptions& options,
-                                                const RecordedDevice& device, ReplayTimeline& timeline,
-                                                bool leads);
+                                                const RecordedDevice& device,
+                                                ReplayTimeline& timeline, bool leads);
 
   void poll(HostTime now);
   [[nodiscard]] HostTime next_due() const;
   [[nodiscard]] int fd() const { return port_->fd(); }
   [[nodiscard]] std::uint16_t port() const { return port_->port(); }
-  [[nodiscard]] bool finished() const { return timeline_.running() && next_spoken_ >= spoken_.size(); }
+  [[nodiscard]] bool finished() const {
+    return timeline_.running() && next_spoken_ >= spoken_.size();
+  }
   [[nodiscard]] std::size_t syncs() const { return cycles_.size() + foreign_syncs_; }
 
  private:
@@ -72,11 +75,13 @@ class RecordedBus {
   std::set<can::NodeId> nodes_;
   std::vector<Cycle> cycles_;
   std::size_t foreign_syncs_ = 0;
-  bool foreign_sync_ = false;  ///< while the recording is read: the latest SYNC was another producer's
+  /// while the recording is read: the latest SYNC was another producer's
+  bool foreign_sync_ = false;
   std::vector<Spoken> spoken_;
   std::vector<Spoken> late_;  ///< of cycles already asked for, by the time they leave
   std::map<SdoRequest, SdoResponses> sdo_;
-  std::map<can::NodeId, SdoRequest> asked_;  ///< while the recording is read: requests without a response yet
+  std::map<can::NodeId, SdoRequest>
+      asked_;  ///< while the recording is read: requests without a response yet
   std::optional<std::size_t> next_cycle_;
   std::size_t next_spoken_ = 0;
   HostTime next_beat_ = HostTime::min();

@@ -1,13 +1,13 @@
 #pragma once
-/// A counter card that says again what it said in a recording. While a card is opened and set up, the n-th
-/// request is answered as the same request was then; scans come with their original timing from the moment
-/// the pacer is started; the status is what it was at that time. Where the card said nothing it says nothing;
-/// a connection that broke then breaks again, and the next one goes on where the next one did; after the last
-/// one all begins anew. A host that restarts the scan although nobody did then gets what is left of it.
-/// Not thread-safe.
+/// A counter card that says again what it said in a recording. While a card is opened and set up,
+/// the n-th request is answered as the same request was then; scans come with their original timing
+/// from the moment the pacer is started; the status is what it was at that time. Where the card
+/// said nothing it says nothing; a connection that broke then breaks again, and the next one goes
+/// on where the next one did; after the last one all begins anew. A host that restarts the scan
+/// although nobody did then gets what is left of it. Not thread-safe.
 ///
-/// A recording does not hold the card's descriptors: they are those of the simulated card, with the serial
-/// number that is given.
+/// A recording does not hold the card's descriptors: they are those of the simulated card, with the
+/// serial number that is given.
 
 #include <deque>
 #include <optional>
@@ -24,7 +24,8 @@ namespace abbe::sim {
 class RecordedCard final : public ExportedCard {
  public:
   /// `timeline` must outlive it. `leads`: it starts the timeline, because no tracker does.
-  RecordedCard(const RecordedDevice& device, const std::string& serial, ReplayTimeline& timeline, bool leads);
+  RecordedCard(const RecordedDevice& device, const std::string& serial, ReplayTimeline& timeline,
+               bool leads);
 
   [[nodiscard]] UsbIds ids() const override;
   [[nodiscard]] ControlAnswer answer(const protocol::usb::Setup& setup, HostTime now) override;

@@ -1,9 +1,10 @@
 #pragma once
-/// A device that only speaks when it is spoken to, saying again what it said in a recording: Modbus over TCP
-/// or RTU, I++ DME. The n-th of equal requests on a connection is answered as the n-th was then: after the
-/// same time, in the same pieces, or not at all; when there were no more, as the last one. A connection that
-/// broke then breaks again, and the next one goes on where the next one did then; after the last one all
-/// begins anew. What nobody asked then is refused. Interface as TrackerDevice; steppable, not thread-safe.
+/// A device that only speaks when it is spoken to, saying again what it said in a recording: Modbus
+/// over TCP or RTU, I++ DME. The n-th of equal requests on a connection is answered as the n-th was
+/// then: after the same time, in the same pieces, or not at all; when there were no more, as the
+/// last one. A connection that broke then breaks again, and the next one goes on where the next one
+/// did then; after the last one all begins anew. What nobody asked then is refused. Interface as
+/// TrackerDevice; steppable, not thread-safe.
 
 #include <deque>
 #include <map>
@@ -15,7 +16,8 @@
 
 namespace abbe::sim {
 
-/// How one protocol cuts a stream of bytes into requests, and what of a request makes it another one.
+/// How one protocol cuts a stream of bytes into requests, and what of a request makes it another
+/// one.
 struct DialogueWire {
   using Bytes = std::span<const std::byte>;
   /// Of the first request in `bytes`; 0: it is not whole yet.

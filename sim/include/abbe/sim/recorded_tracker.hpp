@@ -1,10 +1,10 @@
 #pragma once
-/// A tracker controller that says again what it said in a recording. The n-th of equal commands on a
-/// connection is answered as the n-th was then, after the same time or not at all, when there were no more as
-/// the last one; a command nobody sent then is answered NotImplemented. What was not an answer (bursts,
-/// errors, events, bytes that are no packet) comes with its original timing from the moment measuring starts.
-/// A connection that broke then breaks again, and the next one goes on where the next one did; after the last
-/// one all begins anew. Interface as TrackerDevice.
+/// A tracker controller that says again what it said in a recording. The n-th of equal commands on
+/// a connection is answered as the n-th was then, after the same time or not at all, when there
+/// were no more as the last one; a command nobody sent then is answered NotImplemented. What was
+/// not an answer (bursts, errors, events, bytes that are no packet) comes with its original timing
+/// from the moment measuring starts. A connection that broke then breaks again, and the next one
+/// goes on where the next one did; after the last one all begins anew. Interface as TrackerDevice.
 
 #include <deque>
 #include <map>
@@ -69,7 +69,9 @@ class RecordedTracker {
   void carry_out(const Due& due);
   [[nodiscard]] HostTime spoken_due() const;
   [[nodiscard]] const Connection& connection() const { return connections_[connection_]; }
-  void say(std::span<const std::byte> packet) { out_.insert(out_.end(), packet.begin(), packet.end()); }
+  void say(std::span<const std::byte> packet) {
+    out_.insert(out_.end(), packet.begin(), packet.end());
+  }
 
   ReplayTimeline& timeline_;
   protocol::emscon::PacketFramer framer_;

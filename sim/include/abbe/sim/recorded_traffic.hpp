@@ -1,6 +1,7 @@
 #pragma once
-/// The raw bytes of a recording, device by device, as they crossed the wire: what a replay serves. Reads the
-/// MCAP file whole or broken; only messages on abbe/v1/RawBytes are looked at. Pure but for memory.
+/// The raw bytes of a recording, device by device, as they crossed the wire: what a replay serves.
+/// Reads the MCAP file whole or broken; only messages on abbe/v1/RawBytes are looked at. Pure but
+/// for memory.
 
 #include <chrono>
 #include <cstddef>
@@ -42,8 +43,8 @@ struct RecordedDevice {
   std::vector<RecordedBlock> blocks;
 };
 
-/// By what was said to the device, or, where nothing was, by what it said; a tracker, if that is no protocol
-/// known here.
+/// By what was said to the device, or, where nothing was, by what it said; a tracker, if that is no
+/// protocol known here.
 [[nodiscard]] RecordedKind kind_of(std::span<const RecordedBlock> blocks);
 
 /// The text of the configuration a recording was made with; empty if it does not hold one.
@@ -56,8 +57,8 @@ struct RecordedDevice {
 /// A master that paused for longer is led back to where the recording is.
 inline constexpr std::chrono::milliseconds kOutOfStep{50};
 
-/// Recorded time -> time of the replay, shared by all devices of a recording so that they stay in step. Set
-/// by the first that starts.
+/// Recorded time -> time of the replay, shared by all devices of a recording so that they stay in
+/// step. Set by the first that starts.
 class ReplayTimeline {
  public:
   void start(HostTime recorded, HostTime now) {

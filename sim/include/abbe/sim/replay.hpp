@@ -1,6 +1,7 @@
 #pragma once
-/// All devices of a recording, each on its wire again: emScon, CAN over UDP or SocketCAN, USB/IP, Modbus TCP
-/// and RTU, I++ DME. Steppable: poll(now) never blocks and reads no clock. Not thread-safe.
+/// All devices of a recording, each on its wire again: emScon, CAN over UDP or SocketCAN, USB/IP,
+/// Modbus TCP and RTU, I++ DME. Steppable: poll(now) never blocks and reads no clock. Not
+/// thread-safe.
 
 #include <poll.h>
 
@@ -18,7 +19,8 @@ struct ReplaySetup {
   std::uint16_t tracker_port = 0;  ///< on 127.0.0.1; 0: the kernel chooses
   CanPortOptions bus;
   std::map<std::string, std::uint16_t> ports;  ///< TCP, by the name of the device
-  std::map<std::string, std::string> links;    ///< where a pseudo terminal appears, by the name of the device
+  std::map<std::string, std::string>
+      links;  ///< where a pseudo terminal appears, by the name of the device
   std::map<std::string, std::string> serials;  ///< of counter cards, by the name of the device
 };
 
@@ -46,8 +48,8 @@ class ReplayedDevice {
 class Replay {
  public:
   /// Io for a port that is taken.
-  [[nodiscard]] static Result<std::unique_ptr<Replay>> open(const std::vector<RecordedDevice>& devices,
-                                                            const ReplaySetup& setup, HostTime now);
+  [[nodiscard]] static Result<std::unique_ptr<Replay>> open(
+      const std::vector<RecordedDevice>& devices, const ReplaySetup& setup, HostTime now);
 
   void poll(HostTime now);
   [[nodiscard]] HostTime next_due() const;

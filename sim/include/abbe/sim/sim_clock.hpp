@@ -1,7 +1,8 @@
 #pragma once
-/// The clock of the simulated world across processes: host time = speed x CLOCK_MONOTONIC, without an origin
-/// to share, so that a daemon given the same speed sees the same time. The devices never read it: they are
-/// handed their time (`poll(now)`), and tests hand them whatever they like. Thread-safe (immutable).
+/// The clock of the simulated world across processes: host time = speed x CLOCK_MONOTONIC, without
+/// an origin to share, so that a daemon given the same speed sees the same time. The devices never
+/// read it: they are handed their time (`poll(now)`), and tests hand them whatever they like.
+/// Thread-safe (immutable).
 
 #include <chrono>
 

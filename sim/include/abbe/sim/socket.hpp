@@ -1,6 +1,6 @@
 #pragma once
-/// A file descriptor with an owner, the two kinds of loopback endpoint the simulator needs, and what a server
-/// with one client does with them. All non-blocking.
+/// A file descriptor with an owner, the two kinds of loopback endpoint the simulator needs, and
+/// what a server with one client does with them. All non-blocking.
 
 #include <poll.h>
 #include <sys/socket.h>
@@ -48,6 +48,7 @@ void send_what_fits(const Socket& client, std::vector<std::byte>& unsent,
 /// What a server waits for from its client; -1: there is none.
 void add_client_fd(int client_fd, bool wants_write, std::vector<pollfd>& fds);
 /// The same with one client at a time; `client` may be closed.
-void add_server_fds(const Socket& listener, const Socket& client, bool wants_write, std::vector<pollfd>& fds);
+void add_server_fds(const Socket& listener, const Socket& client, bool wants_write,
+                    std::vector<pollfd>& fds);
 
 }  // namespace abbe::sim

@@ -1,7 +1,7 @@
 #pragma once
-/// A recorded device behind a pseudo terminal: what ControllerServer is for TCP. A connection that broke is
-/// the terminal being plugged out and in again. Steppable: poll(now) never blocks and reads no clock. Not
-/// thread-safe.
+/// A recorded device behind a pseudo terminal: what ControllerServer is for TCP. A connection that
+/// broke is the terminal being plugged out and in again. Steppable: poll(now) never blocks and
+/// reads no clock. Not thread-safe.
 
 #include <memory>
 #include <string>
@@ -16,7 +16,8 @@ class TerminalServer {
  public:
   /// `link`: where the client's end appears.
   [[nodiscard]] static Result<TerminalServer> open(const std::string& link,
-                                                   std::unique_ptr<RecordedDialogue> device, HostTime now);
+                                                   std::unique_ptr<RecordedDialogue> device,
+                                                   HostTime now);
 
   void poll(HostTime now);
   [[nodiscard]] HostTime next_due() const { return device_->next_due(); }
@@ -26,7 +27,8 @@ class TerminalServer {
   [[nodiscard]] const RecordedDialogue& device() const { return *device_; }
 
  private:
-  TerminalServer(PseudoTerminal terminal, std::string link, std::unique_ptr<RecordedDialogue> device)
+  TerminalServer(PseudoTerminal terminal, std::string link,
+                 std::unique_ptr<RecordedDialogue> device)
       : terminal_(std::move(terminal)), link_(std::move(link)), device_(std::move(device)) {}
   void read(HostTime now);
   void write();

@@ -1,7 +1,7 @@
 #pragma once
-/// A surface in the machine's way, touched whenever one axis falls through it, and the probe that says so
-/// some time later. The machine drives on: pre-travel and bending are not simulated. Pure; made from the path
-/// alone.
+/// A surface in the machine's way, touched whenever one axis falls through it, and the probe that
+/// says so some time later. The machine drives on: pre-travel and bending are not simulated. Pure;
+/// made from the path alone.
 
 #include <cstdint>
 #include <vector>
@@ -20,6 +20,7 @@ struct TouchedSurface {
 };
 
 /// When the probe's edges come, s from the start of the motion, ascending.
-[[nodiscard]] std::vector<double> edge_times_s(const TouchedSurface& surface, const PathMotion& path);
+[[nodiscard]] std::vector<double> edge_times_s(const TouchedSurface& surface,
+                                               const PathMotion& path);
 
 }  // namespace abbe::sim

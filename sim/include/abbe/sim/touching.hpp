@@ -1,9 +1,9 @@
 #pragma once
-/// A ball array touched on a machine with errors: the path the machine drives, and when its probe makes
-/// contact. The tip meets the true surfaces; the scales read what they read there. The program of the machine
-/// knows where the array stands: every approach is along the true normal of the surface. The machine drives
-/// on through the surface; pre-travel and bending are not simulated, nor is what stands in the way between
-/// two touches. Pure; deterministic from the seed.
+/// A ball array touched on a machine with errors: the path the machine drives, and when its probe
+/// makes contact. The tip meets the true surfaces; the scales read what they read there. The
+/// program of the machine knows where the array stands: every approach is along the true normal of
+/// the surface. The machine drives on through the surface; pre-travel and bending are not
+/// simulated, nor is what stands in the way between two touches. Pure; deterministic from the seed.
 
 #include <cstdint>
 #include <set>
@@ -50,17 +50,20 @@ struct TouchingProgram {
   std::vector<ProbingMove> moves;
 };
 
-/// The whole procedure, from reading 0 of every axis: at every position ball 1, block 1, block 2, then ball 2
-/// to the last.
+/// The whole procedure, from reading 0 of every axis: at every position ball 1, block 1, block 2,
+/// then ball 2 to the last.
 [[nodiscard]] TouchingProgram plan_touching(const TruthMachine& truth, const BallArray& array,
                                             const TouchingOptions& options);
 
-/// When the probe's edges come, s from the start of the motion, ascending. `path` is that of the program.
-[[nodiscard]] std::vector<double> edge_times_s(const TouchingProgram& program, const TruthMachine& truth,
-                                               const PathMotion& path, double tip_radius_m,
-                                               const TouchingOptions& options);
+/// When the probe's edges come, s from the start of the motion, ascending. `path` is that of the
+/// program.
+[[nodiscard]] std::vector<double> edge_times_s(const TouchingProgram& program,
+                                               const TruthMachine& truth, const PathMotion& path,
+                                               double tip_radius_m, const TouchingOptions& options);
 
-/// The scale reading at which the tip's centre truly is at `place_m` (of a machine without target offset).
-[[nodiscard]] Eigen::Vector3d reading_at_m(const TruthMachine& truth, const Eigen::Vector3d& place_m);
+/// The scale reading at which the tip's centre truly is at `place_m` (of a machine without target
+/// offset).
+[[nodiscard]] Eigen::Vector3d reading_at_m(const TruthMachine& truth,
+                                           const Eigen::Vector3d& place_m);
 
 }  // namespace abbe::sim

@@ -1,11 +1,12 @@
 #pragma once
-/// A laser tracker controller that speaks emScon TPI, without its socket: bytes and a time in, bytes out. It
-/// needs what a real one needs (warm-up, Initialize, a reflector, a measurement mode) and refuses with the
-/// status a real one would give. Not thread-safe.
+/// A laser tracker controller that speaks emScon TPI, without its socket: bytes and a time in,
+/// bytes out. It needs what a real one needs (warm-up, Initialize, a reflector, a measurement mode)
+/// and refuses with the status a real one would give. Not thread-safe.
 ///
-/// Chosen here, because no public source says: a broken beam is an error packet with status Unknown for
-/// StartMeasurement, then event NotReady; when the beam is back comes event Ready, and points go on by
-/// themselves if keepLastPosition is set. GoBirdBath and FindReflector that meet no reflector: NoDistanceSet.
+/// Chosen here, because no public source says: a broken beam is an error packet with status Unknown
+/// for StartMeasurement, then event NotReady; when the beam is back comes event Ready, and points
+/// go on by themselves if keepLastPosition is set. GoBirdBath and FindReflector that meet no
+/// reflector: NoDistanceSet.
 
 #include <array>
 #include <cstddef>
@@ -32,8 +33,8 @@ struct TrackerOptions {
   std::chrono::nanoseconds warm_up{};  ///< from power-on until the laser is stable
   std::chrono::nanoseconds command_latency = std::chrono::milliseconds{10};
   std::chrono::nanoseconds initialize_time = std::chrono::seconds{2};
-  /// Initialize drops the beam; so long does somebody take to bring the reflector. 0: it lies in the bird
-  /// bath, where the beam goes.
+  /// Initialize drops the beam; so long does somebody take to bring the reflector. 0: it lies in
+  /// the bird bath, where the beam goes.
   std::chrono::nanoseconds fetch_beam{};
   double air_temperature_C = 20.0;
   double air_pressure_mbar = 1013.25;
@@ -126,8 +127,8 @@ class TrackerDevice {
   TrackerOptions options_;
   const VirtualMachine& machine_;
   emscon::PacketFramer framer_;
-  std::vector<std::byte> packet_ =
-      std::vector<std::byte>(emscon::kMaxPacketSize);  ///< the packet being written
+  /// the packet being written
+  std::vector<std::byte> packet_ = std::vector<std::byte>(emscon::kMaxPacketSize);
   std::vector<std::byte> out_;
   bool connected_ = false;
   bool wants_close_ = false;
@@ -165,7 +166,8 @@ class TrackerDevice {
     DeviceTime first;
     std::chrono::nanoseconds separation;
   };
-  std::optional<Grid> grid_;  ///< where points lie since power-on, so that a second start does not shift them
+  std::optional<Grid>
+      grid_;  ///< where points lie since power-on, so that a second start does not shift them
   std::uint64_t bursts_ = 0;
   std::uint64_t noise_base_ = 0;
   std::uint64_t noise_next_ = 0;

@@ -1,7 +1,7 @@
 #pragma once
-/// What a laser tracker sees of the virtual machine: pose, beam, noise in range and angles, a clock of its
-/// own, and how its controller gathers points into bursts. Pure functions of (options, time, index); safe to
-/// call from any thread.
+/// What a laser tracker sees of the virtual machine: pose, beam, noise in range and angles, a clock
+/// of its own, and how its controller gathers points into bursts. Pure functions of (options, time,
+/// index); safe to call from any thread.
 ///
 ///   p_machine = R p_tracker + P,  R = Rz Ry Rx;  p_tracker = r (cos el cos az, cos el sin az, sin el)
 ///   noise: r: sigma_r; el: sigma_a; az: sigma_a / cos el, so that it is sigma_a r in both directions across
@@ -40,15 +40,15 @@ struct TrackerView {
 [[nodiscard]] Eigen::Matrix3d R_machine_tracker(const TrackerModel& model);
 
 /// The target at `at`, as the tracker measures it; `index` numbers its noise.
-[[nodiscard]] TrackerView observe(const TrackerModel& model, const VirtualMachine& machine, HostTime at,
-                                  std::uint64_t index);
+[[nodiscard]] TrackerView observe(const TrackerModel& model, const VirtualMachine& machine,
+                                  HostTime at, std::uint64_t index);
 
 /// The tracker's clock at a host time, and back. `power_on` is when it read clock_offset_s.
 [[nodiscard]] DeviceTime device_time(const TrackerModel& model, HostTime power_on, HostTime at);
 [[nodiscard]] HostTime host_time(const TrackerModel& model, HostTime power_on, DeviceTime at);
 
-/// Time from one burst to the next, as measured at real controllers: median 332 ms, 5 to 95 %: 324 to 344 ms,
-/// whatever the point rate and whatever packet rate was asked.
+/// Time from one burst to the next, as measured at real controllers: median 332 ms, 5 to 95 %: 324
+/// to 344 ms, whatever the point rate and whatever packet rate was asked.
 [[nodiscard]] std::chrono::nanoseconds burst_interval(std::uint64_t seed, std::uint64_t burst);
 
 }  // namespace abbe::sim

@@ -1,13 +1,15 @@
 #pragma once
-/// The truth: a machine of three linear axes with 21 known geometric errors, by exact homogeneous transforms.
+/// The truth: a machine of three linear axes with 21 known geometric errors, by exact homogeneous
+/// transforms.
 ///
 ///   p(q) = T_1 T_2 T_3 t,   T_a(q) = Trans(q_a e'_a) Trans(EXa, EYa, EZa) Rz(ECa) Ry(EBa) Rx(EAa)
 ///
-/// axes ordered from workpiece to tool; t = target offset from the tool reference point; e'_a = direction of
-/// travel, tilted by the squareness errors alone and normalised: e'_Y ~ (-C0Y, 1, 0), e'_Z ~ (B0Z, -A0Z, 1),
-/// e'_X = (1, 0, 0). V = actual - nominal = p(q) - (q + t). Everything is the motion of the tool relative to
-/// the workpiece, in machine coordinates, for primed and unprimed axes alike. SI units. Names: ISO 230-1.
-/// Written without a look at `calib`, on purpose. Pure functions; safe to call from any thread.
+/// axes ordered from workpiece to tool; t = target offset from the tool reference point;
+/// e'_a = direction of travel, tilted by the squareness errors alone and normalised: e'_Y ~ (-C0Y,
+/// 1, 0), e'_Z ~ (B0Z, -A0Z, 1), e'_X = (1, 0, 0). V = actual - nominal = p(q) - (q + t).
+/// Everything is the motion of the tool relative to the workpiece, in machine coordinates, for
+/// primed and unprimed axes alike. SI units. Names: ISO 230-1. Written without a look at `calib`,
+/// on purpose. Pure functions; safe to call from any thread.
 
 #include <Eigen/Core>
 #include <array>
@@ -48,8 +50,8 @@ struct AxisRange {
 struct AxisTruth {
   AxisRange range;
   std::array<ErrorFunction, kMotions> error;
-  /// Backlash b: the error is f + s b / 2, s = direction of the last motion (+1, -1; 0 before the first). m
-  /// or rad.
+  /// Backlash b: the error is f + s b / 2, s = direction of the last motion (+1, -1; 0 before the
+  /// first). m or rad.
   std::array<double, kMotions> backlash{};
 };
 
@@ -59,10 +61,10 @@ struct Squareness {
   double C0Y_rad = 0.0;
 };
 
-/// Slow growth of the machine: at heat 1 axis a is longer by growth_per_m[a] and its zero is moved by
-/// shift_m.
+/// Slow growth of the machine: at heat 1 axis a is longer by expansion_per_m[a] and its zero is moved
+/// by shift_m.
 struct ThermalDrift {
-  Eigen::Vector3d growth_per_m = Eigen::Vector3d::Zero();
+  Eigen::Vector3d expansion_per_m = Eigen::Vector3d::Zero();
   Eigen::Vector3d shift_m = Eigen::Vector3d::Zero();
   double time_constant_s = 3600.0;
   [[nodiscard]] double heat_after(double elapsed_s) const;  ///< 1 - exp(-t / tau), 0 before t = 0
@@ -73,8 +75,8 @@ struct TruthMachine {
   std::array<AxisTruth, 3> axes;                         ///< by Axis, not by order
   Squareness squareness;
   ThermalDrift thermal;
-  /// Sag under a travelling weight, which no motion of one axis is: the target sinks by sag exp(-((x - 250
-  /// mm) / 150 mm)^2) (0.5 + y), x and y in m.
+  /// Sag under a travelling weight, which no motion of one axis is: the target sinks by sag
+  /// exp(-((x - 250 mm) / 150 mm)^2) (0.5 + y), x and y in m.
   double sag_m = 0.0;
   Eigen::Vector3d target_offset_m = Eigen::Vector3d::Zero();
 
@@ -96,7 +98,8 @@ struct MachineCondition {
 [[nodiscard]] Eigen::Vector3d error_m(const TruthMachine& truth, const Eigen::Vector3d& q_m,
                                       const MachineCondition& condition = {});
 
-/// Order of X, Y, Z from a chain as "[w X' b Y Z (C1) t]", read from w to t. Other tokens do not matter to V.
+/// Order of X, Y, Z from a chain as "[w X' b Y Z (C1) t]", read from w to t. Other tokens do not
+/// matter to V.
 [[nodiscard]] Result<std::array<Axis, 3>> parse_chain(std::string_view chain);
 
 }  // namespace abbe::sim

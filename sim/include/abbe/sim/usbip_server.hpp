@@ -1,8 +1,8 @@
 #pragma once
-/// A counter card, simulated or recorded, as a USB device that a USB/IP server exports (bus id "1-1"): for
-/// `usbip attach` from any Linux and for USB/IP clients. One client at a time. Requests for scans wait until
-/// they can be filled, as on a real bus; a short one comes only when the scan was stopped. Steppable:
-/// poll(now) never blocks and reads no clock. Not thread-safe.
+/// A counter card, simulated or recorded, as a USB device that a USB/IP server exports (bus id
+/// "1-1"): for `usbip attach` from any Linux and for USB/IP clients. One client at a time. Requests
+/// for scans wait until they can be filled, as on a real bus; a short one comes only when the scan
+/// was stopped. Steppable: poll(now) never blocks and reads no clock. Not thread-safe.
 
 #include <poll.h>
 
@@ -27,7 +27,8 @@ class UsbipServer {
  public:
   /// On 127.0.0.1; port 0: the kernel chooses.
   [[nodiscard]] static Result<UsbipServer> open(std::uint16_t port, const CounterCardOptions& card);
-  [[nodiscard]] static Result<UsbipServer> open(std::uint16_t port, std::unique_ptr<ExportedCard> card);
+  [[nodiscard]] static Result<UsbipServer> open(std::uint16_t port,
+                                                std::unique_ptr<ExportedCard> card);
 
   void poll(HostTime now);
   [[nodiscard]] HostTime next_due() const;
@@ -52,7 +53,9 @@ class UsbipServer {
   void plug_out();  ///< the connection is lost; new ones are closed at once
   void plug_in() { plugged_ = true; }
   void send_bytes(std::span<const std::byte> bytes);  ///< whatever they are, into the stream
-  void hold_output(bool yes) { hold_output_ = yes; }  ///< what is to be sent is kept, then sent at once
+  void hold_output(bool yes) {
+    hold_output_ = yes;
+  }  ///< what is to be sent is kept, then sent at once
   /// The first `bytes` of what is kept leave now.
   void send_part(std::size_t bytes);
 

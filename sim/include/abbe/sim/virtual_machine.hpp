@@ -1,6 +1,6 @@
 #pragma once
-/// A truth machine driven along its path: what scales and a tracker can observe of it at any host time. It
-/// stands at the first vertex until start() says when the motion begins. Thread-safe.
+/// A truth machine driven along its path: what scales and a tracker can observe of it at any host
+/// time. It stands at the first vertex until start() says when the motion begins. Thread-safe.
 
 #include <atomic>
 #include <cstdint>
@@ -16,7 +16,8 @@ namespace abbe::sim {
 
 class VirtualMachine {
  public:
-  VirtualMachine(TruthMachine truth, PathMotion path) : truth_(std::move(truth)), path_(std::move(path)) {}
+  VirtualMachine(TruthMachine truth, PathMotion path)
+      : truth_(std::move(truth)), path_(std::move(path)) {}
 
   /// The motion begins at `at`; only the first call counts.
   void start(HostTime at) {

@@ -1,8 +1,8 @@
 #pragma once
-/// The 18 position-dependent errors of three linear axes as polynomials, and what they do to the functional
-/// point. [Li OMM] eq. (3): every error function is sum_k K_k q^k, k = 0 .. order; with the 3 squareness
-/// errors the volumetric error is E = A(x, y, z) K. Chain w a1 a2 a3 t: the error of an axis acts after its
-/// own motion, to first order
+/// The 18 position-dependent errors of three linear axes as polynomials, and what they do to the
+/// functional point. [Li OMM] eq. (3): every error function is sum_k K_k q^k, k = 0 .. order; with
+/// the 3 squareness errors the volumetric error is E = A(x, y, z) K. Chain w a1 a2 a3 t: the error
+/// of an axis acts after its own motion, to first order
 ///     E = sum_i ( d_i(q_i) + e_i(q_i) x r_i ) + squareness,  r_i = sum over axes nearer to the tool + tool,
 /// with one squareness rotation about e_a3 before the travel of a2 and two, about e_a1 and e_a2, before that
 /// of a3. E = true - reading, evaluated at the reading. Lengths in mm: coefficients are mm^(1-k) and
@@ -28,7 +28,8 @@ struct Monomial {
   std::array<int, 3> exponent{};
   [[nodiscard]] double at(const Vector3& p_mm) const;
   // clang-tidy 14 takes the 0 that a defaulted <=> compares with for a pointer.
-  friend auto operator<=>(const Monomial&, const Monomial&) = default;  // NOLINT(modernize-use-nullptr)
+  friend auto operator<=>(const Monomial&,
+                          const Monomial&) = default;  // NOLINT(modernize-use-nullptr)
 };
 
 /// A(row, coefficient) contains factor * monomial. Row 3 t + c: component c seen with tool t.
@@ -47,9 +48,9 @@ class ErrorPolynomials {
                                                    std::span<const Vector3> tool_offsets_mm);
   [[nodiscard]] static Result<ErrorPolynomials> of(const KinematicChain&, int order);
 
-  /// Names of K: for axis x, y, z, for d (translation) then e (rotation), for direction x, y, z, order high
-  /// to low: `k_exz2` = rotation about x, caused by the motion of z, coefficient of z^2. Then squareness:
-  /// `S_zx`.
+  /// Names of K: for axis x, y, z, for d (translation) then e (rotation), for direction x, y, z,
+  /// order high to low: `k_exz2` = rotation about x, caused by the motion of z, coefficient of z^2.
+  /// Then squareness: `S_zx`.
   [[nodiscard]] std::span<const std::string> names() const { return names_; }
   [[nodiscard]] std::span<const Term> terms() const { return terms_; }
   [[nodiscard]] std::size_t rows() const { return rows_; }  ///< 3 per tool

@@ -1,6 +1,6 @@
 #pragma once
-/// y = X b + S omega + n with Gaussian priors: the algebra behind the Bayesian estimators, and nothing that
-/// knows what the numbers mean.
+/// y = X b + S omega + n with Gaussian priors: the algebra behind the Bayesian estimators, and
+/// nothing that knows what the numbers mean.
 ///     b ~ N(0, diag v),  omega ~ N(0, w^2 I),  n ~ N(0, s^2 I)  after whitening.
 /// One QR of [X S] turns an evaluation of the marginal likelihood from N^3 into (columns)^3, with gradient.
 
@@ -20,8 +20,9 @@ class LinearGaussian {
   [[nodiscard]] Eigen::Index rows() const { return rows_; }
 
   struct Evidence {
-    /// Of y, natural logarithm. Minus infinity, with derivatives of zero, where rounding leaves no covariance
-    /// of y (noise 1e-8 of what the prior makes of it): nothing is known there, least of all a maximum.
+    /// Of y, natural logarithm. Minus infinity, with derivatives of zero, where rounding leaves no
+    /// covariance of y (noise 1e-8 of what the prior makes of it): nothing is known there, least of
+    /// all a maximum.
     double log_likelihood = 0.0;
     Eigen::VectorXd by_log_prior;  ///< derivative by the logarithm of each column's prior variance
     double by_log_noise = 0.0;     ///< by log s^2
@@ -38,8 +39,8 @@ class LinearGaussian {
   /// NaN where rounding leaves no posterior information matrix.
   [[nodiscard]] Posterior posterior(const Eigen::VectorXd& prior, double noise_variance) const;
 
-  /// What the mean would be with each column of `rows` (whitened) in the place of y: the mean is linear in y.
-  /// NaN where rounding leaves no posterior information matrix.
+  /// What the mean would be with each column of `rows` (whitened) in the place of y: the mean is
+  /// linear in y. NaN where rounding leaves no posterior information matrix.
   [[nodiscard]] Eigen::MatrixXd response(const Eigen::VectorXd& prior, double noise_variance,
                                          const Eigen::MatrixXd& rows) const;
 

@@ -1,7 +1,7 @@
 #pragma once
-/// The volumetric error as an equivalent model: V(q) = B(q) c in scaled Legendre polynomials, for one tool
-/// offset, zero at Ball1. Uncertainty from the full covariance of c. Extrapolates outside the balls' hull
-/// without limit: whoever asks must ask the validity volume, too.
+/// The volumetric error as an equivalent model: V(q) = B(q) c in scaled Legendre polynomials, for
+/// one tool offset, zero at Ball1. Uncertainty from the full covariance of c. Extrapolates outside
+/// the balls' hull without limit: whoever asks must ask the validity volume, too.
 
 #include <Eigen/Core>
 #include <array>
@@ -24,9 +24,11 @@ struct NamedCoefficient {
 /// Immutable value; all members may be called from any thread.
 class EvemuModel {
  public:
-  /// BadInput / NotFinite unless c and its covariance fit the design and the covariance is symmetric with no
-  /// negative variance. Neither is changed: whoever wants V(Ball1) = 0 calls zero_at() first.
-  [[nodiscard]] static Result<EvemuModel> of(ScaledDesign, const Vector3& ball1_m, Eigen::VectorXd c_m,
+  /// BadInput / NotFinite unless c and its covariance fit the design and the covariance is
+  /// symmetric with no negative variance. Neither is changed: whoever wants V(Ball1) = 0 calls
+  /// zero_at() first.
+  [[nodiscard]] static Result<EvemuModel> of(ScaledDesign, const Vector3& ball1_m,
+                                             Eigen::VectorXd c_m,
                                              const Eigen::MatrixXd& covariance_m2);
 
   [[nodiscard]] const ScaledDesign& design() const { return design_; }

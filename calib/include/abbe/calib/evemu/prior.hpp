@@ -1,6 +1,7 @@
 #pragma once
-/// What is believed of the coefficients before measuring, with a few numbers left to the data (maximum
-/// marginal likelihood). On the scaled design, where every coefficient is the size of its contribution:
+/// What is believed of the coefficients before measuring, with a few numbers left to the data
+/// (maximum marginal likelihood). On the scaled design, where every coefficient is the size of its
+/// contribution:
 ///   constants: 5 mm;
 ///   bayes-pose: linear translations max(s_d, 2 mm), since squareness knows no smallness; but along the
 ///     axis itself, where they are a scale, max(s_d, 100 um/m arm) half width / arm (arm: the largest half
@@ -19,7 +20,7 @@ namespace abbe::calib::evemu {
 
 inline constexpr double kConstantPrior_m = 5e-3;
 inline constexpr double kLinearPrior_m = 2e-3;
-inline constexpr double kScalePrior = 100e-6;  ///< half of GateLimits::max_growth
+inline constexpr double kScalePrior = 100e-6;  ///< half of GateLimits::max_scale_error
 
 enum class PriorKind { Ridge, BayesPose };
 
@@ -37,10 +38,12 @@ struct HyperParameters {
 [[nodiscard]] Eigen::VectorXd prior_variances(PriorKind, const ScaledDesign&, std::size_t positions,
                                               const HyperParameters&);
 
-/// Quasi-Newton from a few starts within fixed bounds (s 1 nm to 1 mm, w 0.01 urad to 10 mrad, ...).
-/// Deterministic. `problem`: whitened rows of design and pose rotations, and between them those of columns
-/// with known prior variances `added`. NotConverged where no start has a likelihood.
-[[nodiscard]] Result<HyperParameters> most_likely(PriorKind, const ScaledDesign&, std::size_t positions,
+/// Quasi-Newton from a few starts within fixed bounds (s 1 nm to 1 mm, w 0.01 urad to 10 mrad,
+/// ...). Deterministic. `problem`: whitened rows of design and pose rotations, and between them
+/// those of columns with known prior variances `added`. NotConverged where no start has a
+/// likelihood.
+[[nodiscard]] Result<HyperParameters> most_likely(PriorKind, const ScaledDesign&,
+                                                  std::size_t positions,
                                                   const LinearGaussian& problem,
                                                   std::span<const double> added = {});
 /// prior_variances() with those of added columns between design and rotations.

@@ -1,8 +1,9 @@
 #pragma once
-/// The design everything numerical uses: the span of the equivalent model's columns in Legendre polynomials
-/// of u = (q - centre) / half width, arms in units of the largest half width. Every function is at most about
-/// 1 in the volume, so every coefficient is a length: the size of its contribution. Penalties and priors
-/// speak of these coefficients. A stylus offset does not change the span, so there is none here.
+/// The design everything numerical uses: the span of the equivalent model's columns in Legendre
+/// polynomials of u = (q - centre) / half width, arms in units of the largest half width. Every
+/// function is at most about 1 in the volume, so every coefficient is a length: the size of its
+/// contribution. Penalties and priors speak of these coefficients. A stylus offset does not change
+/// the span, so there is none here.
 
 #include <Eigen/Core>
 #include <array>
@@ -55,7 +56,8 @@ class ScaledDesign {
   /// The arms' unit: the largest half width.
   [[nodiscard]] double arm_unit_m() const { return box_.half_width_m.maxCoeff(); }
   [[nodiscard]] std::size_t size() const { return functions_.size(); }
-  /// In the order of equivalent().names(): function j spans name j and, through lower orders, others.
+  /// In the order of equivalent().names(): function j spans name j and, through lower orders,
+  /// others.
   [[nodiscard]] std::span<const DesignFunction> functions() const { return functions_; }
 
   [[nodiscard]] Factors factors(const Vector3& reading_m) const;

@@ -34,14 +34,15 @@ enum class Estimator { Ols, Ridge, BayesPose, Lasso, Mcp, Scad };
 [[nodiscard]] std::string_view name(Estimator);
 [[nodiscard]] std::optional<Estimator> estimator(std::string_view name);
 
-/// Bootstrap: seeded, parametric, by position: noise is drawn anew with the estimated s and w around the
-/// fitted model, lambda and gamma stay; no bias is in it, and penalised estimates have one.
+/// Bootstrap: seeded, parametric, by position: noise is drawn anew with the estimated s and w
+/// around the fitted model, lambda and gamma stay; no bias is in it, and penalised estimates have
+/// one.
 enum class CovarianceKind { Analytic, Bootstrap };
 [[nodiscard]] std::string_view name(CovarianceKind);
 
-/// How rows are held out to choose lambda and gamma. Folds over single rows, as in [Li OMM], let a fit see
-/// the noise it is judged by: the components of a ball share their touches, the balls of a position share
-/// Ball1.
+/// How rows are held out to choose lambda and gamma. Folds over single rows, as in [Li OMM], let a
+/// fit see the noise it is judged by: the components of a ball share their touches, the balls of a
+/// position share Ball1.
 enum class FoldsBy { Position, Ball, Row };
 [[nodiscard]] std::string_view name(FoldsBy);
 [[nodiscard]] std::optional<FoldsBy> folds_by(std::string_view name);
@@ -51,28 +52,33 @@ struct SparseChoice {
   std::vector<double> lambda;  ///< the path down to the chosen one, which is last [mm]
   double gamma = 3.7;
   std::vector<double> all_lambda, all_gamma;
-  Eigen::MatrixXd error_mm2;  ///< mean squared held-out error, all_lambda x all_gamma; NaN: not reached
-  double curvature = 0.0;     ///< smallest eigenvalue of sparse::convexity at the choice; < 0: other minima
-                              ///< may be near
+  Eigen::MatrixXd
+      error_mm2;  ///< mean squared held-out error, all_lambda x all_gamma; NaN: not reached
+  double curvature =
+      0.0;  ///< smallest eigenvalue of sparse::convexity at the choice; < 0: other minima
+            ///< may be near
 };
 
 struct SparseOptions {
   FoldsBy folds = FoldsBy::Position;
-  std::optional<sparse::Folds> given_folds{};  ///< set: these, for 3 rows of every observation in their order
-  /// Grid to choose from; empty: the one of [Li OMM], 100 lambdas 1e-1 .. 1e-10 mm, 50 gammas up to 100.
+  std::optional<sparse::Folds>
+      given_folds{};  ///< set: these, for 3 rows of every observation in their order
+  /// Grid to choose from; empty: the one of [Li OMM], 100 lambdas 1e-1 .. 1e-10 mm, 50 gammas up to
+  /// 100.
   std::vector<double> lambda{}, gamma{};
   std::uint64_t seed = 1;                ///< of the bootstrap, and of folds over rows
   int bootstrap_runs = 100;              ///< a standard deviation to 7 %; at least 2
   std::optional<SparseChoice> chosen{};  ///< set: no search
-  /// Of the path to the chosen lambda, in the fit and in every refit: what ends before it is NotConverged.
-  /// The search has the 10,000 of ncvreg; with those, one of eight refits without a position ended early.
+  /// Of the path to the chosen lambda, in the fit and in every refit: what ends before it is
+  /// NotConverged. The search has the 10,000 of ncvreg; with those, one of eight refits without a
+  /// position ended early.
   long max_sweeps = 1'000'000;
 };
 
 struct SolveOptions {
   Estimator estimator = Estimator::BayesPose;
-  /// Ridge and bayes-pose, when there are touches: rows through the touched points. Off: through the centres
-  /// alone, as in [Li OMM] and as for all other estimators.
+  /// Ridge and bayes-pose, when there are touches: rows through the touched points. Off: through
+  /// the centres alone, as in [Li OMM] and as for all other estimators.
   bool use_touches = true;
   SparseOptions sparse{};
 };
@@ -85,7 +91,7 @@ struct ResidualFigures {
 
 struct Statistics {
   std::size_t positions = 0, balls = 0;  ///< balls: readings over all positions
-  std::size_t observations = 0;          ///< components, without those of Ball1, which are 0 by definition
+  std::size_t observations = 0;  ///< components, without those of Ball1, which are 0 by definition
   std::size_t unknowns = 0;
   std::size_t rank = 0;               ///< of the design with columns of unit length
   double condition = 0.0;             ///< the same, within its rank
@@ -101,20 +107,21 @@ struct Statistics {
 
 /// How a rotation reference went with the model.
 struct ReferenceFit {
-  std::size_t points = 0;            ///< used
-  std::vector<std::size_t> outside;  ///< numbers, from 1, of points outside the balls' hull: not used
-  double chi2 = 0.0;                 ///< of the residuals after turning and moving
+  std::size_t points = 0;  ///< used
+  std::vector<std::size_t>
+      outside;        ///< numbers, from 1, of points outside the balls' hull: not used
+  double chi2 = 0.0;  ///< of the residuals after turning and moving
   double dof = 0.0;
   double widened = 1.0;  ///< what the rotation's covariance was multiplied with for it
 };
 
 /// The rotation about Ball1 that no touch can see.
 struct MeanRotation {
-  /// What the estimate had before it was set to the blocks' direction: with block touches, the prior's
-  /// choice; with errors only, the mean of the pose rotations found.
+  /// What the estimate had before it was set to the blocks' direction: with block touches, the
+  /// prior's choice; with errors only, the mean of the pose rotations found.
   Vector3 removed_rad = Vector3::Zero();
-  Matrix3 cov_rad2 = Matrix3::Zero();       ///< is in the model's covariance
-  bool referenced = false;                  ///< known from elsewhere: the model is more than a shape
+  Matrix3 cov_rad2 = Matrix3::Zero();  ///< is in the model's covariance
+  bool referenced = false;             ///< known from elsewhere: the model is more than a shape
   std::optional<ReferenceFit> reference{};  ///< of with_rotation_reference()
 };
 
@@ -125,7 +132,8 @@ struct Solution {
   CovarianceKind covariance = CovarianceKind::Analytic;
   std::optional<HyperParameters> hyper;
   std::optional<SparseChoice> sparse;
-  /// Observed minus fitted, pose rotations taken out, in the order of the observations; Ball1: zero.
+  /// Observed minus fitted, pose rotations taken out, in the order of the observations; Ball1:
+  /// zero.
   std::vector<Vector3> residuals_m;
   std::vector<Vector3> pose_rotations_rad;  ///< estimated, by position; empty where not modelled
   MeanRotation rotation;
@@ -138,19 +146,21 @@ struct Solution {
 /// The scaled design over the readings.
 [[nodiscard]] Result<ScaledDesign> design_of(const Observations&);
 
-/// Errors of sparse::grid_search for lasso, mcp and scad (folds that are not for these rows), RankDeficient
-/// for ols when the positions do not determine every combination, TooFewObservations, DegenerateGeometry when
-/// the balls enclose no volume.
+/// Errors of sparse::grid_search for lasso, mcp and scad (folds that are not for these rows),
+/// RankDeficient for ols when the positions do not determine every combination, TooFewObservations,
+/// DegenerateGeometry when the balls enclose no volume.
 [[nodiscard]] Result<Solution> solve(const Observations&, const SolveOptions& = {});
 
 /// V known independently at some readings, relative to each other in the machine's directions.
 struct RotationReference {
-  std::span<const BallError> points;  ///< position and ball do not count; >= 3 in the hull, not on a line
-  double sigma_m = 1e-6;              ///< standard uncertainty of V, per component, independent
+  std::span<const BallError>
+      points;             ///< position and ball do not count; >= 3 in the hull, not on a line
+  double sigma_m = 1e-6;  ///< standard uncertainty of V, per component, independent
 };
-/// The same solution turned onto the reference, which may have its own origin. The rotation omega fits
-/// r = V_reference - V_model by generalised least squares, omega = K r, over the noise of the reference and
-/// what the model's shape may be off at its points (B C B^T). Both are then in the covariance:
+/// The same solution turned onto the reference, which may have its own origin. The rotation omega
+/// fits r = V_reference - V_model by generalised least squares, omega = K r, over the noise of the
+/// reference and what the model's shape may be off at its points (B C B^T). Both are then in the
+/// covariance:
 ///     C' = (1 - G K B) C (1 - G K B)^T + sigma^2 G K K^T G^T,    G: c of a rotation about Ball1.
 /// Points outside the balls' hull (by 2 % of its size) are left out and named. Residuals larger than a right
 /// reference has once in 1000 widen the rotation's covariance by chi-square per degree of freedom; beyond 4

@@ -1,11 +1,12 @@
 #pragma once
-/// Which ball or block of the array is being touched, what comes next, and what went wrong. [Li OMM] section
-/// 3: at every position Ball1, Block1, Block2, then Ball2 to the last; the artefact turns about Ball1 between
-/// positions. Only the places of the touches decide, no clock and no command: a touch is told by where the
-/// features must be. Ball1 stands still; Ball1 and the two faces give the place of every other ball (the side
-/// the faces look to follows from the first balls finished, and is known at later positions). So a missed,
-/// doubled or wrong touch is noticed, said, and costs nothing that was acquired: what is missing is asked for
-/// again. Lengths in m, machine coordinates. Ordinary world; not thread-safe.
+/// Which ball or block of the array is being touched, what comes next, and what went wrong.
+/// [Li OMM] section 3: at every position Ball1, Block1, Block2, then Ball2 to the last; the
+/// artefact turns about Ball1 between positions. Only the places of the touches decide, no clock
+/// and no command: a touch is told by where the features must be. Ball1 stands still; Ball1 and the
+/// two faces give the place of every other ball (the side the faces look to follows from the first
+/// balls finished, and is known at later positions). So a missed, doubled or wrong touch is
+/// noticed, said, and costs nothing that was acquired: what is missing is asked for again. Lengths
+/// in m, machine coordinates. Ordinary world; not thread-safe.
 
 #include <cstddef>
 #include <memory>
@@ -19,16 +20,19 @@
 namespace abbe::calib::evemu {
 
 struct TouchPlan {
-  std::vector<int> positions{4, 8, 3, 7, 2, 6, 1, 5};  ///< in the order they are touched; 1 .. n, each once
+  std::vector<int> positions{4, 8, 3, 7,
+                             2, 6, 1, 5};  ///< in the order they are touched; 1 .. n, each once
   std::size_t points_per_ball = 25;
   std::size_t points_per_block = 25;
 };
 
 struct GuideOptions {
   ObserveOptions observe{};  ///< fewest points, tolerances; `positions` comes from the plan
-  /// Two touches nearer than this are one place touched twice: repeatability is far below, points far above.
+  /// Two touches nearer than this are one place touched twice: repeatability is far below, points
+  /// far above.
   double same_place_m = 50e-6;
-  /// Off the sphere a ball is expected at: errors near 3 mm over the length of the array, and the faces'.
+  /// Off the sphere a ball is expected at: errors near 3 mm over the length of the array, and the
+  /// faces'.
   double max_off_expected_m = 5e-3;
   /// Touches on nothing known, one after the other, that end the guiding.
   std::size_t most_astray = 20;

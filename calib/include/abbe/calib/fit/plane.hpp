@@ -1,6 +1,6 @@
 #pragma once
-/// Least-squares plane by total least squares: the direction of the smallest singular value of the centred
-/// points. Covariance: equal, independent noise along the normal, sigma from the residuals.
+/// Least-squares plane by total least squares: the direction of the smallest singular value of the
+/// centred points. Covariance: equal, independent noise along the normal, sigma from the residuals.
 
 #include <optional>
 #include <span>
@@ -13,14 +13,15 @@ namespace abbe::calib::fit {
 struct Plane {
   Vector3 point = Vector3::Zero();  ///< centroid
   Vector3 normal = Vector3::UnitZ();
-  Matrix3 cov_normal = Matrix3::Zero();  ///< rank 2: nothing along the normal itself; zero for 3 points
-  double u_offset = 0.0;                 ///< standard uncertainty of the plane's place along its normal
+  Matrix3 cov_normal =
+      Matrix3::Zero();    ///< rank 2: nothing along the normal itself; zero for 3 points
+  double u_offset = 0.0;  ///< standard uncertainty of the plane's place along its normal
   ResidualStatistics residuals;
 };
 
-/// The normal points to the side of `towards`. NotFinite; TooFewObservations below 3 different points;
-/// DegenerateGeometry on a line, or if `towards` lies in the plane and cannot tell the sides apart.
-/// `known_sigma` as for spheres.
+/// The normal points to the side of `towards`. NotFinite; TooFewObservations below 3 different
+/// points; DegenerateGeometry on a line, or if `towards` lies in the plane and cannot tell the
+/// sides apart. `known_sigma` as for spheres.
 [[nodiscard]] Result<Plane> fit_plane(std::span<const Vector3> points, const Vector3& towards,
                                       std::optional<double> known_sigma = {});
 

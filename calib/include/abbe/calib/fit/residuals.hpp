@@ -17,6 +17,7 @@ struct ResidualStatistics {
 };
 
 /// Of signed residuals r; `unknowns` were fitted to them.
-[[nodiscard]] ResidualStatistics residual_statistics(const Eigen::VectorXd& r, std::size_t unknowns);
+[[nodiscard]] ResidualStatistics residual_statistics(const Eigen::VectorXd& r,
+                                                     std::size_t unknowns);
 
 }  // namespace abbe::calib::fit

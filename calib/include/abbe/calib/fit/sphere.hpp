@@ -1,6 +1,6 @@
 #pragma once
-/// Least-squares sphere: minimises sum (|p_i - c| - r)^2 by Gauss-Newton from the algebraic fit. Covariance:
-/// equal, independent noise of the points along the normal, sigma from the residuals.
+/// Least-squares sphere: minimises sum (|p_i - c| - r)^2 by Gauss-Newton from the algebraic fit.
+/// Covariance: equal, independent noise of the points along the normal, sigma from the residuals.
 
 #include <optional>
 #include <span>
@@ -13,14 +13,16 @@ namespace abbe::calib::fit {
 struct Sphere {
   Vector3 centre = Vector3::Zero();
   double radius = 0.0;
-  Eigen::Matrix4d covariance = Eigen::Matrix4d::Zero();  ///< of centre x y z and radius; zero for 4 points
+  /// of centre x y z and radius; zero for 4 points
+  Eigen::Matrix4d covariance = Eigen::Matrix4d::Zero();
   ResidualStatistics residuals;
-  double condition = 0.0;  ///< of the Jacobian in units of the radius: the flatter the cap, the larger
+  /// of the Jacobian in units of the radius: the flatter the cap, the larger
+  double condition = 0.0;
   int iterations = 0;
 };
 
-/// NotFinite; TooFewObservations below 4 different points; DegenerateGeometry if they lie in a plane (or so
-/// flat a cap that rounding decides); NotConverged if no sphere comes out of it.
+/// NotFinite; TooFewObservations below 4 different points; DegenerateGeometry if they lie in a
+/// plane (or so flat a cap that rounding decides); NotConverged if no sphere comes out of it.
 /// `known_sigma`: noise of a point along the normal, for the covariance instead of the residuals'.
 [[nodiscard]] Result<Sphere> fit_sphere(std::span<const Vector3> points,
                                         std::optional<double> known_sigma = {});

@@ -1,6 +1,7 @@
 #pragma once
-/// Means of consecutive tracker samples. A mean is the mean of the machine's path over the block, not the
-/// path at the mean: whatever a block is compared with has to be averaged over the same sub-points.
+/// Means of consecutive tracker samples. A mean is the mean of the machine's path over the block,
+/// not the path at the mean: whatever a block is compared with has to be averaged over the same
+/// sub-points.
 
 #include <span>
 #include <vector>
@@ -11,9 +12,11 @@ namespace abbe::calib::otf {
 
 struct Block {
   Vector3 mean_tracker_m = Vector3::Zero();
-  std::size_t samples = 0;  ///< valid samples in the mean; 0: the beam was lost, the block only keeps time
-  bool usable = false;      ///< at least half of the samples are there: fit for the adjustment
-  std::size_t first_sub_point = 0;  ///< into BlockSeries::sub_points_tracker_m, Options::row_points of them
+  /// valid samples in the mean; 0: the beam was lost, the block only keeps time
+  std::size_t samples = 0;
+  bool usable = false;  ///< at least half of the samples are there: fit for the adjustment
+  /// into BlockSeries::sub_points_tracker_m, Options::row_points of them
+  std::size_t first_sub_point = 0;
 };
 
 /// Blocks in the order of time, equally long.
@@ -27,10 +30,10 @@ struct BlockSeries {
   std::size_t lost_samples = 0;  ///< invalid or missing in time
 };
 
-/// Samples to a block so that the target travels 8.3 mm in it: fine against nodes 50 mm apart, and the length
-/// at which [Sanders 2023] was re-evaluated (100 samples at 500 Hz and 2500 mm/min). 10 to 1000. The travel
-/// is taken over chords of 50 samples, so that noise does not count as way, and from their upper quartile,
-/// which standstill and ramps do not reach.
+/// Samples to a block so that the target travels 8.3 mm in it: fine against nodes 50 mm apart, and
+/// the length at which [Sanders 2023] was re-evaluated (100 samples at 500 Hz and 2500 mm/min). 10
+/// to 1000. The travel is taken over chords of 50 samples, so that noise does not count as way, and
+/// from their upper quartile, which standstill and ramps do not reach.
 [[nodiscard]] std::size_t suitable_block_samples(std::span<const TrackerObservation>);
 
 /// NotFinite for NaN in a valid sample (says which), BadInput for time that does not ascend,

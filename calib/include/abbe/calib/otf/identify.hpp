@@ -1,5 +1,6 @@
 #pragma once
-/// observe and solve in a row; judge asks for the active model and the limits and follows by itself.
+/// observe and solve in a row; judge asks for the active model and the limits and follows by
+/// itself.
 
 #include "abbe/calib/otf/judge.hpp"
 

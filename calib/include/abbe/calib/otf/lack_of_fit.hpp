@@ -1,9 +1,9 @@
 #pragma once
-/// What the residuals of a run show beyond noise. The model is compared with alternatives, each of which adds
-/// a few columns C to the adjustment y = A U + C d (the tracker moved, the machine drifts, an axis has
-/// backlash, a vertex or a leg of the path was driven elsewhere, the ranges have an offset), or replaces its
-/// design (another order of the axes, closer nodes). With r the residuals of the model, Q = (A^T W^2 A)^-1 in
-/// the gauge:
+/// What the residuals of a run show beyond noise. The model is compared with alternatives, each of
+/// which adds a few columns C to the adjustment y = A U + C d (the tracker moved, the machine
+/// drifts, an axis has backlash, a vertex or a leg of the path was driven elsewhere, the ranges
+/// have an offset), or replaces its design (another order of the axes, closer nodes). With r the
+/// residuals of the model, Q = (A^T W^2 A)^-1 in the gauge:
 ///     S = C^T W^2 C - C^T W^2 A Q A^T W^2 C,   d = S^+ C^T W^2 r,   drop of chi2 = d^T C^T W^2 r,
 /// and the model without the alternative is wrong by V of dU = Q A^T W^2 C d. Not seen: whatever the model
 /// can follow (scale of the ranges, expansion, a path file that is turned or moved as a whole).
@@ -20,14 +20,15 @@ namespace abbe::calib::otf {
 /// Noise of the whitened residuals, in units of the stated standard uncertainty.
 struct ResidualNoise {
   double sigma0 = 1.0;  ///< square root of chi2 per degree of freedom
-  /// From block to block alone: second differences along a leg, which no slow effect enters; median based.
+  /// From block to block alone: second differences along a leg, which no slow effect enters; median
+  /// based.
   double local = 1.0;
-  /// 1 + 2 sum of the autocorrelations along a leg, as far as they are significant: how many blocks carry the
-  /// information of one [Bartlett 1946]. 1 for white noise.
+  /// 1 + 2 sum of the autocorrelations along a leg, as far as they are significant: how many blocks
+  /// carry the information of one [Bartlett 1946]. 1 for white noise.
   double correlation = 1.0;
 
   /// By what the covariance of white noise of the stated size has to be multiplied; at least 1.
-  [[nodiscard]] double covariance_factor() const;
+  [[nodiscard]] double variance_factor() const;
 };
 /// `residual_m` of every row. `degrees_of_freedom`: rows - rank.
 [[nodiscard]] ResidualNoise residual_noise(const Observations&, std::span<const double> residual_m,
@@ -61,8 +62,8 @@ struct Alternative {
   double u_m = 0.0;        ///< rms standard uncertainty of V if it holds, without rigid motion
 };
 
-/// The significant ones (family-wise error probability 1e-4), the largest share first; one of each cause.
-/// CorrelatedNoise stands alone where no other explains half of what is left.
+/// The significant ones (family-wise error probability 1e-4), the largest share first; one of each
+/// cause. CorrelatedNoise stands alone where no other explains half of what is left.
 [[nodiscard]] Result<std::vector<Alternative>> alternatives(const Observations&, const Solution&,
                                                             const Options& = {});
 

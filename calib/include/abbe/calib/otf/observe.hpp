@@ -1,7 +1,7 @@
 #pragma once
 /// Stage one: tracker points and path in, weighted linear observations of the machine's errors out.
-/// Each used block gives two rows, along a2 and a3 of its path frame; the direction of travel carries no
-/// information without synchronised clocks (weight 0 in [Sanders 2023] eq. (4)).
+/// Each used block gives two rows, along a2 and a3 of its path frame; the direction of travel
+/// carries no information without synchronised clocks (weight 0 in [Sanders 2023] eq. (4)).
 
 #include <Eigen/Core>
 #include <array>
@@ -62,9 +62,9 @@ struct Observations {
   std::size_t blocks_used = 0;
 };
 
-/// Rows of one measured point (or block mean) along a2 and a3: W P M B and W P V of [Sanders 2023] eq. (6),
-/// before weighting. `sub_points_m` are the nominal axis positions over which the design is averaged. Appends
-/// two rows.
+/// Rows of one measured point (or block mean) along a2 and a3: W P M B and W P V of [Sanders 2023]
+/// eq. (6), before weighting. `sub_points_m` are the nominal axis positions over which the design
+/// is averaged. Appends two rows.
 struct PointOnPath {
   std::size_t leg = 0;
   std::size_t block = 0;
@@ -83,8 +83,8 @@ void append_rows(Observations&, const PointOnPath&, std::span<const Vector3> sub
 /// The same observations for other tables: another order of the axes, other nodes.
 [[nodiscard]] Observations with_layout(const Observations&, ParameterLayout);
 
-[[nodiscard]] Result<Observations> observe(std::span<const TrackerObservation>, const Machine&, const Path&,
-                                           const Noise&, const Options& = {});
+[[nodiscard]] Result<Observations> observe(std::span<const TrackerObservation>, const Machine&,
+                                           const Path&, const Noise&, const Options& = {});
 /// The same from blocks that were averaged elsewhere.
 [[nodiscard]] Result<Observations> observe_blocks(const BlockSeries&, const Machine&, const Path&,
                                                   const Noise&, const Options& = {});

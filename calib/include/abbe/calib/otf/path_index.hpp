@@ -1,6 +1,7 @@
 #pragma once
-/// Which legs of a path are near a point, without a look at all of them: boxes around runs of consecutive
-/// legs, in a binary tree. The same answers as nearest_on_leg() of every leg gives, to the last bit. Pure.
+/// Which legs of a path are near a point, without a look at all of them: boxes around runs of
+/// consecutive legs, in a binary tree. The same answers as nearest_on_leg() of every leg gives, to
+/// the last bit. Pure.
 
 #include <cstddef>
 #include <optional>
@@ -33,7 +34,8 @@ class PathIndex {
 
   Path path_;
   std::size_t leaves_ = 0;  ///< a power of two; leaf i holds the legs from i * kLegsInLeaf on
-  std::vector<Box> boxes_;  ///< a heap: node k has the children 2 k and 2 k + 1, leaf i is node leaves_ + i
+  std::vector<Box>
+      boxes_;  ///< a heap: node k has the children 2 k and 2 k + 1, leaf i is node leaves_ + i
 };
 
 }  // namespace abbe::calib::otf

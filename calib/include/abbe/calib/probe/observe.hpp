@@ -1,6 +1,6 @@
 #pragma once
-/// Recorded touches as observations: which of them met one place from one side (for the delay), which went
-/// around a sphere (for the qualification). Pure; allocates. SI.
+/// Recorded touches as observations: which of them met one place from one side (for the delay),
+/// which went around a sphere (for the qualification). Pure; allocates. SI.
 
 #include <span>
 #include <vector>
@@ -21,8 +21,8 @@ struct SamePlaceOptions {
   double max_sideways_m = 0.2e-3;  ///< between places, across the approach
 };
 
-/// The largest set of touches that meet one place from one side, as speed and place along the mean approach.
-/// Touches that stand still are left out.
+/// The largest set of touches that meet one place from one side, as speed and place along the mean
+/// approach. Touches that stand still are left out.
 [[nodiscard]] std::vector<FeedTouch> same_place(std::span<const RecordedTouch> touches,
                                                 const SamePlaceOptions& options = {});
 

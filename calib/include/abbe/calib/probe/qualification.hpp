@@ -1,7 +1,7 @@
 #pragma once
-/// A touch probe qualified on a sphere of known radius R: its effective tip radius, and how that changes with
-/// the direction of the approach (lobing, the pre-travel's variation). The centre of the tip at a touch from
-/// the outward direction n, as the scales say, lies at
+/// A touch probe qualified on a sphere of known radius R: its effective tip radius, and how that
+/// changes with the direction of the approach (lobing, the pre-travel's variation). The centre of
+/// the tip at a touch from the outward direction n, as the scales say, lies at
 ///     |p_i - c| = R + r + sum_j a_j Y_j(n_i)
 /// Y_j: the harmonic polynomials of degree 2 and 3 in n (degree 0 is r, degree 1 would be c; the three lobes
 /// of a kinematic seat are of degree 3). Gauss-Newton; residuals along n, independent, of one deviation.
@@ -16,16 +16,17 @@
 namespace abbe::calib::probe {
 
 struct QualifyingTouch {
-  Vector3 p_m = Vector3::Zero();      ///< centre of the tip by the scales, with the delay compensated
-  Vector3 normal = Vector3::UnitZ();  ///< outward at the sphere, against the approach; about 0.1 is enough
+  Vector3 p_m = Vector3::Zero();  ///< centre of the tip by the scales, with the delay compensated
+  /// outward at the sphere, against the approach; about 0.1 is enough
+  Vector3 normal = Vector3::UnitZ();
 };
 
 struct QualificationOptions {
   double sphere_radius_m = 12.5e-3;  ///< certified
   double u_sphere_radius_m = 0.0;
-  /// Of the Jacobian with columns of unit length; above it the touches cover too little of the sphere to tell
-  /// lobing from the centre. Evenly touched down to the equator: 74; 0.3 rad below it: 18; 0.3 rad above:
-  /// 369.
+  /// Of the Jacobian with columns of unit length; above it the touches cover too little of the
+  /// sphere to tell lobing from the centre. Evenly touched down to the equator: 74; 0.3 rad below
+  /// it: 18; 0.3 rad above: 369.
   double max_condition = 300.0;
 };
 
@@ -68,8 +69,8 @@ struct Qualification {
   int freedom = 0;
 };
 
-/// NotFinite; BadInput for a normal of no length; TooFewObservations below 24 touches; DegenerateGeometry if
-/// they cover too little; NotConverged.
+/// NotFinite; BadInput for a normal of no length; TooFewObservations below 24 touches;
+/// DegenerateGeometry if they cover too little; NotConverged.
 [[nodiscard]] Result<Qualification> qualify(std::span<const QualifyingTouch> touches,
                                             const QualificationOptions& options = {});
 

@@ -1,7 +1,7 @@
 #pragma once
-/// Solutions of penalised least squares along decreasing lambda by cyclic coordinate descent with warm
-/// starts, strong and active sets ([Breheny 2011], [Tibshirani 2012]), with the semantics of the R package
-/// ncvreg 3.16, so that solutions and iteration counts can be compared:
+/// Solutions of penalised least squares along decreasing lambda by cyclic coordinate descent with
+/// warm starts, strong and active sets ([Breheny 2011], [Tibshirani 2012]), with the semantics of
+/// the R package ncvreg 3.16, so that solutions and iteration counts can be compared:
 ///   - columns are standardised (standardise.hpp), y is centred, the intercept is always fitted and never
 ///   penalised;
 ///   - one iteration is one sweep over the active columns in the order of the columns; a lambda is done when
@@ -15,9 +15,9 @@
 /// on their order. MCP and SCAD have many local minima; the warm start decides which one is found. Check with
 /// kkt_violation().
 ///
-/// Works on the Gram matrix of the columns: memory p^2, time n p^2 once and p^2 a sweep; meant for n > p up
-/// to a few thousand columns. Pure, no threads. The same input gives the same bits on every x86-64 processor,
-/// alone or in a grid.
+/// Works on the Gram matrix of the columns: memory p^2, time n p^2 once and p^2 a sweep; meant for
+/// n > p up to a few thousand columns. Pure, no threads. The same input gives the same bits on
+/// every x86-64 processor, alone or in a grid.
 
 #include <Eigen/Core>
 #include <optional>
@@ -29,27 +29,31 @@
 namespace abbe::calib::sparse {
 
 struct PathOptions {
-  /// Not increasing, none negative. Empty: default_lambda(); its first value is lambda_max, where all
-  /// coefficients are zero, and costs no sweep.
+  /// Not increasing, none negative. Empty: default_lambda(); its first value is lambda_max, where
+  /// all coefficients are zero, and costs no sweep.
   std::vector<double> lambda{};
-  double tolerance = 1e-4;                    ///< relative to rms(y - mean); 1e-4 as in ncvreg
-  long max_sweeps = 10000;                    ///< of the whole path; 10000 as in ncvreg
-  std::optional<Eigen::Index> max_nonzero{};  ///< the path ends after a lambda with more; none: never
+  double tolerance = 1e-4;  ///< relative to rms(y - mean); 1e-4 as in ncvreg
+  long max_sweeps = 10000;  ///< of the whole path; 10000 as in ncvreg
+  std::optional<Eigen::Index>
+      max_nonzero{};  ///< the path ends after a lambda with more; none: never
 };
 
-/// `count` values equally spaced in log from lambda_max = max_j |x_j' y| / n, the smallest with an empty
-/// solution, down to `ratio` of it; ratio defaults to 0.001 for n > p, else 0.05. Errors as fit_path.
-[[nodiscard]] Result<std::vector<double>> default_lambda(const Eigen::MatrixXd& X, const Eigen::VectorXd& y,
-                                                         int count = 100, std::optional<double> ratio = {});
+/// `count` values equally spaced in log from lambda_max = max_j |x_j' y| / n, the smallest with an
+/// empty solution, down to `ratio` of it; ratio defaults to 0.001 for n > p, else 0.05. Errors as
+/// fit_path.
+[[nodiscard]] Result<std::vector<double>> default_lambda(const Eigen::MatrixXd& X,
+                                                         const Eigen::VectorXd& y, int count = 100,
+                                                         std::optional<double> ratio = {});
 
 /// Column k belongs to lambda[k]; only the first reached() of lambda have one.
 struct Path {
   Penalty penalty;
-  std::vector<double> lambda;    ///< as asked
-  std::vector<long> sweeps;      ///< reached() of them
-  Eigen::MatrixXd standardised;  ///< p x reached, coefficients of standardised columns, in units of y; 0 for
-                                 ///< dropped columns
-  Eigen::MatrixXd coefficients;  ///< (1 + p) x reached, original units, intercept first
+  std::vector<double> lambda;  ///< as asked
+  std::vector<long> sweeps;    ///< reached() of them
+  Eigen::MatrixXd
+      standardised;  ///< p x reached, coefficients of standardised columns, in units of y; 0 for
+                     ///< dropped columns
+  Eigen::MatrixXd coefficients;          ///< (1 + p) x reached, original units, intercept first
   Eigen::VectorXd residual_sum_squares;  ///< |y - fit|^2
   std::vector<Eigen::Index> dropped;     ///< columns that do not vary
   bool budget_exhausted = false;         ///< the last reached lambda may not have converged
@@ -57,10 +61,11 @@ struct Path {
   [[nodiscard]] Eigen::Index reached() const { return coefficients.cols(); }
 };
 
-/// BadInput: shapes differ, lambda increasing or negative, gamma, tolerance or budget out of range, no column
-/// varies. NotFinite: NaN or infinity. TooFewObservations: less than two rows, or y does not vary.
-[[nodiscard]] Result<Path> fit_path(const Eigen::MatrixXd& X, const Eigen::VectorXd& y, const Penalty&,
-                                    const PathOptions& = {});
+/// BadInput: shapes differ, lambda increasing or negative, gamma, tolerance or budget out of range,
+/// no column varies. NotFinite: NaN or infinity. TooFewObservations: less than two rows, or y does
+/// not vary.
+[[nodiscard]] Result<Path> fit_path(const Eigen::MatrixXd& X, const Eigen::VectorXd& y,
+                                    const Penalty&, const PathOptions& = {});
 
 /// Rows of X times column k of coefficients, intercept included. X has the columns of the fit.
 [[nodiscard]] Eigen::VectorXd predict(const Path&, const Eigen::MatrixXd& X, Eigen::Index k);

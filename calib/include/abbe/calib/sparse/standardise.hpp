@@ -8,7 +8,8 @@
 
 namespace abbe::calib::sparse {
 
-/// Columns whose root mean square about the mean is at most this are dropped: their coefficient is 0.
+/// Columns whose root mean square about the mean is at most this are dropped: their coefficient is
+/// 0.
 inline constexpr double kConstantColumn = 1e-6;
 
 struct Standardised {
@@ -22,8 +23,9 @@ struct Standardised {
 /// BadInput: no row, or no column that varies. NotFinite: NaN, infinity, or squares that overflow.
 [[nodiscard]] Result<Standardised> standardise(const Eigen::MatrixXd& X);
 
-/// Coefficients in the units of the original design: row 0 the intercept, row 1 + j column j; one column for
-/// each column of `b`.
-[[nodiscard]] Eigen::MatrixXd to_original(const Standardised&, const Eigen::MatrixXd& b, double y_mean);
+/// Coefficients in the units of the original design: row 0 the intercept, row 1 + j column j; one
+/// column for each column of `b`.
+[[nodiscard]] Eigen::MatrixXd to_original(const Standardised&, const Eigen::MatrixXd& b,
+                                          double y_mean);
 
 }  // namespace abbe::calib::sparse

@@ -1,9 +1,9 @@
 #pragma once
-/// The inner loop: sweeps of coordinate descent over the active columns of one Gram matrix for eight paths at
-/// once, one path in each lane of the vector registers. The paths differ in penalty, lambda and active
-/// columns; a lane does the same arithmetic in the same order whatever the other lanes hold and however wide
-/// the registers are, so its result is the same bits alone or in company, on a processor with AVX-512, AVX2
-/// or neither (multiply and add are never fused).
+/// The inner loop: sweeps of coordinate descent over the active columns of one Gram matrix for
+/// eight paths at once, one path in each lane of the vector registers. The paths differ in penalty,
+/// lambda and active columns; a lane does the same arithmetic in the same order whatever the other
+/// lanes hold and however wide the registers are, so its result is the same bits alone or in
+/// company, on a processor with AVX-512, AVX2 or neither (multiply and add are never fused).
 
 #include <cstddef>
 #include <cstdint>
@@ -13,7 +13,8 @@
 namespace abbe::calib::sparse {
 
 inline constexpr std::size_t kLanes = 8;
-/// Columns are swept in blocks of this many; unused ones at the end have a zero Gram row and a zero mask.
+/// Columns are swept in blocks of this many; unused ones at the end have a zero Gram row and a zero
+/// mask.
 inline constexpr std::size_t kBlock = 4;
 
 struct alignas(64) Lanes {
@@ -23,12 +24,14 @@ struct alignas(64) LaneMask {
   std::int64_t of[kLanes]{};  ///< all bits set: the column is active in this lane; else 0
 };
 
-/// How every lane shrinks z to b, and when it is done: |z| <= lambda: 0; <= inner_end: |z| - lambda; <=
-/// outer_end:
+/// How every lane shrinks z to b, and when it is done: |z| <= lambda: 0; <= inner_end: |z| -
+/// lambda; <= outer_end:
 /// (|z| - offset) * factor; else |z|; times sgn(z).
 struct LaneParameters {
   Lanes lambda, inner_end, outer_end, offset, factor;
-  Lanes tolerance;  ///< a sweep whose largest change is smaller ends the lane; -1: an idle lane never ends
+  Lanes
+      /// a sweep whose largest change is smaller ends the lane; -1: an idle lane never ends
+      tolerance;
 };
 
 struct SweepProblem {

@@ -1,6 +1,7 @@
 #pragma once
-/// Whether somebody set the wall clock while abbed ran (a time server after a dead battery of the real-time
-/// clock, or a bad server). Dates of files are not compared with such a clock. Ordinary world; one thread.
+/// Whether somebody set the wall clock while abbed ran (a time server after a dead battery of the
+/// real-time clock, or a bad server). Dates of files are not compared with such a clock. Ordinary
+/// world; one thread.
 
 #include <chrono>
 

@@ -1,6 +1,6 @@
 #pragma once
-/// The daemon's errors: a code a program can act on and a sentence a person can, "what was tried: what was
-/// seen".
+/// The daemon's errors: a code a program can act on and a sentence a person can, "what was tried:
+/// what was seen".
 
 #include <string>
 #include <tl/expected.hpp>
@@ -20,8 +20,8 @@ enum class ErrorCode {
 struct Error {
   ErrorCode code = ErrorCode::BadInput;
   std::string text;
-  std::vector<std::string> details =
-      {};  ///< one line each, when one sentence is not enough: every fault of a file
+  /// one line each, when one sentence is not enough: every fault of a file
+  std::vector<std::string> details = {};
 };
 
 template <class T>
@@ -45,6 +45,7 @@ using Result = tl::expected<T, Error>;
     case ErrorCode::Refused:
       return 5;
   }
+
   return 4;
 }
 

@@ -1,6 +1,7 @@
 #pragma once
-/// An orderly end waits for every thread, and a thread that hangs never ends. Unless this is destroyed within
-/// `patience`, the process writes `message` to stderr and ends with `exit_code`, without destructors.
+/// An orderly end waits for every thread, and a thread that hangs never ends. Unless this is
+/// destroyed within `patience`, the process writes `message` to stderr and ends with `exit_code`,
+/// without destructors.
 
 #include <chrono>
 #include <string>

@@ -1,6 +1,6 @@
 #pragma once
-/// The faults of one input file, gathered so that a person can mend them all at once. Shared by the TOML and
-/// CSV readers.
+/// The faults of one input file, gathered so that a person can mend them all at once. Shared by the
+/// TOML and CSV readers.
 
 #include <cstddef>
 #include <string>
@@ -11,8 +11,8 @@
 
 namespace abbe::daemon {
 
-/// Collects "file:line:column: key: what is wrong", keeps the 20 nearest to the top of the file and counts
-/// the rest.
+/// Collects "file:line:column: key: what is wrong", keeps the 20 nearest to the top of the file and
+/// counts the rest.
 class Faults {
  public:
   static constexpr std::size_t kShown = 20;
@@ -33,11 +33,13 @@ class Faults {
   std::size_t count_ = 0;
 };
 
-/// The one of `known` that `word` was probably meant to be, or empty: a few letters apart, or the same but
-/// for its unit.
-[[nodiscard]] std::string_view nearest(std::string_view word, const std::vector<std::string_view>& known);
+/// The one of `known` that `word` was probably meant to be, or empty: a few letters apart, or the
+/// same but for its unit.
+[[nodiscard]] std::string_view nearest(std::string_view word,
+                                       const std::vector<std::string_view>& known);
 
 /// ` (did you mean "x"?)`, or nothing.
-[[nodiscard]] std::string suggestion(std::string_view word, const std::vector<std::string_view>& known);
+[[nodiscard]] std::string suggestion(std::string_view word,
+                                     const std::vector<std::string_view>& known);
 
 }  // namespace abbe::daemon

@@ -6,7 +6,8 @@
 
 namespace abbe::daemon {
 
-/// A file as it was read: its name without folder, and the SHA-256 of exactly the bytes that were parsed.
+/// A file as it was read: its name without folder, and the SHA-256 of exactly the bytes that were
+/// parsed.
 struct InputFile {
   std::string name;
   std::string sha256;

@@ -1,6 +1,6 @@
 #pragma once
-/// Structured log lines. Under systemd they go to the journal in its native protocol, with their fields;
-/// elsewhere to stderr, as text with the same content. Ordinary threads only.
+/// Structured log lines. Under systemd they go to the journal in its native protocol, with their
+/// fields; elsewhere to stderr, as text with the same content. Ordinary threads only.
 
 #include <filesystem>
 #include <memory>
@@ -33,12 +33,13 @@ class JournalSink {
   virtual void write(const JournalEntry& entry) = 0;
 };
 
-/// systemd's JOURNAL_NATIVE_PROTOCOL: one datagram an entry. What the journal does not take in 50 ms is lost,
-/// and counted in the next entry. An Error if nobody listens at `socket`.
+/// systemd's JOURNAL_NATIVE_PROTOCOL: one datagram an entry. What the journal does not take in
+/// 50 ms is lost, and counted in the next entry. An Error if nobody listens at `socket`.
 [[nodiscard]] Result<std::unique_ptr<JournalSink>> native_journal(
     const std::filesystem::path& socket = "/run/systemd/journal/socket");
 
-/// "abbed: MESSAGE [ABBE_DEVICE=tracker ...]"; control characters, which a device may have sent, as '?'.
+/// "abbed: MESSAGE [ABBE_DEVICE=tracker ...]"; control characters, which a device may have sent, as
+/// '?'.
 [[nodiscard]] std::unique_ptr<JournalSink> text_journal(int fd);
 
 /// The journal if it reads this process's stderr (JOURNAL_STREAM of systemd.exec(5)), else stderr.

@@ -11,8 +11,8 @@
 
 namespace abbe::daemon {
 
-/// errors.csv: `x_mm,y_mm,z_mm,ex_um,ey_um,ez_um[,ux_um,uy_um,uz_um][,inside]` as `abbe model eval` writes
-/// it, V = true - reading at scale readings, at least one; u and inside are not used.
+/// errors.csv: `x_mm,y_mm,z_mm,ex_um,ey_um,ez_um[,ux_um,uy_um,uz_um][,inside]` as `abbe model eval`
+/// writes it, V = true - reading at scale readings, at least one; u and inside are not used.
 struct KnownErrorsFile {
   InputFile source;
   std::vector<AxisPosition> points_m;

@@ -1,8 +1,8 @@
 #pragma once
 /// A CSV file of numbers, checked cell by cell. Written here because the libraries at hand
-/// (fast-cpp-csv-parser, libcsv) stop at the first fault, do not know the column of a character, and leave
-/// numbers to routines that are slow (strtod) or not correctly rounded; std::from_chars is exact and reads
-/// some 10 million numbers a second.
+/// (fast-cpp-csv-parser, libcsv) stop at the first fault, do not know the column of a character,
+/// and leave numbers to routines that are slow (strtod) or not correctly rounded; std::from_chars
+/// is exact and reads some 10 million numbers a second.
 
 #include <cstddef>
 #include <cstdint>
@@ -19,7 +19,8 @@ namespace abbe::daemon {
 struct ColumnRule {
   std::string_view name;
   bool required = true;
-  std::vector<std::string_view> words = {};  ///< not a number but one of these; the value is its index
+  /// not a number but one of these; the value is its index
+  std::vector<std::string_view> words = {};
 };
 
 /// The columns of one form of a file. A file may have several forms; the header decides.
@@ -28,7 +29,8 @@ using TableForm = std::vector<ColumnRule>;
 /// Rows of finite numbers in the order of the form's columns; an absent optional column holds 0.
 class NumberTable {
  public:
-  NumberTable(std::size_t form, std::vector<bool> present) : form_(form), present_(std::move(present)) {}
+  NumberTable(std::size_t form, std::vector<bool> present)
+      : form_(form), present_(std::move(present)) {}
 
   [[nodiscard]] std::size_t form() const noexcept { return form_; }  ///< which of the forms
   [[nodiscard]] bool has(std::size_t column) const { return present_[column]; }
@@ -37,7 +39,9 @@ class NumberTable {
     return values_[row * width() + column];
   }
   [[nodiscard]] std::size_t line(std::size_t row) const { return lines_[row]; }
-  [[nodiscard]] bool sound(std::size_t row) const { return sound_[row]; }  ///< every cell was a number
+  [[nodiscard]] bool sound(std::size_t row) const {
+    return sound_[row];
+  }  ///< every cell was a number
   [[nodiscard]] std::size_t width() const noexcept { return present_.size(); }
 
   [[nodiscard]] double* append(std::size_t line);  ///< a row of zeros to fill
@@ -54,7 +58,8 @@ class NumberTable {
 
 /// Adds a fault for everything wrong; the table is empty if the header cannot be understood.
 [[nodiscard]] std::optional<NumberTable> parse_numbers(std::string_view text,
-                                                       const std::vector<TableForm>& forms, Faults& faults,
+                                                       const std::vector<TableForm>& forms,
+                                                       Faults& faults,
                                                        const ReadProgress& progress = {});
 
 }  // namespace abbe::daemon

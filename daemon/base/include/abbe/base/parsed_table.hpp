@@ -1,5 +1,6 @@
 #pragma once
-/// A file of numbers read, hashed and parsed; what its meaning forbids is added to `faults` by who reads it.
+/// A file of numbers read, hashed and parsed; what its meaning forbids is added to `faults` by who
+/// reads it.
 
 #include <filesystem>
 #include <string_view>

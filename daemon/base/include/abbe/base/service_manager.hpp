@@ -1,5 +1,6 @@
 #pragma once
-/// What systemd wants to hear from a service of Type=notify, and how often. Without systemd nothing happens.
+/// What systemd wants to hear from a service of Type=notify, and how often. Without systemd nothing
+/// happens.
 
 #include <chrono>
 #include <optional>

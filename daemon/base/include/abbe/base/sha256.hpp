@@ -27,7 +27,7 @@ class Sha256 {
   template <class T>
   requires std::is_trivially_copyable_v<T>
   void update_bytes_of(const T& value) { update(std::as_bytes(std::span{&value, 1})); }
-  [[nodiscard]] std::string hex();               ///< 64 lower-case digits; the hash is finished afterwards
+  [[nodiscard]] std::string hex();  ///< 64 lower-case digits; the hash is finished afterwards
   [[nodiscard]] std::string hex_so_far() const;  ///< of what was added until now; more may be added
 
  private:

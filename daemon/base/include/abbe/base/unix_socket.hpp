@@ -9,14 +9,14 @@
 
 namespace abbe::daemon {
 
-/// A listening socket at `path`, mode 0660. A socket file nobody answers at is replaced; one in use is an
-/// Error.
+/// A listening socket at `path`, mode 0660. A socket file nobody answers at is replaced; one in use
+/// is an Error.
 [[nodiscard]] Result<FileDescriptor> listen_unix(const std::filesystem::path& path);
 
 /// A listener that accepts nobody is an Error after `time_out`.
-[[nodiscard]] Result<FileDescriptor> connect_unix(const std::filesystem::path& path,
-                                                  std::chrono::milliseconds time_out = std::chrono::seconds{
-                                                      2});
+[[nodiscard]] Result<FileDescriptor> connect_unix(
+    const std::filesystem::path& path,
+    std::chrono::milliseconds time_out = std::chrono::seconds{2});
 
 /// For datagrams; fails at once where nobody listens.
 [[nodiscard]] Result<FileDescriptor> connect_unix_datagrams(const std::filesystem::path& path);

@@ -10,7 +10,8 @@
 namespace abbe::daemon {
 
 [[nodiscard]] std::string to_text(protocol::UtcTime time);
-/// Nothing for any other form, and for years before 1678 or after 2261, which UtcTime does not hold.
+/// Nothing for any other form, and for years before 1678 or after 2261, which UtcTime does not
+/// hold.
 [[nodiscard]] std::optional<protocol::UtcTime> utc_from_text(std::string_view text);
 
 }  // namespace abbe::daemon

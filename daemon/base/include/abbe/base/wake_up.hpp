@@ -1,6 +1,6 @@
 #pragma once
-/// Wakes one waiting thread. signal() takes no lock and never waits: a real-time thread may wake an ordinary
-/// one with it.
+/// Wakes one waiting thread. signal() takes no lock and never waits: a real-time thread may wake an
+/// ordinary one with it.
 
 #include <semaphore.h>
 

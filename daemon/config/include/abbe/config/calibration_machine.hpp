@@ -10,7 +10,8 @@ namespace abbe::daemon {
 /// BadInput if the chain or the nodes are not those of a machine of three linear axes.
 [[nodiscard]] Result<calib::otf::Machine> otf_machine(const MachineConfig& machine);
 
-/// BadInput where [target] offset_mm is missing: every calibration needs it, and zeros would pass for it.
+/// BadInput where [target] offset_mm is missing: every calibration needs it, and zeros would pass
+/// for it.
 [[nodiscard]] Result<void> require_target(const MachineConfig& machine);
 
 }  // namespace abbe::daemon

@@ -1,9 +1,10 @@
 #pragma once
-/// The one configuration file, read once into plain structs. In the file lengths are mm, small errors um and
-/// urad, times ms or us, and the unit stands in the key; here everything is SI or std::chrono. A relative
-/// path is meant from the folder of the file. `machine.toml` (only [machine], [axes], [target], [model] and
-/// the noise figures of [tracker]) and `abbed.toml` (everything) are the same format: each reader takes from
-/// either file what it needs. Pure data; safe to copy between threads.
+/// The one configuration file, read once into plain structs. In the file lengths are mm, small
+/// errors um and urad, times ms or us, and the unit stands in the key; here everything is SI or
+/// std::chrono. A relative path is meant from the folder of the file. `machine.toml` (only
+/// [machine], [axes], [target], [model] and the noise figures of [tracker]) and `abbed.toml`
+/// (everything) are the same format: each reader takes from either file what it needs. Pure data;
+/// safe to copy between threads.
 
 #include <array>
 #include <chrono>
@@ -27,8 +28,8 @@ namespace abbe::daemon {
 
 enum class AxisKind { Linear, Rotary };
 
-/// [axes.NAME]. `reference` is where positioning and angle tables are zero: 0 if inside the range, else the
-/// minimum.
+/// [axes.NAME]. `reference` is where positioning and angle tables are zero: 0 if inside the range,
+/// else the minimum.
 struct AxisConfig {
   std::string name;
   AxisKind kind = AxisKind::Linear;
@@ -43,23 +44,24 @@ enum class BasisConfig { Linear };
 /// Direction of a machine axis along which the vertical axis of a levelled tracker points.
 enum class TrackerVertical { PlusX, MinusX, PlusY, MinusY, PlusZ, MinusZ };
 
-/// [machine], [axes.*], [target], [model], and the noise figures of [tracker]: what identification needs to
-/// know.
+/// [machine], [axes.*], [target], [model], and the noise figures of [tracker]: what identification
+/// needs to know.
 struct MachineConfig {
   std::string name;
   std::string chain;             ///< ISO 10791-6 style, "[w X' b Y Z (C1) t]"
   std::vector<AxisConfig> axes;  ///< X, Y, Z, then further linear ones, then rotary ones by name
   std::array<double, 3>
       target_offset_m{};  ///< reflector centre relative to the tool reference point, machine axes
-  bool target_given =
-      false;  ///< [target] offset_mm is there; else the zeros above are no offset: require_target()
+  /// [target] offset_mm is there; else the zeros above are no offset: require_target()
+  bool target_given = false;
   BasisConfig basis = BasisConfig::Linear;
   std::map<std::string, std::vector<double>>
-      nodes_m;                    ///< of every linear axis, ascending, both ends of travel included
-  double sigma_range_m = 2e-6;    ///< standard deviation of one tracker range
-  double sigma_angle_rad = 3e-6;  ///< standard deviation of one tracker direction, perpendicular to the beam
-  /// Of the offset all ranges have in common. 10 um as limit of error of home position and reflector: 10 um /
-  /// sqrt(3).
+      nodes_m;                  ///< of every linear axis, ascending, both ends of travel included
+  double sigma_range_m = 2e-6;  ///< standard deviation of one tracker range
+  double sigma_angle_rad =
+      3e-6;  ///< standard deviation of one tracker direction, perpendicular to the beam
+  /// Of the offset all ranges have in common. 10 um as limit of error of home position and
+  /// reflector: 10 um / sqrt(3).
   double u_range_offset_m = 6e-6;
   std::optional<TrackerVertical> tracker_vertical;          ///< none: the tracker is not levelled
   std::optional<std::array<double, 3>> tracker_position_m;  ///< machine coordinates, to 0.5 m
@@ -73,8 +75,8 @@ enum class WeatherConfig {
   Compute
 };  ///< none: environment is not read; compute: the controller corrects n
 
-/// Continuous: for runs on the fly. Stationary: one mean after the other, for verification at standstills;
-/// no run on the fly is possible then.
+/// Continuous: for runs on the fly. Stationary: one mean after the other, for verification at
+/// standstills; no run on the fly is possible then.
 enum class TrackerModeConfig { Continuous, Stationary };
 
 /// emScon sets both together.
@@ -92,9 +94,10 @@ struct TrackerConfig {
   double point_rate_hz = 500.0;                                              ///< continuous
   std::chrono::nanoseconds stationary_time{std::chrono::milliseconds{500}};  ///< a mean's; whole ms
   WeatherConfig weather = WeatherConfig::Compute;
-  /// Relative standard uncertainty that all its distances have in common. Unless given: with "compute" what
-  /// the controller's own sensors leave of the air (0.2 K and 30 Pa: 2e-7); with [air] assumed_index 0, that
-  /// of [air] is added; else nobody corrects for measured air: u_of_unmeasured_air().
+  /// Relative standard uncertainty that all its distances have in common. Unless given: with
+  /// "compute" what the controller's own sensors leave of the air (0.2 K and 30 Pa: 2e-7); with
+  /// [air] assumed_index 0, that of [air] is added; else nobody corrects for measured air:
+  /// u_of_unmeasured_air().
   double u_scale = kControllersAir;
   static constexpr double kControllersAir = 0.2 / 1e6;
   std::chrono::nanoseconds max_constant_delay{
@@ -104,27 +107,29 @@ struct TrackerConfig {
   std::chrono::nanoseconds initialize_timeout{std::chrono::seconds{120}};
   std::chrono::nanoseconds silence_timeout{
       std::chrono::milliseconds{1500}};  ///< no data while streaming: a fault
-  std::string reflector;                 ///< name or id in the controller's list; empty: the one that is set
-  bool home_after_initialize = false;    ///< the beam to the bird bath after Initialize
+  std::string reflector;  ///< name or id in the controller's list; empty: the one that is set
+  bool home_after_initialize = false;  ///< the beam to the bird bath after Initialize
   std::optional<TrackerSearchConfig>
       search;  ///< around where the beam points; none: as set in the controller
 };
 
 enum class EncoderTransport { Udp, SocketCan };
-/// Who sends the SYNC: the device thread, CAN_BCM on its timer, or the machine (then abbed sends nothing at
-/// all).
+/// Who sends the SYNC: the device thread, CAN_BCM on its timer, or the machine (then abbed sends
+/// nothing at all).
 enum class SyncConfig { Daemon, Kernel, External };
 
-/// One element of [encoder] nodes. reading = offset + count * step, the step negative when `invert = true`.
+/// One element of [encoder] nodes. reading = offset + count * step, the step negative when
+/// `invert = true`.
 struct EncoderNodeConfig {
   std::string axis;
   std::uint8_t node = 0;  ///< CANopen node id, 1 to 127
   double step = 1e-9;     ///< m or rad per count, signed
   double offset = 0.0;    ///< m or rad: the reading at count 0
   AxisKind kind = AxisKind::Linear;
-  int tpdo = 1;                  ///< 1 or 2: which one carries the position
-  int position_byte = 0;         ///< where in it; External only, else the node is asked
-  std::int64_t wrap_counts = 0;  ///< rotary: counts after which it begins anew; 0: the node is asked
+  int tpdo = 1;           ///< 1 or 2: which one carries the position
+  int position_byte = 0;  ///< where in it; External only, else the node is asked
+  /// rotary: counts after which it begins anew; 0: the node is asked
+  std::int64_t wrap_counts = 0;
 };
 
 /// [encoder]: CANopen encoders on one bus.
@@ -137,20 +142,22 @@ struct EncoderConfig {
   std::uint16_t peer_port = 0;   ///< UDP only
   SyncConfig sync = SyncConfig::Daemon;
   std::chrono::nanoseconds sync_period{std::chrono::milliseconds{1}};
-  std::chrono::nanoseconds sampling_delay{};  ///< from the SYNC (its echo; UDP: its send) to the node's latch
+  std::chrono::nanoseconds
+      sampling_delay{};  ///< from the SYNC (its echo; UDP: its send) to the node's latch
   std::chrono::nanoseconds u_sampling_delay =
       std::chrono::microseconds{50};  ///< its standard uncertainty; 0 only with simulated devices
-  /// True: the control already corrects these readings. No model is ACTIVE then, and none can be identified:
-  /// it would be applied, or measured, on top of the control's own.
+  /// True: the control already corrects these readings. No model is ACTIVE then, and none can be
+  /// identified: it would be applied, or measured, on top of the control's own.
   bool axes_compensated = false;
-  std::vector<EncoderNodeConfig> nodes;  ///< in the order of MachineConfig::axes; X, Y and Z are there
+  std::vector<EncoderNodeConfig>
+      nodes;  ///< in the order of MachineConfig::axes; X, Y and Z are there
 };
 
 enum class CardTransport { Usb, Usbip };
 
-/// [counter_card]: a USB-QUAD08 whose counters are the axes, instead of [encoder]. reading = offset + count *
-/// step, count 0 being where the axis stood when the card was set up. `step_nm` is that of one count, four
-/// counts a signal period.
+/// [counter_card]: a USB-QUAD08 whose counters are the axes, instead of [encoder].
+/// reading = offset + count * step, count 0 being where the axis stood when the card was set up.
+/// `step_nm` is that of one count, four counts a signal period.
 struct CounterCardConfig {
   std::string name = "counter_card";
   CardTransport transport = CardTransport::Usb;
@@ -163,13 +170,14 @@ struct CounterCardConfig {
   std::chrono::nanoseconds max_constant_delay{
       std::chrono::milliseconds{1}};  ///< bound of the unobservable part of the delay
   bool axes_compensated = false;      ///< true: the control already corrects these readings
-  /// Axes without marks read their offset where they stand when the card is set up for the first time. Else,
-  /// and always when it began anew in the middle, they are not known until `abbe reference --here`.
+  /// Axes without marks read their offset where they stand when the card is set up for the first
+  /// time. Else, and always when it began anew in the middle, they are not known until
+  /// `abbe reference --here`.
   bool zero_is_here = false;
 };
 
-/// One element of [reference] axes: the distance-coded marks of the scale. Reading at a mark = zero_mark +
-/// (reversed: -) its place on the scale.
+/// One element of [reference] axes: the distance-coded marks of the scale. Reading at a
+/// mark = zero_mark + (reversed: -) its place on the scale.
 struct ReferenceAxisConfig {
   std::string axis;
   drivers::DistanceCode code;
@@ -178,14 +186,14 @@ struct ReferenceAxisConfig {
   bool reversed = false;         ///< the scale's places rise as the reading falls
 };
 
-/// [reference]: a second card that latches axes of [counter_card] on their marks. These axes are not known
-/// until `abbe reference` has found where their counters began.
+/// [reference]: a second card that latches axes of [counter_card] on their marks. These axes are
+/// not known until `abbe reference` has found where their counters began.
 struct ReferenceConfig {
   CounterCardConfig card;                 ///< its axes are in the order of `axes`
   std::vector<ReferenceAxisConfig> axes;  ///< each is an axis of [counter_card]
-  std::chrono::nanoseconds u_alignment{
-      std::chrono::milliseconds{1}};  ///< how well the two cards' scans lie beside each other in time
-  double tolerance_m = 1e-6;          ///< how well the two cards' counts must be brought together, m or rad
+  std::chrono::nanoseconds u_alignment{std::chrono::milliseconds{
+      1}};                    ///< how well the two cards' scans lie beside each other in time
+  double tolerance_m = 1e-6;  ///< how well the two cards' counts must be brought together, m or rad
 };
 
 /// One [[environment]]: a Modbus device that measures air, scales or parts.
@@ -197,8 +205,8 @@ struct EnvironmentConfig {
   std::chrono::nanoseconds answer_timeout{std::chrono::milliseconds{500}};
 };
 
-/// One [[thermal]]: the readings of an axis are corrected to what the machine really does, by the temperature
-/// of its scale.
+/// One [[thermal]]: the readings of an axis are corrected to what the machine really does, by the
+/// temperature of its scale.
 struct ThermalConfig {
   std::string axis;
   std::uint8_t temperature = 0;  ///< index into Config::temperatures
@@ -216,14 +224,17 @@ struct AirConfig {
   double u_temperature_K = 0.2;
   double u_pressure_Pa = 30.0;
   double u_relative_humidity = 0.03;
-  double u_co2_ppm = 200.0;  ///< people and burners add 50 to 1000 ppm to the 430 outside; nobody measures it
-  std::chrono::nanoseconds max_age{std::chrono::seconds{60}};  ///< an older value is not available any more
-  /// The tracker's distances are raw: computed with this index. Then they are corrected to the air measured.
+  /// people and burners add 50 to 1000 ppm to the 430 outside; nobody measures it
+  double u_co2_ppm = 200.0;
+  std::chrono::nanoseconds max_age{
+      std::chrono::seconds{60}};  ///< an older value is not available any more
+  /// The tracker's distances are raw: computed with this index. Then they are corrected to the air
+  /// measured.
   std::optional<double> assumed_index;
 };
 
-/// [probe]: the touch probe on the latch and edge channels of [counter_card]. Delay and jitter are those that
-/// `abbe calibrate probe` finds for this probe; the wiring comes from the card.
+/// [probe]: the touch probe on the latch and edge channels of [counter_card]. Delay and jitter are
+/// those that `abbe calibrate probe` finds for this probe; the wiring comes from the card.
 struct ProbeConfig {
   std::string name = "probe";
   drivers::ProbeDelay delay;
@@ -233,8 +244,8 @@ struct ProbeConfig {
   std::chrono::nanoseconds window_after{std::chrono::milliseconds{10}};
 };
 
-/// [cmm]: a measuring machine behind an I++ DME server. Its touches are the daemon's; its positions are the
-/// axes where no other device gives them.
+/// [cmm]: a measuring machine behind an I++ DME server. Its touches are the daemon's; its positions
+/// are the axes where no other device gives them.
 struct CmmConfig {
   std::string name = "cmm";
   std::string host;
@@ -259,8 +270,8 @@ struct DaemonConfig {
   std::chrono::nanoseconds hub_period{std::chrono::microseconds{250}};
   std::chrono::nanoseconds watermark{
       std::chrono::milliseconds{600}};  ///< how long the hub waits for a late stream
-  bool simulated = false;               ///< the devices are simulated: only then may `speed` differ from 1
-  double speed = 1.0;                   ///< host time = speed x CLOCK_MONOTONIC
+  bool simulated = false;  ///< the devices are simulated: only then may `speed` differ from 1
+  double speed = 1.0;      ///< host time = speed x CLOCK_MONOTONIC
   RealTimeMode realtime = RealTimeMode::Ignore;
   int tracker_priority = 40;  ///< SCHED_FIFO, 1 to 99
   int encoder_priority = 50;
@@ -277,9 +288,10 @@ struct RecordingConfig {
   std::filesystem::path dir;  ///< default: data_dir/recordings
   std::uint32_t chunk_bytes = 256 * 1024;
   std::chrono::nanoseconds chunk_period{
-      std::chrono::seconds{1}};                          ///< a chunk is closed at the latest after this
-  bool raw = true;                                       ///< also record the device bytes
-  std::uint64_t min_free_bytes = 256ull * 1024 * 1024;   ///< recording stops, acquisition goes on, below this
+      std::chrono::seconds{1}};  ///< a chunk is closed at the latest after this
+  bool raw = true;               ///< also record the device bytes
+  /// recording stops, acquisition goes on, below this
+  std::uint64_t min_free_bytes = 256ull * 1024 * 1024;
   std::uint64_t max_file_bytes = 4096ull * 1024 * 1024;  ///< then the next part begins; 0: never
   std::chrono::hours keep{0};  ///< recordings no model names are removed after this; 0: never
 };
@@ -294,25 +306,27 @@ struct DdsConfig {
   std::chrono::nanoseconds validity{
       std::chrono::milliseconds{500}};  ///< a subscriber must not apply older vectors
   Supervise supervise = Supervise::Child;
-  int priority = 20;               ///< SCHED_FIFO of abbe-dds, below hub and devices; 0: an ordinary process
-  std::filesystem::path profile;   ///< XML profiles; empty: the built-in ones
-  std::filesystem::path security;  ///< keys as `abbe dds keys` makes them; empty: none, what the profile says
-  std::filesystem::path socket;    ///< default: runtime_dir/dds.sock
+  int priority = 20;  ///< SCHED_FIFO of abbe-dds, below hub and devices; 0: an ordinary process
+  std::filesystem::path profile;  ///< XML profiles; empty: the built-in ones
+  std::filesystem::path
+      security;  ///< keys as `abbe dds keys` makes them; empty: none, what the profile says
+  std::filesystem::path socket;  ///< default: runtime_dir/dds.sock
 };
 
 /// [gate]: what a model must satisfy before it may become active.
 struct GateConfig {
   double max_error_m = 1e-3;   ///< largest |V| inside the validity volume
   double max_gradient = 5e-3;  ///< largest |dV/dq|, m per m; 250 um between nodes 50 mm apart
-  /// By which the scales may read something else at a vertex of an on-the-fly path, beside their uncertainty.
+  /// By which the scales may read something else at a vertex of an on-the-fly path, beside their
+  /// uncertainty.
   double path_tolerance_m = 20e-6;
-  /// Share of the legs of an on-the-fly run that a fit does not see while it is judged by them. Models of a
-  /// ball array are judged by positions held out, one after the other.
+  /// Share of the legs of an on-the-fly run that a fit does not see while it is judged by them.
+  /// Models of a ball array are judged by positions held out, one after the other.
   double holdout_fraction = 0.2;
-  /// What this shop takes as it is, by name: "evemu-shape-only", a ball array's model whose rotation about
-  /// Ball1 nobody has referenced; "smaller-volume", a model in place of one that holds in more of the
-  /// machine; "scale-change", one whose scale is another; "path-orientation", a path file that may be turned
-  /// (calib/otf/orientation).
+  /// What this shop takes as it is, by name: "evemu-shape-only", a ball array's model whose
+  /// rotation about Ball1 nobody has referenced; "smaller-volume", a model in place of one that
+  /// holds in more of the machine; "scale-change", one whose scale is another; "path-orientation",
+  /// a path file that may be turned (calib/otf/orientation).
   std::vector<std::string> accept;
 
   [[nodiscard]] bool accepts(std::string_view name) const;
@@ -330,11 +344,13 @@ struct EvemuConfig {
   std::string estimator = "bayes-pose";  ///< one of calib::evemu::estimator()
   std::string folds = "position";        ///< one of calib::evemu::folds_by(): for lasso, mcp, scad
   int order = 3;                         ///< of the polynomials
-  std::vector<int> positions{4, 8, 3, 7, 2, 6, 1, 5};  ///< of the array, in the order they are touched
+  std::vector<int> positions{4, 8, 3, 7,
+                             2, 6, 1, 5};  ///< of the array, in the order they are touched
   std::size_t points_per_ball = 25;
   std::size_t points_per_block = 25;
-  std::chrono::nanoseconds longest_pause{std::chrono::hours{1}};  ///< without a touch: the session ends
-  std::optional<ArtefactTemperatureConfig> artefact;              ///< none: the array counts as at 20 C
+  std::chrono::nanoseconds longest_pause{
+      std::chrono::hours{1}};                         ///< without a touch: the session ends
+  std::optional<ArtefactTemperatureConfig> artefact;  ///< none: the array counts as at 20 C
 };
 
 /// [control]. Root and the daemon's own user may ask for everything; see control_roles.hpp.
@@ -345,8 +361,8 @@ struct ControlConfig {
   std::string move_group = "abbe-move";      ///< may move a machine; empty: nobody else
 };
 
-/// The whole file. `[tracker]` without host, a missing `[encoder]`, a missing `[counter_card]` mean "not
-/// connected". The axes come from one device: [encoder] or [counter_card].
+/// The whole file. `[tracker]` without host, a missing `[encoder]`, a missing `[counter_card]` mean
+/// "not connected". The axes come from one device: [encoder] or [counter_card].
 struct Config {
   MachineConfig machine;
   std::optional<TrackerConfig> tracker;
@@ -372,7 +388,8 @@ struct Config {
 
   /// The control already corrects what the axes read, whichever device reads them.
   [[nodiscard]] bool axes_compensated() const noexcept {
-    return (encoder && encoder->axes_compensated) || (counter_card && counter_card->axes_compensated) ||
+    return (encoder && encoder->axes_compensated) ||
+           (counter_card && counter_card->axes_compensated) ||
            (cmm_reads_axes() && cmm->axes_compensated);
   }
   /// No other device reads the axes: they are what the measuring machine reports.
@@ -380,17 +397,17 @@ struct Config {
 };
 
 /// Reads and checks a whole file. Io if it cannot be read; else BadInput with one line per fault in
-/// Error::details, at most 20, each "file:line:column: key: what is wrong". Nothing is used of a file that
-/// has a fault.
+/// Error::details, at most 20, each "file:line:column: key: what is wrong". Nothing is used of a
+/// file that has a fault.
 [[nodiscard]] Result<Config> load_config(const std::filesystem::path& file);
 
 /// The same for the text of a file; `file` names it in the errors and anchors relative paths.
 [[nodiscard]] Result<Config> parse_config(std::string_view text, const std::filesystem::path& file);
 
-/// SHA-256 in hex over what a model depends on: the machine (identity, chain, axes, target, basis, nodes) and
-/// what a scale reading is (which node is which axis, its step and offset, whether the control corrects it
-/// already). A stored model is ACTIVE only where this agrees. Noise figures, and how the bytes travel, do not
-/// enter.
+/// SHA-256 in hex over what a model depends on: the machine (identity, chain, axes, target, basis,
+/// nodes) and what a scale reading is (which node is which axis, its step and offset, whether the
+/// control corrects it already). A stored model is ACTIVE only where this agrees. Noise figures,
+/// and how the bytes travel, do not enter.
 [[nodiscard]] std::string machine_hash(const Config& config);
 
 }  // namespace abbe::daemon

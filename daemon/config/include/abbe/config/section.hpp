@@ -1,7 +1,7 @@
 #pragma once
-/// One table of a TOML file while it is being read: every get() names the key, its unit and its bounds; a
-/// fault goes to the list instead of stopping, and close() refuses every key nobody asked for. A Section of a
-/// table that is not there gives the defaults, so a reader has no branches.
+/// One table of a TOML file while it is being read: every get() names the key, its unit and its
+/// bounds; a fault goes to the list instead of stopping, and close() refuses every key nobody asked
+/// for. A Section of a table that is not there gives the defaults, so a reader has no branches.
 
 #include <toml++/toml.h>
 #include <chrono>
@@ -45,8 +45,8 @@ class Section {
   [[nodiscard]] bool present() const noexcept { return table_ != nullptr; }
   [[nodiscard]] bool has(std::string_view key) const;  ///< also marks the key as known
   [[nodiscard]] const std::string& path() const noexcept { return path_; }
-  [[nodiscard]] const toml::node* node(
-      std::string_view key) const;  ///< null if absent; for keys of several types
+  /// null if absent; for keys of several types
+  [[nodiscard]] const toml::node* node(std::string_view key) const;
   [[nodiscard]] std::vector<std::string> keys() const;
   [[nodiscard]] Section child(std::string_view key, Need need = Need::Optional);
   [[nodiscard]] std::vector<Section> children(std::string_view key);  ///< an array of tables
@@ -64,19 +64,21 @@ class Section {
                    Need need = Need::Optional);
   /// One of the given words; out receives its enumerator.
   template <class Enum>
-  bool get_word(std::string_view key, Enum& out, std::vector<std::pair<std::string_view, Enum>> words,
-                Need need = Need::Optional);
+  bool get_word(std::string_view key, Enum& out,
+                std::vector<std::pair<std::string_view, Enum>> words, Need need = Need::Optional);
   /// A path; a relative one is meant from `base`.
   bool get(std::string_view key, std::filesystem::path& out, const std::filesystem::path& base);
 
-  void fault(std::string_view key, std::string_view what);  ///< at the key, or at the table if it has none
-  void close();  ///< refuses the keys nobody asked for; call when all is read
+  void fault(std::string_view key,
+             std::string_view what);  ///< at the key, or at the table if it has none
+  void close();                       ///< refuses the keys nobody asked for; call when all is read
 
  private:
   [[nodiscard]] const toml::node* find(std::string_view key, Need need);
   void fault_at(toml::source_position at, std::string_view key, std::string_view what);
   [[nodiscard]] std::string full(std::string_view key) const;
-  bool take_integer(std::string_view key, std::int64_t& out, std::int64_t min, std::int64_t max, Need need);
+  bool take_integer(std::string_view key, std::int64_t& out, std::int64_t min, std::int64_t max,
+                    Need need);
   bool take_word(std::string_view key, std::size_t& out, const std::vector<std::string_view>& words,
                  Need need);
 
@@ -88,7 +90,8 @@ class Section {
 };
 
 template <class Integer>
-bool Section::get_integer(std::string_view key, Integer& out, std::int64_t min, std::int64_t max, Need need) {
+bool Section::get_integer(std::string_view key, Integer& out, std::int64_t min, std::int64_t max,
+                          Need need) {
   std::int64_t value = 0;
   if (!take_integer(key, value, min, max, need)) return false;
   out = static_cast<Integer>(value);
@@ -96,8 +99,8 @@ bool Section::get_integer(std::string_view key, Integer& out, std::int64_t min, 
 }
 
 template <class Enum>
-bool Section::get_word(std::string_view key, Enum& out, std::vector<std::pair<std::string_view, Enum>> words,
-                       Need need) {
+bool Section::get_word(std::string_view key, Enum& out,
+                       std::vector<std::pair<std::string_view, Enum>> words, Need need) {
   std::vector<std::string_view> names;
   names.reserve(words.size());
   for (const auto& [name, value] : words) names.push_back(name);

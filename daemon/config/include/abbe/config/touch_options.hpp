@@ -7,7 +7,8 @@
 namespace abbe::daemon {
 
 /// The probe on the card's channels; `machine` says which axes are linear.
-[[nodiscard]] drivers::TouchOptions touch_options(const ProbeConfig& probe, const CounterCardConfig& card,
+[[nodiscard]] drivers::TouchOptions touch_options(const ProbeConfig& probe,
+                                                  const CounterCardConfig& card,
                                                   const MachineConfig& machine);
 
 }  // namespace abbe::daemon

@@ -1,7 +1,7 @@
 #pragma once
-/// A tracker whose distances are corrected for air that no instrument measured: weather = "none", where the
-/// controller is set to assumed_air(), or weather = "read", where its index stays as it was set last; and no
-/// [air] assumed_index. Pure.
+/// A tracker whose distances are corrected for air that no instrument measured: weather = "none",
+/// where the controller is set to assumed_air(), or weather = "read", where its index stays as it
+/// was set last; and no [air] assumed_index. Pure.
 
 #include <optional>
 #include <string>
@@ -19,8 +19,8 @@ namespace abbe::daemon {
 
 [[nodiscard]] bool air_is_unmeasured(const Config& config) noexcept;
 
-/// For verdict and status: what was corrected for, and `u_scale` as it is in the model. None: the air is
-/// measured.
+/// For verdict and status: what was corrected for, and `u_scale` as it is in the model. None: the
+/// air is measured.
 [[nodiscard]] std::optional<std::string> unmeasured_air_text(const Config& config, double u_scale);
 
 }  // namespace abbe::daemon

@@ -20,7 +20,8 @@ namespace abbe::dds {
 class Announcer final : private eprosima::fastdds::dds::DomainParticipantListener {
  public:
   using WallTime = std::chrono::steady_clock::time_point;
-  static constexpr std::chrono::milliseconds kFirst{20};  ///< after a discovery; then twice as long each time
+  static constexpr std::chrono::milliseconds kFirst{
+      20};  ///< after a discovery; then twice as long each time
   static constexpr std::chrono::milliseconds kPeriod{2000};  ///< at most
 
   /// Both must outlive this.
@@ -29,8 +30,9 @@ class Announcer final : private eprosima::fastdds::dds::DomainParticipantListene
   Announcer(const Announcer&) = delete;
   Announcer& operator=(const Announcer&) = delete;
 
-  /// Announces at most one writer: what is to be written does not wait for all. Call it in every cycle.
-  void turn(WallTime now);
+  /// Announces at most one writer: what is to be written does not wait for all. Call it in every
+  /// cycle.
+  void cycle(WallTime now);
 
  private:
   void on_participant_discovery(eprosima::fastdds::dds::DomainParticipant* participant,

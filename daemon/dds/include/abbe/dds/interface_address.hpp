@@ -6,8 +6,8 @@
 
 namespace abbe::dds {
 
-/// With the index of its interface: multicast memberships end with the interface, and one that is made again
-/// with the same address has another index.
+/// With the index of its interface: multicast memberships end with the interface, and one that is
+/// made again with the same address has another index.
 struct InterfaceAddress {
   unsigned interface = 0;
   std::string address;

@@ -1,6 +1,6 @@
 #pragma once
-/// Samples as one JSON object a line, for programs that read abbe-watch: "topic" and every field of the IDL
-/// by its name. NaN becomes null. Pure, thread-safe.
+/// Samples as one JSON object a line, for programs that read abbe-watch: "topic" and every field of
+/// the IDL by its name. NaN becomes null. Pure, thread-safe.
 
 #include <cstddef>
 #include <span>
@@ -12,6 +12,7 @@
 namespace abbe::dds {
 
 /// Without the newline. Error BadInput: the payload does not decode.
-[[nodiscard]] daemon::Result<std::string> json_line(daemon::Topic topic, std::span<const std::byte> payload);
+[[nodiscard]] daemon::Result<std::string> json_line(daemon::Topic topic,
+                                                    std::span<const std::byte> payload);
 
 }  // namespace abbe::dds

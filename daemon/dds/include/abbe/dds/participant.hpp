@@ -32,22 +32,25 @@ struct ParticipantOptions {
   std::uint32_t domain = 0;
   std::filesystem::path
       profiles;  ///< XML file with a participant profile "abbe"; empty: the built-in abbe-dds.xml
-  std::filesystem::path security;  ///< keys as `abbe dds keys` makes them; empty: what the profile says
+  std::filesystem::path
+      security;  ///< keys as `abbe dds keys` makes them; empty: what the profile says
   daemon::DdsRole role = daemon::DdsRole::Subscriber;
 };
 
 class Participant {
  public:
-  /// Error: Usage for a domain above kHighestDomain, BadInput for a profile that cannot be read or has no
-  /// participant "abbe", and for keys that cannot be used, Io if no participant can be created (no port), or
-  /// no interface of the profile is up.
+  /// Error: Usage for a domain above kHighestDomain, BadInput for a profile that cannot be read or
+  /// has no participant "abbe", and for keys that cannot be used, Io if no participant can be
+  /// created (no port), or no interface of the profile is up.
   [[nodiscard]] static Result<Participant> create(const ParticipantOptions& options);
 
-  /// The topic with its payload type, registered without TypeObject and TypeInformation. Error Io: Fast DDS
-  /// refuses.
+  /// The topic with its payload type, registered without TypeObject and TypeInformation. Error Io:
+  /// Fast DDS refuses.
   [[nodiscard]] Result<eprosima::fastdds::dds::Topic*> topic(daemon::Topic topic);
 
-  [[nodiscard]] eprosima::fastdds::dds::DomainParticipant& get() const noexcept { return *participant_; }
+  [[nodiscard]] eprosima::fastdds::dds::DomainParticipant& get() const noexcept {
+    return *participant_;
+  }
 
   /// Keys of `security` or of the profile keep strangers out.
   [[nodiscard]] bool is_secure() const;
@@ -61,7 +64,8 @@ class Participant {
   struct Deleter {
     void operator()(eprosima::fastdds::dds::DomainParticipant* participant) const noexcept;
   };
-  Participant(eprosima::fastdds::dds::DomainParticipant* participant, std::vector<std::string> allowed)
+  Participant(eprosima::fastdds::dds::DomainParticipant* participant,
+              std::vector<std::string> allowed)
       : participant_(participant), allowed_addresses_(std::move(allowed)) {}
   std::unique_ptr<eprosima::fastdds::dds::DomainParticipant, Deleter> participant_;
   std::vector<std::string> allowed_addresses_;

@@ -1,6 +1,6 @@
 #pragma once
-/// Where the participants of a domain announce that they can be reached, for messages that name one. A
-/// participant may announce what it likes. Thread-safe.
+/// Where the participants of a domain announce that they can be reached, for messages that name
+/// one. A participant may announce what it likes. Thread-safe.
 
 #include <fastdds/dds/domain/DomainParticipantListener.hpp>
 #include <map>

@@ -1,6 +1,6 @@
 #pragma once
-/// Readers of topics of abbe, for programs that subscribe: payloads as they arrive, by whom, and whether a
-/// publisher of ModelState is alive. Used by one thread.
+/// Readers of topics of abbe, for programs that subscribe: payloads as they arrive, by whom, and
+/// whether a publisher of ModelState is alive. Used by one thread.
 
 #include <array>
 #include <chrono>
@@ -37,11 +37,12 @@ class Readers {
   Readers(Readers&&) noexcept;
   Readers& operator=(Readers&&) noexcept;
 
-  /// Returns when something arrived, the liveliness of ModelState's writer changed, or the time is over.
+  /// Returns when something arrived, the liveliness of ModelState's writer changed, or the time is
+  /// over.
   void wait(std::chrono::milliseconds at_most);
 
-  /// Everything that has arrived, topic by topic in the order given to create(). Bytes are a stranger's:
-  /// decode them.
+  /// Everything that has arrived, topic by topic in the order given to create(). Bytes are a
+  /// stranger's: decode them.
   void take(const OnArrival& on_arrival);
 
   /// Whether this writer of ModelState keeps its lease; false also if ModelState was not asked for.

@@ -1,6 +1,6 @@
 #pragma once
-/// What one machine has told a subscriber about its errors, and whether it may be applied by the rule of
-/// abbe_v1.idl. Pure; used by one thread. SI: m.
+/// What one machine has told a subscriber about its errors, and whether it may be applied by the
+/// rule of abbe_v1.idl. Pure; used by one thread. SI: m.
 
 #include <chrono>
 #include <cstddef>
@@ -25,8 +25,8 @@ class ReceivedModel {
  public:
   void state(v1::ModelState state);
   void model(v1::ErrorModel model) { model_ = std::move(model); }
-  /// Slices are kept by model: those of the next one come before its state, and a late joiner may meet old
-  /// ones among them.
+  /// Slices are kept by model: those of the next one come before its state, and a late joiner may
+  /// meet old ones among them.
   void slice(v1::ErrorGrid slice);
 
   [[nodiscard]] const std::optional<v1::ModelState>& state() const noexcept { return state_; }
@@ -50,8 +50,9 @@ class ReceivedModel {
                               std::optional<std::chrono::nanoseconds> waited,
                               const std::optional<v1::ModelState>& state, bool publisher_alive);
 
-/// How much longer the vectors of one publisher were on their way than the quickest of them: in the network,
-/// in a socket while this process stood still. The two clocks need not agree; they may drift apart by kDrift.
+/// How much longer the vectors of one publisher were on their way than the quickest of them: in the
+/// network, in a socket while this process stood still. The two clocks need not agree; they may
+/// drift apart by kDrift.
 class Delay {
  public:
   using Instant = std::chrono::steady_clock::time_point;
@@ -60,17 +61,20 @@ class Delay {
   static constexpr std::chrono::milliseconds kFirst{200};  ///< shows how quick the way can be
 
   /// Nothing until then: the first vectors may all have waited.
-  [[nodiscard]] std::optional<std::chrono::nanoseconds> of(const v1::Compensation& vector, Instant now);
+  [[nodiscard]] std::optional<std::chrono::nanoseconds> of(const v1::Compensation& vector,
+                                                           Instant now);
 
-  /// For the publisher that comes after this one, which may have the same clock: abbe-dds after a restart.
-  /// Then what is known holds on; a first vector farther than kSameClock from it shows another clock.
+  /// For the publisher that comes after this one, which may have the same clock: abbe-dds after a
+  /// restart. Then what is known holds on; a first vector farther than kSameClock from it shows
+  /// another clock.
   [[nodiscard]] Delay for_next_publisher() const;
   static constexpr std::chrono::milliseconds kSameClock{20};
 
  private:
   bool inherited_ = false;
   std::optional<Instant> first_;
-  std::optional<std::chrono::nanoseconds> least_;  ///< from the publisher's clock to ours, and the way
+  std::optional<std::chrono::nanoseconds>
+      least_;  ///< from the publisher's clock to ours, and the way
   Instant last_{};
 };
 

@@ -31,10 +31,10 @@ class Writers final : public daemon::DdsOutlet {
   /// Says to the readers of ModelState: somebody answers for it.
   void assert_liveliness() override;
 
-  /// Sends the announcement of a writer once more, to every participant that is known, with a heartbeat of
-  /// discovery. `index` < announced(). With DDS Security that is one more writer, which has no readers: with
-  /// every announcement Fast DDS sends a writer's keys to all of its readers again, and Cyclone DDS 0.10 does
-  /// not survive that (daemon/docs/dds.md, "Found again").
+  /// Sends the announcement of a writer once more, to every participant that is known, with a
+  /// heartbeat of discovery. `index` < announced(). With DDS Security that is one more writer,
+  /// which has no readers: with every announcement Fast DDS sends a writer's keys to all of its
+  /// readers again, and Cyclone DDS 0.10 does not survive that (daemon/docs/dds.md, "Found again").
   void announce(std::size_t index);
   [[nodiscard]] std::size_t announced() const noexcept { return announced_.size(); }
 

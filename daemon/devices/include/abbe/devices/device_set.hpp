@@ -1,6 +1,6 @@
 #pragma once
-/// The configured devices with their rings and threads, as one thing the hub can drain. The devices' threads
-/// are theirs; every function here but end_machine() is for the hub's thread.
+/// The configured devices with their rings and threads, as one thing the hub can drain. The
+/// devices' threads are theirs; every function here but end_machine() is for the hub's thread.
 
 #include <array>
 #include <chrono>
@@ -21,9 +21,10 @@ namespace abbe::daemon {
 
 class DeviceSet final : public SampleSource {
  public:
-  /// Creates the devices and starts their threads. Io when the system refuses what real-time mode `enforce`
-  /// asks for, BadInput for a device that cannot be opened as configured. `time` must outlive the set.
-  /// `left`: how far an earlier run left the counters of [counter_card], which then go on if the card did.
+  /// Creates the devices and starts their threads. Io when the system refuses what real-time mode
+  /// `enforce` asks for, BadInput for a device that cannot be opened as configured. `time` must
+  /// outlive the set. `left`: how far an earlier run left the counters of [counter_card], which
+  /// then go on if the card did.
   [[nodiscard]] static Result<DeviceSet> start(
       const Config& config, const drivers::TimeSource& time,
       const std::optional<drivers::CounterCardProgress>& left = std::nullopt);
@@ -38,8 +39,8 @@ class DeviceSet final : public SampleSource {
   [[nodiscard]] std::optional<drivers::CounterCardProgress> card_progress() override;
   void measure(std::span<const drivers::ProbePoint> points) override;
   void stop_machine() override;
-  /// Any thread, takes no lock: a motion of the measuring machine is stopped and its session ends, whether or
-  /// not this is ever destroyed. No release is awaited.
+  /// Any thread, takes no lock: a motion of the measuring machine is stopped and its session ends,
+  /// whether or not this is ever destroyed. No release is awaited.
   void end_machine();
   [[nodiscard]] std::optional<std::string> release_awaited() const override;
   [[nodiscard]] Result<void> release_machine() override;

@@ -1,6 +1,6 @@
 #pragma once
-/// The rules of abbe-dds, without DDS: what abbed hands over goes to an outlet, and abbed's silence is told
-/// to everybody.
+/// The rules of abbe-dds, without DDS: what abbed hands over goes to an outlet, and abbed's silence
+/// is told to everybody.
 /// - alive: a beat sent within kSilence, however late it is read. Only then is anything but INVALID written,
 /// and liveliness asserted.
 /// - silent, or the socket closed: every ModelState known goes out once more as MODEL_INVALID, reason
@@ -54,8 +54,8 @@ class DdsBridge {
   /// `at`: when abbed said it. The age in the payload of a vector is changed in place.
   void beat(WallTime at, WallTime now);
   void publish(Topic topic, std::span<std::byte> payload, WallTime at, WallTime now);
-  void lost();              ///< the socket closed, or abbe-dds is leaving
-  void turn(WallTime now);  ///< silence, liveliness, repetition: call at least every 50 ms
+  void lost();               ///< the socket closed, or abbe-dds is leaving
+  void cycle(WallTime now);  ///< silence, liveliness, repetition: call at least every 50 ms
 
   [[nodiscard]] bool source_alive() const noexcept;
   [[nodiscard]] std::uint64_t written() const noexcept;
@@ -78,8 +78,8 @@ class DdsFeed {
   DdsFeed(const DdsFeed&) = delete;
   DdsFeed& operator=(const DdsFeed&) = delete;
 
-  /// One turn: waits at most kRetryPeriod for bytes, feeds every whole frame, then bridge.turn().
-  void turn();
+  /// One turn: waits at most kRetryPeriod for bytes, feeds every whole frame, then bridge.cycle().
+  void cycle();
 
   [[nodiscard]] bool connected() const noexcept;
 

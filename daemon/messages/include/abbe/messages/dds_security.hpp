@@ -1,6 +1,7 @@
 #pragma once
-/// DDS Security with abbe's own keys: `abbe dds keys` makes a folder, `[dds] security` and the subscribers'
-/// `--security` name it. Without it anyone on the domain can publish as this machine. Ordinary world.
+/// DDS Security with abbe's own keys: `abbe dds keys` makes a folder, `[dds] security` and the
+/// subscribers' `--security` name it. Without it anyone on the domain can publish as this machine.
+/// Ordinary world.
 ///
 ///   DIR/ca.key               key of the certificate authority, 0600: keep it away from the machine
 ///   DIR/daemon/              identity of abbe-dds: may publish every topic of abbe
@@ -25,8 +26,8 @@ namespace abbe::daemon {
 /// The participant profile that abbe's programs use, whatever else a site's file holds.
 inline constexpr const char* kDdsProfileName = "abbe";
 
-/// Keys are named, or that profile in the file of the site has dds.sec properties of its own: plugins for
-/// authentication and access. A file that is no XML is not.
+/// Keys are named, or that profile in the file of the site has dds.sec properties of its own:
+/// plugins for authentication and access. A file that is no XML is not.
 [[nodiscard]] bool dds_is_secured(const std::filesystem::path& security,
                                   const std::filesystem::path& profile);
 
@@ -36,8 +37,9 @@ struct DdsKeysOptions {
   std::chrono::days validity{3650};
 };
 
-/// Makes the folder above: EC P-256, governance and permissions signed by a new certificate authority. Error:
-/// Refused if the folder has anything in it, Io if it cannot be written or OpenSSL fails; then nothing stays.
+/// Makes the folder above: EC P-256, governance and permissions signed by a new certificate
+/// authority. Error: Refused if the folder has anything in it, Io if it cannot be written or
+/// OpenSSL fails; then nothing stays.
 [[nodiscard]] Result<void> make_dds_keys(const DdsKeysOptions& options,
                                          std::chrono::system_clock::time_point now);
 
@@ -48,10 +50,11 @@ struct DdsIdentity {
   std::filesystem::path folder;
 };
 
-/// `folder` is an identity, or what make_dds_keys() made: then daemon/ or subscriber-1/ in it. Error BadInput
-/// with what to do: a file is missing or cannot be read, the key is readable by everybody, or the certificate
-/// is not valid at `now`.
-[[nodiscard]] Result<DdsIdentity> find_dds_identity(const std::filesystem::path& folder, DdsRole role,
+/// `folder` is an identity, or what make_dds_keys() made: then daemon/ or subscriber-1/ in it.
+/// Error BadInput with what to do: a file is missing or cannot be read, the key is readable by
+/// everybody, or the certificate is not valid at `now`.
+[[nodiscard]] Result<DdsIdentity> find_dds_identity(const std::filesystem::path& folder,
+                                                    DdsRole role,
                                                     std::chrono::system_clock::time_point now);
 
 /// The properties of a participant, by the names Fast DDS gives them.

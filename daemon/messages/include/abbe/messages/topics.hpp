@@ -1,7 +1,7 @@
 #pragma once
-/// The topics abbe publishes over DDS, as abbed and abbe-dds both see them: number on the local socket,
-/// names, how long a sample counts, and where the key stands in a payload. The QoS that follows from it lives
-/// in abbe-dds. Pure, thread-safe, no allocation.
+/// The topics abbe publishes over DDS, as abbed and abbe-dds both see them: number on the local
+/// socket, names, how long a sample counts, and where the key stands in a payload. The QoS that
+/// follows from it lives in abbe-dds. Pure, thread-safe, no allocation.
 
 #include <array>
 #include <chrono>
@@ -25,7 +25,8 @@ enum class Topic : std::uint8_t {
 };
 inline constexpr std::size_t kTopicCount = 7;
 
-inline constexpr std::size_t kCdrHeaderBytes = 4;  ///< before the payload: representation and options
+/// before the payload: representation and options
+inline constexpr std::size_t kCdrHeaderBytes = 4;
 
 struct TopicTraits {
   /// Live: only the newest sample counts, best effort, dropped rather than queued.
@@ -47,25 +48,29 @@ struct TopicTraits {
 [[nodiscard]] std::span<const TopicTraits> all_topics() noexcept;
 [[nodiscard]] std::optional<Topic> topic_from(std::uint8_t value) noexcept;
 
-/// The key of a payload (CDR_LE with its 4-byte header): the leading members, exactly as they stand in the
-/// payload. Nothing if the bytes are not a payload or end within the key.
+/// The key of a payload (CDR_LE with its 4-byte header): the leading members, exactly as they stand
+/// in the payload. Nothing if the bytes are not a payload or end within the key.
 struct PayloadKey {
   std::span<const std::byte>
-      bytes;                 ///< after the header up to the end of the key; equal bytes = same instance
-  std::string_view machine;  ///< without its NUL
+      bytes;  ///< after the header up to the end of the key; equal bytes = same instance
+  std::string_view machine;              ///< without its NUL
   std::optional<std::string_view> text;  ///< MachineAndText: the second text
   std::optional<std::uint32_t> number;   ///< MachineAndNumber: the number
 };
-[[nodiscard]] std::optional<PayloadKey> payload_key(Topic topic, std::span<const std::byte> payload) noexcept;
+[[nodiscard]] std::optional<PayloadKey> payload_key(Topic topic,
+                                                    std::span<const std::byte> payload) noexcept;
 
 /// How many slices the grid has that this payload of ErrorGrid is a part of. Nothing if it is none.
 [[nodiscard]] std::optional<std::uint32_t> grid_slices(std::span<const std::byte> payload) noexcept;
 
-/// Writes sequence_number of a payload of ErrorModel or ErrorGrid, in place. False, and nothing changed, if it
-/// is none.
-[[nodiscard]] bool set_sequence_number(Topic topic, std::span<std::byte> payload, std::uint64_t number) noexcept;
+/// Writes sequence_number of a payload of ErrorModel or ErrorGrid, in place. False, and nothing
+/// changed, if it is none.
+[[nodiscard]] bool set_sequence_number(Topic topic, std::span<std::byte> payload,
+                                       std::uint64_t number) noexcept;
 
-/// Adds to age_ns of a payload of Compensation, in place. False, and nothing changed, if it is none.
-[[nodiscard]] bool add_to_age(std::span<std::byte> compensation, std::chrono::nanoseconds more) noexcept;
+/// Adds to age_ns of a payload of Compensation, in place. False, and nothing changed, if it is
+/// none.
+[[nodiscard]] bool add_to_age(std::span<std::byte> compensation,
+                              std::chrono::nanoseconds more) noexcept;
 
 }  // namespace abbe::daemon

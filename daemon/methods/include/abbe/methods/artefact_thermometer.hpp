@@ -1,6 +1,7 @@
 #pragma once
-/// How warm the ball array was over a run, by a temperature of [[environment]] or by what the configuration
-/// says. From snapshots alone: a replay finds the same bits. Ordinary world; not thread-safe.
+/// How warm the ball array was over a run, by a temperature of [[environment]] or by what the
+/// configuration says. From snapshots alone: a replay finds the same bits. Ordinary world; not
+/// thread-safe.
 
 #include <cstddef>
 #include <optional>
@@ -18,7 +19,8 @@ class ArtefactThermometer {
   /// False: the sensor has no valid value at this touch.
   [[nodiscard]] bool take(const protocol::Snapshot& touch);
 
-  /// Mean of the sensor's values. u: half their range as a rectangular distribution, (max - min) / (2 sqrt
+  /// Mean of the sensor's values. u: half their range as a rectangular distribution, (max -
+  /// min) / (2 sqrt
   /// 3) ([GUM] 4.3.7), and the configured one. None: nobody knows.
   [[nodiscard]] std::optional<calib::evemu::ArtefactTemperature> over_the_run() const;
 

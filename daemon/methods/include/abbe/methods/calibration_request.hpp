@@ -1,6 +1,6 @@
 #pragma once
-/// What a calibration was asked for, as it comes over the control socket and lies in the recording beside the
-/// samples, so that a replay is asked the same.
+/// What a calibration was asked for, as it comes over the control socket and lies in the recording
+/// beside the samples, so that a replay is asked the same.
 
 #include <nlohmann/json_fwd.hpp>
 #include <string>
@@ -31,8 +31,8 @@ struct CalibrationRequest {
 
 /// {"method": ..., what it needs}; keeps every bit of the numbers.
 [[nodiscard]] nlohmann::json to_json(const CalibrationTask& task);
-/// BadInput naming what is missing or of the wrong type; Usage for a method nobody knows. `plan`: for what of
-/// it an evemu task does not say.
+/// BadInput naming what is missing or of the wrong type; Usage for a method nobody knows. `plan`:
+/// for what of it an evemu task does not say.
 [[nodiscard]] Result<CalibrationTask> task_from_json(const nlohmann::json& object,
                                                      const calib::evemu::TouchPlan& plan = {});
 

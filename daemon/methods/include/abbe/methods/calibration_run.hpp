@@ -23,8 +23,8 @@ using Candidate = std::variant<OtfCandidate, EvemuCandidate>;
                                          const calib::VolumetricModel* active,
                                          const IdentificationWatch& watch = {});
 
-/// What the run consists of, for the model's document: the files that were given, and "points" or "touches"
-/// with the SHA-256 of what entered the identification.
+/// What the run consists of, for the model's document: the files that were given, and "points" or
+/// "touches" with the SHA-256 of what entered the identification.
 [[nodiscard]] std::vector<InputFile> inputs_of(const CalibrationRun& run);
 
 [[nodiscard]] std::string_view method_of(const Candidate& candidate) noexcept;  ///< "otf", "evemu"

@@ -1,16 +1,17 @@
 #pragma once
-/// One calibration from the command to the verdict, as an explicit state machine. It is driven by snapshots
-/// and by the outcome of the identification that somebody else runs; it reads no clock and starts no thread,
-/// so live and replay go through the same states at the same recorded instants.
+/// One calibration from the command to the verdict, as an explicit state machine. It is driven by
+/// snapshots and by the outcome of the identification that somebody else runs; it reads no clock
+/// and starts no thread, so live and replay go through the same states at the same recorded
+/// instants.
 ///
 ///     idle ──start──▶ warming ──the run begins──▶ acquiring ──run complete──▶ identifying ──▶ judged
 ///     ──gate──▶ active
 ///                        │                            │                          │             │
 ///                        └────────────cancel, lost────┴──────data do not allow───┴───gate──────┴──▶ refused
 ///
-/// The same for every method; what differs is the acquisition (OtfAcquisition, EvemuAcquisition). Where
-/// people are guided from touch to touch, every new instruction is an event, too. Ordinary world; not
-/// thread-safe.
+/// The same for every method; what differs is the acquisition (OtfAcquisition, EvemuAcquisition).
+/// Where people are guided from touch to touch, every new instruction is an event, too. Ordinary
+/// world; not thread-safe.
 
 #include <cstdint>
 #include <optional>
@@ -44,8 +45,8 @@ struct AcquiredRun {
   Acquisition acquisition;
   EnvironmentUseOptions environment;
 };
-/// For the identification: points in one piece, the path as the snapshots saw it. O(n) in points and
-/// vertices.
+/// For the identification: points in one piece, the path as the snapshots saw it. O(n) in points
+/// and vertices.
 [[nodiscard]] CalibrationRun run_of(AcquiredRun acquired);
 
 class CalibrationSession {  // NOLINT(bugprone-exception-escape): a defaulted move of a variant
@@ -55,8 +56,8 @@ class CalibrationSession {  // NOLINT(bugprone-exception-escape): a defaulted mo
 
   /// BadInput for a task that is none. Any thread, also while another uses the session.
   [[nodiscard]] Result<PreparedSession> prepare(CalibrationTask task) const;
-  /// Refused while a session is running. What the session before left is in `prepared` then: whoever prepared
-  /// it destroys that, too.
+  /// Refused while a session is running. What the session before left is in `prepared` then:
+  /// whoever prepared it destroys that, too.
   [[nodiscard]] Result<void> start(PreparedSession&& prepared, protocol::HostTime from);
   /// Both.
   [[nodiscard]] Result<void> start(CalibrationRequest request);

@@ -1,8 +1,9 @@
 #pragma once
-/// Which touches belong to one calibration with a ball array, and what comes next. The places are judged by
-/// calib's TouchGuide; here touches become usable or not, with device and reason, and nothing arriving any
-/// more ends the run. Decided from snapshots alone, so that a replay takes the very same touches; only
-/// tick() knows a clock. Ordinary world; not thread-safe; m, scale readings.
+/// Which touches belong to one calibration with a ball array, and what comes next. The places are
+/// judged by calib's TouchGuide; here touches become usable or not, with device and reason, and
+/// nothing arriving any more ends the run. Decided from snapshots alone, so that a replay takes the
+/// very same touches; only tick() knows a clock. Ordinary world; not thread-safe; m, scale
+/// readings.
 
 #include <chrono>
 #include <optional>
@@ -36,21 +37,25 @@ struct EvemuRequest {
 struct EvemuRun {
   EvemuRequest asked;
   std::vector<calib::evemu::Touch> touches;
-  std::optional<calib::evemu::ArtefactTemperature> artefact;  ///< over the touches; none: nobody knows
+  std::optional<calib::evemu::ArtefactTemperature>
+      artefact;  ///< over the touches; none: nobody knows
 };
 
 struct EvemuAcquisitionOptions {
   std::string device = "probe";  ///< its name, for what is said about touches
-  /// A counter card that begins anew counts from where the axes stand; with [reference] the zero is found
-  /// again.
+  /// A counter card that begins anew counts from where the axes stand; with [reference] the zero is
+  /// found again.
   bool zero_is_lost_by_restart = true;
-  /// Host time without a touch that ends the run: the artefact is turned and clamped by hand in between.
+  /// Host time without a touch that ends the run: the artefact is turned and clamped by hand in
+  /// between.
   std::chrono::nanoseconds longest_pause = std::chrono::hours{1};
-  /// Touches more than 1 mm outside are not used; thermal correction moves readings by less. None: no limit.
+  /// Touches more than 1 mm outside are not used; thermal correction moves readings by less. None:
+  /// no limit.
   std::optional<calib::MachineNodes> travel{};
-  std::size_t most_refused = 20;  ///< touches in a row that cannot be used end a run that has none yet
-  /// How warm the array is. A touch at which its sensor has no valid value ends the run: the model would need
-  /// it.
+  std::size_t most_refused =
+      20;  ///< touches in a row that cannot be used end a run that has none yet
+  /// How warm the array is. A touch at which its sensor has no valid value ends the run: the model
+  /// would need it.
   std::optional<ArtefactTemperatureConfig> artefact{};
   std::string artefact_sensor{};  ///< its name
 };
@@ -82,10 +87,11 @@ class EvemuAcquisition {
   [[nodiscard]] EvemuRun release();
 
  private:
-  EvemuAcquisition(EvemuRequest request, calib::evemu::TouchGuide guide, EvemuAcquisitionOptions options);
+  EvemuAcquisition(EvemuRequest request, calib::evemu::TouchGuide guide,
+                   EvemuAcquisitionOptions options);
   void refuse(const protocol::Snapshot& touch, std::string_view fault);
   void note(const protocol::Snapshot& touch, const std::string& what);
-  void say_what_comes_next();
+  void report_next_step();
 
   EvemuRequest request_;
   calib::evemu::TouchGuide guide_;

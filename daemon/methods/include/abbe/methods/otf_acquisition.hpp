@@ -1,8 +1,8 @@
 #pragma once
-/// Which tracker points belong to one on-the-fly run: from the standstill at the first vertex of the path to
-/// the standstill at the last. Decided from snapshots alone, never from a clock, so that a replay takes the
-/// very same points. Ordinary world; not thread-safe; lengths m, axis positions as scale readings in the
-/// order X, Y, Z.
+/// Which tracker points belong to one on-the-fly run: from the standstill at the first vertex of
+/// the path to the standstill at the last. Decided from snapshots alone, never from a clock, so
+/// that a replay takes the very same points. Ordinary world; not thread-safe; lengths m, axis
+/// positions as scale readings in the order X, Y, Z.
 
 #include <array>
 #include <chrono>
@@ -30,7 +30,8 @@ struct RunPoint {
   protocol::DeviceTime device_time{};
   std::array<double, 3> p_tracker_m{};
   bool usable =
-      true;  ///< false: too fast, prism error or trigger violation; it holds its place in the sequence
+      /// false: too fast, prism error or trigger violation; it holds its place in the sequence
+      true;
 };
 
 /// Points of a run in blocks: one more never copies those before.
@@ -50,30 +51,35 @@ class RunPoints {
 };
 
 struct AcquisitionOptions {
-  double stand_tolerance_m = 0.2e-3;   ///< a machine that moves less than this is standing
-  double vertex_tolerance_m = 2e-3;    ///< how near to the first and last vertex the machine must stand
+  double stand_tolerance_m = 0.2e-3;  ///< a machine that moves less than this is standing
+  /// how near to the first and last vertex the machine must stand
+  double vertex_tolerance_m = 2e-3;
   double reading_tolerance_m = 20e-6;  ///< see VertexReadings
-  double path_tolerance_m = 10e-3;  ///< farther from every leg than this means another path is being driven
-  std::chrono::nanoseconds stand_before =
-      std::chrono::milliseconds{200};  ///< 20 points at 100 Hz, see [calib] alignment
-  std::chrono::nanoseconds keep_before =
-      std::chrono::milliseconds{400};  ///< standstill kept in front of the run
-  std::chrono::nanoseconds stand_after =
-      std::chrono::milliseconds{1000};  ///< longer than any dwell at a vertex
-  std::chrono::nanoseconds keep_after = std::chrono::milliseconds{400};  ///< standstill kept behind the run
+  /// farther from every leg than this means another path is being driven
+  double path_tolerance_m = 10e-3;
+  /// 20 points at 100 Hz, see [calib] alignment
+  std::chrono::nanoseconds stand_before = std::chrono::milliseconds{200};
+  /// standstill kept in front of the run
+  std::chrono::nanoseconds keep_before = std::chrono::milliseconds{400};
+  /// longer than any dwell at a vertex
+  std::chrono::nanoseconds stand_after = std::chrono::milliseconds{1000};
+  std::chrono::nanoseconds keep_after =
+      std::chrono::milliseconds{400};  ///< standstill kept behind the run
   /// Inside the run: between two tracker points, or without axis positions, for longer ends it.
   std::chrono::nanoseconds silence = std::chrono::seconds{30};
-  /// Host time for which no point need have arrived: `silence` and the backlog a stalled tracker delivers.
+  /// Host time for which no point need have arrived: `silence` and the backlog a stalled tracker
+  /// delivers.
   std::chrono::nanoseconds arrival_patience = std::chrono::seconds{40};
-  std::chrono::nanoseconds wait_for_start =
-      std::chrono::hours{1};  ///< for the machine to stand at P0 and leave
+  /// for the machine to stand at P0 and leave
+  std::chrono::nanoseconds wait_for_start = std::chrono::hours{1};
   std::chrono::nanoseconds longest_stop =
       std::chrono::minutes{15};  ///< on the path: a longer one ends the run
-  /// Of a run: 67 min at 1000 points a second, 200 MB. A machine that cycles on its path would fill the
-  /// memory.
+  /// Of a run: 67 min at 1000 points a second, 200 MB. A machine that cycles on its path would fill
+  /// the memory.
   std::size_t most_points = 4'000'000;
   EnvironmentUseOptions environment;  ///< what snapshots were corrected with
-  /// A packet out of order goes back by a burst (a third of a second); a clock that began anew by more.
+  /// A packet out of order goes back by a burst (a third of a second); a clock that began anew by
+  /// more.
   std::chrono::nanoseconds clock_began_anew = std::chrono::seconds{1};
 };
 
@@ -89,8 +95,8 @@ class OtfAcquisition {
   void begin(protocol::HostTime from) noexcept { from_ = from; }
   /// Points whose device time does not ascend are left out and counted.
   void take(const protocol::Snapshot& snapshot);
-  /// Fails what nothing arrives for any more; `now` is host time. Never needed for a replay: what it fails
-  /// has no points that could complete it.
+  /// Fails what nothing arrives for any more; `now` is host time. Never needed for a replay: what
+  /// it fails has no points that could complete it.
   void tick(protocol::HostTime now);
 
   [[nodiscard]] Phase phase() const noexcept { return phase_; }
@@ -128,7 +134,8 @@ class OtfAcquisition {
   RunPoints points_;
   MeanEffect environment_;
   VertexReadings readings_{options_.reading_tolerance_m};
-  std::optional<std::pair<protocol::HostTime, calib::Vector3>> before_q_;  // the last known positions
+  std::optional<std::pair<protocol::HostTime, calib::Vector3>>
+      before_q_;                                      // the last known positions
   calib::Vector3 stand_at_ = calib::Vector3::Zero();  // where the current standstill began
   protocol::HostTime stand_since_{};
   bool stand_known_ = false;

@@ -1,6 +1,7 @@
 #pragma once
-/// A model as it is written, kept and exchanged: model.json. Lengths in the file are mm, errors um and urad,
-/// covariance in products of those; here everything is SI. What is written reads back to the same bits.
+/// A model as it is written, kept and exchanged: model.json. Lengths in the file are mm, errors um
+/// and urad, covariance in products of those; here everything is SI. What is written reads back to
+/// the same bits.
 
 #include <cstddef>
 #include <filesystem>
@@ -33,7 +34,7 @@ struct ModelStatistics {
   double condition = 0.0;
   double sigma0 = 0.0;
   double chi2_per_dof = 0.0;
-  double covariance_factor = 1.0;  ///< see calib::otf::Statistics
+  double variance_factor = 1.0;  ///< see calib::otf::Statistics
   ResidualFigures before, after;
   int iterations = 0;
   std::string stop_reason;
@@ -52,8 +53,8 @@ struct ModelDocument {
   ModelStatistics statistics;
   std::vector<InputFile> inputs;
   std::optional<calib::Expansion> artefact{};  ///< of a ball array that counts as warm
-  /// What the recording of the run lacks; empty: nothing, or nothing was recorded on purpose. Such a model is
-  /// as sure as the data it was identified from, but no replay can check it.
+  /// What the recording of the run lacks; empty: nothing, or nothing was recorded on purpose. Such
+  /// a model is as sure as the data it was identified from, but no replay can check it.
   std::string recording_gap{};
 };
 /// For the verdict of a model whose recording has this gap.
@@ -64,28 +65,30 @@ struct ModelDocument {
                                          std::vector<InputFile> inputs, protocol::UtcTime created);
 
 /// The document of a ball array's solution.
-[[nodiscard]] ModelDocument evemu_document(const calib::evemu::Solution& solution, const Config& config,
-                                           std::vector<InputFile> inputs, protocol::UtcTime created);
+[[nodiscard]] ModelDocument evemu_document(const calib::evemu::Solution& solution,
+                                           const Config& config, std::vector<InputFile> inputs,
+                                           protocol::UtcTime created);
 
-/// SHA-256 in hex over what the model *says* (method, chain, basis, nodes, gauge, tools, parameters,
-/// covariance, validity, and what warmth of a ball array was taken out of it), not over dates, inputs or
-/// statistics: the live model's hash equals the replay's.
+/// SHA-256 in hex over what the model *says* (method, chain, basis, nodes, gauge, tools,
+/// parameters, covariance, validity, and what warmth of a ball array was taken out of it), not over
+/// dates, inputs or statistics: the live model's hash equals the replay's.
 [[nodiscard]] std::string model_hash(const ModelDocument& document);
 
-/// How people and the store call a model: 16 digits of a hash over model_hash() and the machine configuration
-/// it was made for. The same model found again under another configuration is another document: one is STALE
-/// where the other is ACTIVE.
+/// How people and the store call a model: 16 digits of a hash over model_hash() and the machine
+/// configuration it was made for. The same model found again under another configuration is another
+/// document: one is STALE where the other is ACTIVE.
 [[nodiscard]] std::string model_id(const ModelDocument& document);
 
 /// The text of model.json; the same document gives the same bytes.
 [[nodiscard]] std::string to_json(const ModelDocument& document);
 
-/// BadInput with every fault in Error::details. `file` only names the text in errors. A text whose recorded
-/// hash is not the hash of its content is refused.
+/// BadInput with every fault in Error::details. `file` only names the text in errors. A text whose
+/// recorded hash is not the hash of its content is refused.
 [[nodiscard]] Result<ModelDocument> parse_model(std::string_view text, const std::string& file);
 [[nodiscard]] Result<ModelDocument> read_model(const std::filesystem::path& file);
 
-/// `name,value,u,unit`: the coefficients of [Li OMM] Table 3 in mm and rad, of a model in polynomials.
+/// `name,value,u,unit`: the coefficients of [Li OMM] Table 3 in mm and rad, of a model in
+/// polynomials.
 [[nodiscard]] std::string to_coefficients_csv(const calib::evemu::EvemuModel& model);
 
 /// `name,position_mm,value,u,unit`

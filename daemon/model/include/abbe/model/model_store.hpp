@@ -58,8 +58,8 @@ struct StoreStamp {
 
 class ModelStore {
  public:
-  /// Creates the folder if needed. Io if that fails, BadInput if state.json is damaged (the models are left
-  /// alone).
+  /// Creates the folder if needed. Io if that fails, BadInput if state.json is damaged (the models
+  /// are left alone).
   [[nodiscard]] static Result<ModelStore> open(const std::filesystem::path& folder);
 
   /// The same without touching the disk: for who goes on without a store until there is one.
@@ -71,24 +71,26 @@ class ModelStore {
   /// For who has less time.
   void set_lock_patience(std::chrono::nanoseconds patience) noexcept { lock_patience_ = patience; }
 
-  /// Renames a state.json that is no state (damaged, a pipe ...) to state.json.damaged-DATE. Which model was
-  /// active is not known then, and the models that are there count as never judged. Not while another process
-  /// changes the store.
+  /// Renames a state.json that is no state (damaged, a pipe ...) to state.json.damaged-DATE. Which
+  /// model was active is not known then, and the models that are there count as never judged. Not
+  /// while another process changes the store.
   [[nodiscard]] Result<void> set_aside_damaged_state(protocol::UtcTime now);
   /// The newest name of such a file; empty: there is none.
   [[nodiscard]] std::string damaged_state() const;
-  /// Removes what processes that are gone left of a write (NAME.PID.new). Best effort. At the start of a
-  /// process, before it writes: what bears its own number is somebody else's.
+  /// Removes what processes that are gone left of a write (NAME.PID.new). Best effort. At the start
+  /// of a process, before it writes: what bears its own number is somebody else's.
   void remove_leftovers() const;
 
-  /// Keeps a model with the gate's verdict; returns its id. A model that is there already (same id) is not
-  /// written again, but the event is, unless it is the one before once more (same verdict and actor).
+  /// Keeps a model with the gate's verdict; returns its id. A model that is there already (same id)
+  /// is not written again, but the event is, unless it is the one before once more (same verdict
+  /// and actor).
   [[nodiscard]] Result<std::string> add(const ModelDocument& document, bool accepted,
                                         std::vector<std::string> reasons, const StoreActor& actor);
 
-  /// Makes a model active. Refused if the gate refused it, unless forced; BadInput if it is not there or
-  /// damaged.
-  [[nodiscard]] Result<void> activate(const std::string& id, const StoreActor& actor, bool force = false);
+  /// Makes a model active. Refused if the gate refused it, unless forced; BadInput if it is not
+  /// there or damaged.
+  [[nodiscard]] Result<void> activate(const std::string& id, const StoreActor& actor,
+                                      bool force = false);
 
   /// Back to the model that was active before; returns its id. Refused if there was none.
   [[nodiscard]] Result<std::string> rollback(const StoreActor& actor);
@@ -97,15 +99,16 @@ class ModelStore {
   [[nodiscard]] Result<std::vector<StoreEvent>> history() const;  ///< oldest first
   [[nodiscard]] Result<std::optional<std::string>> active_id()
       const;  ///< read anew each time: others may change it
-  /// What put the active model in force, read anew each time; `accepted`: what the gate said of the model.
-  /// None: no model is active.
+  /// What put the active model in force, read anew each time; `accepted`: what the gate said of the
+  /// model. None: no model is active.
   [[nodiscard]] Result<std::optional<StoreEvent>> activation() const;
   [[nodiscard]] Result<ModelDocument> load(const std::string& id) const;
 
   /// The same as before: nothing was added or activated since.
   [[nodiscard]] StoreStamp stamp() const noexcept;
 
-  /// The id that begins with `prefix` (4 digits at least), or "active". Usage if none or several do.
+  /// The id that begins with `prefix` (4 digits at least), or "active". Usage if none or several
+  /// do.
   [[nodiscard]] Result<std::string> find(const std::string& prefix) const;
   [[nodiscard]] std::filesystem::path model_path(const std::string& id) const;
 

@@ -1,6 +1,7 @@
 #pragma once
-/// What the hub took out of the rings in one turn, or a replay out of a recording: every stream in its own
-/// order. Reused from turn to turn, so that it stops allocating once it has grown. Pure data.
+/// What the hub took out of the rings in one turn, or a replay out of a recording: every stream in
+/// its own order. Reused from turn to turn, so that it stops allocating once it has grown. Pure
+/// data.
 
 #include <cstddef>
 #include <vector>
@@ -29,7 +30,8 @@ struct Batch {
   std::vector<FromEnvironment> measured_environment;
   std::vector<protocol::ProbeTrigger> touches;
   std::vector<protocol::TouchScan> touch_scans;
-  std::vector<drivers::MarkCrossing> marks;  ///< of the second card: its bytes are recorded, not these
+  std::vector<drivers::MarkCrossing>
+      marks;  ///< of the second card: its bytes are recorded, not these
   std::vector<protocol::RawBlock> tracker_raw;
   std::vector<protocol::RawBlock> encoder_raw;
   std::vector<protocol::RawBlock> probe_raw;      ///< of a measuring machine
@@ -53,7 +55,8 @@ struct Batch {
   [[nodiscard]] bool empty() const noexcept {
     return points.empty() && axes.empty() && environment.empty() && measured_environment.empty() &&
            touches.empty() && touch_scans.empty() && marks.empty() && tracker_raw.empty() &&
-           encoder_raw.empty() && probe_raw.empty() && reference_raw.empty() && environment_raw.empty();
+           encoder_raw.empty() && probe_raw.empty() && reference_raw.empty() &&
+           environment_raw.empty();
   }
 };
 

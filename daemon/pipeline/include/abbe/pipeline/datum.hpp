@@ -1,11 +1,11 @@
 #pragma once
-/// Readings of the axes of a counter card. Its counters begin at 0 wherever the axes stand when it is set up:
-/// until the zero of an axis is found from reference marks ([reference]), or somebody says that the axis
-/// stands at its offset (`abbe reference --here`), and again after the counters began anew, the axis is
-/// missing in every sample. [counter_card] zero = "here" says it of the first set-up only. Decided for each
-/// axis. The uncertainty of a datum is the same error in all readings and is not added to theirs.
-/// Deterministic: decided by the samples' own times, so that a replay from raw bytes is the live run again.
-/// Ordinary world; not thread-safe.
+/// Readings of the axes of a counter card. Its counters begin at 0 wherever the axes stand when it
+/// is set up: until the zero of an axis is found from reference marks ([reference]), or somebody
+/// says that the axis stands at its offset (`abbe reference --here`), and again after the counters
+/// began anew, the axis is missing in every sample. [counter_card] zero = "here" says it of the
+/// first set-up only. Decided for each axis. The uncertainty of a datum is the same error in all
+/// readings and is not added to theirs. Deterministic: decided by the samples' own times, so that a
+/// replay from raw bytes is the live run again. Ordinary world; not thread-safe.
 
 #include <cstdint>
 #include <deque>
@@ -39,12 +39,14 @@ struct DatumState {
 
 class Datum {
  public:
-  /// What is to be done with axes that have no marks. Untouched: recordings from before it was asked.
+  /// What is to be done with axes that have no marks. Untouched: recordings from before it was
+  /// asked.
   enum class WithoutMarks { NeedAZero, Untouched };
   /// Without [counter_card] nothing is ever changed.
   explicit Datum(const Config& config, WithoutMarks without_marks = WithoutMarks::NeedAZero);
 
-  /// Not at the first set-up of the card but where a former file ended; what was found before is over.
+  /// Not at the first set-up of the card but where a former file ended; what was found before is
+  /// over.
   void go_on(const DatumState& state);
   /// In the order of time.
   void found(const FoundDatum& datum);
@@ -81,8 +83,10 @@ inline constexpr const char* kDatumRule = "datum";
 /// Since when the marks were searched for: crossings and samples later than this.
 inline constexpr std::string_view kReferenceRequestName = "reference.json";
 [[nodiscard]] RecordingAttachment reference_request(protocol::HostTime from);
-[[nodiscard]] Result<protocol::HostTime> reference_request_from(const RecordingAttachment& attachment);
-/// At the front of every further file; what was found before it and is still in force lies beside it.
+[[nodiscard]] Result<protocol::HostTime> reference_request_from(
+    const RecordingAttachment& attachment);
+/// At the front of every further file; what was found before it and is still in force lies beside
+/// it.
 inline constexpr std::string_view kDatumStateName = "datum-state.json";
 [[nodiscard]] RecordingAttachment to_attachment(const DatumState& state);
 [[nodiscard]] Result<DatumState> datum_state_from_attachment(const RecordingAttachment& attachment);

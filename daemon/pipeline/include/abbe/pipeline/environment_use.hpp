@@ -1,8 +1,8 @@
 #pragma once
-/// What the environment does to measurements: many devices' samples merged into what is in force at an
-/// instant, scale readings corrected for the temperature of the scale, raw tracker distances for the index of
-/// the air. Composition only: the formulas are calib's. Deterministic, so that a replay is the live run
-/// again. Ordinary world; not thread-safe.
+/// What the environment does to measurements: many devices' samples merged into what is in force at
+/// an instant, scale readings corrected for the temperature of the scale, raw tracker distances for
+/// the index of the air. Composition only: the formulas are calib's. Deterministic, so that a
+/// replay is the live run again. Ordinary world; not thread-safe.
 
 #include <array>
 #include <chrono>
@@ -25,8 +25,8 @@ struct ThermalAxis {
 };
 
 struct EnvironmentUseOptions {
-  protocol::EnvironmentMask measured =
-      0;  ///< by the devices of [[environment]]: not taken from the tracker then
+  /// by the devices of [[environment]]: not taken from the tracker then
+  protocol::EnvironmentMask measured = 0;
   std::chrono::nanoseconds max_age{std::chrono::seconds{60}};
   std::vector<ThermalAxis> thermal;
   AirConfig air;
@@ -38,10 +38,12 @@ struct EnvironmentUseOptions {
 
 /// What the environment of an instant did to what was measured then.
 struct EnvironmentEffect {
-  std::array<double, 3> growth{1.0, 1.0, 1.0};  ///< of the scales of X, Y, Z; 1 without [[thermal]]
-  std::array<double, 3> u_growth{};  ///< relative standard uncertainty of it; 0 without [[thermal]]
-  /// Relative standard uncertainty all distances have in common: of the index they were corrected with, and
-  /// the tracker's own.
+  std::array<double, 3> expansion_factor{1.0, 1.0,
+                                         1.0};  ///< of the scales of X, Y, Z; 1 without [[thermal]]
+  std::array<double, 3>
+      u_expansion_factor{};  ///< relative standard uncertainty of it; 0 without [[thermal]]
+  /// Relative standard uncertainty all distances have in common: of the index they were corrected
+  /// with, and the tracker's own.
   double u_scale = 0.0;
 };
 /// None: what is configured was not available then.
@@ -49,26 +51,29 @@ struct EnvironmentEffect {
                                                          const EnvironmentUseOptions& options);
 
 /// Readings of X, Y, Z as true positions, as correct_for_temperature() makes them.
-[[nodiscard]] std::array<double, 3> grown(std::array<double, 3> reading_m, const EnvironmentEffect& effect,
-                                          const EnvironmentUseOptions& options);
+[[nodiscard]] std::array<double, 3> at_temperature(std::array<double, 3> reading_m,
+                                                   const EnvironmentEffect& effect,
+                                                   const EnvironmentUseOptions& options);
 
-/// Mean over a run: temperatures of scales drift by less than what they are uncertain, or it is no run.
+/// Mean over a run: temperatures of scales drift by less than what they are uncertain, or it is no
+/// run.
 class MeanEffect {
  public:
   void take(const EnvironmentEffect& effect);
   [[nodiscard]] EnvironmentEffect mean() const;
 
  private:
-  EnvironmentEffect sum_{.growth = {0.0, 0.0, 0.0}};
+  EnvironmentEffect sum_{.expansion_factor = {0.0, 0.0, 0.0}};
   std::size_t count_ = 0;
 };
 
-/// Every quantity from the device that measures it: at most one of [[environment]], else the tracker. A value
-/// of a device that has been silent for longer than max_age is NaN. Air that a tracker assumes is not merged.
+/// Every quantity from the device that measures it: at most one of [[environment]], else the
+/// tracker. A value of a device that has been silent for longer than max_age is NaN. Air that a
+/// tracker assumes is not merged.
 class EnvironmentMerge {
  public:
-  /// A sample of [[environment]] is in force from `lag` after its instant: by then it has come, whatever the
-  /// order of arrival, and an environment that is half a second old is as good.
+  /// A sample of [[environment]] is in force from `lag` after its instant: by then it has come,
+  /// whatever the order of arrival, and an environment that is half a second old is as good.
   EnvironmentMerge(const EnvironmentUseOptions& options, std::chrono::nanoseconds lag);
 
   void take(const Batch& batch);
@@ -89,17 +94,17 @@ class EnvironmentMerge {
   protocol::HostTime newest_{};
 };
 
-/// Readings become true positions (and velocities), their uncertainty is added in quadrature. An axis whose
-/// scale temperature is not known has no known position: it is set in missing_mask, and AxisMissing is
-/// flagged.
+/// Readings become true positions (and velocities), their uncertainty is added in quadrature. An
+/// axis whose scale temperature is not known has no known position: it is set in missing_mask, and
+/// AxisMissing is flagged.
 void correct_for_temperature(protocol::Snapshot& snapshot, const EnvironmentUseOptions& options);
 
 /// The index of the air of the sample, or why there is none (a quantity not available).
-[[nodiscard]] Result<calib::RefractiveIndex> index_of_air(const protocol::EnvironmentSample& environment,
-                                                          const AirConfig& config);
+[[nodiscard]] Result<calib::RefractiveIndex> index_of_air(
+    const protocol::EnvironmentSample& environment, const AirConfig& config);
 
-/// With [air] assumed_index: the tracker point's distance is corrected; without a known index the point is
-/// flagged PointInvalid. Else nothing.
+/// With [air] assumed_index: the tracker point's distance is corrected; without a known index the
+/// point is flagged PointInvalid. Else nothing.
 void correct_for_air(protocol::Snapshot& snapshot, const EnvironmentUseOptions& options);
 
 }  // namespace abbe::daemon

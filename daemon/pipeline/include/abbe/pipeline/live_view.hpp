@@ -1,7 +1,7 @@
 #pragma once
-/// The newest of everything, for those who want to see now rather than exactly: the axes as of the latest
-/// SYNC, the latest tracker point (up to a third of a second older) and the latest environment.
-/// Identification never uses it. Ordinary world; not thread-safe.
+/// The newest of everything, for those who want to see now rather than exactly: the axes as of the
+/// latest SYNC, the latest tracker point (up to a third of a second older) and the latest
+/// environment. Identification never uses it. Ordinary world; not thread-safe.
 
 #include <chrono>
 #include <optional>
@@ -14,19 +14,20 @@
 
 namespace abbe::daemon {
 
-/// Without axis samples for this long (wall time, also with simulated devices) the positions are not known.
+/// Without axis samples for this long (wall time, also with simulated devices) the positions are
+/// not known.
 inline constexpr std::chrono::milliseconds kAxesPatience{500};
 
-/// X, Y and Z stand where a live view says, at its instant: all answered, from a bus and nodes without a
-/// fault. Else the positions are the last known ones, however fresh the instant looks.
+/// X, Y and Z stand where a live view says, at its instant: all answered, from a bus and nodes
+/// without a fault. Else the positions are the last known ones, however fresh the instant looks.
 [[nodiscard]] bool axes_known(const protocol::Snapshot& view) noexcept;
 
 class LiveView {
  public:
   LiveView(const AssemblerOptions& options, const drivers::TimeSource& time);
 
-  /// True if anything new came, or something shown is no longer current at `batch.taken`: after 1 s the
-  /// tracker point and the touch are forgotten, after kAxesPatience all axes are missing.
+  /// True if anything new came, or something shown is no longer current at `batch.taken`: after 1 s
+  /// the tracker point and the touch are forgotten, after kAxesPatience all axes are missing.
   bool take(const Batch& batch);
   [[nodiscard]] const protocol::Snapshot& view() const noexcept { return view_; }
   /// The instant of the latest axis sample, whatever was missing in it.
@@ -34,7 +35,9 @@ class LiveView {
     return previous_ ? std::optional{previous_->head.time} : std::nullopt;
   }
   /// The latest instant at which axes_known() held; none yet: nothing.
-  [[nodiscard]] std::optional<protocol::HostTime> axes_known_at() const noexcept { return axes_known_at_; }
+  [[nodiscard]] std::optional<protocol::HostTime> axes_known_at() const noexcept {
+    return axes_known_at_;
+  }
 
  private:
   void take(const protocol::AxisSample& sample);

@@ -1,13 +1,13 @@
 #pragma once
-/// Datum of each axis from its distance-coded marks, with two cards: one counts the axes live, the other
-/// latches them on their marks. Fed with both streams while somebody drives the axes over a few marks; ends
-/// axis by axis. Reads no clock and starts no thread: live and replayed alike. Ordinary world; not
-/// thread-safe.
+/// Datum of each axis from its distance-coded marks, with two cards: one counts the axes live, the
+/// other latches them on their marks. Fed with both streams while somebody drives the axes over a
+/// few marks; ends axis by axis. Reads no clock and starts no thread: live and replayed alike.
+/// Ordinary world; not thread-safe.
 ///
-/// The cards' scans lie beside each other in host time, known to `u_alignment` (each card maps its counted
-/// clock to it). At a mark the live counter was somewhere between its least and largest value around that
-/// time; every mark narrows the difference of the two counters' zeros. Drive slowly: at 1 mm/s and 1 ms a
-/// mark gives it to 2 um.
+/// The cards' scans lie beside each other in host time, known to `u_alignment` (each card maps its
+/// counted clock to it). At a mark the live counter was somewhere between its least and largest
+/// value around that time; every mark narrows the difference of the two counters' zeros. Drive
+/// slowly: at 1 mm/s and 1 ms a mark gives it to 2 um.
 
 #include <cstdint>
 #include <deque>
@@ -24,11 +24,12 @@
 namespace abbe::daemon {
 
 struct ReferenceAxis {
-  std::string name;                     ///< "X"
-  std::uint8_t live_axis = 0;           ///< place in the live card's samples
-  std::uint8_t latched_axis = 0;        ///< place in the latching card's
-  drivers::MarkTraverseOptions marks;   ///< `counts_per_period` with the sign of the live card's step
-  double period = 20e-6;                ///< of the scale's signal, m or rad
+  std::string name;               ///< "X"
+  std::uint8_t live_axis = 0;     ///< place in the live card's samples
+  std::uint8_t latched_axis = 0;  ///< place in the latching card's
+  drivers::MarkTraverseOptions
+      marks;              ///< `counts_per_period` with the sign of the live card's step
+  double period = 20e-6;  ///< of the scale's signal, m or rad
   double max_half_width_counts = 0.75;  ///< how well the difference of the zeros must be known
 };
 
@@ -41,8 +42,8 @@ struct AxisReference {
   enum class State : std::uint8_t { Searching, Found, Failed };
   State state = State::Searching;
   std::size_t marks = 0;
-  double offset =
-      0.0;  ///< m or rad: the reading at the live counter's zero, relative to the scale's zero mark
+  /// m or rad: the reading at the live counter's zero, relative to the scale's zero mark
+  double offset = 0.0;
   double u_offset = 0.0;
   std::string reason;  ///< of the latest refusal, or why it failed
 };
@@ -72,7 +73,7 @@ class ReferenceSession {
   void cross(Axis& axis, const drivers::MarkCrossing& crossing);
   void follow(Axis& axis, protocol::HostTime until);
   void conclude(Axis& axis);
-  void begin_anew(Axis& axis);
+  void restart(Axis& axis);
 
   ReferenceOptions options_;
   std::vector<Axis> axes_;
@@ -87,7 +88,8 @@ class ReferenceSession {
 /// What a found axis says of count 0. m or rad.
 [[nodiscard]] double reading_at_zero(const ReferenceAxisConfig& marks, const AxisReference& found);
 
-/// The request to take the present place of axes without marks as the one where they read their offset.
+/// The request to take the present place of axes without marks as the one where they read their
+/// offset.
 struct StandHere {
   static constexpr double kByEye = 100e-6;
 

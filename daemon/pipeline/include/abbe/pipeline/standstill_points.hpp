@@ -1,9 +1,9 @@
 #pragma once
-/// Where the machine stood still, and where the tracker saw the reflector then: the points of a verification
-/// ([Li OMM] section 5.4). For a tracker in stationary mode (one mean after the other) as for one that
-/// measures continuously. What is nearer than `settle` to either end of a standstill is left out: there the
-/// machine may still swing, or a mean may reach into the motion. Decided from snapshots alone, never from a
-/// clock. Ordinary world; not thread-safe.
+/// Where the machine stood still, and where the tracker saw the reflector then: the points of a
+/// verification ([Li OMM] section 5.4). For a tracker in stationary mode (one mean after the other)
+/// as for one that measures continuously. What is nearer than `settle` to either end of a
+/// standstill is left out: there the machine may still swing, or a mean may reach into the motion.
+/// Decided from snapshots alone, never from a clock. Ordinary world; not thread-safe.
 
 #include <chrono>
 #include <cstddef>
@@ -18,7 +18,8 @@ namespace abbe::daemon {
 
 struct StandstillOptions {
   double tolerance_m = 50e-6;  ///< of an axis about where the standstill began: noise and swinging
-  /// At least the averaging time of a stationary tracker, which is 0.5 s unless configured otherwise.
+  /// At least the averaging time of a stationary tracker, which is 0.5 s unless configured
+  /// otherwise.
   std::chrono::nanoseconds settle = std::chrono::milliseconds{500};
 };
 
@@ -63,8 +64,8 @@ class StandstillPoints {
 
 /// Of this tracker.
 [[nodiscard]] StandstillOptions standstill_options(const Config& config);
-/// Refused where readings at standstills say nothing of a model: no tracker, or axes that the control already
-/// corrects.
+/// Refused where readings at standstills say nothing of a model: no tracker, or axes that the
+/// control already corrects.
 [[nodiscard]] Result<void> check_verification(const Config& config);
 
 }  // namespace abbe::daemon

@@ -1,6 +1,7 @@
 #pragma once
-/// What the scales read while the machine stands at the vertices of its path. A path file that is not the one
-/// the control drives would become an error of the machine in the model. Ordinary world; not thread-safe.
+/// What the scales read while the machine stands at the vertices of its path. A path file that is
+/// not the one the control drives would become an error of the machine in the model. Ordinary
+/// world; not thread-safe.
 
 #include <cstddef>
 #include <optional>
@@ -20,15 +21,16 @@ struct VertexReading {
 
 class VertexReadings {
  public:
-  /// Between two points. A machine that is faster does not stand: a control that rounds the corners has no
-  /// reading there.
+  /// Between two points. A machine that is faster does not stand: a control that rounds the corners
+  /// has no reading there.
   static constexpr double kStands_m_per_s = 1e-3;
 
-  /// `tolerance_m`: by which a standing machine may miss its command (following error, in-position window).
+  /// `tolerance_m`: by which a standing machine may miss its command (following error, in-position
+  /// window).
   explicit VertexReadings(double tolerance_m) : tolerance_m_(tolerance_m) {}
 
-  /// Readings near a vertex, in the order of time; the slowest and latest of a vertex counts. Returns what
-  /// the vertex before contradicts, once this is another one.
+  /// Readings near a vertex, in the order of time; the slowest and latest of a vertex counts.
+  /// Returns what the vertex before contradicts, once this is another one.
   [[nodiscard]] std::optional<std::string> take(const VertexReading& reading);
   /// The machine stands elsewhere now, and its run has not begun.
   void forget() { slowest_.reset(); }

@@ -1,9 +1,9 @@
 #pragma once
-/// Starts abbe-dds as a child of abbed and starts it again when it ends: at once if it had been up for a
-/// while, after `first_delay` if a signal ends it at start, with a growing delay if it exits at start (bad
-/// profile, port in use). A child that does not answer the hub is killed and so started again. Knows its
-/// child by pid only; the child inherits none of abbed's capabilities. Used by one thread that is not
-/// real-time; never blocks but in the destructor.
+/// Starts abbe-dds as a child of abbed and starts it again when it ends: at once if it had been up
+/// for a while, after `first_delay` if a signal ends it at start, with a growing delay if it exits
+/// at start (bad profile, port in use). A child that does not answer the hub is killed and so
+/// started again. Knows its child by pid only; the child inherits none of abbed's capabilities.
+/// Used by one thread that is not real-time; never blocks but in the destructor.
 
 #include <sys/types.h>
 
@@ -24,13 +24,15 @@ class DdsSupervisor {
   using WallTime = std::chrono::steady_clock::time_point;
 
   struct Options {
-    std::filesystem::path program;                 ///< abbe-dds
-    std::vector<std::string> arguments;            ///< without argv[0]
-    int priority = 0;                              ///< SCHED_FIFO; 0, or not permitted: an ordinary process
-    std::chrono::milliseconds steady_after{2000};  ///< alive this long: the next death is answered at once
-    std::chrono::milliseconds first_delay{100};    ///< after a death at start; doubles
+    std::filesystem::path program;       ///< abbe-dds
+    std::vector<std::string> arguments;  ///< without argv[0]
+    int priority = 0;                    ///< SCHED_FIFO; 0, or not permitted: an ordinary process
+    std::chrono::milliseconds steady_after{
+        2000};  ///< alive this long: the next death is answered at once
+    std::chrono::milliseconds first_delay{100};  ///< after a death at start; doubles
     std::chrono::milliseconds longest_delay{5000};
-    std::chrono::milliseconds stop_patience{3000};  ///< destructor: SIGTERM, then this long, then SIGKILL
+    std::chrono::milliseconds stop_patience{
+        3000};  ///< destructor: SIGTERM, then this long, then SIGKILL
     /// Outlives the supervisor; null: nobody asks the child whether it hangs.
     DdsProcess* process = nullptr;
     std::chrono::milliseconds hung_after{2000};       ///< no answer for this long
@@ -43,7 +45,8 @@ class DdsSupervisor {
   DdsSupervisor(DdsSupervisor&&) noexcept;
   DdsSupervisor& operator=(DdsSupervisor&&) noexcept;
 
-  /// Notices an end or a hang and starts again when it is time. Call every cycle, at least every 50 ms.
+  /// Notices an end or a hang and starts again when it is time. Call every cycle, at least every
+  /// 50 ms.
   void poll(WallTime now);
 
   [[nodiscard]] pid_t pid() const noexcept { return pid_; }  ///< 0 while there is none

@@ -1,7 +1,7 @@
 #pragma once
-/// A model as it is published: the payloads of ErrorModel and ErrorGrid, encoded where the model was read,
-/// because that takes long (4096 nodes with covariance). Who publishes them only fills in the sequence
-/// numbers. Pure, thread-safe; allocates.
+/// A model as it is published: the payloads of ErrorModel and ErrorGrid, encoded where the model
+/// was read, because that takes long (4096 nodes with covariance). Who publishes them only fills in
+/// the sequence numbers. Pure, thread-safe; allocates.
 
 #include <cstddef>
 #include <string_view>
@@ -19,6 +19,7 @@ struct ModelPublication {
 };
 
 /// Refused for a model that does not fit into the bounds of the IDL.
-[[nodiscard]] Result<ModelPublication> encode_model(const ModelInForce& model, std::string_view machine);
+[[nodiscard]] Result<ModelPublication> encode_model(const ModelInForce& model,
+                                                    std::string_view machine);
 
 }  // namespace abbe::daemon

@@ -1,8 +1,8 @@
 #pragma once
-/// Hands what the daemon knows to abbe-dds, each topic in its own rhythm: live vectors at their rates, model
-/// and grid when they change, state when it changes and every second (its age moves), health every second and
-/// when it changes. abbe-dds repeats durable topics for late joiners by itself. Rhythms run in wall time,
-/// also with simulated devices. Used by the hub's thread only.
+/// Hands what the daemon knows to abbe-dds, each topic in its own rhythm: live vectors at their
+/// rates, model and grid when they change, state when it changes and every second (its age moves),
+/// health every second and when it changes. abbe-dds repeats durable topics for late joiners by
+/// itself. Rhythms run in wall time, also with simulated devices. Used by the hub's thread only.
 
 #include <array>
 #include <chrono>
@@ -23,9 +23,10 @@ namespace abbe::daemon {
 struct PublisherOptions {
   std::string machine;
   std::array<double, 3> tool_offset_m{};
-  double snapshot_hz = 50.0;                                           ///< 0: whenever something new came
-  double compensation_hz = 100.0;                                      ///< 0: whenever something new came
-  std::chrono::nanoseconds validity = std::chrono::milliseconds{500};  ///< of a live vector, host time
+  double snapshot_hz = 50.0;       ///< 0: whenever something new came
+  double compensation_hz = 100.0;  ///< 0: whenever something new came
+  /// of a live vector, host time
+  std::chrono::nanoseconds validity = std::chrono::milliseconds{500};
   std::string security_warning;  ///< what to report of DDS Security; empty: it is on
 };
 
@@ -35,7 +36,7 @@ struct ModelStanding {
   std::string reason;
   const ModelInForce* model = nullptr;
   const ModelPublication* publication = nullptr;  ///< of `model`
-  std::uint64_t revision = 0;                     ///< changes whenever another model comes into force
+  std::uint64_t revision = 0;  ///< changes whenever another model comes into force
 };
 
 class Publisher {
@@ -44,12 +45,13 @@ class Publisher {
 
   Publisher(DdsLink link, PublisherOptions options, protocol::UtcOffset utc);
 
-  /// Every turn, behind what subscribers wait for: says the daemon is alive and lets the link breathe.
+  /// Every turn, behind what subscribers wait for: says the daemon is alive and lets the link
+  /// breathe.
   void beat(WallTime wall);
   /// Every turn in which something new came; the snapshot first, subscribers wait for it.
   void snapshot(const protocol::Snapshot& view, protocol::HostTime now, WallTime wall);
-  void compensation(const protocol::Snapshot& view, const ModelStanding& standing, protocol::HostTime now,
-                    WallTime wall);
+  void compensation(const protocol::Snapshot& view, const ModelStanding& standing,
+                    protocol::HostTime now, WallTime wall);
   /// Every turn.
   void model(const ModelStanding& standing, protocol::HostTime now, WallTime wall);
   void health(std::span<const StreamHealth> streams, protocol::HostTime now);
@@ -58,13 +60,17 @@ class Publisher {
   /// Why the last message that could not be encoded was not sent; empty: all could.
   [[nodiscard]] const std::string& refusal() const noexcept { return refusal_; }
   [[nodiscard]] const DdsLink& link() const noexcept { return link_; }
-  [[nodiscard]] const std::string& security_warning() const noexcept { return options_.security_warning; }
+  [[nodiscard]] const std::string& security_warning() const noexcept {
+    return options_.security_warning;
+  }
 
  private:
   template <class T>
   void send(Topic topic, const T& message, WallTime at = WallTime::clock::now());
   void send_encoded(Topic topic, std::span<const std::byte> payload);
-  [[nodiscard]] Stamp stamp(protocol::HostTime now) { return {options_.machine, ++sequence_number_, now}; }
+  [[nodiscard]] Stamp stamp(protocol::HostTime now) {
+    return {options_.machine, ++sequence_number_, now};
+  }
 
   DdsLink link_;
   PublisherOptions options_;

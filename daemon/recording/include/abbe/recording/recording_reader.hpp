@@ -1,12 +1,13 @@
 #pragma once
-/// Opens a recording, complete or broken, and gives its messages in the order in which the hub took them,
-/// those of a topic in the order in which they were recorded: what `abbe replay` stands on. Whatever is
-/// damaged is passed over and said in losses(); whole chunks are always given, of a chunk cut off by the end
-/// of the file every whole message.
+/// Opens a recording, complete or broken, and gives its messages in the order in which the hub took
+/// them, those of a topic in the order in which they were recorded: what `abbe replay` stands on.
+/// Whatever is damaged is passed over and said in losses(); whole chunks are always given, of a
+/// chunk cut off by the end of the file every whole message.
 ///
-/// The file is mapped: views stay valid as long as the reader, and the file must not be shortened meanwhile
-/// (a Recorder shortens its own file only after a failed write). Checksums are checked when the file is
-/// opened. Const functions may be used by several threads, each with its own cursor.
+/// The file is mapped: views stay valid as long as the reader, and the file must not be shortened
+/// meanwhile (a Recorder shortens its own file only after a failed write). Checksums are checked
+/// when the file is opened. Const functions may be used by several threads, each with its own
+/// cursor.
 
 #include <cstdint>
 #include <filesystem>
@@ -38,8 +39,8 @@ struct RecordingLoss {
   std::uint64_t offset = 0;  ///< where in the file it begins
   std::uint64_t bytes = 0;   ///< how many bytes of the file are affected
   std::string what;
-  /// Something inside is missing or wrong. Not so where only the end is missing, as after a kill or a power
-  /// cut, or only an index: what stands there is whole.
+  /// Something inside is missing or wrong. Not so where only the end is missing, as after a kill or
+  /// a power cut, or only an index: what stands there is whole.
   bool inside = true;
 };
 
@@ -71,8 +72,8 @@ class RecordingReader {
  public:
   class Cursor;
 
-  /// Error (Io): cannot be read. Error (BadInput): not a recording of this program (no MCAP magic, or cut
-  /// before the end of its metadata).
+  /// Error (Io): cannot be read. Error (BadInput): not a recording of this program (no MCAP magic,
+  /// or cut before the end of its metadata).
   [[nodiscard]] static Result<RecordingReader> open(const std::filesystem::path& file);
   ~RecordingReader();
   RecordingReader(RecordingReader&&) noexcept;
@@ -81,27 +82,30 @@ class RecordingReader {
   [[nodiscard]] const RecordingInfo& info() const noexcept;
   [[nodiscard]] const std::vector<RecordingAttachment>& attachments() const noexcept;
   /// All metadata records by name, for people.
-  [[nodiscard]] const std::map<std::string, std::map<std::string, std::string>>& metadata() const noexcept;
+  [[nodiscard]] const std::map<std::string, std::map<std::string, std::string>>& metadata()
+      const noexcept;
 
   /// Closed by its recorder (whatever happened to it afterwards).
   [[nodiscard]] bool closed_cleanly() const noexcept;
-  /// What is missing or was passed over; empty for a whole recording, also for one still open at a chunk's
-  /// end.
+  /// What is missing or was passed over; empty for a whole recording, also for one still open at a
+  /// chunk's end.
   [[nodiscard]] std::span<const RecordingLoss> losses() const noexcept;
-  /// In one sentence what is damaged inside: "the recording is damaged: chunk 3 ... (and 2 more places)". A
-  /// model identified from it may be off by more than its uncertainty. Empty: nothing.
+  /// In one sentence what is damaged inside: "the recording is damaged: chunk 3 ... (and 2 more
+  /// places)". A model identified from it may be off by more than its uncertainty. Empty: nothing.
   [[nodiscard]] std::string damage() const;
   [[nodiscard]] MetadataCheck configuration_check() const noexcept;
 
   [[nodiscard]] std::uint64_t message_count() const noexcept;
   [[nodiscard]] std::uint64_t size_bytes() const noexcept;
   /// When the first and the last message were taken; nothing if there are none.
-  [[nodiscard]] std::optional<std::pair<protocol::HostTime, protocol::HostTime>> time_range() const noexcept;
+  [[nodiscard]] std::optional<std::pair<protocol::HostTime, protocol::HostTime>> time_range()
+      const noexcept;
   /// SHA-256 of the whole file in hex; reads all of it.
   [[nodiscard]] std::string sha256() const;
 
-  /// All messages by `taken`, those of equal time as they were recorded. None comes before the one recorded
-  /// before it in its topic, even if its log_time says so: once that was the instant described.
+  /// All messages by `taken`, those of equal time as they were recorded. None comes before the one
+  /// recorded before it in its topic, even if its log_time says so: once that was the instant
+  /// described.
   [[nodiscard]] Cursor messages() const;
   /// All messages to the sink. Returns how many wanted ones could not be decoded.
   std::uint64_t read(const RecordingSink& sink) const;
@@ -112,8 +116,8 @@ class RecordingReader {
   std::unique_ptr<State> state_;
 };
 
-/// Walks the messages once. Must not outlive its reader. Holds the message heads of the chunks around the
-/// present time.
+/// Walks the messages once. Must not outlive its reader. Holds the message heads of the chunks
+/// around the present time.
 class RecordingReader::Cursor {
  public:
   [[nodiscard]] std::optional<RecordedMessage> next();

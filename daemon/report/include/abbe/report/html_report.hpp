@@ -1,6 +1,6 @@
 #pragma once
-/// A page that explains a result: text, tables and charts in one file that needs no network, now or in ten
-/// years (Chart.js is inside). Builder; one thread.
+/// A page that explains a result: text, tables and charts in one file that needs no network, now or
+/// in ten years (Chart.js is inside). Builder; one thread.
 
 #include <cstddef>
 #include <string>
@@ -9,8 +9,8 @@
 
 namespace abbe::daemon {
 
-/// Points joined by lines. `u`, where given, is the standard uncertainty of y: drawn as a band of two either
-/// side.
+/// Points joined by lines. `u`, where given, is the standard uncertainty of y: drawn as a band of
+/// two either side.
 struct Curve {
   std::string name;
   std::vector<double> x, y, u;
@@ -51,7 +51,8 @@ class HtmlReport {
   void paragraph(std::string_view);
   /// Two columns: what, value.
   void facts(const std::vector<std::pair<std::string, std::string>>&);
-  void table(const std::vector<std::string>& columns, const std::vector<std::vector<std::string>>& rows);
+  void table(const std::vector<std::string>& columns,
+             const std::vector<std::vector<std::string>>& rows);
   void chart(const LineChart&);
   void chart(const Histogram&);
   void chart(const VectorChart&);

@@ -1,6 +1,6 @@
 #pragma once
-/// The daemon put together: devices, recorder, hub, calibration, publisher and control API, from one
-/// configuration. Nothing here but the wiring and the order of starting and stopping.
+/// The daemon put together: devices, recorder, hub, calibration, publisher and control API, from
+/// one configuration. Nothing here but the wiring and the order of starting and stopping.
 
 #include <filesystem>
 #include <memory>
@@ -21,7 +21,8 @@ struct AbbedOptions {
 
 class Abbed {
  public:
-  /// Takes up everything or nothing. Io for what the system refuses (socket, directory, real-time priority).
+  /// Takes up everything or nothing. Io for what the system refuses (socket, directory, real-time
+  /// priority).
   [[nodiscard]] static Result<std::unique_ptr<Abbed>> start(Config config, AbbedOptions options);
   Abbed(const Abbed&) = delete;
   Abbed& operator=(const Abbed&) = delete;
@@ -29,7 +30,7 @@ class Abbed {
   ~Abbed();
 
   /// Call at least every 50 ms from the thread that started it: supervises abbe-dds.
-  void turn();
+  void cycle();
   /// The hub has turned within the last second: what the watchdog may be told.
   [[nodiscard]] bool alive() const;
   /// What is worth a line in the log at start.

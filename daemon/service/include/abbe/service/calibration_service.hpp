@@ -1,11 +1,11 @@
 #pragma once
-/// Runs calibrations in the daemon: feeds the session, identifies and keeps the judged model in the store on
-/// a thread of its own, and puts it in force if the gate accepted it. A model that the store does not take
-/// (disk full, read-only, locked) stays in memory, is tried again every five seconds and reported until it is
-/// stored or its session is cancelled; there is one at most, because its session goes on. Used by the hub's
-/// thread only, but for prepare(); no call waits for anything, and none does work that grows with path,
-/// points or model: that is done where a task is prepared, where a run is identified, and where a model is
-/// stored.
+/// Runs calibrations in the daemon: feeds the session, identifies and keeps the judged model in the
+/// store on a thread of its own, and puts it in force if the gate accepted it. A model that the
+/// store does not take (disk full, read-only, locked) stays in memory, is tried again every five
+/// seconds and reported until it is stored or its session is cancelled; there is one at most,
+/// because its session goes on. Used by the hub's thread only, but for prepare(); no call waits for
+/// anything, and none does work that grows with path, points or model: that is done where a task is
+/// prepared, where a run is identified, and where a model is stored.
 
 #include <atomic>
 #include <chrono>
@@ -36,9 +36,9 @@ class CalibrationService {
   /// `recorder` may be null: nothing is recorded then, and models name no recording.
   CalibrationService(const Config& config, ModelAuthority& authority, RecorderThread* recorder,
                      protocol::UtcOffset utc);
-  /// Stops a running identification, and tries once more to store a model that waits for the store. Takes
-  /// kStopPatience at most: what does not end until then is left running, with nothing of this object; see
-  /// work_left_running(). A model that is lost is reported on stderr.
+  /// Stops a running identification, and tries once more to store a model that waits for the store.
+  /// Takes kStopPatience at most: what does not end until then is left running, with nothing of
+  /// this object; see background_tasks_running(). A model that is lost is reported on stderr.
   ~CalibrationService();
   static constexpr std::chrono::seconds kStopPatience{4};
   static constexpr std::chrono::seconds kLastTry{1};  ///< of kStopPatience, for the store's lock
@@ -46,8 +46,8 @@ class CalibrationService {
   CalibrationService(const CalibrationService&) = delete;
   CalibrationService& operator=(const CalibrationService&) = delete;
 
-  /// Refused or BadInput for a task of which no calibration could come with this configuration. Any thread
-  /// but the hub's.
+  /// Refused or BadInput for a task of which no calibration could come with this configuration. Any
+  /// thread but the hub's.
   [[nodiscard]] Result<PreparedCalibration> prepare(CalibrationTask task) const;
   /// The id of the session. Refused while there is one. The caller destroys `prepared`.
   [[nodiscard]] Result<std::uint64_t> start(PreparedCalibration&& prepared, const std::string& who,
@@ -55,24 +55,29 @@ class CalibrationService {
   /// Both, for who has no real-time thread.
   [[nodiscard]] Result<std::uint64_t> start(CalibrationTask task, const std::string& who,
                                             protocol::HostTime now);
-  /// Refused without a session, and while the model is being put into a store that may still answer within
-  /// kStorePatience of the authority. An identification is asked to stop; until it has, no other session
-  /// starts. Discards a model that the store does not take; of a store that does not answer the session's
-  /// reason says that the model may still come into it. It is not activated then, unless that had begun.
+  /// Refused without a session, and while the model is being put into a store that may still answer
+  /// within kStorePatience of the authority. An identification is asked to stop; until it has, no
+  /// other session starts. Discards a model that the store does not take; of a store that does not
+  /// answer the session's reason says that the model may still come into it. It is not activated
+  /// then, unless that had begun.
   [[nodiscard]] Result<void> cancel(const std::string& who, protocol::HostTime now);
 
-  /// Every turn: new snapshots, and the outcome of what has ended on the other thread. Returns changes of
-  /// state, in order.
-  std::vector<SessionEvent> turn(std::span<const protocol::Snapshot> snapshots, protocol::HostTime now);
+  /// Every turn: new snapshots, and the outcome of what has ended on the other thread. Returns
+  /// changes of state, in order.
+  std::vector<SessionEvent> cycle(std::span<const protocol::Snapshot> snapshots,
+                                  protocol::HostTime now);
 
   [[nodiscard]] SessionStatus status() const;
-  /// The last kEndedKept sessions before this one, oldest first: whoever asked for one finds its verdict.
+  /// The last kEndedKept sessions before this one, oldest first: whoever asked for one finds its
+  /// verdict.
   [[nodiscard]] const std::deque<SessionStatus>& ended() const noexcept { return ended_; }
-  /// Why an identified model is still in memory only: "model 0123...: write ...: No space left on device".
-  /// Empty: there is none.
+  /// Why an identified model is still in memory only: "model 0123...: write ...: No space left on
+  /// device". Empty: there is none.
   [[nodiscard]] const std::string& not_stored() const noexcept { return not_stored_; }
   /// The verdict of the last identification, for people; none yet: nothing.
-  [[nodiscard]] const std::optional<calib::HeldOutFigures>& held_out() const noexcept { return held_out_; }
+  [[nodiscard]] const std::optional<calib::HeldOutFigures>& held_out() const noexcept {
+    return held_out_;
+  }
 
  private:
   /// A judged model on its way into the store.
@@ -124,7 +129,7 @@ class CalibrationService {
   bool active_left_out_ = false;     // it was made for another machine configuration
   std::shared_ptr<Watch> watch_ = std::make_shared<Watch>();  // of the last identification
   std::deque<SessionStatus> ended_;
-  protocol::HostTime latest_turn_{};
+  protocol::HostTime latest_cycle_{};
   std::optional<calib::HeldOutFigures> held_out_;
 };
 

@@ -39,10 +39,11 @@ struct ControlVerb {
 };
 [[nodiscard]] std::vector<ControlVerb> control_verbs();
 
-/// The answer to one request of `peer`, which is refused without the role the request takes; from any thread
-/// but the hub's; a hub that does not answer in `time_out` is said so.
-[[nodiscard]] nlohmann::json answer_request(Hub& hub, const nlohmann::json& request, const ControlPeer& peer,
-                                            std::chrono::milliseconds time_out = std::chrono::seconds{3});
+/// The answer to one request of `peer`, which is refused without the role the request takes; from
+/// any thread but the hub's; a hub that does not answer in `time_out` is said so.
+[[nodiscard]] nlohmann::json answer_request(
+    Hub& hub, const nlohmann::json& request, const ControlPeer& peer,
+    std::chrono::milliseconds time_out = std::chrono::seconds{3});
 
 /// The same, all steps in this thread, where the hub has none.
 [[nodiscard]] nlohmann::json answer_on_hub(const Hub& hub, const nlohmann::json& request,

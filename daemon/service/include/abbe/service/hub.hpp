@@ -1,8 +1,9 @@
 #pragma once
-/// The loop of the ordinary world: every `hub_period` it empties the rings and hands what came to the
-/// recorder, the assembler (and so to the calibration), the live view and the publisher. It says "alive" to
-/// abbe-dds first thing in every turn, so that a hung hub falls silent. Other threads reach it through
-/// call(). In a turn it takes no lock that an ordinary thread may hold, and no disk is read or written.
+/// The loop of the ordinary world: every `hub_period` it empties the rings and hands what came to
+/// the recorder, the assembler (and so to the calibration), the live view and the publisher. It
+/// says "alive" to abbe-dds first thing in every turn, so that a hung hub falls silent. Other
+/// threads reach it through call(). In a turn it takes no lock that an ordinary thread may hold,
+/// and no disk is read or written.
 
 #include <atomic>
 #include <chrono>
@@ -31,8 +32,8 @@
 
 namespace abbe::daemon {
 
-/// Everything the hub's turn works on. Owned by abbed; `publisher`, `recorder` and the services behind them
-/// may be null.
+/// Everything the hub's turn works on. Owned by abbed; `publisher`, `recorder` and the services
+/// behind them may be null.
 struct HubParts {
   const Config& config;
   const drivers::TimeSource& time;
@@ -57,21 +58,22 @@ class Hub {
   ~Hub();
 
   /// One turn; the hub's thread.
-  void turn(WallTime wall);
+  void cycle(WallTime wall);
   /// Turns every hub_period until stop() is called.
   void run();
   void stop() noexcept { stopping_ = true; }
   /// Wall time at which the last turn began; any thread. The watchdog looks at it.
-  [[nodiscard]] WallTime last_turn() const noexcept;
+  [[nodiscard]] WallTime last_cycle() const noexcept;
 
-  /// Runs `task` on the hub's thread at its next turn and gives back its result; from any other thread.
-  /// Nothing if the hub does not get round to it in `time_out`; it never runs then. What `task` holds is
-  /// destroyed on the calling thread. It is to be short: parse before, format after.
+  /// Runs `task` on the hub's thread at its next turn and gives back its result; from any other
+  /// thread. Nothing if the hub does not get round to it in `time_out`; it never runs then. What
+  /// `task` holds is destroyed on the calling thread. It is to be short: parse before, format
+  /// after.
   template <class Task>
   [[nodiscard]] auto call(Task task, std::chrono::milliseconds time_out)
       -> std::optional<std::invoke_result_t<Task&>> {
     std::optional<std::invoke_result_t<Task&>> result;
-    if (!run_in_turn([&] { result.emplace(task()); }, time_out)) return std::nullopt;
+    if (!run_in_cycle([&] { result.emplace(task()); }, time_out)) return std::nullopt;
     return result;
   }
 
@@ -83,7 +85,7 @@ class Hub {
 
  private:
   struct Call;
-  [[nodiscard]] bool run_in_turn(std::function<void()> task, std::chrono::milliseconds time_out);
+  [[nodiscard]] bool run_in_cycle(std::function<void()> task, std::chrono::milliseconds time_out);
   void run_calls();
   void publish(bool fresh, protocol::HostTime now, WallTime wall);
   void collect_health(protocol::HostTime now);
@@ -96,7 +98,7 @@ class Hub {
   std::vector<protocol::Snapshot> snapshots_;
   std::vector<StreamHealth> health_;
   WallTime next_health_{};
-  std::atomic<std::int64_t> last_turn_ns_{0};
+  std::atomic<std::int64_t> last_cycle_ns_{0};
   std::atomic<bool> stopping_{false};
   drivers::Mailbox<Call*> calls_;     // owned by who calls, unless given up
   drivers::Mailbox<Call*> given_up_;  // by callers, seen by the hub: freed by the next caller

@@ -1,6 +1,7 @@
 #pragma once
-/// An ordinary thread that looks at the daemon four times a second and writes what has changed into the
-/// journal. Neither a slow journal nor this thread holds up the hub: it only answers what it is asked.
+/// An ordinary thread that looks at the daemon four times a second and writes what has changed into
+/// the journal. Neither a slow journal nor this thread holds up the hub: it only answers what it is
+/// asked.
 
 #include <condition_variable>
 #include <functional>
@@ -16,7 +17,8 @@ namespace abbe::daemon {
 class JournalThread {
  public:
   /// `look` runs on the new thread.
-  JournalThread(std::string machine, std::unique_ptr<JournalSink> sink, std::function<Observed()> look,
+  JournalThread(std::string machine, std::unique_ptr<JournalSink> sink,
+                std::function<Observed()> look,
                 std::chrono::milliseconds period = std::chrono::milliseconds{250});
   ~JournalThread();  ///< looks once more
   JournalThread(const JournalThread&) = delete;

@@ -1,7 +1,7 @@
 #pragma once
-/// The slow half of the model authority: puts judged models into the store and reads which one is active,
-/// with all the waiting for disk and locks that takes. For any thread but the hub's; a copy for each.
-/// Ordinary world.
+/// The slow half of the model authority: puts judged models into the store and reads which one is
+/// active, with all the waiting for disk and locks that takes. For any thread but the hub's; a copy
+/// for each. Ordinary world.
 
 #include <atomic>
 #include <chrono>
@@ -19,8 +19,8 @@
 
 namespace abbe::daemon {
 
-/// What the store says is active, read, checked and encoded. Without a model `fault` says why; both empty:
-/// nothing is active. The model is shared with an identification that compares with it.
+/// What the store says is active, read, checked and encoded. Without a model `fault` says why; both
+/// empty: nothing is active. The model is shared with an identification that compares with it.
 struct ActiveModel {
   StoreEvent activation;  ///< default: nothing was ever activated
   std::shared_ptr<const ModelInForce> model;
@@ -39,23 +39,27 @@ struct KeptModel {
 class ModelKeeper {
  public:
   /// Does not touch the disk.
-  ModelKeeper(const std::filesystem::path& store_folder, const Config& config, protocol::UtcOffset utc);
+  ModelKeeper(const std::filesystem::path& store_folder, const Config& config,
+              protocol::UtcOffset utc);
 
-  /// For the start of the daemon: removes what killed processes left in the store and sets a damaged state
-  /// aside. Best effort; what does not work out is an error of read_active().
+  /// For the start of the daemon: removes what killed processes left in the store and sets a
+  /// damaged state aside. Best effort; what does not work out is an error of read_active().
   void tidy_store(protocol::HostTime now);
 
   /// See ModelStore.
-  void set_lock_patience(std::chrono::nanoseconds patience) noexcept { store_.set_lock_patience(patience); }
-  /// Keeps a judged model, activates it if the gate accepted it, and reads it back. May be repeated with the
-  /// same `actor` after an error: what the store has of it already is not entered again. Refused, and nothing
-  /// further done, once `discarded` is true; null: never.
+  void set_lock_patience(std::chrono::nanoseconds patience) noexcept {
+    store_.set_lock_patience(patience);
+  }
+  /// Keeps a judged model, activates it if the gate accepted it, and reads it back. May be repeated
+  /// with the same `actor` after an error: what the store has of it already is not entered again.
+  /// Refused, and nothing further done, once `discarded` is true; null: never.
   [[nodiscard]] Result<KeptModel> keep(const ModelDocument& document, const calib::Verdict& verdict,
                                        const StoreActor& actor, protocol::HostTime now,
                                        const std::atomic<bool>* discarded = nullptr);
   /// An error only if the store itself cannot be read; a damaged model is a `fault`.
   [[nodiscard]] Result<ActiveModel> read_active(protocol::HostTime now) const;
-  /// The same; a state that is damaged is set aside first. Waits for the store's lock at most kAsidePatience.
+  /// The same; a state that is damaged is set aside first. Waits for the store's lock at most
+  /// kAsidePatience.
   [[nodiscard]] Result<ActiveModel> read_active_or_set_aside(protocol::HostTime now);
   static constexpr std::chrono::seconds kAsidePatience{1};
   /// Whether read_active() may say something else than when this was the same. One system call.

@@ -1,6 +1,7 @@
 #pragma once
-/// `abbe reference` in the daemon: runs a ReferenceSession over the live samples and the marks of the second
-/// card, and gives every reading its datum. The hub's thread only; no call waits for anything.
+/// `abbe reference` in the daemon: runs a ReferenceSession over the live samples and the marks of
+/// the second card, and gives every reading its datum. The hub's thread only; no call waits for
+/// anything.
 
 #include <chrono>
 #include <cstdint>
@@ -25,20 +26,22 @@ class ReferenceService {
     bool known = false;            ///< readings have a datum now
   };
 
-  /// `recorder` may be null. `left`: the datum of an earlier run, taken up if the first sample shows that the
-  /// counters went on, else dropped.
-  ReferenceService(const Config& config, RecorderThread* recorder, std::optional<Counting> left = {});
+  /// `recorder` may be null. `left`: the datum of an earlier run, taken up if the first sample
+  /// shows that the counters went on, else dropped.
+  ReferenceService(const Config& config, RecorderThread* recorder,
+                   std::optional<Counting> left = {});
 
-  /// Refused without [reference] and while one runs. Axes that are known already stay so until the new datum.
+  /// Refused without [reference] and while one runs. Axes that are known already stay so until the
+  /// new datum.
   [[nodiscard]] Result<void> start();
   [[nodiscard]] Result<void> cancel();
-  /// Usage for an axis that has marks or is not counted, and for an uncertainty that is not positive. Refused
-  /// while a calibration takes readings, without a fresh sample, and unless the axes have stood for half a
-  /// second.
+  /// Usage for an axis that has marks or is not counted, and for an uncertainty that is not
+  /// positive. Refused while a calibration takes readings, without a fresh sample, and unless the
+  /// axes have stood for half a second.
   [[nodiscard]] Result<void> stand_at_offset(const StandHere& here);
   /// Every turn, before anybody else sees the batch.
-  void turn(Batch& batch);
-  /// After turn(): how far the card has come, as the devices say.
+  void cycle(Batch& batch);
+  /// After cycle(): how far the card has come, as the devices say.
   void take(const std::optional<drivers::CounterCardProgress>& progress);
 
   /// What a later run would have to know; nothing while the counters just began anew.
@@ -79,7 +82,7 @@ class ReferenceService {
   protocol::HostTime from_{};  ///< what came later belongs to the search
   std::optional<Counting> left_;
   std::vector<std::string> carried_on_;
-  protocol::HostTime began_anew_{};                     ///< the counters; of the sample that showed it
+  protocol::HostTime restarted_at_{};  ///< the counters; of the sample that showed it
   std::optional<drivers::CounterCardProgress> coming_;  ///< later than the newest sample
   std::optional<drivers::CounterCardProgress> progress_;
 };

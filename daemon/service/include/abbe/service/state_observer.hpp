@@ -1,8 +1,8 @@
 #pragma once
-/// Turns what the daemon's parts are in, looked at again and again, into one journal entry a change: devices,
-/// recorder, model store, link, session, model, abbe-dds, the hub itself. It reads no clock and writes
-/// nothing. A part that changes more often than kBurst times gets one line in kRefill, with the count of
-/// changes that were left out.
+/// Turns what the daemon's parts are in, looked at again and again, into one journal entry a
+/// change: devices, recorder, model store, link, session, model, abbe-dds, the hub itself. It reads
+/// no clock and writes nothing. A part that changes more often than kBurst times gets one line in
+/// kRefill, with the count of changes that were left out.
 
 #include <chrono>
 #include <cstdint>
@@ -47,7 +47,8 @@ class StateObserver {
   using WallTime = std::chrono::steady_clock::time_point;
   static constexpr double kBurst = 5.0;
   static constexpr std::chrono::seconds kRefill{10};
-  static constexpr std::chrono::seconds kCountPeriod{60};  ///< of lines that only say that a count has grown
+  static constexpr std::chrono::seconds kCountPeriod{
+      60};  ///< of lines that only say that a count has grown
 
   explicit StateObserver(std::string machine) : machine_(std::move(machine)) {}
 

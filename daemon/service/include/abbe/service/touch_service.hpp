@@ -1,9 +1,10 @@
 #pragma once
-/// Touches with the measuring machine of [cmm], one after the other, and what came of them: the daemon's part
-/// of `abbe calibrate artefact`. It ends at the first touch or way that the machine refuses, or when the
-/// machine goes away: then nobody knows any more what stands where. When it is cancelled, or nobody looks on
-/// any more, the motion is stopped where it is (AbortE) and nothing moves after it; the reason says where the
-/// tip stands. The touches until then are kept. The hub's thread only; no call waits for anything.
+/// Touches with the measuring machine of [cmm], one after the other, and what came of them: the
+/// daemon's part of `abbe calibrate artefact`. It ends at the first touch or way that the machine
+/// refuses, or when the machine goes away: then nobody knows any more what stands where. When it is
+/// cancelled, or nobody looks on any more, the motion is stopped where it is (AbortE) and nothing
+/// moves after it; the reason says where the tip stands. The touches until then are kept. The hub's
+/// thread only; no call waits for anything.
 
 #include <array>
 #include <chrono>
@@ -47,22 +48,23 @@ class TouchService {
     bool running = false;
     std::size_t asked = 0;
     std::vector<protocol::ProbeTrigger> touches;  ///< with a position, in the order asked
-    std::string reason;                           ///< why it ended before the last one; empty: it did not
+    std::string reason;  ///< why it ended before the last one; empty: it did not
   };
 
   /// `configured`: there is a [cmm].
-  TouchService(SampleSource& devices, bool configured) : devices_(devices), configured_(configured) {}
+  TouchService(SampleSource& devices, bool configured)
+      : devices_(devices), configured_(configured) {}
 
   /// Where the machine stands, m; refused without [cmm] and while it is not ready.
   [[nodiscard]] Result<std::array<double, 3>> where() const;
-  /// Refused without [cmm], while touches are under way, and while the machine is not ready. What the job
-  /// before left is in `job` then: whoever made it destroys that, too.
+  /// Refused without [cmm], while touches are under way, and while the machine is not ready. What
+  /// the job before left is in `job` then: whoever made it destroys that, too.
   [[nodiscard]] Result<void> start(TouchJob&& job);
   /// Stops the motion that is under way; runs until the machine stands.
   [[nodiscard]] Result<void> cancel();
-  /// Every turn. `points_left` as it was before the batch was drained; `seen` is what the machine said last.
-  /// As cancel() when nobody has looked for kLongestUnwatched.
-  void turn(const Batch& batch, std::size_t points_left, const std::string& seen, WallTime now);
+  /// Every turn. `points_left` as it was before the batch was drained; `seen` is what the machine
+  /// said last. As cancel() when nobody has looked for kLongestUnwatched.
+  void cycle(const Batch& batch, std::size_t points_left, const std::string& seen, WallTime now);
 
   /// For whoever asked for the touches, and watches the machine.
   [[nodiscard]] const Status& look();

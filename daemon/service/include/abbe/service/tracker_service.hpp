@@ -1,7 +1,7 @@
 #pragma once
-/// Orders of people to the laser tracker of [tracker], one at a time, and what came of them: the daemon's
-/// part of `abbe tracker`. An order is handed to the tracker's thread; its report is what the tracker
-/// answered, or that no answer came. The hub's thread only; no call waits for anything.
+/// Orders of people to the laser tracker of [tracker], one at a time, and what came of them: the
+/// daemon's part of `abbe tracker`. An order is handed to the tracker's thread; its report is what
+/// the tracker answered, or that no answer came. The hub's thread only; no call waits for anything.
 
 #include <chrono>
 #include <cstddef>
@@ -39,11 +39,12 @@ class TrackerService {
   TrackerService(SampleSource& devices, std::chrono::nanoseconds longest_order)
       : devices_(devices), longest_order_(longest_order) {}
 
-  /// The number of the order. Usage for a distance or a name that cannot be. Refused without a tracker, while
-  /// a calibration takes readings, while another order is under way, and while the tracker is not connected.
+  /// The number of the order. Usage for a distance or a name that cannot be. Refused without a
+  /// tracker, while a calibration takes readings, while another order is under way, and while the
+  /// tracker is not connected.
   [[nodiscard]] Result<std::uint64_t> start(drivers::TrackerOrder order, Asked asked);
   /// Every turn: takes the reports.
-  void turn(protocol::HostTime now);
+  void cycle(protocol::HostTime now);
 
   /// Oldest first.
   [[nodiscard]] const std::deque<Order>& orders() const noexcept { return orders_; }

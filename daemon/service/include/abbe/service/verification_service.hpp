@@ -1,7 +1,7 @@
 #pragma once
-/// Collects the points of a verification in the running daemon, for `abbe verify --live`: begun and ended
-/// over the control socket, one at a time. Whoever begins later takes over, so that nobody who went away
-/// blocks it. One nobody ends stops at kMostPoints. Used by the hub's thread only.
+/// Collects the points of a verification in the running daemon, for `abbe verify --live`: begun and
+/// ended over the control socket, one at a time. Whoever begins later takes over, so that nobody
+/// who went away blocks it. One nobody ends stops at kMostPoints. Used by the hub's thread only.
 
 #include <cstdint>
 #include <optional>
@@ -30,7 +30,7 @@ class VerificationService {
   /// Why no more points come although it was not ended; empty: they do.
   [[nodiscard]] std::string stopped() const;
 
-  void turn(std::span<const protocol::Snapshot> snapshots);
+  void cycle(std::span<const protocol::Snapshot> snapshots);
 
  private:
   const Config& config_;

@@ -1,7 +1,7 @@
 #pragma once
-/// The files of a ball-array calibration, read into SI: touches, errors that were computed elsewhere, and the
-/// calibrator. Faults as in input_files.hpp: all at once, with file, line and column, and nothing of a file
-/// that has one. Functions, safe from any thread.
+/// The files of a ball-array calibration, read into SI: touches, errors that were computed
+/// elsewhere, and the calibrator. Faults as in input_files.hpp: all at once, with file, line and
+/// column, and nothing of a file that has one. Functions, safe from any thread.
 
 #include <array>
 #include <filesystem>
@@ -40,9 +40,10 @@ struct BlockFace {
   double half_size_m = 5e-3;
 };
 
-/// calibrator.toml, at 20 C: `[calibrator] name, tip_radius_mm, alpha_um_per_m_K, u_alpha_um_per_m_K` (both
-/// or none); `[[ball]] number, x_mm, y_mm, z_mm, radius_mm, u_um`; `[[block]] number, normal, u_urad`, and
-/// where somebody is to touch it x_mm, y_mm, z_mm, half_size_mm. u: standard uncertainties, 0 if left out.
+/// calibrator.toml, at 20 C: `[calibrator] name, tip_radius_mm, alpha_um_per_m_K,
+/// u_alpha_um_per_m_K` (both or none); `[[ball]] number, x_mm, y_mm, z_mm, radius_mm,
+/// u_um`; `[[block]] number, normal, u_urad`, and where somebody is to touch it x_mm, y_mm, z_mm,
+/// half_size_mm. u: standard uncertainties, 0 if left out.
 struct CalibratorFile {
   InputFile source;
   calib::evemu::Calibrator calibrator;

@@ -1,9 +1,9 @@
 #pragma once
-/// The CSV files people hand to abbe, read into SI. Every reader gives all faults of a file at once (at most
-/// 20, each "file:line:column: column name: what is wrong") and nothing of a file that has one: NaN and
-/// infinity, a missing or unknown column, a row too short or too long, time that does not ascend, a last line
-/// that does not end. Comma, one header row, lines that begin with # are comments, decimal point. Functions,
-/// safe from any thread.
+/// The CSV files people hand to abbe, read into SI. Every reader gives all faults of a file at once
+/// (at most 20, each "file:line:column: column name: what is wrong") and nothing of a file that has
+/// one: NaN and infinity, a missing or unknown column, a row too short or too long, time that does
+/// not ascend, a last line that does not end. Comma, one header row, lines that begin with # are
+/// comments, decimal point. Functions, safe from any thread.
 
 #include <cstddef>
 #include <filesystem>
@@ -25,14 +25,15 @@ namespace abbe::daemon {
 struct PathFile {
   InputFile source;
   std::vector<AxisPosition> vertices_m;
-  std::vector<double> feed_m_per_s;  ///< as long as vertices_m, or empty if the file has no such column
-  std::vector<std::size_t> lines;    ///< of the vertices in the file
+  std::vector<double>
+      feed_m_per_s;  ///< as long as vertices_m, or empty if the file has no such column
+  std::vector<std::size_t> lines;  ///< of the vertices in the file
 };
 [[nodiscard]] Result<PathFile> read_path_csv(const std::filesystem::path& file);
 
-/// tracker.csv: `time_s,range_mm,azimuth_rad,elevation_rad[,status]` or `time_s,x_mm,y_mm,z_mm[,status]`.
-/// Status is the device's: 0 good, 1 speed warning (still good), others mark a point that holds its place but
-/// is not used.
+/// tracker.csv: `time_s,range_mm,azimuth_rad,elevation_rad[,status]` or
+/// `time_s,x_mm,y_mm,z_mm[,status]`. Status is the device's: 0 good, 1 speed warning (still good),
+/// others mark a point that holds its place but is not used.
 struct TrackerFile {
   InputFile source;
   std::vector<calib::otf::TrackerObservation> points;
@@ -59,8 +60,8 @@ struct PointsFile {
 };
 [[nodiscard]] Result<PointsFile> read_points_csv(const std::filesystem::path& file);
 
-/// verification.csv: `x_mm,y_mm,z_mm,tracker_x_mm,tracker_y_mm,tracker_z_mm`: scale reading and independent
-/// measurement there, each in its own frame; at least one.
+/// verification.csv: `x_mm,y_mm,z_mm,tracker_x_mm,tracker_y_mm,tracker_z_mm`: scale reading and
+/// independent measurement there, each in its own frame; at least one.
 struct VerificationFile {
   InputFile source;
   std::vector<calib::verify::MeasuredPoint> points;

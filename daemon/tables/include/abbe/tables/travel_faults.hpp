@@ -11,10 +11,12 @@
 
 namespace abbe::daemon {
 
-/// BadInput with line and column (x_mm, y_mm, z_mm) of every position outside the travel, and the mistake (an
-/// axis reversed, two swapped, another unit) that would put all of them inside. `lines`: of the positions.
+/// BadInput with line and column (x_mm, y_mm, z_mm) of every position outside the travel, and the
+/// mistake (an axis reversed, two swapped, another unit) that would put all of them inside.
+/// `lines`: of the positions.
 [[nodiscard]] Result<void> check_travel(const std::filesystem::path& file,
                                         std::span<const calib::Vector3> positions_m,
-                                        std::span<const std::size_t> lines, const MachineConfig& machine);
+                                        std::span<const std::size_t> lines,
+                                        const MachineConfig& machine);
 
 }  // namespace abbe::daemon

@@ -1,7 +1,7 @@
 #pragma once
-/// Which axes are current: an axis is absent when the samples of the last 150 ms, at least three, all missed
-/// it, and until a sample first had it. Counted in samples, not in time: a device thread that was held up
-/// made no sample in which an axis could be missing. Real time; one thread.
+/// Which axes are current: an axis is absent when the samples of the last 150 ms, at least three,
+/// all missed it, and until a sample first had it. Counted in samples, not in time: a device thread
+/// that was held up made no sample in which an axis could be missing. Real time; one thread.
 
 #include <algorithm>
 #include <array>

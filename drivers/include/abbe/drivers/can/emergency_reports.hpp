@@ -1,5 +1,6 @@
 #pragma once
-/// What the encoders of a bus report of themselves (EMCY), in words. Sans-I/O. Ordinary world; one thread.
+/// What the encoders of a bus report of themselves (EMCY), in words. Sans-I/O. Ordinary world; one
+/// thread.
 
 #include <chrono>
 #include <cstdint>
@@ -19,11 +20,12 @@ class EmergencyReports {
   explicit EmergencyReports(std::span<const EncoderAxis> axes);
 
   void on_frame(const can::CanFrame& frame, protocol::HostTime now);
-  /// A fault not reported yet: of each node the latest, at most one a second, with how many others it stands
-  /// for.
+  /// A fault not reported yet: of each node the latest, at most one a second, with how many others
+  /// it stands for.
   [[nodiscard]] std::optional<std::string> take_fault(protocol::HostTime now);
-  /// Axes that are absent, each with the latest emergency of its node, and axes with an emergency that was
-  /// not taken back; empty: none. The emergency of an axis that was well for kSettledAfter is forgotten.
+  /// Axes that are absent, each with the latest emergency of its node, and axes with an emergency
+  /// that was not taken back; empty: none. The emergency of an axis that was well for kSettledAfter
+  /// is forgotten.
   [[nodiscard]] std::string condition(std::uint8_t absent_mask, protocol::HostTime now);
 
  private:

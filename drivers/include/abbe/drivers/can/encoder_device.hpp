@@ -1,19 +1,21 @@
 #pragma once
-/// All encoders of one CAN bus as a Device: configures the nodes, is the SYNC producer, and turns their
-/// answers into one AxisSample per SYNC. The sample leaves as soon as the last axis has answered.
+/// All encoders of one CAN bus as a Device: configures the nodes, is the SYNC producer, and turns
+/// their answers into one AxisSample per SYNC. The sample leaves as soon as the last axis has
+/// answered.
 ///
-/// Before it sends anything it listens (ForeignSync): on a bus with another SYNC producer it sends nothing.
-/// With SyncSource::External it never sends anything: the SYNC and the configuration of the nodes are the
-/// machine's own.
+/// Before it sends anything it listens (ForeignSync): on a bus with another SYNC producer it sends
+/// nothing. With SyncSource::External it never sends anything: the SYNC and the configuration of
+/// the nodes are the machine's own.
 ///
-/// The SYNC runs on the host clock at start + n x period: no drift; a period that could not be served is left
-/// out, counted, and marked as a gap on the next sample. It runs while at least one node is configured and
-/// the bus is not off. With SyncSource::Kernel the SYNC comes from the kernel's timer instead. On SocketCAN
-/// its echo is the time in both cases: on most controllers when the frame was on the wire.
+/// The SYNC runs on the host clock at start + n x period: no drift; a period that could not be
+/// served is left out, counted, and marked as a gap on the next sample. It runs while at least one
+/// node is configured and the bus is not off. With SyncSource::Kernel the SYNC comes from the
+/// kernel's timer instead. On SocketCAN its echo is the time in both cases: on most controllers
+/// when the frame was on the wire.
 ///
-/// States: "closed", "listening", "foreign SYNC" (refused), "no SYNC" (External), "configuring", "silent",
-/// "degraded" (some axes are missing), "streaming" (all axes are current), "bus off". Time-outs are judged
-/// only when everything that had come was read.
+/// States: "closed", "listening", "foreign SYNC" (refused), "no SYNC" (External), "configuring",
+/// "silent", "degraded" (some axes are missing), "streaming" (all axes are current), "bus off".
+/// Time-outs are judged only when everything that had come was read.
 
 #include <array>
 #include <cstdint>
@@ -39,9 +41,11 @@
 namespace abbe::drivers {
 
 enum class SyncSource {
-  Thread,    ///< the device thread sends it, on any transport; without an echo its time is read just before
-  Kernel,    ///< CAN_BCM sends it, whatever the thread does; SocketCAN only
-  External,  ///< the machine sends it, and has configured the nodes: nothing at all is sent from here
+  /// the device thread sends it, on any transport; without an echo its time is read just before
+  Thread,
+  Kernel,  ///< CAN_BCM sends it, whatever the thread does; SocketCAN only
+  /// the machine sends it, and has configured the nodes: nothing at all is sent from here
+  External,
 };
 
 struct EncoderDeviceOptions {
@@ -49,18 +53,18 @@ struct EncoderDeviceOptions {
   EncoderReceiverOptions receiver;
   SupervisorOptions supervisor;
   SyncSource sync = SyncSource::Thread;
-  std::chrono::nanoseconds reopen_after = std::chrono::milliseconds{250};  ///< after the transport failed
-  std::size_t sample_capacity = 8192;                                      ///< 8 s at 1 kHz
+  /// after the transport failed
+  std::chrono::nanoseconds reopen_after = std::chrono::milliseconds{250};
+  std::size_t sample_capacity = 8192;  ///< 8 s at 1 kHz
   std::size_t raw_capacity_blocks = 8192;
 };
 
 class EncoderDevice final : public Device {
  public:
-  /// `time` must outlive the device. BadConfiguration as check(), and for a SYNC that `bus` cannot send. The
-  /// bus is opened by the first wait().
-  [[nodiscard]] static Result<std::unique_ptr<EncoderDevice>> create(const EncoderDeviceOptions& options,
-                                                                     std::unique_ptr<CanBus> bus,
-                                                                     const TimeSource& time);
+  /// `time` must outlive the device. BadConfiguration as check(), and for a SYNC that `bus` cannot
+  /// send. The bus is opened by the first wait().
+  [[nodiscard]] static Result<std::unique_ptr<EncoderDevice>> create(
+      const EncoderDeviceOptions& options, std::unique_ptr<CanBus> bus, const TimeSource& time);
 
   void wait(std::chrono::nanoseconds at_most) override;
   void receive() ABBE_RT override;
@@ -73,7 +77,8 @@ class EncoderDevice final : public Device {
   [[nodiscard]] const EncoderReceiver& receiver() const noexcept { return receiver_; }
 
  private:
-  EncoderDevice(const EncoderDeviceOptions& options, std::unique_ptr<CanBus> bus, const TimeSource& time);
+  EncoderDevice(const EncoderDeviceOptions& options, std::unique_ptr<CanBus> bus,
+                const TimeSource& time);
 
   [[nodiscard]] bool ensure_open(std::chrono::nanoseconds at_most);
   void close_bus(const Error& error);
@@ -128,7 +133,8 @@ class EncoderDevice final : public Device {
   bool sending_ = false;  ///< the supervisor runs
   bool bus_was_off_ = false;
   protocol::HostTime off_since_{};
-  bool reopened_ = false;     ///< since the bus went off: its controller was started again, whoever heard it
+  /// since the bus went off: its controller was started again, whoever heard it
+  bool reopened_ = false;
   bool caught_up_ = true;     ///< everything that came before this SYNC is read
   bool unreachable_ = false;  ///< told already
   std::string refusal_;       ///< why it could not be opened, as told already
@@ -150,8 +156,8 @@ class EncoderDevice final : public Device {
   std::array<ReceivedFrame, CanBus::kMostRead> came_{};
   std::array<ReceivedFrame, CanBus::kMostRead + 1> batch_{};  ///< what the receiver sees of it
   std::size_t batch_count_ = 0;
-  bool all_read_ = true;           ///< nothing else came
-  protocol::HostTime turn_end_{};  ///< what came before is read, if all_read_
+  bool all_read_ = true;            ///< nothing else came
+  protocol::HostTime cycle_end_{};  ///< what came before is read, if all_read_
   std::uint8_t raw_sequence_ = 0;
   std::array<std::byte, protocol::RawBlock::kCapacity> datagram_{};
 };

@@ -1,32 +1,34 @@
 #pragma once
-/// Frames of an encoder bus to AxisSamples. Sans-I/O and deterministic: the same events in the same order
-/// give the same samples, so replay from raw bytes uses it unchanged. Real time: no allocation after
-/// construction. One thread.
+/// Frames of an encoder bus to AxisSamples. Sans-I/O and deterministic: the same events in the same
+/// order give the same samples, so replay from raw bytes uses it unchanged. Real time: no
+/// allocation after construction. One thread.
 ///
-/// A cycle begins when our SYNC goes out (on_sent), or with external_sync when the machine's arrives. The
-/// sample leaves when the last axis has answered, or at the deadline, the next SYNC or bus-off with the axes
-/// that are not known marked in missing_mask: who did not answer keeps the previous value. All axes carry one
-/// time: SYNC + sampling delay. An axis that never answered has position NaN. An answer that comes after its
-/// cycle is closed is counted and not used; one stamped before the SYNC cannot be its answer.
+/// A cycle begins when our SYNC goes out (on_sent), or with external_sync when the machine's
+/// arrives. The sample leaves when the last axis has answered, or at the deadline, the next SYNC or
+/// bus-off with the axes that are not known marked in missing_mask: who did not answer keeps the
+/// previous value. All axes carry one time: SYNC + sampling delay. An axis that never answered has
+/// position NaN. An answer that comes after its cycle is closed is counted and not used; one
+/// stamped before the SYNC cannot be its answer.
 ///
-/// An answer does not say to which SYNC. It is doubtful, and its axis missing, where it may be that to an
-/// earlier one: the first after cycles without any (but not where the node booted, or the SYNC paused for a
-/// period, in between), and those of a cycle in which the node answers twice. If the cycle's sample has left
-/// before the second one, it is given again, with the same time and cycle number and that axis missing: of
-/// two samples of one time the later takes back what the earlier said. What is left: a node that is late in
-/// more than two cycles in a row is doubtful at the beginning and at the end of that, not in between; one
-/// that is late from its first answer on, or whose lateness survives a pause, not at the beginning either.
-/// The period must be longer than the slowest answer.
+/// An answer does not say to which SYNC. It is doubtful, and its axis missing, where it may be that
+/// to an earlier one: the first after cycles without any (but not where the node booted, or the
+/// SYNC paused for a period, in between), and those of a cycle in which the node answers twice. If
+/// the cycle's sample has left before the second one, it is given again, with the same time and
+/// cycle number and that axis missing: of two samples of one time the later takes back what the
+/// earlier said. What is left: a node that is late in more than two cycles in a row is doubtful at
+/// the beginning and at the end of that, not in between; one that is late from its first answer on,
+/// or whose lateness survives a pause, not at the beginning either. The period must be longer than
+/// the slowest answer.
 ///
-/// The scale is configured or read along from the SDO answers on the bus (6005h:01, else 6501h; rotary:
-/// 6001h, else 6501h), so that a recording carries it. 0 is refused: the axis stays missing. So is the place
-/// of the position in a mapping that could not be written, and the period of a heartbeat that could not be
-/// set.
+/// The scale is configured or read along from the SDO answers on the bus (6005h:01, else 6501h;
+/// rotary: 6001h, else 6501h), so that a recording carries it. 0 is refused: the axis stays
+/// missing. So is the place of the position in a mapping that could not be written, and the period
+/// of a heartbeat that could not be set.
 ///
-/// Raw blocks of a CAN bus: each is one whole datagram of protocol/can/udp_framing.hpp with all its frames at
-/// one host time. FromDevice: as received. ToDevice: as sent, the SYNC among them. FromDevice without frames
-/// (no bytes or count 0): nothing came until that time, which is what closes a cycle at its deadline. The
-/// sequence number counts blocks.
+/// Raw blocks of a CAN bus: each is one whole datagram of protocol/can/udp_framing.hpp with all its
+/// frames at one host time. FromDevice: as received. ToDevice: as sent, the SYNC among them.
+/// FromDevice without frames (no bytes or count 0): nothing came until that time, which is what
+/// closes a cycle at its deadline. The sequence number counts blocks.
 
 #include <algorithm>
 #include <array>
@@ -62,8 +64,8 @@ struct EncoderAxis {
   std::uint8_t position_byte = 0;  ///< where in the TPDO the position begins
   std::optional<double> scale{};   ///< m or rad per count, negative reverses; none: ask the encoder
   double offset = 0.0;             ///< m or rad: the reading at count 0
-  std::uint64_t wrap_counts =
-      0;  ///< counts after which it begins anew; 0: what the encoder says, else 2^32 (2^64)
+  /// counts after which it begins anew; 0: what the encoder says, else 2^32 (2^64)
+  std::uint64_t wrap_counts = 0;
   std::optional<std::uint32_t> serial{};  ///< checked when given
 };
 
@@ -73,7 +75,8 @@ struct EncoderReceiverOptions {
   std::chrono::nanoseconds answer_within{};  ///< after the SYNC; 0: 0.8 of the period
   std::chrono::nanoseconds
       sampling_delay{};  ///< the SYNC's time to position taken; device specific, to be calibrated
-  std::chrono::nanoseconds u_sampling_delay = std::chrono::microseconds{50};  ///< its standard uncertainty
+  /// its standard uncertainty
+  std::chrono::nanoseconds u_sampling_delay = std::chrono::microseconds{50};
   std::chrono::nanoseconds heartbeat_timeout = std::chrono::milliseconds{350};
   bool external_sync = false;  ///< the machine's SYNC begins a cycle, as it arrives, not ours
 };
@@ -81,8 +84,10 @@ struct EncoderReceiverOptions {
 [[nodiscard]] Result<void> check(const EncoderReceiverOptions& options);
 /// `options.answer_within`, or 0.8 of the period.
 [[nodiscard]] std::chrono::nanoseconds answer_within(const EncoderReceiverOptions& options);
-/// What two readings of two clocks may disagree by: a stamp this little before the SYNC is not before it.
-[[nodiscard]] constexpr std::chrono::nanoseconds stamp_slack(std::chrono::nanoseconds sync_period) ABBE_RT {
+/// What two readings of two clocks may disagree by: a stamp this little before the SYNC is not
+/// before it.
+[[nodiscard]] constexpr std::chrono::nanoseconds stamp_slack(
+    std::chrono::nanoseconds sync_period) ABBE_RT {
   return sync_period / 50;
 }
 
@@ -106,13 +111,13 @@ class EncoderReceiver {
   /// `options` have passed check(). Allocates.
   explicit EncoderReceiver(const EncoderReceiverOptions& options);
 
-  // Events in the order in which they happened. The samples they complete (at most two) are valid until the
-  // next event.
+  // Events in the order in which they happened. The samples they complete (at most two) are valid
+  // until the next event.
   //
-  // `time_widened`: the kernel stamp was not believed. A position that came so may be the answer to the SYNC
-  // before, and a SYNC heard so left earlier: the sample is flagged TimeWidened and its u_time widened by a
-  // period, rectangular. Raw blocks do not tell: a replay from raw bytes has the same positions without this
-  // flag.
+  // `time_widened`: the kernel stamp was not believed. A position that came so may be the answer to
+  // the SYNC before, and a SYNC heard so left earlier: the sample is flagged TimeWidened and its
+  // u_time widened by a period, rectangular. Raw blocks do not tell: a replay from raw bytes has
+  // the same positions without this flag.
   [[nodiscard]] std::span<const protocol::AxisSample> on_sent(const can::CanFrame& frame,
                                                               protocol::HostTime time,
                                                               bool time_widened = false) ABBE_RT;
@@ -121,8 +126,8 @@ class EncoderReceiver {
                                                                bool time_widened = false) ABBE_RT;
   /// Nothing more came until `now`.
   [[nodiscard]] std::span<const protocol::AxisSample> on_time(protocol::HostTime now) ABBE_RT;
-  /// Frames are missing here: the open cycle ends, as an answer that comes now may be one to a SYNC that is
-  /// missing; the next sample says so.
+  /// Frames are missing here: the open cycle ends, as an answer that comes now may be one to a SYNC
+  /// that is missing; the next sample says so.
   [[nodiscard]] std::span<const protocol::AxisSample> on_loss() ABBE_RT;
   /// When on_time() has something to do: the deadline of the open cycle, else HostTime::max().
   [[nodiscard]] protocol::HostTime deadline() const ABBE_RT;
@@ -133,7 +138,9 @@ class EncoderReceiver {
     const auto give = [&](std::span<const protocol::AxisSample> samples) {
       for (const auto& sample : samples) sink(sample);
     };
-    const auto bytes = std::span{block.bytes}.first(std::min<std::size_t>(block.length, block.bytes.size()));
+
+    const auto bytes =
+        std::span{block.bytes}.first(std::min<std::size_t>(block.length, block.bytes.size()));
     if (block.lost_before > 0) give(on_loss());
     const bool sent = block.direction == protocol::RawBlock::Direction::ToDevice;
     if (bytes.empty() && !sent) return give(on_time(block.time));
@@ -166,10 +173,10 @@ class EncoderReceiver {
     double offset = 0.0;        ///< reading at count 0
     std::uint64_t modulus = 0;  ///< 0: 2^64
     bool seen = false;
-    bool answers = false;         ///< has since it booted, without a pause of the SYNC
-    bool owes = false;            ///< the answer to an earlier SYNC may still come
-    std::uint64_t raw = 0;        ///< the latest count as sent, modulo `modulus`
-    std::uint16_t emergency = 0;  ///< the latest code; 0: none
+    bool answers = false;            ///< has since it booted, without a pause of the SYNC
+    bool reply_outstanding = false;  ///< the answer to an earlier SYNC may still come
+    std::uint64_t raw = 0;           ///< the latest count as sent, modulo `modulus`
+    std::uint16_t emergency = 0;     ///< the latest code; 0: none
     bool heartbeat_lost = false;
     std::optional<protocol::HostTime> last_heartbeat;
   };
@@ -186,7 +193,7 @@ class EncoderReceiver {
   void hear() ABBE_RT;
   void count_late(std::size_t i) ABBE_RT;
   void take_back(std::size_t i, protocol::HostTime time) ABBE_RT;
-  void look_for_debts(bool paused) ABBE_RT;
+  void look_for_outstanding_replies(bool paused) ABBE_RT;
   void take_position(std::size_t i, std::int64_t count) ABBE_RT;
   void on_node_frame(Axis& axis, const can::CanFrame& frame, protocol::HostTime time) ABBE_RT;
   void on_heartbeat(Axis& axis, can::NodeState state, protocol::HostTime time) ABBE_RT;

@@ -1,7 +1,7 @@
 #pragma once
-/// Keeps every node of an encoder bus configured: at start, after a boot-up message, after silence, after
-/// bus-off. Sans-I/O: frames and a time in, frames out; one configurator per node, all at once. Ordinary
-/// world (composes texts). One thread.
+/// Keeps every node of an encoder bus configured: at start, after a boot-up message, after silence,
+/// after bus-off. Sans-I/O: frames and a time in, frames out; one configurator per node, all at
+/// once. Ordinary world (composes texts). One thread.
 
 #include <chrono>
 #include <cstddef>
@@ -18,9 +18,10 @@ namespace abbe::drivers {
 
 struct SupervisorOptions {
   std::uint16_t heartbeat_ms = 100;
-  std::chrono::nanoseconds silence =
-      std::chrono::milliseconds{350};  ///< a ready node that does not answer the SYNC for so long is lost
-  std::chrono::nanoseconds retry_after = std::chrono::seconds{1};  ///< after a configuration that failed
+  std::chrono::nanoseconds silence = std::chrono::milliseconds{
+      350};  ///< a ready node that does not answer the SYNC for so long is lost
+  /// after a configuration that failed
+  std::chrono::nanoseconds retry_after = std::chrono::seconds{1};
   can::SdoClientOptions sdo{};
 };
 
@@ -31,8 +32,8 @@ class EncoderSupervisor {
   void start(protocol::HostTime now);
   /// Nothing may be sent any more: forgets what was under way. start() begins again.
   void stop();
-  /// The bus is back from bus-off: resets the communication of these nodes, each by its own number (node 0
-  /// would be every drive on the bus), then configures them.
+  /// The bus is back from bus-off: resets the communication of these nodes, each by its own number
+  /// (node 0 would be every drive on the bus), then configures them.
   void bus_recovered(protocol::HostTime now);
   /// A SYNC was sent: ready nodes have to answer.
   void on_sync(protocol::HostTime now);
@@ -45,8 +46,8 @@ class EncoderSupervisor {
 
   [[nodiscard]] std::size_t nodes() const { return nodes_.size(); }
   [[nodiscard]] std::size_t ready() const;
-  /// A fault not reported yet, in words; each node reports the same fault once until its positions came
-  /// again for a second.
+  /// A fault not reported yet, in words; each node reports the same fault once until its positions
+  /// came again for a second.
   [[nodiscard]] std::optional<std::string> take_fault();
   /// Identifiers that nodes send with: what the bus must deliver.
   [[nodiscard]] std::vector<std::uint32_t> ids() const;

@@ -1,6 +1,6 @@
 #pragma once
-/// CanFrame to and from the structures of SocketCAN [linux/can.h], and the receive filters for a set of
-/// identifiers. Pure; from_linux is total.
+/// CanFrame to and from the structures of SocketCAN [linux/can.h], and the receive filters for a
+/// set of identifiers. Pure; from_linux is total.
 
 #include <linux/can.h>
 
@@ -16,8 +16,10 @@ namespace abbe::drivers {
 
 namespace can = protocol::can;
 
-/// A read of `size` bytes: CAN_MTU is a classic frame, CANFD_MTU a CAN FD frame; anything else is none.
-[[nodiscard]] std::optional<can::CanFrame> from_linux(const canfd_frame& frame, std::size_t size) noexcept;
+/// A read of `size` bytes: CAN_MTU is a classic frame, CANFD_MTU a CAN FD frame; anything else is
+/// none.
+[[nodiscard]] std::optional<can::CanFrame> from_linux(const canfd_frame& frame,
+                                                      std::size_t size) noexcept;
 
 struct LinuxFrame {
   canfd_frame frame{};

@@ -1,7 +1,8 @@
 #pragma once
-/// The real bus: a Linux SocketCAN RAW socket, filtered to the identifiers in use, with error frames, kernel
-/// receive stamps and the kernel's own loss counter; a BCM socket beside it sends the cyclic SYNC from the
-/// kernel's timer. Bit rate and restart-ms belong to the interface (ip link), not to us.
+/// The real bus: a Linux SocketCAN RAW socket, filtered to the identifiers in use, with error
+/// frames, kernel receive stamps and the kernel's own loss counter; a BCM socket beside it sends
+/// the cyclic SYNC from the kernel's timer. Bit rate and restart-ms belong to the interface (ip
+/// link), not to us.
 
 #include <cstdint>
 #include <memory>
@@ -16,11 +17,12 @@ namespace abbe::drivers {
 
 struct SocketCanOptions {
   std::string interface = "can0";
-  /// Asked for; without CAP_NET_ADMIN the kernel gives net.core.rmem_max at most (by default some 500
-  /// frames).
+  /// Asked for; without CAP_NET_ADMIN the kernel gives net.core.rmem_max at most (by default some
+  /// 500 frames).
   int receive_buffer_bytes = 1 << 20;
   bool require_fd =
-      false;  ///< refuse an interface that carries no CAN FD; where it does, FD frames are read anyway
+      /// refuse an interface that carries no CAN FD; where it does, FD frames are read anyway
+      false;
   double speed = 1.0;  ///< as UdpCanOptions::speed
 };
 
@@ -32,7 +34,8 @@ class SocketCanBus final : public CanBus {
 
   [[nodiscard]] Result<void> open(std::span<const std::uint32_t> ids) override;
   void close() noexcept override;
-  [[nodiscard]] Result<CanRead> read(std::span<ReceivedFrame> out, std::chrono::nanoseconds wall) override;
+  [[nodiscard]] Result<CanRead> read(std::span<ReceivedFrame> out,
+                                     std::chrono::nanoseconds wall) override;
   [[nodiscard]] Result<void> send(std::span<const can::CanFrame> frames) override;
   [[nodiscard]] Result<void> start_sync(std::chrono::nanoseconds period) override;
   void stop_sync() noexcept override;
@@ -53,7 +56,8 @@ class SocketCanBus final : public CanBus {
   int sync_fd_ = -1;          ///< CAN_BCM; closing it ends the SYNC
   bool kernel_sent_ = false;  ///< since open(): what was on its way when it ended is ours, too
   bool sent_sync_ = false;    ///< since open()
-  /// A socket closed before sent a SYNC: one of this computer that is no echo may be its, still on the way.
+  /// A socket closed before sent a SYNC: one of this computer that is no echo may be its, still on
+  /// the way.
   bool left_over_ = false;
   KernelStampMap stamps_;
   std::unique_ptr<Batch> batch_;

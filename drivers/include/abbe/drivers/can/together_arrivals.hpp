@@ -1,7 +1,7 @@
 #pragma once
-/// Answers that arrive together with later ones of the same node: a tunnel or gateway collects frames for
-/// longer than a SYNC period and sends them at once (cannelloni: 0.1 s unless told otherwise), and every
-/// cycle is lost. Sans-I/O. One thread.
+/// Answers that arrive together with later ones of the same node: a tunnel or gateway collects
+/// frames for longer than a SYNC period and sends them at once (cannelloni: 0.1 s unless told
+/// otherwise), and every cycle is lost. Sans-I/O. One thread.
 
 #include <array>
 #include <cstdint>

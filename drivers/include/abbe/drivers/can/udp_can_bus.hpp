@@ -1,7 +1,7 @@
 #pragma once
-/// CAN over UDP with the framing of protocol/can/udp_framing.hpp: peers are the cannelloni tunnel, gateways
-/// and abbe-sim. All frames of a datagram get the arrival time of the datagram; a tunnel that buffers makes
-/// it a late one, which costs nothing here: positions are dated by the SYNC.
+/// CAN over UDP with the framing of protocol/can/udp_framing.hpp: peers are the cannelloni tunnel,
+/// gateways and abbe-sim. All frames of a datagram get the arrival time of the datagram; a tunnel
+/// that buffers makes it a late one, which costs nothing here: positions are dated by the SYNC.
 
 #include <netinet/in.h>
 
@@ -19,13 +19,15 @@
 namespace abbe::drivers {
 
 struct UdpCanOptions {
-  /// The peer may be on any network of this computer; only its datagrams, by address and port, are taken.
+  /// The peer may be on any network of this computer; only its datagrams, by address and port, are
+  /// taken.
   std::string local_address = "0.0.0.0";
   std::uint16_t local_port = 0;            ///< 0: the kernel chooses, see local_port()
   std::string peer_address = "127.0.0.1";  ///< IPv4, or a name that open() looks up
   std::uint16_t peer_port = 20000;
   double speed =
-      1.0;  ///< host time per monotonic time, as given to the TimeSource; 0: stepped, stamps are not used
+      /// host time per monotonic time, as given to the TimeSource; 0: stepped, stamps are not used
+      1.0;
 };
 
 class UdpCanBus final : public CanBus {
@@ -36,7 +38,8 @@ class UdpCanBus final : public CanBus {
 
   [[nodiscard]] Result<void> open(std::span<const std::uint32_t> ids) override;
   void close() noexcept override;
-  [[nodiscard]] Result<CanRead> read(std::span<ReceivedFrame> out, std::chrono::nanoseconds wall) override;
+  [[nodiscard]] Result<CanRead> read(std::span<ReceivedFrame> out,
+                                     std::chrono::nanoseconds wall) override;
   [[nodiscard]] Result<void> send(std::span<const can::CanFrame> frames) override;
   [[nodiscard]] CanBusCounters counters() const noexcept override;
   [[nodiscard]] std::string stranger() const override { return stranger_; }
@@ -59,7 +62,8 @@ class UdpCanBus final : public CanBus {
   UdpCanOptions options_;
   const TimeSource& time_;
   int fd_ = -1;
-  int stranger_fd_ = -1;  ///< the same port, not connected: what others than the peer send arrives there
+  /// the same port, not connected: what others than the peer send arrives there
+  int stranger_fd_ = -1;
   sockaddr_in peer_{};
   std::uint64_t strangers_ = 0;
   std::string stranger_;

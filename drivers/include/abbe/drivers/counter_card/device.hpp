@@ -1,9 +1,9 @@
 #pragma once
-/// A USB-QUAD08 counter card as a Device: CounterCardReceiver and CounterCardSession around one USB link.
-/// wait(): sends what the session asks for, collects what the card sent. receive(): bytes to scans, raw
-/// blocks. States: those of CardState. After the connection was lost the counts go on if the card's clock
-/// channel did. After the card was without power its counters begin at zero where the axes then stand
-/// (SampleFlag::Restarted): positions are true again once a datum was taken.
+/// A USB-QUAD08 counter card as a Device: CounterCardReceiver and CounterCardSession around one USB
+/// link. wait(): sends what the session asks for, collects what the card sent. receive(): bytes to
+/// scans, raw blocks. States: those of CardState. After the connection was lost the counts go on if
+/// the card's clock channel did. After the card was without power its counters begin at zero where
+/// the axes then stand (SampleFlag::Restarted): positions are true again once a datum was taken.
 
 #include <array>
 #include <cstddef>
@@ -12,9 +12,9 @@
 #include <string>
 #include <vector>
 
+#include "abbe/drivers/counter_card/decimation.hpp"
 #include "abbe/drivers/counter_card/receiver.hpp"
 #include "abbe/drivers/counter_card/session.hpp"
-#include "abbe/drivers/counter_card/thinning.hpp"
 #include "abbe/drivers/device.hpp"
 #include "abbe/drivers/raw_ring.hpp"
 #include "abbe/drivers/sample_ring.hpp"
@@ -30,10 +30,12 @@ struct CounterCardOptions {
   std::string serial;  ///< empty: the only card there is
   CounterCardReceiverOptions receiver;
   CounterCardSessionOptions session;  ///< `peer`, `wiring` and `stream` are made from the rest
-  /// How much time one transfer holds: the resolution of arrival times, and what is lost when it is lost.
+  /// How much time one transfer holds: the resolution of arrival times, and what is lost when it is
+  /// lost.
   std::chrono::nanoseconds transfer_time = std::chrono::microseconds{1500};
   std::size_t transfers_in_flight = 32;
-  std::size_t sample_every = 1;         ///< one sample in the ring for so many scans; the sink sees them all
+  /// one sample in the ring for so many scans; the sink sees them all
+  std::size_t sample_every = 1;
   std::size_t sample_capacity = 65536;  ///< 2 s at 33 kHz
   std::size_t raw_capacity_blocks = 4096;
 };
@@ -45,12 +47,11 @@ struct CounterCardOptions {
 
 class CounterCardDevice final : public Device {
  public:
-  /// `time` and `sink` (may be null) must outlive the device. BadConfiguration as check(). The link is opened
-  /// by the first wait().
-  [[nodiscard]] static Result<std::unique_ptr<CounterCardDevice>> create(const CounterCardOptions& options,
-                                                                         std::unique_ptr<UsbLink> link,
-                                                                         const TimeSource& time,
-                                                                         CounterScanSink* sink = nullptr);
+  /// `time` and `sink` (may be null) must outlive the device. BadConfiguration as check(). The link
+  /// is opened by the first wait().
+  [[nodiscard]] static Result<std::unique_ptr<CounterCardDevice>> create(
+      const CounterCardOptions& options, std::unique_ptr<UsbLink> link, const TimeSource& time,
+      CounterScanSink* sink = nullptr);
 
   /// Stops a running scan, for as long as the card answers at once.
   ~CounterCardDevice() override;
@@ -72,8 +73,8 @@ class CounterCardDevice final : public Device {
  private:
   static constexpr std::size_t kProgressCapacity = 16;
 
-  CounterCardDevice(const CounterCardOptions& options, std::unique_ptr<UsbLink> link, const TimeSource& time,
-                    CounterScanSink* sink);
+  CounterCardDevice(const CounterCardOptions& options, std::unique_ptr<UsbLink> link,
+                    const TimeSource& time, CounterScanSink* sink);
 
   void tell(const CardInput& input);
   [[nodiscard]] bool act(const CardAction& action);
@@ -98,7 +99,7 @@ class CounterCardDevice final : public Device {
   const TimeSource& time_;
   CounterScanSink* sink_;
   bool live_axes_ = true;
-  ScanThinning thinning_;
+  ScanDecimation decimation_;
   SampleRing<protocol::AxisSample> samples_;
   RawRing raw_;
   SampleRing<CounterCardProgress> progress_ring_{kProgressCapacity};
@@ -106,8 +107,9 @@ class CounterCardDevice final : public Device {
   CounterCardReceiver receiver_;
   CounterCardSession session_;
 
-  std::span<const UsbEvent> events_;  ///< of the latest wait(); the session hears of them in the next
-  protocol::HostTime turn_end_{};
+  std::span<const UsbEvent>
+      events_;  ///< of the latest wait(); the session hears of them in the next
+  protocol::HostTime cycle_end_{};
   protocol::HostTime read_until_{};  ///< what came before was read by the latest wait()
   std::size_t scans_ = 0;            ///< of the latest receive()
   bool out_of_step_told_ = false;

@@ -1,8 +1,9 @@
 #pragma once
-/// From the count of a latch channel to the count of the clock channel at the same instant. Both count the
-/// same clock, but were zeroed at different moments: latch = clock + offset. With the card's own timer the
-/// offset is 0; else each edge narrows it: an edge came between two scans, so the offset lies in an interval
-/// as long as the scan, and in that of every other edge. Pure state machine, real time, one thread.
+/// From the count of a latch channel to the count of the clock channel at the same instant. Both
+/// count the same clock, but were zeroed at different moments: latch = clock + offset. With the
+/// card's own timer the offset is 0; else each edge narrows it: an edge came between two scans, so
+/// the offset lies in an interval as long as the scan, and in that of every other edge. Pure state
+/// machine, real time, one thread.
 
 #include <cstdint>
 #include <optional>
@@ -15,7 +16,8 @@ namespace abbe::drivers {
 class LatchTracker {
  public:
   /// `in_step`: both counters begin with the clock (the card's own timer).
-  LatchTracker(protocol::quad08::CountWidth width, bool in_step) ABBE_RT : width_(width), in_step_(in_step) {
+  LatchTracker(protocol::quad08::CountWidth width, bool in_step) ABBE_RT : width_(width),
+                                                                           in_step_(in_step) {
     reset();
   }
 
@@ -28,14 +30,14 @@ class LatchTracker {
     std::int64_t clock_count = 0;  ///< unwrapped, of the clock channel
     std::int64_t half_width = 0;   ///< the truth is within
   };
-  /// Every scan in order: what both channels read, and the unwrapped clock of this and of the previous scan.
-  /// True: the latch has changed since the previous scan.
+  /// Every scan in order: what both channels read, and the unwrapped clock of this and of the
+  /// previous scan. True: the latch has changed since the previous scan.
   bool on_scan(std::uint64_t latch_raw, std::uint64_t clock_raw, std::int64_t clock_count,
                std::int64_t previous_clock_count) ABBE_RT;
   /// The latest latch; nothing before the first edge.
   [[nodiscard]] std::optional<Latch> latest() const ABBE_RT { return latest_; }
-  /// Times a latch lay outside the scan in which it came: another clock, or an input latched otherwise than
-  /// assumed.
+  /// Times a latch lay outside the scan in which it came: another clock, or an input latched
+  /// otherwise than assumed.
   [[nodiscard]] std::uint64_t disagreements() const ABBE_RT { return disagreements_; }
 
  private:

@@ -1,9 +1,9 @@
 #pragma once
-/// What is to be said to a counter card, and when: open and self-test, counter set-up, scan start, status
-/// poll, restart after an overrun, open again after it was unplugged. To set a counter up zeroes it: after
-/// opening again the scan is started without, and only if the card does not go on counting its clock is it
-/// set up. Sans-I/O: inputs and a time in, one action out; after each input ask again with CardTick until
-/// nothing is to be done. Ordinary world. One thread.
+/// What is to be said to a counter card, and when: open and self-test, counter set-up, scan start,
+/// status poll, restart after an overrun, open again after it was unplugged. To set a counter up
+/// zeroes it: after opening again the scan is started without, and only if the card does not go on
+/// counting its clock is it set up. Sans-I/O: inputs and a time in, one action out; after each
+/// input ask again with CardTick until nothing is to be done. Ordinary world. One thread.
 
 #include <chrono>
 #include <cstddef>
@@ -25,22 +25,23 @@ struct CounterCardSessionOptions {
   UsbBulkStream stream;
   std::chrono::nanoseconds open_timeout = std::chrono::seconds{2};
   std::chrono::nanoseconds control_timeout = std::chrono::milliseconds{500};
-  std::chrono::nanoseconds silence =
-      std::chrono::milliseconds{90};  ///< no scans for so long is a fault, seen before 100 ms are over
+  std::chrono::nanoseconds silence = std::chrono::milliseconds{
+      90};  ///< no scans for so long is a fault, seen before 100 ms are over
   std::chrono::nanoseconds status_period = std::chrono::milliseconds{100};
   std::chrono::nanoseconds reopen_after = std::chrono::milliseconds{250};
-  std::chrono::nanoseconds retry_after =
-      std::chrono::milliseconds{500};  ///< after a restart that brought no scans
-  unsigned control_tries = 3;  ///< of a request the card refuses or that fails, before the device is closed
-  /// The card of this serial number was set up by an earlier run of the program: its counters are set up only
-  /// if they do not go on.
+  /// after a restart that brought no scans
+  std::chrono::nanoseconds retry_after = std::chrono::milliseconds{500};
+  unsigned control_tries =
+      3;  ///< of a request the card refuses or that fails, before the device is closed
+  /// The card of this serial number was set up by an earlier run of the program: its counters are
+  /// set up only if they do not go on.
   std::optional<std::string> set_up_serial;
 };
 
 // Inputs.
 struct CardTick {
-  /// Whatever came before this instant was handed over: only what is overdue then is missing. A host that was
-  /// held up looks first.
+  /// Whatever came before this instant was handed over: only what is overdue then is missing. A
+  /// host that was held up looks first.
   protocol::HostTime read_until = protocol::HostTime::max();
 };
 struct CardScans {
@@ -50,14 +51,14 @@ struct CardOutOfStep {
   std::string seen;
 };
 /// The clock channel did not go on from where it was: another session of the card.
-struct CardBeganAnew {
+struct CardRestarted {
   std::string seen;  ///< how that showed; may be empty
 };
 struct CardBulkFailed {
   UsbOutcome outcome = UsbOutcome::Failed;
 };
-using CardInput = std::variant<CardTick, UsbOpened, UsbControlDone, UsbBulkStopped, UsbLost, CardScans,
-                               CardOutOfStep, CardBeganAnew, CardBulkFailed>;
+using CardInput = std::variant<CardTick, UsbOpened, UsbControlDone, UsbBulkStopped, UsbLost,
+                               CardScans, CardOutOfStep, CardRestarted, CardBulkFailed>;
 
 // Actions.
 struct CardNothing {};
@@ -68,7 +69,8 @@ struct CardControl {
 };
 struct CardStartBulk {};
 struct CardStopBulk {};
-using CardAction = std::variant<CardNothing, CardOpen, CardClose, CardControl, CardStartBulk, CardStopBulk>;
+using CardAction =
+    std::variant<CardNothing, CardOpen, CardClose, CardControl, CardStartBulk, CardStopBulk>;
 
 enum class CardState : std::uint8_t {
   Closed,
@@ -115,7 +117,7 @@ class CounterCardSession {
   CardAction take(const UsbLost& lost, Now now);
   CardAction take(const CardScans& scans, Now now);
   CardAction take(const CardOutOfStep& out, Now now);
-  CardAction take(const CardBeganAnew& anew, Now now);
+  CardAction take(const CardRestarted& anew, Now now);
   CardAction take(const CardBulkFailed& failed, Now now);
 
   void load(const quad08::Sequence& sequence);
@@ -146,9 +148,10 @@ class CounterCardSession {
   bool halt_ = false;      ///< as soon as the control transfer under way is answered
   bool troubled_ = false;  ///< restarted, and no scans since: not again before retry_at_
   bool scans_since_fault_ = false;
-  bool set_up_ = false;    ///< the counters were, by this session or an earlier run
-  std::string serial_;     ///< of the card that was set up
-  bool resuming_ = false;  ///< scans are expected from counters that were set up before the card was opened
+  bool set_up_ = false;  ///< the counters were, by this session or an earlier run
+  std::string serial_;   ///< of the card that was set up
+  /// scans are expected from counters that were set up before the card was opened
+  bool resuming_ = false;
   bool resumed_again_ = false;  ///< these were out of step once, and the scan was started anew
   unsigned status_tries_ = 0;
   unsigned tries_ = 0;  ///< of the control transfer under way

@@ -1,12 +1,13 @@
 #pragma once
-/// What hangs on which counter of the card. One counter always counts a clock: the time base of every scan,
-/// by which lost scans are seen. The probe hangs on the index input of a second counter of the same clock
-/// (time of the edge to one clock period) and, if there is one to spare, on the phase A input of a third
-/// (number of edges).
+/// What hangs on which counter of the card. One counter always counts a clock: the time base of
+/// every scan, by which lost scans are seen. The probe hangs on the index input of a second counter
+/// of the same clock (time of the edge to one clock period) and, if there is one to spare, on the
+/// phase A input of a third (number of edges).
 ///
-/// ASSUMPTION, to be verified on hardware: in a scan, a counter that is set up with latch-on-index gives its
-/// count at the latest index edge, and 0 before the first. Everything about latch channels and about axes
-/// with `latch_on_index` rests on it; set `latch_verified` once it has been seen on the card in use.
+/// ASSUMPTION, to be verified on hardware: in a scan, a counter that is set up with latch-on-index
+/// gives its count at the latest index edge, and 0 before the first. Everything about latch
+/// channels and about axes with `latch_on_index` rests on it; set `latch_verified` once it has been
+/// seen on the card in use.
 
 #include <chrono>
 #include <cstdint>
@@ -27,20 +28,24 @@ struct CounterAxis {
   std::string name;  ///< "X"; for messages
   std::uint8_t channel = 0;
   double scale = 0.0;  ///< m or rad per count, four counts a signal period; negative reverses
-  double offset =
-      0.0;  ///< m or rad: the reading at count 0, which is where the axis stood when it was set up
-  bool latch_on_index = false;  ///< for reference marks: the count at the latest index pulse, no live reading
+  /// m or rad: the reading at count 0, which is where the axis stood when it was set up
+  double offset = 0.0;
+  /// for reference marks: the count at the latest index pulse, no live reading
+  bool latch_on_index = false;
   quad08::Debounce debounce{};  ///< of phases and index
 };
 
 enum class ClockSource : std::uint8_t {
-  External,  ///< a clock of its own. Where the latch channel's count stands against it is learned from edges
-  Timer0,    ///< the card's timer output 0, wired to the clock inputs: both counters begin with it, in step
+  /// a clock of its own. Where the latch channel's count stands against it is learned from edges
+  External,
+  /// the card's timer output 0, wired to the clock inputs: both counters begin with it, in step
+  Timer0,
   Timer1,
 };
 
 struct CounterCardWiring {
-  std::vector<CounterAxis> axes;  ///< in the order of the sample; 1 to 7, at most as many as a sample holds
+  std::vector<CounterAxis>
+      axes;  ///< in the order of the sample; 1 to 7, at most as many as a sample holds
   std::uint8_t clock_channel = 5;
   ClockSource clock_source = ClockSource::External;
   double clock_hz = 10e6;  ///< with a timer: 48 MHz divided by a whole number
@@ -53,8 +58,8 @@ struct CounterCardWiring {
   double scan_rate_hz = 100e3 / 3.0;  ///< asked for; scan_rate() is what comes of it
 };
 
-/// BadConfiguration names the axis or channel and what is wrong: scale zero, two uses of one channel, two
-/// channels for one axis, a clock too slow to count scans by, ...
+/// BadConfiguration names the axis or channel and what is wrong: scale zero, two uses of one
+/// channel, two channels for one axis, a clock too slow to count scans by, ...
 [[nodiscard]] Result<void> check(const CounterCardWiring& wiring);
 
 // All below: for a wiring that passed check().
@@ -67,7 +72,8 @@ struct CounterCardWiring {
 [[nodiscard]] double clock_counts_per_scan(const CounterCardWiring& wiring);
 /// Periods of 48 MHz in one of the clock; only for a timer.
 [[nodiscard]] std::uint32_t timer_divisor(const CounterCardWiring& wiring);
-/// True if something of the wiring rests on the assumption above and was not verified: to be said at start.
+/// True if something of the wiring rests on the assumption above and was not verified: to be said
+/// at start.
 [[nodiscard]] bool rests_on_assumption(const CounterCardWiring& wiring);
 
 }  // namespace abbe::drivers

@@ -1,10 +1,10 @@
 #pragma once
-/// A Modbus device that measures the environment, as a Device: EnvironmentReceiver around one ModbusLine.
-/// wait(): opens, asks one question, blocks for its answer. receive(): bytes to samples and raw blocks.
-/// Whatever goes wrong ends the connection (one that others use as well, see EnvironmentLine, when none of
-/// them has answered meanwhile); the device then begins with the proving registers, so that one that was
-/// exchanged is found. States: "closed", "proving", "reading", "refused" (wrong device or
-/// map: tried again every `refused_retry`).
+/// A Modbus device that measures the environment, as a Device: EnvironmentReceiver around one
+/// ModbusLine. wait(): opens, asks one question, blocks for its answer. receive(): bytes to samples
+/// and raw blocks. Whatever goes wrong ends the connection (one that others use as well, see
+/// EnvironmentLine, when none of them has answered meanwhile); the device then begins with the
+/// proving registers, so that one that was exchanged is found. States: "closed", "proving",
+/// "reading", "refused" (wrong device or map: tried again every `refused_retry`).
 
 #include <array>
 #include <cstddef>
@@ -38,8 +38,8 @@ struct EnvironmentDeviceOptions {
 
 class EnvironmentDevice final : public Device {
  public:
-  /// `time` must outlive the device. BadConfiguration as check(RegisterMap), or without host or path. The
-  /// line is opened by the first wait().
+  /// `time` must outlive the device. BadConfiguration as check(RegisterMap), or without host or
+  /// path. The line is opened by the first wait().
   [[nodiscard]] static Result<std::unique_ptr<EnvironmentDevice>> create(
       const EnvironmentDeviceOptions& options, const TimeSource& time);
   /// Over a connection that others use as well; it must outlive the device.
@@ -49,7 +49,9 @@ class EnvironmentDevice final : public Device {
   /// Device thread: an answer is under way, or there and not looked at.
   [[nodiscard]] bool busy() const noexcept;
   /// Device thread: has begun on the connection as it is now.
-  [[nodiscard]] bool on_line() const noexcept { return link_.line.is_open() && opening_ == link_.openings; }
+  [[nodiscard]] bool on_line() const noexcept {
+    return link_.line.is_open() && opening_ == link_.openings;
+  }
   /// Device thread: the connection has gone, and not by us.
   void lose(std::string_view what);
   /// Device thread: somebody else found that the connection has gone, and reports it.
@@ -68,7 +70,8 @@ class EnvironmentDevice final : public Device {
  private:
   using Progress = EnvironmentReceiver::Progress;
 
-  EnvironmentDevice(const EnvironmentDeviceOptions& options, const TimeSource& time, EnvironmentLink& link);
+  EnvironmentDevice(const EnvironmentDeviceOptions& options, const TimeSource& time,
+                    EnvironmentLink& link);
 
   void heed_progress(protocol::HostTime now);
   [[nodiscard]] bool ensure_open(std::chrono::nanoseconds at_most);

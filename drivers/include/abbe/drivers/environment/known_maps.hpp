@@ -12,13 +12,15 @@
 namespace abbe::drivers {
 
 struct KnownMapOptions {
-  /// Serial number as printed on the device; "comet-t7510" needs it (its documentation is ambiguous by one
-  /// address), the others have no register for it.
+  /// Serial number as printed on the device; "comet-t7510" needs it (its documentation is ambiguous
+  /// by one address), the others have no register for it.
   std::optional<std::uint32_t> serial_number;
-  /// "icpdas-zt2005-c8": the temperature channel of each of its inputs, none for one that is not used.
+  /// "icpdas-zt2005-c8": the temperature channel of each of its inputs, none for one that is not
+  /// used.
   std::vector<std::optional<std::uint8_t>> inputs;
   std::vector<std::string> input_names;
-  /// "icpdas-zt2005-c8", "comet-t7510": the address of the device, with TCP the one of the gateway's line.
+  /// "icpdas-zt2005-c8", "comet-t7510": the address of the device, with TCP the one of the
+  /// gateway's line.
   std::uint8_t unit = 1;
 };
 

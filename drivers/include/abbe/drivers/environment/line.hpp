@@ -1,9 +1,9 @@
 #pragma once
-/// The Modbus devices of one serial line, or behind one gateway, as one Device with one thread: requests go
-/// out one after the other over one connection, the device that has waited longest first. Each has its own
-/// rounds, time-outs, faults and status. A device that does not answer costs the others its answer_timeout,
-/// and as long again for an answer that comes too late, once in its period; the connection is closed only
-/// when no other device has answered on it meanwhile.
+/// The Modbus devices of one serial line, or behind one gateway, as one Device with one thread:
+/// requests go out one after the other over one connection, the device that has waited longest
+/// first. Each has its own rounds, time-outs, faults and status. A device that does not answer
+/// costs the others its answer_timeout, and as long again for an answer that comes too late, once
+/// in its period; the connection is closed only when no other device has answered on it meanwhile.
 
 #include <memory>
 #include <vector>
@@ -15,8 +15,8 @@ namespace abbe::drivers {
 
 class EnvironmentLine final : public Device {
  public:
-  /// `time` must outlive the line. BadConfiguration as EnvironmentDevice::create(), for no device, and for
-  /// devices that are not on one line with the same settings.
+  /// `time` must outlive the line. BadConfiguration as EnvironmentDevice::create(), for no device,
+  /// and for devices that are not on one line with the same settings.
   [[nodiscard]] static Result<std::unique_ptr<EnvironmentLine>> create(
       const std::vector<EnvironmentDeviceOptions>& options, const TimeSource& time);
 

@@ -1,6 +1,6 @@
 #pragma once
-/// The connection that the Modbus devices of one serial line, or behind one gateway, have in common: one
-/// request at a time. Device thread, ordinary world.
+/// The connection that the Modbus devices of one serial line, or behind one gateway, have in
+/// common: one request at a time. Device thread, ordinary world.
 
 #include <chrono>
 #include <cstdint>
@@ -12,10 +12,11 @@ namespace abbe::drivers {
 
 struct EnvironmentLink {
   ModbusLine line;
-  std::uint64_t openings = 0;        ///< a device that knows an earlier number begins anew
-  std::uint64_t answers = 0;         ///< of all devices
-  protocol::HostTime open_at{};      ///< not opened again before
-  protocol::HostTime quiet_until{};  ///< what comes until then is an answer that is too late: thrown away
+  std::uint64_t openings = 0;    ///< a device that knows an earlier number begins anew
+  std::uint64_t answers = 0;     ///< of all devices
+  protocol::HostTime open_at{};  ///< not opened again before
+  protocol::HostTime
+      quiet_until{};  ///< what comes until then is an answer that is too late: thrown away
 };
 
 /// One serial device (by any of its names) or one host and port.

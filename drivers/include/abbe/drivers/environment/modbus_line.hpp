@@ -1,7 +1,7 @@
 #pragma once
-/// One Modbus connection, over TCP or a serial line: libmodbus opens, sets up and sends. Reading is done
-/// here, because libmodbus blocks in the middle of an answer and hides the bytes that it refuses, and a
-/// recording must hold them. Ordinary world. One thread.
+/// One Modbus connection, over TCP or a serial line: libmodbus opens, sets up and sends. Reading is
+/// done here, because libmodbus blocks in the middle of an answer and hides the bytes that it
+/// refuses, and a recording must hold them. Ordinary world. One thread.
 
 #include <chrono>
 #include <cstddef>
@@ -22,7 +22,8 @@ namespace abbe::drivers {
 namespace modbus = protocol::modbus;
 
 struct ModbusTcp {
-  std::string host;  ///< a name is looked up at every opening, which may take as long as the name server
+  std::string
+      host;  ///< a name is looked up at every opening, which may take as long as the name server
   std::uint16_t port = modbus::kTcpPort;
 };
 
@@ -41,10 +42,10 @@ using ModbusAddress = std::variant<ModbusTcp, ModbusSerial>;
 /// "10.0.0.7:502", "/dev/ttyUSB0 19200 8E1"
 [[nodiscard]] std::string text_of(const ModbusAddress& address);
 
-/// A serial line for one connection only. Two names of a line whose device is not plugged in at the start are
-/// not known to be one: whoever opens it second is told. So is a program that locks in this way (flock).
-/// TIOCEXCL would keep out others, too, but not root, and is not given back by a process that is killed while
-/// another one has the line open.
+/// A serial line for one connection only. Two names of a line whose device is not plugged in at the
+/// start are not known to be one: whoever opens it second is told. So is a program that locks in
+/// this way (flock). TIOCEXCL would keep out others, too, but not root, and is not given back by a
+/// process that is killed while another one has the line open.
 class SerialLock {
  public:
   SerialLock() = default;
@@ -66,8 +67,8 @@ class ModbusLine {
   ModbusLine(const ModbusLine&) = delete;
   ModbusLine& operator=(const ModbusLine&) = delete;
 
-  /// Blocks for `wall` at most (and a name server). Unreachable: refused, no route, no such path, a serial
-  /// line that is in use; Timeout.
+  /// Blocks for `wall` at most (and a name server). Unreachable: refused, no route, no such path, a
+  /// serial line that is in use; Timeout.
   [[nodiscard]] Result<void> open(const ModbusAddress& address, std::chrono::nanoseconds wall);
   [[nodiscard]] bool is_open() const noexcept { return context_ != nullptr; }
   void close() noexcept;

@@ -1,14 +1,14 @@
 #pragma once
-/// What is to be asked of a Modbus device and what its answers mean. Sans-I/O and deterministic: the same
-/// bytes with the same times give the same samples, live or replayed. A connection begins with the proving
-/// registers; then round after round of reads, each of which makes one sample. Real time: allocation-free, no
-/// system call. One thread.
+/// What is to be asked of a Modbus device and what its answers mean. Sans-I/O and deterministic:
+/// the same bytes with the same times give the same samples, live or replayed. A connection begins
+/// with the proving registers; then round after round of reads, each of which makes one sample.
+/// Real time: allocation-free, no system call. One thread.
 ///
-/// A sample describes the middle between the first question of its round and the last answer, rectangular in
-/// between ([GUM] 4.3.7); how old a value is inside the device is not known.
+/// A sample describes the middle between the first question of its round and the last answer,
+/// rectangular in between ([GUM] 4.3.7); how old a value is inside the device is not known.
 ///
-/// Raw blocks: ToDevice, one whole request, an empty one is a connection that was lost; FromDevice, bytes as
-/// read, an empty one is a new connection.
+/// Raw blocks: ToDevice, one whole request, an empty one is a connection that was lost; FromDevice,
+/// bytes as read, an empty one is a new connection.
 
 #include <array>
 #include <cstdint>
@@ -88,7 +88,8 @@ class EnvironmentReceiver {
     std::size_t byte = 0;
   };
   [[nodiscard]] static std::vector<Spot> spots_in(const std::vector<modbus::ReadRequest>& reads,
-                                                  const std::vector<RegisterPlace>& places, int base_offset);
+                                                  const std::vector<RegisterPlace>& places,
+                                                  int base_offset);
 
   Progress fail(const EnvironmentFailure& failure) ABBE_RT;
   Progress accept(std::span<const std::byte> registers) ABBE_RT;

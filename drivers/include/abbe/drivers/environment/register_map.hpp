@@ -1,7 +1,7 @@
 #pragma once
-/// Which registers of a Modbus device hold what: data, not code. A map has registers that are measured, and
-/// registers that prove that the right device answers with the right map (serial number, status word): they
-/// are read first on every connection. Pure data.
+/// Which registers of a Modbus device hold what: data, not code. A map has registers that are
+/// measured, and registers that prove that the right device answers with the right map (serial
+/// number, status word): they are read first on every connection. Pure data.
 
 #include <cstdint>
 #include <optional>
@@ -28,7 +28,8 @@ struct RegisterPlace {
 
 enum class Quantity : std::uint8_t { AirTemperature, AirPressure, RelativeHumidity, Temperature };
 
-/// What no shop floor has: a value outside is no measurement, and on the first round no right map. SI.
+/// What no shop floor has: a value outside is no measurement, and on the first round no right map.
+/// SI.
 struct PlausibleRange {
   double min;
   double max;
@@ -44,7 +45,8 @@ struct MeasuredRegister {
   RegisterPlace place;
   double scale = 1.0;
   double offset = 0.0;
-  std::vector<double> unavailable;  ///< register values that mean "not available" (broken sensor, no probe)
+  std::vector<double>
+      unavailable;  ///< register values that mean "not available" (broken sensor, no probe)
 };
 [[nodiscard]] protocol::EnvironmentMask mask_of(const MeasuredRegister& measured) noexcept;
 
@@ -61,11 +63,12 @@ struct RegisterMap {
   std::vector<ProvingRegister> proving;
 };
 
-/// BadConfiguration: nothing is measured, a quantity twice, a channel beyond kMaxTemperatures, a scale of 0,
-/// an address outside 0 to FFFFh, more reads than kMaxReads.
+/// BadConfiguration: nothing is measured, a quantity twice, a channel beyond kMaxTemperatures, a
+/// scale of 0, an address outside 0 to FFFFh, more reads than kMaxReads.
 [[nodiscard]] Result<void> check(const RegisterMap& map);
 
-/// The fewest reads that cover all of `places`: registers of one unit and function that touch share one.
+/// The fewest reads that cover all of `places`: registers of one unit and function that touch share
+/// one.
 [[nodiscard]] std::vector<modbus::ReadRequest> reads_for(const std::vector<RegisterPlace>& places,
                                                          int base_offset);
 

@@ -1,7 +1,8 @@
 #pragma once
-/// A measuring machine behind an I++ DME server, as a Device: IppReceiver and IppSession around one TCP
-/// connection. A second source of touches behind the same vocabulary as the counter card's: each measured
-/// point is a ProbeTrigger, a failed one a ProbeTrigger without position. States: those of IppState.
+/// A measuring machine behind an I++ DME server, as a Device: IppReceiver and IppSession around one
+/// TCP connection. A second source of touches behind the same vocabulary as the counter card's:
+/// each measured point is a ProbeTrigger, a failed one a ProbeTrigger without position. States:
+/// those of IppState.
 
 #include <array>
 #include <atomic>
@@ -37,9 +38,9 @@ struct IppDeviceOptions {
   std::uint16_t port = ippdme::kPort;
   IppSessionOptions session;  ///< `peer` is made from name, host and port
   IppReceiverOptions receiver;
-  /// Device thread: what must be kept over a restart, and handed back in session.held and session.moving.
-  /// Called with each change: before the first command of a motion is sent, when the machine has stopped,
-  /// when a hold begins or ends.
+  /// Device thread: what must be kept over a restart, and handed back in session.held and
+  /// session.moving. Called with each change: before the first command of a motion is sent, when
+  /// the machine has stopped, when a hold begins or ends.
   std::function<void(const IppMachine&)> machine_changed;
   std::size_t touch_capacity = 256;
   std::size_t position_capacity = 256;  ///< 25 s at 10 a second
@@ -56,49 +57,51 @@ struct IppWords {
   using Close = IppClose;
   using Connected = IppConnected;
   using ConnectionLost = IppConnectionLost;
-  using Message = std::variant<IppAck, IppComplete, IppData, IppError, IppNonsense>;
+  using Message = std::variant<IppAck, IppComplete, IppData, IppError, IppProtocolError>;
   static constexpr std::size_t kInbox = 256;
   static constexpr std::size_t kMostRead = 4096;
 };
 
 class IppDevice final : public Device, private SessionOverTcp<IppDevice, IppWords> {
  public:
-  /// `time` must outlive the device. BadConfiguration as check(). The connection is opened by the first
-  /// wait().
+  /// `time` must outlive the device. BadConfiguration as check(). The connection is opened by the
+  /// first wait().
   [[nodiscard]] static Result<std::unique_ptr<IppDevice>> create(const IppDeviceOptions& options,
                                                                  const TimeSource& time);
-  /// Stops a motion that is under way, waits for the answer to AbortE (at most command_timeout), and ends the
-  /// session without waiting for the answer.
+  /// Stops a motion that is under way, waits for the answer to AbortE (at most command_timeout),
+  /// and ends the session without waiting for the answer.
   ~IppDevice() override;
 
   void wait(std::chrono::nanoseconds at_most) override;
   void receive() ABBE_RT override;
   [[nodiscard]] DeviceStatus status() const override;
 
-  /// Any thread: moves the machine and touches, in the order of the calls; one ProbeTrigger each, numbered
-  /// from 1 in that order. Points not yet begun are forgotten when the connection is lost, and so
-  /// are all that come before the session is ready: a fault each time.
+  /// Any thread: moves the machine and touches, in the order of the calls; one ProbeTrigger each,
+  /// numbered from 1 in that order. Points not yet begun are forgotten when the connection is lost,
+  /// and so are all that come before the session is ready: a fault each time.
   void measure(const ProbePoint& point) { measure(std::span{&point, 1}); }
-  /// All of them or, when the connection is lost in between, nothing of the rest: half a way to a touch leads
-  /// through whatever stands there.
+  /// All of them or, when the connection is lost in between, nothing of the rest: half a way to a
+  /// touch leads through whatever stands there.
   void measure(std::span<const ProbePoint> points);
-  /// Any thread: stops a motion that is under way (AbortE) and forgets all points. The session awaits
-  /// release(), whether or not the machine moved.
+  /// Any thread: stops a motion that is under way (AbortE) and forgets all points. The session
+  /// awaits release(), whether or not the machine moved.
   void abort();
-  /// Any thread: a person has looked at the machine: errors are cleared, the session begins anew. Nothing
-  /// happens unless releasable().
+  /// Any thread: a person has looked at the machine: errors are cleared, the session begins anew.
+  /// Nothing happens unless releasable().
   void release();
-  /// Any thread: the machine awaits a release, whatever the state: also while its server is away, or its
-  /// motion is still being stopped.
+  /// Any thread: the machine awaits a release, whatever the state: also while its server is away,
+  /// or its motion is still being stopped.
   [[nodiscard]] bool held() const noexcept { return held_.load(std::memory_order_relaxed); }
   /// Any thread: held(), and its motion is not still being stopped.
-  [[nodiscard]] bool releasable() const noexcept { return releasable_.load(std::memory_order_relaxed); }
-  /// Any thread, takes no lock: a motion that is under way is stopped and the session ends, as when this is
-  /// destroyed; nothing is begun any more, and no release is awaited. For a program that ends and cannot tell
-  /// whether it will come to destroy this.
+  [[nodiscard]] bool releasable() const noexcept {
+    return releasable_.load(std::memory_order_relaxed);
+  }
+  /// Any thread, takes no lock: a motion that is under way is stopped and the session ends, as when
+  /// this is destroyed; nothing is begun any more, and no release is awaited. For a program that
+  /// ends and cannot tell whether it will come to destroy this.
   void end();
-  /// Any thread: how many of them are neither done nor given up. 0: the touches of all that were begun are in
-  /// the ring.
+  /// Any thread: how many of them are neither done nor given up. 0: the touches of all that were
+  /// begun are in the ring.
   [[nodiscard]] std::size_t points_left() const noexcept {
     // acquire: pairs with the release in count_points(). In this order: never less than there are.
     const auto finished = finished_.load(std::memory_order_acquire);
@@ -138,8 +141,8 @@ class IppDevice final : public Device, private SessionOverTcp<IppDevice, IppWord
   RawRing raw_;
   IppReceiver receiver_;
 
-  using Request =
-      std::variant<std::vector<ProbePoint>, IppAbortRequested, IppReleaseRequested, IppStopRequested>;
+  using Request = std::variant<std::vector<ProbePoint>, IppAbortRequested, IppReleaseRequested,
+                               IppStopRequested>;
   Mailbox<Request> requests_;  ///< the hub asks and takes no lock
   std::size_t taken_ = 0;      ///< points out of it, by the device thread
   std::atomic<std::size_t> asked_{0};

@@ -1,12 +1,13 @@
 #pragma once
-/// From the lines of an I++ DME server to touches and positions, in SI and in host time. Sans-I/O and
-/// deterministic: the same bytes both ways with the same times give the same samples, live or replayed. What
-/// a response means is known from the command with its tag, so the sent lines are needed, too. Real time:
-/// allocation-free, no system call. One thread. About 130 kB: keep it on the heap.
+/// From the lines of an I++ DME server to touches and positions, in SI and in host time. Sans-I/O
+/// and deterministic: the same bytes both ways with the same times give the same samples, live or
+/// replayed. What a response means is known from the command with its tag, so the sent lines are
+/// needed, too. Real time: allocation-free, no system call. One thread. About 130 kB: keep it on
+/// the heap.
 ///
-/// The protocol carries no time. A position lies somewhere between its command and its answer, a touch
-/// likewise: the middle, with half of the whole as a rectangular half-width. For a touch that is seconds;
-/// what counts is the position that the machine latched itself.
+/// The protocol carries no time. A position lies somewhere between its command and its answer, a
+/// touch likewise: the middle, with half of the whole as a rectangular half-width. For a touch that
+/// is seconds; what counts is the position that the machine latched itself.
 
 #include <array>
 #include <chrono>
@@ -55,14 +56,15 @@ struct IppError {
   int code = 0;
   IppText text;
 };
-/// A line that no I++ DME server sends. After it only the answers to AbortE come, until a new connection.
-struct IppNonsense {
+/// A line that no I++ DME server sends. After it only the answers to AbortE come, until a new
+/// connection.
+struct IppProtocolError {
   ippdme::LineError error{};
   IppText line;
 };
 
-using IppMessage = std::variant<protocol::AxisSample, protocol::ProbeTrigger, IppAck, IppComplete, IppData,
-                                IppError, IppNonsense>;
+using IppMessage = std::variant<protocol::AxisSample, protocol::ProbeTrigger, IppAck, IppComplete,
+                                IppData, IppError, IppProtocolError>;
 
 class IppReceiver {
  public:
@@ -72,8 +74,8 @@ class IppReceiver {
 
   /// A command line as it was sent, with its CR LF.
   void sent(std::span<const std::byte> line, protocol::HostTime time) ABBE_RT;
-  /// Bytes of one read and when they arrived; no bytes: a new connection. next() until it gives nothing
-  /// before the next push().
+  /// Bytes of one read and when they arrived; no bytes: a new connection. next() until it gives
+  /// nothing before the next push().
   void push(std::span<const std::byte> bytes, protocol::HostTime arrival) ABBE_RT;
   [[nodiscard]] std::optional<IppMessage> next() ABBE_RT;
 
@@ -99,8 +101,9 @@ class IppReceiver {
   [[nodiscard]] IppMessage error(const ippdme::Response& response) ABBE_RT;
   [[nodiscard]] protocol::AxisSample position(const ippdme::PointReport& at,
                                               const protocol::SampleHead& head) ABBE_RT;
-  [[nodiscard]] protocol::ProbeTrigger touch(const ippdme::PointReport& at, const protocol::SampleHead& head,
-                                             std::uint32_t number, bool warned) ABBE_RT;
+  [[nodiscard]] protocol::ProbeTrigger touch(const ippdme::PointReport& at,
+                                             const protocol::SampleHead& head, std::uint32_t number,
+                                             bool warned) ABBE_RT;
   [[nodiscard]] protocol::SampleHead between(protocol::HostTime from) ABBE_RT;
 
   IppReceiverOptions options_;

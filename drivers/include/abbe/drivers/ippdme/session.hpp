@@ -1,7 +1,7 @@
 #pragma once
-/// What to ask an I++ DME server, and when: the state machine without its socket. Sans-I/O: one input and the
-/// host time in, at most one action out. One command at a time, the next when the one before is complete.
-/// Ordinary world: allocates. One thread.
+/// What to ask an I++ DME server, and when: the state machine without its socket. Sans-I/O: one
+/// input and the host time in, at most one action out. One command at a time, the next when the one
+/// before is complete. Ordinary world: allocates. One thread.
 ///
 ///   Disconnected -> Connecting -> Opening (StartSession, GetDMEVersion)
 ///     -> Configuring (IsHomed [Home], SetTool, OnPtMeasReport, OnMoveReportE) -> Ready <-> Measuring
@@ -10,16 +10,17 @@
 ///   AwaitingRelease -> Clearing (ClearAllErrors) -> Opening, or Connecting, only by IppReleaseRequested
 ///   any -> Stopping -> Disconnected;   any without a motion -> Faulted -> Connecting (after a while)
 ///
-/// No connection with an unfinished motion is closed before AbortE is answered or command_timeout has passed.
-/// When such a connection is lost, the next one begins with AbortE, before StartSession: servers queue
-/// commands behind a motion, and StartSession clears errors. A session starts only after a release. Only for
-/// a server that refuses AbortE outside a session, or does not answer it, a session is started first. While
-/// AwaitingRelease nothing is sent that moves the machine or clears an error.
-/// Home is sent in the first session and after a release, never after a mere loss of the connection.
+/// No connection with an unfinished motion is closed before AbortE is answered or command_timeout
+/// has passed. When such a connection is lost, the next one begins with AbortE, before
+/// StartSession: servers queue commands behind a motion, and StartSession clears errors. A session
+/// starts only after a release. Only for a server that refuses AbortE outside a session, or does
+/// not answer it, a session is started first. While AwaitingRelease nothing is sent that moves the
+/// machine or clears an error. Home is sent in the first session and after a release, never after a
+/// mere loss of the connection.
 ///
-/// While nothing is measured the position is asked for every poll period, which also shows that the server
-/// lives. Points are taken while Ready or Measuring; in any other state they are forgotten, which is a fault.
-/// [I++ DME 1.4.3]
+/// While nothing is measured the position is asked for every poll period, which also shows that the
+/// server lives. Points are taken while Ready or Measuring; in any other state they are forgotten,
+/// which is a fault. [I++ DME 1.4.3]
 
 #include <array>
 #include <chrono>
@@ -52,9 +53,10 @@ enum class IppState {
 /// A literal: "ready", "measuring", ...
 [[nodiscard]] const char* name_of(IppState) noexcept;
 
-/// One touch: the nominal place and the outward normal there, of the centre of the tip. The machine moves to
-/// the place plus its approach distance along the normal and probes against it. Or a place on the way there:
-/// it only moves, straight, and when that is refused nothing that was asked after it is begun.
+/// One touch: the nominal place and the outward normal there, of the centre of the tip. The machine
+/// moves to the place plus its approach distance along the normal and probes against it. Or a place
+/// on the way there: it only moves, straight, and when that is refused nothing that was asked after
+/// it is begun.
 struct ProbePoint {
   std::array<double, 3> position_m{};
   std::array<double, 3> normal = {0.0, 0.0, 1.0};
@@ -63,17 +65,18 @@ struct ProbePoint {
 
 struct IppSessionOptions {
   std::string peer = "measuring machine";  ///< how messages name it: "cmm 10.0.0.9:1294"
-  bool home = false;                       ///< may send a machine home that is not; else that is a fault
-  std::string held;                        ///< not empty: awaits a release from the start, for this reason
-  bool moving = false;                     ///< with held: a motion may be under way, is aborted first
-  std::string tool;                        ///< set before measuring; empty: the one that is set
-  bool move_reports = true;  ///< ask for positions while moving; a refusal of severity 1 is no fault
+  bool home = false;    ///< may send a machine home that is not; else that is a fault
+  std::string held;     ///< not empty: awaits a release from the start, for this reason
+  bool moving = false;  ///< with held: a motion may be under way, is aborted first
+  std::string tool;     ///< set before measuring; empty: the one that is set
+  /// ask for positions while moving; a refusal of severity 1 is no fault
+  bool move_reports = true;
   std::chrono::nanoseconds poll_period = std::chrono::milliseconds{100};
   std::chrono::nanoseconds connect_timeout = std::chrono::seconds{3};
   std::chrono::nanoseconds command_timeout = std::chrono::seconds{3};
   std::chrono::nanoseconds motion_timeout = std::chrono::seconds{120};  ///< Home and PtMeas
-  std::chrono::nanoseconds first_pause =
-      std::chrono::milliseconds{250};  ///< before connecting again, doubled
+  /// before connecting again, doubled
+  std::chrono::nanoseconds first_pause = std::chrono::milliseconds{250};
   std::chrono::nanoseconds longest_pause = std::chrono::milliseconds{500};  ///< ... up to this
 };
 /// BadConfiguration says which option is out of its range.
@@ -84,12 +87,13 @@ struct IppConnected {};
 struct IppConnectionLost {
   std::string what;
 };
-struct IppStopRequested {};     ///< ends the session
-struct IppAbortRequested {};    ///< stops a motion and forgets all points; awaits a release, moving or not
+struct IppStopRequested {};  ///< ends the session
+struct IppAbortRequested {
+};  ///< stops a motion and forgets all points; awaits a release, moving or not
 struct IppReleaseRequested {};  ///< by a person who has looked at the machine
-using IppInput =
-    std::variant<IppTick, IppConnected, IppConnectionLost, IppStopRequested, IppAbortRequested,
-                 IppReleaseRequested, ProbePoint, IppAck, IppComplete, IppData, IppError, IppNonsense>;
+using IppInput = std::variant<IppTick, IppConnected, IppConnectionLost, IppStopRequested,
+                              IppAbortRequested, IppReleaseRequested, ProbePoint, IppAck,
+                              IppComplete, IppData, IppError, IppProtocolError>;
 
 struct IppNothing {};
 struct IppOpen {};   ///< open a connection, then say IppConnected or IppConnectionLost
@@ -159,7 +163,7 @@ class IppSession {
   [[nodiscard]] IppAction take(const IppData& data);
   [[nodiscard]] IppAction take(const IppError& error);
   [[nodiscard]] IppAction take_foreign(const IppError& error);
-  [[nodiscard]] IppAction take(const IppNonsense& nonsense);
+  [[nodiscard]] IppAction take(const IppProtocolError& nonsense);
 
   [[nodiscard]] bool foreign(ippdme::Tag tag) const noexcept;
   [[nodiscard]] IppAction strange(std::string_view what, ippdme::Tag tag);
@@ -197,9 +201,11 @@ class IppSession {
   bool stopped_ = false;
   bool open_ = false;        ///< the connection
   bool in_session_ = false;  ///< StartSession was accepted on it
-  bool moving_ = false;      ///< a motion was asked for and its end not reported, also on a lost connection
-  bool close_then_ = false;  ///< when the motion has stopped: what comes on this connection is not trusted
-  bool held_ = false;        ///< until a person releases the machine
+  /// a motion was asked for and its end not reported, also on a lost connection
+  bool moving_ = false;
+  /// when the motion has stopped: what comes on this connection is not trusted
+  bool close_then_ = false;
+  bool held_ = false;  ///< until a person releases the machine
   std::string hold_reason_;
   std::string last_note_;       ///< without the peer and the reason of a hold
   std::string stop_reason_;     ///< last_note_ when AbortE was sent

@@ -1,14 +1,15 @@
 #pragma once
-/// Distance-coded reference marks: where a scale stands from the distances between neighbouring marks. Pure.
+/// Distance-coded reference marks: where a scale stands from the distances between neighbouring
+/// marks. Pure.
 ///
-/// Fixed marks lie at k N, coded ones at k N + N / 2 + (k + 1), k = 0, 1, ..., all in signal periods from the
-/// scale's zero mark. Two neighbours at the distance M, crossed in the direction D (+1, -1), give with
-/// B = 2 M - N the position of the first one crossed:
+/// Fixed marks lie at k N, coded ones at k N + N / 2 + (k + 1), k = 0, 1, ..., all in signal
+/// periods from the scale's zero mark. Two neighbours at the distance M, crossed in the direction D
+/// (+1, -1), give with B = 2 M - N the position of the first one crossed:
 ///     P1 = (|B| - sgn B - 1) N / 2 + (sgn B - sgn D) |M| / 2
 /// A rotary scale has the same code around a circle of `length` periods; positions are modulo that.
 ///
-/// One wrong period at one of three marks can give another legal triple. Four do not: every single one-period
-/// error at any mark of any four neighbours is refused (the tests try them all).
+/// One wrong period at one of three marks can give another legal triple. Four do not: every single
+/// one-period error at any mark of any four neighbours is refused (the tests try them all).
 
 #include <array>
 #include <cstdint>
@@ -31,18 +32,19 @@ struct DistanceCode {
 [[nodiscard]] Result<void> check(const DistanceCode& code);
 
 enum class MarkFault : std::uint8_t {
-  NotWhole,   ///< the distance of two marks is no whole number of periods: wrong period, or noise
-  NotOfCode,  ///< two neighbours at a distance that the scale does not have: a mark was missed, a wrong scale
-  Disagree,   ///< the decodings of neighbouring pairs contradict each other: a miscount
-  Reversed,   ///< the direction changed between marks
+  NotWhole,  ///< the distance of two marks is no whole number of periods: wrong period, or noise
+  /// two neighbours at a distance that the scale does not have: a mark was missed, a wrong scale
+  NotOfCode,
+  Disagree,    ///< the decodings of neighbouring pairs contradict each other: a miscount
+  Reversed,    ///< the direction changed between marks
   WrongScale,  ///< mark after mark was refused: this is not the scale that is configured
 };
 [[nodiscard]] std::string_view name(MarkFault fault) noexcept;
 
-/// Position of the first of two neighbours, in periods; nothing if no two neighbours are so far apart.
-/// `distance` > 0; `direction` of crossing +1 or -1.
-[[nodiscard]] std::optional<std::int64_t> first_mark(const DistanceCode& code, std::int64_t distance,
-                                                     int direction) noexcept;
+/// Position of the first of two neighbours, in periods; nothing if no two neighbours are so far
+/// apart. `distance` > 0; `direction` of crossing +1 or -1.
+[[nodiscard]] std::optional<std::int64_t> first_mark(const DistanceCode& code,
+                                                     std::int64_t distance, int direction) noexcept;
 
 inline constexpr std::size_t kMarksForDatum = 4;
 
@@ -53,8 +55,8 @@ struct MarkDatum {
   double spread_periods = 0.0;  ///< largest less smallest of the four offsets
 };
 
-/// `marks`: the counter at four consecutive marks, in periods, in the order of crossing, which is in one
-/// direction.
+/// `marks`: the counter at four consecutive marks, in periods, in the order of crossing, which is
+/// in one direction.
 [[nodiscard]] tl::expected<MarkDatum, MarkFault> datum_of(
     const DistanceCode& code, std::span<const double, kMarksForDatum> marks) noexcept;
 

@@ -1,12 +1,13 @@
 #pragma once
-/// One measured point out of several touches of the same place: a fast one finds the surface, after backing
-/// off slow ones measure it. The slow ones must agree, and their mean is the point. Ordinary world, no
-/// allocation; one thread.
+/// One measured point out of several touches of the same place: a fast one finds the surface, after
+/// backing off slow ones measure it. The slow ones must agree, and their mean is the point.
+/// Ordinary world, no allocation; one thread.
 ///
-/// Along the approach, |p1 - p2| of any two slow touches must be <= agree_sigmas times the deviation of such
-/// a difference, sqrt(2) u_random. u_random: the touch's own uncertainty without what all touches share (the
-/// error of the delay, v u_delay), with the probe's repeatability. The mean's uncertainty: u_random /
-/// sqrt(n), or the scatter seen where that is larger, and the shared part whole.
+/// Along the approach, |p1 - p2| of any two slow touches must be <= agree_sigmas times the
+/// deviation of such a difference, sqrt(2) u_random. u_random: the touch's own uncertainty without
+/// what all touches share (the error of the delay, v u_delay), with the probe's repeatability. The
+/// mean's uncertainty: u_random / sqrt(n), or the scatter seen where that is larger, and the shared
+/// part whole.
 
 #include <array>
 #include <chrono>
@@ -59,8 +60,8 @@ class DoubleTouch {
 
   explicit DoubleTouch(const DoubleTouchRules& rules) noexcept : rules_(rules) {}
 
-  /// A point when the last touch of one came, a rejection when it had to be given up (the next begins with a
-  /// find), nothing otherwise.
+  /// A point when the last touch of one came, a rejection when it had to be given up (the next
+  /// begins with a find), nothing otherwise.
   [[nodiscard]] std::optional<tl::expected<MeasuredTouch, TouchRejection>> on_touch(
       const protocol::ProbeTrigger& touch) noexcept;
   void reset() noexcept;

@@ -1,13 +1,13 @@
 #pragma once
-/// Which edges of a probe's signal are touches. The time of the first edge is kept; whether it was a touch is
-/// decided later. Times are counts of the card's clock. Real time; one thread.
+/// Which edges of a probe's signal are touches. The time of the first edge is kept; whether it was
+/// a touch is decided later. Times are counts of the card's clock. Real time; one thread.
 ///
 ///   Armed --edge--> Pending --stands--> Touched --rearm()--> Armed
 ///                      \--did not stand--> Armed, or Pending with the later edge
 ///
-/// An edge counter that is not debounced sees rising edges only: that the signal stands means that no further
-/// edge came. A single pulse shorter than the confirmation cannot be told from a touch; debounce the counter
-/// where that matters.
+/// An edge counter that is not debounced sees rising edges only: that the signal stands means that
+/// no further edge came. A single pulse shorter than the confirmation cannot be told from a touch;
+/// debounce the counter where that matters.
 
 #include <cstdint>
 
@@ -15,7 +15,8 @@
 
 namespace abbe::drivers {
 
-/// Where an edge lies on the card's clock: in [from, to]. Latched: from and to are the latch's own width.
+/// Where an edge lies on the card's clock: in [from, to]. Latched: from and to are the latch's own
+/// width.
 struct EdgeInterval {
   std::int64_t from = 0;
   std::int64_t to = 0;
@@ -40,8 +41,8 @@ class EdgeConfirmation {
   [[nodiscard]] Event on_time(std::int64_t now) ABBE_RT;
   /// One scan in which the signal rose, last at `edge`; `several`: more than once.
   [[nodiscard]] Event on_edge(const EdgeInterval& edge, bool several) ABBE_RT;
-  /// Debounced counters: one scan in which the counter counted. `edge`: where it must have been if no latch
-  /// showed it before.
+  /// Debounced counters: one scan in which the counter counted. `edge`: where it must have been if
+  /// no latch showed it before.
   [[nodiscard]] Event on_counted(const EdgeInterval& edge) ABBE_RT;
 
   void rearm() ABBE_RT;

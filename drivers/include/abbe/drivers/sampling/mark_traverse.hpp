@@ -1,7 +1,7 @@
 #pragma once
-/// The marks of one scale as they are crossed, up to a datum: four consecutive ones in one direction whose
-/// decodings agree. Any fault begins the four anew; too many in a row say that the scale is another one.
-/// Ordinary world, no allocation; one thread.
+/// The marks of one scale as they are crossed, up to a datum: four consecutive ones in one
+/// direction whose decodings agree. Any fault begins the four anew; too many in a row say that the
+/// scale is another one. Ordinary world, no allocation; one thread.
 
 #include <array>
 #include <cstdint>
@@ -15,8 +15,9 @@ namespace abbe::drivers {
 struct MarkTraverseOptions {
   DistanceCode code;
   double counts_per_period = 4.0;  ///< negative: the counter runs against the scale
-  double reversal_periods = 0.5;   ///< going back by this much is a change of direction, less is noise
-  std::size_t most_refusals = 4;   ///< fours refused in a row, none of them by a reversal
+  /// going back by this much is a change of direction, less is noise
+  double reversal_periods = 0.5;
+  std::size_t most_refusals = 4;  ///< fours refused in a row, none of them by a reversal
 };
 
 class MarkTraverse {
@@ -25,8 +26,10 @@ class MarkTraverse {
 
   /// The live counter, as often as it is known; at least about once a period of the scale.
   void on_position(std::int64_t count) noexcept;
-  /// The counter at a mark that was just crossed. A datum, why these marks give none, or nothing yet.
-  [[nodiscard]] std::optional<tl::expected<MarkDatum, MarkFault>> on_mark(std::int64_t count) noexcept;
+  /// The counter at a mark that was just crossed. A datum, why these marks give none, or nothing
+  /// yet.
+  [[nodiscard]] std::optional<tl::expected<MarkDatum, MarkFault>> on_mark(
+      std::int64_t count) noexcept;
   void reset() noexcept;
 
   [[nodiscard]] std::size_t marks() const noexcept { return count_; }

@@ -1,7 +1,7 @@
 #pragma once
-/// Crossings of reference marks out of the scans of a counter card whose axes are latched on their index. A
-/// CounterScanSink; real time. A mark that latches the very count that is latched already is not seen: it can
-/// only be the same mark, crossed back.
+/// Crossings of reference marks out of the scans of a counter card whose axes are latched on their
+/// index. A CounterScanSink; real time. A mark that latches the very count that is latched already
+/// is not seen: it can only be the same mark, crossed back.
 
 #include <array>
 #include <cstddef>
@@ -14,7 +14,8 @@
 namespace abbe::drivers {
 
 struct MarkCrossing {
-  protocol::SampleHead head;  ///< of the scan in which it was seen; Restarted: the card's counts began anew
+  protocol::SampleHead
+      head;  ///< of the scan in which it was seen; Restarted: the card's counts began anew
   protocol::HostTime not_before{};  ///< the scan before that
   std::uint8_t axis = 0;            ///< place in the sample
   std::int64_t count = 0;           ///< of the latching card at the mark

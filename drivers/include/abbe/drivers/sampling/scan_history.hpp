@@ -1,7 +1,7 @@
 #pragma once
-/// The latest scans of a counter card, and where the axes were at an instant of its clock. Instants are
-/// nanoseconds of the card's own clock, so that the mapping to host time has no part in a position. Fixed
-/// memory, taken by the constructor. Real time; one thread.
+/// The latest scans of a counter card, and where the axes were at an instant of its clock. Instants
+/// are nanoseconds of the card's own clock, so that the mapping to host time has no part in a
+/// position. Fixed memory, taken by the constructor. Real time; one thread.
 
 #include <chrono>
 #include <cstddef>
@@ -40,14 +40,15 @@ class ScanHistory {
   [[nodiscard]] std::chrono::nanoseconds clock_period() const ABBE_RT;
   [[nodiscard]] double clock_period_s() const ABBE_RT { return period_s_; }
 
-  /// Where the axes were; `u_position` states the interpolation alone. `host_time` is that of `instant`.
+  /// Where the axes were; `u_position` states the interpolation alone. `host_time` is that of
+  /// `instant`.
   struct At {
     AxesAt axes;
     protocol::HostTime host_time{};
     std::chrono::nanoseconds u_host_time{};
   };
-  [[nodiscard]] tl::expected<At, InterpolationError> at(protocol::DeviceTime instant,
-                                                        const InterpolationOptions& options) const ABBE_RT;
+  [[nodiscard]] tl::expected<At, InterpolationError> at(
+      protocol::DeviceTime instant, const InterpolationOptions& options) const ABBE_RT;
 
  private:
   RingSlots<CounterScan> slots_;

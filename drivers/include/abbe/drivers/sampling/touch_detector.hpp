@@ -1,9 +1,11 @@
 #pragma once
-/// Touches out of the scans of a counter card: first edge, confirmation, position at the contact, re-arming
-/// on retract; and the scans around every touch. A CounterScanSink: live and in a replay the same scans give
-/// the same touches. A touch leaves when it is confirmed, its window as the scans come.
+/// Touches out of the scans of a counter card: first edge, confirmation, position at the contact,
+/// re-arming on retract; and the scans around every touch. A CounterScanSink: live and in a replay
+/// the same scans give the same touches. A touch leaves when it is confirmed, its window as the
+/// scans come.
 ///
-/// Real time: on_scan() takes no memory and does a bounded amount of work. One thread; counters are for any.
+/// Real time: on_scan() takes no memory and does a bounded amount of work. One thread; counters are
+/// for any.
 
 #include <array>
 #include <cstdint>
@@ -43,10 +45,12 @@ class TouchDetector final : public CounterScanSink {
 
   void restart() ABBE_RT;
   void look(const CounterScan& before, const CounterScan& scan) ABBE_RT;
-  [[nodiscard]] Event look_at_every_edge(const CounterScan& before, const CounterScan& scan) ABBE_RT;
+  [[nodiscard]] Event look_at_every_edge(const CounterScan& before,
+                                         const CounterScan& scan) ABBE_RT;
   [[nodiscard]] Event look_at_debounced(const CounterScan& before, const CounterScan& scan) ABBE_RT;
   [[nodiscard]] bool latch_moved(const CounterScan& before, const CounterScan& scan) const ABBE_RT;
-  [[nodiscard]] EdgeInterval latched_edge(const CounterScan& before, const CounterScan& scan) ABBE_RT;
+  [[nodiscard]] EdgeInterval latched_edge(const CounterScan& before,
+                                          const CounterScan& scan) ABBE_RT;
   void note(Event event) ABBE_RT;
   void touched() ABBE_RT;
   void rearm_when_free(const CounterScan& scan) ABBE_RT;

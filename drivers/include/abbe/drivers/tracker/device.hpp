@@ -1,8 +1,8 @@
 #pragma once
-/// A laser tracker that speaks emScon, as a Device: TrackerReceiver and TrackerSession around one TCP
-/// connection. wait(): connects, sends what the session asks for, reads. receive(): bytes to points, weather
-/// and raw blocks. An arrival is when the read returned, in user space: what a kernel stamp could add is far
-/// below the delay of a burst. States: those of TrackerState.
+/// A laser tracker that speaks emScon, as a Device: TrackerReceiver and TrackerSession around one
+/// TCP connection. wait(): connects, sends what the session asks for, reads. receive(): bytes to
+/// points, weather and raw blocks. An arrival is when the read returned, in user space: what a
+/// kernel stamp could add is far below the delay of a burst. States: those of TrackerState.
 
 #include <array>
 #include <cstddef>
@@ -49,17 +49,17 @@ struct TrackerWords {
   using Connected = TrackerConnected;
   using ConnectionLost = TrackerConnectionLost;
   using Message = std::variant<TrackerPointsArrived, emscon::Answer, emscon::ErrorResponse,
-                               emscon::StatusChange, TrackerNonsense>;
+                               emscon::StatusChange, TrackerProtocolError>;
   static constexpr std::size_t kInbox = 128;
   static constexpr std::size_t kMostRead = emscon::kMaxPacketSize;
 };
 
 class TrackerDevice final : public Device, private SessionOverTcp<TrackerDevice, TrackerWords> {
  public:
-  /// `time` must outlive the device. BadConfiguration as check(). The connection is opened by the first
-  /// wait().
-  [[nodiscard]] static Result<std::unique_ptr<TrackerDevice>> create(const TrackerDeviceOptions& options,
-                                                                     const TimeSource& time);
+  /// `time` must outlive the device. BadConfiguration as check(). The connection is opened by the
+  /// first wait().
+  [[nodiscard]] static Result<std::unique_ptr<TrackerDevice>> create(
+      const TrackerDeviceOptions& options, const TimeSource& time);
   /// Stops the measurement and puts back the settings that abbe changed: at most
   /// TrackerSessionOptions::leave_within.
   ~TrackerDevice() override;
@@ -78,7 +78,9 @@ class TrackerDevice final : public Device, private SessionOverTcp<TrackerDevice,
 
   /// One reader each.
   [[nodiscard]] SampleRing<protocol::TrackerPoint>& points() noexcept { return points_; }
-  [[nodiscard]] SampleRing<protocol::EnvironmentSample>& environment() noexcept { return environment_; }
+  [[nodiscard]] SampleRing<protocol::EnvironmentSample>& environment() noexcept {
+    return environment_;
+  }
   [[nodiscard]] RawRing& raw() noexcept { return raw_; }
 
  private:

@@ -1,6 +1,6 @@
 #pragma once
-/// What a person asks of a tracker while abbe uses it. All but ListReflectors move the beam or end the
-/// distance it holds, so the measurement is stopped before and started after. Ordinary world.
+/// What a person asks of a tracker while abbe uses it. All but ListReflectors move the beam or end
+/// the distance it holds, so the measurement is stopped before and started after. Ordinary world.
 
 #include <cstddef>
 #include <cstdint>
@@ -25,7 +25,8 @@ struct TrackerOrder {
   What what = What::ListReflectors;
   std::uint64_t number = 0;  ///< comes back in the report
   std::string reflector;     ///< SetReflector: name or id
-  double distance_m = 0.0;   ///< FindReflector: about how far away the reflector is; 0 to kLongestSearch_m
+  /// FindReflector: about how far away the reflector is; 0 to kLongestSearch_m
+  double distance_m = 0.0;
 };
 /// A literal: "initialize", "find", ...
 [[nodiscard]] const char* name_of(TrackerOrder::What) noexcept;

@@ -1,16 +1,17 @@
 #pragma once
-/// From the bytes of an emScon laser tracker to points and weather, in SI and in host time. Sans-I/O and
-/// deterministic: the same bytes with the same arrival times give the same samples, live or replayed. Expects
-/// the units the session asks for: mm, rad, Celsius, mbar, percent, right-handed Cartesian coordinates. Real
-/// time: allocation-free, no system call. One thread. About 300 kB: keep it on the heap.
+/// From the bytes of an emScon laser tracker to points and weather, in SI and in host time.
+/// Sans-I/O and deterministic: the same bytes with the same arrival times give the same samples,
+/// live or replayed. Expects the units the session asks for: mm, rad, Celsius, mbar, percent,
+/// right-handed Cartesian coordinates. Real time: allocation-free, no system call. One thread.
+/// About 300 kB: keep it on the heap.
 ///
-/// Raw blocks of a tracker: FromDevice, as received; an empty one is a new connection. ToDevice, as sent, an
-/// empty one is a connection that was lost (for people and for serving a recording back; not needed to decode
-/// it).
+/// Raw blocks of a tracker: FromDevice, as received; an empty one is a new connection. ToDevice, as
+/// sent, an empty one is a connection that was lost (for people and for serving a recording back;
+/// not needed to decode it).
 ///
-/// A recording may begin anywhere: until the first new connection the receiver seeks a packet head and takes
-/// points at once. On a new connection it takes none before the controller has accepted StartMeasurement:
-/// what an earlier client left running would come in unknown units.
+/// A recording may begin anywhere: until the first new connection the receiver seeks a packet head
+/// and takes points at once. On a new connection it takes none before the controller has accepted
+/// StartMeasurement: what an earlier client left running would come in unknown units.
 
 #include <array>
 #include <chrono>
@@ -32,13 +33,13 @@ namespace emscon = protocol::emscon;
 
 struct TrackerReceiverOptions {
   ClockModelOptions clock;
-  /// Between two points of a continuous time measurement; a longer hole is marked GapBefore. 0: points come
-  /// when they come (continuous distance, or not known), holes cannot be told.
+  /// Between two points of a continuous time measurement; a longer hole is marked GapBefore. 0:
+  /// points come when they come (continuous distance, or not known), holes cannot be told.
   std::chrono::nanoseconds time_separation = std::chrono::milliseconds{2};
   /// How long a stationary measurement takes; its result says nothing of its own time.
   std::chrono::nanoseconds stationary_time = std::chrono::milliseconds{500};
-  /// The controller reads its weather station. False: the air it reports is what it was set to; the samples
-  /// carry these values, and `measured` is 0.
+  /// The controller reads its weather station. False: the air it reports is what it was set to; the
+  /// samples carry these values, and `measured` is 0.
   bool air_measured = true;
 };
 
@@ -48,15 +49,16 @@ struct TrackerBurst {
 };
 
 /// Bytes that no emScon controller sends. Nothing more comes after it until a new connection.
-struct TrackerNonsense {
+struct TrackerProtocolError {
   std::optional<emscon::DecodeError> error;  ///< none: a packet size that cannot be
   std::array<std::byte, 24> first_bytes{};
   std::size_t length = 0;
 };
 
 /// What push()ed bytes meant, in their order.
-using TrackerMessage = std::variant<TrackerBurst, protocol::EnvironmentSample, emscon::Answer,
-                                    emscon::ErrorResponse, emscon::StatusChange, TrackerNonsense>;
+using TrackerMessage =
+    std::variant<TrackerBurst, protocol::EnvironmentSample, emscon::Answer, emscon::ErrorResponse,
+                 emscon::StatusChange, TrackerProtocolError>;
 
 /// Since construction.
 struct TrackerCounters {
@@ -75,8 +77,8 @@ class TrackerReceiver {
   TrackerReceiver(const TrackerReceiver&) = delete;
   TrackerReceiver& operator=(const TrackerReceiver&) = delete;
 
-  /// Bytes of one read and when they arrived; no bytes: a new connection. At most kMaxPacketSize at once, and
-  /// next() until it gives nothing before the next push().
+  /// Bytes of one read and when they arrived; no bytes: a new connection. At most kMaxPacketSize at
+  /// once, and next() until it gives nothing before the next push().
   void push(std::span<const std::byte> bytes, protocol::HostTime arrival) ABBE_RT;
   /// A hole in a recording: seeks the next packet, marks the next sample.
   void bytes_lost() ABBE_RT;
@@ -101,13 +103,18 @@ class TrackerReceiver {
   [[nodiscard]] std::optional<TrackerMessage> take(const emscon::StatusChange& change) ABBE_RT;
   [[nodiscard]] std::optional<TrackerMessage> take(const emscon::SingleResult& result) ABBE_RT;
   [[nodiscard]] std::optional<TrackerMessage> take(const emscon::MultiResult& result) ABBE_RT;
-  [[nodiscard]] std::optional<TrackerMessage> take(const emscon::ReflectorPosition&) ABBE_RT { return {}; }
-  [[nodiscard]] std::optional<TrackerMessage> take(const emscon::OtherPacket&) ABBE_RT { return {}; }
+  [[nodiscard]] std::optional<TrackerMessage> take(const emscon::ReflectorPosition&) ABBE_RT {
+    return {};
+  }
+  [[nodiscard]] std::optional<TrackerMessage> take(const emscon::OtherPacket&) ABBE_RT {
+    return {};
+  }
   [[nodiscard]] TrackerMessage nonsense(std::optional<emscon::DecodeError> error,
                                         std::span<const std::byte> bytes) ABBE_RT;
   [[nodiscard]] TrackerMessage burst(std::size_t count) ABBE_RT;
 
-  void convert(const emscon::MultiPoint& from, emscon::Status status, protocol::TrackerPoint& to) ABBE_RT;
+  void convert(const emscon::MultiPoint& from, emscon::Status status,
+               protocol::TrackerPoint& to) ABBE_RT;
   void follow(protocol::TrackerPoint& point) ABBE_RT;
   void mark_hole(std::chrono::nanoseconds since_last, protocol::TrackerPoint& point) ABBE_RT;
   void mark_pending(protocol::SampleHead& head) ABBE_RT;

@@ -1,21 +1,23 @@
 #pragma once
-/// What to ask an emScon controller, and when: the command state machine of a tracker, without its socket.
-/// Sans-I/O: one input and the host time in, at most one action out. The order of commands is the one of the
-/// manufacturer's manual: status, units, settings, environment, Initialize, reflector, bird bath,
-/// coordinates, mode, StartMeasurement. One command at a time. Ordinary world: allocates. One thread.
+/// What to ask an emScon controller, and when: the command state machine of a tracker, without its
+/// socket. Sans-I/O: one input and the host time in, at most one action out. The order of commands
+/// is the one of the manufacturer's manual: status, units, settings, environment, Initialize,
+/// reflector, bird bath, coordinates, mode, StartMeasurement. One command at a time. Ordinary
+/// world: allocates. One thread.
 ///
 ///   Disconnected -> Connecting -> Querying [-> WaitWarm] -> Configuring [-> Initialising] -> Ready
 ///     -> Streaming <-> BeamLost;   Ready -> WaitBeam -> Streaming (no beam yet);   Streaming, BeamLost,
 ///     WaitBeam -> Moving -> Ready (an order);   any -> Stopping -> Disconnected;   any -> [Restoring ->]
 ///     Faulted -> Connecting (after a while)
 ///
-/// Disconnected: the connection failed or ended. Faulted: the peer answered, but wrongly, late or with a
-/// refusal that waiting does not mend. Both try again, after a pause that doubles from try to try until
-/// points come.
+/// Disconnected: the connection failed or ended. Faulted: the peer answered, but wrongly, late or
+/// with a refusal that waiting does not mend. Both try again, after a pause that doubles from try
+/// to try until points come.
 ///
-/// Initialize drops the beam and moves the head: it is sent only to a controller that reports itself not
-/// initialised, or on order. A beam that is not there is waited for: who carries the reflector needs an
-/// undisturbed tracker. What is set is read before, and put back when abbe leaves.
+/// Initialize drops the beam and moves the head: it is sent only to a controller that reports
+/// itself not initialised, or on order. A beam that is not there is waited for: who carries the
+/// reflector needs an undisturbed tracker. What is set is read before, and put back when abbe
+/// leaves.
 
 #include <chrono>
 #include <initializer_list>
@@ -65,35 +67,46 @@ struct TrackerSessionOptions {
   std::int32_t time_separation_ms = 2;  ///< 500 points per second
   double spatial_distance_mm = 1.0;
   std::int32_t stationary_time_ms = 500;
-  std::int32_t packets_per_second = 10;  ///< 3 to 10, what the controller offers; a refusal is no fault
-  std::string reflector;                 ///< name or id; empty: the one that is set in the controller
-  bool home_after_initialize = false;    ///< GoBirdBath, when abbe had to initialise the tracker
+  std::int32_t packets_per_second =
+      10;                 ///< 3 to 10, what the controller offers; a refusal is no fault
+  std::string reflector;  ///< name or id; empty: the one that is set in the controller
+  bool home_after_initialize = false;  ///< GoBirdBath, when abbe had to initialise the tracker
   std::optional<emscon::SetSearchParams> search;  ///< radius in mm; none: as set in the controller
   emscon::WeatherMonitor weather = emscon::WeatherMonitor::ReadAndCompute;
-  emscon::Environment environment;  ///< Celsius, mbar, percent; told to the controller if `weather` is None
+  emscon::Environment
+      environment;  ///< Celsius, mbar, percent; told to the controller if `weather` is None
 
   std::chrono::nanoseconds connect_timeout = std::chrono::seconds{3};
   std::chrono::nanoseconds command_timeout = std::chrono::seconds{3};
   /// The first question of a connection is repeated: who was away hears it as soon as he is back.
   std::chrono::nanoseconds ask_again = std::chrono::milliseconds{250};
-  std::chrono::nanoseconds initialize_timeout = std::chrono::seconds{120};     ///< Initialize and GoBirdBath
-  std::chrono::nanoseconds silence_timeout = std::chrono::milliseconds{1500};  ///< no packet while streaming
-  std::chrono::nanoseconds busy_retry = std::chrono::milliseconds{250};  ///< after "busy" or "not ready"
-  std::chrono::nanoseconds busy_patience = std::chrono::seconds{120};    ///< "busy" for longer is a fault
-  std::chrono::nanoseconds warm_poll = std::chrono::seconds{5};  ///< how often a heating laser is asked
-  std::chrono::nanoseconds resume_within =
-      std::chrono::seconds{1};                                    ///< beam back: then StartMeasurement again
-  std::chrono::nanoseconds keep_alive = std::chrono::seconds{5};  ///< how often a quiet controller is asked
-  std::chrono::nanoseconds first_pause =
-      std::chrono::milliseconds{250};  ///< before connecting again, doubled ...
-  std::chrono::nanoseconds longest_pause =
-      std::chrono::milliseconds{500};  ///< ... up to this: whoever is back streams within a second
-  std::chrono::nanoseconds refused_pause = std::chrono::seconds{5};  ///< after a refusal of a command
-  std::chrono::nanoseconds leave_within = std::chrono::seconds{5};   ///< stop and put back the settings
+  /// Initialize and GoBirdBath
+  std::chrono::nanoseconds initialize_timeout = std::chrono::seconds{120};
+  /// no packet while streaming
+  std::chrono::nanoseconds silence_timeout = std::chrono::milliseconds{1500};
+  /// after "busy" or "not ready"
+  std::chrono::nanoseconds busy_retry = std::chrono::milliseconds{250};
+  /// "busy" for longer is a fault
+  std::chrono::nanoseconds busy_patience = std::chrono::seconds{120};
+  /// how often a heating laser is asked
+  std::chrono::nanoseconds warm_poll = std::chrono::seconds{5};
+  /// beam back: then StartMeasurement again
+  std::chrono::nanoseconds resume_within = std::chrono::seconds{1};
+  /// how often a quiet controller is asked
+  std::chrono::nanoseconds keep_alive = std::chrono::seconds{5};
+  /// before connecting again, doubled ...
+  std::chrono::nanoseconds first_pause = std::chrono::milliseconds{250};
+  /// ... up to this: whoever is back streams within a second
+  std::chrono::nanoseconds longest_pause = std::chrono::milliseconds{500};
+  /// after a refusal of a command
+  std::chrono::nanoseconds refused_pause = std::chrono::seconds{5};
+  /// stop and put back the settings
+  std::chrono::nanoseconds leave_within = std::chrono::seconds{5};
 };
 /// BadConfiguration says which option is out of its range.
 [[nodiscard]] Result<void> check(const TrackerSessionOptions& options);
-/// After which an order has been reported; longer only where the controller is busy before several commands.
+/// After which an order has been reported; longer only where the controller is busy before several
+/// commands.
 [[nodiscard]] std::chrono::nanoseconds longest_order(const TrackerSessionOptions& options) noexcept;
 
 // Inputs. Answers, errors, status changes and nonsense come from the receiver as they are.
@@ -106,9 +119,10 @@ struct TrackerPointsArrived {
 };
 struct TrackerTick {};           ///< time has passed; send one at deadline()
 struct TrackerStopRequested {};  ///< end politely and stay away
-using TrackerInput = std::variant<TrackerTick, TrackerConnected, TrackerConnectionLost, TrackerPointsArrived,
-                                  emscon::Answer, emscon::ErrorResponse, emscon::StatusChange,
-                                  TrackerNonsense, TrackerStopRequested, TrackerOrder>;
+using TrackerInput =
+    std::variant<TrackerTick, TrackerConnected, TrackerConnectionLost, TrackerPointsArrived,
+                 emscon::Answer, emscon::ErrorResponse, emscon::StatusChange, TrackerProtocolError,
+                 TrackerStopRequested, TrackerOrder>;
 
 // Actions.
 struct TrackerNothing {};
@@ -170,7 +184,7 @@ class TrackerSession {
   TrackerAction take(const emscon::Answer& answer);
   TrackerAction take(const emscon::ErrorResponse& error);
   TrackerAction take(const emscon::StatusChange& change);
-  TrackerAction take(const TrackerNonsense& nonsense);
+  TrackerAction take(const TrackerProtocolError& nonsense);
   TrackerAction take(const TrackerStopRequested&);
   TrackerAction take(const TrackerOrder& order);
 
@@ -231,11 +245,12 @@ class TrackerSession {
   std::size_t step_ = 0;
   std::optional<Pending> pending_;
   protocol::HostTime
-      due_{};  ///< of what the state waits for: reconnecting, connection, warm-up, points, keep-alive
+      /// of what the state waits for: reconnecting, connection, warm-up, points, keep-alive
+      due_{};
   std::chrono::nanoseconds pause_{};
   protocol::HostTime beam_lost_at_{};
   std::optional<protocol::HostTime>
-      restart_at_;  ///< the beam is back: StartMeasurement, should no point come before
+      restart_at_;            ///< the beam is back: StartMeasurement, should no point come before
   bool result_came_ = false;  ///< Stationary: the one of the latest StartMeasurement
   bool stopped_ = false;
   Fault fault_;
@@ -249,6 +264,6 @@ class TrackerSession {
 };
 
 /// "expected emScon answer, got 48 54 54 50 \"HTTP...\"".
-[[nodiscard]] std::string describe(const TrackerNonsense& nonsense);
+[[nodiscard]] std::string describe(const TrackerProtocolError& nonsense);
 
 }  // namespace abbe::drivers

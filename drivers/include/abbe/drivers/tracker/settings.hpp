@@ -1,9 +1,9 @@
 #pragma once
-/// What abbe sets in a controller, and what stood there before: other programs use the same controller, so
-/// abbe asks before it sets and puts back what it changed. Ordinary world.
+/// What abbe sets in a controller, and what stood there before: other programs use the same
+/// controller, so abbe asks before it sets and puts back what it changed. Ordinary world.
 ///
-/// The transformation and the station orientation keep their values: abbe switches their use off in the
-/// system settings, and on again at the end. Nivel and camera stay as they are.
+/// The transformation and the station orientation keep their values: abbe switches their use off in
+/// the system settings, and on again at the end. Nivel and camera stay as they are.
 
 #include <optional>
 #include <vector>
@@ -25,8 +25,8 @@ class TrackerSettings {
   [[nodiscard]] std::vector<emscon::Request> questions() const;
   /// An answer to one of them. What the controller does not tell is not put back.
   void found(const emscon::Answer& answer);
-  /// The controller may have forgotten what was set: asks anew. A value that abbe itself set is not taken
-  /// for what stood there before.
+  /// The controller may have forgotten what was set: asks anew. A value that abbe itself set is not
+  /// taken for what stood there before.
   void ask_again() noexcept;
 
   /// What abbe sets with this command, given what was found; none if it does not use it.

@@ -1,7 +1,8 @@
 #pragma once
-/// A USB device on this computer through libusb: asynchronous transfers, hot-plug. An unplug shows itself in
-/// one of two ways, both of which end in UsbLost: transfers end with "no device", or they fail first and the
-/// hot-plug notice comes after. Without a running udev there is no notice; then the next request says it.
+/// A USB device on this computer through libusb: asynchronous transfers, hot-plug. An unplug shows
+/// itself in one of two ways, both of which end in UsbLost: transfers end with "no device", or they
+/// fail first and the hot-plug notice comes after. Without a running udev there is no notice; then
+/// the next request says it.
 
 #include <memory>
 
@@ -12,7 +13,8 @@ namespace abbe::drivers {
 
 class LibusbLink final : public UsbLink {
  public:
-  /// `time` must outlive the link. The interface 0 of the device is claimed, a kernel driver on it detached.
+  /// `time` must outlive the link. The interface 0 of the device is claimed, a kernel driver on it
+  /// detached.
   LibusbLink(const UsbIdentity& identity, const TimeSource& time);
   ~LibusbLink() override;
 

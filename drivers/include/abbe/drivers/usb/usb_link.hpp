@@ -1,7 +1,8 @@
 #pragma once
-/// One USB device as a driver needs it: control transfers one at a time, many bulk-in transfers in flight,
-/// and word of its going. Two back-ends: libusb (LibusbLink) and a USB/IP client in the process (UsbipLink).
-/// All calls from one thread, in the ordinary world; nothing blocks but wait(). What goes wrong is an event.
+/// One USB device as a driver needs it: control transfers one at a time, many bulk-in transfers in
+/// flight, and word of its going. Two back-ends: libusb (LibusbLink) and a USB/IP client in the
+/// process (UsbipLink). All calls from one thread, in the ordinary world; nothing blocks but
+/// wait(). What goes wrong is an event.
 
 #include <array>
 #include <chrono>
@@ -50,9 +51,12 @@ struct UsbControlDone {
   UsbOutcome outcome = UsbOutcome::Done;
   std::array<std::byte, kCapacity> data{};
   std::size_t length = 0;
-  [[nodiscard]] std::span<const std::byte> bytes() const noexcept { return std::span{data}.first(length); }
+  [[nodiscard]] std::span<const std::byte> bytes() const noexcept {
+    return std::span{data}.first(length);
+  }
 };
-/// One transfer that ended; its request goes out again by itself. The bytes are lent until the next wait().
+/// One transfer that ended; its request goes out again by itself. The bytes are lent until the next
+/// wait().
 struct UsbBulkIn {
   std::span<const std::byte> bytes;
   protocol::HostTime arrival{};
@@ -77,21 +81,23 @@ class UsbLink {
   virtual void open() = 0;
   /// At once and without an event.
   virtual void close() noexcept = 0;
-  /// One at a time; UsbControlDone follows, or nothing ever if the device does not answer. Writes have no
-  /// data. usb::clear_halt() also clears the host's side of it.
+  /// One at a time; UsbControlDone follows, or nothing ever if the device does not answer. Writes
+  /// have no data. usb::clear_halt() also clears the host's side of it.
   virtual void control(const usb::Setup& setup) = 0;
   /// Requests from the bulk endpoint of the identity, always `in_flight` of them.
   virtual void start_bulk_in(const UsbBulkStream& stream) = 0;
   /// Takes all requests back; UsbBulkStopped follows.
   virtual void stop_bulk_in() = 0;
-  /// Waits for at most `wall` of the operating system's time. The events are valid until the next call.
+  /// Waits for at most `wall` of the operating system's time. The events are valid until the next
+  /// call.
   [[nodiscard]] virtual std::span<const UsbEvent> wait(std::chrono::nanoseconds wall) = 0;
   /// For messages: "USB 09DB:00CA", "USB/IP 127.0.0.1:3240 1-1".
   [[nodiscard]] virtual std::string name() const = 0;
 };
 
 /// "it is 1209:0001, configured is 09DB:00CA"; empty if it is the right one.
-[[nodiscard]] std::string wrong_ids(const UsbIdentity& wanted, std::uint16_t vendor, std::uint16_t product);
+[[nodiscard]] std::string wrong_ids(const UsbIdentity& wanted, std::uint16_t vendor,
+                                    std::uint16_t product);
 /// "its serial number is A, configured is B"; empty if it is the right one or none is configured.
 [[nodiscard]] std::string wrong_serial(const UsbIdentity& wanted, std::string_view serial);
 

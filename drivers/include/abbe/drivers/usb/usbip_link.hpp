@@ -1,6 +1,7 @@
 #pragma once
-/// A USB device behind a USB/IP server, without the kernel: for simulated devices, for devices on another
-/// computer, and where no kernel module may be loaded. TCP; the server may be `usbipd` or abbe-sim.
+/// A USB device behind a USB/IP server, without the kernel: for simulated devices, for devices on
+/// another computer, and where no kernel module may be loaded. TCP; the server may be `usbipd` or
+/// abbe-sim.
 
 #include <cstdint>
 #include <string>

@@ -1,6 +1,7 @@
 #pragma once
 /// CANopen communication objects that are one frame each: NMT, SYNC, heartbeat, EMCY [CiA 301].
-/// Every decoder is total: a frame that is not exactly such an object gives nullopt. Pure, no allocation.
+/// Every decoder is total: a frame that is not exactly such an object gives nullopt. Pure, no
+/// allocation.
 
 #include <array>
 #include <cstddef>
@@ -61,7 +62,12 @@ struct Sync {
 [[nodiscard]] std::optional<Sync> decode_sync(const CanFrame& frame) ABBE_RT;
 
 /// NMT state as the heartbeat carries it; 0 is the boot-up message, sent once after a reset.
-enum class NodeState : std::uint8_t { BootUp = 0, Stopped = 4, Operational = 5, PreOperational = 127 };
+enum class NodeState : std::uint8_t {
+  BootUp = 0,
+  Stopped = 4,
+  Operational = 5,
+  PreOperational = 127
+};
 struct Heartbeat {
   NodeId node = 0;
   NodeState state{};
@@ -85,8 +91,8 @@ enum class EmergencyCode : std::uint16_t {
   IdCollision = 0x8150,
   PdoLength = 0x8210,
 };
-/// The class of an emergency error code in words: "communication: CAN overrun", "device specific". Static
-/// storage.
+/// The class of an emergency error code in words: "communication: CAN overrun", "device specific".
+/// Static storage.
 [[nodiscard]] const char* emergency_text(std::uint16_t code) noexcept;
 /// Bits of the error register 1001h [CiA 301].
 enum class ErrorRegister : std::uint8_t {

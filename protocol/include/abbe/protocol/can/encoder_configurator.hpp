@@ -1,15 +1,16 @@
 #pragma once
-/// Brings one encoder from any state to "sends its position at every SYNC" [CiA 301: PDO configuration
-/// order]. Sans-I/O like the SdoClient it drives: frames and a time in, frames out. No allocation. Not
-/// thread-safe.
+/// Brings one encoder from any state to "sends its position at every SYNC"
+/// [CiA 301: PDO configuration order]. Sans-I/O like the SdoClient it drives: frames and a time in,
+/// frames out. No allocation. Not thread-safe.
 ///
-/// Order: NMT pre-operational; read 1000h and 1018h and check them; read the step and check it (6005h:01,
-/// else 6501h; rotary: 6001h where 6000h says that scaling is on, else 6501h); disable the TPDO; clear its
-/// mapping; map the position; set the count; transmission type, inhibit time, event timer; enable it;
-/// heartbeat; disable the other default TPDO; NMT start.
+/// Order: NMT pre-operational; read 1000h and 1018h and check them; read the step and check it
+/// (6005h:01, else 6501h; rotary: 6001h where 6000h says that scaling is on, else 6501h); disable
+/// the TPDO; clear its mapping; map the position; set the count; transmission type, inhibit time,
+/// event timer; enable it; heartbeat; disable the other default TPDO; NMT start.
 ///
-/// An encoder that refuses a write is read: one with a fixed mapping, transmission type or identifier is as
-/// good if that is what is needed, and one without a settable heartbeat is watched by its positions.
+/// An encoder that refuses a write is read: one with a fixed mapping, transmission type or
+/// identifier is as good if that is what is needed, and one without a settable heartbeat is watched
+/// by its positions.
 
 #include <array>
 #include <cstddef>
@@ -34,9 +35,10 @@ struct EncoderPlan {
   std::optional<std::uint32_t> vendor{};  ///< checked against 1018h when given
   std::optional<std::uint32_t> product{};
   std::optional<std::uint32_t> serial{};
-  std::optional<bool> linear{};     ///< checked against 1000h when given
-  bool needs_scale = false;         ///< a node that does not know its step, or says 0, is refused
-  std::optional<double> step_nm{};  ///< linear: what it must be, if the node says it, within half a nm
+  std::optional<bool> linear{};  ///< checked against 1000h when given
+  bool needs_scale = false;      ///< a node that does not know its step, or says 0, is refused
+  std::optional<double>
+      step_nm{};  ///< linear: what it must be, if the node says it, within half a nm
   std::optional<double> units_per_revolution{};  ///< rotary: the same, within 1e-5
 };
 
@@ -58,11 +60,11 @@ struct EncoderDescription {
   std::uint32_t product = 0;
   std::uint32_t revision = 0;
   std::uint32_t serial = 0;
-  std::optional<std::uint32_t> step_nm;               ///< linear, as read: 0 is for the caller to refuse
+  std::optional<std::uint32_t> step_nm;  ///< linear, as read: 0 is for the caller to refuse
   std::optional<std::uint32_t> operating_parameters;  ///< rotary: 6000h
   std::optional<std::uint32_t> units_per_revolution;  ///< rotary
-  std::optional<std::uint32_t> total_range;           ///< rotary: counts after which the position wraps
-  std::optional<std::uint32_t> revolutions;           ///< rotary without scaling: 6502h
+  std::optional<std::uint32_t> total_range;  ///< rotary: counts after which the position wraps
+  std::optional<std::uint32_t> revolutions;  ///< rotary without scaling: 6502h
   bool fixed_mapping = false;      ///< its TPDO could not be mapped, and holds the position
   std::uint8_t position_byte = 0;  ///< where in the TPDO the position begins
 };

@@ -1,6 +1,6 @@
 #pragma once
-/// What the CAN controller says about the bus, from Linux error frames (class bits in the identifier)
-/// [linux/can/error.h]. Pure, total, no allocation.
+/// What the CAN controller says about the bus, from Linux error frames (class bits in the
+/// identifier) [linux/can/error.h]. Pure, total, no allocation.
 
 #include <cstdint>
 #include <optional>

@@ -1,6 +1,6 @@
 #pragma once
-/// One CAN frame, classic or FD, as plain data: what every bus transport hands up and every codec of this
-/// folder reads. Pure; safe to copy between threads.
+/// One CAN frame, classic or FD, as plain data: what every bus transport hands up and every codec
+/// of this folder reads. Pure; safe to copy between threads.
 
 #include <algorithm>
 #include <array>
@@ -18,8 +18,10 @@ namespace abbe::protocol::can {
 enum class FrameFlag : std::uint8_t {
   Extended = 1u << 0,  ///< 29-bit identifier
   Remote = 1u << 1,    ///< remote request: `length` is the requested length, there are no data
-  Error = 1u << 2,  ///< made by the local controller, `id` holds Linux error class bits (see error_frame.hpp)
-  Fd = 1u << 3,     ///< CAN FD format: up to 64 bytes, `fd_flags` hold BRS (1) and ESI (2)
+  Error = 1u
+          /// made by the local controller, `id` holds Linux error class bits (see error_frame.hpp)
+          << 2,
+  Fd = 1u << 3,  ///< CAN FD format: up to 64 bytes, `fd_flags` hold BRS (1) and ESI (2)
 };
 
 struct CanFrame {
@@ -68,8 +70,8 @@ static_assert(sizeof(CanFrame) == 72);
   std::copy_n(payload.begin(), n, frame.data.begin());
   return frame;
 }
-[[nodiscard]] constexpr CanFrame standard_frame(std::uint32_t id,
-                                                std::initializer_list<std::uint8_t> payload) ABBE_RT {
+[[nodiscard]] constexpr CanFrame standard_frame(
+    std::uint32_t id, std::initializer_list<std::uint8_t> payload) ABBE_RT {
   std::array<std::byte, CanFrame::kMaxClassicData> bytes{};
   std::size_t n = 0;
   for (const auto value : payload) {

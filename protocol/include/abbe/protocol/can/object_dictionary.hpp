@@ -1,10 +1,12 @@
 #pragma once
 /// The object dictionary of one encoder, server side: values, access rights and the rules of PDO
-/// configuration [CiA 301, CiA 406]. For simulators and tests. Fixed size, no allocation. Not thread-safe.
+/// configuration [CiA 301, CiA 406]. For simulators and tests. Fixed size, no allocation. Not
+/// thread-safe.
 ///
-/// Rules beyond plain access: a mapping (1A00h) changes only while its PDO is disabled, its lines only while
-/// sub 0 is 0; a PDO's identifier changes only while disabled; only 6004h, 6008h, 6020h, 6030h, 6500h and
-/// 6503h..6505h can be mapped; 6003h and 6009h set the position; 6200h is 1800h:05.
+/// Rules beyond plain access: a mapping (1A00h) changes only while its PDO is disabled, its lines
+/// only while sub 0 is 0; a PDO's identifier changes only while disabled; only 6004h, 6008h, 6020h,
+/// 6030h, 6500h and 6503h..6505h can be mapped; 6003h and 6009h set the position; 6200h is
+/// 1800h:05.
 
 #include <array>
 #include <cstddef>
@@ -30,8 +32,8 @@ struct EncoderIdentity {
   std::uint32_t product = 0;
   std::uint32_t revision = 0;
   std::uint32_t serial = 0;
-  std::string_view name = "abbe encoder";        ///< 1008h, at most kMaxSdoBytes
-  std::uint32_t step_nm = 10;                    ///< 6005h:01, linear: 10 nm covers +-21.47 m in 32 bits
+  std::string_view name = "abbe encoder";  ///< 1008h, at most kMaxSdoBytes
+  std::uint32_t step_nm = 10;              ///< 6005h:01, linear: 10 nm covers +-21.47 m in 32 bits
   std::uint32_t units_per_revolution = 1 << 20;  ///< 6001h, rotary
   std::uint32_t total_range = 0x7FFFFFFF;        ///< 6002h
   bool has_position64 = true;                    ///< 6008h, 6009h exist (CiA 406 v3.1)
@@ -57,7 +59,8 @@ class ObjectDictionary {
   // From the wire, with all rules. None = accepted.
   [[nodiscard]] AbortCode write(ObjectId object, std::span<const std::byte> value) noexcept;
   /// Copies the value into `out` (kMaxSdoBytes suffice) and sets `size`.
-  [[nodiscard]] AbortCode read(ObjectId object, std::span<std::byte> out, std::size_t& size) const noexcept;
+  [[nodiscard]] AbortCode read(ObjectId object, std::span<std::byte> out,
+                               std::size_t& size) const noexcept;
   /// None when the object could be read, or written, at all (before its value is looked at).
   [[nodiscard]] AbortCode may_read(ObjectId object) const noexcept;
   [[nodiscard]] AbortCode may_write(ObjectId object) const noexcept;
@@ -76,12 +79,14 @@ class ObjectDictionary {
   [[nodiscard]] std::int64_t position() const noexcept { return raw_position_ + offset_; }
 
   [[nodiscard]] TpdoSettings tpdo(unsigned number) const noexcept;  ///< number 1 or 2
-  /// The TPDO with present values, as the mapping says. Total: unknown objects in the mapping give zeros.
+  /// The TPDO with present values, as the mapping says. Total: unknown objects in the mapping give
+  /// zeros.
   [[nodiscard]] CanFrame tpdo_frame(unsigned number) const noexcept;
 
   /// Into 1001h and to the front of 1003h (four are kept); code 0 clears 1001h only.
   void record_error(std::uint16_t code, std::uint8_t error_register) noexcept;
-  /// Factory values of everything writable (NMT reset node); the preset's offset stays, as stored presets do.
+  /// Factory values of everything writable (NMT reset node); the preset's offset stays, as stored
+  /// presets do.
   void reset() noexcept;
 
  private:

@@ -1,6 +1,6 @@
 #pragma once
-/// Process data: mapping entries [CiA 301, object 1A00h] and the position inside a TPDO [CiA 406, objects
-/// 6004h, 6008h]. Pure, no allocation, total.
+/// Process data: mapping entries [CiA 301, object 1A00h] and the position inside a TPDO
+/// [CiA 406, objects 6004h, 6008h]. Pure, no allocation, total.
 
 #include <array>
 #include <cstddef>
@@ -13,7 +13,8 @@
 
 namespace abbe::protocol::can {
 
-/// One line of a mapping: object and how many bits of it, as 1A00h holds it: index << 16 | sub << 8 | bits.
+/// One line of a mapping: object and how many bits of it, as 1A00h holds it: index << 16 | sub << 8
+/// | bits.
 struct MappedObject {
   std::uint16_t index = 0;
   std::uint8_t sub = 0;
@@ -32,7 +33,8 @@ struct MappedObject {
 enum class PositionType : std::uint8_t {
   Signed32,    ///< 6004h of linear encoders
   Unsigned32,  ///< 6004h of rotary encoders
-  Signed64,    ///< 6008h; CiA 406 v3.1 leaves the signedness open, a scale that crosses zero needs the sign
+  /// 6008h; CiA 406 v3.1 leaves the signedness open, a scale that crosses zero needs the sign
+  Signed64,
 };
 [[nodiscard]] constexpr std::size_t size_of(PositionType type) noexcept {
   return type == PositionType::Signed64 ? 8 : 4;
@@ -42,11 +44,14 @@ enum class PositionType : std::uint8_t {
   return type == PositionType::Signed64 ? MappedObject{0x6008, 0, 64} : MappedObject{0x6004, 0, 32};
 }
 
-/// A position in device counts from the payload of a TPDO, `offset` bytes into it; nullopt when it is too
-/// short.
+/// A position in device counts from the payload of a TPDO, `offset` bytes into it; nullopt when it
+/// is too short.
 [[nodiscard]] std::optional<std::int64_t> decode_position(std::span<const std::byte> payload,
-                                                          PositionType type, std::size_t offset = 0) ABBE_RT;
-/// A TPDO that holds just one position; counts that do not fit 32 bits wrap, as a device's counter does.
-[[nodiscard]] CanFrame encode_position(std::uint32_t cob_id, PositionType type, std::int64_t count) ABBE_RT;
+                                                          PositionType type,
+                                                          std::size_t offset = 0) ABBE_RT;
+/// A TPDO that holds just one position; counts that do not fit 32 bits wrap, as a device's counter
+/// does.
+[[nodiscard]] CanFrame encode_position(std::uint32_t cob_id, PositionType type,
+                                       std::int64_t count) ABBE_RT;
 
 }  // namespace abbe::protocol::can

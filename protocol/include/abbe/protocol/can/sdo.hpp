@@ -14,8 +14,8 @@ struct ObjectId {
   friend constexpr auto operator<=>(const ObjectId&, const ObjectId&) = default;
 };
 
-/// The longest object this stack carries; longer ones are refused with OutOfMemory. Encoders' objects are
-/// numbers and names.
+/// The longest object this stack carries; longer ones are refused with OutOfMemory. Encoders'
+/// objects are numbers and names.
 inline constexpr std::size_t kMaxSdoBytes = 128;
 
 enum class AbortCode : std::uint32_t {
@@ -47,8 +47,8 @@ enum class AbortCode : std::uint32_t {
   LocalControl = 0x08000021,
   DeviceState = 0x08000022,
 };
-/// What the object is, not what the node is at the moment (booting, storing, a hardware fault): asking again
-/// does not change it.
+/// What the object is, not what the node is at the moment (booting, storing, a hardware fault):
+/// asking again does not change it.
 [[nodiscard]] constexpr bool is_lasting(AbortCode code) noexcept {
   const auto value = static_cast<std::uint32_t>(code);
   return value >> 24 == 0x06 && code != AbortCode::Hardware;

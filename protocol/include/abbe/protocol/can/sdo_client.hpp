@@ -1,10 +1,11 @@
 #pragma once
-/// One SDO transfer at a time with one node: expedited and segmented, both directions [CiA 301]. Sans-I/O:
-/// frames and a time in, frames out. No allocation. Not thread-safe; not for the real-time path.
+/// One SDO transfer at a time with one node: expedited and segmented, both directions [CiA 301].
+/// Sans-I/O: frames and a time in, frames out. No allocation. Not thread-safe; not for the
+/// real-time path.
 ///
-/// Use: start_*(), then send whatever take_frame() gives after every start_*(), on_frame() and on_time().
-/// A server that stays silent for `timeout` is sent an abort (05040000h) and the transfer begins again,
-/// `retries` times.
+/// Use: start_*(), then send whatever take_frame() gives after every start_*(), on_frame() and
+/// on_time(). A server that stays silent for `timeout` is sent an abort (05040000h) and the
+/// transfer begins again, `retries` times.
 
 #include <array>
 #include <chrono>
@@ -29,7 +30,8 @@ class SdoClient {
  public:
   enum class State : std::uint8_t { Idle, Busy, Done, Failed };
 
-  explicit SdoClient(NodeId node, SdoClientOptions options = {}) noexcept : node_(node), options_(options) {}
+  explicit SdoClient(NodeId node, SdoClientOptions options = {}) noexcept
+      : node_(node), options_(options) {}
 
   /// Reads an object. A transfer that is under way is forgotten.
   void start_upload(ObjectId object, HostTime now) noexcept;
@@ -52,8 +54,11 @@ class SdoClient {
   [[nodiscard]] AbortCode abort_code() const noexcept { return abort_code_; }
   /// The code came from the server, not from here.
   [[nodiscard]] bool aborted_by_server() const noexcept { return aborted_by_server_; }
-  /// What an upload read, once Done; what is being written during a download. Valid until the next start.
-  [[nodiscard]] std::span<const std::byte> value() const noexcept { return {buffer_.data(), size_}; }
+  /// What an upload read, once Done; what is being written during a download. Valid until the next
+  /// start.
+  [[nodiscard]] std::span<const std::byte> value() const noexcept {
+    return {buffer_.data(), size_};
+  }
   /// value() as a little-endian number; nullopt when it is not 1 to 8 bytes.
   [[nodiscard]] std::optional<std::uint64_t> number() const noexcept;
 

@@ -1,6 +1,7 @@
 #pragma once
-/// The other end of the SdoClient: answers for one node out of its object dictionary [CiA 301]. Sans-I/O, no
-/// allocation, total: any request gets an answer or an abort. Not thread-safe. For simulators and tests.
+/// The other end of the SdoClient: answers for one node out of its object dictionary [CiA 301].
+/// Sans-I/O, no allocation, total: any request gets an answer or an abort. Not thread-safe. For
+/// simulators and tests.
 
 #include <array>
 #include <chrono>

@@ -1,8 +1,9 @@
 #pragma once
-/// CAN frames in UDP datagrams, the cannelloni framing: u8 version 2, u8 opcode 0, u8 sequence, u16 BE count,
-/// then per frame u32 BE id with Linux's flag bits (80000000h EFF, 40000000h RTR, 20000000h error), u8 length
-/// (bit 7: CAN FD, then one more byte of FD flags), data (none for RTR). Pure, no allocation; the decoder is
-/// total and checks the whole datagram before it gives the first frame.
+/// CAN frames in UDP datagrams, the cannelloni framing: u8 version 2, u8 opcode 0, u8 sequence, u16
+/// BE count, then per frame u32 BE id with Linux's flag bits (80000000h EFF, 40000000h RTR,
+/// 20000000h error), u8 length (bit 7: CAN FD, then one more byte of FD flags), data (none for
+/// RTR). Pure, no allocation; the decoder is total and checks the whole datagram before it gives
+/// the first frame.
 
 #include <cstddef>
 #include <cstdint>
@@ -19,8 +20,8 @@ inline constexpr std::size_t kDatagramHeader = 5;
 /// Bytes of an encoded frame.
 [[nodiscard]] std::size_t encoded_size(const CanFrame& frame) ABBE_RT;
 
-/// Writes frames into a caller's buffer. add() is false when the next frame does not fit: send finish(),
-/// start anew.
+/// Writes frames into a caller's buffer. add() is false when the next frame does not fit: send
+/// finish(), start anew.
 class DatagramWriter {
  public:
   /// `buffer` holds at least kDatagramHeader bytes and outlives the writer.
@@ -58,19 +59,20 @@ class DatagramView {
   [[nodiscard]] bool next(CanFrame& frame) ABBE_RT;
 
  private:
-  DatagramView(std::span<const std::byte> frames, std::uint8_t sequence, std::uint16_t count) ABBE_RT
-      : rest_(frames),
-        sequence_(sequence),
-        count_(count),
-        left_(count) {}
+  DatagramView(std::span<const std::byte> frames, std::uint8_t sequence,
+               std::uint16_t count) ABBE_RT : rest_(frames),
+                                              sequence_(sequence),
+                                              count_(count),
+                                              left_(count) {}
   std::span<const std::byte> rest_;
   std::uint8_t sequence_;
   std::uint16_t count_;
   std::uint16_t left_;
 };
 
-/// Lost datagrams by their sequence number, which wraps at 256. A number from the half before the expected
-/// one is an old datagram that comes late: counted as such, it does not move the expectation.
+/// Lost datagrams by their sequence number, which wraps at 256. A number from the half before the
+/// expected one is an old datagram that comes late: counted as such, it does not move the
+/// expectation.
 class SequenceGaps {
  public:
   /// How many datagrams are missing between the last one and this one.

@@ -1,7 +1,7 @@
 #pragma once
-/// What an emScon controller answers (packet type 0, controller to client): one answer per request, with the
-/// number of its command, but for GetReflectors, which gets one per reflector. Units as in requests.hpp.
-/// Pure, allocation-free, total.
+/// What an emScon controller answers (packet type 0, controller to client): one answer per request,
+/// with the number of its command, but for GetReflectors, which gets one per reflector. Units as in
+/// requests.hpp. Pure, allocation-free, total.
 
 #include <array>
 #include <cstddef>
@@ -17,7 +17,8 @@ namespace abbe::protocol::emscon {
 
 using Name = std::array<char16_t, 32>;  ///< UTF-16, ends at the first zero
 
-/// The answer to every command that has nothing to tell but its outcome, and to any command that was refused.
+/// The answer to every command that has nothing to tell but its outcome, and to any command that
+/// was refused.
 struct Acknowledge {
   Command command{};
   Status status = Status::Ok;
@@ -120,11 +121,14 @@ struct SettingAnswer {
   Status status = Status::Ok;
   Set set;
 };
-using StationOrientationAnswer = SettingAnswer<SetStationOrientation, Command::GetStationOrientation>;
+using StationOrientationAnswer =
+    SettingAnswer<SetStationOrientation, Command::GetStationOrientation>;
 using TransformationAnswer = SettingAnswer<SetTransformation, Command::GetTransformation>;
 using MeasurementModeAnswer = SettingAnswer<SetMeasurementMode, Command::GetMeasurementMode>;
-using CoordinateSystemTypeAnswer = SettingAnswer<SetCoordinateSystemType, Command::GetCoordinateSystemType>;
-using StationaryModeParamsAnswer = SettingAnswer<SetStationaryModeParams, Command::GetStationaryModeParams>;
+using CoordinateSystemTypeAnswer =
+    SettingAnswer<SetCoordinateSystemType, Command::GetCoordinateSystemType>;
+using StationaryModeParamsAnswer =
+    SettingAnswer<SetStationaryModeParams, Command::GetStationaryModeParams>;
 using ContinuousTimeModeParamsAnswer =
     SettingAnswer<SetContinuousTimeModeParams, Command::GetContinuousTimeModeParams>;
 using ContinuousDistanceModeParamsAnswer =
@@ -133,13 +137,14 @@ using SearchParamsAnswer = SettingAnswer<SetSearchParams, Command::GetSearchPara
 using StatisticModeAnswer = SettingAnswer<SetStatisticMode, Command::GetStatisticMode>;
 
 using Answer =
-    std::variant<Acknowledge, SystemStatusAnswer, TrackerStatusAnswer, UnitsAnswer, EnvironmentAnswer,
-                 RefractionAnswer, ReflectorAnswer, ReflectorsAnswer, SystemSettingsAnswer,
-                 LongSystemParameterAnswer, MeasurementStatusInfoAnswer, ObjectTemperatureAnswer,
-                 TriggerBoardInfoAnswer, TrackerInfoAnswer, StationOrientationAnswer, TransformationAnswer,
-                 MeasurementModeAnswer, CoordinateSystemTypeAnswer, StationaryModeParamsAnswer,
-                 ContinuousTimeModeParamsAnswer, ContinuousDistanceModeParamsAnswer, SearchParamsAnswer,
-                 StatisticModeAnswer>;
+    std::variant<Acknowledge, SystemStatusAnswer, TrackerStatusAnswer, UnitsAnswer,
+                 EnvironmentAnswer, RefractionAnswer, ReflectorAnswer, ReflectorsAnswer,
+                 SystemSettingsAnswer, LongSystemParameterAnswer, MeasurementStatusInfoAnswer,
+                 ObjectTemperatureAnswer, TriggerBoardInfoAnswer, TrackerInfoAnswer,
+                 StationOrientationAnswer, TransformationAnswer, MeasurementModeAnswer,
+                 CoordinateSystemTypeAnswer, StationaryModeParamsAnswer,
+                 ContinuousTimeModeParamsAnswer, ContinuousDistanceModeParamsAnswer,
+                 SearchParamsAnswer, StatisticModeAnswer>;
 
 inline constexpr std::size_t kMaxAnswerSize = 164;
 
@@ -149,9 +154,10 @@ inline constexpr std::size_t kMaxAnswerSize = 164;
 /// Bytes written to `out`, 0 if it is too small; kMaxAnswerSize always suffices.
 [[nodiscard]] std::size_t encode(const Answer&, std::span<std::byte> out) ABBE_RT;
 
-/// `packet` is one whole packet. 16 bytes are an Acknowledge whatever the command (that is how a query is
-/// refused); a longer packet of a command with an answer of its own is that answer, and may have more bytes
-/// at its end than known here (later firmware appends), which are ignored.
-[[nodiscard]] tl::expected<Answer, DecodeError> decode_answer(std::span<const std::byte> packet) ABBE_RT;
+/// `packet` is one whole packet. 16 bytes are an Acknowledge whatever the command (that is how a
+/// query is refused); a longer packet of a command with an answer of its own is that answer, and
+/// may have more bytes at its end than known here (later firmware appends), which are ignored.
+[[nodiscard]] tl::expected<Answer, DecodeError> decode_answer(
+    std::span<const std::byte> packet) ABBE_RT;
 
 }  // namespace abbe::protocol::emscon

@@ -1,7 +1,8 @@
 #pragma once
-/// What a client asks of an emScon controller (packet type 0, client to controller). Lengths, angles,
-/// temperatures, pressures and humidity are in the units that SetUnits chose, hence no unit in their names;
-/// the driver always chooses mm, rad, Celsius, mbar and percent. Pure, allocation-free, total.
+/// What a client asks of an emScon controller (packet type 0, client to controller). Lengths,
+/// angles, temperatures, pressures and humidity are in the units that SetUnits chose, hence no unit
+/// in their names; the driver always chooses mm, rad, Celsius, mbar and percent. Pure,
+/// allocation-free, total.
 
 #include <array>
 #include <cstddef>
@@ -172,18 +173,18 @@ struct GetLongSystemParameter {
   LongParameter parameter = LongParameter::TcpDataPacketRate;
 };
 
-using Request =
-    std::variant<GetSystemStatus, GetTrackerStatus, SetUnits, GetUnits, Initialize, SetStationOrientation,
-                 SetTransformation, SetEnvironmentParams, GetEnvironmentParams, SetRefractionParams,
-                 GetRefractionParams, SetMeasurementMode, SetCoordinateSystemType, SetStationaryModeParams,
-                 SetContinuousTimeModeParams, SetContinuousDistanceModeParams, GetStationOrientation,
-                 GetTransformation, GetMeasurementMode, GetCoordinateSystemType, GetStationaryModeParams,
-                 GetContinuousTimeModeParams, GetContinuousDistanceModeParams, GetSearchParams,
-                 GetStatisticMode, SetReflector, GetReflector, GetReflectors, SetSearchParams,
-                 SetSystemSettings, GetSystemSettings, StartMeasurement, StopMeasurement, GoBirdBath,
-                 GoPosition, FindReflector, SetStatisticMode, SetTriggerSource, SetExternTriggerParams,
-                 SetLongSystemParameter, GetLongSystemParameter, GetMeasurementStatusInfo,
-                 GetObjectTemperature, GetTriggerBoardInfo, GetTrackerInfo>;
+using Request = std::variant<
+    GetSystemStatus, GetTrackerStatus, SetUnits, GetUnits, Initialize, SetStationOrientation,
+    SetTransformation, SetEnvironmentParams, GetEnvironmentParams, SetRefractionParams,
+    GetRefractionParams, SetMeasurementMode, SetCoordinateSystemType, SetStationaryModeParams,
+    SetContinuousTimeModeParams, SetContinuousDistanceModeParams, GetStationOrientation,
+    GetTransformation, GetMeasurementMode, GetCoordinateSystemType, GetStationaryModeParams,
+    GetContinuousTimeModeParams, GetContinuousDistanceModeParams, GetSearchParams, GetStatisticMode,
+    SetReflector, GetReflector, GetReflectors, SetSearchParams, SetSystemSettings,
+    GetSystemSettings, StartMeasurement, StopMeasurement, GoBirdBath, GoPosition, FindReflector,
+    SetStatisticMode, SetTriggerSource, SetExternTriggerParams, SetLongSystemParameter,
+    GetLongSystemParameter, GetMeasurementStatusInfo, GetObjectTemperature, GetTriggerBoardInfo,
+    GetTrackerInfo>;
 
 inline constexpr std::size_t kMaxRequestSize = 68;
 
@@ -192,7 +193,9 @@ inline constexpr std::size_t kMaxRequestSize = 68;
 /// Bytes written to `out`, 0 if it is too small; kMaxRequestSize always suffices.
 [[nodiscard]] std::size_t encode(const Request&, std::span<std::byte> out) ABBE_RT;
 
-/// `packet` is one whole packet, as the framer gives it. The size must be the one of the layout, exactly.
-[[nodiscard]] tl::expected<Request, DecodeError> decode_request(std::span<const std::byte> packet) ABBE_RT;
+/// `packet` is one whole packet, as the framer gives it. The size must be the one of the layout,
+/// exactly.
+[[nodiscard]] tl::expected<Request, DecodeError> decode_request(
+    std::span<const std::byte> packet) ABBE_RT;
 
 }  // namespace abbe::protocol::emscon

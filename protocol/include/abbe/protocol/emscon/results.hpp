@@ -1,7 +1,7 @@
 #pragma once
-/// What an emScon controller sends unasked: measurements, errors, changes of state; and `decode`, for
-/// whatever it sends. Values are in the units of SetUnits and the coordinates of SetCoordinateSystemType.
-/// Pure, allocation-free, total.
+/// What an emScon controller sends unasked: measurements, errors, changes of state; and `decode`,
+/// for whatever it sends. Values are in the units of SetUnits and the coordinates of
+/// SetCoordinateSystemType. Pure, allocation-free, total.
 
 #include <array>
 #include <cassert>
@@ -76,40 +76,44 @@ inline constexpr std::size_t kMaxMultiPoints = (kMaxPacketSize - kMultiHeadSize)
 inline constexpr std::size_t kMaxExtendedMultiPoints =
     (kMaxPacketSize - kMultiHeadSize) / kExtendedMultiPointSize;
 
-/// Types 3 and 10: a burst of points of a continuous measurement. A view of the packet's bytes, which must
-/// outlive it; points are read where they lie.
+/// Types 3 and 10: a burst of points of a continuous measurement. A view of the packet's bytes,
+/// which must outlive it; points are read where they lie.
 class MultiResult {
  public:
   /// Total: `packet` of any bytes gives a result or an error.
-  [[nodiscard]] static tl::expected<MultiResult, DecodeError> from(std::span<const std::byte> packet) ABBE_RT;
+  [[nodiscard]] static tl::expected<MultiResult, DecodeError> from(
+      std::span<const std::byte> packet) ABBE_RT;
 
   [[nodiscard]] const MultiHead& head() const ABBE_RT { return head_; }
   [[nodiscard]] bool extended() const ABBE_RT { return point_size_ == kExtendedMultiPointSize; }
   [[nodiscard]] std::size_t size() const ABBE_RT { return points_.size() / point_size_; }
-  [[nodiscard]] MultiPoint point(std::size_t k) const ABBE_RT;                 ///< k < size()
-  [[nodiscard]] MultiPointStatistics statistics(std::size_t k) const ABBE_RT;  ///< k < size(), extended()
+  [[nodiscard]] MultiPoint point(std::size_t k) const ABBE_RT;  ///< k < size()
+  /// k < size(), extended()
+  [[nodiscard]] MultiPointStatistics statistics(std::size_t k) const ABBE_RT;
 
  private:
-  MultiResult(const MultiHead& head, std::span<const std::byte> points, std::size_t point_size) ABBE_RT
-      : head_(head),
-        points_(points),
-        point_size_(point_size) {}
+  MultiResult(const MultiHead& head, std::span<const std::byte> points,
+              std::size_t point_size) ABBE_RT : head_(head),
+                                                points_(points),
+                                                point_size_(point_size) {}
 
   MultiHead head_;
   std::span<const std::byte> points_;
   std::size_t point_size_;
 };
 
-/// A packet of a known type whose layout is not needed here (six-degree-of-freedom probes, Nivel, type 9).
+/// A packet of a known type whose layout is not needed here (six-degree-of-freedom probes, Nivel,
+/// type 9).
 struct OtherPacket {
   PacketType type{};
 };
 
-using ControllerPacket = std::variant<Answer, ErrorResponse, StatusChange, SingleResult, ReflectorPosition,
-                                      MultiResult, OtherPacket>;
+using ControllerPacket = std::variant<Answer, ErrorResponse, StatusChange, SingleResult,
+                                      ReflectorPosition, MultiResult, OtherPacket>;
 
 /// Whatever a controller sends. `packet` is one whole packet, as the framer gives it.
-[[nodiscard]] tl::expected<ControllerPacket, DecodeError> decode(std::span<const std::byte> packet) ABBE_RT;
+[[nodiscard]] tl::expected<ControllerPacket, DecodeError> decode(
+    std::span<const std::byte> packet) ABBE_RT;
 
 /// Bytes written to `out`, 0 if it is too small (or the points are more than one packet holds).
 [[nodiscard]] std::size_t encode(const ErrorResponse&, std::span<std::byte> out) ABBE_RT;

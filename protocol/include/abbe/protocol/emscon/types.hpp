@@ -1,7 +1,8 @@
 #pragma once
-/// The numbers of the Leica emScon TPI (the TCP interface of LTD and AT901 tracker controllers, and of AT40x
-/// in part). Source: the numeric facts of the emScon TPI 3.6 interface as public clients use them. On the
-/// wire every enum is a little-endian int32, so that a value unknown here is kept as it is and never refused.
+/// The numbers of the Leica emScon TPI (the TCP interface of LTD and AT901 tracker controllers, and
+/// of AT40x in part). Source: the numeric facts of the emScon TPI 3.6 interface as public clients
+/// use them. On the wire every enum is a little-endian int32, so that a value unknown here is kept
+/// as it is and never refused.
 
 #include <chrono>
 #include <cstddef>
@@ -13,8 +14,9 @@
 namespace abbe::protocol::emscon {
 
 inline constexpr std::uint16_t kPort = 700;
-inline constexpr std::size_t kHeaderSize = 8;         ///< int32 size (of the whole packet), int32 type
-inline constexpr std::size_t kMaxPacketSize = 65536;  ///< what public clients reserve; larger is refused
+inline constexpr std::size_t kHeaderSize = 8;  ///< int32 size (of the whole packet), int32 type
+/// what public clients reserve; larger is refused
+inline constexpr std::size_t kMaxPacketSize = 65536;
 
 enum class PacketType : std::int32_t {
   Command = 0,  ///< request and answer alike
@@ -206,7 +208,8 @@ enum class MeasurementMode : std::int32_t {
   SphereCentre = 4,
   CircleCentre = 5,  ///< 6 to 11 are the same with a six-degree-of-freedom probe
 };
-/// Order and signs of the spherical values are not confirmed by any public source: ask for RightHanded.
+/// Order and signs of the spherical values are not confirmed by any public source: ask for
+/// RightHanded.
 enum class CoordinateSystem : std::int32_t {
   RightHanded = 0,
   LeftHandedX = 1,
@@ -253,7 +256,8 @@ enum class MeasurementStatusBit : std::int32_t {
   Initialised = 65536,
 };
 
-/// The tracker's own clock as it stands in every point: seconds and microseconds of an arbitrary epoch.
+/// The tracker's own clock as it stands in every point: seconds and microseconds of an arbitrary
+/// epoch.
 struct TrackerClockReading {
   std::int32_t seconds = 0;
   std::int32_t microseconds = 0;
@@ -273,9 +277,9 @@ struct TrackerClockReading {
 
 /// Why bytes are not a packet.
 enum class DecodeError {
-  Truncated = 1,   ///< fewer bytes than the header, the size field or the packet's layout ask for
-  SizeMismatch,    ///< the size field is not the number of bytes handed in, or not this packet's size
-  NotACommand,     ///< to a controller: the type is not 0
+  Truncated = 1,  ///< fewer bytes than the header, the size field or the packet's layout ask for
+  SizeMismatch,  ///< the size field is not the number of bytes handed in, or not this packet's size
+  NotACommand,   ///< to a controller: the type is not 0
   UnknownCommand,  ///< type 0 with a command that is not part of this interface
   UnknownType,     ///< from a controller: the type is none of 0 to 11
   CountMismatch,   ///< a multi-result whose number of points does not fit its size

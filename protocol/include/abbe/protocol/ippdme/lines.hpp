@@ -1,8 +1,9 @@
 #pragma once
-/// I++ DME: text lines between a client and the server of a measuring machine [I++ DME 1.4.3]. Printable
-/// ASCII (between quotes any byte but CR LF: servers write their texts in the user's language), CR LF at the
-/// end, at most 65536 characters. LineFramer cuts a TCP stream into lines; the parsers are total, give views
-/// into the line and take no memory. Units on the wire: mm, s, degrees, Celsius, N.
+/// I++ DME: text lines between a client and the server of a measuring machine [I++ DME 1.4.3].
+/// Printable ASCII (between quotes any byte but CR LF: servers write their texts in the user's
+/// language), CR LF at the end, at most 65536 characters. LineFramer cuts a TCP stream into lines;
+/// the parsers are total, give views into the line and take no memory. Units on the wire: mm, s,
+/// degrees, Celsius, N.
 ///
 ///   CommandLine = (Tag | ETag) SP Name "(" [Argument {"," Argument}] ")"
 ///   Response    = (Tag | ETag) SP ( "&" | "%" | "#" SP Data | "!" SP Error(F1,F2,F3,"text") )
@@ -76,7 +77,8 @@ struct Argument {
   enum class Kind : std::uint8_t { Number, String, Name, Property };
   static constexpr std::size_t kMostNumbers = 8;
   Kind kind = Kind::Name;
-  std::string_view text;  ///< of a name (also a tag) or property its name, of a string what is in it
+  std::string_view
+      text;  ///< of a name (also a tag) or property its name, of a string what is in it
   std::array<double, kMostNumbers> numbers{};  ///< of a number or a property
   std::size_t count = 0;
 };
@@ -110,14 +112,14 @@ class LineFramer {
  public:
   static constexpr std::size_t kCapacity = 2 * (kMaxLine + 2);
 
-  /// Takes as many bytes as there is room for and says how many; all, whenever next() was called until it
-  /// gave nothing and no more than kMaxLine come at once.
+  /// Takes as many bytes as there is room for and says how many; all, whenever next() was called
+  /// until it gave nothing and no more than kMaxLine come at once.
   std::size_t push(std::span<const std::byte> bytes) ABBE_RT;
-  /// The next line without its end, valid until the next push() or reset(). An error once; then nothing until
-  /// reset() or resume(): the peer speaks something else.
+  /// The next line without its end, valid until the next push() or reset(). An error once; then
+  /// nothing until reset() or resume(): the peer speaks something else.
   [[nodiscard]] std::optional<tl::expected<std::string_view, LineError>> next() ABBE_RT;
-  /// After an error: continues behind the next end of a line. Called before next(), what came with the
-  /// illegal byte is not lost.
+  /// After an error: continues behind the next end of a line. Called before next(), what came with
+  /// the illegal byte is not lost.
   void resume() ABBE_RT;
   void reset() ABBE_RT;
 

@@ -1,8 +1,8 @@
 #pragma once
-/// Reading MCAP, whole or broken, from bytes someone else owns (usually a mapped file): record by record, by
-/// linear scan of a file cut anywhere, or through its summary. Total for any bytes. Only read_summary()
-/// allocates. No compression: a compressed chunk is yielded and said to be one, its records are not opened.
-/// Thread-safe: pure, or state of its own only.
+/// Reading MCAP, whole or broken, from bytes someone else owns (usually a mapped file): record by
+/// record, by linear scan of a file cut anywhere, or through its summary. Total for any bytes. Only
+/// read_summary() allocates. No compression: a compressed chunk is yielded and said to be one, its
+/// records are not opened. Thread-safe: pure, or state of its own only.
 
 #include <optional>
 #include <vector>
@@ -16,10 +16,13 @@ struct Record {
   Opcode opcode = Opcode::Header;  ///< may be one this program does not know: skip it
   std::size_t offset = 0;          ///< of the opcode
   Bytes content;
-  [[nodiscard]] std::size_t end() const noexcept { return offset + kRecordHeadSize + content.size(); }
+  [[nodiscard]] std::size_t end() const noexcept {
+    return offset + kRecordHeadSize + content.size();
+  }
 };
 
-/// Yields framed records until the bytes end. Works on a data section, on a chunk's records, on a summary.
+/// Yields framed records until the bytes end. Works on a data section, on a chunk's records, on a
+/// summary.
 class RecordReader {
  public:
   enum class State : std::uint8_t {
@@ -59,8 +62,9 @@ class MessageReader {
 /// A chunk as the scan found it.
 struct ScannedChunk {
   enum class State : std::uint8_t {
-    Whole,       ///< complete, checksum right or not given
-    Cut,         ///< the file ends inside: `chunk.records` holds what is there, its last record may be torn
+    Whole,  ///< complete, checksum right or not given
+    /// the file ends inside: `chunk.records` holds what is there, its last record may be torn
+    Cut,
     BadCrc,      ///< complete in length, but not what was written
     Compressed,  ///< cannot be opened here
     Malformed,   ///< the record is there, but it is not a Chunk
@@ -70,17 +74,18 @@ struct ScannedChunk {
   Chunk chunk;
 };
 
-/// Walks a file from its start, needing neither footer nor summary. Whole chunks survive whatever happened
-/// behind them; a cut chunk is handed out with those of its bytes that exist.
+/// Walks a file from its start, needing neither footer nor summary. Whole chunks survive whatever
+/// happened behind them; a cut chunk is handed out with those of its bytes that exist.
 class LinearScan {
  public:
   struct Item {
-    Record record;                      ///< the top-level record (content short if it is a cut chunk)
+    Record record;  ///< the top-level record (content short if it is a cut chunk)
     std::optional<ScannedChunk> chunk;  ///< set if it is a Chunk
   };
 
   explicit LinearScan(Bytes file) noexcept;
-  /// The next record of the data section; nothing at DataEnd, at the file's end or where it is broken.
+  /// The next record of the data section; nothing at DataEnd, at the file's end or where it is
+  /// broken.
   [[nodiscard]] std::optional<Item> next() noexcept;
   /// True once DataEnd was reached: nothing of the data section is missing.
   [[nodiscard]] bool complete() const noexcept { return complete_; }
@@ -117,7 +122,8 @@ struct Summary {
 [[nodiscard]] tl::expected<Summary, SummaryError> read_summary(Bytes file);
 
 /// The record an index points to; nothing if none of that kind starts there.
-[[nodiscard]] std::optional<Record> record_at(Bytes file, std::uint64_t offset, Opcode expected) noexcept;
+[[nodiscard]] std::optional<Record> record_at(Bytes file, std::uint64_t offset,
+                                              Opcode expected) noexcept;
 /// The chunk at `offset` of a file, checked like one met by a scan.
 [[nodiscard]] std::optional<ScannedChunk> chunk_at(Bytes file, std::uint64_t offset) noexcept;
 

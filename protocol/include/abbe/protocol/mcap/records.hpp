@@ -1,11 +1,13 @@
 #pragma once
-/// The records of an MCAP file [MCAP specification, mcap.dev/spec], one struct each, and their bytes.
+/// The records of an MCAP file [MCAP specification, mcap.dev/spec], one struct each, and their
+/// bytes.
 ///
-/// Decoding: structs are views into the bytes they were decoded from; total (any bytes give a record or a
-/// DecodeError), no allocation, trailing fields a newer writer may have added are skipped. Encoding:
-/// append(buffer, record) adds opcode, length and content to a buffer the caller owns, without allocation
-/// while its capacity lasts; all integers little-endian. A string of 4 GiB or more cannot be written (lengths
-/// are u32) and must not be asked for. Times are nanoseconds since the Unix epoch, UTC. Pure; thread-safe.
+/// Decoding: structs are views into the bytes they were decoded from; total (any bytes give a
+/// record or a DecodeError), no allocation, trailing fields a newer writer may have added are
+/// skipped. Encoding: append(buffer, record) adds opcode, length and content to a buffer the caller
+/// owns, without allocation while its capacity lasts; all integers little-endian. A string of 4 GiB
+/// or more cannot be written (lengths are u32) and must not be asked for. Times are nanoseconds
+/// since the Unix epoch, UTC. Pure; thread-safe.
 
 #include <array>
 #include <cstddef>
@@ -61,8 +63,8 @@ enum class DecodeError : std::uint8_t {
 template <class T>
 using Decoded = tl::expected<T, DecodeError>;
 
-/// The packed entries of an array or map of two integers, as they lie in the file (so the bytes need no
-/// alignment).
+/// The packed entries of an array or map of two integers, as they lie in the file (so the bytes
+/// need no alignment).
 template <class First, class Second>
 class PackedPairs {
  public:
@@ -70,7 +72,8 @@ class PackedPairs {
 
   PackedPairs() = default;
   /// Views whole entries; a remainder of less than one entry is not seen.
-  explicit PackedPairs(Bytes bytes) noexcept : bytes_(bytes.first(bytes.size() / kEntrySize * kEntrySize)) {}
+  explicit PackedPairs(Bytes bytes) noexcept
+      : bytes_(bytes.first(bytes.size() / kEntrySize * kEntrySize)) {}
 
   [[nodiscard]] Bytes bytes() const noexcept { return bytes_; }
   [[nodiscard]] std::size_t size() const noexcept { return bytes_.size() / kEntrySize; }
@@ -113,7 +116,8 @@ struct Header {
 struct Footer {
   std::uint64_t summary_start = 0;         ///< 0: no summary
   std::uint64_t summary_offset_start = 0;  ///< 0: no summary offsets
-  std::uint32_t summary_crc = 0;  ///< from summary_start to summary_offset_start's last byte; 0: none
+  /// from summary_start to summary_offset_start's last byte; 0: none
+  std::uint32_t summary_crc = 0;
 };
 
 struct Schema {
@@ -146,8 +150,8 @@ struct ChunkHead {
   std::uint64_t uncompressed_size = 0;
   std::uint32_t uncompressed_crc = 0;  ///< 0: none
   std::string_view compression;        ///< empty: none, the only one this room reads or writes
-  std::uint64_t records_size =
-      0;  ///< bytes of records that follow, as the record says (a cut file has fewer)
+  /// bytes of records that follow, as the record says (a cut file has fewer)
+  std::uint64_t records_size = 0;
 };
 
 struct Chunk {
@@ -157,7 +161,8 @@ struct Chunk {
 
 struct MessageIndex {
   std::uint16_t channel_id = 0;
-  PackedPairs<std::uint64_t, std::uint64_t> entries;  ///< log time, offset in the uncompressed records
+  PackedPairs<std::uint64_t, std::uint64_t>
+      entries;  ///< log time, offset in the uncompressed records
 };
 
 struct ChunkIndex {
@@ -224,8 +229,9 @@ struct DataEnd {
   std::uint32_t data_section_crc = 0;  ///< 0: none
 };
 
-/// The content of a record (without opcode and length) as a T; defined for every struct above but ChunkHead.
-/// decode<Chunk> wants all of the chunk's records to be there and does not check their checksum.
+/// The content of a record (without opcode and length) as a T; defined for every struct above but
+/// ChunkHead. decode<Chunk> wants all of the chunk's records to be there and does not check their
+/// checksum.
 template <class T>
 [[nodiscard]] Decoded<T> decode(Bytes content) noexcept = delete;
 

@@ -1,11 +1,11 @@
 #pragma once
-/// Building the bytes of an MCAP file: chunks with their message indexes, and the summary of a clean close.
-/// Sans-I/O: whoever owns the file writes the bytes and says where they went. No compression: a recorder must
-/// be readable to the last whole record after a power cut. Not thread-safe; allocates only when a buffer
-/// outgrows its capacity.
+/// Building the bytes of an MCAP file: chunks with their message indexes, and the summary of a
+/// clean close. Sans-I/O: whoever owns the file writes the bytes and says where they went. No
+/// compression: a recorder must be readable to the last whole record after a power cut. Not
+/// thread-safe; allocates only when a buffer outgrows its capacity.
 ///
-/// File: magic, Header, { Chunk, MessageIndex... | Metadata | Attachment }..., DataEnd, summary, Footer,
-/// magic.
+/// File: magic, Header, { Chunk, MessageIndex... | Metadata | Attachment }..., DataEnd, summary,
+/// Footer, magic.
 
 #include <map>
 #include <string_view>
@@ -28,7 +28,8 @@ struct ChannelShare {
   std::uint64_t index_offset = 0;  ///< of its MessageIndex record, from the Chunk's opcode
 };
 
-/// A chunk with its indexes, ready to be written in one piece. Views into the builder until its clear().
+/// A chunk with its indexes, ready to be written in one piece. Views into the builder until its
+/// clear().
 struct ClosedChunk {
   Bytes bytes;                     ///< Chunk, then one MessageIndex per channel
   std::uint64_t length = 0;        ///< of these bytes
@@ -53,7 +54,8 @@ class ChunkBuilder {
   [[nodiscard]] std::size_t records_size() const noexcept;
   [[nodiscard]] std::uint64_t message_count() const noexcept { return message_count_; }
 
-  /// Writes head, checksum and indexes around the collected records. Nothing may be added before clear().
+  /// Writes head, checksum and indexes around the collected records. Nothing may be added before
+  /// clear().
   [[nodiscard]] ClosedChunk close();
   void clear() noexcept;
 
@@ -73,8 +75,8 @@ class ChunkBuilder {
   std::uint64_t last_time_ns_ = 0;
 };
 
-/// Remembers what was written where, and ends the file with it. Holds about 100 bytes + 10 per channel for
-/// each chunk.
+/// Remembers what was written where, and ends the file with it. Holds about 100 bytes + 10 per
+/// channel for each chunk.
 class SummaryBuilder {
  public:
   void add(const Schema& schema);
@@ -86,8 +88,8 @@ class SummaryBuilder {
 
   [[nodiscard]] std::uint64_t message_count() const noexcept { return statistics_.message_count; }
 
-  /// Appends DataEnd (its checksum not given), summary, summary offsets, Footer and magic. `data_end_offset`
-  /// is where in the file the first appended byte will stand.
+  /// Appends DataEnd (its checksum not given), summary, summary offsets, Footer and magic.
+  /// `data_end_offset` is where in the file the first appended byte will stand.
   void finish(std::uint64_t data_end_offset, Buffer& out) const;
 
  private:

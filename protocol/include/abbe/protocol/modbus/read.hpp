@@ -1,8 +1,9 @@
 #pragma once
-/// The one thing asked of Modbus here: read registers, functions 3 and 4 [Modbus Application Protocol V1.1b3,
-/// 6.3, 6.4], over TCP (MBAP header) or RTU (CRC) [Modbus over Serial Line V1.02, 2.5.1]. Sans-I/O, pure,
-/// allocation-free; usable on the real-time path. The transaction number is always 0, as libmodbus sends it
-/// with a raw request: one request is under way at a time, and a connection that missed an answer is closed.
+/// The one thing asked of Modbus here: read registers, functions 3 and 4 [Modbus Application
+/// Protocol V1.1b3, 6.3, 6.4], over TCP (MBAP header) or RTU (CRC)
+/// [Modbus over Serial Line V1.02, 2.5.1]. Sans-I/O, pure, allocation-free; usable on the real-time
+/// path. The transaction number is always 0, as libmodbus sends it with a raw request: one request
+/// is under way at a time, and a connection that missed an answer is closed.
 
 #include <array>
 #include <cstddef>
@@ -42,7 +43,8 @@ enum class DecodeError : std::uint8_t {
 };
 [[nodiscard]] std::string_view name_of(DecodeError error) noexcept;
 
-/// The answer to a read: its registers as they came (big-endian pairs), or the code of an exception.
+/// The answer to a read: its registers as they came (big-endian pairs), or the code of an
+/// exception.
 struct Answer {
   std::span<const std::byte> registers;  ///< 2 * count bytes; empty with an exception
   std::optional<std::uint8_t> exception;
@@ -51,12 +53,13 @@ struct Answer {
 [[nodiscard]] std::string_view name_of_exception(std::uint8_t code) noexcept;
 
 /// Bytes written, 0 if `out` is too small. [Modbus V1.1b3] 6.3
-std::size_t encode(const ReadRequest& request, Transport transport, std::span<std::byte> out) ABBE_RT;
+std::size_t encode(const ReadRequest& request, Transport transport,
+                   std::span<std::byte> out) ABBE_RT;
 /// The request of a whole frame, as recorded or as a server receives it.
-[[nodiscard]] tl::expected<ReadRequest, DecodeError> decode_request(std::span<const std::byte> frame,
-                                                                    Transport transport) ABBE_RT;
-/// Nothing: `bytes` are the beginning of a right answer, more must come. An error is said as soon as it
-/// shows.
+[[nodiscard]] tl::expected<ReadRequest, DecodeError> decode_request(
+    std::span<const std::byte> frame, Transport transport) ABBE_RT;
+/// Nothing: `bytes` are the beginning of a right answer, more must come. An error is said as soon
+/// as it shows.
 [[nodiscard]] std::optional<tl::expected<Answer, DecodeError>> decode_answer(
     std::span<const std::byte> bytes, Transport transport, const ReadRequest& request) ABBE_RT;
 [[nodiscard]] std::uint16_t crc16(std::span<const std::byte> bytes) ABBE_RT;

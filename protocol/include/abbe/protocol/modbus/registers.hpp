@@ -1,6 +1,7 @@
 #pragma once
-/// What lies in registers: one or two of them as a number. Registers are big-endian; the order of two
-/// registers is a habit of the manufacturer. Pure, allocation-free; usable on the real-time path.
+/// What lies in registers: one or two of them as a number. Registers are big-endian; the order of
+/// two registers is a habit of the manufacturer. Pure, allocation-free; usable on the real-time
+/// path.
 
 #include <cstddef>
 #include <cstdint>
@@ -14,10 +15,13 @@ enum class RegisterType : std::uint8_t { Int16, Uint16, Int32, Uint32, Float32, 
 enum class WordOrder : std::uint8_t { HighFirst, LowFirst };
 
 [[nodiscard]] constexpr std::uint16_t register_count(RegisterType type) noexcept {
-  return type == RegisterType::Int16 || type == RegisterType::Uint16 || type == RegisterType::Bcd16 ? 1 : 2;
+  return type == RegisterType::Int16 || type == RegisterType::Uint16 || type == RegisterType::Bcd16
+             ? 1
+             : 2;
 }
 
-/// NaN for a Float32 that is not finite and for BCD digits above 9. `bytes`: 2 * register_count(type).
+/// NaN for a Float32 that is not finite and for BCD digits above 9. `bytes`:
+/// 2 * register_count(type).
 [[nodiscard]] double decode_register(std::span<const std::byte> bytes, RegisterType type,
                                      WordOrder order) ABBE_RT;
 

@@ -1,7 +1,7 @@
 #pragma once
-/// How one counter of the card counts: the words of its set-up, both directions. Setting a counter up zeroes
-/// it. Bits of the setup word: 0-2 mode, 3-9 options of the mode, 11 always set, 13 register (not scan)
-/// reading [MCC uldaq, CtrUsbQuad08, MIT].
+/// How one counter of the card counts: the words of its set-up, both directions. Setting a counter
+/// up zeroes it. Bits of the setup word: 0-2 mode, 3-9 options of the mode, 11 always set, 13
+/// register (not scan) reading [MCC uldaq, CtrUsbQuad08, MIT].
 
 #include <array>
 #include <cstdint>
@@ -11,14 +11,21 @@
 
 namespace abbe::protocol::quad08 {
 
-enum class CounterMode : std::uint8_t { Count = 1, Period = 2, PulseWidth = 3, Timing = 4, Encoder = 5 };
+enum class CounterMode : std::uint8_t {
+  Count = 1,
+  Period = 2,
+  PulseWidth = 3,
+  Timing = 4,
+  Encoder = 5
+};
 enum class Quadrature : std::uint8_t { X1 = 1, X2 = 2, X4 = 4 };
 
 struct CounterSetup {
   CounterMode mode = CounterMode::Count;
   Quadrature quadrature = Quadrature::X4;  ///< Encoder only
-  /// The index input latches the count. ASSUMPTION, to be verified on hardware: a scan then reads the count
-  /// at the latest index edge instead of that at its own start, and 0 before the first edge.
+  /// The index input latches the count. ASSUMPTION, to be verified on hardware: a scan then reads
+  /// the count at the latest index edge instead of that at its own start, and 0 before the first
+  /// edge.
   bool latch_on_index = false;
   bool register_reading = false;  ///< read by registers; false: read by scans
   friend bool operator==(const CounterSetup&, const CounterSetup&) = default;
@@ -27,20 +34,21 @@ struct CounterSetup {
 /// Nothing for a mode that does not exist.
 [[nodiscard]] std::optional<CounterSetup> decode_counter_setup(std::uint16_t word) ABBE_RT;
 
-/// Input filter. Time codes 0 to 15: 500 ns, 1.5, 3.5, 7.5, 15.5, 31.5, 63.5, 127.5 us, 100, 300, 700
-/// us, 1.5, 3.1, 6.3, 12.7, 25.5 ms.
+/// Input filter. Time codes 0 to 15: 500 ns, 1.5, 3.5, 7.5, 15.5, 31.5, 63.5, 127.5 us, 100, 300,
+/// 700 us, 1.5, 3.1, 6.3, 12.7, 25.5 ms.
 struct Debounce {
   bool enabled = false;
   std::uint8_t time_code = 0;
   bool falling = false;
-  bool trigger_before_stable = false;  ///< the first edge counts, then the input is deaf for the time
+  /// the first edge counts, then the input is deaf for the time
+  bool trigger_before_stable = false;
   friend bool operator==(const Debounce&, const Debounce&) = default;
 };
 [[nodiscard]] std::uint8_t encode(const Debounce& debounce) ABBE_RT;
 [[nodiscard]] Debounce decode_debounce(std::uint8_t code) ABBE_RT;
-inline constexpr std::array<double, 16> kDebounce_s{500e-9,  1.5e-6,   3.5e-6,  7.5e-6, 15.5e-6, 31.5e-6,
-                                                    63.5e-6, 127.5e-6, 100e-6,  300e-6, 700e-6,  1.5e-3,
-                                                    3.1e-3,  6.3e-3,   12.7e-3, 25.5e-3};
+inline constexpr std::array<double, 16> kDebounce_s{
+    500e-9, 1.5e-6, 3.5e-6, 7.5e-6, 15.5e-6, 31.5e-6, 63.5e-6, 127.5e-6,
+    100e-6, 300e-6, 700e-6, 1.5e-3, 3.1e-3,  6.3e-3,  12.7e-3, 25.5e-3};
 
 /// Everything one counter needs, in order.
 inline constexpr std::size_t kChannelWrites = 12;

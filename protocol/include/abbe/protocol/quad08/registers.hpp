@@ -1,6 +1,7 @@
 #pragma once
-/// Measurement Computing USB-QUAD08: identity and registers. Every access is a vendor request on endpoint 0;
-/// a write has no data stage, a read gives two bytes, little-endian [MCC uldaq, UsbIotech, MIT].
+/// Measurement Computing USB-QUAD08: identity and registers. Every access is a vendor request on
+/// endpoint 0; a write has no data stage, a read gives two bytes, little-endian
+/// [MCC uldaq, UsbIotech, MIT].
 
 #include <cstdint>
 #include <optional>
@@ -94,7 +95,9 @@ struct Status {
   [[nodiscard]] constexpr bool overrun() const noexcept {
     return (bits & (kFifoOverrun | kPacerOverrun)) != 0;
   }
-  [[nodiscard]] constexpr bool hardware_error() const noexcept { return (bits & kHardwareError) != 0; }
+  [[nodiscard]] constexpr bool hardware_error() const noexcept {
+    return (bits & kHardwareError) != 0;
+  }
   /// The scan list is loaded and no scan is under way: the pacer may be started.
   [[nodiscard]] constexpr bool ready() const noexcept {
     return (bits & (kPipeFull | kScanning)) == kPipeFull;
@@ -102,10 +105,12 @@ struct Status {
 };
 
 [[nodiscard]] constexpr usb::Setup write(Register where, std::uint16_t value) noexcept {
-  return {0x40, static_cast<std::uint8_t>(Request::Register), value, static_cast<std::uint16_t>(where), 0};
+  return {0x40, static_cast<std::uint8_t>(Request::Register), value,
+          static_cast<std::uint16_t>(where), 0};
 }
 [[nodiscard]] constexpr usb::Setup read(Register where) noexcept {
-  return {0xC0, static_cast<std::uint8_t>(Request::Register), 0, static_cast<std::uint16_t>(where), 2};
+  return {0xC0, static_cast<std::uint8_t>(Request::Register), 0, static_cast<std::uint16_t>(where),
+          2};
 }
 [[nodiscard]] constexpr usb::Setup read_firmware_version() noexcept {
   return {0xC0, static_cast<std::uint8_t>(Request::FirmwareVersion), 0, 0, 2};
@@ -115,7 +120,8 @@ struct Status {
 }
 /// Is it a write to this register?
 [[nodiscard]] constexpr bool is_write(const usb::Setup& setup, Register where) noexcept {
-  return setup.request_type == 0x40 && setup.request == static_cast<std::uint8_t>(Request::Register) &&
+  return setup.request_type == 0x40 &&
+         setup.request == static_cast<std::uint8_t>(Request::Register) &&
          setup.index == static_cast<std::uint16_t>(where);
 }
 

@@ -1,6 +1,6 @@
 #pragma once
-/// Which counters a scan reads, how wide, and how often [MCC uldaq, CtrUsbQuad08, MIT]. A scan on the wire is
-/// the words of the list in its order, little-endian, without header, time or number.
+/// Which counters a scan reads, how wide, and how often [MCC uldaq, CtrUsbQuad08, MIT]. A scan on
+/// the wire is the words of the list in its order, little-endian, without header, time or number.
 
 #include <array>
 #include <cstddef>
@@ -27,7 +27,9 @@ struct ScanLayout {
   std::size_t count = 0;
   CountWidth width = CountWidth::Bits32;
 
-  [[nodiscard]] constexpr std::size_t scan_bytes() const noexcept { return count * bytes_of(width); }
+  [[nodiscard]] constexpr std::size_t scan_bytes() const noexcept {
+    return count * bytes_of(width);
+  }
   [[nodiscard]] constexpr std::span<const std::uint8_t> used() const noexcept {
     return std::span{channels}.first(count);
   }
@@ -53,12 +55,13 @@ struct ScanListEntries {
   }
 };
 [[nodiscard]] ScanListEntries encode(const ScanLayout& layout) ABBE_RT;
-/// What a card makes of a list; nothing if it is none: no first or last entry, words of a counter torn apart,
-/// mixed widths.
-[[nodiscard]] std::optional<ScanLayout> decode_scan_list(std::span<const ScanListEntry> entries) ABBE_RT;
+/// What a card makes of a list; nothing if it is none: no first or last entry, words of a counter
+/// torn apart, mixed widths.
+[[nodiscard]] std::optional<ScanLayout> decode_scan_list(
+    std::span<const ScanListEntry> entries) ABBE_RT;
 
-/// Pacer divisor for the highest rate that is not above `rate_hz`... as the maker's library rounds: down.
-/// Nothing for a rate the card cannot pace (not positive, above 8 MHz, below once a day).
+/// Pacer divisor for the highest rate that is not above `rate_hz`... as the maker's library rounds:
+/// down. Nothing for a rate the card cannot pace (not positive, above 8 MHz, below once a day).
 [[nodiscard]] std::optional<std::uint64_t> pacer_divisor(double rate_hz) ABBE_RT;
 /// The rate a divisor really gives.
 [[nodiscard]] constexpr double pacer_rate_hz(std::uint64_t divisor) noexcept {

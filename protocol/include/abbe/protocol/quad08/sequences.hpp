@@ -1,6 +1,6 @@
 #pragma once
-/// The register writes and reads of each thing one does with the card, in the order of the maker's library
-/// [MCC uldaq, MIT], as lists a driver sends one by one. No allocation.
+/// The register writes and reads of each thing one does with the card, in the order of the maker's
+/// library [MCC uldaq, MIT], as lists a driver sends one by one. No allocation.
 
 #include <array>
 #include <cstddef>
@@ -35,7 +35,9 @@ class Sequence {
   }
   void add(const usb::Setup& setup) ABBE_RT { add(Step{setup}); }
   void add(Register where, std::uint16_t value) ABBE_RT { add(write(where, value)); }
-  [[nodiscard]] std::span<const Step> steps() const ABBE_RT { return std::span{steps_}.first(size_); }
+  [[nodiscard]] std::span<const Step> steps() const ABBE_RT {
+    return std::span{steps_}.first(size_);
+  }
 
  private:
   std::array<Step, kCapacity> steps_{};
@@ -46,13 +48,15 @@ class Sequence {
 [[nodiscard]] Sequence open_sequence() ABBE_RT;
 
 enum class Timer : std::uint8_t { Timer0, Timer1 };
-/// The card's own timer output as a clock: `divisor` periods of 48 MHz per period, half of them high.
+/// The card's own timer output as a clock: `divisor` periods of 48 MHz per period, half of them
+/// high.
 [[nodiscard]] Sequence timer_stop(Timer timer) ABBE_RT;
 [[nodiscard]] Sequence timer_start(Timer timer, std::uint32_t divisor) ABBE_RT;
 
 /// Pacer, scan list and data transfer stopped; counters go on.
 [[nodiscard]] Sequence stop_sequence() ABBE_RT;
-/// Loads the list and the divisor; ends with the endpoint reset. Then the bulk transfers are started.
+/// Loads the list and the divisor; ends with the endpoint reset. Then the bulk transfers are
+/// started.
 [[nodiscard]] Sequence load_sequence(const ScanLayout& layout, std::uint64_t divisor) ABBE_RT;
 /// Data transfer on, list started. Then Status::ready() is waited for.
 [[nodiscard]] Sequence arm_sequence() ABBE_RT;

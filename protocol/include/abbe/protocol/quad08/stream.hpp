@@ -1,7 +1,7 @@
 #pragma once
-/// The stream of scans: counts in the order of the list, over packets cut anywhere. Nothing in it says where
-/// a scan begins: whoever starts it counts bytes from its first, or seeks by a counter whose step is known.
-/// Deterministic, no allocation, total.
+/// The stream of scans: counts in the order of the list, over packets cut anywhere. Nothing in it
+/// says where a scan begins: whoever starts it counts bytes from its first, or seeks by a counter
+/// whose step is known. Deterministic, no allocation, total.
 
 #include <array>
 #include <cstddef>
@@ -26,7 +26,8 @@ using RawScan = std::array<std::uint64_t, kChannels>;
                                                  CountWidth width) noexcept {
   const std::uint64_t modulus = modulus_of(width);
   const std::uint64_t ahead = (to - from) & (modulus - 1);
-  return ahead < modulus / 2 ? static_cast<std::int64_t>(ahead) : -static_cast<std::int64_t>(modulus - ahead);
+  return ahead < modulus / 2 ? static_cast<std::int64_t>(ahead)
+                             : -static_cast<std::int64_t>(modulus - ahead);
 }
 /// The same for a counter that never counts down.
 [[nodiscard]] constexpr std::uint64_t upward_step(std::uint64_t from, std::uint64_t to,
@@ -68,9 +69,10 @@ struct Metronome {
   [[nodiscard]] bool beats(std::uint64_t from, std::uint64_t to, CountWidth width) const ABBE_RT;
 };
 
-/// Where a scan begins in bytes taken out of a stream: the first offset at which the metronome beats twice.
-/// Needs seek_window(layout) bytes to be sure to find one.
-[[nodiscard]] std::optional<std::size_t> seek_scan(std::span<const std::byte> bytes, const ScanLayout& layout,
+/// Where a scan begins in bytes taken out of a stream: the first offset at which the metronome
+/// beats twice. Needs seek_window(layout) bytes to be sure to find one.
+[[nodiscard]] std::optional<std::size_t> seek_scan(std::span<const std::byte> bytes,
+                                                   const ScanLayout& layout,
                                                    const Metronome& metronome) ABBE_RT;
 [[nodiscard]] constexpr std::size_t seek_window(const ScanLayout& layout) noexcept {
   return layout.count == 0 ? 0 : 4 * layout.scan_bytes() - 1;

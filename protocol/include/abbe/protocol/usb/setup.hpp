@@ -1,6 +1,6 @@
 #pragma once
-/// The eight bytes that begin a control transfer, and the standard requests needed here. [USB 2.0] 9.3, 9.4.
-/// Little-endian on the wire. Pure, no allocation.
+/// The eight bytes that begin a control transfer, and the standard requests needed here. [USB 2.0]
+/// 9.3, 9.4. Little-endian on the wire. Pure, no allocation.
 
 #include <array>
 #include <cstddef>
@@ -18,7 +18,9 @@ struct Setup {
   std::uint16_t index = 0;
   std::uint16_t length = 0;
 
-  [[nodiscard]] constexpr bool device_to_host() const noexcept { return (request_type & 0x80u) != 0; }
+  [[nodiscard]] constexpr bool device_to_host() const noexcept {
+    return (request_type & 0x80u) != 0;
+  }
   friend constexpr bool operator==(const Setup&, const Setup&) = default;
 };
 

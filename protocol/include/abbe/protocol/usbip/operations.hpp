@@ -1,8 +1,8 @@
 #pragma once
-/// USB/IP before the transfers: which devices a server exports, and importing one of them. Big-endian, TCP
-/// port 3240, version 1.1.1 [Linux Documentation/usb/usbip_protocol.rst]. An import that is granted turns the
-/// connection into a stream of transfers (urb.hpp). Decoders are total and need the whole message;
-/// message_size() says how much that is. Pure, no allocation.
+/// USB/IP before the transfers: which devices a server exports, and importing one of them.
+/// Big-endian, TCP port 3240, version 1.1.1 [Linux Documentation/usb/usbip_protocol.rst]. An import
+/// that is granted turns the connection into a stream of transfers (urb.hpp). Decoders are total
+/// and need the whole message; message_size() says how much that is. Pure, no allocation.
 
 #include <array>
 #include <cstddef>
@@ -41,7 +41,14 @@ enum class OpError : std::uint8_t {
 };
 [[nodiscard]] const char* to_text(OpError error) noexcept;
 
-enum class Speed : std::uint32_t { Unknown = 0, Low = 1, Full = 2, High = 3, Wireless = 4, Super = 5 };
+enum class Speed : std::uint32_t {
+  Unknown = 0,
+  Low = 1,
+  Full = 2,
+  High = 3,
+  Wireless = 4,
+  Super = 5
+};
 
 /// Text of fixed width on the wire, padded with zeros; longer text is cut.
 template <std::size_t N>
@@ -103,7 +110,8 @@ inline constexpr std::size_t kImportRequestSize = kOpHeadSize + 32;
 inline constexpr std::size_t kImportReplySize = kOpHeadSize + kExportedDeviceSize;
 
 /// The head of any operation; UnknownCode for a code that is none of ours.
-[[nodiscard]] tl::expected<OpHead, OpError> decode_op_head(std::span<const std::byte> bytes) ABBE_RT;
+[[nodiscard]] tl::expected<OpHead, OpError> decode_op_head(
+    std::span<const std::byte> bytes) ABBE_RT;
 
 // Each writer returns the bytes written, 0 if `out` is too small.
 std::size_t encode_device_list_request(std::span<std::byte> out) ABBE_RT;
@@ -111,7 +119,8 @@ std::size_t encode_import_request(const BusId& bus_id, std::span<std::byte> out)
 /// A refusal (`device` empty) is the head alone.
 std::size_t encode_import_reply(OpStatus status, const ExportedDevice* device,
                                 std::span<std::byte> out) ABBE_RT;
-[[nodiscard]] tl::expected<BusId, OpError> decode_import_request(std::span<const std::byte> bytes) ABBE_RT;
+[[nodiscard]] tl::expected<BusId, OpError> decode_import_request(
+    std::span<const std::byte> bytes) ABBE_RT;
 
 struct ImportReply {
   OpStatus status = OpStatus::Ok;
@@ -138,7 +147,8 @@ class DeviceListWriter {
 class DeviceListView {
  public:
   /// Truncated as long as the announced devices have not all come.
-  [[nodiscard]] static tl::expected<DeviceListView, OpError> parse(std::span<const std::byte> bytes) ABBE_RT;
+  [[nodiscard]] static tl::expected<DeviceListView, OpError> parse(
+      std::span<const std::byte> bytes) ABBE_RT;
   [[nodiscard]] std::uint32_t count() const ABBE_RT { return count_; }
   /// The next device; nothing after the last. Its interfaces are left out: nobody here needs them.
   [[nodiscard]] std::optional<ExportedDevice> next() ABBE_RT;

@@ -1,8 +1,9 @@
 #pragma once
-/// USB/IP transfers: each message is a header of 48 bytes, big-endian, then the data of an OUT request or of
-/// an answer to an IN request [Linux Documentation/usb/usbip_protocol.rst]. A reply says neither its
-/// direction nor its endpoint in general (Linux leaves them 0): who asked knows from the sequence number, and
-/// so knows whether data follow. No isochronous transfers. Pure, no allocation, total.
+/// USB/IP transfers: each message is a header of 48 bytes, big-endian, then the data of an OUT
+/// request or of an answer to an IN request [Linux Documentation/usb/usbip_protocol.rst]. A reply
+/// says neither its direction nor its endpoint in general (Linux leaves them 0): who asked knows
+/// from the sequence number, and so knows whether data follow. No isochronous transfers. Pure, no
+/// allocation, total.
 
 #include <array>
 #include <cstddef>
@@ -64,7 +65,8 @@ struct SubmitReply {
 
 struct UnlinkReply {
   UrbHead head;
-  UrbStatus status = UrbStatus::Ok;  ///< Unlinked: it will not be answered any more; Ok: it had been
+  /// Unlinked: it will not be answered any more; Ok: it had been
+  UrbStatus status = UrbStatus::Ok;
   friend bool operator==(const UnlinkReply&, const UnlinkReply&) = default;
 };
 

@@ -1,5 +1,5 @@
-/// A replay gives the turns of the hub again: what a snapshot lacked live because a stream came late, it
-/// lacks once more, although the recording has it.
+/// A replay gives the turns of the hub again: what a snapshot lacked live because a stream came
+/// late, it lacks once more, although the recording has it.
 
 #include <fmt/ranges.h>
 #include <gmock/gmock.h>
@@ -23,10 +23,10 @@ using protocol::HostTime;
 using protocol::Snapshot;
 
 Config tracker_and_encoders() {
-  auto parsed =
-      parse_config(to_toml(config_tables::weak_portal()) + to_toml(config_tables::Tracker{.port = 700}) +
-                       to_toml(config_tables::Encoder{}),
-                   "abbed.toml");
+  auto parsed = parse_config(to_toml(config_tables::weak_portal()) +
+                                 to_toml(config_tables::Tracker{.port = 700}) +
+                                 to_toml(config_tables::Encoder{}),
+                             "abbed.toml");
   if (!parsed) throw std::runtime_error(fmt::format("{}", fmt::join(parsed.error().details, "\n")));
   return std::move(*parsed);
 }
@@ -53,15 +53,19 @@ class LiveHub {
         recorder_(*Recorder::open(example_options(folder), example_info(), {})),
         assembler_(assembler_options(config_)) {}
 
-  void turn(const Batch& batch) {
-    for (const auto& sample : batch.axes) recorder_.record(sample, config_.encoder->name, batch.taken);
-    for (const auto& point : batch.points) recorder_.record(point, config_.tracker->name, batch.taken);
+  void cycle(const Batch& batch) {
+    for (const auto& sample : batch.axes)
+      recorder_.record(sample, config_.encoder->name, batch.taken);
+    for (const auto& point : batch.points)
+      recorder_.record(point, config_.tracker->name, batch.taken);
     assembler_.take(batch);
     assembler_.emit(snapshots_);
   }
   [[nodiscard]] const Config& config() const { return config_; }
   [[nodiscard]] const std::vector<Snapshot>& snapshots() const { return snapshots_; }
-  [[nodiscard]] RecordingReader recording() { return *RecordingReader::open(recorder_.close()->file); }
+  [[nodiscard]] RecordingReader recording() {
+    return *RecordingReader::open(recorder_.close()->file);
+  }
 
  private:
   Config config_;
@@ -74,6 +78,7 @@ TEST(ReplayTurns, WhatCameTooLateLiveComesTooLateAgain) {
   const TemporaryFolder folder;
   LiveHub hub{folder.path()};
   const HostTime start = example_time(0);
+
   // Points every 10 ms; the axes keep up for a second, then come two seconds at once.
   Batch late;
   for (HostTime t = start; t < start + 4s; t += 10ms) {
@@ -86,18 +91,23 @@ TEST(ReplayTurns, WhatCameTooLateLiveComesTooLateAgain) {
       batch.axes.insert(batch.axes.begin(), late.axes.begin(), late.axes.end());
       late.clear();
     }
-    hub.turn(batch);
+    hub.cycle(batch);
   }
+
   const auto lacking = [](const std::vector<Snapshot>& snapshots) {
-    return std::ranges::count_if(
-        snapshots, [](const Snapshot& s) { return has(s.head.flags, protocol::SampleFlag::AxisMissing); });
+    return std::ranges::count_if(snapshots, [](const Snapshot& s) {
+      return has(s.head.flags, protocol::SampleFlag::AxisMissing);
+    });
   };
+
   ASSERT_GT(lacking(hub.snapshots()), 50) << "two seconds late, and 0.6 s are waited for";
   std::vector<Snapshot> again;
   const auto recording = hub.recording();
   const ReplayOptions options{.snapshots = [&](const Snapshot& s) { again.push_back(s); }};
   ASSERT_TRUE(replay(recording, hub.config(), options));
-  ASSERT_GE(again.size(), hub.snapshots().size());  // the end of a recording gives what was still waiting
+  ASSERT_GE(again.size(),
+            hub.snapshots().size());  // the end of a recording gives what was still waiting
+
   for (std::size_t i = 0; i < hub.snapshots().size(); ++i) {
     const Snapshot& live = hub.snapshots()[i];
     EXPECT_EQ(again[i].head.time, live.head.time);
@@ -112,20 +122,24 @@ TEST(ReplayTurns, APointDatedSecondsAheadKeepsItsPlace) {
   LiveHub hub{folder.path()};
   const HostTime start = example_time(0);
   std::vector<HostTime> live;
+
   for (int i = 0; i < 6000; ++i) {
     Batch batch;
     batch.taken = start + 20s + i * 2ms;
     // The clock of the tracker was learnt from a packet that was read ten seconds late.
     batch.points = {point_at(start + i * 2ms + (i < 100 ? 10s : 0s))};
     live.push_back(batch.points[0].head.time);
-    hub.turn(batch);
+    hub.cycle(batch);
   }
+
   std::vector<HostTime> again;
   const auto recording = hub.recording();
   ReplayOptions options;
+
   options.samples = [&](const Batch& batch, HostTime) {
     for (const auto& point : batch.points) again.push_back(point.head.time);
   };
+
   ASSERT_TRUE(replay(recording, hub.config(), options));
   EXPECT_EQ(again, live);
 }

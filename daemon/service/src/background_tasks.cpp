@@ -1,4 +1,4 @@
-#include "abbe/service/work_aside.hpp"
+#include "abbe/service/background_tasks.hpp"
 
 #include <pthread.h>
 #include <sched.h>
@@ -29,7 +29,7 @@ detail::RunningWork::~RunningWork() {
   --running_work;
 }
 
-bool work_left_running() noexcept {
+bool background_tasks_running() noexcept {
   return running_work > 0;
 }
 
@@ -43,26 +43,27 @@ void become_ordinary_thread() noexcept {
 
 namespace {
 
-using AsideWork = std::function<void()>;
+using BackgroundTask = std::function<void()>;
 
 /// The mutex is between the dispatcher and the threads that work, ordinary ones all of them.
-class AsideThreads {
+class BackgroundThreads {
  public:
-  AsideThreads() : dispatcher_([this] { dispatch(); }) {}
-  AsideThreads(const AsideThreads&) = delete;
-  AsideThreads& operator=(const AsideThreads&) = delete;
-  ~AsideThreads() {
+  BackgroundThreads() : dispatcher_([this] { dispatch(); }) {}
+  BackgroundThreads(const BackgroundThreads&) = delete;
+  BackgroundThreads& operator=(const BackgroundThreads&) = delete;
+  ~BackgroundThreads() {
     if (::getpid() != process_) {  // in a forked child there are no such threads
       dispatcher_.detach();
       return;
     }
-    stopping_.store(true, std::memory_order_release);  // release: pairs with the acquire in dispatch()
+    stopping_.store(true,
+                    std::memory_order_release);  // release: pairs with the acquire in dispatch()
     come_.signal();
     dispatcher_.join();
   }
 
   /// Any thread; takes no lock.
-  void run(AsideWork work) {
+  void run(BackgroundTask work) {
     mail_.put(std::move(work));
     come_.signal();
   }
@@ -83,7 +84,7 @@ class AsideThreads {
     for (auto& thread : threads_) thread.join();
   }
 
-  void give_to_a_thread(AsideWork work) {
+  void give_to_a_thread(BackgroundTask work) {
     std::unique_lock lock{mutex_};
     waiting_.push_back(std::move(work));
     if (idle_ >= waiting_.size()) {
@@ -91,6 +92,7 @@ class AsideThreads {
       work_waits_.notify_one();
       return;
     }
+
     lock.unlock();
     try {
       threads_.emplace_back([this] { serve(); });
@@ -102,7 +104,7 @@ class AsideThreads {
   /// On the dispatcher: later than wanted, not never.
   void work_here() {
     std::unique_lock lock{mutex_};
-    AsideWork work = std::move(waiting_.front());
+    BackgroundTask work = std::move(waiting_.front());
     waiting_.pop_front();
     lock.unlock();
     work();
@@ -110,7 +112,7 @@ class AsideThreads {
 
   void serve() {
     for (;;) {
-      AsideWork work;
+      BackgroundTask work;
       {
         std::unique_lock lock{mutex_};
         ++idle_;
@@ -124,32 +126,32 @@ class AsideThreads {
     }
   }
 
-  drivers::Mailbox<AsideWork> mail_;
+  drivers::Mailbox<BackgroundTask> mail_;
   WakeUp come_;
   std::atomic<bool> stopping_{false};
   std::mutex mutex_;
   std::condition_variable work_waits_;
-  std::deque<AsideWork> waiting_;     // under mutex_
-  std::size_t idle_ = 0;              // under mutex_: threads that wait
-  bool ending_ = false;               // under mutex_
-  std::vector<std::thread> threads_;  // the dispatcher's
+  std::deque<BackgroundTask> waiting_;  // under mutex_
+  std::size_t idle_ = 0;                // under mutex_: threads that wait
+  bool ending_ = false;                 // under mutex_
+  std::vector<std::thread> threads_;    // the dispatcher's
   const pid_t process_ = ::getpid();
   std::thread dispatcher_;
 };
 
-AsideThreads& aside_threads() {
-  static AsideThreads threads;
+BackgroundThreads& background_threads() {
+  static BackgroundThreads threads;
   return threads;
 }
 
 }  // namespace
 
-void prepare_work_aside() {
-  (void)aside_threads();
+void prepare_background_tasks() {
+  (void)background_threads();
 }
 
-void run_aside(std::function<void()> work) {
-  aside_threads().run(std::move(work));
+void run_background_task(std::function<void()> work) {
+  background_threads().run(std::move(work));
 }
 
 }  // namespace abbe::daemon

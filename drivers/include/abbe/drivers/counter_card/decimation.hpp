@@ -1,6 +1,6 @@
 #pragma once
-/// One sample for so many scans, without losing what the others were flagged with. For the device and its
-/// replay alike. Real time, one thread.
+/// One sample for so many scans, without losing what the others were flagged with. For the device
+/// and its replay alike. Real time, one thread.
 
 #include <cstddef>
 #include <cstdint>
@@ -12,9 +12,9 @@
 
 namespace abbe::drivers {
 
-class ScanThinning {
+class ScanDecimation {
  public:
-  explicit ScanThinning(std::size_t every) noexcept : every_(every) {}
+  explicit ScanDecimation(std::size_t every) noexcept : every_(every) {}
 
   /// Every n-th scan, with the flags of those before it and what was lost between them.
   [[nodiscard]] std::optional<protocol::AxisSample> take(const protocol::AxisSample& scan) ABBE_RT {

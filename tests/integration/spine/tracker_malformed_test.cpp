@@ -19,11 +19,13 @@ namespace {
 
 using testing::HasSubstr;
 
-/// A web server as far as a tracker driver can tell: whoever connects is answered at once, and hung up on.
+/// A web server as far as a tracker driver can tell: whoever connects is answered at once, and hung
+/// up on.
 class WebServer {
  public:
   WebServer()
-      : listener_(::socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0)), stop_(::eventfd(0, EFD_CLOEXEC)) {
+      : listener_(::socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0)),
+        stop_(::eventfd(0, EFD_CLOEXEC)) {
     sockaddr_in address{};
     address.sin_family = AF_INET;
     address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
@@ -69,6 +71,7 @@ class WebServer {
 TEST_F(Spine, TrackerThatAnswersNonsenseIsNamedAndTheEncodersGoOn) {
   const WebServer nonsense;
   write_path("path.csv", path());
+
   ASSERT_NO_FATAL_FAILURE(start_simulator());
   tracker_port_ = nonsense.port();
   write_configuration();

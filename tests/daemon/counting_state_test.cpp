@@ -14,6 +14,7 @@
 #include "config_tables.hpp"
 #include "failing_disk.hpp"
 #include "recording_fixture.hpp"
+#include "reference_cycle.hpp"
 #include "text_files.hpp"
 
 namespace abbe::daemon {
@@ -146,7 +147,7 @@ TEST(ReferenceAfterARestart, TakesUpTheDatumOfACardThatWentOn) {
   ReferenceService service{config, nullptr, some_counting()};
   Batch batch;
   batch.axes.push_back(counted_sample(HostTime{110s}));
-  service.cycle(batch);
+  give(service, batch);
   EXPECT_EQ(batch.axes[0].missing_mask, 0b010)
       << "Y was not referenced, and zero = \"here\" is over";
   EXPECT_DOUBLE_EQ(batch.axes[0].position[0], 0.1 + 250e-9);
@@ -158,7 +159,7 @@ TEST(ReferenceAfterARestart, DropsTheDatumOfACardThatBeganAnew) {
   ReferenceService service{config, nullptr, some_counting()};
   Batch batch;
   batch.axes.push_back(counted_sample(HostTime{110s}, true));
-  service.cycle(batch);
+  give(service, batch);
   EXPECT_EQ(batch.axes[0].missing_mask, 0) << "zero = \"here\" holds for the first set-up";
   EXPECT_DOUBLE_EQ(batch.axes[0].position[0], 250e-9);
   EXPECT_THAT(service.carried_on(), IsEmpty());
@@ -167,10 +168,10 @@ TEST(ReferenceAfterARestart, DropsTheDatumOfACardThatBeganAnew) {
 TEST(ReferenceAfterARestart, KeepsNoProgressFromBeforeTheCountersBeganAnew) {
   const auto config = card_config();
   ReferenceService service{config, nullptr};
-  const auto turn = [&service](const protocol::AxisSample& sample, HostTime progress) {
+  const auto cycle = [&service](const protocol::AxisSample& sample, HostTime progress) {
     Batch batch;
     batch.axes.push_back(sample);
-    service.cycle(batch);
+    give(service, batch);
     auto counting = some_counting().progress;
     counting.head.time = progress;
     service.take(counting);

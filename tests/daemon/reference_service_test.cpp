@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "config_tables.hpp"
+#include "reference_cycle.hpp"
 
 namespace abbe::daemon {
 namespace {
@@ -119,7 +120,7 @@ Batch drive(ReferenceService& service, Traverse& traverse) {
   Batch batch;
   for (int i = 0; i < 50'000; ++i) {
     batch = traverse.step(0.1 + 1e-6 * i);
-    service.cycle(batch);
+    give(service, batch);
   }
   return batch;
 }
@@ -129,7 +130,7 @@ TEST(ReferenceService, AnAxisIsMissingUntilItsMarksWereFound) {
   ReferenceService service{config, nullptr};
   Traverse traverse;
   Batch batch = traverse.step(0.1);
-  service.cycle(batch);
+  give(service, batch);
   EXPECT_EQ(batch.axes[0].missing_mask & 0b100, 0b100);
   EXPECT_TRUE(has(batch.axes[0].head.flags, SampleFlag::AxisMissing));
   EXPECT_FALSE(service.status().at(0).known);
@@ -155,7 +156,7 @@ TEST(ReferenceService, ACardThatBeganAnewHasNoDatumAnyMore) {
   drive(service, traverse);
   Batch batch = traverse.step(0.2);
   batch.axes[0].head.flags |= SampleFlag::Restarted;
-  service.cycle(batch);
+  give(service, batch);
   EXPECT_EQ(batch.axes[0].missing_mask & 0b100, 0b100);
   EXPECT_FALSE(service.status().at(0).known);
 }
@@ -190,7 +191,7 @@ Batch counts(HostTime t, std::int64_t count, bool restarted = false) {
 void stand(ReferenceService& service, std::int64_t count) {
   for (int k = 0; k <= 10; ++k) {
     Batch batch = counts(HostTime{1s + k * 100ms}, count, k == 0);
-    service.cycle(batch);
+    give(service, batch);
   }
 }
 
@@ -206,11 +207,11 @@ TEST(ReferenceService, AxesWithoutMarksAreNotKnownUntilSomebodySaysWhereTheyStan
   stand(service, 400);
   EXPECT_THAT(service.without_zero(), ::testing::ElementsAre("X", "Y", "Z"));
   Batch batch = counts(HostTime{2s}, 400);
-  service.cycle(batch);
+  give(service, batch);
   EXPECT_EQ(batch.axes[0].missing_mask, 0b111);
   ASSERT_TRUE(service.stand_at_offset(z_at(HostTime{2s})));
   batch = counts(HostTime{3s}, 404);
-  service.cycle(batch);
+  give(service, batch);
   EXPECT_EQ(batch.axes[0].missing_mask, 0b011);
   EXPECT_NEAR(batch.axes[0].position[2], -1e-6, 1e-15);  // two readings of 0.1 mm apart
   EXPECT_THAT(service.without_zero(), ::testing::ElementsAre("X", "Y"));
@@ -222,7 +223,7 @@ TEST(ReferenceService, NobodyCanSayWhereAMovingAxisStands) {
   ReferenceService service{config, nullptr};
   stand(service, 400);
   Batch batch = counts(HostTime{2s}, 440);
-  service.cycle(batch);
+  give(service, batch);
   const auto moving = service.stand_at_offset(z_at(HostTime{2s}));
 
   ASSERT_FALSE(moving);
@@ -231,7 +232,7 @@ TEST(ReferenceService, NobodyCanSayWhereAMovingAxisStands) {
   EXPECT_THAT(service.without_zero(), Contains("Z"));
   EXPECT_TRUE(service.stand_at_offset({.axes = {"X"}, .now = HostTime{2s}}));
   batch = counts(HostTime{2500ms}, 441);  // a count to and fro is no motion
-  service.cycle(batch);
+  give(service, batch);
   EXPECT_TRUE(service.stand_at_offset(z_at(HostTime{2500ms})));
 }
 
@@ -271,16 +272,16 @@ TEST(ReferenceService, ZeroHereHoldsForTheFirstSetUpOnly) {
       config_of(kCard.substr(0, kCard.find("axes")) + kHere + kCard.substr(kCard.find("axes")));
   ReferenceService service{config, nullptr};
   Batch batch = counts(HostTime{1s}, 400, true);
-  service.cycle(batch);
+  give(service, batch);
   EXPECT_EQ(batch.axes[0].missing_mask, 0);
   EXPECT_EQ(batch.axes[0].position[2], -250e-9 * 400.0);
 
   // The bus failed for a moment: the counters begin at 0 where the machine stands now.
   batch = counts(HostTime{2s}, 0, true);
-  service.cycle(batch);
+  give(service, batch);
   EXPECT_EQ(batch.axes[0].missing_mask, 0b111);
   batch = counts(HostTime{3s}, 0);
-  service.cycle(batch);
+  give(service, batch);
   EXPECT_EQ(batch.axes[0].missing_mask, 0b111);
 }
 
@@ -289,7 +290,7 @@ TEST(ReferenceService, ItIsDecidedForEachAxis) {
                                 kCard.substr(kCard.find("axes")) + reference(""));
   ReferenceService service{config, nullptr};
   Batch batch = counts(HostTime{1s}, 0, true);
-  service.cycle(batch);
+  give(service, batch);
   EXPECT_EQ(batch.axes[0].missing_mask, 0b100);
   EXPECT_EQ(service.stand_at_offset(z_at(HostTime{1s})).error().code, ErrorCode::Usage);
 }

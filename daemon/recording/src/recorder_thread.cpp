@@ -335,6 +335,10 @@ RecorderThread::~RecorderThread() {
   }
 }
 
+void RecorderThread::on_samples(const Batch& batch) {
+  if (!batch.empty()) hand_over(batch);
+}
+
 void RecorderThread::hand_over(const Batch& batch) {
   State::Adding adding{*state_};
   Dropped& unsaid = state_->unsaid;

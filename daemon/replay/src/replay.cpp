@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <chrono>
+#include <span>
 #include <thread>
 #include <utility>
 
@@ -13,9 +14,9 @@
 #include "abbe/methods/calibration_session.hpp"
 #include "abbe/methods/otf_inputs.hpp"
 #include "abbe/model/model_document.hpp"
-#include "abbe/pipeline/assembler.hpp"
 #include "abbe/pipeline/counting_state.hpp"
 #include "abbe/pipeline/datum.hpp"
+#include "abbe/pipeline/pipeline.hpp"
 #include "live_cycles.hpp"
 #include "mark_search.hpp"
 #include "raw_decoder.hpp"
@@ -264,8 +265,8 @@ class FromBytes {
   LiveCycles<protocol::EnvironmentSample> weather_;
 };
 
-/// The hub once more, turn by turn.
-class Replay {
+/// Gives the pipeline the batches of the live run, cycle by cycle.
+class Replay : private PipelineObserver {
  public:
   Replay(const RecordingReader& recording, const Config& config, const ReplayOptions& options,
          Attached attached)
@@ -275,8 +276,10 @@ class Replay {
         datum_(std::move(attached.datum)),
         marks_(std::move(attached.marks)),
         calibrations_(recording, std::move(attached.requests), config, options),
-        assembler_(assembler_options(config)),
+        pipeline_(assembler_options(config),
+                  options.source == ReplaySource::RawBytes ? &datum_ : nullptr),
         set_up_(recording) {
+    pipeline_.add(*this);
     if (options.source == ReplaySource::Samples) {
       take_samples();
     } else {
@@ -293,8 +296,7 @@ class Replay {
     begin_ = batch_.taken = range->first;
     report_.recorded = range->second - range->first;
     take_messages(Pace{options_.speed, begin_});
-    assembler_.finish(snapshots_);
-    hand_on();
+    pipeline_.finish(batch_.taken);
     report_.calibrations = calibrations_.finish();
     if (bytes_) report_.datums = marks_.compared(recording_);
     return std::move(report_);
@@ -349,24 +351,23 @@ class Replay {
   void end_cycle() {
     calibrations_.begin_cycle(batch_.taken);
     if (bytes_) bytes_->end_cycle(batch_);
-    marks_.take(batch_);
-    if (bytes_) {  // recorded samples have their datum
-      set_up_.apply(batch_, datum_);
-      datum_.apply(batch_);
-    }
-    if (options_.samples) options_.samples(batch_, begin_);
-    assembler_.take(batch_);
+    pipeline_.cycle(batch_);
     batch_.clear();
-    assembler_.emit(snapshots_);
-    hand_on();
   }
-  void hand_on() {
-    for (const auto& s : snapshots_) {
-      calibrations_.take(s);
-      if (options_.snapshots) options_.snapshots(s);
+  void on_delivered(const Batch& batch) override {
+    marks_.take(batch);
+    if (bytes_) set_up_.apply(batch, datum_);
+  }
+  void on_samples(const Batch& batch) override {
+    if (options_.samples) options_.samples(batch, begin_);
+  }
+  void on_snapshots(std::span<const protocol::Snapshot> snapshots, HostTime /*taken*/) override {
+    for (const auto& snapshot : snapshots) {
+      calibrations_.take(snapshot);
+      if (options_.snapshots) options_.snapshots(snapshot);
     }
-    report_.snapshots += snapshots_.size();
-    snapshots_.clear();
+
+    report_.snapshots += snapshots.size();
   }
 
   const RecordingReader& recording_;
@@ -375,14 +376,13 @@ class Replay {
   Datum datum_;
   MarkSearch marks_;
   Calibrations calibrations_;
-  Assembler assembler_;
+  Pipeline pipeline_;
   SetUpBefore set_up_;
   std::optional<FromBytes> bytes_;
   RecordingSink sink_;
   HostTime begin_{};
   HostTime published_{};  ///< of the message being delivered
   Batch batch_;
-  std::vector<protocol::Snapshot> snapshots_;
   ReplayReport report_;
 };
 

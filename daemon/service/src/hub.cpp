@@ -100,8 +100,13 @@ struct Hub::Call {
 
 Hub::Hub(HubParts parts)
     : parts_(parts),
-      assembler_(assembler_options(parts.config)),
-      live_(assembler_options(parts.config), parts.time) {}
+      pipeline_(assembler_options(parts.config),
+                parts.reference != nullptr ? &parts.reference->datum() : nullptr),
+      live_(assembler_options(parts.config), parts.time) {
+  if (parts_.reference != nullptr) pipeline_.add(*parts_.reference);
+  pipeline_.add(*this);  // before the recorder: subscribers wait for the live view
+  if (parts_.recorder != nullptr) pipeline_.add(*parts_.recorder);
+}
 
 Hub::~Hub() {
   run_calls();
@@ -119,6 +124,8 @@ ModelStanding Hub::standing() const {
 
 void Hub::cycle(WallTime wall) {
   last_cycle_ns_.store(wall.time_since_epoch().count(), std::memory_order_relaxed);
+  cycle_began_ = wall;
+
   batch_.clear();
   const std::size_t points_left = parts_.devices.points_left();
   parts_.devices.drain(batch_);
@@ -126,25 +133,23 @@ void Hub::cycle(WallTime wall) {
   batch_.taken = now;
   touch(points_left, wall);
   if (parts_.tracker != nullptr) parts_.tracker->cycle(now);
-  if (parts_.reference != nullptr) {
-    parts_.reference->cycle(batch_);
-    parts_.reference->take(parts_.devices.card_progress());
-  }
-  const bool fresh = live_.take(batch_);
-  // Live first: subscribers wait for it; abbe-dds's socket, the recorder and the assembler have
-  // time.
-  publish(fresh, now, wall);
-  if (parts_.publisher != nullptr) parts_.publisher->beat(wall);
 
-  if (parts_.recorder != nullptr && !batch_.empty()) parts_.recorder->hand_over(batch_);
-  assembler_.take(batch_);
-  snapshots_.clear();
-  assembler_.emit(snapshots_);
-  for (const auto& event : parts_.calibration.cycle(snapshots_, now)) {
+  pipeline_.cycle(batch_);
+  if (parts_.reference != nullptr) parts_.reference->take(parts_.devices.card_progress());
+  run_calls();
+}
+
+void Hub::on_samples(const Batch& batch) {
+  publish(live_.take(batch), batch.taken);
+  if (parts_.publisher != nullptr) parts_.publisher->beat(cycle_began_);
+}
+
+void Hub::on_snapshots(std::span<const protocol::Snapshot> snapshots, HostTime taken) {
+  for (const auto& event : parts_.calibration.cycle(snapshots, taken)) {
     if (parts_.publisher != nullptr) parts_.publisher->event(event);
   }
-  if (parts_.verification != nullptr) parts_.verification->cycle(snapshots_);
-  run_calls();
+
+  if (parts_.verification != nullptr) parts_.verification->cycle(snapshots);
 }
 
 /// What the machine said last is asked for only when that matters: its health is not for every
@@ -160,8 +165,9 @@ void Hub::touch(std::size_t points_left, WallTime wall) {
   parts_.touching->cycle(batch_, points_left, seen, wall);
 }
 
-void Hub::publish(bool fresh, HostTime now, WallTime wall) {
+void Hub::publish(bool fresh, HostTime now) {
   Publisher* const publisher = parts_.publisher;
+  const WallTime wall = cycle_began_;
   if (fresh && publisher != nullptr) {
     publisher->snapshot(live_.view(), now, wall);
     publisher->compensation(live_.view(), standing(), now, wall);

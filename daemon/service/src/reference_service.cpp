@@ -40,7 +40,7 @@ Result<void> ReferenceService::cancel() {
   return {};
 }
 
-void ReferenceService::cycle(Batch& batch) {
+void ReferenceService::on_delivered(const Batch& batch) {
   if (left_ && !batch.axes.empty()) take_up_left(batch.axes.front());
   for (const auto& sample : batch.axes) {
     if (has(sample.head.flags, protocol::SampleFlag::Restarted)) {
@@ -52,7 +52,6 @@ void ReferenceService::cycle(Batch& batch) {
   }
   if (!batch.axes.empty()) latest_ = batch.axes.back();
   if (running_) look_for_marks(batch);
-  datum_.apply(batch);
 }
 
 /// A run that goes on is recorded as a further file is.

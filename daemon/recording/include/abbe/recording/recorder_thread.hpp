@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "abbe/pipeline/batch.hpp"
+#include "abbe/pipeline/pipeline.hpp"
 #include "abbe/recording/recorder.hpp"
 
 namespace abbe::daemon {
@@ -29,13 +30,16 @@ struct RecorderThreadOptions {
   std::size_t most_waiting_bytes = 64 << 20;
 };
 
-class RecorderThread {
+class RecorderThread : public PipelineObserver {
  public:
   [[nodiscard]] static Result<std::unique_ptr<RecorderThread>> start(RecorderThreadOptions options,
                                                                      RecordingInfo info);
   RecorderThread(const RecorderThread&) = delete;
   RecorderThread& operator=(const RecorderThread&) = delete;
-  ~RecorderThread();  ///< closes the file cleanly
+  ~RecorderThread() override;  ///< closes the file cleanly
+
+  /// Hands over what the batch holds.
+  void on_samples(const Batch& batch) override;
 
   void hand_over(const Batch& batch);
   void hand_over(v1::CalibrationEvent event, protocol::HostTime taken);

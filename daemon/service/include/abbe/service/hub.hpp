@@ -11,14 +11,15 @@
 #include <functional>
 #include <memory>
 #include <optional>
+#include <span>
 #include <type_traits>
 #include <utility>
 #include <vector>
 
 #include "abbe/drivers/mailbox.hpp"
 #include "abbe/drivers/time_source.hpp"
-#include "abbe/pipeline/assembler.hpp"
 #include "abbe/pipeline/live_view.hpp"
+#include "abbe/pipeline/pipeline.hpp"
 #include "abbe/pipeline/sample_source.hpp"
 #include "abbe/pipeline/stream_health.hpp"
 #include "abbe/publishing/publisher.hpp"
@@ -48,14 +49,14 @@ struct HubParts {
   TrackerService* tracker = nullptr;
 };
 
-class Hub {
+class Hub : private PipelineObserver {
  public:
   using WallTime = Publisher::WallTime;
 
   explicit Hub(HubParts parts);
   Hub(const Hub&) = delete;
   Hub& operator=(const Hub&) = delete;
-  ~Hub();
+  ~Hub() override;
 
   /// One turn; the hub's thread.
   void cycle(WallTime wall);
@@ -87,15 +88,18 @@ class Hub {
   struct Call;
   [[nodiscard]] bool run_in_cycle(std::function<void()> task, std::chrono::milliseconds time_out);
   void run_calls();
-  void publish(bool fresh, protocol::HostTime now, WallTime wall);
+  void on_samples(const Batch& batch) override;
+  void on_snapshots(std::span<const protocol::Snapshot> snapshots,
+                    protocol::HostTime taken) override;
+  void publish(bool fresh, protocol::HostTime now);
   void collect_health(protocol::HostTime now);
   void touch(std::size_t points_left, WallTime wall);
 
   HubParts parts_;
-  Assembler assembler_;
+  Pipeline pipeline_;
   LiveView live_;
   Batch batch_;
-  std::vector<protocol::Snapshot> snapshots_;
+  WallTime cycle_began_{};
   std::vector<StreamHealth> health_;
   WallTime next_health_{};
   std::atomic<std::int64_t> last_cycle_ns_{0};

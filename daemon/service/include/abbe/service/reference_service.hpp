@@ -12,12 +12,13 @@
 #include "abbe/config/config.hpp"
 #include "abbe/pipeline/counting_state.hpp"
 #include "abbe/pipeline/datum.hpp"
+#include "abbe/pipeline/pipeline.hpp"
 #include "abbe/pipeline/reference_session.hpp"
 #include "abbe/recording/recorder_thread.hpp"
 
 namespace abbe::daemon {
 
-class ReferenceService {
+class ReferenceService : public PipelineObserver {
  public:
   struct AxisStatus {
     std::string name;
@@ -39,9 +40,11 @@ class ReferenceService {
   /// positive. Refused while a calibration takes readings, without a fresh sample, and unless the
   /// axes have stood for half a second.
   [[nodiscard]] Result<void> stand_at_offset(const StandHere& here);
-  /// Every turn, before anybody else sees the batch.
-  void cycle(Batch& batch);
-  /// After cycle(): how far the card has come, as the devices say.
+  /// Searches the marks while a search is running.
+  void on_delivered(const Batch& batch) override;
+  /// The datum of every axis, for the pipeline.
+  [[nodiscard]] Datum& datum() noexcept { return datum_; }
+  /// After on_delivered(): the progress of the card, as the devices report it.
   void take(const std::optional<drivers::CounterCardProgress>& progress);
 
   /// What a later run would have to know; nothing while the counters just began anew.

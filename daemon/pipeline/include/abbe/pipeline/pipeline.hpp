@@ -1,0 +1,67 @@
+#pragma once
+/// What is done with the samples of one cycle, live (the hub) and in a replay alike:
+///
+///   1. observers see the batch as the devices delivered it (search for reference marks)
+///   2. every axis reading gets its datum; an axis that is not referenced is marked missing
+///   3. observers see the samples (live view, publisher, recorder)
+///   4. samples are assembled to snapshots: axes interpolated to the instant of each tracker point
+///      and touch, corrected for the temperature of the scales, ranges for the index of the air
+///   5. observers see the snapshots (calibration session, verification)
+///
+/// The order of the steps is written here only. Deterministic: reads no clock, so that a replay of
+/// the same batches gives the same snapshots. Ordinary world; one thread.
+
+#include <span>
+#include <vector>
+
+#include "abbe/pipeline/assembler.hpp"
+#include "abbe/pipeline/batch.hpp"
+#include "abbe/pipeline/datum.hpp"
+#include "abbe/protocol/samples.hpp"
+
+namespace abbe::daemon {
+
+/// Implements the steps that interest it. Within a step, observers are called in the order in which
+/// they were added.
+class PipelineObserver {
+ public:
+  PipelineObserver() = default;
+  virtual ~PipelineObserver() = default;
+
+  /// Step 1. A datum that is found now applies to the samples of this batch, too.
+  virtual void on_delivered(const Batch&) {}
+  /// Step 3. Called in every cycle, also with an empty batch.
+  virtual void on_samples(const Batch&) {}
+  /// Step 5. Called in every cycle, also without snapshots. `taken`: Batch::taken.
+  virtual void on_snapshots(std::span<const protocol::Snapshot>, protocol::HostTime /*taken*/) {}
+
+ protected:
+  PipelineObserver(const PipelineObserver&) = default;
+  PipelineObserver& operator=(const PipelineObserver&) = default;
+  PipelineObserver(PipelineObserver&&) = default;
+  PipelineObserver& operator=(PipelineObserver&&) = default;
+};
+
+class Pipeline {
+ public:
+  /// `datum`: null if the samples have their datum already, as those of a recording.
+  Pipeline(AssemblerOptions options, Datum* datum);
+
+  /// The observer outlives the pipeline.
+  void add(PipelineObserver& observer) { observers_.push_back(&observer); }
+
+  /// Steps 1 to 5. Changes the readings in `batch` (step 2).
+  void cycle(Batch& batch);
+  /// Step 5 with the snapshots of all samples that still wait for others, at the end of a recording.
+  void finish(protocol::HostTime taken);
+
+ private:
+  void report_snapshots(protocol::HostTime taken);
+
+  Datum* datum_;
+  Assembler assembler_;
+  std::vector<PipelineObserver*> observers_;
+  std::vector<protocol::Snapshot> snapshots_;  // reused: allocates only at first
+};
+
+}  // namespace abbe::daemon

@@ -6,7 +6,7 @@
 #include <optional>
 
 #include "abbe/devices/device_options.hpp"
-#include "abbe/methods/otf_inputs.hpp"
+#include "abbe/methods/otf/inputs.hpp"
 #include "abbe/pipeline/environment_use.hpp"
 
 namespace abbe::daemon {
@@ -89,7 +89,7 @@ TEST(CalibrationSession, GoesThroughItsStatesAlongThePath) {
 
 std::string reason_of_a_run_along(const std::vector<AxisPosition>& file,
                                   const AcquisitionOptions& options = {}) {
-  CalibrationSession session{options};
+  CalibrationSession session{{options, {}}};
   EXPECT_TRUE(session.start({OtfRequest{file}, HostTime{10s}}));
   Drive drive{session};
   drive.stand(kPath[0], 1s);
@@ -159,7 +159,7 @@ TEST(CalibrationSession, EverySessionHasANumberOfItsOwn) {
 TEST(CalibrationSession, AMachineThatCyclesOnItsPathIsGivenUpAtABound) {
   AcquisitionOptions options;
   options.most_points = 5000;
-  CalibrationSession session{options};
+  CalibrationSession session{{options, {}}};
   ASSERT_TRUE(session.start({OtfRequest{kPath}, HostTime{10s}}));
   Drive drive{session};
   drive.stand(kPath[0], 1s);
@@ -175,7 +175,7 @@ TEST(CalibrationSession, TheRunKnowsItsScalesAndItsAir) {
   constexpr double kAlpha = 10e-6, kFixed_m = -0.05;
   options.environment.thermal = {{0, {.axis = "X", .alpha_per_K = kAlpha, .fixed_m = kFixed_m}}};
   options.environment.air.assumed_index = 1.00027;
-  CalibrationSession session{options};
+  CalibrationSession session{{options, {}}};
   ASSERT_TRUE(session.start({OtfRequest{kPath}, HostTime{10s}}));
   Drive drive{session};
   protocol::EnvironmentSample warm;
@@ -205,7 +205,7 @@ TEST(CalibrationSession, TheRunKnowsWhatTheControllersAirLeaves) {
   config.tracker.emplace();
   AcquisitionOptions options;
   options.environment = environment_use(config);
-  CalibrationSession session{options};
+  CalibrationSession session{{options, {}}};
 
   ASSERT_TRUE(session.start({OtfRequest{kPath}, HostTime{10s}}));
   Drive drive{session};
@@ -223,7 +223,7 @@ TEST(CalibrationSession, TheRunNamesAirThatNobodyMeasured) {
   config.tracker.emplace().weather = WeatherConfig::None;
   AcquisitionOptions options;
   options.environment = environment_use(config);
-  CalibrationSession session{options};
+  CalibrationSession session{{options, {}}};
 
   ASSERT_TRUE(session.start({OtfRequest{kPath}, HostTime{10s}}));
   Drive drive{session};

@@ -1,6 +1,6 @@
 /// Touches as the hub brings them: usable or not, with device and reason; the session that is made
 /// of them.
-#include "abbe/methods/evemu_acquisition.hpp"
+#include "abbe/methods/evemu/acquisition.hpp"
 
 #include <gmock/gmock.h>
 

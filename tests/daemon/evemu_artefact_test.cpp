@@ -11,9 +11,9 @@
 #include <regex>
 
 #include "abbe/devices/device_options.hpp"
-#include "abbe/methods/artefact_thermometer.hpp"
 #include "abbe/methods/calibration_session.hpp"
-#include "abbe/methods/otf_inputs.hpp"
+#include "abbe/methods/evemu/artefact_thermometer.hpp"
+#include "abbe/methods/otf/inputs.hpp"
 #include "abbe/pipeline/assembler.hpp"
 #include "abbe/replay/replay.hpp"
 #include "abbe/sim/ball_array.hpp"
@@ -398,7 +398,7 @@ Batch warm_run(const CalibrationRequest& request) {
 /// As the daemon does it while the run goes on.
 EvemuRun live_run(const CalibrationRequest& request, const Batch& batch, const Config& config) {
   Assembler assembler{assembler_options(config)};
-  CalibrationSession session{acquisition_options(config), evemu_acquisition_options(config)};
+  CalibrationSession session{Methods::options(config)};
   EXPECT_TRUE(session.start(request));
   std::vector<protocol::Snapshot> snapshots;
   assembler.take(batch);

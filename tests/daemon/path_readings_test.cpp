@@ -1,5 +1,5 @@
 /// Scale readings from a file against the vertices of a path.
-#include "abbe/methods/path_readings.hpp"
+#include "abbe/methods/otf/path_readings.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

@@ -8,7 +8,27 @@
 
 namespace abbe::daemon {
 
+namespace {
+
 using protocol::HostTime;
+
+/// The operator is guided from touch to touch.
+template <class Acquisition>
+constexpr bool kGuided = requires(Acquisition& acquisition) {
+  acquisition.next();
+  acquisition.take_notes();
+};
+
+std::optional<calib::evemu::NextTouch> next_of(const Acquisition& acquisition) {
+  return std::visit(
+      [](const auto& of_method) -> std::optional<calib::evemu::NextTouch> {
+        if constexpr (requires { of_method.next(); }) return of_method.next();
+        return std::nullopt;
+      },
+      acquisition);
+}
+
+}  // namespace
 
 bool CalibrationSession::running() const noexcept {
   return status_.state == SessionState::Warming || status_.state == SessionState::Acquiring ||
@@ -20,18 +40,13 @@ bool CalibrationSession::acquiring() const noexcept {
 }
 
 Result<PreparedSession> CalibrationSession::prepare(CalibrationTask task) const {
-  const std::string_view method = method_of(task);
-  if (auto* touching = std::get_if<EvemuRequest>(&task)) {
-    auto made = EvemuAcquisition::create(std::move(*touching), evemu_options_);
-    if (!made) return tl::unexpected(made.error());
-    return PreparedSession{.method = method, .path_m = {}, .acquisition = std::move(*made)};
-  }
-  auto& path_m = std::get<OtfRequest>(task).path_m;
-  if (path_m.size() < 2)
-    return fail(ErrorCode::BadInput, "calibrate otf: a path needs at least two vertices");
-  OtfAcquisition made{path_m, otf_options_};
-  return PreparedSession{
-      .method = method, .path_m = std::move(path_m), .acquisition = std::move(made)};
+  return Methods::visit(
+      std::move(task), [this](auto method, auto&& request) -> Result<PreparedSession> {
+        using Options = typename decltype(method)::Options;
+        auto made = method.acquire(std::move(request), std::get<Options>(options_));
+        if (!made) return tl::unexpected(made.error());
+        return PreparedSession{.method = method.kName, .acquisition = std::move(*made)};
+      });
 }
 
 Result<void> CalibrationSession::start(PreparedSession&& prepared, HostTime from) {
@@ -42,12 +57,10 @@ Result<void> CalibrationSession::start(PreparedSession&& prepared, HostTime from
 
   std::visit([from](auto& a) { a.begin(from); }, prepared.acquisition);
   acquisition_.emplace(std::move(prepared.acquisition));
-  std::swap(path_m_, prepared.path_m);
   status_ = {};
   status_.id = ++started_;
   status_.method = prepared.method;
-  if (const auto* touching = std::get_if<EvemuAcquisition>(&*acquisition_))
-    status_.next = touching->next();
+  status_.next = next_of(*acquisition_);
   enter(SessionState::Warming, std::visit([](const auto& a) { return a.reason(); }, *acquisition_),
         from);
 
@@ -86,8 +99,11 @@ void CalibrationSession::follow_acquisition(HostTime now) {
         return std::pair{a.phase(), a.reason()};
       },
       *acquisition_);
-  if (auto* touching = std::get_if<EvemuAcquisition>(&*acquisition_))
-    follow_guidance(*touching, now);
+  std::visit(
+      [&](auto& acquisition) {
+        if constexpr (kGuided<decltype(acquisition)>) follow_guidance(acquisition, now);
+      },
+      *acquisition_);
 
   switch (phase) {
     case AcquisitionPhase::WaitingAtStart:
@@ -106,8 +122,9 @@ void CalibrationSession::follow_acquisition(HostTime now) {
 
 /// A note is said, then what to do; both are events, so that whoever listens hears them in this
 /// order.
-void CalibrationSession::follow_guidance(EvemuAcquisition& touching, HostTime now) {
-  const auto notes = touching.take_notes();
+template <class Guided>
+void CalibrationSession::follow_guidance(Guided& acquisition, HostTime now) {
+  const auto notes = acquisition.take_notes();
   for (const std::string& note : notes) {
     status_.notes.push_back(note);
     ++status_.noted;
@@ -120,35 +137,24 @@ void CalibrationSession::follow_guidance(EvemuAcquisition& touching, HostTime no
                         status_.notes.begin() + static_cast<std::ptrdiff_t>(surplus));
   }
 
-  status_.next = touching.next();
-  const bool same_state =
-      touching.phase() == (status_.state == SessionState::Warming ? AcquisitionPhase::WaitingAtStart
-                                                                  : AcquisitionPhase::Running);
-  if (same_state && touching.reason() != status_.reason)
-    enter(status_.state, touching.reason(), now);
+  status_.next = acquisition.next();
+  const bool same_state = acquisition.phase() == (status_.state == SessionState::Warming
+                                                      ? AcquisitionPhase::WaitingAtStart
+                                                      : AcquisitionPhase::Running);
+  if (same_state && acquisition.reason() != status_.reason)
+    enter(status_.state, acquisition.reason(), now);
 }
 
-std::optional<AcquiredRun> CalibrationSession::take_run() {
+std::optional<Acquisition> CalibrationSession::take_run() {
   if (status_.state != SessionState::Identifying || !acquisition_) return std::nullopt;
-  AcquiredRun acquired{.path_m = std::exchange(path_m_, {}),
-                       .acquisition = std::move(*acquisition_),
-                       .environment = otf_options_.environment};
-  acquisition_.reset();
   status_.progress = 0.0;
-  return acquired;
+  return std::exchange(acquisition_, std::nullopt);
 }
 
-CalibrationRun run_of(AcquiredRun acquired) {
-  if (auto* touching = std::get_if<EvemuAcquisition>(&acquired.acquisition))
-    return touching->release();
-  auto& otf = std::get<OtfAcquisition>(acquired.acquisition);
-  const EnvironmentEffect effect = otf.environment();
-  for (AxisPosition& q_m : acquired.path_m) q_m = at_temperature(q_m, effect, acquired.environment);
-  return OtfRun{.path_m = std::move(acquired.path_m),
-                .points = otf.release(),
-                .u_scale = effect.u_scale,
-                .u_axis_scale = effect.u_expansion_factor,
-                .unmeasured_air = acquired.environment.unmeasured_air};
+CalibrationRun run_of(Acquisition acquired) {
+  return Methods::visit(std::move(acquired), [](auto method, auto&& of_method) -> CalibrationRun {
+    return method.run_of(std::move(of_method));
+  });
 }
 
 void CalibrationSession::judged(std::string model_id, bool passed, std::string reason,

@@ -12,7 +12,7 @@
 #include "abbe/messages/recording_info.hpp"
 #include "abbe/methods/calibration_request.hpp"
 #include "abbe/methods/calibration_session.hpp"
-#include "abbe/methods/otf_inputs.hpp"
+#include "abbe/methods/otf/inputs.hpp"
 #include "abbe/model/model_document.hpp"
 #include "abbe/pipeline/counting_state.hpp"
 #include "abbe/pipeline/datum.hpp"
@@ -40,7 +40,7 @@ class Calibrations {
         requests_(std::move(requests)),
         config_(config),
         options_(options),
-        session_(acquisition_options(config), evemu_acquisition_options(config)) {}
+        session_(Methods::options(config)) {}
 
   /// Requests came between two turns. One that came later ends the one before, as it did live (by a
   /// cancellation).
@@ -64,7 +64,7 @@ class Calibrations {
  private:
   void begin_next() {
     end();
-    session_ = CalibrationSession{acquisition_options(config_), evemu_acquisition_options(config_)};
+    session_ = CalibrationSession{Methods::options(config_)};
     (void)session_.start(requests_[next_]);
     identified_ = false;
     ++next_;

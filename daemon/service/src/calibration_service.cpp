@@ -8,7 +8,7 @@
 
 #include "abbe/devices/device_options.hpp"
 #include "abbe/methods/calibration_run.hpp"
-#include "abbe/methods/otf_inputs.hpp"
+#include "abbe/methods/otf/inputs.hpp"
 #include "abbe/model/model_document.hpp"
 #include "abbe/service/background_tasks.hpp"
 #include "outcome.hpp"
@@ -72,7 +72,7 @@ CalibrationService::CalibrationService(const Config& config, ModelAuthority& aut
       authority_(authority),
       recorder_(recorder),
       utc_(utc),
-      session_(acquisition_options(config), evemu_acquisition_options(config)) {}
+      session_(Methods::options(config)) {}
 
 CalibrationService::~CalibrationService() {
   const WallTime until = WallTime::clock::now() + kStopPatience;
@@ -122,22 +122,18 @@ Result<void> CalibrationService::check(const CalibrationTask& task) const {
             method_of(task)));
   }
 
-  if (const auto* otf = std::get_if<OtfRequest>(&task)) {
-    if (config_.tracker && config_.tracker->mode == TrackerModeConfig::Stationary)
-      return fail(ErrorCode::Refused,
-                  "calibrate otf: [tracker] mode = \"stationary\" gives no points on the fly");
-    return check_otf_path(otf->path_m, config_.machine);
-  }
-
-  return check_evemu(std::get<EvemuRequest>(task), config_);
+  return Methods::visit(
+      task, [this](auto method, const auto& request) { return method.check(request, config_); });
 }
 
 Result<PreparedCalibration> CalibrationService::prepare(CalibrationTask task) const {
   if (auto fine = check(task); !fine) return tl::unexpected(fine.error());
   RecordingAttachment attachment = to_attachment(task);
+  const MethodNeeds needs =
+      Methods::visit(task, [this](auto method, const auto&) { return method.needs(config_); });
   auto session = session_.prepare(std::move(task));
   if (!session) return tl::unexpected(session.error());
-  return PreparedCalibration{std::move(*session), std::move(attachment)};
+  return PreparedCalibration{std::move(*session), std::move(attachment), needs};
 }
 
 Result<std::uint64_t> CalibrationService::start(PreparedCalibration&& prepared,
@@ -212,7 +208,7 @@ std::vector<SessionEvent> CalibrationService::cycle(std::span<const protocol::Sn
   return events;
 }
 
-void CalibrationService::begin_identification(AcquiredRun acquired) {
+void CalibrationService::begin_identification(Acquisition acquired) {
   auto active = authority_.to_beat();
   active_left_out_ = !active && authority_.in_force() != nullptr;
   std::future<RecordingDigest> digest;

@@ -49,10 +49,8 @@ std::string who(const json& request) {
 }
 
 /// No method uses readings of X, Y or Z without a datum: a run would never get them.
-Result<void> check_zeros(const HubParts& parts, const PreparedSession& task) {
-  const bool by_cmm =
-      std::holds_alternative<EvemuAcquisition>(task.acquisition) && parts.config.cmm.has_value();
-  if (parts.reference == nullptr || by_cmm) return {};
+Result<void> check_zeros(const HubParts& parts, const MethodNeeds& needs) {
+  if (parts.reference == nullptr || !needs.axis_readings) return {};
   auto unknown = parts.reference->unknown();
   const auto linear = std::span{parts.config.machine.axes}.first(
       std::min(kLinearAxes, parts.config.machine.axes.size()));
@@ -70,9 +68,9 @@ Result<void> check_zeros(const HubParts& parts, const PreparedSession& task) {
 }
 
 /// Points of before an order do not belong to those after it.
-Result<void> check_tracker_is_free(const HubParts& parts, const PreparedSession& task) {
+Result<void> check_tracker_is_free(const HubParts& parts, const MethodNeeds& needs) {
   const auto* order = parts.tracker != nullptr ? parts.tracker->running() : nullptr;
-  if (order == nullptr || std::holds_alternative<EvemuAcquisition>(task.acquisition)) return {};
+  if (order == nullptr || !needs.tracker) return {};
   return fail(
       ErrorCode::Refused,
       fmt::format(
@@ -82,7 +80,7 @@ Result<void> check_tracker_is_free(const HubParts& parts, const PreparedSession&
 }
 
 Result<OnHub> calibrate(const HubParts& parts, const json& request) {
-  auto task = task_from_json(request, touch_plan(parts.config.evemu));
+  auto task = task_from_json(request, &parts.config);
   if (!task) return tl::unexpected(task.error());
   auto prepared = parts.calibration.prepare(std::move(*task));
   if (!prepared) return tl::unexpected(prepared.error());
@@ -90,8 +88,8 @@ Result<OnHub> calibrate(const HubParts& parts, const json& request) {
 
   return [shared, by = who(request)](const Hub& hub) {
     const HubParts& on = hub.parts();
-    if (const auto known = check_zeros(on, shared->session); !known) return reply(known.error());
-    if (const auto free = check_tracker_is_free(on, shared->session); !free)
+    if (const auto known = check_zeros(on, shared->needs); !known) return reply(known.error());
+    if (const auto free = check_tracker_is_free(on, shared->needs); !free)
       return reply(free.error());
     const auto started = on.calibration.start(std::move(*shared), by, on.time.now());
     return started ? reply(json{{"ok", true}, {"session", *started}}) : reply(started.error());

@@ -82,12 +82,12 @@ TEST(ReceivedLattice, RefusesAGridWithAHole) {
 }
 
 TEST(GridComparison, ARigidMotionIsWhatNoMeasurementSees) {
-  const Vector3 shift(3e-6, 0, -2e-6), cycle(1e-6, 2e-6, -1e-6);
-  const auto known = known_with([&](const Vector3& p) -> Vector3 { return shift + turn.cross(p); });
+  const Vector3 shift(3e-6, 0, -2e-6), rotation(1e-6, 2e-6, -1e-6);
+  const auto known = known_with([&](const Vector3& p) -> Vector3 { return shift + rotation.cross(p); });
   const auto comparison = known.compared();
   ASSERT_TRUE(comparison.has_value());
   EXPECT_GT(comparison->after.mean_m, 1e-6);
-  EXPECT_LT(comparison->after_rigid_free.max_m, 1e-12);  // second order of the turn and rounding
+  EXPECT_LT(comparison->after_rigid_free.max_m, 1e-12);  // second order of the rotation, and rounding
 }
 
 TEST(GridComparison, PointsOutsideAreCountedAndLeftOut) {

@@ -11,17 +11,12 @@
 #include "abbe/base/axis_position.hpp"
 #include "abbe/base/error.hpp"
 #include "abbe/messages/recording_info.hpp"
-#include "abbe/methods/evemu_acquisition.hpp"
-#include "abbe/methods/otf_acquisition.hpp"
+#include "abbe/methods/methods.hpp"
 
 namespace abbe::daemon {
 
-struct OtfRequest {
-  std::vector<AxisPosition> path_m;
-};
-
 /// One for every method.
-using CalibrationTask = std::variant<OtfRequest, EvemuRequest>;
+using CalibrationTask = Methods::Request;
 [[nodiscard]] std::string_view method_of(const CalibrationTask& task) noexcept;  ///< "otf", "evemu"
 
 struct CalibrationRequest {
@@ -31,10 +26,10 @@ struct CalibrationRequest {
 
 /// {"method": ..., what it needs}; keeps every bit of the numbers.
 [[nodiscard]] nlohmann::json to_json(const CalibrationTask& task);
-/// BadInput naming what is missing or of the wrong type; Usage for a method nobody knows. `plan`:
-/// for what of it an evemu task does not say.
+/// BadInput naming what is missing or of the wrong type; Usage for an unknown method. `config`: for
+/// what the object leaves to the configuration; null: the defaults.
 [[nodiscard]] Result<CalibrationTask> task_from_json(const nlohmann::json& object,
-                                                     const calib::evemu::TouchPlan& plan = {});
+                                                     const Config* config = nullptr);
 
 [[nodiscard]] RecordingAttachment to_attachment(const CalibrationRequest& request);
 /// The same in two steps, of which only the first grows with the task.

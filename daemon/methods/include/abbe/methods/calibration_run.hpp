@@ -8,15 +8,13 @@
 #include <vector>
 
 #include "abbe/base/input_file.hpp"
-#include "abbe/methods/evemu_acquisition.hpp"
-#include "abbe/methods/evemu_identification.hpp"
-#include "abbe/methods/otf_identification.hpp"
+#include "abbe/methods/methods.hpp"
 #include "abbe/model/model_document.hpp"
 
 namespace abbe::daemon {
 
-using CalibrationRun = std::variant<OtfRun, EvemuRun>;
-using Candidate = std::variant<OtfCandidate, EvemuCandidate>;
+using CalibrationRun = Methods::Run;
+using Candidate = Methods::Candidate;
 
 /// `active` may be null.
 [[nodiscard]] Result<Candidate> identify(const CalibrationRun& run, const Config& config,

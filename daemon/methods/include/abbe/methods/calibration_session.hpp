@@ -30,29 +30,22 @@
 
 namespace abbe::daemon {
 
-using Acquisition = std::variant<OtfAcquisition, EvemuAcquisition>;
+using Acquisition = Methods::Acquisition;
 
 /// A task that was checked and made ready to start: what grows with the request is done.
 struct PreparedSession {
   std::string_view method;
-  std::vector<AxisPosition> path_m;  ///< of an on-the-fly run
   Acquisition acquisition;
 };
 
-/// What a session has acquired, as it stood when the run was complete.
-struct AcquiredRun {
-  std::vector<AxisPosition> path_m;
-  Acquisition acquisition;
-  EnvironmentUseOptions environment;
-};
-/// For the identification: points in one piece, the path as the snapshots saw it. O(n) in points
-/// and vertices.
-[[nodiscard]] CalibrationRun run_of(AcquiredRun acquired);
+/// What a session had acquired when the run was complete, as the input of the identification. O(n)
+/// in points and vertices.
+[[nodiscard]] CalibrationRun run_of(Acquisition acquired);
 
 class CalibrationSession {  // NOLINT(bugprone-exception-escape): a defaulted move of a variant
  public:
-  explicit CalibrationSession(AcquisitionOptions otf = {}, EvemuAcquisitionOptions evemu = {})
-      : otf_options_(std::move(otf)), evemu_options_(std::move(evemu)) {}
+  /// Options of every method, in the order of Methods.
+  explicit CalibrationSession(Methods::Options options = {}) : options_(std::move(options)) {}
 
   /// BadInput for a task that is none. Any thread, also while another uses the session.
   [[nodiscard]] Result<PreparedSession> prepare(CalibrationTask task) const;
@@ -70,7 +63,7 @@ class CalibrationSession {  // NOLINT(bugprone-exception-escape): a defaulted mo
   void tick(protocol::HostTime now);
 
   /// The acquired run, once, when the state has become Identifying.
-  [[nodiscard]] std::optional<AcquiredRun> take_run();
+  [[nodiscard]] std::optional<Acquisition> take_run();
   /// What was acquired in vain, once, for whoever has the time to destroy it.
   [[nodiscard]] std::optional<Acquisition> take_discarded() {
     return std::exchange(discarded_, std::nullopt);
@@ -90,12 +83,11 @@ class CalibrationSession {  // NOLINT(bugprone-exception-escape): a defaulted mo
  private:
   [[nodiscard]] bool acquiring() const noexcept;
   void follow_acquisition(protocol::HostTime now);
-  void follow_guidance(EvemuAcquisition& touching, protocol::HostTime now);
+  template <class Guided>
+  void follow_guidance(Guided& acquisition, protocol::HostTime now);
   void enter(SessionState state, std::string reason, protocol::HostTime now);
 
-  AcquisitionOptions otf_options_;
-  EvemuAcquisitionOptions evemu_options_;
-  std::vector<AxisPosition> path_m_;  ///< of an on-the-fly run
+  Methods::Options options_;
   std::optional<Acquisition> acquisition_, discarded_;
   std::uint64_t started_ = 0;  ///< how many sessions
   SessionStatus status_;

@@ -29,6 +29,7 @@ namespace abbe::daemon {
 struct PreparedCalibration {
   PreparedSession session;
   RecordingAttachment attachment;  ///< of the recording
+  MethodNeeds needs;
 };
 
 class CalibrationService {
@@ -100,7 +101,7 @@ class CalibrationService {
   };
   using WallTime = std::chrono::steady_clock::time_point;
   [[nodiscard]] Result<void> check(const CalibrationTask& task) const;
-  void begin_identification(AcquiredRun acquired);
+  void begin_identification(Acquisition acquired);
   [[nodiscard]] bool sign(Result<Identified> identified, protocol::HostTime now);
   void keep(Result<Identified> identified, protocol::HostTime now);
   void discard_unstored();

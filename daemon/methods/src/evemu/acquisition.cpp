@@ -1,4 +1,4 @@
-#include "abbe/methods/evemu_acquisition.hpp"
+#include "abbe/methods/evemu/acquisition.hpp"
 
 #include <fmt/format.h>
 

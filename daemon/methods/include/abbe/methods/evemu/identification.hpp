@@ -11,7 +11,7 @@
 #include "abbe/base/error.hpp"
 #include "abbe/calib/evemu/judge.hpp"
 #include "abbe/config/config.hpp"
-#include "abbe/methods/evemu_acquisition.hpp"
+#include "abbe/methods/evemu/acquisition.hpp"
 
 namespace abbe::daemon {
 

@@ -1,4 +1,4 @@
-#include "abbe/methods/otf_identification.hpp"
+#include "abbe/methods/otf/identification.hpp"
 
 #include <cstddef>
 #include <cstdint>
@@ -9,7 +9,7 @@
 #include "abbe/calib/otf/observe.hpp"
 #include "abbe/config/calib_error.hpp"
 #include "abbe/config/calibration_machine.hpp"
-#include "abbe/methods/otf_inputs.hpp"
+#include "abbe/methods/otf/inputs.hpp"
 
 namespace abbe::daemon {
 namespace {

@@ -15,7 +15,8 @@
 #include "abbe/calib/gate.hpp"
 #include "abbe/calib/otf/solve.hpp"
 #include "abbe/config/config.hpp"
-#include "abbe/methods/otf_acquisition.hpp"
+#include "abbe/methods/identification_watch.hpp"
+#include "abbe/methods/otf/acquisition.hpp"
 
 namespace abbe::daemon {
 
@@ -29,12 +30,6 @@ struct OtfRun {
   /// Note of the verdict: the air the ranges were corrected for without measuring it. None: it was
   /// measured.
   std::optional<std::string> unmeasured_air;
-};
-
-/// How an identification is watched from outside; both are called in its thread and may be empty.
-struct IdentificationWatch {
-  std::function<void(double)> progress = {};  ///< 0 to 1
-  std::function<bool()> stopped = {};         ///< true: it ends soon, with an Error
 };
 
 struct OtfCandidate {

@@ -14,7 +14,7 @@
 #include "abbe/base/input_file.hpp"
 #include "abbe/calib/axis_table.hpp"
 #include "abbe/calib/evemu/touch_guide.hpp"
-#include "abbe/methods/artefact_thermometer.hpp"
+#include "abbe/methods/evemu/artefact_thermometer.hpp"
 #include "abbe/pipeline/acquisition_phase.hpp"
 #include "abbe/protocol/samples.hpp"
 

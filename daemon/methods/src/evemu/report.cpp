@@ -1,4 +1,4 @@
-#include "abbe/methods/evemu_report.hpp"
+#include "abbe/methods/evemu/report.hpp"
 
 #include <fmt/format.h>
 

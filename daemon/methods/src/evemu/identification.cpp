@@ -1,4 +1,4 @@
-#include "abbe/methods/evemu_identification.hpp"
+#include "abbe/methods/evemu/identification.hpp"
 
 #include <fmt/format.h>
 
@@ -7,7 +7,7 @@
 
 #include "abbe/config/calib_error.hpp"
 #include "abbe/config/calibration_machine.hpp"
-#include "abbe/methods/otf_inputs.hpp"
+#include "abbe/methods/otf/inputs.hpp"
 #include "abbe/pipeline/datum.hpp"
 #include "abbe/tables/evemu_files.hpp"
 

@@ -1,4 +1,4 @@
-#include "abbe/methods/otf_acquisition.hpp"
+#include "abbe/methods/otf/acquisition.hpp"
 
 #include <fmt/format.h>
 
@@ -8,7 +8,7 @@
 #include "abbe/base/units.hpp"
 #include "abbe/calib/otf/polyline.hpp"
 #include "abbe/config/linear_axes.hpp"
-#include "abbe/methods/otf_inputs.hpp"
+#include "abbe/methods/otf/inputs.hpp"
 
 namespace abbe::daemon {
 namespace {
@@ -58,8 +58,9 @@ std::vector<RunPoint> RunPoints::joined() const {
   return all;
 }
 
-OtfAcquisition::OtfAcquisition(const std::vector<AxisPosition>& path, AcquisitionOptions options)
-    : path_(otf_path(path)),
+OtfAcquisition::OtfAcquisition(std::vector<AxisPosition> path_m, AcquisitionOptions options)
+    : path_m_(std::move(path_m)),
+      path_(otf_path(path_m_)),
       driven_at_m_(calib::otf::lengths_to_vertices_m(path_.path())),
       options_(std::move(options)) {
   reason_ = fmt::format("waiting for the machine to stand at {} with the tracker streaming",

@@ -11,7 +11,7 @@
 #include "abbe/calib/otf/run.hpp"
 #include "abbe/config/calibration_machine.hpp"
 #include "abbe/config/config.hpp"
-#include "abbe/methods/otf_acquisition.hpp"
+#include "abbe/methods/otf/acquisition.hpp"
 
 namespace abbe::daemon {
 

@@ -1,4 +1,4 @@
-#include "abbe/methods/artefact_thermometer.hpp"
+#include "abbe/methods/evemu/artefact_thermometer.hpp"
 
 #include <algorithm>
 #include <cmath>

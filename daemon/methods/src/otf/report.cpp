@@ -1,4 +1,4 @@
-#include "abbe/methods/otf_report.hpp"
+#include "abbe/methods/otf/report.hpp"
 
 #include <fmt/format.h>
 

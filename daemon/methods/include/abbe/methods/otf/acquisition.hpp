@@ -87,9 +87,9 @@ class OtfAcquisition {
  public:
   using Phase = AcquisitionPhase;
 
-  /// `path`: vertices of the polyline, at least two. O(n): everything that grows with the path, but
+  /// `path_m`: vertices of the polyline, at least two. O(n): everything that grows with the path, but
   /// release(), is done here.
-  explicit OtfAcquisition(const std::vector<AxisPosition>& path, AcquisitionOptions options = {});
+  explicit OtfAcquisition(std::vector<AxisPosition> path_m, AcquisitionOptions options = {});
 
   /// Before the first snapshot. Those before `from` are not looked at.
   void begin(protocol::HostTime from) noexcept { from_ = from; }
@@ -107,6 +107,9 @@ class OtfAcquisition {
   [[nodiscard]] std::size_t points() const noexcept { return points_.size(); }
   /// The points of the run; O(n).
   [[nodiscard]] std::vector<RunPoint> release() { return std::exchange(points_, {}).joined(); }
+  /// The path of the request; O(1).
+  [[nodiscard]] std::vector<AxisPosition> release_path() { return std::exchange(path_m_, {}); }
+  [[nodiscard]] const AcquisitionOptions& options() const noexcept { return options_; }
   /// Mean over the run.
   [[nodiscard]] EnvironmentEffect environment() const { return environment_.mean(); }
 
@@ -124,6 +127,7 @@ class OtfAcquisition {
   void trim_end();
   void fail(std::string reason);
 
+  std::vector<AxisPosition> path_m_;
   calib::otf::PathIndex path_;
   std::vector<double> driven_at_m_;  // every vertex
   protocol::HostTime from_{};

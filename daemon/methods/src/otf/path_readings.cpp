@@ -1,4 +1,4 @@
-#include "abbe/methods/path_readings.hpp"
+#include "abbe/methods/otf/path_readings.hpp"
 
 #include <fmt/format.h>
 
@@ -6,7 +6,7 @@
 #include <optional>
 #include <set>
 
-#include "abbe/methods/otf_acquisition.hpp"
+#include "abbe/methods/otf/acquisition.hpp"
 #include "abbe/pipeline/vertex_readings.hpp"
 
 namespace abbe::daemon {

@@ -1,4 +1,4 @@
-#include "abbe/methods/otf_inputs.hpp"
+#include "abbe/methods/otf/inputs.hpp"
 
 #include <fmt/format.h>
 

@@ -1,0 +1,14 @@
+#pragma once
+/// How the caller watches an identification on another thread. Pure data.
+
+#include <functional>
+
+namespace abbe::daemon {
+
+/// Both functions are called on the thread of the identification and may be empty.
+struct IdentificationWatch {
+  std::function<void(double)> progress = {};  ///< 0 to 1
+  std::function<bool()> stopped = {};         ///< true: the identification ends soon, with an Error
+};
+
+}  // namespace abbe::daemon

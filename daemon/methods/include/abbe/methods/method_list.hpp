@@ -1,0 +1,80 @@
+#pragma once
+/// A list of calibration methods, and what code that is the same for all of them derives from it. A
+/// method is a struct without members that names its parts and what is done with them:
+///
+///     kName             in commands, files and messages
+///     Request           what the calibration was asked for
+///     Options           of the acquisition, from the configuration: options(Config)
+///     Acquisition       takes snapshots: begin, take, tick, phase, reason, progress, points;
+///                       next and take_notes where the operator is guided
+///     Run               what was acquired: run_of(Acquisition)
+///     Candidate         a judged model: solution.model, verdict
+///     needs(Config)     which devices it reads
+///     to_json(Request), request_from(json, Config*)
+///     check(Request, Config), acquire(Request, Options)
+///     identify(Run, Config, active, watch), inputs_of(Run), document_of(Candidate, ...)
+///
+/// Everything here is resolved at compile time.
+
+#include <array>
+#include <concepts>
+#include <cstddef>
+#include <string_view>
+#include <tuple>
+#include <utility>
+#include <variant>
+
+namespace abbe::daemon {
+
+/// What a method reads in a run.
+struct MethodNeeds {
+  bool tracker = false;
+  bool axis_readings = true;  ///< false: touches bring the positions of their own
+};
+
+template <class M, class Part>
+concept HasPart =
+    std::same_as<Part, typename M::Request> || std::same_as<Part, typename M::Acquisition> ||
+    std::same_as<Part, typename M::Run> || std::same_as<Part, typename M::Candidate>;
+
+template <class Part, class M, class... Others>
+consteval auto method_with_part() {
+  if constexpr (HasPart<M, Part>) {
+    return M{};
+  } else {
+    return method_with_part<Part, Others...>();
+  }
+}
+
+template <class... M>
+struct MethodList {
+  using Request = std::variant<typename M::Request...>;
+  using Options = std::tuple<typename M::Options...>;
+  using Acquisition = std::variant<typename M::Acquisition...>;
+  using Run = std::variant<typename M::Run...>;
+  using Candidate = std::variant<typename M::Candidate...>;
+
+  static constexpr std::array<std::string_view, sizeof...(M)> kNames{M::kName...};
+
+  template <class Configuration>
+  [[nodiscard]] static Options options(const Configuration& config) {
+    return {M::options(config)...};
+  }
+  /// act(method) for each method.
+  template <class Act>
+  static void for_each(Act&& act) {
+    (act(M{}), ...);
+  }
+  /// act(method, part) for the Request, Acquisition, Run or Candidate that `parts` holds.
+  template <class Parts, class Act>
+  static auto visit(Parts&& parts, Act&& act) {
+    return std::visit(
+        [&act](auto&& part) {
+          using Part = std::remove_cvref_t<decltype(part)>;
+          return act(method_with_part<Part, M...>(), std::forward<decltype(part)>(part));
+        },
+        std::forward<Parts>(parts));
+  }
+};
+
+}  // namespace abbe::daemon

@@ -1,0 +1,14 @@
+#pragma once
+/// The calibration methods of this build: one line each. docs/adding_a_method.md says what a new
+/// one consists of.
+
+#include "abbe/methods/evemu/method.hpp"
+#include "abbe/methods/method_list.hpp"
+#include "abbe/methods/otf/method.hpp"
+
+namespace abbe::daemon {
+
+using Methods = MethodList<OtfMethod,     // on the fly, with a laser tracker
+                           EvemuMethod>;  // touches of a ball array
+
+}  // namespace abbe::daemon

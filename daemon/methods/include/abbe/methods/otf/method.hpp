@@ -1,0 +1,51 @@
+#pragma once
+/// The on-the-fly method as the session, a replay and the control API use it; see method_list.hpp.
+
+#include <nlohmann/json_fwd.hpp>
+#include <string_view>
+#include <vector>
+
+#include "abbe/base/axis_position.hpp"
+#include "abbe/base/error.hpp"
+#include "abbe/base/input_file.hpp"
+#include "abbe/methods/identification_watch.hpp"
+#include "abbe/methods/method_list.hpp"
+#include "abbe/methods/otf/acquisition.hpp"
+#include "abbe/methods/otf/identification.hpp"
+#include "abbe/model/model_document.hpp"
+
+namespace abbe::daemon {
+
+struct OtfRequest {
+  std::vector<AxisPosition> path_m;
+};
+
+struct OtfMethod {
+  static constexpr std::string_view kName = "otf";
+  using Request = OtfRequest;
+  using Options = AcquisitionOptions;
+  using Acquisition = OtfAcquisition;
+  using Run = OtfRun;
+  using Candidate = OtfCandidate;
+
+  [[nodiscard]] static MethodNeeds needs(const Config&) { return {.tracker = true}; }
+  [[nodiscard]] static Options options(const Config& config);
+  [[nodiscard]] static nlohmann::json to_json(const Request& request);
+  /// Throws nlohmann::json::exception for a member that is missing or of the wrong type.
+  [[nodiscard]] static Request request_from(const nlohmann::json& object, const Config* config);
+  /// Refused or BadInput if no model would come of it: a stationary tracker, or what
+  /// check_otf_path() names.
+  [[nodiscard]] static Result<void> check(const Request& request, const Config& config);
+  [[nodiscard]] static Result<Acquisition> acquire(Request&& request, const Options& options);
+  /// The points in one piece and the path at the temperature of the scales. O(n).
+  [[nodiscard]] static Run run_of(Acquisition&& acquisition);
+  [[nodiscard]] static Result<Candidate> identify(const Run& run, const Config& config,
+                                                  const calib::VolumetricModel* active,
+                                                  const IdentificationWatch& watch);
+  [[nodiscard]] static std::vector<InputFile> inputs_of(const Run& run);
+  [[nodiscard]] static ModelDocument document_of(const Candidate& candidate, const Config& config,
+                                                 std::vector<InputFile> inputs,
+                                                 protocol::UtcTime created);
+};
+
+}  // namespace abbe::daemon

@@ -1,0 +1,63 @@
+#include "abbe/methods/otf/method.hpp"
+
+#include <nlohmann/json.hpp>
+#include <utility>
+
+#include "abbe/methods/otf/inputs.hpp"
+
+namespace abbe::daemon {
+
+OtfMethod::Options OtfMethod::options(const Config& config) {
+  return acquisition_options(config);
+}
+
+nlohmann::json OtfMethod::to_json(const Request& request) {
+  return {{"path_m", request.path_m}};
+}
+
+OtfMethod::Request OtfMethod::request_from(const nlohmann::json& object, const Config* /*config*/) {
+  return {object.at("path_m").get<std::vector<AxisPosition>>()};
+}
+
+Result<void> OtfMethod::check(const Request& request, const Config& config) {
+  if (config.tracker && config.tracker->mode == TrackerModeConfig::Stationary)
+    return fail(ErrorCode::Refused,
+                "calibrate otf: [tracker] mode = \"stationary\" gives no points on the fly");
+  return check_otf_path(request.path_m, config.machine);
+}
+
+Result<OtfMethod::Acquisition> OtfMethod::acquire(Request&& request, const Options& options) {
+  if (request.path_m.size() < 2)
+    return fail(ErrorCode::BadInput, "calibrate otf: a path needs at least two vertices");
+  return OtfAcquisition{std::move(request.path_m), options};
+}
+
+OtfMethod::Run OtfMethod::run_of(Acquisition&& acquisition) {
+  const EnvironmentEffect effect = acquisition.environment();
+  const EnvironmentUseOptions& use = acquisition.options().environment;
+  std::vector<AxisPosition> path_m = acquisition.release_path();
+  for (AxisPosition& q_m : path_m) q_m = at_temperature(q_m, effect, use);
+
+  return {.path_m = std::move(path_m),
+          .points = acquisition.release(),
+          .u_scale = effect.u_scale,
+          .u_axis_scale = effect.u_expansion_factor,
+          .unmeasured_air = use.unmeasured_air};
+}
+
+Result<OtfMethod::Candidate> OtfMethod::identify(const Run& run, const Config& config,
+                                                 const calib::VolumetricModel* active,
+                                                 const IdentificationWatch& watch) {
+  return identify_run(run, config.machine, config.gate, active, watch);
+}
+
+std::vector<InputFile> OtfMethod::inputs_of(const Run& run) {
+  return {{"points", points_sha256(run.points)}};
+}
+
+ModelDocument OtfMethod::document_of(const Candidate& candidate, const Config& config,
+                                     std::vector<InputFile> inputs, protocol::UtcTime created) {
+  return otf_document(candidate.solution, config, std::move(inputs), created);
+}
+
+}  // namespace abbe::daemon

@@ -52,7 +52,6 @@ class DeviceSet final : public SampleSource {
   [[nodiscard]] std::vector<drivers::TrackerOrderReport> tracker_reports() override;
 
  private:
-  void drain_cmm(Batch& batch);
   struct State;
   explicit DeviceSet(std::unique_ptr<State> state);
   std::unique_ptr<State> state_;

@@ -1,0 +1,19 @@
+#include "card_link.hpp"
+
+#include "abbe/drivers/usb/libusb_link.hpp"
+#include "abbe/drivers/usb/usbip_link.hpp"
+
+namespace abbe::daemon {
+
+std::unique_ptr<drivers::UsbLink> make_link(const CounterCardConfig& config,
+                                            const drivers::UsbIdentity& identity,
+                                            const drivers::TimeSource& time) {
+  if (config.transport == CardTransport::Usb)
+    return std::make_unique<drivers::LibusbLink>(identity, time);
+  return std::make_unique<drivers::UsbipLink>(
+      drivers::UsbipOptions{
+          .host = config.host, .port = config.port, .bus_id = config.bus_id, .identity = identity},
+      time);
+}
+
+}  // namespace abbe::daemon

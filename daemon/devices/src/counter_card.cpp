@@ -1,0 +1,146 @@
+#include "abbe/devices/device_options.hpp"
+
+#include <string>
+
+#include "abbe/config/stretched.hpp"
+#include "abbe/config/touch_options.hpp"
+#include "abbe/drivers/counter_card/decimation.hpp"
+#include "abbe/drivers/counter_card/receiver.hpp"
+#include "abbe/drivers/sampling/touch_detector.hpp"
+#include "card_link.hpp"
+#include "kinds.hpp"
+#include "running.hpp"
+
+namespace abbe::daemon {
+namespace {
+
+using TouchDetectorPointer = std::unique_ptr<drivers::TouchDetector>;
+
+/// Of the probe that is connected to the card; null without [probe].
+TouchDetectorPointer touch_detector_of(const Config& config) {
+  if (!config.probe) return nullptr;
+  return std::make_unique<drivers::TouchDetector>(
+      touch_options(*config.probe, *config.counter_card, config.machine));
+}
+
+class RunningCard final : public RunningDevices {
+ public:
+  RunningCard(TouchDetectorPointer detector, Running<drivers::CounterCardDevice> running)
+      : touch_detector_(std::move(detector)), running_(std::move(running)) {}
+
+  void drain(Batch& batch) override {
+    drain_ring(running_.device->samples(), axes_, batch.axes);
+    for (drivers::CounterCardProgress p; running_.device->progress().pop({&p, 1}) != 0;)
+      progress_ = p;
+
+    if (touch_detector_) {
+      drain_ring(touch_detector_->touches(), touches_, batch.touches);
+      drain_ring(touch_detector_->windows(), touch_scans_, batch.touch_scans);
+    }
+
+    drain_ring(running_.device->raw(), blocks_, batch.encoder_raw);
+  }
+  [[nodiscard]] std::vector<const drivers::DeviceThread*> threads() const override {
+    return {running_.thread.get()};
+  }
+  [[nodiscard]] std::vector<std::string> warnings() const override {
+    auto out = RunningDevices::warnings();
+    if (auto assumed = running_.device->assumption(); !assumed.empty())
+      out.push_back(std::move(assumed));
+    return out;
+  }
+  [[nodiscard]] std::optional<drivers::CounterCardProgress> take_progress() override {
+    return std::exchange(progress_, std::nullopt);
+  }
+
+ private:
+  TouchDetectorPointer touch_detector_;  // the card feeds it: destroyed after the card
+  Running<drivers::CounterCardDevice> running_;
+  std::optional<drivers::CounterCardProgress> progress_;
+  std::array<protocol::AxisSample, kMostSamples> axes_;
+  std::array<protocol::ProbeTrigger, 16> touches_;
+  std::array<protocol::TouchScan, 256> touch_scans_;
+  BlockBuffer blocks_;
+};
+
+Result<std::unique_ptr<RunningDevices>> start_counter_card(const DeviceStart& start) {
+  const Config& config = start.config;
+  if (!config.counter_card) return nullptr;
+  auto options = device_options(*config.counter_card, config.daemon.speed);
+  if (start.left) {
+    options.receiver.goes_on_from = start.left;
+    options.session.set_up_serial = std::string{start.left->serial_number()};
+  }
+
+  auto link = make_link(*config.counter_card, drivers::identity_of(options), start.time);
+  auto detector = touch_detector_of(config);
+  auto running =
+      run(drivers::CounterCardDevice::create(options, std::move(link), start.time, detector.get()),
+          thread_options(config.daemon, "abbe-counters", config.daemon.encoder_priority,
+                         config.daemon.encoder_cpu));
+  if (!running) return tl::unexpected(running.error());
+
+  return std::make_unique<RunningCard>(std::move(detector), std::move(*running));
+}
+
+class CardDecoder final : public RawDecoders {
+ public:
+  CardDecoder(const Config& config, const std::optional<drivers::CounterCardProgress>& left)
+      : name_(config.counter_card->name),
+        decimation_(config.counter_card->sample_every),
+        touch_detector_(touch_detector_of(config)) {
+    auto options = device_options(*config.counter_card, config.daemon.speed).receiver;
+    options.goes_on_from = left;
+    receiver_ = std::make_unique<drivers::CounterCardReceiver>(options);
+  }
+
+  void take(const protocol::RawBlock& block, std::string_view device, Batch& batch) override {
+    if (device != name_) return;
+    receiver_->on_raw(block, [&](const drivers::CounterScan& scan) {
+      if (const auto sample = decimation_.take(scan.axes)) batch.axes.push_back(*sample);
+      if (touch_detector_) detect(scan, batch);
+    });
+  }
+
+ private:
+  void detect(const drivers::CounterScan& scan, Batch& batch) {
+    touch_detector_->on_scan(scan);
+    std::array<protocol::ProbeTrigger, 1> touch;
+    while (touch_detector_->touches().pop(touch) == 1) batch.touches.push_back(touch[0]);
+  }
+
+  std::string name_;
+  drivers::ScanDecimation decimation_;
+  TouchDetectorPointer touch_detector_;
+  std::unique_ptr<drivers::CounterCardReceiver> receiver_;
+};
+
+std::unique_ptr<RawDecoders> decoders_of_counter_card(
+    const Config& config, const std::optional<drivers::CounterCardProgress>& left) {
+  return config.counter_card ? std::make_unique<CardDecoder>(config, left) : nullptr;
+}
+
+}  // namespace
+
+drivers::CounterCardOptions device_options(const CounterCardConfig& config, double speed) {
+  drivers::CounterCardOptions options;
+  options.name = config.name;
+  options.serial = config.serial_number;
+  options.receiver.wiring = config.wiring;
+  options.receiver.clock.max_constant_delay = config.max_constant_delay;
+  options.sample_every = config.sample_every;
+  options.transfer_time = stretched(options.transfer_time, speed);
+  auto& session = options.session;
+
+  for (auto* time_out : {&session.open_timeout, &session.control_timeout, &session.silence,
+                         &session.status_period, &session.reopen_after, &session.retry_after}) {
+    *time_out = stretched(*time_out, speed);
+  }
+
+  return options;
+}
+
+const DeviceKind kCounterCard{
+    .table = "counter_card", .start = &start_counter_card, .decoders = &decoders_of_counter_card};
+
+}  // namespace abbe::daemon

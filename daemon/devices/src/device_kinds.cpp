@@ -1,0 +1,23 @@
+#include <functional>
+#include <vector>
+
+#include "kinds.hpp"
+
+namespace abbe::daemon {
+
+std::span<const DeviceKind> device_kinds() {
+  static const std::array kinds{kTracker,       kEncoder,     kCounterCard,
+                                kReferenceCard, kEnvironment, kMeasuringMachine};
+  return kinds;
+}
+
+std::vector<std::string> RunningDevices::warnings() const {
+  std::vector<std::string> out;
+  for (const drivers::DeviceThread* const thread : threads()) {
+    out.insert(out.end(), thread->warnings().begin(), thread->warnings().end());
+  }
+
+  return out;
+}
+
+}  // namespace abbe::daemon

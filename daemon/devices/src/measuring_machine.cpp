@@ -1,0 +1,186 @@
+#include "abbe/devices/device_options.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <span>
+#include <string>
+#include <variant>
+
+#include "abbe/config/stretched.hpp"
+#include "abbe/drivers/ippdme/receiver.hpp"
+#include "kinds.hpp"
+#include "machine_hold.hpp"
+#include "running.hpp"
+
+namespace abbe::daemon {
+namespace {
+
+// Wall time: a machine that is ready reports its position ten times in it.
+constexpr auto kPositionIsOld = std::chrono::seconds{1};
+// How long a request to stop the machine may wait for its thread: 2 mm at 200 mm/s.
+constexpr auto kStopIsHeard = std::chrono::milliseconds{10};
+
+/// A measuring machine behind an I++ DME server. Its touches are those of the probe; its positions
+/// are the axes where the configuration has no other source of axes.
+class RunningMachine final : public RunningDevices, private MachineMotion {
+ public:
+  RunningMachine(Running<drivers::IppDevice> running, bool is_the_axes,
+                 const drivers::TimeSource& time)
+      : running_(std::move(running)), is_the_axes_(is_the_axes), time_(time) {}
+
+  void drain(Batch& batch) override {
+    auto& device = *running_.device;
+    drain_ring(device.touches(), touches_, batch.touches);
+    while (const std::size_t n = device.positions().pop(axes_)) {
+      stands_at_ = axes_[n - 1];
+      if (is_the_axes_)
+        batch.axes.insert(batch.axes.end(), axes_.begin(),
+                          axes_.begin() + static_cast<std::ptrdiff_t>(n));
+    }
+
+    drain_ring(device.raw(), blocks_, batch.probe_raw);
+  }
+  [[nodiscard]] std::vector<const drivers::DeviceThread*> threads() const override {
+    return {running_.thread.get()};
+  }
+  [[nodiscard]] MachineMotion* motion() noexcept override { return this; }
+
+ private:
+  void measure(std::span<const drivers::ProbePoint> points) override {
+    running_.device->measure(points);
+  }
+  void stop() override { running_.device->abort(); }
+  void end() override { running_.device->end(); }
+  [[nodiscard]] std::size_t points_left() const override { return running_.device->points_left(); }
+  [[nodiscard]] std::optional<std::string> release_awaited() const override {
+    if (!running_.device->held()) return std::nullopt;
+    return running_.device->status().last_fault;
+  }
+  [[nodiscard]] Result<void> release() override;
+  [[nodiscard]] std::optional<TipPlace> tip_place() const override {
+    if (!stands_at_ || stands_at_->missing_mask != 0) return std::nullopt;
+    return TipPlace{place(), time_.now() - stands_at_->head.time};
+  }
+  [[nodiscard]] Result<std::array<double, 3>> position() const override;
+  [[nodiscard]] std::array<double, 3> place() const {
+    return {stands_at_->position[0], stands_at_->position[1], stands_at_->position[2]};
+  }
+
+  Running<drivers::IppDevice> running_;
+  bool is_the_axes_;
+  const drivers::TimeSource& time_;
+  std::optional<protocol::AxisSample> stands_at_;
+  std::array<protocol::AxisSample, kMostSamples> axes_;
+  std::array<protocol::ProbeTrigger, 16> touches_;
+  BlockBuffer blocks_;
+};
+
+Result<void> RunningMachine::release() {
+  auto& device = *running_.device;
+  const auto status = device.status();
+  const auto refused = [&](std::string_view why) {
+    return fail(ErrorCode::Refused,
+                fmt::format("machine: {} {}: it is {}", status.name, why, status.state));
+  };
+
+  if (!device.held()) return refused("awaits no release");
+  if (!device.releasable()) return refused("cannot be released before its motion was stopped");
+  device.release();
+  return {};
+}
+
+Result<std::array<double, 3>> RunningMachine::position() const {
+  const auto status = running_.thread->status();
+  const auto refused = [&](std::string_view why) {
+    return fail(
+        ErrorCode::Refused,
+        fmt::format("measuring machine {} {}{}{}", status.name, why,
+                    status.last_fault.empty() ? "" : "; its last fault: ", status.last_fault));
+  };
+
+  if (release_awaited()) return refused("awaits a release by a person (`abbe machine release`)");
+  if (status.state != drivers::name_of(drivers::IppState::Ready))
+    return refused(fmt::format("is not ready: {}", status.state));
+  if (!stands_at_ || time_.now() - stands_at_->head.time > time_.host(kPositionIsOld))
+    return refused("does not say where it stands");
+  if (!std::ranges::all_of(place(), [](double p) { return std::isfinite(p); }))
+    return refused("does not say where it stands");
+
+  return place();
+}
+
+Result<std::unique_ptr<RunningDevices>> start_measuring_machine(const DeviceStart& start) {
+  const Config& config = start.config;
+  if (!config.cmm) return nullptr;
+  auto options = device_options(*config.cmm, config.daemon.speed);
+  keep_hold(config.daemon.data_dir, options);
+  auto thread = thread_options(config.daemon, "abbe-cmm", 0, std::nullopt);
+  thread.wait_at_most = kStopIsHeard;
+  auto running = run(drivers::IppDevice::create(options, start.time), std::move(thread));
+  if (!running) return tl::unexpected(running.error());
+  return std::make_unique<RunningMachine>(std::move(*running), config.cmm_reads_axes(), start.time);
+}
+
+class MachineDecoder final : public RawDecoders {
+ public:
+  explicit MachineDecoder(const Config& config)
+      : name_(config.cmm->name),
+        is_the_axes_(config.cmm_reads_axes()),
+        receiver_(std::make_unique<drivers::IppReceiver>(
+            device_options(*config.cmm, config.daemon.speed).receiver)) {}
+
+  void take(const protocol::RawBlock& block, std::string_view device, Batch& batch) override {
+    if (device != name_) return;
+    const auto bytes = std::span{block.bytes}.first(block.length);
+    if (block.direction == protocol::RawBlock::Direction::ToDevice)
+      return receiver_->sent(bytes, block.time);
+
+    // Lost bytes cut a line in two: decoding begins again with the next connection.
+    if (block.lost_before > 0) receiver_->push({}, block.time);
+    receiver_->push(bytes, block.time);
+    while (const auto message = receiver_->next()) {
+      if (const auto* touch = std::get_if<protocol::ProbeTrigger>(&*message)) {
+        batch.touches.push_back(*touch);
+      } else if (const auto* sample = std::get_if<protocol::AxisSample>(&*message);
+                 sample && is_the_axes_) {
+        batch.axes.push_back(*sample);
+      }
+    }
+  }
+
+ private:
+  std::string name_;
+  bool is_the_axes_;
+  std::unique_ptr<drivers::IppReceiver> receiver_;
+};
+
+std::unique_ptr<RawDecoders> decoders_of_measuring_machine(
+    const Config& config, const std::optional<drivers::CounterCardProgress>&) {
+  return config.cmm ? std::make_unique<MachineDecoder>(config) : nullptr;
+}
+
+}  // namespace
+
+drivers::IppDeviceOptions device_options(const CmmConfig& config, double speed) {
+  drivers::IppDeviceOptions options;
+  options.name = config.name;
+  options.host = config.host;
+  options.port = config.port;
+  options.session.tool = config.tool;
+  options.session.home = config.home;
+  options.session.poll_period = stretched(options.session.poll_period, speed);
+  options.session.connect_timeout = stretched(options.session.connect_timeout, speed);
+  options.session.command_timeout = stretched(config.command_timeout, speed);
+  options.session.motion_timeout = stretched(config.motion_timeout, speed);
+  options.receiver.probe = config.probe;
+  options.receiver.u_position_m = config.u_position_m;
+
+  return options;
+}
+
+const DeviceKind kMeasuringMachine{
+    .table = "cmm", .start = &start_measuring_machine, .decoders = &decoders_of_measuring_machine};
+
+}  // namespace abbe::daemon

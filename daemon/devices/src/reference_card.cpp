@@ -1,0 +1,99 @@
+#include "abbe/devices/device_options.hpp"
+
+#include <string>
+
+#include "abbe/drivers/counter_card/receiver.hpp"
+#include "abbe/drivers/sampling/mark_watcher.hpp"
+#include "card_link.hpp"
+#include "kinds.hpp"
+#include "running.hpp"
+
+namespace abbe::daemon {
+namespace {
+
+/// The second counter card, which latches the axes on their reference marks.
+class RunningReferenceCard final : public RunningDevices {
+ public:
+  /// `start` runs the card with the watcher it feeds.
+  template <class Start>
+  [[nodiscard]] static Result<std::unique_ptr<RunningDevices>> of(const Start& start) {
+    auto made = std::make_unique<RunningReferenceCard>();
+    auto running = start(made->mark_watcher_);
+    if (!running) return tl::unexpected(running.error());
+    made->running_ = std::move(*running);
+    return made;
+  }
+
+  void drain(Batch& batch) override {
+    while (const std::size_t n = mark_watcher_.crossings().pop(marks_))
+      batch.marks.insert(batch.marks.end(), marks_.begin(),
+                         marks_.begin() + static_cast<std::ptrdiff_t>(n));
+    drain_ring(running_.device->raw(), blocks_, batch.reference_raw);
+  }
+  [[nodiscard]] std::vector<const drivers::DeviceThread*> threads() const override {
+    return {running_.thread.get()};
+  }
+  [[nodiscard]] std::vector<std::string> warnings() const override {
+    auto out = RunningDevices::warnings();
+    if (auto assumed = running_.device->assumption(); !assumed.empty())
+      out.push_back(std::move(assumed));
+    return out;
+  }
+
+ private:
+  drivers::MarkWatcher mark_watcher_;  // the card feeds it: destroyed after the card
+  Running<drivers::CounterCardDevice> running_;
+  std::array<drivers::MarkCrossing, 64> marks_;
+  BlockBuffer blocks_;
+};
+
+Result<std::unique_ptr<RunningDevices>> start_reference_card(const DeviceStart& start) {
+  const Config& config = start.config;
+  if (!config.reference) return nullptr;
+  const CounterCardConfig& card = config.reference->card;
+  const auto options = device_options(card, config.daemon.speed);
+
+  return RunningReferenceCard::of([&](drivers::MarkWatcher& watcher) {
+    return run(drivers::CounterCardDevice::create(
+                   options, make_link(card, drivers::identity_of(options), start.time), start.time,
+                   &watcher),
+               thread_options(config.daemon, "abbe-marks", config.daemon.encoder_priority,
+                              config.daemon.encoder_cpu));
+  });
+}
+
+class ReferenceCardDecoder final : public RawDecoders {
+ public:
+  explicit ReferenceCardDecoder(const Config& config)
+      : name_(config.reference->card.name),
+        receiver_(std::make_unique<drivers::CounterCardReceiver>(
+            device_options(config.reference->card, config.daemon.speed).receiver)) {}
+
+  void take(const protocol::RawBlock& block, std::string_view device, Batch& batch) override {
+    if (device != name_) return;
+    receiver_->on_raw(block, [&](const drivers::CounterScan& scan) { watch(scan, batch); });
+  }
+
+ private:
+  void watch(const drivers::CounterScan& scan, Batch& batch) {
+    mark_watcher_.on_scan(scan);
+    for (drivers::MarkCrossing crossing; mark_watcher_.crossings().pop({&crossing, 1}) == 1;)
+      batch.marks.push_back(crossing);
+  }
+
+  std::string name_;
+  std::unique_ptr<drivers::CounterCardReceiver> receiver_;
+  drivers::MarkWatcher mark_watcher_;
+};
+
+std::unique_ptr<RawDecoders> decoders_of_reference_card(
+    const Config& config, const std::optional<drivers::CounterCardProgress>&) {
+  return config.reference ? std::make_unique<ReferenceCardDecoder>(config) : nullptr;
+}
+
+}  // namespace
+
+const DeviceKind kReferenceCard{
+    .table = "reference", .start = &start_reference_card, .decoders = &decoders_of_reference_card};
+
+}  // namespace abbe::daemon

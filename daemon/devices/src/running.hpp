@@ -1,0 +1,55 @@
+#pragma once
+/// What the kinds of devices have in common: a driver with its thread, and its rings.
+
+#include <array>
+#include <cstddef>
+#include <memory>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "abbe/base/error.hpp"
+#include "abbe/config/config.hpp"
+#include "abbe/drivers/device_thread.hpp"
+#include "abbe/protocol/samples.hpp"
+
+namespace abbe::daemon {
+
+/// Taken out of a ring at a time: several bursts.
+inline constexpr std::size_t kMostSamples = 1024;
+inline constexpr std::size_t kMostBlocks = 128;
+
+using BlockBuffer = std::array<protocol::RawBlock, kMostBlocks>;
+
+[[nodiscard]] Error error_of(const drivers::Error& error);
+[[nodiscard]] drivers::DeviceThreadOptions thread_options(const DaemonConfig& config,
+                                                          std::string name, int priority,
+                                                          std::optional<int> cpu);
+
+template <class Ring, class T, std::size_t N>
+void drain_ring(Ring& ring, std::array<T, N>& buffer, std::vector<T>& out) {
+  for (std::size_t n = buffer.size(); n == buffer.size();) {
+    n = ring.pop(buffer);
+    out.insert(out.end(), buffer.begin(), buffer.begin() + static_cast<std::ptrdiff_t>(n));
+  }
+}
+
+/// Destroyed in reverse: the thread ends before the driver.
+template <class D>
+struct Running {
+  std::unique_ptr<D> device;
+  std::unique_ptr<drivers::DeviceThread> thread;
+};
+
+template <class D>
+// NOLINTNEXTLINE(performance-unnecessary-value-param): moved, which clang-tidy 14 does not see in a template
+Result<Running<D>> run(drivers::Result<std::unique_ptr<D>> device,
+                       drivers::DeviceThreadOptions options) {
+  if (!device) return tl::unexpected(error_of(device.error()));
+  auto thread = drivers::DeviceThread::start(**device, std::move(options));
+  if (!thread) return tl::unexpected(error_of(thread.error()));
+  return Running<D>{std::move(*device), std::move(*thread)};
+}
+
+}  // namespace abbe::daemon

@@ -1,0 +1,150 @@
+#include "abbe/devices/device_options.hpp"
+
+#include <chrono>
+#include <cmath>
+#include <span>
+#include <string>
+#include <variant>
+
+#include "abbe/base/units.hpp"
+#include "abbe/config/stretched.hpp"
+#include "abbe/config/unmeasured_air.hpp"
+#include "abbe/drivers/tracker/receiver.hpp"
+#include "kinds.hpp"
+#include "running.hpp"
+
+namespace abbe::daemon {
+namespace {
+
+using protocol::emscon::WeatherMonitor;
+
+WeatherMonitor weather_monitor(WeatherConfig weather) {
+  switch (weather) {
+    case WeatherConfig::None:
+      return WeatherMonitor::None;
+    case WeatherConfig::Read:
+      return WeatherMonitor::Read;
+    case WeatherConfig::Compute:
+      return WeatherMonitor::ReadAndCompute;
+  }
+  return WeatherMonitor::None;
+}
+
+protocol::emscon::Environment controller_units(const calib::Air& air) {
+  return {.temperature = air.temperature_K - kZeroCelsius_K,
+          .pressure = air.pressure_Pa * 1e-2,  // mbar
+          .humidity = air.relative_humidity * 1e2};
+}
+
+class RunningTracker final : public RunningDevices, private TrackerOrders {
+ public:
+  explicit RunningTracker(Running<drivers::TrackerDevice> running) : running_(std::move(running)) {}
+
+  void drain(Batch& batch) override {
+    drain_ring(running_.device->points(), points_, batch.points);
+    drain_ring(running_.device->environment(), weather_, batch.environment);
+    drain_ring(running_.device->raw(), blocks_, batch.tracker_raw);
+  }
+  [[nodiscard]] std::vector<const drivers::DeviceThread*> threads() const override {
+    return {running_.thread.get()};
+  }
+  [[nodiscard]] TrackerOrders* orders() noexcept override { return this; }
+
+ private:
+  [[nodiscard]] drivers::DeviceStatus status() const override { return running_.thread->status(); }
+  void order(drivers::TrackerOrder order) override { running_.device->order(std::move(order)); }
+  [[nodiscard]] std::vector<drivers::TrackerOrderReport> reports() override {
+    return running_.device->reports();
+  }
+
+  Running<drivers::TrackerDevice> running_;
+  std::array<protocol::TrackerPoint, kMostSamples> points_;
+  std::array<protocol::EnvironmentSample, 16> weather_;
+  BlockBuffer blocks_;
+};
+
+Result<std::unique_ptr<RunningDevices>> start_tracker(const DeviceStart& start) {
+  const Config& config = start.config;
+  if (!config.tracker) return nullptr;
+  auto running = run(drivers::TrackerDevice::create(
+                         device_options(*config.tracker, config.daemon.speed), start.time),
+                     thread_options(config.daemon, "abbe-tracker", config.daemon.tracker_priority,
+                                    config.daemon.tracker_cpu));
+  if (!running) return tl::unexpected(running.error());
+  return std::make_unique<RunningTracker>(std::move(*running));
+}
+
+class TrackerDecoder final : public RawDecoders {
+ public:
+  explicit TrackerDecoder(const Config& config)
+      : name_(config.tracker->name),
+        receiver_(drivers::receiver_options(device_options(*config.tracker, config.daemon.speed))) {
+  }
+
+  void take(const protocol::RawBlock& block, std::string_view device, Batch& batch) override {
+    if (device != name_ || block.direction != protocol::RawBlock::Direction::FromDevice) return;
+    if (block.lost_before > 0) receiver_.bytes_lost();
+    receiver_.push(std::span{block.bytes}.first(block.length), block.time);
+
+    while (const auto message = receiver_.next()) {
+      if (const auto* burst = std::get_if<drivers::TrackerBurst>(&*message)) {
+        batch.points.insert(batch.points.end(), burst->points.begin(), burst->points.end());
+      } else if (const auto* weather = std::get_if<protocol::EnvironmentSample>(&*message)) {
+        batch.environment.push_back(*weather);
+      }
+    }
+  }
+
+ private:
+  std::string name_;
+  drivers::TrackerReceiver receiver_;
+};
+
+std::unique_ptr<RawDecoders> decoders_of_tracker(
+    const Config& config, const std::optional<drivers::CounterCardProgress>&) {
+  return config.tracker ? std::make_unique<TrackerDecoder>(config) : nullptr;
+}
+
+}  // namespace
+
+drivers::TrackerDeviceOptions device_options(const TrackerConfig& config, double speed) {
+  drivers::TrackerDeviceOptions options;
+  options.name = config.name;
+  options.host = config.host;
+  options.port = config.port;
+  options.session.time_separation_ms =
+      static_cast<std::int32_t>(std::lround(1000.0 / config.point_rate_hz));
+  if (config.mode == TrackerModeConfig::Stationary)
+    options.session.mode = drivers::TrackerMode::Stationary;
+  options.session.stationary_time_ms =
+      static_cast<std::int32_t>(config.stationary_time / std::chrono::milliseconds{1});
+  options.session.weather = weather_monitor(config.weather);
+  options.session.environment = controller_units(assumed_air());
+  options.session.connect_timeout = stretched(config.connect_timeout, speed);
+  options.session.command_timeout = stretched(config.command_timeout, speed);
+  options.session.initialize_timeout = stretched(config.initialize_timeout, speed);
+  options.session.silence_timeout = stretched(config.silence_timeout, speed);
+  options.session.reflector = config.reflector;
+  options.session.home_after_initialize = config.home_after_initialize;
+
+  if (config.search) {
+    constexpr double kUnitsPerMetre = 1e3;  // abbe sets mm
+    options.session.search = protocol::emscon::SetSearchParams{
+        .radius = kUnitsPerMetre * config.search->radius_m,
+        .timeout_ms =
+            static_cast<std::int32_t>(config.search->timeout / std::chrono::milliseconds{1})};
+  }
+
+  options.clock.max_constant_delay = config.max_constant_delay;
+  return options;
+}
+
+std::chrono::nanoseconds longest_tracker_order(const Config& config) {
+  if (!config.tracker) return {};
+  return drivers::longest_order(device_options(*config.tracker, config.daemon.speed).session);
+}
+
+const DeviceKind kTracker{
+    .table = "tracker", .start = &start_tracker, .decoders = &decoders_of_tracker};
+
+}  // namespace abbe::daemon

@@ -205,7 +205,7 @@ class DrivenMachine final : public daemon::SampleSource {
       point.device_time = protocol::DeviceTime{next_.time_since_epoch()};
       point.p_tracker_m = {2.0 + at[0], at[1], at[2]};
       burst_.push_back(point);
-      batch.encoder_raw.emplace_back().length = 32;
+      batch.raw.emplace_back().block.length = 32;
     }
 
     if (burst_.size() < kBurst) return;
@@ -269,6 +269,7 @@ class Bench {
     daemon::RecorderThreadOptions options;
     options.recorder.directory = folder_;
     options.recorder.name = "run";
+    options.devices = {"encoder"};
     recorder_ =
         daemon::RecorderThread::start(std::move(options), {"mill", {}, 1.0, "", {}}).value();
     authority_.emplace(open_models());

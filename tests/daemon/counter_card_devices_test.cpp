@@ -96,7 +96,7 @@ TEST(CounterCardDevices, GiveTheAxesOfTheConfiguration) {
   const double seconds = (last.cycle - first.cycle) / 2000.0;  // by the card's own pacer
   EXPECT_NEAR(last.position[0] - first.position[0], 0.01 * seconds, 2e-8)
       << "rounded to a count of 10 nm";
-  EXPECT_FALSE(batch.encoder_raw.empty());
+  EXPECT_FALSE(batch.raw.empty());
   EXPECT_EQ(devices->health(time.now()).front().status.name, "counter_card");
   EXPECT_THAT(devices->warnings(), Contains(HasSubstr("not yet seen on hardware")));
 }

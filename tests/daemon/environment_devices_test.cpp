@@ -72,7 +72,8 @@ TEST_F(EnvironmentDevices, AreReadRecordedAndDecodedAgainFromTheirBytes) {
 
   {
     auto recorder = RecorderThread::start(
-        {.recorder = example_options(folder_.path()), .environment = {"air"}}, example_info());
+        {.recorder = example_options(folder_.path()), .environment = {"air"}, .devices = {"air"}},
+        example_info());
     ASSERT_TRUE(recorder) << recorder.error().text;
     (*recorder)->hand_over(batch_);
   }

@@ -30,12 +30,12 @@ struct BusyDevices final : SampleSource {
       axes.head.time = clock->now() + std::chrono::microseconds{i};
       axes.axis_count = 3;
       batch.axes.push_back(axes);
-      batch.encoder_raw.push_back(example_block(turn));
+      batch.raw.push_back({1, example_block(turn)});
     }
     auto& point = batch.points.emplace_back();
     point.head.time = clock->now();
     point.device_time = protocol::DeviceTime{clock->now().time_since_epoch()};
-    batch.tracker_raw.push_back(example_block(turn));
+    batch.raw.push_back({0, example_block(turn)});
   }
   [[nodiscard]] std::vector<StreamHealth> health(HostTime) override {
     StreamHealth h;
@@ -55,6 +55,7 @@ class HubLocks : public test::HubBench<BusyDevices> {
     config_.tracker.emplace().host = "127.0.0.1";
     RecorderThreadOptions options;
     options.recorder = example_options(folder_.path());
+    options.devices = {"tracker", "encoder"};
     recorder_ = RecorderThread::start(std::move(options), example_info()).value();
     verification_.emplace(config_);
     make_hub();

@@ -13,12 +13,16 @@ using protocol::SampleFlag;
 using ::testing::Pair;
 using ::testing::UnorderedElementsAre;
 
+// Places of the devices in Batch::raw.
+constexpr std::size_t kTracker = 0, kEncoder = 1, kProbe = 2, kReference = 3, kEnvironment = 4;
+
 class RecorderThreadTest : public ::testing::Test {
  protected:
   void start(std::size_t most_waiting_bytes) {
     RecorderThreadOptions options;
     options.recorder = example_options(folder_.path());
     options.environment = {"air", "scales"};
+    options.devices = {"tracker", "encoder", "probe", "reference_card", "air", "scales"};
     options.most_waiting_bytes = most_waiting_bytes;
     auto started = RecorderThread::start(std::move(options), example_info());
     if (!started) throw std::runtime_error(started.error().text);
@@ -36,9 +40,10 @@ class RecorderThreadTest : public ::testing::Test {
       b.points.back().head.lost_before = 0;
       b.axes.push_back(example_axes(i));
       b.environment.push_back(example_environment(i));
-      b.tracker_raw.push_back(example_block(i));
-      b.encoder_raw.push_back(example_block(i));
-      b.tracker_raw.back().lost_before = b.encoder_raw.back().lost_before = 0;
+      for (const std::size_t device : {kTracker, kEncoder}) {
+        b.raw.push_back({device, example_block(i)});
+        b.raw.back().block.lost_before = 0;
+      }
     }
     return b;
   }
@@ -69,10 +74,10 @@ TEST_F(RecorderThreadTest, EveryMessageSaysInWhichTurnItWasTaken) {
     b.touch_scans.push_back(example_touch_scan(first));
     for (const std::size_t device : {0u, 1u}) {
       b.measured_environment.push_back({device, example_environment(first)});
-      b.environment_raw.push_back({device, example_block(first)});
+      b.raw.push_back({kEnvironment + device, example_block(first)});
     }
-    b.probe_raw.push_back(example_block(first));
-    b.reference_raw.push_back(example_block(first));
+    b.raw.push_back({kProbe, example_block(first)});
+    b.raw.push_back({kReference, example_block(first)});
     thread_->hand_over(b);
   }
 
@@ -100,7 +105,7 @@ TEST_F(RecorderThreadTest, WhatThereIsNoRoomForIsCountedWithItsRawBlocks) {
 TEST_F(RecorderThreadTest, ABlockTakesTheRoomOfItsBytesOnly) {
   start(20'000);  // ten RawBlocks
   Batch b;
-  for (std::uint32_t i = 0; i < 100; ++i) b.encoder_raw.push_back(example_block(i));
+  for (std::uint32_t i = 0; i < 100; ++i) b.raw.push_back({kEncoder, example_block(i)});
   thread_->hand_over(b);
   EXPECT_EQ(thread_->dropped(), 0u);
   EXPECT_EQ(finish().message_count(), 100u);
@@ -111,8 +116,8 @@ Batch measured(std::size_t device, std::uint32_t first, std::uint32_t count) {
   Batch b;
   for (std::uint32_t i = first; i < first + count; ++i) {
     b.measured_environment.push_back({device, example_environment(i)});
-    b.environment_raw.push_back({device, example_block(i)});
-    b.environment_raw.back().block.lost_before = 0;
+    b.raw.push_back({kEnvironment + device, example_block(i)});
+    b.raw.back().block.lost_before = 0;
   }
   return b;
 }

@@ -25,8 +25,9 @@ TouchDetectorPointer touch_detector_of(const Config& config) {
 
 class RunningCard final : public RunningDevices {
  public:
-  RunningCard(TouchDetectorPointer detector, Running<drivers::CounterCardDevice> running)
-      : touch_detector_(std::move(detector)), running_(std::move(running)) {}
+  RunningCard(TouchDetectorPointer detector, Running<drivers::CounterCardDevice> running,
+              std::size_t place)
+      : touch_detector_(std::move(detector)), running_(std::move(running)), place_(place) {}
 
   void drain(Batch& batch) override {
     drain_ring(running_.device->samples(), axes_, batch.axes);
@@ -38,7 +39,7 @@ class RunningCard final : public RunningDevices {
       drain_ring(touch_detector_->windows(), touch_scans_, batch.touch_scans);
     }
 
-    drain_ring(running_.device->raw(), blocks_, batch.encoder_raw);
+    drain_raw(running_.device->raw(), blocks_, place_, batch);
   }
   [[nodiscard]] std::vector<const drivers::DeviceThread*> threads() const override {
     return {running_.thread.get()};
@@ -56,6 +57,7 @@ class RunningCard final : public RunningDevices {
  private:
   TouchDetectorPointer touch_detector_;  // the card feeds it: destroyed after the card
   Running<drivers::CounterCardDevice> running_;
+  std::size_t place_;
   std::optional<drivers::CounterCardProgress> progress_;
   std::array<protocol::AxisSample, kMostSamples> axes_;
   std::array<protocol::ProbeTrigger, 16> touches_;
@@ -80,7 +82,7 @@ Result<std::unique_ptr<RunningDevices>> start_counter_card(const DeviceStart& st
                          config.daemon.encoder_cpu));
   if (!running) return tl::unexpected(running.error());
 
-  return std::make_unique<RunningCard>(std::move(detector), std::move(*running));
+  return std::make_unique<RunningCard>(std::move(detector), std::move(*running), start.first);
 }
 
 class CardDecoder final : public RawDecoders {
@@ -115,6 +117,13 @@ class CardDecoder final : public RawDecoders {
   std::unique_ptr<drivers::CounterCardReceiver> receiver_;
 };
 
+void name_counter_card(const Config& config, DeviceNames& names) {
+  if (!config.counter_card) return;
+  names.axes = config.counter_card->name;
+  names.all.push_back(config.counter_card->name);
+  if (config.probe) names.touches = config.probe->name;
+}
+
 std::unique_ptr<RawDecoders> decoders_of_counter_card(
     const Config& config, const std::optional<drivers::CounterCardProgress>& left) {
   return config.counter_card ? std::make_unique<CardDecoder>(config, left) : nullptr;
@@ -140,7 +149,9 @@ drivers::CounterCardOptions device_options(const CounterCardConfig& config, doub
   return options;
 }
 
-const DeviceKind kCounterCard{
-    .table = "counter_card", .start = &start_counter_card, .decoders = &decoders_of_counter_card};
+const DeviceKind kCounterCard{.table = "counter_card",
+                              .name = &name_counter_card,
+                              .start = &start_counter_card,
+                              .decoders = &decoders_of_counter_card};
 
 }  // namespace abbe::daemon

@@ -37,8 +37,11 @@ struct DeviceSet::State {
 Result<DeviceSet> DeviceSet::start(const Config& config, const drivers::TimeSource& time,
                                    const std::optional<drivers::CounterCardProgress>& left) {
   auto state = std::make_unique<State>();
+  DeviceNames names;
   for (const DeviceKind& kind : device_kinds()) {
-    auto running = kind.start({.config = config, .time = time, .left = left});
+    const std::size_t first = names.all.size();
+    kind.name(config, names);
+    auto running = kind.start({.config = config, .time = time, .first = first, .left = left});
     if (!running) return tl::unexpected(running.error());
     if (*running == nullptr) continue;
     if (auto* const motion = (*running)->motion()) state->motion = motion;
@@ -95,6 +98,10 @@ void DeviceSet::stop_machine() {
 
 void DeviceSet::end_machine() {
   if (state_->motion != nullptr) state_->motion->end();
+}
+
+bool DeviceSet::moves() const {
+  return state_->motion != nullptr;
 }
 
 std::optional<std::string> DeviceSet::release_awaited() const {

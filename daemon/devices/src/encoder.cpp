@@ -41,11 +41,12 @@ std::unique_ptr<drivers::CanBus> make_bus(const EncoderConfig& config, double sp
 
 class RunningEncoder final : public RunningDevices {
  public:
-  explicit RunningEncoder(Running<drivers::EncoderDevice> running) : running_(std::move(running)) {}
+  RunningEncoder(Running<drivers::EncoderDevice> running, std::size_t place)
+      : running_(std::move(running)), place_(place) {}
 
   void drain(Batch& batch) override {
     drain_ring(running_.device->samples(), axes_, batch.axes);
-    drain_ring(running_.device->raw(), blocks_, batch.encoder_raw);
+    drain_raw(running_.device->raw(), blocks_, place_, batch);
   }
   [[nodiscard]] std::vector<const drivers::DeviceThread*> threads() const override {
     return {running_.thread.get()};
@@ -53,6 +54,7 @@ class RunningEncoder final : public RunningDevices {
 
  private:
   Running<drivers::EncoderDevice> running_;
+  std::size_t place_;
   std::array<protocol::AxisSample, kMostSamples> axes_;
   BlockBuffer blocks_;
 };
@@ -66,7 +68,7 @@ Result<std::unique_ptr<RunningDevices>> start_encoder(const DeviceStart& start) 
                      thread_options(config.daemon, "abbe-encoder", config.daemon.encoder_priority,
                                     config.daemon.encoder_cpu));
   if (!running) return tl::unexpected(running.error());
-  return std::make_unique<RunningEncoder>(std::move(*running));
+  return std::make_unique<RunningEncoder>(std::move(*running), start.first);
 }
 
 class EncoderDecoder final : public RawDecoders {
@@ -84,6 +86,12 @@ class EncoderDecoder final : public RawDecoders {
   std::string name_;
   drivers::EncoderReceiver receiver_;
 };
+
+void name_encoder(const Config& config, DeviceNames& names) {
+  if (!config.encoder) return;
+  names.axes = config.encoder->name;
+  names.all.push_back(config.encoder->name);
+}
 
 std::unique_ptr<RawDecoders> decoders_of_encoder(
     const Config& config, const std::optional<drivers::CounterCardProgress>&) {
@@ -122,7 +130,9 @@ drivers::EncoderDeviceOptions device_options(const EncoderConfig& config, double
   return options;
 }
 
-const DeviceKind kEncoder{
-    .table = "encoder", .start = &start_encoder, .decoders = &decoders_of_encoder};
+const DeviceKind kEncoder{.table = "encoder",
+                          .name = &name_encoder,
+                          .start = &start_encoder,
+                          .decoders = &decoders_of_encoder};
 
 }  // namespace abbe::daemon

@@ -42,6 +42,7 @@ class RunningEnvironment final : public RunningDevices {
   [[nodiscard]] static Result<std::unique_ptr<RunningDevices>> of(const DeviceStart& start) {
     auto made = std::make_unique<RunningEnvironment>();
     made->devices_.resize(start.config.environment.size());
+    made->first_ = start.first;
     for (const auto& devices : devices_of_lines(start.config.environment)) {
       if (auto added = made->add_line(devices, start); !added) return tl::unexpected(added.error());
     }
@@ -54,9 +55,7 @@ class RunningEnvironment final : public RunningDevices {
       auto& device = *devices_[i].device;
       for (protocol::EnvironmentSample sample; device.samples().pop({&sample, 1}) != 0;)
         batch.measured_environment.push_back({i, sample});
-      while (const std::size_t n = device.raw().pop(blocks_)) {
-        for (std::size_t b = 0; b < n; ++b) batch.environment_raw.push_back({i, blocks_[b]});
-      }
+      drain_raw(device.raw(), blocks_, first_ + i, batch);
     }
   }
   [[nodiscard]] std::vector<const drivers::DeviceThread*> threads() const override {
@@ -89,6 +88,7 @@ class RunningEnvironment final : public RunningDevices {
 
   std::vector<Running<drivers::EnvironmentLine>> lines_;
   std::vector<OnLine> devices_;  // in the order of the configuration
+  std::size_t first_ = 0;        // place in DeviceNames::all
   BlockBuffer blocks_;
 };
 
@@ -118,6 +118,13 @@ class EnvironmentDecoders final : public RawDecoders {
   std::vector<drivers::EnvironmentReceiver> receivers_;
 };
 
+void name_environment(const Config& config, DeviceNames& names) {
+  for (const EnvironmentConfig& device : config.environment) {
+    names.environment.push_back(device.name);
+    names.all.push_back(device.name);
+  }
+}
+
 std::unique_ptr<RawDecoders> decoders_of_environment(
     const Config& config, const std::optional<drivers::CounterCardProgress>&) {
   return config.environment.empty() ? nullptr : std::make_unique<EnvironmentDecoders>(config);
@@ -137,7 +144,9 @@ drivers::EnvironmentDeviceOptions device_options(const EnvironmentConfig& config
   return options;
 }
 
-const DeviceKind kEnvironment{
-    .table = "environment", .start = &start_environment, .decoders = &decoders_of_environment};
+const DeviceKind kEnvironment{.table = "environment",
+                              .name = &name_environment,
+                              .start = &start_environment,
+                              .decoders = &decoders_of_environment};
 
 }  // namespace abbe::daemon

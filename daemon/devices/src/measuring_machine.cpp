@@ -26,9 +26,11 @@ constexpr auto kStopIsHeard = std::chrono::milliseconds{10};
 /// are the axes where the configuration has no other source of axes.
 class RunningMachine final : public RunningDevices, private MachineMotion {
  public:
-  RunningMachine(Running<drivers::IppDevice> running, bool is_the_axes,
-                 const drivers::TimeSource& time)
-      : running_(std::move(running)), is_the_axes_(is_the_axes), time_(time) {}
+  RunningMachine(Running<drivers::IppDevice> running, bool is_the_axes, const DeviceStart& start)
+      : running_(std::move(running)),
+        place_(start.first),
+        is_the_axes_(is_the_axes),
+        time_(start.time) {}
 
   void drain(Batch& batch) override {
     auto& device = *running_.device;
@@ -40,7 +42,7 @@ class RunningMachine final : public RunningDevices, private MachineMotion {
                           axes_.begin() + static_cast<std::ptrdiff_t>(n));
     }
 
-    drain_ring(device.raw(), blocks_, batch.probe_raw);
+    drain_raw(device.raw(), blocks_, place_, batch);
   }
   [[nodiscard]] std::vector<const drivers::DeviceThread*> threads() const override {
     return {running_.thread.get()};
@@ -69,6 +71,7 @@ class RunningMachine final : public RunningDevices, private MachineMotion {
   }
 
   Running<drivers::IppDevice> running_;
+  std::size_t place_;
   bool is_the_axes_;
   const drivers::TimeSource& time_;
   std::optional<protocol::AxisSample> stands_at_;
@@ -120,7 +123,7 @@ Result<std::unique_ptr<RunningDevices>> start_measuring_machine(const DeviceStar
   thread.wait_at_most = kStopIsHeard;
   auto running = run(drivers::IppDevice::create(options, start.time), std::move(thread));
   if (!running) return tl::unexpected(running.error());
-  return std::make_unique<RunningMachine>(std::move(*running), config.cmm_reads_axes(), start.time);
+  return std::make_unique<RunningMachine>(std::move(*running), config.cmm_reads_axes(), start);
 }
 
 class MachineDecoder final : public RawDecoders {
@@ -156,6 +159,13 @@ class MachineDecoder final : public RawDecoders {
   std::unique_ptr<drivers::IppReceiver> receiver_;
 };
 
+void name_measuring_machine(const Config& config, DeviceNames& names) {
+  if (!config.cmm) return;
+  names.touches = config.cmm->name;
+  if (config.cmm_reads_axes()) names.axes = config.cmm->name;
+  names.all.push_back(config.cmm->name);
+}
+
 std::unique_ptr<RawDecoders> decoders_of_measuring_machine(
     const Config& config, const std::optional<drivers::CounterCardProgress>&) {
   return config.cmm ? std::make_unique<MachineDecoder>(config) : nullptr;
@@ -180,7 +190,9 @@ drivers::IppDeviceOptions device_options(const CmmConfig& config, double speed) 
   return options;
 }
 
-const DeviceKind kMeasuringMachine{
-    .table = "cmm", .start = &start_measuring_machine, .decoders = &decoders_of_measuring_machine};
+const DeviceKind kMeasuringMachine{.table = "cmm",
+                                   .name = &name_measuring_machine,
+                                   .start = &start_measuring_machine,
+                                   .decoders = &decoders_of_measuring_machine};
 
 }  // namespace abbe::daemon

@@ -16,11 +16,13 @@ class RunningReferenceCard final : public RunningDevices {
  public:
   /// `start` runs the card with the watcher it feeds.
   template <class Start>
-  [[nodiscard]] static Result<std::unique_ptr<RunningDevices>> of(const Start& start) {
+  [[nodiscard]] static Result<std::unique_ptr<RunningDevices>> of(std::size_t place,
+                                                                  const Start& start) {
     auto made = std::make_unique<RunningReferenceCard>();
     auto running = start(made->mark_watcher_);
     if (!running) return tl::unexpected(running.error());
     made->running_ = std::move(*running);
+    made->place_ = place;
     return made;
   }
 
@@ -28,7 +30,7 @@ class RunningReferenceCard final : public RunningDevices {
     while (const std::size_t n = mark_watcher_.crossings().pop(marks_))
       batch.marks.insert(batch.marks.end(), marks_.begin(),
                          marks_.begin() + static_cast<std::ptrdiff_t>(n));
-    drain_ring(running_.device->raw(), blocks_, batch.reference_raw);
+    drain_raw(running_.device->raw(), blocks_, place_, batch);
   }
   [[nodiscard]] std::vector<const drivers::DeviceThread*> threads() const override {
     return {running_.thread.get()};
@@ -43,6 +45,7 @@ class RunningReferenceCard final : public RunningDevices {
  private:
   drivers::MarkWatcher mark_watcher_;  // the card feeds it: destroyed after the card
   Running<drivers::CounterCardDevice> running_;
+  std::size_t place_ = 0;
   std::array<drivers::MarkCrossing, 64> marks_;
   BlockBuffer blocks_;
 };
@@ -53,7 +56,7 @@ Result<std::unique_ptr<RunningDevices>> start_reference_card(const DeviceStart& 
   const CounterCardConfig& card = config.reference->card;
   const auto options = device_options(card, config.daemon.speed);
 
-  return RunningReferenceCard::of([&](drivers::MarkWatcher& watcher) {
+  return RunningReferenceCard::of(start.first, [&](drivers::MarkWatcher& watcher) {
     return run(drivers::CounterCardDevice::create(
                    options, make_link(card, drivers::identity_of(options), start.time), start.time,
                    &watcher),
@@ -86,6 +89,10 @@ class ReferenceCardDecoder final : public RawDecoders {
   drivers::MarkWatcher mark_watcher_;
 };
 
+void name_reference_card(const Config& config, DeviceNames& names) {
+  if (config.reference) names.all.push_back(config.reference->card.name);
+}
+
 std::unique_ptr<RawDecoders> decoders_of_reference_card(
     const Config& config, const std::optional<drivers::CounterCardProgress>&) {
   return config.reference ? std::make_unique<ReferenceCardDecoder>(config) : nullptr;
@@ -93,7 +100,9 @@ std::unique_ptr<RawDecoders> decoders_of_reference_card(
 
 }  // namespace
 
-const DeviceKind kReferenceCard{
-    .table = "reference", .start = &start_reference_card, .decoders = &decoders_of_reference_card};
+const DeviceKind kReferenceCard{.table = "reference",
+                                .name = &name_reference_card,
+                                .start = &start_reference_card,
+                                .decoders = &decoders_of_reference_card};
 
 }  // namespace abbe::daemon

@@ -12,6 +12,7 @@
 #include "abbe/base/error.hpp"
 #include "abbe/config/config.hpp"
 #include "abbe/drivers/device_thread.hpp"
+#include "abbe/pipeline/batch.hpp"
 #include "abbe/protocol/samples.hpp"
 
 namespace abbe::daemon {
@@ -32,6 +33,15 @@ void drain_ring(Ring& ring, std::array<T, N>& buffer, std::vector<T>& out) {
   for (std::size_t n = buffer.size(); n == buffer.size();) {
     n = ring.pop(buffer);
     out.insert(out.end(), buffer.begin(), buffer.begin() + static_cast<std::ptrdiff_t>(n));
+  }
+}
+
+/// The raw blocks of the device of that place in DeviceNames::all.
+template <class Ring>
+void drain_raw(Ring& ring, BlockBuffer& buffer, std::size_t device, Batch& batch) {
+  for (std::size_t n = buffer.size(); n == buffer.size();) {
+    n = ring.pop(buffer);
+    for (std::size_t i = 0; i < n; ++i) batch.raw.push_back({device, buffer[i]});
   }
 }
 

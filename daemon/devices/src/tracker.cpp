@@ -38,12 +38,13 @@ protocol::emscon::Environment controller_units(const calib::Air& air) {
 
 class RunningTracker final : public RunningDevices, private TrackerOrders {
  public:
-  explicit RunningTracker(Running<drivers::TrackerDevice> running) : running_(std::move(running)) {}
+  RunningTracker(Running<drivers::TrackerDevice> running, std::size_t place)
+      : running_(std::move(running)), place_(place) {}
 
   void drain(Batch& batch) override {
     drain_ring(running_.device->points(), points_, batch.points);
     drain_ring(running_.device->environment(), weather_, batch.environment);
-    drain_ring(running_.device->raw(), blocks_, batch.tracker_raw);
+    drain_raw(running_.device->raw(), blocks_, place_, batch);
   }
   [[nodiscard]] std::vector<const drivers::DeviceThread*> threads() const override {
     return {running_.thread.get()};
@@ -58,6 +59,7 @@ class RunningTracker final : public RunningDevices, private TrackerOrders {
   }
 
   Running<drivers::TrackerDevice> running_;
+  std::size_t place_;
   std::array<protocol::TrackerPoint, kMostSamples> points_;
   std::array<protocol::EnvironmentSample, 16> weather_;
   BlockBuffer blocks_;
@@ -71,7 +73,7 @@ Result<std::unique_ptr<RunningDevices>> start_tracker(const DeviceStart& start) 
                      thread_options(config.daemon, "abbe-tracker", config.daemon.tracker_priority,
                                     config.daemon.tracker_cpu));
   if (!running) return tl::unexpected(running.error());
-  return std::make_unique<RunningTracker>(std::move(*running));
+  return std::make_unique<RunningTracker>(std::move(*running), start.first);
 }
 
 class TrackerDecoder final : public RawDecoders {
@@ -99,6 +101,12 @@ class TrackerDecoder final : public RawDecoders {
   std::string name_;
   drivers::TrackerReceiver receiver_;
 };
+
+void name_tracker(const Config& config, DeviceNames& names) {
+  if (!config.tracker) return;
+  names.tracker = config.tracker->name;
+  names.all.push_back(config.tracker->name);
+}
 
 std::unique_ptr<RawDecoders> decoders_of_tracker(
     const Config& config, const std::optional<drivers::CounterCardProgress>&) {
@@ -144,7 +152,9 @@ std::chrono::nanoseconds longest_tracker_order(const Config& config) {
   return drivers::longest_order(device_options(*config.tracker, config.daemon.speed).session);
 }
 
-const DeviceKind kTracker{
-    .table = "tracker", .start = &start_tracker, .decoders = &decoders_of_tracker};
+const DeviceKind kTracker{.table = "tracker",
+                          .name = &name_tracker,
+                          .start = &start_tracker,
+                          .decoders = &decoders_of_tracker};
 
 }  // namespace abbe::daemon

@@ -54,10 +54,7 @@ std::size_t bytes_of(const Batch& batch) noexcept {
                       size_as<EnvironmentOf>(batch.environment) +
                       size_as<EnvironmentOf>(batch.measured_environment);
   bytes += size_of(batch.touches) + size_of(batch.touch_scans);
-  for (const auto* blocks :
-       {&batch.tracker_raw, &batch.encoder_raw, &batch.probe_raw, &batch.reference_raw})
-    bytes += WaitingBlocks::bytes_of(*blocks);
-  for (const auto& [device, block] : batch.environment_raw) bytes += WaitingBlocks::bytes_of(block);
+  for (const auto& [device, block] : batch.raw) bytes += WaitingBlocks::bytes_of(block);
   return bytes;
 }
 
@@ -116,12 +113,9 @@ struct Waiting {
 
 /// Messages of each stream that were dropped since the last one that was not.
 struct Dropped {
-  struct OfDevice {
-    std::uint32_t samples = 0, raw = 0;
-  };
   std::uint32_t points = 0, axes = 0, environment = 0, touches = 0, touch_scans = 0;
-  std::uint32_t tracker_raw = 0, encoder_raw = 0, probe_raw = 0, reference_raw = 0;
-  std::vector<OfDevice> measured;
+  std::vector<std::uint32_t> measured;  // of each device of the environment
+  std::vector<std::uint32_t> raw;       // of each device
 };
 
 template <class T>
@@ -250,15 +244,11 @@ struct RecorderThread::State {
     lose(unsaid.environment, batch.environment.size());
 
     for (const auto& sample : batch.measured_environment)
-      lose(place(unsaid.measured, sample.device).samples, 1);
+      lose(place(unsaid.measured, sample.device), 1);
     lose(unsaid.touches, batch.touches.size());
     lose(unsaid.touch_scans, batch.touch_scans.size());
     if (!options.raw) return;
-    lose(unsaid.tracker_raw, batch.tracker_raw.size());
-    lose(unsaid.encoder_raw, batch.encoder_raw.size());
-    lose(unsaid.probe_raw, batch.probe_raw.size());
-    lose(unsaid.reference_raw, batch.reference_raw.size());
-    for (const auto& raw : batch.environment_raw) lose(place(unsaid.measured, raw.device).raw, 1);
+    for (const auto& raw : batch.raw) lose(place(unsaid.raw, raw.device), 1);
   }
 
   void write(Waiting& turn) {
@@ -356,17 +346,12 @@ void RecorderThread::hand_over(const Batch& batch) {
     append(waiting.environment, taken, {names.tracker, sample}, unsaid.environment);
   for (const auto& [device, sample] : batch.measured_environment)
     append(waiting.environment, taken, {names.environment.at(device), sample},
-           place(unsaid.measured, device).samples);
+           place(unsaid.measured, device));
   append(waiting.touches, taken, batch.touches, unsaid.touches);
   append(waiting.touch_scans, taken, batch.touch_scans, unsaid.touch_scans);
   if (!names.raw) return;
-  waiting.raw.append(taken, names.tracker, batch.tracker_raw, unsaid.tracker_raw);
-  waiting.raw.append(taken, names.encoder, batch.encoder_raw, unsaid.encoder_raw);
-  waiting.raw.append(taken, names.probe, batch.probe_raw, unsaid.probe_raw);
-  waiting.raw.append(taken, names.reference, batch.reference_raw, unsaid.reference_raw);
-  for (const auto& [device, block] : batch.environment_raw)
-    waiting.raw.append(taken, names.environment.at(device), block,
-                       place(unsaid.measured, device).raw);
+  for (const auto& [device, block] : batch.raw)
+    waiting.raw.append(taken, names.devices.at(device), block, place(unsaid.raw, device));
 }
 
 void RecorderThread::hand_over(v1::CalibrationEvent event, protocol::HostTime taken) {

@@ -14,20 +14,10 @@ namespace abbe::daemon {
 class WaitingBlocks {
  public:
   /// What append() will need for these.
-  [[nodiscard]] static std::size_t bytes_of(
-      const std::vector<protocol::RawBlock>& blocks) noexcept {
-    std::size_t bytes = 0;
-    for (const auto& block : blocks) bytes += bytes_of(block);
-    return bytes;
-  }
   [[nodiscard]] static std::size_t bytes_of(const protocol::RawBlock& block) noexcept {
     return sizeof(Head) + block.length;
   }
   /// `dropped` blocks before these never came this far: the first one says so.
-  void append(protocol::HostTime taken, std::string_view device,
-              const std::vector<protocol::RawBlock>& blocks, std::uint32_t& dropped) {
-    for (const auto& block : blocks) append(taken, device, block, dropped);
-  }
   void append(protocol::HostTime taken, std::string_view device, const protocol::RawBlock& block,
               std::uint32_t& dropped) {
     const auto from = protocol::to_raw_bytes(block, {}).bytes;

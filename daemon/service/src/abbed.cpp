@@ -24,6 +24,7 @@
 #include "abbe/base/control_server.hpp"
 #include "abbe/base/exit_deadline.hpp"
 #include "abbe/base/unix_socket.hpp"
+#include "abbe/devices/device_kind.hpp"
 #include "abbe/devices/device_options.hpp"
 #include "abbe/devices/device_set.hpp"
 #include "abbe/drivers/cpu_latency.hpp"
@@ -86,15 +87,13 @@ RecorderThreadOptions recorder_options(const Config& config, const std::string& 
   options.recorder.min_free_bytes = config.recording.min_free_bytes;
   options.recorder.max_file_bytes = config.recording.max_file_bytes;
   options.raw = config.recording.raw;
-  if (config.tracker) options.tracker = config.tracker->name;
-  if (config.encoder) options.encoder = config.encoder->name;
-  if (config.counter_card) options.encoder = config.counter_card->name;
-  if (config.reference) options.reference = config.reference->card.name;
-  for (const auto& device : config.environment) options.environment.push_back(device.name);
-  if (config.probe) options.probe = config.probe->name;
-  if (config.cmm) options.probe = config.cmm->name;
-  if (config.cmm_reads_axes()) options.encoder = config.cmm->name;
 
+  DeviceNames names = device_names(config);
+  options.tracker = std::move(names.tracker);
+  options.encoder = std::move(names.axes);
+  options.probe = std::move(names.touches);
+  options.environment = std::move(names.environment);
+  options.devices = std::move(names.all);
   return options;
 }
 
@@ -327,7 +326,7 @@ struct Abbed::State {
 
     reference.emplace(config, recorder.get(), std::move(left));
     verification.emplace(config);
-    touching.emplace(*devices, config.cmm.has_value());
+    touching.emplace(*devices, devices->moves());
     tracker.emplace(*devices, longest_tracker_order(config));
     hub.emplace(HubParts{.config = config,
                          .time = time,

@@ -7,7 +7,7 @@
 #include <utility>
 
 #include "abbe/base/wake_up.hpp"
-#include "abbe/devices/device_options.hpp"
+#include "abbe/devices/device_kind.hpp"
 
 namespace abbe::daemon {
 namespace {
@@ -102,7 +102,8 @@ Hub::Hub(HubParts parts)
     : parts_(parts),
       pipeline_(assembler_options(parts.config),
                 parts.reference != nullptr ? &parts.reference->datum() : nullptr),
-      live_(assembler_options(parts.config), parts.time) {
+      live_(assembler_options(parts.config), parts.time),
+      touches_by_(device_names(parts.config).touches) {
   if (parts_.reference != nullptr) pipeline_.add(*parts_.reference);
   pipeline_.add(*this);  // before the recorder: subscribers wait for the live view
   if (parts_.recorder != nullptr) pipeline_.add(*parts_.recorder);
@@ -160,7 +161,7 @@ void Hub::touch(std::size_t points_left, WallTime wall) {
   if (points_left == 0 && batch_.touches.empty()) {
     collect_health(parts_.time.now());
     for (const auto& h : health_)
-      if (parts_.config.cmm && h.status.name == parts_.config.cmm->name) seen = h.status.last_fault;
+      if (h.status.name == touches_by_) seen = h.status.last_fault;
   }
   parts_.touching->cycle(batch_, points_left, seen, wall);
 }

@@ -91,16 +91,28 @@ class RawDecoders {
   virtual void take(const protocol::RawBlock& block, std::string_view device, Batch& batch) = 0;
 };
 
-/// What devices are started with. `left`: how far an earlier run left the counters of the counter
+/// The devices of a configuration by name, and which of them delivers what.
+struct DeviceNames {
+  std::vector<std::string> all;  ///< Batch::raw counts them
+  std::string tracker = "tracker", axes = "encoder", touches = "probe";
+  std::vector<std::string> environment;  ///< in the order of Config::environment
+};
+[[nodiscard]] DeviceNames device_names(const Config& config);
+
+/// What devices are started with. `first`: place in DeviceNames::all of the first device of the
+/// kind. `left`: how far an earlier run left the counters of the counter
 /// card, which then go on if the card did.
 struct DeviceStart {
   const Config& config;
   const drivers::TimeSource& time;
+  std::size_t first;
   const std::optional<drivers::CounterCardProgress>& left;
 };
 
 struct DeviceKind {
   std::string_view table;  ///< of the configuration
+  /// Adds the configured devices of this kind.
+  void (*name)(const Config& config, DeviceNames& names);
   /// Null: the configuration has no device of this kind.
   Result<std::unique_ptr<RunningDevices>> (*start)(const DeviceStart& start);
   /// Null as start().

@@ -37,6 +37,8 @@ class DeviceSet final : public SampleSource {
   /// What the system refused in real-time mode `ignore`, one sentence each.
   [[nodiscard]] std::vector<std::string> warnings() const;
   [[nodiscard]] std::optional<drivers::CounterCardProgress> card_progress() override;
+  /// One of the devices moves and touches by itself.
+  [[nodiscard]] bool moves() const;
   void measure(std::span<const drivers::ProbePoint> points) override;
   void stop_machine() override;
   /// Any thread, takes no lock: a motion of the measuring machine is stopped and its session ends,

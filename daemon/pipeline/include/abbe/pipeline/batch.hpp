@@ -16,7 +16,8 @@ struct FromEnvironment {
   std::size_t device = 0;
   protocol::EnvironmentSample sample;
 };
-struct RawFromEnvironment {
+/// From the device of that place in DeviceNames::all.
+struct RawFromDevice {
   std::size_t device = 0;
   protocol::RawBlock block;
 };
@@ -32,11 +33,7 @@ struct Batch {
   std::vector<protocol::TouchScan> touch_scans;
   std::vector<drivers::MarkCrossing>
       marks;  ///< of the second card: its bytes are recorded, not these
-  std::vector<protocol::RawBlock> tracker_raw;
-  std::vector<protocol::RawBlock> encoder_raw;
-  std::vector<protocol::RawBlock> probe_raw;      ///< of a measuring machine
-  std::vector<protocol::RawBlock> reference_raw;  ///< of the second counter card
-  std::vector<RawFromEnvironment> environment_raw;
+  std::vector<RawFromDevice> raw;
 
   void clear() noexcept {
     points.clear();
@@ -46,17 +43,11 @@ struct Batch {
     touches.clear();
     touch_scans.clear();
     marks.clear();
-    tracker_raw.clear();
-    encoder_raw.clear();
-    probe_raw.clear();
-    reference_raw.clear();
-    environment_raw.clear();
+    raw.clear();
   }
   [[nodiscard]] bool empty() const noexcept {
     return points.empty() && axes.empty() && environment.empty() && measured_environment.empty() &&
-           touches.empty() && touch_scans.empty() && marks.empty() && tracker_raw.empty() &&
-           encoder_raw.empty() && probe_raw.empty() && reference_raw.empty() &&
-           environment_raw.empty();
+           touches.empty() && touch_scans.empty() && marks.empty() && raw.empty();
   }
 };
 

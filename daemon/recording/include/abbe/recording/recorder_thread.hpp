@@ -21,10 +21,10 @@ struct RecorderThreadOptions {
   RecorderOptions recorder;
   std::string tracker = "tracker";  ///< device names in the recording
   std::string encoder = "encoder";
-  std::string probe = "probe";               ///< the touch probe, or the measuring machine
-  std::string reference = "reference_card";  ///< the card that sees the marks
-  std::vector<std::string> environment;      ///< in the order of Config::environment
-  bool raw = true;                           ///< record the device bytes, too
+  std::string probe = "probe";           ///< the touch probe, or the measuring machine
+  std::vector<std::string> environment;  ///< in the order of Config::environment
+  std::vector<std::string> devices;      ///< Batch::raw counts them
+  bool raw = true;                       ///< record the device bytes, too
   /// Two minutes of a stalled disk with axes at 1 kHz and a tracker at 500 Hz. The memory may be
   /// locked.
   std::size_t most_waiting_bytes = 64 << 20;

@@ -12,6 +12,7 @@
 #include <memory>
 #include <optional>
 #include <span>
+#include <string>
 #include <type_traits>
 #include <utility>
 #include <vector>
@@ -98,6 +99,7 @@ class Hub : private PipelineObserver {
   HubParts parts_;
   Pipeline pipeline_;
   LiveView live_;
+  std::string touches_by_;  // the device that delivers the touches
   Batch batch_;
   WallTime cycle_began_{};
   std::vector<StreamHealth> health_;

@@ -46,6 +46,11 @@ Result<KeptModel> ModelKeeper::keep(const ModelDocument& document, const calib::
   if (is_discarded()) return fail(ErrorCode::Refused, "the model was discarded");
   if (!verdict.accepted) return KeptModel{*id, std::nullopt};
   if (auto done = activate_once(*id, actor); !done) return tl::unexpected(done.error());
+
+  const auto activation = store_.activation();
+  if (!activation) return tl::unexpected(activation.error());
+  if (*activation && (*activation)->id == *id)  // as stored: nothing is read back and parsed
+    return KeptModel{*id, active_of(**activation, document, now)};
   auto active = read_active(now);
   if (!active) return tl::unexpected(active.error());
   return KeptModel{*id, std::move(*active)};
@@ -82,23 +87,27 @@ Result<ActiveModel> ModelKeeper::read_active(protocol::HostTime now) const {
     return active;
   }
 
-  active.activation = **activation;
-  auto document = store_.load(active.activation.id);
-  if (!document) {
-    active.fault = document.error().text;
-    return active;
-  }
+  auto document = store_.load((*activation)->id);
+  if (document) return active_of(**activation, std::move(*document), now);
 
-  active.made_for_this_machine = document->machine_hash == machine_hash_;
-  active.recording_gap = document->recording_gap;
+  active.activation = **activation;
+  active.fault = document.error().text;
+  return active;
+}
+
+ActiveModel ModelKeeper::active_of(const StoreEvent& activation, ModelDocument document,
+                                   protocol::HostTime now) const {
+  ActiveModel active{.activation = activation};
+  active.made_for_this_machine = document.machine_hash == machine_hash_;
+  active.recording_gap = document.recording_gap;
   auto model = std::make_shared<const ModelInForce>(
-      ModelInForce{.id = active.activation.id,
-                   .method = document->method,
-                   .estimator = document->estimator,
-                   .recording_sha256 = provenance(*document),
-                   .created = document->created,
-                   .active_since = std::min(now, utc_.to_host(active.activation.actor.when)),
-                   .model = std::move(document->model)});
+      ModelInForce{.id = activation.id,
+                   .method = document.method,
+                   .estimator = document.estimator,
+                   .recording_sha256 = provenance(document),
+                   .created = document.created,
+                   .active_since = std::min(now, utc_.to_host(activation.actor.when)),
+                   .model = std::move(document.model)});
   auto publication = encode_model(*model, machine_);
 
   if (!publication) {

@@ -66,6 +66,9 @@ class ModelKeeper {
   [[nodiscard]] StoreStamp stamp() const noexcept { return store_.stamp(); }
 
  private:
+  /// The model of `document`, activated as `activation` says, checked and encoded.
+  [[nodiscard]] ActiveModel active_of(const StoreEvent& activation, ModelDocument document,
+                                      protocol::HostTime now) const;
   [[nodiscard]] Result<void> activate_once(const std::string& id, const StoreActor& actor);
 
   ModelStore store_;

@@ -16,6 +16,7 @@
 #include "abbe/calib/evemu/judge.hpp"
 #include "abbe/config/calib_error.hpp"
 #include "abbe/config/calibration_machine.hpp"
+#include "abbe/methods/evemu/document.hpp"
 #include "abbe/methods/evemu/identification.hpp"
 #include "abbe/methods/evemu/report.hpp"
 #include "abbe/methods/otf/inputs.hpp"

@@ -13,6 +13,7 @@
 #include "abbe/config/calib_error.hpp"
 #include "abbe/config/calibration_machine.hpp"
 #include "abbe/config/unmeasured_air.hpp"
+#include "abbe/methods/otf/document.hpp"
 #include "abbe/methods/otf/identification.hpp"
 #include "abbe/methods/otf/inputs.hpp"
 #include "abbe/methods/otf/path_readings.hpp"

@@ -6,6 +6,7 @@
 
 #include "abbe/base/sha256.hpp"
 #include "abbe/config/json_vector.hpp"
+#include "abbe/methods/evemu/document.hpp"
 
 namespace abbe::daemon {
 namespace {

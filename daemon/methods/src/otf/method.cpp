@@ -3,6 +3,7 @@
 #include <nlohmann/json.hpp>
 #include <utility>
 
+#include "abbe/methods/otf/document.hpp"
 #include "abbe/methods/otf/inputs.hpp"
 
 namespace abbe::daemon {

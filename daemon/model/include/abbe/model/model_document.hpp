@@ -12,8 +12,6 @@
 
 #include "abbe/base/input_file.hpp"
 #include "abbe/calib/environment/thermal_expansion.hpp"
-#include "abbe/calib/evemu/solve.hpp"
-#include "abbe/calib/otf/solve.hpp"
 #include "abbe/calib/volumetric_model.hpp"
 #include "abbe/config/config.hpp"
 #include "abbe/protocol/time.hpp"
@@ -40,7 +38,6 @@ struct ModelStatistics {
   std::string stop_reason;
   friend bool operator==(const ModelStatistics&, const ModelStatistics&) = default;
 };
-[[nodiscard]] ModelStatistics model_statistics(const calib::otf::Statistics& statistics);
 
 /// A model and where it came from.
 struct ModelDocument {
@@ -59,15 +56,6 @@ struct ModelDocument {
 };
 /// For the verdict of a model whose recording has this gap.
 [[nodiscard]] std::string cannot_be_checked(std::string_view recording_gap);
-
-/// The document of an OTF solution.
-[[nodiscard]] ModelDocument otf_document(const calib::otf::Solution& solution, const Config& config,
-                                         std::vector<InputFile> inputs, protocol::UtcTime created);
-
-/// The document of a ball array's solution.
-[[nodiscard]] ModelDocument evemu_document(const calib::evemu::Solution& solution,
-                                           const Config& config, std::vector<InputFile> inputs,
-                                           protocol::UtcTime created);
 
 /// SHA-256 in hex over what the model *says* (method, chain, basis, nodes, gauge, tools,
 /// parameters, covariance, validity, and what warmth of a ball array was taken out of it), not over

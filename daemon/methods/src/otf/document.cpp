@@ -1,12 +1,14 @@
-#include <cmath>
+#include "abbe/methods/otf/document.hpp"
 
-#include "abbe/model/model_document.hpp"
+#include <cmath>
+#include <string>
+#include <utility>
 
 namespace abbe::daemon {
 
 namespace {
 
-ResidualFigures figures(const calib::otf::ResidualStatistics& s) {
+ResidualFigures document_figures(const calib::otf::ResidualStatistics& s) {
   return {s.mean_abs_m, s.rms_m, s.max_abs_m};
 }
 
@@ -14,8 +16,6 @@ ResidualFigures figures(const calib::otf::ResidualStatistics& s) {
 double or_zero(double value) {
   return std::isfinite(value) ? value : 0.0;
 }
-
-}  // namespace
 
 ModelStatistics model_statistics(const calib::otf::Statistics& s) {
   return {.samples = s.samples,
@@ -27,11 +27,13 @@ ModelStatistics model_statistics(const calib::otf::Statistics& s) {
           .sigma0 = or_zero(s.sigma0),
           .chi2_per_dof = or_zero(s.chi2_per_dof),
           .variance_factor = s.variance_factor,
-          .before = figures(s.before),
-          .after = figures(s.after),
+          .before = document_figures(s.before),
+          .after = document_figures(s.after),
           .iterations = s.iterations,
           .stop_reason = std::string{name(s.stop)}};
 }
+
+}  // namespace
 
 ModelDocument otf_document(const calib::otf::Solution& solution, const Config& config,
                            std::vector<InputFile> inputs, protocol::UtcTime created) {

@@ -1,16 +1,18 @@
-#include <cmath>
+#include "abbe/methods/evemu/document.hpp"
 
-#include "abbe/model/model_document.hpp"
+#include <cmath>
+#include <string>
+#include <utility>
 
 namespace abbe::daemon {
 
 namespace {
 
-ResidualFigures figures(const calib::evemu::ResidualFigures& f) {
+ResidualFigures document_figures(const calib::evemu::ResidualFigures& f) {
   return {f.mean_abs_m, f.rms_m, f.max_abs_m};
 }
 
-ModelStatistics statistics(const calib::evemu::Statistics& s) {
+ModelStatistics model_statistics(const calib::evemu::Statistics& s) {
   return {.samples = s.balls,
           .observations = s.observations,
           .unknowns = s.unknowns,
@@ -18,8 +20,8 @@ ModelStatistics statistics(const calib::evemu::Statistics& s) {
           .condition = s.condition,
           .sigma0 = std::sqrt(s.chi2_per_dof),
           .chi2_per_dof = s.chi2_per_dof,
-          .before = figures(s.before),
-          .after = figures(s.after),
+          .before = document_figures(s.before),
+          .after = document_figures(s.after),
           .iterations = s.iterations,
           .stop_reason = "converged"};
 }
@@ -34,7 +36,7 @@ ModelDocument evemu_document(const calib::evemu::Solution& solution, const Confi
           config.machine.name,
           machine_hash(config),
           created,
-          statistics(solution.statistics),
+          model_statistics(solution.statistics),
           std::move(inputs),
           solution.artefact ? solution.artefact->expansion : std::nullopt};
 }

@@ -1,0 +1,17 @@
+#pragma once
+/// The model document of a ball array's solution. Pure.
+
+#include <vector>
+
+#include "abbe/base/input_file.hpp"
+#include "abbe/calib/evemu/solve.hpp"
+#include "abbe/config/config.hpp"
+#include "abbe/model/model_document.hpp"
+
+namespace abbe::daemon {
+
+[[nodiscard]] ModelDocument evemu_document(const calib::evemu::Solution& solution,
+                                           const Config& config, std::vector<InputFile> inputs,
+                                           protocol::UtcTime created);
+
+}  // namespace abbe::daemon

@@ -1,0 +1,16 @@
+#pragma once
+/// The model document of an on-the-fly solution. Pure.
+
+#include <vector>
+
+#include "abbe/base/input_file.hpp"
+#include "abbe/calib/otf/solve.hpp"
+#include "abbe/config/config.hpp"
+#include "abbe/model/model_document.hpp"
+
+namespace abbe::daemon {
+
+[[nodiscard]] ModelDocument otf_document(const calib::otf::Solution& solution, const Config& config,
+                                         std::vector<InputFile> inputs, protocol::UtcTime created);
+
+}  // namespace abbe::daemon

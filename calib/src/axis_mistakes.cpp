@@ -15,7 +15,7 @@ Matrix3 reversed(std::span<const Eigen::Index> axes) {
   return M;
 }
 
-/// Row i takes what was given as axis from[i].
+/// Row i selects the given coordinate from[i].
 Matrix3 reordered(const std::array<Eigen::Index, 3>& from) {
   Matrix3 M = Matrix3::Zero();
   for (Eigen::Index i = 0; i < 3; ++i) {
@@ -55,9 +55,9 @@ const std::vector<AxisMistake>& axis_mistakes() {
 }
 
 const std::vector<UnitMistake>& unit_mistakes() {
-  static const std::vector<UnitMistake> all{{"lengths in m where mm belong", 1e3},
-                                            {"lengths in um where mm belong", 1e-3},
-                                            {"lengths in inches where mm belong", 25.4}};
+  static const std::vector<UnitMistake> all{{"lengths in m instead of mm", 1e3},
+                                            {"lengths in um instead of mm", 1e-3},
+                                            {"lengths in inches instead of mm", 25.4}};
   return all;
 }
 
@@ -82,7 +82,8 @@ std::string inside_travel_with(std::span<const Vector3> points_m, const MachineN
     }
   }
 
-  // What becomes smaller fits most machines: a unit is named where no axis explains it.
+  // Smaller coordinates are inside the travel of most machines. Therefore a wrong unit is reported
+  // only if no axis mistake explains the data.
   const bool explained = !texts.empty();
   for (const UnitMistake& mistake : unit_mistakes()) {
     if (!explained && all_inside(points_m, mistake.factor * Matrix3::Identity(), travel)) {

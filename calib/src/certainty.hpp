@@ -1,5 +1,5 @@
 #pragma once
-/// What the gates of all methods ask of the uncertainty.
+/// Requirement on the uncertainty of a model, common to all identification methods.
 
 #include <cmath>
 #include <string>
@@ -10,14 +10,16 @@
 
 namespace abbe::calib {
 
-/// Half: what is left by a correction whose error is twice its uncertainty is not larger than the
-/// correction.
+/// Largest permitted ratio of the standard uncertainty to the correction. One half: even if the
+/// error of the correction is twice its standard uncertainty, the residual error is not larger than
+/// the uncorrected error.
 inline constexpr double kMostUncertainty = 0.5;
 
-/// Of Verdict::causes.
+/// Entry in Verdict::causes.
 inline constexpr std::string_view kUncertain = "uncertainty";
 
-/// Root mean squares of V and its standard uncertainty, without rigid motion. NaN is refused.
+/// Refuses the model if u_m > kMostUncertainty * V_m or if one of them is NaN. V_m, u_m: rms of V
+/// and of its standard uncertainty, rigid motion removed.
 inline void require_certainty(Verdict& verdict, double V_m, double u_m) {
   if (!(u_m <= kMostUncertainty * V_m)) {
     verdict.refuse(kUncertain,
@@ -26,13 +28,13 @@ inline void require_certainty(Verdict& verdict, double V_m, double u_m) {
   }
 }
 
-/// "the axes have backlash: it moves the model by 12 um rms, beside an uncertainty of 2 um".
+/// "the axes have backlash: it changes the model by 12 um rms, the uncertainty is 2 um".
 inline std::string with_effect(const std::string& cause, double bias_m, double u_m) {
   if (std::isnan(bias_m)) {
-    return cause;  // its effect is not known
+    return cause;  // the effect on the model is not known
   }
-  return message(cause, ": it moves the model by ", 1e6 * bias_m,
-                 " um rms, beside an uncertainty of ", 1e6 * u_m, " um");
+  return message(cause, ": it changes the model by ", 1e6 * bias_m,
+                 " um rms, the uncertainty is ", 1e6 * u_m, " um");
 }
 
 }  // namespace abbe::calib

@@ -1,5 +1,5 @@
 #pragma once
-/// Between two steps of a long computation.
+/// Check for cancellation between two steps of a long computation.
 
 #include <functional>
 
@@ -7,7 +7,7 @@
 
 namespace abbe::calib {
 
-/// NotConverged once `stopped` gives true; it may be empty.
+/// NotConverged if `stopped` returns true. `stopped` may be empty.
 [[nodiscard]] inline Result<void> check_stopped(const std::function<bool()>& stopped) {
   if (stopped && stopped()) {
     return failure(ErrorCode::NotConverged, "identification: stopped before its end");

@@ -16,8 +16,8 @@ using WideVector = std::array<Wide, 3>;
 using LatticePoint = std::array<std::int64_t, 3>;
 using Index = std::size_t;
 
-/// Cells of the lattice along the longest side: 2^39. Differences are below 2^39, components of a
-/// cross product below 2^79, heights below 2^121: they fit in 128 bits.
+/// The lattice has at most 2^39 cells along the longest side. Differences are below 2^39,
+/// components of a cross product below 2^79, heights below 2^121, so that all fit in 128 bits.
 constexpr int kCellBits = 39;
 
 LatticePoint minus(const LatticePoint& a, const LatticePoint& b) {
@@ -39,10 +39,10 @@ Vector3 rounded(const WideVector& v) {
 
 struct Triangle {
   std::array<Index, 3> corner{};  ///< anticlockwise seen from outside
-  std::array<Index, 3> beyond{};  ///< triangle at the edge from corner k to k + 1
+  std::array<Index, 3> beyond{};  ///< neighbour triangle at the edge from corner k to k + 1
   WideVector normal{};            ///< outward, exact
   double length = 0.0;            ///< of the normal
-  std::vector<Index> outside{};   ///< points above this triangle
+  std::vector<Index> outside{};   ///< points assigned to this triangle; they are above it
   bool removed = false;
 };
 
@@ -53,9 +53,9 @@ class Quickhull {
   /// Points at most `tolerance_m` above a triangle count as inside.
   Quickhull(std::span<const Vector3> points_m, double tolerance_m, ApexFrom apex_from);
 
-  /// No triangles: the points are in one plane.
+  /// Empty if the points are in one plane.
   [[nodiscard]] std::vector<Index> corners() const;
-  [[nodiscard]] bool every_corner_stands_out() const;
+  [[nodiscard]] bool every_corner_protrudes() const;
   [[nodiscard]] std::vector<HalfSpace> faces() const;
 
  private:
@@ -66,7 +66,7 @@ class Quickhull {
   }
   [[nodiscard]] bool start_with_four();
   void add_triangle(Index a, Index b, Index c);
-  /// Exact; above: positive.
+  /// Exact height, multiplied by the length of the normal; positive if the point is above t.
   [[nodiscard]] Wide height(const Triangle& t, Index point) const {
     return dot(t.normal, minus(at_[point], at_[t.corner[0]]));
   }
@@ -89,8 +89,10 @@ class Quickhull {
   double tolerance_cells_ = 0.0;
   ApexFrom apex_from_;
   std::vector<Triangle> triangles_;
-  std::vector<Index> begins_at_;  ///< new triangle whose edge to the old ones begins at this point
-  std::vector<Index> close_;      ///< dropped although above a triangle, by less than the tolerance
+  /// Per point: the new triangle whose edge to an old triangle begins at this point.
+  std::vector<Index> begins_at_;
+  /// Points that are assigned to no triangle but are above one by less than the tolerance.
+  std::vector<Index> close_;
 };
 
 Quickhull::Quickhull(std::span<const Vector3> points_m, double tolerance_m, ApexFrom apex_from)
@@ -98,7 +100,7 @@ Quickhull::Quickhull(std::span<const Vector3> points_m, double tolerance_m, Apex
   if (points_m.size() < 4 || !round_to_lattice(points_m)) {
     return;
   }
-  // Below a few cells the tolerance is the rounding's.
+  // A tolerance of less than a few cells would be smaller than the rounding of the coordinates.
   constexpr double kLeastCells = 4.0;
   tolerance_cells_ = tolerance_m > 0.0 ? std::max(kLeastCells, tolerance_m / cell_m_) : 0.0;
   if (start_with_four()) {
@@ -131,9 +133,10 @@ bool Quickhull::round_to_lattice(std::span<const Vector3> points_m) {
   return true;
 }
 
-/// The highest point. Of several (a face parallel to the plane, an edge), the one with least x,
-/// then y, then z: a corner, not a point between two. Half the tolerance: what is chosen is above
-/// the plane where the highest is outside of it.
+/// The highest of the points. If several are equally high (a face parallel to the plane, an edge),
+/// the one with the least x, then y, then z: this is a corner and not a point between two corners.
+/// "Equally high" means within half the tolerance: if the highest point is outside the tolerance,
+/// the selected point is above the plane.
 template <class Height>
 Index Quickhull::extreme(const std::vector<Index>& among, const Height& height) const {
   std::vector<Index> left = among;
@@ -158,7 +161,7 @@ Index Quickhull::extreme(const std::vector<Index>& among, const Height& height) 
   return left.front();
 }
 
-/// Four corners that span a volume, each an extreme one.
+/// Starts with a tetrahedron of four extreme points that span a volume. False if there is none.
 bool Quickhull::start_with_four() {
   std::vector<Index> all(at_.size());
   std::iota(all.begin(), all.end(), Index{0});
@@ -223,7 +226,8 @@ void Quickhull::add_triangle(Index a, Index b, Index c) {
   triangles_.push_back(std::move(t));
 }
 
-/// Every point to the first triangle it is outside of; triangles from `first_triangle` on.
+/// Assigns every point to the first triangle, beginning with `first_triangle`, that it is above by
+/// more than the tolerance.
 void Quickhull::assign(const std::vector<Index>& points, Index first_triangle) {
   for (const Index p : points) {
     bool is_above = false;
@@ -252,17 +256,17 @@ std::vector<Index> Quickhull::outside_from(Index first_triangle) const {
   return points;
 }
 
-/// Of the first triangle that has points outside.
+/// Selects the next point to add above a triangle that has points assigned.
 Index Quickhull::apex_above(Index triangle) const {
   const Triangle& t = triangles_[triangle];
   const auto above = [&](Index p) { return height_cells(t, p); };
-  // An end of an edge may be outside of another triangle than the points between.
+  // A corner at the end of an edge may be assigned to another triangle than the points on the edge.
   return apex_from_ == ApexFrom::AllPoints ? extreme(outside_from(triangle), above)
                                            : extreme(t.outside, above);
 }
 
-/// Removes the triangles the apex is strictly above. They are connected; their boundary is one
-/// closed line.
+/// Removes the triangles that the apex is strictly above and returns them. They are connected;
+/// their boundary is one closed polygon.
 std::vector<Index> Quickhull::remove_visible(Index apex, Index from) {
   std::vector<Index> visible{from};
   triangles_[from].removed = true;
@@ -278,7 +282,7 @@ std::vector<Index> Quickhull::remove_visible(Index apex, Index from) {
   return visible;
 }
 
-/// Replaces what the apex is above by triangles from its boundary to the apex.
+/// Replaces the triangles below the apex with triangles from their boundary to the apex.
 void Quickhull::add_apex(Index apex, Index from) {
   const std::vector<Index> visible = remove_visible(apex, from);
   const Index first_new = triangles_.size();
@@ -321,7 +325,8 @@ void Quickhull::grow() {
         add_apex(apex_above(t), t);
       }
     }
-    // Close to the triangles it was held against, a point may be outside of another one.
+    // A point within the tolerance of the triangles tested so far may be above another triangle by
+    // more than the tolerance.
     assign(std::exchange(close_, {}), 0);
   } while (!outside_from(0).empty());
 }
@@ -338,10 +343,10 @@ std::vector<Index> Quickhull::corners() const {
   return found;
 }
 
-/// By more than the tolerance, along the mean of the normals around it, beyond all corners beside
-/// it: such a corner is outside of the hull of all others. No need to look closer at which points
-/// were chosen.
-bool Quickhull::every_corner_stands_out() const {
+/// True if every corner protrudes by more than the tolerance over all its neighbour corners, in the
+/// direction of the mean normal of the triangles around it. Such a corner is outside the hull of
+/// all other corners, so that the selection of corners needs no further check.
+bool Quickhull::every_corner_protrudes() const {
   std::vector<Vector3> along(at_.size(), Vector3::Zero());
   const auto each_corner = [&](const auto& act) {
     for (const Triangle& t : triangles_) {
@@ -366,7 +371,7 @@ bool Quickhull::every_corner_stands_out() const {
   return all;
 }
 
-/// In the plane of an earlier triangle beside it.
+/// True if the triangle is in the plane of a neighbour triangle with a lower index.
 bool Quickhull::repeats_a_neighbour(Index triangle) const {
   const Triangle& t = triangles_[triangle];
   return std::any_of(t.beyond.begin(), t.beyond.end(), [&](Index n) {
@@ -394,9 +399,9 @@ std::vector<HalfSpace> Quickhull::faces() const {
 std::vector<std::size_t> hull_corners(std::span<const Vector3> points_m, double tolerance_m) {
   const Quickhull hull(points_m, tolerance_m, ApexFrom::OwnPoints);
   std::vector<std::size_t> found = hull.corners();
-  bool settled = hull.every_corner_stands_out();
+  bool settled = hull.every_corner_protrudes();
 
-  // Some may lie between others: again with what was found, until nothing is left out any more.
+  // Some of the corners may be between others: repeat with the corners found until none is removed.
   while (!settled) {
     std::vector<Vector3> some;
     for (const std::size_t i : found) {
@@ -404,7 +409,7 @@ std::vector<std::size_t> hull_corners(std::span<const Vector3> points_m, double 
     }
     const Quickhull again(some, tolerance_m, ApexFrom::AllPoints);
     std::vector<std::size_t> kept = again.corners();
-    settled = kept.size() == found.size() || again.every_corner_stands_out();
+    settled = kept.size() == found.size() || again.every_corner_protrudes();
     std::transform(kept.begin(), kept.end(), kept.begin(), [&](std::size_t i) { return found[i]; });
     found = std::move(kept);
   }

@@ -7,7 +7,8 @@
 namespace abbe::calib {
 namespace {
 
-/// Index of the cell, and how much of it lies behind; false outside.
+/// Finds the index of the cell that contains x, and the position of x in it as a fraction 0 to 1.
+/// False if x is outside.
 bool locate(const std::vector<double>& coordinates, double x, std::size_t& cell, double& fraction) {
   if (coordinates.size() < 2 || x < coordinates.front() || x > coordinates.back()) {
     return false;
@@ -65,7 +66,7 @@ Result<ErrorLattice> ErrorLattice::create(std::span<const LatticeNode> nodes) {
     if (seen[index]) {
       return failure(
           ErrorCode::DegenerateGeometry,
-          message("lattice: the node at (", node.position_m.transpose(), ") m stands twice"));
+          message("lattice: the node at (", node.position_m.transpose(), ") m occurs twice"));
     }
 
     seen[index] = true;

@@ -11,9 +11,10 @@
 namespace abbe::calib {
 namespace {
 
-/// Tables are defined on their whole grid; polynomials are judged where their data were. The nodes
-/// alone will not do: a thin or tilted hull passes between them.
-std::vector<Vector3> places(const VolumetricModel& model) {
+/// Points at which decide() evaluates V. Tables: the whole grid of nodes. Polynomials: only inside
+/// the validity volume. There the nodes alone are not sufficient, because a thin or tilted hull can
+/// pass between them; vertices and midpoints are added.
+std::vector<Vector3> evaluation_points(const VolumetricModel& model) {
   std::vector<Vector3> found = tensor_grid(model.layout().nodes());
   if (model.polynomials() == nullptr) {
     return found;
@@ -36,7 +37,8 @@ double max_error_m(const VolumetricModel& model, const std::vector<Vector3>& at,
   return most;
 }
 
-/// Central differences; of the lowest orders exact, of the fifth wrong by (step / volume)^2.
+/// Largest |dV/dq| from central differences. Exact for polynomials of low order; the relative error
+/// for order five is (step / volume)^2, volume: its extent.
 double max_slope(const VolumetricModel& model, const std::vector<Vector3>& at, const Vector3& t) {
   constexpr double kStep_m = 1e-4;
   double most = 0.0;
@@ -50,9 +52,9 @@ double max_slope(const VolumetricModel& model, const std::vector<Vector3>& at, c
   return most;
 }
 
-/// Along an axis V of tables is linear between nodes and multilinear in the other two: its
-/// derivative is largest on the grid lines.
-double max_step_of_tables(const VolumetricModel& model, const Vector3& t) {
+/// Largest |dV/dq| of tables. V is linear between nodes along an axis and multilinear in the other
+/// two axes, so that its derivative is largest on the grid lines.
+double max_slope_of_tables(const VolumetricModel& model, const Vector3& t) {
   double most = 0.0;
   const MachineNodes& nodes = model.layout().nodes();
   for (const Vector3& q : tensor_grid(nodes)) {
@@ -80,8 +82,9 @@ Vector3 mean(std::span<const Vector3> points) {
   return points.empty() ? sum : Vector3(sum / static_cast<double>(points.size()));
 }
 
-/// On a lattice of 32 cells a side over its box; of a volume thinner than a cell and tilted,
-/// halfway between centre and vertices.
+/// Points inside the volume: those of a lattice with 32 cells per axis over its bounding box. If
+/// none of them is inside (a tilted volume thinner than a cell), the midpoints between centre and
+/// vertices.
 std::vector<Vector3> points_inside(const ValidityVolume& volume) {
   constexpr int kCells = 32;
   const std::span<const Vector3> vertices = volume.vertices_m();
@@ -118,11 +121,13 @@ std::vector<Vector3> points_inside(const ValidityVolume& volume) {
   return found;
 }
 
-/// Below this share the volume has shrunk: what readings and lattice scatter by is less.
+/// If less than this fraction of the old volume is kept, the new volume counts as smaller. The
+/// scatter from readings and lattice is smaller than 2 %.
 constexpr double kSameVolume = 0.98;
 
-/// Of the width of a volume, at each of its sides: what two recalibrations of one machine differ
-/// by. An array set up by hand, to 3 degrees, loses 2.4 to 4.1 % of the volume there.
+/// Rim at each side of a volume as a fraction of its width: the typical difference between two
+/// recalibrations of one machine. A ball array that is set up by hand, within 3 degrees, loses 2.4
+/// to 4.1 % of the volume at the rim.
 constexpr double kRim = 0.02;
 
 void compare_volumes(Verdict& verdict, const VolumetricModel& candidate,
@@ -132,26 +137,27 @@ void compare_volumes(Verdict& verdict, const VolumetricModel& candidate,
     return;
   }
 
-  const std::string seen =
-      message("holds in ", 100 * kept, " % of the volume the active model holds in");
+  const std::string seen = message("the model is valid in ", 100 * kept,
+                                   " % of the validity volume of the active model");
   if (kept_share(active.validity(), candidate.validity(), kRim) >= kSameVolume) {
     verdict.notes.push_back(
-        message(seen, "; the rest lies within ", 100 * kRim, " % of its size beside it"));
+        message(seen, "; the rest is outside by at most ", 100 * kRim, " % of the width"));
   } else if (limits.accept_smaller_volume) {
-    verdict.notes.push_back(message(seen, ", accepted by name"));
+    verdict.notes.push_back(message(seen, ", explicitly accepted"));
   } else {
-    verdict.refuse("volume", message(seen, "; to replace that one, accept ", kSmallerVolume));
+    verdict.refuse("volume",
+                   message(seen, "; to replace the active model, accept ", kSmallerVolume));
   }
 }
 
-struct Growth {
+struct ScaleDifference {
   double value = 0.0;
-  double u = 0.0;  ///< at most: as if the errors of all places were one error
+  double u = 0.0;  ///< upper bound: the errors at all points are assumed to be fully correlated
 };
 
-/// Of the candidate against the active model, where both hold.
-Growth growth_against(const VolumetricModel& candidate, const VolumetricModel& active,
-                      const Vector3& t) {
+/// Scale of the candidate relative to the active model, inside both validity volumes.
+ScaleDifference scale_difference(const VolumetricModel& candidate,
+                                 const VolumetricModel& active, const Vector3& t) {
   constexpr std::size_t kEnough = 1000;
   const std::vector<Vector3> all = points_inside(active.validity());
   std::vector<Vector3> at, difference_m;
@@ -175,13 +181,15 @@ Growth growth_against(const VolumetricModel& candidate, const VolumetricModel& a
   return {common_scale(at, difference_m), squares > 0.0 ? u_along / squares : 0.0};
 }
 
-/// No residual shows a wrong scale of path, ranges or temperature; the active model does.
+/// Residuals do not show a wrong scale of path, ranges or temperature; the difference to the active
+/// model does.
 void compare_scales(Verdict& verdict, const VolumetricModel& candidate,
                     const VolumetricModel& active, const GateLimits& limits) {
-  const Growth g = growth_against(candidate, active, candidate.tool_offsets_m().front());
+  const ScaleDifference g =
+      scale_difference(candidate, active, candidate.tool_offsets_m().front());
   constexpr double kCoverage = 2.0;
 
-  // Written so that a NaN figure is refused.
+  // This form of the condition refuses NaN.
   if (std::abs(g.value) <= limits.max_scale_change + kCoverage * g.u) {
     return;
   }
@@ -192,28 +200,29 @@ void compare_scales(Verdict& verdict, const VolumetricModel& candidate,
               1e6 * g.u, " um/m): wrong scale of the path, of the ranges or of a temperature");
 
   if (limits.accept_scale_change) {
-    verdict.notes.push_back(message(seen, ", accepted by name"));
+    verdict.notes.push_back(message(seen, ", explicitly accepted"));
   } else {
     verdict.refuse("scale-change",
                    message(seen, "; if the machine was changed, accept ", kScaleChange));
   }
 }
 
-void say_what_was_compared(Verdict& verdict, bool holds_for_tool) {
+void note_what_was_compared(Verdict& verdict, bool holds_for_tool) {
   const HeldOutFigures& h = verdict.held_out;
   if (!holds_for_tool) {
     verdict.notes.emplace_back(
-        "not compared with the active model: that one holds for another tool offset");
+        "not compared with the active model: it is valid for another tool offset");
   } else if (h.observations_beside_active < h.observations) {
-    verdict.notes.push_back(message("compared with the active model on ",
-                                    h.observations_beside_active, " of ", h.observations,
-                                    " held-out observations: the others lie outside its volume"));
+    verdict.notes.push_back(
+        message("compared with the active model on ", h.observations_beside_active, " of ",
+                h.observations,
+                " held-out observations: the others are outside its validity volume"));
   }
 }
 
 void require_better(Verdict& verdict, double candidate, double other, double min_improvement,
                     const char* than) {
-  // Written so that a NaN figure is refused.
+  // This form of the condition refuses NaN.
   if (!(candidate < other * (1.0 - min_improvement))) {
     verdict.refuse(
         "held-out",
@@ -235,16 +244,17 @@ void Verdict::refuse(std::string_view cause, std::string text, std::size_t befor
 }
 
 double kept_share(const ValidityVolume& before, const ValidityVolume& after, double rim) {
-  const std::vector<Vector3> asked = points_inside(before);
-  if (asked.empty()) {
+  const std::vector<Vector3> points = points_inside(before);
+  if (points.empty()) {
     return 1.0;
   }
   const Vector3 centre = rim > 0.0 ? mean(points_inside(after)) : Vector3::Zero();
-  const auto kept = std::count_if(asked.begin(), asked.end(), [&](const Vector3& q) {
-    // Widened about its centre, `after` is wider by `rim` of its width at each side.
+  const auto kept = std::count_if(points.begin(), points.end(), [&](const Vector3& q) {
+    // Equivalent to scaling `after` about its centre so that each side moves out by `rim` of its
+    // width.
     return after.contains(centre + (q - centre) / (1.0 + 2.0 * rim));
   });
-  return static_cast<double>(kept) / static_cast<double>(asked.size());
+  return static_cast<double>(kept) / static_cast<double>(points.size());
 }
 
 Verdict decide(const VolumetricModel& candidate, const HeldOutFigures& held_out,
@@ -252,33 +262,36 @@ Verdict decide(const VolumetricModel& candidate, const HeldOutFigures& held_out,
   Verdict verdict;
   verdict.held_out = held_out;
   const Vector3 t = candidate.tool_offsets_m().front();
-  const std::vector<Vector3> at = places(candidate);
+  const std::vector<Vector3> at = evaluation_points(candidate);
   verdict.max_error_m = max_error_m(candidate, at, t);
-  verdict.max_gradient = candidate.polynomials() == nullptr ? max_step_of_tables(candidate, t)
+  verdict.max_gradient = candidate.polynomials() == nullptr ? max_slope_of_tables(candidate, t)
                                                             : max_slope(candidate, at, t);
 
   if (at.empty()) {
-    verdict.refuse("nowhere", "the model holds nowhere: its size and gradient cannot be tested");
+    verdict.refuse("nowhere",
+                   "the validity volume contains no point at which to check size and gradient of "
+                   "the model");
   }
 
   if (held_out.observations == 0) {
-    verdict.refuse("held-out", "nothing was held out to test the model with");
+    verdict.refuse("held-out", "no observation was held out to test the model");
   }
 
   if (held_out.not_held_out > 0) {
     verdict.notes.push_back(
         message(held_out.not_held_out, " of ", held_out.observations + held_out.not_held_out,
-                " observations were not held out: nothing else was measured there"));
+                " observations were not held out: without them the model is not determined"));
   }
 
   require_better(verdict, held_out.candidate, held_out.no_compensation, limits.min_improvement,
                  "without compensation");
   if (held_out.active) {
-    // The candidate's figure comes from fits to a part of the run, the active model from all of its
-    // own: on an unchanged machine the active model stays.
+    // The figure of the candidate is from fits to a part of its run; the active model was fitted to
+    // all of its run. On an unchanged machine the active model therefore has the better figure and
+    // remains active.
     require_better(verdict, held_out.candidate_beside_active.value_or(held_out.candidate),
                    *held_out.active, limits.min_improvement,
-                   "of the active model, so the active model still holds");
+                   "of the active model, so the active model remains valid");
   }
 
   if (!(verdict.max_error_m <= limits.max_error_m)) {
@@ -293,7 +306,7 @@ Verdict decide(const VolumetricModel& candidate, const HeldOutFigures& held_out,
 
   if (active != nullptr) {
     const bool holds_for_tool = active->holds_for_tool(t);
-    say_what_was_compared(verdict, holds_for_tool);
+    note_what_was_compared(verdict, holds_for_tool);
     if (holds_for_tool) {
       compare_volumes(verdict, candidate, *active, limits);
       compare_scales(verdict, candidate, *active, limits);

@@ -15,11 +15,11 @@ namespace {
 
 using Condition = Eigen::RowVectorXd;
 
-/// A node within this share of a cell is the place asked for: nodes computed from a range are off
-/// by rounding (1e-16). The condition then fixes this node alone, and its zero is exact. With its
-/// neighbour weighted by less than 1e-6, the variance of the node is below 1e-12 of the
-/// neighbour's, where rounding decides its sign. V moves by the gradient times 1e-6 cells: 0.25 nm
-/// at the steepest 5 mm/m and 50 mm.
+/// A position closer to a node than this fraction of a cell counts as the node; nodes computed from
+/// a range differ by rounding (1e-16). The condition then contains only this node, so that its
+/// value is exactly zero. With a neighbour weight below 1e-6 in the condition, the variance of the
+/// node would be below 1e-12 of that of the neighbour, and rounding could make it negative. V
+/// changes by the gradient times 1e-6 cells: 0.25 nm at the steepest gradient of 5 mm/m and 50 mm.
 constexpr double kAtNode = 1e-6;
 
 Condition zero_at(const ParameterLayout& layout, const Table& table, double position_m) {
@@ -88,8 +88,8 @@ Eigen::MatrixXd unobservable_combinations(const ParameterLayout& layout,
   const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(scale.asDiagonal() * H *
                                                              scale.asDiagonal());
 
-  // Scaled eigenvalues of complete data fall into two groups, above 5e-3 and at rounding level
-  // (1e-15), whatever the order of the axes; anything between separates them.
+  // The scaled eigenvalues of complete data form two groups for any order of the axes: above 5e-3,
+  // and at rounding level (1e-15). Any threshold between them is suitable.
   constexpr double kZero = 1e-11;
   Eigen::Index nullity = 0;
   while (nullity < n && eigen.eigenvalues()(nullity) < kZero * eigen.eigenvalues()(n - 1)) {

@@ -7,7 +7,7 @@
 namespace abbe::calib {
 namespace {
 
-/// `count` >= 2 of them, evenly by number, the ends always.
+/// Selects `count` >= 2 nodes evenly by index, including both ends.
 std::vector<double> decimated(const std::vector<double>& nodes_m, std::size_t count) {
   std::vector<double> out;
   for (std::size_t i = 0; i < count; ++i) {
@@ -35,11 +35,11 @@ InterpolationGrid of_tables(const MachineNodes& nodes, std::size_t most_nodes) {
   return grid;
 }
 
-/// How much a line through the whole box along each axis misses halfway, at most, by the second
-/// differences on a lattice.
-std::array<double, 3> bend_m(const VolumetricModel& model, const evemu::ReadingBox& box) {
+/// Per axis, an estimate of the largest error at the midpoint if V is interpolated with one cell
+/// over the whole box; from second differences on a lattice.
+std::array<double, 3> midpoint_error_m(const VolumetricModel& model, const evemu::ReadingBox& box) {
   constexpr std::array kAt{-0.8, -0.4, 0.0, 0.4, 0.8};
-  constexpr double kStep = 0.2;  // of the half width: beside the lattice, within the box
+  constexpr double kStep = 0.2;  // fraction of the half width; 0.8 + 0.2 is inside the box
   const Vector3& t = model.tool_offsets_m().front();
   std::array<double, 3> most{};
 
@@ -61,9 +61,10 @@ std::array<double, 3> bend_m(const VolumetricModel& model, const evemu::ReadingB
   return most;
 }
 
-/// The axis that misses most gets one node more, until they are used up: the misses go with
-/// 1 / cells^2.
-std::array<std::size_t, 3> counts_for(const std::array<double, 3>& bend_m, std::size_t most_nodes) {
+/// Adds one node at a time to the axis with the largest interpolation error, up to `most_nodes` in
+/// total. The interpolation error is proportional to 1 / cells^2.
+std::array<std::size_t, 3> counts_for(const std::array<double, 3>& midpoint_error_m,
+                                      std::size_t most_nodes) {
   std::array<std::size_t, 3> count{2, 2, 2};
   std::array<bool, 3> full{};
   while (!(full[0] && full[1] && full[2])) {
@@ -71,7 +72,7 @@ std::array<std::size_t, 3> counts_for(const std::array<double, 3>& bend_m, std::
     double most = -1.0;
     for (std::size_t a = 0; a < 3; ++a) {
       const double cells = static_cast<double>(count[a] - 1);
-      if (const double miss = bend_m[a] / (cells * cells); !full[a] && miss > most) {
+      if (const double miss = midpoint_error_m[a] / (cells * cells); !full[a] && miss > most) {
         most = miss;
         worst = a;
       }
@@ -88,7 +89,7 @@ std::array<std::size_t, 3> counts_for(const std::array<double, 3>& bend_m, std::
 
 InterpolationGrid of_polynomials(const VolumetricModel& model, std::size_t most_nodes) {
   const evemu::ReadingBox box = evemu::bounding_box(model.validity().vertices_m());
-  const std::array<std::size_t, 3> count = counts_for(bend_m(model, box), most_nodes);
+  const std::array<std::size_t, 3> count = counts_for(midpoint_error_m(model, box), most_nodes);
   InterpolationGrid grid;
   for (std::size_t a = 0; a < 3; ++a) {
     const auto k = static_cast<Eigen::Index>(a);
@@ -101,7 +102,7 @@ InterpolationGrid of_polynomials(const VolumetricModel& model, std::size_t most_
   return grid;
 }
 
-/// What interpolation misses halfway from `q` to its neighbour at `beside_m` along axis `a`.
+/// Interpolation error halfway between `q` and its neighbour node at `beside_m` along axis `a`.
 Vector3 miss_halfway(const VolumetricModel& model, const Vector3& q, Eigen::Index a,
                      double beside_m) {
   const Vector3& t = model.tool_offsets_m().front();

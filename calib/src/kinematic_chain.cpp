@@ -12,7 +12,7 @@ namespace {
 struct Token {
   std::string name;
   bool primed = false;
-  bool still = false;  ///< in parentheses
+  bool fixed = false;  ///< in parentheses: does not move
 };
 
 tl::unexpected<Error> broken(std::string_view chain, const std::string& what) {
@@ -26,7 +26,7 @@ std::optional<Axis> linear_axis(const std::string& token) {
   return kAllAxes[static_cast<std::size_t>(token[0] - 'X')];
 }
 
-/// A letter, then digits: A, C1, S, X. w, b and t stand alone.
+/// Either w, b or t alone, or a capital letter followed by digits: A, C1, S, X.
 bool is_token(const std::string& s) {
   if (s == "w" || s == "b" || s == "t") {
     return true;
@@ -54,7 +54,7 @@ Result<std::vector<Token>> tokens(std::string_view chain) {
     Token token;
     std::string name = word;
     if (name.size() > 2 && name.front() == '(' && name.back() == ')') {
-      token.still = true;
+      token.fixed = true;
       name = name.substr(1, name.size() - 2);
     }
     if (name.size() > 1 && name.back() == '\'') {
@@ -82,14 +82,14 @@ Result<void> check_ends(std::string_view chain, const std::vector<Token>& found)
     workpieces += token.name == "w" ? 1 : 0;
     tools += token.name == "t" ? 1 : 0;
     if ((token.name == "w" || token.name == "b" || token.name == "t") &&
-        (token.primed || token.still)) {
+        (token.primed || token.fixed)) {
       return broken(chain, message(token.name, " is not an axis: no prime, no parentheses"));
     }
   }
 
   if (beds != 1 || workpieces != 1 || tools != 1) {
-    return broken(chain, message("w, b and t once each; there are ", workpieces, " w, ", beds,
-                                 " b, ", tools, " t"));
+    return broken(chain, message("must contain w, b and t once each; found ", workpieces, " w, ",
+                                 beds, " b, ", tools, " t"));
   }
 
   return {};
@@ -126,19 +126,19 @@ Result<KinematicChain> KinematicChain::parse(std::string_view chain) {
       continue;
     }
     if (token.primed == after_bed) {
-      return broken(chain, message(token.name, after_bed ? " stands after b and must not be primed"
-                                                         : " stands before b and must be primed"));
+      return broken(chain, message(token.name, after_bed ? " is after b and must not be primed"
+                                                         : " is before b and must be primed"));
     }
     const std::optional<Axis> axis = linear_axis(token.name);
     if (!axis) {
       continue;
     }
-    if (token.still) {
+    if (token.fixed) {
       return broken(chain, message(token.name, " is in parentheses: X, Y and Z must move"));
     }
     for (const Axis earlier : order) {
       if (earlier == *axis) {
-        return broken(chain, message(token.name, " stands there twice"));
+        return broken(chain, message(token.name, " occurs twice"));
       }
     }
     order.push_back(*axis);
@@ -146,7 +146,7 @@ Result<KinematicChain> KinematicChain::parse(std::string_view chain) {
   }
 
   if (order.size() != 3) {
-    return broken(chain, message("needs X, Y and Z; ", order.size(), " of them are there"));
+    return broken(chain, message("must contain X, Y and Z; found ", order.size(), " of them"));
   }
 
   result.order_ = {order[0], order[1], order[2]};

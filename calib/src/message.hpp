@@ -1,5 +1,5 @@
 #pragma once
-/// Pieces of an error text, numbers with six significant digits.
+/// Concatenates the pieces of an error text; numbers have six significant digits.
 
 #include <sstream>
 #include <string>

@@ -37,7 +37,8 @@ Result<ModelDifference> rigid_free(std::span<const Vector3> points_m,
   }
 
   centre /= static_cast<double>(points_m.size());
-  // About the centroid translation and rotation separate: N = diag(n I, sum |p|^2 I - p p^T).
+  // Relative to the centroid, translation and rotation are decoupled:
+  //     N = diag(n I, sum |p|^2 I - p p^T).
   Matrix3 inertia = Matrix3::Zero();
   Vector3 translation = Vector3::Zero(), moment = Vector3::Zero();
 
@@ -89,7 +90,7 @@ Result<ModelDifference> rigid_free_difference(const VolumetricModel& a, const Vo
   if (!a.holds_for_tool(tool_offset_m) || !b.holds_for_tool(tool_offset_m)) {
     return failure(ErrorCode::NotApplicable,
                    message("comparison for tool offset (", tool_offset_m.transpose(),
-                           ") m: one of the models does not hold for it"));
+                           ") m: one of the models is not valid for it"));
   }
   std::vector<Vector3> points, difference;
   for (const Vector3& q : axis_positions_m) {

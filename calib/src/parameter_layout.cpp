@@ -15,8 +15,8 @@ constexpr std::array<std::string_view, 6> kRigidNames{"tx", "ty", "tz", "rx", "r
 Result<void> check(const MachineNodes& nodes) {
   for (const Axis a : kAllAxes) {
     const AxisNodes& axis = nodes[index(a)];
-    if (Result<void> fine = check_nodes(axis.nodes_m); !fine) {
-      return failure(fine.error().code, message("axis ", letter(a), ": ", fine.error().text));
+    if (Result<void> valid = check_nodes(axis.nodes_m); !valid) {
+      return failure(valid.error().code, message("axis ", letter(a), ": ", valid.error().text));
     }
     if (!(axis.reference_m >= axis.nodes_m.front() && axis.reference_m <= axis.nodes_m.back())) {
       return failure(ErrorCode::BadInput,
@@ -27,7 +27,7 @@ Result<void> check(const MachineNodes& nodes) {
   return {};
 }
 
-/// A constant target offset hides these behind translations.
+/// With a constant target offset, the effect of this rotation is the same as that of translations.
 bool inseparable_from_translation(const KinematicChain& chain, ErrorMotion e) {
   if (!is_rotation(e.motion)) {
     return false;
@@ -66,8 +66,8 @@ Result<ParameterLayout> ParameterLayout::all_tables(const KinematicChain& chain,
 Result<ParameterLayout> ParameterLayout::with_tables(const KinematicChain& chain,
                                                      MachineNodes nodes,
                                                      std::span<const ErrorMotion> wanted) {
-  if (Result<void> fine = check(nodes); !fine) {
-    return tl::unexpected(fine.error());
+  if (Result<void> valid = check(nodes); !valid) {
+    return tl::unexpected(valid.error());
   }
 
   ParameterLayout layout;
@@ -84,8 +84,8 @@ Result<ParameterLayout> ParameterLayout::with_tables(const KinematicChain& chain
   }
 
   if (layout.tables_.size() != wanted.size()) {
-    return failure(ErrorCode::BadInput, message("error tables: ", wanted.size(), " named, ",
-                                                layout.tables_.size(), " different ones"));
+    return failure(ErrorCode::BadInput, message("error tables: ", wanted.size(), " requested, ",
+                                                layout.tables_.size(), " of them distinct"));
   }
 
   return layout;

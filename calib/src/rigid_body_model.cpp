@@ -4,13 +4,13 @@ namespace abbe::calib {
 namespace {
 
 /// Levers and basis rows of the three axes at one position.
-struct AxisPlaces {
+struct AxisStates {
   std::array<Vector3, 3> lever_m;
   std::array<BasisRow, 3> basis;
 };
 
-AxisPlaces places(const ParameterLayout& layout, const Vector3& q, const Vector3& t) {
-  AxisPlaces at;
+AxisStates axis_states(const ParameterLayout& layout, const Vector3& q, const Vector3& t) {
+  AxisStates at;
   Vector3 l = t;
   const std::array<Axis, 3>& order = layout.chain().order_w_to_t();
   for (std::size_t i = 3; i-- > 0;) {
@@ -23,7 +23,8 @@ AxisPlaces places(const ParameterLayout& layout, const Vector3& q, const Vector3
   return at;
 }
 
-/// What one unit of a table moves the target: the unit vector, or that crossed with the lever.
+/// Displacement of the target per unit of an error: the unit vector for a translation, its cross
+/// product with the lever for a rotation.
 Vector3 effect(ErrorMotion e, const Vector3& lever_m) {
   const Vector3 unit = Vector3::Unit(static_cast<Eigen::Index>(direction(e.motion)));
   return is_rotation(e.motion) ? Vector3(unit.cross(lever_m)) : unit;
@@ -33,7 +34,8 @@ void push(DesignColumns& columns, std::size_t parameter, const Vector3& dV_dU) {
   columns.column[columns.count++] = {parameter, dV_dU};
 }
 
-/// EA0Z, EB0Z, EC0Y tilt the direction of travel only: no lever.
+/// Displacements per unit of EA0Z, EB0Z, EC0Y. These tilt only the direction of motion, so that the
+/// lever has no effect.
 std::array<Vector3, 3> squareness_effects(const Vector3& q) {
   return {Vector3(0, -q.z(), 0), Vector3(q.z(), 0, 0), Vector3(-q.y(), 0, 0)};
 }
@@ -52,7 +54,7 @@ Vector3 lever(const KinematicChain& chain, Axis a, const Vector3& axis_position_
 
 DesignColumns design_columns(const ParameterLayout& layout, const Vector3& axis_position_m,
                              const Vector3& target_offset_m) {
-  const AxisPlaces at = places(layout, axis_position_m, target_offset_m);
+  const AxisStates at = axis_states(layout, axis_position_m, target_offset_m);
   DesignColumns columns;
   for (const Table& table : layout.tables()) {
     const std::size_t a = index(table.motion.axis);
@@ -86,7 +88,7 @@ DesignColumns design_columns_with_rigid(const ParameterLayout& layout,
 
 Vector3 volumetric_error(const ParameterLayout& layout, std::span<const double> U,
                          const Vector3& axis_position_m, const Vector3& target_offset_m) {
-  const AxisPlaces at = places(layout, axis_position_m, target_offset_m);
+  const AxisStates at = axis_states(layout, axis_position_m, target_offset_m);
   Vector3 V = Vector3::Zero();
   for (const Table& table : layout.tables()) {
     const std::size_t a = index(table.motion.axis);

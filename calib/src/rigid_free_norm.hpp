@@ -1,5 +1,6 @@
 #pragma once
-/// How large a volumetric error and its uncertainty are over some places, without rigid motion.
+/// Root mean squares of a volumetric error and of its uncertainty over a set of places, after
+/// removal of the best-fit rigid motion.
 
 #include <Eigen/Core>
 #include <span>
@@ -8,18 +9,21 @@
 
 namespace abbe::calib {
 
-/// V at the places is D c; without the best-fit rigid motion it is P D c. Holds D^T P D: the mean
-/// square of what any c and any covariance bring there.
+/// V at the places is D c, c: coefficients. After removal of the best-fit rigid motion it is P D c,
+/// P: projection. The class stores D^T P D / n (n places); the mean squares for any c and any
+/// covariance follow from it.
 class RigidFreeNorm {
  public:
-  /// `points_m`: where the rigid motion acts (axis position and tool offset); D: 3 rows each.
+  /// `points_m`: points at which the rigid motion acts (axis position + tool offset). D: 3 rows per
+  /// point.
   RigidFreeNorm(const Eigen::MatrixXd& D, std::span<const Vector3> points_m);
 
-  /// Root mean square length of D c. More coefficients than D has columns: the first count.
+  /// Root mean square length of P D c. If c has more entries than D has columns, the last entries
+  /// are ignored.
   [[nodiscard]] double rms_m(const Eigen::VectorXd& c) const;
-  /// Root of the sum of squares of rms_m() of the columns.
+  /// Root sum of squares of rms_m() over the columns of `c`.
   [[nodiscard]] double rms_of_columns_m(const Eigen::MatrixXd& c) const;
-  /// Root mean square standard uncertainty: root of the trace.
+  /// Root mean square of the standard uncertainty of V (root of the trace).
   [[nodiscard]] double rms_u_m(const Eigen::MatrixXd& covariance) const;
 
  private:

@@ -1,12 +1,13 @@
 #pragma once
-/// Compiled once: the decomposition is by far the largest template of the room.
+/// In a separate source file so that the decomposition, the largest template of this module, is
+/// compiled only once.
 
 #include <Eigen/Core>
 
 namespace abbe::calib {
 
-/// Descending; by QR, then Jacobi rotations of R: small values keep their accuracy relative to the
-/// columns' scale.
+/// Singular values of A in descending order, from a QR decomposition and Jacobi rotations of R.
+/// Small singular values are accurate relative to the scale of the columns.
 [[nodiscard]] Eigen::VectorXd singular_values(const Eigen::MatrixXd& A);
 
 }  // namespace abbe::calib

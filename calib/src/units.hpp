@@ -2,7 +2,7 @@
 
 namespace abbe::calib {
 
-// What people are told, and the named coefficients, are in millimetres and micrometres.
+// Messages and the named coefficients are in millimetres and micrometres.
 inline constexpr double kMmPerM = 1e3;
 inline constexpr double kUmPerM = 1e6;
 

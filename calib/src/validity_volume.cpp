@@ -10,8 +10,8 @@
 namespace abbe::calib {
 namespace {
 
-/// Points closer than this to a plane lie in it: far below the micrometre a position means, far
-/// above rounding.
+/// Points closer than this to a plane count as points of the plane. 1 nm is far below the accuracy
+/// of a position (1 um) and far above rounding.
 constexpr double kFlat_m = 1e-9;
 
 bool by_coordinates(const Vector3& a, const Vector3& b) {
@@ -28,7 +28,7 @@ std::vector<Vector3> distinct(std::span<const Vector3> points) {
 
 tl::unexpected<Error> flat(std::size_t points) {
   return failure(ErrorCode::DegenerateGeometry,
-                 message("validity volume: ", points, " different points do not enclose a volume"));
+                 message("validity volume: ", points, " distinct points do not span a volume"));
 }
 
 Result<void> check_finite(std::span<const Vector3> points) {
@@ -88,7 +88,7 @@ std::vector<Vector3> spread_subset(std::span<const Vector3> points_m, std::size_
     mean += p / static_cast<double>(points_m.size());
   }
 
-  // Distance to the nearest one chosen; at first to the mean, which is none of them.
+  // Distance to the nearest selected point; for the first selection, distance to the mean.
   std::vector<double> distance_m;
   for (const Vector3& p : points_m) {
     distance_m.push_back((p - mean).norm());

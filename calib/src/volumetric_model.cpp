@@ -13,7 +13,7 @@ namespace {
 
 constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 
-/// sum_ij v_i C_ij v_j^T over the few columns that are not zero.
+/// sum_ij v_i C_ij v_j^T over the non-zero columns.
 Matrix3 propagate(const DesignColumns& columns, const Eigen::MatrixXd& covariance) {
   const double* data = covariance.data();
   const auto stride = static_cast<std::size_t>(covariance.rows());
@@ -54,14 +54,14 @@ Result<void> check_shape(const Eigen::MatrixXd& C, std::size_t parameters) {
   return {};
 }
 
-/// For which tools a model of these offsets holds.
+/// The tools for which a model is valid: any tool, tools on a line, or (line zero) one tool.
 struct ToolSpan {
   bool any = false;
   Vector3 line = Vector3::Zero();
 };
 
-/// Offsets that differ by less than the tolerance count as one, and as on a line when so close to
-/// it.
+/// Offsets closer to each other than kToolTolerance_m count as one offset; offsets closer to a line
+/// than that count as on the line.
 ToolSpan tool_span(std::span<const Vector3> offsets_m) {
   const Vector3& first = offsets_m.front();
   Vector3 along = Vector3::Zero();
@@ -81,7 +81,7 @@ ToolSpan tool_span(std::span<const Vector3> offsets_m) {
   return {beside, line};
 }
 
-/// The tables a list of stored parameters speaks of, in order of first appearance.
+/// The tables to which the stored parameters belong, in the order of the parameters.
 std::vector<ErrorMotion> tables_named(std::span<const Parameter> parameters) {
   std::vector<ErrorMotion> found;
   for (const Parameter& p : parameters) {
@@ -93,31 +93,32 @@ std::vector<ErrorMotion> tables_named(std::span<const Parameter> parameters) {
   return found;
 }
 
-/// Stored nodes may have been through a decimal in mm.
+/// Stored nodes can differ by rounding because files contain decimal numbers in mm.
 constexpr double kSameNode_m = 1e-9;
 
 Result<void> check_parameters(const std::vector<Parameter>& stored,
                               const std::vector<Parameter>& expected) {
   if (stored.size() != expected.size()) {
     return failure(ErrorCode::BadInput,
-                   message("model: ", stored.size(), " parameters, its tables and nodes need ",
+                   message("model: ", stored.size(), " parameters; tables and nodes need ",
                            expected.size()));
   }
 
   for (std::size_t i = 0; i < stored.size(); ++i) {
-    const Parameter &is = stored[i], &should = expected[i];
+    const Parameter &actual = stored[i], &wanted = expected[i];
     const bool same_node =
-        is.position_m.has_value() == should.position_m.has_value() &&
-        (!is.position_m || std::abs(*is.position_m - *should.position_m) < kSameNode_m);
-    if (is.name != should.name || !same_node) {
+        actual.position_m.has_value() == wanted.position_m.has_value() &&
+        (!actual.position_m || std::abs(*actual.position_m - *wanted.position_m) < kSameNode_m);
+    if (actual.name != wanted.name || !same_node) {
       return failure(
           ErrorCode::BadInput,
-          message("model: parameter ", i, " is ", is.name, " at ", is.position_m.value_or(kNaN),
-                  " m, should be ", should.name, " at ", should.position_m.value_or(kNaN), " m"));
+          message("model: parameter ", i, " is ", actual.name, " at ",
+                  actual.position_m.value_or(kNaN), " m, should be ", wanted.name, " at ",
+                  wanted.position_m.value_or(kNaN), " m"));
     }
-    if (!std::isfinite(is.value)) {
+    if (!std::isfinite(actual.value)) {
       return failure(ErrorCode::NotFinite,
-                     message("model: parameter ", i, " (", is.name, ") is not a number"));
+                     message("model: parameter ", i, " (", actual.name, ") is not a number"));
     }
   }
 
@@ -139,7 +140,7 @@ Result<void> check_names(const std::vector<Parameter>& stored,
   if (stored.size() != expected.size()) {
     return failure(
         ErrorCode::BadInput,
-        message("model: ", stored.size(), " coefficients, its order needs ", expected.size()));
+        message("model: ", stored.size(), " coefficients; the order needs ", expected.size()));
   }
   for (std::size_t i = 0; i < stored.size(); ++i) {
     if (stored[i].name != expected[i]) {
@@ -150,7 +151,8 @@ Result<void> check_names(const std::vector<Parameter>& stored,
   return {};
 }
 
-/// Grid over the box of the hull: polynomials up to order 5 turn less than once in a quarter of it.
+/// Grid over the bounding box of the hull. Polynomials up to order 5 have less than one turning
+/// point in a quarter of it.
 MachineNodes grid_over(const ValidityVolume& validity) {
   constexpr int kCells = 8;
   const evemu::ReadingBox box = evemu::bounding_box(validity.vertices_m());
@@ -190,18 +192,19 @@ std::vector<Parameter> named(const ParameterLayout& layout, const Eigen::VectorX
 }  // namespace
 
 Result<void> check_covariance(const Eigen::MatrixXd& C) {
-  if (Result<void> fine = check_shape(C, static_cast<std::size_t>(C.rows())); !fine) {
-    return fine;
+  if (Result<void> valid = check_shape(C, static_cast<std::size_t>(C.rows())); !valid) {
+    return valid;
   }
 
-  // Correlations; a variance below 1e-12 of the largest is rounding of what the gauge fixes.
+  // Scale to correlations. A variance below 1e-12 of the largest belongs to a parameter fixed by
+  // the gauge and is only rounding.
   const double least = 1e-12 * (C.size() > 0 ? C.diagonal().maxCoeff() : 0.0);
   const Eigen::VectorXd scale = C.diagonal().unaryExpr(
       [&](double variance) { return least > 0 ? 1 / std::sqrt(std::max(variance, least)) : 1.0; });
   Eigen::MatrixXd correlation = scale.asDiagonal() * C * scale.asDiagonal();
 
-  // A covariance in a gauge is singular; that of ill-conditioned data (1e5) has eigenvalues wrong
-  // by 1e-6.
+  // A covariance in a gauge is singular. With ill-conditioned data (condition 1e5) rounding changes
+  // its eigenvalues by 1e-6.
   constexpr double kRounding = 1e-6;
   correlation.diagonal().array() += kRounding;
   if (Eigen::LLT<Eigen::Ref<Eigen::MatrixXd>>(correlation).info() != Eigen::Success) {
@@ -228,8 +231,8 @@ Result<VolumetricModel> VolumetricModel::from_vector(const ParameterLayout& layo
     return failure(ErrorCode::NotFinite, "model: a parameter is not a number");
   }
 
-  if (Result<void> fine = check_shape(covariance, layout.model_size()); !fine) {
-    return tl::unexpected(fine.error());
+  if (Result<void> valid = check_shape(covariance, layout.model_size()); !valid) {
+    return tl::unexpected(valid.error());
   }
 
   if (tool_offsets_m.empty()) {
@@ -268,7 +271,8 @@ Result<VolumetricModel> VolumetricModel::from_polynomials(evemu::EvemuModel mode
   }
 
   if (gauge == Gauge::G1) {
-    return failure(ErrorCode::BadInput, "model: gauge G1 is for tables, polynomials have Ball1");
+    return failure(ErrorCode::BadInput,
+                   "model: gauge G1 is for tables; polynomials need gauge Ball1");
   }
 
   Result<ParameterLayout> layout =
@@ -297,13 +301,14 @@ Result<VolumetricModel> polynomials_from(const ModelDescription& d) {
     return failure(design.error().code, message("model: ", design.error().text));
   }
 
-  if (Result<void> fine = check_names(d.parameters, design->equivalent().names()); !fine) {
-    return tl::unexpected(fine.error());
+  if (Result<void> valid = check_names(d.parameters, design->equivalent().names()); !valid) {
+    return tl::unexpected(valid.error());
   }
 
   if (d.tool_offsets_m.size() != 1) {
-    return failure(ErrorCode::BadInput, message("model: ", d.tool_offsets_m.size(),
-                                                " tool offsets, polynomials hold for one"));
+    return failure(ErrorCode::BadInput,
+                   message("model: ", d.tool_offsets_m.size(),
+                           " tool offsets; polynomials are valid for exactly one"));
   }
 
   Eigen::VectorXd c_m(static_cast<Eigen::Index>(d.parameters.size()));
@@ -327,8 +332,8 @@ Result<VolumetricModel> polynomials_from(const ModelDescription& d) {
 }  // namespace
 
 Result<VolumetricModel> VolumetricModel::from_description(ModelDescription d) {
-  if (Result<void> fine = check_covariance(d.covariance); !fine) {
-    return tl::unexpected(fine.error());
+  if (Result<void> valid = check_covariance(d.covariance); !valid) {
+    return tl::unexpected(valid.error());
   }
 
   if (d.polynomials) {
@@ -345,8 +350,8 @@ Result<VolumetricModel> VolumetricModel::from_description(ModelDescription d) {
   const Eigen::VectorXd zeros = Eigen::VectorXd::Zero(n);
   const std::vector<Parameter> expected = named(*layout, zeros, Eigen::MatrixXd::Zero(n, n));
 
-  if (Result<void> fine = check_parameters(d.parameters, expected); !fine) {
-    return tl::unexpected(fine.error());
+  if (Result<void> valid = check_parameters(d.parameters, expected); !valid) {
+    return tl::unexpected(valid.error());
   }
 
   Eigen::VectorXd U(n);
@@ -370,12 +375,13 @@ bool VolumetricModel::holds_for_tool(const Vector3& tool_offset_m) const {
          (tool_offset_m - lever_offset_m(tool_offset_m)).norm() <= kToolTolerance_m;
 }
 
-Vector3 VolumetricModel::lever_offset_m(const Vector3& asked_m) const {
-  // Tables contain the lever across the line of their tools; using a slightly different one here
-  // would count the change for some of the rotations only.
+Vector3 VolumetricModel::lever_offset_m(const Vector3& offset_m) const {
+  // The tables include the effect of the lever perpendicular to the line of their tools. A slightly
+  // different offset is therefore projected onto the line: otherwise the difference would act
+  // through some of the rotations only.
   const Vector3& first = tool_offsets_m_.front();
-  return holds_for_any_tool_ ? asked_m
-                             : Vector3(first + tool_line_ * tool_line_.dot(asked_m - first));
+  return holds_for_any_tool_ ? offset_m
+                             : Vector3(first + tool_line_ * tool_line_.dot(offset_m - first));
 }
 
 VolumetricError VolumetricModel::error_at(const Vector3& axis_position_m,
@@ -422,7 +428,7 @@ Result<Correction> VolumetricModel::command_correction(const Vector3& nominal_m,
     return failure(
         ErrorCode::NotApplicable,
         message("correction for tool offset (", tool_offset_m.transpose(),
-                ") m: the model holds for (", tool_offsets_m_.front().transpose(), ") m"));
+                ") m: the model is valid for (", tool_offsets_m_.front().transpose(), ") m"));
   }
 
   if (!nominal_m.allFinite()) {
@@ -445,7 +451,7 @@ Result<Correction> VolumetricModel::command_correction(const Vector3& nominal_m,
   }
 
   return failure(ErrorCode::NotConverged,
-                 message("correction at (", nominal_m.transpose(), ") m: still moving after ",
+                 message("correction at (", nominal_m.transpose(), ") m: no convergence after ",
                          kMostEvaluations, " evaluations"));
 }
 

@@ -354,8 +354,9 @@ TEST(ArtefactTemperature, IsRefusedAloneAndAskedForWhereTheArrayGrows) {
   ObserveOptions warm;
   warm.artefact_temperature = {295.0, 0.2};
 
-  EXPECT_THAT(refusal(grows, {}).text, HasSubstr("nothing says how warm it was"));
-  EXPECT_THAT(refusal(reference_calibrator(), warm).text, HasSubstr("does not say how it grows"));
+  EXPECT_THAT(refusal(grows, {}).text, HasSubstr("the temperature of the array is not given"));
+  EXPECT_THAT(refusal(reference_calibrator(), warm).text,
+              HasSubstr("does not state its thermal expansion"));
   EXPECT_EQ(refusal(grows, {}).code, ErrorCode::BadInput);
   warm.artefact_temperature->temperature_K = std::nan("");
   EXPECT_THAT(refusal(grows, warm).text, HasSubstr("temperature of the array"));

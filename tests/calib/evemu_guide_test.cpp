@@ -201,7 +201,7 @@ TEST_P(StrayOnAMirroredBall, CostsNothing) {
   t.touch_position(4, 2);
   EXPECT_FALSE(t.guide_.failure());
   EXPECT_EQ(t.guide_.next().position, 8);
-  EXPECT_THAT(t.notes_, Contains(HasSubstr("set aside")));
+  EXPECT_THAT(t.notes_, Contains(HasSubstr("discarded")));
 }
 
 INSTANTIATE_TEST_SUITE_P(TouchGuide, StrayOnAMirroredBall, testing::Values(2, 5, 9));
@@ -213,7 +213,7 @@ TEST(TouchGuide, AStrayTouchThatWentOnDoesNotChangeWhatComesNext) {
   t.touch_all(4, Feature::Block, 2);
   t.touch(stray_at_mirrored(t, 4, 9));
   t.touch_all(4, Feature::Ball, 2);
-  EXPECT_THAT(t.notes_.back(), HasSubstr("1 touch before lay on no ball, as ball 2 shows"));
+  EXPECT_THAT(t.notes_.back(), HasSubstr("1 earlier touch is on no ball, as ball 2 shows"));
   EXPECT_EQ(name(t.guide_.next().on), "ball 3");
 }
 
@@ -252,7 +252,7 @@ TEST(TouchGuide, ATouchOffTheOthersOfItsBallIsSetAsideAndAnotherAsked) {
   Toucher t = toucher();
   t.touch(t.points(4, Feature::Ball, 1)[0] + Vector3(0, 0, 2e-3));
   for (std::size_t i = 1; i < 25; ++i) t.touch(t.points(4, Feature::Ball, 1)[i]);
-  EXPECT_THAT(t.notes_.back(), HasSubstr("mm off the others of ball 1: set aside"));
+  EXPECT_THAT(t.notes_.back(), HasSubstr("mm off the others of ball 1: discarded"));
   EXPECT_EQ(t.guide_.next().touched, 24u);
   t.touch(t.points(4, Feature::Ball, 1)[0]);
   EXPECT_EQ(name(t.guide_.next().on), "block 1");
@@ -263,7 +263,7 @@ TEST(TouchGuide, AnArtefactThatWasNotTurnedIsNotAnotherPosition) {
   t.touch_position(4);
   ASSERT_EQ(t.guide_.next().position, 8);
   t.touch_position(4);
-  EXPECT_THAT(t.notes_.back(), HasSubstr("the artefact stands as at position 4: turn it"));
+  EXPECT_THAT(t.notes_.back(), HasSubstr("the same orientation as at position 4: turn it"));
   EXPECT_EQ(t.guide_.next().position, 8);
   t.touch_position(8);
   EXPECT_EQ(t.guide_.next().position, 3);

@@ -203,7 +203,7 @@ TEST(EvemuInput, NamesAPositionTouchedTwice) {
   });
 
   EXPECT_EQ(e.code, ErrorCode::BadInput);
-  EXPECT_THAT(e.text, HasSubstr("the artefact stands as at position 3"));
+  EXPECT_THAT(e.text, HasSubstr("the same orientation as at position 3"));
 }
 
 TEST(EvemuInput, NamesCoplanarPositions) {
@@ -336,7 +336,7 @@ TEST(EvemuInput, NamesWhatWasDoneToErrors) {
   EXPECT_EQ(refusal_of_errors(Matrix3::Identity()), "accepted");
   EXPECT_THAT(refusal_of_errors(-Matrix3::Identity()), HasSubstr("with all signs reversed"));
   EXPECT_THAT(refusal_of_errors(1e-3 * Matrix3::Identity()),
-              HasSubstr("with errors in mm where um belong"));
+              HasSubstr("with errors in mm instead of um"));
   EXPECT_THAT(refusal_of_errors(Vector3(1, -1, 1).asDiagonal()),
               HasSubstr("with Y reversed in errors"));
   EXPECT_THAT(refusal_of_errors(Matrix3{{0, 1, 0}, {1, 0, 0}, {0, 0, 1}}),

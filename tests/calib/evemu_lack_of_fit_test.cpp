@@ -103,7 +103,7 @@ INSTANTIATE_TEST_SUITE_P(
                                [](ArrayRun& r) {
                                  move(r, 3, 9, {0.0, 80e-6, 60e-6});
                                }},
-                    ArrayFault{Cause::ArrayFile, "calibrator file's place of ball 5",
+                    ArrayFault{Cause::ArrayFile, "position of ball 5 in the calibrator file",
                                [](ArrayRun& r) { r.calibrator.balls[4].centre_m.y() += 0.2e-3; }},
                     ArrayFault{Cause::Moved, "position 6: the array moved before ball 4",
                                [](ArrayRun& r) {
@@ -135,7 +135,7 @@ TEST(EvemuJudge, RefusesWhatAFaultMovesByMoreThanItsUncertainty) {
   const Verdict verdict = verdict_of(run);
   ASSERT_FALSE(verdict.accepted);
   EXPECT_THAT(verdict.reasons.front(), HasSubstr("position 3, ball 9"));
-  EXPECT_THAT(verdict.reasons.front(), HasSubstr("it moves the model by"));
+  EXPECT_THAT(verdict.reasons.front(), HasSubstr("it changes the model by"));
   EXPECT_EQ(verdict.causes.front(), "ball");
   EXPECT_EQ(verdict.causes.size(), verdict.reasons.size());
 }
@@ -282,7 +282,7 @@ TEST(EvemuLackOfFit, FindsBacklashAcrossTheAxisThatTurnsRound) {
 TEST(EvemuJudge, NotesBacklashThatItFound) {
   const Verdict verdict = verdict_of(with_backlash(Vector3::Constant(30e-6).asDiagonal()));
   EXPECT_TRUE(verdict.accepted) << (verdict.reasons.empty() ? "" : verdict.reasons.front());
-  EXPECT_THAT(verdict.notes, Contains(HasSubstr("depend on the side they come from")));
+  EXPECT_THAT(verdict.notes, Contains(HasSubstr("depend on the direction of approach")));
 }
 
 /// All touches of a position shift together, uncorrelated over a quarter of them.

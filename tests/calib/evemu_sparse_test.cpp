@@ -136,7 +136,7 @@ TEST(EvemuSparse, IsNotConvergedAboveTheLambdaItWasAskedFor) {
   const auto refused = solve(observations(), options);
   ASSERT_FALSE(refused);
   EXPECT_EQ(refused.error().code, ErrorCode::NotConverged);
-  EXPECT_THAT(refused.error().text, testing::HasSubstr("max_sweeps = 20 end at lambda"));
+  EXPECT_THAT(refused.error().text, testing::HasSubstr("max_sweeps = 20 was reached at lambda"));
 }
 
 /// Without a position the chosen path takes more sweeps than the path with it.

@@ -98,7 +98,7 @@ TEST(Gate, RefusesAnotherScaleThanTheActiveModels) {
   const Verdict accepted =
       decide(candidate, figures(100, 1.0, 1.1), {.accept_scale_change = true}, &active);
   EXPECT_TRUE(accepted.accepted);
-  EXPECT_THAT(accepted.notes, testing::Contains(HasSubstr("accepted by name")));
+  EXPECT_THAT(accepted.notes, testing::Contains(HasSubstr("explicitly accepted")));
 }
 
 TEST(Gate, AScaleWithinTheUncertaintyIsThatOfTheActiveModel) {
@@ -138,7 +138,7 @@ TEST(Gate, LetsASmallerVolumeReplaceALargerOneOnlyByName) {
   EXPECT_TRUE(decide(whole, f, {}, &part).accepted);
   const Verdict told = decide(part, f, {.accept_smaller_volume = true}, &whole);
   EXPECT_TRUE(told.accepted);
-  EXPECT_THAT(told.notes, ElementsAre(HasSubstr("accepted by name")));
+  EXPECT_THAT(told.notes, ElementsAre(HasSubstr("explicitly accepted")));
 }
 
 /// The reference array in eight positions round a vertical axis and up and down, set up by hand: 3
@@ -188,7 +188,7 @@ TEST(Gate, NotesARimThatIsLostAndRefusesMore) {
   f.observations_beside_active = f.observations;
   const Verdict rim = decide(lower_part(whole, 0.975), f, {}, &whole);
   EXPECT_TRUE(rim.accepted);
-  EXPECT_THAT(rim.notes, ElementsAre(HasSubstr("beside it")));
+  EXPECT_THAT(rim.notes, ElementsAre(HasSubstr("of the width")));
   EXPECT_FALSE(decide(lower_part(whole, 0.93), f, {}, &whole).accepted);
   std::vector<Vector3> corners(whole.validity().vertices_m().begin(),
                                whole.validity().vertices_m().end());

@@ -177,7 +177,7 @@ TEST(Alignment, NamesAPathInMetres) {
   Path other = run.path;
   for (Vector3& v : other.vertices_m) v *= 1e-3;
   EXPECT_THAT(refusal(run, other).text,
-              HasSubstr("they fit with lengths in m where mm belong (path)"));
+              HasSubstr("they fit with lengths in m instead of mm (path)"));
 }
 
 TEST(Alignment, RefusesARunThatEndsEarly) {

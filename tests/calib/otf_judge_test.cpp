@@ -59,7 +59,7 @@ TEST(Judge, KeepsTheActiveModelOfAnUnchangedMachine) {
   const auto verdict = judge(again.observations, again.solution, &active, {}, second.options);
   ASSERT_TRUE(verdict);
   EXPECT_FALSE(verdict->accepted);
-  EXPECT_THAT(verdict->reasons, ElementsAre(HasSubstr("the active model still holds")));
+  EXPECT_THAT(verdict->reasons, ElementsAre(HasSubstr("the active model remains valid")));
 }
 
 TEST(Judge, PrefersANewModelToThatOfAnotherMachine) {
@@ -111,7 +111,7 @@ TEST(Judge, ComparesWhereTheActiveModelHoldsOnly) {
 
   // As good where the smaller one holds, and it holds in more.
   EXPECT_THAT(judge(id.observations, id.solution, &active, {}, run.options)->notes,
-              Contains(HasSubstr("lie outside its volume")));
+              Contains(HasSubstr("outside its validity volume")));
 }
 
 TEST(Judge, DoesNotDependOnTheGaugeOfTheActiveModel) {

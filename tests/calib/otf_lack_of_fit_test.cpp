@@ -115,7 +115,7 @@ INSTANTIATE_TEST_SUITE_P(
                move_samples(
                    run, [](double, const Vector3& p) { return Vector3(0.3e-3 * p.normalized()); });
              }},
-        Case{Cause::ChainOrder, "in the order XYZ from workpiece to tool, not ZYX",
+        Case{Cause::ChainOrder, "from workpiece to tool is XYZ, not ZYX",
              [](MadeRun& run) { run.machine.chain = *KinematicChain::parse("[w b Z Y X t]"); }},
         Case{Cause::NodeSpacing, "too far apart (600 mm)",
              [](MadeRun& run) { run.machine.nodes[0] = *equidistant_nodes(-0.3, 0.3, 0.6); }}));

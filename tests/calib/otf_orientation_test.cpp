@@ -127,7 +127,7 @@ TEST(PathOrientation, APlaceNearAnAxisLeavesTheTurnAboutItOpen) {
 
 TEST(PathOrientation, APlaceThatFitsAfterAHalfTurnNamesIt) {
   EXPECT_THAT(verdict_with({.tracker_m = kTracker.t_m}, about_z(kTracker)).reasons,
-              ElementsAre(AllOf(HasSubstr("from the place that is given"),
+              ElementsAre(AllOf(HasSubstr("from the given position"),
                                 HasSubstr("by 180 degrees about Z"),
                                 HasSubstr("signs of the other two axes are reversed"))));
 }

@@ -76,7 +76,7 @@ TEST(PathCheck, NamesTheMistakeThatPutsAllVerticesInside) {
   ASSERT_FALSE(refused);
   EXPECT_THAT(refused.error().text, testing::EndsWith("; all are inside with X reversed"));
   const auto microns = check(Path{{{0, 0, 0}, {300, 0, 0}, {300, 400, 0}}}, travel());
-  EXPECT_THAT(microns.error().text, HasSubstr("all are inside with lengths in um where mm belong"));
+  EXPECT_THAT(microns.error().text, HasSubstr("all are inside with lengths in um instead of mm"));
 }
 
 TEST(PathCheck, TakesVerticesAtTheEndsOfTheTravel) {

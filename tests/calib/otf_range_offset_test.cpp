@@ -112,7 +112,7 @@ TEST(RangeOffset, BeyondItsStatedUncertaintyItIsNamed) {
   const auto verdict = judge(id.observations, id.solution, nullptr, {}, run.options);
   ASSERT_TRUE(verdict) << verdict.error().text;
   EXPECT_THAT(verdict->reasons,
-              Contains(AllOf(HasSubstr("offset of"), HasSubstr("stated are 6 um"))));
+              Contains(AllOf(HasSubstr("offset of"), HasSubstr("stated uncertainty is 6 um"))));
 }
 
 TEST(RangeOffset, WithinItsStatedUncertaintyNothingIsSaid) {

@@ -12,8 +12,8 @@ namespace abbe::calib {
 namespace {
 
 constexpr double kZeroCelsius_K = 273.15;
-constexpr double kGasConstant = 8.314472;   // J/(mol K), CODATA 2002: that of the equation's tables
-constexpr double kStandardCo2_ppm = 450.0;  // of all three equations
+constexpr double kGasConstant = 8.314472;   // J/(mol K), CODATA 2002, as in the equation's tables
+constexpr double kStandardCo2_ppm = 450.0;  // reference value of all three equations
 
 double per_square_um(double wavelength_m) {
   const double um = wavelength_m * 1e6;
@@ -24,7 +24,7 @@ double vapour_pressure_Pa(const Air& air) {
   return air.relative_humidity * saturation_vapour_pressure_Pa(air.temperature_K);
 }
 
-/// Of n - 1 of dry air [Ciddor 1996] eq. (2).
+/// Factor for (n - 1) of dry air for the CO2 content [Ciddor 1996] eq. (2).
 double co2_factor(const Air& air) {
   return 1.0 + kCo2PerPpm * (air.co2_ppm - kStandardCo2_ppm);
 }
@@ -93,8 +93,9 @@ double index_of(const Air& air, double wavelength_m, IndexEquation equation) {
   return 1.0;
 }
 
-/// Change of n when a quantity is one uncertainty up and one down, halved: the sensitivity times u,
-/// exact where n is linear (over any sensible uncertainty it is, to 1e-3 of the share).
+/// Contribution of one input quantity to u_n: sensitivity coefficient times u, computed as
+///     (n(value + u) - n(value - u)) / 2.
+/// Exact for linear n; for any realistic u the nonlinearity changes the contribution by 1e-3.
 double share(Air air, double Air::*quantity, double u, double wavelength_m,
              IndexEquation equation) {
   const double value = air.*quantity;
@@ -104,8 +105,8 @@ double share(Air air, double Air::*quantity, double u, double wavelength_m,
   return 0.5 * (up - index_of(air, wavelength_m, equation));
 }
 
-/// The shop-floor formula has no CO2 in it: its distance from 450 ppm is not corrected, and counts
-/// in full.
+/// Contribution of CO2 to u_n. The shop-floor formula does not contain CO2: the difference to 450
+/// ppm is not corrected and is added in full.
 double share_of_co2(const Air& air, double wavelength_m, IndexEquation equation) {
   if (equation != IndexEquation::ShopFloor)
     return share(air, &Air::co2_ppm, air.u_co2_ppm, wavelength_m, equation);
@@ -161,11 +162,14 @@ Result<RefractiveIndex> refractive_index(const Air& air, double vacuum_wavelengt
     return failure(ErrorCode::BadInput,
                    message("refractive index: wavelength of ", vacuum_wavelength_m,
                            " m; valid for 0.35e-6 to 1.2e-6"));
-  const bool sure = within(air.u_temperature_K, 0.0, 50.0) && within(air.u_pressure_Pa, 0.0, 1e5) &&
-                    within(air.u_relative_humidity, 0.0, 1.0) && within(air.u_co2_ppm, 0.0, 2000.0);
-  if (!sure)
+  const bool valid_u = within(air.u_temperature_K, 0.0, 50.0) &&
+                       within(air.u_pressure_Pa, 0.0, 1e5) &&
+                       within(air.u_relative_humidity, 0.0, 1.0) &&
+                       within(air.u_co2_ppm, 0.0, 2000.0);
+  if (!valid_u)
     return failure(ErrorCode::BadInput,
-                   "refractive index: an uncertainty of the air is negative or none");
+                   "refractive index: an uncertainty of the air is negative, too large or not a "
+                   "number");
 
   const auto part = [&](double Air::*quantity, double u) {
     return share(air, quantity, u, vacuum_wavelength_m, equation);
@@ -196,9 +200,9 @@ Air shop_floor_air() noexcept {
 Result<double> u_of_assumed_air(const Air& assumed, double vacuum_wavelength_m,
                                 IndexEquation equation) {
   const auto n_assumed = refractive_index(assumed, vacuum_wavelength_m, equation);
-  const auto there = refractive_index(shop_floor_air(), vacuum_wavelength_m, equation);
-  if (!n_assumed || !there) return tl::unexpected(n_assumed ? there.error() : n_assumed.error());
-  return root_sum_of_squares(there->u_n, there->n - n_assumed->n) / there->n;
+  const auto actual = refractive_index(shop_floor_air(), vacuum_wavelength_m, equation);
+  if (!n_assumed || !actual) return tl::unexpected(n_assumed ? actual.error() : n_assumed.error());
+  return root_sum_of_squares(actual->u_n, actual->n - n_assumed->n) / actual->n;
 }
 
 double distance_factor(double n_assumed, double n) noexcept {

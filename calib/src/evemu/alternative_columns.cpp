@@ -15,12 +15,12 @@ namespace {
 
 using Rows3 = Eigen::Matrix<double, 3, Eigen::Dynamic>;
 
-/// Of ball b, in the machine's directions.
+/// Vector from Ball1 to ball b in machine directions.
 Vector3 from_ball1_m(const SeenArtefact& s, std::size_t b) {
   return s.ideal_m[b] - s.ideal_m.front();
 }
 
-/// First and last index of what was touched.
+/// First and last index among the touched balls and blocks.
 std::pair<double, double> touched_between(std::span<const SeenArtefact> seen) {
   std::pair<double, double> between{seen.front().ball_index.front(),
                                     seen.front().ball_index.front()};
@@ -38,7 +38,8 @@ double share_of(const std::pair<double, double>& between, double index) {
   return (index - between.first) / std::max(1.0, between.second - between.first);
 }
 
-/// A bow of the long leg upwards and sideways, of the short one upwards, a twist.
+/// Four shapes of a bent array: the long leg bent upwards, the long leg bent sideways, the short
+/// leg bent upwards, a twist.
 Rows3 bow(const SeenArtefact& s, std::size_t ball, double arm_m) {
   const Vector3 a = s.T_self_uni.R.transpose() * from_ball1_m(s, ball) / arm_m;
   Rows3 rows(3, 4);
@@ -47,7 +48,8 @@ Rows3 bow(const SeenArtefact& s, std::size_t ball, double arm_m) {
   return rows;
 }
 
-/// By what G (p - p1) turns the frame of the blocks, times share[b] when block b is touched.
+/// Rotation of the block frame by the motion G (p - p1), of which the fraction share[b] is complete
+/// when block b is touched.
 Vector3 turn_of_blocks(const SeenArtefact& s, const Matrix3& G,
                        const std::array<double, 2>& share) {
   const Vector3 &n1 = s.blocks[0].normal, &n2 = s.blocks[1].normal;
@@ -61,22 +63,24 @@ Vector3 turn_of_blocks(const SeenArtefact& s, const Matrix3& G,
   return z.cross(dz) + z * y.dot(dx);
 }
 
-/// Share of a motion that is done when the touch of an index is made.
+/// Fraction of a motion that is complete at the touch with this index.
 using DoneShare = std::function<double(double index)>;
 
-/// Of G (p - p1), what is seen of a ball: beside what it turns the blocks by.
+/// Displacement of a ball by the motion G (p - p1), relative to the block frame, which the motion
+/// rotates.
 Vector3 seen_of(const SeenArtefact& s, std::size_t ball, const Matrix3& G, const DoneShare& share) {
   const Vector3 a = from_ball1_m(s, ball);
   const Vector3 blocks = turn_of_blocks(s, G, {share(s.block_index[0]), share(s.block_index[1])});
   return share(s.ball_index[ball]) * (G * a) - blocks.cross(a);
 }
 
-/// A shift, beside that of Ball1.
+/// Displacement of a ball by a translation, relative to Ball1.
 Matrix3 seen_shift(const SeenArtefact& s, std::size_t ball, const DoneShare& share) {
   return (share(s.ball_index[ball]) - share(s.ball_index.front())) * Matrix3::Identity();
 }
 
-/// An array that shifts, and turns about Ball1 by one arm.
+/// Displacement of a ball by unit translations of the array, then by unit rotations about Ball1
+/// (displacement at the distance of one arm).
 Rows3 shifted_and_turned(const SeenArtefact& s, std::size_t ball, double arm_m,
                          const DoneShare& share) {
   Rows3 rows(3, 6);
@@ -88,7 +92,8 @@ Rows3 shifted_and_turned(const SeenArtefact& s, std::size_t ball, double arm_m,
   return rows;
 }
 
-/// Something is touched before this ball, and something else after it: the others are single balls.
+/// True if another feature is touched before this ball and another one after it. A step at the
+/// first or last feature cannot be distinguished from a single displaced ball.
 bool between_others(const SeenArtefact& s, std::size_t ball) {
   const auto [first, last] = touched_between({&s, 1});
   return s.ball_index[ball] > first && s.ball_index[ball] < last;
@@ -106,7 +111,7 @@ Eigen::Index columns_by_position(Cause cause) {
   return cause == Cause::Bent ? 4 : 6;
 }
 
-/// Root mean square over positions, of the largest column.
+/// Largest root mean square over the positions, among the columns of a position.
 double largest_rms(const Eigen::VectorXd& d, Eigen::Index count) {
   double most = 0.0;
   for (Eigen::Index k = 0; k < count; ++k) {
@@ -153,7 +158,7 @@ std::vector<std::vector<Added>> AlternativeColumns::families() const {
   return all;
 }
 
-/// Rows of every ball but Ball1, whose rows stay zero.
+/// Calls `block` for the rows of every ball except Ball1, whose rows stay zero.
 template <class Block>
 Eigen::MatrixXd AlternativeColumns::filled(Eigen::Index columns, const Block& block) const {
   const std::size_t balls = o_.seen.front().balls.size();
@@ -189,7 +194,7 @@ Eigen::MatrixXd AlternativeColumns::of_step(const Added& a) const {
   });
 }
 
-/// Columns of its own for every position.
+/// Separate columns for every position.
 Eigen::MatrixXd AlternativeColumns::by_position(Cause cause) const {
   const Eigen::Index count = columns_by_position(cause);
   return filled(count * std::ssize(o_.seen), [&](auto rows, std::size_t p, std::size_t i) {
@@ -253,30 +258,32 @@ std::string text_of(const Added& a, const Eigen::VectorXd& d, const Observations
   switch (a.cause) {
     case Cause::Ball:
       return message(
-          "position ", position, ", ball ", ball, ": ", um(d.norm()),
-          " off its place in the array (", vector_um(d),
-          "): dirt, a loose seat, or the array moved there; clean it and touch the position again");
+          "position ", position, ", ball ", ball, ": the ball is displaced by ", um(d.norm()),
+          " from its place in the array (", vector_um(d),
+          "): dirt, a loose seat, or the array moved; clean it and touch the position again");
     case Cause::ArrayFile:
-      return message("the calibrator file's place of ball ", ball, " is off by ", um(d.norm()),
-                     " (", vector_um(d),
-                     " along its axes), alike at all positions: wrong file or entry, or the ball "
-                     "was displaced since; calibrate the array again");
+      return message("the position of ball ", ball, " in the calibrator file is wrong by ",
+                     um(d.norm()), " (", vector_um(d),
+                     " along the axes of the file), the same at all positions: wrong file or "
+                     "entry, or the ball was displaced after the array's calibration; calibrate "
+                     "the array again");
     case Cause::Moved:
       return message("position ", position, ": the array moved before ball ", ball,
-                     " was touched, by ", um(d.head<3>().norm()), " and ", um(d.tail<3>().norm()),
-                     " of turn at its end; clamp it and touch the position again");
+                     " was touched: translation ", um(d.head<3>().norm()), ", rotation ",
+                     um(d.tail<3>().norm()),
+                     " at its far end; clamp it and touch the position again");
     case Cause::Creep:
       return message("the array creeps after clamping: it moves by up to ",
                      um(largest_rms(d, columns_by_position(a.cause))),
-                     " (rms) in a position; wait after clamping, or clamp it better");
+                     " (rms) within a position; wait after clamping, or clamp it better");
     case Cause::Bent:
-      return message("every position bends the array differently, by ",
+      return message("the array is bent differently at every position, by ",
                      um(largest_rms(d, columns_by_position(a.cause))),
-                     " (rms): clamping, or its supports");
+                     " (rms); check its clamping and supports");
     case Cause::Drift:
-      return message("the machine drifts: within the session it expands or shears by ",
+      return message("the machine drifts: during the session it expands or shears by ",
                      um(d.head<6>().norm()), " over the array and shifts by ",
-                     um(d.tail<3>().norm()), "; let it warm up");
+                     um(d.tail<3>().norm()), "; wait until the machine has warmed up");
     default:
       return {};
   }

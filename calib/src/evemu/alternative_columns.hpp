@@ -1,5 +1,6 @@
 #pragma once
-/// The columns of the alternatives that a ball array's errors are compared with, and their words.
+/// The columns of the alternatives with which the errors of a ball array are compared, and the
+/// texts that describe them.
 
 #include <Eigen/Core>
 #include <string>
@@ -9,19 +10,20 @@
 
 namespace abbe::calib::evemu {
 
+/// One alternative that adds columns to the design.
 struct Added {
   Cause cause;
   std::size_t seen = 0;     ///< index of the position
   std::size_t feature = 0;  ///< index of the ball
 };
 
-/// Built when they are asked for, one alternative at a time: a run of N balls has N single ones of
-/// 3 N x 3.
+/// Builds the columns of one alternative at a time, on request: a run of N balls has N alternatives
+/// for single balls, each with 3 N x 3 columns.
 class AlternativeColumns {
  public:
   explicit AlternativeColumns(const Observations&);
 
-  /// By cause. Empty for errors that were given without touches.
+  /// The alternatives, grouped by cause. Empty for errors that were given without touches.
   [[nodiscard]] std::vector<std::vector<Added>> families() const;
   /// 3 rows.size() x k. Each unknown is a displacement of the ball farthest from Ball1 [m].
   [[nodiscard]] Eigen::MatrixXd of(const Added&) const;
@@ -38,9 +40,9 @@ class AlternativeColumns {
   double arm_m_ = 0.0;
 };
 
-/// ", position 3, ball 4" of an alternative that has a place.
+/// ", position 3, ball 4" for an alternative at one place, else empty.
 [[nodiscard]] std::string where(const Added&, const Observations&);
-/// d: of the columns [m].
+/// Message to the user. d: estimated coefficients of the alternative's columns [m].
 [[nodiscard]] std::string text_of(const Added&, const Eigen::VectorXd& d_m, const Observations&);
 
 }  // namespace abbe::calib::evemu

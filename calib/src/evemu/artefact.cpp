@@ -24,14 +24,16 @@ Result<void> check_balls(const Calibrator& c) {
     const Calibrator::Ball& ball = c.balls[i];
     if (ball.number != static_cast<int>(i) + 1) {
       return broken(c, ErrorCode::BadInput,
-                    message("ball number ", ball.number, " where ", i + 1, " belongs"));
+                    message("ball number ", ball.number, " instead of ", i + 1));
     }
     if (!ball.centre_m.allFinite() || !std::isfinite(ball.u_m)) {
-      return broken(c, ErrorCode::NotFinite, message("ball ", ball.number, " is not a number"));
+      return broken(c, ErrorCode::NotFinite,
+                    message("ball ", ball.number, ": centre or uncertainty is not a number"));
     }
     if (!(ball.radius_m > 0.0) || ball.u_m < 0.0) {
-      return broken(c, ErrorCode::BadInput,
-                    message("ball ", ball.number, " has radius ", ball.radius_m, " m"));
+      return broken(
+          c, ErrorCode::BadInput,
+          message("ball ", ball.number, " has radius ", ball.radius_m, " m, u = ", ball.u_m, " m"));
     }
     for (std::size_t j = 0; j < i; ++j) {
       if ((ball.centre_m - c.balls[j].centre_m).norm() < ball.radius_m + c.balls[j].radius_m) {
@@ -45,7 +47,8 @@ Result<void> check_balls(const Calibrator& c) {
 
 Result<void> check_blocks(const Calibrator& c) {
   if (c.blocks.size() != 2 || c.blocks[0].number != 1 || c.blocks[1].number != 2) {
-    return broken(c, ErrorCode::BadInput, message("needs blocks 1 and 2, has ", c.blocks.size()));
+    return broken(c, ErrorCode::BadInput,
+                  message("needs two blocks, numbered 1 and 2; has ", c.blocks.size()));
   }
 
   for (const Calibrator::Block& block : c.blocks) {
@@ -74,7 +77,8 @@ Result<void> check_expansivity(const Calibrator& c) {
   return {};
 }
 
-/// Of a touch, where residuals do not show it: as many touches as unknowns leave none.
+/// Known uncertainty of a touch, for a fit without residuals (as many touches as unknowns); nullopt
+/// if the residuals show the uncertainty.
 Result<std::optional<double>> noise_of(std::size_t touches, std::size_t unknowns,
                                        std::optional<double> u_touch_m) {
   if (touches != unknowns) {
@@ -83,7 +87,7 @@ Result<std::optional<double>> noise_of(std::size_t touches, std::size_t unknowns
   if (!u_touch_m || !(*u_touch_m > 0.0) || !std::isfinite(*u_touch_m)) {
     return failure(ErrorCode::TooFewObservations,
                    message(touches,
-                           " touches do not show how uncertain they are: touch one place more, or "
+                           " touches do not show their own uncertainty: add at least one touch, or "
                            "state the uncertainty of a touch"));
   }
   return u_touch_m;
@@ -124,8 +128,8 @@ ArtefactUncertainty uncertainty_of(const Calibrator& c, const std::optional<Expa
 
 Result<RigidTransform> uniform_frame(const Vector3& ball1_m, const Vector3& n1, const Vector3& n2) {
   const Vector3 z = n1.normalized(), across = n2.normalized().cross(z);
-  // Faces meet near a right angle; below this the plate's direction about z is a matter of
-  // rounding.
+  // Faces meet near a right angle. If the sine of their angle is smaller than this, the rotation of
+  // the plate about z is poorly determined.
   constexpr double kParallel = 1e-3;
   if (!(across.norm() > kParallel)) {
     return failure(ErrorCode::DegenerateGeometry,

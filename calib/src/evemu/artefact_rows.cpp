@@ -8,10 +8,11 @@
 namespace abbe::calib::evemu {
 namespace {
 
-/// What an error of the array does to ball i (from 0) at a, both in the uniform frame.
+/// Effect of one error of the array on a ball (index from 0), in the uniform frame.
 using Effect = std::function<Vector3(std::size_t ball, const Vector3& from_ball1_m)>;
 
-/// A turn d of the uniform frame turns what is carried into it the other way.
+/// Effect of a rotation d of the uniform frame: the ideal ball centres rotate in the opposite
+/// direction.
 Effect turned_by(const Vector3& d_rad) {
   return [d_rad](std::size_t, const Vector3& a_m) -> Vector3 { return -d_rad.cross(a_m); };
 }
@@ -31,8 +32,8 @@ void add_balls(const ArtefactUncertainty& u, std::vector<Effect>& effects) {
   }
 }
 
-/// uniform_frame(): z = n1, x = n2 x z / sine, so n2 = sine y + cosine z. A change of n1 by e turns
-/// z by z x e, and x by what it does to n2 x n1.
+/// uniform_frame(): z = n1, x = n2 x z / sine, so n2 = sine y + cosine z. A change of n1 by e
+/// rotates z by z x e, and rotates x by its effect on n2 x n1.
 void add_blocks(const ArtefactUncertainty& u, std::vector<Effect>& effects) {
   const double cosine = u.cosine_between_blocks, sine = std::sqrt(1.0 - cosine * cosine);
   const auto& [u1_rad, u2_rad] = u.u_block_rad;

@@ -17,15 +17,16 @@ constexpr std::size_t kLeastBallPoints = 5;
 constexpr std::size_t kLeastFacePoints = 4;
 constexpr double kRingUpper_rad = 45.0 * std::numbers::pi / 180.0;
 constexpr double kRingLower_rad = 80.0 * std::numbers::pi / 180.0;
-constexpr double kOuter = 1.6;                // of the distance in contact
-constexpr double kCosOfFarthestAround = 0.5;  // 60 degrees
+constexpr double kOuter = 1.6;                // times the distance from the centre in contact
+constexpr double kCosOfFarthestAround = 0.5;  // 60 degrees: free straight path around a ball
 
 Vector3 across(const Vector3& up) {
   return up.unitOrthogonal();
 }
 
-/// The pole, then two rings; neighbours lie beside each other. The rings are turned against each
-/// other: two points each would lie in one plane with the pole, which no sphere follows from.
+/// The pole, then the points of two rings in order around the ball. The lower ring is rotated by
+/// half a step: otherwise, with two points on each ring, all points would lie in one plane with the
+/// pole and not determine a sphere.
 std::vector<Vector3> normals_on_a_ball(const Vector3& up, std::size_t points) {
   const Vector3 x = across(up), y = up.cross(x);
   std::vector<Vector3> normals{up};
@@ -51,7 +52,7 @@ std::vector<Vector3> normals_on_a_ball(const Vector3& up, std::size_t points) {
   return normals;
 }
 
-/// Around a square, and its middle last.
+/// Points on a circle around the centre of the face, then the centre.
 std::vector<Vector3> places_on_a_face(const FaceToTouch& face, const Vector3& normal,
                                       std::size_t points) {
   const Vector3 x = across(normal), y = normal.cross(x);
@@ -80,7 +81,7 @@ class Planner {
     top_m_ += options.clearance_m;
   }
 
-  /// The ball that the tip would meet on its way straight up from where it stands; null: none.
+  /// The ball with which the tip would collide on a straight path up from its position; null: none.
   [[nodiscard]] const Calibrator::Ball* ball_above() const {
     const auto above = [this](const Calibrator::Ball& ball) {
       const Vector3 from_centre = here_ - ball.centre_m;
@@ -95,6 +96,7 @@ class Planner {
   void touch(const Calibrator::Ball& ball) {
     const auto normals = normals_on_a_ball(up_, options_.points_per_ball);
     Vector3 before = up_;
+
     for (std::size_t i = 0; i < normals.size(); ++i) {
       const Vector3& n = normals[i];
       const Vector3 outer = ball.centre_m + kOuter * reach(ball) * n;
@@ -106,6 +108,7 @@ class Planner {
         if (before.dot(n) < kCosOfFarthestAround) go_over(ball, way, n);
         way.push_back(outer);
       }
+
       planned_.push_back(
           {Feature::Ball, ball.number, std::move(way), ball.centre_m + reach(ball) * n, n});
       before = n;
@@ -135,16 +138,17 @@ class Planner {
   [[nodiscard]] Vector3 raised(const Vector3& p_m) const {
     return p_m + (top_m_ - up_.dot(p_m)) * up_;
   }
-  /// Up, across, down; from higher than everything straight to above the place.
+  /// Path to a place: up, across, down. Without the first step if the tip is above all features.
   [[nodiscard]] std::vector<Vector3> over_to(const Vector3& place_m) const {
     std::vector<Vector3> way;
-    if (!planned_.empty()) way.push_back(here_);  // a touch ends at the face
+    if (!planned_.empty()) way.push_back(here_);  // back from the contact of the last touch
     if (!high(here_)) way.push_back(raised(here_));
     way.push_back(raised(place_m));
     way.push_back(place_m);
     return way;
   }
-  /// Over the pole; a ring may be farther from it than is free in one straight way.
+  /// Path over the pole in three corner points: the angle from a ring to the pole may exceed that
+  /// of one free straight path.
   void go_over(const Calibrator::Ball& ball, std::vector<Vector3>& way, const Vector3& to) const {
     const double outer = kOuter * reach(ball);
     const Vector3 from = (way.back() - ball.centre_m).normalized();
@@ -157,7 +161,7 @@ class Planner {
   const ArtefactTouchOptions& options_;
   Vector3 up_;
   double top_m_ = -std::numeric_limits<double>::infinity();
-  Vector3 here_;  ///< from where the way to the next touch begins
+  Vector3 here_;  ///< start of the path to the next touch
   std::vector<PlannedTouch> planned_;
 };
 

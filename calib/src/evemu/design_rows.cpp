@@ -7,8 +7,9 @@
 namespace abbe::calib::evemu {
 namespace {
 
-/// Change of a face's normal when its points move: the slope of the movement along the normal, and
-/// what a movement along the face does to points that do not lie in it (a curved V bends the face).
+/// Change of a face's normal when its points are displaced: the slope of the displacement along the
+/// normal, and the effect of a displacement along the face on points that do not lie in the plane
+/// (a curved V deforms the face).
 Eigen::Matrix3Xd normal_change(const fit::Plane& plane, std::span<const Vector3> points_m,
                                const ScaledDesign& design) {
   Matrix3 spread = Matrix3::Zero();
@@ -23,7 +24,8 @@ Eigen::Matrix3Xd normal_change(const fit::Plane& plane, std::span<const Vector3>
     moment.noalias() += r * (plane.normal.transpose() * B) + out_of_plane_m * (in_plane * B);
   }
 
-  // n n^T fills the one direction in which the points have no extent; moment has nothing there.
+  // n n^T makes the matrix regular in the direction in which the points have no extent; moment is
+  // zero in that direction.
   spread += spread.trace() * plane.normal * plane.normal.transpose();
   return -spread.ldlt().solve(moment);
 }
@@ -36,7 +38,7 @@ Eigen::Matrix3Xd block_rotation(const SeenArtefact& seen, const ScaledDesign& de
   const Eigen::Matrix3Xd dn1 = normal_change(seen.blocks[0], seen.block_points_m[0], design);
   const Eigen::Matrix3Xd dn2 = normal_change(seen.blocks[1], seen.block_points_m[1], design);
 
-  // theta turns z = n1 with n1, and x = n2 x z with both: theta = z x dn1 + z (y . dx).
+  // z = n1 rotates with n1, x = n2 x z rotates with both normals: theta = z x dn1 + z (y . dx).
   const double sine = n2.cross(n1).norm();
   Eigen::Matrix3Xd theta(3, dn1.cols());
   for (Eigen::Index j = 0; j < dn1.cols(); ++j) {
@@ -53,8 +55,8 @@ Eigen::Matrix3Xd ball_displacement(const SeenArtefact& seen, std::size_t ball,
   const Vector3& centre = seen.balls[ball].centre;
   const std::vector<Vector3>& points_m = seen.ball_points_m[ball];
 
-  // Points moved by delta change |p - c| - r by n.delta; the fit answers with the dc, dr that undo
-  // it best.
+  // Displacements delta of the points change |p - c| - r by n . delta. The fitted dc, dr compensate
+  // this change in the least-squares sense.
   Eigen::MatrixX4d N(static_cast<Eigen::Index>(points_m.size()), 4);
   Eigen::MatrixXd along(N.rows(), static_cast<Eigen::Index>(design.size()));
   for (std::size_t k = 0; k < points_m.size(); ++k) {

@@ -10,7 +10,7 @@
 namespace abbe::calib::evemu {
 namespace {
 
-/// One row of W with the places of A it came from.
+/// One row of W with the terms of A from which it was formed.
 struct CombinedRow {
   Eigen::RowVectorXd w;
   std::vector<Share> shares;  ///< component = row of A
@@ -29,7 +29,8 @@ LikeTerms like_terms(const ErrorPolynomials& A) {
   return found;
 }
 
-/// Factors are 0, 1 or a tool offset, copied and never computed: equal rows are equal bit by bit.
+/// +1 for equal rows, -1 for negated rows, else 0. Factors are 0, +-1 or a tool offset, copied
+/// without arithmetic: equal rows have equal bits.
 double sign_between(const Eigen::RowVectorXd& a, const Eigen::RowVectorXd& b) {
   return a == b ? 1.0 : (a == -b ? -1.0 : 0.0);
 }
@@ -53,8 +54,9 @@ bool is_translation(const std::string& coefficient) {
   return coefficient.rfind("k_d", 0) == 0;
 }
 
-/// Single: +1; merged: + on a translation (there is one in every merged row: all their monomials
-/// are of the first order or constant, and some d function has them).
+/// The factor of a single coefficient becomes +1. In a merged row the factor of a translation
+/// becomes positive. Every merged row contains a translation: its monomial is constant or of first
+/// order, and a d function has that monomial.
 void normalise_sign(CombinedRow& row, std::span<const std::string> names) {
   Eigen::Index leading = -1;
   for (Eigen::Index j = 0; j < row.w.size(); ++j) {
@@ -70,7 +72,7 @@ void normalise_sign(CombinedRow& row, std::span<const std::string> names) {
   }
 }
 
-/// Names at tool offset zero, where the rows are as few coefficients as they can be.
+/// Names of rows at tool offset zero, where each row has the fewest coefficients.
 std::vector<std::string> row_names(const std::vector<CombinedRow>& rows,
                                    std::span<const std::string> K) {
   std::vector<std::string> names(rows.size());
@@ -97,7 +99,7 @@ std::vector<std::string> row_names(const std::vector<CombinedRow>& rows,
   return names;
 }
 
-/// The row that holds the same place of A.
+/// The row that contains the same component and monomial of A.
 const CombinedRow& with_share(const std::vector<CombinedRow>& rows, const Share& place) {
   return *std::find_if(rows.begin(), rows.end(), [&](const CombinedRow& r) {
     return std::any_of(r.shares.begin(), r.shares.end(), [&](const Share& s) {
@@ -169,7 +171,8 @@ Result<std::size_t> observable_combinations(const KinematicChain& chain, int ord
     longest_mm = std::max(longest_mm, t.norm());
   }
 
-  // Offsets near 1 keep the rows of W of one size; the unit of length does not change their rank.
+  // Offsets are scaled to at most 1 so that the rows of W have similar size; the unit of length
+  // does not change their rank.
   std::vector<Vector3> scaled(tool_offsets_mm.begin(), tool_offsets_mm.end());
   for (Vector3& t : scaled) {
     t /= longest_mm;
@@ -189,8 +192,8 @@ Result<std::size_t> observable_combinations(const KinematicChain& chain, int ord
   }
 
   Eigen::ColPivHouseholderQR<Eigen::MatrixXd> qr(W);
-  // Pivots are of the size of the offsets' differences or at rounding level (1e-15). Styli whose
-  // directions differ by less than a part in 1e9 count as parallel.
+  // Pivots have either the size of the differences between offsets or rounding level (1e-15). Styli
+  // whose directions differ by less than 1e-9 count as parallel.
   constexpr double kZero = 1e-9;
   qr.setThreshold(kZero);
 

@@ -63,8 +63,8 @@ struct Builder {
     }
   }
 
-  /// Between the axes at two places: the rotation about the third axis, before the travel of the
-  /// second.
+  /// Squareness of the axes at two places of the chain: a rotation about the third axis, before the
+  /// travel of the second.
   void add_squareness(std::size_t first_place, std::size_t second_place) {
     const std::size_t a = index(chain.order_w_to_t()[first_place]);
     const std::size_t b = index(chain.order_w_to_t()[second_place]);

@@ -15,8 +15,8 @@
 namespace abbe::calib::evemu {
 namespace {
 
-/// Scatter, over the positions, of the distances between balls at reading + L V: 0 for the true
-/// places of one artefact, whatever V has of a rotation.
+/// Scatter over the positions of the distances between balls at reading + L V. It is 0 for the true
+/// places of one artefact, also if V contains a rotation.
 double shape_scatter_m(const Observations& o, const Matrix3& L) {
   std::map<std::pair<int, int>, std::vector<double>> distances_m;
   for (std::size_t i = 0; i < o.rows.size(); ++i) {
@@ -40,12 +40,12 @@ double shape_scatter_m(const Observations& o, const Matrix3& L) {
   return free > 0.0 ? std::sqrt(squares / free) : 0.0;
 }
 
-/// What V may have suffered on its way into the file.
+/// Possible mistakes in the file of errors.
 std::vector<AxisMistake> mistakes_of_errors() {
   std::vector<AxisMistake> all{
       {"all signs reversed (V = actual - nominal, in um)", -Matrix3::Identity()},
-      {"errors in mm where um belong", 1e3 * Matrix3::Identity()},
-      {"errors in mm where um belong and all signs reversed", -1e3 * Matrix3::Identity()}};
+      {"errors in mm instead of um", 1e3 * Matrix3::Identity()},
+      {"errors in mm instead of um and all signs reversed", -1e3 * Matrix3::Identity()}};
   for (const AxisMistake& mistake : axis_mistakes()) {
     all.push_back({mistake.text + " in errors or readings", mistake.M});
   }
@@ -71,10 +71,10 @@ Result<void> check_one_shape(const Observations& o) {
     return {};
   }
 
-  return failure(ErrorCode::BadInput,
-                 message("errors: distances between the balls differ by ", kUmPerM * given_m,
-                         " um rms from position to position; they fit (", kUmPerM * best_m,
-                         " um) with ", text));
+  return failure(
+      ErrorCode::BadInput,
+      message("errors: distances between the balls differ by ", kUmPerM * given_m,
+              " um rms between the positions, but only by ", kUmPerM * best_m, " um with ", text));
 }
 
 }  // namespace abbe::calib::evemu

@@ -4,10 +4,10 @@
 
 namespace abbe::calib::evemu {
 
-/// BadInput where readings and errors make another artefact at every position, and one artefact
-/// once the errors are reversed, taken in mm, or have an axis reversed or two swapped. Noise of
-/// reading and V together leaves a scatter, too: only a change that leaves a third of it names a
-/// mistake.
+/// BadInput if readings and errors describe an artefact of another shape at every position, but one
+/// shape once the errors are reversed, converted from mm, or have an axis reversed or two axes
+/// swapped. Noise of readings and V also makes the shapes scatter: a mistake is reported only if
+/// correcting it reduces the scatter to a third or less.
 [[nodiscard]] Result<void> check_one_shape(const Observations&);
 
 }  // namespace abbe::calib::evemu

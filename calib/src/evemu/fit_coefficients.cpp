@@ -9,7 +9,7 @@
 namespace abbe::calib::evemu {
 namespace {
 
-/// Ball1's error is zero by definition: among the rows it would pass for an observation without
+/// The error of Ball1 is zero by definition; its rows would be taken for observations without
 /// noise.
 Eigen::MatrixXd without_ball1(const Observations& o, const Eigen::MatrixXd& rows) {
   std::vector<Eigen::Index> kept;
@@ -34,14 +34,14 @@ Result<Fit> fit_ols(const FitProblem& problem) {
   const Eigen::VectorXd scale = problem.X.colwise().norm().cwiseMax(1e-300).cwiseInverse();
   Eigen::ColPivHouseholderQR<Eigen::MatrixXd> qr(problem.X * scale.asDiagonal());
 
-  // Columns of unit length: what is determined has pivots above 1e-4 even for a flat array,
-  // rounding 1e-15.
+  // With columns of unit length, determined coefficients have pivots above 1e-4 even for a flat
+  // array; rounding leaves 1e-15.
   constexpr double kZero = 1e-10;
   qr.setThreshold(kZero);
   if (qr.rank() < n) {
     return failure(ErrorCode::RankDeficient,
                    message("least squares: rank ", qr.rank(), " of ", n,
-                           " coefficients; the positions do not tell them apart"));
+                           " coefficients; the positions do not determine all of them"));
   }
 
   Fit fit;
@@ -60,7 +60,7 @@ Result<Fit> fit_ols(const FitProblem& problem) {
   if (!(left > kZero * trace_C0)) {
     return failure(ErrorCode::TooFewObservations,
                    message("least squares: ", problem.X.rows(), " components for ", n,
-                           " coefficients leave nothing to judge the noise by"));
+                           " coefficients are too few to estimate the noise"));
   }
 
   const double s2 = (problem.y - problem.X * fit.c_m).squaredNorm() / left;
@@ -134,8 +134,8 @@ Result<Fit> fit_prior(PriorKind kind, const FitProblem& problem) {
 
 FitProblem problem_of(const Observations& o, const ScaledDesign& design,
                       const SolveOptions& options) {
-  // Without a prior, rows that are blind to a rotation cannot be solved, and the others are those
-  // of [Li OMM].
+  // Rows from touches do not determine the rotation and cannot be solved without a prior. The other
+  // estimators use the rows of [Li OMM].
   if (options.estimator != Estimator::BayesPose && options.estimator != Estimator::Ridge) {
     return {o,     design,          design_rows(o, design, RowsFrom::Centres), observed_m(o),
             false, artefact_rows(o)};
@@ -164,8 +164,7 @@ Result<Fit> fit_with(const FitProblem& problem, const SolveOptions& options) {
       return fit_sparse(problem, options);
   }
 
-  return failure(ErrorCode::BadInput,
-                 message("estimator ", name(options.estimator), " is not known here"));
+  return failure(ErrorCode::BadInput, message("unknown estimator ", name(options.estimator)));
 }
 
 }  // namespace abbe::calib::evemu

@@ -1,5 +1,5 @@
 #pragma once
-/// What every estimator of coefficients takes and gives: plain numbers on the scaled design.
+/// Input and output of every estimator of coefficients: plain numbers on the scaled design.
 
 #include <Eigen/Core>
 #include <optional>
@@ -21,9 +21,9 @@ struct FitProblem {
 struct Fit {
   Eigen::VectorXd c_m;
   Eigen::MatrixXd covariance_m2;
-  /// K A of estimates c = K y: what one standard uncertainty each of the array's errors does to c.
-  /// Beside covariance_m2; no columns where nothing is uncertain, or where it is in covariance_m2
-  /// (the bootstrap).
+  /// K A of estimates c = K y: effect on c of one standard uncertainty of each error of the array.
+  /// Not included in covariance_m2. No columns if the array is exact, or if the effect is included
+  /// in covariance_m2 (bootstrap).
   Eigen::MatrixXd artefact_m{};
   CovarianceKind kind = CovarianceKind::Analytic;
   std::optional<HyperParameters> hyper;
@@ -35,10 +35,10 @@ struct Fit {
   int iterations = 0;
 };
 
-/// whitened() rows but those of Ball1, whose error is zero by definition.
+/// whitened() rows without those of Ball1, whose error is zero by definition.
 [[nodiscard]] Eigen::MatrixXd white_rows(const Observations&, const Eigen::MatrixXd& rows);
 
-/// The rows of `observations` on a design that may be that of more positions.
+/// The rows of the observations. The design may be scaled to more positions than these.
 [[nodiscard]] FitProblem problem_of(const Observations&, const ScaledDesign&, const SolveOptions&);
 [[nodiscard]] Result<Fit> fit_with(const FitProblem&, const SolveOptions&);
 

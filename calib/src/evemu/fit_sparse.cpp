@@ -11,8 +11,8 @@
 namespace abbe::calib::evemu {
 namespace {
 
-/// The regression of [Li OMM]: plain monomials in mm, because a penalty speaks of the columns it is
-/// given.
+/// The regression of [Li OMM]: plain monomials in mm, because the result of a penalty depends on
+/// the columns.
 struct Regression {
   Eigen::MatrixXd X;
   Eigen::VectorXd y;
@@ -35,7 +35,7 @@ sparse::PenaltyKind kind_of(Estimator e) {
              : (e == Estimator::Mcp ? sparse::PenaltyKind::Mcp : sparse::PenaltyKind::Scad);
 }
 
-/// 50 gammas as in [Li OMM] (its optima lie on this list); the lasso has none.
+/// 50 values of gamma as in [Li OMM] (its optima are in this list); the lasso does not use gamma.
 std::vector<double> gammas(const SolveOptions& options) {
   if (options.estimator == Estimator::Lasso) {
     return {3.0};
@@ -90,8 +90,8 @@ Result<SparseChoice> choose(const Regression& r, const FitProblem& problem,
       });
 }
 
-/// Named coefficients, intercept first, on the scaled design [m]. The intercept belongs to all
-/// three components.
+/// Coefficients of the scaled design [m] from named coefficients, intercept first. The intercept is
+/// added to the constants of all three components.
 Eigen::VectorXd scaled_from_named(const ScaledDesign& design, Eigen::VectorXd with_intercept) {
   Eigen::VectorXd beta = with_intercept.tail(with_intercept.size() - 1);
   for (std::size_t j = 0; j < design.size(); ++j) {
@@ -99,28 +99,32 @@ Eigen::VectorXd scaled_from_named(const ScaledDesign& design, Eigen::VectorXd wi
       beta(static_cast<Eigen::Index>(j)) += with_intercept(0);
     }
   }
-  // Rows have units from mm to rad mm^-order: scaled to one size before they are solved.
+  // The units of the rows range from mm to rad mm^-order: rows are scaled to unit norm before the
+  // solution.
   const Eigen::MatrixXd M = design.named_from_scaled();
   const Eigen::VectorXd scale = M.rowwise().norm().cwiseInverse();
   return (scale.asDiagonal() * M).fullPivLu().solve(scale.cwiseProduct(beta)) / kMmPerM;
 }
 
-/// Down to the chosen lambda: the coefficients of a larger one are those of another estimator.
+/// The path down to the chosen lambda. NotConverged if it ends before: a larger lambda would give
+/// another estimator.
 Result<sparse::Path> path_to(const Regression& r, const SolveOptions& asked,
                              const SparseChoice& choice) {
   sparse::PathOptions options = path_along(choice.lambda);
   options.max_sweeps = asked.sparse.max_sweeps;
+
   return sparse::fit_path(r.X, r.y, {kind_of(asked.estimator), choice.gamma}, options)
       .and_then([&](sparse::Path path) -> Result<sparse::Path> {
         const auto reached = static_cast<std::size_t>(path.reached());
         if (reached == choice.lambda.size() && !path.budget_exhausted) {
           return path;
         }
-        return failure(ErrorCode::NotConverged,
-                       message("sparse fit (", name(asked.estimator), ", gamma ", choice.gamma,
-                               "): max_sweeps = ", options.max_sweeps, " end at lambda ",
-                               path.lambda[std::max<std::size_t>(reached, 1) - 1], ", number ",
-                               reached, " of ", choice.lambda.size(), "; choose a larger lambda"));
+        return failure(
+            ErrorCode::NotConverged,
+            message("sparse fit (", name(asked.estimator), ", gamma ", choice.gamma,
+                    "): the limit max_sweeps = ", options.max_sweeps, " was reached at lambda ",
+                    path.lambda[std::max<std::size_t>(reached, 1) - 1], ", number ", reached,
+                    " of ", choice.lambda.size(), "; choose a larger lambda"));
       });
 }
 
@@ -128,7 +132,7 @@ Eigen::VectorXd at_end(const sparse::Path& path) {
   return path.coefficients.col(path.reached() - 1);
 }
 
-/// Spread of refits to data drawn anew around the fit.
+/// Covariance of refits to random data drawn around the fit.
 Result<Eigen::MatrixXd> bootstrap(const FitProblem& problem, const Regression& r,
                                   const Eigen::VectorXd& fitted_mm, const SolveOptions& options,
                                   const SparseChoice& choice, const HyperParameters& noise) {
@@ -148,7 +152,7 @@ Result<Eigen::MatrixXd> bootstrap(const FitProblem& problem, const Regression& r
 
   for (Eigen::Index run = 0; run < runs; ++run) {
     const Eigen::VectorXd of_rows = draw(r.y.size()),
-                          of_poses = draw(S.cols());  // in this order everywhere
+                          of_poses = draw(S.cols());  // drawn in this order by every compiler
     Eigen::VectorXd scatter = coloured(o, noise.s_m * of_rows) + S * (noise.w_rad * of_poses);
     if (problem.A.cols() > 0) {
       scatter += problem.A * draw(problem.A.cols());  // one array for all positions of a run
@@ -165,8 +169,8 @@ Result<Eigen::MatrixXd> bootstrap(const FitProblem& problem, const Regression& r
                          static_cast<double>(std::max<Eigen::Index>(1, runs - 1)));
 }
 
-/// Noise and pose rotations are those the Bayesian estimator finds: the residuals of a fit that
-/// selects are too small.
+/// Noise and pose rotations are taken from the Bayesian estimator: the residuals of a sparse fit
+/// are too small.
 Result<void> add_covariance(const FitProblem& problem, const Regression& r,
                             const Eigen::VectorXd& beta, const SolveOptions& options, Fit& fit) {
   SolveOptions bayes;

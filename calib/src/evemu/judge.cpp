@@ -20,7 +20,7 @@
 namespace abbe::calib::evemu {
 namespace {
 
-/// The observations of one position, or of all others.
+/// The observations of one position, or of all other positions.
 Observations part_of(const Observations& o, int position, bool others) {
   Observations part = o;
   std::erase_if(part.rows, [&](const BallError& r) { return (r.position == position) == others; });
@@ -29,7 +29,7 @@ Observations part_of(const Observations& o, int position, bool others) {
   return part;
 }
 
-/// V of a contender at the balls of a position, relative to its Ball1.
+/// V of a compared model at the balls of a position, relative to Ball1 of the position.
 Eigen::VectorXd relative_to_ball1(const Observations& position,
                                   const std::function<Vector3(const Vector3&)>& V_at) {
   const Vector3 V1 = V_at(position.rows[position_rows(position).front().ball1].reading_m);
@@ -40,7 +40,7 @@ Eigen::VectorXd relative_to_ball1(const Observations& position,
   return V;
 }
 
-/// `watch` of a part of a computation, its progress from `low` to `high` of the whole.
+/// `watch` for a part of a computation: its progress 0 to 1 is reported as `low` to `high`.
 Watch part_of(const Watch& watch, double low, double high) {
   Watch part{.stopped = watch.stopped};
   if (watch.progress) {
@@ -51,10 +51,11 @@ Watch part_of(const Watch& watch, double low, double high) {
   return part;
 }
 
+/// Residuals of a model after the best-fit rotation of each position, summed over positions.
 struct Remainder {
   double whitened_squares = 0.0;
   double squares_m2 = 0.0;
-  std::size_t components = 0;  ///< without those of Ball1, which is no observation
+  std::size_t components = 0;  ///< without those of Ball1, which is not an observation
 
   void add(const Observations& position, const Eigen::VectorXd& r) {
     const Eigen::MatrixXd S = pose_rotation_rows(position);
@@ -73,8 +74,8 @@ struct Remainder {
   }
 };
 
-/// The balls of a position a model speaks of. Without Ball1 inside there are none: V is relative to
-/// it.
+/// The balls of a position inside the validity volume of a model. nullopt if Ball1 is outside,
+/// because V is relative to Ball1, or if no other ball is inside.
 std::optional<Observations> inside(const Observations& position, const ValidityVolume& volume) {
   if (!volume.contains(position.rows[position_rows(position).front().ball1].reading_m)) {
     return std::nullopt;
@@ -99,13 +100,13 @@ void note_artefact(const Observations& o, Verdict& verdict) {
   }
 }
 
-/// A model may be wrong by its stated uncertainty and half of it: beyond, an alternative refuses
-/// it.
+/// Largest accepted error of a model in units of its stated uncertainty. An alternative that
+/// exceeds it refuses the model.
 constexpr double kCoveredByU = 1.5;
 
-/// Written so that a NaN figure is refused.
+/// True if the uncertainty of the model covers the effect of the alternative. False for NaN.
 bool is_covered(const Alternative& other, const CorrectionSize& size) {
-  if (other.cause == Cause::Scatter) {  // is in u as white noise
+  if (other.cause == Cause::Scatter) {  // included in u as white noise
     const bool of_a_probe = other.bias_m <= std::sqrt(3.0) * kScatterOfProbes_m;
     return other.bias_m <= kMostUncertainty * size.V_m &&
            (of_a_probe || other.bias_m <= kScatterBesideU * size.u_m);
@@ -114,20 +115,21 @@ bool is_covered(const Alternative& other, const CorrectionSize& size) {
          root_sum_of_squares(other.bias_m, other.u_m) <= kCoveredByU * size.u_m;
 }
 
-/// What any of the other causes does to the touches and to the uncertainty.
-bool only_follows(std::string_view cause) {
+/// True for causes that are only consequences: each of the other causes enlarges the scatter of the
+/// touches and the uncertainty.
+bool is_consequence(std::string_view cause) {
   return cause == name(Cause::Scatter) || cause == name(Cause::Form) || cause == kUncertain;
 }
 
 bool is_cause(const Alternative& a) {
-  return a.comparison == Comparison::Made && !only_follows(name(a.cause));
+  return a.comparison == Comparison::Made && !is_consequence(name(a.cause));
 }
 
 bool refuses(const Alternative& a, const CorrectionSize& size) {
   return a.comparison != Comparison::Impossible && !is_covered(a, size);
 }
 
-/// What a run is refused for.
+/// The kinds of reasons for which a run is refused.
 struct RefusedFor {
   bool cause = false, form = false, scatter_or_uncertainty = false;
 };
@@ -147,22 +149,22 @@ RefusedFor refused_for(const Verdict& verdict, const std::vector<Alternative>& o
   return refused;
 }
 
-/// Whether a cause that the uncertainty covers may be behind what refuses: it made that
-/// uncertainty, or the scatter, large. The form of a ball follows from what happens while it is
-/// touched.
-bool may_be_behind(const RefusedFor& refused, const Alternative& a, const CorrectionSize& size) {
+/// True if a cause that the uncertainty covers may be the origin of a refusal for uncertainty,
+/// scatter or form, because it enlarged the uncertainty or the scatter. Only causes that act while
+/// a ball is touched can change its form.
+bool may_be_origin(const RefusedFor& refused, const Alternative& a, const CorrectionSize& size) {
   if (refused.cause || !is_cause(a)) {
     return false;
   }
-  constexpr double kMuchSurer = 0.7;  // with the cause half of the variance is gone
-  const bool matters = a.bias_m > kMatters * size.u_m || a.u_m < kMuchSurer * size.u_m;
+  constexpr double kMuchSmallerU = 0.7;  // ratio of u: the cause explains half of the variance
+  const bool matters = a.bias_m > kMatters * size.u_m || a.u_m < kMuchSmallerU * size.u_m;
   const bool in_time = a.cause == Cause::Touch || a.cause == Cause::Moved ||
                        a.cause == Cause::Creep || a.cause == Cause::Drift ||
                        a.cause == Cause::SlowNoise;
   return matters && (refused.scatter_or_uncertainty || (refused.form && in_time));
 }
 
-/// Reasons before those that only follow from them.
+/// Adds causes as reasons before the reasons that are only consequences.
 void add_alternatives(Verdict& verdict, std::vector<Alternative> others,
                       const CorrectionSize& size) {
   const RefusedFor refused = refused_for(verdict, others, size);
@@ -173,7 +175,7 @@ void add_alternatives(Verdict& verdict, std::vector<Alternative> others,
     const std::string text = other.cause == Cause::Scatter
                                  ? other.text
                                  : with_effect(other.text, other.bias_m, size.u_m);
-    if (refuses(other, size) || may_be_behind(refused, other, size)) {
+    if (refuses(other, size) || may_be_origin(refused, other, size)) {
       verdict.refuse(name(other.cause), text, reasons++);
     } else {
       verdict.notes.push_back(text);
@@ -181,15 +183,15 @@ void add_alternatives(Verdict& verdict, std::vector<Alternative> others,
   }
 }
 
-/// Slow noise that the estimate has in its covariance comes before the first reason that only
-/// follows.
+/// Slow noise in the covariance of the estimate is inserted before the first reason that is only a
+/// consequence; without such a reason it becomes a note.
 void add_slow_noise(Verdict& verdict, const Solution& solution) {
   if (!(solution.slow_noise > 0.0)) {
     return;
   }
   const std::string text =
-      slow_noise_text(solution.statistics.slow_noise_m) + "; it is in the uncertainty";
-  const auto first = std::find_if(verdict.causes.begin(), verdict.causes.end(), only_follows);
+      slow_noise_text(solution.statistics.slow_noise_m) + "; it is included in the uncertainty";
+  const auto first = std::find_if(verdict.causes.begin(), verdict.causes.end(), is_consequence);
   if (first == verdict.causes.end()) {
     verdict.notes.push_back(text);
   } else {
@@ -198,7 +200,7 @@ void add_slow_noise(Verdict& verdict, const Solution& solution) {
   }
 }
 
-/// Of the balls about Ball1.
+/// Largest distance of a ball from Ball1.
 double extent_m(const Observations& o) {
   double most_m = 0.0;
   for (const BallError& row : o.rows) {
@@ -207,15 +209,15 @@ double extent_m(const Observations& o) {
   return most_m;
 }
 
-/// What no touch shows.
+/// Notes on errors that touches cannot detect.
 void note_what_touches_do_not_show(Verdict& verdict, const Observations& o, double extent_m) {
   constexpr double kSteel_per_K = 11.5e-6;
   verdict.notes.push_back(message(
-      "all lengths come from the array: 1 K of wrong temperature of a steel array would be ",
-      1e6 * kSteel_per_K * extent_m, " um over ", extent_m, " m; no touch shows it"));
-  verdict.notes.push_back(message("holds for the tool offset (",
+      "all lengths come from the array: 1 K of wrong temperature of a steel array is an error of ",
+      1e6 * kSteel_per_K * extent_m, " um over ", extent_m, " m; touches cannot show it"));
+  verdict.notes.push_back(message("valid for the tool offset (",
                                   o.machine.tool_offset_m.transpose(),
-                                  ") m as configured; no touch shows it"));
+                                  ") m of the configuration; touches cannot check it"));
 }
 
 }  // namespace
@@ -307,7 +309,7 @@ Result<Verdict> judge(const Observations& observations, const Solution& solution
               kShapeOnly,
               message("shape only: the machine measured the blocks itself, so a rotation of about ",
                       1e6 * u_rad,
-                      " urad about Ball1 is unknown; give a rotation reference or accept ",
+                      " urad about Ball1 is unknown; provide a rotation reference or accept ",
                       kShapeOnly));
         }
         const CorrectionSize size = correction_size(o, solution);
@@ -323,8 +325,9 @@ Result<Verdict> judge(const Observations& observations, const Solution& solution
                       " points lie outside the volume the balls span and were not used"));
         }
         if (const auto& fit = solution.rotation.reference; fit && fit->widened > 1.0) {
-          verdict.notes.push_back(message("rotation reference: chi-square ", fit->widened,
-                                          " per degree of freedom, in the rotation's uncertainty"));
+          verdict.notes.push_back(
+              message("rotation reference: chi-square ", fit->widened,
+                      " per degree of freedom; the rotation's uncertainty is enlarged for it"));
         }
         verdict.accepted = verdict.reasons.empty();
         return verdict;

@@ -28,7 +28,7 @@
 namespace abbe::calib::evemu {
 namespace {
 
-/// Of a false alarm in a run without a fault, over all alternatives together.
+/// Probability of a false alarm in a run without a fault, over all alternatives together.
 constexpr double kFalseAlarm = 1e-4;
 constexpr double kCauses = 13.0;
 
@@ -43,7 +43,7 @@ RigidFreeNorm norm_over_balls(const Observations& o, const ScaledDesign& design)
   return {B, points};
 }
 
-/// White rows of a run, and the estimate of bayes-pose without any alternative.
+/// Whitened rows of a run, and the hyper-parameters of bayes-pose without any alternative.
 struct Rows {
   const Observations& o;
   const ScaledDesign& design;
@@ -81,7 +81,7 @@ Result<Rows> rows_of(const Observations& o, const ScaledDesign& design, const So
   return rows;
 }
 
-/// Estimate with columns added; those of the array's own uncertainty always are.
+/// Estimate with added columns. The columns of the array's own uncertainty are always added.
 struct Refit {
   HyperParameters hyper;
   Eigen::VectorXd c_m, d_m;
@@ -120,8 +120,8 @@ Result<Refit> refit(const Rows& rows, const ScaledDesign& design, const Eigen::M
   return refit_to(rows.y, rows, design, X, C, size_m);
 }
 
-/// The estimate itself, with the array's uncertainty among the columns: what alternatives are
-/// compared with.
+/// The estimate with which alternatives are compared: only the columns of the array's uncertainty
+/// are added.
 Result<Refit> base_of(const Rows& rows) {
   return refit(rows, rows.design, rows.X, Eigen::MatrixXd(rows.X.rows(), 0), 1.0);
 }
@@ -130,12 +130,12 @@ double threshold(double family) {
   return natural_logarithm(kCauses * family / kFalseAlarm);
 }
 
-/// The alternative may hold: a model that was not compared with it is refused.
+/// A comparison that failed. The alternative may be true: the model is refused.
 Alternative not_compared(Cause cause, const std::string& place, const std::string& why) {
   constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
   return {.cause = cause,
           .text = message("the comparison with cause \"", name(cause), "\"", place,
-                          " failed: ", why, "; look at the touches there and calibrate again"),
+                          " failed: ", why, "; check the touches there and calibrate again"),
           .bias_m = kNaN,
           .u_m = kNaN,
           .comparison = Comparison::Failed};
@@ -150,7 +150,7 @@ Alternative impossible(Cause cause, std::string text) {
           .comparison = Comparison::Impossible};
 }
 
-/// What is compared, and the results.
+/// Input and results of the comparisons.
 struct Comparisons {
   const Rows& rows;
   const Refit& base;
@@ -168,7 +168,7 @@ struct Screened {
   Screen::Gain gain{0.0, 0.0};
 };
 
-/// The best of one cause, its place and size. None where an alternative cannot be compared.
+/// The most likely alternative of one cause, by the screen. None if one of them cannot be compared.
 Result<Screened> screened(Comparisons& all, const AlternativeColumns& columns, const Screen& screen,
                           std::span<const Added> family) {
   Screened most;
@@ -178,8 +178,8 @@ Result<Screened> screened(Comparisons& all, const AlternativeColumns& columns, c
     }
     const Screen::Gain gain = screen.gain(white_rows(all.rows.o, columns.of(added)));
     if (!std::isfinite(gain.log_likelihood)) {
-      all.add(not_compared(added.cause, where(added, all.rows.o),
-                           "the data have no likelihood with it"));
+      all.add(
+          not_compared(added.cause, where(added, all.rows.o), "its likelihood cannot be computed"));
       return Screened{};
     }
     if (gain.log_likelihood > most.gain.log_likelihood) {
@@ -190,7 +190,8 @@ Result<Screened> screened(Comparisons& all, const AlternativeColumns& columns, c
   return most;
 }
 
-/// From the screen the best of one cause, from a fit of its own how likely it is.
+/// The screen selects the most likely alternative of one cause; a separate fit computes its
+/// likelihood.
 Result<void> compare_with(Comparisons& all, const AlternativeColumns& columns, const Screen& screen,
                           std::span<const Added> family) {
   const Result<Screened> best = screened(all, columns, screen, family);
@@ -224,7 +225,7 @@ Result<void> compare_with(Comparisons& all, const AlternativeColumns& columns, c
   return {};
 }
 
-/// The same errors with another design in the place of X. `what`: "the order of axes XYZ".
+/// Compares the estimate with another design in place of X. `what`: "the order of axes XYZ".
 void compare_with_design(Comparisons& all, const Result<ScaledDesign>& design, Cause cause,
                          const std::string& what, std::string text) {
   if (!design) {
@@ -271,7 +272,7 @@ std::string letters(const KinematicChain& chain) {
   return text;
 }
 
-/// One of each cause.
+/// Keeps only the most likely alternative among those from index `from` on.
 void keep_the_most_likely(std::vector<Alternative>& found, std::size_t from) {
   const auto first = found.begin() + static_cast<std::ptrdiff_t>(from);
   if (first == found.end()) {
@@ -300,10 +301,9 @@ Result<void> compare_orders_of_axes(Comparisons& all) {
             .and_then([&](const KinematicChain& chain) {
               return ScaledDesign::of(chain, rows.o.order, rows.design.box());
             });
-    compare_with_design(
-        all, design, Cause::ChainOrder, message("the order of axes ", order),
-        message("the axes carry each other in the order ", order, " from workpiece to tool, not ",
-                used, " as the machine's chain says"));
+    compare_with_design(all, design, Cause::ChainOrder, message("the order of axes ", order),
+                        message("the order of the axes from workpiece to tool is ", order, ", not ",
+                                used, " as in the machine's chain"));
   } while (std::next_permutation(order.begin(), order.end()));
   keep_the_most_likely(all.found, before);
 
@@ -315,15 +315,17 @@ Result<void> compare_higher_order(Comparisons& all) {
   if (Result<void> goes_on = check_stopped(all.watch.stopped); !goes_on) {
     return goes_on;
   }
-  compare_with_design(
-      all, ScaledDesign::of(rows.o.machine.chain, rows.o.order + 1, rows.design.box()),
-      Cause::Order, message("polynomials of order ", rows.o.order + 1),
-      message("the errors of this machine are no polynomials of order ", rows.o.order, ": order ",
-              rows.o.order + 1, " fits better; set it as order"));
+  compare_with_design(all,
+                      ScaledDesign::of(rows.o.machine.chain, rows.o.order + 1, rows.design.box()),
+                      Cause::Order, message("polynomials of order ", rows.o.order + 1),
+                      message("polynomials of order ", rows.o.order,
+                              " do not describe the errors of this machine: order ",
+                              rows.o.order + 1, " fits better; set order = ", rows.o.order + 1));
   return {};
 }
 
-/// Slow noise, for estimates without it. That of bayes-pose was compared when it was made.
+/// Compares with slow noise, for estimators that do not model it. For bayes-pose solve() has made
+/// this comparison.
 Result<void> compare_slow_noise(Comparisons& all, const Solution& solution) {
   const Rows& rows = all.rows;
   if (solution.estimator == Estimator::BayesPose || rows.o.seen.empty()) {
@@ -359,11 +361,13 @@ Result<void> compare_slow_noise(Comparisons& all, const Solution& solution) {
   return {};
 }
 
-/// Without what the finding does to the errors seen, whose size the touches know: the more, the
-/// more likely it is. What only scatters has no known effect: NaN, and refuses.
+/// The alternative for a finding in the touches. Its effect is subtracted from the observed errors;
+/// the more significant the finding, the better the size of the effect is known. A finding of
+/// scatter has no known effect: bias_m stays NaN, and the alternative refuses the model.
 Alternative compared_touch(const Rows& rows, const Refit& base, const TouchFinding& f) {
   constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
-  constexpr double kKnownTo = 0.3;  // at best: the surface under a touch is not the fitted one
+  // Smallest relative uncertainty of the effect: the real surface differs from the fitted one.
+  constexpr double kKnownTo = 0.3;
   Alternative found{f.cause, f.text, f.log_likelihood, kNaN, rows.norm.rms_u_m(base.covariance_m2)};
 
   if (f.rows_m.size() == 0) {
@@ -395,7 +399,7 @@ Result<void> compare_touches(Comparisons& all, const TouchResiduals& touches) {
   for (const std::string& place : touches.failed) {
     all.add(not_compared(
         Cause::Touch, ", " + place,
-        "no sphere or plane fits its touches once the model's V is taken out of them"));
+        "no sphere or plane fits its touches after the model's V is removed from them"));
   }
 
   if (!touches.not_compared.empty()) {
@@ -441,7 +445,7 @@ Result<void> compare_all(Comparisons& all, const Solution& solution) {
   return compared;
 }
 
-/// What the balls scatter by beyond touches and array is somewhere in the machine.
+/// Scatter of the ball centres beyond that of touches and array. Its origin is in the machine.
 std::optional<Alternative> unexplained_scatter(const Rows& rows, const Refit& base,
                                                const TouchResiduals& touches) {
   constexpr double kSuspicious = 2.0;
@@ -455,17 +459,18 @@ std::optional<Alternative> unexplained_scatter(const Rows& rows, const Refit& ba
       .cause = Cause::Scatter,
       .text = message(
           "ball centres scatter by ", s_m * kUmPerM,
-          " um about the model, their touches let them scatter by ", touches.s_centre_m * kUmPerM,
-          " um: the errors of this machine are no polynomials of order ", rows.o.order,
-          " (pitch of a screw, a travelling weight), or the array is not rigid, or slow noise"),
+          " um about the model, but the noise of their touches explains only ",
+          touches.s_centre_m * kUmPerM, " um: polynomials of order ", rows.o.order,
+          " do not describe the errors of this machine (pitch of a screw, a moving load), or the "
+          "array is not rigid, or there is slow noise"),
       .log_likelihood = 0.0,
       .bias_m = excess_m,
       .u_m = rows.norm.rms_u_m(base.covariance_m2)};
 }
 
-/// A noise of the probe averages out in the model, what the machine has within a ball does not: no
-/// touch tells them apart. Backlash that was found is not in it: the model is the mean of both
-/// sides.
+/// Noise of the probe averages out in the model; errors of the machine within a ball do not.
+/// Touches cannot distinguish the two. Backlash that was found is not included: the model is the
+/// mean of both directions of approach.
 std::optional<Alternative> scatter_of_touches(const CorrectionSize& size,
                                               const TouchResiduals& touches) {
   const double within_m = std::sqrt(3.0) * touches.sigma_of_no_cause_m;
@@ -476,7 +481,7 @@ std::optional<Alternative> scatter_of_touches(const CorrectionSize& size,
       .cause = Cause::Scatter,
       .text = message("touches scatter by ", touches.sigma_of_no_cause_m * kUmPerM,
                       " um about their balls and blocks: backlash or the pitch of a screw, "
-                      "which the model does not follow, or a probe that does not repeat"),
+                      "which the model does not follow, or a probe with poor repeatability"),
       .log_likelihood = 0.0,
       .bias_m = within_m,
       .u_m = size.u_m};
@@ -499,7 +504,8 @@ CorrectionSize correction_size(const Observations& o, const Solution& solution) 
 
 Result<std::vector<Alternative>> alternatives(const Observations& observations,
                                               const Solution& solution, const Watch& watch) {
-  // Slow noise of any size would follow an array that moved once, too.
+  // All alternatives are compared without slow noise: slow noise that is large enough would also
+  // fit an array that moved once.
   const Observations o = with_slow_noise(observations, 0.0);
   const Result<ScaledDesign> design = design_of(o);
   if (!design) {
@@ -510,7 +516,7 @@ Result<std::vector<Alternative>> alternatives(const Observations& observations,
   const auto base = rows.and_then([](const Rows& r) { return base_of(r); });
   if (!base) {
     return failure(base.error().code,
-                   message("lack of fit, the estimate itself: ", base.error().text));
+                   message("lack of fit of the estimate itself: ", base.error().text));
   }
 
   Comparisons all{*rows, *base, watch};
@@ -526,10 +532,9 @@ Result<std::vector<Alternative>> alternatives(const Observations& observations,
     all.add(*std::move(scatter));
   }
 
-  // Touches that scatter everywhere come before the features that scatter most. First what moves
-  // the model: backlash is highly significant and leaves the centres where they are. Of that one
-  // touch off its surface first: its ball is off its place, or the array seems to have moved,
-  // because of it.
+  // First the alternatives that change the model: backlash is highly significant but hardly moves
+  // the centres. Among these a single touch off its surface comes first: it can be the origin of a
+  // displaced ball or of an array that seems to have moved. Then by likelihood.
   const auto key = [](const Alternative& a) {
     return std::tuple(!(a.bias_m > kMatters * a.u_m), a.cause != Cause::Touch, -a.log_likelihood);
   };

@@ -31,7 +31,7 @@ LinearGaussian::LinearGaussian(const Eigen::MatrixXd& X, const Eigen::MatrixXd& 
 LinearGaussian::Evidence LinearGaussian::evidence(const Eigen::VectorXd& prior,
                                                   double noise) const {
   const Eigen::Index m = R_.rows(), out_of_reach = rows_ - m;
-  // K = R diag(prior) R^T + s^2 I is the covariance of z; the rest of y is pure noise.
+  // K = R diag(prior) R^T + s^2 I is the covariance of z; the rest of y contains only noise.
   const Eigen::MatrixXd scaled = R_ * prior.cwiseSqrt().asDiagonal();
   Eigen::MatrixXd K = Eigen::MatrixXd::Zero(m, m);
   K.selfadjointView<Eigen::Lower>().rankUpdate(scaled);
@@ -55,7 +55,7 @@ LinearGaussian::Evidence LinearGaussian::evidence(const Eigen::VectorXd& prior,
   const Eigen::VectorXd used = L_inv_scaled.colwise().squaredNorm();
   e.by_log_prior = 0.5 * (projected.cwiseAbs2() - used);
 
-  // trace(K^-1) s^2 = m - trace(K^-1 R D R^T); z^T K^-2 z from one more solve.
+  // trace(K^-1) s^2 = m - trace(K^-1 R D R^T), D = diag(prior); z^T K^-2 z from one more solve.
   const Eigen::VectorXd K_inv_z = llt.matrixU().solve(L_inv_z);
   e.by_log_noise = 0.5 * (noise * K_inv_z.squaredNorm() - (static_cast<double>(m) - used.sum()) +
                           rest_ / noise - static_cast<double>(out_of_reach));
@@ -63,7 +63,8 @@ LinearGaussian::Evidence LinearGaussian::evidence(const Eigen::VectorXd& prior,
   return e;
 }
 
-/// Scaled by the prior: no difference of large and small variances.
+/// Posterior information matrix, scaled by the prior: large and small variances are not subtracted
+/// from each other.
 struct LinearGaussian::Information {
   Eigen::VectorXd root;
   Eigen::MatrixXd scaled;
@@ -108,10 +109,10 @@ LinearGaussian::Posterior LinearGaussian::posterior(const Eigen::VectorXd& prior
   p.covariance = 0.5 * (p.covariance + p.covariance.transpose()).eval();
   p.mean = root.cwiseProduct(llt.solve(scaled.transpose() * (z_ / std::sqrt(noise))));
 
-  // Column j spends (inverse * scaled^T scaled)_jj = 1 - inverse_jj.
-  const Eigen::VectorXd spent = Eigen::VectorXd::Ones(n) - inverse.diagonal();
-  p.effective_parameters = spent.head(unknowns_).sum();
-  p.effective_pose_parameters = spent.tail(n - unknowns_).sum();
+  // Degrees of freedom of column j: (inverse * scaled^T scaled)_jj = 1 - inverse_jj.
+  const Eigen::VectorXd used = Eigen::VectorXd::Ones(n) - inverse.diagonal();
+  p.effective_parameters = used.head(unknowns_).sum();
+  p.effective_pose_parameters = used.tail(n - unknowns_).sum();
 
   return p;
 }

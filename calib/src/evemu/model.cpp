@@ -8,7 +8,7 @@
 namespace abbe::calib::evemu {
 namespace {
 
-/// Room on the stack for the entries of all components: 3 * 42 at order 5.
+/// Size of the arrays on the stack for the entries of all components: 3 * 42 at order 5.
 constexpr std::size_t kMostEntries = 128;
 
 std::string unit_of(const DesignFunction& f) {
@@ -36,7 +36,8 @@ Result<EvemuModel> EvemuModel::of(ScaledDesign design, const Vector3& ball1_m, E
 
   if (!covariance_m2.isApprox(covariance_m2.transpose(), 1e-12) ||
       covariance_m2.diagonal().minCoeff() < 0) {
-    return failure(ErrorCode::BadInput, "evemu model: the covariance is not one");
+    return failure(ErrorCode::BadInput,
+                   "evemu model: the covariance is not symmetric or has a negative variance");
   }
 
   EvemuModel model(std::move(design));
@@ -57,7 +58,7 @@ Result<EvemuModel> EvemuModel::of(ScaledDesign design, const Vector3& ball1_m, E
 
   model.first_[3] = model.entries_.size();
   if (model.entries_.size() > kMostEntries) {
-    return failure(ErrorCode::BadInput, "evemu model: more functions than any order has");
+    return failure(ErrorCode::BadInput, "evemu model: more functions than the highest order has");
   }
 
   model.entry_covariance_ = covariance_m2(column, column);
@@ -89,7 +90,7 @@ void EvemuModel::V_and_cov_at(const Vector3& reading_m, Vector3& V_m, Matrix3& c
     V_m(static_cast<Eigen::Index>(e.part.component)) += b[i] * e.c_m;
   }
 
-  // cov_cd = b_c^T C_cd b_d: for every column of C once, from its component downwards.
+  // cov_cd = b_c^T C_cd b_d. Every column of C is read once, from its own component downwards.
   using Column = Eigen::Map<Eigen::VectorXd>;
   alignas(32) std::array<double, kMostEntries> sum;
   const std::size_t total = entries_.size();

@@ -9,9 +9,10 @@
 namespace abbe::calib::evemu {
 namespace {
 
-constexpr double kBall1Variance = 1e-4;
+constexpr double kBall1Variance = 1e-4;  // of s^2; keeps the covariance regular
 
-/// Applies `act` to the balls of every position, component by component.
+/// Applies `act` to the rows of all balls of a position, separately for each position and each
+/// component.
 template <class Act>
 Eigen::MatrixXd by_position(const Observations& o, const Eigen::MatrixXd& rows, const Act& act) {
   Eigen::MatrixXd result(rows.rows(), rows.cols());
@@ -28,7 +29,7 @@ Eigen::MatrixXd by_position(const Observations& o, const Eigen::MatrixXd& rows, 
 
 /// k_ij - k_i1 - k_1j + k_11 of the balls of a position.
 Eigen::MatrixXd slow_covariance(const SeenArtefact& seen) {
-  constexpr double kPerPosition = 4.0;
+  constexpr double kPerPosition = 4.0;  // correlation times in one position
   const std::vector<double> t = times_in_position(seen);
   const auto k = [&](Eigen::Index i, Eigen::Index j) {
     return exponential(-kPerPosition *

@@ -38,13 +38,14 @@ Result<void> check_temperature(const Calibrator& c, const ObserveOptions& option
   if (c.expansivity && !given) {
     return failure(ErrorCode::BadInput,
                    message("calibrator \"", c.name,
-                           "\" says how the array grows, but nothing says how warm it was"));
+                           "\" states the thermal expansion of the array, but the temperature of "
+                           "the array is not given"));
   }
 
   if (given && !c.expansivity) {
     return failure(ErrorCode::BadInput,
                    message("the temperature of the array is given, but calibrator \"", c.name,
-                           "\" does not say how it grows"));
+                           "\" does not state its thermal expansion"));
   }
 
   return {};
@@ -54,7 +55,7 @@ Calibrator at_the_machine(const Calibrator& c, const std::optional<Expansion>& e
   return expansion ? at_temperature(c, *expansion) : c;
 }
 
-/// Of a calibrator that has passed check().
+/// Requires a calibrator that has passed check().
 RigidTransform pre_to_uniform(const Calibrator& c) {
   return inverse(*uniform_frame(c.balls.front().centre_m, c.blocks[0].normal, c.blocks[1].normal));
 }
@@ -82,7 +83,8 @@ Result<void> check_volume(const Observations& o, const ObserveOptions& options) 
   return {};
 }
 
-/// Ball1 of every position, which must be there, be zero, and stand still.
+/// Computes the mean reading of Ball1. BadInput if Ball1 moved between positions or its error is
+/// not zero.
 Result<void> place_ball1(Observations& o, const ObserveOptions& options) {
   std::vector<const BallError*> first;
   for (const BallError& row : o.rows) {
@@ -98,13 +100,14 @@ Result<void> place_ball1(Observations& o, const ObserveOptions& options) {
     if (shift_m > options.max_ball1_shift_m) {
       return at_position(
           row->position, ErrorCode::BadInput,
-          message("Ball1 was read ", shift_m * kMmPerM,
-                  " mm from its mean place: it must stand still, the artefact turns about it"));
+          message("Ball1 was measured ", shift_m * kMmPerM,
+                  " mm from its mean position: Ball1 must stay in place while the artefact is "
+                  "turned about it"));
     }
     if (row->V_m.norm() * kUmPerM > 1e-3) {
       return at_position(row->position, ErrorCode::BadInput,
                          message("the error of Ball1 is ", row->V_m.norm() * kUmPerM,
-                                 " um: errors are relative to Ball1, it must be 0"));
+                                 " um: errors are relative to Ball1, so it must be 0"));
     }
   }
 
@@ -185,14 +188,15 @@ Result<Observations> observe(std::span<const Touch> touches, const Calibrator& a
     }
     for (std::size_t i = 0; i < c.balls.size(); ++i) {
       const Vector3& reading_m = seen->balls[i].centre;
-      // Ball1 is the origin of both frames: exactly zero, not rounding.
+      // Ball1 is the origin of both frames: its error is set to exactly zero, without rounding.
       const Vector3 V_m = i == 0 ? Vector3(Vector3::Zero()) : Vector3(seen->ideal_m[i] - reading_m);
       o.rows.push_back({position, c.balls[i].number, reading_m, V_m});
     }
     if (const auto before = stands_as_at(seen->T_self_uni.R, turned, options.least_turn_rad)) {
-      return at_position(position, ErrorCode::BadInput,
-                         message("the artefact stands as at position ", o.seen[*before].position,
-                                 ": touches of one position twice, or it was not turned"));
+      return at_position(
+          position, ErrorCode::BadInput,
+          message("the artefact has the same orientation as at position ", o.seen[*before].position,
+                  ": one position was touched twice, or the artefact was not turned"));
     }
     turned.push_back(seen->T_self_uni.R);
     o.seen.push_back(*std::move(seen));
@@ -222,7 +226,7 @@ Result<Observations> observe_errors(std::span<const BallError> errors, const Mac
     }
     if (i > 0 && row.position == o.rows[i - 1].position && row.ball == o.rows[i - 1].ball) {
       return at_position(row.position, ErrorCode::BadInput,
-                         message("ball ", row.ball, " stands there twice"));
+                         message("ball ", row.ball, " is listed twice"));
     }
     has_ball1[row.position] = has_ball1[row.position] || row.ball == 1;
   }
@@ -230,7 +234,7 @@ Result<Observations> observe_errors(std::span<const BallError> errors, const Mac
   for (int p = 1; p <= options.positions; ++p) {
     if (!has_ball1.contains(p)) {
       return at_position(p, ErrorCode::TooFewObservations,
-                         message("left out, of ", options.positions, " positions"));
+                         message("left out; ", options.positions, " positions are required"));
     }
   }
 

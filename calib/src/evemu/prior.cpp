@@ -41,24 +41,24 @@ const Bounds& bounds() {
   return b;
 }
 
-/// The error of an axis along itself, linear: its scale.
+/// True for the scale error of an axis: the linear translation along the axis itself.
 bool is_scale(const DesignFunction& f) {
   return f.kind == FunctionKind::Translation && f.order == 1 && f.part[0].component == f.axis;
 }
 
-/// Below this s_d the prior of linear translations does not depend on it.
+/// Lower limit of s_d in the prior of a linear translation.
 double least_s_d_m(const DesignFunction& f, const ScaledDesign& design) {
   return is_scale(f) ? kScalePrior * design.arm_unit_m() : kLinearPrior_m;
 }
 
-/// Of a scale: what the axis has of its own [m^2]. To it comes s_a^2.
+/// Prior variance of a scale error without the part s_a^2 of rotations [m^2].
 double own_scale_variance_m2(const DesignFunction& f, const ScaledDesign& design, double s_d_m) {
   const double half_m = design.box().half_width_m(static_cast<Eigen::Index>(f.axis));
   const double sd_m = std::max(s_d_m, least_s_d_m(f, design)) * half_m / design.arm_unit_m();
   return sd_m * sd_m;
 }
 
-/// d log(variance) / d theta of one column.
+/// d log(prior variance) / d theta of one column. `f`: its function; null: a pose rotation.
 Theta sensitivity(PriorKind kind, const DesignFunction* f, const ScaledDesign& design,
                   const HyperParameters& h) {
   Theta d = Theta::Zero();
@@ -103,7 +103,7 @@ struct Objective {
     for (Eigen::Index j = 0; j < e.by_log_prior.size(); ++j) {
       const auto column = static_cast<std::size_t>(j);
       if (column >= design.size() && column < design.size() + added.size()) {
-        continue;  // known
+        continue;  // its prior variance is known
       }
       const DesignFunction* f = column < design.size() ? &design.functions()[column] : nullptr;
       gradient -= e.by_log_prior(j) * sensitivity(kind, f, design, h);
@@ -114,7 +114,7 @@ struct Objective {
   }
 };
 
-/// Directions that would leave the bounds are taken out.
+/// Sets those components of a direction to zero that would leave the bounds.
 void keep_inside(const Theta& theta, const Theta& gradient, Theta& direction) {
   for (Eigen::Index i = 0; i < theta.size(); ++i) {
     const bool at_low = theta(i) <= bounds().low(i) && gradient(i) > 0;
@@ -133,7 +133,7 @@ struct Minimum {
 /// BFGS with backtracking, steps of at most a factor e^2 in any parameter.
 Minimum descend(Objective& f, const Theta& start) {
   constexpr int kMostIterations = 60;
-  // of the log likelihood per unit of log theta: far below what it can tell
+  // Gradient of the log likelihood by theta (logarithms): far below a significant difference.
   constexpr double kFlat = 1e-4;
   Minimum at{start};
   Theta gradient;
@@ -224,9 +224,9 @@ Result<HyperParameters> most_likely(PriorKind kind, const ScaledDesign& design,
                                     std::size_t positions, const LinearGaussian& problem,
                                     std::span<const double> added) {
   Objective f{kind, design, positions, problem, added};
-  // The likelihood can have one maximum that calls the scatter noise and one that calls it pose
-  // rotation; and one where a flat array's noise is the scale across it (large s_d, small rho)
-  // beside that of a good machine.
+  // The likelihood can have several maxima: one explains the scatter as noise, one as pose
+  // rotations. With a flat array one maximum explains noise as the scale perpendicular to the array
+  // (large s_d, small rho), another one belongs to an accurate machine.
   const std::array<HyperParameters, 4> starts{
       HyperParameters{.s_d_m = 5e-4, .rho = 0.6, .s_a_m = 5e-4, .s_m = 1e-5, .w_rad = 1e-4},
       HyperParameters{.s_d_m = 5e-4, .rho = 0.6, .s_a_m = 5e-4, .s_m = 5e-6, .w_rad = 2e-6},
@@ -244,7 +244,7 @@ Result<HyperParameters> most_likely(PriorKind kind, const ScaledDesign& design,
 
   if (!std::isfinite(best.value)) {
     return failure(ErrorCode::NotConverged,
-                   message("bayes: none of ", used, " starts has a likelihood"));
+                   message("bayes: none of ", used, " starting points has a likelihood"));
   }
 
   HyperParameters h = parameters(best.theta);
@@ -265,7 +265,8 @@ Result<HyperParameters> most_likely_near(const HyperParameters& start, const Sca
   Objective f{PriorKind::BayesPose, design, positions, problem, added};
   const Minimum found = descend(f, logarithms(start));
   if (!std::isfinite(found.value)) {
-    return failure(ErrorCode::NotConverged, "bayes: no likelihood near the estimate");
+    return failure(ErrorCode::NotConverged,
+                   "bayes: the likelihood near the estimate cannot be computed");
   }
   HyperParameters h = parameters(found.theta);
   h.log_likelihood = -found.value;

@@ -1,6 +1,6 @@
 #pragma once
-/// The marginal likelihood with columns added to the design, from hyper-parameters that are nearly
-/// right.
+/// Hyper-parameters of the largest marginal likelihood with columns added to the design, searched
+/// from a starting point near the solution.
 
 #include <Eigen/Core>
 #include <span>
@@ -9,7 +9,7 @@
 
 namespace abbe::calib::evemu {
 
-/// As most_likely() of bayes-pose, from one start.
+/// As most_likely() for bayes-pose, from one starting point.
 [[nodiscard]] Result<HyperParameters> most_likely_near(const HyperParameters& start,
                                                        const ScaledDesign&, std::size_t positions,
                                                        const LinearGaussian& problem,

@@ -17,8 +17,9 @@ struct Used {
   std::vector<std::size_t> outside;
 };
 
-/// Inside, or beyond the hull by no more than 2 % of the way from its middle: the balls themselves
-/// are its vertices, and whoever measures them again reads some micrometres farther out.
+/// Points inside the hull, or outside by at most 2 % of the distance from its centre. The balls
+/// themselves are the vertices of the hull, and a repeated measurement of a ball may lie some
+/// micrometres outside.
 Used inside_of(const ValidityVolume& volume, std::span<const BallError> points) {
   constexpr double kPulledIn = 0.98;
   const Vector3 centre = bounding_box(volume.vertices_m()).centre_m;
@@ -42,8 +43,8 @@ std::string listed(const std::vector<std::size_t>& numbers) {
   return text;
 }
 
-/// Rows of the reference: r = J x + B dc + noise, x = translation and rotation, dc what the model's
-/// shape is off.
+/// Rows of the reference: r = J x + B dc + noise. x: translation and rotation; dc: error of the
+/// model's shape.
 struct Rows {
   Eigen::MatrixXd J, B;
   Eigen::VectorXd r;
@@ -79,8 +80,8 @@ struct Turn {
   double worst_m = 0.0;
 };
 
-/// Generalised least squares over S = sigma^2 1 + B C B^T: where the model's shape is uncertain, or
-/// uncertain together, the reference is not asked to agree with it.
+/// Generalised least squares with the covariance S = sigma^2 1 + B C B^T: where the model's shape
+/// is uncertain, or its errors are correlated, the reference has correspondingly less weight.
 Turn turn_onto(const Rows& rows, const Eigen::MatrixXd& C_shape, double sigma_m) {
   Eigen::MatrixXd S = rows.B * C_shape * rows.B.transpose();
   S.diagonal().array() += sigma_m * sigma_m;
@@ -110,8 +111,8 @@ Turn turn_onto(const Rows& rows, const Eigen::MatrixXd& C_shape, double sigma_m)
   return turn;
 }
 
-/// chi-square that one right reference in 1000 exceeds. Wilson and Hilferty's cube, 2 % high at 3
-/// degrees of freedom, better above.
+/// The value of chi-square that one correct reference in 1000 exceeds. Approximation of Wilson and
+/// Hilferty, 2 % high at 3 degrees of freedom, more accurate above.
 double chi2_of_one_in_1000(double dof) {
   constexpr double kNormal = 3.0902;  // one-sided 99.9 %
   const double s = 2.0 / (9.0 * dof);
@@ -119,7 +120,7 @@ double chi2_of_one_in_1000(double dof) {
   return dof * root * root * root;
 }
 
-/// The covariance of the shape alone: without the rotation set_gauge() put in.
+/// The covariance of the shape alone, without the rotation that set_gauge() added.
 Eigen::MatrixXd shape_covariance(const EvemuModel& model, const MeanRotation& rotation) {
   const Eigen::MatrixX3d G = model.design().rotation_about(model.ball1_m());
   return rotation.referenced
@@ -147,8 +148,8 @@ Result<Solution> with_rotation_reference(Solution solution, const RotationRefere
 
   const EvemuModel& evemu = *solution.model.polynomials();
   const Used used = inside_of(solution.model.validity(), reference.points);
-  if (Result<void> fine = check_size(used, reference.points.size()); !fine) {
-    return tl::unexpected(fine.error());
+  if (Result<void> valid = check_size(used, reference.points.size()); !valid) {
+    return tl::unexpected(valid.error());
   }
 
   const Rows rows = rows_of(evemu, used.points);
@@ -162,25 +163,25 @@ Result<Solution> with_rotation_reference(Solution solution, const RotationRefere
 
   const Eigen::MatrixXd C_shape = shape_covariance(evemu, solution.rotation);
   const Turn turn = turn_onto(rows, C_shape, reference.sigma_m);
-  const double unsuspicious = chi2_of_one_in_1000(turn.dof);
+  const double chi2_limit = chi2_of_one_in_1000(turn.dof);
 
-  // A machine is no polynomial, and many points see that long before they are wrong: up to twice
-  // the stated uncertainties widen the rotation's, as [Birge 1932]. Written so that a NaN is
-  // refused.
+  // Errors of a real machine are not exactly polynomials, and many points detect this before the
+  // reference is wrong. Residuals of up to twice the stated uncertainties therefore only enlarge
+  // the rotation's uncertainty, as [Birge 1932]. The comparison is written to refuse NaN.
   constexpr double kMostPerDof = 4.0;
-  const double widened = turn.chi2 > unsuspicious ? turn.chi2 / turn.dof : 1.0;
-  if (!(turn.chi2 <= std::max(unsuspicious, kMostPerDof * turn.dof))) {
+  const double widened = turn.chi2 > chi2_limit ? turn.chi2 / turn.dof : 1.0;
+  if (!(turn.chi2 <= std::max(chi2_limit, kMostPerDof * turn.dof))) {
     return failure(
         ErrorCode::BadInput,
         message("rotation reference: does not fit the model after any rotation and translation: "
                 "chi-square ",
                 turn.chi2, " with ", turn.dof, " degrees of freedom, point ",
                 used.numbers[turn.worst], " is off by ", 1e6 * turn.worst_m,
-                " um (another frame, sign or artefact, or a smaller uncertainty than it has)"));
+                " um (another frame, sign or artefact, or the stated uncertainty is too small)"));
   }
 
   const Eigen::MatrixX3d G = evemu.design().rotation_about(evemu.ball1_m());
-  // Off after the turn: G (K (B dc + noise)) - dc.
+  // Error after the rotation: G (K (B dc + noise)) - dc.
   const Eigen::MatrixXd kept =
       Eigen::MatrixXd::Identity(C_shape.rows(), C_shape.cols()) - G * (turn.K * rows.B);
   const Matrix3 from_noise = reference.sigma_m * reference.sigma_m * turn.K * turn.K.transpose();
@@ -189,7 +190,7 @@ Result<Solution> with_rotation_reference(Solution solution, const RotationRefere
   Eigen::MatrixXd C = kept * C_shape * kept.transpose() + G * from_noise * G.transpose();
   C += (widened - 1.0) * G * cov_rad2 * G.transpose();
   C = 0.5 * (C + C.transpose()).eval();
-  C.diagonal() = C.diagonal().cwiseMax(0.0);  // what was added came off again, but for rounding
+  C.diagonal() = C.diagonal().cwiseMax(0.0);  // rounding can leave small negative variances
   Result<EvemuModel> turned =
       EvemuModel::of(evemu.design(), evemu.ball1_m(), evemu.c_m() + G * turn.omega_rad, C);
 

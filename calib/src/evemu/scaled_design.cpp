@@ -9,7 +9,7 @@
 namespace abbe::calib::evemu {
 namespace {
 
-using Coefficients = std::array<double, kMostOrder + 1>;  ///< of 1, q, q^2 ...
+using Coefficients = std::array<double, kMostOrder + 1>;  ///< coefficients of 1, q, q^2 ...
 
 std::size_t axis_of(const EquivalentModel& model, std::size_t row) {
   Eigen::Index coefficient = 0;
@@ -91,12 +91,12 @@ Result<ScaledDesign> ScaledDesign::of(const KinematicChain& chain, int order,
     return failure(ErrorCode::NotFinite, "scaled design: the box of readings is not finite");
   }
 
-  // A micrometre of travel in an axis says nothing about polynomials along it.
+  // A micrometre of travel does not determine polynomials along an axis.
   constexpr double kLeastHalfWidth_m = 1e-6;
   if (box.half_width_m.minCoeff() < kLeastHalfWidth_m) {
     return failure(ErrorCode::DegenerateGeometry,
                    message("scaled design: the readings have half widths ",
-                           box.half_width_m.transpose(), " m, an axis does not move"));
+                           box.half_width_m.transpose(), " m: at least one axis does not move"));
   }
 
   Result<EquivalentModel> equivalent = EquivalentModel::of(chain, order);
@@ -150,7 +150,7 @@ Eigen::Matrix3Xd ScaledDesign::B(const Vector3& reading_m) const {
 }
 
 Eigen::MatrixXd ScaledDesign::named_from_scaled() const {
-  // A name with two monomials (a rotation with two arms) is met once through each.
+  // A name with two monomials (a rotation with two arms) receives half from each of them.
   struct Target {
     Eigen::Index row;
     double per_factor;
@@ -199,8 +199,8 @@ Eigen::MatrixXd ScaledDesign::named_from_scaled() const {
 }
 
 Eigen::MatrixX3d ScaledDesign::rotation_about(const Vector3& about_m) const {
-  // omega x (q - about) = L omega, L affine in q: constant part at the centre, slope along each
-  // axis.
+  // omega x (q - about) = L omega with L affine in q: the constant part is L at the centre of the
+  // box, the linear part is the slope along each axis.
   const Matrix3 at_centre = rotation_effect(box_.centre_m - about_m);
   Eigen::MatrixX3d C = Eigen::MatrixX3d::Zero(static_cast<Eigen::Index>(size()), 3);
   for (std::size_t j = 0; j < size(); ++j) {

@@ -11,8 +11,8 @@
 namespace abbe::calib::evemu {
 namespace {
 
-/// Marginal likelihood of the errors seen, with slow noise of that size and the array's uncertainty
-/// as columns.
+/// Logarithm of the marginal likelihood of the observed errors, with slow noise of the size per_s
+/// and with the array's uncertainty as columns.
 Result<double> log_likelihood_with(double per_s, const FitProblem& problem,
                                    const HyperParameters& start) {
   const Observations o = with_slow_noise(problem.observations, per_s);
@@ -24,7 +24,8 @@ Result<double> log_likelihood_with(double per_s, const FitProblem& problem,
   return most_likely_near(start, problem.design, o.positions(), gaussian, added)
       .map([&](const HyperParameters& h) { return h.log_likelihood - log_det_of_noise(o); })
       .map_error([&](const Error& e) {
-        return Error{e.code, message("estimate with slow noise of ", per_s, " s: ", e.text)};
+        return Error{e.code, message("estimate with slow noise of ", per_s,
+                                     " times the noise of a ball centre: ", e.text)};
       });
 }
 
@@ -32,9 +33,9 @@ Result<double> log_likelihood_with(double per_s, const FitProblem& problem,
 
 std::string slow_noise_text(double slow_noise_m) {
   return message("slow noise: within positions all touches shift by ", slow_noise_m * kUmPerM,
-                 " um (standard deviation): vibration, temperature, a probe that does not repeat, "
-                 "or errors of "
-                 "the machine that are no polynomials of the order that is set");
+                 " um (standard deviation): vibration, temperature, a probe with poor "
+                 "repeatability, or machine errors that polynomials of the configured order do not "
+                 "describe");
 }
 
 Observations with_slow_noise(const Observations& o, double per_s) {

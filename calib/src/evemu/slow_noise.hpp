@@ -1,5 +1,5 @@
 #pragma once
-/// How large slow noise is beside the noise of a ball centre, by the marginal likelihood
+/// Estimate of slow noise relative to the noise of a ball centre, by the marginal likelihood
 /// (noise.hpp, prior.hpp).
 
 #include <string>
@@ -9,21 +9,21 @@
 
 namespace abbe::calib::evemu {
 
-/// Natural logarithm of how much more likely the data are to be with slow noise to have it
-/// estimated. White noise alone reaches it in 1 of 40 runs (twice the logarithm is chi2 of one
-/// degree of freedom, or 0 half the time).
+/// Slow noise is included if the logarithm of its likelihood ratio exceeds this. White noise alone
+/// reaches the limit in 1 of 40 runs (twice the logarithm is distributed as chi2 with one degree of
+/// freedom, and is 0 in half of the runs).
 inline constexpr double kWorthSlowNoise = 2.0;
 
 struct SlowNoise {
   double per_s = 0.0;           ///< Observations::slow_noise
-  double log_likelihood = 0.0;  ///< natural logarithm of how much more likely the data are with it
+  double log_likelihood = 0.0;  ///< natural logarithm of the likelihood ratio to no slow noise
 };
-/// The most likely one, 0.35 to 11 s. `start`: hyper-parameters without it. NotConverged where a
-/// comparison fails.
+/// The most likely slow noise, searched from 0.35 to 45 times s (per_s), or 0. `start`:
+/// hyper-parameters without slow noise. NotConverged if a comparison fails.
 [[nodiscard]] Result<SlowNoise> likely_slow_noise(const Observations&, const ScaledDesign&,
                                                   const HyperParameters& start);
 
-/// Standard deviation per coordinate [m], and what to do.
+/// Message to the user. `slow_noise_m`: standard deviation per coordinate.
 [[nodiscard]] std::string slow_noise_text(double slow_noise_m);
 
 [[nodiscard]] Observations with_slow_noise(const Observations&, double per_s);

@@ -40,15 +40,15 @@ Eigen::Matrix3Xd mean_block_rotation(const Observations& o, const ScaledDesign& 
   return mean;
 }
 
-/// What squareness and slopes of a machine let the blocks be turned by, when nothing else is known:
-/// the prior of a linear translation across the volume, as an angle.
+/// Prior covariance of the rotation of the blocks by squareness errors and slopes of the machine:
+/// the prior of a linear translation over the volume, as an angle.
 Matrix3 prior_rotation_rad2(const ScaledDesign& design) {
   const double u_rad = kLinearPrior_m / design.arm_unit_m();
   return u_rad * u_rad * Matrix3::Identity();
 }
 
-/// Sets V(Ball1) = 0 and the rotation to that of the blocks; puts the rotation's uncertainty into
-/// the covariance.
+/// Sets V(Ball1) = 0 and sets the rotation to that of the blocks; adds the rotation's uncertainty
+/// to the covariance.
 MeanRotation set_gauge(const FitProblem& problem, Fit& fit) {
   const Observations& o = problem.observations;
   const Eigen::MatrixX3d G = problem.design.rotation_about(o.ball1_m);
@@ -106,7 +106,8 @@ ResidualFigures residual_figures(const Observations& o, const Eigen::VectorXd& r
   return f;
 }
 
-/// Observed minus fitted; what pose rotations explain is taken out. Ball1 is no observation.
+/// Observed minus fitted, without the estimated pose rotations; zero for Ball1, which is not an
+/// observation.
 Eigen::VectorXd residuals_of(const FitProblem& problem, const Fit& fit) {
   const Observations& o = problem.observations;
   Eigen::VectorXd r = problem.y - problem.X * fit.c_m;
@@ -135,8 +136,8 @@ Statistics statistics_of(const FitProblem& problem, const Fit& fit, const Eigen:
   const Eigen::VectorXd scale = problem.X.colwise().norm().cwiseMax(1e-300).cwiseInverse();
   const Eigen::VectorXd sv = singular_values(problem.X * scale.asDiagonal());
 
-  // Unobservable rotations leave 1e-7 (Ball1 does not come back to the same nanometre), data 1e-4
-  // and more.
+  // Relative singular values: 1e-7 for unobservable rotations (readings of Ball1 differ by
+  // nanometres), 1e-4 and more for determined coefficients.
   constexpr double kZero = 1e-6;
   s.rank = static_cast<std::size_t>((sv.array() > kZero * sv(0)).count());
   s.condition = sv(0) / sv(static_cast<Eigen::Index>(s.rank) - 1);
@@ -158,7 +159,8 @@ Statistics statistics_of(const FitProblem& problem, const Fit& fit, const Eigen:
   return s;
 }
 
-/// Noise and covariance of the sparse estimators come from the bootstrap alone.
+/// BadInput for a sparse estimator without bootstrap: its noise and covariance come only from the
+/// bootstrap.
 Result<void> check(const SolveOptions& options) {
   const bool is_sparse = options.estimator == Estimator::Lasso ||
                          options.estimator == Estimator::Mcp ||
@@ -217,8 +219,8 @@ Result<ScaledDesign> design_of(const Observations& o) {
 }
 
 Result<Solution> solve(const Observations& o, const SolveOptions& options) {
-  if (Result<void> fine = check(options); !fine) {
-    return tl::unexpected(fine.error());
+  if (Result<void> valid = check(options); !valid) {
+    return tl::unexpected(valid.error());
   }
 
   constexpr std::size_t kLeastPositions = 2;

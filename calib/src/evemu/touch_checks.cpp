@@ -12,10 +12,10 @@
 namespace abbe::calib::evemu {
 namespace {
 
-/// How well points lie on a surface, and how far a point lies from it.
+/// A fitted surface: its residuals, and the distance of a point from it.
 struct Surface {
   double rms_m = 0.0;
-  double largest_m = 0.0;  ///< residual
+  double largest_m = 0.0;  ///< largest absolute residual
   std::function<double(const Vector3&)> distance_m;
 };
 using FitSurface = std::function<std::optional<Surface>(std::span<const Vector3>)>;
@@ -31,7 +31,8 @@ std::optional<Surface> sphere_through(std::span<const Vector3> points) {
 }
 
 std::optional<Surface> plane_through(std::span<const Vector3> points) {
-  // Which side is outward does not matter here; one of three directions does not lie in the plane.
+  // The side of the normal does not matter here. fit_plane() needs a direction outside the plane:
+  // at least one of the three axes is.
   for (Eigen::Index axis = 0; axis < 3; ++axis) {
     if (const auto s = fit::fit_plane(points, Vector3(Vector3::Unit(axis)))) {
       return Surface{
@@ -44,11 +45,11 @@ std::optional<Surface> plane_through(std::span<const Vector3> points) {
 
 std::optional<std::string> wrong_touch(std::span<const Vector3> points, std::size_t unknowns,
                                        double most_off_m, const FitSurface& fit) {
-  constexpr double kShare = 0.25;  // of its distance from the others is its residual at least
-  constexpr double kClear = 10.0;  // the others lie that much better
+  constexpr double kShare = 0.25;  // least ratio of a false touch's residual to its distance
+  constexpr double kClear = 10.0;  // least ratio of its distance to the rms of the others
 
-  // A machine with errors of some mm bends a sphere by 0.4 mm. Few touches lie well on another
-  // sphere by chance.
+  // Machine errors of some mm deform a sphere by 0.4 mm. With few touches, the others may fit
+  // another sphere by chance.
   constexpr std::size_t kPerUnknown = 4;
   const std::optional<Surface> all = fit(points);
   if (!all || all->largest_m < kShare * most_off_m || points.size() < kPerUnknown * unknowns) {
@@ -108,7 +109,8 @@ bool touched_from_below(const SeenArtefact& seen) {
               static_cast<double>(seen.ball_points_m[b].size());
     }
   }
-  constexpr double kClearly = 0.2;  // touches all around a ball have 0, on its upper half about 0.5
+  // Mean component along z: 0 for touches all around a ball, about 0.5 for its upper half.
+  constexpr double kClearly = 0.2;
   return mean.dot(seen.T_self_uni.R.col(2)) < -kClearly * static_cast<double>(seen.balls.size());
 }
 

@@ -1,5 +1,5 @@
 #pragma once
-/// What is wrong with touches as a whole: one of them, the side they were on.
+/// Checks of touches: a false touch among those of one feature, and touches from below.
 
 #include <optional>
 #include <span>
@@ -10,16 +10,17 @@
 
 namespace abbe::calib::evemu {
 
-/// A touch that lies farther than `least_false_touch_m` from the surface through the others, which
-/// lie ten times better: "touch 3 of 25 lies 0.7 mm off ..."; or touches that lie farther than
-/// `max_off_surface_m` from one surface.
+/// Message to the user, nullopt if no touch is wrong. Either one touch lies farther than
+/// `least_false_touch_m` from the surface through the others, which lie ten times closer to it
+/// ("touch 3 of 25 lies 0.7 mm off ..."), or touches lie farther than `max_off_surface_m` from one
+/// surface.
 [[nodiscard]] std::optional<std::string> wrong_touch_on_ball(std::span<const Vector3> points_m,
                                                              const ObserveOptions&);
 [[nodiscard]] std::optional<std::string> wrong_touch_on_face(std::span<const Vector3> points_m,
                                                              const ObserveOptions&);
 
-/// Balls of a planar array have the same shape in a mirror: only the side on which they are touched
-/// differs. True: they were touched from below, where the plate is.
+/// True if the balls were touched from below, where the plate is. The mirror image of a planar
+/// array has the same shape: only the touched side reveals a mirrored axis.
 [[nodiscard]] bool touched_from_below(const SeenArtefact&);
 
 }  // namespace abbe::calib::evemu

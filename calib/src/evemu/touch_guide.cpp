@@ -13,8 +13,8 @@
 namespace abbe::calib::evemu {
 namespace {
 
-// The same feature or position in vain twice: whoever touches does not follow.
-constexpr std::size_t kMostSetAside = 2;
+// Number of features or positions discarded in succession after which the guide fails.
+constexpr std::size_t kMostDiscarded = 2;
 
 Result<void> check_plan(const TouchPlan& plan, const ObserveOptions& observe) {
   std::vector<int> sorted = plan.positions, expected(plan.positions.size());
@@ -168,10 +168,10 @@ void TouchGuide::astray(const Vector3& p_m, GuidedTouch& out) {
   if (const double off_m = site_->nearest_ball_m(p_m, ball); std::isfinite(off_m))
     text += message("; nearest is ball ", ball + 1, ", ", kMmPerM * off_m, " mm away");
   else if (site_->points(kBall1).size() == 1) {
-    // Nothing says which of the two was wrong; the next one will.
+    // Two touches do not show which of them was wrong: both are discarded.
     site_->clear(kBall1);
     text = where() + message("the touch at ", place_text(p_m),
-                             " and the one before are not on one ball: both are set aside");
+                             " and the one before are not on one ball: both are discarded");
   }
 
   out.notes.push_back(text + "; expected: " + name(feature_at(feature_)));
@@ -180,15 +180,16 @@ void TouchGuide::astray(const Vector3& p_m, GuidedTouch& out) {
        message(astray_in_a_row_,
                " touches one after the other are on no ball or block of calibrator \"",
                setup_->calibrator.name,
-               "\": calibrator file of another artefact, or another order; the last one: ",
+               "\": calibrator file of another artefact, or touches in another order; the last "
+               "one: ",
                out.notes.back()));
 }
 
-/// All points of it are there already. Ball1 again, with nothing missing elsewhere: the next
-/// position began.
+/// A touch on a feature that already has all its points. If it is on Ball1 and no feature lacks
+/// points, the next position has begun.
 void TouchGuide::on_complete_feature(std::size_t feature, const Vector3& p_m, GuidedTouch& out) {
   if (feature == kBall1 && feature_ != kBall1 && all_have_enough()) {
-    if (pass_over_until(passed_.size(), out) && all_have_enough()) {
+    if (skip_to(passed_.size(), out) && all_have_enough()) {
       end_position(out);
       if (!complete() && !failure_) return put(kBall1, p_m, out);
     }
@@ -197,24 +198,26 @@ void TouchGuide::on_complete_feature(std::size_t feature, const Vector3& p_m, Gu
   }
   out.fate = TouchFate::Doubled;
   out.notes.push_back(
-      where() + message(name(feature_at(feature)), " has all its ", points_of(feature),
-                        " points: this one is not needed; expected: ", name(feature_at(feature_))));
+      where() +
+      message(name(feature_at(feature)), " has all its ", points_of(feature),
+              " points: this touch is not needed; expected: ", name(feature_at(feature_))));
 }
 
 void TouchGuide::put(std::size_t feature, const Vector3& p_m, GuidedTouch& out) {
-  if (feature > feature_ && !pass_over_until(feature, out)) {
-    out.fate = TouchFate::Astray;  // what told it from other features is gone
+  if (feature > feature_ && !skip_to(feature, out)) {
+    out.fate = TouchFate::Astray;  // the discarded feature was needed to assign this touch
     return;
   }
   feature_ = feature;
   site_->add(feature, p_m);
   if (site_->points(feature).size() == points_of(feature) && accept_feature(feature, out))
-    go_on_from(feature, out);
+    expect_next_after(feature, out);
 }
 
-/// Somebody went on: what is missing is said now, and asked for again at the end if it is too much.
-/// False: a whole feature was set aside, which is expected now.
-bool TouchGuide::pass_over_until(std::size_t feature, GuidedTouch& out) {
+/// The operator has gone on to a later feature. Reports the points missing on the features before
+/// it; a feature with too few points is requested again at the end of the position. False if the
+/// guide failed, or if a feature was discarded: that feature is then expected next.
+bool TouchGuide::skip_to(std::size_t feature, GuidedTouch& out) {
   for (std::size_t f = feature_; f < feature; ++f) {
     const std::size_t points = site_->points(f).size();
     if (points >= points_of(f) || passed_[f]) continue;
@@ -242,7 +245,7 @@ bool TouchGuide::accept_feature(std::size_t feature, GuidedTouch& out) {
     site_->drop(feature, *seen.outlier);
     out.notes.push_back(where() + message("the touch at ", place_text(p_m), " is ",
                                           kMmPerM * seen.off_m, " mm off the others of ", which,
-                                          ": set aside, touch another"));
+                                          ": discarded, touch another point"));
     return false;
   }
 
@@ -250,13 +253,13 @@ bool TouchGuide::accept_feature(std::size_t feature, GuidedTouch& out) {
     const Calibrator& c = setup_->calibrator;
     fail(ErrorCode::BadInput,
          message("ball 1 has radius ", kMmPerM * *seen.other_radius_m, " mm, calibrator \"", c.name,
-                 "\" and tip make ", kMmPerM * (c.balls.front().radius_m + c.tip_radius_m),
+                 "\" and tip give ", kMmPerM * (c.balls.front().radius_m + c.tip_radius_m),
                  " mm: calibrator file of another artefact, or another tip"));
     return false;
   }
 
-  if (!seen.fine) {
-    set_feature_aside(feature, which + " is not what its points lie on", out);
+  if (!seen.valid) {
+    discard_feature(feature, "the points of " + which + " do not fit its surface", out);
     return false;
   }
 
@@ -266,9 +269,10 @@ bool TouchGuide::accept_feature(std::size_t feature, GuidedTouch& out) {
     const double off_mrad = kMmPerM * site_->faces_off_rad();
     site_->clear(kBlock1);
     passed_[kBlock1] = false;
-    set_feature_aside(kBlock2,
-                      message("the two faces stand ", off_mrad, " mrad off the calibrator's angle"),
-                      out);
+    discard_feature(
+        kBlock2,
+        message("the angle of the two faces is ", off_mrad, " mrad off the calibrator's angle"),
+        out);
     feature_ = kBlock1;
     return false;
   }
@@ -280,15 +284,16 @@ bool TouchGuide::accept_feature(std::size_t feature, GuidedTouch& out) {
 void TouchGuide::accept_ball(std::size_t feature, GuidedTouch& out) {
   const std::size_t dropped = site_->accept_ball(feature);
   if (dropped == 0) return;
-  out.notes.push_back(where() + message(dropped, dropped == 1 ? " touch" : " touches",
-                                        " before lay on no ball, as ", name(feature_at(feature)),
-                                        " shows where all are: set aside"));
+  out.notes.push_back(where() + message(dropped,
+                                        dropped == 1 ? " earlier touch is" : " earlier touches are",
+                                        " on no ball, as ", name(feature_at(feature)),
+                                        " shows where all balls are: discarded"));
   for (std::size_t f = feature + 1; f < passed_.size(); ++f) {
-    if (!has_enough(f)) passed_[f] = false;  // it was the stray touch that went on
+    if (!has_enough(f)) passed_[f] = false;  // only a stray touch made it count as skipped
   }
 }
 
-void TouchGuide::go_on_from(std::size_t feature, GuidedTouch& out) {
+void TouchGuide::expect_next_after(std::size_t feature, GuidedTouch& out) {
   for (std::size_t f = feature + 1; f < passed_.size(); ++f) {
     if (site_->points(f).size() >= points_of(f) || passed_[f]) continue;
     feature_ = f;
@@ -307,33 +312,36 @@ void TouchGuide::end_position(GuidedTouch& out) {
   const std::vector<Touch> touches = site_->touches(position);
   const auto seen = see_artefact(position, touches, setup_->calibrator, setup_->options.observe);
 
-  if (!seen) return set_position_aside(seen.error().text, out);
+  if (!seen) return discard_position(seen.error().text, out);
   if (const auto before =
           stands_as_at(seen->T_self_uni.R, seen_, setup_->options.observe.least_turn_rad))
-    return set_position_aside(where() + message("the artefact stands as at position ",
-                                                plan().positions[*before], ": turn it"),
-                              out);
+    return discard_position(
+        where() + message("the artefact has the same orientation as at position ",
+                          plan().positions[*before], ": turn it"),
+        out);
+
   site_->keep_sides();
   finished_.insert(finished_.end(), touches.begin(), touches.end());
   seen_.push_back(seen->T_self_uni.R);
-  set_aside_in_a_row_ = 0;
+  discarded_in_a_row_ = 0;
   ++place_;
   begin_position();
 }
 
-void TouchGuide::set_feature_aside(std::size_t feature, const std::string& why, GuidedTouch& out) {
+void TouchGuide::discard_feature(std::size_t feature, const std::string& why, GuidedTouch& out) {
   const std::string text = where() + why;
   site_->clear(feature);
   passed_[feature] = false;
   feature_ = feature;
-  out.notes.push_back(text + ": its touches are set aside, touch it again");
-  if (++set_aside_in_a_row_ >= kMostSetAside) fail(ErrorCode::BadInput, text + ", again");
+  out.notes.push_back(text + ": its touches are discarded, touch it again");
+  if (++discarded_in_a_row_ >= kMostDiscarded) fail(ErrorCode::BadInput, text + ", again");
 }
 
-void TouchGuide::set_position_aside(const std::string& why, GuidedTouch& out) {
+void TouchGuide::discard_position(const std::string& why, GuidedTouch& out) {
   begin_position();
-  out.notes.push_back(why + ": this position's touches are set aside, touch it again from ball 1");
-  if (++set_aside_in_a_row_ >= kMostSetAside) fail(ErrorCode::BadInput, why + ", again");
+  out.notes.push_back(why +
+                      ": the touches of this position are discarded, touch it again from ball 1");
+  if (++discarded_in_a_row_ >= kMostDiscarded) fail(ErrorCode::BadInput, why + ", again");
 }
 
 void TouchGuide::fail(ErrorCode code, std::string text) {

@@ -13,20 +13,20 @@
 namespace abbe::calib::evemu {
 namespace {
 
-/// Touches of one ball or face, V taken out.
+/// Residuals of the touches of one ball or face, with V removed.
 struct FeatureResiduals {
   std::size_t seen = 0;
   Feature feature = Feature::Ball;
   std::size_t index = 0;    ///< of the ball or block, from 0
   Eigen::MatrixXd normals;  ///< outward at each touch, 3 columns
-  Eigen::MatrixXd
-      response;  ///< unknowns x touches: what a displacement along the normal does to the fit
+  /// Unknowns x touches: effect of a touch's displacement along its normal on the fit.
+  Eigen::MatrixXd response;
   Eigen::VectorXd r_m;   ///< residuals
   Eigen::VectorXd free;  ///< share of a touch's displacement that its residual shows, 1 - leverage
   [[nodiscard]] double dof() const { return static_cast<double>(r_m.size() - response.rows()); }
 };
 
-/// `design`: touches x unknowns.
+/// Sets response and free. `design`: touches x unknowns.
 void finish(FeatureResiduals& f, const Eigen::MatrixXd& design) {
   f.response =
       design.colPivHouseholderQr().solve(Eigen::MatrixXd::Identity(design.rows(), design.rows()));
@@ -67,7 +67,7 @@ std::optional<FeatureResiduals> of_ball(const SeenArtefact& s, std::size_t ball,
   return f;
 }
 
-/// Unknowns: offset, and the slopes of the face along x and y of its own.
+/// Unknowns: offset of the face, and its slopes along two directions x and y in the face.
 std::optional<FeatureResiduals> of_block(const SeenArtefact& s, std::size_t block,
                                          const VolumetricModel& model) {
   const std::vector<Vector3> points = without_V(s.block_points_m[block], model);
@@ -107,10 +107,10 @@ std::string place_of(const Observations& o, std::size_t seen, Feature feature, s
 
 struct Features {
   std::vector<FeatureResiduals> compared;
-  std::vector<std::string> failed;  ///< places
+  std::vector<std::string> failed;  ///< places of features without finite residuals
 };
 
-/// Those with more touches than unknowns.
+/// Residuals of all features with more touches than unknowns.
 Features all_features(const Observations& o, const VolumetricModel& model) {
   constexpr std::size_t kUnknownsOfBall = 4, kUnknownsOfBlock = 3;
   Features all;
@@ -141,10 +141,12 @@ Features all_features(const Observations& o, const VolumetricModel& model) {
   return all;
 }
 
-/// A touch that alone determines a part of its surface has no residual.
+/// Touches with a smaller free share are not used: a touch that alone determines a part of its
+/// surface has no residual.
 constexpr double kLeastFree = 0.05;
 
-/// Median absolute value of one residual over the root of its free share; 1.4826: of normal noise.
+/// Standard deviation of one touch: median of |residual| / sqrt(free share), times 1.4826 for
+/// normal noise.
 double pooled_sigma_m(const std::vector<FeatureResiduals>& all) {
   constexpr double kMadToSigma = 1.4826;
   std::vector<double> values;
@@ -177,12 +179,12 @@ double count_of_touches(const std::vector<FeatureResiduals>& all) {
   return count;
 }
 
-/// What a displacement of the touches along their normals does to the errors seen.
+/// Effect on the observed errors of a displacement of the touches along their normals.
 Eigen::VectorXd effect_m(const Observations& o, const FeatureResiduals& f,
                          const Eigen::VectorXd& along_m) {
   Eigen::VectorXd rows = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(3 * o.rows.size()));
   const SeenArtefact& s = o.seen[f.seen];
-  const Vector3 change = (f.response * along_m).head<3>();  // of the centre, or of the normal
+  const Vector3 change = (f.response * along_m).head<3>();  // of the ball centre or face normal
   const auto balls = s.balls.size();
   Vector3 turn = Vector3::Zero();
 
@@ -206,7 +208,7 @@ Eigen::VectorXd effect_m(const Observations& o, const FeatureResiduals& f,
   return rows;
 }
 
-/// The most significant touch, and whether the others of its feature lie well without it.
+/// The most significant single touch, provided the others of its feature fit without it.
 std::optional<TouchFinding> worst_touch(const Observations& o,
                                         const std::vector<FeatureResiduals>& all, double sigma_m,
                                         double false_alarm) {
@@ -226,7 +228,7 @@ std::optional<TouchFinding> worst_touch(const Observations& o,
     }
   }
 
-  // Two-sided tail of the normal distribution: below exp(-w^2 / 2).
+  // The two-sided tail probability of the normal distribution is below exp(-w^2 / 2).
   if (worst == nullptr || !(0.5 * w * w > natural_logarithm(count_of_touches(all) / false_alarm))) {
     return std::nullopt;
   }
@@ -237,7 +239,7 @@ std::optional<TouchFinding> worst_touch(const Observations& o,
   const double x = natural_logarithm(static_cast<double>(all.size()) / false_alarm);
 
   if (rest_m2 > sigma_m * sigma_m * chi2_bound(std::max(0.0, f.dof() - 1.0), x)) {
-    return std::nullopt;  // not one touch
+    return std::nullopt;  // more than one touch is wrong
   }
 
   const Eigen::VectorXd along = size_m * Eigen::VectorXd::Unit(f.r_m.size(), touch);
@@ -251,6 +253,7 @@ std::optional<TouchFinding> worst_touch(const Observations& o,
       .rows_m = effect_m(o, f, along)};
 }
 
+/// The feature whose touches scatter most, if significant.
 std::optional<TouchFinding> worst_form(const Observations& o,
                                        const std::vector<FeatureResiduals>& all, double sigma_m,
                                        double false_alarm) {
@@ -278,10 +281,10 @@ std::optional<TouchFinding> worst_form(const Observations& o,
       .rows_m = {}};
 }
 
-/// -ln of an upper bound of the probability that a share of the sum of squares of a + b degrees of
-/// freedom, a of them, exceeds `share` (Chernoff's bound of the beta distribution); 0 below the
-/// mean.
-double surprise(double share, double a, double b) {
+/// Negative logarithm of an upper bound of a probability: that a of the a + b degrees of freedom
+/// have more than the fraction `share` of the sum of squares (Chernoff's bound of the beta
+/// distribution). 0 if `share` is below the mean.
+double minus_log_tail(double share, double a, double b) {
   const double mean = a / (a + b);
   if (!(share > mean && share < 1.0)) {
     return 0.0;
@@ -290,21 +293,21 @@ double surprise(double share, double a, double b) {
                 b * natural_logarithm((1.0 - mean) / (1.0 - share)));
 }
 
-/// Squares of what is left of one ball or face, and their number that is free.
+/// Sum of squares of the remaining residuals of one ball or face, and its degrees of freedom.
 struct FormSquares {
   const FeatureResiduals* of;
   double m2, dof;
 };
 
-/// A wrong slope of the model's V makes an ellipsoid of a ball: that, too, is taken out. None where
-/// nothing is left.
+/// An error in the slopes of the model's V deforms a ball into an ellipsoid: this is removed too.
+/// nullopt if no degree of freedom remains.
 std::optional<FormSquares> form_squares(const FeatureResiduals& f) {
   if (f.feature == Feature::Block) {
     return f.dof() > 0.0 ? std::optional(FormSquares{&f, f.r_m.squaredNorm(), f.dof()})
                          : std::nullopt;
   }
 
-  constexpr Eigen::Index kUnknowns = 9;  // radius and place, five strains
+  constexpr Eigen::Index kUnknowns = 9;  // radius, three coordinates of the centre, five strains
   if (f.r_m.size() <= kUnknowns) {
     return std::nullopt;
   }
@@ -320,10 +323,10 @@ std::optional<FormSquares> form_squares(const FeatureResiduals& f) {
   return FormSquares{&f, left.squaredNorm(), static_cast<double>(f.r_m.size() - qr.rank())};
 }
 
-/// The k features that scatter most against the others, for every k from 2: with white noise of any
-/// size they have a share of all squares that follows the beta distribution, whichever k of them
-/// are chosen. Balls and faces are compared among themselves: a backlash or a probe with lobes
-/// shows on balls alone.
+/// Compares the k features that scatter most with the others, for every k from 2. With white noise
+/// of any size, the share of k features in the sum of squares follows the beta distribution; the
+/// number of choices of k features is allowed for. Balls and faces are compared separately:
+/// backlash or a probe with lobing shows on balls alone.
 std::optional<TouchFinding> form_of_several(const Observations& o,
                                             const std::vector<FeatureResiduals>& all, Feature kind,
                                             double false_alarm) {
@@ -351,7 +354,7 @@ std::optional<TouchFinding> form_of_several(const Observations& o,
     k += 1.0;
     m2 += f.m2;
     dof += f.dof;
-    const double beyond_choice = surprise(m2 / total_m2, dof, total_dof - dof) - log_choices;
+    const double beyond_choice = minus_log_tail(m2 / total_m2, dof, total_dof - dof) - log_choices;
     if (k < 2.0 || !(beyond_choice > most)) {
       continue;
     }
@@ -371,11 +374,13 @@ std::optional<TouchFinding> form_of_several(const Observations& o,
   return found;
 }
 
-/// When axis a turns round, the place differs by the vector b_a from what its reading says: a touch
-/// against n comes to lie by sum_a sign(n_a) b_a . n / 2 farther out. Column 3 a + m: component m
-/// of b_a. An axis that hardly moves on the way to the touch stands on either side.
+/// Backlash of axis a is a vector b_a: by it the position differs at the same reading after the
+/// axis reverses. A touch against the normal n then lies farther out by
+///     sum_a sign(n_a) b_a . n / 2.
+/// Column 3 a + m: component m of b_a. If an axis hardly moves on the way to the touch, its side is
+/// unknown and it does not contribute.
 constexpr Eigen::Index kBacklashes = 9;
-constexpr double kLeastMotion = 0.1;  // of the way to the touch
+constexpr double kLeastMotion = 0.1;  // component of the unit normal along the axis
 
 Eigen::MatrixXd along_of_backlash(const FeatureResiduals& f) {
   Eigen::MatrixXd along(f.normals.rows(), kBacklashes);
@@ -389,7 +394,7 @@ Eigen::MatrixXd along_of_backlash(const FeatureResiduals& f) {
   return along;
 }
 
-/// What it leaves in the residuals of a ball.
+/// Effect of backlash on the residuals of a ball.
 Eigen::MatrixXd residuals_of_backlash(const FeatureResiduals& ball) {
   const Eigen::MatrixXd along = along_of_backlash(ball);
   Eigen::MatrixXd design(along.rows(), 4);
@@ -399,13 +404,14 @@ Eigen::MatrixXd residuals_of_backlash(const FeatureResiduals& ball) {
 
 struct Backlash {
   Eigen::VectorXd b_m = Eigen::VectorXd::Zero(kBacklashes);
-  double drop = 0.0;    ///< of chi2; 0: not significant
-  double dof = 0.0;     ///< unknowns that the touches show
-  bool across = false;  ///< any of them across the axes
+  double drop = 0.0;    ///< decrease of chi2; 0: not significant
+  double dof = 0.0;     ///< effective number of unknowns that the touches determine
+  bool across = false;  ///< includes components perpendicular to the axes
 };
 
-/// Unknowns of some columns only. A priori 0 with a standard deviation of 100 um, more than axes in
-/// order have: what the touches hardly tell from radius and place stays near zero.
+/// Estimates the unknowns of some columns. Prior: 0 with a standard deviation of 100 um, more than
+/// the backlash of a sound axis. Components that the touches hardly distinguish from radius and
+/// position of a ball therefore stay near zero.
 Backlash backlash_of(const std::vector<Eigen::Index>& columns, const Eigen::MatrixXd& N,
                      const Eigen::VectorXd& g, double sigma_m) {
   constexpr double kPrior_m = 100e-6;
@@ -422,7 +428,7 @@ Backlash backlash_of(const std::vector<Eigen::Index>& columns, const Eigen::Matr
   return found;
 }
 
-/// Along the axes; across them, too, where that explains significantly more.
+/// Backlash along the axes; also perpendicular to them if that explains significantly more.
 Backlash significant_backlash(const std::vector<FeatureResiduals>& all, double sigma_m,
                               double false_alarm) {
   Eigen::MatrixXd N = Eigen::MatrixXd::Zero(kBacklashes, kBacklashes);
@@ -464,24 +470,22 @@ TouchFinding finding_of(const Backlash& backlash, const Observations& o,
     }
   }
 
-  // column a: of axis a
+  // Column a: backlash vector of axis a.
   const Matrix3 b_um = kUmPerM * Eigen::Map<const Matrix3>(backlash.b_m.data());
-  const Matrix3 aside_um = b_um - Matrix3(b_um.diagonal().asDiagonal());
+  const Matrix3 across_um = b_um - Matrix3(b_um.diagonal().asDiagonal());
   return {
       .cause = Cause::Backlash,
-      .text = message("the touches depend on the side they come from: backlash of X ", b_um(0, 0),
+      .text = message("the touches depend on the direction of approach: backlash of X ", b_um(0, 0),
                       ", Y ", b_um(1, 1), ", Z ", b_um(2, 2), " um along the axes, up to ",
-                      aside_um.cwiseAbs().maxCoeff(), " um across them, or a probe with lobes"),
+                      across_um.cwiseAbs().maxCoeff(), " um across them, or a probe with lobing"),
       .log_likelihood = 0.5 * backlash.drop,
       .rows_m = std::move(rows)};
 }
 
 std::string why_not_compared(const Observations& o, const Features& features) {
   if (o.seen.empty()) {
-    return "errors were given without touches: not compared are single touches, balls off their "
-           "places, an "
-           "array "
-           "that moved, creeps or is bent, a drift, and slow noise";
+    return "errors were given without touches: not compared are single touches, displaced balls, "
+           "an array that moved, creeps or is bent, a drift, and slow noise";
   }
   return features.compared.empty() && features.failed.empty()
              ? "single touches are not compared: no ball has 5 touches, no block 4"
@@ -518,9 +522,9 @@ TouchResiduals touch_residuals(const Observations& o, const VolumetricModel& mod
   auto touch = worst_touch(o, all, found.sigma_m, false_alarm);
   std::optional<TouchFinding> form;
 
-  if (!touch) {  // else its ball or block scatters because of it
+  if (!touch) {  // a single false touch makes its ball or block scatter
     form = worst_form(o, left, found.sigma_m, 0.5 * false_alarm);
-    // Where an axis hardly moves on the way to a touch, backlash across it is left in the touch.
+    // Backlash across an axis that hardly moves on the way to a touch stays in the residual.
     if (!form && !backlash.across) {
       form = form_of_several(o, left, Feature::Ball, 0.25 * false_alarm);
     }

@@ -13,7 +13,7 @@
 namespace abbe::calib::evemu {
 namespace {
 
-// A face spans this share of its length across, or it is a line and no face yet.
+// Smallest ratio of width to length of the points on a face; narrower points form a line.
 constexpr double kLeastWidth = 0.05;
 
 std::vector<Vector3> without(const std::vector<Vector3>& points, std::size_t left_out) {
@@ -31,7 +31,7 @@ bool spans_a_face(const std::vector<Vector3>& points) {
   return set && set->singular_values(1) > kLeastWidth * set->singular_values(0);
 }
 
-/// The plane of a face that has points enough, sure or not.
+/// The plane of a face with at least `least` points. A single wrong point may still change it.
 std::optional<fit::Plane> likely_face(const std::vector<Vector3>& points, std::size_t least,
                                       double max_off_m) {
   if (points.size() < least || !spans_a_face(points)) return std::nullopt;
@@ -40,7 +40,7 @@ std::optional<fit::Plane> likely_face(const std::vector<Vector3>& points, std::s
   return *plane;
 }
 
-/// The plane, if it would stand without any one of its points.
+/// The plane of a face, if it remains determined without any single one of its points.
 std::optional<fit::Plane> sure_face(const std::vector<Vector3>& points, double max_off_m) {
   constexpr std::size_t kLeast = 5;
   for (std::size_t i = 0; i < points.size(); ++i) {
@@ -103,8 +103,9 @@ std::optional<std::size_t> Site::feature_of(const Vector3& p_m, std::size_t expe
   return ball_of(p_m, expected);
 }
 
-/// Nothing is known yet: the touches of one ball are no farther apart than its diameter, or twice
-/// that of the calibrator if it is another artefact's.
+/// Used while no feature is known. Touches of one ball are at most one diameter apart; twice the
+/// diameter of the calibrator is accepted, so that a ball of another artefact is recognised by its
+/// radius.
 bool Site::near_first_ball(const Vector3& p_m) const {
   constexpr double kMostDiameters = 2.0;
   return std::ranges::all_of(points_[kBall1], [&](const Vector3& q) {
@@ -115,13 +116,13 @@ bool Site::near_first_ball(const Vector3& p_m) const {
 bool Site::on_face(std::size_t block, const Vector3& p_m) const {
   const auto face = sure_face(points_[block], options_.observe.max_off_surface_m);
   if (!face) return false;
-  constexpr double kBeyond_m = 20e-3;  // of the points there are: a face is a few centimetres large
+  constexpr double kBeyond_m = 20e-3;  // beyond the known points: a face measures few centimetres
   return std::abs((p_m - face->point).dot(face->normal)) <= options_.observe.max_off_surface_m &&
          (p_m - face->point).norm() <= 2.0 * spread_m(points_[block], face->point) + kBeyond_m;
 }
 
-/// The calibrator says where faces look to, not where they are: what is no ball and expected on a
-/// face lies on it until the face is known.
+/// The calibrator states the directions of the faces, not their places. Until a face is known, a
+/// touch that is not on Ball1 and is expected on the face is assigned to it.
 std::optional<std::size_t> Site::face_of(const Vector3& p_m, std::size_t expected) const {
   for (const std::size_t block : {kBlock1, kBlock2}) {
     if (on_face(block, p_m)) return block;
@@ -141,7 +142,8 @@ std::optional<std::size_t> Site::face_of(const Vector3& p_m, std::size_t expecte
   return std::nullopt;
 }
 
-/// A ball of one pair of sides may be where another is with the other sides.
+/// The expected ball is tested first: a ball with one pair of face sides may be at the place of
+/// another ball with the other sides.
 std::optional<std::size_t> Site::ball_of(const Vector3& p_m, std::size_t expected) const {
   for (const Candidate& candidate : candidates_) {
     const std::size_t ball = nearest_ball(candidate, p_m);
@@ -178,7 +180,8 @@ double Site::nearest_ball_m(const Vector3& p_m, std::size_t& ball) const {
   return nearest;
 }
 
-/// One stray touch must not decide: the points of an accepted ball lie on one sphere of its size.
+/// Removes the candidates that do not agree with an accepted ball. Only accepted balls are used, so
+/// that a stray touch cannot remove a candidate.
 void Site::rule_out_by(std::size_t feature) {
   const auto agrees = [&](const Candidate& candidate) {
     return std::ranges::all_of(points_[feature], [&](const Vector3& p) {
@@ -207,7 +210,7 @@ void Site::add(std::size_t feature, const Vector3& p_m) {
   points_[feature].push_back(p_m);
   if (feature == kBall1) {
     const FeatureCheck seen = check(kBall1);
-    if (seen.fine && points_[kBall1].size() >= options_.observe.least_points_per_ball)
+    if (seen.valid && points_[kBall1].size() >= options_.observe.least_points_per_ball)
       ball1_m_ = fit::fit_sphere(points_[kBall1])->centre;
   }
   if (feature <= kBlock2) place_balls();
@@ -231,7 +234,8 @@ std::optional<fit::Plane> Site::face(std::size_t block) const {
   return plane;
 }
 
-/// Ball1 is so far off the face's plane that nothing a machine does brings it to the other side.
+/// True if Ball1 is so far from the plane of the face that machine errors cannot move it to the
+/// other side.
 bool Site::is_sided(const fit::Plane& face) const {
   return (face.point - *ball1_m_).dot(face.normal) > 2.0 * options_.max_off_expected_m;
 }
@@ -267,7 +271,7 @@ void Site::place_balls() {
   }
 }
 
-/// The artefact turns as a whole: a face that looks away from Ball1 does so at every position.
+/// The artefact is rigid: a face that points away from Ball1 does so at every position.
 void Site::keep_sides() {
   if (candidates_.empty()) return;
   for (const std::size_t block : {kBlock1, kBlock2}) {
@@ -292,10 +296,10 @@ FeatureCheck Site::check_ball(std::size_t feature) const {
   };
 
   const auto sphere = fit::fit_sphere(points);
-  if (sphere && fits(*sphere)) return {.fine = true};
+  if (sphere && fits(*sphere)) return {.valid = true};
   FeatureCheck found;
 
-  // One sphere, with more points than it needs, but of another size.
+  // More points than necessary lie on one sphere, but of another radius.
   if (sphere && points.size() > options_.observe.least_points_per_ball &&
       largest(sphere->residuals) <= options_.observe.max_off_surface_m)
     found.other_radius_m = sphere->radius;
@@ -316,7 +320,7 @@ FeatureCheck Site::check_face(std::size_t feature) const {
     return likely_face(some, 3, options_.observe.max_off_surface_m);
   };
 
-  if (face_of_some(points)) return {.fine = true};
+  if (face_of_some(points)) return {.valid = true};
   FeatureCheck found;
   for (std::size_t i = 0; i < points.size(); ++i) {
     const auto rest = face_of_some(without(points, i));

@@ -1,7 +1,7 @@
 #pragma once
-/// One position of the ball array while it is being touched: the points of every feature, and where
-/// the features are as far as these tell. Features by measuring order: 0 Ball1, 1 and 2 the blocks,
-/// 3 Ball2, ...
+/// One position of the ball array while it is being touched: the points of every feature, and the
+/// places of the features that follow from these points. Feature index in measuring order: 0 Ball1,
+/// 1 and 2 the blocks, 3 Ball2, ...
 
 #include <array>
 #include <cstddef>
@@ -13,30 +13,30 @@
 
 namespace abbe::calib::evemu {
 
-inline constexpr std::size_t kBall1 = 0, kBlock1 = 1, kBlock2 = 2;  ///< in this order
+inline constexpr std::size_t kBall1 = 0, kBlock1 = 1, kBlock2 = 2;  ///< feature indices
 
 [[nodiscard]] TouchedFeature feature_at(std::size_t order);
 
-/// What the points of a feature say of themselves.
+/// Check of the points of one feature against the surface of the feature.
 struct FeatureCheck {
-  bool fine = false;
-  std::optional<std::size_t> outlier{};    ///< without this one it would be
-  double off_m = 0.0;                      ///< of the outlier, from the surface of the others
-  std::optional<double> other_radius_m{};  ///< they lie on one sphere, but not on this ball's
+  bool valid = false;
+  std::optional<std::size_t> outlier{};    ///< index of a point without which the others are valid
+  double off_m = 0.0;                      ///< distance of the outlier from the others' surface
+  std::optional<double> other_radius_m{};  ///< the points lie on a sphere of this other radius
 };
 
 class Site {
  public:
-  /// `before`: the position before, for what stays as it was; may be null. References must outlive
-  /// the site.
+  /// `before`: the previous position, from which the place of Ball1 and the known sides of the
+  /// faces are copied; may be null. The calibrator and the options must outlive the site.
   Site(const Calibrator&, const GuideOptions&, const Site* before);
 
-  /// The feature that p lies on; nothing: none known. `expected` decides where the features
-  /// themselves cannot.
+  /// The feature on which p lies; nullopt: on no known feature. If the places of the features do
+  /// not decide, `expected` does.
   [[nodiscard]] std::optional<std::size_t> feature_of(const Vector3& p_m,
                                                       std::size_t expected) const;
-  /// Distance to the surface of the nearest ball known, which it is in `ball`; infinity before any
-  /// is.
+  /// Distance to the surface of the nearest ball with a known place, and its index in `ball`;
+  /// infinity if no place is known.
   [[nodiscard]] double nearest_ball_m(const Vector3& p_m, std::size_t& ball) const;
 
   [[nodiscard]] const std::vector<Vector3>& points(std::size_t feature) const {
@@ -46,13 +46,14 @@ class Site {
   void add(std::size_t feature, const Vector3& p_m);
   void drop(std::size_t feature, std::size_t point);
   void clear(std::size_t feature);
-  /// A ball, all of whose points are sound: it decides to which sides the faces look. Gives the
-  /// number of touches of other balls that lie on none with these sides; they are gone.
+  /// Accepts a ball whose points are all valid. The ball determines the sides to which the faces
+  /// point. Removes touches that lie on no other ball with these sides and returns their number.
   std::size_t accept_ball(std::size_t feature);
-  /// The position is finished: the next one may rely on what was decided.
+  /// Call when the position is finished: keeps the sides of the faces for the next position.
   void keep_sides();
   [[nodiscard]] FeatureCheck check(std::size_t feature) const;
-  /// Both faces are there: the angle between them less the calibrator's.
+  /// Absolute difference between the angle of the two faces and that of the calibrator; pi if a
+  /// face has too few points.
   [[nodiscard]] double faces_off_rad() const;
   [[nodiscard]] std::vector<Touch> touches(int position) const;
 
@@ -70,8 +71,8 @@ class Site {
   [[nodiscard]] std::vector<double> possible_sides(std::size_t block, const fit::Plane& face) const;
   void place_balls();
 
-  /// Places of all balls if the faces look to these sides: 1, a face looks away from Ball1; -1,
-  /// towards it.
+  /// Places of all balls under the assumption that the faces point to these sides: 1, away from
+  /// Ball1; -1, towards it.
   struct Candidate {
     std::array<double, 2> side{};
     std::vector<Vector3> centres_m;
@@ -84,10 +85,10 @@ class Site {
   const Calibrator& calibrator_;
   const GuideOptions& options_;
   std::optional<Vector3> ball1_m_;
-  std::array<std::optional<double>, 2> sides_;  ///< known from the positions before
-  std::vector<std::vector<Vector3>> points_;
-  std::vector<bool> accepted_;         ///< balls
-  std::vector<Candidate> candidates_;  ///< those no accepted ball has contradicted
+  std::array<std::optional<double>, 2> sides_;  ///< known from previous positions
+  std::vector<std::vector<Vector3>> points_;    ///< by feature
+  std::vector<bool> accepted_;                  ///< by feature; only balls are accepted
+  std::vector<Candidate> candidates_;           ///< those consistent with all accepted balls
 };
 
 }  // namespace abbe::calib::evemu

@@ -104,9 +104,9 @@ Result<void> check_twice(int position, std::span<const fit::Sphere> balls) {
   return {};
 }
 
-/// "; they fit with lengths in m where mm belong"
+/// "; they fit with ..." and the mistake in the unit of length; empty if no unit fits.
 std::string radii_fit_with(std::span<const fit::Sphere> balls, const Calibrator& c) {
-  constexpr double kSame = 0.05;  // relative: radii that the touches know to a few per cent
+  constexpr double kSame = 0.05;  // relative: touches determine radii to a few per cent
   for (const UnitMistake& mistake : unit_mistakes()) {
     bool all = true;
     for (std::size_t i = 0; i < balls.size(); ++i) {
@@ -120,11 +120,11 @@ std::string radii_fit_with(std::span<const fit::Sphere> balls, const Calibrator&
   return "";
 }
 
-/// The touch without which the others lie much better on a sphere whose radius is at most half as
-/// far from this one.
+/// The touch without which the others fit a sphere much better, and the radius of that sphere is at
+/// most half as far from `radius_m`. nullopt if there is none.
 std::optional<std::size_t> touch_off_radius(std::span<const Vector3> points_m, double radius_m) {
   constexpr std::size_t kUnknowns = 4, kRedundant = 2;
-  constexpr double kClear = 3.0;  // rms; machines with errors of some mm bend the sphere
+  constexpr double kClear = 3.0;  // ratio of rms; machine errors of some mm deform the sphere
   const Result<fit::Sphere> all = fit::fit_sphere(points_m);
 
   if (!all || points_m.size() <= kUnknowns + kRedundant) {
@@ -153,7 +153,7 @@ std::string why_another_radius(std::span<const fit::Sphere> balls,
                                const Calibrator& c) {
   if (const auto k = touch_off_radius(points_m, expected_m)) {
     return message("without touch ", *k + 1, " of ", points_m.size(),
-                   " it comes nearer to that: a false trigger, or dirt; touch there again");
+                   " it comes nearer to that radius: a false trigger, or dirt; touch there again");
   }
   return "calibrator file of another artefact, or another tip" + radii_fit_with(balls, c);
 }
@@ -167,21 +167,23 @@ Result<void> check_radii(int position, const Touched& touched, std::span<const f
       return at_position(
           position, ErrorCode::BadInput,
           message("ball ", i + 1, " has radius ", balls[i].radius * kMmPerM, " mm, calibrator \"",
-                  c.name, "\" and tip make ", expected_m * kMmPerM,
+                  c.name, "\" and tip give ", expected_m * kMmPerM,
                   " mm: ", why_another_radius(balls, points_m, expected_m, c)));
     }
   }
   return {};
 }
 
-/// In another unit of length every touch seems false.
+/// Reports a wrong unit of length before single touches are checked: with a wrong unit every touch
+/// seems false.
 Result<void> check_unit(int position, const Touched& touched, std::span<const fit::Sphere> balls,
                         const Calibrator& c, const ObserveOptions& options) {
   return radii_fit_with(balls, c).empty() ? Result<void>{}
                                           : check_radii(position, touched, balls, c, options);
 }
 
-/// "; they fit with ...": a reflection, other numbers. Empty: with nothing that was tried.
+/// "; they fit with ..." and the mistakes that explain the shape: a reflection, other ball numbers.
+/// Empty if none of the tested mistakes does.
 std::string balls_fit_with(std::span<const Vector3> calibrated, std::span<const Vector3> seen,
                            const ObserveOptions& options) {
   const auto fits = [&](const std::vector<Vector3>& from) {
@@ -221,7 +223,7 @@ std::string balls_fit_with(std::span<const Vector3> calibrated, std::span<const 
   return texts.empty() ? "" : "; they fit with " + joined_with_or(texts);
 }
 
-/// Machine from calibration coordinates, by the balls alone.
+/// Transformation from calibration to machine coordinates, from the balls alone.
 Result<RigidTransform> rough_pose(int position, std::span<const fit::Sphere> balls,
                                   const Calibrator& c, const ObserveOptions& options) {
   std::vector<Vector3> from, to;
@@ -309,7 +311,7 @@ Result<std::map<int, Touched>> by_position(std::span<const Touch> touches,
     if (!found.contains(p)) {
       return at_position(
           p, ErrorCode::TooFewObservations,
-          message("left out: nothing was touched there, of ", options.positions, " positions"));
+          message("left out: no touches; ", options.positions, " positions are required"));
     }
   }
 

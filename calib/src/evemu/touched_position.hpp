@@ -1,5 +1,5 @@
 #pragma once
-/// The touches of one position of the ball array, and the array that is seen in them.
+/// The touches of one position of the ball array, and the array as measured by them.
 
 #include <map>
 #include <span>
@@ -15,7 +15,7 @@ namespace abbe::calib::evemu {
 /// Touched points of one ball or block.
 struct TouchedPoints {
   std::vector<Vector3> points_m;
-  double index_sum = 0.0;  ///< of their places among all touches
+  double index_sum = 0.0;  ///< sum of the points' indices among all touches
 
   void add(const Vector3& p_m, std::size_t index) {
     points_m.push_back(p_m);
@@ -25,7 +25,7 @@ struct TouchedPoints {
     return index_sum / static_cast<double>(points_m.size());
   }
 };
-/// Of one position, by feature and number.
+/// Touched points of one position, by feature and number.
 using Touched = std::map<std::pair<Feature, int>, TouchedPoints>;
 
 [[nodiscard]] inline tl::unexpected<Error> at_position(int position, ErrorCode code,
@@ -33,14 +33,14 @@ using Touched = std::map<std::pair<Feature, int>, TouchedPoints>;
   return failure(code, message("position ", position, ": ", what));
 }
 
-/// TooFewObservations where a position of 1 to ObserveOptions::positions has no touch; BadInput,
-/// NotFinite.
+/// TooFewObservations if a position of 1 to ObserveOptions::positions has no touch; BadInput for
+/// another position number; NotFinite.
 [[nodiscard]] Result<std::map<int, Touched>> by_position(std::span<const Touch>,
                                                          const ObserveOptions&);
 
 /// Spheres, planes and pose of a position. `at_machine`: the calibrator at the array's temperature;
-/// `T_uni_pre`: from its coordinates into the uniform frame. BadInput that names what does not fit,
-/// and with which mistake it would.
+/// `T_uni_pre`: from its coordinates into the uniform frame. The text of BadInput names the feature
+/// that does not fit, and the mistake that would explain it.
 [[nodiscard]] Result<SeenArtefact> see(int position, const Touched&, const Calibrator& at_machine,
                                        const RigidTransform& T_uni_pre, const ObserveOptions&);
 

@@ -36,7 +36,7 @@ Result<PointSet> point_set(std::span<const Vector3> points, std::size_t needed, 
   }
 
   if (points.size() >= needed && !points.empty()) {
-    // Relative to the first point before summing: the mean of large coordinates would lose digits.
+    // Coordinates relative to the first point: the mean of large coordinates would lose digits.
     set.centred.colwise() -= points.front();
     const Vector3 mean = set.centred.rowwise().mean();
     set.centred.colwise() -= mean;
@@ -52,8 +52,8 @@ Result<PointSet> point_set(std::span<const Vector3> points, std::size_t needed, 
                    message(what, ": ", set.distinct, " different points, needs ", needed));
   }
 
-  // R of the points' QR has their singular values and right vectors, and is 3 x 3 for any number of
-  // them.
+  // R of the QR decomposition of the points has the same singular values and right singular
+  // vectors, and is 3 x 3 for any number of points.
   const Eigen::HouseholderQR<Eigen::MatrixX3d> qr(set.centred.transpose());
   const Eigen::Index rank = std::min<Eigen::Index>(3, set.centred.cols());
   Matrix3 R = Matrix3::Zero();

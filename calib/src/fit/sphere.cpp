@@ -11,13 +11,13 @@ namespace {
 
 constexpr std::size_t kUnknowns = 4;
 
-/// Centre and radius in units of the set's size, about its centroid.
+/// Centre and radius in units of the size of the point set, relative to its centroid.
 struct Normalised {
   Vector3 centre = Vector3::Zero();
   double radius = 1.0;
 };
 
-/// |p|^2 = 2 c.p + (r^2 - |c|^2), linear in c and the bracket.
+/// Algebraic fit: |p|^2 = 2 c . p + (r^2 - |c|^2) is linear in c and in the term in brackets.
 Normalised algebraic(const Eigen::Matrix3Xd& p) {
   Eigen::MatrixX4d A(p.cols(), 4);
   A << 2.0 * p.transpose(), Eigen::VectorXd::Ones(p.cols());
@@ -25,7 +25,7 @@ Normalised algebraic(const Eigen::Matrix3Xd& p) {
   return {x.head<3>(), std::sqrt(std::max(0.0, x(3) + x.head<3>().squaredNorm()))};
 }
 
-/// Jacobian of |p_i - c| - r by centre and radius; residuals into `r`.
+/// Jacobian of |p_i - c| - r by centre and radius; writes the residuals to `r`.
 Eigen::MatrixX4d jacobian(const Eigen::Matrix3Xd& p, const Normalised& s, Eigen::VectorXd& r) {
   Eigen::MatrixX4d J(p.cols(), 4);
   r.resize(p.cols());
@@ -57,8 +57,8 @@ Result<Sphere> fit_sphere(std::span<const Vector3> points, std::optional<double>
   Sphere sphere;
   Eigen::VectorXd r;
 
-  // Gauss-Newton ends at rounding level in 2 to 13 steps on sets with noise up to a fortieth of the
-  // radius.
+  // Gauss-Newton reaches rounding level in 2 to 13 steps on sets with noise of up to a fortieth of
+  // the radius.
   constexpr int kMostIterations = 100;
   constexpr double kSettled = 1e-15;
   double step = 1.0, before = 2.0;
@@ -73,13 +73,13 @@ Result<Sphere> fit_sphere(std::span<const Vector3> points, std::optional<double>
     ++sphere.iterations;
     constexpr double kRounding = 1e-11;
     if (step < kRounding * (1.0 + s.radius) && step >= 0.5 * before) {
-      break;  // rounding, not progress
+      break;  // the step is rounding error
     }
   }
 
   if (!std::isfinite(step) || sphere.iterations >= kMostIterations || !(s.radius > 0.0)) {
     return failure(ErrorCode::NotConverged,
-                   message("sphere: ", points.size(), " points do not determine one (last step ",
+                   message("sphere: ", points.size(), " points do not determine it (last step ",
                            step, " of the set's size after ", sphere.iterations, " iterations)"));
   }
 

@@ -11,8 +11,8 @@
 namespace abbe::calib::otf {
 namespace {
 
-/// Start, means of the blocks that have samples, end.
-std::vector<Vector3> seen(const BlockSeries& series) {
+/// Polyline of the measured path: start, means of the blocks that have samples, end.
+std::vector<Vector3> measured_polyline(const BlockSeries& series) {
   std::vector<Vector3> points{series.start_tracker_m};
   for (const Block& b : series.blocks) {
     if (b.samples > 0) {
@@ -24,8 +24,8 @@ std::vector<Vector3> seen(const BlockSeries& series) {
 }
 
 Result<void> check(const BlockSeries& series, const Path& path) {
-  if (Result<void> fine = check(path); !fine) {
-    return fine;
+  if (Result<void> valid = check(path); !valid) {
+    return valid;
   }
   if (std::count_if(series.blocks.begin(), series.blocks.end(),
                     [](const Block& b) { return b.usable; }) < 4) {
@@ -34,8 +34,8 @@ Result<void> check(const BlockSeries& series, const Path& path) {
   return {};
 }
 
-/// [Sanders 2023] section 1.2.3: start on start, then the rotation that brings end and centroid
-/// closest.
+/// Rough alignment [Sanders 2023] section 1.2.3: the measured start is placed on the nominal start,
+/// then rotated for the best fit of end and centroid.
 Result<RigidTransform> rough(const BlockSeries& series, const Centroid& measured, const Path& path,
                              const Centroid& nominal, const Vector3& t) {
   const Vector3& start = path.vertices_m.front();
@@ -48,7 +48,7 @@ Result<RigidTransform> rough(const BlockSeries& series, const Centroid& measured
   });
 }
 
-/// Axis positions of all blocks under a transform; NaN where the beam was lost.
+/// Axis positions of all blocks with the transform T; NaN for blocks without samples (beam lost).
 std::vector<Vector3> axis_positions(const BlockSeries& series, const RigidTransform& T,
                                     const Vector3& t) {
   std::vector<Vector3> points;
@@ -61,7 +61,8 @@ std::vector<Vector3> axis_positions(const BlockSeries& series, const RigidTransf
   return points;
 }
 
-/// Pairs of measured and closest nominal points, outside the corners.
+/// Pairs of measured points and closest nominal points of the used blocks (usable, outside the
+/// corners).
 struct Pairs {
   std::vector<Vector3> measured_m, nominal_m;
   std::vector<bool> used;
@@ -105,16 +106,17 @@ Pairs pair_up(const BlockSeries& series, std::span<const Vector3> points,
 Result<void> check_length(double measured_m, double nominal_m, double allowed) {
   if (std::abs(measured_m / nominal_m - 1.0) > allowed) {
     return failure(ErrorCode::AlignmentFailed,
-                   message("alignment: the tracker saw ", measured_m, " m of travel, the path is ",
-                           nominal_m, " m long: not the same run, or not all of it"));
+                   message("alignment: the tracker measured ", measured_m,
+                           " m of travel, the path is ", nominal_m,
+                           " m long: another run, or an incomplete one"));
   }
   return {};
 }
 
 tl::unexpected<Error> does_not_fit(const std::string& what, double is_m, double limit_m) {
   return failure(ErrorCode::AlignmentFailed,
-                 message("alignment: ", what, " is ", 1e3 * is_m, " mm, allowed are ",
-                         1e3 * limit_m, " mm: the points do not fit this path"));
+                 message("alignment: ", what, " is ", 1e3 * is_m, " mm, limit ", 1e3 * limit_m,
+                         " mm: the points do not fit this path"));
 }
 
 Result<void> check_fit(const Alignment& a, const Pairs& pairs, const BlockSeries& series,
@@ -148,12 +150,13 @@ Result<void> check_fit(const Alignment& a, const Pairs& pairs, const BlockSeries
 
 void report(const Options& options, int update) {
   if (options.progress) {
-    // Usually done after about ten updates.
+    // The alignment usually converges in about ten updates.
     options.progress(Stage::Align, std::min(1.0, update / 10.0));
   }
 }
 
-/// Iterated closest points: [Sanders 2023] section 1.2.3. Leaves the last pairs in `pairs`.
+/// Fine alignment by iterative closest points: [Sanders 2023] section 1.2.3. `pairs` receives the
+/// pairs of the last iteration.
 Result<void> refine(Alignment& a, Pairs& pairs, const BlockSeries& series, const Path& path,
                     const Vector3& t, const Options& options) {
   double previous_rms_m = 0.0;
@@ -170,8 +173,8 @@ Result<void> refine(Alignment& a, Pairs& pairs, const BlockSeries& series, const
     a.iterations = update + 1;
     a.last_rms_m = pairs.rms_m;
     report(options, update);
-    if (Result<void> goes_on = check_stopped(options.stopped); !goes_on) {
-      return goes_on;
+    if (Result<void> running = check_stopped(options.stopped); !running) {
+      return running;
     }
     if (update == 0) {
       a.first_rms_m = pairs.rms_m;
@@ -181,7 +184,7 @@ Result<void> refine(Alignment& a, Pairs& pairs, const BlockSeries& series, const
       return {};
     }
     if (update == options.max_alignment_updates) {
-      return failure(ErrorCode::NotConverged, message("alignment: still moving after ", update,
+      return failure(ErrorCode::NotConverged, message("alignment: no convergence after ", update,
                                                       " updates, rms ", 1e6 * pairs.rms_m, " um"));
     }
     previous_rms_m = pairs.rms_m;
@@ -195,22 +198,23 @@ Result<void> refine(Alignment& a, Pairs& pairs, const BlockSeries& series, const
 
 Result<Alignment> align_as_given(const BlockSeries& series, const Machine& machine,
                                  const Path& path, const Options& options) {
-  if (Result<void> fine = check(series, path); !fine) {
-    return tl::unexpected(fine.error());
+  if (Result<void> valid = check(series, path); !valid) {
+    return tl::unexpected(valid.error());
   }
 
   const Vector3& t = machine.target_offset_m;
-  const Centroid measured = centroid(seen(series)), nominal = centroid(path.vertices_m);
+  const Centroid measured = centroid(measured_polyline(series));
+  const Centroid nominal = centroid(path.vertices_m);
   const Result<RigidTransform> first = rough(series, measured, path, nominal, t);
 
   if (!first) {
     return tl::unexpected(first.error());
   }
 
-  if (Result<void> fine =
+  if (Result<void> valid =
           check_length(measured.length_m, nominal.length_m, options.max_length_mismatch);
-      !fine) {
-    return tl::unexpected(fine.error());
+      !valid) {
+    return tl::unexpected(valid.error());
   }
 
   Alignment a;
@@ -218,14 +222,14 @@ Result<Alignment> align_as_given(const BlockSeries& series, const Machine& machi
   a.measured_length_m = measured.length_m;
   a.path_length_m = nominal.length_m;
   Pairs pairs;
-  Result<void> fine = refine(a, pairs, series, path, t, options);
+  Result<void> valid = refine(a, pairs, series, path, t, options);
 
-  if (fine) {
-    fine = check_fit(a, pairs, series, path, t, options);
+  if (valid) {
+    valid = check_fit(a, pairs, series, path, t, options);
   }
 
-  if (!fine) {
-    return tl::unexpected(fine.error());
+  if (!valid) {
+    return tl::unexpected(valid.error());
   }
 
   a.used = std::move(pairs.used);
@@ -239,7 +243,8 @@ Path times(const Matrix3& M, Path path) {
   return path;
 }
 
-/// A rigid fit cannot tell one reflection from another: those that stay inside the travel.
+/// Names the reflections after which the path is inside the travel. A rigid fit cannot distinguish
+/// between them.
 std::string reflections(const Path& path, const MachineNodes& travel) {
   std::vector<std::string> texts;
   for (const AxisMistake& mistake : axis_mistakes()) {
@@ -249,10 +254,11 @@ std::string reflections(const Path& path, const MachineNodes& travel) {
     }
   }
   return texts.empty() ? "one axis of the path or of the tracker's frame reversed, or two swapped"
-                       : joined_with_or(texts) + ", or with such a tracker frame";
+                       : joined_with_or(texts) + ", or with the tracker frame reflected";
 }
 
-/// "; they fit with the path driven backwards". Empty: with none of the mistakes that were tried.
+/// Names the mistakes whose correction makes the points fit: "; they fit with the path driven
+/// backwards". Empty if no correction does.
 std::string fits_with(const BlockSeries& series, const Machine& machine, const Path& path,
                       Options options) {
   options.progress = {};

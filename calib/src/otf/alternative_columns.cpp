@@ -12,7 +12,7 @@ namespace {
 constexpr std::size_t kRigid = 6, kDrift = 9, kBacklash = 18, kShift = 3;
 
 std::vector<std::array<int, 3>> directions_of(const std::vector<Vector3>& vertices_m) {
-  constexpr double kRests_m = 1e-6;  // an axis that moves by less holds the side of its last motion
+  constexpr double kRests_m = 1e-6;  // an axis that moves less keeps its direction
   std::vector<std::array<int, 3>> all;
   std::array<int, 3> now{};
 
@@ -105,8 +105,8 @@ std::size_t AlternativeColumns::values(const Added& added, const Observation& ro
   }
 }
 
-/// All places of a step in one pass: the sums behind a place are those of all rows less those
-/// before.
+/// Sums for steps at about 100 positions, in one pass: the sums of the rows after a step are those
+/// of all rows minus those of the rows before it.
 AlternativeColumns::Family AlternativeColumns::steps(std::span<const double> residual_m) const {
   constexpr std::size_t kPlaces = 100, kMargin = 2;
   const std::size_t rows = o_.rows.size(), stride = std::max<std::size_t>(2, rows / kPlaces);
@@ -125,9 +125,9 @@ AlternativeColumns::Family AlternativeColumns::steps(std::span<const double> res
   }
 
   for (auto& [added, sums] : before) {
-    AddedColumns behind = sum;
-    behind -= sums;
-    sums = std::move(behind);
+    AddedColumns after = sum;
+    after -= sums;
+    sums = std::move(after);
   }
 
   return before;
@@ -136,14 +136,14 @@ AlternativeColumns::Family AlternativeColumns::steps(std::span<const double> res
 std::vector<AlternativeColumns::Family> AlternativeColumns::sums(
     std::span<const double> residual_m) const {
   std::vector<Family> all(5);
-  // A path may have 1e5 vertices; only those of legs that are used have columns. Rows come in the
-  // order of legs.
+  // A path may have 1e5 vertices; columns are created only for vertices of legs with observations.
+  // Rows are in the order of legs, so that only the last two entries are searched.
   const auto columns_of = [&](std::size_t family, Cause cause, std::size_t place,
                               std::size_t columns) -> auto& {
-    const auto is_it = [&](const auto& one) { return one.first.place == place; };
+    const auto is_same = [&](const auto& one) { return one.first.place == place; };
     const auto last = all[family].rbegin();
     const auto end = last + std::min<std::ptrdiff_t>(2, std::ssize(all[family]));
-    if (const auto found = std::find_if(last, end, is_it); found != end) {
+    if (const auto found = std::find_if(last, end, is_same); found != end) {
       return *found;
     }
     return all[family].emplace_back(Added{cause, place},
@@ -196,10 +196,10 @@ std::string AlternativeColumns::text(const Added& added, const Eigen::VectorXd& 
     }
     case Cause::Vertex:
       return message("vertex ", added.place, " was driven at ", um(shift),
-                     " from where the path says");
+                     " relative to the path file");
     case Cause::Leg:
       return message("leg ", added.place, " was driven or measured at ", um(shift),
-                     " from where the path says");
+                     " relative to the path file");
     case Cause::RangeOffset:
       return message("all ranges of the tracker have an offset of ", 1e6 * d(0),
                      " um: home position or reflector");

@@ -1,5 +1,6 @@
 #pragma once
-/// The columns of the alternatives that a run is held against, and their words.
+/// The added columns of the alternatives with which a run is compared, and the texts of the
+/// alternatives.
 
 #include <array>
 #include <cstddef>
@@ -13,7 +14,8 @@
 
 namespace abbe::calib::otf {
 
-/// One alternative: its cause, and where: the first block after the step, vertex or leg.
+/// One alternative. `place`: index of the first block after the step (Moved), of the vertex or of
+/// the leg.
 struct Added {
   Cause cause;
   std::size_t place = 0;
@@ -26,22 +28,24 @@ class AlternativeColumns {
 
   explicit AlternativeColumns(const Observations&);
 
-  /// Of one row; returns how many columns there are, 0 where the row has none of it.
+  /// Writes the values of the added columns in one row. Returns the number of columns; 0 if the
+  /// alternative does not affect the row.
   std::size_t values(const Added&, const Observation&, Values&) const;
-  /// Over all rows, by cause. O(rows).
+  /// Sums over all rows for every alternative, grouped by cause. O(rows).
   [[nodiscard]] std::vector<Family> sums(std::span<const double> residual_m) const;
-  /// "the tracker or the machine moved by 52.1 um and 3.2 urad ... on leg 30": `d` of the columns.
+  /// Text for an alternative: "the tracker or the machine moved by 52.1 um and 3.2 urad ... on leg
+  /// 30". `d`: estimated coefficients of the columns.
   [[nodiscard]] std::string text(const Added&, const Eigen::VectorXd& d) const;
 
  private:
-  /// Translation and rotation about the centre of the path.
+  /// Columns of a translation and of a rotation about the centre of the path.
   void rigid(const Observation&, Values&) const;
   [[nodiscard]] Family steps(std::span<const double> residual_m) const;
 
   const Observations& o_;
   Vector3 centre_m_ = Vector3::Zero();
   double last_block_ = 1.0;
-  std::vector<std::array<int, 3>> direction_;  ///< of each leg and axis: sign of the last motion
+  std::vector<std::array<int, 3>> direction_;  ///< per leg and axis: sign of the last motion
 };
 
 }  // namespace abbe::calib::otf

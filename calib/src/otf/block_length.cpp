@@ -9,7 +9,7 @@ std::size_t suitable_block_samples(std::span<const TrackerObservation> samples) 
   constexpr double kBlockTravel_m = 8.33e-3;
   constexpr std::size_t kChord = 50;
 
-  // the design rows of a block are averaged over ten of its points
+  // the design rows of a block are averaged over ten sub-points
   constexpr std::size_t kSmallest = 10;
   constexpr std::size_t kLargest = 1000;
   std::vector<double> travel_m;  // per sample

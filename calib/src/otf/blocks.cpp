@@ -51,7 +51,8 @@ double median_tick_s(std::span<const TrackerObservation> samples) {
   return *middle;
 }
 
-/// Cuts the ticks of the tracker into blocks of equal length; a hole in time counts as lost ticks.
+/// Divides the samples of the tracker into blocks of equal duration. A gap in time counts as lost
+/// samples.
 class BlockCutter {
  public:
   BlockCutter(std::size_t expected_blocks, const Options& options) : options_(options) {
@@ -107,8 +108,8 @@ class BlockCutter {
     ticks_ = 0;
   }
 
-  /// The middles of row_points equal parts: their mean is the mean of the block, unlike that of
-  /// points with both ends.
+  /// Appends the midpoints of row_points equal parts of the block. Their mean is the mean of the
+  /// block; with points at both ends it would not be.
   void push_sub_points() {
     const double step =
         static_cast<double>(in_block_.size()) / static_cast<double>(options_.row_points);
@@ -128,7 +129,7 @@ class BlockCutter {
   std::size_t ticks_ = 0;
 };
 
-/// Mean of the first `count` valid samples of [begin, end).
+/// Mean of the first `count` valid samples in [begin, end).
 template <class Iterator>
 Result<Vector3> standstill(Iterator begin, Iterator end, std::size_t count) {
   Vector3 sum = Vector3::Zero();
@@ -142,7 +143,8 @@ Result<Vector3> standstill(Iterator begin, Iterator end, std::size_t count) {
 
   if (found < count) {
     return failure(ErrorCode::TooFewObservations,
-                   message("tracker blocks: ", found, " valid samples, standstill needs ", count));
+                   message("tracker blocks: ", found, " valid samples, the standstill needs ",
+                           count));
   }
 
   return Vector3(sum / static_cast<double>(count));
@@ -152,8 +154,8 @@ Result<Vector3> standstill(Iterator begin, Iterator end, std::size_t count) {
 
 Result<BlockSeries> make_blocks(std::span<const TrackerObservation> samples,
                                 const Options& options) {
-  if (Result<void> fine = check(samples, options); !fine) {
-    return tl::unexpected(fine.error());
+  if (Result<void> valid = check(samples, options); !valid) {
+    return tl::unexpected(valid.error());
   }
 
   const Result<Vector3> start =
@@ -166,16 +168,17 @@ Result<BlockSeries> make_blocks(std::span<const TrackerObservation> samples,
   }
 
   const double tick_s = median_tick_s(samples);
-  // A pause of an hour is not a run any more, and must not become millions of empty blocks.
-  constexpr double kLongestHole_s = 3600.0;
+  // A longer pause is not part of one run; without this limit it would give millions of empty
+  // blocks.
+  constexpr double kLongestGap_s = 3600.0;
   BlockCutter cutter(samples.size() / options.block_samples + 1, options);
 
   for (std::size_t i = 0; i < samples.size(); ++i) {
     if (i > 0) {
       const double step_s = samples[i].time_s - samples[i - 1].time_s;
-      if (step_s > kLongestHole_s) {
+      if (step_s > kLongestGap_s) {
         return failure(ErrorCode::BadInput,
-                       message("tracker blocks: a hole of ", step_s, " s before sample ", i));
+                       message("tracker blocks: a gap of ", step_s, " s before sample ", i));
       }
       if (step_s > 1.5 * tick_s) {
         cutter.lose(static_cast<std::size_t>(std::lround(step_s / tick_s)) - 1);

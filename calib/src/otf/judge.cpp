@@ -16,7 +16,7 @@
 namespace abbe::calib::otf {
 namespace {
 
-/// Sums over everything held out, of what one contender leaves unexplained.
+/// Sums over all held-out rows of the residuals of one model (or of no compensation).
 struct Remainder {
   double whitened_squares = 0.0;
   double squares_m2 = 0.0;
@@ -28,11 +28,11 @@ struct Remainder {
   [[nodiscard]] double rms_m() const { return std::sqrt(squares_m2 / static_cast<double>(rows)); }
 };
 
-/// Of the best-fit rigid motion: so many rows or fewer it fits exactly, whatever the model. What is
-/// left of them is rounding, and compares nothing.
+/// Number of parameters of the best-fit rigid motion. It fits this many rows or fewer exactly for
+/// any model; their residuals are only rounding and cannot be used for a comparison.
 constexpr std::size_t kRigidUnknowns = 6;
 
-/// The last six entries of a row are the rigid ones.
+/// The last six entries of a row belong to the rigid unknowns.
 Vector6 rigid_row(std::span<const SparseRows::Entry> row) {
   Vector6 r;
   for (std::size_t k = 0; k < 6; ++k) {
@@ -41,8 +41,8 @@ Vector6 rigid_row(std::span<const SparseRows::Entry> row) {
   return r;
 }
 
-/// Takes the best-fit rigid motion out of the residuals of the held-out rows and adds up what
-/// remains.
+/// Removes the best-fit rigid motion from the residuals of the held-out rows and adds the squares
+/// of the remaining residuals to `total`.
 void add_without_rigid(Remainder& total, const Observations& o, std::span<const std::size_t> rows,
                        std::span<const double> residual_m) {
   Eigen::Matrix<double, 6, 6> H = Eigen::Matrix<double, 6, 6>::Zero();
@@ -54,8 +54,8 @@ void add_without_rigid(Remainder& total, const Observations& o, std::span<const 
     g += weight * residual_m[i] * a;
   }
 
-  // A complete orthogonal decomposition: a fold of few legs may leave part of the rigid motion
-  // free, which then is not used.
+  // Complete orthogonal decomposition: a fold with few legs may not determine the whole rigid
+  // motion; the undetermined part is then set to zero.
   const Vector6 rigid = H.completeOrthogonalDecomposition().solve(g);
   for (std::size_t i = 0; i < rows.size(); ++i) {
     const double rest_m = residual_m[i] - rigid_row(o.A.row(rows[i])).dot(rigid);
@@ -75,7 +75,8 @@ double predicted_by_fit(const Observations& o, std::size_t row, const Eigen::Vec
   return sum;
 }
 
-/// Averaged over the same sub-points as the row: fair to a model whose nodes are elsewhere.
+/// Prediction of the model, averaged over the same sub-points as the row. This is necessary for a
+/// model with other nodes.
 double predicted_by_model(const Observations& o, std::size_t row, const VolumetricModel& model) {
   const Observation& r = o.rows[row];
   Vector3 sum = Vector3::Zero();
@@ -85,7 +86,7 @@ double predicted_by_model(const Observations& o, std::size_t row, const Volumetr
   return r.direction.dot(sum) / static_cast<double>(r.sub_points);
 }
 
-/// The rows a model speaks of: all their sub-points lie where it holds.
+/// The rows whose sub-points are all inside the validity volume of a model.
 std::vector<std::size_t> inside(const Observations& o, std::span<const std::size_t> rows,
                                 const ValidityVolume& volume) {
   std::vector<std::size_t> found;
@@ -98,7 +99,7 @@ std::vector<std::size_t> inside(const Observations& o, std::span<const std::size
   return found;
 }
 
-/// Residuals of some rows under one contender's prediction.
+/// Residuals of the given rows with a prediction.
 template <class Prediction>
 std::vector<double> residuals(const Observations& o, std::span<const std::size_t> rows,
                               Prediction predicted_m) {
@@ -118,7 +119,7 @@ std::vector<NormalEquations> equations_by_fold(const Observations& o, std::size_
   return parts;
 }
 
-/// Legs of the fold with an observation of a parameter that the other folds have none of.
+/// Marks the legs of the fold that observe a parameter without observations in the other folds.
 std::vector<bool> legs_needed(const Observations& o, const NormalEquations& others,
                               std::size_t fold, std::size_t folds) {
   std::vector<bool> needed(o.rows.back().leg + 1, false);
@@ -139,11 +140,11 @@ std::vector<bool> legs_needed(const Observations& o, const NormalEquations& othe
 
 struct HeldOutFold {
   Eigen::VectorXd U;
-  std::vector<std::size_t> rows;  ///< that U was not fitted to
+  std::vector<std::size_t> rows;  ///< the held-out rows: U was not fitted to them
 };
 
-/// A leg that alone touches a node stays among what is fitted to. Where the rest does not determine
-/// the model even so, nothing is held out of this fold.
+/// Fits U without the legs of a fold. A leg with the only observations of a node remains in the
+/// fit. If the model is not determined even then, the result has no held-out rows.
 Result<HeldOutFold> hold_out(const std::vector<NormalEquations>& parts, std::size_t fold,
                              const Observations& o, const Options& options) {
   NormalEquations training(o.layout.fit_size());
@@ -178,7 +179,7 @@ Result<HeldOutFold> hold_out(const std::vector<NormalEquations>& parts, std::siz
   return held;
 }
 
-/// Reasons before those that only follow from them.
+/// Inserts the alternatives before the other reasons, which may be only consequences of them.
 void add_alternatives(Verdict& verdict, const std::vector<Alternative>& others) {
   std::size_t reasons = 0;
   for (const Alternative& other : others) {
@@ -187,7 +188,7 @@ void add_alternatives(Verdict& verdict, const std::vector<Alternative>& others) 
       verdict.notes.push_back(other.text);
     } else if (other.bias_m <= other.u_m) {
       verdict.notes.push_back(text);
-    } else {  // and where a figure is NaN
+    } else {  // larger, or NaN
       verdict.refuse(name(other.cause), text, reasons++);
     }
   }
@@ -206,12 +207,12 @@ void require_plausible_scale(Verdict& verdict, double scale, double most) {
   if (!(std::abs(scale) <= most)) {
     verdict.refuse(
         "growth",
-        message("the machine is larger by ", 1e6 * scale, " um/m in all directions, allowed are ",
-                1e6 * most, ": wrong scale of the path, of the ranges or of a temperature"));
+        message("the machine is larger by ", 1e6 * scale, " um/m in all directions, limit ",
+                1e6 * most, " um/m: wrong scale of the path, of the ranges or of a temperature"));
   }
 }
 
-/// Scales that no residual shows, and no uncertainty was given for.
+/// Notes for scale errors that residuals do not show and for which no uncertainty is given.
 void note_what_u_leaves_out(Verdict& verdict, const Observations& o) {
   const std::vector<Vector3> at = tensor_grid(o.layout.nodes());
   Vector3 centre = Vector3::Zero();
@@ -240,20 +241,20 @@ void note_what_u_leaves_out(Verdict& verdict, const Observations& o) {
   }
 }
 
-/// An offset of the ranges that the model follows: its prior decides, and the data do not show more
-/// of it.
+/// Note if the data hardly determine the offset of the ranges, because the model can reproduce it;
+/// the prior then determines the estimate.
 void note_undetermined_offset(Verdict& verdict, const RangeOffset& offset, double prior_m) {
   const double share = offset.u_m / prior_m;  // 1: the data determine nothing
-  constexpr double kOfEqualWeight = 0.7;      // data and prior: 1/sqrt(2)
+  constexpr double kOfEqualWeight = 0.7;      // 1/sqrt(2): data and prior of equal weight
   if (!(prior_m > 0.0) || !(share > kOfEqualWeight)) {
     return;
   }
   const double u_of_data_m = offset.u_m / std::sqrt(std::max(1e-12, 1.0 - share * share));
   constexpr double kNormal99 = 2.576;
   verdict.notes.push_back(message(
-      "the run hardly determines the offset of the tracker's ranges: ", 1e6 * prior_m,
-      " um are stated, and an offset below ",
-      1e6 * kNormal99 * root_sum_of_squares(u_of_data_m, prior_m), " um would not be noticed"));
+      "the run hardly determines the offset of the tracker's ranges: its stated uncertainty is ",
+      1e6 * prior_m, " um, and an offset below ",
+      1e6 * kNormal99 * root_sum_of_squares(u_of_data_m, prior_m), " um would not be detected"));
 }
 
 }  // namespace
@@ -265,7 +266,7 @@ Result<HeldOutFigures> held_out(const Observations& o, const VolumetricModel* ac
   if (folds < 2 || legs < folds) {
     return failure(ErrorCode::TooFewObservations,
                    message("held-out test: ", legs, " legs in ", folds,
-                           " folds, needs 2 folds and a leg in each"));
+                           " folds, needs at least 2 folds and one leg per fold"));
   }
 
   const bool with_active = active != nullptr && active->holds_for_tool(o.target_offset_m);
@@ -273,8 +274,8 @@ Result<HeldOutFigures> held_out(const Observations& o, const VolumetricModel* ac
   Remainder none, candidate, other, candidate_beside;
 
   for (std::size_t f = 0; f < folds; ++f) {
-    if (Result<void> goes_on = check_stopped(options.stopped); !goes_on) {
-      return tl::unexpected(goes_on.error());
+    if (Result<void> running = check_stopped(options.stopped); !running) {
+      return tl::unexpected(running.error());
     }
     const Result<HeldOutFold> fit = hold_out(parts, f, o, options);
     if (!fit) {
@@ -304,8 +305,8 @@ Result<HeldOutFigures> held_out(const Observations& o, const VolumetricModel* ac
     return failure(
         ErrorCode::RankDeficient,
         message("held-out test: without any one of ", folds,
-                " folds the other legs do not determine the model; drive every part of the volume "
-                "on more legs"));
+                " folds the other legs do not determine the model; measure every part of the "
+                "volume on more legs"));
   }
 
   HeldOutFigures figures{.no_compensation = none.rms(),

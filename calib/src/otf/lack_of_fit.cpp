@@ -21,10 +21,10 @@
 namespace abbe::calib::otf {
 namespace {
 
-/// Of a false alarm in a run without a fault, over all alternatives together.
+/// Probability of a false alarm in a run without a fault, over all alternatives together.
 constexpr double kFalseAlarm = 1e-4;
 constexpr double kCauses = 9.0;
-/// Only a model that misses by that much is worth another design: it costs an adjustment each.
+/// Other design matrices are tested only above this variance factor: each test costs an adjustment.
 constexpr double kSuspicious = 2.0;
 
 std::size_t series_end(const Observations& o, std::size_t begin) {
@@ -35,7 +35,7 @@ std::size_t series_end(const Observations& o, std::size_t begin) {
   return end;
 }
 
-/// Whitened residuals of one leg along a2 or a3: every second row.
+/// Whitened residuals of one leg along a2 or a3 (every second row).
 std::vector<double> whitened(const Observations& o, std::span<const double> residual_m,
                              std::size_t begin, std::size_t end) {
   std::vector<double> w;
@@ -54,8 +54,8 @@ double median(std::vector<double> values) {
   return *middle;
 }
 
-/// At most about 9 nodes of each axis, the ends included.
-std::vector<Vector3> places(const MachineNodes& nodes) {
+/// Grid of at most about 9 nodes per axis, including both ends.
+std::vector<Vector3> sparse_grid(const MachineNodes& nodes) {
   constexpr std::size_t kCells = 8;
   MachineNodes few;
   for (const Axis a : kAllAxes) {
@@ -69,9 +69,9 @@ std::vector<Vector3> places(const MachineNodes& nodes) {
   return tensor_grid(few);
 }
 
-/// Of the tables' values U, at some nodes.
+/// Norm for the parameters U of tables, evaluated on sparse_grid().
 RigidFreeNorm rigid_free_norm(const ParameterLayout& layout, const Vector3& t) {
-  const std::vector<Vector3> at = places(layout.nodes());
+  const std::vector<Vector3> at = sparse_grid(layout.nodes());
   Eigen::MatrixXd D =
       Eigen::MatrixXd::Zero(3 * std::ssize(at), static_cast<Eigen::Index>(layout.model_size()));
   std::vector<Vector3> points;
@@ -88,7 +88,7 @@ RigidFreeNorm rigid_free_norm(const ParameterLayout& layout, const Vector3& t) {
   return {D, points};
 }
 
-/// The model, and what is needed to hold alternatives against it.
+/// The fit of the model, and the data needed to compare alternatives with it.
 struct Fit {
   const Observations& o;
   const std::vector<double>& residual_m;
@@ -99,7 +99,7 @@ struct Fit {
   RigidFreeNorm norm;
   double u_white_m = 0.0;
 
-  /// chi2 beyond what noise from block to block explains.
+  /// chi2 in excess of the noise between neighbouring blocks.
   [[nodiscard]] double excess() const {
     return chi2 - static_cast<double>(degrees_of_freedom) * noise.local * noise.local;
   }
@@ -124,7 +124,7 @@ Result<Fit> fit_of(const Observations& o, const Solution& solution, const Option
   return fit;
 }
 
-/// What is left of the residuals once the alternative is part of the model.
+/// Residuals of the model that includes the alternative.
 std::vector<double> residuals_with(const Fit& fit, const AlternativeColumns& columns,
                                    const Added& added, const AddedColumns::Estimate& e) {
   std::vector<double> r = fit.residual_m;
@@ -141,7 +141,7 @@ std::vector<double> residuals_with(const Fit& fit, const AlternativeColumns& col
   return r;
 }
 
-/// Added columns that are significant, the best of their cause.
+/// The alternative of a family with the largest decrease of chi2, if it is significant.
 Result<std::optional<Alternative>> best_of(const Fit& fit, const AlternativeColumns& columns,
                                            std::span<const std::pair<Added, AddedColumns>> family,
                                            const Options& options) {
@@ -151,8 +151,8 @@ Result<std::optional<Alternative>> best_of(const Fit& fit, const AlternativeColu
   const double noise = std::max(1.0, fit.noise.local * fit.noise.local);
 
   for (const auto& [added, sums] : family) {
-    if (Result<void> goes_on = check_stopped(options.stopped); !goes_on) {
-      return tl::unexpected(goes_on.error());
+    if (Result<void> running = check_stopped(options.stopped); !running) {
+      return tl::unexpected(running.error());
     }
     AddedColumns::Estimate e = sums.estimate(fit.adjustment.cofactor_Q, noise * chi2_bound(1.0, x));
     const bool significant = e.drop > noise * chi2_bound(static_cast<double>(e.columns), x);
@@ -171,7 +171,8 @@ Result<std::optional<Alternative>> best_of(const Fit& fit, const AlternativeColu
   const double factor =
       residual_noise(fit.o, left, fit.degrees_of_freedom - best_estimate.columns).variance_factor();
 
-  // With the true cause only noise is left; slow noise lowers chi2 of every alternative a little.
+  // Second test, with the noise after the alternative is applied: with the true cause only noise
+  // remains. Slow noise would give every alternative a small decrease of chi2.
   if (!(best_estimate.drop > std::max(noise, factor) * chi2_bound(columns_added, x))) {
     return std::nullopt;
   }
@@ -185,8 +186,8 @@ Result<std::optional<Alternative>> best_of(const Fit& fit, const AlternativeColu
                      .u_m = root_sum_of_squares(fit.u_white_m, added_u_m) * std::sqrt(factor)};
 }
 
-/// What the data show of the offset of the ranges beyond its prior. `sums`: of residuals less
-/// `estimated`.
+/// Alternative: the data show an offset of the ranges that its prior does not explain. The sums in
+/// `family` are of the residuals after subtraction of the offset `estimated`.
 Result<std::optional<Alternative>> offset_beyond_prior(const Fit& fit,
                                                        const AlternativeColumns& columns,
                                                        const AlternativeColumns::Family& family,
@@ -194,10 +195,10 @@ Result<std::optional<Alternative>> offset_beyond_prior(const Fit& fit,
   const auto& [added, sums] = family.front();
   AddedColumns::Estimate e = sums.estimate(fit.adjustment.cofactor_Q, 0.0);
   if (e.columns == 0) {
-    return std::nullopt;  // the model follows the offset: the prior alone decides
+    return std::nullopt;  // the model can reproduce the offset: only the prior determines it
   }
 
-  constexpr double kNormal99 = 2.576;  // 99 % of a normal deviate lie within
+  constexpr double kNormal99 = 2.576;  // coverage factor for 99 %
   const double factor = fit.noise.variance_factor();
   const double beyond_m = e.d(0), of_data_m = estimated.value_m + beyond_m;
   const double u_of_data_m = e.u(0) * std::sqrt(factor);
@@ -211,25 +212,26 @@ Result<std::optional<Alternative>> offset_beyond_prior(const Fit& fit,
   return Alternative{
       .cause = Cause::RangeOffset,
       .text =
-          message(columns.text(added, e.d), "; stated are ", 1e6 * fit.o.u_range_offset_m, " um"),
+          message(columns.text(added, e.d), "; its stated uncertainty is ",
+                  1e6 * fit.o.u_range_offset_m, " um"),
       .explained = std::clamp(e.drop / std::max(fit.excess(), e.drop), 0.0, 1.0),
       .bias_m = fit.norm.rms_m(e.dU),
       .u_m = root_sum_of_squares(fit.u_white_m, fit.norm.rms_of_columns_m(e.root_cov_dU)) *
              std::sqrt(factor)};
 }
 
-/// The same observations adjusted with another design.
+/// The alternative that another design matrix is correct, if it is clearly better.
 Result<std::optional<Alternative>> other_design(const Fit& fit, const Solution& solution,
                                                 Result<ParameterLayout> layout, Cause cause,
                                                 std::string text, const Options& options) {
-  constexpr std::size_t kMostUnknowns = 800;  // a second for the adjustment
+  constexpr std::size_t kMostUnknowns = 800;  // the adjustment then takes one second
   if (!layout || layout->fit_size() > kMostUnknowns) {
     return std::nullopt;
   }
 
   const Observations other = with_layout(fit.o, *std::move(layout));
-  if (Result<void> goes_on = check_stopped(options.stopped); !goes_on) {
-    return tl::unexpected(goes_on.error());
+  if (Result<void> running = check_stopped(options.stopped); !running) {
+    return tl::unexpected(running.error());
   }
 
   const Result<Adjustment> a = adjust(normal_equations(other), other.layout, options.gauge_weight);
@@ -252,7 +254,7 @@ Result<std::optional<Alternative>> other_design(const Fit& fit, const Solution& 
 
   std::vector<Vector3> points, difference;
   const Vector3& t = fit.o.target_offset_m;
-  for (const Vector3& q : places(other.layout.nodes())) {
+  for (const Vector3& q : sparse_grid(other.layout.nodes())) {
     points.push_back(q + t);
     difference.push_back(
         solution.model.V_at(q, t) -
@@ -262,8 +264,8 @@ Result<std::optional<Alternative>> other_design(const Fit& fit, const Solution& 
   const auto bias = rigid_free(points, difference);
   const double u_m = rigid_free_norm(other.layout, t).rms_u_m(a->covariance) * std::sqrt(factor);
 
-  // Tables that are too coarse are wrong everywhere: what their widened uncertainty covers refuses
-  // nothing.
+  // Tables with too wide nodes have errors everywhere. A change of V that is covered by the stated
+  // (increased) uncertainty must not refuse the model.
   const double stated_u_m = fit.u_white_m * std::sqrt(fit.noise.variance_factor());
   return Alternative{
       .cause = cause,
@@ -295,8 +297,8 @@ Result<std::optional<Alternative>> other_order(const Fit& fit, const Solution& s
     auto found = other_design(
         fit, solution, ParameterLayout::observable_with_one_target(*chain, fit.o.layout.nodes()),
         Cause::ChainOrder,
-        message("the axes carry each other in the order ", letters, " from workpiece to tool, ",
-                "not ", used, " as the machine's chain says"),
+        message("the order of the axes from workpiece to tool is ", letters, ", not ", used,
+                " as in the machine's chain"),
         options);
     if (!found) {
       return found;
@@ -365,13 +367,13 @@ ResidualNoise residual_noise(const Observations& o, std::span<const double> resi
   ResidualNoise noise;
   noise.sigma0 =
       std::sqrt(products[0] / static_cast<double>(std::max<std::size_t>(1, degrees_of_freedom)));
-  constexpr std::size_t kEnough = 30;  // below, legs are too short to tell fast from slow
-  const bool tells = second_differences.size() >= kEnough;
-  noise.local =
-      !tells ? noise.sigma0
-             : kMadToSigma * median(std::move(second_differences)) / std::sqrt(kOfSecondDifference);
+  constexpr std::size_t kEnough = 30;  // fewer do not separate fast from slow noise
+  const bool enough = second_differences.size() >= kEnough;
+  noise.local = !enough ? noise.sigma0
+                        : kMadToSigma * median(std::move(second_differences)) /
+                              std::sqrt(kOfSecondDifference);
 
-  // 99.9 % quantile; the coefficient of n pairs of noise scatters by 1/sqrt(n)
+  // 99.9 % quantile; for white noise the coefficient from n pairs has standard deviation 1/sqrt(n)
   constexpr double kNormal999 = 3.090;
   for (std::size_t lag = 1; lag <= kLags && pairs[lag] > 0; ++lag) {
     const auto n = static_cast<double>(pairs[lag]);
@@ -461,7 +463,7 @@ Result<std::vector<Alternative>> alternatives(const Observations& o, const Solut
                  {.cause = Cause::CorrelatedNoise,
                   .text = message(
                       "the residuals are correlated over ", fit->noise.correlation,
-                      " blocks: air turbulence, vibration, or an effect the model does not have"),
+                      " blocks: air turbulence, vibration, or an effect that is not modelled"),
                   .explained = 1.0,
                   .bias_m = 0.0,
                   .u_m = fit->u_white_m * std::sqrt(fit->noise.variance_factor())});

@@ -22,7 +22,8 @@ std::vector<Leg> legs_of(const Path& path) {
   return legs;
 }
 
-/// Direction of travel from the neighbours; zero where a neighbour is lost or the machine stands.
+/// Direction of travel at point i from its two neighbours. Zero if the machine stands still; NaN or
+/// zero if a neighbour is lost.
 Vector3 chord(std::span<const Vector3> points, std::size_t i) {
   const Vector3 c = points[std::min(i + 1, points.size() - 1)] - points[i == 0 ? 0 : i - 1];
   const double length = c.norm();
@@ -35,7 +36,8 @@ double squared_distance(const Leg& leg, const Vector3& p) {
   return (r - along * leg.direction).squaredNorm();
 }
 
-/// A lost block costs nothing anywhere, a standing one only its distance.
+/// Cost of a block on a leg. A lost block costs nothing on any leg; a block without direction of
+/// travel costs only its squared distance.
 double cost(const Leg& leg, const Vector3& p, const Vector3& travel, double direction_m) {
   if (!p.allFinite()) {
     return 0.0;
@@ -52,13 +54,16 @@ Result<std::vector<std::size_t>> assign_legs(std::span<const Vector3> points_m, 
   const std::vector<Leg> legs = legs_of(path);
   const std::size_t n = points_m.size(), m = legs.size();
   if (m == 0 || n < m) {
-    return failure(ErrorCode::TooFewObservations, message("leg assignment: ", n, " blocks for ", m,
-                                                          " legs, needs one block a leg"));
+    return failure(ErrorCode::TooFewObservations,
+                   message("leg assignment: ", n, " blocks for ", m,
+                           " legs, needs at least one block per leg"));
   }
 
-  // Viterbi: best[j] = least cost of blocks 0..i with block i on leg j; it came from leg j or j -
-  // 1. Of the n blocks n - m stay on the leg of the block before, so that j <= i <= j + n - m: a
-  // bit for each such pair.
+  // Viterbi algorithm. best[j]: least cost of blocks 0..i with block i on leg j; block i - 1 is
+  // then on leg j or j - 1. n - m of the n blocks are on the same leg as the block before,
+  // therefore
+  //     j <= i <= j + n - m.
+  // `advanced` has one bit for each such pair (i, j): block i - 1 is on leg j - 1.
   std::vector<double> best(m, std::numeric_limits<double>::infinity());
   const std::size_t stays = n - m;
   std::vector<bool> advanced(m * (stays + 1), false);
@@ -67,8 +72,8 @@ Result<std::vector<std::size_t>> assign_legs(std::span<const Vector3> points_m, 
 
   for (std::size_t i = 1; i < n; ++i) {
     const Vector3 travel = chord(points_m, i);
-    // Legs that cannot be reached yet, or from which the last one cannot be reached any more, stay
-    // out.
+    // Skip legs that block i cannot have reached, and legs from which the remaining blocks cannot
+    // reach the last leg.
     const std::size_t highest = std::min(m - 1, i), lowest = i > stays ? i - stays : 0;
     for (std::size_t j = highest + 1; j-- > lowest;) {
       const bool from_before = j > 0 && best[j - 1] < best[j];

@@ -17,7 +17,7 @@ Eigen::VectorXd inverse_root(const Eigen::VectorXd& diagonal) {
   return diagonal.cwiseSqrt().cwiseInverse();
 }
 
-/// The parameters with the largest share in a direction the data do not determine.
+/// Names of the parameters with the largest share in the directions that the data do not determine.
 std::string named_parameters(const Eigen::VectorXd& shares, const ParameterLayout& layout) {
   std::vector<std::size_t> order(static_cast<std::size_t>(shares.size()));
   for (std::size_t i = 0; i < order.size(); ++i) {
@@ -39,14 +39,15 @@ std::string named_parameters(const Eigen::VectorXd& shares, const ParameterLayou
   return list;
 }
 
-/// Nodes no row touches.
-Result<void> check_touched(const Eigen::MatrixXd& H, const ParameterLayout& layout) {
-  const Eigen::VectorXd untouched =
+/// RankDeficient if a parameter has no observation.
+Result<void> check_observed(const Eigen::MatrixXd& H, const ParameterLayout& layout) {
+  const Eigen::VectorXd unobserved =
       H.diagonal().unaryExpr([](double d) { return d > 0 ? 0.0 : 1.0; });
-  if (untouched.sum() > 0) {
+  if (unobserved.sum() > 0) {
     return failure(ErrorCode::RankDeficient,
-                   message("adjustment: ", untouched.sum(), " parameters have no data, among them ",
-                           named_parameters(untouched, layout)));
+                   message("adjustment: ", unobserved.sum(),
+                           " parameters have no data, among them ",
+                           named_parameters(unobserved, layout)));
   }
   return {};
 }
@@ -57,10 +58,11 @@ struct Spectrum {
   Eigen::VectorXd weakest_share;  ///< of each parameter in the directions below the threshold
 };
 
-/// Rank of the data alone. Columns are scaled to unit diagonal, so that every entry is at most 1.
-/// Each entry is a sum of `rows` rounded products: its error is below rows * eps, typically
-/// sqrt(rows) * eps, and the spectral norm of the n x n error matrix at most n times that.
-/// Eigenvalues below n * sqrt(rows) * eps * the largest are zero.
+/// Rank and condition of the data without the gauge. Columns are scaled to unit diagonal, so that
+/// every entry is at most 1. Each entry is a sum of `rows` rounded products: its error is below
+/// rows * eps, typically sqrt(rows) * eps. The spectral norm of the n x n error matrix is at most n
+/// times that. Eigenvalues below this threshold count as zero:
+///     n * sqrt(rows) * eps * largest eigenvalue
 Spectrum spectrum(const NormalEquations& N) {
   const Eigen::VectorXd scale = inverse_root(N.H.diagonal());
   const Eigen::MatrixXd scaled = scale.asDiagonal() * symmetric(N.H) * scale.asDiagonal();
@@ -83,8 +85,8 @@ Spectrum spectrum(const NormalEquations& N) {
   return s;
 }
 
-/// Parameters a gauge condition sets to zero by itself. Their zero is exact, in value and in
-/// covariance.
+/// Sets parameters to exactly zero, in value and covariance, if a gauge condition consists of this
+/// parameter alone.
 void clear_fixed(const Eigen::MatrixXd& K, Adjustment& a) {
   for (Eigen::Index i = 0; i < K.rows(); ++i) {
     if ((K.row(i).array() != 0).count() != 1) {
@@ -150,8 +152,8 @@ Result<Adjustment> adjust(const NormalEquations& N, const ParameterLayout& layou
                    message("adjustment: gauge weight ", gauge_weight, " must be positive"));
   }
 
-  if (Result<void> fine = check_touched(N.H, layout); !fine) {
-    return tl::unexpected(fine.error());
+  if (Result<void> valid = check_observed(N.H, layout); !valid) {
+    return tl::unexpected(valid.error());
   }
 
   const Eigen::MatrixXd K = gauge_conditions(Gauge::G1, layout);
@@ -161,8 +163,8 @@ Result<Adjustment> adjust(const NormalEquations& N, const ParameterLayout& layou
 
   if (s.rank + free < unknowns) {
     return failure(ErrorCode::RankDeficient,
-                   message("adjustment: rank ", s.rank, " of ", unknowns - free, " needed from ",
-                           N.rows, " observations; not determined are combinations of ",
+                   message("adjustment: rank ", s.rank, " from ", N.rows, " observations, needs ",
+                           unknowns - free, "; not determined: combinations of ",
                            named_parameters(s.weakest_share, layout)));
   }
 

@@ -10,7 +10,7 @@
 namespace abbe::calib::otf {
 namespace {
 
-/// Columns of M B averaged over positions, ascending by parameter.
+/// Columns of M B averaged over positions, sorted by parameter index.
 class MeanColumns {
  public:
   void add(std::span<const Column> columns) {
@@ -83,8 +83,8 @@ Result<void> check(const Noise& noise) {
   return {};
 }
 
-/// A block that travels farther than twice the corner exclusion can straddle a corner and still be
-/// used.
+/// BadInput if the travel of a block is longer than twice the corner exclusion: such a block could
+/// extend over a corner and still be used.
 Result<void> check_travel(const BlockSeries& series, const Options& options) {
   std::vector<double> travel_m;
   for (std::size_t i = 0; i + 1 < series.blocks.size(); ++i) {
@@ -109,7 +109,8 @@ Result<void> check_travel(const BlockSeries& series, const Options& options) {
       ErrorCode::BadInput,
       message("tracker blocks: ", options.block_samples, " samples travel ", 1e3 * *middle,
               " mm, more than twice the corner exclusion of ", 1e3 * options.corner_m,
-              " mm: use at most ", std::floor(most), " samples a block, or exclude more"));
+              " mm: use at most ", std::floor(most),
+              " samples per block, or increase the exclusion"));
 }
 
 PointOnPath point_on_path(const Block& block, std::size_t i, const Alignment& a, const Path& path,
@@ -117,7 +118,7 @@ PointOnPath point_on_path(const Block& block, std::size_t i, const Alignment& a,
   const Vector3 &from = path.vertices_m[a.leg[i]], &to = path.vertices_m[a.leg[i] + 1];
   const Vector3 q = a.T_machine_tracker * block.mean_tracker_m - t;
   const Vector3 closest = closest_on_leg(from, to, q).closest_m;
-  // The tracker stands at T.t_m in the machine, so the beam is R m.
+  // The tracker position in machine coordinates is T.t_m, so that the beam vector is R m.
   const Vector3 beam_m = a.T_machine_tracker.R * block.mean_tracker_m;
   return {a.leg[i],
           i,
@@ -139,9 +140,9 @@ std::vector<Vector3> sub_points(const BlockSeries& series, std::size_t i, const 
   return points;
 }
 
-/// Ends of what was seen of every leg. Where data begin within three corner exclusions of a vertex,
-/// the vertex itself counts as covered: the model goes on there by less than the distance of two
-/// nodes.
+/// First and last measured position of every leg. If it is within three corner exclusions of the
+/// vertex, the vertex itself counts as covered: the model extrapolates there by less than the
+/// distance of two nodes.
 std::vector<Vector3> covered(const Observations& o, const Path& path, double corner_m) {
   std::vector<Vector3> points;
   for (std::size_t i = 0; i < o.rows.size();) {
@@ -150,10 +151,10 @@ std::vector<Vector3> covered(const Observations& o, const Path& path, double cor
       ++last;
     }
     const Vector3 &from = path.vertices_m[o.rows[i].leg], &to = path.vertices_m[o.rows[i].leg + 1];
-    const Vector3 &first_seen = o.rows[i].axis_position_m,
-                  &last_seen = o.rows[last].axis_position_m;
-    points.push_back((first_seen - from).norm() <= 3 * corner_m ? from : first_seen);
-    points.push_back((last_seen - to).norm() <= 3 * corner_m ? to : last_seen);
+    const Vector3 &first_point = o.rows[i].axis_position_m,
+                  &last_point = o.rows[last].axis_position_m;
+    points.push_back((first_point - from).norm() <= 3 * corner_m ? from : first_point);
+    points.push_back((last_point - to).norm() <= 3 * corner_m ? to : last_point);
     i = last + 1;
   }
 
@@ -209,8 +210,8 @@ Observations with_layout(const Observations& o, ParameterLayout layout) {
 
   for (std::size_t i = 0; i < o.rows.size(); ++i) {
     const Observation& row = o.rows[i];
-    if (i == 0 ||
-        row.first_sub_point != o.rows[i - 1].first_sub_point) {  // the rows of a block share them
+    // The rows of a block have the same sub-points and the same columns.
+    if (i == 0 || row.first_sub_point != o.rows[i - 1].first_sub_point) {
       columns =
           mean_columns(other.layout, o.target_offset_m,
                        std::span(o.sub_points_m).subspan(row.first_sub_point, row.sub_points));
@@ -232,15 +233,15 @@ Result<Observations> observe(std::span<const TrackerObservation> samples, const 
 
 Result<Observations> observe_blocks(const BlockSeries& series, const Machine& machine,
                                     const Path& path, const Noise& noise, const Options& options) {
-  Result<void> fine = check(noise);
-  if (fine) {
-    fine = check_travel(series, options);
+  Result<void> valid = check(noise);
+  if (valid) {
+    valid = check_travel(series, options);
   }
 
   Result<ParameterLayout> layout =
       ParameterLayout::observable_with_one_target(machine.chain, machine.nodes);
-  if (!fine || !layout) {
-    return tl::unexpected(fine ? layout.error() : fine.error());
+  if (!valid || !layout) {
+    return tl::unexpected(valid ? layout.error() : valid.error());
   }
 
   Result<Alignment> alignment = align(series, machine, path, options);
@@ -271,8 +272,8 @@ Result<Observations> observe_blocks(const BlockSeries& series, const Machine& ma
         options.progress(Stage::Observe,
                          static_cast<double>(i + 1) / static_cast<double>(series.blocks.size()));
       }
-      if (Result<void> goes_on = check_stopped(options.stopped); !goes_on) {
-        return tl::unexpected(goes_on.error());
+      if (Result<void> running = check_stopped(options.stopped); !running) {
+        return tl::unexpected(running.error());
       }
     }
   }

@@ -16,9 +16,10 @@ namespace {
 
 constexpr double kTravelTolerance_m = 1e-3;
 
-/// Rows and columns of R hold one 1 or -1 each, and its determinant is 1: all but the identity.
-/// Half turns about X, Y and Z come first.
-const std::vector<Matrix3>& cycles_of_axes() {
+/// The 23 rotations that map axes to axes, without the identity: each row and column of R has one
+/// entry 1 or -1, and the determinant is 1. The rotations by 180 degrees about X, Y and Z come
+/// first.
+const std::vector<Matrix3>& axis_rotations() {
   static const std::vector<Matrix3> all = [] {
     std::vector<Matrix3> turns;
     std::array<Eigen::Index, 3> from{0, 1, 2};
@@ -39,13 +40,13 @@ const std::vector<Matrix3>& cycles_of_axes() {
   return all;
 }
 
-/// Of a direction: its chord is the angle in rad for small angles. 10 degrees: axes of a machine
-/// are not that far off the plumb line.
+/// Tolerance of the up direction, as the chord between two unit vectors (for small angles the angle
+/// in rad). 10 degrees: the axes of a machine are closer to vertical or horizontal than this.
 constexpr double kUpTolerance = 0.17;
-/// Where the tracker stands, by a tape measure.
+/// Tolerance of the given tracker position, which may be measured with a tape.
 constexpr double kPlaceTolerance_m = 0.5;
 
-/// The axis of a half turn about X, Y or Z.
+/// The axis, if R is a rotation by 180 degrees about X, Y or Z.
 std::optional<Axis> half_turn_about(const Matrix3& R) {
   for (const Axis axis : kAllAxes) {
     const auto k = static_cast<Eigen::Index>(index(axis));
@@ -56,7 +57,7 @@ std::optional<Axis> half_turn_about(const Matrix3& R) {
   return std::nullopt;
 }
 
-/// "(-y, x, z)": what the turned path has in its columns.
+/// Columns of the path file after the rotation R: "(-y, x, z)".
 std::string columns(const Matrix3& R) {
   std::string text;
   for (Eigen::Index i = 0; i < 3; ++i) {
@@ -107,27 +108,28 @@ std::string list_of_turns(const std::vector<Matrix3>& turns) {
   return text;
 }
 
-/// The turn that brings `found` to `given`, as words.
-std::string cure(const Vector3& found, const Vector3& given, double at_most) {
-  for (const Matrix3& R : cycles_of_axes()) {
+/// Describes the rotation of the path after which `found` agrees with `given`.
+std::string correction_text(const Vector3& found, const Vector3& given, double at_most) {
+  for (const Matrix3& R : axis_rotations()) {
     if (!((R * found - given).norm() <= at_most)) {
       continue;
     }
     const auto about = half_turn_about(R);
-    return about ? message("; it does after a turn by 180 degrees about ", letter(*about),
+    return about ? message("; they agree after a rotation by 180 degrees about ", letter(*about),
                            ": the signs of the other two axes are reversed in the path file")
-                 : message("; it does with the columns (x, y, z) of the path file read as ",
+                 : message("; they agree with the columns (x, y, z) of the path file read as ",
                            columns(R));
   }
   return "; check the evidence and the axes of the path file";
 }
 
-/// False and a reason where `found` contradicts `given`; else keeps of `open` what the evidence
-/// does not exclude.
+/// If `found` contradicts `given`, adds a reason to the verdict and returns false. Else removes
+/// from `open` the rotations that this evidence excludes.
 bool agrees(Verdict& verdict, std::vector<Matrix3>& open, const Vector3& found,
             const Vector3& given, double at_most, const std::string& what) {
   if (!((found - given).norm() <= at_most)) {
-    verdict.refuse("orientation", message("path orientation: ", what, cure(found, given, at_most)));
+    verdict.refuse("orientation", message("path orientation: ", what,
+                                          correction_text(found, given, at_most)));
     return false;
   }
   const auto excluded = [&](const Matrix3& R) {
@@ -143,24 +145,25 @@ bool agrees_with_up(Verdict& verdict, std::vector<Matrix3>& open,
   const double off_rad = 2.0 * std::asin(std::min(1.0, 0.5 * (found - up).norm()));
   return agrees(
       verdict, open, found, up, kUpTolerance,
-      message("the axis of the levelled tracker does not point along the machine's up but is ",
-              180.0 / std::numbers::pi * off_rad, " degrees off"));
+      message("the z axis of the levelled tracker is ", 180.0 / std::numbers::pi * off_rad,
+              " degrees off the up direction of the machine"));
 }
 
-/// The path turns about the machine's zero, what the tracker sees about the target offset.
+/// A rotation of the path is about the origin of the machine coordinates. The tracker position
+/// rotates about the target offset; it is subtracted from both positions.
 bool agrees_with_place(Verdict& verdict, std::vector<Matrix3>& open, const Vector3& found_m,
                        const Vector3& given_m, const Vector3& target_offset_m) {
   return agrees(verdict, open, found_m - target_offset_m, given_m - target_offset_m,
                 kPlaceTolerance_m,
-                message("the tracker comes out ", (found_m - given_m).norm(),
-                        " m from the place that is given"));
+                message("the computed tracker position is ", (found_m - given_m).norm(),
+                        " m from the given position"));
 }
 
 }  // namespace
 
 std::vector<Matrix3> possible_turns(const Path& path, const MachineNodes& nodes) {
   std::vector<Matrix3> possible;
-  for (const Matrix3& R : cycles_of_axes()) {
+  for (const Matrix3& R : axis_rotations()) {
     std::vector<Vector3> turned = path.vertices_m;
     for (Vector3& q : turned) q = R * q;
     if (outside_travel(turned, nodes, kTravelTolerance_m).empty()) possible.push_back(R);
@@ -178,8 +181,8 @@ void require_orientation(Verdict& verdict, const Path& path, const MachineNodes&
                                                *evidence.tracker_m, target_offset_m))
     return;
   if (open.empty()) return;
-  const std::string text = message("path orientation: the path file would fit as well ",
-                                   list_of_turns(open), ", and nothing given excludes it");
+  const std::string text = message("path orientation: the path file fits equally well ",
+                                   list_of_turns(open), ", and no evidence excludes this");
 
   if (evidence.accepted) {
     verdict.notes.push_back(text);

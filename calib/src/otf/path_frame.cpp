@@ -5,7 +5,7 @@
 namespace abbe::calib::otf {
 namespace {
 
-/// Unit vector perpendicular to `a1`: along the part of `v` that is.
+/// Component of `v` perpendicular to the unit vector `a1`.
 Vector3 perpendicular_part(const Vector3& v, const Vector3& a1) {
   return v - v.dot(a1) * a1;
 }
@@ -25,7 +25,8 @@ PathFrame path_frame(const Vector3& direction, const Vector3& beam_m, const Nois
   frame.a1 = direction.normalized();
   Vector3 across = perpendicular_part(b, frame.a1);
 
-  // Driving along the beam, both perpendicular directions are equally uncertain and any will do.
+  // If the path is parallel to the beam, both perpendicular directions are equally uncertain; any
+  // direction is suitable.
   constexpr double kAlongBeam = 1e-6;
   if (across.norm() < kAlongBeam) {
     across = perpendicular_part(least_parallel_axis(frame.a1), frame.a1);

@@ -11,8 +11,8 @@ namespace {
 constexpr std::size_t kLegsInLeaf = 8;
 constexpr double kNowhere = std::numeric_limits<double>::infinity();
 
-/// A box is never farther away than the legs in it: not by rounding either, which is below 1e-12 of
-/// any travel.
+/// Reduces the distance to a box so that rounding cannot make it larger than the distance to a leg
+/// in the box. The rounding error is below 1e-12 of any travel.
 double rounded_down(double off_m) {
   return off_m * (1.0 - 1e-9) - 1e-12;
 }
@@ -22,7 +22,7 @@ double rounded_down(double off_m) {
 PathIndex::PathIndex(Path path) : path_(std::move(path)) {
   const std::size_t needed = (legs() + kLegsInLeaf - 1) / kLegsInLeaf;
   leaves_ = std::bit_ceil(std::max<std::size_t>(needed, 1));
-  // An empty box is infinitely far away from everything.
+  // The distance to an empty box is infinite.
   boxes_.assign(2 * leaves_, {Vector3::Constant(kNowhere), Vector3::Constant(-kNowhere)});
   for (std::size_t leaf = 0; leaf < needed; ++leaf) boxes_[leaves_ + leaf] = box_of_leaf(leaf);
   for (std::size_t node = leaves_ - 1; node > 0; --node) {
@@ -53,11 +53,12 @@ double PathIndex::off_box_m(std::size_t node, const Vector3& p_m) const {
 
 std::optional<std::size_t> PathIndex::first_within(const Vector3& p_m, double within_m,
                                                    std::size_t from) const {
-  std::vector<std::size_t> waiting{1};  // the leftmost on top
+  std::vector<std::size_t> waiting{1};  // stack of nodes, the leftmost on top
   while (!waiting.empty()) {
     const std::size_t node = waiting.back();
     waiting.pop_back();
-    const std::size_t level = std::bit_width(node) - 1;  // leaves below: first to last of them
+    // The leaves below this node are first_leaf to first_leaf + width - 1.
+    const std::size_t level = std::bit_width(node) - 1;
     const std::size_t width = leaves_ >> level,
                       first_leaf = (node << (std::bit_width(leaves_) - 1 - level)) - leaves_;
     if ((first_leaf + width) * kLegsInLeaf <= from || !(off_box_m(node, p_m) <= within_m)) continue;

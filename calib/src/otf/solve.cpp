@@ -28,9 +28,9 @@ ResidualStatistics residual_statistics(const Observations& o, std::span<const do
   return s;
 }
 
-/// Turbulence, vibration, a tracker worse than its data sheet and effects the model does not have
-/// show here first; they must not leave as a small uncertainty. Smaller residuals than stated prove
-/// nothing and change nothing.
+/// Factor for the covariance, from the residuals. Turbulence, vibration, a tracker worse than its
+/// data sheet and effects that are not modelled increase the residuals; the stated uncertainty must
+/// increase with them. Residuals smaller than the stated noise do not reduce the uncertainty.
 double variance_factor(const ResidualNoise& noise, std::size_t dof) {
   // 99.9 % quantile; chi2/dof has standard deviation sqrt(2/dof)
   constexpr double kNormal999 = 3.090;
@@ -66,7 +66,7 @@ Statistics statistics(const Observations& o, const Adjustment& a, const Residual
   return s;
 }
 
-/// How U moves per relative change of all ranges. The constant part of the lever only moves the
+/// Change of U per relative change of all ranges. The constant part of the lever changes only the
 /// rigid unknowns.
 Eigen::VectorXd dU_dscale(const Observations& o, const Adjustment& a) {
   const Vector3& tracker_m = o.alignment.T_machine_tracker.t_m;
@@ -81,8 +81,8 @@ Eigen::VectorXd dU_dscale(const Observations& o, const Adjustment& a) {
   return a.cofactor_Q * g;
 }
 
-/// How U moves per relative change of the scale of an axis: its positioning table has the slope 1,
-/// and is zero at the reference.
+/// Change of U per relative change of the scale of an axis: its positioning table changes with
+/// slope 1 and is zero at the reference.
 Eigen::VectorXd dU_daxis_scale(const ParameterLayout& layout, Axis axis) {
   Eigen::VectorXd slope = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(layout.fit_size()));
   const AxisNodes& nodes = layout.nodes()[index(axis)];
@@ -94,7 +94,8 @@ Eigen::VectorXd dU_daxis_scale(const ParameterLayout& layout, Axis axis) {
   return slope;
 }
 
-/// The offset of the ranges beside the adjustment `a`, whose residuals are `residual_m`.
+/// Estimates the offset of the ranges in addition to the adjustment `a` with residuals
+/// `residual_m`.
 AddedColumns::Estimate range_offset(const Observations& o, const Adjustment& a,
                                     std::span<const double> residual_m, double factor) {
   AddedColumns sums(1, o.layout.fit_size());
@@ -147,8 +148,8 @@ Result<Solution> solve(const Observations& o, const Options& options) {
   const NormalEquations N = normal_equations(o);
   report(options, 0.5);
 
-  if (Result<void> goes_on = check_stopped(options.stopped); !goes_on) {
-    return tl::unexpected(goes_on.error());
+  if (Result<void> running = check_stopped(options.stopped); !running) {
+    return tl::unexpected(running.error());
   }
 
   Result<Adjustment> a = adjust(N, o.layout, options.gauge_weight);

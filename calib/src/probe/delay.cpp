@@ -13,7 +13,7 @@ namespace abbe::calib::probe {
 namespace {
 
 constexpr std::size_t kLeastFeeds = 3;
-constexpr std::size_t kLeastTouchesPerFeed = 3;  // of each: a variance from two is no estimate
+constexpr std::size_t kLeastTouchesPerFeed = 3;  // a variance from two touches is too uncertain
 
 /// All touches of one feed.
 struct Feed {
@@ -28,7 +28,8 @@ Result<void> check(std::span<const FeedTouch> touches) {
     if (!std::isfinite(t.speed_m_s) || !std::isfinite(t.along_m))
       return failure(ErrorCode::NotFinite, "probe delay: a touch is not finite");
     if (!(t.speed_m_s > 0.0))
-      return failure(ErrorCode::BadInput, message("probe delay: a feed of ", t.speed_m_s, " m/s"));
+      return failure(ErrorCode::BadInput,
+                     message("probe delay: feed ", t.speed_m_s, " m/s, must be greater than 0"));
   }
   return {};
 }
@@ -66,14 +67,15 @@ Result<std::vector<Feed>> group(std::span<const FeedTouch> touches, const DelayO
   return feeds;
 }
 
-/// s0^2 and s_tau^2 with s0^2 + v^2 s_tau^2 next to the feeds' variances; neither negative.
+/// s0^2 and s_tau^2, neither negative, such that s0^2 + v^2 s_tau^2 best fits the variances of the
+/// feeds.
 struct Scatter {
   double s0_m2 = 0.0;
   double jitter_s2 = 0.0;
 };
 
-/// One weighted fit of the variances, weighted by what `guess` says of them: a variance estimated
-/// from n touches has a deviation in proportion to the true one.
+/// One weighted fit of the variances. The weights are computed from `guess`: the standard deviation
+/// of a variance that is estimated from n touches is proportional to the true variance.
 Scatter refined(const std::vector<Feed>& feeds, const Scatter& guess) {
   Eigen::Matrix2d normal = Eigen::Matrix2d::Zero();
   Eigen::Vector2d right = Eigen::Vector2d::Zero();
@@ -110,8 +112,8 @@ Scatter scatter_of(const std::vector<Feed>& feeds) {
   return scatter;
 }
 
-/// Student's t for 95 % over that of the normal distribution: [GUM] table G.2, and from 6 degrees
-/// of freedom on Cornish and Fisher's series, to 0.1 %.
+/// Student's t for 95 % divided by the quantile of the normal distribution: [GUM] table G.2, and
+/// from 6 degrees of freedom the Cornish-Fisher series, accurate to 0.1 %.
 double student_over_normal(double dof) {
   constexpr double z = 1.959964;
   constexpr std::array kT95{12.706205, 4.302653, 3.182446, 2.776445, 2.570582};
@@ -126,7 +128,7 @@ double student_over_normal(double dof) {
 }  // namespace
 
 Result<ProbeDelayFit> fit_delay(std::span<const FeedTouch> touches, const DelayOptions& options) {
-  if (auto fine = check(touches); !fine) return tl::unexpected(fine.error());
+  if (auto valid = check(touches); !valid) return tl::unexpected(valid.error());
   const auto feeds = group(touches, options);
   if (!feeds) return tl::unexpected(feeds.error());
   if (feeds->size() < kLeastFeeds) {
@@ -142,15 +144,16 @@ Result<ProbeDelayFit> fit_delay(std::span<const FeedTouch> touches, const DelayO
   }
 
   const Scatter scatter = scatter_of(*feeds);
-  // From the feeds' mean place and speed, so that places far from the origin lose no digits.
+  // Computed relative to the mean position and speed of the feeds, so that positions far from the
+  // origin lose no digits.
   double sum_w = 0.0;
   double mean_v = 0.0;
   double mean_p = 0.0;
   const double origin = feeds->front().along_m;
   const auto weight = [&](const Feed& f) {
     const double variance = scatter.s0_m2 + f.speed_m_s * f.speed_m_s * scatter.jitter_s2;
-    return f.count /
-           std::max(variance, 1e-30);  // 1 fm: touches without any scatter, made by a computer
+    // At least (1 fm)^2: simulated touches may have no scatter.
+    return f.count / std::max(variance, 1e-30);
   };
   for (const Feed& f : *feeds) {
     sum_w += weight(f);
@@ -180,7 +183,7 @@ Result<ProbeDelayFit> fit_delay(std::span<const FeedTouch> touches, const DelayO
     fit.misfit += weight(f) * residual * residual / static_cast<double>(feeds->size() - 2);
   }
 
-  // Feeds that do not agree say how uncertain the line is, and there are few of them.
+  // With a lack of fit, u_delay_s is estimated from the feeds' mean residuals, which are few.
   fit.dof = static_cast<double>(fit.misfit > 1.0 ? fit.feeds - 2 : fit.touches - fit.feeds);
   fit.u_delay_s *= std::sqrt(std::max(1.0, fit.misfit)) * student_over_normal(fit.dof);
   double squares = 0.0;

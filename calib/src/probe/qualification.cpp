@@ -11,9 +11,9 @@ namespace abbe::calib::probe {
 namespace {
 
 constexpr int kUnknowns = 3 + LobingMap::kTerms;
-constexpr std::size_t kLeastTouches = 24;  // half as many again as unknowns
+constexpr std::size_t kLeastTouches = 24;  // 1.5 times the number of unknowns
 constexpr int kMostIterations = 20;
-constexpr double kStep_m = 1e-13;  // far below a picometre nothing is measured any more
+constexpr double kStep_m = 1e-13;  // far below any measurable length
 
 using Unknowns = Eigen::Matrix<double, kUnknowns, 1>;
 
@@ -27,14 +27,14 @@ Result<void> check(std::span<const QualifyingTouch> touches) {
     if (!t.p_m.allFinite() || !t.normal.allFinite())
       return failure(ErrorCode::NotFinite, "probe qualification: a touch is not finite");
     if (!(t.normal.norm() > 1e-9))
-      return failure(ErrorCode::BadInput, "probe qualification: a normal has no length");
+      return failure(ErrorCode::BadInput, "probe qualification: a normal has zero length");
   }
   return {};
 }
 
 struct System {
-  Eigen::MatrixXd J;  ///< of the residuals by centre and terms
-  Eigen::VectorXd r;  ///< measured less model, m
+  Eigen::MatrixXd J;  ///< negative Jacobian of the residuals by centre and terms
+  Eigen::VectorXd r;  ///< measured minus model, m
 };
 
 System system_at(std::span<const QualifyingTouch> touches, const Unknowns& x,
@@ -46,8 +46,8 @@ System system_at(std::span<const QualifyingTouch> touches, const Unknowns& x,
     const Vector3 unit = d.normalized();
     const LobingMap::Terms Y = LobingMap::basis(unit);
     s.r[i] = d.norm() - sphere_radius_m - Y.dot(x.tail<LobingMap::kTerms>());
-    // The direction turns with the centre, too: lobing over a radius, 1e-4 of this; Gauss-Newton
-    // needs no more.
+    // The change of the direction with the centre is neglected: it is lobing divided by the radius,
+    // 1e-4 of this term, and Gauss-Newton converges without it.
     s.J.row(i).head<3>() = unit.transpose();
     s.J.row(i).tail<LobingMap::kTerms>() = Y.transpose();
   }
@@ -98,7 +98,7 @@ EffectiveRadius LobingMap::at(const Vector3& normal) const {
 
 Result<Qualification> qualify(std::span<const QualifyingTouch> touches,
                               const QualificationOptions& options) {
-  if (auto fine = check(touches); !fine) return tl::unexpected(fine.error());
+  if (auto valid = check(touches); !valid) return tl::unexpected(valid.error());
   Unknowns x = Unknowns::Zero();
   x.head<3>() = first_centre(touches, options.sphere_radius_m);
   Qualification q;
@@ -119,7 +119,7 @@ Result<Qualification> qualify(std::span<const QualifyingTouch> touches,
   }
   if (!converged || !x.allFinite())
     return failure(ErrorCode::NotConverged,
-                   message("probe qualification: no end in ", kMostIterations, " steps"));
+                   message("probe qualification: no convergence in ", kMostIterations, " steps"));
 
   const System s = system_at(touches, x, options.sphere_radius_m);
   q.freedom = static_cast<int>(touches.size()) - kUnknowns;
@@ -132,8 +132,8 @@ Result<Qualification> qualify(std::span<const QualifyingTouch> touches,
   q.cov_centre_m2 = covariance.topLeftCorner<3, 3>();
   LobingMap::Covariance terms =
       covariance.bottomRightCorner<LobingMap::kTerms, LobingMap::kTerms>();
-  terms(0, 0) +=
-      options.u_sphere_radius_m * options.u_sphere_radius_m;  // what the sphere is not, the tip is
+  // An error of the sphere radius is an opposite error of the effective tip radius.
+  terms(0, 0) += options.u_sphere_radius_m * options.u_sphere_radius_m;
   q.map = LobingMap{x.tail<LobingMap::kTerms>(), terms};
   q.lobing_m = lobing_over(touches, q.map);
   return q;

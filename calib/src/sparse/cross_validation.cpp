@@ -17,8 +17,9 @@ namespace {
 
 Result<void> check(const Folds& folds, Eigen::Index rows) {
   if (static_cast<Eigen::Index>(folds.of_row.size()) != rows || folds.count < 2) {
-    return failure(ErrorCode::BadInput, message("cross-validation: ", folds.count, " folds of ",
-                                                folds.of_row.size(), " rows for ", rows, " rows"));
+    return failure(ErrorCode::BadInput,
+                   message("cross-validation: ", folds.count, " folds of ", folds.of_row.size(),
+                           " rows; needs at least 2 folds of ", rows, " rows"));
   }
 
   std::vector<int> size(static_cast<std::size_t>(folds.count), 0);
@@ -64,7 +65,7 @@ std::vector<Path> full_paths(const GramProblem& problem, const std::vector<Penal
   return paths;
 }
 
-/// Lambdas that all rows and every fold reached at this gamma.
+/// Number of lambdas that the full path and every fold reached at this gamma.
 std::size_t common_reach(const Path& path, const std::vector<HeldOut>& folds, std::size_t gamma) {
   std::size_t reach = path.sweeps.size();
   for (const HeldOut& fold : folds) {

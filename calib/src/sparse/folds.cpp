@@ -10,8 +10,9 @@
 namespace abbe::calib::sparse {
 namespace {
 
-/// Fisher and Yates, written out because std::shuffle differs between libraries.
-std::vector<int> permuted_deal(std::size_t items, int folds, std::uint64_t seed) {
+/// Fold of each item, in random order. Fisher-Yates shuffle, written out because std::shuffle gives
+/// different results with different standard libraries.
+std::vector<int> random_assignment(std::size_t items, int folds, std::uint64_t seed) {
   std::vector<int> fold(items);
   for (std::size_t i = 0; i < items; ++i) {
     fold[i] = static_cast<int>(i % static_cast<std::size_t>(folds));
@@ -26,8 +27,8 @@ std::vector<int> permuted_deal(std::size_t items, int folds, std::uint64_t seed)
 Result<void> check_counts(std::string_view what, std::size_t items, int folds) {
   if (folds < 2 || items < static_cast<std::size_t>(folds)) {
     return failure(ErrorCode::TooFewObservations,
-                   message("deal ", items, " ", what, " into ", folds,
-                           " folds: at least 2 folds and one of them for each"));
+                   message("split ", items, " ", what, " into ", folds,
+                           " folds: needs at least 2 folds and as many ", what, " as folds"));
   }
   return {};
 }
@@ -84,7 +85,7 @@ Result<Folds> parse_folds(std::string_view text) {
       labels.push_back(label);
     } else if (line_number > 1) {
       return failure(ErrorCode::BadInput,
-                     message("read folds: line ", line_number, " is no integer: ", line));
+                     message("read folds: line ", line_number, " is not an integer: ", line));
     }
   }
 
@@ -93,14 +94,14 @@ Result<Folds> parse_folds(std::string_view text) {
 
 Result<Folds> random_folds(std::size_t rows, int folds, std::uint64_t seed) {
   return check_counts("rows", rows, folds).map([&] {
-    return Folds{.of_row = permuted_deal(rows, folds, seed), .count = folds};
+    return Folds{.of_row = random_assignment(rows, folds, seed), .count = folds};
   });
 }
 
 Result<Folds> group_folds(std::span<const int> group_of_row, int folds, std::uint64_t seed) {
   const std::vector<int> groups = sorted_distinct(group_of_row);
   return check_counts("groups", groups.size(), folds).map([&] {
-    const std::vector<int> fold_of_group = permuted_deal(groups.size(), folds, seed);
+    const std::vector<int> fold_of_group = random_assignment(groups.size(), folds, seed);
     Folds out{.of_row = {}, .count = folds};
     out.of_row.reserve(group_of_row.size());
     for (const int group : group_of_row) {

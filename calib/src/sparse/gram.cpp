@@ -8,7 +8,7 @@
 namespace abbe::calib::sparse {
 namespace {
 
-/// What rounding leaves of a constant y, relative to its size.
+/// Largest standard deviation of a constant y after rounding, relative to its size.
 constexpr double kConstantY = 1e-14;
 
 Result<void> check_shapes(const Eigen::MatrixXd& X, const Eigen::VectorXd& y) {
@@ -20,7 +20,7 @@ Result<void> check_shapes(const Eigen::MatrixXd& X, const Eigen::VectorXd& y) {
     return failure(ErrorCode::NotFinite, "sparse regression: NaN or infinity in y");
   if (y.size() < 2) {
     return failure(ErrorCode::TooFewObservations,
-                   message("sparse regression: ", y.size(), " row(s), at least 2"));
+                   message("sparse regression: ", y.size(), " row(s), needs at least 2"));
   }
   return {};
 }

@@ -1,5 +1,5 @@
 #pragma once
-/// One regression problem reduced to what coordinate descent needs: inner products of standardised
+/// One regression problem in the form that coordinate descent uses: inner products of standardised
 /// columns and centred y.
 
 #include <Eigen/Core>

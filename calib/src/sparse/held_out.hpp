@@ -1,5 +1,5 @@
 #pragma once
-/// Squared errors of the rows of one fold under the paths of the others.
+/// Squared errors of the rows of one fold, with the paths fitted to the other folds.
 
 #include <Eigen/Core>
 #include <vector>
@@ -9,7 +9,7 @@
 
 namespace abbe::calib::sparse {
 
-/// Count, mean and sum of squared deviations from the mean: adds up over folds without
+/// Count, mean and sum of squared deviations from the mean. add() combines folds without
 /// cancellation.
 struct Moments {
   double count = 0.0;
@@ -20,12 +20,12 @@ struct Moments {
 };
 
 struct HeldOut {
-  std::vector<std::vector<Moments>> error;  ///< of each penalty, each lambda it reached
+  std::vector<std::vector<Moments>> error;  ///< by penalty, then by lambda it reached
   long sweeps = 0;
 };
 
-/// Fits the rows of `all` (standardised by the whole, then anew) that are not in `fold`, judges by
-/// those that are.
+/// Fits the rows of `all` that are not in `fold` and computes the errors of the rows in `fold`. The
+/// rows of `all` are standardised; the training rows are standardised again.
 [[nodiscard]] Result<HeldOut> hold_out(const GramProblem& all, const Folds&, int fold,
                                        const std::vector<Penalty>&, const LambdaList&,
                                        const PathOptions&);

@@ -13,6 +13,7 @@ namespace {
 
 using Index = Eigen::Index;
 
+/// Runs the paths of all tasks in the lanes of one vector batch.
 class LaneBatch {
  public:
   LaneBatch(const GramProblem& problem, std::span<const PathTask> tasks)
@@ -90,7 +91,7 @@ class LaneBatch {
     }
   }
 
-  /// Brings the registers of a lane up to date with its path, or empties them.
+  /// Copies the state of a lane's path to the lane's registers; clears them if the lane is idle.
   void write_out(std::size_t lane) {
     std::optional<PathLane>& path = lanes_[lane].path;
     if (path) make_room(path->active());
@@ -119,15 +120,15 @@ class LaneBatch {
     parameters_.tolerance.of[lane] = idle ? -1.0 : lanes_[lane].path->tolerance();
   }
 
-  /// Columns some path has used, in order; they only grow, so that this is rare.
+  /// Adds columns to those in use. Columns are never removed, so a rebuild is rare.
   void make_room(const std::vector<Index>& wanted) {
-    bool grown = false;
+    bool added = false;
     for (const Index j : wanted) {
       char& in_use = in_use_[static_cast<std::size_t>(j)];
-      grown |= in_use == 0;
+      added |= in_use == 0;
       in_use = 1;
     }
-    if (grown) rebuild();
+    if (added) rebuild();
   }
 
   void rebuild() {
@@ -179,7 +180,7 @@ class LaneBatch {
   std::size_t next_ = 0;
   SweepFunction sweep_ = sweep_variants().front().sweep;
   LaneParameters parameters_;
-  std::vector<char> in_use_;        ///< of the problem's columns
+  std::vector<char> in_use_;        ///< by problem column: nonzero if any path has used it
   std::vector<Index> columns_;      ///< problem column at each place; -1: padding
   std::vector<std::size_t> place_;  ///< of each problem column in use
   std::vector<double> gram_, xty_;

@@ -1,5 +1,6 @@
 #pragma once
-/// Many paths of one Gram problem, eight at a time: a lane that has finished takes the next path.
+/// Solves many paths of one Gram problem, eight at a time: a lane whose path is finished gets the
+/// next path.
 
 #include <span>
 #include <vector>

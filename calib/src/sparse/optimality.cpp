@@ -22,8 +22,8 @@ Result<Fitted> fitted(const Eigen::MatrixXd& X, const Eigen::VectorXd& y, const 
                       const Eigen::VectorXd& b) {
   if (auto checked = check(penalty); !checked) return tl::unexpected(checked.error());
   if (b.size() != X.cols()) {
-    return failure(ErrorCode::BadInput, message("judge a solution: ", b.size(), " coefficients, ",
-                                                X.cols(), " columns"));
+    return failure(ErrorCode::BadInput, message("check of a solution: ", b.size(),
+                                                " coefficients for ", X.cols(), " columns"));
   }
   return gram_problem(X, y).map([&](GramProblem problem) {
     const Eigen::VectorXd kept = b(problem.design.kept);
@@ -82,8 +82,8 @@ Result<double> objective(const Eigen::MatrixXd& X, const Eigen::VectorXd& y, con
 
 Result<Convexity> convexity(const Eigen::MatrixXd& X, const Path& path) {
   if (X.cols() != path.standardised.rows()) {
-    return failure(ErrorCode::BadInput, message("convexity: ", X.cols(), " columns, the path has ",
-                                                path.standardised.rows()));
+    return failure(ErrorCode::BadInput, message("convexity: the design has ", X.cols(),
+                                                " columns, the path ", path.standardised.rows()));
   }
 
   return standardise(X).map([&](const Standardised& design) {

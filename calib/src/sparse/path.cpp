@@ -15,8 +15,8 @@ namespace {
 
 constexpr int kDefaultCount = 100;
 
-/// n > p: a thousandth of lambda_max is close to least squares; else the dense end of the path
-/// means nothing.
+/// For n > p the solution at a thousandth of lambda_max is close to least squares; for n <= p the
+/// end of the path with many nonzero coefficients is not meaningful.
 double default_ratio(const GramProblem& problem) {
   return problem.y.size() > problem.columns() ? 0.001 : 0.05;
 }
@@ -45,12 +45,12 @@ Result<void> check(const PathOptions& options) {
 
   if (options.max_sweeps < 1) {
     return failure(ErrorCode::BadInput,
-                   message("budget of the path: ", options.max_sweeps, " sweeps, at least 1"));
+                   message("max_sweeps of the path must be at least 1: ", options.max_sweeps));
   }
 
   if (options.max_nonzero && *options.max_nonzero < 0) {
     return failure(ErrorCode::BadInput,
-                   message("largest number of coefficients is negative: ", *options.max_nonzero));
+                   message("max_nonzero of the path is negative: ", *options.max_nonzero));
   }
 
   return check_lambda(options.lambda);
@@ -59,7 +59,7 @@ Result<void> check(const PathOptions& options) {
 std::vector<double> default_lambda(const GramProblem& problem, int count, double ratio) {
   const double largest = problem.lambda_max();
   std::vector<double> lambda = log_spaced(largest, ratio * largest, count);
-  // exactly: exp(log(x)) may fall below it, and the first solution would not be empty
+  // Set exactly: exp(log(x)) may be smaller, and then the first solution would not be empty.
   lambda.front() = largest;
   return lambda;
 }
@@ -106,7 +106,7 @@ Result<std::vector<double>> default_lambda(const Eigen::MatrixXd& X, const Eigen
   if (count < 2 || (ratio && !(*ratio > 0 && *ratio < 1))) {
     return failure(ErrorCode::BadInput,
                    message("default lambda: ", count, " values down to ", ratio.value_or(0.001),
-                           " of the largest; at least 2, ratio between 0 and 1"));
+                           " of the largest; needs at least 2 values and a ratio between 0 and 1"));
   }
   return gram_problem(X, y).map([&](const GramProblem& problem) {
     return default_lambda(problem, count, ratio.value_or(default_ratio(problem)));

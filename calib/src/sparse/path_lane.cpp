@@ -21,8 +21,8 @@ PathLane::PathLane(const GramProblem& problem, const PathTask& task)
   }
 }
 
-/// The strong rule of [Tibshirani 2012]; for MCP and SCAD scaled by the steepest slope of the
-/// shrinkage [Breheny 2011].
+/// Threshold of the strong rule of [Tibshirani 2012]; for MCP and SCAD scaled by the steepest slope
+/// of the shrinkage [Breheny 2011].
 double PathLane::cutoff() const {
   const double now = task_.lambda[at_];
   const double before = at_ == 0 ? z_.cwiseAbs().maxCoeff() : task_.lambda[at_ - 1];
@@ -55,8 +55,8 @@ double PathLane::correlation(Eigen::Index j) const {
   return z;
 }
 
-/// One pass over the left-out columns that are in the strong set, or over those that are not; true
-/// if one came in.
+/// One pass over the inactive columns that are in the strong set (`strong`), or over those that are
+/// not. Columns with a nonzero coefficient become active; true if there was one.
 bool PathLane::admit(bool strong) {
   bool entered = false;
   for (std::size_t i = 0; i < is_active_.size(); ++i) {

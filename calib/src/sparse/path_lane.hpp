@@ -1,6 +1,7 @@
 #pragma once
-/// One path on its way: everything but the sweeps. Tells which columns the next sweeps move, at
-/// which lambda, and takes over when they have converged or the budget is used up.
+/// State of one path between sweeps. It gives the active columns and the shrinkage for the next
+/// sweeps; the caller does the sweeps and reports them by swept(), which continues with more
+/// columns or the next lambda.
 
 #include <optional>
 #include <span>
@@ -15,12 +16,12 @@ struct PathTask {
   Penalty penalty;
   std::span<const double> lambda;
   bool first_is_empty = false;  ///< lambda[0] is lambda_max: its solution is known
-  double tolerance = 0.0;       ///< of a coefficient, absolute
+  double tolerance = 0.0;       ///< for the change of a coefficient, absolute
   long max_sweeps = 0;
   Eigen::Index max_nonzero = 0;
 };
 
-/// In standardised units, columns of the Gram problem.
+/// Coefficients in standardised units, for the columns of the Gram problem.
 struct SolvedPath {
   std::vector<long> sweeps;  ///< of each lambda reached
   Eigen::MatrixXd b;         ///< columns x reached
@@ -40,8 +41,9 @@ class PathLane {
   }  ///< in order of entry
   [[nodiscard]] double& coefficient(Eigen::Index j) { return b_(j); }
 
-  /// After `count` sweeps over active(), the last of which moved less than the tolerance if
-  /// `converged`, with coefficient() brought up to date if it did or if the budget is used up.
+  /// To be called after `count` sweeps over active(). `converged`: the largest change in the last
+  /// sweep was below the tolerance. If `converged`, or if the budget is used up, the caller must
+  /// have updated coefficient() before.
   void swept(long count, bool converged);
   [[nodiscard]] SolvedPath take() &&;
 
@@ -59,7 +61,7 @@ class PathLane {
   bool finished_ = false;
   Shrinkage shrink_;
   Eigen::VectorXd b_;
-  Eigen::VectorXd z_;  ///< as last computed: of columns left out, not of the active ones
+  Eigen::VectorXd z_;  ///< last computed correlations; current only for inactive columns
   std::vector<char> is_active_, is_strong_;
   std::vector<Eigen::Index> active_;
   SolvedPath solved_;

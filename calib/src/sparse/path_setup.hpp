@@ -1,6 +1,6 @@
 #pragma once
-/// From what the caller asks to tasks of the solver, and from its solutions to paths in the
-/// caller's units.
+/// Converts the options of the caller to tasks of the solver, and the solutions to paths in the
+/// units of the caller.
 
 #include <vector>
 
@@ -18,7 +18,7 @@ struct LambdaList {
 [[nodiscard]] LambdaList lambda_list(const GramProblem&, const PathOptions&);
 [[nodiscard]] std::vector<double> default_lambda(const GramProblem&, int count, double ratio);
 
-/// `lambda` is viewed, not copied.
+/// The task refers to `lambda`, which must outlive it.
 [[nodiscard]] PathTask path_task(const GramProblem&, const Penalty&, const LambdaList& lambda,
                                  const PathOptions&);
 [[nodiscard]] Path to_path(const GramProblem&, const PathTask&, SolvedPath);

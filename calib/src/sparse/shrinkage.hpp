@@ -1,8 +1,10 @@
 #pragma once
 /// The one-coefficient solution of all three penalties as one piecewise linear function of |z|, so
-/// that scalar code and vector registers compute the same bits:
-///   |z| <= lambda: 0;  <= inner_end: |z| - lambda;  <= outer_end: (|z| - offset) * factor;  else |z|;  times
-///   sgn(z).
+/// that scalar code and vector code compute the same bits. The solution is, times sgn(z):
+///     |z| <= lambda       0
+///     |z| <= inner_end    |z| - lambda
+///     |z| <= outer_end    (|z| - offset) * factor
+///     else                |z|
 
 #include <cmath>
 #include <limits>

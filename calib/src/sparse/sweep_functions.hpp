@@ -1,6 +1,6 @@
 #pragma once
-/// One sweep function for each width of the vector registers; which of them may run is for
-/// sweep_variants() to say.
+/// One sweep function for each width of the vector registers. sweep_variants() gives those that
+/// this processor can run.
 
 #include "abbe/calib/sparse/sweep.hpp"
 

@@ -12,8 +12,10 @@
 namespace abbe::calib::verify {
 namespace {
 
-constexpr std::size_t kLeastPoints = 4;  // a rigid motion from fewer leaves nothing to see
-constexpr double kNothing_m = 1e-9;      // no instrument sees less; a ratio to it says nothing
+// With fewer points the fitted rigid motion leaves too few degrees of freedom.
+constexpr std::size_t kLeastPoints = 4;
+// Below the resolution of any instrument; a ratio to a smaller length is meaningless.
+constexpr double kNegligible_m = 1e-9;
 
 Vector3 mean_of(std::span<const Vector3> v) {
   Vector3 sum = Vector3::Zero();
@@ -23,7 +25,7 @@ Vector3 mean_of(std::span<const Vector3> v) {
   return sum / static_cast<double>(v.size());
 }
 
-/// T measured - wanted, with the T that makes it least.
+/// Residuals T measured - wanted after the best rigid fit T.
 Result<std::vector<Vector3>> left_after_fit(std::span<const Vector3> measured_m,
                                             std::span<const Vector3> wanted_m) {
   const auto T = fit_rigid(measured_m, wanted_m);
@@ -37,7 +39,7 @@ Result<std::vector<Vector3>> left_after_fit(std::span<const Vector3> measured_m,
   return left;
 }
 
-/// What is left at the measured points themselves.
+/// Fills the results at the measured points: residual errors without and with the model.
 Result<void> compare_at_points(const Observations& o, const VolumetricModel& model,
                                const Vector3& tool_m, Comparison& out) {
   std::vector<Vector3> measured, readings, corrected;
@@ -55,7 +57,7 @@ Result<void> compare_at_points(const Observations& o, const VolumetricModel& mod
     return failure(
         ErrorCode::TooFewObservations,
         message("verification: ", out.inside.size(), " of ", o.readings_m.size(),
-                " measured points lie inside the model's validity volume, needs ", kLeastPoints));
+                " measured points are inside the model's validity volume, needs ", kLeastPoints));
   }
 
   auto before = left_after_fit(measured, readings), after = left_after_fit(measured, corrected);
@@ -71,20 +73,20 @@ Result<void> compare_at_points(const Observations& o, const VolumetricModel& mod
   return {};
 }
 
-/// A step in um where mm were meant must not take hours.
+/// BadInput for a step that gives too many grid points, for example a step in um instead of mm.
 Result<void> check_step(const evemu::ReadingBox& box, const Comparison& c) {
   constexpr double kMostPlaces = 1e6;
   const double places = (2.0 * box.half_width_m).cwiseQuotient(c.step_m).array().max(1.0).prod();
   if (!(places <= kMostPlaces)) {
     return failure(ErrorCode::BadInput,
                    message("verification: steps of (", kMmPerM * c.step_m.transpose(), ") mm make ",
-                           places, " grid points, most are ", kMostPlaces));
+                           places, " grid points, limit ", kMostPlaces));
   }
   return {};
 }
 
-/// Multiples of the step inside the validity volume, x slowest, at least `least_distance_m` from
-/// the origin.
+/// Multiples of the step inside the validity volume, at least `least_distance_m` from the origin; z
+/// varies fastest.
 std::vector<Vector3> grid_places(const VolumetricModel& model, const evemu::ReadingBox& box,
                                  const Comparison& c) {
   const Vector3 low = (box.centre_m - box.half_width_m).cwiseQuotient(c.step_m),
@@ -109,7 +111,8 @@ std::vector<Vector3> grid_places(const VolumetricModel& model, const evemu::Read
   return places;
 }
 
-/// Where the grid is, with weights of the measured points; last: the origin, if there is one.
+/// Grid points with the interpolation weights of the measured points. The last one is the origin,
+/// if there is an origin.
 struct WeightedPlaces {
   std::vector<Vector3> q_m;
   std::vector<LinearWeights> weights;
@@ -118,16 +121,16 @@ struct WeightedPlaces {
 Result<WeightedPlaces> weighted_places(const Observations& o, const VolumetricModel& model,
                                        const Comparison& c) {
   const auto box = evemu::bounding_box(model.validity().vertices_m());
-  if (auto fine = check_step(box, c); !fine) {
-    return tl::make_unexpected(fine.error());
+  if (auto valid = check_step(box, c); !valid) {
+    return tl::make_unexpected(valid.error());
   }
 
-  std::vector<Vector3> asked = grid_places(model, box, c);
+  std::vector<Vector3> wanted = grid_places(model, box, c);
   if (c.origin_m) {
-    asked.push_back(*c.origin_m);
+    wanted.push_back(*c.origin_m);
   }
 
-  const auto weights = linear_weights(o.readings_m, asked);
+  const auto weights = linear_weights(o.readings_m, wanted);
   if (!weights) {
     return tl::make_unexpected(weights.error());
   }
@@ -135,13 +138,13 @@ Result<WeightedPlaces> weighted_places(const Observations& o, const VolumetricMo
   if (c.origin_m && !weights->back()) {
     return failure(ErrorCode::DegenerateGeometry,
                    message("verification: the origin (", kMmPerM * c.origin_m->transpose(),
-                           ") mm, where V is set to zero, lies outside the measured points"));
+                           ") mm, where V is set to zero, is outside the measured points"));
   }
 
   WeightedPlaces places;
-  for (std::size_t i = 0; i < asked.size(); ++i) {
+  for (std::size_t i = 0; i < wanted.size(); ++i) {
     if ((*weights)[i]) {
-      places.q_m.push_back(asked[i]);
+      places.q_m.push_back(wanted[i]);
       places.weights.push_back(*(*weights)[i]);
     }
   }
@@ -150,7 +153,7 @@ Result<WeightedPlaces> weighted_places(const Observations& o, const VolumetricMo
   if (grid < kLeastPoints) {
     return failure(ErrorCode::TooFewObservations,
                    message("verification: ", grid,
-                           " grid points lie inside both the model's validity volume and the "
+                           " grid points are inside both the model's validity volume and the "
                            "measured points, needs ",
                            kLeastPoints));
   }
@@ -158,8 +161,8 @@ Result<WeightedPlaces> weighted_places(const Observations& o, const VolumetricMo
   return places;
 }
 
-/// `values` at the places, relative to that at the origin or to their mean. One for every grid
-/// point.
+/// `values` at the grid points relative to the value at the origin (the last one) or, without an
+/// origin, to their mean. The result has one value per grid point, none for the origin.
 std::vector<Vector3> relative(std::vector<Vector3> values, bool has_origin) {
   const Vector3 zero = has_origin ? values.back() : mean_of(values);
   if (has_origin) {
@@ -191,7 +194,7 @@ std::vector<Vector3> modelled(const VolumetricModel& model, const Vector3& tool_
   return out;
 }
 
-/// V_las and the model on the grid.
+/// Fills the grid with V_las and V of the model, and computes the interpolation error.
 Result<void> fill_grid(const Observations& o, const VolumetricModel& model, const Vector3& tool_m,
                        Comparison& out) {
   const auto places = weighted_places(o, model, out);
@@ -204,22 +207,23 @@ Result<void> fill_grid(const Observations& o, const VolumetricModel& model, cons
   const auto stated = relative(modelled(model, tool_m, places->q_m), has_origin);
   const auto coarse =
       relative(interpolated(*places, modelled(model, tool_m, o.readings_m)), has_origin);
-  std::vector<Vector3> bent;
+  std::vector<Vector3> interpolation_error;
 
   for (std::size_t i = 0; i < las.size(); ++i) {
     GridPoint& g = out.grid.emplace_back();
     g.q_m = places->q_m[i];
     g.V_las_m = las[i];
     g.stated_m = stated[i];
-    bent.emplace_back(coarse[i] - stated[i]);
+    interpolation_error.emplace_back(coarse[i] - stated[i]);
   }
 
-  out.interpolation_rms_m = vector_statistics(bent).rms_m;
+  out.interpolation_rms_m = vector_statistics(interpolation_error).rms_m;
   return {};
 }
 
-/// The rotation about the origin, or the rigid motion, that turns the model onto V_las.
-Result<void> cycle_model(Comparison& c) {
+/// Fits the model to V_las: with a rotation about the origin or, without an origin, with a rigid
+/// motion.
+Result<void> fit_model_to_V_las(Comparison& c) {
   std::vector<Vector3> places, difference;
   for (const GridPoint& g : c.grid) {
     places.push_back(g.q_m);
@@ -252,8 +256,9 @@ Result<void> cycle_model(Comparison& c) {
   return {};
 }
 
-void rate(Comparison& c) {
-  std::erase_if(c.grid, [&](const GridPoint& g) { return g.V_las_m.norm() < kNothing_m; });
+/// Computes R_resmag at the grid points and its statistics.
+void compute_ratios(Comparison& c) {
+  std::erase_if(c.grid, [&](const GridPoint& g) { return g.V_las_m.norm() < kNegligible_m; });
   std::vector<double> stated, turned;
   for (GridPoint& g : c.grid) {
     const double size = g.V_las_m.norm();
@@ -266,7 +271,7 @@ void rate(Comparison& c) {
   c.R_turned = ratio_statistics(std::move(turned));
 }
 
-/// Between the order statistics around share * (n - 1).
+/// Interpolated between the order statistics next to share * (n - 1).
 double percentile(const std::vector<double>& sorted, double share) {
   const double at = share * static_cast<double>(sorted.size() - 1);
   const auto below = static_cast<std::size_t>(at);
@@ -274,7 +279,8 @@ double percentile(const std::vector<double>& sorted, double share) {
   return sorted[below] + (at - static_cast<double>(below)) * (sorted[above] - sorted[below]);
 }
 
-Comparison settled(const VolumetricModel& model, const Options& options) {
+/// Comparison with the options applied, defaults included.
+Comparison with_options(const VolumetricModel& model, const Options& options) {
   constexpr double kSteps = 20.0, kTenth = 0.1;
   Comparison c;
   c.origin_m = options.origin_m;
@@ -340,7 +346,7 @@ Effect effect_at_points(const Comparison& c) noexcept {
 }
 
 bool ratios_hold(const Comparison& c) noexcept {
-  return c.interpolation_rms_m <= std::max(kMostInterpolation * c.after.rms_m, kNothing_m);
+  return c.interpolation_rms_m <= std::max(kMostInterpolation * c.after.rms_m, kNegligible_m);
 }
 
 Result<Comparison> compare(const Observations& o, const VolumetricModel& model,
@@ -348,10 +354,10 @@ Result<Comparison> compare(const Observations& o, const VolumetricModel& model,
   if (!model.holds_for_tool(tool_offset_m)) {
     return failure(ErrorCode::NotApplicable,
                    message("verification for tool offset (", kMmPerM * tool_offset_m.transpose(),
-                           ") mm: the model does not hold for it"));
+                           ") mm: the model is not valid for it"));
   }
 
-  Comparison c = settled(model, options);
+  Comparison c = with_options(model, options);
   if (auto done = compare_at_points(o, model, tool_offset_m, c); !done) {
     return tl::make_unexpected(done.error());
   }
@@ -360,11 +366,11 @@ Result<Comparison> compare(const Observations& o, const VolumetricModel& model,
     return tl::make_unexpected(done.error());
   }
 
-  if (auto done = cycle_model(c); !done) {
+  if (auto done = fit_model_to_V_las(c); !done) {
     return tl::make_unexpected(done.error());
   }
 
-  rate(c);
+  compute_ratios(c);
   return c;
 }
 

@@ -24,7 +24,7 @@ Result<Extent> extent_of(std::span<const Vector3> points_m) {
   const Extent extent{0.5 * (low + high), 0.5 * (high - low)};
   const auto flat = [&] {
     return failure(ErrorCode::DegenerateGeometry,
-                   message("volume of ", points_m.size(), " points: they lie in a plane (extents ",
+                   message("volume of ", points_m.size(), " points: they are in a plane (extents ",
                            kMmPerM * (high - low).transpose(), " mm)"));
   };
 

@@ -1,5 +1,5 @@
 #pragma once
-/// Where points lie, and coordinates in which that is the box from -1 to 1.
+/// Bounding box of points, and coordinates scaled so that the box is -1 to 1.
 
 #include <span>
 
@@ -16,8 +16,9 @@ struct Extent {
   [[nodiscard]] double diagonal_m() const { return 2.0 * half_width_m.norm(); }
 };
 
-/// DegenerateGeometry unless the points span a volume: their thinnest direction, in scaled
-/// coordinates, must be more than a thousandth of the widest.
+/// DegenerateGeometry unless the points span a volume: in scaled coordinates, their smallest
+/// principal extent must be more than 1/1000 of the largest. TooFewObservations for fewer than 4
+/// points.
 [[nodiscard]] Result<Extent> extent_of(std::span<const Vector3> points_m);
 
 }  // namespace abbe::calib::verify

@@ -13,16 +13,17 @@ namespace {
 using Vector4 = Eigen::Vector4d;
 using Matrix4 = Eigen::Matrix4d;
 
-// In scaled coordinates everything is of the size of 1.
+// Tolerance for rounding; scaled coordinates are of the order of 1.
 constexpr double kRounding = 1e-10;
 
-/// Four points (or, above their number, slack of a row) and what makes weights of a place.
+/// Simplex basis: four columns, and the matrix that computes their weights for a place. An index in
+/// `point` >= the number of points is the slack variable of a row.
 struct Cell {
   std::array<Eigen::Index, 4> point{};
   Matrix4 weights_from_place = Matrix4::Identity();
 };
 
-/// The points as columns (x, y, z, 1), with the price of using one.
+/// The linear programme: points as columns (x, y, z, 1), with the cost |p|^2 of each.
 class Programme {
  public:
   Programme(std::span<const Vector3> points, const Extent& extent)
@@ -35,10 +36,10 @@ class Programme {
 
   [[nodiscard]] bool is_slack(Eigen::Index i) const { return i >= columns_.cols(); }
 
-  /// Simplex method; nothing if the place is no convex combination of the points.
+  /// Simplex method. nullopt if the place is not a convex combination of the points.
   [[nodiscard]] std::optional<Cell> around(const Vector4& place) const {
-    // Steepest price first; when that has gone on for long, ties may be running in a circle, and
-    // the rule of the least index ends them.
+    // Select the column with the steepest descent first. After kSteepest steps ties may cause an
+    // endless cycle; from then on the least-index rule is used, which always terminates.
     constexpr int kSteepest = 60, kMost = 5000;
     const Vector4 slack_sign =
         (place.array() < 0.0).select(Vector4::Constant(-1.0), Vector4::Ones());
@@ -82,7 +83,8 @@ class Programme {
     return M;
   }
 
-  /// A point that makes the combination need less slack or, with as much slack, cheaper.
+  /// The next point to enter the basis: one that reduces the slack or, with equal slack, the cost.
+  /// nullopt if the basis is optimal.
   [[nodiscard]] std::optional<Eigen::Index> next(const Cell& cell, bool least_index) const {
     Vector4 slack, price;
     for (std::size_t k = 0; k < 4; ++k) {
@@ -122,8 +124,8 @@ class Programme {
     return best;
   }
 
-  /// `entering` takes the place of the point whose weight is used up first; slack goes before
-  /// points.
+  /// `entering` replaces the column whose weight first becomes zero. In a tie, slack variables
+  /// leave before points, then lower indices before higher ones.
   void pivot(Cell& cell, Eigen::Index entering, const Vector4& place) const {
     const Vector4 weight = cell.weights_from_place * place,
                   rate = cell.weights_from_place * columns_.col(entering);
@@ -137,7 +139,7 @@ class Programme {
       }
       const double steps = std::max(0.0, weight(row)) / rate(row);
       const bool tie = std::abs(steps - least) <= kRounding;
-      if (steps < least - kRounding || (tie && goes_first(cell.point[k], cell.point[leaving]))) {
+      if (steps < least - kRounding || (tie && leaves_first(cell.point[k], cell.point[leaving]))) {
         least = steps;
         leaving = k;
       }
@@ -145,7 +147,7 @@ class Programme {
 
     cell.point[leaving] = entering;
   }
-  [[nodiscard]] bool goes_first(Eigen::Index a, Eigen::Index b) const {
+  [[nodiscard]] bool leaves_first(Eigen::Index a, Eigen::Index b) const {
     return is_slack(a) != is_slack(b) ? is_slack(a) : a < b;
   }
 
@@ -160,7 +162,7 @@ LinearWeights weights_in(const Cell& cell, const Vector4& place, const Programme
 
   for (std::size_t k = 0; k < 4; ++k) {
     if (programme.is_slack(cell.point[k])) {
-      continue;  // the place lies on a face of the hull
+      continue;  // the place is on a face of the hull
     }
     w.point[k] = static_cast<std::size_t>(cell.point[k]);
     w.weight[k] = std::max(0.0, raw(static_cast<Eigen::Index>(k)));
@@ -184,7 +186,7 @@ Result<std::vector<std::optional<LinearWeights>>> linear_weights(std::span<const
   }
 
   const Programme programme(points, *extent);
-  std::vector<Cell> found;  // a cell does not depend on the place it was found for
+  std::vector<Cell> found;  // a cell is valid for every place inside it
   std::vector<std::optional<LinearWeights>> all;
 
   for (const Vector3& p : places) {

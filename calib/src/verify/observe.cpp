@@ -20,7 +20,8 @@ Result<void> check_finite(std::span<const MeasuredPoint> points) {
   return {};
 }
 
-/// "; they fit with ...": a reflection, another unit, the rows backwards. Empty: with none of them.
+/// "; they fit with ..." names the mistakes after whose correction the points fit: a reflection,
+/// another unit, reversed order of the rows. Empty if no correction does.
 std::string fits_with(const Observations& o, double most_rms_m) {
   const auto fits = [&](const Matrix3& M, bool backwards) {
     std::vector<Vector3> from;
@@ -63,7 +64,7 @@ std::string fits_with(const Observations& o, double most_rms_m) {
   return texts.empty() ? "" : "; they fit with " + joined_with_or(texts);
 }
 
-Result<void> check_misfit(const Observations& o, const Extent& extent) {
+Result<void> check_lack_of_fit(const Observations& o, const Extent& extent) {
   Vector3 mean = Vector3::Zero();
   for (const Vector3& v : o.V_m) {
     mean += v / static_cast<double>(o.V_m.size());
@@ -81,7 +82,7 @@ Result<void> check_misfit(const Observations& o, const Extent& extent) {
                            " m extent leave ", rms_m, " m rms",
                            o.frame == Frame::BestFit ? " after the best rigid motion"
                                                      : " in the machine's axes",
-                           ": rows mixed up, another unit, or a left-handed frame",
+                           ": rows in the wrong order, another unit, or a left-handed frame",
                            fits_with(o, kMostLackOfFit * extent.diagonal_m())));
   }
 
@@ -119,7 +120,7 @@ Result<Observations> observe(std::span<const MeasuredPoint> points, Frame frame)
     o.V_m.emplace_back(o.T_machine_tracker * p.measured_m - p.reading_m);
   }
 
-  if (auto fits = check_misfit(o, *extent); !fits) {
+  if (auto fits = check_lack_of_fit(o, *extent); !fits) {
     return tl::make_unexpected(fits.error());
   }
 

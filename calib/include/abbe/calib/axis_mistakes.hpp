@@ -1,7 +1,8 @@
 #pragma once
-/// Mistakes in a list of coordinates that keep its numbers: axes reversed or exchanged, or another
-/// unit of length. Where data do not fit as given, each is tried, and the error names those that
-/// fit. Pure.
+/// Typical mistakes in a file of coordinates: an axis has the wrong sign, axes are exchanged, or
+/// the unit of length is wrong. If the data do not fit as given, the caller applies each of these
+/// corrections one after the other. The error message then names the mistakes whose correction
+/// makes the data fit. Pure.
 
 #include <span>
 #include <string>
@@ -14,29 +15,31 @@ namespace abbe::calib {
 
 struct AxisMistake {
   std::string text;  ///< "Y reversed", "X and Z swapped"
-  Matrix3 M;         ///< right = M given; orthogonal
+  Matrix3 M;         ///< correct = M * given; orthogonal
 };
-/// One or two axes reversed, two axes swapped, the three in cyclic order.
+/// One or two axes reversed, two axes swapped, or all three axes permuted cyclically.
 [[nodiscard]] const std::vector<AxisMistake>& axis_mistakes();
 
 struct UnitMistake {
-  std::string text;     ///< "in m where mm belong"
-  double factor = 1.0;  ///< right = factor given
+  std::string text;     ///< "lengths in m instead of mm"
+  double factor = 1.0;  ///< correct = factor * given
 };
-/// m, um and inches where mm belong.
+/// Metres, micrometres or inches in a file that must be in millimetres.
 [[nodiscard]] const std::vector<UnitMistake>& unit_mistakes();
 
-/// A coordinate that its axis cannot have.
+/// A coordinate outside the travel of its axis.
 struct OutsideTravel {
   std::size_t point = 0;
   std::size_t axis = 0;
 };
-/// By point, then axis; up to `tolerance_m` beyond the ends counts as inside (1 nm: a file in mm).
+/// All coordinates outside the travel, sorted by point, then by axis. A coordinate up to
+/// `tolerance_m` beyond an end counts as inside (default 1 nm: rounding of a file in mm).
 [[nodiscard]] std::vector<OutsideTravel> outside_travel(std::span<const Vector3> points_m,
                                                         const MachineNodes& travel,
                                                         double tolerance_m = 1e-9);
 
-/// "; all are inside with Y reversed, or with X and Y swapped". Empty: with none of the mistakes.
+/// Names the mistakes whose correction puts all points inside the travel: "; all are inside with Y
+/// reversed, or with X and Y swapped". Empty if no correction does.
 [[nodiscard]] std::string inside_travel_with(std::span<const Vector3> points_m,
                                              const MachineNodes& travel);
 

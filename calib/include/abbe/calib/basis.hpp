@@ -1,7 +1,7 @@
 #pragma once
-/// How a table is read between its nodes. Linear now; another basis (natural cubic) is a further
-/// enumerator here and a further case in basis_row(): every basis must contain constants and
-/// straight lines exactly, the gauge relies on it.
+/// Interpolation of an error table between its nodes. Only linear interpolation is implemented. To
+/// add another basis (natural cubic), add an enumerator here and a case in basis_row(). Every basis
+/// must reproduce constants and straight lines exactly: the gauge conditions depend on it.
 
 #include <cstddef>
 #include <span>
@@ -22,7 +22,8 @@ struct BasisRow {
   double weight[2] = {1.0, 0.0};
 };
 
-/// Outside the range of the nodes the last cell's formula goes on. `nodes_m` ascending, at least 2.
+/// Outside the range of the nodes, the formula of the nearest cell is extrapolated. `nodes_m` must
+/// be ascending, at least 2.
 [[nodiscard]] BasisRow basis_row(std::span<const double> nodes_m, double position_m);
 
 /// BadInput or NotFinite unless there are at least 2 nodes, all finite and strictly ascending.

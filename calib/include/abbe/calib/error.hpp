@@ -1,5 +1,6 @@
 #pragma once
-/// Errors of the mathematics are values: what was tried, and what was seen instead, in numbers.
+/// Errors of `calib` are return values. The text states the attempted operation and, in numbers,
+/// the observed result.
 
 #include <string>
 #include <tl/expected.hpp>
@@ -10,17 +11,17 @@ namespace abbe::calib {
 enum class ErrorCode {
   BadInput,            ///< an argument breaks its documented contract (shape, order, range, syntax)
   NotFinite,           ///< NaN or infinity in the input
-  TooFewObservations,  ///< not enough data for the question
-  DegenerateGeometry,  ///< the geometry cannot answer: collinear, coincident, flat
+  TooFewObservations,  ///< not enough data for the computation
+  DegenerateGeometry,  ///< points are collinear, coincident or coplanar
   AlignmentFailed,     ///< the measured points do not fit the given path
   RankDeficient,       ///< some parameter is not determined by the data
-  NotConverged,        ///< an iteration used up its budget
-  NotApplicable,       ///< the model does not hold for what was asked (another tool)
+  NotConverged,        ///< an iteration reached its limit
+  NotApplicable,       ///< the model is not valid for this request (another tool)
 };
 
 struct Error {
   ErrorCode code{};
-  std::string text;  ///< "what was tried: what was seen"
+  std::string text;  ///< "attempted operation: observed result"
 };
 
 template <class T>

@@ -1,8 +1,10 @@
 #pragma once
-/// Names of geometric errors, as in ISO 230-1: `E`, the direction of the deviation (X Y Z
-/// translation, A B C rotation about x y z), the moving axis: EXX positioning of X, EYX and EZX its
-/// straightness, EAX roll, EBX and ECX pitch and yaw. Squareness: EA0Z and EB0Z tilt the direction
-/// in which Z travels, EC0Y the direction of Y; X is the primary direction, XY the secondary plane.
+/// Names of geometric errors as in ISO 230-1. A name consists of `E`, the direction of the error
+/// motion (X Y Z: translation, A B C: rotation about x y z) and the moving axis:
+/// - EXX: positioning error of X; EYX, EZX: straightness errors of X,
+/// - EAX: roll of X; EBX, ECX: pitch and yaw of X.
+/// Squareness: EA0Z and EB0Z are tilts of the direction of motion of Z, EC0Y is the tilt of the
+/// direction of Y. X is the primary direction, XY the secondary plane. Sign of all errors:
 /// V = actual - nominal, tool relative to workpiece.
 
 #include <array>
@@ -15,7 +17,7 @@
 
 namespace abbe::calib {
 
-/// What a table describes: translation along x y z [m] or rotation about x y z [rad].
+/// Quantity in an error table: translation along x y z [m] or rotation about x y z [rad].
 enum class Motion : std::size_t { X = 0, Y = 1, Z = 2, A = 3, B = 4, C = 5 };
 inline constexpr std::array<Motion, 6> kAllMotions{Motion::X, Motion::Y, Motion::Z,
                                                    Motion::A, Motion::B, Motion::C};
@@ -40,15 +42,15 @@ struct ErrorMotion {
 /// The other six translations.
 [[nodiscard]] bool is_straightness(ErrorMotion e);
 
-/// Squareness in the order in which it stands in every parameter vector.
+/// Squareness errors in the order in which every parameter vector contains them.
 inline constexpr std::array<std::string_view, 3> kSquarenessNames{"EA0Z", "EB0Z", "EC0Y"};
 
-/// One identified number with its name, as it is stored and reported. Rotations and squareness in
-/// rad, others in m.
+/// One identified parameter with its name, as stored and reported. Rotations and squareness errors
+/// are in rad, all others in m.
 struct Parameter {
-  /// "EXX", "EC0Y", or "k_exz2": a function of the scaled design of [Li OMM], always a length
+  /// "EXX", "EC0Y", or "k_exz2": coefficient of the scaled design of [Li OMM], always in m
   std::string name;
-  std::optional<double> position_m;  ///< node on its axis; none for squareness and k_
+  std::optional<double> position_m;  ///< node on its axis; nullopt for squareness and "k_" names
   double value = 0.0;
   double u = 0.0;  ///< standard uncertainty (k = 1) in the stated gauge, unit of `value`
   [[nodiscard]] bool is_angle() const;

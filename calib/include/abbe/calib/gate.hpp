@@ -1,9 +1,13 @@
 #pragma once
-/// When a model may be trusted, whatever method it came from: it predicts observations it was not
-/// fitted to better than no compensation and, where the active model holds, better than that one;
-/// it holds where the active model does but for a rim of 2 %, unless a smaller volume is accepted
-/// by name; its scale is that of the active model, unless a change is accepted by name; and it is
-/// of a size and smoothness a machine can have.
+/// Acceptance test for an identified model, common to all identification methods. A model is
+/// accepted if all of the following are true:
+/// - It predicts observations to which it was not fitted better than no compensation does and,
+///   inside the validity volume of the active model, better than the active model does.
+/// - Its validity volume contains that of the active model, apart from a rim of 2 %, unless the
+///   configuration accepts "smaller-volume".
+/// - Its scale agrees with that of the active model, unless the configuration accepts
+///   "scale-change".
+/// - Magnitude and gradient of V are within the limits of a real machine.
 
 #include <cstddef>
 #include <optional>
@@ -15,77 +19,83 @@
 
 namespace abbe::calib {
 
-/// Residuals of held-out observations, each divided by its standard uncertainty, root mean square
-/// (1 = as good as the noise allows). Every contender was given the same freedom of a best-fit
-/// rigid motion.
+/// Root mean square of the residuals of held-out observations, each residual divided by its
+/// standard uncertainty (1: the residuals are as small as the noise permits). From the residuals of
+/// each alternative (no compensation, candidate, active model) the best-fit rigid motion is removed
+/// first.
 struct HeldOutFigures {
   double no_compensation = 0.0;
   double candidate = 0.0;
   std::size_t observations = 0;
-  /// Fitted to in every fold: no other observation determines them, so they cannot be predicted.
+  /// Observations that were never held out: without them the model is not determined.
   std::size_t not_held_out = 0;
-  /// Of the observations inside the active model's volume; none: there is no active model, it does
-  /// not hold for this tool, or nothing lies inside. Outside, tables end and polynomials run away:
-  /// to do better there means nothing.
+  /// Figure of the active model, from the observations inside its validity volume only: outside, it
+  /// extrapolates, and a comparison there is meaningless. nullopt if there is no active model, if
+  /// it is not valid for this tool, or if no observation is inside.
   std::optional<double> active{};
-  std::optional<double> candidate_beside_active{};  ///< on the same observations as `active`
+  std::optional<double> candidate_beside_active{};  ///< from the same observations as `active`
   std::size_t observations_beside_active = 0;
-  /// the same, unweighted, in m: for people
+  /// The same figures, unweighted and in m, for display.
   double no_compensation_rms_m = 0.0;
   double candidate_rms_m = 0.0;
   std::optional<double> active_rms_m{};
 };
 
 struct GateLimits {
-  /// |V| anywhere; 1 mm: larger is a machine to be repaired, or a wrong path
+  /// Largest |V| in the volume. 1 mm: with a larger error the machine needs repair, or the path is
+  /// wrong.
   double max_error_m = 1e-3;
-  double max_gradient = 5e-3;  ///< |dV/dq|, m/m; 5 mm/m: 250 um between nodes 50 mm apart
-  /// |growth of the machine alike in all directions|: 200 um/m; larger is a wrong unit, path, range
-  /// or temperature.
+  double max_gradient = 5e-3;  ///< |dV/dq| in m/m; 5 mm/m: 250 um between nodes 50 mm apart
+  /// Absolute value of the scale error common to all directions. 200 um/m: a larger value means a
+  /// wrong unit, path, range or temperature.
   double max_scale_error = 200e-6;
-  /// |growth alike in all directions against the active model| beside twice its standard
-  /// uncertainty: 20 um/m are 1.7 K of steel. More is a wrong scale of path, ranges or temperature,
-  /// or another machine.
+  /// Absolute value of the scale difference to the active model, common to all directions, in
+  /// addition to twice its standard uncertainty. 20 um/m: steel at 1.7 K temperature difference. A
+  /// larger value means a wrong scale of path, ranges or temperature, or a changed machine.
   double max_scale_change = 20e-6;
-  /// required relative drop of the held-out figure; 0: merely better
+  /// Required relative decrease of the held-out figure; 0: any decrease is sufficient.
   double min_improvement = 0.0;
-  bool accept_smaller_volume = false;  ///< than that of the active model
-  bool accept_scale_change = false;    ///< beyond max_scale_change
+  bool accept_smaller_volume = false;  ///< smaller than that of the active model
+  bool accept_scale_change = false;    ///< larger than max_scale_change
 };
 
-/// The name under which a configuration lets a model replace one that holds in more of the machine.
+/// Entry in the configuration that permits a model to replace an active model with a larger
+/// validity volume.
 inline constexpr std::string_view kSmallerVolume = "smaller-volume";
 
-/// The name under which a configuration lets a model replace one from which its scale differs.
+/// Entry in the configuration that permits a model to replace an active model with a different
+/// scale.
 inline constexpr std::string_view kScaleChange = "scale-change";
 
-/// Share of the volume of `before` that lies in `after`, from points on a lattice over `before`: to
-/// a few per cent. What lies beside `after` by no more than `rim` of its width counts as in it.
+/// Fraction of the volume of `before` that is inside `after`, estimated with the points of a
+/// lattice over `before`, accurate to a few per cent. Points outside `after` by at most the
+/// fraction `rim` of its width count as inside.
 [[nodiscard]] double kept_share(const ValidityVolume& before, const ValidityVolume& after,
                                 double rim = 0.0);
 
 /// Accepted only if `reasons` is empty.
 struct Verdict {
   bool accepted = false;
-  std::vector<std::string> reasons;  ///< one sentence with numbers for every broken rule
-  /// Of `reasons`, one each in the same order, for programs: the name of a Cause of the method's
-  /// lack_of_fit.hpp, or held-out, nowhere, size, slope, volume, scale-change, growth, uncertainty,
-  /// orientation, shape-only, damage.
+  std::vector<std::string> reasons;  ///< one sentence with numbers for each rule that is not met
+  /// Machine-readable identifiers of `reasons`, one each in the same order: the name of a Cause of
+  /// the method's lack_of_fit.hpp, or one of held-out, nowhere, size, slope, volume, scale-change,
+  /// growth, uncertainty, orientation, shape-only, damage.
   std::vector<std::string> causes;
-  std::vector<std::string> notes;  ///< what else to know about the comparison; breaks no rule
+  std::vector<std::string> notes;  ///< further information, no reason to refuse
   HeldOutFigures held_out;
-  double max_error_m = 0.0;   ///< of the candidate, where decide() looked
-  double max_gradient = 0.0;  ///< |dV/dq| along an axis, there
+  double max_error_m = 0.0;   ///< of the candidate, at the points that decide() evaluates
+  double max_gradient = 0.0;  ///< |dV/dq| along an axis, at the same points
 
-  /// One reason more: last, or before that of index `before`.
+  /// Adds a reason: at the end, or before the reason with index `before`.
   void refuse(std::string_view cause, std::string text);
   void refuse(std::string_view cause, std::string text, std::size_t before);
 };
 
-/// Pure. `active` may be null. Magnitude and gradient of tables are taken on the tensor grid of the
-/// nodes (V is linear between them along each axis); of polynomials, where it holds: at the
-/// vertices of its hull (all of them readings), halfway between any two, and at the nodes inside. A
-/// model with no such place is refused.
+/// Pure. `active` may be null. Points at which magnitude and gradient of V are evaluated:
+/// - tables: the tensor grid of the nodes (V is linear between them along each axis),
+/// - polynomials: the vertices of the validity hull (each is a measured reading), the midpoints
+///   between any two vertices, and the nodes inside the hull.
+/// A model without any such point is refused.
 [[nodiscard]] Verdict decide(const VolumetricModel& candidate, const HeldOutFigures&,
                              const GateLimits& = {}, const VolumetricModel* active = nullptr);
 

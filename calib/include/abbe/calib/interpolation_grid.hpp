@@ -1,6 +1,6 @@
 #pragma once
-/// A model on a tensor grid, for those who only interpolate linearly between its nodes. What they
-/// miss by that is part of their uncertainty.
+/// A model sampled on a tensor grid, for receivers that interpolate linearly between the nodes. The
+/// interpolation error is part of the uncertainty of the received values.
 
 #include <array>
 #include <cstddef>
@@ -10,22 +10,26 @@
 
 namespace abbe::calib {
 
-/// Coordinates by axis, ascending, at least two.
+/// Node coordinates of each axis in m, ascending, at least two per axis.
 using GridAxes = std::array<std::vector<double>, 3>;
 
 struct InterpolationGrid {
   GridAxes axes_m;
-  bool every_node = false;  ///< of tables: none was left out, linear interpolation is exact
+  bool every_node = false;  ///< all nodes of the tables are used: linear interpolation is exact
 };
 
-/// At most `most_nodes` (>= 8) of them. Of tables the nodes themselves, as long as they fit; else
-/// the longest axis gives some up, again and again. Of polynomials equidistant over the box of the
-/// hull, more along the axes V bends along.
+/// A grid of at most `most_nodes` (>= 8) nodes.
+/// - Tables: the nodes of the tables. While there are too many, one node is removed from the axis
+///   with the most nodes.
+/// - Polynomials: equidistant nodes over the bounding box of the validity hull, more of them on
+///   axes along which V has a larger second derivative.
 [[nodiscard]] InterpolationGrid interpolation_grid(const VolumetricModel&, std::size_t most_nodes);
 
-/// Second moment of what linear interpolation misses in the cells around node (i, j, k), mean over
-/// a cell: to be added to cov_V_m2 there. Along an axis the miss is a parabola between nodes, c the
-/// larger of the misses halfway to either neighbour; over the cell E[p^2] = 8/15, E[p p'] = 4/9.
+/// Second moment of the linear interpolation error around node (i, j, k), averaged over a cell. The
+/// caller adds it to cov_V_m2 at this node. Along each axis the interpolation error is modelled as
+/// a parabola c p(x) between nodes, p = 1 halfway. c is the error halfway to a neighbour node; of
+/// the two neighbours, the one with the larger error counts. The averages over a cell are
+///     E[p^2] = 8/15,   E[p p'] = 4/9   (p' along another axis).
 /// Zero if every_node. Pure.
 [[nodiscard]] Matrix3 interpolation_moment(const VolumetricModel&, const InterpolationGrid&,
                                            const std::array<std::size_t, 3>& node);

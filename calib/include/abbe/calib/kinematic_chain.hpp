@@ -1,9 +1,11 @@
 #pragma once
-/// The order in which a machine's axes carry each other, from a chain string in the style of ISO
-/// 10791-6: `[w X' b Y Z (C1) t]`: w workpiece, b bed, t tool; a prime marks an axis that carries
-/// the workpiece; parentheses mean present, but not moving. For the volumetric error only the order
-/// of X, Y, Z read from w to t matters, because all error tables describe tool relative to
-/// workpiece, primed axis or not.
+/// Kinematic chain of a machine: the order of its axes, parsed from a string in the style of ISO
+/// 10791-6, for example
+///     [w X' b Y Z (C1) t]
+/// w: workpiece, b: bed, t: tool. A prime marks an axis that carries the workpiece. Parentheses
+/// mark an axis that is present but does not move. The volumetric error depends only on the order
+/// of X, Y, Z from w to t: all error tables describe the tool relative to the workpiece, for primed
+/// axes, too.
 
 #include <array>
 #include <cstddef>
@@ -23,20 +25,21 @@ inline constexpr std::array<Axis, 3> kAllAxes{Axis::X, Axis::Y, Axis::Z};
   return static_cast<char>('X' + static_cast<char>(index(a)));
 }
 
-/// A machine of three linear axes. Immutable value; default: X, Y, Z from workpiece to tool, all on
-/// the tool side.
+/// Chain of a machine with three linear axes. Immutable value. Default: X, Y, Z from workpiece to
+/// tool, all three between bed and tool.
 class KinematicChain {
  public:
   KinematicChain() = default;
 
-  /// Needs w first, t last, b once, each of X, Y, Z once and moving; axes before b primed, axes
-  /// after b not. Other axes and spindles (A1, (C1), S ...) are allowed and ignored. BadInput says
-  /// which of these is broken, and where.
+  /// w must be first, t last, b must occur once, X, Y and Z must occur once each and without
+  /// parentheses. Axes before b must have a prime, axes after b must not. Other axes and spindles
+  /// (A1, (C1), S ...) are permitted and ignored. The text of BadInput names the rule that is
+  /// broken and the token.
   [[nodiscard]] static Result<KinematicChain> parse(std::string_view text);
 
   [[nodiscard]] const std::string& text() const { return text_; }
   [[nodiscard]] const std::array<Axis, 3>& order_w_to_t() const { return order_; }
-  /// 0: next to the workpiece, 2: next to the tool.
+  /// Position in the order from w to t. 0: next to the workpiece, 2: next to the tool.
   [[nodiscard]] std::size_t place(Axis a) const;
   [[nodiscard]] bool carries_workpiece(Axis a) const { return primed_[index(a)]; }
 

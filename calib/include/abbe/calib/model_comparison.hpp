@@ -1,6 +1,6 @@
 #pragma once
-/// How far two models are apart where it matters: after the rigid motion no measurement can see is
-/// taken out.
+/// Difference between two models after removal of the best-fit rigid motion, which no measurement
+/// can determine.
 
 #include <span>
 #include <vector>
@@ -17,26 +17,26 @@ struct VectorStatistics {
 [[nodiscard]] VectorStatistics vector_statistics(std::span<const Vector3> v_m);
 
 struct ModelDifference {
-  VectorStatistics as_stated;       ///< of the difference of V in the gauges the models have
+  VectorStatistics as_stated;       ///< of the difference of V, gauges unchanged
   VectorStatistics rigid_free;      ///< after removing the best-fit T + r x p
-  Vector6 rigid = Vector6::Zero();  ///< tx ty tz [m], rx ry rz [rad] that was removed
+  Vector6 rigid = Vector6::Zero();  ///< the removed tx ty tz [m], rx ry rz [rad]
 };
 
-/// Least squares T + r x p of `difference` over points p = axis position + tool offset; needs 3
-/// points not on a line.
+/// Fits T + r x p to `difference_m` by least squares, p = axis position + tool offset. Needs at
+/// least 3 points that are not on a line, else TooFewObservations or DegenerateGeometry.
 [[nodiscard]] Result<ModelDifference> rigid_free(std::span<const Vector3> points_m,
                                                  std::span<const Vector3> difference_m);
 
-/// Least squares s of V = s p + rigid motion: about the mean of the points, translation and
-/// rotation do not matter. 0 for points in one place.
+/// The scale s of V = s p + rigid motion by least squares. Points are taken relative to their mean;
+/// translation and rotation then have no influence on s. 0 if all points coincide.
 [[nodiscard]] double common_scale(std::span<const Vector3> points_m, std::span<const Vector3> V_m);
 
-/// a - b at `axis_positions_m`. NotApplicable if one of them does not hold for the tool.
+/// V of a minus V of b at `axis_positions_m`. NotApplicable if a model is not valid for the tool.
 [[nodiscard]] Result<ModelDifference> rigid_free_difference(
     const VolumetricModel& a, const VolumetricModel& b, const Vector3& tool_offset_m,
     std::span<const Vector3> axis_positions_m);
 
-/// All combinations of the three coordinate lists, x slowest.
+/// All combinations of the node positions of X, Y and Z; z varies fastest.
 [[nodiscard]] std::vector<Vector3> tensor_grid(const MachineNodes&);
 
 }  // namespace abbe::calib

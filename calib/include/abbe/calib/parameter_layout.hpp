@@ -1,7 +1,9 @@
 #pragma once
-/// Which number of the parameter vector U is what: the tables in the order EXX EYX EZX EAX EBX ECX
-/// | EXY .. ECY | EXZ .. ECZ (those in use), nodes ascending; EA0Z EB0Z EC0Y; then, in fits only,
-/// the six rigid unknowns tx ty tz [m] rx ry rz [rad] of the tracker's place.
+/// Order of the entries of the parameter vector U:
+/// 1. the tables in use, in the order EXX EYX EZX EAX EBX ECX, EXY .. ECY, EXZ .. ECZ; nodes
+///    ascending within a table,
+/// 2. the squareness errors EA0Z EB0Z EC0Y,
+/// 3. in fits only: the six rigid unknowns tx ty tz [m] rx ry rz [rad] of the tracker station.
 
 #include <cstddef>
 #include <optional>
@@ -16,21 +18,22 @@ namespace abbe::calib {
 
 struct Table {
   ErrorMotion motion;
-  std::size_t offset = 0;  ///< of its first node in U
+  std::size_t offset = 0;  ///< index of its first node in U
 };
 
 /// Immutable value.
 class ParameterLayout {
  public:
-  /// The 14 tables that one constant target offset can show: without the rotations of the axis
-  /// nearest to the tool and without the rotation of the middle axis about that axis' direction,
-  /// which a constant lever makes inseparable from translations ([Sanders 2023] section 4 counts
-  /// "14 additional unknowns"). For the order X, Y, Z: no ECY EAZ EBZ ECZ.
+  /// The 14 tables that are estimable with one constant target offset. The rotations of the axis
+  /// nearest to the tool are left out, and so is the rotation of the middle axis about the
+  /// direction of the axis nearest to the tool: with a constant lever their effect is a translation
+  /// ([Sanders 2023] section 4 counts "14 additional unknowns"). For the order X, Y, Z the tables
+  /// ECY EAZ EBZ ECZ are left out.
   [[nodiscard]] static Result<ParameterLayout> observable_with_one_target(const KinematicChain&,
                                                                           MachineNodes);
-  /// All 18 tables; identifiable only from three or more non-collinear target offsets.
+  /// All 18 tables; estimable only with three or more non-collinear target offsets.
   [[nodiscard]] static Result<ParameterLayout> all_tables(const KinematicChain&, MachineNodes);
-  /// Any subset, in the canonical order; a repeated table is BadInput.
+  /// Any subset; the tables are sorted into the order above. BadInput if a table is repeated.
   [[nodiscard]] static Result<ParameterLayout> with_tables(const KinematicChain&, MachineNodes,
                                                            std::span<const ErrorMotion>);
 
@@ -41,13 +44,13 @@ class ParameterLayout {
   [[nodiscard]] std::size_t node_count(Axis a) const { return nodes_[index(a)].nodes_m.size(); }
 
   [[nodiscard]] std::size_t squareness_offset() const { return squareness_offset_; }
-  [[nodiscard]] std::size_t model_size() const {
-    return squareness_offset_ + 3;
-  }  ///< without rigid
+  /// Number of parameters without the rigid unknowns.
+  [[nodiscard]] std::size_t model_size() const { return squareness_offset_ + 3; }
   [[nodiscard]] std::size_t rigid_offset() const { return model_size(); }
-  [[nodiscard]] std::size_t fit_size() const { return model_size() + 6; }  ///< with rigid
+  /// Number of parameters with the rigid unknowns.
+  [[nodiscard]] std::size_t fit_size() const { return model_size() + 6; }
 
-  /// "EXX at -0.300 m", "EC0Y", "rx".
+  /// Name of a parameter for messages: "EXX at -0.300 m", "EC0Y", "rx".
   [[nodiscard]] std::string label(std::size_t parameter) const;
 
  private:

@@ -1,12 +1,14 @@
 #pragma once
-/// The same bits on every processor, where std::hypot is free to differ.
+/// Root sum of squares with bit-identical results on every processor; std::hypot does not guarantee
+/// that.
 
 #include <cmath>
 
 namespace abbe::calib {
 
-/// sqrt(a^2 + b^2): the combined standard uncertainty of two independent parts (GUM 5.1.2). Does
-/// not scale its arguments: for values between 1e-150 and 1e150, and zero.
+/// sqrt(a^2 + b^2): the combined standard uncertainty of two independent components (GUM 5.1.2).
+/// The arguments are not scaled: each must be 0 or between 1e-150 and 1e150, else the squares
+/// overflow or underflow.
 [[nodiscard]] inline double root_sum_of_squares(double a, double b) noexcept {
   return std::sqrt(a * a + b * b);
 }

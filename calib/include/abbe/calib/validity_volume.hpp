@@ -1,6 +1,6 @@
 #pragma once
-/// The volume a model's data covered: the convex hull of axis positions. Outside, a model
-/// extrapolates.
+/// Validity volume of a model: the convex hull of the axis positions at which its data were
+/// measured. Outside this volume a model extrapolates.
 
 #include <cstddef>
 #include <span>
@@ -12,27 +12,27 @@ namespace abbe::calib {
 
 struct HalfSpace {
   Vector3 outward;  ///< unit length
-  double offset_m;  ///< outward . p <= offset_m inside
+  double offset_m;  ///< p is inside if outward . p <= offset_m
 };
 
-/// Immutable value; cheap to query. The vertices alone determine what is inside, so that a volume
-/// stored by its vertices is the same volume when it is read.
+/// Immutable value; a query is cheap. The vertices alone determine the volume: a volume that is
+/// stored as its vertices and read again is identical.
 class ValidityVolume {
  public:
-  /// Slack of contains(): a machine at the edge of its travel reads a little beyond it.
+  /// Tolerance of contains(): at the end of its travel an axis can read slightly more than the end.
   static constexpr double kTolerance_m = 1e-6;
 
   ValidityVolume() = default;  ///< contains nothing
-  /// Hull of at least 4 points that are not in one plane, else DegenerateGeometry. Its vertices are
-  /// those of the points that stand out by more than 1 nm: of the points in a face or on an edge,
-  /// its corners. 5,000 vertices take 0.1 s.
+  /// Hull of at least 4 points that are not in one plane, else DegenerateGeometry. Points within
+  /// 1 nm of the hull of the other points are not vertices; points inside a face or an edge are
+  /// therefore left out. 5,000 vertices take 0.1 s.
   [[nodiscard]] static Result<ValidityVolume> hull_of(std::span<const Vector3> axis_positions_m);
-  /// From vertices_m() of another one, all of which are kept: contains() gives the same answers.
-  /// Any other points are vertices too, wherever they lie.
+  /// From vertices_m() of another volume. Every given point is kept as a vertex, whether it is a
+  /// corner of the hull or not. contains() returns the same results as that of the other volume.
   [[nodiscard]] static Result<ValidityVolume> of_vertices(std::span<const Vector3> vertices_m);
 
   [[nodiscard]] bool contains(const Vector3& axis_position_m) const;
-  /// In ascending order of x, then y, then z.
+  /// Sorted by x, then y, then z, ascending.
   [[nodiscard]] std::span<const Vector3> vertices_m() const { return vertices_m_; }
 
  private:
@@ -42,9 +42,10 @@ class ValidityVolume {
   std::vector<Vector3> vertices_m_;
 };
 
-/// At most `most` of the points, spread evenly: again and again the one farthest from those chosen,
-/// beginning with the one farthest from their mean. In the order they had; all of them if they are
-/// no more.
+/// Selects at most `most` of the points, evenly spread (farthest-point sampling). The first
+/// selected point is the one farthest from the mean, each further one is the one farthest from all
+/// selected points. The result keeps the order of the input. All points are returned if there are
+/// at most `most`.
 [[nodiscard]] std::vector<Vector3> spread_subset(std::span<const Vector3> points_m,
                                                  std::size_t most);
 

@@ -1,25 +1,27 @@
 #pragma once
-/// Lengths at the reference temperature of 20 C [ISO 1]. A scale that is warm has its marks too far
-/// apart: the machine has moved farther than it reads. A part that is warm is too long. The two are
-/// corrected separately, each with its own temperature and coefficient. Pure; any thread.
+/// Correction of lengths to the reference temperature of 20 C [ISO 1]. Above 20 C the graduation of
+/// a scale is too wide: the axis has moved farther than it reads. Above 20 C a part is too long.
+/// Scale and part are corrected separately, each with its own temperature and coefficient. Pure;
+/// any thread.
 
 namespace abbe::calib {
 
 inline constexpr double kReferenceTemperature_K = 293.15;  ///< [ISO 1]
 
-/// What expands: linear, with standard uncertainties (k = 1), taken as independent.
+/// Linear thermal expansion of a scale or part. Standard uncertainties (k = 1), assumed to be
+/// independent.
 struct Expansion {
-  /// 11.5e-6 for steel, 8e-6 for glass scales: take it from the data sheet
+  /// typical values: 11.5e-6 for steel, 8e-6 for glass scales; use the value of the data sheet
   double alpha_per_K = 0.0;
-  double u_alpha_per_K = 0.0;  ///< about 1e-6 if it is from a table
+  double u_alpha_per_K = 0.0;  ///< about 1e-6 for a value from a table
   double temperature_K = kReferenceTemperature_K;
   double u_temperature_K = 0.0;
 };
 
-/// 1 + alpha (T - 20 C): what is 1 m long at 20 C is that many metres long at T.
+/// 1 + alpha (T - 20 C): ratio of the length at T to the length at 20 C.
 [[nodiscard]] double expansion_factor(const Expansion& e) noexcept;
-/// Relative standard uncertainty of expansion_factor(): ((T - 20) u_alpha)^2 + (alpha u_T)^2 [GUM] 5.1.2
-/// eq. (10).
+/// Standard uncertainty of expansion_factor() [GUM] 5.1.2 eq. (10):
+///     u^2 = ((T - 20 C) u_alpha)^2 + (alpha u_T)^2
 [[nodiscard]] double u_expansion_factor(const Expansion& e) noexcept;
 
 struct UncertainLength {
@@ -27,15 +29,16 @@ struct UncertainLength {
   double u_m = 0.0;  ///< of the thermal correction alone
 };
 
-/// L20 = L_T / expansion factor: a part of length L_T at its temperature, at 20 C.
+/// Length at 20 C of a part with the length L_T at its temperature T: L20 = L_T / expansion factor.
 [[nodiscard]] UncertainLength length_at_reference(double length_m, const Expansion& part) noexcept;
 
-/// How far an axis really is from where its scale is fixed (`fixed_m`, a reading), given what it
-/// reads.
+/// True position of an axis at the reading `reading_m`. `fixed_m` is the reading at the point where
+/// the scale is fixed to the machine; the scale expands from this point.
 [[nodiscard]] UncertainLength true_position(double reading_m, double fixed_m,
                                             const Expansion& scale) noexcept;
 
-/// A part measured by reading a scale, both warm: L expansion_factor(scale) / expansion_factor(part).
+/// Length at 20 C of a part that is measured with a scale, each at its own temperature:
+///     L20 = reading * expansion_factor(scale) / expansion_factor(part)
 [[nodiscard]] UncertainLength length_at_reference(double reading_m, const Expansion& scale,
                                                   const Expansion& part) noexcept;
 

@@ -1,11 +1,13 @@
 #pragma once
-/// What errors of the array itself do to the errors seen at its balls. They are the same at every
-/// position, in the array's own frame: delta_i of a centre, a small turn d of the uniform frame
-/// from the directions of the blocks, a relative length k. At position p they are taken for
+/// Effect of errors of the array itself on the errors observed at its balls. In the array's own
+/// frame these errors are the same at every position: delta_i of the centre of ball i, a small
+/// rotation d of the uniform frame (from errors of the block directions), a relative length error
+/// k. At position p they change the observed error of ball i ([Li OMM] eq. (12): ideal - actual) by
 ///     R_p [ (delta_i - delta_1) - d x (a_i - a_1) + k (a_i - a_1) ]
-/// of ball i ([Li OMM] eq. (12): ideal - actual), R_p: rotation of T_self_uni, a: places in the uniform
-/// frame. d: z turns with block 1 (u1 about x and y); about z with both,
-///     u^2 = (u2^2 + (n1 . n2)^2 u1^2) / |n2 x n1|^2,    correlated with that about y where n1 . n2 != 0.
+/// R_p: rotation of T_self_uni; a: ball centres in the uniform frame. The uncertainty of d about x
+/// and y is u1, that of block 1. About z both blocks contribute:
+///     u^2 = (u2^2 + (n1 . n2)^2 u1^2) / |n2 x n1|^2
+/// Where n1 . n2 != 0, the rotations about z and y are correlated.
 
 #include <Eigen/Core>
 
@@ -13,10 +15,11 @@
 
 namespace abbe::calib::evemu {
 
-/// A, 3 rows.size() x n: errors seen at the balls are A zeta, zeta ~ N(0, 1), each column one
-/// standard uncertainty. Columns: x, y, z of every ball; direction of block 1 along x and y, of
-/// block 2 along x; length
-/// - without those that are known exactly. No columns for errors that were given without an array.
+/// A, 3 rows.size() x n: the errors observed at the balls are A zeta, zeta ~ N(0, 1). Each column
+/// is the effect of one standard uncertainty. Order of the columns: x, y, z of every ball;
+/// direction of block 1 along x and y; direction of block 2 along x; length. A quantity with zero
+/// uncertainty has no column. No columns if the errors were given without an array
+/// (observe_errors()).
 [[nodiscard]] Eigen::MatrixXd artefact_rows(const Observations&);
 
 }  // namespace abbe::calib::evemu

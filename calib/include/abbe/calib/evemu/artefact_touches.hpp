@@ -1,10 +1,11 @@
 #pragma once
-/// Where to touch a ball array for its own calibration, on a machine that can be told where to go,
-/// and the ways there. Balls are touched on their upper half, faces on a square. Between two
-/// touches the tip stays 1.6 times as far from a ball's centre as in contact, so that a straight
-/// way of up to 60 degrees around it is free; between two features it goes up first, across above
-/// everything, then down. So it does from where it stands at first, and in the end it goes up. What
-/// else stands on the table is not known here. m; pure.
+/// Plan of the touches for the calibration of a ball array on a machine that moves to commanded
+/// positions, with the path to each touch. Balls are touched on their upper half, faces on a circle
+/// and at its centre. Between two touches of a ball the tip stays 1.6 times as far from the ball's
+/// centre as in contact: a straight path of up to 60 degrees around the ball is then free of
+/// collision. Between two features the tip moves up, then across above all features, then down. The
+/// path from the initial tip position begins in the same way, and the last path ends above all
+/// features. Other objects on the table are not taken into account. m; pure.
 
 #include <array>
 #include <optional>
@@ -22,37 +23,38 @@ struct FaceToTouch {
 struct ArtefactTouchOptions {
   std::size_t points_per_ball = 13;  ///< at least 5
   std::size_t points_per_face = 9;   ///< at least 4
-  double clearance_m = 5e-3;  ///< of the tip before a face, and of everything when it travels
+  double clearance_m = 5e-3;  ///< from a face before contact, and above all features in travel
 };
 
 struct PlannedTouch {
   Feature feature = Feature::Ball;
   int number = 0;
-  std::vector<Vector3> way_m;      ///< centres of the tip, one after the other
+  std::vector<Vector3> way_m;      ///< path of the tip's centre, as corner points
   Vector3 at_m = Vector3::Zero();  ///< centre of the tip in contact
   Vector3 normal = Vector3::UnitZ();
 };
 
 struct ArtefactPlan {
   std::vector<PlannedTouch> touches;
-  std::vector<Vector3> leave_m;  ///< after the last touch: off the surface, then above everything
+  std::vector<Vector3> leave_m;  ///< after the last touch: off the surface, then above all features
 };
 
-/// `from_m`: where the tip stands. Up is the outward normal of block 1. BadInput: too few points, a
-/// tip with a ball above it, or as check(nominal).
+/// `from_m`: initial position of the tip's centre. Up is the outward normal of block 1. BadInput:
+/// too few points, or a ball above the tip; also the errors of check(nominal).
 [[nodiscard]] Result<ArtefactPlan> plan_artefact_touches(const Calibrator& nominal,
                                                          const std::array<FaceToTouch, 2>& faces,
                                                          const Vector3& from_m,
                                                          const ArtefactTouchOptions& options);
 
-/// The artefact where it stands: every centre and normal moved.
+/// The artefact in machine coordinates: every centre and every normal transformed.
 [[nodiscard]] Calibrator moved(const Calibrator& calibrator,
                                const RigidTransform& T_machine_artefact);
 
-/// What the touches of a machine with the uncertainty `u_position_m` say: precalibrated(), its
-/// uncertainties widened by what the machine adds to every touch alike ([GUM] 5.1.2 eq. (10)): u to
-/// a centre, u over the half size of a face to its direction. How the array grows is nominal's. The
-/// machine must have measured it at 20 C, or have corrected what it reports.
+/// The calibrator from touches of a machine with the position uncertainty `u_position_m`:
+/// precalibrated(), with uncertainties enlarged by the machine error common to all touches of a
+/// feature ([GUM] 5.1.2 eq. (10)): u for a centre, u / half size of the face for a direction. The
+/// thermal expansion is copied from `nominal`. The machine must have measured the array at 20 C, or
+/// have corrected the positions it reports to 20 C.
 [[nodiscard]] Result<Calibrator> calibrated_artefact(const Calibrator& nominal,
                                                      const std::array<FaceToTouch, 2>& faces,
                                                      std::span<const Touch> touches,

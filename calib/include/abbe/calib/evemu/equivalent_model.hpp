@@ -1,13 +1,15 @@
 #pragma once
 /// The equivalent volumetric error model: the combinations of error coefficients that measurements
-/// of E can tell apart. Algorithm 1 of [Li OMM] combines like terms: for every monomial of every
-/// component of A, the row of all its factors, kept unless it or its negative is there already. The
-/// rows are W; beta = W K, X = A W^+, E = X beta. With one tool offset W has full row rank, so X is
-/// the only solution of A = X W, and its columns are plain monomials (one, or for a rotation with
-/// two arms one in each of two components). Named as in [Li OMM] Table 3: a row of one coefficient
-/// has its name; a merged row is k_eq<component><n>, numbered within the component by decreasing
-/// x > y > z > 1. Sign: a single coefficient counts +1, a merged row has its translations with +1.
-/// Rows in alphabetical order. mm.
+/// of E can distinguish. Algorithm 1 of [Li OMM] combines like terms: for every monomial of every
+/// component of A it takes the row of that monomial's factors over all coefficients. The row is
+/// added to W unless W already contains it or its negative. Then
+///     beta = W K,  X = A W^+,  E = X beta.
+/// With one tool offset W has full row rank, so X is the only solution of A = X W. The columns of X
+/// are single monomials (for a rotation with two arms: one in each of two components). Names as in
+/// [Li OMM] Table 3: a row with one coefficient has the name of that coefficient; a merged row is
+/// k_eq<component><n>, numbered within the component by decreasing x > y > z > 1. Sign: a single
+/// coefficient has the factor +1; in a merged row the translations have the factor +1. Rows are in
+/// alphabetical order. mm.
 
 #include <Eigen/Core>
 #include <span>
@@ -18,7 +20,7 @@
 
 namespace abbe::calib::evemu {
 
-/// Where a column of X is not zero.
+/// One nonzero term of a column of X: factor * monomial in a component.
 struct Share {
   std::size_t component = 0;
   Monomial monomial;
@@ -28,7 +30,7 @@ struct Share {
 /// Immutable value; for one tool offset.
 class EquivalentModel {
  public:
-  /// BadInput for an order out of range. The offset changes W, never the names, the rank or the
+  /// BadInput for an order out of range. The offset changes W, but not the names, the rank or the
   /// span of X.
   [[nodiscard]] static Result<EquivalentModel> of(const KinematicChain&, int order,
                                                   const Vector3& tool_offset_mm = Vector3::Zero());
@@ -39,10 +41,10 @@ class EquivalentModel {
   [[nodiscard]] std::span<const std::string> names() const { return names_; }
   [[nodiscard]] std::span<const std::string> coefficient_names() const {
     return coefficient_names_;
-  }  ///< of K
+  }  ///< names of K
   [[nodiscard]] const Eigen::MatrixXd& W() const { return W_; }
   [[nodiscard]] std::span<const Share> shares(std::size_t column) const { return shares_[column]; }
-  /// 3 x size(). Its columns span 20 orders of magnitude: for numbers use ScaledDesign.
+  /// 3 x size(). Its columns span 20 orders of magnitude: use ScaledDesign for computations.
   [[nodiscard]] Eigen::Matrix3Xd X(const Vector3& p_mm) const;
 
  private:
@@ -53,8 +55,8 @@ class EquivalentModel {
   std::vector<std::vector<Share>> shares_;
 };
 
-/// How many combinations measurements with all these tools (mm) can tell apart: for order 3, 45
-/// with one, 56 with two that are not parallel, 60 with three or more.
+/// Number of combinations that measurements with all these tools (mm) can distinguish: for order 3,
+/// 45 with one tool, 56 with two tools that are not parallel, 60 with three or more.
 [[nodiscard]] Result<std::size_t> observable_combinations(const KinematicChain&, int order,
                                                           std::span<const Vector3> tool_offsets_mm);
 

@@ -1,12 +1,14 @@
 #pragma once
-/// The 18 position-dependent errors of three linear axes as polynomials, and what they do to the
-/// functional point. [Li OMM] eq. (3): every error function is sum_k K_k q^k, k = 0 .. order; with
-/// the 3 squareness errors the volumetric error is E = A(x, y, z) K. Chain w a1 a2 a3 t: the error
-/// of an axis acts after its own motion, to first order
-///     E = sum_i ( d_i(q_i) + e_i(q_i) x r_i ) + squareness,  r_i = sum over axes nearer to the tool + tool,
-/// with one squareness rotation about e_a3 before the travel of a2 and two, about e_a1 and e_a2, before that
-/// of a3. E = true - reading, evaluated at the reading. Lengths in mm: coefficients are mm^(1-k) and
-/// rad mm^-k.
+/// The 18 position-dependent errors of three linear axes as polynomials, and their effect on the
+/// functional point. [Li OMM] eq. (3): every error function is
+///     sum_k K_k q^k,    k = 0 .. order.
+/// With the 3 squareness errors the volumetric error is E = A(x, y, z) K. In the chain w a1 a2 a3 t
+/// the error of an axis acts after the axis's own motion. To first order
+///     E = sum_i ( d_i(q_i) + e_i(q_i) x r_i ) + squareness,
+///     r_i = travels of the axes nearer to the tool + tool offset,
+/// with one squareness rotation about e_a3 before the travel of a2, and two, about e_a1 and e_a2,
+/// before the travel of a3. E = true - reading, evaluated at the reading. Lengths in mm: the units
+/// of the coefficients are mm^(1-k) and rad mm^-k.
 
 #include <Eigen/Core>
 #include <array>
@@ -32,7 +34,7 @@ struct Monomial {
                           const Monomial&) = default;  // NOLINT(modernize-use-nullptr)
 };
 
-/// A(row, coefficient) contains factor * monomial. Row 3 t + c: component c seen with tool t.
+/// A(row, coefficient) contains factor * monomial. Row 3 t + c: component c with tool t.
 struct Term {
   std::size_t row = 0;
   std::size_t coefficient = 0;
@@ -40,7 +42,7 @@ struct Term {
   double factor = 1.0;
 };
 
-/// Immutable value: A, symbolically.
+/// Immutable value: A in symbolic form.
 class ErrorPolynomials {
  public:
   /// BadInput unless kLeastOrder <= order <= kMostOrder and there is at least one tool offset.

@@ -1,11 +1,12 @@
 #pragma once
-/// Stage three: how well the model predicts positions it was not fitted to. Every position is left
-/// out once and the model fitted to the others, hyper-parameters included (not lambda and gamma of
-/// the sparse estimators: those stay as chosen). A position's direction is known only through its
-/// blocks, so every contender gets its own best-fit rotation about Ball1 there, the same three
-/// numbers of freedom from the same rows, and is compared by what remains over the noise balls
-/// share. What this test cannot see is a rotation common to all positions (observe.hpp). A model
-/// with an unreferenced rotation is a shape: it is refused unless somebody accepts that by name.
+/// Stage three: how well the model predicts positions that the fit did not use. Each position is
+/// left out once, and the model is fitted to the others, hyper-parameters included (lambda and
+/// gamma of the sparse estimators are not chosen again). The direction of a position is known only
+/// through its blocks. Therefore every compared model gets its own best-fit rotation about Ball1 at
+/// the position left out, the same three degrees of freedom from the same rows. The models are
+/// compared by the residuals that remain, whitened with the covariance of noise.hpp. This test
+/// cannot detect a rotation common to all positions (observe.hpp). A model with an unreferenced
+/// rotation is correct in shape only: it is refused unless the configuration accepts that by name.
 
 #include "abbe/calib/evemu/lack_of_fit.hpp"
 #include "abbe/calib/evemu/solve.hpp"
@@ -13,7 +14,7 @@
 
 namespace abbe::calib::evemu {
 
-/// The name under which a configuration accepts a model whose rotation nobody has referenced.
+/// The name by which a configuration accepts a model with an unreferenced rotation.
 inline constexpr std::string_view kShapeOnly = "evemu-shape-only";
 
 struct JudgeOptions {
@@ -23,14 +24,14 @@ struct JudgeOptions {
   Watch watch{};  ///< progress: the first half for lack of fit, the second for the held-out test
 };
 
-/// `active` may be null; it is compared at the balls inside its volume, of positions whose Ball1
-/// is, and left out if it does not hold for the tool. Needs 3 positions, else TooFewObservations;
-/// RankDeficient if those that stay do not determine the model.
+/// `active` may be null. It is compared at the balls inside its validity volume, at positions whose
+/// Ball1 is inside it too; it is not compared if it is not valid for the tool. Needs 3 positions,
+/// else TooFewObservations; RankDeficient if the remaining positions do not determine the model.
 [[nodiscard]] Result<HeldOutFigures> held_out(const Observations&, double s_m,
                                               const VolumetricModel* active,
                                               const SolveOptions& = {}, const Watch& = {});
 
-/// held_out(), the limits of the gate, and the rotation.
+/// The verdict from held_out(), alternatives(), the limits of the gate and the rotation reference.
 [[nodiscard]] Result<Verdict> judge(const Observations&, const Solution&,
                                     const VolumetricModel* active, const JudgeOptions& = {});
 

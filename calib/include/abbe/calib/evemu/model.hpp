@@ -1,7 +1,7 @@
 #pragma once
 /// The volumetric error as an equivalent model: V(q) = B(q) c in scaled Legendre polynomials, for
 /// one tool offset, zero at Ball1. Uncertainty from the full covariance of c. Extrapolates outside
-/// the balls' hull without limit: whoever asks must ask the validity volume, too.
+/// the hull of the balls without limit: the caller must also check the validity volume.
 
 #include <Eigen/Core>
 #include <array>
@@ -24,9 +24,9 @@ struct NamedCoefficient {
 /// Immutable value; all members may be called from any thread.
 class EvemuModel {
  public:
-  /// BadInput / NotFinite unless c and its covariance fit the design and the covariance is
-  /// symmetric with no negative variance. Neither is changed: whoever wants V(Ball1) = 0 calls
-  /// zero_at() first.
+  /// BadInput / NotFinite unless c and its covariance have the size of the design and the
+  /// covariance is symmetric without a negative variance. Both are stored unchanged: to get
+  /// V(Ball1) = 0, apply zero_at() first.
   [[nodiscard]] static Result<EvemuModel> of(ScaledDesign, const Vector3& ball1_m,
                                              Eigen::VectorXd c_m,
                                              const Eigen::MatrixXd& covariance_m2);
@@ -38,7 +38,7 @@ class EvemuModel {
 
   /// No allocation.
   [[nodiscard]] Vector3 V_at(const Vector3& reading_m) const;
-  /// V and its covariance; well below a microsecond with optimisation. No allocation.
+  /// V and its covariance; takes well below a microsecond in an optimised build. No allocation.
   void V_and_cov_at(const Vector3& reading_m, Vector3& V_m, Matrix3& cov_m2) const;
 
   /// In the order of the equivalent model's names.
@@ -58,11 +58,11 @@ class EvemuModel {
   Eigen::VectorXd c_m_;
   Eigen::MatrixXd covariance_m2_;
   std::vector<Entry> entries_;
-  std::array<std::size_t, 4> first_{};  ///< where a component's entries begin
+  std::array<std::size_t, 4> first_{};  ///< index of each component's first entry, and the end
   Eigen::MatrixXd entry_covariance_;    ///< between entries: blocks by component are contiguous
 };
 
-/// c -> c - B(place) c on the constants: V is zero there. As a matrix on c.
+/// Matrix T such that V of T c is zero at the place: T subtracts B(place) c from the constants.
 [[nodiscard]] Eigen::MatrixXd zero_at(const ScaledDesign&, const Vector3& place_m);
 
 }  // namespace abbe::calib::evemu

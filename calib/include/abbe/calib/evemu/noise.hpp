@@ -1,11 +1,14 @@
 #pragma once
-/// How errors of balls scatter at one position: every ball has noise s, and all share that of
-/// Ball1, against which they are measured: covariance s^2 (I + 1 1^T) per component, Ball1 itself
-/// exactly 0 (a ten thousandth of the variance stands in for it; its rows are no observations). On
-/// top every position is turned about Ball1 by a small random rotation of standard deviation w per
-/// axis. Slow noise shifts all touches of a position together, by r s per coordinate (r:
-/// Observations::slow_noise), and is uncorrelated over a quarter of its touches. With t_i from 0 to
-/// 1 when ball i was touched, the covariance of balls i and j is
+/// Noise model of the ball errors at one position. Every ball has noise s, and all balls share the
+/// noise of Ball1, to which their errors are relative: covariance s^2 (I + 1 1^T) per component.
+/// The error of Ball1 is exactly 0; its rows are not observations. A ten thousandth of the variance
+/// is used for them, so that the covariance is not singular. In addition every position is rotated
+/// about Ball1 by a small random rotation of standard deviation w per axis.
+///
+/// Slow noise is common to touches that follow each other. Its standard deviation is r s per
+/// coordinate (r: Observations::slow_noise); its correlation decays over a quarter of the touches
+/// of a position. If ball i was touched at the relative time t_i from 0 to 1, the covariance of
+/// balls i and j is
 ///     s^2 (1 + delta_ij + r^2 (k_ij - k_i1 - k_1j + k_11)),    k_ij = exp(-4 |t_i - t_j|).
 
 #include <Eigen/Core>
@@ -23,13 +26,14 @@ struct PositionRows {
 };
 [[nodiscard]] std::vector<PositionRows> position_rows(const Observations&);
 
-/// When each ball was touched, in the order of the touches: 0 with the first ball or block of its
-/// position, 1 with the last.
+/// Relative time of each ball by the order of the touches: 0 for the first ball or block of its
+/// position, 1 for the last.
 [[nodiscard]] std::vector<double> times_in_position(const SeenArtefact&);
 
-/// C0 of one position, count x count, in units of s^2. Slow noise needs `seen`.
+/// Covariance C0 of one position, count x count, in units of s^2. Slow noise requires
+/// Observations::seen.
 [[nodiscard]] Eigen::MatrixXd ball_covariance(const Observations&, const PositionRows&);
-/// Natural logarithm of |det L|, C0 = L L^T, over the components of all balls but Ball1.
+/// Natural logarithm of |det L|, C0 = L L^T, over the components of all balls except Ball1.
 [[nodiscard]] double log_det_of_noise(const Observations&);
 
 /// L^-1 M with C0 = L L^T, position by position: the noise of the result is white, s^2.
@@ -37,10 +41,10 @@ struct PositionRows {
 /// C0 M.
 [[nodiscard]] Eigen::MatrixXd times_ball_covariance(const Observations&,
                                                     const Eigen::MatrixXd& rows);
-/// L M: noise of the right shape from white noise.
+/// L M: gives white noise the covariance C0.
 [[nodiscard]] Eigen::MatrixXd coloured(const Observations&, const Eigen::MatrixXd& rows);
 
-/// 3 rows.size() x 3 positions: what rotations theta_p of the blocks do, -theta_p x (P - P_1).
+/// 3 rows.size() x 3 positions: effect of rotations theta_p of the blocks, -theta_p x (P - P_1).
 [[nodiscard]] Eigen::MatrixXd pose_rotation_rows(const Observations&);
 
 }  // namespace abbe::calib::evemu

@@ -1,14 +1,14 @@
 #pragma once
-/// Stage one: touches of the ball array at several positions in, errors of the ball centres out. V
-/// at a ball = where it should be - where it was read, relative to Ball1; evaluated at the reading.
-/// Blocks and balls are touched with the machine's own errors. They turn the whole artefact at
-/// position p by Theta_p, and move the centre of a sphere by D, not by V at the centre (a curved V
-/// bends the sphere):
-///     V_seen(ball i) = D_i(V) - D_1(V) - Theta_p(V) x (P_i - P_1),    both linear in V at the touched
-///     points.
-/// A rotation common to all positions cancels: no touch can see it ([Li OMM] does not mention it). With the
-/// touched points at hand D and Theta are part of the design (design_rows.hpp); without, D_i = V(P_i) and
-/// Theta is noise.
+/// Stage one: from touches of the ball array at several positions to errors of the ball centres. V
+/// at a ball = ideal centre - measured centre, relative to Ball1; evaluated at the reading. The
+/// machine touches blocks and balls with its own errors. These errors rotate the whole artefact at
+/// position p by Theta_p, and displace the centre of a fitted sphere by D, which differs from V at
+/// the centre (a curved V deforms the sphere):
+///     V_seen(ball i) = D_i(V) - D_1(V) - Theta_p(V) x (P_i - P_1)
+/// D and Theta are linear in V at the touched points. A rotation common to all positions cancels:
+/// touches cannot detect it ([Li OMM] does not mention this). If the touched points are available,
+/// D and Theta are part of the design (design_rows.hpp); otherwise D_i = V(P_i), and Theta is
+/// treated as noise.
 
 #include <Eigen/Core>
 #include <cstddef>
@@ -23,12 +23,12 @@
 
 namespace abbe::calib::evemu {
 
-/// One row of three: V seen at a ball.
+/// One observation of three components: V observed at a ball.
 struct BallError {
   int position = 0;
   int ball = 0;
   Vector3 reading_m = Vector3::Zero();
-  Vector3 V_m = Vector3::Zero();  ///< relative to Ball1: zero there
+  Vector3 V_m = Vector3::Zero();  ///< relative to Ball1, zero for Ball1 itself
 };
 
 struct Machine {
@@ -39,40 +39,41 @@ struct Machine {
 
 struct ObserveOptions {
   int order = 3;
-  /// Positions 1 .. this many must be there; [Li OMM] section 3 uses eight.
+  /// Touches are required at positions 1 to this number; [Li OMM] section 3 uses eight.
   int positions = 8;
-  /// A sphere has 4 unknowns; one point more shows when something is wrong.
+  /// A sphere has 4 unknowns; a fifth point is redundant and reveals a wrong touch.
   std::size_t least_points_per_ball = 5;
   std::size_t least_points_per_block = 4;
-  /// Fitted radius against calibrated radius + tip. Machine errors near 3 mm change it by 0.04 mm;
-  /// the next size of precision ball is 1 mm or more away.
+  /// Largest difference between fitted radius and calibrated radius + tip. Machine errors near 3 mm
+  /// change the radius by 0.04 mm; the next size of precision ball differs by 1 mm or more.
   double max_radius_mismatch_m = 0.2e-3;
-  /// Ball centres against the calibrator's after the best rigid motion: errors near 3 mm leave
-  /// 0.5 mm.
+  /// Largest difference of a ball centre from the calibrator's after the best-fit rigid motion:
+  /// machine errors near 3 mm leave 0.5 mm.
   double max_shape_mismatch_m = 3e-3;
-  /// Measured against calibrated direction of a block, after the same rigid motion.
+  /// Largest angle between measured and calibrated normal of a block, after the same rigid motion.
   double max_block_tilt_rad = 0.05;
-  /// Ball1 stands still while the artefact turns about it; V is relative to it, so it must be one
-  /// place.
+  /// Largest distance of a reading of Ball1 from the mean of its readings. Ball1 stays in place
+  /// while the artefact is turned about it, because V is relative to Ball1.
   double max_ball1_shift_m = 1e-3;
-  /// Smallest turn between two positions; less is the same position again.
+  /// Smallest rotation between two positions; with a smaller one they count as the same position.
   double least_turn_rad = 2e-3;
-  /// Off the surface the others of a feature lie on. Machine errors near 3 mm bend a sphere by
-  /// 0.4 mm.
+  /// Largest distance of a touch from the surface of its feature. Machine errors near 3 mm deform a
+  /// sphere by 0.4 mm.
   double max_off_surface_m = 1e-3;
-  /// A touch farther than this from the surface through the others of its ball or face, which lie
-  /// ten times better, is false; only where there are four touches for each unknown (16 on a ball,
-  /// 12 on a face).
+  /// A touch is false if it lies farther than this from the surface through the other touches of
+  /// its ball or face, and the others lie ten times closer to it. Tested only with at least four
+  /// touches for each unknown (16 on a ball, 12 on a face).
   double least_false_touch_m = 0.15e-3;
-  /// Thinnest against largest extent of all balls. Below, the third axis is not tested.
+  /// Smallest ratio of thinnest to largest extent of all balls. Below it the array covers only a
+  /// plane, and the errors in the third direction are not measured.
   double least_thickness = 1e-3;
-  /// Where the calibrator says how the array grows, and only there.
+  /// Required if the calibrator states the thermal expansion of the array, and only then.
   std::optional<ArtefactTemperature> artefact_temperature{};
 };
 
-/// Where the direction of the artefact came from. Blocks: the machine itself measured it, a
-/// rotation common to all positions is in V and nobody can tell. Independent: from something that
-/// knows, such as a tracker.
+/// Source of the artefact's direction. Blocks: the machine itself measured it; V may then contain a
+/// rotation common to all positions that cannot be detected. Independent: another instrument
+/// measured it, such as a tracker.
 enum class RotationOrigin { Blocks, Independent };
 
 struct Observations {
@@ -81,35 +82,37 @@ struct Observations {
   RotationOrigin rotation = RotationOrigin::Blocks;
   std::vector<BallError> rows;        ///< by position, then ball; every position has Ball1
   std::vector<SeenArtefact> seen;     ///< by position; empty when only errors were given
-  Vector3 ball1_m = Vector3::Zero();  ///< mean reading
-  std::optional<ArtefactUncertainty> artefact{};  ///< none when only errors were given
-  /// Standard deviation of slow noise over that of a ball centre (noise.hpp); 0: none. solve()
-  /// estimates it where it is 0.
+  Vector3 ball1_m = Vector3::Zero();  ///< mean reading of Ball1
+  std::optional<ArtefactUncertainty> artefact{};  ///< nullopt when only errors were given
+  /// Standard deviation of slow noise divided by that of a ball centre (noise.hpp); 0: no slow
+  /// noise given, solve() estimates it.
   double slow_noise = 0.0;
   [[nodiscard]] std::size_t positions() const;
 };
 
-/// Everything wrong with the touches is said by position and number, and named: TooFewObservations
-/// (points on a ball or block, a ball, block or position left out), BadInput (a ball touched under
-/// two numbers, blocks swapped, a false touch, balls touched from below, calibrator of another
-/// artefact or balls numbered differently, Ball1 moved, an artefact that was not turned; a
-/// temperature without an expansivity, or one without the other), DegenerateGeometry (all balls in
-/// one plane). Where the balls fit mirrored, renumbered or in another unit, the error says so. With
+/// Observations from touches. An error text names the position and the number of the feature.
+/// TooFewObservations: too few points on a ball or block; a ball, block or position left out.
+/// BadInput: a ball touched under two numbers; blocks swapped; a false touch; balls touched from
+/// below; the calibrator of another artefact, or balls numbered differently; Ball1 moved; an
+/// artefact that was not turned between positions; a temperature without an expansivity, or an
+/// expansivity without a temperature. DegenerateGeometry: all balls in one plane. If the balls fit
+/// when they are mirrored, renumbered or in another unit, the error text states that. With
 /// temperature and expansivity the array is taken as it is at that temperature.
 [[nodiscard]] Result<Observations> observe(std::span<const Touch>, const Calibrator&,
                                            const Machine&, const ObserveOptions& = {});
-/// One position alone, by the same rules; without a temperature at 20 C, whatever the calibrator
-/// says.
+/// One position alone, by the same rules. Without a temperature the array is taken as at 20 C, even
+/// if the calibrator states an expansivity.
 [[nodiscard]] Result<SeenArtefact> see_artefact(int position, std::span<const Touch> touches_of_it,
                                                 const Calibrator&, const ObserveOptions& = {});
-/// The earlier position at which the artefact stood as it does now.
+/// Index in `before` of the first orientation from which `R_self_uni` differs by less than
+/// `least_turn_rad`; nullopt if there is none.
 [[nodiscard]] std::optional<std::size_t> stands_as_at(const Matrix3& R_self_uni,
                                                       std::span<const Matrix3> before,
                                                       double least_turn_rad);
 
-/// observe() from errors that were computed elsewhere; block rotations are then unknown. BadInput
-/// also where reading + V makes an artefact of another shape at every position, and of one shape
-/// with signs, axes or unit of V changed: the change that fits is named.
+/// observe() for errors that were computed elsewhere; block rotations are then unknown. Also
+/// BadInput if the artefact of reading + V has another shape at every position, but the same shape
+/// at all positions once signs, axes or unit of V are changed: the text names that change.
 [[nodiscard]] Result<Observations> observe_errors(std::span<const BallError>, const Machine&,
                                                   RotationOrigin rotation = RotationOrigin::Blocks,
                                                   const ObserveOptions& = {});

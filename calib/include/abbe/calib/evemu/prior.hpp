@@ -1,14 +1,18 @@
 #pragma once
-/// What is believed of the coefficients before measuring, with a few numbers left to the data
-/// (maximum marginal likelihood). On the scaled design, where every coefficient is the size of its
-/// contribution:
-///   constants: 5 mm;
-///   bayes-pose: linear translations max(s_d, 2 mm), since squareness knows no smallness; but along the
-///     axis itself, where they are a scale, max(s_d, 100 um/m arm) half width / arm (arm: the largest half
-///     width), and s_a for rotations at an unknown offset: of a flat array nothing else limits the scale
-///     of the axis across it; order k translations s_d rho^(k-1); rotations s_a rho^(k-1) times arm; random
-///     pose rotations of w;
-///   ridge: everything but the constants t, no pose rotations.
+/// Prior of the coefficients, with a few hyper-parameters that are estimated from the data (maximum
+/// marginal likelihood). It applies to the scaled design, where every coefficient is the size of
+/// its contribution. Prior standard deviations:
+///   constants                5 mm
+///   bayes-pose
+///     linear translations    max(s_d, 2 mm), because squareness errors can be large
+///     scale of an axis       max(s_d, 100 um/m arm) half width / arm, and s_a: root sum of squares
+///     translations, order k  s_d rho^(k-1)
+///     rotations, order k     s_a rho^(k-1), at the distance arm
+///     pose rotations         w
+///   ridge                    t for all coefficients except the constants; no pose rotations
+/// arm: the largest half width. The scale of an axis is its linear translation along itself. Its
+/// s_a stands for rotations at an unknown offset; with a flat array nothing else limits the scale
+/// of the axis perpendicular to the array.
 
 #include <Eigen/Core>
 #include <span>
@@ -25,7 +29,7 @@ inline constexpr double kScalePrior = 100e-6;  ///< half of GateLimits::max_scal
 enum class PriorKind { Ridge, BayesPose };
 
 struct HyperParameters {
-  double s_d_m = 1e-3;    ///< translations; for ridge: of everything
+  double s_d_m = 1e-3;    ///< translations; for ridge: t, of all coefficients except the constants
   double rho = 0.5;       ///< decay per order
   double s_a_m = 0.5e-3;  ///< rotations at the largest half width
   double s_m = 5e-6;      ///< noise of a ball centre, per coordinate
@@ -38,15 +42,15 @@ struct HyperParameters {
 [[nodiscard]] Eigen::VectorXd prior_variances(PriorKind, const ScaledDesign&, std::size_t positions,
                                               const HyperParameters&);
 
-/// Quasi-Newton from a few starts within fixed bounds (s 1 nm to 1 mm, w 0.01 urad to 10 mrad,
-/// ...). Deterministic. `problem`: whitened rows of design and pose rotations, and between them
-/// those of columns with known prior variances `added`. NotConverged where no start has a
-/// likelihood.
+/// Hyper-parameters of the largest marginal likelihood: quasi-Newton search from a few starting
+/// points within fixed bounds (s 1 nm to 1 mm, w 0.01 urad to 10 mrad, ...). Deterministic.
+/// `problem`: whitened rows of the design, of columns with the known prior variances `added`, and
+/// of pose rotations, in this order. NotConverged if no starting point has a likelihood.
 [[nodiscard]] Result<HyperParameters> most_likely(PriorKind, const ScaledDesign&,
                                                   std::size_t positions,
                                                   const LinearGaussian& problem,
                                                   std::span<const double> added = {});
-/// prior_variances() with those of added columns between design and rotations.
+/// prior_variances() with the variances of added columns inserted between design and rotations.
 [[nodiscard]] Eigen::VectorXd with_added(const Eigen::VectorXd& variances, std::size_t design_size,
                                          std::span<const double> added);
 

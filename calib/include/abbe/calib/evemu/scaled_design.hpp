@@ -1,9 +1,9 @@
 #pragma once
-/// The design everything numerical uses: the span of the equivalent model's columns in Legendre
-/// polynomials of u = (q - centre) / half width, arms in units of the largest half width. Every
-/// function is at most about 1 in the volume, so every coefficient is a length: the size of its
-/// contribution. Penalties and priors speak of these coefficients. A stylus offset does not change
-/// the span, so there is none here.
+/// The design used for all numerical work: the span of the equivalent model's columns in Legendre
+/// polynomials of u = (q - centre) / half width, with arms in units of the largest half width.
+/// Every function is at most about 1 in the volume, so every coefficient is a length: the size of
+/// its contribution. Penalties and priors refer to these coefficients. A stylus offset does not
+/// change the span and is therefore not a parameter here.
 
 #include <Eigen/Core>
 #include <array>
@@ -15,7 +15,7 @@
 
 namespace abbe::calib::evemu {
 
-/// The box of scale readings a design is scaled to.
+/// The box of scale readings to which a design is scaled.
 struct ReadingBox {
   Vector3 centre_m = Vector3::Zero();
   Vector3 half_width_m = Vector3::Ones();
@@ -25,12 +25,12 @@ struct ReadingBox {
 
 enum class FunctionKind { Constant, Translation, Rotation };
 
-/// sum over parts of sign * P_order(u_axis) [* arm of another axis] in one component.
+/// Sum over the parts of sign * P_order(u_axis) [* arm of another axis], each in one component.
 struct DesignFunction {
   struct Part {
     std::size_t component = 0;
     double sign = 1.0;
-    std::size_t arm = 3;  ///< axis; 3: none
+    std::size_t arm = 3;  ///< axis of the arm; 3: no arm
   };
   FunctionKind kind = FunctionKind::Constant;
   std::size_t axis = 0;
@@ -53,11 +53,11 @@ class ScaledDesign {
 
   [[nodiscard]] const EquivalentModel& equivalent() const { return equivalent_; }
   [[nodiscard]] const ReadingBox& box() const { return box_; }
-  /// The arms' unit: the largest half width.
+  /// Unit of the arms: the largest half width.
   [[nodiscard]] double arm_unit_m() const { return box_.half_width_m.maxCoeff(); }
   [[nodiscard]] std::size_t size() const { return functions_.size(); }
-  /// In the order of equivalent().names(): function j spans name j and, through lower orders,
-  /// others.
+  /// In the order of equivalent().names(): function j contributes to name j and, through its lower
+  /// orders, to other names.
   [[nodiscard]] std::span<const DesignFunction> functions() const { return functions_; }
 
   [[nodiscard]] Factors factors(const Vector3& reading_m) const;
@@ -69,7 +69,7 @@ class ScaledDesign {
   [[nodiscard]] Eigen::Matrix3Xd B(const Vector3& reading_m) const;
   /// beta = M (1000 c_m): the named coefficients in mm^(1-k), rad mm^-k.
   [[nodiscard]] Eigen::MatrixXd named_from_scaled() const;
-  /// size() x 3: what c a small rotation omega x (q - about) has.
+  /// size() x 3: maps omega to the c of the small rotation omega x (q - about).
   [[nodiscard]] Eigen::MatrixX3d rotation_about(const Vector3& about_m) const;
 
  private:

@@ -1,21 +1,30 @@
 #pragma once
-/// Stage two: errors of ball centres in, a model with uncertainty out.
-///   ols        least squares, plain; covariance for the noise balls share, s from the residuals.
-///   ridge      shrinks everything but the constants, amount by marginal likelihood.
-///   bayes-pose the default: priors by order, shared noise of Ball1 and random pose rotations, their sizes by
-///              marginal likelihood (prior.hpp); what the machine's errors do to spheres and blocks is in the
-///              design when their touches are there. So is slow noise (noise.hpp) in the covariance of the
-///              balls, where the data are e^2 times as likely with it.
-///   lasso, mcp, scad  as in [Li OMM]: plain monomials in mm, ncvreg's semantics, lambda and gamma by
-///              cross-validation; covariance by bootstrap (see CovarianceKind).
-/// Not estimable from touches: a rotation of V about Ball1 common to all positions (observe.hpp). It is set
-/// to what the blocks say (gauge Ball1-blocks), and its uncertainty is in the covariance. So are errors of
-/// the array that all positions share (artefact_rows.hpp): estimates are c = K y with the hyper-parameters
-/// fixed, which makes T (K A)(K A)^T T^T of them ([GUM] 5.1.2 eq. (10)), T: gauge; the bootstrap draws them
-/// once a run. The array is not estimated: c is the same whatever its uncertainty. What its errors leave in
-/// the residuals is in s and w as well and counts twice. Not in the covariance: that hyper-parameters are
-/// estimates (of nearly coplanar positions, a twentieth of the tilt of [Li OMM], the likelihood can take
-/// slopes of V for pose rotations), and that a machine is no polynomial.
+/// Stage two: from errors of ball centres to a model with uncertainty. Estimators:
+///   ols               ordinary least squares; covariance for the noise that the balls share, s
+///                     from the residuals
+///   ridge             shrinks all coefficients except the constants, amount by marginal likelihood
+///   bayes-pose        the default: priors by order, shared noise of Ball1 and random pose
+///                     rotations, their sizes by marginal likelihood (prior.hpp). With touches, the
+///                     effect of the machine's errors on spheres and blocks is in the design, and
+///                     slow noise (noise.hpp) is in the covariance of the balls if the data are e^2
+///                     times as likely with it
+///   lasso, mcp, scad  as in [Li OMM]: plain monomials in mm, semantics of ncvreg, lambda and gamma
+///                     by cross-validation; covariance by bootstrap (see CovarianceKind)
+///
+/// Not estimable from touches: a rotation of V about Ball1 common to all positions (observe.hpp).
+/// It is set to the direction of the blocks (gauge Ball1-blocks), and its uncertainty is in the
+/// covariance.
+///
+/// Errors of the array that all positions share (artefact_rows.hpp) are not estimated: c does not
+/// depend on their uncertainty. With the hyper-parameters fixed, estimates are linear, c = K y, and
+/// the array's errors add to the covariance ([GUM] 5.1.2 eq. (10); T: gauge)
+///     T (K A)(K A)^T T^T.
+/// The bootstrap draws them once per run. Their effect on the residuals also enlarges s and w and
+/// is therefore counted twice.
+///
+/// Not in the covariance: the uncertainty of the hyper-parameters (with nearly coplanar positions,
+/// a twentieth of the tilt of [Li OMM], the likelihood can attribute slopes of V to pose
+/// rotations), and errors of the machine that are not polynomials.
 
 #include <cstddef>
 #include <cstdint>
@@ -34,57 +43,56 @@ enum class Estimator { Ols, Ridge, BayesPose, Lasso, Mcp, Scad };
 [[nodiscard]] std::string_view name(Estimator);
 [[nodiscard]] std::optional<Estimator> estimator(std::string_view name);
 
-/// Bootstrap: seeded, parametric, by position: noise is drawn anew with the estimated s and w
-/// around the fitted model, lambda and gamma stay; no bias is in it, and penalised estimates have
-/// one.
+/// Bootstrap: seeded, parametric, by position. Each run draws noise with the estimated s and w
+/// around the fitted model; lambda and gamma stay fixed. The bias of penalised estimates is not
+/// included.
 enum class CovarianceKind { Analytic, Bootstrap };
 [[nodiscard]] std::string_view name(CovarianceKind);
 
-/// How rows are held out to choose lambda and gamma. Folds over single rows, as in [Li OMM], let a
-/// fit see the noise it is judged by: the components of a ball share their touches, the balls of a
-/// position share Ball1.
+/// How rows are held out to choose lambda and gamma. With folds over single rows, as in [Li OMM],
+/// the rows held out share noise with the fitted rows, and the held-out error is too small: the
+/// components of a ball share their touches, the balls of a position share Ball1.
 enum class FoldsBy { Position, Ball, Row };
 [[nodiscard]] std::string_view name(FoldsBy);
 [[nodiscard]] std::optional<FoldsBy> folds_by(std::string_view name);
 
 /// lambda and gamma, with the surface they were chosen from.
 struct SparseChoice {
-  std::vector<double> lambda;  ///< the path down to the chosen one, which is last [mm]
+  std::vector<double> lambda;  ///< the path down to the chosen lambda, which is the last [mm]
   double gamma = 3.7;
   std::vector<double> all_lambda, all_gamma;
-  Eigen::MatrixXd
-      error_mm2;  ///< mean squared held-out error, all_lambda x all_gamma; NaN: not reached
-  double curvature =
-      0.0;  ///< smallest eigenvalue of sparse::convexity at the choice; < 0: other minima
-            ///< may be near
+  /// Mean squared held-out error, all_lambda x all_gamma; NaN: not reached.
+  Eigen::MatrixXd error_mm2;
+  /// Smallest eigenvalue of sparse::convexity at the choice; < 0: other minima may be near.
+  double curvature = 0.0;
 };
 
 struct SparseOptions {
   FoldsBy folds = FoldsBy::Position;
-  std::optional<sparse::Folds>
-      given_folds{};  ///< set: these, for 3 rows of every observation in their order
-  /// Grid to choose from; empty: the one of [Li OMM], 100 lambdas 1e-1 .. 1e-10 mm, 50 gammas up to
-  /// 100.
+  /// If set, used instead of `folds`; for the 3 rows of every observation, in their order.
+  std::optional<sparse::Folds> given_folds{};
+  /// Grid to choose from; empty: the grid of [Li OMM], 100 lambdas 1e-1 .. 1e-10 mm, 50 gammas up
+  /// to 100.
   std::vector<double> lambda{}, gamma{};
   std::uint64_t seed = 1;                ///< of the bootstrap, and of folds over rows
-  int bootstrap_runs = 100;              ///< a standard deviation to 7 %; at least 2
-  std::optional<SparseChoice> chosen{};  ///< set: no search
-  /// Of the path to the chosen lambda, in the fit and in every refit: what ends before it is
-  /// NotConverged. The search has the 10,000 of ncvreg; with those, one of eight refits without a
-  /// position ended early.
+  int bootstrap_runs = 100;              ///< 100 give a standard deviation to 7 %; at least 2
+  std::optional<SparseChoice> chosen{};  ///< if set, used without a search
+  /// Sweep limit of the path to the chosen lambda, in the fit and in every refit; a path that ends
+  /// before that lambda is NotConverged. The search uses the 10,000 of ncvreg; with that limit one
+  /// of eight refits without a position ended early.
   long max_sweeps = 1'000'000;
 };
 
 struct SolveOptions {
   Estimator estimator = Estimator::BayesPose;
-  /// Ridge and bayes-pose, when there are touches: rows through the touched points. Off: through
-  /// the centres alone, as in [Li OMM] and as for all other estimators.
+  /// For ridge and bayes-pose, if there are touches. True: rows from the touched points. False:
+  /// rows from the ball centres alone, as in [Li OMM] and as for all other estimators.
   bool use_touches = true;
   SparseOptions sparse{};
 };
 
 struct ResidualFigures {
-  double mean_abs_m = 0.0;  ///< of the components
+  double mean_abs_m = 0.0;  ///< mean absolute component
   double rms_m = 0.0;
   double max_abs_m = 0.0;
 };
@@ -94,35 +102,34 @@ struct Statistics {
   std::size_t observations = 0;  ///< components, without those of Ball1, which are 0 by definition
   std::size_t unknowns = 0;
   std::size_t rank = 0;               ///< of the design with columns of unit length
-  double condition = 0.0;             ///< the same, within its rank
-  double effective_parameters = 0.0;  ///< degrees of freedom the coefficients spend; rank for ols
+  double condition = 0.0;             ///< condition number of the same matrix, within its rank
+  double effective_parameters = 0.0;  ///< degrees of freedom of the coefficients; rank for ols
   double degrees_of_freedom = 0.0;    ///< observations - those of coefficients and pose rotations
   double s_m = 0.0;                   ///< noise of a ball centre per coordinate
   double w_rad = 0.0;                 ///< random pose rotation per axis; 0 where not estimated
-  double slow_noise_m = 0.0;          ///< of slow noise per coordinate, beside s_m (noise.hpp)
-  double chi2_per_dof = 0.0;          ///< of whitened residuals over s; 0 without s
+  double slow_noise_m = 0.0;          ///< slow noise per coordinate, in addition to s_m (noise.hpp)
+  double chi2_per_dof = 0.0;          ///< chi-square of whitened residuals / s; 0 without s
   ResidualFigures before, after;
   int iterations = 0;
 };
 
-/// How a rotation reference went with the model.
+/// Fit of a rotation reference to the model.
 struct ReferenceFit {
-  std::size_t points = 0;  ///< used
-  std::vector<std::size_t>
-      outside;        ///< numbers, from 1, of points outside the balls' hull: not used
-  double chi2 = 0.0;  ///< of the residuals after turning and moving
+  std::size_t points = 0;            ///< number of points used
+  std::vector<std::size_t> outside;  ///< numbers, from 1, of points outside the hull: not used
+  double chi2 = 0.0;                 ///< of the residuals after rotation and translation
   double dof = 0.0;
-  double widened = 1.0;  ///< what the rotation's covariance was multiplied with for it
+  double widened = 1.0;  ///< factor on the rotation's covariance because of chi2
 };
 
-/// The rotation about Ball1 that no touch can see.
+/// The rotation about Ball1 that touches cannot detect.
 struct MeanRotation {
-  /// What the estimate had before it was set to the blocks' direction: with block touches, the
-  /// prior's choice; with errors only, the mean of the pose rotations found.
+  /// Rotation of the estimate before it was set to the direction of the blocks: with block touches,
+  /// as chosen by the prior; with errors only, the mean of the estimated pose rotations.
   Vector3 removed_rad = Vector3::Zero();
-  Matrix3 cov_rad2 = Matrix3::Zero();  ///< is in the model's covariance
-  bool referenced = false;             ///< known from elsewhere: the model is more than a shape
-  std::optional<ReferenceFit> reference{};  ///< of with_rotation_reference()
+  Matrix3 cov_rad2 = Matrix3::Zero();  ///< included in the model's covariance
+  bool referenced = false;             ///< known from another source: the model is not shape-only
+  std::optional<ReferenceFit> reference{};  ///< from with_rotation_reference()
 };
 
 struct Solution {
@@ -132,12 +139,12 @@ struct Solution {
   CovarianceKind covariance = CovarianceKind::Analytic;
   std::optional<HyperParameters> hyper;
   std::optional<SparseChoice> sparse;
-  /// Observed minus fitted, pose rotations taken out, in the order of the observations; Ball1:
-  /// zero.
+  /// Observed minus fitted, pose rotations removed, in the order of the observations; zero for
+  /// Ball1.
   std::vector<Vector3> residuals_m;
   std::vector<Vector3> pose_rotations_rad;  ///< estimated, by position; empty where not modelled
   MeanRotation rotation;
-  std::optional<ArtefactUncertainty> artefact;  ///< as observed; in the model's covariance
+  std::optional<ArtefactUncertainty> artefact;  ///< as observed; included in model's covariance
   /// Observations::slow_noise as given or, by bayes-pose from touches, as estimated.
   double slow_noise = 0.0;
   Statistics statistics;
@@ -146,26 +153,27 @@ struct Solution {
 /// The scaled design over the readings.
 [[nodiscard]] Result<ScaledDesign> design_of(const Observations&);
 
-/// Errors of sparse::grid_search for lasso, mcp and scad (folds that are not for these rows),
-/// RankDeficient for ols when the positions do not determine every combination, TooFewObservations,
-/// DegenerateGeometry when the balls enclose no volume.
+/// Errors: those of sparse::grid_search for lasso, mcp and scad (folds that do not match the rows);
+/// RankDeficient for ols if the positions do not determine every combination; TooFewObservations;
+/// DegenerateGeometry if the balls enclose no volume.
 [[nodiscard]] Result<Solution> solve(const Observations&, const SolveOptions& = {});
 
-/// V known independently at some readings, relative to each other in the machine's directions.
+/// V known independently at some readings in the machine's directions, up to a common translation.
 struct RotationReference {
-  std::span<const BallError>
-      points;             ///< position and ball do not count; >= 3 in the hull, not on a line
+  /// `position` and `ball` are ignored; >= 3 points in the hull, not on a line.
+  std::span<const BallError> points;
   double sigma_m = 1e-6;  ///< standard uncertainty of V, per component, independent
 };
-/// The same solution turned onto the reference, which may have its own origin. The rotation omega
-/// fits r = V_reference - V_model by generalised least squares, omega = K r, over the noise of the
-/// reference and what the model's shape may be off at its points (B C B^T). Both are then in the
-/// covariance:
+/// The solution rotated to agree with the reference, which may have its own origin. The rotation
+/// omega is fitted to r = V_reference - V_model by generalised least squares, omega = K r, with the
+/// noise of the reference and the uncertainty of the model's shape at its points (B C B^T). Both
+/// are then in the covariance:
 ///     C' = (1 - G K B) C (1 - G K B)^T + sigma^2 G K K^T G^T,    G: c of a rotation about Ball1.
-/// Points outside the balls' hull (by 2 % of its size) are left out and named. Residuals larger than a right
-/// reference has once in 1000 widen the rotation's covariance by chi-square per degree of freedom; beyond 4
-/// they are BadInput: another frame, sign or artefact. That test sees what the machine's errors have beside a
-/// rigid motion; any reference of a machine that has nothing else passes.
+/// Points outside the hull of the balls (by 2 % of its size) are not used, and their numbers are
+/// reported. If chi-square is larger than a correct reference has once in 1000, the rotation's
+/// covariance is multiplied by chi-square per degree of freedom; beyond 4 per degree of freedom the
+/// result is BadInput: another frame, sign or artefact. The test uses only errors of the machine
+/// other than a rigid motion; on a machine without such errors every reference passes.
 [[nodiscard]] Result<Solution> with_rotation_reference(Solution, const RotationReference&);
 
 }  // namespace abbe::calib::evemu

@@ -1,12 +1,13 @@
 #pragma once
-/// Which ball or block of the array is being touched, what comes next, and what went wrong.
-/// [Li OMM] section 3: at every position Ball1, Block1, Block2, then Ball2 to the last; the
-/// artefact turns about Ball1 between positions. Only the places of the touches decide, no clock
-/// and no command: a touch is told by where the features must be. Ball1 stands still; Ball1 and the
-/// two faces give the place of every other ball (the side the faces look to follows from the first
-/// balls finished, and is known at later positions). So a missed, doubled or wrong touch is
-/// noticed, said, and costs nothing that was acquired: what is missing is asked for again. Lengths
-/// in m, machine coordinates. Ordinary world; not thread-safe.
+/// Determines which ball or block of the array is being touched, what is to be touched next, and
+/// which touches are wrong. [Li OMM] section 3: at every position Ball1, Block1, Block2, then Ball2
+/// to the last; the artefact is turned about Ball1 between positions. Only the coordinates of the
+/// touches are used, no clock and no command: a touch is assigned to the feature that must be at
+/// its place. Ball1 stays in place. Ball1 and the two faces determine the place of every other ball
+/// (the side to which the faces point follows from the first completed balls and is known at later
+/// positions). A missed, repeated or wrong touch is therefore detected and reported, the touches
+/// acquired before are kept, and missing points are requested again. Lengths in m, machine
+/// coordinates. Not for the RT path; not thread-safe.
 
 #include <cstddef>
 #include <memory>
@@ -28,13 +29,13 @@ struct TouchPlan {
 
 struct GuideOptions {
   ObserveOptions observe{};  ///< fewest points, tolerances; `positions` comes from the plan
-  /// Two touches nearer than this are one place touched twice: repeatability is far below, points
-  /// far above.
+  /// Two touches nearer than this are the same place touched twice. The repeatability of a touch is
+  /// far below this distance, the distance between planned points far above.
   double same_place_m = 50e-6;
-  /// Off the sphere a ball is expected at: errors near 3 mm over the length of the array, and the
-  /// faces'.
+  /// Largest distance of a touch from the expected surface of its ball: machine errors near 3 mm
+  /// over the length of the array, and errors of the measured faces.
   double max_off_expected_m = 5e-3;
-  /// Touches on nothing known, one after the other, that end the guiding.
+  /// Number of successive touches on no known feature after which the guide fails.
   std::size_t most_astray = 20;
 };
 
@@ -47,40 +48,43 @@ struct TouchedFeature {
 
 struct NextTouch {
   int position = 0;
-  std::size_t place = 0;  ///< of the position in the plan, from 0
+  std::size_t place = 0;  ///< index of the position in the plan, from 0
   TouchedFeature on;
-  std::size_t touched = 0;  ///< points it has
-  std::size_t points = 0;   ///< points it is to have
+  std::size_t touched = 0;  ///< points taken on this feature
+  std::size_t points = 0;   ///< points planned on this feature
 };
 
-/// What became of a touch. Only Taken ones enter the result.
+/// How a touch was used. Only Taken touches enter the result. SamePlace: the place was touched
+/// before; Doubled: the feature has all its points; Astray: on no known feature, or not taken (the
+/// guide is complete or has failed, or the feature before was discarded).
 enum class TouchFate { Taken, SamePlace, Doubled, Astray };
 struct GuidedTouch {
   TouchFate fate = TouchFate::Taken;
-  std::vector<std::string> notes;  ///< one sentence each; none: as expected
+  std::vector<std::string> notes;  ///< one sentence each; empty: the touch was as expected
 };
 
 class Site;
 
 class TouchGuide {
  public:
-  /// Error of check(), BadInput for a plan that is none.
+  /// Errors of check(); BadInput for an invalid plan.
   [[nodiscard]] static Result<TouchGuide> create(Calibrator, TouchPlan, GuideOptions = {});
   TouchGuide(TouchGuide&&) noexcept;
   TouchGuide& operator=(TouchGuide&&) noexcept;
   ~TouchGuide();
 
-  /// The tip's centre at a touch. Once complete() or failed(), nothing is taken any more.
+  /// `p_m`: the tip's centre at a touch. Once complete() or after a failure(), no touch is taken.
   [[nodiscard]] GuidedTouch take(const Vector3& p_m);
 
   [[nodiscard]] bool complete() const { return place_ == plan().positions.size(); }
-  /// Why no calibration can come of it: the calibrator is another artefact's, or nobody follows.
+  /// Why calibration is impossible: the calibrator describes another artefact, or the touches do
+  /// not follow the plan. nullopt: no failure.
   [[nodiscard]] const std::optional<Error>& failure() const { return failure_; }
-  /// Not once complete().
+  /// Must not be called once complete().
   [[nodiscard]] NextTouch next() const;
   [[nodiscard]] std::size_t taken() const;
   [[nodiscard]] std::size_t planned() const;
-  /// Of finished positions and the present one.
+  /// Of the finished positions and the current one.
   [[nodiscard]] std::vector<Touch> touches() const;
   [[nodiscard]] const TouchPlan& plan() const;
 
@@ -98,24 +102,24 @@ class TouchGuide {
   void astray(const Vector3& p_m, GuidedTouch& out);
   void on_complete_feature(std::size_t feature, const Vector3& p_m, GuidedTouch& out);
   void put(std::size_t feature, const Vector3& p_m, GuidedTouch& out);
-  [[nodiscard]] bool pass_over_until(std::size_t feature, GuidedTouch& out);
+  [[nodiscard]] bool skip_to(std::size_t feature, GuidedTouch& out);
   [[nodiscard]] bool accept_feature(std::size_t feature, GuidedTouch& out);
   void accept_ball(std::size_t feature, GuidedTouch& out);
-  void go_on_from(std::size_t feature, GuidedTouch& out);
+  void expect_next_after(std::size_t feature, GuidedTouch& out);
   void end_position(GuidedTouch& out);
-  void set_feature_aside(std::size_t feature, const std::string& why, GuidedTouch& out);
-  void set_position_aside(const std::string& why, GuidedTouch& out);
+  void discard_feature(std::size_t feature, const std::string& why, GuidedTouch& out);
+  void discard_position(const std::string& why, GuidedTouch& out);
   void fail(ErrorCode code, std::string text);
 
-  std::unique_ptr<const Setup> setup_;  // stays where it is when the guide is moved
+  std::unique_ptr<const Setup> setup_;  // its address does not change when the guide is moved
   std::unique_ptr<Site> site_;
   std::size_t place_ = 0;
-  std::size_t feature_ = 0;   ///< expected, by measuring order
-  std::vector<bool> passed_;  ///< somebody went on although points were missing
+  std::size_t feature_ = 0;   ///< index of the expected feature, in measuring order
+  std::vector<bool> passed_;  ///< by feature: later features were touched before it had all points
   std::vector<Touch> finished_;
-  std::vector<Matrix3> seen_;  ///< directions of the finished positions
+  std::vector<Matrix3> seen_;  ///< orientations of the artefact at the finished positions
   std::size_t astray_in_a_row_ = 0;
-  std::size_t set_aside_in_a_row_ = 0;  ///< whole features or positions
+  std::size_t discarded_in_a_row_ = 0;  ///< whole features or positions
   std::optional<Error> failure_;
 };
 

@@ -14,14 +14,14 @@ struct Plane {
   Vector3 point = Vector3::Zero();  ///< centroid
   Vector3 normal = Vector3::UnitZ();
   Matrix3 cov_normal =
-      Matrix3::Zero();    ///< rank 2: nothing along the normal itself; zero for 3 points
-  double u_offset = 0.0;  ///< standard uncertainty of the plane's place along its normal
+      Matrix3::Zero();    ///< rank 2: zero along the normal itself; all zero for 3 points
+  double u_offset = 0.0;  ///< standard uncertainty of the plane's position along its normal
   ResidualStatistics residuals;
 };
 
 /// The normal points to the side of `towards`. NotFinite; TooFewObservations below 3 different
-/// points; DegenerateGeometry on a line, or if `towards` lies in the plane and cannot tell the
-/// sides apart. `known_sigma` as for spheres.
+/// points; DegenerateGeometry if the points lie on a line, or if `towards` lies in the plane and
+/// does not determine the side. `known_sigma` as for fit_sphere().
 [[nodiscard]] Result<Plane> fit_plane(std::span<const Vector3> points, const Vector3& towards,
                                       std::optional<double> known_sigma = {});
 

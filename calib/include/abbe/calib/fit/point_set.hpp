@@ -1,6 +1,6 @@
 #pragma once
-/// What every fit checks first, relative to the size of the point set: that points are finite and
-/// different, and do not lie on a line or in a plane when the surface needs more.
+/// The checks before every fit, relative to the size of the point set: the points are finite and
+/// different, and do not lie on a line, or in a plane, if the surface requires that.
 
 #include <Eigen/Core>
 #include <span>
@@ -11,14 +11,14 @@ namespace abbe::calib::fit {
 
 struct PointSet {
   Vector3 centroid = Vector3::Zero();
-  Eigen::Matrix3Xd centred;  ///< one column per point; centring first keeps far points exact
+  Eigen::Matrix3Xd centred;  ///< one column per point, relative to the centroid
   /// principal directions, columns, longest extent first
   Matrix3 directions = Matrix3::Identity();
   Vector3 singular_values = Vector3::Zero();  ///< descending
   double size = 0.0;                          ///< largest distance from the centroid
   std::size_t distinct = 0;
 
-  /// The second, or third, extent is below this fraction of the first.
+  /// Limit for on_a_line() and in_a_plane(): second or third singular value divided by the first.
   static constexpr double kDegenerate = 1e-9;
   [[nodiscard]] bool on_a_line() const {
     return !(singular_values(1) > kDegenerate * singular_values(0));
@@ -28,8 +28,8 @@ struct PointSet {
   }
 };
 
-/// NotFinite; TooFewObservations with fewer than `needed` different points. `what` opens the error
-/// text.
+/// NotFinite; TooFewObservations with fewer than `needed` different points. The error text begins
+/// with `what`.
 [[nodiscard]] Result<PointSet> point_set(std::span<const Vector3> points, std::size_t needed,
                                          const char* what);
 

@@ -1,5 +1,5 @@
 #pragma once
-/// How well points lie on a fitted surface. Any unit of length: the one of the points.
+/// Residuals of points to a fitted surface. The unit of length is that of the points.
 
 #include <cstddef>
 
@@ -12,11 +12,11 @@ struct ResidualStatistics {
   std::size_t degrees_of_freedom = 0;
   double rms = 0.0;     ///< sqrt(sum r^2 / points)
   double sigma0 = 0.0;  ///< sqrt(sum r^2 / degrees of freedom); 0 without redundancy
-  double min = 0.0;     ///< signed: negative lies inside, or behind the normal
+  double min = 0.0;     ///< signed: a negative residual lies inside, or behind the normal
   double max = 0.0;
 };
 
-/// Of signed residuals r; `unknowns` were fitted to them.
+/// Statistics of the signed residuals r of a fit with `unknowns` unknowns.
 [[nodiscard]] ResidualStatistics residual_statistics(const Eigen::VectorXd& r,
                                                      std::size_t unknowns);
 

@@ -16,14 +16,15 @@ struct Sphere {
   /// of centre x y z and radius; zero for 4 points
   Eigen::Matrix4d covariance = Eigen::Matrix4d::Zero();
   ResidualStatistics residuals;
-  /// of the Jacobian in units of the radius: the flatter the cap, the larger
+  /// condition number of the Jacobian in units of the radius: the flatter the cap, the larger
   double condition = 0.0;
   int iterations = 0;
 };
 
 /// NotFinite; TooFewObservations below 4 different points; DegenerateGeometry if they lie in a
-/// plane (or so flat a cap that rounding decides); NotConverged if no sphere comes out of it.
-/// `known_sigma`: noise of a point along the normal, for the covariance instead of the residuals'.
+/// plane, or on a cap so flat that rounding decides the result; NotConverged if the iteration does
+/// not converge to a sphere. `known_sigma`: standard deviation of a point along the normal, used
+/// for the covariance instead of that of the residuals.
 [[nodiscard]] Result<Sphere> fit_sphere(std::span<const Vector3> points,
                                         std::optional<double> known_sigma = {});
 

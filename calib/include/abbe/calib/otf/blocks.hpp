@@ -1,7 +1,7 @@
 #pragma once
-/// Means of consecutive tracker samples. A mean is the mean of the machine's path over the block,
-/// not the path at the mean: whatever a block is compared with has to be averaged over the same
-/// sub-points.
+/// Blocks: means of consecutive tracker samples. A block mean is the average of the machine's path
+/// over the block, not the point of the path at mid-time. A quantity that is compared with a block
+/// must therefore be averaged over the sub-points of the block.
 
 #include <span>
 #include <vector>
@@ -12,35 +12,39 @@ namespace abbe::calib::otf {
 
 struct Block {
   Vector3 mean_tracker_m = Vector3::Zero();
-  /// valid samples in the mean; 0: the beam was lost, the block only keeps time
+  /// Number of valid samples in the mean. 0: the beam was lost; the block only marks the time.
   std::size_t samples = 0;
-  bool usable = false;  ///< at least half of the samples are there: fit for the adjustment
-  /// into BlockSeries::sub_points_tracker_m, Options::row_points of them
+  bool usable = false;  ///< at least half of the samples are valid: used in the adjustment
+  /// Index of the first sub-point in BlockSeries::sub_points_tracker_m. A usable block has
+  /// Options::row_points of them.
   std::size_t first_sub_point = 0;
 };
 
-/// Blocks in the order of time, equally long.
+/// Blocks of equal duration, in the order of time.
 struct BlockSeries {
   std::vector<Block> blocks;
-  std::vector<Vector3> sub_points_tracker_m;  ///< evenly spread valid samples of every usable block
-  std::size_t sub_points = 0;                 ///< per block
+  std::vector<Vector3> sub_points_tracker_m;  ///< of every usable block, evenly spaced
+  std::size_t sub_points = 0;                 ///< number of sub-points per block
   Vector3 start_tracker_m = Vector3::Zero();  ///< mean of the standstill at the first vertex
-  Vector3 end_tracker_m = Vector3::Zero();
+  Vector3 end_tracker_m = Vector3::Zero();    ///< the same at the last vertex
   std::size_t samples = 0;
-  std::size_t lost_samples = 0;  ///< invalid or missing in time
+  std::size_t lost_samples = 0;  ///< invalid samples, and samples missing in the time series
 };
 
-/// Samples to a block so that the target travels 8.3 mm in it: fine against nodes 50 mm apart, and
-/// the length at which [Sanders 2023] was re-evaluated (100 samples at 500 Hz and 2500 mm/min). 10
-/// to 1000. The travel is taken over chords of 50 samples, so that noise does not count as way, and
-/// from their upper quartile, which standstill and ramps do not reach.
+/// Number of samples per block, 10 to 1000, for which the target travels 8.3 mm in a block. This
+/// length is small compared with nodes 50 mm apart; it is also the length used to re-evaluate
+/// [Sanders 2023] (100 samples at 500 Hz and 2500 mm/min). The travel per sample is computed from
+/// chords over 50 samples, so that noise does not add to it. The upper quartile of the chords is
+/// used, so that standstill and acceleration ramps have no influence.
 [[nodiscard]] std::size_t suitable_block_samples(std::span<const TrackerObservation>);
 
-/// NotFinite for NaN in a valid sample (says which), BadInput for time that does not ascend,
-/// TooFewObservations below four blocks or without standstill samples.
+/// NotFinite if a valid sample contains NaN (the text names the sample). BadInput if time does not
+/// ascend, has a gap of more than one hour, or an option is 0. TooFewObservations for fewer than
+/// four blocks or too few standstill samples.
 [[nodiscard]] Result<BlockSeries> make_blocks(std::span<const TrackerObservation>, const Options&);
 
-/// From means alone (a reduced recording): sub-points are spread along the direction of travel.
+/// Blocks from block means only (a reduced recording). The sub-points are spaced along the
+/// direction of travel.
 [[nodiscard]] Result<BlockSeries> blocks_from_means(std::span<const Vector3> means_tracker_m,
                                                     const Vector3& start_tracker_m,
                                                     const Vector3& end_tracker_m, const Options&);

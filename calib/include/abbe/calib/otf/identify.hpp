@@ -1,6 +1,6 @@
 #pragma once
-/// observe and solve in a row; judge asks for the active model and the limits and follows by
-/// itself.
+/// observe() followed by solve(). judge() is separate because it needs the active model and the
+/// limits.
 
 #include "abbe/calib/otf/judge.hpp"
 
@@ -10,7 +10,7 @@ struct Identification {
   Observations observations;
   Solution solution;
 };
-/// Pure and deterministic: the same input gives the same bits.
+/// Pure and deterministic: the same input gives bit-identical results.
 [[nodiscard]] Result<Identification> identify(std::span<const TrackerObservation>, const Machine&,
                                               const Path&, const Noise&, const Options& = {});
 

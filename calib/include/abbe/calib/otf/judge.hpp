@@ -1,11 +1,15 @@
 #pragma once
-/// Stage three: how well the method predicts observations it was not fitted to, against no
-/// compensation and against the active model. Legs are dealt into folds (leg i into fold i mod k:
-/// neighbours in time part, every fold spreads over the volume); the model for a fold is fitted to
-/// the other folds. The alignment took a rigid motion out of y that depends on the machine's
-/// errors, and no model contains it. Every contender therefore gets its own best-fit rigid motion
-/// on each held-out fold, the same six numbers of freedom from the same rows, and is compared by
-/// what remains. That makes the comparison independent of gauges, too.
+/// Stage three: cross-validation. Compares how well the candidate predicts observations to which it
+/// was not fitted with no compensation and with the active model.
+///
+/// Leg i belongs to fold i mod k, so that neighbours in time are in different folds and every fold
+/// covers the whole volume. The model for a fold is fitted to the other folds.
+///
+/// The alignment removes from y a rigid motion that depends on the errors of the machine; no model
+/// contains this motion. Therefore, on each held-out fold, the best-fit rigid motion (six
+/// parameters, same rows) is removed from the residuals of no compensation, candidate and active
+/// model separately, and the remaining residuals are compared. This also makes the comparison
+/// independent of the gauges.
 
 #include "abbe/calib/gate.hpp"
 #include "abbe/calib/otf/lack_of_fit.hpp"
@@ -13,17 +17,16 @@
 
 namespace abbe::calib::otf {
 
-/// `active` may be null; it is compared on the rows inside its volume, and left out if it does not
-/// hold for this run's target offset.
-/// A leg that alone touches a node of the tables is never held out: without it the node is
-/// anything. Such observations are counted. RankDeficient if no fold can be left out,
-/// TooFewObservations with fewer legs than folds.
+/// `active` may be null. It is compared on the rows inside its validity volume, and not at all if
+/// it is not valid for the target offset of this run. If a node of the tables has observations from
+/// one leg only, this leg is never held out, because without it the node is not determined; its
+/// observations are counted in `not_held_out`. RankDeficient if no fold can be held out.
+/// TooFewObservations if there are fewer legs than folds.
 [[nodiscard]] Result<HeldOutFigures> held_out(const Observations&, const VolumetricModel* active,
                                               const Options& = {});
 
-/// held_out(), the limits of the gate, and what the residuals show: an alternative that moves the
-/// model by more than its uncertainty refuses it, and so does an uncertainty of half the correction
-/// and more.
+/// Runs held_out(), decide() and alternatives(). The model is also refused if an alternative
+/// changes it by more than its uncertainty, or if the uncertainty is more than half the correction.
 [[nodiscard]] Result<Verdict> judge(const Observations&, const Solution&,
                                     const VolumetricModel* active, const GateLimits& = {},
                                     const Options& = {});

@@ -1,7 +1,8 @@
 #pragma once
-/// Stage one: tracker points and path in, weighted linear observations of the machine's errors out.
-/// Each used block gives two rows, along a2 and a3 of its path frame; the direction of travel
-/// carries no information without synchronised clocks (weight 0 in [Sanders 2023] eq. (4)).
+/// Stage one: computes weighted linear observations of the machine's errors from tracker points and
+/// path. Each used block gives two rows, along a2 and a3 of its path frame. The component along the
+/// direction of travel is not used: without synchronised clocks it carries no information (weight 0
+/// in [Sanders 2023] eq. (4)).
 
 #include <Eigen/Core>
 #include <array>
@@ -35,12 +36,12 @@ class SparseRows {
 struct Observation {
   double y_m = 0.0;      ///< measured minus nominal position along `direction`
   double sigma_m = 1.0;  ///< standard uncertainty of y
-  double weight = 1.0;   ///< 1/m^2; 1/sigma^2 unless somebody weights otherwise
+  double weight = 1.0;   ///< in 1/m^2; 1/sigma^2 unless the caller sets another weight
   std::size_t leg = 0;
   std::size_t block = 0;
   Vector3 direction = Vector3::UnitX();       ///< a2 or a3, machine coordinates
   Vector3 axis_position_m = Vector3::Zero();  ///< closest nominal axis position
-  std::size_t first_sub_point = 0;            ///< into Observations::sub_points_m
+  std::size_t first_sub_point = 0;            ///< index in Observations::sub_points_m
   std::size_t sub_points = 0;
 };
 
@@ -49,43 +50,45 @@ struct Observations {
   Vector3 target_offset_m = Vector3::Zero();
   SparseRows A{};  ///< fit_size() columns, rigid unknowns last
   std::vector<Observation> rows{};
-  std::vector<Vector3> sub_points_m{};  ///< nominal axis positions a row is averaged over
+  std::vector<Vector3> sub_points_m{};  ///< nominal axis positions; rows are averaged over them
   Alignment alignment{};
-  std::vector<Vector3> vertices_m{};     ///< of the path, axis positions
+  std::vector<Vector3> vertices_m{};     ///< vertices of the path, axis positions
   double u_scale = 0.0;                  ///< see Noise
   std::array<double, 3> u_axis_scale{};  ///< see Noise
   double u_range_offset_m = 0.0;         ///< see Noise
-  std::vector<Vector3> covered_m{};      ///< axis positions whose hull the used blocks cover
+  std::vector<Vector3> covered_m{};      ///< axis positions; their hull is the validity volume
   std::size_t samples = 0;
   std::size_t lost_samples = 0;
   std::size_t blocks = 0;
   std::size_t blocks_used = 0;
 };
 
-/// Rows of one measured point (or block mean) along a2 and a3: W P M B and W P V of [Sanders 2023]
-/// eq. (6), before weighting. `sub_points_m` are the nominal axis positions over which the design
-/// is averaged. Appends two rows.
+/// One measured point (or block mean) relative to the path.
 struct PointOnPath {
   std::size_t leg = 0;
   std::size_t block = 0;
   Vector3 deviation_m = Vector3::Zero();      ///< measured minus closest nominal point
   Vector3 axis_position_m = Vector3::Zero();  ///< closest nominal
   PathFrame frame;
-  double samples = 1.0;  ///< in the mean
+  double samples = 1.0;  ///< number of samples in the mean
 };
+/// Appends the two rows of a point along a2 and a3: P M B and P V of [Sanders 2023] eq. (6), before
+/// weighting with W. `sub_points_m` are the nominal axis positions over which the design matrix is
+/// averaged.
 void append_rows(Observations&, const PointOnPath&, std::span<const Vector3> sub_points_m);
 
-/// What an offset of all ranges moves a row by, per m of offset.
+/// Derivative of y of a row with respect to a common offset of all ranges.
 [[nodiscard]] double drow_drange_offset(const Observations&, const Observation& row);
-/// The same observations, as ranges less this offset give them.
+/// The observations that result if this offset is subtracted from all ranges.
 [[nodiscard]] Observations without_range_offset(Observations, double range_offset_m);
 
-/// The same observations for other tables: another order of the axes, other nodes.
+/// The same observations with the design matrix of another layout: another order of the axes, other
+/// nodes.
 [[nodiscard]] Observations with_layout(const Observations&, ParameterLayout);
 
 [[nodiscard]] Result<Observations> observe(std::span<const TrackerObservation>, const Machine&,
                                            const Path&, const Noise&, const Options& = {});
-/// The same from blocks that were averaged elsewhere.
+/// The same, from blocks that are already averaged.
 [[nodiscard]] Result<Observations> observe_blocks(const BlockSeries&, const Machine&, const Path&,
                                                   const Noise&, const Options& = {});
 

@@ -1,9 +1,11 @@
 #pragma once
-/// A path file in which the signs of two axes are reversed is the right one, turned by 180 degrees
-/// about the third; one with two columns exchanged and a sign reversed is turned by 90 degrees. The
-/// alignment takes the turn for a turn of the tracker: the residuals are those of the right path,
-/// and the errors come out at the wrong places. Something besides the ranges and the path decides:
-/// scales that were read along the path, a levelled tracker, or the place where the tracker stands.
+/// Check of the orientation of the path. If the signs of two axes are reversed in the path file,
+/// the path is the correct one rotated by 180 degrees about the third axis. If two columns are
+/// exchanged and one sign is reversed, it is rotated by 90 degrees. The alignment compensates this
+/// rotation with a rotation of the tracker. The residuals then are the same as with the correct
+/// path, but the identified errors belong to the wrong positions. Only further evidence shows this
+/// mistake: scale readings along the path, a levelled tracker, or the known position of the
+/// tracker.
 
 #include <optional>
 #include <string_view>
@@ -14,17 +16,17 @@
 
 namespace abbe::calib::otf {
 
-/// The name under which a configuration lets a model pass without evidence of the path's
-/// orientation.
+/// Entry in the configuration that permits a model without evidence of the orientation of the path.
 inline constexpr std::string_view kPathOrientation = "path-orientation";
 
-/// Rotations that map axes to axes, other than the identity, after which the path stays within the
-/// travel (to 1 mm). None: the travel shows such an error of the file. Half turns about X, Y, Z
-/// come first.
+/// Rotations by multiples of 90 degrees about the axes, without the identity, after which the whole
+/// path is still within the travel (tolerance 1 mm). If the result is empty, the travel alone
+/// excludes a wrong orientation. Rotations by 180 degrees about X, Y, Z come first.
 [[nodiscard]] std::vector<Matrix3> possible_turns(const Path&, const MachineNodes&);
 
-/// What the evidence of `options` contradicts, as reasons that refuse the model, and which possible
-/// turns it leaves open: that refuses the model, too, unless accepted by name (then it is a note).
+/// Compares the orientation of the path with the evidence. Adds a reason to the verdict if the
+/// evidence contradicts the orientation. Also adds a reason if the evidence does not exclude all of
+/// possible_turns(); this becomes a note if OrientationEvidence::accepted is set.
 void require_orientation(Verdict&, const Path&, const MachineNodes&, const Vector3& target_offset_m,
                          const RigidTransform& T_machine_tracker, const OrientationEvidence&);
 

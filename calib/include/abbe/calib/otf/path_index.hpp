@@ -1,7 +1,7 @@
 #pragma once
-/// Which legs of a path are near a point, without a look at all of them: boxes around runs of
-/// consecutive legs, in a binary tree. The same answers as nearest_on_leg() of every leg gives, to
-/// the last bit. Pure.
+/// Search index for the legs of a path near a point: a binary tree of bounding boxes around groups
+/// of consecutive legs. The results are bit-identical to a search with nearest_on_leg() over all
+/// legs. Pure.
 
 #include <cstddef>
 #include <optional>
@@ -17,10 +17,10 @@ class PathIndex {
   explicit PathIndex(Path path);
 
   [[nodiscard]] const Path& path() const noexcept { return path_; }
-  /// The first leg at or behind `from` that `p_m` is at most `within_m` away from.
+  /// The first leg with index >= `from` whose distance to `p_m` is at most `within_m`.
   [[nodiscard]] std::optional<std::size_t> first_within(const Vector3& p_m, double within_m,
                                                         std::size_t from = 0) const;
-  /// To the nearest leg; infinite for less than two vertices.
+  /// Distance to the nearest leg; infinite for fewer than two vertices.
   [[nodiscard]] double distance_m(const Vector3& p_m) const;
 
  private:
@@ -33,9 +33,9 @@ class PathIndex {
   [[nodiscard]] std::size_t legs() const noexcept;
 
   Path path_;
-  std::size_t leaves_ = 0;  ///< a power of two; leaf i holds the legs from i * kLegsInLeaf on
-  std::vector<Box>
-      boxes_;  ///< a heap: node k has the children 2 k and 2 k + 1, leaf i is node leaves_ + i
+  std::size_t leaves_ = 0;  ///< a power of two; leaf i contains the legs from i * kLegsInLeaf on
+  /// Binary tree in an array: node k has the children 2 k and 2 k + 1, leaf i is node leaves_ + i.
+  std::vector<Box> boxes_;
 };
 
 }  // namespace abbe::calib::otf

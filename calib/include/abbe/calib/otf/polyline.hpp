@@ -1,6 +1,6 @@
 #pragma once
-/// The path of a run as geometry: lengths, nearest points, and whether a run along it can be
-/// identified at all. Pure.
+/// Geometry of the path of a run: lengths, nearest points, and a check that a run along this path
+/// can be identified. Pure.
 
 #include <span>
 #include <vector>
@@ -10,29 +10,29 @@
 
 namespace abbe::calib::otf {
 
-/// Closest point to `p_m` on the line of the leg from `from_m` to `to_m`, not clamped to its ends.
-/// The leg has a length.
+/// Closest point to `p_m` on the infinite line through the leg from `from_m` to `to_m`. The length
+/// of the leg must not be 0.
 struct LegPoint {
   Vector3 closest_m = Vector3::Zero();
-  double along_m = 0.0;  ///< from the beginning of the leg
+  double along_m = 0.0;  ///< distance from the beginning of the leg
 };
 [[nodiscard]] LegPoint closest_on_leg(const Vector3& from_m, const Vector3& to_m,
                                       const Vector3& p_m);
 
-/// Where `p_m` is seen from the leg itself, ends included; a leg may be a point.
+/// Position of `p_m` relative to the leg between its two ends. The length of the leg may be 0.
 struct OnLeg {
   double off_m = 0.0;    ///< distance to the nearest point of the leg
-  double along_m = 0.0;  ///< of that point, from the beginning of the leg
+  double along_m = 0.0;  ///< distance of that point from the beginning of the leg
 };
 [[nodiscard]] OnLeg nearest_on_leg(const Vector3& from_m, const Vector3& to_m, const Vector3& p_m);
 
-/// To the nearest leg; infinite for less than two vertices.
+/// Distance to the nearest leg; infinite for fewer than two vertices.
 [[nodiscard]] double distance_to_path_m(const Path&, const Vector3& p_m);
 
-/// Length of the path up to each vertex: 0 first, the length of the whole path last.
+/// Length of the path up to each vertex. The first value is 0, the last is the length of the path.
 [[nodiscard]] std::vector<double> lengths_to_vertices_m(const Path&);
 
-/// Weighted by length: a mean over time would be drawn to where the machine dwells and to slow
+/// Centroid weighted by length. A mean over time would give too much weight to standstills and slow
 /// corners.
 struct Centroid {
   Vector3 centre_m = Vector3::Zero();  ///< not finite for a length of 0
@@ -40,12 +40,12 @@ struct Centroid {
 };
 [[nodiscard]] Centroid centroid(std::span<const Vector3> polyline_m);
 
-/// What any run along this path needs. BadInput: fewer than three vertices, two in a row the same.
-/// NotFinite: a vertex is no number. DegenerateGeometry: start, end and centroid on a line, where
-/// the rough alignment stands on.
+/// Checks that a run along this path can be aligned. BadInput: fewer than three vertices, or two
+/// consecutive vertices coincide. NotFinite: a vertex contains NaN or infinity. DegenerateGeometry:
+/// start, end and centroid are on a line, so that the rough alignment is not determined.
 [[nodiscard]] Result<void> check(const Path&);
-/// The same, and BadInput for a vertex outside the travel of the axes. To be asked before the
-/// machine drives.
+/// The same, and BadInput for a vertex outside the travel of the axes. Call this before the machine
+/// moves.
 [[nodiscard]] Result<void> check(const Path&, const MachineNodes& travel);
 
 }  // namespace abbe::calib::otf

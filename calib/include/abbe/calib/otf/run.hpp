@@ -1,9 +1,9 @@
 #pragma once
-/// What a run of on-the-fly calibration with a laser tracker ([Sanders 2023]) is made of: the
-/// machine, the path it drove, the tracker's points, how noisy they are, and the choices of the
-/// evaluation. All SI. Noise model: white, Gaussian, independent between samples; sigma_range along
+/// Input of a run of on-the-fly calibration with a laser tracker ([Sanders 2023]): the machine, the
+/// path it drives, the tracker's points and their noise, and the options of the evaluation. All
+/// values in SI units. Noise model: white, Gaussian, independent between samples; sigma_range along
 /// the beam, sigma_angle * range in both directions across it. Correlated noise (turbulence) is
-/// seen in the residuals and widens the stated uncertainties.
+/// detected in the residuals and increases the stated uncertainties.
 
 #include <array>
 #include <cstddef>
@@ -22,20 +22,21 @@ namespace abbe::calib::otf {
 struct Machine {
   KinematicChain chain;
   MachineNodes nodes;  ///< axis ranges, nodes, references
-  /// tool reference point to reflector centre, at this run
+  /// vector from the tool reference point to the reflector centre in this run
   Vector3 target_offset_m = Vector3::Zero();
 };
 
-/// Vertices of the polyline, axis positions (scale readings) in m, exact stop at each. Start, end
-/// and centroid must not be on a line (the rough alignment stands on them), no leg shorter than
-/// twice the corner exclusion is used.
+/// Polyline of the path; a vertex is an axis position (scale readings) in m with an exact stop.
+/// Start, end and centroid must not be on a line: they determine the rough alignment. A leg shorter
+/// than twice the corner exclusion is not used.
 struct Path {
   std::vector<Vector3> vertices_m;
 };
 
-/// One tick of the tracker. A lost tick may be an entry with valid = false or a hole in time_s.
+/// One sample of the tracker. A lost sample is either an entry with valid = false or a gap in
+/// time_s.
 struct TrackerObservation {
-  double time_s = 0.0;  ///< tracker clock, strictly ascending; only its order and holes matter here
+  double time_s = 0.0;  ///< tracker clock, strictly ascending; only order and gaps are used
   Vector3 p_tracker_m = Vector3::Zero();  ///< reflector centre, tracker frame; ignored if !valid
   bool valid = true;
 };
@@ -43,76 +44,76 @@ struct TrackerObservation {
 struct Noise {
   double sigma_range_m = 2e-6;    ///< along the beam, one sample
   double sigma_angle_rad = 3e-6;  ///< across the beam, both directions, one sample
-  /// Relative standard uncertainty all ranges of the run have in common (index of the air). No
-  /// residual shows it: it is a growth of the whole machine.
+  /// Relative standard uncertainty common to all ranges of the run (refractive index of the air).
+  /// Residuals do not show such an error: its effect is a scale error of the whole machine.
   double u_scale = 0.0;
-  /// Relative standard uncertainty of the length of the scales of X, Y, Z (their temperature and
-  /// expansion), in common for all readings of an axis. No residual shows it either: it is a
-  /// positioning error.
+  /// Relative standard uncertainty of the length of the scales of X, Y, Z (temperature and thermal
+  /// expansion), common to all readings of an axis. Residuals do not show such an error either: its
+  /// effect is a positioning error.
   std::array<double, 3> u_axis_scale{};
-  /// Standard uncertainty of the offset that all ranges have in common (home position, reflector).
-  /// Positive: the adjustment estimates the offset, with this prior. 0: the ranges have none.
+  /// Standard uncertainty of the offset common to all ranges (home position, reflector). If
+  /// positive, the adjustment estimates the offset with this prior. 0: the offset is not estimated.
   double u_range_offset_m = 0.0;
 };
 
-/// What besides ranges and path decides how the path lies in the machine; see orientation.hpp.
+/// Evidence of the orientation of the path in the machine; see orientation.hpp.
 struct OrientationEvidence {
-  bool scales_agree = false;  ///< they were read along the path and agreed with it
-  std::optional<Vector3>
-      up{};  ///< unit vector, machine axes: where the z axis of a levelled tracker points
-  std::optional<Vector3> tracker_m{};  ///< its place, machine coordinates, to 0.5 m
-  bool accepted = false;               ///< without evidence, by name
+  bool scales_agree = false;  ///< scale readings exist along the path and agree with it
+  /// Direction of the z axis of a levelled tracker: unit vector in machine coordinates.
+  std::optional<Vector3> up{};
+  std::optional<Vector3> tracker_m{};  ///< tracker position, machine coordinates, within 0.5 m
+  bool accepted = false;  ///< the configuration accepts a path without evidence
 };
 
 enum class Stage { Observe, Align, Solve, Judge };
 [[nodiscard]] std::string_view name(Stage);
 /// Called in the calling thread with 0 <= fraction <= 1, ascending within a stage.
 using Progress = std::function<void(Stage, double fraction)>;
-/// Asked in the calling thread, between steps of a second at most where the model has some hundred
-/// unknowns. True ends the computation with NotConverged.
+/// Called in the calling thread between the steps of the computation. With a few hundred unknowns a
+/// step takes at most one second. If it returns true, the computation ends with NotConverged.
 using Stopped = std::function<bool()>;
 
 struct Options {
-  /// Samples per block mean. 100 samples are 0.2 s and 8.3 mm at 500 Hz and 2500 mm/min: fine
-  /// against 50 mm nodes.
+  /// Samples per block mean. 100 samples are 0.2 s and 8.3 mm at 500 Hz and 2500 mm/min: small
+  /// compared with nodes 50 mm apart.
   std::size_t block_samples = 100;
-  /// Points this close to the end of their leg are not used: mapping and dynamics are doubtful
-  /// there. 10 mm also exceeds half the travel of a block, so that no used block straddles a
-  /// corner.
+  /// Points closer than this to an end of their leg are not used: there the assignment to a leg is
+  /// uncertain and the machine accelerates. 10 mm also exceeds half the travel of a block, so that
+  /// no used block extends over a corner.
   double corner_m = 0.010;
-  /// Samples of standstill at both ends whose mean stands for the first and last vertex: 40 ms at
-  /// 500 Hz.
+  /// Number of standstill samples at each end of the run. Their means are the measured first and
+  /// last vertex. 20 samples are 40 ms at 500 Hz.
   std::size_t standstill_samples = 20;
-  /// Sub-points of a block over which design rows are averaged; 10 are indistinguishable from all.
+  /// Number of sub-points of a block over which design rows are averaged. With 10 the result does
+  /// not differ from that with all samples.
   std::size_t row_points = 10;
-  /// Fine alignment: at least, at most this many updates; stop when the rms falls relatively by
-  /// less than the tolerance.
+  /// Fine alignment: minimum and maximum number of updates. It stops when the relative decrease of
+  /// the rms is less than the tolerance.
   int min_alignment_updates = 7;
   int max_alignment_updates = 200;
   double alignment_tolerance = 1e-6;
-  /// Legs are assigned anew in the first iterations, then kept: the alignment settles to um, legs
-  /// are mm apart.
+  /// Number of updates in which blocks are assigned to legs. After them the assignment is kept: the
+  /// alignment then changes by um, while legs are mm apart.
   int leg_assignment_updates = 5;
-  /// Weight of the direction of travel in the leg assignment, in m: (0.02 m)^2 (1 - cos) beside the
-  /// squared distance.
+  /// Weight of the direction of travel in the leg assignment, in m: (0.02 m)^2 (1 - cos) is added
+  /// to the squared distance.
   double leg_direction_m = 0.02;
-  /// Alignment is refused if the rms distance to the path stays above the first, or one block or
-  /// one end of the path above the second: 1 mm is the largest error a machine passes the gate
-  /// with, and its rms is lower; the path of another run misses by centimetres, and so do the last
-  /// blocks of a truncated one.
+  /// Limits of the distance to the path after the alignment: rms of all blocks, and maximum of one
+  /// block or of one end of the path. AlignmentFailed above them. The gate accepts errors up to 1
+  /// mm, and their rms is lower. With the path of another run the distances are centimetres; so are
+  /// those of the last blocks of a truncated path.
   double max_alignment_rms_m = 1e-3;
   double max_alignment_distance_m = 3e-3;
-  /// Alignment is refused if measured and nominal length of the path differ by more than this
-  /// fraction.
+  /// AlignmentFailed if measured and nominal length of the path differ by more than this fraction.
   double max_length_mismatch = 0.05;
   /// Gauge weight relative to trace(H)/trace(K^T K). Any positive value gives the same solution
   /// (minimal constraints).
   double gauge_weight = 1.0;
-  /// Weighted observations for the held-out comparison are split by leg into this many parts.
+  /// Number of folds of the cross-validation; the observations are assigned to folds by leg.
   std::size_t held_out_folds = 5;
   OrientationEvidence orientation;
   Progress progress;  ///< may be empty
-  Stopped stopped;    ///< may be empty: never
+  Stopped stopped;    ///< may be empty: the computation is never stopped
 };
 
 }  // namespace abbe::calib::otf

@@ -1,16 +1,30 @@
 #pragma once
-/// Stage two: weighted observations in, parameters with covariance out. Minimises |W (A U -
-/// y)|^2 + mu |K U|^2 by normal equations ([Sanders 2023] eq. (7), whose pseudo-inverse gives the
-/// same fit in another gauge). Because the combinations K fixes cost nothing, K U = 0 holds exactly
-/// and mu does not matter (minimal constraints). Covariance: Cov = Q H Q, Q = (H + mu K^T K)^-1, if
-/// weights are 1/sigma^2, else Q (A^T W^2 C W^2 A) Q: [Sanders 2023] eq. (12), corrected for the
-/// rotation into machine coordinates (in sigma_m already) and for the alignment, which is estimated
-/// along; the diagonal holds variances. What all ranges are off by in common (Noise::u_scale) moves
-/// every row by s = direction . (place - tracker), and U by Q A^T W^2 s: u_scale^2 times the square
-/// of that is added, after the factor below. An offset d of all ranges with the prior N(0,
-/// u_range_offset^2) is one more unknown with the column C: with S = C^T W^2 C - C^T W^2 A Q A^T
-/// W^2 C, d = C^T W^2 r / (S + 1/u^2), and U moves by -Q A^T W^2 C d. Not estimable: see
-/// VolumetricModel. Rank and condition are those of the column-scaled data, without the gauge.
+/// Stage two: computes the parameters and their covariance from weighted observations. The
+/// adjustment minimises
+///     |W (A U - y)|^2 + mu |K U|^2
+/// with normal equations ([Sanders 2023] eq. (7); the pseudo-inverse used there gives the same fit
+/// in another gauge). The conditions K U = 0 do not change the residuals, so that they are met
+/// exactly and the solution does not depend on mu (minimal constraints).
+///
+/// Covariance, with H = A^T W^2 A and Q = (H + mu K^T K)^-1:
+///     Cov = Q H Q                      if the weights are 1/sigma^2
+///     Cov = Q (A^T W^2 C W^2 A) Q      for other weights, C the covariance of the observations
+/// This is [Sanders 2023] eq. (12) with two corrections: the rotation into machine coordinates is
+/// already part of sigma_m, and the alignment is estimated together with U. The diagonal contains
+/// variances.
+///
+/// A relative error common to all ranges (Noise::u_scale) shifts row i by s_i and U by dU:
+///     s_i = direction_i . (position_i - tracker),   dU = Q A^T W^2 s
+/// u_scale^2 dU dU^T is added to the covariance after the multiplication with
+/// Statistics::variance_factor.
+///
+/// An offset d of all ranges with the prior N(0, u^2), u = Noise::u_range_offset_m, is one more
+/// unknown with the column C (its derivative) and the residuals r:
+///     S = C^T W^2 C - C^T W^2 A Q A^T W^2 C,   d = C^T W^2 r / (S + 1/u^2)
+///     U changes by -Q A^T W^2 C d
+///
+/// VolumetricModel lists what is not estimable. Rank and condition refer to the column-scaled data,
+/// without the gauge.
 
 #include <Eigen/Core>
 #include <functional>
@@ -22,23 +36,24 @@
 
 namespace abbe::calib::otf {
 
-/// The joint estimator (alignment refined inside the adjustment) will be a further one.
+/// TwoStep: the alignment first, then the adjustment. A joint estimator (alignment as a part of the
+/// adjustment) is not implemented.
 enum class Estimator { TwoStep };
 [[nodiscard]] constexpr std::string_view name(Estimator) {
   return "two-step";
 }
 
-enum class StopReason { Direct };  ///< Direct: linear problem, solved at once
+enum class StopReason { Direct };  ///< Direct: linear problem, solved without iteration
 [[nodiscard]] constexpr std::string_view name(StopReason) {
   return "direct";
 }
 
-/// H = A^T W^2 A, g = A^T W^2 y over fit_size() unknowns; additive over observations. Summation in
-/// row order: the same input gives the same bits.
+/// H = A^T W^2 A and g = A^T W^2 y for fit_size() unknowns; additive over observations. The rows
+/// are summed in their order: the same input gives bit-identical results.
 struct NormalEquations {
   Eigen::MatrixXd H;  ///< lower triangle, the rest is zero
-  Eigen::MatrixXd
-      H_noise;  ///< A^T W^2 C W^2 A, lower triangle; equals H where weights are 1/sigma^2
+  /// A^T W^2 C W^2 A, lower triangle; equal to H if the weights are 1/sigma^2
+  Eigen::MatrixXd H_noise;
   Eigen::VectorXd g;
   std::size_t rows = 0;
 
@@ -46,21 +61,21 @@ struct NormalEquations {
   void add(std::span<const SparseRows::Entry> row, const Observation&);
   NormalEquations& operator+=(const NormalEquations&);
 };
-/// Of the rows for which `take` is true; of all if it is empty.
+/// Normal equations of the rows for which `take` returns true; of all rows if `take` is empty.
 [[nodiscard]] NormalEquations normal_equations(
     const Observations&, const std::function<bool(const Observation&)>& take = {});
 
 struct Adjustment {
   Eigen::VectorXd U;           ///< fit_size(), in gauge G1
   Eigen::MatrixXd covariance;  ///< fit_size() squared
-  Eigen::MatrixXd cofactor_Q;  ///< Q: what a change of g does to U
+  Eigen::MatrixXd cofactor_Q;  ///< cofactor matrix Q = dU/dg
   std::size_t rank = 0;
-  std::size_t datum_defect = 0;  ///< what the gauge fixes: 20 for 14 tables
-  /// of the column-scaled design within its rank: sqrt of the eigenvalue ratio
+  std::size_t datum_defect = 0;  ///< number of combinations fixed by the gauge: 20 for 14 tables
+  /// condition of the column-scaled design matrix within its rank: sqrt of the eigenvalue ratio
   double condition = 0.0;
 };
-/// RankDeficient with the parameters that are not determined, when the data miss more than the
-/// gauge supplies.
+/// RankDeficient if the rank defect of the data is larger than the number of gauge conditions. The
+/// text names parameters that are not determined.
 [[nodiscard]] Result<Adjustment> adjust(const NormalEquations&, const ParameterLayout&,
                                         double gauge_weight = 1.0);
 
@@ -71,9 +86,9 @@ struct ResidualStatistics {
   double weighted_rms = 0.0;  ///< of residual / sigma
 };
 
-/// Of every row, in row order.
+/// One residual per row, in row order.
 struct Residuals {
-  std::vector<double> before_m;  ///< deviation after the alignment, no model
+  std::vector<double> before_m;  ///< y of the row: after the alignment, without a model
   std::vector<double> after_m;
 };
 
@@ -88,33 +103,32 @@ struct Statistics {
   double chi2 = 0.0;
   double chi2_per_dof = 0.0;
   double sigma0 = 0.0;       ///< sqrt(chi2_per_dof)
-  double correlation = 1.0;  ///< blocks that carry the information of one, see ResidualNoise
-  /// What the covariance was multiplied with: chi2_per_dof times `correlation` where that is more
-  /// than the stated uncertainties explain (beyond the 99.9 % quantile of chi2/dof), else 1
-  /// [Birge 1932].
+  double correlation = 1.0;  ///< see ResidualNoise::correlation
+  /// Factor applied to the covariance [Birge 1932]: chi2_per_dof times `correlation` if this
+  /// product exceeds the 99.9 % quantile of chi2/dof for the stated uncertainties, else 1.
   double variance_factor = 1.0;
-  ResidualStatistics before;  ///< deviations after the alignment, no model
-  ResidualStatistics after;
+  ResidualStatistics before;  ///< of Residuals::before_m
+  ResidualStatistics after;   ///< of Residuals::after_m
   int iterations = 0;
   int alignment_iterations = 0;
   double alignment_rms_m = 0.0;
   StopReason stop = StopReason::Direct;
 };
 
-/// Offset of all ranges, where Noise::u_range_offset_m gives it a prior; else 0.
+/// Estimated offset of all ranges; 0 if Noise::u_range_offset_m is 0.
 struct RangeOffset {
   double value_m = 0.0;
   double u_m = 0.0;
 };
 
 struct Solution {
-  VolumetricModel model;  ///< gauge G1, rigid unknowns at 0
+  VolumetricModel model;  ///< gauge G1, without the rigid unknowns
   Estimator estimator = Estimator::TwoStep;
-  Vector6 rigid = Vector6::Zero();  ///< tx ty tz [m], rx ry rz [rad] left over by the alignment
+  Vector6 rigid = Vector6::Zero();  ///< tx ty tz [m], rx ry rz [rad] relative to the alignment
   Eigen::MatrixXd covariance_with_rigid;
   RigidTransform T_machine_tracker;
   Statistics statistics;
-  Residuals residuals;  ///< after_m: less the range offset, too
+  Residuals residuals;  ///< in after_m the range offset is subtracted, too
   RangeOffset range_offset;
 };
 

@@ -1,6 +1,6 @@
 #pragma once
-/// Recorded touches as observations: which of them met one place from one side (for the delay),
-/// which went around a sphere (for the qualification). Pure; allocates. SI.
+/// Observations from recorded touches: touches of one place from one direction (for the delay), and
+/// touches around a sphere (for the qualification). Pure; allocates. SI.
 
 #include <span>
 #include <vector>
@@ -17,16 +17,16 @@ struct RecordedTouch {
 };
 
 struct SamePlaceOptions {
-  double min_cosine = 0.999;       ///< between approaches from one side: 2.6 degrees
-  double max_sideways_m = 0.2e-3;  ///< between places, across the approach
+  double min_cosine = 0.999;       ///< between approaches from one direction: 2.6 degrees
+  double max_sideways_m = 0.2e-3;  ///< between places, perpendicular to the approach
 };
 
-/// The largest set of touches that meet one place from one side, as speed and place along the mean
-/// approach. Touches that stand still are left out.
+/// The largest set of touches of one place from one direction, as speed and position along the mean
+/// approach. Touches with zero velocity are not used.
 [[nodiscard]] std::vector<FeedTouch> same_place(std::span<const RecordedTouch> touches,
                                                 const SamePlaceOptions& options = {});
 
-/// Each touch with the normal against its approach.
+/// Each touch with the normal opposite to its approach. Touches with zero velocity are not used.
 [[nodiscard]] std::vector<QualifyingTouch> around_sphere(std::span<const RecordedTouch> touches);
 
 }  // namespace abbe::calib::probe

@@ -1,7 +1,7 @@
 #pragma once
-/// Which row is held out when. Rows that share noise (the three components of one touched ball, the
-/// balls of one position) belong in one fold: folds over single rows let a fit see the noise it is
-/// judged by, and the error looks too small.
+/// Assignment of rows to the folds of a cross-validation. Rows that share noise (the three
+/// components of one touched ball, the balls of one position) must be in one fold. With folds over
+/// single rows, the rows held out share noise with the fitted rows, and the error is too small.
 
 #include <cstdint>
 #include <span>
@@ -17,20 +17,20 @@ struct Folds {
   int count = 0;            ///< every fold has a row
 };
 
-/// Any labels, each distinct label one fold, numbered in increasing order. TooFewObservations with
-/// less than two labels.
+/// Each distinct label becomes one fold; folds are numbered by increasing label.
+/// TooFewObservations with fewer than two distinct labels.
 [[nodiscard]] Result<Folds> folds_from_labels(std::span<const int> label_of_row);
 
-/// The text of a file: one integer a line, row by row; a first line that is no number is a heading.
-/// BadInput names the line.
+/// `text`: content of a file with one integer label per line, row by row. Empty lines are ignored;
+/// a first line that is not an integer is a heading. BadInput names the line.
 [[nodiscard]] Result<Folds> parse_folds(std::string_view text);
 
-/// Rows dealt at random, sizes differ by at most one. The same seed gives the same folds
-/// everywhere. TooFewObservations when there are fewer rows than folds or fewer than two folds.
+/// Rows distributed at random; fold sizes differ by at most one row. The same seed gives the same
+/// folds on every platform. TooFewObservations with fewer rows than folds or fewer than two folds.
 [[nodiscard]] Result<Folds> random_folds(std::size_t rows, int folds, std::uint64_t seed);
 
-/// Whole groups dealt at random; sizes in groups differ by at most one. folds = number of groups
-/// leaves one group out at a time.
+/// Whole groups distributed at random; fold sizes differ by at most one group. folds = number of
+/// groups leaves one group out at a time.
 [[nodiscard]] Result<Folds> group_folds(std::span<const int> group_of_row, int folds,
                                         std::uint64_t seed);
 

@@ -2,22 +2,21 @@
 /// Solutions of penalised least squares along decreasing lambda by cyclic coordinate descent with
 /// warm starts, strong and active sets ([Breheny 2011], [Tibshirani 2012]), with the semantics of
 /// the R package ncvreg 3.16, so that solutions and iteration counts can be compared:
-///   - columns are standardised (standardise.hpp), y is centred, the intercept is always fitted and never
-///   penalised;
-///   - one iteration is one sweep over the active columns in the order of the columns; a lambda is done when
-///   the largest
-///     change of a standardised coefficient in a sweep is below tolerance * rms(y - mean) and no left-out
-///     column wants to enter;
-///   - the budget counts the sweeps of the whole path. When it is used up, the lambda being worked on keeps
-///   what it has
-///     and the remaining ones are missing (Path::reached() < Path::lambda.size()).
-/// The result is a stationary point only to within the tolerance: with badly conditioned columns it depends
-/// on their order. MCP and SCAD have many local minima; the warm start decides which one is found. Check with
-/// kkt_violation().
+///   - Columns are standardised (standardise.hpp), y is centred, the intercept is always fitted and
+///     never penalised.
+///   - One iteration is one sweep over the active columns in the order of the columns. A lambda is
+///     finished when the largest change of a standardised coefficient in a sweep is below
+///     tolerance * rms(y - mean) and no inactive column would get a nonzero coefficient.
+///   - The budget counts the sweeps of the whole path. When it is used up, the current lambda keeps
+///     the coefficients it has, and the solutions of the remaining lambdas are missing
+///     (Path::reached() < Path::lambda.size()).
+/// The result is a stationary point only to within the tolerance: with badly conditioned columns it
+/// depends on their order. MCP and SCAD have many local minima; the warm start determines which one
+/// is found. Check with kkt_violation().
 ///
-/// Works on the Gram matrix of the columns: memory p^2, time n p^2 once and p^2 a sweep; meant for
-/// n > p up to a few thousand columns. Pure, no threads. The same input gives the same bits on
-/// every x86-64 processor, alone or in a grid.
+/// Works on the Gram matrix of the columns: memory p^2, time n p^2 once and p^2 per sweep; intended
+/// for n > p and up to a few thousand columns. Pure, no threads. The same input gives the same bits
+/// on every x86-64 processor, for a single path and in a grid.
 
 #include <Eigen/Core>
 #include <optional>
@@ -34,13 +33,13 @@ struct PathOptions {
   std::vector<double> lambda{};
   double tolerance = 1e-4;  ///< relative to rms(y - mean); 1e-4 as in ncvreg
   long max_sweeps = 10000;  ///< of the whole path; 10000 as in ncvreg
-  std::optional<Eigen::Index>
-      max_nonzero{};  ///< the path ends after a lambda with more; none: never
+  /// The path ends after a lambda with more nonzero coefficients; nullopt: no limit.
+  std::optional<Eigen::Index> max_nonzero{};
 };
 
-/// `count` values equally spaced in log from lambda_max = max_j |x_j' y| / n, the smallest with an
-/// empty solution, down to `ratio` of it; ratio defaults to 0.001 for n > p, else 0.05. Errors as
-/// fit_path.
+/// `count` values equally spaced in the logarithm, from lambda_max = max_j |x_j' y| / n, the
+/// smallest lambda with an empty solution, down to `ratio` times lambda_max; ratio defaults to
+/// 0.001 for n > p, else 0.05. Errors as fit_path.
 [[nodiscard]] Result<std::vector<double>> default_lambda(const Eigen::MatrixXd& X,
                                                          const Eigen::VectorXd& y, int count = 100,
                                                          std::optional<double> ratio = {});
@@ -48,11 +47,10 @@ struct PathOptions {
 /// Column k belongs to lambda[k]; only the first reached() of lambda have one.
 struct Path {
   Penalty penalty;
-  std::vector<double> lambda;  ///< as asked
-  std::vector<long> sweeps;    ///< reached() of them
-  Eigen::MatrixXd
-      standardised;  ///< p x reached, coefficients of standardised columns, in units of y; 0 for
-                     ///< dropped columns
+  std::vector<double> lambda;  ///< all that were requested
+  std::vector<long> sweeps;    ///< of each reached lambda
+  /// p x reached, coefficients of standardised columns, in units of y; 0 for dropped columns.
+  Eigen::MatrixXd standardised;
   Eigen::MatrixXd coefficients;          ///< (1 + p) x reached, original units, intercept first
   Eigen::VectorXd residual_sum_squares;  ///< |y - fit|^2
   std::vector<Eigen::Index> dropped;     ///< columns that do not vary
@@ -62,7 +60,7 @@ struct Path {
 };
 
 /// BadInput: shapes differ, lambda increasing or negative, gamma, tolerance or budget out of range,
-/// no column varies. NotFinite: NaN or infinity. TooFewObservations: less than two rows, or y does
+/// no column varies. NotFinite: NaN or infinity. TooFewObservations: fewer than two rows, or y does
 /// not vary.
 [[nodiscard]] Result<Path> fit_path(const Eigen::MatrixXd& X, const Eigen::VectorXd& y,
                                     const Penalty&, const PathOptions& = {});

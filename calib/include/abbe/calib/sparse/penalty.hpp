@@ -1,5 +1,5 @@
 #pragma once
-/// Penalties of sparse regression, one coefficient at a time, for columns of unit mean square and
+/// Penalties of sparse regression for a single coefficient, with columns of unit mean square and
 /// the objective
 ///   1/(2n) |y - X b|^2 + sum_j p(|b_j|).
 /// Lasso [Tibshirani 1996], MCP [Zhang 2010], SCAD [Fan 2001]. Unit-free: lambda has the unit of b,
@@ -24,14 +24,14 @@ enum class PenaltyKind { Lasso, Mcp, Scad };
   return "?";
 }
 
-/// gamma says how slowly the penalty lets go of large coefficients: > 2 for SCAD, > 1 for MCP, not
-/// used by the lasso.
+/// The larger gamma, the larger the coefficients that are still penalised. gamma > 2 for SCAD, > 1
+/// for MCP, not used by the lasso.
 struct Penalty {
   PenaltyKind kind = PenaltyKind::Scad;
   double gamma = 3.7;  ///< 3.7: the value [Fan 2001] recommends for SCAD; 3 is customary for MCP
 };
 
-/// BadInput when gamma is too small for the kind, NotFinite when it is no number.
+/// BadInput if gamma is too small for the kind, NotFinite if it is NaN or infinite.
 [[nodiscard]] Result<void> check(const Penalty&);
 
 [[nodiscard]] double value(const Penalty&, double lambda, double magnitude);

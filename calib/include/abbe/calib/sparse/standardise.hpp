@@ -1,5 +1,6 @@
 #pragma once
-/// Columns with mean 0 and mean square 1 (divided by n, not n - 1), and the way back.
+/// Columns scaled to mean 0 and mean square 1 (divided by n, not n - 1), and the conversion of
+/// coefficients to the original columns.
 
 #include <Eigen/Core>
 #include <vector>
@@ -20,7 +21,7 @@ struct Standardised {
   Eigen::Index original_columns = 0;
 };
 
-/// BadInput: no row, or no column that varies. NotFinite: NaN, infinity, or squares that overflow.
+/// BadInput: no rows, or no column varies. NotFinite: NaN, infinity, or squares that overflow.
 [[nodiscard]] Result<Standardised> standardise(const Eigen::MatrixXd& X);
 
 /// Coefficients in the units of the original design: row 0 the intercept, row 1 + j column j; one

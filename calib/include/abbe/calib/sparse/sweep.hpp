@@ -1,9 +1,9 @@
 #pragma once
 /// The inner loop: sweeps of coordinate descent over the active columns of one Gram matrix for
 /// eight paths at once, one path in each lane of the vector registers. The paths differ in penalty,
-/// lambda and active columns; a lane does the same arithmetic in the same order whatever the other
-/// lanes hold and however wide the registers are, so its result is the same bits alone or in
-/// company, on a processor with AVX-512, AVX2 or neither (multiply and add are never fused).
+/// lambda and active columns. The arithmetic of a lane and its order depend neither on the other
+/// lanes nor on the width of the registers. The result of a lane therefore has the same bits alone
+/// and with other lanes, with AVX-512, AVX2 or neither (multiply and add are never fused).
 
 #include <cstddef>
 #include <cstdint>
@@ -13,8 +13,8 @@
 namespace abbe::calib::sparse {
 
 inline constexpr std::size_t kLanes = 8;
-/// Columns are swept in blocks of this many; unused ones at the end have a zero Gram row and a zero
-/// mask.
+/// Number of columns in a block of a sweep. Unused columns of the last block have a zero Gram row
+/// and a zero mask.
 inline constexpr std::size_t kBlock = 4;
 
 struct alignas(64) Lanes {
@@ -24,37 +24,38 @@ struct alignas(64) LaneMask {
   std::int64_t of[kLanes]{};  ///< all bits set: the column is active in this lane; else 0
 };
 
-/// How every lane shrinks z to b, and when it is done: |z| <= lambda: 0; <= inner_end: |z| -
-/// lambda; <= outer_end:
-/// (|z| - offset) * factor; else |z|; times sgn(z).
+/// For every lane the shrinkage of z to b and the convergence criterion. |b| is, times sgn(z):
+///     |z| <= lambda       0
+///     |z| <= inner_end    |z| - lambda
+///     |z| <= outer_end    (|z| - offset) * factor
+///     else                |z|
 struct LaneParameters {
   Lanes lambda, inner_end, outer_end, offset, factor;
-  Lanes
-      /// a sweep whose largest change is smaller ends the lane; -1: an idle lane never ends
-      tolerance;
+  /// A lane has converged after a sweep with a smaller largest change; -1: idle, never converges.
+  Lanes tolerance;
 };
 
 struct SweepProblem {
   std::size_t columns = 0;       ///< multiple of kBlock
-  const double* gram = nullptr;  ///< columns x columns; row j holds all that z_j needs
+  const double* gram = nullptr;  ///< columns x columns; row j is used for z_j
   const double* xty = nullptr;
   const LaneMask* mask = nullptr;
   Lanes* b = nullptr;
 };
 
 struct SweepOutcome {
-  long sweeps = 0;         ///< done
+  long sweeps = 0;         ///< number of sweeps done
   unsigned converged = 0;  ///< bit of every lane whose last sweep was within its tolerance
 };
 
-/// Sweeps until some lane has converged, at most `max_sweeps` (>= 1) times.
+/// Sweeps until at least one lane has converged, at most `max_sweeps` (>= 1) times.
 using SweepFunction = SweepOutcome (*)(const SweepProblem&, const LaneParameters&, long max_sweeps);
 
 struct SweepVariant {
   std::string_view instructions;  ///< "AVX-512", "AVX2", "baseline"
   SweepFunction sweep = nullptr;
 };
-/// Those the processor at hand can run, fastest first; the last one runs everywhere.
+/// The variants that this processor can run, fastest first; the last one runs on every processor.
 [[nodiscard]] std::vector<SweepVariant> sweep_variants();
 
 }  // namespace abbe::calib::sparse

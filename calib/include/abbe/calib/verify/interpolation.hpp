@@ -1,10 +1,11 @@
 #pragma once
-/// Values known at scattered points, wanted in between: linear within the tetrahedra of the points'
-/// Delaunay triangulation, nothing outside their hull. The tetrahedron around a place is the convex
-/// combination of points that makes it with the least sum of weight * |point|^2 (lifted onto a
-/// paraboloid the points' lower hull is the triangulation), so it is found by a linear programme of
-/// four rows and no mesh is built. Coordinates are scaled to the box of the points first: measured
-/// volumes are flat.
+/// Interpolation of values at scattered points: linear within the tetrahedra of the Delaunay
+/// triangulation of the points; no value outside their convex hull. The tetrahedron that contains a
+/// place x is the convex combination of points that solves
+///     minimise sum w_i |p_i|^2   subject to   sum w_i p_i = x,  sum w_i = 1,  w_i >= 0
+/// because the triangulation is the lower hull of the points lifted onto a paraboloid. This is a
+/// linear programme with four rows; no mesh is built. Coordinates are first scaled to the bounding
+/// box of the points, because measured volumes are often flat.
 
 #include <array>
 #include <cstddef>
@@ -16,14 +17,15 @@
 
 namespace abbe::calib::verify {
 
-/// Value at the place = sum of weight * value at point. Weights are >= 0 and sum to 1.
+/// Interpolated value at a place = sum of weight[k] * value at point[k]. Weights are >= 0 and their
+/// sum is 1.
 struct LinearWeights {
   std::array<std::size_t, 4> point{};
   std::array<double, 4> weight{};
 };
 
-/// One for every place, in order; none for a place outside the hull. DegenerateGeometry unless the
-/// points span a volume.
+/// One result per place, in the same order; nullopt for a place outside the hull.
+/// DegenerateGeometry unless the points span a volume.
 [[nodiscard]] Result<std::vector<std::optional<LinearWeights>>> linear_weights(
     std::span<const Vector3> points, std::span<const Vector3> places);
 

@@ -1,10 +1,10 @@
 #pragma once
-/// Stage one of a verification ([Li OMM] section 5.4): scale readings and what an independent
-/// instrument (a laser tracker with its reflector near the tip) measured there, each in its own
-/// frame, become V_las, the volumetric error as the instrument saw it. Nobody knows where the
-/// tracker stands but through these points: fitted onto the readings, its frame takes the rigid
-/// motion out of V that fits V best (six numbers). What is left is shape. V = actual - nominal at
-/// the scale reading. Lengths in m. Pure; allocates.
+/// Stage one of a verification ([Li OMM] section 5.4): computes V_las, the volumetric error
+/// measured with an independent instrument (a laser tracker with its reflector near the tool tip),
+/// from scale readings and the points that the instrument measured there. The pose of the
+/// instrument is known only from these points: its frame is fitted to the readings, and this
+/// removes the best-fit rigid motion (six parameters) from V. V = actual - nominal at the scale
+/// reading. Lengths in m. Pure; allocates.
 
 #include <span>
 #include <vector>
@@ -18,8 +18,10 @@ struct MeasuredPoint {
   Vector3 measured_m = Vector3::Zero();  ///< in the instrument's frame
 };
 
-/// BestFit: T from the points themselves. Machine: the instrument's axes are the machine's by other
-/// means; V keeps its rotation, and the unknown constant between reflector and axis positions.
+/// Frame of the measured points.
+/// - BestFit: T_machine_tracker is fitted to the points.
+/// - Machine: the axes of the instrument are already parallel to those of the machine; V keeps its
+///   rotation and the unknown constant vector between reflector and axis positions.
 enum class Frame { BestFit, Machine };
 
 /// In the order of the points.
@@ -31,12 +33,14 @@ struct Observations {
   std::vector<Vector3> V_m;         ///< T measured - reading
 };
 
-/// What is left after a rigid fit, against the extent of the points: errors of machines stay below
-/// a hundredth; mixed rows, inches or a left-handed frame do not.
+/// Largest permitted rms residual after the rigid fit, as a fraction of the extent of the points.
+/// Errors of machines are smaller; exchanged rows, inches or a left-handed frame give larger
+/// residuals.
 inline constexpr double kMostLackOfFit = 0.01;
 
-/// NotFinite, TooFewObservations (less than 4), DegenerateGeometry (no volume), AlignmentFailed
-/// (kMostLackOfFit; with Frame::Machine after the best constant).
+/// Errors: NotFinite; TooFewObservations for fewer than 4 points; DegenerateGeometry if the points
+/// do not span a volume; AlignmentFailed if the residuals exceed kMostLackOfFit (with
+/// Frame::Machine after subtraction of their mean).
 [[nodiscard]] Result<Observations> observe(std::span<const MeasuredPoint>, Frame = Frame::BestFit);
 
 }  // namespace abbe::calib::verify

@@ -26,12 +26,10 @@ namespace {
 
 constexpr const char* kFooter =
     "Exit codes: 0 done, 2 usage, 3 bad input file, 4 input/output (file, port in use).\n"
-    "A machine file is any TOML file with the tables [machine], [axes.X|Y|Z] and [target], so the "
-    "daemon's "
-    "own\n"
-    "abbed.toml will do; its [tracker] port, [encoder] peer_port and nodes, and [daemon] speed are "
-    "taken "
-    "too.";
+    "A machine file is a TOML file with the tables [machine], [axes.X|Y|Z] and [target], for "
+    "example\n"
+    "the daemon's abbed.toml. Also read from it: [tracker] port, [encoder] peer_port and nodes,\n"
+    "[daemon] speed.";
 
 int run(int argc, char** argv) {
   CLI::App app{"Simulated machine tool, laser tracker and encoders with errors that are known",
@@ -60,8 +58,7 @@ int run(int argc, char** argv) {
 int main(int argc, char** argv) {
   try {
     return abbe::sim::run(argc, argv);
-  } catch (
-      const std::exception& e) {  // out of memory and the like: nothing this program can go on from
+  } catch (const std::exception& e) {  // e.g. out of memory: the program cannot continue
     std::fprintf(stderr, "abbe-sim: %s\n", e.what());
     return abbe::sim::kIoFailed;
   }

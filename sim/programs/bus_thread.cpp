@@ -11,7 +11,7 @@
 namespace abbe::sim {
 namespace {
 
-void turn(Simulation& simulation, const SimClock& clock, int stop_fd) {
+void poll_until_stopped(Simulation& simulation, const SimClock& clock, int stop_fd) {
   std::vector<pollfd> fds{{simulation.bus()->fd(), POLLIN, 0}, {stop_fd, POLLIN, 0}};
   while ((fds[1].revents & POLLIN) == 0) {
     wait(fds, clock, simulation.next_bus_due());
@@ -19,7 +19,7 @@ void turn(Simulation& simulation, const SimClock& clock, int stop_fd) {
   }
 }
 
-Socket made_event() {
+Socket make_event() {
   Socket event(::eventfd(0, EFD_CLOEXEC));
   if (!event) throw std::system_error(errno, std::generic_category(), "eventfd");
   return event;
@@ -28,18 +28,18 @@ Socket made_event() {
 }  // namespace
 
 BusThread::BusThread(Simulation& simulation, SimClock clock)
-    : stop_(made_event()),
-      turning_(std::async(std::launch::async, [&simulation, clock, fd = stop_.get()] {
-        turn(simulation, clock, fd);
+    : stop_(make_event()),
+      polling_(std::async(std::launch::async, [&simulation, clock, fd = stop_.get()] {
+        poll_until_stopped(simulation, clock, fd);
       })) {}
 
 BusThread::~BusThread() {
   ::eventfd_write(stop_.get(), 1);
-  if (turning_.valid()) turning_.wait();
+  if (polling_.valid()) polling_.wait();
 }
 
 void BusThread::check() {
-  if (turning_.wait_for(std::chrono::seconds{0}) == std::future_status::ready) turning_.get();
+  if (polling_.wait_for(std::chrono::seconds{0}) == std::future_status::ready) polling_.get();
 }
 
 }  // namespace abbe::sim

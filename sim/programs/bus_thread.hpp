@@ -1,7 +1,7 @@
 #pragma once
-/// The encoders on a thread of their own. Real ones answer a SYNC whatever else the shop floor
-/// does; a simulator that makes a tracker's burst first answers SYNC periods late when it is built
-/// with sanitizers or the computer is busy.
+/// Polls the encoder bus on a thread of its own. Real encoders answer a SYNC independently of all
+/// other devices. On a common thread the answer would wait until a burst of the tracker is
+/// computed: with sanitizers or on a busy computer that takes several SYNC periods.
 
 #include <future>
 
@@ -12,18 +12,18 @@ namespace abbe::sim {
 
 class BusThread {
  public:
-  /// `simulation` was set up with a bus and bus_apart.
+  /// Precondition: `simulation` was set up with a bus and bus_apart. It must outlive the thread.
   BusThread(Simulation& simulation, SimClock clock);
   ~BusThread();
   BusThread(const BusThread&) = delete;
   BusThread& operator=(const BusThread&) = delete;
 
-  /// Throws what ended the thread, if something did.
+  /// Rethrows the exception that ended the thread, if any.
   void check();
 
  private:
   Socket stop_;  ///< an eventfd
-  std::future<void> turning_;
+  std::future<void> polling_;
 };
 
 }  // namespace abbe::sim

@@ -1,6 +1,6 @@
 #pragma once
-/// The subcommands of abbe-sim. Each adds itself to the command line and returns what runs it; the
-/// result is an exit code.
+/// The subcommands of abbe-sim. Each add function adds a subcommand to the command line and returns
+/// the function that runs it; its result is an exit code.
 
 #include <functional>
 #include <string_view>
@@ -29,7 +29,7 @@ struct Subcommand {
 [[nodiscard]] Subcommand add_replay(CLI::App& app);
 [[nodiscard]] Subcommand add_evemu(CLI::App& app);
 
-/// "abbe-sim: " and the text on stderr; the exit code for it.
+/// Prints "abbe-sim: " and the text of the error to stderr; returns its exit code.
 int report(const Error& error);
 
 }  // namespace abbe::sim

@@ -24,18 +24,18 @@ constexpr double kUmPerM = 1e6;
 
 struct EvemuOptions {
   SetupChoices choices;
-  std::size_t points_per_ball = 0, points_per_block = 0;  // 0: as the file says
+  std::size_t points_per_ball = 0, points_per_block = 0;  // 0: the value of the file
   std::vector<std::size_t> missed, doubled, stray;
   std::string ports_file, calibrator_out, truth_out, reference_out;
   double u_reference_um = 5.0;
   bool start_on_signal = false;
 };
 
-volatile std::sig_atomic_t let_go = 0;
+volatile std::sig_atomic_t start_requested = 0;
 
-void let_go_on_signal() {
+void start_on_sigusr1() {
   struct sigaction action {};
-  action.sa_handler = [](int) { let_go = 1; };
+  action.sa_handler = [](int) { start_requested = 1; };
   sigaction(SIGUSR1, &action, nullptr);
 }
 
@@ -45,9 +45,11 @@ Result<LoadedSetup> load(const EvemuOptions& options) {
   SimulationSetup& simulation = setup->simulation;
   if (simulation.truth.order != std::array{Axis::Z, Axis::X, Axis::Y})
     return bad_input(
-        "the weak-stiffness machine is base, Z, X, Y: [machine] chain = \"[w b Z X Y t]\"");
+        "the machine file has another chain than the weak-stiffness machine: set [machine] chain = "
+        "\"[w b Z X Y t]\"");
   if (simulation.counter_cards.empty())
-    return bad_input("no [counter_card] in the machine file: nobody could read axes and probe");
+    return bad_input(
+        "the machine file has no [counter_card], which counts the axes and the probe: add it");
   simulation.truth = weak_stiffness_machine(setup->weak_stiffness);
   simulation.tracker.reset();
   simulation.bus.reset();
@@ -109,7 +111,8 @@ std::string truth_csv(const TruthMachine& truth, const BallArray& array) {
   return text;
 }
 
-/// V at the balls of all positions as an independent instrument sees it, in the form of errors.csv.
+/// V at the balls of all positions as an independent instrument measures it, in the format of
+/// errors.csv.
 std::string reference_csv(const TruthMachine& truth, const BallArray& array, double u_m,
                           std::uint64_t seed) {
   const auto readings = ball_readings_m(truth, array);
@@ -142,16 +145,16 @@ Result<void> write_files(const EvemuOptions& options, const LoadedSetup& setup,
       });
 }
 
-void narrate(const Simulation& simulation, HostTime now, double speed, int& said) {
+void print_progress(const Simulation& simulation, HostTime now, double speed, int& printed) {
   const VirtualMachine& machine = simulation.machine();
-  if (machine.started() && said == 0) {
-    said = 1;
-    fmt::print(stderr, "machine: touches, {:.0f} s ({:.0f} s on the wall)\n",
+  if (machine.started() && printed == 0) {
+    printed = 1;
+    fmt::print(stderr, "machine: touching, {:.0f} s ({:.0f} s of wall-clock time)\n",
                machine.path().duration_s(), machine.path().duration_s() / speed);
   }
-  if (machine.finished() && now >= *machine.finished() && said == 1) {
-    said = 2;
-    fmt::print(stderr, "machine: all touched, standing\n");
+  if (machine.finished() && now >= *machine.finished() && printed == 1) {
+    printed = 2;
+    fmt::print(stderr, "machine: all touches made, stopped\n");
   }
 }
 
@@ -168,24 +171,24 @@ int run(const EvemuOptions& options) {
   if (!motion) return report(motion.error());
   setup->simulation.edges_s =
       edge_times_s(program, truth, *motion, array.tip_radius_m, setup->touching);
-  let_go_on_signal();
+  start_on_sigusr1();
   const EventLoop loop(setup->speed);
   auto simulation = Simulation::open(setup->simulation, loop.clock().now());
   if (!simulation) return report(simulation.error());
   if (const auto announced = announce_ports(ports_of(**simulation), options.ports_file); !announced)
     return report(announced.error());
   fmt::print(stderr, "{} touches{}\n", program.moves.size(),
-             options.start_on_signal ? ", begin on SIGUSR1" : ", begin once the card is read");
-  int said = 0;
+             options.start_on_signal ? ", start on SIGUSR1" : ", start when the card is scanning");
+  int printed = 0;
 
   while (!loop.stopped()) {
     std::vector<pollfd> fds;
     (*simulation)->add_poll_fds(fds);
     loop.wait(fds, (*simulation)->next_due());
     const HostTime now = loop.clock().now();
-    if (let_go != 0 && !(*simulation)->machine().started()) (*simulation)->let_go(now);
+    if (start_requested != 0 && !(*simulation)->machine().started()) (*simulation)->release(now);
     (*simulation)->poll(now);
-    narrate(**simulation, now, setup->speed, said);
+    print_progress(**simulation, now, setup->speed, printed);
   }
 
   return kDone;
@@ -205,9 +208,9 @@ Subcommand add_evemu(CLI::App& app) {
   sub->add_option("--config", choices.config_file, "TOML file with a [sim] table")
       ->type_name("FILE");
   sub->add_option("--machine", choices.machine_file,
-                  "machine with [counter_card]: abbed.toml will do")
+                  "machine description with [counter_card], e.g. abbed.toml")
       ->type_name("FILE");
-  sub->add_option("--seed", choices.seed, "of all noise (default 1)");
+  sub->add_option("--seed", choices.seed, "seed of all noise (default 1)");
   sub->add_option("--speed", choices.speed,
                   "simulated seconds per second; the daemon must be given the same")
       ->check(CLI::Range(1e-3, 1e4));
@@ -216,12 +219,13 @@ Subcommand add_evemu(CLI::App& app) {
       ->check(CLI::Range(1, 1000));
   sub->add_option("--points-per-block", options->points_per_block, "default 25")
       ->check(CLI::Range(1, 1000));
-  sub->add_option("--miss", options->missed, "touches the probe does not tell, by number from 0");
-  sub->add_option("--double", options->doubled, "touches made twice");
-  sub->add_option("--stray", options->stray, "before these, a touch far from any ball");
+  sub->add_option("--miss", options->missed,
+                  "touches that the probe does not report, by number from 0");
+  sub->add_option("--double", options->doubled, "touches made twice, by number");
+  sub->add_option("--stray", options->stray, "before these touches, a trigger far from any ball");
   sub->add_flag(
       "--start-on-signal", options->start_on_signal,
-      "begin on SIGUSR1; else once somebody reads the card, after [sim.path] standstill_s");
+      "start on SIGUSR1; default: when the card is scanning; then [sim.path] standstill_s");
   sub->add_option("--ports-file", options->ports_file,
                   "written when the card listens: usbip_port=N")
       ->type_name("FILE");
@@ -230,13 +234,12 @@ Subcommand add_evemu(CLI::App& app) {
   sub->add_option("--truth-out", options->truth_out,
                   "write V relative to ball 1 over its volume as CSV")
       ->type_name("FILE");
-  CLI::Option* reference =
-      sub->add_option(
-             "--reference-out", options->reference_out,
-             "write V at the balls as an independent instrument sees it, for --rotation-reference")
-          ->type_name("FILE");
+  CLI::Option* reference = sub->add_option("--reference-out", options->reference_out,
+                                           "write V at the balls as measured by an independent "
+                                           "instrument, for --rotation-reference")
+                               ->type_name("FILE");
   sub->add_option("--u-reference-um", options->u_reference_um,
-                  "that instrument's noise (default 5)")
+                  "standard deviation of that instrument's noise (default 5)")
       ->needs(reference);
 
   return {sub, [options] { return run(*options); }};

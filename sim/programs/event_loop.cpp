@@ -21,13 +21,14 @@ EventLoop::EventLoop(double speed) : clock_(speed) {
   action.sa_handler = request_stop;
   sigaction(SIGINT, &action, nullptr);
   sigaction(SIGTERM, &action, nullptr);
-  // Let through only while waiting, so that none falls between the question and the wait.
-  sigset_t held;
-  sigemptyset(&held);
-  sigaddset(&held, SIGINT);
-  sigaddset(&held, SIGTERM);
-  sigprocmask(SIG_BLOCK, &held, &held_back_while_waiting_);
-  prctl(PR_SET_TIMERSLACK, 1);  // ns; at 20 times real time the usual 50 us would be a millisecond
+  // Unblocked only while waiting, so that no signal is lost between stopped() and the wait.
+  sigset_t blocked;
+  sigemptyset(&blocked);
+  sigaddset(&blocked, SIGINT);
+  sigaddset(&blocked, SIGTERM);
+  sigprocmask(SIG_BLOCK, &blocked, &mask_while_waiting_);
+  // ns; at 20 times real time the default of 50 us would be 1 ms of simulated time
+  prctl(PR_SET_TIMERSLACK, 1);
 }
 
 bool EventLoop::stopped() const {
@@ -35,13 +36,13 @@ bool EventLoop::stopped() const {
 }
 
 void wait(std::vector<pollfd>& fds, const SimClock& clock, HostTime due,
-          const sigset_t* held_back) {
+          const sigset_t* blocked_signals) {
   std::chrono::nanoseconds wall = kLongestWait;
   if (due != HostTime::max()) {
     wall = std::clamp(clock.wall(due - clock.now()), std::chrono::nanoseconds{0}, kLongestWait);
   }
   const timespec timeout{wall.count() / 1'000'000'000, wall.count() % 1'000'000'000};
-  ppoll(fds.data(), fds.size(), &timeout, held_back);
+  ppoll(fds.data(), fds.size(), &timeout, blocked_signals);
 }
 
 }  // namespace abbe::sim

@@ -1,6 +1,6 @@
 #pragma once
-/// Turns something steppable with real time: waits for its sockets or its next due time, then polls
-/// it, until SIGINT or SIGTERM.
+/// Runs steppable devices in real time until SIGINT or SIGTERM: waits for their sockets or for the
+/// time at which the next action is due.
 
 #include <poll.h>
 
@@ -12,26 +12,26 @@
 
 namespace abbe::sim {
 
-/// Until a socket is ready, `due` is there, 200 ms of the wall are over, or a signal comes that is
-/// not held back. `held_back`: those, while waiting; null: those of this thread.
+/// Waits until a socket is ready, the time `due` is reached, 200 ms of wall-clock time have passed
+/// or a signal arrives that is not in `blocked_signals`; null: the signal mask of the thread.
 void wait(std::vector<pollfd>& fds, const SimClock& clock, HostTime due,
-          const sigset_t* held_back = nullptr);
+          const sigset_t* blocked_signals = nullptr);
 
 class EventLoop {
  public:
-  /// From here on SIGINT and SIGTERM only end the loop.
+  /// From now on SIGINT and SIGTERM set stopped() instead of ending the process.
   explicit EventLoop(double speed);
 
   [[nodiscard]] const SimClock& clock() const { return clock_; }
   [[nodiscard]] bool stopped() const;
-  /// Also until SIGINT or SIGTERM comes.
+  /// As sim::wait(); SIGINT and SIGTERM end the wait too.
   void wait(std::vector<pollfd>& fds, HostTime due) const {
-    sim::wait(fds, clock_, due, &held_back_while_waiting_);
+    sim::wait(fds, clock_, due, &mask_while_waiting_);
   }
 
  private:
   SimClock clock_;
-  sigset_t held_back_while_waiting_{};
+  sigset_t mask_while_waiting_{};
 };
 
 }  // namespace abbe::sim

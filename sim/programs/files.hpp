@@ -1,5 +1,5 @@
 #pragma once
-/// Whole files in and out.
+/// Reads and writes whole files.
 
 #include <string>
 #include <string_view>
@@ -9,9 +9,9 @@
 namespace abbe::sim {
 
 [[nodiscard]] Result<std::string> read_file(const std::string& path);
-/// `path` seen from the folder that `file` is in, as paths in configurations are.
+/// `path` relative to the folder of `file`, as in configuration files.
 [[nodiscard]] std::string beside_file(const std::string& file, const std::string& path);
-/// "-" is standard output. Written beside and renamed, so that nobody sees half a file.
+/// Writes PATH.part and renames it, so that no reader sees a partial file. "-" is standard output.
 [[nodiscard]] Result<void> write_file(const std::string& path, std::string_view text);
 
 }  // namespace abbe::sim

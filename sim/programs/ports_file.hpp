@@ -1,8 +1,9 @@
 #pragma once
-/// Where the devices listen, for people (standard output) and for scripts (a file written when
-/// everything listens, whose lines `tracker_port=N`, `can_port=N` or `can_interface=NAME`,
-/// `usbip_port=N` and `cmm_port=N` a shell and a TOML reader both understand; a device that is not
-/// there has no line).
+/// Where the devices listen: printed to standard output, and written to a file for scripts when all
+/// devices listen. Its lines can be read by a shell and by a TOML reader; a device that does not
+/// exist has no line:
+///
+///   tracker_port=N, can_port=N or can_interface=NAME, usbip_port=N, cmm_port=N
 
 #include <cstdint>
 #include <optional>
@@ -17,7 +18,7 @@ namespace abbe::sim {
 /// A device of [[sim.environment]]: `NAME_port=N`, or `NAME_path="PATH"` on a pseudo terminal.
 struct NamedPlace {
   std::string name;
-  std::string where;       ///< for people
+  std::string where;       ///< for messages
   std::uint16_t port = 0;  ///< 0: on a pseudo terminal
   std::string path;
 };
@@ -26,15 +27,15 @@ struct Ports {
   std::optional<std::uint16_t> tracker;
   std::optional<std::uint16_t> can;
   std::vector<NamedPlace> environment;
-  std::vector<std::uint16_t> usbip;  ///< one a counter card
+  std::vector<std::uint16_t> usbip;  ///< one per counter card
   std::optional<std::uint16_t> cmm;
-  std::string can_interface;  ///< SocketCAN; no port then
+  std::string can_interface;  ///< SocketCAN; `can` is empty then
 };
 
-/// Where the devices of a simulation listen; encoders on `can_interface` if it has a name.
+/// Where the devices of a simulation listen; encoders on `can_interface` if it is not empty.
 [[nodiscard]] Ports ports_of(Simulation& simulation, const std::string& can_interface = {});
 
-/// The file is there before anything is printed. Empty path: no file.
+/// Writes the file first, then prints. Empty path: no file.
 [[nodiscard]] Result<void> announce_ports(const Ports& ports, const std::string& path);
 
 }  // namespace abbe::sim

@@ -37,7 +37,7 @@ ScheduledFault read_fault(TomlSection& section) {
   }
 
   const auto known = fault_kind(scheduled.target, kind);
-  if (!known) section.fault("kind", fmt::format("\"{}\" is no fault of this device", kind));
+  if (!known) section.fault("kind", fmt::format("\"{}\" is not a fault of this device", kind));
   scheduled.fault.kind = known.value_or(FaultKind::Mute);
   if (!section.number("at_s", scheduled.fault.at_s, 1.0, kNotNegativeNumber))
     section.fault("at_s", "missing");

@@ -1,5 +1,5 @@
 #pragma once
-/// [[sim.fault]]: what goes wrong, and when.
+/// [[sim.fault]]: faults to inject, and their times.
 
 #include <vector>
 

@@ -60,7 +60,7 @@ void read_encoder_nodes(TomlSection& encoder, std::vector<EncoderNodeOptions>& n
   if (!seen.empty()) nodes = seen;
 }
 
-/// With sync = "external" the machine sends the SYNC, and the machine is here.
+/// With sync = "external" the control of the machine sends the SYNC; the simulator does it.
 void read_sync(TomlSection& encoder, SimulationSetup& simulation) {
   std::string sync;
   encoder.text("sync", sync);

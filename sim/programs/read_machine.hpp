@@ -1,5 +1,5 @@
 #pragma once
-/// The tables the daemon reads too. Keys that only it knows are none of ours.
+/// The tables that the daemon reads too. Keys that only the daemon uses are ignored.
 
 #include "setup_draft.hpp"
 #include "toml_section.hpp"

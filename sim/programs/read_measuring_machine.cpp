@@ -23,7 +23,7 @@ void read_features(TomlSection root, MeasuringMachine& machine) {
     read_place(section, face.centre_m);
     section.vector("normal", face.normal);
     section.number("half_size_mm", face.half_size_m, kMilli, kPositiveNumber);
-    if (!(face.normal.norm() > 0.0)) section.fault("normal", "has no direction");
+    if (!(face.normal.norm() > 0.0)) section.fault("normal", "must not be the zero vector");
     machine.faces.push_back(face);
   }
 }
@@ -33,7 +33,8 @@ void read_features(TomlSection root, MeasuringMachine& machine) {
 void read_cmm(TomlSection section, SimulationSetup& simulation) {
   if (!section.present()) return;
   IppDmeOptions machine;
-  // It measures in its own volume: what the machine tool's axes could do does not matter here.
+  // A measuring machine has a volume of its own: travels and errors of the machine tool do not
+  // apply.
   machine.machine.truth = {};
   std::string tool;
   if (section.text("tool", tool)) machine.tools.push_back(tool);

@@ -8,7 +8,7 @@
 
 namespace abbe::sim {
 
-/// `file` is the one `sim` stands in: paths in it are relative to its folder.
+/// `file` is the file that contains `sim`: paths are relative to its folder.
 void read_sim(TomlSection sim, const std::string& file, SetupDraft& draft);
 
 }  // namespace abbe::sim

@@ -1,5 +1,5 @@
 #pragma once
-/// What abbe-sim evemu plays: how it is touched, and the array that is.
+/// The tables of abbe-sim evemu: how the ball array is touched, and the state of the array.
 
 #include "setup_file.hpp"
 #include "toml_section.hpp"
@@ -8,7 +8,7 @@ namespace abbe::sim {
 
 /// [sim.evemu].
 void read_sim_evemu(TomlSection section, LoadedSetup& setup);
-/// [sim.ball_array]: the array that is touched, against what its calibrator.toml says.
+/// [sim.ball_array]: how the true array differs from its calibrator.toml.
 void read_ball_array(TomlSection section, ArrayState& array);
 
 }  // namespace abbe::sim

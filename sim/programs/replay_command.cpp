@@ -1,4 +1,4 @@
-/// abbe-sim replay: a recording back on the wire, for an unmodified daemon.
+/// abbe-sim replay: sends the raw bytes of a recording again, to an unmodified daemon.
 
 #include <fmt/format.h>
 
@@ -27,7 +27,7 @@ struct ReplayOptions {
   bool exit_at_end = false;
 };
 
-/// "air=1502", "parts=/tmp/parts".
+/// Reads options such as "air=1502" and "parts=/tmp/parts".
 Result<void> read_places(const ReplayOptions& options, ReplaySetup& setup) {
   for (const std::string& place : options.places) {
     const auto equals = place.find('=');
@@ -50,7 +50,8 @@ Result<void> read_places(const ReplayOptions& options, ReplaySetup& setup) {
 /// The serial numbers that the daemon expected of its cards when it recorded them.
 void read_serials(const std::string& configuration, std::map<std::string, std::string>& serials) {
   const auto root = parse_toml(configuration, "recorded configuration");
-  if (!root) return;  // of a daemon of another age: the bytes are served all the same
+  // The configuration of another daemon version: the bytes are replayed nevertheless.
+  if (!root) return;
   for (const auto& [table, usual] :
        {std::pair{"counter_card", "counter_card"}, std::pair{"reference", "reference_card"}}) {
     const auto serial = (*root)[table]["serial_number"].value<std::string>();
@@ -131,7 +132,7 @@ Subcommand add_replay(CLI::App& app) {
   // lives as long as the command line's callbacks
   auto options = std::make_shared<ReplayOptions>();
   CLI::App* sub = app.add_subcommand(
-      "replay", "the raw bytes of a recording on the wire again, with their timing");
+      "replay", "send the raw bytes of a recording again, with their original timing");
   sub->add_option("file", options->file, "MCAP recording with raw bytes")
       ->required()
       ->type_name("FILE");
@@ -141,7 +142,7 @@ Subcommand add_replay(CLI::App& app) {
   sub->add_option("--tracker-port", options->setup.tracker_port, "TCP; 0 = any free one");
   sub->add_option("--can-port", options->setup.bus.port, "UDP; 0 = any free one");
   sub->add_option("--can-peer-port", options->setup.bus.peer_port,
-                  "UDP port of the daemon; 0 = whoever speaks first");
+                  "UDP port of the daemon; 0 = the sender of the latest datagram");
   sub->add_option("--can-interface", options->setup.bus.interface,
                   "SocketCAN interface instead of UDP");
   sub->add_option(
@@ -149,8 +150,11 @@ Subcommand add_replay(CLI::App& app) {
          "NAME=PORT or, for a serial line, NAME=PATH: where the device of that name is served "
          "(default: any free port; repeatable)")
       ->type_name("PLACE");
-  sub->add_option("--ports-file", options->ports_file, "as of run")->type_name("FILE");
-  sub->add_flag("--exit-at-end", options->exit_at_end, "leave when everything has been served");
+  sub->add_option("--ports-file", options->ports_file,
+                  "written when all ports listen: lines as of abbe-sim run")
+      ->type_name("FILE");
+  sub->add_flag("--exit-at-end", options->exit_at_end,
+                "exit when the whole recording has been sent");
 
   return {sub, [options] { return replay(*options); }};
 }

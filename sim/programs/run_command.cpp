@@ -1,4 +1,4 @@
-/// abbe-sim run: the stage with real time and real sockets, until it is told to stop.
+/// abbe-sim run: the simulation in real time on real sockets, until SIGINT or SIGTERM.
 
 #include <fmt/format.h>
 #include <unistd.h>
@@ -25,29 +25,29 @@ struct RunOptions {
   std::string truth_out;
 };
 
-/// Says on stderr what a person in front of the machine would see; a bar only where somebody
-/// watches.
-class Narrator {
+/// Prints the progress of the machine on stderr; a progress bar only on a terminal.
+class ProgressDisplay {
  public:
-  explicit Narrator(double speed) : speed_(speed) {}
+  explicit ProgressDisplay(double speed) : speed_(speed) {}
 
-  void look(Simulation& simulation, HostTime now) {
+  void update(Simulation& simulation, HostTime now) {
     const bool client = simulation.tracker() && simulation.tracker()->client_fd() >= 0;
     if (client != client_)
-      fmt::print(stderr, "{}tracker: client {}\n", bar_end(), client ? "connected" : "gone");
+      fmt::print(stderr, "{}tracker: client {}\n", bar_end(),
+                 client ? "connected" : "disconnected");
     client_ = client;
     const VirtualMachine& machine = simulation.machine();
 
     if (machine.started() && !announced_start_) {
       announced_start_ = true;
-      fmt::print(stderr, "{}machine: {} legs, {:.0f} s ({:.0f} s on the wall)\n", bar_end(),
+      fmt::print(stderr, "{}machine: {} legs, {:.0f} s ({:.0f} s of wall-clock time)\n", bar_end(),
                  machine.path().legs(), machine.path().duration_s(),
                  machine.path().duration_s() / speed_);
     }
 
     if (machine.finished() && now >= *machine.finished() && !announced_end_) {
       announced_end_ = true;
-      fmt::print(stderr, "{}machine: path driven, standing\n", bar_end());
+      fmt::print(stderr, "{}machine: path driven, stopped at its end\n", bar_end());
     }
 
     if (announced_start_ && !announced_end_) draw(machine, now);
@@ -94,7 +94,7 @@ int run(const RunOptions& options) {
   if (const auto announced = announce_ports(ports, options.ports_file); !announced)
     return report(announced.error());
   BusThread encoders(**simulation, loop.clock());
-  Narrator narrator(setup->speed);
+  ProgressDisplay progress(setup->speed);
 
   while (!loop.stopped()) {
     std::vector<pollfd> fds;
@@ -103,7 +103,7 @@ int run(const RunOptions& options) {
     const HostTime now = loop.clock().now();
     (*simulation)->poll(now);
     encoders.check();
-    narrator.look(**simulation, now);
+    progress.update(**simulation, now);
   }
 
   return kDone;
@@ -127,7 +127,7 @@ Subcommand add_run(CLI::App& app) {
   sub->add_option("--tracker-port", choices.tracker_port, "TCP; 0 = any free one");
   sub->add_option("--can-port", choices.can_port, "UDP; 0 = any free one");
   sub->add_option("--can-peer-port", choices.can_peer_port,
-                  "UDP port of the daemon; 0 = whoever speaks first");
+                  "UDP port of the daemon; 0 = the sender of the latest datagram");
   sub->add_option("--can-interface", choices.can_interface,
                   "SocketCAN interface instead of UDP: vcan0");
   sub->add_option("--usbip-port", choices.usbip_port, "TCP, of the counter card; 0 = any free one");
@@ -136,11 +136,11 @@ Subcommand add_run(CLI::App& app) {
       ->type_name("FILE");
   sub->add_option("--truth-out", options->truth_out, "write the errors of this machine as CSV")
       ->type_name("FILE");
-  CLI::Option* streaming =
-      sub->add_flag("--start-when-streaming", choices.start_when_streaming,
-                    "move when the tracker has streamed through the standstill (default)");
+  CLI::Option* streaming = sub->add_flag(
+      "--start-when-streaming", choices.start_when_streaming,
+      "move after the standstill, which begins with the tracker's first point (default)");
   sub->add_flag("--start-at-once", choices.start_at_once,
-                "move after the standstill, watched or not")
+                "move after the standstill, without waiting for the tracker")
       ->excludes(streaming);
 
   return {sub, [options] { return run(*options); }};

@@ -1,6 +1,6 @@
 #pragma once
-/// Everything the files say, before the truth is made of it. Each group of tables has a reader of
-/// its own that fills its part.
+/// The content of the files, before the truth is made from it. Each group of tables has its own
+/// reader, which fills its part.
 
 #include <cstdint>
 #include <string>

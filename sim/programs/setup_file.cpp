@@ -11,7 +11,7 @@
 namespace abbe::sim {
 namespace {
 
-/// A tracker, and an encoder on each axis: there whatever the files say.
+/// A tracker, and an encoder on each axis: they exist without an entry in the files.
 void add_usual_devices(SimulationSetup& simulation) {
   simulation.tracker.emplace();
   simulation.bus.emplace();
@@ -24,8 +24,8 @@ void add_usual_devices(SimulationSetup& simulation) {
 }
 
 Result<void> read_files(const SetupChoices& choices, SetupDraft& draft) {
-  // The machine file comes first although [sim] may name it: what [sim] says about a port or a
-  // speed wins.
+  // The machine file is read first, although [sim] may name it: the ports and the speed in [sim]
+  // override those in the machine file.
   if (!choices.config_file.empty()) {
     auto named = read_toml_file(choices.config_file, [&](TomlSection root) {
       std::string machine;

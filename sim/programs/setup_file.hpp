@@ -1,7 +1,7 @@
 #pragma once
-/// What to simulate, from files: the machine description the daemon uses too, and the simulator's
-/// own [sim] table, in the same file or in one of its own. In files lengths are mm, small errors um
-/// and urad; here everything is SI.
+/// The setup of a simulation from files: the machine description, which the daemon reads too, and
+/// the simulator's own [sim] table, in the same file or in another one. In files lengths are in mm,
+/// small errors in um and urad; here everything is SI.
 
 #include <cstdint>
 #include <optional>
@@ -18,7 +18,7 @@ class App;
 
 namespace abbe::sim {
 
-/// What the command line says; it wins over the files.
+/// The options of the command line; they override the files.
 struct SetupChoices {
   std::string config_file;   ///< with a [sim] table; may name the machine file
   std::string machine_file;  ///< with [machine], [axes.*], [target]

@@ -76,7 +76,7 @@ bool TomlSection::number(std::string_view key, double& value, double scale, Numb
   }
 
   if (*seen < range.least || *seen > range.most) {
-    fault(key, fmt::format("{} is out of range", *seen));
+    fault(key, fmt::format("{} is out of range {} to {}", *seen, range.least, range.most));
     return false;
   }
 

@@ -1,7 +1,7 @@
 #pragma once
 /// One table of a TOML file, read key by key. Every fault goes into one list ("file:line:
-/// table.key: what is wrong", at most 20), and keys that nobody asked for are faults of a strict
-/// table.
+/// table.key: what is wrong", at most 20), and in a strict table every key that was not read is a
+/// fault.
 
 #include <toml++/toml.h>
 #include <Eigen/Core>
@@ -42,7 +42,7 @@ inline constexpr double kMicro = 1e-6;
 
 class TomlSection {
  public:
-  /// `table` may be null: then every get() leaves its value alone.
+  /// `table` may be null: then no function changes its value.
   TomlSection(const toml::table* table, std::string name, TomlFaults& faults)
       : table_(table), name_(std::move(name)), faults_(faults) {}
 
@@ -50,8 +50,8 @@ class TomlSection {
   [[nodiscard]] TomlSection child(std::string_view key);
   [[nodiscard]] std::vector<TomlSection> children(std::string_view key);  ///< of an array of tables
 
-  /// Each sets `value` and says true if the key is there and good. `scale` turns the file's unit
-  /// into SI.
+  /// Each sets `value` and returns true if the key is present and valid; else `value` is unchanged.
+  /// `scale` converts the file's unit to SI.
   bool number(std::string_view key, double& value, double scale = 1.0,
               NumberRange range = kAnyNumber);
   bool integer(std::string_view key, std::int64_t& value, std::int64_t least, std::int64_t most);
@@ -61,7 +61,7 @@ class TomlSection {
   bool vector(std::string_view key, Eigen::Vector3d& value, double scale = 1.0);
 
   void fault(std::string_view key, std::string_view what);
-  /// Keys that nobody asked for are faults from here on.
+  /// Adds a fault for every key that has not been read.
   void refuse_unknown_keys();
 
  private:
@@ -74,8 +74,8 @@ class TomlSection {
   std::set<std::string, std::less<>> known_;
 };
 
-/// BadInput ("FILE:LINE: ...") also for a text beyond protocol::TomlBounds, which no parser sees
-/// then.
+/// BadInput ("FILE:LINE: ..."), also for a text that exceeds protocol::TomlBounds; it is not
+/// parsed.
 [[nodiscard]] Result<toml::table> parse_toml(std::string_view text, const std::string& file);
 
 /// Reads the parts of one file that `reader` knows. Io, or BadInput with every fault at once.

@@ -1,4 +1,4 @@
-/// abbe-sim truth: V of the simulated machine at points, to hold an identified model against.
+/// abbe-sim truth: V of the simulated machine at points, to compare an identified model with.
 /// abbe-sim machine: its 21 errors as a table.
 
 #include <fmt/format.h>

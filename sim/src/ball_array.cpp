@@ -17,7 +17,7 @@ using Eigen::Vector3d;
 constexpr double kUmPerM = 1e6;
 constexpr double kReference_C = 20.0;
 
-/// The errors of one array, in the order they are asked for.
+/// Draws the errors of one array; the calls are numbered.
 class ArrayErrors {
  public:
   explicit ArrayErrors(std::uint64_t seed) : seed_(seed) {}
@@ -85,7 +85,7 @@ BallArray as_it_is(const BallArray& stated, const ArrayState& state) {
   for (ArrayBall& ball : array.balls) ball.centre_m += errors.vector(state.u_ball_m);
 
   for (ArrayFace& face : array.faces) {
-    // What turns it about its own normal changes nothing.
+    // The component about the normal has no effect on the plane of the face.
     const Vector3d turn = errors.vector(state.u_block_rad);
     for (Vector3d* direction : {&face.normal, &face.half_1_m, &face.half_2_m})
       *direction = Eigen::AngleAxisd(turn.norm(), turn.stableNormalized()) * *direction;

@@ -1,5 +1,5 @@
 #pragma once
-/// The two ports of can_port.hpp, and what they share.
+/// The two implementations of CanPort and their common code.
 
 #include <sys/socket.h>
 
@@ -13,12 +13,12 @@ namespace abbe::sim {
 [[nodiscard]] Result<std::unique_ptr<CanPort>> open_udp_port(const CanPortOptions& options);
 [[nodiscard]] Result<std::unique_ptr<CanPort>> open_socket_can_port(const CanPortOptions& options);
 
-/// How long ago the kernel took messages in, by its own stamps.
+/// The age of received messages, from the receive timestamps of the kernel.
 class MessageAge {
  public:
-  /// Asks for stamps unless `speed` is 0.
+  /// Switches timestamps on unless `speed` is 0.
   MessageAge(const Socket& socket, double speed);
-  /// In simulated time; zero when the kernel did not say or its clock was stepped meanwhile.
+  /// In simulated time; 0 if there is no timestamp or the system clock was stepped in between.
   [[nodiscard]] std::chrono::nanoseconds of(const msghdr& message) const;
 
  private:

@@ -17,11 +17,13 @@
 namespace abbe::sim {
 namespace {
 
-constexpr std::size_t kMostUnsent = 32u << 20;  // a client this far behind does not read any more
+// a client with more unsent bytes has stopped reading: its connection is closed
+constexpr std::size_t kMostUnsent = 32u << 20;
 
-/// A tracker controller tells it why; I++ DME and Modbus have no word for it.
+/// Refuses a second client. A tracker controller sends the reason; I++ DME and Modbus have no
+/// message for it.
 template <class Controller>
-void turn_away(const Socket& stranger) {
+void refuse_client(const Socket& accepted) {
   if constexpr (std::is_same_v<Controller, IppDmeDevice> ||
                 std::is_same_v<Controller, RecordedDialogue>)
     return;
@@ -29,7 +31,7 @@ void turn_away(const Socket& stranger) {
   const std::size_t size = emscon::encode(
       emscon::ErrorResponse{emscon::Command{}, emscon::Status::MultipleConnectionsNotAllowed},
       std::span(packet));
-  ::send(stranger.get(), packet.data(), size, MSG_DONTWAIT | MSG_NOSIGNAL);
+  ::send(accepted.get(), packet.data(), size, MSG_DONTWAIT | MSG_NOSIGNAL);
 }
 
 }  // namespace
@@ -46,18 +48,18 @@ void ControllerServer<Controller>::poll(HostTime now) {
 template <class Controller>
 void ControllerServer<Controller>::accept_clients(HostTime now) {
   for (;;) {
-    Socket stranger(::accept4(listener_.get(), nullptr, nullptr, SOCK_NONBLOCK | SOCK_CLOEXEC));
-    if (!stranger) return;
+    Socket accepted(::accept4(listener_.get(), nullptr, nullptr, SOCK_NONBLOCK | SOCK_CLOEXEC));
+    if (!accepted) return;
     device_->advance(now);
     if (!device_->accepts()) continue;  // restarting: the connection is closed at once
-    if (client_) read(now);             // it may just have gone
+    if (client_) read(now);             // detects that the client has disconnected
     if (client_) {
-      turn_away<Controller>(stranger);
+      refuse_client<Controller>(accepted);
       continue;
     }
     const int on = 1;
-    setsockopt(stranger.get(), IPPROTO_TCP, TCP_NODELAY, &on, sizeof on);
-    client_ = std::move(stranger);
+    setsockopt(accepted.get(), IPPROTO_TCP, TCP_NODELAY, &on, sizeof on);
+    client_ = std::move(accepted);
     device_->connected(now);
   }
 }

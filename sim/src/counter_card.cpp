@@ -1,4 +1,4 @@
-// The counters and the stream of scans; requests are counter_card_requests.cpp.
+// The counters and the stream of scans; the requests are in counter_card_requests.cpp.
 #include "abbe/sim/counter_card.hpp"
 
 #include <algorithm>
@@ -12,7 +12,7 @@
 namespace abbe::sim {
 namespace {
 
-constexpr std::size_t kEdgesKept = 64;  // asked for again only by the latest scans
+constexpr std::size_t kEdgesKept = 64;  // later scans need no older edges
 
 /// Whole periods of a clock since the epoch of host time.
 std::int64_t clock_count(const ClockSignal& clock, HostTime at) {
@@ -105,7 +105,7 @@ std::uint64_t CounterCard::latched_value(std::size_t channel, HostTime at) {
   const double now = scale_reading(channel, *scale, at);
   const double before = std::exchange(counter.last_reading, now).value_or(now);
 
-  // The latest mark passed is the one nearest to where it is now.
+  // Of the marks passed since the previous scan, the latest is nearest to the current reading.
   const auto first =
       std::upper_bound(scale->marks.begin(), scale->marks.end(), std::min(before, now));
   const auto last =

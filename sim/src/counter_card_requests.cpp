@@ -1,4 +1,4 @@
-// What the card answers on endpoint 0.
+// The card's answers on endpoint 0.
 #include <algorithm>
 #include <utility>
 
@@ -18,7 +18,8 @@ constexpr std::uint8_t kManufacturerString = 1;
 constexpr std::uint8_t kProductString = 2;
 constexpr std::uint8_t kSerialString = 3;
 constexpr std::uint16_t kCounterBits = 0x07;
-constexpr std::uint16_t kModulusBanks = 0x10;  // and above: words of a modulus, whole range here
+// and above: words of the modulus; ignored, the counters use their whole range
+constexpr std::uint16_t kModulusBanks = 0x10;
 
 constexpr std::uint16_t number(Register where) {
   return static_cast<std::uint16_t>(where);
@@ -197,7 +198,7 @@ void CounterCard::write_register(std::uint16_t where, std::uint16_t value, HostT
     case Register::CounterWord0:
     case Register::Timer1Divisor:
     case Register::TriggerControl:
-      return;  // accepted; nothing here depends on them
+      return;  // accepted without effect in the simulation
   }
 }
 
@@ -229,11 +230,11 @@ void CounterCard::control_acquisition(std::uint16_t value, HostTime now) {
     case acquisition::kPacerInternal:
       pacing_ = list_started_ && dma_;
       pacer_began_ = now;
-      next_scan_ = 1;  // the first one period after the start
+      next_scan_ = 1;  // the first scan follows one period after the start
       for (Counter& counter : counters_) counter.last_reading.reset();
       break;
     default:
-      break;  // an external pacer has no signal here
+      break;  // the signal of an external pacer is not simulated
   }
 }
 

@@ -2,8 +2,8 @@
 
 namespace abbe::sim {
 
-/// Where between `before` and `after` `crossed` becomes true, by bisection to the last bit of a
-/// double. Precondition: it is false at `before` and true at `after`.
+/// The value between `before` and `after` at which `crossed` becomes true, by bisection to the last
+/// bit of a double. Precondition: `crossed` is false at `before` and true at `after`.
 template <class Crossed>
 [[nodiscard]] double crossing(double before, double after, const Crossed& crossed) {
   constexpr int kHalvings = 60;

@@ -1,6 +1,6 @@
 #pragma once
-/// Just enough CSV for the simulator's own inputs: a header row, `#` comments, no quotes. Errors
-/// name file, line and column, all of a file at once (at most 20).
+/// A CSV reader for the simulator's own input files: a header row, `#` comments, no quotes. An
+/// error text names file, line and column and lists all errors of a file (at most 20).
 
 #include <optional>
 #include <string>
@@ -13,7 +13,7 @@ namespace abbe::sim {
 
 struct CsvRow {
   std::size_t line = 0;
-  std::vector<std::string_view> cells;  ///< trimmed; they point into the text that was read
+  std::vector<std::string_view> cells;  ///< trimmed; they refer to the text that was read
 };
 
 struct CsvTable {
@@ -38,7 +38,7 @@ class CsvErrors {
 /// means no header was found.
 [[nodiscard]] CsvTable split_csv(std::string_view text, CsvErrors& errors);
 
-/// The finite number in a cell, or an entry in `errors`.
+/// The number in a cell; nullopt and an entry in `errors` if it is not a finite number.
 [[nodiscard]] std::optional<double> csv_number(const CsvTable& table, const CsvRow& row,
                                                std::size_t column, CsvErrors& errors);
 

@@ -42,7 +42,7 @@ Bytes tcp_meaning(Bytes request) {
   return request.subspan(std::min(kUnit, request.size()));
 }
 void tcp_renumber(std::span<std::byte> answer, Bytes, Bytes request) {
-  // Bytes that are no Modbus have no number.
+  // Bytes that are not Modbus have no transaction number.
   const bool numbered =
       answer.size() < kBeforeLength ||
       (answer[kTransactionSize] == std::byte{0} && answer[kTransactionSize + 1] == std::byte{0});
@@ -57,8 +57,8 @@ std::vector<std::byte> tcp_refusal(Bytes request) {
           kIllegalFunction};
 }
 
-// --- Modbus RTU: unit, function, address (2), count (2), CRC (2, low byte first). Only reads are
-// asked.
+// --- Modbus RTU: unit, function, address (2), count (2), CRC (2, low byte first). Only read
+// requests occur.
 
 constexpr std::size_t kRtuReadSize = 8;
 

@@ -30,7 +30,7 @@ void EncoderBus::produce_sync(std::chrono::nanoseconds period, HostTime first) {
   next_sync_ = first;
 }
 
-/// One at most: what was missed is not made up for.
+/// Sends at most one SYNC: a missed SYNC is not sent later.
 void EncoderBus::send_sync(HostTime now) {
   if (now < next_sync_) return;
   const HostTime at = next_sync_ + sync_period_ * ((now - next_sync_) / sync_period_);
@@ -156,7 +156,7 @@ void EncoderBus::inject(const Fault& fault, HostTime now) {
         all_clears_.push_back({until, node.node()});
         break;
       default:
-        break;  // a tracker's fault
+        break;  // not a fault of an encoder
     }
   }
 

@@ -9,7 +9,7 @@
 namespace abbe::sim {
 namespace {
 
-constexpr std::uint32_t kVendor = 0;  // no assigned vendor id: nobody sells this encoder
+constexpr std::uint32_t kVendor = 0;  // no vendor id is assigned to this simulated encoder
 constexpr std::uint8_t kLastCyclicType = 240;
 constexpr std::uint8_t kFirstEventType = 254;
 
@@ -54,14 +54,14 @@ void EncoderNode::delay_until(HostTime until, std::chrono::nanoseconds delay) {
   delay_ = delay;
 }
 
-void EncoderNode::boot(HostTime at, bool forget_objects) {
-  if (forget_objects) objects_.reset();
+void EncoderNode::boot(HostTime at, bool reset_objects) {
+  if (reset_objects) objects_.reset();
   syncs_seen_ = {};
   state_ = can::NodeState::BootUp;
   boot_at_ = at + options_.boot_time;
 }
 
-/// As the machine's control does: TPDO 1 at every SYNC, a heartbeat, operational.
+/// Configures the node as a machine's control does: TPDO 1 at every SYNC, a heartbeat, operational.
 void EncoderNode::configure() {
   constexpr std::uint64_t kEverySync = 1;
   constexpr std::uint64_t kHeartbeat_ms = 100;
@@ -104,7 +104,7 @@ void EncoderNode::on_nmt(const can::NmtMessage& message, HostTime at) {
     case can::NmtCommand::PreOperational:
       state_ = can::NodeState::PreOperational;
       break;
-    // Both forget the PDO configuration; this encoder keeps nothing of it in its memory.
+    // Both reset the PDO configuration: this encoder does not store it in non-volatile memory.
     case can::NmtCommand::ResetNode:
     case can::NmtCommand::ResetCommunication:
       boot(at, true);

@@ -9,7 +9,7 @@ namespace abbe::sim {
 namespace {
 
 constexpr double kMillimetresPerMetre = 1e3;
-// at most 10 a second, says the specification
+// the specification allows at most 10 reports per second
 constexpr auto kFastestReport = std::chrono::milliseconds{100};
 
 using ippdme::Argument;
@@ -22,7 +22,7 @@ std::vector<Argument> arguments_of(const std::string& text) {
   return all;
 }
 
-/// The names of X(),Y(),IJK(): nothing if there is one that no place has.
+/// The names in X(),Y(),IJK(); nullopt if one of them is not a coordinate of a position.
 std::optional<std::vector<std::string>> place_names(const std::vector<Argument>& arguments) {
   std::vector<std::string> names;
   for (const Argument& a : arguments) {
@@ -33,7 +33,7 @@ std::optional<std::vector<std::string>> place_names(const std::vector<Argument>&
   return names;
 }
 
-/// The place of X(1),Y(2),Z(3), what is not given as it is now.
+/// The position X(1),Y(2),Z(3); a coordinate that is not given keeps its current value.
 Eigen::Vector3d place_m(const std::string& arguments, Eigen::Vector3d here_m) {
   const auto point = ippdme::parse_point(arguments);
   for (Eigen::Index i = 0; point && i < 3; ++i)
@@ -62,7 +62,7 @@ void IppDmeDevice::disconnected() {
   session_ = wants_close_ = false;
   queue_.clear();
   move_report_.reset();
-  if (motion_) motion_->unheard = true;
+  if (motion_) motion_->client_gone = true;
   if (!options_.keeps_moving) motion_.reset();
 }
 
@@ -70,7 +70,7 @@ std::vector<std::byte> IppDmeDevice::take_output() {
   return std::exchange(out_, {});
 }
 
-void IppDmeDevice::say(std::string_view line) {
+void IppDmeDevice::send_line(std::string_view line) {
   const auto bytes = std::as_bytes(std::span{line});
   out_.insert(out_.end(), bytes.begin(), bytes.end());
   out_.push_back(std::byte{'\r'});
@@ -79,9 +79,9 @@ void IppDmeDevice::say(std::string_view line) {
 
 void IppDmeDevice::fault(const Command& command, int severity, int code, std::string_view text) {
   const std::string number = std::to_string(code);
-  say(ippdme::to_string(command.tag) + " ! Error(" + std::to_string(severity) + "," +
-      std::string(4 - std::min<std::size_t>(4, number.size()), '0') + number + "," +
-      command.method + ",\"" + std::string(text) + "\")");
+  send_line(ippdme::to_string(command.tag) + " ! Error(" + std::to_string(severity) + "," +
+            std::string(4 - std::min<std::size_t>(4, number.size()), '0') + number + "," +
+            command.method + ",\"" + std::string(text) + "\")");
   failed_ = failed_ || severity >= 2;
 }
 
@@ -110,7 +110,7 @@ void IppDmeDevice::inject(const Fault& fault, HostTime now) {
   constexpr int kSurfaceNotFound = 1006;
   constexpr int kOutOfLimits = 2500;
   if (fault.kind == FaultKind::Mute) {
-    disconnected();  // it forgets what it was about
+    disconnected();  // discards the session and the queued commands
     motion_.reset();
     mute_until_ = now + seconds_to_ns(fault.duration_s);
   }
@@ -119,17 +119,17 @@ void IppDmeDevice::inject(const Fault& fault, HostTime now) {
   if (fault.kind == FaultKind::EmergencyStop)
     press_emergency_stop(now, now + seconds_to_ns(fault.duration_s));
   if (fault.kind == FaultKind::ErrorReport) report_error(static_cast<int>(fault.value));
-  if (fault.kind == FaultKind::OddTag) say("98765 %");
+  if (fault.kind == FaultKind::OddTag) send_line("98765 %");
   if (fault.kind == FaultKind::NotAscii)
-    say("E0000 ! Error(1,0504,Maschine,\"Druckluft zu niedrig f\xFCr T\xE4ster\")");
+    send_line("E0000 ! Error(1,0504,Maschine,\"Druckluft zu niedrig f\xFCr T\xE4ster\")");
   if (fault.kind == FaultKind::RefuseTouch)
     refuse_touch_ = fault.value > 0.0 ? static_cast<int>(fault.value) : kSurfaceNotFound;
   if (fault.kind == FaultKind::RefuseWay)
     refuse_way_ = fault.value > 0.0 ? static_cast<int>(fault.value) : kOutOfLimits;
-  if (fault.kind == FaultKind::LineGarbage) say("\x01 this is no line of I++ DME");
+  if (fault.kind == FaultKind::LineGarbage) send_line("\x01 this is no line of I++ DME");
 }
 
-// --- what comes in
+// --- received lines
 
 void IppDmeDevice::receive(std::span<const std::byte> bytes, HostTime now) {
   advance(now);
@@ -139,12 +139,12 @@ void IppDmeDevice::receive(std::span<const std::byte> bytes, HostTime now) {
     bytes = bytes.subspan(taken);
     while (const auto line = framer_->next()) {
       if (!*line) {
-        say("E0000 ! Error(3,0007,Server,\"Illegal character\")");
+        send_line("E0000 ! Error(3,0007,Server,\"Illegal character\")");
         framer_->reset();
         return;
       }
       if (!std::ranges::all_of(**line, [](char c) { return c >= ' ' && c <= '~'; })) {
-        say("E0000 ! Error(3,0007,Server,\"Illegal character\")");
+        send_line("E0000 ! Error(3,0007,Server,\"Illegal character\")");
         continue;
       }
       on_line(**line, now);
@@ -160,8 +160,8 @@ void IppDmeDevice::on_line(std::string_view line, HostTime now) {
   const auto parsed = ippdme::parse_command(line);
   if (!parsed) {
     const bool tag = parsed.error() == ippdme::LineError::BadTag;
-    say(tag ? "E0000 ! Error(2,0001,Server,\"Illegal tag\")"
-            : "E0000 ! Error(3,0008,Server,\"Protocol error\")");
+    send_line(tag ? "E0000 ! Error(2,0001,Server,\"Illegal tag\")"
+                  : "E0000 ! Error(3,0008,Server,\"Protocol error\")");
     return;
   }
 
@@ -191,7 +191,7 @@ void IppDmeDevice::on_event(const Command& command, HostTime now) {
     data(command.tag, failed_ ? "ErrStatus(1)" : "ErrStatus(0)");
   } else if (command.method == "OnMoveReportE" && session_) {
     if (!carry_out_reports(command, now)) return;
-    return;  // goes on: it is complete when the session ends
+    return;  // stays active until the session ends
   } else {
     fault(command, 2, 501, "Unsupported command");
   }
@@ -201,7 +201,7 @@ void IppDmeDevice::on_event(const Command& command, HostTime now) {
 
 void IppDmeDevice::abort(HostTime now) {
   position_m_ = reading_m(now);
-  if (motion_ && !motion_->unheard) queue_.push_front(motion_->command);
+  if (motion_ && !motion_->client_gone) queue_.push_front(motion_->command);
   motion_.reset();
   for (const Command& command : queue_) {
     fault(command, 2, 6, "Transaction aborted");
@@ -211,7 +211,7 @@ void IppDmeDevice::abort(HostTime now) {
   failed_ = true;
 }
 
-/// An error that is of no command.
+/// Sends an error that belongs to no command.
 void IppDmeDevice::report_error(int severity) {
   const int code = severity >= 9 ? 503 : severity >= 3 ? 1009 : severity == 2 ? 1001 : 504;
   fault({ippdme::kUnsolicited, "Machine", {}}, severity, code, "From the simulation");
@@ -223,15 +223,15 @@ void IppDmeDevice::press_emergency_stop(HostTime now, HostTime pulled_out_at) {
   motion_.reset();
   queue_.clear();
   failed_ = true;
-  say("E0000 ! Error(3,0500,Machine,\"Emergency stop\")");
+  send_line("E0000 ! Error(3,0500,Machine,\"Emergency stop\")");
 }
 
 void IppDmeDevice::touch_by_hand(const Eigen::Vector3d& reading_m) {
   ++touches_;
-  say("E0000 # PtMeas(" + place({"X", "Y", "Z"}, reading_m) + ")");
+  send_line("E0000 # PtMeas(" + place({"X", "Y", "Z"}, reading_m) + ")");
 }
 
-// --- what is due
+// --- due actions
 
 HostTime IppDmeDevice::next_due() const {
   HostTime due = HostTime::max();
@@ -265,9 +265,10 @@ void IppDmeDevice::begin_next(HostTime now) {
 void IppDmeDevice::carry_out(const Command& command, HostTime now) {
   const bool always = command.method == "StartSession" || command.method == "EndSession";
   if (!session_ && !always) return fault(command, 3, 8, "Protocol error");
-  const bool mends =
+  const bool allowed_after_error =
       command.method == "ClearAllErrors" || command.method == "GetXtdErrStatus" || always;
-  if (failed_ && !mends) return fault(command, 2, 514, "Use ClearAllErrors to continue");
+  if (failed_ && !allowed_after_error)
+    return fault(command, 2, 514, "Use ClearAllErrors to continue");
   if (now < emergency_until_ && command.method == "ClearAllErrors")
     return fault(command, 3, 500, "Emergency stop");
   if (carry_out_session(command) || carry_out_tools(command) || carry_out_motion(command, now) ||
@@ -419,7 +420,7 @@ void IppDmeDevice::end_motion() {
   const Motion motion = *std::exchange(motion_, std::nullopt);
   position_m_ = motion.to_m;
   homed_ = homed_ || motion.homing;
-  if (motion.unheard) return;
+  if (motion.client_gone) return;
 
   if (motion.probing && refuse_touch_ != 0) {
     fault(motion.command, 2, std::exchange(refuse_touch_, 0), "Refused by the simulation");

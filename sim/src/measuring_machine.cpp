@@ -10,12 +10,12 @@
 namespace abbe::sim {
 namespace {
 
-// far below any sphere and tip: the first contact is not stepped over
+// much smaller than any sphere and tip: no contact is skipped
 constexpr double kStep_m = 50e-6;
 constexpr int kHalvings = 45;  // 50 um / 2^45 is below a femtometre
 
-/// To the nearest point of the square; a direction in its plane is chosen, as no file says how it
-/// lies.
+/// Distance to the nearest point of the square. The direction of its edges in the plane is
+/// arbitrary: the files do not state it.
 double distance_m(const Face& face, const Eigen::Vector3d& p_m) {
   const Eigen::Vector3d z = face.normal.normalized();
   const Eigen::Vector3d x = z.unitOrthogonal();
@@ -27,7 +27,7 @@ double distance_m(const Face& face, const Eigen::Vector3d& p_m) {
   return Eigen::Vector3d(beyond(from.dot(x)), beyond(from.dot(y)), from.dot(z)).norm();
 }
 
-/// Distance of the tip's surface to the nearest surface when the scales read q.
+/// Distance between the tip's surface and the nearest surface at scale reading q.
 double clearance_m(const MeasuringMachine& machine, const Eigen::Vector3d& q_m) {
   const Eigen::Vector3d tip_m = position_m(machine.truth, q_m);
   double nearest = std::numeric_limits<double>::infinity();

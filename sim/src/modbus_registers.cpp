@@ -10,7 +10,7 @@ namespace {
 using Registers = std::vector<SimulatedRegister>;
 using std::chrono::nanoseconds;
 
-/// Vaisala: least significant word first, so 30.56 %RH = 41F47AE1h lies as 7AE1h 41F4h.
+/// Vaisala: least significant word first, so 30.56 %RH = 41F47AE1h is stored as 7AE1h 41F4h.
 void put_vaisala_float(Registers& to, std::uint8_t unit, std::uint16_t address, double value) {
   const auto bits = std::bit_cast<std::uint32_t>(static_cast<float>(value));
   to.push_back({unit, RegisterSpace::Holding, address, static_cast<std::uint16_t>(bits & 0xFFFFu)});
@@ -22,7 +22,7 @@ std::uint16_t tenths(double value) {
   return static_cast<std::uint16_t>(static_cast<std::int16_t>(std::lround(10.0 * value)));
 }
 
-/// Magnus formula; good enough for a simulated display.
+/// Magnus formula; its accuracy is sufficient for a simulated display.
 double dew_point_C(double t_C, double rh_percent) {
   const double g = std::log(std::max(rh_percent, 0.1) / 100.0) + 17.62 * t_C / (243.12 + t_C);
   return 243.12 * g / (17.62 - g);

@@ -24,10 +24,9 @@ constexpr std::uint8_t kBusy = 6;
 constexpr std::uint8_t kGatewayTargetSilent = 11;
 constexpr std::string_view kGarbage = "no answer of any Modbus device";
 
+/// Does not close the sockets: objects of Socket own them.
 struct FreeContext {
-  void operator()(modbus_t* context) const {
-    modbus_free(context);
-  }  // the sockets have owners of their own
+  void operator()(modbus_t* context) const { modbus_free(context); }
 };
 using Context = std::unique_ptr<modbus_t, FreeContext>;
 struct FreeMapping {
@@ -57,7 +56,7 @@ struct ModbusServer::State {
   PseudoTerminal terminal;
   Context context;
   std::vector<Query> waiting;
-  std::vector<std::pair<Fault, HostTime>> faults;  ///< with their ends
+  std::vector<std::pair<Fault, HostTime>> faults;  ///< each with its end time
 
   [[nodiscard]] bool serial() const {
     return std::holds_alternative<ModbusPtyEndpoint>(options.endpoint);
@@ -108,8 +107,10 @@ void ModbusServer::State::end_faults(HostTime now) {
   const bool was_out = active(FaultKind::Disconnect) != nullptr;
   std::erase_if(faults, [now](const auto& f) { return f.second <= now; });
   if (!was_out || active(FaultKind::Disconnect) != nullptr) return;
-  if (!plug_in())
-    faults.push_back({{.kind = FaultKind::Disconnect}, now + std::chrono::seconds{1}});  // taken
+  if (!plug_in()) {
+    // The port is in use: try again after a second.
+    faults.push_back({{.kind = FaultKind::Disconnect}, now + std::chrono::seconds{1}});
+  }
 }
 
 void ModbusServer::State::accept_clients() {
@@ -117,7 +118,7 @@ void ModbusServer::State::accept_clients() {
     Socket client{::accept4(listener.get(), nullptr, nullptr, SOCK_NONBLOCK | SOCK_CLOEXEC)};
     if (!client) return;
     if (clients.size() == kMostClients)
-      clients.erase(clients.begin());  // the eldest may be long dead
+      clients.erase(clients.begin());  // the oldest connection may be dead
     clients.push_back(std::move(client));
   }
 }
@@ -132,7 +133,7 @@ void ModbusServer::State::receive(HostTime now) {
   if (terminal.fd() >= 0 && readable(terminal.fd())) (void)receive_from(terminal.fd(), now);
 }
 
-/// False: the client is gone, or speaks something else.
+/// false: the client has disconnected, or its bytes are not Modbus.
 bool ModbusServer::State::receive_from(int fd, HostTime now) {
   std::array<std::uint8_t, MODBUS_MAX_ADU_LENGTH> bytes{};
   modbus_set_socket(context.get(), fd);

@@ -6,8 +6,8 @@
 namespace abbe::sim {
 namespace {
 
-/// The finaliser of SplitMix64 [Steele, Lea, Flood 2014]: a bijection that scatters neighbouring
-/// inputs.
+/// The finaliser of SplitMix64 [Steele, Lea, Flood 2014]: a bijection that maps
+/// neighbouring inputs to unrelated outputs.
 std::uint64_t scatter(std::uint64_t x) {
   x += 0x9e3779b97f4a7c15u;
   x = (x ^ (x >> 30)) * 0xbf58476d1ce4e5b9u;
@@ -17,8 +17,8 @@ std::uint64_t scatter(std::uint64_t x) {
 
 double unit(std::uint64_t seed, std::uint64_t stream, std::uint64_t index) {
   const std::uint64_t bits = scatter(scatter(scatter(seed) ^ stream) ^ index);
-  return (static_cast<double>(bits >> 11) + 0.5) *
-         0x1.0p-53;  // 53 random bits, never 0 and never 1
+  // 53 random bits; the result is never 0 and never 1
+  return (static_cast<double>(bits >> 11) + 0.5) * 0x1.0p-53;
 }
 
 }  // namespace

@@ -35,7 +35,7 @@ Result<PathMotion> PathMotion::plan(const PathPlan& plan) {
     leg.from_m = motion.last_m_;
     leg.length_m = chord.norm();
     leg.unit = chord / leg.length_m;
-    // A leg too short to reach the feed turns at its middle.
+    // A leg too short to reach the feed decelerates from its middle on.
     leg.speed_m_per_s = std::min(feed, std::sqrt(leg.length_m * plan.acceleration_m_per_s2));
     leg.ramp_s = leg.speed_m_per_s / plan.acceleration_m_per_s2;
     leg.cruise_s = leg.length_m / leg.speed_m_per_s - leg.ramp_s;
@@ -78,7 +78,7 @@ AxisMotion PathMotion::on_leg(const Leg& leg, double time_s) const {
 AxisMotion PathMotion::at(double time_s) const {
   if (legs_.empty()) return {first_m_, Eigen::Vector3d::Zero(), {}};
   if (time_s >= end_s_) return {last_m_, Eigen::Vector3d::Zero(), legs_.back().direction};
-  // The leg is the first one not yet over: its dwell belongs to it.
+  // The current leg is the first one that has not ended; the dwell before a leg is part of it.
   const auto leg = std::partition_point(legs_.begin(), legs_.end(), [&](const Leg& l) {
     return l.begin_s + 2.0 * l.ramp_s + l.cruise_s <= time_s;
   });

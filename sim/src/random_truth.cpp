@@ -12,8 +12,8 @@ namespace abbe::sim {
 namespace {
 
 constexpr std::uint64_t kHarmonics = 4;
-// Typical proportions of a medium machining centre: rotations of a tenth of a translation per
-// 10 mm, before scaling.
+// Typical proportions of a medium machining centre, before scaling: a rotation of 60 urad moves a
+// point at 0.5 m by 30 um, the amplitude of the translations.
 constexpr double kTranslation_m = 30e-6;
 constexpr double kRotation_rad = 60e-6;
 constexpr double kSquareness_rad = 60e-6;
@@ -29,8 +29,8 @@ std::vector<double> nodes_over(const AxisRange& range, double spacing_m) {
   return nodes;
 }
 
-/// A few harmonics of falling amplitude and random phase: smooth, neither periodic over the axis
-/// nor symmetric about it.
+/// A sum of harmonics with decreasing amplitude and random phase: smooth, neither periodic over the
+/// axis nor symmetric.
 ErrorFunction smooth_random(const std::vector<double>& nodes, double amplitude,
                             std::uint64_t sequence, const RandomTruthOptions& options) {
   std::vector<double> values(nodes.size(), 0.0);
@@ -63,9 +63,10 @@ ErrorFunction zero_at(const ErrorFunction& f, double reference_m) {
   return minus_line(f, f.at(reference_m), f.at(reference_m));
 }
 
-/// What the target feels of the rotations of `axis` that no data with one target can tell from
-/// translations: all of the last axis, and of the middle one that about the direction of the last.
-Eigen::Vector3d felt_at_target(const TruthMachine& machine, Axis axis, double at_m) {
+/// The displacement of the target by those rotations of `axis` that data with one target cannot
+/// separate from translations: all rotations of the last axis, and of the middle axis the rotation
+/// about the direction of the last axis.
+Eigen::Vector3d displacement_at_target(const TruthMachine& machine, Axis axis, double at_m) {
   const auto& error = machine.axis(axis).error;
   const Eigen::Vector3d rotation(error[3].at(at_m), error[4].at(at_m), error[5].at(at_m));
   if (axis == machine.order[2]) return rotation.cross(machine.target_offset_m);
@@ -77,8 +78,8 @@ Eigen::Vector3d felt_at_target(const TruthMachine& machine, Axis axis, double at
 void remove_rigid_part(TruthMachine& machine, Axis axis) {
   AxisTruth& a = machine.axis(axis);
   for (std::size_t m = 3; m < kMotions; ++m) a.error[m] = zero_at(a.error[m], a.range.reference_m);
-  const Eigen::Vector3d first = felt_at_target(machine, axis, a.range.min_m);
-  const Eigen::Vector3d last = felt_at_target(machine, axis, a.range.max_m);
+  const Eigen::Vector3d first = displacement_at_target(machine, axis, a.range.min_m);
+  const Eigen::Vector3d last = displacement_at_target(machine, axis, a.range.max_m);
   for (std::size_t m = 0; m < 3; ++m) {
     const auto k = static_cast<Eigen::Index>(m);
     ErrorFunction& f = a.error[m];
@@ -130,7 +131,7 @@ TruthMachine random_truth(TruthMachine machine, const RandomTruthOptions& option
   machine.squareness.B0Z_rad = kSquareness_rad * gaussian(options.seed, NoiseStream::Squareness, 1);
   machine.squareness.C0Y_rad = kSquareness_rad * gaussian(options.seed, NoiseStream::Squareness, 2);
 
-  // V is linear in the errors but for the second order, which the second pass takes up.
+  // V is linear in the errors except for the second order, which the second pass corrects.
   for (int pass = 0; pass < 2; ++pass) scale(machine, options.mean_error_m / mean_error_m(machine));
   add_backlash(machine, options);
   return machine;

@@ -41,7 +41,7 @@ RecordedBus::RecordedBus(std::unique_ptr<CanPort> port, const RecordedDevice& de
     if (!view) continue;
     for (can::CanFrame frame; view->next(frame);) take(frame, block.to_device, block.time);
   }
-  if (external()) state_ = can::NodeState::Operational;  // by the machine's control
+  if (external()) state_ = can::NodeState::Operational;  // started by the machine's control
 }
 
 void RecordedBus::take(const can::CanFrame& frame, bool to_device, HostTime time) {
@@ -62,9 +62,9 @@ void RecordedBus::take(const can::CanFrame& frame, bool to_device, HostTime time
   if (can::decode_sync(frame)) {
     ++foreign_syncs_;
     foreign_sync_ = true;
-    spoken_.push_back({time, frame});
+    unsolicited_.push_back({time, frame});
   } else if (can::cob::is_tpdo(frame) && foreign_sync_) {
-    spoken_.push_back({time, frame});
+    unsolicited_.push_back({time, frame});
   } else if (can::cob::is_tpdo(frame)) {
     if (!cycles_.empty()) cycles_.back().answers.push_back({time - cycles_.back().sync, frame});
   } else if (is_function(frame, can::cob::kSdoResponse)) {
@@ -74,21 +74,23 @@ void RecordedBus::take(const can::CanFrame& frame, bool to_device, HostTime time
     asked_.erase(asked);
   } else {
     if (const auto beat = can::decode_heartbeat(frame)) nodes_.insert(beat->node);
-    spoken_.push_back({time, frame});
+    unsolicited_.push_back({time, frame});
   }
 }
 
 void RecordedBus::poll(HostTime now) {
   for (const ArrivedFrame& arrived : port_->receive()) on_frame(arrived.frame, now);
   send_late(now);
-  if (leads_ && external() && port_->has_listener()) timeline_.start(spoken_.front().time, now);
+  if (leads_ && external() && port_->has_listener())
+    timeline_.start(unsolicited_.front().time, now);
   keep_alive(now);
-  if (!timeline_.running()) next_spoken_ = 0;
-  for (; next_spoken_ < spoken_.size() && timeline_.due(spoken_[next_spoken_].time) <= now;
-       ++next_spoken_) {
-    // What was said before the start has been said by keep_alive.
-    if (now - timeline_.due(spoken_[next_spoken_].time) < kOutOfStep)
-      port_->send(std::span(&spoken_[next_spoken_].frame, 1));
+  if (!timeline_.running()) next_unsolicited_ = 0;
+  for (; next_unsolicited_ < unsolicited_.size() &&
+         timeline_.due(unsolicited_[next_unsolicited_].time) <= now;
+       ++next_unsolicited_) {
+    // Frames from before the start are skipped: keep_alive() has sent heartbeats instead.
+    if (now - timeline_.due(unsolicited_[next_unsolicited_].time) < kOutOfStep)
+      port_->send(std::span(&unsolicited_[next_unsolicited_].frame, 1));
   }
 }
 
@@ -96,12 +98,13 @@ HostTime RecordedBus::next_due() const {
   const HostTime late = late_.empty() ? HostTime::max() : late_.front().time;
   if (!timeline_.running())
     return std::min(late, port_->has_listener() ? next_beat_ : HostTime::max());
-  return std::min(
-      late, next_spoken_ < spoken_.size() ? timeline_.due(spoken_[next_spoken_].time) : next_beat_);
+  return std::min(late, next_unsolicited_ < unsolicited_.size()
+                            ? timeline_.due(unsolicited_[next_unsolicited_].time)
+                            : next_beat_);
 }
 
 void RecordedBus::keep_alive(HostTime now) {
-  const bool over = next_spoken_ >= spoken_.size();
+  const bool over = next_unsolicited_ >= unsolicited_.size();
   if ((timeline_.running() && !over) || !port_->has_listener() || now < next_beat_) return;
   next_beat_ = now + kBeat;
   std::vector<can::CanFrame> beats;
@@ -121,8 +124,8 @@ void RecordedBus::on_frame(const can::CanFrame& frame, HostTime now) {
       nmt->command != can::NmtCommand::ResetCommunication)
     return;
   state_ = can::NodeState::PreOperational;
-  if (timeline_.running() && next_spoken_ < spoken_.size())
-    return;  // they boot when they did, if they did
+  if (timeline_.running() && next_unsolicited_ < unsolicited_.size())
+    return;  // the recorded boot-up messages follow at their time
 
   for (const can::NodeId node : nodes_) {
     if (nmt->node != can::kAllNodes && nmt->node != node) continue;
@@ -157,7 +160,8 @@ void RecordedBus::on_sync(HostTime now) {
   answer(cycles_[cycle], now);
 }
 
-/// At once what came within two milliseconds: how long a node takes is no fault.
+/// Answers recorded within 2 ms are sent at once: this response time is normal. Later answers keep
+/// their delay, which is part of a recorded fault.
 void RecordedBus::answer(const Cycle& cycle, HostTime now) {
   constexpr auto kAtOnce = 2ms;
   std::vector<can::CanFrame> at_once;
@@ -168,12 +172,13 @@ void RecordedBus::answer(const Cycle& cycle, HostTime now) {
       late_.push_back({now + answer.delay, answer.frame});
     }
   }
-  std::ranges::stable_sort(late_, {}, &Spoken::time);
+  std::ranges::stable_sort(late_, {}, &Unsolicited::time);
   port_->send(at_once);
 }
 
 void RecordedBus::send_late(HostTime now) {
-  const auto due = std::ranges::find_if(late_, [now](const Spoken& s) { return s.time > now; });
+  const auto due =
+      std::ranges::find_if(late_, [now](const Unsolicited& s) { return s.time > now; });
   for (auto it = late_.begin(); it != due; ++it) port_->send(std::span(&it->frame, 1));
   late_.erase(late_.begin(), due);
 }
@@ -181,7 +186,7 @@ void RecordedBus::send_late(HostTime now) {
 void RecordedBus::on_sdo(const can::CanFrame& frame) {
   const auto known = sdo_.find({frame.id, first_eight(frame)});
   if (known == sdo_.end()) {
-    // Nobody asked this when the recording was made: general error, for the same object.
+    // The request is not in the recording: SDO abort "general error" for the same object.
     const std::uint32_t id = can::cob::kSdoResponse + (frame.id & kNode);
     const can::CanFrame abort = can::standard_frame(
         id, {0x80, frame.byte(1), frame.byte(2), frame.byte(3), 0x00, 0x00, 0x00, 0x08});

@@ -11,8 +11,6 @@ namespace {
 using namespace std::chrono_literals;
 using Outcome = ControlAnswer::Outcome;
 
-// A host that halts the scan so long before it did then has reasons of its own.
-
 constexpr auto kStatus = quad08::read(quad08::Register::Acquisition);
 
 bool is_vendor(const usb::Setup& setup) {
@@ -58,7 +56,7 @@ void RecordedCard::read_message(std::span<const std::byte> message, HostTime tim
 }
 
 void RecordedCard::read_request(const usb::Setup& setup, HostTime time) {
-  // A host asks for the version first thing, twice.
+  // A host begins a connection with two requests for the firmware version.
   const bool version = setup == quad08::read_firmware_version();
   const bool opens = version && (versions_ == 0 || versions_ == 2);
   if (opens || connections_.empty())
@@ -98,13 +96,13 @@ ControlAnswer RecordedCard::answer(const usb::Setup& setup, HostTime now) {
   if (setup == quad08::read_firmware_version() && !std::exchange(opened_, true)) open();
   if (running_ && setup == kStatus) return status_at(recorded(now));
   if (std::exchange(running_, false)) {
-    resuming_ = halts_before_its_time(now);
+    resuming_ = halts_early(now);
     flushing_ = !resuming_;
   }
   return resuming_ ? unrecorded(setup, now) : next_answer(setup, now);
 }
 
-/// The next connection; after the last one the first again.
+/// Selects the next recorded connection; after the last one the first again.
 void RecordedCard::open() {
   connection_ = connection_ ? (*connection_ + 1) % connections_.size() : 0;
   next_ = connections_[*connection_].begins;
@@ -117,7 +115,7 @@ void RecordedCard::open() {
   resuming_ = false;
 }
 
-/// The latest one asked for until then.
+/// The answer to the latest status request at this recorded time.
 ControlAnswer RecordedCard::status_at(HostTime recorded) const {
   constexpr std::byte kListRuns{quad08::Status::kPipeFull};
   const Scan& scan = scans_[*scan_];
@@ -145,7 +143,9 @@ ControlAnswer RecordedCard::next_answer(const usb::Setup& setup, HostTime now) {
   return *recorded;
 }
 
-/// Nobody asked this then. A card that was silent by then is silent; else it does what it is told.
+/// The answer to a request that is not in the recording. There is none if the recorded card left a
+/// later request of this connection unanswered (the last connection excepted), else the card
+/// accepts the request.
 ControlAnswer RecordedCard::unrecorded(const usb::Setup& setup, HostTime now) {
   const auto end = exchanges_.begin() + static_cast<std::ptrdiff_t>(end_of_connection());
   const auto from = std::min(exchanges_.begin() + static_cast<std::ptrdiff_t>(next_), end);
@@ -189,7 +189,8 @@ bool RecordedCard::has_rest() const {
   return scan_ && next_transfer_ < scans_[*scan_].transfers.size();
 }
 
-bool RecordedCard::halts_before_its_time(HostTime now) const {
+/// The host halts the scan more than kOutOfStep earlier than in the recording: it will restart it.
+bool RecordedCard::halts_early(HostTime now) const {
   if (!has_rest()) return false;
   const Scan& scan = scans_[*scan_];
   if (scan.halts >= exchanges_.size()) return true;
@@ -229,7 +230,7 @@ HostTime RecordedCard::available_at(std::size_t bytes) const {
   return due(transfers.back().time);
 }
 
-void RecordedCard::host_gone() {
+void RecordedCard::host_disconnected() {
   fifo_.clear();
   opened_ = running_ = flushing_ = resuming_ = false;
 }

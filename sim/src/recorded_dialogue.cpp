@@ -9,7 +9,8 @@ RecordedDialogue::RecordedDialogue(const RecordedDevice& device, const DialogueW
     : wire_(wire), serial_(device.kind == RecordedKind::ModbusRtu) {
   for (const RecordedBlock& block : device.blocks) take(block);
   if (connections_.empty()) connections_.emplace_back();
-  // What was asked when the recording ended is no silence of the device.
+  // A request without an answer at the end of the recording is dropped: the recording may have
+  // ended before the answer.
   auto& last = connections_.back().exchanges;
   if (!last.empty() && last.back().answer.empty()) last.pop_back();
   index();
@@ -82,12 +83,12 @@ void RecordedDialogue::answer(std::span<const std::byte> request, HostTime now) 
     due_.push_back({now, wire_.refusal(request)});
     return;
   }
-  const std::size_t turn = answered_[meaning]++;
-  schedule(connection.exchanges[known->second[std::min(turn, known->second.size() - 1)]], request,
-           now);
+  const std::size_t repetition = answered_[meaning]++;
+  schedule(connection.exchanges[known->second[std::min(repetition, known->second.size() - 1)]],
+           request, now);
 }
 
-/// The pieces of an answer are renumbered as a whole: a number may be torn in two.
+/// The pieces of an answer are renumbered as a whole: a number may be split between two pieces.
 void RecordedDialogue::schedule(const Exchange& exchange, std::span<const std::byte> request,
                                 HostTime now) {
   std::vector<std::byte> whole;

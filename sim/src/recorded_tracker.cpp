@@ -54,7 +54,7 @@ RecordedTracker::RecordedTracker(const RecordedDevice& device, ReplayTimeline& t
 void RecordedTracker::read(const RecordedBlock& block) {
   Connection& connection = connections_.back();
   if (block.lost()) {
-    connection.spoken.push_back({block.time, {}, true});
+    connection.unsolicited.push_back({block.time, {}, true});
     return;
   }
 
@@ -65,7 +65,7 @@ void RecordedTracker::read(const RecordedBlock& block) {
 
   if (block.hole_before) framer_.resync();
   if (connection.garbled) {
-    connection.spoken.push_back({block.time, block.bytes});
+    connection.unsolicited.push_back({block.time, block.bytes});
     return;
   }
 
@@ -76,14 +76,14 @@ void RecordedTracker::read(const RecordedBlock& block) {
 
   if (!framer_.broken()) return;
   const auto refused = framer_.refused();
-  connection.spoken.push_back({block.time, {refused.begin(), refused.end()}});
+  connection.unsolicited.push_back({block.time, {refused.begin(), refused.end()}});
   connection.garbled = true;
 }
 
 void RecordedTracker::take(std::span<const std::byte> packet, HostTime time) {
   const Head head = head_of(packet);
   if (head.type == kCommandType) return take_answer(head.command, packet, time);
-  connections_.back().spoken.push_back({time, {packet.begin(), packet.end()}});
+  connections_.back().unsolicited.push_back({time, {packet.begin(), packet.end()}});
 }
 
 void RecordedTracker::take_answer(std::int32_t command, std::span<const std::byte> packet,
@@ -93,9 +93,9 @@ void RecordedTracker::take_answer(std::int32_t command, std::span<const std::byt
   auto exchange = std::ranges::find_if(
       exchanges, [](const Exchange& e) { return e.answers.size() < e.wanted; });
 
-  // A recording that began in the middle has answers without questions.
+  // A recording that began during a session contains answers without commands.
   if (exchange == exchanges.end()) exchange = exchanges.insert(exchange, {.asked = time});
-  if (command == kReflectors) {  // the one command with an answer per reflector
+  if (command == kReflectors) {  // the only command with several answers: one per reflector
     const auto first = emscon::decode_answer(packet);
     const auto* reflectors = first ? std::get_if<emscon::ReflectorsAnswer>(&*first) : nullptr;
     if (reflectors != nullptr)
@@ -110,7 +110,7 @@ void RecordedTracker::take_answer(std::int32_t command, std::span<const std::byt
 
 std::size_t RecordedTracker::packets() const {
   std::size_t sum = 0;
-  for (const Connection& connection : connections_) sum += connection.spoken.size();
+  for (const Connection& connection : connections_) sum += connection.unsolicited.size();
   return sum;
 }
 
@@ -146,11 +146,11 @@ void RecordedTracker::answer(std::span<const std::byte> request, HostTime now) {
     std::array<std::byte, emscon::kMaxAnswerSize> refusal{};
     const emscon::Acknowledge no{static_cast<emscon::Command>(command),
                                  emscon::Status::NotImplemented};
-    return say(std::span(refusal).first(emscon::encode(emscon::Answer{no}, refusal)));
+    return send_packet(std::span(refusal).first(emscon::encode(emscon::Answer{no}, refusal)));
   }
 
-  const std::size_t turn = answered_[command]++;
-  const Exchange& exchange = known->second[std::min(turn, known->second.size() - 1)];
+  const std::size_t repetition = answered_[command]++;
+  const Exchange& exchange = known->second[std::min(repetition, known->second.size() - 1)];
   if (exchange.answers.empty()) return;
   Due due{now + (exchange.answered - exchange.asked), exchange.answers};
   if (command == kStart && accepted(exchange.answers.front())) due.starts = exchange.answered;
@@ -159,7 +159,7 @@ void RecordedTracker::answer(std::span<const std::byte> request, HostTime now) {
 }
 
 void RecordedTracker::carry_out(const Due& due) {
-  for (const Packet& packet : due.packets) say(packet);
+  for (const Packet& packet : due.packets) send_packet(packet);
   if (due.stops) stopped_ = true;
   if (!due.starts) return;
   anchored_ = true;
@@ -167,33 +167,34 @@ void RecordedTracker::carry_out(const Due& due) {
   timeline_.restart(*due.starts, due.time);
 }
 
-HostTime RecordedTracker::spoken_due() const {
-  if (!connected_at_ || next_ >= connection().spoken.size() || stopped_) return HostTime::max();
-  const HostTime time = connection().spoken[next_].time;
+HostTime RecordedTracker::unsolicited_due() const {
+  if (!connected_at_ || next_ >= connection().unsolicited.size() || stopped_)
+    return HostTime::max();
+  const HostTime time = connection().unsolicited[next_].time;
   if (anchored_) return timeline_.due(time);
   const bool waits = connection().first_start && time >= *connection().first_start;
   return waits ? HostTime::max() : *connected_at_ + (time - connection().began);
 }
 
 HostTime RecordedTracker::next_due() const {
-  return due_.empty() ? spoken_due() : std::min(due_.front().time, spoken_due());
+  return due_.empty() ? unsolicited_due() : std::min(due_.front().time, unsolicited_due());
 }
 
 void RecordedTracker::advance(HostTime now) {
   while (next_due() <= now) {
-    if (!due_.empty() && due_.front().time <= spoken_due()) {
+    if (!due_.empty() && due_.front().time <= unsolicited_due()) {
       carry_out(due_.front());
       due_.pop_front();
     } else {
-      const Spoken& spoken = connection().spoken[next_++];
-      say(spoken.packet);
-      wants_close_ = wants_close_ || spoken.breaks;
+      const Unsolicited& unsolicited = connection().unsolicited[next_++];
+      send_packet(unsolicited.packet);
+      wants_close_ = wants_close_ || unsolicited.breaks;
     }
   }
 
   const bool last = connection_ + 1 == connections_.size();
   const bool begun = anchored_ || (played_ && !connection().first_start);
-  finished_ = finished_ || (last && begun && next_ >= connection().spoken.size());
+  finished_ = finished_ || (last && begun && next_ >= connection().unsolicited.size());
 }
 
 std::vector<std::byte> RecordedTracker::take_output() {

@@ -35,8 +35,8 @@ class TrafficReader {
     std::vector<RecordedDevice> devices;
     for (auto& [name, device] : devices_) devices.push_back(std::move(device));
     for (RecordedDevice& device : devices) {
-      // The recorder empties one ring after the other: what was sent may stand before what came
-      // earlier.
+      // The recorder empties one ring after the other: in the file, sent bytes may precede bytes
+      // that were received earlier.
       std::ranges::stable_sort(device.blocks, {}, &RecordedBlock::time);
       device.kind = kind_of(device.blocks);
     }
@@ -67,7 +67,7 @@ class TrafficReader {
   std::map<std::string, bool> open_;
 };
 
-/// Every record of the file, also those in chunks, to `take(opcode, content)`.
+/// Passes every record of the file, including those in chunks, to `take(opcode, content)`.
 void for_each_record(std::span<const std::byte> file, const auto& take) {
   mcap::LinearScan scan(file);
   while (const auto item = scan.next()) {
@@ -145,8 +145,8 @@ Result<std::vector<RecordedDevice>> read_traffic(std::span<const std::byte> file
       file, [&](mcap::Opcode opcode, mcap::Bytes content) { reader.on_record(opcode, content); });
   auto devices = reader.finish();
   if (devices.empty())
-    return bad_input(
-        fmt::format("{}: holds no raw bytes of a device ([recording] raw = true)", name));
+    return bad_input(fmt::format(
+        "{}: no raw bytes of a device in this file; record with [recording] raw = true", name));
   return devices;
 }
 

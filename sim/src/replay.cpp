@@ -97,7 +97,7 @@ class ReplayedCard final : public ReplayedDevice {
  private:
   std::string name_;
   UsbipServer server_;
-  const RecordedCard& card_;  ///< the server's
+  const RecordedCard& card_;  ///< owned by the server
 };
 
 class ReplayedTerminal final : public ReplayedDevice {

@@ -101,12 +101,12 @@ void Simulation::start_machine(HostTime now) {
   }
 }
 
-void Simulation::let_go(HostTime now) {
+void Simulation::release(HostTime now) {
   held_ = false;
   machine_.start(now + standstill_);
 }
 
-/// The card must know of an edge before it makes the scan that shows it.
+/// Passes the edges of the next second to the card: it needs an edge before the scan that shows it.
 void Simulation::touch(HostTime now) {
   constexpr auto kAhead = std::chrono::seconds{1};
   if (!machine_.started() || counter_cards_.empty()) return;

@@ -24,7 +24,7 @@ sockaddr_in loopback(std::uint16_t port) {
 tl::unexpected<Error> refused(const char* kind, std::uint16_t port) {
   const int cause = errno;
   const char* hint = cause == EADDRINUSE
-                         ? " (another program has the port; choose another, or 0 for a free one)"
+                         ? " (another program uses the port; choose another, or 0 for a free one)"
                          : "";
   return io_error(
       fmt::format("{} port 127.0.0.1:{}: {}{}", kind, port, std::strerror(cause), hint));

@@ -52,7 +52,7 @@ class SocketCanPort final : public CanPort {
   void send(std::span<const can::CanFrame> frames) override {
     for (const auto& frame : frames) {
       const can_frame out = to_linux(frame);
-      // A full queue loses the frame, as a real node's transmit buffer does.
+      // If the queue is full the frame is lost, as in the transmit buffer of a real node.
       [[maybe_unused]] const auto sent = ::write(socket_.get(), &out, sizeof out);
     }
   }
@@ -79,7 +79,8 @@ class SocketCanPort final : public CanPort {
     message.msg_controllen = control.size();
     const ssize_t size = ::recvmsg(socket_.get(), &message, MSG_DONTWAIT);
 
-    // An interface that went down says so once; the socket hears again when it is up.
+    // ENETDOWN is reported once when the interface goes down; the socket receives again when it is
+    // up.
     if (size < 0) return errno == ENETDOWN;
     if (size == static_cast<ssize_t>(CAN_MTU))
       arrived_.push_back({from_linux(frame), age_.of(message)});
@@ -100,14 +101,14 @@ Result<std::unique_ptr<CanPort>> open_socket_can_port(const CanPortOptions& opti
   };
 
   Socket socket(::socket(PF_CAN, SOCK_RAW | SOCK_NONBLOCK | SOCK_CLOEXEC, CAN_RAW));
-  if (!socket) return refused("socket");
+  if (!socket) return refused("cannot open a socket");
   sockaddr_can address{};
   address.can_family = AF_CAN;
   address.can_ifindex = static_cast<int>(if_nametoindex(options.interface.c_str()));
-  if (address.can_ifindex == 0) return refused("find the interface");
+  if (address.can_ifindex == 0) return refused("cannot find the interface");
 
   if (::bind(socket.get(), reinterpret_cast<const sockaddr*>(&address), sizeof address) != 0) {
-    return refused("bind");
+    return refused("cannot bind");
   }
 
   return std::make_unique<SocketCanPort>(std::move(socket), options.speed);

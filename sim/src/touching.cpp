@@ -13,10 +13,10 @@ namespace {
 using Eigen::Isometry3d;
 using Eigen::Vector3d;
 
-constexpr double kAbove_m = 10e-3;      // over a feature, on the way to the next
-constexpr double kStrayAway_m = 40e-3;  // farther from any ball than any tolerance
+constexpr double kAbove_m = 10e-3;      // clearance of travelling moves above a feature
+constexpr double kStrayAway_m = 40e-3;  // exceeds every tolerance
 
-/// A spiral from the pole down to the equator: neighbours are near, and the points even.
+/// A spiral from the pole to the equator: successive points are close, their density is uniform.
 Vector3d direction_on_ball(std::size_t point, std::size_t points) {
   const double golden_rad = std::numbers::pi * (3.0 - std::sqrt(5.0));
   const double z =
@@ -26,7 +26,7 @@ Vector3d direction_on_ball(std::size_t point, std::size_t points) {
   return {across * std::cos(angle_rad), across * std::sin(angle_rad), z};
 }
 
-/// Row by row there and back; every row with its share of the points.
+/// Points in rows of alternating direction, divided evenly among the rows.
 Vector3d place_on_face(const ArrayFace& face, std::size_t point, std::size_t points) {
   const auto rows = static_cast<std::size_t>(std::lround(std::sqrt(static_cast<double>(points))));
   const std::size_t columns = (points + rows - 1) / rows;
@@ -39,14 +39,14 @@ Vector3d place_on_face(const ArrayFace& face, std::size_t point, std::size_t poi
          from_middle(column, in_row) * face.half_2_m;
 }
 
-/// Collects the path and the probing moves in it.
+/// Builds the path and the list of its probing moves.
 class Planner {
  public:
   Planner(const TruthMachine& truth, const BallArray& array, const TouchingOptions& options)
       : truth_(truth), array_(array), options_(options) {
     program_.path.feed_m_per_s = options.travel_m_per_s;
     program_.path.acceleration_m_per_s2 = options.acceleration_m_per_s2;
-    program_.path.vertices.push_back({});  // the counters of a card begin where the axes stand
+    program_.path.vertices.push_back({});  // reading 0, where the counters are set up
   }
 
   void ball(const Isometry3d& T_machine_array, const ArrayBall& ball) {
@@ -100,12 +100,12 @@ class Planner {
     const Vector3d before_m = contact_m + options_.approach_m * move.normal;
     drive_to(before_m);
     drive_to(contact_m - options_.beyond_m * move.normal, options_.probing_m_per_s);
-    move.leg = program_.path.vertices.size() - 2;  // the one that ends at the latest vertex
+    move.leg = program_.path.vertices.size() - 2;  // the leg that ends at the last vertex
     program_.moves.push_back(move);
     drive_to(before_m, options_.retract_m_per_s);
   }
 
-  /// 0: the feed of travelling. Where it stands already is no leg.
+  /// Feed 0: the travel feed. Adds no leg if the machine is already there.
   void drive_to(const Vector3d& place_m, double feed_m_per_s = 0.0) {
     const Vector3d q_m = reading_at_m(truth_, place_m);
     auto& vertices = program_.path.vertices;
@@ -120,7 +120,7 @@ class Planner {
   std::size_t touches_ = 0;
 };
 
-/// Distance of the tip's surface to that of the feature.
+/// Distance between the surfaces of tip and feature.
 double clearance_m(const ProbingMove& move, const Vector3d& tip_m, double tip_radius_m) {
   if (move.radius_m > 0.0) return (tip_m - move.centre_m).norm() - move.radius_m - tip_radius_m;
   return (tip_m - move.place_m).dot(move.normal) - tip_radius_m;
@@ -139,8 +139,8 @@ double contact_s(const ProbingMove& move, const TruthMachine& truth, const PathM
 }  // namespace
 
 Vector3d reading_at_m(const TruthMachine& truth, const Vector3d& place_m) {
-  constexpr int kMostSteps = 200;  // slopes of V near 0.2 leave nothing after twenty
-  // exactly equal is seldom reached: the last bit goes to and fro
+  constexpr int kMostSteps = 200;  // twenty suffice for slopes of V near 0.2
+  // exact equality is rarely reached: the last bit alternates
   constexpr double kNothing_m = 1e-14;
   Vector3d q_m = place_m;
   for (int i = 0; i < kMostSteps; ++i) {

@@ -1,4 +1,4 @@
-/// What the controller does with each command: answers, refusals, and the state they leave behind.
+/// Execution of each command: answers, refusals and changes of the state.
 
 #include <algorithm>
 #include <array>
@@ -38,8 +38,6 @@ std::chrono::nanoseconds TrackerDevice::latency(const emscon::Request& request) 
   }
   return options_.command_latency;
 }
-
-// commands
 
 void TrackerDevice::carry_out(const emscon::Request& request, HostTime at) {
   if (answer_query(request, at)) return;
@@ -117,12 +115,12 @@ emscon::Status TrackerDevice::outcome(const emscon::Request& request, HostTime a
     return initialised_ ? move_beam(at) : Status::TrackerNotInitialized;
   }
 
-  // Orientation, search and long parameters are remembered and change nothing: the packet rate of
-  // bursts, for example, is what real controllers do whatever they are asked.
+  // Orientation, search and long parameters are stored and have no effect. The packet rate of
+  // bursts, for example, is that of real controllers, which does not depend on the requested rate.
   return Status::Ok;
 }
 
-/// The motors turn, the beam is lost, and with it a measurement that runs.
+/// The head moves: the beam is lost, and a running measurement ends.
 void TrackerDevice::initialise(HostTime at) {
   initialised_ = true;
   ++initializations_;
@@ -134,10 +132,10 @@ void TrackerDevice::initialise(HostTime at) {
   beam_back_ = at + options_.fetch_beam;
 }
 
-/// To the reflector, wherever it is: the beam holds it from then on.
+/// Moves the beam to the reflector; the beam is locked on it afterwards.
 emscon::Status TrackerDevice::move_beam(HostTime at) {
   if (stream_ || single_due_) return emscon::Status::UsageConflict;
-  if (reflector_away_.holds(at)) {  // the head has turned away from whatever it held
+  if (reflector_away_.holds(at)) {  // the head has turned away from its previous target
     distance_set_ = false;
     beam_back_ = std::max(beam_back_.value_or(at), reflector_away_.until);
     return emscon::Status::NoDistanceSet;
@@ -194,23 +192,23 @@ emscon::Status TrackerDevice::start_measurement(HostTime at) {
 
 bool TrackerDevice::answer_setting(const emscon::Request& request) {
   using emscon::Status;
-  const auto tell = [this](const auto& answer) { return send(emscon::Answer{answer}), true; };
+  const auto reply = [this](const auto& answer) { return send(emscon::Answer{answer}), true; };
   if (as<emscon::GetTransformation>(request))
-    return tell(emscon::TransformationAnswer{Status::Ok, transformation_});
+    return reply(emscon::TransformationAnswer{Status::Ok, transformation_});
   if (as<emscon::GetStationOrientation>(request))
-    return tell(emscon::StationOrientationAnswer{Status::Ok, orientation_});
+    return reply(emscon::StationOrientationAnswer{Status::Ok, orientation_});
   if (as<emscon::GetMeasurementMode>(request))
-    return tell(emscon::MeasurementModeAnswer{Status::Ok, {mode_}});
+    return reply(emscon::MeasurementModeAnswer{Status::Ok, {mode_}});
   if (as<emscon::GetCoordinateSystemType>(request))
-    return tell(emscon::CoordinateSystemTypeAnswer{Status::Ok, {coordinates_}});
+    return reply(emscon::CoordinateSystemTypeAnswer{Status::Ok, {coordinates_}});
   if (as<emscon::GetStationaryModeParams>(request))
-    return tell(emscon::StationaryModeParamsAnswer{Status::Ok, stationary_});
+    return reply(emscon::StationaryModeParamsAnswer{Status::Ok, stationary_});
   if (as<emscon::GetContinuousTimeModeParams>(request))
-    return tell(emscon::ContinuousTimeModeParamsAnswer{Status::Ok, continuous_});
+    return reply(emscon::ContinuousTimeModeParamsAnswer{Status::Ok, continuous_});
   if (as<emscon::GetSearchParams>(request))
-    return tell(emscon::SearchParamsAnswer{Status::Ok, search_});
+    return reply(emscon::SearchParamsAnswer{Status::Ok, search_});
   if (as<emscon::GetStatisticMode>(request))
-    return tell(emscon::StatisticModeAnswer{Status::Ok, statistics_});
+    return reply(emscon::StatisticModeAnswer{Status::Ok, statistics_});
 
   return false;
 }

@@ -8,8 +8,8 @@
 namespace abbe::sim {
 namespace {
 
-constexpr double kWeatherThreshold_K = 0.2;  // a change worth an event
-// below the packet size for both kinds of burst, in whole kilobytes of points
+constexpr double kWeatherThreshold_K = 0.2;  // smallest change that causes an event
+// both kinds of burst stay below the largest packet size
 constexpr std::size_t kPointsPerPacket = 1500;
 
 double length_per_metre(emscon::LengthUnit unit) {
@@ -71,7 +71,7 @@ std::vector<std::byte> TrackerDevice::take_output() {
   return std::exchange(out_, {});
 }
 
-// ----------------------------------------------------------------------------------------------------
+// ------------------------------------------------------------------------------------------
 // connection
 
 void TrackerDevice::connected(HostTime now) {
@@ -91,7 +91,7 @@ void TrackerDevice::reset_session() {
   framer_.reset();
   out_.clear();
   pending_.reset();
-  stream_.reset();  // nobody left to measure for
+  stream_.reset();  // without a client nothing is measured
   single_due_.reset();
   wants_close_ = false;
 }
@@ -103,7 +103,7 @@ void TrackerDevice::receive(std::span<const std::byte> bytes, HostTime now) {
     bytes = bytes.subspan(framer_.push(bytes));
     while (const auto packet = framer_.next()) on_packet(*packet, now);
   }
-  if (framer_.broken()) wants_close_ = true;  // whatever this client speaks, it is not TPI
+  if (framer_.broken()) wants_close_ = true;  // the client does not use TPI
 }
 
 void TrackerDevice::on_packet(std::span<const std::byte> packet, HostTime now) {
@@ -192,7 +192,7 @@ void TrackerDevice::finish_boot(HostTime at) {
   announce_start_ = true;
 }
 
-// ----------------------------------------------------------------------------------------------------
+// ------------------------------------------------------------------------------------------
 // results
 
 emscon::MultiPoint TrackerDevice::point_at(DeviceTime t) {
@@ -201,7 +201,7 @@ emscon::MultiPoint TrackerDevice::point_at(DeviceTime t) {
   noise_next_ = std::max(noise_next_, noise_base_ + index + 1);
   const TrackerView view = observe(options_.model, machine_, at, noise_base_ + index);
   Eigen::Vector3d p = length_per_metre(units_.length) * view.p_tracker_m;
-  // Of a transformation the shift alone: enough to see that somebody left one switched on.
+  // Only the translation of a transformation is applied: enough to detect one left switched on.
   if (settings_.apply_transformation) p += Eigen::Vector3d::Map(transformation_.translation.data());
   if (coordinates_ == emscon::CoordinateSystem::LeftHandedX) p.x() = -p.x();
   return {status_of(view.speed, at), emscon::TrackerClockReading::from(t), {p.x(), p.y(), p.z()}};
@@ -256,7 +256,7 @@ void TrackerDevice::emit_points(std::span<const emscon::MultiPoint> points) {
 
 void TrackerDevice::emit_single(HostTime at) {
   single_due_.reset();
-  // The mean of as many points as the measuring time holds at 1 kHz.
+  // The mean of the points in the measurement time at 1 kHz.
   const auto n =
       static_cast<std::uint64_t>(std::max<std::int32_t>(stationary_.measurement_time_ms, 1));
   Eigen::Vector3d sum = Eigen::Vector3d::Zero();
@@ -273,7 +273,7 @@ void TrackerDevice::emit_single(HostTime at) {
   send(result);
 }
 
-// ----------------------------------------------------------------------------------------------------
+// ------------------------------------------------------------------------------------------
 // weather and faults
 
 double TrackerDevice::air_temperature_C(HostTime at) const {
@@ -344,7 +344,7 @@ void TrackerDevice::inject(const Fault& fault, HostTime now) {
       out_.insert(out_.end(), 64, std::byte{0xA5});
       return;
     default:
-      return;  // an encoder's fault
+      return;  // not a fault of a tracker
   }
 }
 

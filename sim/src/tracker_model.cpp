@@ -19,7 +19,7 @@ BeamSpeed judged(const TrackerModel& model, const Eigen::Vector3d& p,
   const double share =
       std::max(radial / model.max_radial_speed_m_per_s, lateral / model.max_lateral_speed_m_per_s);
   if (share > 1.0) return BeamSpeed::Exceeded;
-  return share > kWarningShare ? BeamSpeed::Warning : BeamSpeed::Fine;
+  return share > kWarningShare ? BeamSpeed::Warning : BeamSpeed::Allowed;
 }
 
 Eigen::Vector3d with_noise(const TrackerModel& model, const Eigen::Vector3d& p,
@@ -55,7 +55,7 @@ TrackerView observe(const TrackerModel& model, const VirtualMachine& machine, Ho
 }
 
 DeviceTime device_time(const TrackerModel& model, HostTime power_on, HostTime at) {
-  // The drift alone goes through a double: whole nanoseconds stay whole.
+  // Only the drift is computed as a double, so that the elapsed nanoseconds stay exact.
   const std::chrono::nanoseconds since = at - power_on;
   const auto drift = seconds_to_ns(ns_to_seconds(since) * model.clock_drift_ppm * 1e-6);
   return DeviceTime{seconds_to_ns(model.clock_offset_s) + since + drift};
@@ -69,7 +69,7 @@ HostTime host_time(const TrackerModel& model, HostTime power_on, DeviceTime at) 
 }
 
 std::chrono::nanoseconds burst_interval(std::uint64_t seed, std::uint64_t burst) {
-  // Two half normal distributions about the median; 1.645 standard deviations hold 90 %.
+  // Two half-normal distributions about the median; 90 % are within 1.645 standard deviations.
   const double z = gaussian(seed, NoiseStream::Burst, burst);
   const double ms = 332.0 + z * (z < 0.0 ? 8.0 : 12.0) / 1.645;
   return seconds_to_ns(std::clamp(ms, 300.0, 400.0) * 1e-3);

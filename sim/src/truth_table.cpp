@@ -39,7 +39,8 @@ double* squareness_of(Squareness& s, std::string_view name) {
   return nullptr;
 }
 
-/// Collects the rows, then builds the functions: a table is only whole when the file has ended.
+/// Collects the rows, then builds the functions: the nodes are complete only at the end of the
+/// file.
 class TruthReader {
  public:
   TruthReader(const CsvTable& table, TruthMachine into, CsvErrors& errors)
@@ -64,7 +65,7 @@ class TruthReader {
     const auto place = place_of(backlash ? name.substr(0, name.size() - kBacklash.size()) : name);
     if (!place)
       return errors_.add(row.line,
-                         fmt::format("column name: \"{}\" is no error of this machine", name));
+                         fmt::format("column name: \"{}\" is not an error of this machine", name));
     expect_unit(row, unit_of(place->motion));
 
     if (backlash) {

@@ -10,7 +10,7 @@ namespace abbe::sim {
 namespace {
 
 constexpr std::size_t kLargestDatagram = 65536;
-// below every Ethernet MTU, as the tunnel does by default
+// below every Ethernet MTU; the default of cannelloni
 constexpr std::size_t kOutgoingDatagram = 1400;
 constexpr int kMostDatagrams = 256;
 
@@ -71,7 +71,7 @@ class UdpCanPort final : public CanPort {
     has_peer_ = true;
     const auto age = age_.of(message);
     auto view = can::DatagramView::parse(std::span(buffer_).first(static_cast<std::size_t>(size)));
-    if (!view) return true;  // what is not ours does not reach the bus
+    if (!view) return true;  // not a cannelloni datagram: ignored
     for (can::CanFrame frame; view->next(frame);) arrived_.push_back({frame, age});
 
     return true;

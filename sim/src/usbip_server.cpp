@@ -56,19 +56,19 @@ void UsbipServer::poll(HostTime now) {
 
 HostTime UsbipServer::next_due() const {
   HostTime due = std::min(fault_ends_.value_or(HostTime::max()), card_->breaks_at());
-  if (!mute_ && !deaf_ && !requests_.empty())
+  if (!mute_ && !unresponsive_ && !requests_.empty())
     due = std::min(due, card_->available_at(requests_.front().length));
   return due;
 }
 
 void UsbipServer::accept_clients() {
   for (;;) {
-    Socket stranger(::accept4(listener_.get(), nullptr, nullptr, SOCK_NONBLOCK | SOCK_CLOEXEC));
-    if (!stranger) return;
+    Socket accepted(::accept4(listener_.get(), nullptr, nullptr, SOCK_NONBLOCK | SOCK_CLOEXEC));
+    if (!accepted) return;
     if (!plugged_ || client_) continue;  // closed at once
     const int on = 1;
-    setsockopt(stranger.get(), IPPROTO_TCP, TCP_NODELAY, &on, sizeof on);
-    client_ = std::move(stranger);
+    setsockopt(accepted.get(), IPPROTO_TCP, TCP_NODELAY, &on, sizeof on);
+    client_ = std::move(accepted);
   }
 }
 
@@ -79,7 +79,7 @@ void UsbipServer::read(HostTime now) {
     if (size > 0) {
       incoming_.insert(incoming_.end(), buffer.begin(), buffer.begin() + size);
       if (incoming_.size() > kMostIncoming) return disconnect();
-      if (!deaf_) understand(now);
+      if (!unresponsive_) process_incoming(now);
     } else if (size < 0 && (errno == EAGAIN || errno == EWOULDBLOCK || errno == EINTR)) {
       return;
     } else {
@@ -87,10 +87,10 @@ void UsbipServer::read(HostTime now) {
     }
   }
 
-  accept_clients();  // who waited behind the one that has gone
+  accept_clients();  // a client may be waiting since the previous one disconnected
 }
 
-void UsbipServer::understand(HostTime now) {
+void UsbipServer::process_incoming(HostTime now) {
   while (client_ && !closing_) {
     if (!(imported_ ? on_urb(now) : on_operation())) return;
   }
@@ -109,7 +109,8 @@ usbip::ExportedDevice UsbipServer::exported() const {
   return device;
 }
 
-/// One operation of a connection that is no device yet; false: more bytes are needed.
+/// Processes one operation before the device is imported; false: more bytes are needed, or the
+/// connection ends.
 bool UsbipServer::on_operation() {
   const auto head = usbip::decode_op_head(incoming_);
   if (!head && head.error() == usbip::OpError::Truncated) return false;
@@ -173,7 +174,7 @@ void UsbipServer::on_submit(const usbip::Submit& submit, HostTime now) {
 
   if (submit.head.endpoint != 0)
     return reply(submit.head.sequence, usbip::UrbStatus::Stalled, 0, {});
-  fill_requests(now);  // what was measured before the request is gone before its answer
+  fill_requests(now);  // scans made before the request are sent before its answer
   const auto answer = card_->answer(usb::decode_setup(submit.setup), now);
   if (answer.outcome == ControlAnswer::Outcome::Silent) return;
   if (answer.outcome == ControlAnswer::Outcome::Stalled)
@@ -191,9 +192,9 @@ void UsbipServer::on_unlink(const usbip::Unlink& unlink) {
   send_bytes(usbip::encode(usbip::Urb{answer}));
 }
 
-/// Whole requests only, but for the rest of a scan that has ended.
+/// Fills whole requests only, except with the rest of a scan that has ended.
 void UsbipServer::fill_requests(HostTime now) {
-  if (deaf_) return;
+  if (unresponsive_) return;
   card_->advance(now, wanted_bytes(requests_));
   if (mute_) return;
   while (!requests_.empty() && card_->available() != 0) {
@@ -234,21 +235,21 @@ void UsbipServer::disconnect() {
   incoming_.clear();
   unsent_.clear();
   requests_.clear();
-  card_->host_gone();
+  card_->host_disconnected();
 }
 
 void UsbipServer::plug_out() {
   plugged_ = false;
   disconnect();
-  simulated_->restart();  // it lives on the power of the bus
+  simulated_->restart();  // the card is powered by the bus
 }
 
 void UsbipServer::end_faults(HostTime now) {
   if (!fault_ends_ || now < *fault_ends_) return;
   fault_ends_.reset();
   plugged_ = true;
-  mute_ = deaf_ = hold_output_ = false;
-  understand(now);
+  mute_ = unresponsive_ = hold_output_ = false;
+  process_incoming(now);
 }
 
 void UsbipServer::inject(const Fault& fault, HostTime now) {
@@ -256,7 +257,7 @@ void UsbipServer::inject(const Fault& fault, HostTime now) {
   const HostTime until = now + seconds_to_ns(fault.duration_s);
   switch (fault.kind) {
     case FaultKind::Mute:
-      deaf_ = true;
+      unresponsive_ = true;
       fault_ends_ = until;
       break;
     case FaultKind::Stall:
@@ -280,19 +281,19 @@ void UsbipServer::inject(const Fault& fault, HostTime now) {
     case FaultKind::FailRequest:
       simulated_->fail_controls(static_cast<std::size_t>(std::max(1.0, fault.value)));
       break;
-    case FaultKind::Disconnect:  // the card goes on
+    case FaultKind::Disconnect:  // the card keeps running
       disconnect();
       break;
     case FaultKind::ClockJump:
       simulated_->jump_clock(static_cast<std::int64_t>(fault.value));
       break;
     case FaultKind::UsbGarbage: {
-      const std::vector<std::byte> nonsense(usbip::kUrbHeaderSize, std::byte{0xA5});
-      send_bytes(nonsense);
+      const std::vector<std::byte> garbage(usbip::kUrbHeaderSize, std::byte{0xA5});
+      send_bytes(garbage);
       break;
     }
     default:
-      break;  // another device's fault
+      break;  // not a fault of a counter card
   }
 
   write();

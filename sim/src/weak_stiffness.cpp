@@ -38,13 +38,13 @@ TruthMachine weak_stiffness_machine(const WeakStiffnessOptions& options) {
   truth.axis(Axis::Y).range = {-0.15, 0.40, 0.0};
   truth.axis(Axis::Z).range = {-0.05, 0.15, 0.0};
 
-  // Caused by X. The slopes of straightness along x stand for Table 3's k_eqy1, k_eqz1.
+  // Caused by X. The linear terms of straightness along x are Table 3's k_eqy1, k_eqz1.
   const Cubic dxx{0, 0.00295049, 3.813183e-06, -2.775042e-09};
   const Cubic dyx{0, 0.002007601, 1.167908e-06, 1.848295e-10};
   const Cubic dzx{0, 0.00251692, -1.747859e-06, -9.975762e-10};
   const Cubic exx{0, 6.939124e-06, 6.795187e-09, -2.011528e-11};
   const Cubic ezx{0, 2.169027e-06, 0, -3.121463e-12};
-  // Caused by Y. Slopes: k_eqx1, k_eqz2.
+  // Caused by Y. Linear terms: k_eqx1, k_eqz2.
   const Cubic dxy{0, 0.0004290736, -1.785525e-05, 5.11703e-08};
   const Cubic dyy{0, 0.0002017827, 0, -1.832424e-08};
   const Cubic dzy{0, -0.001512266, 1.548582e-05, -7.038459e-08};
@@ -69,7 +69,7 @@ TruthMachine weak_stiffness_machine(const WeakStiffnessOptions& options) {
   motion(truth, Motion::EB, Axis::Z) = rotation(eyz);
   motion(truth, Motion::EC, Axis::Z) = rotation(ezz);
 
-  // Table 3's constants are some 0.05 mm off V(Ball1) = 0: they are chosen here.
+  // With the constants of Table 3, V(Ball1) is about 0.05 mm: they are adjusted to V(Ball1) = 0.
   const auto set_z = [&] {
     motion(truth, Motion::EX, Axis::Z) = translation(dxz);
     motion(truth, Motion::EY, Axis::Z) = translation(dyz);

@@ -1,7 +1,7 @@
 #pragma once
-/// Runs the faults of a method over many random machines, two at a time, and prints what the gate
-/// accepts and what that is worth. Arguments of the programs: [MACHINES [FIRST_SEED
-/// [PART OF A FAULT'S NAME...]]].
+/// Runs the faults of a calibration method on many random machines, on two threads, and prints what
+/// the gate accepts and how good the accepted models are.
+/// Arguments of the programs: [MACHINES [FIRST_SEED [PART OF A FAULT'S NAME...]]].
 
 #include <fmt/format.h>
 
@@ -22,17 +22,17 @@ namespace abbe::tests::never_worse {
 
 struct Outcome {
   bool accepted = false;
-  std::string first_reason,
-      first_cause;        ///< cause: of Verdict::causes; empty where an error came first
-  double before_m = 0.0;  ///< mean |V| of the truth, without rigid motion
-  double left_m = 0.0;    ///< mean |V of the model - V|, without rigid motion
-  double u_m = 0.0;       ///< mean stated standard uncertainty: root of the trace
+  std::string first_reason;
+  std::string first_cause;  ///< of Verdict::causes; empty if an error came first
+  double before_m = 0.0;    ///< mean |V| of the truth, without rigid motion
+  double left_m = 0.0;      ///< mean |V of the model - true V|, without rigid motion
+  double u_m = 0.0;         ///< mean stated standard uncertainty: root of the trace
   double sigma0 = 0.0;
   std::size_t covered = 0, intervals = 0;  ///< components of V inside their 95 % interval
 };
 
-/// What names a fault: the cause of the first reason of a verdict, or words in the text of an error
-/// that comes before any verdict. Nothing: it need not be named.
+/// The expected diagnosis of a fault: the cause of the first reason of a verdict, or words in the
+/// text of an error before any verdict. Empty: no diagnosis is required.
 struct Names {
   std::vector<std::string> causes{}, words{};
 
@@ -52,7 +52,7 @@ struct Fault {
   std::string name;
   std::function<void(Run&)> put_in;
   Names names;
-  bool visible = true;  ///< false: nothing that is known contradicts it
+  bool visible = true;  ///< false: no available data contradicts the fault
 };
 
 template <class Run>
@@ -129,7 +129,7 @@ void print_table(const Campaign<Run>& campaign, const std::vector<Tally>& tallie
   }
 }
 
-/// Prints the figures. True: all limits are kept.
+/// Prints the figures. Returns true if all limits are met.
 template <class Run>
 bool print_figures(const Campaign<Run>& campaign, const std::vector<Tally>& tallies) {
   Tally all, seen, none;
@@ -147,21 +147,24 @@ bool print_figures(const Campaign<Run>& campaign, const std::vector<Tally>& tall
     return fmt::format("never worse, {}: {}", campaign.method, what);
   };
 
-  print_figure(figure("accepted models that make the machine worse"), "0",
+  print_figure(figure("accepted models with a larger error than no model"), "0",
                "{} of {} accepted of {} runs", all.worse, all.accepted, all.runs);
   print_figure(figure("accepted models wrong by more than 3 u"), "0", "{}", all.too_sure);
-  print_figure(figure("faultless runs accepted"), ">= 97 %", "{} of {}", none.accepted, none.runs);
-  print_figure(figure("95 % intervals of faultless runs cover"), "94 to 97 %", "{:.1f} %",
+  print_figure(figure("runs without a fault accepted"), ">= 97 %", "{} of {}", none.accepted,
+               none.runs);
+  print_figure(figure("coverage of the 95 % intervals of runs without a fault"), "94 to 97 %",
+               "{:.1f} %",
                none.intervals > 0
                    ? 100.0 * static_cast<double>(none.covered) / static_cast<double>(none.intervals)
                    : 0.0);
-  print_figure(figure("cause named first"), ">= 90 %", "{} of {} refused", seen.named, seen.runs);
+  print_figure(figure("refused runs whose first cause is the fault"), ">= 90 %", "{} of {} refused",
+               seen.named, seen.runs);
 
   return all.worse + all.too_sure == 0 && none.accepted * 100 >= 97 * none.runs &&
          seen.named * 10 >= 9 * seen.runs;
 }
 
-/// Exit code: 0 all limits are kept, 1 one is not.
+/// Exit code: 0 if all limits are met, else 1.
 template <class Run>
 int run_campaign(Campaign<Run> campaign, int argc, char** argv) {
   const int machines = argc > 1 ? std::atoi(argv[1]) : 20;

@@ -1,5 +1,5 @@
-// Random machines with every fault of a shop floor, ball array method. Prints what never_worse_otf
-// prints.
+// Random machines with typical faults of a shop floor, ball array method. Prints the same table as
+// never_worse_otf.
 #include "campaign.hpp"
 #include "evemu_run.hpp"
 

@@ -25,7 +25,7 @@ int any_position(EvemuRun& run) {
   return 1 + static_cast<int>(run.random() % run.T_machine_array.size());
 }
 
-/// The array moves in the middle of one position.
+/// The array moves while it is touched in one position.
 void move_within(EvemuRun& run, double shift_m, double angle_rad) {
   const int position = any_position(run);
   const double from = uniform(run.random, 0.15, 0.9);
@@ -37,7 +37,7 @@ void move_within(EvemuRun& run, double shift_m, double angle_rad) {
   };
 }
 
-/// Ball1 is not put back where it was.
+/// Ball1 is not placed exactly at its previous point.
 void move_between(EvemuRun& run) {
   for (Isometry3d& T : run.T_machine_array) {
     const double by_m = log_uniform(run.random, 5e-6, 200e-6);
@@ -54,7 +54,7 @@ void swap_balls(EvemuRun& run) {
   std::swap(run.calibrator.balls[i].centre_m, run.calibrator.balls[j].centre_m);
 }
 
-/// A ball of its table is elsewhere in one position only: dirt under it, a loose seat.
+/// One ball is displaced in one position only: dirt under it, a loose seat.
 void displace_ball_once(EvemuRun& run) {
   const int position = any_position(run);
   const Vector3 centre = run.array.balls[1 + run.random() % (run.array.balls.size() - 1)].centre_m;
@@ -66,7 +66,7 @@ void displace_ball_once(EvemuRun& run) {
   };
 }
 
-/// One touch is off along the normal of the surface, outwards.
+/// One touch is displaced outwards along the normal of the surface.
 void spoil_touch(EvemuRun& run, double by_m) {
   const std::uint64_t at = run.random();
   run.spoil = [=](Touches& touches) {
@@ -86,7 +86,7 @@ void spoil_touch(EvemuRun& run, double by_m) {
   };
 }
 
-/// Every position bends the array in another way, most at its end.
+/// In every position the array is bent differently, most at its end.
 void bend(EvemuRun& run, double at_the_end_m) {
   std::map<int, Vector3> by;
   for (std::size_t i = 0; i < run.T_machine_array.size(); ++i) {
@@ -100,7 +100,7 @@ void bend(EvemuRun& run, double at_the_end_m) {
   };
 }
 
-/// After clamping the array goes on turning and shifting, in every position elsewhere to.
+/// After clamping the array continues to rotate and shift, in every position in another direction.
 void creep(EvemuRun& run, double end_m) {
   std::map<int, std::pair<Vector3, Vector3>> to;
   const double length_m = run.array.balls.back().centre_m.x();
@@ -115,7 +115,7 @@ void creep(EvemuRun& run, double end_m) {
   };
 }
 
-/// The machine warms up: it grows, its axes tilt and its zero drifts.
+/// The machine warms up: it expands, its axes tilt and its zero point drifts.
 void drift(EvemuRun& run, double by_m) {
   Eigen::Matrix3d slope;
   for (Eigen::Index i = 0; i < 3; ++i) slope.col(i) = normal3(run.random);
@@ -144,7 +144,8 @@ void other_chain(EvemuRun& run) {
   run.machine.chain = *calib::KinematicChain::parse(text + " t]");
 }
 
-/// No polynomial of order 3: the sag of a travelling weight and the pitch of a screw.
+/// Errors that no polynomial of order 3 describes: sag under a moving load, periodic error of a
+/// screw.
 void waves(EvemuRun& run, double amplitude_m, double period_m) {
   for (sim::AxisTruth& axis : run.truth.axes) {
     for (std::size_t m = 0; m < 3; ++m) {
@@ -159,7 +160,7 @@ void for_every_touch(EvemuRun& run, const std::function<void(Vector3&)>& act) {
   };
 }
 
-/// One coordinate of one ball in its table.
+/// Changes one coordinate of one ball in the calibrator file.
 void spoil_the_file(EvemuRun& run, double low_m, double high_m) {
   const std::size_t ball = any_ball(run);
   const auto axis = static_cast<Eigen::Index>(run.random() % 3);
@@ -170,7 +171,7 @@ void spoil_the_file(EvemuRun& run, double low_m, double high_m) {
 double over(EvemuRun& run, double low, double high) {
   return log_uniform(run.random, low, high);
 }
-/// Either sign.
+/// The same with a random sign.
 double signed_over(EvemuRun& run, double low, double high) {
   const double sign = run.random() % 2 == 0 ? 1.0 : -1.0;
   return sign * over(run, low, high);
@@ -179,9 +180,9 @@ double signed_over(EvemuRun& run, double low, double high) {
 }  // namespace
 
 std::vector<Fault<EvemuRun>> evemu_faults() {
-  // No polynomials: from ball to ball like noise of the balls, or like slow noise.
+  // Waves are not polynomials: from ball to ball they look like noise of the balls or slow noise.
   const Names waves_named{{"order", "scatter", "slow-noise"}};
-  // An array that moves while a ball is touched makes that one scatter (form).
+  // An array that moves while a ball is touched increases the form error of this ball.
   const Names moved{{"moved", "form"}}, touch{{"touch"}, {"touch ", "false trigger"}},
       file{{"array-file"}, {"calibrator file"}}, clamping{{"bent", "creep", "moved"}},
       handed{{}, {"mirror", "swapped"}}, position{{}, {"position"}};

@@ -17,14 +17,14 @@ using Eigen::Isometry3d;
 const std::array<const char*, 6> kChains{"[w X' b Y Z t]", "[w Y' b X Z t]", "[w X' Z' b Y t]",
                                          "[w b Z X Y t]",  "[w b Y Z X t]",  "[w Z' b Y X t]"};
 
-/// An L of balls, Ball1 in the origin, and two blocks beside its long leg.
+/// Balls in an L shape, Ball1 at the origin, and two blocks beside the long leg.
 sim::BallArray random_array(std::mt19937_64& random) {
   sim::BallArray array;
   array.name = "L";
   const std::size_t long_leg = 5 + random() % 3, short_leg = 2 + random() % 2;
   const double step_m = uniform(random, 0.07, 0.11), radius_m = uniform(random, 8e-3, 13e-3);
   const double across_m = uniform(random, 0.05, 0.08);
-  const double gap_m = random() % 2 == 0 ? step_m : 0.0;  // room for the blocks beside Ball1
+  const double gap_m = random() % 2 == 0 ? step_m : 0.0;  // space for the blocks beside Ball1
 
   for (std::size_t i = 0; i < long_leg; ++i) {
     array.balls.push_back(
@@ -43,20 +43,20 @@ sim::BallArray random_array(std::mt19937_64& random) {
   return array;
 }
 
-/// Fanned about Ball1 as in [Li OMM], tilted and rolled as there by 2 to 5 degrees, where little
-/// shows the scale of the axis across the array, or up to four times as far.
+/// Positions rotated about Ball1 as in [Li OMM]. Tilt and roll are 2 to 5 degrees as there, where
+/// the scale of the axis across the array is poorly observable, or up to four times as large.
 std::vector<Isometry3d> random_positions(std::mt19937_64& random, const Vector3& ball1_m,
                                          std::size_t count) {
   constexpr double kRadPerDeg = M_PI / 180.0;
-  const double farther = uniform(random, 1.0, 4.0);
+  const double tilt_factor = uniform(random, 1.0, 4.0);
   std::vector<Isometry3d> positions;
 
   for (std::size_t i = 0; i < count; ++i) {
     const double fan = 16.0 - 14.0 * static_cast<double>(i % 4) / 3.0 + uniform(random, -1.0, 1.0);
-    const double tilt = (i % 8 < 4 ? 1.0 : -1.0) * farther * uniform(random, 1.8, 3.2);
-    const double roll = (i % 2 == 0 ? 1.0 : -1.0) * farther * uniform(random, 2.5, 5.0);
+    const double tilt = (i % 8 < 4 ? 1.0 : -1.0) * tilt_factor * uniform(random, 1.8, 3.2);
+    const double roll = (i % 2 == 0 ? 1.0 : -1.0) * tilt_factor * uniform(random, 2.5, 5.0);
     Isometry3d T = Isometry3d::Identity();
-    T.translate(ball1_m + 50e-6 * normal3(random));  // put on its seat again by hand
+    T.translate(ball1_m + 50e-6 * normal3(random));  // placed by hand
     T.rotate(Eigen::AngleAxisd(fan * kRadPerDeg, Vector3::UnitZ()));
     T.rotate(Eigen::AngleAxisd(-tilt * kRadPerDeg, Vector3::UnitY()));
     T.rotate(Eigen::AngleAxisd(roll * kRadPerDeg, Vector3::UnitX()));
@@ -82,8 +82,8 @@ sim::ErrorFunction cubic(const std::array<double, 3>& c, double centre_m, double
   return sim::ErrorFunction::polynomial(std::move(in_q));
 }
 
-/// Errors of order 3 in the readings, about `size` large; the linear error of an axis along itself
-/// is a scale, relative to its travel.
+/// Errors of order 3 in the readings with amplitude `size`. The linear error of an axis along
+/// itself is a scale error, relative to its travel.
 void draw_errors(EvemuRun& run, double size) {
   std::mt19937_64& random = run.random;
   double longest_m = 0.0;
@@ -96,13 +96,14 @@ void draw_errors(EvemuRun& run, double size) {
     const double centre_m = 0.5 * (axis.range.min_m + axis.range.max_m);
     const double half_m = 0.5 * (axis.range.max_m - axis.range.min_m);
     for (std::size_t m = 0; m < sim::kMotions; ++m) {
-      const double amplitude = size * (m < 3 ? 1.0 : 2.0);  // rotations: the same over half a metre
+      // Rotations: the same displacement at 0.5 m.
+      const double amplitude = size * (m < 3 ? 1.0 : 2.0);
       std::array<double, 3> c{};
       for (std::size_t k = 0; k < 3; ++k) {
         c[k] = amplitude * normal(random) / std::pow(2.0, static_cast<double>(k));
       }
       if (m == static_cast<std::size_t>(a)) {
-        // the best part of a machine: 100 um/m where others are 250 um
+        // scales are the most accurate part of a machine: 100 um/m where other errors are 250 um
         constexpr double kOfScales = 0.1;
         for (double& order : c) order *= kOfScales * half_m / longest_m;
       }
@@ -143,7 +144,7 @@ void set_ranges(EvemuRun& run) {
   }
 }
 
-/// What a calibration with these uncertainties states of the array.
+/// The calibrator that a calibration with these uncertainties states for the array.
 evemu::Calibrator as_stated(const sim::BallArray& array, const sim::ArrayState& state) {
   evemu::Calibrator c;
   c.name = array.name;
@@ -159,7 +160,7 @@ evemu::Calibrator as_stated(const sim::BallArray& array, const sim::ArrayState& 
   return c;
 }
 
-/// Directions in which a ball is touched: from above and around, in the array's frame.
+/// Normals of the touches on a ball: from above and from the sides, in the array's frame.
 std::vector<Vector3> on_a_ball(std::size_t points) {
   std::vector<Vector3> normals{Vector3::UnitZ()};
   for (std::size_t i = 1; i < points; ++i) {
@@ -171,11 +172,11 @@ std::vector<Vector3> on_a_ball(std::size_t points) {
   return normals;
 }
 
-/// One touch to be made: of a place and with a normal of the array.
+/// One planned touch: a point and a normal in the array's frame.
 struct Aim {
   evemu::Feature feature;
   int number;
-  Vector3 centre_m;  ///< of the tip in contact
+  Vector3 centre_m;  ///< of the tip at contact
   Vector3 normal;
 };
 
@@ -228,7 +229,7 @@ Vector3 reading_at(const EvemuRun& run, const Vector3& p_m, const Vector3& norma
   return q;
 }
 
-/// An orthonormal basis of what six numbers of rigid motion do at the points.
+/// An orthonormal basis of the displacements of the points by the six parameters of a rigid motion.
 Eigen::MatrixXd rigid_basis(const std::vector<Vector3>& points_m) {
   const auto rows = 3 * std::ssize(points_m);
   Eigen::MatrixXd rigid(rows, 6);
@@ -277,7 +278,7 @@ evemu::Touch touch(EvemuRun& run, const Aim& aim, const TouchTime& when, const V
   return {when.position, aim.feature, aim.number, reading_at(run, p, n, when) + shift_m};
 }
 
-/// Mean |V| at the balls, without rigid motion, becomes this large.
+/// Scales the errors so that mean |V| at the balls, without rigid motion, is `mean_error_m`.
 void scale_errors(EvemuRun& run, double mean_error_m) {
   const std::mt19937_64 state = run.random;
   constexpr double kUnit_m = 1e-6;
@@ -299,7 +300,7 @@ Outcome refused(std::string reason) {
   return o;
 }
 
-/// About 250 points inside the volume the model holds in.
+/// About 250 points inside the validity volume of the model.
 std::vector<Vector3> places_in(const calib::ValidityVolume& volume) {
   const evemu::ReadingBox box = evemu::bounding_box(volume.vertices_m());
   constexpr int kSteps = 10;
@@ -318,7 +319,7 @@ std::vector<Vector3> places_in(const calib::ValidityVolume& volume) {
   return found;
 }
 
-/// All without the best-fit rigid motion: the touches do not show it.
+/// Compares without the best-fit rigid motion, which the touches cannot determine.
 void compare(Outcome& outcome, const EvemuRun& run, const calib::VolumetricModel& model) {
   const std::vector<Vector3> points = places_in(model.validity());
   const auto rows = 3 * std::ssize(points);
@@ -368,14 +369,15 @@ EvemuRun random_evemu_run(std::uint64_t seed) {
   run.order = shuffled(random, positions);
   set_ranges(run);
 
-  // Three in four machines of 10 to 200 um, the others up to 0.4 mm: 1 to 2 mm at a corner.
+  // Mean error of three in four machines: 10 to 200 um; of the others up to 0.4 mm, which is 1 to
+  // 2 mm at a corner.
   scale_errors(run, random() % 4 == 0 ? log_uniform(random, 0.2e-3, 0.4e-3)
                                       : log_uniform(random, 10e-6, 200e-6));
   run.points_per_ball = 9 + random() % 17;
   run.points_per_face = 6 + random() % 15;
   run.sigma_touch_m = log_uniform(random, 0.3e-6, 1.5e-6);
 
-  // Within their stated uncertainties.
+  // Errors drawn with their stated uncertainties.
   sim::ArrayState state{.temperature_C = uniform(random, 17.0, 26.0),
                         .alpha_per_K = 11.5e-6,
                         .u_alpha_per_K = uniform(random, 0.2e-6, 1e-6),
@@ -392,7 +394,7 @@ EvemuRun random_evemu_run(std::uint64_t seed) {
   run.observe.positions = static_cast<int>(positions);
   run.machine = {*calib::KinematicChain::parse(chain), Vector3::Zero()};
   run.judge.accept_shape_only = true;
-  run.judge.limits.max_error_m = 0.02;  // as a configuration for weak machines has it
+  run.judge.limits.max_error_m = 0.02;  // as configured for machines of low stiffness
   run.judge.limits.max_gradient = 0.5;
 
   return run;

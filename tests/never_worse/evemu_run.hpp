@@ -1,7 +1,6 @@
 #pragma once
-/// A random machine, a ball array touched on it, and the faults that happen there on a shop floor;
-/// then what the gate says of it and what the model is worth against the truth. Deterministic from
-/// the seed.
+/// A random machine, a ball array touched on it, and typical faults of a shop floor; then the
+/// verdict of the gate, and the error of the model against the truth. Deterministic from the seed.
 
 #include <Eigen/Geometry>
 #include <functional>
@@ -17,34 +16,33 @@ namespace abbe::tests::never_worse {
 
 using calib::Vector3;
 
-/// When something is touched, as shares of the position's and of the session's touches.
+/// The time of a touch, as a share of the touches of the position and of the session.
 struct TouchTime {
   int position = 1;
   double in_position = 0.0, in_session = 0.0;
 };
 
-/// What the machine and the array are, and what is known of them; a fault changes one or the other.
+/// The true machine and array, and their configuration; a fault changes one of the two.
 struct EvemuRun {
-  // the world
+  // the truth
   sim::TruthMachine truth;
-  sim::BallArray array;                            ///< as it stands there, in its own frame
+  sim::BallArray array;                            ///< the true array, in its own frame
   std::vector<Eigen::Isometry3d> T_machine_array;  ///< of positions 1, 2, ...
   std::vector<int> order;                          ///< in which the positions are touched
   std::size_t points_per_ball = 13, points_per_face = 9;
   double sigma_touch_m = 1e-6;
-  double slow_noise_m =
-      0.0;  ///< standard deviation of a shift of all touches that changes over a quarter of
-            ///< a position
-  /// Beside T_machine_array, about Ball1 of the position; may be empty.
+  /// standard deviation of a shift of all touches that changes over a quarter of a position
+  double slow_noise_m = 0.0;
+  /// In addition to T_machine_array, about Ball1 of the position; may be empty.
   std::function<Eigen::Isometry3d(const TouchTime&)> moved;
-  /// Displacement of a place of the array, in its own frame; may be empty.
+  /// Displacement of a point of the array, in its own frame; may be empty.
   std::function<Vector3(const TouchTime&, const Vector3& place_m)> bent;
-  /// Beside V, in machine coordinates; may be empty.
+  /// In addition to V, in machine coordinates; may be empty.
   std::function<Vector3(const TouchTime&, const Vector3& q_m)> drift;
-  std::function<void(std::vector<calib::evemu::Touch>&)>
-      spoil;                                       ///< the list of touches; may be empty
-  Vector3 stated_tool_offset_m = Vector3::Zero();  ///< from the tip that touched to the stated one
-  // what is configured
+  /// Changes the list of touches; may be empty.
+  std::function<void(std::vector<calib::evemu::Touch>&)> spoil;
+  Vector3 stated_tool_offset_m = Vector3::Zero();  ///< from the true tip to the stated one
+  // the configuration
   calib::evemu::Calibrator calibrator;
   calib::evemu::Machine machine;
   calib::evemu::ObserveOptions observe;

@@ -1,5 +1,5 @@
-// The campaign of scripts/soak never-worse, short: a few machines, and of every kind of fault the
-// ones that were accepted once.
+// A short version of the campaign of scripts/soak never-worse: a few machines, some faults, and the
+// seeds of known wrong acceptances.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -34,21 +34,22 @@ TEST(NeverWorseBallArray, NoAcceptedModelIsWorseThanNone) {
   }
 }
 
-// With noise that is white in the model, the first of them was wrong by 3.1 u.
+// With a noise model of white noise the first of these runs is wrong by 3.1 u.
 TEST(NeverWorseBallArray, SlowNoiseIsInTheUncertainty) {
   const auto slow = tallies_of(ball_array({"slow noise"}), 2, 5000).front();
   EXPECT_EQ(slow.runs, 2);
   EXPECT_EQ(slow.too_sure, 0) << slow.largest_left_over_u;
 }
 
-// The false touch makes the uncertainty so large that this covers it, and the ball centres scatter.
+// The false touch increases the estimated uncertainty, which then covers the touch, and the ball
+// centres scatter.
 TEST(NeverWorseBallArray, AFalseTouchIsNamedBeforeTheScatterThatFollows) {
   const auto tally = tallies_of(ball_array({"false trigger"}), 1, 7004).front();
   EXPECT_EQ(tally.accepted, 0);
   EXPECT_EQ(tally.named, 1) << tally.other_reason;
 }
 
-// Accepted, it was wrong by 3.3 u: the errors within a ball were compared with the uncertainty of
+// This run is wrong by 3.3 u if the errors within a ball are compared with the uncertainty of
 // another estimate.
 TEST(NeverWorseBallArray, ErrorsWithinABallAreNotLargeBesideTheUncertainty) {
   const auto screw = tallies_of(ball_array({"screw pitch"}), 1, 8092).front();

@@ -1,4 +1,5 @@
-// Random machines with every fault of a shop floor, on-the-fly method. Prints for every fault how
+// Random machines with typical faults of a shop floor, on-the-fly method. Prints for every fault
+// how
 // many models were accepted, how many of these make the machine worse, how many are wrong by more
 // than three times their stated uncertainty, and how often the fault is the cause named first.
 #include "campaign.hpp"

@@ -17,7 +17,7 @@ namespace {
 
 constexpr double kNode_m = 0.05;
 
-/// The reference path stretched to the travel of this machine.
+/// The reference path, scaled to the travels of this machine.
 std::vector<Vector3> stretched_path(const sim::TruthMachine& truth) {
   std::vector<Vector3> path = otf::case_a_path().vertices_m;
   Vector3 low = path.front(), high = path.front();
@@ -44,7 +44,8 @@ void make_machine(OtfRun& run, double spacing_m) {
   for (const sim::Axis a : sim::kAxes) {
     const auto& range = run.truth.axis(a).range;
     auto nodes = calib::equidistant_nodes(range.min_m, range.max_m, spacing_m);
-    nodes->reference_m = range.reference_m;  // where the truth is zero: intervals hold in the gauge
+    // The truth is zero there: the intervals are valid in this gauge.
+    nodes->reference_m = range.reference_m;
     run.machine.nodes[static_cast<std::size_t>(a)] = *std::move(nodes);
   }
 }
@@ -136,7 +137,8 @@ void compare(Outcome& outcome, const OtfRun& run, const calib::VolumetricModel& 
              left = calib::rigid_free(points, difference);
   outcome.before_m = before->rigid_free.mean_m;
   outcome.left_m = left->rigid_free.mean_m;
-  constexpr double kNormal975 = 1.95996, kFixed_m = 1e-9;  // by the gauge: no interval
+  // A component below kFixed_m is fixed by the gauge and has no interval.
+  constexpr double kNormal975 = 1.95996, kFixed_m = 1e-9;
 
   for (std::size_t i = 0; i < points.size(); ++i) {
     for (Eigen::Index k = 0; k < 3; ++k) {
@@ -160,14 +162,14 @@ calib::RigidTransform about(const Vector3& centre, const Vector3& rotation_rad,
   return T;
 }
 
-/// The tracker stands elsewhere from `share` of the run on: turned about its own place and shifted.
+/// From `share` of the run on the tracker is rotated about its own position and shifted.
 void move_tracker(OtfRun& run, double share, double angle_rad, double shift_m) {
   const auto T = about(run.T_machine_tracker.t_m, angle_rad * direction(run.random),
                        shift_m * direction(run.random));
   run.moved = [T, share](double time) { return time > share ? T : calib::RigidTransform{}; };
 }
 
-/// Two signs reversed in the file.
+/// Reverses signs in the path file.
 void turn_path(OtfRun& run, const Vector3& signs) {
   for (Vector3& q : run.path_m) q = signs.cwiseProduct(q);
 }
@@ -175,7 +177,8 @@ void turn_path(OtfRun& run, const Vector3& signs) {
 void displace_vertex(OtfRun& run, double by_m) {
   const std::size_t i = 3 + run.random() % (run.path_m.size() - 6);
   Vector3 by = by_m * direction(run.random);
-  for (const sim::Axis a : sim::kAxes) {  // into the travel: else the path is refused at once
+  // Towards the middle of the travel, so that the path is not refused.
+  for (const sim::Axis a : sim::kAxes) {
     const auto& range = run.truth.axis(a).range;
     const auto k = static_cast<Eigen::Index>(a);
     by(k) = std::copysign(by(k), 0.5 * (range.min_m + range.max_m) - run.path_m[i](k));
@@ -215,7 +218,7 @@ OtfRun random_otf_run(std::uint64_t seed) {
   run.evidence.up = Vector3::UnitZ();
   run.evidence.tracker_m = run.T_machine_tracker.t_m + 0.15 * direction(random);
 
-  // Within their stated uncertainties.
+  // Errors drawn with their stated uncertainties.
   run.noise.u_scale = 0.45e-6;  // 0.3 ppm of the instrument, 0.33 ppm of the air
   run.range_scale = 1.0 + 0.45e-6 * normal(random);
   run.noise.u_range_offset_m = 6e-6;
@@ -266,7 +269,7 @@ std::vector<Fault<OtfRun>> otf_faults() {
          };
        },
        drift},
-      {"growth by 20 um/m",
+      {"expansion by 20 um/m",
        [](OtfRun& r) {
          r.truth.thermal = {.expansion_per_m = Vector3::Constant(20e-6),
                             .shift_m = Vector3::Zero(),
@@ -334,8 +337,8 @@ std::vector<Fault<OtfRun>> otf_faults() {
 Outcome identify_and_compare(OtfRun run) {
   const auto samples = measure(run);
   const calib::otf::Path path{run.path_m};
-  if (const auto fine = calib::otf::check(path, run.machine.nodes); !fine) {
-    return refused(fine.error().text);
+  if (const auto checked = calib::otf::check(path, run.machine.nodes); !checked) {
+    return refused(checked.error().text);
   }
 
   calib::otf::Options options;

@@ -1,7 +1,7 @@
 #pragma once
-/// A random machine, its on-the-fly run, and the faults that happen to one on a shop floor; then
-/// what the gate says of it and what the model is worth against the truth. Deterministic from the
-/// seed. One thread each.
+/// A random machine, its on-the-fly run, and typical faults of a shop floor; then the verdict of
+/// the gate, and the error of the model against the truth. Deterministic from the seed. Each run is
+/// computed on one thread.
 
 #include <functional>
 #include <random>
@@ -17,22 +17,23 @@ namespace abbe::tests::never_worse {
 
 using calib::Vector3;
 
-/// What the machine is and what is known of it; a fault changes one or the other.
+/// The true machine and its configuration; a fault changes one of the two.
 struct OtfRun {
-  // the world
+  // the truth
   sim::TruthMachine truth;
   std::vector<Vector3> driven_m;  ///< vertices, scale readings
   calib::RigidTransform T_machine_tracker;
-  std::function<calib::RigidTransform(double time_share)>
-      moved;                        ///< of the target in the machine; may be empty
-  Vector3 scale = Vector3::Ones();  ///< true travel per reading: temperature of the scales
+  /// displacement of the target in the machine; may be empty
+  std::function<calib::RigidTransform(double time_share)> moved;
+  /// true travel per reading, due to the temperature of the scales
+  Vector3 scale = Vector3::Ones();
   double range_scale = 1.0, range_offset_m = 0.0;
   double sigma_range_m = 2e-6, sigma_angle_rad = 3e-6;
-  double correlation_s = 0.0;             ///< of the noise; 0: white
+  double correlation_s = 0.0;             ///< correlation time of the noise; 0: white
   double lost_from = 0.0, lost_to = 0.0;  ///< share of the run without a beam
-  double spikes = 0.0;                    ///< share of the samples that are off by 0.2 mm
+  double spikes = 0.0;                    ///< share of the samples with an error of 0.2 mm
   double feed_m_per_s = 5.0 / 60.0, rate_hz = 100.0;
-  // what is configured
+  // the configuration
   calib::otf::Machine machine;
   std::vector<Vector3> path_m;
   calib::otf::Noise noise;

@@ -73,7 +73,7 @@ class CounterCardTest : public testing::Test {
   CounterCard card_{options()};
 };
 
-TEST_F(CounterCardTest, CountsFromWhereItWasSetUp) {
+TEST_F(CounterCardTest, CountsFromThePositionAtSetUp) {
   start();
   card_.advance(kStart + 10ms, 0);
   const auto all = scans();
@@ -83,7 +83,7 @@ TEST_F(CounterCardTest, CountsFromWhereItWasSetUp) {
   EXPECT_EQ(all[9][2], 0u);  // no probe edge yet
 }
 
-TEST_F(CounterCardTest, LatchesTheClockAtTheProbesEdge) {
+TEST_F(CounterCardTest, LatchesTheClockAtTheEdgeOfTheProbe) {
   start();
   card_.add_probe_edge(kStart + 4321us);
   card_.advance(kStart + 6ms, 0);
@@ -94,7 +94,7 @@ TEST_F(CounterCardTest, LatchesTheClockAtTheProbesEdge) {
   EXPECT_EQ(all[4][3], 1u);
 }
 
-TEST_F(CounterCardTest, OverrunsWhenNobodyReads) {
+TEST_F(CounterCardTest, OverrunsWhenTheHostDoesNotRead) {
   start();
   card_.advance(kStart + 200ms, 0);
   EXPECT_FALSE(status().overrun());
@@ -116,20 +116,20 @@ TEST_F(CounterCardTest, KeepsItsCountsOverARestartOfTheScan) {
   EXPECT_EQ(scans().front()[1], 51'000u);
 }
 
-TEST_F(CounterCardTest, ReadsItselfByRegistersToo) {
+TEST_F(CounterCardTest, CountersCanBeReadByRegister) {
   set_up(0, {.mode = quad08::CounterMode::Encoder, .register_reading = true}, kStart);
   (void)card_.control(quad08::write(quad08::Register::CounterBank, 0), kStart);
   const auto low = card_.control(quad08::read(quad08::Register::CounterWord0), kStart + 10ms);
   EXPECT_EQ(quad08::decode_word(*low), 5000);
 }
 
-TEST_F(CounterCardTest, StallsWhatItDoesNotKnow) {
+TEST_F(CounterCardTest, StallsUnknownRequests) {
   EXPECT_FALSE(card_.control({0xC0, 0x77, 0, 0, 2}, kStart).has_value());
   EXPECT_FALSE(
       card_.control(usb::get_descriptor(usb::DescriptorType::String, 9, 255), kStart).has_value());
 }
 
-TEST(DistanceCodedMarks, StandWhereTheFormulaFindsThem) {
+TEST(DistanceCodedMarks, HaveTheDistancesOfTheFormula) {
   const auto marks = distance_coded_marks(0.0, 1.0, 1000, 5);
   // Distances 501, 499, 502, 498, ... signal periods.
   for (std::size_t i = 0; i + 2 < marks.size(); i += 2) {

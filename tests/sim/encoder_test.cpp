@@ -82,7 +82,7 @@ TEST(EncoderNode, ReadsTheScaleAtTheSyncAndNotTheTruePosition) {
   EXPECT_EQ(count, std::llround(machine.motion(sync).q_m.x() / 10e-9));
 }
 
-TEST(EncoderNode, HasNoiseOfItsOwnThatIsTheSameEveryRun) {
+TEST(EncoderNode, HasItsOwnNoiseWhichIsTheSameInEveryRun) {
   const VirtualMachine machine = test::standing_machine();
   const auto counts = [&](std::uint64_t seed) {
     EncoderNode node({.node = 1, .axis = Axis::X, .step_nm = 1, .noise_m = 50e-9, .seed = seed},
@@ -110,7 +110,7 @@ TEST(EncoderNode, HasNoiseOfItsOwnThatIsTheSameEveryRun) {
   EXPECT_NE(values, counts(2));
 }
 
-TEST(EncoderNode, BeatsItsHeart) {
+TEST(EncoderNode, SendsHeartbeats) {
   const VirtualMachine machine = test::standing_machine();
   EncoderNode node({.node = 3}, machine, kPowerOn);
   HostTime now = configure(node, kPowerOn + 1s);
@@ -123,7 +123,7 @@ TEST(EncoderNode, BeatsItsHeart) {
   EXPECT_NEAR(beats, 10, 1);
 }
 
-TEST(EncoderNode, MuteNodeSaysNothingUntilItSpeaksAgain) {
+TEST(EncoderNode, MuteNodeSendsNothingUntilTheFaultEnds) {
   const VirtualMachine machine = test::standing_machine();
   EncoderNode node({.node = 3}, machine, kPowerOn);
   const HostTime now = configure(node, kPowerOn + 1s);
@@ -134,7 +134,7 @@ TEST(EncoderNode, MuteNodeSaysNothingUntilItSpeaksAgain) {
   EXPECT_FALSE(frames_of(node).empty());
 }
 
-TEST(EncoderNode, RestartedNodeBootsAndHasForgottenItsConfiguration) {
+TEST(EncoderNode, RestartedNodeBootsWithoutItsConfiguration) {
   const VirtualMachine machine = test::standing_machine();
   EncoderNode node({.node = 3}, machine, kPowerOn);
   const HostTime now = configure(node, kPowerOn + 1s);
@@ -216,8 +216,8 @@ TEST_F(EncoderBusTest, OverflowIsAnErrorFrame) {
                        can::BusCondition::ReceiveOverflow));
 }
 
-TEST_F(EncoderBusTest, ProducesTheSyncItselfWhenTold) {
-  send(can::encode_sync());  // the bus knows whom to send to
+TEST_F(EncoderBusTest, ProducesTheSyncOnRequest) {
+  send(can::encode_sync());  // the bus learns the address of its peer
   receive();
   bus_.produce_sync(4ms, now_ + 4ms);
   EXPECT_EQ(bus_.next_due(), now_ + 4ms);
@@ -266,7 +266,7 @@ TEST_F(EncoderBusTest, BusOffIsAnErrorFrameThenSilenceThenRestarted) {
       can::has(can::decode_error_frame(receive().at(0))->conditions, can::BusCondition::Restarted));
 }
 
-TEST_F(EncoderBusTest, EmergencyIsFollowedByTheAllClear) {
+TEST_F(EncoderBusTest, EmergencyIsFollowedByEmergencyNoError) {
   send(can::encode_sync());
   receive();
   bus_.inject({FaultKind::Emergency, 0.0, 0.02, 0x5000, 2}, now_);
@@ -275,7 +275,7 @@ TEST_F(EncoderBusTest, EmergencyIsFollowedByTheAllClear) {
   EXPECT_EQ(can::decode_emergency(receive().at(0))->code, 0);
 }
 
-TEST_F(EncoderBusTest, SendsGarbageWhenTold) {
+TEST_F(EncoderBusTest, SendsGarbageOnRequest) {
   send(can::encode_sync());
   receive();
   bus_.inject({FaultKind::BusGarbage, 0.0, 0.0, 0.0, 0}, now_);
@@ -284,7 +284,7 @@ TEST_F(EncoderBusTest, SendsGarbageWhenTold) {
   EXPECT_FALSE(can::DatagramView::parse(bytes));
 }
 
-TEST_F(EncoderBusTest, SurvivesDatagramsThatAreNoFrames) {
+TEST_F(EncoderBusTest, IgnoresDatagramsThatAreNotFrames) {
   constexpr std::array<std::byte, 3> kMalformed{std::byte{9}, std::byte{9}, std::byte{9}};
   test::send_bytes(peer_, kMalformed);
   test::readable(bus_.fd());

@@ -17,7 +17,7 @@ IppDmeOptions with_a_sphere() {
   return o;
 }
 
-/// Says one line at `at` and gives what is answered until `until`, lines joined by a blank.
+/// Sends one line at `at` and returns the answer until `until`; each line ends with "|".
 std::string ask(IppDmeDevice& machine, const std::string& line, HostTime at = kStart,
                 HostTime until = kStart) {
   const std::string bytes = line + "\r\n";
@@ -30,7 +30,7 @@ std::string ask(IppDmeDevice& machine, const std::string& line, HostTime at = kS
   return text;
 }
 
-TEST(IppDmeDevice, AnswersNothingOutsideOfASession) {
+TEST(IppDmeDevice, RefusesCommandsOutsideASession) {
   IppDmeDevice machine{with_a_sphere(), kStart};
   machine.connected(kStart);
   EXPECT_EQ(ask(machine, "00001 IsHomed()"),
@@ -45,7 +45,7 @@ TEST(IppDmeDevice, RefusesASecondSession) {
   EXPECT_NE(ask(machine, "00002 StartSession()").find("Error(3,0008"), std::string::npos);
 }
 
-TEST(IppDmeDevice, WantsItsErrorsClearedAfterAnAbort) {
+TEST(IppDmeDevice, RefusesCommandsAfterAnAbortUntilErrorsAreCleared) {
   IppDmeDevice machine{with_a_sphere(), kStart};
   (void)ask(machine, "00001 StartSession()");
   EXPECT_EQ(ask(machine, "00002 GoTo(X(100))"), "00002 &|");
@@ -57,18 +57,18 @@ TEST(IppDmeDevice, WantsItsErrorsClearedAfterAnAbort) {
   EXPECT_EQ(ask(machine, "00005 GoTo(X(20))"), "00005 &|00005 %|");
 }
 
-TEST(IppDmeDevice, ReportsWhileMovingTenTimesASecondAtMost) {
+TEST(IppDmeDevice, ReportsAtMostTenTimesASecondWhileMoving) {
   IppDmeDevice machine{with_a_sphere(), kStart};
   (void)ask(machine, "00001 StartSession()");
   EXPECT_EQ(ask(machine, "E0001 OnMoveReportE(Time(0.01),Dis(1),X())"), "E0001 &|");
-  const std::string said = ask(machine, "00002 GoTo(X(200))", kStart, kStart + 2s);  // 1 s
+  const std::string answer = ask(machine, "00002 GoTo(X(200))", kStart, kStart + 2s);  // 1 s
   EXPECT_EQ(
-      said,
+      answer,
       "00002 &|E0001 # X(0)|E0001 # X(20)|E0001 # X(40)|E0001 # X(60)|E0001 # X(80)|E0001 # X(100)|"
       "E0001 # X(120)|E0001 # X(140)|E0001 # X(160)|E0001 # X(180)|00002 %|");
 }
 
-TEST(IppDmeDevice, SaysWhereTheSurfaceIsNot) {
+TEST(IppDmeDevice, ReportsAMissingSurfaceAndAnIllegalTouch) {
   IppDmeDevice machine{with_a_sphere(), kStart};
   (void)ask(machine, "00001 StartSession()");
   const std::string missed =
@@ -80,7 +80,7 @@ TEST(IppDmeDevice, SaysWhereTheSurfaceIsNot) {
   EXPECT_NE(inside.find("Error(2,1001"), std::string::npos) << inside;
 }
 
-TEST(MeasuringMachine, TouchesASphereWhereItIs) {
+TEST(MeasuringMachine, TouchesASphereAtItsTruePosition) {
   const MeasuringMachine machine{.spheres = {{.centre_m = {0.0, 0.0, 0.0}, .radius_m = 10e-3}}};
   const Eigen::Vector3d normal = Eigen::Vector3d{1.0, 2.0, 2.0} / 3.0;
   const Probing probing = probe(machine, 12.3e-3 * normal, normal, 0);
@@ -88,7 +88,7 @@ TEST(MeasuringMachine, TouchesASphereWhereItIs) {
   EXPECT_NEAR(probing.reading_m.norm(), 12e-3, 1e-15);
 }
 
-TEST(IppDmeDevice, MeetsTheFaceOfABlockWithinItsSquareOnly) {
+TEST(IppDmeDevice, TouchesTheFaceOfABlockOnlyWithinItsSquare) {
   MeasuringMachine machine;
   machine.tip_radius_m = 2e-3;
   machine.faces = {{.centre_m = {0.1, 0.1, 0.0}, .normal = {0, 0, 1}, .half_size_m = 10e-3}};
@@ -99,7 +99,7 @@ TEST(IppDmeDevice, MeetsTheFaceOfABlockWithinItsSquareOnly) {
             ProbingFault::NothingThere);
 }
 
-TEST(IppDmeDevice, IsMuteForAWhileAndForgetsItsSession) {
+TEST(IppDmeDevice, LosesItsSessionWhenItIsMute) {
   IppDmeDevice machine{with_a_sphere(), kStart};
   machine.connected(kStart);
   (void)ask(machine, "00001 StartSession()");
@@ -109,7 +109,7 @@ TEST(IppDmeDevice, IsMuteForAWhileAndForgetsItsSession) {
             std::string::npos);
 }
 
-TEST(IppDmeDevice, KeepsMovingWhenTheConnectionClosesAndRemembersWhatItHeard) {
+TEST(IppDmeDevice, KeepsMovingWhenTheConnectionClosesAndKeepsTheListOfCommands) {
   IppDmeDevice machine{with_a_sphere(), kStart};
   machine.connected(kStart);
   (void)ask(machine, "00001 StartSession()");
@@ -119,7 +119,7 @@ TEST(IppDmeDevice, KeepsMovingWhenTheConnectionClosesAndRemembersWhatItHeard) {
   EXPECT_TRUE(machine.moving());
   machine.connected(kStart);
   EXPECT_EQ(ask(machine, "00001 StartSession()", kStart + 500ms, kStart + 500ms),
-            "00001 &|");  // waits
+            "00001 &|");  // waits for the end of the motion
   EXPECT_NE(ask(machine, "E0002 AbortE()", kStart + 500ms, kStart + 2s).find("E0002 %"),
             std::string::npos);
   EXPECT_NEAR(machine.reading_m(kStart + 2s)[0], 0.1, 1e-9);
@@ -146,21 +146,21 @@ TEST(IppDmeDevice, SendsOddTagsErrorsAndOtherCharacters) {
   machine.inject({.kind = FaultKind::OddTag}, kStart);
   machine.inject({.kind = FaultKind::ErrorReport, .value = 9}, kStart);
   machine.inject({.kind = FaultKind::NotAscii}, kStart);
-  const auto said = machine.take_output();
-  const std::string_view text{reinterpret_cast<const char*>(said.data()), said.size()};
+  const auto answer = machine.take_output();
+  const std::string_view text{reinterpret_cast<const char*>(answer.data()), answer.size()};
   EXPECT_EQ(text.substr(0, 9), "98765 %\r\n");
   EXPECT_NE(text.find("E0000 ! Error(9,0503,Machine,"), std::string::npos);
   EXPECT_NE(text.find("f\xFCr"), std::string::npos);
 }
 
-TEST(IppDmeDevice, RefusesTheNextTouchWithTheErrorThatIsWanted) {
+TEST(IppDmeDevice, RefusesTheNextTouchWithTheGivenError) {
   IppDmeDevice machine{with_a_sphere(), kStart};
   machine.connected(kStart);
   (void)ask(machine, "00001 StartSession()");
   machine.inject({.kind = FaultKind::RefuseTouch, .value = 1009}, kStart);
-  const auto said =
+  const auto answer =
       ask(machine, "00002 PtMeas(X(100),Y(200),Z(-85.5),IJK(0,0,1))", kStart, kStart + 60s);
-  EXPECT_NE(said.find("00002 ! Error(2,1009,PtMeas"), std::string::npos) << said;
+  EXPECT_NE(answer.find("00002 ! Error(2,1009,PtMeas"), std::string::npos) << answer;
 }
 
 }  // namespace

@@ -22,7 +22,7 @@ std::uint16_t value_at(const std::vector<SimulatedRegister>& registers, std::uin
   return 0;
 }
 
-TEST(ModbusRegisters, LieAsVaisalaShowsThem) {
+TEST(ModbusRegisters, AreStoredInTheWordOrderOfVaisala) {
   EnvironmentModel model;
   model.relative_humidity_percent = {30.56};
   const auto r = registers_of({.model = ModbusModel::Indigo520Hmp}, model, 0s, false);
@@ -38,7 +38,7 @@ TEST(ModbusRegisters, HoldTheSerialNumberOfACometInDecimalDigits) {
   EXPECT_EQ(value_at(r, 0, 4150), 0x1234);
 }
 
-TEST(ModbusRegisters, HoldFrostAsTwosComplement) {
+TEST(ModbusRegisters, HoldNegativeTemperaturesAsTwosComplement) {
   EnvironmentModel model;
   model.air_temperature_C = {-1.5};
   const auto r = registers_of({.model = ModbusModel::CometT7510}, model, 0s, false);
@@ -52,7 +52,7 @@ TEST(Course, DriftsAndSwings) {
   EXPECT_NEAR(course.at(25s), 20.0 + 0.5 * 25.0 / 3600.0 + 1.0, 1e-9);
 }
 
-TEST(ModbusServer, SaysWhichPortIsTaken) {
+TEST(ModbusServer, NamesThePortThatIsInUse) {
   const auto first = ModbusServer::open({}, kStart);
   ASSERT_TRUE(first);
   const auto second = ModbusServer::open({.endpoint = ModbusTcpEndpoint{first->port()}}, kStart);
@@ -61,7 +61,7 @@ TEST(ModbusServer, SaysWhichPortIsTaken) {
   EXPECT_NE(second.error().text.find(std::to_string(first->port())), std::string::npos);
 }
 
-TEST(ModbusServer, TakesItsTerminalAwayAndBringsItBack) {
+TEST(ModbusServer, RemovesItsTerminalAndCreatesItAgain) {
   std::string folder = (std::filesystem::temp_directory_path() / "abbe-sim-XXXXXX").string();
   ASSERT_NE(mkdtemp(folder.data()), nullptr);
   const std::string link = folder + "/line";

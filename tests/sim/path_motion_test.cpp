@@ -31,13 +31,13 @@ TEST(PathMotion, StopsAtEveryVertexAndDwellsThere) {
   EXPECT_EQ(motion.at(0.5 * (motion.leg_begin_s(1) + motion.leg_end_s(0))).q_m, corner.q_m);
 }
 
-TEST(PathMotion, TakesTheTimeOfATrapezoid) {
+TEST(PathMotion, TakesTheTimeOfATrapezoidalSpeedProfile) {
   // 0.5 m at 0.1 m/s and 1 m/s^2: 5 s and one ramp time more.
   const PathMotion motion = l_shaped();
   EXPECT_NEAR(motion.leg_end_s(0) - motion.leg_begin_s(0), 5.1, 1e-12);
 }
 
-TEST(PathMotion, TurnsInTheMiddleOfALegTooShortForTheFeed) {
+TEST(PathMotion, DeceleratesFromTheMiddleOfALegTooShortForTheFeed) {
   const PathMotion motion = l_shaped();
   EXPECT_NEAR(motion.leg_end_s(2) - motion.leg_begin_s(2), 2.0 * std::sqrt(1e-4 / 1.0), 1e-12);
 }
@@ -47,11 +47,12 @@ TEST(PathMotion, VelocityIsTheSlopeOfThePosition) {
   const double h = 1e-6;
   for (double t = 0.0101; t < motion.duration_s(); t += 0.0371) {
     const Eigen::Vector3d slope = (motion.at(t + h).q_m - motion.at(t - h).q_m) / (2.0 * h);
-    EXPECT_LT((slope - motion.at(t).velocity_m_per_s).norm(), 1e-5) << t;  // a h at a kink is 1e-6
+    // At a change of acceleration the difference is about acceleration x h = 1e-6.
+    EXPECT_LT((slope - motion.at(t).velocity_m_per_s).norm(), 1e-5) << t;
   }
 }
 
-TEST(PathMotion, RemembersTheDirectionOfAnAxisThatRests) {
+TEST(PathMotion, KeepsTheLastDirectionOfAnAxisThatStands) {
   const PathMotion motion = l_shaped();
   EXPECT_THAT(motion.at(0.0).direction, testing::ElementsAre(0, 0, 0));
   EXPECT_THAT(motion.at(2.0).direction, testing::ElementsAre(1, 0, 0));
@@ -59,7 +60,7 @@ TEST(PathMotion, RemembersTheDirectionOfAnAxisThatRests) {
   EXPECT_THAT(motion.at(motion.duration_s()).direction, testing::ElementsAre(1, 1, 0));
 }
 
-TEST(PathMotion, HoldsTheFeedOfTheVertexItGoesTo) {
+TEST(PathMotion, MovesAtTheFeedOfTheNextVertex) {
   PathPlan plan;
   plan.vertices = {{{0, 0, 0}}, {{1, 0, 0}, 0.2}, {{0, 0, 0}}};
   plan.feed_m_per_s = 0.1;

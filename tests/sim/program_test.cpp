@@ -1,4 +1,4 @@
-/// abbe-sim as people and scripts meet it: exit codes, messages, files.
+/// abbe-sim as a program: exit codes, messages, files.
 
 #include <gmock/gmock.h>
 #include <sys/wait.h>
@@ -50,7 +50,7 @@ class Program : public testing::Test {
   std::filesystem::path folder_;
 };
 
-TEST_F(Program, WithoutACommandIsUsage) {
+TEST_F(Program, WithoutACommandIsAUsageError) {
   EXPECT_EQ(run("").code, 2);
 }
 
@@ -61,7 +61,7 @@ TEST_F(Program, HelpNamesItsCommandsAndExitCodes) {
   EXPECT_THAT(help.output, HasSubstr("Exit codes"));
 }
 
-/// A parser recurses, and so do the copies of what it made.
+/// The TOML parser recurses, and so do the copies of its result.
 TEST_F(Program, RefusesATomlFileThatNestsTooDeepOrIsTooLarge) {
   std::string key = "a";
   for (int i = 0; i < 40'000; ++i) key += ".a";
@@ -84,20 +84,20 @@ TEST_F(Program, RefusesATomlFileThatNestsTooDeepOrIsTooLarge) {
   EXPECT_THAT(large.output, HasSubstr("at most 1048576 are read"));
 }
 
-TEST_F(Program, SaysWhenNoMachineOrNoPathWasGiven) {
+TEST_F(Program, ReportsAMissingMachineOrPath) {
   EXPECT_EQ(run("run").code, 2);
   const Outcome no_path = run("run --machine " + demo_ + "/machine.toml");
   EXPECT_EQ(no_path.code, 2);
   EXPECT_THAT(no_path.output, HasSubstr("--path"));
 }
 
-TEST_F(Program, FileThatIsNotThereIsInputOutput) {
+TEST_F(Program, AMissingFileIsAnInputOutputError) {
   const Outcome outcome = run("run --machine /nowhere/machine.toml");
   EXPECT_EQ(outcome.code, 4);
   EXPECT_THAT(outcome.output, HasSubstr("/nowhere/machine.toml"));
 }
 
-TEST_F(Program, NamesEveryFaultOfAConfigurationAtOnce) {
+TEST_F(Program, ReportsAllFaultsOfAConfigurationTogether) {
   const std::string config =
       write("bad.toml",
             "[sim]\nspeed = \"fast\"\nfoo = 1\n[sim.path]\nfeed_mm_per_min = -3\n"
@@ -140,7 +140,7 @@ TEST_F(Program, ReadsADaemonsWholeConfiguration) {
   EXPECT_EQ(run("truth --machine " + config + " --grid 2 2 2").code, 0);
 }
 
-TEST_F(Program, TruthIsThatOfTheMachineWrittenAsTables) {
+TEST_F(Program, TruthFromTheTablesEqualsTruthFromTheSeed) {
   const std::string tables = (folder_ / "tables.csv").string();
   const std::string from_seed = (folder_ / "seed.csv").string();
   const std::string from_tables = (folder_ / "tables_truth.csv").string();
@@ -163,7 +163,7 @@ TEST_F(Program, TruthIsThatOfTheMachineWrittenAsTables) {
   }
 }
 
-TEST_F(Program, WritesItsPortsWhenItListensAndStopsWhenTold) {
+TEST_F(Program, WritesItsPortsWhenItListensAndStopsOnASignal) {
   const std::string ports = (folder_ / "ports").string();
   const std::string config = demo_ + "/sim.toml";
   std::array<int, 2> output{};
@@ -178,7 +178,7 @@ TEST_F(Program, WritesItsPortsWhenItListensAndStopsWhenTold) {
   }
   ::close(output[1]);
   char first = 0;
-  ASSERT_EQ(::read(output[0], &first, 1), 1);  // it says its ports after it has written the file
+  ASSERT_EQ(::read(output[0], &first, 1), 1);  // the ports are printed after the file is written
   std::ifstream in(ports);
   std::string tracker_line;
   ASSERT_TRUE(std::getline(in, tracker_line));

@@ -1,4 +1,4 @@
-/// A counter card out of a recording.
+/// Replay of a recorded counter card.
 
 #include <gtest/gtest.h>
 
@@ -13,8 +13,8 @@ using namespace std::chrono_literals;
 using Outcome = ControlAnswer::Outcome;
 namespace usbip = protocol::usbip;
 
-constexpr HostTime kThen{5000s};
-constexpr HostTime kNow{90s};
+constexpr HostTime kRecorded{5000s};
+constexpr HostTime kReplayed{90s};
 constexpr auto kVersion = quad08::read_firmware_version();
 constexpr auto kStatus = quad08::read(quad08::Register::Acquisition);
 constexpr auto kStop = quad08::write(quad08::Register::Acquisition, quad08::acquisition::kPacerOff);
@@ -28,7 +28,7 @@ Data word(unsigned low) {
 class Tape {
  public:
   Tape& at(std::chrono::nanoseconds since) {
-    time = kThen + since;
+    time = kRecorded + since;
     return *this;
   }
   Tape& ask(const usb::Setup& setup) {
@@ -53,7 +53,7 @@ class Tape {
     return ask(kVersion).answer(word(4)).ask(kVersion).answer(word(4));
   }
   RecordedDevice device{"card", RecordedKind::CounterCard, {}};
-  HostTime time = kThen;
+  HostTime time = kRecorded;
 
  private:
   Tape& add(bool to_device, const usbip::Urb& urb, const Data& data) {
@@ -65,7 +65,7 @@ class Tape {
   }
 };
 
-/// A scan that ran over after a quarter of a second and was started anew.
+/// A scan that overruns after 200 ms and is restarted.
 Tape overrun() {
   Tape t;
   t.open().ask(kStart).answer();
@@ -81,8 +81,8 @@ struct Replayed {
   RecordedCard card;
 
   void open() {
-    (void)card.answer(kVersion, kNow);
-    (void)card.answer(kVersion, kNow);
+    (void)card.answer(kVersion, kReplayed);
+    (void)card.answer(kVersion, kReplayed);
   }
   Data at(HostTime now) {
     card.advance(now, 512);
@@ -90,86 +90,86 @@ struct Replayed {
   }
 };
 
-TEST(RecordedCard, ShowsTheDescriptorsOfACardWithThatSerialNumber) {
+TEST(RecordedCard, HasTheDescriptorsOfACardWithTheGivenSerialNumber) {
   Replayed r{overrun()};
-  const auto answer =
-      r.card.answer(usb::get_descriptor(usb::DescriptorType::String, 3, usb::kMaxDescriptor), kNow);
+  const auto answer = r.card.answer(
+      usb::get_descriptor(usb::DescriptorType::String, 3, usb::kMaxDescriptor), kReplayed);
   const auto text = usb::decode_string(answer.data);
   ASSERT_TRUE(text);
   EXPECT_EQ(text->view(), "S1");
 }
 
-TEST(RecordedCard, ScansComeWithTheirTimingFromTheStartOfThePacer) {
+TEST(RecordedCard, SendsScansWithTheirTimingFromTheStartOfThePacer) {
   Replayed r{overrun()};
   r.open();
-  EXPECT_TRUE(r.at(kNow + 1s).empty());
-  EXPECT_EQ(r.card.answer(kStart, kNow).outcome, Outcome::Done);
-  EXPECT_EQ(r.card.available_at(2), kNow + 100ms);
-  EXPECT_TRUE(r.at(kNow + 99ms).empty());
-  EXPECT_EQ(r.at(kNow + 100ms), word(1));
-  EXPECT_EQ(r.at(kNow + 200ms), word(2));
+  EXPECT_TRUE(r.at(kReplayed + 1s).empty());
+  EXPECT_EQ(r.card.answer(kStart, kReplayed).outcome, Outcome::Done);
+  EXPECT_EQ(r.card.available_at(2), kReplayed + 100ms);
+  EXPECT_TRUE(r.at(kReplayed + 99ms).empty());
+  EXPECT_EQ(r.at(kReplayed + 100ms), word(1));
+  EXPECT_EQ(r.at(kReplayed + 200ms), word(2));
 }
 
-TEST(RecordedCard, TheStatusIsThatOfTheTime) {
+TEST(RecordedCard, ReportsTheRecordedStatusOfTheTime) {
   Replayed r{overrun()};
   r.open();
-  (void)r.card.answer(kStart, kNow);
-  EXPECT_EQ(r.card.answer(kStatus, kNow + 50ms).data, word(0x10));
-  EXPECT_EQ(r.card.answer(kStatus, kNow + 150ms).data, word(0x10));
-  EXPECT_EQ(r.card.answer(kStatus, kNow + 210ms).data, word(0x14));
+  (void)r.card.answer(kStart, kReplayed);
+  EXPECT_EQ(r.card.answer(kStatus, kReplayed + 50ms).data, word(0x10));
+  EXPECT_EQ(r.card.answer(kStatus, kReplayed + 150ms).data, word(0x10));
+  EXPECT_EQ(r.card.answer(kStatus, kReplayed + 210ms).data, word(0x14));
 }
 
-TEST(RecordedCard, AScanThatWasRestartedThenGoesOnWithWhatCameThen) {
+TEST(RecordedCard, ARecordedRestartContinuesWithTheScansRecordedAfterIt) {
   Replayed r{overrun()};
   r.open();
-  (void)r.card.answer(kStart, kNow);
-  (void)r.at(kNow + 200ms);
-  EXPECT_EQ(r.card.answer(kStop, kNow + 205ms).outcome, Outcome::Done);
-  EXPECT_EQ(r.card.answer(kStart, kNow + 206ms).outcome, Outcome::Done);
+  (void)r.card.answer(kStart, kReplayed);
+  (void)r.at(kReplayed + 200ms);
+  EXPECT_EQ(r.card.answer(kStop, kReplayed + 205ms).outcome, Outcome::Done);
+  EXPECT_EQ(r.card.answer(kStart, kReplayed + 206ms).outcome, Outcome::Done);
   EXPECT_FALSE(r.card.finished());
-  EXPECT_EQ(r.at(kNow + 305ms), word(3));
+  EXPECT_EQ(r.at(kReplayed + 305ms), word(3));
   EXPECT_TRUE(r.card.finished());
 }
 
-TEST(RecordedCard, AHostThatRestartsByItselfGetsTheRest) {
+TEST(RecordedCard, AHostThatRestartsEarlierThanRecordedGetsTheRest) {
   Replayed r{overrun()};
   r.open();
-  (void)r.card.answer(kStart, kNow);
-  EXPECT_EQ(r.at(kNow + 100ms), word(1));
-  EXPECT_EQ(r.card.answer(kStop, kNow + 110ms).outcome, Outcome::Done);
-  EXPECT_TRUE(r.at(kNow + 250ms).empty());
-  EXPECT_EQ(r.card.answer(kStatus, kNow + 250ms).data, word(0x10));
-  EXPECT_EQ(r.card.answer(kStart, kNow + 260ms).outcome, Outcome::Done);
-  EXPECT_EQ(r.at(kNow + 260ms), word(2));
+  (void)r.card.answer(kStart, kReplayed);
+  EXPECT_EQ(r.at(kReplayed + 100ms), word(1));
+  EXPECT_EQ(r.card.answer(kStop, kReplayed + 110ms).outcome, Outcome::Done);
+  EXPECT_TRUE(r.at(kReplayed + 250ms).empty());
+  EXPECT_EQ(r.card.answer(kStatus, kReplayed + 250ms).data, word(0x10));
+  EXPECT_EQ(r.card.answer(kStart, kReplayed + 260ms).outcome, Outcome::Done);
+  EXPECT_EQ(r.at(kReplayed + 260ms), word(2));
 }
 
-TEST(RecordedCard, ASilentCardIsSilent) {
+TEST(RecordedCard, DoesNotAnswerWhereTheRecordedCardDidNot) {
   Tape t;
   t.open().ask(kStart).answer().at(100ms).scans(word(1)).ask(kStatus).answer(word(0x10));
   t.at(200ms).ask(kStatus);
   t.at(900ms).open().ask(kStart).answer().at(1s).scans(word(2));
   Replayed r{t};
   r.open();
-  (void)r.card.answer(kStart, kNow);
+  (void)r.card.answer(kStart, kReplayed);
 
-  EXPECT_EQ(r.card.answer(kStatus, kNow + 150ms).outcome, Outcome::Done);
-  EXPECT_EQ(r.card.answer(kStatus, kNow + 250ms).outcome, Outcome::Silent);
-  r.card.host_gone();
+  EXPECT_EQ(r.card.answer(kStatus, kReplayed + 150ms).outcome, Outcome::Done);
+  EXPECT_EQ(r.card.answer(kStatus, kReplayed + 250ms).outcome, Outcome::Silent);
+  r.card.host_disconnected();
   r.open();
-  (void)r.card.answer(kStart, kNow + 1s);
-  EXPECT_EQ(r.at(kNow + 1100ms), word(2));
+  (void)r.card.answer(kStart, kReplayed + 1s);
+  EXPECT_EQ(r.at(kReplayed + 1100ms), word(2));
 }
 
-TEST(RecordedCard, AConnectionThatBrokeBreaks) {
+TEST(RecordedCard, ARecordedConnectionLossIsRepeated) {
   Tape t;
   t.open().ask(kStart).answer().at(100ms).scans(word(1)).at(150ms).lose();
   t.at(900ms).open().ask(kStart).answer().at(1s).scans(word(2));
   Replayed r{t};
   r.open();
   EXPECT_EQ(r.card.breaks_at(), HostTime::max());
-  (void)r.card.answer(kStart, kNow);
-  EXPECT_EQ(r.card.breaks_at(), kNow + 150ms);
-  r.card.host_gone();
+  (void)r.card.answer(kStart, kReplayed);
+  EXPECT_EQ(r.card.breaks_at(), kReplayed + 150ms);
+  r.card.host_disconnected();
   EXPECT_EQ(r.card.breaks_at(), HostTime::max());
 }
 

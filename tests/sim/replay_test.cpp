@@ -1,5 +1,5 @@
-/// A recording back on the wire: what was answered then is answered now, and what came then comes
-/// with its timing.
+/// Replay of a recording on the wire: requests get the recorded answers, everything else is sent
+/// with its recorded timing.
 
 #include <gmock/gmock.h>
 
@@ -19,8 +19,8 @@ namespace {
 using namespace std::chrono_literals;
 namespace mcap = protocol::mcap;
 
-constexpr HostTime kThen{5000s};  // when the recording was made
-constexpr HostTime kNow{90s};     // when it is replayed
+constexpr HostTime kRecorded{5000s};  // start of the recording
+constexpr HostTime kReplayed{90s};    // start of the replay
 
 template <class Packet>
 std::vector<std::byte> packed(const Packet& packet) {
@@ -46,12 +46,14 @@ RecordedDevice recorded_tracker() {
   emscon::SystemStatusAnswer status;
   status.serial_number = 4711;
   device.blocks = {
-      {kThen, false, false, packed(emscon::Answer{status})},
-      {kThen + 10ms, false, false, ok(emscon::Command::Initialize)},
-      {kThen + 2s, true, false, packed(emscon::Request{emscon::StartMeasurement{}})},
-      {kThen + 2s, false, false, ok(emscon::Command::StartMeasurement)},
-      {kThen + 3s, false, false, packed(emscon::StatusChange{emscon::Event::MeasurementNotReady})},
-      {kThen + 4s, false, false, packed(emscon::StatusChange{emscon::Event::MeasurementReady})}};
+      {kRecorded, false, false, packed(emscon::Answer{status})},
+      {kRecorded + 10ms, false, false, ok(emscon::Command::Initialize)},
+      {kRecorded + 2s, true, false, packed(emscon::Request{emscon::StartMeasurement{}})},
+      {kRecorded + 2s, false, false, ok(emscon::Command::StartMeasurement)},
+      {kRecorded + 3s, false, false,
+       packed(emscon::StatusChange{emscon::Event::MeasurementNotReady})},
+      {kRecorded + 4s, false, false,
+       packed(emscon::StatusChange{emscon::Event::MeasurementReady})}};
 
   return device;
 }
@@ -61,23 +63,23 @@ RecordedDevice recorded_encoders() {
   const can::CanFrame beat = can::encode_heartbeat(1, can::NodeState::Operational);
   const can::CanFrame sync = can::encode_sync();
   const can::CanFrame ask = can::standard_frame(0x601, {0x40, 0, 0x10, 0, 0, 0, 0, 0});
-  const can::CanFrame told = can::standard_frame(0x581, {0x43, 0, 0x10, 0, 0x96, 0x01, 8, 0});
+  const can::CanFrame response = can::standard_frame(0x581, {0x43, 0, 0x10, 0, 0x96, 0x01, 8, 0});
 
   const auto add = [&](HostTime t, bool to_device, const can::CanFrame& frame) {
     device.blocks.push_back({t, to_device, false, datagram(std::span(&frame, 1))});
   };
 
-  add(kThen, true, ask);
-  add(kThen + 1ms, false, told);
-  add(kThen + 2ms, false, beat);
+  add(kRecorded, true, ask);
+  add(kRecorded + 1ms, false, response);
+  add(kRecorded + 2ms, false, beat);
 
   for (int n = 0; n < 100; ++n) {
-    add(kThen + 2s + n * 1ms, true, sync);
-    add(kThen + 2s + n * 1ms + 100us, false,
+    add(kRecorded + 2s + n * 1ms, true, sync);
+    add(kRecorded + 2s + n * 1ms + 100us, false,
         can::encode_position(0x181, can::PositionType::Signed32, 1000 + n));
   }
 
-  add(kThen + 2s + 50ms, false, can::encode_emergency({1, 0x5000, 1, {}}));
+  add(kRecorded + 2s + 50ms, false, can::encode_emergency({1, 0x5000, 1, {}}));
   return device;
 }
 
@@ -117,24 +119,24 @@ TEST(RecordedTraffic, FindsTheDevicesOfARecording) {
   EXPECT_EQ((*devices)[0].kind, RecordedKind::Encoders);
   EXPECT_EQ((*devices)[1].kind, RecordedKind::Tracker);
   EXPECT_EQ((*devices)[1].blocks.size(), recorded_tracker().blocks.size());
-  EXPECT_EQ((*devices)[1].blocks[2].time, kThen + 2s);
+  EXPECT_EQ((*devices)[1].blocks[2].time, kRecorded + 2s);
   EXPECT_TRUE((*devices)[1].blocks[2].to_device);
 }
 
-/// A recorder empties one ring after the other.
-TEST(RecordedTraffic, IsInTheOrderOfTheWireWhateverThatOfTheFile) {
+/// A recorder empties one ring after the other, so that the order in the file may differ.
+TEST(RecordedTraffic, IsInTheOrderOfTheWireForAnyOrderInTheFile) {
   RecordedDevice device = recorded_tracker();
   std::swap(device.blocks[2], device.blocks[1]);
   const auto read = read_traffic(mcap_file({device}), "file").value();
   EXPECT_TRUE(std::ranges::is_sorted(read.at(0).blocks, {}, &RecordedBlock::time));
 }
 
-TEST(RecordedTraffic, RefusesAFileThatIsNoRecording) {
+TEST(RecordedTraffic, RefusesAFileThatIsNotARecording) {
   EXPECT_FALSE(read_traffic(std::as_bytes(std::span("PK zip")), "r.mcap"));
   EXPECT_FALSE(read_traffic(mcap_file({}), "r.mcap"));
 }
 
-TEST(RecordedTraffic, ReadsWhatIsThereOfAFileCutAnywhere) {
+TEST(RecordedTraffic, ReadsTheCompletePartOfAFileCutAnywhere) {
   const auto file = mcap_file({recorded_tracker()});
   for (std::size_t size = 0; size < file.size(); size += 7) {
     const auto devices = read_traffic(std::span(file).first(size), "r.mcap");
@@ -152,131 +154,132 @@ std::vector<std::byte> reply(RecordedTracker& tracker, const emscon::Request& re
 TEST(RecordedTracker, GivesTheRecordedAnswers) {
   ReplayTimeline timeline;
   RecordedTracker tracker(recorded_tracker(), timeline);
-  tracker.connected(kNow);
-  for (int i = 0; i < 2; ++i) {  // also more often than then
-    const auto answer = emscon::decode_answer(reply(tracker, emscon::GetSystemStatus{}, kNow));
+  tracker.connected(kReplayed);
+  for (int i = 0; i < 2; ++i) {  // also more often than recorded
+    const auto answer = emscon::decode_answer(reply(tracker, emscon::GetSystemStatus{}, kReplayed));
     EXPECT_EQ(std::get<emscon::SystemStatusAnswer>(answer.value()).serial_number, 4711);
   }
 }
 
-TEST(RecordedTracker, DoesNotInventAnswers) {
+TEST(RecordedTracker, AnswersAnUnrecordedCommandWithNotImplemented) {
   ReplayTimeline timeline;
   RecordedTracker tracker(recorded_tracker(), timeline);
-  tracker.connected(kNow);
-  const auto answer = emscon::decode_answer(reply(tracker, emscon::GetUnits{}, kNow));
+  tracker.connected(kReplayed);
+  const auto answer = emscon::decode_answer(reply(tracker, emscon::GetUnits{}, kReplayed));
   EXPECT_EQ(status_of(answer.value()), emscon::Status::NotImplemented);
 }
 
-TEST(RecordedTracker, SpeaksWithTheTimingOfThenFromTheStartOfMeasuring) {
+TEST(RecordedTracker, SendsPacketsWithTheRecordedTimingFromTheStartOfMeasuring) {
   ReplayTimeline timeline;
   RecordedTracker tracker(recorded_tracker(), timeline);
-  tracker.connected(kNow);
+  tracker.connected(kReplayed);
 
   EXPECT_EQ(tracker.next_due(), HostTime::max());
-  reply(tracker, emscon::StartMeasurement{}, kNow);
-  EXPECT_EQ(tracker.next_due(), kNow + 1s);
-  tracker.advance(kNow + 999ms);
+  reply(tracker, emscon::StartMeasurement{}, kReplayed);
+  EXPECT_EQ(tracker.next_due(), kReplayed + 1s);
+  tracker.advance(kReplayed + 999ms);
   EXPECT_TRUE(tracker.take_output().empty());
-  tracker.advance(kNow + 1s);
+  tracker.advance(kReplayed + 1s);
   EXPECT_EQ(tracker.take_output(),
             packed(emscon::StatusChange{emscon::Event::MeasurementNotReady}));
   EXPECT_FALSE(tracker.finished());
-  tracker.advance(kNow + 2s);
+  tracker.advance(kReplayed + 2s);
   EXPECT_TRUE(tracker.finished());
 }
 
-TEST(RecordedTracker, BeginsAnewForTheNextClient) {
+TEST(RecordedTracker, BeginsAgainForTheNextClient) {
   ReplayTimeline timeline;
   RecordedTracker tracker(recorded_tracker(), timeline);
-  tracker.connected(kNow);
-  reply(tracker, emscon::StartMeasurement{}, kNow);
-  tracker.advance(kNow + 10s);
+  tracker.connected(kReplayed);
+  reply(tracker, emscon::StartMeasurement{}, kReplayed);
+  tracker.advance(kReplayed + 10s);
   tracker.disconnected();
-  tracker.connected(kNow + 20s);
-  reply(tracker, emscon::StartMeasurement{}, kNow + 30s);
-  EXPECT_EQ(tracker.next_due(), kNow + 31s);
+  tracker.connected(kReplayed + 20s);
+  reply(tracker, emscon::StartMeasurement{}, kReplayed + 30s);
+  EXPECT_EQ(tracker.next_due(), kReplayed + 31s);
 }
 
-TEST(RecordedTracker, AnswersAfterTheTimeItTookThen) {
+TEST(RecordedTracker, AnswersAfterTheRecordedTime) {
   ReplayTimeline timeline;
   RecordedDevice device = recorded_tracker();
   device.blocks[2].time -= 500ms;
   RecordedTracker tracker(device, timeline);
-  tracker.connected(kNow);
-  EXPECT_TRUE(reply(tracker, emscon::StartMeasurement{}, kNow).empty());
-  EXPECT_EQ(tracker.next_due(), kNow + 500ms);
-  tracker.advance(kNow + 500ms);
+  tracker.connected(kReplayed);
+  EXPECT_TRUE(reply(tracker, emscon::StartMeasurement{}, kReplayed).empty());
+  EXPECT_EQ(tracker.next_due(), kReplayed + 500ms);
+  tracker.advance(kReplayed + 500ms);
   EXPECT_FALSE(tracker.take_output().empty());
-  EXPECT_EQ(tracker.next_due(), kNow + 1500ms);
+  EXPECT_EQ(tracker.next_due(), kReplayed + 1500ms);
 }
 
-TEST(RecordedTracker, SaysNothingWhereItSaidNothing) {
+TEST(RecordedTracker, DoesNotAnswerWhereTheRecordingHasNoAnswer) {
   ReplayTimeline timeline;
   RecordedDevice device = recorded_tracker();
   device.blocks.erase(device.blocks.begin() + 3);
   RecordedTracker tracker(device, timeline);
-  tracker.connected(kNow);
-  EXPECT_TRUE(reply(tracker, emscon::StartMeasurement{}, kNow).empty());
+  tracker.connected(kReplayed);
+  EXPECT_TRUE(reply(tracker, emscon::StartMeasurement{}, kReplayed).empty());
 }
 
-TEST(RecordedTracker, BreaksTheConnectionThatBrokeAndGoesOnOnTheNext) {
+TEST(RecordedTracker, BreaksTheConnectionAsRecordedAndContinuesWithTheNext) {
   ReplayTimeline timeline;
   RecordedDevice device = recorded_tracker();
-  device.blocks[5] = {kThen + 4s, true, false, {}};
-  device.blocks.push_back({kThen + 6s, false, false, {}});
+  device.blocks[5] = {kRecorded + 4s, true, false, {}};
+  device.blocks.push_back({kRecorded + 6s, false, false, {}});
   emscon::SystemStatusAnswer status;
   status.serial_number = 4712;
-  device.blocks.push_back({kThen + 6s, false, false, packed(emscon::Answer{status})});
+  device.blocks.push_back({kRecorded + 6s, false, false, packed(emscon::Answer{status})});
   RecordedTracker tracker(device, timeline);
-  tracker.connected(kNow);
-  reply(tracker, emscon::StartMeasurement{}, kNow);
-  tracker.advance(kNow + 1900ms);
+  tracker.connected(kReplayed);
+  reply(tracker, emscon::StartMeasurement{}, kReplayed);
+  tracker.advance(kReplayed + 1900ms);
 
   EXPECT_FALSE(tracker.wants_close());
-  tracker.advance(kNow + 2s);
+  tracker.advance(kReplayed + 2s);
   EXPECT_TRUE(tracker.wants_close());
   tracker.disconnected();
-  tracker.connected(kNow + 3s);
-  const auto answer = emscon::decode_answer(reply(tracker, emscon::GetSystemStatus{}, kNow + 3s));
+  tracker.connected(kReplayed + 3s);
+  const auto answer =
+      emscon::decode_answer(reply(tracker, emscon::GetSystemStatus{}, kReplayed + 3s));
   EXPECT_EQ(std::get<emscon::SystemStatusAnswer>(answer.value()).serial_number, 4712);
 }
 
-TEST(RecordedTracker, KeepsWhatComesOfItselfUntilSomebodyIsThere) {
+TEST(RecordedTracker, KeepsUnsolicitedPacketsUntilAClientConnects) {
   ReplayTimeline timeline;
   RecordedDevice device = recorded_tracker();
   device.blocks.insert(
       device.blocks.begin(),
-      {{kThen, false, false, {}},
-       {kThen + 1ms, false, false, packed(emscon::StatusChange{emscon::Event::ServerStarted})},
-       {kThen + 2ms, false, false, {}}});
+      {{kRecorded, false, false, {}},
+       {kRecorded + 1ms, false, false, packed(emscon::StatusChange{emscon::Event::ServerStarted})},
+       {kRecorded + 2ms, false, false, {}}});
   RecordedTracker tracker(device, timeline);
-  tracker.connected(kNow);
+  tracker.connected(kReplayed);
   tracker.disconnected();
-  tracker.advance(kNow + 1s);
+  tracker.advance(kReplayed + 1s);
 
   EXPECT_TRUE(tracker.take_output().empty());
-  tracker.connected(kNow + 2s);
-  reply(tracker, emscon::StartMeasurement{}, kNow + 2s);
-  tracker.advance(kNow + 3s);
+  tracker.connected(kReplayed + 2s);
+  reply(tracker, emscon::StartMeasurement{}, kReplayed + 2s);
+  tracker.advance(kReplayed + 3s);
   EXPECT_EQ(tracker.take_output(),
             packed(emscon::StatusChange{emscon::Event::MeasurementNotReady}));
 }
 
-TEST(RecordedTracker, SaysWhatIsNoPacketAsItCame) {
+TEST(RecordedTracker, SendsBytesThatAreNotAPacketUnchanged) {
   ReplayTimeline timeline;
   RecordedDevice device = recorded_tracker();
-  const std::vector<std::byte> nonsense(16, std::byte{0xFF});
-  device.blocks[4].bytes = nonsense;
+  const std::vector<std::byte> malformed(16, std::byte{0xFF});
+  device.blocks[4].bytes = malformed;
   RecordedTracker tracker(device, timeline);
-  tracker.connected(kNow);
-  reply(tracker, emscon::StartMeasurement{}, kNow);
-  tracker.advance(kNow + 1s);
-  EXPECT_EQ(tracker.take_output(), nonsense);
+  tracker.connected(kReplayed);
+  reply(tracker, emscon::StartMeasurement{}, kReplayed);
+  tracker.advance(kReplayed + 1s);
+  EXPECT_EQ(tracker.take_output(), malformed);
 }
 
 class RecordedBusTest : public testing::Test {
  protected:
-  std::vector<can::CanFrame> tell(const can::CanFrame& frame, HostTime now) {
+  std::vector<can::CanFrame> send_and_collect(const can::CanFrame& frame, HostTime now) {
     test::send_bytes(peer_, datagram(std::span(&frame, 1)));
     test::readable(bus_.fd());
     bus_.poll(now);
@@ -290,7 +293,7 @@ class RecordedBusTest : public testing::Test {
   }
 
   std::optional<std::int64_t> position(HostTime now) {
-    for (const can::CanFrame& frame : tell(can::encode_sync(), now)) {
+    for (const can::CanFrame& frame : send_and_collect(can::encode_sync(), now)) {
       if (frame.id == 0x181)
         return can::decode_position(frame.payload(), can::PositionType::Signed32);
     }
@@ -302,38 +305,40 @@ class RecordedBusTest : public testing::Test {
   Socket peer_ = test::connected(SOCK_DGRAM, bus_.port());
 };
 
-TEST_F(RecordedBusTest, AnswersSdoRequestsAsThen) {
-  const auto frames = tell(can::standard_frame(0x601, {0x40, 0, 0x10, 0, 0, 0, 0, 0}), kNow);
+TEST_F(RecordedBusTest, AnswersSdoRequestsAsRecorded) {
+  const auto frames =
+      send_and_collect(can::standard_frame(0x601, {0x40, 0, 0x10, 0, 0, 0, 0, 0}), kReplayed);
   ASSERT_FALSE(frames.empty());
   EXPECT_EQ(frames[0], can::standard_frame(0x581, {0x43, 0, 0x10, 0, 0x96, 0x01, 8, 0}));
-  const auto unknown = tell(can::standard_frame(0x601, {0x40, 1, 0x20, 0, 0, 0, 0, 0}), kNow + 1ms);
+  const auto unknown =
+      send_and_collect(can::standard_frame(0x601, {0x40, 1, 0x20, 0, 0, 0, 0, 0}), kReplayed + 1ms);
   ASSERT_FALSE(unknown.empty());
   EXPECT_EQ(unknown[0].byte(0), 0x80);
 }
 
-TEST_F(RecordedBusTest, StandsAtTheFirstPositionUntilTheRecordingStarts) {
-  EXPECT_EQ(position(kNow), 1000);
-  EXPECT_EQ(position(kNow + 1ms), 1000);
+TEST_F(RecordedBusTest, ReportsTheFirstPositionUntilTheReplayStarts) {
+  EXPECT_EQ(position(kReplayed), 1000);
+  EXPECT_EQ(position(kReplayed + 1ms), 1000);
 }
 
-TEST_F(RecordedBusTest, GivesEverySyncTheNextCycleWhateverTheJitter) {
-  timeline_.start(kThen + 2s, kNow);
-  EXPECT_EQ(position(kNow + 10ms + 200us), 1010);
-  EXPECT_EQ(position(kNow + 10ms + 900us), 1011);
-  EXPECT_EQ(position(kNow + 12ms + 300us), 1012);
+TEST_F(RecordedBusTest, AnswersEverySyncWithTheNextCycleDespiteJitter) {
+  timeline_.start(kRecorded + 2s, kReplayed);
+  EXPECT_EQ(position(kReplayed + 10ms + 200us), 1010);
+  EXPECT_EQ(position(kReplayed + 10ms + 900us), 1011);
+  EXPECT_EQ(position(kReplayed + 12ms + 300us), 1012);
 }
 
-TEST_F(RecordedBusTest, FollowsTheRecordingAfterALongPause) {
-  timeline_.start(kThen + 2s, kNow);
-  EXPECT_EQ(position(kNow), 1000);
-  EXPECT_EQ(position(kNow + 80ms), 1080);
-  EXPECT_EQ(position(kNow + 10s), 1099);
+TEST_F(RecordedBusTest, ContinuesAtTheRecordedTimeAfterALongPause) {
+  timeline_.start(kRecorded + 2s, kReplayed);
+  EXPECT_EQ(position(kReplayed), 1000);
+  EXPECT_EQ(position(kReplayed + 80ms), 1080);
+  EXPECT_EQ(position(kReplayed + 10s), 1099);
 }
 
-TEST_F(RecordedBusTest, EmergencyComesAtItsTime) {
-  timeline_.start(kThen + 2s, kNow);
-  const auto before = tell(can::encode_sync(), kNow + 49ms);
-  const auto after = tell(can::encode_sync(), kNow + 50ms);
+TEST_F(RecordedBusTest, SendsAnEmergencyAtItsTime) {
+  timeline_.start(kRecorded + 2s, kReplayed);
+  const auto before = send_and_collect(can::encode_sync(), kReplayed + 49ms);
+  const auto after = send_and_collect(can::encode_sync(), kReplayed + 50ms);
   const auto emergencies = [](const std::vector<can::CanFrame>& frames) {
     return std::count_if(frames.begin(), frames.end(), [](const can::CanFrame& f) {
       return can::decode_emergency(f).has_value();
@@ -343,10 +348,10 @@ TEST_F(RecordedBusTest, EmergencyComesAtItsTime) {
   EXPECT_EQ(emergencies(after), 1);
 }
 
-TEST_F(RecordedBusTest, AnswersAsLateAsThen) {
+TEST_F(RecordedBusTest, AnswersWithTheRecordedDelay) {
   RecordedDevice device = recorded_encoders();
   for (auto& block : device.blocks)
-    if (block.time > kThen + 2s + 50ms && !block.to_device) block.time += 20ms;
+    if (block.time > kRecorded + 2s + 50ms && !block.to_device) block.time += 20ms;
   ReplayTimeline timeline;
   RecordedBus late = RecordedBus::open({}, device, timeline, true).value();
   const Socket peer = test::connected(SOCK_DGRAM, late.port());
@@ -358,17 +363,17 @@ TEST_F(RecordedBusTest, AnswersAsLateAsThen) {
     late.poll(now);
   };
 
-  sync_at(kNow);
-  sync_at(kNow + 60ms);
-  late.poll(kNow + 60ms);  // heartbeats are due, too
-  EXPECT_EQ(late.next_due(), kNow + 60ms + 20ms + 100us);
+  sync_at(kReplayed);
+  sync_at(kReplayed + 60ms);
+  late.poll(kReplayed + 60ms);  // heartbeats are also due
+  EXPECT_EQ(late.next_due(), kReplayed + 60ms + 20ms + 100us);
 }
 
-TEST_F(RecordedBusTest, IsSilentWhereTheNodeWas) {
+TEST_F(RecordedBusTest, DoesNotAnswerWhereTheNodeDidNot) {
   RecordedDevice device = recorded_encoders();
   const can::CanFrame ask = can::standard_frame(0x601, {0x40, 0, 0x10, 0, 0, 0, 0, 0});
-  device.blocks.push_back({kThen + 3s, true, false, datagram(std::span(&ask, 1))});
-  device.blocks.push_back({kThen + 4s, true, false, datagram(std::span(&ask, 1))});
+  device.blocks.push_back({kRecorded + 3s, true, false, datagram(std::span(&ask, 1))});
+  device.blocks.push_back({kRecorded + 4s, true, false, datagram(std::span(&ask, 1))});
   ReplayTimeline timeline;
   RecordedBus bus = RecordedBus::open({}, device, timeline, true).value();
   const Socket peer = test::connected(SOCK_DGRAM, bus.port());
@@ -377,21 +382,21 @@ TEST_F(RecordedBusTest, IsSilentWhereTheNodeWas) {
   for (int i = 0; i < 2; ++i) {
     test::send_bytes(peer, datagram(std::span(&ask, 1)));
     test::readable(bus.fd());
-    bus.poll(kNow);
-    bool told = false;
+    bus.poll(kReplayed);
+    bool has_response = false;
     while (test::readable(peer.get(), 0)) {
       const auto bytes = test::receive_bytes(peer);
       auto view = can::DatagramView::parse(bytes);
-      for (can::CanFrame f; view && view->next(f);) told = told || f.id == 0x581;
+      for (can::CanFrame f; view && view->next(f);) has_response = has_response || f.id == 0x581;
     }
-    answered.push_back(told);
+    answered.push_back(has_response);
   }
 
   EXPECT_EQ(answered, (std::vector<bool>{true, false}));
 }
 
-// sync = "external": nothing was sent to the nodes, and nothing will be.
-TEST_F(RecordedBusTest, AnotherProducersSyncAndItsAnswersComeByThemselves) {
+// sync = "external": the daemon sends nothing to the nodes, neither in the recording nor now.
+TEST_F(RecordedBusTest, SendsAForeignSyncAndItsAnswersWithoutARequest) {
   RecordedDevice device;
   const auto came = [&device](HostTime time, const can::CanFrame& frame) {
     device.blocks.push_back(
@@ -399,8 +404,8 @@ TEST_F(RecordedBusTest, AnotherProducersSyncAndItsAnswersComeByThemselves) {
   };
 
   for (int cycle = 0; cycle < 3; ++cycle) {
-    came(kThen + 4ms * cycle, can::encode_sync());
-    came(kThen + 4ms * cycle + 1ms,
+    came(kRecorded + 4ms * cycle, can::encode_sync());
+    came(kRecorded + 4ms * cycle + 1ms,
          can::encode_position(0x181, can::PositionType::Signed32, 500 + cycle));
   }
 
@@ -409,12 +414,12 @@ TEST_F(RecordedBusTest, AnotherProducersSyncAndItsAnswersComeByThemselves) {
   EXPECT_EQ(bus.syncs(), 3u);
   const Socket peer = test::connected(SOCK_DGRAM, bus.port());
   const can::CanFrame hello = can::encode_heartbeat(9, can::NodeState::Operational);
-  test::send_bytes(peer, datagram(std::span(&hello, 1)));  // whom to send to
+  test::send_bytes(peer, datagram(std::span(&hello, 1)));  // the bus learns the address of its peer
   test::readable(bus.fd());
   std::vector<std::int64_t> positions;
   std::size_t syncs = 0;
 
-  for (auto now = kNow; now < kNow + 20ms; now += 1ms) {
+  for (auto now = kReplayed; now < kReplayed + 20ms; now += 1ms) {
     bus.poll(now);
     while (test::readable(peer.get(), 0)) {
       const auto bytes = test::receive_bytes(peer);
@@ -432,15 +437,15 @@ TEST_F(RecordedBusTest, AnotherProducersSyncAndItsAnswersComeByThemselves) {
   EXPECT_TRUE(bus.finished());
 }
 
-TEST_F(RecordedBusTest, WithoutATrackerTheFirstSyncStartsTheRecording) {
+TEST_F(RecordedBusTest, WithoutATrackerTheFirstSyncStartsTheReplay) {
   ReplayTimeline timeline;
   RecordedBus alone = RecordedBus::open({}, recorded_encoders(), timeline, true).value();
   const Socket peer = test::connected(SOCK_DGRAM, alone.port());
   const can::CanFrame sync = can::encode_sync();
   test::send_bytes(peer, datagram(std::span(&sync, 1)));
   test::readable(alone.fd());
-  alone.poll(kNow);
-  EXPECT_EQ(timeline.due(kThen + 2s), kNow);
+  alone.poll(kReplayed);
+  EXPECT_EQ(timeline.due(kRecorded + 2s), kReplayed);
 }
 
 }  // namespace

@@ -19,7 +19,7 @@ SimulationSetup small_setup() {
   return setup;
 }
 
-/// The whole stage under a clock of the test's own, and a tracker client on a real socket.
+/// The complete simulation with a clock of the test, and a tracker client on a real socket.
 class SimulationTest : public testing::Test {
  protected:
   void open(const SimulationSetup& setup) {
@@ -35,7 +35,7 @@ class SimulationTest : public testing::Test {
     test::readable(simulation_->tracker()->client_fd());
     simulation_->poll(now_);
     run(300ms);
-    ASSERT_TRUE(test::readable(client_.get()));  // its answer has left
+    ASSERT_TRUE(test::readable(client_.get()));  // the answer has arrived
   }
 
   void stream() {
@@ -60,7 +60,7 @@ TEST_F(SimulationTest, MachineStandsUntilTheTrackerStreams) {
   EXPECT_EQ(simulation_->machine().motion(now_).q_m, Eigen::Vector3d(0, 0, 0));
 }
 
-TEST_F(SimulationTest, MachineMovesAfterItsStandstillAndThenStands) {
+TEST_F(SimulationTest, MachineMovesAfterItsStandstillAndStopsAtTheEnd) {
   open(small_setup());
   stream();
   const HostTime first_point = *simulation_->tracker()->device().first_stream();
@@ -82,14 +82,14 @@ TEST_F(SimulationTest, ConnectionLostDoesNotDriveThePathTwice) {
   EXPECT_EQ(*simulation_->machine().started(), start);
 }
 
-TEST_F(SimulationTest, StartsByItselfWhenNobodyNeedsToWatch) {
+TEST_F(SimulationTest, StartsByItselfWithoutStartWhenStreaming) {
   SimulationSetup setup = small_setup();
   setup.start_when_streaming = false;
   open(setup);
   EXPECT_EQ(*simulation_->machine().started(), HostTime{77s} + 2s);
 }
 
-TEST_F(SimulationTest, FaultsComeAtTheirTime) {
+TEST_F(SimulationTest, InjectsFaultsAtTheirTime) {
   SimulationSetup setup = small_setup();
   setup.start_when_streaming = false;
   setup.faults = {{FaultTarget::Tracker, {FaultKind::Disconnect, 1.0, 0.0, 0.0, 0}}};
@@ -100,7 +100,7 @@ TEST_F(SimulationTest, FaultsComeAtTheirTime) {
   EXPECT_LT(simulation_->tracker()->client_fd(), 0);
 }
 
-TEST_F(SimulationTest, BusApartIsTurnedByPollBusAlone) {
+TEST_F(SimulationTest, WithBusApartOnlyPollBusPollsTheBus) {
   SimulationSetup setup = small_setup();
   setup.start_when_streaming = false;
   setup.nodes = {{.node = 1, .axis = Axis::X}};
@@ -115,12 +115,13 @@ TEST_F(SimulationTest, BusApartIsTurnedByPollBusAlone) {
   simulation_->add_poll_fds(fds);
   for (const pollfd& fd : fds) EXPECT_NE(fd.fd, simulation_->bus()->fd());
   run(3100ms);
-  EXPECT_EQ(simulation_->bus()->next_due(), boot_due);  // nobody has turned it
+  EXPECT_EQ(simulation_->bus()->next_due(), boot_due);  // poll() did not poll the bus
   simulation_->poll_bus(now_);
-  EXPECT_EQ(simulation_->next_bus_due(), now_ + 5s);  // booted, and the end of its bus-off
+  // The node has booted; the end of bus-off is due next.
+  EXPECT_EQ(simulation_->next_bus_due(), now_ + 5s);
 }
 
-TEST_F(SimulationTest, NeverOversleepsWhatIsDue) {
+TEST_F(SimulationTest, NextDueIsInTheFutureAndNeverLate) {
   open(small_setup());
   stream();
   for (int i = 0; i < 50; ++i) {

@@ -5,7 +5,7 @@
 namespace abbe::sim {
 namespace {
 
-/// Down through z = 0, up again and down once more, at 10 mm/s and 20 mm/s.
+/// Moves down through z = 0, up, and down again, at 10 mm/s and 20 mm/s.
 PathMotion down_up_down() {
   PathPlan plan;
   plan.vertices = {
@@ -13,14 +13,14 @@ PathMotion down_up_down() {
   return *PathMotion::plan(plan);
 }
 
-TEST(TouchedSurface, IsTouchedOnTheWayDownOnly) {
+TEST(TouchedSurface, IsTouchedOnlyOnDownwardMoves) {
   const auto path = down_up_down();
   const auto edges = edge_times_s({.delay_s = 0.0, .jitter_s = 0.0}, path);
   ASSERT_EQ(edges.size(), 2u);
   for (const double t : edges) EXPECT_NEAR(path.at(t).q_m[2], 0.0, 1e-12);
 }
 
-TEST(TouchedSurface, TheEdgeComesAfterTheContact) {
+TEST(TouchedSurface, TheEdgeFollowsTheContactAfterTheDelay) {
   const auto path = down_up_down();
   const auto edges = edge_times_s({.delay_s = 2e-3, .jitter_s = 0.0}, path);
   ASSERT_EQ(edges.size(), 2u);

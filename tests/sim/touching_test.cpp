@@ -27,14 +27,14 @@ struct Touching : testing::Test {
   std::vector<double> edges_s;
 };
 
-TEST_F(Touching, TouchesEveryBallAndFaceOnceAPoint) {
+TEST_F(Touching, TouchesEveryPointOfEveryBallAndFaceOnce) {
   plan();
   EXPECT_EQ(program.moves.size(), 9u * 6u + 2u * 5u);
   EXPECT_EQ(edges_s.size(), program.moves.size());
   EXPECT_TRUE(std::ranges::is_sorted(edges_s));
 }
 
-TEST_F(Touching, TheTipMeetsTheTrueSurfaceAtTheEdge) {
+TEST_F(Touching, TheTipContactsTheTrueSurfaceAtTheEdge) {
   options.delay_s = options.jitter_s = 0.0;
   plan();
   for (std::size_t i = 0; i < edges_s.size(); ++i) {
@@ -54,7 +54,7 @@ TEST_F(Touching, TheApproachIsSteadyAroundTheContact) {
   }
 }
 
-TEST_F(Touching, ASilentProbeHasNoEdgeADoubledTouchTwoAndAStrayOneMore) {
+TEST_F(Touching, AMissedTouchHasNoEdgeADoubledOneTwoAndAStrayTouchAddsOne) {
   plan();
   const std::size_t all = edges_s.size();
   options.missed = {3, 7};
@@ -84,7 +84,7 @@ TEST_F(Touching, TheSameSeedGivesTheSameEdges) {
   EXPECT_NE(edges_s, first);
 }
 
-TEST(BallArray, StandsOnItsFirstBallAtEveryPosition) {
+TEST(BallArray, HasItsFirstBallAtTheSamePointInEveryPosition) {
   for (const auto& T_machine_array : reference_positions())
     EXPECT_LT((T_machine_array * reference_ball_array().balls.front().centre_m -
                Eigen::Vector3d(-0.09, 0.14, 0.03))
@@ -92,20 +92,20 @@ TEST(BallArray, StandsOnItsFirstBallAtEveryPosition) {
               1e-15);
 }
 
-TEST(BallArray, IsAsStatedUnlessToldOtherwise) {
-  const BallArray stated = reference_ball_array(), is = as_it_is(stated, {});
+TEST(BallArray, EqualsTheStatedArrayByDefault) {
+  const BallArray stated = reference_ball_array(), actual = as_it_is(stated, {});
   for (std::size_t i = 0; i < stated.balls.size(); ++i) {
-    EXPECT_EQ(is.balls[i].centre_m, stated.balls[i].centre_m);
-    EXPECT_EQ(is.balls[i].radius_m, stated.balls[i].radius_m);
+    EXPECT_EQ(actual.balls[i].centre_m, stated.balls[i].centre_m);
+    EXPECT_EQ(actual.balls[i].radius_m, stated.balls[i].radius_m);
   }
   for (std::size_t i = 0; i < 2; ++i) {
-    EXPECT_EQ(is.faces[i].centre_m, stated.faces[i].centre_m);
-    EXPECT_EQ(is.faces[i].normal, stated.faces[i].normal);
-    EXPECT_EQ(is.faces[i].half_1_m, stated.faces[i].half_1_m);
+    EXPECT_EQ(actual.faces[i].centre_m, stated.faces[i].centre_m);
+    EXPECT_EQ(actual.faces[i].normal, stated.faces[i].normal);
+    EXPECT_EQ(actual.faces[i].half_1_m, stated.faces[i].half_1_m);
   }
 }
 
-TEST(BallArray, GrowsWithItsTemperature) {
+TEST(BallArray, ExpandsWithItsTemperature) {
   const BallArray stated = reference_ball_array();
   const BallArray warm = as_it_is(stated, {.temperature_C = 24.0, .alpha_per_K = 11.5e-6});
   EXPECT_NEAR(warm.balls[5].centre_m.x() - stated.balls[5].centre_m.x(), 0.65 * 46e-6, 1e-15);
@@ -113,29 +113,30 @@ TEST(BallArray, GrowsWithItsTemperature) {
   EXPECT_EQ(warm.faces[1].normal, stated.faces[1].normal);
 }
 
-TEST(BallArray, IsOffByWhatItsFileSays) {
+TEST(BallArray, DiffersFromTheStatedArrayByTheStatedUncertainty) {
   const BallArray stated = reference_ball_array();
   constexpr double kBall_m = 2e-6, kBlock_rad = 5e-6;
   constexpr std::uint64_t kSeeds = 200;
   double ball_m2 = 0.0, block_rad2 = 0.0;
 
   for (std::uint64_t seed = 1; seed <= kSeeds; ++seed) {
-    const BallArray is =
+    const BallArray actual =
         as_it_is(stated, {.u_ball_m = kBall_m, .u_block_rad = kBlock_rad, .seed = seed});
     for (std::size_t i = 0; i < stated.balls.size(); ++i)
-      ball_m2 +=
-          (is.balls[i].centre_m - stated.balls[i].centre_m).squaredNorm() / (3.0 * 9.0 * kSeeds);
+      ball_m2 += (actual.balls[i].centre_m - stated.balls[i].centre_m).squaredNorm() /
+                 (3.0 * 9.0 * kSeeds);
     for (std::size_t i = 0; i < 2; ++i)
       block_rad2 +=
-          (is.faces[i].normal - stated.faces[i].normal).squaredNorm() / (2.0 * 2.0 * kSeeds);
+          (actual.faces[i].normal - stated.faces[i].normal).squaredNorm() / (2.0 * 2.0 * kSeeds);
   }
 
-  // 5400 and 800 numbers know a standard deviation to 1 and 2.5 %; four times that.
+  // The standard error of a standard deviation of 5400 and 800 numbers is 1 % and 2.5 %. The
+  // tolerances are four times that.
   EXPECT_NEAR(std::sqrt(ball_m2) / kBall_m, 1.0, 0.04);
   EXPECT_NEAR(std::sqrt(block_rad2) / kBlock_rad, 1.0, 0.1);
 }
 
-TEST(BallArray, StatesItsUncertaintyAndExpansionInItsFile) {
+TEST(BallArray, WritesItsUncertaintyAndExpansionToItsFile) {
   const auto text = format_calibrator_toml(
       reference_ball_array(),
       {.alpha_per_K = 12e-6, .u_alpha_per_K = 1e-6, .u_ball_m = 2e-6, .u_block_rad = 5e-6});

@@ -38,7 +38,7 @@ double rms(const std::vector<double>& values) {
   return std::sqrt(sum / static_cast<double>(values.size()));
 }
 
-TEST(TrackerDevice, AnswersEveryCommandOfADriversWayToStreaming) {
+TEST(TrackerDevice, AnswersEveryCommandThatADriverSendsBeforeStreaming) {
   const VirtualMachine machine = test::standing_machine();
   TrackerScript script(machine);
   const std::vector<emscon::Request> way{
@@ -70,7 +70,7 @@ TEST(TrackerDevice, AnswersEveryCommandOfADriversWayToStreaming) {
   EXPECT_FALSE(script.device.streaming());
 }
 
-TEST(TrackerDevice, SearchesForAReflectorAndSaysWhenThereIsNone) {
+TEST(TrackerDevice, SearchesForAReflectorAndReportsWhenThereIsNone) {
   const VirtualMachine machine = test::standing_machine();
   TrackerScript script(machine);
 
@@ -103,7 +103,7 @@ TEST(TrackerDevice, MeasuresOnlyAfterInitialize) {
   EXPECT_EQ(script.ask(emscon::StartMeasurement{}), Status::TrackerNotInitialized);
 }
 
-TEST(TrackerDevice, HeatsItsLaserBeforeItCanBeInitialised) {
+TEST(TrackerDevice, RefusesInitializeUntilTheLaserIsWarm) {
   const VirtualMachine machine = test::standing_machine();
   TrackerOptions options;
   options.warm_up = 20s;
@@ -117,7 +117,7 @@ TEST(TrackerDevice, HeatsItsLaserBeforeItCanBeInitialised) {
   EXPECT_EQ(script.ask(emscon::Initialize{}), Status::Ok);
 }
 
-TEST(TrackerDevice, TakesOneCommandAtATime) {
+TEST(TrackerDevice, AcceptsOneCommandAtATime) {
   const VirtualMachine machine = test::standing_machine();
   TrackerScript script(machine);
   script.send(emscon::Initialize{});
@@ -129,7 +129,7 @@ TEST(TrackerDevice, TakesOneCommandAtATime) {
   EXPECT_EQ(command_of(script.answers.back()), emscon::Command::Initialize);
 }
 
-TEST(TrackerDevice, SaysWhatItDoesNotImplement) {
+TEST(TrackerDevice, ReportsCommandsThatItDoesNotImplement) {
   const VirtualMachine machine = test::standing_machine();
   TrackerScript script(machine);
   constexpr std::array<std::uint8_t, 12> kCommand77{12, 0, 0, 0, 0, 0, 0, 0, 77, 0, 0, 0};
@@ -140,14 +140,14 @@ TEST(TrackerDevice, SaysWhatItDoesNotImplement) {
   EXPECT_EQ(command_of(script.answers[0]), emscon::Command{77});
 }
 
-TEST(TrackerDevice, GivesUpOnAClientThatDoesNotSpeakItsLanguage) {
+TEST(TrackerDevice, DisconnectsAClientThatDoesNotUseTpi) {
   const VirtualMachine machine = test::standing_machine();
   TrackerScript script(machine);
   script.device.receive(std::as_bytes(std::span("GET / HTTP/1.1\r\n")), script.now);
   EXPECT_TRUE(script.device.wants_close());
 }
 
-TEST(TrackerDevice, SendsBurstsAsMeasuredAtRealOnes) {
+TEST(TrackerDevice, SendsBurstsAtTheIntervalsOfRealControllers) {
   const VirtualMachine machine = test::standing_machine();
   TrackerScript script(machine);
   script.start_streaming();
@@ -160,7 +160,7 @@ TEST(TrackerDevice, SendsBurstsAsMeasuredAtRealOnes) {
   EXPECT_NEAR(gaps[gaps.size() * 19 / 20], 344.0, 2.5);
 }
 
-TEST(TrackerDevice, FillsBurstsWithWhateverTheRateGives) {
+TEST(TrackerDevice, ABurstContainsAllPointsOfItsInterval) {
   const VirtualMachine machine = test::standing_machine();
   for (const auto& [separation_ms, expected] :
        {std::pair{2, 166.0}, std::pair{20, 16.6}, std::pair{1, 332.0}}) {
@@ -189,7 +189,7 @@ TEST(TrackerDevice, NeverSendsAPointBeforeItsDelay) {
   }
 
   EXPECT_GE(least, 1500us);
-  EXPECT_LE(least, 1500us + 1ms);  // the script looks every millisecond
+  EXPECT_LE(least, 1500us + 1ms);  // the script polls every millisecond
 }
 
 TEST(TrackerDevice, ClockRunsFastByItsDrift) {
@@ -218,7 +218,7 @@ TEST(TrackerDevice, PointsLieOnTheGridOfItsOwnClock) {
   }
 }
 
-TEST(TrackerDevice, NoiseIsThatOfRangeAndAngles) {
+TEST(TrackerDevice, NoiseHasTheStandardDeviationsOfRangeAndAngles) {
   const VirtualMachine machine = test::standing_machine();
   TrackerOptions options;
   TrackerScript script(machine, options);
@@ -244,7 +244,7 @@ TEST(TrackerDevice, NoiseIsThatOfRangeAndAngles) {
   EXPECT_NEAR(rms(elevation), 3e-6 * truth.norm(), 0.08e-6);
 }
 
-TEST(TrackerDevice, SameSeedGivesTheSamePointsHoweverOftenItIsAsked) {
+TEST(TrackerDevice, SameSeedGivesTheSamePointsForAnyPollInterval) {
   VirtualMachine machine = test::moving_machine(0.1);
   machine.start(HostTime{1003s});
   const auto points = [&](std::uint64_t seed, std::chrono::nanoseconds step) {
@@ -269,7 +269,7 @@ TEST(TrackerDevice, SameSeedGivesTheSamePointsHoweverOftenItIsAsked) {
   EXPECT_NE(points(1, 1ms), points(2, 1ms));
 }
 
-TEST(TrackerDevice, BrokenBeamIsAnErrorAndAGapAndComesBack) {
+TEST(TrackerDevice, BrokenBeamIsAnErrorAndAGapUntilTheBeamReturns) {
   const VirtualMachine machine = test::standing_machine();
   TrackerScript script(machine);
   script.start_streaming();
@@ -303,7 +303,7 @@ TEST(TrackerDevice, DoesNotStartWithoutABeam) {
   EXPECT_EQ(script.ask(emscon::StartMeasurement{}), Status::Ok);
 }
 
-TEST(TrackerDevice, FlagsPointsOfATargetTooFast) {
+TEST(TrackerDevice, FlagsPointsOfATargetThatIsTooFast) {
   VirtualMachine machine = test::moving_machine(0.5);
   machine.start(HostTime{1000s});
   TrackerOptions options;
@@ -318,10 +318,10 @@ TEST(TrackerDevice, FlagsPointsOfATargetTooFast) {
               Contains(Field(&emscon::MultiPoint::status, emscon::PointStatus::SpeedExceeded)));
   EXPECT_THAT(points,
               Contains(Field(&emscon::MultiPoint::status, emscon::PointStatus::SpeedWarning)));
-  EXPECT_EQ(points.back().status, emscon::PointStatus::Ok);  // it stands again
+  EXPECT_EQ(points.back().status, emscon::PointStatus::Ok);  // the target has stopped
 }
 
-TEST(TrackerDevice, MarksPointsWithTheFaultItWasTold) {
+TEST(TrackerDevice, MarksPointsWithTheInjectedFault) {
   const VirtualMachine machine = test::standing_machine();
   TrackerScript script(machine);
   script.start_streaming();
@@ -352,7 +352,7 @@ TEST(TrackerDevice, StalledSocketLosesNothing) {
   }
 }
 
-TEST(TrackerDevice, BusyControllerSaysSo) {
+TEST(TrackerDevice, BusyControllerAnswersServerBusy) {
   const VirtualMachine machine = test::standing_machine();
   TrackerScript script(machine);
   script.device.inject({FaultKind::Busy, 0.0, 1.0, 0.0, 0}, script.now);
@@ -361,7 +361,7 @@ TEST(TrackerDevice, BusyControllerSaysSo) {
   EXPECT_EQ(script.ask(emscon::GetUnits{}), Status::Ok);
 }
 
-TEST(TrackerDevice, AnnouncesWeatherThatChanged) {
+TEST(TrackerDevice, ReportsAWeatherChange) {
   const VirtualMachine machine = test::standing_machine();
   TrackerScript script(machine);
   script.start_streaming();
@@ -373,7 +373,7 @@ TEST(TrackerDevice, AnnouncesWeatherThatChanged) {
               21.5, 0.01);
 }
 
-TEST(TrackerDevice, RebootForgetsEverythingAndRestartsItsClock) {
+TEST(TrackerDevice, RebootResetsAllStateAndTheClock) {
   const VirtualMachine machine = test::standing_machine();
   TrackerScript script(machine);
   script.start_streaming();
@@ -414,7 +414,7 @@ TEST(TrackerDevice, MeasuresAStandingTargetOnce) {
             1e-6);  // 500 points: sigma 0.2 um
 }
 
-TEST(TrackerDevice, StopsAfterTheNumberOfPointsItWasAsked) {
+TEST(TrackerDevice, StopsAfterTheRequestedNumberOfPoints) {
   const VirtualMachine machine = test::standing_machine();
   TrackerScript script(machine);
   script.ask(emscon::Initialize{});
@@ -426,7 +426,7 @@ TEST(TrackerDevice, StopsAfterTheNumberOfPointsItWasAsked) {
   EXPECT_THAT(script.events, Contains(emscon::Event::MeasurementCountReached));
 }
 
-TEST(TrackerDevice, UsesTheUnitsItWasTold) {
+TEST(TrackerDevice, UsesTheUnitsThatWereSet) {
   const VirtualMachine machine = test::standing_machine();
   TrackerScript script(machine);
   emscon::SetUnits units;

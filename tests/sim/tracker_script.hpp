@@ -31,7 +31,7 @@ struct Burst {
   std::vector<emscon::MultiPoint> points;
 };
 
-/// The device and its only client. Time moves in steps of `step` and is never read from anywhere.
+/// The device and its only client. Time advances in steps of `step`; no clock is read.
 class TrackerScript {
  public:
   explicit TrackerScript(const VirtualMachine& machine, const TrackerOptions& options = {},
@@ -48,7 +48,7 @@ class TrackerScript {
     }
   }
 
-  /// Sends and waits for the answer; Unknown when none came within 10 s.
+  /// Sends and waits for the answer; Unknown if there is none within 10 s.
   emscon::Status ask(const emscon::Request& request) {
     const std::size_t before = answers.size();
     send(request);

@@ -64,7 +64,7 @@ TEST_F(TrackerServerTest, StreamsBurstsOverARealSocket) {
   EXPECT_GT(result->size(), 140u);
 }
 
-TEST_F(TrackerServerTest, TurnsASecondClientAwayAndKeepsTheFirst) {
+TEST_F(TrackerServerTest, RefusesASecondClientAndKeepsTheFirst) {
   const Socket first = connect();
   const Socket second = connect();
   const auto refusal = emscon::decode(test::receive_bytes(second));
@@ -75,13 +75,13 @@ TEST_F(TrackerServerTest, TurnsASecondClientAwayAndKeepsTheFirst) {
   EXPECT_EQ(ask(first, emscon::SetUnits{}).size(), 16u);
 }
 
-TEST_F(TrackerServerTest, TakesTheNextClientWhenTheFirstHasGone) {
+TEST_F(TrackerServerTest, AcceptsTheNextClientAfterTheFirstDisconnected) {
   connect().close();
   const Socket next = connect();
   EXPECT_EQ(ask(next, emscon::SetUnits{}).size(), 16u);
 }
 
-TEST_F(TrackerServerTest, RebootClosesTheConnectionAndLetsNobodyInUntilItIsOver) {
+TEST_F(TrackerServerTest, RebootClosesTheConnectionAndRefusesClientsUntilItEnds) {
   const Socket client = connect();
   server_.device().inject({FaultKind::Reboot, 0.0, 5.0, 0.0, 0}, now_);
   server_.poll(now_);

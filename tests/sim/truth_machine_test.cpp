@@ -34,13 +34,13 @@ TEST(TruthMachine, AgreesWithTheExactTransformsOfTheReferenceCase) {
   }
 }
 
-TEST(TruthMachine, WithoutErrorsGoesWhereItIsSent) {
+TEST(TruthMachine, WithoutErrorsReachesTheCommandedPosition) {
   const TruthMachine machine = small_machine();
   const Eigen::Vector3d q(0.1, -0.2, -0.3);
   EXPECT_EQ(position_m(machine, q), q + machine.target_offset_m);
 }
 
-TEST(TruthMachine, CarriesTheAxesNearerToTheToolInItsRotations) {
+TEST(TruthMachine, AnAxisRotatesTheAxesBetweenItAndTheTool) {
   TruthMachine machine = small_machine();
   const double angle = 1e-3;
   machine.axis(Axis::X).error[5] = ErrorFunction({-1.0, 1.0}, {angle, angle});  // ECX
@@ -61,7 +61,7 @@ TEST(TruthMachine, LeverDependsOnTheOrderOfTheAxes) {
   EXPECT_NEAR(v.z(), 0.0, 1e-15);
 }
 
-TEST(TruthMachine, SquarenessTiltsTheTravelAndNotTheTool) {
+TEST(TruthMachine, SquarenessTiltsTheTravelButNotTheTool) {
   TruthMachine machine = small_machine();
   machine.squareness.C0Y_rad = 1e-3;
   const Eigen::Vector3d v = error_m(machine, {0.0, 0.2, 0.0});
@@ -78,7 +78,7 @@ TEST(TruthMachine, BacklashIsTheDifferenceBetweenTheDirections) {
   EXPECT_LT((up - down - Eigen::Vector3d(0, 4e-6, 0)).norm(), 1e-16);
 }
 
-TEST(TruthMachine, GrowsAsItWarmsUp) {
+TEST(TruthMachine, ExpandsAsItWarmsUp) {
   TruthMachine machine = small_machine();
   machine.thermal.expansion_per_m.x() = 20e-6;
   machine.thermal.time_constant_s = 100.0;
@@ -105,7 +105,7 @@ TEST(ErrorFunction, CubicPassesThroughItsNodesWithoutCurvatureAtItsEnds) {
   EXPECT_DOUBLE_EQ(f.at(0.4), 3.0);
   const double h = 1e-3;
   EXPECT_NEAR((f.at(0.0) - 2.0 * f.at(h) + f.at(2 * h)) / (h * h), 0.0,
-              12.0);  // grows from 0 with slope ~1e4
+              12.0);  // increases from 0 with slope ~1e4
   const double left = (f.at(0.1) - f.at(0.1 - 1e-7)) / 1e-7;
   const double right = (f.at(0.1 + 1e-7) - f.at(0.1)) / 1e-7;
   EXPECT_NEAR(left, right, 1e-3);
@@ -117,18 +117,18 @@ TEST(ErrorFunction, CubicAgreesWithTheReferenceCase) {
        test::read_rows(std::string(ABBE_TEST_DATA) + "/otf/caseA_V_cubic_at_points.csv")) {
     const Eigen::Vector3d q(std::stod(row[0]), std::stod(row[1]), std::stod(row[2]));
     const Eigen::Vector3d linear(std::stod(row[3]), std::stod(row[4]), std::stod(row[5]));
-    // The file holds the linear model; the exact transforms differ by at most 0.052 um in this
+    // The file contains the linear model; the exact transforms differ by at most 0.052 um in this
     // case.
     EXPECT_LT((error_m(machine, q) - linear).norm(), 0.06e-6);
   }
 }
 
-TEST(RandomTruth, HasTheMeanErrorThatWasAsked) {
+TEST(RandomTruth, HasTheRequestedMeanError) {
   const TruthMachine machine = random_truth(small_machine(), {.seed = 7, .mean_error_m = 100e-6});
   EXPECT_NEAR(mean_error_m(machine), 100e-6, 1e-9);
 }
 
-TEST(RandomTruth, IsTheSameForTheSameSeedAndAnotherForAnother) {
+TEST(RandomTruth, IsEqualForEqualSeedsAndDiffersForOtherSeeds) {
   const auto csv = [](std::uint64_t seed) {
     return format_truth_csv(random_truth(small_machine(), {.seed = seed}));
   };
@@ -136,7 +136,7 @@ TEST(RandomTruth, IsTheSameForTheSameSeedAndAnotherForAnother) {
   EXPECT_NE(csv(3), csv(4));
 }
 
-TEST(RandomTruth, GivesEveryOneOfTheTwentyOneErrors) {
+TEST(RandomTruth, GeneratesAllTwentyOneErrors) {
   const TruthMachine machine = random_truth(small_machine(), {});
   for (const Axis axis : kAxes) {
     for (std::size_t m = 0; m < kMotions; ++m) {
@@ -149,7 +149,7 @@ TEST(RandomTruth, GivesEveryOneOfTheTwentyOneErrors) {
             0.0);
 }
 
-TEST(RandomTruth, LeavesTheReferencePositionInPlace) {
+TEST(RandomTruth, PositioningAndRotationsAreZeroAtTheReference) {
   const TruthMachine machine = random_truth(small_machine(), {});
   // Z's range ends at its reference, so all three straightnesses of Z vanish there; those of X and
   // Y need not.
@@ -158,7 +158,7 @@ TEST(RandomTruth, LeavesTheReferencePositionInPlace) {
   EXPECT_NEAR(machine.axis(Axis::X).error[1].at(-0.3), 0.0, 1e-18);
 }
 
-TEST(TruthCsv, ComesBackAsItWasWritten) {
+TEST(TruthCsv, IsReadAsItWasWritten) {
   const TruthMachine truth = random_truth(small_machine(), {.backlash_m = 1e-6});
   const auto again =
       parse_truth_csv(format_truth_csv(truth), "truth.csv", small_machine(), Shape::Linear);

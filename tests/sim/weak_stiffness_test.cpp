@@ -15,9 +15,9 @@ TEST(WeakStiffnessMachine, HasNoErrorAtBallOne) {
   EXPECT_LT(error_m(weak_stiffness_machine(), kBall1_m).norm(), 1e-12);
 }
 
-/// The polynomials of [Li OMM] eq. (5) by hand, at one reading; what is left is the second order of
-/// the exact transforms: rotations near 1 mrad times displacements near 3 mm.
-TEST(WeakStiffnessMachine, IsThatOfTableThree) {
+/// The polynomials of [Li OMM] eq. (5), evaluated here at one reading. The remaining difference is
+/// the second order of the exact transforms: rotations near 1 mrad times displacements near 3 mm.
+TEST(WeakStiffnessMachine, HasTheErrorsOfTableThree) {
   const double x = 400, y = 200, z = 40;
   const auto E_mm = [](double X, double Y, double Z) -> Vector3d {
     const double ezx = 2.169027e-06 * X - 3.121463e-12 * X * X * X;
@@ -43,7 +43,7 @@ TEST(WeakStiffnessMachine, IsThatOfTableThree) {
   EXPECT_LT((V_mm - expected_mm).norm(), 0.02);
 }
 
-TEST(WeakStiffnessMachine, SagsAndHasAPitchOnlyWhenAsked) {
+TEST(WeakStiffnessMachine, HasSagAndPeriodicErrorOnlyOnRequest) {
   const Vector3d q_m{0.25, 0.5, 0.03};
   const Vector3d plain = error_m(weak_stiffness_machine(), q_m);
   const Vector3d sagging = error_m(weak_stiffness_machine({.sag_m = 10e-6}), q_m);
@@ -53,7 +53,7 @@ TEST(WeakStiffnessMachine, SagsAndHasAPitchOnlyWhenAsked) {
   EXPECT_NEAR(waved.x() - error_m(weak_stiffness_machine(), crest_m).x(), 2e-6, 1e-8);
 }
 
-TEST(ReadingAt, PutsTheTipWhereItIsWanted) {
+TEST(ReadingAt, PutsTheTipAtTheGivenPosition) {
   const TruthMachine truth = weak_stiffness_machine();
   const Vector3d place_m{0.5, 0.2, 0.06};
   EXPECT_LT((position_m(truth, reading_at_m(truth, place_m)) - place_m).norm(), 1e-15);

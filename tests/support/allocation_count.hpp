@@ -1,8 +1,8 @@
 #pragma once
-/// Counts what the calling thread takes from the heap, malloc and operator new alike. Include it
+/// Counts the heap allocations of the calling thread, by malloc and operator new. Include it
 /// anywhere in a test binary: plain builds interpose glibc's malloc family, sanitizer builds use
-/// the sanitizer's own hook, so both kinds keep their allocator. Deallocation is not counted: what
-/// was never taken need not be given back.
+/// the sanitizer's own hook, so both kinds keep their allocator. Deallocation is not counted:
+/// without an allocation there is none.
 
 #include <cerrno>
 #include <cstddef>
@@ -46,7 +46,7 @@ inline AllocationCount::AllocationCount() : begin_(0) {
   static const int installed = __sanitizer_install_malloc_and_free_hooks(
       [](const volatile void*, std::size_t) { ++allocations_of_this_thread; },
       [](const volatile void*) {});
-  if (installed == 0) std::abort();  // a count that stays zero would prove nothing
+  if (installed == 0) std::abort();  // without the hook the count would always be zero
   begin_ = allocations_of_this_thread;
 }
 }  // namespace abbe::tests

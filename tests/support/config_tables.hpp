@@ -1,7 +1,7 @@
 #pragma once
 /// Tables of machine.toml and abbed.toml as the tests of several programs write them: `to_toml()`
-/// of each is its text, and texts are put one behind the other. What only one test needs stands
-/// there, as text: `more` is further keys of a table.
+/// of each is its text, and texts are concatenated. Keys that only one test needs are text in that
+/// test: `more` contains further keys of a table.
 
 #include <fmt/format.h>
 
@@ -19,7 +19,7 @@ struct Travel {
   std::optional<double> reference_mm = {};
 };
 
-/// [machine], [axes] and, where they are said, [target] and [model].
+/// [machine], [axes] and, if they have a value, [target] and [model].
 struct Machine {
   std::string name = "mill";
   std::string chain = "[w X' b Y Z (C1) t]";
@@ -37,12 +37,12 @@ inline Machine mill() {
           .node_spacing_mm = 50};
 }
 
-/// 500 mm each way.
+/// Travels of 500 mm.
 inline Machine half_metre_mill() {
   return {.x = {0, 500}, .y = {0, 500}, .z = {0, 500}, .target_offset_mm = {{0, 0, 0}}};
 }
 
-/// Of [Li OMM]: base, Z, X, Y, probe.
+/// The machine of [Li OMM]: base, Z, X, Y, probe.
 inline Machine weak_portal() {
   return {.name = "weak portal",
           .chain = "[w b Z X Y t]",
@@ -52,33 +52,34 @@ inline Machine weak_portal() {
           .target_offset_mm = {{0, 0, 0}}};
 }
 
-/// [tracker], a simulated one.
+/// [tracker] with a simulated tracker.
 struct Tracker {
   std::uint16_t port = 0;
   std::string more = {};
 };
 
-/// [encoder]: one node an axis on CAN over UDP.
+/// [encoder]: one node per axis on CAN over UDP.
 struct Encoder {
-  std::uint16_t peer_port = 1;  ///< 1: nobody answers there
+  std::uint16_t peer_port = 1;  ///< 1: no node answers on this port
   std::int64_t sync_period_us = 100'000;
   int step_nm = 1;
 };
 
-/// [counter_card] of abbe-sim over USB/IP, its counters at zero where the machine happens to stand.
+/// [counter_card] of abbe-sim over USB/IP; its counters are zero at the current position of the
+/// machine.
 struct CounterCard {
   int scan_rate_hz = 1000;
   std::string more = {};
 };
 
-/// [dds] where only this computer listens.
+/// [dds] limited to this computer.
 struct Dds {
   std::string domain;
   std::string profile;
   std::string more = {};
 };
 
-/// [daemon] of a simulation, in the folder of its configuration; further keys may follow.
+/// [daemon] of a simulation, with its folders beside the configuration; further keys may follow.
 inline constexpr std::string_view kDaemonInItsFolder = R"([daemon]
 data_dir = "data"
 runtime_dir = "run"

@@ -1,5 +1,5 @@
 #pragma once
-/// A DDS domain nobody else on this computer tests in at the moment.
+/// A DDS domain that no other test on this computer uses at the same time.
 
 #include <fcntl.h>
 #include <sys/file.h>
@@ -10,8 +10,8 @@
 
 namespace abbe::test {
 
-/// Domains 1 to 100, whose ports are below those the kernel gives away; claimed by a lock that ends
-/// with this process.
+/// Selects one of the domains 1 to 100, whose ports are below the kernel's ephemeral ports. A file
+/// lock reserves it until this process ends.
 class DomainClaim {
  public:
   DomainClaim() {

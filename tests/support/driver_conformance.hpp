@@ -1,24 +1,24 @@
 #pragma once
-/// What every driver must stand, written once: mute, late, torn, garbage, unplugged, back again,
-/// flooding, slow consumer, restarted peer, clock jump; and in all of it nothing is allocated in
-/// receive(), nothing invalid looks valid, every loss is counted.
+/// The faults that every driver must handle, as one test suite: mute, late, torn, garbage,
+/// unplugged, reconnected, flooding, slow consumer, restarted peer, clock jump. In every test
+/// receive() allocates nothing, no invalid sample is marked valid, and every loss is counted.
 ///
 /// A driver's test supplies a FaultyPeer: the driver, a peer that talks to it over a real socket in
-/// the same thread, and a SteppedTime they share. Nothing sleeps: one turn is peer, wait(),
-/// receive(), then time goes on by kCycle.
+/// the same thread, and a SteppedTime they share. Nothing sleeps: one cycle is peer, wait(),
+/// receive(), then time advances by kCycle.
 ///
 ///   struct MyPeer { ... };  // models FaultyPeer
 ///   INSTANTIATE_TYPED_TEST_SUITE_P(My, DriverConformance, MyPeer);
 ///
-/// What the device must show of each fault: `static std::set<std::string_view> shown(Fault)` are
-/// the states of which it must show one while the fault lasts (a fault that passes unseen by the
-/// state: the usual ones). The counters are the same for every driver: see the tests' names.
+/// `static std::set<std::string_view> shown(Fault)` returns the states of which the device must
+/// report one during the fault (for a fault without an effect on the state: the normal states). The
+/// counters are the same for every driver: see the names of the tests.
 ///
-/// A peer whose device has a clock of its own also has jump_clock(): the clock is suddenly a second
-/// or more ahead.
+/// A peer whose device has its own clock also has jump_clock(): the clock jumps ahead by a second
+/// or more.
 ///
-/// A TCP peer that unplugs keeps its port by holding a second socket bound to it (SO_REUSEPORT, not
-/// listening).
+/// A TCP peer that simulates unplugging keeps its port with a second socket bound to it
+/// (SO_REUSEPORT, not listening).
 
 #include <gtest/gtest.h>
 
@@ -39,7 +39,7 @@ namespace abbe::tests {
 
 enum class Fault { None, Mute, Garbage, Unplugged, Restart };
 
-/// The states of a session over TCP; `well`: of one without a fault.
+/// The states of a session over TCP; `well`: the state without a fault.
 inline std::set<std::string_view> shown_over_tcp(Fault fault, std::string_view well) {
   switch (fault) {
     case Fault::None:
@@ -54,56 +54,55 @@ inline std::set<std::string_view> shown_over_tcp(Fault fault, std::string_view w
   return {};
 }
 
-/// What a driver's test implements. All calls come from one thread and return at once. Default
-/// constructed, the peer is there and well, the device is made and has had no turn yet.
+/// The interface that a driver's test implements. All calls come from one thread and return at
+/// once. After default construction the peer runs without a fault; the device exists and has had no
+/// cycle yet.
 template <class P>
 concept FaultyPeer = requires(P p, std::vector<protocol::SampleHead>& heads) {
   { p.device() } -> std::same_as<drivers::Device&>;
   { p.time() } -> std::same_as<drivers::SteppedTime&>;
-  /// Takes what the device's sample ring holds (all rings, if it has several that carry the
+  /// Takes all samples from the device's sample ring (from all rings, if several carry the
   /// measurement).
   p.take_samples(heads);
-  /// Accepts connections, answers commands; called once a turn while the peer is up.
+  /// Accepts connections, answers commands; called once per cycle while the peer runs.
   p.serve();
-  /// One packet (burst, cycle) of valid samples that end about now. Called once a turn while the
-  /// peer speaks; may say nothing in some turns, if the device is not streaming yet or the packet
-  /// is not due.
+  /// Sends one packet (burst, cycle) of valid samples that end about now. Called once per cycle
+  /// while the peer sends; may send nothing in a cycle if the device is not streaming yet or the
+  /// packet is not due.
   p.send_valid();
-  /// The same, later than usual but within what is tolerated: one packet, held back and then sent.
-  p.hold_back();  ///< from now on send_valid() is kept in the peer ...
-  p.send_held();  ///< ... until now
-  /// The first half of a valid packet; then the rest, where the transport can deliver it
+  /// The same with a tolerated delay: one packet is held back and sent later.
+  p.hold_back();  ///< from now on send_valid() keeps its packet in the peer ...
+  p.send_held();  ///< ... until this call sends it
+  /// Sends the first half of a valid packet; then the rest, if the transport can deliver it
   /// (kTornCanBeFinished).
   p.send_torn();
   p.finish_torn();
-  /// Bytes that are no packet of the protocol.
+  /// Sends bytes that are not a packet of the protocol.
   p.send_garbage();
-  /// The cable is out: connections are lost and refused. And is in again.
+  /// Unplugs the cable: connections are lost and refused. plug_in() connects it again.
   p.unplug();
   p.plug_in();
-  /// At once, more valid samples than the sample ring holds.
+  /// Sends more valid samples at once than the sample ring can hold.
   p.flood();
-  /// Power off and on: connections are lost, the device's clock and counters begin anew.
+  /// Power off and on: connections are lost, the device's clock and counters start again.
   p.restart();
 
-  { P::kCycle } -> std::convertible_to<std::chrono::nanoseconds>;  ///< host time of one turn
-  {
-    P::kSilenceLimit
-    } -> std::convertible_to<std::chrono::nanoseconds>;  ///< silence is a fault after this
-  {
-    P::kRecoveryLimit
-    } -> std::convertible_to<std::chrono::nanoseconds>;  ///< from well again to streaming again
-  {
-    P::kTornCanBeFinished
-    } -> std::convertible_to<bool>;  ///< true: a byte stream; false: datagrams or frames
+  /// host time of one cycle
+  { P::kCycle } -> std::convertible_to<std::chrono::nanoseconds>;
+  /// silence of this duration is a fault
+  { P::kSilenceLimit } -> std::convertible_to<std::chrono::nanoseconds>;
+  /// longest time from the end of a fault to the first sample
+  { P::kRecoveryLimit } -> std::convertible_to<std::chrono::nanoseconds>;
+  /// true: a byte stream; false: datagrams or frames
+  { P::kTornCanBeFinished } -> std::convertible_to<bool>;
 };
 
-/// Flags that keep a sample from being taken for a valid one.
+/// A sample with one of these flags is not valid.
 inline constexpr protocol::SampleFlags kNotToBeUsed =
     protocol::SampleFlag::AxisMissing | protocol::SampleFlag::BusOff |
     protocol::SampleFlag::DeviceError | protocol::SampleFlag::SpeedExceeded |
     protocol::SampleFlag::PointInvalid;
-/// Flags of which the first sample after an interruption carries at least one.
+/// The first sample after an interruption has at least one of these flags.
 inline constexpr protocol::SampleFlags kInterrupted = protocol::SampleFlag::GapBefore |
                                                       protocol::SampleFlag::Restarted |
                                                       protocol::SampleFlag::BeamReturned;
@@ -115,7 +114,7 @@ class DriverConformance : public testing::Test {
 
   drivers::DeviceStatus status() { return peer_.device().status(); }
 
-  /// One turn; returns the heads of the samples it brought.
+  /// Runs one cycle; returns the heads of its samples.
   Heads cycle() {
     if (up_) peer_.serve();
     if (up_ && speaking_) peer_.send_valid();
@@ -137,7 +136,7 @@ class DriverConformance : public testing::Test {
     return all;
   }
 
-  /// Turns until `done()`; false if `limit` of host time passed before. Samples on the way go to
+  /// Runs cycles until `done()`; returns false after `limit` of host time. The samples are in
   /// `seen_`.
   template <class Done>
   bool cycles_until(std::chrono::nanoseconds limit, Done done) {
@@ -159,7 +158,7 @@ class DriverConformance : public testing::Test {
   bool usable_samples_come(std::chrono::nanoseconds limit) {
     return cycles_until(limit, [this] { return usable_in(seen_) != 0; });
   }
-  /// From nothing to streaming; the precondition of every test.
+  /// Starts the device until it streams; the precondition of every test.
   void begin_streaming() {
     ASSERT_TRUE(usable_samples_come(Peer::kRecoveryLimit))
         << "never streamed; last fault: " << status().last_fault;
@@ -168,29 +167,29 @@ class DriverConformance : public testing::Test {
   }
 
   void TearDown() override {
-    EXPECT_EQ(allocated_in_receive_, 0u) << "receive() took memory";
+    EXPECT_EQ(allocated_in_receive_, 0u) << "receive() allocated memory";
     const auto s = status();
     EXPECT_EQ(s.samples, taken_ + s.dropped)
-        << "every decoded sample is taken or counted as dropped";
+        << "a decoded sample must be taken or counted as dropped";
   }
 
-  /// The state that a fault must show, at the latest when the peer's silence would.
+  /// The device reports a state required for the fault, within twice the silence limit.
   bool shows(Fault fault) {
     if constexpr (requires { Peer::shown(fault); }) {
       const auto states = Peer::shown(fault);
       return cycles_until(2 * Peer::kSilenceLimit,
                           [&] { return states.count(status().state) != 0; });
     } else {
-      return true;  // the guest's peers: what a state must be is shown here, once
+      return true;  // peers of the guest: the states are tested here, once
     }
   }
 
   Peer peer_;
   bool up_ = true;  ///< the peer is served: its process runs
   bool speaking_ = true;
-  bool reading_ = true;  ///< somebody takes the samples
+  bool reading_ = true;  ///< the test takes the samples
   Heads seen_;
-  drivers::DeviceStatus before_;  ///< when begin_streaming() was through
+  drivers::DeviceStatus before_;  ///< at the end of begin_streaming()
 
  private:
   static void append(const Heads& from, Heads& to) {
@@ -202,7 +201,7 @@ class DriverConformance : public testing::Test {
 
 TYPED_TEST_SUITE_P(DriverConformance);
 
-TYPED_TEST_P(DriverConformance, StreamsWhatThePeerSays) {
+TYPED_TEST_P(DriverConformance, StreamsTheSamplesOfThePeer) {
   this->begin_streaming();
   const auto heads = this->cycles_for(20 * TypeParam::kCycle);
   EXPECT_GT(this->usable_in(heads), 0u);
@@ -210,15 +209,15 @@ TYPED_TEST_P(DriverConformance, StreamsWhatThePeerSays) {
   EXPECT_EQ(this->status().faults, this->before_.faults);
 }
 
-TYPED_TEST_P(DriverConformance, StampsNoSampleWithTheFuture) {
+TYPED_TEST_P(DriverConformance, TimestampsAreNotInTheFuture) {
   this->begin_streaming();
   for (int i = 0; i < 20; ++i) {
-    const auto before_turn = this->peer_.time().now();
-    for (const auto& head : this->cycle()) EXPECT_LE(head.time, before_turn + 3 * head.u_time);
+    const auto before_cycle = this->peer_.time().now();
+    for (const auto& head : this->cycle()) EXPECT_LE(head.time, before_cycle + 3 * head.u_time);
   }
 }
 
-TYPED_TEST_P(DriverConformance, NoticesAMutePeer) {
+TYPED_TEST_P(DriverConformance, DetectsAMutePeer) {
   this->begin_streaming();
   this->speaking_ = false;
   const auto noticed = [this] { return this->status().faults > this->before_.faults; };
@@ -226,14 +225,14 @@ TYPED_TEST_P(DriverConformance, NoticesAMutePeer) {
   EXPECT_NE(this->status().last_fault, "");
 }
 
-TYPED_TEST_P(DriverConformance, InventsNothingWhileThePeerIsMute) {
+TYPED_TEST_P(DriverConformance, HasNoValidSampleWhileThePeerIsMute) {
   this->begin_streaming();
   this->speaking_ = false;
-  this->cycles_for(2 * TypeParam::kCycle);  // what was under way
+  this->cycles_for(2 * TypeParam::kCycle);  // packets in transit arrive
   EXPECT_EQ(this->usable_in(this->cycles_for(2 * TypeParam::kSilenceLimit)), 0u);
 }
 
-TYPED_TEST_P(DriverConformance, StreamsAgainWhenAMutePeerSpeaks) {
+TYPED_TEST_P(DriverConformance, StreamsAgainWhenAMutePeerSendsAgain) {
   this->begin_streaming();
   this->speaking_ = false;
   this->cycles_for(2 * TypeParam::kSilenceLimit);
@@ -251,7 +250,7 @@ TYPED_TEST_P(DriverConformance, ToleratesALatePacket) {
 }
 
 TYPED_TEST_P(DriverConformance, WaitsForTheRestOfATornPacket) {
-  if (!TypeParam::kTornCanBeFinished) GTEST_SKIP() << "a datagram is never finished";
+  if (!TypeParam::kTornCanBeFinished) GTEST_SKIP() << "the rest of a datagram is never delivered";
   this->begin_streaming();
   this->speaking_ = false;
   this->cycles_for(2 * TypeParam::kCycle);
@@ -262,7 +261,7 @@ TYPED_TEST_P(DriverConformance, WaitsForTheRestOfATornPacket) {
   EXPECT_EQ(this->status().faults, this->before_.faults);
 }
 
-TYPED_TEST_P(DriverConformance, CountsATornDatagramAndGoesOn) {
+TYPED_TEST_P(DriverConformance, CountsATornDatagramAndContinues) {
   if (TypeParam::kTornCanBeFinished) GTEST_SKIP() << "a byte stream may deliver the rest";
   this->begin_streaming();
   this->peer_.send_torn();
@@ -271,7 +270,7 @@ TYPED_TEST_P(DriverConformance, CountsATornDatagramAndGoesOn) {
   EXPECT_TRUE(this->usable_samples_come(TypeParam::kRecoveryLimit));
 }
 
-TYPED_TEST_P(DriverConformance, CountsGarbageAndMakesNoSampleOfIt) {
+TYPED_TEST_P(DriverConformance, CountsGarbageWithoutAValidSample) {
   this->begin_streaming();
   this->speaking_ = false;
   this->cycles_for(2 * TypeParam::kCycle);
@@ -288,7 +287,7 @@ TYPED_TEST_P(DriverConformance, StreamsAgainAfterGarbage) {
   EXPECT_TRUE(this->usable_samples_come(TypeParam::kRecoveryLimit)) << this->status().last_fault;
 }
 
-TYPED_TEST_P(DriverConformance, NoticesThatItIsUnplugged) {
+TYPED_TEST_P(DriverConformance, DetectsThatItIsUnplugged) {
   this->begin_streaming();
   this->peer_.unplug();
   this->up_ = false;
@@ -298,7 +297,7 @@ TYPED_TEST_P(DriverConformance, NoticesThatItIsUnplugged) {
   EXPECT_EQ(this->usable_in(this->cycles_for(TypeParam::kSilenceLimit)), 0u);
 }
 
-TYPED_TEST_P(DriverConformance, StreamsWhenPluggedInAgainAndMarksIt) {
+TYPED_TEST_P(DriverConformance, StreamsAndMarksTheGapWhenPluggedInAgain) {
   this->begin_streaming();
   this->peer_.unplug();
   this->up_ = false;
@@ -317,7 +316,7 @@ TYPED_TEST_P(DriverConformance, StreamsWhenPluggedInAgainAndMarksIt) {
   EXPECT_NE(flags & kInterrupted, 0u);
 }
 
-TYPED_TEST_P(DriverConformance, StartsWhenThePeerComesLater) {
+TYPED_TEST_P(DriverConformance, StartsWhenThePeerStartsLater) {
   this->peer_.unplug();
   this->up_ = false;
   this->cycles_for(2 * TypeParam::kSilenceLimit);
@@ -341,13 +340,13 @@ TYPED_TEST_P(DriverConformance, DropsCountsAndMarksWhenFlooded) {
   EXPECT_TRUE(this->cycles_until(TypeParam::kRecoveryLimit, marked));
 }
 
-TYPED_TEST_P(DriverConformance, MarksWhatASlowConsumerMissed) {
+TYPED_TEST_P(DriverConformance, MarksSamplesMissedByASlowConsumer) {
   this->begin_streaming();
   this->reading_ = false;
   const auto dropped = [this] { return this->status().dropped > this->before_.dropped; };
 
   if (!this->cycles_until(4 * TypeParam::kRecoveryLimit, dropped)) {
-    GTEST_SKIP() << "too slow a device to fill its ring in the time of a test";
+    GTEST_SKIP() << "the device is too slow to fill its ring during a test";
   }
 
   this->reading_ = true;
@@ -359,7 +358,7 @@ TYPED_TEST_P(DriverConformance, MarksWhatASlowConsumerMissed) {
   };
 
   EXPECT_TRUE(this->cycles_until(TypeParam::kRecoveryLimit, marked));
-  EXPECT_TRUE(this->status().connected) << "who reads late disturbs nothing";
+  EXPECT_TRUE(this->status().connected) << "a slow reader must not affect the connection";
 }
 
 TYPED_TEST_P(DriverConformance, KeepsSampleTimesNearTheHostClockThroughAClockJump) {
@@ -383,7 +382,7 @@ TYPED_TEST_P(DriverConformance, KeepsSampleTimesNearTheHostClockThroughAClockJum
   }
 }
 
-TYPED_TEST_P(DriverConformance, StreamsAgainAfterThePeerRestartedAndMarksIt) {
+TYPED_TEST_P(DriverConformance, StreamsAndMarksTheGapAfterThePeerRestarted) {
   this->begin_streaming();
   this->peer_.restart();
   const auto marked = [this] {
@@ -467,18 +466,16 @@ TYPED_TEST_P(DriverConformance, ShowsAClockJumpAndCountsIt) {
   }
 }
 
-REGISTER_TYPED_TEST_SUITE_P(DriverConformance, ShowsThatItStreams, ShowsAMutePeerAndCountsAFault,
-                            ShowsGarbageAndCountsAFault, ShowsThatItIsUnpluggedAndCountsAFault,
-                            ShowsARestartedPeerAndCountsIt, ShowsAClockJumpAndCountsIt,
-                            StreamsWhatThePeerSays, StampsNoSampleWithTheFuture, NoticesAMutePeer,
-                            InventsNothingWhileThePeerIsMute, StreamsAgainWhenAMutePeerSpeaks,
-                            ToleratesALatePacket, WaitsForTheRestOfATornPacket,
-                            CountsATornDatagramAndGoesOn, CountsGarbageAndMakesNoSampleOfIt,
-                            StreamsAgainAfterGarbage, NoticesThatItIsUnplugged,
-                            StreamsWhenPluggedInAgainAndMarksIt, StartsWhenThePeerComesLater,
-                            DropsCountsAndMarksWhenFlooded, MarksWhatASlowConsumerMissed,
-                            KeepsSampleTimesNearTheHostClockThroughAClockJump,
-                            StreamsAgainAfterThePeerRestartedAndMarksIt,
-                            KeepsSampleTimesNearTheHostClockThroughARestart);
+REGISTER_TYPED_TEST_SUITE_P(
+    DriverConformance, ShowsThatItStreams, ShowsAMutePeerAndCountsAFault,
+    ShowsGarbageAndCountsAFault, ShowsThatItIsUnpluggedAndCountsAFault,
+    ShowsARestartedPeerAndCountsIt, ShowsAClockJumpAndCountsIt, StreamsTheSamplesOfThePeer,
+    TimestampsAreNotInTheFuture, DetectsAMutePeer, HasNoValidSampleWhileThePeerIsMute,
+    StreamsAgainWhenAMutePeerSendsAgain, ToleratesALatePacket, WaitsForTheRestOfATornPacket,
+    CountsATornDatagramAndContinues, CountsGarbageWithoutAValidSample, StreamsAgainAfterGarbage,
+    DetectsThatItIsUnplugged, StreamsAndMarksTheGapWhenPluggedInAgain, StartsWhenThePeerStartsLater,
+    DropsCountsAndMarksWhenFlooded, MarksSamplesMissedByASlowConsumer,
+    KeepsSampleTimesNearTheHostClockThroughAClockJump, StreamsAndMarksTheGapAfterThePeerRestarted,
+    KeepsSampleTimesNearTheHostClockThroughARestart);
 
 }  // namespace abbe::tests

@@ -1,7 +1,7 @@
 #pragma once
-/// Encoder nodes in the test's own thread, built from the server side of the protocol room: what an
-/// encoder device under test talks to. Nothing happens but in the functions a test calls. How
-/// frames travel is the deriving class's matter.
+/// Encoder nodes on the thread of the test, built from the server side of the module protocol: the
+/// peer of an encoder device under test. They act only in the functions that a test calls. The
+/// derived class transports the frames.
 
 #include <cstdint>
 #include <deque>
@@ -26,9 +26,9 @@ struct PeerNode {
   can::NodeId id;
   can::NodeState state = can::NodeState::PreOperational;
   std::optional<HostTime> last_heartbeat;
-  bool mute = false;         ///< says nothing at all
+  bool mute = false;         ///< sends nothing
   bool no_position = false;  ///< answers SDO, sends no TPDO
-  /// Writing this object is refused for this reason.
+  /// Writing this object is refused with this abort code.
   std::optional<std::pair<can::ObjectId, can::AbortCode>> refuses;
 
   [[nodiscard]] std::optional<can::CanFrame> answer(const can::CanFrame& frame, HostTime now) {
@@ -152,7 +152,7 @@ class EncoderNodes {
     }
   }
 
-  std::deque<PeerNode> nodes_;  // a deque: a node's server holds on to its dictionary
+  std::deque<PeerNode> nodes_;  // a deque: a node's server refers to its dictionary
   bool sync_waiting_ = false;
   std::size_t syncs_ = 0;
   std::vector<can::NmtMessage> nmt_;

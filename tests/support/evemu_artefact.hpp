@@ -1,6 +1,6 @@
 #pragma once
-/// Studies of what the ball array itself may be off: calibrators somebody might have got, and
-/// observations as they come of one.
+/// Studies of the errors of the ball array itself: possible results of its calibration, and
+/// observations made with them.
 
 #include <optional>
 #include <random>
@@ -9,7 +9,7 @@
 
 namespace abbe::tests::evemu {
 
-/// The same array with uncertainties stated.
+/// The same array with the given stated uncertainties.
 inline calib::evemu::Calibrator stated(calib::evemu::Calibrator c, double u_ball_m,
                                        double u_block_rad) {
   for (auto& ball : c.balls) {
@@ -21,7 +21,7 @@ inline calib::evemu::Calibrator stated(calib::evemu::Calibrator c, double u_ball
   return c;
 }
 
-/// One of the calibrators that a calibration with the stated uncertainties gives.
+/// A random result of a calibration with the stated uncertainties.
 inline calib::evemu::Calibrator drawn(const calib::evemu::Calibrator& c, double u_scale,
                                       std::mt19937_64& random) {
   std::normal_distribution<double> normal;
@@ -44,7 +44,7 @@ inline calib::evemu::Calibrator drawn(const calib::evemu::Calibrator& c, double 
   return out;
 }
 
-/// Places in the uniform frame of a calibrator: [Li OMM] eq. (11).
+/// Ball centres in the uniform frame of a calibrator: [Li OMM] eq. (11).
 inline std::vector<Vector3> in_uniform_frame_m(const calib::evemu::Calibrator& c) {
   const Vector3& ball1_m = c.balls[0].centre_m;
   const calib::Matrix3 R =
@@ -56,7 +56,7 @@ inline std::vector<Vector3> in_uniform_frame_m(const calib::evemu::Calibrator& c
   return places;
 }
 
-/// V at the balls as they come of another calibrator and the same touches: [Li OMM] eq. (12).
+/// V at the balls with another calibrator and the same touches: [Li OMM] eq. (12).
 inline Eigen::VectorXd errors_with_m(const calib::evemu::Observations& o,
                                      const calib::evemu::Calibrator& c) {
   const std::vector<Vector3> places_m = in_uniform_frame_m(c);
@@ -70,8 +70,8 @@ inline Eigen::VectorXd errors_with_m(const calib::evemu::Observations& o,
   return V;
 }
 
-/// simulated() errors as they come of a calibrator `found` with the uncertainties of `u`, where the
-/// truth is that of the layout. No touched points: rows from centres only.
+/// The errors of simulated(), evaluated with the calibrator `found` and the uncertainties `u`; the
+/// layout is the truth. There are no touched points: rows are computed from centres only.
 inline calib::evemu::Observations with_array(calib::evemu::Observations o, const Layout& layout,
                                              const calib::evemu::Calibrator& found,
                                              const calib::evemu::ArtefactUncertainty& u) {

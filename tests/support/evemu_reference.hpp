@@ -1,6 +1,6 @@
 #pragma once
-/// The reference data of local calibration with a ball array, as the prototype that made them wrote
-/// them (tests/data/evemu, mm).
+/// The reference data of local calibration with a ball array, in the format of the
+/// prototype that computed them (tests/data/evemu, mm).
 
 #include <Eigen/Core>
 #include <filesystem>

@@ -44,8 +44,8 @@ inline std::vector<calib::evemu::Touch> reference_touches(const std::string& fil
   return touches;
 }
 
-/// In the order of [Li OMM] section 3: at every position of `positions`, in their order, Ball1, the
-/// blocks, the other balls.
+/// The touches in the order of [Li OMM] section 3: for every position of `positions`, in their
+/// order: Ball1, the blocks, the other balls.
 inline std::vector<calib::evemu::Touch> touches_in_order(
     const std::vector<calib::evemu::Touch>& all,
     const std::vector<int>& positions = {1, 2, 3, 4, 5, 6, 7, 8}) {
@@ -66,7 +66,7 @@ inline std::vector<calib::evemu::Touch> touches_in_order(
   return touches;
 }
 
-/// points72.csv: errors made from truth with 5 um per ball.
+/// points72.csv: errors computed from the truth, with a noise of 5 um per ball.
 inline std::vector<calib::evemu::BallError> reference_errors() {
   std::vector<calib::evemu::BallError> errors;
   for (const auto& row : reference_cells("points72.csv")) {
@@ -84,8 +84,8 @@ inline Eigen::VectorXd reference_coefficients(const std::string& solution) {
   const auto& beta = all["solutions"][solution]["beta"];
   Eigen::VectorXd b(static_cast<Eigen::Index>(beta.size()));
   Eigen::Index i = 0;
-  for (const auto& [name, value] :
-       beta.items()) {  // nlohmann keeps names sorted, as the model does
+  // nlohmann's JSON sorts names as the model does.
+  for (const auto& [name, value] : beta.items()) {
     b(i++) = value.template get<double>();
   }
   return b;

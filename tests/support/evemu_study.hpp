@@ -1,7 +1,8 @@
 #pragma once
-/// Simulated studies of the ball array: the reference layout, a machine whose true errors are
-/// known, errors made from truth with noise, and how much of V a model leaves. Readings solve
-/// true = reading + V(reading).
+/// Simulated studies of the ball array: the reference layout, a machine with known errors, errors
+/// computed from the truth with noise, and the remaining error of a model. Readings solve
+///
+///   true position = reading + V(reading)
 
 #include <cmath>
 #include <functional>
@@ -52,7 +53,7 @@ inline Layout reference_layout(double tilt_scale = 1.0) {
 }
 
 struct Noise {
-  double s_m = 0.0;    ///< of a ball centre, per coordinate
+  double s_m = 0.0;    ///< standard deviation of a ball centre, per coordinate
   double w_rad = 0.0;  ///< random rotation of a position, per axis
 };
 
@@ -93,8 +94,8 @@ inline calib::evemu::Observations simulated(const Layout& layout, const Field& V
                                        calib::evemu::RotationOrigin::Independent, options);
 }
 
-/// Multiples of (100/3, 50/3, 10/3) mm inside the hull of the balls, at least as far from Ball1
-/// as Ball2 is.
+/// Points at multiples of (100/3, 50/3, 10/3) mm inside the hull of the balls, at least as far from
+/// Ball1 as Ball2 is.
 inline std::vector<Vector3> evaluation_grid(const calib::ValidityVolume& hull,
                                             const Layout& layout = reference_layout()) {
   const auto box = calib::evemu::bounding_box(hull.vertices_m());
@@ -119,7 +120,7 @@ inline std::vector<Vector3> evaluation_grid(const calib::ValidityVolume& hull,
   return grid;
 }
 
-/// The same inside the balls of a layout.
+/// The same points inside the hull of the balls of a layout.
 inline std::vector<Vector3> hull_grid(const Layout& layout) {
   std::vector<Vector3> balls;
   for (const auto& position : layout.true_m) {
@@ -128,7 +129,7 @@ inline std::vector<Vector3> hull_grid(const Layout& layout) {
   return evaluation_grid(*calib::ValidityVolume::hull_of(balls), layout);
 }
 
-/// The volume of the reference layout, whatever layout was measured.
+/// The points of the reference layout, independent of the measured layout.
 inline std::vector<Vector3> reference_grid() {
   return hull_grid(reference_layout());
 }
@@ -162,7 +163,7 @@ inline Field raw_field_of(const calib::evemu::Solution& s) {
   return [raw](const Vector3& q) { return raw.V_at(q); };
 }
 
-/// The field without the rotation about Ball1 that fits `truth` best.
+/// `model` after removal of the rotation about Ball1 that fits it best to `truth`.
 inline Field turned_to(const Field& truth, const Field& model, const std::vector<Vector3>& grid) {
   const Vector3 ball1(-0.09, 0.14, 0.03);
   calib::Matrix3 N = calib::Matrix3::Zero();

@@ -1,5 +1,5 @@
 #pragma once
-/// One measured figure as scripts/soak gathers it: a line that begins with "figure: ".
+/// Prints one measured figure for scripts/soak: a line that begins with "figure: ".
 
 #include <fmt/format.h>
 

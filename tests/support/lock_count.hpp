@@ -1,9 +1,9 @@
 #pragma once
-/// Counts what could make the calling thread wait for another thread: mutexes, condition variables
-/// and read-write locks that it takes, threads that it starts. Include it in one source file of a
-/// test binary: the dynamic linker prefers the program's own functions to those of the C library.
-/// Locks inside the C library (malloc, stdio) are not seen. With a sanitizer nothing is counted: it
-/// has functions of its own.
+/// Counts operations that could make the calling thread wait for another thread: locking of
+/// mutexes, condition variables and read-write locks, and starts of threads. Include it in one
+/// source file of a test binary: the dynamic linker prefers the program's own functions to those of
+/// the C library. Locks inside the C library (malloc, stdio) are not counted. With a sanitizer
+/// nothing is counted: it replaces these functions.
 
 #include <dlfcn.h>
 #include <pthread.h>

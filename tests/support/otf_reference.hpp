@@ -1,8 +1,8 @@
 #pragma once
-/// The reference data of on-the-fly calibration, as the prototype that made them wrote them (own
-/// columns, SI). Small files are in tests/data/otf; the two tracker streams and the normal
-/// equations are read from ABBE_REF_DIR, by default ../shared/ref beside the repository, and tests
-/// that need them are skipped where they are not.
+/// The reference data of on-the-fly calibration, in the format of the prototype that computed them
+/// (own columns, SI). Small files are in tests/data/otf; the two tracker streams and the normal
+/// equations are read from ABBE_REF_DIR, by default ../shared/ref beside the repository; tests
+/// that need them are skipped without them.
 
 #include <Eigen/Core>
 #include <cstdint>
@@ -107,7 +107,7 @@ inline calib::otf::Path case_a_path() {
   return path;
 }
 
-/// What the prototype's alignment ended in (ref.json, cases.A.*.icp_R, icp_T; noisy rough_R,
+/// The result of the prototype's alignment (ref.json, cases.A.*.icp_R, icp_T; noisy rough_R,
 /// rough_T).
 inline calib::RigidTransform case_a_alignment(bool noisy) {
   calib::RigidTransform T;

@@ -1,6 +1,7 @@
 #pragma once
-/// A small made-up run of on-the-fly calibration: a machine with random tables, a path, a tracker,
-/// samples. Deterministic from its seed. Constant speed on every leg, a stop at every vertex.
+/// A small synthetic run of on-the-fly calibration: a machine with random tables, a path, a
+/// tracker, samples. Deterministic from its seed. Constant speed on every leg, a stop at every
+/// vertex.
 
 #include <cmath>
 #include <random>
@@ -25,7 +26,7 @@ struct MadeRun {
 
 struct MadeRunOptions {
   unsigned seed = 1;          ///< of the machine
-  unsigned noise_seed = 1;    ///< of what the tracker adds: same machine, another run
+  unsigned noise_seed = 1;    ///< of the tracker's noise: same machine, another run
   double noise_factor = 1.0;  ///< of the default noise model; 0: exact
   double error_scale_m = 30e-6;
   double speed_m_s = 0.4;
@@ -42,7 +43,7 @@ inline calib::otf::Machine coarse_machine(const std::string& chain) {
   return machine;
 }
 
-/// The layout every machine of these tests is identified with.
+/// The parameter layout of all machines in these tests.
 inline calib::ParameterLayout layout_of(const calib::otf::Machine& machine) {
   return *calib::ParameterLayout::observable_with_one_target(machine.chain, machine.nodes);
 }
@@ -57,7 +58,7 @@ inline Eigen::VectorXd random_tables(const calib::ParameterLayout& layout, doubl
   return U;
 }
 
-/// Axis positions of a drive along the path.
+/// Axis positions of a motion along the path.
 inline std::vector<Vector3> drive(const calib::otf::Path& path, double speed_m_s, double rate_hz) {
   std::vector<Vector3> q;
   const auto stand = [&](const Vector3& at) { q.insert(q.end(), 25, at); };

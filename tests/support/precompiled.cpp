@@ -1,2 +1,1 @@
-// Nothing of its own: the target that carries the precompiled headers of all test programs needs
-// one source.
+// Empty: the target with the precompiled headers of all test programs needs one source file.

@@ -1,8 +1,10 @@
 #pragma once
-/// What every real-time path must stand, as two checks for any receiver, ring or device:
-///   expect_no_allocation(10'000, [&](std::size_t i) { receiver.receive(bytes_of(i), arrival, sink); });
-///   expect_no_system_call([&] { receiver.receive(bytes, arrival, sink); });
-/// Prepare everything outside the callable; it holds the real-time path and nothing else.
+/// The two requirements on every real-time path, as checks for any receiver, ring or device:
+///
+///   expect_no_allocation(10'000, [&](std::size_t i) { receiver.receive(bytes_of(i), at, sink); });
+///   expect_no_system_call([&] { receiver.receive(bytes, at, sink); });
+///
+/// Prepare everything outside the callable: it contains only the real-time path.
 
 #include <gtest/gtest.h>
 #include <linux/filter.h>
@@ -18,15 +20,15 @@
 
 namespace abbe::tests {
 
-/// Calls `path(i)` for i = 0 .. times - 1; the calling thread must not take memory in any of them.
+/// Calls `path(i)` for i = 0 .. times - 1; none of the calls may allocate memory.
 template <class Path>
 void expect_no_allocation(std::size_t times, Path&& path) {
   const AllocationCount allocations;
   for (std::size_t i = 0; i < times; ++i) path(i);
-  EXPECT_EQ(allocations.value(), 0u) << "allocations in " << times << " turns of a real-time path";
+  EXPECT_EQ(allocations.value(), 0u) << "allocations in " << times << " calls of a real-time path";
 }
 
-/// From here on the kernel ends this process at any system call but exit_group.
+/// From now on the kernel kills this process at any system call except exit_group.
 inline void allow_only_exit() {
   std::array<sock_filter, 4> filter{{
       BPF_STMT(BPF_LD | BPF_W | BPF_ABS, offsetof(seccomp_data, nr)),
@@ -42,14 +44,14 @@ inline void allow_only_exit() {
 }
 
 #if defined(__SANITIZE_THREAD__)
-// ThreadSanitizer maps its shadow on demand and takes futexes
+// ThreadSanitizer maps its shadow memory on demand and uses futexes
 inline constexpr bool kSystemCallsAreOurs = false;
 #else
 inline constexpr bool kSystemCallsAreOurs = true;
 #endif
 
-/// Runs `path` in a child where any system call is deadly. Skips (does not fail) under
-/// ThreadSanitizer, whose own system calls cannot be told from ours.
+/// Runs `path` in a child process that is killed at any system call. Skips (does not fail) under
+/// ThreadSanitizer, whose own system calls cannot be distinguished from those of `path`.
 template <class Path>
 void expect_no_system_call(Path&& path) {
   if constexpr (kSystemCallsAreOurs) {

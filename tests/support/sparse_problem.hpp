@@ -1,5 +1,5 @@
 #pragma once
-/// Random regression problems, the same for the same seed.
+/// Random regression problems, deterministic from the seed.
 
 #include <Eigen/Core>
 #include <cmath>
@@ -13,8 +13,8 @@ struct Problem {
   Eigen::VectorXd y;
 };
 
-/// Neighbouring columns are correlated by 0.5, have different scales and means; every fourth one
-/// acts on y.
+/// Neighbouring columns have a correlation of 0.5 and different scales and means; y depends on
+/// every fourth column.
 inline Problem random_problem(Eigen::Index rows, Eigen::Index columns, std::uint64_t seed) {
   std::mt19937_64 random(seed);
   std::normal_distribution<double> normal;
@@ -34,7 +34,7 @@ inline Problem random_problem(Eigen::Index rows, Eigen::Index columns, std::uint
 }
 
 /// Columns 1 .. 15 of the Hadamard matrix of order 16: mean 0, mean square 1, orthogonal, so that
-/// coefficients do not know of each other.
+/// each coefficient is estimated independently of the others.
 inline Eigen::MatrixXd orthogonal_design() {
   Eigen::MatrixXd X(16, 15);
   for (int i = 0; i < 16; ++i) {

@@ -1,5 +1,5 @@
 #pragma once
-/// The 216 x 45 problem of a ball array and what ncvreg 3.16.0.7 made of it (tests/data/evemu).
+/// The 216 x 45 problem of a ball array and the results of ncvreg 3.16.0.7 (tests/data/evemu).
 
 #include <Eigen/Core>
 #include <algorithm>
@@ -94,7 +94,7 @@ inline calib::sparse::Folds reference_folds(const std::filesystem::path& folder,
   return calib::sparse::parse_folds(text.str()).value();
 }
 
-/// One call of ncvreg: its arguments and what came out.
+/// One call of ncvreg: its arguments and its results.
 struct ReferencePath {
   calib::sparse::Penalty penalty;
   calib::sparse::PathOptions options;
@@ -102,8 +102,7 @@ struct ReferencePath {
   Eigen::MatrixXd coefficients;  ///< 46 x lambda, intercept first
 };
 
-/// Rows of equal penalty, gamma and tolerance follow each other. 1e6 sweeps: enough that none of
-/// the paths ends early.
+/// Rows of equal penalty, gamma and tolerance are consecutive. With 1e6 sweeps no path ends early.
 inline std::vector<ReferencePath> reference_paths(const std::filesystem::path& folder) {
   using calib::sparse::PenaltyKind;
   const Table table = read_table(folder, "ncvreg_paths.csv");

@@ -1,5 +1,5 @@
 #pragma once
-/// For tests of the kernel's receive stamps.
+/// For tests of the kernel's receive timestamps.
 
 #include <linux/net_tstamp.h>
 #include <sys/socket.h>
@@ -10,9 +10,9 @@
 
 namespace abbe::test {
 
-/// Asks for receive stamps for as long as the program runs. A worker of the kernel switches
-/// stamping off some time after the last socket that asked was closed: a test that opened its own
-/// in between had a stamp for its first arrival and none for the arrivals after it.
+/// Keeps receive timestamps switched on while the program runs. The kernel switches them off in the
+/// background some time after the last socket that uses them was closed: a test that opens its own
+/// socket in between would get a timestamp for the first packet and none for later ones.
 class StampedSocket {
  public:
   StampedSocket() : fd_(::socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC, 0)) {

@@ -1,5 +1,5 @@
 #pragma once
-/// A model with every number different and none of them round, for tests of files and stores.
+/// A model whose numbers are all different and not round, for tests of files and stores.
 
 #include <cmath>
 #include <random>
@@ -10,7 +10,8 @@
 
 namespace abbe::daemon::test {
 
-/// Same seed, same bits. Nodes 150 mm apart in X and Y, 100 mm in Z, divided by `finer`.
+/// Deterministic from the seed, bit by bit. Nodes 150 mm apart in X and Y, 100 mm in Z, divided by
+/// `finer`.
 inline calib::VolumetricModel synthetic_model(unsigned seed, double finer = 1.0) {
   std::mt19937 random(seed);
   std::normal_distribution<double> normal;

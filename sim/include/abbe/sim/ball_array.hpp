@@ -1,7 +1,7 @@
 #pragma once
-/// A ball array as it stands on a machine's table: nine balls in an L, two blocks whose faces give
-/// it a direction; and the eight positions to which it is turned about its first ball. m, machine
-/// coordinates, the true ones. Pure.
+/// A ball array on a machine's table: nine balls in an L shape, and two blocks whose faces define
+/// the orientation of the array; and the eight positions into which the array is rotated about its
+/// first ball. True values in machine coordinates, in m. Pure.
 
 #include <Eigen/Geometry>
 #include <array>
@@ -28,25 +28,25 @@ struct BallArray {
   double tip_radius_m = 1e-3;
 };
 
-/// Sizes and places are chosen: [Li OMM] prints a drawing without numbers.
+/// The dimensions are our choice: the drawing in [Li OMM] has no numbers.
 [[nodiscard]] BallArray reference_ball_array();
 /// T_machine_array of positions 1 to 8.
 [[nodiscard]] std::vector<Eigen::Isometry3d> reference_positions();
 
-/// How the array is against what its file says: at 20 C and as stated, unless told otherwise.
+/// How the true array differs from its calibrator.toml. Default: 20 C and no difference.
 struct ArrayState {
   double temperature_C = 20.0;
-  double alpha_per_K = 0.0;  ///< 0: the file does not speak of it
+  double alpha_per_K = 0.0;  ///< thermal expansion; 0: calibrator.toml has no alpha keys
   double u_alpha_per_K = 0.0;
-  double u_ball_m = 0.0;     ///< of a centre, per coordinate
-  double u_block_rad = 0.0;  ///< of the direction of a face, about each axis across it
+  double u_ball_m = 0.0;     ///< standard uncertainty of a ball centre, per coordinate
+  double u_block_rad = 0.0;  ///< of the direction of a face, about each axis in its plane
   std::uint64_t seed = 1;
 };
-/// The array as it stands there: off what is stated by errors drawn with these uncertainties, and
-/// as long as its temperature makes it.
+/// The true array: `stated` plus errors drawn with the uncertainties in `state`, expanded to the
+/// temperature in `state`.
 [[nodiscard]] BallArray as_it_is(const BallArray& stated, const ArrayState& state);
 
-/// calibrator.toml of the array as stated.
+/// The text of calibrator.toml for the stated array.
 [[nodiscard]] std::string format_calibrator_toml(const BallArray& stated,
                                                  const ArrayState& state = {});
 

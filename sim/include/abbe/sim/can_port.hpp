@@ -1,6 +1,6 @@
 #pragma once
-/// Where simulated nodes meet the bus: CAN over UDP on 127.0.0.1 with the cannelloni framing, or a
-/// SocketCAN interface (vcan). Never blocks. Not thread-safe.
+/// The bus connection of the simulated nodes: CAN over UDP on 127.0.0.1 with the cannelloni
+/// framing, or a SocketCAN interface (vcan). Never blocks. Not thread-safe.
 
 #include <chrono>
 #include <cstdint>
@@ -18,16 +18,16 @@ namespace can = protocol::can;
 
 struct CanPortOptions {
   std::uint16_t port = 0;       ///< UDP on 127.0.0.1; 0: the kernel chooses
-  std::uint16_t peer_port = 0;  ///< UDP on 127.0.0.1; 0: whoever spoke last
+  std::uint16_t peer_port = 0;  ///< UDP on 127.0.0.1; 0: the sender of the latest datagram
   std::string interface {};     ///< SocketCAN instead of UDP: "vcan0"
-  /// Simulated seconds per wall second, to date a frame by its kernel stamp instead of by when this
-  /// process woke up; 0 with a stepped clock: frames have no age.
+  /// Simulated seconds per wall-clock second. A frame is dated by its kernel timestamp, not by the
+  /// time at which this process woke up. 0 for a stepped clock: the age of every frame is then 0.
   double speed = 0.0;
 };
 
 struct ArrivedFrame {
   can::CanFrame frame;
-  std::chrono::nanoseconds age{};  ///< since the kernel took it in, simulated time
+  std::chrono::nanoseconds age{};  ///< since the kernel received it, in simulated time
 };
 
 class CanPort {
@@ -40,13 +40,13 @@ class CanPort {
   CanPort& operator=(const CanPort&) = delete;
   virtual ~CanPort() = default;
 
-  /// What came since the last call, in a bounded number so that a flood cannot keep other devices
-  /// from their turn. Valid until the next call.
+  /// The frames received since the last call. Their number is bounded, so that a flood of frames
+  /// does not block the other devices. Valid until the next call.
   [[nodiscard]] virtual std::span<const ArrivedFrame> receive() = 0;
-  /// Without a listener the frames are gone, as on a real bus.
+  /// Frames sent without a listener are lost, as on a real bus.
   virtual void send(std::span<const can::CanFrame> frames) = 0;
-  /// What is no answer of any node: on UDP bytes that are no datagram, on CAN frames that fit no
-  /// protocol.
+  /// Sends malformed data: on UDP bytes that are not a cannelloni datagram, on CAN frames that no
+  /// encoder sends.
   virtual void send_garbage() = 0;
   [[nodiscard]] virtual bool has_listener() const = 0;
 

@@ -1,8 +1,8 @@
 #pragma once
-/// A tracker controller behind a TCP port: one client at a time, another one is told so and turned
-/// away. Steppable: poll(now) never blocks and reads no clock. Not thread-safe. Controllers:
-/// TrackerDevice (simulated), RecordedTracker and RecordedDialogue (replayed), IppDmeDevice (a
-/// measuring machine).
+/// A device controller behind a TCP port. It serves one client at a time; the connection of a
+/// second client is closed, a tracker sends it an error packet first. Steppable: poll(now) never
+/// blocks and reads no clock. Not thread-safe. Controllers: TrackerDevice (simulated),
+/// RecordedTracker and RecordedDialogue (replayed), IppDmeDevice (a measuring machine).
 
 #include <poll.h>
 
@@ -35,10 +35,11 @@ class ControllerServer {
   [[nodiscard]] int listener_fd() const { return listener_.get(); }
   [[nodiscard]] int client_fd() const { return client_.get(); }  ///< -1 without a client
   [[nodiscard]] bool wants_write() const { return !unsent_.empty(); }
-  /// From now on: as a wire carries one segment after the other. The rest leaves with the next
-  /// poll(), which the caller paces: with add_poll_fds() it follows at once.
+  /// From now on each poll() sends at most `bytes`, to simulate segments that arrive one by one.
+  /// The caller decides when the next poll() sends more; a loop that waits with add_poll_fds()
+  /// sends it at once.
   void send_per_poll(std::size_t bytes) { most_per_poll_ = bytes; }
-  /// What to wait for besides the time.
+  /// Adds the sockets to wait for, in addition to next_due().
   void add_poll_fds(std::vector<pollfd>& fds) const {
     add_server_fds(listener_, client_, wants_write(), fds);
   }

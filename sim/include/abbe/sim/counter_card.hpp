@@ -1,13 +1,15 @@
 #pragma once
 /// A USB-QUAD08 counter card: the registers behind endpoint 0 and the stream of scans behind
-/// endpoint 82h, its counters following scales, a clock and a probe. Sans-I/O and without a clock:
-/// requests and a time in, answers out. Scans are made when somebody asks, for the instants at
-/// which the pacer ticked. Not thread-safe.
+/// endpoint 82h, with counters for scales, a clock and a probe. Sans-I/O and without a clock:
+/// requests and a time in, answers out. Scans are computed when they are requested, for the
+/// instants of the pacer's ticks. Not thread-safe.
 ///
-/// Takes for granted what nobody has seen on hardware yet: a counter with latch-on-index gives, in
-/// a scan, its count at the latest index edge since it was set up, and 0 before; the FIFO's depth
-/// (`fifo_bytes`); that a FIFO that is full ends the scan with status bit 4; that a counter stands
-/// at 0 until it is set up, and goes on whatever happens on the bus as long as the card has power.
+/// Assumptions not yet verified on hardware:
+///   - A counter with latch-on-index reports in each scan its count at the latest index edge since
+///     it was set up, and 0 before the first edge.
+///   - The FIFO has the depth `fifo_bytes`. A full FIFO ends the scan with status bit 4.
+///   - A counter reads 0 until it is set up. It keeps counting through every event on the bus as
+///     long as the card has power.
 
 #include <array>
 #include <cstddef>
@@ -31,7 +33,7 @@ namespace abbe::sim {
 namespace quad08 = protocol::quad08;
 namespace usb = protocol::usb;
 
-/// What hangs on phases A and B of a counter.
+/// The signal on phases A and B of a counter.
 struct ScaleSignal {
   std::function<double(HostTime)> reading;  ///< m or rad
   double step = 10e-9;        ///< m or rad per count, four counts a signal period; may be negative
@@ -42,7 +44,7 @@ struct ClockSignal {
   double hz = 10e6;
   double deviation_ppm = 0.0;  ///< against the host's clock
 };
-/// The card's own timer output 0: runs when the card was told to.
+/// The card's own timer output 0: runs after the command to start it.
 struct TimerSignal {};
 /// Each trigger of the probe is one edge.
 struct ProbeSignal {};
@@ -69,35 +71,35 @@ class CounterCard final : public ExportedCard {
  public:
   explicit CounterCard(const CounterCardOptions& options);
 
-  /// A control transfer; nothing: the card stalls it.
+  /// Answers a control transfer; nullopt: the card stalls it.
   [[nodiscard]] std::optional<std::vector<std::byte>> control(const usb::Setup& setup,
                                                               HostTime now);
   [[nodiscard]] ControlAnswer answer(const usb::Setup& setup, HostTime now) override;
   [[nodiscard]] UsbIds ids() const override { return {options_.vendor, options_.product}; }
-  /// Makes the scans due until `now`. More than the FIFO and `wanted` bytes on their way to the
-  /// host hold: overrun.
+  /// Makes the scans due until `now`. Overrun if they exceed the FIFO plus the `wanted` bytes that
+  /// the host has requested.
   void advance(HostTime now, std::size_t wanted) override;
   [[nodiscard]] std::vector<std::byte> take(std::size_t most) override;
   [[nodiscard]] std::size_t available() const override { return fifo_.size(); }
   [[nodiscard]] HostTime available_at(std::size_t bytes) const override;
   [[nodiscard]] bool scanning() const override { return pacing_ && !overrun_; }
 
-  /// The probe touched at `at`, not before any that came earlier nor before the scans already made.
+  /// Adds an edge of the probe at `at`: not earlier than the previous edges nor than the scans
+  /// already made.
   void add_probe_edge(HostTime at);
   /// Power off and on: registers, counters and FIFO as new.
   void restart();
 
-  // Misbehaviour.
+  // Fault injection.
   void overrun() { overrun_ = true; }
-  /// The next scan lacks its first bytes: those that follow stand elsewhere until the scan starts
-  /// anew.
+  /// The next scan lacks its first `bytes` bytes: all later scans are shifted in the stream until
+  /// the scan is restarted.
   void tear(std::size_t bytes) { torn_ = bytes; }
-  void lose_scans(std::size_t count);          ///< the next ones are never seen
-  void jump_clock(std::int64_t counts);        ///< all clock counters, at once
-  void corrupt_register(std::uint16_t value);  ///< the self-test register reads this from now on
-  void fail_controls(std::size_t count) {
-    failing_controls_ = count;
-  }  ///< the next ones are stalled
+  void lose_scans(std::size_t count);          ///< the next `count` scans are not made
+  void jump_clock(std::int64_t counts);        ///< adds `counts` to every clock counter
+  void corrupt_register(std::uint16_t value);  ///< the self-test register reads `value` from now on
+  /// The next `count` control transfers are stalled.
+  void fail_controls(std::size_t count) { failing_controls_ = count; }
 
   [[nodiscard]] const CounterCardOptions& options() const { return options_; }
   [[nodiscard]] std::uint64_t scans_made() const { return scans_made_; }
@@ -105,8 +107,8 @@ class CounterCard final : public ExportedCard {
  private:
   struct Counter {
     quad08::CounterSetup setup{.register_reading = true};
-    bool set_up = false;    ///< since the power came: else it stands at 0
-    std::int64_t zero = 0;  ///< count of the signal when it was set up
+    bool set_up = false;    ///< since power-on; until then the counter reads 0
+    std::int64_t zero = 0;  ///< count of the signal when the counter was set up
     HostTime set_up_at{};
     std::optional<double> last_reading;  ///< of a scale, at the previous scan
     std::uint64_t latched = 0;

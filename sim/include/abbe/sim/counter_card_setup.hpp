@@ -1,5 +1,5 @@
 #pragma once
-/// A counter card wired to a virtual machine: which channel sees which axis, clock and probe.
+/// A counter card wired to a virtual machine: the channels of the axes, the clock and the probe.
 
 #include <cstdint>
 #include <optional>
@@ -12,11 +12,12 @@
 namespace abbe::sim {
 
 struct CardAxis {
-  std::string name = "X";  ///< X, Y, Z follow the path; any other is a rotary axis that swings
+  /// X, Y, Z follow the path; any other: a rotary axis with sinusoidal motion
+  std::string name = "X";
   std::uint8_t channel = 0;
   double step = 10e-9;  ///< m or rad per count; negative: counts fall as the reading rises
   double noise = 0.0;   ///< standard deviation of one reading, m or rad
-  /// rotary: amplitude of its sinusoidal motion from the machine's start on
+  /// rotary axis: amplitude of its motion, which begins when the machine starts
   double swing_rad = 0.1;
   double swing_period_s = 10.0;
   double signal_period = 0.0;    ///< of the distance-coded marks, m or rad; 0: no marks
@@ -42,8 +43,9 @@ struct CounterCardSetup {
 /// `machine` must outlive the card.
 [[nodiscard]] CounterCardOptions wire(const CounterCardSetup& setup, const VirtualMachine& machine);
 
-/// Scale readings of distance-coded marks: fixed ones every `nominal_increment` signal periods, and
-/// half-way to the next a coded one that stands one signal period further away each time.
+/// Scale readings of distance-coded reference marks, ascending, k = 0 .. pairs - 1: fixed mark k is
+/// k `nominal_increment` signal periods after `zero`; its coded mark follows it after
+/// `nominal_increment` / 2 + k + 1 signal periods.
 [[nodiscard]] std::vector<double> distance_coded_marks(double zero, double signal_period,
                                                        int nominal_increment, int pairs);
 

@@ -25,12 +25,12 @@ class EncoderBus {
                                                std::span<const EncoderNodeOptions> nodes,
                                                const VirtualMachine& machine, HostTime now);
 
-  /// A SYNC every `period` from `first` on, as the machine's own control sends it.
+  /// Sends a SYNC every `period` from `first` on, as a machine's control does.
   void produce_sync(std::chrono::nanoseconds period, HostTime first);
 
   void poll(HostTime now);
   [[nodiscard]] HostTime next_due() const;
-  /// Frames that came from the other side, whatever they were.
+  /// Number of frames received from the client, of every kind.
   [[nodiscard]] std::uint64_t frames_received() const { return frames_received_; }
   [[nodiscard]] int fd() const { return port_->fd(); }
   [[nodiscard]] std::uint16_t port() const { return port_->port(); }
@@ -49,7 +49,7 @@ class EncoderBus {
   void end_bus_off(HostTime now);
 
   std::unique_ptr<CanPort> port_;
-  std::deque<EncoderNode> nodes_;    ///< a deque: the nodes stay where they were made
+  std::deque<EncoderNode> nodes_;    ///< a deque keeps the addresses of the nodes stable
   std::vector<TimedFrame> waiting_;  ///< by due time
   std::optional<HostTime> bus_off_until_;
   std::chrono::nanoseconds sync_period_{};

@@ -1,8 +1,8 @@
 #pragma once
 /// One CANopen encoder: the server side of CiA 301 and CiA 406 around an object dictionary,
 /// measuring one axis of the virtual machine. Sans-I/O: frames and a time in, frames with their
-/// departure time out. Its position is the *scale reading* at the instant a SYNC arrives. Can be
-/// told to misbehave. Not thread-safe.
+/// send time out. Its position is the *scale reading* at the instant a SYNC arrives. Faults can
+/// be injected. Not thread-safe.
 
 #include <cstdint>
 #include <optional>
@@ -25,10 +25,10 @@ struct EncoderNodeOptions {
   bool invert = false;    ///< counts fall as the reading rises
   double noise_m = 5e-9;  ///< standard deviation of one reading before it is rounded to counts
   std::uint64_t seed = 1;
-  std::chrono::nanoseconds boot_time =
-      std::chrono::milliseconds{200};  ///< from reset to boot-up message
-  /// The machine's control has configured it: after its boot-up message it beats, and answers every
-  /// SYNC.
+  /// from reset to boot-up message
+  std::chrono::nanoseconds boot_time = std::chrono::milliseconds{200};
+  /// The machine's control has configured the node: after its boot-up message it sends heartbeats
+  /// and answers every SYNC.
   bool configured = false;
 };
 
@@ -41,32 +41,32 @@ class EncoderNode {
  public:
   /// Powers on at `now`: the boot-up message is due at once. `machine` must outlive the node.
   EncoderNode(const EncoderNodeOptions& options, const VirtualMachine& machine, HostTime now);
-  EncoderNode(const EncoderNode&) = delete;  // its SDO server holds on to its dictionary
+  EncoderNode(const EncoderNode&) = delete;  // its SDO server refers to its dictionary
   EncoderNode& operator=(const EncoderNode&) = delete;
 
   void on_frame(const can::CanFrame& frame, HostTime at);
-  /// Heartbeats, event timers, the end of a restart.
+  /// Does what is due until `now`: heartbeats, event timers, the end of a restart.
   void advance(HostTime now);
   [[nodiscard]] HostTime next_due() const;
   /// Frames made since the last call.
   [[nodiscard]] std::vector<TimedFrame> take_frames();
 
-  // Misbehaviour.
+  // Fault injection.
   void mute_until(HostTime until) { mute_until_ = until; }
-  void delay_until(HostTime until,
-                   std::chrono::nanoseconds delay);  ///< every frame leaves `delay` late
-  void restart(HostTime now);                        ///< as after a power cut
+  /// Every frame is sent `delay` late.
+  void delay_until(HostTime until, std::chrono::nanoseconds delay);
+  void restart(HostTime now);  ///< as after a power cut
   void emergency(std::uint16_t code, std::uint8_t error_register, HostTime now);
 
   [[nodiscard]] can::NodeId node() const { return options_.node; }
-  /// BootUp: silent until its boot time is over.
+  /// BootUp: the node sends and answers nothing until its boot time is over.
   [[nodiscard]] can::NodeState state() const { return state_; }
   [[nodiscard]] const can::ObjectDictionary& objects() const { return objects_; }
 
  private:
   void on_nmt(const can::NmtMessage& message, HostTime at);
   void on_sync(HostTime at);
-  void boot(HostTime at, bool forget_objects);
+  void boot(HostTime at, bool reset_objects);
   void configure();
   void sample(HostTime at);
   void send(const can::CanFrame& frame, HostTime at);

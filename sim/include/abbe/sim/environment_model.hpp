@@ -1,6 +1,7 @@
 #pragma once
-/// How warm, heavy and damp a shop floor is, and how warm its scales and parts are: each quantity a
-/// mean, a drift and a swing. Pure; values are looked up by time, nothing is stepped.
+/// Temperature, pressure and humidity of the air on a shop floor, and the temperatures of scales
+/// and parts. Each quantity is a mean plus a drift and a sinusoidal swing. Pure functions of the
+/// time.
 
 #include <array>
 #include <cstddef>

@@ -1,5 +1,5 @@
 #pragma once
-/// What can go wrong in the simulator, as a value. The text says what was tried and what was seen.
+/// Errors of the simulator as values. The text states what was tried and what was observed.
 
 #include <string>
 #include <tl/expected.hpp>
@@ -7,9 +7,9 @@
 namespace abbe::sim {
 
 enum class ErrorCode {
-  BadInput,  ///< a file or a value that makes no machine, path or configuration
-  Io,        ///< a file or a socket that the system refuses
-  Usage,     ///< a command line that leaves out what cannot be guessed
+  BadInput,  ///< a file or a value is no valid machine, path or configuration
+  Io,        ///< the operating system refused an operation on a file or a socket
+  Usage,     ///< a required command-line option is missing or malformed
 };
 
 struct Error {

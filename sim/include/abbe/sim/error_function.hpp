@@ -1,7 +1,8 @@
 #pragma once
-/// One true error motion as a function of the position of its axis: values on nodes, joined by
-/// straight lines or by a natural cubic spline; or a polynomial; and a wave on top of either.
-/// Outside the nodes the formula of the last cell goes on. Pure; safe to share between threads.
+/// One true error motion as a function of the position of its axis: values on nodes, interpolated
+/// linearly or by a natural cubic spline, or a polynomial; a sine wave can be added to both.
+/// Outside the nodes the formula of the outermost cell is extrapolated. Pure; safe to share between
+/// threads.
 
 #include <span>
 #include <vector>
@@ -21,7 +22,7 @@ class ErrorFunction {
 
   /// sum of coefficient[k] position^k, SI. Has no nodes.
   [[nodiscard]] static ErrorFunction polynomial(std::vector<double> coefficients);
-  /// The same and amplitude sin(2 pi position / period).
+  /// This function plus amplitude sin(2 pi position / period).
   [[nodiscard]] ErrorFunction with_wave(double amplitude, double period_m) const;
 
   [[nodiscard]] double at(double position_m) const;

@@ -1,6 +1,6 @@
 #pragma once
-/// What a USB/IP server needs of the counter card that it exports: the simulated one or the one of
-/// a recording.
+/// The interface between a USB/IP server and the counter card that it exports: the simulated card
+/// or the replay of a recorded one.
 
 #include <cstddef>
 #include <cstdint>
@@ -30,18 +30,18 @@ class ExportedCard {
 
   [[nodiscard]] virtual UsbIds ids() const = 0;
   [[nodiscard]] virtual ControlAnswer answer(const protocol::usb::Setup& setup, HostTime now) = 0;
-  /// Makes the scans due until `now`; `wanted` bytes of them are asked for.
+  /// Makes the scans due until `now`; the host has requested `wanted` bytes.
   virtual void advance(HostTime now, std::size_t wanted) = 0;
   /// Bytes for the host, oldest first; at most `most`.
   [[nodiscard]] virtual std::vector<std::byte> take(std::size_t most) = 0;
   [[nodiscard]] virtual std::size_t available() const = 0;
-  /// When there will be so many bytes; never if the scan does not run.
+  /// When `bytes` bytes will be available; HostTime::max() if no scan runs.
   [[nodiscard]] virtual HostTime available_at(std::size_t bytes) const = 0;
-  /// More bytes will come: a request waits until it can be filled.
+  /// True while more bytes will follow: a request then waits until it can be filled.
   [[nodiscard]] virtual bool scanning() const = 0;
   /// The host's connection has ended.
-  virtual void host_gone() {}
-  /// When the connection breaks by itself.
+  virtual void host_disconnected() {}
+  /// When the connection breaks without a request of the host; HostTime::max(): never.
   [[nodiscard]] virtual HostTime breaks_at() const { return HostTime::max(); }
 };
 

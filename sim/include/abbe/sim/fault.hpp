@@ -1,6 +1,6 @@
 #pragma once
-/// Misbehaviour on a timetable: what goes wrong, when (simulated seconds after the machine begins
-/// to move), how long.
+/// Faults to inject: the kind, the time (simulated seconds after the machine begins to move) and
+/// the duration.
 
 #include <cstdint>
 #include <optional>
@@ -11,45 +11,45 @@ namespace abbe::sim {
 enum class FaultKind {
   // tracker
   BeamBreak,       ///< error packet and event NotReady, no points; after `duration_s` event Ready
-  SpeedExceeded,   ///< points say so, whatever the speed
-  PrismError,      ///< points say so
-  Stall,           ///< the socket is silent, then everything comes at once
-  Mute,            ///< tracker: commands and points are swallowed; encoder: the node says nothing
-  Reboot,          ///< server closing, connection lost, warm again after `duration_s`
-  Disconnect,      ///< the connection breaks and can be made again at once
+  SpeedExceeded,   ///< points have this status at any speed
+  PrismError,      ///< points have this status
+  Stall,           ///< nothing is sent; afterwards everything is sent at once
+  Mute,            ///< tracker: commands and points are discarded; encoder: the node sends nothing
+  Reboot,          ///< event ServerClosing, connection lost; restarted after `duration_s`
+  Disconnect,      ///< the connection breaks; a new one is accepted at once
   Busy,            ///< commands are answered with ServerBusy
-  Weather,         ///< the air becomes `value` K warmer at once, with its events
-  TrackerGarbage,  ///< bytes that are no packet
-  ReflectorAway,   ///< bird bath and search find none
+  Weather,         ///< the air temperature rises by `value` K at once, with its events
+  TrackerGarbage,  ///< bytes that are not a packet
+  ReflectorAway,   ///< GoBirdBath and FindReflector find no reflector
   // encoder
-  Late,        ///< frames leave `value` s late
-  Restart,     ///< the node boots anew
-  Emergency,   ///< EMCY with code `value`; after `duration_s` the all-clear
-  BusGarbage,  ///< datagrams that are no CAN frames
-  Bundled,     ///< frames are held back and leave together every `value` s, as a tunnel does
-  Overflow,    ///< error frame: the controller had no room for what it received
+  Late,        ///< frames are sent `value` s late
+  Restart,     ///< the node boots again
+  Emergency,   ///< EMCY with code `value`; after `duration_s` EMCY "no error"
+  BusGarbage,  ///< datagrams that are not CAN frames
+  Bundled,     ///< frames are held back and sent together every `value` s, as by a tunnel
+  Overflow,    ///< error frame: receive overflow of the CAN controller
   BusOff,      ///< error frame bus-off, silence, then the error frame restarted
-  // environment (and Mute, Late, Disconnect: port or terminal gone for `duration_s`)
+  // environment; also Mute, Late and Disconnect (port or terminal closed for `duration_s`)
   ModbusException,  ///< every request is answered with exception `value` (0: 6, busy)
   ModbusGarbage,    ///< bytes instead of answers
-  WrongMap,         ///< every register lies one address higher
-  SensorsGone,      ///< the probe is unplugged, the wires are broken
-  // counter card; it also stalls and is mute
-  Unplug,       ///< gone from the bus, there again after `duration_s` with all counters at zero
+  WrongMap,         ///< every register is one address higher
+  SensorsGone,      ///< the probe is unplugged, the sensor wires are broken
+  // counter card; also Mute, Stall and Disconnect
+  Unplug,       ///< removed from the bus; back after `duration_s` with all counters at zero
   CardRestart,  ///< power off and on
-  Overrun,      ///< the FIFO was full: no more scans until it is reset
-  LostScans,    ///< the next `value` scans are never seen
+  Overrun,      ///< the FIFO is full: no more scans until it is reset
+  LostScans,    ///< the next `value` scans are not made
   ClockJump,    ///< the counted clock jumps by `value` counts
-  UsbGarbage,   ///< bytes that are no USB/IP
+  UsbGarbage,   ///< bytes that are not USB/IP
   FailRequest,  ///< the next `value` control transfers fail (0: one)
-  // measuring machine; it also is mute and disconnects
-  EmergencyStop,  ///< somebody pressed it; pulled out again after `duration_s`
-  ErrorReport,    ///< an error of severity `value` that is of no command
-  OddTag,         ///< an answer to a command that was not sent
-  NotAscii,       ///< a warning with letters that are not ASCII
+  // measuring machine; also Mute and Disconnect
+  EmergencyStop,  ///< the button is pressed; it is released after `duration_s`
+  ErrorReport,    ///< an error of severity `value` that belongs to no command
+  OddTag,         ///< an answer with the tag of a command that was not sent
+  NotAscii,       ///< a warning with characters that are not ASCII
   RefuseTouch,    ///< the next touch ends with error `value` (0: 1006, surface not found)
-  RefuseWay,      ///< the next GoTo does (0: 2500, out of limits)
-  LineGarbage,    ///< bytes that are no lines
+  RefuseWay,      ///< the next GoTo ends with error `value` (0: 2500, out of limits)
+  LineGarbage,    ///< bytes that are not a line of the protocol
 };
 
 struct Fault {

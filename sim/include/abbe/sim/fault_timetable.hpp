@@ -1,5 +1,6 @@
 #pragma once
-/// Faults at their times after the start of the machine's motion. Not thread-safe.
+/// Scheduled faults, in order of their time after the start of the machine's motion. Not
+/// thread-safe.
 
 #include <vector>
 
@@ -10,11 +11,11 @@ namespace abbe::sim {
 
 class FaultTimetable {
  public:
-  void add(const ScheduledFault& fault);  ///< in any order, before the first is taken
+  void add(const ScheduledFault& fault);  ///< in any order; only before the first take_due()
 
-  /// max(): none is left, or the machine has not begun.
+  /// HostTime::max(): no fault is left, or the machine has not started to move.
   [[nodiscard]] HostTime next_due(const VirtualMachine& machine) const;
-  /// The next one whose time has come; nullptr: none. Valid until add().
+  /// The next fault if it is due, else nullptr. Valid until add().
   [[nodiscard]] const ScheduledFault* take_due(const VirtualMachine& machine, HostTime now);
 
  private:

@@ -1,13 +1,14 @@
 #pragma once
 /// An I++ DME server in front of a simulated measuring machine, without its socket: bytes and a
-/// time in, bytes out. It wants what a real one wants (a session, a homed machine, a tool that
-/// exists) and answers with the error numbers of the specification. Commands are carried out one
-/// after the other, events at once. Not thread-safe. [I++ DME 1.4.3]
+/// time in, bytes out. It has the preconditions of a real server (a session, a homed machine, an
+/// existing tool) and reports errors with the numbers of the specification. Commands are executed
+/// one after the other, events at once. Not thread-safe. [I++ DME 1.4.3]
 ///
-/// Chosen here, because the specification leaves it open: a touch reports the centre of the tip,
-/// and its data line comes when the machine has retracted; a machine that moves when its connection
-/// closes goes on to where it was sent (`keeps_moving`), and commands of the next connection,
-/// StartSession too, wait until it stands: what a client must reckon with.
+/// Our choices where the specification leaves the behaviour open: A touch reports the centre of the
+/// tip, and its data line is sent after the machine has retracted. If the connection closes during
+/// a motion, the machine completes the motion (`keeps_moving`); the commands of the next
+/// connection, including StartSession, wait until the machine has stopped. A client must handle
+/// this.
 
 #include <array>
 #include <cstddef>
@@ -39,8 +40,8 @@ struct IppDmeOptions {
   bool speaks_move_reports = true;
   bool keeps_moving = true;  ///< when the connection closes
   bool answers_aborts = true;
-  bool aborts_outside_session = true;  ///< else AbortE is an error there
-  bool refuses_aborts = false;         ///< with error 0500, and moves on
+  bool aborts_outside_session = true;  ///< false: AbortE outside a session is an error
+  bool refuses_aborts = false;         ///< answers AbortE with error 0500 and continues the motion
 };
 
 class IppDmeDevice {
@@ -51,7 +52,7 @@ class IppDmeDevice {
   void connected(HostTime now);
   void disconnected();
   void receive(std::span<const std::byte> bytes, HostTime now);
-  /// Does what is due until `now`, in the order it is due.
+  /// Executes everything that is due until `now`, in order of time.
   void advance(HostTime now);
   [[nodiscard]] HostTime next_due() const;
 
@@ -62,15 +63,16 @@ class IppDmeDevice {
 
   void inject(const Fault& fault, HostTime now);
 
-  /// The emergency stop is pressed: an unsolicited error, motion ends. Errors cannot be cleared
-  /// before it is pulled out again.
+  /// Presses the emergency stop: the motion ends and an unsolicited error is sent. Errors cannot be
+  /// cleared before the button is released at `pulled_out_at`.
   void press_emergency_stop(HostTime now, HostTime pulled_out_at);
-  /// Somebody touches by hand.
+  /// The operator touches by hand: reports an unsolicited touch at this scale reading.
   void touch_by_hand(const Eigen::Vector3d& reading_m);
 
   [[nodiscard]] bool in_session() const { return session_; }
   [[nodiscard]] bool moving() const { return motion_.has_value(); }
-  /// What came in, without tags: "PtMeas(X(1),Y(2),Z(3))"; the last kMostHeard, of all connections.
+  /// The received commands without tags, e.g. "PtMeas(X(1),Y(2),Z(3))": the latest kMostHeard of
+  /// all connections.
   static constexpr std::size_t kMostHeard = 4096;
   [[nodiscard]] const std::deque<std::string>& heard() const { return heard_; }
   [[nodiscard]] std::uint64_t touches() const { return touches_; }
@@ -83,7 +85,7 @@ class IppDmeDevice {
     std::string method;
     std::string arguments;
   };
-  /// From one place to another; what is said at its end.
+  /// A motion from one position to another, and what to report at its end.
   struct Motion {
     Command command;
     Eigen::Vector3d from_m;
@@ -92,7 +94,7 @@ class IppDmeDevice {
     HostTime end;
     std::optional<Probing> probing;
     bool homing = false;
-    bool unheard = false;  ///< whoever asked is gone
+    bool client_gone = false;  ///< the connection that sent the command is closed
   };
   struct MoveReport {
     ippdme::Tag tag;
@@ -116,11 +118,11 @@ class IppDmeDevice {
   void abort(HostTime now);
   void report_error(int severity);
 
-  void say(std::string_view line);
-  void acknowledge(ippdme::Tag tag) { say(ippdme::to_string(tag) + " &"); }
-  void complete(ippdme::Tag tag) { say(ippdme::to_string(tag) + " %"); }
+  void send_line(std::string_view line);
+  void acknowledge(ippdme::Tag tag) { send_line(ippdme::to_string(tag) + " &"); }
+  void complete(ippdme::Tag tag) { send_line(ippdme::to_string(tag) + " %"); }
   void data(ippdme::Tag tag, std::string_view text) {
-    say(ippdme::to_string(tag) + " # " + std::string(text));
+    send_line(ippdme::to_string(tag) + " # " + std::string(text));
   }
   void fault(const Command& command, int severity, int code, std::string_view text);
   [[nodiscard]] std::string place(const std::vector<std::string>& names,
@@ -142,8 +144,8 @@ class IppDmeDevice {
   HostTime mute_until_ = HostTime::min();
   HostTime emergency_until_ = HostTime::min();
   std::deque<std::string> heard_;
-  int refuse_touch_ = 0;  ///< the next one, with this error; 0: not
-  int refuse_way_ = 0;    ///< likewise
+  int refuse_touch_ = 0;  ///< error of the next touch; 0: none
+  int refuse_way_ = 0;    ///< error of the next GoTo; 0: none
   bool wants_close_ = false;
 };
 

@@ -1,7 +1,8 @@
 #pragma once
-/// A measuring machine with known geometric errors, spheres and faces of blocks on its table: what
-/// it reads when it probes. The tip meets the true surface; the machine reports what its scales say
-/// there. SI, machine coordinates. Pure functions over plain options; safe to call from any thread.
+/// A measuring machine with known geometric errors, and the spheres and block faces on its table:
+/// computes the scale reading of a touch. The tip contacts the true surface; the machine reports
+/// its scale readings at contact. SI, machine coordinates. Pure functions over plain options; safe
+/// to call from any thread.
 
 #include <Eigen/Core>
 #include <cstdint>
@@ -17,7 +18,7 @@ struct Sphere {
   double radius_m = 12.5e-3;
 };
 
-/// A square, seen from both sides.
+/// A square that can be touched from both sides.
 struct Face {
   Eigen::Vector3d centre_m = Eigen::Vector3d::Zero();
   Eigen::Vector3d normal = Eigen::Vector3d::UnitZ();
@@ -29,20 +30,21 @@ struct MeasuringMachine {
   std::vector<Sphere> spheres;
   std::vector<Face> faces;
   double tip_radius_m = 2e-3;
-  double approach_m = 2e-3;  ///< probing begins this far before the nominal place ...
+  double approach_m = 2e-3;  ///< probing begins this far before the nominal point ...
   double search_m = 5e-3;    ///< ... and ends this far behind it
-  double noise_m = 0.0;      ///< of a reading along the approach
+  double noise_m = 0.0;      ///< standard deviation of a reading along the approach
   std::uint64_t seed = 1;
 };
 
 enum class ProbingFault { AlreadyTouching, NothingThere };
 struct Probing {
   std::optional<ProbingFault> fault;
-  /// scales at contact: the centre of the tip, not of the surface
+  /// scale readings at contact: the centre of the tip, not the contact point
   Eigen::Vector3d reading_m = Eigen::Vector3d::Zero();
 };
 
-/// Moves from place + approach x normal against the (unit) normal. `number` draws the noise.
+/// Moves from place_m + approach_m x normal in the direction -normal (`normal` is a unit vector).
+/// `number` is the index of the noise.
 [[nodiscard]] Probing probe(const MeasuringMachine& machine, const Eigen::Vector3d& place_m,
                             const Eigen::Vector3d& normal, std::uint64_t number);
 

@@ -1,6 +1,7 @@
 #pragma once
-/// What the registers of the simulated Modbus devices hold. Written from the manufacturers'
-/// descriptions and not from the driver's maps, so that a wrong map is found. Pure.
+/// The register contents of the simulated Modbus devices. Written from the manufacturers'
+/// documentation, independently of the driver's register maps, so that tests detect an error in
+/// those maps. Pure.
 
 #include <cstdint>
 #include <optional>
@@ -34,7 +35,7 @@ struct ModbusIdentity {
   std::uint8_t unit = 1;  ///< of CometT7510 and Zt2005C8 on a serial line
 };
 
-/// `sensors_gone`: the probe is unplugged, the wires are broken.
+/// `sensors_gone`: simulates an unplugged probe and broken sensor wires.
 [[nodiscard]] std::vector<SimulatedRegister> registers_of(const ModbusIdentity& identity,
                                                           const EnvironmentModel& environment,
                                                           std::chrono::nanoseconds since_start,

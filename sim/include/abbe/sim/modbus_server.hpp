@@ -1,7 +1,7 @@
 #pragma once
 /// A simulated Modbus device behind a TCP port or a pseudo terminal, on libmodbus' server
-/// functions; up to two TCP clients, as the Comet has it. Steppable: poll(now) does what is due and
-/// blocks for a torn request only (20 ms at most). Not thread-safe.
+/// functions. It accepts up to two TCP clients, as the Comet transmitter does. Steppable: poll(now)
+/// does what is due and blocks only on an incomplete request (at most 20 ms). Not thread-safe.
 
 #include <poll.h>
 
@@ -20,8 +20,8 @@ namespace abbe::sim {
 struct ModbusTcpEndpoint {
   std::uint16_t port = 0;  ///< on 127.0.0.1; 0: the kernel chooses
 };
-/// The client's end of a pseudo terminal appears under this path, a symbolic link that is replaced
-/// if it is there already.
+/// `link`: the path of a symbolic link to the client's end of the pseudo terminal. An existing link
+/// is replaced.
 struct ModbusPtyEndpoint {
   std::string link;
 };
@@ -35,7 +35,7 @@ struct ModbusServerOptions {
 
 class ModbusServer {
  public:
-  /// Io: port taken, no pseudo terminal, link not to be made.
+  /// Io: the port is in use, there is no pseudo terminal or the link cannot be created.
   [[nodiscard]] static Result<ModbusServer> open(const ModbusServerOptions& options, HostTime now);
   ModbusServer(ModbusServer&&) noexcept;
   ModbusServer& operator=(ModbusServer&&) noexcept;

@@ -1,13 +1,13 @@
 #pragma once
-/// Random numbers by index, not by turn: the same (seed, stream, index) gives the same number
-/// whoever asks first, so that the wall clock, thread order or a lost connection never change what
+/// Random numbers by index: a number depends only on (seed, stream, index), not on the order of the
+/// calls. The wall clock, the order of threads and a lost connection therefore never change what
 /// the simulated instruments measure. Pure.
 
 #include <cstdint>
 
 namespace abbe::sim {
 
-/// What a number is drawn for; each its own sequence.
+/// The purpose of a random number; each purpose has its own sequence.
 enum class NoiseStream : std::uint64_t {
   Range = 1,
   Azimuth,

@@ -1,5 +1,5 @@
 #pragma once
-/// What the control does with the axes: a polyline of axis positions, trapezoidal speed along each
+/// The motion that the control commands: a polyline of axis positions, trapezoidal speed along each
 /// leg, an exact stop at every vertex and a dwell before every leg. Position at any time is a pure
 /// function; before the start the machine stands at the first vertex, after the end at the last.
 /// Times in s from the start of the motion, lengths in m.
@@ -33,13 +33,14 @@ struct AxisMotion {
 
 class PathMotion {
  public:
-  /// Needs a vertex, and positive feed and acceleration; legs without length are left out.
+  /// BadInput unless there is a vertex and feed and acceleration are positive. Legs of length zero
+  /// are skipped.
   [[nodiscard]] static Result<PathMotion> plan(const PathPlan& plan);
 
   [[nodiscard]] AxisMotion at(double time_s) const;
   [[nodiscard]] double duration_s() const { return end_s_; }
   [[nodiscard]] std::size_t legs() const { return legs_.size(); }
-  /// When leg i leaves its first vertex and when it stands at its last.
+  /// When the machine leaves the first vertex of leg i, and when it stops at the last.
   [[nodiscard]] double leg_begin_s(std::size_t i) const { return legs_[i].begin_s; }
   [[nodiscard]] double leg_end_s(std::size_t i) const;
 
@@ -58,8 +59,9 @@ class PathMotion {
   std::vector<Leg> legs_;
 };
 
-/// The text of path.csv: header `x_mm,y_mm,z_mm[,feed_mm_per_min]`, `#` comments. `name` stands in
-/// the error, which lists every bad line (at most 20). Blank feed cells mean the plan's feed.
+/// The text of path.csv: header `x_mm,y_mm,z_mm[,feed_mm_per_min]`, `#` comments. `name` is the
+/// file name in the error text, which lists every bad line (at most 20). An empty feed cell means
+/// the plan's feed.
 [[nodiscard]] Result<std::vector<PathVertex>> parse_path_csv(std::string_view text,
                                                              std::string_view name);
 

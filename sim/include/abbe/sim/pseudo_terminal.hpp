@@ -1,6 +1,6 @@
 #pragma once
-/// A serial line without wires: a client opens the link as it would open /dev/ttyUSB0. Both ends
-/// are held open, so that the line stays usable while no client is there. Non-blocking. Not
+/// A simulated serial line: a client opens the link as it would open /dev/ttyUSB0. Both ends
+/// are held open, so that the line stays usable while no client has it open. Non-blocking. Not
 /// thread-safe.
 
 #include <string>
@@ -13,14 +13,14 @@ namespace abbe::sim {
 class PseudoTerminal {
  public:
   PseudoTerminal() = default;  ///< closed
-  /// The client's end appears as the symbolic link `link`, which is replaced if it is there
-  /// already. Io: no pseudo terminal, link not to be made.
+  /// Creates the symbolic link `link` to the client's end; an existing link is replaced. Io: there
+  /// is no pseudo terminal or the link cannot be created.
   [[nodiscard]] static Result<PseudoTerminal> open(const std::string& link);
   PseudoTerminal(PseudoTerminal&& other) noexcept = default;
   PseudoTerminal& operator=(PseudoTerminal&& other) noexcept = default;
   ~PseudoTerminal() { close(); }
 
-  /// Unplugged: a client that has it open reads an error; the link is gone.
+  /// Simulates unplugging: a client that has the line open gets a read error; the link is removed.
   void close();
   /// The device's end; -1 when closed.
   [[nodiscard]] int fd() const { return device_.get(); }

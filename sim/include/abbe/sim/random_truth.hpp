@@ -1,9 +1,9 @@
 #pragma once
-/// A machine nobody has seen before: smooth random errors from a seed, scaled so that the mean |V|
-/// over the working volume is what was asked. The errors carry no rigid motion for the machine's
-/// target offset (positioning and rotations are 0 at the reference position, straightness as the
-/// target feels it is 0 at both ends of the axis), so that V is what a calibration with the usual
-/// conventions reports, up to the second order of the transforms (0.05 um at 100 um).
+/// A machine with smooth random errors, drawn from a seed and scaled to the requested mean |V| over
+/// the working volume. The errors contain no rigid-body motion of the target: positioning and
+/// rotations are 0 at the reference position, and the straightness at the target is 0 at both ends
+/// of the axis. V is therefore what a calibration with the usual conventions reports, except for
+/// the second order of the transforms (0.05 um at 100 um).
 
 #include <cstdint>
 
@@ -16,10 +16,8 @@ struct RandomTruthOptions {
   double mean_error_m = 100e-6;
   double node_spacing_m = 0.05;  ///< rounded so that whole cells fill each axis
   Shape shape = Shape::Linear;
-  double backlash_m =
-      /// standard deviation of the translations' backlash; rotations: the same number per metre,
-      /// rad
-      0.0;
+  /// standard deviation of the backlash of translations, m; of rotations: the same number in rad
+  double backlash_m = 0.0;
 };
 
 /// Fills errors, squareness and backlash of `machine`, whose ranges (min < max), order and target

@@ -1,12 +1,14 @@
 #pragma once
-/// The encoders of a recording on their port again. The n-th SYNC from the start is answered with
-/// the frames that answered the n-th SYNC then, as late as then, SDO requests with the recorded
-/// responses to the same request or with silence where that was the answer, everything else
-/// (heartbeats, EMCY, error frames, the SYNC of another producer and the positions that answered
-/// it) comes with its original timing. Until the recording starts nodes are kept alive with
-/// heartbeats and the first positions. Without a tracker in the recording it starts with the first
-/// SYNC, or, where none was sent to the nodes, as soon as somebody listens. Steppable, not
-/// thread-safe.
+/// Replays the encoders of a recording on their CAN port.
+///   - The n-th SYNC is answered with the frames that answered the n-th recorded SYNC, with their
+///     recorded delay.
+///   - An SDO request gets the recorded response to the same request, or none if there was none.
+///   - All other frames (heartbeats, EMCY, error frames, the SYNC of another producer and the
+///     positions that answered it) are sent with their original timing.
+///
+/// Until the replay starts, heartbeats and the first positions keep the nodes alive. If the
+/// recording has no tracker, the replay starts with the first SYNC; if it has no SYNC to the nodes
+/// either, it starts as soon as there is a listener. Steppable, not thread-safe.
 
 #include <map>
 #include <memory>
@@ -23,7 +25,8 @@ namespace abbe::sim {
 
 class RecordedBus {
  public:
-  /// `timeline` must outlive it. `leads`: it starts the timeline, because no tracker does.
+  /// `timeline` must outlive it. `leads`: this device starts the timeline, because the recording
+  /// has no tracker.
   [[nodiscard]] static Result<RecordedBus> open(const EncoderBusOptions& options,
                                                 const RecordedDevice& device,
                                                 ReplayTimeline& timeline, bool leads);
@@ -33,7 +36,7 @@ class RecordedBus {
   [[nodiscard]] int fd() const { return port_->fd(); }
   [[nodiscard]] std::uint16_t port() const { return port_->port(); }
   [[nodiscard]] bool finished() const {
-    return timeline_.running() && next_spoken_ >= spoken_.size();
+    return timeline_.running() && next_unsolicited_ >= unsolicited_.size();
   }
   [[nodiscard]] std::size_t syncs() const { return cycles_.size() + foreign_syncs_; }
 
@@ -46,13 +49,14 @@ class RecordedBus {
     HostTime sync;
     std::vector<Answer> answers;
   };
-  struct Spoken {
+  /// A frame that is sent without a request.
+  struct Unsolicited {
     HostTime time;
     can::CanFrame frame;
   };
   using SdoRequest = std::pair<std::uint32_t, std::array<std::byte, 8>>;
   struct SdoResponses {
-    std::vector<std::optional<can::CanFrame>> frames;  ///< nothing: the node did not answer
+    std::vector<std::optional<can::CanFrame>> frames;  ///< nullopt: the node did not answer
     std::size_t next = 0;
   };
 
@@ -65,7 +69,7 @@ class RecordedBus {
   void send_late(HostTime now);
   void on_sdo(const can::CanFrame& frame);
   void keep_alive(HostTime now);
-  /// Nothing but the SYNC of another producer was on the bus.
+  /// The recording has only SYNCs of another producer.
   [[nodiscard]] bool external() const { return cycles_.empty() && foreign_syncs_ > 0; }
   [[nodiscard]] std::size_t cycle_at(HostTime recorded) const;
 
@@ -75,15 +79,15 @@ class RecordedBus {
   std::set<can::NodeId> nodes_;
   std::vector<Cycle> cycles_;
   std::size_t foreign_syncs_ = 0;
-  /// while the recording is read: the latest SYNC was another producer's
+  /// while the recording is read: the latest SYNC came from another producer
   bool foreign_sync_ = false;
-  std::vector<Spoken> spoken_;
-  std::vector<Spoken> late_;  ///< of cycles already asked for, by the time they leave
+  std::vector<Unsolicited> unsolicited_;
+  std::vector<Unsolicited> late_;  ///< delayed answers of current cycles, by send time
   std::map<SdoRequest, SdoResponses> sdo_;
-  std::map<can::NodeId, SdoRequest>
-      asked_;  ///< while the recording is read: requests without a response yet
+  /// while the recording is read: requests without a response yet
+  std::map<can::NodeId, SdoRequest> asked_;
   std::optional<std::size_t> next_cycle_;
-  std::size_t next_spoken_ = 0;
+  std::size_t next_unsolicited_ = 0;
   HostTime next_beat_ = HostTime::min();
   can::NodeState state_ = can::NodeState::PreOperational;
 };

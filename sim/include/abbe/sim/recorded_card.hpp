@@ -1,13 +1,17 @@
 #pragma once
-/// A counter card that says again what it said in a recording. While a card is opened and set up,
-/// the n-th request is answered as the same request was then; scans come with their original timing
-/// from the moment the pacer is started; the status is what it was at that time. Where the card
-/// said nothing it says nothing; a connection that broke then breaks again, and the next one goes
-/// on where the next one did; after the last one all begins anew. A host that restarts the scan
-/// although nobody did then gets what is left of it. Not thread-safe.
+/// Replays a counter card from a recording.
+///   - While no scan runs, a request gets the answer to the next equal request of the recorded
+///     connection. If the recorded card did not answer, the replay does not answer either.
+///   - A scan has its original timing, counted from the start of the pacer. During a scan the
+///     status is the recorded status of that time.
+///   - A connection that broke in the recording breaks again. The next connection replays the next
+///     recorded one; after the last one the replay begins again with the first.
+///   - A host that halts a scan earlier than in the recording and restarts it gets the rest of the
+///     recorded scan.
+/// Not thread-safe.
 ///
-/// A recording does not hold the card's descriptors: they are those of the simulated card, with the
-/// serial number that is given.
+/// A recording does not contain the card's descriptors: the replay has those of the simulated card,
+/// with the given serial number.
 
 #include <deque>
 #include <optional>
@@ -23,7 +27,8 @@ namespace abbe::sim {
 
 class RecordedCard final : public ExportedCard {
  public:
-  /// `timeline` must outlive it. `leads`: it starts the timeline, because no tracker does.
+  /// `timeline` must outlive it. `leads`: this device starts the timeline, because the recording
+  /// has no tracker.
   RecordedCard(const RecordedDevice& device, const std::string& serial, ReplayTimeline& timeline,
                bool leads);
 
@@ -34,10 +39,10 @@ class RecordedCard final : public ExportedCard {
   [[nodiscard]] std::size_t available() const override { return fifo_.size(); }
   [[nodiscard]] HostTime available_at(std::size_t bytes) const override;
   [[nodiscard]] bool scanning() const override;
-  void host_gone() override;
+  void host_disconnected() override;
   [[nodiscard]] HostTime breaks_at() const override;
 
-  /// Every scan has been served.
+  /// Every recorded scan has been sent.
   [[nodiscard]] bool finished() const { return finished_; }
   [[nodiscard]] std::size_t transfers() const;
 
@@ -45,7 +50,7 @@ class RecordedCard final : public ExportedCard {
   struct Exchange {
     protocol::usb::Setup setup;
     HostTime asked{};
-    std::optional<ControlAnswer> answer;  ///< nothing: the card was silent
+    std::optional<ControlAnswer> answer;  ///< nullopt: the card did not answer
   };
   struct Transfer {
     HostTime time{};
@@ -54,7 +59,7 @@ class RecordedCard final : public ExportedCard {
   /// From one start of the pacer to the next.
   struct Scan {
     std::size_t begins = 0;  ///< the exchange that started it
-    std::size_t halts = 0;   ///< the first exchange after it that is no question for the status
+    std::size_t halts = 0;   ///< the first exchange after it that is not a status request
     std::vector<Transfer> transfers;
   };
   struct Connection {
@@ -74,7 +79,7 @@ class RecordedCard final : public ExportedCard {
   void open();
   void start(std::size_t scan, HostTime now);
   [[nodiscard]] bool has_rest() const;
-  [[nodiscard]] bool halts_before_its_time(HostTime now) const;
+  [[nodiscard]] bool halts_early(HostTime now) const;
   [[nodiscard]] HostTime due(HostTime recorded) const;
   [[nodiscard]] HostTime recorded(HostTime now) const;
 
@@ -84,7 +89,7 @@ class RecordedCard final : public ExportedCard {
   std::vector<Exchange> exchanges_;
   std::vector<Scan> scans_;
   std::vector<Connection> connections_;
-  unsigned versions_ = 0;  ///< while it is read: questions for the firmware on this connection
+  unsigned versions_ = 0;  ///< while it is read: firmware version requests on this connection
 
   bool opened_ = false;   ///< by this host
   std::size_t next_ = 0;  ///< exchange
@@ -92,8 +97,8 @@ class RecordedCard final : public ExportedCard {
   std::optional<std::size_t> scan_;
   std::size_t next_transfer_ = 0;
   bool running_ = false;   ///< the pacer, for this host
-  bool flushing_ = false;  ///< it is being halted: what came until then comes at once
-  bool resuming_ = false;  ///< the host restarts a scan that went on then
+  bool flushing_ = false;  ///< the host halts the scan: the rest is sent at once
+  bool resuming_ = false;  ///< the host restarts a scan that continued in the recording
   std::chrono::nanoseconds shift_{};
   std::deque<std::byte> fifo_;
   bool finished_ = false;

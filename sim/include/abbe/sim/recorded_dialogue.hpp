@@ -1,10 +1,10 @@
 #pragma once
-/// A device that only speaks when it is spoken to, saying again what it said in a recording: Modbus
-/// over TCP or RTU, I++ DME. The n-th of equal requests on a connection is answered as the n-th was
-/// then: after the same time, in the same pieces, or not at all; when there were no more, as the
-/// last one. A connection that broke then breaks again, and the next one goes on where the next one
-/// did then; after the last one all begins anew. What nobody asked then is refused. Interface as
-/// TrackerDevice; steppable, not thread-safe.
+/// Replays a device that only answers requests: Modbus over TCP or RTU, I++ DME. The n-th of
+/// several equal requests on a connection is answered like the n-th in the recording: after the
+/// same time, in the same pieces, or not at all. When the recording has no more, the last answer is
+/// repeated. A request that is not in the recording is refused. A connection that broke in the
+/// recording breaks again. The next connection replays the next recorded one; after the last one
+/// the replay begins again with the first. Interface as TrackerDevice; steppable, not thread-safe.
 
 #include <deque>
 #include <map>
@@ -16,19 +16,20 @@
 
 namespace abbe::sim {
 
-/// How one protocol cuts a stream of bytes into requests, and what of a request makes it another
-/// one.
+/// How one protocol splits a stream of bytes into requests, and which part of a request identifies
+/// it.
 struct DialogueWire {
   using Bytes = std::span<const std::byte>;
-  /// Of the first request in `bytes`; 0: it is not whole yet.
+  /// Size of the first request in `bytes`; 0: the request is incomplete.
   std::size_t (*request_size)(Bytes bytes) = nullptr;
-  /// What two requests must have in common to get the same answer: all but their number.
+  /// The part that two requests must have in common to get the same answer: all but their number.
   Bytes (*meaning)(Bytes request) = nullptr;
-  /// Gives an answer to the `recorded` request the number of the one that is answered now.
+  /// Replaces the number of the `recorded` request in its answer by the number of `request`.
   void (*renumber)(std::span<std::byte> answer, Bytes recorded, Bytes request) = nullptr;
+  /// The answer to a request that is not in the recording.
   std::vector<std::byte> (*refusal)(Bytes request) = nullptr;
 };
-/// Of ModbusTcp, ModbusRtu and MeasuringMachine.
+/// For ModbusTcp, ModbusRtu and MeasuringMachine.
 [[nodiscard]] const DialogueWire& dialogue_wire(RecordedKind kind);
 
 class RecordedDialogue {
@@ -44,7 +45,7 @@ class RecordedDialogue {
   [[nodiscard]] bool wants_close() const { return wants_close_; }
   [[nodiscard]] bool accepts() const { return true; }
 
-  /// What was asked last then has been asked and answered.
+  /// The last request of the recording has been received and answered.
   [[nodiscard]] bool finished() const { return finished_; }
   [[nodiscard]] std::size_t requests() const;
 
@@ -52,10 +53,10 @@ class RecordedDialogue {
   struct Piece {
     std::chrono::nanoseconds delay{};  ///< from the request
     std::vector<std::byte> bytes;
-    bool breaks = false;  ///< the connection, after this
+    bool breaks = false;  ///< the connection breaks after this piece
   };
   struct Exchange {
-    std::vector<std::byte> request;  ///< empty: what came before anything was asked
+    std::vector<std::byte> request;  ///< empty: the device sent the answer before any request
     HostTime time{};
     std::vector<Piece> answer;
   };
@@ -77,11 +78,12 @@ class RecordedDialogue {
   void schedule(const Exchange& exchange, std::span<const std::byte> request, HostTime now);
 
   const DialogueWire& wire_;
-  bool serial_;  ///< a line nobody sees being opened: all is one connection
+  bool serial_;  ///< a serial line: opening it is not visible, so all is one connection
   std::vector<Connection> connections_;
   std::size_t connection_ = 0;
-  bool played_ = false;                          ///< the present connection has been begun
-  std::map<std::string, std::size_t> answered_;  ///< on the present connection
+  bool played_ = false;  ///< a client has connected before
+  /// number of answers on the present connection, by meaning
+  std::map<std::string, std::size_t> answered_;
   std::vector<std::byte> incoming_;
   std::deque<Due> due_;
   std::vector<std::byte> out_;

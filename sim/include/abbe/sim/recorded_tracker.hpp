@@ -1,10 +1,11 @@
 #pragma once
-/// A tracker controller that says again what it said in a recording. The n-th of equal commands on
-/// a connection is answered as the n-th was then, after the same time or not at all, when there
-/// were no more as the last one; a command nobody sent then is answered NotImplemented. What was
-/// not an answer (bursts, errors, events, bytes that are no packet) comes with its original timing
-/// from the moment measuring starts. A connection that broke then breaks again, and the next one
-/// goes on where the next one did; after the last one all begins anew. Interface as TrackerDevice.
+/// Replays a tracker controller from a recording. The n-th of several equal commands on a
+/// connection is answered like the n-th in the recording: after the same time or not at all. When
+/// the recording has no more, the last answer is repeated. A command that is not in the recording
+/// is answered with NotImplemented. All other packets (bursts, errors, events, bytes that are not a
+/// packet) are sent with their original timing from the start of measuring. A connection that broke
+/// in the recording breaks again. The next connection replays the next recorded one; after the last
+/// one the replay begins again with the first. Interface as TrackerDevice.
 
 #include <deque>
 #include <map>
@@ -31,34 +32,35 @@ class RecordedTracker {
   [[nodiscard]] bool wants_close() const { return wants_close_; }
   [[nodiscard]] bool accepts() const { return true; }
 
-  /// Everything has been served.
+  /// The whole recording has been sent.
   [[nodiscard]] bool finished() const { return finished_; }
   [[nodiscard]] std::size_t packets() const;
 
  private:
   using Packet = std::vector<std::byte>;
-  struct Spoken {
+  /// A packet that is sent without a command.
+  struct Unsolicited {
     HostTime time;
     Packet packet;
-    bool breaks = false;  ///< the connection, instead of saying something
+    bool breaks = false;  ///< the connection breaks; `packet` is empty
   };
   struct Exchange {
     HostTime asked{};
     HostTime answered{};
-    std::vector<Packet> answers;  ///< none: the controller said nothing
+    std::vector<Packet> answers;  ///< empty: the controller did not answer
     std::size_t wanted = 1;
   };
   struct Connection {
     HostTime began{};
     std::map<std::int32_t, std::vector<Exchange>> exchanges;  ///< by command
-    std::vector<Spoken> spoken;
+    std::vector<Unsolicited> unsolicited;
     std::optional<HostTime> first_start;
-    bool garbled = false;  ///< while it is read: bytes that are no packets
+    bool garbled = false;  ///< while it is read: bytes that are not packets
   };
   struct Due {
     HostTime time;
     std::vector<Packet> packets;
-    std::optional<HostTime> starts;  ///< measuring, at this recorded time
+    std::optional<HostTime> starts;  ///< recorded time of the start of measuring
     bool stops = false;
   };
 
@@ -67,9 +69,9 @@ class RecordedTracker {
   void take_answer(std::int32_t command, std::span<const std::byte> packet, HostTime time);
   void answer(std::span<const std::byte> request, HostTime now);
   void carry_out(const Due& due);
-  [[nodiscard]] HostTime spoken_due() const;
+  [[nodiscard]] HostTime unsolicited_due() const;
   [[nodiscard]] const Connection& connection() const { return connections_[connection_]; }
-  void say(std::span<const std::byte> packet) {
+  void send_packet(std::span<const std::byte> packet) {
     out_.insert(out_.end(), packet.begin(), packet.end());
   }
 
@@ -77,11 +79,12 @@ class RecordedTracker {
   protocol::emscon::PacketFramer framer_;
   std::vector<Connection> connections_;
   std::size_t connection_ = 0;
-  bool played_ = false;                           ///< the present connection has been begun
-  std::optional<HostTime> connected_at_;          ///< nothing: nobody listens
-  std::map<std::int32_t, std::size_t> answered_;  ///< on the present connection
+  bool played_ = false;                   ///< a client has connected before
+  std::optional<HostTime> connected_at_;  ///< nullopt: no client
+  /// number of answers on the present connection, by command
+  std::map<std::int32_t, std::size_t> answered_;
   std::deque<Due> due_;
-  std::size_t next_ = 0;   ///< of what is spoken
+  std::size_t next_ = 0;   ///< index of the next unsolicited packet
   bool anchored_ = false;  ///< measuring was started on the present connection
   bool stopped_ = false;
   bool finished_ = false;

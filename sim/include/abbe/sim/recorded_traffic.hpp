@@ -1,7 +1,7 @@
 #pragma once
-/// The raw bytes of a recording, device by device, as they crossed the wire: what a replay serves.
-/// Reads the MCAP file whole or broken; only messages on abbe/v1/RawBytes are looked at. Pure but
-/// for memory.
+/// The raw bytes in a recording, by device, as they were transferred on the wire: the input of a
+/// replay. Reads complete and damaged MCAP files; only messages on abbe/v1/RawBytes are used. Pure;
+/// allocates.
 
 #include <chrono>
 #include <cstddef>
@@ -20,18 +20,18 @@ struct RecordedBlock {
   HostTime time{};
   bool to_device = false;
   bool hole_before = false;      ///< the recording lost blocks before this one
-  std::vector<std::byte> bytes;  ///< of one read or one write: continued blocks are joined
+  std::vector<std::byte> bytes;  ///< of one read or one write; continued blocks are joined
 
-  /// Nothing from a device: a connection begins (with encoders: time has passed).
+  /// An empty block from a device: a connection begins (with encoders: time has passed).
   [[nodiscard]] bool connects() const { return !to_device && bytes.empty(); }
-  /// Nothing to a device: the connection was lost, and not by us.
+  /// An empty block to a device: the connection was lost; the daemon did not close it.
   [[nodiscard]] bool lost() const { return to_device && bytes.empty(); }
 };
 
 enum class RecordedKind {
   Tracker,      ///< emScon packets
-  Encoders,     ///< CAN frames in datagrams, whatever the bus was
-  CounterCard,  ///< USB/IP messages, whatever the transport was
+  Encoders,     ///< CAN frames in datagrams, for every kind of bus
+  CounterCard,  ///< USB/IP messages, for every transport
   ModbusTcp,
   ModbusRtu,
   MeasuringMachine,  ///< lines of I++ DME
@@ -43,29 +43,31 @@ struct RecordedDevice {
   std::vector<RecordedBlock> blocks;
 };
 
-/// By what was said to the device, or, where nothing was, by what it said; a tracker, if that is no
-/// protocol known here.
+/// Detects the protocol by the bytes that were sent to the device, else by the bytes that the
+/// device sent. Tracker if no protocol matches.
 [[nodiscard]] RecordedKind kind_of(std::span<const RecordedBlock> blocks);
 
-/// The text of the configuration a recording was made with; empty if it does not hold one.
+/// The text of the configuration a recording was made with; empty if there is none.
 [[nodiscard]] std::string recorded_configuration(std::span<const std::byte> file);
 
-/// `name` stands in the errors. BadInput: no MCAP file, or one without raw bytes.
+/// `name` is the file name in error texts. BadInput: not an MCAP file, or no raw bytes in it.
 [[nodiscard]] Result<std::vector<RecordedDevice>> read_traffic(std::span<const std::byte> file,
                                                                std::string_view name);
 
-/// A master that paused for longer is led back to where the recording is.
+/// Largest difference between the replay and the recorded time; a replay that is further off is
+/// resynchronised with the timeline.
 inline constexpr std::chrono::milliseconds kOutOfStep{50};
 
-/// Recorded time -> time of the replay, shared by all devices of a recording so that they stay in
-/// step. Set by the first that starts.
+/// Maps recorded time to replay time. All devices of a recording share it, so that they stay
+/// synchronised. The first device that starts sets it.
 class ReplayTimeline {
  public:
   void start(HostTime recorded, HostTime now) {
     if (!shift_) shift_ = now - recorded;
   }
   void rewind() { shift_.reset(); }
-  /// Once more, also while it runs: a device that came back begins where it did then.
+  /// Sets the map again, also while it runs: a device that reconnects continues at its recorded
+  /// time.
   void restart(HostTime recorded, HostTime now) { shift_ = now - recorded; }
   [[nodiscard]] bool running() const { return shift_.has_value(); }
   [[nodiscard]] HostTime due(HostTime recorded) const {

@@ -1,6 +1,6 @@
 #pragma once
-/// All devices of a recording, each on its wire again: emScon, CAN over UDP or SocketCAN, USB/IP,
-/// Modbus TCP and RTU, I++ DME. Steppable: poll(now) never blocks and reads no clock. Not
+/// Replays all devices of a recording, each on its own wire: emScon, CAN over UDP or SocketCAN,
+/// USB/IP, Modbus TCP and RTU, I++ DME. Steppable: poll(now) never blocks and reads no clock. Not
 /// thread-safe.
 
 #include <poll.h>
@@ -19,8 +19,8 @@ struct ReplaySetup {
   std::uint16_t tracker_port = 0;  ///< on 127.0.0.1; 0: the kernel chooses
   CanPortOptions bus;
   std::map<std::string, std::uint16_t> ports;  ///< TCP, by the name of the device
-  std::map<std::string, std::string>
-      links;  ///< where a pseudo terminal appears, by the name of the device
+  /// path of the link to a pseudo terminal, by the name of the device
+  std::map<std::string, std::string> links;
   std::map<std::string, std::string> serials;  ///< of counter cards, by the name of the device
 };
 
@@ -28,7 +28,7 @@ struct ReplaySetup {
 struct ReplayedPlace {
   std::string name;
   RecordedKind kind{};
-  std::string what;        ///< for people: "12 packets after the start of measuring"
+  std::string what;        ///< the amount of data, for messages: "12 packets"
   std::uint16_t port = 0;  ///< 0: on `path`
   std::string path;        ///< of a pseudo terminal, or the name of a CAN interface
 };
@@ -40,14 +40,14 @@ class ReplayedDevice {
   virtual void poll(HostTime now) = 0;
   [[nodiscard]] virtual HostTime next_due() const = 0;
   virtual void add_poll_fds(std::vector<pollfd>& fds) const = 0;
-  /// Everything has been served.
+  /// The whole recording has been sent.
   [[nodiscard]] virtual bool finished() const = 0;
   [[nodiscard]] virtual ReplayedPlace place() const = 0;
 };
 
 class Replay {
  public:
-  /// Io for a port that is taken.
+  /// Io if a port is in use.
   [[nodiscard]] static Result<std::unique_ptr<Replay>> open(
       const std::vector<RecordedDevice>& devices, const ReplaySetup& setup, HostTime now);
 

@@ -1,8 +1,7 @@
 #pragma once
-/// The clock of the simulated world across processes: host time = speed x CLOCK_MONOTONIC, without
-/// an origin to share, so that a daemon given the same speed sees the same time. The devices never
-/// read it: they are handed their time (`poll(now)`), and tests hand them whatever they like.
-/// Thread-safe (immutable).
+/// The simulated clock, common to several processes: host time = speed x CLOCK_MONOTONIC. There is
+/// no origin to exchange: a daemon with the same speed has the same time. The devices never read
+/// it: the caller passes the time to poll(now), a test passes any time. Thread-safe (immutable).
 
 #include <chrono>
 
@@ -14,11 +13,11 @@ using protocol::HostTime;
 
 class SimClock {
  public:
-  /// `speed` > 0: simulated seconds per second of the wall.
+  /// `speed` > 0: simulated seconds per wall-clock second.
   explicit SimClock(double speed) : speed_(speed) {}
 
   [[nodiscard]] HostTime now() const;
-  /// How long simulated `d` takes on the wall.
+  /// The wall-clock duration of the simulated duration `d`.
   [[nodiscard]] std::chrono::nanoseconds wall(std::chrono::nanoseconds d) const;
   [[nodiscard]] double speed() const { return speed_; }
 

@@ -1,8 +1,8 @@
 #pragma once
-/// The whole stage: machine, tracker, encoder bus, counter cards, a measuring machine and the
-/// timetable of faults, stepped together. poll(now) does what is due, never blocks and reads no
-/// clock; a program turns it with real time, a test with whatever it likes. Not thread-safe, but
-/// for the bus with `bus_apart`.
+/// The complete simulation: machine, tracker, encoder bus, counter cards, measuring machine and
+/// scheduled faults, stepped together. poll(now) does what is due, never blocks and reads no clock;
+/// a program passes real time, a test any time. Not thread-safe, except for the bus with
+/// `bus_apart`.
 
 #include <poll.h>
 
@@ -25,46 +25,48 @@ namespace abbe::sim {
 struct SimulationSetup {
   TruthMachine truth;
   PathPlan path;
-  bool start_when_streaming =
-      true;           ///< tracker, or without one the first counter card; else by itself
-  bool held = false;  ///< not before let_go()
-  /// before the motion, from the first point or from the start
+  /// The motion starts when the tracker streams (without a tracker: when the first counter card
+  /// scans); false: it starts by itself.
+  bool start_when_streaming = true;
+  bool held = false;  ///< the motion starts only after release()
+  /// before the motion, counted from the first point or from the start
   std::chrono::nanoseconds standstill = std::chrono::seconds{2};
   std::optional<TrackerOptions> tracker;
   std::uint16_t tracker_port = 0;
   std::optional<EncoderBusOptions> bus;
   std::vector<EncoderNodeOptions> nodes;
-  /// The machine's own control sends the SYNC and has configured the nodes; 0: neither.
+  /// Period of the SYNC that the machine's control sends to nodes configured by it; 0: the control
+  /// neither sends a SYNC nor configures the nodes.
   std::chrono::nanoseconds sync_period{};
-  /// The bus is turned by poll_bus() alone. A SYNC is then answered as the machine stands, not as
-  /// it would after a start that the other thread is about to make: with a standstill nobody can
-  /// tell.
+  /// Only poll_bus() polls the bus, so that a second thread can do it. A SYNC at the moment at
+  /// which the other thread starts the machine may still be answered with the position before the
+  /// start. With a standstill both positions are equal.
   bool bus_apart = false;
   std::vector<ModbusServerOptions> environment;
   std::vector<CounterCardSetup> counter_cards;
   std::optional<IppDmeOptions> measuring_machine;
   std::uint16_t measuring_machine_port = 0;
-  std::optional<TouchedSurface> surface;  ///< touched by the probe on the first card
-  std::vector<double>
-      edges_s;  ///< further edges of that probe, s from the start of the motion, ascending
+  std::optional<TouchedSurface> surface;  ///< touched by the probe on the first counter card
+  /// further edges of that probe, s from the start of the motion, ascending
+  std::vector<double> edges_s;
   std::vector<ScheduledFault> faults;
 };
 
 class Simulation {
  public:
-  /// Opens the sockets. BadInput for an impossible path, Io for a port that is taken.
+  /// Opens the sockets. BadInput for an impossible path, Io if a port is in use.
   [[nodiscard]] static Result<std::unique_ptr<Simulation>> open(const SimulationSetup& setup,
                                                                 HostTime now);
 
   void poll(HostTime now);
-  /// The encoders and their faults, with `bus_apart`. May run on a thread of its own, which then is
-  /// the only one to use bus().
+  /// Polls the encoders and their faults, with `bus_apart`. May run on a thread of its own; only
+  /// this thread may then use bus().
   void poll_bus(HostTime now);
   [[nodiscard]] HostTime next_bus_due() const;
-  /// Whoever held the machine waits no longer.
-  void let_go(HostTime now);
+  /// Ends `held`: the motion starts after the standstill.
+  void release(HostTime now);
   [[nodiscard]] HostTime next_due() const;
-  /// What to wait for besides the time.
+  /// Adds the sockets to wait for, in addition to next_due().
   void add_poll_fds(std::vector<pollfd>& fds) const;
 
   [[nodiscard]] VirtualMachine& machine() { return machine_; }
@@ -95,8 +97,8 @@ class Simulation {
   std::vector<ModbusServer> environment_;
   std::deque<UsbipServer> counter_cards_;
   std::optional<IppDmeServer> measuring_machine_;
-  std::deque<double> edges_s_;  ///< that the probe's card does not know of yet
-  FaultTimetable faults_;       ///< of all but the bus
+  std::deque<double> edges_s_;  ///< probe edges not yet passed to the card
+  FaultTimetable faults_;       ///< of all devices except the bus
 };
 
 }  // namespace abbe::sim

@@ -1,6 +1,6 @@
 #pragma once
-/// A file descriptor with an owner, the two kinds of loopback endpoint the simulator needs, and
-/// what a server with one client does with them. All non-blocking.
+/// An owning file descriptor, the two kinds of loopback endpoint of the simulator, and helper
+/// functions for a server with one client. All non-blocking.
 
 #include <poll.h>
 #include <sys/socket.h>
@@ -36,18 +36,18 @@ class Socket {
   int fd_ = -1;
 };
 
-/// Bound to 127.0.0.1; port 0: the kernel chooses. Io when the port is taken: the text says which.
+/// Bound to 127.0.0.1; port 0: the kernel chooses. Io if the port is in use; the text names it.
 [[nodiscard]] Result<Socket> listen_tcp(std::uint16_t port);
 [[nodiscard]] Result<Socket> bind_udp(std::uint16_t port);
 [[nodiscard]] std::uint16_t port_of(const Socket& socket);
 /// 127.0.0.1 with this port, as sendto() wants it.
 [[nodiscard]] sockaddr_storage loopback_address(std::uint16_t port);
-/// What the client takes without blocking, at most `most` bytes, leaves `unsent`.
+/// Sends at most `most` bytes of `unsent` without blocking and removes the bytes sent.
 void send_what_fits(const Socket& client, std::vector<std::byte>& unsent,
                     std::size_t most = std::numeric_limits<std::size_t>::max());
-/// What a server waits for from its client; -1: there is none.
+/// Adds the client's socket to the sockets to wait for; -1: there is no client.
 void add_client_fd(int client_fd, bool wants_write, std::vector<pollfd>& fds);
-/// The same with one client at a time; `client` may be closed.
+/// Adds the listener and the client to the sockets to wait for; `client` may be closed.
 void add_server_fds(const Socket& listener, const Socket& client, bool wants_write,
                     std::vector<pollfd>& fds);
 

@@ -1,7 +1,7 @@
 #pragma once
-/// A recorded device behind a pseudo terminal: what ControllerServer is for TCP. A connection that
-/// broke is the terminal being plugged out and in again. Steppable: poll(now) never blocks and
-/// reads no clock. Not thread-safe.
+/// A recorded device behind a pseudo terminal, as ControllerServer does for TCP. Where the
+/// connection broke in the recording, the terminal is closed and opened again. Steppable: poll(now)
+/// never blocks and reads no clock. Not thread-safe.
 
 #include <memory>
 #include <string>
@@ -14,7 +14,7 @@ namespace abbe::sim {
 
 class TerminalServer {
  public:
-  /// `link`: where the client's end appears.
+  /// `link`: path of the symbolic link to the client's end.
   [[nodiscard]] static Result<TerminalServer> open(const std::string& link,
                                                    std::unique_ptr<RecordedDialogue> device,
                                                    HostTime now);

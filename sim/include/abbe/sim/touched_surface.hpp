@@ -1,7 +1,7 @@
 #pragma once
-/// A surface in the machine's way, touched whenever one axis falls through it, and the probe that
-/// says so some time later. The machine drives on: pre-travel and bending are not simulated. Pure;
-/// made from the path alone.
+/// A surface that the probe touches whenever one axis moves down through it, and the delayed
+/// trigger of the probe. The machine does not stop at contact; pre-travel and bending are not
+/// simulated. Pure; computed from the path alone.
 
 #include <cstdint>
 #include <vector>
@@ -15,11 +15,11 @@ struct TouchedSurface {
   int axis = 2;            ///< 0 to 2: X, Y, Z
   double surface_m = 0.0;  ///< scale reading at contact
   double delay_s = 5e-6;   ///< from contact to the edge
-  double jitter_s = 1e-6;  ///< its standard deviation from touch to touch
+  double jitter_s = 1e-6;  ///< standard deviation of the delay from touch to touch
   std::uint64_t seed = 1;
 };
 
-/// When the probe's edges come, s from the start of the motion, ascending.
+/// Times of the probe's edges, s from the start of the motion, ascending.
 [[nodiscard]] std::vector<double> edge_times_s(const TouchedSurface& surface,
                                                const PathMotion& path);
 

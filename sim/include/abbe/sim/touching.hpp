@@ -1,9 +1,9 @@
 #pragma once
-/// A ball array touched on a machine with errors: the path the machine drives, and when its probe
-/// makes contact. The tip meets the true surfaces; the scales read what they read there. The
-/// program of the machine knows where the array stands: every approach is along the true normal of
-/// the surface. The machine drives on through the surface; pre-travel and bending are not
-/// simulated, nor is what stands in the way between two touches. Pure; deterministic from the seed.
+/// Touching a ball array on a machine with errors: the path of the machine and the times at which
+/// its probe makes contact. The tip contacts the true surfaces. The part program uses the true
+/// position of the array: every approach is along the true normal of the surface. The machine does
+/// not stop at contact. Pre-travel, bending and collisions between two touches are not simulated.
+/// Pure; deterministic from the seed.
 
 #include <cstdint>
 #include <set>
@@ -25,17 +25,17 @@ struct TouchingOptions {
   double retract_m_per_s = 20e-3;
   double travel_m_per_s = 0.2;
   double acceleration_m_per_s2 = 1.0;
-  double noise_m = 3e-6;   ///< of machine and probe along the approach, from touch to touch
+  double noise_m = 3e-6;   ///< of machine and probe along the approach, per touch
   double delay_s = 5e-6;   ///< from contact to the edge
-  double jitter_s = 1e-6;  ///< its standard deviation from touch to touch
+  double jitter_s = 1e-6;  ///< standard deviation of the delay from touch to touch
   std::uint64_t seed = 1;
-  // Misbehaviour, by number of the touch in the program, from 0.
-  std::set<std::size_t> missed;   ///< the probe is silent
-  std::set<std::size_t> doubled;  ///< made twice in the same place
-  std::set<std::size_t> stray;    ///< before it, one in the air 40 mm away
+  // Fault injection, by number of the touch in the program, from 0.
+  std::set<std::size_t> missed;   ///< the probe does not trigger
+  std::set<std::size_t> doubled;  ///< made twice at the same point
+  std::set<std::size_t> stray;    ///< preceded by a trigger in the air, 40 mm from the surface
 };
 
-/// One probing movement: a leg of the path with the surface it goes for.
+/// One probing move: a leg of the path and the surface that it approaches.
 struct ProbingMove {
   std::size_t leg = 0;                                 ///< of the path
   Eigen::Vector3d place_m = Eigen::Vector3d::Zero();   ///< on the surface, true
@@ -50,19 +50,19 @@ struct TouchingProgram {
   std::vector<ProbingMove> moves;
 };
 
-/// The whole procedure, from reading 0 of every axis: at every position ball 1, block 1, block 2,
+/// The whole procedure, from reading 0 of every axis. At every position: ball 1, block 1, block 2,
 /// then ball 2 to the last.
 [[nodiscard]] TouchingProgram plan_touching(const TruthMachine& truth, const BallArray& array,
                                             const TouchingOptions& options);
 
-/// When the probe's edges come, s from the start of the motion, ascending. `path` is that of the
-/// program.
+/// Times of the probe's edges, s from the start of the motion, ascending. `path` is the planned
+/// path of the program.
 [[nodiscard]] std::vector<double> edge_times_s(const TouchingProgram& program,
                                                const TruthMachine& truth, const PathMotion& path,
                                                double tip_radius_m, const TouchingOptions& options);
 
-/// The scale reading at which the tip's centre truly is at `place_m` (of a machine without target
-/// offset).
+/// The scale reading at which the true position of the tip's centre is `place_m` (machine without
+/// target offset).
 [[nodiscard]] Eigen::Vector3d reading_at_m(const TruthMachine& truth,
                                            const Eigen::Vector3d& place_m);
 

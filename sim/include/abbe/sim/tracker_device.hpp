@@ -1,12 +1,13 @@
 #pragma once
-/// A laser tracker controller that speaks emScon TPI, without its socket: bytes and a time in,
-/// bytes out. It needs what a real one needs (warm-up, Initialize, a reflector, a measurement mode)
-/// and refuses with the status a real one would give. Not thread-safe.
+/// A laser tracker controller with the emScon TPI protocol, without its socket: bytes and a time
+/// in, bytes out. It has the preconditions of a real one (warm-up, Initialize, a reflector, a
+/// measurement mode) and refuses with the same status. Not thread-safe.
 ///
-/// Chosen here, because no public source says: a broken beam is an error packet with status Unknown
-/// for StartMeasurement, then event NotReady; when the beam is back comes event Ready, and points
-/// go on by themselves if keepLastPosition is set. GoBirdBath and FindReflector that meet no
-/// reflector: NoDistanceSet.
+/// Our choices where no public source describes the behaviour:
+///   - A broken beam: an error packet with status Unknown for StartMeasurement, then event
+///     NotReady. When the beam is back: event Ready; points continue by themselves if
+///     keepLastPosition is set.
+///   - GoBirdBath and FindReflector that find no reflector: NoDistanceSet.
 
 #include <array>
 #include <cstddef>
@@ -28,13 +29,13 @@ namespace emscon = protocol::emscon;
 
 struct TrackerOptions {
   TrackerModel model;
-  std::chrono::nanoseconds delay =
-      std::chrono::milliseconds{1};    ///< from a point to the earliest burst that holds it
+  /// from a point to the earliest burst that contains it
+  std::chrono::nanoseconds delay = std::chrono::milliseconds{1};
   std::chrono::nanoseconds warm_up{};  ///< from power-on until the laser is stable
   std::chrono::nanoseconds command_latency = std::chrono::milliseconds{10};
   std::chrono::nanoseconds initialize_time = std::chrono::seconds{2};
-  /// Initialize drops the beam; so long does somebody take to bring the reflector. 0: it lies in
-  /// the bird bath, where the beam goes.
+  /// Initialize moves the beam off the reflector; after this time the operator has brought the
+  /// reflector back into the beam. 0: the reflector is in the bird bath, where the beam goes.
   std::chrono::nanoseconds fetch_beam{};
   double air_temperature_C = 20.0;
   double air_pressure_mbar = 1013.25;
@@ -50,15 +51,15 @@ class TrackerDevice {
   void connected(HostTime now);
   void disconnected();
   void receive(std::span<const std::byte> bytes, HostTime now);
-  /// Does what is due until `now`, in the order it is due.
+  /// Executes everything that is due until `now`, in order of time.
   void advance(HostTime now);
   [[nodiscard]] HostTime next_due() const;
 
   /// Bytes for the client, made since the last call.
   [[nodiscard]] std::vector<std::byte> take_output();
-  /// The controller wants the connection closed, once its output is out.
+  /// The connection is to be closed after the output has been sent.
   [[nodiscard]] bool wants_close() const { return wants_close_; }
-  /// False while it restarts: nobody is let in.
+  /// False while the controller restarts: connections are closed at once.
   [[nodiscard]] bool accepts() const { return !booting_until_; }
 
   void inject(const Fault& fault, HostTime now);
@@ -68,7 +69,7 @@ class TrackerDevice {
   [[nodiscard]] bool streaming() const { return stream_.has_value(); }
   [[nodiscard]] std::uint64_t points_sent() const { return points_sent_; }
   [[nodiscard]] std::uint64_t initializations() const { return initializations_; }
-  /// GoBirdBath, FindReflector and GoPosition that were carried out.
+  /// Number of GoBirdBath, FindReflector and GoPosition commands executed.
   [[nodiscard]] std::uint64_t beam_moves() const { return beam_moves_; }
 
  private:
@@ -83,7 +84,7 @@ class TrackerDevice {
     std::uint64_t points_left;
   };
 
-  /// Of the time points are measured in, not of when they are sent.
+  /// An interval of measurement times of points, not of the times at which they are sent.
   struct Window {
     HostTime from = HostTime::max();
     HostTime until = HostTime::max();
@@ -102,7 +103,7 @@ class TrackerDevice {
   [[nodiscard]] emscon::Status move_beam(HostTime at);
   [[nodiscard]] std::chrono::nanoseconds latency(const emscon::Request& request) const;
 
-  // What happens by itself.
+  // Actions without a command.
   void step(HostTime at);
   void emit_burst(HostTime at);
   void emit_points(std::span<const emscon::MultiPoint> points);
@@ -166,8 +167,8 @@ class TrackerDevice {
     DeviceTime first;
     std::chrono::nanoseconds separation;
   };
-  std::optional<Grid>
-      grid_;  ///< where points lie since power-on, so that a second start does not shift them
+  /// measurement times of the points since power-on: a second start does not shift them
+  std::optional<Grid> grid_;
   std::uint64_t bursts_ = 0;
   std::uint64_t noise_base_ = 0;
   std::uint64_t noise_next_ = 0;

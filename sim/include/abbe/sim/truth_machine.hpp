@@ -1,15 +1,18 @@
 #pragma once
-/// The truth: a machine of three linear axes with 21 known geometric errors, by exact homogeneous
+/// The true machine: three linear axes with 21 known geometric errors, by exact homogeneous
 /// transforms.
 ///
 ///   p(q) = T_1 T_2 T_3 t,   T_a(q) = Trans(q_a e'_a) Trans(EXa, EYa, EZa) Rz(ECa) Ry(EBa) Rx(EAa)
 ///
-/// axes ordered from workpiece to tool; t = target offset from the tool reference point;
-/// e'_a = direction of travel, tilted by the squareness errors alone and normalised: e'_Y ~ (-C0Y,
-/// 1, 0), e'_Z ~ (B0Z, -A0Z, 1), e'_X = (1, 0, 0). V = actual - nominal = p(q) - (q + t).
-/// Everything is the motion of the tool relative to the workpiece, in machine coordinates, for
-/// primed and unprimed axes alike. SI units. Names: ISO 230-1. Written without a look at `calib`,
-/// on purpose. Pure functions; safe to call from any thread.
+/// The axes are ordered from workpiece to tool; t = target offset from the tool reference point;
+/// e'_a = direction of travel, tilted by the squareness errors alone and normalised:
+///
+///   e'_X = (1, 0, 0),  e'_Y ~ (-C0Y, 1, 0),  e'_Z ~ (B0Z, -A0Z, 1)
+///   V = actual - nominal = p(q) - (q + t)
+///
+/// All quantities are the motion of the tool relative to the workpiece, in machine coordinates, for
+/// primed and unprimed axes alike. SI units. Names: ISO 230-1. Written independently of `calib`, so
+/// that `calib` is not tested against itself. Pure functions; safe to call from any thread.
 
 #include <Eigen/Core>
 #include <array>
@@ -61,8 +64,8 @@ struct Squareness {
   double C0Y_rad = 0.0;
 };
 
-/// Slow growth of the machine: at heat 1 axis a is longer by expansion_per_m[a] and its zero is moved
-/// by shift_m.
+/// Thermal drift of the machine: at heat 1 axis a is longer by expansion_per_m[a] and its zero
+/// point is shifted by shift_m[a].
 struct ThermalDrift {
   Eigen::Vector3d expansion_per_m = Eigen::Vector3d::Zero();
   Eigen::Vector3d shift_m = Eigen::Vector3d::Zero();
@@ -75,8 +78,10 @@ struct TruthMachine {
   std::array<AxisTruth, 3> axes;                         ///< by Axis, not by order
   Squareness squareness;
   ThermalDrift thermal;
-  /// Sag under a travelling weight, which no motion of one axis is: the target sinks by sag
-  /// exp(-((x - 250 mm) / 150 mm)^2) (0.5 + y), x and y in m.
+  /// Sag under a moving load, which no error motion of a single axis describes. The target is lower
+  /// by (x and y in m)
+  ///
+  ///   sag_m exp(-((x - 0.25) / 0.15)^2) (0.5 + y)
   double sag_m = 0.0;
   Eigen::Vector3d target_offset_m = Eigen::Vector3d::Zero();
 
@@ -84,13 +89,13 @@ struct TruthMachine {
   [[nodiscard]] const AxisTruth& axis(Axis a) const { return axes[static_cast<std::size_t>(a)]; }
 };
 
-/// What besides the position decides the error.
+/// The state on which the error depends, in addition to the position.
 struct MachineCondition {
   std::array<int, 3> direction{};  ///< per axis: sign of its last motion
-  double heat = 0.0;               ///< 0 cold to 1 warm
+  double heat = 0.0;               ///< from 0 (cold) to 1 (final temperature)
 };
 
-/// Where the target really is, in machine coordinates, when the scales read q.
+/// The true position of the target in machine coordinates, at scale reading q.
 [[nodiscard]] Eigen::Vector3d position_m(const TruthMachine& truth, const Eigen::Vector3d& q_m,
                                          const MachineCondition& condition = {});
 
@@ -98,8 +103,8 @@ struct MachineCondition {
 [[nodiscard]] Eigen::Vector3d error_m(const TruthMachine& truth, const Eigen::Vector3d& q_m,
                                       const MachineCondition& condition = {});
 
-/// Order of X, Y, Z from a chain as "[w X' b Y Z (C1) t]", read from w to t. Other tokens do not
-/// matter to V.
+/// The order of X, Y, Z in a kinematic chain such as "[w X' b Y Z (C1) t]", from w to t. Other
+/// tokens have no influence on V.
 [[nodiscard]] Result<std::array<Axis, 3>> parse_chain(std::string_view chain);
 
 }  // namespace abbe::sim

@@ -1,8 +1,8 @@
 #pragma once
-/// A counter card, simulated or recorded, as a USB device that a USB/IP server exports (bus id
-/// "1-1"): for `usbip attach` from any Linux and for USB/IP clients. One client at a time. Requests
-/// for scans wait until they can be filled, as on a real bus; a short one comes only when the scan
-/// was stopped. Steppable: poll(now) never blocks and reads no clock. Not thread-safe.
+/// A USB/IP server that exports a counter card, simulated or recorded, as a USB device (bus id
+/// "1-1"): for `usbip attach` on any Linux and for USB/IP clients. One client at a time. A request
+/// for scan data waits until it can be filled, as on a real bus; it is filled partly only after the
+/// scan has stopped. Steppable: poll(now) never blocks and reads no clock. Not thread-safe.
 
 #include <poll.h>
 
@@ -36,27 +36,26 @@ class UsbipServer {
   [[nodiscard]] int listener_fd() const { return listener_.get(); }  ///< -1 while unplugged
   [[nodiscard]] int client_fd() const { return client_.get(); }      ///< -1 without a client
   [[nodiscard]] bool wants_write() const { return !unsent_.empty(); }
-  /// What to wait for besides the time.
+  /// Adds the sockets to wait for, in addition to next_due().
   void add_poll_fds(std::vector<pollfd>& fds) const {
     add_server_fds(listener_, client_, wants_write(), fds);
   }
-  /// The simulated one; must not be asked for with another.
+  /// The simulated card. Precondition: the exported card is simulated.
   [[nodiscard]] CounterCard& card() { return *simulated_; }
   [[nodiscard]] std::size_t waiting_requests() const { return requests_.size(); }
 
-  /// With a simulated card only.
+  /// No effect with a recorded card.
   void inject(const Fault& fault, HostTime now);
 
-  // Misbehaviour, for tests that step it.
-  void mute(bool yes) { mute_ = yes; }  ///< scans stay in the card; the rest is answered
+  // Fault injection by tests.
+  void mute(bool yes) { mute_ = yes; }  ///< no scan data is sent; control requests are answered
   void disconnect();
   void plug_out();  ///< the connection is lost; new ones are closed at once
   void plug_in() { plugged_ = true; }
-  void send_bytes(std::span<const std::byte> bytes);  ///< whatever they are, into the stream
-  void hold_output(bool yes) {
-    hold_output_ = yes;
-  }  ///< what is to be sent is kept, then sent at once
-  /// The first `bytes` of what is kept leave now.
+  void send_bytes(std::span<const std::byte> bytes);  ///< any bytes, into the stream
+  /// true: output is held back; false: it is sent with the next poll().
+  void hold_output(bool yes) { hold_output_ = yes; }
+  /// Sends the first `bytes` of the output that is held back.
   void send_part(std::size_t bytes);
 
  private:
@@ -69,7 +68,7 @@ class UsbipServer {
 
   void accept_clients();
   void read(HostTime now);
-  void understand(HostTime now);
+  void process_incoming(HostTime now);
   [[nodiscard]] bool on_operation();
   [[nodiscard]] bool on_urb(HostTime now);
   void on_submit(const usbip::Submit& submit, HostTime now);
@@ -85,17 +84,17 @@ class UsbipServer {
   Socket client_;
   std::uint16_t port_ = 0;
   std::unique_ptr<ExportedCard> card_;
-  CounterCard* simulated_ = nullptr;  ///< card_, where it is one
+  CounterCard* simulated_ = nullptr;  ///< card_, or nullptr for a recorded card
   bool imported_ = false;
   bool closing_ = false;
   bool plugged_ = true;
   bool mute_ = false;
-  bool deaf_ = false;
+  bool unresponsive_ = false;
   bool hold_output_ = false;
   std::optional<HostTime> fault_ends_;
   std::vector<std::byte> incoming_;
   std::vector<std::byte> unsent_;
-  std::deque<Request> requests_;  ///< for scans
+  std::deque<Request> requests_;  ///< for scan data
 };
 
 }  // namespace abbe::sim

@@ -1,6 +1,6 @@
 #pragma once
-/// A truth machine driven along its path: what scales and a tracker can observe of it at any host
-/// time. It stands at the first vertex until start() says when the motion begins. Thread-safe.
+/// A truth machine that moves along its path: the scale readings and the target position at any
+/// host time. It stands at the first vertex until the time set by start(). Thread-safe.
 
 #include <atomic>
 #include <cstdint>
@@ -19,7 +19,7 @@ class VirtualMachine {
   VirtualMachine(TruthMachine truth, PathMotion path)
       : truth_(std::move(truth)), path_(std::move(path)) {}
 
-  /// The motion begins at `at`; only the first call counts.
+  /// The motion begins at `at`; only the first call has an effect.
   void start(HostTime at) {
     auto never = kNever;
     start_.compare_exchange_strong(never, at.time_since_epoch().count());
@@ -29,7 +29,7 @@ class VirtualMachine {
     if (start == kNever) return std::nullopt;
     return HostTime{std::chrono::nanoseconds{start}};
   }
-  /// When the path has been driven; nullopt before start().
+  /// When the machine reaches the end of the path; nullopt before start().
   [[nodiscard]] std::optional<HostTime> finished() const {
     const auto start = started();
     if (!start) return std::nullopt;
@@ -38,7 +38,7 @@ class VirtualMachine {
 
   /// Scale readings q, m.
   [[nodiscard]] AxisMotion motion(HostTime at) const { return path_.at(elapsed_s(at)); }
-  /// Where the target really is, machine coordinates, m.
+  /// The true position of the target, machine coordinates, m.
   [[nodiscard]] Eigen::Vector3d target_m(HostTime at) const {
     const AxisMotion m = motion(at);
     return position_m(truth_, m.q_m, {m.direction, truth_.thermal.heat_after(elapsed_s(at))});
